@@ -1,0 +1,27 @@
+"""What the adaptive laws believe of each surface, moved smoothly.
+
+The isolated estimator's theta becomes the effectiveness 1 + theta of its surface; it is rate limited, so that a decision never kicks
+the surfaces, and projected: a surface weaker than `least_effectiveness` is given up rather than divided by.
+"""
+
+from numba import njit
+
+
+@njit(cache=True)
+def approach(control, target):
+    """Move the effectiveness the law uses towards target (4,) by at most one step."""
+    step = control.effectiveness_step
+    for s in range(4):
+        change = target[s] - control.effectiveness[s]
+        control.effectiveness[s] += min(max(change, -step), step)
+
+
+@njit(cache=True)
+def believed_effectiveness(control, G, G_believed):
+    """Fill G_believed (3, 4): G with each column scaled by its surface's effectiveness, or given up."""
+    for s in range(4):
+        effectiveness = control.effectiveness[s]
+        if effectiveness < control.least_effectiveness:
+            effectiveness = 0.0
+        for i in range(3):
+            G_believed[i, s] = G[i, s] * effectiveness

@@ -1,0 +1,29 @@
+"""Feedback linearisation with proportional-integral feedback [Zhang2005, sec. V].
+
+    demand = xm' + Kp e + Ki int e - f - fhat,    e = xm - x,    then G u = demand
+
+All laws share it; they differ in fhat, in the effectiveness they believe and in who carries the demand.
+"""
+
+from numba import njit
+
+
+@njit(cache=True)
+def demand(control, x, f, fhat):
+    """Fill control.demand (3,) rad/s2: what the surfaces must give. x (3,) rad/s; f, fhat (3,) rad/s2."""
+    for i in range(3):
+        error = control.model_rate[i] - x[i]
+        feedback = control.Kp * error + control.Ki * control.integral[i]
+        control.demand[i] = control.model_acceleration[i] + feedback - f[i] - fhat[i]
+
+
+@njit(cache=True)
+def integrate(control, x, G, u):
+    """Advance the integrators; what the limited surfaces u (4,) rad could not give is taken back (anti-windup).
+
+    G (3, 4) includes the believed effectiveness. The back-calculation gain 1/Kp unwinds within one closed-loop time constant.
+    """
+    for i in range(3):
+        given = G[i, 0] * u[0] + G[i, 1] * u[1] + G[i, 2] * u[2] + G[i, 3] * u[3]
+        error = control.model_rate[i] - x[i]
+        control.integral[i] += control.dt * (error + (given - control.demand[i]) / control.Kp)

@@ -1,0 +1,39 @@
+"""The fault detection and approximation estimator (FDAE), always on.
+
+    xhat0' = -Lambda0 (xhat0 - x) + f + G u + fhat        eps0 = x - xhat0        alarm when |eps0_i| > ebar_i for some i
+
+[Zhang2005, sec. IV]. Written for the discrete truth: xhat0[k+1] = x[k] + dt F[k] + exp(-Lambda0 dt) (xhat0[k] - x[k]).
+"""
+
+from numba import njit
+
+from beaver_ftc.diagnosis.network import learn
+from beaver_ftc.diagnosis.thresholds import bound_step
+
+
+@njit(cache=True)
+def detect(fdi, x, t):
+    """Form the residual at time t (s) and raise the alarm if it leaves its threshold. x (3,) rad/s measured."""
+    for i in range(3):
+        fdi.residual[i] = x[i] - fdi.xhat[i]
+        if not fdi.detected:
+            if fdi.threshold[i] > 0.0:
+                fdi.worst_ratio = max(fdi.worst_ratio, abs(fdi.residual[i]) / fdi.threshold[i])
+            if abs(fdi.residual[i]) > fdi.threshold[i]:
+                fdi.detected = 1
+                fdi.detected_at_s = t
+                fdi.detected_axis = i
+
+
+@njit(cache=True)
+def predict(fdi, x, believed, leaking):
+    """Advance the FDAE and its threshold by one frame, and teach the network what sticks out.
+
+    x (3,) rad/s; `believed` (3,) rad/s2 is f + G u, with the isolated fault once there is one.
+    """
+    if fdi.detected:
+        learn(fdi.network, fdi.residual, fdi.threshold, leaking, fdi.dt)
+    for i in range(3):
+        rate = believed[i] + fdi.network.output[i]
+        fdi.xhat[i] = x[i] + fdi.dt * rate + fdi.decay[i] * (fdi.xhat[i] - x[i])
+        fdi.threshold[i] = bound_step(fdi.threshold[i], fdi.eta_bar[i], fdi.decay[i], fdi.dt)

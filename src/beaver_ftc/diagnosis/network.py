@@ -1,0 +1,83 @@
+"""The network that learns an unknown fault: Gaussian radial basis functions of alpha and of beta, linear in its weights.
+
+    fhat_i = W_i^T Phi(alpha, beta)       W_i' = P{gain Phi D[eps_i] - leak W_i},   |Phi| = 1
+
+[Zhang2005, sec. IV and V]. Phi is normalised, so that `gain` alone sets the bandwidth of learning wherever the state is. D is a continuous
+dead zone at the detection threshold: the network cannot learn what the admitted uncertainty explains.
+"""
+
+import numpy as np
+from numba import njit
+
+ALPHA_CENTRES = np.linspace(-0.1, 0.5, 9)
+BETA_CENTRES = np.linspace(-0.3, 0.3, 5)
+N_BASIS = len(ALPHA_CENTRES) + len(BETA_CENTRES)
+
+NETWORK = np.dtype(
+    [
+        ("gain", "f8"), ("leak_per_s", "f8"), ("weight_limit", "f8"),
+        ("weights", "f8", (3, N_BASIS)), ("basis", "f8", (N_BASIS,)), ("output", "f8", (3,)),
+    ],
+    align=True,
+)  # fmt: skip
+
+_N_ALPHA = len(ALPHA_CENTRES)
+_N_BETA = len(BETA_CENTRES)
+_ALPHA_FIRST, _ALPHA_STEP = ALPHA_CENTRES[0], ALPHA_CENTRES[1] - ALPHA_CENTRES[0]
+_BETA_FIRST, _BETA_STEP = BETA_CENTRES[0], BETA_CENTRES[1] - BETA_CENTRES[0]
+
+
+@njit(cache=True)
+def basis(alpha, beta, out):
+    """Fill out (N_BASIS,) with the normalised radial basis functions at (alpha, beta), rad.
+
+    Each width equals the spacing of its centres; outside the grid the nearest edge answers.
+    """
+    a = min(max((alpha - _ALPHA_FIRST) / _ALPHA_STEP, 0.0), _N_ALPHA - 1.0)
+    b = min(max((beta - _BETA_FIRST) / _BETA_STEP, 0.0), _N_BETA - 1.0)
+    square = 0.0
+    for j in range(_N_ALPHA):
+        out[j] = np.exp(-0.5 * (a - j) ** 2)
+        square += out[j] ** 2
+    for j in range(_N_BETA):
+        out[_N_ALPHA + j] = np.exp(-0.5 * (b - j) ** 2)
+        square += out[_N_ALPHA + j] ** 2
+    norm = np.sqrt(square)
+    for j in range(N_BASIS):
+        out[j] /= norm
+
+
+@njit(cache=True)
+def dead_zone(residual, threshold):
+    """D[eps]: nothing inside the threshold, what sticks out of it outside."""
+    if residual > threshold:
+        return residual - threshold
+    if residual < -threshold:
+        return residual + threshold
+    return 0.0
+
+
+@njit(cache=True)
+def evaluate(network, alpha, beta):
+    """Fill network.output (3,) rad/s2 for the present alpha and beta."""
+    basis(alpha, beta, network.basis)
+    for i in range(3):
+        total = 0.0
+        for j in range(N_BASIS):
+            total += network.weights[i, j] * network.basis[j]
+        network.output[i] = total
+
+
+@njit(cache=True)
+def learn(network, residual, threshold, leaking, dt):
+    """Advance the weights by one frame; residual and threshold (3,) rad/s, dt s.
+
+    `leaking` lets go of what was learnt once another estimate explains the fault.
+    """
+    keep = np.exp(-network.leak_per_s * dt) if leaking else 1.0
+    limit = network.weight_limit
+    for i in range(3):
+        drive = dt * network.gain * dead_zone(residual[i], threshold[i])
+        for j in range(N_BASIS):
+            weight = keep * network.weights[i, j] + drive * network.basis[j]
+            network.weights[i, j] = min(max(weight, -limit), limit)

@@ -1,0 +1,38 @@
+"""The diagnosis' memory: one record, so that a frame is one call into compiled code."""
+
+import numpy as np
+
+from beaver_ftc.diagnosis.network import NETWORK
+
+MAX_ESTIMATORS = 16
+NOT_ISOLATED, UNANTICIPATED = -1, -2
+INTERVAL, PUBLISHED = 0, 1
+
+ESTIMATOR = np.dtype(
+    [
+        ("kind", "i8"), ("surface", "i8"),
+        ("low", "f8"), ("high", "f8"),  # the known set of theta
+        ("excluded", "i8"), ("excluded_at_s", "f8"),
+        ("xhat", "f8", (3,)), ("residual", "f8", (3,)), ("lower", "f8", (3,)), ("upper", "f8", (3,)),
+        ("omega", "f8", (3,)), ("rise", "f8", (3,)), ("fall", "f8", (3,)), ("bound", "f8", (3,)),
+        ("theta", "f8", (3,)), ("covariance", "f8", (3,)),
+        ("base", "f8", (3,)), ("Z", "f8", (3,)),
+    ],
+    align=True,
+)  # fmt: skip
+
+DIAGNOSIS = np.dtype(
+    [
+        ("enabled", "i8"), ("thresholds", "i8"), ("dt", "f8"), ("forgetting", "f8"),
+        ("decay", "f8", (3,)), ("fie_decay", "f8", (3,)),
+        ("inertia", "f8", (3,)), ("constant", "f8", (3,)), ("earth_rate", "f8"),
+        ("eta_bar", "f8", (3,)),
+        ("xhat", "f8", (3,)), ("residual", "f8", (3,)), ("threshold", "f8", (3,)), ("worst_ratio", "f8"),
+        ("detected", "i8"), ("detected_at_s", "f8"), ("detected_axis", "i8"),
+        ("isolated", "i8"), ("isolated_at_s", "f8"),
+        ("n_estimators", "i8"), ("estimator", ESTIMATOR, (MAX_ESTIMATORS,)),
+        ("network", NETWORK),
+        ("effect", "f8", (3,)), ("certain_after_s", "f8"),  # what guarantee.py keeps
+    ],
+    align=True,
+)  # fmt: skip

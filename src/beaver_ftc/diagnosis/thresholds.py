@@ -1,0 +1,52 @@
+"""Adaptive thresholds: what a residual may reach without the fault in question.
+
+All filters are exact for the discrete truth x[k+1] = x[k] + dt (F[k] + eta[k]): with a = exp(-lam dt) a residual obeys
+eps[k+1] = a eps[k] + dt eta[k], and so does its bound with eta_bar in place of eta. The promises of the theory therefore
+hold at any frame rate, with no allowance for discretisation.
+"""
+
+from numba import njit
+
+
+@njit(cache=True)
+def bound_step(bound, eta_bar, decay, dt):
+    """Advance ebar' = -lam ebar + eta_bar by one frame [Zhang2005, sec. IV].
+
+    Units: bound rad/s, eta_bar rad/s2, decay = exp(-lam dt), dt s.
+    """
+    return decay * bound + dt * eta_bar
+
+
+@njit(cache=True)
+def interval(low, high, rise, fall, omega, theta, bound):
+    """The signed interval (lower, upper), rad/s, that holds the residual of the true estimator.
+
+    The parameter may move anywhere within [low, high] at every instant, so an incipient or intermittent fault is covered:
+    int w Z theta lies between low rise + high fall and high rise + low fall, where rise and fall filter the positive and the
+    negative part of Z. The residual is that integral less omega thetahat, widened by the bound on the uncertainty.
+    """
+    lower = low * rise + high * fall - omega * theta - bound
+    upper = high * rise + low * fall - omega * theta + bound
+    return lower, upper
+
+
+@njit(cache=True)
+def published(low, high, omega, theta, bound):
+    """The norm bound mu = k |Omega| + bound, rad/s, symmetric; k bounds |theta - thetahat| [Zhang2005, via Zhang2002]."""
+    mu = max(theta - low, high - theta) * abs(omega) + bound
+    return -mu, mu
+
+
+@njit(cache=True)
+def uncertainty_bound(x, design, inertia, constant, earth_rate, eta_bar):
+    """Fill eta_bar (3,) rad/s2: the published bound, and what the Earth's rotation adds.
+
+    Published: inertia_i |cross term_i| + constant_i [Zhang2005, sec. VII]. JSBSim integrates rates against inertial space and reports
+    them against the Earth: the difference turns with the body, at no more than earth_rate |x| on any axis, and the same
+    again through the inertia coupling, whose constants are below 1.
+    """
+    p, q, r = x[0], x[1], x[2]
+    earth = earth_rate * (2.0 * (abs(p) + abs(q) + abs(r)) + earth_rate)
+    eta_bar[0] = inertia[0] * abs(design.Pqr * q * r) + constant[0] + earth
+    eta_bar[1] = inertia[1] * abs(design.Qpr * p * r) + constant[1] + earth
+    eta_bar[2] = inertia[2] * abs(design.Rpq * p * q) + constant[2] + earth

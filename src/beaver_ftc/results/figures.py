@@ -1,0 +1,210 @@
+"""The figures of a flight as PNG: the views drawn with matplotlib, without its global state.
+
+Colours are Okabe and Ito's, told apart by the colour-blind; line styles and widths keep the curves apart in grey.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from beaver_ftc.results import log
+from beaver_ftc.results.metrics import Document
+from beaver_ftc.results.series import WHOLE, Series, read_series
+from beaver_ftc.results.views import Panel, Trace, View, unit_of, views
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+DPI = 110
+BLACK, ORANGE, SKY, GREEN, YELLOW, BLUE, VERMILION, PURPLE = (
+    "#000000", "#e69f00", "#56b4e9", "#009e73", "#f0e442", "#0072b2", "#d55e00", "#cc79a7",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Look:
+    """How a role is drawn: colour, line style and width, and whether it lies above the others."""
+
+    colour: str
+    dash: str = "-"
+    width: float = 1.2
+    above: int = 2
+
+
+LOOKS = {
+    "actual": Look(BLUE, "-", 1.3, 4),
+    "target": Look(ORANGE, (0, (5, 2)), 1.6, 5),  # type: ignore[arg-type]
+    "command": Look("#999999", ":", 1.4, 3),
+    "bound": Look(VERMILION, "--", 1.2, 3),
+    "aileron": Look(SKY, "-.", 1.6),
+    "elevator": Look(BLUE, "-", 1.6),
+    "rudder": Look(ORANGE, "--", 1.6),
+    "flap": Look(GREEN, ":", 2.0),
+}
+
+
+@dataclass(frozen=True)
+class Mark:
+    """An instant shown in every figure: a line over the panel and a symbol at its edge."""
+
+    name: str
+    time_s: float
+    colour: str
+    dash: str
+    symbol: str
+
+    @property
+    def label(self) -> str:
+        """Name and time, for the legend."""
+        return f"{self.name} {self.time_s:.2f} s"
+
+
+def marks(metrics: Document) -> list[Mark]:
+    """The instants of fault, detection, isolation and departure, as far as they exist."""
+    fault, departure = metrics["fault"], metrics["departure"]
+    instants = (
+        ("fault", fault and fault["at_s"], VERMILION, "-", "v"),
+        ("detection", metrics["detection"]["time_s"], BLACK, "--", "D"),
+        ("isolation", metrics["isolation"]["time_s"], PURPLE, "-.", "s"),
+        ("departure", departure and departure["time_s"], BLACK, ":", "X"),
+    )
+    return [Mark(name, time, *look) for name, time, *look in instants if time is not None]
+
+
+def closeup_window(instants: Sequence[Mark]) -> tuple[float, float] | None:
+    """Where to look closely: from just before the fault (or the alarm) to a few seconds after the last event."""
+    if not instants:
+        return None
+    times = [mark.time_s for mark in instants if mark.name != "departure"] or [instants[0].time_s]
+    return min(times) - 0.5, min(max(times), min(times) + 10.0) + 2.0
+
+
+def write_figures(log_path: Path, metrics: Document, folder: Path) -> list[Path]:
+    """Draw every view of the log into `folder` as `<view>.png`, some with a `<view>-closeup.png`; return the files."""
+    shown, instants, window = views(log.column_names(log_path)), marks(metrics), closeup_window(marks(metrics))
+    closeups = [view for view in shown if view.closeup] if window else []
+    folder.mkdir(exist_ok=True)
+    jobs = [(shown, WHOLE, ""), (closeups, window or WHOLE, "-closeup")]
+    return [
+        _save(draw(view, series, instants, metrics["scenario"]), folder / f"{view.name}{ending}.png")
+        for drawn, span, ending in jobs
+        for series in [read_series(log_path, _columns(drawn), span)]
+        for view in drawn
+    ]
+
+
+def draw(view: View, series: Series, instants: Sequence[Mark], subtitle: str) -> "Figure":
+    """One view as a matplotlib figure, over the time that `series` covers."""
+    from matplotlib.figure import Figure
+
+    down = -(-len(view.panels) // view.across)
+    heights = [_height(panel, view.across) for panel in view.panels[:: view.across]]
+    width = 10.0 if view.across == 1 else 12.0
+    figure = Figure(figsize=(width, 1.3 + sum(heights)), dpi=DPI, layout="constrained")
+    grid = figure.subplots(down, view.across, sharex=True, squeeze=False, height_ratios=heights)
+    for axes, panel in zip(grid.flat, view.panels, strict=False):
+        _draw_panel(axes, panel, series, instants)
+    _say_absent(view, series, list(grid.flat))
+    for axes in grid[-1]:
+        axes.set_xlabel("time (s)", fontsize=9)
+    figure.suptitle(f"{view.title}\n{subtitle}", fontsize=11)
+    _draw_legend(figure, list(grid.flat))
+    return figure
+
+
+def _columns(drawn: Sequence[View]) -> list[str]:
+    return [column for view in drawn for column in view.columns]
+
+
+def _height(panel: Panel, across: int) -> float:
+    """Height of a panel in inches."""
+    if panel.steps:
+        return 0.5 + 0.28 * len(panel.steps)
+    return 2.1 if across == 1 else 1.9
+
+
+def _save(figure: "Figure", path: Path) -> Path:
+    figure.savefig(path, metadata={"Software": "beaver-ftc"})
+    return path
+
+
+def _draw_panel(axes: "Axes", panel: Panel, series: Series, instants: Sequence[Mark]) -> None:
+    for trace in panel.traces:
+        _draw_trace(axes, trace, series, bool(panel.steps))
+    _draw_shade(axes, panel, series)
+    _draw_marks(axes, instants, series["t_s"])
+    axes.set_title(panel.label if panel.steps or not panel.unit else f"{panel.label} ({panel.unit})", fontsize=9)
+    axes.tick_params(labelsize=8)
+    axes.grid(visible=True, color="#dddddd", linewidth=0.6)
+    axes.ticklabel_format(axis="x", useOffset=False)
+    if series["t_s"].size > 1:
+        axes.set_xlim(series["t_s"][0], series["t_s"][-1])
+    if panel.steps:
+        axes.set_yticks(range(len(panel.steps)), panel.steps)
+        axes.set_ylim(-0.4, len(panel.steps) - 0.6)
+    elif panel.limits:
+        axes.set_ylim(*panel.limits)
+
+
+def _draw_trace(axes: "Axes", trace: Trace, series: Series, stepped: bool) -> None:
+    look = LOOKS[trace.role]
+    _, factor = unit_of(trace.column)
+    axes.plot(
+        series["t_s"],
+        trace.sign * factor * series[trace.column],
+        color=look.colour,
+        linestyle=look.dash,
+        linewidth=look.width,
+        zorder=look.above,
+        drawstyle="steps-post" if stepped else "default",
+        label=trace.label or "_",
+    )
+
+
+def _draw_shade(axes: "Axes", panel: Panel, series: Series) -> None:
+    if not panel.shade or not (series[panel.shade] == 1).any():
+        return
+    axes.fill_between(
+        series["t_s"], 0, 1, where=series[panel.shade] == 1, transform=axes.get_xaxis_transform(),
+        color=YELLOW, alpha=0.3, linewidth=0, step="post", label=panel.shade_label, zorder=0,
+    )  # fmt: skip
+
+
+def _draw_marks(axes: "Axes", instants: Sequence[Mark], t_s: np.ndarray) -> None:
+    """A line each, and symbols at staggered heights so that instants close together are told apart."""
+    for rank, mark in enumerate(instants):
+        if not t_s.size or not t_s[0] <= mark.time_s <= t_s[-1]:
+            continue
+        axes.axvline(mark.time_s, color=mark.colour, linestyle=mark.dash, linewidth=0.9, alpha=0.8, zorder=2.5)
+        axes.plot(
+            [mark.time_s], [1.0 - 0.09 * rank], transform=axes.get_xaxis_transform(), color=mark.colour,
+            marker=mark.symbol, markersize=4.5, linestyle=mark.dash, linewidth=0.9, label=mark.label, zorder=6,
+            clip_on=False,
+        )  # fmt: skip
+
+
+def _say_absent(view: View, series: Series, grid: Iterable["Axes"]) -> None:
+    """Say so where a view has nothing to show, rather than leaving empty axes to be wondered at."""
+    if view.absent and all(np.isnan(series[column]).all() for column in view.columns):
+        for axes in grid:
+            axes.text(0.5, 0.5, view.absent, transform=axes.transAxes, ha="center", va="center", fontsize=9)
+
+
+def _draw_legend(figure: "Figure", grid: Iterable["Axes"]) -> None:
+    """One legend for the figure: each label once, whichever panel it appears in (panels of one curve name it)."""
+    entries: dict[str, Any] = {}
+    for axes in grid:
+        handles, labels = axes.get_legend_handles_labels()
+        entries |= {label: handle for label, handle in zip(labels, handles, strict=True) if label not in entries}
+    shown = {label: handle for label, handle in entries.items() if label not in _titles(grid)}
+    figure.legend(
+        shown.values(), shown.keys(), loc="outside lower center", ncols=min(len(shown), 8) or 1, fontsize=8, frameon=False
+    )
+
+
+def _titles(grid: Iterable["Axes"]) -> set[str]:
+    return {axes.get_title().rpartition(" (")[0] or axes.get_title() for axes in grid}

@@ -1,0 +1,140 @@
+"""What a flight amounts to: the document `metrics.json` (SPEC 9).
+
+Times are seconds from the start of the flight, delays seconds from the first fault, rates deg/s. A quantity that
+does not exist is null: a document never holds NaN. Nothing in it depends on the wall clock or the machine's name,
+so that the same scenario and seed give the same file.
+"""
+
+import json
+import math
+import platform
+from functools import cache
+from importlib.metadata import version
+from typing import TYPE_CHECKING, Any
+
+from beaver_ftc.results.expectations import evaluate
+
+if TYPE_CHECKING:
+    from beaver_ftc.loop import Flight
+    from beaver_ftc.scenario.schema import Scenario
+
+Document = dict[str, Any]
+
+AXES = ("p", "q", "r")
+UNANTICIPATED = "unanticipated"
+
+
+def metrics(flight: "Flight") -> Document:
+    """The metrics of `flight`, with the keys of SPEC 9 in that order."""
+    scenario = flight.scenario
+    fault = first_fault(scenario)
+    document = {
+        "scenario": scenario.name,
+        "seed": scenario.seed,
+        "frames": flight.frames,
+        "fault": fault,
+        "detection": _detection(flight, fault),
+        "isolation": _isolation(flight, fault),
+        "false_alarm": _false_alarm(flight.detection_time_s, fault),
+        "tracking": {
+            "pre_fault_rms_deg_s": _per_axis_deg_s(flight.pre_fault_rms_rad_s),
+            "post_fault_rms_deg_s": _per_axis_deg_s(flight.post_fault_rms_rad_s),
+        },
+        "supervisor": [{"time_s": _number(time), "mode": mode} for time, mode in flight.supervisor],
+        "envelope_exits": [
+            {"start_s": _number(start), "end_s": _number(end)} for start, end in flight.envelope_exits
+        ],
+        "departure": _departure(flight),
+        "saturation_s": {surface: _number(time) for surface, time in flight.saturation_s.items()},
+    }
+    expectations = evaluate(scenario.expect, document)
+    document["expectations"] = expectations
+    document["passed"] = all(expectation["passed"] for expectation in expectations)
+    document["versions"] = dict(versions())
+    return document
+
+
+def as_json(document: Any) -> str:
+    """`document` as JSON text, keys in the order given; raises ValueError on NaN or infinity."""
+    return json.dumps(document, indent=2, allow_nan=False, ensure_ascii=False) + "\n"
+
+
+def first_fault(scenario: "Scenario") -> Document | None:
+    """The earliest declared fault as {actuator, type, at_s}; the actuator of an unanticipated one is null."""
+    if not scenario.faults:
+        return None
+    fault = min(scenario.faults, key=lambda fault: fault.at_s)
+    return {"actuator": getattr(fault, "actuator", None), "type": fault.type, "at_s": fault.at_s}
+
+
+@cache
+def versions() -> Document:
+    """Versions of what produces the numbers."""
+    packages = {name: version(name) for name in ("beaver-ftc", "jsbsim", "numpy", "numba")}
+    return packages | {"python": platform.python_version()}
+
+
+def _detection(flight: "Flight", fault: Document | None) -> Document:
+    return {
+        "detected": flight.detection_time_s is not None,
+        "time_s": _number(flight.detection_time_s),
+        "delay_s": _delay(flight.detection_time_s, fault),
+        "axis": flight.detection_axis,
+        "guaranteed_delay_s": _number(flight.guaranteed_delay_s),
+    }
+
+
+def _isolation(flight: "Flight", fault: Document | None) -> Document:
+    return {
+        "isolated": flight.isolated is not None,
+        "fault": flight.isolated,
+        "type": flight.isolation_type,
+        "time_s": _number(flight.isolation_time_s),
+        "delay_s": _delay(flight.isolation_time_s, fault),
+        "correct": _correct(flight.isolated, fault),
+        "estimate": _number(flight.estimate),
+        "candidates": list(flight.candidates),
+    }
+
+
+def _correct(isolated: str | None, fault: Document | None) -> bool | None:
+    """Whether the isolated fault is the declared one; null while nothing is isolated."""
+    if isolated is None:
+        return None
+    if fault is None:
+        return False
+    return isolated == (UNANTICIPATED if fault["type"] == UNANTICIPATED else fault["actuator"])
+
+
+def _false_alarm(detection_time_s: float | None, fault: Document | None) -> bool:
+    """An alarm without a fault, or before it. (The alarm is latched: there is one a flight.)"""
+    if detection_time_s is None:
+        return False
+    return fault is None or detection_time_s < fault["at_s"]
+
+
+def _delay(time_s: float | None, fault: Document | None) -> float | None:
+    """Time since the fault; null without one, or where the event came before it."""
+    if time_s is None or fault is None or time_s < fault["at_s"]:
+        return None
+    return _number(time_s - fault["at_s"])
+
+
+def _departure(flight: "Flight") -> Document | None:
+    if flight.departure is None:
+        return None
+    time_s, signal = flight.departure
+    return {"time_s": _number(time_s), "signal": signal}
+
+
+def _per_axis_deg_s(rates_rad_s: tuple[float, float, float] | None) -> Document | None:
+    if rates_rad_s is None:
+        return None
+    return {axis: _number(math.degrees(rate)) for axis, rate in zip(AXES, rates_rad_s, strict=True)}
+
+
+def _number(value: float | None) -> float | None:
+    """A finite Python float without the rounding dust of frame times (nine decimals), or null."""
+    if value is None or not math.isfinite(value):
+        return None
+    return round(float(value), 9)

@@ -1,0 +1,186 @@
+"""What there is to see in a flight: each view a table of panels, each panel a list of traces of log columns.
+
+The figures and the report draw the same views, each with its own means. Units follow from the column's name;
+degrees appear here, at the boundary, and nowhere before.
+"""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+AXES = ("p", "q", "r")
+SURFACES = ("aileron", "elevator", "rudder", "flap")
+AXIS_NAMES = {"p": "roll rate p", "q": "pitch rate q", "r": "yaw rate r"}
+MODES = ("nominal", "adaptive", "reallocated", "unanticipated")
+
+_DEG_PER_RAD = 57.29577951308232
+_UNITS = (  # (ending of the column's name, unit shown, factor), the longest endings first
+    ("_rad_s2", "deg/s²", _DEG_PER_RAD),
+    ("_rad_s", "deg/s", _DEG_PER_RAD),
+    ("_rad", "deg", _DEG_PER_RAD),
+    ("_mps", "m/s", 1.0),
+    ("_pa", "Pa", 1.0),
+    ("_m", "m", 1.0),
+    ("_s", "s", 1.0),
+)
+
+
+@dataclass(frozen=True)
+class Trace:
+    """One curve: a log column, how it is called and in which role it appears (its look follows from the role)."""
+
+    column: str
+    label: str
+    role: str
+    sign: float = 1.0
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One pair of axes; time in seconds runs along all of them."""
+
+    label: str
+    traces: tuple[Trace, ...]
+    log_scale: bool = False
+    limits: tuple[float, float] | None = None
+    steps: tuple[str, ...] = ()  # names of the values 0, 1, 2, ... of a discrete quantity
+    shade: str = ""  # a 0/1 column: the panel is shaded while it is 1
+    shade_label: str = ""
+
+    @property
+    def unit(self) -> str:
+        """The unit of the panel's traces, empty for a dimensionless quantity."""
+        return unit_of(self.traces[0].column)[0]
+
+
+@dataclass(frozen=True)
+class View:
+    """A figure: panels, filled row by row into `across` columns."""
+
+    name: str
+    title: str
+    panels: tuple[Panel, ...]
+    across: int = 1
+    absent: str = ""  # what to say where the log holds nothing of this
+    closeup: bool = False  # worth a second look around the fault
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """The log columns it shows."""
+        traced = [trace.column for panel in self.panels for trace in panel.traces]
+        shaded = [panel.shade for panel in self.panels if panel.shade]
+        return tuple(dict.fromkeys(traced + shaded))
+
+
+def unit_of(column: str) -> tuple[str, float]:
+    """Unit to show a log column in, and the factor from the column's own unit to it."""
+    return next(((unit, factor) for ending, unit, factor in _UNITS if column.endswith(ending)), ("", 1.0))
+
+
+def estimators(columns: Sequence[str]) -> tuple[str, ...]:
+    """Names of the isolation estimators a log has columns of, in the log's order."""
+    matches = (re.fullmatch(r"fie_(.+)_excluded", column) for column in columns)
+    return tuple(match.group(1) for match in matches if match)
+
+
+def views(columns: Sequence[str]) -> tuple[View, ...]:
+    """Every view that a log with these columns allows."""
+    known = set(columns)
+    named = (
+        _tracking(), _surfaces(), _detection(), _isolation(estimators(columns)), _effectiveness(), _supervisor(),
+        _states(),
+    )  # fmt: skip
+    return tuple(view for view in named if view.panels and known.issuperset(view.columns))
+
+
+def _tracking() -> View:
+    panels = tuple(
+        Panel(
+            AXIS_NAMES[axis],
+            (
+                Trace(f"{axis}_reference_rad_s", "reference", "command"),
+                Trace(f"{axis}_model_rad_s", "reference model", "target"),
+                Trace(f"{axis}_rad_s", "aircraft", "actual"),
+            ),
+        )
+        for axis in AXES
+    )
+    return View("tracking", "Tracking: body rates against their reference", panels)
+
+
+def _surfaces() -> View:
+    panels = tuple(
+        Panel(
+            surface,
+            (
+                Trace(f"{surface}_cmd_rad", "command", "command"),
+                Trace(f"{surface}_pos_rad", "position", "target"),
+                Trace(f"{surface}_effective_rad", "effective", "actual"),
+            ),
+            shade=f"{surface}_saturated",
+            shade_label="saturated",
+        )
+        for surface in SURFACES
+    )
+    return View("surfaces", "Control surfaces: commanded, reached, and as the aerodynamics see them", panels)
+
+
+def _detection() -> View:
+    panels = tuple(
+        Panel(
+            f"{AXIS_NAMES[axis]}: residual",
+            (
+                Trace(f"{axis}_threshold_rad_s", "± threshold", "bound"),
+                Trace(f"{axis}_threshold_rad_s", "", "bound", -1.0),
+                Trace(f"{axis}_residual_rad_s", "residual", "actual"),
+            ),
+        )
+        for axis in AXES
+    )
+    title = "Detection: residuals of the detection estimator against their thresholds"
+    return View("detection", title, panels, closeup=True)
+
+
+def _isolation(names: Sequence[str]) -> View:
+    panels = tuple(
+        Panel(
+            f"{name} estimator: {axis}",
+            (
+                Trace(f"fie_{name}_{axis}_lower_rad_s", "threshold", "bound"),
+                Trace(f"fie_{name}_{axis}_upper_rad_s", "", "bound"),
+                Trace(f"fie_{name}_{axis}_residual_rad_s", "residual", "actual"),
+            ),
+            shade=f"fie_{name}_excluded",
+            shade_label="excluded",
+        )
+        for name in names
+        for axis in AXES
+    )
+    title = "Isolation: residuals of each isolation estimator against its thresholds"
+    return View("isolation", title, panels, across=3, absent="no alarm: it never ran", closeup=True)
+
+
+def _effectiveness() -> View:
+    traces = tuple(Trace(f"{surface}_effectiveness_estimate", surface, surface) for surface in SURFACES)
+    panel = Panel("effectiveness (1 healthy)", traces, limits=(-0.05, 1.1))
+    return View("effectiveness", "Estimated effectiveness of each surface", (panel,))
+
+
+def _supervisor() -> View:
+    panels = (
+        Panel("mode", (Trace("mode", "mode", "actual"),), steps=MODES),
+        Panel("alarm", (Trace("detected", "alarm", "actual"),), steps=("quiet", "alarm")),
+        Panel("envelope", (Trace("envelope_valid", "envelope", "actual"),), steps=("outside", "inside")),
+    )
+    return View("supervisor", "Supervisor: who is in charge", panels)
+
+
+def _states() -> View:
+    names = (
+        ("airspeed_mps", "airspeed"), ("alpha_rad", "angle of attack"), ("beta_rad", "sideslip"),
+        ("p_rad_s", "roll rate p"), ("q_rad_s", "pitch rate q"), ("r_rad_s", "yaw rate r"),
+        ("phi_rad", "bank φ"), ("theta_rad", "pitch θ"), ("psi_rad", "heading ψ"),
+        ("north_m", "north"), ("east_m", "east"), ("altitude_m", "altitude"),
+    )  # fmt: skip
+    panels = tuple(Panel(label, (Trace(column, label, "actual"),)) for column, label in names)
+    return View("states", "The twelve states", panels, across=3)

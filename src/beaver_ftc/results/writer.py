@@ -1,0 +1,175 @@
+"""A result folder that appears whole or not at all.
+
+Everything is written into a hidden sibling of the final folder, which is renamed into place at the end. A killed
+run leaves only the hidden folder; it is locked while in use, so the next run knows it for stale and removes it.
+"""
+
+import contextlib
+import ctypes
+import errno
+import os
+import shutil
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+from beaver_ftc.errors import SimulationFailed
+
+try:
+    import fcntl
+except ImportError:  # not a POSIX system: nothing can be locked, so nothing is taken for stale
+    fcntl = None  # type: ignore[assignment]
+
+FILES_OF_A_RESULT = frozenset({
+    "scenario.yaml", "log.parquet", "metrics.json", "report.html", "figures",
+    "log.csv", "flight.acmi", "results.parquet", "summary.json", "mismatch.json", "mismatch.csv",
+})  # fmt: skip
+_AT_FDCWD = -100
+_RENAME_EXCHANGE = 2
+
+
+@contextlib.contextmanager
+def result_folder(out: Path, name: str) -> Iterator[Path]:
+    """Yield an empty folder to fill; on success it becomes `out/name`, on any failure it vanishes.
+
+    Raises SimulationFailed where the folder cannot be written, or `out/name` is not a result of ours.
+    """
+    final = out / name
+    with _clear_disk_errors(final):
+        refuse_foreign(final)
+        created = _make_parents(out)
+        _remove_stale(out, name)
+        unnamed = Path(tempfile.mkdtemp(prefix=".beaver-ftc-", dir=out))
+        partial = unnamed.with_name(_prefix(name) + unnamed.name.rpartition("-")[2])
+        try:
+            with _locked(unnamed):  # before it bears the name by which another run would look for stale ones
+                unnamed.rename(partial)
+                partial.chmod(0o777 & ~_umask())
+                yield partial
+                _sync(partial)
+                _move_into_place(partial, final)
+        except BaseException:
+            shutil.rmtree(partial, ignore_errors=True)
+            _remove_empty(created)
+            raise
+
+
+def refuse_foreign(folder: Path) -> None:
+    """Raise SimulationFailed if `folder` exists and holds anything that is not a result: it would be lost."""
+    if not os.path.lexists(folder):
+        return
+    if folder.is_symlink() or not folder.is_dir():
+        raise SimulationFailed(f"cannot write {folder}: it exists and is not a folder")
+    strangers = sorted(entry.name for entry in folder.iterdir() if entry.name not in FILES_OF_A_RESULT)
+    if strangers:
+        raise SimulationFailed(
+            f"will not replace {folder}: it holds {strangers[0]}, which is no result of beaver-ftc; "
+            "move it away or choose another --out"
+        )
+
+
+@contextlib.contextmanager
+def _clear_disk_errors(final: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        reason = os.strerror(error.errno) if error.errno else str(error)
+        raise SimulationFailed(f"cannot write {final}: {reason[:1].lower()}{reason[1:]}") from error
+
+
+def _prefix(name: str) -> str:
+    return f".{name}.partial-"
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask
+
+
+def _make_parents(folder: Path) -> list[Path]:
+    """Create `folder` with its parents; return those that were missing, deepest first."""
+    missing = []
+    for candidate in (folder, *folder.parents):
+        if candidate.exists():
+            break
+        missing.append(candidate)
+    folder.mkdir(parents=True, exist_ok=True)
+    return missing
+
+
+def _remove_empty(folders: list[Path]) -> None:
+    with contextlib.suppress(OSError):
+        for folder in folders:
+            folder.rmdir()
+
+
+@contextlib.contextmanager
+def _locked(folder: Path) -> Iterator[None]:
+    descriptor = os.open(folder, os.O_RDONLY) if fcntl else -1
+    try:
+        if fcntl:
+            with contextlib.suppress(OSError):  # a file system without locks: nobody can call it stale either
+                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        yield
+    finally:
+        if fcntl:
+            os.close(descriptor)
+
+
+def _remove_stale(out: Path, name: str) -> None:
+    """Remove what killed runs of this scenario left behind."""
+    for leftover in out.glob(f"{_prefix(name)}*"):
+        if _is_stale(leftover):
+            shutil.rmtree(leftover, ignore_errors=True)
+
+
+def _is_stale(folder: Path) -> bool:
+    if not fcntl:
+        return False
+    try:
+        descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    except OSError:
+        return False
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        return False
+    finally:
+        os.close(descriptor)
+    return True
+
+
+def _sync(folder: Path) -> None:
+    """Bring the folder's files to the disk before its name says that they are there."""
+    for path in (*folder.rglob("*"), folder):
+        descriptor = os.open(path, os.O_RDONLY)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
+
+
+def _move_into_place(partial: Path, final: Path) -> None:
+    refuse_foreign(final)
+    if not final.exists():
+        partial.rename(final)
+    elif _exchange(partial, final):
+        shutil.rmtree(partial, ignore_errors=True)
+    else:
+        retired = partial.with_name(f"{partial.name}-replaced")
+        final.rename(retired)
+        partial.rename(final)
+        shutil.rmtree(retired, ignore_errors=True)
+
+
+def _exchange(one: Path, other: Path) -> bool:
+    """Swap two folders in one step, as Linux can; False where the system or the file system cannot."""
+    try:
+        rename = ctypes.CDLL(None, use_errno=True).renameat2
+    except (AttributeError, OSError, TypeError):
+        return False
+    done = rename(_AT_FDCWD, os.fsencode(one), _AT_FDCWD, os.fsencode(other), _RENAME_EXCHANGE) == 0
+    if not done and ctypes.get_errno() not in (errno.ENOSYS, errno.EINVAL, errno.EOPNOTSUPP):
+        raise OSError(ctypes.get_errno(), os.strerror(ctypes.get_errno()))
+    return done

@@ -1,0 +1,157 @@
+"""A flight made by hand: the columns and the summary of a run with plausible numbers, for testing what shows them."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+AXES = ("p", "q", "r")
+SURFACES = ("aileron", "elevator", "rudder", "flap")
+ESTIMATORS = ("aileron", "elevator", "rudder")
+STATES = (
+    "airspeed_mps", "alpha_rad", "beta_rad", "p_rad_s", "q_rad_s", "r_rad_s",
+    "phi_rad", "theta_rad", "psi_rad", "north_m", "east_m", "altitude_m",
+)  # fmt: skip
+COLUMNS = (
+    "t_s", *STATES, "pdot_rad_s2", "qdot_rad_s2", "rdot_rad_s2", "qdyn_pa", "dpt", "envelope_valid",
+    *(f"{a}_measured_rad_s" for a in AXES), *(f"{a}_reference_rad_s" for a in AXES),
+    *(f"{a}_model_rad_s" for a in AXES),
+    *(f"{s}_{what}_rad" for s in SURFACES for what in ("cmd", "pos", "effective")),
+    *(f"{s}_saturated" for s in SURFACES),
+    *(f"{a}_{what}_rad_s" for a in AXES for what in ("residual", "threshold")),
+    *(f"{a}_eta_bar_rad_s2" for a in AXES), *(f"{a}_network_rad_s2" for a in AXES),
+    *(
+        name
+        for e in ESTIMATORS
+        for name in (
+            *(f"fie_{e}_{a}_{what}_rad_s" for a in AXES for what in ("residual", "lower", "upper")),
+            f"fie_{e}_excluded",
+        )
+    ),
+    *(f"{s}_effectiveness_estimate" for s in SURFACES), "mode", "detected",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Fault:
+    at_s: float = 12.0
+    type: str = "loss_of_effectiveness"
+    actuator: str | None = "elevator"
+    magnitude: float = 0.4
+
+
+class Expect:
+    """Stands for the scenario's `expect` block: knows only how to list what is set."""
+
+    def __init__(self, **expected: Any) -> None:
+        self._expected = expected
+
+    def model_dump(self, exclude_none: bool) -> dict[str, Any]:
+        assert exclude_none
+        return self._expected
+
+
+@dataclass(frozen=True)
+class Scenario:
+    name: str = "synthetic"
+    description: str = "A flight made by hand."
+    seed: int = 7
+    rate_hz: float = 100.0
+    duration_s: float = 30.0
+    faults: tuple[Fault, ...] = (Fault(),)
+    expect: Any = field(default_factory=Expect)
+
+
+@dataclass
+class Flight:
+    scenario: Any = field(default_factory=Scenario)
+    frames: int = 3000
+    columns: tuple[str, ...] = COLUMNS
+    detection_time_s: float | None = 12.07
+    detection_axis: str | None = "q"
+    guaranteed_delay_s: float | None = 0.31
+    isolation_time_s: float | None = 12.12
+    isolated: str | None = "elevator"
+    isolation_type: str | None = "loss_of_effectiveness"
+    candidates: tuple[str, ...] = ("elevator",)
+    estimate: float | None = -0.39
+    pre_fault_rms_rad_s: tuple[float, float, float] = (0.001, 0.002, 0.003)
+    post_fault_rms_rad_s: tuple[float, float, float] | None = (0.002, 0.01, 0.003)
+    supervisor: list[tuple[float, str]] = field(
+        default_factory=lambda: [(0.0, "nominal"), (12.07, "adaptive"), (12.12, "reallocated")]
+    )
+    envelope_exits: list[tuple[float, float]] = field(default_factory=list)
+    departure: tuple[float, str] | None = None
+    saturation_s: dict[str, float] = field(default_factory=lambda: dict.fromkeys(SURFACES, 0.0))
+    worst_residual_ratio: float = 0.11
+
+
+def rows(flight: Flight) -> np.ndarray:
+    """The log of `flight`, shape (frames, columns): sines, a fault at 12 s, residuals that leave their bounds."""
+    t = np.arange(flight.frames) / flight.scenario.rate_hz
+    values = dict.fromkeys(COLUMNS, np.zeros_like(t)) | {"t_s": t}
+    rng = np.random.default_rng(flight.scenario.seed)
+    after = np.clip(t - 12.0, 0.0, None)
+    detected = t >= 12.07
+    values |= _states(t) | _rates(t, after) | _surfaces(t, after)
+    for axis in AXES:
+        threshold = 0.02 * (1 - np.exp(-t))
+        noise = 0.1 * threshold * np.sin(10 * t) + 1e-5 * rng.standard_normal(t.size)
+        values[f"{axis}_residual_rad_s"] = noise + (axis == "q") * 0.08 * np.minimum(after, 1) * np.sin(1.3 * t)
+        values[f"{axis}_threshold_rad_s"] = threshold
+        values[f"{axis}_eta_bar_rad_s2"] = 0.02 + 0.001 * np.abs(np.sin(t))
+        for estimator in ESTIMATORS:
+            values |= _estimator(f"fie_{estimator}_{axis}", t, detected, drifts=estimator != "elevator" and axis == "q")
+    for estimator in ESTIMATORS:
+        values[f"fie_{estimator}_excluded"] = np.where(
+            detected, np.where(t > 12.12, float(estimator != "elevator"), 0.0), np.nan
+        )
+    values["envelope_valid"] = np.ones_like(t)
+    values["mode"] = np.where(t < 12.07, 0.0, np.where(t < 12.12, 1.0, 2.0))
+    values["detected"] = detected.astype(float)
+    return np.column_stack([values[name] for name in COLUMNS])
+
+
+def _states(t: np.ndarray) -> dict[str, np.ndarray]:
+    return {
+        "airspeed_mps": 45 + 0.5 * np.sin(0.2 * t), "alpha_rad": 0.06 + 0.01 * np.sin(t),
+        "beta_rad": 0.01 * np.sin(0.9 * t), "phi_rad": 0.1 * np.sin(0.5 * t),
+        "theta_rad": 0.05 + 0.02 * np.sin(0.8 * t), "psi_rad": 0.02 * t,
+        "north_m": 45 * t * np.cos(0.01 * t), "east_m": 45 * t * np.sin(0.01 * t),
+        "altitude_m": 1828.8 + 4 * np.sin(0.3 * t), "qdyn_pa": np.full_like(t, 1037.0), "dpt": np.full_like(t, 0.6),
+    }  # fmt: skip
+
+
+def _rates(t: np.ndarray, after: np.ndarray) -> dict[str, np.ndarray]:
+    out = {}
+    for axis, frequency in zip(AXES, (0.25, 0.2, 0.1), strict=True):
+        reference = np.radians(3) * np.sin(2 * np.pi * frequency * t)
+        out[f"{axis}_reference_rad_s"] = reference
+        out[f"{axis}_model_rad_s"] = np.radians(3) * np.sin(2 * np.pi * frequency * t - 0.2)
+        error = 0.02 * np.exp(-after) * np.sin(3 * after) if axis == "q" else 0.0
+        out[f"{axis}_rad_s"] = out[f"{axis}_measured_rad_s"] = out[f"{axis}_model_rad_s"] + error
+    return out
+
+
+def _surfaces(t: np.ndarray, after: np.ndarray) -> dict[str, np.ndarray]:
+    out = {}
+    for surface in SURFACES:
+        position = np.zeros_like(t) if surface == "flap" else 0.04 * np.sin(1.2 * t)
+        if surface == "flap":
+            position = 0.2 * np.minimum(after, 1) * np.sin(1.2 * t)
+        out[f"{surface}_cmd_rad"] = out[f"{surface}_pos_rad"] = position
+        out[f"{surface}_effective_rad"] = position * np.where((surface == "elevator") & (t >= 12), 0.6, 1.0)
+        health = 1 - 0.4 * (1 - np.exp(-after / 0.5)) if surface == "elevator" else np.ones_like(t)
+        out[f"{surface}_effectiveness_estimate"] = health
+    return out
+
+
+def _estimator(stem: str, t: np.ndarray, active: np.ndarray, drifts: bool) -> dict[str, np.ndarray]:
+    since = np.clip(t - 12.07, 0, None)
+    residual = 0.002 * np.sin(10 * t) + drifts * 0.06 * np.minimum(since, 1) * np.sin(2 * since + 1)
+    upper = 0.012 + 0.01 * np.exp(-since)
+    return {
+        f"{stem}_residual_rad_s": np.where(active, residual, np.nan),
+        f"{stem}_lower_rad_s": np.where(active, -upper, np.nan),
+        f"{stem}_upper_rad_s": np.where(active, upper, np.nan),
+    }

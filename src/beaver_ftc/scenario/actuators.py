@@ -1,0 +1,66 @@
+"""What moves the surfaces: ideal, a preset, one set of numbers for all, or one a surface."""
+
+from typing import Any, Self
+
+from pydantic import Field, GetJsonSchemaHandler, model_validator
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema
+
+from beaver_ftc.design.coefficients import SURFACES
+from beaver_ftc.scenario.base import Number, Section, number, refuse
+
+
+class ActuatorDynamics(Section):
+    """First-order lag, rate limit and stops of one surface."""
+
+    bandwidth_rad_s: Number = number(0.0, unit="rad/s", says="bandwidth of the lag, 0 means none", ge=0, le=10_000)
+    rate_limit_deg_s: Number = number(0.0, unit="deg/s", says="largest surface rate, 0 means no limit", ge=0, le=100_000)
+    travel_deg: tuple[Number, Number] | None = Field(
+        None, description="lower and upper stop; left out: the aircraft's own, deg", json_schema_extra={"unit": "deg"}
+    )
+
+    @model_validator(mode="after")
+    def _stops_are_in_order(self) -> Self:
+        if self.travel_deg is not None and not -90 <= self.travel_deg[0] < self.travel_deg[1] <= 90:
+            refuse([(("travel_deg",), "stops out of order or range, allowed: [lower, upper] from -90 to 90 deg")])
+        return self
+
+    @property
+    def is_ideal(self) -> bool:
+        """No lag and no rate limit; the stops are always there."""
+        return self.bandwidth_rad_s == 0 and self.rate_limit_deg_s == 0
+
+
+PRESETS: dict[str, dict[str, float]] = {
+    "ideal": {},
+    "servo": {"bandwidth_rad_s": 20.0, "rate_limit_deg_s": 60.0},  # SPEC 7's example of real actuators
+}
+
+
+class Actuators(Section):
+    """One set of dynamics a surface; a preset's name or one mapping stands for all four."""
+
+    aileron: ActuatorDynamics = ActuatorDynamics()
+    elevator: ActuatorDynamics = ActuatorDynamics()
+    rudder: ActuatorDynamics = ActuatorDynamics()
+    flap: ActuatorDynamics = ActuatorDynamics()
+
+    @model_validator(mode="before")
+    @classmethod
+    def _expand(cls, given: Any) -> Any:
+        if isinstance(given, str):
+            given = PRESETS.get(given, given)
+        if isinstance(given, dict) and given.keys() <= ActuatorDynamics.model_fields.keys():
+            return dict.fromkeys(SURFACES, given)
+        return given
+
+    @property
+    def is_ideal(self) -> bool:
+        return all(getattr(self, surface).is_ideal for surface in SURFACES)
+
+    @classmethod
+    def __get_pydantic_json_schema__(cls, core: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+        surfaces = handler.resolve_ref_schema(handler(core))
+        uniform = next(iter(surfaces["properties"].values()))
+        preset = {"enum": list(PRESETS), "type": "string", "description": "a preset"}
+        return {"anyOf": [preset, {k: v for k, v in uniform.items() if k == "$ref"}, surfaces]}

@@ -1,0 +1,53 @@
+"""What every section of a scenario shares: frozen, no unknown keys, no coercion between text, truth values and numbers."""
+
+from collections.abc import Iterable, Sequence
+from difflib import get_close_matches
+from typing import Annotated, Any
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, Strict
+from pydantic_core import PydanticCustomError
+
+Location = tuple[int | str, ...]
+Conflict = tuple[Location, str]
+
+
+class Section(BaseModel):
+    """A part of a scenario file: immutable, strict about its keys, finite in its numbers."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+def _whole(value: Any) -> Any:
+    """1e4 and 2.0 are whole numbers to whoever writes them."""
+    return int(value) if isinstance(value, float) and value.is_integer() else value
+
+
+Number = Annotated[float, Strict()]
+Whole = Annotated[int, Strict(), BeforeValidator(_whole)]
+Flag = Annotated[bool, Strict()]
+
+
+def number(default: Any = ..., *, unit: str, says: str, **limits: Any) -> Any:
+    """A field holding one number: its unit and meaning go into the JSON Schema an editor shows."""
+    return Field(default, description=f"{says}, {unit}", json_schema_extra={"unit": unit}, **limits)
+
+
+def refuse(conflicts: Sequence[Conflict]) -> None:
+    """Raise if values that are each fine contradict one another; every conflict keeps its own location."""
+    if conflicts:
+        raise PydanticCustomError("conflict", "contradictory values", {"conflicts": list(conflicts)})
+
+
+def check_order(start_s: float, end_s: float | None, start_key: str) -> None:
+    """Refuse an end that does not come after its start."""
+    if end_s is not None and end_s <= start_s:
+        refuse([(("end_s",), f"{end_s:g} is not after {start_key}, allowed: later than {start_s:g} s")])
+
+
+def suggestion(given: str, known: Iterable[str], cutoff: float = 0.6) -> str:
+    """`, did you mean x?` if something known is near to what was given, and what is allowed."""
+    names = list(known)
+    lower = {name.lower(): name for name in reversed(names)}
+    near = get_close_matches(given.lower()[:100], lower, n=1, cutoff=cutoff)
+    hint = f", did you mean {lower[near[0]]}?" if near else ","
+    return f"{hint} allowed: {', '.join(names)}"

@@ -1,0 +1,206 @@
+"""YAML text to plain data that remembers its lines.
+
+The tree is built from libyaml's event stream, so nothing but mappings, lists, texts, numbers, truth values and null
+can come out, and a hostile file is stopped while it is read: nesting, size and alias expansion are bounded, and
+recursion (which a composer written the usual way would crash on) never happens.
+
+Anchors and aliases are read, because repeating a value by name is what YAML users do, but what they expand to counts
+towards the bound: an alias bomb ends at MAX_NODES. Merge keys (`<<`) and tags are not read.
+Numbers are read as YAML 1.2 and everybody's eyes do: 1e-3 is a number, 12:30 and 012 are not.
+"""
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+import yaml
+
+from beaver_ftc.scenario.base import Location
+
+MAX_NODES = 400_000
+MAX_DEPTH = 32
+
+_LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+_INTEGER = re.compile(r"[-+]?(0|[1-9][0-9_]*)")
+_FLOAT = re.compile(r"[-+]?([0-9][0-9_]*\.?[0-9_]*|\.[0-9][0-9_]*)([eE][-+]?[0-9]+)?")
+_LEADING_ZERO = re.compile(r"[-+]?0[0-9_]+")
+_WORDS = {
+    **dict.fromkeys(("", "~", "null", "Null", "NULL"), None),
+    **dict.fromkeys(("true", "True", "TRUE", "yes", "Yes", "YES", "on", "On", "ON"), True),
+    **dict.fromkeys(("false", "False", "FALSE", "no", "No", "NO", "off", "Off", "OFF"), False),
+    **dict.fromkeys((".nan", ".NaN", ".NAN"), float("nan")),
+    **dict.fromkeys((".inf", ".Inf", ".INF", "+.inf", "+.Inf", "+.INF"), float("inf")),
+    **dict.fromkeys(("-.inf", "-.Inf", "-.INF"), float("-inf")),
+}
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One mistake: the line it is on, where in the document, what is wrong and what is allowed."""
+
+    line: int
+    location: Location
+    says: str
+
+
+class MalformedDocument(Exception):
+    """The text is no YAML document that can be read on; carries the one problem that stopped it."""
+
+    def __init__(self, line: int, says: str, location: Location = ()) -> None:
+        super().__init__(says)
+        self.problem = Problem(line, location, says)
+
+
+@dataclass
+class Document:
+    """Plain data, the line of each value (and key) by location, and the mistakes that did not stop the reading."""
+
+    data: Any = None
+    lines: dict[Location, int] = field(default_factory=dict)
+    problems: list[Problem] = field(default_factory=list)
+
+    def line(self, location: Location) -> int:
+        """The line of a location, or of the nearest thing around it that the file does contain."""
+        while location not in self.lines and location:
+            location = location[:-1]
+        return self.lines.get(location, 1)
+
+
+def parse(text: str) -> Document:
+    """Read one YAML document. Raises MalformedDocument; mistakes that leave the rest readable are in `.problems`."""
+    try:
+        return _Builder(text).build()
+    except yaml.YAMLError as error:
+        raise MalformedDocument(_error_line(error, text), _error_text(error)) from None
+
+
+def _error_line(error: yaml.YAMLError, text: str) -> int:
+    mark = getattr(error, "problem_mark", None) or getattr(error, "context_mark", None)
+    if mark is not None:
+        return mark.line + 1
+    position = getattr(error, "position", None)
+    return 1 if position is None else 1 + text.encode()[:position].count(b"\n")
+
+
+def _error_text(error: yaml.YAMLError) -> str:
+    reason = getattr(error, "problem", None) or getattr(error, "reason", None) or "not readable"
+    if "cannot start any token" in reason:
+        reason += " (a tab, or a character that wants quotes?)"
+    context = getattr(error, "context", None)
+    return f"is not YAML: {f'{context}: ' if context else ''}{reason}, allowed: one YAML mapping indented with spaces"
+
+
+def scalar(text: str) -> Any:
+    """A plain scalar: null, truth value, number, or the text itself."""
+    if text in _WORDS:
+        return _WORDS[text]
+    if _LEADING_ZERO.fullmatch(text):  # octal in YAML 1.1, decimal in 1.2: nobody's number
+        return text
+    if _INTEGER.fullmatch(text) and len(text) <= 400:
+        return int(text)
+    return float(text.replace("_", "")) if _FLOAT.fullmatch(text) else text
+
+
+class _Builder:
+    """Turns the event stream into a Document, an explicit stack standing in for recursion."""
+
+    def __init__(self, text: str) -> None:
+        self.document = Document()
+        self._events = _events(text)
+        self._anchors: dict[str, tuple[Any, int]] = {}
+        self._nodes = 0
+
+    def build(self) -> Document:
+        started = False
+        for event in self._events:
+            if isinstance(event, yaml.DocumentStartEvent):
+                if started:
+                    raise MalformedDocument(_line(event), "a second document starts here, allowed: one a file")
+                started = True
+            elif isinstance(event, yaml.NodeEvent):
+                self.document.data = self._value(event, ())
+        return self.document
+
+    def _value(self, event: yaml.Event, location: Location) -> Any:
+        """One value with all that is below it. Recursion is bounded by MAX_DEPTH."""
+        self._count(1, event, location)
+        self.document.lines.setdefault(location, _line(event))
+        if isinstance(event, yaml.AliasEvent):
+            return self._alias(event, location)
+        if event.tag is not None and event.tag != "!":
+            raise MalformedDocument(_line(event), f"tag {event.tag} is not read, allowed: plain values", location)
+        value = self._content(event, location)
+        if event.anchor is not None:
+            self._anchors[event.anchor] = (value, _size(value))
+        return value
+
+    def _content(self, event: yaml.Event, location: Location) -> Any:
+        if isinstance(event, yaml.ScalarEvent):
+            return scalar(event.value) if event.implicit[0] else event.value
+        if len(location) >= MAX_DEPTH:
+            raise MalformedDocument(_line(event), f"nested too deeply, allowed: {MAX_DEPTH} levels")
+        return self._mapping(location) if isinstance(event, yaml.MappingStartEvent) else self._list(location)
+
+    def _list(self, location: Location) -> list[Any]:
+        items: list[Any] = []
+        while not isinstance(event := next(self._events), yaml.SequenceEndEvent):
+            items.append(self._value(event, (*location, len(items))))
+        return items
+
+    def _mapping(self, location: Location) -> dict[str, Any]:
+        mapping: dict[str, Any] = {}
+        key_lines: dict[str, int] = {}
+        while not isinstance(event := next(self._events), yaml.MappingEndEvent):
+            key = self._key(event, location)
+            below, line = (*location, key), _line(event)
+            if key in mapping:
+                says = f"duplicate key, first on line {key_lines[key]}, allowed: each key once"
+                self.document.problems.append(Problem(line, below, says))
+                self._value(next(self._events), (*below, "(duplicate)"))
+                continue
+            key_lines[key] = self.document.lines[below] = line
+            mapping[key] = self._value(next(self._events), below)
+        return mapping
+
+    def _key(self, event: yaml.Event, location: Location) -> str:
+        if not isinstance(event, yaml.ScalarEvent):
+            raise MalformedDocument(_line(event), "a key is not plain text, allowed: key: value", location)
+        if event.value == "<<":
+            raise MalformedDocument(_line(event), "merge keys are not read, allowed: the keys themselves", location)
+        self._count(1, event, location)
+        return event.value
+
+    def _alias(self, event: yaml.AliasEvent, location: Location) -> Any:
+        if event.anchor not in self._anchors:
+            says = f"alias *{event.anchor} has no complete anchor before it, allowed: the value itself"
+            raise MalformedDocument(_line(event), says, location)
+        value, size = self._anchors[event.anchor]
+        self._count(size, event, location)
+        return value
+
+    def _count(self, nodes: int, event: yaml.Event, location: Location) -> None:
+        self._nodes += nodes
+        if self._nodes > MAX_NODES:
+            says = f"the file holds or its aliases expand to too many values, allowed: at most {MAX_NODES}"
+            raise MalformedDocument(_line(event), says, location)
+
+
+def _size(value: Any) -> int:
+    """How many values an anchored value stands for (itself and all below)."""
+    if isinstance(value, dict):
+        return 1 + sum(1 + _size(item) for item in value.values())
+    return 1 + sum(map(_size, value)) if isinstance(value, list) else 1
+
+
+def _events(text: str) -> Iterator[yaml.Event]:
+    loader = _LOADER(text)
+    try:
+        while loader.check_event():
+            yield loader.get_event()
+    finally:
+        loader.dispose()
+
+
+def _line(event: yaml.Event) -> int:
+    return event.start_mark.line + 1

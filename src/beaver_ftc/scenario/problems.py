@@ -1,0 +1,234 @@
+"""From a validation error to lines a user can act on: `FILE:LINE: key.path: what is wrong, what is allowed`.
+
+What is allowed is read from the JSON Schema, the same text an editor shows, so the two cannot disagree.
+"""
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from pydantic import ValidationError
+
+from beaver_ftc.errors import BadInput
+from beaver_ftc.scenario.base import Location, suggestion
+from beaver_ftc.scenario.document import Document, Problem
+
+WHOLE_FILE = "(file)"
+_SHOWN = 48
+
+
+class ScenarioError(BadInput):
+    """A file that cannot be used; `str` is one line a mistake, `problems` the mistakes."""
+
+    def __init__(self, source: str, problems: Sequence[Problem]) -> None:
+        self.source = source
+        self.problems = tuple(dict.fromkeys(sorted(problems, key=lambda problem: problem.line)))
+        super().__init__("\n".join(self.lines))
+
+    @property
+    def lines(self) -> tuple[str, ...]:
+        source = one_line(self.source, 4096)
+        return tuple(
+            f"{source}:{problem.line}: {key_path(problem.location)}: {one_line(problem.says, 2000)}"
+            for problem in self.problems
+        )
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return (type(self), (self.source, self.problems))
+
+
+def key_path(location: Location) -> str:
+    """('faults', 0, 'at_s') -> faults[0].at_s"""
+    path = ""
+    for part in location:
+        path += f"[{part}]" if isinstance(part, int) else f".{one_line(part, _SHOWN)}" if path else one_line(part, _SHOWN)
+    return path or WHOLE_FILE
+
+
+def one_line(text: str, longest: int) -> str:
+    """Text fit for one line of a terminal: control characters escaped, length bounded."""
+    shown = "".join(c if c.isprintable() else c.encode("unicode_escape", "replace").decode() for c in text[:longest])
+    return shown if len(text) <= longest else f"{shown}..."
+
+
+def problems_of(error: ValidationError, document: Document, schema: dict[str, Any]) -> Iterator[Problem]:
+    """The mistakes in a document's data, each at its line."""
+    for detail in error.errors(include_url=False):
+        location = _in_document(detail["loc"], document.data)
+        if detail["type"] == "conflict":
+            for below, says in detail["ctx"]["conflicts"]:
+                where = _in_document((*location, *below), document.data)
+                yield Problem(document.line(where), where, says)
+        else:
+            yield Problem(document.line(location), location, _says(detail, location, document.data, schema))
+
+
+def _in_document(loc: Location, data: Any) -> Location:
+    """Pydantic's location without the steps it adds for itself (a union's tag, an expanded preset)."""
+    location: list[int | str] = []
+    for i, part in enumerate(loc):
+        if _has(data, part):
+            location.append(part)
+            data = data[part]
+        elif i == len(loc) - 1 and isinstance(data, dict) and part != "[key]":
+            location.append(part)
+    return tuple(location)
+
+
+def _has(data: Any, part: int | str) -> bool:
+    if isinstance(data, dict):
+        return part in data
+    return isinstance(data, list) and isinstance(part, int) and part < len(data)
+
+
+def _says(detail: Any, location: Location, data: Any, schema: dict[str, Any]) -> str:
+    kind, given = detail["type"], detail["input"]
+    if kind == "extra_forbidden":
+        known = _keys(_at(schema, location[:-1], data))
+        return f"unknown key{suggestion(str(location[-1]), known, cutoff=0.5)}"
+    here = _at(schema, location, data)
+    if kind in ("missing", "union_tag_not_found"):
+        return _missing(kind, here, location)
+    if kind in ("literal_error", "enum", "union_tag_invalid"):
+        return _not_one_of(detail, given, here)
+    return f"{_wrong(detail, given)}, allowed: {_allowed(here, detail)}"
+
+
+def _missing(kind: str, here: list[dict[str, Any]], location: Location) -> str:
+    if kind == "union_tag_not_found":
+        types = [tag for node in here for tag in node.get("discriminator", {}).get("mapping", {})]
+        return f"required key type is missing, allowed: {', '.join(types)}"
+    return f"required key is missing, allowed: {_allowed(here, {})}"
+
+
+def _not_one_of(detail: Any, given: Any, here: list[dict[str, Any]]) -> str:
+    if detail["type"] == "union_tag_invalid":
+        given, allowed = detail["ctx"]["tag"], detail["ctx"]["expected_tags"].replace("'", "").split(", ")
+        return f"type {_shown(given)} is not known{suggestion(str(given), allowed)}"
+    allowed = list(map(str, _choices(here)))
+    if not allowed:
+        return f"{_shown(given)} is not known, allowed: {detail['ctx']['expected']}"
+    hint = suggestion(given, allowed) if isinstance(given, str) else f", allowed: {', '.join(allowed)}"
+    return f"{_shown(given)} is not known{hint}"
+
+
+_WRONG_TYPE = ("_type", "_parsing", "_attributes_type")
+
+
+def _wrong(detail: Any, given: Any) -> str:
+    kind = detail["type"]
+    if kind == "finite_number":
+        return f"{_shown(given)} is not finite"
+    if kind in ("greater_than", "greater_than_equal", "less_than", "less_than_equal"):
+        return f"{_shown(given)} is out of range"
+    if kind in ("too_long", "string_too_long"):
+        return f"too long, {detail['ctx'].get('actual_length') or len(given)}"
+    if kind in ("too_short", "string_too_short"):
+        return "too short"
+    if kind.endswith(_WRONG_TYPE) or kind == "model_type":
+        return f"{_shown(given)} is {_type_name(given)}"
+    if kind == "string_pattern_mismatch":
+        return f"{_shown(given)} has characters that are not allowed"
+    return one_line(f"{_shown(given)}: {detail['msg']}", 300)
+
+
+def _shown(given: Any) -> str:
+    if isinstance(given, dict | list | tuple):
+        return "this"
+    if given is None or isinstance(given, bool):
+        return {None: "nothing", True: "true", False: "false"}[given]
+    if isinstance(given, int) and abs(given) >= 10**15:
+        return "a whole number this large"
+    return one_line(f"{given:g}" if isinstance(given, float) else repr(given), _SHOWN)
+
+
+def _type_name(given: Any) -> str:
+    names = {bool: "true or false", dict: "a mapping", list: "a list", str: "text", type(None): "no value"}
+    return names.get(type(given), "a number")
+
+
+def _at(schema: dict[str, Any], location: Location, data: Any) -> list[dict[str, Any]]:
+    """The schemas a location may have: one, or the branches of a union that fit what the data says it is."""
+    nodes = _branches(schema, schema, data)
+    for part in location:
+        data = data[part] if _has(data, part) else None
+        below = [child for node in nodes for child in _children(node, part)]
+        nodes = [branch for node in below for branch in _branches(node, schema, data)]
+    return nodes
+
+
+def _children(node: dict[str, Any], part: int | str) -> Iterator[dict[str, Any]]:
+    if isinstance(part, int):
+        prefix = node.get("prefixItems", [])
+        yield from prefix[part : part + 1] or ([node["items"]] if isinstance(node.get("items"), dict) else [])
+    elif part in node.get("properties", {}):
+        yield node["properties"][part]
+    elif isinstance(node.get("additionalProperties"), dict):
+        yield node["additionalProperties"]
+
+
+def _branches(node: dict[str, Any], root: dict[str, Any], data: Any) -> list[dict[str, Any]]:
+    """The node with references and unions resolved; a union on `type` by the data's own type."""
+    if "$ref" in node:
+        target = root["$defs"][node["$ref"].rsplit("/", 1)[-1]]
+        around = {key: value for key, value in node.items() if key != "$ref"}
+        return _branches({**target, **around}, root, data)
+    mapping = node.get("discriminator", {}).get("mapping", {})
+    tag = data.get("type") if isinstance(data, dict) else None
+    if mapping and isinstance(tag, str) and tag in mapping:
+        return _branches({"$ref": mapping[tag]}, root, data)
+    union = node.get("anyOf") or node.get("oneOf")
+    if not union or mapping:
+        return [node]
+    inherited = {key: node[key] for key in ("description", "unit") if key in node}
+    return [b for branch in union for b in _branches({**inherited, **branch}, root, data)]
+
+
+def _keys(nodes: list[dict[str, Any]]) -> list[str]:
+    return list(dict.fromkeys(key for node in nodes for key in node.get("properties", {})))
+
+
+def _choices(nodes: list[dict[str, Any]]) -> list[Any]:
+    return [choice for node in nodes for choice in node.get("enum", [node["const"]] if "const" in node else [])]
+
+
+def _allowed(nodes: list[dict[str, Any]], detail: Any) -> str:
+    kinds = list(dict.fromkeys(_kind(node) for node in nodes if node.get("type") != "null"))
+    says = next((node["description"] for node in nodes if "unit" in node), "")
+    meaning = f" ({says})" if says and len(kinds) == 1 else ""
+    return " or ".join(kinds) + meaning if kinds else "see `beaver-ftc schema`"
+
+
+def _kind(node: dict[str, Any]) -> str:
+    if choices := _choices([node]):
+        return ", ".join(map(str, choices))
+    return {
+        "number": lambda: f"a number{_range(node)}",
+        "integer": lambda: f"a whole number{_range(node)}",
+        "boolean": lambda: "true or false",
+        "array": lambda: f"a list{_length(node, 'Items', 'items')}",
+        "string": lambda: f"text{_pattern(node)}{_length(node, 'Length', 'characters')}",
+        "object": lambda: f"a mapping of {', '.join(_keys([node])) or 'names to values'}",
+    }.get(node.get("type", ""), lambda: node.get("description", "another value"))()
+
+
+def _range(node: dict[str, Any]) -> str:
+    above, below = node.get("exclusiveMinimum"), node.get("exclusiveMaximum")
+    low, high = node.get("minimum", above), node.get("maximum", below)
+    if low is None or high is None:
+        return "" if low is None and high is None else (f" over {above:g}" if above is not None else _one_bound(low, high))
+    return f" {'over' if above is not None else 'from'} {low:g} {'up to' if above is not None else 'to'} {high:g}"
+
+
+def _one_bound(low: float | None, high: float | None) -> str:
+    return f" of at least {low:g}" if low is not None else f" of at most {high:g}"
+
+
+def _pattern(node: dict[str, Any]) -> str:
+    return " of letters, digits, - and _" if node.get("pattern") else ""
+
+
+def _length(node: dict[str, Any], suffix: str, unit: str) -> str:
+    low, high = node.get(f"min{suffix}"), node.get(f"max{suffix}")
+    if low is not None and low == high:
+        return f" of {low} {unit}"
+    return f" of at most {high} {unit}" if high is not None else ""

@@ -1,0 +1,229 @@
+"""The shapes a body-rate reference can have, and their values in time.
+
+One class a kind: its parameters and `rate_deg_s(t_s)`. tau = t - start_s; every signal is zero before `start_s`
+and, but for the ramp and the table, from `end_s` on. A new kind is a class here and a line in `Signal`.
+"""
+
+from math import pi
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import ConfigDict, Field, ValidationInfo, model_validator
+
+from beaver_ftc.scenario.base import Number, Section, check_order, number
+from beaver_ftc.scenario.table import MAX_ROWS, check_table, read_column
+
+Samples = NDArray[np.float64]
+
+RAD_PER_DEG = pi / 180.0
+_INSTANT_S = 1e-9
+"""Frame times are k / rate in floating point: a signal starts on the frame its start names."""
+
+_LATEST_S = 360_000.0
+
+
+def _amplitude() -> Any:
+    return number(unit="deg/s", says="amplitude", ge=-1000, le=1000)
+
+
+def _frequency(says: str = "frequency") -> Any:
+    return number(unit="Hz", says=says, gt=0, le=500)
+
+
+def _start() -> Any:
+    return number(0.0, unit="s", says="when it starts", ge=0, le=_LATEST_S)
+
+
+def _during(tau_s: Samples, length_s: float | None) -> NDArray[np.bool_]:
+    """0 <= tau < length, where length None is for ever."""
+    begun = tau_s >= -_INSTANT_S
+    return begun if length_s is None else begun & (tau_s < length_s - _INSTANT_S)
+
+
+class _Window(Section):
+    """A signal that is zero outside [start_s, end_s)."""
+
+    start_s: Number = _start()
+    end_s: Number | None = number(None, unit="s", says="when it ends; left out: with the flight", gt=0)
+
+    @model_validator(mode="after")
+    def _ends_after_it_starts(self) -> Self:
+        check_order(self.start_s, self.end_s, "start_s")
+        return self
+
+    @property
+    def length_s(self) -> float | None:
+        return None if self.end_s is None else self.end_s - self.start_s
+
+
+class Sine(_Window):
+    """amplitude sin(2 pi frequency tau + phase)."""
+
+    amplitude_deg_s: Number = _amplitude()
+    frequency_hz: Number = _frequency()
+    phase_deg: Number = number(0.0, unit="deg", says="phase at start_s", ge=-360, le=360)
+
+    def rate_deg_s(self, t_s: Samples) -> Samples:
+        tau_s = t_s - self.start_s
+        wave = self.amplitude_deg_s * np.sin(2 * pi * self.frequency_hz * tau_s + self.phase_deg * RAD_PER_DEG)
+        return np.where(_during(tau_s, self.length_s), wave, 0.0)
+
+
+class Doublet(Section):
+    """+amplitude for width_s, then -amplitude for width_s: it lasts twice its width and turns back what it turned."""
+
+    amplitude_deg_s: Number = _amplitude()
+    start_s: Number = _start()
+    width_s: Number = number(1.0, unit="s", says="length of each of the two pulses", gt=0, le=_LATEST_S)
+
+    def rate_deg_s(self, t_s: Samples) -> Samples:
+        tau_s = t_s - self.start_s
+        up = _during(tau_s, self.width_s)
+        down = _during(tau_s - self.width_s, self.width_s)
+        return self.amplitude_deg_s * (up.astype(float) - down)
+
+
+class Step(_Window):
+    """amplitude from start_s on (a pulse, with end_s)."""
+
+    amplitude_deg_s: Number = _amplitude()
+
+    def rate_deg_s(self, t_s: Samples) -> Samples:
+        return np.where(_during(t_s - self.start_s, self.length_s), self.amplitude_deg_s, 0.0)
+
+
+class Square(_Window):
+    """+amplitude in the first half of each period, -amplitude in the second; phase shifts it as in `sine`."""
+
+    amplitude_deg_s: Number = _amplitude()
+    frequency_hz: Number = _frequency()
+    phase_deg: Number = number(0.0, unit="deg", says="phase at start_s", ge=-360, le=360)
+
+    def rate_deg_s(self, t_s: Samples) -> Samples:
+        tau_s = t_s - self.start_s
+        turns = (tau_s + _INSTANT_S) * self.frequency_hz + self.phase_deg / 360.0
+        wave = np.where(turns % 1.0 < 0.5, self.amplitude_deg_s, -self.amplitude_deg_s)
+        return np.where(_during(tau_s, self.length_s), wave, 0.0)
+
+
+class _Closed(Section):
+    """A signal that needs both its ends."""
+
+    start_s: Number = _start()
+    end_s: Number = number(unit="s", says="when it ends", gt=0, le=_LATEST_S)
+
+    @model_validator(mode="after")
+    def _ends_after_it_starts(self) -> Self:
+        check_order(self.start_s, self.end_s, "start_s")
+        return self
+
+    @property
+    def length_s(self) -> float:
+        return self.end_s - self.start_s
+
+
+class Ramp(_Closed):
+    """From 0 at start_s in a straight line to amplitude at end_s, held from there on."""
+
+    amplitude_deg_s: Number = _amplitude()
+
+    def rate_deg_s(self, t_s: Samples) -> Samples:
+        return self.amplitude_deg_s * np.clip((t_s - self.start_s) / self.length_s, 0.0, 1.0)
+
+
+class Chirp(_Closed):
+    """amplitude sin(2 pi (f0 tau + (f1 - f0) tau^2 / 2T)): the frequency goes in a straight line from f0 to f1 in T."""
+
+    amplitude_deg_s: Number = _amplitude()
+    start_frequency_hz: Number = _frequency("frequency at start_s")
+    end_frequency_hz: Number = _frequency("frequency at end_s")
+
+    def rate_deg_s(self, t_s: Samples) -> Samples:
+        tau_s = t_s - self.start_s
+        sweep_hz_s = (self.end_frequency_hz - self.start_frequency_hz) / self.length_s
+        turns = self.start_frequency_hz * tau_s + 0.5 * sweep_hz_s * tau_s**2
+        return np.where(_during(tau_s, self.length_s), self.amplitude_deg_s * np.sin(2 * pi * turns), 0.0)
+
+
+class Csv(Section):
+    """A table in a CSV file beside the scenario, straight lines between its rows, its end values held outside.
+
+    The table is read when the scenario is loaded and becomes part of it (`time_s`, `values_deg_s`), so that a fully
+    resolved scenario flies anywhere.
+    """
+
+    file: str = Field(min_length=1, max_length=200, description="CSV file in the scenario's own folder or below it")
+    column: str = Field("rate_deg_s", min_length=1, max_length=100, description="column to fly, deg/s; time is `t_s`")
+    time_s: tuple[Number, ...] = Field(min_length=1, max_length=MAX_ROWS, description="read from the file: times, s")
+    values_deg_s: tuple[Number, ...] = Field(
+        min_length=1, max_length=MAX_ROWS, description="read from the file: rates, deg/s"
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _read(cls, given: Any, info: ValidationInfo) -> Any:
+        if not isinstance(given, dict) or "time_s" in given or "values_deg_s" in given:
+            return given
+        folder = (info.context or {}).get("folder")
+        return {**given, **read_column(given.get("file"), given.get("column", "rate_deg_s"), folder)}
+
+    @model_validator(mode="after")
+    def _table_is_a_time_history(self) -> Self:
+        check_table(self.time_s, self.values_deg_s)
+        return self
+
+    def rate_deg_s(self, t_s: Samples) -> Samples:
+        return np.interp(t_s, self.time_s, self.values_deg_s)
+
+
+class Signal(Section):
+    """One signal: a mapping of exactly one kind to its parameters."""
+
+    model_config = ConfigDict(json_schema_extra={"minProperties": 1, "maxProperties": 1})
+
+    sine: Sine | None = None
+    doublet: Doublet | None = None
+    step: Step | None = None
+    square: Square | None = None
+    ramp: Ramp | None = None
+    chirp: Chirp | None = None
+    csv: Csv | None = None
+
+    @model_validator(mode="after")
+    def _exactly_one_kind(self) -> Self:
+        given = [kind for kind in type(self).model_fields if getattr(self, kind) is not None]
+        if len(given) != 1:
+            allowed = ", ".join(type(self).model_fields)
+            refuse([((), f"{len(given)} kinds in one item, allowed: exactly one of {allowed} (one list item each)")])
+        return self
+
+    @property
+    def shape(self) -> Sine | Doublet | Step | Square | Ramp | Chirp | Csv:
+        """The parameters of the one kind given."""
+        return next(shape for kind in type(self).model_fields if (shape := getattr(self, kind)) is not None)
+
+
+Signals = tuple[Signal, ...]
+
+
+class Reference(Section):
+    """What the three body rates shall follow; the signals of an axis are summed, a missing axis is 0."""
+
+    p: Signals = Field((), max_length=50, description="roll rate reference")
+    q: Signals = Field((), max_length=50, description="pitch rate reference")
+    r: Signals = Field((), max_length=50, description="yaw rate reference")
+
+
+def sample(reference: Reference, t_s: Samples) -> Samples:
+    """The commanded body rates at the given times.
+
+    Shapes: t_s (n,) -> (n, 3), columns p, q, r. Units: s -> rad/s.
+    """
+    t_s = np.asarray(t_s, dtype=float)
+    axes = [sum((item.shape.rate_deg_s(t_s) for item in axis), np.zeros_like(t_s)) for axis in _axes(reference)]
+    return np.column_stack(axes) * RAD_PER_DEG
+
+
+def _axes(reference: Reference) -> tuple[Signals, Signals, Signals]:
+    return reference.p, reference.q, reference.r

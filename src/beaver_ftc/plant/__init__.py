@@ -1,0 +1,1 @@
+"""The truth: the Beaver in JSBSim. The only package that imports jsbsim."""

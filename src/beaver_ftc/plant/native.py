@@ -1,0 +1,168 @@
+"""Many properties in one compiled call.
+
+A property read through JSBSim's Python binding costs about 0.1 us; a frame reads and writes some forty. The
+binding exports the C++ accessors of a property node, so a compiled kernel can call them on the node's own
+address: 0.01 us each. That rests on how one build of the binding is laid out, so `available` checks it
+before it is used, and the environment variable BEAVER_FTC_NATIVE=0 turns it off; the caller then reads and
+writes through Python.
+
+    bank = NodeBank([plant.node(name) for name in names])
+    read_nodes(getter_address(), bank.pointers, out)       # also from inside another compiled kernel
+"""
+
+import ctypes
+import os
+import sys
+from collections.abc import Sequence
+from functools import lru_cache
+from importlib import import_module
+
+import jsbsim
+import numba
+import numpy as np
+from llvmlite import ir
+from numba.core import types
+from numba.extending import intrinsic
+
+_GETTER = "_ZNK14SGPropertyNode14getDoubleValueEv"  # double SGPropertyNode::getDoubleValue() const
+_SETTER = "_ZN14SGPropertyNode14setDoubleValueEd"  # bool SGPropertyNode::setDoubleValue(double)
+
+# The Python node: reference count, type, C++ method table, then the counted pointer to the C++ node.
+_NODE_SIZE = 32
+_POINTER_OFFSET = 24
+
+
+@lru_cache(maxsize=1)
+def _library() -> ctypes.CDLL:
+    return ctypes.CDLL(import_module("jsbsim._jsbsim").__file__)
+
+
+def _address(symbol: str) -> int:
+    try:
+        return ctypes.cast(getattr(_library(), symbol), ctypes.c_void_p).value or 0
+    except (AttributeError, OSError):
+        return 0
+
+
+def getter_address() -> int:
+    """Address of the compiled read of one node; 0 if this build does not export it."""
+    return _address(_GETTER)
+
+
+def setter_address() -> int:
+    """Address of the compiled write of one node; 0 if this build does not export it."""
+    return _address(_SETTER)
+
+
+@intrinsic
+def _call_getter(typingctx, function, node):
+    def codegen(context, builder, signature, args):
+        prototype = ir.FunctionType(ir.DoubleType(), [ir.IntType(64)])
+        return builder.call(builder.inttoptr(args[0], prototype.as_pointer()), [args[1]])
+
+    return types.float64(types.int64, types.int64), codegen
+
+
+@intrinsic
+def _call_setter(typingctx, function, node, value):
+    def codegen(context, builder, signature, args):
+        prototype = ir.FunctionType(ir.IntType(1), [ir.IntType(64), ir.DoubleType()])
+        return builder.call(builder.inttoptr(args[0], prototype.as_pointer()), [args[1], args[2]])
+
+    return types.boolean(types.int64, types.int64, types.float64), codegen
+
+
+@numba.njit(cache=True)
+def read_nodes(getter, pointers, out):
+    """Read nodes into out. getter: getter_address(). pointers, out: (n,) int64, float64."""
+    for i in range(pointers.size):
+        out[i] = _call_getter(getter, pointers[i])  # type: ignore[call-arg]
+
+
+@numba.njit(cache=True)
+def write_nodes(setter, pointers, values):
+    """Write values to nodes. setter: setter_address(). pointers, values: (n,) int64, float64."""
+    for i in range(pointers.size):
+        _call_setter(setter, pointers[i], values[i])  # type: ignore[call-arg]
+
+
+def _pointer(node: jsbsim.FGPropertyNode) -> int:
+    return ctypes.c_int64.from_address(id(node) + _POINTER_OFFSET).value
+
+
+class NodeBank:
+    """Property nodes with their C++ addresses.
+
+    pointers: (n,) int64, valid as long as the bank lives: it keeps the nodes, and whatever `owner` it is
+    given (the Plant, whose executive the tied properties read from).
+    """
+
+    def __init__(self, nodes: Sequence[jsbsim.FGPropertyNode], owner: object = None) -> None:
+        self.nodes = tuple(nodes)
+        self.owner = owner
+        native = available()
+        self.pointers = np.array([_pointer(node) if native else 0 for node in self.nodes], dtype=np.int64)
+
+    def read(self, out: np.ndarray) -> None:
+        """Read every node into out (n,), natively where available."""
+        if available():
+            read_nodes(getter_address(), self.pointers, out)
+        else:
+            for i, node in enumerate(self.nodes):
+                out[i] = node.get_double_value()
+
+    def write(self, values: np.ndarray) -> None:
+        """Write values (n,) to the nodes, natively where available."""
+        if available():
+            write_nodes(setter_address(), self.pointers, values)
+        else:
+            for node, value in zip(self.nodes, values, strict=True):
+                node.set_double_value(float(value))
+
+
+def available() -> bool:
+    """Whether nodes can be read and written by address here; BEAVER_FTC_NATIVE=0 says no."""
+    return os.environ.get("BEAVER_FTC_NATIVE", "1") != "0" and _layout_is_known()
+
+
+@lru_cache(maxsize=1)
+def _layout_is_known() -> bool:
+    """Check this build of the binding, safest evidence first: nothing unknown is dereferenced."""
+    cpython = sys.implementation.name == "cpython" and ctypes.sizeof(ctypes.c_void_p) == 8
+    if not (cpython and jsbsim.FGPropertyNode.__basicsize__ == _NODE_SIZE):
+        return False
+    return bool(getter_address() and setter_address()) and _pointers_are_nodes() and _values_agree()
+
+
+def _made(manager: jsbsim.FGPropertyManager, name: str) -> jsbsim.FGPropertyNode:
+    node = manager.get_node(name, True)
+    assert node is not None
+    return node
+
+
+def _trial_nodes() -> list[jsbsim.FGPropertyNode]:
+    """Nodes in a property tree of their own, with no aircraft behind them."""
+    manager = jsbsim.FGPropertyManager()
+    nodes = [_made(manager, f"trial/value-{i}") for i in range(3)]
+    for i, node in enumerate(nodes):
+        node.set_double_value(1.0 / (i + 3))
+    return nodes
+
+
+def _pointers_are_nodes() -> bool:
+    """Two wrappers of one node hold the same aligned address, wrappers of different nodes different ones."""
+    manager = jsbsim.FGPropertyManager()
+    first, second, again = (_made(manager, f"trial/{name}") for name in "aba")
+    same = _pointer(first) == _pointer(again) and first is not again
+    return same and _pointer(first) != _pointer(second) and _pointer(first) > 0 and _pointer(first) % 8 == 0
+
+
+def _values_agree() -> bool:
+    """What is written natively reads back through Python to the bit, and the other way round."""
+    nodes = _trial_nodes()
+    pointers = np.array([_pointer(node) for node in nodes], dtype=np.int64)
+    seen = np.empty(len(nodes))
+    read_nodes(getter_address(), pointers, seen)
+    reads = [node.get_double_value() for node in nodes] == seen.tolist()
+    write_nodes(setter_address(), pointers, -seen)
+    return reads and [node.get_double_value() for node in nodes] == (-seen).tolist()

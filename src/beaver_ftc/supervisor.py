@@ -4,8 +4,7 @@ nominal until detection; adaptive until isolation, compensating an unknown fault
 take over), or still adaptive with the isolated estimate (aileron, rudder: no second surface), or unanticipated (no known fault fits).
 """
 
-from numba import njit
-
+from beaver_ftc.compiled import kernel
 from beaver_ftc.control.state import FAULT_TOLERANT, NOMINAL
 from beaver_ftc.design.model import ELEVATOR
 from beaver_ftc.diagnosis.state import UNANTICIPATED
@@ -14,7 +13,7 @@ MODES = ("nominal", "adaptive", "reallocated", "unanticipated")
 MODE_NOMINAL, MODE_ADAPTIVE, MODE_REALLOCATED, MODE_UNANTICIPATED = range(4)
 
 
-@njit(cache=True)
+@kernel
 def mode_of(law, detected, isolated, surface):
     """The mode for a law, given the diagnosis: detected 0/1, isolated (estimator index, -1 or -2) and its surface.
 

@@ -4,10 +4,10 @@ The isolated estimator's theta becomes the effectiveness 1 + theta of its surfac
 the surfaces, and projected: a surface weaker than `least_effectiveness` is given up rather than divided by.
 """
 
-from numba import njit
+from beaver_ftc.compiled import kernel
 
 
-@njit(cache=True)
+@kernel
 def approach(control, target):
     """Move the effectiveness the law uses towards target (4,) by at most one step."""
     step = control.effectiveness_step
@@ -16,7 +16,7 @@ def approach(control, target):
         control.effectiveness[s] += min(max(change, -step), step)
 
 
-@njit(cache=True)
+@kernel
 def believed_effectiveness(control, G, G_believed):
     """Fill G_believed (3, 4): G with each column scaled by its surface's effectiveness, or given up."""
     for s in range(4):

@@ -1,11 +1,10 @@
 """From demanded angular accelerations to surfaces: lateral pair, elevator, and the hand-over from elevator to flap."""
 
-from numba import njit
-
+from beaver_ftc.compiled import kernel
 from beaver_ftc.design.model import AILERON, ELEVATOR, FLAP, RUDDER
 
 
-@njit(cache=True)
+@kernel
 def clip(control, surface, deflection):
     """Limit a deflection (rad) to the surface's travel and note saturation."""
     limited = min(max(deflection, control.low[surface]), control.high[surface])
@@ -13,13 +12,13 @@ def clip(control, surface, deflection):
     return limited
 
 
-@njit(cache=True)
+@kernel
 def divide(moment, effectiveness):
     """moment / effectiveness; a surface given up (no effectiveness left) is not asked for anything."""
     return moment / effectiveness if effectiveness != 0.0 else 0.0
 
 
-@njit(cache=True)
+@kernel
 def lateral(control, G, u):
     """Aileron and rudder for the roll and yaw demand; when one saturates the other makes the best of its own axis."""
     roll, yaw = control.demand[0], control.demand[2]
@@ -30,13 +29,13 @@ def lateral(control, G, u):
     u[AILERON] = clip(control, AILERON, divide(roll - G[0, RUDDER] * u[RUDDER], G[0, AILERON]))
 
 
-@njit(cache=True)
+@kernel
 def smooth(share):
     """3 s^2 - 2 s^3: from 0 to 1 with no kink at either end."""
     return share * share * (3.0 - 2.0 * share)
 
 
-@njit(cache=True)
+@kernel
 def pitch(control, G, u):
     """Elevator and flap for the pitch demand.
 
@@ -45,15 +44,13 @@ def pitch(control, G, u):
     """
     needed = control.demand[1]
     share = smooth(control.hand_over)
-    healthy = control.effectiveness[ELEVATOR]
-    hold = divide(G[1, ELEVATOR], healthy) * control.trim[ELEVATOR] if healthy > 0.0 else 0.0
-    hold = hold if G[1, ELEVATOR] != 0.0 else 0.0
+    hold = divide(G[1, ELEVATOR], control.effectiveness[ELEVATOR]) * control.trim[ELEVATOR]
     flap = control.trim[FLAP] + share * (divide(needed - hold, G[1, FLAP]) - control.trim[FLAP])
     u[FLAP] = clip(control, FLAP, flap)
     u[ELEVATOR] = clip(control, ELEVATOR, divide(needed - G[1, FLAP] * u[FLAP], G[1, ELEVATOR]))
 
 
-@njit(cache=True)
+@kernel
 def allocate(control, G, u):
     """Fill u (4,) rad for control.demand; G (3, 4) rad/s2 per rad with the believed effectiveness in it."""
     lateral(control, G, u)

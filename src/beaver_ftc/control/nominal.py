@@ -5,10 +5,10 @@
 All laws share it; they differ in fhat, in the effectiveness they believe and in who carries the demand.
 """
 
-from numba import njit
+from beaver_ftc.compiled import kernel
 
 
-@njit(cache=True)
+@kernel
 def demand(control, x, f, fhat):
     """Fill control.demand (3,) rad/s2: what the surfaces must give. x (3,) rad/s; f, fhat (3,) rad/s2."""
     for i in range(3):
@@ -17,7 +17,7 @@ def demand(control, x, f, fhat):
         control.demand[i] = control.model_acceleration[i] + feedback - f[i] - fhat[i]
 
 
-@njit(cache=True)
+@kernel
 def integrate(control, x, G, u):
     """Advance the integrators; what the limited surfaces u (4,) rad could not give is taken back (anti-windup).
 

@@ -6,19 +6,25 @@ Second order, so that xm' needs no differentiation; discretised exactly for a re
 """
 
 import numpy as np
-from numba import njit
+
+from beaver_ftc.compiled import kernel
 
 
 def discretise(wn: float, zeta: float, dt: float) -> tuple[np.ndarray, np.ndarray]:
-    """State transition A (2, 2) and input B (2,) of (xm, xm') over dt (s) under a held reference; wn in rad/s."""
-    from scipy.linalg import expm
+    """State transition A (2, 2) and input B (2,) of (xm, xm') over dt (s) under a held reference; wn in rad/s.
 
-    continuous = np.array([[0.0, 1.0, 0.0], [-(wn**2), -2 * zeta * wn, wn**2], [0.0, 0.0, 0.0]])
-    step = expm(continuous * dt)
-    return step[:2, :2], step[:2, 2]
+    Cayley-Hamilton for a 2 x 2 matrix: exp(F dt) = e^{-s dt} (c I + d (F + s I)) with s = zeta wn, and c, d the (hyperbolic)
+    cosine and sine of m dt, m^2 = s^2 - wn^2. The input follows from the equilibrium (ref, 0).
+    """
+    s = zeta * wn
+    m = np.sqrt(complex(s * s - wn * wn))
+    c = np.cosh(m * dt).real
+    d = (np.sinh(m * dt) / m).real if abs(m) * dt > 1e-8 else dt
+    A = np.exp(-s * dt) * np.array([[c + s * d, d], [-wn * wn * d, c - s * d]])
+    return A, np.array([1.0 - A[0, 0], -A[1, 0]])
 
 
-@njit(cache=True)
+@kernel
 def follow(control, reference):
     """Advance the reference model by one frame towards `reference` (3,) rad/s."""
     A, B = control.model_A, control.model_B

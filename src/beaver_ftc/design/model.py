@@ -13,8 +13,8 @@ from collections.abc import Mapping
 from dataclasses import asdict, replace
 
 import numpy as np
-from numba import njit
 
+from beaver_ftc.compiled import kernel
 from beaver_ftc.design.coefficients import GEOMETRY, MASS, SURFACES, inertia_coefficients, value
 
 AXES = ("p", "q", "r")
@@ -63,7 +63,7 @@ def design_record(
     return design
 
 
-@njit(cache=True)
+@kernel
 def regressors(design, x, y, u, out):
     """Fill `out` (3, 9) with what each moment coefficient term multiplies; dimensionless or rad.
 
@@ -86,7 +86,7 @@ def regressors(design, x, y, u, out):
     out[2, 7], out[2, 8] = u[AILERON], u[RUDDER]
 
 
-@njit(cache=True)
+@kernel
 def free_response(design, x, y, f):
     """Fill f (3,) rad/s2: angular acceleration at neutral surfaces. Arguments as in `regressors`."""
     p, q, r = x[0], x[1], x[2]
@@ -108,7 +108,7 @@ def free_response(design, x, y, f):
     f[2] = design.Rpq * p * q + design.Rqr * q * r + design.Rn * N + design.Rl * L
 
 
-@njit(cache=True)
+@kernel
 def control_effectiveness(design, y, G):
     """Fill G (3, 4) rad/s2 per rad: the angular acceleration of each surface."""
     k = design.coefficient
@@ -124,7 +124,7 @@ def control_effectiveness(design, y, G):
     G[1, FLAP] = longitudinal * k[1, 8]
 
 
-@njit(cache=True)
+@kernel
 def acceleration(f, G, u, out):
     """Fill out (3,) with f + G u, rad/s2."""
     for i in range(3):

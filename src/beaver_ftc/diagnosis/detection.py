@@ -5,13 +5,12 @@
 [Zhang2005, sec. IV]. Written for the discrete truth: xhat0[k+1] = x[k] + dt F[k] + exp(-Lambda0 dt) (xhat0[k] - x[k]).
 """
 
-from numba import njit
-
+from beaver_ftc.compiled import kernel
 from beaver_ftc.diagnosis.network import learn
 from beaver_ftc.diagnosis.thresholds import bound_step
 
 
-@njit(cache=True)
+@kernel
 def detect(fdi, x, t):
     """Form the residual at time t (s) and raise the alarm if it leaves its threshold. x (3,) rad/s measured."""
     for i in range(3):
@@ -25,7 +24,7 @@ def detect(fdi, x, t):
                 fdi.detected_axis = i
 
 
-@njit(cache=True)
+@kernel
 def predict(fdi, x, believed, leaking):
     """Advance the FDAE and its threshold by one frame, and teach the network what sticks out.
 

@@ -7,18 +7,18 @@ Every hypothesis is linear in one unknown parameter per axis, phi_i = base_i + t
 A new fault type is one entry in `PARAMETER_SET` and one branch in `hypothesis`.
 """
 
-from numba import njit
+from beaver_ftc.compiled import kernel
 
 LOSS = 0
 PARAMETER_SET = {LOSS: (-1.0, 0.0)}
 
 
-@njit(cache=True)
-def hypothesis(kind, surface, G, u, base, Z):
+@kernel
+def hypothesis(kind, surface, G, Gu, base, Z):
     """Fill base (3,) rad/s2 and the regressor Z (3,) rad/s2 per unit of theta, for one fault of `surface`.
 
-    G (3, 4) rad/s2 per rad; u (4,) rad, the commanded deflections in effect.
+    G (3, 4) rad/s2 per rad; Gu (3, 4) rad/s2, the acceleration each commanded surface would give if healthy.
     """
     for i in range(3):
         base[i] = 0.0
-        Z[i] = G[i, surface] * u[surface]
+        Z[i] = Gu[i, surface]

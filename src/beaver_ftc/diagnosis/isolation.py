@@ -6,14 +6,13 @@
 the residual of the true estimator is exactly Omega (theta - thetahat) plus the filtered uncertainty, whatever the estimate does.
 """
 
-from numba import njit
-
+from beaver_ftc.compiled import kernel
 from beaver_ftc.diagnosis.fault_class import hypothesis
 from beaver_ftc.diagnosis.state import INTERVAL, NOT_ISOLATED, UNANTICIPATED
 from beaver_ftc.diagnosis.thresholds import bound_step, interval, published
 
 
-@njit(cache=True)
+@kernel
 def start(fdi, x):
     """Start every estimator at the measured x (3,) rad/s, with no residual and no knowledge of theta."""
     for s in range(fdi.n_estimators):
@@ -23,7 +22,7 @@ def start(fdi, x):
             fie.covariance[i] = (fie.high - fie.low) ** 2 / 12.0  # of a uniform distribution
 
 
-@njit(cache=True)
+@kernel
 def test(fdi, fie, x, t):
     """Form the residual and its limits at time t (s); exclude the fault when a residual leaves them."""
     for i in range(3):
@@ -39,7 +38,7 @@ def test(fdi, fie, x, t):
             fie.excluded_at_s = t
 
 
-@njit(cache=True)
+@kernel
 def decide(fdi, t):
     """The generalised observer scheme: the one left is the fault; none left means it is outside the class."""
     left, last = 0, NOT_ISOLATED
@@ -53,7 +52,7 @@ def decide(fdi, t):
         fdi.isolated_at_s = t
 
 
-@njit(cache=True)
+@kernel
 def isolate(fdi, x, t):
     """Test every estimator against the measured x (3,) rad/s at time t (s), and decide."""
     for s in range(fdi.n_estimators):
@@ -61,7 +60,7 @@ def isolate(fdi, x, t):
     decide(fdi, t)
 
 
-@njit(cache=True)
+@kernel
 def adapt(fie, i, forgetting):
     """One least-squares step of thetahat_i, projected onto the known set; returns the step.
 
@@ -80,11 +79,14 @@ def adapt(fie, i, forgetting):
     return fie.theta[i] - before
 
 
-@njit(cache=True)
-def predict(fdi, fie, x, believed, G, u):
-    """Advance one estimator by a frame; x (3,) rad/s, believed (3,) rad/s2 is f + G u, u (4,) rad in effect."""
+@kernel
+def predict(fdi, fie, x, believed, G, Gu):
+    """Advance one estimator by a frame; x (3,) rad/s as the frame began, the rest means over the frame.
+
+    believed (3,) rad/s2 is f + G u; G (3, 4) rad/s2 per rad; Gu (3, 4) rad/s2 the contribution of each surface to it.
+    """
     dt = fdi.dt
-    hypothesis(fie.kind, fie.surface, G, u, fie.base, fie.Z)
+    hypothesis(fie.kind, fie.surface, G, Gu, fie.base, fie.Z)
     for i in range(3):
         a = fdi.fie_decay[i]
         Z, theta = fie.Z[i], fie.theta[i]
@@ -98,8 +100,8 @@ def predict(fdi, fie, x, believed, G, u):
         fie.bound[i] = bound_step(fie.bound[i], fdi.eta_bar[i], a, dt)
 
 
-@njit(cache=True)
-def predict_all(fdi, x, believed, G, u):
+@kernel
+def predict_all(fdi, x, believed, G, Gu):
     """Advance the bank by a frame; arguments as in `predict`."""
     for s in range(fdi.n_estimators):
-        predict(fdi, fdi.estimator[s], x, believed, G, u)
+        predict(fdi, fdi.estimator[s], x, believed, G, Gu)

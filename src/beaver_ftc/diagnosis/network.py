@@ -7,7 +7,8 @@ dead zone at the detection threshold: the network cannot learn what the admitted
 """
 
 import numpy as np
-from numba import njit
+
+from beaver_ftc.compiled import kernel
 
 ALPHA_CENTRES = np.linspace(-0.1, 0.5, 9)
 BETA_CENTRES = np.linspace(-0.3, 0.3, 5)
@@ -27,7 +28,7 @@ _ALPHA_FIRST, _ALPHA_STEP = ALPHA_CENTRES[0], ALPHA_CENTRES[1] - ALPHA_CENTRES[0
 _BETA_FIRST, _BETA_STEP = BETA_CENTRES[0], BETA_CENTRES[1] - BETA_CENTRES[0]
 
 
-@njit(cache=True)
+@kernel
 def basis(alpha, beta, out):
     """Fill out (N_BASIS,) with the normalised radial basis functions at (alpha, beta), rad.
 
@@ -47,7 +48,7 @@ def basis(alpha, beta, out):
         out[j] /= norm
 
 
-@njit(cache=True)
+@kernel
 def dead_zone(residual, threshold):
     """D[eps]: nothing inside the threshold, what sticks out of it outside."""
     if residual > threshold:
@@ -57,7 +58,7 @@ def dead_zone(residual, threshold):
     return 0.0
 
 
-@njit(cache=True)
+@kernel
 def evaluate(network, alpha, beta):
     """Fill network.output (3,) rad/s2 for the present alpha and beta."""
     basis(alpha, beta, network.basis)
@@ -68,7 +69,7 @@ def evaluate(network, alpha, beta):
         network.output[i] = total
 
 
-@njit(cache=True)
+@kernel
 def learn(network, residual, threshold, leaking, dt):
     """Advance the weights by one frame; residual and threshold (3,) rad/s, dt s.
 

@@ -5,10 +5,10 @@ eps[k+1] = a eps[k] + dt eta[k], and so does its bound with eta_bar in place of 
 hold at any frame rate, with no allowance for discretisation.
 """
 
-from numba import njit
+from beaver_ftc.compiled import kernel
 
 
-@njit(cache=True)
+@kernel
 def bound_step(bound, eta_bar, decay, dt):
     """Advance ebar' = -lam ebar + eta_bar by one frame [Zhang2005, sec. IV].
 
@@ -17,7 +17,7 @@ def bound_step(bound, eta_bar, decay, dt):
     return decay * bound + dt * eta_bar
 
 
-@njit(cache=True)
+@kernel
 def interval(low, high, rise, fall, omega, theta, bound):
     """The signed interval (lower, upper), rad/s, that holds the residual of the true estimator.
 
@@ -30,14 +30,14 @@ def interval(low, high, rise, fall, omega, theta, bound):
     return lower, upper
 
 
-@njit(cache=True)
+@kernel
 def published(low, high, omega, theta, bound):
     """The norm bound mu = k |Omega| + bound, rad/s, symmetric; k bounds |theta - thetahat| [Zhang2005, via Zhang2002]."""
     mu = max(theta - low, high - theta) * abs(omega) + bound
     return -mu, mu
 
 
-@njit(cache=True)
+@kernel
 def uncertainty_bound(x, design, inertia, constant, earth_rate, eta_bar):
     """Fill eta_bar (3,) rad/s2: the published bound, and what the Earth's rotation adds.
 

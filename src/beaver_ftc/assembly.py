@@ -1,0 +1,86 @@
+"""Turns a scenario into the frame record that the compiled loop works on."""
+
+from math import exp, pi
+
+import numpy as np
+
+from beaver_ftc import channels as ch
+from beaver_ftc.control.config import ControlConfig
+from beaver_ftc.control.reference_model import discretise
+from beaver_ftc.control.state import LAWS
+from beaver_ftc.design.model import AILERON, ELEVATOR, RUDDER, design_record
+from beaver_ftc.diagnosis.config import FdiConfig
+from beaver_ftc.diagnosis.fault_class import LOSS, PARAMETER_SET
+from beaver_ftc.diagnosis.state import INTERVAL, NOT_ISOLATED, PUBLISHED
+from beaver_ftc.frame import FRAME
+from beaver_ftc.scenario.schema import Scenario
+
+EARTH_RATE_RAD_S = 2.0 * pi / 86164.0905  # one turn per sidereal day [WGS84]
+PUBLISHED_CLASS = (("aileron", LOSS, AILERON), ("elevator", LOSS, ELEVATOR), ("rudder", LOSS, RUDDER))
+_THRESHOLDS = {"interval": INTERVAL, "published": PUBLISHED}
+
+
+def estimator_names() -> tuple[str, ...]:
+    """Names of the isolation estimators, in the bank's order."""
+    return tuple(name for name, _, _ in PUBLISHED_CLASS)
+
+
+def _assemble_diagnosis(fdi: np.void, config: FdiConfig, dt: float) -> None:
+    fdi["enabled"] = config.scheme == "adaptive-estimators"
+    fdi["thresholds"] = _THRESHOLDS[config.thresholds]
+    fdi["dt"] = dt
+    fdi["forgetting"] = exp(-dt / config.forgetting_time_s)
+    fdi["decay"] = exp(-config.detection_pole_per_s * dt)
+    fdi["fie_decay"] = exp(-config.isolation_pole_per_s * dt)
+    fdi["inertia"] = config.bounds.inertia_coupling.as_tuple()
+    fdi["constant"] = config.bounds.constant_rad_s2.as_tuple()
+    fdi["earth_rate"] = EARTH_RATE_RAD_S
+    fdi["detected_at_s"] = fdi["isolated_at_s"] = fdi["certain_after_s"] = -1.0
+    fdi["isolated"] = NOT_ISOLATED
+    fdi["n_estimators"] = len(PUBLISHED_CLASS)
+    for fie, (_, kind, surface) in zip(fdi["estimator"], PUBLISHED_CLASS, strict=False):
+        fie["kind"], fie["surface"] = kind, surface
+        fie["low"], fie["high"] = PARAMETER_SET[kind]
+
+
+def _assemble_network(network: np.void, config: ControlConfig) -> None:
+    network["gain"] = config.network_gain_per_s2
+    network["leak_per_s"] = config.network_leak_per_s
+    network["weight_limit"] = config.network_weight_limit_rad_s2
+
+
+def _assemble_control(control: np.void, config: ControlConfig, dt: float, trim: np.ndarray, travel: np.ndarray) -> None:
+    control["law"] = LAWS.index(config.law)
+    control["dt"] = dt
+    control["Kp"], control["Ki"] = config.proportional_per_s, config.integral_per_s2
+    control["model_A"], control["model_B"] = discretise(
+        config.reference_natural_frequency_rad_s, config.reference_damping, dt
+    )
+    control["effectiveness"] = 1.0
+    control["effectiveness_step"] = config.effectiveness_rate_per_s * dt if config.law != "oracle" else np.inf
+    control["least_effectiveness"] = config.least_effectiveness
+    control["trim"] = control["command"] = trim
+    control["low"], control["high"] = travel
+    control["hand_over_step"] = dt / config.hand_over_s
+
+
+def assemble(scenario: Scenario, trim: np.ndarray, travel: np.ndarray) -> np.ndarray:
+    """The frame record, shape (1,), of a flight about to start.
+
+    trim (4,) rad: the surfaces in trim; travel (2, 4) rad: lower and upper stops. The truth's nodes are attached by the loop.
+    """
+    frames = np.zeros(1, FRAME)
+    frame = frames[0]
+    dt = 1.0 / scenario.rate_hz
+    n = scenario.substeps
+    frame["dt"] = dt
+    frame["first_share"], frame["end_share"] = 1.0 / n, (n - 1.0) / (2.0 * n)
+    frame["design"] = design_record(engine_terms=scenario.design_model.engine_terms)[0]
+    frame["factor"] = [factor for _, _, factor in ch.TRUTH]
+    frame["u"] = frame["u_then"] = trim
+    _assemble_diagnosis(frame["fdi"], scenario.fdi, dt)
+    _assemble_network(frame["fdi"]["network"], scenario.control)
+    _assemble_control(frame["control"], scenario.control, dt, trim, travel)
+    return frames
+
+

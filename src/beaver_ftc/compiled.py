@@ -1,0 +1,59 @@
+"""How this package compiles its per-frame maths: once per machine, with floating-point rules a flight can rely on.
+
+Division by zero gives inf or nan, as in NumPy and JSBSim: the loop looks for non-finite values once a frame instead of every operation doing so.
+No fast-math: the same flight gives the same bits.
+
+Compiled code is kept in the user's cache, in a folder named after the sources. Numba itself looks only at the file of the outermost
+function: without this, a change in an inner kernel would leave an old outer one in use. It also works where the package is read-only.
+"""
+
+import hashlib
+import os
+import tempfile
+from collections.abc import Iterator
+from functools import lru_cache
+from pathlib import Path
+
+import numba
+
+_PACKAGE = Path(__file__).parent
+_SOURCES = ("design/*.py", "diagnosis/*.py", "control/*.py", "plant/native.py", "channels.py", "frame.py", "supervisor.py")
+
+
+def _candidates() -> Iterator[Path]:
+    """Folders that may keep compiled code, best first."""
+    if "NUMBA_CACHE_DIR" in os.environ:
+        yield Path(os.environ["NUMBA_CACHE_DIR"])
+    yield Path(os.environ.get("XDG_CACHE_HOME") or Path("~/.cache").expanduser()) / "beaver-ftc"
+    yield Path(tempfile.gettempdir()) / f"beaver-ftc-{os.getuid()}"
+
+
+def _is_writable(folder: Path) -> bool:
+    try:
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        return os.access(folder, os.W_OK) and folder.stat().st_uid == os.getuid()
+    except OSError:
+        return False
+
+
+def _fingerprint() -> str:
+    digest = hashlib.sha256()
+    for pattern in _SOURCES:
+        for source in sorted(_PACKAGE.glob(pattern)):
+            digest.update(source.name.encode() + source.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+@lru_cache(maxsize=1)
+def cache_folder() -> Path | None:
+    """Where compiled kernels are kept; None where nothing can be written, and each process then compiles its own."""
+    base = next((folder for folder in _candidates() if _is_writable(folder)), None)
+    return base / _fingerprint() if base else None
+
+
+def kernel(function):
+    """Compile a function of arrays, records and numbers; the plain form stays at `.py_func`."""
+    folder = cache_folder()
+    if folder is not None:
+        numba.config.CACHE_DIR = str(folder)
+    return numba.njit(cache=folder is not None, error_model="numpy")(function)

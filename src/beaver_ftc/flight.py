@@ -1,0 +1,52 @@
+"""What a flight yields, and where its log goes."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from beaver_ftc.scenario.schema import Scenario
+
+
+class LogSink(Protocol):
+    """Takes the log as it is flown, in chunks: a ten-hour flight has 3.6 million rows."""
+
+    def open(self, columns: Sequence[str]) -> None:
+        """Called once, with the columns in order."""
+
+    def write(self, rows: np.ndarray) -> None:
+        """rows (n, columns), float64; the array is reused afterwards."""
+
+    def close(self) -> None:
+        """Called once, after the last row."""
+
+
+@dataclass(frozen=True)
+class Flight:
+    """Everything the metrics need; times in s since the start, rates in rad/s, per axis (p, q, r).
+
+    isolated: aileron, elevator, rudder, flap, unanticipated, or None while more than one fault fits (`candidates`).
+    estimate: the isolated fault's parameter, theta in [-1, 0] for a loss of effectiveness.
+    guaranteed_delay_s: from the fault to the instant from which detection was certain, None if that never came.
+    worst_residual_ratio: largest |residual| / threshold before the first alarm.
+    """
+
+    scenario: Scenario
+    frames: int
+    columns: tuple[str, ...]
+    detection_time_s: float | None
+    detection_axis: str | None
+    guaranteed_delay_s: float | None
+    isolation_time_s: float | None
+    isolated: str | None
+    isolation_type: str | None
+    candidates: tuple[str, ...]
+    estimate: float | None
+    pre_fault_rms_rad_s: tuple[float, float, float]
+    post_fault_rms_rad_s: tuple[float, float, float] | None
+    supervisor: tuple[tuple[float, str], ...]
+    envelope_exits: tuple[tuple[float, float], ...]
+    departure: tuple[float, str] | None
+    saturation_s: dict[str, float]
+    worst_residual_ratio: float

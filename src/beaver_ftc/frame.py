@@ -1,0 +1,380 @@
+"""One frame of the closed loop, compiled: measure, predict, detect, isolate, decide, command, record.
+
+Everything a flight remembers between frames is one record, so that a frame is one call from Python. The order matters and is JSBSim's:
+after `run()` number k the rates x[k] and the accelerations a[k] = F(x[k], u[k]) are there, u[k] being the command written before that
+run; the next run moves the rates by dt a[k]. The command computed here is u[k+1]. With n JSBSim frames in one of ours the rates move by
+dt/n a[k], and then by the accelerations on the way, already under u[k+1]: see `elapse`.
+"""
+
+import numpy as np
+
+from beaver_ftc import channels as ch
+from beaver_ftc.compiled import kernel
+from beaver_ftc.control import adaptive, allocation, nominal, reference_model
+from beaver_ftc.control.state import CONTROL, NOMINAL, ORACLE
+from beaver_ftc.design.model import ALPHA, BETA, DESIGN, QDYN, control_effectiveness, free_response
+from beaver_ftc.diagnosis import detection, guarantee, isolation, network
+from beaver_ftc.diagnosis.state import DIAGNOSIS
+from beaver_ftc.diagnosis.thresholds import uncertainty_bound
+from beaver_ftc.plant.native import read_nodes, write_nodes
+from beaver_ftc.supervisor import MODE_NOMINAL, MODE_REALLOCATED, mode_of
+
+MAX_EVENTS = 64
+FLYING, DEPARTED, NOT_FINITE = 0, 1, 2
+DEPARTURE_ANGLE_RAD = 0.6
+DEPARTURE_RATE_RAD_S = 6.0
+DEPARTURE_SIGNALS = ("p", "q", "r", "alpha", "beta")
+
+FRAME = np.dtype(
+    [
+        ("design", DESIGN), ("fdi", DIAGNOSIS), ("control", CONTROL),
+        ("k", "i8"), ("row", "i8"), ("dt", "f8"), ("t", "f8"), ("first_share", "f8"), ("end_share", "f8"),
+        # the truth's nodes
+        ("native", "i8"), ("getter", "i8"), ("setter", "i8"),
+        ("read_pointers", "i8", (ch.N_TRUTH,)), ("write_pointers", "i8", (4,)), ("factor", "f8", (ch.N_TRUTH,)),
+        ("truth", "f8", (ch.N_TRUTH,)),
+        ("latitude_0", "f8"), ("longitude_0", "f8"), ("radius_m", "f8"),
+        # the truth's faults, for the oracle and for the analyst
+        ("faulted", "i8"), ("fault_at_s", "f8"), ("Cm_alpha3", "f8"), ("phi", "f8", (3,)),
+        # what is measured and believed
+        ("x", "f8", (3,)), ("y", "f8", (5,)), ("u", "f8", (4,)),
+        ("f", "f8", (3,)), ("G", "f8", (3, 4)), ("G_believed", "f8", (3, 4)),
+        # the frame before, and means over the frame that elapsed since
+        ("x_then", "f8", (3,)), ("f_then", "f8", (3,)), ("G_then", "f8", (3, 4)), ("u_then", "f8", (4,)),
+        ("eta_bar_then", "f8", (3,)), ("phi_then", "f8", (3,)),
+        ("G_mean", "f8", (3, 4)), ("Gu_mean", "f8", (3, 4)), ("believed", "f8", (3,)),
+        ("fhat", "f8", (3,)), ("target", "f8", (4,)),
+        # what happened
+        ("mode", "i8"), ("n_modes", "i8"), ("mode_at_s", "f8", (MAX_EVENTS,)), ("mode_is", "i8", (MAX_EVENTS,)),
+        ("pre_fault_square", "f8", (3,)), ("pre_fault_frames", "i8"),
+        ("post_fault_square", "f8", (3,)), ("post_fault_frames", "i8"),
+        ("saturated_frames", "i8", (4,)),
+        ("outside", "i8"), ("n_exits", "i8"), ("exit_at_s", "f8", (MAX_EVENTS,)), ("return_at_s", "f8", (MAX_EVENTS,)),
+        ("departed", "i8"),
+    ],
+    align=True,
+)  # fmt: skip
+
+
+@kernel
+def measure(frame):
+    """Read the truth and form what the sensors give: x (3,) rad/s and y (5,)."""
+    truth = frame.truth
+    if frame.native:
+        read_nodes(frame.getter, frame.read_pointers, truth)
+    for i in range(ch.N_TRUTH):
+        truth[i] *= frame.factor[i]
+    for i in range(3):
+        frame.x[i] = truth[i]
+    y = frame.y
+    y[0], y[1], y[2], y[3], y[4] = truth[ch.ALPHA], truth[ch.BETA], truth[ch.AIRSPEED], truth[ch.QDYN], truth[ch.DPT]
+
+
+@kernel
+def flight_status(truth):
+    """FLYING, NOT_FINITE, or DEPARTED + the index in DEPARTURE_SIGNALS of what left its limits, times ten."""
+    for i in range(ch.N_TRUTH):
+        if not np.isfinite(truth[i]):
+            return NOT_FINITE
+    for i in range(3):
+        if abs(truth[i]) > DEPARTURE_RATE_RAD_S:
+            return DEPARTED + 10 * i
+    if abs(truth[ch.ALPHA]) > DEPARTURE_ANGLE_RAD:
+        return DEPARTED + 30
+    if abs(truth[ch.BETA]) > DEPARTURE_ANGLE_RAD:
+        return DEPARTED + 40
+    return FLYING
+
+
+@kernel
+def fault_effect(frame):
+    """Fill frame.phi (3,) rad/s2: what the truth's faults do to the angular acceleration, as the design model weighs it."""
+    G, truth, y, design = frame.G, frame.truth, frame.y, frame.design
+    for i in range(3):
+        frame.phi[i] = 0.0
+        if frame.faulted:
+            for s in range(4):
+                frame.phi[i] += G[i, s] * (truth[ch.EFFECTIVE + s] - frame.u[s])
+    if frame.faulted:
+        frame.phi[1] += frame.Cm_alpha3 * design.Qm * y[QDYN] * design.S * design.c * y[ALPHA] ** 3
+
+
+@kernel
+def elapse(frame):
+    """Means over the frame that has elapsed: G, the moment of each surface, f + G u, and the bound.
+
+    The truth is a left sum over n JSBSim frames, the first under the old command. For f and G linear in time over the frame its mean weighs
+    the old sample (n + 1)/2n and the new one (n - 1)/2n: for n = 1 the old one alone, and exactly.
+    """
+    first, end = frame.first_share, frame.end_share
+    for i in range(3):
+        rate = (1.0 - end) * frame.f_then[i] + end * frame.f[i]
+        for s in range(4):
+            then, now = frame.G_then[i, s], frame.G[i, s]
+            frame.G_mean[i, s] = (1.0 - end) * then + end * now
+            moved = (1.0 - first - end) * then + end * now
+            frame.Gu_mean[i, s] = first * then * frame.u_then[s] + moved * frame.u[s]
+            rate += frame.Gu_mean[i, s]
+        frame.believed[i] = rate
+        frame.fdi.eta_bar[i] = (1.0 - end) * frame.eta_bar_then[i] + end * frame.fdi.eta_bar[i]
+        frame.phi_then[i] = (1.0 - end) * frame.phi_then[i] + end * frame.phi[i]
+
+
+@kernel
+def predict(frame):
+    """Bring the estimators from the frame before to this one."""
+    fdi = frame.fdi
+    guarantee.track(fdi, frame.phi_then)
+    if fdi.detected:
+        isolation.predict_all(fdi, frame.x_then, frame.believed, frame.G_mean, frame.Gu_mean)
+        for s in range(4):
+            lost = 1.0 - frame.control.effectiveness[s]
+            for i in range(3):
+                frame.believed[i] -= lost * frame.Gu_mean[i, s]
+    detection.predict(fdi, frame.x_then, frame.believed, fdi.isolated >= 0)
+
+
+@kernel
+def remember(frame):
+    """Keep what the next frame's `elapse` needs of this one."""
+    frame.x_then[:], frame.f_then[:], frame.G_then[:], frame.u_then[:] = frame.x, frame.f, frame.G, frame.u
+    frame.eta_bar_then[:], frame.phi_then[:] = frame.fdi.eta_bar_now, frame.phi
+
+
+@kernel
+def diagnose(frame):
+    """Predict, compare, raise the alarm, exclude, decide."""
+    fdi, x, t = frame.fdi, frame.x, frame.t
+    uncertainty_bound(x, frame.design, fdi.inertia, fdi.constant, fdi.earth_rate, fdi.eta_bar_now)
+    fdi.eta_bar[:] = fdi.eta_bar_now
+    if frame.k > 0:
+        elapse(frame)
+    if fdi.enabled:
+        if frame.k > 0:
+            predict(frame)
+        guarantee.judge(fdi, t)
+        decide(fdi, frame.y, x, t)
+    remember(frame)
+
+
+@kernel
+def decide(fdi, y, x, t):
+    """From residuals to alarm, and from then on to a verdict."""
+    known = fdi.detected
+    detection.detect(fdi, x, t)
+    if not fdi.detected:
+        return
+    if not known:
+        isolation.start(fdi, x)
+    isolation.isolate(fdi, x, t)
+    network.evaluate(fdi.network, y[ALPHA], y[BETA])
+
+
+@kernel
+def isolated_surface(fdi):
+    """The surface of the isolated fault, or -1."""
+    return fdi.estimator[fdi.isolated].surface if fdi.isolated >= 0 else -1
+
+
+@kernel
+def supervise(frame):
+    """Put the right law in charge and note every change."""
+    fdi = frame.fdi
+    mode = mode_of(frame.control.law, fdi.detected, fdi.isolated, isolated_surface(fdi))
+    if frame.control.law == ORACLE:
+        mode = MODE_NOMINAL
+    if (mode != frame.mode or frame.n_modes == 0) and frame.n_modes < MAX_EVENTS:
+        frame.mode_at_s[frame.n_modes] = frame.t
+        frame.mode_is[frame.n_modes] = mode
+        frame.n_modes += 1
+    frame.mode = mode
+
+
+@kernel
+def dominant_axis(surface):
+    """The axis a surface is there for: aileron p, elevator and flap q, rudder r."""
+    return 0 if surface == 0 else (2 if surface == 2 else 1)
+
+
+@kernel
+def accommodate(frame):
+    """What the law believes of the surfaces and of the unknown: effectiveness (4,) and fhat (3,) rad/s2."""
+    control, fdi = frame.control, frame.fdi
+    surface = isolated_surface(fdi)
+    for s in range(4):
+        frame.target[s] = 1.0
+        if control.law == ORACLE:
+            frame.target[s] = frame.truth[ch.TRUE_EFFECTIVENESS + s]
+        elif s == surface:
+            frame.target[s] = 1.0 + fdi.estimator[fdi.isolated].theta[dominant_axis(s)]
+    adaptive.approach(control, frame.target)
+    for i in range(3):
+        frame.fhat[i] = 0.0 if control.law in (NOMINAL, ORACLE) else fdi.network.output[i]
+    if control.law == ORACLE:
+        design, y = frame.design, frame.y
+        frame.fhat[1] = frame.Cm_alpha3 * design.Qm * y[QDYN] * design.S * design.c * y[ALPHA] ** 3
+
+
+@kernel
+def command(frame, reference):
+    """Fill control.command (4,) rad from the reference (3,) rad/s: the law in charge."""
+    control = frame.control
+    accommodate(frame)
+    if control.law == NOMINAL:
+        frame.G_believed[:] = frame.G
+    else:
+        adaptive.believed_effectiveness(control, frame.G, frame.G_believed)
+    if frame.mode == MODE_REALLOCATED:
+        control.hand_over = min(control.hand_over + control.hand_over_step, 1.0)
+    nominal.demand(control, frame.x, frame.f, frame.fhat)
+    allocation.allocate(control, frame.G_believed, control.command)
+    nominal.integrate(control, frame.x, frame.G_believed, control.command)
+
+
+@kernel
+def account(frame):
+    """Sums for the metrics: tracking error before and after the fault, saturation, envelope exits."""
+    control = frame.control
+    after = frame.faulted
+    for i in range(3):
+        square = (control.model_rate[i] - frame.x[i]) ** 2
+        if after:
+            frame.post_fault_square[i] += square
+        else:
+            frame.pre_fault_square[i] += square
+    if after:
+        frame.post_fault_frames += 1
+    else:
+        frame.pre_fault_frames += 1
+    for s in range(4):
+        frame.saturated_frames[s] += control.saturated[s]
+    note_envelope(frame)
+
+
+@kernel
+def note_envelope(frame):
+    """Note when the flight leaves the validated envelope and when it comes back."""
+    outside = frame.truth[ch.ENVELOPE] < 0.5
+    if outside and not frame.outside:
+        if frame.n_exits < MAX_EVENTS:
+            frame.exit_at_s[frame.n_exits] = frame.t
+            frame.return_at_s[frame.n_exits] = np.inf
+        frame.n_exits += 1
+    elif frame.outside and not outside and frame.n_exits <= MAX_EVENTS:
+        frame.return_at_s[frame.n_exits - 1] = frame.t
+    frame.outside = outside
+
+
+@kernel
+def put(row, column, values):
+    """Write values into row from column on; returns the next column."""
+    for i in range(values.size):
+        row[column + i] = values[i]
+    return column + values.size
+
+
+@kernel
+def record_truth(frame, row):
+    """The first columns of the log: time and the truth. Returns the next column."""
+    truth = frame.truth
+    row[0] = frame.t
+    row[1], row[2], row[3] = truth[ch.AIRSPEED], truth[ch.ALPHA], truth[ch.BETA]
+    column = put(row, 4, truth[0:3])
+    column = put(row, column, truth[ch.PHI : ch.PHI + 3])
+    row[column] = (truth[ch.LATITUDE] - frame.latitude_0) * frame.radius_m
+    row[column + 1] = (truth[ch.LONGITUDE] - frame.longitude_0) * frame.radius_m * np.cos(frame.latitude_0)
+    row[column + 2] = truth[ch.ALTITUDE]
+    column = put(row, column + 3, truth[ch.PDOT : ch.PDOT + 3])
+    row[column], row[column + 1], row[column + 2] = truth[ch.QDYN], truth[ch.DPT], truth[ch.ENVELOPE]
+    return column + 3
+
+
+@kernel
+def record_surfaces(frame, row, column):
+    """Command in effect, position and effective deflection of each surface; then who was saturated."""
+    for s in range(4):
+        row[column] = frame.u[s]
+        row[column + 1] = frame.truth[ch.POS + s]
+        row[column + 2] = frame.truth[ch.EFFECTIVE + s]
+        column += 3
+    return put(row, column, frame.control.saturated)
+
+
+@kernel
+def record_estimators(fdi, row, column):
+    """Residuals between their limits, per estimator; not a number before the estimators start."""
+    for s in range(fdi.n_estimators):
+        fie = fdi.estimator[s]
+        for i in range(3):
+            row[column] = fie.residual[i] if fdi.detected else np.nan
+            row[column + 1] = fie.lower[i] if fdi.detected else np.nan
+            row[column + 2] = fie.upper[i] if fdi.detected else np.nan
+            column += 3
+        row[column] = fie.excluded
+        column += 1
+    return column
+
+
+@kernel
+def record(frame, reference, row):
+    """Write one row of the log, in the order of channels.log_columns."""
+    control, fdi = frame.control, frame.fdi
+    column = record_truth(frame, row)
+    column = put(row, column, frame.x)
+    column = put(row, column, reference)
+    column = put(row, column, control.model_rate)
+    column = record_surfaces(frame, row, column)
+    column = put(row, column, fdi.residual)
+    column = put(row, column, fdi.threshold)
+    column = put(row, column, fdi.eta_bar)
+    column = put(row, column, fdi.network.output)
+    column = record_estimators(fdi, row, column)
+    column = put(row, column, control.effectiveness)
+    row[column] = frame.mode
+    row[column + 1] = fdi.detected
+
+
+@kernel
+def begin(frame):
+    """Measure, and work out what the design model makes of it. Returns the flight's status."""
+    frame.t = frame.k * frame.dt
+    measure(frame)
+    status = flight_status(frame.truth)
+    if status != NOT_FINITE:
+        free_response(frame.design, frame.x, frame.y, frame.f)
+        control_effectiveness(frame.design, frame.y, frame.G)
+        fault_effect(frame)
+    return status
+
+
+@kernel
+def finish(frame, reference, row):
+    """Account, record and hand the command over; the reference model moves on."""
+    account(frame)
+    record(frame, reference, row)
+    reference_model.follow(frame.control, reference)
+    for s in range(4):
+        frame.u[s] = frame.control.command[s]
+    if frame.native:
+        write_nodes(frame.setter, frame.write_pointers, frame.u)
+    frame.k += 1
+    frame.row += 1
+
+
+@kernel
+def fly_frame(frames, references, log):
+    """One frame of the closed loop with the built-in diagnosis and law.
+
+    frames (1,) of dtype FRAME; references (n, 3) rad/s and log (n, columns) of the present chunk, indexed by frame.row.
+    Returns FLYING, or why the flight ends: the row of a departure is still recorded, that of a non-finite truth is not.
+    """
+    frame = frames[0]
+    status = begin(frame)
+    if status == NOT_FINITE:
+        return status
+    reference, row = references[frame.row], log[frame.row]
+    diagnose(frame)
+    supervise(frame)
+    command(frame, reference)
+    finish(frame, reference, row)
+    return status

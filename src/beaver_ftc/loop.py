@@ -1,0 +1,175 @@
+"""The closed loop: JSBSim flies, the compiled frame measures, diagnoses, decides and commands, the log goes to its sink."""
+
+from collections.abc import Callable, Iterable
+from math import radians
+
+import numpy as np
+
+from beaver_ftc import channels as ch
+from beaver_ftc.assembly import assemble, estimator_names
+from beaver_ftc.design.coefficients import SURFACES
+from beaver_ftc.errors import SimulationFailed
+from beaver_ftc.flight import Flight, LogSink
+from beaver_ftc.frame import FLYING, NOT_FINITE, fly_frame
+from beaver_ftc.outcome import flight_of
+from beaver_ftc.plant import native
+from beaver_ftc.plant.adapter import Plant
+from beaver_ftc.plant.configure import configure
+from beaver_ftc.plant.faults import FaultSchedule
+from beaver_ftc.plant.trim import TrimPoint, trim
+from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.scenario.signals import sample
+
+CHUNK_ROWS = 8192
+EARTH_RADIUS_M = 6371000.0  # for the log's north and east: a local plane, not navigation
+
+
+class Cockpit:
+    """The wires between one plant and one frame record: which nodes are read and written, natively or through Python."""
+
+    def __init__(self, plant: Plant, frames: np.ndarray) -> None:
+        self._frames = frames
+        self._read = native.NodeBank([plant.node(name) for _, name, _ in ch.TRUTH], owner=plant)
+        self._write = native.NodeBank([plant.node(name) for name in ch.COMMANDS], owner=plant)
+        self.native = native.available()
+        frame = frames[0]
+        frame["native"] = self.native
+        frame["getter"], frame["setter"] = native.getter_address(), native.setter_address()
+        frame["read_pointers"], frame["write_pointers"] = self._read.pointers, self._write.pointers
+
+    def read(self) -> None:
+        """Bring the truth into the frame record, through Python."""
+        self._read.read(self._frames["truth"][0])
+
+    def write(self) -> None:
+        """Hand the command over, through Python."""
+        self._write.write(self._frames["u"][0])
+
+
+class Loop:
+    """One flight in progress."""
+
+    def __init__(self, scenario: Scenario) -> None:
+        self.scenario = scenario
+        self.plant = Plant(scenario.rate_hz, scenario.substeps)
+        configure(self.plant, scenario)
+        self.trim = trim_of(scenario, self.plant)
+        self.plant.start(self.trim)
+        surfaces = np.array([getattr(self.trim, f"{s}_rad") for s in SURFACES])
+        self.frames = assemble(scenario, surfaces, travel_rad(self.plant))
+        self.cockpit = Cockpit(self.plant, self.frames)
+        self.schedule = FaultSchedule(scenario.faults, self.plant, scenario.rate_hz)
+        self.n_frames = round(scenario.duration_s * scenario.rate_hz)
+        self.columns = ch.log_columns(estimator_names())
+        self._log = np.empty((min(CHUNK_ROWS, self.n_frames), len(self.columns)))
+        self._set_origin()
+
+    def _set_origin(self) -> None:
+        frame = self.frames[0]
+        frame["latitude_0"] = self.plant.read(ch.TRUTH[ch.LATITUDE][1])
+        frame["longitude_0"] = self.plant.read(ch.TRUTH[ch.LONGITUDE][1])
+        frame["radius_m"] = EARTH_RADIUS_M + self.scenario.initial.altitude_m
+
+    def chunks(self) -> Iterable[np.ndarray]:
+        """Fly; yield the log a chunk at a time, rows (n, columns). The array is reused."""
+        for start in range(0, self.n_frames, CHUNK_ROWS):
+            rows = min(CHUNK_ROWS, self.n_frames - start)
+            t = np.arange(start, start + rows) / self.scenario.rate_hz
+            status = self._fly_chunk(start, rows, sample(self.scenario.reference, t))
+            flown = int(self.frames["row"][0])
+            yield self._log[:flown]
+            if status != FLYING:
+                return
+
+    def _fly_chunk(self, start: int, rows: int, references: np.ndarray) -> int:
+        """Frames start to start + rows; returns why it ended."""
+        self.frames["row"] = 0
+        k, end = start, start + rows
+        while k < end:
+            self.schedule.apply(k)
+            self._tell_analyst(k)
+            stop = min(self.schedule.next_change(k), end)
+            status = self._fly_segment(k, stop, references)
+            if status != FLYING:
+                return status
+            k = stop
+        return FLYING
+
+    def _fly_segment(self, k: int, stop: int, references: np.ndarray) -> int:
+        """Frames k to stop, in which no fault changes."""
+        if k == 0:
+            status = self._fly_frames(1, 0, references)
+            if status != FLYING:
+                return status
+            k = 1
+        return self._fly_frames(stop - k, self.scenario.substeps, references)
+
+    def _fly_frames(self, count: int, runs: int, references: np.ndarray) -> int:
+        run, frames, log, cockpit = self.plant.run, self.frames, self._log, self.cockpit
+        through_python = not cockpit.native
+        for _ in range(count):
+            for _ in range(runs):
+                run()
+            if through_python:
+                cockpit.read()
+            status = fly_frame(frames, references, log)
+            if through_python:
+                cockpit.write()
+            if status:
+                return self._landed(status)
+        return FLYING
+
+    def _landed(self, status: int) -> int:
+        if status == NOT_FINITE:
+            bad = [name for (name, _, _), value in zip(ch.TRUTH, self.frames["truth"][0], strict=True) if not np.isfinite(value)]
+            raise SimulationFailed(
+                f"{self.scenario.name}: {', '.join(bad)} not finite at {self.frames['t'][0]:g} s; the flight cannot go on"
+            )
+        self.frames["departed"] = status
+        return status
+
+    def _tell_analyst(self, k: int) -> None:
+        """The oracle and the guarantee know the truth's faults; the diagnosis never looks at these fields."""
+        frame = self.frames[0]
+        if self.schedule.begun(k) and not frame["faulted"]:
+            frame["faulted"], frame["fault_at_s"] = 1, k / self.scenario.rate_hz
+        frame["Cm_alpha3"] = self.plant.read("failures/unanticipated/Cm-alpha3")
+
+
+def trim_of(scenario: Scenario, plant: Plant) -> TrimPoint:
+    """The scenario's trim, on its truth with the coefficient errors; BadInput when there is none."""
+    initial = scenario.initial
+    return trim(
+        initial.airspeed_mps,
+        initial.altitude_m,
+        engine_rpm=initial.engine_rpm,
+        manifold_pressure_inhg=initial.manifold_pressure_inhg,
+        flap_rad=radians(initial.flap_deg),
+        plant=plant,
+    )
+
+
+def travel_rad(plant: Plant) -> np.ndarray:
+    """Lower and upper stops of the surfaces, (2, 4) rad."""
+    return np.array([[plant.read(f"actuators/{s}/position-{end}-rad") for s in SURFACES] for end in ("min", "max")])
+
+
+def fly(
+    scenario: Scenario, sink: LogSink | None = None, progress: Callable[[float], None] | None = None
+) -> Flight:
+    """Fly a scenario. The log goes to `sink`; `progress` is called with the share flown, chunk by chunk.
+
+    Raises BadInput when the flight cannot be trimmed or asks for what there is not, SimulationFailed when a value is not finite.
+    """
+    loop = Loop(scenario)
+    if sink is not None:
+        sink.open(loop.columns)
+    for rows in loop.chunks():
+        if sink is not None:
+            sink.write(rows)
+        if progress is not None:
+            progress(loop.frames["k"][0] / loop.n_frames)
+    if sink is not None:
+        sink.close()
+    return flight_of(scenario, loop.frames[0], loop.columns)
+

@@ -1,0 +1,84 @@
+"""From the frame record at the end of a flight to what the flight yields."""
+
+from math import isfinite
+
+import numpy as np
+
+from beaver_ftc.assembly import PUBLISHED_CLASS, estimator_names
+from beaver_ftc.design.model import AXES, SURFACES
+from beaver_ftc.diagnosis.state import NOT_ISOLATED, UNANTICIPATED
+from beaver_ftc.flight import Flight
+from beaver_ftc.frame import DEPARTURE_SIGNALS, dominant_axis
+from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.supervisor import MODES
+
+_TYPES = {0: "loss_of_effectiveness"}
+
+
+def _instant(seconds: float) -> float | None:
+    return float(seconds) if seconds >= 0.0 else None
+
+
+def _rms(square_sum: np.ndarray, frames: int) -> tuple[float, float, float] | None:
+    if frames == 0:
+        return None
+    p, q, r = np.sqrt(square_sum / frames)
+    return float(p), float(q), float(r)
+
+
+def _isolation(fdi: np.void) -> dict:
+    """isolated, isolation_type, candidates, estimate, isolation_time_s of a Flight."""
+    verdict = int(fdi["isolated"])
+    left = [n for n, fie in zip(estimator_names(), fdi["estimator"], strict=False) if not fie["excluded"]]
+    nothing = {"isolated": None, "isolation_type": None, "estimate": None, "isolation_time_s": None}
+    if not fdi["detected"] or verdict == NOT_ISOLATED:
+        return {**nothing, "candidates": tuple(left) if fdi["detected"] else ()}
+    at_s = float(fdi["isolated_at_s"])
+    if verdict == UNANTICIPATED:
+        return {**nothing, "isolated": "unanticipated", "isolation_type": "unanticipated", "candidates": (), "isolation_time_s": at_s}
+    fie = fdi["estimator"][verdict]
+    surface = int(fie["surface"])
+    return {
+        "isolated": SURFACES[surface],
+        "isolation_type": _TYPES[PUBLISHED_CLASS[verdict][1]],
+        "candidates": tuple(left),
+        "estimate": float(fie["theta"][dominant_axis(surface)]),
+        "isolation_time_s": at_s,
+    }
+
+
+def _envelope_exits(frame: np.void) -> tuple[tuple[float, float], ...]:
+    count = min(int(frame["n_exits"]), len(frame["exit_at_s"]))
+    end_s = float(frame["t"])
+    return tuple(
+        (float(out), float(back) if isfinite(back) else end_s)
+        for out, back in zip(frame["exit_at_s"][:count], frame["return_at_s"][:count], strict=True)
+    )
+
+
+def _guaranteed_delay(frame: np.void) -> float | None:
+    certain = _instant(frame["fdi"]["certain_after_s"])
+    return None if certain is None or not frame["faulted"] else certain - float(frame["fault_at_s"])
+
+
+def flight_of(scenario: Scenario, frame: np.void, columns: tuple[str, ...]) -> Flight:
+    """Read the flight's outcome off its frame record."""
+    fdi, dt = frame["fdi"], float(frame["dt"])
+    departed = int(frame["departed"])
+    modes = range(int(frame["n_modes"]))
+    return Flight(
+        scenario=scenario,
+        frames=int(frame["k"]),
+        columns=columns,
+        detection_time_s=_instant(fdi["detected_at_s"]),
+        detection_axis=AXES[int(fdi["detected_axis"])] if fdi["detected"] else None,
+        guaranteed_delay_s=_guaranteed_delay(frame),
+        pre_fault_rms_rad_s=_rms(frame["pre_fault_square"], int(frame["pre_fault_frames"])) or (0.0, 0.0, 0.0),
+        post_fault_rms_rad_s=_rms(frame["post_fault_square"], int(frame["post_fault_frames"])),
+        supervisor=tuple((float(frame["mode_at_s"][i]), MODES[int(frame["mode_is"][i])]) for i in modes),
+        envelope_exits=_envelope_exits(frame),
+        departure=(float(frame["t"]), DEPARTURE_SIGNALS[departed // 10]) if departed else None,
+        saturation_s={s: int(n) * dt for s, n in zip(SURFACES, frame["saturated_frames"], strict=True)},
+        worst_residual_ratio=float(fdi["worst_ratio"]),
+        **_isolation(fdi),
+    )

@@ -10,6 +10,7 @@ from beaver_ftc.paths import data_root
 from beaver_ftc.plant.state import START_LATITUDE_DEG, FlightState
 
 FT_PER_M = 1.0 / 0.3048
+PA_PER_PSF = 4.4482216152605 / 0.3048**2
 
 # betadot enters the side force with the value of the previous run; each further run at the same state
 # divides the error by more than 100 (CY_betadot qdyn S b / 2 m V^2 is at most 0.01), so five leave nothing

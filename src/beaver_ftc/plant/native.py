@@ -18,11 +18,12 @@ from functools import lru_cache
 from importlib import import_module
 
 import jsbsim
-import numba
 import numpy as np
 from llvmlite import ir
 from numba.core import types
 from numba.extending import intrinsic
+
+from beaver_ftc.compiled import kernel
 
 _GETTER = "_ZNK14SGPropertyNode14getDoubleValueEv"  # double SGPropertyNode::getDoubleValue() const
 _SETTER = "_ZN14SGPropertyNode14setDoubleValueEd"  # bool SGPropertyNode::setDoubleValue(double)
@@ -72,14 +73,14 @@ def _call_setter(typingctx, function, node, value):
     return types.boolean(types.int64, types.int64, types.float64), codegen
 
 
-@numba.njit(cache=True)
+@kernel
 def read_nodes(getter, pointers, out):
     """Read nodes into out. getter: getter_address(). pointers, out: (n,) int64, float64."""
     for i in range(pointers.size):
         out[i] = _call_getter(getter, pointers[i])  # type: ignore[call-arg]
 
 
-@numba.njit(cache=True)
+@kernel
 def write_nodes(setter, pointers, values):
     """Write values to nodes. setter: setter_address(). pointers, values: (n,) int64, float64."""
     for i in range(pointers.size):

@@ -1,4 +1,4 @@
-"""A flight made by hand: the columns and the summary of a run with plausible numbers, for testing what shows them."""
+"""A flight made by hand: columns and summary of a run with plausible numbers, to test what shows them."""
 
 from dataclasses import dataclass, field
 from typing import Any
@@ -87,7 +87,7 @@ class Flight:
 
 
 def rows(flight: Flight) -> np.ndarray:
-    """The log of `flight`, shape (frames, columns): sines, a fault at 12 s, residuals that leave their bounds."""
+    """The log of `flight`, shape (frames, columns): sines, a fault at 12 s, residuals that leave bounds."""
     t = np.arange(flight.frames) / flight.scenario.rate_hz
     values = dict.fromkeys(COLUMNS, np.zeros_like(t)) | {"t_s": t}
     rng = np.random.default_rng(flight.scenario.seed)
@@ -97,11 +97,15 @@ def rows(flight: Flight) -> np.ndarray:
     for axis in AXES:
         threshold = 0.02 * (1 - np.exp(-t))
         noise = 0.1 * threshold * np.sin(10 * t) + 1e-5 * rng.standard_normal(t.size)
-        values[f"{axis}_residual_rad_s"] = noise + (axis == "q") * 0.08 * np.minimum(after, 1) * np.sin(1.3 * t)
+        values[f"{axis}_residual_rad_s"] = noise + (axis == "q") * 0.08 * np.minimum(after, 1) * np.sin(
+            1.3 * t
+        )
         values[f"{axis}_threshold_rad_s"] = threshold
         values[f"{axis}_eta_bar_rad_s2"] = 0.02 + 0.001 * np.abs(np.sin(t))
         for estimator in ESTIMATORS:
-            values |= _estimator(f"fie_{estimator}_{axis}", t, detected, drifts=estimator != "elevator" and axis == "q")
+            values |= _estimator(
+                f"fie_{estimator}_{axis}", t, detected, drifts=estimator != "elevator" and axis == "q"
+            )
     for estimator in ESTIMATORS:
         values[f"fie_{estimator}_excluded"] = np.where(
             detected, np.where(t > 12.12, float(estimator != "elevator"), 0.0), np.nan
@@ -118,7 +122,8 @@ def _states(t: np.ndarray) -> dict[str, np.ndarray]:
         "beta_rad": 0.01 * np.sin(0.9 * t), "phi_rad": 0.1 * np.sin(0.5 * t),
         "theta_rad": 0.05 + 0.02 * np.sin(0.8 * t), "psi_rad": 0.02 * t,
         "north_m": 45 * t * np.cos(0.01 * t), "east_m": 45 * t * np.sin(0.01 * t),
-        "altitude_m": 1828.8 + 4 * np.sin(0.3 * t), "qdyn_pa": np.full_like(t, 1037.0), "dpt": np.full_like(t, 0.6),
+        "altitude_m": 1828.8 + 4 * np.sin(0.3 * t), "qdyn_pa": np.full_like(t, 1037.0),
+        "dpt": np.full_like(t, 0.6),
     }  # fmt: skip
 
 

@@ -1,7 +1,7 @@
 """What a scenario expects of its flight (`expect:`), held against the metrics: what a CI job asserts.
 
-One rule a key. A rule takes what was expected and the metrics document, and returns what was found and whether
-that will do. Where the quantity does not exist (nothing was detected, say) the expectation fails.
+One rule a key. A rule takes what was expected and the metrics document, and returns what was found and
+whether that will do. Where the quantity does not exist (nothing was detected, say) the expectation fails.
 """
 
 from collections.abc import Callable, Iterator
@@ -12,7 +12,7 @@ Rule = Callable[[Any, Document], tuple[Any, bool]]
 
 
 def evaluate(expect: Any, metrics: Document) -> list[Document]:
-    """One {name, passed, expected, actual} for each expectation set in `expect`, in the order of its fields."""
+    """One {name, passed, expected, actual} for each expectation set in `expect`, in its fields' order."""
     return [
         {"name": name, "passed": passed, "expected": expected, "actual": actual}
         for name, rule, expected in _each(expect)
@@ -25,7 +25,9 @@ def _each(expect: Any) -> Iterator[tuple[str, Rule, Any]]:
         return
     for name, expected in expect.model_dump(exclude_none=True).items():
         if isinstance(expected, dict):
-            yield from ((f"{name}.{axis}", _rms_at_most(name, axis), limit) for axis, limit in expected.items())
+            yield from (
+                (f"{name}.{axis}", _rms_at_most(name, axis), limit) for axis, limit in expected.items()
+            )
         else:
             yield name, _RULES[name], expected
 

@@ -1,6 +1,6 @@
 """The figures of a flight as PNG: the views drawn with matplotlib, without its global state.
 
-Colours are Okabe and Ito's, told apart by the colour-blind; line styles and widths keep the curves apart in grey.
+Colours are Okabe and Ito's, told apart by the colour-blind; line styles and widths tell curves apart in grey.
 """
 
 from collections.abc import Iterable, Sequence
@@ -76,7 +76,7 @@ def marks(metrics: Document) -> list[Mark]:
 
 
 def closeup_window(instants: Sequence[Mark]) -> tuple[float, float] | None:
-    """Where to look closely: from just before the fault (or the alarm) to a few seconds after the last event."""
+    """Where to look closely: from just before the fault (or alarm) to two seconds after the last event."""
     if not instants:
         return None
     times = [mark.time_s for mark in instants if mark.name != "departure"] or [instants[0].time_s]
@@ -84,8 +84,12 @@ def closeup_window(instants: Sequence[Mark]) -> tuple[float, float] | None:
 
 
 def write_figures(log_path: Path, metrics: Document, folder: Path) -> list[Path]:
-    """Draw every view of the log into `folder` as `<view>.png`, some with a `<view>-closeup.png`; return the files."""
-    shown, instants, window = views(log.column_names(log_path)), marks(metrics), closeup_window(marks(metrics))
+    """Draw every view of the log as `<view>.png`, some also as `<view>-closeup.png`; return the files."""
+    shown, instants, window = (
+        views(log.column_names(log_path)),
+        marks(metrics),
+        closeup_window(marks(metrics)),
+    )
     closeups = [view for view in shown if view.closeup] if window else []
     folder.mkdir(exist_ok=True)
     jobs = [(shown, WHOLE, ""), (closeups, window or WHOLE, "-closeup")]
@@ -137,7 +141,9 @@ def _draw_panel(axes: "Axes", panel: Panel, series: Series, instants: Sequence[M
         _draw_trace(axes, trace, series, bool(panel.steps))
     _draw_shade(axes, panel, series)
     _draw_marks(axes, instants, series["t_s"])
-    axes.set_title(panel.label if panel.steps or not panel.unit else f"{panel.label} ({panel.unit})", fontsize=9)
+    axes.set_title(
+        panel.label if panel.steps or not panel.unit else f"{panel.label} ({panel.unit})", fontsize=9
+    )
     axes.tick_params(labelsize=8)
     axes.grid(visible=True, color="#dddddd", linewidth=0.6)
     axes.ticklabel_format(axis="x", useOffset=False)
@@ -179,11 +185,13 @@ def _draw_marks(axes: "Axes", instants: Sequence[Mark], t_s: np.ndarray) -> None
     for rank, mark in enumerate(instants):
         if not t_s.size or not t_s[0] <= mark.time_s <= t_s[-1]:
             continue
-        axes.axvline(mark.time_s, color=mark.colour, linestyle=mark.dash, linewidth=0.9, alpha=0.8, zorder=2.5)
+        axes.axvline(
+            mark.time_s, color=mark.colour, linestyle=mark.dash, linewidth=0.9, alpha=0.8, zorder=2.5
+        )
         axes.plot(
             [mark.time_s], [1.0 - 0.09 * rank], transform=axes.get_xaxis_transform(), color=mark.colour,
-            marker=mark.symbol, markersize=4.5, linestyle=mark.dash, linewidth=0.9, label=mark.label, zorder=6,
-            clip_on=False,
+            marker=mark.symbol, markersize=4.5, linestyle=mark.dash, linewidth=0.9, label=mark.label,
+            zorder=6, clip_on=False,
         )  # fmt: skip
 
 
@@ -195,14 +203,21 @@ def _say_absent(view: View, series: Series, grid: Iterable["Axes"]) -> None:
 
 
 def _draw_legend(figure: "Figure", grid: Iterable["Axes"]) -> None:
-    """One legend for the figure: each label once, whichever panel it appears in (panels of one curve name it)."""
+    """One legend for the figure: each label once, but for the single curves that panel titles name."""
     entries: dict[str, Any] = {}
     for axes in grid:
         handles, labels = axes.get_legend_handles_labels()
-        entries |= {label: handle for label, handle in zip(labels, handles, strict=True) if label not in entries}
+        entries |= {
+            label: handle for label, handle in zip(labels, handles, strict=True) if label not in entries
+        }
     shown = {label: handle for label, handle in entries.items() if label not in _titles(grid)}
     figure.legend(
-        shown.values(), shown.keys(), loc="outside lower center", ncols=min(len(shown), 8) or 1, fontsize=8, frameon=False
+        shown.values(),
+        shown.keys(),
+        loc="outside lower center",
+        ncols=min(len(shown), 8) or 1,
+        fontsize=8,
+        frameon=False,
     )
 
 

@@ -1,7 +1,7 @@
-"""The log of a flight as a parquet file: one row a frame, written in row groups so that memory stays bounded.
+"""The log of a flight as a parquet file: one row a frame, written in row groups to keep memory bounded.
 
-Columns are plain float64, snappy-compressed and without dictionaries: what PlotJuggler, pandas and every other
-reader opens as it is, and what costs the loop least (0.8 us a frame of 90 columns).
+Columns are plain float64, snappy-compressed and without dictionaries: what PlotJuggler, pandas and every
+other reader opens as it is, and what costs the loop least.
 """
 
 from collections.abc import Iterator, Sequence

@@ -1,8 +1,8 @@
 """What a flight amounts to: the document `metrics.json` (SPEC 9).
 
-Times are seconds from the start of the flight, delays seconds from the first fault, rates deg/s. A quantity that
-does not exist is null: a document never holds NaN. Nothing in it depends on the wall clock or the machine's name,
-so that the same scenario and seed give the same file.
+Times are seconds from the start of the flight, delays seconds from the first fault, rates deg/s. A quantity
+that does not exist is null: a document never holds NaN. Nothing in it depends on the wall clock or the
+machine's name, so that the same scenario and seed give the same file.
 """
 
 import json
@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 from beaver_ftc.results.expectations import evaluate
 
 if TYPE_CHECKING:
-    from beaver_ftc.loop import Flight
+    from beaver_ftc.flight import Flight
     from beaver_ftc.scenario.schema import Scenario
 
 Document = dict[str, Any]

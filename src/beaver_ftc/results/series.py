@@ -1,4 +1,4 @@
-"""A log reduced to what an eye can tell apart: for each stretch of a long flight, its lowest and highest value.
+"""A log reduced to what an eye can tell apart: of each stretch of a long flight its lowest and highest.
 
 Read a row group at a time, so that a ten-hour flight fits; a short flight is returned as it is.
 """

@@ -27,7 +27,7 @@ _UNITS = (  # (ending of the column's name, unit shown, factor), the longest end
 
 @dataclass(frozen=True)
 class Trace:
-    """One curve: a log column, how it is called and in which role it appears (its look follows from the role)."""
+    """One curve: a log column, what it is called and its role (from which its look follows)."""
 
     column: str
     label: str
@@ -87,8 +87,8 @@ def views(columns: Sequence[str]) -> tuple[View, ...]:
     """Every view that a log with these columns allows."""
     known = set(columns)
     named = (
-        _tracking(), _surfaces(), _detection(), _isolation(estimators(columns)), _effectiveness(), _supervisor(),
-        _states(),
+        _tracking(), _surfaces(), _detection(), _isolation(estimators(columns)), _effectiveness(),
+        _supervisor(), _states(),
     )  # fmt: skip
     return tuple(view for view in named if view.panels and known.issuperset(view.columns))
 

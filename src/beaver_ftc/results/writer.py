@@ -1,7 +1,8 @@
 """A result folder that appears whole or not at all.
 
-Everything is written into a hidden sibling of the final folder, which is renamed into place at the end. A killed
-run leaves only the hidden folder; it is locked while in use, so the next run knows it for stale and removes it.
+Everything is written into a hidden sibling of the final folder, which is renamed into place at the end. A
+killed run leaves only the hidden folder; it is locked while in use, so the next run knows it for stale and
+removes it.
 """
 
 import contextlib

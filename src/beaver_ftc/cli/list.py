@@ -1,0 +1,57 @@
+"""`beaver-ftc list`: what there is to choose from."""
+
+from typing import Any
+
+from beaver_ftc.cli.output import Format, FormatOption, emit, emit_json
+
+Entries = list[dict[str, str]]
+
+
+def command(format: FormatOption = Format.text) -> None:
+    """List the built-in scenarios, diagnosis schemes, control laws, fault types and reference signals."""
+    available = _available()
+    if format is Format.json:
+        emit_json(available)
+    else:
+        emit("\n\n".join(_section(kind, entries) for kind, entries in available.items()))
+
+
+def _available() -> dict[str, Entries]:
+    """Kind -> entries, each a name and a description."""
+    from beaver_ftc.scenario.builtin import builtin_scenarios
+    from beaver_ftc.scenario.schema import Scenario
+
+    schema = Scenario.model_json_schema()["$defs"]
+    return {
+        "scenarios": [{"name": name, "description": says.strip()} for name, says, _ in builtin_scenarios()],
+        "schemes": _choices(schema["FdiConfig"]["properties"]["scheme"]),
+        "laws": _choices(schema["ControlConfig"]["properties"]["law"]),
+        "faults": [entry for part in schema.values() for entry in _fault(part)],
+        "signals": [_kind(schema, name, part) for name, part in schema["Signal"]["properties"].items()],
+    }
+
+
+def _choices(node: dict[str, Any]) -> Entries:
+    return [{"name": name, "description": ""} for name in node.get("enum", [])]
+
+
+def _fault(part: dict[str, Any]) -> Entries:
+    """A part of the schema as a fault type, if it is one: it has a fixed `type`."""
+    kind = part.get("properties", {}).get("type", {}).get("const")
+    return [{"name": kind, "description": _first_line(part)}] if kind else []
+
+
+def _kind(schema: dict[str, Any], name: str, node: dict[str, Any]) -> dict[str, str]:
+    references = [branch["$ref"] for branch in node.get("anyOf", [node]) if "$ref" in branch]
+    part = schema[references[0].rpartition("/")[2]] if references else {}
+    return {"name": name, "description": _first_line(part)}
+
+
+def _first_line(part: dict[str, Any]) -> str:
+    return part.get("description", "").partition("\n")[0]
+
+
+def _section(kind: str, entries: Entries) -> str:
+    width = max((len(entry["name"]) for entry in entries), default=0)
+    lines = (f"  {entry['name']:{width}}  {entry['description']}".rstrip() for entry in entries)
+    return "\n".join((kind, *lines))

@@ -1,0 +1,83 @@
+"""The command `beaver-ftc`: its commands, and what becomes of errors.
+
+A command is one module of this package with a function `command`, thin, importing what it needs when it runs,
+and one name here. `--help` must answer at once.
+"""
+
+import os
+import signal
+import sys
+import traceback
+from importlib import import_module
+from typing import Annotated, NoReturn
+
+import typer
+
+from beaver_ftc import __version__
+from beaver_ftc.errors import BeaverFtcError, SimulationFailed
+
+COMMANDS = (
+    "run",
+    "validate",
+    "schema",
+    "trim",
+    "list",
+)
+
+app = typer.Typer(
+    name="beaver-ftc",
+    no_args_is_help=True,
+    add_completion=False,
+    rich_markup_mode=None,  # plain help: importing rich for it would cost a third of the time to answer
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"beaver-ftc {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def options(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
+    ] = False,
+) -> None:
+    """Fault diagnosis and fault-tolerant control of the DHC-2 Beaver, flown by JSBSim.
+
+    Exit status: 0 done and every expectation met, 1 an expectation failed, 2 bad input or usage, 3 the
+    simulation could not be completed.
+    """
+
+
+for _name in COMMANDS:
+    app.command(_name)(import_module(f"beaver_ftc.cli.{_name}").command)
+
+
+def main() -> NoReturn:
+    """Run the command line; an error becomes a line on standard error and the exit status of its kind."""
+    signal.signal(
+        signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM)
+    )  # unwind: leave nothing half written
+    for stream in (sys.stdout, sys.stderr):
+        if hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="replace")  # a terminal that lacks a letter is no reason to fail
+    try:
+        app()
+    except BeaverFtcError as error:
+        sys.exit(report(error))
+    except Exception as error:
+        sys.exit(report(SimulationFailed(f"unexpected {type(error).__name__}: {error}"), error))
+    sys.exit(0)
+
+
+def report(error: BeaverFtcError, cause: BaseException | None = None) -> int:
+    """Say what went wrong on standard error; return the exit status."""
+    if os.environ.get("BEAVER_FTC_DEBUG"):
+        traceback.print_exception(cause or error)
+    else:
+        print(error, file=sys.stderr)
+    return error.exit_code

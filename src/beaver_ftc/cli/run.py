@@ -1,0 +1,99 @@
+"""`beaver-ftc run`: fly scenarios, keep the results, say the verdict."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from beaver_ftc.cli.output import Format, FormatOption, complain, emit, emit_json
+from beaver_ftc.errors import BadInput, BeaverFtcError, SimulationFailed
+
+if TYPE_CHECKING:
+    from beaver_ftc.scenario.schema import Scenario
+
+
+def command(
+    scenarios: Annotated[
+        list[str], typer.Argument(metavar="SCENARIO...", help="A file, or the name of a built-in scenario.")
+    ],
+    out: Annotated[Path, typer.Option(help="Folder for the results, one folder a scenario in it.")] = Path(
+        "runs"
+    ),
+    format: FormatOption = Format.text,
+    no_report: Annotated[bool, typer.Option("--no-report", help="Skip report.html and the figures.")] = False,
+) -> None:
+    """Fly scenarios and report what the diagnosis and the control made of them.
+
+    With --format json: {"passed": ..., "runs": [...]}, each run its metrics and `folder`, or its `error`.
+    """
+    try:
+        loaded = load_all(scenarios)
+    except BadInput as error:
+        if format is Format.json:
+            emit_json({"passed": False, "runs": [], "errors": str(error).splitlines()})
+        raise
+    raise typer.Exit(_run_all(loaded, out, format, report=not no_report))
+
+
+def load_all(names: list[str]) -> list["Scenario"]:
+    """Load every scenario before the first one flies; raises BadInput with every mistake in all of them."""
+    from beaver_ftc.scenario.loader import load_scenario
+
+    loaded: list[Scenario] = []
+    mistakes: list[str] = []
+    for name in names:
+        try:
+            loaded.append(load_scenario(name))
+        except BadInput as error:
+            mistakes.append(str(error))
+    mistakes += _repeated([scenario.name for scenario in loaded])
+    if mistakes:
+        raise BadInput("\n".join(mistakes))
+    return loaded
+
+
+def _repeated(names: list[str]) -> list[str]:
+    twice = dict.fromkeys(name for name in names if names.count(name) > 1)
+    return [f"two scenarios are named {name}: one result would replace the other" for name in twice]
+
+
+def _run_all(scenarios: list["Scenario"], out: Path, format: Format, report: bool) -> int:
+    """Fly one after the other; one that fails does not stop the rest. Returns the worst exit status."""
+    runs, status = [], 0
+    for scenario in scenarios:
+        try:
+            document = _run_one(scenario, out, report)
+        except BeaverFtcError as error:
+            complain(str(error))
+            runs.append({"scenario": scenario.name, "error": str(error)})
+            status = max(status, error.exit_code)
+            continue
+        runs.append(document)
+        status = max(status, 0 if document["passed"] else 1)
+        if format is Format.text:
+            _say(document)
+    if format is Format.json:
+        emit_json({"passed": status == 0, "runs": runs})
+    return status
+
+
+def _run_one(scenario: "Scenario", out: Path, report: bool) -> dict[str, Any]:
+    from beaver_ftc.cli.progress import progress_bar
+    from beaver_ftc.results.run import run
+
+    for warning in scenario.warnings():
+        complain(f"{scenario.name}: warning: {warning}")
+    with progress_bar(scenario.name) as progress:
+        try:
+            document = run(scenario, out, report, progress)
+        except MemoryError as error:
+            raise SimulationFailed(f"{scenario.name}: out of memory") from error
+    return document | {"folder": str(out / scenario.name)}
+
+
+def _say(document: dict[str, Any]) -> None:
+    import sys
+
+    from beaver_ftc.results.verdict import verdict_text
+
+    emit(verdict_text(document, document["folder"], colour=sys.stdout.isatty()))

@@ -1,0 +1,86 @@
+"""`beaver-ftc trim`: steady straight flight at a given condition."""
+
+import math
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from beaver_ftc.cli.output import Format, FormatOption, emit, emit_json
+
+if TYPE_CHECKING:
+    from beaver_ftc.plant.trim import TrimPoint
+    from beaver_ftc.scenario.schema import Scenario
+
+_RESIDUALS = ("udot_mps2", "vdot_mps2", "wdot_mps2", "pdot_rad_s2", "qdot_rad_s2", "rdot_rad_s2")
+_SHOWN = (  # what, attribute, unit; angles in degrees
+    ("airspeed", "airspeed_mps", "m/s"),
+    ("altitude", "altitude_m", "m"),
+    ("engine speed", "engine_rpm", "rpm"),
+    ("manifold pressure", "manifold_pressure_inhg", "inHg"),
+    ("flap", "flap_rad", "deg"),
+    ("angle of attack", "alpha_rad", "deg"),
+    ("sideslip", "beta_rad", "deg"),
+    ("pitch attitude", "theta_rad", "deg"),
+    ("flight path", "gamma_rad", "deg"),
+    ("aileron", "aileron_rad", "deg"),
+    ("elevator", "elevator_rad", "deg"),
+    ("rudder", "rudder_rad", "deg"),
+)
+
+
+def command(
+    scenario: Annotated[
+        str | None, typer.Argument(metavar="[SCENARIO]", help="Take the flight condition from it.")
+    ] = None,
+    airspeed_mps: Annotated[float | None, typer.Option(min=20, max=70, help="True airspeed, m/s.")] = None,
+    altitude_m: Annotated[float | None, typer.Option(min=-300, max=6000, help="Altitude, m.")] = None,
+    engine_rpm: Annotated[float | None, typer.Option(min=0, max=3000, help="Engine speed, rpm.")] = None,
+    manifold_pressure_inhg: Annotated[
+        float | None, typer.Option(min=0, max=50, help="Manifold pressure, inHg.")
+    ] = None,
+    flap_deg: Annotated[float | None, typer.Option(min=-6, max=60, help="Flap deflection, deg.")] = None,
+    format: FormatOption = Format.text,
+) -> None:
+    """Trim the Beaver in steady straight flight; what cannot be trimmed is bad input (2).
+
+    What is not given is the scenario's, or else its default: 45 m/s at 1828.8 m, 1800 rpm, 20 inHg, no flap.
+    """
+    from beaver_ftc.loop import trim_of
+
+    asked = {
+        "airspeed_mps": airspeed_mps,
+        "altitude_m": altitude_m,
+        "engine_rpm": engine_rpm,
+        "manifold_pressure_inhg": manifold_pressure_inhg,
+        "flap_deg": flap_deg,
+    }
+    point = trim_of(_condition(scenario, {key: value for key, value in asked.items() if value is not None}))
+    if format is Format.json:
+        emit_json(_document(point))
+    else:
+        emit(_table(point))
+
+
+def _condition(name: str | None, asked: dict[str, float]) -> "Scenario":
+    from beaver_ftc.scenario.loader import load_scenario
+    from beaver_ftc.scenario.schema import Scenario
+
+    scenario = Scenario(name="trim") if name is None else load_scenario(name)
+    return scenario.model_copy(update={"initial": scenario.initial.model_copy(update=asked)})
+
+
+def _document(point: "TrimPoint") -> dict[str, Any]:
+    return asdict(point) | {"residual": dict(zip(_RESIDUALS, point.residual, strict=True))}
+
+
+def _table(point: "TrimPoint") -> str:
+    lines = [f"{what:18}{_shown(getattr(point, name), unit):>12} {unit}" for what, name, unit in _SHOWN]
+    lines.append(f"{'worst residual':18}{max(map(abs, point.residual)):>12.1e} m/s2 or rad/s2")
+    if not point.envelope_valid:
+        lines.append("outside the flight-validated envelope")
+    return "\n".join(lines)
+
+
+def _shown(value: float, unit: str) -> str:
+    return f"{math.degrees(value):.4f}" if unit == "deg" else f"{value:g}"

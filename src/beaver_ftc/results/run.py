@@ -1,0 +1,42 @@
+"""Fly a scenario and keep what came out: the result folder of one run (SPEC 9)."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from beaver_ftc.results.log import ParquetLog
+from beaver_ftc.results.metrics import Document, as_json, metrics
+from beaver_ftc.results.writer import result_folder
+
+if TYPE_CHECKING:
+    from beaver_ftc.scenario.schema import Scenario
+
+Progress = Callable[[float], None]
+
+
+def run(scenario: "Scenario", out: Path, report: bool = True, progress: Progress | None = None) -> Document:
+    """Fly `scenario`, write `out/<name>/` whole or not at all, and return the metrics document.
+
+    Raises BadInput for a flight that cannot be trimmed, SimulationFailed for one not completed or kept.
+    """
+    from beaver_ftc.loop import fly
+    from beaver_ftc.scenario.dump import to_yaml
+
+    with result_folder(out, scenario.name) as folder:
+        with ParquetLog(folder / "log.parquet") as log:
+            flight = fly(scenario, log, progress)
+        document = metrics(flight)
+        (folder / "scenario.yaml").write_text(to_yaml(scenario), encoding="utf-8")
+        (folder / "metrics.json").write_text(as_json(document), encoding="utf-8")
+        if report:
+            write_report_files(folder, document)
+    return document
+
+
+def write_report_files(folder: Path, document: Document) -> None:
+    """Draw the figures and the report of a result folder that holds its log and its scenario."""
+    from beaver_ftc.results.figures import write_figures
+    from beaver_ftc.results.report import write_report
+
+    write_figures(folder / "log.parquet", document, folder / "figures")
+    write_report(folder, document)

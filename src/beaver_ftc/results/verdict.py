@@ -1,0 +1,147 @@
+"""What a flight amounts to, in words: the verdict in the terminal and at the head of the report.
+
+Everything is said from the metrics document, so that the words and `metrics.json` cannot disagree.
+"""
+
+import io
+from typing import TYPE_CHECKING, Any
+
+from beaver_ftc.results.metrics import Document
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+
+def title(metrics: Document) -> str:
+    """The scenario's name and whether it did as expected."""
+    if not metrics["expectations"]:
+        return f"{metrics['scenario']}: flown, nothing was expected"
+    return f"{metrics['scenario']}: {'PASSED' if metrics['passed'] else 'FAILED'}"
+
+
+def facts(metrics: Document) -> list[tuple[str, str]]:
+    """(what, how it went) for each thing worth knowing, in the order in which they happen."""
+    said = (
+        ("fault", _fault(metrics)),
+        ("detection", _detection(metrics)),
+        ("isolation", _isolation(metrics)),
+        ("supervisor", _supervisor(metrics)),
+        ("envelope", _envelope(metrics)),
+        ("departure", _departure(metrics)),
+        ("saturation", _saturation(metrics)),
+    )
+    return [(what, how) for what, how in said if how]
+
+
+def tracking(metrics: Document) -> list[tuple[str, str, str, str]]:
+    """(when, p, q, r): the RMS tracking errors in deg/s, before and after the fault."""
+    rows = (("before", "pre_fault_rms_deg_s"), ("after", "post_fault_rms_deg_s"))
+    tracked = [(when, metrics["tracking"][key]) for when, key in rows]
+    return [(when, _value(rms["p"]), _value(rms["q"]), _value(rms["r"])) for when, rms in tracked if rms]
+
+
+def expectations(metrics: Document) -> list[tuple[str, str, str, bool]]:
+    """(name, expected, actual, passed) for each expectation."""
+    return [
+        (found["name"], _bound(found["expected"]), _value(found["actual"]), found["passed"])
+        for found in metrics["expectations"]
+    ]
+
+
+def verdict_text(metrics: Document, folder: str, colour: bool = False) -> str:
+    """The verdict of one flight as a table for the terminal."""
+    from rich.console import Console
+
+    console = Console(file=io.StringIO(), force_terminal=colour, highlight=False, emoji=False, markup=False)
+    with console.capture() as captured:
+        console.print(_table(metrics, folder))
+    return "\n".join(line.rstrip() for line in captured.get().splitlines()) + "\n"
+
+
+def _table(metrics: Document, folder: str) -> "Table":
+    from rich.table import Table
+    from rich.text import Text
+
+    headline = Text(title(metrics), "bold green" if metrics["passed"] else "bold red")
+    table = Table(title=headline, title_justify="left", show_header=False, box=None)
+    table.add_column(style="bold", no_wrap=True)
+    table.add_column(overflow="fold")
+    for what, how in facts(metrics):
+        table.add_row(what, how)
+    for when, p, q, r in tracking(metrics):
+        table.add_row(
+            "tracking RMS" if when == "before" else "", f"p {p}  q {q}  r {r} deg/s {when} the fault"
+        )
+    for name, expected, actual, passed in expectations(metrics):
+        mark = Text("met   " if passed else "MISSED", "green" if passed else "bold red")
+        table.add_row("expected", Text.assemble(mark, f" {name} {expected}: {actual}"))
+    table.add_row("results", folder)
+    return table
+
+
+def _fault(metrics: Document) -> str:
+    fault = metrics["fault"]
+    if fault is None:
+        return "none"
+    return f"{fault['actuator'] or ''} {fault['type'].replace('_', ' ')} at {_time(fault['at_s'])}".strip()
+
+
+def _detection(metrics: Document) -> str:
+    detection = metrics["detection"]
+    if not detection["detected"]:
+        return "no alarm"
+    if metrics["false_alarm"]:
+        return f"FALSE ALARM at {_time(detection['time_s'])} on {detection['axis']}"
+    guaranteed = detection["guaranteed_delay_s"]
+    within = "" if guaranteed is None else f" (certain within {_time(guaranteed)})"
+    return f"after {_time(detection['delay_s'])} on {detection['axis']}{within}"
+
+
+def _isolation(metrics: Document) -> str:
+    isolation = metrics["isolation"]
+    if not isolation["isolated"]:
+        left = ", ".join(isolation["candidates"])
+        return (
+            f"not isolated, still possible: {left}" if metrics["detection"]["detected"] and left else "none"
+        )
+    when = "" if isolation["delay_s"] is None else f" after {_time(isolation['delay_s'])}"
+    estimate = "" if isolation["estimate"] is None else f", estimated theta {_value(isolation['estimate'])}"
+    return f"{isolation['fault']}{when}, {'correct' if isolation['correct'] else 'WRONG'}{estimate}"
+
+
+def _supervisor(metrics: Document) -> str:
+    return " → ".join(f"{change['mode']} {_time(change['time_s'])}" for change in metrics["supervisor"])
+
+
+def _envelope(metrics: Document) -> str:
+    exits = metrics["envelope_exits"]
+    if not exits:
+        return ""
+    total_s = sum(stay["end_s"] - stay["start_s"] for stay in exits)
+    return f"left {len(exits)} time(s), {_time(total_s)} in all, first at {_time(exits[0]['start_s'])}"
+
+
+def _departure(metrics: Document) -> str:
+    departure = metrics["departure"]
+    return f"LOST at {_time(departure['time_s'])}: {departure['signal']}" if departure else ""
+
+
+def _saturation(metrics: Document) -> str:
+    return ", ".join(f"{surface} {_time(time)}" for surface, time in metrics["saturation_s"].items() if time)
+
+
+def _bound(expected: Any) -> str:
+    at_most = isinstance(expected, int | float) and not isinstance(expected, bool)
+    return f"≤ {_value(expected)}" if at_most else _value(expected)
+
+
+def _time(seconds: float) -> str:
+    return f"{seconds:.2f} s" if seconds < 1000 else f"{seconds:.1f} s"
+
+
+def _value(value: Any) -> str:
+    if value is None:
+        return "none"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return value if isinstance(value, str) else f"{value:.3g}"

@@ -1,0 +1,131 @@
+import errno
+import os
+import signal
+import subprocess
+import sys
+import threading
+
+import pytest
+
+from beaver_ftc.errors import SimulationFailed
+from beaver_ftc.results import writer
+from beaver_ftc.results.writer import result_folder
+
+KILLED = """
+import os, signal, sys
+from pathlib import Path
+from beaver_ftc.results.writer import result_folder
+with result_folder(Path(sys.argv[1]), "case") as folder:
+    (folder / "log.parquet").write_text("half")
+    os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+def _result(out, text, name="case"):
+    with result_folder(out, name) as folder:
+        (folder / "metrics.json").write_text(text)
+
+
+def _names(folder):
+    return sorted(path.name for path in folder.iterdir())
+
+
+def test_result_appears_only_when_it_is_whole(tmp_path):
+    out = tmp_path / "deep" / "runs"
+    with result_folder(out, "case") as folder:
+        (folder / "metrics.json").write_text("new")
+        assert not (out / "case").exists()
+    assert (out / "case" / "metrics.json").read_text() == "new"
+    assert _names(out) == ["case"]
+
+
+def test_failure_leaves_no_trace_not_even_of_its_parents(tmp_path):
+    with pytest.raises(KeyError), result_folder(tmp_path / "deep" / "runs", "case"):
+        raise KeyError
+    assert _names(tmp_path) == []
+
+
+@pytest.mark.parametrize("can_exchange", [True, False])
+def test_new_result_replaces_the_old_one_entirely(tmp_path, monkeypatch, can_exchange):
+    if not can_exchange:
+        monkeypatch.setattr(writer, "_exchange", lambda one, other: False)
+    with result_folder(tmp_path, "case") as folder:
+        (folder / "metrics.json").write_text("old")
+        (folder / "report.html").write_text("old")
+    _result(tmp_path, "new")
+    assert _names(tmp_path) == ["case"]
+    assert _names(tmp_path / "case") == ["metrics.json"]
+    assert (tmp_path / "case" / "metrics.json").read_text() == "new"
+
+
+def test_old_result_survives_a_failed_run(tmp_path):
+    _result(tmp_path, "old")
+    with pytest.raises(KeyboardInterrupt), result_folder(tmp_path, "case"):
+        raise KeyboardInterrupt
+    assert (tmp_path / "case" / "metrics.json").read_text() == "old"
+
+
+def test_killed_run_leaves_nothing_at_the_final_name_and_the_next_one_cleans_up(tmp_path):
+    killed = subprocess.run([sys.executable, "-c", KILLED, tmp_path], check=False)
+    assert killed.returncode == -signal.SIGKILL
+    assert not (tmp_path / "case").exists()
+    assert len(_names(tmp_path)) == 1, "expected the hidden leftover of the killed run"
+    _result(tmp_path, "new")
+    assert _names(tmp_path) == ["case"]
+
+
+def test_run_in_progress_is_not_taken_for_a_leftover(tmp_path):
+    with result_folder(tmp_path, "case") as folder:
+        (folder / "metrics.json").write_text("slow")
+        other = threading.Thread(target=_result, args=(tmp_path, "quick"))
+        other.start()
+        other.join()
+        assert (folder / "metrics.json").read_text() == "slow"
+    assert (tmp_path / "case" / "metrics.json").read_text() == "slow"
+    assert _names(tmp_path) == ["case"]
+
+
+def test_leftover_of_another_scenario_is_left_alone(tmp_path):
+    (tmp_path / ".case-2.partial-x").mkdir()
+    _result(tmp_path, "new", "case")
+    assert _names(tmp_path) == [".case-2.partial-x", "case"]
+
+
+@pytest.mark.parametrize("stranger", ["thesis.tex", ".git"])
+def test_folder_with_something_else_in_it_is_not_touched(tmp_path, stranger):
+    (tmp_path / "case" / stranger).mkdir(parents=True)
+    with pytest.raises(SimulationFailed, match="no result of beaver-ftc"), result_folder(tmp_path, "case"):
+        pytest.fail("refuse before flying, not after")
+    assert _names(tmp_path) == ["case"]
+    assert _names(tmp_path / "case") == [stranger]
+
+
+def test_file_in_the_place_of_the_result_is_not_touched(tmp_path):
+    (tmp_path / "case").write_text("mine")
+    with pytest.raises(SimulationFailed, match="not a folder"), result_folder(tmp_path, "case"):
+        pass
+    assert (tmp_path / "case").read_text() == "mine"
+
+
+def test_out_that_is_a_file_is_a_clear_error(tmp_path):
+    (tmp_path / "runs").write_text("")
+    with pytest.raises(SimulationFailed, match=r"cannot write .*runs/case: ") as failed:
+        _result(tmp_path / "runs", "x")
+    assert "\n" not in str(failed.value)
+
+
+def test_full_disk_is_a_clear_error_and_leaves_nothing(tmp_path, monkeypatch):
+    def full(descriptor):
+        raise OSError(errno.ENOSPC, "raised by the test")
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(SimulationFailed, match="no space left on device"):
+        _result(tmp_path, "x")
+    assert _names(tmp_path) == []
+
+
+def test_result_is_readable_for_whom_the_umask_allows(tmp_path):
+    _result(tmp_path, "x")
+    mask = os.umask(0)
+    os.umask(mask)
+    assert (tmp_path / "case").stat().st_mode & 0o777 == 0o777 & ~mask

@@ -13,16 +13,24 @@ from beaver_ftc.scenario.base import Number, Section, number, refuse
 class ActuatorDynamics(Section):
     """First-order lag, rate limit and stops of one surface."""
 
-    bandwidth_rad_s: Number = number(0.0, unit="rad/s", says="bandwidth of the lag, 0 means none", ge=0, le=10_000)
-    rate_limit_deg_s: Number = number(0.0, unit="deg/s", says="largest surface rate, 0 means no limit", ge=0, le=100_000)
+    bandwidth_rad_s: Number = number(
+        0.0, unit="rad/s", says="bandwidth of the lag, 0 means none", ge=0, le=10_000
+    )
+    rate_limit_deg_s: Number = number(
+        0.0, unit="deg/s", says="largest surface rate, 0 means no limit", ge=0, le=100_000
+    )
     travel_deg: tuple[Number, Number] | None = Field(
-        None, description="lower and upper stop; left out: the aircraft's own, deg", json_schema_extra={"unit": "deg"}
+        default=None,
+        description="lower and upper stop; left out: the aircraft's own, deg",
+        json_schema_extra={"unit": "deg"},
     )
 
     @model_validator(mode="after")
     def _stops_are_in_order(self) -> Self:
         if self.travel_deg is not None and not -90 <= self.travel_deg[0] < self.travel_deg[1] <= 90:
-            refuse([(("travel_deg",), "stops out of order or range, allowed: [lower, upper] from -90 to 90 deg")])
+            refuse(
+                [(("travel_deg",), "stops out of order or range, allowed: [lower, upper] from -90 to 90 deg")]
+            )
         return self
 
     @property
@@ -38,21 +46,19 @@ PRESETS: dict[str, dict[str, float]] = {
 
 
 class Actuators(Section):
-    """One set of dynamics a surface; a preset's name or one mapping stands for all four."""
+    """One set of dynamics a surface; a preset's name, or numbers beside the surfaces, stand for all four."""
 
-    aileron: ActuatorDynamics = ActuatorDynamics()
-    elevator: ActuatorDynamics = ActuatorDynamics()
-    rudder: ActuatorDynamics = ActuatorDynamics()
-    flap: ActuatorDynamics = ActuatorDynamics()
+    aileron: ActuatorDynamics = Field(default_factory=ActuatorDynamics)
+    elevator: ActuatorDynamics = Field(default_factory=ActuatorDynamics)
+    rudder: ActuatorDynamics = Field(default_factory=ActuatorDynamics)
+    flap: ActuatorDynamics = Field(default_factory=ActuatorDynamics)
 
     @model_validator(mode="before")
     @classmethod
     def _expand(cls, given: Any) -> Any:
         if isinstance(given, str):
             given = PRESETS.get(given, given)
-        if isinstance(given, dict) and given.keys() <= ActuatorDynamics.model_fields.keys():
-            return dict.fromkeys(SURFACES, given)
-        return given
+        return _by_surface(given) if isinstance(given, dict) else given
 
     @property
     def is_ideal(self) -> bool:
@@ -60,7 +66,17 @@ class Actuators(Section):
 
     @classmethod
     def __get_pydantic_json_schema__(cls, core: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
-        surfaces = handler.resolve_ref_schema(handler(core))
-        uniform = next(iter(surfaces["properties"].values()))
+        mapping = handler.resolve_ref_schema(handler(core))
+        one = handler.resolve_ref_schema({"$ref": mapping["properties"]["aileron"]["$ref"]})
+        mapping["properties"] = {**one["properties"], **mapping["properties"]}
         preset = {"enum": list(PRESETS), "type": "string", "description": "a preset"}
-        return {"anyOf": [preset, {k: v for k, v in uniform.items() if k == "$ref"}, surfaces]}
+        return {"anyOf": [preset, mapping]}
+
+
+def _by_surface(given: dict[str, Any]) -> dict[str, Any]:
+    """Numbers given for all surfaces become each surface's own, unless it has its own already."""
+    for_all = {key: value for key, value in given.items() if key in ActuatorDynamics.model_fields}
+    rest = {key: value for key, value in given.items() if key not in for_all}
+    own = {surface: rest.get(surface, {}) for surface in SURFACES}
+    merged = {surface: {**for_all, **it} if isinstance(it, dict) else it for surface, it in own.items()}
+    return {**rest, **merged}

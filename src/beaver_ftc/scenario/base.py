@@ -1,4 +1,4 @@
-"""What every section of a scenario shares: frozen, no unknown keys, no coercion between text, truth values and numbers."""
+"""What every section of a scenario shares: frozen, strict about its keys, no coercion of values."""
 
 from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
@@ -38,10 +38,11 @@ def refuse(conflicts: Sequence[Conflict]) -> None:
         raise PydanticCustomError("conflict", "contradictory values", {"conflicts": list(conflicts)})
 
 
-def check_order(start_s: float, end_s: float | None, start_key: str) -> None:
-    """Refuse an end that does not come after its start."""
-    if end_s is not None and end_s <= start_s:
-        refuse([(("end_s",), f"{end_s:g} is not after {start_key}, allowed: later than {start_s:g} s")])
+def order_conflicts(start_s: float, end_s: float | None, start_key: str) -> list[Conflict]:
+    """The conflict of an end that does not come after its start."""
+    if end_s is None or end_s > start_s:
+        return []
+    return [(("end_s",), f"{end_s:g} is not after {start_key}, allowed: later than {start_s:g} s")]
 
 
 def suggestion(given: str, known: Iterable[str], cutoff: float = 0.6) -> str:

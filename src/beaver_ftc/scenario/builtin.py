@@ -23,11 +23,15 @@ def builtin_scenarios() -> list[tuple[str, str, Path]]:
     """(name, description, file) of each built-in scenario."""
     from beaver_ftc.scenario.loader import load_scenario
 
-    return [(s.name, s.description, builtin_path(name)) for name in builtin_names() for s in (load_scenario(name),)]
+    return [
+        (s.name, s.description, builtin_path(name))
+        for name in builtin_names()
+        for s in (load_scenario(name),)
+    ]
 
 
 def resolve(name_or_path: str | Path) -> Path:
-    """A built-in name, or else a path: of a file that exists, or as given. A file is told from a name by its looks."""
+    """The file a built-in name stands for; anything else is a path already."""
     given = str(name_or_path)
     if not looks_like_a_path(given) and given in builtin_names():
         return builtin_path(given)

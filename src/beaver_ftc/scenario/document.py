@@ -1,11 +1,11 @@
 """YAML text to plain data that remembers its lines.
 
-The tree is built from libyaml's event stream, so nothing but mappings, lists, texts, numbers, truth values and null
-can come out, and a hostile file is stopped while it is read: nesting, size and alias expansion are bounded, and
-recursion (which a composer written the usual way would crash on) never happens.
+The tree is built from libyaml's event stream, so nothing but mappings, lists, texts, numbers, truth values
+and null can come out, and a hostile file is stopped while it is read: nesting (which a composer that recurses
+freely crashes on), size and alias expansion are bounded.
 
-Anchors and aliases are read, because repeating a value by name is what YAML users do, but what they expand to counts
-towards the bound: an alias bomb ends at MAX_NODES. Merge keys (`<<`) and tags are not read.
+Anchors and aliases are read, because repeating a value by name is what YAML users do, but what they expand to
+counts towards the bound: an alias bomb ends at MAX_NODES. Merge keys (`<<`) and tags are not read.
 Numbers are read as YAML 1.2 and everybody's eyes do: 1e-3 is a number, 12:30 and 012 are not.
 """
 
@@ -44,7 +44,7 @@ class Problem:
     says: str
 
 
-class MalformedDocument(Exception):
+class MalformedDocumentError(Exception):
     """The text is no YAML document that can be read on; carries the one problem that stopped it."""
 
     def __init__(self, line: int, says: str, location: Location = ()) -> None:
@@ -54,7 +54,7 @@ class MalformedDocument(Exception):
 
 @dataclass
 class Document:
-    """Plain data, the line of each value (and key) by location, and the mistakes that did not stop the reading."""
+    """Plain data, the line of each value by location, and the mistakes that did not stop the reading."""
 
     data: Any = None
     lines: dict[Location, int] = field(default_factory=dict)
@@ -68,11 +68,14 @@ class Document:
 
 
 def parse(text: str) -> Document:
-    """Read one YAML document. Raises MalformedDocument; mistakes that leave the rest readable are in `.problems`."""
+    """Read one YAML document.
+
+    Raises MalformedDocumentError; mistakes that leave the rest readable are in `.problems`.
+    """
     try:
         return _Builder(text).build()
     except yaml.YAMLError as error:
-        raise MalformedDocument(_error_line(error, text), _error_text(error)) from None
+        raise MalformedDocumentError(_error_line(error, text), _error_text(error)) from None
 
 
 def _error_line(error: yaml.YAMLError, text: str) -> int:
@@ -88,7 +91,8 @@ def _error_text(error: yaml.YAMLError) -> str:
     if "cannot start any token" in reason:
         reason += " (a tab, or a character that wants quotes?)"
     context = getattr(error, "context", None)
-    return f"is not YAML: {f'{context}: ' if context else ''}{reason}, allowed: one YAML mapping indented with spaces"
+    where = f"{context}: " if context else ""
+    return f"is not YAML: {where}{reason}, allowed: one YAML mapping indented with spaces"
 
 
 def scalar(text: str) -> Any:
@@ -103,7 +107,7 @@ def scalar(text: str) -> Any:
 
 
 class _Builder:
-    """Turns the event stream into a Document, an explicit stack standing in for recursion."""
+    """Turns the event stream into a Document."""
 
     def __init__(self, text: str) -> None:
         self.document = Document()
@@ -116,30 +120,34 @@ class _Builder:
         for event in self._events:
             if isinstance(event, yaml.DocumentStartEvent):
                 if started:
-                    raise MalformedDocument(_line(event), "a second document starts here, allowed: one a file")
+                    raise MalformedDocumentError(
+                        _line(event), "a second document starts here, allowed: one a file"
+                    )
                 started = True
             elif isinstance(event, yaml.NodeEvent):
                 self.document.data = self._value(event, ())
         return self.document
 
-    def _value(self, event: yaml.Event, location: Location) -> Any:
+    def _value(self, event: Any, location: Location) -> Any:
         """One value with all that is below it. Recursion is bounded by MAX_DEPTH."""
         self._count(1, event, location)
         self.document.lines.setdefault(location, _line(event))
         if isinstance(event, yaml.AliasEvent):
             return self._alias(event, location)
         if event.tag is not None and event.tag != "!":
-            raise MalformedDocument(_line(event), f"tag {event.tag} is not read, allowed: plain values", location)
+            raise MalformedDocumentError(
+                _line(event), f"tag {event.tag} is not read, allowed: plain values", location
+            )
         value = self._content(event, location)
         if event.anchor is not None:
             self._anchors[event.anchor] = (value, _size(value))
         return value
 
-    def _content(self, event: yaml.Event, location: Location) -> Any:
+    def _content(self, event: Any, location: Location) -> Any:
         if isinstance(event, yaml.ScalarEvent):
             return scalar(event.value) if event.implicit[0] else event.value
         if len(location) >= MAX_DEPTH:
-            raise MalformedDocument(_line(event), f"nested too deeply, allowed: {MAX_DEPTH} levels")
+            raise MalformedDocumentError(_line(event), f"nested too deeply, allowed: {MAX_DEPTH} levels")
         return self._mapping(location) if isinstance(event, yaml.MappingStartEvent) else self._list(location)
 
     def _list(self, location: Location) -> list[Any]:
@@ -165,16 +173,20 @@ class _Builder:
 
     def _key(self, event: yaml.Event, location: Location) -> str:
         if not isinstance(event, yaml.ScalarEvent):
-            raise MalformedDocument(_line(event), "a key is not plain text, allowed: key: value", location)
+            raise MalformedDocumentError(
+                _line(event), "a key is not plain text, allowed: key: value", location
+            )
         if event.value == "<<":
-            raise MalformedDocument(_line(event), "merge keys are not read, allowed: the keys themselves", location)
+            raise MalformedDocumentError(
+                _line(event), "merge keys are not read, allowed: the keys themselves", location
+            )
         self._count(1, event, location)
         return event.value
 
     def _alias(self, event: yaml.AliasEvent, location: Location) -> Any:
         if event.anchor not in self._anchors:
             says = f"alias *{event.anchor} has no complete anchor before it, allowed: the value itself"
-            raise MalformedDocument(_line(event), says, location)
+            raise MalformedDocumentError(_line(event), says, location)
         value, size = self._anchors[event.anchor]
         self._count(size, event, location)
         return value
@@ -183,7 +195,7 @@ class _Builder:
         self._nodes += nodes
         if self._nodes > MAX_NODES:
             says = f"the file holds or its aliases expand to too many values, allowed: at most {MAX_NODES}"
-            raise MalformedDocument(_line(event), says, location)
+            raise MalformedDocumentError(_line(event), says, location)
 
 
 def _size(value: Any) -> int:
@@ -202,5 +214,5 @@ def _events(text: str) -> Iterator[yaml.Event]:
         loader.dispose()
 
 
-def _line(event: yaml.Event) -> int:
+def _line(event: Any) -> int:
     return event.start_mark.line + 1

@@ -4,7 +4,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from beaver_ftc.scenario.base import Number, Section, check_order, number, refuse
+from beaver_ftc.scenario.base import Conflict, Number, Section, number, order_conflicts, refuse
 
 Actuator = Literal["aileron", "elevator", "rudder", "flap"]
 
@@ -16,31 +16,37 @@ class _Fault(Section):
     end_s: Number | None = number(None, unit="s", says="when it is gone; left out: it stays", gt=0)
 
     @model_validator(mode="after")
-    def _ends_after_it_starts(self) -> Self:
-        check_order(self.at_s, self.end_s, "at_s")
+    def _fits_together(self) -> Self:
+        refuse(self._conflicts())
         return self
+
+    def _conflicts(self) -> list[Conflict]:
+        return order_conflicts(self.at_s, self.end_s, "at_s")
 
 
 class _Switched(_Fault):
     """A fault that is either there or not: a jam does not grow."""
 
-    profile: Literal["abrupt"] = Field("abrupt", description="this type of fault is always abrupt")
+    profile: Literal["abrupt"] = Field(default="abrupt", description="this type of fault is always abrupt")
 
 
 class _Gradual(_Fault):
     """A fault with a time profile B(t - at_s): a step, or 1 - exp(-kappa (t - at_s)) (SPEC 4)."""
 
-    profile: Literal["abrupt", "incipient"] = Field("abrupt", description="a step, or growing as 1 - exp(-kappa t)")
-    kappa_per_s: Number | None = number(None, unit="1/s", says="growth rate of an incipient fault", gt=0, le=1000)
+    profile: Literal["abrupt", "incipient"] = Field(
+        default="abrupt", description="a step, or growing as 1 - exp(-kappa t)"
+    )
+    kappa_per_s: Number | None = number(
+        None, unit="1/s", says="growth rate of an incipient fault", gt=0, le=1000
+    )
 
-    @model_validator(mode="after")
-    def _growth_rate_belongs_to_incipient(self) -> Self:
+    def _conflicts(self) -> list[Conflict]:
         incipient, given = self.profile == "incipient", self.kappa_per_s is not None
         if incipient and not given:
-            refuse([(("kappa_per_s",), "required key is missing, allowed: the growth rate of the incipient fault, 1/s")])
-        if given and not incipient:
-            refuse([(("kappa_per_s",), "has no meaning here, allowed: only with profile: incipient")])
-        return self
+            says = "required key is missing, allowed: the growth rate of the incipient fault, 1/s"
+        else:
+            says = "has no meaning here, allowed: only with profile: incipient"
+        return super()._conflicts() + ([] if incipient == given else [(("kappa_per_s",), says)])
 
 
 class LossOfEffectiveness(_Gradual):
@@ -48,7 +54,9 @@ class LossOfEffectiveness(_Gradual):
 
     type: Literal["loss_of_effectiveness"]
     actuator: Actuator = Field(description="the surface that fails")
-    magnitude: Number = number(unit="share of 1", says="effectiveness lost: 0 healthy, 1 no moment at all", ge=0, le=1)
+    magnitude: Number = number(
+        unit="share of 1", says="effectiveness lost: 0 healthy, 1 no moment at all", ge=0, le=1
+    )
 
 
 class Stuck(_Switched):
@@ -66,7 +74,9 @@ class Hardover(_Switched):
 
     type: Literal["hardover"]
     actuator: Actuator = Field(description="the surface that fails")
-    direction: Literal[1, -1] = Field(1, description="the stop it runs to: 1 positive, -1 negative deflection")
+    direction: Literal[1, -1] = Field(
+        default=1, description="the stop it runs to: 1 positive, -1 negative deflection"
+    )
 
 
 class Float(_Switched):
@@ -105,7 +115,9 @@ class Unanticipated(_Gradual):
     """A fault outside the declared class: an extra pitching moment coefficient on alpha^3 (SPEC 4)."""
 
     type: Literal["unanticipated"]
-    Cm_alpha3: Number = number(10.0, unit="1/rad^3", says="extra Cm on alpha^3, published case 10", ge=-1000, le=1000)
+    Cm_alpha3: Number = number(
+        10.0, unit="1/rad^3", says="extra Cm on alpha^3, published case 10", ge=-1000, le=1000
+    )
 
 
 Fault = Annotated[

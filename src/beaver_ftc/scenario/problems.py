@@ -40,13 +40,21 @@ def key_path(location: Location) -> str:
     """('faults', 0, 'at_s') -> faults[0].at_s"""
     path = ""
     for part in location:
-        path += f"[{part}]" if isinstance(part, int) else f".{one_line(part, _SHOWN)}" if path else one_line(part, _SHOWN)
+        path += (
+            f"[{part}]"
+            if isinstance(part, int)
+            else f".{one_line(part, _SHOWN)}"
+            if path
+            else one_line(part, _SHOWN)
+        )
     return path or WHOLE_FILE
 
 
 def one_line(text: str, longest: int) -> str:
     """Text fit for one line of a terminal: control characters escaped, length bounded."""
-    shown = "".join(c if c.isprintable() else c.encode("unicode_escape", "replace").decode() for c in text[:longest])
+    shown = "".join(
+        c if c.isprintable() else c.encode("unicode_escape", "replace").decode() for c in text[:longest]
+    )
     return shown if len(text) <= longest else f"{shown}..."
 
 
@@ -59,7 +67,9 @@ def problems_of(error: ValidationError, document: Document, schema: dict[str, An
                 where = _in_document((*location, *below), document.data)
                 yield Problem(document.line(where), where, says)
         else:
-            yield Problem(document.line(location), location, _says(detail, location, document.data, schema))
+            says = _says(detail, location, document.data, schema)
+            where = (*location, "type") if detail["type"].startswith("union_tag") else location
+            yield Problem(document.line(where), where, says)
 
 
 def _in_document(loc: Location, data: Any) -> Location:
@@ -86,6 +96,8 @@ def _says(detail: Any, location: Location, data: Any, schema: dict[str, Any]) ->
         known = _keys(_at(schema, location[:-1], data))
         return f"unknown key{suggestion(str(location[-1]), known, cutoff=0.5)}"
     here = _at(schema, location, data)
+    if kind == "missing" and isinstance(detail["loc"][-1], int):
+        return f"too few items, allowed: {_allowed(here, detail)}"
     if kind in ("missing", "union_tag_not_found"):
         return _missing(kind, here, location)
     if kind in ("literal_error", "enum", "union_tag_invalid"):
@@ -96,14 +108,14 @@ def _says(detail: Any, location: Location, data: Any, schema: dict[str, Any]) ->
 def _missing(kind: str, here: list[dict[str, Any]], location: Location) -> str:
     if kind == "union_tag_not_found":
         types = [tag for node in here for tag in node.get("discriminator", {}).get("mapping", {})]
-        return f"required key type is missing, allowed: {', '.join(types)}"
+        return f"required key is missing, allowed: {', '.join(types)}"
     return f"required key is missing, allowed: {_allowed(here, {})}"
 
 
 def _not_one_of(detail: Any, given: Any, here: list[dict[str, Any]]) -> str:
     if detail["type"] == "union_tag_invalid":
         given, allowed = detail["ctx"]["tag"], detail["ctx"]["expected_tags"].replace("'", "").split(", ")
-        return f"type {_shown(given)} is not known{suggestion(str(given), allowed)}"
+        return f"{_shown(given)} is not known{suggestion(str(given), allowed)}"
     allowed = list(map(str, _choices(here)))
     if not allowed:
         return f"{_shown(given)} is not known, allowed: {detail['ctx']['expected']}"
@@ -111,24 +123,25 @@ def _not_one_of(detail: Any, given: Any, here: list[dict[str, Any]]) -> str:
     return f"{_shown(given)} is not known{hint}"
 
 
-_WRONG_TYPE = ("_type", "_parsing", "_attributes_type")
+_WRONG_TYPE = ("_type", "_parsing")
+_SAYS = {
+    **dict.fromkeys(
+        ("greater_than", "greater_than_equal", "less_than", "less_than_equal"), "is out of range"
+    ),
+    **dict.fromkeys(("too_long", "string_too_long"), "is too long"),
+    **dict.fromkeys(("too_short", "string_too_short"), "is too short"),
+    "finite_number": "is not finite",
+    "string_pattern_mismatch": "has characters that are not allowed",
+}
 
 
 def _wrong(detail: Any, given: Any) -> str:
-    kind = detail["type"]
-    if kind == "finite_number":
-        return f"{_shown(given)} is not finite"
-    if kind in ("greater_than", "greater_than_equal", "less_than", "less_than_equal"):
-        return f"{_shown(given)} is out of range"
-    if kind in ("too_long", "string_too_long"):
-        return f"too long, {detail['ctx'].get('actual_length') or len(given)}"
-    if kind in ("too_short", "string_too_short"):
-        return "too short"
-    if kind.endswith(_WRONG_TYPE) or kind == "model_type":
-        return f"{_shown(given)} is {_type_name(given)}"
-    if kind == "string_pattern_mismatch":
-        return f"{_shown(given)} has characters that are not allowed"
-    return one_line(f"{_shown(given)}: {detail['msg']}", 300)
+    kind, shown = detail["type"], _shown(given)
+    if kind in _SAYS:
+        return f"{shown} {_SAYS[kind]}"
+    if kind.endswith(_WRONG_TYPE):
+        return f"{shown} is {_type_name(given)}"
+    return one_line(f"{shown}: {detail['msg']}", 300)
 
 
 def _shown(given: Any) -> str:
@@ -142,7 +155,7 @@ def _shown(given: Any) -> str:
 
 
 def _type_name(given: Any) -> str:
-    names = {bool: "true or false", dict: "a mapping", list: "a list", str: "text", type(None): "no value"}
+    names = {bool: "a truth value", dict: "a mapping", list: "a list", str: "text", type(None): "no value"}
     return names.get(type(given), "a number")
 
 
@@ -179,7 +192,7 @@ def _branches(node: dict[str, Any], root: dict[str, Any], data: Any) -> list[dic
     union = node.get("anyOf") or node.get("oneOf")
     if not union or mapping:
         return [node]
-    inherited = {key: node[key] for key in ("description", "unit") if key in node}
+    inherited: dict[str, Any] = {key: node[key] for key in ("description", "unit") if key in node}
     return [b for branch in union for b in _branches({**inherited, **branch}, root, data)]
 
 
@@ -188,7 +201,9 @@ def _keys(nodes: list[dict[str, Any]]) -> list[str]:
 
 
 def _choices(nodes: list[dict[str, Any]]) -> list[Any]:
-    return [choice for node in nodes for choice in node.get("enum", [node["const"]] if "const" in node else [])]
+    return [
+        choice for node in nodes for choice in node.get("enum", [node["const"]] if "const" in node else [])
+    ]
 
 
 def _allowed(nodes: list[dict[str, Any]], detail: Any) -> str:
@@ -199,8 +214,8 @@ def _allowed(nodes: list[dict[str, Any]], detail: Any) -> str:
 
 
 def _kind(node: dict[str, Any]) -> str:
-    if choices := _choices([node]):
-        return ", ".join(map(str, choices))
+    if choices := _choices([node]) or list(node.get("discriminator", {}).get("mapping", {})):
+        return f"{'a mapping of type ' if 'discriminator' in node else ''}{', '.join(map(str, choices))}"
     return {
         "number": lambda: f"a number{_range(node)}",
         "integer": lambda: f"a whole number{_range(node)}",
@@ -214,13 +229,15 @@ def _kind(node: dict[str, Any]) -> str:
 def _range(node: dict[str, Any]) -> str:
     above, below = node.get("exclusiveMinimum"), node.get("exclusiveMaximum")
     low, high = node.get("minimum", above), node.get("maximum", below)
-    if low is None or high is None:
-        return "" if low is None and high is None else (f" over {above:g}" if above is not None else _one_bound(low, high))
-    return f" {'over' if above is not None else 'from'} {low:g} {'up to' if above is not None else 'to'} {high:g}"
+    if low is not None and high is not None:
+        return f" over {low:g} up to {high:g}" if above is not None else f" from {low:g} to {_bound(high)}"
+    if low is not None:
+        return f" over {low:g}" if above is not None else f" of at least {low:g}"
+    return "" if high is None else f" of at most {high:g}"
 
 
-def _one_bound(low: float | None, high: float | None) -> str:
-    return f" of at least {low:g}" if low is not None else f" of at most {high:g}"
+def _bound(value: float) -> str:
+    return str(value) if isinstance(value, int) else f"{value:g}"
 
 
 def _pattern(node: dict[str, Any]) -> str:

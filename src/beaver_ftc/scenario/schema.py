@@ -1,4 +1,4 @@
-"""The scenario file (SPEC 7) as frozen, typed, strict sections. Units are in the key names; ranges are the contract's."""
+"""The scenario file (SPEC 7) as frozen, typed, strict sections; ranges are the contract's."""
 
 from math import degrees
 from typing import Annotated, Literal, Self
@@ -9,7 +9,8 @@ from beaver_ftc.control.config import ControlConfig
 from beaver_ftc.design.coefficients import TERMS, TRAVEL
 from beaver_ftc.diagnosis.config import FdiConfig
 from beaver_ftc.scenario.actuators import Actuators
-from beaver_ftc.scenario.base import Conflict, Flag, Number, Section, Whole, number, refuse, suggestion
+from beaver_ftc.scenario.base import Flag, Number, Section, Whole, number, refuse, suggestion
+from beaver_ftc.scenario.consistency import DURATION_S, RATE_HZ, Outline, conflicts
 from beaver_ftc.scenario.faults import Fault
 from beaver_ftc.scenario.sensors import Sensors
 from beaver_ftc.scenario.signals import Reference
@@ -21,7 +22,9 @@ FLAP_TRAVEL_DEG = (degrees(TRAVEL["flap"].min_rad), degrees(TRAVEL["flap"].max_r
 class Initial(Section):
     """The trimmed flight condition the run starts from."""
 
-    airspeed_mps: Number = number(45.0, unit="m/s", says="true airspeed, validated from 30 to 55", ge=20, le=70)
+    airspeed_mps: Number = number(
+        45.0, unit="m/s", says="true airspeed, validated from 30 to 55", ge=20, le=70
+    )
     altitude_m: Number = number(1828.8, unit="m", says="altitude above sea level", ge=-300, le=6000)
     engine_rpm: Number = number(1800.0, unit="rpm", says="engine speed", ge=0, le=3000)
     manifold_pressure_inhg: Number = number(20.0, unit="inHg", says="manifold pressure", ge=0, le=50)
@@ -31,7 +34,7 @@ class Initial(Section):
 
 
 class InertiaCoupling(Section):
-    """theta_p, theta_q, theta_r: relative errors of Pqr, Qpr, Rpq in the truth (SPEC 4; published within 0.25)."""
+    """theta_p, theta_q, theta_r: relative errors of Pqr, Qpr, Rpq in the truth (published: within 0.25)."""
 
     p: Number = number(0.0, unit="share of 1", says="theta_p", ge=-1, le=1)
     q: Number = number(0.0, unit="share of 1", says="theta_q", ge=-1, le=1)
@@ -48,25 +51,31 @@ class Sinusoid(Section):
 class SinusoidAxes(Section):
     """One sinusoid an axis."""
 
-    p: Sinusoid = Sinusoid()
-    q: Sinusoid = Sinusoid()
-    r: Sinusoid = Sinusoid()
+    p: Sinusoid = Field(default_factory=Sinusoid)
+    q: Sinusoid = Field(default_factory=Sinusoid)
+    r: Sinusoid = Field(default_factory=Sinusoid)
 
 
-def _known_coefficients(ratios: dict[str, float]) -> dict[str, float]:
-    refuse([((name,), f"unknown aerodynamic term{suggestion(name, TERMS)}") for name in ratios if name not in TERMS])
-    return ratios
+def _known_term(name: str) -> str:
+    if name not in TERMS:
+        refuse([((), f"unknown aerodynamic term{suggestion(name, TERMS)}")])
+    return name
 
 
+TermName = Annotated[str, AfterValidator(_known_term)]
 Ratio = Annotated[Number, Field(ge=-10, le=10)]
 
 
 class Uncertainty(Section):
     """How the truth differs from what the designer believes."""
 
-    inertia_coupling: InertiaCoupling = Field(InertiaCoupling(), description="relative errors of the inertia coupling")
-    sinusoid: SinusoidAxes = Field(SinusoidAxes(), description="sinusoidal angular accelerations")
-    coefficients: Annotated[dict[str, Ratio], AfterValidator(_known_coefficients)] = Field(
+    inertia_coupling: InertiaCoupling = Field(
+        default_factory=InertiaCoupling, description="relative errors of the inertia coupling"
+    )
+    sinusoid: SinusoidAxes = Field(
+        default_factory=SinusoidAxes, description="sinusoidal angular accelerations"
+    )
+    coefficients: dict[TermName, Ratio] = Field(
         default_factory=dict,
         description="truth / design ratio of single aerodynamic terms, 1 is no error, e.g. Cm_alpha: 1.05",
         examples=[{"Cm_alpha": 1.05}],
@@ -79,10 +88,16 @@ Wind = Annotated[Number, Field(ge=-100, le=100)]
 class Environment(Section):
     """The air."""
 
-    turbulence: Literal["none", "dryden"] = Field("none", description="still air or Dryden turbulence")
-    severity: Literal["light", "moderate", "severe"] | None = Field(None, description="of the turbulence")
+    turbulence: Literal["none", "dryden"] = Field(
+        default="none", description="still air or Dryden turbulence"
+    )
+    severity: Literal["light", "moderate", "severe"] | None = Field(
+        default=None, description="of the turbulence"
+    )
     wind_mps: tuple[Wind, Wind, Wind] = Field(
-        (0.0, 0.0, 0.0), description="steady wind towards north, east, down, m/s", json_schema_extra={"unit": "m/s"}
+        default=(0.0, 0.0, 0.0),
+        description="steady wind towards north, east, down, m/s",
+        json_schema_extra={"unit": "m/s"},
     )
 
     @model_validator(mode="after")
@@ -98,7 +113,9 @@ class Environment(Section):
 class DesignModel(Section):
     """What the designer's model leaves out on purpose (SPEC 3)."""
 
-    engine_terms: Flag = Field(True, description="false neglects the dpt terms of Cl, Cm, Cn, as published")
+    engine_terms: Flag = Field(
+        default=True, description="false neglects the dpt terms of Cl, Cm, Cn, as published"
+    )
 
 
 class RmsLimits(Section):
@@ -112,76 +129,68 @@ class RmsLimits(Section):
 class Expect(Section):
     """What must come out for the run to pass; what is left out is not asserted."""
 
-    detected_within_s: Number | None = number(None, unit="s", says="delay from fault to first alarm", ge=0, le=360_000)
-    isolated_as: Literal["aileron", "elevator", "rudder", "flap", "unanticipated"] | None = Field(
-        None, description="what the diagnosis must name"
+    detected_within_s: Number | None = number(
+        None, unit="s", says="delay from fault to first alarm", ge=0, le=360_000
     )
-    isolated_within_s: Number | None = number(None, unit="s", says="delay from fault to isolation", ge=0, le=360_000)
-    no_false_alarm: Flag | None = Field(None, description="true: no alarm without a fault; false: there must be one")
-    no_departure: Flag | None = Field(None, description="true: the aircraft is kept; false: it must be lost")
-    post_fault_rms_deg_s: RmsLimits | None = Field(None, description="largest RMS tracking error after the fault")
+    isolated_as: Literal["aileron", "elevator", "rudder", "flap", "unanticipated"] | None = Field(
+        default=None, description="what the diagnosis must name"
+    )
+    isolated_within_s: Number | None = number(
+        None, unit="s", says="delay from fault to isolation", ge=0, le=360_000
+    )
+    no_false_alarm: Flag | None = Field(
+        default=None, description="true: no alarm without a fault; false: there must be one"
+    )
+    no_departure: Flag | None = Field(
+        default=None, description="true: the aircraft is kept; false: it must be lost"
+    )
+    post_fault_rms_deg_s: RmsLimits | None = Field(
+        default=None, description="largest RMS tracking error after the fault"
+    )
 
 
 class Scenario(Section):
-    """One flight: the aircraft, what it shall do, what breaks, who diagnoses and controls, what is expected."""
+    """One flight: what flies, what it shall do, what breaks, who diagnoses and controls, what is expected."""
 
     model_config = ConfigDict(title="beaver-ftc scenario")
 
     name: str = Field(
-        pattern=NAME_PATTERN, max_length=100, description="name of the result folder: letters, digits, - and _",
+        pattern=NAME_PATTERN,
+        max_length=100,
+        description="name of the result folder: letters, digits, - and _",
         examples=["elevator-partial-loss"],
-    )  # fmt: skip
-    description: str = Field("", max_length=2000, description="what the case shows")
-    aircraft: Literal["beaver"] = Field("beaver", description="a folder of aircraft/")
-    duration_s: Number = number(30.0, unit="s", says="length of the flight", gt=0, le=360_000)
-    rate_hz: Number = number(100.0, unit="Hz", says="frame rate of diagnosis and control", ge=20, le=1000)
-    substeps: Whole = Field(1, ge=1, le=50, description="JSBSim frames per such frame")
-    seed: Whole = Field(1, ge=0, le=2**63 - 1, description="of everything random in the flight")
-    initial: Initial = Field(Initial(), description="flight condition at the start, trimmed")
-    reference: Reference = Field(Reference(), description="body rates to follow")
-    faults: tuple[Fault, ...] = Field((), max_length=100, description="what breaks, and when")
-    uncertainty: Uncertainty = Field(Uncertainty(), description="how the truth differs from the design model")
-    actuators: Actuators = Field(Actuators(), description="actuator dynamics")
-    sensors: Sensors = Field(Sensors(), description="measurement errors")
-    environment: Environment = Field(Environment(), description="wind and turbulence")
-    fdi: FdiConfig = Field(FdiConfig(), description="fault detection and isolation")
-    control: ControlConfig = Field(ControlConfig(), description="the control law")
-    design_model: DesignModel = Field(DesignModel(), description="what the designer believes")
-    expect: Expect = Field(Expect(), description="what must come out")
+    )
+    description: str = Field(default="", max_length=2000, description="what the case shows")
+    aircraft: Literal["beaver"] = Field(default="beaver", description="a folder of aircraft/")
+    duration_s: Number = number(DURATION_S, unit="s", says="length of the flight", gt=0, le=360_000)
+    rate_hz: Number = number(RATE_HZ, unit="Hz", says="frame rate of diagnosis and control", ge=20, le=1000)
+    substeps: Whole = Field(default=1, ge=1, le=50, description="JSBSim frames per such frame")
+    seed: Whole = Field(default=1, ge=0, le=2**63 - 1, description="of everything random in the flight")
+    initial: Initial = Field(default_factory=Initial, description="flight condition at the start, trimmed")
+    reference: Reference = Field(default_factory=Reference, description="body rates to follow")
+    faults: tuple[Fault, ...] = Field(default=(), max_length=100, description="what breaks, and when")
+    uncertainty: Uncertainty = Field(
+        default_factory=Uncertainty, description="how the truth differs from the design model"
+    )
+    actuators: Actuators = Field(default_factory=Actuators, description="actuator dynamics")
+    sensors: Sensors = Field(default_factory=Sensors, description="measurement errors")
+    environment: Environment = Field(default_factory=Environment, description="wind and turbulence")
+    fdi: FdiConfig = Field(default_factory=FdiConfig, description="fault detection and isolation")
+    control: ControlConfig = Field(default_factory=ControlConfig, description="the control law")
+    design_model: DesignModel = Field(default_factory=DesignModel, description="what the designer believes")
+    expect: Expect = Field(default_factory=Expect, description="what must come out")
 
     @model_validator(mode="after")
     def _parts_fit_together(self) -> Self:
-        refuse([*_too_late(self), *_too_short(self), *_expected_of_no_fault(self)])
+        refuse(conflicts(self._outline()))
         return self
+
+    def _outline(self) -> Outline:
+        expected = tuple(key for key, value in self.expect if value is not None)
+        return Outline(self.duration_s, self.rate_hz, tuple(fault.at_s for fault in self.faults), expected)
 
     def warnings(self) -> tuple[str, ...]:
         """What is allowed and yet deserves a word: one line each, `key.path: what`."""
         from beaver_ftc.scenario.warnings import warnings_of
 
         return warnings_of(self)
-
-
-def _too_late(scenario: Scenario) -> list[Conflict]:
-    end_s = scenario.duration_s
-    return [
-        (("faults", i, "at_s"), f"{fault.at_s:g} is after the end, allowed: earlier than duration_s, {end_s:g} s")
-        for i, fault in enumerate(scenario.faults)
-        if fault.at_s >= end_s
-    ]
-
-
-def _too_short(scenario: Scenario) -> list[Conflict]:
-    frame_s = 1.0 / scenario.rate_hz
-    if scenario.duration_s >= frame_s:
-        return []
-    return [(("duration_s",), f"{scenario.duration_s:g} is less than one frame, allowed: at least {frame_s:g} s")]
-
-
-_OF_A_FAULT = ("detected_within_s", "isolated_as", "isolated_within_s", "post_fault_rms_deg_s")
-
-
-def _expected_of_no_fault(scenario: Scenario) -> list[Conflict]:
-    if scenario.faults:
-        return []
-    says = "there is no fault to expect it of, allowed: only with faults"
-    return [(("expect", key), says) for key in _OF_A_FAULT if getattr(scenario.expect, key) is not None]

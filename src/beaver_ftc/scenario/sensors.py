@@ -1,8 +1,8 @@
-"""What the aircraft's instruments do to the truth: one section a signal, none of them means a perfect measurement."""
+"""What the instruments do to the truth: one section a signal; what is left out is measured perfectly."""
 
 from typing import Any
 
-from pydantic import GetJsonSchemaHandler, model_validator
+from pydantic import Field, GetJsonSchemaHandler, model_validator
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
@@ -54,13 +54,13 @@ PRESETS: dict[str, dict[str, dict[str, float]]] = {"ideal": {}}
 class Sensors(Section):
     """The measurements the diagnosis and the law live on."""
 
-    p: RateGyro = RateGyro()
-    q: RateGyro = RateGyro()
-    r: RateGyro = RateGyro()
-    alpha: FlowVane = FlowVane()
-    beta: FlowVane = FlowVane()
-    V: Airspeed = Airspeed()
-    qdyn: DynamicPressure = DynamicPressure()
+    p: RateGyro = Field(default_factory=RateGyro)
+    q: RateGyro = Field(default_factory=RateGyro)
+    r: RateGyro = Field(default_factory=RateGyro)
+    alpha: FlowVane = Field(default_factory=FlowVane)
+    beta: FlowVane = Field(default_factory=FlowVane)
+    V: Airspeed = Field(default_factory=Airspeed)
+    qdyn: DynamicPressure = Field(default_factory=DynamicPressure)
 
     @model_validator(mode="before")
     @classmethod

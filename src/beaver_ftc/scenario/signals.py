@@ -1,7 +1,7 @@
 """The shapes a body-rate reference can have, and their values in time.
 
-One class a kind: its parameters and `rate_deg_s(t_s)`. tau = t - start_s; every signal is zero before `start_s`
-and, but for the ramp and the table, from `end_s` on. A new kind is a class here and a line in `Signal`.
+One class a kind: its parameters and `rate_deg_s(t_s)`. tau = t - start_s; every signal but the table is zero
+before `start_s` and, but for the ramp, from `end_s` on. A new kind is a class here and a line in `Signal`.
 """
 
 from math import pi
@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ConfigDict, Field, ValidationInfo, model_validator
 
-from beaver_ftc.scenario.base import Number, Section, check_order, number
+from beaver_ftc.scenario.base import Number, Section, number, order_conflicts, refuse
 from beaver_ftc.scenario.table import MAX_ROWS, check_table, read_column
 
 Samples = NDArray[np.float64]
@@ -49,7 +49,7 @@ class _Window(Section):
 
     @model_validator(mode="after")
     def _ends_after_it_starts(self) -> Self:
-        check_order(self.start_s, self.end_s, "start_s")
+        refuse(order_conflicts(self.start_s, self.end_s, "start_s"))
         return self
 
     @property
@@ -66,12 +66,14 @@ class Sine(_Window):
 
     def rate_deg_s(self, t_s: Samples) -> Samples:
         tau_s = t_s - self.start_s
-        wave = self.amplitude_deg_s * np.sin(2 * pi * self.frequency_hz * tau_s + self.phase_deg * RAD_PER_DEG)
+        wave = self.amplitude_deg_s * np.sin(
+            2 * pi * self.frequency_hz * tau_s + self.phase_deg * RAD_PER_DEG
+        )
         return np.where(_during(tau_s, self.length_s), wave, 0.0)
 
 
 class Doublet(Section):
-    """+amplitude for width_s, then -amplitude for width_s: it lasts twice its width and turns back what it turned."""
+    """+amplitude for width_s, then -amplitude for width_s: it lasts two widths and undoes its own turn."""
 
     amplitude_deg_s: Number = _amplitude()
     start_s: Number = _start()
@@ -115,7 +117,7 @@ class _Closed(Section):
 
     @model_validator(mode="after")
     def _ends_after_it_starts(self) -> Self:
-        check_order(self.start_s, self.end_s, "start_s")
+        refuse(order_conflicts(self.start_s, self.end_s, "start_s"))
         return self
 
     @property
@@ -133,7 +135,7 @@ class Ramp(_Closed):
 
 
 class Chirp(_Closed):
-    """amplitude sin(2 pi (f0 tau + (f1 - f0) tau^2 / 2T)): the frequency goes in a straight line from f0 to f1 in T."""
+    """amplitude sin(2 pi (f0 tau + (f1 - f0) tau^2 / 2T)): a linear sweep from f0 to f1 in T."""
 
     amplitude_deg_s: Number = _amplitude()
     start_frequency_hz: Number = _frequency("frequency at start_s")
@@ -147,15 +149,21 @@ class Chirp(_Closed):
 
 
 class Csv(Section):
-    """A table in a CSV file beside the scenario, straight lines between its rows, its end values held outside.
+    """A table in a CSV file beside the scenario: straight lines between rows, end values held outside.
 
-    The table is read when the scenario is loaded and becomes part of it (`time_s`, `values_deg_s`), so that a fully
-    resolved scenario flies anywhere.
+    The table is read when the scenario is loaded and becomes part of it (`time_s`, `values_deg_s`), so that a
+    fully resolved scenario flies anywhere.
     """
 
-    file: str = Field(min_length=1, max_length=200, description="CSV file in the scenario's own folder or below it")
-    column: str = Field("rate_deg_s", min_length=1, max_length=100, description="column to fly, deg/s; time is `t_s`")
-    time_s: tuple[Number, ...] = Field(min_length=1, max_length=MAX_ROWS, description="read from the file: times, s")
+    file: str = Field(
+        min_length=1, max_length=200, description="CSV file in the scenario's own folder or below it"
+    )
+    column: str = Field(
+        default="rate_deg_s", min_length=1, max_length=100, description="column to fly, deg/s; time is `t_s`"
+    )
+    time_s: tuple[Number, ...] = Field(
+        min_length=1, max_length=MAX_ROWS, description="read from the file: times, s"
+    )
     values_deg_s: tuple[Number, ...] = Field(
         min_length=1, max_length=MAX_ROWS, description="read from the file: rates, deg/s"
     )
@@ -195,7 +203,7 @@ class Signal(Section):
         given = [kind for kind in type(self).model_fields if getattr(self, kind) is not None]
         if len(given) != 1:
             allowed = ", ".join(type(self).model_fields)
-            refuse([((), f"{len(given)} kinds in one item, allowed: exactly one of {allowed} (one list item each)")])
+            refuse([((), f"{len(given)} kinds in one list item, allowed: exactly one of {allowed}")])
         return self
 
     @property
@@ -210,9 +218,9 @@ Signals = tuple[Signal, ...]
 class Reference(Section):
     """What the three body rates shall follow; the signals of an axis are summed, a missing axis is 0."""
 
-    p: Signals = Field((), max_length=50, description="roll rate reference")
-    q: Signals = Field((), max_length=50, description="pitch rate reference")
-    r: Signals = Field((), max_length=50, description="yaw rate reference")
+    p: Signals = Field(default=(), max_length=50, description="roll rate reference")
+    q: Signals = Field(default=(), max_length=50, description="pitch rate reference")
+    r: Signals = Field(default=(), max_length=50, description="yaw rate reference")
 
 
 def sample(reference: Reference, t_s: Samples) -> Samples:
@@ -221,7 +229,9 @@ def sample(reference: Reference, t_s: Samples) -> Samples:
     Shapes: t_s (n,) -> (n, 3), columns p, q, r. Units: s -> rad/s.
     """
     t_s = np.asarray(t_s, dtype=float)
-    axes = [sum((item.shape.rate_deg_s(t_s) for item in axis), np.zeros_like(t_s)) for axis in _axes(reference)]
+    axes = [
+        sum((item.shape.rate_deg_s(t_s) for item in axis), np.zeros_like(t_s)) for axis in _axes(reference)
+    ]
     return np.column_stack(axes) * RAD_PER_DEG
 
 

@@ -1,4 +1,4 @@
-"""A reference signal from a CSV file: a bounded file in the scenario's own folder, time strictly increasing."""
+"""A reference signal from a CSV file: of bounded size, in the scenario's own folder, time increasing."""
 
 import csv
 from collections.abc import Sequence
@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from beaver_ftc.scenario.base import refuse
-from beaver_ftc.scenario.files import Unreadable, read_text
+from beaver_ftc.scenario.files import UnreadableError, read_text
 
 MAX_ROWS = 20_000
 _MAX_BYTES = 2_000_000
@@ -18,14 +18,14 @@ _FORMAT = "comma-separated text with a header line, times in column t_s, rates i
 
 
 def read_column(file: Any, column: Any, folder: Path | None) -> dict[str, list[float]]:
-    """The named column of a CSV file against its `t_s`. Times in s, values in deg/s; refuses what is not a table."""
+    """The named column of a CSV file (deg/s) against its `t_s` (s); refuses what is not a table."""
     if not isinstance(file, str) or not isinstance(column, str) or not file:
         return {}  # the type of `file` and `column` is reported by the schema
     path = _inside(folder, file)
     try:
         lines = read_text(path, _MAX_BYTES).splitlines()
         return _parse(lines, column)
-    except Unreadable as error:
+    except UnreadableError as error:
         refuse([(("file",), f"{file!r} line {error.line}: {error}")])
     raise AssertionError("refuse always raises here")
 
@@ -33,7 +33,14 @@ def read_column(file: Any, column: Any, folder: Path | None) -> dict[str, list[f
 def _inside(folder: Path | None, file: str) -> Path:
     """The file's path, resolved, if it is in the folder or below it: a scenario reads nothing else."""
     if folder is None:
-        refuse([(("file",), "there is no folder to read it from, allowed: csv in a scenario that is a file itself")])
+        refuse(
+            [
+                (
+                    ("file",),
+                    "there is no folder to read it from, allowed: csv in a scenario that is a file itself",
+                )
+            ]
+        )
     assert folder is not None
     root = folder.resolve()
     try:
@@ -41,7 +48,9 @@ def _inside(folder: Path | None, file: str) -> Path:
     except (OSError, ValueError, RuntimeError):
         path = Path("/")
     if Path(file).is_absolute() or ".." in Path(file).parts or not path.is_relative_to(root):
-        refuse([(("file",), f"{file!r} is outside, allowed: a file in the scenario's own folder or below it")])
+        refuse(
+            [(("file",), f"{file!r} is outside, allowed: a file in the scenario's own folder or below it")]
+        )
     return path
 
 
@@ -49,9 +58,9 @@ def _parse(lines: Sequence[str], column: str) -> dict[str, list[float]]:
     header = [name.strip() for name in next(csv.reader(lines[:1]), [])]
     for name in ("t_s", column):
         if header.count(name) != 1:
-            raise Unreadable(f"the header has no column {name!r}, allowed: {_FORMAT}")
+            raise UnreadableError(f"the header has no column {name!r}, allowed: {_FORMAT}")
     if len(lines) - 1 > MAX_ROWS:
-        raise Unreadable(f"too many rows ({len(lines) - 1}), allowed: at most {MAX_ROWS}")
+        raise UnreadableError(f"too many rows ({len(lines) - 1}), allowed: at most {MAX_ROWS}")
     at, of = header.index("t_s"), header.index(column)
     rows = [_row(line, number, (at, of)) for number, line in enumerate(lines[1:], start=2) if line.strip()]
     return {"time_s": [row[0] for row in rows], "values_deg_s": [row[1] for row in rows]}
@@ -62,14 +71,14 @@ def _row(line: str, number: int, columns: tuple[int, int]) -> tuple[float, float
     try:
         at, of = float(cells[columns[0]]), float(cells[columns[1]])
     except (ValueError, IndexError):
-        raise Unreadable(f"{line[:40]!r} is not a row of numbers, allowed: {_FORMAT}", number) from None
+        raise UnreadableError(f"{line[:40]!r} is not a row of numbers, allowed: {_FORMAT}", number) from None
     if not (isfinite(at) and isfinite(of)):
-        raise Unreadable(f"{line[:40]!r} is not finite, allowed: finite numbers", number)
+        raise UnreadableError(f"{line[:40]!r} is not finite, allowed: finite numbers", number)
     return at, of
 
 
 def check_table(time_s: Sequence[float], values_deg_s: Sequence[float]) -> None:
-    """Refuse a table whose columns differ in length, whose times do not increase, or whose values no aircraft flies."""
+    """Refuse columns of different length, times that do not increase, values that no aircraft flies."""
     if len(time_s) != len(values_deg_s):
         refuse([((), f"{len(time_s)} times but {len(values_deg_s)} values, allowed: as many of each")])
     if not all(a < b for a, b in pairwise(time_s)) or time_s[0] < 0 or time_s[-1] > _LATEST_S:

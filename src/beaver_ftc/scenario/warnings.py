@@ -18,8 +18,8 @@ def _airspeed(scenario: Scenario) -> Iterator[str]:
     airspeed_mps = scenario.initial.airspeed_mps
     if not lowest <= airspeed_mps <= highest:
         yield (
-            f"initial.airspeed_mps: {airspeed_mps:g} is outside the range the aerodynamic model was identified in, "
-            f"{lowest:g} to {highest:g} m/s"
+            f"initial.airspeed_mps: {airspeed_mps:g} is outside the range the aerodynamic model "
+            f"was identified in, {lowest:g} to {highest:g} m/s"
         )
 
 

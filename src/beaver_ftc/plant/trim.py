@@ -179,7 +179,7 @@ def _solve(truth: Plant, state: FlightState) -> tuple[FlightState, np.ndarray]:
         state = _moved(state, step)
         here = _accelerations(truth, state)
     raise BadInput(
-        f"no steady straight flight at {state.airspeed_mps:g} m/s and {state.altitude_m:g} m with this engine "
+        f"no steady straight flight at {state.airspeed_mps:g} m/s, {state.altitude_m:g} m with this engine "
         "and flap setting, allowed: an airspeed at which the wing carries the aircraft (validated: 30 to 55)"
     )
 

@@ -1,0 +1,190 @@
+"""Fault injection: when which failure property of the aircraft changes.
+
+A fault at `at_s` is in force in the first frame whose time t >= at_s - 1e-9 s, and in every JSBSim run of
+that frame; one with `end_s` is repaired in the first frame whose time t >= end_s - 1e-9 s. Faults may
+overlap: effectiveness and rate scale multiply, biases and alpha^3 moments add; of two jams the earlier
+holds, of two runaways or two oscillations the later. On one surface a jam hides a trailing surface, which
+hides a runaway (that is the aircraft's own order).
+"""
+
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from math import ceil, exp, inf, radians
+from typing import Any
+
+from beaver_ftc.plant.adapter import Plant
+
+TIME_TOLERANCE_S = 1e-9
+NEVER = sys.maxsize
+
+# 1 - exp(-kappa t) is 1 to the last bit from here on: an incipient fault is then as good as an abrupt one.
+_FULLY_GROWN = 37.0
+
+HEALTHY = {
+    "effectiveness": 1.0,
+    "stuck": 0.0,
+    "stuck-at-rad": 0.0,
+    "hardover": 0.0,
+    "float": 0.0,
+    "bias-rad": 0.0,
+    "rate-scale": 1.0,
+    "oscillation-amplitude-rad": 0.0,
+    "oscillation-frequency-rad_sec": 0.0,
+    "Cm-alpha3": 0.0,
+}
+
+
+# An effect changes the failure properties of one surface, given how far the fault has grown (0 to 1) and
+# where the surface was when it struck.
+Properties = dict[str, float]
+Effect = Callable[[Properties, Any, float, float], None]
+
+
+def _loss_of_effectiveness(of: Properties, fault: Any, share: float, was_rad: float) -> None:
+    of["effectiveness"] *= 1.0 - share * fault.magnitude
+
+
+def _stuck(of: Properties, fault: Any, share: float, was_rad: float) -> None:
+    if of["stuck"] == 0.0:
+        of["stuck"] = 1.0
+        of["stuck-at-rad"] = was_rad if fault.position_deg is None else radians(fault.position_deg)
+
+
+def _hardover(of: Properties, fault: Any, share: float, was_rad: float) -> None:
+    of["hardover"] = float(fault.direction)
+
+
+def _float(of: Properties, fault: Any, share: float, was_rad: float) -> None:
+    of["float"] = 1.0
+
+
+def _bias(of: Properties, fault: Any, share: float, was_rad: float) -> None:
+    of["bias-rad"] += share * radians(fault.bias_deg)
+
+
+def _rate_limit(of: Properties, fault: Any, share: float, was_rad: float) -> None:
+    of["rate-scale"] *= 1.0 - share * (1.0 - fault.scale)
+
+
+def _oscillatory(of: Properties, fault: Any, share: float, was_rad: float) -> None:
+    of["oscillation-amplitude-rad"] = share * radians(fault.amplitude_deg)
+    of["oscillation-frequency-rad_sec"] = fault.frequency_rad_s
+
+
+def _unanticipated(of: Properties, fault: Any, share: float, was_rad: float) -> None:
+    of["Cm-alpha3"] += share * fault.Cm_alpha3
+
+
+EFFECTS: dict[str, Effect] = {
+    "loss_of_effectiveness": _loss_of_effectiveness,
+    "stuck": _stuck,
+    "hardover": _hardover,
+    "float": _float,
+    "bias": _bias,
+    "rate_limit": _rate_limit,
+    "oscillatory": _oscillatory,
+    "unanticipated": _unanticipated,
+}
+
+
+def frame_of(time_s: float, rate_hz: float) -> int:
+    """The first frame k whose time k / rate_hz is not before time_s."""
+    return ceil((time_s - TIME_TOLERANCE_S) * rate_hz)
+
+
+@dataclass
+class _Event:
+    """One fault as frames: in force from `first` to before `last`, still growing before `grown`."""
+
+    fault: Any
+    rate_hz: float
+    kappa_per_s: float
+    first: int
+    last: int
+    grown: int
+    was_rad: float = 0.0
+
+    @classmethod
+    def of(cls, fault: Any, rate_hz: float) -> "_Event":
+        kappa_per_s = fault.kappa_per_s if fault.profile == "incipient" else inf
+        first = frame_of(fault.at_s, rate_hz)
+        last = NEVER if fault.end_s is None else frame_of(fault.end_s, rate_hz)
+        grown = frame_of(fault.at_s + _FULLY_GROWN / kappa_per_s, rate_hz)
+        return cls(fault, rate_hz, kappa_per_s, first, last, grown)
+
+    @property
+    def place(self) -> str:
+        """The folder of the failure properties it changes."""
+        return f"failures/{getattr(self.fault, 'actuator', 'unanticipated')}"
+
+    def in_force(self, k: int) -> bool:
+        return self.first <= k < self.last
+
+    def share(self, k: int) -> float:
+        """B(t - at_s): how far the fault has grown by frame k, 0 to 1."""
+        age_s = max(0.0, k / self.rate_hz - self.fault.at_s)
+        return 1.0 if k >= self.grown else 1.0 - exp(-self.kappa_per_s * age_s)
+
+    def next_change(self, k: int) -> int:
+        """The first frame after k in which this fault changes something."""
+        if k < self.first:
+            return self.first
+        if k >= self.last:
+            return NEVER
+        return min(k + 1 if k < self.grown else NEVER, self.last)
+
+
+class FaultSchedule:
+    """Sets the aircraft's failure properties, frame by frame; between changes there is nothing to do.
+
+    faults: the scenario's. plant: the aircraft they happen to. rate_hz: frame rate of the loop.
+    """
+
+    def __init__(self, faults: Sequence[Any], plant: Plant, rate_hz: float) -> None:
+        self._plant = plant
+        self._events = sorted((_Event.of(fault, rate_hz) for fault in faults), key=lambda event: event.first)
+        self._written: dict[str, float] = {}
+        self._struck: set[int] = set()
+
+    def begun(self, k: int) -> bool:
+        """Whether some fault has struck by frame k, repaired or not."""
+        return any(event.first <= k for event in self._events)
+
+    def next_change(self, k: int) -> int:
+        """The first frame after k in which something changes; NEVER if none."""
+        return min((event.next_change(k) for event in self._events), default=NEVER)
+
+    def apply(self, k: int) -> None:
+        """Bring the aircraft's failures to frame k. Call it before that frame's runs; again is harmless."""
+        self._note_where_surfaces_were(k)
+        if self._write(self._wanted(k)) and k == 0:
+            self._plant.settle()  # nothing runs before frame 0 is read: its accelerations must show the fault
+
+    def _note_where_surfaces_were(self, k: int) -> None:
+        for i, event in enumerate(self._events):
+            if event.in_force(k) and i not in self._struck:
+                self._struck.add(i)
+                if event.fault.type == "stuck":
+                    event.was_rad = self._plant.read(f"fcs/{event.fault.actuator}-pos-rad")
+
+    def _wanted(self, k: int) -> dict[str, float]:
+        """Failure properties at frame k, of every place a fault of this flight touches."""
+        places = {event.place: dict(HEALTHY) for event in self._events}
+        for event in self._events:
+            if event.in_force(k):
+                EFFECTS[event.fault.type](places[event.place], event.fault, event.share(k), event.was_rad)
+        return {
+            f"{place}/{name}": value
+            for place, properties in places.items()
+            for name, value in properties.items()
+            if value != HEALTHY[name] or f"{place}/{name}" in self._written
+        }
+
+    def _write(self, wanted: dict[str, float]) -> bool:
+        """Write what differs from what was written last; whether anything did."""
+        changed = {name: value for name, value in wanted.items() if self._written.get(name) != value}
+        for name, value in changed.items():
+            self._plant.write(name, value)
+        self._written.update(changed)
+        return bool(changed)

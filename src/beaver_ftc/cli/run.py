@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from beaver_ftc.cli.inputs import load_all
 from beaver_ftc.cli.output import Format, FormatOption, complain, emit, emit_json
 from beaver_ftc.errors import BadInput, BeaverFtcError, SimulationFailed
 
@@ -33,28 +34,6 @@ def command(
             emit_json({"passed": False, "runs": [], "errors": str(error).splitlines()})
         raise
     raise typer.Exit(_run_all(loaded, out, format, report=not no_report))
-
-
-def load_all(names: list[str]) -> list["Scenario"]:
-    """Load every scenario before the first one flies; raises BadInput with every mistake in all of them."""
-    from beaver_ftc.scenario.loader import load_scenario
-
-    loaded: list[Scenario] = []
-    mistakes: list[str] = []
-    for name in names:
-        try:
-            loaded.append(load_scenario(name))
-        except BadInput as error:
-            mistakes.append(str(error))
-    mistakes += _repeated([scenario.name for scenario in loaded])
-    if mistakes:
-        raise BadInput("\n".join(mistakes))
-    return loaded
-
-
-def _repeated(names: list[str]) -> list[str]:
-    twice = dict.fromkeys(name for name in names if names.count(name) > 1)
-    return [f"two scenarios are named {name}: one result would replace the other" for name in twice]
 
 
 def _run_all(scenarios: list["Scenario"], out: Path, format: Format, report: bool) -> int:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from beaver_ftc.cli.inputs import trim_point
 from beaver_ftc.cli.output import Format, FormatOption, emit, emit_json
 
 if TYPE_CHECKING:
@@ -46,8 +47,6 @@ def command(
 
     What is not given is the scenario's, or else its default: 45 m/s at 1828.8 m, 1800 rpm, 20 inHg, no flap.
     """
-    from beaver_ftc.loop import trim_of
-
     asked = {
         "airspeed_mps": airspeed_mps,
         "altitude_m": altitude_m,
@@ -55,7 +54,9 @@ def command(
         "manifold_pressure_inhg": manifold_pressure_inhg,
         "flap_deg": flap_deg,
     }
-    point = trim_of(_condition(scenario, {key: value for key, value in asked.items() if value is not None}))
+    point = trim_point(
+        _condition(scenario, {key: value for key, value in asked.items() if value is not None})
+    )
     if format is Format.json:
         emit_json(_document(point))
     else:

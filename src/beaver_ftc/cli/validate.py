@@ -4,6 +4,7 @@ from typing import Annotated, Any
 
 import typer
 
+from beaver_ftc.cli.inputs import check_flyable
 from beaver_ftc.cli.output import Format, FormatOption, complain, emit, emit_json
 from beaver_ftc.errors import BadInput
 
@@ -32,6 +33,7 @@ def _check(file: str) -> dict[str, Any]:
 
     try:
         scenario = load_scenario(file)
+        check_flyable(scenario, file)
     except BadInput as error:
         return {"file": file, "valid": False, "errors": str(error).splitlines(), "warnings": []}
     return {"file": file, "valid": True, "errors": [], "warnings": list(scenario.warnings())}

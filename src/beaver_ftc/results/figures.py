@@ -1,16 +1,13 @@
-"""The figures of a flight as PNG: the views drawn with matplotlib, without its global state.
-
-Colours are Okabe and Ito's, told apart by the colour-blind; line styles and widths tell curves apart in grey.
-"""
+"""The figures of a flight as PNG: the views drawn with matplotlib, without its global state."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from beaver_ftc.results import log
+from beaver_ftc.results.looks import GREY, LOOKS, YELLOW, Mark, marks
 from beaver_ftc.results.metrics import Document
 from beaver_ftc.results.series import WHOLE, Series, read_series
 from beaver_ftc.results.views import Panel, Trace, View, unit_of, views
@@ -20,59 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 DPI = 110
-BLACK, ORANGE, SKY, GREEN, YELLOW, BLUE, VERMILION, PURPLE = (
-    "#000000", "#e69f00", "#56b4e9", "#009e73", "#f0e442", "#0072b2", "#d55e00", "#cc79a7",
-)  # fmt: skip
-
-
-@dataclass(frozen=True)
-class Look:
-    """How a role is drawn: colour, line style and width, and whether it lies above the others."""
-
-    colour: str
-    dash: str = "-"
-    width: float = 1.2
-    above: int = 2
-
-
-LOOKS = {
-    "actual": Look(BLUE, "-", 1.3, 4),
-    "target": Look(ORANGE, (0, (5, 2)), 1.6, 5),  # type: ignore[arg-type]
-    "command": Look("#999999", ":", 1.4, 3),
-    "bound": Look(VERMILION, "--", 1.2, 3),
-    "aileron": Look(SKY, "-.", 1.6),
-    "elevator": Look(BLUE, "-", 1.6),
-    "rudder": Look(ORANGE, "--", 1.6),
-    "flap": Look(GREEN, ":", 2.0),
-}
-
-
-@dataclass(frozen=True)
-class Mark:
-    """An instant shown in every figure: a line over the panel and a symbol at its edge."""
-
-    name: str
-    time_s: float
-    colour: str
-    dash: str
-    symbol: str
-
-    @property
-    def label(self) -> str:
-        """Name and time, for the legend."""
-        return f"{self.name} {self.time_s:.2f} s"
-
-
-def marks(metrics: Document) -> list[Mark]:
-    """The instants of fault, detection, isolation and departure, as far as they exist."""
-    fault, departure = metrics["fault"], metrics["departure"]
-    instants = (
-        ("fault", fault and fault["at_s"], VERMILION, "-", "v"),
-        ("detection", metrics["detection"]["time_s"], BLACK, "--", "D"),
-        ("isolation", metrics["isolation"]["time_s"], PURPLE, "-.", "s"),
-        ("departure", departure and departure["time_s"], BLACK, ":", "X"),
-    )
-    return [Mark(name, time, *look) for name, time, *look in instants if time is not None]
+LOWEST_RATIO = 1e-3  # of a logarithmic axis: what is smaller is nothing
 
 
 def closeup_window(instants: Sequence[Mark]) -> tuple[float, float] | None:
@@ -154,6 +99,11 @@ def _draw_panel(axes: "Axes", panel: Panel, series: Series, instants: Sequence[M
         axes.set_ylim(-0.4, len(panel.steps) - 0.6)
     elif panel.limits:
         axes.set_ylim(*panel.limits)
+    if panel.log_scale:
+        axes.set_yscale("log")
+        axes.set_ylim(bottom=max(axes.get_ylim()[0], LOWEST_RATIO))
+    if panel.level is not None:
+        axes.axhline(panel.level, color=GREY, linewidth=1.0, zorder=1)
 
 
 def _draw_trace(axes: "Axes", trace: Trace, series: Series, stepped: bool) -> None:
@@ -163,12 +113,17 @@ def _draw_trace(axes: "Axes", trace: Trace, series: Series, stepped: bool) -> No
         series["t_s"],
         trace.sign * factor * series[trace.column],
         color=look.colour,
-        linestyle=look.dash,
+        linestyle=_linestyle(look.dash),
         linewidth=look.width,
         zorder=look.above,
         drawstyle="steps-post" if stepped else "default",
         label=trace.label or "_",
     )
+
+
+def _linestyle(dash: tuple[float, ...]) -> Any:
+    """Dashes in points as matplotlib takes them (which counts in line widths: about 1.5 points)."""
+    return (0, tuple(length / 1.5 for length in dash)) if dash else "-"
 
 
 def _draw_shade(axes: "Axes", panel: Panel, series: Series) -> None:
@@ -186,12 +141,17 @@ def _draw_marks(axes: "Axes", instants: Sequence[Mark], t_s: np.ndarray) -> None
         if not t_s.size or not t_s[0] <= mark.time_s <= t_s[-1]:
             continue
         axes.axvline(
-            mark.time_s, color=mark.colour, linestyle=mark.dash, linewidth=0.9, alpha=0.8, zorder=2.5
+            mark.time_s,
+            color=mark.colour,
+            linestyle=_linestyle(mark.dash),
+            linewidth=0.9,
+            alpha=0.8,
+            zorder=2.5,
         )
         axes.plot(
             [mark.time_s], [1.0 - 0.09 * rank], transform=axes.get_xaxis_transform(), color=mark.colour,
-            marker=mark.symbol, markersize=4.5, linestyle=mark.dash, linewidth=0.9, label=mark.label,
-            zorder=6, clip_on=False,
+            marker=mark.symbol, markersize=4.5, linestyle=_linestyle(mark.dash), linewidth=0.9,
+            label=mark.label, zorder=6, clip_on=False,
         )  # fmt: skip
 
 

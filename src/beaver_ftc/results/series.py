@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from beaver_ftc.results import log
+from beaver_ftc.results.views import sources
 
 MAX_POINTS = 4000
 WHOLE = (-math.inf, math.inf)
@@ -28,9 +29,22 @@ def read_series(
     frame_s = _frame_s(path)
     rows = min(log.row_count(path), (window_s[1] - window_s[0]) / frame_s)
     stretch = 1 if rows <= max_points else math.ceil(2 * rows / max_points)
-    chunks = (_within(chunk, window_s) for chunk in log.read_chunks(path, wanted))
+    chunks = (_derive(_within(chunk, window_s), wanted) for chunk in log.read_chunks(path, sources(wanted)))
     parts = [chunk if stretch == 1 else _envelope(chunk, stretch) for chunk in chunks if chunk["t_s"].size]
     return {name: np.concatenate([part[name] for part in parts] or [np.empty(0)]) for name in wanted}
+
+
+def _derive(chunk: Series, wanted: Sequence[str]) -> Series:
+    return {name: chunk[name] if name in chunk else _ratio(chunk, sources([name])) for name in wanted}
+
+
+def _ratio(chunk: Series, names: Sequence[str]) -> np.ndarray:
+    """|residual| / threshold, the threshold on the residual's side; NaN where there is no threshold."""
+    residual, *bounds = (chunk[name] for name in names)
+    bound = bounds[0] if len(bounds) == 1 else np.where(residual < 0, bounds[0], bounds[1])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = np.abs(residual / bound)
+    return np.where(np.isfinite(ratio), ratio, np.nan)
 
 
 def _frame_s(path: Path) -> float:

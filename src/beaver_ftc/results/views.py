@@ -5,13 +5,15 @@ degrees appear here, at the boundary, and nowhere before.
 """
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 AXES = ("p", "q", "r")
 SURFACES = ("aileron", "elevator", "rudder", "flap")
 AXIS_NAMES = {"p": "roll rate p", "q": "pitch rate q", "r": "yaw rate r"}
 MODES = ("nominal", "adaptive", "reallocated", "unanticipated")
+
+RATIO = "_ratio"  # ends the name of a derived column: |residual| / threshold
 
 _DEG_PER_RAD = 57.29577951308232
 _UNITS = (  # (ending of the column's name, unit shown, factor), the longest endings first
@@ -46,6 +48,7 @@ class Panel:
     steps: tuple[str, ...] = ()  # names of the values 0, 1, 2, ... of a discrete quantity
     shade: str = ""  # a 0/1 column: the panel is shaded while it is 1
     shade_label: str = ""
+    level: float | None = None  # a value worth a line across
 
     @property
     def unit(self) -> str:
@@ -87,10 +90,23 @@ def views(columns: Sequence[str]) -> tuple[View, ...]:
     """Every view that a log with these columns allows."""
     known = set(columns)
     named = (
-        _tracking(), _surfaces(), _detection(), _isolation(estimators(columns)), _effectiveness(),
-        _supervisor(), _states(),
+        _tracking(), _surfaces(), _detection(), _isolation(estimators(columns)),
+        _ratio(estimators(columns)), _effectiveness(), _supervisor(), _states(),
     )  # fmt: skip
-    return tuple(view for view in named if view.panels and known.issuperset(view.columns))
+    return tuple(view for view in named if view.panels and known.issuperset(sources(view.columns)))
+
+
+def sources(columns: Iterable[str]) -> tuple[str, ...]:
+    """The log columns that columns to be shown, some of them derived, are made from."""
+    return tuple(dict.fromkeys(source for column in columns for source in _sources(column)))
+
+
+def _sources(column: str) -> tuple[str, ...]:
+    stem = column.removesuffix(RATIO)
+    if stem == column:
+        return (column,)
+    bounds = ("lower", "upper") if stem.startswith("fie_") else ("threshold",)
+    return tuple(f"{stem}_{what}_rad_s" for what in ("residual", *bounds))
 
 
 def _tracking() -> View:
@@ -158,6 +174,21 @@ def _isolation(names: Sequence[str]) -> View:
     )
     title = "Isolation: residuals of each isolation estimator against its thresholds"
     return View("isolation", title, panels, across=3, absent="no alarm: it never ran", closeup=True)
+
+
+def _ratio(names: Sequence[str]) -> View:
+    stems = [("detection estimator", ""), *((f"{name} estimator", f"fie_{name}_") for name in names)]
+    panels = tuple(
+        Panel(
+            f"{label}: |residual| / threshold",
+            tuple(Trace(f"{stem}{axis}{RATIO}", axis, axis) for axis in AXES),
+            log_scale=True,
+            level=1.0,
+        )
+        for label, stem in stems
+    )
+    title = "How close to the threshold: above 1 is an alarm, or an estimator excluded"
+    return View("ratio", title, panels, closeup=True)
 
 
 def _effectiveness() -> View:

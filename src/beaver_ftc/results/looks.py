@@ -1,0 +1,66 @@
+"""How things look, on paper as on the screen: one table for the figures and the report.
+
+Colours are Okabe and Ito's, told apart by the colour-blind; dashes, widths and letters tell the rest in grey.
+"""
+
+from dataclasses import dataclass
+
+from beaver_ftc.results.metrics import Document
+
+BLACK, ORANGE, SKY, GREEN, YELLOW, BLUE, VERMILION, PURPLE, GREY = (
+    "#000000", "#e69f00", "#56b4e9", "#009e73", "#f0e442", "#0072b2", "#d55e00", "#cc79a7", "#8a8a8a",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Look:
+    """How a role is drawn: colour, dashes (on, off, ... in points; none is a solid line), width, and rank."""
+
+    colour: str
+    dash: tuple[float, ...] = ()
+    width: float = 1.4
+    above: int = 2
+
+
+LOOKS = {
+    "actual": Look(BLUE, (), 1.4, 4),
+    "target": Look(ORANGE, (7, 3), 1.6, 5),
+    "command": Look(GREY, (1.5, 2), 1.4, 3),
+    "bound": Look(VERMILION, (5, 3), 1.3, 3),
+    "p": Look(ORANGE, (7, 3), 1.4, 4),
+    "q": Look(BLUE, (), 1.4, 5),
+    "r": Look(GREEN, (2, 2), 1.6, 4),
+    "aileron": Look(SKY, (7, 2, 1.5, 2), 1.8, 3),
+    "elevator": Look(BLUE, (), 1.8, 2),
+    "rudder": Look(ORANGE, (6, 4), 1.8, 4),
+    "flap": Look(GREEN, (2, 3), 2.2, 5),
+}
+MODE_COLOURS = {"nominal": "#bfe5d9", "adaptive": SKY, "reallocated": ORANGE, "unanticipated": PURPLE}
+
+
+@dataclass(frozen=True)
+class Mark:
+    """An instant shown wherever time runs: a line over the panel and a symbol at its edge."""
+
+    name: str
+    time_s: float
+    colour: str
+    dash: tuple[float, ...]
+    symbol: str
+
+    @property
+    def label(self) -> str:
+        """Name and time, for the legend."""
+        return f"{self.name} {self.time_s:.2f} s"
+
+
+def marks(metrics: Document) -> list[Mark]:
+    """The instants of fault, detection, isolation and departure, as far as they exist."""
+    fault, departure = metrics["fault"], metrics["departure"]
+    instants = (
+        ("fault", fault and fault["at_s"], VERMILION, (), "v"),
+        ("detection", metrics["detection"]["time_s"], BLACK, (4, 2), "D"),
+        ("isolation", metrics["isolation"]["time_s"], PURPLE, (6, 2, 1, 2), "s"),
+        ("departure", departure and departure["time_s"], BLACK, (1, 2), "X"),
+    )
+    return [Mark(name, time, *look) for name, time, *look in instants if time is not None]

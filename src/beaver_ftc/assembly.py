@@ -30,6 +30,7 @@ def _assemble_diagnosis(fdi: np.void, config: FdiConfig, dt: float) -> None:
     fdi["thresholds"] = _THRESHOLDS[config.thresholds]
     fdi["dt"] = dt
     fdi["forgetting"] = exp(-dt / config.forgetting_time_s)
+    fdi["pole"] = config.detection_pole_per_s
     fdi["decay"] = exp(-config.detection_pole_per_s * dt)
     fdi["fie_decay"] = exp(-config.isolation_pole_per_s * dt)
     fdi["inertia"] = config.bounds.inertia_coupling.as_tuple()

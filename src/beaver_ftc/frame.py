@@ -12,12 +12,12 @@ from beaver_ftc import channels as ch
 from beaver_ftc.compiled import kernel
 from beaver_ftc.control import adaptive, allocation, nominal, reference_model
 from beaver_ftc.control.state import CONTROL, NOMINAL, ORACLE
-from beaver_ftc.design.model import ALPHA, BETA, DESIGN, QDYN, control_effectiveness, free_response
+from beaver_ftc.design.model import ALPHA, BETA, DESIGN, ELEVATOR, QDYN, control_effectiveness, free_response
 from beaver_ftc.diagnosis import detection, guarantee, isolation, network
 from beaver_ftc.diagnosis.state import DIAGNOSIS
 from beaver_ftc.diagnosis.thresholds import uncertainty_bound
 from beaver_ftc.plant.native import read_nodes, write_nodes
-from beaver_ftc.supervisor import MODE_NOMINAL, MODE_REALLOCATED, mode_of
+from beaver_ftc.supervisor import MODE_ADAPTIVE, MODE_NOMINAL, MODE_REALLOCATED, MODE_UNANTICIPATED, mode_of
 
 MAX_EVENTS = 64
 FLYING, DEPARTED, NOT_FINITE = 0, 1, 2
@@ -48,7 +48,7 @@ FRAME = np.dtype(
         ("mode", "i8"), ("n_modes", "i8"), ("mode_at_s", "f8", (MAX_EVENTS,)), ("mode_is", "i8", (MAX_EVENTS,)),
         ("pre_fault_square", "f8", (3,)), ("pre_fault_frames", "i8"),
         ("post_fault_square", "f8", (3,)), ("post_fault_frames", "i8"),
-        ("saturated_frames", "i8", (4,)),
+        ("saturated_frames", "i8", (4,)), ("worst_ratio", "f8"),
         ("outside", "i8"), ("n_exits", "i8"), ("exit_at_s", "f8", (MAX_EVENTS,)), ("return_at_s", "f8", (MAX_EVENTS,)),
         ("departed", "i8"),
     ],
@@ -87,16 +87,23 @@ def flight_status(truth):
 
 
 @kernel
+def unanticipated_effect(frame):
+    """The pitch acceleration of the truth's extra moment on alpha^3, rad/s2 (SPEC 4)."""
+    design, y = frame.design, frame.y
+    return frame.Cm_alpha3 * design.Qm * y[QDYN] * design.S * design.c * y[ALPHA] ** 3
+
+
+@kernel
 def fault_effect(frame):
     """Fill frame.phi (3,) rad/s2: what the truth's faults do to the angular acceleration, as the design model weighs it."""
-    G, truth, y, design = frame.G, frame.truth, frame.y, frame.design
+    G, truth = frame.G, frame.truth
     for i in range(3):
         frame.phi[i] = 0.0
         if frame.faulted:
             for s in range(4):
                 frame.phi[i] += G[i, s] * (truth[ch.EFFECTIVE + s] - frame.u[s])
     if frame.faulted:
-        frame.phi[1] += frame.Cm_alpha3 * design.Qm * y[QDYN] * design.S * design.c * y[ALPHA] ** 3
+        frame.phi[1] += unanticipated_effect(frame)
 
 
 @kernel
@@ -177,12 +184,25 @@ def isolated_surface(fdi):
 
 
 @kernel
+def true_mode(frame):
+    """The mode for one who is told the true fault the moment it occurs."""
+    if not frame.faulted:
+        return MODE_NOMINAL
+    if frame.Cm_alpha3 != 0.0:
+        return MODE_UNANTICIPATED
+    if frame.truth[ch.TRUE_EFFECTIVENESS + ELEVATOR] < 1.0:
+        return MODE_REALLOCATED
+    return MODE_ADAPTIVE
+
+
+@kernel
 def supervise(frame):
     """Put the right law in charge and note every change."""
     fdi = frame.fdi
-    mode = mode_of(frame.control.law, fdi.detected, fdi.isolated, isolated_surface(fdi))
     if frame.control.law == ORACLE:
-        mode = MODE_NOMINAL
+        mode = true_mode(frame)
+    else:
+        mode = mode_of(frame.control.law, fdi.detected, fdi.isolated, isolated_surface(fdi))
     if (mode != frame.mode or frame.n_modes == 0) and frame.n_modes < MAX_EVENTS:
         frame.mode_at_s[frame.n_modes] = frame.t
         frame.mode_is[frame.n_modes] = mode
@@ -208,11 +228,11 @@ def accommodate(frame):
         elif s == surface:
             frame.target[s] = 1.0 + fdi.estimator[fdi.isolated].theta[dominant_axis(s)]
     adaptive.approach(control, frame.target)
-    for i in range(3):
-        frame.fhat[i] = 0.0 if control.law in (NOMINAL, ORACLE) else fdi.network.output[i]
+    frame.fhat[:] = 0.0
     if control.law == ORACLE:
-        design, y = frame.design, frame.y
-        frame.fhat[1] = frame.Cm_alpha3 * design.Qm * y[QDYN] * design.S * design.c * y[ALPHA] ** 3
+        frame.fhat[1] = unanticipated_effect(frame)
+    elif control.law != NOMINAL and fdi.detected:
+        detection.unknown_acceleration(fdi, frame.fhat)
 
 
 @kernel
@@ -246,9 +266,19 @@ def account(frame):
         frame.post_fault_frames += 1
     else:
         frame.pre_fault_frames += 1
+        note_closest_approach(frame)
     for s in range(4):
         frame.saturated_frames[s] += control.saturated[s]
     note_envelope(frame)
+
+
+@kernel
+def note_closest_approach(frame):
+    """The largest share of its threshold that a residual has reached in healthy flight."""
+    fdi = frame.fdi
+    for i in range(3):
+        if fdi.threshold[i] > 0.0:
+            frame.worst_ratio = max(frame.worst_ratio, abs(fdi.residual[i]) / fdi.threshold[i])
 
 
 @kernel

@@ -79,6 +79,6 @@ def flight_of(scenario: Scenario, frame: np.void, columns: tuple[str, ...]) -> F
         envelope_exits=_envelope_exits(frame),
         departure=(float(frame["t"]), DEPARTURE_SIGNALS[departed // 10]) if departed else None,
         saturation_s={s: int(n) * dt for s, n in zip(SURFACES, frame["saturated_frames"], strict=True)},
-        worst_residual_ratio=float(fdi["worst_ratio"]),
+        worst_residual_ratio=float(frame["worst_ratio"]),
         **_isolation(fdi),
     )

@@ -15,13 +15,10 @@ def detect(fdi, x, t):
     """Form the residual at time t (s) and raise the alarm if it leaves its threshold. x (3,) rad/s measured."""
     for i in range(3):
         fdi.residual[i] = x[i] - fdi.xhat[i]
-        if not fdi.detected:
-            if fdi.threshold[i] > 0.0:
-                fdi.worst_ratio = max(fdi.worst_ratio, abs(fdi.residual[i]) / fdi.threshold[i])
-            if abs(fdi.residual[i]) > fdi.threshold[i]:
-                fdi.detected = 1
-                fdi.detected_at_s = t
-                fdi.detected_axis = i
+        if not fdi.detected and abs(fdi.residual[i]) > fdi.threshold[i]:
+            fdi.detected = 1
+            fdi.detected_at_s = t
+            fdi.detected_axis = i
 
 
 @kernel
@@ -36,3 +33,13 @@ def predict(fdi, x, believed, leaking):
         rate = believed[i] + fdi.network.output[i]
         fdi.xhat[i] = x[i] + fdi.dt * rate + fdi.decay[i] * (fdi.xhat[i] - x[i])
         fdi.threshold[i] = bound_step(fdi.threshold[i], fdi.eta_bar[i], fdi.decay[i], fdi.dt)
+
+
+@kernel
+def unknown_acceleration(fdi, out):
+    """Fill out (3,) rad/s2 with what the FDAE believes beyond the model: what the network has learnt, and what it is about to.
+
+    The residual settles at (phi - fhat) / Lambda0, so Lambda0 eps0 is the part of the fault not yet in the weights, at the bandwidth of the estimator.
+    """
+    for i in range(3):
+        out[i] = fdi.network.output[i] + fdi.pole[i] * fdi.residual[i]

@@ -24,10 +24,10 @@ ESTIMATOR = np.dtype(
 DIAGNOSIS = np.dtype(
     [
         ("enabled", "i8"), ("thresholds", "i8"), ("dt", "f8"), ("forgetting", "f8"),
-        ("decay", "f8", (3,)), ("fie_decay", "f8", (3,)),
+        ("pole", "f8", (3,)), ("decay", "f8", (3,)), ("fie_decay", "f8", (3,)),
         ("inertia", "f8", (3,)), ("constant", "f8", (3,)), ("earth_rate", "f8"),
         ("eta_bar", "f8", (3,)), ("eta_bar_now", "f8", (3,)),  # over the elapsed frame, and at this instant
-        ("xhat", "f8", (3,)), ("residual", "f8", (3,)), ("threshold", "f8", (3,)), ("worst_ratio", "f8"),
+        ("xhat", "f8", (3,)), ("residual", "f8", (3,)), ("threshold", "f8", (3,)),
         ("detected", "i8"), ("detected_at_s", "f8"), ("detected_axis", "i8"),
         ("isolated", "i8"), ("isolated_at_s", "f8"),
         ("n_estimators", "i8"), ("estimator", ESTIMATOR, (MAX_ESTIMATORS,)),

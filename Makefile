@@ -1,0 +1,38 @@
+# `make demo` and `make test` are all there is to know; both set up what they need.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+WORKERS ?= 2
+
+.PHONY: demo test lint clean help
+
+help:
+	@echo "make demo   set up, fly the published elevator case, print the verdict and where the report lies"
+	@echo "make test   set up and run the whole test suite"
+	@echo "make lint   set up and run the linters"
+	@echo "make clean  remove the virtual environment and what runs have written"
+
+$(VENV)/.demo: pyproject.toml
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "beaver-ftc needs Python 3.11 or newer; set PYTHON=...")'
+	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable .
+	touch $@
+
+$(VENV)/.dev: $(VENV)/.demo
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
+	touch $@
+
+demo: $(VENV)/.demo
+	$(BIN)/beaver-ftc run elevator-partial-loss --out runs
+	@echo "report: runs/elevator-partial-loss/report.html"
+
+test: $(VENV)/.dev
+	$(BIN)/python -m pytest -n $(WORKERS) --dist worksteal
+
+lint: $(VENV)/.dev
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+
+clean:
+	rm -rf $(VENV) runs sweeps .pytest_cache .hypothesis .mypy_cache .ruff_cache

@@ -50,7 +50,9 @@ def _assemble_network(network: np.void, config: ControlConfig) -> None:
     network["weight_limit"] = config.network_weight_limit_rad_s2
 
 
-def _assemble_control(control: np.void, config: ControlConfig, dt: float, trim: np.ndarray, travel: np.ndarray) -> None:
+def _assemble_control(
+    control: np.void, config: ControlConfig, dt: float, trim: np.ndarray, travel: np.ndarray
+) -> None:
     control["law"] = LAWS.index(config.law)
     control["dt"] = dt
     control["Kp"], control["Ki"] = config.proportional_per_s, config.integral_per_s2
@@ -68,7 +70,8 @@ def _assemble_control(control: np.void, config: ControlConfig, dt: float, trim: 
 def assemble(scenario: Scenario, trim: np.ndarray, travel: np.ndarray) -> np.ndarray:
     """The frame record, shape (1,), of a flight about to start.
 
-    trim (4,) rad: the surfaces in trim; travel (2, 4) rad: lower and upper stops. The truth's nodes are attached by the loop.
+    trim (4,) rad: the surfaces in trim; travel (2, 4) rad: lower and upper stops. The truth's nodes are
+    attached by the loop.
     """
     frames = np.zeros(1, FRAME)
     frame = frames[0]
@@ -83,5 +86,3 @@ def assemble(scenario: Scenario, trim: np.ndarray, travel: np.ndarray) -> np.nda
     _assemble_network(frame["fdi"]["network"], scenario.control)
     _assemble_control(frame["control"], scenario.control, dt, trim, travel)
     return frames
-
-

@@ -39,15 +39,19 @@ _INDEX = {name: index for index, (name, _, _) in enumerate(TRUTH)}
 COMMANDS = tuple(f"fcs/{s}-cmd-rad" for s in SURFACES)
 
 # Indices compiled code uses.
-AIRSPEED, ALPHA, BETA, QDYN, DPT = (_INDEX[n] for n in ("airspeed_mps", "alpha_rad", "beta_rad", "qdyn_pa", "dpt"))
-PHI, LATITUDE, LONGITUDE, ALTITUDE = (_INDEX[n] for n in ("phi_rad", "latitude_rad", "longitude_rad", "altitude_m"))
+AIRSPEED, ALPHA, BETA, QDYN, DPT = (
+    _INDEX[n] for n in ("airspeed_mps", "alpha_rad", "beta_rad", "qdyn_pa", "dpt")
+)
+PHI, LATITUDE, LONGITUDE, ALTITUDE = (
+    _INDEX[n] for n in ("phi_rad", "latitude_rad", "longitude_rad", "altitude_m")
+)
 PDOT, ENVELOPE = _INDEX["pdot_rad_s2"], _INDEX["envelope_valid"]
 POS, EFFECTIVE = _INDEX["aileron_pos_rad"], _INDEX["aileron_effective_rad"]
 TRUE_EFFECTIVENESS = _INDEX["aileron_effectiveness"]
 
 _STATES = (
-    "airspeed_mps", "alpha_rad", "beta_rad", "p_rad_s", "q_rad_s", "r_rad_s", "phi_rad", "theta_rad", "psi_rad",
-    "north_m", "east_m", "altitude_m",
+    "airspeed_mps", "alpha_rad", "beta_rad", "p_rad_s", "q_rad_s", "r_rad_s",
+    "phi_rad", "theta_rad", "psi_rad", "north_m", "east_m", "altitude_m",
 )  # fmt: skip
 _TRUTH_EXTRAS = ("pdot_rad_s2", "qdot_rad_s2", "rdot_rad_s2", "qdyn_pa", "dpt", "envelope_valid")
 

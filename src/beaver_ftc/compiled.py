@@ -1,10 +1,12 @@
-"""How this package compiles its per-frame maths: once per machine, with floating-point rules a flight can rely on.
+"""How this package compiles its per-frame maths: once per machine, with floating-point rules a flight can
+rely on.
 
-Division by zero gives inf or nan, as in NumPy and JSBSim: the loop looks for non-finite values once a frame instead of every operation doing so.
-No fast-math: the same flight gives the same bits.
+Division by zero gives inf or nan, as in NumPy and JSBSim: the loop looks for non-finite values once a frame
+instead of every operation doing so. No fast-math: the same flight gives the same bits.
 
-Compiled code is kept in the user's cache, in a folder named after the sources. Numba itself looks only at the file of the outermost
-function: without this, a change in an inner kernel would leave an old outer one in use. It also works where the package is read-only.
+Compiled code is kept in the user's cache, in a folder named after the sources. Numba itself looks only at
+the file of the outermost function: without this, a change in an inner kernel would leave an old outer one
+in use. It also works where the package is read-only.
 """
 
 import hashlib
@@ -17,7 +19,15 @@ from pathlib import Path
 import numba
 
 _PACKAGE = Path(__file__).parent
-_SOURCES = ("design/*.py", "diagnosis/*.py", "control/*.py", "plant/native.py", "channels.py", "frame.py", "supervisor.py")
+_SOURCES = (
+    "design/*.py",
+    "diagnosis/*.py",
+    "control/*.py",
+    "plant/native.py",
+    "channels.py",
+    "frame.py",
+    "supervisor.py",
+)
 
 
 def _candidates() -> Iterator[Path]:
@@ -46,7 +56,8 @@ def _fingerprint() -> str:
 
 @lru_cache(maxsize=1)
 def cache_folder() -> Path | None:
-    """Where compiled kernels are kept; None where nothing can be written, and each process then compiles its own."""
+    """Where compiled kernels are kept; None where nothing can be written, and each process then compiles
+    its own."""
     base = next((folder for folder in _candidates() if _is_writable(folder)), None)
     return base / _fingerprint() if base else None
 
@@ -55,5 +66,5 @@ def kernel(function):
     """Compile a function of arrays, records and numbers; the plain form stays at `.py_func`."""
     folder = cache_folder()
     if folder is not None:
-        numba.config.CACHE_DIR = str(folder)
+        numba.config.CACHE_DIR = str(folder)  # type: ignore[attr-defined]
     return numba.njit(cache=folder is not None, error_model="numpy")(function)

@@ -26,10 +26,10 @@ class LogSink(Protocol):
 class Flight:
     """Everything the metrics need; times in s since the start, rates in rad/s, per axis (p, q, r).
 
-    isolated: aileron, elevator, rudder, flap, unanticipated, or None while more than one fault fits (`candidates`).
-    estimate: the isolated fault's parameter, theta in [-1, 0] for a loss of effectiveness.
-    guaranteed_delay_s: from the fault to the instant from which detection was certain, None if that never came.
-    worst_residual_ratio: largest |residual| / threshold before the first alarm.
+    isolated: aileron, elevator, rudder, flap, unanticipated, or None while more than one fault fits
+    (`candidates`). estimate: the isolated fault's parameter, theta in [-1, 0] for a loss of effectiveness.
+    guaranteed_delay_s: from the fault to the instant from which detection was certain, None if that never
+    came. worst_residual_ratio: largest |residual| / threshold before the first alarm.
     """
 
     scenario: Scenario

@@ -1,9 +1,10 @@
 """One frame of the closed loop, compiled: measure, predict, detect, isolate, decide, command, record.
 
-Everything a flight remembers between frames is one record, so that a frame is one call from Python. The order matters and is JSBSim's:
-after `run()` number k the rates x[k] and the accelerations a[k] = F(x[k], u[k]) are there, u[k] being the command written before that
-run; the next run moves the rates by dt a[k]. The command computed here is u[k+1]. With n JSBSim frames in one of ours the rates move by
-dt/n a[k], and then by the accelerations on the way, already under u[k+1]: see `elapse`.
+Everything a flight remembers between frames is one record, so that a frame is one call from Python. The
+order matters and is JSBSim's: after `run()` number k the rates x[k] and the accelerations a[k] = F(x[k],
+u[k]) are there, u[k] being the command written before that run; the next run moves the rates by dt a[k].
+The command computed here is u[k+1]. With n JSBSim frames in one of ours the rates move by dt/n a[k], and
+then by the accelerations on the way, already under u[k+1]: see `elapse`.
 """
 
 import numpy as np
@@ -31,8 +32,8 @@ FRAME = np.dtype(
         ("k", "i8"), ("row", "i8"), ("dt", "f8"), ("t", "f8"), ("first_share", "f8"), ("end_share", "f8"),
         # the truth's nodes
         ("native", "i8"), ("getter", "i8"), ("setter", "i8"),
-        ("read_pointers", "i8", (ch.N_TRUTH,)), ("write_pointers", "i8", (4,)), ("factor", "f8", (ch.N_TRUTH,)),
-        ("truth", "f8", (ch.N_TRUTH,)),
+        ("read_pointers", "i8", (ch.N_TRUTH,)), ("write_pointers", "i8", (4,)),
+        ("factor", "f8", (ch.N_TRUTH,)), ("truth", "f8", (ch.N_TRUTH,)),
         ("latitude_0", "f8"), ("longitude_0", "f8"), ("radius_m", "f8"),
         # the truth's faults, for the oracle and for the analyst
         ("faulted", "i8"), ("fault_at_s", "f8"), ("Cm_alpha3", "f8"), ("phi", "f8", (3,)),
@@ -45,11 +46,13 @@ FRAME = np.dtype(
         ("G_mean", "f8", (3, 4)), ("Gu_mean", "f8", (3, 4)), ("believed", "f8", (3,)),
         ("fhat", "f8", (3,)), ("target", "f8", (4,)),
         # what happened
-        ("mode", "i8"), ("n_modes", "i8"), ("mode_at_s", "f8", (MAX_EVENTS,)), ("mode_is", "i8", (MAX_EVENTS,)),
+        ("mode", "i8"), ("n_modes", "i8"),
+        ("mode_at_s", "f8", (MAX_EVENTS,)), ("mode_is", "i8", (MAX_EVENTS,)),
         ("pre_fault_square", "f8", (3,)), ("pre_fault_frames", "i8"),
         ("post_fault_square", "f8", (3,)), ("post_fault_frames", "i8"),
         ("saturated_frames", "i8", (4,)), ("worst_ratio", "f8"),
-        ("outside", "i8"), ("n_exits", "i8"), ("exit_at_s", "f8", (MAX_EVENTS,)), ("return_at_s", "f8", (MAX_EVENTS,)),
+        ("outside", "i8"), ("n_exits", "i8"),
+        ("exit_at_s", "f8", (MAX_EVENTS,)), ("return_at_s", "f8", (MAX_EVENTS,)),
         ("departed", "i8"),
     ],
     align=True,
@@ -67,7 +70,13 @@ def measure(frame):
     for i in range(3):
         frame.x[i] = truth[i]
     y = frame.y
-    y[0], y[1], y[2], y[3], y[4] = truth[ch.ALPHA], truth[ch.BETA], truth[ch.AIRSPEED], truth[ch.QDYN], truth[ch.DPT]
+    y[0], y[1], y[2], y[3], y[4] = (
+        truth[ch.ALPHA],
+        truth[ch.BETA],
+        truth[ch.AIRSPEED],
+        truth[ch.QDYN],
+        truth[ch.DPT],
+    )
 
 
 @kernel
@@ -95,7 +104,8 @@ def unanticipated_effect(frame):
 
 @kernel
 def fault_effect(frame):
-    """Fill frame.phi (3,) rad/s2: what the truth's faults do to the angular acceleration, as the design model weighs it."""
+    """Fill frame.phi (3,) rad/s2: what the truth's faults do to the angular acceleration, as the design
+    model weighs it."""
     G, truth = frame.G, frame.truth
     for i in range(3):
         frame.phi[i] = 0.0
@@ -110,8 +120,9 @@ def fault_effect(frame):
 def elapse(frame):
     """Means over the frame that has elapsed: G, the moment of each surface, f + G u, and the bound.
 
-    The truth is a left sum over n JSBSim frames, the first under the old command. For f and G linear in time over the frame its mean weighs
-    the old sample (n + 1)/2n and the new one (n - 1)/2n: for n = 1 the old one alone, and exactly.
+    The truth is a left sum over n JSBSim frames, the first under the old command. For f and G linear in
+    time over the frame its mean weighs the old sample (n + 1)/2n and the new one (n - 1)/2n: for n = 1 the
+    old one alone, and exactly.
     """
     first, end = frame.first_share, frame.end_share
     for i in range(3):
@@ -395,8 +406,9 @@ def finish(frame, reference, row):
 def fly_frame(frames, references, log):
     """One frame of the closed loop with the built-in diagnosis and law.
 
-    frames (1,) of dtype FRAME; references (n, 3) rad/s and log (n, columns) of the present chunk, indexed by frame.row.
-    Returns FLYING, or why the flight ends: the row of a departure is still recorded, that of a non-finite truth is not.
+    frames (1,) of dtype FRAME; references (n, 3) rad/s and log (n, columns) of the present chunk, indexed
+    by frame.row. Returns FLYING, or why the flight ends: the row of a departure is still recorded, that of
+    a non-finite truth is not.
     """
     frame = frames[0]
     status = begin(frame)

@@ -1,4 +1,5 @@
-"""The closed loop: JSBSim flies, the compiled frame measures, diagnoses, decides and commands, the log goes to its sink."""
+"""The closed loop: JSBSim flies, the compiled frame measures, diagnoses, decides and commands, the log goes
+to its sink."""
 
 from collections.abc import Callable, Iterable
 from math import radians
@@ -25,7 +26,8 @@ EARTH_RADIUS_M = 6371000.0  # for the log's north and east: a local plane, not n
 
 
 class Cockpit:
-    """The wires between one plant and one frame record: which nodes are read and written, natively or through Python."""
+    """The wires between one plant and one frame record: which nodes are read and written, natively or
+    through Python."""
 
     def __init__(self, plant: Plant, frames: np.ndarray) -> None:
         self._frames = frames
@@ -121,9 +123,14 @@ class Loop:
 
     def _landed(self, status: int) -> int:
         if status == NOT_FINITE:
-            bad = [name for (name, _, _), value in zip(ch.TRUTH, self.frames["truth"][0], strict=True) if not np.isfinite(value)]
+            bad = [
+                name
+                for (name, _, _), value in zip(ch.TRUTH, self.frames["truth"][0], strict=True)
+                if not np.isfinite(value)
+            ]
             raise SimulationFailed(
-                f"{self.scenario.name}: {', '.join(bad)} not finite at {self.frames['t'][0]:g} s; the flight cannot go on"
+                f"{self.scenario.name}: not finite at {self.frames['t'][0]:g} s: {', '.join(bad)}; "
+                "the flight cannot go on"
             )
         self.frames["departed"] = status
         return status
@@ -151,7 +158,9 @@ def trim_of(scenario: Scenario, plant: Plant) -> TrimPoint:
 
 def travel_rad(plant: Plant) -> np.ndarray:
     """Lower and upper stops of the surfaces, (2, 4) rad."""
-    return np.array([[plant.read(f"actuators/{s}/position-{end}-rad") for s in SURFACES] for end in ("min", "max")])
+    return np.array(
+        [[plant.read(f"actuators/{s}/position-{end}-rad") for s in SURFACES] for end in ("min", "max")]
+    )
 
 
 def fly(
@@ -159,7 +168,8 @@ def fly(
 ) -> Flight:
     """Fly a scenario. The log goes to `sink`; `progress` is called with the share flown, chunk by chunk.
 
-    Raises BadInput when the flight cannot be trimmed or asks for what there is not, SimulationFailed when a value is not finite.
+    Raises BadInput when the flight cannot be trimmed or asks for what there is not, SimulationFailed when a
+    value is not finite.
     """
     loop = Loop(scenario)
     if sink is not None:
@@ -172,4 +182,3 @@ def fly(
     if sink is not None:
         sink.close()
     return flight_of(scenario, loop.frames[0], loop.columns)
-

@@ -5,7 +5,8 @@ from math import isfinite
 import numpy as np
 
 from beaver_ftc.assembly import PUBLISHED_CLASS, estimator_names
-from beaver_ftc.design.model import AXES, SURFACES
+from beaver_ftc.design.coefficients import SURFACES
+from beaver_ftc.design.model import AXES
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, UNANTICIPATED
 from beaver_ftc.flight import Flight
 from beaver_ftc.frame import DEPARTURE_SIGNALS, dominant_axis
@@ -35,7 +36,13 @@ def _isolation(fdi: np.void) -> dict:
         return {**nothing, "candidates": tuple(left) if fdi["detected"] else ()}
     at_s = float(fdi["isolated_at_s"])
     if verdict == UNANTICIPATED:
-        return {**nothing, "isolated": "unanticipated", "isolation_type": "unanticipated", "candidates": (), "isolation_time_s": at_s}
+        return {
+            **nothing,
+            "isolated": "unanticipated",
+            "isolation_type": "unanticipated",
+            "candidates": (),
+            "isolation_time_s": at_s,
+        }
     fie = fdi["estimator"][verdict]
     surface = int(fie["surface"])
     return {
@@ -73,7 +80,8 @@ def flight_of(scenario: Scenario, frame: np.void, columns: tuple[str, ...]) -> F
         detection_time_s=_instant(fdi["detected_at_s"]),
         detection_axis=AXES[int(fdi["detected_axis"])] if fdi["detected"] else None,
         guaranteed_delay_s=_guaranteed_delay(frame),
-        pre_fault_rms_rad_s=_rms(frame["pre_fault_square"], int(frame["pre_fault_frames"])) or (0.0, 0.0, 0.0),
+        pre_fault_rms_rad_s=_rms(frame["pre_fault_square"], int(frame["pre_fault_frames"]))
+        or (0.0, 0.0, 0.0),
         post_fault_rms_rad_s=_rms(frame["post_fault_square"], int(frame["post_fault_frames"])),
         supervisor=tuple((float(frame["mode_at_s"][i]), MODES[int(frame["mode_is"][i])]) for i in modes),
         envelope_exits=_envelope_exits(frame),

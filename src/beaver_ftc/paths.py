@@ -1,4 +1,4 @@
-"""Where the aircraft and the built-in scenarios live: inside an installed wheel, or at the repository's root."""
+"""Where the aircraft and the built-in scenarios live: in an installed wheel, or at the repository's root."""
 
 from pathlib import Path
 

@@ -1,7 +1,8 @@
 """Who is in charge: the reconfiguration supervisor [Zhang2005, sec. VI].
 
-nominal until detection; adaptive until isolation, compensating an unknown fault; then reallocated (elevator, whose demand the flap can
-take over), or still adaptive with the isolated estimate (aileron, rudder: no second surface), or unanticipated (no known fault fits).
+nominal until detection; adaptive until isolation, compensating an unknown fault; then reallocated
+(elevator, whose demand the flap can take over), or still adaptive with the isolated estimate (aileron,
+rudder: no second surface), or unanticipated (no known fault fits).
 """
 
 from beaver_ftc.compiled import kernel
@@ -15,7 +16,8 @@ MODE_NOMINAL, MODE_ADAPTIVE, MODE_REALLOCATED, MODE_UNANTICIPATED = range(4)
 
 @kernel
 def mode_of(law, detected, isolated, surface):
-    """The mode for a law, given the diagnosis: detected 0/1, isolated (estimator index, -1 or -2) and its surface.
+    """The mode for a law, given the diagnosis: detected 0/1, isolated (estimator index, -1 or -2) and its
+    surface.
 
     The nominal law has nothing to reconfigure: it stays in charge.
     """

@@ -1,7 +1,8 @@
 """What the adaptive laws believe of each surface, moved smoothly.
 
-The isolated estimator's theta becomes the effectiveness 1 + theta of its surface; it is rate limited, so that a decision never kicks
-the surfaces, and projected: a surface weaker than `least_effectiveness` is given up rather than divided by.
+The isolated estimator's theta becomes the effectiveness 1 + theta of its surface; it is rate limited, so
+that a decision never kicks the surfaces, and projected: a surface weaker than `least_effectiveness` is
+given up rather than divided by.
 """
 
 from beaver_ftc.compiled import kernel

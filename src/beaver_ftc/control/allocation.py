@@ -1,4 +1,5 @@
-"""From demanded angular accelerations to surfaces: lateral pair, elevator, and the hand-over from elevator to flap."""
+"""From demanded angular accelerations to surfaces: lateral pair, elevator, and the hand-over from elevator
+to flap."""
 
 from beaver_ftc.compiled import kernel
 from beaver_ftc.design.model import AILERON, ELEVATOR, FLAP, RUDDER
@@ -20,7 +21,8 @@ def divide(moment, effectiveness):
 
 @kernel
 def lateral(control, G, u):
-    """Aileron and rudder for the roll and yaw demand; when one saturates the other makes the best of its own axis."""
+    """Aileron and rudder for the roll and yaw demand; when one saturates the other makes the best of its
+    own axis."""
     roll, yaw = control.demand[0], control.demand[2]
     determinant = G[0, AILERON] * G[2, RUDDER] - G[0, RUDDER] * G[2, AILERON]
     aileron = divide(roll * G[2, RUDDER] - yaw * G[0, RUDDER], determinant)
@@ -39,8 +41,9 @@ def smooth(share):
 def pitch(control, G, u):
     """Elevator and flap for the pitch demand.
 
-    Before the hand-over the elevator carries all. After it, the elevator holds its trimmed moment, the flap carries what moves, and
-    what the flap's short upward travel cannot give goes back to what is left of the elevator.
+    Before the hand-over the elevator carries all. After it, the elevator holds its trimmed moment, the flap
+    carries what moves, and what the flap's short upward travel cannot give goes back to what is left of the
+    elevator.
     """
     needed = control.demand[1]
     share = smooth(control.hand_over)

@@ -2,11 +2,13 @@
 
     xdot = f(x, y) + G(y) u          x = (p, q, r), y = (alpha, beta, V, qdyn, dpt), u = (da, de, dr, df)
 
-[Zhang2005, eq. (2)] with the coefficients of [TM88]. The moment coefficients are linear in their terms, so they are kept
-as a table of coefficients times a table of regressors: a bound on a coefficient is then a bound on an acceleration.
+[Zhang2005, eq. (2)] with the coefficients of [TM88]. The moment coefficients are linear in their terms, so
+they are kept as a table of coefficients times a table of regressors: a bound on a coefficient is then a
+bound on an acceleration.
 
-Sign conventions: body axes X forward, Y right, Z down; positive moments right wing down, nose up, nose right;
-positive aileron rolls left, positive elevator pitches down, positive rudder yaws left, positive flap pitches up.
+Sign conventions: body axes X forward, Y right, Z down; positive moments right wing down, nose up, nose
+right; positive aileron rolls left, positive elevator pitches down, positive rudder yaws left, positive flap
+pitches up.
 """
 
 from collections.abc import Mapping
@@ -15,7 +17,7 @@ from dataclasses import asdict, replace
 import numpy as np
 
 from beaver_ftc.compiled import kernel
-from beaver_ftc.design.coefficients import GEOMETRY, MASS, SURFACES, inertia_coefficients, value
+from beaver_ftc.design.coefficients import GEOMETRY, MASS, inertia_coefficients, value
 
 AXES = ("p", "q", "r")
 AILERON, ELEVATOR, RUDDER, FLAP = range(4)
@@ -47,8 +49,8 @@ def design_record(
 ) -> np.ndarray:
     """The design model as a record array of shape (1,), dtype `DESIGN`.
 
-    `engine_terms=False` neglects the slipstream in the moments, as published. `scale` multiplies single coefficients,
-    `inertia_scale` the whole tensor: deliberate errors of the designer.
+    `engine_terms=False` neglects the slipstream in the moments, as published. `scale` multiplies single
+    coefficients, `inertia_scale` the whole tensor: deliberate errors of the designer.
     """
     design = np.zeros(1, DESIGN)
     mass = replace(MASS, **{name: inertia_scale * getattr(MASS, name) for name in _INERTIA})
@@ -102,7 +104,11 @@ def free_response(design, x, y, f):
         k[2, 0] + k[2, 1] * beta + k[2, 2] * ph + k[2, 3] * rh + k[2, 4] * qh
         + k[2, 5] * beta * beta * beta + k[2, 6] * dpt * dpt * dpt
     )  # fmt: skip
-    L, M, N = qdyn * design.S * design.b * Cl, qdyn * design.S * design.c * Cm, qdyn * design.S * design.b * Cn
+    L, M, N = (
+        qdyn * design.S * design.b * Cl,
+        qdyn * design.S * design.c * Cm,
+        qdyn * design.S * design.b * Cn,
+    )
     f[0] = design.Ppq * p * q + design.Pqr * q * r + design.Pn * N + design.Pl * L
     f[1] = design.Qpp * p * p + design.Qpr * p * r + design.Qrr * r * r + design.Qm * M
     f[2] = design.Rpq * p * q + design.Rqr * q * r + design.Rn * N + design.Rl * L

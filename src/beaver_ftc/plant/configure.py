@@ -22,7 +22,9 @@ def _refuse_what_is_missing(scenario: Scenario) -> None:
     if not scenario.sensors.is_ideal:
         raise BadInput(f"{scenario.name}: sensors: measurement errors are not available yet, allowed: ideal")
     if scenario.environment.turbulence != "none" or any(scenario.environment.wind_mps):
-        raise BadInput(f"{scenario.name}: environment: wind and turbulence are not available yet, allowed: still air")
+        raise BadInput(
+            f"{scenario.name}: environment: wind and turbulence are not available yet, allowed: still air"
+        )
 
 
 def _uncertainty(plant: Plant, scenario: Scenario) -> None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from beaver_ftc.results import log
-from beaver_ftc.results.looks import GREY, LOOKS, YELLOW, Mark, marks
+from beaver_ftc.results.looks import GREY, LOOKS, YELLOW, Mark, closeup_window, marks
 from beaver_ftc.results.metrics import Document
 from beaver_ftc.results.series import WHOLE, Series, read_series
 from beaver_ftc.results.views import Panel, Trace, View, unit_of, views
@@ -18,14 +18,6 @@ if TYPE_CHECKING:
 
 DPI = 110
 LOWEST_RATIO = 1e-3  # of a logarithmic axis: what is smaller is nothing
-
-
-def closeup_window(instants: Sequence[Mark]) -> tuple[float, float] | None:
-    """Where to look closely: from just before the fault (or alarm) to two seconds after the last event."""
-    if not instants:
-        return None
-    times = [mark.time_s for mark in instants if mark.name != "departure"] or [instants[0].time_s]
-    return min(times) - 0.5, min(max(times), min(times) + 10.0) + 2.0
 
 
 def write_figures(log_path: Path, metrics: Document, folder: Path) -> list[Path]:

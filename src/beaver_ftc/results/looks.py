@@ -3,6 +3,7 @@
 Colours are Okabe and Ito's, told apart by the colour-blind; dashes, widths and letters tell the rest in grey.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from beaver_ftc.results.metrics import Document
@@ -35,6 +36,7 @@ LOOKS = {
     "rudder": Look(ORANGE, (6, 4), 1.8, 4),
     "flap": Look(GREEN, (2, 3), 2.2, 5),
 }
+PLUM = "#8f4a74"  # a darker purple, for letters and thin lines
 MODE_COLOURS = {"nominal": "#bfe5d9", "adaptive": SKY, "reallocated": ORANGE, "unanticipated": PURPLE}
 
 
@@ -47,6 +49,7 @@ class Mark:
     colour: str
     dash: tuple[float, ...]
     symbol: str
+    letter: str
 
     @property
     def label(self) -> str:
@@ -58,9 +61,17 @@ def marks(metrics: Document) -> list[Mark]:
     """The instants of fault, detection, isolation and departure, as far as they exist."""
     fault, departure = metrics["fault"], metrics["departure"]
     instants = (
-        ("fault", fault and fault["at_s"], VERMILION, (), "v"),
-        ("detection", metrics["detection"]["time_s"], BLACK, (4, 2), "D"),
-        ("isolation", metrics["isolation"]["time_s"], PURPLE, (6, 2, 1, 2), "s"),
-        ("departure", departure and departure["time_s"], BLACK, (1, 2), "X"),
+        ("fault", fault and fault["at_s"], VERMILION, (), "v", "F"),
+        ("detection", metrics["detection"]["time_s"], BLACK, (4, 2), "D", "D"),
+        ("isolation", metrics["isolation"]["time_s"], PLUM, (6, 2, 1, 2), "s", "I"),
+        ("departure", departure and departure["time_s"], BLACK, (1, 2), "X", "X"),
     )
     return [Mark(name, time, *look) for name, time, *look in instants if time is not None]
+
+
+def closeup_window(instants: Sequence[Mark]) -> tuple[float, float] | None:
+    """Where to look closely: from just before the fault (or alarm) to two seconds after the last event."""
+    if not instants:
+        return None
+    times = [mark.time_s for mark in instants if mark.name != "departure"] or [instants[0].time_s]
+    return min(times) - 0.5, min(max(times), min(times) + 10.0) + 2.0

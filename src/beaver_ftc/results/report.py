@@ -1,48 +1,162 @@
-"""The report of a run as one HTML file that needs nothing else: no network, no other file."""
+"""The report of one or more runs as one HTML file that needs nothing else: no network, no other file.
+
+The page draws the same views as the figures, from the log's numbers inside it: whole flight, and at full
+resolution around the fault.
+"""
 
 import base64
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from beaver_ftc.results import verdict
+import numpy as np
+
+from beaver_ftc.results import log, verdict
+from beaver_ftc.results.looks import LOOKS, MODE_COLOURS, Mark, closeup_window, marks
 from beaver_ftc.results.metrics import Document
+from beaver_ftc.results.series import Series, read_series
+from beaver_ftc.results.views import Panel, Trace, View, unit_of, views
 
 if TYPE_CHECKING:
     from jinja2 import Environment
 
 _TEMPLATES = Path(__file__).parent / "templates"
+_PATH = ("north_m", "east_m", "altitude_m", "phi_rad", "theta_rad", "psi_rad")
 
 
-def write_report(folder: Path, metrics: Document) -> None:
-    """Write `report.html` into a result folder, from its figures, its `scenario.yaml` and the metrics."""
-    (folder / "report.html").write_text(render(folder, metrics), encoding="utf-8")
+def write_report(path: Path, folders: Sequence[Path]) -> None:
+    """Write the report of the runs in these result folders, side by side, as one HTML file.
+
+    Each folder holds `scenario.yaml`, `metrics.json` and `log.parquet`.
+    """
+    path.write_text(render(folders), encoding="utf-8")
 
 
-def render(folder: Path, metrics: Document) -> str:
+def render(folders: Sequence[Path]) -> str:
     """The report as HTML text."""
-    return (
-        _environment()
-        .get_template("report.html.j2")
-        .render(
-            metrics=metrics,
-            title=verdict.title(metrics),
-            facts=verdict.facts(metrics),
-            tracking=verdict.tracking(metrics),
-            expectations=verdict.expectations(metrics),
-            scenario=(folder / "scenario.yaml").read_text(encoding="utf-8"),
-            figures=[(path.stem, _data_uri(path)) for path in sorted((folder / "figures").glob("*.png"))],
-        )
+    documents = [json.loads((folder / "metrics.json").read_text(encoding="utf-8")) for folder in folders]
+    texts = [(folder / "scenario.yaml").read_text(encoding="utf-8") for folder in folders]
+    template = _environment().get_template("report.html.j2")
+    return template.render(
+        runs=[_words(document, text) for document, text in zip(documents, texts, strict=True)],
+        modes=MODE_COLOURS,
+        marks=_kinds_of_marks(documents),
+        data=_harmless(json.dumps(_data(folders, documents), allow_nan=False, separators=(",", ":"))),
+        css=_asset("report.css"),
+        script=_asset("report.js"),
     )
+
+
+def _words(metrics: Document, scenario: str) -> Document:
+    import yaml
+
+    return {
+        "metrics": metrics,
+        "title": verdict.title(metrics),
+        "description": yaml.safe_load(scenario).get("description", ""),
+        "facts": verdict.facts(metrics),
+        "tracking": verdict.tracking(metrics),
+        "expectations": verdict.expectations(metrics),
+        "scenario": scenario,
+    }
+
+
+def _kinds_of_marks(documents: Sequence[Document]) -> list[Mark]:
+    """One mark of each kind that at least one of the runs has."""
+    return list({mark.name: mark for document in documents for mark in marks(document)}.values())
+
+
+def _data(folders: Sequence[Path], documents: Sequence[Document]) -> Document:
+    """What the page draws from."""
+    logs = [folder / "log.parquet" for folder in folders]
+    shown = _common_views(logs)
+    columns = tuple(dict.fromkeys([*_PATH, "mode", *(name for view in shown for name in view.columns)]))
+    return {
+        "runs": [_run(path, document, columns) for path, document in zip(logs, documents, strict=True)],
+        "views": [_view(view) for view in shown],
+        "looks": {role: asdict(look) for role, look in LOOKS.items()},
+        "modes": list(MODE_COLOURS.items()),
+    }
+
+
+def _common_views(logs: Sequence[Path]) -> tuple[View, ...]:
+    """Every view that all runs have."""
+    first, *rest = (views(log.column_names(path)) for path in logs)
+    return tuple(view for view in first if all(view in other for other in rest))
+
+
+def _run(path: Path, metrics: Document, columns: Sequence[str]) -> Document:
+    instants = marks(metrics)
+    window = closeup_window(instants)
+    levels = [read_series(path, columns)]
+    if window and levels[0]["t_s"].size < log.row_count(path):
+        levels.append(read_series(path, columns, window))
+    return {
+        "name": metrics["scenario"],
+        "marks": [asdict(mark) for mark in instants],
+        "window": window or _ends(levels[0]),
+        "levels": [{name: _packed(name, values) for name, values in level.items()} for level in levels],
+    }
+
+
+def _ends(series: Series) -> tuple[float, float]:
+    return (float(series["t_s"][0]), float(series["t_s"][-1])) if series["t_s"].size else (0.0, 0.0)
+
+
+def _packed(name: str, values: np.ndarray) -> str:
+    """Values as base64 of little-endian floats: double for time, single for what is only looked at."""
+    return base64.b64encode(values.astype("<f8" if name == "t_s" else "<f4").tobytes()).decode("ascii")
+
+
+def _view(view: View) -> Document:
+    return {
+        "name": view.name,
+        "title": view.title,
+        "across": view.across,
+        "absent": view.absent,
+        "panels": [_panel(panel) for panel in view.panels],
+    }
+
+
+def _panel(panel: Panel) -> Document:
+    return {
+        "label": panel.label,
+        "unit": panel.unit,
+        "log": panel.log_scale,
+        "limits": panel.limits,
+        "steps": panel.steps,
+        "shade": panel.shade,
+        "shadeLabel": panel.shade_label,
+        "level": panel.level,
+        "traces": [_trace(trace) for trace in panel.traces],
+    }
+
+
+def _trace(trace: Trace) -> Document:
+    factor = trace.sign * unit_of(trace.column)[1]
+    return {"column": trace.column, "label": trace.label, "role": trace.role, "factor": factor}
+
+
+def _harmless(text: str) -> Any:
+    """JSON that cannot end the script element it stands in."""
+    from markupsafe import Markup
+
+    return Markup(text.replace("<", "\\u003c"))
+
+
+@cache
+def _asset(name: str) -> Any:
+    from markupsafe import Markup
+
+    return Markup((_TEMPLATES / name).read_text(encoding="utf-8"))
 
 
 @cache
 def _environment() -> "Environment":
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-    options: dict[str, Any] = {"autoescape": True, "trim_blocks": True, "lstrip_blocks": True}
+    options: Mapping[str, Any] = {"autoescape": True, "trim_blocks": True, "lstrip_blocks": True}
     return Environment(loader=FileSystemLoader(_TEMPLATES), undefined=StrictUndefined, **options)
-
-
-def _data_uri(path: Path) -> str:
-    return "data:image/png;base64," + base64.b64encode(path.read_bytes()).decode("ascii")

@@ -39,4 +39,4 @@ def write_report_files(folder: Path, document: Document) -> None:
     from beaver_ftc.results.report import write_report
 
     write_figures(folder / "log.parquet", document, folder / "figures")
-    write_report(folder, document)
+    write_report(folder / "report.html", [folder])

@@ -102,7 +102,7 @@ def scalar(text: str) -> Any:
     if _LEADING_ZERO.fullmatch(text):  # octal in YAML 1.1, decimal in 1.2: nobody's number
         return text
     if _INTEGER.fullmatch(text) and len(text) <= 400:
-        return int(text)
+        return int(text.replace("_", ""))
     return float(text.replace("_", "")) if _FLOAT.fullmatch(text) else text
 
 

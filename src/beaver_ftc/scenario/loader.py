@@ -78,7 +78,9 @@ def validate(
         instance = model.model_validate(document.data, context={"folder": folder})
     except ValidationError as error:
         problems += problems_of(error, document, model.model_json_schema())
-        problems += [Problem(document.line(at), at, says) for at, says in conflicts_in(document.data)]
+        known = {problem.location for problem in problems}
+        hidden = [(at, says) for at, says in conflicts_in(document.data) if at not in known]
+        problems += [Problem(document.line(at), at, says) for at, says in hidden]
     if problems or instance is None:
         raise ScenarioError(source, problems)
     return instance

@@ -38,16 +38,11 @@ class ScenarioError(BadInput):
 
 def key_path(location: Location) -> str:
     """('faults', 0, 'at_s') -> faults[0].at_s"""
-    path = ""
-    for part in location:
-        path += (
-            f"[{part}]"
-            if isinstance(part, int)
-            else f".{one_line(part, _SHOWN)}"
-            if path
-            else one_line(part, _SHOWN)
-        )
-    return path or WHOLE_FILE
+    parts = (
+        f"[{part}]" if isinstance(part, int) else f".{one_line(part, _SHOWN) or '(empty)'}"
+        for part in location
+    )
+    return "".join(parts).removeprefix(".") or WHOLE_FILE
 
 
 def one_line(text: str, longest: int) -> str:
@@ -140,7 +135,7 @@ def _wrong(detail: Any, given: Any) -> str:
     if kind in _SAYS:
         return f"{shown} {_SAYS[kind]}"
     if kind.endswith(_WRONG_TYPE):
-        return f"{shown} is {_type_name(given)}"
+        return "has no value" if given is None else f"{shown} is {_type_name(given)}"
     return one_line(f"{shown}: {detail['msg']}", 300)
 
 
@@ -155,7 +150,7 @@ def _shown(given: Any) -> str:
 
 
 def _type_name(given: Any) -> str:
-    names = {bool: "a truth value", dict: "a mapping", list: "a list", str: "text", type(None): "no value"}
+    names = {bool: "a truth value", dict: "a mapping", list: "a list", str: "text"}
     return names.get(type(given), "a number")
 
 

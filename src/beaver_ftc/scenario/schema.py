@@ -1,7 +1,7 @@
 """The scenario file (SPEC 7) as frozen, typed, strict sections; ranges are the contract's."""
 
 from math import degrees
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, ConfigDict, Field, model_validator
 
@@ -194,3 +194,8 @@ class Scenario(Section):
         from beaver_ftc.scenario.warnings import warnings_of
 
         return warnings_of(self)
+
+
+def json_schema() -> dict[str, Any]:
+    """The JSON Schema of a scenario file, for editors; descriptions and units of every key are in it."""
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **Scenario.model_json_schema()}

@@ -155,6 +155,8 @@ class Csv(Section):
     fully resolved scenario flies anywhere.
     """
 
+    model_config = ConfigDict(json_schema_extra={"required": ["file"]})
+
     file: str = Field(
         min_length=1, max_length=200, description="CSV file in the scenario's own folder or below it"
     )

@@ -20,7 +20,10 @@ _FORMAT = "comma-separated text with a header line, times in column t_s, rates i
 def read_column(file: Any, column: Any, folder: Path | None) -> dict[str, list[float]]:
     """The named column of a CSV file (deg/s) against its `t_s` (s); refuses what is not a table."""
     if not isinstance(file, str) or not isinstance(column, str) or not file:
-        return {}  # the type of `file` and `column` is reported by the schema
+        return {
+            "time_s": [0.0],
+            "values_deg_s": [0.0],
+        }  # the schema reports `file` or `column`, and only them
     path = _inside(folder, file)
     try:
         lines = read_text(path, _MAX_BYTES).splitlines()
@@ -63,6 +66,8 @@ def _parse(lines: Sequence[str], column: str) -> dict[str, list[float]]:
         raise UnreadableError(f"too many rows ({len(lines) - 1}), allowed: at most {MAX_ROWS}")
     at, of = header.index("t_s"), header.index(column)
     rows = [_row(line, number, (at, of)) for number, line in enumerate(lines[1:], start=2) if line.strip()]
+    if not rows:
+        raise UnreadableError(f"there are no rows, allowed: {_FORMAT}", 2)
     return {"time_s": [row[0] for row in rows], "values_deg_s": [row[1] for row in rows]}
 
 

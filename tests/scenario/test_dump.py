@@ -1,0 +1,44 @@
+"""A dumped scenario is complete, and is the scenario."""
+
+import yaml
+from hypothesis import given, settings
+
+from beaver_ftc.scenario.dump import to_yaml
+from beaver_ftc.scenario.loader import load_scenario, load_text
+from beaver_ftc.scenario.schema import Scenario
+
+from .strategies import SCENARIOS
+
+
+@settings(max_examples=150, deadline=None)
+@given(SCENARIOS)
+def test_a_dump_loads_as_the_same_scenario(data):
+    scenario = Scenario.model_validate(data)
+    text = to_yaml(scenario)
+    assert load_text(text) == scenario
+    assert to_yaml(load_text(text)) == text
+
+
+def test_a_dump_says_every_default():
+    written = yaml.safe_load(to_yaml(load_text("name: x")))
+    assert written["initial"]["airspeed_mps"] == 45
+    assert written["fdi"]["scheme"] == "adaptive-estimators"
+    assert written["actuators"]["flap"]["bandwidth_rad_s"] == 0
+    assert set(written) == set(Scenario.model_fields)
+
+
+def test_a_dump_flies_without_its_table_s_file(tmp_path):
+    (tmp_path / "ref.csv").write_text("t_s,rate_deg_s\n0,0\n1,2\n")
+    path = tmp_path / "s.yaml"
+    path.write_text("name: x\nreference: {p: [{csv: {file: ref.csv}}]}\n")
+    scenario = load_scenario(path)
+    assert load_text(to_yaml(scenario)) == scenario
+
+
+def test_the_largest_table_dumps_to_a_scenario_that_still_loads(tmp_path):
+    rows = "".join(f"{i / 100},{0.1234567 * (i % 7)}\n" for i in range(20_000))
+    (tmp_path / "ref.csv").write_text("t_s,rate_deg_s\n" + rows)
+    path = tmp_path / "s.yaml"
+    path.write_text("name: x\nreference: {p: [{csv: {file: ref.csv}}], q: [{csv: {file: ref.csv}}]}\n")
+    scenario = load_scenario(path)
+    assert load_text(to_yaml(scenario)) == scenario

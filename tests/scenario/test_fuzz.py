@@ -1,0 +1,167 @@
+"""Whatever the bytes, loading gives a scenario or a ScenarioError whose every line is one mistake."""
+
+import re
+from collections.abc import Callable
+from copy import deepcopy
+
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+from beaver_ftc.scenario.builtin import builtin_path
+from beaver_ftc.scenario.document import Document
+from beaver_ftc.scenario.loader import load_scenario, load_text, validate
+from beaver_ftc.scenario.problems import ScenarioError
+from beaver_ftc.scenario.schema import Scenario
+
+from .strategies import SCENARIOS
+
+LINE = re.compile(r"^[^\n]+:\d+: [^\n]+$")
+SEED = builtin_path("elevator-partial-loss").read_text()
+
+
+def complaint(read: Callable[[], Scenario]) -> str:
+    """What is said of the input, "" if nothing; anything but a ScenarioError fails the test."""
+    try:
+        assert isinstance(read(), Scenario)
+    except ScenarioError as error:
+        return str(error) or "a ScenarioError that says nothing"
+    return ""
+
+
+def survives(read: Callable[[], Scenario]) -> None:
+    says = complaint(read)
+    lines = says.split("\n") if says else []
+    assert all(LINE.match(line) for line in lines)
+    assert len(set(lines)) == len(lines)
+    assert len(says) < 2_000_000
+
+
+@settings(max_examples=200, deadline=None)
+@given(st.binary(max_size=200))
+def test_random_bytes(tmp_path_factory, data):
+    path = tmp_path_factory.mktemp("fuzz") / "s.yaml"
+    path.write_bytes(data)
+    survives(lambda: load_scenario(path))
+
+
+YAML_WORDS = st.sampled_from(
+    [
+        *(
+            "name",
+            "faults",
+            "type",
+            "bias",
+            "reference",
+            "q",
+            "sine",
+            "csv",
+            "file",
+            "actuators",
+            "expect",
+            "sensors",
+        ),
+        *(
+            ": ",
+            ":",
+            "- ",
+            "\n",
+            "\n  ",
+            "\n    ",
+            ", ",
+            "{",
+            "}",
+            "[",
+            "]",
+            "&a ",
+            "*a",
+            "!!str ",
+            "'",
+            '"',
+            "#",
+            "|",
+            ">",
+        ),
+        *(
+            "? ",
+            "<<",
+            "---",
+            "...",
+            "%YAML 1.1",
+            "\t",
+            "0",
+            "1e3",
+            ".nan",
+            "-1",
+            "true",
+            "~",
+            "12:30",
+            "é",
+            "\u2028",
+            "\x85",
+        ),
+    ]
+)
+
+
+@settings(max_examples=500, deadline=None)
+@given(st.lists(YAML_WORDS, max_size=40).map("".join))
+@example("a: &a [*a]")
+@example("{? {a: 1} : 2}")
+@example("- " * 2000)
+@example("? " * 2000)
+@example("name: x\nfaults: [[], {}, {type: []}, {type: {}}, {type: null}, {type: bias, at_s: {}}]")
+@example("name: x\nactuators: []")
+@example("name: x\nactuators: {elevator: []}")
+@example("name: x\nsensors: [ideal]")
+@example("name: x\nuncertainty: {coefficients: []}")
+@example("name: x\nexpect: []")
+@example("name: x\nreference: {q: [{csv: {file: [], column: {}}}, {csv: []}, {csv: {time_s: []}}]}")
+@example("name: x\nreference: {q: [{csv: {file: a, time_s: [], values_deg_s: []}}]}")
+def test_random_yaml(text):
+    survives(lambda: load_text(text, source="s.yaml"))
+
+
+@settings(max_examples=300, deadline=None)
+@given(st.data())
+def test_a_good_file_with_a_piece_cut_out_doubled_or_replaced(data):
+    start = data.draw(st.integers(0, len(SEED)))
+    stop = data.draw(st.integers(start, min(len(SEED), start + 60)))
+    new = data.draw(
+        st.sampled_from(["", SEED[start:stop] * 2, "\n", ": ", "1", "[", "}", "x", "&a", "*a", " ", "-"])
+    )
+    text = SEED[:start] + new + SEED[stop:]
+    survives(lambda: load_text(text, source="s.yaml"))
+
+
+VALUES = st.one_of(
+    st.none(),
+    st.booleans(),
+    st.integers(),
+    st.floats(),
+    st.text(max_size=10),
+    st.just([]),
+    st.just({}),
+    st.just({"type": "bias"}),
+    st.just([{"sine": None}]),
+)
+
+
+@settings(max_examples=300, deadline=None)
+@given(SCENARIOS, st.data())
+def test_a_good_scenario_with_values_replaced(scenario, data):
+    scenario = deepcopy(scenario)
+    for _ in range(data.draw(st.integers(1, 3))):
+        _replace_one(scenario, data)
+    survives(lambda: validate(Scenario, Document(scenario), "s.yaml"))
+
+
+def _replace_one(node, data) -> None:
+    """Walk down at random and put anything in the place of something."""
+    keys = list(node) if isinstance(node, dict) else list(range(len(node)))
+    if not keys:
+        return
+    key = data.draw(st.sampled_from(keys))
+    if isinstance(node[key], dict | list) and node[key] and data.draw(st.booleans()):
+        _replace_one(node[key], data)
+    else:
+        node[key] = deepcopy(data.draw(VALUES))

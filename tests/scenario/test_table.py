@@ -1,0 +1,102 @@
+"""CSV references: what is read, what is refused, and nothing outside the scenario's folder."""
+
+import os
+import re
+
+import pytest
+
+from beaver_ftc.scenario.loader import load_scenario, load_text
+from beaver_ftc.scenario.problems import ScenarioError
+
+GOOD = "t_s,rate_deg_s\n0,0\n1,2\n"
+
+
+def load(folder, file="ref.csv", more=""):
+    path = folder / "scenario.yaml"
+    path.write_text(f"name: x\nreference:\n  q:\n    - csv:\n        file: {file}\n        {more}\n")
+    return load_scenario(path)
+
+
+def refused(folder, **options) -> str:
+    with pytest.raises(ScenarioError) as caught:
+        load(folder, **options)
+    (line,) = str(caught.value).split("\n")
+    return line
+
+
+def test_a_column_by_name(tmp_path):
+    (tmp_path / "ref.csv").write_text("\ufefft_s,p,q\r\n0,1,2\r\n0.5,3,4\r\n", encoding="utf-8")
+    table = load(tmp_path, more="column: q").reference.q[0].csv
+    assert table.time_s == (0, 0.5)
+    assert table.values_deg_s == (2, 4)
+
+
+def test_a_file_in_a_folder_below(tmp_path):
+    (tmp_path / "tables").mkdir()
+    (tmp_path / "tables" / "ref.csv").write_text(GOOD)
+    assert load(tmp_path, file="tables/ref.csv").reference.q[0].csv.values_deg_s == (0, 2)
+
+
+@pytest.mark.parametrize(
+    ("content", "says"),
+    [
+        ("", "the header has no column 't_s'"),
+        ("0,0\n1,2\n", "the header has no column 't_s'"),
+        ("t_s,q\n0,0\n", "the header has no column 'rate_deg_s'"),
+        ("t_s,t_s,rate_deg_s\n0,0,0\n", "the header has no column 't_s'"),
+        ("t_s,rate_deg_s\n", "line 2: there are no rows"),
+        ("t_s,rate_deg_s\n0,0\n0,1\n", "times do not increase"),
+        ("t_s,rate_deg_s\n1,0\n0,1\n", "times do not increase"),
+        ("t_s,rate_deg_s\n-1,0\n0,1\n", "times do not increase from 0"),
+        ("t_s,rate_deg_s\n0,0\n1,nan\n", "line 3: '1,nan' is not finite"),
+        ("t_s,rate_deg_s\n0,0\n1,inf\n", "line 3: '1,inf' is not finite"),
+        ("t_s,rate_deg_s\n0,0\n1\n", "line 3: '1' is not a row of numbers"),
+        ("t_s,rate_deg_s\n0,0\n1,two\n", "line 3: '1,two' is not a row of numbers"),
+        ("t_s,rate_deg_s\n0,0\n1,2000\n", "rates out of range"),
+        ("t_s;rate_deg_s\n0;0\n", "the header has no column 't_s'"),
+        ("t_s,rate_deg_s\n" + "".join(f"{i},0\n" for i in range(20_001)), "too many rows (20001)"),
+        ("t_s,rate_deg_s\n" + "0,0\n" * 600_000, "is too large"),
+        ("t_s,rate_deg_s\n0,\0\n", "line 2: is a binary file"),
+    ],
+)
+def test_what_is_no_table(tmp_path, content, says):
+    (tmp_path / "ref.csv").write_text(content)
+    line = refused(tmp_path)
+    assert says in line
+    assert re.search(r"scenario\.yaml:\d+: reference\.q\[0\]\.csv", line)
+
+
+@pytest.mark.parametrize(
+    "file", ["../ref.csv", "/etc/hostname", "a/../../ref.csv", "a/../ref.csv", "link.csv", "up/ref.csv"]
+)
+def test_nothing_outside_the_folder_is_read(tmp_path, file):
+    inside = tmp_path / "inside"
+    inside.mkdir()
+    (tmp_path / "ref.csv").write_text(GOOD)
+    (inside / "ref.csv").write_text(GOOD)
+    os.symlink(tmp_path / "ref.csv", inside / "link.csv")
+    os.symlink(tmp_path, inside / "up")
+    assert "is outside, allowed: a file in the scenario's own folder or below it" in refused(
+        inside, file=file
+    )
+
+
+@pytest.mark.parametrize(
+    ("file", "says"), [("none.csv", "no such file"), (".", "is a folder"), ("pipe", "is a pipe")]
+)
+def test_what_is_no_file(tmp_path, file, says):
+    os.mkfifo(tmp_path / "pipe")
+    assert says in refused(tmp_path, file=file)
+
+
+def test_a_text_without_a_folder_has_no_files():
+    with pytest.raises(ScenarioError, match="no folder to read it from"):
+        load_text("name: x\nreference: {q: [{csv: {file: ref.csv}}]}")
+
+
+@pytest.mark.parametrize(
+    "values", ["time_s: [0, 1], values_deg_s: [0]", "time_s: [1, 0], values_deg_s: [0, 1]"]
+)
+def test_a_table_written_out_is_checked_too(values):
+    with pytest.raises(ScenarioError, match=r"reference.q\[0\].csv: "):
+        load_text(f"name: x\nreference: {{q: [{{csv: {{file: ref.csv, {values}}}}}]}}")

@@ -1,0 +1,108 @@
+"""The design model against FDC's own state derivatives, and against itself taken apart."""
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from beaver_ftc.design.coefficients import engine_power_kw, slipstream
+from beaver_ftc.design.model import TERMS, control_effectiveness, design_record, free_response, regressors
+
+REFERENCE = Path(__file__).parents[1] / "data" / "fdc_state_derivatives.csv"
+
+
+def rows():
+    with REFERENCE.open() as file:
+        return [{name: float(value) for name, value in row.items()} for row in csv.DictReader(file)]
+
+
+def density(altitude_m):
+    """FDC's atmosphere: 6.5 K/km, R = 287.05, and the gravity of the altitude itself in the pressure law."""
+    T = 288.15 - 0.0065 * altitude_m
+    g = 9.80665 * (6371020.0 / (6371020.0 + altitude_m)) ** 2
+    return 101325.0 * (T / 288.15) ** (g / (287.05 * 0.0065)) / (287.05 * T)
+
+
+def measured(row):
+    rho = density(row["h_m"])
+    power = engine_power_kw(row["engine_rpm"], row["manifold_pressure_inHg"], rho)
+    V = row["V_mps"]
+    y = np.array([row["alpha_rad"], row["beta_rad"], V, 0.5 * rho * V**2, slipstream(power, rho, V)])
+    x = np.array([row["p_rad_s"], row["q_rad_s"], row["r_rad_s"]])
+    u = np.array([row[f"{s}_rad"] for s in ("aileron", "elevator", "rudder", "flap")])
+    return x, y, u
+
+
+def split(design, x, y):
+    f, G = np.zeros(3), np.zeros((3, 4))
+    free_response(design, x, y, f)
+    control_effectiveness(design, y, G)
+    return f, G
+
+
+def test_it_gives_the_angular_accelerations_of_fdc():
+    design = design_record()[0]
+    ours, theirs = [], []
+    for row in rows():
+        x, y, u = measured(row)
+        f, G = split(design, x, y)
+        ours.append(f + G @ u)
+        theirs.append([row["pdot_rad_s2"], row["qdot_rad_s2"], row["rdot_rad_s2"]])
+    error = np.sqrt(np.mean((np.array(ours) - theirs) ** 2, axis=0))
+    assert np.all(error <= 2e-5 * np.sqrt(np.mean(np.square(theirs), axis=0)))
+
+
+def moment_form(design, x, y, u):
+    """Euler's equations with the inertia tensor itself and the table of terms: no constant of SPEC 3 is used."""
+    table = np.zeros((3, 9))
+    regressors(design, x, y, u, table)
+    Cl, Cm, Cn = np.sum(table * design["coefficient"], axis=1)
+    S, b, c = design["S"], design["b"], design["c"]
+    moments = y[3] * S * np.array([b * Cl, c * Cm, b * Cn])
+    inertia = np.array([[5368.39, 0, -117.64], [0, 6928.93, 0], [-117.64, 0, 11158.75]])
+    return np.linalg.solve(inertia, moments - np.cross(x, inertia @ x))
+
+
+rates = st.floats(-1, 1)
+deflections = st.floats(-0.4, 0.4)
+
+
+@given(
+    x=st.tuples(rates, rates, rates),
+    y=st.tuples(
+        st.floats(-0.1, 0.3),
+        st.floats(-0.3, 0.3),
+        st.floats(25, 60),
+        st.floats(300, 2200),
+        st.floats(-0.1, 0.6),
+    ),
+    u=st.tuples(deflections, deflections, deflections, deflections),
+)
+def test_split_equals_eulers_equations(x, y, u):
+    x, y, u = map(np.array, (x, y, u))
+    design = design_record()[0]
+    f, G = split(design, x, y)
+    assert f + G @ u == pytest.approx(moment_form(design, x, y, u), rel=1e-9, abs=1e-9)
+
+
+def test_neglecting_the_engine_removes_its_three_terms_alone():
+    x, y, _ = measured(rows()[7])
+    without = split(design_record(engine_terms=False)[0], x, y)[0]
+    y[4] = 0.0
+    assert without == pytest.approx(split(design_record()[0], x, y)[0], abs=1e-14)
+
+
+def test_every_moment_term_of_the_table_is_used():
+    from beaver_ftc.design.coefficients import coefficient_terms
+
+    for coefficient, names in zip(("Cl", "Cm", "Cn"), TERMS, strict=True):
+        assert {term.name for term in coefficient_terms(coefficient)} == {name for name in names if name}
+
+
+def test_the_atmosphere_used_here_is_the_standard_one():
+    assert density(0.0) == pytest.approx(1.225, rel=1e-4)
+    assert density(1000.0) == pytest.approx(1.1117, rel=1e-3)
+    assert density(3000.0) == pytest.approx(0.9093, rel=1e-3)

@@ -8,6 +8,7 @@ import numpy as np
 
 from beaver_ftc import channels as ch
 from beaver_ftc.assembly import assemble, estimator_names
+from beaver_ftc.compiled import direct
 from beaver_ftc.design.coefficients import SURFACES
 from beaver_ftc.errors import SimulationFailed
 from beaver_ftc.flight import Flight, LogSink
@@ -64,6 +65,8 @@ class Loop:
         self.n_frames = round(scenario.duration_s * scenario.rate_hz)
         self.columns = ch.log_columns(estimator_names())
         self._log = np.empty((min(CHUNK_ROWS, self.n_frames), len(self.columns)))
+        self._references = np.empty((len(self._log), 3))
+        self._fly_frame = direct(fly_frame, self.frames, self._references, self._log)
         self._set_origin()
 
     def _set_origin(self) -> None:
@@ -77,13 +80,14 @@ class Loop:
         for start in range(0, self.n_frames, CHUNK_ROWS):
             rows = min(CHUNK_ROWS, self.n_frames - start)
             t = np.arange(start, start + rows) / self.scenario.rate_hz
-            status = self._fly_chunk(start, rows, sample(self.scenario.reference, t))
+            self._references[:rows] = sample(self.scenario.reference, t)
+            status = self._fly_chunk(start, rows)
             flown = int(self.frames["row"][0])
             yield self._log[:flown]
             if status != FLYING:
                 return
 
-    def _fly_chunk(self, start: int, rows: int, references: np.ndarray) -> int:
+    def _fly_chunk(self, start: int, rows: int) -> int:
         """Frames start to start + rows; returns why it ended."""
         self.frames["row"] = 0
         k, end = start, start + rows
@@ -91,26 +95,28 @@ class Loop:
             self.schedule.apply(k)
             self._tell_analyst(k)
             stop = min(self.schedule.next_change(k), end)
-            status = self._fly_segment(k, stop, references)
+            status = self._fly_segment(k, stop)
             if status != FLYING:
                 return status
             k = stop
         return FLYING
 
-    def _fly_segment(self, k: int, stop: int, references: np.ndarray) -> int:
+    def _fly_segment(self, k: int, stop: int) -> int:
         """Frames k to stop, in which no fault changes."""
         if k == 0:
-            status = self._fly_frames(1, 0, references)
+            status = self._fly_frames(1, 0)
             if status != FLYING:
                 return status
             k = 1
-        return self._fly_frames(stop - k, self.scenario.substeps, references)
+        return self._fly_frames(stop - k, self.scenario.substeps)
 
-    def _fly_frames(self, count: int, runs: int, references: np.ndarray) -> int:
-        run, frames, log, cockpit = self.plant.run, self.frames, self._log, self.cockpit
+    def _fly_frames(self, count: int, runs: int) -> int:
+        frames, references, log = self.frames, self._references, self._log
+        fly_frame, cockpit = self._fly_frame, self.cockpit
+        simulator_frames = (self.plant.run,) * runs
         through_python = not cockpit.native
         for _ in range(count):
-            for _ in range(runs):
+            for run in simulator_frames:
                 run()
             if through_python:
                 cockpit.read()

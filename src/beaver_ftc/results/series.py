@@ -4,7 +4,7 @@ Read a row group at a time, so that a ten-hour flight fits; a short flight is re
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -29,9 +29,20 @@ def read_series(
     frame_s = _frame_s(path)
     rows = min(log.row_count(path), (window_s[1] - window_s[0]) / frame_s)
     stretch = 1 if rows <= max_points else math.ceil(2 * rows / max_points)
-    chunks = (_derive(_within(chunk, window_s), wanted) for chunk in log.read_chunks(path, sources(wanted)))
+    whole = _unwrap_heading(log.read_chunks(path, sources(wanted)))
+    chunks = (_derive(_within(chunk, window_s), wanted) for chunk in whole)
     parts = [chunk if stretch == 1 else _envelope(chunk, stretch) for chunk in chunks if chunk["t_s"].size]
     return {name: np.concatenate([part[name] for part in parts] or [np.empty(0)]) for name in wanted}
+
+
+def _unwrap_heading(chunks: Iterable[Series]) -> Iterator[Series]:
+    """Heading without its jumps of a whole turn."""
+    last = np.empty(0)
+    for chunk in chunks:
+        if "psi_rad" in chunk:
+            chunk["psi_rad"] = np.unwrap(np.append(last, chunk["psi_rad"]))[last.size :]
+            last = chunk["psi_rad"][-1:]
+        yield chunk
 
 
 def _derive(chunk: Series, wanted: Sequence[str]) -> Series:

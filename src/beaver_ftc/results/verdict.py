@@ -74,7 +74,7 @@ def _table(metrics: Document, folder: str) -> "Table":
         )
     for name, expected, actual, passed in expectations(metrics):
         mark = Text("met   " if passed else "MISSED", "green" if passed else "bold red")
-        table.add_row("expected", Text.assemble(mark, f" {name} {expected}: {actual}"))
+        table.add_row("expected", Text.assemble(mark, f" {name} {expected}, got {actual}"))
     table.add_row("results", folder)
     return table
 

@@ -45,7 +45,13 @@ function ticks(low, high, count) {
   return { values: found, digits: Math.min(6, Math.max(0, -Math.floor(Math.log10(step) + 1e-9))) };
 }
 
-const shown = (value) => (Number.isNaN(value) ? "–" : Math.abs(value) >= 1e4 || (value !== 0 && Math.abs(value) < 1e-3) ? value.toExponential(2) : value.toPrecision(4));
+/** A value in four digits; what is below a millionth of a millionth is nothing. */
+function shown(value) {
+  const size = Math.abs(value);
+  if (Number.isNaN(value)) return "–";
+  if (size < 1e-12) return "0";
+  return size >= 1e4 || size < 1e-3 ? value.toExponential(2) : value.toPrecision(4);
+}
 
 // ---- the shared clock and window -------------------------------------------------------------------------------
 
@@ -148,7 +154,7 @@ class Panel {
     const caption = make("figcaption", {}, make("strong", { textContent: this.spec.label + unit }));
     this.spec.traces.forEach((trace, i) => {
       if (!trace.label) return;
-      const entry = make("span", {}, make("output"));
+      const entry = make("span");
       if (this.spec.traces.length > 1) {
         entry.innerHTML = sample(DATA.looks[trace.role]);
         entry.append(` ${trace.label} `);
@@ -286,7 +292,7 @@ class Panel {
     const flags = series[this.spec.shade];
     if (!flags) return;
     let any = false;
-    pen.fillStyle = "#f7f0a0";
+    pen.fillStyle = "#faf6cf";
     for (const [start, end] of stretches(series.t_s, (i) => flags[i] === 1)) {
       pen.fillRect(x(start), top, Math.max(1, x(end) - x(start)), bottom - top);
       any = true;
@@ -479,14 +485,26 @@ class Space {
   draw(pen, width, height) {
     const series = seriesFor(this.run, clock.now, clock.now), craft = this.aircraft(series);
     const size = this.follow ? 1 : this.extent / 160;
-    const target = this.follow ? craft.position : this.centre;
-    const project = this.camera(width, height, target, (this.follow ? 45 : 1.25 * this.extent) * this.zoom);
     const floor = this.raised([0, 0, this.floor])[2];
+    const target = this.follow ? craft.position : [this.centre[0], this.centre[1], (this.centre[2] + floor) / 2];
+    const distance = this.follow ? 45 : this.fitting(width, height, target, floor);
+    const project = this.camera(width, height, target, distance * this.zoom);
     this.drawGround(pen, project, target, floor);
     this.drawPath(pen, project, floor);
     this.drawMarks(pen, project);
     this.drawAircraft(pen, project, craft, size);
     this.say(series, craft.index);
+  }
+
+  /** The distance from which the whole path, and the ground below it, is in sight. */
+  fitting(width, height, target, floor) {
+    const { t_s, north_m, east_m, altitude_m } = this.run.levels[0], skip = Math.max(1, Math.floor(t_s.length / 40));
+    const points = [];
+    for (let i = 0; i < t_s.length; i += skip) points.push(this.raised([north_m[i], east_m[i], altitude_m[i]]), [north_m[i], east_m[i], floor]);
+    const inSight = (at) => at && at[0] > 30 && at[0] < width - 30 && at[1] > 62 && at[1] < height - 10;
+    let distance = 0.4 * this.extent;
+    while (distance < 20 * this.extent && !points.map(this.camera(width, height, target, distance)).every(inSight)) distance *= 1.1;
+    return distance;
   }
 
   drawGround(pen, project, target, floor) {
@@ -521,13 +539,16 @@ class Space {
 
   drawMarks(pen, project) {
     const { t_s, north_m, east_m, altitude_m } = this.run.levels[0];
-    this.run.marks.forEach((mark, rank) => {
+    let rank = 0, before = -Infinity;
+    this.run.marks.forEach((mark) => {
       const i = indexAt(t_s, mark.time_s), at = project(this.raised([north_m[i], east_m[i], altitude_m[i]]));
       if (!at) return;
+      rank = Math.abs(at[0] - before) < 13 ? rank + 1 : 0;
+      before = at[0];
       const up = at[1] - 26 - 14 * rank;
       pen.strokeStyle = pen.fillStyle = mark.colour;
       pen.lineWidth = 1;
-      line(pen, at[0], at[1], at[0], up + 6);
+      if (rank === 0) line(pen, at[0], at[1], at[0], up + 6);
       pen.fillRect(at[0] - 6, up - 6, 12, 13);
       pen.fillStyle = "#fff";
       pen.font = "bold 10px system-ui, sans-serif";
@@ -606,6 +627,7 @@ byId("speed").onchange = (event) => { clock.speed = Number(event.target.value); 
 byId("whole").onclick = () => showWindow(0, END);
 byId("near").onclick = () => showWindow(Math.min(...DATA.runs.map((run) => run.window[0])), Math.max(...DATA.runs.map((run) => run.window[1])));
 byId("near").hidden = !DATA.runs.some((run) => run.marks.length);
+window.addEventListener("beforeprint", () => document.querySelectorAll("details").forEach((part) => { part.open = true; }));
 window.addEventListener("keydown", (event) => {
   if (event.target !== document.body) return;
   const step = (clock.end - clock.start) / 100;

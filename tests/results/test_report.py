@@ -1,0 +1,186 @@
+import io
+import json
+import re
+
+import matplotlib.image
+import numpy as np
+import pytest
+from browser import PROGRAM, Browser
+from synthetic import Expect, Fault, Flight, Scenario, rows
+
+from beaver_ftc.results.log import ParquetLog
+from beaver_ftc.results.metrics import as_json, metrics
+from beaver_ftc.results.report import render, write_report
+
+NASTY = "</script><script>throw 1</script> <b>&amp;"
+
+
+def _folder(path, flight, description="A flight made by hand."):
+    path.mkdir()
+    with ParquetLog(path / "log.parquet") as log:
+        log.open(flight.columns)
+        log.write(rows(flight))
+    (path / "metrics.json").write_text(as_json(metrics(flight)))
+    (path / "scenario.yaml").write_text(
+        json.dumps({"name": flight.scenario.name, "description": description})
+    )
+    return path
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    expect = Expect(detected_within_s=0.5, isolated_within_s=0.1)
+    return _folder(tmp_path_factory.mktemp("runs") / "a", Flight(scenario=Scenario(expect=expect)), NASTY)
+
+
+def test_report_needs_nothing_but_itself(folder):
+    html = render([folder])
+    assert not re.search(r"""(src|href)\s*=\s*["'](?!data:)""", html)
+    assert not re.search(r"(https?:)?//[a-z]+\.", html.replace("// ", ""))
+    assert len(html) < 3e6
+
+
+def test_report_says_the_verdict_the_numbers_and_the_versions(folder):
+    html = render([folder])
+    assert "synthetic: FAILED" in html
+    assert html.count("MISSED") == 1
+    for said in ("12.00 s", "0.07 s", "estimated theta -0.39", "isolated_within_s ≤ 0.1", "jsbsim"):
+        assert said in html
+
+
+def test_text_of_a_scenario_cannot_become_part_of_the_page(folder):
+    html = render([folder])
+    assert "throw 1</script>" not in html
+    assert html.count("</script>") == 2
+
+
+def test_same_run_gives_the_same_report(folder):
+    assert render([folder]) == render([folder])
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory):
+    if PROGRAM is None:
+        pytest.skip("no Chromium is installed")
+    opened = Browser(tmp_path_factory.mktemp("profile"))
+    yield opened
+    opened.close()
+
+
+@pytest.fixture
+def page(browser, folder, tmp_path):
+    browser.trouble.clear()
+    write_report(tmp_path / "report.html", [folder])
+    browser.open(tmp_path / "report.html")
+    yield browser
+    assert browser.trouble == []
+
+
+INK = """(canvas) => {
+  const pixels = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data;
+  let ink = 0;
+  for (let i = 0; i < pixels.length; i += 4) {
+    if (pixels[i + 3] && pixels[i] + pixels[i + 1] + pixels[i + 2] < 690) ink += 1;
+  }
+  return ink;
+}"""
+
+
+def test_every_curve_is_drawn_once_it_is_scrolled_to(page):
+    empty = page.evaluate(f"""(async () => {{
+      const ink = {INK}, empty = [];
+      for (const canvas of document.querySelectorAll("canvas")) {{
+        canvas.scrollIntoView({{block: "center"}});
+        await new Promise((done) => setTimeout(done, 60));
+        if (ink(canvas) < 300) empty.push(canvas.ariaLabel);
+      }}
+      return empty;
+    }})()""")
+    assert empty == []
+    assert page.evaluate("document.querySelectorAll('canvas').length") >= 30
+
+
+def _middle(page, selector):
+    box = page.evaluate(f"""(() => {{
+      const element = document.querySelector("{selector}");
+      element.scrollIntoView({{block: "center"}});
+      const box = element.getBoundingClientRect();
+      return [box.left, box.top, box.width, box.height];
+    }})()""")
+    page.settle()
+    return box
+
+
+def test_dragging_zooms_all_axes_and_double_click_undoes_it(page):
+    left, top, width, height = _middle(page, "#tracking canvas")
+    before = page.evaluate("[beaverReport.clock.start, beaverReport.clock.end]")
+    for kind, share in (("mousePressed", 0.4), ("mouseMoved", 0.5), ("mouseReleased", 0.6)):
+        page.mouse(kind, left + share * width, top + height / 2)
+    start, end = page.evaluate("[beaverReport.clock.start, beaverReport.clock.end]")
+    assert before[0] < start < end < before[1]
+    assert end - start == pytest.approx(0.2 * (before[1] - before[0]), rel=0.1)
+    page.evaluate("document.querySelector('#states canvas').dispatchEvent(new MouseEvent('dblclick'))")
+    assert page.evaluate("[beaverReport.clock.start, beaverReport.clock.end]") == before
+
+
+def test_pointing_reads_the_value_of_the_log_with_its_unit(page, folder):
+    _middle(page, "#states canvas")
+    page.evaluate("beaverReport.setTime(10)")
+    page.settle()
+    said = page.evaluate("document.querySelector('#states output').value")
+    assert said == f"{45 + 0.5 * np.sin(2.0):.2f} m/s"
+
+
+def test_replay_moves_at_the_pace_of_the_flight_and_stops(page):
+    page.evaluate("document.getElementById('play').click()")
+    took = page.evaluate("""(async () => {
+      const [then, t] = [performance.now(), beaverReport.clock.now];
+      await new Promise((done) => setTimeout(done, 700));
+      return (beaverReport.clock.now - t) / ((performance.now() - then) / 1000);
+    })()""")
+    assert took == pytest.approx(1.0, abs=0.15)
+    page.evaluate("document.getElementById('play').click()")
+    assert page.evaluate("beaverReport.clock.playing") is False
+
+
+def test_replay_turns_the_aircraft(page):
+    _middle(page, ".space canvas")
+    looks = []
+    for time in (0, 3):
+        page.evaluate(f"beaverReport.setTime({time})")
+        page.settle()
+        looks.append(matplotlib.image.imread(io.BytesIO(page.screenshot())))
+    assert np.abs(looks[0] - looks[1]).max() > 0.2
+
+
+def test_phone_needs_no_sideways_scrolling(page):
+    page.call("Emulation.setDeviceMetricsOverride", width=390, height=844, deviceScaleFactor=2, mobile=True)
+    page.settle()
+    assert page.evaluate("document.documentElement.scrollWidth") <= 390
+    page.call("Emulation.clearDeviceMetricsOverride")
+
+
+def test_runs_stand_side_by_side_on_the_same_scale(browser, folder, tmp_path):
+    without = Flight(
+        scenario=Scenario(name="quiet", faults=()),
+        detection_time_s=None,
+        isolation_time_s=None,
+        isolated=None,
+    )
+    write_report(tmp_path / "both.html", [folder, _folder(tmp_path / "quiet", without)])
+    browser.trouble.clear()
+    browser.open(tmp_path / "both.html")
+    assert browser.evaluate("document.querySelectorAll('#tracking canvas').length") == 6
+    boxes = browser.evaluate("""[...document.querySelectorAll('#tracking .grid')].map((grid) => {
+      const box = grid.getBoundingClientRect(); return [box.left, box.top]; })""")
+    assert boxes[0][0] < boxes[1][0]
+    assert boxes[0][1] == boxes[1][1]
+    assert browser.trouble == []
+
+
+def test_first_of_two_faults_is_marked(tmp_path):
+    two = Scenario(faults=(Fault(at_s=20.0), Fault(at_s=12.0)))
+    data = re.search(
+        r'id="data">(.*?)</script>', render([_folder(tmp_path / "two", Flight(scenario=two))])
+    ).group(1)
+    assert [mark["time_s"] for mark in json.loads(data)["runs"][0]["marks"]] == [12.0, 12.07, 12.12]

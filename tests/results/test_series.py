@@ -1,0 +1,78 @@
+import numpy as np
+import pytest
+
+from beaver_ftc.results.log import ParquetLog
+from beaver_ftc.results.series import read_series
+
+COLUMNS = ("t_s", "x", "psi_rad", "q_residual_rad_s", "q_threshold_rad_s",
+           "fie_e_q_residual_rad_s", "fie_e_q_lower_rad_s", "fie_e_q_upper_rad_s")  # fmt: skip
+
+
+def _log(path, rows, **columns):
+    t = np.arange(rows) / 100
+    values = {name: columns.get(name, np.zeros(rows)) for name in COLUMNS} | {"t_s": t}
+    with ParquetLog(path, 1000) as log:
+        log.open(COLUMNS)
+        log.write(np.column_stack([values[name] for name in COLUMNS]))
+    return path
+
+
+@pytest.fixture
+def path(tmp_path):
+    return tmp_path / "log.parquet"
+
+
+def test_short_log_is_returned_as_it_is(path):
+    x = np.random.default_rng(1).standard_normal(3000)
+    np.testing.assert_array_equal(read_series(_log(path, 3000, x=x), ["x"])["x"], x)
+
+
+def test_long_log_keeps_every_peak_at_its_time(path):
+    x = np.zeros(50_000)
+    x[12_345], x[33_333] = 7.0, -3.0
+    series = read_series(_log(path, 50_000, x=x), ["x"], max_points=400)
+    assert series["x"].size <= 480
+    assert series["t_s"][series["x"].argmax()] == pytest.approx(123.45, abs=2.5)
+    assert series["t_s"][series["x"].argmin()] == pytest.approx(333.33, abs=2.5)
+    assert (series["x"].max(), series["x"].min()) == (7.0, -3.0)
+    assert (np.diff(series["t_s"]) >= 0).all()
+
+
+def test_window_of_a_long_log_is_in_full_resolution(path):
+    x = np.arange(50_000.0)
+    series = read_series(_log(path, 50_000, x=x), ["x"], (99.995, 110.005), max_points=2000)
+    np.testing.assert_array_equal(series["x"], np.arange(10_000, 11_001))
+
+
+def test_what_is_not_there_stays_absent_without_hiding_its_neighbours(path):
+    x = np.full(50_000, np.nan)
+    x[25_001] = 2.0
+    series = read_series(_log(path, 50_000, x=x), ["x"], max_points=400)
+    assert np.nanmax(series["x"]) == 2.0
+    assert np.isnan(series["x"][:100]).all()
+
+
+def test_heading_goes_on_where_it_passes_north(path):
+    psi = np.linspace(0, 4 * np.pi, 2500)
+    np.testing.assert_allclose(
+        read_series(_log(path, 2500, psi_rad=psi % (2 * np.pi)), ["psi_rad"])["psi_rad"], psi
+    )
+
+
+def test_ratio_is_of_the_bound_on_the_residuals_side(path):
+    one = np.ones(4)
+    bounds = {
+        "fie_e_q_lower_rad_s": -2 * one,
+        "fie_e_q_upper_rad_s": 4 * one,
+        "q_threshold_rad_s": [0, 1, 2, 4],
+    }
+    residual = np.array([1.0, -1.0, 3.0, np.nan])
+    _log(path, 4, fie_e_q_residual_rad_s=residual, q_residual_rad_s=residual, **bounds)
+    series = read_series(path, ["q_ratio", "fie_e_q_ratio"])
+    np.testing.assert_allclose(series["fie_e_q_ratio"], [0.25, 0.5, 0.75, np.nan])
+    np.testing.assert_allclose(series["q_ratio"], [np.nan, 1.0, 1.5, np.nan])
+
+
+def test_single_row_and_empty_log(tmp_path):
+    assert read_series(_log(tmp_path / "one", 1), ["x"])["x"].size == 1
+    assert read_series(_log(tmp_path / "none", 0), ["x"])["x"].size == 0

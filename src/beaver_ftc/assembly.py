@@ -8,7 +8,8 @@ from beaver_ftc import channels as ch
 from beaver_ftc.control.config import ControlConfig
 from beaver_ftc.control.reference_model import discretise
 from beaver_ftc.control.state import LAWS
-from beaver_ftc.design.model import AILERON, ELEVATOR, RUDDER, design_record
+from beaver_ftc.design.model import AILERON, ELEVATOR, RUDDER
+from beaver_ftc.design.variants import design_of
 from beaver_ftc.diagnosis.config import FdiConfig
 from beaver_ftc.diagnosis.fault_class import LOSS, PARAMETER_SET
 from beaver_ftc.diagnosis.state import INTERVAL, NOT_ISOLATED, PUBLISHED
@@ -79,7 +80,7 @@ def assemble(scenario: Scenario, trim: np.ndarray, travel: np.ndarray) -> np.nda
     n = scenario.substeps
     frame["dt"] = dt
     frame["first_share"], frame["end_share"] = 1.0 / n, (n - 1.0) / (2.0 * n)
-    frame["design"] = design_record(engine_terms=scenario.design_model.engine_terms)[0]
+    frame["design"] = design_of(scenario.design_model)[0]
     frame["factor"] = [factor for _, _, factor in ch.TRUTH]
     frame["u"] = frame["u_then"] = trim
     _assemble_diagnosis(frame["fdi"], scenario.fdi, dt)

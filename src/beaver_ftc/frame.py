@@ -13,7 +13,8 @@ from beaver_ftc import channels as ch
 from beaver_ftc.compiled import kernel
 from beaver_ftc.control import adaptive, allocation, nominal, reference_model
 from beaver_ftc.control.state import CONTROL, NOMINAL, ORACLE
-from beaver_ftc.design.model import ALPHA, BETA, DESIGN, ELEVATOR, QDYN, control_effectiveness, free_response
+from beaver_ftc.design.model import ALPHA, BETA, DESIGN, ELEVATOR, QDYN
+from beaver_ftc.design.variants import response
 from beaver_ftc.diagnosis import detection, guarantee, isolation, network
 from beaver_ftc.diagnosis.state import DIAGNOSIS
 from beaver_ftc.diagnosis.thresholds import uncertainty_bound
@@ -382,8 +383,7 @@ def begin(frame):
     measure(frame)
     status = flight_status(frame.truth)
     if status != NOT_FINITE:
-        free_response(frame.design, frame.x, frame.y, frame.f)
-        control_effectiveness(frame.design, frame.y, frame.G)
+        response(frame.design, frame.x, frame.y, frame.f, frame.G)
         fault_effect(frame)
     return status
 

@@ -10,6 +10,7 @@ from beaver_ftc import channels as ch
 from beaver_ftc.assembly import assemble, estimator_names
 from beaver_ftc.compiled import direct
 from beaver_ftc.design.coefficients import SURFACES
+from beaver_ftc.design.variants import anchor
 from beaver_ftc.errors import SimulationFailed
 from beaver_ftc.flight import Flight, LogSink
 from beaver_ftc.frame import FLYING, NOT_FINITE, fly_frame
@@ -68,12 +69,20 @@ class Loop:
         self._references = np.empty((len(self._log), 3))
         self._fly_frame = direct(fly_frame, self.frames, self._references, self._log)
         self._set_origin()
+        self._anchor_design(surfaces)
 
     def _set_origin(self) -> None:
         frame = self.frames[0]
         frame["latitude_0"] = self.plant.read(ch.TRUTH[ch.LATITUDE][1])
         frame["longitude_0"] = self.plant.read(ch.TRUTH[ch.LONGITUDE][1])
         frame["radius_m"] = EARTH_RADIUS_M + self.scenario.initial.altitude_m
+
+    def _anchor_design(self, surfaces: np.ndarray) -> None:
+        """Show the design model the trim, which a linearised or frozen one holds on to."""
+        self.cockpit.read()
+        truth = self.frames["truth"][0] * self.frames["factor"][0]
+        y = truth[[ch.ALPHA, ch.BETA, ch.AIRSPEED, ch.QDYN, ch.DPT]]
+        anchor(self.frames["design"][0], truth[:3], y, surfaces)
 
     def chunks(self) -> Iterable[np.ndarray]:
         """Fly; yield the log a chunk at a time, rows (n, columns). The array is reused."""

@@ -12,12 +12,12 @@ pitches up.
 """
 
 from collections.abc import Mapping
-from dataclasses import asdict, replace
+from dataclasses import asdict
 
 import numpy as np
 
 from beaver_ftc.compiled import kernel
-from beaver_ftc.design.coefficients import GEOMETRY, MASS, inertia_coefficients, value
+from beaver_ftc.design.coefficients import GEOMETRY, MASS, MassProperties, inertia_coefficients, value
 
 AXES = ("p", "q", "r")
 AILERON, ELEVATOR, RUDDER, FLAP = range(4)
@@ -30,7 +30,6 @@ TERMS = (
     ("Cn_0", "Cn_beta", "Cn_p", "Cn_r", "Cn_q", "Cn_beta3", "Cn_dpt3", "Cn_da", "Cn_dr"),
 )
 ENGINE_TERMS = ("Cl_a2dpt", "Cm_dpt", "Cn_dpt3")
-_INERTIA = ("Ix_kg_m2", "Iy_kg_m2", "Iz_kg_m2", "Jxz_kg_m2")
 
 DESIGN = np.dtype(
     [
@@ -39,21 +38,24 @@ DESIGN = np.dtype(
         ("Rpq", "f8"), ("Rqr", "f8"), ("Rl", "f8"), ("Rn", "f8"),
         ("S", "f8"), ("b", "f8"), ("c", "f8"),
         ("coefficient", "f8", (3, 9)),
+        # of a linearised or frozen model: see variants.py
+        ("linearised", "i8"), ("frozen_alpha", "i8"),
+        ("x0", "f8", (3,)), ("y0", "f8", (5,)),
+        ("f0", "f8", (3,)), ("f_x", "f8", (3, 3)), ("f_y", "f8", (3, 5)), ("G0", "f8", (3, 4)),
     ],
     align=True,
 )  # fmt: skip
 
 
 def design_record(
-    *, engine_terms: bool = True, scale: Mapping[str, float] | None = None, inertia_scale: float = 1.0
+    *, engine_terms: bool = True, scale: Mapping[str, float] | None = None, mass: MassProperties = MASS
 ) -> np.ndarray:
     """The design model as a record array of shape (1,), dtype `DESIGN`.
 
     `engine_terms=False` neglects the slipstream in the moments, as published. `scale` multiplies single
-    coefficients, `inertia_scale` the whole tensor: deliberate errors of the designer.
+    coefficients, `mass` is what the designer takes the inertia for: deliberate errors of the designer.
     """
     design = np.zeros(1, DESIGN)
-    mass = replace(MASS, **{name: inertia_scale * getattr(MASS, name) for name in _INERTIA})
     dimensions = {"S": GEOMETRY.wing_area_m2, "b": GEOMETRY.span_m, "c": GEOMETRY.chord_m}
     for name, number in {**asdict(inertia_coefficients(mass)), **dimensions}.items():
         design[name] = number

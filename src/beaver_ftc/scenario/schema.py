@@ -110,11 +110,40 @@ class Environment(Section):
         return self
 
 
+Scale = Annotated[Number, Field(ge=0.1, le=10)]
+
+
+class InertiaScale(Section):
+    """What the designer takes the inertia for, as a share of the table's value."""
+
+    Ix: Scale = number(1.0, unit="share of 1", says="roll inertia")
+    Iy: Scale = number(1.0, unit="share of 1", says="pitch inertia")
+    Iz: Scale = number(1.0, unit="share of 1", says="yaw inertia")
+    Jxz: Ratio = number(1.0, unit="share of 1", says="product of inertia")
+
+
 class DesignModel(Section):
-    """What the designer's model leaves out on purpose (SPEC 3)."""
+    """What the designer leaves out or gets wrong on purpose (SPEC 3); the truth stays as it is."""
 
     engine_terms: Flag = Field(
         default=True, description="false neglects the dpt terms of Cl, Cm, Cn, as published"
+    )
+    linearised: Flag = Field(
+        default=False, description="true: the Jacobian at the trim the flight starts from, instead of f and G"
+    )
+    frozen_alpha: Flag = Field(
+        default=False, description="true: alpha stays at its trim value in the designer's model"
+    )
+    mass: Scale = number(
+        1.0, unit="share of 1", says="the designer's mass over the table's; inertia goes with it"
+    )
+    inertia: InertiaScale = Field(
+        default_factory=InertiaScale, description="the designer's inertia over the table's"
+    )
+    coefficients: dict[TermName, Ratio] = Field(
+        default_factory=dict,
+        description="design / table ratio of single aerodynamic terms, 1 is no error, e.g. Cm_alpha: 0.9",
+        examples=[{"Cm_alpha": 0.9}],
     )
 
 

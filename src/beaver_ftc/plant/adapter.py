@@ -104,9 +104,13 @@ class Plant:
         self._command(state)
         self._place(state)
         self.fdm.set_sim_time(0.0)
+        self._initialise()
+        self.settle()
+        self._initialise()  # again, so that the integrator's past derivatives are the settled ones too
+
+    def _initialise(self) -> None:
         if not self.fdm.run_ic():
             raise SimulationFailed("JSBSim cannot initialise the flight")
-        self.settle()
 
     def settle(self) -> None:
         """Run, time standing still, until accelerations belong to the state and the surfaces as commanded."""

@@ -30,9 +30,9 @@ TOLERANCE = 1e-9  # m/s2 and rad/s2, in each of the six accelerations (SPEC: iss
 # R-985 Wasp Junior: 450 hp for take-off at 2300 rpm and 36.5 inHg; below, idling.
 ENGINE_RPM = (600.0, 2300.0)
 MANIFOLD_PRESSURE_INHG = (10.0, 36.5)
-# The chart fit [FDC] gives 333 kW at that rating. With the throttle closed the engine absorbs no more than
-# its friction: 1.3 bar in 16.1 l at 2300 rpm is 40 kW.
-ENGINE_POWER_KW = (-40.0, 340.0)
+# The chart fit [FDC] gives 333 kW at that rating, more in thin air. With the throttle closed the engine
+# absorbs no more than its friction: 1.3 bar in 16.1 l at 2300 rpm is 40 kW.
+ENGINE_POWER_KW = (-40.0, 400.0)
 
 _ALPHA_LIMIT_RAD = 0.6  # beyond it an aircraft has departed (SPEC 1), so it cannot be trimmed there
 _MAX_ITERATIONS = 12

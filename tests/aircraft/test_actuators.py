@@ -1,0 +1,230 @@
+"""Actuators and their failures, surface by surface, against closed forms."""
+
+from math import exp, sin
+
+import numpy as np
+import pytest
+
+from beaver_ftc.design.coefficients import SURFACES, TRAVEL
+from beaver_ftc.plant.adapter import Plant
+
+DT = 0.01
+RUNAWAY_RATE = 1.0472  # rad/s, 60 deg/s
+
+
+class Surface:
+    """One surface of a trimmed Beaver, by short names."""
+
+    def __init__(self, plant, name):
+        self.plant, self.name = plant, name
+
+    def command(self, rad, norm=0.0):
+        self.plant.write(f"fcs/{self.name}-cmd-rad", rad)
+        self.plant.write(f"fcs/{self.name}-cmd-norm", norm)
+
+    def fail(self, **properties):
+        for name, value in properties.items():
+            self.plant.write(f"failures/{self.name}/{name.replace('__', '-')}", value)
+
+    def actuator(self, bandwidth=0.0, rate_limit=0.0):
+        self.plant.write(f"actuators/{self.name}/bandwidth-rad_sec", bandwidth)
+        self.plant.write(f"actuators/{self.name}/rate-limit-rad_sec", rate_limit)
+
+    def run(self, frames=1):
+        """Positions after each of so many frames."""
+        positions = []
+        for _ in range(frames):
+            self.plant.run()
+            positions.append(self.position)
+        return np.array(positions)
+
+    @property
+    def position(self):
+        return self.plant.read(f"fcs/{self.name}-pos-rad")
+
+    @property
+    def effective(self):
+        return self.plant.read(f"fcs/{self.name}-effective-rad")
+
+
+@pytest.fixture(params=SURFACES)
+def surface(request, beaver):
+    """Each surface in turn, at zero and ideal."""
+    each = Surface(beaver, request.param)
+    each.command(0.0)
+    each.run()
+    return each
+
+
+@pytest.fixture
+def travel(surface):
+    return TRAVEL[surface.name]
+
+
+def test_an_ideal_actuator_passes_the_command_in_the_same_frame_to_the_bit(surface, travel):
+    for command in np.random.default_rng(1).uniform(travel.min_rad, travel.max_rad, 50):
+        surface.command(command)
+        assert surface.run() == [command]
+        assert surface.effective == command
+
+
+def test_position_stops(surface, travel):
+    surface.command(5.0)
+    assert surface.run() == [travel.max_rad]
+    surface.command(-5.0)
+    assert surface.run() == [travel.min_rad]
+
+
+def test_travel_can_be_overridden(surface):
+    surface.plant.write(f"actuators/{surface.name}/position-max-rad", 0.05)
+    surface.command(5.0)
+    assert surface.run() == [0.05]
+
+
+@pytest.mark.parametrize("norm", [-1.0, -0.3, 0.4, 1.0])
+def test_normalised_command_adds_scaled_to_the_travel_on_its_side(surface, travel, norm):
+    side = travel.max_rad if norm > 0 else -travel.min_rad
+    surface.command(0.0, norm)
+    assert surface.run() == pytest.approx([norm * side], abs=1e-15)
+    surface.command(-0.01 * np.sign(norm), norm)
+    assert surface.run() == pytest.approx([norm * side - 0.01 * np.sign(norm)], abs=1e-15)
+
+
+@pytest.mark.parametrize("rate_hz", [100, 1000])
+def test_lag_is_the_exact_exponential(trim_point, rate_hz):
+    plant = Plant(rate_hz=rate_hz)
+    plant.start(trim_point)
+    elevator = Surface(plant, "elevator")
+    start = elevator.position
+    elevator.actuator(bandwidth=20.0)
+    elevator.command(0.1)
+    t = np.arange(1, 31) / rate_hz
+    assert elevator.run(30) == pytest.approx(0.1 + (start - 0.1) * np.exp(-20 * t), abs=1e-14)
+
+
+def test_rate_limit(surface):
+    surface.actuator(rate_limit=0.5)
+    surface.command(-0.06)
+    assert surface.run(14) == pytest.approx(-np.minimum(0.005 * np.arange(1, 15), 0.06), abs=1e-15)
+
+
+def test_lag_within_the_rate_limit(surface):
+    surface.actuator(bandwidth=20.0, rate_limit=0.5)
+    surface.command(0.09)
+    steps = np.diff(surface.run(60), prepend=0.0)
+    assert 0.09 * (1 - exp(-20 * DT)) > 0.5 * DT, "the case must reach the limit"
+    assert steps.max() == pytest.approx(0.5 * DT, abs=1e-15)
+    assert steps[-1] / steps[-2] == pytest.approx(exp(-20 * DT), rel=1e-6)
+
+
+def test_effectiveness_scales_what_the_aerodynamics_see(surface):
+    surface.command(0.08)
+    surface.fail(effectiveness=0.6)
+    assert surface.run() == [0.08]
+    assert surface.effective == 0.6 * 0.08
+
+
+def test_a_jam_holds_whatever_is_commanded(surface):
+    surface.fail(stuck=1, stuck__at__rad=0.03)
+    for command in (0.2, -0.09, 0.0):
+        surface.command(command, norm=0.1)
+        assert surface.run() == [0.03]
+    surface.fail(bias__rad=0.02, oscillation__amplitude__rad=0.02, oscillation__frequency__rad_sec=9.0)
+    assert (surface.run(20) == 0.03).all()
+
+
+def test_a_floating_surface_gives_no_moment(surface):
+    surface.command(0.08)
+    surface.fail(float=1, bias__rad=0.02)
+    assert surface.run() == [0.0]
+    assert surface.effective == 0.0
+
+
+@pytest.mark.parametrize("direction", [-1, 1])
+@pytest.mark.parametrize(("rate_limit", "rate"), [(0.0, RUNAWAY_RATE), (0.4, 0.4)])
+def test_a_runaway_goes_to_its_stop_at_the_rate_limit_whatever_is_commanded(
+    surface, travel, direction, rate_limit, rate
+):
+    stop = travel.max_rad if direction > 0 else travel.min_rad
+    surface.actuator(bandwidth=20.0 if rate_limit else 0.0, rate_limit=rate_limit)
+    surface.fail(hardover=direction)
+    for frame in range(1, 280):
+        surface.command(0.09 * (-1) ** frame, norm=0.2 * (-1) ** (frame // 3))
+        wanted = direction * min(rate * DT * frame, abs(stop))
+        assert surface.run() == pytest.approx([wanted], abs=1e-13)
+
+
+@pytest.mark.parametrize("failure", [{"stuck": 1, "stuck__at__rad": -0.09}, {"hardover": 1}, {"float": 1}])
+@pytest.mark.parametrize(("bandwidth", "rate_limit"), [(20.0, 0.0), (0.0, 0.3), (15.0, 0.5)])
+def test_a_repaired_surface_returns_by_its_own_dynamics(surface, failure, bandwidth, rate_limit):
+    """After repair the position is that of a fresh actuator started where the failure left the surface."""
+    surface.actuator(bandwidth, rate_limit)
+    surface.fail(**failure)
+    surface.command(0.02)
+    x = surface.run(7)[-1]
+    surface.fail(**dict.fromkeys(failure, 0))
+    for position in surface.run(40):
+        step = (0.02 - x) * (1 - exp(-bandwidth * DT) if bandwidth else 1)
+        x += np.clip(step, -rate_limit * DT, rate_limit * DT) if rate_limit else step
+        assert position == pytest.approx(x, abs=1e-13)
+
+
+def test_a_repaired_ideal_surface_follows_again_at_once(surface):
+    surface.fail(hardover=-1)
+    surface.run(10)
+    surface.fail(hardover=0)
+    surface.command(0.05)
+    assert surface.run() == [0.05]
+
+
+def test_bias_is_added_after_the_actuator(surface, travel):
+    surface.command(0.03)
+    surface.fail(bias__rad=-0.05)
+    assert surface.run() == pytest.approx([-0.02], abs=1e-16)
+    surface.fail(bias__rad=3.0)
+    assert surface.run() == [travel.max_rad]
+
+
+def test_oscillation_is_added_after_the_actuator(surface):
+    surface.command(0.01)
+    surface.fail(oscillation__amplitude__rad=0.02, oscillation__frequency__rad_sec=7.0)
+    for _ in range(50):
+        position = surface.run()[0]
+        t = surface.plant.read("simulation/sim-time-sec")
+        assert position == pytest.approx(0.01 + 0.02 * sin(7.0 * t), abs=1e-15)
+
+
+def test_rate_scale_slows_the_actuator(surface):
+    surface.actuator(rate_limit=0.5)
+    surface.fail(rate__scale=0.2)
+    surface.command(0.09)
+    assert surface.run(20) == pytest.approx(0.5 * 0.2 * DT * np.arange(1, 21), abs=1e-15)
+
+
+def test_a_slow_actuator_with_no_declared_limit_has_a_share_of_the_runaway_rate(surface):
+    surface.fail(rate__scale=0.1)
+    surface.command(0.09)
+    assert surface.run(20) == pytest.approx(0.1 * RUNAWAY_RATE * DT * np.arange(1, 21), abs=1e-15)
+    surface.fail(rate__scale=0.0)
+    surface.command(-0.09)
+    where = surface.position
+    assert (surface.run(20) == where).all()
+
+
+def test_a_start_puts_the_surfaces_in_place_whatever_their_dynamics(beaver, trim_point):
+    for name in SURFACES:
+        Surface(beaver, name).actuator(bandwidth=5.0, rate_limit=0.1)
+    beaver.start(trim_point)
+    for name in SURFACES:
+        assert Surface(beaver, name).position == getattr(trim_point, f"{name}_rad")
+
+
+def test_the_aircraft_loads_healthy_and_ideal():
+    plant = Plant(rate_hz=100)
+    for name in SURFACES:
+        healthy = {"effectiveness": 1, "rate-scale": 1} | dict.fromkeys(
+            ("stuck", "stuck-at-rad", "hardover", "float", "bias-rad", "oscillation-amplitude-rad"), 0
+        )
+        assert {each: plant.read(f"failures/{name}/{each}") for each in healthy} == healthy
+        assert plant.read(f"actuators/{name}/bandwidth-rad_sec") == 0
+        assert plant.read(f"actuators/{name}/rate-limit-rad_sec") == 0

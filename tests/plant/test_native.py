@@ -1,0 +1,86 @@
+"""Compiled property access gives what Python gives, to the bit."""
+
+import numba
+import numpy as np
+import pytest
+
+from beaver_ftc.plant import native
+from beaver_ftc.plant.native import NodeBank
+
+READ = [
+    "velocities/vt-fps",
+    "aero/alpha-rad",
+    "accelerations/qdot-rad_sec2",
+    "aero/coefficient/Cm",
+    "aero/dpt",
+    "fcs/flap-pos-rad",
+    "simulation/sim-time-sec",
+]
+WRITTEN = ["fcs/aileron-cmd-rad", "fcs/elevator-cmd-rad", "fcs/rudder-cmd-rad", "failures/flap/effectiveness"]
+
+needs_native = pytest.mark.skipif(not native.available(), reason="this build of JSBSim has another layout")
+
+
+@needs_native
+def test_reads_agree_to_the_bit_along_a_flight(beaver):
+    bank, found = NodeBank([beaver.node(name) for name in READ], owner=beaver), np.empty(len(READ))
+    for _ in range(50):
+        beaver.run()
+        native.read_nodes(native.getter_address(), bank.pointers, found)
+        assert found.tolist() == [beaver.read(name) for name in READ]
+
+
+@needs_native
+def test_writes_agree_to_the_bit(beaver):
+    bank, values = (
+        NodeBank([beaver.node(name) for name in WRITTEN], owner=beaver),
+        np.array([0.1, -0.2, 1 / 3, 0.7]),
+    )
+    native.write_nodes(native.setter_address(), bank.pointers, values)
+    assert [beaver.read(name) for name in WRITTEN] == values.tolist()
+
+
+@needs_native
+def test_usable_inside_another_kernel(beaver):
+    @numba.njit
+    def first_plus_second(getter, pointers, out):
+        native.read_nodes(getter, pointers, out)
+        return out[0] + out[1]
+
+    bank = NodeBank([beaver.node(name) for name in READ[:2]], owner=beaver)
+    total = first_plus_second(native.getter_address(), bank.pointers, np.empty(2))
+    assert total == beaver.read(READ[0]) + beaver.read(READ[1])
+
+
+def test_the_plain_path_gives_the_same(beaver, monkeypatch):
+    native_bank, out = NodeBank([beaver.node(name) for name in READ], owner=beaver), np.empty(len(READ))
+    native_bank.read(out)
+    monkeypatch.setenv("BEAVER_FTC_NATIVE", "0")
+    assert not native.available()
+    plain_bank, plain = NodeBank([beaver.node(name) for name in READ], owner=beaver), np.empty(len(READ))
+    plain_bank.read(plain)
+    assert plain.tolist() == out.tolist()
+    assert not plain_bank.pointers.any(), "without native access nobody may follow an address"
+    NodeBank([beaver.node(name) for name in WRITTEN], owner=beaver).write(np.array([0.1, 0.2, 0.3, 0.4]))
+    assert [beaver.read(name) for name in WRITTEN] == [0.1, 0.2, 0.3, 0.4]
+
+
+def test_a_bank_keeps_its_aircraft_alive(trim_point):
+    from beaver_ftc.plant.adapter import Plant
+
+    plant = Plant(rate_hz=100)
+    plant.start(trim_point)
+    bank, out = NodeBank([plant.node("velocities/vt-fps")], owner=plant), np.empty(1)
+    del plant
+    bank.read(out)
+    assert out[0] * 0.3048 == pytest.approx(45)
+
+
+@pytest.mark.parametrize(
+    "change", [{"_NODE_SIZE": 40}, {"_GETTER": "_ZNK9NoSuchName"}, {"_POINTER_OFFSET": 16}]
+)
+def test_another_layout_is_recognised(monkeypatch, change):
+    """A node of another size, a missing symbol, a word that is not the node's address."""
+    for name, value in change.items():
+        monkeypatch.setattr(native, name, value)
+    assert not native._layout_is_known.__wrapped__()

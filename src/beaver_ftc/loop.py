@@ -3,6 +3,7 @@ to its sink."""
 
 from collections.abc import Callable, Iterable
 from math import radians
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,8 +21,14 @@ from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.configure import configure
 from beaver_ftc.plant.faults import FaultSchedule
 from beaver_ftc.plant.trim import TrimPoint, trim
+from beaver_ftc.plugins import DETECTORS, LAWS, is_compiled
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.signals import sample
+
+if TYPE_CHECKING:
+    from beaver_ftc.control.base import Law
+    from beaver_ftc.diagnosis.base import Detector
+    from beaver_ftc.plugged import PluggedFrame
 
 CHUNK_ROWS = 8192
 EARTH_RADIUS_M = 6371000.0  # for the log's north and east: a local plane, not navigation
@@ -51,9 +58,11 @@ class Cockpit:
 
 
 class Loop:
-    """One flight in progress."""
+    """One flight in progress. detector, law: plug-ins to fly with, in place of those the scenario names."""
 
-    def __init__(self, scenario: Scenario) -> None:
+    def __init__(
+        self, scenario: Scenario, detector: "Detector | None" = None, law: "Law | None" = None
+    ) -> None:
         self.scenario = scenario
         self.plant = Plant(scenario.rate_hz, scenario.substeps)
         configure(self.plant, scenario)
@@ -62,14 +71,15 @@ class Loop:
         surfaces = np.array([getattr(self.trim, f"{s}_rad") for s in SURFACES])
         self.frames = assemble(scenario, surfaces, travel_rad(self.plant))
         self.cockpit = Cockpit(self.plant, self.frames)
+        self._anchor_design(surfaces)
         self.schedule = FaultSchedule(scenario.faults, self.plant, scenario.rate_hz)
         self.n_frames = round(scenario.duration_s * scenario.rate_hz)
-        self.columns = ch.log_columns(estimator_names())
+        self.plugged = self._plugged(detector, law)
+        self.columns = ch.log_columns(estimator_names() if self._diagnoses_itself else ())
         self._log = np.empty((min(CHUNK_ROWS, self.n_frames), len(self.columns)))
         self._references = np.empty((len(self._log), 3))
-        self._fly_frame = direct(fly_frame, self.frames, self._references, self._log)
+        self._fly_frame = self.plugged or direct(fly_frame, self.frames, self._references, self._log)
         self._set_origin()
-        self._anchor_design(surfaces)
 
     def _set_origin(self) -> None:
         frame = self.frames[0]
@@ -83,6 +93,26 @@ class Loop:
         truth = self.frames["truth"][0] * self.frames["factor"][0]
         y = truth[[ch.ALPHA, ch.BETA, ch.AIRSPEED, ch.QDYN, ch.DPT]]
         anchor(self.frames["design"][0], truth[:3], y, surfaces)
+
+    def _plugged(self, detector: "Detector | None", law: "Law | None") -> "PluggedFrame | None":
+        """The frame in which plug-ins take part; None, and nothing of it imported, if all is compiled in."""
+        names = self.scenario.fdi.scheme, self.scenario.control.law
+        if detector is law is None and is_compiled(DETECTORS, names[0]) and is_compiled(LAWS, names[1]):
+            return None
+        from beaver_ftc.plugged import plugged_frame
+
+        self.cockpit.read()
+        start = self.frames["truth"][0] * self.frames["factor"][0]
+        return plugged_frame(self.frames, self.scenario, start, detector, law)
+
+    @property
+    def _diagnoses_itself(self) -> bool:
+        return self.plugged is None or self.plugged.detector is None
+
+    def land(self) -> Flight:
+        """What the flight has yielded so far."""
+        verdict = None if self._diagnoses_itself else self.plugged.verdict
+        return flight_of(self.scenario, self.frames[0], self.columns, verdict)
 
     def chunks(self) -> Iterable[np.ndarray]:
         """Fly; yield the log a chunk at a time, rows (n, columns). The array is reused."""
@@ -179,14 +209,20 @@ def travel_rad(plant: Plant) -> np.ndarray:
 
 
 def fly(
-    scenario: Scenario, sink: LogSink | None = None, progress: Callable[[float], None] | None = None
+    scenario: Scenario,
+    sink: LogSink | None = None,
+    progress: Callable[[float], None] | None = None,
+    detector: "Detector | None" = None,
+    law: "Law | None" = None,
 ) -> Flight:
     """Fly a scenario. The log goes to `sink`; `progress` is called with the share flown, chunk by chunk.
+
+    detector, law: plug-ins to fly with, in place of those the scenario names.
 
     Raises BadInput when the flight cannot be trimmed or asks for what there is not, SimulationFailed when a
     value is not finite.
     """
-    loop = Loop(scenario)
+    loop = Loop(scenario, detector, law)
     if sink is not None:
         sink.open(loop.columns)
     for rows in loop.chunks():
@@ -196,4 +232,4 @@ def fly(
             progress(loop.frames["k"][0] / loop.n_frames)
     if sink is not None:
         sink.close()
-    return flight_of(scenario, loop.frames[0], loop.columns)
+    return loop.land()

@@ -7,6 +7,7 @@ import numpy as np
 from beaver_ftc.assembly import PUBLISHED_CLASS, estimator_names
 from beaver_ftc.design.coefficients import SURFACES
 from beaver_ftc.design.model import AXES
+from beaver_ftc.diagnosis.base import Verdict
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, UNANTICIPATED
 from beaver_ftc.flight import Flight
 from beaver_ftc.frame import DEPARTURE_SIGNALS, dominant_axis
@@ -68,8 +69,38 @@ def _guaranteed_delay(frame: np.void) -> float | None:
     return None if certain is None or not frame["faulted"] else certain - float(frame["fault_at_s"])
 
 
-def flight_of(scenario: Scenario, frame: np.void, columns: tuple[str, ...]) -> Flight:
-    """Read the flight's outcome off its frame record."""
+def verdict_of(frame: np.void) -> Verdict:
+    """What the built-in diagnosis makes of the flight so far, as a plug-in law is told."""
+    fdi = frame["fdi"]
+    if not fdi["detected"]:
+        return Verdict()
+    found = _isolation(fdi)
+    return Verdict(
+        detected=True,
+        axis=AXES[int(fdi["detected_axis"])],
+        isolated=found["isolated"],
+        type=found["isolation_type"],
+        estimate=found["estimate"],
+        candidates=found["candidates"],
+    )
+
+
+def _told(fdi: np.void, verdict: Verdict) -> dict:
+    """isolated, isolation_type, candidates, estimate, isolation_time_s of a Flight, from a plug-in's verdict."""
+    isolated = verdict.isolated if fdi["detected"] else None
+    return {
+        "isolated": isolated,
+        "isolation_type": verdict.type if isolated else None,
+        "candidates": tuple(verdict.candidates) if fdi["detected"] else (),
+        "estimate": verdict.estimate if isolated else None,
+        "isolation_time_s": float(fdi["isolated_at_s"]) if isolated else None,
+    }
+
+
+def flight_of(
+    scenario: Scenario, frame: np.void, columns: tuple[str, ...], verdict: Verdict | None = None
+) -> Flight:
+    """Read the flight's outcome off its frame record; `verdict` is a plug-in detector's last one."""
     fdi, dt = frame["fdi"], float(frame["dt"])
     departed = int(frame["departed"])
     modes = range(int(frame["n_modes"]))
@@ -88,5 +119,5 @@ def flight_of(scenario: Scenario, frame: np.void, columns: tuple[str, ...]) -> F
         departure=(float(frame["t"]), DEPARTURE_SIGNALS[departed // 10]) if departed else None,
         saturation_s={s: int(n) * dt for s, n in zip(SURFACES, frame["saturated_frames"], strict=True)},
         worst_residual_ratio=float(frame["worst_ratio"]),
-        **_isolation(fdi),
+        **(_isolation(fdi) if verdict is None else _told(fdi, verdict)),
     )

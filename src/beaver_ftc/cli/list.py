@@ -18,21 +18,31 @@ def command(format: FormatOption = Format.text) -> None:
 
 def _available() -> dict[str, Entries]:
     """Kind -> entries, each a name and a description."""
+    from beaver_ftc.plugins import DETECTORS, LAWS
     from beaver_ftc.scenario.builtin import builtin_scenarios
     from beaver_ftc.scenario.schema import Scenario
 
     schema = Scenario.model_json_schema()["$defs"]
     return {
         "scenarios": [{"name": name, "description": says.strip()} for name, says, _ in builtin_scenarios()],
-        "schemes": _choices(schema["FdiConfig"]["properties"]["scheme"]),
-        "laws": _choices(schema["ControlConfig"]["properties"]["law"]),
+        "schemes": _registered(DETECTORS),
+        "laws": _registered(LAWS),
         "faults": [entry for part in schema.values() for entry in _fault(part)],
         "signals": [_kind(schema, name, part) for name, part in schema["Signal"]["properties"].items()],
     }
 
 
-def _choices(node: dict[str, Any]) -> Entries:
-    return [{"name": name, "description": ""} for name in node.get("enum", [])]
+def _registered(group: str) -> Entries:
+    """The detectors or laws that a scenario may name, those of other installed packages included."""
+    from beaver_ftc.plugins import OURS, registered
+
+    return [
+        {
+            "name": entry.name,
+            "description": entry.description() + ("" if entry.package == OURS else f" [{entry.package}]"),
+        }
+        for entry in registered(group).values()
+    ]
 
 
 def _fault(part: dict[str, Any]) -> Entries:

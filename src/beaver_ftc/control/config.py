@@ -1,6 +1,17 @@
 """What a scenario may say about the control law (`control:`), with defaults and their reasons."""
 
-from pydantic import BaseModel, ConfigDict, Field
+from typing import Annotated
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+
+
+def _known_law(name: str) -> str:
+    from beaver_ftc.plugins import LAWS, refusal
+    from beaver_ftc.scenario.base import refuse
+
+    wrong = refusal(LAWS, name)
+    refuse([((), wrong)] if wrong else [])
+    return name
 
 
 class ControlConfig(BaseModel):
@@ -8,9 +19,12 @@ class ControlConfig(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
-    law: str = Field(
-        "fault-tolerant", description="nominal | adaptive | fault-tolerant | oracle, or a registered law"
+    law: Annotated[str, AfterValidator(_known_law)] = Field(
+        "fault-tolerant",
+        description="nominal | adaptive | fault-tolerant | oracle, a registered law (see `beaver-ftc list`), "
+        "or module:Class of an installed package",
     )
+    options: dict[str, float] = Field({}, description="parameters of a registered law, by name")
     proportional_per_s: float = Field(
         2.0, gt=0, le=50, description="Kp, 1/s: error bandwidth, well above the 0.2 Hz references"
     )

@@ -1,0 +1,123 @@
+"""Which detectors and laws there are: built in, by entry point of an installed package, or `module:Class`.
+
+    [project.entry-points."beaver_ftc.detectors"]        # in the pyproject.toml of the package
+    my-detector = "my_package:MyDetector"
+
+A scenario names them by `fdi.scheme` and `control.law`; it never names a path.
+"""
+
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+from importlib import import_module, util
+from inspect import getdoc, isclass
+
+from beaver_ftc.errors import BadInput
+
+DETECTORS, LAWS = "beaver_ftc.detectors", "beaver_ftc.laws"
+OURS = "beaver-ftc"
+_BY_CLASS = re.compile(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)*:[A-Za-z_]\w*")
+
+# In the compiled frame itself.
+_COMPILED = {
+    DETECTORS: {
+        "adaptive-estimators": "N + 1 nonlinear adaptive estimators with adaptive thresholds [Zhang2005].",
+        "none": "No diagnosis.",
+    },
+    LAWS: {
+        "nominal": "Feedback linearisation with proportional-integral feedback.",
+        "adaptive": "Nominal, and compensates an unknown fault by what the estimators have learnt of it.",
+        "fault-tolerant": "Adaptive, and hands pitch control from a weak elevator to the flap.",
+        "oracle": "Fault-tolerant, and told the true fault the moment it occurs: the yardstick.",
+    },
+}
+_RIVALS = {
+    DETECTORS: {
+        "rls-monitor": "beaver_ftc.rivals.rls:RlsMonitor",
+        "augmented-ekf": "beaver_ftc.rivals.ekf:AugmentedEkf",
+        "augmented-ukf": "beaver_ftc.rivals.ukf:AugmentedUkf",
+        "multiple-models": "beaver_ftc.rivals.imm:InteractingMultipleModels",
+        "observer-constant": "beaver_ftc.rivals.observer:ConstantThresholdObserver",
+    },
+    LAWS: {
+        "indi": "beaver_ftc.rivals.indi:IncrementalInversion",
+        "l1-adaptive": "beaver_ftc.rivals.l1:L1Adaptive",
+        "lqr": "beaver_ftc.rivals.lqr:FixedGainLqr",
+    },
+}
+_METHODS = ("reset", "step")
+
+
+@dataclass(frozen=True)
+class Registered:
+    """A detector or law by name. target: `module:Class`, empty for what the compiled frame does itself."""
+
+    group: str
+    name: str
+    target: str
+    package: str
+
+    def description(self) -> str:
+        """The first line of its docstring; imports its class. A class that cannot be loaded is said to be so."""
+        if not self.target:
+            return _COMPILED[self.group][self.name]
+        try:
+            return (getdoc(plugin_class(self.group, self.name)) or "").partition("\n")[0]
+        except BadInput as error:
+            return f"broken: {error}"
+
+
+def is_compiled(group: str, name: str) -> bool:
+    """Whether the compiled frame does this scheme or law itself."""
+    return name in _COMPILED[group]
+
+
+def registered(group: str) -> dict[str, Registered]:
+    """Everything registered under DETECTORS or LAWS, by name, ours first; imports none of it."""
+    ours = {name: Registered(group, name, "", OURS) for name in _COMPILED[group]}
+    ours |= {name: Registered(group, name, target, OURS) for name, target in _RIVALS[group].items()}
+    others = {entry.name: entry for entry in _from_packages(group) if entry.name not in ours}
+    return ours | others
+
+
+def _from_packages(group: str) -> Iterable[Registered]:
+    from importlib.metadata import entry_points
+
+    for point in sorted(entry_points(group=group), key=lambda point: point.name):
+        yield Registered(group, point.name, point.value, point.dist.name if point.dist else "")
+
+
+def refusal(group: str, name: str) -> str | None:
+    """What is wrong with a scheme's or law's name in a scenario, and what is allowed; None if nothing is."""
+    from beaver_ftc.scenario.base import suggestion
+
+    if name in _COMPILED[group] or name in _RIVALS[group]:
+        return None
+    known = registered(group)
+    if name in known:
+        return None
+    if not _BY_CLASS.fullmatch(name):
+        what = "scheme" if group == DETECTORS else "law"
+        return (
+            f"unknown {what} {name[:100]!r}{suggestion(name, known)}, or module:Class of an installed package"
+        )
+    module = name.partition(".")[0].partition(":")[0]
+    return None if util.find_spec(module) else f"no installed package has the module {module!r}"
+
+
+def plugin_class(group: str, name: str) -> type:
+    """The class behind a name that is not compiled in. Raises BadInput, naming it, if there is none."""
+    entry = registered(group).get(name)
+    target = entry.target if entry else name
+    module, _, attribute = target.partition(":")
+    try:
+        found = getattr(import_module(module), attribute)
+    except Exception as error:
+        reason = " ".join(str(error).split())
+        raise BadInput(f"plug-in {name}: cannot load {target}: {type(error).__name__}: {reason}") from error
+    missing = [method for method in _METHODS if not callable(getattr(found, method, None))]
+    if not isclass(found) or missing:
+        needs = f"lacks {' and '.join(missing)}" if missing else "is not a class"
+        raise BadInput(f"plug-in {name}: {target} {needs}, allowed: a class with reset and step")
+    return found
+

@@ -7,7 +7,7 @@ import pytest
 from beaver_ftc.control.state import ADAPTIVE, FAULT_TOLERANT, LAWS, NOMINAL
 from beaver_ftc.design.model import AILERON, ELEVATOR, FLAP, RUDDER
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, UNANTICIPATED
-from beaver_ftc.supervisor import MODES, mode_of
+from beaver_ftc.supervisor import MODES, mode_of, next_mode
 
 SITUATIONS = {  # detected, isolated, surface
     "healthy": (0, NOT_ISOLATED, -1),
@@ -38,3 +38,9 @@ def test_mode(law, situation):
 
 def test_the_laws_are_numbered_as_they_are_named():
     assert [LAWS[NOMINAL], LAWS[ADAPTIVE], LAWS[FAULT_TOLERANT]] == ["nominal", "adaptive", "fault-tolerant"]
+
+
+@pytest.mark.parametrize(("now", "wanted"), list(itertools.product(MODES, MODES)))
+def test_the_way_out_of_nominal_leads_through_adaptive(now, wanted):
+    reached = MODES[next_mode(MODES.index(now), MODES.index(wanted))]
+    assert reached == ("adaptive" if now == "nominal" and wanted != "nominal" else wanted)

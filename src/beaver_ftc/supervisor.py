@@ -15,6 +15,16 @@ MODE_NOMINAL, MODE_ADAPTIVE, MODE_REALLOCATED, MODE_UNANTICIPATED = range(4)
 
 
 @kernel
+def next_mode(now, wanted):
+    """The mode to go to from `now`: whatever is wanted, but never past `adaptive`.
+
+    An isolation in the very frame of the alarm is acted upon one frame later, so that the published sequence
+    (compensate the unknown, then use what is known of it) holds whatever the diagnosis is capable of.
+    """
+    return MODE_ADAPTIVE if now == MODE_NOMINAL and wanted != MODE_NOMINAL else wanted
+
+
+@kernel
 def mode_of(law, detected, isolated, surface):
     """The mode for a law, given the diagnosis: detected 0/1, isolated (estimator index, -1 or -2) and its
     surface.

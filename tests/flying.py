@@ -1,0 +1,69 @@
+"""Helpers for tests that fly: scenarios from a few words, logs kept in memory."""
+
+import numpy as np
+
+from beaver_ftc.loop import fly
+from beaver_ftc.scenario.schema import Scenario
+
+PUBLISHED_UNCERTAINTY = {
+    "inertia_coupling": {"p": 0.25, "q": -0.25, "r": 0.25},
+    "sinusoid": {
+        "p": {"amplitude_rad_s2": 0.02, "frequency_rad_s": 10},
+        "q": {"amplitude_rad_s2": 0.02, "frequency_rad_s": 15},
+        "r": {"amplitude_rad_s2": 0.02, "frequency_rad_s": 10},
+    },
+}
+SINES = {
+    "p": [{"sine": {"amplitude_deg_s": 3, "frequency_hz": 0.25}}],
+    "q": [{"sine": {"amplitude_deg_s": 3, "frequency_hz": 0.2}}],
+    "r": [{"sine": {"amplitude_deg_s": 3, "frequency_hz": 0.3}}],
+}
+
+
+class Memory:
+    """A log sink that keeps everything; `memory["q_rad_s"]` is a column."""
+
+    def open(self, columns):
+        self.columns, self.chunks = list(columns), []
+
+    def write(self, rows):
+        self.chunks.append(rows.copy())
+
+    def close(self):
+        self.rows = np.concatenate(self.chunks)
+
+    def __getitem__(self, column):
+        return self.rows[:, self.columns.index(column)]
+
+    def error_deg_s(self, axis):
+        """Tracking error of an axis, deg/s."""
+        return np.rad2deg(self[f"{axis}_model_rad_s"] - self[f"{axis}_rad_s"])
+
+    def rms_deg_s(self, axis, from_s, to_s=np.inf):
+        """RMS tracking error of an axis over a time span, deg/s."""
+        span = (self["t_s"] >= from_s) & (self["t_s"] < to_s)
+        return float(np.sqrt(np.mean(self.error_deg_s(axis)[span] ** 2)))
+
+
+def scenario(**keys):
+    """A scenario with sine references and the published uncertainty, unless said otherwise."""
+    return Scenario.model_validate(
+        {"name": "test", "reference": SINES, "uncertainty": PUBLISHED_UNCERTAINTY, **keys}
+    )
+
+
+def loss(actuator="elevator", magnitude=0.4, at_s=12.0, **more):
+    """A loss of effectiveness."""
+    return {
+        "type": "loss_of_effectiveness",
+        "actuator": actuator,
+        "magnitude": magnitude,
+        "at_s": at_s,
+        **more,
+    }
+
+
+def flown(**keys):
+    """(flight, log) of `scenario(**keys)`."""
+    memory = Memory()
+    return fly(scenario(**keys), memory), memory

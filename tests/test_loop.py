@@ -49,7 +49,7 @@ class TestEveryBuiltInScenario:
     def test_every_fault_shows_in_its_channel(self, built_in):
         flight, log = built_in
         for fault in flight.scenario.faults:
-            after = log["t_s"] > fault.at_s
+            after = log["t_s"] >= fault.at_s - 1e-9
             if fault.type == "loss_of_effectiveness":
                 share = log[f"{fault.actuator}_effective_rad"] / log[f"{fault.actuator}_pos_rad"]
                 assert share[~after] == pytest.approx(1.0)

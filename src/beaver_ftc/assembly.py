@@ -7,7 +7,7 @@ import numpy as np
 from beaver_ftc import channels as ch
 from beaver_ftc.control.config import ControlConfig
 from beaver_ftc.control.reference_model import discretise
-from beaver_ftc.control.state import LAWS
+from beaver_ftc.control.state import LAWS, NOMINAL
 from beaver_ftc.design.model import AILERON, ELEVATOR, RUDDER
 from beaver_ftc.design.variants import design_of
 from beaver_ftc.diagnosis.config import FdiConfig
@@ -45,6 +45,15 @@ def _assemble_diagnosis(fdi: np.void, config: FdiConfig, dt: float) -> None:
         fie["low"], fie["high"] = PARAMETER_SET[kind]
 
 
+def _assemble_sharpening(fdi: np.void, config: FdiConfig, dt: float) -> None:
+    sharpen = config.sharpen
+    fdi["memory"], fdi["shared"] = sharpen.memory, sharpen.shared_effectiveness
+    fdi["membership"], fdi["abrupt"] = sharpen.set_membership, config.fault_profile == "abrupt"
+    poles = (config.detection_pole_per_s, *(config.pole_bank_per_s if sharpen.pole_bank else ()))
+    fdi["n_poles"] = len(poles)
+    fdi["bank_decay"][: len(poles)] = [exp(-pole * dt) for pole in poles]
+
+
 def _assemble_network(network: np.void, config: ControlConfig) -> None:
     network["gain"] = config.network_gain_per_s2
     network["leak_per_s"] = config.network_leak_per_s
@@ -54,7 +63,7 @@ def _assemble_network(network: np.void, config: ControlConfig) -> None:
 def _assemble_control(
     control: np.void, config: ControlConfig, dt: float, trim: np.ndarray, travel: np.ndarray
 ) -> None:
-    control["law"] = LAWS.index(config.law)
+    control["law"] = LAWS.index(config.law) if config.law in LAWS else NOMINAL  # a plug-in: plugged.py
     control["dt"] = dt
     control["Kp"], control["Ki"] = config.proportional_per_s, config.integral_per_s2
     control["model_A"], control["model_B"] = discretise(
@@ -84,6 +93,7 @@ def assemble(scenario: Scenario, trim: np.ndarray, travel: np.ndarray) -> np.nda
     frame["factor"] = [factor for _, _, factor in ch.TRUTH]
     frame["u"] = frame["u_then"] = trim
     _assemble_diagnosis(frame["fdi"], scenario.fdi, dt)
+    _assemble_sharpening(frame["fdi"], scenario.fdi, dt)
     _assemble_network(frame["fdi"]["network"], scenario.control)
     _assemble_control(frame["control"], scenario.control, dt, trim, travel)
     return frames

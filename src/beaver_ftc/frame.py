@@ -15,11 +15,11 @@ from beaver_ftc.control import adaptive, allocation, nominal, reference_model
 from beaver_ftc.control.state import CONTROL, NOMINAL, ORACLE
 from beaver_ftc.design.model import ALPHA, BETA, DESIGN, ELEVATOR, QDYN
 from beaver_ftc.design.variants import response
-from beaver_ftc.diagnosis import detection, guarantee, isolation, network
+from beaver_ftc.diagnosis import bank, detection, guarantee, isolation, network
 from beaver_ftc.diagnosis.state import DIAGNOSIS
 from beaver_ftc.diagnosis.thresholds import uncertainty_bound
 from beaver_ftc.plant.native import read_nodes, write_nodes
-from beaver_ftc.supervisor import MODE_ADAPTIVE, MODE_NOMINAL, MODE_REALLOCATED, MODE_UNANTICIPATED, mode_of
+from beaver_ftc.supervisor import MODE_ADAPTIVE, MODE_NOMINAL, MODE_REALLOCATED, MODE_UNANTICIPATED, mode_of, next_mode
 
 MAX_EVENTS = 64
 FLYING, DEPARTED, NOT_FINITE = 0, 1, 2
@@ -144,8 +144,10 @@ def predict(frame):
     """Bring the estimators from the frame before to this one."""
     fdi = frame.fdi
     guarantee.track(fdi, frame.phi_then)
+    bank.innovate(fdi, frame.x, frame.x_then, frame.believed)
+    isolation.suppose_all(fdi, frame.G_mean, frame.Gu_mean)
     if fdi.detected:
-        isolation.predict_all(fdi, frame.x_then, frame.believed, frame.G_mean, frame.Gu_mean)
+        isolation.predict_all(fdi, frame.x_then, frame.believed)
         for s in range(4):
             lost = 1.0 - frame.control.effectiveness[s]
             for i in range(3):
@@ -163,17 +165,32 @@ def remember(frame):
 @kernel
 def diagnose(frame):
     """Predict, compare, raise the alarm, exclude, decide."""
-    fdi, x, t = frame.fdi, frame.x, frame.t
-    uncertainty_bound(x, frame.design, fdi.inertia, fdi.constant, fdi.earth_rate, fdi.eta_bar_now)
+    look_back(frame)
+    conclude(frame)
+    remember(frame)
+
+
+@kernel
+def look_back(frame):
+    """What the design model makes of the frame that has elapsed: its bound and its means."""
+    fdi = frame.fdi
+    uncertainty_bound(frame.x, frame.design, fdi.inertia, fdi.constant, fdi.earth_rate, fdi.eta_bar_now)
     fdi.eta_bar[:] = fdi.eta_bar_now
     if frame.k > 0:
         elapse(frame)
+
+
+@kernel
+def conclude(frame):
+    """The built-in estimators, from prediction to verdict."""
+    fdi, x, t = frame.fdi, frame.x, frame.t
     if fdi.enabled:
         if frame.k > 0:
             predict(frame)
+        else:
+            bank.align(fdi, frame.G)
         guarantee.judge(fdi, t)
         decide(fdi, frame.y, x, t)
-    remember(frame)
 
 
 @kernel
@@ -185,7 +202,7 @@ def decide(fdi, y, x, t):
         return
     if not known:
         isolation.start(fdi, x)
-    isolation.isolate(fdi, x, t)
+    isolation.isolate(fdi, x, t, known)
     network.evaluate(fdi.network, y[ALPHA], y[BETA])
 
 
@@ -215,6 +232,7 @@ def supervise(frame):
         mode = true_mode(frame)
     else:
         mode = mode_of(frame.control.law, fdi.detected, fdi.isolated, isolated_surface(fdi))
+    mode = next_mode(frame.mode, mode)
     if (mode != frame.mode or frame.n_modes == 0) and frame.n_modes < MAX_EVENTS:
         frame.mode_at_s[frame.n_modes] = frame.t
         frame.mode_is[frame.n_modes] = mode
@@ -237,6 +255,8 @@ def accommodate(frame):
         frame.target[s] = 1.0
         if control.law == ORACLE:
             frame.target[s] = frame.truth[ch.TRUE_EFFECTIVENESS + s]
+        elif fdi.estimates and fdi.detected:
+            frame.target[s] = fdi.effectiveness[s]
         elif s == surface:
             frame.target[s] = 1.0 + fdi.estimator[fdi.isolated].theta[dominant_axis(s)]
     adaptive.approach(control, frame.target)
@@ -287,10 +307,7 @@ def account(frame):
 @kernel
 def note_closest_approach(frame):
     """The largest share of its threshold that a residual has reached in healthy flight."""
-    fdi = frame.fdi
-    for i in range(3):
-        if fdi.threshold[i] > 0.0:
-            frame.worst_ratio = max(frame.worst_ratio, abs(fdi.residual[i]) / fdi.threshold[i])
+    frame.worst_ratio = max(frame.worst_ratio, bank.closest_approach(frame.fdi))
 
 
 @kernel

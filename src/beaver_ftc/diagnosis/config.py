@@ -1,8 +1,10 @@
 """What a scenario may say about the diagnosis (`fdi:`), with defaults and their reasons."""
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+
+from beaver_ftc.diagnosis.state import DEADBEAT_PER_S, MAX_POLES
 
 Bound = Annotated[float, Field(ge=0, le=100)]
 
@@ -21,6 +23,15 @@ class PerAxis(BaseModel):
         return self.p, self.q, self.r
 
 
+def _known_scheme(name: str) -> str:
+    from beaver_ftc.plugins import DETECTORS, refusal
+    from beaver_ftc.scenario.base import refuse
+
+    wrong = refusal(DETECTORS, name)
+    refuse([((), wrong)] if wrong else [])
+    return name
+
+
 class Bounds(BaseModel):
     """What uncertainty the diagnosis admits; thresholds follow from it [Zhang2005, sec. VII]."""
 
@@ -34,20 +45,66 @@ class Bounds(BaseModel):
     )
 
 
+class Sharpen(BaseModel):
+    """Margin the published scheme gives away; each step loses no guarantee (docs/theory.md, section 3)."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    pole_bank: bool = Field(True, description="alarm on the first of several filters: `fdi.pole_bank_per_s`")
+    memory: bool = Field(
+        True, description="hold each fault against the whole flight, not only what follows the alarm"
+    )
+    shared_effectiveness: bool = Field(
+        True, description="one parameter per surface, shared by the axes it moves"
+    )
+    set_membership: bool = Field(True, description="intersect the sets of a parameter declared constant")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _all_or_none(cls, given: Any) -> Any:
+        if given in ("all", "none"):
+            return dict.fromkeys(cls.model_fields, given == "all")
+        return given
+
+
 class FdiConfig(BaseModel):
     """Gains, bounds and the choice of scheme. All have defaults."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
-    scheme: str = Field("adaptive-estimators", description="a registered detector, or `none`")
+    scheme: Annotated[str, AfterValidator(_known_scheme)] = Field(
+        "adaptive-estimators",
+        description="a registered detector (see `beaver-ftc list`), module:Class of an installed package, or none",
+    )
+    options: dict[str, float] = Field({}, description="parameters of a registered detector, by name")
     thresholds: Literal["interval", "published"] = Field(
         "interval", description="isolation test: signed interval or the paper's norm bound"
     )
     detection_pole_per_s: float = Field(
-        10.0, gt=0, le=1000, description="Lambda0, 1/s: a fault a few times the bound shows within 0.1 s"
+        10.0, gt=0, le=1000, description="Lambda0, 1/s: a few times the bound shows in 0.1 s"
     )
-    isolation_pole_per_s: float = Field(10.0, gt=0, le=1000, description="Lambda of the isolation estimators, 1/s")
+    isolation_pole_per_s: float = Field(
+        10.0, gt=0, le=1000, description="Lambda of the isolation estimators, 1/s"
+    )
     forgetting_time_s: float = Field(
-        5.0, gt=0, le=3600, description="memory of the effectiveness estimates, s: longer than a reference period"
+        5.0, gt=0, le=3600, description="memory of the estimates, s: longer than a reference period"
     )
     bounds: Bounds = Bounds()
+    sharpen: Sharpen = Field(
+        Sharpen(), description="steps beyond the published scheme: `all`, `none` or one by one"
+    )
+    pole_bank_per_s: tuple[Annotated[float, Field(gt=0, le=DEADBEAT_PER_S)], ...] = Field(
+        (DEADBEAT_PER_S,),
+        max_length=MAX_POLES - 1,
+        description="filters beside the published one, 1/s; the default keeps a single frame",
+    )
+    fault_profile: Literal["any", "abrupt"] = Field(
+        "any", description="what is assumed of the fault's course: nothing, or constant once it is there"
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _published_means_published(cls, given: Any) -> Any:
+        if isinstance(given, dict) and given.get("thresholds") == "published":
+            return {"sharpen": "none", **given}
+        return given

@@ -1,24 +1,27 @@
 """The fault detection and approximation estimator (FDAE), always on.
 
-    xhat0' = -Lambda0 (xhat0 - x) + f + G u + fhat        eps0 = x - xhat0        alarm when |eps0_i| > ebar_i for some i
+    xhat0' = -Lambda0 (xhat0 - x) + f + G u + fhat,  eps0 = x - xhat0,  alarm when |eps0_i| > ebar_i, some i
 
-[Zhang2005, sec. IV]. Written for the discrete truth: xhat0[k+1] = x[k] + dt F[k] + exp(-Lambda0 dt) (xhat0[k] - x[k]).
+[Zhang2005, sec. IV]. Until the alarm eps0 is filter 0 of the bank (bank.py), which raises it. Written for
+the discrete truth: xhat0[k+1] = x[k] + dt F[k] + exp(-Lambda0 dt) (xhat0[k] - x[k]).
 """
 
 from beaver_ftc.compiled import kernel
+from beaver_ftc.diagnosis import bank
 from beaver_ftc.diagnosis.network import learn
 from beaver_ftc.diagnosis.thresholds import bound_step
 
 
 @kernel
 def detect(fdi, x, t):
-    """Form the residual at time t (s) and raise the alarm if it leaves its threshold. x (3,) rad/s measured."""
+    """Form the residual at time t (s) and raise the alarm if the bank does. x (3,) rad/s measured."""
     for i in range(3):
         fdi.residual[i] = x[i] - fdi.xhat[i]
-        if not fdi.detected and abs(fdi.residual[i]) > fdi.threshold[i]:
-            fdi.detected = 1
-            fdi.detected_at_s = t
-            fdi.detected_axis = i
+    axis = bank.alarm(fdi)
+    if axis >= 0 and not fdi.detected:
+        fdi.detected = 1
+        fdi.detected_at_s = t
+        fdi.detected_axis = axis
 
 
 @kernel
@@ -37,9 +40,10 @@ def predict(fdi, x, believed, leaking):
 
 @kernel
 def unknown_acceleration(fdi, out):
-    """Fill out (3,) rad/s2 with what the FDAE believes beyond the model: what the network has learnt, and what it is about to.
+    """Fill out (3,) rad/s2 with what the FDAE believes beyond the model: learnt, and about to be learnt.
 
-    The residual settles at (phi - fhat) / Lambda0, so Lambda0 eps0 is the part of the fault not yet in the weights, at the bandwidth of the estimator.
+    The residual settles at (phi - fhat) / Lambda0, so Lambda0 eps0 is the part of the fault not yet in the
+    weights, at the bandwidth of the estimator.
     """
     for i in range(3):
         out[i] = fdi.network.output[i] + fdi.pole[i] * fdi.residual[i]

@@ -1,15 +1,40 @@
 """The fault isolation estimators (FIE), started at detection, and the decision among them.
 
-    xhats' = -Lambdas (xhats - x) + f + G u + base + Zs ths + Oms ths'      Oms' = -Lambdas Oms + Zs,  Oms(Td) = 0
+    xhats' = -Lambdas (xhats - x) + f + G u + base + Zs ths + Oms ths'
+    Oms' = -Lambdas Oms + Zs,  Oms(Td) = 0
 
-[Zhang2005, sec. IV]. In discrete time, with Omega[k+1] = a Omega[k] + dt Z[k] and the estimate's step multiplied by Omega[k+1],
-the residual of the true estimator is exactly Omega (theta - thetahat) plus the filtered uncertainty, whatever the estimate does.
+[Zhang2005, sec. IV]. In discrete time, with Omega[k+1] = a Omega[k] + dt Z[k] and the estimate's step
+multiplied by Omega[k+1], the residual of the true estimator is exactly Omega (theta - thetahat) plus the
+filtered uncertainty, whatever the estimate does.
+
+The sharpened tests (bank.py, membership.py) exclude beside it, each by its own switch; a fault is excluded
+by the first test that fails.
 """
 
 from beaver_ftc.compiled import kernel
+from beaver_ftc.diagnosis import bank, membership
 from beaver_ftc.diagnosis.fault_class import hypothesis
 from beaver_ftc.diagnosis.state import INTERVAL, NOT_ISOLATED, UNANTICIPATED
 from beaver_ftc.diagnosis.thresholds import bound_step, interval, published
+
+
+@kernel
+def suppose(fdi, fie, G, Gu):
+    """What the fault would have done in the elapsed frame, and to the bank since the flight began.
+
+    G (3, 4) rad/s2 per rad; Gu (3, 4) rad/s2, the contribution of each surface; means over the frame.
+    """
+    hypothesis(fie.kind, fie.surface, G, Gu, fie.base, fie.Z)
+    if fdi.memory:
+        bank.remember(fdi, fie)
+
+
+@kernel
+def suppose_all(fdi, G, Gu):
+    """`suppose` for every estimator, where something will ask for it."""
+    if fdi.memory or fdi.detected:
+        for s in range(fdi.n_estimators):
+            suppose(fdi, fdi.estimator[s], G, Gu)
 
 
 @kernel
@@ -20,11 +45,13 @@ def start(fdi, x):
         for i in range(3):
             fie.xhat[i] = x[i]
             fie.covariance[i] = (fie.high - fie.low) ** 2 / 12.0  # of a uniform distribution
+            fie.theta_low[i], fie.theta_high[i] = fie.low, fie.high
 
 
 @kernel
-def test(fdi, fie, x, t):
-    """Form the residual and its limits at time t (s); exclude the fault when a residual leaves them."""
+def within_limits(fdi, fie, x):
+    """Form the residual and its limits; whether it is within them on every axis."""
+    within = True
     for i in range(3):
         fie.residual[i] = x[i] - fie.xhat[i]
         if fdi.thresholds == INTERVAL:
@@ -32,10 +59,24 @@ def test(fdi, fie, x, t):
                 fie.low, fie.high, fie.rise[i], fie.fall[i], fie.omega[i], fie.theta[i], fie.bound[i]
             )
         else:
-            fie.lower[i], fie.upper[i] = published(fie.low, fie.high, fie.omega[i], fie.theta[i], fie.bound[i])
-        if not fie.excluded and not fie.lower[i] <= fie.residual[i] <= fie.upper[i]:
-            fie.excluded = 1
-            fie.excluded_at_s = t
+            fie.lower[i], fie.upper[i] = published(
+                fie.low, fie.high, fie.omega[i], fie.theta[i], fie.bound[i]
+            )
+        within = within and fie.lower[i] <= fie.residual[i] <= fie.upper[i]
+    return within
+
+
+@kernel
+def possible(fdi, fie, x, started):
+    """Whether the fault can be the one, by every test switched on. `started`: a frame or more ago."""
+    can_be = within_limits(fdi, fie, x)
+    if fdi.memory:
+        can_be = can_be and bank.explains(fdi, fie, fdi.shared)
+    if fdi.shared and (started or fdi.memory):
+        can_be = can_be and membership.agree(fdi, fie)
+    if fdi.membership and fdi.abrupt and started:
+        can_be = can_be and membership.narrow(fdi, fie)
+    return can_be
 
 
 @kernel
@@ -53,19 +94,22 @@ def decide(fdi, t):
 
 
 @kernel
-def isolate(fdi, x, t):
-    """Test every estimator against the measured x (3,) rad/s at time t (s), and decide."""
+def isolate(fdi, x, t, started):
+    """Test every estimator against the measured x (3,) rad/s at time t (s), and decide; as `possible`."""
     for s in range(fdi.n_estimators):
-        test(fdi, fdi.estimator[s], x, t)
+        fie = fdi.estimator[s]
+        if not possible(fdi, fie, x, started) and not fie.excluded:
+            fie.excluded = 1
+            fie.excluded_at_s = t
     decide(fdi, t)
 
 
 @kernel
-def adapt(fie, i, forgetting):
-    """One least-squares step of thetahat_i, projected onto the known set; returns the step.
+def correct(fie, i, residual, forgetting, low, high):
+    """One least-squares step of thetahat_i on a residual, projected onto [low, high]; returns the step.
 
-    Gradient along Omega with the gain covariance / (noise + Omega^2 covariance); the noise is the bound on the filtered
-    uncertainty, so an estimate moves no faster than its information allows.
+    Gradient along Omega with the gain covariance / (noise + Omega^2 covariance); the noise is the bound on
+    the filtered uncertainty, so an estimate moves no faster than its information allows.
     """
     noise = fie.bound[i] ** 2
     gain = fie.covariance[i] * fie.omega[i]
@@ -73,35 +117,62 @@ def adapt(fie, i, forgetting):
     if scale <= 0.0:
         return 0.0
     before = fie.theta[i]
-    fie.theta[i] = min(max(before + gain / scale * fie.residual[i], fie.low), fie.high)
+    fie.theta[i] = min(max(before + gain / scale * residual, low), high)
     prior = (fie.high - fie.low) ** 2 / 12.0
     fie.covariance[i] = min(fie.covariance[i] * noise / scale / forgetting, prior)
     return fie.theta[i] - before
 
 
 @kernel
-def predict(fdi, fie, x, believed, G, Gu):
-    """Advance one estimator by a frame; x (3,) rad/s as the frame began, the rest means over the frame.
+def adapt_jointly(fie, forgetting):
+    """The same for one theta shared by the axes, each correcting what those before have left."""
+    total = 0.0
+    for i in range(3):
+        if i > 0:
+            fie.theta[i], fie.covariance[i] = fie.theta[i - 1], fie.covariance[i - 1]
+        if fie.Z[i] != 0.0:
+            left = fie.residual[i] - fie.omega[i] * total
+            total += correct(fie, i, left, forgetting, fie.theta_low[i], fie.theta_high[i])
+            forgetting = 1.0  # once a frame
+    for i in range(2):
+        fie.theta[i], fie.covariance[i] = fie.theta[2], fie.covariance[2]
+    return total
 
-    believed (3,) rad/s2 is f + G u; G (3, 4) rad/s2 per rad; Gu (3, 4) rad/s2 the contribution of each surface to it.
+
+@kernel
+def predict(fdi, fie, x, believed):
+    """Advance one estimator by a frame.
+
+    x (3,) rad/s as the frame began; believed (3,) rad/s2 is f + G u, mean over the frame; fie.base and
+    fie.Z are already this frame's.
     """
     dt = fdi.dt
-    hypothesis(fie.kind, fie.surface, G, Gu, fie.base, fie.Z)
     for i in range(3):
-        a = fdi.fie_decay[i]
-        Z, theta = fie.Z[i], fie.theta[i]
-        omega = a * fie.omega[i] + dt * Z
-        step = adapt(fie, i, fdi.forgetting)
-        rate = believed[i] + fie.base[i] + Z * theta
-        fie.xhat[i] = x[i] + dt * rate + a * (fie.xhat[i] - x[i]) + omega * step
-        fie.omega[i] = omega
+        Z, theta, a = fie.Z[i], fie.theta[i], fdi.fie_decay[i]
+        fie.xhat[i] = x[i] + dt * (believed[i] + fie.base[i] + Z * theta) + a * (fie.xhat[i] - x[i])
+    adapt(fdi, fie)
+    for i in range(3):
+        Z, a = fie.Z[i], fdi.fie_decay[i]
         fie.rise[i] = a * fie.rise[i] + dt * max(Z, 0.0)
         fie.fall[i] = a * fie.fall[i] + dt * min(Z, 0.0)
         fie.bound[i] = bound_step(fie.bound[i], fdi.eta_bar[i], a, dt)
 
 
 @kernel
-def predict_all(fdi, x, believed, G, Gu):
-    """Advance the bank by a frame; arguments as in `predict`."""
+def adapt(fdi, fie):
+    """Move the estimate by the residual the frame began with, and the prediction along Omega[k+1]."""
+    joint = adapt_jointly(fie, fdi.forgetting) if fdi.shared else 0.0
+    for i in range(3):
+        if fdi.shared:
+            step = joint
+        else:
+            step = correct(fie, i, fie.residual[i], fdi.forgetting, fie.theta_low[i], fie.theta_high[i])
+        fie.omega[i] = fdi.fie_decay[i] * fie.omega[i] + fdi.dt * fie.Z[i]
+        fie.xhat[i] += fie.omega[i] * step
+
+
+@kernel
+def predict_all(fdi, x, believed):
+    """Advance the estimators by a frame; arguments as in `predict`."""
     for s in range(fdi.n_estimators):
-        predict(fdi, fdi.estimator[s], x, believed, G, Gu)
+        predict(fdi, fdi.estimator[s], x, believed)

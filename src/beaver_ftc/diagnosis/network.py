@@ -1,9 +1,11 @@
-"""The network that learns an unknown fault: Gaussian radial basis functions of alpha and of beta, linear in its weights.
+"""The network that learns an unknown fault: Gaussian radial basis functions of alpha and of beta, linear in
+its weights.
 
     fhat_i = W_i^T Phi(alpha, beta)       W_i' = P{gain Phi D[eps_i] - leak W_i},   |Phi| = 1
 
-[Zhang2005, sec. IV and V]. Phi is normalised, so that `gain` alone sets the bandwidth of learning wherever the state is. D is a continuous
-dead zone at the detection threshold: the network cannot learn what the admitted uncertainty explains.
+[Zhang2005, sec. IV and V]. Phi is normalised, so that `gain` alone sets the bandwidth of learning wherever
+the state is. D is a continuous dead zone at the detection threshold: the network cannot learn what the
+admitted uncertainty explains.
 """
 
 import numpy as np

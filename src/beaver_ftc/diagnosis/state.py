@@ -5,8 +5,10 @@ import numpy as np
 from beaver_ftc.diagnosis.network import NETWORK
 
 MAX_ESTIMATORS = 16
+MAX_POLES = 6
 NOT_ISOLATED, UNANTICIPATED = -1, -2
 INTERVAL, PUBLISHED = 0, 1
+DEADBEAT_PER_S = 1e6  # a pole at which exp(-lam dt) is 0: the filter keeps nothing but the last frame
 
 ESTIMATOR = np.dtype(
     [
@@ -17,6 +19,9 @@ ESTIMATOR = np.dtype(
         ("omega", "f8", (3,)), ("rise", "f8", (3,)), ("fall", "f8", (3,)), ("bound", "f8", (3,)),
         ("theta", "f8", (3,)), ("covariance", "f8", (3,)),
         ("base", "f8", (3,)), ("Z", "f8", (3,)),
+        # what bank.py and membership.py keep
+        ("across", "f8", (3,)), ("reach_low", "f8", (MAX_POLES, 4)), ("reach_high", "f8", (MAX_POLES, 4)),
+        ("theta_low", "f8", (3,)), ("theta_high", "f8", (3,)),
     ],
     align=True,
 )  # fmt: skip
@@ -32,7 +37,12 @@ DIAGNOSIS = np.dtype(
         ("isolated", "i8"), ("isolated_at_s", "f8"),
         ("n_estimators", "i8"), ("estimator", ESTIMATOR, (MAX_ESTIMATORS,)),
         ("network", NETWORK),
-        ("effect", "f8", (3,)), ("certain_after_s", "f8"),  # what guarantee.py keeps
+        ("estimates", "i8"), ("effectiveness", "f8", (4,)),  # of every surface, from a plug-in that estimates it
+        # the sharpened scheme's switches and its bank; filter 0 is the published one
+        ("memory", "i8"), ("shared", "i8"), ("membership", "i8"), ("abrupt", "i8"),
+        ("n_poles", "i8"), ("bank_decay", "f8", (MAX_POLES,)), ("innovation", "f8", (3,)),
+        ("bank_residual", "f8", (MAX_POLES, 3)), ("bank_threshold", "f8", (MAX_POLES, 3)),
+        ("effect", "f8", (MAX_POLES, 3)), ("certain_after_s", "f8"),  # what guarantee.py keeps
     ],
     align=True,
 )  # fmt: skip

@@ -1,8 +1,8 @@
 """Adaptive thresholds: what a residual may reach without the fault in question.
 
-All filters are exact for the discrete truth x[k+1] = x[k] + dt (F[k] + eta[k]): with a = exp(-lam dt) a residual obeys
-eps[k+1] = a eps[k] + dt eta[k], and so does its bound with eta_bar in place of eta. The promises of the theory therefore
-hold at any frame rate, with no allowance for discretisation.
+All filters are exact for the discrete truth x[k+1] = x[k] + dt (F[k] + eta[k]): with a = exp(-lam dt) a
+residual obeys eps[k+1] = a eps[k] + dt eta[k], and so does its bound with eta_bar in place of eta. The
+promises of the theory therefore hold at any frame rate, with no allowance for discretisation.
 """
 
 from beaver_ftc.compiled import kernel
@@ -21,9 +21,10 @@ def bound_step(bound, eta_bar, decay, dt):
 def interval(low, high, rise, fall, omega, theta, bound):
     """The signed interval (lower, upper), rad/s, that holds the residual of the true estimator.
 
-    The parameter may move anywhere within [low, high] at every instant, so an incipient or intermittent fault is covered:
-    int w Z theta lies between low rise + high fall and high rise + low fall, where rise and fall filter the positive and the
-    negative part of Z. The residual is that integral less omega thetahat, widened by the bound on the uncertainty.
+    The parameter may move anywhere within [low, high] at every instant, so an incipient or intermittent
+    fault is covered: int w Z theta lies between low rise + high fall and high rise + low fall, where rise
+    and fall filter the positive and the negative part of Z. The residual is that integral less omega
+    thetahat, widened by the bound on the uncertainty.
     """
     lower = low * rise + high * fall - omega * theta - bound
     upper = high * rise + low * fall - omega * theta + bound
@@ -32,7 +33,9 @@ def interval(low, high, rise, fall, omega, theta, bound):
 
 @kernel
 def published(low, high, omega, theta, bound):
-    """The norm bound mu = k |Omega| + bound, rad/s, symmetric; k bounds |theta - thetahat| [Zhang2005, via Zhang2002]."""
+    """The norm bound mu = k |Omega| + bound, rad/s, symmetric; k bounds |theta - thetahat| [Zhang2005, via
+    Zhang2002].
+    """
     mu = max(theta - low, high - theta) * abs(omega) + bound
     return -mu, mu
 
@@ -41,9 +44,10 @@ def published(low, high, omega, theta, bound):
 def uncertainty_bound(x, design, inertia, constant, earth_rate, eta_bar):
     """Fill eta_bar (3,) rad/s2: the published bound, and what the Earth's rotation adds.
 
-    Published: inertia_i |cross term_i| + constant_i [Zhang2005, sec. VII]. JSBSim integrates rates against inertial space and reports
-    them against the Earth: the difference turns with the body, at no more than earth_rate |x| on any axis, and the same
-    again through the inertia coupling, whose constants are below 1.
+    Published: inertia_i |cross term_i| + constant_i [Zhang2005, sec. VII]. JSBSim integrates rates against
+    inertial space and reports them against the Earth: the difference turns with the body, at no more than
+    earth_rate |x| on any axis, and the same again through the inertia coupling, whose constants are below
+    1.
     """
     p, q, r = x[0], x[1], x[2]
     earth = earth_rate * (2.0 * (abs(p) + abs(q) + abs(r)) + earth_rate)

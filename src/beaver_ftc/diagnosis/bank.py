@@ -1,0 +1,116 @@
+"""A bank of detection filters on one innovation, and the memory of what each fault could have done to them.
+
+    nu[k] = (x[k+1] - x[k]) / dt - F[k] = eta[k] + phi[k]
+    E_m[k+1] = a_m E_m[k] + dt nu[k],   a_m = exp(-lam_m dt)
+
+Every filter has the exact bound of its own pole, so the alarm is the first of theirs at no cost in false
+alarms. A pole far above the frame rate (`DEADBEAT_PER_S`) tests the innovation itself, |nu| > eta_bar; for
+a bound that holds instant by instant no filter, window or sum of innovations can alarm earlier
+(docs/theory.md, section 3). Slower poles earn their place where errors are correlated over frames, as
+measurement errors are.
+"""
+
+import numpy as np
+
+from beaver_ftc.compiled import kernel
+from beaver_ftc.diagnosis.thresholds import bound_step
+
+
+@kernel
+def align(fdi, G):
+    """Fix, once, the direction across which each fault has least effect; G (3, 4) as the flight begins.
+
+    Unit length, in the roll-yaw plane, whose two axes are the only ones that one surface moves together.
+    The bound is exact for any fixed direction; this one has power while G keeps its direction, which
+    depends on alpha alone, and weakly.
+    """
+    for s in range(fdi.n_estimators):
+        fie = fdi.estimator[s]
+        p, r = G[0, fie.surface], G[2, fie.surface]
+        length = np.hypot(p, r)
+        if length > 0.0:
+            fie.across[0], fie.across[2] = r / length, -p / length
+
+
+@kernel
+def innovate(fdi, x, x_then, believed):
+    """Form the innovation of the elapsed frame and pass it through the bank.
+
+    x, x_then (3,) rad/s: measured now and a frame ago; believed (3,) rad/s2: f + G u of the healthy
+    aircraft, mean over the frame.
+    """
+    for i in range(3):
+        fdi.innovation[i] = (x[i] - x_then[i]) / fdi.dt - believed[i]
+        for m in range(fdi.n_poles):
+            a = fdi.bank_decay[m]
+            fdi.bank_residual[m, i] = a * fdi.bank_residual[m, i] + fdi.dt * fdi.innovation[i]
+            fdi.bank_threshold[m, i] = bound_step(fdi.bank_threshold[m, i], fdi.eta_bar[i], a, fdi.dt)
+
+
+@kernel
+def alarm(fdi):
+    """The first axis on which a filter of the bank leaves its bound, or -1."""
+    for i in range(3):
+        for m in range(fdi.n_poles):
+            if abs(fdi.bank_residual[m, i]) > fdi.bank_threshold[m, i]:
+                return i
+    return -1
+
+
+@kernel
+def closest_approach(fdi):
+    """The largest share of its bound that a filter of the bank has reached at this instant."""
+    worst = 0.0
+    for i in range(3):
+        for m in range(fdi.n_poles):
+            if fdi.bank_threshold[m, i] > 0.0:
+                worst = max(worst, abs(fdi.bank_residual[m, i]) / fdi.bank_threshold[m, i])
+    return worst
+
+
+@kernel
+def extremes(fie, i):
+    """Least and greatest acceleration (rad/s2) of axis i: theta anywhere in its set, or no fault at all."""
+    one, other = fie.base[i] + fie.low * fie.Z[i], fie.base[i] + fie.high * fie.Z[i]
+    return min(0.0, one, other), max(0.0, one, other)
+
+
+@kernel
+def aligned_extremes(fie):
+    """The same along `fie.across` (3,), across the fault's own direction: there it can do little."""
+    base, slope = 0.0, 0.0
+    for i in range(3):
+        base += fie.across[i] * fie.base[i]
+        slope += fie.across[i] * fie.Z[i]
+    one, other = base + fie.low * slope, base + fie.high * slope
+    return min(0.0, one, other), max(0.0, one, other)
+
+
+@kernel
+def remember(fdi, fie):
+    """Advance what the fault can have done to each filter since the flight began; channel 3 is `across`."""
+    for channel in range(4):
+        low, high = extremes(fie, channel) if channel < 3 else aligned_extremes(fie)
+        for m in range(fdi.n_poles):
+            a = fdi.bank_decay[m]
+            fie.reach_low[m, channel] = a * fie.reach_low[m, channel] + fdi.dt * low
+            fie.reach_high[m, channel] = a * fie.reach_high[m, channel] + fdi.dt * high
+
+
+@kernel
+def explains(fdi, fie, shared):
+    """Whether the fault, whatever its course since the flight began, can have brought the filters here.
+
+    `shared`: also across its direction, which only a parameter shared by the axes confines.
+    """
+    for m in range(fdi.n_poles):
+        residual, bound = 0.0, 0.0
+        for i in range(3):
+            r, b = fdi.bank_residual[m, i], fdi.bank_threshold[m, i]
+            if not fie.reach_low[m, i] - b <= r <= fie.reach_high[m, i] + b:
+                return False
+            residual += fie.across[i] * r
+            bound += abs(fie.across[i]) * b
+        if shared and not fie.reach_low[m, 3] - bound <= residual <= fie.reach_high[m, 3] + bound:
+            return False
+    return True

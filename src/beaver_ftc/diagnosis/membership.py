@@ -1,0 +1,74 @@
+"""Set membership: which parameters of a fault agree with the innovation, and have agreed all along.
+
+    theta agrees with a frame on axis i if |nu_i - base_i - theta Z_i| <= eta_bar_i
+
+One surface has one parameter, so its axes must agree on one theta. Frame by frame this is the sharpest test
+there is of a parameter that may move as it likes; of one that stays put (`fdi.fault_profile: abrupt`) the
+sets of all frames since the alarm may be intersected.
+"""
+
+from beaver_ftc.compiled import kernel
+
+NOTHING = (1.0, -1.0)
+
+
+@kernel
+def healthy(fdi):
+    """Whether the admitted uncertainty alone explains the elapsed frame."""
+    within = True
+    for i in range(3):
+        within = within and abs(fdi.innovation[i]) <= fdi.eta_bar[i]
+    return within
+
+
+@kernel
+def solve(value, bound, slope, low, high):
+    """The theta of [low, high] with |value - theta slope| <= bound, as (low, high); low > high if none."""
+    if slope == 0.0:
+        return (low, high) if abs(value) <= bound else NOTHING
+    one, other = (value - bound) / slope, (value + bound) / slope
+    return max(low, min(one, other)), min(high, max(one, other))
+
+
+@kernel
+def agreeing(fdi, fie, i):
+    """The interval of theta that agrees with the elapsed frame on axis i."""
+    return solve(fdi.innovation[i] - fie.base[i], fdi.eta_bar[i], fie.Z[i], fie.low, fie.high)
+
+
+@kernel
+def agree(fdi, fie):
+    """Whether one theta, or no fault at all, explains the elapsed frame on every axis."""
+    if healthy(fdi):
+        return True
+    low, high = fie.low, fie.high
+    for i in range(3):
+        axis_low, axis_high = agreeing(fdi, fie, i)
+        low, high = max(low, axis_low), min(high, axis_high)
+    return low <= high
+
+
+@kernel
+def intersect(fie, i, interval, shared):
+    """Keep of the set of theta on axis i, or of every axis if shared, what is also in `interval`."""
+    low, high = interval
+    for j in range(3):
+        if shared or j == i:
+            fie.theta_low[j] = max(fie.theta_low[j], low)
+            fie.theta_high[j] = min(fie.theta_high[j], high)
+
+
+@kernel
+def narrow(fdi, fie):
+    """Intersect with what frame and filtered residual say of a constant theta; False when nothing is left.
+
+    Filtered: eps + Omega thetahat = Omega theta + filtered uncertainty, whatever the estimate thetahat did.
+    """
+    for i in range(3):
+        intersect(fie, i, agreeing(fdi, fie, i), fdi.shared)
+        filtered = fie.residual[i] + fie.omega[i] * fie.theta[i]
+        intersect(fie, i, solve(filtered, fie.bound[i], fie.omega[i], fie.low, fie.high), fdi.shared)
+    left = True
+    for i in range(3):
+        left = left and fie.theta_low[i] <= fie.theta_high[i]
+    return left

@@ -78,7 +78,7 @@ class Loop:
         self.columns = ch.log_columns(estimator_names() if self._diagnoses_itself else ())
         self._log = np.empty((min(CHUNK_ROWS, self.n_frames), len(self.columns)))
         self._references = np.empty((len(self._log), 3))
-        self._fly_frame = self.plugged or direct(fly_frame, self.frames, self._references, self._log)
+        self.fly_frame = self.plugged or self.direct(fly_frame)
         self._set_origin()
 
     def _set_origin(self) -> None:
@@ -109,6 +109,10 @@ class Loop:
     def _diagnoses_itself(self) -> bool:
         return self.plugged is None or self.plugged.detector is None
 
+    def direct(self, kernel: Callable[..., int]) -> Callable[..., int]:
+        """A compiled frame as this flight calls it: `frame.fly_frame`, or another in its place."""
+        return direct(kernel, self.frames, self._references, self._log)
+
     def land(self) -> Flight:
         """What the flight has yielded so far."""
         verdict = None if self._diagnoses_itself else self.plugged.verdict
@@ -118,16 +122,16 @@ class Loop:
         """Fly; yield the log a chunk at a time, rows (n, columns). The array is reused."""
         for start in range(0, self.n_frames, CHUNK_ROWS):
             rows = min(CHUNK_ROWS, self.n_frames - start)
-            t = np.arange(start, start + rows) / self.scenario.rate_hz
-            self._references[:rows] = sample(self.scenario.reference, t)
-            status = self._fly_chunk(start, rows)
+            status = self.fly_chunk(start, rows)
             flown = int(self.frames["row"][0])
             yield self._log[:flown]
             if status != FLYING:
                 return
 
-    def _fly_chunk(self, start: int, rows: int) -> int:
-        """Frames start to start + rows; returns why it ended."""
+    def fly_chunk(self, start: int, rows: int) -> int:
+        """Frames start to start + rows, into the first rows of the log; returns why it ended."""
+        t = np.arange(start, start + rows) / self.scenario.rate_hz
+        self._references[:rows] = sample(self.scenario.reference, t)
         self.frames["row"] = 0
         k, end = start, start + rows
         while k < end:
@@ -151,7 +155,7 @@ class Loop:
 
     def _fly_frames(self, count: int, runs: int) -> int:
         frames, references, log = self.frames, self._references, self._log
-        fly_frame, cockpit = self._fly_frame, self.cockpit
+        fly_frame, cockpit = self.fly_frame, self.cockpit
         simulator_frames = (self.plant.run,) * runs
         through_python = not cockpit.native
         for _ in range(count):

@@ -6,8 +6,9 @@ import pytest
 
 from beaver_ftc.errors import BadInput
 from beaver_ftc.plant.adapter import Plant
-from beaver_ftc.plant.trim import TOLERANCE, trim
+from beaver_ftc.plant.trim import trim
 
+TOLERANCE = 1e-9  # m/s2 and rad/s2
 SIX = [f"accelerations/{axis}dot-ft_sec2" for axis in "uvw"] + [
     f"accelerations/{axis}dot-rad_sec2" for axis in "pqr"
 ]

@@ -82,7 +82,7 @@ class Plant:
     def node(self, name: str) -> jsbsim.FGPropertyNode:
         """The held node of a property; UnknownProperty if the aircraft lacks it."""
         if name not in self._nodes:
-            found = self._manager.get_node(name) if self._manager.hasNode(name) else None
+            found = self._manager.get_node(name)  # unlike a write by name, this creates nothing
             if found is None:
                 raise UnknownProperty(f"the aircraft has no property {name!r}")
             self._nodes[name] = found

@@ -25,12 +25,12 @@ _STEP = 1e-30  # of a complex step: far below rounding, so the derivative is exa
 
 def design_of(model: "DesignModel") -> np.ndarray:
     """The design record (1,) of a scenario's `design_model`; one that needs the trim wants `anchor` as well."""
-    design = design_record(engine_terms=model.engine_terms, scale=model.coefficients, mass=_mass(model))
+    design = design_record(engine_terms=model.engine_terms, scale=model.coefficients, mass=mass_of(model))
     design["linearised"], design["frozen_alpha"] = model.linearised, model.frozen_alpha
     return design
 
 
-def _mass(model: "DesignModel") -> MassProperties:
+def mass_of(model: "DesignModel") -> MassProperties:
     """A heavier aircraft of the same shape has its inertia in proportion."""
     return replace(
         MASS,

@@ -1,0 +1,75 @@
+"""The mismatch of a flight, frame by frame, split into its sources; a stretch of the log at a time."""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from beaver_ftc.mismatch.sources import (
+    SOURCES,
+    Case,
+    Contributions,
+    believed_mean,
+    instantaneous,
+    integration,
+)
+from beaver_ftc.mismatch.states import Columns, States, states_of, with_next
+
+if TYPE_CHECKING:
+    from beaver_ftc.scenario.schema import Scenario
+
+UNEXPLAINED = "unexplained"
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """n frames of a flight; all accelerations (n, 3) rad/s2 over p, q, r.
+
+    total: JSBSim's angular acceleration over each frame less the design model's f + G u. contributions: what each of
+    SOURCES adds to it. parts: single faults and single coefficients, under the name of their source.
+    eta_bar: the bound in force over the same frames.
+    """
+
+    t_s: np.ndarray
+    total: np.ndarray
+    contributions: Contributions
+    parts: dict[str, Contributions]
+    eta_bar: np.ndarray
+
+    @property
+    def unexplained(self) -> np.ndarray:
+        """What no source accounts for, (n, 3) rad/s2."""
+        return self.total - sum(self.contributions[name] for name in SOURCES)
+
+    @property
+    def uncertainty(self) -> np.ndarray:
+        """The mismatch without the faults, (n, 3) rad/s2: the eta that eta_bar shall bound."""
+        return self.total - self.contributions["fault"]
+
+
+def split(scenario: "Scenario", chunks: Iterable[Columns]) -> Iterator[Stretch]:
+    """Split the mismatch of the flight whose log comes in `chunks` (column name -> values, in time's order)."""
+    case: Case | None = None
+    for log, more in with_next(chunks):
+        states = states_of(log)
+        if case is None:
+            case = Case.of(scenario, states[:1])
+        yield _over_frames(case, states) if more else _at_end(case, states)
+
+
+def _over_frames(case: Case, states: States) -> Stretch:
+    """All frames but the last, which has no end here yet."""
+    here, following = states[:-1], states[1:]
+    contributions, parts = instantaneous(case, here)
+    contributions["integration"] = integration(case, here, following)
+    flown = (following.x - here.x) * case.scenario.rate_hz
+    return Stretch(here.t_s, flown - believed_mean(case, here, following), contributions, parts, following.eta_bar)
+
+
+def _at_end(case: Case, states: States) -> Stretch:
+    """The flight's last row: nothing follows, so JSBSim's acceleration at that instant stands for the frame."""
+    contributions, parts = instantaneous(case, states)
+    contributions["integration"] = np.zeros_like(states.x)
+    believed = case.belief.acceleration(states.x_measured, states.y_measured, states.u)
+    return Stretch(states.t_s, states.xdot - believed, contributions, parts, states.eta_bar)

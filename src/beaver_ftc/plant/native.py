@@ -159,11 +159,15 @@ def _pointers_are_nodes() -> bool:
 
 
 def _values_agree() -> bool:
-    """What is written natively reads back through Python to the bit, and the other way round."""
+    """What is written by address reads back through Python to the bit, and the other way round.
+
+    Called through ctypes, not a kernel: a short run need not load two more kernels.
+    """
+    read = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_void_p)(getter_address())
+    write = ctypes.CFUNCTYPE(ctypes.c_bool, ctypes.c_void_p, ctypes.c_double)(setter_address())
     nodes = _trial_nodes()
-    pointers = np.array([_pointer(node) for node in nodes], dtype=np.int64)
-    seen = np.empty(len(nodes))
-    read_nodes(getter_address(), pointers, seen)
-    reads = [node.get_double_value() for node in nodes] == seen.tolist()
-    write_nodes(setter_address(), pointers, -seen)
-    return reads and [node.get_double_value() for node in nodes] == (-seen).tolist()
+    values = [node.get_double_value() for node in nodes]
+    reads = [read(_pointer(node)) for node in nodes] == values
+    for node, value in zip(nodes, values, strict=True):
+        write(_pointer(node), -value)
+    return reads and [node.get_double_value() for node in nodes] == [-value for value in values]

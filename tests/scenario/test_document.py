@@ -24,7 +24,9 @@ from beaver_ftc.scenario.document import MAX_DEPTH, MalformedDocumentError, pars
         ("~", None),
         ("null", None),
         ("1e999", math.inf),
-        ("9" * 401, math.inf),
+        ("9" * 401, "9" * 401),
+        ("-" + "9" * 399, -int("9" * 399)),
+        ("1_.5_0e1", 15.0),
         ("-.inf", -math.inf),
         ("12:30", "12:30"),  # 750 in YAML 1.1
         ("012", "012"),  # 10 in YAML 1.1, 12 in 1.2
@@ -96,6 +98,10 @@ MALFORMED = {
     "tab": ("a:\n\t- 1", "tab"),
     "open bracket": ("a: [1, 2", "is not YAML"),
     "control character": ("a: \x01", "is not YAML"),
+    "deep by aliases": (
+        "\n".join(["a0: &a0 [1]"] + [f"a{i}: &a{i} [*a{i - 1}]" for i in range(1, 900)]),
+        "too deeply",
+    ),
     "deep lists": ("[" * 100_000, "nested too deeply"),
     "deep mappings": ("{a: " * 100_000, "nested too deeply"),
     "deep blocks": ("\n".join(" " * i + "a:" for i in range(500)), "nested too deeply"),

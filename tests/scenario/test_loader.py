@@ -3,6 +3,7 @@
 import os
 import pickle
 import re
+import time
 from pathlib import Path
 
 import pytest
@@ -160,6 +161,25 @@ def test_a_file_without_a_mapping(text):
 
 def test_an_empty_mapping_lacks_its_name():
     assert mistakes("{}")[0].startswith("s.yaml:1: name: required key is missing")
+
+
+HUGE = {
+    "items": "name: x\nfaults:\n" + "- 1\n" * 150_000,
+    "duplicate keys": "name: x\n" * 150_000,
+    "unknown keys": "name: x\n" + "".join(f"durations{i}_s: 1\n" for i in range(100_000)),
+    "late faults": "name: x\nfaults:\n" + "- {type: float, actuator: flap, at_s: 40}\n" * 20_000,
+    "terms": "name: x\nuncertainty:\n  coefficients:\n" + "".join(f"    Cm_{i}: 1\n" for i in range(100_000)),
+    "digits": "name: x\nseed: " + "1" * 1_000_000 + "." + "e" * 1_000_000,
+    "anchors": "name: x\n" + "".join(f"a{i}: &a{i} 1\n" for i in range(100_000)),
+}
+
+
+@pytest.mark.parametrize("case", HUGE)
+def test_a_hostile_file_costs_seconds_and_a_hundred_lines_at_most(case):
+    began = time.process_time()
+    lines = mistakes(HUGE[case])
+    assert len(lines) <= 101
+    assert time.process_time() - began < 10  # a quadratic step would take minutes
 
 
 # Files

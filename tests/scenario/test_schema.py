@@ -163,7 +163,8 @@ def test_whole_numbers_may_be_written_as_people_do():
             "reference.q[0]: 51 Hz is over the Nyquist",
         ),
         (
-            "reference: {p: [{chirp: {amplitude_deg_s: 1, end_s: 9, start_frequency_hz: 60, end_frequency_hz: 1}}]}",
+            "reference: {p: [{chirp: {amplitude_deg_s: 1, end_s: 9, "
+            "start_frequency_hz: 9, end_frequency_hz: 60}}]}",
             "reference.p[0]: 60 Hz",
         ),
         (

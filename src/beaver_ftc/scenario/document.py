@@ -12,7 +12,7 @@ Numbers are read as YAML 1.2 and everybody's eyes do: 1e-3 is a number, 12:30 an
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import yaml
 
@@ -20,10 +20,13 @@ from beaver_ftc.scenario.base import Location
 
 MAX_NODES = 400_000
 MAX_DEPTH = 32
+MAX_PROBLEMS = 100
+_LONGEST_NUMBER = 400
 
 _LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 _INTEGER = re.compile(r"[-+]?(0|[1-9][0-9_]*)")
-_FLOAT = re.compile(r"[-+]?([0-9][0-9_]*\.?[0-9_]*|\.[0-9][0-9_]*)([eE][-+]?[0-9]+)?")
+_FLOAT = re.compile(r"[-+]?([0-9][0-9_]*(\.[0-9_]*)?|\.[0-9][0-9_]*)([eE][-+]?[0-9]+)?")
+_TOO_DEEP = f"nested too deeply, allowed: {MAX_DEPTH} levels"
 _LEADING_ZERO = re.compile(r"[-+]?0[0-9_]+")
 _WORDS = {
     **dict.fromkeys(("", "~", "null", "Null", "NULL"), None),
@@ -99,11 +102,19 @@ def scalar(text: str) -> Any:
     """A plain scalar: null, truth value, number, or the text itself."""
     if text in _WORDS:
         return _WORDS[text]
-    if _LEADING_ZERO.fullmatch(text):  # octal in YAML 1.1, decimal in 1.2: nobody's number
-        return text
-    if _INTEGER.fullmatch(text) and len(text) <= 400:
+    if len(text) > _LONGEST_NUMBER or _LEADING_ZERO.fullmatch(text):
+        return text  # a leading zero is octal in YAML 1.1, decimal in 1.2: nobody's number
+    if _INTEGER.fullmatch(text):
         return int(text.replace("_", ""))
     return float(text.replace("_", "")) if _FLOAT.fullmatch(text) else text
+
+
+class _Anchored(NamedTuple):
+    """What an anchor names: the value, how many values it is when written out, and how deep."""
+
+    value: Any
+    nodes: int
+    depth: int
 
 
 class _Builder:
@@ -112,7 +123,7 @@ class _Builder:
     def __init__(self, text: str) -> None:
         self.document = Document()
         self._events = _events(text)
-        self._anchors: dict[str, tuple[Any, int]] = {}
+        self._anchors: dict[str, _Anchored] = {}
         self._nodes = 0
 
     def build(self) -> Document:
@@ -130,7 +141,8 @@ class _Builder:
 
     def _value(self, event: Any, location: Location) -> Any:
         """One value with all that is below it. Recursion is bounded by MAX_DEPTH."""
-        self._count(1, event, location)
+        before = self._nodes
+        self._count(1, event)
         self.document.lines.setdefault(location, _line(event))
         if isinstance(event, yaml.AliasEvent):
             return self._alias(event, location)
@@ -140,14 +152,14 @@ class _Builder:
             )
         value = self._content(event, location)
         if event.anchor is not None:
-            self._anchors[event.anchor] = (value, _size(value))
+            self._anchors[event.anchor] = _Anchored(value, self._nodes - before, _depth(value))
         return value
 
     def _content(self, event: Any, location: Location) -> Any:
         if isinstance(event, yaml.ScalarEvent):
             return scalar(event.value) if event.implicit[0] else event.value
         if len(location) >= MAX_DEPTH:
-            raise MalformedDocumentError(_line(event), f"nested too deeply, allowed: {MAX_DEPTH} levels")
+            raise MalformedDocumentError(_line(event), _TOO_DEEP)
         return self._mapping(location) if isinstance(event, yaml.MappingStartEvent) else self._list(location)
 
     def _list(self, location: Location) -> list[Any]:
@@ -163,13 +175,18 @@ class _Builder:
             key = self._key(event, location)
             below, line = (*location, key), _line(event)
             if key in mapping:
-                says = f"duplicate key, first on line {key_lines[key]}, allowed: each key once"
-                self.document.problems.append(Problem(line, below, says))
-                self._value(next(self._events), (*below, "(duplicate)"))
+                self._duplicate(line, below, key_lines[key])
                 continue
             key_lines[key] = self.document.lines[below] = line
             mapping[key] = self._value(next(self._events), below)
         return mapping
+
+    def _duplicate(self, line: int, location: Location, first: int) -> None:
+        """Note it, and read past its value."""
+        says = f"duplicate key, first on line {first}, allowed: each key once"
+        if len(self.document.problems) < MAX_PROBLEMS:
+            self.document.problems.append(Problem(line, location, says))
+        self._value(next(self._events), (*location, "(duplicate)"))
 
     def _key(self, event: yaml.Event, location: Location) -> str:
         if not isinstance(event, yaml.ScalarEvent):
@@ -180,29 +197,30 @@ class _Builder:
             raise MalformedDocumentError(
                 _line(event), "merge keys are not read, allowed: the keys themselves", location
             )
-        self._count(1, event, location)
+        self._count(1, event)
         return event.value
 
     def _alias(self, event: yaml.AliasEvent, location: Location) -> Any:
         if event.anchor not in self._anchors:
             says = f"alias *{event.anchor} has no complete anchor before it, allowed: the value itself"
             raise MalformedDocumentError(_line(event), says, location)
-        value, size = self._anchors[event.anchor]
-        self._count(size, event, location)
-        return value
+        anchored = self._anchors[event.anchor]
+        self._count(anchored.nodes, event)
+        if len(location) + anchored.depth > MAX_DEPTH:
+            raise MalformedDocumentError(_line(event), _TOO_DEEP)
+        return anchored.value
 
-    def _count(self, nodes: int, event: yaml.Event, location: Location) -> None:
+    def _count(self, nodes: int, event: yaml.Event) -> None:
         self._nodes += nodes
         if self._nodes > MAX_NODES:
             says = f"the file holds or its aliases expand to too many values, allowed: at most {MAX_NODES}"
-            raise MalformedDocumentError(_line(event), says, location)
+            raise MalformedDocumentError(_line(event), says)
 
 
-def _size(value: Any) -> int:
-    """How many values an anchored value stands for (itself and all below)."""
-    if isinstance(value, dict):
-        return 1 + sum(1 + _size(item) for item in value.values())
-    return 1 + sum(map(_size, value)) if isinstance(value, list) else 1
+def _depth(value: Any) -> int:
+    """Levels of lists and mappings in a value that is itself no deeper than MAX_DEPTH."""
+    below = value.values() if isinstance(value, dict) else value if isinstance(value, list) else None
+    return 0 if below is None else 1 + max(map(_depth, below), default=0)
 
 
 def _events(text: str) -> Iterator[yaml.Event]:

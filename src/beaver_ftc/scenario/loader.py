@@ -1,6 +1,7 @@
 """A scenario from a file, a built-in name or a text: every mistake at once, one line each."""
 
 from collections.abc import Callable
+from itertools import islice
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -9,7 +10,7 @@ from pydantic import BaseModel, ValidationError
 from beaver_ftc.scenario.base import Conflict, suggestion
 from beaver_ftc.scenario.builtin import builtin_names, looks_like_a_path, resolve
 from beaver_ftc.scenario.consistency import conflicts, outline_of_data
-from beaver_ftc.scenario.document import Document, MalformedDocumentError, Problem, parse
+from beaver_ftc.scenario.document import MAX_PROBLEMS, Document, MalformedDocumentError, Problem, parse
 from beaver_ftc.scenario.files import UnreadableError, read_text
 from beaver_ftc.scenario.problems import ScenarioError, problems_of
 from beaver_ftc.scenario.schema import Scenario
@@ -77,7 +78,7 @@ def validate(
     try:
         instance = model.model_validate(document.data, context={"folder": folder})
     except ValidationError as error:
-        problems += problems_of(error, document, model.model_json_schema())
+        problems += islice(problems_of(error, document, model.model_json_schema()), MAX_PROBLEMS)
         known = {problem.location for problem in problems}
         hidden = [(at, says) for at, says in conflicts_in(document.data) if at not in known]
         problems += [Problem(document.line(at), at, says) for at, says in hidden]

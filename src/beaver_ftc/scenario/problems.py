@@ -10,7 +10,7 @@ from pydantic import ValidationError
 
 from beaver_ftc.errors import BadInput
 from beaver_ftc.scenario.base import Location, suggestion
-from beaver_ftc.scenario.document import Document, Problem
+from beaver_ftc.scenario.document import MAX_PROBLEMS, Document, Problem
 
 WHOLE_FILE = "(file)"
 _SHOWN = 48
@@ -21,7 +21,7 @@ class ScenarioError(BadInput):
 
     def __init__(self, source: str, problems: Sequence[Problem]) -> None:
         self.source = source
-        self.problems = tuple(dict.fromkeys(sorted(problems, key=lambda problem: problem.line)))
+        self.problems = _in_order(problems)
         super().__init__("\n".join(self.lines))
 
     @property
@@ -34,6 +34,15 @@ class ScenarioError(BadInput):
 
     def __reduce__(self) -> tuple[Any, ...]:
         return (type(self), (self.source, self.problems))
+
+
+def _in_order(problems: Sequence[Problem]) -> tuple[Problem, ...]:
+    """By line, each once; after the first MAX_PROBLEMS a word that there are more."""
+    distinct = list(dict.fromkeys(sorted(problems, key=lambda problem: problem.line)))
+    if len(distinct) <= MAX_PROBLEMS:
+        return tuple(distinct)
+    more = Problem(distinct[MAX_PROBLEMS].line, (), f"has more than {MAX_PROBLEMS} mistakes, allowed: none")
+    return (*distinct[:MAX_PROBLEMS], more)
 
 
 def key_path(location: Location) -> str:
@@ -90,6 +99,8 @@ def _says(detail: Any, location: Location, data: Any, schema: dict[str, Any]) ->
     if kind == "extra_forbidden":
         known = _keys(_at(schema, location[:-1], data))
         return f"unknown key{suggestion(str(location[-1]), known, cutoff=0.5)}"
+    if kind == "unknown_name":
+        return f"{detail['msg']}{suggestion(detail['ctx']['name'], detail['ctx']['known'])}"
     here = _at(schema, location, data)
     if kind == "missing" and isinstance(detail["loc"][-1], int):
         return f"too few items, allowed: {_allowed(here, detail)}"

@@ -9,7 +9,7 @@ from beaver_ftc.control.config import ControlConfig
 from beaver_ftc.design.coefficients import TERMS, TRAVEL
 from beaver_ftc.diagnosis.config import FdiConfig
 from beaver_ftc.scenario.actuators import Actuators
-from beaver_ftc.scenario.base import Flag, Number, Section, Whole, number, refuse, suggestion
+from beaver_ftc.scenario.base import Flag, Number, Section, Whole, number, refuse, unknown_name
 from beaver_ftc.scenario.consistency import DURATION_S, RATE_HZ, Outline, conflicts
 from beaver_ftc.scenario.faults import Fault
 from beaver_ftc.scenario.sensors import Sensors
@@ -58,7 +58,7 @@ class SinusoidAxes(Section):
 
 def _known_term(name: str) -> str:
     if name not in TERMS:
-        refuse([((), f"unknown aerodynamic term{suggestion(name, TERMS)}")])
+        unknown_name("aerodynamic term", name, TERMS)
     return name
 
 

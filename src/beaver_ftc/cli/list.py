@@ -8,7 +8,10 @@ Entries = list[dict[str, str]]
 
 
 def command(format: FormatOption = Format.text) -> None:
-    """List the built-in scenarios, diagnosis schemes, control laws, fault types and reference signals."""
+    """List what there is to choose from.
+
+    Built-in scenarios, diagnosis schemes, control laws, fault types and reference signals.
+    """
     available = _available()
     if format is Format.json:
         emit_json(available)

@@ -23,7 +23,7 @@ def command(
     format: FormatOption = Format.text,
     no_report: Annotated[bool, typer.Option("--no-report", help="Skip report.html and the figures.")] = False,
 ) -> None:
-    """Fly scenarios and report what the diagnosis and the control made of them.
+    """Fly scenarios and say the verdict.
 
     With --format json: {"passed": ..., "runs": [...]}, each run its metrics and `folder`, or its `error`.
     """

@@ -43,9 +43,10 @@ def command(
     flap_deg: Annotated[float | None, typer.Option(min=-6, max=60, help="Flap deflection, deg.")] = None,
     format: FormatOption = Format.text,
 ) -> None:
-    """Trim the Beaver in steady straight flight; what cannot be trimmed is bad input (2).
+    """Print a trimmed flight condition.
 
-    What is not given is the scenario's, or else its default: 45 m/s at 1828.8 m, 1800 rpm, 20 inHg, no flap.
+    Steady straight flight, wings level; what cannot be trimmed is bad input (2). What is not given
+    is the scenario's, or else its default: 45 m/s at 1828.8 m, 1800 rpm, 20 inHg, no flap.
     """
     asked = {
         "airspeed_mps": airspeed_mps,

@@ -15,7 +15,9 @@ def command(
     ],
     format: FormatOption = Format.text,
 ) -> None:
-    """Check scenario files; every mistake is one line FILE:LINE: key.path: what is wrong, what is allowed.
+    """Check scenario files.
+
+    Every mistake is one line on standard error, FILE:LINE: key.path: what is wrong, what is allowed.
 
     With --format json: {"valid": ..., "files": [{"file", "valid", "errors", "warnings"}]}.
     """

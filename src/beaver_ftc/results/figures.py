@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 DPI = 110
+LEFT, STEPS_LEFT, RIGHT, TOP, BOTTOM, GAP = 0.75, 1.2, 0.2, 0.9, 0.85, 0.42  # inches
 LOWEST_RATIO = 1e-3  # of a logarithmic axis: what is smaller is nothing
 
 
@@ -42,17 +43,14 @@ def draw(view: View, series: Series, instants: Sequence[Mark], subtitle: str) ->
     """One view as a matplotlib figure, over the time that `series` covers."""
     from matplotlib.figure import Figure
 
-    down = -(-len(view.panels) // view.across)
-    heights = [_height(panel, view.across) for panel in view.panels[:: view.across]]
-    width = 10.0 if view.across == 1 else 12.0
-    figure = Figure(figsize=(width, 1.3 + sum(heights)), dpi=DPI, layout="constrained")
-    grid = figure.subplots(down, view.across, sharex=True, squeeze=False, height_ratios=heights)
+    figure, grid = _laid_out(view, Figure)
     for axes, panel in zip(grid.flat, view.panels, strict=False):
         _draw_panel(axes, panel, series, instants)
     _say_absent(view, series, list(grid.flat))
     for axes in grid[-1]:
         axes.set_xlabel("time (s)", fontsize=9)
-    figure.suptitle(f"{view.title}\n{subtitle}", fontsize=11)
+    top = 1 - 0.12 / figure.get_figheight()
+    figure.suptitle(f"{view.title}\n{subtitle}", fontsize=11, y=top, va="top")
     _draw_legend(figure, list(grid.flat))
     return figure
 
@@ -61,11 +59,29 @@ def _columns(drawn: Sequence[View]) -> list[str]:
     return [column for view in drawn for column in view.columns]
 
 
+def _laid_out(view: View, new_figure: Any) -> tuple["Figure", Any]:
+    """An empty figure with its grid of axes, laid out in inches: a solver would double the time."""
+    down = -(-len(view.panels) // view.across)
+    heights = [_height(panel, view.across) for panel in view.panels[:: view.across]]
+    width = 10.0 if view.across == 1 else 12.0
+    height = TOP + BOTTOM + sum(heights) + GAP * (down - 1)
+    figure = new_figure(figsize=(width, height), dpi=DPI)
+    left = STEPS_LEFT if view.panels[0].steps else LEFT
+    grid = figure.subplots(
+        down, view.across, sharex=True, squeeze=False, height_ratios=heights,
+        gridspec_kw={
+            "left": left / width, "right": 1 - RIGHT / width, "top": 1 - TOP / height,
+            "bottom": BOTTOM / height, "hspace": GAP * down / sum(heights), "wspace": 0.19,
+        },
+    )  # fmt: skip
+    return figure, grid
+
+
 def _height(panel: Panel, across: int) -> float:
-    """Height of a panel in inches."""
+    """Height of a panel's axes in inches."""
     if panel.steps:
-        return 0.5 + 0.28 * len(panel.steps)
-    return 2.1 if across == 1 else 1.9
+        return 0.25 + 0.25 * len(panel.steps)
+    return 1.75 if across == 1 else 1.5
 
 
 def _save(figure: "Figure", path: Path) -> Path:
@@ -166,7 +182,8 @@ def _draw_legend(figure: "Figure", grid: Iterable["Axes"]) -> None:
     figure.legend(
         shown.values(),
         shown.keys(),
-        loc="outside lower center",
+        loc="lower center",
+        bbox_to_anchor=(0.5, 0.04 / figure.get_figheight()),
         ncols=min(len(shown), 8) or 1,
         fontsize=8,
         frameon=False,

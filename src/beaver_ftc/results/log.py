@@ -74,7 +74,12 @@ class ParquetLog:
     def _flush_to(self, writer: Any) -> None:
         import pyarrow as pa
 
-        arrays = [pa.array(column[: self._used]) for column in self._buffer]
+        # Not pa.array: it imports pandas, if that is installed, only to see whether it was given a series.
+        used, float64 = self._used, pa.float64()
+        arrays = [
+            pa.Array.from_buffers(float64, used, [None, pa.py_buffer(column[:used])])
+            for column in self._buffer
+        ]
         writer.write_table(pa.Table.from_arrays(arrays, schema=self._schema))
         self._used = 0
 

@@ -1,0 +1,289 @@
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pandas as pd
+import pytest
+import yaml
+
+BEAVER = Path(sys.executable).with_name("beaver-ftc")
+SHORT = """
+name: short
+duration_s: 6
+reference: {q: [{sine: {amplitude_deg_s: 3, frequency_hz: 0.2}}]}
+faults: [{actuator: elevator, type: loss_of_effectiveness, magnitude: 0.4, at_s: 3, profile: abrupt}]
+expect: {detected_within_s: 1.0, no_departure: true}
+"""
+
+
+def _beaver(*arguments, cwd, **options):
+    return subprocess.run(
+        [BEAVER, *arguments], cwd=cwd, capture_output=True, text=True, timeout=120, check=False, **options
+    )
+
+
+@pytest.fixture
+def short(tmp_path):
+    (tmp_path / "short.yaml").write_text(SHORT)
+    return tmp_path
+
+
+def _names(folder):
+    return sorted(path.name for path in folder.iterdir())
+
+
+def test_run_writes_the_contract_and_says_the_verdict(short):
+    done = _beaver("run", "short.yaml", cwd=short)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "short: PASSED" in done.stdout
+    folder = short / "runs" / "short"
+    assert _names(folder) == ["figures", "log.parquet", "metrics.json", "report.html", "scenario.yaml"]
+    log = pd.read_parquet(folder / "log.parquet")
+    assert log.columns[0] == "t_s"
+    assert len(log) == json.loads((folder / "metrics.json").read_text())["frames"] == 600
+    assert yaml.safe_load((folder / "scenario.yaml").read_text())["rate_hz"] == 100
+
+
+def test_resolved_scenario_flies_again_to_the_same_numbers(short):
+    assert _beaver("run", "short.yaml", "--no-report", cwd=short).returncode == 0
+    again = _beaver("run", "runs/short/scenario.yaml", "--no-report", "--out", "again", cwd=short)
+    assert again.returncode == 0
+    for name in ("log.parquet", "metrics.json", "scenario.yaml"):
+        assert (short / "runs/short" / name).read_bytes() == (short / "again/short" / name).read_bytes()
+
+
+def test_json_is_one_document_and_nothing_else(short):
+    done = _beaver("run", "short.yaml", "--format", "json", "--no-report", cwd=short)
+    document = json.loads(done.stdout)
+    assert document["passed"] is True
+    (run,) = document["runs"]
+    assert run.pop("folder") == "runs/short"
+    assert run == json.loads((short / "runs/short/metrics.json").read_text())
+    assert _names(short / "runs/short") == ["log.parquet", "metrics.json", "scenario.yaml"]
+
+
+def test_missed_expectation_is_status_1(short):
+    (short / "strict.yaml").write_text(SHORT.replace("short", "strict").replace("1.0", "0.0"))
+    done = _beaver("run", "short.yaml", "strict.yaml", "--no-report", cwd=short)
+    assert done.returncode == 1
+    assert "short: PASSED" in done.stdout
+    assert "strict: FAILED" in done.stdout
+    assert _names(short / "runs") == ["short", "strict"]
+
+
+@pytest.mark.parametrize("format", ["text", "json"])
+def test_bad_input_in_one_scenario_flies_none(short, format):
+    (short / "bad.yaml").write_text(SHORT.replace("duration_s: 6", "duration_s: -6\nrate_hzz: 50"))
+    done = _beaver("run", "short.yaml", "bad.yaml", "--format", format, cwd=short)
+    assert done.returncode == 2
+    lines = done.stderr.splitlines()
+    assert [line.split(": ")[:2] for line in lines] == [
+        ["bad.yaml:3", "duration_s"],
+        ["bad.yaml:4", "rate_hzz"],
+    ]
+    assert not (short / "runs").exists()
+    if format == "json":
+        assert json.loads(done.stdout) == {"passed": False, "runs": [], "errors": lines}
+    else:
+        assert done.stdout == ""
+
+
+def test_flight_that_cannot_be_trimmed_is_bad_input_with_its_place(short):
+    (short / "slow.yaml").write_text("name: slow\ninitial: {airspeed_mps: 22, altitude_m: 6000}\n")
+    for command in (["run", "short.yaml", "slow.yaml"], ["validate", "slow.yaml"]):
+        done = _beaver(*command, cwd=short)
+        assert done.returncode == 2
+        assert done.stderr.startswith("slow.yaml:2: initial")
+        assert done.stderr.count("\n") == 1
+        assert not (short / "runs").exists()
+
+
+def test_two_scenarios_of_one_name_are_refused(short):
+    done = _beaver("run", "short.yaml", "short.yaml", cwd=short)
+    assert done.returncode == 2
+    assert "named short" in done.stderr
+    assert not (short / "runs").exists()
+
+
+@pytest.mark.parametrize(
+    "arguments", [["fly"], ["run"], ["run", "x", "--format", "xml"], ["trim", "--flap-deg", "x"]]
+)
+def test_wrong_usage_is_status_2_on_standard_error(tmp_path, arguments):
+    done = _beaver(*arguments, cwd=tmp_path)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert "Traceback" not in done.stderr
+
+
+def test_folder_that_cannot_be_written_is_status_3(short):
+    (short / "file").write_text("")
+    done = _beaver("run", "short.yaml", "--out", "file/runs", cwd=short)
+    assert done.returncode == 3
+    assert done.stderr.startswith("cannot write file/runs/short: ")
+    assert done.stderr.count("\n") == 1
+
+
+def _limit_file_size():
+    import resource
+
+    resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))
+
+
+def test_disk_that_fills_up_is_status_3_and_leaves_nothing(short):
+    done = _beaver("run", "short.yaml", "--no-report", cwd=short, preexec_fn=_limit_file_size)
+    assert done.returncode == 3
+    assert done.stderr.startswith("cannot write runs/short: ")
+    assert done.stderr.count("\n") == 1
+    assert _names(short) == ["short.yaml"]
+
+
+def test_full_standard_output_is_status_3(short):
+    with open("/dev/full", "w") as full:
+        done = subprocess.run(
+            [BEAVER, "run", "short.yaml", "--no-report"],
+            cwd=short,
+            stdout=full,
+            stderr=subprocess.PIPE,
+            check=False,
+        )
+    assert done.returncode == 3
+    assert b"Traceback" not in done.stderr
+
+
+def test_reader_that_goes_away_is_no_error(short):
+    read, write = os.pipe()
+    os.close(read)
+    done = subprocess.run(
+        [BEAVER, "run", "short.yaml", "--no-report"],
+        cwd=short,
+        stdout=write,
+        stderr=subprocess.PIPE,
+        check=False,
+    )
+    os.close(write)
+    assert (done.returncode, done.stderr) == (0, b"")
+
+
+LONG = SHORT.replace("short", "long").replace("duration_s: 6", "duration_s: 20000")
+
+
+@pytest.mark.parametrize(
+    ("number", "status", "left"),
+    [(signal.SIGKILL, -9, True), (signal.SIGTERM, 143, False), (signal.SIGINT, 130, False)],
+)
+def test_run_that_is_ended_leaves_no_half_result(short, number, status, left):
+    (short / "long.yaml").write_text(LONG)
+    with subprocess.Popen([BEAVER, "run", "long.yaml"], cwd=short, stderr=subprocess.PIPE) as running:
+        while not list(short.glob("runs/.long*/log.parquet")):
+            assert running.poll() is None
+            time.sleep(0.02)
+        time.sleep(0.3)
+        running.send_signal(number)
+        said = running.communicate(timeout=60)[1]
+    assert running.returncode == status
+    assert b"Traceback" not in said
+    assert not (short / "runs/long").exists()
+    assert (short / "runs").exists() is left
+
+
+def test_validate_reports_every_file(short):
+    (short / "bad.yaml").write_text("name: bad\nduration_s: -6\n")
+    (short / "fast.yaml").write_text("name: fast\ninitial: {airspeed_mps: 57}\n")
+    done = _beaver("validate", "short.yaml", "bad.yaml", "fast.yaml", "nowhere.yaml", cwd=short)
+    assert done.returncode == 2
+    assert done.stdout.splitlines() == ["short.yaml: OK", "fast.yaml: OK"]
+    assert [line.split(": ")[0] for line in done.stderr.splitlines()] == [
+        "bad.yaml:2",
+        "fast.yaml",
+        "nowhere.yaml:1",
+    ]
+    document = json.loads(_beaver("validate", "short.yaml", "bad.yaml", "--format", "json", cwd=short).stdout)
+    assert document["valid"] is False
+    assert [file["valid"] for file in document["files"]] == [True, False]
+
+
+def test_schema_accepts_what_validate_accepts(short):
+    schema = json.loads(_beaver("schema", cwd=short).stdout)
+    assert set(yaml.safe_load(SHORT)) <= set(schema["properties"])
+    assert schema["required"] == ["name"]
+
+
+def test_trim_prints_the_same_flight_as_text_and_json(tmp_path):
+    options = ("--airspeed-mps", "40", "--altitude-m", "1000", "--flap-deg", "10")
+    point = json.loads(_beaver("trim", *options, "--format", "json", cwd=tmp_path).stdout)
+    assert point["airspeed_mps"] == 40
+    assert point["flap_rad"] == pytest.approx(0.17453293)
+    assert max(map(abs, point["residual"].values())) < 1e-9
+    text = _beaver("trim", *options, cwd=tmp_path).stdout
+    assert f"{point['alpha_rad'] * 57.29577951:.4f} deg" in text
+
+
+def test_trim_takes_the_condition_of_a_scenario(short):
+    (short / "fast.yaml").write_text("name: fast\ninitial: {airspeed_mps: 52, altitude_m: 500}\n")
+    point = json.loads(
+        _beaver("trim", "fast.yaml", "--altitude-m", "600", "--format", "json", cwd=short).stdout
+    )
+    assert (point["airspeed_mps"], point["altitude_m"]) == (52, 600)
+
+
+def test_what_cannot_be_trimmed_is_status_2(tmp_path):
+    done = _beaver("trim", "--airspeed-mps", "22", "--altitude-m", "6000", cwd=tmp_path)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.count("\n") == 1
+
+
+def test_list_names_what_a_scenario_can_say(tmp_path):
+    document = json.loads(_beaver("list", "--format", "json", cwd=tmp_path).stdout)
+    names = {kind: {entry["name"] for entry in entries} for kind, entries in document.items()}
+    assert "elevator-partial-loss" in names["scenarios"]
+    assert {"nominal", "adaptive", "fault-tolerant", "oracle"} <= names["laws"]
+    assert "adaptive-estimators" in names["schemes"]
+    assert {"stuck", "hardover", "float", "bias", "unanticipated"} <= names["faults"]
+    assert {"sine", "doublet", "step", "square", "ramp", "chirp", "csv"} == names["signals"]
+    text = _beaver("list", cwd=tmp_path).stdout
+    assert all(name in text for group in names.values() for name in group)
+
+
+HEAVY = (
+    "numpy",
+    "numba",
+    "jsbsim",
+    "scipy",
+    "matplotlib",
+    "pyarrow",
+    "pandas",
+    "pydantic",
+    "yaml",
+    "rich",
+    "jinja2",
+)
+
+
+def test_help_imports_nothing_heavy():
+    script = f"import sys, beaver_ftc.cli.main; print([name for name in {HEAVY} if name in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert done.stdout == "[]\n"
+
+
+def test_run_imports_neither_plots_nor_pandas(short):
+    script = (
+        "import sys; sys.argv = ['beaver-ftc', 'run', 'short.yaml', '--no-report']\n"
+        "from beaver_ftc.cli.main import main\n"
+        "try: main()\n"
+        "except SystemExit: pass\n"
+        "print([name for name in ('matplotlib', 'plotly', 'pandas', 'jinja2') if name in sys.modules])"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script], cwd=short, capture_output=True, text=True, check=True
+    )
+    assert done.stdout.splitlines()[-1] == "[]"
+
+
+def test_version_and_help(tmp_path):
+    assert _beaver("--version", cwd=tmp_path).stdout.startswith("beaver-ftc ")
+    shown = _beaver("--help", cwd=tmp_path).stdout
+    assert all(f"\n  {name} " in shown for name in ("run", "validate", "schema", "trim", "list"))
+    assert "..." not in shown.partition("Commands:")[2]

@@ -29,7 +29,8 @@ class Flight:
     isolated: aileron, elevator, rudder, flap, unanticipated, or None while more than one fault fits
     (`candidates`). estimate: the isolated fault's parameter, theta in [-1, 0] for a loss of effectiveness.
     guaranteed_delay_s: from the fault to the instant from which detection was certain, None if that never
-    came. worst_residual_ratio: largest |residual| / threshold before the first alarm.
+    came. worst_residual_ratio: largest |residual| / threshold in healthy flight; closest_approach: the same
+    of each filter of the bank, the published one first.
     """
 
     scenario: Scenario
@@ -50,3 +51,4 @@ class Flight:
     departure: tuple[float, str] | None
     saturation_s: dict[str, float]
     worst_residual_ratio: float
+    closest_approach: tuple[float, ...] = ()

@@ -51,7 +51,7 @@ FRAME = np.dtype(
         ("mode_at_s", "f8", (MAX_EVENTS,)), ("mode_is", "i8", (MAX_EVENTS,)),
         ("pre_fault_square", "f8", (3,)), ("pre_fault_frames", "i8"),
         ("post_fault_square", "f8", (3,)), ("post_fault_frames", "i8"),
-        ("saturated_frames", "i8", (4,)), ("worst_ratio", "f8"),
+        ("saturated_frames", "i8", (4,)),
         ("outside", "i8"), ("n_exits", "i8"),
         ("exit_at_s", "f8", (MAX_EVENTS,)), ("return_at_s", "f8", (MAX_EVENTS,)),
         ("departed", "i8"),
@@ -298,16 +298,10 @@ def account(frame):
         frame.post_fault_frames += 1
     else:
         frame.pre_fault_frames += 1
-        note_closest_approach(frame)
+        bank.note_closest_approach(frame.fdi)
     for s in range(4):
         frame.saturated_frames[s] += control.saturated[s]
     note_envelope(frame)
-
-
-@kernel
-def note_closest_approach(frame):
-    """The largest share of its threshold that a residual has reached in healthy flight."""
-    frame.worst_ratio = max(frame.worst_ratio, bank.closest_approach(frame.fdi))
 
 
 @kernel

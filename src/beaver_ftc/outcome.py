@@ -104,6 +104,7 @@ def flight_of(
     fdi, dt = frame["fdi"], float(frame["dt"])
     departed = int(frame["departed"])
     modes = range(int(frame["n_modes"]))
+    closest = tuple(float(share) for share in fdi["closest"][: max(int(fdi["n_poles"]), 1)])
     return Flight(
         scenario=scenario,
         frames=int(frame["k"]),
@@ -118,6 +119,7 @@ def flight_of(
         envelope_exits=_envelope_exits(frame),
         departure=(float(frame["t"]), DEPARTURE_SIGNALS[departed // 10]) if departed else None,
         saturation_s={s: int(n) * dt for s, n in zip(SURFACES, frame["saturated_frames"], strict=True)},
-        worst_residual_ratio=float(frame["worst_ratio"]),
+        worst_residual_ratio=max(closest),
+        closest_approach=closest,
         **(_isolation(fdi) if verdict is None else _told(fdi, verdict)),
     )

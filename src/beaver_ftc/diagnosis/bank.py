@@ -58,14 +58,13 @@ def alarm(fdi):
 
 
 @kernel
-def closest_approach(fdi):
-    """The largest share of its bound that a filter of the bank has reached at this instant."""
-    worst = 0.0
-    for i in range(3):
-        for m in range(fdi.n_poles):
+def note_closest_approach(fdi):
+    """Keep the largest share of its bound that each filter has reached."""
+    for m in range(fdi.n_poles):
+        for i in range(3):
             if fdi.bank_threshold[m, i] > 0.0:
-                worst = max(worst, abs(fdi.bank_residual[m, i]) / fdi.bank_threshold[m, i])
-    return worst
+                share = abs(fdi.bank_residual[m, i]) / fdi.bank_threshold[m, i]
+                fdi.closest[m] = max(fdi.closest[m], share)
 
 
 @kernel

@@ -42,6 +42,7 @@ DIAGNOSIS = np.dtype(
         ("memory", "i8"), ("shared", "i8"), ("membership", "i8"), ("abrupt", "i8"),
         ("n_poles", "i8"), ("bank_decay", "f8", (MAX_POLES,)), ("innovation", "f8", (3,)),
         ("bank_residual", "f8", (MAX_POLES, 3)), ("bank_threshold", "f8", (MAX_POLES, 3)),
+        ("closest", "f8", (MAX_POLES,)),  # largest share of its bound that each filter reached in healthy flight
         ("effect", "f8", (MAX_POLES, 3)), ("certain_after_s", "f8"),  # what guarantee.py keeps
     ],
     align=True,

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
-from typing import Annotated, Any, NoReturn
+from typing import Annotated, Any
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, Strict
 from pydantic_core import PydanticCustomError
@@ -36,11 +36,6 @@ def refuse(conflicts: Sequence[Conflict]) -> None:
     """Raise if values that are each fine contradict one another; every conflict keeps its own location."""
     if conflicts:
         raise PydanticCustomError("conflict", "contradictory values", {"conflicts": list(conflicts)})
-
-
-def unknown_name(kind: str, name: str, known: Iterable[str]) -> NoReturn:
-    """Refuse a name that is none of the known ones; the suggestion is made when the mistake is shown."""
-    raise PydanticCustomError("unknown_name", "unknown {kind}", {"kind": kind, "name": name, "known": known})
 
 
 def order_conflicts(start_s: float, end_s: float | None, start_key: str) -> list[Conflict]:

@@ -1,6 +1,7 @@
 """A scenario from a file, a built-in name or a text: every mistake at once, one line each."""
 
 from collections.abc import Callable
+from functools import lru_cache
 from itertools import islice
 from pathlib import Path
 from typing import Any, TypeVar
@@ -30,6 +31,11 @@ def load_scenario(path_or_name: str | Path) -> Scenario:
 def load_text(text: str, source: str = "<text>", folder: Path | None = None) -> Scenario:
     """The scenario in a text; `source` begins its error lines, `folder` is where its CSV files are."""
     return validate(Scenario, parse_document(text, source), source, folder, _conflicts)
+
+
+@lru_cache
+def _schema(model: type[BaseModel]) -> dict[str, Any]:
+    return model.model_json_schema()
 
 
 def _conflicts(data: dict[str, Any]) -> list[Conflict]:
@@ -78,7 +84,7 @@ def validate(
     try:
         instance = model.model_validate(document.data, context={"folder": folder})
     except ValidationError as error:
-        problems += islice(problems_of(error, document, model.model_json_schema()), MAX_PROBLEMS)
+        problems += islice(problems_of(error, document, _schema(model)), MAX_PROBLEMS)
         known = {problem.location for problem in problems}
         hidden = [(at, says) for at, says in conflicts_in(document.data) if at not in known]
         problems += [Problem(document.line(at), at, says) for at, says in hidden]

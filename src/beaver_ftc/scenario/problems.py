@@ -99,8 +99,6 @@ def _says(detail: Any, location: Location, data: Any, schema: dict[str, Any]) ->
     if kind == "extra_forbidden":
         known = _keys(_at(schema, location[:-1], data))
         return f"unknown key{suggestion(str(location[-1]), known, cutoff=0.5)}"
-    if kind == "unknown_name":
-        return f"{detail['msg']}{suggestion(detail['ctx']['name'], detail['ctx']['known'])}"
     here = _at(schema, location, data)
     if kind == "missing" and isinstance(detail["loc"][-1], int):
         return f"too few items, allowed: {_allowed(here, detail)}"

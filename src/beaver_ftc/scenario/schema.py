@@ -3,13 +3,13 @@
 from math import degrees
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import AfterValidator, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, BeforeValidator, ConfigDict, Field, model_validator
 
 from beaver_ftc.control.config import ControlConfig
 from beaver_ftc.design.coefficients import TERMS, TRAVEL
 from beaver_ftc.diagnosis.config import FdiConfig
 from beaver_ftc.scenario.actuators import Actuators
-from beaver_ftc.scenario.base import Flag, Number, Section, Whole, number, refuse, unknown_name
+from beaver_ftc.scenario.base import Flag, Number, Section, Whole, number, refuse, suggestion
 from beaver_ftc.scenario.consistency import DURATION_S, RATE_HZ, Outline, conflicts
 from beaver_ftc.scenario.faults import Fault
 from beaver_ftc.scenario.sensors import Sensors
@@ -58,12 +58,20 @@ class SinusoidAxes(Section):
 
 def _known_term(name: str) -> str:
     if name not in TERMS:
-        unknown_name("aerodynamic term", name, TERMS)
+        refuse([((), f"unknown aerodynamic term{suggestion(name, TERMS)}")])
     return name
+
+
+def _no_more_than_there_are(given: Any) -> Any:
+    """Refuse a mapping that cannot be right before a suggestion is made for each of its names."""
+    if isinstance(given, dict) and len(given) > len(TERMS):
+        refuse([((), f"{len(given)} terms, allowed: at most the {len(TERMS)} there are")])
+    return given
 
 
 TermName = Annotated[str, AfterValidator(_known_term)]
 Ratio = Annotated[Number, Field(ge=-10, le=10)]
+Ratios = Annotated[dict[TermName, Ratio], BeforeValidator(_no_more_than_there_are)]
 
 
 class Uncertainty(Section):
@@ -75,7 +83,7 @@ class Uncertainty(Section):
     sinusoid: SinusoidAxes = Field(
         default_factory=SinusoidAxes, description="sinusoidal angular accelerations"
     )
-    coefficients: dict[TermName, Ratio] = Field(
+    coefficients: Ratios = Field(
         default_factory=dict,
         description="truth / design ratio of single aerodynamic terms, 1 is no error, e.g. Cm_alpha: 1.05",
         examples=[{"Cm_alpha": 1.05}],
@@ -140,7 +148,7 @@ class DesignModel(Section):
     inertia: InertiaScale = Field(
         default_factory=InertiaScale, description="the designer's inertia over the table's"
     )
-    coefficients: dict[TermName, Ratio] = Field(
+    coefficients: Ratios = Field(
         default_factory=dict,
         description="design / table ratio of single aerodynamic terms, 1 is no error, e.g. Cm_alpha: 0.9",
         examples=[{"Cm_alpha": 0.9}],

@@ -28,6 +28,7 @@ _SOURCES = (
     "channels.py",
     "compiled.py",
     "frame.py",
+    "stages.py",
     "supervisor.py",
 )
 

@@ -115,7 +115,7 @@ class Loop:
 
     def land(self) -> Flight:
         """What the flight has yielded so far."""
-        verdict = None if self._diagnoses_itself else self.plugged.verdict
+        verdict = self.plugged.verdict if self.plugged and self.plugged.detector else None
         return flight_of(self.scenario, self.frames[0], self.columns, verdict)
 
     def chunks(self) -> Iterable[np.ndarray]:

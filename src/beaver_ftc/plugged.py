@@ -32,7 +32,11 @@ class PluggedFrame:
     """
 
     def __init__(
-        self, detector: Detector | None, law: Law | None, names: tuple[str, str], context: tuple[Context, Context]
+        self,
+        detector: Detector | None,
+        law: Law | None,
+        names: tuple[str, str],
+        context: tuple[Context, Context],
     ) -> None:
         self.detector, self.law = detector, law
         self.verdict = Verdict()
@@ -107,14 +111,14 @@ class PluggedFrame:
         told = self._told[0]
         told["detected"], told["axis"] = bool(verdict.detected), _AXES[verdict.axis]
         told["isolated"] = _ISOLATED[verdict.isolated]
-        told["theta"] = self._finite("verdict.estimate", 0.0 if verdict.estimate is None else verdict.estimate)
+        told["theta"] = 0.0 if verdict.estimate is None else self._finite(verdict.estimate)
         told["estimates"] = verdict.effectiveness is not None
         if verdict.effectiveness is not None:
             told["effectiveness"] = self._four(name, "verdict.effectiveness", verdict.effectiveness)
 
-    def _finite(self, what: str, value: Any) -> float:
+    def _finite(self, value: Any) -> float:
         if not isinstance(value, float | int | np.floating) or not isfinite(value):
-            self._blame(self._names[0], f"{what} is {value!r}, allowed: a finite number")
+            self._blame(self._names[0], f"verdict.estimate is {value!r}, allowed: a finite number")
         return float(value)
 
     def _deflections(self, answer: Any) -> np.ndarray:
@@ -127,7 +131,8 @@ class PluggedFrame:
         except (TypeError, ValueError):
             array = np.empty(0)
         if array.shape != (4,):
-            self._blame(name, f"{what} has shape {np.shape(values) if array.size else type(values).__name__}, allowed: (4,)")
+            shape = f"shape {array.shape}" if array.size else f"type {type(values).__name__}"
+            self._blame(name, f"{what} has {shape}, allowed: four numbers")
         if not np.isfinite(array).all():
             self._blame(name, f"{what} is not finite: {array.tolist()}")
         return array
@@ -144,7 +149,9 @@ def _measured(frame: np.void) -> Measured:
     )
 
 
-def context_of(frames: np.ndarray, scenario: Scenario, start: np.ndarray, options: Mapping[str, float]) -> Context:
+def context_of(
+    frames: np.ndarray, scenario: Scenario, start: np.ndarray, options: Mapping[str, float]
+) -> Context:
     """What a plug-in is told before the flight; start: the truth's channels at the start, in SI."""
     frame = frames[0]
     control, fdi = frame["control"], frame["fdi"]
@@ -190,7 +197,8 @@ def plugged_frame(
 
 
 def _names(scenario: Scenario, detector: Detector | None, law: Law | None) -> tuple[str, str]:
-    """What to call the plug-ins: by the scenario's names, or by their classes if the scenario did not name them."""
+    """What to call the plug-ins: by the scenario's names, or by their classes if the scenario did not name
+    them."""
     scheme, other = scenario.fdi.scheme, scenario.control.law
     return (
         type(detector).__name__ if is_compiled(DETECTORS, scheme) else scheme,

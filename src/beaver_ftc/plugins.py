@@ -58,7 +58,8 @@ class Registered:
     package: str
 
     def description(self) -> str:
-        """The first line of its docstring; imports its class. A class that cannot be loaded is said to be so."""
+        """The first line of its docstring; imports its class. A class that cannot be loaded is said to be
+        so."""
         if not self.target:
             return _COMPILED[self.group][self.name]
         try:
@@ -120,4 +121,3 @@ def plugin_class(group: str, name: str) -> type:
         needs = f"lacks {' and '.join(missing)}" if missing else "is not a class"
         raise BadInput(f"plug-in {name}: {target} {needs}, allowed: a class with reset and step")
     return found
-

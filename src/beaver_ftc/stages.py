@@ -1,6 +1,7 @@
 """The compiled frame in stages, for flights in which a plug-in diagnoses or commands between them.
 
-    sense -> diagnose | heed -> decide_mode -> command | obey -> close          (left: built in, right: a plug-in)
+    sense -> diagnose | heed -> decide_mode -> command | obey -> close          (left: built in, right: a
+    plug-in)
 
 `frame.fly_frame` is the same in one call.
 """
@@ -8,9 +9,9 @@
 import numpy as np
 
 from beaver_ftc.compiled import kernel
-from beaver_ftc.diagnosis import bank, guarantee, network
-from beaver_ftc.diagnosis.state import NOT_ISOLATED
 from beaver_ftc.design.model import ALPHA, BETA
+from beaver_ftc.diagnosis import guarantee, network
+from beaver_ftc.diagnosis.state import NOT_ISOLATED
 from beaver_ftc.frame import (
     NOT_FINITE,
     accommodate,
@@ -85,7 +86,12 @@ def note(frame, verdict):
 @kernel
 def built_in_statistic(frames):
     """The largest share of its threshold that a residual of the built-in detection reaches at this frame."""
-    return bank.closest_approach(frames[0].fdi)
+    fdi, largest = frames[0].fdi, 0.0
+    for m in range(fdi.n_poles):
+        for i in range(3):
+            if fdi.bank_threshold[m, i] > 0.0:
+                largest = max(largest, abs(fdi.bank_residual[m, i]) / fdi.bank_threshold[m, i])
+    return largest
 
 
 @kernel

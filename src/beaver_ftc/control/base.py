@@ -32,4 +32,5 @@ class Law(Protocol):
         """Called once before a flight."""
 
     def step(self, measured: Measured, reference: Reference, verdict: Verdict) -> np.ndarray:
-        """Called every frame: the command (4,) rad for aileron, elevator, rudder, flap. The loop limits it."""
+        """Called every frame: the command (4,) rad for aileron, elevator, rudder, flap. The loop limits
+        it."""

@@ -1,0 +1,86 @@
+"""Observer residual against a constant threshold: the textbook scheme [Chen1999, ch. 2].
+
+    eps[k+1] = a eps[k] + dt nu,   a = exp(-pole dt)        alarm when |eps_i| > alarm constant_i / pole
+
+The residual is that of the published detection estimator; only the threshold does not move with the state.
+A fault is named by the surface whose filtered effect fits the residual best, by least squares over a fading
+window.
+"""
+
+from collections.abc import Mapping
+from math import exp
+from typing import ClassVar
+
+import numpy as np
+
+from beaver_ftc.design.context import Context
+from beaver_ftc.diagnosis.base import Measured, Verdict
+from beaver_ftc.rivals.options import options_of
+
+SURFACES = ("aileron", "elevator", "rudder")
+
+
+class Fit:
+    """Fading sums of residual and regressors, and what each surface makes of them.
+
+    J_s = min over theta in [-1, 0] of sum |eps - theta Omega_s|^2, in units of the threshold.
+    """
+
+    def __init__(self, fade: float) -> None:
+        self._fade = fade
+        self.count, self.residual = 0.0, 0.0
+        self.cross, self.regressor = np.zeros(3), np.zeros(3)
+
+    def step(self, eps: np.ndarray, Omega: np.ndarray) -> None:
+        """Add one frame: eps (3,) and Omega (3, 3), a column a surface, both over the threshold."""
+        self.count = self._fade * self.count + 1.0
+        self.residual = self._fade * self.residual + float(eps @ eps)
+        self.cross = self._fade * self.cross + eps @ Omega
+        self.regressor = self._fade * self.regressor + (Omega**2).sum(axis=0)
+
+    def best(self) -> tuple[int, float, float]:
+        """(surface, theta, mean misfit square) of the surface that fits best."""
+        theta = np.clip(self.cross / np.maximum(self.regressor, 1e-300), -1.0, 0.0)
+        J = self.residual - 2.0 * theta * self.cross + theta**2 * self.regressor
+        s = int(np.argmin(J))
+        return s, float(theta[s]), float(J[s] / self.count)
+
+
+class ConstantThresholdObserver:
+    """Observer residual with a constant threshold, surface named by least squares [Chen1999]."""
+
+    name: ClassVar[str] = "observer-constant"
+    defaults: ClassVar[Mapping[str, float]] = {"alarm": 2.0, "pole_per_s": 10.0, "window_s": 0.5}
+
+    def reset(self, context: Context) -> None:
+        """No residual."""
+        self.option = options_of(self.name, self.defaults, context.options)
+        pole = self.option["pole_per_s"]
+        self.dt, self.a = context.dt_s, exp(-pole * context.dt_s)
+        # a declared bound of zero would make any rounding an alarm
+        self.scale = self.option["alarm"] * np.maximum(context.constant_rad_s2, 1e-4) / pole
+        self.eps, self.Omega = np.zeros(3), np.zeros((3, 3))
+        self.before: np.ndarray | None = None
+        self.fit = Fit(exp(-context.dt_s / self.option["window_s"]))
+        self.detected, self.axis = False, "p"
+
+    def step(self, measured: Measured, command: np.ndarray) -> Verdict:
+        """Filter the innovation, compare, and from the alarm on ask whose effect it is."""
+        if self.before is not None:
+            innovation = measured.x - self.before - self.dt * measured.acceleration
+            self.eps = self.a * self.eps + innovation
+            self.Omega = self.a * self.Omega + self.dt * measured.contribution[:, :3]
+        self.before = measured.x
+        share = np.abs(self.eps) / self.scale
+        statistic = float(share.max())
+        if statistic > 1.0 and not self.detected:
+            self.detected, self.axis = True, "pqr"[int(np.argmax(share))]
+        return self.verdict(statistic) if self.detected else Verdict(statistic=statistic)
+
+    def verdict(self, statistic: float) -> Verdict:
+        """The surface that fits; none fits if what it leaves is still over the threshold in the mean."""
+        self.fit.step(self.eps / self.scale, self.Omega / self.scale[:, None])
+        s, theta, misfit = self.fit.best()
+        if misfit > 1.0:
+            return Verdict(True, self.axis, "unanticipated", "unanticipated", statistic=statistic)
+        return Verdict(True, self.axis, SURFACES[s], "loss_of_effectiveness", theta, None, statistic)

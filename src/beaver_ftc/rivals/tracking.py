@@ -1,0 +1,40 @@
+"""What the rival laws share: a proportional-integral demand, and surfaces from it.
+
+    nu = xm' + Kp e + Ki int e,   e = xm - x        [the built-in laws' own, with their default gains]
+
+so that the laws differ in what they make of the demand, not in what they demand. The flap stays in trim.
+"""
+
+import numpy as np
+
+from beaver_ftc.control.base import Reference
+from beaver_ftc.design.context import Context
+from beaver_ftc.diagnosis.base import Measured
+
+GAINS = {"proportional_per_s": 2.0, "integral_per_s2": 1.0}
+
+
+class Demand:
+    """The demanded angular acceleration, with conditional integration against wind-up."""
+
+    def __init__(self, context: Context, option: dict[str, float]) -> None:
+        self._dt = context.dt_s
+        self._Kp, self._Ki = option["proportional_per_s"], option["integral_per_s2"]
+        self.integral = np.zeros(3)
+
+    def of(self, measured: Measured, reference: Reference, saturated: bool) -> np.ndarray:
+        """nu (3,) rad/s2; the integral stands still while a surface is at its stop."""
+        error = reference.rate - measured.x
+        if not saturated:
+            self.integral = self.integral + self._dt * error
+        return reference.acceleration + self._Kp * error + self._Ki * self.integral
+
+
+def limited(deflections: np.ndarray, context: Context) -> np.ndarray:
+    """(4,) rad, within the travel."""
+    return np.clip(deflections, context.travel_rad[0], context.travel_rad[1])
+
+
+def with_flap(three: np.ndarray, context: Context) -> np.ndarray:
+    """Aileron, elevator, rudder (3,) rad and the flap of the trim: (4,) rad."""
+    return np.append(three, context.trim_rad[3])

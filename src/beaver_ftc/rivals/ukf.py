@@ -1,0 +1,48 @@
+"""Unscented Kalman filter with the surfaces' effectiveness as states, and a CUSUM on its innovations."""
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+import numpy as np
+
+from beaver_ftc.design.context import Context
+from beaver_ftc.diagnosis.base import Measured
+from beaver_ftc.rivals.effectiveness import DEFAULTS, EffectivenessFilter, N
+from beaver_ftc.rivals.kalman import sigma_points
+
+
+class AugmentedUkf(EffectivenessFilter):
+    """Unscented Kalman filter of effectiveness, CUSUM on the innovation squared [Julier2004], [Page1954]."""
+
+    name: ClassVar[str] = "augmented-ukf"
+    defaults: ClassVar[Mapping[str, float]] = DEFAULTS | {"alarm": 20.0, "allowance": 3.0, "spread": float(N)}
+
+    def reset(self, context: Context) -> None:
+        """As the base does, with an empty sum."""
+        super().reset(context)
+        self.sum = 0.0
+
+    def propagate(self, measured: Measured) -> None:
+        """Move the sigma points through the dynamics; their mean and covariance are z- and P-."""
+        points, weights = sigma_points(self.z, self.P, self.option["spread"])
+        points = self.dynamics(points, measured)
+        self.z = weights @ points
+        off = points - self.z
+        self.P = (off.T * weights) @ off
+        self.P[np.diag_indices(N)] += self.process_noise(measured)
+
+    def dynamics(self, points: np.ndarray, measured: Measured) -> np.ndarray:
+        """Each sigma point a frame later; f differs between points by its change from the measured state."""
+        dt, f = self.context.dt_s, self.context.model.f
+        moved = points.copy()
+        here = f(measured.x, measured.y)
+        for i, point in enumerate(points):
+            away = f(point[:3], measured.y) - here
+            loss = measured.contribution[:, :3] @ point[3:]
+            moved[i, :3] += dt * (measured.acceleration + away + loss)
+        return moved
+
+    def statistic(self, square: float) -> float:
+        """g = max(0, g + (square - 3 allowance)) over the alarm level; 3 is what a healthy flight expects."""
+        self.sum = max(0.0, self.sum + min(square, 1e6) - 3.0 * self.option["allowance"])
+        return self.sum / self.option["alarm"]

@@ -101,12 +101,13 @@ class NodeBank:
     def __init__(self, nodes: Sequence[jsbsim.FGPropertyNode], owner: object = None) -> None:
         self.nodes = tuple(nodes)
         self.owner = owner
-        native = available()
-        self.pointers = np.array([_pointer(node) if native else 0 for node in self.nodes], dtype=np.int64)
+        self._native = available()
+        pointers = [_pointer(node) if self._native else 0 for node in self.nodes]
+        self.pointers = np.array(pointers, dtype=np.int64)
 
     def read(self, out: np.ndarray) -> None:
         """Read every node into out (n,), natively where available."""
-        if available():
+        if self._native:
             read_nodes(getter_address(), self.pointers, out)
         else:
             for i, node in enumerate(self.nodes):
@@ -114,7 +115,7 @@ class NodeBank:
 
     def write(self, values: np.ndarray) -> None:
         """Write values (n,) to the nodes, natively where available."""
-        if available():
+        if self._native:
             write_nodes(setter_address(), self.pointers, values)
         else:
             for node, value in zip(self.nodes, values, strict=True):

@@ -22,6 +22,8 @@ COMMANDS = (
     "schema",
     "trim",
     "list",
+    "bench",
+    "verify",
 )
 
 app = typer.Typer(

@@ -44,7 +44,7 @@ class Draw:
         return Scenario.model_validate({
             "name": f"{self.kind}-{self.index}",
             "duration_s": fault["at_s"] + AFTER_FAULT_S if fault else HEALTHY_S,
-            "rate_hz": int(rng.integers(_RATE_HZ[0], _RATE_HZ[1], endpoint=True)),
+            "rate_hz": round(_log_uniform(rng, *_RATE_HZ)),
             "initial": {"airspeed_mps": rng.uniform(*_AIRSPEED_MPS), "altitude_m": rng.uniform(*_ALTITUDE_M)},
             "reference": {axis: [_signal(rng) for _ in range(rng.integers(1, 3))] for axis in AXES},
             "faults": [fault] if fault else [],
@@ -72,12 +72,12 @@ def _fault(rng: np.random.Generator) -> dict[str, Any]:
 def _signal(rng: np.random.Generator) -> dict[str, Any]:
     """Zero on average, or the attitude would run away under open outer loops."""
     amplitude = {"amplitude_deg_s": rng.uniform(0.5, 5.0)}
-    wave = {**amplitude, "frequency_hz": _log_uniform(rng, 0.05, 0.5), "phase_deg": rng.uniform(0, 360)}
+    wave = {**amplitude, "frequency_hz": _log_uniform(rng, 0.1, 0.7), "phase_deg": rng.uniform(0, 360)}
     kind = rng.choice(["sine", "square", "doublet", "chirp"], p=[0.5, 0.2, 0.15, 0.15])
     if kind == "doublet":
         return {"doublet": {**amplitude, "start_s": rng.uniform(0, 15), "width_s": rng.uniform(0.5, 3)}}
     if kind == "chirp":
-        sweep = {"start_s": 0.0, "end_s": rng.uniform(20, HEALTHY_S), "start_frequency_hz": 0.05}
+        sweep = {"start_s": 0.0, "end_s": rng.uniform(20, HEALTHY_S), "start_frequency_hz": 0.1}
         return {"chirp": {**amplitude, **sweep, "end_frequency_hz": rng.uniform(0.2, 1.0)}}
     return {str(kind): wave}
 

@@ -12,7 +12,7 @@ PROMISES = ("false_alarms", "true_fault_exclusions", "wrong_isolations", "late_d
 
 
 def summarise(rows: dict[str, list[Row]]) -> dict[str, Any]:
-    """The document of a campaign; `kept` says whether every promise of the sharpened scheme, the default, held.
+    """The document of a campaign; `kept`: whether every promise of the sharpened scheme, the default, held.
 
     The published one is there for comparison: its isolation threshold presumes a constant parameter.
     """

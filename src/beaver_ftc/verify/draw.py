@@ -13,7 +13,7 @@ from beaver_ftc.scenario.schema import Scenario
 
 AXES = ("p", "q", "r")
 SURFACES = ("aileron", "elevator", "rudder")
-HEALTHY_S = 60.0  # attitude is open loop: a longer flight wanders out of the validated envelope
+HEALTHY_S = 100.0  # attitude is open loop: a longer flight wanders out of the validated envelope
 AFTER_FAULT_S = 20.0  # several periods of the slowest reference
 _AIRSPEED_MPS, _ALTITUDE_M, _RATE_HZ = (35.0, 52.0), (0.0, 3000.0), (20, 100)
 _MAGNITUDE, _KAPPA_PER_S, _FAULT_AT_S = (0.05, 1.0), (0.2, 10.0), (3.0, 8.0)

@@ -1,6 +1,7 @@
 """The one place that talks to JSBSim: a silent executive with the Beaver loaded, its properties by name."""
 
 from math import cos, sin
+from pathlib import Path
 
 import jsbsim
 
@@ -47,9 +48,9 @@ class _Errors(jsbsim.FGLogger):
         pass
 
 
-def _load(errors: _Errors) -> jsbsim.FGFDMExec:
+def _load(errors: _Errors, root: Path) -> jsbsim.FGFDMExec:
     jsbsim.set_logger(errors)
-    fdm = jsbsim.FGFDMExec(str(data_root()))
+    fdm = jsbsim.FGFDMExec(str(root))
     fdm.set_debug_level(0)
     try:
         loaded = fdm.load_model("beaver")
@@ -68,10 +69,11 @@ class Plant:
 
     rate_hz:  frame rate of diagnosis and control.
     substeps: JSBSim frames per such frame; `run` advances one JSBSim frame of dt_s = 1/(rate_hz substeps).
+    root:     JSBSim's root directory, if not this package's.
     """
 
-    def __init__(self, rate_hz: float, substeps: int = 1) -> None:
-        self.fdm = _load(_Errors())
+    def __init__(self, rate_hz: float, substeps: int = 1, root: Path | None = None) -> None:
+        self.fdm = _load(_Errors(), root or data_root())
         self.rate_hz, self.substeps = rate_hz, substeps
         self.dt_s = 1.0 / (rate_hz * substeps)
         self.fdm.set_dt(self.dt_s)

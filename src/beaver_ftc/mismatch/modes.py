@@ -1,0 +1,97 @@
+"""Eigenmodes and transfer functions of a linear aircraft: names, frequencies, dampings, zeros, responses.
+
+Classical eight states: position, altitude and heading are left out. On a flat Earth nothing depends on heading; on a
+turning one lift does a little (2 Omega cos(latitude) per rad), which moves the slow spiral root by up to 7e-4 1/s.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+LONGITUDINAL = ("airspeed", "alpha", "q", "theta")
+LATERAL = ("beta", "p", "r", "phi")
+CLASSICAL = LONGITUDINAL + LATERAL
+MODES = ("short_period", "phugoid", "roll", "dutch_roll", "spiral")
+CHANNELS = (("aileron", "p"), ("elevator", "q"), ("rudder", "r"))
+
+
+@dataclass(frozen=True)
+class Mode:
+    """One mode: its pole with the larger imaginary part, 1/s."""
+
+    name: str
+    pole: complex
+
+    @property
+    def frequency_rad_s(self) -> float:
+        """Undamped natural frequency; for a real pole its magnitude."""
+        return abs(self.pole)
+
+    @property
+    def damping(self) -> float:
+        """Damping ratio: 1 for a stable real pole."""
+        return -self.pole.real / abs(self.pole)
+
+
+def modes(A: np.ndarray) -> dict[str, Mode]:
+    """The five modes of a system matrix (8, 8) over CLASSICAL, by name."""
+    poles, shapes = np.linalg.eig(A)
+    share = np.abs(shapes * np.linalg.inv(shapes).T)  # participation of each state in each mode
+    lateral = share[len(LONGITUDINAL) :].sum(axis=0) / share.sum(axis=0)
+    order = np.argsort(lateral)
+    slow, fast = _by_size(poles[order[:4]])
+    rest = poles[order[4:]]
+    turning = rest[np.argsort(-np.abs(rest.imag))]
+    spiral, roll = sorted(turning[2:], key=abs)
+    found = {"short_period": fast, "phugoid": slow, "roll": roll, "dutch_roll": turning[0], "spiral": spiral}
+    return {name: Mode(name, _upper(found[name])) for name in MODES}
+
+
+def _by_size(poles: np.ndarray) -> tuple[complex, complex]:
+    """Of two pairs the slower's and the faster's pole."""
+    ordered = sorted(poles, key=abs)
+    return ordered[0], ordered[-1]
+
+
+def _upper(pole: complex) -> complex:
+    return complex(pole.real, abs(pole.imag))
+
+
+def deviation(pole: complex, reference: complex) -> float:
+    """Distance of two poles over the reference's magnitude."""
+    return abs(pole - reference) / abs(reference)
+
+
+def response(A: np.ndarray, b: np.ndarray, row: int, frequency_rad_s: np.ndarray) -> np.ndarray:
+    """Frequency response (n,), complex, from an input (column b) to state `row`."""
+    identity = np.eye(len(A))
+    return np.array([np.linalg.solve(1j * w * identity - A, b)[row] for w in frequency_rad_s])
+
+
+def zeros(A: np.ndarray, b: np.ndarray, row: int) -> np.ndarray:
+    """Transmission zeros from input column b to state `row`, slowest first.
+
+    The finite generalised eigenvalues of [[A, b], [c, 0]] against [[I, 0], [0, 0]].
+    """
+    from scipy.linalg import eigvals
+
+    n = len(A)
+    c = np.eye(n)[row]
+    system = np.block([[A, b[:, None]], [c[None, :], np.zeros((1, 1))]])
+    descriptor = np.diag([1.0] * n + [0.0])
+    found = eigvals(system, descriptor)
+    finite = found[np.isfinite(found) & (np.abs(found) < 1e6)]
+    return finite[np.argsort(np.abs(finite))]
+
+
+def pulse_response(A: np.ndarray, b: np.ndarray, row: int, t_s: np.ndarray, pulse_s: float) -> np.ndarray:
+    """State `row` at evenly spaced times t_s (n,) after a unit pulse of length pulse_s at time 0; exact."""
+    from scipy.linalg import expm
+
+    dt, n = t_s[1] - t_s[0], len(A)
+    step = expm(np.block([[A, b[:, None]], [np.zeros((1, n + 1))]]) * dt)
+    state, out = np.zeros(n), []
+    for t in t_s:
+        out.append(state[row])
+        state = step[:n, :n] @ state + step[:n, n] * (t < pulse_s - 0.5 * dt)
+    return np.array(out)

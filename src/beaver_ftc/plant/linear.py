@@ -1,0 +1,163 @@
+"""The truth linearised about a flight condition, in two ways.
+
+`differences`: central differences of JSBSim's accelerations, each at a settled state. It is right everywhere.
+
+`own`: JSBSim's FGLinearization, as a second opinion. Three things to know (1.3.3). It asks the first engine for its
+thruster and, the Beaver having no engine, would bring the process down: so a copy of the aircraft is loaded with one that
+weighs nothing and gives nothing. Setting alpha it passes sideslip in degrees where radians are due, so only a flight
+condition with no sideslip is linearised rightly. It does not wait for the side force of betadot to settle.
+"""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from math import hypot
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING
+
+import jsbsim
+import numpy as np
+
+from beaver_ftc.errors import SimulationFailed
+from beaver_ftc.paths import data_root
+from beaver_ftc.plant.adapter import FT_PER_M, Plant
+from beaver_ftc.plant.configure import configure
+from beaver_ftc.plant.state import FlightState
+
+if TYPE_CHECKING:
+    from beaver_ftc.scenario.schema import Scenario
+
+M_PER_FT = 1.0 / FT_PER_M
+_EARTH_RADIUS_M = 6371000.0
+
+# State, the field of FlightState that moves it, and how far for a difference: small against the curvature of the
+# polynomials, large against rounding.
+_MOVED = (
+    ("airspeed", "airspeed_mps", 1e-2),
+    ("alpha", "alpha_rad", 1e-4),
+    ("beta", "beta_rad", 1e-4),
+    ("p", "p_rad_s", 1e-4),
+    ("q", "q_rad_s", 1e-4),
+    ("r", "r_rad_s", 1e-4),
+    ("phi", "phi_rad", 1e-4),
+    ("theta", "theta_rad", 1e-4),
+    ("psi", "psi_rad", 1e-4),
+    ("altitude", "altitude_m", 10.0),
+)
+_SURFACES = ("aileron", "elevator", "rudder", "flap")
+_SURFACE_STEP_RAD = 1e-3
+
+# JSBSim's states by our names, with the factor from its unit to ours; latitude and longitude become metres.
+_STATES = {
+    "Vt": ("airspeed", M_PER_FT),
+    "Alpha": ("alpha", 1.0),
+    "Beta": ("beta", 1.0),
+    "P": ("p", 1.0),
+    "Q": ("q", 1.0),
+    "R": ("r", 1.0),
+    "Phi": ("phi", 1.0),
+    "Theta": ("theta", 1.0),
+    "Psi": ("psi", 1.0),
+    "Latitude": ("north", _EARTH_RADIUS_M),
+    "Longitude": ("east", _EARTH_RADIUS_M),
+    "Alt": ("altitude", M_PER_FT),
+}
+_INPUTS = {"DaCmd": "aileron", "DeCmd": "elevator", "DrCmd": "rudder"}
+
+_PLACE = '<location unit="M"> <x> 0 </x> <y> 0 </y> <z> 0 </z> </location>'
+_NO_PROPULSION = "<propulsion/>"
+_INERT_PROPULSION = (
+    f'<propulsion> <engine file="inert"> {_PLACE} <thruster file="nothing"> {_PLACE} </thruster> </engine>'
+    " </propulsion>"
+)
+_ENGINE = '<electric_engine name="inert"> <power unit="WATTS"> 0 </power> </electric_engine>'
+_THRUSTER = '<direct name="nothing"> </direct>'
+
+
+@dataclass(frozen=True)
+class LinearModel:
+    """xdot = A x + B u about a flight condition; SI and rad. states (n,), inputs (m,) name rows and columns."""
+
+    A: np.ndarray
+    B: np.ndarray
+    states: tuple[str, ...]
+    inputs: tuple[str, ...]
+
+    def of(self, states: tuple[str, ...]) -> "LinearModel":
+        """The same model with these states only, the others held, in this order."""
+        rows = [self.states.index(name) for name in states]
+        return LinearModel(self.A[np.ix_(rows, rows)], self.B[rows], states, self.inputs)
+
+
+def differences(plant: Plant, point: FlightState) -> LinearModel:
+    """The plant about a flight condition: ten states (no position over ground), four surfaces."""
+    A = [_slope(plant, point, field, step) for _, field, step in _MOVED]
+    B = [_slope(plant, point, f"{surface}_rad", _SURFACE_STEP_RAD) for surface in _SURFACES]
+    names = tuple(name for name, _, _ in _MOVED)
+    return LinearModel(np.column_stack(A), np.column_stack(B), names, _SURFACES)
+
+
+def _slope(plant: Plant, point: FlightState, field: str, step: float) -> np.ndarray:
+    here = getattr(point, field)
+    ahead, behind = (_derivative(plant, replace(point, **{field: here + way})) for way in (step, -step))
+    return (ahead - behind) / (2.0 * step)
+
+
+def _derivative(plant: Plant, state: FlightState) -> np.ndarray:
+    """Time derivative of the ten states, (10,), from JSBSim's accelerations."""
+    plant.start(state)
+    u, v, w = (plant.read(f"velocities/{axis}-fps") * M_PER_FT for axis in "uvw")
+    udot, vdot, wdot = (plant.read(f"accelerations/{axis}dot-ft_sec2") * M_PER_FT for axis in "uvw")
+    V, uw = hypot(u, v, w), hypot(u, w)
+    Vdot = (u * udot + v * vdot + w * wdot) / V
+    flow = [Vdot, (u * wdot - w * udot) / uw**2, (vdot * V - v * Vdot) / (V * uw)]
+    turning = [plant.read(f"accelerations/{axis}dot-rad_sec2") for axis in "pqr"]
+    attitude = [plant.read(f"velocities/{angle}dot-rad_sec") for angle in ("phi", "theta", "psi")]
+    return np.array([*flow, *turning, *attitude, plant.read("velocities/h-dot-fps") * M_PER_FT])
+
+
+def own(scenario: "Scenario", point: FlightState) -> LinearModel:
+    """The scenario's truth as JSBSim linearises it: twelve states, three surfaces.
+
+    point: a flight condition with no sideslip. Raises SimulationFailed where JSBSim makes nothing of it.
+    """
+    if point.beta_rad != 0.0:
+        raise SimulationFailed("JSBSim linearises rightly only with no sideslip")
+    with _aircraft_with_an_engine() as root:
+        plant = Plant(scenario.rate_hz, root=root)
+        configure(plant, scenario)
+        plant.start(point)
+        linear = jsbsim.FGLinearization(plant.fdm)
+        per_norm = [plant.read(f"actuators/{surface}/position-max-rad") for surface in _INPUTS.values()]
+    return _in_our_units(linear, np.array(per_norm))
+
+
+@contextmanager
+def _aircraft_with_an_engine() -> Iterator[Path]:
+    """A root directory with the Beaver in it, an inert engine added."""
+    text = (data_root() / "aircraft" / "beaver" / "beaver.xml").read_text(encoding="utf-8")
+    if _NO_PROPULSION not in text:
+        raise SimulationFailed("the aircraft is not the one linear analysis knows: it has engines")
+    with TemporaryDirectory(prefix="beaver-ftc-") as folder:
+        root = Path(folder)
+        for path, content in (
+            ("aircraft/beaver/beaver.xml", text.replace(_NO_PROPULSION, _INERT_PROPULSION)),
+            ("engine/inert.xml", _ENGINE),
+            ("engine/nothing.xml", _THRUSTER),
+        ):
+            (root / path).parent.mkdir(parents=True, exist_ok=True)
+            (root / path).write_text(content, encoding="utf-8")
+        yield root
+
+
+def _in_our_units(linear: jsbsim.FGLinearization, rad_per_norm: np.ndarray) -> LinearModel:
+    """Rename and rescale; JSBSim's surface inputs are shares of the travel, and its throttle goes."""
+    named = [_STATES[name] for name in linear.x_names]
+    columns = [linear.u_names.index(name) for name in _INPUTS]
+    factor = np.array([factor for _, factor in named])
+    A = np.array(linear.system_matrix) * factor[:, None] / factor
+    B = np.array(linear.input_matrix)[:, columns] * factor[:, None] / rad_per_norm
+    if not (np.isfinite(A).all() and np.isfinite(B).all()):
+        raise SimulationFailed("JSBSim's linearisation is not finite")
+    return LinearModel(A, B, tuple(name for name, _ in named), tuple(_INPUTS.values()))

@@ -1,0 +1,161 @@
+"""`beaver-ftc sweep`: fly many flights, keep one row each, say what they show."""
+
+import signal
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from beaver_ftc.cli.output import Format, FormatOption, complain, emit, emit_json
+from beaver_ftc.errors import BadInput
+
+if TYPE_CHECKING:
+    from beaver_ftc.scenario.sweep_loader import Sweep
+    from beaver_ftc.sweep.flying import Keep
+    from beaver_ftc.sweep.run import Options
+
+
+class Backend(StrEnum):
+    """Who flies."""
+
+    local = "local"
+    ray = "ray"
+
+
+class Objective(StrEnum):
+    """What a worst-case search looks for."""
+
+    delay = "delay"
+    false_alarm = "false_alarm"
+    tracking = "tracking"
+
+
+def command(
+    file: Annotated[
+        str, typer.Argument(metavar="FILE", help="A sweep file, or the name of a built-in sweep.")
+    ],
+    out: Annotated[Path, typer.Option(help="Folder for the results, one folder a sweep in it.")] = Path(
+        "runs"
+    ),
+    workers: Annotated[
+        int | None,
+        typer.Option(min=1, max=4096, help="Processes, or Ray tasks, at a time. Default: one a core."),
+    ] = None,
+    backend: Annotated[Backend, typer.Option(help="Local processes, or a Ray cluster.")] = Backend.local,
+    ray_address: Annotated[
+        str | None, typer.Option(help="Ray cluster to join, e.g. auto. Default: one on this machine.")
+    ] = None,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Fly what is missing from an earlier start.")
+    ] = False,
+    keep_logs: Annotated[
+        str,
+        typer.Option(
+            help="Flights to keep a result folder of: none, failed, missed, worst, all, or indices 3,17."
+        ),
+    ] = "none",
+    replay: Annotated[
+        int | None, typer.Option(min=0, metavar="INDEX", help="Fly this one flight again, as `run` would.")
+    ] = None,
+    search: Annotated[
+        Objective | None, typer.Option(help="Look for the worst flight instead of sampling.")
+    ] = None,
+    format: FormatOption = Format.text,
+    no_report: Annotated[bool, typer.Option("--no-report", help="Skip report.html and the figures.")] = False,
+) -> None:
+    """Fly a sweep: many flights of one scenario, varied, on all cores or on a cluster.
+
+    What has been flown is kept, whatever happens: go on with --resume. With --format json: the summary.
+    """
+    from beaver_ftc.scenario.sweep_loader import load_sweep
+    from beaver_ftc.sweep.run import Options
+
+    sweep = load_sweep(file)
+    options = Options(
+        out=out,
+        workers=workers or _cores(),
+        backend=backend.value,
+        address=ray_address,
+        resume=resume,
+        keep=_keep(keep_logs),
+        report=not no_report,
+        search=search.value if search else None,
+        source=file,
+    )
+    if replay is None:
+        raise typer.Exit(_fly(sweep, options, format))
+    raise typer.Exit(_replay(sweep, options, replay, format))
+
+
+def _cores() -> int:
+    import os
+
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def _keep(asked: str) -> "Keep":
+    from beaver_ftc.sweep.flying import KEEP_POLICIES, Keep
+
+    if asked in KEEP_POLICIES:
+        return Keep(asked)
+    try:
+        return Keep("selected", frozenset(int(index) for index in asked.split(",")))
+    except ValueError:
+        allowed = ", ".join(KEEP_POLICIES)
+        raise BadInput(
+            f"--keep-logs: {asked!r} is not known, allowed: {allowed}, or indices like 3,17"
+        ) from None
+
+
+def _fly(sweep: "Sweep", options: "Options", format: Format) -> int:
+    from beaver_ftc.cli.sweep_progress import live_progress
+    from beaver_ftc.sweep.run import named_for, run_sweep
+    from beaver_ftc.sweep.words import summary_text
+
+    with _stoppable() as stopped, live_progress(sweep.name) as progress:
+        document = run_sweep(sweep, options, progress, stopped)
+    document |= {"folder": str(options.out / named_for(sweep, options.search).name)}
+    if format is Format.json:
+        emit_json(document)
+    else:
+        emit(summary_text(document, colour=sys.stdout.isatty()))
+    return 0 if document["passed"] else 1
+
+
+def _replay(sweep: "Sweep", options: "Options", index: int, format: Format) -> int:
+    from beaver_ftc.results.verdict import verdict_text
+    from beaver_ftc.sweep.run import replay
+
+    document: dict[str, Any] = replay(sweep, options, index)
+    if format is Format.json:
+        emit_json(document)
+    else:
+        emit(verdict_text(document, document["folder"], colour=sys.stdout.isatty()))
+    return 0 if document["passed"] else 1
+
+
+@contextmanager
+def _stoppable() -> Iterator[Callable[[], bool]]:
+    """Let Ctrl-C (or SIGTERM) end the sweep after what is in the air; a second one ends it at once."""
+    asked: list[int] = []
+
+    def stop(number: int, frame: Any) -> None:
+        if asked:
+            raise KeyboardInterrupt
+        asked.append(number)
+        complain("\nstopping once the flights in the air have landed; once more to stop at once")
+
+    before = {number: signal.signal(number, stop) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield lambda: bool(asked)
+    except KeyboardInterrupt:
+        from beaver_ftc.sweep.run import SweepStopped
+
+        raise SweepStopped("stopped at once; what had landed is kept, go on with --resume") from None
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)

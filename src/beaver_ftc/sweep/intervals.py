@@ -1,0 +1,82 @@
+"""What a number of flights can say with confidence: bounds for rates, counts and quantiles.
+
+All are functions of counts alone. A bound that the flights do not give is infinite.
+"""
+
+import math
+from dataclasses import dataclass
+from statistics import NormalDist
+
+import numpy as np
+
+CONFIDENCE = 0.95
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """An estimate with its two-sided interval."""
+
+    value: float
+    low: float
+    high: float
+
+
+def wilson(successes: int, trials: int, confidence: float = CONFIDENCE) -> Estimate:
+    """A rate with its two-sided score interval [Wilson 1927]."""
+    if trials == 0:
+        return Estimate(math.nan, 0.0, 1.0)
+    low, high = (wilson_bound(successes, trials, (1.0 + confidence) / 2, upper) for upper in (False, True))
+    return Estimate(successes / trials, low, high)
+
+
+def wilson_bound(successes: int, trials: int, confidence: float, upper: bool) -> float:
+    """The rate's one-sided score bound: (p + z^2/2n +- z sqrt(p(1-p)/n + z^2/4n^2)) / (1 + z^2/n)."""
+    if trials == 0:
+        return 1.0 if upper else 0.0
+    if successes == (trials if upper else 0):
+        return float(upper)  # exactly, not up to rounding
+    z, p, n = NormalDist().inv_cdf(confidence), successes / trials, trials
+    half = z * math.sqrt(p * (1 - p) / n + z * z / (4 * n * n))
+    return (p + z * z / (2 * n) + (half if upper else -half)) / (1 + z * z / n)
+
+
+def poisson(events: int, exposure: float, confidence: float = CONFIDENCE) -> Estimate:
+    """Events per unit of exposure with their two-sided exact interval [Garwood 1936]."""
+    if exposure <= 0:
+        return Estimate(math.nan, 0.0, math.inf)
+    low, high = (poisson_bound(events, exposure, (1.0 + confidence) / 2, upper) for upper in (False, True))
+    return Estimate(events / exposure, low, high)
+
+
+def poisson_bound(events: int, exposure: float, confidence: float, upper: bool) -> float:
+    """The rate's one-sided exact bound: the mean at which so few (so many) events get improbable."""
+    from scipy.special import gammaincinv
+
+    if exposure <= 0:
+        return math.inf if upper else 0.0
+    if upper:
+        return float(gammaincinv(events + 1, confidence)) / exposure
+    return float(gammaincinv(events, 1 - confidence)) / exposure if events else 0.0
+
+
+def quantile(ordered: np.ndarray, q: float) -> float:
+    """The q quantile of ordered values (n,): the smallest one that a share q does not exceed."""
+    if not ordered.size:
+        return math.nan
+    return float(ordered[max(0, math.ceil(q * ordered.size - 1e-9) - 1)])
+
+
+def quantile_bound(ordered: np.ndarray, q: float, confidence: float, upper: bool) -> float:
+    """The quantile's one-sided bound, free of any distribution: an order statistic.
+
+    The r-th smallest of n values is at or above the q quantile with probability P(Binomial(n, q) < r).
+    """
+    from scipy.special import bdtr
+
+    n = ordered.size
+    below = bdtr(np.arange(n), n, q) if n else np.empty(0)  # P(Binomial <= k), k = 0 .. n - 1
+    if upper:
+        enough = np.flatnonzero(below >= confidence)
+        return float(ordered[enough[0]]) if enough.size else math.inf
+    enough = np.flatnonzero(below <= 1 - confidence)
+    return float(ordered[enough[-1] + 1]) if enough.size and enough[-1] + 1 < n else -math.inf

@@ -1,0 +1,164 @@
+"""Which values each flight of a sweep flies with: a function of the sweep and the flight's index alone.
+
+`linspace` keys, and all keys of a grid, are gone through in turn, the last key fastest. The others come from
+a point of the unit cube through the inverse of their distribution; the sampling is where those points come
+from.
+"""
+
+import math
+import warnings
+from collections.abc import Iterator, Sequence
+from statistics import NormalDist
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from beaver_ftc.scenario.sweep_loader import Sweep
+from beaver_ftc.scenario.sweep_schema import SweepFile, Variation
+
+_ALMOST = 2.0**-53  # keeps a unit number off 0 and 1, where a normal distribution is infinite
+
+# Second word of the seed sequences: what the numbers are for. A flight's own seed is (index,) alone.
+_OF_VALUES, _OF_DESIGN = 1, 2
+
+
+class Assignment(NamedTuple):
+    """One flight to be flown: its index and the value of each varied key."""
+
+    run: int
+    values: dict[str, Any]
+
+
+def flight_seed(sweep_seed: int, index: int) -> int:
+    """The seed of one flight, 63 bits, from the sweep's seed and the flight's index."""
+    words = np.random.SeedSequence(sweep_seed, spawn_key=(index,)).generate_state(1, np.uint64)
+    return int(words[0] >> np.uint64(1))
+
+
+def value_at(how: Variation, u: float) -> Any:
+    """The value a variation has at a number u in [0, 1): the inverse of its distribution function."""
+    if how.uniform is not None:
+        low, high = how.uniform
+        return low + u * (high - low)
+    if how.loguniform is not None:
+        low, high = how.loguniform
+        return min(max(low * (high / low) ** u, low), high)
+    if how.normal is not None:
+        return _normal(NormalDist(*how.normal), how.within, u)
+    assert how.count is not None
+    return counted_value(how, min(int(u * how.count), how.count - 1))
+
+
+def _normal(distribution: NormalDist, within: tuple[float, float] | None, u: float) -> float:
+    """The normal distribution's inverse, cut to an interval by drawing from the part inside."""
+    low, high = within or (-math.inf, math.inf)
+    below = distribution.cdf(low) if within else 0.0
+    inside = (distribution.cdf(high) if within else 1.0) - below
+    share = min(max(below + u * inside, _ALMOST), 1.0 - _ALMOST)
+    return min(max(distribution.inv_cdf(share), low), high)
+
+
+def counted_value(how: Variation, position: int) -> Any:
+    """The value at a position of a `linspace` or a `choice`."""
+    if how.choice is not None:
+        return how.choice[position]
+    assert how.linspace is not None
+    first, last, count = how.linspace
+    return last if position == count - 1 else first + position * (last - first) / max(count - 1, 1)
+
+
+class Plan:
+    """The values of every flight of a sweep."""
+
+    def __init__(self, sweep: Sweep) -> None:
+        self._file: SweepFile = sweep.file
+        vary = sweep.file.vary.items()
+        self._in_turn = [(key, how) for key, how in vary if _is_in_turn(sweep.file, how)]
+        self._drawn = [(key, how) for key, how in vary if not _is_in_turn(sweep.file, how)]
+        self._latin = _latin_hypercube(sweep.file, len(self._drawn)) if sweep.file.sampling == "lhs" else None
+
+    def assignments(self, indices: Sequence[int]) -> list[Assignment]:
+        """The values of these flights; the indices are in order."""
+        points = self._points(indices)
+        return [
+            Assignment(index, self._in_order(self._counted(index) | self._drawn_values(point)))
+            for index, point in zip(indices, points, strict=True)
+        ]
+
+    def _points(self, indices: Sequence[int]) -> np.ndarray:
+        """Points of the unit cube, (flights, drawn keys)."""
+        if not self._drawn or not indices:
+            return np.empty((len(indices), 0))
+        if self._latin is not None:
+            return self._latin[list(indices)]
+        if self._file.sampling == "sobol":
+            return _sobol(self._file.seed, len(self._drawn), indices)
+        return np.array([_random(self._file.seed, index, len(self._drawn)) for index in indices])
+
+    def _counted(self, index: int) -> dict[str, Any]:
+        values = {}
+        rest = index
+        for key, how in reversed(self._in_turn):
+            assert how.count is not None
+            rest, position = divmod(rest, how.count)
+            values[key] = counted_value(how, position)
+        return values
+
+    def _drawn_values(self, point: np.ndarray) -> dict[str, Any]:
+        return {key: value_at(how, float(u)) for (key, how), u in zip(self._drawn, point, strict=True)}
+
+    def _in_order(self, values: dict[str, Any]) -> dict[str, Any]:
+        return {key: values[key] for key in self._file.vary}
+
+
+def _is_in_turn(file: SweepFile, how: Variation) -> bool:
+    return file.sampling == "grid" or how.linspace is not None
+
+
+def _random(seed: int, index: int, dimensions: int) -> np.ndarray:
+    sequence = np.random.SeedSequence(seed, spawn_key=(index, _OF_VALUES))
+    return np.random.Generator(np.random.PCG64(sequence)).random(dimensions)
+
+
+def _design_generator(seed: int) -> np.random.Generator:
+    return np.random.Generator(np.random.PCG64(np.random.SeedSequence(seed, spawn_key=(0, _OF_DESIGN))))
+
+
+def _latin_hypercube(file: SweepFile, dimensions: int) -> np.ndarray:
+    """One flight in each of `flights` equal slices of every key [McKay, Beckman, Conover 1979]."""
+    generator = _design_generator(file.seed)
+    columns = [
+        (generator.permutation(file.flights) + generator.random(file.flights)) / file.flights
+        for _ in range(dimensions)
+    ]
+    return np.column_stack(columns) if columns else np.empty((file.flights, 0))
+
+
+def _sobol(seed: int, dimensions: int, indices: Sequence[int]) -> np.ndarray:
+    """Scrambled Sobol points [Owen 1995] at these indices."""
+    from scipy.stats import qmc
+
+    engine = qmc.Sobol(dimensions, scramble=True, seed=_design_generator(seed))
+    with warnings.catch_warnings():
+        warnings.simplefilter(
+            "ignore", UserWarning
+        )  # that a sample is no power of 2: the sweep as a whole may be
+        return np.concatenate([_stretch(engine, first, last) for first, last in _stretches(indices)])
+
+
+def _stretch(engine: Any, first: int, last: int) -> np.ndarray:
+    engine.reset()
+    if first:
+        engine.fast_forward(first)
+    return engine.random(last - first)
+
+
+def _stretches(indices: Sequence[int]) -> Iterator[tuple[int, int]]:
+    """Unbroken stretches [first, last) of increasing indices."""
+    first = previous = indices[0]
+    for index in indices[1:]:
+        if index != previous + 1:
+            yield first, previous + 1
+            first = index
+        previous = index
+    yield first, previous + 1

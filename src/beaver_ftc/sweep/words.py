@@ -1,0 +1,4 @@
+def summary_text(d, colour=False):
+    import json
+
+    return json.dumps(d, indent=1)

@@ -1,5 +1,6 @@
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -284,6 +285,36 @@ def test_run_imports_neither_plots_nor_pandas(short):
 
 def test_version_and_help(tmp_path):
     assert _beaver("--version", cwd=tmp_path).stdout.startswith("beaver-ftc ")
-    shown = _beaver("--help", cwd=tmp_path).stdout
-    assert all(f"\n  {name} " in shown for name in ("run", "validate", "schema", "trim", "list"))
-    assert "..." not in shown.partition("Commands:")[2]
+    said = dict(re.findall(r"^  (\w+)  +(.+)$", _beaver("--help", cwd=tmp_path).stdout, re.MULTILINE))
+    assert {"run", "validate", "schema", "trim", "list"} <= set(said)
+    assert said["run"] == "Fly scenarios and say the verdict."
+
+
+@pytest.mark.parametrize("format", ["text", "json"])
+def test_what_nobody_foresaw_is_one_line_and_status_3(short, format):
+    script = (
+        "import sys, beaver_ftc.loop as loop\n"
+        f"sys.argv = ['beaver-ftc', 'run', 'short.yaml', '--no-report', '--format', '{format}']\n"
+        "def fly(*_): raise ZeroDivisionError('two\\nlines')\n"
+        "loop.fly = fly\n"
+        "from beaver_ftc.cli.main import main\n"
+        "main()"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script], cwd=short, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 3
+    assert done.stderr.startswith("unexpected ZeroDivisionError: two lines")
+    assert done.stderr.count("\n") == 1
+    assert _names(short) == ["short.yaml"]
+    if format == "json":
+        assert json.loads(done.stdout)["runs"][0]["error"] == done.stderr.strip()
+
+
+def test_runs_of_one_name_at_once_leave_one_whole_result(short):
+    runs = [
+        subprocess.Popen([BEAVER, "run", "short.yaml", "--no-report"], cwd=short, stdout=-3) for _ in range(3)
+    ]
+    assert [run.wait(timeout=120) for run in runs] == [0, 0, 0]
+    assert _names(short / "runs") == ["short"]
+    assert len(pd.read_parquet(short / "runs/short/log.parquet")) == 600

@@ -74,3 +74,8 @@ def test_flight_without_alarm_says_that_the_isolation_never_ran(tmp_path):
 def test_views_of_a_log_without_estimators_leave_those_out(flight):
     columns = [name for name in flight.columns if not name.startswith("fie_")]
     assert {view.name for view in views(columns)} == EVERY - {"isolation"}
+
+
+def test_fault_that_never_came_is_not_marked():
+    lost = Flight(detection_time_s=None, isolation_time_s=None, isolated=None, departure=(5.0, "beta"))
+    assert [mark.name for mark in marks(metrics(lost))] == ["departure"]

@@ -142,3 +142,9 @@ def test_a_loss_can_be_expected():
     scenario = Scenario(expect=Expect(no_departure=False))
     assert _of(scenario)["passed"] is False
     assert _of(scenario, departure=(15.0, "alpha_rad"))["passed"] is True
+
+
+def test_flight_that_begins_with_the_fault_has_no_before():
+    tracking = _of(Scenario(faults=(Fault(at_s=0.0),)))["tracking"]
+    assert tracking["pre_fault_rms_deg_s"] is None
+    assert tracking["post_fault_rms_deg_s"] is not None

@@ -4,17 +4,16 @@ A command is one module of this package with a function `command`, thin, importi
 and one name here. `--help` must answer at once.
 """
 
-import os
 import signal
 import sys
-import traceback
 from importlib import import_module
 from typing import Annotated, NoReturn
 
 import typer
 
 from beaver_ftc import __version__
-from beaver_ftc.errors import BeaverFtcError, SimulationFailed
+from beaver_ftc.cli.output import report, unexpected
+from beaver_ftc.errors import BeaverFtcError
 
 COMMANDS = (
     "run",
@@ -22,6 +21,7 @@ COMMANDS = (
     "schema",
     "trim",
     "list",
+    "sweep",
     "bench",
     "verify",
 )
@@ -72,14 +72,5 @@ def main() -> NoReturn:
     except BeaverFtcError as error:
         sys.exit(report(error))
     except Exception as error:
-        sys.exit(report(SimulationFailed(f"unexpected {type(error).__name__}: {error}"), error))
+        sys.exit(report(unexpected(error)))
     sys.exit(0)
-
-
-def report(error: BeaverFtcError, cause: BaseException | None = None) -> int:
-    """Say what went wrong on standard error; return the exit status."""
-    if os.environ.get("BEAVER_FTC_DEBUG"):
-        traceback.print_exception(cause or error)
-    else:
-        print(error, file=sys.stderr)
-    return error.exit_code

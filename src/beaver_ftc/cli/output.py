@@ -2,12 +2,13 @@
 
 import os
 import sys
+import traceback
 from enum import StrEnum
 from typing import Annotated, Any
 
 import typer
 
-from beaver_ftc.errors import SimulationFailed
+from beaver_ftc.errors import BeaverFtcError, SimulationFailed
 
 
 class Format(StrEnum):
@@ -42,6 +43,23 @@ def emit_json(document: Any) -> None:
 def complain(text: str) -> None:
     """Write a line to standard error."""
     print(text, file=sys.stderr)
+
+
+def report(error: BeaverFtcError) -> int:
+    """Say what went wrong, with its traceback if BEAVER_FTC_DEBUG is set; returns the exit status."""
+    if os.environ.get("BEAVER_FTC_DEBUG"):
+        traceback.print_exception(error)
+    else:
+        complain(str(error))
+    return error.exit_code
+
+
+def unexpected(error: Exception) -> SimulationFailed:
+    """What nobody foresaw, as a line for the user; the error itself is the cause of the new one."""
+    said = " ".join(str(error).split())
+    failed = SimulationFailed(f"unexpected {type(error).__name__}: {said} (BEAVER_FTC_DEBUG=1 shows where)")
+    failed.__cause__ = error
+    return failed
 
 
 def _discard_stdout() -> None:

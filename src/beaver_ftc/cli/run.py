@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from beaver_ftc.cli.inputs import load_all
-from beaver_ftc.cli.output import Format, FormatOption, complain, emit, emit_json
-from beaver_ftc.errors import BadInput, BeaverFtcError, SimulationFailed
+from beaver_ftc.cli.output import Format, FormatOption, complain, emit, emit_json, report, unexpected
+from beaver_ftc.errors import BadInput, BeaverFtcError
 
 if TYPE_CHECKING:
     from beaver_ftc.scenario.schema import Scenario
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 def command(
     scenarios: Annotated[
-        list[str], typer.Argument(metavar="SCENARIO...", help="A file, or the name of a built-in scenario.")
+        list[str], typer.Argument(metavar="SCENARIO", help="A file, or the name of a built-in scenario.")
     ],
     out: Annotated[Path, typer.Option(help="Folder for the results, one folder a scenario in it.")] = Path(
         "runs"
@@ -33,19 +33,19 @@ def command(
         if format is Format.json:
             emit_json({"passed": False, "runs": [], "errors": str(error).splitlines()})
         raise
-    raise typer.Exit(_run_all(loaded, out, format, report=not no_report))
+    raise typer.Exit(_run_all(loaded, out, format, with_report=not no_report))
 
 
-def _run_all(scenarios: list["Scenario"], out: Path, format: Format, report: bool) -> int:
+def _run_all(scenarios: list["Scenario"], out: Path, format: Format, with_report: bool) -> int:
     """Fly one after the other; one that fails does not stop the rest. Returns the worst exit status."""
     runs, status = [], 0
     for scenario in scenarios:
         try:
-            document = _run_one(scenario, out, report)
-        except BeaverFtcError as error:
-            complain(str(error))
-            runs.append({"scenario": scenario.name, "error": str(error)})
-            status = max(status, error.exit_code)
+            document = _run_one(scenario, out, with_report)
+        except Exception as error:
+            failure = error if isinstance(error, BeaverFtcError) else unexpected(error)
+            status = max(status, report(failure))
+            runs.append({"scenario": scenario.name, "error": str(failure)})
             continue
         runs.append(document)
         status = max(status, 0 if document["passed"] else 1)
@@ -56,17 +56,14 @@ def _run_all(scenarios: list["Scenario"], out: Path, format: Format, report: boo
     return status
 
 
-def _run_one(scenario: "Scenario", out: Path, report: bool) -> dict[str, Any]:
+def _run_one(scenario: "Scenario", out: Path, with_report: bool) -> dict[str, Any]:
     from beaver_ftc.cli.progress import progress_bar
     from beaver_ftc.results.run import run
 
     for warning in scenario.warnings():
         complain(f"{scenario.name}: warning: {warning}")
     with progress_bar(scenario.name) as progress:
-        try:
-            document = run(scenario, out, report, progress)
-        except MemoryError as error:
-            raise SimulationFailed(f"{scenario.name}: out of memory") from error
+        document = run(scenario, out, with_report, progress)
     return document | {"folder": str(out / scenario.name)}
 
 

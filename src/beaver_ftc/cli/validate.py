@@ -11,7 +11,7 @@ from beaver_ftc.errors import BadInput
 
 def command(
     files: Annotated[
-        list[str], typer.Argument(metavar="FILE...", help="Scenario files, or names of built-in ones.")
+        list[str], typer.Argument(metavar="FILE", help="Scenario files, or names of built-in ones.")
     ],
     format: FormatOption = Format.text,
 ) -> None:

@@ -3,6 +3,7 @@
 Colours are Okabe and Ito's, told apart by the colour-blind; dashes, widths and letters tell the rest in grey.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -58,7 +59,7 @@ class Mark:
 
 
 def marks(metrics: Document) -> list[Mark]:
-    """The instants of fault, detection, isolation and departure, as far as they exist."""
+    """The instants of fault, detection, isolation and departure, as far as they came before the end."""
     fault, departure = metrics["fault"], metrics["departure"]
     instants = (
         ("fault", fault and fault["at_s"], VERMILION, (), "v", "F"),
@@ -66,7 +67,8 @@ def marks(metrics: Document) -> list[Mark]:
         ("isolation", metrics["isolation"]["time_s"], PLUM, (6, 2, 1, 2), "s", "I"),
         ("departure", departure and departure["time_s"], BLACK, (1, 2), "X", "X"),
     )
-    return [Mark(name, time, *look) for name, time, *look in instants if time is not None]
+    end_s = departure["time_s"] if departure else math.inf
+    return [Mark(name, time, *look) for name, time, *look in instants if time is not None and time <= end_s]
 
 
 def closeup_window(instants: Sequence[Mark]) -> tuple[float, float] | None:

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from beaver_ftc.scenario.schema import Scenario
 
 Document = dict[str, Any]
+Rates = tuple[float, float, float]
 
 AXES = ("p", "q", "r")
 UNANTICIPATED = "unanticipated"
@@ -37,7 +38,7 @@ def metrics(flight: "Flight") -> Document:
         "isolation": _isolation(flight, fault),
         "false_alarm": _false_alarm(flight.detection_time_s, fault),
         "tracking": {
-            "pre_fault_rms_deg_s": _per_axis_deg_s(flight.pre_fault_rms_rad_s),
+            "pre_fault_rms_deg_s": _per_axis_deg_s(_before(fault, flight.pre_fault_rms_rad_s)),
             "post_fault_rms_deg_s": _per_axis_deg_s(flight.post_fault_rms_rad_s),
         },
         "supervisor": [{"time_s": _number(time), "mode": mode} for time, mode in flight.supervisor],
@@ -120,6 +121,11 @@ def _delay(time_s: float | None, fault: Document | None) -> float | None:
     return _number(time_s - fault["at_s"])
 
 
+def _before(fault: Document | None, rms_rad_s: Rates) -> Rates | None:
+    """What was measured before the fault; nothing was where the flight begins with it."""
+    return None if fault and fault["at_s"] <= 0 else rms_rad_s
+
+
 def _departure(flight: "Flight") -> Document | None:
     if flight.departure is None:
         return None
@@ -127,7 +133,7 @@ def _departure(flight: "Flight") -> Document | None:
     return {"time_s": _number(time_s), "signal": signal}
 
 
-def _per_axis_deg_s(rates_rad_s: tuple[float, float, float] | None) -> Document | None:
+def _per_axis_deg_s(rates_rad_s: Rates | None) -> Document | None:
     if rates_rad_s is None:
         return None
     return {axis: _number(math.degrees(rate)) for axis, rate in zip(AXES, rates_rad_s, strict=True)}

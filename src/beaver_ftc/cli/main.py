@@ -22,6 +22,7 @@ COMMANDS = (
     "trim",
     "list",
     "sweep",
+    "compare",
     "bench",
     "verify",
 )

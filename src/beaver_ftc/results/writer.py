@@ -24,7 +24,7 @@ except ImportError:  # not a POSIX system: nothing can be locked, so nothing is 
 FILES_OF_A_RESULT = frozenset({
     "scenario.yaml", "log.parquet", "metrics.json", "report.html", "figures",
     "log.csv", "flight.acmi", "results.parquet", "summary.json", "mismatch.json", "mismatch.csv",
-    "mismatch.parquet",
+    "mismatch.parquet", "comparison.json", "comparison.png", "comparison.html", "runs.json", "runs.png",
 })  # fmt: skip
 _AT_FDCWD = -100
 _RENAME_EXCHANGE = 2

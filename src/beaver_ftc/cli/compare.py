@@ -1,0 +1,145 @@
+"""`beaver-ftc compare`: finished runs side by side, or schemes and laws on the same flights."""
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from beaver_ftc.cli.output import Format, FormatOption, emit, emit_json
+from beaver_ftc.errors import BadInput
+
+_OURS = "adaptive-estimators", "fault-tolerant"
+
+
+def command(
+    runs: Annotated[
+        list[Path] | None, typer.Argument(metavar="[RUN...]", help="Result folders of `run`.")
+    ] = None,
+    sweep: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Compare on the flights of a sweep.")
+    ] = None,
+    benchmark: Annotated[
+        bool, typer.Option("--benchmark", help="Compare on the standard sets; update the leaderboard.")
+    ] = False,
+    tune: Annotated[bool, typer.Option("--tune", help="Tune the rivals on the calibration set.")] = False,
+    schemes: Annotated[
+        str | None, typer.Option(help="Comma-separated schemes; all registered ones if left out.")
+    ] = None,
+    laws: Annotated[
+        str | None, typer.Option(help="Comma-separated laws; all registered ones if left out.")
+    ] = None,
+    only: Annotated[str | None, typer.Option("--set", help="With --benchmark: one set.")] = None,
+    flights: Annotated[
+        int | None, typer.Option(min=1, help="At most this many flights of each sweep.")
+    ] = None,
+    workers: Annotated[int, typer.Option(min=1, help="Processes.")] = 2,
+    target: Annotated[float, typer.Option(min=0, help="With --tune: false alarms per hour allowed.")] = 1.0,
+    out: Annotated[Path, typer.Option(help="Folder for the comparison.")] = Path("comparisons"),
+    leaderboard: Annotated[
+        Path | None, typer.Option(help="With --benchmark: the Markdown file to update.")
+    ] = None,
+    format: FormatOption = Format.text,
+) -> None:
+    """Compare finished runs; or schemes and laws on the same flights (--sweep, --benchmark).
+
+    Writes comparison.json, comparison.png and comparison.html (for runs: runs.json and runs.png) below --out.
+    """
+    asked = [bool(runs), sweep is not None, benchmark, tune]
+    if sum(asked) != 1:
+        raise BadInput("compare: allowed: exactly one of RUN..., --sweep FILE, --benchmark, --tune")
+    if runs:
+        _compare_runs(runs, out, format)
+    elif tune:
+        _tune(target, workers, flights, format)
+    else:
+        cases = _cases(sweep, only, flights)
+        name = f"benchmark-{only}" if only else "benchmark" if benchmark else cases[0].set
+        document = _fly(cases, schemes, laws, workers)
+        _keep(document, out, name, format)
+        _update(document, leaderboard)
+
+
+def _compare_runs(folders: list[Path], out: Path, format: Format) -> None:
+    from beaver_ftc.compare.runs import as_text, labels, read_runs, write_figure
+    from beaver_ftc.results.metrics import as_json
+    from beaver_ftc.results.writer import result_folder
+
+    runs = read_runs(folders)
+    with result_folder(out, "runs") as folder:
+        write_figure(runs, folder / "runs.png")
+        (folder / "runs.json").write_text(as_json(runs), encoding="utf-8")
+    if format is Format.json:
+        emit_json({"runs": dict(zip(labels(runs), runs, strict=True))})
+    else:
+        emit(f"{as_text(runs)}\n\nfigure: {out / 'runs' / 'runs.png'}")
+
+
+def _cases(sweep: Path | None, only: str | None, most: int | None) -> list[Any]:
+    from beaver_ftc.compare.flights import of_set, of_sweep, set_names
+
+    if sweep is not None:
+        return of_sweep(sweep, most=most)
+    return [case for name in ([only] if only else set_names()) for case in of_set(name, most)]
+
+
+def _chosen(group: str, given: str | None, ours: str) -> list[str]:
+    """The names asked for, ours among them. Raises BadInput with a line a name that is not registered."""
+    from beaver_ftc.plugins import refusal, registered
+
+    if given is None:
+        return list(registered(group))
+    names = [name.strip() for name in given.split(",") if name.strip()]
+    what = "schemes" if ours == _OURS[0] else "laws"
+    wrong = [f"--{what}: {says}" for name in names if (says := refusal(group, name))]
+    if wrong:
+        raise BadInput("\n".join(wrong))
+    return list(dict.fromkeys([ours, *names]))
+
+
+def _fly(cases: list[Any], schemes: str | None, laws: str | None, workers: int) -> dict[str, Any]:
+    from beaver_ftc.cli.progress import progress_bar
+    from beaver_ftc.compare.crew import fly_cases
+    from beaver_ftc.compare.document import document_of
+    from beaver_ftc.compare.trial import entries_of
+    from beaver_ftc.plugins import DETECTORS, LAWS
+
+    entries = entries_of(_chosen(DETECTORS, schemes, _OURS[0]), _chosen(LAWS, laws, _OURS[1]))
+    with progress_bar(f"{len(cases)} flights, {len(entries)} times each") as progress:
+        return document_of(fly_cases(cases, entries, workers, progress), entries)
+
+
+def _keep(document: dict[str, Any], out: Path, name: str, format: Format) -> None:
+    from beaver_ftc.compare.figure import write_figure
+    from beaver_ftc.compare.page import write_page
+    from beaver_ftc.compare.table import as_text
+    from beaver_ftc.results.metrics import as_json
+    from beaver_ftc.results.writer import result_folder
+
+    with result_folder(out, name) as folder:
+        (folder / "comparison.json").write_text(as_json(document), encoding="utf-8")
+        write_figure(document, folder / "comparison.png")
+        write_page(document, folder / "comparison.png", folder / "comparison.html", f"Comparison: {name}")
+    if format is Format.json:
+        emit_json(document | {"folder": str(out / name)})
+    else:
+        emit(f"{as_text(document)}page: {out / name / 'comparison.html'}")
+
+
+def _update(document: dict[str, Any], leaderboard: Path | None) -> None:
+    from beaver_ftc.compare.benchmark import write_leaderboard
+
+    if leaderboard is not None:
+        write_leaderboard(document, leaderboard)
+
+
+def _tune(target: float, workers: int, most: int | None, format: Format) -> None:
+    from beaver_ftc.cli.progress import progress_bar
+    from beaver_ftc.compare.tune import tune, write_tuned
+
+    with progress_bar("calibration flights") as progress:
+        document = tune(target, workers, most, progress)
+    write_tuned(document)
+    if format is Format.json:
+        emit_json(document)
+    else:
+        emit("\n".join(f"{name}: {options}" for name, options in document["options"].items()))

@@ -1,0 +1,133 @@
+"""One healthy-handed flight, and what any detector would have made of it.
+
+The nominal law does not listen to a detector, so one flight under it serves them all: it is recorded once
+and played back to each. What is kept of a detector's statistic is exact and short: its largest value before
+the fault, and each value after it that was larger than all before.
+"""
+
+from bisect import bisect_right
+from dataclasses import dataclass
+from math import inf, isfinite, isnan
+from time import perf_counter
+
+import numpy as np
+
+from beaver_ftc.design.context import Context
+from beaver_ftc.diagnosis.base import Detector, Measured, Verdict
+from beaver_ftc.loop import Loop
+from beaver_ftc.plugins import DETECTORS, plugin_class
+from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.stages import built_in_statistic
+
+
+class Recorder:
+    """A detector that keeps what it is shown and never raises an alarm."""
+
+    def __init__(self) -> None:
+        self.seen: list[tuple[Measured, np.ndarray]] = []
+
+    def reset(self, context: Context) -> None:
+        """Keep the context as well: whoever is played the flight needs it."""
+        self.context = context
+
+    def step(self, measured: Measured, command: np.ndarray) -> Verdict:
+        """Keep, say nothing."""
+        self.seen.append((measured, command))
+        return Verdict()
+
+
+@dataclass(frozen=True)
+class Trace:
+    """A detector's statistic over one flight; alarm where it exceeds 1.
+
+    before: largest value before the fault (or in all of a healthy flight). records: (delay s, value), each
+    larger than all before it since the fault. healthy_s: time without a fault. us: time a frame took,
+    microseconds.
+    """
+
+    before: float
+    records: tuple[tuple[float, float], ...]
+    faulted: bool
+    healthy_s: float
+    us: float = 0.0
+
+    def false_alarm(self, level: float = 1.0) -> bool:
+        """Whether it raises an alarm without a fault, at this level of the statistic."""
+        return self.before > level
+
+    def delay_s(self, level: float = 1.0) -> float:
+        """From the fault to the alarm at this level; infinite where there is none, or there was one
+        before."""
+        if self.before > level:
+            return inf
+        values = [value for _, value in self.records]
+        index = bisect_right(values, level)
+        return self.records[index][0] if index < len(self.records) else inf
+
+
+@dataclass
+class Recording:
+    """A flight under the nominal law as a detector sees it, with the built-in statistic beside it."""
+
+    context: Context
+    seen: list[tuple[Measured, np.ndarray]]
+    built_in: np.ndarray
+    fault_at_s: float
+
+
+class _Watch:
+    """Stands in for the flight's frame: flies it, then notes the built-in statistic."""
+
+    def __init__(self, loop: Loop) -> None:
+        assert loop.plugged is not None
+        self._frame, self.values = loop.plugged, list[float]()
+
+    def __call__(self, frames: np.ndarray, references: np.ndarray, log: np.ndarray) -> int:
+        status = self._frame(frames, references, log)
+        self.values.append(built_in_statistic(frames))
+        return status
+
+
+def record(scenario: Scenario) -> Recording:
+    """Fly a scenario under the nominal law and keep what a detector would see."""
+    nominal = scenario.control.model_copy(update={"law": "nominal"})
+    recorder = Recorder()
+    loop = Loop(scenario.model_copy(update={"control": nominal}), recorder)
+    watch = _Watch(loop)
+    loop.fly_frame = watch
+    for _ in loop.chunks():
+        pass
+    fault_at_s = min((fault.at_s for fault in scenario.faults), default=inf)
+    return Recording(recorder.context, recorder.seen, np.array(watch.values), fault_at_s)
+
+
+def replay(recording: Recording, scheme: str, options: dict[str, float] | None = None) -> Trace:
+    """The trace of a scheme, built in or plugged in, over a recorded flight."""
+    if scheme == "adaptive-estimators":
+        return trace(recording, recording.built_in)
+    detector: Detector = plugin_class(DETECTORS, scheme)()
+    detector.reset(Context(**{**vars(recording.context), "options": options or {}}))
+    began = perf_counter()
+    verdicts = [detector.step(measured, command) for measured, command in recording.seen]
+    us = 1e6 * (perf_counter() - began) / max(len(verdicts), 1)
+    return trace(recording, np.array([_statistic(verdict) for verdict in verdicts]), us)
+
+
+def _statistic(verdict: Verdict) -> float:
+    """A detector without a statistic has only its alarm: well above the level, or well below."""
+    if isnan(verdict.statistic):
+        return 1e6 if verdict.detected else 0.0
+    return verdict.statistic
+
+
+def trace(recording: Recording, statistic: np.ndarray, us: float = 0.0) -> Trace:
+    """Boil a statistic (frames,) down to what decides about alarms at any level."""
+    t = np.array([measured.t_s for measured, _ in recording.seen])
+    healthy = t < recording.fault_at_s - 1e-9
+    before = float(statistic[healthy].max(initial=0.0))
+    after, delay = statistic[~healthy], t[~healthy] - recording.fault_at_s
+    largest = np.maximum.accumulate(after) if after.size else after
+    news = np.flatnonzero(np.diff(largest, prepend=-inf) > 0.0)
+    records = tuple((float(delay[i]), float(after[i])) for i in news)
+    faulted = isfinite(recording.fault_at_s) and bool(after.size)
+    return Trace(before, records, faulted, float(healthy.sum()) * recording.context.dt_s, us)

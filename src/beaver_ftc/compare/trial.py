@@ -1,0 +1,128 @@
+"""Fly one case with every scheme and every law that is compared, and say what came of each."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from math import hypot, inf
+from time import perf_counter
+
+from beaver_ftc.compare.flights import Case
+from beaver_ftc.compare.replay import Trace, record, replay
+from beaver_ftc.errors import BeaverFtcError
+from beaver_ftc.flight import Flight
+from beaver_ftc.loop import Loop
+from beaver_ftc.results.metrics import metrics
+from beaver_ftc.scenario.schema import Scenario
+
+SCHEME, LAW, ORACLE = "adaptive-estimators", "fault-tolerant", "oracle"
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A scheme and a law that fly together."""
+
+    scheme: str
+    law: str
+
+
+@dataclass(frozen=True)
+class Result:
+    """What an entry made of a case. Times in s, errors in deg/s; infinite where there is none.
+
+    healthy_s: time under observation without a fault, until the first alarm. rms_deg_s: over all axes,
+    after the fault (all the flight without one), and infinite after a departure.
+    """
+
+    entry: Entry
+    false_alarm: bool
+    healthy_s: float
+    faulted: bool
+    delay_s: float = inf
+    isolated: str | None = None
+    correct: bool = False
+    isolation_delay_s: float = inf
+    rms_deg_s: float = inf
+    departed: bool = False
+    us: float = 0.0
+    error: str | None = None
+
+
+@dataclass
+class Trial:
+    """All results of one case; traces by scheme."""
+
+    case: Case
+    results: list[Result] = field(default_factory=list)
+    traces: dict[str, Trace] = field(default_factory=dict)
+
+
+def entries_of(schemes: Sequence[str], laws: Sequence[str]) -> list[Entry]:
+    """Every scheme with our law, every law with our scheme, and the oracle as the yardstick."""
+    pairs = [Entry(scheme, LAW) for scheme in schemes] + [Entry(SCHEME, law) for law in laws]
+    return list(dict.fromkeys([*pairs, Entry(SCHEME, LAW), Entry(SCHEME, ORACLE)]))
+
+
+def with_entry(scenario: Scenario, entry: Entry) -> Scenario:
+    """The scenario with this scheme and this law."""
+    return scenario.model_copy(
+        update={
+            "fdi": scenario.fdi.model_copy(update={"scheme": entry.scheme}),
+            "control": scenario.control.model_copy(update={"law": entry.law}),
+        }
+    )
+
+
+def fly_case(case: Case, entries: Sequence[Entry]) -> Trial:
+    """Fly a case with every entry; record it once under the nominal law for the trade-off of each scheme."""
+    trial = Trial(case, [_fly(case.scenario, entry) for entry in entries])
+    recording = record(case.scenario)
+    for scheme in dict.fromkeys(entry.scheme for entry in entries):
+        if scheme != "none":
+            trial.traces[scheme] = replay(recording, scheme, case.scenario.fdi.options)
+    return trial
+
+
+def _fly(scenario: Scenario, entry: Entry) -> Result:
+    try:
+        loop = Loop(with_entry(scenario, entry))
+        began = perf_counter()
+        for _ in loop.chunks():
+            pass
+        us = 1e6 * (perf_counter() - began) / loop.n_frames
+        return result_of(loop.land(), entry, us)
+    except BeaverFtcError as error:
+        return Result(entry, False, 0.0, bool(scenario.faults), error=str(error))
+
+
+def result_of(flight: Flight, entry: Entry, us: float) -> Result:
+    """Boil a flight down."""
+    document = metrics(flight)
+    fault, detection, isolation = document["fault"], document["detection"], document["isolation"]
+    end_s = flight.frames / flight.scenario.rate_hz
+    healthy_s = min(end_s, fault["at_s"]) if fault else end_s
+    if document["false_alarm"]:
+        healthy_s = detection["time_s"]
+    correct = bool(isolation["correct"]) and not document["false_alarm"]
+    return Result(
+        entry=entry,
+        false_alarm=document["false_alarm"],
+        healthy_s=healthy_s,
+        faulted=fault is not None and end_s > fault["at_s"],
+        delay_s=_or_never(detection["delay_s"]),
+        isolated=isolation["fault"],
+        correct=correct,
+        isolation_delay_s=_or_never(isolation["delay_s"]) if correct else inf,
+        rms_deg_s=_rms(document),
+        departed=document["departure"] is not None,
+        us=us,
+    )
+
+
+def _or_never(value: float | None) -> float:
+    return inf if value is None else value
+
+
+def _rms(document: dict) -> float:
+    if document["departure"]:
+        return inf
+    tracking = document["tracking"]
+    return hypot(*(tracking["post_fault_rms_deg_s"] or tracking["pre_fault_rms_deg_s"]).values())

@@ -22,6 +22,9 @@ def command(
     ),
     format: FormatOption = Format.text,
     no_report: Annotated[bool, typer.Option("--no-report", help="Skip report.html and the figures.")] = False,
+    junit: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Also write the verdict as JUnit XML, for CI.")
+    ] = None,
 ) -> None:
     """Fly scenarios and say the verdict.
 
@@ -33,10 +36,12 @@ def command(
         if format is Format.json:
             emit_json({"passed": False, "runs": [], "errors": str(error).splitlines()})
         raise
-    raise typer.Exit(_run_all(loaded, out, format, with_report=not no_report))
+    raise typer.Exit(_run_all(loaded, out, format, not no_report, junit))
 
 
-def _run_all(scenarios: list["Scenario"], out: Path, format: Format, with_report: bool) -> int:
+def _run_all(
+    scenarios: list["Scenario"], out: Path, format: Format, with_report: bool, junit: Path | None
+) -> int:
     """Fly one after the other; one that fails does not stop the rest. Returns the worst exit status."""
     runs, status = [], 0
     for scenario in scenarios:
@@ -51,9 +56,17 @@ def _run_all(scenarios: list["Scenario"], out: Path, format: Format, with_report
         status = max(status, 0 if document["passed"] else 1)
         if format is Format.text:
             _say(document)
+    if junit is not None:
+        _write_junit(runs, junit)
     if format is Format.json:
         emit_json({"passed": status == 0, "runs": runs})
     return status
+
+
+def _write_junit(runs: list[dict[str, Any]], junit: Path) -> None:
+    from beaver_ftc.results.junit import write_junit
+
+    write_junit(runs, junit)
 
 
 def _run_one(scenario: "Scenario", out: Path, with_report: bool) -> dict[str, Any]:

@@ -67,5 +67,7 @@ def _draw_ratios(axis: Any, part: Document) -> None:
     axis.axvline(1.0, color="#000000", linewidth=0.8)
     axis.set_yticks(range(len(rows)), [row["law"] for row in rows], fontsize=7)
     axis.set_xscale("log")
+    axis.xaxis.set_major_formatter("{x:g}")
+    axis.xaxis.set_minor_formatter("")
     axis.set_xlabel("tracking error over the oracle's: median to 90 %")
     axis.grid(alpha=0.3)

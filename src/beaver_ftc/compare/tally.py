@@ -117,10 +117,14 @@ def trade_off(traces: Sequence[Trace]) -> list[Point]:
 
 
 def point_at(traces: Sequence[Trace], level: float) -> Point:
-    """False alarms, detections and delay at a level of the statistic."""
+    """False alarms, detections and delay at a level of the statistic.
+
+    Detections and delays are of the flights in which the fault was still to be detected: no false alarm
+    before it.
+    """
     hours = sum(trace.healthy_s for trace in traces) / 3600.0
     alarms = sum(trace.false_alarm(level) for trace in traces)
-    delays = [trace.delay_s(level) for trace in traces if trace.faulted]
+    delays = [trace.delay_s(level) for trace in traces if trace.faulted and not trace.false_alarm(level)]
     rate = sum(delay < inf for delay in delays) / len(delays) if delays else 0.0
     return Point(level, alarms / hours if hours else 0.0, rate, quantile(delays, 0.5))
 

@@ -20,6 +20,11 @@ def evaluate(expect: Any, metrics: Document) -> list[Document]:
     ]
 
 
+def names(expect: Any) -> list[str]:
+    """The names of what a scenario expects, as in `evaluate`."""
+    return [name for name, _, _ in _each(expect)]
+
+
 def _each(expect: Any) -> Iterator[tuple[str, Rule, Any]]:
     if expect is None:
         return

@@ -86,12 +86,11 @@ def assemble(scenario: Scenario, trim: np.ndarray, travel: np.ndarray) -> np.nda
     frames = np.zeros(1, FRAME)
     frame = frames[0]
     dt = 1.0 / scenario.rate_hz
-    n = scenario.substeps
     frame["dt"] = dt
-    frame["first_share"], frame["end_share"] = 1.0 / n, (n - 1.0) / (2.0 * n)
+    frame["share"] = 1.0 / scenario.substeps
     frame["design"] = design_of(scenario.design_model)[0]
     frame["factor"] = [factor for _, _, factor in ch.TRUTH]
-    frame["u"] = frame["u_then"] = trim
+    frame["u"] = trim
     _assemble_diagnosis(frame["fdi"], scenario.fdi, dt)
     _assemble_sharpening(frame["fdi"], scenario.fdi, dt)
     _assemble_network(frame["fdi"]["network"], scenario.control)

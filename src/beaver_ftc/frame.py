@@ -19,7 +19,14 @@ from beaver_ftc.diagnosis import bank, detection, guarantee, isolation, network
 from beaver_ftc.diagnosis.state import DIAGNOSIS
 from beaver_ftc.diagnosis.thresholds import uncertainty_bound
 from beaver_ftc.plant.native import read_nodes, write_nodes
-from beaver_ftc.supervisor import MODE_ADAPTIVE, MODE_NOMINAL, MODE_REALLOCATED, MODE_UNANTICIPATED, mode_of, next_mode
+from beaver_ftc.supervisor import (
+    MODE_ADAPTIVE,
+    MODE_NOMINAL,
+    MODE_REALLOCATED,
+    MODE_UNANTICIPATED,
+    mode_of,
+    next_mode,
+)
 
 MAX_EVENTS = 64
 FLYING, DEPARTED, NOT_FINITE = 0, 1, 2
@@ -30,7 +37,7 @@ DEPARTURE_SIGNALS = ("p", "q", "r", "alpha", "beta")
 FRAME = np.dtype(
     [
         ("design", DESIGN), ("fdi", DIAGNOSIS), ("control", CONTROL),
-        ("k", "i8"), ("row", "i8"), ("dt", "f8"), ("t", "f8"), ("first_share", "f8"), ("end_share", "f8"),
+        ("k", "i8"), ("row", "i8"), ("dt", "f8"), ("t", "f8"), ("share", "f8"),
         # the truth's nodes
         ("native", "i8"), ("getter", "i8"), ("setter", "i8"),
         ("read_pointers", "i8", (ch.N_TRUTH,)), ("write_pointers", "i8", (4,)),
@@ -42,8 +49,9 @@ FRAME = np.dtype(
         ("x", "f8", (3,)), ("y", "f8", (5,)), ("u", "f8", (4,)),
         ("f", "f8", (3,)), ("G", "f8", (3, 4)), ("G_believed", "f8", (3, 4)),
         # the frame before, and means over the frame that elapsed since
-        ("x_then", "f8", (3,)), ("f_then", "f8", (3,)), ("G_then", "f8", (3, 4)), ("u_then", "f8", (4,)),
-        ("eta_bar_then", "f8", (3,)), ("phi_then", "f8", (3,)),
+        ("x_then", "f8", (3,)), ("f_sum", "f8", (3,)), ("G_sum", "f8", (3, 4)), ("Gu_sum", "f8", (3, 4)),
+        ("eta_bar_sum", "f8", (3,)), ("phi_sum", "f8", (3,)), ("phi_mean", "f8", (3,)),
+        ("Gu_first", "f8", (3, 4)), ("Gu_spread", "f8", (3, 4)),
         ("G_mean", "f8", (3, 4)), ("Gu_mean", "f8", (3, 4)), ("believed", "f8", (3,)),
         ("fhat", "f8", (3,)), ("target", "f8", (4,)),
         # what happened
@@ -118,34 +126,61 @@ def fault_effect(frame):
 
 
 @kernel
+def sum_up(frame):
+    """Add what the design model makes of this instant to the sums over the frame."""
+    for i in range(3):
+        frame.f_sum[i] += frame.f[i]
+        frame.eta_bar_sum[i] += frame.fdi.eta_bar_now[i]
+        frame.phi_sum[i] += frame.phi[i]
+        for s in range(4):
+            frame.G_sum[i, s] += frame.G[i, s]
+            frame.Gu_sum[i, s] += frame.G[i, s] * frame.u[s]
+
+
+@kernel
 def elapse(frame):
     """Means over the frame that has elapsed: G, the moment of each surface, f + G u, and the bound.
 
-    The truth is a left sum over n JSBSim frames, the first under the old command. For f and G linear in
-    time over the frame its mean weighs the old sample (n + 1)/2n and the new one (n - 1)/2n: for n = 1 the
-    old one alone, and exactly.
+    The truth is a left sum over n JSBSim frames, the first under the old command; so are these means.
     """
-    first, end = frame.first_share, frame.end_share
+    share = frame.share
     for i in range(3):
-        rate = (1.0 - end) * frame.f_then[i] + end * frame.f[i]
+        rate = share * frame.f_sum[i]
         for s in range(4):
-            then, now = frame.G_then[i, s], frame.G[i, s]
-            frame.G_mean[i, s] = (1.0 - end) * then + end * now
-            moved = (1.0 - first - end) * then + end * now
-            frame.Gu_mean[i, s] = first * then * frame.u_then[s] + moved * frame.u[s]
+            frame.G_mean[i, s] = share * frame.G_sum[i, s]
+            frame.Gu_mean[i, s] = share * frame.Gu_sum[i, s]
             rate += frame.Gu_mean[i, s]
         frame.believed[i] = rate
-        frame.fdi.eta_bar[i] = (1.0 - end) * frame.eta_bar_then[i] + end * frame.fdi.eta_bar[i]
-        frame.phi_then[i] = (1.0 - end) * frame.phi_then[i] + end * frame.phi[i]
+        frame.fdi.eta_bar[i] = share * frame.eta_bar_sum[i]
+        frame.phi_mean[i] = share * frame.phi_sum[i]
+    if share < 1.0:
+        spread(frame)
+
+
+@kernel
+def spread(frame):
+    """Fill Gu_spread (3, 4) rad/s2: by how much the mean over the frame can mislead about a fault that
+    changed in it.
+
+    A fault grows, strikes or goes from one frame to the next, so the first JSBSim frame and the others may
+    differ in it. With z0 and z the moments of a surface in the first and the others, the mean effect lies
+    no further outside the extremes for the mean moment than |z0 - z| / n.
+    """
+    share = frame.share
+    for i in range(3):
+        for s in range(4):
+            first = frame.Gu_first[i, s]
+            others = (frame.Gu_sum[i, s] - first) * share / (1.0 - share)
+            frame.Gu_spread[i, s] = share * abs(first - others)
 
 
 @kernel
 def predict(frame):
     """Bring the estimators from the frame before to this one."""
     fdi = frame.fdi
-    guarantee.track(fdi, frame.phi_then)
+    guarantee.track(fdi, frame.phi_mean)
     bank.innovate(fdi, frame.x, frame.x_then, frame.believed)
-    isolation.suppose_all(fdi, frame.G_mean, frame.Gu_mean)
+    isolation.suppose_all(fdi, frame.G_mean, frame.Gu_mean, frame.Gu_spread)
     if fdi.detected:
         isolation.predict_all(fdi, frame.x_then, frame.believed)
         for s in range(4):
@@ -157,9 +192,19 @@ def predict(frame):
 
 @kernel
 def remember(frame):
-    """Keep what the next frame's `elapse` needs of this one."""
-    frame.x_then[:], frame.f_then[:], frame.G_then[:], frame.u_then[:] = frame.x, frame.f, frame.G, frame.u
-    frame.eta_bar_then[:], frame.phi_then[:] = frame.fdi.eta_bar_now, frame.phi
+    """Begin the next frame's sums with this instant, the command in effect still the old one."""
+    frame.x_then[:] = frame.x
+    frame.f_sum[:], frame.eta_bar_sum[:], frame.phi_sum[:] = 0.0, 0.0, 0.0
+    frame.G_sum[:], frame.Gu_sum[:] = 0.0, 0.0
+    sum_up(frame)
+    frame.Gu_first[:] = frame.Gu_sum
+
+
+@kernel
+def bound_now(frame):
+    """The bound on the uncertainty at this instant."""
+    fdi = frame.fdi
+    uncertainty_bound(frame.x, frame.design, fdi.inertia, fdi.constant, fdi.earth_rate, fdi.eta_bar_now)
 
 
 @kernel
@@ -173,9 +218,8 @@ def diagnose(frame):
 @kernel
 def look_back(frame):
     """What the design model makes of the frame that has elapsed: its bound and its means."""
-    fdi = frame.fdi
-    uncertainty_bound(frame.x, frame.design, fdi.inertia, fdi.constant, fdi.earth_rate, fdi.eta_bar_now)
-    fdi.eta_bar[:] = fdi.eta_bar_now
+    bound_now(frame)
+    frame.fdi.eta_bar[:] = frame.fdi.eta_bar_now
     if frame.k > 0:
         elapse(frame)
 
@@ -391,6 +435,12 @@ def record(frame, reference, row):
 def begin(frame):
     """Measure, and work out what the design model makes of it. Returns the flight's status."""
     frame.t = frame.k * frame.dt
+    return sense(frame)
+
+
+@kernel
+def sense(frame):
+    """Measure, and work out what the design model makes of it. Returns the flight's status."""
     measure(frame)
     status = flight_status(frame.truth)
     if status != NOT_FINITE:
@@ -411,6 +461,18 @@ def finish(frame, reference, row):
         write_nodes(frame.setter, frame.write_pointers, frame.u)
     frame.k += 1
     frame.row += 1
+
+
+@kernel
+def look(frames):
+    """See the truth inside a frame of the loop, for the means over that frame, and leave it alone.
+
+    frames (1,) of dtype FRAME. A departure, or what is not finite, is left for `fly_frame` to find.
+    """
+    frame = frames[0]
+    if sense(frame) != NOT_FINITE:
+        bound_now(frame)
+        sum_up(frame)
 
 
 @kernel

@@ -14,7 +14,7 @@ from beaver_ftc.design.coefficients import SURFACES
 from beaver_ftc.design.variants import anchor
 from beaver_ftc.errors import SimulationFailed
 from beaver_ftc.flight import Flight, LogSink
-from beaver_ftc.frame import FLYING, NOT_FINITE, fly_frame
+from beaver_ftc.frame import FLYING, NOT_FINITE, fly_frame, look
 from beaver_ftc.outcome import flight_of
 from beaver_ftc.plant import native
 from beaver_ftc.plant.adapter import Plant
@@ -79,6 +79,7 @@ class Loop:
         self._log = np.empty((min(CHUNK_ROWS, self.n_frames), len(self.columns)))
         self._references = np.empty((len(self._log), 3))
         self.fly_frame = self.plugged or self.direct(fly_frame)
+        self.look = direct(look, self.frames)
         self._set_origin()
 
     def _set_origin(self) -> None:
@@ -156,10 +157,12 @@ class Loop:
     def _fly_frames(self, count: int, runs: int) -> int:
         frames, references, log = self.frames, self._references, self._log
         fly_frame, cockpit = self.fly_frame, self.cockpit
-        simulator_frames = (self.plant.run,) * runs
+        between, last = range(runs - 1), (self.plant.run,) * min(runs, 1)
         through_python = not cockpit.native
         for _ in range(count):
-            for run in simulator_frames:
+            for _ in between:
+                self._look_between()
+            for run in last:
                 run()
             if through_python:
                 cockpit.read()
@@ -169,6 +172,13 @@ class Loop:
             if status:
                 return self._landed(status)
         return FLYING
+
+    def _look_between(self) -> None:
+        """One JSBSim frame inside a frame of the loop, seen but not acted upon."""
+        self.plant.run()
+        if not self.cockpit.native:
+            self.cockpit.read()
+        self.look(self.frames)
 
     def _landed(self, status: int) -> int:
         if status == NOT_FINITE:

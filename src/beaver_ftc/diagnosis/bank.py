@@ -71,18 +71,19 @@ def note_closest_approach(fdi):
 def extremes(fie, i):
     """Least and greatest acceleration (rad/s2) of axis i: theta anywhere in its set, or no fault at all."""
     one, other = fie.base[i] + fie.low * fie.Z[i], fie.base[i] + fie.high * fie.Z[i]
-    return min(0.0, one, other), max(0.0, one, other)
+    return min(0.0, one, other) - fie.spread[i], max(0.0, one, other) + fie.spread[i]
 
 
 @kernel
 def aligned_extremes(fie):
     """The same along `fie.across` (3,), across the fault's own direction: there it can do little."""
-    base, slope = 0.0, 0.0
+    base, slope, spread = 0.0, 0.0, 0.0
     for i in range(3):
+        spread += abs(fie.across[i]) * fie.spread[i]
         base += fie.across[i] * fie.base[i]
         slope += fie.across[i] * fie.Z[i]
     one, other = base + fie.low * slope, base + fie.high * slope
-    return min(0.0, one, other), max(0.0, one, other)
+    return min(0.0, one, other) - spread, max(0.0, one, other) + spread
 
 
 @kernel

@@ -74,7 +74,7 @@ class FdiConfig(BaseModel):
 
     scheme: Annotated[str, AfterValidator(_known_scheme)] = Field(
         "adaptive-estimators",
-        description="a registered detector (see `beaver-ftc list`), module:Class of an installed package, or none",
+        description="a registered detector (`beaver-ftc list`), module:Class of an installed package, none",
     )
     options: dict[str, float] = Field({}, description="parameters of a registered detector, by name")
     thresholds: Literal["interval", "published"] = Field(

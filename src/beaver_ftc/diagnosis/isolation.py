@@ -19,22 +19,25 @@ from beaver_ftc.diagnosis.thresholds import bound_step, interval, published
 
 
 @kernel
-def suppose(fdi, fie, G, Gu):
+def suppose(fdi, fie, G, Gu, spread):
     """What the fault would have done in the elapsed frame, and to the bank since the flight began.
 
-    G (3, 4) rad/s2 per rad; Gu (3, 4) rad/s2, the contribution of each surface; means over the frame.
+    G (3, 4) rad/s2 per rad; Gu (3, 4) rad/s2, the contribution of each surface; means over the frame. spread
+    (3, 4) rad/s2: by how much the mean can mislead about a fault that changed in the frame.
     """
     hypothesis(fie.kind, fie.surface, G, Gu, fie.base, fie.Z)
+    for i in range(3):
+        fie.spread[i] = spread[i, fie.surface]
     if fdi.memory:
         bank.remember(fdi, fie)
 
 
 @kernel
-def suppose_all(fdi, G, Gu):
+def suppose_all(fdi, G, Gu, spread):
     """`suppose` for every estimator, where something will ask for it."""
     if fdi.memory or fdi.detected:
         for s in range(fdi.n_estimators):
-            suppose(fdi, fdi.estimator[s], G, Gu)
+            suppose(fdi, fdi.estimator[s], G, Gu, spread)
 
 
 @kernel
@@ -155,7 +158,7 @@ def predict(fdi, fie, x, believed):
         Z, a = fie.Z[i], fdi.fie_decay[i]
         fie.rise[i] = a * fie.rise[i] + dt * max(Z, 0.0)
         fie.fall[i] = a * fie.fall[i] + dt * min(Z, 0.0)
-        fie.bound[i] = bound_step(fie.bound[i], fdi.eta_bar[i], a, dt)
+        fie.bound[i] = bound_step(fie.bound[i], fdi.eta_bar[i] + fie.spread[i], a, dt)
 
 
 @kernel

@@ -18,7 +18,7 @@ ESTIMATOR = np.dtype(
         ("xhat", "f8", (3,)), ("residual", "f8", (3,)), ("lower", "f8", (3,)), ("upper", "f8", (3,)),
         ("omega", "f8", (3,)), ("rise", "f8", (3,)), ("fall", "f8", (3,)), ("bound", "f8", (3,)),
         ("theta", "f8", (3,)), ("covariance", "f8", (3,)),
-        ("base", "f8", (3,)), ("Z", "f8", (3,)),
+        ("base", "f8", (3,)), ("Z", "f8", (3,)), ("spread", "f8", (3,)),
         # what bank.py and membership.py keep
         ("across", "f8", (3,)), ("reach_low", "f8", (MAX_POLES, 4)), ("reach_high", "f8", (MAX_POLES, 4)),
         ("theta_low", "f8", (3,)), ("theta_high", "f8", (3,)),
@@ -37,12 +37,12 @@ DIAGNOSIS = np.dtype(
         ("isolated", "i8"), ("isolated_at_s", "f8"),
         ("n_estimators", "i8"), ("estimator", ESTIMATOR, (MAX_ESTIMATORS,)),
         ("network", NETWORK),
-        ("estimates", "i8"), ("effectiveness", "f8", (4,)),  # of every surface, from a plug-in that estimates it
+        ("estimates", "i8"), ("effectiveness", "f8", (4,)),  # of every surface, as a plug-in estimates it
         # the sharpened scheme's switches and its bank; filter 0 is the published one
         ("memory", "i8"), ("shared", "i8"), ("membership", "i8"), ("abrupt", "i8"),
         ("n_poles", "i8"), ("bank_decay", "f8", (MAX_POLES,)), ("innovation", "f8", (3,)),
         ("bank_residual", "f8", (MAX_POLES, 3)), ("bank_threshold", "f8", (MAX_POLES, 3)),
-        ("closest", "f8", (MAX_POLES,)),  # largest share of its bound that each filter reached in healthy flight
+        ("closest", "f8", (MAX_POLES,)),  # largest share of its bound each filter reached in healthy flight
         ("effect", "f8", (MAX_POLES, 3)), ("certain_after_s", "f8"),  # what guarantee.py keeps
     ],
     align=True,

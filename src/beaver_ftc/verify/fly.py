@@ -61,11 +61,12 @@ def judge(flight: Flight) -> Row:
     fault, frame_s = scenario.faults[0], 1.0 / scenario.rate_hz
     struck_s = ceil((fault.at_s - _LATE_S) * scenario.rate_hz) * frame_s
     delay_s = None if flight.detection_time_s is None else flight.detection_time_s - struck_s
+    earliest_s = frame_s if scenario.substeps == 1 else 0.0  # of one JSBSim frame a fault shows in the next
     guaranteed_s = flight.guaranteed_delay_s
     late = guaranteed_s is not None and (delay_s is None or delay_s > guaranteed_s + frame_s + _LATE_S)
     return {
         "delay_s": delay_s,
-        "false_alarm": delay_s is not None and delay_s <= _LATE_S,
+        "false_alarm": delay_s is not None and delay_s < earliest_s - _LATE_S,
         "guaranteed_s": guaranteed_s,
         "late": late,
         "isolation_s": flight.isolation_time_s - struck_s if flight.isolation_time_s is not None else None,

@@ -59,7 +59,7 @@ def _scheme(rows: Sequence[Row]) -> dict[str, Any]:
         "late_detections": sum(row["late"] for row in rows),
     }
     certain = [row for row in rows if row["guaranteed_s"] is not None]
-    ratios = [row["delay_s"] / row["guaranteed_s"] for row in certain if row["delay_s"] is not None]
+    ratios = [row["delay_s"] / row["guaranteed_s"] for row in certain if row["delay_s"]]
     return {
         **counts,
         **{f"{name}_probability_upper_95": binomial_upper(count, n) for name, count in counts.items()},

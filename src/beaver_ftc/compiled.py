@@ -19,6 +19,7 @@ from pathlib import Path
 import numba
 import numpy as np
 from numba.core.dispatcher import Dispatcher
+from numba.core.runtime import rtsys
 
 _PACKAGE = Path(__file__).parent
 _SOURCES = (
@@ -89,5 +90,22 @@ def direct(function, *arguments):
 def _entry_point(function, kinds):
     """The machine code for C-ordered arrays of these types and dimensions: 9 ms to find, so kept."""
     types = tuple(numba.typeof(np.empty((0,) * dimensions, dtype)) for dtype, dimensions in kinds)
+    stored = _stored(function, types)
+    if stored is not None:
+        return stored
     function.compile(types)
     return function.overloads[types].entry_point
+
+
+def _stored(function, types):
+    """The machine code an earlier process has kept, or None.
+
+    Numba itself would first make ready to compile, which takes 0.25 s and imports SciPy, and then find that
+    there is nothing to compile. What is used here is not a promise of Numba's: on any surprise, the long way.
+    """
+    try:
+        rtsys.initialize(function.targetctx)
+        found = function._cache._load_overload(types, function.targetctx)
+    except Exception:
+        return None
+    return found.entry_point if found is not None else None

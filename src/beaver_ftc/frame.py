@@ -33,6 +33,7 @@ FLYING, DEPARTED, NOT_FINITE = 0, 1, 2
 DEPARTURE_ANGLE_RAD = 0.6
 DEPARTURE_RATE_RAD_S = 6.0
 DEPARTURE_SIGNALS = ("p", "q", "r", "alpha", "beta")
+DOMINANT_AXIS = (0, 1, 2, 1)  # what a surface is there for: aileron p, elevator and flap q, rudder r
 
 FRAME = np.dtype(
     [
@@ -285,12 +286,6 @@ def supervise(frame):
 
 
 @kernel
-def dominant_axis(surface):
-    """The axis a surface is there for: aileron p, elevator and flap q, rudder r."""
-    return 0 if surface == 0 else (2 if surface == 2 else 1)
-
-
-@kernel
 def accommodate(frame):
     """What the law believes of the surfaces and of the unknown: effectiveness (4,) and fhat (3,) rad/s2."""
     control, fdi = frame.control, frame.fdi
@@ -302,7 +297,7 @@ def accommodate(frame):
         elif fdi.estimates and fdi.detected:
             frame.target[s] = fdi.effectiveness[s]
         elif s == surface:
-            frame.target[s] = 1.0 + fdi.estimator[fdi.isolated].theta[dominant_axis(s)]
+            frame.target[s] = 1.0 + fdi.estimator[fdi.isolated].theta[DOMINANT_AXIS[s]]
     adaptive.approach(control, frame.target)
     frame.fhat[:] = 0.0
     if control.law == ORACLE:

@@ -10,7 +10,7 @@ from beaver_ftc.design.model import AXES
 from beaver_ftc.diagnosis.base import Verdict
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, UNANTICIPATED
 from beaver_ftc.flight import Flight
-from beaver_ftc.frame import DEPARTURE_SIGNALS, dominant_axis
+from beaver_ftc.frame import DEPARTURE_SIGNALS, DOMINANT_AXIS
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.supervisor import MODES
 
@@ -50,7 +50,7 @@ def _isolation(fdi: np.void) -> dict:
         "isolated": SURFACES[surface],
         "isolation_type": _TYPES[PUBLISHED_CLASS[verdict][1]],
         "candidates": tuple(left),
-        "estimate": float(fie["theta"][dominant_axis(surface)]),
+        "estimate": float(fie["theta"][DOMINANT_AXIS[surface]]),
         "isolation_time_s": at_s,
     }
 

@@ -22,7 +22,7 @@ from beaver_ftc.scenario.schema import Scenario
 
 SCENARIO = "elevator-partial-loss"
 BEFORE_ALARM_S, AFTER_ALARM_S = 1.0, 14.0  # the fault strikes at 12 s
-FRAMES = 500  # a block: 3 ms, short against the machine's moods, long against the clock
+FRAMES = 1000  # a block: 6 ms, short against the machine's moods, long against the clock
 LONG_FLIGHT_S = 330.0  # two row groups of the log file
 
 Say = Callable[[str], None]

@@ -101,25 +101,18 @@ class NodeBank:
     def __init__(self, nodes: Sequence[jsbsim.FGPropertyNode], owner: object = None) -> None:
         self.nodes = tuple(nodes)
         self.owner = owner
-        self._native = available()
-        pointers = [_pointer(node) if self._native else 0 for node in self.nodes]
-        self.pointers = np.array(pointers, dtype=np.int64)
+        native = available()
+        self.pointers = np.array([_pointer(node) if native else 0 for node in self.nodes], dtype=np.int64)
 
     def read(self, out: np.ndarray) -> None:
-        """Read every node into out (n,), natively where available."""
-        if self._native:
-            read_nodes(getter_address(), self.pointers, out)
-        else:
-            for i, node in enumerate(self.nodes):
-                out[i] = node.get_double_value()
+        """Read every node into out (n,), through Python."""
+        for i, node in enumerate(self.nodes):
+            out[i] = node.get_double_value()
 
     def write(self, values: np.ndarray) -> None:
-        """Write values (n,) to the nodes, natively where available."""
-        if self._native:
-            write_nodes(setter_address(), self.pointers, values)
-        else:
-            for node, value in zip(self.nodes, values, strict=True):
-                node.set_double_value(float(value))
+        """Write values (n,) to the nodes, through Python."""
+        for node, value in zip(self.nodes, values, strict=True):
+            node.set_double_value(float(value))
 
 
 def available() -> bool:
@@ -160,15 +153,14 @@ def _pointers_are_nodes() -> bool:
 
 
 def _values_agree() -> bool:
-    """What is written by address reads back through Python to the bit, and the other way round.
-
-    Called through ctypes, not a kernel: a short run need not load two more kernels.
-    """
-    read = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_void_p)(getter_address())
-    write = ctypes.CFUNCTYPE(ctypes.c_bool, ctypes.c_void_p, ctypes.c_double)(setter_address())
-    nodes = _trial_nodes()
-    values = [node.get_double_value() for node in nodes]
-    reads = [read(_pointer(node)) for node in nodes] == values
-    for node, value in zip(nodes, values, strict=True):
-        write(_pointer(node), -value)
-    return reads and [node.get_double_value() for node in nodes] == [-value for value in values]
+    """What is written by address reads back through Python to the bit, and the other way round."""
+    get = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_void_p)(getter_address())
+    put = ctypes.CFUNCTYPE(ctypes.c_bool, ctypes.c_void_p, ctypes.c_double)(setter_address())
+    for node in _trial_nodes():
+        read = get(_pointer(node))
+        if node.get_double_value() != read:
+            return False
+        put(_pointer(node), -read)
+        if node.get_double_value() != -read:
+            return False
+    return True

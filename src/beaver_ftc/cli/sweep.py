@@ -77,7 +77,7 @@ def command(
     sweep = load_sweep(file)
     options = Options(
         out=out,
-        workers=workers or _cores(),
+        workers=workers,
         backend=backend.value,
         address=ray_address,
         resume=resume,
@@ -89,12 +89,6 @@ def command(
     if replay is None:
         raise typer.Exit(_fly(sweep, options, format))
     raise typer.Exit(_replay(sweep, options, replay, format))
-
-
-def _cores() -> int:
-    import os
-
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _keep(asked: str) -> "Keep":

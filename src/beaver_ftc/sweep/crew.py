@@ -126,9 +126,8 @@ def serve(connection: Connection, job: Job) -> None:
     """The life of a worker process: fly what comes until nobody is there any more."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the terminal's Ctrl-C is for the one who gives the orders
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    _be_silent()
     connection.send(_READY)
-    with contextlib.suppress(EOFError, OSError):
+    with silence(), contextlib.suppress(EOFError, OSError):
         while True:
             connection.send(_flown(job, connection.recv()))
 
@@ -140,12 +139,20 @@ def _flown(job: Job, flights: Sequence[Assignment]) -> list[Row] | Exception:
         return SimulationFailed(str(error))
 
 
-def _be_silent() -> None:
-    """Whatever a library prints, the sweep's output is the sweep's own."""
+@contextlib.contextmanager
+def silence() -> Iterator[None]:
+    """Whatever a library prints meanwhile, on whatever level, goes nowhere: the output is the sweep's own."""
     nowhere = os.open(os.devnull, os.O_WRONLY)
-    for stream in (1, 2):
+    kept = {stream: os.dup(stream) for stream in (1, 2)}
+    for stream in kept:
         os.dup2(nowhere, stream)
-    os.close(nowhere)
+    try:
+        yield
+    finally:
+        for stream, copy in kept.items():
+            os.dup2(copy, stream)
+            os.close(copy)
+        os.close(nowhere)
 
 
 def _context() -> Any:
@@ -157,11 +164,15 @@ def _context() -> Any:
     return context
 
 
+def one_thread_each() -> dict[str, str]:
+    """Environment of a worker: one thread for linear algebra, since the cores are taken by the flights."""
+    return dict.fromkeys(_ONE_THREAD, "1")
+
+
 @contextlib.contextmanager
 def _single_threaded() -> Iterator[None]:
-    """One thread a worker for the linear algebra: the cores are taken by the flights."""
     before = {name: os.environ.get(name) for name in _ONE_THREAD}
-    os.environ.update(dict.fromkeys(_ONE_THREAD, "1"))
+    os.environ.update(one_thread_each())
     try:
         yield
     finally:

@@ -16,9 +16,10 @@ if TYPE_CHECKING:
 
 NO_FAULT = "no fault"
 _METRICS = (
-    "run", "status", "reason", "frames", "flown_s", "fault_free_s", "fault.actuator", "fault.type",
-    "fault.at_s", "detection.delay_s", "detection.detected", "detection.guaranteed_delay_s",
-    "isolation.fault", "isolation.correct", "isolation.delay_s", "false_alarm", "worst_residual_ratio", "passed",
+    "run", "status", "reason", "frames", "flown_s", "fault_free_s", "false_alarm", "worst_residual_ratio",
+    "passed", "fault.actuator", "fault.type", "fault.at_s",
+    "detection.detected", "detection.delay_s", "detection.guaranteed_delay_s",
+    "isolation.fault", "isolation.correct", "isolation.delay_s",
     *(f"tracking.{when}_fault_rms_deg_s.{axis}" for when in ("pre", "post") for axis in AXES),
 )  # fmt: skip
 

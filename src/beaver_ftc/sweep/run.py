@@ -1,6 +1,7 @@
 """A sweep from beginning to end: fly what is missing, then say what it all shows."""
 
 import json
+import os
 from collections.abc import Callable, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field, replace
@@ -37,7 +38,7 @@ class Options:
     """How to fly a sweep; nothing here changes what comes out."""
 
     out: Path = Path("runs")
-    workers: int = 1
+    workers: int | None = None  # of local processes, one a core; of Ray, two tasks a CPU
     backend: str = "local"
     address: str | None = None
     resume: bool = False
@@ -134,7 +135,12 @@ def _crew(sweep: Sweep, options: Options) -> Crew:
         from beaver_ftc.sweep.ray_crew import RayCrew
 
         return RayCrew(job, options.address, options.workers)
-    return LocalCrew(job, options.workers)
+    return LocalCrew(job, options.workers or cores())
+
+
+def cores() -> int:
+    """The cores this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def conclude(sweep: Sweep, options: Options, store: Store) -> Document:

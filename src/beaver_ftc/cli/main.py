@@ -17,6 +17,7 @@ from beaver_ftc.errors import BeaverFtcError
 
 COMMANDS = (
     "run",
+    "mismatch",
     "validate",
     "schema",
     "trim",

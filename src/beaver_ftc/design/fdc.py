@@ -1,10 +1,10 @@
 """The Beaver on a flat Earth: the twelve nonlinear state equations of the FDC toolbox, [FDC].
 
-An independent road to what JSBSim flies, for linear analysis. Everything is analytic in its arguments, so complex steps
-give its Jacobian to rounding.
+An independent road to what JSBSim flies, for linear analysis. Everything is analytic in its arguments, so
+complex steps give its Jacobian to rounding.
 
-State (12,), in the log's order: airspeed m/s, alpha, beta rad, p, q, r rad/s, phi, theta, psi rad, north, east,
-altitude m. Surfaces (4,) rad: aileron, elevator, rudder, flap.
+State (12,), in the log's order: airspeed m/s, alpha, beta rad, p, q, r rad/s, phi, theta, psi rad, north,
+east, altitude m. Surfaces (4,) rad: aileron, elevator, rudder, flap.
 """
 
 from collections.abc import Mapping
@@ -26,8 +26,9 @@ from beaver_ftc.design.coefficients import (
 STATES = ("airspeed", "alpha", "beta", "p", "q", "r", "phi", "theta", "psi", "north", "east", "altitude")
 SURFACES = ("aileron", "elevator", "rudder", "flap")
 
-# Atmosphere as FDC has it: the standard troposphere over geometric altitude, with the gravity of that altitude in the
-# pressure's exponent. Next to the standard's geopotential altitude it changes density by 0.02 % at 3 km.
+# Atmosphere as FDC has it: the standard troposphere over geometric altitude, with the gravity of that
+# altitude in the pressure's exponent. Next to the standard's geopotential altitude it changes density by
+# 0.02 % at 3 km.
 _SEA_LEVEL_TEMPERATURE_K = 288.15
 _SEA_LEVEL_PRESSURE_PA = 101325.0
 _LAPSE_K_PER_M = 0.0065
@@ -89,13 +90,18 @@ def derivatives(
     """Time derivative of the state, (12,) per s [FDC, chapter 3]."""
     of = aerodynamic_coefficients(state, surfaces, engine, ratio)
     betadot_ratio = (ratio or {}).get("CY_betadot", 1.0)
-    return np.concatenate([
-        _flow_rates(state, of, betadot_ratio), _body_accelerations(state, of), _euler_rates(state), _track(state)
-    ])  # fmt: skip
+    return np.concatenate(
+        [
+            _flow_rates(state, of, betadot_ratio),
+            _body_accelerations(state, of),
+            _euler_rates(state),
+            _track(state),
+        ]
+    )
 
 
 def _flow_rates(state: np.ndarray, of: Mapping, betadot_ratio: float) -> np.ndarray:
-    """Vdot, alphadot, betadot; the force of betadot acts across the flight path and so changes betadot alone."""
+    """Vdot, alphadot, betadot; the force of betadot acts across the flight path: it changes betadot alone."""
     V, alpha, beta, p, q, r, phi, theta = state[:8]
     weight, area = MASS.mass_kg * gravity(state[11]), of["qdyn"] * GEOMETRY.wing_area_m2
     X = area * of["CX"] - weight * np.sin(theta)
@@ -123,11 +129,13 @@ def _body_accelerations(state: np.ndarray, of: Mapping) -> np.ndarray:
         area * GEOMETRY.chord_m * of["Cm"],
         area * GEOMETRY.span_m * of["Cn"],
     )
-    return np.array([
-        i.Ppq * p * q + i.Pqr * q * r + i.Pl * L + i.Pn * N,
-        i.Qpp * p * p + i.Qpr * p * r + i.Qrr * r * r + i.Qm * M,
-        i.Rpq * p * q + i.Rqr * q * r + i.Rl * L + i.Rn * N,
-    ])
+    return np.array(
+        [
+            i.Ppq * p * q + i.Pqr * q * r + i.Pl * L + i.Pn * N,
+            i.Qpp * p * p + i.Qpr * p * r + i.Qrr * r * r + i.Qm * M,
+            i.Rpq * p * q + i.Rqr * q * r + i.Rl * L + i.Rn * N,
+        ]
+    )
 
 
 def _euler_rates(state: np.ndarray) -> np.ndarray:
@@ -144,11 +152,13 @@ def _track(state: np.ndarray) -> np.ndarray:
     u, v, w = V * np.cos(alpha) * np.cos(beta), V * np.sin(beta), V * np.sin(alpha) * np.cos(beta)
     across, down = v * np.cos(phi) - w * np.sin(phi), v * np.sin(phi) + w * np.cos(phi)
     ahead = u * np.cos(theta) + down * np.sin(theta)
-    return np.array([
-        ahead * np.cos(psi) - across * np.sin(psi),
-        ahead * np.sin(psi) + across * np.cos(psi),
-        u * np.sin(theta) - down * np.cos(theta),
-    ])
+    return np.array(
+        [
+            ahead * np.cos(psi) - across * np.sin(psi),
+            ahead * np.sin(psi) + across * np.cos(psi),
+            u * np.sin(theta) - down * np.cos(theta),
+        ]
+    )
 
 
 def linearise(

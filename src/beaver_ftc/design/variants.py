@@ -4,8 +4,8 @@
     frozen alpha                f(x, y0) and G(y0) with alpha held at its trim value, all else as measured
     linearised about trim       f = f0 + f_x (x - x0) + f_y (y - y0), G = G0
 
-The linear model is that of f + G u at (x0, y0, u0): the surfaces' moments vary with y too, so f_y holds d(G u0)/dy, and
-f0 + G0 u0 is the acceleration in trim.
+The linear model is that of f + G u at (x0, y0, u0): the surfaces' moments vary with y too, so f_y holds
+d(G u0)/dy, and f0 + G0 u0 is the acceleration in trim.
 """
 
 from dataclasses import replace
@@ -24,7 +24,7 @@ _STEP = 1e-30  # of a complex step: far below rounding, so the derivative is exa
 
 
 def design_of(model: "DesignModel") -> np.ndarray:
-    """The design record (1,) of a scenario's `design_model`; one that needs the trim wants `anchor` as well."""
+    """The design record (1,) of a scenario's `design_model`; one tied to the trim wants `anchor` as well."""
     design = design_record(engine_terms=model.engine_terms, scale=model.coefficients, mass=mass_of(model))
     design["linearised"], design["frozen_alpha"] = model.linearised, model.frozen_alpha
     return design
@@ -56,7 +56,7 @@ def anchor(design: np.void, x: np.ndarray, y: np.ndarray, u: np.ndarray) -> None
 def jacobian(
     design: np.void, x: np.ndarray, y: np.ndarray, u: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """f (3,), G (3, 4), and the derivatives of f + G u with x, (3, 3), and with y, (3, 5), by complex steps."""
+    """f (3,), G (3, 4) and the derivatives of f + G u with x (3, 3) and with y (3, 5), by complex steps."""
     f, G = _split(design, x.astype(complex), y.astype(complex))
     along_x = [_directional(design, x + 1j * _STEP * e, y + 0j, u) for e in np.eye(3)]
     along_y = [_directional(design, x + 0j, y + 1j * _STEP * e, u) for e in np.eye(5)]

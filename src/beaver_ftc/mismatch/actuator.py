@@ -2,8 +2,8 @@
 
     a' = a + min(max(w (demand - a), -rate dt), rate dt),  w = 1 - exp(-bandwidth dt)
 
-every JSBSim frame of dt, within the stops; with neither lag nor rate limit a is the demand. The command of a row was in
-force in all JSBSim frames that led to it; at the start the actuator rests at its command.
+every JSBSim frame of dt, within the stops; with neither lag nor rate limit a is the demand. The command
+of a row was in force in all JSBSim frames that led to it; at the start the actuator rests at its command.
 """
 
 from dataclasses import dataclass
@@ -37,8 +37,12 @@ class HealthyActuators:
         dynamics = [getattr(scenario.actuators, surface) for surface in SURFACES]
         stops = np.array([_stops(surface, of) for surface, of in zip(SURFACES, dynamics, strict=True)])
         return cls(
-            gain=np.array([1.0 - exp(-d.bandwidth_rad_s * dt) if d.bandwidth_rad_s else 1.0 for d in dynamics]),
-            reach=np.array([radians(d.rate_limit_deg_s) * dt if d.rate_limit_deg_s else inf for d in dynamics]),
+            gain=np.array(
+                [1.0 - exp(-d.bandwidth_rad_s * dt) if d.bandwidth_rad_s else 1.0 for d in dynamics]
+            ),
+            reach=np.array(
+                [radians(d.rate_limit_deg_s) * dt if d.rate_limit_deg_s else inf for d in dynamics]
+            ),
             low=stops[:, 0],
             high=stops[:, 1],
             runs=scenario.substeps,
@@ -64,11 +68,12 @@ def _stops(surface: str, dynamics) -> tuple[float, float]:
 
 @kernel
 def _follow(commands, gain, reach, low, high, first_runs, runs, at, positions):
-    """Fill positions (n, 4) rad and leave `at` (4,) rad at the last; the first row takes `first_runs` frames."""
+    """Fill positions (n, 4) rad and leave `at` (4,) rad at the last; `first_runs` is for the first row."""
     for k in range(commands.shape[0]):
         for s in range(4):
             demand = min(max(commands[k, s], low[s]), high[s])
             for _ in range(first_runs if k == 0 else runs):
                 way = min(max(gain[s] * (demand - at[s]), -reach[s]), reach[s])
-                at[s] = min(max(at[s] + way, low[s]), high[s])
+                ideal = gain[s] == 1.0 and reach[s] == np.inf
+                at[s] = demand if ideal else min(max(at[s] + way, low[s]), high[s])
             positions[k, s] = at[s]

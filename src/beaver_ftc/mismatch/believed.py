@@ -1,4 +1,4 @@
-"""What the designer believes and what the truth is made of, as numbers; the design model for many frames at once."""
+"""What the designer believes and what the truth is made of, as numbers, and for many frames at once."""
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -33,7 +33,8 @@ def true_parts(scenario: "Scenario") -> Parts:
     """The truth's moments as the scenario declares them."""
     ratio = scenario.uncertainty.coefficients
     return Parts(
-        {name: value(name) * ratio.get(name, 1.0) for name in moments.MOMENT_TERMS}, inertia_coefficients(MASS)
+        {name: value(name) * ratio.get(name, 1.0) for name in moments.MOMENT_TERMS},
+        inertia_coefficients(MASS),
     )
 
 

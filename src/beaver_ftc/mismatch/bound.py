@@ -1,4 +1,4 @@
-"""From what was needed to what to declare: the bound recommended for a set of runs, and what it costs the guarantee."""
+"""The bound recommended for a set of runs, and what it costs the guarantee of detection."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -20,8 +20,8 @@ PerAxis = dict[str, float]
 class Recommendation:
     """The constant part of eta_bar, rad/s2 per axis, that covers all of `runs` runs.
 
-    coverage: the chance that one more run of the same kind stays within it, runs / (runs + 1): it is as likely as any
-    other to be the worst of all.
+    coverage: the chance that one more run of the same kind stays within it, runs / (runs + 1): it is as
+    likely as any other to be the worst of all.
     """
 
     constant_rad_s2: PerAxis

@@ -1,9 +1,9 @@
-"""What each declared fault does to the angular acceleration, weighed with the design model's G as the theory does.
+"""What each declared fault does to the angular acceleration, weighed with the design's G as in theory.
 
-A loss of effectiveness is what it takes from the surface where the surface is: the product of all losses, taken one
-after the other. A fault of the mechanism (jam, runaway, bias, ...) is the way from where the healthy actuator would be
-to where the surface is; of several on one surface at once the latest to strike has it. The unanticipated one is its own
-moment.
+A loss of effectiveness is what it takes from the surface where the surface is: the product of all losses,
+taken one after the other. A fault of the mechanism (jam, runaway, bias, ...) is the way from where the
+healthy actuator would be to where the surface is; of several on one surface at once the latest to strike
+has it. The unanticipated one is its own moment.
 """
 
 from collections.abc import Iterator
@@ -23,7 +23,7 @@ Effects = dict[str, np.ndarray]
 
 
 def fault_effects(scenario: "Scenario", belief: Belief, states: States, healthy: np.ndarray) -> Effects:
-    """The angular acceleration (n, 3) rad/s2 of each fault; healthy (n, 4) rad, the actuators' positions without."""
+    """The angular acceleration (n, 3) rad/s2 of each fault; healthy (n, 4) rad is where they found it."""
     G = belief.effectiveness(states.y)
     effects: Effects = {}
     for name, fault, moved in _deflections(scenario, states, healthy):

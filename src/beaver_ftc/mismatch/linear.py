@@ -1,8 +1,8 @@
 """The truth's linear model beside the design model's, at the trim a scenario starts from.
 
-truth: JSBSim's accelerations differenced about the trim. fdc: the FDC equations, by complex steps, an independent road.
-design: the FDC equations with the moments the designer believes. own: JSBSim's own linearisation, at the same condition
-without its sideslip, against the FDC equations there.
+truth: JSBSim's accelerations differenced about the trim. fdc: the FDC equations, by complex steps, an
+independent road. design: the FDC equations with the moments the designer believes. own: JSBSim's own
+linearisation, at the same condition without its sideslip, against the FDC equations there.
 """
 
 from dataclasses import dataclass, replace
@@ -25,7 +25,7 @@ _STEP = 1e-30  # complex
 
 @dataclass(frozen=True)
 class LinearAnalysis:
-    """Linear models over the eight classical states: by name, the models, their modes; and the second opinion.
+    """Linear models over the eight classical states: by name, the models and their modes; a second opinion.
 
     own_deviation: per mode, JSBSim's own linearisation against the FDC equations, both with no sideslip.
     """
@@ -58,7 +58,10 @@ def analyse(scenario: "Scenario") -> LinearAnalysis:
         "design": LinearModel(*designed(scenario, point, A, B), fdc.STATES, fdc.SURFACES).of(CLASSICAL),
     }
     return LinearAnalysis(
-        point, models, {name: modes(model.A) for name, model in models.items()}, own_deviation(scenario, point)
+        point,
+        models,
+        {name: modes(model.A) for name, model in models.items()},
+        own_deviation(scenario, point),
     )
 
 
@@ -67,7 +70,9 @@ def own_deviation(scenario: "Scenario", point: "FlightState") -> dict[str, float
     from beaver_ftc.plant.linear import LinearModel, own
 
     straight = replace(point, beta_rad=0.0)
-    reference = modes(LinearModel(*fdc_matrices(scenario, straight), fdc.STATES, fdc.SURFACES).of(CLASSICAL).A)
+    reference = modes(
+        LinearModel(*fdc_matrices(scenario, straight), fdc.STATES, fdc.SURFACES).of(CLASSICAL).A
+    )
     found = modes(own(scenario, straight).of(CLASSICAL).A)
     return {name: deviation(found[name].pole, reference[name].pole) for name in MODES}
 

@@ -1,7 +1,8 @@
 """Eigenmodes and transfer functions of a linear aircraft: names, frequencies, dampings, zeros, responses.
 
-Classical eight states: position, altitude and heading are left out. On a flat Earth nothing depends on heading; on a
-turning one lift does a little (2 Omega cos(latitude) per rad), which moves the slow spiral root by up to 7e-4 1/s.
+Classical eight states: position, altitude and heading are left out. On a flat Earth nothing depends on
+heading; on a turning one lift does a little (2 Omega cos(latitude) per rad), which moves the slow spiral
+root by up to 7e-4 1/s.
 """
 
 from dataclasses import dataclass

@@ -65,8 +65,10 @@ def aerodynamic(
 def inertial(inertia: InertiaCoefficients, x: np.ndarray) -> np.ndarray:
     """The angular acceleration (n, 3) rad/s2 of turning with no moment, from the rate products [SPEC 3]."""
     p, q, r = x.T
-    return np.column_stack([
-        inertia.Ppq * p * q + inertia.Pqr * q * r,
-        inertia.Qpp * p * p + inertia.Qpr * p * r + inertia.Qrr * r * r,
-        inertia.Rpq * p * q + inertia.Rqr * q * r,
-    ])
+    return np.column_stack(
+        [
+            inertia.Ppq * p * q + inertia.Pqr * q * r,
+            inertia.Qpp * p * p + inertia.Qpr * p * r + inertia.Qrr * r * r,
+            inertia.Rpq * p * q + inertia.Rqr * q * r,
+        ]
+    )

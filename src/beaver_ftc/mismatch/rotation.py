@@ -1,7 +1,7 @@
 """What a turning Earth does to the angular acceleration.
 
-Moments turn the body against inertial space; its rates are reported against the Earth. With w the reported rates, W the
-Earth's rotation in body axes and w_i = w + W,
+Moments turn the body against inertial space; its rates are reported against the Earth. With w the
+reported rates, W the Earth's rotation in body axes and w_i = w + W,
 
     wdot = J^-1 (M - w_i x J w_i) + w_i x W            [SL03, sec. 1.5]
 
@@ -38,7 +38,9 @@ def latitude_rad(north_m: np.ndarray, start_altitude_m: float) -> np.ndarray:
     return radians(START_LATITUDE_DEG) + north_m / (MEAN_RADIUS_M + start_altitude_m)
 
 
-def earth_rotation(inertial: Inertial, x: np.ndarray, attitude: np.ndarray, latitude: np.ndarray) -> np.ndarray:
+def earth_rotation(
+    inertial: Inertial, x: np.ndarray, attitude: np.ndarray, latitude: np.ndarray
+) -> np.ndarray:
     """What the Earth's rotation adds to the angular acceleration, (n, 3) rad/s2.
 
     inertial: the angular acceleration with no moment, -J^-1 (w x J w), as a function of w (n, 3).

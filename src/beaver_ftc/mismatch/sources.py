@@ -1,7 +1,8 @@
 """The sources of mismatch, each by its own formula: what it adds to truth minus design, (n, 3) rad/s2.
 
-They are the steps from the design model, at what was measured and commanded, to the truth: each changes one thing and
-leaves the rest as the steps before it left it, so that all of them together make the whole difference.
+They are the steps from the design model, at what was measured and commanded, to the truth: each changes
+one thing and leaves the rest as the steps before it left it, so that all of them together make the whole
+difference.
 
     f + G u  at the measured state and the command
       sensors            at the true state
@@ -34,8 +35,8 @@ if TYPE_CHECKING:
     from beaver_ftc.scenario.schema import Scenario
 
 SOURCES = (
-    "sensors", "actuators", "fault", "simplification", "engine", "coefficients", "inertia", "inertia_coupling",
-    "sinusoids", "wind_turbulence", "earth_rotation", "integration",
+    "sensors", "actuators", "fault", "simplification", "engine", "coefficients", "inertia",
+    "inertia_coupling", "sinusoids", "wind_turbulence", "earth_rotation", "integration",
 )  # fmt: skip
 Contributions = dict[str, np.ndarray]
 
@@ -99,7 +100,8 @@ def _believed_coefficient(case: Case, name: str) -> float:
 def inertia(case: Case, s: States, extra_moment: np.ndarray) -> np.ndarray:
     """The truth's moments and rate products by the truth's inertia less by the designer's.
 
-    extra_moment (n, 3) rad/s2: the pitching moment of unanticipated faults, as the designer's inertia weighs it.
+    extra_moment (n, 3) rad/s2: the pitching moment of unanticipated faults, as the designer's inertia
+    weighs it.
     """
     true, believed = case.truth.inertia, case.belief.parts.inertia
     if true == believed:
@@ -179,10 +181,10 @@ def _unanticipated(case: Case, faults: Contributions, nothing: np.ndarray) -> np
 
 
 def integration(case: Case, s: States, following: States) -> np.ndarray:
-    """How the rates moved over a frame less JSBSim's acceleration at its start, and the design model's likewise.
+    """How the rates moved over a frame less JSBSim's acceleration at its start; the design's likewise.
 
-    The design model's mean over a frame of n JSBSim frames weighs its samples at the start and the end as the diagnosis
-    does; for n = 1 it is the one at the start. following: the same frames, each one later.
+    The design model's mean over a frame of n JSBSim frames weighs its samples at the start and the end as
+    the diagnosis does; for n = 1 it is the one at the start. following: the same frames, each one later.
     """
     dt = 1.0 / case.scenario.rate_hz
     moved = (following.x - s.x) / dt - s.xdot
@@ -198,5 +200,7 @@ def believed_mean(case: Case, s: States, following: States) -> np.ndarray:
     n = case.scenario.substeps
     start, end = (n + 1.0) / (2.0 * n), (n - 1.0) / (2.0 * n)
     old_command = _believed(case, s, s.u) / n
-    new_command = _believed(case, s, following.u) * (start - 1.0 / n) + _believed(case, following, following.u) * end
+    new_command = (
+        _believed(case, s, following.u) * (start - 1.0 / n) + _believed(case, following, following.u) * end
+    )
     return old_command + new_command

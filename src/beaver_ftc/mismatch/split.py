@@ -26,9 +26,9 @@ UNEXPLAINED = "unexplained"
 class Stretch:
     """n frames of a flight; all accelerations (n, 3) rad/s2 over p, q, r.
 
-    total: JSBSim's angular acceleration over each frame less the design model's f + G u. contributions: what each of
-    SOURCES adds to it. parts: single faults and single coefficients, under the name of their source.
-    eta_bar: the bound in force over the same frames.
+    total: JSBSim's angular acceleration over each frame less the design model's f + G u. contributions:
+    what each of SOURCES adds to it. parts: single faults and single coefficients, under the name of their
+    source. eta_bar: the bound in force over the same frames.
     """
 
     t_s: np.ndarray
@@ -49,7 +49,7 @@ class Stretch:
 
 
 def split(scenario: "Scenario", chunks: Iterable[Columns]) -> Iterator[Stretch]:
-    """Split the mismatch of the flight whose log comes in `chunks` (column name -> values, in time's order)."""
+    """Split the mismatch of the flight whose log comes in `chunks` of columns, in time's order."""
     case: Case | None = None
     for log, more in with_next(chunks):
         states = states_of(log)
@@ -64,11 +64,13 @@ def _over_frames(case: Case, states: States) -> Stretch:
     contributions, parts = instantaneous(case, here)
     contributions["integration"] = integration(case, here, following)
     flown = (following.x - here.x) * case.scenario.rate_hz
-    return Stretch(here.t_s, flown - believed_mean(case, here, following), contributions, parts, following.eta_bar)
+    return Stretch(
+        here.t_s, flown - believed_mean(case, here, following), contributions, parts, following.eta_bar
+    )
 
 
 def _at_end(case: Case, states: States) -> Stretch:
-    """The flight's last row: nothing follows, so JSBSim's acceleration at that instant stands for the frame."""
+    """The flight's last row: nothing follows, so JSBSim's acceleration then stands for the frame."""
     contributions, parts = instantaneous(case, states)
     contributions["integration"] = np.zeros_like(states.x)
     believed = case.belief.acceleration(states.x_measured, states.y_measured, states.u)

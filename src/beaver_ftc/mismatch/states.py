@@ -1,4 +1,4 @@
-"""A stretch of the log as arrays: what was true, what was measured, what was commanded and what became of it."""
+"""A stretch of the log as arrays: what was true, measured and commanded, and what became of it."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
@@ -39,10 +39,11 @@ OPTIONAL = tuple(measured_name(column) for column in (*_RATES, *_Y)) + tuple(map
 class States:
     """Frames of a flight; n of them. SI and rad.
 
-    x, x_measured, x_air (n, 3) body rates relative to the Earth, as measured, and relative to the turning air;
-    y, y_measured (n, 5) alpha, beta, V, qdyn, dpt; u, position, effective (n, 4): the command in effect, the
-    actuators' output and what the aerodynamics see; xdot (n, 3) JSBSim's angular acceleration;
-    attitude (n, 3) phi, theta, psi; north_m, altitude_m (n,); eta_bar (n, 3), over the frame that ends here.
+    x, x_measured, x_air (n, 3) body rates relative to the Earth, as measured, and relative to the turning
+    air; y, y_measured (n, 5) alpha, beta, V, qdyn, dpt; u, position, effective (n, 4): the command in
+    effect, the actuators' output and what the aerodynamics see; xdot (n, 3) JSBSim's angular
+    acceleration; attitude (n, 3) phi, theta, psi; north_m, altitude_m (n,); eta_bar (n, 3), over the
+    frame that ends here.
     """
 
     t_s: np.ndarray
@@ -69,9 +70,7 @@ class States:
 
 def states_of(log: Columns) -> States:
     """The states in log columns (name -> (n,)). A log without a measured column measured the truth."""
-    surfaces = {
-        what: [f"{s}_{what}_rad" for s in SURFACES] for what in ("cmd", "pos", "effective")
-    }
+    surfaces = {what: [f"{s}_{what}_rad" for s in SURFACES] for what in ("cmd", "pos", "effective")}
     return States(
         t_s=log["t_s"],
         x=_stack(log, _RATES),
@@ -107,7 +106,9 @@ def with_next(chunks: Iterable[Columns]) -> Iterator[tuple[Columns, bool]]:
     for chunk in chunks:
         if chunk["t_s"].size == 0:
             continue
-        joined = chunk if held is None else {name: np.concatenate([held[name], chunk[name]]) for name in chunk}
+        joined = (
+            chunk if held is None else {name: np.concatenate([held[name], chunk[name]]) for name in chunk}
+        )
         if joined["t_s"].size > 1:
             yield joined, True
         held = {name: values[-1:].copy() for name, values in joined.items()}

@@ -1,4 +1,4 @@
-"""The figures of a split flight, kept while it is read: RMS, largest value, share of the bound, when it is exceeded."""
+"""The figures of a split flight, kept while it is read: RMS, peaks, shares of the bound, exceedances."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -32,7 +32,7 @@ class Figures:
 
 @dataclass
 class Exceedance:
-    """A stay of the uncertainty above its bound: when, how far (share of the bound), and because of which source."""
+    """A stay of the uncertainty above its bound: when, how far in shares of the bound, and why."""
 
     start_s: float
     end_s: float

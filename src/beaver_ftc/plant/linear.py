@@ -2,10 +2,11 @@
 
 `differences`: central differences of JSBSim's accelerations, each at a settled state. It is right everywhere.
 
-`own`: JSBSim's FGLinearization, as a second opinion. Three things to know (1.3.3). It asks the first engine for its
-thruster and, the Beaver having no engine, would bring the process down: so a copy of the aircraft is loaded with one that
-weighs nothing and gives nothing. Setting alpha it passes sideslip in degrees where radians are due, so only a flight
-condition with no sideslip is linearised rightly. It does not wait for the side force of betadot to settle.
+`own`: JSBSim's FGLinearization, as a second opinion. Three things to know (1.3.3). It asks the first
+engine for its thruster and, the Beaver having no engine, would bring the process down: so a copy of the
+aircraft is loaded with one that weighs nothing and gives nothing. Setting alpha it passes sideslip in
+degrees where radians are due, so only a flight condition with no sideslip is linearised rightly. It does
+not wait for the side force of betadot to settle.
 """
 
 from collections.abc import Iterator
@@ -31,8 +32,8 @@ if TYPE_CHECKING:
 M_PER_FT = 1.0 / FT_PER_M
 _EARTH_RADIUS_M = 6371000.0
 
-# State, the field of FlightState that moves it, and how far for a difference: small against the curvature of the
-# polynomials, large against rounding.
+# State, the field of FlightState that moves it, and how far for a difference: small against the curvature
+# of the polynomials, large against rounding.
 _MOVED = (
     ("airspeed", "airspeed_mps", 1e-2),
     ("alpha", "alpha_rad", 1e-4),
@@ -77,7 +78,7 @@ _THRUSTER = '<direct name="nothing"> </direct>'
 
 @dataclass(frozen=True)
 class LinearModel:
-    """xdot = A x + B u about a flight condition; SI and rad. states (n,), inputs (m,) name rows and columns."""
+    """xdot = A x + B u about a flight condition, SI and rad; states (n,) and inputs (m,) name the axes."""
 
     A: np.ndarray
     B: np.ndarray

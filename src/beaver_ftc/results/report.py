@@ -47,7 +47,17 @@ def render(folders: Sequence[Path]) -> str:
         data=_harmless(json.dumps(_data(folders, documents), allow_nan=False, separators=(",", ":"))),
         css=_asset("report.css"),
         script=_asset("report.js"),
+        sections=[_mismatch(folder) for folder in folders],
     )
+
+
+def _mismatch(folder: Path) -> Any:
+    """What `beaver-ftc mismatch` has found in a folder, if it has been there."""
+    from markupsafe import Markup
+
+    from beaver_ftc.mismatch.section import mismatch_section
+
+    return Markup(mismatch_section(folder))
 
 
 def _words(metrics: Document, scenario: str) -> Document:

@@ -1,0 +1,147 @@
+"""Fly a scenario, split its mismatch, keep the results beside the run's own."""
+
+from collections.abc import Callable, Iterable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from beaver_ftc.mismatch.document import (
+    Document,
+    document,
+    guarantee_document,
+    linear_document,
+    recommendation_document,
+    rows,
+    write_csv,
+)
+from beaver_ftc.mismatch.states import OPTIONAL, REQUIRED, Columns
+
+if TYPE_CHECKING:
+    from beaver_ftc.mismatch.linear import LinearAnalysis
+    from beaver_ftc.mismatch.tally import Tally
+    from beaver_ftc.scenario.schema import Scenario
+
+Progress = Callable[[float], None]
+
+
+def run_mismatch(
+    scenario: "Scenario", out: Path, report: bool = True, progress: Progress | None = None
+) -> tuple[Document, "Tally"]:
+    """Fly `scenario` and write `out/<name>/`: a run's result folder with the mismatch in it.
+
+    Raises BadInput for a flight that cannot be trimmed, SimulationFailed for one not completed or kept.
+    """
+    from beaver_ftc.loop import fly
+    from beaver_ftc.results.log import ParquetLog
+    from beaver_ftc.results.metrics import as_json, metrics
+    from beaver_ftc.results.writer import result_folder
+    from beaver_ftc.scenario.dump import to_yaml
+
+    with result_folder(out, scenario.name) as folder:
+        with ParquetLog(folder / "log.parquet") as log:
+            flight = fly(scenario, log, progress)
+        flown = metrics(flight)
+        (folder / "scenario.yaml").write_text(to_yaml(scenario), encoding="utf-8")
+        (folder / "metrics.json").write_text(as_json(flown), encoding="utf-8")
+        found, kept = analyse_folder(scenario, folder, flown, report)
+    return found, kept
+
+
+def analyse_folder(
+    scenario: "Scenario", folder: Path, flown: Document, report: bool
+) -> tuple[Document, "Tally"]:
+    """Split the flight whose log is in a result folder; add the mismatch's files, figures and report."""
+    from beaver_ftc.mismatch.linear import analyse
+    from beaver_ftc.results.metrics import as_json
+
+    kept = tally_of_log(scenario, folder / "log.parquet", folder / "mismatch.parquet")
+    analysis = analyse(scenario)
+    found = complete(scenario, kept, flown, analysis)
+    (folder / "mismatch.json").write_text(as_json(found), encoding="utf-8")
+    write_csv(folder / "mismatch.csv", list(rows(found)))
+    if report:
+        _report(folder, found, flown, analysis)
+    return found, kept
+
+
+def complete(scenario: "Scenario", kept: "Tally", flown: Document, analysis: "LinearAnalysis") -> Document:
+    """The document of one flight, its own recommendation, what that does to the guarantee, and the modes."""
+    return (
+        document(scenario, kept, flown)
+        | recommended_for(scenario, [kept])
+        | {"linear": linear_document(analysis)}
+    )
+
+
+def recommended_for(scenario: "Scenario", kept: Iterable["Tally"]) -> Document:
+    """The bound that covers these flights, and the published elevator case flown with it and this design."""
+    from beaver_ftc.mismatch.bound import guarantee_with, recommend
+
+    recommended = recommend(kept)
+    declared = scenario.fdi.bounds.constant_rad_s2.model_dump()
+    return {
+        "recommended": recommendation_document(recommended),
+        "guarantee": guarantee_document(
+            guarantee_with(declared, scenario), guarantee_with(recommended.constant_rad_s2, scenario)
+        ),
+    }
+
+
+def tally_of_log(scenario: "Scenario", log: Path, frames: Path) -> "Tally":
+    """Split a log, a row group at a time; every frame goes to `frames`."""
+    from beaver_ftc.mismatch.frames import written
+    from beaver_ftc.mismatch.split import split
+
+    return _tally(scenario, written(split(scenario, _chunks(log)), frames))
+
+
+def tally_of_flight(scenario: "Scenario") -> tuple["Tally", Document]:
+    """Fly and split without keeping a file: the tally and the flight's metrics."""
+    from beaver_ftc.loop import fly
+    from beaver_ftc.mismatch.split import split
+    from beaver_ftc.results.metrics import metrics
+
+    log = _Memory()
+    flight = fly(scenario, log)
+    return _tally(scenario, split(scenario, log.chunks())), metrics(flight)
+
+
+def _tally(scenario: "Scenario", stretches) -> "Tally":
+    from beaver_ftc.mismatch.tally import tally
+
+    constant = np.array(scenario.fdi.bounds.constant_rad_s2.as_tuple())
+    return tally(stretches, constant, 1.0 / scenario.rate_hz)
+
+
+def _chunks(log: Path) -> Iterator[Columns]:
+    from beaver_ftc.results.log import column_names, read_chunks
+
+    there = column_names(log)
+    return read_chunks(log, [name for name in (*REQUIRED, *OPTIONAL) if name in there])
+
+
+class _Memory:
+    """A log sink that keeps the columns the split needs: for flights of minutes, not hours."""
+
+    def open(self, columns: Iterable[str]) -> None:
+        self._columns = {name: i for i, name in enumerate(columns) if name in REQUIRED or name in OPTIONAL}
+        self._rows: list[np.ndarray] = []
+
+    def write(self, rows: np.ndarray) -> None:
+        self._rows.append(rows[:, list(self._columns.values())])
+
+    def close(self) -> None:
+        pass
+
+    def chunks(self) -> Iterator[Columns]:
+        for rows_ in self._rows:
+            yield {name: rows_[:, i] for i, name in enumerate(self._columns)}
+
+
+def _report(folder: Path, found: Document, flown: Document, analysis: "LinearAnalysis") -> None:
+    from beaver_ftc.mismatch.figures import write_figures
+    from beaver_ftc.results.run import write_report_files
+
+    write_figures(folder, found, flown, analysis)
+    write_report_files(folder, flown)

@@ -1,0 +1,27 @@
+"""The manual's examples load, and its tables name every kind, type and expectation there is."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from beaver_ftc.scenario.loader import load_text
+from beaver_ftc.scenario.schema import Expect, json_schema
+from beaver_ftc.scenario.signals import Signal
+
+MANUAL = (Path(__file__).parents[2] / "docs" / "scenarios.md").read_text()
+EXAMPLES = re.findall(r"```yaml\n(.*?)```", MANUAL, re.DOTALL)
+
+
+@pytest.mark.parametrize("text", EXAMPLES)
+def test_an_example_loads_without_a_warning(text):
+    assert load_text(text).warnings() == ()
+
+
+def fault_types() -> list[str]:
+    return list(json_schema()["properties"]["faults"]["items"]["discriminator"]["mapping"])
+
+
+def test_every_signal_fault_and_expectation_is_explained():
+    for name in [*Signal.model_fields, *fault_types(), *Expect.model_fields]:
+        assert re.search(rf"^\| `{name}` \|", MANUAL, re.MULTILINE), name

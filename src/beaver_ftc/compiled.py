@@ -17,7 +17,6 @@ from functools import lru_cache
 from pathlib import Path
 
 import numba
-import numpy as np
 from numba.core.dispatcher import Dispatcher
 from numba.core.runtime import rtsys
 
@@ -89,7 +88,7 @@ def direct(function, *arguments):
 @lru_cache(maxsize=64)
 def _entry_point(function, kinds):
     """The machine code for C-ordered arrays of these types and dimensions: 9 ms to find, so kept."""
-    types = tuple(numba.typeof(np.empty((0,) * dimensions, dtype)) for dtype, dimensions in kinds)
+    types = tuple(numba.types.Array(numba.from_dtype(dtype), dimensions, "C") for dtype, dimensions in kinds)
     stored = _stored(function, types)
     if stored is not None:
         return stored

@@ -12,11 +12,11 @@ from beaver_ftc.assembly import EARTH_RATE_RAD_S
 from beaver_ftc.bench.contenders import take_over
 from beaver_ftc.control.reference_model import discretise
 from beaver_ftc.design.coefficients import GEOMETRY, MASS, SURFACES, inertia_coefficients, value
+from beaver_ftc.diagnosis.state import ALPHA_CENTRES, BETA_CENTRES, N_BASIS
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.signals import sample
 
 AXES = "pqr"
-ALPHA_CENTRES, BETA_CENTRES = np.linspace(-0.1, 0.35, 10), np.linspace(-0.2, 0.2, 5)
 LEAST_EFFECTIVENESS = 0.1
 
 
@@ -70,8 +70,8 @@ class Estimators:
         self.forgetting = np.exp(-dt / fdi.forgetting_time_s)
         self.pole = fdi.detection_pole_per_s
         self.x_hat, self.threshold, self.residual = np.zeros(3), np.zeros(3), np.zeros(3)
-        self.weights = np.zeros((3, ALPHA_CENTRES.size + BETA_CENTRES.size))
-        self.basis = np.zeros(self.weights.shape[1])
+        self.weights = np.zeros((3, N_BASIS))
+        self.basis = np.zeros(N_BASIS)
         self.detected = False
         self.excluded = np.zeros(3, bool)
         self.fie = np.zeros((3, 3))

@@ -11,18 +11,7 @@ admitted uncertainty explains.
 import numpy as np
 
 from beaver_ftc.compiled import kernel
-
-ALPHA_CENTRES = np.linspace(-0.1, 0.5, 9)
-BETA_CENTRES = np.linspace(-0.3, 0.3, 5)
-N_BASIS = len(ALPHA_CENTRES) + len(BETA_CENTRES)
-
-NETWORK = np.dtype(
-    [
-        ("gain", "f8"), ("leak_per_s", "f8"), ("weight_limit", "f8"),
-        ("weights", "f8", (3, N_BASIS)), ("basis", "f8", (N_BASIS,)), ("output", "f8", (3,)),
-    ],
-    align=True,
-)  # fmt: skip
+from beaver_ftc.diagnosis.state import ALPHA_CENTRES, BETA_CENTRES, N_BASIS
 
 _N_ALPHA = len(ALPHA_CENTRES)
 _N_BETA = len(BETA_CENTRES)

@@ -2,13 +2,23 @@
 
 import numpy as np
 
-from beaver_ftc.diagnosis.network import NETWORK
-
 MAX_ESTIMATORS = 16
 MAX_POLES = 6
 NOT_ISOLATED, UNANTICIPATED = -1, -2
 INTERVAL, PUBLISHED = 0, 1
 DEADBEAT_PER_S = 1e6  # a pole at which exp(-lam dt) is 0: the filter keeps nothing but the last frame
+
+# Centres of the network's basis functions, rad; and its memory.
+ALPHA_CENTRES = np.linspace(-0.1, 0.5, 9)
+BETA_CENTRES = np.linspace(-0.3, 0.3, 5)
+N_BASIS = len(ALPHA_CENTRES) + len(BETA_CENTRES)
+NETWORK = np.dtype(
+    [
+        ("gain", "f8"), ("leak_per_s", "f8"), ("weight_limit", "f8"),
+        ("weights", "f8", (3, N_BASIS)), ("basis", "f8", (N_BASIS,)), ("output", "f8", (3,)),
+    ],
+    align=True,
+)  # fmt: skip
 
 ESTIMATOR = np.dtype(
     [

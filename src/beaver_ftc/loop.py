@@ -2,7 +2,6 @@
 to its sink."""
 
 from collections.abc import Callable, Iterable
-from math import radians
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,9 +17,8 @@ from beaver_ftc.frame import FLYING, NOT_FINITE, fly_frame, look
 from beaver_ftc.outcome import flight_of
 from beaver_ftc.plant import native
 from beaver_ftc.plant.adapter import Plant
-from beaver_ftc.plant.configure import configure
+from beaver_ftc.plant.configure import configure, trim_of
 from beaver_ftc.plant.faults import FaultSchedule
-from beaver_ftc.plant.trim import TrimPoint, trim
 from beaver_ftc.plugins import DETECTORS, LAWS, is_compiled
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.signals import sample
@@ -200,19 +198,6 @@ class Loop:
         if self.schedule.begun(k) and not frame["faulted"]:
             frame["faulted"], frame["fault_at_s"] = 1, k / self.scenario.rate_hz
         frame["Cm_alpha3"] = self.plant.read("failures/unanticipated/Cm-alpha3")
-
-
-def trim_of(scenario: Scenario, plant: Plant) -> TrimPoint:
-    """The scenario's trim, on its truth with the coefficient errors; BadInput when there is none."""
-    initial = scenario.initial
-    return trim(
-        initial.airspeed_mps,
-        initial.altitude_m,
-        engine_rpm=initial.engine_rpm,
-        manifold_pressure_inhg=initial.manifold_pressure_inhg,
-        flap_rad=radians(initial.flap_deg),
-        plant=plant,
-    )
 
 
 def travel_rad(plant: Plant) -> np.ndarray:

@@ -30,7 +30,7 @@ def load_all(names: list[str]) -> list["Scenario"]:
 
 def check_flyable(scenario: "Scenario", name: str) -> None:
     """Raise BadInput, in the form of any other mistake in a file, if the flight cannot be trimmed."""
-    from beaver_ftc.loop import trim_of
+    from beaver_ftc.plant.configure import trim_of
 
     plant = _configured(scenario)
     try:
@@ -41,7 +41,7 @@ def check_flyable(scenario: "Scenario", name: str) -> None:
 
 def trim_point(scenario: "Scenario") -> "TrimPoint":
     """The steady flight a scenario starts from; BadInput if there is none."""
-    from beaver_ftc.loop import trim_of
+    from beaver_ftc.plant.configure import trim_of
 
     return trim_of(scenario, _configured(scenario))
 

@@ -6,14 +6,15 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from beaver_ftc.design.coefficients import SURFACES
-from beaver_ftc.design.variants import response
 
 
 class DesignModel:
     """The design model as two functions, xdot = f(x, y) + G(y) u (see design/model.py for the order of y)."""
 
     def __init__(self, record: np.ndarray) -> None:
-        self._record = record[0]
+        from beaver_ftc.design.variants import response  # compiled: nothing for those who only list plug-ins
+
+        self._record, self._fill = record[0], response
 
     def f(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Angular acceleration (3,) rad/s2 at neutral surfaces; x (3,) rad/s, y (5,)."""
@@ -25,7 +26,7 @@ class DesignModel:
 
     def _response(self, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         f, G = np.empty(3), np.zeros((3, 4))
-        response(self._record, x, y, f, G)
+        self._fill(self._record, x, y, f, G)
         return f, G
 
 

@@ -43,9 +43,8 @@ class LinearAnalysis:
 
 def analyse(scenario: "Scenario") -> LinearAnalysis:
     """Linearise the scenario's truth and what the designer believes, at its trim."""
-    from beaver_ftc.loop import trim_of
     from beaver_ftc.plant.adapter import Plant
-    from beaver_ftc.plant.configure import configure
+    from beaver_ftc.plant.configure import configure, trim_of
     from beaver_ftc.plant.linear import LinearModel, differences
 
     plant = Plant(scenario.rate_hz, scenario.substeps)

@@ -1,10 +1,11 @@
-"""Writes what a scenario says of the truth (uncertainty, actuators) into the aircraft's properties."""
+"""Writes what a scenario says of the truth into the aircraft's properties, and trims it there."""
 
 from math import radians
 
 from beaver_ftc.design.coefficients import SURFACES
 from beaver_ftc.errors import BadInput
 from beaver_ftc.plant.adapter import Plant
+from beaver_ftc.plant.trim import TrimPoint, trim
 from beaver_ftc.scenario.schema import Scenario
 
 _AXES = ("p", "q", "r")
@@ -47,3 +48,16 @@ def _actuators(plant: Plant, scenario: Scenario) -> None:
             low, high = dynamics.travel_deg
             plant.write(f"actuators/{surface}/position-min-rad", radians(low))
             plant.write(f"actuators/{surface}/position-max-rad", radians(high))
+
+
+def trim_of(scenario: Scenario, plant: Plant) -> TrimPoint:
+    """The scenario's trim, on its truth with the coefficient errors; BadInput when there is none."""
+    initial = scenario.initial
+    return trim(
+        initial.airspeed_mps,
+        initial.altitude_m,
+        engine_rpm=initial.engine_rpm,
+        manifold_pressure_inhg=initial.manifold_pressure_inhg,
+        flap_rad=radians(initial.flap_deg),
+        plant=plant,
+    )

@@ -24,6 +24,7 @@ COMMANDS = (
     "list",
     "sweep",
     "compare",
+    "reproduce",
     "bench",
     "verify",
 )

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 DPI = 110
 LEFT, STEPS_LEFT, RIGHT, TOP, BOTTOM, GAP = 0.75, 1.2, 0.2, 0.9, 0.85, 0.42  # inches
-LOWEST_RATIO = 1e-3  # of a logarithmic axis: what is smaller is nothing
+LOWEST_RATIO = 1e-2  # of a logarithmic axis: what is smaller is nothing
 
 
 def write_figures(log_path: Path, metrics: Document, folder: Path) -> list[Path]:
@@ -184,7 +184,8 @@ def _draw_legend(figure: "Figure", grid: Iterable["Axes"]) -> None:
         shown.keys(),
         loc="lower center",
         bbox_to_anchor=(0.5, 0.04 / figure.get_figheight()),
-        ncols=min(len(shown), 8) or 1,
+        ncols=min(len(shown), 12 if figure.get_figwidth() > 11 else 8) or 1,
+        columnspacing=1.2,
         fontsize=8,
         frameon=False,
     )

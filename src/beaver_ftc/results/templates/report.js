@@ -136,7 +136,7 @@ function paintable(canvas, draw) {
 
 const MARGIN = { left: 52, right: 10, top: 12, bottom: 26 };
 const BAND = 6;
-const LOWEST = 1e-3;
+const LOWEST = 1e-2;
 const MODE_COLOURS = DATA.modes.map(([, colour]) => colour);
 
 class Panel {

@@ -1,0 +1,85 @@
+"""What [Zhang2005] gives, and what it leaves open: every choice of ours, in one place, with its reason."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from beaver_ftc.scenario.schema import Scenario
+
+FAULT_AT_S = 12.0
+AMPLITUDE_DEG_S = 3.0
+
+ELEVATOR_LOSS = {
+    "type": "loss_of_effectiveness", "actuator": "elevator", "magnitude": 0.4, "at_s": FAULT_AT_S
+}  # fmt: skip
+UNANTICIPATED = {"type": "unanticipated", "Cm_alpha3": 10, "at_s": FAULT_AT_S}
+
+# Section VII: the sinusoids of eta, the uncertainty's bound, and thresholds by the norm bound.
+GIVEN: Mapping[str, Any] = {
+    "uncertainty.sinusoid.p": {"amplitude_rad_s2": 0.02, "frequency_rad_s": 10},
+    "uncertainty.sinusoid.q": {"amplitude_rad_s2": 0.02, "frequency_rad_s": 15},
+    "uncertainty.sinusoid.r": {"amplitude_rad_s2": 0.02, "frequency_rad_s": 10},
+    "fdi.bounds.inertia_coupling": {"p": 0.25, "q": 0.25, "r": 0.25},
+    "fdi.bounds.constant_rad_s2": {"p": 0.02, "q": 0.02, "r": 0.02},
+    "fdi.thresholds": "published",
+    "fdi.sharpen": "none",
+}
+
+
+@dataclass(frozen=True)
+class Choice:
+    """A scenario key the paper leaves open, what it is set to, and why."""
+
+    key: str
+    value: Any
+    reason: str
+
+
+def _sine(frequency_hz: float) -> list[dict[str, Any]]:
+    return [{"sine": {"amplitude_deg_s": AMPLITUDE_DEG_S, "frequency_hz": frequency_hz}}]
+
+
+CHOICES = (
+    Choice("initial.airspeed_mps", 45.0, "well inside the validated 30 to 55 m/s, margin on both sides"),
+    Choice("initial.altitude_m", 1828.8, "6000 ft, a usual cruising altitude of a Beaver"),
+    Choice("initial.engine_rpm", 1800.0, "the engine setting of the FDC trim examples"),
+    Choice("initial.manifold_pressure_inhg", 20.0, "the engine setting of the FDC trim examples"),
+    Choice("initial.flap_deg", 0.0, "the flap is free to take over from the elevator"),
+    Choice("duration_s", 30.0, "three and a half periods of the pitch reference after the fault"),
+    Choice("rate_hz", 100.0, "not given; ten times the fastest pole of the scheme"),
+    Choice(
+        "reference.p", _sine(0.25), "small enough to stay in the envelope; 2.5 times the RMS a fault costs"
+    ),
+    Choice("reference.q", _sine(0.2), "excites the elevator, at a period the figure's 30 s show well"),
+    Choice("reference.r", _sine(0.15), "a period of its own, so that the axes are not in step"),
+    Choice(
+        "uncertainty.inertia_coupling",
+        {"p": 0.25, "q": -0.25, "r": 0.25},
+        "only the range is given: these are corners of it",
+    ),
+    Choice("fdi.detection_pole_per_s", 10.0, "a few times the bound shows within 0.1 s"),
+    Choice("fdi.isolation_pole_per_s", 10.0, "the detection estimator's"),
+    Choice("fdi.forgetting_time_s", 5.0, "the estimate remembers one period of the pitch reference"),
+    Choice("control.proportional_per_s", 2.0, "error bandwidth well above the references' 0.25 Hz"),
+    Choice("control.integral_per_s2", 1.0, "Kp^2/4: two equal real error poles"),
+    Choice(
+        "control.reference_natural_frequency_rad_s", 10.0, "faster than the loop, slower than the frame rate"
+    ),
+    Choice("control.reference_damping", 1.0, "no overshoot"),
+    Choice("control.network_gain_per_s2", 60.0, "a well damped observer with the detection estimator's pole"),
+    Choice("control.hand_over_s", 1.0, "continuous, and short beside the reference's period"),
+)
+
+
+def scenario(name: str, changes: Mapping[str, Any]) -> Scenario:
+    """The published setting with our choices and `changes`, all dotted keys, as a scenario."""
+    document: dict[str, Any] = {"name": name}
+    for key, value in {**GIVEN, **{c.key: c.value for c in CHOICES}, **changes}.items():
+        _put(document, key.split("."), value)
+    return Scenario.model_validate(document)
+
+
+def _put(document: dict[str, Any], path: list[str], value: Any) -> None:
+    for key in path[:-1]:
+        document = document.setdefault(key, {})
+    document[path[-1]] = value

@@ -16,7 +16,7 @@ _INTRODUCTION = (
     '"Sharpened" is what the default estimators make of the same flight.'
 )
 _ABOUT_FIGURES = (
-    "One figure for each published one. The paper names the two upper panels (elevator and flap) and the lower "
+    "One figure for each published one. The paper names the upper panels (elevator and flap) and the lower "
     "right one (pitch rate); the lower left one is ours."
 )
 _ABOUT_SENSITIVITY = (
@@ -118,7 +118,8 @@ table {{ border-collapse: collapse; font-size: .9rem }}
 th, td {{ text-align: left; vertical-align: top; padding: .2rem .9rem .2rem 0 }}
 th, td {{ border-bottom: 1px solid #d8d8d8 }}
 tr {{ break-inside: avoid }}
-.met, .missed {{ white-space: nowrap }} .met {{ color: #00614a }} .missed {{ color: #a33b00; font-weight: 700 }}
+.met, .missed {{ white-space: nowrap }}
+.met {{ color: #00614a }} .missed {{ color: #a33b00; font-weight: 700 }}
 .figures {{ display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 36rem), 1fr)) }}
 img {{ width: 100%; break-inside: avoid }}
 @media print {{ body {{ font-size: 10px }} .wide {{ overflow: visible }} }}

@@ -2,6 +2,7 @@
 to its sink."""
 
 from collections.abc import Callable, Iterable
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -77,7 +78,6 @@ class Loop:
         self._log = np.empty((min(CHUNK_ROWS, self.n_frames), len(self.columns)))
         self._references = np.empty((len(self._log), 3))
         self.fly_frame = self.plugged or self.direct(fly_frame)
-        self.look = direct(look, self.frames)
         self._set_origin()
 
     def _set_origin(self) -> None:
@@ -171,12 +171,16 @@ class Loop:
                 return self._landed(status)
         return FLYING
 
+    @cached_property
+    def _look(self) -> Callable[[np.ndarray], int]:
+        return direct(look, self.frames)
+
     def _look_between(self) -> None:
         """One JSBSim frame inside a frame of the loop, seen but not acted upon."""
         self.plant.run()
         if not self.cockpit.native:
             self.cockpit.read()
-        self.look(self.frames)
+        self._look(self.frames)
 
     def _landed(self, status: int) -> int:
         if status == NOT_FINITE:

@@ -74,6 +74,7 @@ def log_columns(estimators: Iterable[str]) -> tuple[str, ...]:
         *(f"{s}_saturated" for s in SURFACES),
         *_per_axis("{}_residual_rad_s"), *_per_axis("{}_threshold_rad_s"),
         *_per_axis("{}_eta_bar_rad_s2"), *_per_axis("{}_network_rad_s2"),
+        *_per_axis("{}_design_rad_s2"),
         *(column for name in estimators for column in _estimator_columns(name)),
         *(f"{s}_effectiveness_estimate" for s in SURFACES),
         "mode", "detected",

@@ -54,6 +54,7 @@ FRAME = np.dtype(
         ("eta_bar_sum", "f8", (3,)), ("phi_sum", "f8", (3,)), ("phi_mean", "f8", (3,)),
         ("Gu_first", "f8", (3, 4)), ("Gu_spread", "f8", (3, 4)),
         ("G_mean", "f8", (3, 4)), ("Gu_mean", "f8", (3, 4)), ("believed", "f8", (3,)),
+        ("design_mean", "f8", (3,)),
         ("fhat", "f8", (3,)), ("target", "f8", (4,)),
         # what happened
         ("mode", "i8"), ("n_modes", "i8"),
@@ -151,7 +152,7 @@ def elapse(frame):
             frame.G_mean[i, s] = share * frame.G_sum[i, s]
             frame.Gu_mean[i, s] = share * frame.Gu_sum[i, s]
             rate += frame.Gu_mean[i, s]
-        frame.believed[i] = rate
+        frame.believed[i] = frame.design_mean[i] = rate
         frame.fdi.eta_bar[i] = share * frame.eta_bar_sum[i]
         frame.phi_mean[i] = share * frame.phi_sum[i]
     if share < 1.0:
@@ -420,6 +421,7 @@ def record(frame, reference, row):
     column = put(row, column, fdi.threshold)
     column = put(row, column, fdi.eta_bar)
     column = put(row, column, fdi.network.output)
+    column = put(row, column, frame.design_mean)
     column = record_estimators(fdi, row, column)
     column = put(row, column, control.effectiveness)
     row[column] = frame.mode

@@ -48,8 +48,15 @@ class HealthyActuators:
             runs=scenario.substeps,
         )
 
+    @property
+    def _ideal(self) -> np.ndarray:
+        """Which follow their command at once, (4,) bool."""
+        return (self.gain == 1.0) & np.isinf(self.reach)
+
     def follow(self, commands: np.ndarray) -> np.ndarray:
         """Positions (n, 4) rad at rows with these commands (n, 4) rad, following those given before."""
+        if self._ideal.all():
+            return np.clip(commands, self.low, self.high)
         positions = np.empty_like(commands)
         first = self.at_rad is None
         if self.at_rad is None:

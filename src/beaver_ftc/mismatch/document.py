@@ -39,7 +39,7 @@ def document(scenario: "Scenario", tally: Tally, metrics: Document) -> Document:
         "axes": {axis: _axis(tally, i) for i, axis in enumerate(AXES)},
         "dominant": dominant(tally),
         "bound": {axis: _bound(tally.bounds[i], tally, i) for i, axis in enumerate(AXES)},
-        "closure": tally.closure,
+        "closure": float(tally.figures[UNEXPLAINED].largest.max()),
         "false_alarm": metrics["false_alarm"],
         "detection": metrics["detection"],
         "isolation": {key: metrics["isolation"][key] for key in ("fault", "delay_s", "correct")},

@@ -183,24 +183,9 @@ def _unanticipated(case: Case, faults: Contributions, nothing: np.ndarray) -> np
 def integration(case: Case, s: States, following: States) -> np.ndarray:
     """How the rates moved over a frame less JSBSim's acceleration at its start; the design's likewise.
 
-    The design model's mean over a frame of n JSBSim frames weighs its samples at the start and the end as
-    the diagnosis does; for n = 1 it is the one at the start. following: the same frames, each one later.
+    The design model's mean over a frame is the diagnosis': over all its JSBSim frames. With one JSBSim frame
+    a frame it is the sample at the start. following: the same frames, each one later.
     """
-    dt = 1.0 / case.scenario.rate_hz
-    moved = (following.x - s.x) / dt - s.xdot
-    return moved - (believed_mean(case, s, following) - _believed(case, s, s.u))
-
-
-def _believed(case: Case, s: States, u: np.ndarray) -> np.ndarray:
-    return case.belief.acceleration(s.x_measured, s.y_measured, u)
-
-
-def believed_mean(case: Case, s: States, following: States) -> np.ndarray:
-    """f + G u over the frame: the first JSBSim frame under the old command, the others under the new."""
-    n = case.scenario.substeps
-    start, end = (n + 1.0) / (2.0 * n), (n - 1.0) / (2.0 * n)
-    old_command = _believed(case, s, s.u) / n
-    new_command = (
-        _believed(case, s, following.u) * (start - 1.0 / n) + _believed(case, following, following.u) * end
-    )
-    return old_command + new_command
+    moved = (following.x - s.x) * case.scenario.rate_hz - s.xdot
+    sampled = case.belief.acceleration(s.x_measured, s.y_measured, s.u)
+    return moved - (following.design_mean - sampled)

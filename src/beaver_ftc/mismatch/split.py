@@ -10,7 +10,6 @@ from beaver_ftc.mismatch.sources import (
     SOURCES,
     Case,
     Contributions,
-    believed_mean,
     instantaneous,
     integration,
 )
@@ -64,9 +63,7 @@ def _over_frames(case: Case, states: States) -> Stretch:
     contributions, parts = instantaneous(case, here)
     contributions["integration"] = integration(case, here, following)
     flown = (following.x - here.x) * case.scenario.rate_hz
-    return Stretch(
-        here.t_s, flown - believed_mean(case, here, following), contributions, parts, following.eta_bar
-    )
+    return Stretch(here.t_s, flown - following.design_mean, contributions, parts, following.eta_bar)
 
 
 def _at_end(case: Case, states: States) -> Stretch:

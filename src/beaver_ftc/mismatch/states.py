@@ -16,7 +16,8 @@ _RATES = tuple(f"{axis}_rad_s" for axis in AXES)
 _ATTITUDE = ("phi_rad", "theta_rad", "psi_rad")
 REQUIRED = (
     "t_s", *_RATES, *_Y, *_ATTITUDE, "north_m", "altitude_m",
-    *(f"{axis}dot_rad_s2" for axis in AXES), *(f"{axis}_eta_bar_rad_s2" for axis in AXES), *_SURFACE_COLUMNS,
+    *(f"{axis}dot_rad_s2" for axis in AXES), *(f"{axis}_eta_bar_rad_s2" for axis in AXES),
+    *(f"{axis}_design_rad_s2" for axis in AXES), *_SURFACE_COLUMNS,
 )  # fmt: skip
 
 
@@ -42,8 +43,8 @@ class States:
     x, x_measured, x_air (n, 3) body rates relative to the Earth, as measured, and relative to the turning
     air; y, y_measured (n, 5) alpha, beta, V, qdyn, dpt; u, position, effective (n, 4): the command in
     effect, the actuators' output and what the aerodynamics see; xdot (n, 3) JSBSim's angular
-    acceleration; attitude (n, 3) phi, theta, psi; north_m, altitude_m (n,); eta_bar (n, 3), over the
-    frame that ends here.
+    acceleration; attitude (n, 3) phi, theta, psi; north_m, altitude_m (n,); eta_bar, design_mean (n, 3)
+    rad/s2: the bound, and f + G u as the diagnosis averaged it, over the frame that ends here.
     """
 
     t_s: np.ndarray
@@ -60,6 +61,7 @@ class States:
     north_m: np.ndarray
     altitude_m: np.ndarray
     eta_bar: np.ndarray
+    design_mean: np.ndarray
 
     def __len__(self) -> int:
         return self.t_s.size
@@ -86,6 +88,7 @@ def states_of(log: Columns) -> States:
         north_m=log["north_m"],
         altitude_m=log["altitude_m"],
         eta_bar=_stack(log, [f"{axis}_eta_bar_rad_s2" for axis in AXES]),
+        design_mean=_stack(log, [f"{axis}_design_rad_s2" for axis in AXES]),
     )
 
 

@@ -64,7 +64,6 @@ class Tally:
     constant: np.ndarray
     frame_s: float
     frames: int = 0
-    closure: float = 0.0
     figures: dict[str, Figures] = field(default_factory=dict)
     parts: dict[str, dict[str, Figures]] = field(default_factory=dict)
     bounds: tuple[AxisBound, AxisBound, AxisBound] = field(
@@ -74,16 +73,13 @@ class Tally:
     def add(self, stretch: Stretch) -> None:
         """Take in a stretch."""
         self.frames += stretch.t_s.size
-        unexplained = stretch.unexplained
-        whole = {TOTAL: stretch.total, **stretch.contributions, UNEXPLAINED: unexplained}
+        whole = {TOTAL: stretch.total, **stretch.contributions, UNEXPLAINED: stretch.unexplained}
         for name, values in whole.items():
             self.figures.setdefault(name, Figures()).add(values, stretch.eta_bar)
         for source, parts in stretch.parts.items():
             kept = self.parts.setdefault(source, {})
             for name, values in parts.items():
                 kept.setdefault(name, Figures()).add(values, stretch.eta_bar)
-        added = sum(stretch.contributions[name] for name in SOURCES) + unexplained
-        self.closure = max(self.closure, float(np.abs(stretch.total - added).max()))
         self._hold_against_bound(stretch)
 
     def rms(self, name: str) -> np.ndarray:

@@ -118,7 +118,7 @@ def _moved(problem: Problem, below: Location) -> Problem:
 
 def _self_contained(data: dict[str, Any], scenario: Scenario) -> dict[str, Any]:
     reference = scenario.model_dump(mode="json", include={"reference"}, exclude_unset=True)
-    return {**data, **reference}
+    return {"name": scenario.name, **data, **reference}
 
 
 def _with_settings(

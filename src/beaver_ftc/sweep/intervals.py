@@ -69,7 +69,8 @@ def quantile(ordered: np.ndarray, q: float) -> float:
 def quantile_bound(ordered: np.ndarray, q: float, confidence: float, upper: bool) -> float:
     """The quantile's one-sided bound, free of any distribution: an order statistic.
 
-    The r-th smallest of n values is at or above the q quantile with probability P(Binomial(n, q) < r).
+    The r-th smallest of n values is at or above the q quantile with probability P(Binomial(n, q) < r), and at
+    or below it with probability P(Binomial(n, q) >= r) [Wilks 1941].
     """
     from scipy.special import bdtr
 
@@ -79,4 +80,4 @@ def quantile_bound(ordered: np.ndarray, q: float, confidence: float, upper: bool
         enough = np.flatnonzero(below >= confidence)
         return float(ordered[enough[0]]) if enough.size else math.inf
     enough = np.flatnonzero(below <= 1 - confidence)
-    return float(ordered[enough[-1] + 1]) if enough.size and enough[-1] + 1 < n else -math.inf
+    return float(ordered[enough[-1]]) if enough.size else -math.inf

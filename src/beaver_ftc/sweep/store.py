@@ -82,8 +82,8 @@ class Store:
         if not path.exists():
             return self._compacted_batch(runs)
         try:
-            table = read_table(path, schema=self.schema)
-            if table.column("run").to_pylist() == list(runs):
+            table = read_table(path)
+            if table.schema.equals(self.schema) and table.column("run").to_pylist() == list(runs):
                 return table
         except (ArrowException, OSError, KeyError):
             pass
@@ -100,7 +100,7 @@ class Store:
     def land(self, batch: int, table: "pa.Table") -> None:
         """Keep a batch. Raises SimulationFailed if the disk will not have it."""
         with clear_disk_errors(self.folder):
-            _write_parquet(self._part(batch), [table], self.schema)
+            write_parquet(self._part(batch), [table], self.schema)
 
     def is_compacted(self, flights: int) -> bool:
         """Whether `results.parquet` is there with all flights."""
@@ -116,7 +116,7 @@ class Store:
     def compact(self, batches: Iterator["pa.Table"]) -> None:
         """Make `results.parquet` of all batches, in order, and remove the parts."""
         with clear_disk_errors(self.folder):
-            _write_parquet(self.results, batches, self.schema)
+            write_parquet(self.results, batches, self.schema)
             self.remove_parts()
 
     def remove_parts(self) -> None:
@@ -160,7 +160,7 @@ def write_whole(path: Path, content: bytes) -> None:
     _replace(path, lambda file: file.write(content))
 
 
-def _write_parquet(path: Path, tables: "Iterator[pa.Table] | list[pa.Table]", schema: "pa.Schema") -> None:
+def write_parquet(path: Path, tables: "Iterator[pa.Table] | list[pa.Table]", schema: "pa.Schema") -> None:
     from pyarrow.parquet import ParquetWriter
 
     def fill(file: IO[bytes]) -> None:

@@ -1,0 +1,85 @@
+import pytest
+
+from beaver_ftc.scenario.keys import UnusableKeyError, parse_key, with_values
+from beaver_ftc.scenario.problems import ScenarioError
+from beaver_ftc.scenario.sweep_loader import builtin_sweeps, load_sweep, load_sweep_text
+
+HEAD = "base: elevator-partial-loss\nruns: 3\nvary:\n  "
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "key", "says"),
+    [
+        (HEAD + "faults[0].magnitude: {uniform: [0.1, 1.5]}", 4, "vary.faults[0].magnitude", "1.5 is out of range"),
+        (HEAD + "faults[1].magnitude: {uniform: [0.1, 1]}", 4, "vary.faults[1].magnitude", "no faults[1]"),
+        (HEAD + "initial.airspeed: {uniform: [40, 50]}", 4, "vary.initial.airspeed", "did you mean airspeed_mps?"),
+        (HEAD + "initial.airspeed_mps: {uniform: [50, 40]}", 4, "vary.initial.airspeed_mps.uniform", "out of order"),
+        (HEAD + "initial.airspeed_mps: {}", 4, "vary.initial.airspeed_mps", "exactly one of"),
+        (HEAD + "initial.airspeed_mps: {loguniform: [0, 4]}", 4, "vary.initial.airspeed_mps.loguniform", "over 0"),
+        (HEAD + "seed: {choice: [1, 2]}", 4, "vary.seed", "follows from the sweep's seed"),
+        (HEAD + "faults[0].at_s: {normal: [40, 1]}", 4, "vary.faults[0].at_s", "after the end"),
+        (HEAD + "actuators.bandwidth_rad_s: {choice: [-1]}", 4, "vary.actuators.bandwidth_rad_s", "out of range"),
+        (HEAD + "..: {choice: [1]}", 4, "vary...", "is no dotted key"),
+        (
+            HEAD + "faults[0].at_s: {choice: [1]}\n  faults[0]: {choice: [{type: float, actuator: rudder, at_s: 1}]}",
+            5, "vary.faults[0]", "varied twice",
+        ),
+        ("base: elevator\nruns: 1", 1, "base", "no such file or built-in scenario"),
+        ("base: nothing/here.yaml\nruns: 1", 1, "base", "no such file"),
+        ("base:\n  duration_s: -1\nruns: 1", 2, "base.duration_s", "-1 is out of range"),
+        ("base: fault-free\nset: {duration: 3}\nruns: 1", 2, "set.duration", "did you mean duration_s?"),
+        ("base: fault-free", 1, "runs", "required key is missing"),
+        ("base: fault-free\nruns: 2\nexpect: {detection_rate: {}}", 3, "expect.detection_rate", "bounds nothing"),
+        ("base: fault-free\nruns: 2\nsamplings: lhs", 3, "samplings", "did you mean sampling?"),
+        (
+            "base: fault-free\nsampling: grid\nvary: {initial.airspeed_mps: {uniform: [40, 50]}}",
+            3, "vary.initial.airspeed_mps", "cannot be counted",
+        ),
+    ],
+)  # fmt: skip
+def test_a_mistake_is_named_with_its_line(text, line, key, says):
+    with pytest.raises(ScenarioError) as caught:
+        load_sweep_text(text, "sweep.yaml")
+    messages = [str(entry) for entry in caught.value.lines]
+    assert any(entry.startswith(f"sweep.yaml:{line}: {key}") and says in entry for entry in messages), (
+        messages
+    )
+    assert caught.value.exit_code == 2
+
+
+@pytest.mark.parametrize("name", builtin_sweeps())
+def test_built_in_sweeps_load_and_say_what_they_show(name):
+    sweep = load_sweep(name)
+    assert sweep.name == name
+    assert sweep.flights >= 100
+    assert sweep.file.description
+
+
+def test_a_base_beside_the_file_brings_its_tables_along(tmp_path):
+    (tmp_path / "rates.csv").write_text("t_s,rate_deg_s\n0,0\n1,2\n")
+    (tmp_path / "base.yaml").write_text("name: own\nreference: {q: [{csv: {file: rates.csv}}]}\n")
+    (tmp_path / "many.sweep.yaml").write_text("base: base.yaml\nruns: 2\n")
+    sweep = load_sweep(tmp_path / "many.sweep.yaml")
+    assert sweep.name == "many"
+    for path in tmp_path.iterdir():
+        path.unlink()
+    assert sweep.scenario({}).reference.q[0].shape.values_deg_s == (0.0, 2.0)
+
+
+def test_a_part_of_an_ideal_section_can_vary():
+    sweep = load_sweep_text(
+        "base: {actuators: ideal}\nruns: 2\nvary: {actuators.bandwidth_rad_s: {uniform: [5, 20]}}"
+    )
+    scenario = sweep.scenario({"actuators.bandwidth_rad_s": 7.0})
+    assert scenario.actuators.elevator.bandwidth_rad_s == 7.0
+
+
+def test_keys_are_places_and_places_are_keys():
+    assert parse_key("faults[0].magnitude") == ("faults", 0, "magnitude")
+    assert with_values({"a": [{"b": 1}]}, {("a", 0, "b"): 2, ("c", "d"): 3}) == {
+        "a": [{"b": 2}],
+        "c": {"d": 3},
+    }
+    for key in ("", "a..b", "a[", "[x]", "a.b]", "a[-1]"):
+        with pytest.raises(UnusableKeyError):
+            parse_key(key)

@@ -1,6 +1,12 @@
-"""Makes tests/flying.py importable from every test folder."""
+"""What all tests share: the helpers of tests/flying.py, and property tests that do not depend on the machine's mood."""
 
 import sys
 from pathlib import Path
 
+from hypothesis import settings
+
 sys.path.insert(0, str(Path(__file__).parent))
+
+# No deadline: a first call compiles. Derandomised: a red build can be repeated.
+settings.register_profile("repeatable", deadline=None, derandomize=True)
+settings.load_profile("repeatable")

@@ -35,6 +35,8 @@ def command(
     except BadInput as error:
         if format is Format.json:
             emit_json({"passed": False, "runs": [], "errors": str(error).splitlines()})
+        if junit is not None:
+            _write_junit([{"scenario": "scenarios", "error": str(error)}], junit)
         raise
     raise typer.Exit(_run_all(loaded, out, format, not no_report, junit))
 

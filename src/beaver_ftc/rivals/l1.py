@@ -1,7 +1,7 @@
 """L1 adaptive control with piecewise-constant adaptation [Hovakimyan2010, sec. 3.3].
 
-    xhat' = f + G u + sigma - a (xhat - x),      sigma = -a e^{-a dt} / (1 - e^{-a dt}) (xhat - x)
-    G u = nu - f - C sigma,      C a first-order low-pass filter
+    xhat' = f + G u + sigma - a (xhat - x),      sigma = -e^{-a dt} / Phi (xhat - x),   Phi = (1 - e^{-a
+    dt}) / a G u = nu - f - C sigma,      C a first-order low-pass filter
 
 The adaptation is as fast as the frame allows; what reaches the surfaces is limited by C alone.
 """
@@ -24,14 +24,14 @@ class Predictor:
 
     def __init__(self, pole_per_s: float, dt_s: float) -> None:
         self._dt, self._a = dt_s, exp(-pole_per_s * dt_s)
-        self._gain = pole_per_s * self._a / (1.0 - self._a)
+        self._Phi = (1.0 - self._a) / pole_per_s
         self.error, self.sigma = np.zeros(3), np.zeros(3)
 
     def step(self, moved: np.ndarray, acceleration: np.ndarray) -> np.ndarray:
         """moved (3,) rad/s: change of the measured rates over the frame; acceleration (3,) rad/s2: f + G u
         in it."""
-        self.error = self._a * self.error + self._dt * (acceleration + self.sigma) - moved
-        self.sigma = -self._gain * self.error
+        self.error = self._a * self.error + self._dt * acceleration + self._Phi * self.sigma - moved
+        self.sigma = -self._a / self._Phi * self.error
         return self.sigma
 
 
@@ -40,7 +40,7 @@ class L1Adaptive:
 
     name: ClassVar[str] = "l1-adaptive"
     fault_tolerant = False
-    defaults: ClassVar[Mapping[str, float]] = GAINS | {"predictor_per_s": 10.0, "bandwidth_per_s": 20.0}
+    defaults: ClassVar[Mapping[str, float]] = GAINS | {"predictor_per_s": 1.0, "bandwidth_per_s": 20.0}
 
     def reset(self, context: Context) -> None:
         """Nothing unexplained yet."""

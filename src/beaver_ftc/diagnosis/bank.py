@@ -70,7 +70,7 @@ def note_closest_approach(fdi):
 @kernel
 def extremes(fie, i):
     """Least and greatest acceleration (rad/s2) of axis i: theta anywhere in its set, or no fault at all."""
-    one, other = fie.base[i] + fie.low * fie.Z[i], fie.base[i] + fie.high * fie.Z[i]
+    one, other = fie.offset[i] + fie.low * fie.Z[i], fie.offset[i] + fie.high * fie.Z[i]
     return min(0.0, one, other) - fie.spread[i], max(0.0, one, other) + fie.spread[i]
 
 
@@ -80,7 +80,7 @@ def aligned_extremes(fie):
     base, slope, spread = 0.0, 0.0, 0.0
     for i in range(3):
         spread += abs(fie.across[i]) * fie.spread[i]
-        base += fie.across[i] * fie.base[i]
+        base += fie.across[i] * fie.offset[i]
         slope += fie.across[i] * fie.Z[i]
     one, other = base + fie.low * slope, base + fie.high * slope
     return min(0.0, one, other) - spread, max(0.0, one, other) + spread

@@ -25,7 +25,7 @@ def suppose(fdi, fie, G, Gu, spread):
     G (3, 4) rad/s2 per rad; Gu (3, 4) rad/s2, the contribution of each surface; means over the frame. spread
     (3, 4) rad/s2: by how much the mean can mislead about a fault that changed in the frame.
     """
-    hypothesis(fie.kind, fie.surface, G, Gu, fie.base, fie.Z)
+    hypothesis(fie.kind, fie.surface, G, Gu, fie.offset, fie.Z)
     for i in range(3):
         fie.spread[i] = spread[i, fie.surface]
     if fdi.memory:
@@ -146,13 +146,13 @@ def adapt_jointly(fie, forgetting):
 def predict(fdi, fie, x, believed):
     """Advance one estimator by a frame.
 
-    x (3,) rad/s as the frame began; believed (3,) rad/s2 is f + G u, mean over the frame; fie.base and
+    x (3,) rad/s as the frame began; believed (3,) rad/s2 is f + G u, mean over the frame; fie.offset and
     fie.Z are already this frame's.
     """
     dt = fdi.dt
     for i in range(3):
         Z, theta, a = fie.Z[i], fie.theta[i], fdi.fie_decay[i]
-        fie.xhat[i] = x[i] + dt * (believed[i] + fie.base[i] + Z * theta) + a * (fie.xhat[i] - x[i])
+        fie.xhat[i] = x[i] + dt * (believed[i] + fie.offset[i] + Z * theta) + a * (fie.xhat[i] - x[i])
     adapt(fdi, fie)
     for i in range(3):
         Z, a = fie.Z[i], fdi.fie_decay[i]

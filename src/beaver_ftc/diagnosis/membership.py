@@ -34,7 +34,7 @@ def solve(value, bound, slope, low, high):
 def agreeing(fdi, fie, i):
     """The interval of theta that agrees with the elapsed frame on axis i."""
     return solve(
-        fdi.innovation[i] - fie.base[i], fdi.eta_bar[i] + fie.spread[i], fie.Z[i], fie.low, fie.high
+        fdi.innovation[i] - fie.offset[i], fdi.eta_bar[i] + fie.spread[i], fie.Z[i], fie.low, fie.high
     )
 
 

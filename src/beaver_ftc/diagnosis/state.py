@@ -28,7 +28,7 @@ ESTIMATOR = np.dtype(
         ("xhat", "f8", (3,)), ("residual", "f8", (3,)), ("lower", "f8", (3,)), ("upper", "f8", (3,)),
         ("omega", "f8", (3,)), ("rise", "f8", (3,)), ("fall", "f8", (3,)), ("bound", "f8", (3,)),
         ("theta", "f8", (3,)), ("covariance", "f8", (3,)),
-        ("base", "f8", (3,)), ("Z", "f8", (3,)), ("spread", "f8", (3,)),
+        ("offset", "f8", (3,)), ("Z", "f8", (3,)), ("spread", "f8", (3,)),
         # what bank.py and membership.py keep
         ("across", "f8", (3,)), ("reach_low", "f8", (MAX_POLES, 4)), ("reach_high", "f8", (MAX_POLES, 4)),
         ("theta_low", "f8", (3,)), ("theta_high", "f8", (3,)),

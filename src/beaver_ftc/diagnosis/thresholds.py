@@ -7,6 +7,10 @@ promises of the theory therefore hold at any frame rate, with no allowance for d
 
 from beaver_ftc.compiled import kernel
 
+# Double precision leaves 1e-16 of a rate below 6 rad/s, divided by a frame of 1 ms or more, and of the terms
+# of f + G u, which stay below 100 rad/s2; a few operations each.
+ROUNDING_RAD_S2 = 1e-11
+
 
 @kernel
 def bound_step(bound, eta_bar, decay, dt):
@@ -50,7 +54,7 @@ def uncertainty_bound(x, design, inertia, constant, earth_rate, eta_bar):
     1.
     """
     p, q, r = x[0], x[1], x[2]
-    earth = earth_rate * (2.0 * (abs(p) + abs(q) + abs(r)) + earth_rate)
+    earth = earth_rate * (2.0 * (abs(p) + abs(q) + abs(r)) + earth_rate) + ROUNDING_RAD_S2
     eta_bar[0] = inertia[0] * abs(design.Pqr * q * r) + constant[0] + earth
     eta_bar[1] = inertia[1] * abs(design.Qpr * p * r) + constant[1] + earth
     eta_bar[2] = inertia[2] * abs(design.Rpq * p * q) + constant[2] + earth

@@ -47,10 +47,7 @@ def _faulty(draw: Draw) -> Row:
         scenario = draw.scenario(fdi)
         row[scheme] = judge(fly(scenario))
     fault = scenario.faults[0]
-    return row | {
-        "actuator": fault.actuator, "magnitude": fault.magnitude, "profile": fault.profile, "rate_hz":
-        scenario.rate_hz
-    }  # fmt: skip
+    return row | {"rate_hz": scenario.rate_hz, "substeps": scenario.substeps, **fault.model_dump(exclude_none=True)}
 
 
 def judge(flight: Flight) -> Row:
@@ -59,6 +56,7 @@ def judge(flight: Flight) -> Row:
     """
     scenario = flight.scenario
     fault, frame_s = scenario.faults[0], 1.0 / scenario.rate_hz
+    actuator = getattr(fault, "actuator", "unanticipated")
     struck_s = ceil((fault.at_s - _LATE_S) * scenario.rate_hz) * frame_s
     delay_s = None if flight.detection_time_s is None else flight.detection_time_s - struck_s
     earliest_s = frame_s if scenario.substeps == 1 else 0.0  # of one JSBSim frame a fault shows in the next
@@ -70,6 +68,6 @@ def judge(flight: Flight) -> Row:
         "guaranteed_s": guaranteed_s,
         "late": late,
         "isolation_s": flight.isolation_time_s - struck_s if flight.isolation_time_s is not None else None,
-        "excluded": delay_s is not None and fault.actuator not in (*flight.candidates, flight.isolated),
-        "wrong": flight.isolated not in (None, fault.actuator),
+        "excluded": delay_s is not None and actuator not in (*flight.candidates, flight.isolated),
+        "wrong": flight.isolated not in (None, actuator),
     }

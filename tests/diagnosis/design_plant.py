@@ -1,0 +1,161 @@
+"""The design model as a plant, on which the theory holds exactly: x[k+1] = x[k] + dt (f + G u + phi + eta).
+
+A flight condition that moves, a law that follows changing references, an uncertainty that fights the
+diagnosis with all it is allowed, and a fault with any course in time. The diagnosis is the flying one,
+frame for frame.
+"""
+
+import numba
+import numpy as np
+from numba import njit
+
+from beaver_ftc.assembly import assemble
+from beaver_ftc.design.variants import response
+from beaver_ftc.diagnosis.bank import note_closest_approach
+from beaver_ftc.diagnosis.thresholds import ROUNDING_RAD_S2
+from beaver_ftc.frame import bound_now, diagnose
+from beaver_ftc.scenario.schema import Scenario
+
+TRAVEL_RAD = np.array([[-0.52, -0.49, -0.44, -0.1], [0.52, 0.49, 0.44, 1.03]])
+SURFACES = ("aileron", "elevator", "rudder")
+
+
+@njit
+def believe(frames):
+    """What the design model makes of this instant."""
+    frame = frames[0]
+    response(frame.design, frame.x, frame.y, frame.f, frame.G)
+    bound_now(frame)
+
+
+@njit
+def conclude(frames):
+    """The flying diagnosis of this instant."""
+    diagnose(frames[0])
+    note_closest_approach(frames[0].fdi)
+
+
+class DesignPlant:
+    """One flight. theta(k): the fault's parameter of `surface` at frame k, 0 while there is none."""
+
+    def __init__(self, seed=0, rate_hz=100.0, airspeed_mps=45.0, surface=None, theta=None, **fdi):
+        scenario = Scenario.model_validate({"name": "design-plant", "rate_hz": rate_hz, "fdi": fdi})
+        self.frames = assemble(scenario, np.zeros(4), TRAVEL_RAD)
+        if numba.config.DISABLE_JIT:
+            self.frames = self.frames.view(np.recarray)
+        self.frame, self.fdi = self.frames[0], self.frames[0]["fdi"]
+        self.fdi["earth_rate"] = 0.0  # this plant flies over a flat Earth at rest
+        self.dt, self.airspeed_mps = 1.0 / rate_hz, airspeed_mps
+        self.surface, self.theta = surface, theta or (lambda k: 0.0)
+        self.rng = np.random.default_rng(seed)
+        self.wave = self.rng.uniform(0.2, 2.0, 8), self.rng.uniform(0, 6.28, 8)
+        self.amplitude = self.rng.uniform(0.0, 0.2, 3)
+        self.x, self.u, self.k = self.rng.uniform(-0.05, 0.05, 3), np.zeros(4), 0
+        self.innovations, self.bounds = [], []
+
+    def _waves(self):
+        frequency, phase = self.wave
+        return np.sin(frequency * self.k * self.dt + phase)
+
+    def condition(self):
+        """y: incidence and airspeed wander slowly."""
+        w = self._waves()
+        V = self.airspeed_mps * (1 + 0.05 * w[0])
+        return np.array([0.1 + 0.05 * w[1], 0.05 * w[2], V, 0.5 * V * V, 0.3 + 0.1 * w[3]])
+
+    def command(self, f, G):
+        """Feedback linearisation towards square and sine references, limited: it need not be a good law."""
+        w = self._waves()
+        reference = self.amplitude * np.array([np.sign(w[4]), w[5], np.sign(w[6])])
+        u = np.linalg.solve(G[:, :3], 3.0 * (reference - self.x) - f)
+        return np.append(np.clip(u, -0.4, 0.4), 0.0)
+
+    def effect(self, G):
+        """phi of the fault, rad/s2."""
+        return (
+            np.zeros(3)
+            if self.surface is None
+            else self.theta(self.k) * G[:, self.surface] * self.u[self.surface]
+        )
+
+    def fly(self, frames, uncertainty, until=lambda plant: False):
+        """Fly so many frames, or until `until`, against `uncertainty(plant, bound, phi)` in rad/s2."""
+        for _ in range(frames):
+            self._step(uncertainty)
+            if until(self):
+                break
+        return self
+
+    def _step(self, uncertainty):
+        frame = self.frame
+        frame["k"], frame["t"] = self.k, self.k * self.dt
+        frame["x"], frame["y"], frame["u"] = self.x, self.condition(), self.u
+        believe(self.frames)
+        f, G = frame["f"].copy(), frame["G"].copy()
+        phi = self.effect(G)
+        frame["phi"] = phi
+        bound = np.maximum(self.fdi["eta_bar_now"] - ROUNDING_RAD_S2, 0.0)
+        conclude(self.frames)
+        eta = np.clip(uncertainty(self, bound, phi), -bound, bound)
+        self.innovations.append(phi + eta)
+        self.bounds.append(bound)
+        self.x = self.x + self.dt * (f + G @ self.u + phi + eta)
+        self.u = self.command(f, G)
+        self.k += 1
+
+    @property
+    def detected_at_s(self):
+        return float(self.fdi["detected_at_s"]) if self.fdi["detected"] else np.inf
+
+    @property
+    def certain_after_s(self):
+        certain = float(self.fdi["certain_after_s"])
+        return certain if certain >= 0 else np.inf
+
+    def excluded(self, surface):
+        """Whether the estimator of a surface has been excluded."""
+        return bool(self.fdi["estimator"][surface]["excluded"])
+
+
+def _random(plant, bound, phi):
+    return plant.rng.uniform(-bound, bound)
+
+
+def _bang_bang(plant, bound, phi):
+    held = plant.k // 7
+    return bound * np.sign(np.random.default_rng(held).uniform(-1, 1, 3))
+
+
+def _push(plant, bound, phi):
+    """Everything in the direction in which the residual already leans."""
+    return bound * np.where(plant.fdi["bank_residual"][0] >= 0, 1.0, -1.0)
+
+
+def _hide(plant, bound, phi):
+    """As much of the fault as possible is undone."""
+    return -phi
+
+
+def _exaggerate(plant, bound, phi):
+    """The fault seems larger than its set allows."""
+    return np.where(phi == 0.0, bound, np.sign(phi) * bound)
+
+
+def _sinusoid(plant, bound, phi):
+    return bound * np.sin(plant.wave[0][7] * 10 * plant.k * plant.dt)
+
+
+def _across(plant, bound, phi):
+    """The fault seems to be another surface's: roll and yaw are pushed apart."""
+    return bound * np.array([1.0, np.sign(plant.k % 3 - 1.0), -1.0]) * (1 if plant.k // 20 % 2 else -1)
+
+
+UNCERTAINTIES = {
+    "random": _random,
+    "bang-bang": _bang_bang,
+    "push": _push,
+    "hide": _hide,
+    "exaggerate": _exaggerate,
+    "sinusoid": _sinusoid,
+    "across": _across,
+}

@@ -1,0 +1,168 @@
+"""The promises of SPEC 5, on the plant where they hold exactly, against an uncertainty that fights them."""
+
+import numpy as np
+import pytest
+from design_plant import SURFACES, UNCERTAINTIES, DesignPlant
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+FRAMES = 160
+BOUNDS = {
+    "published": {},
+    "none": {"inertia_coupling": {"p": 0, "q": 0, "r": 0}, "constant_rad_s2": {"p": 0, "q": 0, "r": 0}},
+    "wide": {
+        "inertia_coupling": {"p": 1, "q": 0.5, "r": 2},
+        "constant_rad_s2": {"p": 0.1, "q": 0.001, "r": 0.05},
+    },
+}
+switches = st.fixed_dictionaries(
+    {name: st.booleans() for name in ("pole_bank", "memory", "shared_effectiveness", "set_membership")}
+)
+poles = st.floats(0.05, 1000)
+flights = st.fixed_dictionaries({
+    "seed": st.integers(0, 2**32),
+    "rate_hz": st.floats(20, 1000),
+    "airspeed_mps": st.floats(25, 60),
+    "detection_pole_per_s": poles,
+    "isolation_pole_per_s": poles,
+    "pole_bank_per_s": st.lists(st.one_of(poles, st.just(1e6)), max_size=5),
+    "forgetting_time_s": st.floats(0.1, 100),
+    "sharpen": switches,
+    "bounds": st.sampled_from(list(BOUNDS.values())),
+})  # fmt: skip
+uncertainties = st.sampled_from(list(UNCERTAINTIES.values()))
+
+
+def constant(at, size):
+    """A step at frame `at`."""
+    return lambda k: -size if k >= at else 0.0
+
+
+def incipient(at, size, grows):
+    """1 - exp(-grows (k - at)) from frame `at` on."""
+    return lambda k: -size * (1 - np.exp(-grows * (k - at))) if k >= at else 0.0
+
+
+def intermittent(at, size, period):
+    """On and off from frame `at` on."""
+    return lambda k: -size if k >= at and (k - at) // period % 2 == 0 else 0.0
+
+
+at, size = st.integers(0, FRAMES // 2), st.floats(0.0, 1.0)
+constants = st.builds(constant, at, size)
+any_course = st.one_of(
+    constants,
+    st.builds(incipient, at, size, st.floats(0.001, 1)),
+    st.builds(intermittent, at, size, st.integers(1, 40)),
+)
+
+
+@settings(max_examples=120, deadline=None)
+@given(flights, uncertainties, st.sampled_from(["interval", "published"]))
+def test_no_admissible_uncertainty_raises_an_alarm(flight, uncertainty, thresholds):
+    plant = DesignPlant(thresholds=thresholds, **flight).fly(FRAMES, uncertainty)
+    assert not plant.fdi["detected"]
+    assert not any(plant.excluded(s) for s in range(3))
+    assert max(plant.fdi["closest"]) <= 1.0  # of every filter, however near the uncertainty drives it
+
+
+@settings(max_examples=150, deadline=None)
+@given(flights, uncertainties, st.integers(0, 2), any_course)
+def test_the_true_fault_is_never_excluded_whatever_its_course(flight, uncertainty, surface, theta):
+    plant = DesignPlant(surface=surface, theta=theta, **flight).fly(FRAMES, uncertainty)
+    assert not plant.excluded(surface)
+
+
+@settings(max_examples=100, deadline=None)
+@given(flights, uncertainties, st.integers(0, 2), constants, st.sampled_from(["interval", "published"]))
+def test_a_constant_true_fault_is_never_excluded_by_any_threshold(
+    flight, uncertainty, surface, theta, thresholds
+):
+    """The published norm bound and set membership both presume a constant parameter."""
+    plant = DesignPlant(
+        surface=surface, theta=theta, thresholds=thresholds, fault_profile="abrupt", **flight
+    ).fly(FRAMES, uncertainty)
+    assert not plant.excluded(surface)
+    if plant.fdi["detected"]:
+        fie, true = plant.fdi["estimator"][surface], theta(FRAMES)
+        assert (fie["theta_low"] <= true + 1e-9).all()
+        assert (fie["theta_high"] >= true - 1e-9).all()
+
+
+@settings(max_examples=100, deadline=None)
+@given(flights, uncertainties, st.integers(0, 2), any_course)
+def test_detected_no_later_than_the_guaranteed_instant(flight, uncertainty, surface, theta):
+    plant = DesignPlant(surface=surface, theta=theta, **flight).fly(FRAMES, uncertainty)
+    assert plant.detected_at_s <= plant.certain_after_s
+
+
+@pytest.mark.parametrize("surface", range(3))
+def test_an_uncertainty_that_hides_the_fault_delays_detection_to_the_guaranteed_instant(surface):
+    """The guarantee is not slack: the worst uncertainty there is makes it come true and no earlier."""
+    plant = DesignPlant(seed=3, surface=surface, theta=incipient(20, 1.0, 0.01))
+    plant.fly(2000, UNCERTAINTIES["hide"], until=lambda p: p.fdi["detected"])
+    assert plant.detected_at_s == plant.certain_after_s < np.inf
+
+
+def test_bounds_are_attained_so_no_smaller_ones_would_do():
+    plant = DesignPlant(seed=1, pole_bank_per_s=[2.0, 50.0, 1e6]).fly(400, lambda p, bound, phi: bound)
+    assert plant.fdi["closest"][:4] == pytest.approx(1.0, abs=1e-6)
+
+
+def test_filters_and_bounds_are_the_convolutions_they_stand_for():
+    lam = 7.0
+    plant = DesignPlant(seed=2, surface=0, theta=constant(50, 0.5), detection_pole_per_s=lam)
+    plant.fly(200, UNCERTAINTIES["random"])
+    weight = plant.dt * np.exp(-lam * plant.dt * np.arange(198, -1, -1))
+    residual = weight @ np.array(plant.innovations[:199])
+    bound = weight @ np.array(plant.bounds[:199])
+    assert plant.fdi["bank_residual"][0] == pytest.approx(residual, abs=1e-12)
+    assert plant.fdi["bank_threshold"][0] == pytest.approx(bound, abs=1e-10)
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.integers(0, 2**32), st.floats(20, 200), poles, st.integers(0, 2), any_course, uncertainties)
+def test_no_filter_alarms_before_the_innovation_itself(seed, rate_hz, pole, surface, theta, uncertainty):
+    """Where every innovation is inside its bound there is nothing for any filter to find."""
+
+    def alarm(bank, lam):
+        plant = DesignPlant(
+            seed, rate_hz, surface=surface, theta=theta, pole_bank_per_s=bank, detection_pole_per_s=lam
+        )
+        return plant.fly(FRAMES, uncertainty, until=lambda p: p.fdi["detected"]).detected_at_s
+
+    assert alarm([1e6], pole) <= alarm([], pole)
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.integers(0, 2**32), st.integers(0, 2), st.floats(0.1, 1.0), uncertainties)
+def test_more_sharpening_never_isolates_later(seed, surface, size, uncertainty):
+    """On one recorded flight each step can only exclude more."""
+
+    def excluded(sharpen):
+        plant = DesignPlant(seed, surface=surface, theta=constant(20, size), sharpen=sharpen)
+        plant.fly(120, uncertainty)
+        return {s for s in range(3) if plant.excluded(s)}
+
+    none = {"memory": False, "shared_effectiveness": False, "set_membership": False}
+    assert excluded({**none}) <= excluded({**none, "memory": True}) <= excluded("all")
+
+
+def test_a_surface_is_named_at_the_alarm_when_no_other_moves_that_axis():
+    plant = DesignPlant(seed=5, surface=1, theta=constant(40, 0.5))
+    plant.fly(200, UNCERTAINTIES["random"], until=lambda p: p.fdi["detected"])
+    assert plant.fdi["isolated"] == SURFACES.index("elevator")
+    assert plant.fdi["isolated_at_s"] == plant.fdi["detected_at_s"]
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.integers(0, 2**32), st.sampled_from([0, 2]), st.floats(0.1, 1.0))
+def test_a_constant_parameter_stays_in_its_shrinking_set(seed, surface, size):
+    """Without any uncertainty the set closes on the parameter, and so does the estimate."""
+    plant = DesignPlant(seed, surface=surface, theta=constant(20, size), fault_profile="abrupt")
+    plant.fly(200, lambda *_: np.zeros(3), until=lambda p: False)
+    fie = plant.fdi["estimator"][surface]
+    if plant.fdi["detected"]:
+        assert fie["theta_low"][0] - 1e-9 <= -size <= fie["theta_high"][0] + 1e-9
+        assert fie["theta_low"][0] <= fie["theta"][0] <= fie["theta_high"][0]
+        assert fie["theta_low"][0] == fie["theta_low"][2]

@@ -17,7 +17,7 @@ def _known_law(name: str) -> str:
 class ControlConfig(BaseModel):
     """The law and its gains. All have defaults; the paper prints none of them."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, strict=True)
 
     law: Annotated[str, AfterValidator(_known_law)] = Field(
         "fault-tolerant",

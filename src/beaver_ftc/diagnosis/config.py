@@ -2,17 +2,18 @@
 
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, Strict, model_validator
 
 from beaver_ftc.diagnosis.state import DEADBEAT_PER_S, MAX_POLES
 
 Bound = Annotated[float, Field(ge=0, le=100)]
+Pole = Annotated[float, Field(gt=0, le=DEADBEAT_PER_S)]
 
 
 class PerAxis(BaseModel):
     """One non-negative number for each of p, q and r."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, strict=True)
 
     p: Bound = 0.0
     q: Bound = 0.0
@@ -35,7 +36,7 @@ def _known_scheme(name: str) -> str:
 class Bounds(BaseModel):
     """What uncertainty the diagnosis admits; thresholds follow from it [Zhang2005, sec. VII]."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, strict=True)
 
     inertia_coupling: PerAxis = Field(
         PerAxis(p=0.25, q=0.25, r=0.25), description="relative error of Pqr, Qpr, Rpq: as published"
@@ -48,7 +49,7 @@ class Bounds(BaseModel):
 class Sharpen(BaseModel):
     """Margin the published scheme gives away; each step loses no guarantee (docs/theory.md, section 3)."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
 
     pole_bank: bool = Field(True, description="alarm on the first of several filters: `fdi.pole_bank_per_s`")
     memory: bool = Field(
@@ -70,7 +71,7 @@ class Sharpen(BaseModel):
 class FdiConfig(BaseModel):
     """Gains, bounds and the choice of scheme. All have defaults."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, strict=True)
 
     scheme: Annotated[str, AfterValidator(_known_scheme)] = Field(
         "adaptive-estimators",
@@ -93,7 +94,7 @@ class FdiConfig(BaseModel):
     sharpen: Sharpen = Field(
         Sharpen(), description="steps beyond the published scheme: `all`, `none` or one by one"
     )
-    pole_bank_per_s: tuple[Annotated[float, Field(gt=0, le=DEADBEAT_PER_S)], ...] = Field(
+    pole_bank_per_s: Annotated[tuple[Pole, ...], Strict(False)] = Field(
         (DEADBEAT_PER_S,),
         max_length=MAX_POLES - 1,
         description="filters beside the published one, 1/s; the default keeps a single frame",

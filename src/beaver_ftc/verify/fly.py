@@ -47,7 +47,11 @@ def _faulty(draw: Draw) -> Row:
         scenario = draw.scenario(fdi)
         row[scheme] = judge(fly(scenario))
     fault = scenario.faults[0]
-    return row | {"rate_hz": scenario.rate_hz, "substeps": scenario.substeps, **fault.model_dump(exclude_none=True)}
+    return row | {
+        "rate_hz": scenario.rate_hz,
+        "substeps": scenario.substeps,
+        **fault.model_dump(exclude_none=True),
+    }
 
 
 def judge(flight: Flight) -> Row:

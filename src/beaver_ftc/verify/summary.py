@@ -35,7 +35,7 @@ def summarise(rows: dict[str, list[Row]]) -> dict[str, Any]:
 def _healthy(rows: Sequence[Row]) -> dict[str, Any]:
     hours = sum(row["watched_s"] for row in rows) / 3600.0
     alarms = sum(row["alarm"] for row in rows)
-    closest = np.array([row["closest"] for row in rows]).reshape(len(rows), -1)
+    closest = np.max([row["closest"] for row in rows], axis=0).tolist() if rows else []
     return {
         "flights": len(rows),
         "hours": hours,
@@ -44,7 +44,7 @@ def _healthy(rows: Sequence[Row]) -> dict[str, Any]:
         "false_alarms_per_hour_upper_95": poisson_upper(alarms, hours) if hours else None,
         "departures": sum(row["departed"] for row in rows),
         "hours_outside_envelope": sum(row["outside_s"] for row in rows) / 3600.0,
-        "closest_approach": dict(zip(SCHEMES, closest.max(axis=0).tolist(), strict=False))
+        "closest_approach": dict(zip(SCHEMES, closest, strict=False))
         if len(rows)
         else {},
     }

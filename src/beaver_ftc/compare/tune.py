@@ -36,16 +36,16 @@ MARGIN = 1.2
 DEPARTED_DEG_S = 10.0
 LEVEL = "alarm"
 DETECTORS: dict[str, dict[str, tuple[float, ...]]] = {
-    "rls-monitor": {"forgetting_s": (2.0, 10.0), "score_s": (1.0, 4.0)},
-    "augmented-ekf": {"noise": (1.0, 3.0, 10.0), "drift_per_s": (0.03, 0.1, 0.5)},
-    "augmented-ukf": {"noise": (1.0, 3.0), "drift_per_s": (0.03, 0.3), "allowance": (0.3, 1.0)},
-    "multiple-models": {"noise": (0.5, 1.0, 3.0), "stay": (0.999, 0.9999)},
-    "observer-constant": {"pole_per_s": (3.0, 10.0, 30.0, 100.0)},
+    "rls-monitor": {"forgetting_s": (0.5, 2.0, 10.0), "score_s": (0.5, 1.0, 4.0)},
+    "augmented-ekf": {"noise": (1.0, 3.0, 10.0), "drift_per_s": (0.1, 0.5, 2.0)},
+    "augmented-ukf": {"noise": (1.0, 3.0), "drift_per_s": (0.03, 0.3), "allowance": (1.0, 3.0)},
+    "multiple-models": {"noise": (0.25, 0.5, 1.0), "stay": (0.99, 0.999)},
+    "observer-constant": {"pole_per_s": (10.0, 100.0, 1e4)},
 }
 LAWS: dict[str, dict[str, tuple[float, ...]]] = {
-    "indi": {"filter_per_s": (50.0, 100.0, 200.0)},
-    "l1-adaptive": {"bandwidth_per_s": (10.0, 20.0, 40.0)},
-    "lqr": {"deflection_deg": (1.0, 3.0, 10.0)},
+    "indi": {"filter_per_s": (100.0, 200.0, 400.0)},
+    "l1-adaptive": {"bandwidth_per_s": (20.0, 40.0, 80.0)},
+    "lqr": {"deflection_deg": (3.0, 10.0, 30.0)},
 }
 # The level at which the statistic is 1 per unit of itself: traces at any level follow from it.
 _UNIT = {LEVEL: 1.0}

@@ -27,7 +27,7 @@ def test_a_row_says_what_the_flights_metrics_say(short):
 
 
 def test_every_metric_has_a_column(short):
-    """All that SPEC 9 lists, but for what is the same in all flights and lists, which have their own columns."""
+    """All that SPEC 9 lists, but for what all flights share; lists have columns of their own."""
     from beaver_ftc.loop import fly
 
     document = metrics(fly(scenario_of(short, Plan(short).assignments([0])[0])))
@@ -63,8 +63,11 @@ def test_values_that_contradict_each_other_are_a_row_too(short):
 
 @pytest.mark.parametrize(
     ("error", "reason"),
-    [(SimulationFailed("q_rad_s not finite"), "q_rad_s not finite"), (ZeroDivisionError("of a plug-in"), "ZeroDivisionError: of a plug-in")],
-)  # fmt: skip
+    [
+        (SimulationFailed("q_rad_s not finite"), "q_rad_s not finite"),
+        (ZeroDivisionError("of a plug-in"), "ZeroDivisionError: of a plug-in"),
+    ],
+)
 def test_a_flight_that_fails_is_a_row_with_its_reason(short, monkeypatch, error, reason):
     def fail(*_, **__):
         raise error

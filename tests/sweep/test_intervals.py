@@ -32,7 +32,7 @@ def test_no_event_in_three_units_bounds_the_rate_at_one():
 
 
 def test_wilks_number_of_flights_bounds_a_quantile():
-    """S.S. Wilks (1941): 59 is the least number whose largest bounds the 95 % quantile with 95 % confidence."""
+    """S.S. Wilks (1941): the largest of 59 bounds the 95 % quantile with 95 % confidence; of 58 not."""
     assert quantile_bound(np.arange(59.0), 0.95, 0.95, upper=True) == 58.0
     assert quantile_bound(np.arange(58.0), 0.95, 0.95, upper=True) == math.inf
     assert quantile_bound(np.arange(59.0), 0.05, 0.95, upper=False) == 0.0

@@ -188,7 +188,7 @@ def test_what_cannot_be_flown_does_not_stop_the_rest(tmp_path, small_batches):
 
 def test_if_nothing_can_be_flown_that_is_a_failure(tmp_path, small_batches):
     nothing = sweep_of(UNFLYABLE.replace("[20, 45]", "[20]"))
-    with pytest.raises(SimulationFailed, match="no flight could be flown: .*20 m/s"):
+    with pytest.raises(SimulationFailed, match=r"no flight could be flown: .*20 m/s"):
         run_sweep(nothing, Options(out=tmp_path, workers=2, report=False))
     assert (tmp_path / "short" / "summary.json").exists()
 

@@ -52,7 +52,7 @@ BASE = {"frames": 1, "status": "flown", "flown_s": 20.0, "fault.at_s": 5.0, "fal
         ("delay", {"detection.delay_s": None, "false_alarm": True}, -np.inf),
         ("delay", {"frames": None}, -np.inf),
         ("false_alarm", {"worst_residual_ratio": 0.8}, 0.8),
-        ("tracking", {f"tracking.post_fault_rms_deg_s.{a}": v for a, v in zip("pqr", (1.0, 3.0, 2.0), strict=True)}, 3.0),
+        ("tracking", {f"tracking.post_fault_rms_deg_s.{axis}": "pqr".index(axis) for axis in "pqr"}, 2.0),
         ("tracking", {"status": "departed"}, 1e6 - 20.0),
     ],
 )  # fmt: skip

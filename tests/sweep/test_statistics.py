@@ -48,7 +48,8 @@ def detected(run, delay_s, name="elevator", **metrics):
 
 ROWS = [
     detected(0, 0.1), detected(1, 0.2), detected(2, 0.3, **{"detection.guaranteed_delay_s": 0.25}),
-    detected(3, 0.4, "aileron"), detected(4, 0.5, None), detected(5, 0.6, **{"detection.guaranteed_delay_s": 0.7}),
+    detected(3, 0.4, "aileron"), detected(4, 0.5, None),
+    detected(5, 0.6, **{"detection.guaranteed_delay_s": 0.7}),
     row(6), row(7),
     row(8, **{"false_alarm": True, "detection.detected": True, "detection.time_s": 3.0, "fault_free_s": 3.0}),
     row(9, "departed", **{"reason": "alpha_rad at 20 s", "flown_s": 20.0, "passed": False}),

@@ -1,4 +1,4 @@
-"""`beaver-ftc validate`: say what is wrong with scenario files, without flying them."""
+"""`beaver-ftc validate`: say what is wrong with scenario and sweep files, without flying them."""
 
 from typing import Annotated, Any
 
@@ -11,11 +11,11 @@ from beaver_ftc.errors import BadInput
 
 def command(
     files: Annotated[
-        list[str], typer.Argument(metavar="FILE", help="Scenario files, or names of built-in ones.")
+        list[str], typer.Argument(metavar="FILE", help="Scenario and sweep files, or names of built-in ones.")
     ],
     format: FormatOption = Format.text,
 ) -> None:
-    """Check scenario files.
+    """Check scenario and sweep files.
 
     Every mistake is one line on standard error, FILE:LINE: key.path: what is wrong, what is allowed.
 
@@ -32,8 +32,12 @@ def command(
 
 def _check(file: str) -> dict[str, Any]:
     from beaver_ftc.scenario.loader import load_scenario
+    from beaver_ftc.scenario.sweep_loader import is_sweep, load_sweep
 
     try:
+        if is_sweep(file):
+            load_sweep(file)
+            return {"file": file, "valid": True, "errors": [], "warnings": []}
         scenario = load_scenario(file)
         check_flyable(scenario, file)
     except BadInput as error:

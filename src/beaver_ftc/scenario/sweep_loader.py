@@ -71,6 +71,15 @@ def load_sweep_text(
     return Sweep(file, base)
 
 
+def is_sweep(path_or_name: str | Path) -> bool:
+    """Whether a file (or name) that can be read says that it is a sweep: it has a `base`, as no scenario has."""
+    path = resolve_sweep(path_or_name)
+    try:
+        return path.is_file() and "base" in parse_document(read_file(path, str(path)), str(path)).data
+    except ScenarioError:
+        return False
+
+
 def builtin_sweeps() -> list[str]:
     """Names of the sweeps that come with the project."""
     return sorted(path.stem for path in (data_root() / "scenarios" / "sweeps").glob("*.yaml"))

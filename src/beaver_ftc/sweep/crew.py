@@ -14,7 +14,7 @@ from multiprocessing.connection import Connection, wait
 from typing import Any, NamedTuple, Protocol
 
 from beaver_ftc.errors import SimulationFailed
-from beaver_ftc.sweep.flying import Job, fly_all
+from beaver_ftc.sweep.flying import Job, fly_all, warm_up
 from beaver_ftc.sweep.sampling import Assignment
 from beaver_ftc.sweep.table import Row
 
@@ -67,7 +67,11 @@ class LocalCrew:
     def __init__(self, job: Job, workers: int) -> None:
         self._job = job
         self._context = _context()
-        self._workers = [self._hire() for _ in range(workers)]
+        self._workers = [self._hire()]
+        wait(
+            [self._workers[0].connection]
+        )  # the first compiles, should that be needed; the others find it done
+        self._workers += [self._hire() for _ in range(workers - 1)]
 
     @property
     def slots(self) -> int:
@@ -126,8 +130,9 @@ def serve(connection: Connection, job: Job) -> None:
     """The life of a worker process: fly what comes until nobody is there any more."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the terminal's Ctrl-C is for the one who gives the orders
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    connection.send(_READY)
     with silence(), contextlib.suppress(EOFError, OSError):
+        warm_up(job)
+        connection.send(_READY)
         while True:
             connection.send(_flown(job, connection.recv()))
 

@@ -1,5 +1,6 @@
 """One flight of a sweep: its scenario, its row, and on request its log. What runs in the workers."""
 
+import contextlib
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -73,6 +74,15 @@ def fly_one(job: Job, assignment: Assignment) -> Row:
 def fly_all(job: Job, assignments: Sequence[Assignment]) -> list[Row]:
     """Fly one after the other."""
     return [fly_one(job, assignment) for assignment in assignments]
+
+
+def warm_up(job: Job) -> None:
+    """Fly two frames of the base, so that whatever is compiled or loaded once has been."""
+    from beaver_ftc.loop import fly
+
+    with contextlib.suppress(Exception):  # whatever is wrong shows in the flights' rows
+        base = job.sweep.scenario({})
+        fly(base.model_copy(update={"duration_s": 2.0 / base.rate_hz, "faults": ()}))
 
 
 def _row(sweep: Sweep, assignment: Assignment) -> Row:

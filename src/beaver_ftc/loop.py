@@ -60,12 +60,18 @@ class Loop:
     """One flight in progress. detector, law: plug-ins to fly with, in place of those the scenario names."""
 
     def __init__(
-        self, scenario: Scenario, detector: "Detector | None" = None, law: "Law | None" = None
+        self,
+        scenario: Scenario,
+        detector: "Detector | None" = None,
+        law: "Law | None" = None,
+        prepare: Callable[[Plant], None] | None = None,
     ) -> None:
         self.scenario = scenario
         self.plant = Plant(scenario.rate_hz, scenario.substeps)
         configure(self.plant, scenario)
         self.trim = trim_of(scenario, self.plant)
+        if prepare is not None:
+            prepare(self.plant)
         self.plant.start(self.trim)
         surfaces = np.array([getattr(self.trim, f"{s}_rad") for s in SURFACES])
         self.frames = assemble(scenario, surfaces, travel_rad(self.plant))
@@ -217,15 +223,17 @@ def fly(
     progress: Callable[[float], None] | None = None,
     detector: "Detector | None" = None,
     law: "Law | None" = None,
+    prepare: Callable[[Plant], None] | None = None,
 ) -> Flight:
     """Fly a scenario. The log goes to `sink`; `progress` is called with the share flown, chunk by chunk.
 
-    detector, law: plug-ins to fly with, in place of those the scenario names.
+    detector, law: plug-ins to fly with, in place of those the scenario names. prepare: called with the
+    trimmed plant just before the flight.
 
     Raises BadInput when the flight cannot be trimmed or asks for what there is not, SimulationFailed when a
     value is not finite.
     """
-    loop = Loop(scenario, detector, law)
+    loop = Loop(scenario, detector, law, prepare)
     if sink is not None:
         sink.open(loop.columns)
     for rows in loop.chunks():

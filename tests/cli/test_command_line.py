@@ -60,11 +60,38 @@ def test_resolved_scenario_flies_again_to_the_same_numbers(short):
 def test_json_is_one_document_and_nothing_else(short):
     done = _beaver("run", "short.yaml", "--format", "json", "--no-report", cwd=short)
     document = json.loads(done.stdout)
-    assert document["passed"] is True
-    (run,) = document["runs"]
+    (run,) = document.pop("runs")
+    assert document == run
     assert run.pop("folder") == "runs/short"
     assert run == json.loads((short / "runs/short/metrics.json").read_text())
+    assert run["passed"] is True
     assert _names(short / "runs/short") == ["log.parquet", "metrics.json", "scenario.yaml"]
+
+
+def test_json_of_several_scenarios_is_a_list_with_one_verdict(short):
+    (short / "strict.yaml").write_text(SHORT.replace("short", "strict").replace("1.0", "0.0"))
+    done = _beaver("run", "short.yaml", "strict.yaml", "--format", "json", "--no-report", cwd=short)
+    document = json.loads(done.stdout)
+    assert set(document) == {"passed", "runs"}
+    assert document["passed"] is False
+    assert [run["passed"] for run in document["runs"]] == [True, False]
+
+
+def test_exports_lie_beside_the_log_when_asked_for(short):
+    assert _beaver("run", "short.yaml", "--no-report", "--csv", "--acmi", cwd=short).returncode == 0
+    expected = ["flight.acmi", "log.csv", "log.parquet", "metrics.json", "scenario.yaml"]
+    assert _names(short / "runs/short") == expected
+    assert _beaver("run", "short.yaml", "--no-report", cwd=short).returncode == 0
+    assert "log.csv" not in _names(short / "runs/short")
+
+
+@pytest.mark.parametrize("address", ["localhost", ":5550", "localhost:0", "localhost:65536", "localhost:x"])
+def test_what_is_no_address_of_a_flightgear_is_bad_input(short, address):
+    done = _beaver("run", "short.yaml", "--flightgear", address, cwd=short)
+    assert done.returncode == 2
+    assert done.stderr.splitlines() == [
+        f"--flightgear: {address!r} is no address, allowed: HOST:PORT with a port of 1 to 65535"
+    ]
 
 
 def test_missed_expectation_is_status_1(short):
@@ -295,7 +322,7 @@ def test_what_nobody_foresaw_is_one_line_and_status_3(short, format):
     script = (
         "import sys, beaver_ftc.loop as loop\n"
         f"sys.argv = ['beaver-ftc', 'run', 'short.yaml', '--no-report', '--format', '{format}']\n"
-        "def fly(*_): raise ZeroDivisionError('two\\nlines')\n"
+        "def fly(*_, **__): raise ZeroDivisionError('two\\nlines')\n"
         "loop.fly = fly\n"
         "from beaver_ftc.cli.main import main\n"
         "main()"

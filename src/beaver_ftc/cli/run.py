@@ -1,5 +1,7 @@
 """`beaver-ftc run`: fly scenarios, keep the results, say the verdict."""
 
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -10,7 +12,10 @@ from beaver_ftc.cli.output import Format, FormatOption, complain, emit, emit_jso
 from beaver_ftc.errors import BadInput, BeaverFtcError
 
 if TYPE_CHECKING:
+    from beaver_ftc.plant.adapter import Plant
     from beaver_ftc.scenario.schema import Scenario
+
+    Prepare = Callable[[Plant], None]
 
 
 def command(
@@ -25,10 +30,16 @@ def command(
     junit: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Also write the verdict as JUnit XML, for CI.")
     ] = None,
+    csv: Annotated[bool, typer.Option("--csv", help="Also write the log as log.csv.")] = False,
+    acmi: Annotated[bool, typer.Option("--acmi", help="Also write flight.acmi, for Tacview.")] = False,
+    flightgear: Annotated[
+        str | None, typer.Option(metavar="HOST:PORT", help="Show it in FlightGear, at the pace of the clock.")
+    ] = None,
 ) -> None:
     """Fly scenarios and say the verdict.
 
-    With --format json: {"passed": ..., "runs": [...]}, each run its metrics and `folder`, or its `error`.
+    With --format json: the metrics and `folder` of the run (or its `error`), with `runs`, a list of it; of
+    several scenarios {"passed": ..., "runs": [...]}.
     """
     try:
         loaded = load_all(scenarios)
@@ -38,17 +49,47 @@ def command(
         if junit is not None:
             _write_junit([{"scenario": "scenarios", "error": str(error)}], junit)
         raise
-    raise typer.Exit(_run_all(loaded, out, format, not no_report, junit))
+    exports = [name for name, wanted in (("csv", csv), ("acmi", acmi)) if wanted]
+    run_one = partial(
+        _run_one, out=out, with_report=not no_report, exports=exports, prepare=_shown(flightgear)
+    )
+    raise typer.Exit(_run_all(loaded, run_one, format, junit))
+
+
+def _shown(flightgear: str | None) -> "Prepare | None":
+    """What connects a plant to the FlightGear at HOST:PORT."""
+    if flightgear is None:
+        return None
+    host, port = _address(flightgear)
+    from beaver_ftc.plant.flightgear import show_in_flightgear
+
+    return partial(show_in_flightgear, host=host, port=port)
+
+
+def _address(given: str) -> tuple[str, int]:
+    import socket
+
+    host, _, port = given.rpartition(":")
+    if not host or not port.isdecimal() or not 0 < int(port) < 65536:
+        raise BadInput(f"--flightgear: {given!r} is no address, allowed: HOST:PORT with a port of 1 to 65535")
+    try:
+        socket.getaddrinfo(host, int(port), socket.AF_INET, socket.SOCK_DGRAM)
+    except (OSError, UnicodeError):
+        raise BadInput(f"--flightgear: there is no host {host!r}") from None
+    return host, int(port)
 
 
 def _run_all(
-    scenarios: list["Scenario"], out: Path, format: Format, with_report: bool, junit: Path | None
+    scenarios: list["Scenario"],
+    run_one: Callable[["Scenario"], dict[str, Any]],
+    format: Format,
+    junit: Path | None,
 ) -> int:
     """Fly one after the other; one that fails does not stop the rest. Returns the worst exit status."""
     runs, status = [], 0
     for scenario in scenarios:
         try:
-            document = _run_one(scenario, out, with_report)
+            document = run_one(scenario)
         except Exception as error:
             failure = error if isinstance(error, BeaverFtcError) else unexpected(error)
             status = max(status, report(failure))
@@ -61,7 +102,8 @@ def _run_all(
     if junit is not None:
         _write_junit(runs, junit)
     if format is Format.json:
-        emit_json({"passed": status == 0, "runs": runs})
+        first = runs[0] if len(runs) == 1 else {}
+        emit_json(first | {"passed": status == 0, "runs": runs})
     return status
 
 
@@ -71,14 +113,16 @@ def _write_junit(runs: list[dict[str, Any]], junit: Path) -> None:
     write_junit(runs, junit)
 
 
-def _run_one(scenario: "Scenario", out: Path, with_report: bool) -> dict[str, Any]:
+def _run_one(
+    scenario: "Scenario", out: Path, with_report: bool, exports: list[str], prepare: "Prepare | None"
+) -> dict[str, Any]:
     from beaver_ftc.cli.progress import progress_bar
     from beaver_ftc.results.run import run
 
     for warning in scenario.warnings():
         complain(f"{scenario.name}: warning: {warning}")
     with progress_bar(scenario.name) as progress:
-        document = run(scenario, out, with_report, progress)
+        document = run(scenario, out, with_report, progress, exports, prepare)
     return document | {"folder": str(out / scenario.name)}
 
 

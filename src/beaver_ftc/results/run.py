@@ -1,6 +1,6 @@
 """Fly a scenario and keep what came out: the result folder of one run (SPEC 9)."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -9,14 +9,23 @@ from beaver_ftc.results.metrics import Document, as_json, metrics
 from beaver_ftc.results.writer import result_folder
 
 if TYPE_CHECKING:
+    from beaver_ftc.plant.adapter import Plant
     from beaver_ftc.scenario.schema import Scenario
 
 Progress = Callable[[float], None]
 
 
-def run(scenario: "Scenario", out: Path, report: bool = True, progress: Progress | None = None) -> Document:
+def run(
+    scenario: "Scenario",
+    out: Path,
+    report: bool = True,
+    progress: Progress | None = None,
+    exports: Collection[str] = (),
+    prepare: "Callable[[Plant], None] | None" = None,
+) -> Document:
     """Fly `scenario`, write `out/<name>/` whole or not at all, and return the metrics document.
 
+    exports: of "csv" and "acmi". prepare: called with the trimmed plant just before the flight.
     Raises BadInput for a flight that cannot be trimmed, SimulationFailed for one not completed or kept.
     """
     from beaver_ftc.loop import fly
@@ -24,12 +33,14 @@ def run(scenario: "Scenario", out: Path, report: bool = True, progress: Progress
 
     with result_folder(out, scenario.name) as folder:
         with ParquetLog(folder / "log.parquet") as log:
-            flight = fly(scenario, log, progress)
+            flight = fly(scenario, log, progress, prepare=prepare)
         document = metrics(flight)
         (folder / "scenario.yaml").write_text(to_yaml(scenario), encoding="utf-8")
         (folder / "metrics.json").write_text(as_json(document), encoding="utf-8")
         if report:
             write_report_files(folder, document)
+        if exports:
+            write_exports(folder, document, exports)
     return document
 
 
@@ -40,3 +51,13 @@ def write_report_files(folder: Path, document: Document) -> None:
 
     write_figures(folder / "log.parquet", document, folder / "figures")
     write_report(folder / "report.html", [folder])
+
+
+def write_exports(folder: Path, document: Document, exports: Collection[str]) -> None:
+    """Write the log of a result folder for other tools: "csv" as log.csv, "acmi" as flight.acmi."""
+    from beaver_ftc.results.exports import write_acmi, write_csv
+
+    if "csv" in exports:
+        write_csv(folder / "log.parquet", folder / "log.csv")
+    if "acmi" in exports:
+        write_acmi(folder / "log.parquet", document, folder / "flight.acmi")

@@ -1,0 +1,40 @@
+"""Shows a flight in FlightGear while it is flown: JSBSim's own output, at the pace of the clock."""
+
+import time
+from collections.abc import Callable
+
+from beaver_ftc.errors import SimulationFailed
+from beaver_ftc.plant.adapter import Plant
+
+DIRECTIVE = "aircraft/beaver/flightgear.xml"
+
+
+def show_in_flightgear(plant: Plant, host: str, port: int) -> None:
+    """Send the plant's state to FlightGear from its start on, and hold its frames back to real time.
+
+    Call it before `Plant.start`, with which JSBSim opens the socket. UDP: nobody need listen.
+    """
+    loaded = plant.fdm.set_output_directive(DIRECTIVE)
+    # JSBSim 1.3.3 documents HOST:PORT/PROTOCOL, and takes HOST:PROTOCOL/PORT.
+    if not loaded or not plant.fdm.set_output_filename(0, f"{host}:UDP/{port}"):
+        raise SimulationFailed(f"JSBSim cannot load {DIRECTIVE}")
+    plant.fdm.enable_output()
+    plant.run = paced(plant.run, plant.dt_s)
+
+
+def paced(
+    run: Callable[[], bool],
+    dt_s: float,
+    clock: Callable[[], float] = time.monotonic,
+    sleep: Callable[[float], None] = time.sleep,
+) -> Callable[[], bool]:
+    """`run` no sooner than dt_s after its last turn was due; what is late is not caught up in a burst."""
+    due = clock()
+
+    def on_time() -> bool:
+        nonlocal due
+        due = max(due + dt_s, clock())
+        sleep(max(0.0, due - clock()))
+        return run()
+
+    return on_time

@@ -1,6 +1,6 @@
 """Turns a scenario into the frame record that the compiled loop works on."""
 
-from math import exp, pi
+from math import ceil, exp, pi, radians
 
 import numpy as np
 
@@ -8,25 +8,33 @@ from beaver_ftc import channels as ch
 from beaver_ftc.control.config import ControlConfig
 from beaver_ftc.control.reference_model import discretise
 from beaver_ftc.control.state import LAWS, NOMINAL
-from beaver_ftc.design.model import AILERON, ELEVATOR, RUDDER
+from beaver_ftc.design.coefficients import SURFACES
+from beaver_ftc.design.model import AILERON, ELEVATOR, FLAP, RUDDER
 from beaver_ftc.design.variants import design_of
 from beaver_ftc.diagnosis.config import FdiConfig
-from beaver_ftc.diagnosis.fault_class import LOSS, PARAMETER_SET
-from beaver_ftc.diagnosis.state import INTERVAL, NOT_ISOLATED, PUBLISHED
+from beaver_ftc.diagnosis.fault_class import PARAMETER_SET
+from beaver_ftc.diagnosis.state import INTERVAL, LOSS, NOT_ISOLATED, POSITION, PUBLISHED
 from beaver_ftc.frame import FRAME
 from beaver_ftc.scenario.schema import Scenario
 
+RUNAWAY_RATE_RAD_S = pi / 3.0  # of an actuator with no declared rate limit: the aircraft's default
 EARTH_RATE_RAD_S = 2.0 * pi / 86164.0905  # one turn per sidereal day [WGS84]
 PUBLISHED_CLASS = (("aileron", LOSS, AILERON), ("elevator", LOSS, ELEVATOR), ("rudder", LOSS, RUDDER))
+EVERY_TYPE = (
+    *PUBLISHED_CLASS,
+    ("flap", LOSS, FLAP),
+    *((f"{s}_position", POSITION, i) for i, s in enumerate(SURFACES)),
+)
+FAULT_CLASSES = {"published": PUBLISHED_CLASS, "all": EVERY_TYPE}
 _THRESHOLDS = {"interval": INTERVAL, "published": PUBLISHED}
 
 
-def estimator_names() -> tuple[str, ...]:
-    """Names of the isolation estimators, in the bank's order."""
-    return tuple(name for name, _, _ in PUBLISHED_CLASS)
+def estimator_names(fault_class: str) -> tuple[str, ...]:
+    """Names of the isolation estimators of a fault class, in the bank's order."""
+    return tuple(name for name, _, _ in FAULT_CLASSES[fault_class])
 
 
-def _assemble_diagnosis(fdi: np.void, config: FdiConfig, dt: float) -> None:
+def _assemble_diagnosis(fdi: np.void, config: FdiConfig, dt: float, travel: np.ndarray) -> None:
     fdi["enabled"] = config.scheme == "adaptive-estimators"
     fdi["thresholds"] = _THRESHOLDS[config.thresholds]
     fdi["dt"] = dt
@@ -39,10 +47,22 @@ def _assemble_diagnosis(fdi: np.void, config: FdiConfig, dt: float) -> None:
     fdi["earth_rate"] = EARTH_RATE_RAD_S
     fdi["detected_at_s"] = fdi["isolated_at_s"] = fdi["certain_after_s"] = -1.0
     fdi["isolated"] = NOT_ISOLATED
-    fdi["n_estimators"] = len(PUBLISHED_CLASS)
-    for fie, (_, kind, surface) in zip(fdi["estimator"], PUBLISHED_CLASS, strict=False):
+    members = FAULT_CLASSES[config.fault_class]
+    fdi["n_estimators"] = len(members)
+    for fie, (_, kind, surface) in zip(fdi["estimator"], members, strict=False):
         fie["kind"], fie["surface"] = kind, surface
-        fie["low"], fie["high"] = PARAMETER_SET[kind]
+        fie["low"], fie["high"] = PARAMETER_SET[kind] if kind == LOSS else travel[:, surface]
+
+
+def _assemble_types(fdi: np.void, scenario: Scenario, dt: float, travel: np.ndarray) -> None:
+    config = scenario.fdi
+    fdi["every_type"], fdi["whole"] = config.fault_class == "all", scenario.substeps == 1
+    fdi["patience"] = ceil(pi / config.slowest_oscillation_rad_s / dt)
+    fdi["type"] = fdi["lead"] = fdi["lead_kind"] = fdi["type_at_s"] = -1
+    for name, place, low, high in zip(SURFACES, fdi["surface"], *travel, strict=True):
+        place["travel_low"], place["travel_high"] = low, high
+        rate_deg_s = getattr(scenario.actuators, name).rate_limit_deg_s
+        place["least_runaway_rate"] = 0.5 * (radians(rate_deg_s) or RUNAWAY_RATE_RAD_S)
 
 
 def _assemble_sharpening(fdi: np.void, config: FdiConfig, dt: float) -> None:
@@ -71,6 +91,7 @@ def _assemble_control(
     )
     control["effectiveness"] = 1.0
     control["effectiveness_step"] = config.effectiveness_rate_per_s * dt if config.law != "oracle" else np.inf
+    control["offset_step"] = control["effectiveness_step"]
     control["least_effectiveness"] = config.least_effectiveness
     control["trim"] = control["command"] = trim
     control["low"], control["high"] = travel
@@ -91,7 +112,8 @@ def assemble(scenario: Scenario, trim: np.ndarray, travel: np.ndarray) -> np.nda
     frame["design"] = design_of(scenario.design_model)[0]
     frame["factor"] = [factor for _, _, factor in ch.TRUTH]
     frame["u"] = trim
-    _assemble_diagnosis(frame["fdi"], scenario.fdi, dt)
+    _assemble_diagnosis(frame["fdi"], scenario.fdi, dt, travel)
+    _assemble_types(frame["fdi"], scenario, dt, travel)
     _assemble_sharpening(frame["fdi"], scenario.fdi, dt)
     _assemble_network(frame["fdi"]["network"], scenario.control)
     _assemble_control(frame["control"], scenario.control, dt, trim, travel)

@@ -52,3 +52,6 @@ class Flight:
     saturation_s: dict[str, float]
     worst_residual_ratio: float
     closest_approach: tuple[float, ...] = ()
+    type_time_s: float | None = None
+    estimate_interval: tuple[float, float] | None = None
+    frequency_rad_s: float | None = None

@@ -15,7 +15,7 @@ from beaver_ftc.control import adaptive, allocation, nominal, reference_model
 from beaver_ftc.control.state import CONTROL, NOMINAL, ORACLE
 from beaver_ftc.design.model import ALPHA, BETA, DESIGN, ELEVATOR, QDYN
 from beaver_ftc.design.variants import response
-from beaver_ftc.diagnosis import bank, detection, guarantee, isolation, network
+from beaver_ftc.diagnosis import bank, detection, fault_types, guarantee, isolation, network
 from beaver_ftc.diagnosis.state import DIAGNOSIS
 from beaver_ftc.diagnosis.thresholds import uncertainty_bound
 from beaver_ftc.plant.native import read_nodes, write_nodes
@@ -45,7 +45,7 @@ FRAME = np.dtype(
         ("factor", "f8", (ch.N_TRUTH,)), ("truth", "f8", (ch.N_TRUTH,)),
         ("latitude_0", "f8"), ("longitude_0", "f8"), ("radius_m", "f8"),
         # the truth's faults, for the oracle and for the analyst
-        ("faulted", "i8"), ("fault_at_s", "f8"), ("Cm_alpha3", "f8"), ("phi", "f8", (3,)),
+        ("faulted", "i8"), ("fault_at_s", "f8"), ("immovable", "i8", (4,)), ("Cm_alpha3", "f8"), ("phi", "f8", (3,)),
         # what is measured and believed
         ("x", "f8", (3,)), ("y", "f8", (5,)), ("u", "f8", (4,)),
         ("f", "f8", (3,)), ("G", "f8", (3, 4)), ("G_believed", "f8", (3, 4)),
@@ -55,7 +55,7 @@ FRAME = np.dtype(
         ("Gu_first", "f8", (3, 4)), ("Gu_spread", "f8", (3, 4)),
         ("G_mean", "f8", (3, 4)), ("Gu_mean", "f8", (3, 4)), ("believed", "f8", (3,)),
         ("design_mean", "f8", (3,)),
-        ("fhat", "f8", (3,)), ("target", "f8", (4,)),
+        ("fhat", "f8", (3,)), ("target", "f8", (4,)), ("offset", "f8", (4,)),
         # what happened
         ("mode", "i8"), ("n_modes", "i8"),
         ("mode_at_s", "f8", (MAX_EVENTS,)), ("mode_is", "i8", (MAX_EVENTS,)),
@@ -189,7 +189,17 @@ def predict(frame):
             lost = 1.0 - frame.control.effectiveness[s]
             for i in range(3):
                 frame.believed[i] -= lost * frame.Gu_mean[i, s]
-    detection.predict(fdi, frame.x_then, frame.believed, fdi.isolated >= 0)
+        if fdi.every_type:
+            believe_offsets(frame)
+    detection.predict(fdi, frame.x_then, frame.believed, fdi.isolated >= 0 or fdi.lead >= 0)
+
+
+@kernel
+def believe_offsets(frame):
+    """What the surfaces give without being asked, as far as the diagnosis knows, is no surprise to the FDAE."""
+    for s in range(4):
+        for i in range(3):
+            frame.believed[i] += frame.G_mean[i, s] * frame.control.offset[s]
 
 
 @kernel
@@ -265,7 +275,7 @@ def true_mode(frame):
         return MODE_NOMINAL
     if frame.Cm_alpha3 != 0.0:
         return MODE_UNANTICIPATED
-    if frame.truth[ch.TRUE_EFFECTIVENESS + ELEVATOR] < 1.0:
+    if frame.truth[ch.TRUE_EFFECTIVENESS + ELEVATOR] < 1.0 or frame.immovable[ELEVATOR]:
         return MODE_REALLOCATED
     return MODE_ADAPTIVE
 
@@ -276,6 +286,10 @@ def supervise(frame):
     fdi = frame.fdi
     if frame.control.law == ORACLE:
         mode = true_mode(frame)
+    elif fdi.every_type:
+        replaced = fdi.lead_kind == fault_types.LOSES or fdi.lead_kind == fault_types.FIXED
+        isolated = fdi.lead if replaced else min(fdi.isolated, 0)
+        mode = mode_of(frame.control.law, fdi.detected, isolated, fdi.lead if replaced else -1)
     else:
         mode = mode_of(frame.control.law, fdi.detected, fdi.isolated, isolated_surface(fdi))
     mode = next_mode(frame.mode, mode)
@@ -287,24 +301,64 @@ def supervise(frame):
 
 
 @kernel
+def tell_oracle(frame, s):
+    """The true effectiveness of surface s, none if it does not move, and what it is off besides."""
+    effective = frame.truth[ch.EFFECTIVE + s]
+    frame.target[s] = 0.0 if frame.immovable[s] else frame.truth[ch.TRUE_EFFECTIVENESS + s]
+    if frame.faulted:
+        frame.offset[s] = effective - frame.target[s] * frame.u[s]
+
+
+@kernel
+def act_on_lead(frame, s):
+    """What the diagnosis of every type makes of surface s: effectiveness left, and offset."""
+    fdi = frame.fdi
+    surface = fdi.surface[s]
+    if fdi.lead_kind == fault_types.LOSES:
+        frame.target[s] = 1.0 + fdi.estimator[s].theta[DOMINANT_AXIS[s]]
+    elif fdi.lead_kind == fault_types.FIXED:
+        frame.target[s] = 0.0
+        frame.offset[s] = surface.command + fault_types.deflection_error(fdi, s)
+    elif fdi.lead_kind == fault_types.SHIFTED:
+        frame.offset[s] = fault_types.deflection_error(fdi, s)
+
+
+@kernel
 def accommodate(frame):
     """What the law believes of the surfaces and of the unknown: effectiveness (4,) and fhat (3,) rad/s2."""
     control, fdi = frame.control, frame.fdi
     surface = isolated_surface(fdi)
     for s in range(4):
-        frame.target[s] = 1.0
+        frame.target[s], frame.offset[s] = 1.0, 0.0
         if control.law == ORACLE:
-            frame.target[s] = frame.truth[ch.TRUE_EFFECTIVENESS + s]
+            tell_oracle(frame, s)
         elif fdi.estimates and fdi.detected:
             frame.target[s] = fdi.effectiveness[s]
-        elif s == surface:
+        elif fdi.every_type and s == fdi.lead:
+            act_on_lead(frame, s)
+        elif s == surface and not fdi.every_type:
             frame.target[s] = 1.0 + fdi.estimator[fdi.isolated].theta[DOMINANT_AXIS[s]]
     adaptive.approach(control, frame.target)
+    adaptive.approach_offset(control, frame.offset)
     frame.fhat[:] = 0.0
     if control.law == ORACLE:
         frame.fhat[1] = unanticipated_effect(frame)
     elif control.law != NOMINAL and fdi.detected:
         detection.unknown_acceleration(fdi, frame.fhat)
+        if fdi.lead >= 0 and fdi.lead_kind == fault_types.LAGS:
+            frame.fhat[:] = 0.0  # to ask a slow surface for what it lacks would only wind the command up
+
+
+@kernel
+def park(frame):
+    """Command a surface that does not follow to its trim: should it come loose, that is where it goes, and it
+    shows."""
+    control, fdi = frame.control, frame.fdi
+    for s in range(4):
+        told = frame.immovable[s] and control.law == ORACLE
+        if told or (s == fdi.lead and fdi.lead_kind == fault_types.FIXED and control.effectiveness[s] == 0.0):
+            control.command[s] = control.trim[s]
+            control.saturated[s] = 0
 
 
 @kernel
@@ -318,8 +372,13 @@ def command(frame, reference):
         adaptive.believed_effectiveness(control, frame.G, frame.G_believed)
     if frame.mode == MODE_REALLOCATED:
         control.hand_over = min(control.hand_over + control.hand_over_step, 1.0)
+    elif frame.fdi.every_type:
+        control.hand_over = max(control.hand_over - control.hand_over_step, 0.0)
     nominal.demand(control, frame.x, frame.f, frame.fhat)
+    if control.law != NOMINAL:
+        adaptive.allow_for_offsets(control, frame.G)
     allocation.allocate(control, frame.G_believed, control.command)
+    park(frame)
     nominal.integrate(control, frame.x, frame.G_believed, control.command)
 
 

@@ -4,17 +4,16 @@ from math import isfinite
 
 import numpy as np
 
-from beaver_ftc.assembly import PUBLISHED_CLASS, estimator_names
+from beaver_ftc.assembly import estimator_names
 from beaver_ftc.design.coefficients import SURFACES
 from beaver_ftc.design.model import AXES
 from beaver_ftc.diagnosis.base import Verdict
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, UNANTICIPATED
 from beaver_ftc.flight import Flight
 from beaver_ftc.frame import DEPARTURE_SIGNALS, DOMINANT_AXIS
+from beaver_ftc.named import found
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.supervisor import MODES
-
-_TYPES = {0: "loss_of_effectiveness"}
 
 
 def _instant(seconds: float) -> float | None:
@@ -30,8 +29,10 @@ def _rms(square_sum: np.ndarray, frames: int) -> tuple[float, float, float] | No
 
 def _isolation(fdi: np.void) -> dict:
     """isolated, isolation_type, candidates, estimate, isolation_time_s of a Flight."""
+    if fdi["every_type"]:
+        return found(fdi)
     verdict = int(fdi["isolated"])
-    left = [n for n, fie in zip(estimator_names(), fdi["estimator"], strict=False) if not fie["excluded"]]
+    left = [n for n, fie in zip(estimator_names("published"), fdi["estimator"], strict=False) if not fie["excluded"]]
     nothing = {"isolated": None, "isolation_type": None, "estimate": None, "isolation_time_s": None}
     if not fdi["detected"] or verdict == NOT_ISOLATED:
         return {**nothing, "candidates": tuple(left) if fdi["detected"] else ()}
@@ -48,7 +49,7 @@ def _isolation(fdi: np.void) -> dict:
     surface = int(fie["surface"])
     return {
         "isolated": SURFACES[surface],
-        "isolation_type": _TYPES[PUBLISHED_CLASS[verdict][1]],
+        "isolation_type": "loss_of_effectiveness",
         "candidates": tuple(left),
         "estimate": float(fie["theta"][DOMINANT_AXIS[surface]]),
         "isolation_time_s": at_s,
@@ -74,14 +75,14 @@ def verdict_of(frame: np.void) -> Verdict:
     fdi = frame["fdi"]
     if not fdi["detected"]:
         return Verdict()
-    found = _isolation(fdi)
+    said = _isolation(fdi)
     return Verdict(
         detected=True,
         axis=AXES[int(fdi["detected_axis"])],
-        isolated=found["isolated"],
-        type=found["isolation_type"],
-        estimate=found["estimate"],
-        candidates=found["candidates"],
+        isolated=said["isolated"],
+        type=said["isolation_type"],
+        estimate=said["estimate"],
+        candidates=said["candidates"],
     )
 
 

@@ -13,6 +13,7 @@ CONTROL = np.dtype(
         ("model_rate", "f8", (3,)), ("model_acceleration", "f8", (3,)),
         ("integral", "f8", (3,)), ("demand", "f8", (3,)),
         ("effectiveness", "f8", (4,)), ("effectiveness_step", "f8"), ("least_effectiveness", "f8"),
+        ("offset", "f8", (4,)), ("offset_step", "f8"), ("given_up", "i8", (4,)),
         ("trim", "f8", (4,)), ("low", "f8", (4,)), ("high", "f8", (4,)),
         ("command", "f8", (4,)), ("saturated", "i8", (4,)),
         ("hand_over", "f8"), ("hand_over_step", "f8"),

@@ -78,6 +78,14 @@ class FdiConfig(BaseModel):
         description="a registered detector (`beaver-ftc list`), module:Class of an installed package, none",
     )
     options: dict[str, float] = Field({}, description="parameters of a registered detector, by name")
+    fault_class: Literal["published", "all"] = Field(
+        "published",
+        description="what may befall a surface: loss of effectiveness of aileron, elevator or rudder, "
+        "or every fault type on all four",
+    )
+    slowest_oscillation_rad_s: float = Field(
+        1.0, gt=0, le=100, description="oscillatory failures are this fast or faster (class `all`), rad/s"
+    )
     thresholds: Literal["interval", "published"] = Field(
         "interval", description="isolation test: signed interval or the paper's norm bound"
     )

@@ -3,13 +3,16 @@
 Every hypothesis is linear in one unknown parameter per axis, phi_i = base_i + theta_i Z_i:
 
     loss of effectiveness   base 0          Z_i = G_is u_s      theta in [-1, 0]       [Zhang2005, eq. (4)]
+    position                base -G_is u_s  Z_i = G_is          theta in the travel
 
-A new fault type is one entry in `PARAMETER_SET` and one branch in `hypothesis`.
+LOSS on aileron, elevator and rudder is the published class. POSITION says no more than "this surface is where
+it should not be": its parameter, the deflection rad, may move as it likes, so it covers whatever can befall
+the surface. The two together are `fdi.fault_class: all`; what has befallen it is fault_types.py's question.
 """
 
 from beaver_ftc.compiled import kernel
+from beaver_ftc.diagnosis.state import LOSS, POSITION
 
-LOSS = 0
 PARAMETER_SET = {LOSS: (-1.0, 0.0)}
 
 
@@ -20,5 +23,7 @@ def hypothesis(kind, surface, G, Gu, base, Z):
     G (3, 4) rad/s2 per rad; Gu (3, 4) rad/s2, the acceleration each commanded surface would give if healthy.
     """
     for i in range(3):
-        base[i] = 0.0
-        Z[i] = Gu[i, surface]
+        if kind == POSITION:
+            base[i], Z[i] = -Gu[i, surface], G[i, surface]
+        else:
+            base[i], Z[i] = 0.0, Gu[i, surface]

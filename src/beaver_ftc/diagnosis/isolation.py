@@ -12,9 +12,9 @@ by the first test that fails.
 """
 
 from beaver_ftc.compiled import kernel
-from beaver_ftc.diagnosis import bank, membership
+from beaver_ftc.diagnosis import bank, fault_types, membership
 from beaver_ftc.diagnosis.fault_class import hypothesis
-from beaver_ftc.diagnosis.state import INTERVAL, NOT_ISOLATED, UNANTICIPATED
+from beaver_ftc.diagnosis.state import INTERVAL, LOSS, NOT_ISOLATED, POSITION, UNANTICIPATED
 from beaver_ftc.diagnosis.thresholds import bound_step, interval, published
 
 
@@ -49,6 +49,8 @@ def start(fdi, x):
             fie.xhat[i] = x[i]
             fie.covariance[i] = (fie.high - fie.low) ** 2 / 12.0  # of a uniform distribution
             fie.theta_low[i], fie.theta_high[i] = fie.low, fie.high
+    if fdi.every_type:
+        fault_types.start(fdi)
 
 
 @kernel
@@ -75,9 +77,9 @@ def possible(fdi, fie, x, started):
     can_be = within_limits(fdi, fie, x)
     if fdi.memory:
         can_be = can_be and bank.explains(fdi, fie, fdi.shared)
-    if fdi.shared and (started or fdi.memory):
+    if (fdi.shared or fie.kind == POSITION) and (started or fdi.memory):
         can_be = can_be and membership.agree(fdi, fie)
-    if fdi.membership and fdi.abrupt and started:
+    if fdi.membership and fdi.abrupt and started and fie.kind == LOSS:
         can_be = can_be and membership.narrow(fdi, fie)
     return can_be
 
@@ -104,7 +106,12 @@ def isolate(fdi, x, t, started):
         if not possible(fdi, fie, x, started) and not fie.excluded:
             fie.excluded = 1
             fie.excluded_at_s = t
-    decide(fdi, t)
+    if not fdi.every_type:
+        decide(fdi, t)
+        return
+    if started or fdi.memory:
+        fault_types.examine(fdi)
+    fault_types.decide(fdi, t)
 
 
 @kernel

@@ -6,6 +6,8 @@ MAX_ESTIMATORS = 16
 MAX_POLES = 6
 NOT_ISOLATED, UNANTICIPATED = -1, -2
 INTERVAL, PUBLISHED = 0, 1
+LOSS, POSITION = 0, 1  # kinds of hypothesis: fault_class.py
+N_TYPES = 9  # fault_types.py
 DEADBEAT_PER_S = 1e6  # a pole at which exp(-lam dt) is 0: the filter keeps nothing but the last frame
 
 # Centres of the network's basis functions, rad; and its memory.
@@ -36,6 +38,21 @@ ESTIMATOR = np.dtype(
     align=True,
 )  # fmt: skip
 
+# What fault_types.py keeps of one surface. Sets of frame and `then`, the one before: positions, rad.
+SURFACE = np.dtype(
+    [
+        ("travel_low", "f8"), ("travel_high", "f8"), ("least_runaway_rate", "f8"),
+        ("command", "f8"), ("low", "f8"), ("high", "f8"),
+        ("command_then", "f8"), ("low_then", "f8"), ("high_then", "f8"),
+        ("set_low", "f8", (N_TYPES,)), ("set_high", "f8", (N_TYPES,)), ("type_excluded", "i8", (N_TYPES,)),
+        ("start_low", "f8"), ("start_high", "f8"), ("started_at", "i8"),
+        ("sign", "i8"), ("steady_since", "i8"), ("flips", "i8"), ("first_flip", "i8"), ("last_flip", "i8"),
+        ("square", "f8"), ("squares", "f8"), ("absent", "i8"), ("quiet", "i8"),
+        ("run_low", "f8"), ("run_high", "f8"), ("run_sign", "i8"), ("run_at", "i8"),
+    ],
+    align=True,
+)  # fmt: skip
+
 DIAGNOSIS = np.dtype(
     [
         ("enabled", "i8"), ("thresholds", "i8"), ("dt", "f8"), ("forgetting", "f8"),
@@ -52,6 +69,11 @@ DIAGNOSIS = np.dtype(
         ("memory", "i8"), ("shared", "i8"), ("membership", "i8"), ("abrupt", "i8"),
         ("n_poles", "i8"), ("bank_decay", "f8", (MAX_POLES,)), ("innovation", "f8", (3,)),
         ("bank_residual", "f8", (MAX_POLES, 3)), ("bank_threshold", "f8", (MAX_POLES, 3)),
+        # faults of every type: fault_types.py
+        ("every_type", "i8"), ("whole", "i8"), ("surface", SURFACE, (4,)),
+        ("frame", "i8"), ("wrong", "i8"), ("wrong_then", "i8"), ("wrong_before", "i8"),
+        ("evidence", "i8"), ("patience", "i8"), ("type", "i8"), ("type_at_s", "f8"),
+        ("lead", "i8"), ("lead_kind", "i8"),
         ("closest", "f8", (MAX_POLES,)),  # largest share of its bound each filter reached in healthy flight
         ("effect", "f8", (MAX_POLES, 3)), ("certain_after_s", "f8"),  # what guarantee.py keeps
     ],

@@ -1,0 +1,393 @@
+"""Which type of fault has befallen a surface: exact feasible sets, frame by frame.
+
+The innovation nu = eta + G_s (p_s - u_s) and |eta| <= eta_bar put the surface's true deflection p_s of each
+frame in an interval, its axes agreeing on one. A type is a statement about p_s that holds in every frame in
+which something is wrong; the set of its one parameter is the intersection over those frames, and the type is
+excluded when nothing is left. For a bound that holds instant by instant this is the exact feasible set: no
+test can exclude a type sooner without excluding a true one some day.
+
+    loss            p = (1 + theta) u      1 + theta in [0, 1], constant
+    varying loss    the same               1 + theta anywhere in [0, 1] in every frame (incipient)
+    stuck           p = c                  c in the travel
+    float           p = 0
+    hardover        p reaches its stop at no less than half its rate limit, and stays
+    bias            p = u + b              b constant; cut off by the stops
+    oscillatory     p - u swings about 0   no half-cycle longer than pi / slowest oscillation
+    rate limit      p moves to u only      at any rate
+
+A frame that admits eta alone tells nothing: so a fault may be intermittent. The promise: the type, constant
+while it is there, is never excluded, and so never misnamed. What cannot be told apart stays a candidate.
+"""
+
+import numpy as np
+
+from beaver_ftc.compiled import kernel
+from beaver_ftc.diagnosis import membership
+from beaver_ftc.diagnosis.state import N_TYPES, NOT_ISOLATED, UNANTICIPATED
+
+CONSTANT_LOSS, STUCK, FLOAT, UP, DOWN, BIAS, VARYING_LOSS, OSCILLATORY, SLOW = range(N_TYPES)
+TYPES = (
+    "loss_of_effectiveness", "stuck", "float", "hardover", "hardover", "bias",
+    "loss_of_effectiveness", "oscillatory", "rate_limit",
+)  # fmt: skip
+N_CONSTANT = 6  # of these the parameter is constant: what they say of one frame, the next can refute
+POSITION_FIRST = 4  # estimators 0 to 3 are losses of effectiveness, 4 to 7 positions, in surface order
+ELEVATOR, FLAP = 1, 3
+# What is done about it: scale the command, give the surface up, add an offset, or leave it to its pace.
+LOSES, FIXED, SHIFTED, LAGS = range(4)
+HASTE_FRAMES = 5
+ABSENT_FRAMES = 20
+FLIPS_OF_AN_OSCILLATION = 3
+
+
+@kernel
+def start(fdi):
+    """Nothing is known of any surface yet."""
+    for s in range(4):
+        surface = fdi.surface[s]
+        surface.set_low[:], surface.set_high[:] = -np.inf, np.inf
+        surface.run_at = -2
+        surface.set_low[STUCK], surface.set_high[STUCK] = surface.travel_low, surface.travel_high
+        surface.set_low[CONSTANT_LOSS], surface.set_high[CONSTANT_LOSS] = 0.0, 1.0
+        surface.started_at = -1
+
+
+@kernel
+def locate(fdi, s):
+    """The set of positions of surface s (rad) that agree with the elapsed frame on every axis."""
+    fie, surface = fdi.estimator[POSITION_FIRST + s], fdi.surface[s]
+    axis = 1 if s == ELEVATOR or s == FLAP else (0 if s == 0 else 2)
+    surface.low_then, surface.high_then, surface.command_then = surface.low, surface.high, surface.command
+    surface.command = -fie.offset[axis] / fie.Z[axis]
+    surface.low, surface.high = fie.low, fie.high
+    for i in range(3):
+        low, high = membership.agreeing(fdi, fie, i)
+        surface.low, surface.high = max(surface.low, low), min(surface.high, high)
+
+
+@kernel
+def intersect(surface, kind, low, high):
+    """Keep of a type's set what is also in [low, high]; exclude the type when nothing is left."""
+    surface.set_low[kind] = max(surface.set_low[kind], low)
+    surface.set_high[kind] = min(surface.set_high[kind], high)
+    if surface.set_low[kind] > surface.set_high[kind]:
+        surface.type_excluded[kind] = 1
+
+
+@kernel
+def judge_loss(surface, low, high, u):
+    """Hold both kinds of loss against a position in [low, high] rad under the command u rad."""
+    one, other = membership.solve(0.5 * (low + high), 0.5 * (high - low), u, 0.0, 1.0)
+    if one > other:
+        surface.type_excluded[VARYING_LOSS] = 1
+    intersect(surface, CONSTANT_LOSS, one, other)
+
+
+@kernel
+def judge_runaway(surface, low, high, elapsed_s):
+    """A runaway has by now come at least as far as its least rate takes it, or to the stop."""
+    way = surface.least_runaway_rate * elapsed_s
+    if high < min(surface.travel_high, surface.start_low + way):
+        surface.type_excluded[UP] = 1
+    if low > max(surface.travel_low, surface.start_high - way):
+        surface.type_excluded[DOWN] = 1
+
+
+@kernel
+def judge_bias(surface, low, high, u):
+    """At a stop a bias may be larger than it shows."""
+    least = low - u if low > surface.travel_low else -np.inf
+    greatest = high - u if high < surface.travel_high else np.inf
+    intersect(surface, BIAS, least, greatest)
+
+
+@kernel
+def judge_oscillation(fdi, surface, low, high, frame):
+    """Count half-cycles; a sign that stays for longer than the slowest half-cycle is no oscillation.
+
+    low, high rad: of the deflection error. Counting half-cycles above a level that noise cannot reach is how
+    oscillatory failures are monitored in service [Goupil2010].
+    """
+    sign = 1 if low > 0.0 else (-1 if high < 0.0 else 0)
+    if sign == 0:
+        surface.steady_since = frame + 1
+        return
+    if sign != surface.sign:
+        note_flip(surface, frame)
+        surface.sign, surface.steady_since = sign, frame
+    if frame - surface.steady_since > fdi.patience:
+        surface.type_excluded[OSCILLATORY] = 1
+
+
+@kernel
+def note_flip(surface, frame):
+    """A half-cycle ends here; the first one is cut off at its beginning and counts for nothing."""
+    if surface.sign != 0:
+        if surface.flips == 0:
+            surface.first_flip = frame
+        else:
+            surface.squares += surface.square
+        surface.last_flip = frame
+        surface.flips += 1
+        surface.square = 0.0
+
+
+@kernel
+def judge_pace(surface, low, high, u, frame):
+    """A slow surface never moves away from its command, so while it stands on one side it comes nearer."""
+    sign = 1 if low > u else (-1 if high < u else 0)
+    if sign == 0 or sign != surface.run_sign or frame != surface.run_at + 1:
+        surface.run_low, surface.run_high = low, high
+    elif (sign > 0 and low > surface.run_high) or (sign < 0 and high < surface.run_low):
+        surface.type_excluded[SLOW] = 1
+    surface.run_low, surface.run_high = max(surface.run_low, low), min(surface.run_high, high)
+    surface.run_sign, surface.run_at = sign, frame
+
+
+@kernel
+def judge(fdi, surface, frame):
+    """Hold every type of one surface against the frame before the elapsed one, in which something was wrong."""
+    low, high, u = surface.low_then, surface.high_then, surface.command_then
+    if low > high:
+        return
+    if surface.started_at < 0:
+        surface.started_at, surface.start_low, surface.start_high = frame, low, high
+    judge_loss(surface, low, high, u)
+    intersect(surface, STUCK, low, high)
+    if low > 0.0 or high < 0.0:
+        surface.type_excluded[FLOAT] = 1
+    judge_runaway(surface, low, high, (frame - surface.started_at) * fdi.dt)
+    judge_bias(surface, low, high, u)
+    judge_oscillation(fdi, surface, low - u, high - u, frame)
+    judge_pace(surface, low, high, u, frame)
+
+
+@kernel
+def examine(fdi):
+    """Take in the elapsed frame, and judge the one before.
+
+    With several JSBSim frames in one of ours a fault may begin or end within a frame, which then shows a
+    part of it: such a frame, next to a healthy one, is passed over.
+    """
+    fdi.wrong_before, fdi.wrong_then, fdi.wrong = fdi.wrong_then, fdi.wrong, not membership.healthy(fdi)
+    for s in range(4):
+        locate(fdi, s)
+        surface = fdi.surface[s]
+        surface.square += (0.5 * (surface.low_then + surface.high_then) - surface.command_then) ** 2
+    if fdi.lead >= 0 and fdi.lead_kind == FIXED and not fdi.wrong_then:
+        note_quiet(fdi, fdi.surface[fdi.lead])
+    elif fdi.wrong_then and (fdi.whole or (fdi.wrong_before and fdi.wrong)):
+        fdi.evidence += 1
+        for s in range(4):
+            judge(fdi, fdi.surface[s], fdi.frame - 1)
+    fdi.frame += 1
+
+
+@kernel
+def note_quiet(fdi, surface):
+    """A surface given up and commanded to where it happens to be says by its quiet that it does not swing."""
+    fdi.evidence += 1
+    surface.quiet += 1
+    if surface.quiet > fdi.patience:
+        surface.type_excluded[OSCILLATORY] = 1
+
+
+@kernel
+def possible(fdi, s):
+    """Whether anything on surface s can be the fault."""
+    return not fdi.estimator[POSITION_FIRST + s].excluded
+
+
+@kernel
+def alive(fdi, s, kind):
+    """Whether this type on surface s can be the fault."""
+    return possible(fdi, s) and not fdi.surface[s].type_excluded[kind]
+
+
+@kernel
+def any_constant(fdi, s):
+    """Whether a type with a constant parameter is left on surface s."""
+    left = False
+    for kind in range(N_CONSTANT):
+        left = left or alive(fdi, s, kind)
+    return left
+
+
+@kernel
+def swings(fdi, s):
+    """Whether surface s is known to have swung for two half-cycles and more."""
+    return alive(fdi, s, OSCILLATORY) and fdi.surface[s].flips >= FLIPS_OF_AN_OSCILLATION
+
+
+@kernel
+def explained(fdi, s):
+    """Whether some type on surface s is left."""
+    return any_constant(fdi, s) or alive(fdi, s, VARYING_LOSS) or alive(fdi, s, SLOW) or swings(fdi, s)
+
+
+@kernel
+def sole(fdi, constant):
+    """The one surface that is possible, with a type of constant parameter left if so asked; -1 none, -2 several."""
+    found = -1
+    for s in range(4):
+        if possible(fdi, s) and (any_constant(fdi, s) or not constant):
+            found = s if found == -1 else -2
+    return found
+
+
+@kernel
+def surface_at_fault(fdi):
+    """The surface the fault is on, NOT_ISOLATED or UNANTICIPATED.
+
+    What acts on pitch alone shows no direction, so a surface left over there must also have a type that
+    explains it. Of elevator and flap, each of which can do what the other does if it only moves accordingly,
+    the one is named for which a constant suffices, once a slow oscillation of the other would have shown.
+    """
+    s = sole(fdi, False)
+    if s == -1:
+        return UNANTICIPATED
+    if s >= 0:
+        lateral = s != ELEVATOR and s != FLAP
+        return s if lateral or explained(fdi, s) else NOT_ISOLATED
+    s = sole(fdi, True)
+    return s if s >= 0 and others_refuted(fdi, s) else NOT_ISOLATED
+
+
+@kernel
+def others_refuted(fdi, chosen):
+    """Whether nothing but a fault that follows the chosen one's commands is left on the other surfaces.
+
+    An oscillation is given one half-cycle of the slowest to betray itself, a whole one if it is still possible.
+    """
+    waits = 1
+    for s in range(4):
+        if s != chosen and (alive(fdi, s, OSCILLATORY) or alive(fdi, s, VARYING_LOSS)):
+            waits = 2
+    return fdi.evidence >= waits * fdi.patience
+
+
+@kernel
+def loses(fdi, s):
+    """Whether a loss of effectiveness is left; one that varies counts only when no constant explains it."""
+    varies = alive(fdi, s, VARYING_LOSS) and not any_constant(fdi, s)
+    return alive(fdi, s, CONSTANT_LOSS) or varies
+
+
+@kernel
+def one_type(fdi, s):
+    """The one type of constant parameter left on surface s, or -1; a runaway is one, whichever the stop."""
+    found, several = -1, False
+    for kind in range(N_CONSTANT):
+        if alive(fdi, s, kind):
+            several = several or (found >= 0 and not (found == UP and kind == DOWN))
+            found = kind
+    return -1 if several else found
+
+
+@kernel
+def type_at_fault(fdi, s):
+    """The type of the fault on surface s, or -1 while more than one fits or an oscillation may yet show."""
+    found = one_type(fdi, s)
+    if fdi.evidence < fdi.patience:
+        return -1
+    patient = not alive(fdi, s, OSCILLATORY) or fdi.evidence >= 2 * fdi.patience
+    if any_constant(fdi, s):
+        return found if patient else -1
+    return one_course(fdi, s, patient)
+
+
+@kernel
+def one_course(fdi, s, patient):
+    """The same when no constant explains it: a loss or a pace that varies, or an oscillation."""
+    if alive(fdi, s, SLOW):
+        return SLOW if not (alive(fdi, s, VARYING_LOSS) or alive(fdi, s, OSCILLATORY)) else -1
+    if alive(fdi, s, VARYING_LOSS):
+        return VARYING_LOSS if patient else -1
+    return OSCILLATORY if swings(fdi, s) else -1
+
+
+@kernel
+def decide(fdi, t):
+    """Name the surface and, when it is certain, the type; t s."""
+    s = surface_at_fault(fdi)
+    before = fdi.estimator[fdi.isolated].surface if fdi.isolated >= 0 else fdi.isolated
+    kind = type_at_fault(fdi, s) if s >= 0 else -1
+    if s != before:
+        fdi.isolated_at_s = t
+    if kind != fdi.type:
+        fdi.type, fdi.type_at_s = kind, t
+    fdi.isolated = s
+    if s >= 0 and not (kind == CONSTANT_LOSS or kind == VARYING_LOSS):
+        fdi.isolated = POSITION_FIRST + s
+    take_the_lead(fdi)
+
+
+@kernel
+def is_fixed(fdi, s):
+    """Whether surface s is known to ignore its command."""
+    stays = alive(fdi, s, STUCK) or alive(fdi, s, UP) or alive(fdi, s, DOWN)
+    return stays and not alive(fdi, s, BIAS) and (not loses(fdi, s) or alive(fdi, s, FLOAT))
+
+
+@kernel
+def measure_for(fdi, s):
+    """What is to be done about surface s as far as is known: LOSES, FIXED, SHIFTED or -1 (wait)."""
+    if is_fixed(fdi, s):
+        return FIXED
+    if not any_constant(fdi, s) and not alive(fdi, s, VARYING_LOSS):
+        return LAGS if alive(fdi, s, SLOW) and not alive(fdi, s, OSCILLATORY) else SHIFTED
+    fixed = alive(fdi, s, STUCK) or alive(fdi, s, UP) or alive(fdi, s, DOWN)
+    if loses(fdi, s):
+        return -1 if fixed or alive(fdi, s, BIAS) else LOSES
+    return -1 if fixed else SHIFTED
+
+
+@kernel
+def presumed(fdi):
+    """The surface the law acts upon: the one at fault, or the likeliest; -1 none yet.
+
+    It may act before all doubt is gone, since it can take it back. Of elevator and flap with nothing
+    constant left on either, it does not matter which is thought to be off: the moment is the same.
+    """
+    if fdi.isolated >= 0:
+        return fdi.estimator[fdi.isolated].surface
+    if fdi.isolated == UNANTICIPATED or fdi.evidence < HASTE_FRAMES:
+        return -1
+    s = sole(fdi, True)
+    if s == -1:
+        return ELEVATOR if possible(fdi, ELEVATOR) else (FLAP if possible(fdi, FLAP) else -1)
+    return s if s >= 0 else -1
+
+
+@kernel
+def take_the_lead(fdi):
+    """Settle on which surface the law acts and how; let go of a fault that has gone."""
+    s = presumed(fdi)
+    fdi.lead_kind = measure_for(fdi, s) if s >= 0 else -1
+    fdi.lead = s if fdi.lead_kind >= 0 else -1
+    if fdi.lead >= 0:
+        surface = fdi.surface[s]
+        deflection = deflection_error(fdi, s) + surface.command
+        there = surface.low <= deflection <= surface.high or fdi.lead_kind == LOSES
+        surface.absent = 0 if there else surface.absent + 1
+        if surface.absent >= ABSENT_FRAMES:
+            fdi.lead = -1
+
+
+@kernel
+def middle(surface, kind):
+    """The middle of a type's set."""
+    return 0.5 * (surface.set_low[kind] + surface.set_high[kind])
+
+
+@kernel
+def deflection_error(fdi, s):
+    """How far surface s is off its command, rad, by what is left of the types, or as the last frame shows it."""
+    surface = fdi.surface[s]
+    if alive(fdi, s, FLOAT):
+        return -surface.command
+    if alive(fdi, s, STUCK):
+        return middle(surface, STUCK) - surface.command
+    if alive(fdi, s, BIAS) and surface.set_high[BIAS] - surface.set_low[BIAS] < np.inf:
+        return middle(surface, BIAS)
+    return 0.5 * (surface.low + surface.high) - surface.command

@@ -53,7 +53,7 @@ def flight(theta=(0.0, 0.0, 0.0), at_s=5.0, noise=0.02, extra=0.0, duration_s=12
 
 def watch(name, seen, **options):
     detector = plugin_class(DETECTORS, name)()
-    detector.reset(context(**options))
+    detector.reset(context(**{**detector.defaults, **options}))  # as the source has it, not as it was tuned
     verdicts, alarm_s = [], None
     for measured in seen:
         verdicts.append(detector.step(measured, np.zeros(4)))
@@ -183,7 +183,7 @@ def test_the_monitor_names_the_pair_that_broke():
             u = 0.9 * u + rng.normal(size=4)
 
     detector = plugin_class(DETECTORS, "rls-monitor")()
-    detector.reset(context())
+    detector.reset(context(**detector.defaults))
     verdict, first = None, None
     for measured, command in seen():
         verdict = detector.step(measured, command)

@@ -39,7 +39,7 @@ def loop(name, effectiveness=1.0, disturbance=0.0, duration_s=20.0, **options):
     """Fly a law on the linear plant with the simulator's frame of delay; the error of each frame (n, 3)
     rad/s."""
     law = plugin_class(LAWS, name)()
-    law.reset(context(**options))
+    law.reset(context(**{**law.defaults, **options}))  # as the source has it, not as it was tuned
     x, u, acceleration, errors = np.zeros(3), np.zeros(4), np.zeros(3), []
     for k in range(round(duration_s / DT)):
         rate = np.full(3, 0.02)

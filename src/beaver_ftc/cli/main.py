@@ -27,6 +27,7 @@ COMMANDS = (
     "reproduce",
     "bench",
     "verify",
+    "detectability",
 )
 
 app = typer.Typer(

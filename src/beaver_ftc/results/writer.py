@@ -25,7 +25,8 @@ FILES_OF_A_RESULT = frozenset({
     "scenario.yaml", "log.parquet", "metrics.json", "report.html", "figures",
     "log.csv", "flight.acmi", "results.parquet", "summary.json", "mismatch.json", "mismatch.csv",
     "mismatch.parquet", "comparison.json", "comparison.png", "comparison.html", "runs.json", "runs.png",
-    "runs.html", "reproduction.json", "reproduction.md", "reproduction.html",
+    "runs.html", "reproduction.json", "reproduction.md", "reproduction.html", "detectability.json",
+    "detectability.csv", "detectability.png",
 })  # fmt: skip
 _AT_FDCWD = -100
 _RENAME_EXCHANGE = 2

@@ -1,0 +1,38 @@
+"""`beaver-ftc detectability`: how small a fault is certain to be found, and what it can be taken for."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from beaver_ftc.cli.output import Format, FormatOption, emit, emit_json
+
+
+def command(
+    scenario: Annotated[
+        str, typer.Argument(metavar="SCENARIO", help="A file, or the name of a built-in scenario.")
+    ],
+    out: Annotated[Path, typer.Option(help="Folder for the map, the CSV and the JSON.")] = Path("runs"),
+    format: FormatOption = Format.text,
+) -> None:
+    """Survey speed, altitude and excitation for the smallest fault certain to be detected and isolated.
+
+    Certain: within 0.5 s and 1 s, whatever the declared uncertainty does, along the scenario's references
+    scaled by 0.25 to 2; `median` where the fault strikes at half of all instants.
+    """
+    from beaver_ftc.cli.progress import progress_bar
+    from beaver_ftc.detectability.output import document, text, write
+    from beaver_ftc.detectability.survey import survey
+    from beaver_ftc.results.writer import result_folder
+    from beaver_ftc.scenario.loader import load_scenario
+
+    loaded = load_scenario(scenario)
+    name = f"{loaded.name[:86]}-detectability"  # a name of at most 100 characters
+    with result_folder(out, name) as folder:
+        with progress_bar(name) as progress:
+            rows = survey(loaded, progress=progress)
+        write(folder, loaded.name, rows)
+    if format is Format.json:
+        emit_json(document(loaded.name, rows) | {"folder": str(out / name)})
+    else:
+        emit(f"{text(rows)}\n{out / name}")

@@ -1,0 +1,1 @@
+"""How small a fault is certain to be found, and what it can be taken for, along a flight."""

@@ -193,6 +193,8 @@ def test_finished_runs_stand_side_by_side(tmp_path):
     assert "post RMS q, deg/s *" in rows
     assert "fault" in rows
     assert (tmp_path / "out" / "runs" / "runs.png").stat().st_size > 10_000
+    page = (tmp_path / "out" / "runs" / "runs.html").read_text()
+    assert page.count('<p class="folder">') == 2
     done = _run(*folders, "--out", tmp_path / "out", "--format", "json")
     assert set(json.loads(done.output)["runs"]) == {"a", "b"}
 

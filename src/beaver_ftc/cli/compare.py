@@ -42,7 +42,7 @@ def command(
 ) -> None:
     """Compare finished runs; or schemes and laws on the same flights (--sweep, --benchmark).
 
-    Writes comparison.json, comparison.png and comparison.html (for runs: runs.json and runs.png) below --out.
+    Writes comparison.json, comparison.png and comparison.html (for runs: runs.json, runs.png, runs.html) below --out.
     """
     asked = [bool(runs), sweep is not None, benchmark, tune]
     if sum(asked) != 1:
@@ -62,16 +62,18 @@ def command(
 def _compare_runs(folders: list[Path], out: Path, format: Format) -> None:
     from beaver_ftc.compare.runs import as_text, labels, read_runs, write_figure
     from beaver_ftc.results.metrics import as_json
+    from beaver_ftc.results.report import write_report
     from beaver_ftc.results.writer import result_folder
 
     runs = read_runs(folders)
     with result_folder(out, "runs") as folder:
         write_figure(runs, folder / "runs.png")
         (folder / "runs.json").write_text(as_json(runs), encoding="utf-8")
+        write_report(folder / "runs.html", folders, labels(runs))
     if format is Format.json:
         emit_json({"runs": dict(zip(labels(runs), runs, strict=True))})
     else:
-        emit(f"{as_text(runs)}\n\nfigure: {out / 'runs' / 'runs.png'}")
+        emit(f"{as_text(runs)}\n\nreport: {out / 'runs' / 'runs.html'}")
 
 
 def _cases(sweep: Path | None, only: str | None, most: int | None) -> list[Any]:

@@ -28,13 +28,15 @@ def read_runs(folders: Sequence[Path]) -> list[Document]:
 
 
 def _why(error: Exception) -> str:
-    return (
-        "holds no metrics.json" if isinstance(error, OSError) else "holds a metrics.json that cannot be read"
-    )
+    if isinstance(error, OSError):
+        return f"holds no {Path(error.filename).name}"
+    return "holds a metrics.json that cannot be read"
 
 
 def _read(folder: Path) -> Document:
     document = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
+    for name in ("scenario.yaml", "log.parquet"):
+        (folder / name).stat()
     rows_of(document)  # a document that lacks a key is refused here
     return document | {"folder": str(folder)}
 

@@ -17,7 +17,7 @@ import numpy as np
 from beaver_ftc.results import log, verdict
 from beaver_ftc.results.looks import LOOKS, MODE_COLOURS, Mark, closeup_window, marks
 from beaver_ftc.results.metrics import Document
-from beaver_ftc.results.series import Series, read_series
+from beaver_ftc.results.series import MAX_POINTS, Series, read_series
 from beaver_ftc.results.views import Panel, Trace, View, unit_of, views
 
 if TYPE_CHECKING:
@@ -27,24 +27,26 @@ _TEMPLATES = Path(__file__).parent / "templates"
 _PATH = ("north_m", "east_m", "altitude_m", "phi_rad", "theta_rad", "psi_rad")
 
 
-def write_report(path: Path, folders: Sequence[Path]) -> None:
+def write_report(path: Path, folders: Sequence[Path], names: Sequence[str] = ()) -> None:
     """Write the report of the runs in these result folders, side by side, as one HTML file.
 
-    Each folder holds `scenario.yaml`, `metrics.json` and `log.parquet`.
+    Each folder holds `scenario.yaml`, `metrics.json` and `log.parquet`. names: what to call the runs, if not
+    by their scenarios' names.
     """
-    path.write_text(render(folders), encoding="utf-8")
+    path.write_text(render(folders, names), encoding="utf-8")
 
 
-def render(folders: Sequence[Path]) -> str:
+def render(folders: Sequence[Path], names: Sequence[str] = ()) -> str:
     """The report as HTML text."""
     documents = [json.loads((folder / "metrics.json").read_text(encoding="utf-8")) for folder in folders]
     texts = [(folder / "scenario.yaml").read_text(encoding="utf-8") for folder in folders]
     template = _environment().get_template("report.html.j2")
     return template.render(
         runs=[_words(document, text) for document, text in zip(documents, texts, strict=True)],
+        names=names,
         modes=MODE_COLOURS,
         marks=_kinds_of_marks(documents),
-        data=_harmless(json.dumps(_data(folders, documents), allow_nan=False, separators=(",", ":"))),
+        data=_harmless(json.dumps(_data(folders, documents, names), allow_nan=False, separators=(",", ":"))),
         css=_asset("report.css"),
         script=_asset("report.js"),
         sections=[_mismatch(folder) for folder in folders],
@@ -79,13 +81,18 @@ def _kinds_of_marks(documents: Sequence[Document]) -> list[Mark]:
     return list({mark.name: mark for document in documents for mark in marks(document)}.values())
 
 
-def _data(folders: Sequence[Path], documents: Sequence[Document]) -> Document:
+def _data(folders: Sequence[Path], documents: Sequence[Document], names: Sequence[str]) -> Document:
     """What the page draws from."""
     logs = [folder / "log.parquet" for folder in folders]
     shown = _common_views(logs)
     columns = tuple(dict.fromkeys([*_PATH, "mode", *(name for view in shown for name in view.columns)]))
     return {
-        "runs": [_run(path, document, columns) for path, document in zip(logs, documents, strict=True)],
+        "runs": [
+            _run(path, document, columns, name, _points(len(logs)))
+            for path, document, name in zip(
+                logs, documents, names or [document["scenario"] for document in documents], strict=True
+            )
+        ],
         "views": [_view(view) for view in shown],
         "looks": {role: asdict(look) for role, look in LOOKS.items()},
         "modes": list(MODE_COLOURS.items()),
@@ -98,14 +105,19 @@ def _common_views(logs: Sequence[Path]) -> tuple[View, ...]:
     return tuple(view for view in first if all(view in other for other in rest))
 
 
-def _run(path: Path, metrics: Document, columns: Sequence[str]) -> Document:
+def _points(runs: int) -> int:
+    """Points of each curve, fewer the more runs there are: the page stays within a few megabytes."""
+    return MAX_POINTS if runs <= 2 else max(600, 2 * MAX_POINTS // runs)
+
+
+def _run(path: Path, metrics: Document, columns: Sequence[str], name: str, points: int) -> Document:
     instants = marks(metrics)
     window = closeup_window(instants)
-    levels = [read_series(path, columns)]
+    levels = [read_series(path, columns, max_points=points)]
     if window and levels[0]["t_s"].size < log.row_count(path):
-        levels.append(read_series(path, columns, window))
+        levels.append(read_series(path, columns, window, points))
     return {
-        "name": metrics["scenario"],
+        "name": name,
         "marks": [asdict(mark) for mark in instants],
         "window": window or _ends(levels[0]),
         "levels": [{name: _packed(name, values) for name, values in level.items()} for level in levels],

@@ -71,7 +71,7 @@ def flight():
 
 @pytest.mark.parametrize("fault", FAULTS)
 def test_a_fault_a_little_larger_is_found_in_time_whatever_the_uncertainty(flight, fault):
-    """The map is worked out along the healthy flight; a flight with the fault must agree where it is sharpest."""
+    """The map follows from the healthy flight; one with the fault must agree where it is sharpest."""
     seen = excitation(flight)
     least = best_in_window(detection_magnitude(seen.moment[FAULTS[fault]], seen.bound), 50)
     start = int(np.argmin(least))

@@ -25,7 +25,7 @@ def detection_magnitude(z: np.ndarray, bound: np.ndarray) -> np.ndarray:
 
     z, bound (n, 3) rad/s2.
     """
-    with np.errstate(divide="ignore"):
+    with np.errstate(divide="ignore", over="ignore"):
         return np.min(2.0 * bound / np.abs(z), axis=1)
 
 
@@ -43,7 +43,7 @@ def _corners(a: np.ndarray, b: np.ndarray):
     """Where max_i |a_i - b_i t| may be least: the ends, the zeros, where two axes are equal; (n,) each."""
     yield np.zeros(len(a))
     yield np.ones(len(a))
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(all="ignore"):
         for i in range(3):
             yield a[:, i] / b[:, i]
         for i, j in combinations(range(3), 2):

@@ -13,7 +13,7 @@ import numpy as np
 from beaver_ftc.bench.contenders import Bare, ClosedLoop
 from beaver_ftc.bench.parts import PARTS, frame_with
 from beaver_ftc.bench.plugged import InnovationDetector, ProportionalInversion
-from beaver_ftc.bench.stopwatch import Contender, Timing, interleave
+from beaver_ftc.bench.stopwatch import WALL, Contender, Timing, interleave
 from beaver_ftc.bench.straightforward import Straightforward
 from beaver_ftc.bench.whole_flight import BareFlight, WholeFlight
 from beaver_ftc.plant import native
@@ -144,7 +144,7 @@ def _whole_flights(scenario: Scenario, rounds: int) -> Document:
     frames = round(LONG_FLIGHT_S * scenario.rate_hz)
     with tempfile.TemporaryDirectory() as folder:
         with_file = WholeFlight(long, Path(folder) / "log.parquet")
-        us = interleave([BareFlight(long), WholeFlight(long), with_file], rounds, frames)
+        us = interleave([BareFlight(long), WholeFlight(long), with_file], rounds, frames, WALL)
     return {
         "frames": frames,
         **_against(us[:, 0], us[:, 1]),

@@ -1,0 +1,271 @@
+"""What a frame of the bare aircraft spends, and where.
+
+    python benchmarks/aircraft_cost.py [--rounds N]
+
+Each variant is the Beaver's XML with one feature taken out, flown from the same trimmed state, all of them side
+by side in one process. What a feature costs is what its absence saves, round by round.
+"""
+
+import argparse
+import sys
+import tempfile
+import xml.etree.ElementTree as ET
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from beaver_ftc.bench.stopwatch import Timing, interleave
+from beaver_ftc.paths import data_root
+from beaver_ftc.plant import adapter
+from beaver_ftc.plant.adapter import Plant
+from beaver_ftc.plant.state import FlightState
+from beaver_ftc.plant.trim import trim
+
+SURFACES = ("aileron", "elevator", "rudder", "flap")
+FRAMES = 500
+
+
+def surface_function(root: ET.Element, name: str) -> tuple[ET.Element, ET.Element]:
+    """A function of the flight control system, and the channel it is in."""
+    for channel in root.iter("channel"):
+        for function in channel:
+            if function.get("name") == name:
+                return channel, function
+    raise KeyError(name)
+
+
+def body(function: ET.Element) -> ET.Element:
+    """What a function computes."""
+    inner = function.find("function")
+    return next(element for element in (function if inner is None else inner) if element.tag != "description")
+
+
+def set_body(function: ET.Element, formula: str) -> None:
+    """Let a function of the flight control system compute something else."""
+    inner = function.find("function")
+    assert inner is not None
+    inner.clear()
+    inner.append(ET.fromstring(formula))
+
+
+def without_actuators(root: ET.Element) -> None:
+    """Ideal actuators only: position is demand. Their failures go with them; effectiveness stays."""
+    for s in SURFACES:
+        for stage in ("rate-in-force-rad_sec", "actuator-rad"):
+            channel, function = surface_function(root, f"fcs/{s}-{stage}")
+            channel.remove(function)
+        set_body(
+            surface_function(root, f"fcs/{s}-pos-rad")[1],
+            f"<sum><property>fcs/{s}-demand-rad</property></sum>",
+        )
+
+
+def without_bias_and_oscillation(root: ET.Element) -> None:
+    """No bias and no oscillatory failure."""
+    for s in SURFACES:
+        set_body(
+            surface_function(root, f"fcs/{s}-pos-rad")[1],
+            f"<sum><property>fcs/{s}-actuator-rad</property></sum>",
+        )
+
+
+def without_standard_commands(root: ET.Element) -> None:
+    """No `fcs/<s>-cmd-norm`, and no runaway."""
+    for s in SURFACES:
+        demand = surface_function(root, f"fcs/{s}-demand-rad")[1]
+        set_body(demand, f"<sum><property>fcs/{s}-cmd-rad</property></sum>")
+
+
+def without_surfaces(root: ET.Element) -> None:
+    """No flight control system: the commands go to the aerodynamics."""
+    control = root.find("flight_control")
+    assert control is not None
+    for channel in control.findall("channel"):
+        control.remove(channel)
+    for s in SURFACES:
+        for name in (f"fcs/{s}-pos-rad", f"fcs/{s}-effective-rad"):
+            ET.SubElement(control, "property", value="0").text = name
+
+
+def aerodynamics(root: ET.Element) -> ET.Element:
+    """The aerodynamics section."""
+    found = root.find("aerodynamics")
+    assert found is not None
+    return found
+
+
+def functions(root: ET.Element) -> dict[str, ET.Element]:
+    """The functions outside the axes, by name."""
+    return {f.get("name", ""): f for f in aerodynamics(root).findall("function")}
+
+
+def drop_property(root: ET.Element, wanted: Callable[[str], bool]) -> None:
+    """Remove factors from every product."""
+    for product in root.iter("product"):
+        for factor in product.findall("property"):
+            if wanted((factor.text or "").strip()):
+                product.remove(factor)
+
+
+def without_term_scales(root: ET.Element) -> None:
+    """No `uncertainty/<Coefficient>-scale`."""
+    drop_property(
+        aerodynamics(root), lambda name: name.startswith("uncertainty/") and name.endswith("-scale")
+    )
+
+
+def without_separate_terms(root: ET.Element) -> None:
+    """One function a coefficient: its terms stand in the sum, and cannot be logged one by one."""
+    named = functions(root)
+    for name, function in named.items():
+        if name.startswith("aero/coefficient/") and "_" not in name:
+            inline(function, named, aerodynamics(root))
+
+
+def inline(total: ET.Element, named: dict[str, ET.Element], section: ET.Element) -> None:
+    """Put the terms of a sum in the place of their names, but for those needed elsewhere."""
+    terms = body(total)
+    for i, term in enumerate(list(terms)):
+        name = (term.text or "").strip()
+        if name in named and name != "aero/coefficient/CY_betadot":
+            terms[i] = body(named[name])
+            section.remove(named[name])
+
+
+def without_uncertainty_of_accelerations(root: ET.Element) -> None:
+    """No inertia coupling error and no sinusoids."""
+    section, named = aerodynamics(root), functions(root)
+    for axis in "pqr":
+        section.remove(named[f"uncertainty/{axis}dot-rad_sec2"])
+    for moment in section.iter("function"):
+        if (moment.get("name") or "").startswith("aero/moment/"):
+            parts = body(moment)
+            for extra in list(parts)[1:]:
+                parts.remove(extra)
+
+
+def without_turned_betadot(root: ET.Element) -> None:
+    """The side force of betadot along body Y."""
+    section, named = aerodynamics(root), functions(root)
+    for axis in "XYZ":
+        section.remove(named[f"aero/coefficient/C{axis}_turn"])
+    for total in section.iter("sum"):
+        for part in total.findall("property"):
+            if (part.text or "").strip().endswith("_turn"):
+                total.remove(part)
+
+
+def without_envelope(root: ET.Element) -> None:
+    """No `aero/envelope-valid`."""
+    section = aerodynamics(root)
+    section.remove(functions(root)["aero/envelope-valid"])
+    ET.SubElement(section, "property", value="1").text = "aero/envelope-valid"
+
+
+def without_engine(root: ET.Element) -> None:
+    """A constant slipstream."""
+    section, named = aerodynamics(root), functions(root)
+    for name in ("engine/power-kw", "aero/dpt", "aero/density-kg_m3"):
+        section.remove(named[name])
+    for name in ("engine/power-kw", "aero/dpt"):
+        ET.SubElement(section, "property", value="0.2").text = name
+
+
+def without_unanticipated(root: ET.Element) -> None:
+    """No unanticipated fault."""
+    section, named = aerodynamics(root), functions(root)
+    section.remove(named["aero/coefficient/Cm_unanticipated"])
+    total = body(named["aero/coefficient/Cm"])
+    for part in total.findall("property"):
+        if (part.text or "").strip() == "aero/coefficient/Cm_unanticipated":
+            total.remove(part)
+
+
+def jsbsim_alone(root: ET.Element) -> None:
+    """No surfaces and no aerodynamics: a mass on the rotating Earth, in the atmosphere."""
+    without_surfaces(root)
+    section = aerodynamics(root)
+    for part in list(section):
+        if part.tag != "property":
+            section.remove(part)
+    for name in ("engine/power-kw", "aero/dpt", "aero/envelope-valid"):
+        ET.SubElement(section, "property", value="0.2").text = name
+
+
+VARIANTS: dict[str, Callable[[ET.Element], None]] = {
+    "actuators: lag, rate limit, jam, float, slow": without_actuators,
+    "bias and oscillatory failure": without_bias_and_oscillation,
+    "standard commands and runaway": without_standard_commands,
+    "all four surfaces": without_surfaces,
+    "a scale on every term": without_term_scales,
+    "every term a function of its own": without_separate_terms,
+    "error of inertia coupling, sinusoids": without_uncertainty_of_accelerations,
+    "betadot turned across the flight path": without_turned_betadot,
+    "unanticipated fault": without_unanticipated,
+    "slipstream from the engine": without_engine,
+    "validity of the envelope": without_envelope,
+    "surfaces and aerodynamics": jsbsim_alone,
+}
+
+
+class Variant:
+    """A contender: a Beaver from this folder, from a trimmed state, with the surfaces held."""
+
+    def __init__(self, folder: Path, state: FlightState) -> None:
+        adapter.data_root = lambda: folder  # type: ignore[assignment]
+        try:
+            self._plant = Plant(rate_hz=100)
+        finally:
+            adapter.data_root = data_root
+        self._state = state
+
+    def prepare(self) -> None:
+        """Back to trim."""
+        self._plant.start(self._state)
+
+    def fly(self, frames: int) -> None:
+        """Fly on."""
+        run = self._plant.run
+        for _ in range(frames):
+            run()
+
+
+def write_variant(folder: Path, change: Callable[[ET.Element], None]) -> Path:
+    """A root folder for JSBSim with the changed aircraft in it."""
+    tree = ET.parse(data_root() / "aircraft" / "beaver" / "beaver.xml")
+    change(tree.getroot())
+    aircraft = folder / "aircraft" / "beaver"
+    aircraft.mkdir(parents=True)
+    tree.write(aircraft / "beaver.xml")
+    return folder
+
+
+def measure(rounds: int) -> np.ndarray:
+    """Microseconds a frame, (rounds, 1 + variants), the whole aircraft first."""
+    plant = Plant(rate_hz=100)
+    state = trim(45.0, 1828.8, plant=plant)
+    with tempfile.TemporaryDirectory() as folder:
+        contenders = [Variant(data_root(), state)]
+        for i, change in enumerate(VARIANTS.values()):
+            contenders.append(Variant(write_variant(Path(folder) / str(i), change), state))
+        return interleave(contenders, rounds, FRAMES)
+
+
+def main() -> int:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("--rounds", type=int, default=100)
+    us = measure(parser.parse_args().rounds)
+    whole = Timing.of(us[:, 0])
+    print(f"us a frame; medians [quartiles] over {len(us)} rounds of {FRAMES} frames")
+    print(f"{'the whole aircraft':48}{whole.median:8.3f}  [{whole.low:.3f}, {whole.high:.3f}]")
+    print("\nwhat is saved without")
+    for name, variant in zip(VARIANTS, us[:, 1:].T, strict=True):
+        saved = Timing.of(us[:, 0] - variant)
+        print(f"  {name:46}{saved.median:8.3f}  [{saved.low:.3f}, {saved.high:.3f}]")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

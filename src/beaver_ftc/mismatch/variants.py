@@ -23,21 +23,26 @@ VARIANTS: dict[str, dict[str, Any]] = {
 
 def variant_of(scenario: "Scenario", text: str) -> "Scenario":
     """The scenario with one variant's design model, named after both. Raises BadInput for an unknown one."""
-    from pydantic import ValidationError
-
-    from beaver_ftc.scenario.schema import Scenario
-
-    data = scenario.model_dump(mode="python", by_alias=True)
+    data = scenario.model_dump(mode="json", by_alias=True, exclude_none=True)
     for piece in text.split("+"):
         _merge(data["design_model"], _changes(piece.strip()))
     if text != DECLARED:
         data["name"] = f"{scenario.name}-{_as_name(text)}"[:100]
-    data.pop("expect")  # what was expected of the scenario's own design need not hold for another
+    data.pop("expect", None)  # what was expected of the scenario's own design need not hold for another
+    return _validated(data, text)
+
+
+def _validated(data: dict[str, Any], text: str) -> "Scenario":
+    import yaml
+
+    from beaver_ftc.scenario.loader import load_text
+    from beaver_ftc.scenario.problems import ScenarioError, key_path
+
     try:
-        return Scenario.model_validate(data)
-    except ValidationError as error:
-        says = "; ".join(f"{'.'.join(map(str, e['loc']))}: {e['msg']}" for e in error.errors())
-        raise BadInput(f"--variant {text}: {says}") from None
+        return load_text(yaml.safe_dump(data))
+    except ScenarioError as error:
+        says = (f"--variant {text}: {key_path(each.location)}: {each.says}" for each in error.problems)
+        raise BadInput("\n".join(says)) from None
 
 
 def _changes(piece: str) -> dict[str, Any]:

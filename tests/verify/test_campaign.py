@@ -86,6 +86,17 @@ def test_another_seeds_folder_is_refused(flown):
         conduct(Campaign(hours=0, faults=1, seed=5), flown[1], workers=1)
 
 
+def test_each_step_flies_the_same_faults(tmp_path):
+    rows = conduct(Campaign(hours=0, faults=4, seed=4, steps=True), tmp_path, workers=1)["faulty"]
+    for row in rows:
+        delays = [
+            row[step]["delay_s"] for step in ("published", "interval", "pole bank", "memory", "sharpened")
+        ]
+        assert delays[0] == delays[1] >= delays[2] == delays[3] == delays[4]
+        if row["profile"] == "incipient":
+            assert row["constant"] == row["sharpened"]
+
+
 def test_the_promises_hold_in_the_small(flown):
     document = summarise(flown[0])
     assert document["kept"]
@@ -97,7 +108,7 @@ def test_the_promises_hold_in_the_small(flown):
 def _faulty_row(**sharpened):
     well = {
         "delay_s": 0.1, "false_alarm": False, "guaranteed_s": 0.2, "late": False, "isolation_s": 0.2,
-        "excluded": False, "wrong": False,
+        "excluded": False, "wrong": False, "estimate_error": 0.01,
     }  # fmt: skip
     return {"index": 0, "published": well, "sharpened": {**well, **sharpened}}
 

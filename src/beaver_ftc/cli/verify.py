@@ -19,6 +19,9 @@ def command(
     out: Annotated[
         Path, typer.Option(help="Folder of the flights flown; a campaign goes on from it.")
     ] = Path("runs/verification"),
+    steps: Annotated[
+        bool, typer.Option("--steps", help="Also fly every step from the published scheme on.")
+    ] = False,
     format: FormatOption = Format.text,
 ) -> None:
     """Fly at random inside all that is declared and count broken promises, with exact confidence limits.
@@ -32,7 +35,7 @@ def command(
     from beaver_ftc.verify.summary import summarise, summary_text
 
     with progress_bar("verify") as progress:
-        rows = conduct(Campaign(hours, faults, seed), out, workers or os.cpu_count() or 1, progress)
+        rows = conduct(Campaign(hours, faults, seed, steps), out, workers or os.cpu_count() or 1, progress)
     document = summarise(rows)
     if format is Format.json:
         emit_json({"seed": seed, **document})

@@ -13,6 +13,7 @@ import os
 import signal
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from math import ceil
 from pathlib import Path
 from typing import Any
@@ -21,21 +22,28 @@ from beaver_ftc import __version__
 from beaver_ftc.errors import BadInput, SimulationFailed
 from beaver_ftc.paths import data_root
 from beaver_ftc.verify.draw import HEALTHY_S, Draw
-from beaver_ftc.verify.fly import Row, fly_draw
+from beaver_ftc.verify.fly import SCHEMES, STEPS, Row, fly_draw
 
 KINDS = ("healthy", "faulty")
 CHUNK = 50
 _PACKAGE = Path(__file__).parents[1]
 Progress = Callable[[float], None]
+Schemes = dict[str, dict[str, Any]]
 
 
 @dataclass(frozen=True)
 class Campaign:
-    """How much to fly: flight hours without a fault, and flights with one."""
+    """Flight hours without a fault, flights with one, and whether each step of sharpening flies these too."""
 
     hours: float
     faults: int
     seed: int
+    steps: bool = False
+
+    @property
+    def schemes(self) -> Schemes:
+        """The diagnoses each faulty flight is flown with."""
+        return STEPS if self.steps else SCHEMES
 
     def wanted(self, kind: str) -> int:
         """Number of flights of a kind."""
@@ -49,11 +57,11 @@ def conduct(
 
     Raises BadInput if the folder holds another seed's flights, or another version's.
     """
-    _open(folder, campaign.seed)
+    _open(folder, campaign)
     rows = {kind: _kept(folder, kind) for kind in KINDS}
     chunks = [chunk for kind in KINDS for chunk in _missing(campaign, kind, rows[kind])]
     done, total = sum(map(len, rows.values())), sum(campaign.wanted(kind) for kind in KINDS)
-    for chunk, flown in _fly_all(chunks, workers):
+    for chunk, flown in _fly_all(chunks, campaign.schemes, workers):
         _keep(folder, chunk, flown)
         rows[chunk[0].kind].update((row["index"], row) for row in flown)
         done += len(chunk)
@@ -62,9 +70,14 @@ def conduct(
     return {kind: [rows[kind][i] for i in range(campaign.wanted(kind))] for kind in KINDS}
 
 
-def _identity(seed: int) -> dict[str, Any]:
+def _identity(campaign: Campaign) -> dict[str, Any]:
     """What must be the same for rows to belong together: the seed, the version and the code that flies."""
-    return {"seed": seed, "version": __version__, "code": _fingerprint()}
+    return {
+        "seed": campaign.seed,
+        "schemes": list(campaign.schemes),
+        "version": __version__,
+        "code": _fingerprint(),
+    }
 
 
 def _fingerprint() -> str:
@@ -75,8 +88,8 @@ def _fingerprint() -> str:
     return digest.hexdigest()[:16]
 
 
-def _open(folder: Path, seed: int) -> None:
-    manifest, mine = folder / "campaign.json", _identity(seed)
+def _open(folder: Path, campaign: Campaign) -> None:
+    manifest, mine = folder / "campaign.json", _identity(campaign)
     try:
         folder.mkdir(parents=True, exist_ok=True)
         if not manifest.exists():
@@ -117,17 +130,20 @@ def _write_whole(path: Path, content: Any) -> None:
     partial.replace(path)
 
 
-def _fly_chunk(chunk: list[Draw]) -> tuple[list[Draw], list[Row]]:
-    return chunk, [fly_draw(draw) for draw in chunk]
+def _fly_chunk(schemes: Schemes, chunk: list[Draw]) -> tuple[list[Draw], list[Row]]:
+    return chunk, [fly_draw(draw, schemes) for draw in chunk]
 
 
-def _fly_all(chunks: list[list[Draw]], workers: int) -> Iterable[tuple[list[Draw], list[Row]]]:
+def _fly_all(
+    chunks: list[list[Draw]], schemes: Schemes, workers: int
+) -> Iterable[tuple[list[Draw], list[Row]]]:
     """Chunks as they land, in no particular order."""
+    fly_chunk = partial(_fly_chunk, schemes)
     if workers == 1 or len(chunks) < 2:
-        yield from map(_fly_chunk, chunks)
+        yield from map(fly_chunk, chunks)
         return
     with _pool(min(workers, len(chunks))) as pool:
-        yield from pool.imap_unordered(_fly_chunk, chunks)
+        yield from pool.imap_unordered(fly_chunk, chunks)
 
 
 @contextlib.contextmanager

@@ -1,22 +1,35 @@
 """Fly one drawn flight and keep what the promises are judged by."""
 
-from math import ceil
+from math import ceil, exp
 from typing import Any
 
 from beaver_ftc.errors import BadInput
 from beaver_ftc.flight import Flight
+from beaver_ftc.scenario.faults import LossOfEffectiveness
 from beaver_ftc.verify.draw import Draw
 
-SCHEMES: dict[str, dict[str, Any]] = {"published": {"thresholds": "published"}, "sharpened": {}}
+PUBLISHED, SHARPENED = "published", "sharpened"
+_OFF = {"pole_bank": False, "memory": False, "shared_effectiveness": False}
+SCHEMES: dict[str, dict[str, Any]] = {PUBLISHED: {"thresholds": "published"}, SHARPENED: {}}
+# From the published scheme to the default, and on to what takes a declaration, one step after the other.
+STEPS: dict[str, dict[str, Any]] = {
+    PUBLISHED: SCHEMES[PUBLISHED],
+    "interval": {"sharpen": _OFF},
+    "pole bank": {"sharpen": {**_OFF, "pole_bank": True}},
+    "memory": {"sharpen": {"shared_effectiveness": False}},
+    SHARPENED: SCHEMES[SHARPENED],
+    "constant": {"fault_profile": "abrupt"},
+}
+_CONSTANT_ONLY = "constant"  # for faults that are: one that grows is outside what this step declares
 _LATE_S = 1e-9  # rounding of frame times
 
 Row = dict[str, Any]
 
 
-def fly_draw(draw: Draw) -> Row:
+def fly_draw(draw: Draw, schemes: dict[str, dict[str, Any]] = SCHEMES) -> Row:
     """The row of a flight. A fault is flown once with each scheme, in all else the same flight."""
     try:
-        return _faulty(draw) if draw.kind == "faulty" else _healthy(draw)
+        return _faulty(draw, schemes) if draw.kind == "faulty" else _healthy(draw)
     except BadInput as error:  # a draw without a trim: said, not counted
         return {"index": draw.index, "skipped": str(error)}
 
@@ -39,13 +52,14 @@ def _healthy(draw: Draw) -> Row:
     }
 
 
-def _faulty(draw: Draw) -> Row:
+def _faulty(draw: Draw, schemes: dict[str, dict[str, Any]]) -> Row:
     from beaver_ftc.loop import fly
 
     row: Row = {"index": draw.index}
-    for scheme, fdi in SCHEMES.items():
+    for scheme, fdi in schemes.items():
         scenario = draw.scenario(fdi)
-        row[scheme] = judge(fly(scenario))
+        abrupt = scenario.faults[0].profile == "abrupt"
+        row[scheme] = judge(fly(scenario)) if abrupt or scheme != _CONSTANT_ONLY else row[SHARPENED]
     fault = scenario.faults[0]
     return row | {
         "rate_hz": scenario.rate_hz,
@@ -74,4 +88,15 @@ def judge(flight: Flight) -> Row:
         "isolation_s": flight.isolation_time_s - struck_s if flight.isolation_time_s is not None else None,
         "excluded": delay_s is not None and actuator not in (*flight.candidates, flight.isolated),
         "wrong": flight.isolated not in (None, actuator),
+        "estimate_error": _estimate_error(flight) if flight.isolated == actuator else None,
     }
+
+
+def _estimate_error(flight: Flight) -> float | None:
+    """How far the estimated parameter is from the true one as the flight ends."""
+    fault = flight.scenario.faults[0]
+    if flight.estimate is None or not isinstance(fault, LossOfEffectiveness):
+        return None
+    age_s = flight.frames / flight.scenario.rate_hz - fault.at_s
+    grown = 1.0 if fault.kappa_per_s is None else 1.0 - exp(-fault.kappa_per_s * age_s)
+    return abs(flight.estimate + fault.magnitude * grown)

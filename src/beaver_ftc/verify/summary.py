@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from beaver_ftc.verify.confidence import binomial_upper, poisson_upper
-from beaver_ftc.verify.fly import SCHEMES, Row
+from beaver_ftc.verify.fly import SCHEMES, SHARPENED, STEPS, Row
 
 PROMISES = ("false_alarms", "true_fault_exclusions", "wrong_isolations", "late_detections")
 
@@ -22,12 +22,16 @@ def summarise(rows: dict[str, list[Row]]) -> dict[str, Any]:
         "healthy": _healthy(healthy),
         "faults": len(faulty),
         "skipped": len(rows["healthy"]) + len(rows["faulty"]) - len(healthy) - len(faulty),
-        "schemes": {scheme: _scheme([row[scheme] for row in faulty]) for scheme in SCHEMES} if faulty else {},
+        "schemes": {
+            scheme: _scheme([row[scheme] for row in faulty])
+            for scheme in STEPS
+            if faulty and scheme in faulty[0]
+        },
     }
     if faulty:
         document["delay_shorter_by"] = _shorter(document["schemes"])
     document["kept"] = document["healthy"]["false_alarms"] == 0 and all(
-        document["schemes"]["sharpened"][promise] == 0 for promise in PROMISES if faulty
+        document["schemes"][SHARPENED][promise] == 0 for promise in PROMISES if faulty
     )
     return document
 
@@ -44,9 +48,7 @@ def _healthy(rows: Sequence[Row]) -> dict[str, Any]:
         "false_alarms_per_hour_upper_95": poisson_upper(alarms, hours) if hours else None,
         "departures": sum(row["departed"] for row in rows),
         "hours_outside_envelope": sum(row["outside_s"] for row in rows) / 3600.0,
-        "closest_approach": dict(zip(SCHEMES, closest, strict=False))
-        if len(rows)
-        else {},
+        "closest_approach": dict(zip(SCHEMES, closest, strict=False)) if len(rows) else {},
     }
 
 
@@ -69,6 +71,9 @@ def _scheme(rows: Sequence[Row]) -> dict[str, Any]:
         "delay_s": _quantiles(row["delay_s"] for row in rows),
         "isolation_delay_s": _quantiles(row["isolation_s"] for row in rows),
         "delay_over_guaranteed": _quantiles(ratios),
+        "estimate_error": _quantiles(
+            row["estimate_error"] for row in rows if row["estimate_error"] is not None
+        ),
     }
 
 
@@ -84,7 +89,7 @@ def _quantiles(values: Iterable[float | None]) -> dict[str, float | None]:
 
 def _shorter(schemes: dict[str, Any]) -> float | None:
     """By what share the sharpened scheme's median delay is shorter than the published one's."""
-    published, sharpened = (schemes[name]["delay_s"]["median"] for name in ("published", "sharpened"))
+    published, sharpened = (schemes[name]["delay_s"]["median"] for name in SCHEMES)
     return 1.0 - sharpened / published if published and sharpened is not None else None
 
 
@@ -116,7 +121,7 @@ def _fault_lines(document: dict[str, Any]) -> list[str]:
     schemes = document["schemes"]
     if not schemes:
         return []
-    lines = [f"{document['faults']} random faults{'':17}" + "".join(f"{name:>24}" for name in schemes)]
+    lines = [f"{document['faults']} random faults{'':17}" + "".join(f"{name:>18}" for name in schemes)]
     for promise in PROMISES:
         cells = [f"{s[promise]} (p < {s[promise + '_probability_upper_95']:.1e})" for s in schemes.values()]
         lines.append(_line(promise.replace("_", " "), cells))
@@ -130,6 +135,7 @@ def _fault_lines(document: dict[str, Any]) -> list[str]:
         ("detection delay, s", "delay_s"),
         ("isolation delay, s", "isolation_delay_s"),
         ("delay / guaranteed", "delay_over_guaranteed"),
+        ("error of the estimate", "estimate_error"),
     ):
         for quantile in ("median", "p90"):
             lines.append(_line(f"{label}, {quantile}", [_number(s[key][quantile]) for s in schemes.values()]))
@@ -139,7 +145,7 @@ def _fault_lines(document: dict[str, Any]) -> list[str]:
 
 
 def _line(label: str, cells: Iterable[str]) -> str:
-    return f"  {label:<32}" + "".join(f"{cell:>24}" for cell in cells)
+    return f"  {label:<32}" + "".join(f"{cell:>18}" for cell in cells)
 
 
 def _number(value: float | None) -> str:

@@ -155,7 +155,7 @@ def test_the_best_fit_is_the_constrained_least_squares_solution():
     solution = np.linalg.lstsq(Omega[:, :, 1].reshape(-1, 1), eps.ravel(), rcond=None)[0][0]
     assert surface == 1
     assert theta == pytest.approx(solution)
-    assert misfit == pytest.approx(np.sum((eps - theta * Omega[:, :, 1]) ** 2) / 40)
+    assert misfit == pytest.approx(np.sum((eps - theta * Omega[:, :, 1]) ** 2) / 120)
 
 
 def test_the_monitor_learns_any_second_order_pair_and_sees_it_change():

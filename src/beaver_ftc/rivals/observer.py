@@ -3,8 +3,8 @@
     eps[k+1] = a eps[k] + dt nu,   a = exp(-pole dt)        alarm when |eps_i| > alarm constant_i / pole
 
 The residual is that of the published detection estimator; only the threshold does not move with the state.
-A fault is named by the surface whose filtered effect fits the residual best, by least squares over a fading
-window.
+From the alarm on, a residual started anew is fitted by the filtered effect of each surface, by least squares
+over a fading window; the best fit names the fault, and a window after the alarm the name stands.
 """
 
 from collections.abc import Mapping
@@ -39,11 +39,11 @@ class Fit:
         self.regressor = self._fade * self.regressor + (Omega**2).sum(axis=0)
 
     def best(self) -> tuple[int, float, float]:
-        """(surface, theta, mean misfit square) of the surface that fits best."""
+        """(surface, theta, mean misfit square of an axis) of the surface that fits best."""
         theta = np.clip(self.cross / np.maximum(self.regressor, 1e-300), -1.0, 0.0)
         J = self.residual - 2.0 * theta * self.cross + theta**2 * self.regressor
         s = int(np.argmin(J))
-        return s, float(theta[s]), float(J[s] / self.count)
+        return s, float(theta[s]), float(J[s] / (3.0 * self.count))
 
 
 class ConstantThresholdObserver:
@@ -59,28 +59,35 @@ class ConstantThresholdObserver:
         self.dt, self.a = context.dt_s, exp(-pole * context.dt_s)
         # a declared bound of zero would make any rounding an alarm
         self.scale = self.option["alarm"] * np.maximum(context.constant_rad_s2, 1e-4) / pole
-        self.eps, self.Omega = np.zeros(3), np.zeros((3, 3))
+        self.eps, self.since, self.Omega = np.zeros(3), np.zeros(3), np.zeros((3, 3))
         self.before: np.ndarray | None = None
         self.fit = Fit(exp(-context.dt_s / self.option["window_s"]))
-        self.detected, self.axis = False, "p"
+        self.alarm_s: float | None = None
+        self.axis, self.named = "p", Verdict()
 
     def step(self, measured: Measured, command: np.ndarray) -> Verdict:
         """Filter the innovation, compare, and from the alarm on ask whose effect it is."""
         if self.before is not None:
             innovation = measured.x - self.before - self.dt * measured.acceleration
             self.eps = self.a * self.eps + innovation
+            self.since = self.a * self.since + innovation
             self.Omega = self.a * self.Omega + self.dt * measured.contribution[:, :3]
         self.before = measured.x
         share = np.abs(self.eps) / self.scale
         statistic = float(share.max())
-        if statistic > 1.0 and not self.detected:
-            self.detected, self.axis = True, "pqr"[int(np.argmax(share))]
-        return self.verdict(statistic) if self.detected else Verdict(statistic=statistic)
+        if statistic > 1.0 and self.alarm_s is None:
+            self.alarm_s, self.axis = measured.t_s, "pqr"[int(np.argmax(share))]
+            self.since, self.Omega = np.zeros(3), np.zeros((3, 3))
+        if self.alarm_s is None:
+            return Verdict(statistic=statistic)
+        if measured.t_s <= self.alarm_s + self.option["window_s"]:
+            self.named = self.verdict()
+        return self.named._replace(statistic=statistic)
 
-    def verdict(self, statistic: float) -> Verdict:
+    def verdict(self) -> Verdict:
         """The surface that fits; none fits if what it leaves is still over the threshold in the mean."""
-        self.fit.step(self.eps / self.scale, self.Omega / self.scale[:, None])
+        self.fit.step(self.since / self.scale, self.Omega / self.scale[:, None])
         s, theta, misfit = self.fit.best()
         if misfit > 1.0:
-            return Verdict(True, self.axis, "unanticipated", "unanticipated", statistic=statistic)
-        return Verdict(True, self.axis, SURFACES[s], "loss_of_effectiveness", theta, None, statistic)
+            return Verdict(True, self.axis, "unanticipated", "unanticipated")
+        return Verdict(True, self.axis, SURFACES[s], "loss_of_effectiveness", theta)

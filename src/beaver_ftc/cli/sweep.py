@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from beaver_ftc.cli.output import Format, FormatOption, complain, emit, emit_json
-from beaver_ftc.errors import BadInput
+from beaver_ftc.errors import BadInput, BeaverFtcError
 
 if TYPE_CHECKING:
     from beaver_ftc.scenario.sweep_loader import Sweep
@@ -71,10 +71,8 @@ def command(
 
     What has been flown is kept, whatever happens: go on with --resume. With --format json: the summary.
     """
-    from beaver_ftc.scenario.sweep_loader import load_sweep
     from beaver_ftc.sweep.run import Options
 
-    sweep = load_sweep(file)
     options = Options(
         out=out,
         workers=workers,
@@ -86,9 +84,19 @@ def command(
         search=search.value if search else None,
         source=file,
     )
-    if replay is None:
-        raise typer.Exit(_fly(sweep, options, format))
-    raise typer.Exit(_replay(sweep, options, replay, format))
+    try:
+        raise typer.Exit(_command(options, replay, format))
+    except BeaverFtcError as error:
+        if format is Format.json:
+            emit_json({"passed": False, "errors": str(error).splitlines()})
+        raise
+
+
+def _command(options: "Options", replay: int | None, format: Format) -> int:
+    from beaver_ftc.scenario.sweep_loader import load_sweep
+
+    sweep = load_sweep(options.source)
+    return _fly(sweep, options, format) if replay is None else _replay(sweep, options, replay, format)
 
 
 def _keep(asked: str) -> "Keep":

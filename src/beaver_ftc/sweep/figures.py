@@ -3,6 +3,7 @@
 Each function takes the flights and returns a figure, or None where the flights hold nothing of that kind.
 """
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -23,6 +24,7 @@ Drawer = Callable[[Flights, Document], "Figure | None"]
 
 DPI = 110
 BINS = 16
+LEAST_A_BIN = 10
 MOST_LINES = 400  # of parallel coordinates: more is a grey block
 _FAULT_LOOKS = (
     (BLUE, "o", "-"),
@@ -76,7 +78,9 @@ def detection_probability(flights: Flights, summary: Document) -> "Figure | None
     labels = flights.fault_labels
     for look, label in zip(_cycle(_FAULT_LOOKS), sorted(set(labels[flights.faulted])), strict=False):
         group = flights.faulted & (labels == label)
-        _probability_curve(axes, flights.values(key)[group], flights.detected[group], label, look)
+        values = flights.values(key)[group]
+        bins = _levels(values) if flights.vary[key].count else _bins(values)
+        _probability_curve(axes, values, bins, flights.detected[group], label, look)
     if flights.vary[key].loguniform:
         axes.set_xscale("log")
     axes.set_ylim(-0.03, 1.03)
@@ -86,8 +90,9 @@ def detection_probability(flights: Flights, summary: Document) -> "Figure | None
     return figure
 
 
-def _probability_curve(axes: "Axes", values: np.ndarray, hits: np.ndarray, label: str, look: tuple) -> None:
-    groups = _bins(values)
+def _probability_curve(
+    axes: "Axes", values: np.ndarray, groups: list[np.ndarray], hits: np.ndarray, label: str, look: tuple
+) -> None:
     found = [wilson(int(hits[group].sum()), group.size) for group in groups]
     shares = np.array([estimate.value for estimate in found])
     reach = np.array([[e.value - e.low, e.high - e.value] for e in found]).T
@@ -98,12 +103,18 @@ def _probability_curve(axes: "Axes", values: np.ndarray, hits: np.ndarray, label
     )  # fmt: skip
 
 
-def _bins(values: np.ndarray) -> list[np.ndarray]:
-    """Positions of the values in equally full bins, in order; one bin a value where there are few."""
+def _levels(values: np.ndarray) -> list[np.ndarray]:
+    """Positions of the flights at each value, in order of the values."""
     levels, group = np.unique(values, return_inverse=True)
-    if levels.size <= 2 * BINS:
-        return [np.flatnonzero(group == level) for level in range(levels.size)]
-    return [part for part in np.array_split(np.argsort(values, kind="stable"), BINS) if part.size]
+    if levels.size > 2 * BINS:
+        return _bins(values)
+    return [np.flatnonzero(group == level) for level in range(levels.size)]
+
+
+def _bins(values: np.ndarray) -> list[np.ndarray]:
+    """Positions of the values in equally full bins, in order, none with too few flights to say anything."""
+    count = min(BINS, max(1, values.size // LEAST_A_BIN))
+    return np.array_split(np.argsort(values, kind="stable"), count)
 
 
 def _cycle(looks: tuple) -> list:
@@ -154,6 +165,10 @@ def confusion_matrix(flights: Flights, summary: Document) -> "Figure | None":
         axes.text(column, row, text, ha="center", va="center", fontsize=8, color=ink if count else GREY)
     axes.set_xticks(range(len(columns)), columns)
     axes.set_yticks(range(len(rows)), rows)
+    for border in range(1, len(rows)):
+        axes.axhline(border - 0.5, color="white", linewidth=2)
+    for border in range(1, len(columns)):
+        axes.axvline(border - 0.5, color="white", linewidth=2)
     return figure
 
 
@@ -246,7 +261,7 @@ def _scaled(axes: "Axes", place: int, flights: Flights, key: str) -> np.ndarray:
     if not flights.is_number(key):
         names, group = np.unique(values.astype(str), return_inverse=True)
         for i, name in enumerate(names):
-            _say(axes, place, i / max(names.size - 1, 1), name[:24])
+            _say(axes, place, i / max(names.size - 1, 1), _short(name))
         return group / max(names.size - 1, 1)
     low, high = float(values.min()), float(values.max())
     _say(axes, place, 0.0, f"{low:.3g}")
@@ -254,6 +269,12 @@ def _scaled(axes: "Axes", place: int, flights: Flights, key: str) -> np.ndarray:
     if flights.vary[key].loguniform:
         values, low, high = np.log(values), np.log(low), np.log(high)
     return (values - low) / max(high - low, 1e-300)
+
+
+def _short(name: str) -> str:
+    """A choice as there is room for it: of a section, the words in it."""
+    words = re.findall(r': "([^"]+)"', name)
+    return (" ".join(words) or name.replace("[]", "none"))[:28].replace("_", " ")
 
 
 def _scaled_delay(axes: "Axes", place: int, flights: Flights) -> np.ndarray:

@@ -35,6 +35,7 @@ def render(summary: Document, folder: Path) -> str:
         worst=[flight | {"link": _link(folder, flight["name"])} for flight in summary["worst"]],
         figures=_figures(folder),
         value=words.value,
+        percent=words.percent,
     )  # fmt: skip
 
 

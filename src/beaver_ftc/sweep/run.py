@@ -103,6 +103,7 @@ def run_sweep(
                 tally.count(rows)
                 progress(tally)
 
+            store.reopen()
             source = _source(sweep, options, store, landed)
             _fly_missing(source, sweep, options, tally, stopped)
             store.compact(source.tables())

@@ -12,10 +12,9 @@ from beaver_ftc.sweep.table import Row, table_of
 if TYPE_CHECKING:
     import pyarrow as pa
 
-FRAMES_A_BATCH = (
-    50_000  # a third of a second of work: little to lose, and a part file costs no share worth saying
-)
+FRAMES_A_BATCH = 50_000  # a third of a second of work: little to lose, and a file costs no share worth saying
 MOST_A_BATCH = 256
+MOST_BATCHES = 20_000  # of a sweep of millions: so many files are still handled with ease
 
 Landed = Callable[[Sequence[Row]], None]
 
@@ -24,7 +23,8 @@ def batch_size(sweep: Sweep) -> int:
     """Flights a batch, from the sweep alone, so that a resumed sweep has the same batches."""
     scenario = sweep.scenario({})
     frames = scenario.duration_s * scenario.rate_hz * scenario.substeps
-    return max(1, min(MOST_A_BATCH, round(FRAMES_A_BATCH / frames)))
+    size = max(1, min(MOST_A_BATCH, round(FRAMES_A_BATCH / frames)))
+    return max(size, -(-sweep.flights // MOST_BATCHES))
 
 
 class SweepSource:

@@ -8,7 +8,6 @@ use.
 
 import contextlib
 import errno
-import fcntl
 import json
 import os
 from collections.abc import Callable, Iterator
@@ -16,6 +15,11 @@ from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any, Self
 
 from beaver_ftc.errors import BadInput, SimulationFailed
+
+try:
+    import fcntl
+except ImportError:  # not a POSIX system: nothing can be locked
+    fcntl = None  # type: ignore[assignment]
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -26,6 +30,7 @@ OWN_FILES = frozenset({
     "lock", "sweep.json", "parts", "results.parquet", "summary.json", "report.html", "figures", "flights",
 })  # fmt: skip
 ROWS_PER_GROUP = 8192
+_KEPT = "; what has been flown is kept, go on with --resume"
 _WRITE_OPTIONS: dict[str, Any] = {"compression": "snappy", "write_statistics": False, "use_dictionary": False}
 
 
@@ -67,6 +72,7 @@ class Store:
                 self._clear()
             self.parts.mkdir(exist_ok=True)
             write_whole(self.folder / "sweep.json", json.dumps(identity.document, indent=2).encode() + b"\n")
+            _sync_folder(self.folder.parent)
             _remove_leftovers(self.folder)
 
     def has_flights(self) -> bool:
@@ -99,7 +105,7 @@ class Store:
 
     def land(self, batch: int, table: "pa.Table") -> None:
         """Keep a batch. Raises SimulationFailed if the disk will not have it."""
-        with clear_disk_errors(self.folder):
+        with clear_disk_errors(self.folder, _KEPT):
             write_parquet(self._part(batch), [table], self.schema)
 
     def is_compacted(self, flights: int) -> bool:
@@ -113,9 +119,13 @@ class Store:
         except (FileNotFoundError, ArrowException):
             return False
 
+    def reopen(self) -> None:
+        """There is still something to fly: let nobody take the sweep for finished."""
+        (self.folder / "summary.json").unlink(missing_ok=True)
+
     def compact(self, batches: Iterator["pa.Table"]) -> None:
         """Make `results.parquet` of all batches, in order, and remove the parts."""
-        with clear_disk_errors(self.folder):
+        with clear_disk_errors(self.folder, _KEPT):
             write_parquet(self.results, batches, self.schema)
             self.remove_parts()
 
@@ -230,6 +240,8 @@ def _refuse_foreign(folder: Path) -> None:
 def _locked(folder: Path) -> IO[str]:
     """Lock the folder for as long as the file stays open; the system lets go of it when the process dies."""
     file = (folder / "lock").open("a")
+    if fcntl is None:
+        return file
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
@@ -245,13 +257,10 @@ def _locked(folder: Path) -> IO[str]:
 
 
 @contextlib.contextmanager
-def clear_disk_errors(folder: Path) -> Iterator[None]:
-    """Turn an operating system's error into one line. What has landed stays; the line says so."""
+def clear_disk_errors(folder: Path, but: str = "") -> Iterator[None]:
+    """Turn an operating system's error into one line, which may end with a word of comfort."""
     try:
         yield
     except OSError as error:
         reason = os.strerror(error.errno) if error.errno else str(error)
-        raise SimulationFailed(
-            f"cannot write {folder}: {reason[:1].lower()}{reason[1:]}; "
-            "what has been flown is kept, go on with --resume"
-        ) from error
+        raise SimulationFailed(f"cannot write {folder}: {reason[:1].lower()}{reason[1:]}{but}") from error

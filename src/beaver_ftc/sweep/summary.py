@@ -4,6 +4,7 @@ A rate comes with its count, what it is of, and its 95 % interval. What the flig
 """
 
 import math
+import re
 from collections import Counter
 from typing import TYPE_CHECKING, Any
 
@@ -23,6 +24,7 @@ QUANTILES = {"median": 0.5, "p90": 0.9, "p95": 0.95, "p99": 0.99, "max": 1.0}
 FALSE_ALARM, NO_ALARM, NOT_ISOLATED = "false alarm", "no alarm", "not isolated"
 _NAMED = ("aileron", "elevator", "rudder", "flap", "unanticipated")
 MOST_REASONS = 20
+_NUMBERS = re.compile(r"-?\d+(\.\d+)?(e[-+]?\d+)?")
 
 
 def summarise(flights: Flights, sweep: "Sweep") -> Document:
@@ -79,12 +81,18 @@ def _statuses(flights: Flights) -> dict[str, int]:
 
 
 def _reasons(flights: Flights) -> list[Document]:
-    """Why flights have no metrics, the most frequent reason first, each with one flight to look at."""
+    """Why flights have no metrics, the most frequent reason first, said in the words of its first flight.
+
+    Reasons that differ in their numbers alone are one.
+    """
     failed = np.flatnonzero(~flights.measured)
-    counts = Counter(flights["reason"][failed].tolist())
-    first = {flights["reason"][i]: int(flights["run"][i]) for i in reversed(failed)}
-    common = counts.most_common(MOST_REASONS)
-    return [{"reason": reason, "count": count, "first_run": first[reason]} for reason, count in common]
+    kinds = [_NUMBERS.sub("#", reason) for reason in flights["reason"][failed]]
+    first = dict(zip(reversed(kinds), reversed(failed.tolist()), strict=True))
+    return [
+        {"reason": flights["reason"][i], "count": count, "first_run": int(flights["run"][i])}
+        for kind, count in Counter(kinds).most_common(MOST_REASONS)
+        for i in (first[kind],)
+    ]
 
 
 def _detection(flights: Flights, group: np.ndarray) -> Document:

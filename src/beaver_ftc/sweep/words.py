@@ -63,9 +63,9 @@ def expectations(summary: Document) -> list[tuple[str, str, str, bool]]:
 
 def expected(level: Document) -> str:
     """A bound in words: `95 % quantile ≤ 0.5 with 95 % confidence`."""
-    part = f"{_percent(level['quantile'])} quantile " if "quantile" in level else ""
+    part = f"{percent(level['quantile'])} quantile " if "quantile" in level else ""
     bound = f"≥ {value(level['at_least'])}" if "at_least" in level else f"≤ {value(level['at_most'])}"
-    sure = f" with {_percent(level['confidence'])} confidence" if "confidence" in level else ""
+    sure = f" with {percent(level['confidence'])} confidence" if "confidence" in level else ""
     return f"{part}{bound}{sure}"
 
 
@@ -74,6 +74,15 @@ def value(number: Any) -> str:
     if number is None:
         return "none"
     return number if isinstance(number, str) else f"{number:.3g}"
+
+
+def percent(share: float | None) -> str:
+    """A share in percent, with the digits that matter near 0 and 1."""
+    if share is None:
+        return "none"
+    digits = 1 if 0.01 <= share <= 0.99 or share in (0, 1) else 2
+    text = f"{100 * share:.{digits}f}"
+    return f"{text.rstrip('0').rstrip('.')} %"
 
 
 def summary_text(summary: Document, colour: bool = False) -> str:
@@ -134,7 +143,7 @@ def _rate(rate: Document, what: str) -> str:
     if not rate["of"]:
         return ""
     return (
-        f"{_percent(rate['rate'])} ({_percent(rate['low'])} to {_percent(rate['high'])}): "
+        f"{percent(rate['rate'])} ({percent(rate['low'])} to {percent(rate['high'])}): "
         f"{rate['count']} of {rate['of']} {what}"
     )
 
@@ -163,7 +172,7 @@ def _false_alarms(found: Document) -> str:
     return (
         f"{found['count']} in {value(found['hours'])} h without a fault: {value(found['per_hour'])}/h "
         f"({value(found['low'])} to {value(found['high'])}); residuals came to "
-        f"{value(found['closest_residual_ratio'])} of the threshold"
+        f"{found['closest_residual_ratio']:.4g} of the threshold"
     )
 
 
@@ -175,11 +184,4 @@ def _guarantee(found: Document) -> str:
 
 def _drivers(ranking: list[Document]) -> str:
     told = [entry for entry in ranking if entry["p_value"] <= 0.05 and entry["explained"] >= 0.01][:3]
-    return ", ".join(f"{entry['key']} ({_percent(entry['explained'])} of the ranks)" for entry in told)
-
-
-def _percent(share: float) -> str:
-    """A share in percent, with the digits that matter near 0 and 1."""
-    digits = 1 if 0.01 <= share <= 0.99 or share in (0, 1) else 2
-    text = f"{100 * share:.{digits}f}"
-    return f"{text.rstrip('0').rstrip('.')} %"
+    return ", ".join(f"{entry['key']} ({percent(entry['explained'])} of the ranks)" for entry in told)

@@ -58,7 +58,7 @@ def _candidates(flights: Flights) -> Iterator[tuple[int, str]]:
     rms = np.where(flights.faulted & np.isfinite(flights.worst_rms_deg_s), flights.worst_rms_deg_s, -np.inf)
     yield from _largest(rms, lambda i: f"tracking error {rms[i]:.3g} deg/s RMS")
     ratio = np.nan_to_num(flights["worst_residual_ratio"], nan=-np.inf)
-    yield from _largest(ratio, lambda i: f"residual {ratio[i]:.3g} of its threshold without a fault")
+    yield from _largest(ratio, lambda i: f"residual {ratio[i]:.4g} of its threshold without a fault")
 
 
 def _those(flights: Flights, which: np.ndarray, why: Any) -> Iterator[tuple[int, str]]:

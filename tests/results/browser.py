@@ -14,6 +14,11 @@ _ARGUMENTS = (
     "--headless=new",
     "--no-sandbox",
     "--disable-gpu",
+    "--disable-quic",
+    "--disable-sync",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--no-first-run",
     "--remote-debugging-pipe",
     "--window-size=1300,1000",
 )

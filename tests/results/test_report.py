@@ -160,6 +160,16 @@ def test_phone_needs_no_sideways_scrolling(page):
     page.call("Emulation.clearDeviceMetricsOverride")
 
 
+def test_paper_gets_curves_drawn_for_its_width_and_nothing_to_press(page):
+    page.call("Emulation.setEmulatedMedia", media="print")
+    page.evaluate("dispatchEvent(new Event('beforeprint'))")
+    widths = page.evaluate("[...document.querySelectorAll('#tracking canvas')].map((c) => c.width)")
+    assert all(0 < width <= 2 * 700 for width in widths)
+    assert page.evaluate("document.getElementById('play').checkVisibility()") is False
+    page.call("Emulation.setEmulatedMedia", media="")
+    page.evaluate("dispatchEvent(new Event('afterprint'))")
+
+
 def test_runs_stand_side_by_side_on_the_same_scale(browser, folder, tmp_path):
     without = Flight(
         scenario=Scenario(name="quiet", faults=()),

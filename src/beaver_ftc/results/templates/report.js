@@ -107,6 +107,8 @@ function play(on) {
 
 // ---- a canvas that knows its size and draws only while it can be seen ----------------------------------------------
 
+const PAPER = 700;  // width of a printed page in pixels: what is wider is drawn again for it, not squeezed
+
 const seen = new IntersectionObserver((entries) => {
   for (const entry of entries) entry.target.inView = entry.isIntersecting;
   repaint();
@@ -114,10 +116,11 @@ const seen = new IntersectionObserver((entries) => {
 const sized = new ResizeObserver(repaint);
 
 function paintable(canvas, draw) {
-  const paint = (always) => {
-    if (!always && !canvas.inView) return;
-    const ratio = Math.max(window.devicePixelRatio || 1, always ? 2 : 1);
-    const width = canvas.clientWidth, height = canvas.clientHeight;
+  const paint = (onPaper) => {
+    if (!onPaper && !canvas.inView) return;
+    const ratio = Math.max(window.devicePixelRatio || 1, onPaper ? 2 : 1);
+    const shrink = onPaper ? Math.min(1, PAPER / document.querySelector("main").clientWidth) : 1;
+    const width = canvas.clientWidth * shrink, height = canvas.clientHeight;
     if (!width || !height) return;
     if (canvas.width !== Math.round(width * ratio)) canvas.width = Math.round(width * ratio);
     if (canvas.height !== Math.round(height * ratio)) canvas.height = Math.round(height * ratio);
@@ -360,7 +363,7 @@ function line(pen, x0, y0, x1, y1) {
 
 /** Values and labels along the value axis. */
 function valueTicks(low, high, log, steps, count) {
-  if (steps.length) return steps.map((name, i) => [i, name.length > 8 ? name.slice(0, 7) + "…" : name]);
+  if (steps.length) return steps.map((name, i) => [i, name.length > 7 ? name.slice(0, 6) + "…" : name]);
   if (log) {
     const decades = [];
     for (let d = Math.ceil(Math.log10(low) - 1e-9); d <= Math.log10(high) + 1e-9; d++) decades.push([10 ** d, String(+(10 ** d).toPrecision(1))]);
@@ -628,6 +631,7 @@ byId("whole").onclick = () => showWindow(0, END);
 byId("near").onclick = () => showWindow(Math.min(...DATA.runs.map((run) => run.window[0])), Math.max(...DATA.runs.map((run) => run.window[1])));
 byId("near").hidden = !DATA.runs.some((run) => run.marks.length);
 window.addEventListener("beforeprint", () => document.querySelectorAll("details").forEach((part) => { part.open = true; }));
+window.addEventListener("afterprint", repaint);
 window.addEventListener("keydown", (event) => {
   if (event.target !== document.body) return;
   const step = (clock.end - clock.start) / 100;

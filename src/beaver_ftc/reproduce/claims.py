@@ -77,7 +77,8 @@ def _last_to_go(flights: Flights) -> float:
     """From detection to the exclusion of the last of the two estimators that do not fit, s."""
     flown = flights["elevator"]
     times = [flown.excluded_at_s(name) for name in ("aileron", "rudder")]
-    return round(max(times) - (flown.metrics["detection"]["time_s"] or np.inf), 9)
+    detected_s = flown.metrics["detection"]["time_s"]
+    return np.inf if detected_s is None else round(max(times) - detected_s, 9)
 
 
 def _adaptive_after(flights: Flights) -> float:
@@ -97,6 +98,8 @@ def _share_of_flap(flights: Flights) -> float:
     """Travel of the flap over that of the elevator, after the hand-over."""
     flown = flights["elevator"]
     after = flown.between(FAULT_AT_S + 3.0)
+    if not after.any():
+        return 0.0
     return float(np.ptp(flown.log["flap_cmd_rad"][after]) / np.ptp(flown.log["elevator_cmd_rad"][after]))
 
 

@@ -16,7 +16,8 @@ STATE = (
 SURFACES = ("aileron_rad", "elevator_rad", "rudder_rad", "flap_rad")
 DERIVATIVES = {
     "Vdot_mps2": 1e-6, "alphadot_rad_s": 1e-6, "betadot_rad_s": 5e-5,
-    "pdot_rad_s2": 1e-6, "qdot_rad_s2": 1e-6, "rdot_rad_s2": 1e-6, "phidot_rad_s": 1e-9, "thetadot_rad_s": 1e-9, "psidot_rad_s": 1e-9,
+    "pdot_rad_s2": 1e-6, "qdot_rad_s2": 1e-6, "rdot_rad_s2": 1e-6,
+    "phidot_rad_s": 1e-9, "thetadot_rad_s": 1e-9, "psidot_rad_s": 1e-9,
     "xdot_mps": 1e-9, "ydot_mps": 1e-9, "hdot_mps": 1e-9,
 }  # fmt: skip
 """RMS error over RMS value. betadot: FDC solves for the force of betadot to first order only."""

@@ -125,7 +125,8 @@ def test_variants_are_flown_side_by_side(tmp_path):
 @pytest.mark.parametrize(
     ("variant", "says"),
     [("nonsense", "no such variant"), ("mass=heavy", "is no value"), ("mas=1.1", "mas"),
-     ("mass=1000", "mass"), ("declared,declared", "twice"), ("coefficients.Cm_alpa=0.9", "unknown aerodynamic term")],
+     ("mass=1000", "mass"), ("declared,declared", "twice"),
+     ("coefficients.Cm_alpa=0.9", "unknown aerodynamic term")],
 )  # fmt: skip
 def test_a_wrong_variant_is_bad_input_of_one_line(tmp_path, variant, says):
     (tmp_path / "short.yaml").write_text(SHORT)

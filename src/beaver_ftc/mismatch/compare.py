@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from beaver_ftc.mismatch.document import Document, write_csv
-from beaver_ftc.mismatch.figures import AXIS_NAMES, new_figure, save
+from beaver_ftc.mismatch.figures import AXIS_NAMES, largest_sources, new_figure, save
 from beaver_ftc.mismatch.states import AXES
 from beaver_ftc.mismatch.words import label, percent
 from beaver_ftc.results.looks import BLACK, BLUE, GREY, VERMILION
@@ -27,6 +27,7 @@ def entry(found: Document) -> Document:
         **{f"{axis}_worst_ratio": bounds[axis]["worst_ratio"] for axis in AXES},
         **{f"{axis}_smallest_constant_rad_s2": bounds[axis]["smallest_constant_rad_s2"] for axis in AXES},
         **{f"{axis}_exceeded_s": bounds[axis]["exceeded_s"] for axis in AXES},
+        **{f"{axis}_dominant": largest_sources(found, axis)[0] for axis in AXES},
         "dominant": found["dominant"]["source"] if found["dominant"] else None,
         "false_alarm": found["false_alarm"],
         "guarantee_void": found["guarantee"]["recommended"]["false_alarm"],
@@ -56,7 +57,7 @@ def comparison_figure(entries: Sequence[Document]) -> "Figure":
     grid = figure.subplots(1, 3, sharey=True, sharex=True)
     ratios = np.array([[_ratio(each, axis) for each in entries] for axis in AXES])
     for axis, axes, row in zip(AXES, grid, ratios, strict=True):
-        _draw(axes, AXIS_NAMES[axis], row, [each["dominant"] for each in entries])
+        _draw(axes, AXIS_NAMES[axis], row, [each[f"{axis}_dominant"] for each in entries])
         axes.set_xlim(min(0.1, 0.5 * ratios.min()), 60.0 * max(ratios.max(), 1.0))
     grid[0].set_yticks(range(len(entries)), [each["scenario"] for each in entries], fontsize=9)
     grid[0].invert_yaxis()
@@ -68,13 +69,11 @@ def _ratio(of: Document, axis: str) -> float:
     return 1e6 if ratio is None else max(ratio, 1e-6)
 
 
-def _draw(axes: "Axes", title: str, ratios: np.ndarray, reasons: list[str | None]) -> None:
+def _draw(axes: "Axes", title: str, ratios: np.ndarray, reasons: list[str]) -> None:
     colours = [VERMILION if ratio > 1.0 else BLUE for ratio in ratios]
     axes.barh(range(len(ratios)), ratios, color=colours, height=0.7)
     for row, (ratio, reason) in enumerate(zip(ratios, reasons, strict=True)):
-        axes.annotate(
-            f" {percent(float(ratio))} ({label(reason or 'none')})", (ratio, row), va="center", fontsize=7
-        )
+        axes.annotate(f" {percent(float(ratio))} ({label(reason)})", (ratio, row), va="center", fontsize=7)
     axes.axvline(1.0, color=BLACK, linewidth=1.0, dashes=(4, 2))
     axes.set_xscale("log")
     axes.set_title(title, fontsize=10)

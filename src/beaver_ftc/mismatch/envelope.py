@@ -8,7 +8,7 @@ import numpy as np
 
 from beaver_ftc.errors import BadInput
 from beaver_ftc.mismatch.document import Document, write_csv
-from beaver_ftc.mismatch.figures import AXIS_NAMES, new_figure, save
+from beaver_ftc.mismatch.figures import AXIS_NAMES, largest_sources, new_figure, save
 from beaver_ftc.mismatch.states import AXES
 
 if TYPE_CHECKING:
@@ -56,7 +56,7 @@ def _cell(scenario: "Scenario", V: float, h: float) -> Iterator[Document]:
             "axis": axis,
             "worst_ratio": bound["worst_ratio"],
             "smallest_constant_rad_s2": bound["smallest_constant_rad_s2"],
-            "dominant": _reason(found, axis),
+            "dominant": largest_sources(found, axis)[0],
             "false_alarm": found["false_alarm"],
         }
 
@@ -69,13 +69,6 @@ def _blank(axis: str) -> Document:
         "dominant": None,
         "false_alarm": None,
     }
-
-
-def _reason(found: Document, axis: str) -> str:
-    sources = {
-        name: of for name, of in found["axes"][axis].items() if name not in ("total", "fault", "unexplained")
-    }
-    return max(sources, key=lambda name: sources[name]["max"])
 
 
 def write_map(out: Path, scenario: "Scenario", entries: list[Document], report: bool) -> Path:

@@ -99,7 +99,7 @@ def largest_sources(found: Document, axis: str) -> list[str]:
         (name for name in SOURCES if name != "fault"), key=lambda name: -found["axes"][axis][name]["max"]
     )
     least = LEAST_CURVE * found["axes"][axis][by_peak[0]]["max"]
-    return [name for name in by_peak[:SHOWN_SOURCES] if found["axes"][axis][name]["max"] > least]
+    return [name for name in by_peak[:SHOWN_SOURCES] if found["axes"][axis][name]["max"] >= least]
 
 
 def _draw_sources(axes: "Axes", series: dict, axis: str, chosen: list[str], instants: Sequence[Mark]) -> None:
@@ -113,10 +113,15 @@ def _draw_sources(axes: "Axes", series: dict, axis: str, chosen: list[str], inst
         axes.plot(
             t, series[column(axis, name)], color=colour, linestyle=style, linewidth=1.3, label=label(name)
         )
-    for mark in instants:
+    for i, mark in enumerate(instants):
         axes.axvline(mark.time_s, color=mark.colour, linewidth=0.9, linestyle=(0, mark.dash or (1, 0)))
         axes.annotate(
-            mark.letter, (mark.time_s, 1.0), xycoords=("data", "axes fraction"), fontsize=8, va="bottom"
+            mark.letter,
+            (mark.time_s, 1.0),
+            xycoords=("data", "axes fraction"),
+            xytext=(0, 2 + 9 * (i % 2)),  # neighbours do not collide
+            textcoords="offset points",
+            fontsize=8,
         )
     _dress(axes, f"{AXIS_NAMES[axis]} (rad/s²)")
     axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=8, frameon=False)

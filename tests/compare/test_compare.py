@@ -12,12 +12,14 @@ from beaver_ftc.cli.main import app
 from beaver_ftc.compare.benchmark import MARK, write_leaderboard
 from beaver_ftc.compare.crew import fly_cases, spread
 from beaver_ftc.compare.document import better_than_ours, document_of
-from beaver_ftc.compare.flights import CALIBRATION, of_set, of_sweep, set_names
+from beaver_ftc.compare.flights import CALIBRATION, Case, of_set, of_sweep, set_names
 from beaver_ftc.compare.replay import Trace
-from beaver_ftc.compare.trial import LAW, ORACLE, SCHEME, Entry, entries_of
+from beaver_ftc.compare.table import as_text
+from beaver_ftc.compare.trial import LAW, ORACLE, SCHEME, Entry, entries_of, fly_case
 from beaver_ftc.compare.tune import DETECTORS, LAWS, alarm_level, candidates
 from beaver_ftc.plugins import plugin_class
 from beaver_ftc.rivals.options import tuned
+from beaver_ftc.scenario.schema import Scenario
 
 BEAVER = Path(sys.executable).with_name("beaver-ftc")
 SWEEP = """
@@ -92,6 +94,7 @@ def test_workers_do_not_change_the_result(sweep):
         (("--benchmark", "--schemes", "efk", "--flights", "1"), "--schemes: unknown scheme 'efk'"),
         (("--benchmark", "--laws", "lqx", "--flights", "1"), "--laws: unknown law 'lqx'"),
         (("--sweep", "nowhere.yaml"), "no such file"),
+        (("--tune", "--set", "published"), "--set: allowed: only with --benchmark"),
         (("nowhere",), "nowhere: holds no metrics.json, allowed: a result folder"),
     ],
 )
@@ -103,6 +106,25 @@ def test_bad_usage_is_one_line_and_exit_status_2(tmp_path, arguments, says):
     assert says in done.stderr
     assert "Traceback" not in done.stderr
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_plug_in_that_fails_spoils_only_its_own_line(sweep):
+    entries = entries_of(["json:JSONDecoder", "observer-constant"], [LAW])
+    document = document_of(fly_cases(of_sweep(sweep), entries), entries)
+    part = document["sets"]["few"]
+    broken, fine = part["lines"][0], part["lines"][1]
+    assert (broken["flights"], broken["failed"]) == (0, 3)
+    assert (fine["flights"], fine["failed"], fine["detection_rate"]) == (3, 0, 1.0)
+    assert any("json:JSONDecoder lacks reset and step" in error for error in part["errors"])
+    assert as_text(document)
+
+
+def test_a_case_that_cannot_be_flown_is_said():
+    scenario = Scenario(name="low", initial={"airspeed_mps": 20.0, "manifold_pressure_inhg": 10.0})
+    entries = entries_of([SCHEME], [LAW])
+    document = document_of([fly_case(Case("s", scenario), entries)], entries)
+    assert document["sets"]["s"]["lines"][0]["failed"] == 1
+    assert document["sets"]["s"]["errors"]
 
 
 def _line(scheme, law, **changes):

@@ -42,11 +42,14 @@ def command(
 ) -> None:
     """Compare finished runs; or schemes and laws on the same flights (--sweep, --benchmark).
 
-    Writes comparison.json, comparison.png and comparison.html (for runs: runs.json, runs.png, runs.html) below --out.
+    Writes comparison.json, comparison.png and comparison.html (for runs: runs.json, runs.png, runs.html)
+    below --out.
     """
     asked = [bool(runs), sweep is not None, benchmark, tune]
     if sum(asked) != 1:
         raise BadInput("compare: allowed: exactly one of RUN..., --sweep FILE, --benchmark, --tune")
+    if only is not None and not benchmark:
+        raise BadInput("compare: --set: allowed: only with --benchmark")
     if runs:
         _compare_runs(runs, out, format)
     elif tune:

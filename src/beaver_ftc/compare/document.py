@@ -43,8 +43,12 @@ def _set(trials: Sequence[Trial], entries: Sequence[Entry]) -> Document:
         "trade_off": {s: [_point(p) for p in trade_off(of)] for s, of in traces.items()},
         "without_false_alarm": {s: _point(matched(of)) for s, of in traces.items()},
         "better_than_ours": better_than_ours(lines),
-        "errors": sorted({result.error for trial in trials for result in trial.results if result.error}),
+        "errors": sorted({error for trial in trials for error in _errors(trial)}),
     }
+
+
+def _errors(trial: Trial) -> list[str]:
+    return [*trial.failures, *(result.error for result in trial.results if result.error)]
 
 
 def _plain(line: Line) -> Document:

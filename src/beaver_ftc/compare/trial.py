@@ -6,7 +6,7 @@ from math import hypot, inf
 from time import perf_counter
 
 from beaver_ftc.compare.flights import Case
-from beaver_ftc.compare.replay import Trace, record, replay
+from beaver_ftc.compare.replay import Recording, Trace, record, replay
 from beaver_ftc.errors import BeaverFtcError
 from beaver_ftc.flight import Flight
 from beaver_ftc.loop import Loop
@@ -48,11 +48,12 @@ class Result:
 
 @dataclass
 class Trial:
-    """All results of one case; traces by scheme."""
+    """All results of one case; traces by scheme, and why one is missing."""
 
     case: Case
     results: list[Result] = field(default_factory=list)
     traces: dict[str, Trace] = field(default_factory=dict)
+    failures: list[str] = field(default_factory=list)
 
 
 def entries_of(schemes: Sequence[str], laws: Sequence[str]) -> list[Entry]:
@@ -74,11 +75,23 @@ def with_entry(scenario: Scenario, entry: Entry) -> Scenario:
 def fly_case(case: Case, entries: Sequence[Entry]) -> Trial:
     """Fly a case with every entry; record it once under the nominal law for the trade-off of each scheme."""
     trial = Trial(case, [_fly(case.scenario, entry) for entry in entries])
-    recording = record(case.scenario)
-    for scheme in dict.fromkeys(entry.scheme for entry in entries):
-        if scheme != "none":
-            trial.traces[scheme] = replay(recording, scheme, case.scenario.fdi.options)
+    schemes = [scheme for scheme in dict.fromkeys(entry.scheme for entry in entries) if scheme != "none"]
+    try:
+        recording = record(case.scenario)
+    except BeaverFtcError as error:
+        trial.failures.append(str(error))
+        return trial
+    for scheme in schemes:
+        _trace(trial, recording, scheme)
     return trial
+
+
+def _trace(trial: Trial, recording: Recording, scheme: str) -> None:
+    """Play the flight to a scheme; what a plug-in fails over is not the end of the comparison."""
+    try:
+        trial.traces[scheme] = replay(recording, scheme, trial.case.scenario.fdi.options)
+    except Exception as error:
+        trial.failures.append(f"{scheme}, on a recorded flight: {type(error).__name__}: {error}")
 
 
 def _fly(scenario: Scenario, entry: Entry) -> Result:

@@ -4,12 +4,13 @@ VENV := .venv
 BIN := $(VENV)/bin
 WORKERS ?= 2
 
-.PHONY: demo test lint clean help
+.PHONY: demo test lint docs clean help
 
 help:
 	@echo "make demo   set up, fly the published elevator case, print the verdict and where the report lies"
 	@echo "make test   set up and run the whole test suite"
 	@echo "make lint   set up and run the linters"
+	@echo "make docs   set up and write the generated pages and pictures of docs/ anew"
 	@echo "make clean  remove the virtual environment and what runs have written"
 
 $(VENV)/.demo: pyproject.toml
@@ -33,6 +34,9 @@ lint: $(VENV)/.dev
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+
+docs: $(VENV)/.demo
+	$(BIN)/python -m beaver_ftc.docs
 
 clean:
 	rm -rf $(VENV) runs sweeps .pytest_cache .hypothesis .mypy_cache .ruff_cache

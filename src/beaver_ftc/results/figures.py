@@ -184,7 +184,7 @@ def _draw_legend(figure: "Figure", grid: Iterable["Axes"]) -> None:
         shown.keys(),
         loc="lower center",
         bbox_to_anchor=(0.5, 0.04 / figure.get_figheight()),
-        ncols=min(len(shown), 12 if figure.get_figwidth() > 11 else 8) or 1,
+        ncols=min(len(shown), 12 if figure.get_figwidth() > 11 else 9) or 1,
         columnspacing=1.2,
         fontsize=8,
         frameon=False,

@@ -1,0 +1,50 @@
+"""The picture a newcomer sees first: the published elevator case, from fault to recovery."""
+
+from pathlib import Path
+
+from beaver_ftc.results.views import Panel, Trace, View
+
+SPAN_S = (6.0, 24.0)
+VIEW = View(
+    "elevator-partial-loss",
+    "Elevator loses 40 % of its effectiveness at 12 s",
+    (
+        Panel(
+            "pitch rate q",
+            (Trace("q_model_rad_s", "reference", "target"), Trace("q_rad_s", "aircraft", "actual")),
+        ),
+        Panel(
+            "residual of q",
+            (
+                Trace("q_threshold_rad_s", "± threshold", "bound"),
+                Trace("q_threshold_rad_s", "", "bound", -1.0),
+                Trace("q_residual_rad_s", "residual", "actual"),
+            ),
+        ),
+        Panel(
+            "surfaces",
+            (
+                Trace("elevator_effective_rad", "elevator", "elevator"),
+                Trace("flap_effective_rad", "flap", "flap"),
+            ),
+        ),
+    ),
+)
+
+
+def write_figure(path: Path) -> Path:
+    """Fly the built-in scenario `elevator-partial-loss` and draw it into `path`."""
+    from tempfile import TemporaryDirectory
+
+    from beaver_ftc.results.figures import draw
+    from beaver_ftc.results.looks import marks
+    from beaver_ftc.results.run import run
+    from beaver_ftc.results.series import read_series
+    from beaver_ftc.scenario.loader import load_scenario
+
+    with TemporaryDirectory() as folder:
+        metrics = run(load_scenario("elevator-partial-loss"), Path(folder), report=False)
+        series = read_series(Path(folder, metrics["scenario"], "log.parquet"), VIEW.columns, SPAN_S)
+    said = "detected, isolated, and pitch handed over to the flap"
+    draw(VIEW, series, marks(metrics), said).savefig(path, metadata={"Software": "beaver-ftc"})
+    return path

@@ -5,11 +5,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from beaver_ftc.mismatch.bound import guarantee_with, recommend, rounded_up
-from beaver_ftc.mismatch.run import tally_of_flight
+from beaver_ftc.mismatch.bound import guarantee_with, recommend, rounded_up, with_bound
+from beaver_ftc.mismatch.run import settle, tally_of_flight
 from beaver_ftc.mismatch.sources import SOURCES
 from beaver_ftc.mismatch.split import Stretch
-from beaver_ftc.mismatch.tally import AxisBound, Tally, tally
+from beaver_ftc.mismatch.tally import AxisBound, Tally
 from flying import loss, scenario
 
 CONSTANT = np.array([0.02, 0.02, 0.02])
@@ -26,7 +26,10 @@ def stretch(t_s, eta, fault=0.0, eta_bar=0.03, source="sinusoids"):
 
 
 def kept(*stretches):
-    return tally(stretches, CONSTANT, 0.1)
+    found = Tally(CONSTANT, 0.1)
+    for each in stretches:
+        found.add(each)
+    return found
 
 
 def test_the_smallest_constant_leaves_the_rest_of_the_bound_as_it_is():
@@ -120,6 +123,25 @@ def test_a_larger_bound_guarantees_the_published_case_later_or_never():
         g.detection_delay_s is None or g.detection_delay_s <= d + 1e-9
         for g, d in zip(found, delays, strict=True)
     )
+
+
+def test_the_recommended_bound_covers_the_flight_it_makes():
+    """With the published bound a wrong mass alarms and another law flies on; without, it needs more."""
+    case = scenario(design_model={"mass": 1.1}, faults=[loss(at_s=6)], duration_s=12)
+    kept, flown = tally_of_flight(case)
+    assert flown["false_alarm"]
+    found = settle([case], [kept])
+    assert found.settled
+    again, flown_with_it = tally_of_flight(with_bound(case, found.constant_rad_s2))
+    assert not again.exceeded
+    assert not flown_with_it["false_alarm"]
+
+
+def test_a_run_within_its_bound_is_recommended_what_it_used():
+    case = scenario(duration_s=6)
+    kept, _ = tally_of_flight(case)
+    found = settle([case, case], [kept, kept])
+    assert found == recommend([kept, kept])
 
 
 def test_neglecting_the_engine_with_the_published_bound_raises_a_false_alarm():

@@ -93,7 +93,7 @@ def _compare(
     from beaver_ftc.mismatch.text import comparison_text
 
     entries = [entry(found) for found in documents]
-    recommended = recommended_for(scenarios[0], tallies)
+    recommended = recommended_for(scenarios, tallies)
     folder = write_comparison(out, entries, recommended, report)
     if format is Format.text:
         emit(comparison_text(entries, recommended, str(folder), _colour()))

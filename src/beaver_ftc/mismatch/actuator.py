@@ -57,12 +57,10 @@ class HealthyActuators:
         """Positions (n, 4) rad at rows with these commands (n, 4) rad, following those given before."""
         if self._ideal.all():
             return np.clip(commands, self.low, self.high)
-        positions = np.empty_like(commands)
-        first = self.at_rad is None
         if self.at_rad is None:
             self.at_rad = np.clip(commands[0], self.low, self.high)
-        _follow(commands, self.gain, self.reach, self.low, self.high, 0 if first else self.runs, self.runs,
-                self.at_rad, positions)  # fmt: skip
+        positions = np.empty_like(commands)
+        _follow(commands, self.gain, self.reach, self.low, self.high, self.runs, self.at_rad, positions)
         return positions
 
 
@@ -74,13 +72,13 @@ def _stops(surface: str, dynamics) -> tuple[float, float]:
 
 
 @kernel
-def _follow(commands, gain, reach, low, high, first_runs, runs, at, positions):
-    """Fill positions (n, 4) rad and leave `at` (4,) rad at the last; `first_runs` is for the first row."""
+def _follow(commands, gain, reach, low, high, runs, at, positions):
+    """Fill positions (n, 4) rad, `runs` JSBSim frames a row, and leave `at` (4,) rad at the last."""
     for k in range(commands.shape[0]):
         for s in range(4):
             demand = min(max(commands[k, s], low[s]), high[s])
-            for _ in range(first_runs if k == 0 else runs):
+            ideal = gain[s] == 1.0 and reach[s] == np.inf
+            for _ in range(runs):
                 way = min(max(gain[s] * (demand - at[s]), -reach[s]), reach[s])
-                ideal = gain[s] == 1.0 and reach[s] == np.inf
                 at[s] = demand if ideal else min(max(at[s] + way, low[s]), high[s])
             positions[k, s] = at[s]

@@ -22,10 +22,12 @@ class Recommendation:
 
     coverage: the chance that one more run of the same kind stays within it, runs / (runs + 1): it is as
     likely as any other to be the worst of all.
+    settled: flown with it, no run that had exceeded its bound does so again.
     """
 
     constant_rad_s2: PerAxis
     runs: int
+    settled: bool = True
 
     @property
     def coverage(self) -> float:
@@ -73,11 +75,15 @@ def published_case(constant_rad_s2: PerAxis, like: "Scenario") -> "Scenario":
     """The built-in published elevator case with the design model of `like` and this constant bound."""
     from beaver_ftc.scenario.loader import load_scenario
 
-    case = load_scenario(PUBLISHED_CASE)
-    per_axis = case.fdi.bounds.constant_rad_s2.model_copy(update=constant_rad_s2)
-    bounds = case.fdi.bounds.model_copy(update={"constant_rad_s2": per_axis})
-    fdi = case.fdi.model_copy(update={"bounds": bounds})
-    return case.model_copy(update={"fdi": fdi, "design_model": like.design_model})
+    case = load_scenario(PUBLISHED_CASE).model_copy(update={"design_model": like.design_model})
+    return with_bound(case, constant_rad_s2)
+
+
+def with_bound(scenario: "Scenario", constant_rad_s2: PerAxis) -> "Scenario":
+    """The scenario with another constant part of the bound."""
+    per_axis = scenario.fdi.bounds.constant_rad_s2.model_copy(update=constant_rad_s2)
+    bounds = scenario.fdi.bounds.model_copy(update={"constant_rad_s2": per_axis})
+    return scenario.model_copy(update={"fdi": scenario.fdi.model_copy(update={"bounds": bounds})})
 
 
 def _delay(flight: "Flight", fault_s: float) -> float | None:

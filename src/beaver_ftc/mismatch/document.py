@@ -101,6 +101,7 @@ def recommendation_document(recommended: Recommendation) -> Document:
         "constant_rad_s2": recommended.constant_rad_s2,
         "runs": recommended.runs,
         "coverage": recommended.coverage,
+        "settled": recommended.settled,
     }
 
 

@@ -1,6 +1,7 @@
 """Fly a scenario, split its mismatch, keep the results beside the run's own."""
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -18,11 +19,14 @@ from beaver_ftc.mismatch.document import (
 from beaver_ftc.mismatch.states import OPTIONAL, REQUIRED, Columns
 
 if TYPE_CHECKING:
+    from beaver_ftc.mismatch.bound import Recommendation
     from beaver_ftc.mismatch.linear import LinearAnalysis
+    from beaver_ftc.mismatch.split import Stretch
     from beaver_ftc.mismatch.tally import Tally
     from beaver_ftc.scenario.schema import Scenario
 
 Progress = Callable[[float], None]
+MAX_ROUNDS = 5
 
 
 def run_mismatch(
@@ -69,49 +73,90 @@ def complete(scenario: "Scenario", kept: "Tally", flown: Document, analysis: "Li
     """The document of one flight, its own recommendation, what that does to the guarantee, and the modes."""
     return (
         document(scenario, kept, flown)
-        | recommended_for(scenario, [kept])
+        | recommended_for([scenario], [kept])
         | {"linear": linear_document(analysis)}
     )
 
 
-def recommended_for(scenario: "Scenario", kept: Iterable["Tally"]) -> Document:
-    """The bound that covers these flights, and the published elevator case flown with it and this design."""
-    from beaver_ftc.mismatch.bound import guarantee_with, recommend
+def recommended_for(scenarios: Sequence["Scenario"], kept: Sequence["Tally"]) -> Document:
+    """The bound that covers these flights, and the published elevator case flown with it and the design."""
+    from beaver_ftc.mismatch.bound import guarantee_with
 
-    recommended = recommend(kept)
-    declared = scenario.fdi.bounds.constant_rad_s2.model_dump()
+    first = scenarios[0]
+    recommended = settle(scenarios, kept)
+    declared = first.fdi.bounds.constant_rad_s2.model_dump()
     return {
         "recommended": recommendation_document(recommended),
         "guarantee": guarantee_document(
-            guarantee_with(declared, scenario), guarantee_with(recommended.constant_rad_s2, scenario)
+            guarantee_with(declared, first), guarantee_with(recommended.constant_rad_s2, first)
         ),
     }
+
+
+def settle(scenarios: Sequence["Scenario"], kept: Sequence["Tally"]) -> "Recommendation":
+    """The recommended bound, flown with until it covers the flights it changes.
+
+    A bound too small raises an alarm, after which another law flies; without that alarm the flight, and its
+    mismatch, is another. So flights that exceeded their bound are flown again with the recommended one.
+    """
+    from beaver_ftc.mismatch.bound import recommend, with_bound
+
+    tallies = list(kept)
+    open_ = [i for i, tally in enumerate(tallies) if tally.exceeded]
+    recommended = recommend(tallies)
+    for _ in range(MAX_ROUNDS):
+        if not open_:
+            return recommended
+        again = {i: tally_of_flight(with_bound(scenarios[i], recommended.constant_rad_s2))[0] for i in open_}
+        open_ = [i for i, tally in again.items() if tally.exceeded]
+        tallies += again.values()
+        recommended = replace(recommend(tallies), runs=len(scenarios), settled=not open_)
+    return recommended
 
 
 def tally_of_log(scenario: "Scenario", log: Path, frames: Path) -> "Tally":
     """Split a log, a row group at a time; every frame goes to `frames`."""
     from beaver_ftc.mismatch.frames import written
     from beaver_ftc.mismatch.split import split
+    from beaver_ftc.mismatch.tally import tally_for
 
-    return _tally(scenario, written(split(scenario, _chunks(log)), frames))
+    kept = tally_for(scenario)
+    for stretch in written(split(scenario, _chunks(log)), frames):
+        kept.add(stretch)
+    return kept
 
 
 def tally_of_flight(scenario: "Scenario") -> tuple["Tally", Document]:
-    """Fly and split without keeping a file: the tally and the flight's metrics."""
+    """Fly and split as it is flown, keeping no log: the tally and the flight's metrics."""
     from beaver_ftc.loop import fly
-    from beaver_ftc.mismatch.split import split
     from beaver_ftc.results.metrics import metrics
 
-    log = _Memory()
-    flight = fly(scenario, log)
-    return _tally(scenario, split(scenario, log.chunks())), metrics(flight)
+    sink = _SplittingSink(scenario)
+    flight = fly(scenario, sink)
+    return sink.tally, metrics(flight)
 
 
-def _tally(scenario: "Scenario", stretches) -> "Tally":
-    from beaver_ftc.mismatch.tally import tally
+class _SplittingSink:
+    """A log sink that splits and forgets."""
 
-    constant = np.array(scenario.fdi.bounds.constant_rad_s2.as_tuple())
-    return tally(stretches, constant, 1.0 / scenario.rate_hz)
+    def __init__(self, scenario: "Scenario") -> None:
+        from beaver_ftc.mismatch.split import Splitter
+        from beaver_ftc.mismatch.tally import tally_for
+
+        self._splitter, self.tally = Splitter(scenario), tally_for(scenario)
+
+    def open(self, columns: Sequence[str]) -> None:
+        self._columns = {name: i for i, name in enumerate(columns) if name in REQUIRED or name in OPTIONAL}
+
+    def write(self, rows_: np.ndarray) -> None:
+        self._add(self._splitter.feed({name: rows_[:, i] for name, i in self._columns.items()}))
+
+    def close(self) -> None:
+        self._add(self._splitter.end())
+
+    def _add(self, stretches: "Iterator[Stretch]") -> None:
+        for stretch in stretches:
+            self.tally.add(stretch)
 
 
 def _chunks(log: Path) -> Iterator[Columns]:
@@ -119,24 +164,6 @@ def _chunks(log: Path) -> Iterator[Columns]:
 
     there = column_names(log)
     return read_chunks(log, [name for name in (*REQUIRED, *OPTIONAL) if name in there])
-
-
-class _Memory:
-    """A log sink that keeps the columns the split needs: for flights of minutes, not hours."""
-
-    def open(self, columns: Iterable[str]) -> None:
-        self._columns = {name: i for i, name in enumerate(columns) if name in REQUIRED or name in OPTIONAL}
-        self._rows: list[np.ndarray] = []
-
-    def write(self, rows: np.ndarray) -> None:
-        self._rows.append(rows[:, list(self._columns.values())])
-
-    def close(self) -> None:
-        pass
-
-    def chunks(self) -> Iterator[Columns]:
-        for rows_ in self._rows:
-            yield {name: rows_[:, i] for i, name in enumerate(self._columns)}
 
 
 def _report(folder: Path, found: Document, flown: Document, analysis: "LinearAnalysis") -> None:

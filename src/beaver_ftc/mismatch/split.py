@@ -13,7 +13,7 @@ from beaver_ftc.mismatch.sources import (
     instantaneous,
     integration,
 )
-from beaver_ftc.mismatch.states import Columns, States, states_of, with_next
+from beaver_ftc.mismatch.states import Columns, States, joined, last_row, states_of
 
 if TYPE_CHECKING:
     from beaver_ftc.scenario.schema import Scenario
@@ -47,14 +47,41 @@ class Stretch:
         return self.total - self.contributions["fault"]
 
 
+class Splitter:
+    """Splits the mismatch of a flight while its log comes in, chunk by chunk, in time's order.
+
+    The acceleration over a frame needs the frame's end, so the last row of a chunk waits for the next.
+    """
+
+    def __init__(self, scenario: "Scenario") -> None:
+        self._scenario = scenario
+        self._case: Case | None = None
+        self._held: Columns | None = None
+
+    def feed(self, chunk: Columns) -> Iterator[Stretch]:
+        """Take in log columns (name -> (n,)); yields the frames that have ended."""
+        if chunk["t_s"].size == 0:
+            return
+        log = joined(self._held, chunk)
+        self._held = last_row(log)
+        states = states_of(log)
+        if self._case is None:
+            self._case = Case.of(self._scenario, states[:1])
+        if len(states) > 1:
+            yield _over_frames(self._case, states)
+
+    def end(self) -> Iterator[Stretch]:
+        """The flight has ended: yields its last row."""
+        if self._held is not None and self._case is not None:
+            yield _at_end(self._case, states_of(self._held))
+
+
 def split(scenario: "Scenario", chunks: Iterable[Columns]) -> Iterator[Stretch]:
     """Split the mismatch of the flight whose log comes in `chunks` of columns, in time's order."""
-    case: Case | None = None
-    for log, more in with_next(chunks):
-        states = states_of(log)
-        if case is None:
-            case = Case.of(scenario, states[:1])
-        yield _over_frames(case, states) if more else _at_end(case, states)
+    splitter = Splitter(scenario)
+    for chunk in chunks:
+        yield from splitter.feed(chunk)
+    yield from splitter.end()
 
 
 def _over_frames(case: Case, states: States) -> Stretch:

@@ -1,6 +1,6 @@
 """A stretch of the log as arrays: what was true, measured and commanded, and what became of it."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -100,20 +100,11 @@ def _present(log: Columns, names: Iterable[str], other) -> list[str]:
     return [other(name) if other(name) in log else name for name in names]
 
 
-def with_next(chunks: Iterable[Columns]) -> Iterator[tuple[Columns, bool]]:
-    """Yield stretches of the log that overlap by one row, and whether there is more to come.
+def joined(held: Columns | None, chunk: Columns) -> Columns:
+    """Columns one after the other; `held` None is nothing."""
+    return chunk if held is None else {name: np.concatenate([held[name], chunk[name]]) for name in chunk}
 
-    The acceleration over a frame needs the frame's end: the last row of a stretch is the first of the next.
-    """
-    held: Columns | None = None
-    for chunk in chunks:
-        if chunk["t_s"].size == 0:
-            continue
-        joined = (
-            chunk if held is None else {name: np.concatenate([held[name], chunk[name]]) for name in chunk}
-        )
-        if joined["t_s"].size > 1:
-            yield joined, True
-        held = {name: values[-1:].copy() for name, values in joined.items()}
-    if held is not None:
-        yield held, False
+
+def last_row(log: Columns) -> Columns:
+    """The last row, as columns of one; a copy, so that the rest can go."""
+    return {name: values[-1:].copy() for name, values in log.items()}

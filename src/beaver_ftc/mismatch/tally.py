@@ -1,12 +1,15 @@
 """The figures of a split flight, kept while it is read: RMS, peaks, shares of the bound, exceedances."""
 
-from collections.abc import Iterable
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from beaver_ftc.mismatch.sources import SOURCES
 from beaver_ftc.mismatch.split import UNEXPLAINED, Stretch
+
+if TYPE_CHECKING:
+    from beaver_ftc.scenario.schema import Scenario
 
 TOTAL = "total"
 MAX_EXCEEDANCES = 100  # kept with their times, per axis; all are counted
@@ -82,6 +85,11 @@ class Tally:
                 kept.setdefault(name, Figures()).add(values, stretch.eta_bar)
         self._hold_against_bound(stretch)
 
+    @property
+    def exceeded(self) -> bool:
+        """Whether the uncertainty was above its bound on any axis."""
+        return any(bound.exceeded_frames for bound in self.bounds)
+
     def rms(self, name: str) -> np.ndarray:
         """RMS of a source over the flight, (3,) rad/s2."""
         return np.sqrt(self.figures[name].square_sum / max(self.frames, 1))
@@ -140,9 +148,7 @@ def dominant(stretch: Stretch, frame: int, axis: int) -> str:
     return max(names, key=lambda name: abs(stretch.contributions[name][frame, axis]))
 
 
-def tally(stretches: Iterable[Stretch], constant: np.ndarray, frame_s: float) -> Tally:
-    """The figures of a whole flight; constant (3,) rad/s2, frame_s in s."""
-    kept = Tally(np.asarray(constant, float), frame_s)
-    for stretch in stretches:
-        kept.add(stretch)
-    return kept
+def tally_for(scenario: "Scenario") -> Tally:
+    """An empty tally of a scenario's flight."""
+    constant = np.array(scenario.fdi.bounds.constant_rad_s2.as_tuple())
+    return Tally(constant, 1.0 / scenario.rate_hz)

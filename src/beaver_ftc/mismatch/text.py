@@ -35,7 +35,8 @@ def verdict(found: Document) -> str:
 
 def _recommendation(recommended: Document) -> str:
     constant = "  ".join(f"{axis} {recommended['constant_rad_s2'][axis]:g}" for axis in AXES)
-    return f"recommended  constant bound {constant} rad/s2, from {recommended['runs']} run(s)"
+    doubt = "" if recommended["settled"] else ", still exceeded when flown"
+    return f"recommended  constant bound {constant} rad/s2, from {recommended['runs']} run(s){doubt}"
 
 
 def _guarantee(guarantee: Document) -> list[str]:
@@ -155,7 +156,7 @@ def _printed(tables: list[Any], colour: bool) -> str:
     from rich.console import Console
 
     console = Console(
-        file=io.StringIO(), force_terminal=colour, highlight=False, emoji=False, markup=False, width=130
+        file=io.StringIO(), force_terminal=colour, highlight=False, emoji=False, markup=False, width=150
     )
     with console.capture() as captured:
         for table in tables:

@@ -2,7 +2,7 @@
 to its sink."""
 
 from collections.abc import Callable, Iterable
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -153,41 +153,48 @@ class Loop:
     def _fly_segment(self, k: int, stop: int) -> int:
         """Frames k to stop, in which no fault changes."""
         if k == 0:
-            status = self._fly_frames(1, 0)
+            status = self.fly_frames(1, 0)
             if status != FLYING:
                 return status
             k = 1
-        return self._fly_frames(stop - k, self.scenario.substeps)
+        return self.fly_frames(stop - k, self.scenario.substeps)
 
-    def _fly_frames(self, count: int, runs: int) -> int:
-        frames, references, log = self.frames, self._references, self._log
-        fly_frame, cockpit = self.fly_frame, self.cockpit
-        between, last = range(runs - 1), (self.plant.run,) * min(runs, 1)
-        through_python = not cockpit.native
+    def fly_frames(self, count: int, runs: int) -> int:
+        """So many frames of the loop, each of so many JSBSim frames, in which no fault changes."""
+        frames, references, log, fly_frame = self.frames, self._references, self._log, self.fly_frame
+        advance = self._advance(runs)
         for _ in range(count):
-            for _ in between:
-                self._look_between()
-            for run in last:
-                run()
-            if through_python:
-                cockpit.read()
+            advance()
             status = fly_frame(frames, references, log)
-            if through_python:
-                cockpit.write()
             if status:
                 return self._landed(status)
         return FLYING
 
-    @cached_property
-    def _look(self) -> Callable[[np.ndarray], int]:
-        return direct(look, self.frames)
+    def _advance(self, runs: int) -> Callable[[], object]:
+        """What brings the truth from one frame of the loop to the next; mostly JSBSim's own `run`."""
+        if runs == 1 and self.cockpit.native:
+            return self.plant.run
+        return partial(self._advance_by, runs)
+
+    def _advance_by(self, runs: int) -> None:
+        """Hand the command over, run, and read; between two runs the truth is seen but not acted upon."""
+        if runs and not self.cockpit.native:
+            self.cockpit.write()
+        for left in reversed(range(runs)):
+            self.plant.run()
+            if left:
+                self._look_between()
+        if not self.cockpit.native:
+            self.cockpit.read()
 
     def _look_between(self) -> None:
-        """One JSBSim frame inside a frame of the loop, seen but not acted upon."""
-        self.plant.run()
         if not self.cockpit.native:
             self.cockpit.read()
         self._look(self.frames)
+
+    @cached_property
+    def _look(self) -> Callable[[np.ndarray], int]:
+        return direct(look, self.frames)
 
     def _landed(self, status: int) -> int:
         if status == NOT_FINITE:

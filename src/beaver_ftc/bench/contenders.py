@@ -58,17 +58,22 @@ class ClosedLoop:
         self.loop = Loop(scenario, detector, law)
         self.loop.fly_chunk(0, round(at_s * scenario.rate_hz))
         self._moment = Moment.of(self.loop)
+        self.loop.fly_chunk(self._moment.k, self._frames_left())  # its references stay
         if compiled_frame is not None:
             self.loop.fly_frame = self.loop.direct(compiled_frame)
+
+    def _frames_left(self) -> int:
+        return self.loop.n_frames - self._moment.k
 
     def prepare(self) -> None:
         """Back to `at_s`."""
         self.loop.plant.start(self._moment.state)
         self.loop.frames[:] = self._moment.frames
+        self.loop.frames["row"] = 0
 
     def fly(self, frames: int) -> None:
         """Fly on."""
-        self.loop.fly_chunk(self._moment.k, frames)
+        self.loop.fly_frames(frames, self.loop.scenario.substeps)
 
 
 class Bare:

@@ -14,13 +14,14 @@ from beaver_ftc.scenario.schema import Scenario
 AXES = ("p", "q", "r")
 SURFACES = ("aileron", "elevator", "rudder")
 HEALTHY_S = 100.0  # attitude is open loop: a longer flight wanders out of the validated envelope
-AFTER_FAULT_S = 20.0  # several periods of the slowest reference
-_AIRSPEED_MPS, _ALTITUDE_M, _RATE_HZ = (35.0, 52.0), (0.0, 3000.0), (20, 100)
+AFTER_FAULT_S = 15.0  # more than a period of the slowest reference
+_AIRSPEED_MPS, _ALTITUDE_M = (35.0, 52.0), (0.0, 3000.0)
+_RATE_HZ = {"healthy": (20, 50), "faulty": (20, 100)}  # a slow hour flies sooner
 _MAGNITUDE, _KAPPA_PER_S, _FAULT_AT_S = (0.05, 1.0), (0.2, 10.0), (3.0, 8.0)
 _INERTIA, _AMPLITUDE_RAD_S2, _FREQUENCY_RAD_S = 0.25, 0.02, (0.1, 60.0)
 _AT_THE_BOUND = 0.3  # share of flights with an uncertainty at its very bound
 
-_COARSE = 0.1  # share of flights with several JSBSim frames in a frame of the loop
+_COARSE = 0.05  # share of flights with several JSBSim frames in a frame of the loop
 
 _HEALTHY, _FAULTY = 0, 1
 
@@ -46,7 +47,7 @@ class Draw:
         return Scenario.model_validate({
             "name": f"{self.kind}-{self.index}",
             "duration_s": fault["at_s"] + AFTER_FAULT_S if fault else HEALTHY_S,
-            "rate_hz": round(_log_uniform(rng, *_RATE_HZ)),
+            "rate_hz": round(_log_uniform(rng, *_RATE_HZ[self.kind])),
             "substeps": int(rng.integers(2, 5)) if rng.random() < _COARSE else 1,
             "initial": {"airspeed_mps": rng.uniform(*_AIRSPEED_MPS), "altitude_m": rng.uniform(*_ALTITUDE_M)},
             "reference": {axis: [_signal(rng) for _ in range(rng.integers(1, 3))] for axis in AXES},

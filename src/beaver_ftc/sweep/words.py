@@ -13,6 +13,8 @@ if TYPE_CHECKING:
 
 Document = dict[str, Any]
 
+_UNITS = {"delay": " s", "false_alarm": " of the threshold", "tracking": " deg/s"}
+
 
 def title(summary: Document) -> str:
     """The sweep's name and whether it shows what it should."""
@@ -136,7 +138,8 @@ def _search(summary: Document) -> str:
     search = summary.get("search")
     if search is None:
         return ""
-    return f"{search['objective'].replace('_', ' ')}: {value(search['score'])} in flight {search['run']}"
+    score = "none" if search["score"] is None else f"{search['score']:.4g}{_UNITS[search['objective']]}"
+    return f"the worst {search['objective'].replace('_', ' ')}: {score} in flight {search['run']}"
 
 
 def _rate(rate: Document, what: str) -> str:

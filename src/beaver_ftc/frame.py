@@ -245,6 +245,7 @@ def conclude(frame):
             predict(frame)
         else:
             bank.align(fdi, frame.G)
+            fdi.xhat[:] = x  # no residual to begin with
         guarantee.judge(fdi, t)
         decide(fdi, frame.y, x, t)
 

@@ -67,6 +67,12 @@ class Sharpen(BaseModel):
             return dict.fromkeys(cls.model_fields, given == "all")
         return given
 
+    @classmethod
+    def __get_pydantic_json_schema__(cls, core: Any, handler: Any) -> dict[str, Any]:
+        """One by one, or in a word."""
+        one_by_one = handler(core)
+        return one_by_one | {"anyOf": [{"enum": ["all", "none"]}, {"type": one_by_one.pop("type")}]}
+
 
 class FdiConfig(BaseModel):
     """Gains, bounds and the choice of scheme. All have defaults."""

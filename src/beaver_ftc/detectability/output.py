@@ -85,10 +85,30 @@ def _short(magnitude: float | None) -> str:
 
 
 def text(rows: Sequence[Row]) -> str:
-    """A line a fault and grid point."""
+    """A line a fault and grid point, then one a fault and excitation."""
     place = f"{'fault':<10}{'m/s':>6}{'m':>7}{'excit.':>8}"
     head = f"{place}{'detected':>10}{'median':>8}{'isolated':>10}{'median':>8}   why"
-    return "\n".join([head, *map(_line, rows)])
+    return "\n".join([head, *map(_line, rows), "", *_summary(rows)])
+
+
+def _summary(rows: Sequence[Row]) -> list[str]:
+    """How many grid points each fault is certain at, and from which magnitudes on."""
+    lines = [f"{'fault':<10}{'excit.':>8}{'certain at':>12}{'from':>13}{'half the time at':>18}{'from':>13}"]
+    for fault, scale in dict.fromkeys((row["fault"], row["excitation"]) for row in rows):
+        chosen = [row for row in rows if (row["fault"], row["excitation"]) == (fault, scale)]
+        always, half = (_range([row[key] for row in chosen]) for key in ("isolated", "isolated_median"))
+        lines.append(f"{fault:<10}{scale:>8g}{always[0]:>12}{always[1]:>13}{half[0]:>18}{half[1]:>13}")
+    lines.sort(key=lambda line: line.split()[0] != "fault" and list(FAULTS).index(line.split()[0]) + 1)
+    return [
+        *lines,
+        "certain: detected and isolated in time, wherever there is a magnitude; of so many grid points",
+    ]
+
+
+def _range(magnitudes: Sequence[float | None]) -> tuple[str, str]:
+    certain = [magnitude for magnitude in magnitudes if magnitude is not None]
+    span = f"{min(certain):.2f} - {max(certain):.2f}" if certain else "-"
+    return f"{len(certain)} of {len(magnitudes)}", span
 
 
 def _line(row: Row) -> str:

@@ -4,6 +4,7 @@ import csv
 import io
 import json
 from collections.abc import Sequence
+from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -94,15 +95,11 @@ def text(rows: Sequence[Row]) -> str:
 def _summary(rows: Sequence[Row]) -> list[str]:
     """How many grid points each fault is certain at, and from which magnitudes on."""
     lines = [f"{'fault':<10}{'excit.':>8}{'certain at':>12}{'from':>13}{'half the time at':>18}{'from':>13}"]
-    for fault, scale in dict.fromkeys((row["fault"], row["excitation"]) for row in rows):
+    for fault, scale in product(FAULTS, sorted({row["excitation"] for row in rows})):
         chosen = [row for row in rows if (row["fault"], row["excitation"]) == (fault, scale)]
         always, half = (_range([row[key] for row in chosen]) for key in ("isolated", "isolated_median"))
         lines.append(f"{fault:<10}{scale:>8g}{always[0]:>12}{always[1]:>13}{half[0]:>18}{half[1]:>13}")
-    lines.sort(key=lambda line: line.split()[0] != "fault" and list(FAULTS).index(line.split()[0]) + 1)
-    return [
-        *lines,
-        "certain: detected and isolated in time, wherever there is a magnitude; of so many grid points",
-    ]
+    return [*lines, "certain: detected and isolated in time, from some magnitude on; of so many grid points"]
 
 
 def _range(magnitudes: Sequence[float | None]) -> tuple[str, str]:

@@ -104,6 +104,14 @@ def test_the_alarm_is_latched_and_an_early_one_is_false():
     assert log["detected"][-1] == 1
 
 
+def test_the_fault_class_of_the_built_in_diagnosis_is_no_matter():
+    flown = scenario(**SHORT, fdi={"fault_class": "all"})
+    _, published = _flown(detector=culprits.Teller())
+    _, every = _flown(flown, detector=culprits.Teller())
+    assert np.array_equal(published["elevator_cmd_rad"], every["elevator_cmd_rad"])
+    assert every["mode"][-1] == 2
+
+
 def test_unanticipated_is_a_verdict_too():
     class Other(culprits.Teller):
         says = Verdict(True, "q", "unanticipated", "unanticipated")

@@ -123,6 +123,18 @@ def test_dragging_zooms_all_axes_and_double_click_undoes_it(page):
     assert page.evaluate("[beaverReport.clock.start, beaverReport.clock.end]") == before
 
 
+def test_keys_zoom_about_the_cursor_and_show_the_whole_flight_again(page):
+    whole = page.evaluate("[beaverReport.clock.start, beaverReport.clock.end]")
+    page.evaluate("beaverReport.setTime(10)")
+    press = "document.body.dispatchEvent(new KeyboardEvent('keydown', {{key: '{}', bubbles: true}}))"
+    page.evaluate(press.format("+"))
+    assert page.evaluate("[beaverReport.clock.start, beaverReport.clock.end]") == pytest.approx(
+        [10 - (10 - whole[0]) / 2, 10 + (whole[1] - 10) / 2]
+    )
+    page.evaluate(press.format("0"))
+    assert page.evaluate("[beaverReport.clock.start, beaverReport.clock.end]") == whole
+
+
 def test_pointing_reads_the_value_of_the_log_with_its_unit(page, folder):
     _middle(page, "#states canvas")
     page.evaluate("beaverReport.setTime(10)")

@@ -111,6 +111,15 @@ def _said_theta(name: str) -> Callable[[Flights], str]:
     return remark
 
 
+def _named(name: str) -> Callable[[Flights], str]:
+    def remark(flights: Flights) -> str:
+        delay = _delay(flights[name], "detection")
+        beside = [said for said in (_sharpened(name)(flights), _said_theta(name)(flights)) if said]
+        return "; ".join([f"detected after {delay:.2f} s", *beside])
+
+    return remark
+
+
 def _sharpened(name: str) -> Callable[[Flights], str]:
     def remark(flights: Flights) -> str:
         beside = flights.get(f"{name}-sharpened")
@@ -210,7 +219,7 @@ CLAIMS = (
     Claim(
         "mentioned", "An aileron fault is detected and isolated just as well.",
         "isolation", "s after detection", _isolation("aileron", "aileron"), IMMEDIATELY_S,
-        remark=_said_theta("aileron"),
+        remark=_named("aileron"),
     ),
     Claim(
         "mentioned", "An aileron fault leaves tracking satisfactory.",
@@ -219,7 +228,7 @@ CLAIMS = (
     Claim(
         "mentioned", "A rudder fault is detected and isolated just as well.",
         "isolation", "s after detection", _isolation("rudder", "rudder"), IMMEDIATELY_S,
-        remark=_said_theta("rudder"),
+        remark=_named("rudder"),
     ),
     Claim(
         "mentioned", "A rudder fault leaves tracking satisfactory.",

@@ -78,6 +78,13 @@ function showWindow(start, end) {
   repaint();
 }
 
+/** Widen or narrow the window by a factor; the time under the cursor stays where it is, if it can be seen. */
+function zoom(factor) {
+  const seen = clock.now >= clock.start && clock.now <= clock.end;
+  const about = seen ? clock.now : (clock.start + clock.end) / 2;
+  showWindow(about - (about - clock.start) * factor, about + (clock.end - about) * factor);
+}
+
 function setTime(t) {
   clock.now = Math.min(END, Math.max(0, t));
   if (clock.playing && (clock.now < clock.start || clock.now > clock.end)) {
@@ -635,7 +642,10 @@ window.addEventListener("afterprint", repaint);
 window.addEventListener("keydown", (event) => {
   if (event.target !== document.body) return;
   const step = (clock.end - clock.start) / 100;
-  const keys = { ArrowRight: () => setTime(clock.now + step), ArrowLeft: () => setTime(clock.now - step), " ": () => play(!clock.playing) };
+  const keys = {
+    ArrowRight: () => setTime(clock.now + step), ArrowLeft: () => setTime(clock.now - step), " ": () => play(!clock.playing),
+    "+": () => zoom(0.5), "-": () => zoom(2), 0: () => showWindow(0, END),
+  };
   if (keys[event.key]) { event.preventDefault(); keys[event.key](); }
 });
 window.beaverReport = { clock, showWindow, setTime, play };

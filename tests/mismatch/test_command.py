@@ -79,7 +79,7 @@ def test_the_folder_holds_a_run_and_its_mismatch(flown_folder):
         rows = list(csv.DictReader(file))
     total = next(row for row in rows if row["axis"] == "q" and row["source"] == "total")
     assert float(total["rms_rad_s2"]) == found["axes"]["q"]["total"]["rms"]
-    for name in ("sources", "bound", "linear", "response"):
+    for name in ("sources", "bound", "linear", "zeros", "response"):
         assert (result / "figures" / f"mismatch-{name}.png").stat().st_size > 10_000
 
 
@@ -94,6 +94,17 @@ def test_a_run_without_mismatch_has_no_such_section(tmp_path):
     from beaver_ftc.mismatch.section import mismatch_section
 
     assert mismatch_section(tmp_path) == ""
+
+
+def test_a_bound_of_nothing_is_no_trouble(tmp_path):
+    """A design so good that nothing is admitted: shares of nothing are null, in words `no bound`."""
+    nothing = "fdi: {bounds: {constant_rad_s2: {p: 0, q: 0, r: 0}, inertia_coupling: {p: 0, q: 0, r: 0}}}\n"
+    (tmp_path / "short.yaml").write_text(SHORT + nothing)
+    done = beaver(tmp_path, "mismatch", "short.yaml", "--out", "out")
+    assert done.returncode == 0, done.stderr
+    found = json.loads((tmp_path / "out" / "short" / "mismatch.json").read_text())
+    assert found["bound"]["q"]["exceeded_times"] >= 1
+    assert found["recommended"]["constant_rad_s2"]["q"] > 0.0
 
 
 def test_variants_are_flown_side_by_side(tmp_path):
@@ -137,9 +148,10 @@ def test_a_wrong_variant_is_bad_input_of_one_line(tmp_path, variant, says):
     assert done.stdout == ""
 
 
-def test_an_unknown_scenario_is_bad_input(tmp_path):
-    done = beaver(tmp_path, "mismatch", "no-such-scenario")
+def test_an_unknown_scenario_is_bad_input_in_json_too(tmp_path):
+    done = beaver(tmp_path, "mismatch", "no-such-scenario", "--format", "json")
     assert done.returncode == 2
+    assert json.loads(done.stdout) == {"runs": [], "errors": done.stderr.splitlines()}
     assert "Traceback" not in done.stderr
 
 

@@ -33,7 +33,12 @@ def command(
     With --format json: the document of the flight, axes.{p,q,r}.{source}: rms, max, share, bound_share;
     of several flights {"runs": [...], "recommended": ..., "guarantee": ...}.
     """
-    flown = [each for scenario in load_all(scenarios) for each in _variants(scenario, variant)]
+    try:
+        flown = [each for scenario in load_all(scenarios) for each in _variants(scenario, variant)]
+    except BadInput as error:
+        if format is Format.json:
+            emit_json({"runs": [], "errors": str(error).splitlines()})
+        raise
     documents, recommended = _fly_all(flown, out, format, report=not no_report)
     maps = [_map(scenario, out, format, report=not no_report) for scenario in flown if map]
     for document, entries in zip(documents, maps, strict=False):

@@ -11,7 +11,7 @@ import numpy as np
 
 from beaver_ftc.mismatch.document import Document
 from beaver_ftc.mismatch.frames import column
-from beaver_ftc.mismatch.modes import CHANNELS, pulse_response, response
+from beaver_ftc.mismatch.modes import CHANNELS, pulse_response, response, zeros
 from beaver_ftc.mismatch.sources import SOURCES
 from beaver_ftc.mismatch.split import UNEXPLAINED
 from beaver_ftc.mismatch.states import AXES
@@ -58,6 +58,7 @@ def write_figures(folder: Path, found: Document, flown: Document, analysis: "Lin
         "mismatch-sources": sources_figure(folder / "mismatch.parquet", found, marks(flown)),
         "mismatch-bound": bound_figure(found),
         "mismatch-linear": linear_figure(analysis, found["scenario"]),
+        "mismatch-zeros": zeros_figure(analysis, found["scenario"]),
         "mismatch-response": response_figure(analysis, found["scenario"]),
     }
     return [save(figure, figures / f"{name}.png") for name, figure in drawn.items()]
@@ -221,6 +222,32 @@ def _draw_bode(magnitude: "Axes", phase: "Axes", analysis: "LinearAnalysis", sur
 
 def _line(look: dict[str, Any]) -> dict[str, Any]:
     return {key: value for key, value in look.items() if key != "marker"}
+
+
+def zeros_figure(analysis: "LinearAnalysis", name: str) -> "Figure":
+    """Zeros from each surface to its rate, over the truth's poles: what cancels, what is misplaced."""
+    figure = new_figure(14.0, 4.8, f"Zeros from surface to rate, over the truth's poles (grey dots)\n{name}")
+    row = figure.subplots(1, 3)
+    poles = np.linalg.eigvals(analysis.models["truth"].A)
+    for (surface, rate), axes in zip(CHANNELS, row, strict=True):
+        axes.scatter(poles.real, poles.imag, color=GREY, s=14)
+        for look, model in ((look, analysis.models[name]) for name, look in MODEL_LOOKS.items()):
+            found = zeros(model.A, model.B[:, model.inputs.index(surface)], model.states.index(rate))
+            hollow = (
+                {"facecolors": "none", "edgecolors": look["color"]}
+                if look["marker"] == "o"
+                else {"color": look["color"]}
+            )
+            axes.scatter(found.real, found.imag, marker=look["marker"], s=80, label=look["label"], **hollow)
+        axes.axvline(0.0, color=GREY, linewidth=0.8)
+        axes.set_title(f"{surface} to {rate}", fontsize=10)
+        axes.set_xlabel("real part (1/s)", fontsize=9)
+        _dress(axes, "")
+    row[0].set_ylabel("imaginary part (rad/s)", fontsize=9)
+    figure.legend(
+        *row[0].get_legend_handles_labels(), loc="outside lower center", ncols=3, fontsize=9, frameon=False
+    )
+    return figure
 
 
 def response_figure(analysis: "LinearAnalysis", name: str) -> "Figure":

@@ -13,6 +13,7 @@ PICTURES = {
     "mismatch-sources": "What the mismatch is made of, in time",
     "mismatch-bound": "How much of the bound each source uses",
     "mismatch-linear": "Poles and frequency responses: truth, FDC equations, design model",
+    "mismatch-zeros": "Zeros from each surface to its rate",
     "mismatch-response": "Pulse responses of the linear models",
 }
 
@@ -35,6 +36,8 @@ def _heading(found: Document) -> str:
         f"{percent(worst['bound_share'])} on {worst['axis']}."
     )  # fmt: skip
     case = found["guarantee"]["recommended"]
+    if found["false_alarm"]:
+        says += f" It raised a false alarm at {seconds(found['detection']['time_s'], 'no time')}."
     constant = ", ".join(f"{axis} {found['recommended']['constant_rad_s2'][axis]:g}" for axis in AXES)
     certain = seconds(case["guaranteed_delay_s"], "no time: it is not")
     return (

@@ -91,7 +91,7 @@ def _assemble_control(
     )
     control["effectiveness"] = 1.0
     control["effectiveness_step"] = config.effectiveness_rate_per_s * dt if config.law != "oracle" else np.inf
-    control["offset_step"] = control["effectiveness_step"]
+    control["reference_scale"] = 1.0
     control["least_effectiveness"] = config.least_effectiveness
     control["trim"] = control["command"] = trim
     control["low"], control["high"] = travel

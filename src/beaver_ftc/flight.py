@@ -55,3 +55,4 @@ class Flight:
     type_time_s: float | None = None
     estimate_interval: tuple[float, float] | None = None
     frequency_rad_s: float | None = None
+    authority: dict[str, tuple[float, float]] | None = None

@@ -11,7 +11,7 @@ import numpy as np
 
 from beaver_ftc import channels as ch
 from beaver_ftc.compiled import kernel
-from beaver_ftc.control import adaptive, allocation, nominal, reference_model
+from beaver_ftc.control import adaptive, allocation, authority, nominal, reference_model
 from beaver_ftc.control.state import CONTROL, NOMINAL, ORACLE
 from beaver_ftc.design.model import ALPHA, BETA, DESIGN, ELEVATOR, QDYN
 from beaver_ftc.design.variants import response
@@ -55,13 +55,14 @@ FRAME = np.dtype(
         ("Gu_first", "f8", (3, 4)), ("Gu_spread", "f8", (3, 4)),
         ("G_mean", "f8", (3, 4)), ("Gu_mean", "f8", (3, 4)), ("believed", "f8", (3,)),
         ("design_mean", "f8", (3,)),
-        ("fhat", "f8", (3,)), ("target", "f8", (4,)), ("offset", "f8", (4,)),
+        ("fhat", "f8", (3,)), ("target", "f8", (4,)),
         # what happened
         ("mode", "i8"), ("n_modes", "i8"),
         ("mode_at_s", "f8", (MAX_EVENTS,)), ("mode_is", "i8", (MAX_EVENTS,)),
         ("pre_fault_square", "f8", (3,)), ("pre_fault_frames", "i8"),
         ("post_fault_square", "f8", (3,)), ("post_fault_frames", "i8"),
         ("saturated_frames", "i8", (4,)),
+        ("demanded", "f8", (3,)), ("lacking", "f8", (3,)), ("beyond_frames", "i8", (3,)),
         ("outside", "i8"), ("n_exits", "i8"),
         ("exit_at_s", "f8", (MAX_EVENTS,)), ("return_at_s", "f8", (MAX_EVENTS,)),
         ("departed", "i8"),
@@ -307,21 +308,24 @@ def tell_oracle(frame, s):
     effective = frame.truth[ch.EFFECTIVE + s]
     frame.target[s] = 0.0 if frame.immovable[s] else frame.truth[ch.TRUE_EFFECTIVENESS + s]
     if frame.faulted:
-        frame.offset[s] = effective - frame.target[s] * frame.u[s]
+        frame.control.offset[s] = effective - frame.target[s] * frame.u[s]
 
 
 @kernel
 def act_on_lead(frame, s):
-    """What the diagnosis of every type makes of surface s: effectiveness left, and offset."""
-    fdi = frame.fdi
+    """What the diagnosis of every type makes of surface s: effectiveness left, and offset. A jam brooks no delay."""
+    fdi, control = frame.fdi, frame.control
     surface = fdi.surface[s]
     if fdi.lead_kind == fault_types.LOSES:
         frame.target[s] = 1.0 + fdi.estimator[s].theta[DOMINANT_AXIS[s]]
     elif fdi.lead_kind == fault_types.FIXED:
-        frame.target[s] = 0.0
-        frame.offset[s] = surface.command + fault_types.deflection_error(fdi, s)
+        frame.target[s] = control.effectiveness[s] = 0.0
+        control.offset[s] = surface.command + fault_types.deflection_error(fdi, s)
     elif fdi.lead_kind == fault_types.SHIFTED:
-        frame.offset[s] = fault_types.deflection_error(fdi, s)
+        control.offset[s] = fault_types.deflection_error(fdi, s)
+    elif fdi.lead_kind == fault_types.LAGS:
+        control.lag[s] = 0.5 * (surface.low + surface.high) - surface.command
+        control.hedging = 1
 
 
 @kernel
@@ -330,7 +334,7 @@ def accommodate(frame):
     control, fdi = frame.control, frame.fdi
     surface = isolated_surface(fdi)
     for s in range(4):
-        frame.target[s], frame.offset[s] = 1.0, 0.0
+        frame.target[s], control.offset[s], control.lag[s] = 1.0, 0.0, 0.0
         if control.law == ORACLE:
             tell_oracle(frame, s)
         elif fdi.estimates and fdi.detected:
@@ -340,7 +344,6 @@ def accommodate(frame):
         elif s == surface and not fdi.every_type:
             frame.target[s] = 1.0 + fdi.estimator[fdi.isolated].theta[DOMINANT_AXIS[s]]
     adaptive.approach(control, frame.target)
-    adaptive.approach_offset(control, frame.offset)
     frame.fhat[:] = 0.0
     if control.law == ORACLE:
         frame.fhat[1] = unanticipated_effect(frame)
@@ -351,15 +354,28 @@ def accommodate(frame):
 
 
 @kernel
-def park(frame):
+def give_up(frame):
     """Command a surface that does not follow to its trim: should it come loose, that is where it goes, and it
-    shows."""
+    shows. From then on the reference is bent to what is left."""
     control, fdi = frame.control, frame.fdi
     for s in range(4):
         told = frame.immovable[s] and control.law == ORACLE
         if told or (s == fdi.lead and fdi.lead_kind == fault_types.FIXED and control.effectiveness[s] == 0.0):
             control.command[s] = control.trim[s]
             control.saturated[s] = 0
+            control.hedging = 1
+
+
+@kernel
+def advance_hand_over(frame):
+    """Hand the pitch demand to the flap, or back. What an immovable elevator no longer carries goes at once."""
+    control = frame.control
+    if frame.mode == MODE_REALLOCATED:
+        control.hand_over = min(control.hand_over + control.hand_over_step, 1.0)
+        if control.hedging:
+            control.hand_over = max(control.hand_over, 1.0 - control.effectiveness[ELEVATOR])
+    elif frame.fdi.every_type:
+        control.hand_over = max(control.hand_over - control.hand_over_step, 0.0)
 
 
 @kernel
@@ -371,16 +387,15 @@ def command(frame, reference):
         frame.G_believed[:] = frame.G
     else:
         adaptive.believed_effectiveness(control, frame.G, frame.G_believed)
-    if frame.mode == MODE_REALLOCATED:
-        control.hand_over = min(control.hand_over + control.hand_over_step, 1.0)
-    elif frame.fdi.every_type:
-        control.hand_over = max(control.hand_over - control.hand_over_step, 0.0)
+    advance_hand_over(frame)
     nominal.demand(control, frame.x, frame.f, frame.fhat)
     if control.law != NOMINAL:
         adaptive.allow_for_offsets(control, frame.G)
     allocation.allocate(control, frame.G_believed, control.command)
-    park(frame)
+    give_up(frame)
     nominal.integrate(control, frame.x, frame.G_believed, control.command)
+    if frame.faulted or control.hedging:
+        authority.note_shortfall(control, frame.G_believed, control.command)
 
 
 @kernel
@@ -396,12 +411,24 @@ def account(frame):
             frame.pre_fault_square[i] += square
     if after:
         frame.post_fault_frames += 1
+        account_authority(frame)
     else:
         frame.pre_fault_frames += 1
         bank.note_closest_approach(frame.fdi)
     for s in range(4):
         frame.saturated_frames[s] += control.saturated[s]
     note_envelope(frame)
+
+
+@kernel
+def account_authority(frame):
+    """How much of what was demanded after the fault the surfaces could not give, and for how long not even
+    the rates could have been held."""
+    control = frame.control
+    for i in range(3):
+        frame.demanded[i] += abs(control.demand[i])
+        frame.lacking[i] += abs(control.shortfall[i])
+        frame.beyond_frames[i] += control.beyond[i]
 
 
 @kernel
@@ -512,6 +539,7 @@ def finish(frame, reference, row):
     account(frame)
     record(frame, reference, row)
     reference_model.follow(frame.control, reference)
+    authority.govern(frame.control, reference)
     for s in range(4):
         frame.u[s] = frame.control.command[s]
     if frame.native:

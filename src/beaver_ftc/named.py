@@ -62,11 +62,11 @@ def _types_left(fdi: np.void, s: int) -> list[str]:
 
 
 def _open_questions(fdi: np.void) -> Iterator[str]:
-    """`surface type` for each that is possible; a bare surface, and `unanticipated`, where no type fits."""
+    """`surface:type` for each that is possible; a bare surface, and `unanticipated`, where no type fits."""
     possible = [s for s in range(len(SURFACES)) if not fdi["estimator"][ft.POSITION_FIRST + s]["excluded"]]
     for s in possible:
         types = _types_left(fdi, s)
-        yield from (f"{SURFACES[s]} {kind}" for kind in types) if types else (SURFACES[s],)
+        yield from (f"{SURFACES[s]}:{kind}" for kind in types) if types else (SURFACES[s],)
     if not any(_types_left(fdi, s) for s in possible):
         yield "unanticipated"
 

@@ -70,6 +70,16 @@ def _guaranteed_delay(frame: np.void) -> float | None:
     return None if certain is None or not frame["faulted"] else certain - float(frame["fault_at_s"])
 
 
+def _authority(frame: np.void) -> dict[str, tuple[float, float]] | None:
+    """Per axis, after the fault: share of the demanded acceleration given, and seconds beyond holding."""
+    if not frame["post_fault_frames"]:
+        return None
+    demanded, lacking = frame["demanded"], frame["lacking"]
+    shares = [1.0 - float(lack / asked) if asked > 0.0 else 1.0 for asked, lack in zip(demanded, lacking, strict=True)]
+    beyond_s = [int(n) * float(frame["dt"]) for n in frame["beyond_frames"]]
+    return dict(zip(AXES, zip(shares, beyond_s, strict=True), strict=True))
+
+
 def verdict_of(frame: np.void) -> Verdict:
     """What the built-in diagnosis makes of the flight so far, as a plug-in law is told."""
     fdi = frame["fdi"]
@@ -122,5 +132,6 @@ def flight_of(
         saturation_s={s: int(n) * dt for s, n in zip(SURFACES, frame["saturated_frames"], strict=True)},
         worst_residual_ratio=max(closest),
         closest_approach=closest,
+        authority=_authority(frame),
         **(_isolation(fdi) if verdict is None else _told(fdi, verdict)),
     )

@@ -84,6 +84,10 @@ class Flight:
     departure: tuple[float, str] | None = None
     saturation_s: dict[str, float] = field(default_factory=lambda: dict.fromkeys(SURFACES, 0.0))
     worst_residual_ratio: float = 0.11
+    type_time_s: float | None = None
+    estimate_interval: tuple[float, float] | None = None
+    frequency_rad_s: float | None = None
+    authority: dict[str, tuple[float, float]] | None = None
 
 
 def rows(flight: Flight) -> np.ndarray:

@@ -8,7 +8,7 @@ from beaver_ftc.results.metrics import as_json, metrics
 
 KEYS = [
     "scenario", "seed", "frames", "fault", "detection", "isolation", "false_alarm", "tracking", "supervisor",
-    "envelope_exits", "departure", "saturation_s", "expectations", "passed", "versions",
+    "envelope_exits", "departure", "authority", "saturation_s", "expectations", "passed", "versions",
 ]  # fmt: skip
 
 
@@ -26,6 +26,8 @@ def test_published_case_has_every_key_of_the_contract_in_order():
     assert document["isolation"] == {
         "isolated": True, "fault": "elevator", "type": "loss_of_effectiveness",
         "time_s": 12.12, "delay_s": 0.12, "correct": True, "estimate": -0.39, "candidates": ["elevator"],
+        "type_correct": True, "type_delay_s": None, "estimate_deg": None, "estimate_interval": None,
+        "frequency_rad_s": None,
     }  # fmt: skip
     assert document["false_alarm"] is False
     assert document["supervisor"][1] == {"time_s": 12.07, "mode": "adaptive"}

@@ -18,20 +18,12 @@ def approach(control, target):
 
 
 @kernel
-def approach_offset(control, offset):
-    """Move the offsets the law allows for towards offset (4,) rad by at most one step."""
-    step = control.offset_step
-    for s in range(4):
-        change = offset[s] - control.offset[s]
-        control.offset[s] += min(max(change, -step), step)
-
-
-@kernel
 def allow_for_offsets(control, G):
     """Take what the surfaces give without being asked, G (3, 4) rad/s2 per rad times offset, off the demand."""
     for i in range(3):
         for s in range(4):
             control.demand[i] -= G[i, s] * control.offset[s]
+            control.hold[i] -= G[i, s] * control.offset[s]
 
 
 @kernel

@@ -12,9 +12,10 @@ from beaver_ftc.compiled import kernel
 def demand(control, x, f, fhat):
     """Fill control.demand (3,) rad/s2: what the surfaces must give. x (3,) rad/s; f, fhat (3,) rad/s2."""
     for i in range(3):
-        error = control.model_rate[i] - x[i]
+        error = control.governed_rate[i] - x[i]
         feedback = control.Kp * error + control.Ki * control.integral[i]
-        control.demand[i] = control.model_acceleration[i] + feedback - f[i] - fhat[i]
+        control.demand[i] = control.governed_acceleration[i] + feedback - f[i] - fhat[i]
+        control.hold[i] = -f[i] - fhat[i]
 
 
 @kernel
@@ -27,5 +28,5 @@ def integrate(control, x, G, u):
     """
     for i in range(3):
         given = G[i, 0] * u[0] + G[i, 1] * u[1] + G[i, 2] * u[2] + G[i, 3] * u[3]
-        error = control.model_rate[i] - x[i]
+        error = control.governed_rate[i] - x[i]
         control.integral[i] += control.dt * (error + (given - control.demand[i]) / control.Kp)

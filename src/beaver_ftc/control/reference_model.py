@@ -28,10 +28,19 @@ def discretise(wn: float, zeta: float, dt: float) -> tuple[np.ndarray, np.ndarra
 
 
 @kernel
+def advance(control, rate, acceleration, reference):
+    """Rate (rad/s) and acceleration (rad/s2) of the model a frame on, `reference` (rad/s) held."""
+    A, B = control.model_A, control.model_B
+    return (
+        A[0, 0] * rate + A[0, 1] * acceleration + B[0] * reference,
+        A[1, 0] * rate + A[1, 1] * acceleration + B[1] * reference,
+    )
+
+
+@kernel
 def follow(control, reference):
     """Advance the reference model by one frame towards `reference` (3,) rad/s."""
-    A, B = control.model_A, control.model_B
     for i in range(3):
         rate, acceleration = control.model_rate[i], control.model_acceleration[i]
-        control.model_rate[i] = A[0, 0] * rate + A[0, 1] * acceleration + B[0] * reference[i]
-        control.model_acceleration[i] = A[1, 0] * rate + A[1, 1] * acceleration + B[1] * reference[i]
+        rate, acceleration = advance(control, rate, acceleration, reference[i])
+        control.model_rate[i], control.model_acceleration[i] = rate, acceleration

@@ -13,7 +13,10 @@ CONTROL = np.dtype(
         ("model_rate", "f8", (3,)), ("model_acceleration", "f8", (3,)),
         ("integral", "f8", (3,)), ("demand", "f8", (3,)),
         ("effectiveness", "f8", (4,)), ("effectiveness_step", "f8"), ("least_effectiveness", "f8"),
-        ("offset", "f8", (4,)), ("offset_step", "f8"), ("given_up", "i8", (4,)),
+        ("offset", "f8", (4,)), ("lag", "f8", (4,)),
+        # what authority.py keeps
+        ("governed_rate", "f8", (3,)), ("governed_acceleration", "f8", (3,)), ("hedging", "i8"), ("reference_scale", "f8", (3,)),
+        ("hold", "f8", (3,)), ("shortfall", "f8", (3,)), ("beyond", "i8", (3,)),
         ("trim", "f8", (4,)), ("low", "f8", (4,)), ("high", "f8", (4,)),
         ("command", "f8", (4,)), ("saturated", "i8", (4,)),
         ("hand_over", "f8"), ("hand_over_step", "f8"),

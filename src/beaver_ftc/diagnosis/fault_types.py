@@ -35,7 +35,6 @@ POSITION_FIRST = 4  # estimators 0 to 3 are losses of effectiveness, 4 to 7 posi
 ELEVATOR, FLAP = 1, 3
 # What is done about it: scale the command, give the surface up, add an offset, or leave it to its pace.
 LOSES, FIXED, SHIFTED, LAGS = range(4)
-HASTE_FRAMES = 5
 ABSENT_FRAMES = 20
 FLIPS_OF_AN_OSCILLATION = 3
 
@@ -186,6 +185,8 @@ def examine(fdi):
 @kernel
 def note_quiet(fdi, surface):
     """A surface given up and commanded to where it happens to be says by its quiet that it does not swing."""
+    if surface.low_then > surface.set_high[STUCK] or surface.high_then < surface.set_low[STUCK]:
+        return
     fdi.evidence += 1
     surface.quiet += 1
     if surface.quiet > fdi.patience:
@@ -331,32 +332,32 @@ def is_fixed(fdi, s):
 
 @kernel
 def measure_for(fdi, s):
-    """What is to be done about surface s as far as is known: LOSES, FIXED, SHIFTED or -1 (wait)."""
+    """What is to be done about surface s as far as is known: LOSES, FIXED, LAGS or SHIFTED.
+
+    To add what the last frame shows to be off is right for a bias and an oscillation, serves a loss of
+    effectiveness meanwhile, and moves the command so that a jam betrays itself in the next frame.
+    """
     if is_fixed(fdi, s):
         return FIXED
     if not any_constant(fdi, s) and not alive(fdi, s, VARYING_LOSS):
-        return LAGS if alive(fdi, s, SLOW) and not alive(fdi, s, OSCILLATORY) else SHIFTED
+        return LAGS if alive(fdi, s, SLOW) else SHIFTED
     fixed = alive(fdi, s, STUCK) or alive(fdi, s, UP) or alive(fdi, s, DOWN)
-    if loses(fdi, s):
-        return -1 if fixed or alive(fdi, s, BIAS) else LOSES
-    return -1 if fixed else SHIFTED
+    return LOSES if loses(fdi, s) and not fixed and not alive(fdi, s, BIAS) else SHIFTED
 
 
 @kernel
 def presumed(fdi):
     """The surface the law acts upon: the one at fault, or the likeliest; -1 none yet.
 
-    It may act before all doubt is gone, since it can take it back. Of elevator and flap with nothing
-    constant left on either, it does not matter which is thought to be off: the moment is the same.
+    It acts before all doubt is gone, since it can take it back. Of elevator and flap it does not matter which
+    is thought to be off, as long as both follow their commands: the moment is the same.
     """
     if fdi.isolated >= 0:
         return fdi.estimator[fdi.isolated].surface
-    if fdi.isolated == UNANTICIPATED or fdi.evidence < HASTE_FRAMES:
-        return -1
     s = sole(fdi, True)
-    if s == -1:
-        return ELEVATOR if possible(fdi, ELEVATOR) else (FLAP if possible(fdi, FLAP) else -1)
-    return s if s >= 0 else -1
+    if s >= 0:
+        return s
+    return ELEVATOR if possible(fdi, ELEVATOR) else (FLAP if possible(fdi, FLAP) else -1)
 
 
 @kernel
@@ -386,8 +387,9 @@ def deflection_error(fdi, s):
     surface = fdi.surface[s]
     if alive(fdi, s, FLOAT):
         return -surface.command
-    if alive(fdi, s, STUCK):
+    stuck, biased = alive(fdi, s, STUCK), alive(fdi, s, BIAS)
+    if stuck and not biased:
         return middle(surface, STUCK) - surface.command
-    if alive(fdi, s, BIAS) and surface.set_high[BIAS] - surface.set_low[BIAS] < np.inf:
+    if biased and surface.set_high[BIAS] - surface.set_low[BIAS] < np.inf:
         return middle(surface, BIAS)
     return 0.5 * (surface.low + surface.high) - surface.command

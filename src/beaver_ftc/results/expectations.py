@@ -54,6 +54,16 @@ def _isolated_as(fault: str, metrics: Document) -> tuple[Any, bool]:
     return actual, actual == fault
 
 
+def _isolated_type(kind: str, metrics: Document) -> tuple[Any, bool]:
+    actual = metrics["isolation"]["type"]
+    return actual, actual == kind
+
+
+def _candidate_type(kind: str, metrics: Document) -> tuple[Any, bool]:
+    actual = metrics["isolation"]["candidates"]
+    return actual, any(kind == candidate.rpartition(":")[2] for candidate in actual)
+
+
 def _no_false_alarm(expected: bool, metrics: Document) -> tuple[Any, bool]:
     actual = not metrics["false_alarm"]
     return actual, actual == expected
@@ -76,6 +86,8 @@ _RULES: dict[str, Rule] = {
     "detected_within_s": _detected_within,
     "isolated_as": _isolated_as,
     "isolated_within_s": _isolated_within,
+    "isolated_type": _isolated_type,
+    "candidate_type": _candidate_type,
     "no_false_alarm": _no_false_alarm,
     "no_departure": _no_departure,
 }

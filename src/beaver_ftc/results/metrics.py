@@ -23,6 +23,7 @@ Rates = tuple[float, float, float]
 
 AXES = ("p", "q", "r")
 UNANTICIPATED = "unanticipated"
+LOSS_OF_EFFECTIVENESS = "loss_of_effectiveness"
 
 
 def metrics(flight: "Flight") -> Document:
@@ -46,6 +47,7 @@ def metrics(flight: "Flight") -> Document:
             {"start_s": _number(start), "end_s": _number(end)} for start, end in flight.envelope_exits
         ],
         "departure": _departure(flight),
+        "authority": _authority(flight),
         "saturation_s": {surface: _number(time) for surface, time in flight.saturation_s.items()},
     }
     expectations = evaluate(scenario.expect, document)
@@ -95,6 +97,11 @@ def _isolation(flight: "Flight", fault: Document | None) -> Document:
         "correct": _correct(flight.isolated, fault),
         "estimate": _number(flight.estimate),
         "candidates": list(flight.candidates),
+        "type_correct": _type_correct(flight.isolation_type, fault),
+        "type_delay_s": _delay(flight.type_time_s, fault),
+        "estimate_deg": _estimate_deg(flight),
+        "estimate_interval": [_number(end) for end in flight.estimate_interval or ()] or None,
+        "frequency_rad_s": _number(flight.frequency_rad_s),
     }
 
 
@@ -105,6 +112,28 @@ def _correct(isolated: str | None, fault: Document | None) -> bool | None:
     if fault is None:
         return False
     return isolated == (UNANTICIPATED if fault["type"] == UNANTICIPATED else fault["actuator"])
+
+
+def _type_correct(kind: str | None, fault: Document | None) -> bool | None:
+    """Whether the type named is the declared one; null while none is named."""
+    return None if kind is None else fault is not None and kind == fault["type"]
+
+
+def _estimate_deg(flight: "Flight") -> float | None:
+    """The estimate in deg, where it is a deflection."""
+    angle = flight.estimate is not None and flight.isolation_type != LOSS_OF_EFFECTIVENESS
+    return _number(math.degrees(flight.estimate)) if angle else None
+
+
+def _authority(flight: "Flight") -> Document | None:
+    """Per axis, since the fault: share of the demanded acceleration that was given, and for how long what
+    holds the rates was beyond what the surfaces can give."""
+    if flight.authority is None:
+        return None
+    return {
+        axis: {"given_share": _number(share), "beyond_s": _number(beyond_s)}
+        for axis, (share, beyond_s) in flight.authority.items()
+    }
 
 
 def _false_alarm(detection_time_s: float | None, fault: Document | None) -> bool:

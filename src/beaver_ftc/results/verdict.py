@@ -105,8 +105,23 @@ def _isolation(metrics: Document) -> str:
             f"not isolated, still possible: {left}" if metrics["detection"]["detected"] and left else "none"
         )
     when = "" if isolation["delay_s"] is None else f" after {_time(isolation['delay_s'])}"
-    estimate = "" if isolation["estimate"] is None else f", estimated theta {_value(isolation['estimate'])}"
-    return f"{isolation['fault']}{when}, {'correct' if isolation['correct'] else 'WRONG'}{estimate}"
+    right = "correct" if isolation["correct"] and isolation["type_correct"] is not False else "WRONG"
+    return f"{isolation['fault']}{when}, {right}{_type(isolation)}{_estimate(isolation)}"
+
+
+def _type(isolation: Document) -> str:
+    """The type, or those still possible; nothing where the class knows no other."""
+    if isolation["type"] is None:
+        return f", {' or '.join(isolation['candidates']).replace('_', ' ') or 'of no known type'}"
+    return "" if isolation["type"] == "unanticipated" else f", {isolation['type'].replace('_', ' ')}"
+
+
+def _estimate(isolation: Document) -> str:
+    if isolation["estimate"] is None:
+        return ""
+    if isolation["estimate_deg"] is None:
+        return f", estimated theta {_value(isolation['estimate'])}"
+    return f", estimated {_value(isolation['estimate_deg'])} deg"
 
 
 def _supervisor(metrics: Document) -> str:

@@ -163,6 +163,11 @@ class RmsLimits(Section):
     r: Number | None = number(None, unit="deg/s", says="yaw rate", ge=0, le=1000)
 
 
+FaultType = Literal[
+    "loss_of_effectiveness", "stuck", "hardover", "float", "bias", "rate_limit", "oscillatory", "unanticipated"
+]
+
+
 class Expect(Section):
     """What must come out for the run to pass; what is left out is not asserted."""
 
@@ -171,6 +176,12 @@ class Expect(Section):
     )
     isolated_as: Literal["aileron", "elevator", "rudder", "flap", "unanticipated"] | None = Field(
         default=None, description="what the diagnosis must name"
+    )
+    isolated_type: FaultType | None = Field(
+        default=None, description="the fault type the diagnosis must name"
+    )
+    candidate_type: FaultType | None = Field(
+        default=None, description="a fault type that must be named or still be possible"
     )
     isolated_within_s: Number | None = number(
         None, unit="s", says="delay from fault to isolation", ge=0, le=360_000

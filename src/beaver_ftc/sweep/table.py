@@ -52,6 +52,14 @@ def _first_entry(mode: str) -> Getter:
     return get
 
 
+def _interval(end: int) -> Getter:
+    def get(document: Document, flight: "Flight") -> Any:
+        interval = document["isolation"]["estimate_interval"]
+        return interval[end] if interval else None
+
+    return get
+
+
 def _outside_s(document: Document, flight: "Flight") -> float:
     return sum(stay["end_s"] - stay["start_s"] for stay in document["envelope_exits"])
 
@@ -86,6 +94,9 @@ COLUMNS: tuple[tuple[str, str, Getter], ...] = (
     *_under("flag", "isolation", "isolated", "correct"),
     *_under("text", "isolation", "fault", "type"),
     *_under("float", "isolation", "time_s", "delay_s", "estimate"),
+    *_under("flag", "isolation", "type_correct"),
+    *_under("float", "isolation", "type_delay_s", "estimate_deg", "frequency_rad_s"),
+    *((f"isolation.estimate_interval.{end}", "float", _interval(i)) for i, end in enumerate(("low", "high"))),
     ("isolation.candidates", "text", lambda document, flight: " ".join(document["isolation"]["candidates"])),
     ("false_alarm", "flag", _at("false_alarm")),
     ("worst_residual_ratio", "float", lambda document, flight: flight.worst_residual_ratio),
@@ -97,6 +108,7 @@ COLUMNS: tuple[tuple[str, str, Getter], ...] = (
     ("envelope_exits.total_s", "float", _outside_s),
     *_under("float", "departure", "time_s"),
     *_under("text", "departure", "signal"),
+    *(column for a in AXES for column in _under("float", f"authority.{a}", "given_share", "beyond_s")),
     *_under("float", "saturation_s", *SURFACES),
     ("expectations.missed", "text", _missed_expectations),
     ("passed", "flag", _at("passed")),

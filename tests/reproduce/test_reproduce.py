@@ -108,7 +108,7 @@ def test_unanticipated_fault_is_never_named_under_the_interval_test():
     ("value", "unit", "said"),
     [
         (0.0224, "of the amplitude", "2.2 % of the amplitude"),
-        (1436.2, "times", "1436 times"),
+        (317.2, "times", "317 times"),
         (0.01, "s", "0.01 s"),
         (None, "s", "never"),
     ],

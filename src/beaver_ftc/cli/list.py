@@ -10,7 +10,7 @@ Entries = list[dict[str, str]]
 def command(format: FormatOption = Format.text) -> None:
     """List what there is to choose from.
 
-    Built-in scenarios, diagnosis schemes, control laws, fault types and reference signals.
+    Built-in scenarios and sweeps, diagnosis schemes, control laws, fault types and reference signals.
     """
     available = _available()
     if format is Format.json:
@@ -28,11 +28,20 @@ def _available() -> dict[str, Entries]:
     schema = Scenario.model_json_schema()["$defs"]
     return {
         "scenarios": [{"name": name, "description": says.strip()} for name, says, _ in builtin_scenarios()],
+        "sweeps": _sweeps(),
         "schemes": _registered(DETECTORS),
         "laws": _registered(LAWS),
         "faults": [entry for part in schema.values() for entry in _fault(part)],
         "signals": [_kind(schema, name, part) for name, part in schema["Signal"]["properties"].items()],
     }
+
+
+def _sweeps() -> Entries:
+    from beaver_ftc.scenario.sweep_loader import builtin_sweeps, load_sweep
+
+    return [
+        {"name": name, "description": load_sweep(name).file.description.strip()} for name in builtin_sweeps()
+    ]
 
 
 def _registered(group: str) -> Entries:

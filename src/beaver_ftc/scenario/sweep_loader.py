@@ -1,5 +1,6 @@
 """A sweep from its file: the base scenario made self-contained, every key tried on it before it flies."""
 
+import contextlib
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -105,10 +106,11 @@ def _base_path(base: str, document: Document, source: str, folder: Path | None) 
     if not looks_like_a_path(base) and base in builtin_names():
         return builtin_path(base)
     path = (folder or Path()) / base
-    if path.is_file():
-        return path
+    with contextlib.suppress(OSError):  # a name no file can have
+        if path.is_file():
+            return path
     names = suggestion(base, builtin_names()) if not looks_like_a_path(base) else ", allowed: a scenario file"
-    says = f"no such file or built-in scenario: {base!r}{names}"
+    says = f"no such file or built-in scenario: {base[:100]!r}{names}"
     raise ScenarioError(source, [Problem(document.line(("base",)), ("base",), says)])
 
 

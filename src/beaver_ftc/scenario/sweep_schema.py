@@ -7,7 +7,7 @@ from pydantic import ConfigDict, Field, model_validator
 from beaver_ftc.scenario.base import Conflict, Number, Section, Whole, refuse
 from beaver_ftc.scenario.schema import NAME_PATTERN
 
-MAX_RUNS = 100_000_000
+MAX_RUNS = 10_000_000
 Sampling = Literal["random", "grid", "lhs", "sobol"]
 KINDS = ("uniform", "loguniform", "normal", "linspace", "choice")
 COUNTED = ("linspace", "choice")  # kinds with a finite number of values: what a grid is made of

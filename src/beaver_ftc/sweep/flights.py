@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -36,9 +36,10 @@ class Flights:
         """The columns of a `results.parquet` that statistics need."""
         from pyarrow.parquet import read_table
 
-        names = [*_METRICS, *sweep.keys]
-        table = read_table(path, columns=names, memory_map=False)
-        return cls({name: _array(table.column(name)) for name in names}, dict(sweep.file.vary))
+        columns = {
+            name: _array(read_table(path, columns=[name]).column(0)) for name in (*_METRICS, *sweep.keys)
+        }
+        return cls(columns, dict(sweep.file.vary))
 
     def __getitem__(self, name: str) -> np.ndarray:
         return self.columns[name]
@@ -104,9 +105,8 @@ class Flights:
         """What broke in each flight, in words: the surface, with the type where there are several types."""
         kinds, actuators = self["fault.type"], self["fault.actuator"]
         several = len(set(kinds[kinds != ""])) > 1
-        return np.array(
-            [_label(kind, actuator, several) for kind, actuator in zip(kinds, actuators, strict=True)]
-        )
+        pairs = zip(kinds, actuators, strict=True)
+        return np.array([_label(kind, actuator, several) for kind, actuator in pairs], dtype=object)
 
     def values(self, key: str) -> np.ndarray:
         """The values of a varied key."""
@@ -127,10 +127,14 @@ def _array(column) -> np.ndarray:
     if pa.types.is_boolean(column.type):
         return column.fill_null(False).to_numpy(zero_copy_only=False)
     if pa.types.is_string(column.type):
-        return np.array(column.fill_null("").to_pylist(), dtype=object)
+        coded = (
+            column.fill_null("").combine_chunks().dictionary_encode()
+        )  # each text once, however many flights
+        return np.array(coded.dictionary.to_pylist(), dtype=object)[coded.indices.to_numpy()]
     return column.to_numpy()
 
 
+@cache
 def _label(kind: str, actuator: str, several_types: bool) -> str:
     if not kind:
         return NO_FAULT

@@ -94,7 +94,7 @@ def run_sweep(
     sweep = named_for(sweep, options.search)
     tally = Tally(sweep.flights)
     folder = options.out / sweep.name
-    options = replace(options, keep=replace(options.keep, folder=folder / "flights"))
+    options = replace(options, keep=replace(options.keep, folder=(folder / "flights").resolve()))
     with Store(folder, schema_of(sweep)) as store:
         store.begin(Identity.of(sweep, options.search), options.resume)
         if not store.is_compacted(sweep.flights):

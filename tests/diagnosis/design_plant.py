@@ -36,9 +36,13 @@ def conclude(frames):
 
 
 class DesignPlant:
-    """One flight. theta(k): the fault's parameter of `surface` at frame k, 0 while there is none."""
+    """One flight. theta(k): lost effectiveness of `surface` at frame k, 0 while healthy; or position(k, u):
+    where it really is, rad.
+    """
 
-    def __init__(self, seed=0, rate_hz=100.0, airspeed_mps=45.0, surface=None, theta=None, **fdi):
+    def __init__(
+        self, seed=0, rate_hz=100.0, airspeed_mps=45.0, surface=None, theta=None, position=None, **fdi
+    ):
         scenario = Scenario.model_validate({"name": "design-plant", "rate_hz": rate_hz, "fdi": fdi})
         self.frames = assemble(scenario, np.zeros(4), TRAVEL_RAD)
         if numba.config.DISABLE_JIT:
@@ -46,7 +50,8 @@ class DesignPlant:
         self.frame, self.fdi = self.frames[0], self.frames[0]["fdi"]
         self.fdi["earth_rate"] = 0.0  # this plant flies over a flat Earth at rest
         self.dt, self.airspeed_mps = 1.0 / rate_hz, airspeed_mps
-        self.surface, self.theta = surface, theta or (lambda k: 0.0)
+        self.surface = surface
+        self.position = position or (lambda k, u: u * (1 + theta(k)) if theta else u)
         self.rng = np.random.default_rng(seed)
         self.wave = self.rng.uniform(0.2, 2.0, 8), self.rng.uniform(0, 6.28, 8)
         self.amplitude = self.rng.uniform(0.0, 0.2, 3)
@@ -72,11 +77,10 @@ class DesignPlant:
 
     def effect(self, G):
         """phi of the fault, rad/s2."""
-        return (
-            np.zeros(3)
-            if self.surface is None
-            else self.theta(self.k) * G[:, self.surface] * self.u[self.surface]
-        )
+        if self.surface is None:
+            return np.zeros(3)
+        u = self.u[self.surface]
+        return G[:, self.surface] * (self.position(self.k, u) - u)
 
     def fly(self, frames, uncertainty, until=lambda plant: False):
         """Fly so many frames, or until `until`, against `uncertainty(plant, bound, phi)` in rad/s2."""

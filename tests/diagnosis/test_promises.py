@@ -6,6 +6,8 @@ from design_plant import SURFACES, UNCERTAINTIES, DesignPlant
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from beaver_ftc.diagnosis.fault_types import POSITION_FIRST
+
 FRAMES = 160
 BOUNDS = {
     "published": {},
@@ -71,6 +73,29 @@ def test_no_admissible_uncertainty_raises_an_alarm(flight, uncertainty, threshol
 def test_the_true_fault_is_never_excluded_whatever_its_course(flight, uncertainty, surface, theta):
     plant = DesignPlant(surface=surface, theta=theta, **flight).fly(FRAMES, uncertainty)
     assert not plant.excluded(surface)
+
+
+low, high = -0.44, 0.44  # within every surface's travel
+positions = st.one_of(
+    st.builds(lambda at, c: lambda k, u: c if k >= at else u, at, st.floats(low, high)),
+    st.builds(lambda at, b: lambda k, u: np.clip(u + b * (k >= at), low, high), at, st.floats(-0.2, 0.2)),
+    st.builds(lambda at, w: lambda k, u: u + 0.04 * np.sin(w * k) * (k >= at), at, st.floats(0.01, 3)),
+    st.builds(
+        lambda at, seed: lambda k, u: np.random.default_rng(seed + k).uniform(low, high) if k >= at else u,
+        at,
+        st.integers(0, 10**6),
+    ),
+)
+
+
+@settings(max_examples=100, deadline=None)
+@given(flights, uncertainties, st.integers(0, 2), positions)
+def test_a_surface_that_may_be_anywhere_is_never_excluded(flight, uncertainty, surface, position):
+    """Jammed, biased, swinging or mad: its position estimator admits it."""
+    plant = DesignPlant(surface=surface, position=position, fault_class="all", **flight)
+    plant.fly(FRAMES, uncertainty)
+    assert not plant.excluded(POSITION_FIRST + surface)
+    assert plant.detected_at_s <= plant.certain_after_s
 
 
 @settings(max_examples=100, deadline=None)

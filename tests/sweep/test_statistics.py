@@ -9,53 +9,10 @@ from beaver_ftc.scenario.sweep_loader import load_sweep_text
 from beaver_ftc.scenario.sweep_schema import SweepExpect
 from beaver_ftc.sweep import words
 from beaver_ftc.sweep.expectations import evaluate
-from beaver_ftc.sweep.flights import Flights
-from beaver_ftc.sweep.store import write_parquet
 from beaver_ftc.sweep.summary import summarise
-from beaver_ftc.sweep.table import COLUMNS, schema_of, table_of
 from beaver_ftc.sweep.worst import replay_command, worst_flights
 
-SWEEP = """\
-name: counted
-base: elevator-partial-loss
-runs: 12
-vary:
-  faults[0].magnitude: {uniform: [0.1, 1]}
-"""
-NOTHING = dict.fromkeys(name for name, _, _ in COLUMNS)
-
-
-def row(run, status="flown", **metrics):
-    base = {
-        "frames": 3000, "flown_s": 30.0, "fault_free_s": 12.0, "fault.actuator": "elevator",
-        "fault.type": "loss_of_effectiveness", "fault.at_s": 12.0, "detection.detected": False,
-        "false_alarm": False, "worst_residual_ratio": 0.5, "passed": True,
-        "tracking.pre_fault_rms_deg_s.q": 0.1, "tracking.post_fault_rms_deg_s.q": 0.2,
-    }  # fmt: skip
-    values = {"faults[0].magnitude": (run + 1) / 12}
-    return {"run": run, **values, "seed": run, "status": status, "reason": None, **NOTHING, **base, **metrics}
-
-
-def detected(run, delay_s, name="elevator", **metrics):
-    found = {"detection.detected": True, "detection.time_s": 12 + delay_s, "detection.delay_s": delay_s}
-    if name:
-        found |= {
-            "isolation.fault": name, "isolation.correct": name == metrics.get("fault.actuator", "elevator"),
-            "isolation.delay_s": delay_s + 0.1, "isolation.isolated": True,
-        }  # fmt: skip
-    return row(run, **(found | metrics))
-
-
-ROWS = [
-    detected(0, 0.1), detected(1, 0.2), detected(2, 0.3, **{"detection.guaranteed_delay_s": 0.25}),
-    detected(3, 0.4, "aileron"), detected(4, 0.5, None),
-    detected(5, 0.6, **{"detection.guaranteed_delay_s": 0.7}),
-    row(6), row(7),
-    row(8, **{"false_alarm": True, "detection.detected": True, "detection.time_s": 3.0, "fault_free_s": 3.0}),
-    row(9, "departed", **{"reason": "alpha_rad at 20 s", "flown_s": 20.0, "passed": False}),
-    {**row(10, "bad_input"), **NOTHING, "reason": "no trim"},
-    row(11, **{"fault.actuator": None, "fault.type": None, "fault.at_s": None, "fault_free_s": 30.0}),
-]  # fmt: skip
+from .counted import ROWS, SWEEP, flights_of
 
 
 @pytest.fixture
@@ -64,10 +21,8 @@ def sweep():
 
 
 @pytest.fixture
-def flights(sweep, tmp_path):
-    schema = schema_of(sweep)
-    write_parquet(tmp_path / "results.parquet", [table_of(sweep, schema, ROWS)], schema)
-    return Flights.read(tmp_path / "results.parquet", sweep)
+def flights(tmp_path):
+    return flights_of(ROWS, tmp_path)
 
 
 @pytest.fixture

@@ -25,6 +25,11 @@ Drawer = Callable[[Flights, Document], "Figure | None"]
 DPI = 110
 BINS = 16
 LEAST_A_BIN = 10
+_SEARCHED = {
+    "delay": "detection delay (s)",
+    "false_alarm": "residual / threshold without a fault",
+    "tracking": "RMS tracking error after the fault (deg/s)",
+}
 MOST_LINES = 400  # of parallel coordinates: more is a grey block
 _FAULT_LOOKS = (
     (BLUE, "o", "-"),
@@ -305,7 +310,8 @@ def search_history(flights: Flights, summary: Document) -> "Figure | None":
     history = [np.nan if score is None else score for score in search["history"]]
     axes.plot(range(1, len(history) + 1), history, color=BLUE, marker="o", markersize=3.5)
     axes.set_xlabel("generation", fontsize=9)
-    axes.set_ylabel(search["objective"].replace("_", " "), fontsize=9)
+    axes.set_ylabel(_SEARCHED[search["objective"]], fontsize=9)
+    axes.ticklabel_format(useOffset=False)
     return figure
 
 

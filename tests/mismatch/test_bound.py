@@ -22,7 +22,8 @@ def stretch(t_s, eta, fault=0.0, eta_bar=0.03, source="sinusoids"):
     contributions = {name: np.zeros_like(values) for name in SOURCES}
     contributions[source], contributions["fault"] = values, values * 0.0 + fault
     total = values + contributions["fault"]
-    return Stretch(np.asarray(t_s), total, contributions, {}, np.full_like(values, eta_bar))
+    place = np.column_stack([45.0 + eta, 1000.0 + eta, 0.1 + eta])
+    return Stretch(np.asarray(t_s), total, contributions, {}, np.full_like(values, eta_bar), place)
 
 
 def kept(*stretches):
@@ -57,6 +58,8 @@ def test_stays_above_the_bound_are_timed_also_across_stretches():
     ]
     assert whole.exceedances[0].peak_ratio == pytest.approx(0.05 / 0.03)
     assert whole.exceedances[0].peak_s == pytest.approx(0.2)
+    peak = whole.exceedances[0]
+    assert (peak.airspeed_mps, peak.altitude_m, peak.alpha_rad) == pytest.approx((45.05, 1000.05, 0.15))
     assert (whole.exceeded_frames, whole.stays) == (5, 3)
     for cut in range(1, 10):
         parts = kept(stretch(t[:cut], eta[:cut]), stretch(t[cut:], eta[cut:])).bounds[0]

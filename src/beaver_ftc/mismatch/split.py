@@ -27,7 +27,8 @@ class Stretch:
 
     total: JSBSim's angular acceleration over each frame less the design model's f + G u. contributions:
     what each of SOURCES adds to it. parts: single faults and single coefficients, under the name of their
-    source. eta_bar: the bound in force over the same frames.
+    source. eta_bar: the bound in force over the same frames. place (n, 3): airspeed m/s, altitude m,
+    alpha rad.
     """
 
     t_s: np.ndarray
@@ -35,6 +36,7 @@ class Stretch:
     contributions: Contributions
     parts: dict[str, Contributions]
     eta_bar: np.ndarray
+    place: np.ndarray
 
     @property
     def unexplained(self) -> np.ndarray:
@@ -90,7 +92,13 @@ def _over_frames(case: Case, states: States) -> Stretch:
     contributions, parts = instantaneous(case, here)
     contributions["integration"] = integration(case, here, following)
     flown = (following.x - here.x) * case.scenario.rate_hz
-    return Stretch(here.t_s, flown - following.design_mean, contributions, parts, following.eta_bar)
+    return Stretch(
+        here.t_s, flown - following.design_mean, contributions, parts, following.eta_bar, _place(here)
+    )
+
+
+def _place(states: States) -> np.ndarray:
+    return np.column_stack([states.y[:, 2], states.altitude_m, states.y[:, 0]])
 
 
 def _at_end(case: Case, states: States) -> Stretch:
@@ -98,4 +106,4 @@ def _at_end(case: Case, states: States) -> Stretch:
     contributions, parts = instantaneous(case, states)
     contributions["integration"] = np.zeros_like(states.x)
     believed = case.belief.acceleration(states.x_measured, states.y_measured, states.u)
-    return Stretch(states.t_s, states.xdot - believed, contributions, parts, states.eta_bar)
+    return Stretch(states.t_s, states.xdot - believed, contributions, parts, states.eta_bar, _place(states))

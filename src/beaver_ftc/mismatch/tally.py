@@ -1,6 +1,6 @@
 """The figures of a split flight, kept while it is read: RMS, peaks, shares of the bound, exceedances."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -35,12 +35,15 @@ class Figures:
 
 @dataclass
 class Exceedance:
-    """A stay of the uncertainty above its bound: when, how far in shares of the bound, and why."""
+    """A stay of the uncertainty above its bound: when, how far in shares of the bound, where, and why."""
 
     start_s: float
     end_s: float
     peak_ratio: float
     peak_s: float
+    airspeed_mps: float
+    altitude_m: float
+    alpha_rad: float
     source: str
 
 
@@ -113,12 +116,16 @@ def _note(bound: AxisBound, ratio: np.ndarray, stretch: Stretch, axis: int, fram
     bound.exceeded_frames += int(above.sum())
     for first, last in _runs(above):
         peak = first + int(ratio[first:last].argmax())
+        airspeed_mps, altitude_m, alpha_rad = map(float, stretch.place[peak])
         stay = Exceedance(
-            float(stretch.t_s[first]),
-            float(stretch.t_s[last - 1]) + frame_s,
-            float(ratio[peak]),
-            float(stretch.t_s[peak]),
-            dominant(stretch, peak, axis),
+            start_s=float(stretch.t_s[first]),
+            end_s=float(stretch.t_s[last - 1]) + frame_s,
+            peak_ratio=float(ratio[peak]),
+            peak_s=float(stretch.t_s[peak]),
+            airspeed_mps=airspeed_mps,
+            altitude_m=altitude_m,
+            alpha_rad=alpha_rad,
+            source=dominant(stretch, peak, axis),
         )
         _keep(bound, stay, goes_on=first == 0 and bound.outside)
     bound.outside = bool(above[-1])
@@ -133,7 +140,7 @@ def _keep(bound: AxisBound, stay: Exceedance, goes_on: bool) -> None:
         last = bound.exceedances[-1]
         last.end_s = stay.end_s
         if stay.peak_ratio > last.peak_ratio:
-            last.peak_ratio, last.peak_s, last.source = stay.peak_ratio, stay.peak_s, stay.source
+            bound.exceedances[-1] = replace(stay, start_s=last.start_s)
 
 
 def _runs(mask: np.ndarray) -> list[tuple[int, int]]:

@@ -372,7 +372,8 @@ def advance_hand_over(frame):
     control = frame.control
     if frame.mode == MODE_REALLOCATED:
         control.hand_over = min(control.hand_over + control.hand_over_step, 1.0)
-        if control.hedging:
+        given_up = control.effectiveness[ELEVATOR] < control.least_effectiveness
+        if control.hedging or (given_up and frame.fdi.every_type):
             control.hand_over = max(control.hand_over, 1.0 - control.effectiveness[ELEVATOR])
     elif frame.fdi.every_type:
         control.hand_over = max(control.hand_over - control.hand_over_step, 0.0)

@@ -25,6 +25,7 @@ COMMANDS = (
     "sweep",
     "compare",
     "reproduce",
+    "matrix",
     "bench",
     "verify",
     "detectability",

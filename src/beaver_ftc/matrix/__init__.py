@@ -1,0 +1,1 @@
+"""Every fault type on every surface: what the diagnosis makes of it, and what the flight costs."""

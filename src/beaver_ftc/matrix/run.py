@@ -1,0 +1,33 @@
+"""Fly the matrix and keep it in a result folder."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from beaver_ftc.compare.crew import spread
+from beaver_ftc.matrix.cases import AIRSPEEDS_MPS, cases
+from beaver_ftc.matrix.flying import fly_case
+from beaver_ftc.matrix.summary import document_of
+from beaver_ftc.matrix.text import as_text
+
+Document = dict[str, Any]
+NAME = "fault-matrix"
+
+
+def run_matrix(
+    out: Path,
+    airspeeds_mps: tuple[float, ...] = AIRSPEEDS_MPS,
+    workers: int = 1,
+    progress: Callable[[float], None] | None = None,
+) -> Document:
+    """Write `out/fault-matrix/` (table, JSON, heat map); return the document."""
+    from beaver_ftc.matrix.figure import write_heat_map
+    from beaver_ftc.results.metrics import as_json
+    from beaver_ftc.results.writer import result_folder
+
+    with result_folder(out, NAME) as folder:
+        document = document_of(spread(fly_case, cases(airspeeds_mps), workers, progress))
+        (folder / f"{NAME}.json").write_text(as_json(document), encoding="utf-8")
+        (folder / f"{NAME}.txt").write_text(as_text(document) + "\n", encoding="utf-8")
+        write_heat_map(document, folder / f"{NAME}.png")
+    return document

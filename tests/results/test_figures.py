@@ -17,7 +17,7 @@ def test_every_view_becomes_a_picture_with_something_on_it(log_path, flight, tmp
     files = write_figures(log_path, metrics(flight), tmp_path / "figures")
     assert {file.stem.removesuffix("-closeup") for file in files} == EVERY
     assert {file.stem for file in files if "closeup" in file.stem} == {
-        "detection-closeup", "isolation-closeup", "ratio-closeup",
+        "detection-closeup", "isolation-closeup",
     }  # fmt: skip
     for file in files:
         picture = matplotlib.image.imread(file)[..., :3]

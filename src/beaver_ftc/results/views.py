@@ -160,7 +160,7 @@ def _detection() -> View:
 def _isolation(names: Sequence[str]) -> View:
     panels = tuple(
         Panel(
-            f"{name} estimator: {axis}",
+            f"{_spoken(name)} estimator: {axis}",
             (
                 Trace(f"fie_{name}_{axis}_lower_rad_s", "threshold", "bound"),
                 Trace(f"fie_{name}_{axis}_upper_rad_s", "", "bound"),
@@ -177,7 +177,7 @@ def _isolation(names: Sequence[str]) -> View:
 
 
 def _ratio(names: Sequence[str]) -> View:
-    stems = [("detection estimator", ""), *((f"{name} estimator", f"fie_{name}_") for name in names)]
+    stems = [("detection estimator", ""), *((f"{_spoken(name)} estimator", f"fie_{name}_") for name in names)]
     panels = tuple(
         Panel(
             f"{label}: |residual| / threshold",
@@ -188,7 +188,11 @@ def _ratio(names: Sequence[str]) -> View:
         for label, stem in stems
     )
     title = "How close to the threshold: above 1 is an alarm, or an estimator excluded"
-    return View("ratio", title, panels, closeup=True)
+    return View("ratio", title, panels, across=1 if len(panels) <= 4 else 3)
+
+
+def _spoken(name: str) -> str:
+    return name.replace("_", " ")
 
 
 def _effectiveness() -> View:

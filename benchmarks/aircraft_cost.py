@@ -2,8 +2,8 @@
 
     python benchmarks/aircraft_cost.py [--rounds N]
 
-Each variant is the Beaver's XML with one feature taken out, flown from the same trimmed state, all of them side
-by side in one process. What a feature costs is what its absence saves, round by round.
+Each variant is the Beaver's XML with one feature taken out, flown from the same trimmed state, all of them
+side by side in one process. What a feature costs is what its absence saves, round by round.
 """
 
 import argparse

@@ -9,8 +9,10 @@ the file of the outermost function: without this, a change in an inner kernel wo
 in use. It also works where the package is read-only.
 """
 
+import contextlib
 import hashlib
 import os
+import shutil
 import tempfile
 from collections.abc import Iterator
 from functools import lru_cache
@@ -19,6 +21,8 @@ from pathlib import Path
 import numba
 from numba.core.dispatcher import Dispatcher
 from numba.core.runtime import rtsys
+
+_VERSIONS_KEPT = 10
 
 _PACKAGE = Path(__file__).parent
 _SOURCES = (
@@ -38,14 +42,21 @@ def _candidates() -> Iterator[Path]:
     """Folders that may keep compiled code, best first."""
     if "NUMBA_CACHE_DIR" in os.environ:
         yield Path(os.environ["NUMBA_CACHE_DIR"])
-    yield Path(os.environ.get("XDG_CACHE_HOME") or Path("~/.cache").expanduser()) / "beaver-ftc"
-    yield Path(tempfile.gettempdir()) / f"beaver-ftc-{os.getuid()}"
+    with contextlib.suppress(RuntimeError):  # no home at all
+        yield Path(os.environ.get("XDG_CACHE_HOME") or Path("~/.cache").expanduser()) / "beaver-ftc"
+    with contextlib.suppress(FileNotFoundError):  # nor anywhere for temporary files
+        yield Path(tempfile.gettempdir()) / f"beaver-ftc-{_user()}"
+
+
+def _user() -> int:
+    return os.getuid() if hasattr(os, "getuid") else 0
 
 
 def _is_writable(folder: Path) -> bool:
+    """Whether the folder is ours to write. Code is loaded from it, so nobody else may own it."""
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-        return os.access(folder, os.W_OK) and folder.stat().st_uid == os.getuid()
+        return os.access(folder, os.W_OK) and folder.stat().st_uid == _user()
     except OSError:
         return False
 
@@ -63,15 +74,40 @@ def cache_folder() -> Path | None:
     """Where compiled kernels are kept; None where nothing can be written, and each process then compiles
     its own."""
     base = next((folder for folder in _candidates() if _is_writable(folder)), None)
-    return base / _fingerprint() if base else None
+    if base is None:
+        return None
+    folder = base / _fingerprint()
+    if not folder.exists():
+        _discard_old(base)
+    return folder
+
+
+def _discard_old(base: Path) -> None:
+    """Remove what earlier versions have left, but for the latest: someone may be flying with them."""
+    folders = [folder for folder in base.glob("[0-9a-f]" * 16) if folder.is_dir()]
+    folders.sort(key=lambda folder: folder.stat().st_mtime, reverse=True)
+    for folder in folders[_VERSIONS_KEPT:]:
+        shutil.rmtree(folder, ignore_errors=True)
 
 
 def kernel(function):
     """Compile a function of arrays, records and numbers; the plain form stays at `.py_func`."""
-    folder = cache_folder()
-    if folder is not None:
-        numba.config.CACHE_DIR = str(folder)  # type: ignore[attr-defined]
-    return numba.njit(cache=folder is not None, error_model="numpy")(function)
+    return compile_into(cache_folder(), function)
+
+
+def compile_into(folder: Path | None, function):
+    """Compile a function when it is first called, and keep its code in `folder`.
+
+    Numba is told of the folder for this function only: others' functions keep to their own.
+    """
+    if folder is None:
+        return numba.njit(error_model="numpy")(function)
+    others = numba.config.CACHE_DIR  # type: ignore[attr-defined]
+    numba.config.CACHE_DIR = str(folder)  # type: ignore[attr-defined]
+    try:
+        return numba.njit(cache=True, error_model="numpy")(function)
+    finally:
+        numba.config.CACHE_DIR = others  # type: ignore[attr-defined]
 
 
 def direct(function, *arguments):

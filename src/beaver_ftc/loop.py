@@ -134,11 +134,15 @@ class Loop:
             if status != FLYING:
                 return
 
-    def fly_chunk(self, start: int, rows: int) -> int:
-        """Frames start to start + rows, into the first rows of the log; returns why it ended."""
+    def sample_references(self, start: int, rows: int) -> None:
+        """Find the references of frames start to start + rows, for the first rows of the log to come."""
         t = np.arange(start, start + rows) / self.scenario.rate_hz
         self._references[:rows] = sample(self.scenario.reference, t)
         self.frames["row"] = 0
+
+    def fly_chunk(self, start: int, rows: int) -> int:
+        """Frames start to start + rows, into the first rows of the log; returns why it ended."""
+        self.sample_references(start, rows)
         k, end = start, start + rows
         while k < end:
             self.schedule.apply(k)

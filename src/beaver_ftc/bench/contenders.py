@@ -3,8 +3,6 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import numpy as np
-
 from beaver_ftc import channels as ch
 from beaver_ftc.control.base import Law
 from beaver_ftc.design.coefficients import SURFACES
@@ -16,12 +14,12 @@ from beaver_ftc.scenario.schema import Scenario
 
 
 def state_of(plant: Plant) -> FlightState:
-    """Where an aircraft is now, to `start` it from again."""
+    """Where an aircraft with ideal actuators is now: its surfaces as they were in the run just flown."""
     truth = {name: plant.read(property_) * factor for name, property_, factor in ch.TRUTH}
     names = set(FlightState.__dataclass_fields__) & set(truth)
     return FlightState(
         **{name: truth[name] for name in names},
-        **{f"{s}_rad": plant.read(f"fcs/{s}-cmd-rad") for s in SURFACES},
+        **{f"{s}_rad": truth[f"{s}_pos_rad"] for s in SURFACES},
         engine_rpm=plant.read("engine/speed-rpm"),
         manifold_pressure_inhg=plant.read("engine/manifold-pressure-inhg"),
     )
@@ -29,16 +27,25 @@ def state_of(plant: Plant) -> FlightState:
 
 @dataclass(frozen=True)
 class Moment:
-    """An instant of a flight to come back to: the frame's number, the aircraft's state, the loop's memory."""
+    """An instant between two frames of a flight, to come back to.
 
-    k: int
+    state: the aircraft's, of the frame just flown. commands: by property, for the frame to come.
+    """
+
+    plant: Plant
     state: FlightState
-    frames: np.ndarray
+    commands: dict[str, float]
 
     @classmethod
-    def of(cls, loop: Loop) -> "Moment":
-        """This instant of a flight."""
-        return cls(int(loop.frames["k"][0]), state_of(loop.plant), loop.frames.copy())
+    def of(cls, plant: Plant) -> "Moment":
+        """The present."""
+        return cls(plant, state_of(plant), {name: plant.read(name) for name in ch.COMMANDS})
+
+    def come_back(self) -> None:
+        """Put the aircraft there again."""
+        self.plant.start(self.state)
+        for name, deflection_rad in self.commands.items():
+            self.plant.write(name, deflection_rad)
 
 
 class ClosedLoop:
@@ -57,19 +64,16 @@ class ClosedLoop:
     ) -> None:
         self.loop = Loop(scenario, detector, law)
         self.loop.fly_chunk(0, round(at_s * scenario.rate_hz))
-        self._moment = Moment.of(self.loop)
-        self.loop.fly_chunk(self._moment.k, self._frames_left())  # its references stay
+        k = int(self.loop.frames["k"][0])
+        self.loop.sample_references(k, self.loop.n_frames - k)
+        self._moment, self._frames = Moment.of(self.loop.plant), self.loop.frames.copy()
         if compiled_frame is not None:
             self.loop.fly_frame = self.loop.direct(compiled_frame)
 
-    def _frames_left(self) -> int:
-        return self.loop.n_frames - self._moment.k
-
     def prepare(self) -> None:
         """Back to `at_s`."""
-        self.loop.plant.start(self._moment.state)
-        self.loop.frames[:] = self._moment.frames
-        self.loop.frames["row"] = 0
+        self._moment.come_back()
+        self.loop.frames[:] = self._frames
 
     def fly(self, frames: int) -> None:
         """Fly on."""
@@ -80,12 +84,13 @@ class Bare:
     """JSBSim alone: the same aircraft from the same state, surfaces held, nothing read, nothing written."""
 
     def __init__(self, scenario: Scenario, at_s: float) -> None:
-        self.plant, self._state = take_over(scenario, at_s)
+        self._moment = take_over(scenario, at_s)
+        self.plant = self._moment.plant
         self._runs = scenario.substeps
 
     def prepare(self) -> None:
         """Back to where the loop starts."""
-        self.plant.start(self._state)
+        self._moment.come_back()
 
     def fly(self, frames: int) -> None:
         """Fly on."""
@@ -94,8 +99,8 @@ class Bare:
             run()
 
 
-def take_over(scenario: Scenario, at_s: float) -> tuple[Plant, FlightState]:
-    """The aircraft of a flight at `at_s`, for someone else to fly, with its faults, and its state there."""
+def take_over(scenario: Scenario, at_s: float) -> Moment:
+    """The aircraft of a flight, with its faults, at `at_s`: for someone else to fly."""
     loop = Loop(scenario)
     loop.fly_chunk(0, round(at_s * scenario.rate_hz))
-    return loop.plant, state_of(loop.plant)
+    return Moment.of(loop.plant)

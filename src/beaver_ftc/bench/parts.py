@@ -13,8 +13,6 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-import numba
-
 import beaver_ftc.frame  # noqa: F401  (its kernels must be there to be copied)
 from beaver_ftc import compiled
 
@@ -88,24 +86,18 @@ def frame_with(switched_on: int) -> Kernel:
 def frame_without(stand_ins: Mapping[str, Kernel], name: str) -> Kernel:
     """A private `frame.fly_frame` with stand-ins for the kernels named; `name` names its cache."""
     used: set[str] = set()
+    folder = compiled.cache_folder()
 
     def kernel(function):
         full_name = f"{function.__module__}.{function.__name__}".removeprefix("beaver_ftc.")
         used.add(full_name)
-        return _compile(stand_ins.get(full_name, function), name)
+        return compiled.compile_into(folder and folder / name, stand_ins.get(full_name, function))
 
     with _fresh_kernel_modules(kernel):
         fly_frame = import_module("beaver_ftc.frame").fly_frame
     if unknown := set(stand_ins) - used:
         raise ValueError(f"no such kernel: {', '.join(sorted(unknown))}")
     return fly_frame
-
-
-def _compile(function: Kernel, name: str) -> Kernel:
-    folder = compiled.cache_folder()
-    if folder is not None:
-        numba.config.CACHE_DIR = str(folder / name)  # type: ignore[attr-defined]
-    return numba.njit(cache=folder is not None, error_model="numpy")(function)
 
 
 def _digest(path: Path) -> str:

@@ -173,19 +173,20 @@ class Straightforward:
 
     def __init__(self, scenario: Scenario, at_s: float = 0.0, frames: int = 1000) -> None:
         self.scenario, self.at_s = scenario, at_s
-        self.plant, self.state = take_over(scenario, at_s)
+        self.start = take_over(scenario, at_s)
+        self.plant = self.start.plant
         self.model = DesignModel()
         self.references = sample(scenario.reference, at_s + np.arange(frames) / scenario.rate_hz)
         self.prepare()
 
     def prepare(self) -> None:
         """Back to the start, with nothing detected."""
-        self.plant.start(self.state)
+        self.start.come_back()
         dt = 1.0 / self.scenario.rate_hz
         self.estimators = Estimators(self.scenario, dt)
-        self.law = FeedbackLinearisation(self.scenario, dt, self.state.flap_rad)
-        self.u = np.array([getattr(self.state, f"{s}_rad") for s in SURFACES])
-        self.law.model[0] = [getattr(self.state, f"{axis}_rad_s") for axis in AXES]
+        self.law = FeedbackLinearisation(self.scenario, dt, self.start.state.flap_rad)
+        self.u = np.array(list(self.start.commands.values()))
+        self.law.model[0] = [getattr(self.start.state, f"{axis}_rad_s") for axis in AXES]
         self.then: tuple[np.ndarray, ...] | None = None
         self.log: list[dict[str, float]] = []
 

@@ -18,31 +18,55 @@ DETECTORS, LAWS = "beaver_ftc.detectors", "beaver_ftc.laws"
 OURS = "beaver-ftc"
 _BY_CLASS = re.compile(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)*:[A-Za-z_]\w*")
 
-# In the compiled frame itself.
-_COMPILED = {
+# Name -> (module:Class, what `list` says of it). Without a class it is in the compiled frame itself.
+_OURS = {
     DETECTORS: {
-        "adaptive-estimators": "N + 1 nonlinear adaptive estimators with adaptive thresholds [Zhang2005].",
-        "none": "No diagnosis.",
+        "adaptive-estimators": (
+            "",
+            "N + 1 nonlinear adaptive estimators with adaptive thresholds [Zhang2005].",
+        ),
+        "none": ("", "No diagnosis."),
+        "rls-monitor": (
+            "beaver_ftc.rivals.rls:RlsMonitor",
+            "Recursive least-squares monitor of each surface and its rate, without a model [Keipour2019].",
+        ),
+        "augmented-ekf": (
+            "beaver_ftc.rivals.ekf:AugmentedEkf",
+            "Extended Kalman filter of effectiveness, chi-square test on the estimates [Jazwinski1970].",
+        ),
+        "augmented-ukf": (
+            "beaver_ftc.rivals.ukf:AugmentedUkf",
+            "Unscented Kalman filter of effectiveness, CUSUM on the innovation squared [Julier2004].",
+        ),
+        "multiple-models": (
+            "beaver_ftc.rivals.imm:InteractingMultipleModels",
+            "Interacting multiple models of lost effectiveness, alarm on the odds of a fault [Blom1988].",
+        ),
+        "observer-constant": (
+            "beaver_ftc.rivals.observer:ConstantThresholdObserver",
+            "Observer residual with a constant threshold, surface named by least squares [Chen1999].",
+        ),
     },
     LAWS: {
-        "nominal": "Feedback linearisation with proportional-integral feedback.",
-        "adaptive": "Nominal, and compensates an unknown fault by what the estimators have learnt of it.",
-        "fault-tolerant": "Adaptive, and hands pitch control from a weak elevator to the flap.",
-        "oracle": "Fault-tolerant, and told the true fault the moment it occurs: the yardstick.",
-    },
-}
-_RIVALS = {
-    DETECTORS: {
-        "rls-monitor": "beaver_ftc.rivals.rls:RlsMonitor",
-        "augmented-ekf": "beaver_ftc.rivals.ekf:AugmentedEkf",
-        "augmented-ukf": "beaver_ftc.rivals.ukf:AugmentedUkf",
-        "multiple-models": "beaver_ftc.rivals.imm:InteractingMultipleModels",
-        "observer-constant": "beaver_ftc.rivals.observer:ConstantThresholdObserver",
-    },
-    LAWS: {
-        "indi": "beaver_ftc.rivals.indi:IncrementalInversion",
-        "l1-adaptive": "beaver_ftc.rivals.l1:L1Adaptive",
-        "lqr": "beaver_ftc.rivals.lqr:FixedGainLqr",
+        "nominal": ("", "Feedback linearisation with proportional-integral feedback."),
+        "adaptive": (
+            "",
+            "Nominal, and compensates an unknown fault by what the estimators have learnt of it.",
+        ),
+        "fault-tolerant": ("", "Adaptive, and hands pitch control from a weak elevator to the flap."),
+        "oracle": ("", "Fault-tolerant, and told the true fault the moment it occurs: the yardstick."),
+        "indi": (
+            "beaver_ftc.rivals.indi:IncrementalInversion",
+            "Incremental nonlinear dynamic inversion on filtered angular acceleration [Sieberling2010].",
+        ),
+        "l1-adaptive": (
+            "beaver_ftc.rivals.l1:L1Adaptive",
+            "L1 adaptive control, piecewise-constant adaptation behind a low-pass filter [Hovakimyan2010].",
+        ),
+        "lqr": (
+            "beaver_ftc.rivals.lqr:FixedGainLqr",
+            "Fixed-gain linear quadratic regulator about the trim, with integral action [Anderson1990].",
+        ),
     },
 }
 _METHODS = ("reset", "step")
@@ -56,12 +80,12 @@ class Registered:
     name: str
     target: str
     package: str
+    says: str = ""
 
     def description(self) -> str:
-        """The first line of its docstring; imports its class. A class that cannot be loaded is said to be
-        so."""
-        if not self.target:
-            return _COMPILED[self.group][self.name]
+        """One line; of another package's class the first of its docstring, or why it cannot be loaded."""
+        if self.says:
+            return self.says
         try:
             return (getdoc(plugin_class(self.group, self.name)) or "").partition("\n")[0]
         except BadInput as error:
@@ -70,13 +94,14 @@ class Registered:
 
 def is_compiled(group: str, name: str) -> bool:
     """Whether the compiled frame does this scheme or law itself."""
-    return name in _COMPILED[group]
+    return name in _OURS[group] and not _OURS[group][name][0]
 
 
 def registered(group: str) -> dict[str, Registered]:
     """Everything registered under DETECTORS or LAWS, by name, ours first; imports none of it."""
-    ours = {name: Registered(group, name, "", OURS) for name in _COMPILED[group]}
-    ours |= {name: Registered(group, name, target, OURS) for name, target in _RIVALS[group].items()}
+    ours = {
+        name: Registered(group, name, target, OURS, says) for name, (target, says) in _OURS[group].items()
+    }
     others = {entry.name: entry for entry in _from_packages(group) if entry.name not in ours}
     return ours | others
 
@@ -92,7 +117,7 @@ def refusal(group: str, name: str) -> str | None:
     """What is wrong with a scheme's or law's name in a scenario, and what is allowed; None if nothing is."""
     from beaver_ftc.scenario.base import suggestion
 
-    if name in _COMPILED[group] or name in _RIVALS[group]:
+    if name in _OURS[group]:
         return None
     known = registered(group)
     if name in known:

@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from inspect import getdoc
 
 import culprits
 import numpy as np
@@ -218,6 +219,7 @@ def test_everything_registered_keeps_the_protocol(group):
     for name, entry in registered(group).items():
         assert entry.description().strip()
         if entry.target:
+            assert getdoc(plugin_class(group, name)).startswith(entry.description())
             assert isinstance(plugin_class(group, name)(), Detector if group == DETECTORS else Law)
 
 

@@ -54,7 +54,7 @@ def posterior(predicted: np.ndarray, log_likelihoods: np.ndarray) -> np.ndarray:
 
 
 class InteractingMultipleModels:
-    """Interacting multiple models of lost effectiveness, alarm on the probability of any fault [Blom1988]."""
+    """Interacting multiple models of lost effectiveness, alarm on the odds of a fault [Blom1988]."""
 
     name: ClassVar[str] = "multiple-models"
     defaults: ClassVar[Mapping[str, float]] = {

@@ -1,4 +1,4 @@
-"""Unscented Kalman filter with the surfaces' effectiveness as states, and a CUSUM on its innovations."""
+"""Unscented Kalman filter with the surfaces' effectiveness as states, and a CUSUM [Page1954] on innovations."""
 
 from collections.abc import Mapping
 from typing import ClassVar
@@ -12,7 +12,7 @@ from beaver_ftc.rivals.kalman import sigma_points
 
 
 class AugmentedUkf(EffectivenessFilter):
-    """Unscented Kalman filter of effectiveness, CUSUM on the innovation squared [Julier2004], [Page1954]."""
+    """Unscented Kalman filter of effectiveness, CUSUM on the innovation squared [Julier2004]."""
 
     name: ClassVar[str] = "augmented-ukf"
     defaults: ClassVar[Mapping[str, float]] = DEFAULTS | {"alarm": 20.0, "allowance": 3.0, "spread": float(N)}

@@ -1,0 +1,85 @@
+"""Several JSBSim frames in a frame of the loop: exact means, and room for a fault that changed inside it."""
+
+import numpy as np
+import pytest
+from design_plant import TRAVEL_RAD
+from hypothesis import given
+from hypothesis import strategies as st
+from numba import njit
+
+from beaver_ftc.assembly import assemble
+from beaver_ftc.diagnosis.bank import aligned_extremes, extremes
+from beaver_ftc.frame import elapse, remember, sum_up
+from beaver_ftc.scenario.schema import Scenario
+
+
+@njit
+def first(frames):
+    remember(frames[0])
+
+
+@njit
+def another(frames):
+    sum_up(frames[0])
+
+
+@njit
+def over(frames):
+    elapse(frames[0])
+
+
+@njit
+def limits(frames, surface):
+    fie = frames[0].fdi.estimator[surface]
+    return extremes(fie, 0), aligned_extremes(fie)
+
+
+def record(substeps):
+    return assemble(Scenario(name="x", substeps=substeps), np.zeros(4), TRAVEL_RAD)
+
+
+def fill(frame, rng):
+    for name in ("f", "G", "u"):
+        frame[name] = rng.uniform(-1, 1, frame[name].shape)
+    frame["fdi"]["eta_bar_now"] = rng.uniform(0, 1, 3)
+    return frame["f"].copy(), frame["G"].copy(), frame["u"].copy(), frame["fdi"]["eta_bar_now"].copy()
+
+
+@pytest.mark.parametrize("substeps", [1, 2, 7])
+def test_what_is_believed_is_the_mean_over_the_instants(substeps):
+    rng, frames = np.random.default_rng(substeps), record(substeps)
+    seen = [fill(frames[0], rng)]
+    first(frames)
+    for _ in range(substeps - 1):
+        seen.append(fill(frames[0], rng))
+        another(frames)
+    over(frames)
+    believed = np.mean([f + G @ u for f, G, u, _ in seen], axis=0)
+    assert frames[0]["believed"] == pytest.approx(believed)
+    assert frames[0]["fdi"]["eta_bar"] == pytest.approx(np.mean([bound for *_, bound in seen], axis=0))
+
+
+numbers = st.floats(-2, 2)
+shares = st.floats(-1, 0)
+
+
+@given(st.integers(2, 50), numbers, numbers, shares, shares)
+def test_a_loss_that_changed_inside_the_frame_stays_within_the_extremes(n, moment0, moment, theta0, theta):
+    """The first instant under the old command and the old fault, the others under the new ones."""
+    frames = record(n)
+    frame, fie = frames[0], frames[0]["fdi"]["estimator"][0]
+    frame["Gu_first"][0, 0], frame["Gu_sum"][0, 0] = moment0, moment0 + (n - 1) * moment
+    over(frames)
+    fie["Z"][0], fie["spread"][0] = frame["Gu_mean"][0, 0], frame["Gu_spread"][0, 0]
+    fie["across"][0] = 1.0
+    effect = (theta0 * moment0 + (n - 1) * theta * moment) / n
+    for low, high in limits(frames, 0):
+        assert low - 1e-12 <= effect <= high + 1e-12
+
+
+def test_one_instant_leaves_no_room():
+    frames = record(1)
+    fill(frames[0], np.random.default_rng(0))
+    first(frames)
+    over(frames)
+    assert (frames[0]["Gu_spread"] == 0.0).all()

@@ -8,7 +8,7 @@ the fault, and each value after it that was larger than all before.
 from bisect import bisect_right
 from dataclasses import dataclass
 from math import inf, isfinite, isnan
-from time import perf_counter
+from time import process_time
 
 import numpy as np
 
@@ -107,9 +107,9 @@ def replay(recording: Recording, scheme: str, options: dict[str, float] | None =
         return trace(recording, recording.built_in)
     detector: Detector = plugin_class(DETECTORS, scheme)()
     detector.reset(Context(**{**vars(recording.context), "options": options or {}}))
-    began = perf_counter()
+    began = process_time()
     verdicts = [detector.step(measured, command) for measured, command in recording.seen]
-    us = 1e6 * (perf_counter() - began) / max(len(verdicts), 1)
+    us = 1e6 * (process_time() - began) / max(len(verdicts), 1)
     return trace(recording, np.array([_statistic(verdict) for verdict in verdicts]), us)
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from math import hypot, inf
-from time import perf_counter
+from time import process_time
 
 from beaver_ftc.compare.flights import Case
 from beaver_ftc.compare.replay import Recording, Trace, record, replay
@@ -97,10 +97,10 @@ def _trace(trial: Trial, recording: Recording, scheme: str) -> None:
 def _fly(scenario: Scenario, entry: Entry) -> Result:
     try:
         loop = Loop(with_entry(scenario, entry))
-        began = perf_counter()
+        began = process_time()
         for _ in loop.chunks():
             pass
-        us = 1e6 * (perf_counter() - began) / loop.n_frames
+        us = 1e6 * (process_time() - began) / loop.n_frames
         return result_of(loop.land(), entry, us)
     except BeaverFtcError as error:
         return Result(entry, False, 0.0, bool(scenario.faults), error=str(error))

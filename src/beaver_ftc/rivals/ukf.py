@@ -1,4 +1,4 @@
-"""Unscented Kalman filter with the surfaces' effectiveness as states, and a CUSUM [Page1954] on innovations."""
+"""Unscented Kalman filter with the effectiveness of surfaces as states, and a CUSUM [Page1954] on innovations."""
 
 from collections.abc import Mapping
 from typing import ClassVar

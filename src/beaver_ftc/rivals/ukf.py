@@ -1,4 +1,4 @@
-"""Unscented Kalman filter with the effectiveness of surfaces as states, and a CUSUM [Page1954] on innovations."""
+"""Unscented Kalman filter with effectiveness as states, and a CUSUM [Page1954] on its innovations."""
 
 from collections.abc import Mapping
 from typing import ClassVar

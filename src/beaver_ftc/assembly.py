@@ -11,7 +11,7 @@ from beaver_ftc.control.state import LAWS, NOMINAL
 from beaver_ftc.design.coefficients import SURFACES
 from beaver_ftc.design.model import AILERON, ELEVATOR, FLAP, RUDDER
 from beaver_ftc.design.variants import design_of
-from beaver_ftc.diagnosis.config import FdiConfig
+from beaver_ftc.diagnosis.config import FdiConfig, Probing
 from beaver_ftc.diagnosis.fault_class import PARAMETER_SET
 from beaver_ftc.diagnosis.state import INTERVAL, LOSS, NOT_ISOLATED, POSITION, PUBLISHED
 from beaver_ftc.frame import FRAME
@@ -98,6 +98,14 @@ def _assemble_control(
     control["hand_over_step"] = dt / config.hand_over_s
 
 
+def _assemble_probing(control: np.void, probing: Probing | None, dt: float) -> None:
+    if probing is not None:
+        control["probe_amplitude"] = radians(probing.amplitude_deg)
+        control["probe_step"] = 2.0 * pi * probing.frequency_hz * dt
+        control["probe_frames"] = round(probing.duration_s / dt)
+        control["probe_from_s"] = control["probe_to_s"] = -1.0
+
+
 def assemble(scenario: Scenario, trim: np.ndarray, travel: np.ndarray) -> np.ndarray:
     """The frame record, shape (1,), of a flight about to start.
 
@@ -117,4 +125,5 @@ def assemble(scenario: Scenario, trim: np.ndarray, travel: np.ndarray) -> np.nda
     _assemble_sharpening(frame["fdi"], scenario.fdi, dt)
     _assemble_network(frame["fdi"]["network"], scenario.control)
     _assemble_control(frame["control"], scenario.control, dt, trim, travel)
+    _assemble_probing(frame["control"], scenario.fdi.probing, dt)
     return frames

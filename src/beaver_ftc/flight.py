@@ -56,3 +56,4 @@ class Flight:
     estimate_interval: tuple[float, float] | None = None
     frequency_rad_s: float | None = None
     authority: dict[str, tuple[float, float]] | None = None
+    probing_s: tuple[float, float] | None = None

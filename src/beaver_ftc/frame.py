@@ -11,12 +11,12 @@ import numpy as np
 
 from beaver_ftc import channels as ch
 from beaver_ftc.compiled import kernel
-from beaver_ftc.control import adaptive, allocation, authority, nominal, reference_model
+from beaver_ftc.control import adaptive, allocation, authority, nominal, probing, reference_model
 from beaver_ftc.control.state import CONTROL, NOMINAL, ORACLE
 from beaver_ftc.design.model import ALPHA, BETA, DESIGN, ELEVATOR, QDYN
 from beaver_ftc.design.variants import response
 from beaver_ftc.diagnosis import bank, detection, fault_types, guarantee, isolation, network
-from beaver_ftc.diagnosis.state import DIAGNOSIS
+from beaver_ftc.diagnosis.state import DIAGNOSIS, NOT_ISOLATED
 from beaver_ftc.diagnosis.thresholds import uncertainty_bound
 from beaver_ftc.plant.native import read_nodes, write_nodes
 from beaver_ftc.supervisor import (
@@ -367,6 +367,14 @@ def give_up(frame):
 
 
 @kernel
+def in_doubt(frame):
+    """Whether elevator or flap is at fault and it has long been open which."""
+    fdi, law = frame.fdi, frame.control.law
+    open_question = fdi.every_type and fdi.detected and fdi.isolated == NOT_ISOLATED
+    return open_question and fdi.evidence >= fdi.patience and law != NOMINAL and law != ORACLE
+
+
+@kernel
 def advance_hand_over(frame):
     """Hand the pitch demand to the flap, or back. What an immovable elevator no longer carries goes at once."""
     control = frame.control
@@ -389,6 +397,8 @@ def command(frame, reference):
     else:
         adaptive.believed_effectiveness(control, frame.G, frame.G_believed)
     advance_hand_over(frame)
+    if control.probe_frames > 0:
+        probing.advance(control, in_doubt(frame), frame.t)
     nominal.demand(control, frame.x, frame.f, frame.fhat)
     if control.law != NOMINAL:
         adaptive.allow_for_offsets(control, frame.G)

@@ -54,11 +54,15 @@ def _alive(fdi: np.void, s: int, kind: int) -> bool:
 
 
 def _types_left(fdi: np.void, s: int) -> list[str]:
-    """Types still possible on surface s, each once. One that may take any course counts only if no simpler does."""
+    """Types still possible on surface s, each once.
+
+    One that may take any course counts only if no simpler does, and a slow surface until it would have moved.
+    """
     left = [kind for kind in range(len(ft.TYPES)) if _alive(fdi, s, kind)]
-    constant = [kind for kind in left if kind < ft.N_CONSTANT]
-    kept = [kind for kind in left if kind not in (ft.VARYING_LOSS, ft.SLOW) or not constant]
-    return list(dict.fromkeys(ft.TYPES[kind] for kind in kept))
+    if any(kind < ft.N_CONSTANT for kind in left):
+        early = fdi["evidence"] < fdi["patience"]
+        left = [kind for kind in left if kind != ft.VARYING_LOSS and (kind != ft.SLOW or early)]
+    return list(dict.fromkeys(ft.TYPES[kind] for kind in left))
 
 
 def _open_questions(fdi: np.void) -> Iterator[str]:

@@ -70,6 +70,15 @@ def _guaranteed_delay(frame: np.void) -> float | None:
     return None if certain is None or not frame["faulted"] else certain - float(frame["fault_at_s"])
 
 
+def _probing_s(frame: np.void) -> tuple[float, float] | None:
+    """When the active diagnosis began and ended."""
+    control = frame["control"]
+    if not control["probe_frames"] or control["probe_from_s"] < 0.0:
+        return None
+    began, ended = float(control["probe_from_s"]), float(control["probe_to_s"])
+    return began, (ended if ended >= 0.0 else float(frame["t"]))
+
+
 def _authority(frame: np.void) -> dict[str, tuple[float, float]] | None:
     """Per axis, after the fault: share of the demanded acceleration given, and seconds beyond holding."""
     if not frame["post_fault_frames"]:
@@ -133,5 +142,6 @@ def flight_of(
         worst_residual_ratio=max(closest),
         closest_approach=closest,
         authority=_authority(frame),
+        probing_s=_probing_s(frame),
         **(_isolation(fdi) if verdict is None else _told(fdi, verdict)),
     )

@@ -49,7 +49,7 @@ def pitch(control, G, u):
     share = smooth(control.hand_over)
     hold = divide(G[1, ELEVATOR], control.effectiveness[ELEVATOR]) * control.trim[ELEVATOR]
     flap = control.trim[FLAP] + share * (divide(needed - hold, G[1, FLAP]) - control.trim[FLAP])
-    u[FLAP] = clip(control, FLAP, flap)
+    u[FLAP] = clip(control, FLAP, flap + control.probe)
     u[ELEVATOR] = clip(control, ELEVATOR, divide(needed - G[1, FLAP] * u[FLAP], G[1, ELEVATOR]))
 
 

@@ -14,6 +14,8 @@ CONTROL = np.dtype(
         ("integral", "f8", (3,)), ("demand", "f8", (3,)),
         ("effectiveness", "f8", (4,)), ("effectiveness_step", "f8"), ("least_effectiveness", "f8"),
         ("offset", "f8", (4,)), ("lag", "f8", (4,)),
+        ("probe_amplitude", "f8"), ("probe_step", "f8"), ("probe_frames", "i8"), ("probe", "f8"), ("probed", "i8"),
+        ("probe_from_s", "f8"), ("probe_to_s", "f8"),
         # what authority.py keeps
         ("governed_rate", "f8", (3,)), ("governed_acceleration", "f8", (3,)), ("hedging", "i8"), ("reference_scale", "f8", (3,)),
         ("hold", "f8", (3,)), ("shortfall", "f8", (3,)), ("beyond", "i8", (3,)),

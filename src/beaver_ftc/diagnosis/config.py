@@ -46,6 +46,20 @@ class Bounds(BaseModel):
     )
 
 
+class Probing(BaseModel):
+    """A small movement of the flap, met by the elevator, to learn which of the two is at fault.
+
+    If both follow, nothing is felt. It begins when the pitch axis is at fault and neither is named once a slow
+    oscillation would have shown, and ends when one is.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    amplitude_deg: float = Field(3.0, gt=0, le=10, description="greatest flap deflection, downwards, deg")
+    frequency_hz: float = Field(0.5, gt=0, le=5, description="movements a second, Hz")
+    duration_s: float = Field(4.0, gt=0, le=60, description="at most so long, s")
+
+
 class Sharpen(BaseModel):
     """Margin the published scheme gives away; each step loses no guarantee (docs/theory.md, section 3)."""
 
@@ -91,6 +105,9 @@ class FdiConfig(BaseModel):
     )
     slowest_oscillation_rad_s: float = Field(
         1.0, gt=0, le=100, description="oscillatory failures are this fast or faster (class `all`), rad/s"
+    )
+    probing: Probing | None = Field(
+        None, description="active diagnosis (class `all`): off unless given; `{}` for its defaults"
     )
     thresholds: Literal["interval", "published"] = Field(
         "interval", description="isolation test: signed interval or the paper's norm bound"

@@ -102,6 +102,7 @@ def _isolation(flight: "Flight", fault: Document | None) -> Document:
         "estimate_deg": _estimate_deg(flight),
         "estimate_interval": [_number(end) for end in flight.estimate_interval or ()] or None,
         "frequency_rad_s": _number(flight.frequency_rad_s),
+        "probing_s": [_number(instant) for instant in flight.probing_s or ()] or None,
     }
 
 

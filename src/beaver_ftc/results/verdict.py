@@ -25,6 +25,7 @@ def facts(metrics: Document) -> list[tuple[str, str]]:
         ("fault", _fault(metrics)),
         ("detection", _detection(metrics)),
         ("isolation", _isolation(metrics)),
+        ("probing", _probing(metrics)),
         ("supervisor", _supervisor(metrics)),
         ("envelope", _envelope(metrics)),
         ("departure", _departure(metrics)),
@@ -107,6 +108,11 @@ def _isolation(metrics: Document) -> str:
     when = "" if isolation["delay_s"] is None else f" after {_time(isolation['delay_s'])}"
     right = "correct" if isolation["correct"] and isolation["type_correct"] is not False else "WRONG"
     return f"{isolation['fault']}{when}, {right}{_type(isolation)}{_estimate(isolation)}"
+
+
+def _probing(metrics: Document) -> str:
+    instants = metrics["isolation"].get("probing_s")
+    return f"flap and elevator moved from {_time(instants[0])} to {_time(instants[1])}" if instants else ""
 
 
 def _type(isolation: Document) -> str:

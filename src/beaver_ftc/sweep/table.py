@@ -52,10 +52,10 @@ def _first_entry(mode: str) -> Getter:
     return get
 
 
-def _interval(end: int) -> Getter:
+def _of_pair(name: str, end: int) -> Getter:
     def get(document: Document, flight: "Flight") -> Any:
-        interval = document["isolation"]["estimate_interval"]
-        return interval[end] if interval else None
+        pair = document["isolation"][name]
+        return pair[end] if pair else None
 
     return get
 
@@ -96,7 +96,11 @@ COLUMNS: tuple[tuple[str, str, Getter], ...] = (
     *_under("float", "isolation", "time_s", "delay_s", "estimate"),
     *_under("flag", "isolation", "type_correct"),
     *_under("float", "isolation", "type_delay_s", "estimate_deg", "frequency_rad_s"),
-    *((f"isolation.estimate_interval.{end}", "float", _interval(i)) for i, end in enumerate(("low", "high"))),
+    *(
+        (f"isolation.{pair}.{end}", "float", _of_pair(pair, i))
+        for pair, ends in (("estimate_interval", ("low", "high")), ("probing_s", ("from", "to")))
+        for i, end in enumerate(ends)
+    ),
     ("isolation.candidates", "text", lambda document, flight: " ".join(document["isolation"]["candidates"])),
     ("false_alarm", "flag", _at("false_alarm")),
     ("worst_residual_ratio", "float", lambda document, flight: flight.worst_residual_ratio),

@@ -1,5 +1,6 @@
 """Linear analysis: JSBSim's modes against FDC's over the envelope, the linear tools against closed forms."""
 
+import dataclasses
 import subprocess
 import sys
 from importlib.metadata import version
@@ -7,8 +8,9 @@ from importlib.metadata import version
 import numpy as np
 import pytest
 
+from beaver_ftc.design import fdc
 from beaver_ftc.errors import SimulationFailed
-from beaver_ftc.mismatch.linear import analyse
+from beaver_ftc.mismatch.linear import analyse, engine_of, state_vector, surfaces_of
 from beaver_ftc.mismatch.modes import CLASSICAL, MODES, deviation, modes, pulse_response, response, zeros
 from beaver_ftc.plant.linear import own
 from beaver_ftc.plant.state import FlightState
@@ -35,6 +37,17 @@ def test_modes_of_jsbsim_agree_with_fdc_within_one_percent(analysis):
 
 def test_jsbsims_own_linearisation_agrees_with_fdc_within_one_percent(analysis):
     assert max(analysis.own_deviation.values()) <= 0.01, analysis.own_deviation
+
+
+def test_surfaces_act_in_jsbsims_linear_models_as_in_fdc(analysis):
+    """Angular acceleration per rad of each surface, from differences and from JSBSim's own linearisation."""
+    rates = ("p", "q", "r")
+    straight = dataclasses.replace(analysis.point, beta_rad=0.0)
+    _, B = fdc.linearise(state_vector(straight), surfaces_of(straight), engine_of(straight))
+    found = own(scenario(), straight).of(rates).B
+    assert found == pytest.approx(B[3:6, :3], rel=2e-3, abs=1e-3)
+    differenced = analysis.models["truth"].of(rates).B
+    assert differenced == pytest.approx(analysis.models["fdc"].of(rates).B, rel=2e-3, abs=1e-3)
 
 
 def test_a_design_model_with_all_terms_has_the_truths_modes(analysis):

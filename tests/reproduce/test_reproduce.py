@@ -121,7 +121,7 @@ def test_command_writes_table_figures_and_page(tmp_path):
     before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
     done = CliRunner().invoke(app, ["reproduce", "--out", str(tmp_path), "--format", "json"])
     assert done.exit_code == 0, done.output
-    assert resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before < 60
+    assert resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before < 100  # s of CPU: 60 s on 2 cores
     document = json.loads(done.stdout)
     assert document["passed"] is True
     folder = tmp_path / "reproduction"

@@ -13,6 +13,7 @@ from beaver_ftc.reproduce.choices import CHOICES, GIVEN, scenario
 from beaver_ftc.reproduce.claims import CLAIMS
 from beaver_ftc.reproduce.document import fly_published
 from beaver_ftc.reproduce.figures import FIGURES
+from beaver_ftc.reproduce.margins import shares
 from beaver_ftc.reproduce.sensitivity import VARIANTS
 from beaver_ftc.scenario.loader import load_scenario
 
@@ -117,6 +118,21 @@ def test_numbers_in_words(value, unit, said):
     assert words.number(value, unit) == said
 
 
+@pytest.mark.parametrize(
+    ("lowest", "number", "highest", "at_least", "expected"),
+    [
+        (0.1, 0.2, 1.0, False, (0.2, 0.4, 2.0)),
+        (1.0, 2.0, 5.0, True, (0.1, 0.25, 0.5)),
+        (0.1, 0.2, None, False, (0.2, 0.4, np.inf)),
+        (1.0, None, None, True, (0.0, 0.0, 0.5)),
+        (0.0, 0.0, 5.0, True, (0.1, np.inf, np.inf)),
+    ],
+)
+def test_margins_are_shares_of_what_is_allowed(lowest, number, highest, at_least, expected):
+    claim = {"lowest": lowest, "number": number, "highest": highest, "limit": 0.5, "at_least": at_least}
+    assert shares(claim) == pytest.approx(expected)
+
+
 def test_command_writes_table_figures_and_page(tmp_path):
     before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
     done = CliRunner().invoke(app, ["reproduce", "--out", str(tmp_path), "--format", "json"])
@@ -125,9 +141,10 @@ def test_command_writes_table_figures_and_page(tmp_path):
     document = json.loads(done.stdout)
     assert document["passed"] is True
     folder = tmp_path / "reproduction"
-    assert {path.stem for path in (folder / "figures").iterdir()} == {view.name for view, _, _ in FIGURES}
+    pictures = {view.name for view, _, _ in FIGURES} | {"sensitivity"}
+    assert {path.stem for path in (folder / "figures").iterdir()} == pictures
     page = (folder / "reproduction.html").read_text()
-    assert page.count("<img") == len(FIGURES)
+    assert page.count("<img") == len(pictures)
     assert page.count("borne out</td>") == len(CLAIMS)
     assert not re.search(r"""(src|href)\s*=\s*["'](?!data:)""", page)
     assert len(page) < 5e6

@@ -45,6 +45,7 @@ def _write_reproduction(docs: Path) -> Iterator[Path]:
     from beaver_ftc.compare.crew import spread
     from beaver_ftc.reproduce.document import document_of, fly_published
     from beaver_ftc.reproduce.figures import write_figures
+    from beaver_ftc.reproduce.margins import write_margins
     from beaver_ftc.reproduce.page import as_markdown
 
     flights = fly_published()
@@ -52,7 +53,8 @@ def _write_reproduction(docs: Path) -> Iterator[Path]:
     path = docs / "reproduction.md"
     path.write_text(as_markdown(document, "images/reproduction"), encoding="utf-8")
     yield path
-    yield from map(lighten, write_figures(flights, docs / "images" / "reproduction"))
+    folder = docs / "images" / "reproduction"
+    yield from map(lighten, [*write_figures(flights, folder), write_margins(document, folder)])
 
 
 def lighten(picture: Path) -> Path:

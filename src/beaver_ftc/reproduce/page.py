@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from html import escape
 from pathlib import Path
 
-from beaver_ftc.reproduce import words
+from beaver_ftc.reproduce import margins, words
 from beaver_ftc.reproduce.figures import FIGURES
 from beaver_ftc.results.metrics import Document
 
@@ -23,6 +23,7 @@ _ABOUT_SENSITIVITY = (
     "Each choice changed, one at a time, all cases flown again, every number measured again: its range, and "
     "under how many of the changes the statement still holds."
 )
+_ABOUT_MARGINS = "How far each number stays from its limit"
 _ABOUT_CHOICES = "What the paper leaves open, in one place (`src/beaver_ftc/reproduce/choices.py`)."
 
 
@@ -34,6 +35,7 @@ def as_markdown(document: Document, figures: str) -> str:
         "## Figures", _ABOUT_FIGURES,
         *(f"![{view.title}]({figures}/{view.name}.png)" for view, _, _ in FIGURES),
         "## What the conclusions hang on", _ABOUT_SENSITIVITY,
+        f"![{_ABOUT_MARGINS}]({figures}/{margins.NAME}.png)",
         _markdown_table(words.SENSITIVITY_HEAD, words.sensitivity_rows(document)),
         *_markdown_exceptions(document), _changes(document),
         "## What the paper leaves open", _ABOUT_CHOICES,
@@ -64,6 +66,7 @@ def write_page(document: Document, figures: Mapping[str, Path], path: Path) -> N
         "<h2>Figures</h2>", _paragraph(_ABOUT_FIGURES), '<div class="figures">',
         *(_picture(view.title, figures[view.name]) for view, _, _ in FIGURES), "</div>",
         "<h2>What the conclusions hang on</h2>", _paragraph(_ABOUT_SENSITIVITY),
+        _picture(_ABOUT_MARGINS, figures[margins.NAME]),
         _html_table(words.SENSITIVITY_HEAD, words.sensitivity_rows(document)),
         _html_exceptions(document), _paragraph(_changes(document)),
         "<h2>What the paper leaves open</h2>", _paragraph(_ABOUT_CHOICES.replace("`", "")),

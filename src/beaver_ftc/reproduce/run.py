@@ -7,6 +7,7 @@ from pathlib import Path
 from beaver_ftc.compare.crew import spread
 from beaver_ftc.reproduce.document import document_of, fly_published
 from beaver_ftc.reproduce.figures import write_figures
+from beaver_ftc.reproduce.margins import write_margins
 from beaver_ftc.reproduce.page import as_markdown, write_page
 from beaver_ftc.results.metrics import Document, as_json
 from beaver_ftc.results.writer import result_folder
@@ -19,7 +20,8 @@ def reproduce(out: Path, workers: int = 2, progress: Callable[[float], None] | N
     with result_folder(out, NAME) as folder:
         flights = fly_published()
         document = document_of(flights, partial(spread, workers=workers, progress=progress))
-        figures = {path.stem: path for path in write_figures(flights, folder / "figures")}
+        drawn = [*write_figures(flights, folder / "figures"), write_margins(document, folder / "figures")]
+        figures = {path.stem: path for path in drawn}
         (folder / f"{NAME}.json").write_text(as_json(document), encoding="utf-8")
         (folder / f"{NAME}.md").write_text(as_markdown(document, "figures"), encoding="utf-8")
         write_page(document, figures, folder / f"{NAME}.html")

@@ -41,7 +41,7 @@ VARIANTS = (
     Variant("altitude 3000 m", {"initial.altitude_m": 3000.0}),
     Variant("references half as fast", _references("sine", times=0.5)),
     Variant("references twice as fast", _references("sine", times=2.0)),
-    Variant("square references", _references("square")),
+    Variant("square references, which jump themselves", _references("square")),
     Variant("uncertainty -, +, -", _couplings(-0.25, 0.25, -0.25)),
     Variant("uncertainty +, +, +", _couplings(0.25, 0.25, 0.25)),
     Variant("no inertia uncertainty", _couplings(0.0, 0.0, 0.0)),

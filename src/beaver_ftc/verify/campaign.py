@@ -13,7 +13,7 @@ import os
 import signal
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from functools import partial
+from functools import cache, partial
 from math import ceil
 from pathlib import Path
 from typing import Any
@@ -80,6 +80,7 @@ def _identity(campaign: Campaign) -> dict[str, Any]:
     }
 
 
+@cache
 def _fingerprint() -> str:
     """Of the package's sources and the aircraft: any change may change a flight."""
     digest = hashlib.sha256()

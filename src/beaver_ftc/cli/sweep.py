@@ -71,6 +71,10 @@ def command(
 
     What has been flown is kept, whatever happens: go on with --resume. With --format json: the summary.
     """
+    if backend is Backend.local and replay is None:
+        from beaver_ftc.sweep.processes import start_early
+
+        start_early()
     from beaver_ftc.sweep.run import Options
 
     options = Options(

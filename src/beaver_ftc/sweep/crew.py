@@ -5,7 +5,6 @@ lost.
 """
 
 import contextlib
-import multiprocessing
 import os
 import signal
 from collections.abc import Iterator, Sequence
@@ -14,12 +13,12 @@ from multiprocessing.connection import Connection, wait
 from typing import Any, NamedTuple, Protocol
 
 from beaver_ftc.errors import SimulationFailed
+from beaver_ftc.sweep import processes
 from beaver_ftc.sweep.flying import Job, fly_all, warm_up
 from beaver_ftc.sweep.sampling import Assignment
 from beaver_ftc.sweep.table import Row
 
 _READY = "ready"
-_ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 
 class Task(NamedTuple):
@@ -66,7 +65,7 @@ class LocalCrew:
 
     def __init__(self, job: Job, workers: int) -> None:
         self._job = job
-        self._context = _context()
+        self._context = processes.context()
         self._workers = [self._hire()]
         wait(
             [self._workers[0].connection]
@@ -98,7 +97,7 @@ class LocalCrew:
     def _hire(self) -> _Worker:
         ours, theirs = self._context.Pipe()
         process = self._context.Process(target=serve, args=(theirs, self._job), daemon=True)
-        with _single_threaded():
+        with processes.single_threaded():
             process.start()
         theirs.close()
         return _Worker(process, ours)
@@ -158,31 +157,3 @@ def silence() -> Iterator[None]:
             os.dup2(copy, stream)
             os.close(copy)
         os.close(nowhere)
-
-
-def _context() -> Any:
-    """Workers fork from a clean process with everything imported; where that cannot be, they start afresh."""
-    if "forkserver" not in multiprocessing.get_all_start_methods():
-        return multiprocessing.get_context("spawn")
-    context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload(["beaver_ftc.sweep.crew", "beaver_ftc.loop", "beaver_ftc.results.metrics"])
-    return context
-
-
-def one_thread_each() -> dict[str, str]:
-    """Environment of a worker: one thread for linear algebra, since the cores are taken by the flights."""
-    return dict.fromkeys(_ONE_THREAD, "1")
-
-
-@contextlib.contextmanager
-def _single_threaded() -> Iterator[None]:
-    before = {name: os.environ.get(name) for name in _ONE_THREAD}
-    os.environ.update(one_thread_each())
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value

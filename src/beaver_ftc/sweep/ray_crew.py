@@ -8,8 +8,9 @@ from typing import Any
 
 from beaver_ftc.errors import BadInput, SimulationFailed
 from beaver_ftc.results.metrics import versions
-from beaver_ftc.sweep.crew import Outcome, Task, one_thread_each, silence
+from beaver_ftc.sweep.crew import Outcome, Task, silence
 from beaver_ftc.sweep.flying import Job, fly_all
+from beaver_ftc.sweep.processes import one_thread_each
 from beaver_ftc.sweep.sampling import Assignment
 from beaver_ftc.sweep.table import Row
 

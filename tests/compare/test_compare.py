@@ -15,7 +15,7 @@ from beaver_ftc.compare.document import better_than_ours, document_of
 from beaver_ftc.compare.flights import CALIBRATION, Case, of_set, of_sweep, set_names
 from beaver_ftc.compare.replay import Trace
 from beaver_ftc.compare.table import as_text
-from beaver_ftc.compare.trial import LAW, ORACLE, SCHEME, Entry, entries_of, fly_case
+from beaver_ftc.compare.trial import LAW, ORACLE, SCHEME, Entry, entries_of, fly_case, with_entry
 from beaver_ftc.compare.tune import DETECTORS, LAWS, alarm_level, candidates
 from beaver_ftc.plugins import plugin_class
 from beaver_ftc.rivals.options import tuned
@@ -117,6 +117,12 @@ def test_a_plug_in_that_fails_spoils_only_its_own_line(sweep):
     assert (fine["flights"], fine["failed"], fine["detection_rate"]) == (3, 0, 1.0)
     assert any("json:JSONDecoder lacks reset and step" in error for error in part["errors"])
     assert as_text(document)
+
+
+def test_options_are_the_named_schemes_alone():
+    named = Scenario(name="n", fdi={"scheme": "augmented-ekf", "options": {"noise": 2.0}})
+    assert with_entry(named, Entry("augmented-ekf", LAW)).fdi.options == {"noise": 2.0}
+    assert with_entry(named, Entry("observer-constant", LAW)).fdi.options == {}
 
 
 def test_a_case_that_cannot_be_flown_is_said():

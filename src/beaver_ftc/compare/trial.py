@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from math import hypot, inf
 from time import process_time
+from typing import Any
 
 from beaver_ftc.compare.flights import Case
 from beaver_ftc.compare.replay import Recording, Trace, record, replay
@@ -63,13 +64,23 @@ def entries_of(schemes: Sequence[str], laws: Sequence[str]) -> list[Entry]:
 
 
 def with_entry(scenario: Scenario, entry: Entry) -> Scenario:
-    """The scenario with this scheme and this law."""
+    """The scenario with this scheme and this law; options are those of the one the scenario names, nobody
+    else's."""
+    fdi: dict[str, Any] = {"scheme": entry.scheme, "options": options_for(scenario, entry.scheme)}
+    control: dict[str, Any] = {"law": entry.law}
+    if entry.law != scenario.control.law:
+        control["options"] = {}
     return scenario.model_copy(
         update={
-            "fdi": scenario.fdi.model_copy(update={"scheme": entry.scheme}),
-            "control": scenario.control.model_copy(update={"law": entry.law}),
+            "fdi": scenario.fdi.model_copy(update=fdi),
+            "control": scenario.control.model_copy(update=control),
         }
     )
+
+
+def options_for(scenario: Scenario, scheme: str) -> dict[str, float]:
+    """The options a scheme flies with in this scenario."""
+    return dict(scenario.fdi.options) if scheme == scenario.fdi.scheme else {}
 
 
 def fly_case(case: Case, entries: Sequence[Entry]) -> Trial:
@@ -89,7 +100,7 @@ def fly_case(case: Case, entries: Sequence[Entry]) -> Trial:
 def _trace(trial: Trial, recording: Recording, scheme: str) -> None:
     """Play the flight to a scheme; what a plug-in fails over is not the end of the comparison."""
     try:
-        trial.traces[scheme] = replay(recording, scheme, trial.case.scenario.fdi.options)
+        trial.traces[scheme] = replay(recording, scheme, options_for(trial.case.scenario, scheme))
     except Exception as error:
         trial.failures.append(f"{scheme}, on a recorded flight: {type(error).__name__}: {error}")
 

@@ -24,6 +24,8 @@ _SOURCES = (
     "design/*.py",
     "diagnosis/*.py",
     "control/*.py",
+    "rivals/*.py",
+    "rivals/*.json",
     "scenario/*.py",
     "sweep/flying.py",
 )

@@ -10,11 +10,15 @@ from beaver_ftc.control.reference_model import discretise
 from beaver_ftc.control.state import LAWS, NOMINAL
 from beaver_ftc.design.coefficients import SURFACES
 from beaver_ftc.design.model import AILERON, ELEVATOR, FLAP, RUDDER
-from beaver_ftc.design.variants import design_of
+from beaver_ftc.design.variants import design_of, mass_of
+from beaver_ftc.diagnosis.admitted import admit, poles_for_noise
 from beaver_ftc.diagnosis.config import FdiConfig, Probing
 from beaver_ftc.diagnosis.fault_class import PARAMETER_SET
-from beaver_ftc.diagnosis.state import INTERVAL, LOSS, NOT_ISOLATED, POSITION, PUBLISHED
+from beaver_ftc.diagnosis.state import INTERVAL, LOSS, MAX_POLES, NOT_ISOLATED, POSITION, PUBLISHED
+from beaver_ftc.errors import BadInput
 from beaver_ftc.frame import FRAME
+from beaver_ftc.plant.instruments import LONGEST_DELAY, SIGNALS
+from beaver_ftc.scenario.actuators import Actuators
 from beaver_ftc.scenario.schema import Scenario
 
 RUNAWAY_RATE_RAD_S = pi / 3.0  # of an actuator with no declared rate limit: the aircraft's default
@@ -69,7 +73,11 @@ def _assemble_sharpening(fdi: np.void, config: FdiConfig, dt: float) -> None:
     sharpen = config.sharpen
     fdi["memory"], fdi["shared"] = sharpen.memory, sharpen.shared_effectiveness
     fdi["membership"], fdi["abrupt"] = sharpen.set_membership, config.fault_profile == "abrupt"
-    poles = (config.detection_pole_per_s, *(config.pole_bank_per_s if sharpen.pole_bank else ()))
+    bank = (
+        *config.pole_bank_per_s,
+        *poles_for_noise(config.bounds.sensors, max(config.bounds.constant_rad_s2.as_tuple())),
+    )
+    poles = (config.detection_pole_per_s, *(bank if sharpen.pole_bank else ()))[:MAX_POLES]
     fdi["n_poles"] = len(poles)
     fdi["bank_decay"][: len(poles)] = [exp(-pole * dt) for pole in poles]
 
@@ -106,6 +114,47 @@ def _assemble_probing(control: np.void, probing: Probing | None, dt: float) -> N
         control["probe_from_s"] = control["probe_to_s"] = -1.0
 
 
+def _assemble_instruments(instruments: np.void, scenario: Scenario, dt: float) -> None:
+    """dt: seconds between samples, which is a JSBSim frame."""
+    instruments["real"] = not scenario.sensors.is_ideal
+    instruments["random"] = scenario.seed
+    for i, name in enumerate(SIGNALS):
+        sensor = getattr(scenario.sensors, name)
+        noise, bias, quantum = sensor.noise_bias_quantum
+        instruments["noise"][i], instruments["bias"][i], instruments["quantum"][i] = noise, bias, quantum
+        instruments["gain"][i], instruments["dropout"][i] = 1.0 + sensor.scale_error, sensor.dropout_share
+        instruments["keep"][i] = exp(-sensor.bandwidth_rad_s * dt) if sensor.bandwidth_rad_s else 0.0
+        instruments["delay"][i] = sensor.delay_s / dt
+        if sensor.delay_s / dt > LONGEST_DELAY:
+            raise BadInput(
+                f"{scenario.name}: sensors.{name}.delay_s is {sensor.delay_s:g} s, "
+                f"allowed: {LONGEST_DELAY} JSBSim frames, {LONGEST_DELAY * dt:g} s here"
+            )
+
+
+def _assemble_actuators(actuators: np.void, given: Actuators, dt: float, travel: np.ndarray) -> None:
+    """dt: s, a JSBSim frame; travel (2, 4) rad."""
+    actuators["real"] = not given.is_ideal
+    actuators["low"], actuators["high"] = travel
+    for s, surface in enumerate(SURFACES):
+        dynamics = getattr(given, surface)
+        bandwidth, rate = dynamics.bandwidth_rad_s, radians(dynamics.rate_limit_deg_s)
+        actuators["approach"][s] = 1.0 - exp(-bandwidth * dt) if bandwidth else 1.0
+        actuators["step"][s] = rate * dt if rate else np.inf
+
+
+def _assemble_admitted(frame: np.void, scenario: Scenario) -> None:
+    """The errors that `fdi.bounds` declares beside the published ones."""
+    admitted = frame["fdi"]["admitted"]
+    coefficient, mass = frame["design"]["coefficient"], mass_of(scenario.design_model)
+    admit(admitted, scenario.fdi.bounds, coefficient, mass)
+    if admitted["any"] and scenario.fdi.fault_class == "all":
+        raise BadInput(
+            f"{scenario.name}: fdi.fault_class: all is not available yet with errors declared in fdi.bounds beyond "
+            "inertia_coupling and constant_rad_s2, allowed: published"
+        )
+
+
 def assemble(scenario: Scenario, trim: np.ndarray, travel: np.ndarray) -> np.ndarray:
     """The frame record, shape (1,), of a flight about to start.
 
@@ -119,9 +168,13 @@ def assemble(scenario: Scenario, trim: np.ndarray, travel: np.ndarray) -> np.nda
     frame["share"] = 1.0 / scenario.substeps
     frame["design"] = design_of(scenario.design_model)[0]
     frame["factor"] = [factor for _, _, factor in ch.TRUTH]
-    frame["u"] = trim
+    frame["u"] = frame["commanded"] = trim
+    jsbsim_dt = dt / scenario.substeps
+    _assemble_instruments(frame["instruments"], scenario, jsbsim_dt)
+    _assemble_actuators(frame["actuators"], scenario.actuators, jsbsim_dt, travel)
     _assemble_diagnosis(frame["fdi"], scenario.fdi, dt, travel)
     _assemble_types(frame["fdi"], scenario, dt, travel)
+    _assemble_admitted(frame, scenario)
     _assemble_sharpening(frame["fdi"], scenario.fdi, dt)
     _assemble_network(frame["fdi"]["network"], scenario.control)
     _assemble_control(frame["control"], scenario.control, dt, trim, travel)

@@ -30,6 +30,7 @@ _SOURCES = (
     "diagnosis/*.py",
     "control/*.py",
     "plant/native.py",
+    "plant/instruments.py",
     "channels.py",
     "compiled.py",
     "frame.py",

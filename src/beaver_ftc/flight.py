@@ -1,7 +1,7 @@
 """What a flight yields, and where its log goes."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
@@ -30,7 +30,8 @@ class Flight:
     (`candidates`). estimate: the isolated fault's parameter, theta in [-1, 0] for a loss of effectiveness.
     guaranteed_delay_s: from the fault to the instant from which detection was certain, None if that never
     came. worst_residual_ratio: largest |residual| / threshold in healthy flight; closest_approach: the same
-    of each filter of the bank, the published one first.
+    of each filter of the bank, the published one first. surface_travel_rad: path of each surface, up and
+    down added.
     """
 
     scenario: Scenario
@@ -52,6 +53,7 @@ class Flight:
     saturation_s: dict[str, float]
     worst_residual_ratio: float
     closest_approach: tuple[float, ...] = ()
+    surface_travel_rad: dict[str, float] = field(default_factory=dict)
     type_time_s: float | None = None
     estimate_interval: tuple[float, float] | None = None
     frequency_rad_s: float | None = None

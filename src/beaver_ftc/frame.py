@@ -13,11 +13,14 @@ from beaver_ftc import channels as ch
 from beaver_ftc.compiled import kernel
 from beaver_ftc.control import adaptive, allocation, authority, nominal, probing, reference_model
 from beaver_ftc.control.state import CONTROL, NOMINAL, ORACLE
+from beaver_ftc.design.actuators import ACTUATORS, move
 from beaver_ftc.design.model import ALPHA, BETA, DESIGN, ELEVATOR, QDYN
 from beaver_ftc.design.variants import response
 from beaver_ftc.diagnosis import bank, detection, fault_types, guarantee, isolation, network
+from beaver_ftc.diagnosis.derived import changing_error, derived_bound
 from beaver_ftc.diagnosis.state import DIAGNOSIS, NOT_ISOLATED
 from beaver_ftc.diagnosis.thresholds import uncertainty_bound
+from beaver_ftc.plant.instruments import INSTRUMENTS, N_SIGNALS, read_all
 from beaver_ftc.plant.native import read_nodes, write_nodes
 from beaver_ftc.supervisor import (
     MODE_ADAPTIVE,
@@ -38,6 +41,7 @@ DOMINANT_AXIS = (0, 1, 2, 1)  # what a surface is there for: aileron p, elevator
 FRAME = np.dtype(
     [
         ("design", DESIGN), ("fdi", DIAGNOSIS), ("control", CONTROL),
+        ("instruments", INSTRUMENTS), ("actuators", ACTUATORS),
         ("k", "i8"), ("row", "i8"), ("dt", "f8"), ("t", "f8"), ("share", "f8"),
         # the truth's nodes
         ("native", "i8"), ("getter", "i8"), ("setter", "i8"),
@@ -47,7 +51,9 @@ FRAME = np.dtype(
         # the truth's faults, for the oracle and for the analyst
         ("faulted", "i8"), ("fault_at_s", "f8"), ("immovable", "i8", (4,)), ("Cm_alpha3", "f8"), ("phi", "f8", (3,)),
         # what is measured and believed
-        ("x", "f8", (3,)), ("y", "f8", (5,)), ("u", "f8", (4,)),
+        ("seen", "f8", (N_SIGNALS,)), ("x", "f8", (3,)), ("y", "f8", (5,)), ("u", "f8", (4,)),
+        ("u_then", "f8", (4,)),
+        ("commanded", "f8", (4,)),  # u is where the healthy surfaces are under it, u_then where they were
         ("f", "f8", (3,)), ("G", "f8", (3, 4)), ("G_believed", "f8", (3, 4)),
         # the frame before, and means over the frame that elapsed since
         ("x_then", "f8", (3,)), ("f_sum", "f8", (3,)), ("G_sum", "f8", (3, 4)), ("Gu_sum", "f8", (3, 4)),
@@ -61,7 +67,7 @@ FRAME = np.dtype(
         ("mode_at_s", "f8", (MAX_EVENTS,)), ("mode_is", "i8", (MAX_EVENTS,)),
         ("pre_fault_square", "f8", (3,)), ("pre_fault_frames", "i8"),
         ("post_fault_square", "f8", (3,)), ("post_fault_frames", "i8"),
-        ("saturated_frames", "i8", (4,)),
+        ("saturated_frames", "i8", (4,)), ("travelled", "f8", (4,)), ("position_then", "f8", (4,)),
         ("demanded", "f8", (3,)), ("lacking", "f8", (3,)), ("beyond_frames", "i8", (3,)),
         ("outside", "i8"), ("n_exits", "i8"),
         ("exit_at_s", "f8", (MAX_EVENTS,)), ("return_at_s", "f8", (MAX_EVENTS,)),
@@ -79,14 +85,19 @@ def measure(frame):
         read_nodes(frame.getter, frame.read_pointers, truth)
     for i in range(ch.N_TRUTH):
         truth[i] *= frame.factor[i]
+    seen = frame.seen
+    for i in range(N_SIGNALS):
+        seen[i] = truth[i]
+    if frame.instruments.real:
+        read_all(frame.instruments, seen)
     for i in range(3):
-        frame.x[i] = truth[i]
+        frame.x[i] = seen[i]
     y = frame.y
     y[0], y[1], y[2], y[3], y[4] = (
-        truth[ch.ALPHA],
-        truth[ch.BETA],
-        truth[ch.AIRSPEED],
-        truth[ch.QDYN],
+        seen[ch.ALPHA],
+        seen[ch.BETA],
+        seen[ch.AIRSPEED],
+        seen[ch.QDYN],
         truth[ch.DPT],
     )
 
@@ -207,6 +218,7 @@ def believe_offsets(frame):
 def remember(frame):
     """Begin the next frame's sums with this instant, the command in effect still the old one."""
     frame.x_then[:] = frame.x
+    frame.fdi.noise_then[:] = frame.fdi.noise
     frame.f_sum[:], frame.eta_bar_sum[:], frame.phi_sum[:] = 0.0, 0.0, 0.0
     frame.G_sum[:], frame.Gu_sum[:] = 0.0, 0.0
     sum_up(frame)
@@ -217,7 +229,12 @@ def remember(frame):
 def bound_now(frame):
     """The bound on the uncertainty at this instant."""
     fdi = frame.fdi
-    uncertainty_bound(frame.x, frame.design, fdi.inertia, fdi.constant, fdi.earth_rate, fdi.eta_bar_now)
+    x = frame.x
+    fdi.eta_bar_now[:] = 0.0
+    if fdi.admitted.any:
+        derived_bound(fdi.admitted, frame.design, x, frame.y, frame.u, fdi.eta_bar_now)
+        x = fdi.admitted.far_x
+    uncertainty_bound(x, frame.design, fdi.inertia, fdi.constant, fdi.earth_rate, fdi.eta_bar_now)
 
 
 @kernel
@@ -231,10 +248,16 @@ def diagnose(frame):
 @kernel
 def look_back(frame):
     """What the design model makes of the frame that has elapsed: its bound and its means."""
+    fdi = frame.fdi
     bound_now(frame)
-    frame.fdi.eta_bar[:] = frame.fdi.eta_bar_now
+    fdi.eta_bar[:] = fdi.eta_bar_now
+    if fdi.admitted.any:
+        for i in range(3):
+            fdi.noise[i] = changing_error(fdi.admitted, i, frame.x[i])
     if frame.k > 0:
         elapse(frame)
+    else:
+        detection.begin(fdi, frame.x)
 
 
 @kernel
@@ -246,7 +269,6 @@ def conclude(frame):
             predict(frame)
         else:
             bank.align(fdi, frame.G)
-            fdi.xhat[:] = x  # no residual to begin with
         guarantee.judge(fdi, t)
         decide(fdi, frame.y, x, t)
 
@@ -411,11 +433,12 @@ def command(frame, reference):
 
 @kernel
 def account(frame):
-    """Sums for the metrics: tracking error before and after the fault, saturation, envelope exits."""
+    """Sums for the metrics: tracking error before and after the fault, saturation, surface travel,
+    envelope exits."""
     control = frame.control
     after = frame.faulted
     for i in range(3):
-        square = (control.model_rate[i] - frame.x[i]) ** 2
+        square = (control.model_rate[i] - frame.truth[i]) ** 2
         if after:
             frame.post_fault_square[i] += square
         else:
@@ -428,6 +451,9 @@ def account(frame):
         bank.note_closest_approach(frame.fdi)
     for s in range(4):
         frame.saturated_frames[s] += control.saturated[s]
+        if frame.k > 0:
+            frame.travelled[s] += abs(frame.truth[ch.POS + s] - frame.position_then[s])
+        frame.position_then[s] = frame.truth[ch.POS + s]
     note_envelope(frame)
 
 
@@ -484,7 +510,7 @@ def record_truth(frame, row):
 def record_surfaces(frame, row, column):
     """Command in effect, position and effective deflection of each surface; then who was saturated."""
     for s in range(4):
-        row[column] = frame.u[s]
+        row[column] = frame.commanded[s]
         row[column + 1] = frame.truth[ch.POS + s]
         row[column + 2] = frame.truth[ch.EFFECTIVE + s]
         column += 3
@@ -552,9 +578,11 @@ def finish(frame, reference, row):
     reference_model.follow(frame.control, reference)
     authority.govern(frame.control, reference)
     for s in range(4):
-        frame.u[s] = frame.control.command[s]
+        frame.commanded[s] = frame.control.command[s]
+    frame.u_then[:] = frame.u
+    move(frame.actuators, frame.commanded, frame.u)
     if frame.native:
-        write_nodes(frame.setter, frame.write_pointers, frame.u)
+        write_nodes(frame.setter, frame.write_pointers, frame.commanded)
     frame.k += 1
     frame.row += 1
 
@@ -569,6 +597,7 @@ def look(frames):
     if sense(frame) != NOT_FINITE:
         bound_now(frame)
         sum_up(frame)
+    move(frame.actuators, frame.commanded, frame.u)
 
 
 @kernel

@@ -106,8 +106,7 @@ class BeaverEnv(gymnasium.Env):
         loop = self._loop
         if loop is None:
             raise gymnasium.error.ResetNeeded("call reset() before step()")
-        loop.frames["u"][0] = self._pilot.deflect(np.asarray(action, dtype=float))
-        loop.cockpit.write()
+        loop.command_instead(self._pilot.deflect(np.asarray(action, dtype=float)))
         departed = loop.fly_chunk(self._k, 1) != FLYING
         self._k += 1
         over = self._k >= loop.n_frames and not departed

@@ -10,6 +10,7 @@ import numpy as np
 from beaver_ftc import channels as ch
 from beaver_ftc.assembly import assemble, estimator_names
 from beaver_ftc.compiled import direct
+from beaver_ftc.design.actuators import move
 from beaver_ftc.design.coefficients import SURFACES
 from beaver_ftc.design.variants import anchor
 from beaver_ftc.errors import SimulationFailed
@@ -18,8 +19,9 @@ from beaver_ftc.frame import FLYING, NOT_FINITE, fly_frame, look
 from beaver_ftc.outcome import flight_of
 from beaver_ftc.plant import native
 from beaver_ftc.plant.adapter import Plant
-from beaver_ftc.plant.configure import configure, trim_of
+from beaver_ftc.plant.configure import configure, take_off, trim_of
 from beaver_ftc.plant.faults import FaultSchedule
+from beaver_ftc.plant.gust import GustSchedule
 from beaver_ftc.plugins import DETECTORS, LAWS, is_compiled
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.signals import sample
@@ -54,7 +56,7 @@ class Cockpit:
 
     def write(self) -> None:
         """Hand the command over, through Python."""
-        self._write.write(self._frames["u"][0])
+        self._write.write(self._frames["commanded"][0])
 
 
 class Loop:
@@ -73,12 +75,13 @@ class Loop:
         self.trim = trim_of(scenario, self.plant)
         if prepare is not None:
             prepare(self.plant)
-        self.plant.start(self.trim)
+        take_off(self.plant, scenario, self.trim)
         surfaces = np.array([getattr(self.trim, f"{s}_rad") for s in SURFACES])
         self.frames = assemble(scenario, surfaces, travel_rad(self.plant))
         self.cockpit = Cockpit(self.plant, self.frames)
         self._anchor_design(surfaces)
         self.schedule = FaultSchedule(scenario.faults, self.plant, scenario.rate_hz)
+        self.gust = GustSchedule(scenario.environment.gust, self.plant, scenario.rate_hz)
         self.n_frames = round(scenario.duration_s * scenario.rate_hz)
         self.plugged = self._plugged(detector, law)
         self.columns = ch.log_columns(estimator_names(scenario.fdi.fault_class) if self._diagnoses_itself else ())
@@ -124,6 +127,13 @@ class Loop:
         verdict = self.plugged.verdict if self.plugged and self.plugged.detector else None
         return flight_of(self.scenario, self.frames[0], self.columns, verdict)
 
+    def command_instead(self, deflections: np.ndarray) -> None:
+        """Replace the command (4,) rad of the frame just flown, before anything has moved."""
+        frame = self.frames[0]
+        frame["commanded"], frame["u"] = deflections, frame["u_then"]
+        move(frame["actuators"], frame["commanded"], frame["u"])
+        self.cockpit.write()
+
     def chunks(self) -> Iterable[np.ndarray]:
         """Fly; yield the log a chunk at a time, rows (n, columns). The array is reused."""
         for start in range(0, self.n_frames, CHUNK_ROWS):
@@ -146,8 +156,9 @@ class Loop:
         k, end = start, start + rows
         while k < end:
             self.schedule.apply(k)
+            self.gust.apply(k)
             self._tell_analyst(k)
-            stop = min(self.schedule.next_change(k), end)
+            stop = min(self.schedule.next_change(k), self.gust.next_change(k), end)
             status = self._fly_segment(k, stop)
             if status != FLYING:
                 return status

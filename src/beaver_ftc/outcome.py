@@ -143,5 +143,6 @@ def flight_of(
         closest_approach=closest,
         authority=_authority(frame),
         probing_s=_probing_s(frame),
+        surface_travel_rad={s: float(x) for s, x in zip(SURFACES, frame["travelled"], strict=True)},
         **(_isolation(fdi) if verdict is None else _told(fdi, verdict)),
     )

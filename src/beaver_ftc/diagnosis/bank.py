@@ -13,7 +13,7 @@ measurement errors are.
 import numpy as np
 
 from beaver_ftc.compiled import kernel
-from beaver_ftc.diagnosis.thresholds import bound_step
+from beaver_ftc.diagnosis.thresholds import bound_step, noise_step
 
 
 @kernel
@@ -41,10 +41,13 @@ def innovate(fdi, x, x_then, believed):
     """
     for i in range(3):
         fdi.innovation[i] = (x[i] - x_then[i]) / fdi.dt - believed[i]
+        fdi.frame_bound[i] = fdi.eta_bar[i] + (fdi.noise[i] + fdi.noise_then[i]) / fdi.dt
         for m in range(fdi.n_poles):
             a = fdi.bank_decay[m]
             fdi.bank_residual[m, i] = a * fdi.bank_residual[m, i] + fdi.dt * fdi.innovation[i]
-            fdi.bank_threshold[m, i] = bound_step(fdi.bank_threshold[m, i], fdi.eta_bar[i], a, fdi.dt)
+            fdi.bank_eta[m, i] = bound_step(fdi.bank_eta[m, i], fdi.eta_bar[i], a, fdi.dt)
+            fdi.bank_noise[m, i] = noise_step(fdi.bank_noise[m, i], fdi.noise_then[i], a)
+            fdi.bank_threshold[m, i] = fdi.bank_eta[m, i] + fdi.bank_noise[m, i] + fdi.noise[i]
 
 
 @kernel

@@ -2,11 +2,16 @@
 
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, Strict, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, Strict, field_validator, model_validator
 
+from beaver_ftc.design.coefficients import TERMS
 from beaver_ftc.diagnosis.state import DEADBEAT_PER_S, MAX_POLES
+from beaver_ftc.scenario.base import refuse, suggestion
+from beaver_ftc.scenario.sensors import Sensors
 
 Bound = Annotated[float, Field(ge=0, le=100)]
+Share = Annotated[float, Field(ge=0, le=0.9)]
+Deflection = Annotated[float, Field(ge=0, le=30)]
 Pole = Annotated[float, Field(gt=0, le=DEADBEAT_PER_S)]
 
 
@@ -26,7 +31,6 @@ class PerAxis(BaseModel):
 
 def _known_scheme(name: str) -> str:
     from beaver_ftc.plugins import DETECTORS, refusal
-    from beaver_ftc.scenario.base import refuse
 
     wrong = refusal(DETECTORS, name)
     refuse([((), wrong)] if wrong else [])
@@ -44,6 +48,36 @@ class Bounds(BaseModel):
     constant_rad_s2: PerAxis = Field(
         PerAxis(p=0.02, q=0.02, r=0.02), description="unstructured angular acceleration, rad/s2: as published"
     )
+    coefficients: Share | dict[str, Share] = Field(
+        0.0, description="tolerance of the moment coefficients as a share: of all, or by name"
+    )
+    inertia: Share = Field(0.0, description="tolerance of Ix, Iy, Iz and Jxz as a share of each")
+    sensors: Sensors = Field(
+        default_factory=Sensors,
+        description="measurement errors, as those of the truth: a preset, or noise, bias, resolution, slope "
+        "by signal",
+    )
+    deflection_deg: Deflection = Field(
+        0.0, description="how far a surface may be from its actuator's model, deg"
+    )
+    turbulence: Literal["none", "light", "moderate", "severe"] = Field(
+        "none", description="rotation of the air, which no instrument sees: Dryden, above 2000 ft"
+    )
+
+    @field_validator("coefficients")
+    @classmethod
+    def _known_terms(cls, given: float | dict[str, float]) -> float | dict[str, float]:
+        known = sorted(name for name in TERMS if name[:2] in ("Cl", "Cm", "Cn"))
+        unknown = [name for name in given if name not in known] if isinstance(given, dict) else []
+        refuse([((name,), f"unknown moment coefficient{suggestion(name, known)}") for name in unknown])
+        return given
+
+    @field_validator("sensors")
+    @classmethod
+    def _can_be_bounded(cls, given: Sensors) -> Sensors:
+        loose = [name for name, sensor in given if not sensor.is_bounded]
+        refuse([((name,), "a lag, a delay or a lost sample has no bound, allowed: 0") for name in loose])
+        return given
 
 
 class Probing(BaseModel):

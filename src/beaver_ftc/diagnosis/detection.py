@@ -8,8 +8,18 @@ the discrete truth: xhat0[k+1] = x[k] + dt F[k] + exp(-Lambda0 dt) (xhat0[k] - x
 
 from beaver_ftc.compiled import kernel
 from beaver_ftc.diagnosis import bank
-from beaver_ftc.diagnosis.network import learn
-from beaver_ftc.diagnosis.thresholds import bound_step
+from beaver_ftc.diagnosis.network import dead_zone, learn
+from beaver_ftc.diagnosis.thresholds import bound_step, noise_step
+
+
+@kernel
+def begin(fdi, x):
+    """Start at the first measurement x (3,) rad/s: no residual, and all of the gyro's error still to come."""
+    for i in range(3):
+        fdi.xhat[i] = x[i]
+        fdi.threshold_noise[i] = fdi.noise[i]
+        for m in range(fdi.n_poles):
+            fdi.bank_noise[m, i] = fdi.noise[i]
 
 
 @kernel
@@ -35,7 +45,9 @@ def predict(fdi, x, believed, leaking):
     for i in range(3):
         rate = believed[i] + fdi.network.output[i]
         fdi.xhat[i] = x[i] + fdi.dt * rate + fdi.decay[i] * (fdi.xhat[i] - x[i])
-        fdi.threshold[i] = bound_step(fdi.threshold[i], fdi.eta_bar[i], fdi.decay[i], fdi.dt)
+        fdi.threshold_eta[i] = bound_step(fdi.threshold_eta[i], fdi.eta_bar[i], fdi.decay[i], fdi.dt)
+        fdi.threshold_noise[i] = noise_step(fdi.threshold_noise[i], fdi.noise_then[i], fdi.decay[i])
+        fdi.threshold[i] = fdi.threshold_eta[i] + fdi.threshold_noise[i] + fdi.noise[i]
 
 
 @kernel
@@ -43,7 +55,9 @@ def unknown_acceleration(fdi, out):
     """Fill out (3,) rad/s2 with what the FDAE believes beyond the model: learnt, and about to be learnt.
 
     The residual settles at (phi - fhat) / Lambda0, so Lambda0 eps0 is the part of the fault not yet in the
-    weights, at the bandwidth of the estimator.
+    weights, at the bandwidth of the estimator. What the gyro's noise alone explains stays out of it, and off
+    the surfaces.
     """
     for i in range(3):
-        out[i] = fdi.network.output[i] + fdi.pole[i] * fdi.residual[i]
+        noise = fdi.threshold_noise[i] + fdi.noise[i]
+        out[i] = fdi.network.output[i] + fdi.pole[i] * dead_zone(fdi.residual[i], noise)

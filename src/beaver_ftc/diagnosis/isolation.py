@@ -15,7 +15,7 @@ from beaver_ftc.compiled import kernel
 from beaver_ftc.diagnosis import bank, fault_types, membership
 from beaver_ftc.diagnosis.fault_class import hypothesis
 from beaver_ftc.diagnosis.state import INTERVAL, LOSS, NOT_ISOLATED, POSITION, UNANTICIPATED
-from beaver_ftc.diagnosis.thresholds import bound_step, interval, published
+from beaver_ftc.diagnosis.thresholds import bound_step, interval, noise_step, published
 
 
 @kernel
@@ -47,6 +47,7 @@ def start(fdi, x):
         fie = fdi.estimator[s]
         for i in range(3):
             fie.xhat[i] = x[i]
+            fie.bound_noise[i] = fdi.noise[i]
             fie.covariance[i] = (fie.high - fie.low) ** 2 / 12.0  # of a uniform distribution
             fie.theta_low[i], fie.theta_high[i] = fie.low, fie.high
     if fdi.every_type:
@@ -165,7 +166,9 @@ def predict(fdi, fie, x, believed):
         Z, a = fie.Z[i], fdi.fie_decay[i]
         fie.rise[i] = a * fie.rise[i] + dt * max(Z, 0.0)
         fie.fall[i] = a * fie.fall[i] + dt * min(Z, 0.0)
-        fie.bound[i] = bound_step(fie.bound[i], fdi.eta_bar[i] + fie.spread[i], a, dt)
+        fie.bound_eta[i] = bound_step(fie.bound_eta[i], fdi.eta_bar[i] + fie.spread[i], a, dt)
+        fie.bound_noise[i] = noise_step(fie.bound_noise[i], fdi.noise_then[i], a)
+        fie.bound[i] = fie.bound_eta[i] + fie.bound_noise[i] + fdi.noise[i]
 
 
 @kernel

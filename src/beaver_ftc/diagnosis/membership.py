@@ -17,7 +17,7 @@ def healthy(fdi):
     """Whether the admitted uncertainty alone explains the elapsed frame."""
     within = True
     for i in range(3):
-        within = within and abs(fdi.innovation[i]) <= fdi.eta_bar[i]
+        within = within and abs(fdi.innovation[i]) <= fdi.frame_bound[i]
     return within
 
 
@@ -34,7 +34,7 @@ def solve(value, bound, slope, low, high):
 def agreeing(fdi, fie, i):
     """The interval of theta that agrees with the elapsed frame on axis i."""
     return solve(
-        fdi.innovation[i] - fie.offset[i], fdi.eta_bar[i] + fie.spread[i], fie.Z[i], fie.low, fie.high
+        fdi.innovation[i] - fie.offset[i], fdi.frame_bound[i] + fie.spread[i], fie.Z[i], fie.low, fie.high
     )
 
 

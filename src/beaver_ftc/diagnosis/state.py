@@ -29,6 +29,7 @@ ESTIMATOR = np.dtype(
         ("excluded", "i8"), ("excluded_at_s", "f8"),
         ("xhat", "f8", (3,)), ("residual", "f8", (3,)), ("lower", "f8", (3,)), ("upper", "f8", (3,)),
         ("omega", "f8", (3,)), ("rise", "f8", (3,)), ("fall", "f8", (3,)), ("bound", "f8", (3,)),
+        ("bound_eta", "f8", (3,)), ("bound_noise", "f8", (3,)),
         ("theta", "f8", (3,)), ("covariance", "f8", (3,)),
         ("offset", "f8", (3,)), ("Z", "f8", (3,)), ("spread", "f8", (3,)),
         # what bank.py and membership.py keep
@@ -53,13 +54,35 @@ SURFACE = np.dtype(
     align=True,
 )  # fmt: skip
 
+# What else than the published bound is admitted: see derived.py.
+ADMITTED = np.dtype(
+    [
+        ("any", "i8"),
+        ("tolerance", "f8", (3, 9)),  # of each moment coefficient, as design.model.TERMS
+        ("inertia", "f8", (12,)),  # of each inertia coefficient, in the order of design.coefficients
+        ("offset", "f8", (7,)), ("slope", "f8", (7,)),  # error of a signal: offset + slope |signal|
+        ("steady", "f8", (3,)),  # of the offset of a gyro, what does not change
+        ("gust", "f8", (3,)), ("deflection", "f8"),
+        # scratch: magnitudes as measured, and the furthest they can be from there
+        ("near_x", "f8", (3,)), ("near_y", "f8", (5,)), ("near_u", "f8", (4,)),
+        ("far_x", "f8", (3,)), ("far_y", "f8", (5,)), ("far_u", "f8", (4,)), ("far_aero", "f8", (3,)),
+        ("near", "f8", (3, 9)), ("far", "f8", (3, 9)),
+        ("moment", "f8", (3,)), ("slack", "f8", (3,)),
+    ],
+    align=True,
+)  # fmt: skip
+
 DIAGNOSIS = np.dtype(
     [
         ("enabled", "i8"), ("thresholds", "i8"), ("dt", "f8"), ("forgetting", "f8"),
         ("pole", "f8", (3,)), ("decay", "f8", (3,)), ("fie_decay", "f8", (3,)),
         ("inertia", "f8", (3,)), ("constant", "f8", (3,)), ("earth_rate", "f8"),
         ("eta_bar", "f8", (3,)), ("eta_bar_now", "f8", (3,)),  # over the elapsed frame, and at this instant
+        ("admitted", ADMITTED),
+        ("noise", "f8", (3,)), ("noise_then", "f8", (3,)),  # bound on what a gyro's error changes by
+        ("frame_bound", "f8", (3,)),  # rad/s2, on the innovation of one frame: eta_bar and noise
         ("xhat", "f8", (3,)), ("residual", "f8", (3,)), ("threshold", "f8", (3,)),
+        ("threshold_eta", "f8", (3,)), ("threshold_noise", "f8", (3,)),
         ("detected", "i8"), ("detected_at_s", "f8"), ("detected_axis", "i8"),
         ("isolated", "i8"), ("isolated_at_s", "f8"),
         ("n_estimators", "i8"), ("estimator", ESTIMATOR, (MAX_ESTIMATORS,)),
@@ -69,6 +92,7 @@ DIAGNOSIS = np.dtype(
         ("memory", "i8"), ("shared", "i8"), ("membership", "i8"), ("abrupt", "i8"),
         ("n_poles", "i8"), ("bank_decay", "f8", (MAX_POLES,)), ("innovation", "f8", (3,)),
         ("bank_residual", "f8", (MAX_POLES, 3)), ("bank_threshold", "f8", (MAX_POLES, 3)),
+        ("bank_eta", "f8", (MAX_POLES, 3)), ("bank_noise", "f8", (MAX_POLES, 3)),
         # faults of every type: fault_types.py
         ("every_type", "i8"), ("whole", "i8"), ("surface", SURFACE, (4,)),
         ("frame", "i8"), ("wrong", "i8"), ("wrong_then", "i8"), ("wrong_before", "i8"),

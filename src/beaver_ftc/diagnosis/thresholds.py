@@ -22,6 +22,15 @@ def bound_step(bound, eta_bar, decay, dt):
 
 
 @kernel
+def noise_step(noise, nbar, decay):
+    """Advance the filtered bound on a gyro's changing error, rad/s, by one frame; nbar as the frame began.
+
+    See derived.py: what a residual may owe to the gyro is this and the present nbar.
+    """
+    return decay * noise + (1.0 - decay) * nbar
+
+
+@kernel
 def interval(low, high, rise, fall, omega, theta, bound):
     """The signed interval (lower, upper), rad/s, that holds the residual of the true estimator.
 
@@ -46,7 +55,7 @@ def published(low, high, omega, theta, bound):
 
 @kernel
 def uncertainty_bound(x, design, inertia, constant, earth_rate, eta_bar):
-    """Fill eta_bar (3,) rad/s2: the published bound, and what the Earth's rotation adds.
+    """Add to eta_bar (3,) rad/s2 the published bound, and what the Earth's rotation adds.
 
     Published: inertia_i |cross term_i| + constant_i [Zhang2005, sec. VII]. JSBSim integrates rates against
     inertial space and reports them against the Earth: the difference turns with the body, at no more than
@@ -55,6 +64,6 @@ def uncertainty_bound(x, design, inertia, constant, earth_rate, eta_bar):
     """
     p, q, r = x[0], x[1], x[2]
     earth = earth_rate * (2.0 * (abs(p) + abs(q) + abs(r)) + earth_rate) + ROUNDING_RAD_S2
-    eta_bar[0] = inertia[0] * abs(design.Pqr * q * r) + constant[0] + earth
-    eta_bar[1] = inertia[1] * abs(design.Qpr * p * r) + constant[1] + earth
-    eta_bar[2] = inertia[2] * abs(design.Rpq * p * q) + constant[2] + earth
+    eta_bar[0] += inertia[0] * abs(design.Pqr * q * r) + constant[0] + earth
+    eta_bar[1] += inertia[1] * abs(design.Qpr * p * r) + constant[1] + earth
+    eta_bar[2] += inertia[2] * abs(design.Rpq * p * q) + constant[2] + earth

@@ -1,9 +1,11 @@
 """The one place that talks to JSBSim: a silent executive with the Beaver loaded, its properties by name."""
 
+from collections.abc import Sequence
 from math import cos, sin
 from pathlib import Path
 
 import jsbsim
+import numpy as np
 
 from beaver_ftc.design.coefficients import SURFACES
 from beaver_ftc.errors import SimulationFailed
@@ -98,10 +100,11 @@ class Plant:
         """Set a property, in the unit its name says."""
         self.node(name).set_double_value(value)
 
-    def start(self, state: FlightState) -> None:
+    def start(self, state: FlightState, wind_mps: Sequence[float] = (0.0, 0.0, 0.0)) -> None:
         """Put the aircraft into a state at time 0: surfaces and engine in place, accelerations the state's.
 
         Surfaces are commanded through `fcs/<s>-cmd-rad`; failures and uncertainties stay as they are set.
+        wind_mps: steady wind towards north, east, down; the state is that relative to the air.
         """
         self._command(state)
         self._place(state)
@@ -109,6 +112,20 @@ class Plant:
         self._initialise()
         self.settle()
         self._initialise()  # again, so that the integrator's past derivatives are the settled ones too
+        if any(wind_mps):
+            self._drift(state, wind_mps)
+
+    def _drift(self, state: FlightState, wind_mps: Sequence[float]) -> None:
+        """Let the air, and the aircraft with it, move over the ground; initialising makes JSBSim forget a
+        wind."""
+        ground = body_axes(state) @ np.asarray(wind_mps)
+        for axis, speed in zip("uvw", ground, strict=True):
+            name = f"ic/{axis}-fps"
+            self.write(name, self.read(name) + speed * FT_PER_M)
+        self._initialise()
+        for axis, speed in zip(("north", "east", "down"), wind_mps, strict=True):
+            self.write(f"atmosphere/wind-{axis}-fps", speed * FT_PER_M)
+        self.settle()
 
     def _initialise(self) -> None:
         if not self.fdm.run_ic():
@@ -146,3 +163,14 @@ class Plant:
         }
         for name, value in initial.items():
             self.write(f"ic/{name}", value)
+
+
+def body_axes(state: FlightState) -> np.ndarray:
+    """Rotation (3, 3) from north-east-down to body axes, by yaw, pitch, roll."""
+    (sphi, cphi), (sth, cth), (spsi, cpsi) = (
+        (sin(angle), cos(angle)) for angle in (state.phi_rad, state.theta_rad, state.psi_rad)
+    )
+    roll = np.array([[1, 0, 0], [0, cphi, sphi], [0, -sphi, cphi]])
+    pitch = np.array([[cth, 0, -sth], [0, 1, 0], [sth, 0, cth]])
+    yaw = np.array([[cpsi, spsi, 0], [-spsi, cpsi, 0], [0, 0, 1]])
+    return roll @ pitch @ yaw

@@ -2,30 +2,26 @@
 
 from math import radians
 
-from beaver_ftc.design.coefficients import SURFACES
-from beaver_ftc.errors import BadInput
-from beaver_ftc.plant.adapter import Plant
+from beaver_ftc.design.coefficients import MASS, SURFACES
+from beaver_ftc.plant.adapter import FT_PER_M, Plant
 from beaver_ftc.plant.trim import TrimPoint, trim
 from beaver_ftc.scenario.schema import Scenario
 
 _AXES = ("p", "q", "r")
+LB_PER_KG, IN_PER_M = 1.0 / 0.45359237, 12.0 * FT_PER_M
+
+# JSBSim's Dryden turbulence in Tustin's form, whose spectrum does not depend on the frame. Curve of equal
+# probability of exceedence, and wind at 20 ft for what is below 2000 ft (15, 30, 45 kt) [MIL-F-8785C, 3.7].
+TUSTIN = 4
+EXCEEDENCE = {"light": 3, "moderate": 4, "severe": 6}
+WIND_AT_20_FT = {"light": 25.3, "moderate": 50.6, "severe": 76.0}  # ft/s
 
 
 def configure(plant: Plant, scenario: Scenario) -> None:
-    """Declare the scenario's truth; failures come later, in flight."""
-    _refuse_what_is_missing(scenario)
+    """Declare the scenario's truth; failures come later, in flight, and the air at take-off."""
     _uncertainty(plant, scenario)
+    _mass(plant, scenario)
     _actuators(plant, scenario)
-
-
-def _refuse_what_is_missing(scenario: Scenario) -> None:
-    """Nothing in a scenario is silently skipped: what the truth cannot do yet is refused by name."""
-    if not scenario.sensors.is_ideal:
-        raise BadInput(f"{scenario.name}: sensors: measurement errors are not available yet, allowed: ideal")
-    if scenario.environment.turbulence != "none" or any(scenario.environment.wind_mps):
-        raise BadInput(
-            f"{scenario.name}: environment: wind and turbulence are not available yet, allowed: still air"
-        )
 
 
 def _uncertainty(plant: Plant, scenario: Scenario) -> None:
@@ -37,6 +33,35 @@ def _uncertainty(plant: Plant, scenario: Scenario) -> None:
         plant.write(f"uncertainty/sinusoid/{axis}-frequency-rad_sec", sinusoid.frequency_rad_s)
     for name, ratio in uncertainty.coefficients.items():
         plant.write(f"uncertainty/{name}-scale", ratio)
+
+
+def _mass(plant: Plant, scenario: Scenario) -> None:
+    """Mass and inertia by small masses about the centre of gravity, which moves against the aerodynamics."""
+    uncertainty = scenario.uncertainty
+    change = {axis: getattr(uncertainty.inertia, axis) - 1.0 for axis in ("Ix", "Iy", "Iz")}
+    Ix, Iy, Iz = (change[axis] * getattr(MASS, f"{axis}_kg_m2") for axis in change)
+    pairs = [(Iy + Iz - Ix) / 2, (Iz + Ix - Iy) / 2, (Ix + Iy - Iz) / 2]  # kg m2 of the x, y and z pair
+    extra_kg = MASS.mass_kg * (uncertainty.mass - 1.0)
+    masses_kg = [extra_kg - sum(pairs), *(pair / 2 for pair in pairs for _ in range(2))]  # at 1 m
+    if any(masses_kg):
+        for i, mass_kg in enumerate(masses_kg):
+            plant.write(f"inertia/pointmass-weight-lbs[{i}]", mass_kg * LB_PER_KG)
+    forward, right, down = uncertainty.cg_m
+    for axis, aft_right_up in zip("xyz", (forward, -right, down), strict=True):
+        plant.write(f"metrics/aero-rp-{axis}-in", aft_right_up * IN_PER_M)
+
+
+def take_off(plant: Plant, scenario: Scenario, trim_point: TrimPoint) -> None:
+    """Start the trimmed flight in the scenario's air: JSBSim's own wind and turbulence [MIL-F-8785C]."""
+    environment = scenario.environment
+    plant.start(trim_point, environment.wind_mps)
+    if environment.severity is not None:
+        plant.write("atmosphere/randomseed", 1 + scenario.seed % (2**31 - 2))
+        plant.write("atmosphere/turb-type", TUSTIN)
+        plant.write(
+            "atmosphere/turbulence/milspec/windspeed_at_20ft_AGL-fps", WIND_AT_20_FT[environment.severity]
+        )
+        plant.write("atmosphere/turbulence/milspec/severity", EXCEEDENCE[environment.severity])
 
 
 def _actuators(plant: Plant, scenario: Scenario) -> None:

@@ -49,6 +49,9 @@ def metrics(flight: "Flight") -> Document:
         "departure": _departure(flight),
         "authority": _authority(flight),
         "saturation_s": {surface: _number(time) for surface, time in flight.saturation_s.items()},
+        "surface_travel_deg": {
+            surface: _number(math.degrees(path)) for surface, path in flight.surface_travel_rad.items()
+        },
     }
     expectations = evaluate(scenario.expect, document)
     document["expectations"] = expectations

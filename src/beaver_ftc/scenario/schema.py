@@ -74,6 +74,17 @@ Ratio = Annotated[Number, Field(ge=-10, le=10)]
 Ratios = Annotated[dict[TermName, Ratio], BeforeValidator(_no_more_than_there_are)]
 
 
+class TrueInertia(Section):
+    """The truth's inertia, as a share of the table's value."""
+
+    Ix: Number = number(1.0, unit="share of 1", says="roll inertia", ge=0.5, le=2)
+    Iy: Number = number(1.0, unit="share of 1", says="pitch inertia", ge=0.5, le=2)
+    Iz: Number = number(1.0, unit="share of 1", says="yaw inertia", ge=0.5, le=2)
+
+
+Offset = Annotated[Number, Field(ge=-0.5, le=0.5)]
+
+
 class Uncertainty(Section):
     """How the truth differs from what the designer believes."""
 
@@ -88,9 +99,32 @@ class Uncertainty(Section):
         description="truth / design ratio of single aerodynamic terms, 1 is no error, e.g. Cm_alpha: 1.05",
         examples=[{"Cm_alpha": 1.05}],
     )
+    mass: Number = number(
+        1.0, unit="share of 1", says="truth / design ratio of the mass, at the same inertia", ge=0.5, le=2
+    )
+    inertia: TrueInertia = Field(
+        default_factory=TrueInertia, description="truth / design ratio of the inertia"
+    )
+    cg_m: tuple[Offset, Offset, Offset] = Field(
+        default=(0.0, 0.0, 0.0),
+        description="centre of gravity, forward, right and down of where the designer has it, m",
+        json_schema_extra={"unit": "m"},
+    )
 
 
 Wind = Annotated[Number, Field(ge=-100, le=100)]
+
+
+class Gust(Section):
+    """A one-minus-cosine gust: it rises, stays and fades as JSBSim's own does."""
+
+    at_s: Number = number(unit="s", says="when it starts", ge=0, le=360_000)
+    velocity_mps: tuple[Wind, Wind, Wind] = Field(
+        description="at its height, towards north, east, down, m/s", json_schema_extra={"unit": "m/s"}
+    )
+    rise_s: Number = number(1.0, unit="s", says="duration of the rise", gt=0, le=3600)
+    hold_s: Number = number(0.0, unit="s", says="time at its height", ge=0, le=3600)
+    fade_s: Number = number(1.0, unit="s", says="duration of the decay", gt=0, le=3600)
 
 
 class Environment(Section):
@@ -107,6 +141,7 @@ class Environment(Section):
         description="steady wind towards north, east, down, m/s",
         json_schema_extra={"unit": "m/s"},
     )
+    gust: Gust | None = Field(default=None, description="a one-minus-cosine gust")
 
     @model_validator(mode="after")
     def _severity_belongs_to_turbulence(self) -> Self:

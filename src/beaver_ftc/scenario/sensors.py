@@ -1,6 +1,7 @@
 """What the instruments do to the truth: one section a signal; what is left out is measured perfectly."""
 
-from typing import Any
+from math import radians
+from typing import Any, ClassVar
 
 from pydantic import Field, GetJsonSchemaHandler, model_validator
 from pydantic.json_schema import JsonSchemaValue
@@ -10,45 +11,97 @@ from beaver_ftc.scenario.base import Number, Section, number
 
 
 class _Sensor(Section):
-    """measured = (1 + scale_error) true(t - delay) + bias + white noise."""
+    """measured = quantised((1 + scale_error) lagged(t - delay) + bias + noise); lost: the last one."""
 
-    scale_error: Number = number(0.0, unit="share of 1", says="relative error of the slope", ge=-1, le=1)
+    # Keys of noise, bias and resolution, and their unit in SI.
+    si: ClassVar[tuple[str, str, str, float]]
+
+    scale_error: Number = number(0.0, unit="share of 1", says="relative error of the slope", ge=-0.9, le=1)
     delay_s: Number = number(0.0, unit="s", says="age of the measurement", ge=0, le=1)
+    bandwidth_rad_s: Number = number(
+        0.0, unit="rad/s", says="bandwidth of the first-order lag, 0 means none", ge=0, le=100_000
+    )
+    dropout_share: Number = number(
+        0.0, unit="share of 1", says="samples lost, the last one standing in", ge=0, le=0.99
+    )
 
     @property
     def is_ideal(self) -> bool:
         return all(value == 0 for _, value in self)
 
+    @property
+    def is_bounded(self) -> bool:
+        """Whether the error is bounded by noise, bias, resolution and slope alone."""
+        return self.delay_s == self.bandwidth_rad_s == self.dropout_share == 0
+
+    @property
+    def noise_bias_quantum(self) -> tuple[float, float, float]:
+        """Standard deviation, bias and resolution, SI."""
+        noise, bias, quantum, unit = self.si
+        return getattr(self, noise) * unit, getattr(self, bias) * unit, getattr(self, quantum) * unit
+
 
 class RateGyro(_Sensor):
     """A body rate."""
 
+    si = ("noise_std_deg_s", "bias_deg_s", "quantum_deg_s", radians(1.0))
+
     noise_std_deg_s: Number = number(0.0, unit="deg/s", says="standard deviation of a sample", ge=0, le=100)
     bias_deg_s: Number = number(0.0, unit="deg/s", says="constant error", ge=-100, le=100)
+    quantum_deg_s: Number = number(0.0, unit="deg/s", says="resolution", ge=0, le=100)
 
 
 class FlowVane(_Sensor):
     """An incidence angle."""
 
+    si = ("noise_std_deg", "bias_deg", "quantum_deg", radians(1.0))
+
     noise_std_deg: Number = number(0.0, unit="deg", says="standard deviation of a sample", ge=0, le=45)
     bias_deg: Number = number(0.0, unit="deg", says="constant error", ge=-45, le=45)
+    quantum_deg: Number = number(0.0, unit="deg", says="resolution", ge=0, le=45)
 
 
 class Airspeed(_Sensor):
     """True airspeed."""
 
+    si = ("noise_std_mps", "bias_mps", "quantum_mps", 1.0)
+
     noise_std_mps: Number = number(0.0, unit="m/s", says="standard deviation of a sample", ge=0, le=50)
     bias_mps: Number = number(0.0, unit="m/s", says="constant error", ge=-50, le=50)
+    quantum_mps: Number = number(0.0, unit="m/s", says="resolution", ge=0, le=50)
 
 
 class DynamicPressure(_Sensor):
     """Dynamic pressure."""
 
+    si = ("noise_std_pa", "bias_pa", "quantum_pa", 1.0)
+
     noise_std_pa: Number = number(0.0, unit="Pa", says="standard deviation of a sample", ge=0, le=5000)
     bias_pa: Number = number(0.0, unit="Pa", says="constant error", ge=-5000, le=5000)
+    quantum_pa: Number = number(0.0, unit="Pa", says="resolution", ge=0, le=5000)
 
 
-PRESETS: dict[str, dict[str, dict[str, float]]] = {"ideal": {}}
+def _grade(gyro: dict[str, float], vane: dict[str, float], V: dict, qdyn: dict) -> dict[str, dict]:
+    """The same gyro on every axis, the same vane twice."""
+    return {**dict.fromkeys("pqr", gyro), "alpha": vane, "beta": vane, "V": V, "qdyn": qdyn}
+
+
+# Each number's source is in docs/robustness.md, section 1; noise is that of a sample at 100 Hz.
+PRESETS: dict[str, dict[str, dict[str, float]]] = {
+    "ideal": {},
+    "tactical-grade": _grade(
+        {"noise_std_deg_s": 0.0208, "bias_deg_s": 0.00028, "scale_error": 0.00015},
+        {"noise_std_deg": 0.025, "bias_deg": 0.1},
+        {"noise_std_mps": 0.05, "bias_mps": 0.2},
+        {"noise_std_pa": 2.0, "bias_pa": 5.0},
+    ),
+    "consumer-grade": _grade(
+        {"noise_std_deg_s": 0.1, "bias_deg_s": 0.5, "scale_error": 0.03, "quantum_deg_s": 0.0153},
+        {"noise_std_deg": 0.043, "bias_deg": 0.5, "quantum_deg": 0.088},
+        {"noise_std_mps": 0.1, "bias_mps": 0.4},
+        {"noise_std_pa": 3.0, "bias_pa": 17.0},
+    ),
+}
 
 
 class Sensors(Section):

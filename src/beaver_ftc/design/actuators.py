@@ -1,0 +1,33 @@
+"""What the diagnosis believes of the actuators: the aircraft's own first-order lag, rate limit and stops.
+
+    u[k+1] = u[k] + limited((command - u[k]) (1 - exp(-bandwidth dt))),   |limited| <= rate dt
+
+the discretisation of aircraft/beaver/beaver.xml, one step a JSBSim frame, so that a healthy surface is where
+the model has it.
+"""
+
+import numpy as np
+
+from beaver_ftc.compiled import kernel
+
+ACTUATORS = np.dtype(
+    [
+        ("real", "i8"),
+        ("approach", "f8", (4,)),  # share of the way to the command in one JSBSim frame; 1 without lag
+        ("step", "f8", (4,)),  # rad, the furthest in one JSBSim frame
+        ("low", "f8", (4,)), ("high", "f8", (4,)),
+    ],
+    align=True,
+)  # fmt: skip
+
+
+@kernel
+def move(actuators, command, u):
+    """Move the surfaces u (4,) rad by one JSBSim frame towards command (4,) rad."""
+    if not actuators.real:
+        u[:] = command
+        return
+    for s in range(4):
+        wanted = min(max(command[s], actuators.low[s]), actuators.high[s])
+        step = min(max((wanted - u[s]) * actuators.approach[s], -actuators.step[s]), actuators.step[s])
+        u[s] = min(max(u[s] + step, actuators.low[s]), actuators.high[s])

@@ -1,0 +1,87 @@
+"""From what a scenario declares in `fdi.bounds` to the numbers of derived.py."""
+
+from dataclasses import astuple, replace
+from itertools import product
+from math import exp, log, radians, sqrt
+
+import numpy as np
+
+from beaver_ftc.design.coefficients import GEOMETRY, MASS, MassProperties, inertia_coefficients
+from beaver_ftc.design.model import TERMS
+from beaver_ftc.diagnosis.config import Bounds
+from beaver_ftc.plant.instruments import NOISE_LIMIT_SIGMA, SIGNALS
+from beaver_ftc.scenario.sensors import Sensors
+
+# Largest vertical gust (standard deviation) above 2000 ft and its scale [MIL-F-8785C, fig. 7, 3.7.2].
+GUST_FT_S = {"none": 0.0, "light": 7.4, "moderate": 10.6, "severe": 23.6}
+SCALE_FT = 1750.0
+ROLLING = 1.9  # of the rotating gusts the strongest [Yeager1998, eq. 8]; pitching and yawing are weaker
+GUST_LIMIT_SIGMA = 6.0  # once in 5e8 samples beyond, were they independent
+_INERTIA = ("Ix_kg_m2", "Iy_kg_m2", "Iz_kg_m2", "Jxz_kg_m2")
+DELAYS_S = (0.1, 0.5, 2.0)  # within which a pole of the bank finds the smallest fault
+
+
+def gust_sigma_rad_s(turbulence: str) -> float:
+    """Standard deviation of the air's rotation, rad/s, on any axis."""
+    span_ft = GEOMETRY.span_m / 0.3048
+    return ROLLING * GUST_FT_S[turbulence] / sqrt(SCALE_FT * span_ft)
+
+
+def inertia_slack(tolerance: float, mass: MassProperties = MASS) -> np.ndarray:
+    """Largest change of the twelve inertia coefficients for every inertia within its tolerance.
+
+    Each is monotonic in each inertia as long as the others stay put, so the corners tell.
+    """
+    nominal = np.array(astuple(inertia_coefficients(mass)))
+    worst = np.zeros(12)
+    for signs in product((-1.0, 1.0), repeat=4):
+        change = {
+            name: getattr(mass, name) * (1 + tolerance * s) for name, s in zip(_INERTIA, signs, strict=True)
+        }
+        there = np.array(astuple(inertia_coefficients(replace(mass, **change))))
+        worst = np.maximum(worst, np.abs(there - nominal))
+    return worst
+
+
+def tolerances(given: float | dict[str, float], coefficient: np.ndarray) -> np.ndarray:
+    """Tolerance of each coefficient (3, 9), absolute."""
+    share = np.zeros((3, 9))
+    for i, names in enumerate(TERMS):
+        for j, name in enumerate(names):
+            share[i, j] = given.get(name, 0.0) if isinstance(given, dict) else given
+    return share * np.abs(coefficient)
+
+
+def admit(admitted: np.void, bounds: Bounds, coefficient: np.ndarray, mass: MassProperties) -> None:
+    """Fill the record: coefficient (3, 9) and mass are the designer's."""
+    admitted["tolerance"] = tolerances(bounds.coefficients, coefficient)
+    admitted["inertia"] = inertia_slack(bounds.inertia, mass)
+    admitted["deflection"] = radians(bounds.deflection_deg)
+    admitted["gust"] = GUST_LIMIT_SIGMA * gust_sigma_rad_s(bounds.turbulence)
+    for i, name in enumerate(SIGNALS):
+        sensor = getattr(bounds.sensors, name)
+        noise, bias, quantum = sensor.noise_bias_quantum
+        admitted["offset"][i] = NOISE_LIMIT_SIGMA * noise + abs(bias) + quantum / 2
+        admitted["slope"][i] = abs(sensor.scale_error)
+        if i < 3:
+            admitted["steady"][i] = abs(bias)
+    declared = (admitted["tolerance"], admitted["inertia"], admitted["deflection"], admitted["gust"])
+    admitted["any"] = any(np.any(part) for part in declared) or not bounds.sensors.is_ideal
+
+
+def poles_for_noise(sensors: Sensors, constant_rad_s2: float) -> tuple[float, ...]:
+    """Poles (1/s) that find the smallest constant fault phi within each of DELAYS_S, despite gyro noise.
+
+    After T the residual is phi (1 - exp(-lam T)) / lam, its bound at most eta_bar / lam + 2 nbar. The excess
+    of one over the other is greatest at lam = ln(phi T / (2 nbar)) / T; the smallest phi with any follows.
+    """
+    nbar = max(2 * NOISE_LIMIT_SIGMA * getattr(sensors, axis).noise_bias_quantum[0] for axis in "pqr")
+    return tuple(_pole(delay_s, nbar, constant_rad_s2) for delay_s in DELAYS_S) if nbar > 0 else ()
+
+
+def _pole(delay_s: float, noise: float, eta_bar: float) -> float:
+    phi, pole = eta_bar + 8.0 * noise / delay_s, 1.0 / delay_s
+    for _ in range(50):
+        pole = max(log(phi * delay_s / noise) / delay_s, 0.1 / delay_s)
+        phi = (noise * pole + eta_bar) / (1.0 - exp(-pole * delay_s))
+    return pole

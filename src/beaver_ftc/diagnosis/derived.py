@@ -1,0 +1,103 @@
+"""What a declared uncertainty of coefficients, inertia, measurements, deflections and air can do to xdot.
+
+The design model is a sum of products: inertia coefficient times dynamic pressure times aerodynamic
+coefficient times powers of measured signals. If every factor f is known to within e, then
+
+    |prod (f + e) - prod f| <= prod (|f| + |e|) - prod |f|
+
+and the sum of these over the terms bounds |F(truth) - F(measured)| at this very state; with all errors of
+one sign it is attained term by term. The same bound serves the isolation estimators: a lost share of a
+surface multiplies its terms by 1 + theta in [0, 1], and with them their error.
+
+A gyro's error enters once more, as xdot is taken from its readings. Its constant part drops out of the
+difference; of what changes, n with |n| <= nbar, the filter eps[k+1] = a eps[k] + n[k+1] - n[k] keeps
+n[k] - m[k], m[k+1] = a m[k] + (1 - a) n[k], so no more than nbar[k] and the filtered nbar: twice nbar,
+however fast the frames.
+"""
+
+from beaver_ftc.compiled import kernel
+from beaver_ftc.design.model import AIRSPEED, QDYN, regressors
+
+_AIR_DATA = 3  # gyros come first among the signals, then alpha, beta, airspeed, dynamic pressure
+_LEAST_AIRSPEED_SHARE = 0.1
+
+
+@kernel
+def error(admitted, i, reading):
+    """How far the truth of signal i can be from its reading."""
+    return (admitted.offset[i] + admitted.slope[i] * abs(reading)) / (1.0 - admitted.slope[i])
+
+
+@kernel
+def changing_error(admitted, i, reading):
+    """How far gyro i can be off, rad/s, but for a constant: noise, resolution, slope times the true rate."""
+    changing = admitted.offset[i] - admitted.steady[i]
+    return changing + admitted.slope[i] * (abs(reading) + error(admitted, i, reading))
+
+
+@kernel
+def magnitudes(admitted, x, y, u):
+    """Fill the scratch with |signal| as measured and as large as it may be; for airspeed, as small."""
+    for i in range(3):
+        admitted.near_x[i] = abs(x[i])
+        admitted.far_x[i] = abs(x[i]) + error(admitted, i, x[i])
+        admitted.far_aero[i] = admitted.far_x[i] + admitted.gust[i]
+    for i in range(4):
+        admitted.near_y[i] = abs(y[i])
+        admitted.far_y[i] = abs(y[i]) + error(admitted, _AIR_DATA + i, y[i])
+        admitted.near_u[i] = abs(u[i])
+        admitted.far_u[i] = abs(u[i]) + admitted.deflection
+    admitted.near_y[4] = admitted.far_y[4] = abs(y[4])
+    V = y[AIRSPEED]
+    admitted.far_y[AIRSPEED] = max(2.0 * V - admitted.far_y[AIRSPEED], _LEAST_AIRSPEED_SHARE * V)
+
+
+@kernel
+def moments(admitted, design):
+    """Fill moment (3,), the sum of the magnitudes of a moment's terms, and slack (3,), their error; N m."""
+    near_q, far_q = admitted.near_y[QDYN], admitted.far_y[QDYN]
+    for i in range(3):
+        near, far = 0.0, 0.0
+        for j in range(9):
+            size = abs(design.coefficient[i, j])
+            near += size * admitted.near[i, j]
+            far += (size + admitted.tolerance[i, j]) * admitted.far[i, j]
+        arm = design.S * (design.c if i == 1 else design.b)
+        admitted.moment[i] = arm * near_q * near
+        admitted.slack[i] = arm * (far_q * far - near_q * near)
+
+
+@kernel
+def product_slack(size, tolerance, near, far):
+    """Error of a coefficient times a signal."""
+    return (abs(size) + tolerance) * far - abs(size) * near
+
+
+@kernel
+def moment_slack(admitted, i, size, tolerance):
+    """Error of an inertia coefficient times moment i."""
+    near = admitted.moment[i]
+    return product_slack(size, tolerance, near, near + admitted.slack[i])
+
+
+@kernel
+def rate_slack(admitted, i, j, size, tolerance):
+    """Error of an inertia coefficient times rates i and j."""
+    near, far = admitted.near_x, admitted.far_x
+    return product_slack(size, tolerance, near[i] * near[j], far[i] * far[j])
+
+
+@kernel
+def derived_bound(admitted, design, x, y, u, eta_bar):
+    """Add to eta_bar (3,) rad/s2 what the declared errors can do; x (3,), y (5,), u (4,) as measured."""
+    magnitudes(admitted, x, y, u)
+    regressors(design, admitted.near_x, admitted.near_y, admitted.near_u, admitted.near)
+    regressors(design, admitted.far_aero, admitted.far_y, admitted.far_u, admitted.far)
+    moments(admitted, design)
+    t = admitted.inertia
+    eta_bar[0] += moment_slack(admitted, 0, design.Pl, t[2]) + moment_slack(admitted, 2, design.Pn, t[3])
+    eta_bar[0] += rate_slack(admitted, 0, 1, design.Ppq, t[0]) + rate_slack(admitted, 1, 2, design.Pqr, t[1])
+    eta_bar[1] += moment_slack(admitted, 1, design.Qm, t[7]) + rate_slack(admitted, 0, 2, design.Qpr, t[5])
+    eta_bar[1] += rate_slack(admitted, 0, 0, design.Qpp, t[4]) + rate_slack(admitted, 2, 2, design.Qrr, t[6])
+    eta_bar[2] += moment_slack(admitted, 0, design.Rl, t[10]) + moment_slack(admitted, 2, design.Rn, t[11])
+    eta_bar[2] += rate_slack(admitted, 0, 1, design.Rpq, t[8]) + rate_slack(admitted, 1, 2, design.Rqr, t[9])

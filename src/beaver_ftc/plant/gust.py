@@ -1,0 +1,39 @@
+"""The one-minus-cosine gust of a scenario, by JSBSim's own model, set off at its frame."""
+
+from math import ceil
+
+from beaver_ftc.plant.adapter import FT_PER_M, Plant
+from beaver_ftc.scenario.schema import Gust
+
+NEVER = 2**62
+_LOCAL_FRAME = 3  # of atmosphere/cosine-gust/frame: north, east, down
+
+
+class GustSchedule:
+    """Sets the gust off; without one it does nothing."""
+
+    def __init__(self, gust: Gust | None, plant: Plant, rate_hz: float) -> None:
+        self._plant = plant
+        self._starts = NEVER
+        if gust is None:
+            return
+        self._starts = ceil(gust.at_s * rate_hz - 1e-9)
+        height = sum(speed**2 for speed in gust.velocity_mps) ** 0.5
+        values = {
+            "startup-duration-sec": gust.rise_s, "steady-duration-sec": gust.hold_s,
+            "end-duration-sec": gust.fade_s, "magnitude-ft_sec": height * FT_PER_M, "frame": _LOCAL_FRAME,
+        }  # fmt: skip
+        values |= {f"{axis}-velocity-ft_sec": v for axis, v in zip("XYZ", gust.velocity_mps, strict=True)}
+        for name, value in values.items():
+            plant.write(f"atmosphere/cosine-gust/{name}", value)
+        if height == 0.0:
+            self._starts = NEVER
+
+    def apply(self, k: int) -> None:
+        """Set the gust off if frame k is its."""
+        if k == self._starts:
+            self._plant.write("atmosphere/cosine-gust/start", 1.0)
+
+    def next_change(self, k: int) -> int:
+        """The first frame after k at which `apply` has something to do."""
+        return self._starts if k < self._starts else NEVER

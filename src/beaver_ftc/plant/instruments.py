@@ -1,0 +1,99 @@
+"""What the instruments make of the truth: lag, delay, slope, offset, noise, resolution, lost samples.
+
+    reading = quantised((1 + scale_error) lagged(t - delay) + bias + noise),    or the last one if it is lost
+
+Noise is white and normal, cut off at NOISE_LIMIT_SIGMA standard deviations: a bound on it can then be declared
+and holds. A flight draws its random numbers from a counter of its own [Steele2014], so it repeats to the
+bit whatever else is flown beside it.
+"""
+
+import numpy as np
+
+from beaver_ftc.compiled import kernel
+
+SIGNALS = ("p", "q", "r", "alpha", "beta", "V", "qdyn")
+N_SIGNALS = len(SIGNALS)
+NOISE_LIMIT_SIGMA = 4.0
+LONGEST_DELAY = 1000  # JSBSim frames
+
+INSTRUMENTS = np.dtype(
+    [
+        ("real", "i8"), ("random", "u8"),
+        ("gain", "f8", (N_SIGNALS,)), ("bias", "f8", (N_SIGNALS,)), ("noise", "f8", (N_SIGNALS,)),
+        ("quantum", "f8", (N_SIGNALS,)), ("dropout", "f8", (N_SIGNALS,)),
+        ("keep", "f8", (N_SIGNALS,)),  # exp(-bandwidth dt), 0 without lag
+        ("delay", "f8", (N_SIGNALS,)),  # JSBSim frames
+        ("lagged", "f8", (N_SIGNALS,)), ("line", "f8", (LONGEST_DELAY + 2, N_SIGNALS)), ("taken", "i8"),
+        ("reading", "f8", (N_SIGNALS,)),
+    ],
+    align=True,
+)  # fmt: skip
+
+_GOLDEN, _FIRST, _SECOND = (
+    np.uint64(0x9E3779B97F4A7C15),
+    np.uint64(0xBF58476D1CE4E5B9),
+    np.uint64(0x94D049BB133111EB),
+)
+_30, _27, _31, _11 = np.uint64(30), np.uint64(27), np.uint64(31), np.uint64(11)
+
+
+@kernel
+def uniform(instruments):
+    """The next random number of this flight, in [0, 1)."""
+    instruments.random += _GOLDEN
+    z = instruments.random
+    z = (z ^ (z >> _30)) * _FIRST
+    z = (z ^ (z >> _27)) * _SECOND
+    z = z ^ (z >> _31)
+    return (z >> _11) * 2.0**-53
+
+
+@kernel
+def normal(instruments):
+    """The next standard normal number, drawn again beyond NOISE_LIMIT_SIGMA."""
+    value = 2.0 * NOISE_LIMIT_SIGMA
+    while abs(value) > NOISE_LIMIT_SIGMA:
+        radius = np.sqrt(-2.0 * np.log(1.0 - uniform(instruments)))
+        value = radius * np.cos(2.0 * np.pi * uniform(instruments))
+    return value
+
+
+@kernel
+def delayed(instruments, i, value):
+    """Put the value of signal i into its delay line; returns what comes out, between frames if need be."""
+    line, now = instruments.line, instruments.taken
+    if now == 0:
+        line[:, i] = value
+    line[now % line.shape[0], i] = value
+    whole = int(instruments.delay[i])
+    part = instruments.delay[i] - whole
+    late, later = line[(now - whole) % line.shape[0], i], line[(now - whole - 1) % line.shape[0], i]
+    return late + part * (later - late)
+
+
+@kernel
+def read_one(instruments, i, true):
+    """The reading of signal i, SI."""
+    keep = instruments.keep[i] if instruments.taken > 0 else 0.0
+    instruments.lagged[i] = true + keep * (instruments.lagged[i] - true)
+    value = instruments.lagged[i]
+    if instruments.delay[i] > 0.0:
+        value = delayed(instruments, i, value)
+    value = instruments.gain[i] * value + instruments.bias[i]
+    if instruments.noise[i] > 0.0:
+        value += instruments.noise[i] * normal(instruments)
+    if instruments.quantum[i] > 0.0:
+        value = instruments.quantum[i] * np.floor(value / instruments.quantum[i] + 0.5)
+    return value
+
+
+@kernel
+def read_all(instruments, signals):
+    """Put a sample of every signal in the place of the truth; signals (N_SIGNALS,), SI, as SIGNALS."""
+    for i in range(N_SIGNALS):
+        value = read_one(instruments, i, signals[i])
+        lost = instruments.dropout[i] > 0.0 and uniform(instruments) < instruments.dropout[i]
+        if not lost or instruments.taken == 0:
+            instruments.reading[i] = value
+        signals[i] = instruments.reading[i]
+    instruments.taken += 1

@@ -150,8 +150,8 @@ def _assemble_admitted(frame: np.void, scenario: Scenario) -> None:
     admit(admitted, scenario.fdi.bounds, coefficient, mass)
     if admitted["any"] and scenario.fdi.fault_class == "all":
         raise BadInput(
-            f"{scenario.name}: fdi.fault_class: all is not available yet with errors declared in fdi.bounds beyond "
-            "inertia_coupling and constant_rad_s2, allowed: published"
+            f"{scenario.name}: fdi.fault_class: all is not available yet with errors declared in "
+            "fdi.bounds beyond inertia_coupling and constant_rad_s2, allowed: published"
         )
 
 

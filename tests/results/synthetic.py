@@ -83,6 +83,7 @@ class Flight:
     envelope_exits: list[tuple[float, float]] = field(default_factory=list)
     departure: tuple[float, str] | None = None
     saturation_s: dict[str, float] = field(default_factory=lambda: dict.fromkeys(SURFACES, 0.0))
+    surface_travel_rad: dict[str, float] = field(default_factory=lambda: dict.fromkeys(SURFACES, 0.5))
     worst_residual_ratio: float = 0.11
     type_time_s: float | None = None
     estimate_interval: tuple[float, float] | None = None

@@ -41,6 +41,9 @@ def metrics(flight: "Flight") -> Document:
         "tracking": {
             "pre_fault_rms_deg_s": _per_axis_deg_s(_before(fault, flight.pre_fault_rms_rad_s)),
             "post_fault_rms_deg_s": _per_axis_deg_s(flight.post_fault_rms_rad_s),
+            "surface_travel_deg": {
+                surface: _number(math.degrees(path)) for surface, path in flight.surface_travel_rad.items()
+            },
         },
         "supervisor": [{"time_s": _number(time), "mode": mode} for time, mode in flight.supervisor],
         "envelope_exits": [
@@ -49,9 +52,6 @@ def metrics(flight: "Flight") -> Document:
         "departure": _departure(flight),
         "authority": _authority(flight),
         "saturation_s": {surface: _number(time) for surface, time in flight.saturation_s.items()},
-        "surface_travel_deg": {
-            surface: _number(math.degrees(path)) for surface, path in flight.surface_travel_rad.items()
-        },
     }
     expectations = evaluate(scenario.expect, document)
     document["expectations"] = expectations

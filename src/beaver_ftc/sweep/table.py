@@ -106,6 +106,7 @@ COLUMNS: tuple[tuple[str, str, Getter], ...] = (
     ("worst_residual_ratio", "float", lambda document, flight: flight.worst_residual_ratio),
     *_under("float", "tracking.pre_fault_rms_deg_s", *AXES),
     *_under("float", "tracking.post_fault_rms_deg_s", *AXES),
+    *_under("float", "tracking.surface_travel_deg", *SURFACES),
     ("supervisor.mode", "text", lambda document, flight: document["supervisor"][-1]["mode"]),
     *((f"supervisor.{mode}_at_s", "float", _first_entry(mode)) for mode in MODES),
     ("envelope_exits.count", "int", lambda document, flight: len(document["envelope_exits"])),

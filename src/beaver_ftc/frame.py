@@ -47,7 +47,7 @@ FRAME = np.dtype(
         ("native", "i8"), ("getter", "i8"), ("setter", "i8"),
         ("read_pointers", "i8", (ch.N_TRUTH,)), ("write_pointers", "i8", (4,)),
         ("factor", "f8", (ch.N_TRUTH,)), ("truth", "f8", (ch.N_TRUTH,)),
-        ("latitude_0", "f8"), ("longitude_0", "f8"), ("radius_m", "f8"),
+        ("latitude_0", "f8"), ("longitude_0", "f8"), ("radius_m", "f8"), ("parallel_radius_m", "f8"),
         # the truth's faults, for the oracle and for the analyst
         ("faulted", "i8"), ("fault_at_s", "f8"), ("immovable", "i8", (4,)), ("Cm_alpha3", "f8"), ("phi", "f8", (3,)),
         # what is measured and believed
@@ -499,7 +499,7 @@ def record_truth(frame, row):
     column = put(row, 4, truth[0:3])
     column = put(row, column, truth[ch.PHI : ch.PHI + 3])
     row[column] = (truth[ch.LATITUDE] - frame.latitude_0) * frame.radius_m
-    row[column + 1] = (truth[ch.LONGITUDE] - frame.longitude_0) * frame.radius_m * np.cos(frame.latitude_0)
+    row[column + 1] = (truth[ch.LONGITUDE] - frame.longitude_0) * frame.parallel_radius_m
     row[column + 2] = truth[ch.ALTITUDE]
     column = put(row, column + 3, truth[ch.PDOT : ch.PDOT + 3])
     row[column], row[column + 1], row[column + 2] = truth[ch.QDYN], truth[ch.DPT], truth[ch.ENVELOPE]

@@ -95,6 +95,7 @@ class Loop:
         frame["latitude_0"] = self.plant.read(ch.TRUTH[ch.LATITUDE][1])
         frame["longitude_0"] = self.plant.read(ch.TRUTH[ch.LONGITUDE][1])
         frame["radius_m"] = EARTH_RADIUS_M + self.scenario.initial.altitude_m
+        frame["parallel_radius_m"] = frame["radius_m"] * np.cos(frame["latitude_0"])
 
     def _anchor_design(self, surfaces: np.ndarray) -> None:
         """Show the design model the trim, which a linearised or frozen one holds on to."""

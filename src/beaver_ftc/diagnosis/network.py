@@ -13,10 +13,27 @@ import numpy as np
 from beaver_ftc.compiled import kernel
 from beaver_ftc.diagnosis.state import ALPHA_CENTRES, BETA_CENTRES, N_BASIS
 
+_PER_STEP = np.exp(-1.0)
 _N_ALPHA = len(ALPHA_CENTRES)
 _N_BETA = len(BETA_CENTRES)
 _ALPHA_FIRST, _ALPHA_STEP = ALPHA_CENTRES[0], ALPHA_CENTRES[1] - ALPHA_CENTRES[0]
 _BETA_FIRST, _BETA_STEP = BETA_CENTRES[0], BETA_CENTRES[1] - BETA_CENTRES[0]
+
+
+@kernel
+def gaussians(place, count, first, out):
+    """Fill out[first : first + count] with exp(-(place - j)^2 / 2), j = 0, 1, ...; returns the sum of squares.
+
+    From one to the next they change by exp(place - j - 1/2), and that by 1/e: two exponentials do for all.
+    """
+    value, change = np.exp(-0.5 * place * place), np.exp(place - 0.5)
+    square = 0.0
+    for j in range(count):
+        out[first + j] = value
+        square += value * value
+        value *= change
+        change *= _PER_STEP
+    return square
 
 
 @kernel
@@ -27,14 +44,7 @@ def basis(alpha, beta, out):
     """
     a = min(max((alpha - _ALPHA_FIRST) / _ALPHA_STEP, 0.0), _N_ALPHA - 1.0)
     b = min(max((beta - _BETA_FIRST) / _BETA_STEP, 0.0), _N_BETA - 1.0)
-    square = 0.0
-    for j in range(_N_ALPHA):
-        out[j] = np.exp(-0.5 * (a - j) ** 2)
-        square += out[j] ** 2
-    for j in range(_N_BETA):
-        out[_N_ALPHA + j] = np.exp(-0.5 * (b - j) ** 2)
-        square += out[_N_ALPHA + j] ** 2
-    norm = np.sqrt(square)
+    norm = np.sqrt(gaussians(a, _N_ALPHA, 0, out) + gaussians(b, _N_BETA, _N_ALPHA, out))
     for j in range(N_BASIS):
         out[j] /= norm
 

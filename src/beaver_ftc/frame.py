@@ -18,6 +18,7 @@ from beaver_ftc.design.model import ALPHA, BETA, DESIGN, ELEVATOR, QDYN
 from beaver_ftc.design.variants import response
 from beaver_ftc.diagnosis import bank, detection, fault_types, guarantee, isolation, network
 from beaver_ftc.diagnosis.derived import changing_error, derived_bound
+from beaver_ftc.diagnosis.fault_types import DOMINANT_AXIS
 from beaver_ftc.diagnosis.state import DIAGNOSIS, NOT_ISOLATED
 from beaver_ftc.diagnosis.thresholds import uncertainty_bound
 from beaver_ftc.plant.instruments import INSTRUMENTS, N_SIGNALS, read_all
@@ -36,7 +37,6 @@ FLYING, DEPARTED, NOT_FINITE = 0, 1, 2
 DEPARTURE_ANGLE_RAD = 0.6
 DEPARTURE_RATE_RAD_S = 6.0
 DEPARTURE_SIGNALS = ("p", "q", "r", "alpha", "beta")
-DOMINANT_AXIS = (0, 1, 2, 1)  # what a surface is there for: aileron p, elevator and flap q, rudder r
 
 FRAME = np.dtype(
     [
@@ -49,7 +49,8 @@ FRAME = np.dtype(
         ("factor", "f8", (ch.N_TRUTH,)), ("truth", "f8", (ch.N_TRUTH,)),
         ("latitude_0", "f8"), ("longitude_0", "f8"), ("radius_m", "f8"), ("parallel_radius_m", "f8"),
         # the truth's faults, for the oracle and for the analyst
-        ("faulted", "i8"), ("fault_at_s", "f8"), ("immovable", "i8", (4,)), ("Cm_alpha3", "f8"), ("phi", "f8", (3,)),
+        ("faulted", "i8"), ("fault_at_s", "f8"), ("immovable", "i8", (4,)),
+        ("Cm_alpha3", "f8"), ("phi", "f8", (3,)),
         # what is measured and believed
         ("seen", "f8", (N_SIGNALS,)), ("x", "f8", (3,)), ("y", "f8", (5,)), ("u", "f8", (4,)),
         ("u_then", "f8", (4,)),
@@ -208,7 +209,7 @@ def predict(frame):
 
 @kernel
 def believe_offsets(frame):
-    """What the surfaces give without being asked, as far as the diagnosis knows, is no surprise to the FDAE."""
+    """What the surfaces are known to give without being asked is no surprise to the FDAE."""
     for s in range(4):
         for i in range(3):
             frame.believed[i] += frame.G_mean[i, s] * frame.control.offset[s]
@@ -311,7 +312,7 @@ def supervise(frame):
     if frame.control.law == ORACLE:
         mode = true_mode(frame)
     elif fdi.every_type:
-        replaced = fdi.lead_kind == fault_types.LOSES or fdi.lead_kind == fault_types.FIXED
+        replaced = fdi.lead_kind in (fault_types.LOSES, fault_types.FIXED)
         isolated = fdi.lead if replaced else min(fdi.isolated, 0)
         mode = mode_of(frame.control.law, fdi.detected, isolated, fdi.lead if replaced else -1)
     else:
@@ -335,7 +336,7 @@ def tell_oracle(frame, s):
 
 @kernel
 def act_on_lead(frame, s):
-    """What the diagnosis of every type makes of surface s: effectiveness left, and offset. A jam brooks no delay."""
+    """What the diagnosis of every type makes of surface s: effectiveness and offset. A jam cannot wait."""
     fdi, control = frame.fdi, frame.control
     surface = fdi.surface[s]
     if fdi.lead_kind == fault_types.LOSES:
@@ -393,12 +394,12 @@ def in_doubt(frame):
     """Whether elevator or flap is at fault and it has long been open which."""
     fdi, law = frame.fdi, frame.control.law
     open_question = fdi.every_type and fdi.detected and fdi.isolated == NOT_ISOLATED
-    return open_question and fdi.evidence >= fdi.patience and law != NOMINAL and law != ORACLE
+    return open_question and fdi.evidence >= fdi.patience and law not in (NOMINAL, ORACLE)
 
 
 @kernel
 def advance_hand_over(frame):
-    """Hand the pitch demand to the flap, or back. What an immovable elevator no longer carries goes at once."""
+    """Hand the pitch demand to the flap, or back. What a jammed elevator no longer carries goes at once."""
     control = frame.control
     if frame.mode == MODE_REALLOCATED:
         control.hand_over = min(control.hand_over + control.hand_over_step, 1.0)

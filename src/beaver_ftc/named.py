@@ -50,7 +50,8 @@ def found(fdi: np.void) -> Found:
 
 
 def _alive(fdi: np.void, s: int, kind: int) -> bool:
-    return not (fdi["estimator"][ft.POSITION_FIRST + s]["excluded"] or fdi["surface"][s]["type_excluded"][kind])
+    surface = fdi["surface"][s]
+    return not (fdi["estimator"][ft.POSITION_FIRST + s]["excluded"] or surface["type_excluded"][kind])
 
 
 def _types_left(fdi: np.void, s: int) -> list[str]:
@@ -60,13 +61,13 @@ def _types_left(fdi: np.void, s: int) -> list[str]:
     """
     left = [kind for kind in range(len(ft.TYPES)) if _alive(fdi, s, kind)]
     if any(kind < ft.N_CONSTANT for kind in left):
-        early = fdi["evidence"] < fdi["patience"]
+        early = fdi["evidence"] - fdi["surface"][s]["quiet"] < fdi["patience"]
         left = [kind for kind in left if kind != ft.VARYING_LOSS and (kind != ft.SLOW or early)]
     return list(dict.fromkeys(ft.TYPES[kind] for kind in left))
 
 
 def _open_questions(fdi: np.void) -> Iterator[str]:
-    """`surface:type` for each that is possible; a bare surface, and `unanticipated`, where no type fits."""
+    """`surface:type` for each that is possible; bare surfaces and `unanticipated` where no type fits."""
     possible = [s for s in range(len(SURFACES)) if not fdi["estimator"][ft.POSITION_FIRST + s]["excluded"]]
     for s in possible:
         types = _types_left(fdi, s)

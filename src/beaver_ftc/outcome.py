@@ -32,7 +32,8 @@ def _isolation(fdi: np.void) -> dict:
     if fdi["every_type"]:
         return found(fdi)
     verdict = int(fdi["isolated"])
-    left = [n for n, fie in zip(estimator_names("published"), fdi["estimator"], strict=False) if not fie["excluded"]]
+    names = estimator_names("published")
+    left = [name for name, fie in zip(names, fdi["estimator"], strict=False) if not fie["excluded"]]
     nothing = {"isolated": None, "isolation_type": None, "estimate": None, "isolation_time_s": None}
     if not fdi["detected"] or verdict == NOT_ISOLATED:
         return {**nothing, "candidates": tuple(left) if fdi["detected"] else ()}
@@ -83,8 +84,8 @@ def _authority(frame: np.void) -> dict[str, tuple[float, float]] | None:
     """Per axis, after the fault: share of the demanded acceleration given, and seconds beyond holding."""
     if not frame["post_fault_frames"]:
         return None
-    demanded, lacking = frame["demanded"], frame["lacking"]
-    shares = [1.0 - float(lack / asked) if asked > 0.0 else 1.0 for asked, lack in zip(demanded, lacking, strict=True)]
+    both = zip(frame["demanded"], frame["lacking"], strict=True)
+    shares = [1.0 - float(lack / asked) if asked > 0.0 else 1.0 for asked, lack in both]
     beyond_s = [int(n) * float(frame["dt"]) for n in frame["beyond_frames"]]
     return dict(zip(AXES, zip(shares, beyond_s, strict=True), strict=True))
 
@@ -106,7 +107,7 @@ def verdict_of(frame: np.void) -> Verdict:
 
 
 def _told(fdi: np.void, verdict: Verdict) -> dict:
-    """isolated, isolation_type, candidates, estimate, isolation_time_s of a Flight, from a plug-in's verdict."""
+    """The same of a Flight, from a plug-in's verdict."""
     isolated = verdict.isolated if fdi["detected"] else None
     return {
         "isolated": isolated,

@@ -9,11 +9,11 @@ winding up. And it is scaled: following only the half of a swing that is within 
 attitude, so what is missed on one side is asked for on neither.
 """
 
-MISSED_RAD_S = 0.1  # a rate missed in all by this much: the reference is given up
-RECOVERY_S = 30.0  # and asked for again within this time: several periods of a slow reference
-
 from beaver_ftc.compiled import kernel
 from beaver_ftc.control.reference_model import advance
+
+MISSED_RAD_S = 0.1  # a rate missed in all by this much: the reference is given up
+RECOVERY_S = 30.0  # and asked for again within this time: several periods of a slow reference
 
 
 @kernel

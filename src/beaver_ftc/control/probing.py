@@ -11,7 +11,7 @@ from beaver_ftc.compiled import kernel
 
 @kernel
 def advance(control, wanted, t):
-    """Bring the probe to the next frame, t s: begin when wanted, end with the movement in which it no longer is."""
+    """Bring the probe to the next frame, t s: begin when wanted, end with the movement when no longer."""
     if control.probed == 0:
         if not wanted or control.probe_from_s >= 0.0:
             return

@@ -32,6 +32,8 @@ TYPES = (
 )  # fmt: skip
 N_CONSTANT = 6  # of these the parameter is constant: what they say of one frame, the next can refute
 POSITION_FIRST = 4  # estimators 0 to 3 are losses of effectiveness, 4 to 7 positions, in surface order
+DOMINANT_AXIS = (0, 1, 2, 1)  # what a surface is there for: aileron p, elevator and flap q, rudder r
+PITCH = 1
 ELEVATOR, FLAP = 1, 3
 # What is done about it: scale the command, give the surface up, add an offset, or leave it to its pace.
 LOSES, FIXED, SHIFTED, LAGS = range(4)
@@ -55,7 +57,7 @@ def start(fdi):
 def locate(fdi, s):
     """The set of positions of surface s (rad) that agree with the elapsed frame on every axis."""
     fie, surface = fdi.estimator[POSITION_FIRST + s], fdi.surface[s]
-    axis = 1 if s == ELEVATOR or s == FLAP else (0 if s == 0 else 2)
+    axis = DOMINANT_AXIS[s]
     surface.low_then, surface.high_then, surface.command_then = surface.low, surface.high, surface.command
     surface.command = -fie.offset[axis] / fie.Z[axis]
     surface.low, surface.high = fie.low, fie.high
@@ -145,7 +147,7 @@ def judge_pace(surface, low, high, u, frame):
 
 @kernel
 def judge(fdi, surface, frame):
-    """Hold every type of one surface against the frame before the elapsed one, in which something was wrong."""
+    """Hold every type of one surface against the frame before the elapsed one: something was wrong in it."""
     low, high, u = surface.low_then, surface.high_then, surface.command_then
     if low > high:
         return
@@ -228,7 +230,7 @@ def explained(fdi, s):
 
 @kernel
 def sole(fdi, constant):
-    """The one surface that is possible, with a type of constant parameter left if so asked; -1 none, -2 several."""
+    """The one possible surface, with a type of constant parameter left if so asked; -1 none, -2 several."""
     found = -1
     for s in range(4):
         if possible(fdi, s) and (any_constant(fdi, s) or not constant):
@@ -248,8 +250,7 @@ def surface_at_fault(fdi):
     if s == -1:
         return UNANTICIPATED
     if s >= 0:
-        lateral = s != ELEVATOR and s != FLAP
-        return s if lateral or explained(fdi, s) else NOT_ISOLATED
+        return s if DOMINANT_AXIS[s] != PITCH or explained(fdi, s) else NOT_ISOLATED
     s = sole(fdi, True)
     return s if s >= 0 and others_refuted(fdi, s) else NOT_ISOLATED
 
@@ -258,7 +259,7 @@ def surface_at_fault(fdi):
 def others_refuted(fdi, chosen):
     """Whether nothing but a fault that follows the chosen one's commands is left on the other surfaces.
 
-    An oscillation is given one half-cycle of the slowest to betray itself, a whole one if it is still possible.
+    An oscillation is given one half-cycle of the slowest to betray itself, a whole one if still possible.
     """
     waits = 1
     for s in range(4):
@@ -286,10 +287,18 @@ def one_type(fdi, s):
 
 
 @kernel
+def may_be_slow(fdi, s):
+    """Whether what looks like a jam may be a slow surface that has come to where it is commanded: it has not
+    stood off its command for long."""
+    loud = fdi.evidence - fdi.surface[s].quiet
+    return any_constant(fdi, s) and alive(fdi, s, SLOW) and loud < fdi.patience
+
+
+@kernel
 def type_at_fault(fdi, s):
     """The type of the fault on surface s, or -1 while more than one fits or an oscillation may yet show."""
     found = one_type(fdi, s)
-    if fdi.evidence < fdi.patience:
+    if fdi.evidence < fdi.patience or may_be_slow(fdi, s):
         return -1
     patient = not alive(fdi, s, OSCILLATORY) or fdi.evidence >= 2 * fdi.patience
     if any_constant(fdi, s):
@@ -318,7 +327,7 @@ def decide(fdi, t):
     if kind != fdi.type:
         fdi.type, fdi.type_at_s = kind, t
     fdi.isolated = s
-    if s >= 0 and not (kind == CONSTANT_LOSS or kind == VARYING_LOSS):
+    if s >= 0 and kind not in (CONSTANT_LOSS, VARYING_LOSS):
         fdi.isolated = POSITION_FIRST + s
     take_the_lead(fdi)
 
@@ -383,7 +392,7 @@ def middle(surface, kind):
 
 @kernel
 def deflection_error(fdi, s):
-    """How far surface s is off its command, rad, by what is left of the types, or as the last frame shows it."""
+    """How far surface s is off its command, rad, by the types left, or as the last frame shows it."""
     surface = fdi.surface[s]
     if alive(fdi, s, FLOAT):
         return -surface.command

@@ -52,7 +52,7 @@ class Case(NamedTuple):
 
 def cases(airspeeds_mps: tuple[float, ...] = AIRSPEEDS_MPS) -> list[Case]:
     """Every fault on every surface at every airspeed, fault by fault."""
-    return [Case(name, surface, speed) for name, _ in FAULTS for surface in SURFACES for speed in airspeeds_mps]
+    return [Case(fault, surface, V) for fault, _ in FAULTS for surface in SURFACES for V in airspeeds_mps]
 
 
 def scenario_of(case: Case, law: str, trimmed_deg: float) -> "Scenario":

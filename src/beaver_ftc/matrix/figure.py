@@ -31,7 +31,8 @@ def write_heat_map(document: Document, path: Path) -> None:
         for j, surface in enumerate(SURFACES):
             axes.text(j, i, _label(by_place[fault, surface]), ha="center", va="center", **_ink(grid[i, j]))
     bar = figure.colorbar(image, ticks=range(int(MOST_DOUBLINGS) + 1))
-    bar.ax.set_yticklabels([f"{2**n}" for n in range(int(MOST_DOUBLINGS))] + [f"{2**int(MOST_DOUBLINGS)} or more"])
+    most = int(MOST_DOUBLINGS)
+    bar.ax.set_yticklabels([f"{2**n}" for n in range(most)] + [f"{2**most} or more"])
     bar.set_label("tracking RMS over the oracle's, worst airspeed")
     figure.savefig(path, dpi=120, metadata={"Software": None})
 

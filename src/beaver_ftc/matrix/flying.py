@@ -29,7 +29,7 @@ def trimmed_deg(airspeed_mps: float, surface: str) -> float:
 
 
 def fly_case(case: Case) -> Document:
-    """The row of a case: fault, verdict, tracking beside the oracle's, and why the aircraft was lost if it was."""
+    """The row of a case: fault, verdict, tracking beside the oracle's, and why it was lost, if so."""
     from beaver_ftc.loop import fly
 
     off_deg = trimmed_deg(case.airspeed_mps, case.surface)

@@ -7,9 +7,9 @@ from beaver_ftc.matrix.cases import FAULTS
 
 Document = dict[str, Any]
 LEGEND = (
-    "cell: verdict, delay of the alarm, tracking RMS of the surface's own axis over the oracle's; the worst of all\n"
-    "airspeeds. named: surface and type. surface: type still open. open: surface still open. unseen: no alarm, no\n"
-    "effect beyond the admitted uncertainty. *: aircraft lost (remarks)."
+    "cell: verdict, delay of the alarm, tracking RMS of the surface's own axis over the oracle's; the worst\n"
+    "of all airspeeds. named: surface and type. surface: type still open. open: surface still open. unseen:\n"
+    "no alarm, no effect beyond the admitted uncertainty. *: aircraft lost (remarks)."
 )
 
 
@@ -22,7 +22,8 @@ def as_text(document: Document) -> str:
         f"{fault:{width}}" + "".join(f"  {_cell(by_place[fault, surface]):21}" for surface in SURFACES)
         for fault, _ in FAULTS
     ]
-    return "\n".join([head, *(line.rstrip() for line in lines), "", LEGEND, "", *_remarks(document), _totals(document)])
+    lines = [line.rstrip() for line in (head, *lines)]
+    return "\n".join([*lines, "", LEGEND, "", *_remarks(document), _totals(document)])
 
 
 def _cell(cell: Document) -> str:
@@ -33,7 +34,8 @@ def _cell(cell: Document) -> str:
 
 def _remarks(document: Document) -> list[str]:
     said = [cell for cell in document["cells"] if cell["lost"]]
-    return [f"* {cell['surface']} {cell['fault']}: {cell['remark']}" for cell in said] + ([""] if said else [])
+    lines = [f"* {cell['surface']} {cell['fault']}: {cell['remark']}" for cell in said]
+    return [*lines, ""] if lines else []
 
 
 def _totals(document: Document) -> str:

@@ -125,8 +125,9 @@ def _type_correct(kind: str | None, fault: Document | None) -> bool | None:
 
 def _estimate_deg(flight: "Flight") -> float | None:
     """The estimate in deg, where it is a deflection."""
-    angle = flight.estimate is not None and flight.isolation_type != LOSS_OF_EFFECTIVENESS
-    return _number(math.degrees(flight.estimate)) if angle else None
+    if flight.estimate is None or flight.isolation_type == LOSS_OF_EFFECTIVENESS:
+        return None
+    return _number(math.degrees(flight.estimate))
 
 
 def _authority(flight: "Flight") -> Document | None:

@@ -11,7 +11,10 @@ from beaver_ftc.scenario.base import Conflict
 
 DURATION_S = 30.0
 RATE_HZ = 100.0
-_OF_A_FAULT = ("detected_within_s", "isolated_as", "isolated_within_s", "isolated_type", "candidate_type", "post_fault_rms_deg_s")
+_OF_A_FAULT = (
+    "detected_within_s", "isolated_as", "isolated_type", "candidate_type", "isolated_within_s",
+    "post_fault_rms_deg_s",
+)  # fmt: skip
 
 
 class Outline(NamedTuple):

@@ -150,3 +150,10 @@ def test_flight_that_begins_with_the_fault_has_no_before():
     tracking = _of(Scenario(faults=(Fault(at_s=0.0),)))["tracking"]
     assert tracking["pre_fault_rms_deg_s"] is None
     assert tracking["post_fault_rms_deg_s"] is not None
+
+
+def test_an_alarm_in_the_very_frame_of_the_fault_is_no_false_alarm():
+    """5.89 s as a frame time lies a rounding below 5.890000000000001 s as a declared one."""
+    document = _of(Scenario(faults=(Fault(at_s=5.890000000000001),)), detection_time_s=5.89)
+    assert document["false_alarm"] is False
+    assert document["detection"]["delay_s"] == 0.0

@@ -23,6 +23,7 @@ Rates = tuple[float, float, float]
 
 AXES = ("p", "q", "r")
 UNANTICIPATED = "unanticipated"
+TIME_TOLERANCE_S = 1e-9
 LOSS_OF_EFFECTIVENESS = "loss_of_effectiveness"
 
 
@@ -145,14 +146,19 @@ def _false_alarm(detection_time_s: float | None, fault: Document | None) -> bool
     """An alarm without a fault, or before it. (The alarm is latched: there is one a flight.)"""
     if detection_time_s is None:
         return False
-    return fault is None or detection_time_s < fault["at_s"]
+    return fault is None or _before_the_fault(detection_time_s, fault)
+
+
+def _before_the_fault(time_s: float, fault: Document) -> bool:
+    """Frame times and declared times carry rounding dust: a fault is in force at its very time."""
+    return time_s < fault["at_s"] - TIME_TOLERANCE_S
 
 
 def _delay(time_s: float | None, fault: Document | None) -> float | None:
     """Time since the fault; null without one, or where the event came before it."""
-    if time_s is None or fault is None or time_s < fault["at_s"]:
+    if time_s is None or fault is None or _before_the_fault(time_s, fault):
         return None
-    return _number(time_s - fault["at_s"])
+    return _number(max(time_s - fault["at_s"], 0.0))
 
 
 def _before(fault: Document | None, rms_rad_s: Rates) -> Rates | None:

@@ -116,16 +116,19 @@ class Plant:
             self._drift(state, wind_mps)
 
     def _drift(self, state: FlightState, wind_mps: Sequence[float]) -> None:
-        """Let the air, and the aircraft with it, move over the ground; initialising makes JSBSim forget a
-        wind."""
+        """Let the air, and the aircraft with it, move over the ground.
+
+        As a lasting gust: JSBSim forgets a wind while initialising, and with it the right past derivatives.
+        """
         ground = body_axes(state) @ np.asarray(wind_mps)
         for axis, speed in zip("uvw", ground, strict=True):
             name = f"ic/{axis}-fps"
             self.write(name, self.read(name) + speed * FT_PER_M)
-        self._initialise()
         for axis, speed in zip(("north", "east", "down"), wind_mps, strict=True):
-            self.write(f"atmosphere/wind-{axis}-fps", speed * FT_PER_M)
+            self.write(f"atmosphere/gust-{axis}-fps", speed * FT_PER_M)
+        self._initialise()
         self.settle()
+        self._initialise()
 
     def _initialise(self) -> None:
         if not self.fdm.run_ic():

@@ -3,8 +3,8 @@
     reading = quantised((1 + scale_error) lagged(t - delay) + bias + noise),    or the last one if it is lost
 
 Noise is white and normal, cut off at NOISE_LIMIT_SIGMA standard deviations: a bound on it can then be
-declared and holds. A flight draws its random numbers from a counter of its own [Steele2014], so it repeats to the
-bit whatever else is flown beside it.
+declared and holds. A flight draws its random numbers from a counter of its own [Steele2014], so it repeats
+to the bit whatever else is flown beside it.
 """
 
 import numpy as np

@@ -199,7 +199,14 @@ class RmsLimits(Section):
 
 
 FaultType = Literal[
-    "loss_of_effectiveness", "stuck", "hardover", "float", "bias", "rate_limit", "oscillatory", "unanticipated"
+    "loss_of_effectiveness",
+    "stuck",
+    "hardover",
+    "float",
+    "bias",
+    "rate_limit",
+    "oscillatory",
+    "unanticipated",
 ]
 
 

@@ -1,7 +1,7 @@
 """What the instruments do to the truth: one section a signal; what is left out is measured perfectly."""
 
 from math import radians
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 from pydantic import Field, GetJsonSchemaHandler, model_validator
 from pydantic.json_schema import JsonSchemaValue
@@ -33,6 +33,11 @@ class _Sensor(Section):
     def is_bounded(self) -> bool:
         """Whether the error is bounded by noise, bias, resolution and slope alone."""
         return self.delay_s == self.bandwidth_rad_s == self.dropout_share == 0
+
+    def is_within(self, declared: Self) -> bool:
+        """Whether `declared`, read as bounds, covers this sensor's errors."""
+        sizes = [(abs(value), abs(getattr(declared, key))) for key, value in self]
+        return all(size <= allowed for size, allowed in sizes)
 
     @property
     def noise_bias_quantum(self) -> tuple[float, float, float]:

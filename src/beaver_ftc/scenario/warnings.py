@@ -7,10 +7,35 @@ from beaver_ftc.design.coefficients import ENVELOPE_AIRSPEED_MPS
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.signals import Chirp
 
+_SEVERITIES = ("none", "light", "moderate", "severe")
+_MOMENTS = ("Cl", "Cm", "Cn")
+_ROUNDING = 1e-9
+
 
 def warnings_of(scenario: Scenario) -> tuple[str, ...]:
     """One line a warning, `key.path: what`."""
-    return (*_airspeed(scenario), *_too_fast_for_the_frame(scenario))
+    return (*_airspeed(scenario), *_too_fast_for_the_frame(scenario), *_undeclared(scenario))
+
+
+def _undeclared(scenario: Scenario) -> Iterator[str]:
+    """Errors of the truth that `fdi.bounds` does not cover: an alarm may then have no fault behind it."""
+    bounds, truth = scenario.fdi.bounds, scenario.uncertainty
+    for name, sensor in scenario.sensors:
+        if not sensor.is_within(getattr(bounds.sensors, name)):
+            yield f"sensors.{name}: its errors are not within fdi.bounds.sensors.{name}"
+    severity, declared = scenario.environment.severity, bounds.turbulence
+    if _SEVERITIES.index(severity or "none") > _SEVERITIES.index(declared):
+        yield f"environment.severity: {severity} is more than fdi.bounds.turbulence, {declared}"
+    for name, ratio in truth.coefficients.items():
+        share = bounds.coefficients
+        allowed = share.get(name, 0.0) if isinstance(share, dict) else share
+        if name[:2] in _MOMENTS and abs(ratio - 1.0) > allowed + _ROUNDING:
+            yield f"uncertainty.coefficients.{name}: {ratio:g} is beyond fdi.bounds.coefficients, {allowed:g}"
+    for axis, ratio in truth.inertia:
+        if abs(ratio - 1.0) > bounds.inertia + _ROUNDING:
+            yield f"uncertainty.inertia.{axis}: {ratio:g} is beyond fdi.bounds.inertia, {bounds.inertia:g}"
+    if any(truth.cg_m):
+        yield "uncertainty.cg_m: a displaced centre of gravity is covered by fdi.bounds.constant_rad_s2 only"
 
 
 def _airspeed(scenario: Scenario) -> Iterator[str]:

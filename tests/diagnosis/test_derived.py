@@ -1,0 +1,148 @@
+"""Derived bounds: never exceeded by any admitted error, and attained where all errors conspire."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from beaver_ftc.assembly import assemble
+from beaver_ftc.design.model import control_effectiveness, design_record, free_response
+from beaver_ftc.diagnosis.admitted import inertia_slack, poles_for_noise
+from beaver_ftc.diagnosis.derived import derived_bound
+from beaver_ftc.diagnosis.thresholds import noise_step
+from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.scenario.sensors import Sensors
+
+TRAVEL_RAD = np.array([[-0.52, -0.49, -0.44, -0.1], [0.52, 0.49, 0.44, 1.03]])
+TERMS_USED = (
+    "Cl_p",
+    "Cl_da",
+    "Cl_daa",
+    "Cl_beta",
+    "Cm_0",
+    "Cm_alpha",
+    "Cm_q",
+    "Cm_de",
+    "Cm_df",
+    "Cn_p",
+    "Cn_dr",
+)
+
+
+def acceleration(x, y, u, **changes):
+    design = design_record(**changes)[0]
+    f, G = np.zeros(3), np.zeros((3, 4))
+    free_response(design, x, y, f)
+    control_effectiveness(design, y, G)
+    return f + G @ u
+
+
+def bound(x, y, u, **bounds):
+    scenario = Scenario.model_validate({"name": "x", "fdi": {"bounds": bounds}})
+    frame = assemble(scenario, np.zeros(4), TRAVEL_RAD)[0]
+    out = np.zeros(3)
+    derived_bound(frame["fdi"]["admitted"], frame["design"], x, y, u, out)
+    return out
+
+
+def state(rng):
+    x = rng.uniform(-0.3, 0.3, 3)
+    V = rng.uniform(32, 55)
+    y = np.array([rng.uniform(-0.05, 0.25), rng.uniform(-0.1, 0.1), V, 0.5 * V * V, rng.uniform(0.2, 0.6)])
+    return x, y, rng.uniform(-0.3, 0.3, 4)
+
+
+SENSORS = {
+    "p": {"noise_std_deg_s": 0.2, "bias_deg_s": 0.1, "scale_error": 0.02},
+    "alpha": {"bias_deg": 1.0, "noise_std_deg": 0.1},
+    "beta": {"bias_deg": 0.5},
+    "V": {"bias_mps": 1.5},
+    "qdyn": {"bias_pa": 20.0, "scale_error": 0.01},
+}
+
+
+@settings(max_examples=300, deadline=None)
+@given(st.integers(0, 2**32), st.booleans())
+def test_no_admitted_error_exceeds_the_bound(seed, at_the_corner):
+    rng = np.random.default_rng(seed)
+
+    def within(size):
+        return size * (rng.choice([-1.0, 1.0]) if at_the_corner else rng.uniform(-1, 1))
+
+    x, y, u = state(rng)
+    tolerance, deflection_deg = 0.1, 0.3
+    scale = {name: 1 + within(tolerance) for name in TERMS_USED}
+    xm, ym = x.copy(), y.copy()
+    xm[0] = x[0] * (1 + within(0.02)) + np.radians(within(4 * 0.2 + 0.1))
+    ym[0] += np.radians(within(1.4))
+    ym[1] += np.radians(within(0.5))
+    ym[2] += within(1.5)
+    ym[3] = y[3] * (1 + within(0.01)) + within(20.0)
+    moved = u + np.radians([within(deflection_deg) for _ in range(4)])
+    error = acceleration(x, y, moved, scale=scale) - acceleration(xm, ym, u)
+    admitted = bound(xm, ym, u, coefficients=tolerance, sensors=SENSORS, deflection_deg=deflection_deg)
+    assert (np.abs(error) <= admitted * (1 + 1e-9)).all()
+
+
+def test_one_coefficient_alone_attains_its_bound():
+    x, y, u = state(np.random.default_rng(2))
+    error = acceleration(x, y, u, scale={"Cm_alpha": 1.05}) - acceleration(x, y, u)
+    assert bound(x, y, u, coefficients={"Cm_alpha": 0.05})[1] == pytest.approx(abs(error[1]), rel=1e-9)
+
+
+def test_nothing_declared_adds_nothing():
+    x, y, u = state(np.random.default_rng(3))
+    assert (bound(x, y, u) == 0.0).all()
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.integers(0, 2**32))
+def test_inertia_coefficients_are_extreme_at_the_corners(seed):
+    from dataclasses import astuple, replace
+
+    from beaver_ftc.design.coefficients import MASS, inertia_coefficients
+
+    rng, tolerance = np.random.default_rng(seed), 0.08
+    names = ("Ix_kg_m2", "Iy_kg_m2", "Iz_kg_m2", "Jxz_kg_m2")
+    change = {n: getattr(MASS, n) * (1 + rng.uniform(-tolerance, tolerance)) for n in names}
+    there, nominal = (np.array(astuple(inertia_coefficients(m))) for m in (replace(MASS, **change), MASS))
+    assert (np.abs(there - nominal) <= inertia_slack(tolerance) * (1 + 1e-12)).all()
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.integers(0, 2**32), st.floats(0.0, 1.0), st.integers(1, 60))
+def test_filtered_noise_stays_within_its_bound_and_can_reach_it(seed, a, frames):
+    """eps[k+1] = a eps[k] + n[k+1] - n[k]; the worst noise keeps one sign until the last frame."""
+    rng = np.random.default_rng(seed)
+    nbar = rng.uniform(0.5, 1.5, frames + 1)
+    for n in (rng.uniform(-nbar, nbar), np.append(-nbar[:-1], nbar[-1])):
+        eps, filtered = 0.0, nbar[0]
+        for k in range(frames):
+            eps = a * eps + n[k + 1] - n[k]
+            filtered = noise_step(filtered, nbar[k], a)
+        assert abs(eps) <= filtered + nbar[-1] + 1e-12
+    assert abs(eps) == pytest.approx(filtered + nbar[-1], rel=1e-9)
+
+
+def test_poles_for_noise_give_the_greatest_excess():
+    """By brute force: no other pole finds a smaller fault within the same time."""
+    sensors = Sensors.model_validate("tactical-grade")
+    nbar, eta = 8 * np.radians(0.0208), 0.02
+
+    def smallest_fault(pole, delay_s):
+        return (nbar * pole + eta) / (1 - np.exp(-pole * delay_s))
+
+    for delay_s, pole in zip((0.1, 0.5, 2.0), poles_for_noise(sensors, eta), strict=True):
+        least = min(smallest_fault(other, delay_s) for other in np.geomspace(0.05, 200, 4000))
+        assert smallest_fault(pole, delay_s) == pytest.approx(least, rel=1e-5)
+    assert poles_for_noise(Sensors(), eta) == ()
+
+
+def test_errors_that_have_no_bound_cannot_be_declared():
+    from beaver_ftc.scenario.loader import load_text
+    from beaver_ftc.scenario.problems import ScenarioError
+
+    with pytest.raises(ScenarioError, match=r"fdi\.bounds\.sensors\.p"):
+        load_text("name: x\nfdi: {bounds: {sensors: {p: {delay_s: 0.1}}}}\n")
+    with pytest.raises(ScenarioError, match=r"Cm_alfa.*did you mean Cm_alpha"):
+        load_text("name: x\nfdi: {bounds: {coefficients: {Cm_alfa: 0.1}}}\n")

@@ -1,0 +1,43 @@
+"""What the truth does and the diagnosis was not told is said, one line each."""
+
+import pytest
+
+from beaver_ftc.scenario.loader import load_text
+
+TOLD = """
+fdi: {bounds: {sensors: tactical-grade, turbulence: light, coefficients: {Cm_alpha: 0.05}, inertia: 0.05}}
+"""
+
+
+def warnings(text):
+    return load_text(f"name: x\n{text}").warnings()
+
+
+@pytest.mark.parametrize(
+    ("truth", "says"),
+    [
+        ("sensors: {q: {noise_std_deg_s: 0.1}}", "sensors.q: "),
+        ("sensors: {alpha: {delay_s: 0.01}}", "sensors.alpha: "),
+        ("environment: {turbulence: dryden, severity: moderate}", "environment.severity: moderate"),
+        ("uncertainty: {coefficients: {Cm_alpha: 1.06}}", "uncertainty.coefficients.Cm_alpha: 1.06"),
+        ("uncertainty: {coefficients: {Cm_q: 1.01}}", "uncertainty.coefficients.Cm_q: 1.01"),
+        ("uncertainty: {inertia: {Iy: 0.9}}", "uncertainty.inertia.Iy: 0.9"),
+        ("uncertainty: {cg_m: [0.01, 0, 0]}", "uncertainty.cg_m: "),
+    ],
+)
+def test_an_error_beyond_the_declared_is_said(truth, says):
+    (line,) = warnings(f"{TOLD}{truth}\n")
+    assert line.startswith(says)
+
+
+@pytest.mark.parametrize(
+    "truth",
+    [
+        "sensors: tactical-grade",
+        "environment: {turbulence: dryden, severity: light}",
+        "uncertainty: {coefficients: {Cm_alpha: 0.95, CX_0: 1.3}, inertia: {Ix: 1.05}, mass: 1.1}",
+        "actuators: servo",
+    ],
+)
+def test_an_error_within_the_declared_is_not(truth):
+    assert warnings(f"{TOLD}{truth}\n") == ()

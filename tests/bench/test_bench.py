@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from beaver_ftc.bench import measure
-from beaver_ftc.bench.contenders import Bare, ClosedLoop, state_of
+from beaver_ftc.bench.contenders import Bare, ClosedLoop, state_of, take_over
 from beaver_ftc.bench.plugged import InnovationDetector, ProportionalInversion
 from beaver_ftc.bench.text import text_of
 from beaver_ftc.loop import fly
@@ -54,7 +54,8 @@ def published():
 
 @pytest.mark.parametrize("at_s", [measure.BEFORE_ALARM_S, measure.AFTER_ALARM_S])
 def test_the_bare_aircraft_starts_where_the_loop_does_and_stays_in_the_envelope(published, at_s):
-    bare, loop = Bare(published, at_s), ClosedLoop(published, at_s)
+    loop = ClosedLoop(published, at_s)
+    bare = Bare(take_over(published, at_s))
     bare.prepare()
     loop.prepare()
     assert state_of(bare.plant) == state_of(loop.loop.plant)

@@ -1,6 +1,7 @@
-"""Who is timed: each flies the same seconds of the same flight from the same state, in its own aircraft."""
+"""Who is timed: each flies the same seconds of the same flight, from the same state."""
 
 from collections.abc import Callable
+from copy import copy
 from dataclasses import dataclass
 
 from beaver_ftc import channels as ch
@@ -49,31 +50,29 @@ class Moment:
 
 
 class ClosedLoop:
-    """The loop itself, from `at_s` on.
-
-    compiled_frame: in place of the whole frame, one with parts taken out. detector, law: plug-ins in Python.
-    """
+    """The loop itself, from `at_s` on. detector, law: plug-ins in Python."""
 
     def __init__(
-        self,
-        scenario: Scenario,
-        at_s: float,
-        compiled_frame: Callable[..., int] | None = None,
-        detector: Detector | None = None,
-        law: Law | None = None,
+        self, scenario: Scenario, at_s: float, detector: Detector | None = None, law: Law | None = None
     ) -> None:
         self.loop = Loop(scenario, detector, law)
-        self.loop.fly_chunk(0, round(at_s * scenario.rate_hz))
-        k = int(self.loop.frames["k"][0])
-        self.loop.sample_references(k, self.loop.n_frames - k)
-        self._moment, self._frames = Moment.of(self.loop.plant), self.loop.frames.copy()
-        if compiled_frame is not None:
-            self.loop.fly_frame = self.loop.direct(compiled_frame)
+        first = round(at_s * scenario.rate_hz)
+        self.loop.fly_chunk(0, first)
+        self.loop.sample_references(first, self.loop.n_frames - first)
+        self.moment, self._frames = Moment.of(self.loop.plant), self.loop.frames.copy()
+        self._fly_frame = self.loop.fly_frame
+
+    def with_frame(self, compiled_frame: Callable[..., int]) -> "ClosedLoop":
+        """The same loop and aircraft, with another compiled frame: one with parts taken out."""
+        other = copy(self)
+        other._fly_frame = self.loop.direct(compiled_frame)
+        return other
 
     def prepare(self) -> None:
         """Back to `at_s`."""
-        self._moment.come_back()
+        self.moment.come_back()
         self.loop.frames[:] = self._frames
+        self.loop.fly_frame = self._fly_frame
 
     def fly(self, frames: int) -> None:
         """Fly on."""
@@ -81,19 +80,17 @@ class ClosedLoop:
 
 
 class Bare:
-    """JSBSim alone: the same aircraft from the same state, surfaces held, nothing read, nothing written."""
+    """JSBSim alone: an aircraft from a moment on, surfaces held, nothing read, nothing written."""
 
-    def __init__(self, scenario: Scenario, at_s: float) -> None:
-        self._moment = take_over(scenario, at_s)
-        self.plant = self._moment.plant
-        self._runs = scenario.substeps
+    def __init__(self, moment: Moment, runs: int = 1) -> None:
+        self.plant, self._moment, self._runs = moment.plant, moment, runs
 
     def prepare(self) -> None:
-        """Back to where the loop starts."""
+        """Back to that moment."""
         self._moment.come_back()
 
     def fly(self, frames: int) -> None:
-        """Fly on."""
+        """Fly on; `runs` JSBSim frames to each."""
         run = self.plant.run
         for _ in range(frames * self._runs):
             run()

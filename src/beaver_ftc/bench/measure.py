@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from beaver_ftc.bench.contenders import Bare, ClosedLoop
+from beaver_ftc.bench.contenders import Bare, ClosedLoop, take_over
 from beaver_ftc.bench.parts import PARTS, frame_with
 from beaver_ftc.bench.plugged import InnovationDetector, ProportionalInversion
 from beaver_ftc.bench.stopwatch import WALL, Contender, Timing, interleave
 from beaver_ftc.bench.straightforward import Straightforward
-from beaver_ftc.bench.whole_flight import BareFlight, WholeFlight
+from beaver_ftc.bench.whole_flight import WholeFlight
 from beaver_ftc.plant import native
 from beaver_ftc.scenario.loader import load_scenario
 from beaver_ftc.scenario.schema import Scenario
@@ -77,10 +77,11 @@ def _processor() -> str:
 
 
 def _phase(scenario: Scenario, at_s: float, rounds: int, with_parts: bool) -> Document:
-    """The bare aircraft, the loop with ever more of its parts, the loop."""
+    """The bare aircraft, the loop, the loop with ever more of its parts; all in one aircraft, one memory."""
     names = ["calling", *(part.name for part in PARTS)] if with_parts else []
-    stages = [ClosedLoop(scenario, at_s, frame_with(i)) for i in range(len(names))]
-    us = interleave([Bare(scenario, at_s), ClosedLoop(scenario, at_s), *stages], rounds, FRAMES)
+    whole = ClosedLoop(scenario, at_s)
+    stages = [whole.with_frame(frame_with(i)) for i in range(len(names))]
+    us = interleave([Bare(whole.moment, scenario.substeps), whole, *stages], rounds, FRAMES)
     bare, loop, steps = us[:, 0], us[:, 1], us[:, 2:]
     before = np.column_stack([bare, steps[:, :-1]]) if with_parts else steps
     return {
@@ -118,7 +119,8 @@ def _alternatives(scenario: Scenario, rounds: int) -> Document:
         ),
         "properties_through_python": _without_native(lambda: ClosedLoop(scenario, at_s)),
     }
-    us = interleave([Bare(scenario, at_s), *contenders.values()], rounds, FRAMES)
+    bare = Bare(take_over(scenario, at_s), scenario.substeps)
+    us = interleave([bare, *contenders.values()], rounds, FRAMES)
     return {
         name: {**_figures("us", column), **_figures("ratio", column / us[:, 0])}
         for name, column in zip(contenders, us[:, 1:].T, strict=True)
@@ -144,7 +146,8 @@ def _whole_flights(scenario: Scenario, rounds: int) -> Document:
     frames = round(LONG_FLIGHT_S * scenario.rate_hz)
     with tempfile.TemporaryDirectory() as folder:
         with_file = WholeFlight(long, Path(folder) / "log.parquet")
-        us = interleave([BareFlight(long), WholeFlight(long), with_file], rounds, frames, WALL)
+        bare = Bare(take_over(long, 0.0), long.substeps)
+        us = interleave([bare, WholeFlight(long), with_file], rounds, frames, WALL)
     return {
         "frames": frames,
         **_against(us[:, 0], us[:, 1]),

@@ -1,18 +1,10 @@
-"""Contenders that fly from take-over to landing, everything included: loading, trim, the loop, the log."""
+"""A contender that flies from loading to landing, everything included: trim, the loop, the log."""
 
 from pathlib import Path
 
-from beaver_ftc.bench.contenders import Bare
 from beaver_ftc.loop import fly
 from beaver_ftc.results.log import ParquetLog
 from beaver_ftc.scenario.schema import Scenario
-
-
-class BareFlight(Bare):
-    """JSBSim alone, for as many frames."""
-
-    def __init__(self, scenario: Scenario) -> None:
-        super().__init__(scenario, at_s=0.0)
 
 
 class WholeFlight:

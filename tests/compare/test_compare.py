@@ -12,7 +12,9 @@ from beaver_ftc.cli.main import app
 from beaver_ftc.compare.benchmark import MARK, write_leaderboard
 from beaver_ftc.compare.crew import fly_cases, spread
 from beaver_ftc.compare.document import better_than_ours, document_of
+from beaver_ftc.compare.figure import write_figure
 from beaver_ftc.compare.flights import CALIBRATION, Case, of_set, of_sweep, set_names
+from beaver_ftc.compare.page import write_page
 from beaver_ftc.compare.replay import Trace
 from beaver_ftc.compare.table import as_text
 from beaver_ftc.compare.trial import LAW, ORACLE, SCHEME, Entry, entries_of, fly_case, with_entry
@@ -137,6 +139,18 @@ def _line(scheme, law, **changes):
     ours = {"false_alarms_per_h": 0.0, "detection_rate": 0.9, "delay_median_s": 0.1, "delay_90_s": None,
             "isolation_rate": 0.8, "ratio_median": 1.5, "ratio_90": 2.0, "departures": 0}  # fmt: skip
     return {"scheme": scheme, "law": law, **ours, **changes}
+
+
+def test_a_set_without_faults_can_be_drawn(tmp_path):
+    scenario = Scenario(name="still", duration_s=2)
+    entries = entries_of([SCHEME, "none"], ["lqr"])
+    document = document_of([fly_case(Case("healthy", scenario), entries)], entries)
+    row = document["sets"]["healthy"]["lines"][0]
+    assert (row["detection_rate"], row["false_alarms_per_h"]) == (None, 0.0)
+    write_figure(document, tmp_path / "figure.png")
+    write_page(document, tmp_path / "figure.png", tmp_path / "page.html", "Still")
+    assert as_text(document)
+    assert "Still" in (tmp_path / "page.html").read_text()
 
 
 def test_what_is_better_than_ours_is_said_and_nothing_else():

@@ -49,7 +49,8 @@ def _draw_curves(rate: Any, delay: Any, part: Document) -> None:
         axis.set_xlim(left=-1.0)
         axis.grid(alpha=0.3)
     rate.set_ylim(-0.05, 1.05)
-    delay.set_yscale("log")
+    delay.set_yscale("symlog", linthresh=0.01)
+    delay.set_ylim(bottom=0.0)
 
 
 def _draw_ratios(axis: Any, part: Document) -> None:
@@ -64,7 +65,7 @@ def _draw_ratios(axis: Any, part: Document) -> None:
             axis.annotate(
                 "aircraft lost", (1.0, place), fontsize=7, xytext=(4, 5), textcoords="offset points"
             )
-    axis.axvline(1.0, color="#000000", linewidth=0.8)
+    axis.plot([1.0, 1.0], [-0.5, len(rows) - 0.5], color="#000000", linewidth=0.8)
     axis.set_yticks(range(len(rows)), [row["law"] for row in rows], fontsize=7)
     axis.set_xscale("log")
     axis.xaxis.set_major_formatter("{x:g}")

@@ -62,7 +62,8 @@ def _types_left(fdi: np.void, s: int) -> list[str]:
     left = [kind for kind in range(len(ft.TYPES)) if _alive(fdi, s, kind)]
     if any(kind < ft.N_CONSTANT for kind in left):
         early = fdi["evidence"] - fdi["surface"][s]["quiet"] < fdi["patience"]
-        left = [kind for kind in left if kind != ft.VARYING_LOSS and (kind != ft.SLOW or early)]
+        stays = {ft.OSCILLATORY, ft.SLOW} if early else {ft.OSCILLATORY}
+        left = [kind for kind in left if kind < ft.N_CONSTANT or kind in stays]
     return list(dict.fromkeys(ft.TYPES[kind] for kind in left))
 
 
@@ -80,6 +81,8 @@ def _estimate(fdi: np.void, s: int, kind: int) -> float | None:
     surface = fdi["surface"][s]
     if kind in (ft.CONSTANT_LOSS, ft.VARYING_LOSS):
         return float(fdi["estimator"][s]["theta"][DOMINANT_AXIS[s]])
+    if kind == ft.GROWING_BIAS:
+        return float(0.5 * (surface["low"] + surface["high"]) - surface["command"])
     if kind in (ft.STUCK, ft.BIAS):
         return float(0.5 * (surface["set_low"][kind] + surface["set_high"][kind]))
     if kind in (ft.UP, ft.DOWN):

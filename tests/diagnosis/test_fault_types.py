@@ -29,6 +29,12 @@ def bias(surface, at, share, dt):
     return lambda k, u: float(np.clip(u + (0.8 * share - 0.4) * (k >= at), low, high))
 
 
+def growing(surface, at, share, dt):
+    low, high = TRAVEL_RAD[:, surface]
+    b = 0.4 * share - 0.2
+    return lambda k, u: float(np.clip(u + b * (1 - np.exp(-0.03 * max(k - at, 0))), low, high))
+
+
 def lost(surface, at, share, dt):
     return lambda k, u: u * (1 - share) if k >= at else u
 
@@ -82,6 +88,7 @@ TYPES = {
     "stuck": (stuck, ft.STUCK),
     "float": (floating, ft.FLOAT),
     "bias": (bias, ft.BIAS),
+    "growing bias": (growing, ft.GROWING_BIAS),
     "hardover up": (runaway(1), ft.UP),
     "hardover down": (runaway(-1), ft.DOWN),
     "oscillatory": (swinging, ft.OSCILLATORY),

@@ -14,6 +14,7 @@ test can exclude a type sooner without excluding a true one some day.
     bias            p = u + b              b constant; cut off by the stops
     oscillatory     p - u swings about 0   no half-cycle longer than pi / slowest oscillation
     rate limit      p moves to u only      at any rate
+    growing bias    p = u + b              b of one sign and never smaller (incipient)
 
 A frame that admits eta alone tells nothing: so a fault may be intermittent. The promise: the type, constant
 while it is there, is never excluded, and so never misnamed. What cannot be told apart stays a candidate.
@@ -25,10 +26,10 @@ from beaver_ftc.compiled import kernel
 from beaver_ftc.diagnosis import membership
 from beaver_ftc.diagnosis.state import N_TYPES, NOT_ISOLATED, UNANTICIPATED
 
-CONSTANT_LOSS, STUCK, FLOAT, UP, DOWN, BIAS, VARYING_LOSS, OSCILLATORY, SLOW = range(N_TYPES)
+CONSTANT_LOSS, STUCK, FLOAT, UP, DOWN, BIAS, VARYING_LOSS, OSCILLATORY, SLOW, GROWING_BIAS = range(N_TYPES)
 TYPES = (
     "loss_of_effectiveness", "stuck", "float", "hardover", "hardover", "bias",
-    "loss_of_effectiveness", "oscillatory", "rate_limit",
+    "loss_of_effectiveness", "oscillatory", "rate_limit", "bias",
 )  # fmt: skip
 N_CONSTANT = 6  # of these the parameter is constant: what they say of one frame, the next can refute
 POSITION_FIRST = 4  # estimators 0 to 3 are losses of effectiveness, 4 to 7 positions, in surface order
@@ -146,6 +147,20 @@ def judge_pace(surface, low, high, u, frame):
 
 
 @kernel
+def judge_growth(surface, low, high, u):
+    """An incipient bias keeps its sign and does not shrink; at a stop it may be larger than it shows."""
+    if low > surface.travel_low and high < surface.travel_high:
+        if low - u > 0.0:
+            surface.grown_up = max(surface.grown_up, low - u)
+        if high - u < 0.0:
+            surface.grown_down = min(surface.grown_down, high - u)
+        above, below = surface.grown_up > 0.0, surface.grown_down < 0.0
+        less_above, less_below = high - u < surface.grown_up, low - u > surface.grown_down
+        if (above and below) or (above and less_above) or (below and less_below):
+            surface.type_excluded[GROWING_BIAS] = 1
+
+
+@kernel
 def judge(fdi, surface, frame):
     """Hold every type of one surface against the frame before the elapsed one: something was wrong in it."""
     low, high, u = surface.low_then, surface.high_then, surface.command_then
@@ -161,6 +176,7 @@ def judge(fdi, surface, frame):
     judge_bias(surface, low, high, u)
     judge_oscillation(fdi, surface, low - u, high - u, frame)
     judge_pace(surface, low, high, u, frame)
+    judge_growth(surface, low, high, u)
 
 
 @kernel
@@ -225,7 +241,8 @@ def swings(fdi, s):
 @kernel
 def explained(fdi, s):
     """Whether some type on surface s is left."""
-    return any_constant(fdi, s) or alive(fdi, s, VARYING_LOSS) or alive(fdi, s, SLOW) or swings(fdi, s)
+    courses = alive(fdi, s, VARYING_LOSS) or alive(fdi, s, SLOW) or alive(fdi, s, GROWING_BIAS)
+    return any_constant(fdi, s) or courses or swings(fdi, s)
 
 
 @kernel
@@ -308,11 +325,14 @@ def type_at_fault(fdi, s):
 
 @kernel
 def one_course(fdi, s, patient):
-    """The same when no constant explains it: a loss or a pace that varies, or an oscillation."""
-    if alive(fdi, s, SLOW):
-        return SLOW if not (alive(fdi, s, VARYING_LOSS) or alive(fdi, s, OSCILLATORY)) else -1
-    if alive(fdi, s, VARYING_LOSS):
-        return VARYING_LOSS if patient else -1
+    """The same when no constant explains it: a loss, pace or bias that varies, or an oscillation."""
+    fading, slow, growing = alive(fdi, s, VARYING_LOSS), alive(fdi, s, SLOW), alive(fdi, s, GROWING_BIAS)
+    if fading + slow + growing > 1 or (slow and alive(fdi, s, OSCILLATORY)):
+        return -1
+    if slow:
+        return SLOW
+    if fading or growing:
+        return (VARYING_LOSS if fading else GROWING_BIAS) if patient else -1
     return OSCILLATORY if swings(fdi, s) else -1
 
 

@@ -7,7 +7,7 @@ MAX_POLES = 6
 NOT_ISOLATED, UNANTICIPATED = -1, -2
 INTERVAL, PUBLISHED = 0, 1
 LOSS, POSITION = 0, 1  # kinds of hypothesis: fault_class.py
-N_TYPES = 9  # fault_types.py
+N_TYPES = 10  # fault_types.py
 DEADBEAT_PER_S = 1e6  # a pole at which exp(-lam dt) is 0: the filter keeps nothing but the last frame
 
 # Centres of the network's basis functions, rad; and its memory.
@@ -50,6 +50,7 @@ SURFACE = np.dtype(
         ("sign", "i8"), ("steady_since", "i8"), ("flips", "i8"), ("first_flip", "i8"), ("last_flip", "i8"),
         ("square", "f8"), ("squares", "f8"), ("absent", "i8"), ("quiet", "i8"),
         ("run_low", "f8"), ("run_high", "f8"), ("run_sign", "i8"), ("run_at", "i8"),
+        ("grown_up", "f8"), ("grown_down", "f8"),
     ],
     align=True,
 )  # fmt: skip

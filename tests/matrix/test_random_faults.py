@@ -1,0 +1,67 @@
+"""Random faults of every type on the truth: none is named wrongly, none is imagined."""
+
+import numpy as np
+
+from beaver_ftc.loop import fly
+from beaver_ftc.matrix.flying import verdict
+from beaver_ftc.results.metrics import metrics
+from flying import scenario
+
+FAULTS = 100
+
+
+def drawn(rng, at_s):
+    """A fault of any type, abrupt or incipient, lasting or not."""
+    kind, more = (
+        ("loss_of_effectiveness", {"magnitude": rng.uniform(0.2, 1)}),
+        ("stuck", {"position_deg": rng.uniform(-10, 10)} if rng.random() < 0.7 else {}),
+        ("hardover", {"direction": int(rng.choice([-1, 1]))}),
+        ("float", {}),
+        ("bias", {"bias_deg": rng.uniform(-5, 5)}),
+        ("rate_limit", {"scale": rng.uniform(0.005, 0.1)}),
+        ("oscillatory", {"amplitude_deg": rng.uniform(0.3, 4), "frequency_rad_s": rng.uniform(1, 12)}),
+    )[rng.integers(7)]
+    if kind in ("loss_of_effectiveness", "bias", "oscillatory") and rng.random() < 0.3:
+        more |= {"profile": "incipient", "kappa_per_s": rng.uniform(0.1, 5)}
+    if rng.random() < 0.2:
+        more["end_s"] = at_s + rng.uniform(1, 8)
+    surface = ("aileron", "elevator", "rudder", "flap")[rng.integers(4)]
+    return {"type": kind, "actuator": surface, "at_s": at_s, **more}
+
+
+def flight_of(rng):
+    at_s = 2 + rng.integers(0, 800) / 100
+    return scenario(
+        duration_s=at_s + 14,
+        rate_hz=int(rng.choice([50, 100])),
+        substeps=int(rng.choice([1, 1, 3])),
+        initial={"airspeed_mps": rng.uniform(35, 52), "altitude_m": rng.uniform(0, 3000)},
+        reference={
+            axis: [{"sine": {"amplitude_deg_s": rng.uniform(0, 4), "frequency_hz": rng.uniform(0.1, 0.6)}}]
+            for axis in "pqr"
+        },
+        uncertainty={
+            "inertia_coupling": dict(zip("pqr", rng.uniform(-0.25, 0.25, 3), strict=True)),
+            "sinusoid": {
+                axis: {"amplitude_rad_s2": rng.uniform(0, 0.02), "frequency_rad_s": rng.uniform(0.5, 30)}
+                for axis in "pqr"
+            },
+        },
+        faults=[drawn(rng, at_s)],
+        fdi={"fault_class": "all"},
+        control={"law": "fault-tolerant" if rng.random() < 0.8 else "nominal"},
+    )
+
+
+def test_none_is_named_wrongly_and_none_is_imagined():
+    rng = np.random.default_rng(77)
+    wrong, named = [], 0
+    for _ in range(FAULTS):
+        flight = fly(flight_of(rng))
+        fault = flight.scenario.faults[0]
+        said = verdict(metrics(flight), fault.actuator, fault.type)
+        named += said in ("named", "surface")
+        if said == "WRONG":
+            wrong.append((fault, flight.isolated, flight.isolation_type, flight.candidates))
+    assert wrong == []
+    assert named >= FAULTS / 2

@@ -87,11 +87,9 @@ def _estimate(fdi: np.void, s: int, kind: int) -> float | None:
         return float(0.5 * (surface["set_low"][kind] + surface["set_high"][kind]))
     if kind in (ft.UP, ft.DOWN):
         return float(surface["travel_high"] if _alive(fdi, s, ft.UP) else surface["travel_low"])
-    if kind == ft.FLOAT:
-        return 0.0
     if kind == ft.OSCILLATORY:
         return float(sqrt(2.0 * surface["squares"] / (surface["last_flip"] - surface["first_flip"])))
-    return None
+    return 0.0 if kind == ft.FLOAT else None
 
 
 def _interval(fdi: np.void, s: int, kind: int) -> tuple[float, float] | None:

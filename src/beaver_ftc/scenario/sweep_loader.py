@@ -73,7 +73,7 @@ def load_sweep_text(
 
 
 def is_sweep(path_or_name: str | Path) -> bool:
-    """Whether a file (or name) that can be read says that it is a sweep: it has a `base`, as no scenario has."""
+    """Whether a file (or name) that can be read is a sweep: it has a `base`, as no scenario has."""
     path = resolve_sweep(path_or_name)
     try:
         return path.is_file() and "base" in parse_document(read_file(path, str(path)), str(path)).data

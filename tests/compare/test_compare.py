@@ -161,8 +161,13 @@ def test_what_is_better_than_ours_is_said_and_nothing_else():
         _line(SCHEME, "lqr", ratio_median=0.7, ratio_90=None),
         _line(SCHEME, ORACLE, ratio_median=1.0, ratio_90=1.0),
     ]
-    assert better_than_ours(lines) == [
+    free = {
+        SCHEME: {"detection_rate": 0.9, "delay_median_s": 0.1},
+        "rival": {"detection_rate": 1.0, "delay_median_s": 0.2},
+    }
+    assert better_than_ours(lines, free) == [
         "rival has the better 90 % detection delay, s: 5 against never",
+        "with no false alarm, rival has the better detection rate: 1 against 0.9",
         "lqr has the better median tracking ratio to the oracle: 0.7 against 1.5",
     ]
 

@@ -1,20 +1,16 @@
 """Counting: rates with their bounds, quantiles with what never came, levels at matched false alarms."""
 
-from math import inf, log
+from math import inf
 
-import numpy as np
 import pytest
-from scipy.stats import poisson
 
 from beaver_ftc.compare.replay import Trace
 from beaver_ftc.compare.tally import (
     line_of,
     matched,
     point_at,
-    poisson_upper,
-    quantile,
+    share_within,
     trade_off,
-    wilson_lower,
 )
 from beaver_ftc.compare.trial import Entry, Result
 
@@ -53,26 +49,10 @@ def test_nothing_to_count_is_not_zero():
     assert line.false_alarms_per_h is None
 
 
-@pytest.mark.parametrize("count", [0, 1, 7])
-def test_the_poisson_bound_is_where_so_few_become_unlikely(count):
-    assert poisson.cdf(count, poisson_upper(count)) == pytest.approx(0.05)
-
-
-def test_no_alarm_in_t_hours_bounds_the_rate_by_three_over_t():
-    assert poisson_upper(0) == pytest.approx(-log(0.05))
-
-
-@pytest.mark.parametrize(("k", "n"), [(0, 10), (5, 10), (10, 10), (99, 100)])
-def test_the_wilson_bound_solves_its_equation(k, n):
-    """p lies z standard deviations of its own below k / n."""
-    p, z = wilson_lower(k, n), 1.6448536269514722
-    assert (k / n - p) == pytest.approx(z * np.sqrt(p * (1 - p) / n), abs=1e-9)
-
-
 def test_quantiles_count_what_never_came_as_last():
-    assert quantile([3.0, 1.0, inf, 2.0], 0.5) == 2.0
-    assert quantile([3.0, 1.0, inf, 2.0], 0.9) == inf
-    assert quantile([], 0.5) == inf
+    assert share_within([3.0, 1.0, inf, 2.0], 0.5) == 2.0
+    assert share_within([3.0, 1.0, inf, 2.0], 0.9) == inf
+    assert share_within([], 0.5) == inf
 
 
 def _traces():

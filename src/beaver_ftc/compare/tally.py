@@ -2,13 +2,14 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from math import inf, sqrt
+from math import inf
 from statistics import median
+
+import numpy as np
 
 from beaver_ftc.compare.replay import Trace
 from beaver_ftc.compare.trial import ORACLE, SCHEME, Entry, Result, Trial
-
-CONFIDENCE = 0.95
+from beaver_ftc.statistics import CONFIDENCE, poisson_bound, quantile, wilson_bound
 
 
 @dataclass(frozen=True)
@@ -50,16 +51,18 @@ def line_of(entry: Entry, results: Sequence[Result], oracle: Sequence[Result]) -
         false_alarms=alarms,
         healthy_h=hours,
         false_alarms_per_h=alarms / hours if hours else None,
-        false_alarms_per_h_upper=poisson_upper(alarms) / hours if hours else None,
+        false_alarms_per_h_upper=poisson_bound(alarms, hours, CONFIDENCE, upper=True) if hours else None,
         faults=len(faulted),
         detection_rate=detected / len(faulted) if faulted else None,
-        detection_rate_lower=wilson_lower(detected, len(faulted)) if faulted else None,
-        delay_median_s=quantile([r.delay_s for r in faulted], 0.5),
-        delay_90_s=quantile([r.delay_s for r in faulted], 0.9),
+        detection_rate_lower=wilson_bound(detected, len(faulted), CONFIDENCE, upper=False)
+        if faulted
+        else None,
+        delay_median_s=share_within([r.delay_s for r in faulted], 0.5),
+        delay_90_s=share_within([r.delay_s for r in faulted], 0.9),
         isolation_rate=sum(r.correct for r in faulted) / len(faulted) if faulted else None,
-        isolation_delay_median_s=quantile([r.isolation_delay_s for r in faulted], 0.5),
-        ratio_median=quantile(ratios, 0.5) if ratios else None,
-        ratio_90=quantile(ratios, 0.9) if ratios else None,
+        isolation_delay_median_s=share_within([r.isolation_delay_s for r in faulted], 0.5),
+        ratio_median=share_within(ratios, 0.5) if ratios else None,
+        ratio_90=share_within(ratios, 0.9) if ratios else None,
         departures=sum(r.departed for r in mine),
         us=median(r.us for r in mine) if mine else 0.0,
     )
@@ -75,28 +78,9 @@ def _results(trials: Iterable[Trial], entry: Entry) -> list[Result]:
     return [result for trial in trials for result in trial.results if result.entry == entry]
 
 
-def quantile(values: Sequence[float], share: float) -> float:
-    """The smallest value that at least this share of the values do not exceed; infinite of none."""
-    if not values:
-        return inf
-    ordered = sorted(values)
-    return ordered[max(0, min(len(ordered) - 1, int(-(-share * len(ordered) // 1)) - 1))]
-
-
-def poisson_upper(count: int, confidence: float = CONFIDENCE) -> float:
-    """Upper one-sided confidence bound of a Poisson mean of which `count` were seen [Garwood1936]."""
-    from scipy.stats import chi2
-
-    return float(chi2.ppf(confidence, 2 * (count + 1)) / 2.0)
-
-
-def wilson_lower(successes: int, n: int, confidence: float = CONFIDENCE) -> float:
-    """Lower one-sided confidence bound of a probability [Wilson1927]."""
-    from statistics import NormalDist
-
-    z, p = NormalDist().inv_cdf(confidence), successes / n
-    centre, spread = p + z * z / (2 * n), z * sqrt(p * (1 - p) / n + z * z / (4 * n * n))
-    return max(0.0, (centre - spread) / (1 + z * z / n))
+def share_within(values: Sequence[float], share: float) -> float:
+    """The smallest value that at least this share of the flights do not exceed; infinite of none."""
+    return quantile(np.sort(np.asarray(values, dtype=float)), share) if len(values) else inf
 
 
 @dataclass(frozen=True)
@@ -126,7 +110,7 @@ def point_at(traces: Sequence[Trace], level: float) -> Point:
     alarms = sum(trace.false_alarm(level) for trace in traces)
     delays = [trace.delay_s(level) for trace in traces if trace.faulted and not trace.false_alarm(level)]
     rate = sum(delay < inf for delay in delays) / len(delays) if delays else 0.0
-    return Point(level, alarms / hours if hours else 0.0, rate, quantile(delays, 0.5))
+    return Point(level, alarms / hours if hours else 0.0, rate, share_within(delays, 0.5))
 
 
 def matched(traces: Sequence[Trace], per_hour: float = 0.0) -> Point:

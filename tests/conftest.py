@@ -1,4 +1,4 @@
-"""What all tests share: the helpers of tests/flying.py, and property tests that do not depend on the machine's mood."""
+"""What all tests share: the helpers of tests/flying.py, and property tests that repeat themselves."""
 
 import sys
 from pathlib import Path

@@ -84,7 +84,9 @@ class Loop:
         self.gust = GustSchedule(scenario.environment.gust, self.plant, scenario.rate_hz)
         self.n_frames = round(scenario.duration_s * scenario.rate_hz)
         self.plugged = self._plugged(detector, law)
-        self.columns = ch.log_columns(estimator_names(scenario.fdi.fault_class) if self._diagnoses_itself else ())
+        self.columns = ch.log_columns(
+            estimator_names(scenario.fdi.fault_class) if self._diagnoses_itself else ()
+        )
         self._log = np.empty((min(CHUNK_ROWS, self.n_frames), len(self.columns)))
         self._references = np.empty((len(self._log), 3))
         self.fly_frame = self.plugged or self.direct(fly_frame)
@@ -231,7 +233,9 @@ class Loop:
         frame = self.frames[0]
         if self.schedule.begun(k) and not frame["faulted"]:
             frame["faulted"], frame["fault_at_s"] = 1, k / self.scenario.rate_hz
-        frame["immovable"] = [any(self.plant.read(f"failures/{s}/{how}") for how in IMMOVABLE) for s in SURFACES]
+        frame["immovable"] = [
+            any(self.plant.read(f"failures/{s}/{how}") for how in IMMOVABLE) for s in SURFACES
+        ]
         frame["Cm_alpha3"] = self.plant.read("failures/unanticipated/Cm-alpha3")
 
 

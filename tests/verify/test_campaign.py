@@ -11,9 +11,9 @@ from typer.testing import CliRunner
 
 from beaver_ftc.cli.main import app
 from beaver_ftc.errors import BadInput
+from beaver_ftc.statistics import binomial_upper, poisson_bound
 from beaver_ftc.verify import campaign
 from beaver_ftc.verify.campaign import Campaign, conduct
-from beaver_ftc.verify.confidence import binomial_upper, poisson_upper
 from beaver_ftc.verify.draw import Draw
 from beaver_ftc.verify.summary import PROMISES, summarise, summary_text
 
@@ -142,14 +142,14 @@ def test_delays_that_never_come_count_as_longest():
 
 
 def test_no_events_give_the_textbook_limits():
-    assert poisson_upper(0, 10.0) == pytest.approx(-log(0.05) / 10.0)
+    assert poisson_bound(0, 10.0, 0.95, upper=True) == pytest.approx(-log(0.05) / 10.0)
     assert binomial_upper(0, 50) == pytest.approx(1 - 0.05 ** (1 / 50))
     assert binomial_upper(7, 7) == 1.0
 
 
 @given(st.integers(0, 40), st.integers(0, 200), st.floats(0.5, 0.999))
 def test_at_the_limit_so_few_events_have_just_the_stated_chance(events, more, confidence):
-    limit = poisson_upper(events, 1.0, confidence)
+    limit = poisson_bound(events, 1.0, confidence, upper=True)
     assert poisson.cdf(events, limit) == pytest.approx(1 - confidence, rel=1e-6)
     if more:
         limit = binomial_upper(events, events + more, confidence)

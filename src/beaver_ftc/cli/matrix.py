@@ -11,8 +11,8 @@ from beaver_ftc.cli.output import Format, FormatOption, emit, emit_json
 def command(
     out: Annotated[Path, typer.Option(help="Folder for the results: `fault-matrix` in it.")] = Path("runs"),
     airspeed: Annotated[
-        list[float], typer.Option(min=30, max=55, help="Airspeed, m/s; once for each.")
-    ] = [38.0, 45.0, 52.0],  # noqa: B006
+        list[float] | None, typer.Option(min=30, max=55, help="Airspeed, m/s; once for each. [38, 45, 52]")
+    ] = None,
     workers: Annotated[int, typer.Option(min=1, help="Processes.")] = 1,
     format: FormatOption = Format.text,
 ) -> None:
@@ -21,11 +21,12 @@ def command(
     Exit status 1 if a fault is named wrongly or an alarm is false.
     """
     from beaver_ftc.cli.progress import progress_bar
+    from beaver_ftc.matrix.cases import AIRSPEEDS_MPS
     from beaver_ftc.matrix.run import NAME, run_matrix
     from beaver_ftc.matrix.text import as_text
 
     with progress_bar("faults") as progress:
-        document = run_matrix(out, tuple(airspeed), workers, progress)
+        document = run_matrix(out, tuple(airspeed or AIRSPEEDS_MPS), workers, progress)
     folder = str(out / NAME)
     if format is Format.json:
         emit_json(document | {"folder": folder})

@@ -19,7 +19,7 @@ def approach(control, target):
 
 @kernel
 def allow_for_offsets(control, G):
-    """Take what the surfaces give without being asked, G (3, 4) rad/s2 per rad times offset, off the demand."""
+    """Take off the demand what the surfaces give unasked: G (3, 4) rad/s2 per rad times the offsets."""
     for i in range(3):
         for s in range(4):
             control.demand[i] -= G[i, s] * control.offset[s]

@@ -83,8 +83,8 @@ class Bounds(BaseModel):
 class Probing(BaseModel):
     """A small movement of the flap, met by the elevator, to learn which of the two is at fault.
 
-    If both follow, nothing is felt. It begins when the pitch axis is at fault and neither is named once a slow
-    oscillation would have shown, and ends when one is.
+    If both follow, nothing is felt. It begins when the pitch axis is at fault and neither is named once a
+    slow oscillation would have shown, and ends when one is.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from beaver_ftc.scenario.sweep_schema import AxisLevels, Level, QuantileLevel, SweepExpect
+from beaver_ftc.statistics import poisson, poisson_bound, quantile, quantile_bound, wilson, wilson_bound
 from beaver_ftc.sweep.flights import Flights
-from beaver_ftc.sweep.intervals import poisson, poisson_bound, quantile, quantile_bound, wilson, wilson_bound
 from beaver_ftc.sweep.summary import number
 
 if TYPE_CHECKING:

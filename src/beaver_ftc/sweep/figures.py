@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from beaver_ftc.results.looks import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILION
+from beaver_ftc.statistics import wilson
 from beaver_ftc.sweep.flights import Flights
-from beaver_ftc.sweep.intervals import wilson
 from beaver_ftc.sweep.summary import NO_ALARM
 
 if TYPE_CHECKING:

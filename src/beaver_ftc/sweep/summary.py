@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from beaver_ftc.statistics import CONFIDENCE, poisson, quantile, wilson
 from beaver_ftc.sweep import sensitivity
 from beaver_ftc.sweep.flights import NO_FAULT, Flights
-from beaver_ftc.sweep.intervals import CONFIDENCE, poisson, quantile, wilson
 from beaver_ftc.sweep.table import AXES
 
 if TYPE_CHECKING:

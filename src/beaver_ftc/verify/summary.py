@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from beaver_ftc.verify.confidence import binomial_upper, poisson_upper
+from beaver_ftc.statistics import CONFIDENCE, binomial_upper, poisson_bound
 from beaver_ftc.verify.fly import SCHEMES, SHARPENED, STEPS, Row
 
 PROMISES = ("false_alarms", "true_fault_exclusions", "wrong_isolations", "late_detections")
@@ -45,7 +45,9 @@ def _healthy(rows: Sequence[Row]) -> dict[str, Any]:
         "hours": hours,
         "false_alarms": alarms,
         "false_alarms_per_hour": alarms / hours if hours else None,
-        "false_alarms_per_hour_upper_95": poisson_upper(alarms, hours) if hours else None,
+        "false_alarms_per_hour_upper_95": poisson_bound(alarms, hours, CONFIDENCE, upper=True)
+        if hours
+        else None,
         "departures": sum(row["departed"] for row in rows),
         "hours_outside_envelope": sum(row["outside_s"] for row in rows) / 3600.0,
         "closest_approach": dict(zip(SCHEMES, closest, strict=False)) if len(rows) else {},

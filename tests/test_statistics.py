@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from beaver_ftc.sweep.intervals import poisson, poisson_bound, quantile, quantile_bound, wilson, wilson_bound
+from beaver_ftc.statistics import poisson, poisson_bound, quantile, quantile_bound, wilson, wilson_bound
 
 
 @pytest.mark.parametrize(

@@ -22,7 +22,7 @@ class Estimate:
 
 
 def wilson(successes: int, trials: int, confidence: float = CONFIDENCE) -> Estimate:
-    """A rate with its two-sided score interval [Wilson 1927]."""
+    """A rate with its two-sided score interval [Wilson1927]."""
     if trials == 0:
         return Estimate(math.nan, 0.0, 1.0)
     low, high = (wilson_bound(successes, trials, (1.0 + confidence) / 2, upper) for upper in (False, True))
@@ -41,7 +41,7 @@ def wilson_bound(successes: int, trials: int, confidence: float, upper: bool) ->
 
 
 def poisson(events: int, exposure: float, confidence: float = CONFIDENCE) -> Estimate:
-    """Events per unit of exposure with their two-sided exact interval [Garwood 1936]."""
+    """Events per unit of exposure with their two-sided exact interval [Garwood1936]."""
     if exposure <= 0:
         return Estimate(math.nan, 0.0, math.inf)
     low, high = (poisson_bound(events, exposure, (1.0 + confidence) / 2, upper) for upper in (False, True))
@@ -59,6 +59,13 @@ def poisson_bound(events: int, exposure: float, confidence: float, upper: bool) 
     return float(gammaincinv(events, 1 - confidence)) / exposure if events else 0.0
 
 
+def binomial_upper(events: int, trials: int, confidence: float = CONFIDENCE) -> float:
+    """Exact upper limit of a probability after `events` in `trials` [ClopperPearson1934]."""
+    from scipy.special import betaincinv
+
+    return float(betaincinv(events + 1, trials - events, confidence)) if events < trials else 1.0
+
+
 def quantile(ordered: np.ndarray, q: float) -> float:
     """The q quantile of ordered values (n,): the smallest one that a share q does not exceed."""
     if not ordered.size:
@@ -70,7 +77,7 @@ def quantile_bound(ordered: np.ndarray, q: float, confidence: float, upper: bool
     """The quantile's one-sided bound, free of any distribution: an order statistic.
 
     The r-th smallest of n values is at or above the q quantile with probability P(Binomial(n, q) < r), and at
-    or below it with probability P(Binomial(n, q) >= r) [Wilks 1941].
+    or below it with probability P(Binomial(n, q) >= r) [Wilks1941].
     """
     from scipy.special import bdtr
 

@@ -18,7 +18,8 @@ CONTROL = np.dtype(
         ("probe", "f8"), ("probed", "i8"), ("probe_from_s", "f8"), ("probe_to_s", "f8"),
         # what authority.py keeps
         ("governed_rate", "f8", (3,)), ("governed_acceleration", "f8", (3,)), ("hedging", "i8"),
-        ("reference_scale", "f8", (3,)), ("hold", "f8", (3,)), ("shortfall", "f8", (3,)), ("beyond", "i8", (3,)),
+        ("reference_scale", "f8", (3,)), ("hold", "f8", (3,)),
+        ("shortfall", "f8", (3,)), ("beyond", "i8", (3,)),
         ("trim", "f8", (4,)), ("low", "f8", (4,)), ("high", "f8", (4,)),
         ("command", "f8", (4,)), ("saturated", "i8", (4,)),
         ("hand_over", "f8"), ("hand_over_step", "f8"),

@@ -22,7 +22,7 @@ _BETA_FIRST, _BETA_STEP = BETA_CENTRES[0], BETA_CENTRES[1] - BETA_CENTRES[0]
 
 @kernel
 def gaussians(place, count, first, out):
-    """Fill out[first : first + count] with exp(-(place - j)^2 / 2), j = 0, 1, ...; returns the sum of squares.
+    """Fill out[first : first + count] with exp(-(place - j)^2 / 2), j = 0, 1, ...; return the squares' sum.
 
     From one to the next they change by exp(place - j - 1/2), and that by 1/e: two exponentials do for all.
     """

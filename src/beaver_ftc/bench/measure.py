@@ -13,7 +13,7 @@ import numpy as np
 from beaver_ftc.bench.contenders import Bare, ClosedLoop, take_over
 from beaver_ftc.bench.parts import PARTS, frame_with
 from beaver_ftc.bench.plugged import InnovationDetector, ProportionalInversion
-from beaver_ftc.bench.stopwatch import WALL, Contender, Timing, interleave
+from beaver_ftc.bench.stopwatch import Contender, Timing, interleave
 from beaver_ftc.bench.straightforward import Straightforward
 from beaver_ftc.bench.whole_flight import WholeFlight
 from beaver_ftc.plant import native
@@ -147,7 +147,7 @@ def _whole_flights(scenario: Scenario, rounds: int) -> Document:
     with tempfile.TemporaryDirectory() as folder:
         with_file = WholeFlight(long, Path(folder) / "log.parquet")
         bare = Bare(take_over(long, 0.0), long.substeps)
-        us = interleave([bare, WholeFlight(long), with_file], rounds, frames, WALL)
+        us = interleave([bare, WholeFlight(long), with_file], rounds, frames)
     return {
         "frames": frames,
         **_against(us[:, 0], us[:, 1]),

@@ -1,7 +1,6 @@
 """Timing side by side in one process: a machine's mood then strikes all contenders alike.
 
-Time is this process's own processor time, so that others at work on the machine count little; what waits, as
-for a disk, is timed by the wall.
+Time is this process's own processor time: others at work on the machine, and its disk, count little.
 """
 
 import gc
@@ -39,12 +38,10 @@ class Timing:
 
 
 Clock = Callable[[], int]  # ns
-PROCESSOR: Clock = time.process_time_ns
-WALL: Clock = time.perf_counter_ns
 
 
 def interleave(
-    contenders: Sequence[Contender], rounds: int, frames: int, clock: Clock = PROCESSOR
+    contenders: Sequence[Contender], rounds: int, frames: int, clock: Clock = time.process_time_ns
 ) -> np.ndarray:
     """Time all contenders in turn, A B C then C B A; microseconds a frame, (rounds, contenders).
 

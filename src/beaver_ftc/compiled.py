@@ -22,7 +22,7 @@ import numba
 from numba.core.dispatcher import Dispatcher
 from numba.core.runtime import rtsys
 
-_VERSIONS_KEPT = 10
+_VERSIONS_KEPT = 5
 
 _PACKAGE = Path(__file__).parent
 _SOURCES = (

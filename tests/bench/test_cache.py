@@ -76,7 +76,10 @@ def test_what_old_versions_left_goes_but_for_the_latest(nowhere, tmp_path):
     (base / "keep-me").mkdir()
     nowhere.setenv("XDG_CACHE_HOME", str(tmp_path))
     compiled.cache_folder()
-    assert {path.name for path in base.iterdir()} == {"keep-me", *(folder.name for folder in old[-10:])}
+    assert {path.name for path in base.iterdir()} == {
+        "keep-me",
+        *(folder.name for folder in old[-compiled._VERSIONS_KEPT :]),
+    }
 
 
 PROGRAM = """

@@ -1,4 +1,4 @@
-"""What can go wrong, and the exit status each kind ends with (SPEC 8)."""
+"""What can go wrong, and the exit status each kind ends with."""
 
 
 class BeaverFtcError(Exception):

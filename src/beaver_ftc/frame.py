@@ -121,7 +121,7 @@ def flight_status(truth):
 
 @kernel
 def unanticipated_effect(frame):
-    """The pitch acceleration of the truth's extra moment on alpha^3, rad/s2 (SPEC 4)."""
+    """The pitch acceleration of the truth's extra moment on alpha^3, rad/s2 [Zhang2005]."""
     design, y = frame.design, frame.y
     return frame.Cm_alpha3 * design.Qm * y[QDYN] * design.S * design.c * y[ALPHA] ** 3
 

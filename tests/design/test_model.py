@@ -56,7 +56,7 @@ def test_it_gives_the_angular_accelerations_of_fdc():
 
 
 def moment_form(design, x, y, u):
-    """Euler's equations with the inertia tensor and the table of terms: no constant of SPEC 3 is used."""
+    """Euler's equations with the inertia tensor and the table of terms: no inertia constant is used."""
     table = np.zeros((3, 9))
     regressors(design, x, y, u, table)
     Cl, Cm, Cn = np.sum(table * design["coefficient"], axis=1)

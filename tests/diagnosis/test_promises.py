@@ -1,4 +1,4 @@
-"""The promises of SPEC 5, on the plant where they hold exactly, against an uncertainty that fights them."""
+"""The promises of the theory, on the plant where they hold exactly, against an uncertainty that fights."""
 
 import numpy as np
 import pytest

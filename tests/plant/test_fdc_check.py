@@ -1,4 +1,4 @@
-"""SPEC 10, first two rows: the truth reproduces the FDC equations."""
+"""The truth reproduces the FDC equations."""
 
 from pathlib import Path
 

@@ -27,7 +27,7 @@ def test_a_row_says_what_the_flights_metrics_say(short):
 
 
 def test_every_metric_has_a_column(short):
-    """All that SPEC 9 lists, but for what all flights share; lists have columns of their own."""
+    """All that metrics.json lists, but for what all flights share; lists have columns of their own."""
     from beaver_ftc.loop import fly
 
     document = metrics(fly(scenario_of(short, Plan(short).assignments([0])[0])))

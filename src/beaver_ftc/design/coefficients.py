@@ -69,7 +69,7 @@ class MassProperties:
 
 @dataclass(frozen=True)
 class InertiaCoefficients:
-    """What multiplies rate products, N, L and M in the angular accelerations (SPEC 3) [FDC]."""
+    """What multiplies rate products, N, L and M in the angular accelerations [FDC]."""
 
     Ppq: float
     Pqr: float

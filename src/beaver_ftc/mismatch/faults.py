@@ -52,14 +52,14 @@ def in_force(fault: Any, t_s: np.ndarray) -> np.ndarray:
 
 
 def share(fault: Any, t_s: np.ndarray) -> np.ndarray:
-    """B(t - T0) (n,): how far a fault has grown, 0 where it is not there [SPEC 4]."""
+    """B(t - T0) (n,): how far a fault has grown, 0 where it is not there [Zhang2005]."""
     age = np.maximum(t_s - fault.at_s, 0.0)
     grown = 1.0 - np.exp(-fault.kappa_per_s * age) if fault.profile == "incipient" else 1.0
     return np.where(in_force(fault, t_s), grown, 0.0)
 
 
 def unanticipated(fault: Any, belief: Belief, states: States) -> np.ndarray:
-    """The extra pitching moment on alpha^3 as an acceleration (n, 3) rad/s2 [SPEC 4]."""
+    """The extra pitching moment on alpha^3 as an acceleration (n, 3) rad/s2 [Zhang2005]."""
     moment = states.y[:, 3] * GEOMETRY.wing_area_m2 * GEOMETRY.chord_m * states.y[:, 0] ** 3
     pitch = fault.Cm_alpha3 * share(fault, states.t_s) * belief.parts.inertia.Qm * moment
     return np.column_stack([0.0 * pitch, pitch, 0.0 * pitch])

@@ -1,7 +1,7 @@
 """Angular accelerations from the coefficient table, for many frames at once.
 
 The same physics as `design.model`, by another road: each term is its table entry's value times the product of
-its factors, turned into an acceleration by the inertia, [SPEC 3]. Nothing is summed that one may want apart.
+its factors, turned into an acceleration by the inertia [FDC]. Nothing is summed that one may want apart.
 """
 
 from collections.abc import Iterable, Mapping
@@ -63,7 +63,7 @@ def aerodynamic(
 
 
 def inertial(inertia: InertiaCoefficients, x: np.ndarray) -> np.ndarray:
-    """The angular acceleration (n, 3) rad/s2 of turning with no moment, from the rate products [SPEC 3]."""
+    """The angular acceleration (n, 3) rad/s2 of turning with no moment, from the rate products [FDC]."""
     p, q, r = x.T
     return np.column_stack(
         [

@@ -1,4 +1,4 @@
-"""The truth against the FDC data: state derivatives at random states, and two doublet responses (SPEC 10).
+"""The truth against the FDC data: state derivatives at random states, and two doublet responses.
 
 The data are CSV files computed from the FDC equations by an independent implementation; `report(folder)` is
 the comparison, e.g.

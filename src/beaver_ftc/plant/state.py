@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-# Gravity is that of latitude 45 deg, where the FDC data belong (SPEC 1).
+# Gravity is that of latitude 45 deg, where the FDC data belong.
 START_LATITUDE_DEG = 45.0
 
 

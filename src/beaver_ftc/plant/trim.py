@@ -25,7 +25,7 @@ from beaver_ftc.errors import BadInput
 from beaver_ftc.plant.adapter import FT_PER_M, PA_PER_PSF, Plant
 from beaver_ftc.plant.state import FlightState
 
-TOLERANCE = 1e-9  # m/s2 and rad/s2, in each of the six accelerations (SPEC: issue 2, item 2)
+TOLERANCE = 1e-9  # m/s2 and rad/s2, in each of the six accelerations
 
 # R-985 Wasp Junior: 450 hp for take-off at 2300 rpm and 36.5 inHg; below, idling.
 ENGINE_RPM = (600.0, 2300.0)
@@ -34,7 +34,7 @@ MANIFOLD_PRESSURE_INHG = (10.0, 36.5)
 # absorbs no more than its friction: 1.3 bar in 16.1 l at 2300 rpm is 40 kW.
 ENGINE_POWER_KW = (-40.0, 400.0)
 
-_ALPHA_LIMIT_RAD = 0.6  # beyond it an aircraft has departed (SPEC 1), so it cannot be trimmed there
+_ALPHA_LIMIT_RAD = 0.6  # beyond it an aircraft has departed, so it cannot be trimmed there
 _MAX_ITERATIONS = 12
 _STEP = 1e-5  # rad, for the Jacobian
 _LIFTED_TRAVEL_RAD = 10.0

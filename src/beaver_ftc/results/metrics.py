@@ -1,4 +1,4 @@
-"""What a flight amounts to: the document `metrics.json` (SPEC 9).
+"""What a flight amounts to: the document `metrics.json`.
 
 Times are seconds from the start of the flight, delays seconds from the first fault, rates deg/s. A quantity
 that does not exist is null: a document never holds NaN. Nothing in it depends on the wall clock or the
@@ -28,7 +28,7 @@ LOSS_OF_EFFECTIVENESS = "loss_of_effectiveness"
 
 
 def metrics(flight: "Flight") -> Document:
-    """The metrics of `flight`, with the keys of SPEC 9 in that order."""
+    """The metrics of `flight`, key by key in the order documented."""
     scenario = flight.scenario
     fault = first_fault(scenario)
     document = {

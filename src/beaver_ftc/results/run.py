@@ -1,4 +1,4 @@
-"""Fly a scenario and keep what came out: the result folder of one run (SPEC 9)."""
+"""Fly a scenario and keep what came out: the result folder of one run."""
 
 from collections.abc import Callable, Collection
 from pathlib import Path

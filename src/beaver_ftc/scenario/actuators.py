@@ -41,7 +41,7 @@ class ActuatorDynamics(Section):
 
 PRESETS: dict[str, dict[str, float]] = {
     "ideal": {},
-    "servo": {"bandwidth_rad_s": 20.0, "rate_limit_deg_s": 60.0},  # SPEC 7's example of real actuators
+    "servo": {"bandwidth_rad_s": 20.0, "rate_limit_deg_s": 60.0},  # rates as in [SL03]
 }
 
 

@@ -31,7 +31,7 @@ class _Switched(_Fault):
 
 
 class _Gradual(_Fault):
-    """A fault with a time profile B(t - at_s): a step, or 1 - exp(-kappa (t - at_s)) (SPEC 4)."""
+    """A fault with a time profile B(t - at_s): a step, or 1 - exp(-kappa (t - at_s)) [Zhang2005]."""
 
     profile: Literal["abrupt", "incipient"] = Field(
         default="abrupt", description="a step, or growing as 1 - exp(-kappa t)"
@@ -112,7 +112,7 @@ class Oscillatory(_Gradual):
 
 
 class Unanticipated(_Gradual):
-    """A fault outside the declared class: an extra pitching moment coefficient on alpha^3 (SPEC 4)."""
+    """A fault outside the declared class: an extra pitching moment coefficient on alpha^3 [Zhang2005]."""
 
     type: Literal["unanticipated"]
     Cm_alpha3: Number = number(

@@ -1,4 +1,4 @@
-"""The scenario file (SPEC 7) as frozen, typed, strict sections; ranges are the contract's."""
+"""The scenario file as frozen, typed, strict sections; ranges are the contract's."""
 
 from math import degrees
 from typing import Annotated, Any, Literal, Self
@@ -166,7 +166,7 @@ class InertiaScale(Section):
 
 
 class DesignModel(Section):
-    """What the designer leaves out or gets wrong on purpose (SPEC 3); the truth stays as it is."""
+    """What the designer leaves out or gets wrong on purpose; the truth stays as it is."""
 
     engine_terms: Flag = Field(
         default=True, description="false neglects the dpt terms of Cl, Cm, Cn, as published"

@@ -1,4 +1,4 @@
-"""The sweep file (SPEC 7): a base scenario, what varies in it, and what the statistics must show."""
+"""The sweep file: a base scenario, what varies in it, and what the statistics must show."""
 
 from typing import Annotated, Any, Literal, Self
 

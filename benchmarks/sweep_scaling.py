@@ -96,10 +96,11 @@ def compare_workers(n: int, workers: int, rounds: int) -> float:
 
 
 def compare_costs(n: int) -> None:
-    """Print what a sweep costs beside flying, and memory."""
-    wall, alone = flight_seconds()
+    """Print what a sweep costs beside flying (timed before and after, as speed drifts), and memory."""
+    before = flight_seconds()
     few = memory_mb()
     worker, own = processor_seconds(n)
+    wall, alone = ((a + b) / 2 for a, b in zip(before, flight_seconds(), strict=True))
     beside = (worker + own) / (n * alone) - 1
     print(f"one flight alone            {1e3 * alone:8.2f} ms of processor, {1e3 * wall:.2f} ms of wall time")
     print(

@@ -1,7 +1,6 @@
 """Dotted keys: `faults[0].magnitude` as a place in a scenario's data."""
 
 import re
-from copy import deepcopy
 from typing import Any
 
 from beaver_ftc.scenario.base import Location
@@ -25,10 +24,17 @@ def parse_key(key: str) -> Location:
 
 def with_values(data: dict[str, Any], values: dict[Location, Any]) -> dict[str, Any]:
     """A copy of the data with these values in these places; sections that are missing are made."""
-    changed = deepcopy(data)
+    changed = _copied(data)
     for location, value in values.items():
-        _put(changed, location, deepcopy(value))
+        _put(changed, location, _copied(value))
     return changed
+
+
+def _copied(data: Any) -> Any:
+    """A copy of mappings and lists all the way down; for plain data several times faster than deepcopy."""
+    if isinstance(data, dict):
+        return {key: _copied(value) for key, value in data.items()}
+    return [_copied(value) for value in data] if isinstance(data, list) else data
 
 
 def _put(data: Any, location: Location, value: Any) -> None:

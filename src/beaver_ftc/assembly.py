@@ -58,13 +58,15 @@ def _assemble_diagnosis(fdi: np.void, config: FdiConfig, dt: float, travel: np.n
         fie["low"], fie["high"] = PARAMETER_SET[kind] if kind == LOSS else travel[:, surface]
 
 
-def _assemble_types(fdi: np.void, scenario: Scenario, dt: float, travel: np.ndarray) -> None:
-    config = scenario.fdi
+def _assemble_types(frame: np.void, scenario: Scenario, dt: float, travel: np.ndarray) -> None:
+    config, fdi, actuators = scenario.fdi, frame["fdi"], frame["actuators"]
     fdi["every_type"], fdi["whole"] = config.fault_class == "all", scenario.substeps == 1
     fdi["patience"] = ceil(pi / config.slowest_oscillation_rad_s / dt)
     fdi["type"] = fdi["lead"] = fdi["lead_kind"] = fdi["type_at_s"] = -1
-    for name, place, low, high in zip(SURFACES, fdi["surface"], *travel, strict=True):
+    fdi["instants"], fdi["returns"] = scenario.substeps, actuators["real"]
+    for s, (name, place, low, high) in enumerate(zip(SURFACES, fdi["surface"], *travel, strict=True)):
         place["travel_low"], place["travel_high"] = low, high
+        place["approach"], place["step"] = actuators["approach"][s], actuators["step"][s]
         rate_deg_s = getattr(scenario.actuators, name).rate_limit_deg_s
         place["least_runaway_rate"] = 0.5 * (radians(rate_deg_s) or RUNAWAY_RATE_RAD_S)
 
@@ -173,7 +175,7 @@ def assemble(scenario: Scenario, trim: np.ndarray, travel: np.ndarray) -> np.nda
     _assemble_instruments(frame["instruments"], scenario, jsbsim_dt)
     _assemble_actuators(frame["actuators"], scenario.actuators, jsbsim_dt, travel)
     _assemble_diagnosis(frame["fdi"], scenario.fdi, dt, travel)
-    _assemble_types(frame["fdi"], scenario, dt, travel)
+    _assemble_types(frame, scenario, dt, travel)
     _assemble_admitted(frame, scenario)
     _assemble_sharpening(frame["fdi"], scenario.fdi, dt)
     _assemble_network(frame["fdi"]["network"], scenario.control)

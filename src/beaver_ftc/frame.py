@@ -196,6 +196,8 @@ def predict(frame):
     guarantee.track(fdi, frame.phi_mean)
     bank.innovate(fdi, frame.x, frame.x_then, frame.believed)
     isolation.suppose_all(fdi, frame.G_mean, frame.Gu_mean, frame.Gu_spread)
+    if fdi.every_type:
+        fault_types.note_orders(fdi, frame.commanded)
     if fdi.detected:
         isolation.predict_all(fdi, frame.x_then, frame.believed)
         for s in range(4):

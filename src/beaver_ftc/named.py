@@ -62,7 +62,7 @@ def _types_left(fdi: np.void, s: int) -> list[str]:
     left = [kind for kind in range(len(ft.TYPES)) if _alive(fdi, s, kind)]
     if any(kind < ft.N_CONSTANT for kind in left):
         early = fdi["evidence"] - fdi["surface"][s]["quiet"] < fdi["patience"]
-        stays = {ft.OSCILLATORY, ft.SLOW} if early else {ft.OSCILLATORY}
+        stays = {ft.OSCILLATORY, ft.GROWING_BIAS} | ({ft.SLOW} if early else set())
         left = [kind for kind in left if kind < ft.N_CONSTANT or kind in stays]
     return list(dict.fromkeys(ft.TYPES[kind] for kind in left))
 

@@ -41,9 +41,19 @@ class DesignPlant:
     """
 
     def __init__(
-        self, seed=0, rate_hz=100.0, airspeed_mps=45.0, surface=None, theta=None, position=None, **fdi
+        self,
+        seed=0,
+        rate_hz=100.0,
+        airspeed_mps=45.0,
+        surface=None,
+        theta=None,
+        position=None,
+        actuators="ideal",
+        **fdi,
     ):
-        scenario = Scenario.model_validate({"name": "design-plant", "rate_hz": rate_hz, "fdi": fdi})
+        keys = {"rate_hz": rate_hz, "fdi": fdi, "actuators": actuators}
+        scenario = Scenario.model_validate({"name": "design-plant", **keys})
+        self.servo = actuators == "servo"
         self.frames = assemble(scenario, np.zeros(4), TRAVEL_RAD)
         if numba.config.DISABLE_JIT:
             self.frames = self.frames.view(np.recarray)
@@ -56,6 +66,7 @@ class DesignPlant:
         self.wave = self.rng.uniform(0.2, 2.0, 8), self.rng.uniform(0, 6.28, 8)
         self.amplitude = self.rng.uniform(0.0, 0.2, 3)
         self.x, self.u, self.k = self.rng.uniform(-0.05, 0.05, 3), np.zeros(4), 0
+        self.commanded = np.zeros(4)
         self.innovations, self.bounds = [], []
 
     def _waves(self):
@@ -74,6 +85,13 @@ class DesignPlant:
         reference = self.amplitude * np.array([np.sign(w[4]), w[5], np.sign(w[6])])
         u = np.linalg.solve(G[:, :3], 3.0 * (reference - self.x) - f)
         return np.append(np.clip(u, -0.4, 0.4), 0.0)
+
+    def moved(self, u, command):
+        """Where an actuator at u is a frame later: 20 rad/s, 60 deg/s."""
+        if not self.servo:
+            return command
+        furthest = np.deg2rad(60) * self.dt
+        return u + np.clip((command - u) * (1 - np.exp(-20 * self.dt)), -furthest, furthest)
 
     def effect(self, G):
         """phi of the fault, rad/s2."""
@@ -94,6 +112,7 @@ class DesignPlant:
         frame = self.frame
         frame["k"], frame["t"] = self.k, self.k * self.dt
         frame["x"], frame["y"], frame["u"] = self.x, self.condition(), self.u
+        frame["commanded"] = self.commanded
         believe(self.frames)
         f, G = frame["f"].copy(), frame["G"].copy()
         phi = self.effect(G)
@@ -104,7 +123,8 @@ class DesignPlant:
         self.innovations.append(phi + eta)
         self.bounds.append(bound)
         self.x = self.x + self.dt * (f + G @ self.u + phi + eta)
-        self.u = self.command(f, G)
+        self.commanded = self.command(f, G)
+        self.u = self.moved(self.u, self.commanded)
         self.k += 1
 
     @property

@@ -22,6 +22,12 @@ ACTUATORS = np.dtype(
 
 
 @kernel
+def nearer(u, wanted, approach, step):
+    """Where a surface at u (rad) is one JSBSim frame later; it rises with u, and never passes `wanted`."""
+    return u + min(max((wanted - u) * approach, -step), step)
+
+
+@kernel
 def move(actuators, command, u):
     """Move the surfaces u (4,) rad by one JSBSim frame towards command (4,) rad."""
     if not actuators.real:
@@ -29,5 +35,5 @@ def move(actuators, command, u):
         return
     for s in range(4):
         wanted = min(max(command[s], actuators.low[s]), actuators.high[s])
-        step = min(max((wanted - u[s]) * actuators.approach[s], -actuators.step[s]), actuators.step[s])
-        u[s] = min(max(u[s] + step, actuators.low[s]), actuators.high[s])
+        there = nearer(u[s], wanted, actuators.approach[s], actuators.step[s])
+        u[s] = min(max(there, actuators.low[s]), actuators.high[s])

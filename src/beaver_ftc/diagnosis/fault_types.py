@@ -23,10 +23,22 @@ while it is there, is never excluded, and so never misnamed. What cannot be told
 import numpy as np
 
 from beaver_ftc.compiled import kernel
-from beaver_ftc.diagnosis import membership
-from beaver_ftc.diagnosis.state import N_TYPES, NOT_ISOLATED, UNANTICIPATED
+from beaver_ftc.diagnosis import membership, release
+from beaver_ftc.diagnosis.state import (
+    BIAS,
+    CONSTANT_LOSS,
+    DOWN,
+    FLOAT,
+    GROWING_BIAS,
+    NOT_ISOLATED,
+    OSCILLATORY,
+    SLOW,
+    STUCK,
+    UNANTICIPATED,
+    UP,
+    VARYING_LOSS,
+)
 
-CONSTANT_LOSS, STUCK, FLOAT, UP, DOWN, BIAS, VARYING_LOSS, OSCILLATORY, SLOW, GROWING_BIAS = range(N_TYPES)
 TYPES = (
     "loss_of_effectiveness", "stuck", "float", "hardover", "hardover", "bias",
     "loss_of_effectiveness", "oscillatory", "rate_limit", "bias",
@@ -48,10 +60,21 @@ def start(fdi):
     for s in range(4):
         surface = fdi.surface[s]
         surface.set_low[:], surface.set_high[:] = -np.inf, np.inf
+        surface.low, surface.high = surface.travel_low, surface.travel_high
         surface.run_at = -2
         surface.set_low[STUCK], surface.set_high[STUCK] = surface.travel_low, surface.travel_high
         surface.set_low[CONSTANT_LOSS], surface.set_high[CONSTANT_LOSS] = 0.0, 1.0
         surface.started_at = -1
+        release.start(surface)
+
+
+@kernel
+def note_orders(fdi, commanded):
+    """What the surfaces have been told to do, commanded (4,) rad, since the elapsed frame began."""
+    for s in range(4):
+        surface = fdi.surface[s]
+        surface.order_before, surface.order_then = surface.order_then, surface.order
+        surface.order = min(max(commanded[s], surface.travel_low), surface.travel_high)
 
 
 @kernel
@@ -59,6 +82,7 @@ def locate(fdi, s):
     """The set of positions of surface s (rad) that agree with the elapsed frame on every axis."""
     fie, surface = fdi.estimator[POSITION_FIRST + s], fdi.surface[s]
     axis = DOMINANT_AXIS[s]
+    surface.low_before, surface.high_before = surface.low_then, surface.high_then
     surface.low_then, surface.high_then, surface.command_then = surface.low, surface.high, surface.command
     surface.command = -fie.offset[axis] / fie.Z[axis]
     surface.low, surface.high = fie.low, fie.high
@@ -86,13 +110,31 @@ def judge_loss(surface, low, high, u):
 
 
 @kernel
-def judge_runaway(surface, low, high, elapsed_s):
-    """A runaway has by now come at least as far as its least rate takes it, or to the stop."""
-    way = surface.least_runaway_rate * elapsed_s
-    if high < min(surface.travel_high, surface.start_low + way):
-        surface.type_excluded[UP] = 1
-    if low > max(surface.travel_low, surface.start_high - way):
-        surface.type_excluded[DOWN] = 1
+def hold(fdi, surface, kind, least, greatest):
+    """Whether a type can be holding the surface between least and greatest (rad) in the judged frame.
+
+    If not, it may have let go, and the actuator be bringing the surface back; else the type is excluded.
+    """
+    returning = fdi.returns and release.possible(fdi, surface, kind)
+    if least <= surface.high_then and greatest >= surface.low_then and not surface.released[kind]:
+        return True
+    if returning:
+        surface.released[kind] = 1
+    else:
+        surface.type_excluded[kind] = 1
+    return False
+
+
+@kernel
+def judge_held(fdi, surface):
+    """A jam stays where it is; a runaway has by now come at least as far as its least rate takes it, or to
+    the stop."""
+    if hold(fdi, surface, STUCK, surface.set_low[STUCK], surface.set_high[STUCK]):
+        intersect(surface, STUCK, surface.low_then, surface.high_then)
+    hold(fdi, surface, FLOAT, 0.0, 0.0)
+    least, greatest = release.run_at_least(fdi, surface, fdi.frame - 1)
+    hold(fdi, surface, UP, least, surface.travel_high)
+    hold(fdi, surface, DOWN, surface.travel_low, greatest)
 
 
 @kernel
@@ -135,9 +177,14 @@ def note_flip(surface, frame):
 
 
 @kernel
-def judge_pace(surface, low, high, u, frame):
-    """A slow surface never moves away from its command, so while it stands on one side it comes nearer."""
-    sign = 1 if low > u else (-1 if high < u else 0)
+def judge_pace(fdi, surface, low, high, frame):
+    """A slow surface never moves away from its command, so while it stands on one side it comes nearer.
+
+    Of several JSBSim frames in one of ours the first is the old command's.
+    """
+    one = surface.order_before
+    other = one if fdi.whole else surface.order_then
+    sign = 1 if low > max(one, other) else (-1 if high < min(one, other) else 0)
     if sign == 0 or sign != surface.run_sign or frame != surface.run_at + 1:
         surface.run_low, surface.run_high = low, high
     elif (sign > 0 and low > surface.run_high) or (sign < 0 and high < surface.run_low):
@@ -169,13 +216,10 @@ def judge(fdi, surface, frame):
     if surface.started_at < 0:
         surface.started_at, surface.start_low, surface.start_high = frame, low, high
     judge_loss(surface, low, high, u)
-    intersect(surface, STUCK, low, high)
-    if low > 0.0 or high < 0.0:
-        surface.type_excluded[FLOAT] = 1
-    judge_runaway(surface, low, high, (frame - surface.started_at) * fdi.dt)
+    judge_held(fdi, surface)
     judge_bias(surface, low, high, u)
     judge_oscillation(fdi, surface, low - u, high - u, frame)
-    judge_pace(surface, low, high, u, frame)
+    judge_pace(fdi, surface, low, high, frame)
     judge_growth(surface, low, high, u)
 
 
@@ -191,12 +235,17 @@ def examine(fdi):
         locate(fdi, s)
         surface = fdi.surface[s]
         surface.square += (0.5 * (surface.low_then + surface.high_then) - surface.command_then) ** 2
+        if fdi.returns and fdi.frame > 0:
+            release.let_go(fdi, surface)
     if fdi.lead >= 0 and fdi.lead_kind == FIXED and not fdi.wrong_then:
         note_quiet(fdi, fdi.surface[fdi.lead])
     elif fdi.wrong_then and (fdi.whole or (fdi.wrong_before and fdi.wrong)):
         fdi.evidence += 1
         for s in range(4):
             judge(fdi, fdi.surface[s], fdi.frame - 1)
+    if fdi.returns and fdi.frame > 0:
+        for s in range(4):
+            release.bring_back(fdi, fdi.surface[s])
     fdi.frame += 1
 
 
@@ -312,6 +361,12 @@ def may_be_slow(fdi, s):
 
 
 @kernel
+def may_be_growing(fdi, s, found):
+    """Whether what looks like a jam or a loss may be a bias that grows as the command happens to go."""
+    return found in (CONSTANT_LOSS, STUCK, FLOAT) and alive(fdi, s, GROWING_BIAS)
+
+
+@kernel
 def type_at_fault(fdi, s):
     """The type of the fault on surface s, or -1 while more than one fits or an oscillation may yet show."""
     found = one_type(fdi, s)
@@ -319,7 +374,7 @@ def type_at_fault(fdi, s):
         return -1
     patient = not alive(fdi, s, OSCILLATORY) or fdi.evidence >= 2 * fdi.patience
     if any_constant(fdi, s):
-        return found if patient else -1
+        return found if patient and not may_be_growing(fdi, s, found) else -1
     return one_course(fdi, s, patient)
 
 

@@ -7,7 +7,8 @@ MAX_POLES = 6
 NOT_ISOLATED, UNANTICIPATED = -1, -2
 INTERVAL, PUBLISHED = 0, 1
 LOSS, POSITION = 0, 1  # kinds of hypothesis: fault_class.py
-N_TYPES = 10  # fault_types.py
+N_TYPES = 10  # fault_types.py; what holds a surface comes one after the other: release.py
+CONSTANT_LOSS, STUCK, FLOAT, UP, DOWN, BIAS, VARYING_LOSS, OSCILLATORY, SLOW, GROWING_BIAS = range(N_TYPES)
 DEADBEAT_PER_S = 1e6  # a pole at which exp(-lam dt) is 0: the filter keeps nothing but the last frame
 
 # Centres of the network's basis functions, rad; and its memory.
@@ -51,6 +52,12 @@ SURFACE = np.dtype(
         ("square", "f8"), ("squares", "f8"), ("absent", "i8"), ("quiet", "i8"),
         ("run_low", "f8"), ("run_high", "f8"), ("run_sign", "i8"), ("run_at", "i8"),
         ("grown_up", "f8"), ("grown_down", "f8"),
+        # its actuator, what it was ordered, and what release.py keeps: positions, rad
+        ("approach", "f8"), ("step", "f8"),
+        ("order", "f8"), ("order_then", "f8"), ("order_before", "f8"),
+        ("low_before", "f8"), ("high_before", "f8"),
+        ("free_low", "f8", (2, N_TYPES)), ("free_high", "f8", (2, N_TYPES)), ("released", "i8", (N_TYPES,)),
+        ("kept_low", "f8", (2,)), ("kept_high", "f8", (2,)),
     ],
     align=True,
 )  # fmt: skip
@@ -95,7 +102,8 @@ DIAGNOSIS = np.dtype(
         ("bank_residual", "f8", (MAX_POLES, 3)), ("bank_threshold", "f8", (MAX_POLES, 3)),
         ("bank_eta", "f8", (MAX_POLES, 3)), ("bank_noise", "f8", (MAX_POLES, 3)),
         # faults of every type: fault_types.py
-        ("every_type", "i8"), ("whole", "i8"), ("surface", SURFACE, (4,)),
+        ("every_type", "i8"), ("whole", "i8"), ("instants", "i8"), ("returns", "i8"),
+        ("surface", SURFACE, (4,)),
         ("frame", "i8"), ("wrong", "i8"), ("wrong_then", "i8"), ("wrong_before", "i8"),
         ("evidence", "i8"), ("patience", "i8"), ("type", "i8"), ("type_at_s", "f8"),
         ("lead", "i8"), ("lead_kind", "i8"),

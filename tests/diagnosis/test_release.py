@@ -1,0 +1,90 @@
+"""A repaired surface on its way back: neither at fault nor healthy, and no reason to doubt what it was."""
+
+import pytest
+from design_plant import TRAVEL_RAD, UNCERTAINTIES, DesignPlant
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from test_fault_types import TYPES, cases, shares, surfaces
+
+from beaver_ftc.diagnosis import fault_types as ft
+
+HELD = ("stuck", "float", "hardover up", "hardover down")
+uncertainties = st.sampled_from(list(UNCERTAINTIES.values()))
+
+
+class Repaired:
+    """A servo held by a fault from frame `at` to `gone`; otherwise it follows its command."""
+
+    def __init__(self, kind, surface, at, gone, share, dt, back=None):
+        self.make, self.code = TYPES[kind]
+        self.surface, self.at, self.gone = surface, at, gone
+        self.true, self.back = (
+            self.make(surface, at, share, dt),
+            back or (lambda plant, a, c: plant.moved(a, c)),
+        )
+        self.actuator = 0.0
+
+    def __call__(self, k, u):
+        if k < self.at:
+            self.actuator = u
+        elif k < self.gone:
+            self.actuator = self.true(k, u)
+        else:
+            self.actuator = self.back(self.plant, self.actuator, self.plant.commanded[self.surface])
+        return self.actuator
+
+
+def fly(case, surface, fault, uncertainty, frames=200):
+    plant = DesignPlant(surface=surface, position=fault, fault_class="all", actuators="servo", **case)
+    fault.plant = plant
+    return plant.fly(frames, uncertainty)
+
+
+@pytest.mark.parametrize("kind", HELD)
+@settings(max_examples=40, deadline=None)
+@given(cases, surfaces, st.integers(0, 60), st.integers(3, 60), shares, uncertainties)
+def test_a_return_excludes_neither_surface_nor_type(kind, case, surface, at, lasting, share, uncertainty):
+    fault = Repaired(kind, surface, at, at + lasting, share, 1 / case["rate_hz"])
+    plant = fly(case, surface, fault, uncertainty)
+    assert not plant.excluded(ft.POSITION_FIRST + surface)
+    assert not plant.fdi["surface"][surface]["type_excluded"][fault.code]
+
+
+@settings(max_examples=60, deadline=None)
+@given(cases, surfaces, st.integers(0, 60), st.integers(3, 60), shares, uncertainties)
+def test_a_return_does_not_move_the_jam(case, surface, at, lasting, share, uncertainty):
+    """Where it was jammed stays within its set, though the last frames showed it elsewhere."""
+    fault = Repaired("stuck", surface, at, at + lasting, share, 1 / case["rate_hz"])
+    plant = fly(case, surface, fault, uncertainty, frames=at + lasting + int(3 * case["rate_hz"]))
+    low, high = TRAVEL_RAD[:, surface]
+    known = plant.fdi["surface"][surface]
+    healthy = not (plant.fdi["wrong"] or plant.fdi["wrong_then"])
+    if healthy:
+        assert known["set_low"][ft.STUCK] <= low + share * (high - low) <= known["set_high"][ft.STUCK]
+
+
+@pytest.mark.parametrize("kind", ["stuck", "float"])
+def test_a_surface_that_comes_back_otherwise_than_its_actuator_could_was_not_held(kind):
+    """Half as fast as a servo: that is no return."""
+    case = {"seed": 3, "rate_hz": 100.0, "airspeed_mps": 45.0}
+    crawling = lambda plant, a, c: a + 0.1 * (plant.moved(a, c) - a)  # noqa: E731
+    for back, excluded in ((None, False), (crawling, True)):
+        fault = Repaired(kind, 1, 30, 80, 0.1, 0.01, back)
+        plant = fly(case, 1, fault, UNCERTAINTIES["random"], frames=300)
+        assert bool(plant.fdi["surface"][1]["type_excluded"][fault.code]) == excluded
+
+
+def test_a_servo_does_not_keep_a_bias_from_being_told_from_a_jam():
+    """No return lasts: what is off for good is excluded as a jam within a few time constants of the servo."""
+    case = {"seed": 4, "rate_hz": 100.0, "airspeed_mps": 45.0}
+    plant = DesignPlant(
+        surface=0,
+        position=lambda k, u: u + 0.03 * (k >= 30),
+        fault_class="all",
+        actuators="servo",
+        **case,
+    ).fly(100, UNCERTAINTIES["random"])
+    excluded = plant.fdi["surface"][0]["type_excluded"]
+    assert excluded[ft.STUCK]
+    assert excluded[ft.FLOAT]
+    assert not excluded[ft.BIAS]

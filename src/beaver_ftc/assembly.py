@@ -8,7 +8,7 @@ from beaver_ftc import channels as ch
 from beaver_ftc.control.config import ControlConfig
 from beaver_ftc.control.reference_model import discretise
 from beaver_ftc.control.state import LAWS, NOMINAL
-from beaver_ftc.design.coefficients import SURFACES
+from beaver_ftc.design.coefficients import SURFACES, engine_power_kw, slipstream, value
 from beaver_ftc.design.model import AILERON, ELEVATOR, FLAP, RUDDER
 from beaver_ftc.design.variants import design_of, mass_of
 from beaver_ftc.diagnosis.admitted import admit, poles_for_noise
@@ -23,6 +23,7 @@ from beaver_ftc.scenario.schema import Scenario
 
 RUNAWAY_RATE_RAD_S = pi / 3.0  # of an actuator with no declared rate limit: the aircraft's default
 EARTH_RATE_RAD_S = 2.0 * pi / 86164.0905  # one turn per sidereal day [WGS84]
+YAW_SHARE = 0.5  # of the rudder, that engine power may claim: the rest is there to fly with
 PUBLISHED_CLASS = (("aileron", LOSS, AILERON), ("elevator", LOSS, ELEVATOR), ("rudder", LOSS, RUDDER))
 EVERY_TYPE = (
     *PUBLISHED_CLASS,
@@ -116,6 +117,38 @@ def _assemble_probing(control: np.void, probing: Probing | None, dt: float) -> N
         control["probe_from_s"] = control["probe_to_s"] = -1.0
 
 
+def power_is_at_hand(scenario: Scenario) -> bool:
+    """Whether the built-in law of a scenario may use the engine."""
+    law, every_type = scenario.control.law, scenario.fdi.fault_class == "all"
+    return scenario.control.power.enabled and (law == "oracle" or (law == "fault-tolerant" and every_type))
+
+
+def _assemble_power(control: np.void, scenario: Scenario, dt: float) -> None:
+    config, power, initial = scenario.control.power, control["power"], scenario.initial
+    power["enabled"], power["from_s"] = power_is_at_hand(scenario), -1.0
+    power["impatience"], power["forgiveness"] = dt / config.patience_s, dt / config.release_s
+    power["speed_gain"] = config.speed_gain_inhg_per_mps
+    power["attitude_gain"] = config.attitude_gain_inhg_per_deg / radians(1.0)
+    for name, lag_s in (
+        ("smoothing", config.smoothing_s), ("washout", config.washout_s), ("leak", config.attitude_memory_s),
+    ):  # fmt: skip
+        power[name] = 1.0 - exp(-dt / lag_s)
+    trim = initial.manifold_pressure_inhg
+    power["trim"] = power["command"] = power["least"] = power["greatest"] = trim
+    power["low"], power["high"] = min(config.lowest_inhg, trim), max(config.highest_inhg, trim)
+    power["step"] = config.rate_inhg_s * dt
+    power["dpt_factor"], power["highest_dpt"] = _slipstream_limits(initial.engine_rpm, control)
+
+
+def _slipstream_limits(engine_rpm: float, control: np.void) -> tuple[float, float]:
+    """rho V^3 d dpt / d pz of the engine [FDC], kg/(m3) (m/s)^3 per inHg; and the dpt at which holding the
+    propeller's yawing moment takes YAW_SHARE of the rudder's travel."""
+    kw_per_inhg = engine_power_kw(engine_rpm, 1.0, 1.0) - engine_power_kw(engine_rpm, 0.0, 1.0)
+    rudder_rad = min(-control["low"][RUDDER], control["high"][RUDDER])
+    dpt3 = YAW_SHARE * value("Cn_dr") * rudder_rad / value("Cn_dpt3")
+    return slipstream(kw_per_inhg, 1.0, 1.0) - slipstream(0.0, 1.0, 1.0), max(dpt3, 0.0) ** (1.0 / 3.0)
+
+
 def _assemble_instruments(instruments: np.void, scenario: Scenario, dt: float) -> None:
     """dt: seconds between samples, which is a JSBSim frame."""
     instruments["real"] = not scenario.sensors.is_ideal
@@ -181,4 +214,5 @@ def assemble(scenario: Scenario, trim: np.ndarray, travel: np.ndarray) -> np.nda
     _assemble_network(frame["fdi"]["network"], scenario.control)
     _assemble_control(frame["control"], scenario.control, dt, trim, travel)
     _assemble_probing(frame["control"], scenario.fdi.probing, dt)
+    _assemble_power(frame["control"], scenario, dt)
     return frames

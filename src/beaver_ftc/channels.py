@@ -37,6 +37,7 @@ N_TRUTH = len(TRUTH)
 _INDEX = {name: index for index, (name, _, _) in enumerate(TRUTH)}
 
 COMMANDS = tuple(f"fcs/{s}-cmd-rad" for s in SURFACES)
+MANIFOLD_PRESSURE = "engine/manifold-pressure-inhg"
 
 # Indices compiled code uses.
 AIRSPEED, ALPHA, BETA, QDYN, DPT = (
@@ -65,8 +66,9 @@ def _estimator_columns(name: str) -> list[str]:
     return [*limits, f"fie_{name}_excluded"]
 
 
-def log_columns(estimators: Iterable[str]) -> tuple[str, ...]:
-    """The log's columns in order, for the isolation estimators of these names."""
+def log_columns(estimators: Iterable[str], power: bool = False) -> tuple[str, ...]:
+    """The log's columns in order, for the isolation estimators of these names; power: the law may use the
+    engine."""
     return (
         "t_s", *_STATES, *_TRUTH_EXTRAS,
         *_per_axis("{}_measured_rad_s"), *_per_axis("{}_reference_rad_s"), *_per_axis("{}_model_rad_s"),
@@ -78,4 +80,5 @@ def log_columns(estimators: Iterable[str]) -> tuple[str, ...]:
         *(column for name in estimators for column in _estimator_columns(name)),
         *(f"{s}_effectiveness_estimate" for s in SURFACES),
         "mode", "detected",
+        *(("manifold_pressure_inhg",) if power else ()),
     )  # fmt: skip

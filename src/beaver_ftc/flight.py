@@ -31,7 +31,8 @@ class Flight:
     guaranteed_delay_s: from the fault to the instant from which detection was certain, None if that never
     came. worst_residual_ratio: largest |residual| / threshold in healthy flight; closest_approach: the same
     of each filter of the bank, the published one first. surface_travel_rad: path of each surface, up and
-    down added.
+    down added. engine_power: if pitch was left to the engine, since when and for how long, s, and the lowest
+    and highest manifold pressure, inHg.
     """
 
     scenario: Scenario
@@ -59,3 +60,4 @@ class Flight:
     frequency_rad_s: float | None = None
     authority: dict[str, tuple[float, float]] | None = None
     probing_s: tuple[float, float] | None = None
+    engine_power: tuple[float, float, float, float] | None = None

@@ -11,7 +11,7 @@ import numpy as np
 
 from beaver_ftc import channels as ch
 from beaver_ftc.compiled import kernel
-from beaver_ftc.control import adaptive, allocation, authority, nominal, probing, reference_model
+from beaver_ftc.control import adaptive, allocation, authority, nominal, power, probing, reference_model
 from beaver_ftc.control.state import CONTROL, NOMINAL, ORACLE
 from beaver_ftc.design.actuators import ACTUATORS, move
 from beaver_ftc.design.model import ALPHA, BETA, DESIGN, ELEVATOR, QDYN
@@ -46,6 +46,7 @@ FRAME = np.dtype(
         # the truth's nodes
         ("native", "i8"), ("getter", "i8"), ("setter", "i8"),
         ("read_pointers", "i8", (ch.N_TRUTH,)), ("write_pointers", "i8", (4,)),
+        ("engine_pointer", "i8", (1,)),
         ("factor", "f8", (ch.N_TRUTH,)), ("truth", "f8", (ch.N_TRUTH,)),
         ("latitude_0", "f8"), ("longitude_0", "f8"), ("radius_m", "f8"), ("parallel_radius_m", "f8"),
         # the truth's faults, for the oracle and for the analyst
@@ -430,8 +431,10 @@ def command(frame, reference):
     allocation.allocate(control, frame.G_believed, control.command)
     give_up(frame)
     nominal.integrate(control, frame.x, frame.G_believed, control.command)
-    if frame.faulted or control.hedging:
+    if frame.faulted or control.hedging or (control.power.enabled and frame.fdi.detected):
         authority.note_shortfall(control, frame.G_believed, control.command)
+    if control.power.enabled:
+        power.steer(control, frame.x, frame.y, frame.fdi.detected, frame.t)
 
 
 @kernel
@@ -553,6 +556,8 @@ def record(frame, reference, row):
     column = put(row, column, control.effectiveness)
     row[column] = frame.mode
     row[column + 1] = fdi.detected
+    if control.power.enabled:
+        row[column + 2] = control.power.command[0]
 
 
 @kernel
@@ -586,6 +591,8 @@ def finish(frame, reference, row):
     move(frame.actuators, frame.commanded, frame.u)
     if frame.native:
         write_nodes(frame.setter, frame.write_pointers, frame.commanded)
+        if frame.control.power.in_use:
+            write_nodes(frame.setter, frame.engine_pointer, frame.control.power.command)
     frame.k += 1
     frame.row += 1
 

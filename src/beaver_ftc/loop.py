@@ -44,11 +44,13 @@ class Cockpit:
         self._frames = frames
         self._read = native.NodeBank([plant.node(name) for _, name, _ in ch.TRUTH], owner=plant)
         self._write = native.NodeBank([plant.node(name) for name in ch.COMMANDS], owner=plant)
+        self._engine = native.NodeBank([plant.node(ch.MANIFOLD_PRESSURE)], owner=plant)
         self.native = native.available()
         frame = frames[0]
         frame["native"] = self.native
         frame["getter"], frame["setter"] = native.getter_address(), native.setter_address()
         frame["read_pointers"], frame["write_pointers"] = self._read.pointers, self._write.pointers
+        frame["engine_pointer"] = self._engine.pointers
 
     def read(self) -> None:
         """Bring the truth into the frame record, through Python."""
@@ -57,6 +59,9 @@ class Cockpit:
     def write(self) -> None:
         """Hand the command over, through Python."""
         self._write.write(self._frames["commanded"][0])
+        power = self._frames["control"]["power"]
+        if power["in_use"][0]:
+            self._engine.write(power["command"][0])
 
 
 class Loop:
@@ -85,7 +90,8 @@ class Loop:
         self.n_frames = round(scenario.duration_s * scenario.rate_hz)
         self.plugged = self._plugged(detector, law)
         self.columns = ch.log_columns(
-            estimator_names(scenario.fdi.fault_class) if self._diagnoses_itself else ()
+            estimator_names(scenario.fdi.fault_class) if self._diagnoses_itself else (),
+            bool(self.frames["control"]["power"]["enabled"][0]),
         )
         self._log = np.empty((min(CHUNK_ROWS, self.n_frames), len(self.columns)))
         self._references = np.empty((len(self._log), 3))

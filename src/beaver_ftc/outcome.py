@@ -90,6 +90,15 @@ def _authority(frame: np.void) -> dict[str, tuple[float, float]] | None:
     return dict(zip(AXES, zip(shares, beyond_s, strict=True), strict=True))
 
 
+def _engine_power(frame: np.void) -> tuple[float, float, float, float] | None:
+    """Since when and for how long pitch was left to the engine, s, and the range it went through, inHg."""
+    power = frame["control"]["power"]
+    if not power["enabled"] or power["from_s"] < 0.0:
+        return None
+    in_charge_s = int(power["frames"]) * float(frame["dt"])
+    return float(power["from_s"]), in_charge_s, float(power["least"]), float(power["greatest"])
+
+
 def verdict_of(frame: np.void) -> Verdict:
     """What the built-in diagnosis makes of the flight so far, as a plug-in law is told."""
     fdi = frame["fdi"]
@@ -144,6 +153,7 @@ def flight_of(
         closest_approach=closest,
         authority=_authority(frame),
         probing_s=_probing_s(frame),
+        engine_power=_engine_power(frame),
         surface_travel_rad={s: float(x) for s, x in zip(SURFACES, frame["travelled"], strict=True)},
         **(_isolation(fdi) if verdict is None else _told(fdi, verdict)),
     )

@@ -9,7 +9,7 @@ import numpy as np
 from beaver_ftc import channels as ch
 from beaver_ftc import stages
 from beaver_ftc.control.base import Law, Reference
-from beaver_ftc.control.state import ADAPTIVE, NOMINAL
+from beaver_ftc.control.state import ADAPTIVE, NOMINAL, ORACLE
 from beaver_ftc.design.coefficients import SURFACES
 from beaver_ftc.design.context import Context, DesignModel
 from beaver_ftc.diagnosis.base import Detector, Measured, Verdict
@@ -187,6 +187,8 @@ def plugged_frame(
         return None
     if detector is not None:
         _clear_for_detector(frames["fdi"][0])
+    if law is not None or frames["control"]["law"][0] != ORACLE:
+        frames["control"]["power"]["enabled"] = 0
     if law is not None:
         frames["control"]["law"] = ADAPTIVE if getattr(law, "fault_tolerant", False) else NOMINAL
     contexts = (

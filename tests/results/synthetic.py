@@ -90,6 +90,7 @@ class Flight:
     frequency_rad_s: float | None = None
     authority: dict[str, tuple[float, float]] | None = None
     probing_s: tuple[float, float] | None = None
+    engine_power: tuple[float, float, float, float] | None = None
 
 
 def rows(flight: Flight) -> np.ndarray:

@@ -1,8 +1,8 @@
 """What a scenario may say about the control law (`control:`), with defaults and their reasons."""
 
-from typing import Annotated
+from typing import Annotated, Self
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
 
 def _known_law(name: str) -> str:
@@ -12,6 +12,56 @@ def _known_law(name: str) -> str:
     wrong = refusal(LAWS, name)
     refuse([((), wrong)] if wrong else [])
     return name
+
+
+class EnginePower(BaseModel):
+    """Engine power on pitch, once neither elevator nor flap acts on it; with the fault-tolerant law and
+    fault_class: all, and with the oracle. docs/fault-types.md has the design."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, strict=True)
+
+    enabled: bool = Field(True, description="false: the engine stays as trimmed, whatever is lost")
+    speed_gain_inhg_per_mps: float = Field(
+        3.0,
+        ge=0,
+        le=50,
+        description="less power for more airspeed than usual, inHg per m/s: damps the phugoid",
+    )
+    attitude_gain_inhg_per_deg: float = Field(
+        0.9, ge=0, le=50, description="more power for a nose too high, inHg per deg: power lowers it"
+    )
+    washout_s: float = Field(
+        20.0, gt=0, le=600, description="usual airspeed: the mean over about so long, a phugoid's period, s"
+    )
+    attitude_memory_s: float = Field(
+        10.0, gt=0, le=600, description="how long a missed pitch rate is remembered, s"
+    )
+    smoothing_s: float = Field(
+        0.5, ge=0.05, le=10, description="lag on the airspeed, against noise and gusts, s"
+    )
+    lowest_inhg: float = Field(
+        10.0, ge=0, le=50, description="manifold pressure with the throttle closed, inHg"
+    )
+    highest_inhg: float = Field(
+        36.5, ge=0, le=50, description="highest manifold pressure, inHg: the R-985's take-off rating"
+    )
+    rate_inhg_s: float = Field(
+        5.0, gt=0, le=100, description="fastest change, inHg/s: the whole range in five seconds"
+    )
+    patience_s: float = Field(
+        1.0, gt=0, le=60, description="how long pitch must have been lost before power takes over, s"
+    )
+    release_s: float = Field(
+        10.0, gt=0, le=600, description="and how long not, before the engine goes back to its trim, s"
+    )
+
+    @model_validator(mode="after")
+    def _a_range(self) -> Self:
+        from beaver_ftc.scenario.base import refuse
+
+        says = f"below lowest_inhg, allowed: {self.lowest_inhg:g} inHg or more"
+        refuse([(("highest_inhg",), says)] if self.highest_inhg < self.lowest_inhg else [])
+        return self
 
 
 class ControlConfig(BaseModel):
@@ -60,4 +110,7 @@ class ControlConfig(BaseModel):
     )
     hand_over_s: float = Field(
         1.0, gt=0, le=60, description="duration of the continuous hand-over to the flap, s"
+    )
+    power: EnginePower = Field(
+        default_factory=EnginePower, description="engine power on pitch, when elevator and flap are lost"
     )

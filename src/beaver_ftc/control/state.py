@@ -5,6 +5,21 @@ import numpy as np
 NOMINAL, ADAPTIVE, FAULT_TOLERANT, ORACLE = range(4)
 LAWS = ("nominal", "adaptive", "fault-tolerant", "oracle")
 
+# What power.py keeps: its settings, its state, and what is told of it.
+POWER = np.dtype(
+    [
+        ("enabled", "i8"), ("impatience", "f8"), ("forgiveness", "f8"),  # shares per frame
+        ("speed_gain", "f8"), ("attitude_gain", "f8"),  # inHg per m/s, inHg per rad
+        ("smoothing", "f8"), ("washout", "f8"), ("leak", "f8"),  # shares per frame
+        ("trim", "f8"), ("low", "f8"), ("high", "f8"), ("step", "f8"),  # inHg
+        ("dpt_factor", "f8"), ("highest_dpt", "f8"),
+        ("lost", "f8"), ("engaged", "i8"), ("in_use", "i8"), ("moved", "i8"),
+        ("speed", "f8"), ("usual_speed", "f8"), ("attitude", "f8"),
+        ("command", "f8", (1,)),  # inHg
+        ("from_s", "f8"), ("frames", "i8"), ("least", "f8"), ("greatest", "f8"),
+    ],
+    align=True,
+)  # fmt: skip
 CONTROL = np.dtype(
     [
         ("law", "i8"), ("dt", "f8"),
@@ -23,6 +38,7 @@ CONTROL = np.dtype(
         ("trim", "f8", (4,)), ("low", "f8", (4,)), ("high", "f8", (4,)),
         ("command", "f8", (4,)), ("saturated", "i8", (4,)),
         ("hand_over", "f8"), ("hand_over_step", "f8"),
+        ("power", POWER),
     ],
     align=True,
 )  # fmt: skip

@@ -24,7 +24,7 @@ LOWEST_RATIO = 1e-2  # of a logarithmic axis: what is smaller is nothing
 def write_figures(log_path: Path, metrics: Document, folder: Path) -> list[Path]:
     """Draw every view of the log as `<view>.png`, some also as `<view>-closeup.png`; return the files."""
     shown, instants, window = (
-        views(log.column_names(log_path)),
+        views(log.column_names(log_path), bool(metrics.get("engine_power"))),
         marks(metrics),
         closeup_window(marks(metrics)),
     )

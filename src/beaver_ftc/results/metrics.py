@@ -52,6 +52,7 @@ def metrics(flight: "Flight") -> Document:
         ],
         "departure": _departure(flight),
         "authority": _authority(flight),
+        "engine_power": _engine_power(flight),
         "saturation_s": {surface: _number(time) for surface, time in flight.saturation_s.items()},
     }
     expectations = evaluate(scenario.expect, document)
@@ -140,6 +141,15 @@ def _authority(flight: "Flight") -> Document | None:
         axis: {"given_share": _number(share), "beyond_s": _number(beyond_s)}
         for axis, (share, beyond_s) in flight.authority.items()
     }
+
+
+def _engine_power(flight: "Flight") -> Document | None:
+    """Since when and for how long engine power stood in for elevator and flap, and how far it went; null if
+    it never did."""
+    if flight.engine_power is None:
+        return None
+    names = ("from_s", "in_charge_s", "lowest_inhg", "highest_inhg")
+    return {name: _number(value) for name, value in zip(names, flight.engine_power, strict=True)}
 
 
 def _false_alarm(detection_time_s: float | None, fault: Document | None) -> bool:

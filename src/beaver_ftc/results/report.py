@@ -84,7 +84,7 @@ def _kinds_of_marks(documents: Sequence[Document]) -> list[Mark]:
 def _data(folders: Sequence[Path], documents: Sequence[Document], names: Sequence[str]) -> Document:
     """What the page draws from."""
     logs = [folder / "log.parquet" for folder in folders]
-    shown = _common_views(logs)
+    shown = _common_views(logs, documents)
     columns = tuple(dict.fromkeys([*_PATH, "mode", *(name for view in shown for name in view.columns)]))
     return {
         "runs": [
@@ -99,9 +99,12 @@ def _data(folders: Sequence[Path], documents: Sequence[Document], names: Sequenc
     }
 
 
-def _common_views(logs: Sequence[Path]) -> tuple[View, ...]:
+def _common_views(logs: Sequence[Path], documents: Sequence[Document]) -> tuple[View, ...]:
     """Every view that all runs have."""
-    first, *rest = (views(log.column_names(path)) for path in logs)
+    first, *rest = (
+        views(log.column_names(path), bool(document.get("engine_power")))
+        for path, document in zip(logs, documents, strict=True)
+    )
     return tuple(view for view in first if all(view in other for other in rest))
 
 

@@ -27,6 +27,7 @@ def facts(metrics: Document) -> list[tuple[str, str]]:
         ("isolation", _isolation(metrics)),
         ("probing", _probing(metrics)),
         ("supervisor", _supervisor(metrics)),
+        ("engine power", _engine_power(metrics)),
         ("envelope", _envelope(metrics)),
         ("departure", _departure(metrics)),
         ("saturation", _saturation(metrics)),
@@ -132,6 +133,14 @@ def _estimate(isolation: Document) -> str:
 
 def _supervisor(metrics: Document) -> str:
     return " → ".join(f"{change['mode']} {_time(change['time_s'])}" for change in metrics["supervisor"])
+
+
+def _engine_power(metrics: Document) -> str:
+    power = metrics.get("engine_power")
+    if not power:
+        return ""
+    span = f"{power['lowest_inhg']:.1f} to {power['highest_inhg']:.1f} inHg"
+    return f"took over pitch at {_time(power['from_s'])}, for {_time(power['in_charge_s'])} in all, {span}"
 
 
 def _envelope(metrics: Document) -> str:

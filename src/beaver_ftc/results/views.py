@@ -21,6 +21,7 @@ _UNITS = (  # (ending of the column's name, unit shown, factor), the longest end
     ("_rad_s", "deg/s", _DEG_PER_RAD),
     ("_rad", "deg", _DEG_PER_RAD),
     ("_mps", "m/s", 1.0),
+    ("_inhg", "inHg", 1.0),
     ("_pa", "Pa", 1.0),
     ("_m", "m", 1.0),
     ("_s", "s", 1.0),
@@ -86,12 +87,13 @@ def estimators(columns: Sequence[str]) -> tuple[str, ...]:
     return tuple(match.group(1) for match in matches if match)
 
 
-def views(columns: Sequence[str]) -> tuple[View, ...]:
-    """Every view that a log with these columns allows."""
+def views(columns: Sequence[str], power: bool = False) -> tuple[View, ...]:
+    """Every view that a log with these columns allows; power: the law has used the engine."""
     known = set(columns)
     named = (
         _tracking(), _surfaces(), _detection(), _isolation(estimators(columns)),
-        _ratio(estimators(columns)), _effectiveness(), _supervisor(), _states(),
+        _ratio(estimators(columns)), _effectiveness(), _supervisor(), *((_engine(),) if power else ()),
+        _states(),
     )  # fmt: skip
     return tuple(view for view in named if view.panels and known.issuperset(sources(view.columns)))
 
@@ -208,6 +210,16 @@ def _supervisor() -> View:
         Panel("envelope", (Trace("envelope_valid", "envelope", "actual"),), steps=("outside", "inside")),
     )
     return View("supervisor", "Supervisor: who is in charge", panels)
+
+
+def _engine() -> View:
+    panels = (
+        Panel("manifold pressure", (Trace("manifold_pressure_inhg", "manifold pressure", "actual"),)),
+        Panel("slipstream dpt", (Trace("dpt", "slipstream", "actual"),)),
+        Panel("airspeed", (Trace("airspeed_mps", "airspeed", "actual"),)),
+        Panel("pitch θ", (Trace("theta_rad", "pitch θ", "actual"),)),
+    )
+    return View("engine", "Engine power on pitch, when elevator and flap are lost", panels)
 
 
 def _states() -> View:

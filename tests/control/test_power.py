@@ -1,0 +1,331 @@
+"""Engine power on pitch: when it takes over, what it may do, and that it helps."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.linalg import expm
+
+from beaver_ftc.assembly import assemble
+from beaver_ftc.control import power
+from beaver_ftc.control.config import EnginePower
+from beaver_ftc.control.state import ORACLE
+from beaver_ftc.design import fdc
+from beaver_ftc.design.coefficients import value
+from beaver_ftc.design.model import ELEVATOR, FLAP, RUDDER
+from beaver_ftc.errors import BadInput
+from beaver_ftc.matrix.cases import REFERENCE
+from beaver_ftc.matrix.flying import trimmed_deg
+from beaver_ftc.mismatch.linear import engine_of, state_vector, surfaces_of
+from beaver_ftc.plant.trim import MANIFOLD_PRESSURE_INHG, trim
+from beaver_ftc.results.metrics import metrics
+from beaver_ftc.results.verdict import facts
+from beaver_ftc.results.views import views
+from beaver_ftc.scenario.loader import load_text
+from flying import flown, scenario
+
+DT = 0.01
+TRAVEL = np.array([[-0.52, -0.49, -0.44, -0.1], [0.52, 0.49, 0.44, 1.03]])
+Y = np.array([0.146, 0.0, 45.0, 0.5 * 1.0225 * 45.0**2, 0.515])
+SPEEDS = (38.0, 45.0, 52.0)
+
+
+def control_record(**keys):
+    """An oracle's control record, all well, as a flight begins with it."""
+    given = scenario(control={"law": "oracle", "power": keys})
+    return assemble(given, np.zeros(4), TRAVEL)[0]["control"]
+
+
+def lose_pitch(control):
+    control["effectiveness"][[ELEVATOR, FLAP]] = 0.0
+
+
+def steered(control, frames, V=lambda t: 45.0, q=lambda t: 0.0):
+    """Manifold pressure over so many frames."""
+    history, y = [], Y.copy()
+    for k in range(frames):
+        y[2] = V(k * DT)
+        power.steer(control, np.array([0.0, q(k * DT), 0.0]), y, 1, k * DT)
+        history.append(float(control["power"]["command"][0]))
+    return np.array(history)
+
+
+class TestWhen:
+    def test_it_waits_out_its_patience_and_then_stays(self):
+        control = control_record(patience_s=1.0)
+        lose_pitch(control)
+        history = steered(control, 300, V=lambda t: 44.0 + min(t, 1.0))
+        assert (history[:99] == 20.0).all()
+        assert (history[110:] < 20.0).all()
+        assert control["power"]["from_s"] == pytest.approx(0.99, abs=0.011)
+
+    def test_one_of_the_two_is_enough_to_do_without(self):
+        for surface in (ELEVATOR, FLAP):
+            control = control_record()
+            control["effectiveness"][surface] = 0.0
+            assert (steered(control, 300, V=lambda t: 45 + t) == 20.0).all()
+
+    @pytest.mark.parametrize(("lack", "stop", "engaged"), [(0.3, 1, 1), (0.3, 0, 0), (0.04, 1, 0)])
+    def test_a_lack_that_lasts_counts_when_the_elevator_has_nothing_left(self, lack, stop, engaged):
+        control = control_record()
+        control["shortfall"][1], control["saturated"][ELEVATOR] = lack, stop
+        steered(control, 200)
+        assert control["power"]["engaged"] == engaged
+
+    def test_a_lack_that_changes_sign_is_no_less_of_one(self):
+        control = control_record()
+        control["saturated"][ELEVATOR] = 1
+        for k in range(40):
+            control["shortfall"][1] = 0.2 * np.sign(np.sin(k))
+            steered(control, 5)
+        assert control["power"]["engaged"] == 1
+
+    def test_when_a_surface_is_back_the_engine_goes_back_to_its_trim_exactly(self):
+        control = control_record(release_s=2.0)
+        lose_pitch(control)
+        steered(control, 300, V=lambda t: 45 + t)
+        control["effectiveness"][FLAP] = 1.0
+        history = steered(control, 600)
+        assert history[150] != 20.0
+        assert history[-1] == 20.0
+        assert not control["power"]["in_use"]
+
+    def test_without_an_alarm_only_the_oracle_acts(self):
+        control = control_record()
+        lose_pitch(control)
+        for law, engaged in ((ORACLE - 1, 0), (ORACLE, 1)):
+            control["law"] = law
+            for _ in range(200):
+                power.steer(control, np.zeros(3), Y, 0, 0.0)
+            assert control["power"]["engaged"] == engaged
+
+
+class TestWithin:
+    @settings(max_examples=40, deadline=None)
+    @given(st.lists(st.tuples(st.floats(20, 90), st.floats(-1, 1), st.floats(0, 4)), min_size=3, max_size=12))
+    def test_limits_and_rate_whatever_is_measured(self, told):
+        control = control_record(patience_s=0.01)
+        lose_pitch(control)
+        history, y = [20.0], Y.copy()
+        for V, q, dpt in told:
+            y[2], y[3], y[4] = V, 0.5 * 1.02 * V * V, dpt
+            for _ in range(60):
+                power.steer(control, np.array([0.0, q, 0.0]), y, 1, 0.0)
+                history.append(float(control["power"]["command"][0]))
+        assert min(history) >= 10.0
+        assert max(history) <= 36.5
+        assert np.abs(np.diff(history)).max() <= 5.0 * DT + 1e-12
+
+    def test_it_leaves_the_rudder_half_its_travel(self):
+        """Pressure asked for without end: slipstream by FDC's own chart, its yaw by the table."""
+        control, y = control_record(patience_s=0.01, attitude_memory_s=600), Y.copy()
+        lose_pitch(control)
+        density, V = 1.0225, 34.0
+        y[2], y[3] = V, 0.5 * density * V * V
+        for _ in range(3000):
+            pressure = float(control["power"]["command"][0])
+            kw = 0.7355 * (
+                -326.5
+                + 0.00412 * (pressure + 7.4) * (1800 + 2010)
+                + (408 - 0.0965 * 1800) * (1 - density / 1.225)
+            )
+            y[4] = 0.08696 + 191.18 * 2 * kw / (density * V**3)
+            power.steer(control, np.array([0.0, 0.5, 0.0]), y, 1, 0.0)
+        rudder = -value("Cn_dpt3") * y[4] ** 3 / -value("Cn_dr")
+        assert 25.0 < pressure < 36.0
+        assert rudder == pytest.approx(0.5 * TRAVEL[1, RUDDER], rel=0.01)
+
+
+class TestTheDesign:
+    """The loop about the trim, on FDC's equations by complex steps: another road than the one flown."""
+
+    LONGITUDINAL = (0, 1, 4, 7)  # V, alpha, q, theta
+
+    def plant(self, V):
+        point = trim(V, 1828.8)
+        arguments = state_vector(point), surfaces_of(point), engine_of(point)
+        A = fdc.linearise(*arguments)[0]
+        ahead, behind = (
+            fdc.derivatives(*arguments[:2], fdc.Engine(1800.0, 20.0 + step)) for step in (0.01, -0.01)
+        )
+        rows = list(self.LONGITUDINAL)
+        return A[np.ix_(rows, rows)], ((ahead - behind) / 0.02)[rows]
+
+    def loop(self, V, gain=1.0, delay_s=0.0):
+        """System matrix of aircraft, airspeed's lag, its slow mean, attitude missed, and a delay (Pade)."""
+        A, B = self.plant(V)
+        config = EnginePower()
+        n = 8 if delay_s else 7
+        F, K = np.zeros((n, n)), np.zeros(n)
+        F[:4, :4] = A
+        F[4, [0, 4]] = np.array([1, -1]) / config.smoothing_s
+        F[5, [4, 5]] = np.array([1, -1]) / config.washout_s
+        F[6, 2], F[6, 6] = 1.0, -1.0 / config.attitude_memory_s
+        K[4], K[5] = -config.speed_gain_inhg_per_mps, config.speed_gain_inhg_per_mps
+        K[6] = np.rad2deg(config.attitude_gain_inhg_per_deg)
+        K *= gain
+        if delay_s:  # u delayed: x' = -2/T x + 4/T u, u_d = x - u
+            F[7] = 4.0 / delay_s * K
+            F[7, 7] -= 2.0 / delay_s
+            F[:4] += np.outer(B, np.eye(n)[7] - K)
+        else:
+            F[:4] += np.outer(B, K)
+        return F
+
+    def test_the_range_is_the_engines(self):
+        config = EnginePower()
+        assert (config.lowest_inhg, config.highest_inhg) == MANIFOLD_PRESSURE_INHG
+
+    def phugoid_damping(self, F):
+        poles = np.linalg.eigvals(F)
+        slow = [s for s in poles if 0.1 < abs(s) < 1.0 and s.imag > 1e-6]
+        return min((-s.real / abs(s) for s in slow), default=1.0)
+
+    @pytest.mark.parametrize("V", [34.0, *SPEEDS, 55.0])
+    def test_the_phugoid_is_damped(self, V):
+        assert self.phugoid_damping(self.plant(V)[0]) < 0.15
+        assert self.phugoid_damping(self.loop(V)) > 0.38
+
+    @pytest.mark.parametrize("V", [34.0, *SPEEDS, 55.0])
+    @pytest.mark.parametrize("gain", [0.5, 1.0, 2.0])
+    def test_it_stays_stable_at_half_and_twice_the_gain_and_with_half_a_second_of_delay(self, V, gain):
+        assert np.linalg.eigvals(self.loop(V, gain)).real.max() < 0.0
+        assert np.linalg.eigvals(self.loop(V, gain, delay_s=0.5)).real.max() < 0.0
+
+    def test_the_kernel_is_that_law(self):
+        """The response to a disturbed trim, the linear aircraft under the compiled law, and by expm."""
+        A, B = self.plant(45.0)
+        step = expm(np.block([[A, B[:, None]], [np.zeros((1, 5))]]) * DT)
+        F = self.loop(45.0)
+        control = control_record(patience_s=0.01, rate_inhg_s=100)
+        lose_pitch(control)
+        steered(control, 5)
+        exact = expm(F * DT)
+        x, z = np.array([2.0, 0.0, 0.0, 0.02]), np.array([2.0, 0.0, 0.0, 0.02, 0.0, 0.0, 0.0])
+        y = Y.copy()
+        for _ in range(3000):
+            y[2] = 45.0 + x[0]
+            power.steer(control, np.array([0.0, x[2], 0.0]), y, 1, 0.0)
+            x = step[:4, :4] @ x + step[:4, 4] * (float(control["power"]["command"][0]) - 20.0)
+            z = exact @ z
+            assert (np.abs(x - z[:4]) < [0.03, 3e-4, 3e-4, 1e-3]).all()
+
+
+def lost(V, off_deg=0.0, flap_deg=0.0, law="oracle", enabled=True, flap_at_s=12.0, **keys):
+    """(flight, log) with the elevator stuck off trim and the flap stuck."""
+    faults = [
+        {
+            "actuator": "elevator", "type": "stuck", "at_s": 12.0,
+            "position_deg": trimmed_deg(V, "elevator") + off_deg,
+        },
+        {"actuator": "flap", "type": "stuck", "at_s": flap_at_s, "position_deg": flap_deg},
+    ]  # fmt: skip
+    return flown(
+        **{
+            "duration_s": 80.0,
+            "initial": {"airspeed_mps": V},
+            "reference": REFERENCE,
+            "faults": faults,
+            "fdi": {"fault_class": "all"},
+            "control": {"law": law, "power": {"enabled": enabled}},
+            **keys,
+        }
+    )
+
+
+def swing_deg(log):
+    late = log["t_s"] > 30.0
+    return float(np.ptp(np.rad2deg(log["theta_rad"][late])))
+
+
+@pytest.mark.parametrize("V", SPEEDS)
+@pytest.mark.parametrize("law", ["oracle", "fault-tolerant"])
+class TestBothLost:
+    def test_near_trim_the_phugoid_goes(self, V, law):
+        (_, without), (flight, log) = (lost(V, law=law, enabled=on) for on in (False, True))
+        assert swing_deg(log) < 0.5 * swing_deg(without)
+        late = log["t_s"] > 30.0
+        assert np.rad2deg(np.sqrt(np.mean(log["q_rad_s"][late] ** 2))) < 0.35
+        assert np.abs(np.rad2deg(log["phi_rad"])).max() < 15.0
+        assert log["envelope_valid"].all()
+        assert flight.engine_power is not None
+
+    @pytest.mark.parametrize("off_deg", [-2.0, -1.0, 1.0, 2.0])
+    def test_off_trim_all_stays_finite_and_does_not_swing_more(self, V, law, off_deg):
+        (_, without), (flight, log) = (lost(V, off_deg, law=law, enabled=on) for on in (False, True))
+        assert flight.departure is None
+        assert np.isfinite(log.rows[:, : log.columns.index("p_measured_rad_s")]).all()
+        assert swing_deg(log) < max(swing_deg(without), 2.5)
+        assert np.abs(np.rad2deg(log["q_rad_s"])).max() < 8.0
+
+
+@pytest.mark.parametrize(
+    ("V", "off_deg", "flap_deg"),
+    [(38.0, 0.0, 20.0), (45.0, -10.0, 0.0), (52.0, -8.0, 0.0), (52.0, 0.0, 15.0)],
+)
+def test_an_aircraft_lost_without_power_is_kept_with_it(V, off_deg, flap_deg):
+    (without, _), (flight, _) = (lost(V, off_deg, flap_deg, enabled=on) for on in (False, True))
+    assert without.departure is not None
+    assert flight.departure is None
+
+
+def test_an_ambiguous_verdict_is_no_obstacle():
+    flight, _ = lost(45.0, law="fault-tolerant", flap_at_s=20.0)
+    assert flight.isolated in (None, "unanticipated")
+    assert 20.0 < flight.engine_power[0] < 30.0
+
+
+def test_the_design_model_knows_what_the_engine_does():
+    """Without uncertainty the design model makes of every frame what the truth does, power moving or not."""
+    _, log = lost(45.0, uncertainty={})
+    moving = np.abs(np.diff(log["manifold_pressure_inhg"])) > 0.01
+    error = (log["q_design_rad_s2"][1:] - np.diff(log["q_rad_s"]) / DT)[1:]
+    assert moving.sum() > 200
+    assert np.abs(error[moving[1:]]).max() < 0.02 * 0.02  # a fiftieth of the admitted uncertainty
+
+
+def test_python_hands_the_command_over_as_compiled_code_does(monkeypatch):
+    _, native = lost(45.0, duration_s=20.0)
+    monkeypatch.setenv("BEAVER_FTC_NATIVE", "0")
+    _, plain = lost(45.0, duration_s=20.0)
+    assert np.ptp(native["manifold_pressure_inhg"]) > 1.0
+    assert np.array_equal(native.rows, plain.rows, equal_nan=True)
+
+
+class TestOtherwise:
+    def test_the_published_class_knows_nothing_of_it(self):
+        flight, log = lost(45.0, law="fault-tolerant", fdi={}, duration_s=20.0)
+        assert "manifold_pressure_inhg" not in log.columns
+        assert flight.engine_power is None
+
+    @pytest.mark.parametrize("law", ["oracle", "fault-tolerant"])
+    def test_the_engine_stays_as_it_is_while_elevator_or_flap_act(self, law):
+        for faults in ([], [{"actuator": "elevator", "type": "stuck", "at_s": 5.0, "position_deg": 0.6}]):
+            flight, log = flown(
+                duration_s=15.0, faults=faults, fdi={"fault_class": "all"}, control={"law": law}
+            )
+            assert (log["manifold_pressure_inhg"] == 20.0).all()
+            assert flight.engine_power is None
+
+    def test_switched_off_the_flight_is_to_the_bit_the_one_before(self):
+        _, log = lost(45.0, enabled=False, duration_s=20.0)
+        assert "manifold_pressure_inhg" not in log.columns
+
+
+def test_it_is_reported():
+    flight, log = lost(45.0, duration_s=30.0)
+    document = metrics(flight)["engine_power"]
+    assert document["from_s"] == pytest.approx(13.0, abs=0.02)
+    assert document["in_charge_s"] == pytest.approx(17.0, abs=0.05)
+    assert document["lowest_inhg"] == pytest.approx(log["manifold_pressure_inhg"].min())
+    assert document["highest_inhg"] == pytest.approx(log["manifold_pressure_inhg"].max())
+    assert "took over pitch at 12.99 s" in dict(facts(metrics(flight)))["engine power"]
+    names = [view.name for view in views(log.columns, power=True)]
+    assert "engine" in names
+    assert "engine" not in [view.name for view in views(log.columns)]
+
+
+def test_a_range_upside_down_is_refused_in_one_line():
+    text = "name: x\ncontrol:\n  power: {lowest_inhg: 30, highest_inhg: 20}\n"
+    with pytest.raises(BadInput, match=r"control\.power\.highest_inhg: below lowest_inhg, allowed: 30 inHg"):
+        load_text(text)

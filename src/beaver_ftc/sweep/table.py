@@ -114,6 +114,7 @@ COLUMNS: tuple[tuple[str, str, Getter], ...] = (
     *_under("float", "departure", "time_s"),
     *_under("text", "departure", "signal"),
     *(column for a in AXES for column in _under("float", f"authority.{a}", "given_share", "beyond_s")),
+    *_under("float", "engine_power", "from_s", "in_charge_s", "lowest_inhg", "highest_inhg"),
     *_under("float", "saturation_s", *SURFACES),
     ("expectations.missed", "text", _missed_expectations),
     ("passed", "flag", _at("passed")),

@@ -13,6 +13,7 @@ from beaver_ftc.control.state import ADAPTIVE, NOMINAL, ORACLE
 from beaver_ftc.design.coefficients import SURFACES
 from beaver_ftc.design.context import Context, DesignModel
 from beaver_ftc.diagnosis.base import Detector, Measured, Verdict
+from beaver_ftc.diagnosis.declared import declared_of
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, UNANTICIPATED
 from beaver_ftc.errors import BeaverFtcError, SimulationFailed
 from beaver_ftc.frame import NOT_FINITE
@@ -155,18 +156,22 @@ def context_of(
     """What a plug-in is told before the flight; start: the truth's channels at the start, in SI."""
     frame = frames[0]
     control, fdi = frame["control"], frame["fdi"]
+    trim_y = start[[ch.ALPHA, ch.BETA, ch.AIRSPEED, ch.QDYN, ch.DPT]]
     return Context(
         dt_s=float(frame["dt"]),
         substeps=scenario.substeps,
         model=DesignModel(frames["design"].copy()),
         trim_x=start[:3].copy(),
-        trim_y=start[[ch.ALPHA, ch.BETA, ch.AIRSPEED, ch.QDYN, ch.DPT]],
+        trim_y=trim_y,
         trim_rad=control["trim"].copy(),
         travel_rad=np.array([control["low"], control["high"]]),
         constant_rad_s2=fdi["constant"].copy(),
         inertia_coupling=fdi["inertia"].copy(),
         seed=scenario.seed,
         options=dict(options),
+        declared=declared_of(
+            scenario.fdi.bounds, scenario.actuators, frames["design"], trim_y, control["trim"]
+        ),
     )
 
 

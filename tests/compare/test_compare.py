@@ -13,15 +13,24 @@ from beaver_ftc.compare.benchmark import MARK, write_leaderboard
 from beaver_ftc.compare.crew import fly_cases, spread
 from beaver_ftc.compare.document import better_than_ours, document_of
 from beaver_ftc.compare.figure import write_figure
-from beaver_ftc.compare.flights import CALIBRATION, Case, of_set, of_sweep, set_names
+from beaver_ftc.compare.flights import CALIBRATION, CALIBRATION_ERRORS, Case, of_set, of_sweep, set_names
 from beaver_ftc.compare.page import write_page
 from beaver_ftc.compare.replay import Trace
 from beaver_ftc.compare.table import as_text
 from beaver_ftc.compare.trial import LAW, ORACLE, SCHEME, Entry, entries_of, fly_case, with_entry
-from beaver_ftc.compare.tune import DETECTORS, LAWS, alarm_level, candidates
+from beaver_ftc.compare.tune import (
+    DETECTORS,
+    DETECTORS_FOR_ERRORS,
+    LAWS,
+    _best_detector,
+    alarm_level,
+    candidates,
+)
+from beaver_ftc.loop import Loop
 from beaver_ftc.plugins import plugin_class
-from beaver_ftc.rivals.options import tuned
+from beaver_ftc.rivals.options import TUNED, TUNED_FOR_ERRORS, tuned
 from beaver_ftc.scenario.schema import Scenario
+from flying import scenario
 
 BEAVER = Path(sys.executable).with_name("beaver-ftc")
 SWEEP = """
@@ -193,7 +202,7 @@ def test_every_standard_set_is_sound(name):
 
 
 def test_nothing_is_tuned_on_what_is_compared():
-    tuned_on = {case.scenario.seed for case in of_set(CALIBRATION)}
+    tuned_on = {case.scenario.seed for name in (CALIBRATION, CALIBRATION_ERRORS) for case in of_set(name)}
     compared = {case.scenario.seed for name in set_names() for case in of_set(name)}
     assert not tuned_on & compared
 
@@ -211,13 +220,44 @@ def test_the_alarm_level_leaves_the_allowed_number_of_alarms():
     assert sum(trace.false_alarm(level) for trace in healthy) == 2
 
 
-def test_what_is_tuned_are_options_the_rivals_have():
-    for grids, group in ((DETECTORS, "beaver_ftc.detectors"), (LAWS, "beaver_ftc.laws")):
-        for name, grid in grids.items():
-            known = plugin_class(group, name).defaults
-            assert set(grid) <= set(known)
-            assert set(tuned()[name]) <= set(known)
-            assert len(candidates(grid)) > 1
+@pytest.mark.parametrize(
+    ("grids", "group", "path"),
+    [
+        (DETECTORS, "beaver_ftc.detectors", TUNED),
+        (DETECTORS_FOR_ERRORS, "beaver_ftc.detectors", TUNED_FOR_ERRORS),
+        (LAWS, "beaver_ftc.laws", TUNED),
+    ],
+)
+def test_what_is_tuned_are_options_the_rivals_have(grids, group, path):
+    for name, grid in grids.items():
+        known = plugin_class(group, name).defaults
+        assert set(grid) <= set(known)
+        assert set(grid) <= set(tuned(path)[name]) <= set(known)
+        assert len(candidates(grid)) > 1
+
+
+def test_what_is_tuned_for_errors_flies_only_where_errors_are_declared():
+    seen = {}
+    for name, bounds in (("none", {}), ("errors", {"turbulence": "light"})):
+        flown = Loop(scenario(duration_s=1, fdi={"scheme": "augmented-ekf", "bounds": bounds}))
+        seen[name] = flown.plugged.detector.option
+    assert seen["none"]["drift_per_s"] == tuned()["augmented-ekf"]["drift_per_s"]
+    assert seen["errors"]["drift_per_s"] == tuned(TUNED_FOR_ERRORS)["augmented-ekf"]["drift_per_s"]
+
+
+def test_a_candidate_is_judged_in_each_air_at_a_level_of_its_own():
+    """The quick candidate is as noisy in rough air as its fault is loud there; one level for all air would
+    blind it in still air."""
+
+    def flight(before, after):
+        return Trace(before, ((0.5, after),), faulted=after > 0.0, healthy_s=3600.0)
+
+    air = ["none", "none", "light", "light"]
+    keen = [flight(1.0, 0.0), flight(0.5, 2.0), flight(10.0, 0.0), flight(5.0, 20.0)]
+    dull = [flight(1.0, 0.0), flight(0.5, 0.9), flight(1.0, 0.0), flight(0.5, 2.0)]
+    played = [{"x": pair} for pair in zip(dull, keen, strict=True)]
+    best = _best_detector("x", {"kind": (0.0, 1.0)}, played, air, 0.0)
+    assert best == {"kind": 1.0, "alarm": pytest.approx(12.0)}
 
 
 def test_work_is_spread_in_order():

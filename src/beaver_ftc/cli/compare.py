@@ -22,6 +22,9 @@ def command(
         bool, typer.Option("--benchmark", help="Compare on the standard sets; update the leaderboard.")
     ] = False,
     tune: Annotated[bool, typer.Option("--tune", help="Tune the rivals on the calibration set.")] = False,
+    errors: Annotated[
+        bool, typer.Option("--errors", help="With --tune: for declared sensor errors and turbulence.")
+    ] = False,
     schemes: Annotated[
         str | None, typer.Option(help="Comma-separated schemes; all registered ones if left out.")
     ] = None,
@@ -50,10 +53,12 @@ def command(
         raise BadInput("compare: allowed: exactly one of RUN..., --sweep FILE, --benchmark, --tune")
     if only is not None and not benchmark:
         raise BadInput("compare: --set: allowed: only with --benchmark")
+    if errors and not tune:
+        raise BadInput("compare: --errors: allowed: only with --tune")
     if runs:
         _compare_runs(runs, out, format)
     elif tune:
-        _tune(target, workers, flights, format)
+        _tune(target, workers, flights, errors, format)
     else:
         cases = _cases(sweep, only, flights)
         name = f"benchmark-{only}" if only else "benchmark" if benchmark else cases[0].set
@@ -137,13 +142,13 @@ def _update(document: dict[str, Any], leaderboard: Path | None) -> None:
         write_leaderboard(document, leaderboard)
 
 
-def _tune(target: float, workers: int, most: int | None, format: Format) -> None:
+def _tune(target: float, workers: int, most: int | None, errors: bool, format: Format) -> None:
     from beaver_ftc.cli.progress import progress_bar
     from beaver_ftc.compare.tune import tune, write_tuned
 
     with progress_bar("calibration flights") as progress:
-        document = tune(target, workers, most, progress)
-    write_tuned(document)
+        document = tune(target, workers, most, progress, errors)
+    write_tuned(document, errors=errors)
     if format is Format.json:
         emit_json(document)
     else:

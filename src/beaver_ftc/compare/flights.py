@@ -8,6 +8,7 @@ from beaver_ftc.paths import data_root
 from beaver_ftc.scenario.schema import Scenario
 
 CALIBRATION = "calibration"
+CALIBRATION_ERRORS = "calibration-errors"
 
 
 @dataclass(frozen=True)
@@ -36,14 +37,15 @@ def benchmark_folder() -> Path:
 
 
 def set_names() -> list[str]:
-    """The standard sets but the one that is for tuning."""
+    """The standard sets but those that are for tuning."""
     folders = sorted(path.name for path in benchmark_folder().iterdir() if path.is_dir())
-    return [name for name in folders if name != CALIBRATION]
+    return [name for name in folders if not name.startswith(CALIBRATION)]
 
 
 def of_set(name: str, most: int | None = None) -> list[Case]:
     """The flights of a standard set; of each of its sweeps, the first `most`."""
     folder = benchmark_folder() / name
     if not folder.is_dir():
-        raise BadInput(f"no benchmark set {name!r}, allowed: {', '.join([*set_names(), CALIBRATION])}")
+        allowed = ", ".join([*set_names(), CALIBRATION, CALIBRATION_ERRORS])
+        raise BadInput(f"no benchmark set {name!r}, allowed: {allowed}")
     return [case for path in sorted(folder.glob("*.yaml")) for case in of_sweep(path, name, most)]

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 
@@ -12,22 +13,83 @@ class DesignModel:
     """The design model as two functions, xdot = f(x, y) + G(y) u (see design/model.py for the order of y)."""
 
     def __init__(self, record: np.ndarray) -> None:
-        from beaver_ftc.design.variants import response  # compiled: nothing for those who only list plug-ins
+        from beaver_ftc.design.variants import responses  # compiled: nothing for those who only list plug-ins
 
-        self._record, self._fill = record[0], response
+        self._record, self._fill = record[0], responses
 
     def f(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Angular acceleration (3,) rad/s2 at neutral surfaces; x (3,) rad/s, y (5,)."""
-        return self._response(x, y)[0]
+        """Angular acceleration (3,) rad/s2 at neutral surfaces; x (3,) rad/s, y (5,). Of x (n, 3), (n, 3)."""
+        return self._response(np.atleast_2d(x), y)[0].reshape(np.shape(x))
 
     def G(self, y: np.ndarray) -> np.ndarray:
         """Angular acceleration of each surface, (3, 4) rad/s2 per rad; y (5,)."""
-        return self._response(np.zeros(3), y)[1]
+        return self._response(np.zeros((1, 3)), y)[1]
 
     def _response(self, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        f, G = np.empty(3), np.zeros((3, 4))
-        self._fill(self._record, x, y, f, G)
+        f, G = np.empty(x.shape), np.zeros((3, 4))
+        self._fill(self._record, np.ascontiguousarray(x), y, f, G)
         return f, G
+
+
+SIGNALS = ("p", "q", "r", "alpha", "beta", "V", "qdyn")
+
+
+_ZEROS = {shape: partial(np.zeros, shape) for shape in (3, 4, 7, (3, 3), (3, 9))}
+
+
+@dataclass(frozen=True)
+class Declared:
+    """What a designer is told of errors beside the published bounds; all zero where nothing is declared.
+
+    noise, bias, resolution, slope (7,): of the instruments, in the order of SIGNALS, SI; noise is the
+    standard deviation of a sample. gust_rad_s, gust_time_s (3,): rotation of the air about each axis,
+    standard deviation and correlation time; gust_effect (3, 3) 1/s: the angular acceleration it causes.
+    coefficients (3, 9): tolerance of each moment coefficient, absolute, as design.model.TERMS. inertia:
+    tolerance as a share. deflection_rad: how far a surface may be from its actuator's model.
+    model_rad_s2 (3,): standard deviation, at the trim, of the acceleration the model gets wrong by all of
+    these but the gyros and the air. bandwidth_rad_s, rate_limit_rad_s (4,): the actuators, 0 is ideal.
+    """
+
+    noise: np.ndarray = field(default_factory=_ZEROS[7])
+    bias: np.ndarray = field(default_factory=_ZEROS[7])
+    resolution: np.ndarray = field(default_factory=_ZEROS[7])
+    slope: np.ndarray = field(default_factory=_ZEROS[7])
+    gust_rad_s: np.ndarray = field(default_factory=_ZEROS[3])
+    gust_time_s: np.ndarray = field(default_factory=_ZEROS[3])
+    gust_effect: np.ndarray = field(default_factory=_ZEROS[3, 3])
+    coefficients: np.ndarray = field(default_factory=_ZEROS[3, 9])
+    inertia: float = 0.0
+    deflection_rad: float = 0.0
+    model_rad_s2: np.ndarray = field(default_factory=_ZEROS[3])
+    bandwidth_rad_s: np.ndarray = field(default_factory=_ZEROS[4])
+    rate_limit_rad_s: np.ndarray = field(default_factory=_ZEROS[4])
+
+    @property
+    def errors(self) -> bool:
+        """Whether any error is declared."""
+        shares = self.noise, self.bias, self.resolution, self.slope, self.gust_rad_s, self.coefficients
+        return bool(any(np.any(share) for share in shares) or self.inertia or self.deflection_rad)
+
+    @property
+    def air(self) -> bool:
+        """Whether turbulence is declared."""
+        return bool(np.any(self.gust_rad_s))
+
+    @property
+    def gyro_rad_s(self) -> np.ndarray:
+        """Standard deviation of a gyro's sample, noise and rounding, (3,)."""
+        return np.hypot(self.noise[:3], self.resolution[:3] / np.sqrt(12.0))
+
+    @property
+    def turbulence_rad_s2(self) -> np.ndarray:
+        """Standard deviation of the angular acceleration that turbulence causes, per axis, (3,)."""
+        return np.sqrt((self.gust_effect**2) @ self.gust_rad_s**2)
+
+    @property
+    def turbulence_time_s(self) -> np.ndarray:
+        """Its correlation time, (3,): the mean of those of the gusts that cause it, by their variance."""
+        share = self.gust_effect**2 * self.gust_rad_s**2
+        return share @ self.gust_time_s / np.maximum(share.sum(axis=1), 1e-300)
 
 
 @dataclass(frozen=True)
@@ -38,6 +100,7 @@ class Context:
     trim_x (3,) rad/s, trim_y (5,), trim_rad (4,): the flight condition at the start.
     travel_rad (2, 4): lower and upper stops. constant_rad_s2 (3,), inertia_coupling (3,): declared bounds of
     the uncertainty. seed: of everything random. options: `fdi.options` or `control.options` of the scenario.
+    declared: instruments, air and tolerances, as far as `fdi.bounds` declares them, and the actuators.
     """
 
     dt_s: float
@@ -52,3 +115,4 @@ class Context:
     seed: int = 0
     options: Mapping[str, float] = field(default_factory=dict)
     surfaces: tuple[str, ...] = SURFACES
+    declared: Declared = field(default_factory=Declared)

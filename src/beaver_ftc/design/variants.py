@@ -93,6 +93,13 @@ def response(design, x, y, f, G):
 
 
 @kernel
+def responses(design, x, y, f, G):
+    """The same at each of x (n, 3), into f (n, 3); G is that of y."""
+    for i in range(x.shape[0]):
+        response(design, x[i], y, f[i], G)
+
+
+@kernel
 def linear_response(design, x, y, f, G):
     """Fill f and G with the linear model about (x0, y0)."""
     for i in range(3):

@@ -5,7 +5,7 @@
 
 theta is the lost effectiveness of the fault class [Zhang2005, eq. (4)]. The declared bound on the
 uncertainty is taken for a standard deviation, times `noise`: it is no white noise, which is what the
-filters assume.
+filters assume. Declared gyro noise is the measurement's; declared turbulence adds states (air.py).
 """
 
 from collections.abc import Mapping
@@ -16,6 +16,7 @@ import numpy as np
 
 from beaver_ftc.design.context import Context
 from beaver_ftc.diagnosis.base import Measured, Verdict
+from beaver_ftc.rivals.air import Air, rate_variance, unexplained
 from beaver_ftc.rivals.kalman import update
 from beaver_ftc.rivals.options import options_of
 
@@ -38,10 +39,13 @@ class EffectivenessFilter:
 
     def reset(self, context: Context) -> None:
         """Start healthy, with theta known to a tenth."""
-        self.context, self.option = context, options_of(self.name, self.defaults, context.options)
-        self.z = np.zeros(N)
-        self.P = np.diag([self.option["measurement_rad_s"] ** 2] * 3 + [0.01] * 3)
-        self.R = np.eye(3) * self.option["measurement_rad_s"] ** 2
+        self.context, self.option = context, options_of(self.name, self.defaults, context)
+        self.air = Air(context)
+        self.n = N + self.air.n
+        rates = rate_variance(context.declared, self.option["measurement_rad_s"])
+        self.z = np.zeros(self.n)
+        self.P = np.diag(np.concatenate((rates, [0.01] * 3, self.air.variance)))
+        self.R = np.diag(rates)
         self.Q_theta = self.option["drift_per_s"] ** 2 * context.dt_s
         self.fade = exp(-context.dt_s / self.option["misfit_s"])
         self.square, self.detected, self.first = 3.0, False, True
@@ -55,7 +59,7 @@ class EffectivenessFilter:
         self.propagate(measured)
         nu = measured.x - self.z[:3]
         self.z, self.P, S = update(self.z, self.P, nu, self.R)
-        self.z[3:] = np.clip(self.z[3:], -1.0, 1.0)
+        self.z[3:N] = np.clip(self.z[3:N], -1.0, 1.0)
         square = float(nu @ np.linalg.solve(S, nu))
         self.square = self.fade * self.square + (1.0 - self.fade) * min(square, 1e6)
         return self.verdict(measured, self.statistic(square))
@@ -69,13 +73,14 @@ class EffectivenessFilter:
         raise NotImplementedError
 
     def process_noise(self, measured: Measured) -> np.ndarray:
-        """Q (N,), the diagonal: of the rates from the declared bound, of theta a random walk."""
-        rates = (self.context.dt_s * self.option["noise"] * measured.eta_bar) ** 2
-        return np.concatenate((rates, np.full(3, self.Q_theta)))
+        """Q (n,), the diagonal: of the rates from the declared bound, of theta a random walk, of the air."""
+        size = unexplained(self.context, measured.eta_bar)
+        rates = (self.context.dt_s * self.option["noise"] * size) ** 2
+        return np.concatenate((rates, np.full(3, self.Q_theta), self.air.noise))
 
     def significance(self) -> np.ndarray:
         """theta^2 / variance of each surface, chi-square with one degree of freedom when healthy, (3,)."""
-        return self.z[3:] ** 2 / np.diagonal(self.P)[3:]
+        return self.z[3:N] ** 2 / np.diagonal(self.P)[3:N]
 
     def verdict(self, measured: Measured, statistic: float) -> Verdict:
         """Name the surface whose theta is most significantly off, or none: innovations misfit, or a surface
@@ -84,7 +89,7 @@ class EffectivenessFilter:
         if not self.detected:
             return Verdict(statistic=statistic)
         effectiveness = np.ones(4)
-        effectiveness[:3] += np.clip(self.z[3:], -1.0, 0.0)
+        effectiveness[:3] += np.clip(self.z[3:N], -1.0, 0.0)
         worst = int(np.argmax(self.significance()))
         if self.square > 3.0 * self.option["misfit"] or self.z[3 + worst] > 0.0:
             return Verdict(True, None, "unanticipated", "unanticipated", None, None, statistic)

@@ -23,19 +23,23 @@ class AugmentedEkf(EffectivenessFilter):
         """z- = g(z), P- = F P F' + Q with the Jacobian F at the estimate."""
         F = self.jacobian(measured)
         dt = self.context.dt_s
-        self.z[:3] += dt * (measured.acceleration + measured.contribution[:, :3] @ self.z[3:])
+        self.z[:3] += dt * (measured.acceleration + measured.contribution[:, :3] @ self.z[3:N])
+        if self.air.n:
+            self.z[:3] += self.air.effect @ self.z[N:]
+            self.z[N:] *= self.air.keep
         self.P = F @ self.P @ F.T
-        self.P[np.diag_indices(N)] += self.process_noise(measured)
+        self.P[np.diag_indices(self.n)] += self.process_noise(measured)
 
     def jacobian(self, measured: Measured) -> np.ndarray:
-        """F (N, N): [[1 + dt df/dx, dt G_s u_s], [0, 1]]."""
+        """F (n, n): [[1 + dt df/dx, dt G_s u_s], [0, 1]], and with the air [.., dt B] and its decay."""
         f, y, dt = self.context.model.f, measured.y, self.context.dt_s
-        F = np.eye(N)
-        for j in range(3):
-            step = np.zeros(3)
-            step[j] = _STEP
-            F[:3, j] += dt * (f(measured.x + step, y) - f(measured.x - step, y)) / (2.0 * _STEP)
-        F[:3, 3:] = dt * measured.contribution[:, :3]
+        F = np.eye(self.n)
+        step = _STEP * np.eye(3)
+        there = f(np.concatenate((measured.x + step, measured.x - step)), y)
+        F[:3, :3] += dt * (there[:3] - there[3:]).T / (2.0 * _STEP)
+        F[:3, 3:N] = dt * measured.contribution[:, :3]
+        F[:3, N:] = self.air.effect
+        F[range(N, self.n), range(N, self.n)] = self.air.keep
         return F
 
     def statistic(self, square: float) -> float:

@@ -2,7 +2,7 @@
 
 Hypotheses: healthy; each surface with little and with much of its effectiveness lost; and one that explains
 anything badly, by noise alone, for faults outside the class. Mixing, filtering, combination as in
-[Blom1988]; actuator faults as modes as in [Zhang1998].
+[Blom1988]; actuator faults as modes as in [Zhang1998]. Declared turbulence is a state of each (air.py).
 """
 
 from collections.abc import Mapping
@@ -12,6 +12,7 @@ import numpy as np
 
 from beaver_ftc.design.context import Context
 from beaver_ftc.diagnosis.base import Measured, Verdict
+from beaver_ftc.rivals.air import Air, rate_variance, unexplained
 from beaver_ftc.rivals.kalman import log_likelihood, update
 from beaver_ftc.rivals.options import options_of
 
@@ -68,14 +69,18 @@ class InteractingMultipleModels:
 
     def reset(self, context: Context) -> None:
         """Healthy, almost certainly."""
-        self.option = options_of(self.name, self.defaults, context.options)
+        self.context, self.option = context, options_of(self.name, self.defaults, context)
         self.dt = context.dt_s
         self.chain = transition(self.option["stay"], N_MODES)
         self.probability = np.full(N_MODES, _LEAST)
         self.probability[0] = 1.0 - (N_MODES - 1) * _LEAST
-        self.R = np.eye(3) * self.option["measurement_rad_s"] ** 2
-        self.x = np.zeros((N_MODES, 3))
-        self.P = np.tile(self.R, (N_MODES, 1, 1))
+        self.air = Air(context)
+        rates = rate_variance(context.declared, self.option["measurement_rad_s"])
+        self.R = np.diag(rates)
+        self.x = np.zeros((N_MODES, 3 + self.air.n))
+        self.P = np.tile(np.diag(np.concatenate((rates, self.air.variance))), (N_MODES, 1, 1))
+        self.F = np.eye(3 + self.air.n)
+        self.F[:3, 3:], self.F[3:, 3:] = self.air.effect, np.diag(self.air.keep)
         self.noise = np.full(N_MODES, self.option["noise"])
         self.noise[-1] = self.option["unknown_noise"]
         self.detected = False
@@ -84,12 +89,16 @@ class InteractingMultipleModels:
     def step(self, measured: Measured, command: np.ndarray) -> Verdict:
         """Mix, filter, weigh, decide."""
         if self.first:
-            self.first, self.x[:] = False, measured.x
+            self.first, self.x[:, :3] = False, measured.x
             return Verdict(statistic=0.0)
         x, P, predicted = mix(self.x, self.P, self.probability, self.chain)
-        x = x + self.dt * self.accelerations(measured)
-        P = P + np.einsum("m,ij->mij", (self.dt * self.noise) ** 2, np.diag(measured.eta_bar**2))
-        nu = measured.x - x
+        if self.air.n:
+            x, P = x @ self.F.T, self.F @ P @ self.F.T
+            P[:, range(3, 6), range(3, 6)] += self.air.noise
+        x[:, :3] += self.dt * self.accelerations(measured)
+        size = unexplained(self.context, measured.eta_bar)
+        P[:, :3, :3] += np.einsum("m,ij->mij", (self.dt * self.noise) ** 2, np.diag(size**2))
+        nu = measured.x - x[:, :3]
         self.x, self.P, S = update(x, P, nu, self.R)
         self.probability = posterior(predicted, log_likelihood(nu, S))
         return self.verdict()

@@ -45,7 +45,7 @@ class IncrementalInversion:
 
     def reset(self, context: Context) -> None:
         """In trim: no acceleration, trimmed surfaces."""
-        self.context, self.option = context, options_of(self.name, self.defaults, context.options)
+        self.context, self.option = context, options_of(self.name, self.defaults, context)
         self.demand = Demand(context, self.option)
         pole, dt = self.option["filter_per_s"], context.dt_s
         self.acceleration = LowPass(pole, dt, np.zeros(3))

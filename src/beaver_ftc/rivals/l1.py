@@ -44,7 +44,7 @@ class L1Adaptive:
 
     def reset(self, context: Context) -> None:
         """Nothing unexplained yet."""
-        self.context, self.option = context, options_of(self.name, self.defaults, context.options)
+        self.context, self.option = context, options_of(self.name, self.defaults, context)
         self.demand = Demand(context, self.option)
         self.predictor = Predictor(self.option["predictor_per_s"], context.dt_s)
         self.filter = exp(-self.option["bandwidth_per_s"] * context.dt_s)

@@ -37,7 +37,7 @@ class FixedGainLqr:
 
     def reset(self, context: Context) -> None:
         """Linearise about the trim and solve for the gains, once."""
-        self.context, option = context, options_of(self.name, self.defaults, context.options)
+        self.context, option = context, options_of(self.name, self.defaults, context)
         self.A, self.B = linearised(context)
         dt = context.dt_s
         A = np.block([[np.eye(3) + dt * self.A, np.zeros((3, 3))], [dt * np.eye(3), np.eye(3)]])

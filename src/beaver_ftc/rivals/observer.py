@@ -5,10 +5,16 @@
 The residual is that of the published detection estimator; only the threshold does not move with the state.
 From the alarm on, a residual started anew is fitted by the filtered effect of each surface, by least squares
 over a fading window; the best fit names the fault, and a window after the alarm the name stands.
+
+What is declared of gyros and air has a known deviation behind that filter; the threshold is `alarm` times all
+of it together:
+
+    gyro  n[k+1] - n[k], white      -> sigma^2 2 / (1 + a)
+    air   first order, r = exp(-dt / tau) -> dt^2 sigma^2 (1 + a r) / ((1 - a^2) (1 - a r))
 """
 
 from collections.abc import Mapping
-from math import exp
+from math import exp, sqrt
 from typing import ClassVar
 
 import numpy as np
@@ -46,6 +52,16 @@ class Fit:
         return s, float(theta[s]), float(J[s] / (3.0 * self.count))
 
 
+def residual_deviation(context: Context, a: float) -> np.ndarray:
+    """Standard deviation (3,) rad/s of the healthy residual behind the filter, by what is declared."""
+    declared, dt = context.declared, context.dt_s
+    steady = np.hypot(np.maximum(context.constant_rad_s2, 1e-4), declared.model_rad_s2) * dt / (1.0 - a)
+    r = np.exp(-dt / np.maximum(declared.turbulence_time_s, dt))
+    air = dt * declared.turbulence_rad_s2 * np.sqrt((1.0 + a * r) / ((1.0 - a * a) * (1.0 - a * r)))
+    gyro = declared.gyro_rad_s * sqrt(2.0 / (1.0 + a))
+    return np.sqrt(steady**2 + air**2 + gyro**2)
+
+
 class ConstantThresholdObserver:
     """Observer residual with a constant threshold, surface named by least squares [Chen1999]."""
 
@@ -54,11 +70,13 @@ class ConstantThresholdObserver:
 
     def reset(self, context: Context) -> None:
         """No residual."""
-        self.option = options_of(self.name, self.defaults, context.options)
+        self.option = options_of(self.name, self.defaults, context)
         pole = self.option["pole_per_s"]
         self.dt, self.a = context.dt_s, exp(-pole * context.dt_s)
         # a declared bound of zero would make any rounding an alarm
         self.scale = self.option["alarm"] * np.maximum(context.constant_rad_s2, 1e-4) / pole
+        if context.declared.errors:
+            self.scale = self.option["alarm"] * residual_deviation(context, self.a)
         self.eps, self.since, self.Omega = np.zeros(3), np.zeros(3), np.zeros((3, 3))
         self.before: np.ndarray | None = None
         self.fit = Fit(exp(-context.dt_s / self.option["window_s"]))

@@ -54,10 +54,11 @@ class RlsMonitor:
 
     def reset(self, context: Context) -> None:
         """Know nothing."""
-        self.option = options_of(self.name, self.defaults, context.options)
+        self.option = options_of(self.name, self.defaults, context)
         forgetting = exp(-context.dt_s / self.option["forgetting_s"])
         fade = exp(-context.dt_s / self.option["score_s"])
-        self.pairs = [Pair(forgetting, fade, self.option["floor_rad_s"]) for _ in PAIRS]
+        floor = np.hypot(self.option["floor_rad_s"], context.declared.gyro_rad_s)
+        self.pairs = [Pair(forgetting, fade, float(floor[i])) for _, i, _ in PAIRS]
         self.verdict = Verdict()
 
     def step(self, measured: Measured, command: np.ndarray) -> Verdict:

@@ -24,22 +24,23 @@ class AugmentedUkf(EffectivenessFilter):
 
     def propagate(self, measured: Measured) -> None:
         """Move the sigma points through the dynamics; their mean and covariance are z- and P-."""
-        points, weights = sigma_points(self.z, self.P, self.option["spread"])
+        points, weights = sigma_points(self.z, self.P, self.option["spread"] + self.air.n)
         points = self.dynamics(points, measured)
         self.z = weights @ points
         off = points - self.z
         self.P = (off.T * weights) @ off
-        self.P[np.diag_indices(N)] += self.process_noise(measured)
+        self.P[np.diag_indices(self.n)] += self.process_noise(measured)
 
     def dynamics(self, points: np.ndarray, measured: Measured) -> np.ndarray:
         """Each sigma point a frame later; f differs between points by its change from the measured state."""
         dt, f = self.context.dt_s, self.context.model.f
         moved = points.copy()
-        here = f(measured.x, measured.y)
-        for i, point in enumerate(points):
-            away = f(point[:3], measured.y) - here
-            loss = measured.contribution[:, :3] @ point[3:]
-            moved[i, :3] += dt * (measured.acceleration + away + loss)
+        away = f(points[:, :3], measured.y) - f(measured.x, measured.y)
+        loss = np.array([measured.contribution[:, :3] @ point[3:N] for point in points])
+        moved[:, :3] += dt * (measured.acceleration + away + loss)
+        if self.air.n:
+            moved[:, :3] += points[:, N:] @ self.air.effect.T
+            moved[:, N:] *= self.air.keep
         return moved
 
     def statistic(self, square: float) -> float:

@@ -1,0 +1,107 @@
+"""What a detector is told of instruments and air is what the truth does."""
+
+import numpy as np
+import pytest
+
+from beaver_ftc.compare.replay import Recorder, record
+from beaver_ftc.design.coefficients import TERMS, value
+from beaver_ftc.design.context import Declared
+from beaver_ftc.design.model import TERMS as ORDER
+from beaver_ftc.diagnosis.declared import gusts
+from beaver_ftc.loop import Loop
+from flying import scenario
+
+
+def told(**keys):
+    loop = Loop(scenario(duration_s=1, **keys), Recorder())
+    return loop.plugged.detector.context.declared
+
+
+def test_nothing_declared_is_nothing_told():
+    declared = told(sensors="tactical-grade", environment={"turbulence": "dryden", "severity": "light"})
+    assert not declared.errors
+    assert not declared.air
+    assert not declared.turbulence_rad_s2.any()
+    for name, zeros in vars(Declared()).items():
+        if name not in ("gust_time_s", "gust_effect"):
+            assert np.array_equal(getattr(declared, name), zeros), name
+
+
+def test_instruments_are_told_as_the_preset_has_them():
+    declared = told(fdi={"bounds": {"sensors": "consumer-grade"}})
+    assert declared.errors
+    assert declared.noise == pytest.approx([np.radians(0.1)] * 3 + [np.radians(0.043)] * 2 + [0.1, 3.0])
+    assert declared.bias == pytest.approx([np.radians(0.5)] * 5 + [0.4, 17.0])
+    assert declared.slope[:3] == pytest.approx([0.03] * 3)
+    assert declared.gyro_rad_s == pytest.approx(np.radians(np.hypot(0.1, 0.0153 / np.sqrt(12))) * np.ones(3))
+
+
+def test_the_actuators_are_told():
+    declared = told(actuators="servo")
+    assert declared.bandwidth_rad_s == pytest.approx([20.0] * 4)
+    assert declared.rate_limit_rad_s == pytest.approx(np.radians([60.0] * 4))
+    assert not declared.errors
+
+
+def test_one_coefficient_off_gives_its_own_share_of_the_acceleration():
+    """Cm_alpha off by a tenth: a tenth of its moment, over the inertia."""
+    declared = told(fdi={"bounds": {"coefficients": {"Cm_alpha": 0.1}}})
+    loop = Loop(scenario(duration_s=1), Recorder())
+    alpha, _, _, qdyn, _ = loop.plugged.detector.context.trim_y
+    expected = 0.1 * abs(TERMS["Cm_alpha"].value) * alpha * qdyn * 23.23 * 1.5875 / 6928.93
+    assert declared.model_rad_s2 == pytest.approx([0.0, expected, 0.0], abs=1e-9)
+    place = ORDER[1].index("Cm_alpha")
+    assert declared.coefficients[1, place] == pytest.approx(0.1 * abs(value("Cm_alpha")))
+
+
+def test_errors_of_air_data_add_by_their_squares():
+    both = told(fdi={"bounds": {"sensors": {"alpha": {"noise_std_deg": 0.3}, "beta": {"bias_deg": 0.4}}}})
+    alpha = told(fdi={"bounds": {"sensors": {"alpha": {"noise_std_deg": 0.3}}}})
+    beta = told(fdi={"bounds": {"sensors": {"beta": {"bias_deg": 0.4}}}})
+    assert alpha.model_rad_s2[1] > 10 * alpha.model_rad_s2[0]
+    assert beta.model_rad_s2[0] > 10 * beta.model_rad_s2[1]
+    assert both.model_rad_s2 == pytest.approx(np.hypot(alpha.model_rad_s2, beta.model_rad_s2))
+
+
+@pytest.mark.parametrize("severity", ["light", "moderate"])
+def test_the_turbulence_told_is_the_one_flown(severity):
+    """What the model does not explain of a flight in JSBSim's turbulence has the size and the memory told."""
+    innovations = []
+    for seed in range(6):
+        recording = record(
+            scenario(
+                duration_s=30,
+                seed=seed,
+                uncertainty={},
+                environment={"turbulence": "dryden", "severity": severity},
+                fdi={"bounds": {"turbulence": severity}},
+            )
+        )
+        x = np.array([measured.x for measured, _ in recording.seen])
+        believed = np.array([measured.acceleration for measured, _ in recording.seen])
+        innovations.append((np.diff(x, axis=0) / 0.01 - believed[1:])[200:])
+    declared = recording.context.declared
+    size = np.sqrt(np.mean([np.mean(nu**2, axis=0) for nu in innovations], axis=0))
+    assert size == pytest.approx(declared.turbulence_rad_s2, rel=0.2)
+    lag = 25
+    kept = np.mean([np.mean(nu[lag:] * nu[:-lag], axis=0) for nu in innovations], axis=0) / size**2
+    assert kept == pytest.approx(np.exp(-lag * 0.01 / declared.turbulence_time_s), abs=0.15)
+
+
+def test_the_air_rolls_more_than_it_pitches_or_yaws_and_faster_flight_meets_it_sooner():
+    slow, fast = gusts("light", 40.0), gusts("light", 50.0)
+    assert slow[0][0] > slow[0][2] > slow[0][1] > 0
+    assert slow[0] == pytest.approx(fast[0])
+    assert slow[1] == pytest.approx(1.25 * fast[1])
+    assert gusts("moderate", 40.0)[0] == pytest.approx(10.6 / 7.4 * slow[0])
+
+
+def test_the_slopes_of_the_gusts_have_the_variance_of_drydens_spectrum():
+    """sigma^2 of s / V / (1 + tau s) behind Dryden's vertical gusts, by numerical integration."""
+    V, L, sigma = 45.0, 1750 * 0.3048, 7.4 * 0.3048
+    rotation, time_s = gusts("light", V)
+    omega = np.linspace(0.0, 4000.0, 4_000_001)
+    gust = sigma**2 * L / (np.pi * V) * (1 + 3 * (L * omega / V) ** 2) / (1 + (L * omega / V) ** 2) ** 2
+    for axis in (1, 2):
+        slope = gust * (omega / V) ** 2 / (1 + (time_s[axis] * omega) ** 2)
+        assert rotation[axis] ** 2 == pytest.approx(np.trapezoid(slope, omega), rel=2e-3)

@@ -3,7 +3,16 @@ import math
 import numpy as np
 import pytest
 
-from beaver_ftc.statistics import poisson, poisson_bound, quantile, quantile_bound, wilson, wilson_bound
+from beaver_ftc.statistics import (
+    binomial,
+    poisson,
+    poisson_bound,
+    quantile,
+    quantile_bound,
+    sign_test,
+    wilson,
+    wilson_bound,
+)
 
 
 @pytest.mark.parametrize(
@@ -15,6 +24,31 @@ def test_rates_have_the_intervals_of_newcombes_table(successes, trials, low, hig
     found = wilson(successes, trials)
     assert (round(found.low, 4), round(found.high, 4)) == (low, high)
     assert found.value == successes / trials
+
+
+@pytest.mark.parametrize(("successes", "trials"), [(81, 263), (1, 29), (7, 8)])
+def test_beyond_an_exact_interval_so_few_or_so_many_are_improbable(successes, trials):
+    """At each end the tail of the binomial distribution, added up term by term, is 2.5 %."""
+
+    def tail(p, counts):
+        return sum(math.comb(trials, k) * p**k * (1 - p) ** (trials - k) for k in counts)
+
+    found = binomial(successes, trials)
+    assert tail(found.low, range(successes, trials + 1)) == pytest.approx(0.025)
+    assert tail(found.high, range(successes + 1)) == pytest.approx(0.025)
+    assert found.low < found.value < found.high
+
+
+def test_none_of_twenty_leaves_the_lower_end_at_nothing():
+    found = binomial(0, 20)
+    assert (found.low, found.high) == (0.0, pytest.approx(1 - 0.025 ** (1 / 20)))
+    assert binomial(20, 20).low == pytest.approx(0.025 ** (1 / 20))
+
+
+def test_between_equals_the_sign_test_counts_coin_throws():
+    assert sign_test(6, 0) == sign_test(0, 6) == pytest.approx(2 / 64)
+    assert sign_test(1, 7) == pytest.approx(2 * 9 / 256)
+    assert sign_test(5, 5) == sign_test(0, 0) == 1.0
 
 
 @pytest.mark.parametrize(
@@ -56,6 +90,7 @@ def test_a_quantile_is_the_smallest_value_that_enough_do_not_exceed():
 def test_bounds_without_flights_say_nothing():
     assert (wilson_bound(0, 0, 0.95, upper=True), wilson_bound(0, 0, 0.95, upper=False)) == (1.0, 0.0)
     assert poisson(0, 0.0).high == math.inf
+    assert (binomial(0, 0).low, binomial(0, 0).high) == (0.0, 1.0)
     assert quantile_bound(np.empty(0), 0.5, 0.9, upper=True) == math.inf
 
 

@@ -59,6 +59,23 @@ def poisson_bound(events: int, exposure: float, confidence: float, upper: bool) 
     return float(gammaincinv(events, 1 - confidence)) / exposure if events else 0.0
 
 
+def binomial(events: int, trials: int, confidence: float = CONFIDENCE) -> Estimate:
+    """A probability with its two-sided exact interval [ClopperPearson1934]."""
+    if trials == 0:
+        return Estimate(math.nan, 0.0, 1.0)
+    one_sided = (1.0 + confidence) / 2.0
+    low = 1.0 - binomial_upper(trials - events, trials, one_sided)
+    return Estimate(events / trials, low, binomial_upper(events, trials, one_sided))
+
+
+def sign_test(wins: int, losses: int) -> float:
+    """Probability of a result at least as uneven between equals, two-sided and exact [Conover1999]."""
+    from scipy.special import bdtr
+
+    n = wins + losses
+    return min(1.0, 2.0 * float(bdtr(min(wins, losses), n, 0.5))) if n else 1.0
+
+
 def binomial_upper(events: int, trials: int, confidence: float = CONFIDENCE) -> float:
     """Exact upper limit of a probability after `events` in `trials` [ClopperPearson1934]."""
     from scipy.special import betaincinv

@@ -5,7 +5,7 @@ from math import inf
 import numpy as np
 import pytest
 
-from beaver_ftc.compare.replay import Trace, record, replay, trace
+from beaver_ftc.compare.replay import Trace, record, replay, replay_together, trace
 from beaver_ftc.loop import fly
 from flying import scenario
 
@@ -24,6 +24,26 @@ def test_the_alarm_of_a_replay_is_that_of_a_flight(recorded, scheme):
     assert seen.delay_s() == pytest.approx(flown.detection_time_s - 6.0)
     assert seen.faulted
     assert seen.healthy_s == pytest.approx(6.0)
+
+
+@pytest.mark.parametrize("scheme", ["augmented-ekf", "observer-constant", "multiple-models", "rls-monitor"])
+def test_flights_played_together_are_as_if_played_alone(recorded, scheme):
+    """Up to the fault one detector, then one each: nothing of one fault gets into another's."""
+    faults = [FAULT | {"actuator": surface, "magnitude": 1.0} for surface in ("aileron", "rudder")]
+    others = [record(scenario(duration_s=9, faults=[fault])) for fault in faults]
+    together = replay_together([recorded, *others], scheme)
+    for alone, seen in zip([recorded, *others], together, strict=True):
+        expected = replay(alone, scheme)
+        assert (seen.before, seen.records) == (expected.before, expected.records)
+        assert (seen.faulted, seen.healthy_s) == (expected.faulted, expected.healthy_s)
+    assert len({seen.records for seen in together}) > 1
+
+
+def test_flights_that_were_never_alike_are_played_alone(recorded):
+    other = record(scenario(duration_s=9, faults=[FAULT], initial={"airspeed_mps": 50.0}))
+    together = replay_together([recorded, other], "observer-constant")
+    for alone, seen in zip([recorded, other], together, strict=True):
+        assert seen.records == replay(alone, "observer-constant").records
 
 
 def test_the_recording_changes_nothing(recorded):

@@ -26,6 +26,7 @@ COMMANDS = (
     "compare",
     "reproduce",
     "matrix",
+    "power",
     "bench",
     "verify",
     "detectability",

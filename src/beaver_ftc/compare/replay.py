@@ -6,6 +6,8 @@ the fault, and each value after it that was larger than all before.
 """
 
 from bisect import bisect_right
+from collections.abc import Sequence
+from copy import deepcopy
 from dataclasses import dataclass
 from math import inf, isfinite, isnan
 from time import process_time
@@ -111,6 +113,37 @@ def replay(recording: Recording, scheme: str, options: dict[str, float] | None =
     verdicts = [detector.step(measured, command) for measured, command in recording.seen]
     us = 1e6 * (process_time() - began) / max(len(verdicts), 1)
     return trace(recording, np.array([_statistic(verdict) for verdict in verdicts]), us)
+
+
+def replay_together(
+    recordings: Sequence[Recording], scheme: str, options: dict[str, float] | None = None
+) -> list[Trace]:
+    """The traces of a plugged-in scheme over flights that are the same until their faults strike.
+
+    What they have in common is played once; from there on each has a copy of the detector.
+    """
+    first = recordings[0]
+    common = _frames_in_common(recordings)
+    context = Context(**{**vars(first.context), "options": options or {}})
+    detector: Detector = plugin_class(DETECTORS, scheme)()
+    detector.reset(context)
+    before = [_statistic(detector.step(*shown)) for shown in first.seen[:common]]
+    traces = []
+    for recording in recordings:
+        apart = deepcopy(detector, {id(context): context, id(context.model): context.model})
+        after = [_statistic(apart.step(*shown)) for shown in recording.seen[common:]]
+        traces.append(trace(recording, np.array(before + after)))
+    return traces
+
+
+def _frames_in_common(recordings: Sequence[Recording]) -> int:
+    """Frames before any fault in which all flights were measured alike, to the bit; zero if they differ."""
+    count = min(
+        sum(measured.t_s < recording.fault_at_s - 1e-9 for measured, _ in recording.seen)
+        for recording in recordings
+    )
+    last = [np.concatenate((r.seen[count - 1][0].x, r.seen[count - 1][0].y)) for r in recordings if count]
+    return count if all(np.array_equal(last[0], other) for other in last[1:]) else 0
 
 
 def _statistic(verdict: Verdict) -> float:

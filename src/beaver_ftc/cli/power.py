@@ -1,0 +1,52 @@
+"""`beaver-ftc power`: how likely a fault is found, by every scheme at the same false-alarm rate."""
+
+import os
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from beaver_ftc.cli.output import Format, FormatOption, emit, emit_json
+
+
+class GridName(StrEnum):
+    """The grids there are."""
+
+    quick = "quick"
+    full = "full"
+
+
+def command(
+    grid: Annotated[
+        GridName, typer.Option(help="quick: under a minute of CPU; full: under ten.")
+    ] = GridName.quick,
+    schemes: Annotated[
+        str | None, typer.Option(help="Comma-separated schemes beside ours; all registered ones if left out.")
+    ] = None,
+    workers: Annotated[
+        int | None, typer.Option(min=1, max=1024, help="Processes; default: one a core.")
+    ] = None,
+    out: Annotated[Path, typer.Option(help="Folder for the results: `power` in it.")] = Path("runs"),
+    format: FormatOption = Format.text,
+) -> None:
+    """Map detection probability and delay over surface, magnitude, excitation, sensors and turbulence.
+
+    Every scheme watches the same flights, at the alarm level that gives all the same false-alarm rate on the
+    same healthy flights. Writes power.json, power.parquet, power.txt, and maps as PNG and SVG.
+    """
+    from beaver_ftc.cli.progress import progress_bar
+    from beaver_ftc.power.contenders import contenders
+    from beaver_ftc.power.grid import GRIDS
+    from beaver_ftc.power.run import NAME, run_power
+    from beaver_ftc.power.text import as_text
+
+    names = None if schemes is None else [name.strip() for name in schemes.split(",") if name.strip()]
+    chosen = contenders(names)
+    with progress_bar(f"power, {grid.value} grid") as progress:
+        document = run_power(out, GRIDS[grid], chosen, workers or os.cpu_count() or 1, progress)
+    folder = str(out / NAME)
+    if format is Format.json:
+        emit_json(document | {"folder": folder})
+    else:
+        emit(as_text(document) + f"\n\nresults: {folder}")

@@ -1,0 +1,58 @@
+"""Fly a bout once, and see what every scheme makes of it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from beaver_ftc.compare.replay import Recording, Trace, record, replay_together, trace
+from beaver_ftc.errors import BeaverFtcError
+from beaver_ftc.power.contenders import Contender
+from beaver_ftc.power.grid import WATCHED_S, Bout, Grid, loss, scenario_of, strikes_at_s
+from beaver_ftc.scenario.schema import Scenario
+
+
+@dataclass
+class Watched:
+    """What came of a bout: of every scheme, a trace for each of its flights, in order; why one is missing."""
+
+    bout: Bout
+    faults: tuple[tuple[str, float], ...] = ()
+    traces: dict[str, list[Trace]] = field(default_factory=dict)
+    failures: list[str] = field(default_factory=list)
+
+
+def fly_faulted(bout: Bout, grid: Grid, schemes: Sequence[Contender]) -> Watched:
+    """Every fault of the grid in this bout."""
+    at_s = strikes_at_s(bout)
+    flights = [scenario_of(bout, at_s + WATCHED_S, [loss(*fault, at_s)]) for fault in grid.faults]
+    return _watch(Watched(bout, grid.faults), flights, schemes)
+
+
+def fly_healthy(bout: Bout, grid: Grid, schemes: Sequence[Contender]) -> Watched:
+    """The one flight of a bout without a fault."""
+    return _watch(Watched(bout), [scenario_of(bout, grid.healthy_flight_s)], schemes)
+
+
+def _watch(watched: Watched, flights: Sequence[Scenario], schemes: Sequence[Contender]) -> Watched:
+    seen: list[Recording] = []
+    for contender in schemes:
+        try:
+            if contender.built_in or not seen:
+                recordings = [record(with_fdi(flight, contender)) for flight in flights]
+                seen = seen or recordings
+            watched.traces[contender.name] = (
+                [trace(recording, recording.built_in) for recording in recordings]
+                if contender.built_in
+                else replay_together(seen, contender.scheme)
+            )
+        except BeaverFtcError as error:
+            watched.failures.append(f"{contender.name}: {error}")
+        except Exception as error:  # a plug-in may raise anything: not the end of the comparison
+            watched.failures.append(f"{contender.name}: {type(error).__name__}: {error}")
+    return watched
+
+
+def with_fdi(flight: Scenario, contender: Contender) -> Scenario:
+    """The flight with what the contender wants of the built-in diagnosis."""
+    document = flight.model_dump(mode="json", exclude_none=True)
+    document["fdi"] |= contender.fdi
+    return Scenario.model_validate(document)

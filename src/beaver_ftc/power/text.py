@@ -1,0 +1,117 @@
+"""The survey for the terminal: a table a condition, then where ours is better or worse."""
+
+import io
+from typing import TYPE_CHECKING, Any
+
+from beaver_ftc.power.document import SIGNIFICANT
+from beaver_ftc.power.tally import WITHIN_S
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+Document = dict[str, Any]
+WIDTH = 140
+
+
+def as_text(document: Document, colour: bool = False) -> str:
+    """Tables, legend, comparison and failures."""
+    from rich.console import Console
+
+    console = Console(
+        file=io.StringIO(), width=WIDTH, force_terminal=colour, highlight=False, emoji=False, markup=False
+    )
+    with console.capture() as captured:
+        for sensors, turbulence in document["grid"]["conditions"]:
+            console.print(_table(document, sensors, turbulence))
+    lines = [line.rstrip() for line in captured.get().splitlines()]
+    said = [*_legend(document), "", *comparison(document), *_failures(document)]
+    return "\n".join([*lines, *said])
+
+
+def _table(document: Document, sensors: str, turbulence: str) -> "Table":
+    from rich import box
+    from rich.table import Table
+
+    surfaces = document["grid"]["surfaces"]
+    table = Table(title=title_of(sensors, turbulence), title_justify="left", box=box.SIMPLE_HEAD)
+    for head in ("scheme", "false alarms/h", "before faults/h", *surfaces):
+        table.add_column(head, no_wrap=True)
+    for level in document["levels"]:
+        if (level["sensors"], level["turbulence"]) == (sensors, turbulence):
+            cells = [_total(document, level, surface) for surface in surfaces]
+            alarms = _rate(level["calibration"]), _rate(level["before_faults"])
+            table.add_row(level["scheme"], *alarms, *cells)
+    return table
+
+
+def title_of(sensors: str, turbulence: str) -> str:
+    """A condition in words."""
+    air = "still air" if turbulence == "none" else f"{turbulence} turbulence"
+    return f"{sensors} sensors, {air}"
+
+
+def _rate(alarms: Document | None) -> str:
+    if alarms is None or alarms["per_h"] is None:
+        return "-"
+    high = "" if alarms["per_h_high"] is None else f" to {alarms['per_h_high']:.0f}"
+    return f"{alarms['per_h']:.0f} ({alarms['per_h_low']:.0f}{high})"
+
+
+def _total(document: Document, level: Document, surface: str) -> str:
+    for total in document["totals"]:
+        if total["surface"] == surface and _same(total, level):
+            return shares(total)
+    return "-"
+
+
+def _same(total: Document, level: Document) -> bool:
+    return all(total[name] == level[name] for name in ("sensors", "turbulence", "scheme"))
+
+
+def shares(total: Document) -> str:
+    """Per cent found within each delay, and the median delay."""
+    if not total["flights"]:
+        return "-"
+    percent = "/".join(f"{100 * total['within'][f'{within_s:g}']['value']:.0f}" for within_s in WITHIN_S)
+    median_s = total["median_delay_s"]
+    return f"{percent} {'never' if median_s is None else f'{median_s:.2f} s'}"
+
+
+def _legend(document: Document) -> list[str]:
+    grid = document["grid"]
+    hours = [level["calibration"]["hours"] for level in document["levels"]]
+    within = "/".join(f"{within_s:g}" for within_s in WITHIN_S)
+    chance = document["false_alarms_per_h"] * WITHIN_S[-1] / 36.0
+    losses = ", ".join(f"{100 * magnitude:g}" for magnitude in grid["magnitudes"])
+    references = ", ".join(f"{excitation:g}" for excitation in grid["excitations_deg_s"])
+    return [
+        f"per surface: % of losses of {losses} % detected within {within} s, and the median delay, under "
+        f"references of {references} deg/s.",
+        "false alarms/h: every scheme at the level of its statistic with at most "
+        f"{document['false_alarms_per_h']:g} per hour, on the same {min(hours, default=0.0):.2f} h of "
+        "healthy flight (95 % limits);",
+        f"before faults: the same on other flights. By chance alone {chance:.1f} % are detected within "
+        f"{WITHIN_S[-1]:g} s.",
+    ]
+
+
+def comparison(document: Document) -> list[str]:
+    """Where ours finds more or fewer faults than another scheme, and is unlikely to by chance."""
+    lines = [
+        f"{duel['ours']} is {duel['verdict']} than {duel['against']}: {duel['surface']}, "
+        f"{title_of(duel['sensors'], duel['turbulence'])}: more found within {duel['within_s']:g} s in "
+        f"{duel['seeds_ours']} seeds, fewer in {duel['seeds_theirs']} (p = {duel['p']:.2g})"
+        for duel in document["comparison"]
+        if duel["verdict"] != "even"
+    ]
+    worse = sum(duel["verdict"] == "worse" for duel in document["comparison"])
+    better = sum(duel["verdict"] == "better" for duel in document["comparison"])
+    total = (
+        f"{len(document['comparison'])} comparisons: better in {better}, worse in {worse}, no difference at "
+        f"p < {SIGNIFICANT:g} in the rest"
+    )
+    return [*sorted(lines, key=lambda line: " worse " not in line), total]
+
+
+def _failures(document: Document) -> list[str]:
+    return [f"could not be judged: {failure}" for failure in document["failures"]]

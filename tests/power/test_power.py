@@ -19,8 +19,9 @@ from beaver_ftc.power.document import document_of
 from beaver_ftc.power.flying import Watched, fly_faulted, with_fdi
 from beaver_ftc.power.grid import GRIDS, Bout, Condition, loss, scenario_of, strikes_at_s
 from beaver_ftc.power.levels import level_at, level_for
+from beaver_ftc.power.limit import chance
 from beaver_ftc.power.run import run_power
-from beaver_ftc.power.tally import rows_of, summary
+from beaver_ftc.power.tally import limit, rows_of, summary
 from beaver_ftc.power.text import as_text, comparison
 
 STILL, LIGHT = Condition("ideal", "none"), Condition("tactical-grade", "light")
@@ -33,7 +34,7 @@ SMALL = replace(
     bouts=2,
     healthy_h=4 * 12.0 / 3600.0,
     healthy_flight_s=12.0,
-    per_h=0.0,
+    per_h=60.0,
 )
 
 
@@ -117,7 +118,7 @@ def watched(seed, **delays):
         scheme: [Trace(0.5, ((0.2, 1.5), *(((delay, 3.0),) if delay is not None else ())), True, 10.0)]
         for scheme, delay in delays.items()
     }
-    return Watched(Bout(STILL, 3.0, seed), (("rudder", 0.4),), traces)
+    return Watched(Bout(STILL, 3.0, seed), (("rudder", 0.4),), traces, [[1.0, 2.0, 3.0]])
 
 
 class TestCounts:
@@ -139,6 +140,13 @@ class TestCounts:
         assert found["median_delay_s"] == 0.9
         assert summary(rows, own=True)["within"]["0.5"]["value"] == 1.0
         assert summary([rows[-1]])["flights"] == 0
+
+    def test_the_limit_counts_a_flight_once_however_many_schemes_watched_it(self):
+        levels = {(*STILL, scheme): level_at(healthy(2.0), 2.0) for scheme in "ab"}
+        far = watched(2, a=0.1)
+        far.deflections = [[100.0] * 3]
+        found = limit(rows_of([watched(1, a=0.7, b=0.7), far], levels), 36.0)
+        assert found["1"] == pytest.approx(0.5 * chance(2.0, 1.0, 36.0) + 0.5)
 
     def test_flights_of_a_seed_count_once(self):
         """Each of nine seeds brings two flights that both schemes share: nine throws of a coin, not 18."""

@@ -9,7 +9,17 @@ from beaver_ftc.power.contenders import BUILT_IN
 from beaver_ftc.power.flying import Watched
 from beaver_ftc.power.grid import WATCHED_S, Grid
 from beaver_ftc.power.levels import Level
-from beaver_ftc.power.tally import Key, Row, grouped, held_out, levels_of, own_levels_of, rows_of, summary
+from beaver_ftc.power.tally import (
+    Key,
+    Row,
+    grouped,
+    held_out,
+    levels_of,
+    limit,
+    own_levels_of,
+    rows_of,
+    summary,
+)
 from beaver_ftc.results.metrics import versions
 from beaver_ftc.statistics import sign_test
 
@@ -36,6 +46,10 @@ def document_of(
         "levels": _levels(levels, held_out(faulted, levels), own_levels_of(healthy)),
         "totals": [_line((*PLACE, "scheme"), key, of, own=True) for key, of in totals.items()],
         "cells": [_line(CELL, key, of) for key, of in cells.items()],
+        "limits": [
+            {**dict(zip(PLACE, key, strict=True)), "within": limit(of, grid.per_h)}
+            for key, of in grouped(rows, *PLACE).items()
+        ],
         "comparison": _comparison(rows),
         "failures": sorted({failure for one in (*healthy, *faulted) for failure in one.failures}),
         "versions": dict(versions()),

@@ -8,8 +8,8 @@ import numpy as np
 
 from beaver_ftc.compare.figure import COLOURS, DASHES, MARKS
 from beaver_ftc.power.document import JUDGED_S
-from beaver_ftc.power.tally import Row, grouped, summary
-from beaver_ftc.power.text import title_of
+from beaver_ftc.power.tally import Row, grouped, limit, summary
+from beaver_ftc.power.text import TOLD, title_of
 
 Document = dict[str, Any]
 FORMATS = ("png", "svg")
@@ -94,7 +94,9 @@ def _curves(document: Document, sensors: str, rows: Sequence[Row]) -> Any:
     by_place = grouped(rows, "surface", "turbulence")
     for line, surface in zip(axes, surfaces, strict=True):
         for panel, turbulence in zip(line, air, strict=True):
-            _draw(panel, by_place.get((surface, turbulence), []), schemes)
+            here = by_place.get((surface, turbulence), [])
+            _draw(panel, here, schemes)
+            _draw_limit(panel, here, document["false_alarms_per_h"])
         line[0].set_ylabel(f"{surface}\ndetected within {JUDGED_S:g} s, %", fontsize=9)
     for panel, turbulence in zip(axes[0], air, strict=True):
         panel.set_title(title_of(sensors, turbulence), fontsize=9)
@@ -105,6 +107,14 @@ def _curves(document: Document, sensors: str, rows: Sequence[Row]) -> Any:
     rate = f"at most {document['false_alarms_per_h']:g} false alarms per hour"
     figure.suptitle(f"Loss of effectiveness, {rate}, all references", fontsize=11)
     return figure
+
+
+def _draw_limit(panel: Any, rows: Sequence[Row], per_h: float) -> None:
+    found = {m: limit(here, per_h) for (m,), here in sorted(grouped(rows, "magnitude").items())}
+    share = [100 * within[f"{JUDGED_S:g}"] for within in found.values()]
+    panel.plot(
+        [100 * m for m in found], share, color="#000000", linewidth=3.5, alpha=0.25, label=TOLD, zorder=0
+    )
 
 
 def _draw(panel: Any, rows: Sequence[Row], schemes: Sequence[str]) -> None:

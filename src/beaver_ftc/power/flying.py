@@ -6,17 +6,22 @@ from dataclasses import dataclass, field
 from beaver_ftc.compare.replay import Recording, Trace, record, replay_together, trace
 from beaver_ftc.errors import BeaverFtcError
 from beaver_ftc.power.contenders import Contender
-from beaver_ftc.power.grid import WATCHED_S, Bout, Grid, loss, scenario_of, strikes_at_s
+from beaver_ftc.power.grid import WATCHED_S, WITHIN_S, Bout, Grid, loss, scenario_of, strikes_at_s
+from beaver_ftc.power.limit import deflections
 from beaver_ftc.scenario.schema import Scenario
 
 
 @dataclass
 class Watched:
-    """What came of a bout: of every scheme, a trace for each of its flights, in order; why one is missing."""
+    """What came of a bout: of every scheme, a trace for each of its flights, in order; why one is missing.
+
+    deflections: how far each fault stands out of the noise, after each of WITHIN_S (limit.py).
+    """
 
     bout: Bout
     faults: tuple[tuple[str, float], ...] = ()
     traces: dict[str, list[Trace]] = field(default_factory=dict)
+    deflections: list[list[float]] = field(default_factory=list)
     failures: list[str] = field(default_factory=list)
 
 
@@ -38,7 +43,8 @@ def _watch(watched: Watched, flights: Sequence[Scenario], schemes: Sequence[Cont
         try:
             if contender.built_in or not seen:
                 recordings = [record(with_fdi(flight, contender)) for flight in flights]
-                seen = seen or recordings
+            if not seen:
+                seen, watched.deflections = recordings, _deflections(recordings, watched.faults)
             watched.traces[contender.name] = (
                 [trace(recording, recording.built_in) for recording in recordings]
                 if contender.built_in
@@ -49,6 +55,13 @@ def _watch(watched: Watched, flights: Sequence[Scenario], schemes: Sequence[Cont
         except Exception as error:  # a plug-in may raise anything: not the end of the comparison
             watched.failures.append(f"{contender.name}: {type(error).__name__}: {error}")
     return watched
+
+
+def _deflections(recordings: Sequence[Recording], faults: Sequence[tuple[str, float]]) -> list[list[float]]:
+    """Of every fault; a healthy flight has none."""
+    return [
+        deflections(recording, *fault, WITHIN_S) for recording, fault in zip(recordings, faults, strict=False)
+    ]
 
 
 def with_fdi(flight: Scenario, contender: Contender) -> Scenario:

@@ -9,6 +9,7 @@ from beaver_ftc.scenario.schema import Scenario
 
 STRIKES_S = (8.0, 10.0)  # a fault strikes at random in between
 WATCHED_S = 5.0  # after it
+WITHIN_S = (0.5, 1.0, WATCHED_S)  # how soon is soon
 FREQUENCY_HZ = {"p": 0.25, "q": 0.2, "r": 0.15}
 _RATE_HZ = 100.0
 
@@ -74,9 +75,9 @@ GRIDS = {
         surfaces=_SURFACES,
         magnitudes=(0.4, 1.0),
         excitations_deg_s=(3.0, 6.0),
-        bouts=4,
-        healthy_h=0.05,
-        healthy_flight_s=15.0,
+        bouts=6,
+        healthy_h=0.06,
+        healthy_flight_s=18.0,
         per_h=20.0,
     ),
     "full": Grid(

@@ -9,7 +9,7 @@ from beaver_ftc.compare.crew import spread
 from beaver_ftc.power.contenders import Contender
 from beaver_ftc.power.document import document_of
 from beaver_ftc.power.flying import Watched, fly_faulted, fly_healthy
-from beaver_ftc.power.grid import Bout, Grid
+from beaver_ftc.power.grid import WITHIN_S, Bout, Grid
 from beaver_ftc.power.tally import Row
 from beaver_ftc.power.text import as_text
 
@@ -68,5 +68,6 @@ def write_rows(rows: Sequence[Row], path: Path) -> None:
         "sensors": text, "turbulence": text, "excitation_deg_s": number, "seed": pa.int64(),
         "surface": text, "magnitude": number, "scheme": text,
         "false_alarm": flag, "delay_s": number, "own_false_alarm": flag, "own_delay_s": number,
+        **{f"deflection_{within_s:g}": number for within_s in WITHIN_S},
     }  # fmt: skip
     pq.write_table(pa.Table.from_pylist(list(rows), schema=pa.schema(columns)), path)

@@ -2,19 +2,20 @@
 
 from collections.abc import Iterable, Sequence
 from math import inf, isfinite
+from statistics import fmean
 from typing import Any
 
 from beaver_ftc.compare.replay import Trace
 from beaver_ftc.compare.tally import share_within
 from beaver_ftc.power.flying import Watched
+from beaver_ftc.power.grid import WITHIN_S
 from beaver_ftc.power.levels import Level, level_at, level_for
+from beaver_ftc.power.limit import chance
 from beaver_ftc.statistics import Estimate, binomial
 
 Row = dict[str, Any]
 Document = dict[str, Any]
 Key = tuple[str, str, str]  # sensors, turbulence, scheme
-
-WITHIN_S = (0.5, 1.0, 5.0)
 
 
 def levels_of(healthy: Iterable[Watched], per_h: float) -> dict[Key, Level]:
@@ -57,10 +58,11 @@ def rows_of(faulted: Iterable[Watched], levels: dict[Key, Level]) -> list[Row]:
             "magnitude": magnitude,
             "scheme": scheme,
             **_alarms(trace, levels[(*one.bout.condition, scheme)].level),
+            **{f"deflection_{s:g}": d for s, d in zip(WITHIN_S, deflections, strict=True)},
         }
         for one in faulted
         for scheme, traces in one.traces.items()
-        for (surface, magnitude), trace in zip(one.faults, traces, strict=True)
+        for (surface, magnitude), trace, deflections in zip(one.faults, traces, one.deflections, strict=True)
         if trace.faulted
     ]
 
@@ -97,6 +99,16 @@ def summary(rows: Sequence[Row], own: bool = False) -> Document:
 
 def _share(delays: Sequence[float], within_s: float) -> Estimate:
     return binomial(sum(delay <= within_s + 1e-9 for delay in delays), len(delays))
+
+
+def limit(rows: Sequence[Row], per_h: float) -> Document:
+    """What a test that is told the fault would find of the same flights, within each of WITHIN_S."""
+    one_each = {(row["excitation_deg_s"], row["seed"], row["surface"], row["magnitude"]): row for row in rows}
+    flights = list(one_each.values())
+    return {
+        f"{within_s:g}": fmean(chance(row[f"deflection_{within_s:g}"], within_s, per_h) for row in flights)
+        for within_s in WITHIN_S
+    }
 
 
 def grouped(rows: Iterable[Row], *names: str) -> dict[tuple[Any, ...], list[Row]]:

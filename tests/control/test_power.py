@@ -16,6 +16,7 @@ from beaver_ftc.design.model import ELEVATOR, FLAP, RUDDER
 from beaver_ftc.errors import BadInput
 from beaver_ftc.matrix.cases import REFERENCE
 from beaver_ftc.matrix.flying import trimmed_deg
+from beaver_ftc.matrix.pitch_margins import closed_loop
 from beaver_ftc.mismatch.linear import engine_of, state_vector, surfaces_of
 from beaver_ftc.plant.trim import MANIFOLD_PRESSURE_INHG, trim
 from beaver_ftc.results.metrics import metrics
@@ -175,6 +176,9 @@ class TestTheDesign:
     def test_the_range_is_the_engines(self):
         config = EnginePower()
         assert (config.lowest_inhg, config.highest_inhg) == MANIFOLD_PRESSURE_INHG
+
+    def test_it_is_the_loop_of_the_report(self):
+        assert closed_loop(*self.plant(45.0), EnginePower()) == pytest.approx(self.loop(45.0), abs=1e-12)
 
     def phugoid_damping(self, F):
         poles = np.linalg.eigvals(F)

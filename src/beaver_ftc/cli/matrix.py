@@ -1,11 +1,14 @@
 """`beaver-ftc matrix`: every fault type on every surface, beside the oracle."""
 
+from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from beaver_ftc.cli.output import Format, FormatOption, emit, emit_json
+
+Document = dict[str, Any]
 
 
 def command(
@@ -14,22 +17,42 @@ def command(
         list[float] | None, typer.Option(min=30, max=55, help="Airspeed, m/s; once for each. [38, 45, 52]")
     ] = None,
     workers: Annotated[int, typer.Option(min=1, help="Processes.")] = 1,
+    pitch_lost: Annotated[
+        bool,
+        typer.Option(
+            "--pitch-lost", help="Elevator and flap lost at once instead, with engine power and without."
+        ),
+    ] = False,
     format: FormatOption = Format.text,
 ) -> None:
     """Fly every fault type on every surface: detected, named, and tracked how well beside the oracle.
 
-    Exit status 1 if a fault is named wrongly or an alarm is false.
+    Exit status 1 if a fault is named wrongly or an alarm is false; with --pitch-lost, if engine power loses
+    an aircraft that is kept without it.
     """
     from beaver_ftc.cli.progress import progress_bar
     from beaver_ftc.matrix.cases import AIRSPEEDS_MPS
-    from beaver_ftc.matrix.run import NAME, run_matrix
-    from beaver_ftc.matrix.text import as_text
 
+    name, run, as_text = _pitch_lost() if pitch_lost else _every_fault()
     with progress_bar("faults") as progress:
-        document = run_matrix(out, tuple(airspeed or AIRSPEEDS_MPS), workers, progress)
-    folder = str(out / NAME)
+        document = run(out, tuple(airspeed or AIRSPEEDS_MPS), workers, progress)
+    folder = str(out / name)
     if format is Format.json:
         emit_json(document | {"folder": folder})
     else:
         emit(as_text(document) + f"\n\nresults: {folder}")
     raise typer.Exit(0 if document["passed"] else 1)
+
+
+def _every_fault() -> tuple[str, Callable[..., Document], Callable[[Document], str]]:
+    from beaver_ftc.matrix.run import NAME, run_matrix
+    from beaver_ftc.matrix.text import as_text
+
+    return NAME, run_matrix, as_text
+
+
+def _pitch_lost() -> tuple[str, Callable[..., Document], Callable[[Document], str]]:
+    from beaver_ftc.matrix.pitch_lost import NAME, run_pitch_lost
+    from beaver_ftc.matrix.pitch_text import as_text
+
+    return NAME, run_pitch_lost, as_text

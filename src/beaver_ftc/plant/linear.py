@@ -48,6 +48,7 @@ _MOVED = (
 )
 _SURFACES = ("aileron", "elevator", "rudder", "flap")
 _SURFACE_STEP_RAD = 1e-3
+_PRESSURE_STEP_INHG = 0.1
 
 # JSBSim's states by our names, with the factor from its unit to ours; latitude and longitude become metres.
 _STATES = {
@@ -97,6 +98,11 @@ def differences(plant: Plant, point: FlightState) -> LinearModel:
     B = [_slope(plant, point, f"{surface}_rad", _SURFACE_STEP_RAD) for surface in _SURFACES]
     names = tuple(name for name, _, _ in _MOVED)
     return LinearModel(np.column_stack(A), np.column_stack(B), names, _SURFACES)
+
+
+def engine_slope(plant: Plant, point: FlightState) -> np.ndarray:
+    """What the ten states' derivatives, as in `differences`, gain per inHg of manifold pressure, (10,)."""
+    return _slope(plant, point, "manifold_pressure_inhg", _PRESSURE_STEP_INHG)
 
 
 def _slope(plant: Plant, point: FlightState, field: str, step: float) -> np.ndarray:

@@ -215,7 +215,7 @@ def _supervisor() -> View:
 def _engine() -> View:
     panels = (
         Panel("manifold pressure", (Trace("manifold_pressure_inhg", "manifold pressure", "actual"),)),
-        Panel("slipstream dpt", (Trace("dpt", "slipstream", "actual"),)),
+        Panel("slipstream dpt", (Trace("dpt", "slipstream dpt", "actual"),)),
         Panel("airspeed", (Trace("airspeed_mps", "airspeed", "actual"),)),
         Panel("pitch θ", (Trace("theta_rad", "pitch θ", "actual"),)),
     )

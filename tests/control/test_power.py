@@ -273,6 +273,22 @@ def test_an_aircraft_lost_without_power_is_kept_with_it(V, off_deg, flap_deg):
     assert flight.departure is None
 
 
+@pytest.mark.parametrize("severity", ["light", "moderate"])
+def test_in_turbulence_it_steadies_too(severity):
+    """With noisy instruments; over four seeds, as one flight says little of random air."""
+
+    def unrest(enabled):
+        squares = []
+        for seed in range(1, 5):
+            air = {"turbulence": "dryden", "severity": severity}
+            _, log = lost(45.0, enabled=enabled, seed=seed, environment=air, sensors="tactical-grade")
+            after = log["t_s"] > 15.0
+            squares.append([np.var(log[name][after]) for name in ("theta_rad", "airspeed_mps")])
+        return np.sqrt(np.mean(squares, axis=0))
+
+    assert (unrest(True) < 0.75 * unrest(False)).all()
+
+
 def test_an_ambiguous_verdict_is_no_obstacle():
     flight, _ = lost(45.0, law="fault-tolerant", flap_at_s=20.0)
     assert flight.isolated in (None, "unanticipated")

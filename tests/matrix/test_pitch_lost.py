@@ -9,6 +9,7 @@ from beaver_ftc.control.config import EnginePower
 from beaver_ftc.matrix.pitch_lost import LAWS, LOST, PitchCase, document_of, fly_case, run_pitch_lost
 from beaver_ftc.matrix.pitch_margins import about_trim, closed_loop, loop_response, margins
 from beaver_ftc.matrix.pitch_text import as_text
+from beaver_ftc.results.writer import refuse_foreign
 
 
 @pytest.fixture(scope="module")
@@ -45,6 +46,10 @@ def test_what_is_written_is_what_was_found(found):
     assert text == as_text(document) + "\n"
     assert "flap 20 deg down  lost 19.5 s >" in text
     assert "0 lost that are kept without" in text
+
+
+def test_it_can_be_written_again(found):
+    refuse_foreign(found[1])
 
 
 def test_a_row_is_the_same_flown_alone(found):

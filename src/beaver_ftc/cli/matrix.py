@@ -12,7 +12,9 @@ Document = dict[str, Any]
 
 
 def command(
-    out: Annotated[Path, typer.Option(help="Folder for the results: `fault-matrix` in it.")] = Path("runs"),
+    out: Annotated[
+        Path, typer.Option(help="Folder for the results: `fault-matrix` or `pitch-lost` in it.")
+    ] = Path("runs"),
     airspeed: Annotated[
         list[float] | None, typer.Option(min=30, max=55, help="Airspeed, m/s; once for each. [38, 45, 52]")
     ] = None,

@@ -27,7 +27,7 @@ FILES_OF_A_RESULT = frozenset({
     "mismatch.parquet", "comparison.json", "comparison.png", "comparison.html", "runs.json", "runs.png",
     "runs.html", "reproduction.json", "reproduction.md", "reproduction.html", "detectability.json",
     "detectability.csv", "detectability.png", "fault-matrix.json", "fault-matrix.txt", "fault-matrix.png",
-    "power.json", "power.txt", "power.parquet",
+    "power.json", "power.txt", "power.parquet", "pitch-lost.json", "pitch-lost.txt",
 })  # fmt: skip
 _AT_FDCWD = -100
 _RENAME_EXCHANGE = 2

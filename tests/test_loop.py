@@ -9,6 +9,8 @@ from beaver_ftc import loop
 from beaver_ftc.channels import TRUTH
 from beaver_ftc.errors import BadInput, SimulationFailed
 from beaver_ftc.loop import fly
+from beaver_ftc.results.metrics import metrics
+from beaver_ftc.results.verdict import facts
 from beaver_ftc.scenario.builtin import builtin_scenarios
 from beaver_ftc.scenario.loader import load_scenario
 from flying import Memory, flown, loss, scenario
@@ -69,6 +71,16 @@ class TestEveryBuiltInScenario:
         for fault in flight.scenario.faults:
             if fault.type == "loss_of_effectiveness":
                 assert not log[f"fie_{fault.actuator}_excluded"].any()
+
+    def test_rates_stay_bounded_or_the_report_says_why_no_law_could(self, built_in):
+        flight, log = built_in
+        if flight.scenario.control.law == "nominal":
+            pytest.skip("shows what a law that knows of no fault does")
+        first = min((fault.at_s for fault in flight.scenario.faults), default=0.0)
+        after = log["t_s"] >= first
+        fastest = max(np.abs(log[f"{axis}_rad_s"][after]).max() for axis in "pqr")
+        why = dict(facts(metrics(flight))).get("authority", "")
+        assert (flight.departure is None and fastest < np.deg2rad(15)) or "no deflection at all" in why
 
     def test_the_log_has_one_row_a_frame_on_the_frame_clock(self, built_in):
         flight, log = built_in

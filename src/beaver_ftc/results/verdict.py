@@ -11,6 +11,8 @@ from beaver_ftc.results.metrics import Document
 if TYPE_CHECKING:
     from rich.table import Table
 
+LEAST_BEYOND_S = 0.1
+
 
 def title(metrics: Document) -> str:
     """The scenario's name and whether it did as expected."""
@@ -28,6 +30,7 @@ def facts(metrics: Document) -> list[tuple[str, str]]:
         ("probing", _probing(metrics)),
         ("supervisor", _supervisor(metrics)),
         ("engine power", _engine_power(metrics)),
+        ("authority", _authority(metrics)),
         ("envelope", _envelope(metrics)),
         ("departure", _departure(metrics)),
         ("saturation", _saturation(metrics)),
@@ -141,6 +144,18 @@ def _engine_power(metrics: Document) -> str:
         return ""
     span = f"{power['lowest_inhg']:.1f} to {power['highest_inhg']:.1f} inHg"
     return f"took over pitch at {_time(power['from_s'])}, for {_time(power['in_charge_s'])} in all, {span}"
+
+
+def _authority(metrics: Document) -> str:
+    """For how long no law could have held a rate, if long enough to matter."""
+    axes = metrics.get("authority") or {}
+    beyond_s = {
+        axis: given["beyond_s"] for axis, given in axes.items() if given["beyond_s"] >= LEAST_BEYOND_S
+    }
+    if not beyond_s:
+        return ""
+    said = ", ".join(f"{axis} for {_time(time)}" for axis, time in beyond_s.items())
+    return f"no deflection at all could hold the rate: {said}"
 
 
 def _envelope(metrics: Document) -> str:

@@ -63,13 +63,24 @@ def _assemble_types(frame: np.void, scenario: Scenario, dt: float, travel: np.nd
     config, fdi, actuators = scenario.fdi, frame["fdi"], frame["actuators"]
     fdi["every_type"], fdi["whole"] = config.fault_class == "all", scenario.substeps == 1
     fdi["patience"] = ceil(pi / config.slowest_oscillation_rad_s / dt)
-    fdi["type"] = fdi["lead"] = fdi["lead_kind"] = fdi["type_at_s"] = -1
+    fdi["type"] = fdi["lead"] = fdi["lead_kind"] = fdi["type_at_s"] = fdi["first"] = -1
+    fdi["pairs"] = config.pairs
+    if config.pairs:
+        _assemble_pairs(fdi)
     fdi["instants"], fdi["returns"] = scenario.substeps, actuators["real"]
     for s, (name, place, low, high) in enumerate(zip(SURFACES, fdi["surface"], *travel, strict=True)):
         place["travel_low"], place["travel_high"] = low, high
+        place["in_question"] = not config.pairs or name in ("elevator", "flap")
+        place["measure"], place["type"] = -1, -1
         place["approach"], place["step"] = actuators["approach"][s], actuators["step"][s]
         rate_deg_s = getattr(scenario.actuators, name).rate_limit_deg_s
         place["least_runaway_rate"] = 0.5 * (radians(rate_deg_s) or RUNAWAY_RATE_RAD_S)
+
+
+def _assemble_pairs(fdi: np.void) -> None:
+    """Each plane is asked for itself: pitch by elevator and flap, roll and yaw by ailerons and rudder."""
+    for fie in fdi["estimator"][: fdi["n_estimators"]]:
+        fie["unasked"] = (1, 0, 1) if fie["surface"] in (ELEVATOR, FLAP) else (0, 1, 0)
 
 
 def _assemble_sharpening(fdi: np.void, config: FdiConfig, dt: float) -> None:

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -32,7 +32,8 @@ class Flight:
     came. worst_residual_ratio: largest |residual| / threshold in healthy flight; closest_approach: the same
     of each filter of the bank, the published one first. surface_travel_rad: path of each surface, up and
     down added. engine_power: if pitch was left to the engine, since when and for how long, s, and the lowest
-    and highest manifold pressure, inHg.
+    and highest manifold pressure, inHg. faults: of several at once (`fdi.pairs`), each as named.py has it,
+    the first named first.
     """
 
     scenario: Scenario
@@ -61,3 +62,4 @@ class Flight:
     authority: dict[str, tuple[float, float]] | None = None
     probing_s: tuple[float, float] | None = None
     engine_power: tuple[float, float, float, float] | None = None
+    faults: tuple[dict[str, Any], ...] = ()

@@ -342,14 +342,14 @@ def act_on_lead(frame, s):
     """What the diagnosis of every type makes of surface s: effectiveness and offset. A jam cannot wait."""
     fdi, control = frame.fdi, frame.control
     surface = fdi.surface[s]
-    if fdi.lead_kind == fault_types.LOSES:
-        frame.target[s] = 1.0 + fdi.estimator[s].theta[DOMINANT_AXIS[s]]
-    elif fdi.lead_kind == fault_types.FIXED:
+    if surface.measure == fault_types.LOSES:
+        frame.target[s] = fault_types.effectiveness_left(fdi, s)
+    elif surface.measure == fault_types.FIXED:
         frame.target[s] = control.effectiveness[s] = 0.0
         control.offset[s] = surface.command + fault_types.deflection_error(fdi, s)
-    elif fdi.lead_kind == fault_types.SHIFTED:
+    elif surface.measure == fault_types.SHIFTED:
         control.offset[s] = fault_types.deflection_error(fdi, s)
-    elif fdi.lead_kind == fault_types.LAGS:
+    elif surface.measure == fault_types.LAGS:
         control.lag[s] = 0.5 * (surface.low + surface.high) - surface.command
         control.hedging = 1
 
@@ -365,7 +365,7 @@ def accommodate(frame):
             tell_oracle(frame, s)
         elif fdi.estimates and fdi.detected:
             frame.target[s] = fdi.effectiveness[s]
-        elif fdi.every_type and s == fdi.lead:
+        elif fdi.every_type and fdi.surface[s].measure >= 0:
             act_on_lead(frame, s)
         elif s == surface and not fdi.every_type:
             frame.target[s] = 1.0 + fdi.estimator[fdi.isolated].theta[DOMINANT_AXIS[s]]
@@ -386,7 +386,8 @@ def give_up(frame):
     control, fdi = frame.control, frame.fdi
     for s in range(4):
         told = frame.immovable[s] and control.law == ORACLE
-        if told or (s == fdi.lead and fdi.lead_kind == fault_types.FIXED and control.effectiveness[s] == 0.0):
+        fixed = fdi.every_type and fdi.surface[s].measure == fault_types.FIXED
+        if told or (fixed and control.effectiveness[s] == 0.0):
             control.command[s] = control.trim[s]
             control.saturated[s] = 0
             control.hedging = 1
@@ -397,7 +398,7 @@ def in_doubt(frame):
     """Whether elevator or flap is at fault and it has long been open which."""
     fdi, law = frame.fdi, frame.control.law
     open_question = fdi.every_type and fdi.detected and fdi.isolated == NOT_ISOLATED
-    return open_question and fdi.evidence >= fdi.patience and law not in (NOMINAL, ORACLE)
+    return open_question and fdi.surface[ELEVATOR].evidence >= fdi.patience and law not in (NOMINAL, ORACLE)
 
 
 @kernel

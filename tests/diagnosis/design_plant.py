@@ -49,6 +49,7 @@ class DesignPlant:
         theta=None,
         position=None,
         actuators="ideal",
+        beside=(),
         **fdi,
     ):
         keys = {"rate_hz": rate_hz, "fdi": fdi, "actuators": actuators}
@@ -62,6 +63,7 @@ class DesignPlant:
         self.dt, self.airspeed_mps = 1.0 / rate_hz, airspeed_mps
         self.surface = surface
         self.position = position or (lambda k, u: u * (1 + theta(k)) if theta else u)
+        self.beside = beside  # (surface, position) of further faults
         self.rng = np.random.default_rng(seed)
         self.wave = self.rng.uniform(0.2, 2.0, 8), self.rng.uniform(0, 6.28, 8)
         self.amplitude = self.rng.uniform(0.0, 0.2, 3)
@@ -95,10 +97,9 @@ class DesignPlant:
 
     def effect(self, G):
         """phi of the fault, rad/s2."""
-        if self.surface is None:
-            return np.zeros(3)
-        u = self.u[self.surface]
-        return G[:, self.surface] * (self.position(self.k, u) - u)
+        faults = [] if self.surface is None else [(self.surface, self.position), *self.beside]
+        off = [G[:, s] * (position(self.k, self.u[s]) - self.u[s]) for s, position in faults]
+        return np.sum(off, axis=0) if off else np.zeros(3)
 
     def fly(self, frames, uncertainty, until=lambda plant: False):
         """Fly so many frames, or until `until`, against `uncertainty(plant, bound, phi)` in rad/s2."""

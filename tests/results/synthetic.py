@@ -91,6 +91,7 @@ class Flight:
     authority: dict[str, tuple[float, float]] | None = None
     probing_s: tuple[float, float] | None = None
     engine_power: tuple[float, float, float, float] | None = None
+    faults: tuple[dict, ...] = ()
 
 
 def rows(flight: Flight) -> np.ndarray:

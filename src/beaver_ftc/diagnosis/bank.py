@@ -110,7 +110,7 @@ def explains(fdi, fie, shared):
         residual, bound = 0.0, 0.0
         for i in range(3):
             r, b = fdi.bank_residual[m, i], fdi.bank_threshold[m, i]
-            if not fie.reach_low[m, i] - b <= r <= fie.reach_high[m, i] + b:
+            if not fie.reach_low[m, i] - b <= r <= fie.reach_high[m, i] + b and not fie.unasked[i]:
                 return False
             residual += fie.across[i] * r
             bound += abs(fie.across[i]) * b

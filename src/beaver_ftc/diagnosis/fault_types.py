@@ -52,20 +52,30 @@ ELEVATOR, FLAP = 1, 3
 LOSES, FIXED, SHIFTED, LAGS = range(4)
 ABSENT_FRAMES = 20
 FLIPS_OF_AN_OSCILLATION = 3
+# What decides whether a surface can be at fault: its estimator, or what is known of the other (pairs.py).
+BY_ESTIMATOR, BY_DEDUCTION, RULED_OUT = range(3)
 
 
 @kernel
 def start(fdi):
     """Nothing is known of any surface yet."""
     for s in range(4):
-        surface = fdi.surface[s]
-        surface.set_low[:], surface.set_high[:] = -np.inf, np.inf
-        surface.low, surface.high = surface.travel_low, surface.travel_high
-        surface.run_at = -2
-        surface.set_low[STUCK], surface.set_high[STUCK] = surface.travel_low, surface.travel_high
-        surface.set_low[CONSTANT_LOSS], surface.set_high[CONSTANT_LOSS] = 0.0, 1.0
-        surface.started_at = -1
-        release.start(surface)
+        begin(fdi.surface[s])
+
+
+@kernel
+def begin(surface):
+    """Nothing is known of this surface yet."""
+    surface.set_low[:], surface.set_high[:] = -np.inf, np.inf
+    surface.low, surface.high = surface.travel_low, surface.travel_high
+    surface.run_at = -2
+    surface.set_low[STUCK], surface.set_high[STUCK] = surface.travel_low, surface.travel_high
+    surface.set_low[CONSTANT_LOSS], surface.set_high[CONSTANT_LOSS] = 0.0, 1.0
+    surface.started_at = -1
+    surface.type_excluded[:] = 0
+    surface.evidence = surface.quiet = surface.flips = surface.sign = 0
+    surface.grown_up = surface.grown_down = 0.0
+    release.start(surface)
 
 
 @kernel
@@ -224,37 +234,56 @@ def judge(fdi, surface, frame):
 
 
 @kernel
-def examine(fdi):
-    """Take in the elapsed frame, and judge the one before.
+def take_in(fdi):
+    """Where each surface was in the elapsed frame, if it alone is at fault, and whether something was."""
+    wrong = not membership.healthy(fdi)
+    for s in range(4):
+        surface = fdi.surface[s]
+        surface.wrong_before, surface.wrong_then, surface.wrong = surface.wrong_then, surface.wrong, wrong
+        locate(fdi, s)
+
+
+@kernel
+def judge_all(fdi):
+    """Judge the frame before the elapsed one.
 
     With several JSBSim frames in one of ours a fault may begin or end within a frame, which then shows a
     part of it: such a frame, next to a healthy one, is passed over.
     """
-    fdi.wrong_before, fdi.wrong_then, fdi.wrong = fdi.wrong_then, fdi.wrong, not membership.healthy(fdi)
     for s in range(4):
-        locate(fdi, s)
         surface = fdi.surface[s]
         surface.square += (0.5 * (surface.low_then + surface.high_then) - surface.command_then) ** 2
         if fdi.returns and fdi.frame > 0:
             release.let_go(fdi, surface)
-    if fdi.lead >= 0 and fdi.lead_kind == FIXED and not fdi.wrong_then:
-        note_quiet(fdi, fdi.surface[fdi.lead])
-    elif fdi.wrong_then and (fdi.whole or (fdi.wrong_before and fdi.wrong)):
-        fdi.evidence += 1
-        for s in range(4):
-            judge(fdi, fdi.surface[s], fdi.frame - 1)
-    if fdi.returns and fdi.frame > 0:
-        for s in range(4):
-            release.bring_back(fdi, fdi.surface[s])
+        if surface.measure == FIXED and not surface.wrong_then:
+            note_quiet(fdi, s)
+        elif surface.wrong_then and (fdi.whole or (surface.wrong_before and surface.wrong)):
+            surface.evidence += 1
+            judge(fdi, surface, fdi.frame - 1)
+        if fdi.returns and fdi.frame > 0:
+            release.bring_back(fdi, surface)
     fdi.frame += 1
 
 
 @kernel
-def note_quiet(fdi, surface):
-    """A surface given up and commanded to where it happens to be says by its quiet that it does not swing."""
+def examine(fdi):
+    """Take in the elapsed frame, and judge the one before."""
+    take_in(fdi)
+    judge_all(fdi)
+
+
+@kernel
+def note_quiet(fdi, s):
+    """A surface given up and commanded to where it happens to be says by its quiet that it does not swing.
+
+    That is evidence against the others too, as far as one of them all is in question.
+    """
+    surface = fdi.surface[s]
     if surface.low_then > surface.set_high[STUCK] or surface.high_then < surface.set_low[STUCK]:
         return
-    fdi.evidence += 1
+    for other in range(4):
+        if other == s or (surface.in_question and fdi.surface[other].in_question):
+            fdi.surface[other].evidence += 1
     surface.quiet += 1
     if surface.quiet > fdi.patience:
         surface.type_excluded[OSCILLATORY] = 1
@@ -263,6 +292,9 @@ def note_quiet(fdi, surface):
 @kernel
 def possible(fdi, s):
     """Whether anything on surface s can be the fault."""
+    standing = fdi.surface[s].standing
+    if standing != BY_ESTIMATOR:
+        return standing == BY_DEDUCTION
     return not fdi.estimator[POSITION_FIRST + s].excluded
 
 
@@ -284,7 +316,13 @@ def any_constant(fdi, s):
 @kernel
 def swings(fdi, s):
     """Whether surface s is known to have swung for two half-cycles and more."""
-    return alive(fdi, s, OSCILLATORY) and fdi.surface[s].flips >= FLIPS_OF_AN_OSCILLATION
+    return possible(fdi, s) and swings_by(fdi.surface[s])
+
+
+@kernel
+def swings_by(surface):
+    """The same of a surface known to be at fault."""
+    return not surface.type_excluded[OSCILLATORY] and surface.flips >= FLIPS_OF_AN_OSCILLATION
 
 
 @kernel
@@ -299,7 +337,7 @@ def sole(fdi, constant):
     """The one possible surface, with a type of constant parameter left if so asked; -1 none, -2 several."""
     found = -1
     for s in range(4):
-        if possible(fdi, s) and (any_constant(fdi, s) or not constant):
+        if fdi.surface[s].in_question and possible(fdi, s) and (any_constant(fdi, s) or not constant):
             found = s if found == -1 else -2
     return found
 
@@ -329,9 +367,13 @@ def others_refuted(fdi, chosen):
     """
     waits = 1
     for s in range(4):
-        if s != chosen and (alive(fdi, s, OSCILLATORY) or alive(fdi, s, VARYING_LOSS)):
+        if (
+            s != chosen
+            and fdi.surface[s].in_question
+            and (alive(fdi, s, OSCILLATORY) or alive(fdi, s, VARYING_LOSS))
+        ):
             waits = 2
-    return fdi.evidence >= waits * fdi.patience
+    return fdi.surface[chosen].evidence >= waits * fdi.patience
 
 
 @kernel
@@ -356,7 +398,7 @@ def one_type(fdi, s):
 def may_be_slow(fdi, s):
     """Whether what looks like a jam may be a slow surface that has come to where it is commanded: it has not
     stood off its command for long."""
-    loud = fdi.evidence - fdi.surface[s].quiet
+    loud = fdi.surface[s].evidence - fdi.surface[s].quiet
     return any_constant(fdi, s) and alive(fdi, s, SLOW) and loud < fdi.patience
 
 
@@ -369,10 +411,10 @@ def may_be_growing(fdi, s, found):
 @kernel
 def type_at_fault(fdi, s):
     """The type of the fault on surface s, or -1 while more than one fits or an oscillation may yet show."""
-    found = one_type(fdi, s)
-    if fdi.evidence < fdi.patience or may_be_slow(fdi, s):
+    found, evidence = one_type(fdi, s), fdi.surface[s].evidence
+    if evidence < fdi.patience or may_be_slow(fdi, s):
         return -1
-    patient = not alive(fdi, s, OSCILLATORY) or fdi.evidence >= 2 * fdi.patience
+    patient = not alive(fdi, s, OSCILLATORY) or evidence >= 2 * fdi.patience
     if any_constant(fdi, s):
         return found if patient and not may_be_growing(fdi, s, found) else -1
     return one_course(fdi, s, patient)
@@ -446,17 +488,27 @@ def presumed(fdi):
 
 @kernel
 def take_the_lead(fdi):
-    """Settle on which surface the law acts and how; let go of a fault that has gone."""
+    """Settle on which surface the law acts and how."""
     s = presumed(fdi)
+    for other in range(4):
+        fdi.surface[other].measure = -1
     fdi.lead_kind = measure_for(fdi, s) if s >= 0 else -1
     fdi.lead = s if fdi.lead_kind >= 0 else -1
     if fdi.lead >= 0:
-        surface = fdi.surface[s]
-        deflection = deflection_error(fdi, s) + surface.command
-        there = surface.low <= deflection <= surface.high or fdi.lead_kind == LOSES
-        surface.absent = 0 if there else surface.absent + 1
-        if surface.absent >= ABSENT_FRAMES:
+        if still_there(fdi, s, fdi.lead_kind):
+            fdi.surface[s].measure = fdi.lead_kind
+        else:
             fdi.lead = -1
+
+
+@kernel
+def still_there(fdi, s, measure):
+    """Whether the fault of surface s shows, or did a moment ago; one that has gone is let go."""
+    surface = fdi.surface[s]
+    deflection = deflection_error(fdi, s) + surface.command
+    there = surface.low <= deflection <= surface.high or measure == LOSES
+    surface.absent = 0 if there else surface.absent + 1
+    return surface.absent < ABSENT_FRAMES
 
 
 @kernel
@@ -477,3 +529,14 @@ def deflection_error(fdi, s):
     if biased and surface.set_high[BIAS] - surface.set_low[BIAS] < np.inf:
         return middle(surface, BIAS)
     return 0.5 * (surface.low + surface.high) - surface.command
+
+
+@kernel
+def effectiveness_left(fdi, s):
+    """What surface s has left of its effectiveness.
+
+    The estimator fits both axes of a surface, so beside another fault the set of the constant is asked.
+    """
+    if fdi.pairs and alive(fdi, s, CONSTANT_LOSS):
+        return middle(fdi.surface[s], CONSTANT_LOSS)
+    return 1.0 + fdi.estimator[s].theta[DOMINANT_AXIS[s]]

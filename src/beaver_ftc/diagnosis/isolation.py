@@ -12,7 +12,7 @@ by the first test that fails.
 """
 
 from beaver_ftc.compiled import kernel
-from beaver_ftc.diagnosis import bank, fault_types, membership
+from beaver_ftc.diagnosis import bank, fault_types, membership, pairs
 from beaver_ftc.diagnosis.fault_class import hypothesis
 from beaver_ftc.diagnosis.state import INTERVAL, LOSS, NOT_ISOLATED, POSITION, UNANTICIPATED
 from beaver_ftc.diagnosis.thresholds import bound_step, interval, noise_step, published
@@ -68,7 +68,7 @@ def within_limits(fdi, fie, x):
             fie.lower[i], fie.upper[i] = published(
                 fie.low, fie.high, fie.omega[i], fie.theta[i], fie.bound[i]
             )
-        within = within and fie.lower[i] <= fie.residual[i] <= fie.upper[i]
+        within = within and (fie.lower[i] <= fie.residual[i] <= fie.upper[i] or fie.unasked[i])
     return within
 
 
@@ -109,6 +109,10 @@ def isolate(fdi, x, t, started):
             fie.excluded_at_s = t
     if not fdi.every_type:
         decide(fdi, t)
+        return
+    if fdi.pairs:
+        pairs.examine(fdi)
+        pairs.decide(fdi, t)
         return
     if started or fdi.memory:
         fault_types.examine(fdi)

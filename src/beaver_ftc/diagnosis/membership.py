@@ -32,7 +32,9 @@ def solve(value, bound, slope, low, high):
 
 @kernel
 def agreeing(fdi, fie, i):
-    """The interval of theta that agrees with the elapsed frame on axis i."""
+    """The interval of theta that agrees with the elapsed frame on axis i, if that axis is asked."""
+    if fie.unasked[i]:
+        return fie.low, fie.high
     return solve(
         fdi.innovation[i] - fie.offset[i], fdi.frame_bound[i] + fie.spread[i], fie.Z[i], fie.low, fie.high
     )

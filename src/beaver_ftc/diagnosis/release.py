@@ -146,7 +146,7 @@ def let_go(fdi, surface):
 @kernel
 def bring_back(fdi, surface):
     """Carry what has been let go to the next frame."""
-    if not fdi.wrong_then:
+    if not surface.wrong_then:
         settle(surface)
     for kind in HELD:
         for which in (EARLIER, LATER):

@@ -27,7 +27,7 @@ ESTIMATOR = np.dtype(
     [
         ("kind", "i8"), ("surface", "i8"),
         ("low", "f8"), ("high", "f8"),  # the known set of theta
-        ("excluded", "i8"), ("excluded_at_s", "f8"),
+        ("excluded", "i8"), ("excluded_at_s", "f8"), ("unasked", "i8", (3,)),
         ("xhat", "f8", (3,)), ("residual", "f8", (3,)), ("lower", "f8", (3,)), ("upper", "f8", (3,)),
         ("omega", "f8", (3,)), ("rise", "f8", (3,)), ("fall", "f8", (3,)), ("bound", "f8", (3,)),
         ("bound_eta", "f8", (3,)), ("bound_noise", "f8", (3,)),
@@ -52,6 +52,11 @@ SURFACE = np.dtype(
         ("square", "f8"), ("squares", "f8"), ("absent", "i8"), ("quiet", "i8"),
         ("run_low", "f8"), ("run_high", "f8"), ("run_sign", "i8"), ("run_at", "i8"),
         ("grown_up", "f8"), ("grown_down", "f8"),
+        # what is concluded: see pairs.py for `standing` and what was known when it was named
+        ("wrong", "i8"), ("wrong_then", "i8"), ("wrong_before", "i8"), ("evidence", "i8"),
+        ("in_question", "i8"), ("measure", "i8"), ("standing", "i8"),
+        ("named", "i8"), ("named_at_s", "f8"), ("type", "i8"), ("type_at_s", "f8"),
+        ("known_low", "f8", (N_TYPES,)), ("known_high", "f8", (N_TYPES,)), ("known_not", "i8", (N_TYPES,)),
         # its actuator, what it was ordered, and what release.py keeps: positions, rad
         ("approach", "f8"), ("step", "f8"),
         ("order", "f8"), ("order_then", "f8"), ("order_before", "f8"),
@@ -104,9 +109,11 @@ DIAGNOSIS = np.dtype(
         # faults of every type: fault_types.py
         ("every_type", "i8"), ("whole", "i8"), ("instants", "i8"), ("returns", "i8"),
         ("surface", SURFACE, (4,)),
-        ("frame", "i8"), ("wrong", "i8"), ("wrong_then", "i8"), ("wrong_before", "i8"),
-        ("evidence", "i8"), ("patience", "i8"), ("type", "i8"), ("type_at_s", "f8"),
+        ("frame", "i8"), ("patience", "i8"), ("type", "i8"), ("type_at_s", "f8"),
         ("lead", "i8"), ("lead_kind", "i8"),
+        # two at once: pairs.py
+        ("pairs", "i8"), ("alarmed", "i8", (2,)), ("no_lateral_pair", "i8"), ("first", "i8"),
+        ("unsettled", "i8"),
         ("closest", "f8", (MAX_POLES,)),  # largest share of its bound each filter reached in healthy flight
         ("effect", "f8", (MAX_POLES, 3)), ("certain_after_s", "f8"),  # what guarantee.py keeps
     ],

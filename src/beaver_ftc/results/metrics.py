@@ -99,16 +99,50 @@ def _isolation(flight: "Flight", fault: Document | None) -> Document:
         "type": flight.isolation_type,
         "time_s": _number(flight.isolation_time_s),
         "delay_s": _delay(flight.isolation_time_s, fault),
-        "correct": _correct(flight.isolated, fault),
+        "correct": _correct(flight.isolated, _meant(flight, fault)),
         "estimate": _number(flight.estimate),
         "candidates": list(flight.candidates),
-        "type_correct": _type_correct(flight.isolation_type, fault),
+        "type_correct": _type_correct(flight.isolation_type, _meant(flight, fault)),
         "type_delay_s": _delay(flight.type_time_s, fault),
         "estimate_deg": _estimate_deg(flight),
         "estimate_interval": [_number(end) for end in flight.estimate_interval or ()] or None,
         "frequency_rad_s": _number(flight.frequency_rad_s),
         "probing_s": [_number(instant) for instant in flight.probing_s or ()] or None,
+        "faults": [_one_of_several(found, flight.scenario) for found in flight.faults],
     }
+
+
+def _one_of_several(found: Document, scenario: "Scenario") -> Document:
+    """One of several faults at once; `fault` is null where a plane's is open between its candidates."""
+    surface, kind = found["isolated"], found["isolation_type"]
+    declared = [fault for fault in scenario.faults if getattr(fault, "actuator", None) == surface]
+    first = min(declared, key=lambda fault: fault.at_s, default=None)
+    fault = None if first is None else {"at_s": first.at_s}
+    estimate = found.get("estimate")
+    in_deg = None if estimate is None or kind == LOSS_OF_EFFECTIVENESS else math.degrees(estimate)
+    return {
+        "fault": surface,
+        "type": kind,
+        "time_s": _number(found["isolation_time_s"]),
+        "delay_s": _delay(found["isolation_time_s"], fault),
+        "correct": None if surface is None else bool(declared),
+        "candidates": list(found["candidates"]),
+        "type_correct": None if kind is None else any(kind == fault.type for fault in declared),
+        "type_delay_s": _delay(found.get("type_time_s"), fault),
+        "estimate": _number(estimate),
+        "estimate_deg": _number(in_deg),
+        "estimate_interval": [_number(end) for end in found.get("estimate_interval") or ()] or None,
+        "frequency_rad_s": _number(found.get("frequency_rad_s")),
+    }
+
+
+def _meant(flight: "Flight", fault: Document | None) -> Document | None:
+    """The declared fault that the verdict is held against: the first, or of several that surface's."""
+    if not flight.faults:
+        return fault
+    of_surface = (one for one in flight.scenario.faults if getattr(one, "actuator", None) == flight.isolated)
+    first = min(of_surface, key=lambda one: one.at_s, default=None)
+    return fault if first is None else {"actuator": flight.isolated, "type": first.type, "at_s": first.at_s}
 
 
 def _correct(isolated: str | None, fault: Document | None) -> bool | None:

@@ -27,6 +27,7 @@ def facts(metrics: Document) -> list[tuple[str, str]]:
         ("fault", _fault(metrics)),
         ("detection", _detection(metrics)),
         ("isolation", _isolation(metrics)),
+        *(("", said) for said in _others(metrics)),
         ("probing", _probing(metrics)),
         ("supervisor", _supervisor(metrics)),
         ("engine power", _engine_power(metrics)),
@@ -36,6 +37,17 @@ def facts(metrics: Document) -> list[tuple[str, str]]:
         ("saturation", _saturation(metrics)),
     )
     return [(what, how) for what, how in said if how]
+
+
+def _others(metrics: Document) -> list[str]:
+    """What else is at fault, of several faults at once, and what is open."""
+    isolation = metrics["isolation"]
+    rest = isolation.get("faults", [])[1:] if isolation["isolated"] else []
+    return [_one(fault) if fault["fault"] else _still_possible(fault["candidates"]) for fault in rest]
+
+
+def _still_possible(candidates: list[str]) -> str:
+    return f"not isolated, still possible: {', '.join(candidates)}"
 
 
 def tracking(metrics: Document) -> list[tuple[str, str, str, str]]:
@@ -105,10 +117,13 @@ def _detection(metrics: Document) -> str:
 def _isolation(metrics: Document) -> str:
     isolation = metrics["isolation"]
     if not isolation["isolated"]:
-        left = ", ".join(isolation["candidates"])
-        return (
-            f"not isolated, still possible: {left}" if metrics["detection"]["detected"] and left else "none"
-        )
+        left = isolation["candidates"]
+        return _still_possible(left) if metrics["detection"]["detected"] and left else "none"
+    return _one(isolation)
+
+
+def _one(isolation: Document) -> str:
+    """One named fault."""
     when = "" if isolation["delay_s"] is None else f" after {_time(isolation['delay_s'])}"
     right = "correct" if isolation["correct"] and isolation["type_correct"] is not False else "WRONG"
     return f"{isolation['fault']}{when}, {right}{_type(isolation)}{_estimate(isolation)}"

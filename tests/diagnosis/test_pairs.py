@@ -1,0 +1,85 @@
+"""Pairs of faults on the plant where the theory holds exactly, against an uncertainty that fights them."""
+
+import pytest
+from design_plant import UNCERTAINTIES, DesignPlant
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pydantic import ValidationError
+from test_fault_types import TYPES, shares, uncertainties
+
+from beaver_ftc.diagnosis import fault_types as ft
+from beaver_ftc.named import found
+from beaver_ftc.scenario.schema import Scenario
+
+AILERON, ELEVATOR, RUDDER = range(3)
+kinds = st.sampled_from(list(TYPES))
+starts = st.integers(0, 300)
+
+
+def fly(seed, uncertainty, faults, frames=700, pairs=True):
+    """faults: (surface, kind, first frame, share)."""
+    positions = [(s, TYPES[kind][0](s, at, share, 0.02)) for s, kind, at, share in faults]
+    (surface, position), *beside = positions
+    plant = DesignPlant(
+        seed=seed,
+        rate_hz=50.0,
+        surface=surface,
+        position=position,
+        beside=beside,
+        fault_class="all",
+        pairs=pairs,
+    )
+    return plant.fly(frames, uncertainty)
+
+
+def check(plant, faults):
+    """No surface named that is healthy, no type named or excluded wrongly."""
+    true = {("aileron", "elevator", "rudder")[s]: ft.TYPES[TYPES[kind][1]] for s, kind, _, _ in faults}
+    for one in found(plant.fdi)["faults"]:
+        if one["isolated"]:
+            assert one["isolated"] in true
+            assert one["isolation_type"] in (true[one["isolated"]], None)
+            assert true[one["isolated"]] in one["candidates"]
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.integers(0, 2**32), uncertainties, kinds, kinds, starts, starts, shares, shares)
+def test_ailerons_and_rudder(seed, uncertainty, kind, other, at, later, share, other_share):
+    faults = (AILERON, kind, at, share), (RUDDER, other, later, other_share)
+    plant = fly(seed, uncertainty, faults)
+    check(plant, faults)
+    for surface, one, _, _ in faults:
+        assert not plant.fdi["surface"][surface]["type_excluded"][TYPES[one][1]]
+    assert not plant.fdi["no_lateral_pair"]
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.integers(0, 2**32), uncertainties, kinds, kinds, starts, starts, shares, shares)
+def test_a_fault_in_each_plane(seed, uncertainty, kind, other, at, later, share, other_share):
+    faults = (ELEVATOR, kind, at, share), (RUDDER, other, later, other_share)
+    check(fly(seed, uncertainty, faults), faults)
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.integers(0, 2**32), uncertainties, kinds, st.integers(0, 2), starts, shares)
+def test_one_fault_is_not_taken_for_two(seed, uncertainty, kind, surface, at, share):
+    faults = ((surface, kind, at, share),)
+    plant = fly(seed, uncertainty, faults)
+    check(plant, faults)
+    assert len(found(plant.fdi)["faults"]) <= 1
+
+
+def test_both_are_named_and_a_search_for_one_finds_neither():
+    faults = (AILERON, "stuck", 30, 0.6), (RUDDER, "bias", 200, 0.8)
+    plant = fly(4, UNCERTAINTIES["random"], faults)
+    assert {one["isolated"] for one in found(plant.fdi)["faults"]} == {"aileron", "rudder"}
+    alone = fly(4, UNCERTAINTIES["random"], faults, pairs=False)
+    assert found(alone.fdi)["isolated"] == "unanticipated"
+
+
+def test_pairs_belong_to_the_class_of_all_faults():
+    with pytest.raises(ValidationError) as refused:
+        Scenario.model_validate({"name": "x", "fdi": {"pairs": True}})
+    ((key, why),) = refused.value.errors()[0]["ctx"]["conflicts"]
+    assert key == ("pairs",)
+    assert "allowed: true with fault_class: all" in why

@@ -82,6 +82,12 @@ def _missed_expectations(document: Document, flight: "Flight") -> str:
     return " ".join(found["name"] for found in document["expectations"] if not found["passed"])
 
 
+def _faults(document: Document, flight: "Flight") -> str:
+    """surface:type of each fault that was named, of several at once."""
+    named = (found for found in document["isolation"]["faults"] if found["fault"])
+    return " ".join(f"{found['fault']}:{found['type'] or 'open'}" for found in named)
+
+
 COLUMNS: tuple[tuple[str, str, Getter], ...] = (
     ("frames", "int", _at("frames")),
     ("flown_s", "float", _flown_s),
@@ -102,6 +108,7 @@ COLUMNS: tuple[tuple[str, str, Getter], ...] = (
         for i, end in enumerate(ends)
     ),
     ("isolation.candidates", "text", lambda document, flight: " ".join(document["isolation"]["candidates"])),
+    ("isolation.faults", "text", _faults),
     ("false_alarm", "flag", _at("false_alarm")),
     ("worst_residual_ratio", "float", lambda document, flight: flight.worst_residual_ratio),
     *_under("float", "tracking.pre_fault_rms_deg_s", *AXES),

@@ -14,7 +14,17 @@ from beaver_ftc.design.variants import design_of, mass_of
 from beaver_ftc.diagnosis.admitted import admit, poles_for_noise
 from beaver_ftc.diagnosis.config import FdiConfig, Probing
 from beaver_ftc.diagnosis.fault_class import PARAMETER_SET
-from beaver_ftc.diagnosis.state import INTERVAL, LOSS, MAX_POLES, NOT_ISOLATED, POSITION, PUBLISHED
+from beaver_ftc.diagnosis.state import (
+    EITHER,
+    INTERVAL,
+    LOSS,
+    MAX_POLES,
+    NOT_ISOLATED,
+    POSITION,
+    PUBLISHED,
+    STATISTICS,
+    WORST_CASE,
+)
 from beaver_ftc.errors import BadInput
 from beaver_ftc.frame import FRAME
 from beaver_ftc.plant.instruments import LONGEST_DELAY, SIGNALS
@@ -31,6 +41,7 @@ EVERY_TYPE = (
     *((f"{s}_position", POSITION, i) for i, s in enumerate(SURFACES)),
 )
 FAULT_CLASSES = {"published": PUBLISHED_CLASS, "all": EVERY_TYPE}
+_AUTHORITIES = {"either": EITHER, "worst-case": WORST_CASE, "statistical": STATISTICS}
 _THRESHOLDS = {"interval": INTERVAL, "published": PUBLISHED}
 
 
@@ -52,6 +63,7 @@ def _assemble_diagnosis(fdi: np.void, config: FdiConfig, dt: float, travel: np.n
     fdi["earth_rate"] = EARTH_RATE_RAD_S
     fdi["detected_at_s"] = fdi["isolated_at_s"] = fdi["certain_after_s"] = -1.0
     fdi["isolated"] = NOT_ISOLATED
+    fdi["authority"] = _AUTHORITIES[config.authority]
     members = FAULT_CLASSES[config.fault_class]
     fdi["n_estimators"] = len(members)
     for fie, (_, kind, surface) in zip(fdi["estimator"], members, strict=False):

@@ -33,7 +33,8 @@ class Flight:
     of each filter of the bank, the published one first. surface_travel_rad: path of each surface, up and
     down added. engine_power: if pitch was left to the engine, since when and for how long, s, and the lowest
     and highest manifold pressure, inHg. faults: of several at once (`fdi.pairs`), each as named.py has it,
-    the first named first.
+    the first named first. statistical: when the statistical detector would have raised the alarm, its level
+    in standard deviations, and the largest share of it reached in healthy flight.
     """
 
     scenario: Scenario
@@ -63,3 +64,4 @@ class Flight:
     probing_s: tuple[float, float] | None = None
     engine_power: tuple[float, float, float, float] | None = None
     faults: tuple[dict[str, Any], ...] = ()
+    statistical: dict[str, float | None] | None = None

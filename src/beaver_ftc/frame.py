@@ -16,10 +16,10 @@ from beaver_ftc.control.state import CONTROL, NOMINAL, ORACLE
 from beaver_ftc.design.actuators import ACTUATORS, move
 from beaver_ftc.design.model import ALPHA, BETA, DESIGN, ELEVATOR, QDYN
 from beaver_ftc.design.variants import response
-from beaver_ftc.diagnosis import bank, detection, fault_types, guarantee, isolation, network
+from beaver_ftc.diagnosis import air, bank, detection, fault_types, guarantee, isolation, network, statistical
 from beaver_ftc.diagnosis.derived import changing_error, derived_bound
 from beaver_ftc.diagnosis.fault_types import DOMINANT_AXIS
-from beaver_ftc.diagnosis.state import DIAGNOSIS, NOT_ISOLATED
+from beaver_ftc.diagnosis.state import DIAGNOSIS, NOT_ISOLATED, WORST_CASE
 from beaver_ftc.diagnosis.thresholds import uncertainty_bound
 from beaver_ftc.plant.instruments import INSTRUMENTS, N_SIGNALS, read_all
 from beaver_ftc.plant.native import read_nodes, write_nodes
@@ -34,6 +34,7 @@ from beaver_ftc.supervisor import (
 
 MAX_EVENTS = 64
 FLYING, DEPARTED, NOT_FINITE = 0, 1, 2
+SURE = 400.0  # one over the variance of an effectiveness known to 0.05
 DEPARTURE_ANGLE_RAD = 0.6
 DEPARTURE_RATE_RAD_S = 6.0
 DEPARTURE_SIGNALS = ("p", "q", "r", "alpha", "beta")
@@ -62,7 +63,7 @@ FRAME = np.dtype(
         ("eta_bar_sum", "f8", (3,)), ("phi_sum", "f8", (3,)), ("phi_mean", "f8", (3,)),
         ("Gu_first", "f8", (3, 4)), ("Gu_spread", "f8", (3, 4)),
         ("G_mean", "f8", (3, 4)), ("Gu_mean", "f8", (3, 4)), ("believed", "f8", (3,)),
-        ("design_mean", "f8", (3,)),
+        ("design_mean", "f8", (3,)), ("surprise", "f8", (3,)),
         ("fhat", "f8", (3,)), ("target", "f8", (4,)),
         # what happened
         ("mode", "i8"), ("n_modes", "i8"),
@@ -196,6 +197,8 @@ def predict(frame):
     fdi = frame.fdi
     guarantee.track(fdi, frame.phi_mean)
     bank.innovate(fdi, frame.x, frame.x_then, frame.believed)
+    if fdi.statistical.enabled:
+        compare_likelihoods(frame)
     isolation.suppose_all(fdi, frame.G_mean, frame.Gu_mean, frame.Gu_spread)
     if fdi.every_type:
         fault_types.note_orders(fdi, frame.commanded)
@@ -207,7 +210,34 @@ def predict(frame):
                 frame.believed[i] -= lost * frame.Gu_mean[i, s]
         if fdi.every_type:
             believe_offsets(frame)
+    if fdi.statistical.enabled:
+        for i in range(3):
+            frame.surprise[i] = (frame.x[i] - frame.x_then[i]) / fdi.dt - frame.believed[i]
+        statistical.follow_rest(fdi.statistical, frame.surprise, fdi.dt)
     detection.predict(fdi, frame.x_then, frame.believed, fdi.isolated >= 0 or fdi.lead >= 0)
+
+
+@kernel
+def compare_likelihoods(frame):
+    """Show the statistical detector the elapsed frame."""
+    fdi = frame.fdi
+    cubic = statistical.unanticipated_pitch(frame.design, frame.y)
+    statistical.signatures(fdi.statistical, frame.Gu_mean, cubic)
+    statistical.observe(fdi.statistical, fdi.innovation, fdi.dt, frame.k, fdi.detected)
+    statistical.score(fdi.statistical, frame.t)
+
+
+@kernel
+def look_ahead(frame):
+    """Ready the statistical detector for the next frame: the air as the vanes see it, noise, coefficients."""
+    fdi = frame.fdi
+    attitude = frame.truth[ch.PHI : ch.PHI + 3]
+    if fdi.statistical.air.moving:
+        if frame.k > 0:
+            air.observe(fdi.statistical.air, frame.y, attitude, fdi.dt)
+        else:
+            air.begin(fdi.statistical.air, frame.y, attitude)
+    statistical.prepare(fdi.statistical, fdi, frame.design, frame.x, frame.y, frame.u)
 
 
 @kernel
@@ -225,6 +255,8 @@ def remember(frame):
     frame.fdi.noise_then[:] = frame.fdi.noise
     frame.f_sum[:], frame.eta_bar_sum[:], frame.phi_sum[:] = 0.0, 0.0, 0.0
     frame.G_sum[:], frame.Gu_sum[:] = 0.0, 0.0
+    if frame.fdi.statistical.enabled:
+        look_ahead(frame)
     sum_up(frame)
     frame.Gu_first[:] = frame.Gu_sum
 
@@ -294,6 +326,20 @@ def decide(fdi, y, x, t):
 def isolated_surface(fdi):
     """The surface of the isolated fault, or -1."""
     return fdi.estimator[fdi.isolated].surface if fdi.isolated >= 0 else -1
+
+
+@kernel
+def likelihood_counts(fdi):
+    """Whether the statistical detector's estimates are the ones to use."""
+    return fdi.statistical.enabled and fdi.authority != WORST_CASE
+
+
+@kernel
+def isolated_theta(fdi, s):
+    """Estimated theta of the isolated loss of surface s: under noise, the most likely one."""
+    if likelihood_counts(fdi):
+        return statistical.loss_of(fdi.statistical, s)[0]
+    return fdi.estimator[fdi.isolated].theta[DOMINANT_AXIS[s]]
 
 
 @kernel
@@ -368,13 +414,18 @@ def accommodate(frame):
         elif fdi.every_type and fdi.surface[s].measure >= 0:
             act_on_lead(frame, s)
         elif s == surface and not fdi.every_type:
-            frame.target[s] = 1.0 + fdi.estimator[fdi.isolated].theta[DOMINANT_AXIS[s]]
+            frame.target[s] = 1.0 + isolated_theta(fdi, s)
+            if likelihood_counts(fdi) and statistical.loss_of(fdi.statistical, s)[1] > SURE:
+                control.effectiveness[s] = frame.target[s]  # what is known well need not be eased in
     adaptive.approach(control, frame.target)
     frame.fhat[:] = 0.0
     if control.law == ORACLE:
         frame.fhat[1] = unanticipated_effect(frame)
     elif control.law != NOMINAL and fdi.detected:
-        detection.unknown_acceleration(fdi, frame.fhat)
+        if likelihood_counts(fdi):
+            statistical.unknown_acceleration(fdi.statistical, frame.fhat)
+        else:
+            detection.unknown_acceleration(fdi, frame.fhat)
         if fdi.lead >= 0 and fdi.lead_kind == fault_types.LAGS:
             frame.fhat[:] = 0.0  # to ask a slow surface for what it lacks would only wind the command up
 

@@ -12,7 +12,8 @@ from beaver_ftc.assembly import assemble, estimator_names
 from beaver_ftc.compiled import direct
 from beaver_ftc.design.actuators import move
 from beaver_ftc.design.coefficients import SURFACES
-from beaver_ftc.design.variants import anchor
+from beaver_ftc.design.variants import anchor, mass_of
+from beaver_ftc.diagnosis import noise_model
 from beaver_ftc.errors import SimulationFailed
 from beaver_ftc.flight import Flight, LogSink
 from beaver_ftc.frame import FLYING, NOT_FINITE, fly_frame, look
@@ -21,7 +22,7 @@ from beaver_ftc.plant import native
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.configure import configure, take_off, trim_of
 from beaver_ftc.plant.faults import FaultSchedule
-from beaver_ftc.plant.gust import GustSchedule
+from beaver_ftc.plant.gust import GustSchedule, MovingAir
 from beaver_ftc.plugins import DETECTORS, LAWS, is_compiled
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.signals import sample
@@ -86,6 +87,7 @@ class Loop:
         self.cockpit = Cockpit(self.plant, self.frames)
         self._anchor_design(surfaces)
         self.schedule = FaultSchedule(scenario.faults, self.plant, scenario.rate_hz)
+        self.air = MovingAir(scenario.environment, self.plant)
         self.gust = GustSchedule(scenario.environment.gust, self.plant, scenario.rate_hz)
         self.n_frames = round(scenario.duration_s * scenario.rate_hz)
         self.plugged = self._plugged(detector, law)
@@ -110,7 +112,10 @@ class Loop:
         self.cockpit.read()
         truth = self.frames["truth"][0] * self.frames["factor"][0]
         y = truth[[ch.ALPHA, ch.BETA, ch.AIRSPEED, ch.QDYN, ch.DPT]]
-        anchor(self.frames["design"][0], truth[:3], y, surfaces)
+        frame, scenario = self.frames[0], self.scenario
+        anchor(frame["design"], truth[:3], y, surfaces)
+        start, mass = (truth[:3], y, surfaces), mass_of(scenario.design_model)
+        noise_model.set_up(frame["fdi"], scenario.fdi, frame["design"], mass, start, scenario.rate_hz)
 
     def _plugged(self, detector: "Detector | None", law: "Law | None") -> "PluggedFrame | None":
         """The frame in which plug-ins take part; None, and nothing of it imported, if all is compiled in."""
@@ -196,7 +201,7 @@ class Loop:
 
     def _advance(self, runs: int) -> Callable[[], object]:
         """What brings the truth from one frame of the loop to the next; mostly JSBSim's own `run`."""
-        if runs == 1 and self.cockpit.native:
+        if runs == 1 and self.cockpit.native and not self.air.turbulent:
             return self.plant.run
         return partial(self._advance_by, runs)
 
@@ -205,6 +210,7 @@ class Loop:
         if runs and not self.cockpit.native:
             self.cockpit.write()
         for left in reversed(range(runs)):
+            self.air.turn()
             self.plant.run()
             if left:
                 self._look_between()

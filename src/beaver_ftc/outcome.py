@@ -10,7 +10,7 @@ from beaver_ftc.design.model import AXES
 from beaver_ftc.diagnosis.base import Verdict
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, UNANTICIPATED
 from beaver_ftc.flight import Flight
-from beaver_ftc.frame import DEPARTURE_SIGNALS, DOMINANT_AXIS
+from beaver_ftc.frame import DEPARTURE_SIGNALS, isolated_theta
 from beaver_ftc.named import found
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.supervisor import MODES
@@ -52,7 +52,7 @@ def _isolation(fdi: np.void) -> dict:
         "isolated": SURFACES[surface],
         "isolation_type": "loss_of_effectiveness",
         "candidates": tuple(left),
-        "estimate": float(fie["theta"][DOMINANT_AXIS[surface]]),
+        "estimate": float(isolated_theta(fdi, surface)),
         "isolation_time_s": at_s,
     }
 
@@ -97,6 +97,18 @@ def _engine_power(frame: np.void) -> tuple[float, float, float, float] | None:
         return None
     in_charge_s = int(power["frames"]) * float(frame["dt"])
     return float(power["from_s"]), in_charge_s, float(power["least"]), float(power["greatest"])
+
+
+def _statistical(fdi: np.void) -> dict[str, float | None] | None:
+    """What the statistical detector made of the flight, if there was one."""
+    statistical = fdi["statistical"]
+    if not statistical["enabled"]:
+        return None
+    return {
+        "time_s": _instant(statistical["detected_at_s"]),
+        "alarm_level": float(statistical["alarm_level"]),
+        "closest_approach": float(statistical["closest"]),
+    }
 
 
 def verdict_of(frame: np.void) -> Verdict:
@@ -149,7 +161,8 @@ def flight_of(
         envelope_exits=_envelope_exits(frame),
         departure=(float(frame["t"]), DEPARTURE_SIGNALS[departed // 10]) if departed else None,
         saturation_s={s: int(n) * dt for s, n in zip(SURFACES, frame["saturated_frames"], strict=True)},
-        worst_residual_ratio=max(closest),
+        worst_residual_ratio=max(*closest, float(fdi["statistical"]["closest"])),
+        statistical=_statistical(fdi),
         closest_approach=closest,
         authority=_authority(frame),
         probing_s=_probing_s(frame),

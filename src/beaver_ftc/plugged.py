@@ -215,5 +215,5 @@ def _names(scenario: Scenario, detector: Detector | None, law: Law | None) -> tu
 
 def _clear_for_detector(fdi: np.void) -> None:
     """No built-in isolation; instead, one place a surface for what the plug-in says of it."""
-    fdi["enabled"] = fdi["n_estimators"] = fdi["every_type"] = 0
+    fdi["enabled"] = fdi["n_estimators"] = fdi["every_type"] = fdi["statistical"]["enabled"] = 0
     fdi["estimator"]["surface"][: len(SURFACES)] = range(len(SURFACES))

@@ -11,7 +11,7 @@ import numpy as np
 from beaver_ftc.compiled import kernel
 from beaver_ftc.design.model import ALPHA, BETA
 from beaver_ftc.diagnosis import guarantee, network
-from beaver_ftc.diagnosis.state import NOT_ISOLATED
+from beaver_ftc.diagnosis.state import NOT_ISOLATED, STATISTICS, WORST_CASE
 from beaver_ftc.frame import (
     NOT_FINITE,
     accommodate,
@@ -87,6 +87,10 @@ def note(frame, verdict):
 def built_in_statistic(frames):
     """The largest share of its threshold that a residual of the built-in detection reaches at this frame."""
     fdi, largest = frames[0].fdi, 0.0
+    if fdi.authority != WORST_CASE:
+        largest = fdi.statistical.score
+    if fdi.authority == STATISTICS:
+        return largest
     for m in range(fdi.n_poles):
         for i in range(3):
             if fdi.bank_threshold[m, i] > 0.0:

@@ -92,6 +92,7 @@ class Flight:
     probing_s: tuple[float, float] | None = None
     engine_power: tuple[float, float, float, float] | None = None
     faults: tuple[dict, ...] = ()
+    statistical: dict[str, float | None] | None = None
 
 
 def rows(flight: Flight) -> np.ndarray:

@@ -68,6 +68,7 @@ def note_closest_approach(fdi):
             if fdi.bank_threshold[m, i] > 0.0:
                 share = abs(fdi.bank_residual[m, i]) / fdi.bank_threshold[m, i]
                 fdi.closest[m] = max(fdi.closest[m], share)
+    fdi.statistical.closest = max(fdi.statistical.closest, fdi.statistical.score)
 
 
 @kernel

@@ -1,6 +1,6 @@
 """What a scenario may say about the diagnosis (`fdi:`), with defaults and their reasons."""
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, Strict, field_validator, model_validator
 
@@ -80,6 +80,28 @@ class Bounds(BaseModel):
         return given
 
 
+class Statistical(BaseModel):
+    """Likelihood ratio tests beside the worst-case thresholds; levels follow from the rates declared here."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    false_alarms_per_h: float = Field(
+        1e-3,
+        gt=0,
+        le=3600,
+        description="at most so many false alarms per flight hour under the noise declared",
+    )
+    misnaming: float = Field(
+        1e-4, gt=0, lt=0.5, description="chance, within a second, that noise excludes the true fault"
+    )
+    uncertainty_rad_s: float = Field(
+        15.0,
+        gt=0,
+        le=1000,
+        description="how fast an uncertainty that is merely bounded swings, rad/s: as published",
+    )
+
+
 class Probing(BaseModel):
     """A small movement of the flap, met by the elevator, to learn which of the two is at fault.
 
@@ -148,6 +170,13 @@ class FdiConfig(BaseModel):
     probing: Probing | None = Field(
         None, description="active diagnosis (class `all`): off unless given; `{}` for its defaults"
     )
+    statistical: Statistical | None = Field(
+        None,
+        description="statistical detector beside the worst-case one: off unless given; `{}` for its defaults",
+    )
+    authority: Literal["either", "worst-case", "statistical"] = Field(
+        "either", description="whose alarms and exclusions count where there are two detectors"
+    )
     thresholds: Literal["interval", "published"] = Field(
         "interval", description="isolation test: signed interval or the paper's norm bound"
     )
@@ -181,6 +210,14 @@ class FdiConfig(BaseModel):
             if wrong
             else []
         )
+        return self
+
+    @model_validator(mode="after")
+    def _nobody_in_charge(self) -> Self:
+        if self.authority == "statistical" and self.statistical is None:
+            refuse(
+                [(("authority",), "statistical wants fdi.statistical, e.g. {}, allowed: either, worst-case")]
+            )
         return self
 
     @model_validator(mode="before")

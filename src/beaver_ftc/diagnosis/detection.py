@@ -9,6 +9,7 @@ the discrete truth: xhat0[k+1] = x[k] + dt F[k] + exp(-Lambda0 dt) (xhat0[k] - x
 from beaver_ftc.compiled import kernel
 from beaver_ftc.diagnosis import bank
 from beaver_ftc.diagnosis.network import dead_zone, learn
+from beaver_ftc.diagnosis.state import STATISTICS, WORST_CASE
 from beaver_ftc.diagnosis.thresholds import bound_step, noise_step
 
 
@@ -24,10 +25,12 @@ def begin(fdi, x):
 
 @kernel
 def detect(fdi, x, t):
-    """Form the residual at time t (s) and raise the alarm if the bank does. x (3,) rad/s measured."""
+    """Form the residual and raise the alarm if a detector in authority does; x (3,) rad/s measured, t s."""
     for i in range(3):
         fdi.residual[i] = x[i] - fdi.xhat[i]
-    axis = bank.alarm(fdi)
+    axis = bank.alarm(fdi) if fdi.authority != STATISTICS else -1
+    if axis < 0 and fdi.authority != WORST_CASE and fdi.statistical.score > 1.0:
+        axis = fdi.statistical.axis
     if axis >= 0 and not fdi.detected:
         fdi.detected = 1
         fdi.detected_at_s = t

@@ -14,7 +14,16 @@ by the first test that fails.
 from beaver_ftc.compiled import kernel
 from beaver_ftc.diagnosis import bank, fault_types, membership, pairs
 from beaver_ftc.diagnosis.fault_class import hypothesis
-from beaver_ftc.diagnosis.state import INTERVAL, LOSS, NOT_ISOLATED, POSITION, UNANTICIPATED
+from beaver_ftc.diagnosis.state import (
+    INTERVAL,
+    LOSS,
+    NOT_ISOLATED,
+    POSITION,
+    STATISTICS,
+    UNANTICIPATED,
+    WORST_CASE,
+)
+from beaver_ftc.diagnosis.statistical import excludes
 from beaver_ftc.diagnosis.thresholds import bound_step, interval, noise_step, published
 
 
@@ -86,6 +95,16 @@ def possible(fdi, fie, x, started):
 
 
 @kernel
+def rules_out(fdi, fie, within):
+    """Whether a fault is excluded by those in authority; `within`: it is possible in the worst case."""
+    if fdi.authority != STATISTICS and not within:
+        return True
+    statistical = fdi.statistical
+    asked = statistical.enabled and fdi.authority != WORST_CASE and fie.kind == LOSS
+    return asked and excludes(statistical, fie.surface)
+
+
+@kernel
 def decide(fdi, t):
     """The generalised observer scheme: the one left is the fault; none left means it is outside the class."""
     left, last = 0, NOT_ISOLATED
@@ -104,7 +123,7 @@ def isolate(fdi, x, t, started):
     """Test every estimator against the measured x (3,) rad/s at time t (s), and decide; as `possible`."""
     for s in range(fdi.n_estimators):
         fie = fdi.estimator[s]
-        if not possible(fdi, fie, x, started) and not fie.excluded:
+        if rules_out(fdi, fie, possible(fdi, fie, x, started)) and not fie.excluded:
             fie.excluded = 1
             fie.excluded_at_s = t
     if not fdi.every_type:

@@ -85,6 +85,65 @@ ADMITTED = np.dtype(
     align=True,
 )  # fmt: skip
 
+# What the statistical detector keeps: air.py, whitening.py, likelihood.py. A block is the axes whose noise
+# goes together: pitch, and roll with yaw. States of a filter: what is left of the rate, then the drift.
+N_SLOTS = 10
+MAX_HYPOTHESES, MAX_REGRESSORS = 4, 18
+EITHER, WORST_CASE, STATISTICS = 0, 1, 2  # whose alarms count
+STEP, ALPHA3 = 2, 3  # further kinds of hypothesis: likelihood.py
+
+AIR = np.dtype(
+    [
+        ("moving", "i8"),
+        ("longitudinal", "f8", (10,)), ("side", "f8", (7,)), ("normal", "f8", (9,)),  # force coefficients
+        ("area_per_mass", "f8"), ("gravity", "f8"), ("span", "f8"), ("chord", "f8"),
+        ("velocity", "f8", (3,)), ("force", "f8", (3,)), ("turn", "f8", (3, 3)), ("heading", "f8"),
+        ("gust", "f8", (3,)), ("rotation", "f8", (3,)), ("damping", "f8", (3, 3)),
+        ("acceleration", "f8", (3,)),
+        ("per_metre", "f8", (3,)),  # intensity of the rotation's drift over airspeed, rad2/s3 per m/s
+        ("unseen", "f8", (3,)),  # share of it that the vanes do not show
+        ("jitter", "f8"),  # standard deviation of the pitching and yawing gust as seen, rad m/s
+    ],
+    align=True,
+)  # fmt: skip
+
+HYPOTHESIS = np.dtype(
+    [
+        ("kind", "i8"), ("surface", "i8"), ("axis", "i8"), ("alarms", "i8"),
+        ("signature", "f8", (2,)), ("response", "f8", (N_SLOTS, 4)),
+        ("correlation", "f8", (N_SLOTS,)), ("information", "f8", (N_SLOTS,)),
+        ("overlap", "f8", (N_SLOTS, MAX_REGRESSORS)),
+        ("score", "f8"), ("theta", "f8"), ("certainty", "f8"), ("at_least", "f8"), ("at_most", "f8"),
+    ],
+    align=True,
+)  # fmt: skip
+
+BLOCK = np.dtype(
+    [
+        ("n", "i8"), ("axis", "i8", (2,)),
+        ("state", "f8", (4,)), ("rest", "f8", (4,)), ("innovation", "f8", (2,)), ("scratch", "f8", (2,)),
+        ("P_xx", "f8", (2, 2)), ("P_xd", "f8", (2, 2)), ("P_dd", "f8", (2, 2)),
+        ("drift", "f8", (2, 2)), ("jitter", "f8", (2,)), ("noise", "f8", (2,)),
+        ("S_inverse", "f8", (2, 2)), ("K_x", "f8", (2, 2)), ("K_d", "f8", (2, 2)),
+        ("n_regressors", "i8"), ("tolerance", "f8", (MAX_REGRESSORS,)),
+        ("regressor", "f8", (MAX_REGRESSORS, 2)), ("regressor_state", "f8", (MAX_REGRESSORS, 4)),
+        ("regressor_response", "f8", (MAX_REGRESSORS, 2)),
+        ("n_hypotheses", "i8"), ("hypothesis", HYPOTHESIS, (MAX_HYPOTHESES,)),
+    ],
+    align=True,
+)  # fmt: skip
+
+STATISTICAL = np.dtype(
+    [
+        ("enabled", "i8"), ("alarm_level", "f8"), ("naming_level", "f8"), ("keep", "f8"),
+        ("rapidity", "f8"),  # 1/s: intensity of the drift of an uncertainty over its bound squared
+        ("bounded", "f8", (3,)), ("deflection", "f8", (3,)), ("jitter", "f8", (3,)), ("tolerated", "i8"),
+        ("block", BLOCK, (2,)), ("air", AIR), ("terms", "f8", (3, 9)),
+        ("score", "f8"), ("axis", "i8"), ("closest", "f8"), ("detected_at_s", "f8"),
+    ],
+    align=True,
+)  # fmt: skip
+
 DIAGNOSIS = np.dtype(
     [
         ("enabled", "i8"), ("thresholds", "i8"), ("dt", "f8"), ("forgetting", "f8"),
@@ -114,6 +173,7 @@ DIAGNOSIS = np.dtype(
         # two at once: pairs.py
         ("pairs", "i8"), ("alarmed", "i8", (2,)), ("no_lateral_pair", "i8"), ("first", "i8"),
         ("unsettled", "i8"),
+        ("statistical", STATISTICAL), ("authority", "i8"),
         ("closest", "f8", (MAX_POLES,)),  # largest share of its bound each filter reached in healthy flight
         ("effect", "f8", (MAX_POLES, 3)), ("certain_after_s", "f8"),  # what guarantee.py keeps
     ],

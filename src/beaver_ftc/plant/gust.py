@@ -1,12 +1,33 @@
-"""The one-minus-cosine gust of a scenario, by JSBSim's own model, set off at its frame."""
+"""The air that moves: the one-minus-cosine gust, set off at its frame, and the axes of the turbulence.
+
+Both are JSBSim's own models.
+"""
 
 from math import ceil
 
 from beaver_ftc.plant.adapter import FT_PER_M, Plant
-from beaver_ftc.scenario.schema import Gust
+from beaver_ftc.scenario.schema import Environment, Gust
 
 NEVER = 2**62
 _LOCAL_FRAME = 3  # of atmosphere/cosine-gust/frame: north, east, down
+
+
+class MovingAir:
+    """Turns the turbulence with the aircraft's heading, as its spectra are meant [MIL-F-8785C, 3.7.1].
+
+    JSBSim keeps it in axes along the wind, and without one along whatever direction it met first: a rolling
+    gust would pitch an aircraft that flies across. `psiw` turns them the other way round.
+    """
+
+    def __init__(self, environment: Environment, plant: Plant) -> None:
+        self.turbulent = environment.severity is not None
+        self._heading = plant.node("attitude/psi-rad")
+        self._axes = plant.node("atmosphere/psiw-rad")
+
+    def turn(self) -> None:
+        """Before a JSBSim frame: axes along the present heading."""
+        if self.turbulent:
+            self._axes.set_double_value(-self._heading.get_double_value())
 
 
 class GustSchedule:

@@ -88,6 +88,8 @@ def _detection(flight: "Flight", fault: Document | None) -> Document:
         "time_s": _number(flight.detection_time_s),
         "delay_s": _delay(flight.detection_time_s, fault),
         "axis": flight.detection_axis,
+        "statistical": flight.statistical
+        and {key: _number(value) for key, value in flight.statistical.items()},
         "guaranteed_delay_s": _number(flight.guaranteed_delay_s),
     }
 

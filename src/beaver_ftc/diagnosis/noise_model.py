@@ -1,0 +1,220 @@
+"""From what a scenario declares to the statistical detector's numbers: levels, noise, tolerances."""
+
+from math import exp, pi, sqrt
+from statistics import NormalDist
+
+import numpy as np
+
+from beaver_ftc.design.coefficients import GEOMETRY, MassProperties, coefficient_terms
+from beaver_ftc.design.model import AILERON, AIRSPEED, ALPHA, AXES, BETA, DPT, ELEVATOR, QDYN, RUDDER, TERMS
+from beaver_ftc.design.variants import jacobian
+from beaver_ftc.diagnosis.admitted import GUST_FT_S, SCALE_FT, inertia_slack, tolerances
+from beaver_ftc.diagnosis.config import Bounds, FdiConfig, Statistical
+from beaver_ftc.diagnosis.state import ALPHA3, LOSS, N_SLOTS, STEP
+from beaver_ftc.plant.instruments import SIGNALS
+from beaver_ftc.scenario.sensors import Sensors
+
+# (kind, surface, axis, raises alarms); of the published class, and what it is held against.
+PITCH = ((LOSS, ELEVATOR, 1, 1), (STEP, -1, 1, 1), (ALPHA3, -1, 1, 0))
+LATERAL = ((LOSS, AILERON, 0, 1), (LOSS, RUDDER, 2, 1), (STEP, -1, 0, 1), (STEP, -1, 2, 1))
+BLOCKS = (((1,), PITCH), ((0, 2), LATERAL))
+SIDES = {LOSS: 1, STEP: 2, ALPHA3: 2}  # a loss has a sign, a step may go either way
+
+# Share of the intensity of the rolling, pitching and yawing gust that the vanes leave; measured on exact
+# vanes it is below 0.003 and 0.05 (`tests/diagnosis/test_air.py`).
+UNSEEN = (1.0, 0.003, 0.03)
+PRIOR_DRIFT_RAD_S2 = 1.0  # what a drift may be at the start of a flight: soon forgotten
+_RATE_TERMS = ("p", "q", "r")
+
+
+def tests_a_frame() -> int:
+    """How many one-sided tests the detector makes in a frame."""
+    return N_SLOTS * sum(SIDES[kind] for _, members in BLOCKS for kind, _, _, alarms in members if alarms)
+
+
+def alarm_level(false_alarms_per_h: float, rate_hz: float) -> float:
+    """Standard deviations at which all tests of an hour together give so many false alarms at most."""
+    return -NormalDist().inv_cdf(false_alarms_per_h / (3600.0 * rate_hz * tests_a_frame()))
+
+
+def naming_level(misnaming: float, rate_hz: float) -> float:
+    """Difference of log likelihoods that chance gives with this probability at most within a second."""
+    return 0.5 * NormalDist().inv_cdf(misnaming / (rate_hz * tests_a_frame())) ** 2
+
+
+def set_up(
+    fdi: np.void,
+    config: FdiConfig,
+    design: np.void,
+    mass: MassProperties,
+    start: tuple[np.ndarray, np.ndarray, np.ndarray],
+    rate_hz: float,
+) -> None:
+    """Fill the statistical part of a diagnosis record; start: x (3,), y (5,) and u (4,) in trim."""
+    statistical, given = fdi["statistical"], config.statistical
+    statistical["detected_at_s"] = -1.0
+    if given is None:
+        return
+    statistical["enabled"] = 1
+    statistical["alarm_level"] = alarm_level(given.false_alarms_per_h, rate_hz)
+    statistical["naming_level"] = naming_level(given.misnaming, rate_hz)
+    statistical["keep"] = exp(-1.0 / (rate_hz * config.forgetting_time_s))
+    _set_up_blocks(statistical, config.bounds.sensors)
+    _set_up_noise(statistical, given, config.bounds, design, start, 1.0 / rate_hz)
+    _set_up_tolerances(statistical, config.bounds, design, mass, start)
+    _set_up_air(statistical["air"], config.bounds.turbulence, mass)
+    if statistical["air"]["moving"]:
+        statistical["jitter"] += _gust_jitter(config.bounds.sensors, design, start[1]) ** 2
+
+
+def _random_error(sensors: Sensors, name: str) -> float:
+    """Standard deviation of what changes from sample to sample: noise and rounding."""
+    noise, _, quantum = getattr(sensors, name).noise_bias_quantum
+    return sqrt(noise**2 + quantum**2 / 12.0)
+
+
+def _set_up_blocks(statistical: np.void, sensors: Sensors) -> None:
+    for block, (axes, members) in zip(statistical["block"], BLOCKS, strict=True):
+        block["n"], block["n_hypotheses"] = len(axes), len(members)
+        block["n_regressors"] = 9 * len(axes)
+        for i, axis in enumerate(axes):
+            block["axis"][i] = axis
+            variance = _random_error(sensors, AXES[axis]) ** 2
+            block["noise"][i] = block["P_xx"][i, i] = variance
+            block["P_dd"][i, i] = PRIOR_DRIFT_RAD_S2**2
+        for hypothesis, (kind, surface, axis, alarms) in zip(block["hypothesis"], members, strict=False):
+            hypothesis["kind"], hypothesis["surface"] = kind, surface
+            hypothesis["axis"], hypothesis["alarms"] = axis, alarms
+
+
+def _set_up_noise(
+    statistical: np.void,
+    given: Statistical,
+    bounds: Bounds,
+    design: np.void,
+    start: tuple[np.ndarray, np.ndarray, np.ndarray],
+    dt_s: float,
+) -> None:
+    """What drifts, and what is white: noise of the measurements that f + G u is made of."""
+    dt = float(dt_s)
+    noise = max(_random_error(bounds.sensors, axis) for axis in AXES)
+    largest = max(bounds.constant_rad_s2.as_tuple())
+    level = float(statistical["alarm_level"])
+    statistical["rapidity"] = rapidity(largest, given.uncertainty_rad_s, noise, level, dt)
+    _, G, f_x, f_y = jacobian(design, *start)
+    errors = np.array([_random_error(bounds.sensors, name) for name in SIGNALS])
+    along = np.column_stack([f_x, f_y[:, [ALPHA, BETA, AIRSPEED, QDYN]]])
+    statistical["jitter"] = (along**2) @ errors**2
+    statistical["deflection"] = np.abs(G).sum(axis=1) * np.radians(bounds.deflection_deg)
+
+
+def rapidity(eta_bar: float, omega: float, noise: float, level: float, dt_s: float) -> float:
+    """Intensity of the random walk that stands for a bounded uncertainty, over its bound squared, 1/s.
+
+    An uncertainty of eta_bar sin(omega t) moves the test for a step by eta_bar omega sqrt(2 sqrt 2 / i w0),
+    w0 = (i / n)^(1/4), for a walk of intensity i and gyro noise of density n = noise^2 dt (docs/theory.md).
+    Half the alarm level is left for it: noise alone then takes up no more than the other half. With no noise
+    to speak of w0 is the frame rate. eta_bar rad/s2, omega rad/s, noise rad/s, level in standard deviations.
+    """
+    if eta_bar == 0.0:
+        return 0.0
+    swing = 8.0 * sqrt(2.0) * (eta_bar * omega / level) ** 2  # of i w0
+    density = noise**2 * dt_s
+    walk = (swing * density**0.25) ** 0.8
+    return max(walk, swing * dt_s) / eta_bar**2
+
+
+def _set_up_tolerances(
+    statistical: np.void,
+    bounds: Bounds,
+    design: np.void,
+    mass: MassProperties,
+    start: tuple[np.ndarray, np.ndarray, np.ndarray],
+) -> None:
+    """What is constant but unknown, as tolerances of coefficients: theirs, inertia, steady sensor errors."""
+    tolerance = steady_tolerance(bounds, np.asarray(design["coefficient"]), mass, start[1], start[2])
+    statistical["block"][0]["tolerance"][:9] = tolerance[1]
+    statistical["block"][1]["tolerance"][:] = np.concatenate([tolerance[0], tolerance[2]])
+    statistical["tolerated"] = bool(np.any(tolerance))
+
+
+def steady_tolerance(
+    bounds: Bounds, coefficient: np.ndarray, mass: MassProperties, y: np.ndarray, u: np.ndarray
+) -> np.ndarray:
+    """Tolerance (3, 9) of each moment coefficient that covers every declared constant error; y, u in trim."""
+    size = np.abs(coefficient)
+    share = np.full((3, 9), _inertia_share(bounds.inertia, mass))
+    for i, names in enumerate(TERMS):
+        share[i] += getattr(bounds.sensors, AXES[i]).scale_error + _steady_share(bounds, "qdyn", y[QDYN])
+        for j, name in enumerate(names):
+            if name[3:] in _RATE_TERMS:
+                share[i, j] += _steady_share(bounds, "V", y[AIRSPEED])
+            share[i, j] += name[3:].count("alpha") * bounds.sensors.alpha.scale_error
+            share[i, j] += name[3:].count("beta") * bounds.sensors.beta.scale_error
+    total = tolerances(bounds.coefficients, coefficient) + share * size
+    alpha, beta = (getattr(bounds.sensors, name).noise_bias_quantum[1] for name in ("alpha", "beta"))
+    total[:, 0] += abs(alpha) * _slope_alpha(coefficient, y, u) + abs(beta) * _slope_beta(coefficient, y)
+    return total
+
+
+def _steady_share(bounds: Bounds, name: str, value: float) -> float:
+    sensor = getattr(bounds.sensors, name)
+    return abs(sensor.noise_bias_quantum[1]) / value + abs(sensor.scale_error)
+
+
+def _inertia_share(tolerance: float, mass: MassProperties) -> float:
+    """Largest relative error of what multiplies a moment on its own axis."""
+    from dataclasses import astuple
+
+    from beaver_ftc.design.coefficients import inertia_coefficients
+
+    slack, nominal = inertia_slack(tolerance, mass), np.abs(astuple(inertia_coefficients(mass)))
+    return float(max(slack[i] / nominal[i] for i in (2, 7, 11)))
+
+
+def _slope_alpha(k: np.ndarray, y: np.ndarray, u: np.ndarray) -> np.ndarray:
+    """|d(Cl, Cm, Cn) / d alpha|, (3,) 1/rad."""
+    Cl = 2 * k[0, 4] * y[ALPHA] * y[DPT] + k[0, 6] * u[AILERON]
+    return np.abs([Cl, k[1, 1] + 2 * k[1, 2] * y[ALPHA], 0.0])
+
+
+def _slope_beta(k: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """|d(Cl, Cm, Cn) / d beta|, (3,) 1/rad."""
+    return np.abs([k[0, 1], 2 * k[1, 4] * y[BETA], k[2, 1] + 3 * k[2, 5] * y[BETA] ** 2])
+
+
+def _set_up_air(air: np.void, turbulence: str, mass: MassProperties) -> None:
+    air["moving"] = turbulence != "none"
+    for name, coefficient in (("longitudinal", "CX"), ("side", "CY"), ("normal", "CZ")):
+        terms = [term.value for term in coefficient_terms(coefficient) if term.name != "CY_betadot"]
+        air[name] = terms
+    air["area_per_mass"] = GEOMETRY.wing_area_m2 / mass.mass_kg
+    air["gravity"] = 9.80665  # m/s2, standard; what is constant has no part in a change of the gust
+    air["span"], air["chord"] = GEOMETRY.span_m, GEOMETRY.chord_m
+    air["per_metre"], air["unseen"] = gust_drift(turbulence), UNSEEN
+
+
+def gust_drift(turbulence: str) -> np.ndarray:
+    """Intensity of the random walk that each rotating gust is over times short beside its own, over V.
+
+    (3,) rad2/s3 per m/s, for roll, pitch and yaw. The rolling gust is a first-order process with
+    sigma = 1.9 sigma_w / sqrt(L b) and a lag of sqrt(L b) / 2.6 V [Yeager1998, eq. 8]: 2 sigma^2 / lag. The
+    others are lagged slopes of a velocity of intensity 3 sigma_w^2 V / L [MIL-F-8785C, 3.7], over (V lag)^2.
+    """
+    sigma_w, L, b = 0.3048 * GUST_FT_S[turbulence], 0.3048 * SCALE_FT, GEOMETRY.span_m
+    rolling = 2.0 * 1.9**2 * 2.6 * sigma_w**2 / (L * b) ** 1.5
+    velocity = 3.0 * sigma_w**2 / L
+    return np.array([rolling, velocity * (pi / (4 * b)) ** 2, velocity * (pi / (3 * b)) ** 2])
+
+
+def _gust_jitter(sensors: Sensors, design: np.void, y: np.ndarray) -> np.ndarray:
+    """Standard deviation, rad/s2 on each axis, of what the vanes' noise adds to the gust they see."""
+    V, b = y[AIRSPEED], GEOMETRY.span_m
+    speed = 0.3 * _random_error(sensors, "V") / V  # through attitudes of up to 17 deg
+    pitching = (_random_error(sensors, "alpha") + speed) * pi * V / (4 * b)
+    yawing = (_random_error(sensors, "beta") + speed) * pi * V / (3 * b)
+    from beaver_ftc.diagnosis.air import damping
+
+    A = np.zeros((3, 3))
+    damping.py_func(np.asarray(design).view(np.recarray), y, A)
+    return np.sqrt((A[:, 1] * pitching) ** 2 + (A[:, 2] * yawing) ** 2)

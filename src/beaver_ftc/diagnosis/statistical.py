@@ -1,0 +1,182 @@
+"""The statistical detector: likelihood ratios on the whitened innovation, beside the worst-case thresholds.
+
+Pitch is one block, roll and yaw another, whose noise goes together. Its declared rate of false alarms holds
+for the declared noise; the worst-case scheme beside it needs no probability at all. `fdi.authority` says
+whose alarms and exclusions count.
+"""
+
+from beaver_ftc.compiled import kernel
+from beaver_ftc.design.model import ALPHA, QDYN, regressors
+from beaver_ftc.diagnosis import air, likelihood, whitening
+from beaver_ftc.diagnosis.state import LOSS, STEP
+from beaver_ftc.diagnosis.thresholds import uncertainty_bound
+
+PITCH, LATERAL = 0, 1
+_TERMS = 9  # of a moment coefficient
+
+
+@kernel
+def signatures(statistical, Gu, cubic):
+    """What each fault would have done in the elapsed frame, times theta. Gu (3, 4) rad/s2: what each surface
+    gave, mean over it; cubic rad/s2: a pitching moment on alpha^3."""
+    for b in range(2):
+        block = statistical.block[b]
+        for h in range(block.n_hypotheses):
+            hypothesis = block.hypothesis[h]
+            for i in range(block.n):
+                if hypothesis.kind == LOSS:
+                    hypothesis.signature[i] = Gu[block.axis[i], hypothesis.surface]
+                elif hypothesis.kind == STEP:
+                    hypothesis.signature[i] = 1.0 if hypothesis.axis == block.axis[i] else 0.0
+                else:
+                    hypothesis.signature[i] = cubic
+
+
+@kernel
+def observe(statistical, innovation, dt, frame, latched):
+    """Take in one frame: innovation (3,) rad/s2, frame number, whether the alarm is out."""
+    keep = statistical.keep if latched else 1.0
+    slot = likelihood.slot_to_start(frame)
+    for b in range(2):
+        block = statistical.block[b]
+        if not latched:
+            likelihood.start(block, slot)
+        whitening.advance(block, dt)
+        for i in range(block.n):
+            axis = block.axis[i]
+            block.scratch[i] = innovation[axis] - statistical.air.acceleration[axis]
+        whitening.whiten(block, block.state, block.scratch, dt, block.innovation)
+        if statistical.tolerated:
+            for j in range(block.n_regressors):
+                whitening.whiten(
+                    block, block.regressor_state[j], block.regressor[j], dt, block.regressor_response[j]
+                )
+        likelihood.weigh(block, statistical.tolerated, dt, keep)
+        likelihood.judge(block, statistical.tolerated)
+
+
+@kernel
+def follow_rest(statistical, surprise, dt):
+    """Filter what the law's beliefs leave unexplained: surprise (3,) rad/s2, known faults taken off."""
+    for b in range(2):
+        block = statistical.block[b]
+        for i in range(block.n):
+            axis = block.axis[i]
+            block.scratch[i] = surprise[axis] - statistical.air.acceleration[axis]
+        whitening.whiten(block, block.rest, block.scratch, dt, block.scratch)
+
+
+@kernel
+def unknown_acceleration(statistical, out):
+    """Fill out (3,) rad/s2 with what goes on beyond the law's beliefs: the drift that explains the rates
+    best, and the gust the vanes see."""
+    for b in range(2):
+        block = statistical.block[b]
+        for i in range(block.n):
+            axis = block.axis[i]
+            out[axis] = block.rest[2 + i] + statistical.air.acceleration[axis]
+
+
+@kernel
+def score(statistical, t):
+    """Find the largest share of the alarm level that any hypothesis reaches, and its axis; at t s."""
+    statistical.score = 0.0
+    for b in range(2):
+        block = statistical.block[b]
+        for h in range(block.n_hypotheses):
+            hypothesis = block.hypothesis[h]
+            share = hypothesis.score / statistical.alarm_level
+            if hypothesis.alarms and share > statistical.score:
+                statistical.score, statistical.axis = share, hypothesis.axis
+    if statistical.score > 1.0 and statistical.detected_at_s < 0.0:
+        statistical.detected_at_s = t
+
+
+@kernel
+def best_alternative(statistical, surface):
+    """The greatest log likelihood ratio that any hypothesis but the loss of a surface has at least."""
+    best = 0.0
+    for b in range(2):
+        block = statistical.block[b]
+        for h in range(block.n_hypotheses):
+            hypothesis = block.hypothesis[h]
+            if not (hypothesis.kind == LOSS and hypothesis.surface == surface):
+                best = max(best, hypothesis.at_least)
+    return best
+
+
+@kernel
+def excludes(statistical, surface):
+    """Whether something else explains the flight better than a loss of this surface, by the naming level."""
+    for b in range(2):
+        block = statistical.block[b]
+        for h in range(block.n_hypotheses):
+            hypothesis = block.hypothesis[h]
+            if hypothesis.kind == LOSS and hypothesis.surface == surface:
+                better = best_alternative(statistical, surface) - hypothesis.at_most
+                return better > statistical.naming_level
+    return False
+
+
+@kernel
+def loss_of(statistical, surface):
+    """Estimated theta of a loss of effectiveness of a surface, in [-1, 0], and one over its variance."""
+    for b in range(2):
+        block = statistical.block[b]
+        for h in range(block.n_hypotheses):
+            hypothesis = block.hypothesis[h]
+            if hypothesis.kind == LOSS and hypothesis.surface == surface:
+                return hypothesis.theta, hypothesis.certainty
+    return 0.0, 0.0
+
+
+@kernel
+def unanticipated_pitch(design, y):
+    """Pitch acceleration, rad/s2, of a moment coefficient of one on alpha^3 [Zhang2005]; y (5,)."""
+    return design.Qm * y[QDYN] * design.S * design.c * y[ALPHA] ** 3
+
+
+@kernel
+def prepare(statistical, fdi, design, x, y, u):
+    """Make ready for the frame to come: noise as it is now, and what the coefficients multiply.
+
+    x (3,) rad/s, y (5,) as measured, u (4,) rad the surfaces in effect.
+    """
+    if statistical.air.moving:
+        air.effect(statistical.air, design, x, y, u)
+    drifts(statistical, fdi, design, x, y)
+    if statistical.tolerated:
+        coefficients(statistical, design, x, y, u)
+
+
+@kernel
+def drifts(statistical, fdi, design, x, y):
+    """Fill each block's drift and jitter: uncertainty that is merely bounded, and the air not seen."""
+    bounded = statistical.bounded
+    bounded[:] = 0.0
+    uncertainty_bound(x, design, fdi.inertia, fdi.constant, fdi.earth_rate, bounded)
+    for b in range(2):
+        block = statistical.block[b]
+        for i in range(block.n):
+            axis = block.axis[i]
+            for j in range(block.n):
+                block.drift[i, j] = 0.0
+                if statistical.air.moving:
+                    block.drift[i, j] = air.unseen_drift(statistical.air, y[2], axis, block.axis[j])
+            size = bounded[axis] + statistical.deflection[axis]
+            block.drift[i, i] += statistical.rapidity * size * size
+            block.jitter[i] = statistical.jitter[axis]
+
+
+@kernel
+def coefficients(statistical, design, x, y, u):
+    """Fill each block's regressors (n, 2) rad/s2: what each moment coefficient is multiplied by."""
+    regressors(design, x, y, u, statistical.terms)
+    lateral, longitudinal = y[QDYN] * design.S * design.b, y[QDYN] * design.S * design.c
+    pitch, rolling = statistical.block[PITCH], statistical.block[LATERAL]
+    for j in range(_TERMS):
+        pitch.regressor[j, 0] = design.Qm * longitudinal * statistical.terms[1, j]
+        Cl, Cn = lateral * statistical.terms[0, j], lateral * statistical.terms[2, j]
+        rolling.regressor[j, 0], rolling.regressor[j, 1] = design.Pl * Cl, design.Rl * Cl
+        rolling.regressor[_TERMS + j, 0] = design.Pn * Cn
+        rolling.regressor[_TERMS + j, 1] = design.Rn * Cn

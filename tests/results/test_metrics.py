@@ -23,6 +23,7 @@ def test_published_case_has_every_key_of_the_contract_in_order():
     assert document["fault"] == {"actuator": "elevator", "type": "loss_of_effectiveness", "at_s": 12.0}
     assert document["detection"] == {
         "detected": True, "time_s": 12.07, "delay_s": 0.07, "axis": "q", "guaranteed_delay_s": 0.31,
+        "statistical": None,
     }  # fmt: skip
     assert document["isolation"] == {
         "isolated": True, "fault": "elevator", "type": "loss_of_effectiveness",
@@ -49,6 +50,7 @@ def test_flight_without_fault_and_alarm():
     assert document["fault"] is None
     assert document["detection"] == {
         "detected": False, "time_s": None, "delay_s": None, "axis": None, "guaranteed_delay_s": None,
+        "statistical": None,
     }  # fmt: skip
     assert document["isolation"]["isolated"] is False
     assert document["isolation"]["correct"] is None

@@ -88,9 +88,9 @@ def _detection(flight: "Flight", fault: Document | None) -> Document:
         "time_s": _number(flight.detection_time_s),
         "delay_s": _delay(flight.detection_time_s, fault),
         "axis": flight.detection_axis,
+        "guaranteed_delay_s": _number(flight.guaranteed_delay_s),
         "statistical": flight.statistical
         and {key: _number(value) for key, value in flight.statistical.items()},
-        "guaranteed_delay_s": _number(flight.guaranteed_delay_s),
     }
 
 

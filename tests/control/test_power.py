@@ -295,6 +295,13 @@ def test_an_ambiguous_verdict_is_no_obstacle():
     assert 20.0 < flight.engine_power[0] < 30.0
 
 
+@pytest.mark.parametrize("V", SPEEDS)
+def test_two_jams_named_one_after_the_other_are_acted_upon_at_once(V):
+    fdi = {"fault_class": "all", "pairs": True}
+    flight, _ = lost(V, 1.0, law="fault-tolerant", flap_at_s=20.0, fdi=fdi)
+    assert 21.0 <= flight.engine_power[0] < 21.2
+
+
 def test_the_design_model_knows_what_the_engine_does():
     """Without uncertainty the design model makes of every frame what the truth does, power moving or not."""
     _, log = lost(45.0, uncertainty={})

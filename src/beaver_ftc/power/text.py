@@ -101,8 +101,8 @@ def _legend(document: Document) -> list[str]:
         "healthy flight (95 % limits);",
         f"before faults: the same on other flights. By chance alone {chance:.1f} % are detected within "
         f"{WITHIN_S[-1]:g} s.",
-        f"{TOLD}: a test that knows surface, magnitude and instant, made once in that time at the same rate, "
-        "in Gaussian noise as declared.",
+        f"{TOLD}: a test of the rates alone that knows surface, magnitude and instant, made once in that "
+        "time at the same rate.",
     ]
 
 

@@ -3,7 +3,7 @@
 import io
 from typing import TYPE_CHECKING, Any
 
-from beaver_ftc.power.document import SIGNIFICANT
+from beaver_ftc.power.document import JUDGED_S, SIGNIFICANT
 from beaver_ftc.power.grid import WITHIN_S
 
 if TYPE_CHECKING:
@@ -108,20 +108,34 @@ def _legend(document: Document) -> list[str]:
 
 def comparison(document: Document) -> list[str]:
     """Where ours finds more or fewer faults than another scheme, and is unlikely to by chance."""
+    duels = document["comparison"]
     lines = [
-        f"{duel['ours']} is {duel['verdict']} than {duel['against']}: {duel['surface']}, "
-        f"{title_of(duel['sensors'], duel['turbulence'])}: more found within {duel['within_s']:g} s in "
-        f"{duel['seeds_ours']} seeds, fewer in {duel['seeds_theirs']} (p = {duel['p']:.2g})"
-        for duel in document["comparison"]
-        if duel["verdict"] != "even"
+        f"{ours} is {verdict} than {against}: {'; '.join(_places(duels, ours, against, verdict))}"
+        for ours in dict.fromkeys(duel["ours"] for duel in duels)
+        for verdict in ("worse", "better")
+        for against in dict.fromkeys(duel["against"] for duel in duels)
+        if _places(duels, ours, against, verdict)
     ]
-    worse = sum(duel["verdict"] == "worse" for duel in document["comparison"])
-    better = sum(duel["verdict"] == "better" for duel in document["comparison"])
-    total = (
-        f"{len(document['comparison'])} comparisons: better in {better}, worse in {worse}, no difference at "
+    return [*lines, *_counts(duels)]
+
+
+def _places(duels: list[Document], ours: str, against: str, verdict: str) -> list[str]:
+    """`surface, surface in condition` for each condition in which that is so."""
+    found: dict[str, list[str]] = {}
+    for duel in duels:
+        if (duel["ours"], duel["against"], duel["verdict"]) == (ours, against, verdict):
+            found.setdefault(title_of(duel["sensors"], duel["turbulence"]), []).append(duel["surface"])
+    return [f"{', '.join(surfaces)} with {condition}" for condition, surfaces in found.items()]
+
+
+def _counts(duels: list[Document]) -> list[str]:
+    return [
+        f"{ours}, faults found within {JUDGED_S:g} s, {len(verdicts)} comparisons: better in "
+        f"{verdicts.count('better')}, worse in {verdicts.count('worse')}, no difference at "
         f"p < {SIGNIFICANT:g} in the rest"
-    )
-    return [*sorted(lines, key=lambda line: " worse " not in line), total]
+        for ours in dict.fromkeys(duel["ours"] for duel in duels)
+        for verdicts in [[duel["verdict"] for duel in duels if duel["ours"] == ours]]
+    ]
 
 
 def _failures(document: Document) -> list[str]:

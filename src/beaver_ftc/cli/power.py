@@ -1,6 +1,7 @@
 """`beaver-ftc power`: how likely a fault is found, by every scheme at the same false-alarm rate."""
 
 import os
+from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
@@ -24,6 +25,12 @@ def command(
     schemes: Annotated[
         str | None, typer.Option(help="Comma-separated schemes beside ours; all registered ones if left out.")
     ] = None,
+    rates_alone: Annotated[
+        bool,
+        typer.Option(
+            "--rates-alone", help="Do not show plug-ins the air as our detector sees it by the vanes."
+        ),
+    ] = False,
     workers: Annotated[
         int | None, typer.Option(min=1, max=1024, help="Processes; default: one a core.")
     ] = None,
@@ -44,7 +51,8 @@ def command(
     names = None if schemes is None else [name.strip() for name in schemes.split(",") if name.strip()]
     chosen = contenders(names)
     with progress_bar(f"power, {grid.value} grid") as progress:
-        document = run_power(out, GRIDS[grid], chosen, workers or os.cpu_count() or 1, progress)
+        survey = replace(GRIDS[grid], vanes=not rates_alone)
+        document = run_power(out, survey, chosen, workers or os.cpu_count() or 1, progress)
     folder = str(out / NAME)
     if format is Format.json:
         emit_json(document | {"folder": folder})

@@ -8,7 +8,7 @@ the fault, and each value after it that was larger than all before.
 from bisect import bisect_right
 from collections.abc import Sequence
 from copy import deepcopy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf, isfinite, isnan
 from time import process_time
 
@@ -16,6 +16,7 @@ import numpy as np
 
 from beaver_ftc.design.context import Context
 from beaver_ftc.diagnosis.base import Detector, Measured, Verdict
+from beaver_ftc.diagnosis.noise_model import UNSEEN
 from beaver_ftc.loop import Loop
 from beaver_ftc.plugins import DETECTORS, plugin_class
 from beaver_ftc.scenario.schema import Scenario
@@ -69,12 +70,18 @@ class Trace:
 
 @dataclass
 class Recording:
-    """A flight under the nominal law as a detector sees it, with the built-in statistic beside it."""
+    """A flight under the nominal law as a detector sees it, with the built-in statistic beside it.
+
+    With `fdi.statistical`: air (frames, 3) rad/s2, what the vanes' view of the air explains of each elapsed
+    frame, and air_noise (3,) rad/s2, the standard deviation of its noise.
+    """
 
     context: Context
     seen: list[tuple[Measured, np.ndarray]]
     built_in: np.ndarray
     fault_at_s: float
+    air: np.ndarray | None = None
+    air_noise: np.ndarray | None = None
 
 
 class _Watch:
@@ -82,9 +89,12 @@ class _Watch:
 
     def __init__(self, loop: Loop) -> None:
         assert loop.plugged is not None
-        self._frame, self.values = loop.plugged, list[float]()
+        self._frame, self.values, self.air = loop.plugged, list[float](), list[np.ndarray]()
+        self._statistical = loop.frames["fdi"]["statistical"]
+        self._statistical["enabled"] = loop.scenario.fdi.statistical is not None
 
     def __call__(self, frames: np.ndarray, references: np.ndarray, log: np.ndarray) -> int:
+        self.air.append(self._statistical["air"]["acceleration"][0].copy())
         status = self._frame(frames, references, log)
         self.values.append(built_in_statistic(frames))
         return status
@@ -100,7 +110,33 @@ def record(scenario: Scenario) -> Recording:
     for _ in loop.chunks():
         pass
     fault_at_s = min((fault.at_s for fault in scenario.faults), default=inf)
-    return Recording(recorder.context, recorder.seen, np.array(watch.values), fault_at_s)
+    recording = Recording(recorder.context, recorder.seen, np.array(watch.values), fault_at_s)
+    if scenario.fdi.statistical is not None:
+        recording.air = np.array(watch.air)
+        recording.air_noise = np.sqrt(loop.frames["fdi"]["statistical"]["jitter"][0])
+    return recording
+
+
+def aware_of_the_air(recording: Recording) -> Recording:
+    """The flight as shown to a detector that uses the vanes' view of the air as the built-in one does.
+
+    What is seen of the air is part of `acceleration`, what is not is what is declared of it.
+    """
+    assert recording.air is not None
+    assert recording.air_noise is not None
+    seen = [
+        (measured._replace(acceleration=measured.acceleration + air), command)
+        for (measured, command), air in zip(recording.seen, recording.air, strict=True)
+    ]
+    declared = recording.context.declared
+    told = replace(
+        declared,
+        gust_rad_s=declared.gust_rad_s * np.sqrt(UNSEEN),
+        model_rad_s2=np.hypot(declared.model_rad_s2, recording.air_noise)
+        if declared.air
+        else declared.model_rad_s2,
+    )
+    return replace(recording, context=replace(recording.context, declared=told), seen=seen)
 
 
 def replay(recording: Recording, scheme: str, options: dict[str, float] | None = None) -> Trace:

@@ -21,7 +21,11 @@ class Contender(NamedTuple):
         return is_compiled(DETECTORS, self.scheme)
 
 
-BUILT_IN: dict[str, dict[str, Any]] = {ESTIMATORS: {}}
+STATISTICAL = "statistical"
+BUILT_IN: dict[str, dict[str, Any]] = {
+    ESTIMATORS: {},
+    STATISTICAL: {"statistical": {}, "authority": "statistical"},
+}
 
 
 def contenders(names: list[str] | None = None) -> list[Contender]:

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from beaver_ftc.compare.replay import Recording, Trace, record, replay_together, trace
+from beaver_ftc.compare.replay import Recording, Trace, aware_of_the_air, record, replay_together, trace
 from beaver_ftc.errors import BeaverFtcError
 from beaver_ftc.power.contenders import Contender
 from beaver_ftc.power.grid import WATCHED_S, WITHIN_S, Bout, Grid, loss, scenario_of, strikes_at_s
@@ -29,22 +29,23 @@ def fly_faulted(bout: Bout, grid: Grid, schemes: Sequence[Contender]) -> Watched
     """Every fault of the grid in this bout."""
     at_s = strikes_at_s(bout)
     flights = [scenario_of(bout, at_s + WATCHED_S, [loss(*fault, at_s)]) for fault in grid.faults]
-    return _watch(Watched(bout, grid.faults), flights, schemes)
+    return _watch(Watched(bout, grid.faults), flights, schemes, grid.vanes)
 
 
 def fly_healthy(bout: Bout, grid: Grid, schemes: Sequence[Contender]) -> Watched:
     """The one flight of a bout without a fault."""
-    return _watch(Watched(bout), [scenario_of(bout, grid.healthy_flight_s)], schemes)
+    return _watch(Watched(bout), [scenario_of(bout, grid.healthy_flight_s)], schemes, grid.vanes)
 
 
-def _watch(watched: Watched, flights: Sequence[Scenario], schemes: Sequence[Contender]) -> Watched:
+def _watch(
+    watched: Watched, flights: Sequence[Scenario], schemes: Sequence[Contender], vanes: bool
+) -> Watched:
     seen: list[Recording] = []
     for contender in schemes:
         try:
-            if contender.built_in or not seen:
+            if contender.built_in:
                 recordings = [record(with_fdi(flight, contender)) for flight in flights]
-            if not seen:
-                seen, watched.deflections = recordings, _deflections(recordings, watched.faults)
+                seen = _as_shown(recordings, vanes)
             watched.traces[contender.name] = (
                 [trace(recording, recording.built_in) for recording in recordings]
                 if contender.built_in
@@ -54,7 +55,16 @@ def _watch(watched: Watched, flights: Sequence[Scenario], schemes: Sequence[Cont
             watched.failures.append(f"{contender.name}: {error}")
         except Exception as error:  # a plug-in may raise anything: not the end of the comparison
             watched.failures.append(f"{contender.name}: {type(error).__name__}: {error}")
+    watched.deflections = _deflections(seen, watched.faults)
     return watched
+
+
+def _as_shown(recordings: Sequence[Recording], vanes: bool) -> list[Recording]:
+    """What plug-ins are shown of the flights."""
+    return [
+        aware_of_the_air(recording) if vanes and recording.air is not None else recording
+        for recording in recordings
+    ]
 
 
 def _deflections(recordings: Sequence[Recording], faults: Sequence[tuple[str, float]]) -> list[list[float]]:

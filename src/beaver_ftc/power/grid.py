@@ -42,6 +42,7 @@ class Grid:
     healthy_h: float
     healthy_flight_s: float
     per_h: float
+    vanes: bool = True  # whether plug-ins are shown the air as our statistical detector sees it
 
     @property
     def faults(self) -> tuple[tuple[str, float], ...]:
@@ -75,7 +76,7 @@ GRIDS = {
         surfaces=_SURFACES,
         magnitudes=(0.4, 1.0),
         excitations_deg_s=(3.0, 6.0),
-        bouts=6,
+        bouts=5,
         healthy_h=0.06,
         healthy_flight_s=18.0,
         per_h=20.0,

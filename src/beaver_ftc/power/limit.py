@@ -1,15 +1,14 @@
-"""What the rates alone can show: the test that is told the fault and the instant it strikes.
+"""What can be seen at all: the test that is told the fault and the instant it strikes.
 
-With all that is declared taken as Gaussian and the air seen by no instrument, a Kalman filter makes of the
-measurements independent innovations of covariance S. A fault phi, rad/s2, adds to them a known signature s,
-and the likelihood ratio of "this fault, since then" against "none" has the deflection
+With all that is declared taken as Gaussian, a Kalman filter makes of the measurements, as they are shown to
+plug-ins, independent innovations of covariance S. A fault phi, rad/s2, adds to them a known signature s, and
+the likelihood ratio of "this fault, since then" against "none" has the deflection
 
     d^2 = sum s' S^-1 s,        s = H delta,  delta[k+1] = F (1 - K H) delta[k] + dt phi[k]
 
 so that at a false-alarm probability of alpha it finds the fault with probability Phi(d - Phi^-1(1 - alpha))
-[Kay1998, sec. 4.4], and nothing finds it more often from the rates alone; a scheme that learns of the air
-from the vanes may. Made once every T seconds, at r false alarms per hour:
-alpha = r T / 3600.
+[Kay1998, sec. 4.4], and nothing finds it more often from these measurements. Made once every T seconds, at r
+false alarms per hour, alpha = r T / 3600.
 
 The unexplained acceleration of the published bound is a sinusoid of unknown frequency; here it is a
 first-order process of the same power and UNEXPLAINED_S of memory.

@@ -101,9 +101,15 @@ def _legend(document: Document) -> list[str]:
         "healthy flight (95 % limits);",
         f"before faults: the same on other flights. By chance alone {chance:.1f} % are detected within "
         f"{WITHIN_S[-1]:g} s.",
-        f"{TOLD}: a test of the rates alone that knows surface, magnitude and instant, made once in that "
-        "time at the same rate.",
+        f"{TOLD}: a test that knows surface, magnitude and instant, made once in that time at the same rate.",
+        _shown(grid["vanes"]),
     ]
+
+
+def _shown(vanes: bool) -> str:
+    if vanes:
+        return "plug-ins and that test are shown the air as the statistical scheme sees it by the vanes."
+    return "plug-ins and that test have the rates alone; the statistical scheme sees the air by its vanes."
 
 
 def comparison(document: Document) -> list[str]:

@@ -85,12 +85,24 @@ def note(frame, verdict):
 
 @kernel
 def built_in_statistic(frames):
-    """The largest share of its threshold that a residual of the built-in detection reaches at this frame."""
-    fdi, largest = frames[0].fdi, 0.0
-    if fdi.authority != WORST_CASE:
-        largest = fdi.statistical.score
+    """The largest share of its threshold that the built-in detection reaches at this frame.
+
+    Of two detectors, the worst-case one counts beyond its bound only: it has no rate of false alarms that a
+    lower level could trade for power.
+    """
+    fdi = frames[0].fdi
+    chances = fdi.statistical.enabled and fdi.authority != WORST_CASE
+    likely = fdi.statistical.score if chances else 0.0
     if fdi.authority == STATISTICS:
-        return largest
+        return likely
+    certain = largest_share(fdi)
+    return max(likely, certain) if certain > 1.0 or not chances else likely
+
+
+@kernel
+def largest_share(fdi):
+    """The largest share of its bound that a filter of the bank reaches."""
+    largest = 0.0
     for m in range(fdi.n_poles):
         for i in range(3):
             if fdi.bank_threshold[m, i] > 0.0:

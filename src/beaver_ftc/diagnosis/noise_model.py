@@ -17,7 +17,7 @@ from beaver_ftc.scenario.sensors import Sensors
 # (kind, surface, axis, raises alarms); of the published class, and what it is held against.
 PITCH = ((LOSS, ELEVATOR, 1, 1), (STEP, -1, 1, 1), (ALPHA3, -1, 1, 0))
 LATERAL = ((LOSS, AILERON, 0, 1), (LOSS, RUDDER, 2, 1), (STEP, -1, 0, 1), (STEP, -1, 2, 1))
-BLOCKS = (((1,), PITCH), ((0, 2), LATERAL))
+BLOCKS = (((1,), PITCH), ((0, 2), LATERAL), ((0, 2), LATERAL))  # the last in moving air only
 SIDES = {LOSS: 1, STEP: 2, ALPHA3: 2}  # a loss has a sign, a step may go either way
 
 # Share of the intensity of the rolling, pitching and yawing gust that the vanes leave; measured on exact
@@ -27,19 +27,21 @@ PRIOR_DRIFT_RAD_S2 = 1.0  # what a drift may be at the start of a flight: soon f
 _RATE_TERMS = ("p", "q", "r")
 
 
-def tests_a_frame() -> int:
+def tests_a_frame(n_blocks: int) -> int:
     """How many one-sided tests the detector makes in a frame."""
-    return N_SLOTS * sum(SIDES[kind] for _, members in BLOCKS for kind, _, _, alarms in members if alarms)
+    return N_SLOTS * sum(
+        SIDES[kind] for _, members in BLOCKS[:n_blocks] for kind, _, _, alarms in members if alarms
+    )
 
 
-def alarm_level(false_alarms_per_h: float, rate_hz: float) -> float:
+def alarm_level(false_alarms_per_h: float, rate_hz: float, n_blocks: int = len(BLOCKS)) -> float:
     """Standard deviations at which all tests of an hour together give so many false alarms at most."""
-    return -NormalDist().inv_cdf(false_alarms_per_h / (3600.0 * rate_hz * tests_a_frame()))
+    return -NormalDist().inv_cdf(false_alarms_per_h / (3600.0 * rate_hz * tests_a_frame(n_blocks)))
 
 
-def naming_level(misnaming: float, rate_hz: float) -> float:
+def naming_level(misnaming: float, rate_hz: float, n_blocks: int = len(BLOCKS)) -> float:
     """Difference of log likelihoods that chance gives with this probability at most within a second."""
-    return 0.5 * NormalDist().inv_cdf(misnaming / (rate_hz * tests_a_frame())) ** 2
+    return 0.5 * NormalDist().inv_cdf(misnaming / (rate_hz * tests_a_frame(n_blocks))) ** 2
 
 
 def set_up(
@@ -56,13 +58,16 @@ def set_up(
     if given is None:
         return
     statistical["enabled"] = 1
-    statistical["alarm_level"] = alarm_level(given.false_alarms_per_h, rate_hz)
-    statistical["naming_level"] = naming_level(given.misnaming, rate_hz)
+    _set_up_air(statistical["air"], config.bounds.turbulence, mass)
+    n_blocks = len(BLOCKS) if statistical["air"]["moving"] else len(BLOCKS) - 1
+    statistical["n_blocks"] = n_blocks
+    statistical["alarm_level"] = alarm_level(given.false_alarms_per_h, rate_hz, n_blocks)
+    statistical["naming_level"] = naming_level(given.misnaming, rate_hz, n_blocks)
     statistical["keep"] = exp(-1.0 / (rate_hz * config.forgetting_time_s))
     _set_up_blocks(statistical, config.bounds.sensors)
+    statistical["block"][-1]["lag"] = statistical["air"]["rolling"]
     _set_up_noise(statistical, given, config.bounds, design, start, 1.0 / rate_hz)
     _set_up_tolerances(statistical, config.bounds, design, mass, start)
-    _set_up_air(statistical["air"], config.bounds.turbulence, mass)
     if statistical["air"]["moving"]:
         statistical["jitter"] += _gust_jitter(config.bounds.sensors, design, start[1]) ** 2
 
@@ -76,7 +81,7 @@ def _random_error(sensors: Sensors, name: str) -> float:
 def _set_up_blocks(statistical: np.void, sensors: Sensors) -> None:
     for block, (axes, members) in zip(statistical["block"], BLOCKS, strict=True):
         block["n"], block["n_hypotheses"] = len(axes), len(members)
-        block["n_regressors"] = 9 * len(axes)
+        block["n_regressors"], block["keep"] = 9 * len(axes), 1.0
         for i, axis in enumerate(axes):
             block["axis"][i] = axis
             variance = _random_error(sensors, AXES[axis]) ** 2
@@ -134,7 +139,7 @@ def _set_up_tolerances(
     """What is constant but unknown, as tolerances of coefficients: theirs, inertia, steady sensor errors."""
     tolerance = steady_tolerance(bounds, np.asarray(design["coefficient"]), mass, start[1], start[2])
     statistical["block"][0]["tolerance"][:9] = tolerance[1]
-    statistical["block"][1]["tolerance"][:] = np.concatenate([tolerance[0], tolerance[2]])
+    statistical["block"]["tolerance"][1:] = np.concatenate([tolerance[0], tolerance[2]])
     statistical["tolerated"] = bool(np.any(tolerance))
 
 
@@ -192,6 +197,7 @@ def _set_up_air(air: np.void, turbulence: str, mass: MassProperties) -> None:
     air["gravity"] = 9.80665  # m/s2, standard; what is constant has no part in a change of the gust
     air["span"], air["chord"] = GEOMETRY.span_m, GEOMETRY.chord_m
     air["per_metre"], air["unseen"] = gust_drift(turbulence), UNSEEN
+    air["rolling"] = sqrt(0.3048 * SCALE_FT * GEOMETRY.span_m) / 2.6  # [Yeager1998, eq. 10]
 
 
 def gust_drift(turbulence: str) -> np.ndarray:

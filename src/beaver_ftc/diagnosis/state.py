@@ -86,7 +86,8 @@ ADMITTED = np.dtype(
 )  # fmt: skip
 
 # What the statistical detector keeps: air.py, whitening.py, likelihood.py. A block is the axes whose noise
-# goes together: pitch, and roll with yaw. States of a filter: what is left of the rate, then the drift.
+# goes together: pitch, and roll with yaw, the latter twice. States of a filter: what is left of the rate,
+# then the drift.
 N_SLOTS = 10
 MAX_HYPOTHESES, MAX_REGRESSORS = 4, 18
 EITHER, WORST_CASE, STATISTICS = 0, 1, 2  # whose alarms count
@@ -102,6 +103,7 @@ AIR = np.dtype(
         ("acceleration", "f8", (3,)),
         ("per_metre", "f8", (3,)),  # intensity of the rotation's drift over airspeed, rad2/s3 per m/s
         ("unseen", "f8", (3,)),  # share of it that the vanes do not show
+        ("rolling", "f8"),  # lag of the rolling gust times airspeed, m
         ("jitter", "f8"),  # standard deviation of the pitching and yawing gust as seen, rad m/s
     ],
     align=True,
@@ -120,7 +122,7 @@ HYPOTHESIS = np.dtype(
 
 BLOCK = np.dtype(
     [
-        ("n", "i8"), ("axis", "i8", (2,)),
+        ("n", "i8"), ("axis", "i8", (2,)), ("lag", "f8"), ("keep", "f8"),
         ("state", "f8", (4,)), ("rest", "f8", (4,)), ("innovation", "f8", (2,)), ("scratch", "f8", (2,)),
         ("P_xx", "f8", (2, 2)), ("P_xd", "f8", (2, 2)), ("P_dd", "f8", (2, 2)),
         ("drift", "f8", (2, 2)), ("jitter", "f8", (2,)), ("noise", "f8", (2,)),
@@ -138,7 +140,7 @@ STATISTICAL = np.dtype(
         ("enabled", "i8"), ("alarm_level", "f8"), ("naming_level", "f8"), ("keep", "f8"),
         ("rapidity", "f8"),  # 1/s: intensity of the drift of an uncertainty over its bound squared
         ("bounded", "f8", (3,)), ("deflection", "f8", (3,)), ("jitter", "f8", (3,)), ("tolerated", "i8"),
-        ("block", BLOCK, (2,)), ("air", AIR), ("terms", "f8", (3, 9)),
+        ("n_blocks", "i8"), ("block", BLOCK, (3,)), ("air", AIR), ("terms", "f8", (3, 9)),
         ("score", "f8"), ("axis", "i8"), ("closest", "f8"), ("detected_at_s", "f8"),
     ],
     align=True,

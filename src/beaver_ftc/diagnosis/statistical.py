@@ -1,17 +1,21 @@
 """The statistical detector: likelihood ratios on the whitened innovation, beside the worst-case thresholds.
 
-Pitch is one block, roll and yaw another, whose noise goes together. Its declared rate of false alarms holds
+Pitch is one block, roll and yaw another, whose noise goes together. In moving air roll and yaw are looked at
+twice: by a drift that may go anywhere, which is quick and knows nothing of constants, and by one that returns
+as fast as the rolling gust does, which gathers evidence for longer. Its declared rate of false alarms holds
 for the declared noise; the worst-case scheme beside it needs no probability at all. `fdi.authority` says
 whose alarms and exclusions count.
 """
 
+import numpy as np
+
 from beaver_ftc.compiled import kernel
-from beaver_ftc.design.model import ALPHA, QDYN, regressors
+from beaver_ftc.design.model import AIRSPEED, ALPHA, QDYN, regressors
 from beaver_ftc.diagnosis import air, likelihood, whitening
 from beaver_ftc.diagnosis.state import LOSS, STEP
 from beaver_ftc.diagnosis.thresholds import uncertainty_bound
 
-PITCH, LATERAL = 0, 1
+PITCH, LATERAL, RETURNING = 0, 1, 2
 _TERMS = 9  # of a moment coefficient
 
 
@@ -19,7 +23,7 @@ _TERMS = 9  # of a moment coefficient
 def signatures(statistical, Gu, cubic):
     """What each fault would have done in the elapsed frame, times theta. Gu (3, 4) rad/s2: what each surface
     gave, mean over it; cubic rad/s2: a pitching moment on alpha^3."""
-    for b in range(2):
+    for b in range(statistical.n_blocks):
         block = statistical.block[b]
         for h in range(block.n_hypotheses):
             hypothesis = block.hypothesis[h]
@@ -37,7 +41,7 @@ def observe(statistical, innovation, dt, frame, latched):
     """Take in one frame: innovation (3,) rad/s2, frame number, whether the alarm is out."""
     keep = statistical.keep if latched else 1.0
     slot = likelihood.slot_to_start(frame)
-    for b in range(2):
+    for b in range(statistical.n_blocks):
         block = statistical.block[b]
         if not latched:
             likelihood.start(block, slot)
@@ -81,7 +85,7 @@ def unknown_acceleration(statistical, out):
 def score(statistical, t):
     """Find the largest share of the alarm level that any hypothesis reaches, and its axis; at t s."""
     statistical.score = 0.0
-    for b in range(2):
+    for b in range(statistical.n_blocks):
         block = statistical.block[b]
         for h in range(block.n_hypotheses):
             hypothesis = block.hypothesis[h]
@@ -93,41 +97,53 @@ def score(statistical, t):
 
 
 @kernel
-def best_alternative(statistical, surface):
+def best_alternative(block, surface):
     """The greatest log likelihood ratio that any hypothesis but the loss of a surface has at least."""
     best = 0.0
-    for b in range(2):
-        block = statistical.block[b]
-        for h in range(block.n_hypotheses):
-            hypothesis = block.hypothesis[h]
-            if not (hypothesis.kind == LOSS and hypothesis.surface == surface):
-                best = max(best, hypothesis.at_least)
+    for h in range(block.n_hypotheses):
+        hypothesis = block.hypothesis[h]
+        if not (hypothesis.kind == LOSS and hypothesis.surface == surface):
+            best = max(best, hypothesis.at_least)
     return best
 
 
 @kernel
+def loss_at_most(block, surface):
+    """The log likelihood ratio a loss of this surface has at most; none where the block does not feel it."""
+    for h in range(block.n_hypotheses):
+        hypothesis = block.hypothesis[h]
+        if hypothesis.kind == LOSS and hypothesis.surface == surface:
+            return hypothesis.at_most
+    return 0.0
+
+
+@kernel
 def excludes(statistical, surface):
-    """Whether something else explains the flight better than a loss of this surface, by the naming level."""
-    for b in range(2):
-        block = statistical.block[b]
-        for h in range(block.n_hypotheses):
-            hypothesis = block.hypothesis[h]
-            if hypothesis.kind == LOSS and hypothesis.surface == surface:
-                better = best_alternative(statistical, surface) - hypothesis.at_most
-                return better > statistical.naming_level
+    """Whether something else explains the flight better than a loss of this surface, by the naming level.
+
+    Each view of roll and yaw is held against that of pitch: a loss explains what it does to its own axes.
+    """
+    pitch = statistical.block[PITCH]
+    for b in range(LATERAL, statistical.n_blocks):
+        lateral = statistical.block[b]
+        better = max(best_alternative(pitch, surface), best_alternative(lateral, surface))
+        worse = max(loss_at_most(pitch, surface), loss_at_most(lateral, surface))
+        if better - worse > statistical.naming_level:
+            return True
     return False
 
 
 @kernel
 def loss_of(statistical, surface):
     """Estimated theta of a loss of effectiveness of a surface, in [-1, 0], and one over its variance."""
-    for b in range(2):
+    theta, certainty = 0.0, 0.0
+    for b in range(statistical.n_blocks):
         block = statistical.block[b]
         for h in range(block.n_hypotheses):
             hypothesis = block.hypothesis[h]
-            if hypothesis.kind == LOSS and hypothesis.surface == surface:
-                return hypothesis.theta, hypothesis.certainty
-    return 0.0, 0.0
+            if hypothesis.kind == LOSS and hypothesis.surface == surface and hypothesis.certainty > certainty:
+                theta, certainty = hypothesis.theta, hypothesis.certainty
+    return theta, certainty
 
 
 @kernel
@@ -155,17 +171,18 @@ def drifts(statistical, fdi, design, x, y):
     bounded = statistical.bounded
     bounded[:] = 0.0
     uncertainty_bound(x, design, fdi.inertia, fdi.constant, fdi.earth_rate, bounded)
-    for b in range(2):
+    for b in range(statistical.n_blocks):
         block = statistical.block[b]
         for i in range(block.n):
             axis = block.axis[i]
             for j in range(block.n):
                 block.drift[i, j] = 0.0
                 if statistical.air.moving:
-                    block.drift[i, j] = air.unseen_drift(statistical.air, y[2], axis, block.axis[j])
+                    block.drift[i, j] = air.unseen_drift(statistical.air, y[AIRSPEED], axis, block.axis[j])
             size = bounded[axis] + statistical.deflection[axis]
             block.drift[i, i] += statistical.rapidity * size * size
             block.jitter[i] = statistical.jitter[axis]
+        block.keep = np.exp(-fdi.dt * y[AIRSPEED] / block.lag) if block.lag > 0.0 else 1.0
 
 
 @kernel
@@ -173,10 +190,13 @@ def coefficients(statistical, design, x, y, u):
     """Fill each block's regressors (n, 2) rad/s2: what each moment coefficient is multiplied by."""
     regressors(design, x, y, u, statistical.terms)
     lateral, longitudinal = y[QDYN] * design.S * design.b, y[QDYN] * design.S * design.c
-    pitch, rolling = statistical.block[PITCH], statistical.block[LATERAL]
+    pitch = statistical.block[PITCH]
     for j in range(_TERMS):
         pitch.regressor[j, 0] = design.Qm * longitudinal * statistical.terms[1, j]
-        Cl, Cn = lateral * statistical.terms[0, j], lateral * statistical.terms[2, j]
-        rolling.regressor[j, 0], rolling.regressor[j, 1] = design.Pl * Cl, design.Rl * Cl
-        rolling.regressor[_TERMS + j, 0] = design.Pn * Cn
-        rolling.regressor[_TERMS + j, 1] = design.Rn * Cn
+    for b in range(LATERAL, statistical.n_blocks):
+        rolling = statistical.block[b]
+        for j in range(_TERMS):
+            Cl, Cn = lateral * statistical.terms[0, j], lateral * statistical.terms[2, j]
+            rolling.regressor[j, 0], rolling.regressor[j, 1] = design.Pl * Cl, design.Rl * Cl
+            rolling.regressor[_TERMS + j, 0] = design.Pn * Cn
+            rolling.regressor[_TERMS + j, 1] = design.Rn * Cn

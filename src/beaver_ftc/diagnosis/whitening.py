@@ -1,14 +1,14 @@
 """A Kalman filter that turns innovations into white noise of known covariance.
 
-    x[k+1] = x[k] + dt (F[k] + d[k] + phi[k])      d[k+1] = d[k] + drift      measured: x + gyro noise
+    x[k+1] = x[k] + dt (F[k] + d[k] + phi[k])      d[k+1] = a d[k] + drift      measured: x + gyro noise
 
 F is the design model, d what moves slowly beside it: the air's rotation, uncertainty that is merely bounded,
-constants that nobody told. phi is a fault. The drift is a random walk, so whatever is constant has no part in
-the whitened innovation, and whatever drifts less than declared has less. The filter is linear: a fault, or
-the error of a coefficient, passes through it by itself, and that is what the innovation is compared with
-(likelihood.py).
+constants that nobody told. phi is a fault. With a = 1 the drift is a random walk: whatever is constant has no
+part in the whitened innovation, and whatever drifts less than declared has less. The filter is linear: a
+fault, or the error of a coefficient, passes through it by itself, and that is what the innovation is
+compared with (likelihood.py).
 
-    g = e + dt (nu - d)      e <- g - K_x g      d <- d + K_d g
+    g = e + dt (nu - d)      e <- g - K_x g      d <- a d + K_d g
 
 with nu the innovation of the frame as acceleration and e what is left of the rate.
 """
@@ -38,8 +38,8 @@ def spread_uncertainty(block, dt):
         P_xx[i, i] += dt * dt * block.jitter[i]
     for i in range(block.n):
         for j in range(block.n):
-            P_xd[i, j] += dt * P_dd[i, j]
-            P_dd[i, j] += dt * block.drift[i, j]
+            P_xd[i, j] = block.keep * (P_xd[i, j] + dt * P_dd[i, j])
+            P_dd[i, j] = block.keep * block.keep * P_dd[i, j] + dt * block.drift[i, j]
             S[i, j] = P_xx[i, j]
         S[i, i] += block.noise[i]
 
@@ -99,4 +99,4 @@ def whiten(block, state, acceleration, dt, out):
             kept -= block.K_x[i, j] * out[j]
             drift += block.K_d[i, j] * out[j]
         state[i] = kept
-        state[2 + i] += drift
+        state[2 + i] = block.keep * state[2 + i] + drift

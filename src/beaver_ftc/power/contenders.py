@@ -21,10 +21,11 @@ class Contender(NamedTuple):
         return is_compiled(DETECTORS, self.scheme)
 
 
-STATISTICAL = "statistical"
+STATISTICAL, BOTH = "statistical", "both"
 BUILT_IN: dict[str, dict[str, Any]] = {
     ESTIMATORS: {},
     STATISTICAL: {"statistical": {}, "authority": "statistical"},
+    BOTH: {"statistical": {}},
 }
 
 

@@ -3,6 +3,7 @@
 import io
 from typing import TYPE_CHECKING, Any
 
+from beaver_ftc.power.contenders import BUILT_IN
 from beaver_ftc.power.document import JUDGED_S, SIGNIFICANT
 from beaver_ftc.power.grid import WITHIN_S
 
@@ -11,6 +12,7 @@ if TYPE_CHECKING:
 
 Document = dict[str, Any]
 WIDTH = 140
+OWN = "  as it ships"
 TOLD = "(told the fault)"
 
 
@@ -42,6 +44,9 @@ def _table(document: Document, sensors: str, turbulence: str) -> "Table":
             cells = [_total(document, level, surface) for surface in surfaces]
             alarms = _rate(level["calibration"]), _rate(level["before_faults"])
             table.add_row(level["scheme"], *alarms, *cells)
+            if level["scheme"] in BUILT_IN:
+                own = [_total(document, level, surface, own=True) for surface in surfaces]
+                table.add_row(OWN, _rate(level["own_level"]), "", *own)
     table.add_row(TOLD, "", "", *(_limit(document, sensors, turbulence, surface) for surface in surfaces))
     return table
 
@@ -66,10 +71,10 @@ def _limit(document: Document, sensors: str, turbulence: str, surface: str) -> s
     return "-"
 
 
-def _total(document: Document, level: Document, surface: str) -> str:
+def _total(document: Document, level: Document, surface: str, own: bool = False) -> str:
     for total in document["totals"]:
         if total["surface"] == surface and _same(total, level):
-            return shares(total)
+            return shares(total["own_level"] if own else total)
     return "-"
 
 
@@ -101,6 +106,7 @@ def _legend(document: Document) -> list[str]:
         "healthy flight (95 % limits);",
         f"before faults: the same on other flights. By chance alone {chance:.1f} % are detected within "
         f"{WITHIN_S[-1]:g} s.",
+        f"{OWN.strip()}: at the level that follows from what it declares.",
         f"{TOLD}: a test that knows surface, magnitude and instant, made once in that time at the same rate.",
         _shown(grid["vanes"]),
     ]

@@ -101,7 +101,7 @@ def rules_out(fdi, fie, within):
         return True
     statistical = fdi.statistical
     asked = statistical.enabled and fdi.authority != WORST_CASE and fie.kind == LOSS
-    return asked and excludes(statistical, fie.surface)
+    return asked and excludes(statistical, fie.surface, fdi.abrupt)
 
 
 @kernel

@@ -16,6 +16,9 @@ from beaver_ftc.diagnosis.state import LOSS, STEP
 from beaver_ftc.diagnosis.thresholds import uncertainty_bound
 
 PITCH, LATERAL, RETURNING = 0, 1, 2
+# Of what the best explanation explains, the part that a constant theta leaves to a loss that grows is larger
+# for every rate of growth (docs/theory.md, section 7).
+LEAST_PART = 0.25
 _TERMS = 9  # of a moment coefficient
 
 
@@ -118,17 +121,19 @@ def loss_at_most(block, surface):
 
 
 @kernel
-def excludes(statistical, surface):
+def excludes(statistical, surface, abrupt):
     """Whether something else explains the flight better than a loss of this surface, by the naming level.
 
-    Each view of roll and yaw is held against that of pitch: a loss explains what it does to its own axes.
+    Each view of roll and yaw is held against that of pitch: a loss explains what it does to its own axes. A
+    loss whose course is not declared `abrupt` may grow, and a constant theta then explains only part of what
+    it does: it is excluded where that part is small besides.
     """
     pitch = statistical.block[PITCH]
     for b in range(LATERAL, statistical.n_blocks):
         lateral = statistical.block[b]
         better = max(best_alternative(pitch, surface), best_alternative(lateral, surface))
         worse = max(loss_at_most(pitch, surface), loss_at_most(lateral, surface))
-        if better - worse > statistical.naming_level:
+        if better - worse > statistical.naming_level and (abrupt or worse < LEAST_PART * better):
             return True
     return False
 

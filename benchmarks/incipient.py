@@ -2,10 +2,11 @@
 
     python benchmarks/incipient.py [flights]
 
-The statistical detector forgets what is constant, and its drift follows what changes slowly. Elevator losses of 40 %
-and more grow as 1 - exp(-kappa (t - T0)), once with the real errors of `robust-elevator-all` and once with those of
-`robust-elevator-sensors` in still air; each flight is flown with the worst-case detector in charge, with the
-statistical one, and with either. Prints how many are detected within a minute, and how large the loss has grown by then.
+The statistical detector forgets what is constant, and its drift follows what changes slowly. Elevator losses
+of 40 % and more grow as 1 - exp(-kappa (t - T0)), once with the real errors of `robust-elevator-all` and once
+with those of `robust-elevator-sensors` in still air; each flight is flown with the worst-case detector in
+charge, with the statistical one, and with either. Prints how many are detected within a minute, and how large
+the loss has grown by then.
 """
 
 import sys

@@ -2,9 +2,9 @@
 
     python benchmarks/robust_tracking.py [flights]
 
-Flies the first flights of each `robust-elevator-*` sweep three times, in the same air with the same noise: with
-the fault-tolerant law, the oracle and the nominal law. Prints the RMS tracking error after the fault over the
-oracle's, per axis, of all flights together and of the flights one by one, and the paths of elevator and aileron.
+Flies the first flights of each `robust-elevator-*` sweep three times, in the same air with the same noise:
+with the fault-tolerant law, the oracle and the nominal law. Prints the RMS tracking error after the fault
+over the oracle's, per axis of all flights together, in pitch flight by flight, and the elevator's path.
 """
 
 import sys

@@ -17,7 +17,7 @@ from beaver_ftc.scenario.sensors import Sensors
 # (kind, surface, axis, raises alarms); of the published class, and what it is held against.
 PITCH = ((LOSS, ELEVATOR, 1, 1), (STEP, -1, 1, 1), (ALPHA3, -1, 1, 0))
 LATERAL = ((LOSS, AILERON, 0, 1), (LOSS, RUDDER, 2, 1), (STEP, -1, 0, 1), (STEP, -1, 2, 1))
-BLOCKS = (((1,), PITCH), ((0, 2), LATERAL), ((0, 2), LATERAL))  # the last in moving air only
+BLOCKS = (((1,), PITCH), ((0, 2), LATERAL), ((0, 2), LATERAL))
 SIDES = {LOSS: 1, STEP: 2, ALPHA3: 2}  # a loss has a sign, a step may go either way
 
 # Share of the intensity of the rolling, pitching and yawing gust that the vanes leave; measured on exact
@@ -27,21 +27,19 @@ PRIOR_DRIFT_RAD_S2 = 1.0  # what a drift may be at the start of a flight: soon f
 _RATE_TERMS = ("p", "q", "r")
 
 
-def tests_a_frame(n_blocks: int) -> int:
+def tests_a_frame() -> int:
     """How many one-sided tests the detector makes in a frame."""
-    return N_SLOTS * sum(
-        SIDES[kind] for _, members in BLOCKS[:n_blocks] for kind, _, _, alarms in members if alarms
-    )
+    return N_SLOTS * sum(SIDES[kind] for _, members in BLOCKS for kind, _, _, alarms in members if alarms)
 
 
-def alarm_level(false_alarms_per_h: float, rate_hz: float, n_blocks: int = len(BLOCKS)) -> float:
+def alarm_level(false_alarms_per_h: float, rate_hz: float) -> float:
     """Standard deviations at which all tests of an hour together give so many false alarms at most."""
-    return -NormalDist().inv_cdf(false_alarms_per_h / (3600.0 * rate_hz * tests_a_frame(n_blocks)))
+    return -NormalDist().inv_cdf(false_alarms_per_h / (3600.0 * rate_hz * tests_a_frame()))
 
 
-def naming_level(misnaming: float, rate_hz: float, n_blocks: int = len(BLOCKS)) -> float:
+def naming_level(misnaming: float, rate_hz: float) -> float:
     """Difference of log likelihoods that chance gives with this probability at most within a second."""
-    return 0.5 * NormalDist().inv_cdf(misnaming / (rate_hz * tests_a_frame(n_blocks))) ** 2
+    return 0.5 * NormalDist().inv_cdf(misnaming / (rate_hz * tests_a_frame())) ** 2
 
 
 def set_up(
@@ -59,15 +57,14 @@ def set_up(
         return
     statistical["enabled"] = 1
     _set_up_air(statistical["air"], config.bounds.turbulence, mass)
-    n_blocks = len(BLOCKS) if statistical["air"]["moving"] else len(BLOCKS) - 1
-    statistical["n_blocks"] = n_blocks
-    statistical["alarm_level"] = alarm_level(given.false_alarms_per_h, rate_hz, n_blocks)
-    statistical["naming_level"] = naming_level(given.misnaming, rate_hz, n_blocks)
+    statistical["n_blocks"] = len(BLOCKS)
+    statistical["alarm_level"] = alarm_level(given.false_alarms_per_h, rate_hz)
+    statistical["naming_level"] = naming_level(given.misnaming, rate_hz)
     statistical["keep"] = exp(-1.0 / (rate_hz * config.forgetting_time_s))
     _set_up_blocks(statistical, config.bounds.sensors)
-    statistical["block"][-1]["lag"] = statistical["air"]["rolling"]
     _set_up_noise(statistical, given, config.bounds, design, start, 1.0 / rate_hz)
     _set_up_tolerances(statistical, config.bounds, design, mass, start)
+    statistical["block"][-1]["lag"] = returning_length(statistical, float(start[1][AIRSPEED]), rate_hz)
     if statistical["air"]["moving"]:
         statistical["jitter"] += _gust_jitter(config.bounds.sensors, design, start[1]) ** 2
 
@@ -127,6 +124,21 @@ def rapidity(eta_bar: float, omega: float, noise: float, level: float, dt_s: flo
     density = noise**2 * dt_s
     walk = (swing * density**0.25) ** 0.8
     return max(walk, swing * dt_s) / eta_bar**2
+
+
+def returning_length(statistical: np.void, airspeed_mps: float, rate_hz: float) -> float:
+    """Within which distance flown, m, the drift of the second view of roll and yaw returns.
+
+    In moving air that of the rolling gust. In still air what a bounded uncertainty allows: over the longest
+    window, T, one that swings along with the fault moves a test for a drift of intensity i and lag tau by
+    eta_bar sqrt(T / 2 i) / tau, and half the alarm level is left for it.
+    """
+    if statistical["air"]["moving"]:
+        return float(statistical["air"]["rolling"])
+    if statistical["rapidity"] == 0.0:
+        return 0.0  # nothing is declared that drifts: the two views are one
+    longest_s = 2 ** (N_SLOTS - 1) / rate_hz
+    return airspeed_mps * sqrt(2.0 * longest_s / statistical["rapidity"]) / float(statistical["alarm_level"])
 
 
 def _set_up_tolerances(

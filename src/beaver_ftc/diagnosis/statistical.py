@@ -1,8 +1,8 @@
 """The statistical detector: likelihood ratios on the whitened innovation, beside the worst-case thresholds.
 
-Pitch is one block, roll and yaw another, whose noise goes together. In moving air roll and yaw are looked at
+Pitch is one block, roll and yaw another, whose noise goes together. Roll and yaw are looked at
 twice: by a drift that may go anywhere, which is quick and knows nothing of constants, and by one that returns
-as fast as the rolling gust does, which gathers evidence for longer. Its declared rate of false alarms holds
+as the rolling gust does, which gathers evidence for longer. Its declared rate of false alarms holds
 for the declared noise; the worst-case scheme beside it needs no probability at all. `fdi.authority` says
 whose alarms and exclusions count.
 """

@@ -45,6 +45,15 @@ def survey(tmp_path_factory):
 
 
 class TestFlights:
+    def test_part_of_a_grid_flies_the_same_flights(self):
+        full = GRIDS["full"]
+        part = full.only("tactical-grade", "light")
+        assert part.faulted() == [bout for bout in full.faulted() if bout.condition == LIGHT]
+        assert part.healthy() == [bout for bout in full.healthy() if bout.condition == LIGHT]
+        assert full.only(None, None) == full
+        with pytest.raises(BadInput, match="allowed: tactical-grade, none; tactical-grade, light"):
+            GRIDS["quick"].only("ideal", None)
+
     def test_everything_but_the_fault_follows_from_the_bout(self):
         bout = Bout(LIGHT, 3.0, 7)
         healthy, faulty = scenario_of(bout, 12.0), scenario_of(bout, 12.0, [loss("rudder", 0.4, 9.0)])

@@ -18,12 +18,33 @@ class GridName(StrEnum):
     full = "full"
 
 
+class SensorsName(StrEnum):
+    """The sensors there are in a grid."""
+
+    ideal = "ideal"
+    tactical_grade = "tactical-grade"
+
+
+class TurbulenceName(StrEnum):
+    """The air there is in a grid."""
+
+    none = "none"
+    light = "light"
+    moderate = "moderate"
+
+
 def command(
     grid: Annotated[
         GridName, typer.Option(help="quick: under a minute of CPU; full: under ten.")
     ] = GridName.quick,
     schemes: Annotated[
         str | None, typer.Option(help="Comma-separated schemes beside ours; all registered ones if left out.")
+    ] = None,
+    sensors: Annotated[
+        SensorsName | None, typer.Option(help="Only with these sensors; left out: all of the grid.")
+    ] = None,
+    turbulence: Annotated[
+        TurbulenceName | None, typer.Option(help="Only in this air; left out: all of the grid.")
     ] = None,
     rates_alone: Annotated[
         bool,
@@ -51,7 +72,7 @@ def command(
     names = None if schemes is None else [name.strip() for name in schemes.split(",") if name.strip()]
     chosen = contenders(names)
     with progress_bar(f"power, {grid.value} grid") as progress:
-        survey = replace(GRIDS[grid], vanes=not rates_alone)
+        survey = replace(GRIDS[grid].only(sensors, turbulence), vanes=not rates_alone)
         document = run_power(out, survey, chosen, workers or os.cpu_count() or 1, progress)
     folder = str(out / NAME)
     if format is Format.json:

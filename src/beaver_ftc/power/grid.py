@@ -1,10 +1,11 @@
 """Which flights are flown: surfaces, magnitudes, excitations, instruments and air, and how many of each."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from beaver_ftc.errors import BadInput
 from beaver_ftc.scenario.schema import Scenario
 
 STRIKES_S = (8.0, 10.0)  # a fault strikes at random in between
@@ -48,6 +49,18 @@ class Grid:
     def faults(self) -> tuple[tuple[str, float], ...]:
         """Every surface with every magnitude."""
         return tuple((surface, magnitude) for surface in self.surfaces for magnitude in self.magnitudes)
+
+    def only(self, sensors: str | None, turbulence: str | None) -> "Grid":
+        """The same flights under some of the conditions. Raises BadInput if there are none."""
+        kept = tuple(
+            condition
+            for condition in self.conditions
+            if sensors in (None, condition.sensors) and turbulence in (None, condition.turbulence)
+        )
+        if not kept:
+            there = "; ".join(f"{one.sensors}, {one.turbulence}" for one in self.conditions)
+            raise BadInput(f"power: this grid has no such condition, allowed: {there}")
+        return replace(self, conditions=kept)
 
     def faulted(self) -> list[Bout]:
         """The bouts with faults; each flies all of them. The same seeds in every condition."""

@@ -34,9 +34,7 @@ class TurbulenceName(StrEnum):
 
 
 def command(
-    grid: Annotated[
-        GridName, typer.Option(help="quick: under a minute of CPU; full: under ten.")
-    ] = GridName.quick,
+    grid: Annotated[GridName, typer.Option(help="quick: a minute of CPU; full: ten or so.")] = GridName.quick,
     schemes: Annotated[
         str | None, typer.Option(help="Comma-separated schemes beside ours; all registered ones if left out.")
     ] = None,

@@ -11,7 +11,7 @@ from beaver_ftc.control.state import LAWS, NOMINAL
 from beaver_ftc.design.coefficients import SURFACES, engine_power_kw, slipstream, value
 from beaver_ftc.design.model import AILERON, ELEVATOR, FLAP, RUDDER
 from beaver_ftc.design.variants import design_of, mass_of
-from beaver_ftc.diagnosis.admitted import admit, poles_for_noise
+from beaver_ftc.diagnosis.admitted import admit, gyros_vary, poles_for_noise
 from beaver_ftc.diagnosis.config import FdiConfig, Probing
 from beaver_ftc.diagnosis.fault_class import PARAMETER_SET
 from beaver_ftc.diagnosis.state import (
@@ -31,6 +31,7 @@ from beaver_ftc.plant.instruments import LONGEST_DELAY, SIGNALS
 from beaver_ftc.scenario.actuators import Actuators
 from beaver_ftc.scenario.schema import Scenario
 
+BLOCK_S = 0.2  # to be examined at once where gyros are noisy: short beside the slowest half-cycle, 3.1 s
 RUNAWAY_RATE_RAD_S = pi / 3.0  # of an actuator with no declared rate limit: the aircraft's default
 EARTH_RATE_RAD_S = 2.0 * pi / 86164.0905  # one turn per sidereal day [WGS84]
 YAW_SHARE = 0.5  # of the rudder, that engine power may claim: the rest is there to fly with
@@ -73,8 +74,10 @@ def _assemble_diagnosis(fdi: np.void, config: FdiConfig, dt: float, travel: np.n
 
 def _assemble_types(frame: np.void, scenario: Scenario, dt: float, travel: np.ndarray) -> None:
     config, fdi, actuators = scenario.fdi, frame["fdi"], frame["actuators"]
-    fdi["every_type"], fdi["whole"] = config.fault_class == "all", scenario.substeps == 1
-    fdi["patience"] = ceil(pi / config.slowest_oscillation_rad_s / dt)
+    fdi["every_type"] = config.fault_class == "all"
+    fdi["block"] = block = ceil(BLOCK_S / dt) if gyros_vary(config.bounds.sensors) else 1
+    fdi["whole"], fdi["span_s"] = scenario.substeps == 1 and block == 1, block * dt
+    fdi["patience"] = ceil(pi / config.slowest_oscillation_rad_s / (block * dt))
     fdi["type"] = fdi["lead"] = fdi["lead_kind"] = fdi["type_at_s"] = fdi["first"] = -1
     fdi["pairs"] = config.pairs
     if config.pairs:
@@ -206,10 +209,11 @@ def _assemble_admitted(frame: np.void, scenario: Scenario) -> None:
     admitted = frame["fdi"]["admitted"]
     coefficient, mass = frame["design"]["coefficient"], mass_of(scenario.design_model)
     admit(admitted, scenario.fdi.bounds, coefficient, mass)
-    if admitted["any"] and scenario.fdi.fault_class == "all":
+    frame["fdi"]["own_errors"] = admitted["any"] and scenario.fdi.fault_class == "all"
+    if scenario.fdi.pairs and frame["fdi"]["block"] > 1:
         raise BadInput(
-            f"{scenario.name}: fdi.fault_class: all is not available yet with errors declared in "
-            "fdi.bounds beyond inertia_coupling and constant_rad_s2, allowed: published"
+            f"{scenario.name}: fdi.pairs is not available with errors of the gyros that vary declared in "
+            "fdi.bounds.sensors, allowed: a bias"
         )
 
 

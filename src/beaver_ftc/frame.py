@@ -17,7 +17,7 @@ from beaver_ftc.design.actuators import ACTUATORS, move
 from beaver_ftc.design.model import ALPHA, BETA, DESIGN, ELEVATOR, QDYN
 from beaver_ftc.design.variants import response
 from beaver_ftc.diagnosis import air, bank, detection, fault_types, guarantee, isolation, network, statistical
-from beaver_ftc.diagnosis.derived import changing_error, derived_bound
+from beaver_ftc.diagnosis.derived import changing_error, derived_bound, slack_per_rad
 from beaver_ftc.diagnosis.fault_types import DOMINANT_AXIS
 from beaver_ftc.diagnosis.state import DIAGNOSIS, NOT_ISOLATED, WORST_CASE
 from beaver_ftc.diagnosis.thresholds import uncertainty_bound
@@ -60,7 +60,8 @@ FRAME = np.dtype(
         ("f", "f8", (3,)), ("G", "f8", (3, 4)), ("G_believed", "f8", (3, 4)),
         # the frame before, and means over the frame that elapsed since
         ("x_then", "f8", (3,)), ("f_sum", "f8", (3,)), ("G_sum", "f8", (3, 4)), ("Gu_sum", "f8", (3, 4)),
-        ("eta_bar_sum", "f8", (3,)), ("phi_sum", "f8", (3,)), ("phi_mean", "f8", (3,)),
+        ("eta_bar_sum", "f8", (3,)), ("own_per_rad_sum", "f8", (3, 4)), ("own_sum", "f8", (3, 4)),
+        ("phi_sum", "f8", (3,)), ("phi_mean", "f8", (3,)),
         ("Gu_first", "f8", (3, 4)), ("Gu_spread", "f8", (3, 4)),
         ("G_mean", "f8", (3, 4)), ("Gu_mean", "f8", (3, 4)), ("believed", "f8", (3,)),
         ("design_mean", "f8", (3,)), ("surprise", "f8", (3,)),
@@ -152,6 +153,18 @@ def sum_up(frame):
         for s in range(4):
             frame.G_sum[i, s] += frame.G[i, s]
             frame.Gu_sum[i, s] += frame.G[i, s] * frame.u[s]
+    if frame.fdi.own_errors:
+        sum_up_own_errors(frame)
+
+
+@kernel
+def sum_up_own_errors(frame):
+    """Add what the declared errors do to the surfaces' own terms now, per rad and at the command."""
+    per_rad = frame.fdi.admitted.per_rad
+    for i in range(3):
+        for s in range(4):
+            frame.own_per_rad_sum[i, s] += per_rad[i, s]
+            frame.own_sum[i, s] += per_rad[i, s] * abs(frame.u[s])
 
 
 @kernel
@@ -170,6 +183,9 @@ def elapse(frame):
         frame.believed[i] = frame.design_mean[i] = rate
         frame.fdi.eta_bar[i] = share * frame.eta_bar_sum[i]
         frame.phi_mean[i] = share * frame.phi_sum[i]
+    if frame.fdi.own_errors:
+        frame.fdi.own_per_rad[:] = share * frame.own_per_rad_sum
+        frame.fdi.own[:] = share * frame.own_sum
     if share < 1.0:
         spread(frame)
 
@@ -257,6 +273,8 @@ def remember(frame):
     frame.G_sum[:], frame.Gu_sum[:] = 0.0, 0.0
     if frame.fdi.statistical.enabled:
         look_ahead(frame)
+    if frame.fdi.own_errors:
+        frame.own_per_rad_sum[:], frame.own_sum[:] = 0.0, 0.0
     sum_up(frame)
     frame.Gu_first[:] = frame.Gu_sum
 
@@ -269,6 +287,9 @@ def bound_now(frame):
     fdi.eta_bar_now[:] = 0.0
     if fdi.admitted.any:
         derived_bound(fdi.admitted, frame.design, x, frame.y, frame.u, fdi.eta_bar_now)
+        if fdi.own_errors:
+            for s in range(4):
+                slack_per_rad(fdi.admitted, frame.design, s)
         x = fdi.admitted.far_x
     uncertainty_bound(x, frame.design, fdi.inertia, fdi.constant, fdi.earth_rate, fdi.eta_bar_now)
 

@@ -104,7 +104,7 @@ def _types_left(fdi: np.void, s: int) -> list[str]:
     One that may take any course counts only if no simpler does, and a slow surface until it would have moved.
     """
     left = [kind for kind in range(len(ft.TYPES)) if _alive(fdi, s, kind)]
-    if any(kind < ft.N_CONSTANT for kind in left):
+    if any(kind < ft.N_CONSTANT for kind in left) and not fdi["own_errors"]:
         early = fdi["surface"][s]["evidence"] - fdi["surface"][s]["quiet"] < fdi["patience"]
         stays = {ft.OSCILLATORY, ft.GROWING_BIAS} | ({ft.SLOW} if early else set())
         left = [kind for kind in left if kind < ft.N_CONSTANT or kind in stays]
@@ -164,4 +164,4 @@ def _interval(fdi: np.void, s: int, kind: int) -> tuple[float, float] | None:
 def _frequency_rad_s(fdi: np.void, s: int) -> float:
     surface = fdi["surface"][s]
     half_cycles = int(surface["flips"]) - 1
-    return half_cycles * pi / (float(fdi["dt"]) * int(surface["last_flip"] - surface["first_flip"]))
+    return half_cycles * pi / (float(fdi["span_s"]) * int(surface["last_flip"] - surface["first_flip"]))

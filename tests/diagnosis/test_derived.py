@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from beaver_ftc.assembly import assemble
 from beaver_ftc.design.model import control_effectiveness, design_record, free_response
 from beaver_ftc.diagnosis.admitted import inertia_slack, poles_for_noise
-from beaver_ftc.diagnosis.derived import derived_bound
+from beaver_ftc.diagnosis.derived import derived_bound, slack_per_rad
 from beaver_ftc.diagnosis.thresholds import noise_step
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.sensors import Sensors
@@ -146,3 +146,19 @@ def test_errors_that_have_no_bound_cannot_be_declared():
         load_text("name: x\nfdi: {bounds: {sensors: {p: {delay_s: 0.1}}}}\n")
     with pytest.raises(ScenarioError, match=r"Cm_alfa.*did you mean Cm_alpha"):
         load_text("name: x\nfdi: {bounds: {coefficients: {Cm_alfa: 0.1}}}\n")
+
+
+@settings(max_examples=50, deadline=None)
+@given(st.integers(0, 2**32), st.integers(0, 3))
+def test_a_surfaces_own_share_of_the_bound_is_its_slope(seed, surface):
+    """The bound is affine in |u|: a radian more raises it by what the surface's own terms may be off."""
+    x, y, u = state(np.random.default_rng(seed))
+    bounds = {"coefficients": 0.05, "inertia": 0.02, "sensors": SENSORS, "deflection_deg": 0.1}
+    further = u.copy()
+    further[surface] = np.sign(u[surface]) * (abs(u[surface]) + 1.0)
+    frame = assemble(Scenario.model_validate({"name": "x", "fdi": {"bounds": bounds}}), u, TRAVEL_RAD)[0]
+    derived_bound(frame["fdi"]["admitted"], frame["design"], x, y, u, np.zeros(3))
+    slack_per_rad(frame["fdi"]["admitted"], frame["design"], surface)
+    rise = bound(x, y, further, **bounds) - bound(x, y, u, **bounds)
+    assert frame["fdi"]["admitted"]["per_rad"][:, surface] == pytest.approx(rise, abs=1e-9)
+    assert rise.max() > 0.1

@@ -13,7 +13,8 @@ Document = dict[str, Any]
 
 def command(
     out: Annotated[
-        Path, typer.Option(help="Folder for the results: `fault-matrix` or `pitch-lost` in it.")
+        Path,
+        typer.Option(help="Folder for the results: `fault-matrix`, `fault-matrix-declared` or `pitch-lost`."),
     ] = Path("runs"),
     airspeed: Annotated[
         list[float] | None, typer.Option(min=30, max=55, help="Airspeed, m/s; once for each. [38, 45, 52]")
@@ -23,6 +24,13 @@ def command(
         bool,
         typer.Option(
             "--pitch-lost", help="Elevator and flap lost at once instead, with engine power and without."
+        ),
+    ] = False,
+    declared: Annotated[
+        bool,
+        typer.Option(
+            "--declared",
+            help="With tactical-grade sensors, servos and 5 % wrong moment coefficients, and told so.",
         ),
     ] = False,
     format: FormatOption = Format.text,
@@ -35,7 +43,9 @@ def command(
     from beaver_ftc.cli.progress import progress_bar
     from beaver_ftc.matrix.cases import AIRSPEEDS_MPS
 
-    name, run, as_text = _pitch_lost() if pitch_lost else _every_fault()
+    if pitch_lost and declared:
+        raise typer.BadParameter("--pitch-lost and --declared exclude each other, allowed: one of them")
+    name, run, as_text = _pitch_lost() if pitch_lost else _every_fault(declared)
     with progress_bar("faults") as progress:
         document = run(out, tuple(airspeed or AIRSPEEDS_MPS), workers, progress)
     folder = str(out / name)
@@ -46,11 +56,14 @@ def command(
     raise typer.Exit(0 if document["passed"] else 1)
 
 
-def _every_fault() -> tuple[str, Callable[..., Document], Callable[[Document], str]]:
-    from beaver_ftc.matrix.run import NAME, run_matrix
+def _every_fault(declared: bool) -> tuple[str, Callable[..., Document], Callable[[Document], str]]:
+    from functools import partial
+
+    from beaver_ftc.matrix.run import DECLARED, NAME, run_matrix
     from beaver_ftc.matrix.text import as_text
 
-    return NAME, run_matrix, as_text
+    name = DECLARED if declared else NAME
+    return name, partial(run_matrix, name=name), as_text
 
 
 def _pitch_lost() -> tuple[str, Callable[..., Document], Callable[[Document], str]]:

@@ -79,6 +79,12 @@ def poles_for_noise(sensors: Sensors, constant_rad_s2: float) -> tuple[float, ..
     return tuple(_pole(delay_s, nbar, constant_rad_s2) for delay_s in DELAYS_S) if nbar > 0 else ()
 
 
+def gyros_vary(sensors: Sensors) -> bool:
+    """Whether the error of some gyro is more than a constant."""
+    gyros = [getattr(sensors, axis) for axis in "pqr"]
+    return any(gyro.noise_bias_quantum[0] or gyro.noise_bias_quantum[2] or gyro.scale_error for gyro in gyros)
+
+
 def _pole(delay_s: float, noise: float, eta_bar: float) -> float:
     phi, pole = eta_bar + 8.0 * noise / delay_s, 1.0 / delay_s
     for _ in range(50):

@@ -15,11 +15,19 @@ n[k] - m[k], m[k+1] = a m[k] + (1 - a) n[k], so no more than nbar[k] and the fil
 however fast the frames.
 """
 
+import numpy as np
+
 from beaver_ftc.compiled import kernel
-from beaver_ftc.design.model import AIRSPEED, QDYN, regressors
+from beaver_ftc.design.model import AILERON, AIRSPEED, ALPHA, ELEVATOR, FLAP, QDYN, RUDDER, TERMS, regressors
 
 _AIR_DATA = 3  # gyros come first among the signals, then alpha, beta, airspeed, dynamic pressure
 _LEAST_AIRSPEED_SHARE = 0.1
+_CL_DAA = TERMS[0].index("Cl_daa")
+_OF_SURFACE = {"da": AILERON, "daa": AILERON, "de": ELEVATOR, "dr": RUDDER, "df": FLAP}
+# (3, 9): the surface each term of a moment belongs to, or -1
+SURFACE_OF_TERM = np.array(
+    [[_OF_SURFACE.get(name.partition("_")[2], -1) for name in names] for names in TERMS]
+)
 
 
 @kernel
@@ -85,6 +93,37 @@ def rate_slack(admitted, i, j, size, tolerance):
     """Error of an inertia coefficient times rates i and j."""
     near, far = admitted.near_x, admitted.far_x
     return product_slack(size, tolerance, near[i] * near[j], far[i] * far[j])
+
+
+@kernel
+def moment_per_rad(admitted, design, i, s):
+    """Of moment i, what surface s adds per rad: its magnitude, and with all errors; N m."""
+    near, far = 0.0, 0.0
+    for j in range(9):
+        if SURFACE_OF_TERM[i, j] == s:
+            size = abs(design.coefficient[i, j])
+            is_daa = i == 0 and j == _CL_DAA
+            near += size * (admitted.near_y[ALPHA] if is_daa else 1.0)
+            far += (size + admitted.tolerance[i, j]) * (admitted.far_y[ALPHA] if is_daa else 1.0)
+    arm = design.S * (design.c if i == 1 else design.b)
+    return arm * admitted.near_y[QDYN] * near, arm * admitted.far_y[QDYN] * far
+
+
+@kernel
+def slack_per_rad(admitted, design, s):
+    """Fill per_rad (3, s) rad/s2 per rad: what the declared errors can do to the effect of surface s.
+
+    The bound is affine in |u_s|; this is its slope. `derived_bound` comes first.
+    """
+    t, per_rad = admitted.inertia, admitted.per_rad
+    roll, roll_far = moment_per_rad(admitted, design, 0, s)
+    pitch, pitch_far = moment_per_rad(admitted, design, 1, s)
+    yaw, yaw_far = moment_per_rad(admitted, design, 2, s)
+    per_rad[0, s] = product_slack(design.Pl, t[2], roll, roll_far)
+    per_rad[0, s] += product_slack(design.Pn, t[3], yaw, yaw_far)
+    per_rad[1, s] = product_slack(design.Qm, t[7], pitch, pitch_far)
+    per_rad[2, s] = product_slack(design.Rl, t[10], roll, roll_far)
+    per_rad[2, s] += product_slack(design.Rn, t[11], yaw, yaw_far)
 
 
 @kernel

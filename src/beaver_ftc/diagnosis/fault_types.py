@@ -30,6 +30,7 @@ from beaver_ftc.diagnosis.state import (
     DOWN,
     FLOAT,
     GROWING_BIAS,
+    N_TYPES,
     NOT_ISOLATED,
     OSCILLATORY,
     SLOW,
@@ -83,8 +84,18 @@ def note_orders(fdi, commanded):
     """What the surfaces have been told to do, commanded (4,) rad, since the elapsed frame began."""
     for s in range(4):
         surface = fdi.surface[s]
-        surface.order_before, surface.order_then = surface.order_then, surface.order
-        surface.order = min(max(commanded[s], surface.travel_low), surface.travel_high)
+        if fdi.in_block == 0:
+            for age in (2, 1):
+                surface.orders[age, : fdi.block] = surface.orders[age - 1, : fdi.block]
+                surface.order_low[age], surface.order_high[age] = (
+                    surface.order_low[age - 1],
+                    surface.order_high[age - 1],
+                )
+            surface.order_low[0], surface.order_high[0] = np.inf, -np.inf
+        order = min(max(commanded[s], surface.travel_low), surface.travel_high)
+        surface.orders[0, fdi.in_block] = order
+        surface.order_low[0] = min(surface.order_low[0], order)
+        surface.order_high[0] = max(surface.order_high[0], order)
 
 
 @kernel
@@ -97,6 +108,8 @@ def locate(fdi, s):
     surface.command = -fie.offset[axis] / fie.Z[axis]
     surface.low, surface.high = fie.low, fie.high
     for i in range(3):
+        if fdi.block > 1 and i != axis and fie.Z[i] != 0.0:
+            continue  # over a block the axes weigh what varies differently
         low, high = membership.agreeing(fdi, fie, i)
         surface.low, surface.high = max(surface.low, low), min(surface.high, high)
 
@@ -111,10 +124,11 @@ def intersect(surface, kind, low, high):
 
 
 @kernel
-def judge_loss(surface, low, high, u):
+def judge_loss(fdi, surface, low, high, u):
     """Hold both kinds of loss against a position in [low, high] rad under the command u rad."""
     one, other = membership.solve(0.5 * (low + high), 0.5 * (high - low), u, 0.0, 1.0)
-    if one > other:
+    swung = fdi.block > 1 and surface.least_command[1] < 0.0 < surface.greatest_command[1]
+    if one > other and not swung:
         surface.type_excluded[VARYING_LOSS] = 1
     intersect(surface, CONSTANT_LOSS, one, other)
 
@@ -148,10 +162,19 @@ def judge_held(fdi, surface):
 
 
 @kernel
-def judge_bias(surface, low, high, u):
+def clear_of_stops(fdi, surface, low, high, u):
+    """Whether a surface off by a constant stayed off its lower and its upper stop throughout."""
+    if fdi.block > 1:
+        low, high = low - (u - surface.least_command[1]), high + (surface.greatest_command[1] - u)
+    return low > surface.travel_low, high < surface.travel_high
+
+
+@kernel
+def judge_bias(fdi, surface, low, high, u):
     """At a stop a bias may be larger than it shows."""
-    least = low - u if low > surface.travel_low else -np.inf
-    greatest = high - u if high < surface.travel_high else np.inf
+    off_low, off_high = clear_of_stops(fdi, surface, low, high, u)
+    least = low - u if off_low else -np.inf
+    greatest = high - u if off_high else np.inf
     intersect(surface, BIAS, least, greatest)
 
 
@@ -192,9 +215,10 @@ def judge_pace(fdi, surface, low, high, frame):
 
     Of several JSBSim frames in one of ours the first is the old command's.
     """
-    one = surface.order_before
-    other = one if fdi.whole else surface.order_then
-    sign = 1 if low > max(one, other) else (-1 if high < min(one, other) else 0)
+    newest = 2 if fdi.whole else 1
+    lowest = min(surface.order_low[2], surface.order_low[newest])
+    highest = max(surface.order_high[2], surface.order_high[newest])
+    sign = 1 if low > highest else (-1 if high < lowest else 0)
     if sign == 0 or sign != surface.run_sign or frame != surface.run_at + 1:
         surface.run_low, surface.run_high = low, high
     elif (sign > 0 and low > surface.run_high) or (sign < 0 and high < surface.run_low):
@@ -204,9 +228,10 @@ def judge_pace(fdi, surface, low, high, frame):
 
 
 @kernel
-def judge_growth(surface, low, high, u):
+def judge_growth(fdi, surface, low, high, u):
     """An incipient bias keeps its sign and does not shrink; at a stop it may be larger than it shows."""
-    if low > surface.travel_low and high < surface.travel_high:
+    off_low, off_high = clear_of_stops(fdi, surface, low, high, u)
+    if off_low and off_high:
         if low - u > 0.0:
             surface.grown_up = max(surface.grown_up, low - u)
         if high - u < 0.0:
@@ -225,12 +250,12 @@ def judge(fdi, surface, frame):
         return
     if surface.started_at < 0:
         surface.started_at, surface.start_low, surface.start_high = frame, low, high
-    judge_loss(surface, low, high, u)
+    judge_loss(fdi, surface, low, high, u)
     judge_held(fdi, surface)
-    judge_bias(surface, low, high, u)
+    judge_bias(fdi, surface, low, high, u)
     judge_oscillation(fdi, surface, low - u, high - u, frame)
     judge_pace(fdi, surface, low, high, frame)
-    judge_growth(surface, low, high, u)
+    judge_growth(fdi, surface, low, high, u)
 
 
 @kernel
@@ -260,6 +285,8 @@ def judge_all(fdi):
         elif surface.wrong_then and (fdi.whole or (surface.wrong_before and surface.wrong)):
             surface.evidence += 1
             judge(fdi, surface, fdi.frame - 1)
+        else:
+            surface.steady_since = fdi.frame  # it may have swung to the other side, unseen
         if fdi.returns and fdi.frame > 0:
             release.bring_back(fdi, surface)
     fdi.frame += 1
@@ -285,7 +312,7 @@ def note_quiet(fdi, s):
         if other == s or (surface.in_question and fdi.surface[other].in_question):
             fdi.surface[other].evidence += 1
     surface.quiet += 1
-    if surface.quiet > fdi.patience:
+    if surface.quiet > fdi.patience and not fdi.own_errors:
         surface.type_excluded[OSCILLATORY] = 1
 
 
@@ -363,16 +390,16 @@ def surface_at_fault(fdi):
 def others_refuted(fdi, chosen):
     """Whether nothing but a fault that follows the chosen one's commands is left on the other surfaces.
 
-    An oscillation is given one half-cycle of the slowest to betray itself, a whole one if still possible.
+    An oscillation is given one half-cycle of the slowest to betray itself, a whole one if still possible;
+    where errors are declared that a course can hide in, every type of the others must have been excluded.
     """
     waits = 1
     for s in range(4):
-        if (
-            s != chosen
-            and fdi.surface[s].in_question
-            and (alive(fdi, s, OSCILLATORY) or alive(fdi, s, VARYING_LOSS))
-        ):
-            waits = 2
+        if s != chosen and fdi.surface[s].in_question:
+            if fdi.own_errors and possible(fdi, s) and anything_left(fdi.surface[s]):
+                return False
+            if alive(fdi, s, OSCILLATORY) or alive(fdi, s, VARYING_LOSS):
+                waits = 2
     return fdi.surface[chosen].evidence >= waits * fdi.patience
 
 
@@ -409,11 +436,43 @@ def may_be_growing(fdi, s, found):
 
 
 @kernel
+def anything_left(surface):
+    """Whether any type of a surface is not excluded."""
+    left = False
+    for kind in range(N_TYPES):
+        left = left or not surface.type_excluded[kind]
+    return left
+
+
+@kernel
+def sole_type(fdi, s):
+    """The one type left on surface s whatever its course, or -1: in coarse sets a constant proves nothing."""
+    losing = alive(fdi, s, CONSTANT_LOSS) or alive(fdi, s, VARYING_LOSS)
+    biased = alive(fdi, s, BIAS) or alive(fdi, s, GROWING_BIAS)
+    running = alive(fdi, s, UP) or alive(fdi, s, DOWN)
+    stuck, trailing = alive(fdi, s, STUCK), alive(fdi, s, FLOAT)
+    swinging, slow = alive(fdi, s, OSCILLATORY), alive(fdi, s, SLOW)
+    if losing + biased + running + stuck + trailing + swinging + slow != 1:
+        return -1
+    if losing:
+        return CONSTANT_LOSS if alive(fdi, s, CONSTANT_LOSS) else VARYING_LOSS
+    if biased:
+        return BIAS if alive(fdi, s, BIAS) else GROWING_BIAS
+    if swinging:
+        return OSCILLATORY if swings(fdi, s) else -1
+    if running:
+        return UP if alive(fdi, s, UP) else DOWN
+    return STUCK if stuck else (FLOAT if trailing else SLOW)
+
+
+@kernel
 def type_at_fault(fdi, s):
     """The type of the fault on surface s, or -1 while more than one fits or an oscillation may yet show."""
     found, evidence = one_type(fdi, s), fdi.surface[s].evidence
     if evidence < fdi.patience or may_be_slow(fdi, s):
         return -1
+    if fdi.own_errors:
+        return sole_type(fdi, s)
     patient = not alive(fdi, s, OSCILLATORY) or evidence >= 2 * fdi.patience
     if any_constant(fdi, s):
         return found if patient and not may_be_growing(fdi, s, found) else -1

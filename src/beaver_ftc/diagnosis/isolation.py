@@ -12,7 +12,7 @@ by the first test that fails.
 """
 
 from beaver_ftc.compiled import kernel
-from beaver_ftc.diagnosis import bank, fault_types, membership, pairs
+from beaver_ftc.diagnosis import bank, blocks, fault_types, membership, pairs
 from beaver_ftc.diagnosis.fault_class import hypothesis
 from beaver_ftc.diagnosis.state import (
     INTERVAL,
@@ -37,6 +37,8 @@ def suppose(fdi, fie, G, Gu, spread):
     hypothesis(fie.kind, fie.surface, G, Gu, fie.offset, fie.Z)
     for i in range(3):
         fie.spread[i] = spread[i, fie.surface]
+    if fdi.own_errors and fie.kind == POSITION:
+        membership.allow_for_own_errors(fdi, fie)
     if fdi.memory:
         bank.remember(fdi, fie)
 
@@ -134,7 +136,10 @@ def isolate(fdi, x, t, started):
         pairs.decide(fdi, t)
         return
     if started or fdi.memory:
-        fault_types.examine(fdi)
+        if fdi.block > 1:
+            blocks.examine(fdi)
+        else:
+            fault_types.examine(fdi)
     fault_types.decide(fdi, t)
 
 

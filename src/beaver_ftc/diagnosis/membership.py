@@ -10,6 +10,7 @@ sets of all frames since the alarm may be intersected.
 from beaver_ftc.compiled import kernel
 
 NOTHING = (1.0, -1.0)
+ROUNDS = 4  # each narrows what is left of the travel to the tolerance's share of it
 
 
 @kernel
@@ -38,6 +39,40 @@ def agreeing(fdi, fie, i):
     return solve(
         fdi.innovation[i] - fie.offset[i], fdi.frame_bound[i] + fie.spread[i], fie.Z[i], fie.low, fie.high
     )
+
+
+@kernel
+def dominant(fie):
+    """The axis a surface acts upon most."""
+    axis = 0
+    for i in range(1, 3):
+        if abs(fie.Z[i]) > abs(fie.Z[axis]):
+            axis = i
+    return axis
+
+
+@kernel
+def allow_for_own_errors(fdi, fie):
+    """Widen the room of a position by what the errors of the surface's own terms do where it can have been.
+
+    eta_bar holds them at the command. The further the surface is from neutral, the more they do; how far it
+    can have been follows from the frame itself, in a few rounds from its travel inwards, each of them valid.
+    Of several JSBSim frames in one of ours the first may have seen it where it was a frame before.
+    """
+    s, axis = fie.surface, dominant(fie)
+    before, reach = fie.furthest, max(abs(fie.low), abs(fie.high))
+    room = fie.spread[axis]
+    value = fdi.innovation[axis] - fie.offset[axis]
+    earlier = 2.0 * before / fdi.instants if fdi.instants > 1 else 0.0
+    for _ in range(ROUNDS):
+        own = max(fdi.own_per_rad[axis, s] * (reach + earlier) - fdi.own[axis, s], 0.0)
+        low, high = solve(value, fdi.frame_bound[axis] + room + own, fie.Z[axis], fie.low, fie.high)
+        if low > high:
+            break
+        reach = min(reach, max(abs(low), abs(high)))
+    fie.furthest = reach
+    for i in range(3):
+        fie.spread[i] += max(fdi.own_per_rad[i, s] * (reach + earlier) - fdi.own[i, s], 0.0)
 
 
 @kernel

@@ -21,6 +21,7 @@ from beaver_ftc.diagnosis.state import DOWN, FLOAT, STUCK, UP
 
 EARLIER, LATER = 0, 1
 HELD = (STUCK, FLOAT, UP, DOWN)
+UNEVENNESS = 0.05  # a surface's effectiveness does not change by more within a block
 NOT_BACK_RAD = 1e-12  # what is nearer to a healthy surface acts within rounding as one
 
 
@@ -48,11 +49,14 @@ def start(surface):
 @kernel
 def carried(fdi, surface, a):
     """Mean position over the judged frame of a surface that is at a (rad) as it begins; and as it ends."""
-    total = a
-    for _ in range(fdi.instants - 1):
-        a = nearer(a, surface.order_then, surface.approach, surface.step)
-        total += a
-    return total / fdi.instants, nearer(a, surface.order_then, surface.approach, surface.step)
+    total, count = 0.0, 0
+    for k in range(fdi.block):
+        order = surface.orders[1, k]
+        for _ in range(fdi.instants):
+            total += a
+            count += 1
+            a = nearer(a, order, surface.approach, surface.step)
+    return total / count, a
 
 
 @kernel
@@ -61,8 +65,11 @@ def possible(fdi, surface, kind):
     left = False
     for which in (EARLIER, LATER):
         if any_release(surface, which, kind):
-            low, _ = carried(fdi, surface, surface.free_low[which, kind])
-            high, _ = carried(fdi, surface, surface.free_high[which, kind])
+            low, end = carried(fdi, surface, surface.free_low[which, kind])
+            high, other_end = carried(fdi, surface, surface.free_high[which, kind])
+            if fdi.block > 1:
+                low -= UNEVENNESS * abs(end - surface.free_low[which, kind])
+                high += UNEVENNESS * abs(other_end - surface.free_high[which, kind])
             away = max(abs(low - surface.command_then), abs(high - surface.command_then)) > NOT_BACK_RAD
             if away and low <= surface.high_then and high >= surface.low_then:
                 left = True
@@ -103,7 +110,10 @@ def run_at_least(fdi, surface, frame):
     """How far up a runaway has come by a frame, and how far down one has: rad, the stop at most."""
     if surface.started_at < 0:
         return surface.travel_low, surface.travel_high
-    way = surface.least_runaway_rate * fdi.dt * (frame - surface.started_at)
+    elapsed = frame - surface.started_at
+    if fdi.block > 1:
+        elapsed = max(elapsed - 1, 0)  # the mean over a block was reached within it
+    way = surface.least_runaway_rate * fdi.span_s * elapsed
     return (
         min(surface.travel_high, surface.start_low + way),
         max(surface.travel_low, surface.start_high - way),

@@ -4,6 +4,7 @@ import numpy as np
 
 MAX_ESTIMATORS = 16
 MAX_POLES = 6
+MAX_BLOCK = 256  # frames of a block: blocks.py
 NOT_ISOLATED, UNANTICIPATED = -1, -2
 INTERVAL, PUBLISHED = 0, 1
 LOSS, POSITION = 0, 1  # kinds of hypothesis: fault_class.py
@@ -33,6 +34,8 @@ ESTIMATOR = np.dtype(
         ("bound_eta", "f8", (3,)), ("bound_noise", "f8", (3,)),
         ("theta", "f8", (3,)), ("covariance", "f8", (3,)),
         ("offset", "f8", (3,)), ("Z", "f8", (3,)), ("spread", "f8", (3,)),
+        ("furthest", "f8"),  # rad, from neutral, that the surface can have been in the frame
+        ("block_offset", "f8", (3,)), ("block_Z", "f8", (3,)), ("block_spread", "f8", (3,)),
         # what bank.py and membership.py keep
         ("across", "f8", (3,)), ("reach_low", "f8", (MAX_POLES, 4)), ("reach_high", "f8", (MAX_POLES, 4)),
         ("theta_low", "f8", (3,)), ("theta_high", "f8", (3,)),
@@ -59,7 +62,8 @@ SURFACE = np.dtype(
         ("known_low", "f8", (N_TYPES,)), ("known_high", "f8", (N_TYPES,)), ("known_not", "i8", (N_TYPES,)),
         # its actuator, what it was ordered, and what release.py keeps: positions, rad
         ("approach", "f8"), ("step", "f8"),
-        ("order", "f8"), ("order_then", "f8"), ("order_before", "f8"),
+        ("orders", "f8", (3, MAX_BLOCK)), ("order_low", "f8", (3,)), ("order_high", "f8", (3,)),
+        ("least_command", "f8", (2,)), ("greatest_command", "f8", (2,)),
         ("low_before", "f8"), ("high_before", "f8"),
         ("free_low", "f8", (2, N_TYPES)), ("free_high", "f8", (2, N_TYPES)), ("released", "i8", (N_TYPES,)),
         ("kept_low", "f8", (2,)), ("kept_high", "f8", (2,)),
@@ -80,6 +84,7 @@ ADMITTED = np.dtype(
         ("near_x", "f8", (3,)), ("near_y", "f8", (5,)), ("near_u", "f8", (4,)),
         ("far_x", "f8", (3,)), ("far_y", "f8", (5,)), ("far_u", "f8", (4,)), ("far_aero", "f8", (3,)),
         ("near", "f8", (3, 9)), ("far", "f8", (3, 9)),
+        ("per_rad", "f8", (3, 4)),
         ("moment", "f8", (3,)), ("slack", "f8", (3,)),
     ],
     align=True,
@@ -176,6 +181,11 @@ DIAGNOSIS = np.dtype(
         ("pairs", "i8"), ("alarmed", "i8", (2,)), ("no_lateral_pair", "i8"), ("first", "i8"),
         ("unsettled", "i8"),
         ("statistical", STATISTICAL), ("authority", "i8"),
+        # errors of the surfaces' own terms, per rad of deflection and at the command: means over the frame
+        ("own_errors", "i8"), ("own_per_rad", "f8", (3, 4)), ("own", "f8", (3, 4)),
+        # blocks of frames: blocks.py
+        ("block", "i8"), ("in_block", "i8"), ("span_s", "f8"),
+        ("block_innovation", "f8", (3,)), ("block_eta", "f8", (3,)), ("block_noise", "f8", (3,)),
         ("closest", "f8", (MAX_POLES,)),  # largest share of its bound each filter reached in healthy flight
         ("effect", "f8", (MAX_POLES, 3)), ("certain_after_s", "f8"),  # what guarantee.py keeps
     ],

@@ -3,10 +3,12 @@
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from beaver_ftc.design.coefficients import SURFACES
+from beaver_ftc.design.model import TERMS
 
 if TYPE_CHECKING:
     from beaver_ftc.scenario.schema import Scenario
 
+TOLERANCE, SENSORS = 0.05, "tactical-grade"
 AIRSPEEDS_MPS = (38.0, 45.0, 52.0)
 AT_S = 12.0
 DURATION_S = 30.0
@@ -48,11 +50,29 @@ class Case(NamedTuple):
     fault: str
     surface: str
     airspeed_mps: float
+    declared: bool = False  # with the errors of `declared`
 
 
-def cases(airspeeds_mps: tuple[float, ...] = AIRSPEEDS_MPS) -> list[Case]:
+def cases(airspeeds_mps: tuple[float, ...] = AIRSPEEDS_MPS, declared: bool = False) -> list[Case]:
     """Every fault on every surface at every airspeed, fault by fault."""
-    return [Case(fault, surface, V) for fault, _ in FAULTS for surface in SURFACES for V in airspeeds_mps]
+    return [
+        Case(fault, surface, V, declared)
+        for fault, _ in FAULTS
+        for surface in SURFACES
+        for V in airspeeds_mps
+    ]
+
+
+def declared() -> dict[str, Any]:
+    """Real sensors, servos, coefficients at the ends of their tolerance by turns: all of it declared."""
+    names = [name for terms in TERMS for name in terms if name]
+    wrong = {name: 1.0 + (TOLERANCE if i % 2 else -TOLERANCE) for i, name in enumerate(names)}
+    return {
+        "uncertainty": UNCERTAINTY | {"coefficients": wrong},
+        "sensors": SENSORS,
+        "actuators": "servo",
+        "fdi": {"fault_class": "all", "bounds": {"coefficients": TOLERANCE, "sensors": SENSORS}},
+    }
 
 
 def scenario_of(case: Case, law: str, trimmed_deg: float) -> "Scenario":
@@ -73,4 +93,5 @@ def scenario_of(case: Case, law: str, trimmed_deg: float) -> "Scenario":
             "fdi": {"fault_class": "all"},
             "control": {"law": law},
         }
+        | (declared() if case.declared else {})
     )

@@ -11,7 +11,7 @@ from beaver_ftc.matrix.summary import document_of
 from beaver_ftc.matrix.text import as_text
 
 Document = dict[str, Any]
-NAME = "fault-matrix"
+NAME, DECLARED = "fault-matrix", "fault-matrix-declared"
 
 
 def run_matrix(
@@ -19,14 +19,16 @@ def run_matrix(
     airspeeds_mps: tuple[float, ...] = AIRSPEEDS_MPS,
     workers: int = 1,
     progress: Callable[[float], None] | None = None,
+    name: str = NAME,
 ) -> Document:
-    """Write `out/fault-matrix/` (table, JSON, heat map); return the document."""
+    """Write `out/fault-matrix/` (table, JSON, heat map), or that of `name`; return the document."""
     from beaver_ftc.matrix.figure import write_heat_map
     from beaver_ftc.results.metrics import as_json
     from beaver_ftc.results.writer import result_folder
 
-    with result_folder(out, NAME) as folder:
-        document = document_of(spread(fly_case, cases(airspeeds_mps), workers, progress))
+    with result_folder(out, name) as folder:
+        flown = spread(fly_case, cases(airspeeds_mps, declared=name == DECLARED), workers, progress)
+        document = document_of(flown)
         (folder / f"{NAME}.json").write_text(as_json(document), encoding="utf-8")
         (folder / f"{NAME}.txt").write_text(as_text(document) + "\n", encoding="utf-8")
         write_heat_map(document, folder / f"{NAME}.png")

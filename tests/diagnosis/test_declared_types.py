@@ -1,0 +1,100 @@
+"""Types of fault with errors declared: a truth with other coefficients, seen through noisy gyros."""
+
+import numpy as np
+import pytest
+from design_plant import DesignPlant, believe, conclude
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from test_fault_types import TYPES, shares, starts, surfaces
+
+from beaver_ftc.assembly import assemble
+from beaver_ftc.design.model import TERMS, control_effectiveness, design_record, free_response
+from beaver_ftc.diagnosis import fault_types as ft
+from beaver_ftc.errors import BadInput
+from beaver_ftc.named import found
+from beaver_ftc.scenario.schema import Scenario
+
+NOISE_DEG_S = 0.02
+TOLERANCE = 0.05
+SURFACES = ("aileron", "elevator", "rudder", "flap")
+NAMES = [name for terms in TERMS for name in terms if name]
+
+
+class RealPlant(DesignPlant):
+    """The truth has coefficients at the ends of their tolerance; the gyros are off by up to four sigma."""
+
+    def __init__(self, seed, noisy, **keys):
+        bounds = {"coefficients": TOLERANCE}
+        if noisy:
+            bounds["sensors"] = {axis: {"noise_std_deg_s": NOISE_DEG_S} for axis in "pqr"}
+        super().__init__(seed=seed, bounds=bounds, fault_class="all", **keys)
+        wrong = {name: 1 + TOLERANCE * self.rng.choice([-1, 1]) for name in NAMES}
+        self.truth = design_record(scale=wrong)[0]
+        self.furthest = 4 * np.deg2rad(NOISE_DEG_S) * noisy
+
+    def _step(self, uncertainty):
+        frame = self.frame
+        seen = self.x + self.rng.choice([-1, 1], 3) * self.furthest
+        frame["k"], frame["t"] = self.k, self.k * self.dt
+        frame["x"], frame["y"], frame["u"], frame["commanded"] = (
+            seen,
+            self.condition(),
+            self.u,
+            self.commanded,
+        )
+        believe(self.frames)
+        f, G, true_f, true_G = frame["f"].copy(), frame["G"].copy(), np.zeros(3), np.zeros((3, 4))
+        free_response(self.truth, self.x, frame["y"], true_f)
+        control_effectiveness(self.truth, frame["y"], true_G)
+        conclude(self.frames)
+        eta = self.rng.uniform(-0.02, 0.02, 3)
+        self.x = self.x + self.dt * (true_f + true_G @ self.u + self.effect(true_G) + eta)
+        true_x, self.x = self.x, seen
+        self.commanded = self.u = self.command(f, G)
+        self.x = true_x
+        self.k += 1
+
+
+def fly(seed, noisy, kind, surface, at, share, frames):
+    position = TYPES[kind][0](surface, at, share, 0.02)
+    return RealPlant(seed, noisy, rate_hz=50.0, surface=surface, position=position).fly(frames, None)
+
+
+@pytest.mark.parametrize("noisy", [False, True])
+@settings(max_examples=80, deadline=None)
+@given(st.integers(0, 2**32), st.sampled_from(list(TYPES)), surfaces, starts, shares)
+def test_the_true_type_is_neither_excluded_nor_named_wrongly(noisy, seed, kind, surface, at, share):
+    plant = fly(seed, noisy, kind, surface, at, share, 700)
+    code = TYPES[kind][1]
+    assert not plant.excluded(ft.POSITION_FIRST + surface)
+    assert not plant.fdi["surface"][surface]["type_excluded"][code]
+    said = found(plant.fdi)
+    assert said["isolated"] in (SURFACES[surface], None)
+    assert said["isolation_type"] in (ft.TYPES[code], None)
+
+
+@pytest.mark.parametrize("noisy", [False, True])
+def test_an_estimate_is_certain_to_lie_in_its_interval(noisy):
+    """An aileron stuck a quarter up its travel."""
+    plant = fly(4, noisy, "stuck", 0, 30, 0.25, 900)
+    known = plant.fdi["surface"][0]
+    assert known["set_low"][ft.STUCK] <= -0.26 <= known["set_high"][ft.STUCK]
+    assert known["set_high"][ft.STUCK] - known["set_low"][ft.STUCK] < np.deg2rad(4)
+    assert found(plant.fdi)["isolated"] == "aileron"
+
+
+def test_blocks_see_what_frames_do_not():
+    """With noisy gyros a frame leaves the rudder several degrees of room, a block a small part of it."""
+    plant = fly(4, True, "bias", 2, 30, 0.9, 600)
+    known, estimator = plant.fdi["surface"][2], plant.fdi["estimator"][ft.POSITION_FIRST + 2]
+    of_a_frame = 2 * plant.fdi["frame_bound"][2] / abs(estimator["Z"][2])
+    assert known["high"] - known["low"] < 0.5 * of_a_frame
+
+
+def test_pairs_are_refused_with_noisy_gyros_in_one_line():
+    bounds = {"sensors": "tactical-grade"}
+    fdi = {"fault_class": "all", "pairs": True, "bounds": bounds}
+    with pytest.raises(BadInput, match=r"x: fdi.pairs is not available .*, allowed: a bias$"):
+        assemble(
+            Scenario.model_validate({"name": "x", "fdi": fdi}), np.zeros(4), np.array([[-1.0] * 4, [1.0] * 4])
+        )

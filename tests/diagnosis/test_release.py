@@ -58,7 +58,7 @@ def test_a_return_does_not_move_the_jam(case, surface, at, lasting, share, uncer
     plant = fly(case, surface, fault, uncertainty, frames=at + lasting + int(3 * case["rate_hz"]))
     low, high = TRAVEL_RAD[:, surface]
     known = plant.fdi["surface"][surface]
-    healthy = not (plant.fdi["wrong"] or plant.fdi["wrong_then"])
+    healthy = not (known["wrong"] or known["wrong_then"])
     if healthy:
         assert known["set_low"][ft.STUCK] <= low + share * (high - low) <= known["set_high"][ft.STUCK]
 

@@ -98,12 +98,15 @@ def possible(fdi, fie, x, started):
 
 @kernel
 def rules_out(fdi, fie, within):
-    """Whether a fault is excluded by those in authority; `within`: it is possible in the worst case."""
+    """Whether a fault is excluded by those in authority; `within`: it is possible in the worst case.
+
+    Of faults of every type the sets alone know: a jam is neither a loss nor a step.
+    """
+    if fdi.every_type or fdi.authority == WORST_CASE:
+        return not within
     if fdi.authority != STATISTICS and not within:
         return True
-    statistical = fdi.statistical
-    asked = statistical.enabled and fdi.authority != WORST_CASE and fie.kind == LOSS
-    return asked and excludes(statistical, fie.surface, fdi.abrupt)
+    return fdi.statistical.enabled and excludes(fdi, fie.surface)
 
 
 @kernel

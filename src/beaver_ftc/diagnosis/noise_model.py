@@ -1,6 +1,6 @@
 """From what a scenario declares to the statistical detector's numbers: levels, noise, tolerances."""
 
-from math import exp, pi, sqrt
+from math import exp, hypot, pi, sqrt
 from statistics import NormalDist
 
 import numpy as np
@@ -10,7 +10,7 @@ from beaver_ftc.design.model import AILERON, AIRSPEED, ALPHA, AXES, BETA, DPT, E
 from beaver_ftc.design.variants import jacobian
 from beaver_ftc.diagnosis.admitted import GUST_FT_S, SCALE_FT, inertia_slack, tolerances
 from beaver_ftc.diagnosis.config import Bounds, FdiConfig, Statistical
-from beaver_ftc.diagnosis.state import ALPHA3, LOSS, N_SLOTS, STEP
+from beaver_ftc.diagnosis.state import ALPHA3, LEAST_UNCERTAINTY_RAD_S2, LOSS, N_SLOTS, STEP
 from beaver_ftc.plant.instruments import SIGNALS
 from beaver_ftc.scenario.sensors import Sensors
 
@@ -20,11 +20,17 @@ LATERAL = ((LOSS, AILERON, 0, 1), (LOSS, RUDDER, 2, 1), (STEP, -1, 0, 1), (STEP,
 BLOCKS = (((1,), PITCH), ((0, 2), LATERAL), ((0, 2), LATERAL))
 SIDES = {LOSS: 1, STEP: 2, ALPHA3: 2}  # a loss has a sign, a step may go either way
 
-# Share of the intensity of the rolling, pitching and yawing gust that the vanes leave; measured on exact
-# vanes it is below 0.003 and 0.05 (`tests/diagnosis/test_air.py`).
+# Share of the intensity of the rolling, pitching and yawing gust that the vanes leave; on exact vanes and
+# over a filter's memory it is less (`tests/diagnosis/test_air.py`).
 UNSEEN = (1.0, 0.003, 0.03)
 PRIOR_DRIFT_RAD_S2 = 1.0  # what a drift may be at the start of a flight: soon forgotten
+LEAST_NOISE_RAD_S = 1e-9  # of a gyro: exact ones are still doubles, and a variance no difference of zeros
 _RATE_TERMS = ("p", "q", "r")
+_POWERS = {  # of each signal in a term, what a relative error of it counts
+    "p": (("p", 1),), "q": (("q", 1),), "r": (("r", 1),),
+    "alpha": (("alpha", 1),), "alpha2": (("alpha", 2),), "a2dpt": (("alpha", 2),), "daa": (("alpha", 1),),
+    "beta": (("beta", 1),), "beta2": (("beta", 2),), "beta3": (("beta", 3),),
+}  # fmt: skip
 
 
 def tests_a_frame() -> int:
@@ -53,7 +59,7 @@ def set_up(
     """Fill the statistical part of a diagnosis record; start: x (3,), y (5,) and u (4,) in trim."""
     statistical, given = fdi["statistical"], config.statistical
     statistical["detected_at_s"] = -1.0
-    if given is None:
+    if given is None or not fdi["enabled"]:  # a plug-in, or nobody, diagnoses
         return
     statistical["enabled"] = 1
     _set_up_air(statistical["air"], config.bounds.turbulence, mass)
@@ -81,7 +87,7 @@ def _set_up_blocks(statistical: np.void, sensors: Sensors) -> None:
         block["n_regressors"], block["keep"] = 9 * len(axes), 1.0
         for i, axis in enumerate(axes):
             block["axis"][i] = axis
-            variance = _random_error(sensors, AXES[axis]) ** 2
+            variance = max(_random_error(sensors, AXES[axis]), LEAST_NOISE_RAD_S) ** 2
             block["noise"][i] = block["P_xx"][i, i] = variance
             block["P_dd"][i, i] = PRIOR_DRIFT_RAD_S2**2
         for hypothesis, (kind, surface, axis, alarms) in zip(block["hypothesis"], members, strict=False):
@@ -115,15 +121,16 @@ def rapidity(eta_bar: float, omega: float, noise: float, level: float, dt_s: flo
 
     An uncertainty of eta_bar sin(omega t) moves the test for a step by eta_bar omega sqrt(2 sqrt 2 / i w0),
     w0 = (i / n)^(1/4), for a walk of intensity i and gyro noise of density n = noise^2 dt (docs/theory.md).
-    Half the alarm level is left for it: noise alone then takes up no more than the other half. With no noise
-    to speak of w0 is the frame rate. eta_bar rad/s2, omega rad/s, noise rad/s, level in standard deviations.
+    With no noise to speak of w0 is the frame rate. A loss under a moving command grows beside the uncertainty
+    for as long as both go the same way: by eta_bar sqrt(omega / i) times 1.204, the largest value of
+    sin(z) / sqrt(z / 2), z half of omega t. Half the alarm level is left for it: noise alone then takes up no
+    more than the other half. eta_bar rad/s2, omega rad/s, noise rad/s, level in standard deviations.
     """
-    if eta_bar == 0.0:
-        return 0.0
+    eta_bar = max(eta_bar, LEAST_UNCERTAINTY_RAD_S2)
     swing = 8.0 * sqrt(2.0) * (eta_bar * omega / level) ** 2  # of i w0
-    density = noise**2 * dt_s
-    walk = (swing * density**0.25) ** 0.8
-    return max(walk, swing * dt_s) / eta_bar**2
+    ramp = 4.0 * (1.204 * eta_bar / level) ** 2 * omega
+    walk = (swing * (noise**2 * dt_s) ** 0.25) ** 0.8
+    return max(hypot(walk, ramp), swing * dt_s) / eta_bar**2
 
 
 def returning_length(statistical: np.void, airspeed_mps: float, rate_hz: float) -> float:
@@ -162,12 +169,13 @@ def steady_tolerance(
     size = np.abs(coefficient)
     share = np.full((3, 9), _inertia_share(bounds.inertia, mass))
     for i, names in enumerate(TERMS):
-        share[i] += getattr(bounds.sensors, AXES[i]).scale_error + _steady_share(bounds, "qdyn", y[QDYN])
+        share[i] += abs(getattr(bounds.sensors, AXES[i]).scale_error) + _steady_share(bounds, "qdyn", y[QDYN])
         for j, name in enumerate(names):
             if name[3:] in _RATE_TERMS:
                 share[i, j] += _steady_share(bounds, "V", y[AIRSPEED])
-            share[i, j] += name[3:].count("alpha") * bounds.sensors.alpha.scale_error
-            share[i, j] += name[3:].count("beta") * bounds.sensors.beta.scale_error
+            for signal, power in _POWERS.get(name[3:], ()):
+                if signal != AXES[i]:  # a gyro's slope is counted once for all terms of its own axis
+                    share[i, j] += power * abs(getattr(bounds.sensors, signal).scale_error)
     total = tolerances(bounds.coefficients, coefficient) + share * size
     alpha, beta = (getattr(bounds.sensors, name).noise_bias_quantum[1] for name in ("alpha", "beta"))
     total[:, 0] += abs(alpha) * _slope_alpha(coefficient, y, u) + abs(beta) * _slope_beta(coefficient, y)

@@ -12,7 +12,7 @@ import numpy as np
 from beaver_ftc.compiled import kernel
 from beaver_ftc.design.model import AIRSPEED, ALPHA, QDYN, regressors
 from beaver_ftc.diagnosis import air, likelihood, whitening
-from beaver_ftc.diagnosis.state import LOSS, STEP
+from beaver_ftc.diagnosis.state import LEAST_UNCERTAINTY_RAD_S2, LOSS, STEP
 from beaver_ftc.diagnosis.thresholds import uncertainty_bound
 
 PITCH, LATERAL, RETURNING = 0, 1, 2
@@ -100,12 +100,26 @@ def score(statistical, t):
 
 
 @kernel
-def best_alternative(block, surface):
-    """The greatest log likelihood ratio that any hypothesis but the loss of a surface has at least."""
+def is_open(fdi, surface):
+    """Whether a loss of this surface has not been excluded."""
+    for s in range(fdi.n_estimators):
+        fie = fdi.estimator[s]
+        if fie.kind == LOSS and fie.surface == surface:
+            return not fie.excluded
+    return True
+
+
+@kernel
+def best_alternative(fdi, block, surface):
+    """The greatest log likelihood ratio that any hypothesis but the loss of a surface has at least.
+
+    What has been excluded is no alternative: as the evidence for that fades, uncertainty that goes along with
+    the commands may gather some for it.
+    """
     best = 0.0
     for h in range(block.n_hypotheses):
         hypothesis = block.hypothesis[h]
-        if not (hypothesis.kind == LOSS and hypothesis.surface == surface):
+        if hypothesis.kind != LOSS or (hypothesis.surface != surface and is_open(fdi, hypothesis.surface)):
             best = max(best, hypothesis.at_least)
     return best
 
@@ -121,19 +135,20 @@ def loss_at_most(block, surface):
 
 
 @kernel
-def excludes(statistical, surface, abrupt):
+def excludes(fdi, surface):
     """Whether something else explains the flight better than a loss of this surface, by the naming level.
 
     Each view of roll and yaw is held against that of pitch: a loss explains what it does to its own axes. A
     loss whose course is not declared `abrupt` may grow, and a constant theta then explains only part of what
     it does: it is excluded where that part is small besides.
     """
+    statistical = fdi.statistical
     pitch = statistical.block[PITCH]
     for b in range(LATERAL, statistical.n_blocks):
         lateral = statistical.block[b]
-        better = max(best_alternative(pitch, surface), best_alternative(lateral, surface))
+        better = max(best_alternative(fdi, pitch, surface), best_alternative(fdi, lateral, surface))
         worse = max(loss_at_most(pitch, surface), loss_at_most(lateral, surface))
-        if better - worse > statistical.naming_level and (abrupt or worse < LEAST_PART * better):
+        if better - worse > statistical.naming_level and (fdi.abrupt or worse < LEAST_PART * better):
             return True
     return False
 
@@ -184,7 +199,7 @@ def drifts(statistical, fdi, design, x, y):
                 block.drift[i, j] = 0.0
                 if statistical.air.moving:
                     block.drift[i, j] = air.unseen_drift(statistical.air, y[AIRSPEED], axis, block.axis[j])
-            size = bounded[axis] + statistical.deflection[axis]
+            size = max(bounded[axis] + statistical.deflection[axis], LEAST_UNCERTAINTY_RAD_S2)
             block.drift[i, i] += statistical.rapidity * size * size
             block.jitter[i] = statistical.jitter[axis]
         block.keep = np.exp(-fdi.dt * y[AIRSPEED] / block.lag) if block.lag > 0.0 else 1.0

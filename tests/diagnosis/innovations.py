@@ -1,0 +1,179 @@
+"""Innovations as the statistical detector is told they are, and the same statistics by plain linear algebra.
+
+    nu[k] = d[k] + jitter w[k] + (n[k+1] - n[k]) / dt,  d[k+1] = keep d[k] + sqrt(drift dt) v[k]
+
+with w, v, and n over its own standard deviation, independent and standard normal.
+"""
+
+import numpy as np
+from scipy.linalg import block_diag
+from scipy.signal import lfilter
+
+from beaver_ftc.assembly import assemble
+from beaver_ftc.compiled import kernel
+from beaver_ftc.design.coefficients import MASS
+from beaver_ftc.diagnosis import likelihood, noise_model, statistical, whitening
+from beaver_ftc.diagnosis.state import BLOCK, N_SLOTS
+from beaver_ftc.scenario.schema import Scenario
+
+TRAVEL_RAD = np.array([[-0.52, -0.49, -0.44, -0.1], [0.52, 0.49, 0.44, 1.03]])
+LEVEL_FLIGHT = np.zeros(3), np.array([0.1, 0.02, 45.0, 1036.0, 0.3]), np.zeros(4)  # x, y, u
+
+
+def block_of(drift, noise, jitter=0.0, prior=1.0, keep=1.0):
+    """A block as a record, with as many axes as `drift` (n, n) has. Standard deviations noise and jitter."""
+    n = len(drift)
+    block = np.zeros(1, BLOCK).view(np.recarray)[0]
+    block["n"], block["axis"][:n], block["keep"] = n, range(n), keep
+    block["drift"][:n, :n] = drift
+    block["noise"][:n], block["jitter"][:n] = np.square(noise), np.square(jitter)
+    block["P_xx"][:n, :n] = np.diag(block["noise"][:n])
+    block["P_dd"][:n, :n] = prior**2 * np.eye(n)
+    return block
+
+
+def with_hypotheses(block, *kinds, tolerance=()):
+    """The same with hypotheses of these kinds, and regressors of these tolerances."""
+    block["n_hypotheses"], block["n_regressors"] = len(kinds), len(tolerance)
+    block["tolerance"][: len(tolerance)] = tolerance
+    for hypothesis, kind in zip(block["hypothesis"], kinds, strict=False):
+        hypothesis["kind"] = kind
+    return block
+
+
+def covariance(block, frames, dt):
+    """Of the stacked innovations (frames n,), frame by frame, from the model's very definition."""
+    n = int(block["n"])
+    k = np.arange(frames)
+    kept = block["keep"] ** (k[:, None] - k[None, :] - 1) * (
+        k[None, :] < k[:, None]
+    )  # of v[column] in d[row]
+    walk = np.kron(dt * kept @ kept.T, block["drift"][:n, :n])
+    constant = np.kron(block["keep"] ** np.add.outer(k, k), block["P_dd"][:n, :n])
+    difference = (2.0 * np.eye(frames) - np.eye(frames, k=1) - np.eye(frames, k=-1)) / dt**2
+    gyros = np.kron(difference, np.diag(block["noise"][:n]))
+    return constant + walk + gyros + np.kron(np.eye(frames), np.diag(block["jitter"][:n]))
+
+
+def drawn(block, frames, dt, rng, start=0.0):
+    """Innovations (frames, n) rad/s2; start: standard deviation of the drift as they begin."""
+    n = int(block["n"])
+    root = np.linalg.cholesky(block["drift"][:n, :n] + 1e-300 * np.eye(n))
+    steps = np.sqrt(dt) * rng.standard_normal((frames, n)) @ root.T
+    steps[0] = start * rng.standard_normal(n)
+    gyros = np.sqrt(block["noise"][:n]) * rng.standard_normal((frames + 1, n))
+    white = np.sqrt(block["jitter"][:n]) * rng.standard_normal((frames, n))
+    drifts = lfilter([1.0], [1.0, -float(block["keep"])], steps, axis=0)
+    return drifts + white + np.diff(gyros, axis=0) / dt
+
+
+class PlainKalman:
+    """The textbook filter of 2n states, rates and drifts, on measured rates."""
+
+    def __init__(self, block, dt):
+        n = self.n = int(block["n"])
+        self.F = np.block([[np.eye(n), dt * np.eye(n)], [np.zeros((n, n)), block["keep"] * np.eye(n)]])
+        self.H = np.hstack([np.eye(n), np.zeros((n, n))])
+        self.P = block_diag(block["P_xx"][:n, :n], block["P_dd"][:n, :n])
+        self.Q = block_diag(dt**2 * np.diag(block["jitter"][:n]), dt * block["drift"][:n, :n])
+        self.R = np.diag(block["noise"][:n])
+        self.x = np.zeros(2 * n)
+
+    def step(self, z):
+        """Innovation (n,) of the measured rates z (n,), after a frame; P, S and K are left to look at."""
+        self.x, self.P = self.F @ self.x, self.F @ self.P @ self.F.T + self.Q
+        self.S = self.H @ self.P @ self.H.T + self.R
+        self.K = self.P @ self.H.T @ np.linalg.inv(self.S)
+        innovation = z - self.H @ self.x
+        self.x = self.x + self.K @ innovation
+        rest = np.eye(2 * self.n) - self.K @ self.H
+        self.P = rest @ self.P @ rest.T + self.K @ self.R @ self.K.T
+        return innovation
+
+
+@kernel
+def filter_all(block, innovations, dt, out):
+    """Innovations (k, n) rad/s2 whitened into out (k, 2)."""
+    for k in range(len(innovations)):
+        whitening.advance(block, dt)
+        block.scratch[: block.n] = innovations[k]
+        whitening.whiten(block, block.state, block.scratch, dt, out[k])
+
+
+@kernel
+def weigh_all(block, innovations, signatures, regressors, first, keep, tolerated, dt):
+    """Show a block frames `first` onwards: innovations (k, n), signatures (k, h, 2), regressors (k, j, 2)."""
+    for k in range(len(innovations)):
+        if keep == 1.0:
+            likelihood.start(block, likelihood.slot_to_start(first + k))
+        whitening.advance(block, dt)
+        block.scratch[: block.n] = innovations[k]
+        whitening.whiten(block, block.state, block.scratch, dt, block.innovation)
+        for j in range(block.n_regressors):
+            whitening.whiten(
+                block, block.regressor_state[j], regressors[k, j], dt, block.regressor_response[j]
+            )
+        for h in range(block.n_hypotheses):
+            block.hypothesis[h].signature[:] = signatures[k, h]
+        likelihood.weigh(block, tolerated, dt, keep)
+        likelihood.judge(block, tolerated)
+
+
+class Detector:
+    """The compiled detector alone, made ready as before a flight, at one flight condition."""
+
+    def __init__(self, rate_hz=100.0, **fdi):
+        keys = {"rate_hz": rate_hz, "fdi": {"statistical": {}, **fdi}}
+        scenario = Scenario.model_validate({"name": "detector-alone", **keys})
+        self.frames = assemble(scenario, np.zeros(4), TRAVEL_RAD).view(np.recarray)
+        frame = self.frames[0]
+        self.fdi, self.dt = frame["fdi"], 1.0 / rate_hz
+        noise_model.set_up(self.fdi, scenario.fdi, frame["design"], MASS, LEVEL_FLIGHT, rate_hz)
+        self.detector = self.fdi["statistical"]
+        statistical.prepare(self.detector, self.fdi, frame["design"], *LEVEL_FLIGHT)
+        self.frame = 0
+
+    @property
+    def blocks(self):
+        return self.detector["block"][: self.detector["n_blocks"]]
+
+    def innovations(self, frames, rng):
+        """Healthy ones (frames, 3), as declared."""
+        out = np.empty((frames, 3))
+        for block in self.blocks:  # of the two views of roll and yaw the latter, if it is there
+            out[:, block["axis"][: block["n"]]] = drawn(
+                block, frames, self.dt, rng, noise_model.PRIOR_DRIFT_RAD_S2
+            )
+        return out
+
+    def watch(self, innovations, Gu, cubic, renew=False):
+        """Scores (k,), shares of the alarm level; `renew`: begin anew after an alarm, as a new flight."""
+        scores = np.empty(len(innovations))
+        watch_all(self.detector, innovations, Gu, cubic, self.frame, renew, self.dt, scores)
+        self.frame += len(innovations)
+        return scores
+
+
+@kernel
+def watch_all(detector, innovations, Gu, cubic, first, renew, dt, scores):
+    """The frames of a flight without one: innovations (k, 3), Gu (k, 3, 4) rad/s2, cubic (k,)."""
+    for k in range(len(innovations)):
+        statistical.signatures(detector, Gu[k], cubic[k])
+        statistical.observe(detector, innovations[k], dt, first + k, 0)
+        statistical.score(detector, (first + k) * dt)
+        scores[k] = detector.score
+        if renew and detector.score > 1.0:
+            for slot in range(N_SLOTS):
+                for b in range(detector.n_blocks):
+                    likelihood.start(detector.block[b], slot)
+
+
+def surfaces_at_work(frames, rate_hz, rng, size=0.3):
+    """Gu (frames, 3, 4) rad/s2 of surfaces that follow sines, and a pitching moment on alpha^3 (frames,)."""
+    t = np.arange(frames)[:, None] / rate_hz
+    wave = np.sin(2 * np.pi * np.array([0.25, 0.2, 0.3]) * t + rng.uniform(0, 6, 3))
+    Gu = np.zeros((frames, 3, 4))
+    Gu[:, 0, 0], Gu[:, 2, 0] = -size * wave[:, 0], -0.05 * size * wave[:, 0]
+    Gu[:, 1, 1] = -size * wave[:, 1]
+    Gu[:, 0, 2], Gu[:, 2, 2] = 0.2 * size * wave[:, 2], -size * wave[:, 2]
+    return Gu, 0.05 + 0.01 * wave[:, 1]

@@ -1,0 +1,202 @@
+"""The likelihood ratios against generalised least squares with the whole covariance, and their promises."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from innovations import block_of, covariance, drawn, weigh_all, with_hypotheses
+from scipy.stats import kstest
+
+from beaver_ftc.diagnosis import likelihood
+from beaver_ftc.diagnosis.state import ALPHA3, LOSS, N_SLOTS, STEP
+
+DT = 0.01
+TOGETHER = np.array([[0.04, 0.006], [0.006, 0.003]])
+AXES = {  # drift, noise, what a drift keeps of itself in a frame
+    "one axis": (np.array([[0.02]]), [3e-4], 1.0),
+    "two axes": (TOGETHER, [3e-4, 8e-4], 1.0),
+    "a drift that returns": (TOGETHER, [3e-4, 8e-4], 0.95),
+}
+
+
+def _block(case, *kinds, tolerance=()):
+    drift, noise, kept = AXES[case]
+    return with_hypotheses(block_of(drift, noise, jitter=0.05, keep=kept), *kinds, tolerance=tolerance)
+
+
+def _shown(block, nu, signatures, regressors=None, first=0, keep=1.0):
+    """Show a block innovations (k, n), with signatures (k, h, n) and regressors (k, j, n)."""
+    frames, n = nu.shape
+    wide = np.zeros((frames, signatures.shape[1], 2))
+    wide[:, :, :n] = signatures
+    known = np.zeros((frames, int(block["n_regressors"]), 2))
+    if regressors is not None:
+        known[:, :, :n] = regressors
+    weigh_all(block, nu, wide, known, first, keep, regressors is not None, DT)
+    return block
+
+
+def _onsets(frames):
+    """By slot, the frame at which it last began anew: slot j at odd multiples of 2^j."""
+    starts = {}
+    for k in range(frames):
+        twos = N_SLOTS - 1 if k == 0 else (k & -k).bit_length() - 1
+        starts[min(twos, N_SLOTS - 1)] = k
+    return starts
+
+
+@pytest.mark.parametrize("case", AXES)
+@pytest.mark.parametrize("frames", [37, 64, 101])
+def test_evidence_and_information_of_every_onset_are_those_of_least_squares(case, frames):
+    rng = np.random.default_rng(frames)
+    block = _block(case, LOSS, STEP, tolerance=(0.1, 0.2, 0.3))
+    n = int(block["n"])
+    inverse = np.linalg.inv(covariance(block, frames, DT))
+    signatures, regressors = rng.normal(size=(frames, 2, n)), rng.normal(size=(frames, 3, n))
+    nu = drawn(block, frames, DT, rng, start=1.0)
+    _shown(block, nu, signatures, regressors)
+    for slot, onset in _onsets(frames).items():
+        for h in range(2):
+            s = np.where(np.arange(frames)[:, None] >= onset, signatures[:, h], 0.0).ravel()
+            hypothesis = block["hypothesis"][h]
+            assert hypothesis["information"][slot] == pytest.approx(s @ inverse @ s, rel=1e-6)
+            assert hypothesis["correlation"][slot] == pytest.approx(
+                s @ inverse @ nu.ravel(), rel=1e-6, abs=1e-9
+            )
+            overlap = [s @ inverse @ regressors[:, j].ravel() for j in range(3)]
+            assert hypothesis["overlap"][slot][:3] == pytest.approx(overlap, rel=1e-6, abs=1e-9)
+
+
+def _statistics(case, theta, flights=2500, frames=24, scale=0.5):
+    """N / sqrt(D) of the newest long onset, theta_hat and D over many flights with a fault from the start."""
+    rng = np.random.default_rng(1)
+    normal, estimate, information = [], [], []
+    for _ in range(flights):
+        block = _block(case, STEP)
+        n = int(block["n"])
+        signature = scale * rng.normal(size=(frames, 1, n))
+        nu = drawn(block, frames, DT, rng, start=1.0) + theta * signature[:, 0]
+        hypothesis = _shown(block, nu, signature)["hypothesis"][0]
+        N, D = hypothesis["correlation"][N_SLOTS - 1], hypothesis["information"][N_SLOTS - 1]
+        normal.append(N / np.sqrt(D))
+        estimate.append(N / D)
+        information.append(D)
+    return np.array(normal), np.array(estimate), np.array(information)
+
+
+@pytest.mark.parametrize("case", AXES)
+def test_without_a_fault_the_test_is_standard_normal_tails_and_all(case):
+    normal, _, _ = _statistics(case, theta=0.0)
+    assert kstest(normal, "norm").pvalue > 1e-3
+    assert np.mean(normal**2) == pytest.approx(1.0, abs=4 * np.sqrt(2 / len(normal)))
+    assert np.mean(normal**4) == pytest.approx(3.0, abs=4 * np.sqrt(96 / len(normal)))
+    assert np.mean(np.abs(normal) > 2.0) == pytest.approx(0.0455, abs=4 * np.sqrt(0.0455 / len(normal)))
+
+
+@pytest.mark.parametrize("case", AXES)
+@pytest.mark.parametrize("theta", [-0.4, 1.5])
+def test_the_estimate_is_unbiased_and_as_sure_as_it_says(case, theta):
+    _, estimate, information = _statistics(case, theta)
+    error = (estimate - theta) * np.sqrt(information)
+    assert np.mean(error) == pytest.approx(0.0, abs=4 / np.sqrt(len(error)))
+    assert np.mean(error**2) == pytest.approx(1.0, abs=4 * np.sqrt(2 / len(error)))
+
+
+@settings(max_examples=60)
+@given(
+    st.sampled_from(sorted(AXES)),
+    st.integers(0, 2**31),
+    st.lists(st.floats(-1, 1), min_size=3, max_size=3),
+    st.sampled_from([1.0, 0.98]),
+    st.booleans(),
+)
+def test_errors_of_coefficients_within_their_tolerance_never_add_to_a_score(case, seed, share, keep, corner):
+    rng, frames = np.random.default_rng(seed), 90
+    tolerance = rng.uniform(0, 1, 3)
+    n = len(AXES[case][1])
+    signatures, regressors = rng.normal(size=(frames, 3, n)), rng.normal(size=(frames, 3, n))
+    error = tolerance * (np.sign(share) if corner else share)
+    nu = drawn(_block(case), frames, DT, rng)
+    kinds = LOSS, STEP, ALPHA3
+    clean = _shown(_block(case, *kinds), nu, signatures, keep=keep)
+    wrong = nu + np.einsum("j,kjn->kn", error, regressors)
+    careful = _shown(_block(case, *kinds, tolerance=tolerance), wrong, signatures, regressors, keep=keep)
+    for h in range(3):
+        before, after = clean["hypothesis"][h], careful["hypothesis"][h]
+        assert after["score"] <= before["score"] + 1e-9
+        assert after["at_least"] <= before["at_least"] + 1e-9
+        assert after["at_most"] >= before["at_most"] - 1e-9
+
+
+def test_the_worst_corner_takes_all_of_the_allowance():
+    """No allowance is wasted: at one corner the score is what it is without errors."""
+    rng, frames = np.random.default_rng(4), 33  # one onset at a frame of its own: the last
+    signatures, regressors = rng.normal(size=(frames, 1, 2)), rng.normal(size=(frames, 2, 2))
+    tolerance = np.array([0.5, 0.3])
+    nu = drawn(_block("two axes"), frames, DT, rng)
+    clean = _shown(_block("two axes", STEP), nu, signatures)["hypothesis"][0]
+    slot = N_SLOTS - 1
+    blank = _shown(_block("two axes", STEP, tolerance=tolerance), nu, signatures, regressors)["hypothesis"][0]
+    overlap = blank["overlap"][slot][:2]
+    worst = np.sign(clean["correlation"][slot]) * np.sign(overlap) * tolerance
+    wrong = nu + np.einsum("j,kjn->kn", worst, regressors)
+    block = _shown(_block("two axes", STEP, tolerance=tolerance), wrong, signatures, regressors)
+    seen = block["hypothesis"][0]
+    slack = likelihood.tolerance(block, seen, slot)
+    assert abs(seen["correlation"][slot]) - slack == pytest.approx(abs(clean["correlation"][slot]), rel=1e-9)
+
+
+def test_there_is_always_an_onset_of_about_every_age():
+    """Within a factor of two, up to as many frames as the slots can tell apart."""
+    frames, oldest = 3000, 2 ** (N_SLOTS - 1)
+    onset = np.zeros(N_SLOTS, int)
+    for k in range(frames):
+        onset[likelihood.slot_to_start(k)] = k
+        ages = k - onset
+        age = np.arange(1, min(k, oldest) + 1)[:, None]
+        assert np.any((ages >= age / 2) & (ages <= 2 * age), axis=1).all(), k
+    assert ages.max() < 2 * oldest
+
+
+def test_a_loss_is_no_gain_and_a_step_may_go_either_way():
+    frames = 50
+    signatures = np.ones((frames, 2, 1)) * np.sin(0.3 * np.arange(frames))[:, None, None]
+    for theta in (-0.8, 0.8):
+        block = _shown(_block("one axis", LOSS, STEP), theta * signatures[:, 0], signatures)
+        loss, step = block["hypothesis"][0], block["hypothesis"][1]
+        assert step["score"] > 1.0
+        assert step["theta"] == pytest.approx(theta, abs=1e-9)
+        assert loss["score"] == (pytest.approx(step["score"]) if theta < 0 else 0.0)
+        assert loss["at_most"] == (0.0 if theta > 0 else pytest.approx(loss["at_least"]))
+
+
+@given(st.floats(-200, 200), st.floats(0.01, 100))
+def test_the_likelihood_of_a_loss_is_greatest_within_its_set(evidence, information):
+    """By search over theta in [-1, 0] instead of cases; evidence is that for a loss."""
+    theta = np.linspace(0, 1, 4001)
+    best = np.max(theta * evidence - 0.5 * theta**2 * information)
+    found = likelihood.log_likelihood(LOSS, evidence, information)
+    assert found == pytest.approx(best, rel=1e-5, abs=1e-4 * information)
+
+
+def test_the_estimate_of_a_loss_knows_that_it_is_one():
+    """With no information it is in the middle; with much of it, what was seen."""
+    assert likelihood.estimate(LOSS, 0.0, 0.0) == -0.5
+    assert likelihood.estimate(LOSS, -0.4e6, 1e6) == pytest.approx(-0.4, abs=1e-4)
+    assert likelihood.estimate(LOSS, -5e6, 1e6) == -1.0
+    assert likelihood.estimate(LOSS, 5e6, 1e6) == 0.0
+
+
+def test_from_the_alarm_on_old_evidence_is_forgotten():
+    """By least squares with weights: each frame counts `keep` times what the next one counts."""
+    frames, keep = 200, 0.95
+    signatures = np.ones((frames, 1, 1)) * np.cos(0.2 * np.arange(frames))[:, None, None]
+    nu = -0.5 * signatures[:, 0]
+    nu[frames // 2 :] = -0.9 * signatures[frames // 2 :, 0]
+    block = _shown(_block("one axis", LOSS), nu, signatures, keep=keep)
+    forever = _shown(_block("one axis", STEP), nu, signatures)
+    slot = N_SLOTS - 1
+    hypothesis, everything = block["hypothesis"][0], forever["hypothesis"][0]
+    recent = hypothesis["correlation"][slot] / hypothesis["information"][slot]
+    assert recent == pytest.approx(-0.9, abs=0.02)
+    assert everything["correlation"][slot] / everything["information"][slot] > -0.85

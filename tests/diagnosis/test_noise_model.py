@@ -1,0 +1,196 @@
+"""What is declared is kept: rates of false alarms, bounded uncertainty, steady errors of coefficients."""
+
+import numpy as np
+import pytest
+from innovations import LEVEL_FLIGHT, Detector, surfaces_at_work
+from scipy.stats import norm
+
+from beaver_ftc.design.coefficients import MASS
+from beaver_ftc.design.model import AXES, TERMS, design_record, regressors
+from beaver_ftc.design.variants import response
+from beaver_ftc.diagnosis import noise_model, statistical
+from beaver_ftc.diagnosis.config import Bounds
+from beaver_ftc.diagnosis.state import LOSS
+from beaver_ftc.plant.instruments import SIGNALS
+from beaver_ftc.statistics import poisson
+
+NO_COUPLING = {"p": 0.0, "q": 0.0, "r": 0.0}
+TACTICAL = {"sensors": "tactical-grade"}
+SETTINGS = {
+    "ideal gyros": {},
+    "tactical-grade": TACTICAL,
+    "tolerances": {**TACTICAL, "coefficients": 0.05},
+    "light turbulence": {**TACTICAL, "turbulence": "light"},
+    "severe turbulence, poor gyros": {"sensors": "consumer-grade", "turbulence": "severe"},
+}
+
+
+@pytest.mark.parametrize("turbulence", ["none", "light"])
+@pytest.mark.parametrize("rate_hz", [20.0, 100.0, 1000.0])
+def test_the_level_shares_the_declared_rate_among_all_tests_of_an_hour(rate_hz, turbulence):
+    alone = Detector(rate_hz, bounds={"turbulence": turbulence})
+    hypotheses = [h for block in alone.blocks for h in block["hypothesis"][: block["n_hypotheses"]]]
+    slots = len(hypotheses[0]["correlation"])
+    tests = sum(slots * (1 if h["kind"] == LOSS else 2) for h in hypotheses if h["alarms"])
+    tail = norm.sf(alone.detector["alarm_level"])
+    assert tail * tests * rate_hz * 3600 == pytest.approx(1e-3, rel=1e-6)
+    margin = np.sqrt(2 * alone.detector["naming_level"])
+    assert norm.sf(margin) * tests * rate_hz == pytest.approx(1e-4, rel=1e-6)
+
+
+@pytest.mark.parametrize("per_h", [3600.0, 36000.0])
+@pytest.mark.parametrize("rate_hz", [20.0, 100.0])
+@pytest.mark.parametrize("setting", SETTINGS)
+def test_false_alarms_are_no_more_than_declared_and_not_absurdly_fewer(setting, rate_hz, per_h):
+    """On innovations as declared, a new flight after every alarm. The union bound costs a factor of six or
+    so: tests of neighbouring onsets and frames go together."""
+    alone = Detector(rate_hz, bounds=SETTINGS[setting])
+    alone.detector["alarm_level"] = noise_model.alarm_level(per_h, rate_hz, len(alone.blocks))
+    hours, rng = 240.0 / 3600.0, np.random.default_rng(8)
+    frames = round(hours * 3600.0 * rate_hz)
+    scores = alone.watch(alone.innovations(frames, rng), *surfaces_at_work(frames, rate_hz, rng), renew=True)
+    seen = poisson(int(np.sum(scores > 1.0)), hours, 0.999)
+    assert seen.high <= per_h
+    assert seen.low > 0.02 * per_h
+
+
+def _share(rate_hz, omega, eta_bar, declared=None, seconds=20, **bounds):
+    """Largest share of the level that eta_bar sin(omega t) reaches, in roll and pitch, or yaw."""
+    constant = dict.fromkeys(AXES, eta_bar)
+    largest = 0.0
+    for axes in ((0, 1), (2,)):
+        for phase in (0.0, 0.8, 1.6, 2.4):
+            alone = Detector(
+                rate_hz,
+                statistical={"uncertainty_rad_s": declared or omega},
+                bounds={"constant_rad_s2": constant, "inertia_coupling": NO_COUPLING, **bounds},
+            )
+            frames = round(seconds * rate_hz)
+            nu = np.zeros((frames, 3))
+            nu[:, axes] = eta_bar * np.sin(omega * np.arange(frames)[:, None] / rate_hz + phase)
+            scores = alone.watch(nu, *surfaces_at_work(frames, rate_hz, np.random.default_rng(1)))
+            largest = max(largest, scores[round(2 * rate_hz) :].max())
+    return largest
+
+
+@pytest.mark.parametrize("omega", [15.0, 60.0])
+@pytest.mark.parametrize("rate_hz", [20.0, 100.0, 500.0])
+@pytest.mark.parametrize(
+    ("sensors", "eta_bar"), [("ideal", 0.02), ("tactical-grade", 0.02), ("tactical-grade", 0.3)]
+)
+def test_bounded_uncertainty_takes_no_more_than_half_the_level(sensors, eta_bar, rate_hz, omega):
+    assert 0.1 < _share(rate_hz, omega, eta_bar, sensors=sensors) < 0.505
+
+
+@pytest.mark.parametrize("sensors", ["ideal", "tactical-grade"])
+@pytest.mark.parametrize("rate_hz", [20.0, 100.0, 500.0])
+def test_and_not_the_whole_where_it_goes_at_the_pace_of_the_commands(sensors, rate_hz):
+    """At 3 rad/s it resembles what a lost surface would do for as long as the windows are."""
+    assert _share(rate_hz, 3.0, 0.02, sensors=sensors) < 0.75
+
+
+def test_uncertainty_that_stays_put_is_no_fault_in_moving_air_either():
+    """There the drift of one view returns, and what is constant leaves a trace."""
+    for omega in (0.0, 0.3, 1.5, 4.0):
+        assert _share(100.0, omega, 0.02, 15.0, **TACTICAL, turbulence="light") < 0.5
+
+
+@pytest.mark.parametrize("sensors", ["ideal", "tactical-grade"])
+@pytest.mark.parametrize("coupling", [0.0, 0.25])
+def test_with_no_uncertainty_declared_the_detector_still_has_numbers(sensors, coupling):
+    """Nothing may drift then, and gyros may be exact: no division by nothing."""
+    bounds = {
+        "constant_rad_s2": NO_COUPLING,
+        "inertia_coupling": dict.fromkeys(AXES, coupling),
+        "sensors": sensors,
+    }
+    alone = Detector(100.0, bounds=bounds)
+    frames = 3000
+    Gu, cubic = surfaces_at_work(frames, 100.0, np.random.default_rng(1))
+    faulty = np.zeros((frames, 3))
+    faulty[2000:] = -0.3 * Gu[2000:, :, 1]
+    scores = alone.watch(faulty, Gu, cubic)
+    assert scores[:2000].max() == 0.0
+    assert scores[2000:].max() > 1.0
+    assert np.isfinite(scores).all()
+
+
+def _moment_scale(design):
+    """Angular accelerations of Cl, Cm and Cn at the flight condition, (3, 3)."""
+    S, b, c, qdyn = design["S"], design["b"], design["c"], LEVEL_FLIGHT[1][3]
+    Cl = np.array([design["Pl"], 0.0, design["Rl"]]) * qdyn * S * b
+    Cm = np.array([0.0, design["Qm"], 0.0]) * qdyn * S * c
+    Cn = np.array([design["Pn"], 0.0, design["Rn"]]) * qdyn * S * b
+    return np.abs(np.column_stack([Cl, Cm, Cn]))
+
+
+def _rates(design, x, y, u):
+    f, G = np.zeros(3), np.zeros((3, 4))
+    response(design, x, y, f, G)
+    return f + G @ u
+
+
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+@pytest.mark.parametrize(
+    ("signal", "kind"),
+    [(signal, "scale_error") for signal in SIGNALS]
+    + [(signal, "bias") for signal in SIGNALS if signal not in AXES],
+)
+def test_a_steady_error_of_a_sensor_is_within_the_tolerances_it_is_turned_into(signal, kind, sign):
+    """Small rates about trim; what a gyro's bias does is constant, and the drift's part."""
+    unit = {"alpha": "bias_deg", "beta": "bias_deg", "V": "bias_mps", "qdyn": "bias_pa"}.get(signal)
+    size = 0.02 if kind == "scale_error" else {"alpha": 0.3, "beta": 0.3, "V": 0.4, "qdyn": 10.0}[signal]
+    bounds = Bounds.model_validate({"sensors": {signal: {(unit if kind == "bias" else kind): size}}})
+    design = design_record()[0]
+    i = SIGNALS.index(signal)
+    _, y, _ = LEVEL_FLIGHT
+    rng = np.random.default_rng(2)
+    tolerance = noise_model.steady_tolerance(bounds, np.array(design["coefficient"]), MASS, y, np.zeros(4))
+    for _ in range(50):
+        x, u = rng.uniform(-0.02, 0.02, 3), np.append(rng.uniform(-0.005, 0.005, 3), 0.0)
+        seen = np.concatenate([x, y[:4]])
+        truth = _rates(design, x, y, u)
+        error = sign * (np.deg2rad(size) if unit == "bias_deg" else size)
+        seen[i] = seen[i] + error if kind == "bias" else seen[i] * (1 + sign * size)
+        if signal in AXES:
+            truth[i] *= 1 + sign * size
+        told = np.append(seen[3:], y[4])
+        terms = np.zeros((3, 9))
+        regressors(design, seen[:3], told, u, terms)
+        explained = _moment_scale(design) @ np.sum(tolerance * np.abs(terms), axis=1)
+        wrong = np.abs(truth - _rates(design, seen[:3], told, u))
+        assert (wrong <= 1.05 * explained + 3e-4).all(), (wrong, explained)
+
+
+def test_tolerances_of_coefficients_and_inertia_add_up():
+    bounds = Bounds.model_validate({"coefficients": {"Cm_de": 0.1}, "inertia": 0.05})
+    coefficient = np.array(design_record()["coefficient"][0])
+    tolerance = noise_model.steady_tolerance(bounds, coefficient, MASS, *LEVEL_FLIGHT[1:])
+    inertia = noise_model.steady_tolerance(
+        Bounds.model_validate({"inertia": 0.05}), coefficient, MASS, *LEVEL_FLIGHT[1:]
+    )
+    i = TERMS[1].index("Cm_de")
+    assert (tolerance - inertia)[1, i] == pytest.approx(0.1 * abs(coefficient[1, i]))
+    assert inertia[1, i] >= 0.05 / 1.05 * abs(coefficient[1, i])
+
+
+def test_noise_of_other_sensors_and_of_deflections_is_part_of_the_noise():
+    """By moving each signal by its standard deviation: what that does to f + G u is the jitter."""
+    alone = Detector(100.0, bounds={**TACTICAL, "deflection_deg": 0.5})
+    design = alone.frames[0]["design"]
+    x, y, u = LEVEL_FLIGHT
+    sensors = Bounds.model_validate(TACTICAL).sensors
+    square, around = np.zeros(3), np.concatenate([x, y[:4]])
+    for i, name in enumerate(SIGNALS):
+        moved = around.copy()
+        moved[i] += getattr(sensors, name).noise_bias_quantum[0]
+        square += (_rates(design, moved[:3], np.append(moved[3:], y[4]), u) - _rates(design, x, y, u)) ** 2
+    assert alone.detector["jitter"] == pytest.approx(square, rel=0.02)
+    for block in alone.blocks:
+        n = block["n"]
+        assert block["jitter"][:n] == pytest.approx(square[block["axis"][:n]], rel=0.02)
+    half_a_degree = np.abs(_rates(design, x, y, u) - _rates(design, x, y, u + np.deg2rad([0, 0.5, 0, 0])))[1]
+    assert alone.detector["deflection"][1] >= half_a_degree
+    calm = Detector(100.0, bounds=TACTICAL)
+    assert alone.blocks[0]["drift"][0, 0] > calm.blocks[0]["drift"][0, 0]
+    assert statistical.PITCH == 0

@@ -1,0 +1,126 @@
+"""The whitening filter against a textbook Kalman filter, the Riccati equation, and what it is for."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from innovations import PlainKalman, block_of, drawn, filter_all
+from scipy.linalg import solve_discrete_are
+
+from beaver_ftc.diagnosis import whitening
+
+TOGETHER = np.array([[0.04, 0.006], [0.006, 0.003]])
+CASES = {  # drift, noise, what a drift keeps of itself in a frame
+    "one axis": (np.array([[0.02]]), [3e-4], 1.0),
+    "two axes": (TOGETHER, [3e-4, 8e-4], 1.0),
+    "a drift that returns": (TOGETHER, [3e-4, 8e-4], 0.98),
+}
+WALKS = ("one axis", "two axes")
+
+
+def _whitened(block, innovations, dt):
+    out = np.zeros((len(innovations), 2))
+    filter_all(block, innovations, dt, out)
+    return out[:, : block["n"]]
+
+
+def _parts(block):
+    n = int(block["n"])
+    return {
+        name: np.array(block[name][:n, :n]) for name in ("P_xx", "P_xd", "P_dd", "S_inverse", "K_x", "K_d")
+    }
+
+
+@settings(max_examples=25)
+@given(st.sampled_from(sorted(CASES)), st.sampled_from([20.0, 100.0, 1000.0]), st.integers(0, 2**31))
+def test_it_is_the_textbook_filter_while_noise_and_drift_change(case, rate_hz, seed):
+    rng, dt = np.random.default_rng(seed), 1 / rate_hz
+    drift, noise, keep = CASES[case]
+    block, n = block_of(drift, noise, jitter=0.05, keep=keep), len(drift)
+    plain = PlainKalman(block, dt)
+    rate = np.zeros(n)
+    for _ in range(60):
+        root = rng.normal(size=(n, n))
+        block["drift"][:n, :n] = 0.1 * root @ root.T
+        block["jitter"][:n] = rng.uniform(0, 0.01, n)
+        plain.Q[:n, :n] = np.diag(dt**2 * block["jitter"][:n])
+        plain.Q[n:, n:] = dt * block["drift"][:n, :n]
+        acceleration = rng.normal(size=n)
+        rate = rate + dt * acceleration
+        expected = plain.step(rate)
+        assert _whitened(block, acceleration[None], dt)[0] == pytest.approx(expected, rel=1e-7, abs=1e-13)
+        parts = _parts(block)
+        assert np.linalg.inv(parts["S_inverse"]) == pytest.approx(plain.S, rel=1e-8)
+        assert np.vstack([parts["K_x"], parts["K_d"]]) == pytest.approx(plain.K, rel=1e-7, abs=1e-9)
+        assert parts["P_dd"] == pytest.approx(plain.P[n:, n:], rel=1e-7, abs=1e-12)
+        assert parts["P_xd"] == pytest.approx(plain.P[:n, n:], rel=1e-7, abs=1e-14)
+
+
+@pytest.mark.parametrize("rate_hz", [20.0, 100.0, 1000.0])
+@pytest.mark.parametrize("case", CASES)
+def test_after_a_million_frames_it_is_where_the_riccati_equation_says(case, rate_hz):
+    drift, noise, keep = CASES[case]
+    block, n, dt = block_of(drift, noise, jitter=0.02, keep=keep), len(drift), 1 / rate_hz
+    plain = PlainKalman(block, dt)
+    P = solve_discrete_are(plain.F.T, plain.H.T, plain.Q, plain.R)
+    _whitened(block, np.zeros((1_000_000, n)), dt)
+    parts = _parts(block)
+    assert np.linalg.inv(parts["S_inverse"]) == pytest.approx(P[:n, :n] + plain.R, rel=1e-6)
+    K = P @ plain.H.T @ np.linalg.inv(P[:n, :n] + plain.R)
+    assert np.vstack([parts["K_x"], parts["K_d"]]) == pytest.approx(K, rel=1e-5, abs=1e-9)
+
+
+@pytest.mark.parametrize("jitter", [0.0, 0.5])
+@pytest.mark.parametrize("case", CASES)
+def test_innovations_of_the_model_come_out_white_and_of_the_covariance_said(case, jitter):
+    drift, noise, keep = CASES[case]
+    block, dt, frames = block_of(drift, noise, jitter, keep=keep), 0.01, 200_000
+    white = _whitened(block, drawn(block, frames, dt, np.random.default_rng(5), start=1.0), dt)[1000:]
+    n = len(drift)
+    unit = white @ np.linalg.cholesky(block["S_inverse"][:n, :n])
+    assert unit.T @ unit / len(unit) == pytest.approx(np.eye(n), abs=5 * np.sqrt(2 / frames))
+    for lag in (1, 2, 5, 20, 100, 500):
+        across = unit[lag:].T @ unit[:-lag] / len(unit)
+        assert across == pytest.approx(np.zeros((n, n)), abs=5 / np.sqrt(frames))
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_from_the_first_frame_on_the_covariance_is_as_said(case):
+    """Over many flights, frame by frame: also while the filter is still finding out about the drift."""
+    drift, noise, keep = CASES[case]
+    dt, frames, flights, n = 0.01, 8, 4000, len(drift)
+    rng, squares = np.random.default_rng(2), np.zeros((frames, n, n))
+    for _ in range(flights):
+        block = block_of(drift, noise, keep=keep)
+        g = _whitened(block, drawn(block, frames, dt, rng, start=1.0), dt)
+        squares += g[:, :, None] * g[:, None, :]
+    block = block_of(drift, noise, keep=keep)
+    for k in range(frames):
+        whitening.advance(block, dt)
+        whole = np.linalg.cholesky(block["S_inverse"][:n, :n])
+        assert whole.T @ (squares[k] / flights) @ whole == pytest.approx(
+            np.eye(n), abs=6 * np.sqrt(2 / flights)
+        )
+
+
+@pytest.mark.parametrize("case", WALKS)
+def test_what_is_constant_leaves_no_trace(case):
+    drift, noise, keep = CASES[case]
+    n = len(drift)
+    wave = np.sin(0.1 * np.arange(3000))[:, None] * np.ones(n)
+    without = _whitened(block_of(drift, noise, keep=keep), wave, 0.01)
+    beside = _whitened(block_of(drift, noise, keep=keep), wave + np.array([3.0, -2.0])[:n], 0.01)
+    trace = np.abs(beside - without).max(axis=1)
+    assert trace[0] > 0.01
+    assert trace[1500:].max() < 1e-9 * trace[0]
+
+
+@pytest.mark.parametrize("case", WALKS)
+def test_gyros_without_noise_are_believed_at_once(case):
+    """The drift is then the last innovation, and the next one tells only how it changed."""
+    drift, _, _ = CASES[case]
+    block, n, dt = block_of(drift, 0.0), len(drift), 0.01
+    nu = drawn(block, 5000, dt, np.random.default_rng(3), start=1.0)
+    white = _whitened(block, nu, dt)
+    assert white[1:] == pytest.approx(dt * np.diff(nu, axis=0), abs=1e-12)
+    assert np.linalg.inv(block["S_inverse"][:n, :n]) == pytest.approx(dt**3 * drift, rel=1e-6)

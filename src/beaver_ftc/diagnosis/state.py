@@ -96,7 +96,7 @@ ADMITTED = np.dtype(
 N_SLOTS = 10
 MAX_HYPOTHESES, MAX_REGRESSORS = 4, 18
 EITHER, WORST_CASE, STATISTICS = 0, 1, 2  # whose alarms count
-LEAST_UNCERTAINTY_RAD_S2 = 1e-3  # that the detector reckons with: a bound that passes zero does not stay there
+LEAST_UNCERTAINTY_RAD_S2 = 1e-3  # reckoned with: a bound that passes zero does not stay there
 STEP, ALPHA3 = 2, 3  # further kinds of hypothesis: likelihood.py
 
 AIR = np.dtype(

@@ -1,0 +1,208 @@
+"""What the vanes know of the air's rotation, held against JSBSim's own gusts, and the algebra behind it."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from beaver_ftc.design.coefficients import MASS
+from beaver_ftc.design.model import design_record
+from beaver_ftc.design.variants import jacobian
+from beaver_ftc.diagnosis import air, noise_model
+from beaver_ftc.diagnosis.state import AIR
+from beaver_ftc.loop import Loop
+from flying import scenario
+
+MEMORY_S = 0.05  # over which the whitening filter compares, about
+FT = 0.3048
+
+
+def air_of(turbulence="light"):
+    """The record as before a flight."""
+    record = np.zeros(1, AIR).view(np.recarray)[0]
+    noise_model._set_up_air(record, turbulence, MASS)
+    return record
+
+
+class Flown:
+    """A flight frame by frame: gusts seen and true (k, 3) rad/s in level axes, airspeed, headings."""
+
+    def __init__(self, turbulence="light", **keys):
+        environment = {"turbulence": "dryden", "severity": turbulence} if turbulence != "none" else {}
+        environment |= keys.pop("environment", {})
+        bounds = {"turbulence": turbulence if turbulence != "none" else "light"}
+        fdi = {"statistical": {}, "bounds": bounds}
+        given = scenario(**{"uncertainty": {}, "environment": environment, "fdi": fdi, **keys})
+        loop = Loop(given)
+        loop.sample_references(0, loop.n_frames)
+        nodes = [loop.plant.node(f"atmosphere/{axis}-turb-rad_sec") for axis in "pqr"]
+        heading = loop.plant.node("attitude/psi-rad")
+        accelerations = [loop.plant.node(f"accelerations/a-pilot-{axis}-ft_sec2") for axis in "xyz"]
+        record = loop.frames["fdi"]["statistical"]["air"][0]
+        rows = []
+        loop.fly_frames(1, 0)
+        for _ in range(loop.n_frames - 1):
+            loop.fly_frames(1, given.substeps)
+            turn = np.array(record["turn"])
+            true = turn.T @ [node.get_double_value() for node in nodes]
+            felt = [FT * node.get_double_value() for node in accelerations]
+            V = loop.frames["y"][0][2]
+            rows.append([*record["gust"], *true, V, heading.get_double_value(), *record["force"], *felt])
+        rows = np.array(rows)
+        self.seen, self.true = rows[:, 0:3], rows[:, 3:6]
+        self.airspeed, self.heading = rows[:, 6].mean(), np.unwrap(rows[:, 7])
+        self.force, self.felt = rows[:, 8:11], rows[:, 11:14]
+        self.rate_hz, self.turbulence = given.rate_hz, turbulence
+
+    def intensity(self, signal, over_s=MEMORY_S):
+        """Of the random walk that differs as much over so long (3,), as a share of what is declared."""
+        frames = round(over_s * self.rate_hz)
+        differences = signal[frames:] - signal[:-frames]
+        declared = noise_model.gust_drift(self.turbulence) * self.airspeed
+        return np.mean(differences**2, axis=0) / over_s / declared
+
+
+@cache
+def _flown(turbulence, airspeed_mps, seed, **keys):
+    return Flown(
+        turbulence,
+        duration_s=20,
+        seed=seed,
+        initial={"airspeed_mps": airspeed_mps, "altitude_m": 1143},
+        **keys,
+    )
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("airspeed_mps", [35, 45, 52])
+@pytest.mark.parametrize("turbulence", ["light", "severe"])
+def test_pitching_and_yawing_gusts_are_seen_but_for_less_than_the_share_declared(
+    turbulence, airspeed_mps, seed
+):
+    flown = _flown(turbulence, airspeed_mps, seed)
+    left = flown.intensity(flown.true - flown.seen)
+    assert left[1] < noise_model.UNSEEN[1]
+    assert left[2] < noise_model.UNSEEN[2]
+    assert np.corrcoef(flown.true[:, 1], flown.seen[:, 1])[0, 1] > 0.98
+    assert np.corrcoef(flown.true[:, 2], flown.seen[:, 2])[0, 1] > 0.95
+
+
+@pytest.mark.parametrize("keys", [{"substeps": 4}, {"rate_hz": 200}, {"rate_hz": 50}])
+def test_and_at_other_rates_and_between_jsbsims_frames(keys):
+    flown = Flown("light", duration_s=20, seed=3, **keys)
+    left = flown.intensity(flown.true - flown.seen)
+    assert left[1] < noise_model.UNSEEN[1]
+    assert left[2] < noise_model.UNSEEN[2]
+
+
+def test_a_steady_wind_is_not_taken_for_a_gust():
+    still, windy = (
+        Flown("light", duration_s=10, seed=3, environment={"wind_mps": wind})
+        for wind in ([0, 0, 0], [6, -8, 0.5])
+    )
+    assert windy.seen == pytest.approx(still.seen, abs=1e-3)
+    assert np.std(still.seen[:, 1]) > 0.01
+
+
+@pytest.mark.parametrize("turbulence", ["light", "severe"])
+def test_all_three_true_gusts_drift_no_faster_than_declared(turbulence):
+    flights = [_flown(turbulence, 45, seed) for seed in (1, 2, 3, 4)]
+    share = np.mean([flight.intensity(flight.true) for flight in flights], axis=0)
+    assert (share < 1.0).all()
+    assert (share > 0.5).all()
+
+
+def test_still_air_shows_no_gust():
+    flown = Flown("none", duration_s=20)
+    assert np.abs(np.diff(flown.seen[:, 1:], axis=0)).max() < 2e-4
+    assert np.abs(flown.seen[:, 1:]).max() < 5e-3  # against 0.03 rad/s in light turbulence
+
+
+def test_the_specific_force_is_the_one_felt_aboard():
+    """At the centre of gravity, against JSBSim's accelerometer, under references on all axes."""
+    flown = Flown("none", duration_s=8)
+    wrong = np.abs(flown.force - flown.felt)
+    assert flown.felt[:, 2].mean() == pytest.approx(-9.8, abs=0.5)
+    assert (wrong.max(axis=0) < [0.05, 0.1, 0.1]).all()
+
+
+def _turn(phi, theta):
+    turn = np.zeros((3, 3))
+    air.level_axes(phi, theta, turn)
+    return turn
+
+
+@given(st.floats(-3, 3), st.floats(-1.5, 1.5))
+def test_level_axes_are_turned_not_bent(phi, theta):
+    turn = _turn(phi, theta)
+    assert turn @ turn.T == pytest.approx(np.eye(3), abs=1e-12)
+    assert np.linalg.det(turn) == pytest.approx(1.0)
+    down = turn @ [0.0, 0.0, 1.0]
+    assert down == pytest.approx([-np.sin(theta), np.sin(phi) * np.cos(theta), np.cos(phi) * np.cos(theta)])
+    vector = np.array([0.3, -1.0, 2.0])
+    assert [air.to_level(turn, vector, i) for i in range(3)] == pytest.approx(turn.T @ vector)
+    assert (turn.T @ [1.0, 0.0, 0.0])[1] == 0.0  # the nose points ahead, up or down, not aside
+
+
+@given(st.floats(0.0, 6.28), st.floats(-3.0, 3.0))
+def test_a_heading_changes_by_what_it_turned_even_past_north(then, turned):
+    now = (then + turned) % (2 * np.pi)
+    assert air.heading_change(now, then) == pytest.approx(turned, abs=1e-9)
+
+
+@given(st.floats(30, 55), st.floats(0, 0.25), st.floats(-0.1, 0.1))
+def test_the_damping_is_the_slope_of_the_aerodynamic_moments(V, alpha, beta):
+    """f without its inertia coupling, which is of second order in the rates: at none, its slope vanishes."""
+    design = design_record()[0]
+    y = np.array([alpha, beta, V, 0.5 * V * V, 0.3])
+    _, _, slope, _ = jacobian(design, np.zeros(3), y, np.zeros(4))
+    out = np.zeros((3, 3))
+    air.damping(design, y, out)
+    assert out == pytest.approx(slope, rel=1e-9, abs=1e-12)
+
+
+def test_a_gust_acts_through_the_damping_in_body_axes():
+    """The air pitches up: against it the aircraft pitches down, and is damped as if it did."""
+    record, design = air_of(), design_record()[0]
+    y = np.array([0.1, 0.02, 45.0, 1036.0, 0.3])
+    record["turn"] = _turn(0.6, 0.1)
+    record["gust"] = [0.0, 0.02, -0.03]
+    air.effect(record, design.view(), np.zeros(3), y, np.zeros(4))
+    _, _, slope, _ = jacobian(design, np.zeros(3), y, np.zeros(4))
+    body = _turn(0.6, 0.1) @ record["gust"]
+    assert record["acceleration"] == pytest.approx(-slope @ body)
+
+
+def test_what_is_not_seen_drifts_in_body_axes_as_a_covariance_turns():
+    record, design = air_of(), design_record()[0]
+    y = np.array([0.1, 0.02, 45.0, 1036.0, 0.3])
+    record["turn"] = turn = _turn(0.6, 0.1)
+    air.effect(record, design, np.zeros(3), y, np.zeros(4))
+    spread = turn @ np.diag(45.0 * noise_model.gust_drift("light") * noise_model.UNSEEN) @ turn.T
+    expected = record["damping"] @ spread @ record["damping"].T
+    found = [[air.unseen_drift(record, 45.0, i, j) for j in range(3)] for i in range(3)]
+    assert np.array(found) == pytest.approx(expected, rel=1e-12)
+
+
+TURN = {  # to 30 deg of bank, and round
+    "p": [
+        {"step": {"amplitude_deg_s": 15, "start_s": 0.5}},
+        {"step": {"amplitude_deg_s": -15, "start_s": 2.5}},
+    ],
+    "q": [{"step": {"amplitude_deg_s": 3.6, "start_s": 1.5}}],
+    "r": [{"step": {"amplitude_deg_s": 6.2, "start_s": 1.5}}],
+}
+
+
+@pytest.mark.parametrize("wind_mps", [[0, 0, 0], [10, 5, 0]])
+def test_the_rolling_gust_rolls_whatever_the_heading(wind_mps):
+    """Of an aircraft that flies across what JSBSim takes for ahead it would pitch the nose; the vanes would
+    see nothing of it."""
+    flown = Flown("light", duration_s=25, seed=5, reference=TURN, environment={"wind_mps": wind_mps})
+    across = np.abs(np.cos(flown.heading)) < 0.5
+    assert across.sum() > 400
+    left = flown.intensity((flown.true - flown.seen)[across])
+    assert left[1] < noise_model.UNSEEN[1]
+    assert left[2] < noise_model.UNSEEN[2]

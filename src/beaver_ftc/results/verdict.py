@@ -26,6 +26,7 @@ def facts(metrics: Document) -> list[tuple[str, str]]:
     said = (
         ("fault", _fault(metrics)),
         ("detection", _detection(metrics)),
+        ("statistical", _statistical(metrics)),
         ("isolation", _isolation(metrics)),
         *(("", said) for said in _others(metrics)),
         ("probing", _probing(metrics)),
@@ -112,6 +113,16 @@ def _detection(metrics: Document) -> str:
     guaranteed = detection["guaranteed_delay_s"]
     within = "" if guaranteed is None else f" (certain within {_time(guaranteed)})"
     return f"after {_time(detection['delay_s'])} on {detection['axis']}{within}"
+
+
+def _statistical(metrics: Document) -> str:
+    """What the statistical detector would have said by itself; nothing if there was none."""
+    said = metrics["detection"].get("statistical")
+    if said is None:
+        return ""
+    when = "no alarm" if said["time_s"] is None else f"alarm at {_time(said['time_s'])}"
+    level = f"level {said['alarm_level']:.2f} standard deviations"
+    return f"{when}; {level}, in healthy flight at most {said['closest_approach']:.2f} of it"
 
 
 def _isolation(metrics: Document) -> str:

@@ -1,0 +1,135 @@
+"""Flights with the statistical detector: what it finds under noise, and what it leaves alone."""
+
+import numpy as np
+import pytest
+
+from beaver_ftc.results.metrics import metrics
+from beaver_ftc.results.verdict import facts
+from flying import flown, loss
+
+NOISY = {
+    "sensors": "tactical-grade",
+    "environment": {"turbulence": "dryden", "severity": "light"},
+}
+DECLARED = {"sensors": "tactical-grade", "turbulence": "light"}
+UNANTICIPATED = {"type": "unanticipated", "Cm_alpha3": 10, "at_s": 4}
+AT_WORK = {  # enough for the ailerons to stand out against the rolling gust
+    "p": [{"sine": {"amplitude_deg_s": 12, "frequency_hz": 0.5}}],
+    "q": [{"sine": {"amplitude_deg_s": 4, "frequency_hz": 0.3}}],
+    "r": [{"sine": {"amplitude_deg_s": 5, "frequency_hz": 0.4}}],
+}
+
+
+def _fdi(authority="either", bounds=None, **more):
+    return {"statistical": {}, "authority": authority, "bounds": bounds or {}, **more}
+
+
+@pytest.mark.parametrize(("surface", "magnitude"), [("elevator", 0.3), ("aileron", 0.8), ("rudder", 0.6)])
+def test_losses_are_found_named_and_estimated_under_noise_servos_turbulence_and_tolerances(
+    surface, magnitude
+):
+    flight, _ = flown(
+        duration_s=16, seed=2, reference=AT_WORK, actuators="servo",
+        faults=[loss(surface, magnitude, at_s=4)],
+        fdi=_fdi(bounds={**DECLARED, "coefficients": 0.05}), **NOISY,
+    )  # fmt: skip
+    assert flight.isolated == surface
+    assert 4.0 < flight.detection_time_s <= flight.isolation_time_s
+    assert flight.estimate == pytest.approx(-magnitude, abs=0.25)
+    assert flight.statistical["time_s"] == flight.detection_time_s
+
+
+@pytest.mark.parametrize("noise", [{}, NOISY])
+@pytest.mark.parametrize("authority", ["either", "statistical"])
+def test_the_published_unanticipated_fault_is_named_so(authority, noise):
+    flight, _ = flown(
+        duration_s=8, faults=[UNANTICIPATED], fdi=_fdi(authority, DECLARED if noise else None), **noise
+    )
+    assert flight.isolated == "unanticipated"
+    assert flight.detection_time_s < 4.5
+
+
+@pytest.mark.parametrize("noise", [{}, NOISY])
+def test_with_worst_case_authority_the_flight_is_the_one_without_it(noise):
+    keys = {"duration_s": 10, "faults": [loss(at_s=4)], **noise}
+    bounds = DECLARED if noise else {}
+    _, without = flown(fdi={"bounds": bounds}, **keys)
+    _, beside = flown(fdi=_fdi("worst-case", bounds), **keys)
+    assert np.array_equal(without.rows, beside.rows, equal_nan=True)
+
+
+@pytest.mark.parametrize("authority", ["either", "statistical"])
+@pytest.mark.parametrize("kappa", [0.1, 0.5, 5.0])
+@pytest.mark.parametrize("surface", ["elevator", "rudder"])
+def test_a_loss_that_grows_is_never_taken_for_something_else(surface, kappa, authority):
+    """Nor is one named already given up while its evidence fades, for what goes along with the commands."""
+    fault = loss(surface, 0.6, at_s=4, profile="incipient", kappa_per_s=kappa)
+    flight, _ = flown(duration_s=40, faults=[fault], fdi=_fdi(authority))
+    assert flight.isolated == surface or (flight.detection_time_s is None and authority == "statistical")
+
+
+def test_what_grows_slowly_is_found_by_the_worst_case_beside_the_drift_that_takes_it_in():
+    fault = loss("elevator", 0.6, at_s=4, profile="incipient", kappa_per_s=0.1)
+    both, _ = flown(duration_s=15, faults=[fault], fdi=_fdi("either"))
+    alone, _ = flown(duration_s=15, faults=[fault], fdi=_fdi("statistical"))
+    assert both.detection_time_s < 5.0
+    assert alone.detection_time_s is None
+
+
+@pytest.mark.parametrize(
+    ("severity", "keys"),
+    [
+        ("light", {}),
+        ("moderate", {"initial": {"airspeed_mps": 38}}),
+        ("severe", {"initial": {"airspeed_mps": 52}}),
+        ("light", {"rate_hz": 20}),
+        ("light", {"rate_hz": 200, "duration_s": 20}),
+        ("light", {"substeps": 4, "duration_s": 30}),
+        ("light", {"sensors": "consumer-grade"}),
+    ],
+)
+def test_no_false_alarm_in_moving_air(severity, keys):
+    environment = {"turbulence": "dryden", "severity": severity, "wind_mps": [4, -3, 0]}
+    keys = {"duration_s": 60, "seed": 4, "sensors": "tactical-grade", "environment": environment} | keys
+    bounds = {"sensors": keys["sensors"], "turbulence": severity}
+    flight, _ = flown(fdi=_fdi("statistical", bounds), **keys)
+    assert flight.detection_time_s is None
+    assert 0.2 < flight.statistical["closest_approach"] < 1.0
+
+
+@pytest.mark.parametrize("rate_hz", [20, 100, 500])
+def test_no_false_alarm_under_the_published_uncertainty_with_exact_gyros(rate_hz):
+    flight, _ = flown(duration_s=20, rate_hz=rate_hz, fdi=_fdi("statistical"))
+    assert flight.detection_time_s is None
+    assert flight.statistical["closest_approach"] < 0.7
+
+
+@pytest.mark.parametrize("authority", ["either", "statistical"])
+@pytest.mark.parametrize(
+    ("fault", "kind"),
+    [
+        (loss("elevator", 0.5, at_s=4), "loss_of_effectiveness"),
+        ({"type": "stuck", "actuator": "rudder", "at_s": 4}, "stuck"),
+    ],
+)
+def test_of_every_type_the_sets_name_whoever_raised_the_alarm(fault, kind, authority):
+    flight, _ = flown(duration_s=10, faults=[fault], fdi=_fdi(authority, fault_class="all"))
+    assert flight.isolated == fault["actuator"]
+    assert kind in (flight.isolation_type, *flight.candidates) or any(kind in c for c in flight.candidates)
+
+
+def test_a_scheme_that_is_not_ours_leaves_it_off():
+    flight, _ = flown(duration_s=3, fdi=_fdi(scheme="none"))
+    assert flight.statistical is None
+    assert flight.detection_time_s is None
+
+
+@pytest.mark.parametrize("given", [{"statistical": {}}, {}])
+def test_a_run_says_what_it_would_have_said_by_itself(given):
+    flight, _ = flown(duration_s=6, faults=[loss(at_s=4)], fdi=given)
+    said = dict(facts(metrics(flight)))
+    if given:
+        assert said["statistical"].startswith("alarm at 4.0")
+        assert "standard deviations" in said["statistical"]
+    else:
+        assert "statistical" not in said

@@ -57,6 +57,12 @@ _STATES = (
 _TRUTH_EXTRAS = ("pdot_rad_s2", "qdot_rad_s2", "rdot_rad_s2", "qdyn_pa", "dpt", "envelope_valid")
 
 
+LIKELIHOODS = (
+    *(f"{s}_loss_likelihood_share" for s in SURFACES[:3]),
+    *(f"{axis}_step_likelihood_share" for axis in AXES),
+)
+
+
 def _per_axis(pattern: str) -> list[str]:
     return [pattern.format(axis) for axis in AXES]
 
@@ -66,9 +72,9 @@ def _estimator_columns(name: str) -> list[str]:
     return [*limits, f"fie_{name}_excluded"]
 
 
-def log_columns(estimators: Iterable[str], power: bool = False) -> tuple[str, ...]:
+def log_columns(estimators: Iterable[str], power: bool = False, statistical: bool = False) -> tuple[str, ...]:
     """The log's columns in order, for the isolation estimators of these names; power: the law may use the
-    engine."""
+    engine; statistical: there is a statistical detector, whose tests are logged as shares of its level."""
     return (
         "t_s", *_STATES, *_TRUTH_EXTRAS,
         *_per_axis("{}_measured_rad_s"), *_per_axis("{}_reference_rad_s"), *_per_axis("{}_model_rad_s"),
@@ -81,4 +87,5 @@ def log_columns(estimators: Iterable[str], power: bool = False) -> tuple[str, ..
         *(f"{s}_effectiveness_estimate" for s in SURFACES),
         "mode", "detected",
         *(("manifold_pressure_inhg",) if power else ()),
+        *(LIKELIHOODS if statistical else ()),
     )  # fmt: skip

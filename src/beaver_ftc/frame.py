@@ -631,6 +631,8 @@ def record(frame, reference, row):
     row[column + 1] = fdi.detected
     if control.power.enabled:
         row[column + 2] = control.power.command[0]
+    if fdi.statistical.enabled:
+        statistical.record(fdi.statistical, row)
 
 
 @kernel

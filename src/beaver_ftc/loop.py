@@ -94,6 +94,7 @@ class Loop:
         self.columns = ch.log_columns(
             estimator_names(scenario.fdi.fault_class) if self._diagnoses_itself else (),
             bool(self.frames["control"]["power"]["enabled"][0]),
+            bool(self.frames["fdi"]["statistical"]["enabled"][0]),
         )
         self._log = np.empty((min(CHUNK_ROWS, self.n_frames), len(self.columns)))
         self._references = np.empty((len(self._log), 3))

@@ -100,6 +100,21 @@ def score(statistical, t):
 
 
 @kernel
+def record(statistical, row):
+    """Write the last columns of the log: each test as a share of the alarm level, losses, then steps."""
+    first = row.size - 6
+    for i in range(6):
+        row[first + i] = 0.0
+    for b in range(statistical.n_blocks):
+        block = statistical.block[b]
+        for h in range(block.n_hypotheses):
+            hypothesis = block.hypothesis[h]
+            if hypothesis.alarms:
+                place = first + (hypothesis.surface if hypothesis.kind == LOSS else 3 + hypothesis.axis)
+                row[place] = max(row[place], hypothesis.score / statistical.alarm_level)
+
+
+@kernel
 def is_open(fdi, surface):
     """Whether a loss of this surface has not been excluded."""
     for s in range(fdi.n_estimators):

@@ -91,7 +91,7 @@ def views(columns: Sequence[str], power: bool = False) -> tuple[View, ...]:
     """Every view that a log with these columns allows; power: the law has used the engine."""
     known = set(columns)
     named = (
-        _tracking(), _surfaces(), _detection(), _isolation(estimators(columns)),
+        _tracking(), _surfaces(), _detection(), _likelihood(), _isolation(estimators(columns)),
         _ratio(estimators(columns)), _effectiveness(), _supervisor(), *((_engine(),) if power else ()),
         _states(),
     )  # fmt: skip
@@ -157,6 +157,19 @@ def _detection() -> View:
     )
     title = "Detection: residuals of the detection estimator against their thresholds"
     return View("detection", title, panels, closeup=True)
+
+
+def _likelihood() -> View:
+    losses = tuple(
+        Trace(f"{surface}_loss_likelihood_share", f"{surface} loss", surface) for surface in SURFACES[:3]
+    )
+    steps = tuple(Trace(f"{axis}_step_likelihood_share", f"step of {axis}'", axis) for axis in AXES)
+    panels = (
+        Panel("loss of a surface: test / alarm level", losses, log_scale=True, level=1.0),
+        Panel("step of an acceleration: test / alarm level", steps, log_scale=True, level=1.0),
+    )
+    title = "Detection: likelihood ratio tests against their alarm level"
+    return View("likelihood", title, panels, closeup=True)
 
 
 def _isolation(names: Sequence[str]) -> View:

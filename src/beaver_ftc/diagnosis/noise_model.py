@@ -70,7 +70,10 @@ def set_up(
     _set_up_blocks(statistical, config.bounds.sensors)
     _set_up_noise(statistical, given, config.bounds, design, start, 1.0 / rate_hz)
     _set_up_tolerances(statistical, config.bounds, design, mass, start)
-    statistical["block"][-1]["lag"] = returning_length(statistical, float(start[1][AIRSPEED]), rate_hz)
+    block = statistical["block"][-1]
+    block["lag"] = returning_length(statistical, float(start[1][AIRSPEED]), rate_hz)
+    if statistical["air"]["moving"]:
+        block["stronger"] = (statistical["air"]["rolling"] / block["lag"]) ** 2
     if statistical["air"]["moving"]:
         statistical["jitter"] += _gust_jitter(config.bounds.sensors, design, start[1]) ** 2
 
@@ -84,7 +87,7 @@ def _random_error(sensors: Sensors, name: str) -> float:
 def _set_up_blocks(statistical: np.void, sensors: Sensors) -> None:
     for block, (axes, members) in zip(statistical["block"], BLOCKS, strict=True):
         block["n"], block["n_hypotheses"] = len(axes), len(members)
-        block["n_regressors"], block["keep"] = 9 * len(axes), 1.0
+        block["n_regressors"], block["keep"], block["stronger"] = 9 * len(axes), 1.0, 1.0
         for i, axis in enumerate(axes):
             block["axis"][i] = axis
             variance = max(_random_error(sensors, AXES[axis]), LEAST_NOISE_RAD_S) ** 2
@@ -136,16 +139,17 @@ def rapidity(eta_bar: float, omega: float, noise: float, level: float, dt_s: flo
 def returning_length(statistical: np.void, airspeed_mps: float, rate_hz: float) -> float:
     """Within which distance flown, m, the drift of the second view of roll and yaw returns.
 
-    In moving air that of the rolling gust. In still air what a bounded uncertainty allows: over the longest
-    window, T, one that swings along with the fault moves a test for a drift of intensity i and lag tau by
-    eta_bar sqrt(T / 2 i) / tau, and half the alarm level is left for it.
+    As soon as a bounded uncertainty allows: over the longest window, T, one that swings along with the fault
+    moves a test for a drift of intensity i and lag tau by eta_bar sqrt(T / 2 i) / tau, and half the alarm
+    level is left for it; and no later than the rolling gust does. A gust that returns later is taken for a
+    stronger one, with the same power where it is slow and more where it is fast.
     """
-    if statistical["air"]["moving"]:
-        return float(statistical["air"]["rolling"])
+    rolling = float(statistical["air"]["rolling"]) if statistical["air"]["moving"] else 0.0
     if statistical["rapidity"] == 0.0:
-        return 0.0  # nothing is declared that drifts: the two views are one
+        return rolling  # 0 in still air: nothing is declared that drifts, and the two views are one
     longest_s = 2 ** (N_SLOTS - 1) / rate_hz
-    return airspeed_mps * sqrt(2.0 * longest_s / statistical["rapidity"]) / float(statistical["alarm_level"])
+    lag_s = sqrt(2.0 * longest_s / statistical["rapidity"]) / float(statistical["alarm_level"])
+    return min(airspeed_mps * lag_s, rolling or np.inf)
 
 
 def _set_up_tolerances(

@@ -128,7 +128,7 @@ HYPOTHESIS = np.dtype(
 
 BLOCK = np.dtype(
     [
-        ("n", "i8"), ("axis", "i8", (2,)), ("lag", "f8"), ("keep", "f8"),
+        ("n", "i8"), ("axis", "i8", (2,)), ("lag", "f8"), ("keep", "f8"), ("stronger", "f8"),
         ("state", "f8", (4,)), ("rest", "f8", (4,)), ("innovation", "f8", (2,)), ("scratch", "f8", (2,)),
         ("P_xx", "f8", (2, 2)), ("P_xd", "f8", (2, 2)), ("P_dd", "f8", (2, 2)),
         ("drift", "f8", (2, 2)), ("jitter", "f8", (2,)), ("noise", "f8", (2,)),

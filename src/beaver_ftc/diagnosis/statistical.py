@@ -213,7 +213,8 @@ def drifts(statistical, fdi, design, x, y):
             for j in range(block.n):
                 block.drift[i, j] = 0.0
                 if statistical.air.moving:
-                    block.drift[i, j] = air.unseen_drift(statistical.air, y[AIRSPEED], axis, block.axis[j])
+                    unseen = air.unseen_drift(statistical.air, y[AIRSPEED], axis, block.axis[j])
+                    block.drift[i, j] = block.stronger * unseen
             size = max(bounded[axis] + statistical.deflection[axis], LEAST_UNCERTAINTY_RAD_S2)
             block.drift[i, i] += statistical.rapidity * size * size
             block.jitter[i] = statistical.jitter[axis]

@@ -10,7 +10,7 @@ from beaver_ftc.design.model import AXES
 from beaver_ftc.diagnosis.base import Verdict
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, UNANTICIPATED
 from beaver_ftc.flight import Flight
-from beaver_ftc.frame import DEPARTURE_SIGNALS, isolated_theta
+from beaver_ftc.frame import DEPARTURE_SIGNALS, DOMINANT_AXIS, isolated_theta
 from beaver_ftc.named import found
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.supervisor import MODES
@@ -25,6 +25,14 @@ def _rms(square_sum: np.ndarray, frames: int) -> tuple[float, float, float] | No
         return None
     p, q, r = np.sqrt(square_sum / frames)
     return float(p), float(q), float(r)
+
+
+def _estimate(fdi: np.void, surface: int) -> float:
+    """theta of the isolated loss. Compiled code is asked only where it must be: the first call from Python
+    takes a quarter of a second."""
+    if fdi["statistical"]["enabled"]:
+        return float(isolated_theta(fdi, surface))
+    return float(fdi["estimator"][int(fdi["isolated"])]["theta"][DOMINANT_AXIS[surface]])
 
 
 def _isolation(fdi: np.void) -> dict:
@@ -52,7 +60,7 @@ def _isolation(fdi: np.void) -> dict:
         "isolated": SURFACES[surface],
         "isolation_type": "loss_of_effectiveness",
         "candidates": tuple(left),
-        "estimate": float(isolated_theta(fdi, surface)),
+        "estimate": _estimate(fdi, surface),
         "isolation_time_s": at_s,
     }
 

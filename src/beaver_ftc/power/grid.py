@@ -13,6 +13,7 @@ WATCHED_S = 5.0  # after it
 WITHIN_S = (0.5, 1.0, WATCHED_S)  # how soon is soon
 FREQUENCY_HZ = {"p": 0.25, "q": 0.2, "r": 0.15}
 _RATE_HZ = 100.0
+UNEXPLAINED_UP_TO_RAD_S = 15.0  # the faster of the published sinusoids, and what is declared of them
 
 
 class Condition(NamedTuple):
@@ -163,7 +164,7 @@ def _uncertainty(bout: Bout) -> dict[str, Any]:
     """Inside the published bound [Zhang2005, sec. VII]: half of it at the bound, whatever the frequency."""
     draws = _draws(bout, 1)
     coupling = draws.uniform(-0.25, 0.25, 3).tolist()
-    frequency = np.exp(draws.uniform(np.log(1.0), np.log(30.0), 3)).tolist()
+    frequency = np.exp(draws.uniform(np.log(1.0), np.log(UNEXPLAINED_UP_TO_RAD_S), 3)).tolist()
     return {
         "inertia_coupling": dict(zip("pqr", coupling, strict=True)),
         "sinusoid": {

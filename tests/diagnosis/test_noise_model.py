@@ -90,9 +90,10 @@ def test_and_not_the_whole_where_it_goes_at_the_pace_of_the_commands(sensors, ra
 
 
 def test_uncertainty_that_stays_put_is_no_fault_in_moving_air_either():
-    """There the drift of one view returns, and what is constant leaves a trace."""
+    """There the drift of one view returns, and what is constant leaves a trace: half the level is left for
+    what swings along with a fault, and a constant is worth the root of two as much."""
     for omega in (0.0, 0.3, 1.5, 4.0):
-        assert _share(100.0, omega, 0.02, 15.0, **TACTICAL, turbulence="light") < 0.5
+        assert _share(100.0, omega, 0.02, 15.0, **TACTICAL, turbulence="light") < 0.72
 
 
 @pytest.mark.parametrize("sensors", ["ideal", "tactical-grade"])

@@ -1,14 +1,16 @@
 """From what a scenario declares to the statistical detector's numbers: levels, noise, tolerances."""
 
+from dataclasses import astuple
 from math import exp, hypot, pi, sqrt
 from statistics import NormalDist
 
 import numpy as np
 
-from beaver_ftc.design.coefficients import GEOMETRY, MassProperties, coefficient_terms
+from beaver_ftc.design.coefficients import GEOMETRY, MassProperties, coefficient_terms, inertia_coefficients
 from beaver_ftc.design.model import AILERON, AIRSPEED, ALPHA, AXES, BETA, DPT, ELEVATOR, QDYN, RUDDER, TERMS
 from beaver_ftc.design.variants import jacobian
 from beaver_ftc.diagnosis.admitted import GUST_FT_S, SCALE_FT, inertia_slack, tolerances
+from beaver_ftc.diagnosis.air import damping
 from beaver_ftc.diagnosis.config import Bounds, FdiConfig, Statistical
 from beaver_ftc.diagnosis.state import ALPHA3, LEAST_UNCERTAINTY_RAD_S2, LOSS, N_SLOTS, STEP
 from beaver_ftc.plant.instruments import SIGNALS
@@ -25,6 +27,7 @@ SIDES = {LOSS: 1, STEP: 2, ALPHA3: 2}  # a loss has a sign, a step may go either
 UNSEEN = (1.0, 0.003, 0.03)
 PRIOR_DRIFT_RAD_S2 = 1.0  # what a drift may be at the start of a flight: soon forgotten
 LEAST_NOISE_RAD_S = 1e-9  # of a gyro: exact ones are still doubles, and a variance no difference of zeros
+Start = tuple[np.ndarray, np.ndarray, np.ndarray]  # x (3,) rad/s, y (5,) and u (4,) rad in trim
 _RATE_TERMS = ("p", "q", "r")
 _POWERS = {  # of each signal in a term, what a relative error of it counts
     "p": (("p", 1),), "q": (("q", 1),), "r": (("r", 1),),
@@ -53,7 +56,7 @@ def set_up(
     config: FdiConfig,
     design: np.void,
     mass: MassProperties,
-    start: tuple[np.ndarray, np.ndarray, np.ndarray],
+    start: Start,
     rate_hz: float,
 ) -> None:
     """Fill the statistical part of a diagnosis record; start: x (3,), y (5,) and u (4,) in trim."""
@@ -74,7 +77,6 @@ def set_up(
     block["lag"] = returning_length(statistical, float(start[1][AIRSPEED]), rate_hz)
     if statistical["air"]["moving"]:
         block["stronger"] = (statistical["air"]["rolling"] / block["lag"]) ** 2
-    if statistical["air"]["moving"]:
         statistical["jitter"] += _gust_jitter(config.bounds.sensors, design, start[1]) ** 2
 
 
@@ -103,15 +105,14 @@ def _set_up_noise(
     given: Statistical,
     bounds: Bounds,
     design: np.void,
-    start: tuple[np.ndarray, np.ndarray, np.ndarray],
+    start: Start,
     dt_s: float,
 ) -> None:
     """What drifts, and what is white: noise of the measurements that f + G u is made of."""
-    dt = float(dt_s)
     noise = max(_random_error(bounds.sensors, axis) for axis in AXES)
     largest = max(bounds.constant_rad_s2.as_tuple())
     level = float(statistical["alarm_level"])
-    statistical["rapidity"] = rapidity(largest, given.uncertainty_rad_s, noise, level, dt)
+    statistical["rapidity"] = rapidity(largest, given.uncertainty_rad_s, noise, level, dt_s)
     _, G, f_x, f_y = jacobian(design, *start)
     errors = np.array([_random_error(bounds.sensors, name) for name in SIGNALS])
     along = np.column_stack([f_x, f_y[:, [ALPHA, BETA, AIRSPEED, QDYN]]])
@@ -157,7 +158,7 @@ def _set_up_tolerances(
     bounds: Bounds,
     design: np.void,
     mass: MassProperties,
-    start: tuple[np.ndarray, np.ndarray, np.ndarray],
+    start: Start,
 ) -> None:
     """What is constant but unknown, as tolerances of coefficients: theirs, inertia, steady sensor errors."""
     tolerance = steady_tolerance(bounds, np.asarray(design["coefficient"]), mass, start[1], start[2])
@@ -193,10 +194,6 @@ def _steady_share(bounds: Bounds, name: str, value: float) -> float:
 
 def _inertia_share(tolerance: float, mass: MassProperties) -> float:
     """Largest relative error of what multiplies a moment on its own axis."""
-    from dataclasses import astuple
-
-    from beaver_ftc.design.coefficients import inertia_coefficients
-
     slack, nominal = inertia_slack(tolerance, mass), np.abs(astuple(inertia_coefficients(mass)))
     return float(max(slack[i] / nominal[i] for i in (2, 7, 11)))
 
@@ -243,8 +240,6 @@ def _gust_jitter(sensors: Sensors, design: np.void, y: np.ndarray) -> np.ndarray
     speed = 0.3 * _random_error(sensors, "V") / V  # through attitudes of up to 17 deg
     pitching = (_random_error(sensors, "alpha") + speed) * pi * V / (4 * b)
     yawing = (_random_error(sensors, "beta") + speed) * pi * V / (3 * b)
-    from beaver_ftc.diagnosis.air import damping
-
     A = np.zeros((3, 3))
     damping.py_func(np.asarray(design).view(np.recarray), y, A)
     return np.sqrt((A[:, 1] * pitching) ** 2 + (A[:, 2] * yawing) ** 2)

@@ -97,6 +97,7 @@ COLUMNS: tuple[tuple[str, str, Getter], ...] = (
     *_under("flag", "detection", "detected"),
     *_under("float", "detection", "time_s", "delay_s", "guaranteed_delay_s"),
     *_under("text", "detection", "axis"),
+    *_under("float", "detection.statistical", "time_s", "alarm_level", "closest_approach"),
     *_under("flag", "isolation", "isolated", "correct"),
     *_under("text", "isolation", "fault", "type"),
     *_under("float", "isolation", "time_s", "delay_s", "estimate"),

@@ -14,7 +14,7 @@ from beaver_ftc.compiled import kernel
 from beaver_ftc.control import adaptive, allocation, authority, nominal, power, probing, reference_model
 from beaver_ftc.control.state import CONTROL, NOMINAL, ORACLE
 from beaver_ftc.design.actuators import ACTUATORS, move
-from beaver_ftc.design.model import ALPHA, BETA, DESIGN, ELEVATOR, QDYN
+from beaver_ftc.design.model import ALPHA, BETA, DESIGN, ELEVATOR, unanticipated_pitch
 from beaver_ftc.design.variants import response
 from beaver_ftc.diagnosis import air, bank, detection, fault_types, guarantee, isolation, network, statistical
 from beaver_ftc.diagnosis.derived import changing_error, derived_bound, slack_per_rad
@@ -123,13 +123,6 @@ def flight_status(truth):
 
 
 @kernel
-def unanticipated_effect(frame):
-    """The pitch acceleration of the truth's extra moment on alpha^3, rad/s2 [Zhang2005]."""
-    design, y = frame.design, frame.y
-    return frame.Cm_alpha3 * design.Qm * y[QDYN] * design.S * design.c * y[ALPHA] ** 3
-
-
-@kernel
 def fault_effect(frame):
     """Fill frame.phi (3,) rad/s2: what the truth's faults do to the angular acceleration, as the design
     model weighs it."""
@@ -140,7 +133,7 @@ def fault_effect(frame):
             for s in range(4):
                 frame.phi[i] += G[i, s] * (truth[ch.EFFECTIVE + s] - frame.u[s])
     if frame.faulted:
-        frame.phi[1] += unanticipated_effect(frame)
+        frame.phi[1] += unanticipated_pitch(frame.design, frame.y, frame.Cm_alpha3)
 
 
 @kernel
@@ -237,7 +230,7 @@ def predict(frame):
 def compare_likelihoods(frame):
     """Show the statistical detector the elapsed frame."""
     fdi = frame.fdi
-    cubic = statistical.unanticipated_pitch(frame.design, frame.y)
+    cubic = unanticipated_pitch(frame.design, frame.y, 1.0)
     statistical.signatures(fdi.statistical, frame.Gu_mean, cubic)
     statistical.observe(fdi.statistical, fdi.innovation, fdi.dt, frame.k, fdi.detected)
     statistical.score(fdi.statistical, frame.t)
@@ -252,7 +245,7 @@ def look_ahead(frame):
         if frame.k > 0:
             air.observe(fdi.statistical.air, frame.y, attitude, fdi.dt)
         else:
-            air.begin(fdi.statistical.air, frame.y, attitude)
+            air.advance_axes(fdi.statistical.air, frame.y, attitude)
     statistical.prepare(fdi.statistical, fdi, frame.design, frame.x, frame.y, frame.u)
 
 
@@ -441,7 +434,7 @@ def accommodate(frame):
     adaptive.approach(control, frame.target)
     frame.fhat[:] = 0.0
     if control.law == ORACLE:
-        frame.fhat[1] = unanticipated_effect(frame)
+        frame.fhat[1] = unanticipated_pitch(frame.design, frame.y, frame.Cm_alpha3)
     elif control.law != NOMINAL and fdi.detected:
         if likelihood_counts(fdi):
             statistical.unknown_acceleration(fdi.statistical, frame.fhat)

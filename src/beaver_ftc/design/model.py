@@ -133,6 +133,12 @@ def control_effectiveness(design, y, G):
 
 
 @kernel
+def unanticipated_pitch(design, y, Cm_alpha3):
+    """Pitch acceleration, rad/s2, of an extra moment coefficient on alpha^3 [Zhang2005]; y (5,)."""
+    return Cm_alpha3 * design.Qm * y[QDYN] * design.S * design.c * y[ALPHA] ** 3
+
+
+@kernel
 def acceleration(f, G, u, out):
     """Fill out (3,) with f + G u, rad/s2."""
     for i in range(3):

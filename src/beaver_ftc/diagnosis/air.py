@@ -79,14 +79,11 @@ def damping(design, y, out):
 
 
 @kernel
-def begin(air, y, attitude):
-    """Take the first measurement as it is: no gust has changed yet. y (5,); attitude (3,) rad."""
-    advance_axes(air, y, attitude)
-
-
-@kernel
 def advance_axes(air, y, attitude):
-    """Bring `turn`, `heading` and the `velocity` through the air, m/s in level axes, to this frame."""
+    """Bring `turn`, `heading` and the `velocity` through the air, m/s in level axes, to this frame.
+
+    y (5,) and attitude (3,) rad as measured. Of the first frame that is all: no gust has changed yet.
+    """
     alpha, beta, V = y[ALPHA], y[BETA], y[AIRSPEED]
     level_axes(attitude[0], attitude[1], air.turn)
     air.heading = attitude[2]

@@ -1,21 +1,20 @@
 """The statistical detector: likelihood ratios on the whitened innovation, beside the worst-case thresholds.
 
-Pitch is one block, roll and yaw another, whose noise goes together. Roll and yaw are looked at
-twice: by a drift that may go anywhere, which is quick and knows nothing of constants, and by one that returns
-as the rolling gust does, which gathers evidence for longer. Its declared rate of false alarms holds
-for the declared noise; the worst-case scheme beside it needs no probability at all. `fdi.authority` says
-whose alarms and exclusions count.
+Pitch is one block, roll and yaw another, whose noise goes together. Roll and yaw are looked at twice: by a
+drift that may go anywhere, which is quick and knows nothing of constants, and by one that returns, which
+gathers evidence for longer. The declared rate of false alarms holds for the declared noise; the worst-case
+scheme beside it needs no probability at all. `fdi.authority` says whose alarms and exclusions count.
 """
 
 import numpy as np
 
 from beaver_ftc.compiled import kernel
-from beaver_ftc.design.model import AIRSPEED, ALPHA, QDYN, regressors
+from beaver_ftc.design.model import AIRSPEED, QDYN, regressors
 from beaver_ftc.diagnosis import air, likelihood, whitening
 from beaver_ftc.diagnosis.state import LEAST_UNCERTAINTY_RAD_S2, LOSS, STEP
 from beaver_ftc.diagnosis.thresholds import uncertainty_bound
 
-PITCH, LATERAL, RETURNING = 0, 1, 2
+PITCH, LATERAL, RETURNING = 0, 1, 2  # blocks: the last is the second view of roll and yaw
 # Of what the best explanation explains, the part that a constant theta leaves to a loss that grows is larger
 # for every rate of growth (docs/theory.md, section 7).
 LEAST_PART = 0.25
@@ -65,7 +64,7 @@ def observe(statistical, innovation, dt, frame, latched):
 @kernel
 def follow_rest(statistical, surprise, dt):
     """Filter what the law's beliefs leave unexplained: surprise (3,) rad/s2, known faults taken off."""
-    for b in range(2):
+    for b in range(RETURNING):
         block = statistical.block[b]
         for i in range(block.n):
             axis = block.axis[i]
@@ -77,7 +76,7 @@ def follow_rest(statistical, surprise, dt):
 def unknown_acceleration(statistical, out):
     """Fill out (3,) rad/s2 with what goes on beyond the law's beliefs: the drift that explains the rates
     best, and the gust the vanes see."""
-    for b in range(2):
+    for b in range(RETURNING):
         block = statistical.block[b]
         for i in range(block.n):
             axis = block.axis[i]
@@ -179,12 +178,6 @@ def loss_of(statistical, surface):
             if hypothesis.kind == LOSS and hypothesis.surface == surface and hypothesis.certainty > certainty:
                 theta, certainty = hypothesis.theta, hypothesis.certainty
     return theta, certainty
-
-
-@kernel
-def unanticipated_pitch(design, y):
-    """Pitch acceleration, rad/s2, of a moment coefficient of one on alpha^3 [Zhang2005]; y (5,)."""
-    return design.Qm * y[QDYN] * design.S * design.c * y[ALPHA] ** 3
 
 
 @kernel

@@ -29,6 +29,19 @@ def drawn(rng, at_s):
     return {"type": kind, "actuator": surface, "at_s": at_s, **more}
 
 
+def conditions(rng):
+    """Frames, flight condition and references of a random flight."""
+    return {
+        "rate_hz": int(rng.choice([50, 100])),
+        "substeps": int(rng.choice([1, 1, 3])),
+        "initial": {"airspeed_mps": rng.uniform(35, 52), "altitude_m": rng.uniform(0, 3000)},
+        "reference": {
+            axis: [{"sine": {"amplitude_deg_s": rng.uniform(0, 4), "frequency_hz": rng.uniform(0.1, 0.6)}}]
+            for axis in "pqr"
+        },
+    }
+
+
 def flight_of(rng, repaired=False, **more):
     at_s = 2 + rng.integers(0, 800) / 100
     fault = drawn(rng, at_s)
@@ -36,13 +49,7 @@ def flight_of(rng, repaired=False, **more):
         fault["end_s"] = at_s + rng.uniform(1, 8)
     return scenario(
         duration_s=at_s + 14,
-        rate_hz=int(rng.choice([50, 100])),
-        substeps=int(rng.choice([1, 1, 3])),
-        initial={"airspeed_mps": rng.uniform(35, 52), "altitude_m": rng.uniform(0, 3000)},
-        reference={
-            axis: [{"sine": {"amplitude_deg_s": rng.uniform(0, 4), "frequency_hz": rng.uniform(0.1, 0.6)}}]
-            for axis in "pqr"
-        },
+        **conditions(rng),
         uncertainty={
             "inertia_coupling": dict(zip("pqr", rng.uniform(-0.25, 0.25, 3), strict=True)),
             "sinusoid": {

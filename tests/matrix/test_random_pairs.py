@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from test_random_faults import drawn
+from test_random_faults import conditions, drawn
 
 from beaver_ftc.loop import fly
 from beaver_ftc.results.metrics import metrics
@@ -30,13 +30,7 @@ def flight_of(rng, actuators, repaired):
     faults = two_faults(rng, repaired)
     return scenario(
         duration_s=faults[0]["at_s"] + 20,
-        rate_hz=int(rng.choice([50, 100])),
-        substeps=int(rng.choice([1, 1, 3])),
-        initial={"airspeed_mps": rng.uniform(35, 52), "altitude_m": rng.uniform(0, 3000)},
-        reference={
-            axis: [{"sine": {"amplitude_deg_s": rng.uniform(0, 4), "frequency_hz": rng.uniform(0.1, 0.6)}}]
-            for axis in "pqr"
-        },
+        **conditions(rng),
         faults=faults,
         actuators=actuators,
         fdi={"fault_class": "all", "pairs": True},

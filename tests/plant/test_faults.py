@@ -1,12 +1,14 @@
 """The fault schedule: the right property, from the right frame to the right frame, at the right value."""
 
 from math import exp, radians
+from typing import get_args
 
 import pytest
 from pydantic import TypeAdapter
 
 from beaver_ftc.plant.faults import EFFECTS, HEALTHY, NEVER, FaultSchedule, frame_of
 from beaver_ftc.scenario.faults import Fault
+from beaver_ftc.scenario.schema import FaultType
 
 RATE_HZ = 100
 
@@ -72,16 +74,7 @@ def test_each_type_sets_its_properties_alone_and_repairs_them(beaver, surface, g
 
 
 def test_every_type_of_the_scenario_has_an_effect():
-    assert set(EFFECTS) == {
-        "loss_of_effectiveness",
-        "stuck",
-        "hardover",
-        "float",
-        "bias",
-        "rate_limit",
-        "oscillatory",
-        "unanticipated",
-    }
+    assert set(EFFECTS) == set(get_args(FaultType))
 
 
 def test_the_unanticipated_fault(beaver):

@@ -1,6 +1,7 @@
 """Whatever the bytes, loading gives a scenario or a ScenarioError whose every line is one mistake."""
 
 import re
+from collections import Counter
 from collections.abc import Callable
 from copy import deepcopy
 
@@ -28,12 +29,13 @@ def complaint(read: Callable[[], Scenario]) -> str:
     return ""
 
 
-def survives(read: Callable[[], Scenario]) -> None:
+def unclear(read: Callable[[], Scenario]) -> list[str]:
+    """Lines of the complaint that name no place or come twice; its beginning, if there is no end to it."""
     says = complaint(read)
     lines = says.split("\n") if says else []
-    assert all(LINE.match(line) for line in lines)
-    assert len(set(lines)) == len(lines)
-    assert len(says) < 2_000_000
+    repeated = [line for line, count in Counter(lines).items() if count > 1]
+    endless = [says[:100]] if len(says) >= 2_000_000 else []
+    return [line for line in lines if not LINE.match(line)] + repeated + endless
 
 
 @settings(max_examples=200, deadline=None)
@@ -41,7 +43,7 @@ def survives(read: Callable[[], Scenario]) -> None:
 def test_random_bytes(tmp_path_factory, data):
     path = tmp_path_factory.mktemp("fuzz") / "s.yaml"
     path.write_bytes(data)
-    survives(lambda: load_scenario(path))
+    assert not unclear(lambda: load_scenario(path))
 
 
 YAML_WORDS = st.sampled_from(
@@ -118,7 +120,7 @@ YAML_WORDS = st.sampled_from(
 @example("name: x\nreference: {q: [{csv: {file: [], column: {}}}, {csv: []}, {csv: {time_s: []}}]}")
 @example("name: x\nreference: {q: [{csv: {file: a, time_s: [], values_deg_s: []}}]}")
 def test_random_yaml(text):
-    survives(lambda: load_text(text, source="s.yaml"))
+    assert not unclear(lambda: load_text(text, source="s.yaml"))
 
 
 @settings(max_examples=300, deadline=None)
@@ -130,7 +132,7 @@ def test_a_good_file_with_a_piece_cut_out_doubled_or_replaced(data):
         st.sampled_from(["", SEED[start:stop] * 2, "\n", ": ", "1", "[", "}", "x", "&a", "*a", " ", "-"])
     )
     text = SEED[:start] + new + SEED[stop:]
-    survives(lambda: load_text(text, source="s.yaml"))
+    assert not unclear(lambda: load_text(text, source="s.yaml"))
 
 
 VALUES = st.one_of(
@@ -152,7 +154,7 @@ def test_a_good_scenario_with_values_replaced(scenario, data):
     scenario = deepcopy(scenario)
     for _ in range(data.draw(st.integers(1, 3))):
         _replace_one(scenario, data)
-    survives(lambda: validate(Scenario, Document(scenario), "s.yaml"))
+    assert not unclear(lambda: validate(Scenario, Document(scenario), "s.yaml"))
 
 
 def _replace_one(node, data) -> None:

@@ -211,8 +211,11 @@ def _time(seconds: float) -> str:
 
 
 def _value(value: Any) -> str:
-    if value is None:
+    """A value of the metrics for people: what is expected, and what came out, of any key of `expect:`."""
+    if value is None or value == []:
         return "none"
     if isinstance(value, bool):
         return "yes" if value else "no"
+    if isinstance(value, list):
+        return ", ".join(_value(entry) for entry in value)
     return value if isinstance(value, str) else f"{value:.3g}"

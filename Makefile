@@ -36,7 +36,7 @@ lint: $(VENV)/.dev
 	$(BIN)/mypy
 
 docs: $(VENV)/.demo
-	$(BIN)/python -m beaver_ftc.docs
+	$(BIN)/python -m tools.docs
 
 clean:
 	rm -rf $(VENV) runs sweeps .pytest_cache .hypothesis .mypy_cache .ruff_cache

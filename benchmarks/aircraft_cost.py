@@ -15,12 +15,12 @@ from pathlib import Path
 
 import numpy as np
 
-from beaver_ftc.bench.stopwatch import Timing, interleave
 from beaver_ftc.paths import data_root
 from beaver_ftc.plant import adapter
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.state import FlightState
 from beaver_ftc.plant.trim import trim
+from beaver_ftc.studies.bench.stopwatch import Timing, interleave
 
 SURFACES = ("aileron", "elevator", "rudder", "flap")
 FRAMES = 500

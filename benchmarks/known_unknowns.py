@@ -18,10 +18,10 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from beaver_ftc.loop import fly
+from beaver_ftc.loop.loop import fly
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.sweep_loader import load_sweep
-from beaver_ftc.sweep.sampling import Plan, flight_seed
+from beaver_ftc.studies.sweep.sampling import Plan, flight_seed
 
 CONDITIONS = ("all", "sensors")
 KAPPAS_PER_S = (0.02, 0.05, 0.1, 0.3, 1.0, 3.0)

@@ -13,7 +13,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from beaver_ftc.loop import fly
+from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.log import ParquetLog
 from beaver_ftc.scenario.schema import Scenario
 

@@ -14,10 +14,10 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from beaver_ftc.flight import Flight
-from beaver_ftc.loop import fly
+from beaver_ftc.loop.flight import Flight
+from beaver_ftc.loop.loop import fly
 from beaver_ftc.scenario.sweep_loader import Sweep, load_sweep
-from beaver_ftc.sweep.sampling import Plan, flight_seed
+from beaver_ftc.studies.sweep.sampling import Plan, flight_seed
 
 CONDITIONS = ("sensors", "servo", "coefficients", "air", "all", "all-published")
 LAWS = ("fault-tolerant", "oracle", "nominal")

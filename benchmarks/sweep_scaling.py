@@ -17,9 +17,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 from beaver_ftc.scenario.sweep_loader import Sweep, load_sweep
-from beaver_ftc.sweep.flying import Job, fly_all, scenario_of
-from beaver_ftc.sweep.run import Options, Tally, run_sweep
-from beaver_ftc.sweep.sampling import Plan
+from beaver_ftc.studies.sweep.flying import Job, fly_all, scenario_of
+from beaver_ftc.studies.sweep.run import Options, Tally, run_sweep
+from beaver_ftc.studies.sweep.sampling import Plan
 
 FLIGHTS_ALONE = 200
 
@@ -68,7 +68,7 @@ def _processor_time(pid: int) -> float:
 
 def flight_seconds() -> tuple[float, float]:
     """(wall, processor) time of one flight by itself: `fly`, in a process that does nothing else."""
-    from beaver_ftc.loop import fly
+    from beaver_ftc.loop.loop import fly
 
     sweep = sweep_of(FLIGHTS_ALONE)
     flights = Plan(sweep).assignments(range(FLIGHTS_ALONE))

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from beaver_ftc.loop import fly
+from beaver_ftc.loop.loop import fly
 from beaver_ftc.scenario.schema import Scenario
 
 PUBLISHED_UNCERTAINTY = {

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from beaver_ftc.loop import fly
+from beaver_ftc.loop.loop import fly
 from flying import flown, loss, scenario
 
 UNANTICIPATED = {"type": "unanticipated", "Cm_alpha3": 10, "at_s": 12.0}

@@ -29,13 +29,12 @@ _SOURCES = (
     "design/*.py",
     "diagnosis/*.py",
     "control/*.py",
+    "plant/channels.py",
     "plant/native.py",
     "plant/instruments.py",
-    "channels.py",
     "compiled.py",
-    "frame.py",
-    "stages.py",
-    "supervisor.py",
+    "loop/frame.py",
+    "loop/stages.py",
 )
 
 

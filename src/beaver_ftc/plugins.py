@@ -27,23 +27,23 @@ _OURS = {
         ),
         "none": ("", "No diagnosis."),
         "rls-monitor": (
-            "beaver_ftc.rivals.rls:RlsMonitor",
+            "beaver_ftc.diagnosis.rivals.rls:RlsMonitor",
             "Recursive least-squares monitor of each surface and its rate, without a model [Keipour2019].",
         ),
         "augmented-ekf": (
-            "beaver_ftc.rivals.ekf:AugmentedEkf",
+            "beaver_ftc.diagnosis.rivals.ekf:AugmentedEkf",
             "Extended Kalman filter of effectiveness, chi-square test on the estimates [Jazwinski1970].",
         ),
         "augmented-ukf": (
-            "beaver_ftc.rivals.ukf:AugmentedUkf",
+            "beaver_ftc.diagnosis.rivals.ukf:AugmentedUkf",
             "Unscented Kalman filter of effectiveness, CUSUM on the innovation squared [Julier2004].",
         ),
         "multiple-models": (
-            "beaver_ftc.rivals.imm:InteractingMultipleModels",
+            "beaver_ftc.diagnosis.rivals.imm:InteractingMultipleModels",
             "Interacting multiple models of lost effectiveness, alarm on the odds of a fault [Blom1988].",
         ),
         "observer-constant": (
-            "beaver_ftc.rivals.observer:ConstantThresholdObserver",
+            "beaver_ftc.diagnosis.rivals.observer:ConstantThresholdObserver",
             "Observer residual with a constant threshold, surface named by least squares [Chen1999].",
         ),
     },
@@ -56,15 +56,15 @@ _OURS = {
         "fault-tolerant": ("", "Adaptive, and hands pitch control from a weak elevator to the flap."),
         "oracle": ("", "Fault-tolerant, and told the true fault the moment it occurs: the yardstick."),
         "indi": (
-            "beaver_ftc.rivals.indi:IncrementalInversion",
+            "beaver_ftc.control.rivals.indi:IncrementalInversion",
             "Incremental nonlinear dynamic inversion on filtered angular acceleration [Sieberling2010].",
         ),
         "l1-adaptive": (
-            "beaver_ftc.rivals.l1:L1Adaptive",
+            "beaver_ftc.control.rivals.l1:L1Adaptive",
             "L1 adaptive control, piecewise-constant adaptation behind a low-pass filter [Hovakimyan2010].",
         ),
         "lqr": (
-            "beaver_ftc.rivals.lqr:FixedGainLqr",
+            "beaver_ftc.control.rivals.lqr:FixedGainLqr",
             "Fixed-gain linear quadratic regulator about the trim, with integral action [Anderson1990].",
         ),
     },

@@ -320,7 +320,7 @@ def test_version_and_help(tmp_path):
 @pytest.mark.parametrize("format", ["text", "json"])
 def test_what_nobody_foresaw_is_one_line_and_status_3(short, format):
     script = (
-        "import sys, beaver_ftc.loop as loop\n"
+        "import sys, beaver_ftc.loop.loop as loop\n"
         f"sys.argv = ['beaver-ftc', 'run', 'short.yaml', '--no-report', '--format', '{format}']\n"
         "def fly(*_, **__): raise ZeroDivisionError('two\\nlines')\n"
         "loop.fly = fly\n"

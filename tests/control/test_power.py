@@ -6,7 +6,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import expm
 
-from beaver_ftc.assembly import assemble
 from beaver_ftc.control import power
 from beaver_ftc.control.config import EnginePower
 from beaver_ftc.control.state import ORACLE
@@ -14,15 +13,16 @@ from beaver_ftc.design import fdc
 from beaver_ftc.design.coefficients import value
 from beaver_ftc.design.model import ELEVATOR, FLAP, RUDDER
 from beaver_ftc.errors import BadInput
-from beaver_ftc.matrix.cases import REFERENCE
-from beaver_ftc.matrix.flying import trimmed_deg
-from beaver_ftc.matrix.pitch_margins import closed_loop
-from beaver_ftc.mismatch.linear import engine_of, state_vector, surfaces_of
+from beaver_ftc.loop.assembly import assemble
 from beaver_ftc.plant.trim import MANIFOLD_PRESSURE_INHG, trim
 from beaver_ftc.results.metrics import metrics
 from beaver_ftc.results.verdict import facts
 from beaver_ftc.results.views import views
 from beaver_ftc.scenario.loader import load_text
+from beaver_ftc.studies.matrix.cases import REFERENCE
+from beaver_ftc.studies.matrix.flying import trimmed_deg
+from beaver_ftc.studies.matrix.pitch_margins import closed_loop
+from beaver_ftc.studies.mismatch.linear import engine_of, state_vector, surfaces_of
 from flying import flown, scenario
 
 DT = 0.01

@@ -9,11 +9,11 @@ import numba
 import numpy as np
 from numba import njit
 
-from beaver_ftc.assembly import assemble
 from beaver_ftc.design.variants import response
 from beaver_ftc.diagnosis.bank import note_closest_approach
 from beaver_ftc.diagnosis.thresholds import ROUNDING_RAD_S2
-from beaver_ftc.frame import bound_now, diagnose
+from beaver_ftc.loop.assembly import assemble
+from beaver_ftc.loop.frame import bound_now, diagnose
 from beaver_ftc.scenario.schema import Scenario
 
 TRAVEL_RAD = np.array([[-0.52, -0.49, -0.44, -0.1], [0.52, 0.49, 0.44, 1.03]])

@@ -9,11 +9,11 @@ import numpy as np
 from scipy.linalg import block_diag
 from scipy.signal import lfilter
 
-from beaver_ftc.assembly import assemble
 from beaver_ftc.compiled import kernel
 from beaver_ftc.design.coefficients import MASS
 from beaver_ftc.diagnosis import likelihood, noise_model, statistical, whitening
 from beaver_ftc.diagnosis.state import BLOCK, N_SLOTS
+from beaver_ftc.loop.assembly import assemble
 from beaver_ftc.scenario.schema import Scenario
 
 TRAVEL_RAD = np.array([[-0.52, -0.49, -0.44, -0.1], [0.52, 0.49, 0.44, 1.03]])

@@ -12,7 +12,7 @@ from beaver_ftc.design.model import design_record
 from beaver_ftc.design.variants import jacobian
 from beaver_ftc.diagnosis import air, noise_model
 from beaver_ftc.diagnosis.state import AIR
-from beaver_ftc.loop import Loop
+from beaver_ftc.loop.loop import Loop
 from flying import scenario
 
 MEMORY_S = 0.05  # over which the whitening filter compares, about

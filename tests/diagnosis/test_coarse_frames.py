@@ -7,9 +7,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numba import njit
 
-from beaver_ftc.assembly import assemble
 from beaver_ftc.diagnosis.bank import aligned_extremes, extremes
-from beaver_ftc.frame import elapse, remember, sum_up
+from beaver_ftc.loop.assembly import assemble
+from beaver_ftc.loop.frame import elapse, remember, sum_up
 from beaver_ftc.scenario.schema import Scenario
 
 

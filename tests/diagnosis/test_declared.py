@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from beaver_ftc.compare.replay import Recorder, record
 from beaver_ftc.design.coefficients import TERMS, value
 from beaver_ftc.design.context import Declared
 from beaver_ftc.design.model import TERMS as ORDER
 from beaver_ftc.diagnosis.declared import gusts
-from beaver_ftc.loop import Loop
+from beaver_ftc.loop.loop import Loop
+from beaver_ftc.studies.compare.replay import Recorder, record
 from flying import scenario
 
 

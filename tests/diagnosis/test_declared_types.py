@@ -7,11 +7,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from test_fault_types import TYPES, shares, starts, surfaces
 
-from beaver_ftc.assembly import assemble
 from beaver_ftc.design.model import TERMS, control_effectiveness, design_record, free_response
 from beaver_ftc.diagnosis import fault_types as ft
+from beaver_ftc.diagnosis.words import found
 from beaver_ftc.errors import BadInput
-from beaver_ftc.named import found
+from beaver_ftc.loop.assembly import assemble
 from beaver_ftc.scenario.schema import Scenario
 
 NOISE_DEG_S = 0.02

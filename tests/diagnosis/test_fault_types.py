@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from beaver_ftc.diagnosis import fault_types as ft
-from beaver_ftc.named import found
+from beaver_ftc.diagnosis.words import found
 
 FRAMES = 200
 SURFACES = ("aileron", "elevator", "rudder", "flap")

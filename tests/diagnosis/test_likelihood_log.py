@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from beaver_ftc.channels import LIKELIHOODS
+from beaver_ftc.plant.channels import LIKELIHOODS
 from beaver_ftc.results.views import views
 from flying import flown, loss
 

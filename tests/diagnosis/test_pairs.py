@@ -8,7 +8,7 @@ from pydantic import ValidationError
 from test_fault_types import TYPES, shares, uncertainties
 
 from beaver_ftc.diagnosis import fault_types as ft
-from beaver_ftc.named import found
+from beaver_ftc.diagnosis.words import found
 from beaver_ftc.scenario.schema import Scenario
 
 AILERON, ELEVATOR, RUDDER = range(3)

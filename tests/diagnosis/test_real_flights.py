@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from beaver_ftc.loop import fly
+from beaver_ftc.loop.loop import fly
 from beaver_ftc.scenario.schema import Scenario
 from flying import SINES, Memory
 

@@ -4,8 +4,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from beaver_ftc.loop import fly
-from beaver_ftc.verify.draw import Draw
+from beaver_ftc.loop.loop import fly
+from beaver_ftc.studies.verify.draw import Draw
 from flying import PUBLISHED_UNCERTAINTY, flown, loss
 
 NOTHING_DECLARED = {

@@ -99,7 +99,7 @@ def test_a_centre_of_gravity_further_forward_needs_the_moment_of_the_weight():
 
 
 def test_a_gust_rises_to_its_height_and_fades():
-    from beaver_ftc.loop import Loop
+    from beaver_ftc.loop.loop import Loop
 
     gust = {"at_s": 1.0, "velocity_mps": [0.0, 3.0, -4.0], "rise_s": 0.5, "hold_s": 1.0, "fade_s": 0.5}
     scenario = Scenario.model_validate({"name": "x", "duration_s": 4, "environment": {"gust": gust}})

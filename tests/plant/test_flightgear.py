@@ -3,7 +3,7 @@ import struct
 
 import pytest
 
-from beaver_ftc.loop import fly
+from beaver_ftc.loop.loop import fly
 from beaver_ftc.plant.flightgear import paced, show_in_flightgear
 from flying import loss, scenario
 

@@ -18,12 +18,12 @@ def command(
 
     The first time, the frame is compiled once more for each part that is taken out: about two minutes.
     """
-    from beaver_ftc.bench.measure import bench
+    from beaver_ftc.studies.bench.measure import bench
 
     document = bench(rounds, not no_parts, say=lambda what: complain(f"timing {what}"))
     if format is Format.json:
         emit_json(document)
     else:
-        from beaver_ftc.bench.text import text_of
+        from beaver_ftc.studies.bench.text import text_of
 
         emit(text_of(document))

@@ -68,10 +68,10 @@ def command(
 
 
 def _compare_runs(folders: list[Path], out: Path, format: Format) -> None:
-    from beaver_ftc.compare.runs import as_text, labels, read_runs, write_figure
     from beaver_ftc.results.metrics import as_json
     from beaver_ftc.results.report import write_report
     from beaver_ftc.results.writer import result_folder
+    from beaver_ftc.studies.compare.runs import as_text, labels, read_runs, write_figure
 
     runs = read_runs(folders)
     with result_folder(out, "runs") as folder:
@@ -85,7 +85,7 @@ def _compare_runs(folders: list[Path], out: Path, format: Format) -> None:
 
 
 def _cases(sweep: Path | None, only: str | None, most: int | None) -> list[Any]:
-    from beaver_ftc.compare.flights import of_set, of_sweep, set_names
+    from beaver_ftc.studies.compare.flights import of_set, of_sweep, set_names
 
     if sweep is not None:
         return of_sweep(sweep, most=most)
@@ -108,10 +108,10 @@ def _chosen(group: str, given: str | None, ours: str) -> list[str]:
 
 def _fly(cases: list[Any], schemes: str | None, laws: str | None, workers: int) -> dict[str, Any]:
     from beaver_ftc.cli.progress import progress_bar
-    from beaver_ftc.compare.crew import fly_cases
-    from beaver_ftc.compare.document import document_of
-    from beaver_ftc.compare.trial import entries_of
     from beaver_ftc.plugins import DETECTORS, LAWS
+    from beaver_ftc.studies.compare.crew import fly_cases
+    from beaver_ftc.studies.compare.document import document_of
+    from beaver_ftc.studies.compare.trial import entries_of
 
     entries = entries_of(_chosen(DETECTORS, schemes, _OURS[0]), _chosen(LAWS, laws, _OURS[1]))
     with progress_bar(f"{len(cases)} flights, {len(entries)} times each") as progress:
@@ -119,11 +119,11 @@ def _fly(cases: list[Any], schemes: str | None, laws: str | None, workers: int) 
 
 
 def _keep(document: dict[str, Any], out: Path, name: str, format: Format) -> None:
-    from beaver_ftc.compare.figure import write_figure
-    from beaver_ftc.compare.page import write_page
-    from beaver_ftc.compare.table import as_text
     from beaver_ftc.results.metrics import as_json
     from beaver_ftc.results.writer import result_folder
+    from beaver_ftc.studies.compare.figure import write_figure
+    from beaver_ftc.studies.compare.page import write_page
+    from beaver_ftc.studies.compare.table import as_text
 
     with result_folder(out, name) as folder:
         (folder / "comparison.json").write_text(as_json(document), encoding="utf-8")
@@ -136,7 +136,7 @@ def _keep(document: dict[str, Any], out: Path, name: str, format: Format) -> Non
 
 
 def _update(document: dict[str, Any], leaderboard: Path | None) -> None:
-    from beaver_ftc.compare.benchmark import write_leaderboard
+    from beaver_ftc.studies.compare.benchmark import write_leaderboard
 
     if leaderboard is not None:
         write_leaderboard(document, leaderboard)
@@ -144,7 +144,7 @@ def _update(document: dict[str, Any], leaderboard: Path | None) -> None:
 
 def _tune(target: float, workers: int, most: int | None, errors: bool, format: Format) -> None:
     from beaver_ftc.cli.progress import progress_bar
-    from beaver_ftc.compare.tune import tune, write_tuned
+    from beaver_ftc.studies.compare.tune import tune, write_tuned
 
     with progress_bar("calibration flights") as progress:
         document = tune(target, workers, most, progress, errors)

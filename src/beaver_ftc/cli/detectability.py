@@ -21,10 +21,10 @@ def command(
     scaled by 0.25 to 2; `median` where the fault strikes at half of all instants.
     """
     from beaver_ftc.cli.progress import progress_bar
-    from beaver_ftc.detectability.output import document, text, write
-    from beaver_ftc.detectability.survey import survey
     from beaver_ftc.results.writer import result_folder
     from beaver_ftc.scenario.loader import load_scenario
+    from beaver_ftc.studies.detectability.output import document, text, write
+    from beaver_ftc.studies.detectability.survey import survey
 
     loaded = load_scenario(scenario)
     name = f"{loaded.name[:86]}-detectability"  # a name of at most 100 characters

@@ -41,7 +41,7 @@ def command(
     an aircraft that is kept without it.
     """
     from beaver_ftc.cli.progress import progress_bar
-    from beaver_ftc.matrix.cases import AIRSPEEDS_MPS
+    from beaver_ftc.studies.matrix.cases import AIRSPEEDS_MPS
 
     if pitch_lost and declared:
         raise typer.BadParameter("--pitch-lost and --declared exclude each other, allowed: one of them")
@@ -59,15 +59,15 @@ def command(
 def _every_fault(declared: bool) -> tuple[str, Callable[..., Document], Callable[[Document], str]]:
     from functools import partial
 
-    from beaver_ftc.matrix.run import DECLARED, NAME, run_matrix
-    from beaver_ftc.matrix.text import as_text
+    from beaver_ftc.studies.matrix.run import DECLARED, NAME, run_matrix
+    from beaver_ftc.studies.matrix.text import as_text
 
     name = DECLARED if declared else NAME
     return name, partial(run_matrix, name=name), as_text
 
 
 def _pitch_lost() -> tuple[str, Callable[..., Document], Callable[[Document], str]]:
-    from beaver_ftc.matrix.pitch_lost import NAME, run_pitch_lost
-    from beaver_ftc.matrix.pitch_text import as_text
+    from beaver_ftc.studies.matrix.pitch_lost import NAME, run_pitch_lost
+    from beaver_ftc.studies.matrix.pitch_text import as_text
 
     return NAME, run_pitch_lost, as_text

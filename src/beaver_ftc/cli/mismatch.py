@@ -48,7 +48,7 @@ def command(
 
 
 def _variants(scenario: "Scenario", text: str) -> list["Scenario"]:
-    from beaver_ftc.mismatch.variants import variant_of
+    from beaver_ftc.studies.mismatch.variants import variant_of
 
     wanted = [scenario] if not text else [variant_of(scenario, each.strip()) for each in text.split(",")]
     names = [each.name for each in wanted]
@@ -76,7 +76,7 @@ def _fly_all(
 
 def _fly(scenario: "Scenario", out: Path, report: bool) -> tuple[dict[str, Any], Any]:
     from beaver_ftc.cli.progress import progress_bar
-    from beaver_ftc.mismatch.run import run_mismatch
+    from beaver_ftc.studies.mismatch.run import run_mismatch
 
     for warning in scenario.warnings():
         complain(f"{scenario.name}: warning: {warning}")
@@ -93,9 +93,9 @@ def _compare(
     format: Format,
     report: bool,
 ) -> dict[str, Any]:
-    from beaver_ftc.mismatch.compare import entry, write_comparison
-    from beaver_ftc.mismatch.run import recommended_for
-    from beaver_ftc.mismatch.text import comparison_text
+    from beaver_ftc.studies.mismatch.compare import entry, write_comparison
+    from beaver_ftc.studies.mismatch.run import recommended_for
+    from beaver_ftc.studies.mismatch.text import comparison_text
 
     entries = [entry(found) for found in documents]
     recommended = recommended_for(scenarios, tallies)
@@ -107,7 +107,7 @@ def _compare(
 
 def _map(scenario: "Scenario", out: Path, format: Format, report: bool) -> list[dict[str, Any]]:
     from beaver_ftc.cli.progress import progress_bar
-    from beaver_ftc.mismatch.envelope import envelope_map, write_map
+    from beaver_ftc.studies.mismatch.envelope import envelope_map, write_map
 
     with progress_bar(f"{scenario.name}: envelope") as progress:
         entries = envelope_map(scenario, progress)
@@ -118,7 +118,7 @@ def _map(scenario: "Scenario", out: Path, format: Format, report: bool) -> list[
 
 
 def _say(found: dict[str, Any], folder: Path) -> None:
-    from beaver_ftc.mismatch.text import mismatch_text
+    from beaver_ftc.studies.mismatch.text import mismatch_text
 
     emit(mismatch_text(found, str(folder), _colour()))
 

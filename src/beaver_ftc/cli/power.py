@@ -62,10 +62,10 @@ def command(
     same healthy flights. Writes power.json, power.parquet, power.txt, and maps as PNG and SVG.
     """
     from beaver_ftc.cli.progress import progress_bar
-    from beaver_ftc.power.contenders import contenders
-    from beaver_ftc.power.grid import GRIDS
-    from beaver_ftc.power.run import NAME, run_power
-    from beaver_ftc.power.text import as_text
+    from beaver_ftc.studies.power.contenders import contenders
+    from beaver_ftc.studies.power.grid import GRIDS
+    from beaver_ftc.studies.power.run import NAME, run_power
+    from beaver_ftc.studies.power.text import as_text
 
     names = None if schemes is None else [name.strip() for name in schemes.split(",") if name.strip()]
     chosen = contenders(names)

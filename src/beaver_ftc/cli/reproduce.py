@@ -20,8 +20,8 @@ def command(
     import sys
 
     from beaver_ftc.cli.progress import progress_bar
-    from beaver_ftc.reproduce.run import NAME, reproduce
-    from beaver_ftc.reproduce.text import as_text
+    from beaver_ftc.studies.reproduce.run import NAME, reproduce
+    from beaver_ftc.studies.reproduce.text import as_text
 
     with progress_bar("changes to what the paper leaves open") as progress:
         document = reproduce(out, workers, progress)

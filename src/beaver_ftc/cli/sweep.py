@@ -15,8 +15,8 @@ from beaver_ftc.errors import BadInput, BeaverFtcError
 
 if TYPE_CHECKING:
     from beaver_ftc.scenario.sweep_loader import Sweep
-    from beaver_ftc.sweep.flying import Keep
-    from beaver_ftc.sweep.run import Options
+    from beaver_ftc.studies.sweep.flying import Keep
+    from beaver_ftc.studies.sweep.run import Options
 
 
 class Backend(StrEnum):
@@ -72,10 +72,10 @@ def command(
     What has been flown is kept, whatever happens: go on with --resume. With --format json: the summary.
     """
     if backend is Backend.local and replay is None:
-        from beaver_ftc.sweep.processes import start_early
+        from beaver_ftc.studies.sweep.processes import start_early
 
         start_early()
-    from beaver_ftc.sweep.run import Options
+    from beaver_ftc.studies.sweep.run import Options
 
     options = Options(
         out=out,
@@ -104,7 +104,7 @@ def _command(options: "Options", replay: int | None, format: Format) -> int:
 
 
 def _keep(asked: str) -> "Keep":
-    from beaver_ftc.sweep.flying import KEEP_POLICIES, Keep
+    from beaver_ftc.studies.sweep.flying import KEEP_POLICIES, Keep
 
     if asked in KEEP_POLICIES:
         return Keep(asked)
@@ -119,8 +119,8 @@ def _keep(asked: str) -> "Keep":
 
 def _fly(sweep: "Sweep", options: "Options", format: Format) -> int:
     from beaver_ftc.cli.sweep_progress import live_progress
-    from beaver_ftc.sweep.run import named_for, run_sweep
-    from beaver_ftc.sweep.words import summary_text
+    from beaver_ftc.studies.sweep.run import named_for, run_sweep
+    from beaver_ftc.studies.sweep.words import summary_text
 
     with _stoppable() as stopped, live_progress(sweep.name) as progress:
         document = run_sweep(sweep, options, progress, stopped)
@@ -134,7 +134,7 @@ def _fly(sweep: "Sweep", options: "Options", format: Format) -> int:
 
 def _replay(sweep: "Sweep", options: "Options", index: int, format: Format) -> int:
     from beaver_ftc.results.verdict import verdict_text
-    from beaver_ftc.sweep.run import replay
+    from beaver_ftc.studies.sweep.run import replay
 
     document: dict[str, Any] = replay(sweep, options, index)
     if format is Format.json:
@@ -159,7 +159,7 @@ def _stoppable() -> Iterator[Callable[[], bool]]:
     try:
         yield lambda: bool(asked)
     except KeyboardInterrupt:
-        from beaver_ftc.sweep.run import SweepStopped
+        from beaver_ftc.studies.sweep.run import SweepStopped
 
         raise SweepStopped("stopped at once; what had landed is kept, go on with --resume") from None
     finally:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from beaver_ftc.sweep.run import Tally
+    from beaver_ftc.studies.sweep.run import Tally
 
 TERMINAL_S, LOG_S = 0.2, 30.0  # time between two lines
 

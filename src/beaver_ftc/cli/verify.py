@@ -31,8 +31,8 @@ def command(
     Exit status 1 if a promise is broken.
     """
     from beaver_ftc.cli.progress import progress_bar
-    from beaver_ftc.verify.campaign import Campaign, conduct
-    from beaver_ftc.verify.summary import summarise, summary_text
+    from beaver_ftc.studies.verify.campaign import Campaign, conduct
+    from beaver_ftc.studies.verify.summary import summarise, summary_text
 
     with progress_bar("verify") as progress:
         rows = conduct(Campaign(hours, faults, seed, steps), out, workers or os.cpu_count() or 1, progress)

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 from beaver_ftc.results.expectations import evaluate
 
 if TYPE_CHECKING:
-    from beaver_ftc.flight import Flight
+    from beaver_ftc.loop.flight import Flight
     from beaver_ftc.scenario.schema import Scenario
 
 Document = dict[str, Any]

@@ -57,7 +57,7 @@ def _mismatch(folder: Path) -> Any:
     """What `beaver-ftc mismatch` has found in a folder, if it has been there."""
     from markupsafe import Markup
 
-    from beaver_ftc.mismatch.section import mismatch_section
+    from beaver_ftc.studies.mismatch.section import mismatch_section
 
     return Markup(mismatch_section(folder))
 

@@ -28,7 +28,7 @@ def run(
     exports: of "csv" and "acmi". prepare: called with the trimmed plant just before the flight.
     Raises BadInput for a flight that cannot be trimmed, SimulationFailed for one not completed or kept.
     """
-    from beaver_ftc.loop import fly
+    from beaver_ftc.loop.loop import fly
     from beaver_ftc.scenario.dump import to_yaml
 
     with result_folder(out, scenario.name) as folder:

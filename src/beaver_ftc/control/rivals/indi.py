@@ -1,0 +1,69 @@
+"""Incremental nonlinear dynamic inversion: measure the acceleration instead of modelling it.
+
+    u = u0 + G^-1 (nu - xdot0)          [Sieberling2010]
+
+xdot0 is the filtered difference of the measured rates and u0 the command that gave it, through the same
+filter [Smeur2016, sec. III]. A rate measured now shows the command given two steps ago (JSBSim's frame of
+delay, and the difference's), so that is the u0 that belongs to it.
+"""
+
+from collections.abc import Mapping
+from math import exp
+from typing import ClassVar
+
+import numpy as np
+
+from beaver_ftc.control.base import Reference
+from beaver_ftc.control.rivals.tracking import GAINS, Demand, limited, with_flap
+from beaver_ftc.design.context import Context
+from beaver_ftc.diagnosis.base import Measured, Verdict
+from beaver_ftc.diagnosis.rivals.options import options_of
+
+DELAY_FRAMES = 2
+
+
+class LowPass:
+    """Second-order low-pass filter with two equal poles, exact for an input held over the frame."""
+
+    def __init__(self, pole_per_s: float, dt_s: float, start: np.ndarray) -> None:
+        self._a = exp(-pole_per_s * dt_s)
+        self._first, self.value = start.copy(), start.copy()
+
+    def step(self, value: np.ndarray) -> np.ndarray:
+        """The filtered value."""
+        self._first = self._a * self._first + (1.0 - self._a) * value
+        self.value = self._a * self.value + (1.0 - self._a) * self._first
+        return self.value
+
+
+class IncrementalInversion:
+    """Incremental nonlinear dynamic inversion on filtered angular acceleration [Sieberling2010]."""
+
+    name: ClassVar[str] = "indi"
+    fault_tolerant = False
+    defaults: ClassVar[Mapping[str, float]] = GAINS | {"filter_per_s": 50.0}
+
+    def reset(self, context: Context) -> None:
+        """In trim: no acceleration, trimmed surfaces."""
+        self.context, self.option = context, options_of(self.name, self.defaults, context)
+        self.demand = Demand(context, self.option)
+        pole, dt = self.option["filter_per_s"], context.dt_s
+        self.acceleration = LowPass(pole, dt, np.zeros(3))
+        self.command = LowPass(pole, dt, context.trim_rad[:3])
+        self.given = [context.trim_rad[:3].copy()] * (DELAY_FRAMES + 1)
+        self.before: np.ndarray | None = None
+        self.saturated = False
+
+    def step(self, measured: Measured, reference: Reference, verdict: Verdict) -> np.ndarray:
+        """u0 + G^-1 (nu - xdot0)."""
+        before = measured.x if self.before is None else self.before
+        xdot0 = self.acceleration.step((measured.x - before) / self.context.dt_s)
+        u0 = self.command.step(self.given[-DELAY_FRAMES])
+        nu = self.demand.of(measured, reference, self.saturated)
+        G = self.context.model.G(measured.y)[:, :3]
+        wanted = with_flap(u0 + np.linalg.solve(G, nu - xdot0), self.context)
+        command = limited(wanted, self.context)
+        self.saturated = bool((command != wanted).any())
+        self.before = measured.x
+        self.given = [*self.given[1:], command[:3]]
+        return command

@@ -1,0 +1,68 @@
+"""L1 adaptive control with piecewise-constant adaptation [Hovakimyan2010, sec. 3.3].
+
+    xhat' = f + G u + sigma - a (xhat - x),      sigma = -e^{-a dt} / Phi (xhat - x),   Phi = (1 - e^{-a
+    dt}) / a G u = nu - f - C sigma,      C a first-order low-pass filter
+
+The adaptation is as fast as the frame allows; what reaches the surfaces is limited by C alone.
+"""
+
+from collections.abc import Mapping
+from math import exp
+from typing import ClassVar
+
+import numpy as np
+
+from beaver_ftc.control.base import Reference
+from beaver_ftc.control.rivals.tracking import GAINS, Demand, limited, with_flap
+from beaver_ftc.design.context import Context
+from beaver_ftc.diagnosis.base import Measured, Verdict
+from beaver_ftc.diagnosis.rivals.options import options_of
+
+
+class Predictor:
+    """The state predictor and its adaptation; sigma (3,) rad/s2 is what the model does not explain."""
+
+    def __init__(self, pole_per_s: float, dt_s: float) -> None:
+        self._dt, self._a = dt_s, exp(-pole_per_s * dt_s)
+        self._Phi = (1.0 - self._a) / pole_per_s
+        self.error, self.sigma = np.zeros(3), np.zeros(3)
+
+    def step(self, moved: np.ndarray, acceleration: np.ndarray) -> np.ndarray:
+        """moved (3,) rad/s: change of the measured rates over the frame; acceleration (3,) rad/s2: f + G u
+        in it."""
+        self.error = self._a * self.error + self._dt * acceleration + self._Phi * self.sigma - moved
+        self.sigma = -self._a / self._Phi * self.error
+        return self.sigma
+
+
+class L1Adaptive:
+    """L1 adaptive control, piecewise-constant adaptation behind a low-pass filter [Hovakimyan2010]."""
+
+    name: ClassVar[str] = "l1-adaptive"
+    fault_tolerant = False
+    defaults: ClassVar[Mapping[str, float]] = GAINS | {"predictor_per_s": 1.0, "bandwidth_per_s": 20.0}
+
+    def reset(self, context: Context) -> None:
+        """Nothing unexplained yet."""
+        self.context, self.option = context, options_of(self.name, self.defaults, context)
+        self.demand = Demand(context, self.option)
+        self.predictor = Predictor(self.option["predictor_per_s"], context.dt_s)
+        self.filter = exp(-self.option["bandwidth_per_s"] * context.dt_s)
+        self.compensated = np.zeros(3)
+        self.before: np.ndarray | None = None
+        self.saturated = False
+
+    def step(self, measured: Measured, reference: Reference, verdict: Verdict) -> np.ndarray:
+        """Learn what the elapsed frame did not explain, and demand the rest."""
+        if self.before is not None:
+            sigma = self.predictor.step(measured.x - self.before, measured.acceleration)
+            self.compensated = self.filter * self.compensated + (1.0 - self.filter) * sigma
+        self.before = measured.x
+        nu = self.demand.of(measured, reference, self.saturated)
+        model, trim = self.context.model, self.context.trim_rad
+        G = model.G(measured.y)
+        rest = nu - model.f(measured.x, measured.y) - self.compensated - G[:, 3] * trim[3]
+        wanted = with_flap(np.linalg.solve(G[:, :3], rest), self.context)
+        command = limited(wanted, self.context)
+        self.saturated = bool((command != wanted).any())
+        return command

@@ -1,0 +1,72 @@
+"""Fixed-gain linear quadratic regulator about the trim, with integral action [Anderson1990, ch. 3].
+
+    minimise sum e' Qe e + i' Qi i + du' R du,    e = xm - x,  i = int e,  du = u - u_trim - u_feedforward
+
+Weights by Bryson's rule: one over the square of what is acceptable. The gains never change: that is the
+point of it.
+"""
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+import numpy as np
+
+from beaver_ftc.control.base import Reference
+from beaver_ftc.control.rivals.tracking import limited, with_flap
+from beaver_ftc.design.context import Context
+from beaver_ftc.diagnosis.base import Measured, Verdict
+from beaver_ftc.diagnosis.rivals.options import options_of
+
+_STEP = 1e-6
+
+
+def gains(A: np.ndarray, B: np.ndarray, Q: np.ndarray, R: np.ndarray) -> np.ndarray:
+    """K (m, n) of u = -K z for z[k+1] = A z + B u, from the discrete algebraic Riccati equation."""
+    from scipy.linalg import solve_discrete_are
+
+    P = solve_discrete_are(A, B, Q, R)
+    return np.linalg.solve(R + B.T @ P @ B, B.T @ P @ A)
+
+
+class FixedGainLqr:
+    """Fixed-gain linear quadratic regulator about the trim, with integral action [Anderson1990]."""
+
+    name: ClassVar[str] = "lqr"
+    fault_tolerant = False
+    defaults: ClassVar[Mapping[str, float]] = {"error_deg_s": 0.5, "integral_deg": 0.5, "deflection_deg": 3.0}
+
+    def reset(self, context: Context) -> None:
+        """Linearise about the trim and solve for the gains, once."""
+        self.context, option = context, options_of(self.name, self.defaults, context)
+        self.A, self.B = linearised(context)
+        dt = context.dt_s
+        A = np.block([[np.eye(3) + dt * self.A, np.zeros((3, 3))], [dt * np.eye(3), np.eye(3)]])
+        B = np.vstack((dt * self.B, np.zeros((3, 3))))
+        acceptable = [option["error_deg_s"]] * 3 + [option["integral_deg"]] * 3
+        Q = np.diag(1.0 / np.radians(acceptable) ** 2)
+        R = np.eye(3) / np.radians(option["deflection_deg"]) ** 2
+        self.K = gains(A, B, Q, R)
+        self.integral = np.zeros(3)
+        self.saturated = False
+
+    def step(self, measured: Measured, reference: Reference, verdict: Verdict) -> np.ndarray:
+        """Trim, what the linear model asks for to follow the reference, and K times what is missing."""
+        context = self.context
+        error = reference.rate - measured.x
+        if not self.saturated:
+            self.integral = self.integral + context.dt_s * error
+        needed = reference.acceleration - self.A @ (reference.rate - context.trim_x)
+        ahead = np.linalg.solve(self.B, needed)
+        back = self.K @ np.concatenate((error, self.integral))
+        wanted = with_flap(context.trim_rad[:3] + ahead + back, context)
+        command = limited(wanted, context)
+        self.saturated = bool((command != wanted).any())
+        return command
+
+
+def linearised(context: Context) -> tuple[np.ndarray, np.ndarray]:
+    """A (3, 3) 1/s and B (3, 3) rad/s2 per rad of the design model about the trim, air data held."""
+    model, x, y = context.model, context.trim_x, context.trim_y
+    steps = np.eye(3) * _STEP
+    A = np.column_stack([(model.f(x + s, y) - model.f(x - s, y)) / (2.0 * _STEP) for s in steps])
+    return A, model.G(y)[:, :3]

@@ -1,1 +1,0 @@
-"""Documentation made from what it documents: `python -m beaver_ftc.docs` writes it anew."""

@@ -1,0 +1,1 @@
+"""Other people's frames around ours: pytest, Gymnasium."""

@@ -1,0 +1,245 @@
+"""Turns a scenario into the frame record that the compiled loop works on."""
+
+from math import ceil, exp, pi, radians
+
+import numpy as np
+
+from beaver_ftc.control.config import ControlConfig
+from beaver_ftc.control.reference_model import discretise
+from beaver_ftc.control.state import LAWS, NOMINAL
+from beaver_ftc.design.coefficients import SURFACES, engine_power_kw, slipstream, value
+from beaver_ftc.design.model import AILERON, ELEVATOR, FLAP, RUDDER
+from beaver_ftc.design.variants import design_of, mass_of
+from beaver_ftc.diagnosis.admitted import admit, gyros_vary, poles_for_noise
+from beaver_ftc.diagnosis.config import FdiConfig, Probing
+from beaver_ftc.diagnosis.fault_class import PARAMETER_SET
+from beaver_ftc.diagnosis.state import (
+    EITHER,
+    INTERVAL,
+    LOSS,
+    MAX_POLES,
+    NOT_ISOLATED,
+    POSITION,
+    PUBLISHED,
+    STATISTICS,
+    WORST_CASE,
+)
+from beaver_ftc.errors import BadInput
+from beaver_ftc.loop.frame import FRAME
+from beaver_ftc.plant import channels as ch
+from beaver_ftc.plant.instruments import LONGEST_DELAY, SIGNALS
+from beaver_ftc.scenario.actuators import Actuators
+from beaver_ftc.scenario.schema import Scenario
+
+BLOCK_S = 0.2  # to be examined at once where gyros are noisy: short beside the slowest half-cycle, 3.1 s
+RUNAWAY_RATE_RAD_S = pi / 3.0  # of an actuator with no declared rate limit: the aircraft's default
+EARTH_RATE_RAD_S = 2.0 * pi / 86164.0905  # one turn per sidereal day [WGS84]
+YAW_SHARE = 0.5  # of the rudder, that engine power may claim: the rest is there to fly with
+PUBLISHED_CLASS = (("aileron", LOSS, AILERON), ("elevator", LOSS, ELEVATOR), ("rudder", LOSS, RUDDER))
+EVERY_TYPE = (
+    *PUBLISHED_CLASS,
+    ("flap", LOSS, FLAP),
+    *((f"{s}_position", POSITION, i) for i, s in enumerate(SURFACES)),
+)
+FAULT_CLASSES = {"published": PUBLISHED_CLASS, "all": EVERY_TYPE}
+_AUTHORITIES = {"either": EITHER, "worst-case": WORST_CASE, "statistical": STATISTICS}
+_THRESHOLDS = {"interval": INTERVAL, "published": PUBLISHED}
+
+
+def estimator_names(fault_class: str) -> tuple[str, ...]:
+    """Names of the isolation estimators of a fault class, in the bank's order."""
+    return tuple(name for name, _, _ in FAULT_CLASSES[fault_class])
+
+
+def _assemble_diagnosis(fdi: np.void, config: FdiConfig, dt: float, travel: np.ndarray) -> None:
+    fdi["enabled"] = config.scheme == "adaptive-estimators"
+    fdi["thresholds"] = _THRESHOLDS[config.thresholds]
+    fdi["dt"] = dt
+    fdi["forgetting"] = exp(-dt / config.forgetting_time_s)
+    fdi["pole"] = config.detection_pole_per_s
+    fdi["decay"] = exp(-config.detection_pole_per_s * dt)
+    fdi["fie_decay"] = exp(-config.isolation_pole_per_s * dt)
+    fdi["inertia"] = config.bounds.inertia_coupling.as_tuple()
+    fdi["constant"] = config.bounds.constant_rad_s2.as_tuple()
+    fdi["earth_rate"] = EARTH_RATE_RAD_S
+    fdi["detected_at_s"] = fdi["isolated_at_s"] = fdi["certain_after_s"] = -1.0
+    fdi["isolated"] = NOT_ISOLATED
+    fdi["authority"] = _AUTHORITIES[config.authority]
+    members = FAULT_CLASSES[config.fault_class]
+    fdi["n_estimators"] = len(members)
+    for fie, (_, kind, surface) in zip(fdi["estimator"], members, strict=False):
+        fie["kind"], fie["surface"] = kind, surface
+        fie["low"], fie["high"] = PARAMETER_SET[kind] if kind == LOSS else travel[:, surface]
+
+
+def _assemble_types(frame: np.void, scenario: Scenario, dt: float, travel: np.ndarray) -> None:
+    config, fdi, actuators = scenario.fdi, frame["fdi"], frame["actuators"]
+    fdi["every_type"] = config.fault_class == "all"
+    fdi["block"] = block = ceil(BLOCK_S / dt) if gyros_vary(config.bounds.sensors) else 1
+    fdi["whole"], fdi["span_s"] = scenario.substeps == 1 and block == 1, block * dt
+    fdi["patience"] = ceil(pi / config.slowest_oscillation_rad_s / (block * dt))
+    fdi["type"] = fdi["lead"] = fdi["lead_kind"] = fdi["type_at_s"] = fdi["first"] = -1
+    fdi["pairs"] = config.pairs
+    if config.pairs:
+        _assemble_pairs(fdi)
+    fdi["instants"], fdi["returns"] = scenario.substeps, actuators["real"]
+    for s, (name, place, low, high) in enumerate(zip(SURFACES, fdi["surface"], *travel, strict=True)):
+        place["travel_low"], place["travel_high"] = low, high
+        place["in_question"] = not config.pairs or name in ("elevator", "flap")
+        place["measure"], place["type"] = -1, -1
+        place["approach"], place["step"] = actuators["approach"][s], actuators["step"][s]
+        rate_deg_s = getattr(scenario.actuators, name).rate_limit_deg_s
+        place["least_runaway_rate"] = 0.5 * (radians(rate_deg_s) or RUNAWAY_RATE_RAD_S)
+
+
+def _assemble_pairs(fdi: np.void) -> None:
+    """Each plane is asked for itself: pitch by elevator and flap, roll and yaw by ailerons and rudder."""
+    for fie in fdi["estimator"][: fdi["n_estimators"]]:
+        fie["unasked"] = (1, 0, 1) if fie["surface"] in (ELEVATOR, FLAP) else (0, 1, 0)
+
+
+def _assemble_sharpening(fdi: np.void, config: FdiConfig, dt: float) -> None:
+    sharpen = config.sharpen
+    fdi["memory"], fdi["shared"] = sharpen.memory, sharpen.shared_effectiveness
+    fdi["membership"], fdi["abrupt"] = sharpen.set_membership, config.fault_profile == "abrupt"
+    bank = (
+        *config.pole_bank_per_s,
+        *poles_for_noise(config.bounds.sensors, max(config.bounds.constant_rad_s2.as_tuple())),
+    )
+    poles = (config.detection_pole_per_s, *(bank if sharpen.pole_bank else ()))[:MAX_POLES]
+    fdi["n_poles"] = len(poles)
+    fdi["bank_decay"][: len(poles)] = [exp(-pole * dt) for pole in poles]
+
+
+def _assemble_network(network: np.void, config: ControlConfig) -> None:
+    network["gain"] = config.network_gain_per_s2
+    network["leak_per_s"] = config.network_leak_per_s
+    network["weight_limit"] = config.network_weight_limit_rad_s2
+
+
+def _assemble_control(
+    control: np.void, config: ControlConfig, dt: float, trim: np.ndarray, travel: np.ndarray
+) -> None:
+    control["law"] = LAWS.index(config.law) if config.law in LAWS else NOMINAL  # a plug-in: plugged.py
+    control["dt"] = dt
+    control["Kp"], control["Ki"] = config.proportional_per_s, config.integral_per_s2
+    control["model_A"], control["model_B"] = discretise(
+        config.reference_natural_frequency_rad_s, config.reference_damping, dt
+    )
+    control["effectiveness"] = 1.0
+    control["effectiveness_step"] = config.effectiveness_rate_per_s * dt if config.law != "oracle" else np.inf
+    control["reference_scale"] = 1.0
+    control["least_effectiveness"] = config.least_effectiveness
+    control["trim"] = control["command"] = trim
+    control["low"], control["high"] = travel
+    control["hand_over_step"] = dt / config.hand_over_s
+
+
+def _assemble_probing(control: np.void, probing: Probing | None, dt: float) -> None:
+    if probing is not None:
+        control["probe_amplitude"] = radians(probing.amplitude_deg)
+        control["probe_step"] = 2.0 * pi * probing.frequency_hz * dt
+        control["probe_frames"] = round(probing.duration_s / dt)
+        control["probe_from_s"] = control["probe_to_s"] = -1.0
+
+
+def power_is_at_hand(scenario: Scenario) -> bool:
+    """Whether the built-in law of a scenario may use the engine."""
+    law, every_type = scenario.control.law, scenario.fdi.fault_class == "all"
+    return scenario.control.power.enabled and (law == "oracle" or (law == "fault-tolerant" and every_type))
+
+
+def _assemble_power(control: np.void, scenario: Scenario, dt: float) -> None:
+    config, power, initial = scenario.control.power, control["power"], scenario.initial
+    power["enabled"], power["from_s"] = power_is_at_hand(scenario), -1.0
+    power["impatience"], power["forgiveness"] = dt / config.patience_s, dt / config.release_s
+    power["speed_gain"] = config.speed_gain_inhg_per_mps
+    power["attitude_gain"] = config.attitude_gain_inhg_per_deg / radians(1.0)
+    for name, lag_s in (
+        ("smoothing", config.smoothing_s), ("washout", config.washout_s), ("leak", config.attitude_memory_s),
+    ):  # fmt: skip
+        power[name] = 1.0 - exp(-dt / lag_s)
+    trim = initial.manifold_pressure_inhg
+    power["trim"] = power["command"] = power["least"] = power["greatest"] = trim
+    power["low"], power["high"] = min(config.lowest_inhg, trim), max(config.highest_inhg, trim)
+    power["step"] = config.rate_inhg_s * dt
+    power["dpt_factor"], power["highest_dpt"] = _slipstream_limits(initial.engine_rpm, control)
+
+
+def _slipstream_limits(engine_rpm: float, control: np.void) -> tuple[float, float]:
+    """rho V^3 d dpt / d pz of the engine [FDC], kg/(m3) (m/s)^3 per inHg; and the dpt at which holding the
+    propeller's yawing moment takes YAW_SHARE of the rudder's travel."""
+    kw_per_inhg = engine_power_kw(engine_rpm, 1.0, 1.0) - engine_power_kw(engine_rpm, 0.0, 1.0)
+    rudder_rad = min(-control["low"][RUDDER], control["high"][RUDDER])
+    dpt3 = YAW_SHARE * value("Cn_dr") * rudder_rad / value("Cn_dpt3")
+    return slipstream(kw_per_inhg, 1.0, 1.0) - slipstream(0.0, 1.0, 1.0), max(dpt3, 0.0) ** (1.0 / 3.0)
+
+
+def _assemble_instruments(instruments: np.void, scenario: Scenario, dt: float) -> None:
+    """dt: seconds between samples, which is a JSBSim frame."""
+    instruments["real"] = not scenario.sensors.is_ideal
+    instruments["random"] = scenario.seed
+    for i, name in enumerate(SIGNALS):
+        sensor = getattr(scenario.sensors, name)
+        noise, bias, quantum = sensor.noise_bias_quantum
+        instruments["noise"][i], instruments["bias"][i], instruments["quantum"][i] = noise, bias, quantum
+        instruments["gain"][i], instruments["dropout"][i] = 1.0 + sensor.scale_error, sensor.dropout_share
+        instruments["keep"][i] = exp(-sensor.bandwidth_rad_s * dt) if sensor.bandwidth_rad_s else 0.0
+        instruments["delay"][i] = sensor.delay_s / dt
+        if sensor.delay_s / dt > LONGEST_DELAY:
+            raise BadInput(
+                f"{scenario.name}: sensors.{name}.delay_s is {sensor.delay_s:g} s, "
+                f"allowed: {LONGEST_DELAY} JSBSim frames, {LONGEST_DELAY * dt:g} s here"
+            )
+
+
+def _assemble_actuators(actuators: np.void, given: Actuators, dt: float, travel: np.ndarray) -> None:
+    """dt: s, a JSBSim frame; travel (2, 4) rad."""
+    actuators["real"] = not given.is_ideal
+    actuators["low"], actuators["high"] = travel
+    for s, surface in enumerate(SURFACES):
+        dynamics = getattr(given, surface)
+        bandwidth, rate = dynamics.bandwidth_rad_s, radians(dynamics.rate_limit_deg_s)
+        actuators["approach"][s] = 1.0 - exp(-bandwidth * dt) if bandwidth else 1.0
+        actuators["step"][s] = rate * dt if rate else np.inf
+
+
+def _assemble_admitted(frame: np.void, scenario: Scenario) -> None:
+    """The errors that `fdi.bounds` declares beside the published ones."""
+    admitted = frame["fdi"]["admitted"]
+    coefficient, mass = frame["design"]["coefficient"], mass_of(scenario.design_model)
+    admit(admitted, scenario.fdi.bounds, coefficient, mass)
+    frame["fdi"]["own_errors"] = admitted["any"] and scenario.fdi.fault_class == "all"
+    if scenario.fdi.pairs and frame["fdi"]["block"] > 1:
+        raise BadInput(
+            f"{scenario.name}: fdi.pairs is not available with errors of the gyros that vary declared in "
+            "fdi.bounds.sensors, allowed: a bias"
+        )
+
+
+def assemble(scenario: Scenario, trim: np.ndarray, travel: np.ndarray) -> np.ndarray:
+    """The frame record, shape (1,), of a flight about to start.
+
+    trim (4,) rad: the surfaces in trim; travel (2, 4) rad: lower and upper stops. The truth's nodes are
+    attached by the loop.
+    """
+    frames = np.zeros(1, FRAME)
+    frame = frames[0]
+    dt = 1.0 / scenario.rate_hz
+    frame["dt"] = dt
+    frame["share"] = 1.0 / scenario.substeps
+    frame["design"] = design_of(scenario.design_model)[0]
+    frame["factor"] = [factor for _, _, factor in ch.TRUTH]
+    frame["u"] = frame["commanded"] = trim
+    jsbsim_dt = dt / scenario.substeps
+    _assemble_instruments(frame["instruments"], scenario, jsbsim_dt)
+    _assemble_actuators(frame["actuators"], scenario.actuators, jsbsim_dt, travel)
+    _assemble_diagnosis(frame["fdi"], scenario.fdi, dt, travel)
+    _assemble_types(frame, scenario, dt, travel)
+    _assemble_admitted(frame, scenario)
+    _assemble_sharpening(frame["fdi"], scenario.fdi, dt)
+    _assemble_network(frame["fdi"]["network"], scenario.control)
+    _assemble_control(frame["control"], scenario.control, dt, trim, travel)
+    _assemble_probing(frame["control"], scenario.fdi.probing, dt)
+    _assemble_power(frame["control"], scenario, dt)
+    return frames

@@ -1,0 +1,288 @@
+"""The closed loop: JSBSim flies, the compiled frame measures, diagnoses, decides and commands, the log goes
+to its sink."""
+
+from collections.abc import Callable, Iterable
+from functools import cached_property, partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from beaver_ftc.compiled import direct
+from beaver_ftc.design.actuators import move
+from beaver_ftc.design.coefficients import SURFACES
+from beaver_ftc.design.variants import anchor, mass_of
+from beaver_ftc.diagnosis import noise_model
+from beaver_ftc.errors import SimulationFailed
+from beaver_ftc.loop.assembly import assemble, estimator_names
+from beaver_ftc.loop.flight import Flight, LogSink
+from beaver_ftc.loop.frame import FLYING, NOT_FINITE, fly_frame, look
+from beaver_ftc.loop.outcome import flight_of
+from beaver_ftc.plant import channels as ch
+from beaver_ftc.plant import native
+from beaver_ftc.plant.adapter import Plant
+from beaver_ftc.plant.configure import configure, take_off, trim_of
+from beaver_ftc.plant.faults import FaultSchedule
+from beaver_ftc.plant.gust import GustSchedule, MovingAir
+from beaver_ftc.plugins import DETECTORS, LAWS, is_compiled
+from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.scenario.signals import sample
+
+if TYPE_CHECKING:
+    from beaver_ftc.control.base import Law
+    from beaver_ftc.diagnosis.base import Detector
+    from beaver_ftc.loop.plugged import PluggedFrame
+
+CHUNK_ROWS = 8192
+IMMOVABLE = ("stuck", "hardover", "float")  # failures in which a surface does not follow its command
+EARTH_RADIUS_M = 6371000.0  # for the log's north and east: a local plane, not navigation
+
+
+class Cockpit:
+    """The wires between one plant and one frame record: which nodes are read and written, natively or
+    through Python."""
+
+    def __init__(self, plant: Plant, frames: np.ndarray) -> None:
+        self._frames = frames
+        self._read = native.NodeBank([plant.node(name) for _, name, _ in ch.TRUTH], owner=plant)
+        self._write = native.NodeBank([plant.node(name) for name in ch.COMMANDS], owner=plant)
+        self._engine = native.NodeBank([plant.node(ch.MANIFOLD_PRESSURE)], owner=plant)
+        self.native = native.available()
+        frame = frames[0]
+        frame["native"] = self.native
+        frame["getter"], frame["setter"] = native.getter_address(), native.setter_address()
+        frame["read_pointers"], frame["write_pointers"] = self._read.pointers, self._write.pointers
+        frame["engine_pointer"] = self._engine.pointers
+
+    def read(self) -> None:
+        """Bring the truth into the frame record, through Python."""
+        self._read.read(self._frames["truth"][0])
+
+    def write(self) -> None:
+        """Hand the command over, through Python."""
+        self._write.write(self._frames["commanded"][0])
+        power = self._frames["control"]["power"]
+        if power["in_use"][0]:
+            self._engine.write(power["command"][0])
+
+
+class Loop:
+    """One flight in progress. detector, law: plug-ins to fly with, in place of those the scenario names."""
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        detector: "Detector | None" = None,
+        law: "Law | None" = None,
+        prepare: Callable[[Plant], None] | None = None,
+    ) -> None:
+        self.scenario = scenario
+        self.plant = Plant(scenario.rate_hz, scenario.substeps)
+        configure(self.plant, scenario)
+        self.trim = trim_of(scenario, self.plant)
+        if prepare is not None:
+            prepare(self.plant)
+        take_off(self.plant, scenario, self.trim)
+        surfaces = np.array([getattr(self.trim, f"{s}_rad") for s in SURFACES])
+        self.frames = assemble(scenario, surfaces, travel_rad(self.plant))
+        self.cockpit = Cockpit(self.plant, self.frames)
+        self._anchor_design(surfaces)
+        self.schedule = FaultSchedule(scenario.faults, self.plant, scenario.rate_hz)
+        self.air = MovingAir(scenario.environment, self.plant)
+        self.gust = GustSchedule(scenario.environment.gust, self.plant, scenario.rate_hz)
+        self.n_frames = round(scenario.duration_s * scenario.rate_hz)
+        self.plugged = self._plugged(detector, law)
+        self.columns = ch.log_columns(
+            estimator_names(scenario.fdi.fault_class) if self._diagnoses_itself else (),
+            bool(self.frames["control"]["power"]["enabled"][0]),
+            bool(self.frames["fdi"]["statistical"]["enabled"][0]),
+        )
+        self._log = np.empty((min(CHUNK_ROWS, self.n_frames), len(self.columns)))
+        self._references = np.empty((len(self._log), 3))
+        self.fly_frame = self.plugged or self.direct(fly_frame)
+        self._set_origin()
+
+    def _set_origin(self) -> None:
+        frame = self.frames[0]
+        frame["latitude_0"] = self.plant.read(ch.TRUTH[ch.LATITUDE][1])
+        frame["longitude_0"] = self.plant.read(ch.TRUTH[ch.LONGITUDE][1])
+        frame["radius_m"] = EARTH_RADIUS_M + self.scenario.initial.altitude_m
+        frame["parallel_radius_m"] = frame["radius_m"] * np.cos(frame["latitude_0"])
+
+    def _anchor_design(self, surfaces: np.ndarray) -> None:
+        """Show the design model the trim, which a linearised or frozen one holds on to."""
+        self.cockpit.read()
+        truth = self.frames["truth"][0] * self.frames["factor"][0]
+        y = truth[[ch.ALPHA, ch.BETA, ch.AIRSPEED, ch.QDYN, ch.DPT]]
+        frame, scenario = self.frames[0], self.scenario
+        anchor(frame["design"], truth[:3], y, surfaces)
+        start, mass = (truth[:3], y, surfaces), mass_of(scenario.design_model)
+        noise_model.set_up(frame["fdi"], scenario.fdi, frame["design"], mass, start, scenario.rate_hz)
+
+    def _plugged(self, detector: "Detector | None", law: "Law | None") -> "PluggedFrame | None":
+        """The frame in which plug-ins take part; None, and nothing of it imported, if all is compiled in."""
+        names = self.scenario.fdi.scheme, self.scenario.control.law
+        if detector is law is None and is_compiled(DETECTORS, names[0]) and is_compiled(LAWS, names[1]):
+            return None
+        from beaver_ftc.loop.plugged import plugged_frame
+
+        self.cockpit.read()
+        start = self.frames["truth"][0] * self.frames["factor"][0]
+        return plugged_frame(self.frames, self.scenario, start, detector, law)
+
+    @property
+    def _diagnoses_itself(self) -> bool:
+        return self.plugged is None or self.plugged.detector is None
+
+    def direct(self, kernel: Callable[..., int]) -> Callable[..., int]:
+        """A compiled frame as this flight calls it: `frame.fly_frame`, or another in its place."""
+        return direct(kernel, self.frames, self._references, self._log)
+
+    def land(self) -> Flight:
+        """What the flight has yielded so far."""
+        verdict = self.plugged.verdict if self.plugged and self.plugged.detector else None
+        return flight_of(self.scenario, self.frames[0], self.columns, verdict)
+
+    def command_instead(self, deflections: np.ndarray) -> None:
+        """Replace the command (4,) rad of the frame just flown, before anything has moved."""
+        frame = self.frames[0]
+        frame["commanded"], frame["u"] = deflections, frame["u_then"]
+        move(frame["actuators"], frame["commanded"], frame["u"])
+        self.cockpit.write()
+
+    def chunks(self) -> Iterable[np.ndarray]:
+        """Fly; yield the log a chunk at a time, rows (n, columns). The array is reused."""
+        for start in range(0, self.n_frames, CHUNK_ROWS):
+            rows = min(CHUNK_ROWS, self.n_frames - start)
+            status = self.fly_chunk(start, rows)
+            flown = int(self.frames["row"][0])
+            yield self._log[:flown]
+            if status != FLYING:
+                return
+
+    def sample_references(self, start: int, rows: int) -> None:
+        """Find the references of frames start to start + rows, for the first rows of the log to come."""
+        t = np.arange(start, start + rows) / self.scenario.rate_hz
+        self._references[:rows] = sample(self.scenario.reference, t)
+        self.frames["row"] = 0
+
+    def fly_chunk(self, start: int, rows: int) -> int:
+        """Frames start to start + rows, into the first rows of the log; returns why it ended."""
+        self.sample_references(start, rows)
+        k, end = start, start + rows
+        while k < end:
+            self.schedule.apply(k)
+            self.gust.apply(k)
+            self._tell_analyst(k)
+            stop = min(self.schedule.next_change(k), self.gust.next_change(k), end)
+            status = self._fly_segment(k, stop)
+            if status != FLYING:
+                return status
+            k = stop
+        return FLYING
+
+    def _fly_segment(self, k: int, stop: int) -> int:
+        """Frames k to stop, in which no fault changes."""
+        if k == 0:
+            status = self.fly_frames(1, 0)
+            if status != FLYING:
+                return status
+            k = 1
+        return self.fly_frames(stop - k, self.scenario.substeps)
+
+    def fly_frames(self, count: int, runs: int) -> int:
+        """So many frames of the loop, each of so many JSBSim frames, in which no fault changes."""
+        frames, references, log, fly_frame = self.frames, self._references, self._log, self.fly_frame
+        advance = self._advance(runs)
+        for _ in range(count):
+            advance()
+            status = fly_frame(frames, references, log)
+            if status:
+                return self._landed(status)
+        return FLYING
+
+    def _advance(self, runs: int) -> Callable[[], object]:
+        """What brings the truth from one frame of the loop to the next; mostly JSBSim's own `run`."""
+        if runs == 1 and self.cockpit.native and not self.air.turbulent:
+            return self.plant.run
+        return partial(self._advance_by, runs)
+
+    def _advance_by(self, runs: int) -> None:
+        """Hand the command over, run, and read; between two runs the truth is seen but not acted upon."""
+        if runs and not self.cockpit.native:
+            self.cockpit.write()
+        for left in reversed(range(runs)):
+            self.air.turn()
+            self.plant.run()
+            if left:
+                self._look_between()
+        if not self.cockpit.native:
+            self.cockpit.read()
+
+    def _look_between(self) -> None:
+        if not self.cockpit.native:
+            self.cockpit.read()
+        self._look(self.frames)
+
+    @cached_property
+    def _look(self) -> Callable[[np.ndarray], int]:
+        return direct(look, self.frames)
+
+    def _landed(self, status: int) -> int:
+        if status == NOT_FINITE:
+            bad = [
+                name
+                for (name, _, _), value in zip(ch.TRUTH, self.frames["truth"][0], strict=True)
+                if not np.isfinite(value)
+            ]
+            raise SimulationFailed(
+                f"{self.scenario.name}: not finite at {self.frames['t'][0]:g} s: {', '.join(bad)}; "
+                "the flight cannot go on"
+            )
+        self.frames["departed"] = status
+        return status
+
+    def _tell_analyst(self, k: int) -> None:
+        """The oracle and the guarantee know the truth's faults; the diagnosis never looks at these fields."""
+        frame = self.frames[0]
+        if self.schedule.begun(k) and not frame["faulted"]:
+            frame["faulted"], frame["fault_at_s"] = 1, k / self.scenario.rate_hz
+        frame["immovable"] = [
+            any(self.plant.read(f"failures/{s}/{how}") for how in IMMOVABLE) for s in SURFACES
+        ]
+        frame["Cm_alpha3"] = self.plant.read("failures/unanticipated/Cm-alpha3")
+
+
+def travel_rad(plant: Plant) -> np.ndarray:
+    """Lower and upper stops of the surfaces, (2, 4) rad."""
+    return np.array(
+        [[plant.read(f"actuators/{s}/position-{end}-rad") for s in SURFACES] for end in ("min", "max")]
+    )
+
+
+def fly(
+    scenario: Scenario,
+    sink: LogSink | None = None,
+    progress: Callable[[float], None] | None = None,
+    detector: "Detector | None" = None,
+    law: "Law | None" = None,
+    prepare: Callable[[Plant], None] | None = None,
+) -> Flight:
+    """Fly a scenario. The log goes to `sink`; `progress` is called with the share flown, chunk by chunk.
+
+    detector, law: plug-ins to fly with, in place of those the scenario names. prepare: called with the
+    trimmed plant just before the flight.
+
+    Raises BadInput when the flight cannot be trimmed or asks for what there is not, SimulationFailed when a
+    value is not finite.
+    """
+    loop = Loop(scenario, detector, law, prepare)
+    if sink is not None:
+        sink.open(loop.columns)
+    for rows in loop.chunks():
+        if sink is not None:
+            sink.write(rows)
+        if progress is not None:
+            progress(loop.frames["k"][0] / loop.n_frames)
+    if sink is not None:
+        sink.close()
+    return loop.land()

@@ -1,0 +1,180 @@
+"""From the frame record at the end of a flight to what the flight yields."""
+
+from math import isfinite
+
+import numpy as np
+
+from beaver_ftc.control.supervisor import MODES
+from beaver_ftc.design.coefficients import SURFACES
+from beaver_ftc.design.model import AXES
+from beaver_ftc.diagnosis.base import Verdict
+from beaver_ftc.diagnosis.state import NOT_ISOLATED, UNANTICIPATED
+from beaver_ftc.diagnosis.words import found
+from beaver_ftc.loop.assembly import estimator_names
+from beaver_ftc.loop.flight import Flight
+from beaver_ftc.loop.frame import DEPARTURE_SIGNALS, DOMINANT_AXIS, isolated_theta
+from beaver_ftc.scenario.schema import Scenario
+
+
+def _instant(seconds: float) -> float | None:
+    return float(seconds) if seconds >= 0.0 else None
+
+
+def _rms(square_sum: np.ndarray, frames: int) -> tuple[float, float, float] | None:
+    if frames == 0:
+        return None
+    p, q, r = np.sqrt(square_sum / frames)
+    return float(p), float(q), float(r)
+
+
+def _estimate(fdi: np.void, surface: int) -> float:
+    """theta of the isolated loss. Compiled code is asked only where it must be: the first call from Python
+    takes a quarter of a second."""
+    if fdi["statistical"]["enabled"]:
+        return float(isolated_theta(fdi, surface))
+    return float(fdi["estimator"][int(fdi["isolated"])]["theta"][DOMINANT_AXIS[surface]])
+
+
+def _isolation(fdi: np.void) -> dict:
+    """isolated, isolation_type, candidates, estimate, isolation_time_s of a Flight."""
+    if fdi["every_type"]:
+        return found(fdi)
+    verdict = int(fdi["isolated"])
+    names = estimator_names("published")
+    left = [name for name, fie in zip(names, fdi["estimator"], strict=False) if not fie["excluded"]]
+    nothing = {"isolated": None, "isolation_type": None, "estimate": None, "isolation_time_s": None}
+    if not fdi["detected"] or verdict == NOT_ISOLATED:
+        return {**nothing, "candidates": tuple(left) if fdi["detected"] else ()}
+    at_s = float(fdi["isolated_at_s"])
+    if verdict == UNANTICIPATED:
+        return {
+            **nothing,
+            "isolated": "unanticipated",
+            "isolation_type": "unanticipated",
+            "candidates": (),
+            "isolation_time_s": at_s,
+        }
+    fie = fdi["estimator"][verdict]
+    surface = int(fie["surface"])
+    return {
+        "isolated": SURFACES[surface],
+        "isolation_type": "loss_of_effectiveness",
+        "candidates": tuple(left),
+        "estimate": _estimate(fdi, surface),
+        "isolation_time_s": at_s,
+    }
+
+
+def _envelope_exits(frame: np.void) -> tuple[tuple[float, float], ...]:
+    count = min(int(frame["n_exits"]), len(frame["exit_at_s"]))
+    end_s = float(frame["t"])
+    return tuple(
+        (float(out), float(back) if isfinite(back) else end_s)
+        for out, back in zip(frame["exit_at_s"][:count], frame["return_at_s"][:count], strict=True)
+    )
+
+
+def _guaranteed_delay(frame: np.void) -> float | None:
+    certain = _instant(frame["fdi"]["certain_after_s"])
+    return None if certain is None or not frame["faulted"] else certain - float(frame["fault_at_s"])
+
+
+def _probing_s(frame: np.void) -> tuple[float, float] | None:
+    """When the active diagnosis began and ended."""
+    control = frame["control"]
+    if not control["probe_frames"] or control["probe_from_s"] < 0.0:
+        return None
+    began, ended = float(control["probe_from_s"]), float(control["probe_to_s"])
+    return began, (ended if ended >= 0.0 else float(frame["t"]))
+
+
+def _authority(frame: np.void) -> dict[str, tuple[float, float]] | None:
+    """Per axis, after the fault: share of the demanded acceleration given, and seconds beyond holding."""
+    if not frame["post_fault_frames"]:
+        return None
+    both = zip(frame["demanded"], frame["lacking"], strict=True)
+    shares = [1.0 - float(lack / asked) if asked > 0.0 else 1.0 for asked, lack in both]
+    beyond_s = [int(n) * float(frame["dt"]) for n in frame["beyond_frames"]]
+    return dict(zip(AXES, zip(shares, beyond_s, strict=True), strict=True))
+
+
+def _engine_power(frame: np.void) -> tuple[float, float, float, float] | None:
+    """Since when and for how long pitch was left to the engine, s, and the range it went through, inHg."""
+    power = frame["control"]["power"]
+    if not power["enabled"] or power["from_s"] < 0.0:
+        return None
+    in_charge_s = int(power["frames"]) * float(frame["dt"])
+    return float(power["from_s"]), in_charge_s, float(power["least"]), float(power["greatest"])
+
+
+def _statistical(fdi: np.void) -> dict[str, float | None] | None:
+    """What the statistical detector made of the flight, if there was one."""
+    statistical = fdi["statistical"]
+    if not statistical["enabled"]:
+        return None
+    return {
+        "time_s": _instant(statistical["detected_at_s"]),
+        "alarm_level": float(statistical["alarm_level"]),
+        "closest_approach": float(statistical["closest"]),
+    }
+
+
+def verdict_of(frame: np.void) -> Verdict:
+    """What the built-in diagnosis makes of the flight so far, as a plug-in law is told."""
+    fdi = frame["fdi"]
+    if not fdi["detected"]:
+        return Verdict()
+    said = _isolation(fdi)
+    return Verdict(
+        detected=True,
+        axis=AXES[int(fdi["detected_axis"])],
+        isolated=said["isolated"],
+        type=said["isolation_type"],
+        estimate=said["estimate"],
+        candidates=said["candidates"],
+    )
+
+
+def _told(fdi: np.void, verdict: Verdict) -> dict:
+    """The same of a Flight, from a plug-in's verdict."""
+    isolated = verdict.isolated if fdi["detected"] else None
+    return {
+        "isolated": isolated,
+        "isolation_type": verdict.type if isolated else None,
+        "candidates": tuple(verdict.candidates) if fdi["detected"] else (),
+        "estimate": verdict.estimate if isolated else None,
+        "isolation_time_s": float(fdi["isolated_at_s"]) if isolated else None,
+    }
+
+
+def flight_of(
+    scenario: Scenario, frame: np.void, columns: tuple[str, ...], verdict: Verdict | None = None
+) -> Flight:
+    """Read the flight's outcome off its frame record; `verdict` is a plug-in detector's last one."""
+    fdi, dt = frame["fdi"], float(frame["dt"])
+    departed = int(frame["departed"])
+    modes = range(int(frame["n_modes"]))
+    closest = tuple(float(share) for share in fdi["closest"][: max(int(fdi["n_poles"]), 1)])
+    return Flight(
+        scenario=scenario,
+        frames=int(frame["k"]),
+        columns=columns,
+        detection_time_s=_instant(fdi["detected_at_s"]),
+        detection_axis=AXES[int(fdi["detected_axis"])] if fdi["detected"] else None,
+        guaranteed_delay_s=_guaranteed_delay(frame),
+        pre_fault_rms_rad_s=_rms(frame["pre_fault_square"], int(frame["pre_fault_frames"]))
+        or (0.0, 0.0, 0.0),
+        post_fault_rms_rad_s=_rms(frame["post_fault_square"], int(frame["post_fault_frames"])),
+        supervisor=tuple((float(frame["mode_at_s"][i]), MODES[int(frame["mode_is"][i])]) for i in modes),
+        envelope_exits=_envelope_exits(frame),
+        departure=(float(frame["t"]), DEPARTURE_SIGNALS[departed // 10]) if departed else None,
+        saturation_s={s: int(n) * dt for s, n in zip(SURFACES, frame["saturated_frames"], strict=True)},
+        worst_residual_ratio=max(*closest, float(fdi["statistical"]["closest"])),
+        statistical=_statistical(fdi),
+        closest_approach=closest,
+        authority=_authority(frame),
+        probing_s=_probing_s(frame),
+        engine_power=_engine_power(frame),
+        surface_travel_rad={s: float(x) for s, x in zip(SURFACES, frame["travelled"], strict=True)},
+        **(_isolation(fdi) if verdict is None else _told(fdi, verdict)),
+    )

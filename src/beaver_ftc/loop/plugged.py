@@ -1,0 +1,219 @@
+"""Flying with a plug-in: asks it, checks what it answers, names it when the answer is no good."""
+
+from collections.abc import Mapping
+from math import isfinite
+from typing import Any
+
+import numpy as np
+
+from beaver_ftc.control.base import Law, Reference
+from beaver_ftc.control.state import ADAPTIVE, NOMINAL, ORACLE
+from beaver_ftc.design.coefficients import SURFACES
+from beaver_ftc.design.context import Context, DesignModel
+from beaver_ftc.diagnosis.base import Detector, Measured, Verdict
+from beaver_ftc.diagnosis.declared import declared_of
+from beaver_ftc.diagnosis.state import NOT_ISOLATED, UNANTICIPATED
+from beaver_ftc.errors import BeaverFtcError, SimulationFailed
+from beaver_ftc.loop import stages
+from beaver_ftc.loop.frame import NOT_FINITE
+from beaver_ftc.loop.outcome import verdict_of
+from beaver_ftc.plant import channels as ch
+from beaver_ftc.plugins import DETECTORS, LAWS, is_compiled, plugin_class
+from beaver_ftc.scenario.schema import Scenario
+
+_AXES = {"p": 0, "q": 1, "r": 2, None: 0}
+_ISOLATED = {None: NOT_ISOLATED, "unanticipated": UNANTICIPATED} | {s: i for i, s in enumerate(SURFACES)}
+
+
+class PluggedFrame:
+    """One frame of the loop with a detector or a law that is not compiled in; called as `frame.fly_frame` is.
+
+    detector, law: the plug-ins, None where the built-in one is in place. names: what to call them when one is
+    at fault.
+    """
+
+    def __init__(
+        self,
+        detector: Detector | None,
+        law: Law | None,
+        names: tuple[str, str],
+        context: tuple[Context, Context],
+    ) -> None:
+        self.detector, self.law = detector, law
+        self.verdict = Verdict()
+        self._names = names
+        self._told = np.zeros(1, stages.TOLD)
+        self._t_s = 0.0
+        if detector is not None:
+            self._ask(names[0], detector.reset, context[0])
+        if law is not None:
+            self._ask(names[1], law.reset, context[1])
+
+    def __call__(self, frames: np.ndarray, references: np.ndarray, log: np.ndarray) -> int:
+        """Fly one frame; see `frame.fly_frame`."""
+        status = stages.sense(frames)
+        if status == NOT_FINITE:
+            return status
+        frame = frames[0]
+        self._t_s = float(frame["t"])
+        measured = _measured(frame)
+        self._diagnose(frames, measured)
+        stages.decide_mode(frames)
+        self._command(frames, references, measured)
+        stages.close(frames, references, log)
+        return status
+
+    def _diagnose(self, frames: np.ndarray, measured: Measured) -> None:
+        if self.detector is None:
+            stages.diagnose(frames)
+            return
+        verdict = self._ask(self._names[0], self.detector.step, measured, frames[0]["u"].copy())
+        self._tell(verdict)
+        self.verdict = verdict
+        stages.heed(frames, self._told)
+
+    def _command(self, frames: np.ndarray, references: np.ndarray, measured: Measured) -> None:
+        if self.law is None:
+            stages.act(frames, references)
+            return
+        frame = frames[0]
+        control = frame["control"]
+        reference = Reference(
+            references[int(frame["row"])].copy(),
+            control["model_rate"].copy(),
+            control["model_acceleration"].copy(),
+        )
+        verdict = self.verdict if self.detector is not None else verdict_of(frame)
+        answer = self._ask(self._names[1], self.law.step, measured, reference, verdict)
+        stages.obey(frames, self._deflections(answer))
+
+    def _ask(self, name: str, question: Any, *arguments: Any) -> Any:
+        try:
+            return question(*arguments)
+        except BeaverFtcError:
+            raise
+        except Exception as error:
+            reason = " ".join(str(error).split())
+            self._blame(name, f"{question.__name__} raised {type(error).__name__}: {reason}")
+
+    def _blame(self, name: str, what: str) -> None:
+        raise SimulationFailed(f"plug-in {name} at {self._t_s:g} s: {what[:500]}")
+
+    def _tell(self, verdict: Any) -> None:
+        """Check a verdict and put it into the record that compiled code reads."""
+        name = self._names[0]
+        if not isinstance(verdict, Verdict):
+            self._blame(name, f"step returned {type(verdict).__name__}, allowed: a Verdict")
+        if verdict.axis not in _AXES:
+            self._blame(name, f"verdict.axis is {verdict.axis!r}, allowed: p, q, r or None")
+        if verdict.isolated not in _ISOLATED:
+            allowed = ", ".join(str(key) for key in _ISOLATED)
+            self._blame(name, f"verdict.isolated is {verdict.isolated!r}, allowed: {allowed}")
+        told = self._told[0]
+        told["detected"], told["axis"] = bool(verdict.detected), _AXES[verdict.axis]
+        told["isolated"] = _ISOLATED[verdict.isolated]
+        told["theta"] = 0.0 if verdict.estimate is None else self._finite(verdict.estimate)
+        told["estimates"] = verdict.effectiveness is not None
+        if verdict.effectiveness is not None:
+            told["effectiveness"] = self._four(name, "verdict.effectiveness", verdict.effectiveness)
+
+    def _finite(self, value: Any) -> float:
+        if not isinstance(value, float | int | np.floating) or not isfinite(value):
+            self._blame(self._names[0], f"verdict.estimate is {value!r}, allowed: a finite number")
+        return float(value)
+
+    def _deflections(self, answer: Any) -> np.ndarray:
+        return self._four(self._names[1], "the command", answer)
+
+    def _four(self, name: str, what: str, values: Any) -> np.ndarray:
+        """Four finite numbers, or the plug-in is to blame."""
+        try:
+            array = np.asarray(values, dtype=float)
+        except (TypeError, ValueError):
+            array = np.empty(0)
+        if array.shape != (4,):
+            shape = f"shape {array.shape}" if array.size else f"type {type(values).__name__}"
+            self._blame(name, f"{what} has {shape}, allowed: four numbers")
+        if not np.isfinite(array).all():
+            self._blame(name, f"{what} is not finite: {array.tolist()}")
+        return array
+
+
+def _measured(frame: np.void) -> Measured:
+    return Measured(
+        float(frame["t"]),
+        frame["x"].copy(),
+        frame["y"].copy(),
+        frame["believed"].copy(),
+        frame["Gu_mean"].copy(),
+        frame["fdi"]["eta_bar"].copy(),
+    )
+
+
+def context_of(
+    frames: np.ndarray, scenario: Scenario, start: np.ndarray, options: Mapping[str, float]
+) -> Context:
+    """What a plug-in is told before the flight; start: the truth's channels at the start, in SI."""
+    frame = frames[0]
+    control, fdi = frame["control"], frame["fdi"]
+    trim_y = start[[ch.ALPHA, ch.BETA, ch.AIRSPEED, ch.QDYN, ch.DPT]]
+    return Context(
+        dt_s=float(frame["dt"]),
+        substeps=scenario.substeps,
+        model=DesignModel(frames["design"].copy()),
+        trim_x=start[:3].copy(),
+        trim_y=trim_y,
+        trim_rad=control["trim"].copy(),
+        travel_rad=np.array([control["low"], control["high"]]),
+        constant_rad_s2=fdi["constant"].copy(),
+        inertia_coupling=fdi["inertia"].copy(),
+        seed=scenario.seed,
+        options=dict(options),
+        declared=declared_of(
+            scenario.fdi.bounds, scenario.actuators, frames["design"], trim_y, control["trim"]
+        ),
+    )
+
+
+def plugged_frame(
+    frames: np.ndarray, scenario: Scenario, start: np.ndarray, detector: Detector | None, law: Law | None
+) -> PluggedFrame | None:
+    """The frame with the plug-ins the scenario names, or with these; None if everything is compiled in.
+
+    frames: the assembled record, made ready for them. start: as in `context_of`. Raises BadInput for a name
+    that cannot be loaded, SimulationFailed for a plug-in that fails at reset.
+    """
+    fdi, control = scenario.fdi, scenario.control
+    if detector is None and not is_compiled(DETECTORS, fdi.scheme):
+        detector = plugin_class(DETECTORS, fdi.scheme)()
+    if law is None and not is_compiled(LAWS, control.law):
+        law = plugin_class(LAWS, control.law)()
+    if detector is None and law is None:
+        return None
+    if detector is not None:
+        _clear_for_detector(frames["fdi"][0])
+    if law is not None or frames["control"]["law"][0] != ORACLE:
+        frames["control"]["power"]["enabled"] = 0
+    if law is not None:
+        frames["control"]["law"] = ADAPTIVE if getattr(law, "fault_tolerant", False) else NOMINAL
+    contexts = (
+        context_of(frames, scenario, start, fdi.options),
+        context_of(frames, scenario, start, control.options),
+    )
+    return PluggedFrame(detector, law, _names(scenario, detector, law), contexts)
+
+
+def _names(scenario: Scenario, detector: Detector | None, law: Law | None) -> tuple[str, str]:
+    """What to call the plug-ins: by the scenario's names, or by their classes if the scenario did not name
+    them."""
+    scheme, other = scenario.fdi.scheme, scenario.control.law
+    return (
+        type(detector).__name__ if is_compiled(DETECTORS, scheme) else scheme,
+        type(law).__name__ if is_compiled(LAWS, other) else other,
+    )
+
+
+def _clear_for_detector(fdi: np.void) -> None:
+    """No built-in isolation; instead, one place a surface for what the plug-in says of it."""
+    fdi["enabled"] = fdi["n_estimators"] = fdi["every_type"] = fdi["statistical"]["enabled"] = 0
+    fdi["estimator"]["surface"][: len(SURFACES)] = range(len(SURFACES))

@@ -1,0 +1,1 @@
+"""Questions asked of many flights: one folder a study."""

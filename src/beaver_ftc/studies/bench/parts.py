@@ -1,0 +1,135 @@
+"""The compiled frame with parts of it taken out, for timing.
+
+A part is a set of kernels. Taken out, each is replaced by a stand-in that does nothing, and everything that
+calls it is compiled anew from the same source: what is timed is the frame itself, less that part.
+"""
+
+import hashlib
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import beaver_ftc.loop.frame  # noqa: F401  (its kernels must be there to be copied)
+from beaver_ftc import compiled
+
+Kernel = Callable[..., Any]
+
+FLYING = 0
+UNLIMITED_RAD_S = 1e9  # a threshold nothing reaches, finite so that what is computed from it stays a number
+
+
+def nothing(*arguments):
+    """Stands in for a kernel that fills its arguments."""
+
+
+def flying(truth):
+    """Stands in for `frame.flight_status`."""
+    return FLYING
+
+
+def unlimited(bound, eta_bar, decay, dt):
+    """Stands in for `thresholds.bound_step`."""
+    return UNLIMITED_RAD_S
+
+
+def all_residuals(*arguments):
+    """Stands in for the thresholds of isolation: (lower, upper)."""
+    return -UNLIMITED_RAD_S, UNLIMITED_RAD_S
+
+
+@dataclass(frozen=True)
+class Part:
+    """A part of the frame: its name, what it does, and the kernels it consists of, with their stand-ins."""
+
+    name: str
+    does: str
+    kernels: Mapping[str, Kernel]
+
+
+# In the order in which they are switched on. Writing comes before the law, and hands over a held command.
+PARTS = (
+    Part("reading", "the truth's properties, and whether they are finite and within limits",
+         {"frame.measure": nothing, "frame.flight_status": flying}),
+    Part("fdae", "the design model, the detection estimator and its bank of filters",
+         {"design.variants.response": nothing, "frame.fault_effect": nothing, "frame.diagnose": nothing}),
+    Part("fies", "the isolation estimators, and the decision among them",
+         {"diagnosis.isolation.suppose_all": nothing, "diagnosis.isolation.predict_all": nothing,
+          "diagnosis.isolation.start": nothing, "diagnosis.isolation.isolate": nothing}),
+    Part("thresholds", "the bound on the uncertainty, and every threshold that follows from it",
+         {"diagnosis.thresholds.uncertainty_bound": nothing, "diagnosis.thresholds.bound_step": unlimited,
+          "diagnosis.thresholds.interval": all_residuals, "diagnosis.thresholds.published": all_residuals}),
+    Part("network", "the network of the detection estimator, which learns after the alarm",
+         {"diagnosis.network.learn": nothing, "diagnosis.network.evaluate": nothing}),
+    Part("supervisor", "who is in charge", {"frame.supervise": nothing}),
+    Part("writing", "the command, into the aircraft's properties", {"plant.native.write_nodes": nothing}),
+    Part("law", "reference model, feedback linearisation, accommodation, allocation, anti-windup",
+         {"frame.command": nothing, "control.reference_model.follow": nothing}),
+    Part("logging", "every column of the log, and the sums of the metrics",
+         {"frame.record": nothing, "frame.account": nothing}),
+)  # fmt: skip
+
+
+def frame_with(switched_on: int) -> Kernel:
+    """`frame.fly_frame` with the first so many of PARTS; compiled once, into a cache of its own."""
+    if switched_on == len(PARTS):
+        return import_module("beaver_ftc.loop.frame").fly_frame
+    out: dict[str, Kernel] = {}
+    for part in PARTS[switched_on:]:
+        out |= part.kernels
+    return frame_without(out, f"parts-{switched_on}-{_digest(Path(__file__))}")
+
+
+def frame_without(stand_ins: Mapping[str, Kernel], name: str) -> Kernel:
+    """A private `frame.fly_frame` with stand-ins for the kernels named; `name` names its cache."""
+    used: set[str] = set()
+    folder = compiled.cache_folder()
+
+    def kernel(function):
+        full_name = f"{function.__module__}.{function.__name__}".removeprefix("beaver_ftc.")
+        used.add(full_name)
+        return compiled.compile_into(folder and folder / name, stand_ins.get(full_name, function))
+
+    with _fresh_kernel_modules(kernel):
+        fly_frame = import_module("beaver_ftc.loop.frame").fly_frame
+    if unknown := set(stand_ins) - used:
+        raise ValueError(f"no such kernel: {', '.join(sorted(unknown))}")
+    return fly_frame
+
+
+def _digest(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()[:8]
+
+
+@contextmanager
+def _fresh_kernel_modules(kernel: Callable[[Kernel], Kernel]) -> Iterator[None]:
+    """Within this, importing a module of kernels makes a new one, decorated by `kernel`.
+
+    The old ones come back afterwards.
+    """
+    usual = compiled.kernel
+    modules = {
+        name: module
+        for name, module in sys.modules.items()
+        if name.startswith("beaver_ftc.") and module is not compiled and getattr(module, "kernel", 0) is usual
+    }
+    for name in modules:
+        _forget(name)
+    compiled.kernel = kernel
+    try:
+        yield
+    finally:
+        compiled.kernel = usual
+        for name, module in modules.items():
+            sys.modules[name] = module
+            package, _, leaf = name.rpartition(".")
+            setattr(sys.modules[package], leaf, module)
+
+
+def _forget(name: str) -> None:
+    package, _, leaf = name.rpartition(".")
+    del sys.modules[name]
+    delattr(sys.modules[package], leaf)

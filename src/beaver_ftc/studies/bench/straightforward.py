@@ -1,0 +1,244 @@
+"""The loop as one writes it first: properties by name, published equations in NumPy, a dictionary a frame.
+
+It flies the published scheme: the detection estimator with its network, three isolation estimators with
+interval thresholds, and feedback linearisation. It is here to be compared with, in time and in its verdict;
+the modules of the loop have the sources.
+"""
+
+import numpy as np
+
+from beaver_ftc.control.reference_model import discretise
+from beaver_ftc.design.coefficients import GEOMETRY, MASS, SURFACES, inertia_coefficients, value
+from beaver_ftc.diagnosis.state import ALPHA_CENTRES, BETA_CENTRES, N_BASIS
+from beaver_ftc.loop.assembly import EARTH_RATE_RAD_S
+from beaver_ftc.plant import channels as ch
+from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.scenario.signals import sample
+from beaver_ftc.studies.bench.contenders import take_over
+
+AXES = "pqr"
+LEAST_EFFECTIVENESS = 0.1
+
+
+class DesignModel:
+    """xdot = I^-1 (M - x cross I x), with the moments of the coefficient table."""
+
+    def __init__(self) -> None:
+        self.inertia = np.array(
+            [[MASS.Ix_kg_m2, 0, -MASS.Jxz_kg_m2], [0, MASS.Iy_kg_m2, 0], [-MASS.Jxz_kg_m2, 0, MASS.Iz_kg_m2]]
+        )
+        self.inverse = np.linalg.inv(self.inertia)
+        inertia = inertia_coefficients(MASS)
+        self.coupling = np.array([inertia.Pqr, inertia.Qpr, inertia.Rpq])
+        self.lengths = np.array([GEOMETRY.span_m, GEOMETRY.chord_m, GEOMETRY.span_m])
+        self.k = {name: value(name) for name in (
+            "Cl_0", "Cl_beta", "Cl_p", "Cl_r", "Cl_da", "Cl_daa", "Cl_dr", "Cl_a2dpt",
+            "Cm_0", "Cm_alpha", "Cm_alpha2", "Cm_q", "Cm_beta2", "Cm_r", "Cm_dpt", "Cm_de", "Cm_df",
+            "Cn_0", "Cn_beta", "Cn_p", "Cn_r", "Cn_q", "Cn_beta3", "Cn_dpt3", "Cn_da", "Cn_dr",
+        )}  # fmt: skip
+
+    def f_and_G(self, x: np.ndarray, truth: dict[str, float]) -> tuple[np.ndarray, np.ndarray]:
+        """f (3,) rad/s2 and G (3, 4) rad/s2 per rad at the rates x (3,) rad/s."""
+        k, a, be, dpt = self.k, truth["alpha_rad"], truth["beta_rad"], truth["dpt"]
+        ph, qh, rh = x * self.lengths / truth["airspeed_mps"] * np.array([0.5, 1.0, 0.5])
+        coefficients = np.array([
+            k["Cl_0"] + k["Cl_beta"] * be + k["Cl_p"] * ph + k["Cl_r"] * rh + k["Cl_a2dpt"] * a**2 * dpt,
+            k["Cm_0"] + k["Cm_alpha"] * a + k["Cm_alpha2"] * a**2 + k["Cm_q"] * qh
+            + k["Cm_beta2"] * be**2 + k["Cm_r"] * rh + k["Cm_dpt"] * dpt,
+            k["Cn_0"] + k["Cn_beta"] * be + k["Cn_p"] * ph + k["Cn_r"] * rh + k["Cn_q"] * qh
+            + k["Cn_beta3"] * be**3 + k["Cn_dpt3"] * dpt**3,
+        ])  # fmt: skip
+        slopes = np.array([
+            [k["Cl_da"] + k["Cl_daa"] * a, 0, k["Cl_dr"], 0],
+            [0, k["Cm_de"], 0, k["Cm_df"]],
+            [k["Cn_da"], 0, k["Cn_dr"], 0],
+        ])  # fmt: skip
+        scale = truth["qdyn_pa"] * GEOMETRY.wing_area_m2 * self.lengths
+        gyroscopic = np.cross(x, self.inertia @ x)
+        return self.inverse @ (scale * coefficients - gyroscopic), self.inverse @ (scale[:, None] * slopes)
+
+
+class Estimators:
+    """The detection estimator, its network, the isolation estimators; arrays (3,) or (estimator, axis)."""
+
+    def __init__(self, scenario: Scenario, dt: float) -> None:
+        fdi = scenario.fdi
+        self.dt, self.gain = dt, scenario.control.network_gain_per_s2
+        self.keep = np.exp(-scenario.control.network_leak_per_s * dt)
+        self.decay = np.exp(-fdi.detection_pole_per_s * dt)
+        self.fie_decay = np.exp(-fdi.isolation_pole_per_s * dt)
+        self.forgetting = np.exp(-dt / fdi.forgetting_time_s)
+        self.pole = fdi.detection_pole_per_s
+        self.x_hat, self.threshold, self.residual = np.zeros(3), np.zeros(3), np.zeros(3)
+        self.weights = np.zeros((3, N_BASIS))
+        self.basis = np.zeros(N_BASIS)
+        self.detected = False
+        self.excluded = np.zeros(3, bool)
+        self.fie = np.zeros((3, 3))
+        self.omega, self.rise, self.fall, self.bound = (np.zeros((3, 3)) for _ in range(4))
+        self.theta, self.covariance = np.zeros((3, 3)), np.full((3, 3), 1.0 / 12.0)
+        self.fie_residual, self.lower, self.upper = (np.full((3, 3), np.nan) for _ in range(3))
+
+    def predict(self, x: np.ndarray, rate: np.ndarray, Z: np.ndarray, eta_bar: np.ndarray) -> None:
+        """One frame on.
+
+        x (3,) rad/s as it began; rad/s2: rate (3,) = f + G u, Z (3, 3) what each surface gives of it.
+        """
+        if self.detected:
+            self.adapt(x, rate, Z, eta_bar)
+            outside = np.sign(self.residual) * np.maximum(np.abs(self.residual) - self.threshold, 0.0)
+            self.weights += self.dt * self.gain * np.outer(outside, self.basis)
+            self.weights *= self.keep if self.isolated is not None else 1.0
+        believed = rate + self.weights @ self.basis + (self.effectiveness[:3] - 1.0) @ Z
+        self.x_hat = x + self.dt * believed + self.decay * (self.x_hat - x)
+        self.threshold = self.decay * self.threshold + self.dt * eta_bar
+
+    def adapt(self, x: np.ndarray, rate: np.ndarray, Z: np.ndarray, eta_bar: np.ndarray) -> None:
+        """The same for the isolation estimators, by least squares projected onto [-1, 0]."""
+        a, dt, noise = self.fie_decay, self.dt, self.bound**2
+        scale = noise + self.omega**2 * self.covariance
+        gain = np.divide(self.covariance * self.omega, scale, out=np.zeros((3, 3)), where=scale > 0)
+        theta = np.clip(self.theta + gain * self.fie_residual, -1.0, 0.0)
+        share = np.divide(noise, scale, out=np.ones((3, 3)), where=scale > 0)
+        self.covariance = np.minimum(self.covariance * share / self.forgetting, 1.0 / 12.0)
+        omega = a * self.omega + dt * Z
+        self.fie = x + dt * (rate + Z * self.theta) + a * (self.fie - x) + omega * (theta - self.theta)
+        self.omega, self.theta = omega, theta
+        self.rise = a * self.rise + dt * np.maximum(Z, 0.0)
+        self.fall = a * self.fall + dt * np.minimum(Z, 0.0)
+        self.bound = a * self.bound + dt * eta_bar
+
+    def judge(self, x: np.ndarray, alpha: float, beta: float) -> None:
+        """Compare with the measured x (3,) rad/s: raise the alarm, exclude faults."""
+        self.residual = x - self.x_hat
+        if not self.detected and (np.abs(self.residual) > self.threshold).any():
+            self.detected = True
+            self.fie = np.tile(x, (3, 1))
+        if self.detected:
+            self.fie_residual = x - self.fie
+            self.lower = -self.rise - self.omega * self.theta - self.bound
+            self.upper = -self.fall - self.omega * self.theta + self.bound
+            within = (self.lower <= self.fie_residual) & (self.fie_residual <= self.upper)
+            self.excluded |= ~within.all(axis=1)
+            self.basis = _basis(alpha, beta)
+
+    @property
+    def isolated(self) -> int | None:
+        """The one estimator left, if there is but one."""
+        left = np.flatnonzero(~self.excluded)
+        return int(left[0]) if self.detected and left.size == 1 else None
+
+    @property
+    def effectiveness(self) -> np.ndarray:
+        """What is believed of the surfaces, (4,): 1 but for the isolated one."""
+        believed, isolated = np.ones(4), self.isolated
+        if isolated is not None:
+            believed[isolated] = max(1.0 + self.theta[isolated, isolated], LEAST_EFFECTIVENESS)
+        return believed
+
+
+def _basis(alpha: float, beta: float) -> np.ndarray:
+    """Normalised radial basis functions along alpha and along beta, each as wide as its spacing."""
+    along_alpha = np.exp(-0.5 * ((alpha - ALPHA_CENTRES) / (ALPHA_CENTRES[1] - ALPHA_CENTRES[0])) ** 2)
+    along_beta = np.exp(-0.5 * ((beta - BETA_CENTRES) / (BETA_CENTRES[1] - BETA_CENTRES[0])) ** 2)
+    both = np.concatenate([along_alpha, along_beta])
+    return both / np.linalg.norm(both)
+
+
+class FeedbackLinearisation:
+    """Reference model, proportional-integral feedback; a weak surface is asked for more, the flap never."""
+
+    def __init__(self, scenario: Scenario, dt: float, flap_rad: float) -> None:
+        control = scenario.control
+        self.dt, self.Kp, self.Ki = dt, control.proportional_per_s, control.integral_per_s2
+        self.A, self.B = discretise(control.reference_natural_frequency_rad_s, control.reference_damping, dt)
+        self.model = np.zeros((2, 3))  # rate and acceleration of the reference model
+        self.integral = np.zeros(3)
+        self.flap_rad = flap_rad
+
+    def command(
+        self, x: np.ndarray, f: np.ndarray, G: np.ndarray, unknown: np.ndarray, reference: np.ndarray
+    ) -> np.ndarray:
+        """The deflections (4,) rad; G (3, 4) includes what is believed of the surfaces."""
+        error = self.model[0] - x
+        self.integral += self.dt * error
+        demand = self.model[1] + self.Kp * error + self.Ki * self.integral - f - unknown
+        three = np.linalg.solve(G[:, :3], demand - G[:, 3] * self.flap_rad)
+        self.model = self.A @ self.model + np.outer(self.B, reference)
+        return np.append(np.clip(three, -0.44, 0.44), self.flap_rad)
+
+
+class Straightforward:
+    """A contender: flies a scenario from `at_s` on, as the loop does."""
+
+    def __init__(self, scenario: Scenario, at_s: float = 0.0, frames: int = 1000) -> None:
+        self.scenario, self.at_s = scenario, at_s
+        self.start = take_over(scenario, at_s)
+        self.plant = self.start.plant
+        self.model = DesignModel()
+        self.references = sample(scenario.reference, at_s + np.arange(frames) / scenario.rate_hz)
+        self.prepare()
+
+    def prepare(self) -> None:
+        """Back to the start, with nothing detected."""
+        self.start.come_back()
+        dt = 1.0 / self.scenario.rate_hz
+        self.estimators = Estimators(self.scenario, dt)
+        self.law = FeedbackLinearisation(self.scenario, dt, self.start.state.flap_rad)
+        self.u = np.array(list(self.start.commands.values()))
+        self.law.model[0] = [getattr(self.start.state, f"{axis}_rad_s") for axis in AXES]
+        self.then: tuple[np.ndarray, ...] | None = None
+        self.log: list[dict[str, float]] = []
+
+    def fly(self, frames: int) -> None:
+        """Fly on."""
+        for k in range(frames):
+            self.step(self.references[k])
+
+    def step(self, reference: np.ndarray) -> None:
+        """One frame; reference (3,) rad/s."""
+        fdm, estimators = self.plant.fdm, self.estimators
+        fdm.run()
+        truth = {name: fdm[property_] * factor for name, property_, factor in ch.TRUTH}
+        x = np.array([truth[f"{axis}_rad_s"] for axis in AXES])
+        f, G = self.model.f_and_G(x, truth)
+        if self.then is None:
+            estimators.x_hat = x
+        else:
+            estimators.predict(*self.then)
+        estimators.judge(x, truth["alpha_rad"], truth["beta_rad"])
+        self.then = (x, f + G @ self.u, (G * self.u)[:, :3].T, self.bound(x))
+        self.u = self.command(x, f, G, reference)
+        for surface, deflection in zip(SURFACES, self.u, strict=True):
+            fdm[f"fcs/{surface}-cmd-rad"] = deflection
+        self.log.append(self.row(truth, x, reference))
+
+    def bound(self, x: np.ndarray) -> np.ndarray:
+        """The bound on the uncertainty, (3,) rad/s2: as published, and for the turning Earth."""
+        bounds, coupling = self.scenario.fdi.bounds, self.model.coupling
+        cross = np.array([x[1] * x[2], x[0] * x[2], x[0] * x[1]])
+        earth = EARTH_RATE_RAD_S * (2.0 * np.abs(x).sum() + EARTH_RATE_RAD_S)
+        published = np.array(bounds.inertia_coupling.as_tuple()) * np.abs(coupling * cross)
+        return published + bounds.constant_rad_s2.as_tuple() + earth
+
+    def command(self, x: np.ndarray, f: np.ndarray, G: np.ndarray, reference: np.ndarray) -> np.ndarray:
+        """The law, told what the estimators have found."""
+        estimators, unknown = self.estimators, np.zeros(3)
+        if estimators.detected:
+            unknown = estimators.weights @ estimators.basis + estimators.pole * estimators.residual
+        return self.law.command(x, f, G * estimators.effectiveness, unknown, reference)
+
+    def row(self, truth: dict[str, float], x: np.ndarray, reference: np.ndarray) -> dict[str, float]:
+        """A row of the log."""
+        e = self.estimators
+        row = truth | {f"{s}_cmd_rad": u for s, u in zip(SURFACES, self.u, strict=True)}
+        for i, axis in enumerate(AXES):
+            row[f"{axis}_measured_rad_s"], row[f"{axis}_reference_rad_s"] = x[i], reference[i]
+            row[f"{axis}_model_rad_s"] = self.law.model[0, i]
+            row[f"{axis}_residual_rad_s"], row[f"{axis}_threshold_rad_s"] = e.residual[i], e.threshold[i]
+            for s in range(3):
+                row[f"fie_{SURFACES[s]}_{axis}_residual_rad_s"] = e.fie_residual[s, i]
+                row[f"fie_{SURFACES[s]}_{axis}_lower_rad_s"] = e.lower[s, i]
+                row[f"fie_{SURFACES[s]}_{axis}_upper_rad_s"] = e.upper[s, i]
+        row["detected"] = e.detected
+        return row

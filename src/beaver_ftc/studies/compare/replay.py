@@ -1,0 +1,202 @@
+"""One healthy-handed flight, and what any detector would have made of it.
+
+The nominal law does not listen to a detector, so one flight under it serves them all: it is recorded once
+and played back to each. What is kept of a detector's statistic is exact and short: its largest value before
+the fault, and each value after it that was larger than all before.
+"""
+
+from bisect import bisect_right
+from collections.abc import Sequence
+from copy import deepcopy
+from dataclasses import dataclass, replace
+from math import inf, isfinite, isnan
+from time import process_time
+
+import numpy as np
+
+from beaver_ftc.design.context import Context
+from beaver_ftc.diagnosis.base import Detector, Measured, Verdict
+from beaver_ftc.diagnosis.noise_model import UNSEEN
+from beaver_ftc.loop.loop import Loop
+from beaver_ftc.loop.stages import built_in_statistic
+from beaver_ftc.plugins import DETECTORS, plugin_class
+from beaver_ftc.scenario.schema import Scenario
+
+
+class Recorder:
+    """A detector that keeps what it is shown and never raises an alarm."""
+
+    def __init__(self) -> None:
+        self.seen: list[tuple[Measured, np.ndarray]] = []
+
+    def reset(self, context: Context) -> None:
+        """Keep the context as well: whoever is played the flight needs it."""
+        self.context = context
+
+    def step(self, measured: Measured, command: np.ndarray) -> Verdict:
+        """Keep, say nothing."""
+        self.seen.append((measured, command))
+        return Verdict()
+
+
+@dataclass(frozen=True)
+class Trace:
+    """A detector's statistic over one flight; alarm where it exceeds 1.
+
+    before: largest value before the fault (or in all of a healthy flight). records: (delay s, value), each
+    larger than all before it since the fault. healthy_s: time without a fault. us: time a frame took,
+    microseconds.
+    """
+
+    before: float
+    records: tuple[tuple[float, float], ...]
+    faulted: bool
+    healthy_s: float
+    us: float = 0.0
+
+    def false_alarm(self, level: float = 1.0) -> bool:
+        """Whether it raises an alarm without a fault, at this level of the statistic."""
+        return self.before > level
+
+    def delay_s(self, level: float = 1.0) -> float:
+        """From the fault to the alarm at this level; infinite where there is none, or there was one
+        before."""
+        if self.before > level:
+            return inf
+        values = [value for _, value in self.records]
+        index = bisect_right(values, level)
+        return self.records[index][0] if index < len(self.records) else inf
+
+
+@dataclass
+class Recording:
+    """A flight under the nominal law as a detector sees it, with the built-in statistic beside it.
+
+    With `fdi.statistical`: air (frames, 3) rad/s2, what the vanes' view of the air explains of each elapsed
+    frame, and air_noise (3,) rad/s2, the standard deviation of its noise.
+    """
+
+    context: Context
+    seen: list[tuple[Measured, np.ndarray]]
+    built_in: np.ndarray
+    fault_at_s: float
+    air: np.ndarray | None = None
+    air_noise: np.ndarray | None = None
+
+
+class _Watch:
+    """Stands in for the flight's frame: flies it, then notes the built-in statistic."""
+
+    def __init__(self, loop: Loop) -> None:
+        assert loop.plugged is not None
+        self._frame, self.values, self.air = loop.plugged, list[float](), list[np.ndarray]()
+        self._statistical = loop.frames["fdi"]["statistical"]
+        self._statistical["enabled"] = loop.scenario.fdi.statistical is not None
+
+    def __call__(self, frames: np.ndarray, references: np.ndarray, log: np.ndarray) -> int:
+        self.air.append(self._statistical["air"]["acceleration"][0].copy())
+        status = self._frame(frames, references, log)
+        self.values.append(built_in_statistic(frames))
+        return status
+
+
+def record(scenario: Scenario) -> Recording:
+    """Fly a scenario under the nominal law and keep what a detector would see."""
+    nominal = scenario.control.model_copy(update={"law": "nominal"})
+    recorder = Recorder()
+    loop = Loop(scenario.model_copy(update={"control": nominal}), recorder)
+    watch = _Watch(loop)
+    loop.fly_frame = watch
+    for _ in loop.chunks():
+        pass
+    fault_at_s = min((fault.at_s for fault in scenario.faults), default=inf)
+    recording = Recording(recorder.context, recorder.seen, np.array(watch.values), fault_at_s)
+    if scenario.fdi.statistical is not None:
+        recording.air = np.array(watch.air)
+        recording.air_noise = np.sqrt(loop.frames["fdi"]["statistical"]["jitter"][0])
+    return recording
+
+
+def aware_of_the_air(recording: Recording) -> Recording:
+    """The flight as shown to a detector that uses the vanes' view of the air as the built-in one does.
+
+    What is seen of the air is part of `acceleration`, what is not is what is declared of it.
+    """
+    assert recording.air is not None
+    assert recording.air_noise is not None
+    seen = [
+        (measured._replace(acceleration=measured.acceleration + air), command)
+        for (measured, command), air in zip(recording.seen, recording.air, strict=True)
+    ]
+    declared = recording.context.declared
+    told = replace(
+        declared,
+        gust_rad_s=declared.gust_rad_s * np.sqrt(UNSEEN),
+        model_rad_s2=np.hypot(declared.model_rad_s2, recording.air_noise)
+        if declared.air
+        else declared.model_rad_s2,
+    )
+    return replace(recording, context=replace(recording.context, declared=told), seen=seen)
+
+
+def replay(recording: Recording, scheme: str, options: dict[str, float] | None = None) -> Trace:
+    """The trace of a scheme, built in or plugged in, over a recorded flight."""
+    if scheme == "adaptive-estimators":
+        return trace(recording, recording.built_in)
+    detector: Detector = plugin_class(DETECTORS, scheme)()
+    detector.reset(Context(**{**vars(recording.context), "options": options or {}}))
+    began = process_time()
+    verdicts = [detector.step(measured, command) for measured, command in recording.seen]
+    us = 1e6 * (process_time() - began) / max(len(verdicts), 1)
+    return trace(recording, np.array([_statistic(verdict) for verdict in verdicts]), us)
+
+
+def replay_together(
+    recordings: Sequence[Recording], scheme: str, options: dict[str, float] | None = None
+) -> list[Trace]:
+    """The traces of a plugged-in scheme over flights that are the same until their faults strike.
+
+    What they have in common is played once; from there on each has a copy of the detector.
+    """
+    first = recordings[0]
+    common = _frames_in_common(recordings)
+    context = Context(**{**vars(first.context), "options": options or {}})
+    detector: Detector = plugin_class(DETECTORS, scheme)()
+    detector.reset(context)
+    before = [_statistic(detector.step(*shown)) for shown in first.seen[:common]]
+    traces = []
+    for recording in recordings:
+        apart = deepcopy(detector, {id(context): context, id(context.model): context.model})
+        after = [_statistic(apart.step(*shown)) for shown in recording.seen[common:]]
+        traces.append(trace(recording, np.array(before + after)))
+    return traces
+
+
+def _frames_in_common(recordings: Sequence[Recording]) -> int:
+    """Frames before any fault in which all flights were measured alike, to the bit; zero if they differ."""
+    count = min(
+        sum(measured.t_s < recording.fault_at_s - 1e-9 for measured, _ in recording.seen)
+        for recording in recordings
+    )
+    last = [np.concatenate((r.seen[count - 1][0].x, r.seen[count - 1][0].y)) for r in recordings if count]
+    return count if all(np.array_equal(last[0], other) for other in last[1:]) else 0
+
+
+def _statistic(verdict: Verdict) -> float:
+    """A detector without a statistic has only its alarm: well above the level, or well below."""
+    if isnan(verdict.statistic):
+        return 1e6 if verdict.detected else 0.0
+    return verdict.statistic
+
+
+def trace(recording: Recording, statistic: np.ndarray, us: float = 0.0) -> Trace:
+    """Boil a statistic (frames,) down to what decides about alarms at any level."""
+    t = np.array([measured.t_s for measured, _ in recording.seen])
+    healthy = t < recording.fault_at_s - 1e-9
+    before = float(statistic[healthy].max(initial=0.0))
+    after, delay = statistic[~healthy], t[~healthy] - recording.fault_at_s
+    largest = np.maximum.accumulate(after) if after.size else after
+    news = np.flatnonzero(np.diff(largest, prepend=-inf) > 0.0)
+    records = tuple((float(delay[i]), float(after[i])) for i in news)
+    faulted = isfinite(recording.fault_at_s) and bool(after.size)
+    return Trace(before, records, faulted, float(healthy.sum()) * recording.context.dt_s, us)

@@ -1,0 +1,152 @@
+"""Fly one case with every scheme and every law that is compared, and say what came of each."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from math import hypot, inf
+from time import process_time
+from typing import Any
+
+from beaver_ftc.errors import BeaverFtcError
+from beaver_ftc.loop.flight import Flight
+from beaver_ftc.loop.loop import Loop
+from beaver_ftc.results.metrics import metrics
+from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.studies.compare.flights import Case
+from beaver_ftc.studies.compare.replay import Recording, Trace, record, replay
+
+SCHEME, LAW, ORACLE = "adaptive-estimators", "fault-tolerant", "oracle"
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A scheme and a law that fly together."""
+
+    scheme: str
+    law: str
+
+
+@dataclass(frozen=True)
+class Result:
+    """What an entry made of a case. Times in s, errors in deg/s; infinite where there is none.
+
+    healthy_s: time under observation without a fault, until the first alarm. rms_deg_s: over all axes,
+    after the fault (all the flight without one), and infinite after a departure.
+    """
+
+    entry: Entry
+    false_alarm: bool
+    healthy_s: float
+    faulted: bool
+    delay_s: float = inf
+    isolated: str | None = None
+    correct: bool = False
+    isolation_delay_s: float = inf
+    rms_deg_s: float = inf
+    departed: bool = False
+    us: float = 0.0
+    error: str | None = None
+
+
+@dataclass
+class Trial:
+    """All results of one case; traces by scheme, and why one is missing."""
+
+    case: Case
+    results: list[Result] = field(default_factory=list)
+    traces: dict[str, Trace] = field(default_factory=dict)
+    failures: list[str] = field(default_factory=list)
+
+
+def entries_of(schemes: Sequence[str], laws: Sequence[str]) -> list[Entry]:
+    """Every scheme with our law, every law with our scheme, and the oracle as the yardstick."""
+    pairs = [Entry(scheme, LAW) for scheme in schemes] + [Entry(SCHEME, law) for law in laws]
+    return list(dict.fromkeys([*pairs, Entry(SCHEME, LAW), Entry(SCHEME, ORACLE)]))
+
+
+def with_entry(scenario: Scenario, entry: Entry) -> Scenario:
+    """The scenario with this scheme and this law; options are those of the one the scenario names, nobody
+    else's."""
+    fdi: dict[str, Any] = {"scheme": entry.scheme, "options": options_for(scenario, entry.scheme)}
+    control: dict[str, Any] = {"law": entry.law}
+    if entry.law != scenario.control.law:
+        control["options"] = {}
+    return scenario.model_copy(
+        update={
+            "fdi": scenario.fdi.model_copy(update=fdi),
+            "control": scenario.control.model_copy(update=control),
+        }
+    )
+
+
+def options_for(scenario: Scenario, scheme: str) -> dict[str, float]:
+    """The options a scheme flies with in this scenario."""
+    return dict(scenario.fdi.options) if scheme == scenario.fdi.scheme else {}
+
+
+def fly_case(case: Case, entries: Sequence[Entry]) -> Trial:
+    """Fly a case with every entry; record it once under the nominal law for the trade-off of each scheme."""
+    trial = Trial(case, [_fly(case.scenario, entry) for entry in entries])
+    schemes = [scheme for scheme in dict.fromkeys(entry.scheme for entry in entries) if scheme != "none"]
+    try:
+        recording = record(case.scenario)
+    except BeaverFtcError as error:
+        trial.failures.append(str(error))
+        return trial
+    for scheme in schemes:
+        _trace(trial, recording, scheme)
+    return trial
+
+
+def _trace(trial: Trial, recording: Recording, scheme: str) -> None:
+    """Play the flight to a scheme; what a plug-in fails over is not the end of the comparison."""
+    try:
+        trial.traces[scheme] = replay(recording, scheme, options_for(trial.case.scenario, scheme))
+    except Exception as error:
+        trial.failures.append(f"{scheme}, on a recorded flight: {type(error).__name__}: {error}")
+
+
+def _fly(scenario: Scenario, entry: Entry) -> Result:
+    try:
+        loop = Loop(with_entry(scenario, entry))
+        began = process_time()
+        for _ in loop.chunks():
+            pass
+        us = 1e6 * (process_time() - began) / loop.n_frames
+        return result_of(loop.land(), entry, us)
+    except BeaverFtcError as error:
+        return Result(entry, False, 0.0, bool(scenario.faults), error=str(error))
+
+
+def result_of(flight: Flight, entry: Entry, us: float) -> Result:
+    """Boil a flight down."""
+    document = metrics(flight)
+    fault, detection, isolation = document["fault"], document["detection"], document["isolation"]
+    end_s = flight.frames / flight.scenario.rate_hz
+    healthy_s = min(end_s, fault["at_s"]) if fault else end_s
+    if document["false_alarm"]:
+        healthy_s = detection["time_s"]
+    correct = bool(isolation["correct"]) and not document["false_alarm"]
+    return Result(
+        entry=entry,
+        false_alarm=document["false_alarm"],
+        healthy_s=healthy_s,
+        faulted=fault is not None and end_s > fault["at_s"],
+        delay_s=_or_never(detection["delay_s"]),
+        isolated=isolation["fault"],
+        correct=correct,
+        isolation_delay_s=_or_never(isolation["delay_s"]) if correct else inf,
+        rms_deg_s=_rms(document),
+        departed=document["departure"] is not None,
+        us=us,
+    )
+
+
+def _or_never(value: float | None) -> float:
+    return inf if value is None else value
+
+
+def _rms(document: dict) -> float:
+    if document["departure"]:
+        return inf
+    tracking = document["tracking"]
+    return hypot(*(tracking["post_fault_rms_deg_s"] or tracking["pre_fault_rms_deg_s"]).values())

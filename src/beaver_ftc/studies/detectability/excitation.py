@@ -1,0 +1,57 @@
+"""What a healthy flight excites: the moment of each surface, frame by frame, against the declared bound."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from beaver_ftc.design.coefficients import SURFACES as ALL_SURFACES
+from beaver_ftc.design.model import AXES, control_effectiveness
+from beaver_ftc.design.variants import design_of
+from beaver_ftc.loop.loop import fly
+from beaver_ftc.scenario.schema import Scenario
+
+SETTLED_S = 2.0  # the start of a reference is a step of its own
+
+
+@dataclass(frozen=True)
+class Excitation:
+    """Along a flight of n frames: the moment of each surface (4, n, 3) rad/s2, the bound on the uncertainty
+    (n, 3) rad/s2, and the length of a frame dt s.
+    """
+
+    moment: np.ndarray
+    bound: np.ndarray
+    dt: float
+
+
+class _Memory:
+    def open(self, columns):
+        self.columns, self.chunks = list(columns), []
+
+    def write(self, rows):
+        self.chunks.append(rows.copy())
+
+    def close(self):
+        self.rows = np.concatenate(self.chunks)
+
+    def read(self, *names: str) -> np.ndarray:
+        return np.ascontiguousarray(self.rows[:, [self.columns.index(name) for name in names]])
+
+
+def excitation(scenario: Scenario) -> Excitation:
+    """Fly the scenario without its faults and weigh what the surfaces did with the design model.
+
+    Raises BadInput when it cannot be trimmed, SimulationFailed when the flight ends before it has settled.
+    """
+    log = _Memory()
+    fly(scenario.model_copy(update={"faults": ()}), log)
+    y = log.read("alpha_rad", "beta_rad", "airspeed_mps", "qdyn_pa", "dpt")
+    u = log.read(*(f"{surface}_cmd_rad" for surface in ALL_SURFACES))
+    bound = log.read(*(f"{axis}_eta_bar_rad_s2" for axis in AXES))
+    design, G = design_of(scenario.design_model)[0], np.zeros((len(y), 3, 4))
+    for row, at in zip(y, G, strict=True):
+        control_effectiveness(design, row, at)
+    first = int(SETTLED_S * scenario.rate_hz)
+    return Excitation(
+        (G * u[:, None, :]).transpose(2, 0, 1)[:, first:], bound[first:], 1.0 / scenario.rate_hz
+    )

@@ -1,0 +1,50 @@
+"""The matrix as a heat map: colour says how the flight compares with the oracle's, letters the verdict."""
+
+from math import log2
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from beaver_ftc.design.coefficients import SURFACES
+from beaver_ftc.studies.matrix.cases import FAULTS
+
+Document = dict[str, Any]
+MOST_DOUBLINGS = 3.0
+
+
+def write_heat_map(document: Document, path: Path) -> None:
+    """Draw the matrix into a PNG."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    names = [fault for fault, _ in FAULTS]
+    by_place = {(cell["fault"], cell["surface"]): cell for cell in document["cells"]}
+    grid = np.array([[_doublings(by_place[fault, surface]) for surface in SURFACES] for fault in names])
+    figure = Figure(figsize=(9, 0.5 * len(names) + 1.5), layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = figure.subplots()
+    image = axes.imshow(grid, cmap="cividis", vmin=0, vmax=MOST_DOUBLINGS, aspect="auto")
+    axes.set_xticks(range(len(SURFACES)), SURFACES)
+    axes.set_yticks(range(len(names)), names)
+    for i, fault in enumerate(names):
+        for j, surface in enumerate(SURFACES):
+            axes.text(j, i, _label(by_place[fault, surface]), ha="center", va="center", **_ink(grid[i, j]))
+    bar = figure.colorbar(image, ticks=range(int(MOST_DOUBLINGS) + 1))
+    most = int(MOST_DOUBLINGS)
+    bar.ax.set_yticklabels([f"{2**n}" for n in range(most)] + [f"{2**most} or more"])
+    bar.set_label("tracking RMS over the oracle's, worst airspeed")
+    figure.savefig(path, dpi=120, metadata={"Software": None})
+
+
+def _doublings(cell: Document) -> float:
+    return 0.0 if cell["ratio"] is None else min(max(log2(cell["ratio"]), 0.0), MOST_DOUBLINGS)
+
+
+def _label(cell: Document) -> str:
+    delay = "" if cell["delay_s"] is None else f", {cell['delay_s']:.2f} s"
+    return f"{cell['verdict']}{delay}{', lost' if cell['lost'] else ''}"
+
+
+def _ink(doublings: float) -> dict[str, Any]:
+    return {"color": "black" if doublings > 0.5 * MOST_DOUBLINGS else "white", "fontsize": 9}

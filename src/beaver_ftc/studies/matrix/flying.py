@@ -1,0 +1,92 @@
+"""Fly a case of the matrix, once with the fault-tolerant law and once with the oracle."""
+
+from functools import lru_cache
+from math import degrees
+from typing import TYPE_CHECKING, Any
+
+from beaver_ftc.studies.matrix.cases import OWN_AXIS, Case, scenario_of
+
+if TYPE_CHECKING:
+    from beaver_ftc.loop.flight import Flight
+
+Document = dict[str, Any]
+
+
+@lru_cache
+def trimmed_deg(airspeed_mps: float, surface: str) -> float:
+    """Deflection of a surface in the trim the cases start from."""
+    from beaver_ftc.plant.trim import trim
+    from beaver_ftc.scenario.schema import Initial
+
+    initial = Initial(airspeed_mps=airspeed_mps)
+    point = trim(
+        airspeed_mps,
+        initial.altitude_m,
+        engine_rpm=initial.engine_rpm,
+        manifold_pressure_inhg=initial.manifold_pressure_inhg,
+    )
+    return degrees(getattr(point, f"{surface}_rad"))
+
+
+def fly_case(case: Case) -> Document:
+    """The row of a case: fault, verdict, tracking beside the oracle's, and why it was lost, if so."""
+    from beaver_ftc.loop.loop import fly
+
+    off_deg = trimmed_deg(case.airspeed_mps, case.surface)
+    flight, oracle = (fly(scenario_of(case, law, off_deg)) for law in ("fault-tolerant", "oracle"))
+    return {**case._asdict(), **_diagnosis(flight, case), **_tracking(flight, oracle, case)}
+
+
+def _diagnosis(flight: "Flight", case: Case) -> Document:
+    from beaver_ftc.results.metrics import metrics
+
+    document = metrics(flight)
+    isolation, true_type = document["isolation"], flight.scenario.faults[0].type
+    return {
+        "detected": document["detection"]["detected"],
+        "delay_s": document["detection"]["delay_s"],
+        "false_alarm": document["false_alarm"],
+        "isolated": isolation["fault"],
+        "isolation_delay_s": isolation["delay_s"],
+        "type": isolation["type"],
+        "candidates": isolation["candidates"],
+        "estimate": isolation["estimate"],
+        "verdict": verdict(document, case.surface, true_type),
+    }
+
+
+def verdict(document: Document, surface: str, true_type: str) -> str:
+    """named (surface and type right), surface (right, type open), open (still possible), unseen or WRONG."""
+    isolation = document["isolation"]
+    if not document["detection"]["detected"]:
+        return "unseen"
+    if document["false_alarm"]:
+        return "WRONG"
+    if isolation["fault"] is None:
+        left = isolation["candidates"]
+        return "open" if surface in left or f"{surface}:{true_type}" in left else "WRONG"
+    if isolation["fault"] != surface or isolation["type_correct"] is False:
+        return "WRONG"
+    if isolation["type"] is None:
+        return "surface" if true_type in isolation["candidates"] or not isolation["candidates"] else "WRONG"
+    return "named"
+
+
+def _tracking(flight: "Flight", oracle: "Flight", case: Case) -> Document:
+    axis = OWN_AXIS[case.surface]
+    ours, best = (_rms_deg_s(one, axis) for one in (flight, oracle))
+    return {
+        "axis": axis,
+        "rms_deg_s": ours,
+        "oracle_rms_deg_s": best,
+        "ratio": ours / best if best else None,
+        "departure_s": flight.departure[0] if flight.departure else None,
+        "oracle_departure_s": oracle.departure[0] if oracle.departure else None,
+        "departure_signal": flight.departure[1] if flight.departure else None,
+        "oracle_beyond_s": oracle.authority[axis][1] if oracle.authority else 0.0,
+        "oracle_left_envelope_s": oracle.envelope_exits[0][0] if oracle.envelope_exits else None,
+    }
+
+
+def _rms_deg_s(flight: "Flight", axis: str) -> float:
+    return degrees((flight.post_fault_rms_rad_s or (0.0,) * 3)["pqr".index(axis)])

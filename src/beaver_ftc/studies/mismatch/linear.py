@@ -1,0 +1,149 @@
+"""The truth's linear model beside the design model's, at the trim a scenario starts from.
+
+truth: JSBSim's accelerations differenced about the trim. fdc: the FDC equations, by complex steps, an
+independent road. design: the FDC equations with the moments the designer believes. own: JSBSim's own
+linearisation, at the same condition without its sideslip, against the FDC equations there.
+"""
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from beaver_ftc.design import fdc
+from beaver_ftc.design.coefficients import engine_power_kw, slipstream
+from beaver_ftc.design.variants import anchor, design_of, jacobian
+from beaver_ftc.studies.mismatch.modes import CLASSICAL, MODES, Mode, deviation, modes
+
+if TYPE_CHECKING:
+    from beaver_ftc.plant.linear import LinearModel
+    from beaver_ftc.plant.state import FlightState
+    from beaver_ftc.scenario.schema import Scenario
+
+_STEP = 1e-30  # complex
+
+
+@dataclass(frozen=True)
+class LinearAnalysis:
+    """Linear models over the eight classical states: by name, the models and their modes; a second opinion.
+
+    own_deviation: per mode, JSBSim's own linearisation against the FDC equations, both with no sideslip.
+    """
+
+    point: "FlightState"
+    models: dict[str, "LinearModel"]
+    modes: dict[str, dict[str, Mode]]
+    own_deviation: dict[str, float]
+
+    def deviation(self, name: str) -> dict[str, float]:
+        """How far each mode of a model is from the truth's, as a share of its magnitude."""
+        truth = self.modes["truth"]
+        return {mode: deviation(self.modes[name][mode].pole, truth[mode].pole) for mode in MODES}
+
+
+def analyse(scenario: "Scenario") -> LinearAnalysis:
+    """Linearise the scenario's truth and what the designer believes, at its trim."""
+    from beaver_ftc.plant.adapter import Plant
+    from beaver_ftc.plant.configure import configure, trim_of
+    from beaver_ftc.plant.linear import LinearModel, differences
+
+    plant = Plant(scenario.rate_hz, scenario.substeps)
+    configure(plant, scenario)
+    point = trim_of(scenario, plant)
+    A, B = fdc_matrices(scenario, point)
+    models = {
+        "truth": differences(plant, point).of(CLASSICAL),
+        "fdc": LinearModel(A, B, fdc.STATES, fdc.SURFACES).of(CLASSICAL),
+        "design": LinearModel(*designed(scenario, point, A, B), fdc.STATES, fdc.SURFACES).of(CLASSICAL),
+    }
+    return LinearAnalysis(
+        point,
+        models,
+        {name: modes(model.A) for name, model in models.items()},
+        own_deviation(scenario, point),
+    )
+
+
+def own_deviation(scenario: "Scenario", point: "FlightState") -> dict[str, float]:
+    """JSBSim's own linearisation against the FDC equations, per mode, at `point` without its sideslip."""
+    from beaver_ftc.plant.linear import LinearModel, own
+
+    straight = replace(point, beta_rad=0.0)
+    reference = modes(
+        LinearModel(*fdc_matrices(scenario, straight), fdc.STATES, fdc.SURFACES).of(CLASSICAL).A
+    )
+    found = modes(own(scenario, straight).of(CLASSICAL).A)
+    return {name: deviation(found[name].pole, reference[name].pole) for name in MODES}
+
+
+def fdc_matrices(scenario: "Scenario", point: "FlightState") -> tuple[np.ndarray, np.ndarray]:
+    """A (12, 12), B (12, 4) of the FDC equations with the truth's declared coefficients."""
+    ratio = dict(scenario.uncertainty.coefficients)
+    return fdc.linearise(state_vector(point), surfaces_of(point), engine_of(point), ratio)
+
+
+def state_vector(point: "FlightState") -> np.ndarray:
+    """A flight condition as the FDC state, (12,)."""
+    return np.array([
+        point.airspeed_mps, point.alpha_rad, point.beta_rad, point.p_rad_s, point.q_rad_s, point.r_rad_s,
+        point.phi_rad, point.theta_rad, point.psi_rad, 0.0, 0.0, point.altitude_m,
+    ])  # fmt: skip
+
+
+def surfaces_of(point: "FlightState") -> np.ndarray:
+    """Deflections (4,) rad."""
+    return np.array([getattr(point, f"{surface}_rad") for surface in fdc.SURFACES])
+
+
+def engine_of(point: "FlightState") -> fdc.Engine:
+    """Engine setting."""
+    return fdc.Engine(point.engine_rpm, point.manifold_pressure_inhg)
+
+
+def designed(
+    scenario: "Scenario", point: "FlightState", A: np.ndarray, B: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """A and B with the rows of p, q and r as the designer believes them."""
+    f_x, f_y, G = believed_derivatives(scenario, point)
+    A, B = A.copy(), B.copy()
+    rows = slice(3, 6)
+    A[rows] = 0.0
+    A[rows, 3:6] = f_x
+    A[rows, 1:3] = f_y[:, :2]
+    for column, slope in ((0, air_data_slope(point, "airspeed")), (11, air_data_slope(point, "altitude"))):
+        A[rows, column] = f_y[:, 2:] @ slope
+    B[rows] = G
+    return A, B
+
+
+def believed_derivatives(
+    scenario: "Scenario", point: "FlightState"
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """f_x (3, 3), f_y (3, 5) and G (3, 4) of the design model at a trim."""
+    design = design_of(scenario.design_model)[0]
+    x, y, u = np.zeros(3), measured(point), surfaces_of(point)
+    anchor(design, x, y, u)
+    if design["linearised"] or design["frozen_alpha"]:
+        return design["f_x"].copy(), design["f_y"].copy(), design["G0"].copy()
+    _, G, f_x, f_y = jacobian(design, x, y, u)
+    return f_x, f_y, G
+
+
+def measured(point: "FlightState") -> np.ndarray:
+    """y = (alpha, beta, V, qdyn, dpt) at a flight condition."""
+    V, qdyn, dpt = air_data(point, point.airspeed_mps, point.altitude_m)
+    return np.array([point.alpha_rad, point.beta_rad, V, qdyn, dpt])
+
+
+def air_data(point: "FlightState", airspeed_mps, altitude_m) -> tuple:
+    """V, qdyn, dpt with the point's engine setting."""
+    density = fdc.atmosphere(altitude_m)
+    power = engine_power_kw(point.engine_rpm, point.manifold_pressure_inhg, density)
+    return airspeed_mps, 0.5 * density * airspeed_mps**2, slipstream(power, density, airspeed_mps)
+
+
+def air_data_slope(point: "FlightState", along: str) -> np.ndarray:
+    """Derivative (3,) of V, qdyn, dpt with airspeed or altitude, by a complex step."""
+    V = point.airspeed_mps + 1j * _STEP * (along == "airspeed")
+    h = point.altitude_m + 1j * _STEP * (along == "altitude")
+    return np.array([complex(each).imag / _STEP for each in air_data(point, V, h)])

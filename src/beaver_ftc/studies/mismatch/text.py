@@ -1,0 +1,165 @@
+"""The mismatch as tables for the terminal."""
+
+import io
+from typing import TYPE_CHECKING, Any
+
+from beaver_ftc.studies.mismatch.document import Document
+from beaver_ftc.studies.mismatch.states import AXES
+from beaver_ftc.studies.mismatch.words import label, number, percent, seconds
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+
+def mismatch_text(found: Document, folder: str, colour: bool = False) -> str:
+    """One flight: the sources, the bound, what to declare, the modes."""
+    tables = [sources_table(found), bound_table(found), modes_table(found)]
+    return _printed(tables, colour) + f"\n{verdict(found)}\nresults      {folder}\n"
+
+
+def verdict(found: Document) -> str:
+    """What it comes to, in words."""
+    lines = []
+    worst = found["dominant"]
+    if worst is not None:
+        lines.append(
+            f"dominant     {label(worst['source'])}: "
+            f"{percent(worst['bound_share'])} of the bound on {worst['axis']}"
+        )
+    if found["false_alarm"]:
+        detection = found["detection"]
+        lines.append(f"FALSE ALARM  at {detection['time_s']:.2f} s on {detection['axis']}")
+    lines += [_recommendation(found["recommended"]), *_guarantee(found["guarantee"])]
+    return "\n".join(lines)
+
+
+def _recommendation(recommended: Document) -> str:
+    constant = "  ".join(f"{axis} {recommended['constant_rad_s2'][axis]:g}" for axis in AXES)
+    doubt = "" if recommended["settled"] else ", still exceeded when flown"
+    return f"recommended  constant bound {constant} rad/s2, from {recommended['runs']} run(s){doubt}"
+
+
+def _guarantee(guarantee: Document) -> list[str]:
+    return [
+        f"published elevator case with the {which} bound: {_case(guarantee[which])}"
+        for which in ("declared", "recommended")
+    ]
+
+
+def _case(case: Document) -> str:
+    if case["false_alarm"]:
+        return "FALSE ALARM before the fault"
+    detected, certain = case["detection_delay_s"], case["guaranteed_delay_s"]
+    return (
+        f"{'not detected' if detected is None else f'detected after {detected:.2f} s'}, "
+        f"{'never certain' if certain is None else f'certain within {certain:.2f} s'}"
+    )
+
+
+def sources_table(found: Document) -> "Table":
+    """RMS, largest value and share of the bound of every source that there is, per axis."""
+    table = _table(f"{found['scenario']}: truth less design (1e-3 rad/s2; share of the bound)", "source")
+    for axis in AXES:
+        for what in ("rms", "max", "bound"):
+            table.add_column(f"{axis} {what}", justify="right")
+    for name, part, per_axis in _lines(found):
+        cells = [cell for of in per_axis for cell in _figures(of)]
+        table.add_row(f"  {part}" if part else label(name), *cells, style="dim" if part else None)
+    return table
+
+
+def _lines(found: Document) -> list[tuple[str, str, list[Document | None]]]:
+    lines: list[tuple[str, str, list[Document | None]]] = []
+    for name in found["axes"]["p"]:
+        per_axis = [found["axes"][axis][name] for axis in AXES]
+        if any(of["max"] > 0.0 for of in per_axis):
+            lines.append((name, "", per_axis))
+        for part in per_axis[0].get("parts", {}):
+            lines.append((name, part, [of["parts"][part] for of in per_axis]))
+    return lines
+
+
+def _figures(of: Document | None) -> tuple[str, str, str]:
+    if of is None or of["max"] == 0.0:
+        return "-", "-", "-"
+    return number(1e3 * of["rms"]), number(1e3 * of["max"]), percent(of["bound_share"])
+
+
+def bound_table(found: Document) -> "Table":
+    """The bound of each axis, how far it was used and exceeded, and the smallest that would have done."""
+    table = _table("the bound, without the fault", "axis")
+    for heading in ("constant", "smallest", "worst", "at", "exceeded", "times", "because of"):
+        table.add_column(heading, justify="right")
+    for axis in AXES:
+        of = found["bound"][axis]
+        stays = of["exceedances"]
+        table.add_row(
+            axis, f"{of['constant_rad_s2']:.4g}", f"{of['smallest_constant_rad_s2']:.4g}",
+            percent(of["worst_ratio"]),
+            f"{of['worst_at_s']:.2f} s", f"{of['exceeded_s']:.2f} s", str(of["exceeded_times"]),
+            label(max(stays, key=lambda stay: stay["peak_ratio"] or 0.0)["source"]) if stays else "-",
+        )  # fmt: skip
+    return table
+
+
+def modes_table(found: Document) -> "Table":
+    """Frequency and damping of each mode, and how far the others are from the truth."""
+    linear = found["linear"]
+    table = _table(f"modes at trim, {linear['airspeed_mps']:g} m/s and {linear['altitude_m']:g} m", "mode")
+    for heading in ("truth rad/s", "damping", "FDC off by", "design off by", "JSBSim's own off by"):
+        table.add_column(heading, justify="right")
+    for name, mode in linear["modes"].items():
+        table.add_row(
+            label(name), f"{mode['truth']['frequency_rad_s']:.4g}", f"{mode['truth']['damping']:.3g}",
+            percent(mode["deviation"]["fdc"]), percent(mode["deviation"]["design"]),
+            percent(mode["jsbsim_own_deviation"]),
+        )  # fmt: skip
+    return table
+
+
+def comparison_table(entries: list[Document]) -> "Table":
+    """Runs side by side: worst share of the bound, smallest constant, reason, alarm and guarantee."""
+    table = _table("worst share of the bound / smallest constant bound in rad/s2", "run")
+    for heading in (*AXES, "dominant", "false alarm", "certain within"):
+        table.add_column(heading, justify="right")
+    for entry in entries:
+        table.add_row(
+            entry["scenario"],
+            *(_needed(entry, axis) for axis in AXES),
+            label(entry["dominant"] or "-"), "yes" if entry["false_alarm"] else "no",
+            "void" if entry["guarantee_void"] else seconds(entry["guaranteed_delay_s"], "never"),
+        )  # fmt: skip
+    return table
+
+
+def _needed(entry: Document, axis: str) -> str:
+    return f"{percent(entry[f'{axis}_worst_ratio'])} / {entry[f'{axis}_smallest_constant_rad_s2']:.3g}"
+
+
+def comparison_text(entries: list[Document], recommended: Document, folder: str, colour: bool = False) -> str:
+    """Several flights side by side, and the bound that covers them all."""
+    lines = [_recommendation(recommended["recommended"]), *_guarantee(recommended["guarantee"])]
+    return (
+        _printed([comparison_table(entries)], colour) + "\n" + "\n".join(lines) + f"\nresults      {folder}\n"
+    )
+
+
+def _table(title: str, first: str) -> "Table":
+    from rich.table import Table
+
+    table = Table(title=title, title_justify="left", box=None, pad_edge=False)
+    table.add_column(first, no_wrap=True)
+    return table
+
+
+def _printed(tables: list[Any], colour: bool) -> str:
+    from rich.console import Console
+
+    console = Console(
+        file=io.StringIO(), force_terminal=colour, highlight=False, emoji=False, markup=False, width=150
+    )
+    with console.capture() as captured:
+        for table in tables:
+            console.print(table)
+            console.print()
+    return "\n".join(line.rstrip() for line in captured.get().splitlines()) + "\n"

@@ -1,0 +1,128 @@
+"""The flights of the published study, and a few beside them for comparison."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from beaver_ftc.diagnosis.state import DEADBEAT_PER_S
+from beaver_ftc.loop.loop import fly
+from beaver_ftc.results.metrics import Document, metrics
+from beaver_ftc.studies.reproduce.choices import ELEVATOR_LOSS, FAULT_AT_S, UNANTICIPATED, scenario
+
+AXES = ("p", "q", "r")
+ESTIMATORS = ("aileron", "elevator", "rudder")
+NOMINAL = {"control.law": "nominal"}
+SHARPENED = {"fdi.thresholds": "interval", "fdi.sharpen": "all", "fdi.pole_bank_per_s": (DEADBEAT_PER_S,)}
+SETTLED_S = 2.0  # from rest, or from a fault, to steady tracking: four error time constants
+
+
+@dataclass(frozen=True)
+class Case:
+    """One flight: where the paper shows it, and what sets it apart from the choices."""
+
+    name: str
+    shown_in: str
+    changes: Mapping[str, Any] = field(default_factory=dict)
+
+
+def _loss(actuator: str) -> list[dict[str, Any]]:
+    return [{**ELEVATOR_LOSS, "actuator": actuator}]
+
+
+PUBLISHED = (
+    Case("fault-free-nominal", "Fig. 2a", NOMINAL),
+    Case("elevator-nominal", "Fig. 2b", {"faults": _loss("elevator"), **NOMINAL}),
+    Case("elevator", "Fig. 3, 4, 5", {"faults": _loss("elevator")}),
+    Case("unanticipated-nominal", "Fig. 6", {"faults": [UNANTICIPATED], **NOMINAL}),
+    Case("unanticipated", "Fig. 7", {"faults": [UNANTICIPATED]}),
+    Case("aileron", "mentioned", {"faults": _loss("aileron")}),
+    Case("rudder", "mentioned", {"faults": _loss("rudder")}),
+)
+BESIDE = (
+    Case("elevator-sharpened", "", {"faults": _loss("elevator"), **SHARPENED}),
+    Case("unanticipated-sharpened", "", {"faults": [UNANTICIPATED], **SHARPENED}),
+    Case("aileron-sharpened", "", {"faults": _loss("aileron"), **SHARPENED}),
+    Case("rudder-sharpened", "", {"faults": _loss("rudder"), **SHARPENED}),
+    Case("unanticipated-interval", "", {"faults": [UNANTICIPATED], "fdi.thresholds": "interval"}),
+)
+
+
+class _Memory:
+    """A log sink that keeps the flight as columns."""
+
+    def open(self, columns: Any) -> None:
+        self._names, self._chunks = tuple(columns), list[np.ndarray]()
+
+    def write(self, rows: np.ndarray) -> None:
+        self._chunks.append(rows.copy())
+
+    def close(self) -> None:
+        self.columns = dict(zip(self._names, np.concatenate(self._chunks).T, strict=True))
+
+
+@dataclass(frozen=True)
+class Flown:
+    """A case flown: its metrics, and its log as name -> values, shape (frames,)."""
+
+    metrics: Document
+    log: dict[str, np.ndarray]
+
+    def error_deg_s(self, axis: str) -> np.ndarray:
+        """Tracking error of an axis, deg/s."""
+        return np.degrees(self.log[f"{axis}_model_rad_s"] - self.log[f"{axis}_rad_s"])
+
+    def rms_deg_s(self, axis: str, start_s: float, end_s: float = np.inf) -> float:
+        """RMS tracking error of an axis from start_s to end_s, deg/s; infinite where the flight is over."""
+        error = self.error_deg_s(axis)[self.between(start_s, end_s)]
+        return float(np.sqrt(np.mean(error**2))) if error.size else np.inf
+
+    def before_deg_s(self, axis: str) -> float:
+        """RMS tracking error before the fault, once settled, deg/s."""
+        return self.rms_deg_s(axis, SETTLED_S, FAULT_AT_S)
+
+    def after_deg_s(self, axis: str) -> float:
+        """RMS tracking error after the fault, once settled, deg/s."""
+        return self.rms_deg_s(axis, FAULT_AT_S + SETTLED_S)
+
+    def between(self, start_s: float, end_s: float = np.inf) -> np.ndarray:
+        """Which frames lie in a span of time."""
+        return (self.log["t_s"] >= start_s) & (self.log["t_s"] < end_s)
+
+    def excluded_at_s(self, estimator: str) -> float:
+        """When an isolation estimator was excluded, s; infinite if it never was."""
+        out = np.flatnonzero(self.log[f"fie_{estimator}_excluded"] == 1)
+        return float(self.log["t_s"][out[0]]) if out.size else np.inf
+
+    def closest(self, estimator: str) -> float:
+        """Largest |residual| / threshold of an isolation estimator, on the residual's side."""
+        return max(np.nanmax(self._ratio(f"fie_{estimator}_{axis}")) for axis in AXES)
+
+    def _ratio(self, stem: str) -> np.ndarray:
+        residual = self.log[f"{stem}_residual_rad_s"]
+        bound = np.where(residual < 0, self.log[f"{stem}_lower_rad_s"], self.log[f"{stem}_upper_rad_s"])
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.where(residual == 0, 0.0, np.abs(residual / bound))
+
+    def closest_before_fault(self) -> float:
+        """Largest |residual| / threshold of the detection estimator before the fault."""
+        healthy = self.between(self.log["t_s"][1], FAULT_AT_S)  # residual and threshold start from zero
+        residual, threshold = (
+            np.array([self.log[f"{axis}_{what}_rad_s"][healthy] for axis in AXES])
+            for what in ("residual", "threshold")
+        )
+        return float(np.max(np.abs(residual / threshold)))
+
+    def named_s(self, estimator: str) -> float:
+        """For how long this was the only estimator left, s."""
+        left = np.column_stack([self.log[f"fie_{name}_excluded"] != 1 for name in ESTIMATORS])
+        alone = (left.sum(axis=1) == 1) & left[:, ESTIMATORS.index(estimator)] & (self.log["detected"] == 1)
+        return float(alone.sum() * (self.log["t_s"][1] - self.log["t_s"][0]))
+
+
+def fly_case(case: Case, changes: Mapping[str, Any] | None = None) -> Flown:
+    """Fly a case, with further changes to the choices."""
+    memory = _Memory()
+    flight = fly(scenario(case.name, {**case.changes, **(changes or {})}), memory)
+    return Flown(metrics(flight), memory.columns)

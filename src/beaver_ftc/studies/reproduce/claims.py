@@ -1,0 +1,258 @@
+"""Each statement of [Zhang2005, sec. VII], how we read it as a number, and whether ours bears it out."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from beaver_ftc.studies.reproduce.cases import ESTIMATORS, Flown
+from beaver_ftc.studies.reproduce.choices import AMPLITUDE_DEG_S, FAULT_AT_S
+
+Flights = Mapping[str, Flown]
+
+DETECTED_WITHIN_S = 0.5  # the paper's own number
+IMMEDIATELY_S = 0.1  # "almost immediately": less than the eye sees in a figure of 30 s
+GOOD = 0.1  # of the reference's amplitude: RMS error of good tracking
+DETERIORATED = 3.0  # times the RMS error before the fault: a change nobody overlooks
+TAKEN_OVER = 0.2  # of the flap's travel: what the elevator may still move
+CONTINUOUS_DEG_S = 60.0  # a rate that surface actuators follow [SL03]; a switch would be 100 times as fast
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A published statement; `measure` gives our number (in `unit`), which must be at most or at least the
+    limit, and says more in words."""
+
+    where: str
+    statement: str
+    quantity: str
+    unit: str
+    measure: Callable[[Flights], float]
+    limit: float
+    at_least: bool = False
+    remark: Callable[[Flights], str] = lambda flights: ""
+
+    def holds(self, number: float) -> bool:
+        """Whether our number bears the statement out."""
+        return bool(number >= self.limit if self.at_least else number <= self.limit)
+
+
+def _delay(flown: Flown, what: str) -> float:
+    delay = flown.metrics[what]["delay_s"]
+    return np.inf if delay is None else delay
+
+
+def _detection(name: str) -> Callable[[Flights], float]:
+    return lambda flights: _delay(flights[name], "detection")
+
+
+def _isolation(name: str, fault: str) -> Callable[[Flights], float]:
+    """Isolation after detection, s; infinite if anything else is named."""
+
+    def measure(flights: Flights) -> float:
+        found = flights[name].metrics
+        if found["isolation"]["fault"] != fault:
+            return np.inf
+        return round(found["isolation"]["time_s"] - found["detection"]["time_s"], 9)
+
+    return measure
+
+
+def _tracking(name: str, axis: str) -> Callable[[Flights], float]:
+    """RMS error after the fault over the amplitude of the reference, infinite if the aircraft is lost."""
+
+    def measure(flights: Flights) -> float:
+        flown = flights[name]
+        return np.inf if flown.metrics["departure"] else flown.after_deg_s(axis) / AMPLITUDE_DEG_S
+
+    return measure
+
+
+def _deterioration(name: str) -> Callable[[Flights], float]:
+    """RMS pitch rate error after the fault over that before, over all the flight there is."""
+    return lambda flights: flights[name].rms_deg_s("q", FAULT_AT_S) / flights[name].before_deg_s("q")
+
+
+def _last_to_go(flights: Flights) -> float:
+    """From detection to the exclusion of the last of the two estimators that do not fit, s."""
+    flown = flights["elevator"]
+    times = [flown.excluded_at_s(name) for name in ("aileron", "rudder")]
+    detected_s = flown.metrics["detection"]["time_s"]
+    return np.inf if detected_s is None else round(max(times) - detected_s, 9)
+
+
+def _adaptive_after(flights: Flights) -> float:
+    """From detection to the adaptive law being in charge, s."""
+    found = flights["elevator"].metrics
+    begun = [change["time_s"] for change in found["supervisor"] if change["mode"] == "adaptive"]
+    return round(begun[0] - found["detection"]["time_s"], 9) if begun else np.inf
+
+
+def _flap_rate(flights: Flights) -> float:
+    """Fastest motion the flap is commanded, deg/s."""
+    log = flights["elevator"].log
+    return float(np.max(np.abs(np.degrees(np.diff(log["flap_cmd_rad"]) / np.diff(log["t_s"])))))
+
+
+def _share_of_elevator(flights: Flights) -> float:
+    """Travel of the elevator over that of the flap, after the hand-over."""
+    flown = flights["elevator"]
+    after = flown.between(FAULT_AT_S + 3.0)
+    if not after.any():
+        return np.inf
+    elevator, flap = (float(np.ptp(flown.log[f"{name}_cmd_rad"][after])) for name in ("elevator", "flap"))
+    return elevator / flap if flap else np.inf
+
+
+def _said_theta(name: str) -> Callable[[Flights], str]:
+    def remark(flights: Flights) -> str:
+        theta = flights[name].metrics["isolation"]["estimate"]
+        return "" if theta is None else f"estimated theta {theta:.3f}, true -0.4"
+
+    return remark
+
+
+def _named(name: str) -> Callable[[Flights], str]:
+    def remark(flights: Flights) -> str:
+        delay = _delay(flights[name], "detection")
+        beside = [said for said in (_sharpened(name)(flights), _said_theta(name)(flights)) if said]
+        return "; ".join([f"detected after {delay:.2f} s", *beside])
+
+    return remark
+
+
+def _sharpened(name: str) -> Callable[[Flights], str]:
+    def remark(flights: Flights) -> str:
+        beside = flights.get(f"{name}-sharpened")
+        return f"{_delay(beside, 'detection'):.2f} s sharpened" if beside else ""
+
+    return remark
+
+
+def _degraded(flights: Flights) -> str:
+    flown = flights["elevator-nominal"]
+    return f"{flown.before_deg_s('q'):.3f} to {flown.after_deg_s('q'):.2f} deg/s RMS"
+
+
+def _restored(flights: Flights) -> str:
+    flown, nominal = flights["elevator"], flights["elevator-nominal"]
+    return (
+        f"{flown.after_deg_s('q'):.3f} deg/s RMS, {flown.before_deg_s('q'):.3f} before the fault, "
+        f"{nominal.after_deg_s('q'):.2f} under the nominal law"
+    )
+
+
+def _lost(flights: Flights) -> str:
+    departure = flights["unanticipated-nominal"].metrics["departure"]
+    if departure is None:
+        return "tracking lost, aircraft kept"
+    return f"the aircraft departs in {departure['signal']} at {departure['time_s']:.2f} s"
+
+
+def _last_standing(flights: Flights) -> str:
+    flown, interval = flights["unanticipated"], flights.get("unanticipated-interval")
+    named = max(ESTIMATORS, key=flown.named_s)
+    if flown.named_s(named) == 0.0:
+        return "at no time is a known fault left alone"
+    said = f"the norm bound names the {named} for {flown.named_s(named):.2f} s before it is excluded too"
+    if interval is None or interval.named_s(named):
+        return said
+    return f"{said}; the interval test never names it"
+
+
+def _recovered(axis: str, name: str) -> Callable[[Flights], str]:
+    return lambda flights: (
+        f"{flights[name].after_deg_s(axis):.3f} deg/s RMS, {flights[name].before_deg_s(axis):.3f} before"
+    )
+
+
+_OF_AMPLITUDE = "of the reference's amplitude"
+CLAIMS = (
+    Claim(
+        "Fig. 2a", "Without a fault the nominal law tracks the pitch rate well.",
+        "RMS error of q", _OF_AMPLITUDE,
+        lambda flights: flights["fault-free-nominal"].rms_deg_s("q", 2.0) / AMPLITUDE_DEG_S, GOOD,
+    ),
+    Claim(
+        "Fig. 2b", "After the elevator fault the nominal law tracks much worse.",
+        "RMS error of q", "times that before", _deterioration("elevator-nominal"), DETERIORATED,
+        at_least=True, remark=_degraded,
+    ),
+    Claim(
+        "Fig. 3", "Before the fault the residual stays below its threshold.",
+        "largest |residual| / threshold", "", lambda flights: flights["elevator"].closest_before_fault(), 1.0,
+    ),
+    Claim(
+        "Fig. 3", "The elevator fault is detected within 0.5 s.",
+        "detection", "s after the fault", _detection("elevator"), DETECTED_WITHIN_S,
+        remark=_sharpened("elevator"),
+    ),
+    Claim(
+        "Fig. 4a, 4c", "The aileron's and the rudder's estimators exceed their thresholds almost at once.",
+        "last exclusion", "s after detection", _last_to_go, IMMEDIATELY_S,
+    ),
+    Claim(
+        "Fig. 4b", "No residual of the elevator's estimator ever exceeds its threshold.",
+        "largest |residual| / threshold", "", lambda flights: flights["elevator"].closest("elevator"), 1.0,
+    ),
+    Claim(
+        "Fig. 4", "The fault is thereby isolated as the elevator's.",
+        "isolation", "s after detection", _isolation("elevator", "elevator"), IMMEDIATELY_S,
+        remark=_said_theta("elevator"),
+    ),
+    Claim(
+        "Fig. 5", "Right after detection the adaptive law takes over.",
+        "in charge", "s after detection", _adaptive_after, IMMEDIATELY_S,
+        remark=lambda flights: "the paper's text says about 10 s here, its fault comes at 12 s",
+    ),
+    Claim(
+        "Fig. 5", "After isolation the flap moves in the elevator's place.",
+        "travel of the elevator", "of the flap's", _share_of_elevator, TAKEN_OVER,
+    ),
+    Claim(
+        "Fig. 5", "The hand-over from elevator to flap is continuous.",
+        "fastest motion of the flap", "deg/s", _flap_rate, CONTINUOUS_DEG_S,
+    ),
+    Claim(
+        "Fig. 5", "With reallocation the pitch rate is tracked acceptably in spite of the fault.",
+        "RMS error of q", _OF_AMPLITUDE, _tracking("elevator", "q"), GOOD, remark=_restored,
+    ),
+    Claim(
+        "mentioned", "An aileron fault is detected and isolated just as well.",
+        "isolation", "s after detection", _isolation("aileron", "aileron"), IMMEDIATELY_S,
+        remark=_named("aileron"),
+    ),
+    Claim(
+        "mentioned", "An aileron fault leaves tracking satisfactory.",
+        "RMS error of p", _OF_AMPLITUDE, _tracking("aileron", "p"), GOOD, remark=_recovered("p", "aileron"),
+    ),
+    Claim(
+        "mentioned", "A rudder fault is detected and isolated just as well.",
+        "isolation", "s after detection", _isolation("rudder", "rudder"), IMMEDIATELY_S,
+        remark=_named("rudder"),
+    ),
+    Claim(
+        "mentioned", "A rudder fault leaves tracking satisfactory.",
+        "RMS error of r", _OF_AMPLITUDE, _tracking("rudder", "r"), GOOD, remark=_recovered("r", "rudder"),
+    ),
+    Claim(
+        "Fig. 6", "After the unanticipated fault the nominal law tracks much worse.",
+        "RMS error of q", "times that before", _deterioration("unanticipated-nominal"), DETERIORATED,
+        at_least=True, remark=_lost,
+    ),
+    Claim(
+        "mentioned", "The unanticipated fault is detected within 0.5 s.",
+        "detection", "s after the fault", _detection("unanticipated"), DETECTED_WITHIN_S,
+        remark=_sharpened("unanticipated"),
+    ),
+    Claim(
+        "mentioned", "The unanticipated fault is not taken for one of the known ones.",
+        "last estimator excluded", "s after detection", _isolation("unanticipated", "unanticipated"),
+        DETECTED_WITHIN_S, remark=_last_standing,
+    ),
+    Claim(
+        "Fig. 7", "The adaptive law keeps tracking acceptable in spite of the unanticipated fault.",
+        "RMS error of q", _OF_AMPLITUDE, _tracking("unanticipated", "q"), GOOD,
+        remark=_recovered("q", "unanticipated"),
+    ),
+)  # fmt: skip

@@ -1,0 +1,132 @@
+"""One figure for each published figure, with its panels, in the looks of every other figure here."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from beaver_ftc.results.figures import draw
+from beaver_ftc.results.looks import marks
+from beaver_ftc.results.series import Series
+from beaver_ftc.results.views import AXES, AXIS_NAMES, Panel, Trace, View
+from beaver_ftc.studies.reproduce.cases import Flown
+from beaver_ftc.studies.reproduce.choices import FAULT_AT_S
+
+WHOLE = (0.0, np.inf)
+CLOSE = (FAULT_AT_S - 0.5, FAULT_AT_S + 5.0)
+
+
+def _surface(name: str) -> Panel:
+    return Panel(
+        f"{name} deflection",
+        (
+            Trace(f"{name}_cmd_rad", "command", "command"),
+            Trace(f"{name}_effective_rad", "effective", "actual"),
+        ),
+    )
+
+
+def _rate(axis: str) -> Panel:
+    return Panel(
+        AXIS_NAMES[axis],
+        (Trace(f"{axis}_model_rad_s", "reference", "target"), Trace(f"{axis}_rad_s", "aircraft", "actual")),
+    )
+
+
+def _errors() -> Panel:
+    traces = tuple(Trace(f"{axis}_error_rad_s", axis, axis) for axis in AXES)
+    return Panel("tracking errors", traces)
+
+
+def _tracking_view(name: str, title: str, above: tuple[Panel, ...], axis: str = "q") -> View:
+    return View(name, title, (*above, _errors(), _rate(axis)), across=2)
+
+
+def _detection_view(name: str, title: str) -> View:
+    panels = tuple(
+        Panel(
+            f"{AXIS_NAMES[axis]}: residual",
+            (
+                Trace(f"{axis}_threshold_rad_s", "± threshold", "bound"),
+                Trace(f"{axis}_threshold_rad_s", "", "bound", -1.0),
+                Trace(f"{axis}_residual_rad_s", "residual", "actual"),
+            ),
+        )
+        for axis in AXES
+    )
+    return View(name, title, panels)
+
+
+def _isolation_view(name: str, estimator: str, title: str) -> View:
+    panels = tuple(
+        Panel(
+            f"{AXIS_NAMES[axis]}: residual",
+            (
+                Trace(f"fie_{estimator}_{axis}_lower_rad_s", "± threshold", "bound"),
+                Trace(f"fie_{estimator}_{axis}_upper_rad_s", "", "bound"),
+                Trace(f"fie_{estimator}_{axis}_residual_rad_s", "residual", "actual"),
+            ),
+            shade=f"fie_{estimator}_excluded",
+            shade_label="excluded",
+        )
+        for axis in AXES
+    )
+    return View(name, title, panels)
+
+
+_PITCH = (_surface("elevator"), _surface("flap"))
+FIGURES: tuple[tuple[View, str, tuple[float, float]], ...] = (  # view, case, span of time
+    (_tracking_view("fig-2a", "Fig. 2a: nominal law, no fault", _PITCH), "fault-free-nominal", WHOLE),
+    (
+        _tracking_view("fig-2b", "Fig. 2b: nominal law, 40 % loss of the elevator", _PITCH),
+        "elevator-nominal", WHOLE,
+    ),
+    (_detection_view("fig-3", "Fig. 3: detection of the elevator fault"), "elevator", WHOLE),
+    (_isolation_view("fig-4a", "aileron", "Fig. 4a: isolation estimator 1, aileron"), "elevator", CLOSE),
+    (_isolation_view("fig-4b", "elevator", "Fig. 4b: isolation estimator 2, elevator"), "elevator", CLOSE),
+    (_isolation_view("fig-4c", "rudder", "Fig. 4c: isolation estimator 3, rudder"), "elevator", CLOSE),
+    (_tracking_view("fig-5", "Fig. 5: fault-tolerant law, elevator to flap", _PITCH), "elevator", WHOLE),
+    (
+        _tracking_view("fig-6", "Fig. 6: nominal law, unanticipated fault", _PITCH),
+        "unanticipated-nominal", WHOLE,
+    ),
+    (
+        _tracking_view("fig-7", "Fig. 7: fault-tolerant law, unanticipated fault", _PITCH),
+        "unanticipated", WHOLE,
+    ),
+    (
+        _tracking_view(
+            "aileron", "Mentioned: aileron fault", (_surface("aileron"), _surface("rudder")), "p"
+        ),
+        "aileron", WHOLE,
+    ),
+    (
+        _tracking_view("rudder", "Mentioned: rudder fault", (_surface("aileron"), _surface("rudder")), "r"),
+        "rudder", WHOLE,
+    ),
+    (
+        _detection_view("unanticipated-detection", "Mentioned: detection of the unanticipated fault"),
+        "unanticipated", CLOSE,
+    ),
+)  # fmt: skip
+
+
+def write_figures(flights: Mapping[str, Flown], folder: Path) -> list[Path]:
+    """Draw every figure as `<name>.png` into `folder`; return the files."""
+    folder.mkdir(exist_ok=True)
+    return [_write(view, flights[case], span, folder) for view, case, span in FIGURES]
+
+
+def _write(view: View, flown: Flown, span: tuple[float, float], folder: Path) -> Path:
+    path = folder / f"{view.name}.png"
+    said = f"case {flown.metrics['scenario']}"
+    figure = draw(view, _series(flown, span), marks(flown.metrics), said)
+    figure.savefig(path, metadata={"Software": "beaver-ftc"})
+    return path
+
+
+def _series(flown: Flown, span: tuple[float, float]) -> Series:
+    """The log within a span of time, with the tracking errors."""
+    shown = flown.between(*span)
+    errors = {f"{axis}_error_rad_s": np.radians(flown.error_deg_s(axis)) for axis in AXES}
+    return {name: values[shown] for name, values in {**flown.log, **errors}.items()}

@@ -1,0 +1,325 @@
+"""The figures of a sweep as PNG, drawn with matplotlib without its global state.
+
+Each function takes the flights and returns a figure, or None where the flights hold nothing of that kind.
+"""
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from beaver_ftc.results.looks import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILION
+from beaver_ftc.studies.statistics import wilson
+from beaver_ftc.studies.sweep.flights import Flights
+from beaver_ftc.studies.sweep.summary import NO_ALARM
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+Document = dict[str, Any]
+Drawer = Callable[[Flights, Document], "Figure | None"]
+
+DPI = 110
+BINS = 16
+LEAST_A_BIN = 10
+_SEARCHED = {
+    "delay": "detection delay (s)",
+    "false_alarm": "residual / threshold without a fault",
+    "tracking": "RMS tracking error after the fault (deg/s)",
+}
+MOST_LINES = 400  # of parallel coordinates: more is a grey block
+_FAULT_LOOKS = (
+    (BLUE, "o", "-"),
+    (ORANGE, "s", "--"),
+    (GREEN, "^", "-."),
+    (PURPLE, "D", ":"),
+    (SKY, "v", "-"),
+)
+
+
+def write_figures(flights: Flights, summary: Document, folder: Path) -> list[Path]:
+    """Draw what there is to draw as `<figure>.png`; return the files."""
+    folder.mkdir(exist_ok=True)
+    for old in folder.glob("*.png"):
+        old.unlink()
+    drawn = [(name, draw(flights, summary)) for name, (_, draw) in FIGURES.items()]
+    return [_save(figure, folder / f"{name}.png") for name, figure in drawn if figure is not None]
+
+
+def _save(figure: "Figure", path: Path) -> Path:
+    figure.savefig(path, metadata={"Software": "beaver-ftc"})
+    return path
+
+
+def _axes(title: str, size: tuple[float, float] = (8.0, 4.6)) -> tuple["Figure", "Axes"]:
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=size, dpi=DPI, layout="constrained")
+    axes = figure.subplots()
+    axes.set_title(title, fontsize=10)
+    axes.tick_params(labelsize=8)
+    axes.grid(visible=True, color="#dddddd", linewidth=0.6)
+    axes.set_axisbelow(True)
+    return figure, axes
+
+
+def magnitude_key(flights: Flights, summary: Document) -> str | None:
+    """How large the fault is: of the varied numbers of a fault, the one that delays hang on most."""
+    ranked = [entry["key"] for entry in summary["sensitivity"]["detection_delay"]]
+    numbers = [key for key in (ranked or flights.vary) if flights.is_number(key)]
+    of_faults = [key for key in numbers if key.startswith("faults[") and not key.endswith(("at_s", "end_s"))]
+    return next(iter(of_faults or numbers), None)
+
+
+def detection_probability(flights: Flights, summary: Document) -> "Figure | None":
+    """Share detected against the fault's magnitude, a curve a fault, with Wilson intervals."""
+    key = magnitude_key(flights, summary)
+    if key is None or not flights.faulted.any():
+        return None
+    figure, axes = _axes("Detection probability (bars: 95 % intervals)")
+    labels = flights.fault_labels
+    for look, label in zip(_cycle(_FAULT_LOOKS), sorted(set(labels[flights.faulted])), strict=False):
+        group = flights.faulted & (labels == label)
+        values = flights.values(key)[group]
+        bins = _levels(values) if flights.vary[key].count else _bins(values)
+        _probability_curve(axes, values, bins, flights.detected[group], label, look)
+    if flights.vary[key].loguniform:
+        axes.set_xscale("log")
+    axes.set_ylim(-0.03, 1.03)
+    axes.set_xlabel(key, fontsize=9)
+    axes.set_ylabel("share detected", fontsize=9)
+    axes.legend(fontsize=8)
+    return figure
+
+
+def _probability_curve(
+    axes: "Axes", values: np.ndarray, groups: list[np.ndarray], hits: np.ndarray, label: str, look: tuple
+) -> None:
+    found = [wilson(int(hits[group].sum()), group.size) for group in groups]
+    shares = np.array([estimate.value for estimate in found])
+    reach = np.array([[e.value - e.low, e.high - e.value] for e in found]).T
+    colour, marker, dash = look
+    axes.errorbar(
+        [values[group].mean() for group in groups], shares, np.maximum(reach, 0), label=label, color=colour,
+        marker=marker, linestyle=dash, markersize=4.5, linewidth=1.3, elinewidth=0.8, capsize=2,
+    )  # fmt: skip
+
+
+def _levels(values: np.ndarray) -> list[np.ndarray]:
+    """Positions of the flights at each value, in order of the values."""
+    levels, group = np.unique(values, return_inverse=True)
+    if levels.size > 2 * BINS:
+        return _bins(values)
+    return [np.flatnonzero(group == level) for level in range(levels.size)]
+
+
+def _bins(values: np.ndarray) -> list[np.ndarray]:
+    """Positions of the values in equally full bins, in order, none with too few flights to say anything."""
+    count = min(BINS, max(1, values.size // LEAST_A_BIN))
+    return np.array_split(np.argsort(values, kind="stable"), count)
+
+
+def _cycle(looks: tuple) -> list:
+    return [looks[i % len(looks)] for i in range(100)]
+
+
+def delay_distribution(flights: Flights, summary: Document) -> "Figure | None":
+    """Share of faults detected within a time, a curve a fault; what is missing at the top was missed."""
+    if not flights.detected.any():
+        return None
+    figure, axes = _axes("Detection delay: share of faults detected within a time")
+    labels = flights.fault_labels
+    for look, label in zip(_cycle(_FAULT_LOOKS), sorted(set(labels[flights.faulted])), strict=False):
+        group = flights.faulted & (labels == label)
+        delays = np.sort(flights.detection_delay_s[group & flights.detected])
+        if delays.size:
+            shares = np.arange(1, delays.size + 1) / group.sum()
+            axes.step(
+                delays, shares, where="post", label=label, color=look[0], linestyle=look[2], linewidth=1.4
+            )
+    for q in (0.5, 0.95):
+        axes.axhline(q, color=GREY, linewidth=0.8, linestyle=":")
+    positive = flights.detection_delay_s[flights.detected & (flights.detection_delay_s > 0)]
+    if positive.size and positive.max() > 20 * np.median(positive):
+        axes.set_xscale("log")
+    axes.set_ylim(0, 1.02)
+    axes.set_xlabel("detection delay (s)", fontsize=9)
+    axes.set_ylabel("share of faults", fontsize=9)
+    axes.legend(fontsize=8, loc="lower right")
+    return figure
+
+
+def confusion_matrix(flights: Flights, summary: Document) -> "Figure | None":
+    """Declared fault against diagnosis."""
+    confusion = summary["confusion"]
+    counts = np.array(confusion["counts"])
+    if not counts.size:
+        return None
+    rows, columns = confusion["faults"], confusion["diagnoses"]
+    size = (2.6 + 1.15 * len(columns), 1.7 + 0.55 * len(rows))
+    figure, axes = _axes("What broke (rows) against what the diagnosis said (columns)", size)
+    axes.grid(visible=False)
+    shares = counts / np.maximum(counts.sum(axis=1, keepdims=True), 1)
+    axes.imshow(shares, cmap="Blues", vmin=0, vmax=1.15, aspect="auto")
+    for (row, column), count in np.ndenumerate(counts):
+        ink = "white" if shares[row, column] > 0.6 else BLACK
+        text = f"{count}\n{shares[row, column]:.0%}" if count else "0"
+        axes.text(column, row, text, ha="center", va="center", fontsize=8, color=ink if count else GREY)
+    axes.set_xticks(range(len(columns)), columns)
+    axes.set_yticks(range(len(rows)), rows)
+    for border in range(1, len(rows)):
+        axes.axhline(border - 0.5, color="white", linewidth=2)
+    for border in range(1, len(columns)):
+        axes.axvline(border - 0.5, color="white", linewidth=2)
+    return figure
+
+
+def sensitivity_bars(flights: Flights, summary: Document) -> "Figure | None":
+    """How much of each outcome each varied key explains."""
+    titles = {
+        "detection_delay": "detection delay", "missed_detection": "missed detection",
+        "tracking_error": "tracking error", "residual_before_fault": "residual before the fault",
+    }  # fmt: skip
+    rankings = {titles[name]: ranking for name, ranking in summary["sensitivity"].items() if ranking}
+    if not rankings:
+        return None
+    keys = [entry["key"] for entry in next(iter(rankings.values()))][:12]
+    figure, axes = _axes(
+        "What drives what: share of the outcome's ranks that a key explains", (8.0, 1.5 + 0.5 * len(keys))
+    )
+    height = 0.8 / len(rankings)
+    colours = (BLUE, ORANGE, GREEN, PURPLE)
+    for position, (name, ranking) in enumerate(rankings.items()):
+        explained = {entry["key"]: entry["explained"] for entry in ranking}
+        places = np.arange(len(keys)) + (position + 0.5) * height - 0.4
+        axes.barh(places, [explained[key] for key in keys], height, label=name, color=colours[position])
+    axes.set_yticks(range(len(keys)), keys)
+    axes.invert_yaxis()
+    axes.set_xlim(0, 1)
+    axes.legend(fontsize=8, loc="lower right")
+    return figure
+
+
+def parallel_coordinates(flights: Flights, summary: Document) -> "Figure | None":
+    """Each flight a line through its varied values and its delay, the bad ones on top."""
+    keys = _shown_keys(flights, summary)
+    if not keys:
+        return None
+    chosen = _spread(flights)
+    figure, axes = _axes(
+        f"{chosen.size} of {len(flights)} flights, a line each", (max(7.0, 1.7 * len(keys) + 3), 5.0)
+    )
+    axes.grid(visible=False)
+    scaled = np.column_stack([*(_scaled(axes, i, flights, key)[chosen] for i, key in enumerate(keys)),
+                              _scaled_delay(axes, len(keys), flights)[chosen]])  # fmt: skip
+    for label, which, colour, alpha in _outcomes(flights):
+        lines = scaled[which[chosen]]
+        if lines.size:
+            axes.plot(lines.T, color=colour, alpha=alpha, linewidth=0.8)
+            axes.plot([], [], color=colour, label=label)
+    axes.set_xticks(range(len(keys) + 1), [*map(_broken, keys), "detection\ndelay"], fontsize=8)
+    axes.set_yticks([])
+    axes.set_ylim(-0.06, 1.06)
+    axes.set_xlim(-0.3, len(keys) + 0.45)
+    for place in range(len(keys) + 1):
+        axes.axvline(place, color=BLACK, linewidth=0.8)
+    figure.legend(loc="outside lower center", ncols=4, fontsize=8, frameon=False)
+    return figure
+
+
+def _shown_keys(flights: Flights, summary: Document) -> list[str]:
+    ranked = [entry["key"] for entry in summary["sensitivity"]["detection_delay"]]
+    return (ranked or list(flights.vary))[:8]
+
+
+def _broken(key: str) -> str:
+    """A key on lines short enough to stand side by side."""
+    return key.replace(".", "\n.")
+
+
+def _spread(flights: Flights) -> np.ndarray:
+    """Positions of the flights to draw: every bad one as far as there is room, and of the others evenly."""
+    bad = np.flatnonzero((flights.faulted & ~flights.detected) | flights.departed | flights["false_alarm"])
+    bad = bad[:: max(1, -(-bad.size // (MOST_LINES // 2)))]
+    return np.union1d(bad, np.arange(0, len(flights), max(1, -(-len(flights) // MOST_LINES))))
+
+
+def _outcomes(flights: Flights) -> list[tuple[str, np.ndarray, str, float]]:
+    """(label, which, colour, alpha), drawn in this order."""
+    bad = flights["false_alarm"] | flights.departed | ~flights.measured
+    wrong = flights.detected & (flights["isolation.fault"] != "") & ~flights["isolation.correct"]
+    missed = flights.faulted & ~flights.detected
+    return [
+        ("detected, or nothing to detect", ~bad & ~missed & ~wrong, BLUE, 0.25),
+        (NO_ALARM, missed & ~bad, ORANGE, 0.5),
+        ("named wrongly", wrong & ~bad, PURPLE, 0.7),
+        ("false alarm, lost or not flown", bad, VERMILION, 0.8),
+    ]
+
+
+def _scaled(axes: "Axes", place: int, flights: Flights, key: str) -> np.ndarray:
+    """A key's values from 0 to 1, its ends or its names written beside its axis."""
+    values = flights.values(key)
+    if not flights.is_number(key):
+        names, group = np.unique(values.astype(str), return_inverse=True)
+        for i, name in enumerate(names):
+            _say(axes, place, i / max(names.size - 1, 1), _short(name))
+        return group / max(names.size - 1, 1)
+    low, high = float(values.min()), float(values.max())
+    _say(axes, place, 0.0, f"{low:.3g}")
+    _say(axes, place, 1.0, f"{high:.3g}")
+    if flights.vary[key].loguniform:
+        values, low, high = np.log(values), np.log(low), np.log(high)
+    return (values - low) / max(high - low, 1e-300)
+
+
+def _short(name: str) -> str:
+    """A choice as there is room for it: of a section, the words in it."""
+    words = re.findall(r': "([^"]+)"', name)
+    return (" ".join(words) or name.replace("[]", "none"))[:28].replace("_", " ")
+
+
+def _scaled_delay(axes: "Axes", place: int, flights: Flights) -> np.ndarray:
+    """The delay from 0 to 0.9 on a logarithm, never at 1; without a fault there is no point."""
+    delays = flights.detection_delay_s
+    seen = delays[flights.detected & (delays > 0)]
+    low, high = (float(seen.min()), float(seen.max())) if seen.size else (0.01, 1.0)
+    if seen.size:
+        _say(axes, place, 0.0, f"{low:.2g} s")
+        _say(axes, place, 0.9, f"{high:.2g} s")
+    if (flights.faulted & ~flights.detected).any():
+        _say(axes, place, 1.0, "never")
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = 0.9 * (np.log(np.maximum(delays, low)) - np.log(low)) / max(np.log(high / low), 1e-12)
+    return np.where(flights.faulted, np.where(flights.detected, share, 1.0), np.nan)
+
+
+def _say(axes: "Axes", place: int, height: float, text: str) -> None:
+    axes.annotate(text, (place, height), xytext=(4, 0), textcoords="offset points", fontsize=7, va="center")
+
+
+def search_history(flights: Flights, summary: Document) -> "Figure | None":
+    """The worst flight found so far, generation by generation."""
+    if "search" not in summary:
+        return None
+    search = summary["search"]
+    figure, axes = _axes("Worst-case search: the worst flight so far")
+    history = [np.nan if score is None else score for score in search["history"]]
+    axes.plot(range(1, len(history) + 1), history, color=BLUE, marker="o", markersize=3.5)
+    axes.set_xlabel("generation", fontsize=9)
+    axes.set_ylabel(_SEARCHED[search["objective"]], fontsize=9)
+    axes.ticklabel_format(useOffset=False)
+    return figure
+
+
+FIGURES: dict[str, tuple[str, Drawer]] = {
+    "search": ("Worst-case search", search_history),
+    "detection-probability": ("Detection probability against magnitude", detection_probability),
+    "delay-distribution": ("Detection delay", delay_distribution),
+    "confusion-matrix": ("Confusion matrix", confusion_matrix),
+    "sensitivity": ("Sensitivity", sensitivity_bars),
+    "parallel-coordinates": ("Parallel coordinates", parallel_coordinates),
+}

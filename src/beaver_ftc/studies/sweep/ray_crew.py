@@ -1,0 +1,95 @@
+"""A Ray cluster as crew: each task a Ray task, a few in the queue for each CPU so that none waits.
+
+Whether a lost task is flown again is the engine's to decide, as with local processes; Ray itself does not
+retry.
+"""
+
+from typing import Any
+
+from beaver_ftc.errors import BadInput, SimulationFailed
+from beaver_ftc.results.metrics import versions
+from beaver_ftc.studies.sweep.crew import Outcome, Task, silence
+from beaver_ftc.studies.sweep.flying import Job, fly_all
+from beaver_ftc.studies.sweep.processes import one_thread_each
+from beaver_ftc.studies.sweep.sampling import Assignment
+from beaver_ftc.studies.sweep.table import Row
+
+QUEUED_A_CPU = 2
+
+
+class RayCrew:
+    """The CPUs of a Ray cluster: one that runs already, one at an address, or one started on this machine."""
+
+    def __init__(self, job: Job, address: str | None, workers: int | None) -> None:
+        self._ray = _ray()
+        self._ours = _join(self._ray, address)
+        self._most = workers
+        self._job = self._ray.put(job)
+        self._versions = dict(versions())
+        self._fly = self._ray.remote(num_cpus=1, max_retries=0)(fly_task)
+        self._tasks: dict[Any, Task] = {}
+
+    @property
+    def slots(self) -> int:
+        """Follows the cluster as nodes come and go."""
+        cpus = max(1, int(self._ray.cluster_resources().get("CPU", 1)))
+        return self._most or QUEUED_A_CPU * cpus
+
+    def submit(self, task: Task) -> None:
+        self._tasks[self._fly.remote(self._job, self._versions, task.flights)] = task
+
+    def outcomes(self, timeout_s: float) -> list[Outcome]:
+        ready, _ = self._ray.wait(list(self._tasks), num_returns=1, timeout=timeout_s)
+        return [Outcome(self._tasks.pop(reference), self._rows(reference)) for reference in ready]
+
+    def close(self) -> None:
+        for reference in self._tasks:
+            self._ray.cancel(reference, force=True)
+        if self._ours:
+            self._ray.shutdown()
+
+    def _rows(self, reference: Any) -> list[Row] | None:
+        """The rows, or None if the worker or its node was lost. SimulationFailed if the code failed."""
+        try:
+            return self._ray.get(reference)
+        except self._ray.exceptions.RayTaskError as error:
+            raise SimulationFailed(f"a worker cannot go on: {error.cause or error}") from None
+        except self._ray.exceptions.RayError:
+            return None
+
+
+def fly_task(job: Job, driver_versions: dict[str, str], flights: tuple[Assignment, ...]) -> list[Row]:
+    """Fly a task on whatever node it is, if that has what the others have."""
+    own = dict(versions())
+    if own != driver_versions:
+        changed = ", ".join(
+            f"{name} {own.get(name)} instead of {version}"
+            for name, version in driver_versions.items()
+            if own.get(name) != version
+        )
+        raise SimulationFailed(f"a node of the cluster has {changed}: the table would mix versions")
+    with silence():
+        return fly_all(job, flights)
+
+
+def _ray() -> Any:
+    try:
+        import ray
+    except ImportError:
+        raise BadInput(
+            "--backend ray: Ray is not installed, allowed: pip install 'beaver-ftc[ray]'"
+        ) from None
+    return ray
+
+
+def _join(ray: Any, address: str | None) -> bool:
+    """Join a cluster, or start one; whether it is this process that joined."""
+    if ray.is_initialized():
+        return False
+    options: dict[str, Any] = {} if address else {"include_dashboard": False}
+    try:
+        with silence():
+            ray.init(address, log_to_driver=False, runtime_env={"env_vars": one_thread_each()}, **options)
+    except (ConnectionError, ValueError, RuntimeError) as error:
+        raise BadInput(f"--ray-address: cannot join a Ray cluster ({str(error).splitlines()[0]})") from None
+    return True

@@ -1,0 +1,197 @@
+"""Worst-case search: instead of drawing flights, look for the admissible one with the worst outcome.
+
+Differential evolution [Storn and Price 1997], current-to-best/1/bin, on the unit cube of the varied keys, a
+generation a batch. Each generation follows from the seed and from the outcomes before it alone: a search that
+is interrupted goes on exactly as it would have, and any number of workers finds the same flight.
+"""
+
+import math
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from beaver_ftc.errors import BadInput
+from beaver_ftc.scenario.sweep_loader import Sweep
+from beaver_ftc.studies.sweep.engine import Batch
+from beaver_ftc.studies.sweep.sampling import Assignment, value_at
+from beaver_ftc.studies.sweep.source import Landed
+from beaver_ftc.studies.sweep.store import Store
+from beaver_ftc.studies.sweep.table import AXES, DEPARTED, Row, table_of
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+WEIGHT, CROSSOVER = 0.7, 0.9  # [Storn and Price 1997] recommend 0.4 to 1 and, for few dependent keys, 0.9
+_OF_SEARCH = 2
+_ALMOST_ONE = math.nextafter(1.0, 0.0)
+
+
+def delay_score(row: Mapping[str, Any]) -> float:
+    """Detection delay, s; of a missed fault, the time it stayed undetected."""
+    at_s = row["fault.at_s"]
+    if row["detection.delay_s"] is not None:
+        return row["detection.delay_s"]
+    if at_s is None or row["false_alarm"]:
+        return -math.inf
+    return row["flown_s"] - at_s
+
+
+def false_alarm_score(row: Mapping[str, Any]) -> float:
+    """How close a residual came to its threshold without a fault; 1 is a false alarm."""
+    return row["worst_residual_ratio"]
+
+
+def tracking_score(row: Mapping[str, Any]) -> float:
+    """Largest RMS tracking error after the fault, deg/s; losing the aircraft is worse, the earlier."""
+    if row["status"] == DEPARTED:
+        return 1e6 - row["flown_s"]
+    after = [row[f"tracking.post_fault_rms_deg_s.{axis}"] for axis in AXES]
+    return -math.inf if None in after else max(after)
+
+
+OBJECTIVES = {"delay": delay_score, "false_alarm": false_alarm_score, "tracking": tracking_score}
+
+
+def score(objective: str, row: Mapping[str, Any]) -> float:
+    """What the search makes as large as it can; minus infinity for a flight without metrics."""
+    return -math.inf if row["frames"] is None else float(OBJECTIVES[objective](row))
+
+
+class Evolution:
+    """The population: points of the unit cube (members, keys) and their scores (members,)."""
+
+    def __init__(self, seed: int, keys: int) -> None:
+        self.members = min(64, max(16, 4 * keys))
+        self._seed, self._keys = seed, keys
+        self.generation = 0
+        self._points = np.empty((0, keys))
+        self._scores = np.empty(0)
+
+    def trials(self) -> np.ndarray:
+        """The points to fly in this generation, (members, keys)."""
+        sequence = np.random.SeedSequence(self._seed, spawn_key=(self.generation, 0, _OF_SEARCH))
+        generator = np.random.Generator(np.random.PCG64(sequence))
+        if self.generation == 0:
+            slices = [generator.permutation(self.members) for _ in range(self._keys)]
+            return (np.column_stack(slices) + generator.random((self.members, self._keys))) / self.members
+        return self._mutants(generator)
+
+    def _mutants(self, generator: np.random.Generator) -> np.ndarray:
+        """x + F (best - x) + F (x_a - x_b), a part of its keys left as they were, reflected into the cube."""
+        x, n = self._points, self.members
+        a, b = (generator.permutation(n) for _ in range(2))
+        mutants = x + WEIGHT * (x[self._scores.argmax()] - x) + WEIGHT * (x[a] - x[b])
+        taken = generator.random(x.shape) < CROSSOVER
+        taken[np.arange(n), generator.integers(self._keys, size=n)] = True
+        inside = np.abs(np.where(taken, mutants, x))
+        return np.minimum(1.0 - np.abs(1.0 - inside % 2.0), _ALMOST_ONE)
+
+    def select(self, scores: np.ndarray) -> None:
+        """Let each trial that is no worse take its parent's place; a last generation may be cut short."""
+        trials = self.trials()[: scores.size]
+        if self.generation == 0:
+            missing = self.members - scores.size
+            self._points, self._scores = trials, np.append(scores, [-math.inf] * missing)
+        else:
+            better = np.flatnonzero(scores >= self._scores[: scores.size])
+            self._points[better], self._scores[better] = trials[better], scores[better]
+        self.generation += 1
+
+
+class SearchSource:
+    """A `Source`: one generation after the other, `flights` in all."""
+
+    def __init__(self, sweep: Sweep, objective: str, store: Store, on_landed: Landed) -> None:
+        if not sweep.keys:
+            raise BadInput(f"{sweep.name}: vary: nothing varies, allowed in a search: at least one key")
+        self._sweep, self._objective, self._store, self._on_landed = sweep, objective, store, on_landed
+        self._evolution = Evolution(sweep.file.seed, len(sweep.keys))
+        self._known: dict[int, Assignment] = {}
+        self._in_flight = False
+        self._catch_up()
+
+    def next_batch(self) -> Batch | None:
+        runs = self._runs(self._evolution.generation)
+        if self._in_flight or not runs:
+            return None
+        self._in_flight = True
+        return Batch(self._evolution.generation, self._assignments(runs))
+
+    def flights_left(self) -> int:
+        return 0  # the next generation waits for this one: it must be spread over all workers
+
+    def landed(self, batch: Batch, rows: list[Row]) -> None:
+        self._store.land(batch.number, table_of(self._sweep, self._store.schema, rows))
+        self._select(rows)
+        self._in_flight = False
+
+    def tables(self) -> "Iterator[pa.Table]":
+        """Every generation's table, in order."""
+        number = 0
+        while runs := self._runs(number):
+            table = self._store.landed(number, runs)
+            assert table is not None
+            yield table
+            number += 1
+
+    def assignment(self, index: int) -> Assignment:
+        """The values of a flight that has been flown, or is next. Raises BadInput for one still unknown."""
+        for flight in self._assignments(self._runs(self._evolution.generation)):
+            self._known[flight.run] = flight
+        if index not in self._known:
+            raise BadInput(
+                f"flight {index} of {self._sweep.name} is not known yet: the search has not come so far"
+            )
+        return self._known[index]
+
+    def _catch_up(self) -> None:
+        while runs := self._runs(self._evolution.generation):
+            table = self._store.landed(self._evolution.generation, runs)
+            if table is None:
+                return
+            self._known.update({flight.run: flight for flight in self._assignments(runs)})
+            self._select(table.to_pylist())
+
+    def _select(self, rows: list[Row]) -> None:
+        self._evolution.select(np.array([score(self._objective, row) for row in rows]))
+        self._on_landed(rows)
+
+    def _assignments(self, runs: range) -> tuple[Assignment, ...]:
+        if not runs:
+            return ()
+        points = self._evolution.trials()[: len(runs)]
+        return tuple(
+            Assignment(index, self._values(point)) for index, point in zip(runs, points, strict=True)
+        )
+
+    def _values(self, point: np.ndarray) -> dict[str, Any]:
+        keys = self._sweep.file.vary.items()
+        return {key: value_at(how, float(u)) for (key, how), u in zip(keys, point, strict=True)}
+
+    def _runs(self, generation: int) -> range:
+        members, flights = self._evolution.members, self._sweep.flights
+        return range(generation * members, min((generation + 1) * members, flights))
+
+
+def found(objective: str, results: Path, sweep: Sweep) -> dict[str, Any]:
+    """What the search found: the worst flight, and the worst score after each generation."""
+    from pyarrow.parquet import read_table
+
+    rows = read_table(results).to_pylist()
+    scores = np.array([score(objective, row) for row in rows])
+    best = int(scores.argmax())
+    members = Evolution(sweep.file.seed, len(sweep.keys)).members
+    after = np.maximum.accumulate(scores)[min(members, scores.size) - 1 :: members]
+    return {
+        "objective": objective,
+        "run": rows[best]["run"],
+        "score": _finite(scores[best]),
+        "values": {key: rows[best][key] for key in sweep.keys},
+        "history": [_finite(value) for value in after],
+    }
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None

@@ -1,0 +1,192 @@
+"""The table of a sweep: one row a flight, `run` first, then what varied, then what came of it.
+
+Nothing in it depends on the clock, the worker or the order of the flights: the same sweep gives the same
+bytes.
+"""
+
+import json
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
+
+from beaver_ftc.scenario.sweep_schema import Variation
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+    from beaver_ftc.loop.flight import Flight
+    from beaver_ftc.scenario.sweep_loader import Sweep
+
+Row = dict[str, Any]
+Document = dict[str, Any]
+Getter = Callable[[Document, "Flight"], Any]
+
+FLOWN, DEPARTED, BAD_INPUT, FAILED, CRASHED = "flown", "departed", "bad_input", "failed", "crashed"
+RESULTS = (FLOWN, DEPARTED)  # the statuses of a flight that has metrics
+
+AXES = ("p", "q", "r")
+SURFACES = ("aileron", "elevator", "rudder", "flap")
+MODES = ("adaptive", "reallocated", "unanticipated")
+
+
+def _at(*path: str) -> Getter:
+    """The value at a path of the metrics document; None where a section on the way is null."""
+
+    def get(document: Document, flight: "Flight") -> Any:
+        here: Any = document
+        for part in path:
+            here = None if here is None else here[part]
+        return here
+
+    return get
+
+
+def _under(kind: str, section: str, *names: str) -> list[tuple[str, str, Getter]]:
+    parts = section.split(".")
+    return [(f"{section}.{name}", kind, _at(*parts, name)) for name in names]
+
+
+def _first_entry(mode: str) -> Getter:
+    def get(document: Document, flight: "Flight") -> Any:
+        return next((change["time_s"] for change in document["supervisor"] if change["mode"] == mode), None)
+
+    return get
+
+
+def _of_pair(name: str, end: int) -> Getter:
+    def get(document: Document, flight: "Flight") -> Any:
+        pair = document["isolation"][name]
+        return pair[end] if pair else None
+
+    return get
+
+
+def _outside_s(document: Document, flight: "Flight") -> float:
+    return sum(stay["end_s"] - stay["start_s"] for stay in document["envelope_exits"])
+
+
+def _flown_s(document: Document, flight: "Flight") -> float:
+    return flight.frames / flight.scenario.rate_hz
+
+
+def _fault_free_s(document: Document, flight: "Flight") -> float:
+    """Time in which an alarm would have been false: until the fault, the alarm or the end."""
+    ends = [_flown_s(document, flight)]
+    if document["fault"] is not None:
+        ends.append(document["fault"]["at_s"])
+    if document["detection"]["time_s"] is not None:
+        ends.append(document["detection"]["time_s"])
+    return min(ends)
+
+
+def _missed_expectations(document: Document, flight: "Flight") -> str:
+    return " ".join(found["name"] for found in document["expectations"] if not found["passed"])
+
+
+def _faults(document: Document, flight: "Flight") -> str:
+    """surface:type of each fault that was named, of several at once."""
+    named = (found for found in document["isolation"]["faults"] if found["fault"])
+    return " ".join(f"{found['fault']}:{found['type'] or 'open'}" for found in named)
+
+
+COLUMNS: tuple[tuple[str, str, Getter], ...] = (
+    ("frames", "int", _at("frames")),
+    ("flown_s", "float", _flown_s),
+    ("fault_free_s", "float", _fault_free_s),
+    *_under("text", "fault", "actuator", "type"),
+    *_under("float", "fault", "at_s"),
+    *_under("flag", "detection", "detected"),
+    *_under("float", "detection", "time_s", "delay_s", "guaranteed_delay_s"),
+    *_under("text", "detection", "axis"),
+    *_under("float", "detection.statistical", "time_s", "alarm_level", "closest_approach"),
+    *_under("flag", "isolation", "isolated", "correct"),
+    *_under("text", "isolation", "fault", "type"),
+    *_under("float", "isolation", "time_s", "delay_s", "estimate"),
+    *_under("flag", "isolation", "type_correct"),
+    *_under("float", "isolation", "type_delay_s", "estimate_deg", "frequency_rad_s"),
+    *(
+        (f"isolation.{pair}.{end}", "float", _of_pair(pair, i))
+        for pair, ends in (("estimate_interval", ("low", "high")), ("probing_s", ("from", "to")))
+        for i, end in enumerate(ends)
+    ),
+    ("isolation.candidates", "text", lambda document, flight: " ".join(document["isolation"]["candidates"])),
+    ("isolation.faults", "text", _faults),
+    ("false_alarm", "flag", _at("false_alarm")),
+    ("worst_residual_ratio", "float", lambda document, flight: flight.worst_residual_ratio),
+    *_under("float", "tracking.pre_fault_rms_deg_s", *AXES),
+    *_under("float", "tracking.post_fault_rms_deg_s", *AXES),
+    *_under("float", "tracking.surface_travel_deg", *SURFACES),
+    ("supervisor.mode", "text", lambda document, flight: document["supervisor"][-1]["mode"]),
+    *((f"supervisor.{mode}_at_s", "float", _first_entry(mode)) for mode in MODES),
+    ("envelope_exits.count", "int", lambda document, flight: len(document["envelope_exits"])),
+    ("envelope_exits.total_s", "float", _outside_s),
+    *_under("float", "departure", "time_s"),
+    *_under("text", "departure", "signal"),
+    *(column for a in AXES for column in _under("float", f"authority.{a}", "given_share", "beyond_s")),
+    *_under("float", "engine_power", "from_s", "in_charge_s", "lowest_inhg", "highest_inhg"),
+    *_under("float", "saturation_s", *SURFACES),
+    ("expectations.missed", "text", _missed_expectations),
+    ("passed", "flag", _at("passed")),
+)
+
+
+def kind_of(how: Variation) -> str:
+    """The type of a varied key's column: numbers and texts as they are, sections as JSON."""
+    if how.choice is None:
+        return "float"
+    if all(isinstance(value, bool) for value in how.choice):
+        return "flag"
+    numbers = all(isinstance(value, int | float) and not isinstance(value, bool) for value in how.choice)
+    return "float" if numbers else "text"
+
+
+def as_cell(value: Any, kind: str) -> Any:
+    """A varied value as its column holds it."""
+    if kind == "float":
+        return float(value)
+    return value if kind == "flag" or isinstance(value, str) else json.dumps(value)
+
+
+def row_of(run: int, values: dict[str, Any], seed: int, document: Document, flight: "Flight") -> Row:
+    """The row of a flight that has metrics."""
+    departure = document["departure"]
+    status = DEPARTED if departure else FLOWN
+    reason = f"{departure['signal']} at {departure['time_s']:g} s" if departure else None
+    metrics = {name: get(document, flight) for name, _, get in COLUMNS}
+    return {"run": run, **values, "seed": seed, "status": status, "reason": reason, **metrics}
+
+
+def row_of_failure(run: int, values: dict[str, Any], seed: int, status: str, reason: str) -> Row:
+    """The row of a flight that has none, and why."""
+    nothing = dict.fromkeys(name for name, _, _ in COLUMNS)
+    return {"run": run, **values, "seed": seed, "status": status, "reason": reason, **nothing}
+
+
+def schema_of(sweep: "Sweep") -> "pa.Schema":
+    """The table's columns and their types."""
+    import pyarrow as pa
+
+    types = {"float": pa.float64(), "int": pa.int64(), "flag": pa.bool_(), "text": pa.string()}
+    varied = [pa.field(key, types[kind_of(how)]) for key, how in sweep.file.vary.items()]
+    metrics = [pa.field(name, types[kind]) for name, kind, _ in COLUMNS]
+    return pa.schema([
+        pa.field("run", pa.int64(), nullable=False), *varied, pa.field("seed", pa.int64(), nullable=False),
+        pa.field("status", pa.string(), nullable=False), pa.field("reason", pa.string()), *metrics,
+    ])  # fmt: skip
+
+
+def table_of(sweep: "Sweep", schema: "pa.Schema", rows: Sequence[Row]) -> "pa.Table":
+    """Rows in order of `run` as a table."""
+    import pyarrow as pa
+
+    kinds = {key: kind_of(how) for key, how in sweep.file.vary.items()}
+    ordered = sorted(rows, key=lambda row: row["run"])
+    columns = [
+        [as_cell(row[name], kinds[name]) for row in ordered]
+        if name in kinds
+        else [row[name] for row in ordered]
+        for name in schema.names
+    ]
+    return pa.Table.from_arrays(
+        [pa.array(column, type=field.type) for column, field in zip(columns, schema, strict=True)],
+        schema=schema,
+    )

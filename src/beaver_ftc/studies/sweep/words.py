@@ -1,0 +1,190 @@
+"""What a sweep shows, in words: for the terminal and at the head of the report.
+
+Everything is said from the summary document, so that the words and `summary.json` cannot disagree.
+"""
+
+import io
+from typing import TYPE_CHECKING, Any
+
+from beaver_ftc.studies.sweep.table import AXES
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+Document = dict[str, Any]
+
+_UNITS = {"delay": " s", "false_alarm": " of the threshold", "tracking": " deg/s"}
+
+
+def title(summary: Document) -> str:
+    """The sweep's name and whether it shows what it should."""
+    if not summary["expectations"]:
+        return f"{summary['sweep']}: flown, nothing was expected"
+    return f"{summary['sweep']}: {'PASSED' if summary['passed'] else 'FAILED'}"
+
+
+def facts(summary: Document) -> list[tuple[str, str]]:
+    """(what, what the flights show) for each thing worth knowing."""
+    said = (
+        ("flights", _flights(summary)),
+        ("searched for", _search(summary)),
+        ("detection", _rate(summary["detection"], "faults detected")),
+        ("detection delay", _quantiles(summary["detection"]["delay_s"], "s")),
+        ("isolation", _rate(summary["isolation"], "faults named rightly")),
+        ("wrongly named", _wrong(summary["isolation"]["wrong"])),
+        ("false alarms", _false_alarms(summary["false_alarms"])),
+        ("guarantee", _guarantee(summary["guarantee"])),
+        (
+            "departures",
+            _rate(summary["departures"], "flights lost") if summary["departures"]["count"] else "",
+        ),
+        ("drives the delay", _drivers(summary["sensitivity"]["detection_delay"])),
+        ("drives misses", _drivers(summary["sensitivity"]["missed_detection"])),
+    )
+    return [(what, how) for what, how in said if how]
+
+
+def tracking(summary: Document) -> list[tuple[str, str, str, str]]:
+    """(what, p, q, r): medians of the tracking errors, deg/s, and of their ratio."""
+    rows = (
+        ("before the fault", "pre_fault_rms_deg_s"),
+        ("after", "post_fault_rms_deg_s"),
+        ("ratio", "ratio"),
+    )
+    medians = [(what, [summary["tracking"][axis][key]["median"] for axis in AXES]) for what, key in rows]
+    return [(what, value(p), value(q), value(r)) for what, (p, q, r) in medians if {p, q, r} != {None}]
+
+
+def expectations(summary: Document) -> list[tuple[str, str, str, bool]]:
+    """(name, expected, actual, passed) for each expectation."""
+    return [
+        (found["name"], expected(found["expected"]), value(found["actual"]), found["passed"])
+        for found in summary["expectations"]
+    ]
+
+
+def expected(level: Document) -> str:
+    """A bound in words: `95 % quantile ≤ 0.5 with 95 % confidence`."""
+    part = f"{percent(level['quantile'])} quantile " if "quantile" in level else ""
+    bound = f"≥ {value(level['at_least'])}" if "at_least" in level else f"≤ {value(level['at_most'])}"
+    sure = f" with {percent(level['confidence'])} confidence" if "confidence" in level else ""
+    return f"{part}{bound}{sure}"
+
+
+def value(number: Any) -> str:
+    """A number as it is worth reading."""
+    if number is None:
+        return "none"
+    return number if isinstance(number, str) else f"{number:.3g}"
+
+
+def percent(share: float | None) -> str:
+    """A share in percent, with the digits that matter near 0 and 1."""
+    if share is None:
+        return "none"
+    digits = 1 if 0.01 <= share <= 0.99 or share in (0, 1) else 2
+    text = f"{100 * share:.{digits}f}"
+    return f"{text.rstrip('0').rstrip('.')} %"
+
+
+def summary_text(summary: Document, colour: bool = False) -> str:
+    """The summary as a table for the terminal."""
+    from rich.console import Console
+
+    console = Console(file=io.StringIO(), force_terminal=colour, highlight=False, emoji=False, markup=False)
+    with console.capture() as captured:
+        console.print(_table(summary))
+    lines = [line.rstrip() for line in captured.get().splitlines()]
+    return "\n".join([*lines, *_worth_a_look(summary)]) + "\n"
+
+
+def _worth_a_look(summary: Document) -> list[str]:
+    """The worst flights with their commands, each on a line of its own to be copied."""
+    return [f" {'; '.join(flight['why'])}:\n   {flight['replay']}" for flight in summary["worst"][:3]]
+
+
+def _table(summary: Document) -> "Table":
+    from rich.table import Table
+    from rich.text import Text
+
+    headline = Text(title(summary), "bold green" if summary["passed"] else "bold red")
+    table = Table(title=headline, title_justify="left", show_header=False, box=None)
+    table.add_column(style="bold", no_wrap=True)
+    table.add_column(overflow="fold")
+    for what, how in facts(summary):
+        table.add_row(what, how)
+    for what, p, q, r in tracking(summary):
+        unit = "" if what == "ratio" else " deg/s"
+        table.add_row(
+            "tracking RMS, median" if what.startswith("before") else "", f"p {p}  q {q}  r {r}{unit} {what}"
+        )
+    for name, bound, actual, passed in expectations(summary):
+        mark = Text("met   " if passed else "MISSED", "green" if passed else "bold red")
+        table.add_row("expected", Text.assemble(mark, f" {name} {bound}: {actual}"))
+    table.add_row("results", summary["folder"])
+    return table
+
+
+def _flights(summary: Document) -> str:
+    others = ", ".join(
+        f"{count} {status.replace('_', ' ')}"
+        for status, count in summary["statuses"].items()
+        if status != "flown"
+    )
+    return f"{summary['flights']}, {summary['flown_h']:.3g} h in the air{f' ({others})' if others else ''}"
+
+
+def _search(summary: Document) -> str:
+    search = summary.get("search")
+    if search is None:
+        return ""
+    score = "none" if search["score"] is None else f"{search['score']:.4g}{_UNITS[search['objective']]}"
+    return f"the worst {search['objective'].replace('_', ' ')}: {score} in flight {search['run']}"
+
+
+def _rate(rate: Document, what: str) -> str:
+    if not rate["of"]:
+        return ""
+    return (
+        f"{percent(rate['rate'])} ({percent(rate['low'])} to {percent(rate['high'])}): "
+        f"{rate['count']} of {rate['of']} {what}"
+    )
+
+
+def _wrong(rate: Document) -> str:
+    return f"{rate['count']} of {rate['of']} named" if rate["count"] else ""
+
+
+def _quantiles(quantiles: Document, unit: str) -> str:
+    if not quantiles["of"]:
+        return ""
+    named = ", ".join(
+        f"{name.replace('p', '') + ' %' if name[0] == 'p' else name} {_delay(quantiles[name], unit)}"
+        for name in ("median", "p95", "p99", "max")
+    )
+    return named
+
+
+def _delay(seconds: float | None, unit: str) -> str:
+    return "never" if seconds is None else f"{value(seconds)} {unit}"
+
+
+def _false_alarms(found: Document) -> str:
+    if not found["hours"]:
+        return ""
+    return (
+        f"{found['count']} in {value(found['hours'])} h without a fault: {value(found['per_hour'])}/h "
+        f"({value(found['low'])} to {value(found['high'])}); residuals came to "
+        f"{found['closest_residual_ratio']:.4g} of the threshold"
+    )
+
+
+def _guarantee(found: Document) -> str:
+    if not found["promised"]:
+        return ""
+    return f"{found['broken']} of {found['promised']} faults detected later than theory promises"
+
+
+def _drivers(ranking: list[Document]) -> str:
+    told = [entry for entry in ranking if entry["p_value"] <= 0.05 and entry["explained"] >= 0.01][:3]
+    return ", ".join(f"{entry['key']} ({percent(entry['explained'])} of the ranks)" for entry in told)

@@ -1,0 +1,136 @@
+"""Each rival law on its own ground: what its theory promises of a plant it was made for."""
+
+import numpy as np
+import pytest
+
+from beaver_ftc.control.base import Reference
+from beaver_ftc.control.rivals.indi import LowPass
+from beaver_ftc.control.rivals.l1 import Predictor
+from beaver_ftc.control.rivals.lqr import gains
+from beaver_ftc.design.context import Context
+from beaver_ftc.diagnosis.base import Measured, Verdict
+from beaver_ftc.loop.loop import fly
+from beaver_ftc.plugins import LAWS, plugin_class
+from flying import Memory, scenario
+
+DT = 0.01
+A = np.array([[-4.0, 0.0, 1.0], [0.0, -3.0, 0.0], [-0.2, 0.0, -0.8]])
+G = np.array([[-9.0, 0.0, 0.5, 0.0], [0.0, -12.0, 0.0, 3.0], [-0.4, 0.0, -4.0, 0.0]])
+LAW_NAMES = ("indi", "l1-adaptive", "lqr")
+
+
+class Linear:
+    """A design model xdot = A x + G u."""
+
+    def f(self, x, y):
+        return A @ x
+
+    def G(self, y):
+        return G
+
+
+def context(**options):
+    travel = np.array([[-0.5] * 4, [0.5] * 4])
+    return Context(DT, 1, Linear(), np.zeros(3), np.zeros(5), np.zeros(4), travel, np.zeros(3), np.zeros(3),
+                   options=options)  # fmt: skip
+
+
+def loop(name, effectiveness=1.0, disturbance=0.0, duration_s=20.0, **options):
+    """Fly a law on the linear plant with the simulator's frame of delay; the error of each frame (n, 3)
+    rad/s."""
+    law = plugin_class(LAWS, name)()
+    law.reset(context(**{**law.defaults, **options}))  # as the source has it, not as it was tuned
+    x, u, acceleration, errors = np.zeros(3), np.zeros(4), np.zeros(3), []
+    for k in range(round(duration_s / DT)):
+        rate = np.full(3, 0.02)
+        measured = Measured(k * DT, x.copy(), np.zeros(5), acceleration, np.zeros((3, 4)), np.zeros(3))
+        command = law.step(measured, Reference(rate, rate, np.zeros(3)), Verdict())
+        errors.append(rate - x)
+        acceleration = A @ x + G @ u
+        x = x + DT * (A @ x + effectiveness * (G @ u) + disturbance)
+        u = command
+    return np.array(errors)
+
+
+@pytest.mark.parametrize("name", LAW_NAMES)
+@pytest.mark.parametrize(("effectiveness", "disturbance"), [(1.0, 0.0), (1.0, 0.3), (0.5, 0.0), (0.6, -0.3)])
+def test_a_constant_reference_is_reached_whatever_stands_in_the_way(name, effectiveness, disturbance):
+    errors = loop(name, effectiveness, disturbance)
+    assert np.abs(errors[-1]).max() < 2e-4
+    assert np.abs(errors).max() < 1.0
+
+
+@pytest.mark.parametrize("name", ["indi", "l1-adaptive"])
+def test_what_is_unknown_is_compensated_without_the_integral(name):
+    errors = loop(name, 1.0, 0.3, integral_per_s2=0.0)
+    assert np.abs(errors[-1]).max() < 2e-3  # an uncompensated 0.3 rad/s2 would leave 0.3 / Kp = 0.15 rad/s
+
+
+def test_gains_solve_the_scalar_riccati_equation():
+    """a = b = q = r = 1: P = P - P^2 / (1 + P) + 1, so P is the golden ratio and K = P / (1 + P)."""
+    one = np.eye(1)
+    golden = (1 + np.sqrt(5)) / 2
+    assert gains(one, one, one, one)[0, 0] == pytest.approx(golden / (1 + golden))
+
+
+def test_gains_minimise_the_cost():
+    """Any other gain costs more, summed over a long run."""
+    rng = np.random.default_rng(4)
+    a, b, Q, R = np.array([[1.0, 0.1], [0.0, 0.9]]), np.array([[0.0], [0.1]]), np.eye(2), np.eye(1)
+    best = gains(a, b, Q, R)
+
+    def cost(K):
+        z, total = np.array([1.0, -0.5]), 0.0
+        for _ in range(2000):
+            u = -K @ z
+            total += z @ Q @ z + u @ R @ u
+            z = a @ z + b @ u
+        return total
+
+    for _ in range(20):
+        assert cost(best + 0.05 * rng.normal(size=best.shape)) > cost(best)
+
+
+def test_the_predictor_finds_a_constant_disturbance_within_frames():
+    """In one frame, to its e^{-a dt} dt / Phi: what piecewise-constant adaptation leaves [Hovakimyan2010]."""
+    pole, d = 10.0, np.array([0.4, -0.2, 0.1])
+    predictor = Predictor(pole, DT)
+    first = predictor.step(DT * d, np.zeros(3))
+    a = np.exp(-pole * DT)
+    assert first == pytest.approx(a * DT * pole / (1.0 - a) * d)
+    for _ in range(20):
+        assert predictor.step(DT * d, np.zeros(3)) == pytest.approx(first)
+
+
+def test_the_filter_has_its_step_response():
+    """1 - (1 + n (1 - a)) a^n ... of two equal discrete poles, against the convolution sum."""
+    a, n = np.exp(-50.0 * DT), 30
+    low_pass = LowPass(50.0, DT, np.zeros(1))
+    for _ in range(n):
+        value = low_pass.step(np.ones(1))
+    impulse = (1 - a) * a ** np.arange(n)
+    assert value[0] == pytest.approx(np.convolve(impulse, impulse)[:n].sum())
+
+
+@pytest.mark.parametrize("name", LAW_NAMES)
+def test_the_beaver_follows_and_survives_half_an_elevator(name):
+    fault = {"actuator": "elevator", "type": "loss_of_effectiveness", "magnitude": 0.5, "at_s": 6}
+    log = Memory()
+    flight = fly(scenario(duration_s=14, faults=[fault], control={"law": name}), log)
+    assert flight.departure is None
+    assert max(log.rms_deg_s(axis, 2, 6) for axis in "pqr") < 0.8
+    assert log.rms_deg_s("q", 8) < 1.2
+    assert [mode for _, mode in flight.supervisor] == ["nominal"]  # these laws do not use the verdict
+
+
+@pytest.mark.parametrize("name", LAW_NAMES)
+def test_a_saturated_surface_does_not_wind_the_integral_up(name):
+    errors = loop(name, 1.0, np.array([0.0, 8.0, 0.0]), duration_s=5)  # more than the elevator can hold
+    assert np.isfinite(errors).all()
+    law = plugin_class(LAWS, name)()
+    law.reset(context())
+    for k in range(400):
+        measured = Measured(k * DT, np.full(3, 9.0), np.zeros(5), np.zeros(3), np.zeros((3, 4)), np.zeros(3))
+        law.step(measured, Reference(np.zeros(3), np.zeros(3), np.zeros(3)), Verdict())
+    integral = law.integral if name == "lqr" else law.demand.integral
+    assert np.abs(integral).max() < 0.5

@@ -1,0 +1,46 @@
+"""Every law in every situation: the whole table, written out."""
+
+import itertools
+
+import pytest
+
+from beaver_ftc.control.state import ADAPTIVE, FAULT_TOLERANT, LAWS, NOMINAL
+from beaver_ftc.control.supervisor import MODES, mode_of, next_mode
+from beaver_ftc.design.model import AILERON, ELEVATOR, FLAP, RUDDER
+from beaver_ftc.diagnosis.state import NOT_ISOLATED, UNANTICIPATED
+
+SITUATIONS = {  # detected, isolated, surface
+    "healthy": (0, NOT_ISOLATED, -1),
+    "detected": (1, NOT_ISOLATED, -1),
+    "aileron": (1, 0, AILERON),
+    "elevator": (1, 1, ELEVATOR),
+    "rudder": (1, 2, RUDDER),
+    "flap": (1, 3, FLAP),
+    "unanticipated": (1, UNANTICIPATED, -1),
+}
+EXPECTED = {
+    "nominal": dict.fromkeys(SITUATIONS, "nominal"),
+    "adaptive": {
+        "healthy": "nominal", "detected": "adaptive", "aileron": "adaptive", "elevator": "adaptive",
+        "rudder": "adaptive", "flap": "adaptive", "unanticipated": "unanticipated",
+    },
+    "fault-tolerant": {
+        "healthy": "nominal", "detected": "adaptive", "aileron": "adaptive", "elevator": "reallocated",
+        "rudder": "adaptive", "flap": "adaptive", "unanticipated": "unanticipated",
+    },
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("law", "situation"), list(itertools.product(EXPECTED, SITUATIONS)))
+def test_mode(law, situation):
+    assert MODES[mode_of(LAWS.index(law), *SITUATIONS[situation])] == EXPECTED[law][situation]
+
+
+def test_the_laws_are_numbered_as_they_are_named():
+    assert [LAWS[NOMINAL], LAWS[ADAPTIVE], LAWS[FAULT_TOLERANT]] == ["nominal", "adaptive", "fault-tolerant"]
+
+
+@pytest.mark.parametrize(("now", "wanted"), list(itertools.product(MODES, MODES)))
+def test_the_way_out_of_nominal_leads_through_adaptive(now, wanted):
+    reached = MODES[next_mode(MODES.index(now), MODES.index(wanted))]
+    assert reached == ("adaptive" if now == "nominal" and wanted != "nominal" else wanted)

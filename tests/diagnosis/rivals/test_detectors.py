@@ -1,0 +1,284 @@
+"""Each rival detector on its own ground: a plant for which what it assumes is true."""
+
+import numpy as np
+import pytest
+
+from beaver_ftc.design.context import Context, Declared
+from beaver_ftc.diagnosis.base import Measured
+from beaver_ftc.diagnosis.rivals.air import Air
+from beaver_ftc.diagnosis.rivals.observer import Fit, residual_deviation
+from beaver_ftc.diagnosis.rivals.rls import Pair
+from beaver_ftc.plugins import DETECTORS, plugin_class
+
+DT = 0.01
+BOUND = np.full(3, 0.02)
+FILTERS = ("augmented-ekf", "augmented-ukf", "multiple-models", "observer-constant")
+
+
+class Still:
+    """A design model of an aircraft without dynamics of its own: xdot = G u + noise."""
+
+    def f(self, x, y):
+        return np.zeros_like(x)
+
+    def G(self, y):
+        return np.zeros((3, 4))
+
+
+def context(declared=None, **options):
+    return Context(DT, 1, Still(), np.zeros(3), np.zeros(5), np.zeros(4), np.array([[-1.0] * 4, [1.0] * 4]),
+                   BOUND, np.zeros(3), options=options, declared=declared or Declared())  # fmt: skip
+
+
+GUSTY = Declared(
+    noise=np.array([3e-4] * 3 + [0.0] * 4),
+    gust_rad_s=np.array([0.05, 0.03, 0.03]),
+    gust_time_s=np.array([0.8, 0.4, 0.3]),
+    gust_effect=np.array([[5.0, 0.0, -2.0], [0.0, 3.0, 0.3], [0.9, -0.2, 0.5]]),
+)
+
+
+def flight(theta=(0.0, 0.0, 0.0), at_s=5.0, noise=0.02, extra=0.0, duration_s=12.0, seed=1, air=None):
+    """Yield what a detector sees of a plant with white acceleration noise and lost effectiveness from at_s
+    on.
+
+    theta: per surface; the surfaces swing at different rates, so that they can be told apart. air: gyro
+    noise and gusts, as declared.
+    """
+    rng = np.random.default_rng(seed)
+    x = np.zeros(3)
+    air = air or Declared(gust_time_s=np.ones(3))
+    gust, keep = air.gust_rad_s * rng.normal(size=3), np.exp(-DT / air.gust_time_s)
+    moments, acceleration, contribution = np.zeros(3), np.zeros(3), np.zeros((3, 4))
+    for k in range(round(duration_s / DT)):
+        t = k * DT
+        seen = x + air.noise[:3] * rng.normal(size=3)
+        yield Measured(t, seen, np.zeros(5), acceleration, contribution, BOUND)
+        moments = np.sin(2.0 * np.pi * np.array([0.3, 0.4, 0.5]) * t + 1.0)
+        contribution = np.zeros((3, 4))
+        contribution[range(3), range(3)] = moments
+        acceleration = moments.copy()
+        fault = (
+            np.array(theta) * moments + extra * np.array([0.0, np.cos(7.0 * t), 0.0]) if t >= at_s else 0.0
+        )
+        x = x + DT * (acceleration + air.gust_effect @ gust + fault + noise * rng.normal(size=3))
+        gust = keep * gust + np.sqrt(1.0 - keep**2) * air.gust_rad_s * rng.normal(size=3)
+
+
+def watch(name, seen, declared=None, **options):
+    """As the source has it, not as it was tuned."""
+    detector = plugin_class(DETECTORS, name)()
+    detector.reset(context(declared, **{**detector.defaults, **options}))
+    verdicts, alarm_s = [], None
+    for measured in seen:
+        verdicts.append(detector.step(measured, np.zeros(4)))
+        if verdicts[-1].detected and alarm_s is None:
+            alarm_s = measured.t_s
+    return detector, verdicts, alarm_s
+
+
+@pytest.mark.parametrize("name", FILTERS)
+@pytest.mark.parametrize(("surface", "place"), [("aileron", 0), ("elevator", 1), ("rudder", 2)])
+def test_a_lost_surface_is_seen_and_named(name, surface, place):
+    theta = np.zeros(3)
+    theta[place] = -0.5
+    _, verdicts, alarm_s = watch(name, flight(theta))
+    assert alarm_s is not None
+    assert 5.0 <= alarm_s < 6.5
+    assert verdicts[-1].isolated == surface
+    assert verdicts[-1].axis == "pqr"[place]
+    assert verdicts[-1].estimate == pytest.approx(-0.5, abs=0.1)
+
+
+@pytest.mark.parametrize("name", FILTERS)
+def test_noise_within_the_declared_size_is_no_fault(name):
+    for seed in range(3):
+        _, verdicts, alarm_s = watch(name, flight(duration_s=20, seed=seed))
+        assert alarm_s is None
+        assert max(v.statistic for v in verdicts) < 1.0
+
+
+@pytest.mark.parametrize("name", FILTERS)
+def test_something_no_surface_explains_is_not_blamed_on_one(name):
+    _, verdicts, alarm_s = watch(name, flight(extra=2.0))
+    assert alarm_s is not None
+    assert verdicts[-1].isolated == "unanticipated"
+
+
+@pytest.mark.parametrize("name", [*FILTERS, "rls-monitor"])
+def test_the_statistic_is_one_at_the_alarm_and_scales_with_its_level(name):
+    seen = list(flight((0.0, -0.6, 0.0)))
+    _, low, _ = watch(name, seen, alarm=1e3)
+    _, high, _ = watch(name, seen, alarm=2e3)
+    a, b = (np.array([v.statistic for v in verdicts]) for verdicts in (low, high))
+    assert a == pytest.approx(2.0 * b)
+    _, verdicts, _ = watch(name, seen, alarm=500.0 * a.max())
+    first = next(i for i, v in enumerate(verdicts) if v.detected)
+    assert verdicts[first].statistic > 1.0
+    assert max(v.statistic for v in verdicts[:first]) <= 1.0
+
+
+@pytest.mark.parametrize("name", ["augmented-ekf", "augmented-ukf"])
+def test_the_estimate_is_as_good_as_the_filter_says(name):
+    """Over many flights the estimate's error, over its own standard deviation, has unit variance."""
+    shares = []
+    for seed in range(12):
+        seen = flight((-0.3, -0.6, 0.0), at_s=0.0, seed=seed, duration_s=4)
+        detector, _, _ = watch(name, seen, noise=1.0, drift_per_s=1e-6)
+        error = detector.z[3:5] - [-0.3, -0.6]
+        shares.append(error / np.sqrt(np.diagonal(detector.P)[3:5]))
+    assert np.sqrt(np.mean(np.square(shares))) == pytest.approx(1.0, abs=0.35)
+
+
+@pytest.mark.parametrize("name", ["augmented-ekf", "augmented-ukf"])
+def test_in_declared_air_the_estimate_is_still_as_good_as_the_filter_says(name):
+    """Gusts are states of the filter: neither the effectiveness nor the gusts are believed too well known."""
+    shares, gusts = [], []
+    for seed in range(12):
+        theta = 0.1 * np.random.default_rng(100 + seed).normal(size=3)  # as known at the start
+        seen = flight(theta, at_s=0.0, seed=seed, duration_s=4, air=GUSTY)
+        detector, _, _ = watch(name, seen, GUSTY, noise=1.0, drift_per_s=1e-6)
+        deviation = np.sqrt(np.diagonal(detector.P))
+        shares.append((detector.z[3:6] - theta) / deviation[3:6])
+        gusts.append(detector.z[6:] / np.sqrt(np.maximum(GUSTY.gust_rad_s**2 - deviation[6:] ** 2, 1e-12)))
+    assert np.sqrt(np.mean(np.square(shares))) == pytest.approx(1.0, abs=0.35)
+    assert np.sqrt(np.mean(np.square(gusts))) == pytest.approx(1.0, abs=0.35)
+
+
+def innovations(declared, seed=0):
+    """Innovations squared, over what the filter expects of them, on a healthy flight in gusts."""
+    detector = plugin_class(DETECTORS, "augmented-ekf")()
+    detector.reset(context(declared, **{**detector.defaults, "noise": 1.0, "drift_per_s": 1e-6}))
+    squares, detector.statistic = [], lambda square: squares.append(square) or 0.0
+    for measured in flight(duration_s=20, seed=seed, air=GUSTY):
+        detector.step(measured, np.zeros(4))
+    return np.mean(squares) / 3.0
+
+
+def test_innovations_are_as_large_as_expected_only_if_the_air_is_declared():
+    assert innovations(GUSTY) == pytest.approx(1.0, abs=0.1)
+    gyros = Declared(noise=GUSTY.noise)
+    assert innovations(gyros) > 3.0
+
+
+@pytest.mark.parametrize("name", FILTERS)
+def test_declared_air_is_no_fault_and_hides_a_large_one_only_for_a_while(name):
+    level = {"alarm": 4.0} if name == "observer-constant" else {}  # in deviations, once errors are declared
+    for seed in range(2):
+        _, _, alarm_s = watch(name, flight(duration_s=15, seed=seed, air=GUSTY), GUSTY, **level)
+        assert alarm_s is None
+    _, _, alarm_s = watch(name, flight((0.0, -1.0, 0.0), air=GUSTY), GUSTY, **level)
+    assert 5.0 <= alarm_s < 7.0
+
+
+def test_the_models_of_the_multiple_models_filter_know_the_air():
+    """The probability of health keeps up in gusts only if they are declared."""
+    highest = {}
+    for name, declared in (("air", GUSTY), ("gyros", Declared(noise=GUSTY.noise))):
+        seen = flight(duration_s=10, seed=4, air=GUSTY)
+        _, verdicts, _ = watch("multiple-models", seen, declared, noise=1.0)
+        highest[name] = max(v.statistic for v in verdicts)
+    assert highest["air"] < 0.5
+    assert highest["gyros"] > 1.0
+
+
+@pytest.mark.parametrize("pole_per_s", [1.0, 10.0, 1e4])
+def test_the_observers_threshold_is_the_deviation_of_its_residual(pole_per_s):
+    declared = Declared(
+        noise=GUSTY.noise,
+        gust_rad_s=GUSTY.gust_rad_s,
+        gust_time_s=GUSTY.gust_time_s,
+        gust_effect=np.diag([5.0, 3.0, 0.5]),
+    )
+    still = Context(**{**vars(context(declared)), "constant_rad_s2": np.zeros(3)})
+    detector = plugin_class(DETECTORS, "observer-constant")()
+    detector.reset(context(declared, pole_per_s=pole_per_s, alarm=1e9))
+    residuals = []
+    for measured in flight(duration_s=400, noise=0.0, air=declared):
+        detector.step(measured, np.zeros(4))
+        residuals.append(detector.eps)
+    expected = residual_deviation(still, np.exp(-pole_per_s * DT))
+    assert np.std(residuals[500:], axis=0) == pytest.approx(expected, rel=0.15)
+
+
+def test_air_that_is_not_declared_has_no_states():
+    assert Air(context()).n == 0
+    assert Air(context(GUSTY)).n == 3
+
+
+def test_on_a_linear_plant_the_unscented_filter_is_the_extended_one():
+    seen = list(flight((-0.3, 0.0, -0.5)))
+    ekf, _, _ = watch("augmented-ekf", seen, noise=1.0)
+    ukf, _, _ = watch("augmented-ukf", seen, noise=1.0)
+    assert ukf.z == pytest.approx(ekf.z, abs=1e-6)
+    assert np.allclose(ukf.P, ekf.P, rtol=1e-4, atol=1e-12)
+
+
+def test_cusum_waits_inversely_to_the_excess():
+    """A steady excess e over the allowance crosses h after h / e samples [Page1954]."""
+    detector = plugin_class(DETECTORS, "augmented-ukf")()
+    detector.reset(context(alarm=50.0, allowance=1.0))
+    values = [detector.statistic(5.0) for _ in range(26)]
+    assert values[24] == pytest.approx(1.0)
+    assert values[25] > 1.0
+    assert detector.statistic(0.0) == pytest.approx((52.0 - 3.0) / 50.0)
+
+
+def test_the_observers_residual_has_its_closed_form():
+    """A constant unexplained acceleration c gives eps = dt c (1 - a^n) / (1 - a) after n frames."""
+    detector = plugin_class(DETECTORS, "observer-constant")()
+    detector.reset(context(pole_per_s=10.0, alarm=1e9))
+    for k in range(51):
+        x = np.array([0.0, 0.3 * DT * k, 0.0])
+        detector.step(Measured(k * DT, x, np.zeros(5), np.zeros(3), np.zeros((3, 4)), BOUND), np.zeros(4))
+    a = np.exp(-10.0 * DT)
+    assert detector.eps[1] == pytest.approx(DT * 0.3 * (1 - a**50) / (1 - a))
+
+
+def test_the_best_fit_is_the_constrained_least_squares_solution():
+    rng = np.random.default_rng(3)
+    eps, Omega = rng.normal(size=(40, 3)), rng.normal(size=(40, 3, 3))
+    eps += -0.4 * Omega[:, :, 1]
+    fit = Fit(1.0)
+    for e, omega in zip(eps, Omega, strict=True):
+        fit.step(e, omega)
+    surface, theta, misfit = fit.best()
+    solution = np.linalg.lstsq(Omega[:, :, 1].reshape(-1, 1), eps.ravel(), rcond=None)[0][0]
+    assert surface == 1
+    assert theta == pytest.approx(solution)
+    assert misfit == pytest.approx(np.sum((eps - theta * Omega[:, :, 1]) ** 2) / 120)
+
+
+def test_the_monitor_learns_any_second_order_pair_and_sees_it_change():
+    """y[k] = 1.6 y[k-1] - 0.7 y[k-2] + b u[k-1]: predicted once learnt, an alarm when b halves."""
+    rng = np.random.default_rng(5)
+    pair, y, scores = Pair(0.999, 0.995, 1e-4), [0.0, 0.0], []
+    u = rng.normal(size=3000)
+    for k in range(2, 3000):
+        b = 0.5 if k < 2500 else 0.25
+        y.append(1.6 * y[-1] - 0.7 * y[-2] + b * u[k - 1] + 1e-3 * rng.normal())
+        scores.append(pair.step(u[k], y[-1]))
+    assert pair._model.w[:2] == pytest.approx([1.6, -0.7], abs=0.02)
+    assert max(scores[1500:2497]) < 8.0
+    assert max(scores[2497:2510]) > 20.0
+
+
+def test_the_monitor_names_the_pair_that_broke():
+    def seen():
+        rng = np.random.default_rng(2)
+        u, x = np.zeros(4), np.zeros(3)
+        for k in range(2000):
+            yield Measured(k * DT, x.copy(), np.zeros(5), np.zeros(3), np.zeros((3, 4)), BOUND), u.copy()
+            gain = np.array([1.0, 1.0, 1.0 if k < 1500 else 0.2])
+            x = 0.95 * x + 0.05 * gain * u[:3] + 1e-5 * rng.normal(size=3)
+            u = 0.9 * u + rng.normal(size=4)
+
+    detector = plugin_class(DETECTORS, "rls-monitor")()
+    detector.reset(context(**detector.defaults))
+    verdict, first = None, None
+    for measured, command in seen():
+        verdict = detector.step(measured, command)
+        if verdict.detected and first is None:
+            first = measured.t_s
+    assert 15.0 <= first < 15.5
+    assert verdict.isolated == "rudder"

@@ -1,0 +1,277 @@
+"""A plug-in in the built-in one's place: what it drives, and what happens when it is no good."""
+
+import subprocess
+import sys
+from inspect import getdoc
+
+import culprits
+import numpy as np
+import pytest
+
+from beaver_ftc.control.base import Law
+from beaver_ftc.diagnosis.base import Detector, Verdict
+from beaver_ftc.errors import BadInput, SimulationFailed
+from beaver_ftc.loop.loop import fly
+from beaver_ftc.plugins import DETECTORS, LAWS, plugin_class, registered
+from beaver_ftc.results.metrics import metrics
+from flying import Memory, scenario
+
+FAULT = {"actuator": "elevator", "type": "loss_of_effectiveness", "magnitude": 0.4, "at_s": 3}
+SHORT = {"duration_s": 6, "faults": [FAULT]}
+
+
+class PythonNominal:
+    """The nominal law, written out from its equation: demand = xm' + Kp e + Ki int e - f, G u = demand."""
+
+    def reset(self, context):
+        self.context, self.integral = context, np.zeros(3)
+
+    def step(self, measured, reference, verdict):
+        model, trim = self.context.model, self.context.trim_rad
+        error = reference.rate - measured.x
+        demand = reference.acceleration + 2.0 * error + 1.0 * self.integral - model.f(measured.x, measured.y)
+        G = model.G(measured.y)
+        self.integral = self.integral + self.context.dt_s * error
+        return np.append(np.linalg.solve(G[:, :3], demand - G[:, 3] * trim[3]), trim[3])
+
+
+def _flown(log_of=None, **settings):
+    log = Memory()
+    return fly(log_of or scenario(**SHORT), log, **settings), log
+
+
+def test_the_nominal_law_in_python_flies_like_the_compiled_one():
+    _, compiled = _flown(scenario(**SHORT, control={"law": "nominal"}))
+    _, python = _flown(law=PythonNominal())
+    for column in ("q_rad_s", "alpha_rad", "elevator_cmd_rad", "aileron_cmd_rad"):
+        assert np.allclose(python[column], compiled[column], rtol=0, atol=1e-9)
+    assert np.ptp(compiled["elevator_cmd_rad"]) > 0.01
+
+
+def test_a_detector_that_sees_nothing_is_no_detector():
+    _, none = _flown(scenario(**SHORT, fdi={"scheme": "none"}))
+    flight, silent = _flown(detector=culprits.Silent())
+    assert flight.detection_time_s is None
+    assert flight.supervisor == ((0.0, "nominal"),)
+    assert np.array_equal(silent["q_rad_s"], none["q_rad_s"])
+
+
+def test_what_a_detector_is_shown_is_the_flight_as_the_model_explains_it():
+    class Keep(culprits.Silent):
+        def step(self, measured, command):
+            seen.append((measured, command))
+            return Verdict()
+
+    seen = []
+    healthy = scenario(duration_s=3, uncertainty={})
+    _, log = _flown(healthy, detector=Keep())
+    assert [m.t_s for m, _ in seen] == pytest.approx(log["t_s"])
+    assert np.array([u for _, u in seen])[:, 1] == pytest.approx(log["elevator_cmd_rad"])
+    x = np.array([m.x for m, _ in seen])
+    explained = np.array([m.acceleration for m, _ in seen])
+    innovation = np.diff(x, axis=0) / 0.01 - explained[1:]
+    assert np.abs(innovation).max() < 2e-3  # the Earth turns; nothing else is left
+    assert np.abs(explained).max() > 0.05
+
+
+def test_a_verdict_drives_supervisor_law_and_metrics():
+    flight, log = _flown(detector=culprits.Teller())
+    document = metrics(flight)
+    detection = document["detection"]
+    assert (detection["time_s"], detection["delay_s"], detection["axis"]) == (3.0, 0.0, "q")
+    isolation = document["isolation"]
+    assert (isolation["fault"], isolation["type"], isolation["correct"]) == (
+        "elevator",
+        "loss_of_effectiveness",
+        True,
+    )
+    assert isolation["estimate"] == -0.4
+    modes = [(step["time_s"], step["mode"]) for step in document["supervisor"]]
+    assert modes == [(0.0, "nominal"), (3.0, "adaptive"), (3.01, "reallocated")]
+    assert log["elevator_effectiveness_estimate"][-1] == pytest.approx(0.6)
+    assert log["detected"][log["t_s"] >= 3.0].all()
+
+
+def test_the_alarm_is_latched_and_an_early_one_is_false():
+    class Blinks(culprits.Teller):
+        from_s = 1.0
+
+        def step(self, measured, command):
+            return super().step(measured, command) if measured.t_s < 2 else Verdict()
+
+    flight, log = _flown(detector=Blinks())
+    assert metrics(flight)["false_alarm"]
+    assert flight.detection_time_s == 1.0
+    assert log["detected"][-1] == 1
+
+
+def test_the_fault_class_of_the_built_in_diagnosis_is_no_matter():
+    flown = scenario(**SHORT, fdi={"fault_class": "all"})
+    _, published = _flown(detector=culprits.Teller())
+    _, every = _flown(flown, detector=culprits.Teller())
+    assert np.array_equal(published["elevator_cmd_rad"], every["elevator_cmd_rad"])
+    assert every["mode"][-1] == 2
+
+
+def test_unanticipated_is_a_verdict_too():
+    class Other(culprits.Teller):
+        says = Verdict(True, "q", "unanticipated", "unanticipated")
+
+    flight, _ = _flown(detector=Other())
+    assert flight.isolated == "unanticipated"
+    assert [mode for _, mode in flight.supervisor] == ["nominal", "adaptive", "unanticipated"]
+
+
+def test_estimates_of_every_surface_reach_the_law():
+    class Estimates(culprits.Teller):
+        says = Verdict(True, "q", effectiveness=np.array([0.9, 0.6, 0.8, 1.0]))
+
+    _, log = _flown(detector=Estimates())
+    last = [log[f"{s}_effectiveness_estimate"][-1] for s in ("aileron", "elevator", "rudder", "flap")]
+    assert last == pytest.approx([0.9, 0.6, 0.8, 1.0])
+
+
+def test_being_told_the_truth_is_worth_the_oracle():
+    oracle, _ = _flown(scenario(**SHORT, control={"law": "oracle"}))
+    told, _ = _flown(detector=culprits.Teller())
+    deaf, _ = _flown(scenario(**SHORT, fdi={"scheme": "none"}))
+    assert told.post_fault_rms_rad_s[1] < 2.0 * oracle.post_fault_rms_rad_s[1]
+    assert deaf.post_fault_rms_rad_s[1] > 5.0 * oracle.post_fault_rms_rad_s[1]
+
+
+def test_a_plug_in_cannot_write_into_the_flight():
+    _, clean = _flown(detector=culprits.Silent())
+    _, vandalised = _flown(detector=culprits.Vandal())
+    assert np.array_equal(clean.rows, vandalised.rows, equal_nan=True)
+
+
+def test_commands_are_limited_to_the_travel():
+    class Full(culprits.Hold):
+        def step(self, measured, reference, verdict):
+            return np.array([0.0, -9.0, 0.0, 0.0])
+
+    flight, log = _flown(scenario(duration_s=1), law=Full())
+    assert log["elevator_cmd_rad"].min() == pytest.approx(-0.49)
+    assert flight.saturation_s["elevator"] > 0
+
+
+def test_with_substeps_and_other_rates_the_model_still_explains_the_flight():
+    class Keep(culprits.Silent):
+        def step(self, measured, command):
+            if self.before is not None:
+                dt = self.context.dt_s
+                off.append(np.abs((measured.x - self.before) / dt - measured.acceleration).max())
+            self.before = measured.x
+            return Verdict()
+
+        before = None
+
+    off = []
+    _flown(scenario(duration_s=3, uncertainty={}, rate_hz=50, substeps=4), detector=Keep())
+    assert max(off) < 0.02
+
+
+@pytest.mark.parametrize(
+    ("name", "says"),
+    [
+        ("RaisesAtReset", "reset raised LookupError: no weights"),
+        ("Raises", "at 0.51 s: step raised ZeroDivisionError: division by zero"),
+        ("NotAVerdict", "step returned bool, allowed: a Verdict"),
+        ("UnknownSurface", "verdict.isolated is 'canard', allowed: None, unanticipated, aileron"),
+        ("NanEstimate", "verdict.estimate is nan, allowed: a finite number"),
+        ("ThreeEffectivenesses", "verdict.effectiveness has shape (3,), allowed: four numbers"),
+        ("WrongAxis", "verdict.axis is 'yaw', allowed: p, q, r or None"),
+    ],
+)
+def test_a_bad_detector_is_named(name, says):
+    with pytest.raises(SimulationFailed) as failed:
+        fly(scenario(**SHORT, fdi={"scheme": f"culprits:{name}"}))
+    message = str(failed.value)
+    assert message.startswith(f"plug-in culprits:{name} at ")
+    assert says in message
+    assert "\n" not in message
+
+
+@pytest.mark.parametrize(
+    ("name", "says"),
+    [
+        ("NanLaw", "the command is not finite"),
+        ("ThreeSurfaces", "the command has shape (3,), allowed: four numbers"),
+        ("TextLaw", "the command has type str, allowed: four numbers"),
+        ("RaisingLaw", "step raised IndexError: no such layer"),
+    ],
+)
+def test_a_bad_law_is_named(name, says):
+    with pytest.raises(SimulationFailed, match=f"plug-in culprits:{name} at 0 s: ") as failed:
+        fly(scenario(**SHORT, control={"law": f"culprits:{name}"}))
+    assert says in str(failed.value)
+
+
+def test_a_class_that_is_no_plug_in_is_bad_input():
+    with pytest.raises(BadInput, match="culprits:NoStep lacks step, allowed: a class with reset and step"):
+        fly(scenario(**SHORT, fdi={"scheme": "culprits:NoStep"}))
+    with pytest.raises(BadInput, match="cannot load culprits:Nobody: AttributeError"):
+        fly(scenario(**SHORT, fdi={"scheme": "culprits:Nobody"}))
+
+
+@pytest.mark.parametrize("group", [DETECTORS, LAWS])
+def test_everything_registered_keeps_the_protocol(group):
+    for name, entry in registered(group).items():
+        assert entry.description().strip()
+        if entry.target:
+            assert getdoc(plugin_class(group, name)).startswith(entry.description())
+            assert isinstance(plugin_class(group, name)(), Detector if group == DETECTORS else Law)
+
+
+def test_a_failed_flight_leaves_nothing_behind(tmp_path):
+    (tmp_path / "s.yaml").write_text("name: s\nduration_s: 2\nfdi: {scheme: 'culprits:Raises'}\n")
+    done = _beaver(tmp_path, "run", "s.yaml", "--no-report")
+    assert done.returncode == 3
+    assert done.stderr.strip().startswith("plug-in culprits:Raises at ")
+    assert len(done.stderr.strip().splitlines()) == 1
+    assert not (tmp_path / "runs").exists()
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "says"),
+    [
+        ("fdi", "scheme: augmented-efk", "unknown scheme 'augmented-efk', did you mean augmented-ekf?"),
+        ("control", "law: lqg", "unknown law 'lqg', did you mean lqr?"),
+        ("fdi", "scheme: ../mine.py", "unknown scheme '../mine.py', allowed: adaptive-estimators"),
+        ("fdi", "scheme: 'nowhere.at_all:Mine'", "no installed package has the module 'nowhere'"),
+    ],
+)
+def test_an_unknown_name_is_bad_input_at_its_line(tmp_path, key, value, says):
+    (tmp_path / "s.yaml").write_text(f"name: s\n{key}: {{{value}}}\n")
+    done = _beaver(tmp_path, "validate", "s.yaml")
+    assert done.returncode == 2
+    assert done.stderr.startswith(f"s.yaml:2: {key}.{value.partition(':')[0]}: {says}")
+
+
+def test_options_reach_the_plug_in_and_unknown_ones_are_refused():
+    with pytest.raises(BadInput, match=r"augmented-ekf: options.alram: unknown option, did you mean alarm\?"):
+        fly(scenario(**SHORT, fdi={"scheme": "augmented-ekf", "options": {"alram": 3}}))
+    deaf = fly(scenario(**SHORT, fdi={"scheme": "augmented-ekf", "options": {"alarm": 1e12}}))
+    assert deaf.detection_time_s is None
+
+
+def test_a_flight_without_plug_ins_imports_none_of_this():
+    code = (
+        "import sys; from beaver_ftc.loop.loop import fly; from beaver_ftc.scenario.schema import Scenario\n"
+        "fly(Scenario(name='s', duration_s=0.1))\n"
+        "print([m for m in sys.modules if 'plugged' in m or 'rivals' in m])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+def _beaver(folder, *arguments):
+    code = "import sys; sys.path.insert(0, sys.argv.pop(1)); from beaver_ftc.cli.main import main; main()"
+    here = str(culprits.__file__).rpartition("/")[0]
+    return subprocess.run(
+        [sys.executable, "-c", code, here, *arguments],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        check=False,
+    )

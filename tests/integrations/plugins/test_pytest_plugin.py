@@ -1,0 +1,85 @@
+"""Scenario files as pytest items, in a pytest of their own."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+MEETS = """
+name: meets
+duration_s: 4
+reference: {q: [{sine: {amplitude_deg_s: 3, frequency_hz: 0.5}}]}
+faults: [{actuator: elevator, type: loss_of_effectiveness, magnitude: 0.5, at_s: 2}]
+expect: {detected_within_s: 0.5, isolated_as: elevator, post_fault_rms_deg_s: {q: 5, p: 5}}
+"""
+MISSES = MEETS.replace("meets", "misses").replace("isolated_as: elevator", "isolated_as: rudder")
+SWEEP = "name: many\nbase: fault-free\nruns: 3\nvary: {initial.airspeed_mps: {uniform: [40, 45]}}\n"
+
+
+def _pytest(folder, *arguments):
+    command = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", "--basetemp", "tmp", *arguments]
+    return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False, timeout=300)
+
+
+@pytest.fixture
+def folder(tmp_path):
+    (tmp_path / "pytest.ini").write_text("[pytest]\n")
+    (tmp_path / "meets.scenario.yaml").write_text(MEETS)
+    (tmp_path / "misses.yaml").write_text(MISSES)
+    (tmp_path / "many.yaml").write_text(SWEEP)
+    (tmp_path / "unrelated.yaml").write_text("services: {web: {image: nginx}}\n")
+    return tmp_path
+
+
+def test_marked_files_are_collected_by_themselves(folder):
+    done = _pytest(folder, "-v")
+    assert done.returncode == 0, done.stdout
+    names = re.findall(r"meets\.scenario\.yaml::(\S+) PASSED", done.stdout)
+    assert names == [
+        "detected_within_s", "isolated_as", "post_fault_rms_deg_s.p", "post_fault_rms_deg_s.q"
+    ]  # fmt: skip
+    assert "misses" not in done.stdout
+
+
+def test_a_missed_expectation_is_one_item_with_both_values_and_the_result_is_kept(folder):
+    done = _pytest(folder, "--beaver", ".", "-n", "2", "--dist", "loadgroup")
+    assert done.returncode == 1
+    assert "7 passed" in done.stdout
+    assert "1 failed" in done.stdout
+    assert "isolated_as: expected rudder, actual elevator" in done.stdout
+    assert "Traceback" not in done.stdout
+    kept = Path(re.search(r"kept: (\S+)", done.stdout)[1])
+    assert (kept / "report.html").is_file()
+    assert list((kept / "figures").glob("*.png"))
+    assert "many" not in done.stdout
+    assert "unrelated" not in done.stdout
+
+
+def test_a_file_that_is_wrong_says_where(folder):
+    (folder / "wrong.scenario.yaml").write_text("name: wrong\nduration_s: -1\n")
+    done = _pytest(folder, "wrong.scenario.yaml")
+    assert done.returncode == 2
+    assert re.search(r"wrong\.scenario\.yaml:2: duration_s: -1 is out of range", done.stdout)
+    assert "Traceback" not in done.stdout
+
+
+def test_a_scenario_that_expects_nothing_must_complete(folder):
+    (folder / "plain.scenario.yaml").write_text("name: plain\nduration_s: 1\n")
+    (folder / "broken.scenario.yaml").write_text("name: broken\nduration_s: 1\nfdi: {scheme: 'json:tool'}\n")
+    done = _pytest(folder, "-v", "plain.scenario.yaml", "broken.scenario.yaml")
+    assert "plain.scenario.yaml::completes PASSED" in done.stdout
+    assert "broken.scenario.yaml::completes FAILED" in done.stdout
+    assert "plug-in json:tool: cannot load json:tool" in done.stdout
+
+
+def test_unused_it_imports_nothing_of_the_testbed(folder):
+    (folder / "test_nothing.py").write_text(
+        "import sys\ndef test_lean():\n"
+        "    ours = {m for m in sys.modules if m.startswith('beaver_ftc')}\n"
+        "    assert ours <= {'beaver_ftc', 'beaver_ftc.integrations.pytest_plugin'}\n"
+        "    assert not {'numpy', 'pydantic', 'numba', 'jsbsim'} & set(sys.modules)\n"
+    )
+    done = _pytest(folder, "test_nothing.py", "-p", "no:hypothesispytest")
+    assert done.returncode == 0, done.stdout

@@ -1,0 +1,78 @@
+"""The template package installs, is listed, flies and is compared."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+TEMPLATE = Path(__file__).parents[3] / "examples" / "my-detector"
+BEAVER = Path(sys.executable).with_name("beaver-ftc")
+SWEEP = """
+base:
+  name: few
+  duration_s: 6
+  reference: {q: [{sine: {amplitude_deg_s: 3, frequency_hz: 0.2}}]}
+  faults: [{actuator: elevator, type: loss_of_effectiveness, magnitude: 0.4, at_s: 3}]
+runs: 2
+vary: {"faults[0].magnitude": {uniform: [0.3, 0.9]}}
+"""
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("site")
+    copy = tmp_path_factory.mktemp("source") / "my-detector"
+    subprocess.run(["cp", "-r", TEMPLATE, copy], check=True)
+    command = [sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--no-build-isolation"]
+    subprocess.run([*command, "--no-index", "--target", folder, copy], check=True)
+    return folder
+
+
+def _beaver(site, folder, *arguments):
+    environment = {**os.environ, "PYTHONPATH": str(site)}
+    return subprocess.run(
+        [BEAVER, *arguments], cwd=folder, env=environment, capture_output=True, text=True, check=False
+    )
+
+
+def test_it_is_under_forty_lines():
+    assert len((TEMPLATE / "src/my_detector/__init__.py").read_text().splitlines()) <= 40
+
+
+def test_it_is_listed(site, tmp_path):
+    done = _beaver(site, tmp_path, "list", "--format", "json")
+    schemes = {entry["name"]: entry["description"] for entry in json.loads(done.stdout)["schemes"]}
+    assert schemes["my-cusum"].endswith("[my-detector]")
+
+
+def test_it_flies_by_name_and_by_class(site, tmp_path):
+    for name, scheme in (("a", "my-cusum"), ("b", "my_detector:MyCusum")):
+        (tmp_path / f"{name}.yaml").write_text(
+            f"name: {name}\nduration_s: 14\nfdi: {{scheme: '{scheme}'}}\n"
+            "reference: {q: [{sine: {amplitude_deg_s: 3, frequency_hz: 0.2}}]}\n"
+            "faults: [{actuator: elevator, type: loss_of_effectiveness, magnitude: 0.4, at_s: 12}]\n"
+            "expect: {detected_within_s: 0.1, isolated_as: elevator, no_false_alarm: true}\n"
+        )
+    done = _beaver(site, tmp_path, "run", "a.yaml", "b.yaml", "--no-report")
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_without_the_package_its_name_is_unknown(tmp_path):
+    (tmp_path / "a.yaml").write_text("name: a\nfdi: {scheme: my-cusum}\n")
+    done = _beaver(tmp_path, tmp_path, "validate", "a.yaml")
+    assert done.returncode == 2
+    assert "unknown scheme 'my-cusum'" in done.stderr
+
+
+def test_it_is_compared(site, tmp_path):
+    (tmp_path / "few.sweep.yaml").write_text(SWEEP)
+    arguments = ("--schemes", "my-cusum", "--laws", "nominal", "--workers", "1", "--format", "json")
+    done = _beaver(site, tmp_path, "compare", "--sweep", "few.sweep.yaml", *arguments)
+    assert done.returncode == 0, done.stderr
+    (part,) = json.loads(done.stdout)["sets"].values()
+    rates = {row["scheme"]: row["detection_rate"] for row in part["lines"] if row["law"] == "fault-tolerant"}
+    assert rates == {"adaptive-estimators": 1.0, "my-cusum": 1.0}
+    assert "my-cusum" in part["trade_off"]

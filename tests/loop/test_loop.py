@@ -1,0 +1,176 @@
+"""The closed loop: one suite over every built-in scenario, and what must not depend on how it is run."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from beaver_ftc.errors import BadInput, SimulationFailed
+from beaver_ftc.loop.loop import fly, loop
+from beaver_ftc.plant.channels import TRUTH
+from beaver_ftc.results.metrics import metrics
+from beaver_ftc.results.verdict import facts
+from beaver_ftc.scenario.builtin import builtin_scenarios
+from beaver_ftc.scenario.loader import load_scenario
+from flying import Memory, flown, loss, scenario
+
+BUILT_IN = [name for name, _, _ in builtin_scenarios()]
+
+
+def outcome(flight):
+    """Everything a flight yields but its scenario, comparable."""
+    return {k: v for k, v in vars(flight).items() if k != "scenario"}
+
+
+@pytest.fixture(scope="module", params=BUILT_IN)
+def built_in(request):
+    memory = Memory()
+    return fly(load_scenario(request.param), memory), memory
+
+
+def require_promises(flight):
+    """A scenario made to show a false alarm flies outside what is declared, where nothing is promised."""
+    if flight.scenario.expect.no_false_alarm is False:
+        pytest.skip("shows what an undeclared mismatch does")
+
+
+class TestEveryBuiltInScenario:
+    def test_every_number_is_finite_once_its_estimator_runs(self, built_in):
+        flight, log = built_in
+        bank = [c for c in log.columns if c.startswith("fie_")]
+        assert np.isfinite(log.rows[:, [i for i, c in enumerate(log.columns) if c not in bank]]).all()
+        if flight.detection_time_s is not None:
+            assert np.isfinite(log.rows[log["detected"] == 1]).all()
+
+    def test_surfaces_stay_within_their_travel(self, built_in):
+        _, log = built_in
+        for surface, low, high in (("aileron", -0.52, 0.52), ("elevator", -0.49, 0.49), ("flap", -0.1, 1.03)):
+            assert log[f"{surface}_cmd_rad"].min() >= low
+            assert log[f"{surface}_cmd_rad"].max() <= high
+
+    def test_no_alarm_without_a_fault(self, built_in):
+        flight, _ = built_in
+        require_promises(flight)
+        first = min((fault.at_s for fault in flight.scenario.faults), default=np.inf)
+        assert flight.detection_time_s is None or flight.detection_time_s >= first
+
+    def test_every_fault_shows_in_its_channel(self, built_in):
+        flight, log = built_in
+        for fault in flight.scenario.faults:
+            after = log["t_s"] >= fault.at_s - 1e-9
+            if fault.type == "loss_of_effectiveness":
+                share = log[f"{fault.actuator}_effective_rad"] / log[f"{fault.actuator}_pos_rad"]
+                assert share[~after] == pytest.approx(1.0)
+                assert share[after] == pytest.approx(1.0 - fault.magnitude)
+            assert flight.detection_time_s is not None
+
+    def test_the_estimator_of_the_true_fault_is_never_excluded(self, built_in):
+        flight, log = built_in
+        require_promises(flight)
+        for fault in flight.scenario.faults:
+            if fault.type == "loss_of_effectiveness":
+                assert not log[f"fie_{fault.actuator}_excluded"].any()
+
+    def test_rates_stay_bounded_or_the_report_says_why_no_law_could(self, built_in):
+        flight, log = built_in
+        if flight.scenario.control.law == "nominal":
+            pytest.skip("shows what a law that knows of no fault does")
+        first = min((fault.at_s for fault in flight.scenario.faults), default=0.0)
+        after = log["t_s"] >= first
+        fastest = max(np.abs(log[f"{axis}_rad_s"][after]).max() for axis in "pqr")
+        why = dict(facts(metrics(flight))).get("authority", "")
+        assert (flight.departure is None and fastest < np.deg2rad(15)) or "no deflection at all" in why
+
+    def test_the_log_has_one_row_a_frame_on_the_frame_clock(self, built_in):
+        flight, log = built_in
+        assert len(log.rows) == flight.frames
+        assert log["t_s"] == pytest.approx(np.arange(flight.frames) / flight.scenario.rate_hz, abs=1e-12)
+
+
+def test_same_scenario_same_bits():
+    (first, one), (second, two) = flown(faults=[loss()]), flown(faults=[loss()])
+    assert np.array_equal(one.rows, two.rows, equal_nan=True)
+    assert outcome(first) == outcome(second)
+
+
+def test_reading_through_python_gives_the_same_bits(monkeypatch):
+    _, native = flown(faults=[loss()], duration_s=15)
+    monkeypatch.setenv("BEAVER_FTC_NATIVE", "0")
+    _, through_python = flown(faults=[loss()], duration_s=15)
+    assert np.array_equal(native.rows, through_python.rows, equal_nan=True)
+
+
+def test_the_log_does_not_depend_on_the_chunks(monkeypatch):
+    _, whole = flown(faults=[loss()])
+    monkeypatch.setattr(loop, "CHUNK_ROWS", 257)
+    _, pieces = flown(faults=[loss()])
+    assert np.array_equal(whole.rows, pieces.rows, equal_nan=True)
+
+
+def test_a_flight_without_a_log_has_the_same_outcome():
+    case = scenario(faults=[loss()])
+    assert outcome(fly(case)) == outcome(fly(case, Memory()))
+
+
+def test_progress_ends_at_one():
+    shares = []
+    fly(scenario(duration_s=1), progress=shares.append)
+    assert shares[-1] == 1.0
+
+
+class TestFrames:
+    def test_the_truth_moves_by_the_acceleration_logged(self):
+        """x[k+1] = x[k] + dt a[k]: what the estimators rest on, up to the Earth's rotation."""
+        _, log = flown(faults=[loss()])
+        for axis in "pqr":
+            moved = np.diff(log[f"{axis}_rad_s"]) * 100
+            assert moved == pytest.approx(log[f"{axis}dot_rad_s2"][:-1], abs=1e-4)
+
+    def test_a_command_acts_one_frame_later(self):
+        _, log = flown(faults=[loss()])
+        assert log["elevator_cmd_rad"] == pytest.approx(log["elevator_pos_rad"], abs=1e-15)
+
+    @pytest.mark.parametrize("substeps", [2, 5, 10])
+    def test_finer_truth_raises_no_alarm(self, substeps):
+        flight, _ = flown(substeps=substeps, duration_s=15)
+        assert flight.detection_time_s is None
+
+
+class TestDepartures:
+    def test_a_departure_ends_the_flight_and_says_which_signal(self):
+        flight, log = flown(
+            duration_s=40,
+            faults=[{"type": "unanticipated", "Cm_alpha3": 10, "at_s": 12}],
+            control={"law": "nominal"},
+        )
+        at_s, signal = flight.departure
+        assert signal == "alpha"
+        assert at_s == log["t_s"][-1]
+        assert abs(log["alpha_rad"][-1]) > 0.6
+        assert np.abs(log["alpha_rad"][:-1]).max() <= 0.6
+        assert flight.envelope_exits
+
+    def test_a_truth_that_is_not_finite_is_named(self, monkeypatch):
+        flying = loop.Loop(scenario(duration_s=2))
+        flying.cockpit.native = False
+        flying.frames["native"] = 0
+        read = flying.cockpit.read
+
+        def poisoned():
+            read()
+            if flying.frames["k"][0] == 50:
+                flying.frames["truth"][0, [name for name, _, _ in TRUTH].index("beta_rad")] = np.nan
+
+        monkeypatch.setattr(flying.cockpit, "read", poisoned)
+        with pytest.raises(SimulationFailed, match=r"beta_rad.*0\.5 s|0\.5 s.*beta_rad"):
+            list(flying.chunks())
+
+
+def test_what_cannot_be_trimmed_is_bad_input():
+    with pytest.raises(BadInput):
+        fly(scenario(initial={"airspeed_mps": 21, "altitude_m": 6000}))
+
+
+def test_a_flight_is_plain_data():
+    flight, _ = flown(duration_s=1)
+    assert dataclasses.replace(flight, frames=1).frames == 1

@@ -1,0 +1,148 @@
+"""Where compiled code is kept: it must be found again by the next process, wherever the package lies."""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from beaver_ftc import compiled
+from beaver_ftc.paths import data_root
+
+REPOSITORY = data_root()
+
+
+@pytest.fixture
+def nowhere(monkeypatch, tmp_path):
+    """An environment with no folder for a cache: in /dev/null not even root can write one."""
+    for name in ("XDG_CACHE_HOME", "NUMBA_CACHE_DIR"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setenv("HOME", os.devnull)
+    monkeypatch.setattr(compiled.tempfile, "gettempdir", lambda: os.devnull)
+    compiled.cache_folder.cache_clear()
+    yield monkeypatch
+    compiled.cache_folder.cache_clear()
+
+
+def test_the_users_cache_comes_first(nowhere, tmp_path):
+    nowhere.setenv("XDG_CACHE_HOME", str(tmp_path))
+    assert compiled.cache_folder().parent == tmp_path / "beaver-ftc"
+
+
+def test_numbas_own_setting_beats_it(nowhere, tmp_path):
+    nowhere.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    nowhere.setenv("NUMBA_CACHE_DIR", str(tmp_path / "numba"))
+    assert compiled.cache_folder().parent == tmp_path / "numba"
+
+
+def test_without_a_home_there_is_the_folder_for_temporary_files(nowhere, tmp_path):
+    nowhere.setattr(compiled.tempfile, "gettempdir", lambda: str(tmp_path))
+    folder = compiled.cache_folder().parent
+    assert folder.parent == tmp_path
+    assert folder.stat().st_mode & 0o077 == 0, "code is loaded from it: it is nobody else's business"
+
+
+def test_with_nowhere_to_write_nothing_is_kept(nowhere):
+    assert compiled.cache_folder() is None
+
+
+def test_no_home_at_all_and_no_folder_for_temporary_files_is_no_error(nowhere):
+    def none(*_):
+        raise RuntimeError("no home directory")
+
+    def no_folder():
+        raise FileNotFoundError("no usable temporary directory")
+
+    nowhere.setattr(compiled.Path, "expanduser", none)
+    nowhere.setattr(compiled.tempfile, "gettempdir", no_folder)
+    assert compiled.cache_folder() is None
+
+
+@pytest.mark.skipif(not hasattr(os, "getuid"), reason="folders have no owner here")
+def test_a_folder_somebody_else_owns_is_not_trusted(nowhere, tmp_path):
+    nowhere.setenv("XDG_CACHE_HOME", str(tmp_path))
+    nowhere.setattr(compiled, "_user", lambda: os.getuid() + 1)
+    assert compiled.cache_folder() is None
+
+
+def test_what_old_versions_left_goes_but_for_the_latest(nowhere, tmp_path):
+    base = tmp_path / "beaver-ftc"
+    old = [base / f"{i:016x}" for i in range(14)]
+    for i, folder in enumerate(old):
+        folder.mkdir(parents=True)
+        os.utime(folder, (i, i))
+    (base / "keep-me").mkdir()
+    nowhere.setenv("XDG_CACHE_HOME", str(tmp_path))
+    compiled.cache_folder()
+    assert {path.name for path in base.iterdir()} == {
+        "keep-me",
+        *(folder.name for folder in old[-compiled._VERSIONS_KEPT :]),
+    }
+
+
+PROGRAM = """
+import sys
+from beaver_ftc.loop.frame import fly_frame
+from beaver_ftc.loop.loop import fly
+from beaver_ftc.scenario.loader import load_scenario
+import beaver_ftc
+flight = fly(load_scenario("elevator-partial-loss"))
+assert flight.isolated == "elevator"
+heavy = [name for name in ("scipy.linalg", "pandas", "matplotlib", "plotly") if name in sys.modules]
+print(beaver_ftc.__file__, "compiled" if fly_frame.overloads else "loaded", *heavy)
+"""
+
+
+def run(folder, **environment):
+    """Fly in a process of its own, from `folder`; what it says."""
+    kept = {
+        name: value for name, value in os.environ.items() if name not in ("XDG_CACHE_HOME", "NUMBA_CACHE_DIR")
+    }
+    done = subprocess.run(
+        [sys.executable, "-c", PROGRAM],
+        cwd=folder,
+        env=kept | environment,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    return done.stdout.split()
+
+
+def listing(folder: Path) -> dict[str, float]:
+    return {str(path): path.stat().st_mtime_ns for path in folder.rglob("*")}
+
+
+def test_the_second_run_compiles_nothing_wherever_it_is_started(tmp_path):
+    run(tmp_path)  # whoever runs the tests first compiles
+    kept = listing(compiled.cache_folder())
+    (tmp_path / "elsewhere").mkdir()
+    _, how, *heavy = run(tmp_path / "elsewhere")
+    assert how == "loaded"
+    assert heavy == []
+    assert listing(compiled.cache_folder()) == kept
+
+
+def test_an_installation_nobody_can_write_to_compiles_once_into_the_temporary_folder(tmp_path):
+    package, temporary = tmp_path / "site" / "beaver_ftc", tmp_path / "temporary"
+    shutil.copytree(
+        Path(compiled.__file__).parent, package, ignore=shutil.ignore_patterns("__pycache__", "data")
+    )
+    for name in ("aircraft", "scenarios"):
+        shutil.copytree(REPOSITORY / name, package / "data" / name)
+    temporary.mkdir()
+    for path in package.rglob("*"):
+        path.chmod(0o555 if path.is_dir() else 0o444)
+    before = listing(package)
+    environment = {
+        "PYTHONPATH": str(package.parent), "HOME": os.devnull, "TMPDIR": str(temporary),
+        "PYTHONDONTWRITEBYTECODE": "1",
+    }  # fmt: skip
+    first, second = run(tmp_path, **environment), run(tmp_path, **environment)
+    assert first[:2] == [str(package / "__init__.py"), "compiled"]
+    assert second == [str(package / "__init__.py"), "loaded"]
+    assert listing(package) == before
+    for path in package.rglob("*"):
+        path.chmod(0o755)

@@ -1,0 +1,54 @@
+"""Parts of the frame are really taken out, and nothing but them."""
+
+import numpy as np
+import pytest
+
+from beaver_ftc import compiled
+from beaver_ftc.design.coefficients import SURFACES
+from beaver_ftc.loop.loop import Loop, frame
+from beaver_ftc.studies.bench.parts import PARTS, frame_with, frame_without, nothing
+from flying import scenario
+
+
+def test_all_parts_together_are_the_frame_itself():
+    assert frame_with(len(PARTS)) is frame.fly_frame
+
+
+def test_every_part_names_kernels_there_are():
+    for i in range(len(PARTS)):
+        assert frame_with(i) is not frame.fly_frame
+
+
+def test_an_unknown_kernel_is_refused():
+    with pytest.raises(ValueError, match=r"no such kernel: frame\.dream"):
+        frame_without({"frame.dream": nothing}, "dream")
+
+
+def test_the_loops_own_kernels_are_left_as_they_were():
+    from beaver_ftc.diagnosis import isolation
+
+    before = frame.fly_frame, isolation.predict_all, compiled.kernel
+    frame_with(1)
+    from beaver_ftc.diagnosis import isolation as isolation_now
+    from beaver_ftc.loop import frame as frame_now
+
+    assert (frame_now.fly_frame, isolation_now.predict_all, compiled.kernel) == before
+
+
+def test_with_reading_alone_the_truth_is_read_and_nothing_else_happens():
+    loop = Loop(scenario(duration_s=2))
+    loop.fly_chunk(0, 10)
+    loop.fly_frame = loop.direct(frame_with(1))
+    before = loop.frames.copy()
+    commands = [loop.plant.read(f"fcs/{s}-cmd-rad") for s in SURFACES]
+    loop.plant.write("fcs/elevator-cmd-rad", 0.01)
+    loop.frames["row"] = 0
+    loop._log[:] = np.nan
+    loop.fly_frames(20, 1)
+    now = loop.frames
+    assert (now["truth"] != before["truth"]).any(axis=1).all()
+    assert now["k"][0] == before["k"][0] + 20
+    for untouched in ("fdi", "control", "f", "G"):
+        assert now[untouched].tobytes() == before[untouched].tobytes()
+    assert np.isnan(loop._log).all()
+    assert loop.plant.read("fcs/elevator-cmd-rad") == 0.01 != commands[1]

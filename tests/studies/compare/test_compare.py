@@ -1,0 +1,299 @@
+"""The command, the document it writes, the standard sets, and finished runs side by side."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from beaver_ftc.cli.main import app
+from beaver_ftc.diagnosis.rivals.options import TUNED, TUNED_FOR_ERRORS, tuned
+from beaver_ftc.loop.loop import Loop
+from beaver_ftc.plugins import plugin_class
+from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.studies.compare.benchmark import MARK, write_leaderboard
+from beaver_ftc.studies.compare.crew import fly_cases, spread
+from beaver_ftc.studies.compare.document import better_than_ours, document_of
+from beaver_ftc.studies.compare.figure import write_figure
+from beaver_ftc.studies.compare.flights import (
+    CALIBRATION,
+    CALIBRATION_ERRORS,
+    Case,
+    of_set,
+    of_sweep,
+    set_names,
+)
+from beaver_ftc.studies.compare.page import write_page
+from beaver_ftc.studies.compare.replay import Trace
+from beaver_ftc.studies.compare.table import as_text
+from beaver_ftc.studies.compare.trial import LAW, ORACLE, SCHEME, Entry, entries_of, fly_case, with_entry
+from beaver_ftc.studies.compare.tune import (
+    DETECTORS,
+    DETECTORS_FOR_ERRORS,
+    LAWS,
+    _best_detector,
+    alarm_level,
+    candidates,
+)
+from flying import scenario
+
+BEAVER = Path(sys.executable).with_name("beaver-ftc")
+SWEEP = """
+base:
+  name: few
+  duration_s: 5
+  reference: {q: [{sine: {amplitude_deg_s: 3, frequency_hz: 0.4}}]}
+  faults: [{actuator: elevator, type: loss_of_effectiveness, magnitude: 0.4, at_s: 3}]
+runs: 3
+vary: {"faults[0].magnitude": {uniform: [0.3, 0.9]}}
+"""
+
+
+@pytest.fixture
+def sweep(tmp_path):
+    (tmp_path / "few.yaml").write_text(SWEEP)
+    return tmp_path / "few.yaml"
+
+
+def _run(*arguments):
+    return CliRunner().invoke(app, ["compare", *map(str, arguments)])
+
+
+@pytest.fixture
+def compared(sweep, tmp_path):
+    names = ("--schemes", "observer-constant,augmented-ekf", "--laws", "nominal,lqr")
+    done = _run("--sweep", sweep, *names, "--workers", 1, "--out", tmp_path / "out", "--format", "json")
+    assert done.exit_code == 0, done.output
+    return json.loads(done.output), tmp_path / "out" / "few"
+
+
+def test_a_comparison_has_everything_asked_for(compared):
+    document, folder = compared
+    part = document["sets"]["few"]
+    pairs = [(row["scheme"], row["law"]) for row in part["lines"]]
+    assert pairs == [
+        (SCHEME, LAW), ("observer-constant", LAW), ("augmented-ekf", LAW),
+        (SCHEME, "nominal"), (SCHEME, "lqr"), (SCHEME, ORACLE),
+    ]  # fmt: skip
+    assert set(part["trade_off"]) == {SCHEME, "observer-constant", "augmented-ekf"}
+    assert part["flights"] == 3
+    assert part["errors"] == []
+    oracle = part["lines"][-1]
+    assert (oracle["ratio_median"], oracle["ratio_90"]) == (1.0, 1.0)
+    assert part["lines"][0]["detection_rate"] == 1.0
+    nominal = part["lines"][3]
+    assert nominal["ratio_median"] > 2.0
+    assert sorted(path.name for path in folder.iterdir()) == [
+        "comparison.html", "comparison.json", "comparison.png"
+    ]  # fmt: skip
+    page = (folder / "comparison.html").read_text()
+    assert "augmented-ekf" in page
+    assert "http" not in page.replace("http://www.w3.org", "")
+
+
+def test_workers_do_not_change_the_result(sweep):
+    entries = entries_of(["observer-constant"], ["lqr"])
+    cases = of_sweep(sweep)
+    one, two = (document_of(fly_cases(cases, entries, n), entries) for n in (1, 2))
+    for document in (one, two):
+        for row in document["sets"]["few"]["lines"]:
+            assert row.pop("us") > 0  # the one thing that is measured on the clock
+    assert one == two
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        ((), "exactly one of RUN..., --sweep FILE, --benchmark, --tune"),
+        (("--benchmark", "--tune"), "exactly one of"),
+        (("--benchmark", "--set", "publisched"), "no benchmark set 'publisched', allowed: "),
+        (("--benchmark", "--schemes", "efk", "--flights", "1"), "--schemes: unknown scheme 'efk'"),
+        (("--benchmark", "--laws", "lqx", "--flights", "1"), "--laws: unknown law 'lqx'"),
+        (("--sweep", "nowhere.yaml"), "no such file"),
+        (("--tune", "--set", "published"), "--set: allowed: only with --benchmark"),
+        (("nowhere",), "nowhere: holds no metrics.json, allowed: a result folder"),
+    ],
+)
+def test_bad_usage_is_one_line_and_exit_status_2(tmp_path, arguments, says):
+    done = subprocess.run(
+        [BEAVER, "compare", *arguments], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 2
+    assert says in done.stderr
+    assert "Traceback" not in done.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_plug_in_that_fails_spoils_only_its_own_line(sweep):
+    entries = entries_of(["json:JSONDecoder", "observer-constant"], [LAW])
+    document = document_of(fly_cases(of_sweep(sweep), entries), entries)
+    part = document["sets"]["few"]
+    broken, fine = part["lines"][0], part["lines"][1]
+    assert (broken["flights"], broken["failed"]) == (0, 3)
+    assert (fine["flights"], fine["failed"], fine["detection_rate"]) == (3, 0, 1.0)
+    assert any("json:JSONDecoder lacks reset and step" in error for error in part["errors"])
+    assert as_text(document)
+
+
+def test_options_are_the_named_schemes_alone():
+    named = Scenario(name="n", fdi={"scheme": "augmented-ekf", "options": {"noise": 2.0}})
+    assert with_entry(named, Entry("augmented-ekf", LAW)).fdi.options == {"noise": 2.0}
+    assert with_entry(named, Entry("observer-constant", LAW)).fdi.options == {}
+
+
+def test_a_case_that_cannot_be_flown_is_said():
+    scenario = Scenario(name="low", initial={"airspeed_mps": 20.0, "manifold_pressure_inhg": 10.0})
+    entries = entries_of([SCHEME], [LAW])
+    document = document_of([fly_case(Case("s", scenario), entries)], entries)
+    assert document["sets"]["s"]["lines"][0]["failed"] == 1
+    assert document["sets"]["s"]["errors"]
+
+
+def _line(scheme, law, **changes):
+    ours = {"false_alarms_per_h": 0.0, "detection_rate": 0.9, "delay_median_s": 0.1, "delay_90_s": None,
+            "isolation_rate": 0.8, "ratio_median": 1.5, "ratio_90": 2.0, "departures": 0}  # fmt: skip
+    return {"scheme": scheme, "law": law, **ours, **changes}
+
+
+def test_a_set_without_faults_can_be_drawn(tmp_path):
+    scenario = Scenario(name="still", duration_s=2)
+    entries = entries_of([SCHEME, "none"], ["lqr"])
+    document = document_of([fly_case(Case("healthy", scenario), entries)], entries)
+    row = document["sets"]["healthy"]["lines"][0]
+    assert (row["detection_rate"], row["false_alarms_per_h"]) == (None, 0.0)
+    write_figure(document, tmp_path / "figure.png")
+    write_page(document, tmp_path / "figure.png", tmp_path / "page.html", "Still")
+    assert as_text(document)
+    assert "Still" in (tmp_path / "page.html").read_text()
+
+
+def test_what_is_better_than_ours_is_said_and_nothing_else():
+    lines = [
+        _line(SCHEME, LAW),
+        _line("none", LAW, false_alarms_per_h=0.0, delay_median_s=None),
+        _line("rival", LAW, delay_90_s=5.0, detection_rate=0.8, delay_median_s=None),
+        _line(SCHEME, "lqr", ratio_median=0.7, ratio_90=None),
+        _line(SCHEME, ORACLE, ratio_median=1.0, ratio_90=1.0),
+    ]
+    free = {
+        SCHEME: {"detection_rate": 0.9, "delay_median_s": 0.1},
+        "rival": {"detection_rate": 1.0, "delay_median_s": 0.2},
+    }
+    assert better_than_ours(lines, free) == [
+        "rival has the better 90 % detection delay, s: 5 against never",
+        "with no false alarm, rival has the better detection rate: 1 against 0.9",
+        "lqr has the better median tracking ratio to the oracle: 0.7 against 1.5",
+    ]
+
+
+def test_the_leaderboard_keeps_what_was_written_by_hand(tmp_path, compared):
+    path = tmp_path / "board.md"
+    path.write_text(f"# Mine\n\nWords.\n\n{MARK}\n\nold\n")
+    write_leaderboard(compared[0], path)
+    text = path.read_text()
+    assert text.startswith(f"# Mine\n\nWords.\n\n{MARK}\n\nMade with beaver-ftc ")
+    assert "old" not in text
+    assert "| adaptive-estimators |" in text
+    assert "What loses:" in text
+
+
+@pytest.mark.parametrize("name", [*set_names(), CALIBRATION])
+def test_every_standard_set_is_sound(name):
+    """Its flights can be drawn, and fly on values of their own."""
+    cases = of_set(name)
+    assert len({case.scenario.name for case in cases}) == len(cases)
+    assert len({case.scenario.seed for case in cases}) == len(cases)
+    assert all(case.scenario.fdi.scheme == SCHEME for case in cases)
+
+
+def test_nothing_is_tuned_on_what_is_compared():
+    tuned_on = {case.scenario.seed for name in (CALIBRATION, CALIBRATION_ERRORS) for case in of_set(name)}
+    compared = {case.scenario.seed for name in set_names() for case in of_set(name)}
+    assert not tuned_on & compared
+
+
+def test_the_sets_cover_the_fault_types():
+    types = {fault.type for case in of_set("fault-types") for fault in case.scenario.faults}
+    assert types == {"bias", "stuck", "float", "oscillatory", "loss_of_effectiveness"}
+    assert not any(case.scenario.faults for case in of_set("healthy"))
+
+
+def test_the_alarm_level_leaves_the_allowed_number_of_alarms():
+    healthy = [Trace(value, (), faulted=False, healthy_s=900.0) for value in (3.0, 1.0, 2.0, 5.0)]  # one hour
+    assert alarm_level(healthy, 0.5) == pytest.approx(1.2 * 5.0)
+    level = alarm_level(healthy, 2.0)
+    assert sum(trace.false_alarm(level) for trace in healthy) == 2
+
+
+@pytest.mark.parametrize(
+    ("grids", "group", "path"),
+    [
+        (DETECTORS, "beaver_ftc.detectors", TUNED),
+        (DETECTORS_FOR_ERRORS, "beaver_ftc.detectors", TUNED_FOR_ERRORS),
+        (LAWS, "beaver_ftc.laws", TUNED),
+    ],
+)
+def test_what_is_tuned_are_options_the_rivals_have(grids, group, path):
+    for name, grid in grids.items():
+        known = plugin_class(group, name).defaults
+        assert set(grid) <= set(known)
+        assert set(grid) <= set(tuned(path)[name]) <= set(known)
+        assert len(candidates(grid)) > 1
+
+
+def test_what_is_tuned_for_errors_flies_only_where_errors_are_declared():
+    seen = {}
+    for name, bounds in (("none", {}), ("errors", {"turbulence": "light"})):
+        flown = Loop(scenario(duration_s=1, fdi={"scheme": "augmented-ekf", "bounds": bounds}))
+        seen[name] = flown.plugged.detector.option
+    assert seen["none"]["drift_per_s"] == tuned()["augmented-ekf"]["drift_per_s"]
+    assert seen["errors"]["drift_per_s"] == tuned(TUNED_FOR_ERRORS)["augmented-ekf"]["drift_per_s"]
+
+
+def test_a_candidate_is_judged_in_each_air_at_a_level_of_its_own():
+    """The quick candidate is as noisy in rough air as its fault is loud there; one level for all air would
+    blind it in still air."""
+
+    def flight(before, after):
+        return Trace(before, ((0.5, after),), faulted=after > 0.0, healthy_s=3600.0)
+
+    air = ["none", "none", "light", "light"]
+    keen = [flight(1.0, 0.0), flight(0.5, 2.0), flight(10.0, 0.0), flight(5.0, 20.0)]
+    dull = [flight(1.0, 0.0), flight(0.5, 0.9), flight(1.0, 0.0), flight(0.5, 2.0)]
+    played = [{"x": pair} for pair in zip(dull, keen, strict=True)]
+    best = _best_detector("x", {"kind": (0.0, 1.0)}, played, air, 0.0)
+    assert best == {"kind": 1.0, "alarm": pytest.approx(12.0)}
+
+
+def test_work_is_spread_in_order():
+    assert spread(abs, [-3, 2, -1], 2) == [3, 2, 1]
+
+
+def test_finished_runs_stand_side_by_side(tmp_path):
+    for name, law in (("a", "nominal"), ("b", "fault-tolerant")):
+        (tmp_path / f"{name}.yaml").write_text(
+            f"name: {name}\nduration_s: 5\ncontrol: {{law: {law}}}\n"
+            "reference: {q: [{sine: {amplitude_deg_s: 3, frequency_hz: 0.4}}]}\n"
+            "faults: [{actuator: elevator, type: loss_of_effectiveness, magnitude: 0.5, at_s: 2}]\n"
+        )
+    command = [BEAVER, "run", "a.yaml", "b.yaml", "--no-report"]
+    subprocess.run(command, cwd=tmp_path, check=True, capture_output=True)
+    folders = [tmp_path / "runs" / name for name in "ab"]
+    done = _run(*folders, "--out", tmp_path / "out")
+    assert done.exit_code == 0
+    rows = {line.split("  ")[0]: line for line in done.output.splitlines()}
+    assert "post RMS q, deg/s *" in rows
+    assert "fault" in rows
+    assert (tmp_path / "out" / "runs" / "runs.png").stat().st_size > 10_000
+    page = (tmp_path / "out" / "runs" / "runs.html").read_text()
+    assert page.count('<p class="folder">') == 2
+    done = _run(*folders, "--out", tmp_path / "out", "--format", "json")
+    assert set(json.loads(done.output)["runs"]) == {"a", "b"}
+
+
+def test_entries_are_every_scheme_with_our_law_and_every_law_with_our_scheme():
+    assert entries_of(["x"], ["y"]) == [
+        Entry("x", LAW), Entry(SCHEME, "y"), Entry(SCHEME, LAW), Entry(SCHEME, ORACLE)
+    ]  # fmt: skip

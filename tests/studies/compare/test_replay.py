@@ -1,0 +1,129 @@
+"""One recorded flight serves every detector: its traces are what a flight of its own would have given."""
+
+from math import inf
+
+import numpy as np
+import pytest
+
+from beaver_ftc.loop.loop import fly
+from beaver_ftc.studies.compare.replay import Trace, aware_of_the_air, record, replay, replay_together, trace
+from flying import scenario
+
+FAULT = {"actuator": "elevator", "type": "loss_of_effectiveness", "magnitude": 0.5, "at_s": 6}
+
+
+@pytest.fixture(scope="module")
+def recorded():
+    return record(scenario(duration_s=9, faults=[FAULT]))
+
+
+@pytest.mark.parametrize("scheme", ["adaptive-estimators", "observer-constant", "multiple-models"])
+def test_the_alarm_of_a_replay_is_that_of_a_flight(recorded, scheme):
+    flown = fly(scenario(duration_s=9, faults=[FAULT], fdi={"scheme": scheme}, control={"law": "nominal"}))
+    seen = replay(recorded, scheme)
+    assert seen.delay_s() == pytest.approx(flown.detection_time_s - 6.0)
+    assert seen.faulted
+    assert seen.healthy_s == pytest.approx(6.0)
+
+
+@pytest.mark.parametrize("scheme", ["augmented-ekf", "observer-constant", "multiple-models", "rls-monitor"])
+def test_flights_played_together_are_as_if_played_alone(recorded, scheme):
+    """Up to the fault one detector, then one each: nothing of one fault gets into another's."""
+    faults = [FAULT | {"actuator": surface, "magnitude": 1.0} for surface in ("aileron", "rudder")]
+    others = [record(scenario(duration_s=9, faults=[fault])) for fault in faults]
+    together = replay_together([recorded, *others], scheme)
+    for alone, seen in zip([recorded, *others], together, strict=True):
+        expected = replay(alone, scheme)
+        assert (seen.before, seen.records) == (expected.before, expected.records)
+        assert (seen.faulted, seen.healthy_s) == (expected.faulted, expected.healthy_s)
+    assert len({seen.records for seen in together}) > 1
+
+
+def test_flights_that_were_never_alike_are_played_alone(recorded):
+    other = record(scenario(duration_s=9, faults=[FAULT], initial={"airspeed_mps": 50.0}))
+    together = replay_together([recorded, other], "observer-constant")
+    for alone, seen in zip([recorded, other], together, strict=True):
+        assert seen.records == replay(alone, "observer-constant").records
+
+
+def test_the_statistical_detector_alarms_on_the_recording_as_in_flight():
+    fdi = {"statistical": {}, "authority": "statistical", "bounds": {"sensors": "tactical-grade"}}
+    keys = {"duration_s": 9, "faults": [FAULT], "sensors": "tactical-grade", "fdi": fdi}
+    flown = fly(scenario(**keys, control={"law": "nominal"}))
+    seen = replay(record(scenario(**keys)), "adaptive-estimators")
+    assert seen.delay_s() == pytest.approx(flown.detection_time_s - 6.0)
+    assert not seen.false_alarm()
+
+
+@pytest.fixture(scope="module")
+def airborne():
+    """A flight in light turbulence with exact instruments and a perfect model; the vanes see the air."""
+    return record(
+        scenario(
+            duration_s=30,
+            uncertainty={},
+            environment={"turbulence": "dryden", "severity": "light"},
+            fdi={"statistical": {}, "bounds": {"turbulence": "light"}},
+        )
+    )
+
+
+def unexplained(recording):
+    """Acceleration that a detector cannot explain, RMS per axis after two seconds."""
+    x = np.array([measured.x for measured, _ in recording.seen])
+    believed = np.array([measured.acceleration for measured, _ in recording.seen])
+    return np.sqrt(np.mean((np.diff(x, axis=0) / 0.01 - believed[1:])[200:] ** 2, axis=0))
+
+
+def test_with_the_vanes_what_is_left_unexplained_is_what_is_declared_of_it(airborne):
+    aware = aware_of_the_air(airborne)
+    declared = aware.context.declared
+    assert unexplained(aware)[1] < 0.2 * unexplained(airborne)[1]
+    assert unexplained(aware)[[0, 2]] == pytest.approx(declared.turbulence_rad_s2[[0, 2]], rel=0.3)
+    assert unexplained(aware)[1] <= 1.2 * declared.turbulence_rad_s2[1]
+    assert declared.gust_rad_s[0] == airborne.context.declared.gust_rad_s[0]
+    assert np.array_equal(aware.context.declared.gust_time_s, airborne.context.declared.gust_time_s)
+
+
+def test_noise_of_the_vanes_is_told_as_well():
+    vanes = {name: {"noise_std_deg": 0.5} for name in ("alpha", "beta")}
+    noisy = record(
+        scenario(
+            duration_s=10,
+            uncertainty={},
+            sensors=vanes,
+            fdi={"statistical": {}, "bounds": {"sensors": vanes, "turbulence": "light"}},
+        )
+    )
+    seen = np.std(noisy.air[200:], axis=0)
+    assert seen[1] > 0.01
+    assert aware_of_the_air(noisy).context.declared.model_rad_s2[1] > 0.5 * seen[1]
+
+
+def test_the_recording_changes_nothing(recorded):
+    silent = fly(scenario(duration_s=9, faults=[FAULT], fdi={"scheme": "none"}, control={"law": "nominal"}))
+    assert len(recorded.seen) == silent.frames
+    last, _ = recorded.seen[-1]
+    assert np.isfinite(last.x).all()
+    assert recorded.fault_at_s == 6.0
+
+
+def test_a_trace_answers_as_the_whole_series_would(recorded):
+    rng = np.random.default_rng(0)
+    statistic = np.abs(rng.normal(size=len(recorded.seen))).cumsum() ** 0.5 * rng.random(len(recorded.seen))
+    seen = trace(recorded, statistic)
+    t = np.array([measured.t_s for measured, _ in recorded.seen])
+    before, after = statistic[t < 6 - 1e-9], statistic[t >= 6 - 1e-9]
+    for level in np.quantile(statistic, [0.1, 0.5, 0.9, 0.999, 1.0]):
+        assert seen.false_alarm(level) == (before > level).any()
+        over = np.flatnonzero(after > level)
+        expected = t[t >= 6 - 1e-9][over[0]] - 6 if over.size and not (before > level).any() else inf
+        assert seen.delay_s(level) == pytest.approx(expected)
+
+
+def test_a_level_beyond_everything_is_never_reached():
+    quiet = Trace(0.5, ((0.0, 0.6), (1.0, 0.9)), faulted=True, healthy_s=10.0)
+    assert quiet.delay_s(0.9) == inf
+    assert quiet.delay_s(0.89) == 1.0
+    assert quiet.delay_s(0.4) == inf  # there was an alarm before
+    assert quiet.false_alarm(0.4)

@@ -1,0 +1,80 @@
+"""Counting: rates with their bounds, quantiles with what never came, levels at matched false alarms."""
+
+from math import inf
+
+import pytest
+
+from beaver_ftc.studies.compare.replay import Trace
+from beaver_ftc.studies.compare.tally import (
+    line_of,
+    matched,
+    point_at,
+    share_within,
+    trade_off,
+)
+from beaver_ftc.studies.compare.trial import Entry, Result
+
+ENTRY = Entry("a", "b")
+
+
+def _result(**changes):
+    values = {"entry": ENTRY, "false_alarm": False, "healthy_s": 360.0, "faulted": True, "delay_s": 0.1,
+              "isolated": "rudder", "correct": True, "isolation_delay_s": 0.2, "rms_deg_s": 1.0}  # fmt: skip
+    return Result(**{**values, **changes})
+
+
+def test_a_line_counts():
+    mine = [
+        _result(),
+        _result(delay_s=inf, correct=False, isolation_delay_s=inf, rms_deg_s=4.0),
+        _result(false_alarm=True, healthy_s=180.0, delay_s=inf, correct=False, isolation_delay_s=inf),
+        _result(faulted=False, delay_s=inf, correct=False, rms_deg_s=inf, departed=True),
+        _result(error="could not"),
+    ]
+    oracle = [_result(rms_deg_s=0.5)] * 5
+    line = line_of(ENTRY, mine, oracle)
+    assert (line.flights, line.failed, line.faults, line.departures) == (4, 1, 3, 1)
+    assert line.healthy_h == pytest.approx((3 * 360 + 180) / 3600)
+    assert line.false_alarms_per_h == pytest.approx(1 / 0.35)
+    assert line.detection_rate == pytest.approx(1 / 3)
+    assert line.isolation_rate == pytest.approx(1 / 3)
+    assert line.delay_median_s == inf
+    assert line.ratio_median == 2.0  # of 2, 8, 2 and infinity, the least that half do not exceed
+    assert line.ratio_90 == inf
+
+
+def test_nothing_to_count_is_not_zero():
+    line = line_of(ENTRY, [_result(faulted=False, healthy_s=0.0)], [_result()])
+    assert line.detection_rate is None
+    assert line.false_alarms_per_h is None
+
+
+def test_quantiles_count_what_never_came_as_last():
+    assert share_within([3.0, 1.0, inf, 2.0], 0.5) == 2.0
+    assert share_within([3.0, 1.0, inf, 2.0], 0.9) == inf
+    assert share_within([], 0.5) == inf
+
+
+def _traces():
+    healthy = [Trace(value, (), faulted=False, healthy_s=1800.0) for value in (0.2, 0.5, 0.7)]
+    faulted = [
+        Trace(0.1, ((0.0, 0.3), (1.0, 0.8)), faulted=True, healthy_s=900.0),
+        Trace(0.6, ((0.5, 2.0),), faulted=True, healthy_s=900.0),
+    ]
+    return healthy + faulted
+
+
+def test_a_lower_level_buys_delay_with_false_alarms():
+    points = trade_off(_traces())
+    assert [point.level for point in points] == [1.0, 0.7, 0.6, 0.5, 0.2, 0.1]
+    assert [p.false_alarms_per_h for p in points] == pytest.approx([0, 0, 0.5, 1.0, 1.5, 2.0], abs=0.5)
+    rates = [point.false_alarms_per_h for point in points]
+    assert rates == sorted(rates)
+    assert points[0].detection_rate == 0.5
+    assert points[1].detection_rate == 1.0
+
+
+def test_the_matched_level_is_the_most_sensitive_one_allowed():
+    assert matched(_traces()).level == 0.7
+    assert matched(_traces(), 0.51).level == 0.6
+    assert point_at(_traces(), 0.1).detection_rate == 1.0  # of the one flight without an earlier alarm

@@ -1,0 +1,127 @@
+"""The fault mismatch function against brute force, and its promises against flights."""
+
+import csv
+import json
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from typer.testing import CliRunner
+
+from beaver_ftc.cli.main import app
+from beaver_ftc.errors import BadInput
+from beaver_ftc.loop.loop import fly
+from beaver_ftc.studies.detectability import survey as surveying
+from beaver_ftc.studies.detectability.excitation import SETTLED_S, excitation
+from beaver_ftc.studies.detectability.mismatch import (
+    best_in_window,
+    detection_magnitude,
+    exclusion_magnitude,
+    mismatch,
+)
+from beaver_ftc.studies.detectability.output import as_csv, draw
+from beaver_ftc.studies.detectability.survey import EXCITATIONS, FAULTS, at, judge, survey
+from flying import loss, scenario
+
+moments = st.lists(st.floats(-1, 1), min_size=3, max_size=3)
+bounds = st.lists(st.floats(0.01, 0.5), min_size=3, max_size=3)
+
+
+def _rows(*vectors):
+    return [np.array([vector]) for vector in vectors]
+
+
+@settings(max_examples=200)
+@given(moments, moments, bounds)
+def test_mismatch_is_the_least_over_every_parameter_of_the_other_fault(z, other, bound):
+    shares = np.linspace(0, 1, 2001)[:, None]
+    brute = np.abs((np.array(z) - shares * np.array(other)) / (2 * np.array(bound))).max(axis=1).min()
+    found = mismatch(*_rows(z, other, bound))[0]
+    assert found <= brute + 1e-12
+    assert found == pytest.approx(brute, abs=0.05)  # the grid's step, 1/2000, over twice the smallest bound
+
+
+@given(moments, moments, bounds)
+def test_from_the_exclusion_magnitude_on_the_other_fault_is_excluded(z, other, bound):
+    z, other, bound = _rows(z, other, bound)
+    least = exclusion_magnitude(z, other, bound)[0]
+    for magnitude in (0.3, 0.7, 1.0):
+        certain = mismatch(magnitude * z, other, bound)[0] > 1.0
+        assert certain == (magnitude >= least) or abs(magnitude - least) < 1e-4
+
+
+@given(moments, bounds)
+def test_no_fault_at_all_is_the_other_fault_with_no_moment(z, bound):
+    z, nothing, bound = _rows(z, [0, 0, 0], bound)
+    detected, excluded = detection_magnitude(z, bound)[0], exclusion_magnitude(z, nothing, bound)[0]
+    assert excluded == pytest.approx(detected, rel=1e-3, abs=1e-4) or (
+        detected > 0.9999 and excluded > 0.9999
+    )
+
+
+def test_best_in_window_looks_ahead():
+    assert best_in_window(np.array([3.0, 1.0, 2.0, 5.0]), 2).tolist() == [1.0, 1.0, 2.0]
+
+
+@pytest.fixture(scope="module")
+def flight():
+    return scenario(duration_s=14)
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_fault_a_little_larger_is_found_in_time_whatever_the_uncertainty(flight, fault):
+    """The map follows from the healthy flight; one with the fault must agree where it is sharpest."""
+    seen = excitation(flight)
+    least = best_in_window(detection_magnitude(seen.moment[FAULTS[fault]], seen.bound), 50)
+    start = int(np.argmin(least))
+    struck_s, magnitude = SETTLED_S + start * seen.dt, 1.1 * least[start]
+    flown = fly(
+        flight.model_copy(update={"faults": scenario(faults=[loss(fault, magnitude, struck_s)]).faults})
+    )
+    assert flown.guaranteed_delay_s <= 0.5 + 1e-9
+    assert flown.detection_time_s - struck_s <= 0.5 + 1e-9
+
+
+def test_more_excitation_makes_smaller_faults_certain(flight):
+    medians = [
+        judge(excitation(at(flight, 45, 1000, scale)), "aileron")["detected_median"]
+        for scale in (0.5, 1.0, 2.0)
+    ]
+    assert medians == sorted(medians, reverse=True)
+
+
+def test_isolation_is_never_easier_than_detection(flight):
+    for fault in FAULTS:
+        row = judge(excitation(flight), fault)
+        if row["isolated"] is not None:
+            assert row["isolated"] >= row["detected"] - 1e-4
+        assert row["confused_with"] != fault
+
+
+def test_what_cannot_be_trimmed_is_said_not_dropped(flight):
+    rows = survey(flight, speeds_mps=[45.0, 21.0], altitudes_m=[1000.0], excitations=[1.0])
+    assert len(rows) == 2 * len(FAULTS)
+    assert all(row["detected"] is None and row["why"] for row in rows[len(FAULTS) :])
+
+
+def test_another_scheme_is_refused(flight):
+    with pytest.raises(BadInput, match="sharpened scheme"):
+        survey(scenario(fdi={"thresholds": "published"}))
+
+
+def test_csv_and_map_hold_every_point(flight):
+    rows = survey(flight, speeds_mps=[45.0], altitudes_m=[0.0, 2000.0], excitations=[0.5, 1.0])
+    assert len(list(csv.DictReader(as_csv(rows).splitlines()))) == len(rows) == 2 * 2 * len(FAULTS)
+    assert len([axes for axes in draw("x", rows).axes if axes.get_title()]) == 2 * len(FAULTS)
+
+
+def test_the_command_leaves_map_csv_and_json(tmp_path, monkeypatch):
+    monkeypatch.setattr(surveying.survey, "__defaults__", ([45.0], [1000.0], EXCITATIONS[2:3], None))
+    asked = ["detectability", "fault-free", "--out", str(tmp_path), "--format", "json"]
+    result = CliRunner().invoke(app, asked)
+    assert result.exit_code == 0
+    document = json.loads(result.stdout)
+    folder = tmp_path / "fault-free-detectability"
+    assert json.loads((folder / "detectability.json").read_text())["points"] == document["points"]
+    assert {file.suffix for file in folder.iterdir()} == {".json", ".csv", ".png"}

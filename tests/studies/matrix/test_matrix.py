@@ -1,0 +1,112 @@
+"""The fault matrix: the bars of every fault type, flown."""
+
+import json
+
+import pytest
+
+from beaver_ftc.design.coefficients import SURFACES
+from beaver_ftc.studies.matrix.cases import AIRSPEEDS_MPS, FAULTS, cases
+from beaver_ftc.studies.matrix.flying import fly_case, verdict
+from beaver_ftc.studies.matrix.run import run_matrix
+from beaver_ftc.studies.matrix.text import as_text
+
+ALLOWED_S = {"aileron": 0.5, "elevator": 0.5, "rudder": 1.0}
+PERIODS_S = {"1 rad/s": 6.283, "5 rad/s": 1.257, "10 rad/s": 0.628}
+
+
+@pytest.fixture(scope="module")
+def matrix(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("matrix")
+    return run_matrix(folder), folder / "fault-matrix"
+
+
+def flights(matrix, *words, surfaces=tuple(ALLOWED_S)):
+    rows = [
+        row
+        for row in matrix[0]["flights"]
+        if row["surface"] in surfaces and any(row["fault"].startswith(word) for word in words)
+    ]
+    assert rows
+    return rows
+
+
+def test_every_type_on_every_surface_at_every_speed_is_flown(matrix):
+    assert len(matrix[0]["flights"]) == len(FAULTS) * len(SURFACES) * len(AIRSPEEDS_MPS)
+    assert {cell["surface"] for cell in matrix[0]["cells"]} == set(SURFACES)
+
+
+def test_no_false_alarm_no_wrong_surface_no_wrong_type(matrix):
+    assert matrix[0]["false_alarms"] == 0
+    assert [row for row in matrix[0]["flights"] if row["verdict"] == "WRONG"] == []
+    assert matrix[0]["passed"]
+
+
+def test_detected_in_time(matrix):
+    for row in flights(matrix, "40 %", "total", "stuck", "hardover", "float", "bias"):
+        assert row["delay_s"] <= ALLOWED_S[row["surface"]], row
+
+
+def test_an_oscillation_is_detected_within_three_periods(matrix):
+    """The published Airbus benchmark's demand [Goupil2010]."""
+    for row in flights(matrix, "oscillation", surfaces=SURFACES):
+        period_s = next(period for name, period in PERIODS_S.items() if row["fault"].endswith(f" {name}"))
+        assert row["delay_s"] <= 3 * period_s, row
+
+
+def test_the_surface_is_named_for_aileron_and_rudder_jams_and_biases(matrix):
+    for row in flights(matrix, "stuck", "bias", "hardover", "float", surfaces=("aileron", "rudder")):
+        assert row["isolated"] == row["surface"], row
+
+
+def test_nothing_is_lost_that_the_oracle_keeps(matrix):
+    assert matrix[0]["lost_though_the_oracle_was_not"] == []
+
+
+def test_tracking_is_at_most_twice_the_oracles(matrix):
+    for row in flights(matrix, "40 %", "stuck", "float", "bias", "oscillation", surfaces=SURFACES):
+        assert row["ratio"] <= 2.0, row
+
+
+def test_where_the_aircraft_is_lost_the_report_says_why(matrix):
+    for cell in matrix[0]["cells"]:
+        assert ("lost in" in cell["remark"]) == (cell["lost"] > 0)
+
+
+def test_what_is_written_is_what_was_found(matrix):
+    document, folder = matrix
+    assert json.loads((folder / "fault-matrix.json").read_text()) == json.loads(json.dumps(document))
+    assert (folder / "fault-matrix.txt").read_text() == as_text(document) + "\n"
+    assert (folder / "fault-matrix.png").stat().st_size > 10_000
+
+
+def test_a_row_is_the_same_flown_alone(matrix):
+    case = cases((45.0,))[9]
+    assert fly_case(case) in matrix[0]["flights"]
+
+
+class TestVerdict:
+    def of(self, fault, kind, candidates=(), detected=True, false_alarm=False, true_type="stuck"):
+        document = {
+            "detection": {"detected": detected},
+            "false_alarm": false_alarm,
+            "isolation": {
+                "fault": fault,
+                "type": kind,
+                "candidates": list(candidates),
+                "type_correct": None if kind is None else kind == true_type,
+            },
+        }
+        return verdict(document, "elevator", true_type)
+
+    def test_each(self):
+        assert self.of("elevator", "stuck", ["stuck"]) == "named"
+        assert self.of("elevator", None, ["stuck", "float"]) == "surface"
+        assert self.of(None, None, ["elevator:stuck", "flap:stuck"]) == "open"
+        assert self.of(None, None, detected=False) == "unseen"
+
+    def test_what_is_wrong(self):
+        assert self.of("rudder", "stuck", ["stuck"]) == "WRONG"
+        assert self.of("elevator", "bias", ["bias"]) == "WRONG"
+        assert self.of("elevator", None, ["bias"]) == "WRONG"
+        assert self.of(None, None, ["flap:stuck"]) == "WRONG"
+        assert self.of("elevator", "stuck", ["stuck"], false_alarm=True) == "WRONG"

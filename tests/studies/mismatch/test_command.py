@@ -1,0 +1,205 @@
+"""`beaver-ftc mismatch` as its users meet it: documents, files, variants, the map, mistakes."""
+
+import csv
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from beaver_ftc.errors import BadInput
+from beaver_ftc.results.log import read
+from beaver_ftc.studies.mismatch import envelope
+from beaver_ftc.studies.mismatch.sources import SOURCES
+from beaver_ftc.studies.mismatch.variants import VARIANTS, variant_of
+from flying import loss, scenario
+
+SHORT = """
+name: short
+duration_s: 4
+reference: {q: [{sine: {amplitude_deg_s: 3, frequency_hz: 0.5}}]}
+faults: [{actuator: elevator, type: loss_of_effectiveness, magnitude: 0.4, at_s: 2}]
+uncertainty: {coefficients: {Cm_alpha: 1.01, Cl_p: 0.98}}
+"""
+
+
+def beaver(folder, *arguments):
+    command = [sys.executable, "-c", "from beaver_ftc.cli.main import main; main()"]
+    return subprocess.run([*command, *arguments], cwd=folder, capture_output=True, text=True, check=False)
+
+
+@pytest.fixture(scope="module")
+def flown_folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("mismatch")
+    (folder / "short.yaml").write_text(SHORT)
+    done = beaver(folder, "mismatch", "short.yaml", "--out", "out", "--format", "json")
+    assert done.returncode == 0, done.stderr
+    return folder, json.loads(done.stdout)
+
+
+def test_the_document_has_every_source_of_every_axis(flown_folder):
+    _, found = flown_folder
+    for axis in "pqr":
+        assert list(found["axes"][axis]) == [*SOURCES, "unexplained", "total"]
+        for of in found["axes"][axis].values():
+            assert {"rms", "max", "share", "bound_share"} <= set(of)
+            assert of["rms"] <= of["max"] + 1e-18
+    assert set(found["axes"]["q"]["coefficients"]["parts"]) == {"Cm_alpha", "Cl_p"}
+    assert list(found["axes"]["q"]["fault"]["parts"]) == ["elevator loss of effectiveness at 2 s"]
+    assert found["axes"]["q"]["unexplained"]["share"] <= 0.01
+    assert set(found["linear"]["modes"]) == {"short_period", "phugoid", "roll", "dutch_roll", "spiral"}
+    assert found["recommended"]["constant_rad_s2"].keys() == {"p", "q", "r"}
+
+
+def test_the_document_agrees_with_the_frames_file(flown_folder):
+    folder, found = flown_folder
+    frames = read(folder / "out" / "short" / "mismatch.parquet")
+    for axis in "pqr":
+        total = frames[f"{axis}_total_rad_s2"]
+        parts = sum(frames[f"{axis}_{name}_rad_s2"] for name in (*SOURCES, "unexplained"))
+        assert total == pytest.approx(parts, abs=1e-12)
+        for name in (*SOURCES, "total"):
+            values = frames[f"{axis}_{name}_rad_s2"]
+            assert found["axes"][axis][name]["rms"] == pytest.approx(np.sqrt(np.mean(values**2)), rel=1e-9)
+            assert found["axes"][axis][name]["max"] == pytest.approx(np.abs(values).max(), rel=1e-12)
+
+
+def test_the_folder_holds_a_run_and_its_mismatch(flown_folder):
+    folder, found = flown_folder
+    result = folder / "out" / "short"
+    names = {path.name for path in result.iterdir()}
+    assert names == {
+        "scenario.yaml", "metrics.json", "log.parquet", "report.html", "figures",
+        "mismatch.json", "mismatch.csv", "mismatch.parquet",
+    }  # fmt: skip
+    kept = json.loads((result / "mismatch.json").read_text())
+    assert kept == {key: value for key, value in found.items() if key != "folder"}
+    with (result / "mismatch.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    total = next(row for row in rows if row["axis"] == "q" and row["source"] == "total")
+    assert float(total["rms_rad_s2"]) == found["axes"]["q"]["total"]["rms"]
+    for name in ("sources", "bound", "linear", "zeros", "response"):
+        assert (result / "figures" / f"mismatch-{name}.png").stat().st_size > 10_000
+
+
+def test_the_report_has_a_section_of_it(flown_folder):
+    folder, _ = flown_folder
+    page = (folder / "out" / "short" / "report.html").read_text()
+    assert "Truth against design: short" in page
+    assert page.count("data:image/png;base64,") >= 4
+
+
+def test_a_run_without_mismatch_has_no_such_section(tmp_path):
+    from beaver_ftc.studies.mismatch.section import mismatch_section
+
+    assert mismatch_section(tmp_path) == ""
+
+
+def test_a_bound_of_nothing_is_no_trouble(tmp_path):
+    """A design so good that nothing is admitted: shares of nothing are null, in words `no bound`."""
+    nothing = "fdi: {bounds: {constant_rad_s2: {p: 0, q: 0, r: 0}, inertia_coupling: {p: 0, q: 0, r: 0}}}\n"
+    (tmp_path / "short.yaml").write_text(SHORT + nothing)
+    done = beaver(tmp_path, "mismatch", "short.yaml", "--out", "out")
+    assert done.returncode == 0, done.stderr
+    found = json.loads((tmp_path / "out" / "short" / "mismatch.json").read_text())
+    assert found["bound"]["q"]["exceeded_times"] >= 1
+    assert found["recommended"]["constant_rad_s2"]["q"] > 0.0
+
+
+def test_variants_are_flown_side_by_side(tmp_path):
+    (tmp_path / "short.yaml").write_text(SHORT)
+    done = beaver(
+        tmp_path,
+        "mismatch",
+        "short.yaml",
+        "--out",
+        "out",
+        "--no-report",
+        "--variant",
+        "declared,engine-neglected,mass=1.2",
+    )
+    assert done.returncode == 0, done.stderr
+    assert "short-engine-neglected" in done.stdout
+    comparison = json.loads((tmp_path / "out" / "mismatch-comparison" / "mismatch.json").read_text())
+    assert [run["scenario"] for run in comparison["runs"]] == [
+        "short",
+        "short-engine-neglected",
+        "short-mass-1-2",
+    ]
+    plain, neglected, _ = comparison["runs"]
+    assert neglected["q_worst_ratio"] > 5 * plain["q_worst_ratio"]
+    assert neglected["dominant"] == "engine"
+    assert comparison["recommended"]["constant_rad_s2"]["q"] >= neglected["q_smallest_constant_rad_s2"]
+
+
+@pytest.mark.parametrize(
+    ("variant", "says"),
+    [("nonsense", "no such variant"), ("mass=heavy", "is no value"), ("mas=1.1", "mas"),
+     ("mass=1000", "mass"), ("declared,declared", "twice"),
+     ("coefficients.Cm_alpa=0.9", "unknown aerodynamic term")],
+)  # fmt: skip
+def test_a_wrong_variant_is_bad_input_of_one_line(tmp_path, variant, says):
+    (tmp_path / "short.yaml").write_text(SHORT)
+    done = beaver(tmp_path, "mismatch", "short.yaml", "--variant", variant)
+    assert done.returncode == 2
+    assert says in done.stderr
+    assert len(done.stderr.splitlines()) == 1
+    assert done.stdout == ""
+
+
+def test_an_unknown_scenario_is_bad_input_in_json_too(tmp_path):
+    done = beaver(tmp_path, "mismatch", "no-such-scenario", "--format", "json")
+    assert done.returncode == 2
+    assert json.loads(done.stdout) == {"runs": [], "errors": done.stderr.splitlines()}
+    assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize("name", VARIANTS)
+def test_every_named_variant_is_a_valid_scenario_that_differs_in_its_design_model_alone(name):
+    base = scenario(faults=[loss()])
+    found = variant_of(base, name)
+    assert found.model_dump(exclude={"name", "design_model", "expect"}) == base.model_dump(
+        exclude={"name", "design_model", "expect"}
+    )
+    assert (found.design_model == base.design_model) == (name == "declared")
+
+
+def test_variants_join():
+    found = variant_of(scenario(), "linearised+coefficients.Cm_alpha=0.9+inertia.Ix=1.5").design_model
+    assert (found.linearised, found.coefficients, found.inertia.Ix) == (True, {"Cm_alpha": 0.9}, 1.5)
+
+
+def test_a_long_name_stays_a_valid_name():
+    base = scenario().model_copy(update={"name": "x" * 95})
+    assert len(variant_of(base, "engine-neglected").name) <= 100
+
+
+def test_the_map_covers_the_envelope_and_names_the_reason(monkeypatch, tmp_path):
+    monkeypatch.setattr(envelope, "AIRSPEEDS_MPS", (40.0, 50.0))
+    monkeypatch.setattr(envelope, "ALTITUDES_M", (500.0, 2500.0))
+    case = scenario(duration_s=2, faults=[loss(at_s=1)], design_model={"engine_terms": False})
+    entries = envelope.envelope_map(case)
+    assert len(entries) == 2 * 2 * 3
+    slow, fast = (
+        next(e for e in entries if e["axis"] == "q" and e["airspeed_mps"] == V and e["altitude_m"] == 500.0)
+        for V in (40.0, 50.0)
+    )
+    assert slow["dominant"] == fast["dominant"] == "engine"
+    assert slow["worst_ratio"] > fast["worst_ratio"] > 1.0  # the slipstream matters more at low speed
+    folder = envelope.write_map(tmp_path, case, entries, report=True)
+    assert (folder / "figures" / "mismatch-map.png").exists()
+    with (folder / "mismatch.csv").open() as file:
+        assert len(list(csv.DictReader(file))) == 12
+
+
+def test_where_there_is_no_trim_the_map_says_so(monkeypatch):
+    def refuses(case):
+        raise BadInput("no trim")
+
+    monkeypatch.setattr("beaver_ftc.studies.mismatch.run.tally_of_flight", refuses)
+    monkeypatch.setattr(envelope, "AIRSPEEDS_MPS", (40.0,))
+    monkeypatch.setattr(envelope, "ALTITUDES_M", (500.0,))
+    entries = envelope.envelope_map(scenario())
+    assert [entry["worst_ratio"] for entry in entries] == [None] * 3
+    assert envelope.map_figure(entries, "x") is not None

@@ -1,0 +1,221 @@
+"""The split on flights of JSBSim: it must account for all that was declared, and for nothing that was not."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from beaver_ftc.loop import loop
+from beaver_ftc.plant.adapter import Plant
+from beaver_ftc.plant.configure import configure
+from beaver_ftc.plant.state import FlightState
+from beaver_ftc.scenario.builtin import builtin_names
+from beaver_ftc.scenario.loader import load_scenario
+from beaver_ftc.studies.mismatch.run import tally_of_flight
+from beaver_ftc.studies.mismatch.sources import SOURCES
+from beaver_ftc.studies.mismatch.split import split
+from beaver_ftc.studies.mismatch.variants import variant_of
+from flying import PUBLISHED_UNCERTAINTY, flown, loss, scenario
+
+PUBLISHED_BOUND = 0.02  # rad/s2
+ROUNDING = 5e-8  # rad/s2: what unit conversions and rounding of the aircraft's XML may leave
+NOTHING = {"inertia_coupling": {"p": 0, "q": 0, "r": 0}, "sinusoid": {}}
+
+
+def stretch_of(case, log):
+    """The whole flight in one stretch, its last row left out."""
+    first, _ = split(case, [{name: log[name] for name in log.columns}])
+    return first
+
+
+def split_flight(**keys):
+    case = scenario(**keys)
+    _, log = flown(**keys)
+    return stretch_of(case, log)
+
+
+def largest(values):
+    return float(np.abs(values).max())
+
+
+STILL_AIR = [name for name in builtin_names() if load_scenario(name).environment.severity is None]
+
+
+@pytest.mark.parametrize("name", STILL_AIR)
+def test_unexplained_is_at_most_one_percent_of_every_built_in_scenario(name):
+    kept, _ = tally_of_flight(load_scenario(name))
+    assert (kept.rms("unexplained") <= 0.01 * kept.rms("total")).all()
+    assert kept.figures["unexplained"].largest.max() <= 1e-6
+
+
+@pytest.mark.parametrize(
+    "initial", [{}, {"airspeed_mps": 33, "altitude_m": 500, "flap_deg": 10}, {"airspeed_mps": 54}]
+)
+def test_with_nothing_declared_truth_and_design_differ_by_the_earth_alone(initial):
+    found = split_flight(uncertainty=NOTHING, initial=initial, duration_s=10)
+    assert largest(found.total) <= 0.02 * PUBLISHED_BOUND
+    assert largest(found.unexplained) <= 0.02 * PUBLISHED_BOUND
+    assert largest(found.unexplained) <= ROUNDING
+    others = [name for name in SOURCES if name not in ("earth_rotation", "integration")]
+    assert all(largest(found.contributions[name]) == 0.0 for name in others)
+
+
+DECLARED = {
+    "coefficients": {
+        "uncertainty": {"coefficients": {"Cm_alpha": 1.1, "Cl_p": 0.9, "Cn_dpt3": 1.5, "CZ_alpha": 1.05}}
+    },
+    "engine": {"design_model": {"engine_terms": False}},
+    "simplification": {"design_model": {"linearised": True, "frozen_alpha": True}},
+    "inertia": {"design_model": {"mass": 1.1, "inertia": {"Ix": 0.8, "Jxz": 3.0}}},
+    "inertia_coupling": {"uncertainty": {"inertia_coupling": {"p": 0.2, "q": -0.2, "r": 0.2}}},
+    "sinusoids": {"uncertainty": {"sinusoid": {"q": {"amplitude_rad_s2": 0.02, "frequency_rad_s": 15}}}},
+    "actuators": {"actuators": "servo"},
+    "fault": {"faults": [loss(at_s=4)]},
+}
+
+
+@pytest.mark.parametrize(("source", "keys"), DECLARED.items())
+def test_each_declaration_shows_in_its_own_source_alone_and_leaves_nothing(source, keys):
+    found = split_flight(**{"uncertainty": NOTHING, "duration_s": 8, **keys})
+    assert largest(found.contributions[source]) > 1e-5
+    allowed = {source, "earth_rotation", "integration"}
+    assert all(largest(found.contributions[name]) == 0.0 for name in SOURCES if name not in allowed)
+    assert largest(found.unexplained) <= ROUNDING
+
+
+def test_a_coarse_frame_means_the_mismatch_over_its_jsbsim_frames():
+    """A sinusoid at the frame's start, and its mean over five JSBSim frames: the rest is integration."""
+    wave = {"sinusoid": {"q": {"amplitude_rad_s2": 0.02, "frequency_rad_s": 15}}}
+    found = split_flight(uncertainty=wave, substeps=5, duration_s=4)
+    within = found.t_s[:, None] + np.arange(5) / 500
+    mean = (0.02 * np.sin(15 * within)).mean(axis=1)
+    assert found.total[:, 1] == pytest.approx(mean, abs=2e-5)
+    integration = mean - 0.02 * np.sin(15 * found.t_s)
+    assert found.contributions["integration"][:, 1] == pytest.approx(integration, abs=2e-5)
+    assert largest(found.unexplained) <= ROUNDING
+
+
+FAULTS = {
+    "jam, repaired": [{"type": "stuck", "actuator": "elevator", "at_s": 3, "end_s": 5}],
+    "runaway": [{"type": "hardover", "actuator": "aileron", "at_s": 3, "end_s": 3.4}],
+    "float and incipient loss": [
+        {"type": "float", "actuator": "rudder", "at_s": 3},
+        loss("aileron", 0.5, 4.0, profile="incipient", kappa_per_s=0.5),
+    ],
+    "all on the elevator": [
+        {"type": "bias", "actuator": "elevator", "bias_deg": 2, "at_s": 3},
+        {"type": "oscillatory", "actuator": "elevator", "amplitude_deg": 1, "frequency_rad_s": 6, "at_s": 4},
+        loss(magnitude=0.3, at_s=3.5),
+        loss(magnitude=0.2, at_s=5),
+    ],
+    "slow actuator, and the unanticipated growing": [
+        {"type": "rate_limit", "actuator": "elevator", "scale": 0.005, "at_s": 3},
+        {"type": "unanticipated", "Cm_alpha3": 5, "at_s": 4, "profile": "incipient", "kappa_per_s": 1},
+    ],
+}
+
+
+@pytest.mark.parametrize("actuators", ["ideal", "servo"])
+@pytest.mark.parametrize("faults", FAULTS.values(), ids=FAULTS)
+def test_every_fault_is_accounted_for_part_by_part(faults, actuators):
+    found = split_flight(uncertainty=NOTHING, faults=faults, actuators=actuators, duration_s=7)
+    parts = found.parts["fault"]
+    assert len(parts) == len(faults)
+    assert all(largest(part) > 1e-4 for part in parts.values())
+    assert sum(parts.values()) == pytest.approx(found.contributions["fault"], abs=1e-15)
+    before = found.t_s < 3.0 - 1e-9
+    assert all(largest(part[before]) == 0.0 for part in parts.values())
+    assert largest(found.unexplained) <= ROUNDING
+
+
+def test_faults_with_wrong_inertia_and_unanticipated_moment_leave_nothing():
+    found = split_flight(
+        faults=[{"type": "unanticipated", "Cm_alpha3": 8, "at_s": 2}],
+        design_model={"inertia": {"Iy": 1.3}}, duration_s=6,
+    )  # fmt: skip
+    assert largest(found.unexplained) <= ROUNDING
+
+
+def test_what_nobody_declared_is_unexplained(monkeypatch):
+    """Tamper with the truth behind the scenario's back: Cm_alpha 10 % up shows, and nowhere else."""
+
+    def tampered(plant, case):
+        configure(plant, case)
+        plant.write("uncertainty/Cm_alpha-scale", 1.1)
+
+    monkeypatch.setattr(loop, "configure", tampered)
+    keys = {"uncertainty": NOTHING, "duration_s": 5}
+    _, log = flown(**keys)
+    found = stretch_of(scenario(**keys), log)
+    term = 0.1 * -0.6028 * log["alpha_rad"] * log["qdyn_pa"] * 23.23 * 1.5875 / 6928.93
+    assert found.unexplained[:, 1] == pytest.approx(term[:-1], abs=ROUNDING)
+    assert largest(found.unexplained[:, [0, 2]]) <= ROUNDING
+
+
+@pytest.mark.parametrize("name", ["Cm_alpha2", "Cl_beta", "Cn_q", "Cl_daa", "Cm_df", "Cl_a2dpt"])
+def test_a_term_is_what_jsbsim_makes_of_it(name):
+    """JSBSim's acceleration with the term up by a half, less that without, at one state."""
+    from beaver_ftc.studies.mismatch.sources import Case, coefficient_errors
+    from beaver_ftc.studies.mismatch.states import States
+
+    case = scenario(uncertainty={"coefficients": {name: 1.5}})
+    state = FlightState(
+        41.0, 900.0, alpha_rad=0.17, beta_rad=0.09, p_rad_s=0.3, q_rad_s=-0.2, r_rad_s=0.25, aileron_rad=0.2,
+        elevator_rad=-0.1, rudder_rad=0.1, flap_rad=0.3,
+    )  # fmt: skip
+    accelerations = []
+    for which in (case, scenario(uncertainty=NOTHING)):
+        plant = Plant(100)
+        configure(plant, which)
+        plant.start(state)
+        accelerations.append([plant.read(f"accelerations/{axis}dot-rad_sec2") for axis in "pqr"])
+    qdyn, dpt = plant.read("aero/qbar-psf") * 47.88025898033584, plant.read("aero/dpt")
+    y = np.array([[0.17, 0.09, 41.0, qdyn, dpt]])
+    x, u, none = np.array([[0.3, -0.2, 0.25]]), np.array([[0.2, -0.1, 0.1, 0.3]]), np.zeros((1, 3))
+    states = States(np.zeros(1), x, x, x, y, y, u, u, u, none, none, np.zeros(1), np.zeros(1), none, none)
+    found = coefficient_errors(Case.of(case, states), states)
+    assert list(found) == [name]
+    assert found[name][0] == pytest.approx(np.subtract(*accelerations), rel=1e-6, abs=1e-9)
+
+
+def test_the_split_does_not_depend_on_the_pieces_the_log_comes_in():
+    keys = {"actuators": "servo", "faults": [loss(at_s=2)], "duration_s": 4}
+    case = scenario(**keys)
+    _, log = flown(**keys)
+    edges = [0, 1, 2, 150, 151, 399, 400]
+    pieces = [{name: log[name][a:b] for name in log.columns} for a, b in pairwise(edges)]
+    joined, whole = list(split(case, pieces)), list(split(case, [{name: log[name] for name in log.columns}]))
+    for name in SOURCES:
+        together = [np.concatenate([s.contributions[name] for s in parts]) for parts in (joined, whole)]
+        assert np.array_equal(*together)
+    assert np.array_equal(np.concatenate([s.t_s for s in joined]), log["t_s"])
+
+
+def test_total_is_jsbsims_acceleration_less_f_and_G_u():
+    """One JSBSim frame a frame: what the log's own columns say, but for the Earth within a frame."""
+    keys = {"faults": [loss(at_s=2)], "duration_s": 4}
+    _, log = flown(**keys)
+    found = stretch_of(scenario(**keys), log)
+    for i, axis in enumerate("pqr"):
+        assert found.total[:, i] == pytest.approx(
+            log[f"{axis}dot_rad_s2"][:-1] - log[f"{axis}_design_rad_s2"][1:], abs=1e-7
+        )
+
+
+def test_neglecting_the_engine_is_the_dominant_source_of_the_published_case_and_alarms_falsely():
+    case = load_scenario("engine-neglected")
+    kept, flown_as = tally_of_flight(case)
+    shares = {name: kept.figures[name].bound_share[1] for name in SOURCES if name != "fault"}
+    assert max(shares, key=shares.get) == "engine"
+    assert shares["engine"] > 10.0
+    assert flown_as["false_alarm"]
+    assert not tally_of_flight(variant_of(case, "engine_terms=true"))[1]["false_alarm"]
+
+
+def test_the_published_uncertainty_is_split_as_declared():
+    found = split_flight(duration_s=6)
+    for i, axis in enumerate("pqr"):
+        wave = PUBLISHED_UNCERTAINTY["sinusoid"][axis]
+        expected = wave["amplitude_rad_s2"] * np.sin(wave["frequency_rad_s"] * found.t_s)
+        assert found.contributions["sinusoids"][:, i] == pytest.approx(expected, abs=1e-12)
+    assert largest(found.contributions["inertia_coupling"]) > 1e-5

@@ -1,0 +1,95 @@
+"""The test that is told the fault: against one big Gaussian problem, and against counting."""
+
+from dataclasses import replace
+from statistics import NormalDist
+
+import numpy as np
+import pytest
+
+from beaver_ftc.loop.loop import Loop
+from beaver_ftc.studies.compare.replay import Recorder, record
+from beaver_ftc.studies.power.grid import Bout, Condition, loss, scenario_of, strikes_at_s
+from beaver_ftc.studies.power.limit import UNEXPLAINED_S, Whitening, chance, deflections
+
+DT = 0.01
+LIGHT = Condition("tactical-grade", "light")
+
+
+@pytest.fixture(scope="module")
+def context():
+    return Loop(scenario_of(Bout(LIGHT, 3.0, 1), 1.0), Recorder()).plugged.detector.context
+
+
+def covariance(context, n):
+    """Of the measured rates of n frames, (3 n, 3 n), the first of them known as well as it is measured."""
+    declared = context.declared
+    k = np.arange(n)
+
+    def process(sigma, time_s):
+        return sigma**2 * np.exp(-np.abs(k[:, None] - k[None, :]) * DT / time_s)
+
+    accelerations = np.zeros((3, n, 3, n))
+    for j in range(3):
+        gust = process(declared.gust_rad_s[j], declared.gust_time_s[j])
+        effect = declared.gust_effect[:, j]
+        accelerations += np.einsum("a,b,kl->akbl", effect, effect, gust)
+        unexplained = process(context.constant_rad_s2[j] / np.sqrt(2.0), UNEXPLAINED_S)
+        accelerations[j, :, j] += unexplained + declared.model_rad_s2[j] ** 2 * np.eye(n)
+    summed = DT * np.tril(np.ones((n, n)), -1)
+    rates = np.einsum("kl,albm,nm->akbn", summed, accelerations, summed)
+    for i in range(3):
+        gyro = declared.gyro_rad_s[i] ** 2 + 1e-10
+        rates[i, :, i] += gyro * np.eye(n) + gyro  # noise, and where it began
+    return rates.reshape(3 * n, 3 * n)
+
+
+def test_the_deflection_is_that_of_the_whole_flight_at_once(context):
+    before, after = 150, 40
+    rng = np.random.default_rng(4)
+    phi = np.cumsum(rng.normal(size=(after, 3)), axis=0) * [0.1, 0.03, 0.02]
+    mean = np.zeros((3, before + after))
+    mean[:, before:] = DT * np.cumsum(phi, axis=0).T
+    C = covariance(context, before + after)
+    expected = np.sqrt(mean.ravel() @ np.linalg.solve(C, mean.ravel()))
+    assert Whitening(context).deflection(phi)[-1] == pytest.approx(expected, rel=0.01)
+
+
+def test_twice_the_fault_stands_out_twice_as_much_and_only_grows(context):
+    phi = np.random.default_rng(0).normal(size=(50, 3))
+    whitening = Whitening(context)
+    d = whitening.deflection(phi)
+    assert whitening.deflection(2.0 * phi) == pytest.approx(2.0 * d)
+    assert (np.diff(d) >= 0.0).all()
+
+
+def test_rougher_air_hides_more(context):
+    phi = np.full((100, 3), 0.1)
+    rough = replace(context, declared=replace(context.declared, gust_rad_s=3.0 * context.declared.gust_rad_s))
+    still = replace(context, declared=replace(context.declared, gust_rad_s=np.zeros(3)))
+    found = [Whitening(one).deflection(phi)[-1] for one in (rough, context, still)]
+    assert found[0] < 0.6 * found[1] < 0.6 * found[2]
+
+
+def test_of_a_flight_it_takes_what_the_surface_gave(context):
+    bout = Bout(LIGHT, 6.0, 2)
+    at_s = strikes_at_s(bout)
+    recording = record(scenario_of(bout, at_s + 1.0, [loss("elevator", 0.7, at_s)]))
+    seen = [measured for measured, _ in recording.seen]
+    frames = round(at_s * 100)
+    effect = np.array([-0.7 * measured.contribution[:, 1] for measured in seen[frames + 1 :]])
+    d = Whitening(recording.context).deflection(effect)
+    assert deflections(recording, "elevator", 0.7, (0.5, 1.0)) == pytest.approx([d[49], d[-1]])
+    assert not effect[:, [0, 2]].any()
+
+
+def test_chance_is_what_throwing_the_noise_counts():
+    """The likelihood ratio of a known shift d is normal about d: counted at the level that noise exceeds so
+    often."""
+    rng = np.random.default_rng(1)
+    per_h, within_s, d = 36.0, 5.0, 2.0
+    level = np.quantile(rng.normal(size=400_000), 1.0 - per_h * within_s / 3600.0)
+    counted = np.mean(d + rng.normal(size=400_000) > level)
+    assert chance(d, within_s, per_h) == pytest.approx(counted, abs=0.01)
+    assert chance(0.0, within_s, per_h) == pytest.approx(per_h * within_s / 3600.0)
+    assert chance(5.0, within_s, 0.0) == 0.0
+    assert chance(NormalDist().inv_cdf(1.0 - 0.05), within_s, per_h) == pytest.approx(0.5)

@@ -1,0 +1,300 @@
+"""The survey of detection probability: its flights, its levels, its counts, and what the command writes."""
+
+import json
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from typer.testing import CliRunner
+
+from beaver_ftc.cli.main import app
+from beaver_ftc.errors import BadInput
+from beaver_ftc.studies.compare.replay import Trace, record
+from beaver_ftc.studies.power.contenders import BUILT_IN, ESTIMATORS, Contender, contenders
+from beaver_ftc.studies.power.document import document_of
+from beaver_ftc.studies.power.flying import Watched, fly_faulted, with_fdi
+from beaver_ftc.studies.power.grid import GRIDS, Bout, Condition, loss, scenario_of, strikes_at_s
+from beaver_ftc.studies.power.levels import level_at, level_for
+from beaver_ftc.studies.power.limit import chance
+from beaver_ftc.studies.power.run import run_power
+from beaver_ftc.studies.power.tally import limit, rows_of, summary
+from beaver_ftc.studies.power.text import as_text, comparison
+
+STILL, LIGHT = Condition("ideal", "none"), Condition("tactical-grade", "light")
+SMALL = replace(
+    GRIDS["quick"],
+    conditions=(STILL, LIGHT),
+    surfaces=("aileron", "elevator"),
+    magnitudes=(0.5, 1.0),
+    excitations_deg_s=(3.0,),
+    bouts=2,
+    healthy_h=4 * 12.0 / 3600.0,
+    healthy_flight_s=12.0,
+    per_h=60.0,
+)
+
+
+@pytest.fixture(scope="module")
+def survey(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("power")
+    return run_power(folder, SMALL, contenders(["observer-constant"]), workers=2), folder / "power"
+
+
+class TestFlights:
+    def test_part_of_a_grid_flies_the_same_flights(self):
+        full = GRIDS["full"]
+        part = full.only("tactical-grade", "light")
+        assert part.faulted() == [bout for bout in full.faulted() if bout.condition == LIGHT]
+        assert part.healthy() == [bout for bout in full.healthy() if bout.condition == LIGHT]
+        assert full.only(None, None) == full
+        with pytest.raises(BadInput, match="allowed: tactical-grade, none; tactical-grade, light"):
+            GRIDS["quick"].only("ideal", None)
+
+    def test_everything_but_the_fault_follows_from_the_bout(self):
+        bout = Bout(LIGHT, 3.0, 7)
+        healthy, faulty = scenario_of(bout, 12.0), scenario_of(bout, 12.0, [loss("rudder", 0.4, 9.0)])
+        assert faulty.model_copy(update={"faults": ()}) == healthy
+        assert scenario_of(bout._replace(seed=8), 12.0).reference != healthy.reference
+
+    def test_seeds_are_the_same_in_every_condition_and_no_healthy_one_has_a_fault(self):
+        for grid in GRIDS.values():
+            by_condition = {
+                condition: {(b.excitation_deg_s, b.seed) for b in grid.faulted() if b.condition == condition}
+                for condition in grid.conditions
+            }
+            assert len({frozenset(bouts) for bouts in by_condition.values()}) == 1
+            seeds = {bout.seed for bout in grid.faulted() if bout.condition == grid.conditions[0]}
+            assert len(seeds) == grid.bouts * len(grid.excitations_deg_s)
+            assert not seeds & {bout.seed for bout in grid.healthy()}
+            assert {bout.excitation_deg_s for bout in grid.healthy()} == set(grid.excitations_deg_s)
+
+    @given(st.integers(0, 2_000_000), st.sampled_from([1.0, 3.0, 6.0]))
+    def test_the_truth_stays_within_what_is_declared(self, seed, excitation):
+        scenario = scenario_of(Bout(LIGHT, excitation, seed), 12.0)
+        assert scenario.warnings() == ()
+        frame = 100.0 * strikes_at_s(Bout(LIGHT, excitation, seed))
+        assert frame == pytest.approx(round(frame), abs=1e-9)
+        for axis in "pqr":
+            assert abs(getattr(scenario.uncertainty.inertia_coupling, axis)) <= 0.25
+            (signal,) = getattr(scenario.reference, axis)
+            assert signal.sine.amplitude_deg_s == excitation
+
+    def test_a_flight_is_the_same_until_its_fault_strikes(self):
+        bout = Bout(LIGHT, 3.0, 3)
+        at_s = strikes_at_s(bout)
+        flights = [
+            record(scenario_of(bout, at_s + 1.0, [loss(surface, 1.0, at_s)])).seen
+            for surface in ("aileron", "rudder")
+        ]
+        rates = [np.array([measured.x for measured, _ in seen]) for seen in flights]
+        frames = round(at_s * 100)
+        assert np.array_equal(rates[0][:frames], rates[1][:frames])
+        assert not np.array_equal(rates[0], rates[1])
+
+
+def healthy(*largest, flight_s=360.0):
+    return [Trace(value, (), faulted=False, healthy_s=flight_s) for value in largest]
+
+
+class TestLevels:
+    @given(
+        st.lists(st.floats(0.0, 1e6), min_size=2, max_size=40, unique=True),
+        st.floats(0.0, 12.0),
+    )
+    def test_no_more_alarms_than_allowed_and_no_lower_level_would_do(self, largest, per_h):
+        traces = healthy(*largest)
+        level = level_for(traces, per_h)
+        assert level.alarms <= max(per_h * level.hours, 0.0) + 1e-6
+        assert level.alarms == sum(value > level.level for value in largest)
+        below = [value for value in largest if value < level.level]
+        if below:
+            assert level_at(traces, max(below)).alarms > per_h * level.hours - 1e-6
+
+    def test_hours_and_limits_are_those_of_the_flights(self):
+        level = level_for(healthy(*range(20)), 2.0)  # two hours
+        assert (level.alarms, level.hours) == (4, 2.0)
+        assert level.level == 15
+        assert (level.per_h.low, level.per_h.high) == pytest.approx((1.0899 / 2, 10.2416 / 2), rel=1e-3)
+
+
+def watched(seed, **delays):
+    """A bout with one fault, a scheme a keyword: its delay at the level 2, or None."""
+    traces = {
+        scheme: [Trace(0.5, ((0.2, 1.5), *(((delay, 3.0),) if delay is not None else ())), True, 10.0)]
+        for scheme, delay in delays.items()
+    }
+    return Watched(Bout(STILL, 3.0, seed), (("rudder", 0.4),), traces, [[1.0, 2.0, 3.0]])
+
+
+class TestCounts:
+    def test_a_row_has_the_delay_at_the_common_level_and_at_the_schemes_own(self):
+        levels = {(*STILL, "a"): level_at(healthy(2.0), 2.0), (*STILL, "b"): level_at(healthy(0.4), 0.4)}
+        found, missed = rows_of([watched(1, a=0.7, b=0.7)], levels)
+        assert (found["delay_s"], found["own_delay_s"], found["false_alarm"]) == (0.7, 0.2, False)
+        assert (missed["delay_s"], missed["false_alarm"], missed["own_false_alarm"]) == (None, True, False)
+
+    def test_the_summary_counts_flights_that_were_still_silent(self):
+        rows = [
+            {"delay_s": delay, "false_alarm": early, "own_delay_s": 0.1, "own_false_alarm": False}
+            for delay, early in ((0.5, False), (0.9, False), (None, False), (4.0, False), (None, True))
+        ]
+        found = summary(rows)
+        assert found["flights"] == 4
+        assert [found["within"][s]["value"] for s in ("0.5", "1", "5")] == [0.25, 0.5, 0.75]
+        assert found["within"]["1"]["low"] < 0.5 < found["within"]["1"]["high"]
+        assert found["median_delay_s"] == 0.9
+        assert summary(rows, own=True)["within"]["0.5"]["value"] == 1.0
+        assert summary([rows[-1]])["flights"] == 0
+
+    def test_the_limit_counts_a_flight_once_however_many_schemes_watched_it(self):
+        levels = {(*STILL, scheme): level_at(healthy(2.0), 2.0) for scheme in "ab"}
+        far = watched(2, a=0.1)
+        far.deflections = [[100.0] * 3]
+        found = limit(rows_of([watched(1, a=0.7, b=0.7), far], levels), 36.0)
+        assert found["1"] == pytest.approx(0.5 * chance(2.0, 1.0, 36.0) + 0.5)
+
+    def test_flights_of_a_seed_count_once(self):
+        """Each of nine seeds brings two flights that both schemes share: nine throws of a coin, not 18."""
+        ours = next(iter(BUILT_IN))
+        both = [watched(seed, **{ours: 0.3, "x": None}) for seed in range(9) for _ in range(2)]
+        quiet = [replace_traces(watched(1_000_000, **{ours: None, "x": None}))]
+        document, _ = document_of(SMALL, quiet, both)
+        (duel,) = [duel for duel in document["comparison"] if duel["ours"] == ours]
+        assert (duel["seeds_ours"], duel["seeds_theirs"], duel["verdict"]) == (9, 0, "better")
+        assert duel["p"] == pytest.approx(2 / 512)
+        assert "is better than x: rudder" in comparison(document)[0]
+
+
+def replace_traces(one):
+    """The bout as a healthy one, whose statistic comes to 2."""
+    return Watched(one.bout, (), {scheme: healthy(2.0) for scheme in one.traces})
+
+
+class TestSurvey:
+    def test_every_scheme_has_watched_every_flight(self, survey):
+        document, folder = survey
+        rows = pq.read_table(folder / "power.parquet").to_pylist()
+        schemes = {*BUILT_IN, "observer-constant"}
+        assert len(rows) == 2 * 2 * 4 * len(schemes)
+        assert {row["scheme"] for row in rows} == schemes
+        assert len(document["cells"]) == 2 * 4 * len(schemes)
+        assert document["failures"] == []
+
+    def test_levels_hold_on_the_flights_they_were_set_on(self, survey):
+        for level in survey[0]["levels"]:
+            assert level["calibration"]["hours"] == pytest.approx(SMALL.healthy_h)
+            assert level["calibration"]["per_h"] <= SMALL.per_h
+            assert level["before_faults"]["hours"] > 0
+
+    def test_with_perfect_instruments_and_still_air_ours_finds_every_large_loss(self, survey):
+        cells = [
+            cell
+            for cell in survey[0]["cells"]
+            if (cell["sensors"], cell["scheme"], cell["magnitude"]) == ("ideal", ESTIMATORS, 1.0)
+        ]
+        assert [cell["within"]["1"]["value"] for cell in cells] == [1.0, 1.0]
+
+    def test_a_fault_found_sooner_is_also_found_later(self, survey):
+        watched = [total for total in survey[0]["totals"] if total["flights"]]  # no alarm before the fault
+        assert len(watched) > len(survey[0]["totals"]) / 2
+        for total in watched:
+            shares = [total["within"][s]["value"] for s in ("0.5", "1", "5")]
+            assert all(a <= b for a, b in pairwise(shares))
+
+    def test_what_is_written_is_what_was_found(self, survey):
+        document, folder = survey
+        assert json.loads((folder / "power.json").read_text()) == json.loads(json.dumps(document))
+        assert (folder / "power.txt").read_text() == as_text(document) + "\n"
+        names = [*(f"map-{scheme}" for scheme in (*BUILT_IN, "observer-constant"))]
+        names += ["schemes-ideal", "schemes-tactical-grade"]
+        for name in names:
+            assert (folder / "figures" / f"{name}.png").stat().st_size > 10_000
+            assert (folder / "figures" / f"{name}.svg").read_text().startswith("<?xml")
+
+    def test_it_is_flown_again_into_the_same_folder_to_the_same_numbers(self, survey):
+        document, folder = survey
+        pictures = {path.name: path.read_bytes() for path in (folder / "figures").iterdir()}
+        assert run_power(folder.parent, SMALL, contenders(["observer-constant"])) == document
+        assert {path.name: path.read_bytes() for path in (folder / "figures").iterdir()} == pictures
+
+    def test_without_the_vanes_plug_ins_are_shown_the_rates_alone_and_ours_as_before(self):
+        bout = SMALL.faulted()[-1]
+        with_vanes, without = (
+            fly_faulted(bout, replace(SMALL, vanes=vanes), contenders(["augmented-ekf"]))
+            for vanes in (True, False)
+        )
+        for scheme in BUILT_IN:
+            assert with_vanes.traces[scheme] == without.traces[scheme]
+        assert with_vanes.traces["augmented-ekf"] != without.traces["augmented-ekf"]
+        elevator = [place for place, (surface, _) in enumerate(SMALL.faults) if surface == "elevator"]
+        for place in elevator:
+            assert with_vanes.deflections[place][1] > 1.5 * without.deflections[place][1]
+
+    def test_a_bout_flown_alone_gives_the_same(self, survey):
+        document, folder = survey
+        bout = SMALL.faulted()[-1]
+        one = fly_faulted(bout, SMALL, contenders(["observer-constant"]))
+        level = next(
+            level["level"]
+            for level in document["levels"]
+            if (level["sensors"], level["turbulence"], level["scheme"]) == (*LIGHT, "observer-constant")
+        )
+        rows = [
+            row
+            for row in pq.read_table(folder / "power.parquet").to_pylist()
+            if (row["seed"], row["turbulence"], row["scheme"]) == (bout.seed, "light", "observer-constant")
+        ]
+        delays = [trace.delay_s(level) for trace in one.traces["observer-constant"]]
+        assert [row["delay_s"] for row in rows] == [None if np.isinf(d) else d for d in delays]
+
+
+class Raises:
+    """A plug-in that fails in flight."""
+
+    def reset(self, context):
+        pass
+
+    def step(self, measured, command):
+        raise ZeroDivisionError("no such luck")
+
+
+class TestContenders:
+    def test_ours_come_first_and_only_once(self):
+        names = [contender.name for contender in contenders(["observer-constant", ESTIMATORS])]
+        assert names == [*BUILT_IN, "observer-constant"]
+        everybody = [contender.name for contender in contenders()]
+        assert {"augmented-ekf", "rls-monitor"} <= set(everybody)
+        assert "none" not in everybody
+
+    def test_a_scheme_that_is_none_is_refused(self):
+        for name in ("none", "augmented-ekff"):
+            with pytest.raises(BadInput, match=r"--schemes: .*(allowed|did you mean)"):
+                contenders([name])
+
+    def test_what_a_built_in_one_wants_is_in_its_flight(self):
+        flight = scenario_of(Bout(LIGHT, 3.0, 1), 5.0)
+        for contender in contenders([]):
+            fdi = with_fdi(flight, contender).fdi
+            assert fdi.bounds == flight.fdi.bounds
+            assert (fdi.statistical is not None) == (contender.name != ESTIMATORS)
+            assert fdi.authority == contender.fdi.get("authority", "either")
+
+    def test_a_plug_in_that_fails_is_named_and_the_others_go_on(self):
+        broken = Contender("broken", f"{__name__}:Raises", {})
+        grid = replace(SMALL, magnitudes=(1.0,), surfaces=("elevator",))
+        one = fly_faulted(grid.faulted()[0], grid, [*contenders([]), broken])
+        assert set(one.traces) == set(BUILT_IN)
+        assert one.failures == ["broken: ZeroDivisionError: no such luck"]
+
+
+def test_the_command_refuses_what_it_does_not_know(tmp_path):
+    done = CliRunner().invoke(app, ["power", "--grid", "huge", "--out", str(tmp_path)])
+    assert done.exit_code == 2
+    done = CliRunner().invoke(app, ["power", "--schemes", "nobody", "--out", str(tmp_path)])
+    assert done.exit_code != 0
+    assert isinstance(done.exception, BadInput)
+    assert not any(tmp_path.iterdir())

@@ -1,0 +1,99 @@
+"""The engine with crews that lose workers, shuffle their outcomes, or die over one flight."""
+
+import random
+
+import pytest
+
+from beaver_ftc.studies.sweep.crew import Outcome, Task
+from beaver_ftc.studies.sweep.engine import Batch, Engine
+from beaver_ftc.studies.sweep.sampling import Assignment
+
+
+class Numbers:
+    """A source of batches of flights, remembering what lands."""
+
+    def __init__(self, flights: int, size: int) -> None:
+        runs = [range(first, min(first + size, flights)) for first in range(0, flights, size)]
+        self._coming = [Batch(n, tuple(Assignment(run, {}) for run in batch)) for n, batch in enumerate(runs)]
+        self.landings: list[tuple[int, list[int]]] = []
+        self.rows: list[dict] = []
+
+    def next_batch(self):
+        return self._coming.pop(0) if self._coming else None
+
+    def flights_left(self):
+        return sum(len(batch.flights) for batch in self._coming)
+
+    def landed(self, batch, rows):
+        self.landings.append((batch.number, [row["run"] for row in rows]))
+        self.rows += rows
+
+
+class Unreliable:
+    """A crew that loses a share of its tasks, and every one with a deadly flight in it."""
+
+    def __init__(self, slots: int, loses: float = 0.0, deadly: frozenset[int] = frozenset()) -> None:
+        self.slots, self._loses, self._deadly = slots, loses, deadly
+        self._random = random.Random(4)
+        self._tasks: list[Task] = []
+        self.submitted: list[Task] = []
+
+    def submit(self, task):
+        assert len(self._tasks) < self.slots, "more tasks than it has hands"
+        self._tasks.append(task)
+        self.submitted.append(task)
+
+    def outcomes(self, timeout_s):
+        task = self._tasks.pop(self._random.randrange(len(self._tasks)))
+        runs = [flight.run for flight in task.flights]
+        if self._deadly.intersection(runs) or self._random.random() < self._loses:
+            return [Outcome(task, None)]
+        return [Outcome(task, [{"run": run, "status": "flown"} for run in reversed(runs)])]
+
+    def close(self):
+        pass
+
+
+def fly(source, crew):
+    Engine(source, crew, sweep_seed=1).fly()
+    return source
+
+
+@pytest.mark.parametrize("slots", [1, 3, 40])
+@pytest.mark.parametrize("size", [1, 7, 100])
+def test_every_flight_lands_once_in_its_batch(slots, size):
+    source = fly(Numbers(50, size), Unreliable(slots))
+    assert sorted(source.landings) == [
+        (n, list(range(first, min(first + size, 50)))) for n, first in enumerate(range(0, 50, size))
+    ]
+
+
+def test_lost_tasks_are_flown_again():
+    source = fly(Numbers(200, 10), Unreliable(4, loses=0.2))
+    assert sorted(row["run"] for row in source.rows) == list(range(200))
+    assert sum(row["status"] == "crashed" for row in source.rows) <= 4  # 0.2^3 each, by chance
+
+
+def test_the_flight_that_kills_its_process_is_found_and_only_it():
+    crew = Unreliable(4, deadly=frozenset({13, 77}))
+    source = fly(Numbers(100, 20), crew)
+    crashed = [row for row in source.rows if row["status"] == "crashed"]
+    assert sorted(row["run"] for row in crashed) == [13, 77]
+    assert all("each time it is tried" in row["reason"] for row in crashed)
+    assert sorted(row["run"] for row in source.rows) == list(range(100))
+
+
+def test_the_last_tasks_are_small_so_that_no_worker_waits_long():
+    crew = Unreliable(2)
+    fly(Numbers(64, 32), crew)
+    sizes = [len(task.flights) for task in crew.submitted]
+    assert sizes[0] == 8  # 64 flights left for two workers, four tasks each
+    assert sizes[-1] <= 4
+
+
+def test_stopping_lands_what_is_in_the_air_and_hands_out_no_more():
+    source, crew = Numbers(100, 5), Unreliable(2)
+    Engine(source, crew, 1).fly(stopped=lambda: len(crew.submitted) >= 4)
+    assert len(crew.submitted) == 4
+    assert not crew._tasks
+    assert all(len(runs) == 5 for _, runs in source.landings)

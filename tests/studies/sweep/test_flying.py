@@ -1,0 +1,113 @@
+import pytest
+
+from beaver_ftc.errors import SimulationFailed
+from beaver_ftc.results.metrics import metrics
+from beaver_ftc.studies.sweep.flying import Job, Keep, fly_one, scenario_of
+from beaver_ftc.studies.sweep.sampling import Assignment, Plan, flight_seed
+from beaver_ftc.studies.sweep.table import COLUMNS
+
+from .conftest import SHORT, sweep_of
+
+
+def test_a_row_says_what_the_flights_metrics_say(short):
+    from beaver_ftc.loop.loop import fly
+
+    (flight,) = Plan(short).assignments([7])
+    row = fly_one(Job(short), flight)
+    document = metrics(fly(scenario_of(short, flight)))
+    assert row["run"] == 7
+    assert row["seed"] == document["seed"] == flight_seed(3, 7)
+    assert row["status"] == "flown"
+    assert row["faults[0].magnitude"] == flight.values["faults[0].magnitude"]
+    assert row["fault.actuator"] == flight.values["faults[0].actuator"] == document["fault"]["actuator"]
+    assert row["detection.delay_s"] == document["detection"]["delay_s"] is not None
+    assert row["tracking.post_fault_rms_deg_s.q"] == document["tracking"]["post_fault_rms_deg_s"]["q"]
+    assert row["saturation_s.elevator"] == document["saturation_s"]["elevator"]
+    assert row["fault_free_s"] == 0.5
+
+
+def test_every_metric_has_a_column(short):
+    """All that metrics.json lists, but for what all flights share; lists have columns of their own."""
+    from beaver_ftc.loop.loop import fly
+
+    document = metrics(fly(scenario_of(short, Plan(short).assignments([0])[0])))
+    paths = {
+        f"{section}.{key}" if isinstance(below, dict) else section
+        for section, below in document.items()
+        for key in (below if isinstance(below, dict) else [""])
+    } - {"scenario", "seed", "versions"}
+    names = {name for name, _, _ in COLUMNS}
+    lists = {"supervisor", "envelope_exits", "expectations", "departure"}
+    missing = {
+        path
+        for path in paths
+        if not path.startswith("versions.")
+        and not any(name == path or name.startswith(f"{path}.") for name in names)
+    }
+    assert missing <= lists
+
+
+def test_a_flight_that_cannot_be_trimmed_is_a_row_with_its_reason():
+    sweep = sweep_of(SHORT.replace("{normal: [45, 3], within: [36, 54]}", "{choice: [20, 45]}"))
+    row = fly_one(Job(sweep), Assignment(0, {"initial.airspeed_mps": 20.0}))
+    assert row["status"] == "bad_input"
+    assert "20 m/s" in row["reason"]
+    assert row["detection.detected"] is None
+
+
+def test_values_that_contradict_each_other_are_a_row_too(short):
+    row = fly_one(Job(short), Assignment(0, {"faults[0].at_s": 2.0}))
+    assert row["status"] == "bad_input"
+    assert row["reason"].startswith("faults[0].at_s: 2 is after the end")
+
+
+@pytest.mark.parametrize(
+    ("error", "reason"),
+    [
+        (SimulationFailed("q_rad_s not finite"), "q_rad_s not finite"),
+        (ZeroDivisionError("of a plug-in"), "ZeroDivisionError: of a plug-in"),
+    ],
+)
+def test_a_flight_that_fails_is_a_row_with_its_reason(short, monkeypatch, error, reason):
+    def fail(*_, **__):
+        raise error
+
+    monkeypatch.setattr("beaver_ftc.loop.loop.fly", fail)
+    row = fly_one(Job(short), Plan(short).assignments([1])[0])
+    assert (row["status"], row["reason"]) == ("failed", reason)
+
+
+@pytest.mark.parametrize(
+    ("policy", "row", "wanted"),
+    [
+        ("none", {"status": "failed"}, False),
+        ("all", {"status": "flown"}, True),
+        ("failed", {"status": "failed"}, True),
+        ("failed", {"status": "flown", "passed": False}, True),
+        ("failed", {"status": "flown", "passed": True, "detection.detected": False}, False),
+        ("missed", {"status": "flown", "passed": True, "detection.detected": False}, True),
+        (
+            "missed",
+            {"status": "flown", "passed": True, "detection.detected": True, "isolation.correct": False},
+            True,
+        ),
+        (
+            "missed",
+            {"status": "flown", "passed": True, "detection.detected": True, "isolation.correct": True},
+            False,
+        ),
+    ],
+)
+def test_keeping_follows_the_policy(policy, row, wanted):
+    full = {
+        "run": 1,
+        "passed": None,
+        "fault.type": "float",
+        "detection.detected": None,
+        "isolation.correct": None,
+    }
+    assert Keep(policy).wants(full | row) is wanted
+
+
+def test_selected_flights_are_kept_whatever_became_of_them():
+    assert Keep("selected", frozenset({5})).wants({"run": 5})

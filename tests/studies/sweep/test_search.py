@@ -1,0 +1,87 @@
+import numpy as np
+import pytest
+
+from beaver_ftc.errors import BadInput
+from beaver_ftc.studies.sweep.run import Options, assignment_of, named_for, run_sweep
+from beaver_ftc.studies.sweep.search import Evolution, score
+
+from .conftest import SHORT, sweep_of
+
+
+def evolve(function, keys, generations, seed=1):
+    evolution = Evolution(seed, keys)
+    for _ in range(generations):
+        evolution.select(np.array([function(point) for point in evolution.trials()]))
+    return evolution
+
+
+def test_it_finds_the_top_of_a_hill_in_four_dimensions():
+    """The other road: the hill's top is where it was put."""
+    top = np.array([0.2, 0.9, 0.5, 0.71])
+    evolution = evolve(lambda x: -np.sum((x - top) ** 2), 4, 60)
+    best = evolution._points[evolution._scores.argmax()]
+    np.testing.assert_allclose(best, top, atol=2e-3)
+
+
+def test_it_beats_as_many_random_flights_on_a_narrow_ridge():
+    def ridge(x):
+        return -abs(x[0] - x[1]) * 10 - (x[0] - 0.83) ** 2 - (x[2] - 0.4) ** 2
+
+    evolution = evolve(ridge, 3, 30)
+    random = np.random.default_rng(0).random((30 * evolution.members, 3))
+    assert evolution._scores.max() > max(map(ridge, random))
+
+
+def test_its_points_stay_in_the_cube_and_follow_the_seed():
+    first, again, other = (evolve(lambda x: x.sum(), 3, 12, seed) for seed in (1, 1, 2))
+    assert (first._points >= 0).all()
+    assert (first._points < 1).all()
+    np.testing.assert_array_equal(first.trials(), again.trials())
+    assert not np.array_equal(first.trials(), other.trials())
+
+
+BASE = {"frames": 1, "status": "flown", "flown_s": 20.0, "fault.at_s": 5.0, "false_alarm": False}
+
+
+@pytest.mark.parametrize(
+    ("objective", "row", "expected"),
+    [
+        ("delay", {"detection.delay_s": 0.3}, 0.3),
+        ("delay", {"detection.delay_s": None}, 15.0),
+        ("delay", {"detection.delay_s": None, "fault.at_s": None}, -np.inf),
+        ("delay", {"detection.delay_s": None, "false_alarm": True}, -np.inf),
+        ("delay", {"frames": None}, -np.inf),
+        ("false_alarm", {"worst_residual_ratio": 0.8}, 0.8),
+        ("tracking", {f"tracking.post_fault_rms_deg_s.{axis}": "pqr".index(axis) for axis in "pqr"}, 2.0),
+        ("tracking", {"status": "departed"}, 1e6 - 20.0),
+    ],
+)  # fmt: skip
+def test_a_flights_score(objective, row, expected):
+    assert score(objective, BASE | row) == expected
+
+
+SEARCH = SHORT.replace("runs: 48", "runs: 56")
+
+
+def test_a_search_that_is_stopped_goes_on_to_the_same_end(tmp_path, small_batches):
+    sweep = sweep_of(SEARCH)
+    whole = run_sweep(sweep, Options(out=tmp_path / "whole", workers=2, search="delay", report=False))
+    seen = []
+    stopping = Options(out=tmp_path / "halves", workers=1, search="delay", report=False)
+    with pytest.raises(Exception, match="stopped, 16 of 56"):
+        run_sweep(sweep, stopping, lambda tally: seen.append(tally.done), stopped=lambda: bool(seen))
+    resumed = run_sweep(
+        sweep, Options(out=tmp_path / "halves", workers=2, search="delay", resume=True, report=False)
+    )
+    files = [tmp_path / name / "short-search-delay" / "results.parquet" for name in ("whole", "halves")]
+    assert files[0].read_bytes() == files[1].read_bytes()
+    assert resumed["search"] == whole["search"]
+    assert whole["search"]["history"] == sorted(whole["search"]["history"])
+    worst = assignment_of(named_for(sweep, "delay"), stopping, whole["search"]["run"])
+    assert worst.values == whole["search"]["values"]
+
+
+def test_nothing_to_vary_is_nothing_to_search(tmp_path):
+    sweep = sweep_of("base: fault-free\nruns: 4")
+    with pytest.raises(BadInput, match="nothing varies"):
+        run_sweep(sweep, Options(out=tmp_path, search="delay"))

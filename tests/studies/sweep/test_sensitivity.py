@@ -1,0 +1,50 @@
+import numpy as np
+import pytest
+
+from beaver_ftc.studies.sweep.sensitivity import rank, ranks_of
+
+
+@pytest.fixture
+def keys():
+    generator = np.random.default_rng(2)
+    return {
+        "driver": generator.random(600),
+        "idle": generator.random(600),
+        "kind": np.array(generator.choice(["a", "b"], 600), dtype=object),
+    }
+
+
+def test_the_key_that_drives_comes_first_and_idle_ones_explain_nothing(keys):
+    found = rank(keys, np.exp(5 * keys["driver"]))
+    assert found[0]["key"] == "driver"
+    assert found[0]["explained"] > 0.95
+    assert found[0]["rank_correlation"] == pytest.approx(1.0)
+    assert found[0]["p_value"] == pytest.approx(1 / 200)
+    assert all(entry["explained"] < 0.03 and entry["p_value"] > 0.02 for entry in found[1:])
+
+
+def test_an_effect_that_is_not_monotone_is_seen(keys):
+    found = rank(keys, (keys["driver"] - 0.5) ** 2)
+    assert found[0]["key"] == "driver"
+    assert found[0]["explained"] > 0.8
+    assert abs(found[0]["rank_correlation"]) < 0.15
+
+
+def test_names_can_drive_and_missed_faults_rank_last(keys):
+    outcome = np.where(keys["kind"] == "b", np.inf, keys["idle"])
+    found = rank(keys, outcome)
+    assert found[0]["key"] == "kind"
+    assert found[0]["rank_correlation"] is None
+    assert found[0]["explained"] > 0.6
+
+
+def test_an_outcome_that_never_changes_has_no_drivers(keys):
+    assert rank(keys, np.zeros(600)) == []
+
+
+def test_it_is_repeatable(keys):
+    assert rank(keys, keys["idle"]) == rank(keys, keys["idle"])
+
+
+def test_equal_values_share_the_mean_of_their_ranks():
+    np.testing.assert_array_equal(ranks_of(np.array([5.0, 1.0, 5.0, np.inf])), [1.5, 0.0, 1.5, 3.0])

@@ -1,0 +1,141 @@
+"""Statistics against a table small enough to count by hand."""
+
+import math
+from pathlib import Path
+
+import pytest
+
+from beaver_ftc.scenario.sweep_loader import load_sweep_text
+from beaver_ftc.scenario.sweep_schema import SweepExpect
+from beaver_ftc.studies.sweep import words
+from beaver_ftc.studies.sweep.expectations import evaluate
+from beaver_ftc.studies.sweep.summary import summarise
+from beaver_ftc.studies.sweep.worst import replay_command, worst_flights
+
+from .counted import ROWS, SWEEP, flights_of
+
+
+@pytest.fixture
+def sweep():
+    return load_sweep_text(SWEEP)
+
+
+@pytest.fixture
+def flights(tmp_path):
+    return flights_of(ROWS, tmp_path)
+
+
+@pytest.fixture
+def summary(flights, sweep):
+    return summarise(flights, sweep)
+
+
+def test_detection_counts_faults_that_came_before_any_alarm(summary):
+    found = summary["detection"]
+    assert (found["count"], found["of"]) == (
+        6,
+        9,
+    )  # 0 to 7 and 9; 8 was alarmed before, 10 not flown, 11 healthy
+    assert found["rate"] == pytest.approx(6 / 9)
+
+
+def test_delay_quantiles_count_missed_faults_as_never(summary):
+    found = summary["detection"]["delay_s"]
+    assert (found["of"], found["median"], found["p90"], found["max"]) == (9, 0.5, None, None)
+    seen = summary["detection"]["delay_of_detected_s"]
+    assert (seen["of"], seen["median"], seen["max"]) == (6, 0.3, 0.6)
+
+
+def test_isolation_counts_right_and_wrong_names(summary):
+    found = summary["isolation"]
+    assert (found["count"], found["of"]) == (4, 9)
+    assert (found["wrong"]["count"], found["wrong"]["of"]) == (1, 5)
+
+
+def test_false_alarms_are_per_hour_without_a_fault(summary):
+    found = summary["false_alarms"]
+    hours = (9 * 12.0 + 3.0 + 30.0) / 3600
+    assert found["count"] == 1
+    assert found["hours"] == pytest.approx(hours)
+    assert found["per_hour"] == pytest.approx(1 / hours)
+    assert found["high"] == pytest.approx(5.572 / hours, rel=1e-3)
+
+
+def test_a_broken_guarantee_is_seen(summary):
+    assert summary["guarantee"] == {"promised": 2, "broken": 1}  # flight 2: 0.3 s where 0.25 s were promised
+
+
+def test_the_confusion_matrix_has_every_flight_once(summary):
+    confusion = summary["confusion"]
+    counts = {
+        (fault, said): count
+        for fault, line in zip(confusion["faults"], confusion["counts"], strict=True)
+        for said, count in zip(confusion["diagnoses"], line, strict=True)
+        if count
+    }
+    assert counts == {
+        ("elevator", "elevator"): 4, ("elevator", "aileron"): 1, ("elevator", "not isolated"): 1,
+        ("elevator", "no alarm"): 3, ("elevator", "false alarm"): 1, ("no fault", "no alarm"): 1,
+    }  # fmt: skip
+
+
+def test_departures_and_failures(summary):
+    assert (summary["departures"]["count"], summary["departures"]["of"]) == (1, 11)
+    assert summary["statuses"] == {"bad_input": 1, "departed": 1, "flown": 10}
+    assert summary["reasons"] == [{"reason": "no trim", "count": 1, "first_run": 10}]
+
+
+def test_tracking_ratio_is_after_over_before_and_infinite_when_lost(summary):
+    ratio = summary["tracking"]["q"]["ratio"]
+    assert ratio["of"] == 9
+    assert ratio["median"] == pytest.approx(2.0)
+    assert ratio["max"] is None
+
+
+def test_the_worst_flights_come_with_their_command(flights, sweep):
+    command = replay_command("my sweep.yaml", Path("else where"))
+    worst = {flight["run"]: flight for flight in worst_flights(flights, sweep, command)}
+    assert worst[10]["replay"] == "beaver-ftc sweep 'my sweep.yaml' --out 'else where' --replay 10"
+    assert worst[3]["why"][0] == "named aileron"
+    assert {10, 8, 9, 3, 6, 7, 5} <= set(worst)
+    assert 11 not in worst or worst[11]["why"][0].startswith("residual")
+
+
+@pytest.mark.parametrize(
+    ("expect", "actual", "passed"),
+    [
+        ({"detection_rate": {"at_least": 0.6}}, 6 / 9, True),
+        ({"detection_rate": {"at_least": 0.6, "confidence": 0.95}}, 0.3985, False),
+        ({"detection_rate": {"at_most": 0.6}}, 6 / 9, False),
+        ({"departure_rate": {"at_most": 0.1}}, 1 / 11, True),
+        ({"failure_rate": {"at_most": 0.0}}, 1 / 12, False),
+        ({"pass_rate": {"at_least": 0.9}}, 10 / 11, True),
+        ({"detection_delay_s": {"quantile": 0.5, "at_most": 0.5}}, 0.5, True),
+        ({"detection_delay_s": {"quantile": 0.9, "at_most": 5.0}}, None, False),
+        ({"detection_delay_s": {"quantile": 0.2, "at_most": 0.4, "confidence": 0.9}}, 0.4, True),
+        ({"post_fault_rms_deg_s": {"q": {"quantile": 0.5, "at_most": 0.2}}}, 0.2, True),
+        ({"tracking_ratio": {"q": {"quantile": 0.5, "at_most": 1.5}}}, 2.0, False),
+        ({"tracking_ratio": {"p": {"at_most": 1.5}}}, None, False),
+    ],
+)
+def test_expectations_hold_the_flights_to_their_bounds(flights, expect, actual, passed):
+    (found,) = evaluate(SweepExpect(**expect), flights)
+    assert found["passed"] is passed
+    assert found["actual"] == (None if actual is None else pytest.approx(actual, abs=1e-3))
+
+
+def test_both_sides_of_a_bound_are_two_expectations(flights):
+    found = evaluate(SweepExpect(detection_rate={"at_least": 0.5, "at_most": 0.6}), flights)
+    assert [(entry["passed"], set(entry["expected"])) for entry in found] == [
+        (True, {"at_least"}),
+        (False, {"at_most"}),
+    ]
+
+
+def test_words_say_what_the_summary_says(summary):
+    summary |= {"expectations": [], "passed": True, "worst": [], "folder": "runs/counted"}
+    text = words.summary_text(summary)
+    assert "6 of 9 faults detected" in text
+    assert "95 % never" in text
+    assert "1 of 2 faults detected later than theory promises" in text
+    assert not any(math.isnan(value) for value in summary["detection"].values() if isinstance(value, float))

@@ -1,0 +1,78 @@
+import re
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+from tools.docs.generate import lighten
+from tools.docs.properties import as_markdown, meaning_of
+
+from beaver_ftc.errors import BadInput
+from beaver_ftc.plant.adapter import Plant
+from beaver_ftc.studies.reproduce.claims import CLAIMS
+from beaver_ftc.studies.reproduce.figures import FIGURES
+
+ROOT = Path(__file__).resolve().parents[2]
+DOCS = ROOT / "docs"
+PAGES = [ROOT / "README.md", *sorted(DOCS.glob("*.md"))]
+
+
+def test_property_page_is_up_to_date():
+    assert (DOCS / "properties.md").read_text() == as_markdown(), "run python -m tools.docs"
+
+
+def test_every_property_on_the_page_is_one_the_aircraft_has():
+    plant = Plant(100)
+    names = re.findall(r"^\| `([^`]+)` \|", as_markdown(), re.MULTILINE)
+    assert len(names) > 100
+    for name in names:
+        for surface in ("aileron", "elevator", "rudder", "flap"):
+            plant.node(name.replace("<s>", surface))
+
+
+def test_every_named_property_of_the_xml_is_on_the_page():
+    root = ElementTree.parse(ROOT / "aircraft/beaver/beaver.xml").getroot()
+    named = {e.get("name") for e in root.iter() if e.tag in ("function", "fcs_function") and e.get("name")}
+    valued = {e.text.strip() for e in root.iter("property") if "value" in e.attrib}
+    page = as_markdown()
+    for name in named | valued:
+        term = re.fullmatch(r"uncertainty/(\w+)-scale", name)
+        shown = f"aero/coefficient/{term[1]}" if term else re.sub("aileron|elevator|rudder|flap", "<s>", name)
+        assert f"`{shown}`" in page, name
+
+
+def test_property_without_a_meaning_is_refused():
+    with pytest.raises(BadInput, match="fcs/no-such-thing"):
+        meaning_of("fcs/no-such-thing")
+
+
+def test_reproduction_page_has_every_statement_and_every_figure():
+    text = (DOCS / "reproduction.md").read_text()
+    for claim in CLAIMS:
+        (row,) = [
+            line for line in text.splitlines() if claim.statement in line and "borne out" in line.lower()
+        ]
+        assert "NOT BORNE OUT" not in row
+    for view, _, _ in FIGURES:
+        assert f"images/reproduction/{view.name}.png" in text
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_links_lead_somewhere(page):
+    links = re.findall(r"\]\(([^)#\s]+)", page.read_text())
+    lost = [link for link in links if "://" not in link and not (page.parent / link).exists()]
+    assert lost == []
+
+
+def test_lightened_picture_is_smaller_and_looks_the_same(tmp_path):
+    import matplotlib.image
+    import numpy as np
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(4, 3))
+    figure.subplots().plot(np.sin(np.linspace(0, 20, 500)))
+    figure.savefig(tmp_path / "a.png")
+    figure.savefig(tmp_path / "b.png")
+    lighten(tmp_path / "b.png")
+    assert (tmp_path / "b.png").stat().st_size < 0.7 * (tmp_path / "a.png").stat().st_size
+    before, after = (matplotlib.image.imread(tmp_path / f"{name}.png")[..., :3] for name in "ab")
+    assert np.abs(before - after).mean() < 0.01

@@ -1,0 +1,1 @@
+"""What builds the documentation and checks data; not shipped in the wheel."""

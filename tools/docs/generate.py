@@ -1,0 +1,66 @@
+"""What is generated, and where it goes."""
+
+from collections.abc import Iterator
+from functools import partial
+from pathlib import Path
+
+from beaver_ftc.errors import BadInput
+from beaver_ftc.paths import data_root
+
+
+def write_docs(folder: Path | None = None) -> Iterator[Path]:
+    """Write every generated page and picture into `folder` (the source tree's `docs/`); yield the files.
+
+    Raises BadInput in an installed package, which has no such folder.
+    """
+    docs = folder or _docs_of_source_tree()
+    (docs / "images").mkdir(exist_ok=True)
+    yield _write_properties(docs)
+    yield _write_first_figure(docs)
+    yield from _write_reproduction(docs)
+
+
+def _docs_of_source_tree() -> Path:
+    docs = data_root() / "docs"
+    if not docs.is_dir():
+        raise BadInput("the documentation is generated into a source tree, and this is none")
+    return docs
+
+
+def _write_properties(docs: Path) -> Path:
+    from tools.docs.properties import as_markdown
+
+    path = docs / "properties.md"
+    path.write_text(as_markdown(), encoding="utf-8")
+    return path
+
+
+def _write_first_figure(docs: Path) -> Path:
+    from tools.docs.first_figure import write_figure
+
+    return lighten(write_figure(docs / "images" / "elevator-partial-loss.png"))
+
+
+def _write_reproduction(docs: Path) -> Iterator[Path]:
+    from beaver_ftc.studies.compare.crew import spread
+    from beaver_ftc.studies.reproduce.document import document_of, fly_published
+    from beaver_ftc.studies.reproduce.figures import write_figures
+    from beaver_ftc.studies.reproduce.margins import write_margins
+    from beaver_ftc.studies.reproduce.page import as_markdown
+
+    flights = fly_published()
+    document = document_of(flights, partial(spread, workers=2))
+    path = docs / "reproduction.md"
+    path.write_text(as_markdown(document, "images/reproduction"), encoding="utf-8")
+    yield path
+    folder = docs / "images" / "reproduction"
+    yield from map(lighten, [*write_figures(flights, folder), write_margins(document, folder)])
+
+
+def lighten(picture: Path) -> Path:
+    """Reduce a picture to a palette of 64 colours: a third of the size, and no difference to see."""
+    from PIL import Image
+
+    with Image.open(picture) as image:
+        image.convert("RGB").quantize(64, dither=Image.Dither.NONE).save(picture, optimize=True)
+    return picture

@@ -1,0 +1,157 @@
+"""The truth against the FDC data: state derivatives at random states, and two doublet responses.
+
+The data are CSV files computed from the FDC equations by an independent implementation; `report(folder)` is
+the comparison, e.g.
+
+    python -c "from tools.fdc_check import report; print(report('tests/data'))"
+"""
+
+from dataclasses import dataclass
+from math import hypot, pi
+from pathlib import Path
+
+import numpy as np
+
+from beaver_ftc.plant.adapter import FT_PER_M, Plant
+from beaver_ftc.plant.state import FlightState
+
+M_PER_FT = 1.0 / FT_PER_M
+SAMPLE_S = 0.05
+DERIVATIVE_BAR = {
+    "Vdot_mps2": 2e-4,
+    "alphadot_rad_s": 5e-4,
+    "pdot_rad_s2": 2e-4,
+    "qdot_rad_s2": 2e-4,
+    "rdot_rad_s2": 2e-4,
+}
+RESPONSE_BAR = {1000: 0.01, 100: 0.05}  # by frame rate, Hz
+
+# FDC's altitude and track against JSBSim's; its earth is flat, so 20 s are short enough to compare positions.
+_RESPONSE = {
+    "V_mps": ("velocities/vt-fps", M_PER_FT),
+    "alpha_rad": ("aero/alpha-rad", 1.0),
+    "beta_rad": ("aero/beta-rad", 1.0),
+    "p_rad_s": ("velocities/p-rad_sec", 1.0),
+    "q_rad_s": ("velocities/q-rad_sec", 1.0),
+    "r_rad_s": ("velocities/r-rad_sec", 1.0),
+    "phi_rad": ("attitude/phi-rad", 1.0),
+    "theta_rad": ("attitude/theta-rad", 1.0),
+    "psi_rad": ("attitude/psi-rad", 1.0),
+    "x_m": ("position/from-start-neu-n-ft", M_PER_FT),
+    "y_m": ("position/from-start-neu-e-ft", M_PER_FT),
+    "h_m": ("position/h-sl-meters", 1.0),
+}
+_SURFACE_COLUMNS = ("aileron_rad", "elevator_rad", "rudder_rad")
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """How well one signal agrees: `error` as the share it is measured in, and its bar (None: no bar)."""
+
+    signal: str
+    error: float
+    bar: float | None
+
+    @property
+    def met(self) -> bool:
+        return self.bar is None or self.error <= self.bar
+
+
+def read_table(path: Path) -> np.ndarray:
+    """A CSV file with a header as a structured array."""
+    return np.genfromtxt(path, delimiter=",", names=True)
+
+
+def flight_state(row: np.void) -> FlightState:
+    """The state, surfaces and engine of one row of the FDC data."""
+    names = ("alpha_rad", "beta_rad", "p_rad_s", "q_rad_s", "r_rad_s", "phi_rad", "theta_rad", "psi_rad")
+    return FlightState(
+        airspeed_mps=float(row["V_mps"]),
+        altitude_m=float(row["h_m"]),
+        engine_rpm=float(row["engine_rpm"]),
+        manifold_pressure_inhg=float(row["manifold_pressure_inHg"]),
+        **{name: float(row[name]) for name in (*names, *_SURFACE_COLUMNS, "flap_rad")},
+    )
+
+
+def derivatives(plant: Plant) -> dict[str, float]:
+    """Time derivatives of the truth's state, named as in the FDC data; from JSBSim's own accelerations."""
+    u, v, w = (plant.read(f"velocities/{axis}-fps") * M_PER_FT for axis in "uvw")
+    udot, vdot, wdot = (plant.read(f"accelerations/{axis}dot-ft_sec2") * M_PER_FT for axis in "uvw")
+    V, uw = hypot(u, v, w), hypot(u, w)
+    Vdot = (u * udot + v * vdot + w * wdot) / V
+    rates = {f"{axis}dot_rad_s2": plant.read(f"accelerations/{axis}dot-rad_sec2") for axis in "pqr"}
+    return {
+        "Vdot_mps2": Vdot,
+        "alphadot_rad_s": (u * wdot - w * udot) / uw**2,
+        "betadot_rad_s": (vdot * V - v * Vdot) / (V * uw),
+    } | rates
+
+
+def derivative_agreement(folder: Path) -> list[Agreement]:
+    """RMS error over RMS value of each state derivative, over the random states."""
+    table = read_table(folder / "fdc_state_derivatives.csv")
+    plant, found = Plant(rate_hz=100), []
+    for row in table:
+        plant.start(flight_state(row))
+        found.append(derivatives(plant))
+    return [
+        Agreement(name, _rms(np.array([each[name] for each in found]) - table[name]) / _rms(table[name]), bar)
+        for name, bar in (DERIVATIVE_BAR | {"betadot_rad_s": None}).items()
+    ]
+
+
+def response_agreement(folder: Path, surface: str, rate_hz: int) -> list[Agreement]:
+    """Largest error over span of each signal, in the 20 s after a doublet of `surface` begins the flight.
+
+    The truth is flown as the loop flies it: after each run the state is read and the next command written.
+    """
+    table = read_table(folder / f"fdc_{surface}_doublet.csv")
+    agreements = []
+    for name, flown in _fly(table, rate_hz).items():
+        largest = np.abs(_difference(name, flown, table[name])).max()
+        agreements.append(Agreement(name, float(largest / np.ptp(table[name])), RESPONSE_BAR[rate_hz]))
+    return agreements
+
+
+def _fly(table: np.ndarray, rate_hz: int) -> dict[str, np.ndarray]:
+    plant = Plant(rate_hz=rate_hz)
+    plant.start(flight_state(table[0]))
+    frames = round(SAMPLE_S * rate_hz)
+    samples = [[plant.read(name) for name, _ in _RESPONSE.values()]]
+    for row in table[:-1]:
+        for column in _SURFACE_COLUMNS:
+            plant.write(f"fcs/{column.removesuffix('_rad')}-cmd-rad", float(row[column]))
+        for _ in range(frames):
+            plant.run()
+        samples.append([plant.read(name) for name, _ in _RESPONSE.values()])
+    values = np.array(samples).T
+    return {name: values[i] * factor for i, (name, (_, factor)) in enumerate(_RESPONSE.items())}
+
+
+def _difference(name: str, ours: np.ndarray, theirs: np.ndarray) -> np.ndarray:
+    difference = ours - theirs
+    return (difference + pi) % (2 * pi) - pi if name == "psi_rad" else difference
+
+
+def _rms(x: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(x**2)))
+
+
+def report(folder: str | Path) -> str:
+    """The whole comparison as text: one line a signal, with its bar."""
+    folder = Path(folder)
+    lines = ["state derivatives at random states: RMS error / RMS value"]
+    lines += _rows(derivative_agreement(folder))
+    for surface in ("aileron", "elevator"):
+        for rate_hz in RESPONSE_BAR:
+            lines.append(f"{surface} doublet, 20 s, {rate_hz} Hz: largest error / span")
+            lines += _rows(response_agreement(folder, surface, rate_hz))
+    return "\n".join(lines)
+
+
+def _rows(agreements: list[Agreement]) -> list[str]:
+    return [
+        f"  {each.signal:16}{each.error:10.2e}" + ("" if each.bar is None else f"   bar {each.bar:g}")
+        for each in agreements
+    ]

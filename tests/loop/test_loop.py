@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from beaver_ftc.errors import BadInput, SimulationFailed
-from beaver_ftc.loop.loop import fly, loop
+from beaver_ftc.loop import loop
+from beaver_ftc.loop.loop import fly
 from beaver_ftc.plant.channels import TRUTH
 from beaver_ftc.results.metrics import metrics
 from beaver_ftc.results.verdict import facts

@@ -5,7 +5,8 @@ import pytest
 
 from beaver_ftc import compiled
 from beaver_ftc.design.coefficients import SURFACES
-from beaver_ftc.loop.loop import Loop, frame
+from beaver_ftc.loop import frame
+from beaver_ftc.loop.loop import Loop
 from beaver_ftc.studies.bench.parts import PARTS, frame_with, frame_without, nothing
 from flying import scenario
 

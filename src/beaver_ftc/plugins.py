@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from importlib import import_module, util
 from inspect import getdoc, isclass
 
-from beaver_ftc.errors import BadInput
+from beaver_ftc.errors import BadInput, suggestion
 
 DETECTORS, LAWS = "beaver_ftc.detectors", "beaver_ftc.laws"
 OURS = "beaver-ftc"
@@ -115,8 +115,6 @@ def _from_packages(group: str) -> Iterable[Registered]:
 
 def refusal(group: str, name: str) -> str | None:
     """What is wrong with a scheme's or law's name in a scenario, and what is allowed; None if nothing is."""
-    from beaver_ftc.scenario.base import suggestion
-
     if name in _OURS[group]:
         return None
     known = registered(group)

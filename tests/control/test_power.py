@@ -7,7 +7,6 @@ from hypothesis import strategies as st
 from scipy.linalg import expm
 
 from beaver_ftc.control import power
-from beaver_ftc.control.config import EnginePower
 from beaver_ftc.control.state import ORACLE
 from beaver_ftc.design import fdc
 from beaver_ftc.design.coefficients import value
@@ -18,6 +17,7 @@ from beaver_ftc.plant.trim import MANIFOLD_PRESSURE_INHG, trim
 from beaver_ftc.results.metrics import metrics
 from beaver_ftc.results.verdict import facts
 from beaver_ftc.results.views import views
+from beaver_ftc.scenario.control import EnginePower
 from beaver_ftc.scenario.loader import load_text
 from beaver_ftc.studies.matrix.cases import REFERENCE
 from beaver_ftc.studies.matrix.flying import trimmed_deg

@@ -9,9 +9,9 @@ from beaver_ftc.design.coefficients import MASS
 from beaver_ftc.design.model import AXES, TERMS, design_record, regressors
 from beaver_ftc.design.variants import response
 from beaver_ftc.diagnosis import noise_model, statistical
-from beaver_ftc.diagnosis.config import Bounds
 from beaver_ftc.diagnosis.state import LOSS
 from beaver_ftc.plant.instruments import SIGNALS
+from beaver_ftc.scenario.diagnosis import Bounds
 from beaver_ftc.studies.statistics import poisson
 
 NO_COUPLING = {"p": 0.0, "q": 0.0, "r": 0.0}

@@ -8,8 +8,8 @@ import numpy as np
 
 from beaver_ftc.design.coefficients import GEOMETRY, MASS, MassProperties, inertia_coefficients
 from beaver_ftc.design.model import TERMS
-from beaver_ftc.diagnosis.config import Bounds
 from beaver_ftc.plant.instruments import NOISE_LIMIT_SIGMA, SIGNALS
+from beaver_ftc.scenario.diagnosis import Bounds
 from beaver_ftc.scenario.sensors import Sensors
 
 # Largest vertical gust (standard deviation) above 2000 ft and its scale [MIL-F-8785C, fig. 7, 3.7.2].

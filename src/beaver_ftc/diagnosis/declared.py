@@ -7,8 +7,8 @@ import numpy as np
 from beaver_ftc.design.coefficients import GEOMETRY, SURFACES
 from beaver_ftc.design.context import SIGNALS, Declared, DesignModel
 from beaver_ftc.diagnosis.admitted import GUST_FT_S, ROLLING, SCALE_FT, tolerances
-from beaver_ftc.diagnosis.config import Bounds
 from beaver_ftc.scenario.actuators import Actuators
+from beaver_ftc.scenario.diagnosis import Bounds
 
 _M_PER_FT = 0.3048
 _AIR_DATA = 3  # gyros come first among the signals, then alpha, beta, airspeed, dynamic pressure

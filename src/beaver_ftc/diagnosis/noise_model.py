@@ -11,9 +11,9 @@ from beaver_ftc.design.model import AILERON, AIRSPEED, ALPHA, AXES, BETA, DPT, E
 from beaver_ftc.design.variants import jacobian
 from beaver_ftc.diagnosis.admitted import GUST_FT_S, SCALE_FT, inertia_slack, tolerances
 from beaver_ftc.diagnosis.air import damping
-from beaver_ftc.diagnosis.config import Bounds, FdiConfig, Statistical
 from beaver_ftc.diagnosis.state import ALPHA3, LEAST_UNCERTAINTY_RAD_S2, LOSS, N_SLOTS, STEP
 from beaver_ftc.plant.instruments import SIGNALS
+from beaver_ftc.scenario.diagnosis import Bounds, FdiConfig, Statistical
 from beaver_ftc.scenario.sensors import Sensors
 
 # (kind, surface, axis, raises alarms); of the published class, and what it is held against.

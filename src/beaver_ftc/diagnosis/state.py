@@ -2,15 +2,15 @@
 
 import numpy as np
 
+from beaver_ftc.scenario.diagnosis import MAX_POLES
+
 MAX_ESTIMATORS = 16
-MAX_POLES = 6
 MAX_BLOCK = 256  # frames of a block: blocks.py
 NOT_ISOLATED, UNANTICIPATED = -1, -2
 INTERVAL, PUBLISHED = 0, 1
 LOSS, POSITION = 0, 1  # kinds of hypothesis: fault_class.py
 N_TYPES = 10  # fault_types.py; what holds a surface comes one after the other: release.py
 CONSTANT_LOSS, STUCK, FLOAT, UP, DOWN, BIAS, VARYING_LOSS, OSCILLATORY, SLOW, GROWING_BIAS = range(N_TYPES)
-DEADBEAT_PER_S = 1e6  # a pole at which exp(-lam dt) is 0: the filter keeps nothing but the last frame
 
 # Centres of the network's basis functions, rad; and its memory.
 ALPHA_CENTRES = np.linspace(-0.1, 0.5, 9)

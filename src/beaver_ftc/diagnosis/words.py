@@ -13,8 +13,8 @@ import numpy as np
 from beaver_ftc.design.coefficients import SURFACES
 from beaver_ftc.design.model import AILERON, ELEVATOR, FLAP, RUDDER
 from beaver_ftc.diagnosis import fault_types as ft
+from beaver_ftc.diagnosis.fault_types import DOMINANT_AXIS
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, UNANTICIPATED
-from beaver_ftc.loop.frame import DOMINANT_AXIS
 
 PLANES = ((ELEVATOR, FLAP), (AILERON, RUDDER))  # as pairs.py numbers them
 

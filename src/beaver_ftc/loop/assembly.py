@@ -4,20 +4,17 @@ from math import ceil, exp, pi, radians
 
 import numpy as np
 
-from beaver_ftc.control.config import ControlConfig
 from beaver_ftc.control.reference_model import discretise
 from beaver_ftc.control.state import LAWS, NOMINAL
 from beaver_ftc.design.coefficients import SURFACES, engine_power_kw, slipstream, value
 from beaver_ftc.design.model import AILERON, ELEVATOR, FLAP, RUDDER
 from beaver_ftc.design.variants import design_of, mass_of
 from beaver_ftc.diagnosis.admitted import admit, gyros_vary, poles_for_noise
-from beaver_ftc.diagnosis.config import FdiConfig, Probing
 from beaver_ftc.diagnosis.fault_class import PARAMETER_SET
 from beaver_ftc.diagnosis.state import (
     EITHER,
     INTERVAL,
     LOSS,
-    MAX_POLES,
     NOT_ISOLATED,
     POSITION,
     PUBLISHED,
@@ -29,6 +26,8 @@ from beaver_ftc.loop.frame import FRAME
 from beaver_ftc.plant import channels as ch
 from beaver_ftc.plant.instruments import LONGEST_DELAY, SIGNALS
 from beaver_ftc.scenario.actuators import Actuators
+from beaver_ftc.scenario.control import ControlConfig
+from beaver_ftc.scenario.diagnosis import MAX_POLES, FdiConfig, Probing
 from beaver_ftc.scenario.schema import Scenario
 
 BLOCK_S = 0.2  # to be examined at once where gyros are noisy: short beside the slowest half-cycle, 3.1 s

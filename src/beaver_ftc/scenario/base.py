@@ -1,7 +1,6 @@
 """What every section of a scenario shares: frozen, strict about its keys, no coercion of values."""
 
-from collections.abc import Iterable, Sequence
-from difflib import get_close_matches
+from collections.abc import Sequence
 from typing import Annotated, Any
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, Strict
@@ -43,12 +42,3 @@ def order_conflicts(start_s: float, end_s: float | None, start_key: str) -> list
     if end_s is None or end_s > start_s:
         return []
     return [(("end_s",), f"{end_s:g} is not after {start_key}, allowed: later than {start_s:g} s")]
-
-
-def suggestion(given: str, known: Iterable[str], cutoff: float = 0.6) -> str:
-    """`, did you mean x?` if something known is near to what was given, and what is allowed."""
-    names = list(known)
-    lower = {name.lower(): name for name in reversed(names)}
-    near = get_close_matches(given.lower()[:100], lower, n=1, cutoff=cutoff)
-    hint = f", did you mean {lower[near[0]]}?" if near else ","
-    return f"{hint} allowed: {', '.join(names)}"

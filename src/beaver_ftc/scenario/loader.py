@@ -8,7 +8,8 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
-from beaver_ftc.scenario.base import Conflict, suggestion
+from beaver_ftc.errors import suggestion
+from beaver_ftc.scenario.base import Conflict
 from beaver_ftc.scenario.builtin import builtin_names, looks_like_a_path, resolve
 from beaver_ftc.scenario.consistency import conflicts, outline_of_data
 from beaver_ftc.scenario.document import MAX_PROBLEMS, Document, MalformedDocumentError, Problem, parse

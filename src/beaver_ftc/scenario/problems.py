@@ -8,8 +8,8 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from beaver_ftc.errors import BadInput
-from beaver_ftc.scenario.base import Location, suggestion
+from beaver_ftc.errors import BadInput, suggestion
+from beaver_ftc.scenario.base import Location
 from beaver_ftc.scenario.document import MAX_PROBLEMS, Document, Problem
 
 WHOLE_FILE = "(file)"

@@ -5,12 +5,13 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, BeforeValidator, ConfigDict, Field, model_validator
 
-from beaver_ftc.control.config import ControlConfig
 from beaver_ftc.design.coefficients import TERMS, TRAVEL
-from beaver_ftc.diagnosis.config import FdiConfig
+from beaver_ftc.errors import suggestion
 from beaver_ftc.scenario.actuators import Actuators
-from beaver_ftc.scenario.base import Flag, Number, Section, Whole, number, refuse, suggestion
+from beaver_ftc.scenario.base import Flag, Number, Section, Whole, number, refuse
 from beaver_ftc.scenario.consistency import DURATION_S, RATE_HZ, Outline, conflicts
+from beaver_ftc.scenario.control import ControlConfig
+from beaver_ftc.scenario.diagnosis import FdiConfig
 from beaver_ftc.scenario.faults import Fault
 from beaver_ftc.scenario.sensors import Sensors
 from beaver_ftc.scenario.signals import Reference

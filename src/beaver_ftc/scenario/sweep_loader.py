@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from beaver_ftc.errors import suggestion
 from beaver_ftc.paths import data_root
-from beaver_ftc.scenario.base import Location, suggestion
+from beaver_ftc.scenario.base import Location
 from beaver_ftc.scenario.builtin import builtin_names, builtin_path, looks_like_a_path
 from beaver_ftc.scenario.document import Document, Problem
 from beaver_ftc.scenario.keys import UnusableKeyError, parse_key, with_values

@@ -5,8 +5,8 @@ import json
 import numpy as np
 import pytest
 
-from beaver_ftc.control.config import EnginePower
 from beaver_ftc.results.writer import FILES_OF_A_RESULT
+from beaver_ftc.scenario.control import EnginePower
 from beaver_ftc.studies.matrix.pitch_lost import LAWS, LOST, PitchCase, document_of, fly_case, run_pitch_lost
 from beaver_ftc.studies.matrix.pitch_margins import about_trim, closed_loop, loop_response, margins
 from beaver_ftc.studies.matrix.pitch_text import as_text

@@ -10,7 +10,7 @@ from functools import cache
 from pathlib import Path
 
 from beaver_ftc.design.context import Context
-from beaver_ftc.errors import BadInput
+from beaver_ftc.errors import BadInput, suggestion
 
 TUNED = Path(__file__).with_name("tuned.json")
 TUNED_FOR_ERRORS = Path(__file__).with_name("tuned_for_errors.json")
@@ -24,8 +24,6 @@ def tuned(path: Path = TUNED) -> dict[str, dict[str, float]]:
 
 def options_of(name: str, defaults: Mapping[str, float], context: Context) -> dict[str, float]:
     """The parameters a rival flies with. Raises BadInput for one it does not have."""
-    from beaver_ftc.scenario.base import suggestion
-
     for key in context.options:
         if key not in defaults:
             raise BadInput(f"{name}: options.{key}: unknown option{suggestion(key, defaults)}")

@@ -156,7 +156,7 @@ def run_pitch_lost(
 
 def document_of(rows: list[Document], airspeeds_mps: Sequence[float]) -> Document:
     """All flights, the linear margins, and whether power lost an aircraft that was kept without it."""
-    from beaver_ftc.control.config import EnginePower
+    from beaver_ftc.scenario.control import EnginePower
 
     harmed = [row for row in rows if row["with"]["departure"] and not row["without"]["departure"]]
     return {

@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from beaver_ftc.control.config import EnginePower
+from beaver_ftc.scenario.control import EnginePower
 
 if TYPE_CHECKING:
     from beaver_ftc.plant.linear import LinearModel

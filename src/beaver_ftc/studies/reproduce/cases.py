@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from beaver_ftc.diagnosis.state import DEADBEAT_PER_S
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.metrics import Document, metrics
+from beaver_ftc.scenario.diagnosis import DEADBEAT_PER_S
 from beaver_ftc.studies.reproduce.choices import ELEVATOR_LOSS, FAULT_AT_S, UNANTICIPATED, scenario
 
 AXES = ("p", "q", "r")

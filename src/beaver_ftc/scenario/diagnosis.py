@@ -5,9 +5,13 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, Strict, field_validator, model_validator
 
 from beaver_ftc.design.coefficients import TERMS
-from beaver_ftc.diagnosis.state import DEADBEAT_PER_S, MAX_POLES
-from beaver_ftc.scenario.base import refuse, suggestion
+from beaver_ftc.errors import suggestion
+from beaver_ftc.plugins import DETECTORS, refusal
+from beaver_ftc.scenario.base import refuse
 from beaver_ftc.scenario.sensors import Sensors
+
+MAX_POLES = 6  # of the bank of detection filters, the published one included
+DEADBEAT_PER_S = 1e6  # a pole at which exp(-lam dt) is 0: the filter keeps nothing but the last frame
 
 Bound = Annotated[float, Field(ge=0, le=100)]
 Share = Annotated[float, Field(ge=0, le=0.9)]
@@ -30,8 +34,6 @@ class PerAxis(BaseModel):
 
 
 def _known_scheme(name: str) -> str:
-    from beaver_ftc.plugins import DETECTORS, refusal
-
     wrong = refusal(DETECTORS, name)
     refuse([((), wrong)] if wrong else [])
     return name

@@ -4,11 +4,11 @@ from typing import Annotated, Self
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
+from beaver_ftc.plugins import LAWS, refusal
+from beaver_ftc.scenario.base import refuse
+
 
 def _known_law(name: str) -> str:
-    from beaver_ftc.plugins import LAWS, refusal
-    from beaver_ftc.scenario.base import refuse
-
     wrong = refusal(LAWS, name)
     refuse([((), wrong)] if wrong else [])
     return name
@@ -57,8 +57,6 @@ class EnginePower(BaseModel):
 
     @model_validator(mode="after")
     def _a_range(self) -> Self:
-        from beaver_ftc.scenario.base import refuse
-
         says = f"below lowest_inhg, allowed: {self.lowest_inhg:g} inHg or more"
         refuse([(("highest_inhg",), says)] if self.highest_inhg < self.lowest_inhg else [])
         return self

@@ -1,0 +1,149 @@
+"""The house rules that keep the package readable: floors, sizes, no circles, one importer of JSBSim.
+
+CONTRIBUTING.md has the same map in words. What a file imports is read from its syntax tree, imports inside
+functions and under TYPE_CHECKING included: an arrow is an arrow.
+"""
+
+import ast
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+import beaver_ftc
+
+ROOT = Path(beaver_ftc.__file__).parent
+PACKAGE = "beaver_ftc"
+
+# Folders from the ground up; a folder imports what is below its own floor, and itself.
+FLOORS = (
+    {"errors", "compiled", "paths", "plugins"},
+    {"aircraft"},
+    {"design"},
+    {"scenario"},
+    {"plant"},
+    {"diagnosis"},
+    {"control"},
+    {"loop"},
+    {"results"},
+    {"flights"},
+    {"studies"},
+    {"integrations", "live"},
+    {"cli"},
+)
+TOOLS = FLOORS[0]
+MOST_FOLDERS, MOST_LINES = 13, 350
+
+# Exceptions still to be mended: (importing file, what it imports). Nothing may be added.
+UPWARD = {
+    ("design/variants.py", "scenario"),
+    ("results/report.py", "studies"),
+}
+CIRCLES = {
+    frozenset({"scenario.schema", "scenario.warnings"}),
+    frozenset({"scenario.builtin", "scenario.loader"}),
+    frozenset({"studies.matrix.pitch_lost", "studies.matrix.pitch_text"}),
+}
+LONG = {"diagnosis/fault_types.py", "loop/frame.py"}
+
+
+@cache
+def modules() -> dict[str, Path]:
+    """Dotted name below the package -> file; a package goes by its folder's name."""
+    found = {}
+    for path in sorted(ROOT.rglob("*.py")):
+        parts = path.relative_to(ROOT).with_suffix("").parts
+        found[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
+    return found
+
+
+@cache
+def imports(name: str) -> frozenset[str]:
+    """Every dotted name that a module imports, whole: `numpy`, `beaver_ftc.loop.frame.fly_frame`."""
+    found = set()
+    for node in ast.walk(ast.parse(modules()[name].read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{name} imports relatively"
+            found |= {f"{node.module}.{alias.name}" for alias in node.names}
+    return frozenset(found)
+
+
+def own_imports(name: str) -> set[str]:
+    """The modules of this package that a module imports."""
+    found = set()
+    for target in imports(name):
+        if not target.startswith(f"{PACKAGE}."):
+            continue
+        inner = target.removeprefix(f"{PACKAGE}.")
+        found.add(inner if inner in modules() else inner.rpartition(".")[0])
+    return found - {name, ""}
+
+
+def floor_of(name: str) -> int:
+    """The floor of a module, or of the folder it is in."""
+    (floor,) = (i for i, rooms in enumerate(FLOORS) if name.partition(".")[0] in rooms)
+    return floor
+
+
+def test_every_room_is_on_the_plan():
+    rooms = {name.partition(".")[0] for name in modules() if name}
+    assert rooms <= set().union(*FLOORS)
+
+
+@pytest.mark.parametrize("name", [name for name in modules() if name])
+def test_imports_run_downwards_only(name):
+    file = modules()[name].relative_to(ROOT).as_posix()
+    room = name.partition(".")[0]
+    for target in own_imports(name):
+        other = target.partition(".")[0]
+        allowed = other == room or floor_of(other) < floor_of(room) or {room, other} <= TOOLS
+        assert allowed or (file, other) in UPWARD, f"{file} imports {other}"
+
+
+def test_no_two_modules_import_each_other_in_a_circle():
+    assert {frozenset(circle) for circle in circles()} <= CIRCLES
+
+
+def circles() -> list[set[str]]:
+    """Sets of modules each of which reaches all others by imports (Tarjan's strongly connected ones)."""
+    order, low, stack, found = {}, {}, [], []
+
+    def visit(name):
+        order[name] = low[name] = len(order)
+        stack.append(name)
+        for target in own_imports(name):
+            if target not in order:
+                visit(target)
+            if target in stack:
+                low[name] = min(low[name], low[target])
+        if low[name] == order[name]:
+            circle = set(stack[stack.index(name) :])
+            del stack[stack.index(name) :]
+            if len(circle) > 1:
+                found.append(circle)
+
+    for name in modules():
+        if name not in order:
+            visit(name)
+    return found
+
+
+def test_only_the_plant_imports_jsbsim():
+    importers = {name for name in modules() if any(i.partition(".")[0] == "jsbsim" for i in imports(name))}
+    assert importers
+    assert {name.partition(".")[0] for name in importers} == {"plant"}
+
+
+def test_few_folders_and_few_loose_modules():
+    folders = {path.name for path in ROOT.iterdir() if (path / "__init__.py").exists()}
+    loose = {path.stem for path in ROOT.glob("*.py")} - {"__init__", "__main__"}
+    assert len(folders) <= MOST_FOLDERS
+    assert loose <= TOOLS
+
+
+def test_no_file_is_long():
+    files = {path.relative_to(ROOT).as_posix(): path for path in modules().values()}
+    long = {file for file, path in files.items() if len(path.read_text().splitlines()) > MOST_LINES}
+    assert long <= LONG

@@ -26,55 +26,30 @@ SURFACES = ("aileron", "elevator", "rudder", "flap")
 FRAMES = 500
 
 
-def surface_function(root: ET.Element, name: str) -> tuple[ET.Element, ET.Element]:
-    """A function of the flight control system, and the channel it is in."""
-    for channel in root.iter("channel"):
-        for function in channel:
-            if function.get("name") == name:
-                return channel, function
-    raise KeyError(name)
-
-
-def body(function: ET.Element) -> ET.Element:
-    """What a function computes."""
-    inner = function.find("function")
-    return next(element for element in (function if inner is None else inner) if element.tag != "description")
-
-
-def set_body(function: ET.Element, formula: str) -> None:
-    """Let a function of the flight control system compute something else."""
-    inner = function.find("function")
+def set_component(root: ET.Element, name: str, formula: str) -> None:
+    """Let a component of the flight control system compute something else."""
+    component = next(each for each in root.iter("fcs_function") if each.get("name") == name)
+    inner = component.find("function")
     assert inner is not None
     inner.clear()
     inner.append(ET.fromstring(formula))
 
 
+def body(function: ET.Element) -> ET.Element:
+    """What a function computes."""
+    return next(element for element in function if element.tag != "description")
+
+
 def without_actuators(root: ET.Element) -> None:
-    """Ideal actuators only: position is demand. Their failures go with them; effectiveness stays."""
+    """Ideal actuators only: position is command, with no jam, float, runaway or normalised command."""
     for s in SURFACES:
-        for stage in ("rate-in-force-rad_sec", "actuator-rad"):
-            channel, function = surface_function(root, f"fcs/{s}-{stage}")
-            channel.remove(function)
-        set_body(
-            surface_function(root, f"fcs/{s}-pos-rad")[1],
-            f"<sum><property>fcs/{s}-demand-rad</property></sum>",
-        )
+        set_component(root, f"fcs/{s}-actuator-rad", f"<sum><property>fcs/{s}-cmd-rad</property></sum>")
 
 
 def without_bias_and_oscillation(root: ET.Element) -> None:
     """No bias and no oscillatory failure."""
     for s in SURFACES:
-        set_body(
-            surface_function(root, f"fcs/{s}-pos-rad")[1],
-            f"<sum><property>fcs/{s}-actuator-rad</property></sum>",
-        )
-
-
-def without_standard_commands(root: ET.Element) -> None:
-    """No `fcs/<s>-cmd-norm`, and no runaway."""
-    for s in SURFACES:
-        demand = surface_function(root, f"fcs/{s}-demand-rad")[1]
-        set_body(demand, f"<sum><property>fcs/{s}-cmd-rad</property></sum>")
+        set_component(root, f"fcs/{s}-pos-rad", f"<sum><property>fcs/{s}-actuator-rad</property></sum>")
 
 
 def without_surfaces(root: ET.Element) -> None:
@@ -116,21 +91,9 @@ def without_term_scales(root: ET.Element) -> None:
 
 
 def without_separate_terms(root: ET.Element) -> None:
-    """One function a coefficient: its terms stand in the sum, and cannot be logged one by one."""
-    named = functions(root)
-    for name, function in named.items():
-        if name.startswith("aero/coefficient/") and "_" not in name:
-            inline(function, named, aerodynamics(root))
-
-
-def inline(total: ET.Element, named: dict[str, ET.Element], section: ET.Element) -> None:
-    """Put the terms of a sum in the place of their names, but for those needed elsewhere."""
-    terms = body(total)
-    for i, term in enumerate(list(terms)):
-        name = (term.text or "").strip()
-        if name in named and name != "aero/coefficient/CY_betadot":
-            terms[i] = body(named[name])
-            section.remove(named[name])
+    """One function a coefficient: its terms have no name, and cannot be logged one by one."""
+    for part in aerodynamics(root).iter("product"):
+        part.attrib.pop("name", None)
 
 
 def without_uncertainty_of_accelerations(root: ET.Element) -> None:
@@ -138,6 +101,7 @@ def without_uncertainty_of_accelerations(root: ET.Element) -> None:
     section, named = aerodynamics(root), functions(root)
     for axis in "pqr":
         section.remove(named[f"uncertainty/{axis}dot-rad_sec2"])
+    section.remove(named["uncertainty/of-accelerations"])
     for moment in section.iter("function"):
         if (moment.get("name") or "").startswith("aero/moment/"):
             parts = body(moment)
@@ -145,15 +109,19 @@ def without_uncertainty_of_accelerations(root: ET.Element) -> None:
                 parts.remove(extra)
 
 
+def drop_part(root: ET.Element, wanted: Callable[[str], bool]) -> None:
+    """Remove named parts from every sum."""
+    for total in root.iter("sum"):
+        for part in total.findall("product"):
+            if wanted(part.get("name", "")):
+                total.remove(part)
+
+
 def without_turned_betadot(root: ET.Element) -> None:
     """The side force of betadot along body Y."""
-    section, named = aerodynamics(root), functions(root)
-    for axis in "XYZ":
-        section.remove(named[f"aero/coefficient/C{axis}_turn"])
-    for total in section.iter("sum"):
-        for part in total.findall("property"):
-            if (part.text or "").strip().endswith("_turn"):
-                total.remove(part)
+    section = aerodynamics(root)
+    section.remove(functions(root)["aero/coefficient/CY_betadot-tilted"])
+    drop_part(section, lambda name: name.endswith("_turn"))
 
 
 def without_envelope(root: ET.Element) -> None:
@@ -174,12 +142,7 @@ def without_engine(root: ET.Element) -> None:
 
 def without_unanticipated(root: ET.Element) -> None:
     """No unanticipated fault."""
-    section, named = aerodynamics(root), functions(root)
-    section.remove(named["aero/coefficient/Cm_unanticipated"])
-    total = body(named["aero/coefficient/Cm"])
-    for part in total.findall("property"):
-        if (part.text or "").strip() == "aero/coefficient/Cm_unanticipated":
-            total.remove(part)
+    drop_part(aerodynamics(root), lambda name: name.endswith("Cm_unanticipated"))
 
 
 def jsbsim_alone(root: ET.Element) -> None:
@@ -194,12 +157,11 @@ def jsbsim_alone(root: ET.Element) -> None:
 
 
 VARIANTS: dict[str, Callable[[ET.Element], None]] = {
-    "actuators: lag, rate limit, jam, float, slow": without_actuators,
+    "actuators: lag, rate limit, jam, float, slow, runaway": without_actuators,
     "bias and oscillatory failure": without_bias_and_oscillation,
-    "standard commands and runaway": without_standard_commands,
     "all four surfaces": without_surfaces,
     "a scale on every term": without_term_scales,
-    "every term a function of its own": without_separate_terms,
+    "every term readable by itself": without_separate_terms,
     "error of inertia coupling, sinusoids": without_uncertainty_of_accelerations,
     "betadot turned across the flight path": without_turned_betadot,
     "unanticipated fault": without_unanticipated,

@@ -10,6 +10,7 @@ from beaver_ftc.errors import BadInput
 from beaver_ftc.paths import data_root
 
 _XML = "aircraft/beaver/beaver.xml"
+_OPERATIONS = ("product", "sum", "max", "ifthen")
 _SURFACE = re.compile(rf"({'|'.join(SURFACES)})")
 
 # The XML has no place for what a plain property means: here it is, by the end of its name.
@@ -76,7 +77,8 @@ def _inputs(root: Element) -> list[tuple[str, float]]:
 
 
 def _functions(root: Element) -> list[Element]:
-    return [e for e in root.iter() if e.tag in ("function", "fcs_function") and e.get("name")]
+    """Everything that can be read: functions, components, and operations inside them that have a name."""
+    return [e for e in root.iter() if e.get("name") and (e.tag in _OPERATIONS or e.tag.endswith("function"))]
 
 
 def _is_term(element: Element) -> bool:
@@ -112,7 +114,7 @@ def meaning_of(name: str) -> str:
     """What a property that can be set means. BadInput for one that MEANINGS lacks."""
     endings = [ending for ending in MEANINGS if name.endswith(ending)]
     if not endings:
-        raise BadInput(f"{name}: what it means is missing in beaver_ftc/docs/properties.py")
+        raise BadInput(f"{name}: what it means is missing in tools/docs/properties.py")
     return MEANINGS[max(endings, key=len)]
 
 

@@ -1,3 +1,61 @@
-"""Actuator fault diagnosis and fault-tolerant control of the DHC-2 Beaver, flown by JSBSim."""
+"""Actuator fault diagnosis and fault-tolerant control of the DHC-2 Beaver, flown by JSBSim.
+
+    import beaver_ftc as bf
+
+    flight = bf.fly("elevator-partial-loss")
+    flight.log, flight.detection, flight.plot("tracking")
+
+What is heavy is imported when it is first used.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from beaver_ftc.errors import BadInput, SimulationFailed
+
+if TYPE_CHECKING:
+    from beaver_ftc.control.base import Law, Reference
+    from beaver_ftc.design.context import Context
+    from beaver_ftc.diagnosis.base import Detector, Measured, Verdict
+    from beaver_ftc.results.flight import Flight, fly, open_run
+    from beaver_ftc.results.simulation import Simulation
+    from beaver_ftc.scenario.builtin import builtin_names as scenarios
+    from beaver_ftc.scenario.given import load
+    from beaver_ftc.scenario.schema import Scenario
 
 __version__ = "0.1.0"
+
+# Public name -> module:name it is found by at first use.
+_WHERE = {
+    "Context": "beaver_ftc.design.context:Context",
+    "Detector": "beaver_ftc.diagnosis.base:Detector",
+    "Flight": "beaver_ftc.results.flight:Flight",
+    "Law": "beaver_ftc.control.base:Law",
+    "Measured": "beaver_ftc.diagnosis.base:Measured",
+    "Reference": "beaver_ftc.control.base:Reference",
+    "Scenario": "beaver_ftc.scenario.schema:Scenario",
+    "Simulation": "beaver_ftc.results.simulation:Simulation",
+    "Verdict": "beaver_ftc.diagnosis.base:Verdict",
+    "fly": "beaver_ftc.results.flight:fly",
+    "load": "beaver_ftc.scenario.given:load",
+    "open_run": "beaver_ftc.results.flight:open_run",
+    "scenarios": "beaver_ftc.scenario.builtin:builtin_names",
+}
+
+__all__ = [
+    "BadInput", "Context", "Detector", "Flight", "Law", "Measured", "Reference", "Scenario", "Simulation",
+    "SimulationFailed", "Verdict", "__version__", "fly", "load", "open_run", "scenarios",
+]  # fmt: skip
+
+
+def __getattr__(name: str) -> Any:
+    """Import a public name when it is first asked for."""
+    if name not in _WHERE:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    module, _, attribute = _WHERE[name].partition(":")
+    found = globals()[name] = getattr(import_module(module), attribute)
+    return found
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -96,8 +96,8 @@ class Loop:
             bool(self.frames["control"]["power"]["enabled"][0]),
             bool(self.frames["fdi"]["statistical"]["enabled"][0]),
         )
-        self._log = np.empty((min(CHUNK_ROWS, self.n_frames), len(self.columns)))
-        self._references = np.empty((len(self._log), 3))
+        self.log = np.empty((min(CHUNK_ROWS, self.n_frames), len(self.columns)))
+        self.references = np.empty((len(self.log), 3))
         self.fly_frame = self.plugged or self.direct(fly_frame)
         self._set_origin()
 
@@ -135,7 +135,7 @@ class Loop:
 
     def direct(self, kernel: Callable[..., int]) -> Callable[..., int]:
         """A compiled frame as this flight calls it: `frame.fly_frame`, or another in its place."""
-        return direct(kernel, self.frames, self._references, self._log)
+        return direct(kernel, self.frames, self.references, self.log)
 
     def land(self) -> Flight:
         """What the flight has yielded so far."""
@@ -155,14 +155,14 @@ class Loop:
             rows = min(CHUNK_ROWS, self.n_frames - start)
             status = self.fly_chunk(start, rows)
             flown = int(self.frames["row"][0])
-            yield self._log[:flown]
+            yield self.log[:flown]
             if status != FLYING:
                 return
 
     def sample_references(self, start: int, rows: int) -> None:
         """Find the references of frames start to start + rows, for the first rows of the log to come."""
         t = np.arange(start, start + rows) / self.scenario.rate_hz
-        self._references[:rows] = sample(self.scenario.reference, t)
+        self.references[:rows] = sample(self.scenario.reference, t)
         self.frames["row"] = 0
 
     def fly_chunk(self, start: int, rows: int) -> int:
@@ -170,17 +170,21 @@ class Loop:
         self.sample_references(start, rows)
         k, end = start, start + rows
         while k < end:
-            self.schedule.apply(k)
-            self.gust.apply(k)
-            self._tell_analyst(k)
-            stop = min(self.schedule.next_change(k), self.gust.next_change(k), end)
-            status = self._fly_segment(k, stop)
+            stop = min(self.turn_to(k), end)
+            status = self.fly_segment(k, stop)
             if status != FLYING:
                 return status
             k = stop
         return FLYING
 
-    def _fly_segment(self, k: int, stop: int) -> int:
+    def turn_to(self, k: int) -> int:
+        """Bring faults and gusts to frame k, the next to fly; returns the frame at which to call again."""
+        self.schedule.apply(k)
+        self.gust.apply(k)
+        self._tell_analyst(k)
+        return min(self.schedule.next_change(k), self.gust.next_change(k))
+
+    def fly_segment(self, k: int, stop: int) -> int:
         """Frames k to stop, in which no fault changes."""
         if k == 0:
             status = self.fly_frames(1, 0)
@@ -191,7 +195,7 @@ class Loop:
 
     def fly_frames(self, count: int, runs: int) -> int:
         """So many frames of the loop, each of so many JSBSim frames, in which no fault changes."""
-        frames, references, log, fly_frame = self.frames, self._references, self._log, self.fly_frame
+        frames, references, log, fly_frame = self.frames, self.references, self.log, self.fly_frame
         advance = self._advance(runs)
         for _ in range(count):
             advance()

@@ -41,6 +41,7 @@ class PluggedFrame:
     ) -> None:
         self.detector, self.law = detector, law
         self.verdict = Verdict()
+        self.held_rad: np.ndarray | None = None  # a command (surfaces,) that takes the law's place
         self._names = names
         self._told = np.zeros(1, stages.TOLD)
         self._t_s = 0.0
@@ -56,7 +57,7 @@ class PluggedFrame:
             return status
         frame = frames[0]
         self._t_s = float(frame["t"])
-        measured = _measured(frame)
+        measured = measured_of(frame)
         self._diagnose(frames, measured)
         stages.decide_mode(frames)
         self._command(frames, references, measured)
@@ -73,6 +74,9 @@ class PluggedFrame:
         stages.heed(frames, self._told)
 
     def _command(self, frames: np.ndarray, references: np.ndarray, measured: Measured) -> None:
+        if self.held_rad is not None:
+            stages.obey(frames, self.held_rad)
+            return
         if self.law is None:
             stages.act(frames, references)
             return
@@ -139,7 +143,8 @@ class PluggedFrame:
         return array
 
 
-def _measured(frame: np.void) -> Measured:
+def measured_of(frame: np.void) -> Measured:
+    """What is known at the frame just flown."""
     return Measured(
         float(frame["t"]),
         frame["x"].copy(),

@@ -104,6 +104,7 @@ class _Event:
     last: int
     grown: int
     was_rad: float = 0.0
+    struck: bool = False
 
     @classmethod
     def of(cls, fault: Any, rate_hz: float) -> "_Event":
@@ -143,9 +144,17 @@ class FaultSchedule:
 
     def __init__(self, faults: Sequence[Any], plant: Plant, rate_hz: float) -> None:
         self._plant = plant
-        self._events = sorted((_Event.of(fault, rate_hz) for fault in faults), key=lambda event: event.first)
+        self._rate_hz = rate_hz
+        self._declared: list[_Event] = []
         self._written: dict[str, float] = {}
-        self._struck: set[int] = set()
+        self.declare(faults)
+
+    def declare(self, faults: Sequence[Any]) -> None:
+        """Take these faults for those declared so far: some more at the end, some that end otherwise."""
+        before, self._declared = self._declared, [_Event.of(fault, self._rate_hz) for fault in faults]
+        for event, known in zip(self._declared, before, strict=False):
+            event.was_rad, event.struck = known.was_rad, known.struck
+        self._events = sorted(self._declared, key=lambda event: event.first)
 
     def begun(self, k: int) -> bool:
         """Whether some fault has struck by frame k, repaired or not."""
@@ -162,9 +171,9 @@ class FaultSchedule:
             self._plant.settle()  # nothing runs before frame 0 is read: its accelerations must show the fault
 
     def _note_where_surfaces_were(self, k: int) -> None:
-        for i, event in enumerate(self._events):
-            if event.in_force(k) and i not in self._struck:
-                self._struck.add(i)
+        for event in self._events:
+            if event.in_force(k) and not event.struck:
+                event.struck = True
                 if event.fault.type == "stuck":
                     event.was_rad = self._plant.read(f"fcs/{event.fault.actuator}-pos-rad")
 

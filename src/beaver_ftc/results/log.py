@@ -4,6 +4,7 @@ Columns are plain float64, snappy-compressed and without dictionaries: what Plot
 other reader opens as it is, and what costs the loop least.
 """
 
+import shutil
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from types import TracebackType
@@ -83,6 +84,78 @@ class ParquetLog:
         ]
         writer.write_table(pa.Table.from_arrays(arrays, schema=self._schema))
         self._used = 0
+
+
+class MemoryLog:
+    """A `LogSink` that keeps the log in memory, and reads like a stored one."""
+
+    def __init__(self) -> None:
+        self.columns: tuple[str, ...] = ()
+        self._chunks: list[np.ndarray] = []
+
+    def open(self, columns: Sequence[str]) -> None:
+        """Start anew; `columns` name the log's columns in order."""
+        self.columns, self._chunks = tuple(columns), []
+
+    def write(self, rows: np.ndarray) -> None:
+        """Keep a copy of `rows`, shape (n, columns), float64."""
+        self._chunks.append(rows.copy())
+
+    def close(self) -> None:
+        """Nothing is left to be done."""
+
+    @property
+    def rows(self) -> np.ndarray:
+        """The whole log, (frames, columns)."""
+        if len(self._chunks) != 1:
+            self._chunks = [np.concatenate(self._chunks or [np.empty((0, len(self.columns)))])]
+        return self._chunks[0]
+
+    def so_far(self) -> "MemoryLog":
+        """The log as it is now; this one may grow."""
+        now = MemoryLog()
+        now.columns, now._chunks = self.columns, list(self._chunks)
+        return now
+
+    def copy_to(self, path: Path) -> None:
+        """Write the parquet file that a run would have written."""
+        with ParquetLog(path) as log:
+            log.open(self.columns)
+            log.write(self.rows)
+
+    def row_count(self) -> int:
+        """Number of frames."""
+        return sum(len(chunk) for chunk in self._chunks)
+
+    def read_chunks(self, columns: Sequence[str] | None = None) -> Iterator[dict[str, np.ndarray]]:
+        """Yield the log a chunk at a time, each as name -> values, shape (rows,)."""
+        wanted = self.columns if columns is None else columns
+        places = [self.columns.index(name) for name in wanted]
+        for chunk in self._chunks:
+            yield {name: chunk[:, place] for name, place in zip(wanted, places, strict=True)}
+
+
+class StoredLog:
+    """The log in a parquet file, read when asked for."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self.columns = column_names(path)
+
+    def copy_to(self, path: Path) -> None:
+        """Copy the file."""
+        shutil.copyfile(self._path, path)
+
+    def row_count(self) -> int:
+        """Number of frames."""
+        return row_count(self._path)
+
+    def read_chunks(self, columns: Sequence[str] | None = None) -> Iterator[dict[str, np.ndarray]]:
+        """Yield the log a row group at a time, each as name -> values, shape (rows,)."""
+        return read_chunks(self._path, columns)
+
+
+Log = MemoryLog | StoredLog
 
 
 def column_names(path: Path) -> tuple[str, ...]:

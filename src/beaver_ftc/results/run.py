@@ -29,19 +29,25 @@ def run(
     Raises BadInput for a flight that cannot be trimmed, SimulationFailed for one not completed or kept.
     """
     from beaver_ftc.loop.loop import fly
-    from beaver_ftc.scenario.dump import to_yaml
 
     with result_folder(out, scenario.name) as folder:
         with ParquetLog(folder / "log.parquet") as log:
             flight = fly(scenario, log, progress, prepare=prepare)
         document = metrics(flight)
-        (folder / "scenario.yaml").write_text(to_yaml(scenario), encoding="utf-8")
-        (folder / "metrics.json").write_text(as_json(document), encoding="utf-8")
+        write_documents(folder, scenario, document)
         if report:
             write_report_files(folder, document)
         if exports:
             write_exports(folder, document, exports)
     return document
+
+
+def write_documents(folder: Path, scenario: "Scenario", document: Document) -> None:
+    """Write what was flown and what came out of it into a result folder."""
+    from beaver_ftc.scenario.dump import to_yaml
+
+    (folder / "scenario.yaml").write_text(to_yaml(scenario), encoding="utf-8")
+    (folder / "metrics.json").write_text(as_json(document), encoding="utf-8")
 
 
 def write_report_files(folder: Path, document: Document) -> None:

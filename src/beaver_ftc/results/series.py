@@ -20,16 +20,26 @@ Series = dict[str, np.ndarray]
 def read_series(
     path: Path, columns: Sequence[str], window_s: tuple[float, float] = WHOLE, max_points: int = MAX_POINTS
 ) -> Series:
+    """What `series_of` makes of the log in a parquet file."""
+    return series_of(log.StoredLog(path), columns, window_s, max_points)
+
+
+def series_of(
+    source: log.Log,
+    columns: Sequence[str],
+    window_s: tuple[float, float] = WHOLE,
+    max_points: int = MAX_POINTS,
+) -> Series:
     """`t_s` and the named columns within a window of time, each of shape (points,), about max_points at most.
 
     A longer log is cut into stretches of equal length; each gives two points at its first two instants, the
     lowest value and the highest in the order in which they occur, so that no peak is lost.
     """
     wanted = tuple(dict.fromkeys(("t_s", *columns)))
-    frame_s = _frame_s(path)
-    rows = min(log.row_count(path), (window_s[1] - window_s[0]) / frame_s)
+    frame_s = _frame_s(source)
+    rows = min(source.row_count(), (window_s[1] - window_s[0]) / frame_s)
     stretch = 1 if rows <= max_points else math.ceil(2 * rows / max_points)
-    whole = _unwrap_heading(log.read_chunks(path, sources(wanted)))
+    whole = _unwrap_heading(source.read_chunks(sources(wanted)))
     chunks = (_derive(_within(chunk, window_s), wanted) for chunk in whole)
     parts = [chunk if stretch == 1 else _envelope(chunk, stretch) for chunk in chunks if chunk["t_s"].size]
     return {name: np.concatenate([part[name] for part in parts] or [np.empty(0)]) for name in wanted}
@@ -58,9 +68,9 @@ def _ratio(chunk: Series, names: Sequence[str]) -> np.ndarray:
     return np.where(np.isfinite(ratio), ratio, np.nan)
 
 
-def _frame_s(path: Path) -> float:
+def _frame_s(source: log.Log) -> float:
     """Time from one row to the next, s; infinite in a log of a single row."""
-    first = next(log.read_chunks(path, ["t_s"]), {"t_s": np.empty(0)})["t_s"][:2]
+    first = next(source.read_chunks(["t_s"]), {"t_s": np.empty(0)})["t_s"][:2]
     return float(first[1] - first[0]) if first.size == 2 else math.inf
 
 

@@ -11,7 +11,7 @@ from beaver_ftc.scenario.base import Conflict
 
 DURATION_S = 30.0
 RATE_HZ = 100.0
-_OF_A_FAULT = (
+OF_A_FAULT = (
     "detected_within_s", "isolated_as", "isolated_type", "candidate_type", "isolated_within_s",
     "post_fault_rms_deg_s",
 )  # fmt: skip
@@ -69,7 +69,7 @@ def _expected_of_no_fault(outline: Outline) -> list[Conflict]:
     if outline.starts_s is None or outline.starts_s:
         return []
     says = "there is no fault to expect it of, allowed: only with faults"
-    return [(("expect", key), says) for key in outline.expected if key in _OF_A_FAULT]
+    return [(("expect", key), says) for key in outline.expected if key in OF_A_FAULT]
 
 
 def _as_list(value: Any) -> list[Any]:

@@ -31,7 +31,12 @@ def load_scenario(path_or_name: str | Path) -> Scenario:
 
 def load_text(text: str, source: str = "<text>", folder: Path | None = None) -> Scenario:
     """The scenario in a text; `source` begins its error lines, `folder` is where its CSV files are."""
-    return validate(Scenario, parse_document(text, source), source, folder, _conflicts)
+    return validate_scenario(parse_document(text, source), source, folder)
+
+
+def validate_scenario(document: Document, source: str = "", folder: Path | None = None) -> Scenario:
+    """The scenario in a document; without a source its error lines begin with the key."""
+    return validate(Scenario, document, source, folder, _conflicts)
 
 
 @lru_cache

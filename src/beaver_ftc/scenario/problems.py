@@ -17,7 +17,10 @@ _SHOWN = 48
 
 
 class ScenarioError(BadInput):
-    """A file that cannot be used; `str` is one line a mistake, `problems` the mistakes."""
+    """A file that cannot be used; `str` is one line a mistake, `problems` the mistakes.
+
+    What comes from no file has an empty source: its lines begin with the key.
+    """
 
     def __init__(self, source: str, problems: Sequence[Problem]) -> None:
         self.source = source
@@ -26,11 +29,13 @@ class ScenarioError(BadInput):
 
     @property
     def lines(self) -> tuple[str, ...]:
-        source = one_line(self.source, 4096)
         return tuple(
-            f"{source}:{problem.line}: {key_path(problem.location)}: {one_line(problem.says, 2000)}"
+            f"{self._place(problem)}{key_path(problem.location)}: {one_line(problem.says, 2000)}"
             for problem in self.problems
         )
+
+    def _place(self, problem: Problem) -> str:
+        return f"{one_line(self.source, 4096)}:{problem.line}: " if self.source else ""
 
     def __reduce__(self) -> tuple[Any, ...]:
         return (type(self), (self.source, self.problems))

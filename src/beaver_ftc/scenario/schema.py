@@ -1,5 +1,6 @@
 """The scenario file as frozen, typed, strict sections; ranges are the contract's."""
 
+from collections.abc import Mapping
 from math import degrees
 from typing import Annotated, Any, Literal, Self
 
@@ -279,6 +280,15 @@ class Scenario(Section):
     def _outline(self) -> Outline:
         expected = tuple(key for key, value in self.expect if value is not None)
         return Outline(self.duration_s, self.rate_hz, tuple(fault.at_s for fault in self.faults), expected)
+
+    def with_(self, changes: Mapping[str, Any]) -> "Scenario":
+        """This scenario with new values at dotted keys, e.g. `{"faults[0].magnitude": 0.2}`.
+
+        Raises BadInput that names the key, what is wrong and what is allowed.
+        """
+        from beaver_ftc.scenario.given import changed
+
+        return changed(self, changes)
 
     def warnings(self) -> tuple[str, ...]:
         """What is allowed and yet deserves a word: one line each, `key.path: what`."""

@@ -230,11 +230,16 @@ def sample(reference: Reference, t_s: Samples) -> Samples:
 
     Shapes: t_s (n,) -> (n, 3), columns p, q, r. Units: s -> rad/s.
     """
+    return sample_deg_s(reference, t_s) * RAD_PER_DEG
+
+
+def sample_deg_s(reference: Reference, t_s: Samples) -> Samples:
+    """The same in deg/s, as the file has them."""
     t_s = np.asarray(t_s, dtype=float)
     axes = [
         sum((item.shape.rate_deg_s(t_s) for item in axis), np.zeros_like(t_s)) for axis in _axes(reference)
     ]
-    return np.column_stack(axes) * RAD_PER_DEG
+    return np.column_stack(axes)
 
 
 def _axes(reference: Reference) -> tuple[Signals, Signals, Signals]:

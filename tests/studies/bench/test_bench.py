@@ -86,7 +86,7 @@ def test_every_round_flies_what_the_flight_itself_flew():
     for _ in range(2):
         contender.prepare()
         contender.fly(300)
-        flown = contender.loop._log[:300][:, columns]
+        flown = contender.loop.log[:300][:, columns]
         np.testing.assert_allclose(flown, log.rows[first : first + 300][:, columns], atol=1e-5)
 
 

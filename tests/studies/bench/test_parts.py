@@ -44,12 +44,12 @@ def test_with_reading_alone_the_truth_is_read_and_nothing_else_happens():
     commands = [loop.plant.read(f"fcs/{s}-cmd-rad") for s in SURFACES]
     loop.plant.write("fcs/elevator-cmd-rad", 0.01)
     loop.frames["row"] = 0
-    loop._log[:] = np.nan
+    loop.log[:] = np.nan
     loop.fly_frames(20, 1)
     now = loop.frames
     assert (now["truth"] != before["truth"]).any(axis=1).all()
     assert now["k"][0] == before["k"][0] + 20
     for untouched in ("fdi", "control", "f", "G"):
         assert now[untouched].tobytes() == before[untouched].tobytes()
-    assert np.isnan(loop._log).all()
+    assert np.isnan(loop.log).all()
     assert loop.plant.read("fcs/elevator-cmd-rad") == 0.01 != commands[1]

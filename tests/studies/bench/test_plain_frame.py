@@ -51,7 +51,7 @@ def recording(tmp_path_factory):
     truth, references = np.empty((FRAMES, ch.N_TRUTH)), np.empty((FRAMES, 3))
     for k in range(FRAMES):
         loop.fly_chunk(k, 1)
-        truth[k], references[k] = loop.frames["truth"][0], loop._references[0]
+        truth[k], references[k] = loop.frames["truth"][0], loop.references[0]
     assert loop.land().isolated == "elevator"
     np.save(folder / "words.npy", words)
     np.save(folder / "truth.npy", truth)

@@ -1,0 +1,313 @@
+"""A flight a step at a time: whoever calls may look, break, repair, steer and command in between.
+
+What is done to a flight is kept, frame by frame: `scenario_flown` says it all and flies it again to the bit.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from difflib import get_close_matches
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from beaver_ftc.errors import BadInput
+from beaver_ftc.loop.flight import Flight, LogSink
+from beaver_ftc.loop.held import HeldFrame
+from beaver_ftc.loop.loop import CHUNK_ROWS, FLYING, Loop
+from beaver_ftc.loop.outcome import verdict_of
+from beaver_ftc.loop.plugged import measured_of
+from beaver_ftc.plant.adapter import UnknownProperty
+from beaver_ftc.scenario.base import suggestion
+from beaver_ftc.scenario.given import fault_of
+from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.scenario.signals import RAD_PER_DEG, sample_deg_s
+from beaver_ftc.scenario.sticks import StickTrack, flown, in_force
+
+if TYPE_CHECKING:
+    from beaver_ftc.control.base import Law
+    from beaver_ftc.diagnosis.base import Detector, Measured, Verdict
+    from beaver_ftc.plant.adapter import Plant
+
+Vector = NDArray[np.float64]
+UNANTICIPATED = "unanticipated"
+
+
+class Stepping:
+    """A flight in progress. The first step flies frame 0 as well, in which the trimmed flight is measured.
+
+    sink: where the log goes. prepare: called with the trimmed plant just before the flight.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        detector: "Detector | None" = None,
+        law: "Law | None" = None,
+        sink: LogSink | None = None,
+        prepare: "Callable[[Plant], None] | None" = None,
+    ) -> None:
+        self._scenario, self._plug_ins, self._prepare = scenario, (detector, law), prepare
+        self._sink = sink
+        self.reset()
+
+    def reset(self) -> None:
+        """Put the aircraft back into trim, nothing broken, the log empty: the same scenario anew."""
+        self._loop = Loop(self._scenario, *self._plug_ins, self._prepare)
+        self._own_frame = self._loop.fly_frame
+        self._held_frame: HeldFrame | None = None
+        self._faults = self._scenario.faults
+        self._next, self._turn_at, self._written = 0, 0, 0
+        self._status = FLYING
+        self._by_hand = False
+        self._stick = StickTrack()
+        self._base: tuple[int, Vector] | None = None
+        if self._sink is not None:
+            self._sink.open(self._loop.columns)
+
+    @property
+    def t_s(self) -> float:
+        """Time of the frame just flown, s since the start."""
+        return float(self._frame["t"])
+
+    @property
+    def frames(self) -> int:
+        """Frames flown so far."""
+        return self._next
+
+    @property
+    def done(self) -> bool:
+        """Whether the flight is over: its duration flown, or the aircraft lost."""
+        return self.departed or self._next >= self._loop.n_frames
+
+    @property
+    def departed(self) -> bool:
+        """Whether the aircraft has been lost."""
+        return self._status != FLYING
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Names of the log's columns."""
+        return self._loop.columns
+
+    @property
+    def values(self) -> Vector:
+        """The log's row of the frame just flown, (columns,)."""
+        self._begin()
+        row: Vector = self._loop.log[int(self._frame["row"]) - 1].copy()
+        return row
+
+    @property
+    def measured(self) -> "Measured":
+        """What the instruments and the design model say of the frame just flown."""
+        self._begin()
+        return measured_of(self._frame)
+
+    @property
+    def verdict(self) -> "Verdict":
+        """What the diagnosis makes of the flight so far."""
+        plugged = self._loop.plugged
+        return plugged.verdict if plugged and plugged.detector else verdict_of(self._frame)
+
+    @property
+    def trim_rad(self) -> Vector:
+        """Surfaces in trim, (surfaces,) rad."""
+        trim: Vector = self._frame["control"]["trim"].copy()
+        return trim
+
+    @property
+    def travel_rad(self) -> Vector:
+        """Lower and upper stops, (2, surfaces) rad."""
+        control = self._frame["control"]
+        return np.array([control["low"], control["high"]])
+
+    def step(
+        self, command: ArrayLike | None = None, *, frames: int = 1, stick: ArrayLike | None = None
+    ) -> None:
+        """Fly one frame, or so many.
+
+        command (surfaces,) rad: another's, in place of the law's, held over these frames and kept within the
+        travel. stick (3,) rad/s: added to the scenario's reference of these frames. Raises BadInput for what
+        is not that and once the flight is over, SimulationFailed when a value is not finite.
+        """
+        if self.done:
+            raise BadInput(f"{self._scenario.name}: the flight is over at {self.t_s:g} s, allowed: reset()")
+        if not isinstance(frames, int) or frames < 1:
+            raise BadInput(f"frames: {frames!r} is out of range, allowed: a whole number of at least 1")
+        deflections = None if command is None else self._deflections(command)
+        rate_deg_s = None if stick is None else _vector(stick, 3, "stick", "rad/s") / RAD_PER_DEG
+        self._begin()
+        self._take_command(deflections)
+        end = min(self._next + frames, self._loop.n_frames)
+        self._fly_to(end, rate_deg_s)
+
+    def inject(self, fault: Mapping[str, Any]) -> None:
+        """Break something now, from the next frame on: a fault as in a scenario file, without `at_s`.
+
+        Raises BadInput that names the key.
+        """
+        self._declare((*self._faults, fault_of(fault, self._now_s)))
+
+    def repair(self, actuator: str | None = None) -> None:
+        """End now what is wrong with a surface, with the aerodynamics (`unanticipated`), or with anything.
+
+        Faults that are yet to come stay. Raises BadInput for a name that no fault can have.
+        """
+        names = (*self._surfaces, UNANTICIPATED)
+        if actuator is not None and actuator not in names:
+            raise BadInput(f"actuator: {actuator!r:.60} is not known{suggestion(str(actuator), names)}")
+        self._declare(tuple(self._repaired(fault, actuator) for fault in self._faults))
+
+    def read(self, name: str) -> float:
+        """A property of JSBSim's, in the unit its name says. Raises BadInput if there is none such."""
+        try:
+            return self._loop.plant.read(name)
+        except UnknownProperty:
+            raise BadInput(
+                f"the aircraft has no property {name!r:.80}{self._near(name)}, allowed: one that JSBSim lists"
+            ) from None
+
+    __getitem__ = read
+
+    def scenario_flown(self) -> Scenario:
+        """The scenario that flies what has been flown, to the bit.
+
+        Faults are at the frames they were injected and repaired at, the stick's rates are tables, the
+        duration is the time flown.
+
+        Raises BadInput for a flight in which another commanded the surfaces: no scenario says that.
+        """
+        if self._by_hand:
+            raise BadInput(
+                f"{self._scenario.name}: the surfaces were commanded by hand, allowed in a scenario: "
+                "the reference, sticks and faults"
+            )
+        self._begin()
+        return flown(self._scenario, self._faults, self._stick, self._next)
+
+    def as_it_happened(self) -> Scenario:
+        """The scenario of the verdict: as given if it was flown to its end and nobody interfered."""
+        if self.done and self._faults is self._scenario.faults and not self._stick.moved:
+            return self._scenario
+        if self._by_hand:
+            faults = in_force(self._faults, self._now_s)
+            return self._scenario.model_copy(update={"faults": faults})
+        return self.scenario_flown()
+
+    def outcome(self) -> Flight:
+        """What the flight has yielded so far."""
+        self._begin()
+        self._loop.scenario = self.as_it_happened()
+        return self._loop.land()
+
+    def flush(self) -> None:
+        """Hand the sink what has been flown since."""
+        row = int(self._frame["row"])
+        if self._sink is not None and row > self._written:
+            self._sink.write(self._loop.log[self._written : row])
+        self._written = row
+
+    @property
+    def _frame(self) -> np.void:
+        frame: np.void = self._loop.frames[0]
+        return frame
+
+    @property
+    def _surfaces(self) -> tuple[str, ...]:
+        from beaver_ftc.design.coefficients import SURFACES
+
+        return SURFACES
+
+    @property
+    def _now_s(self) -> float:
+        return self._next / self._scenario.rate_hz
+
+    def _begin(self) -> None:
+        if self._next == 0:
+            self._fly_to(1, None)
+
+    def _fly_to(self, end: int, stick_deg_s: Vector | None) -> None:
+        """Frames up to `end`, chunk by chunk as `Loop.chunks` has them, stopping where something changes."""
+        loop = self._loop
+        while self._next < end and not self.departed:
+            k = self._next
+            if k % CHUNK_ROWS == 0:
+                self._begin_chunk(k)
+            if k >= self._turn_at:
+                self._turn_at = loop.turn_to(k)
+            stop = min(end, self._turn_at, (k // CHUNK_ROWS + 1) * CHUNK_ROWS)
+            self._steer(k, stop, stick_deg_s)
+            try:
+                self._status = loop.fly_segment(k, stop)
+            finally:
+                self._next = int(self._frame["k"])
+
+    def _begin_chunk(self, k: int) -> None:
+        self.flush()
+        self._written = 0
+        self._loop.sample_references(k, min(CHUNK_ROWS, self._loop.n_frames - k))
+
+    def _steer(self, k: int, stop: int, stick_deg_s: Vector | None) -> None:
+        """Put the stick on top of the references of frames k to stop."""
+        self._stick.move(k, stick_deg_s)
+        if stick_deg_s is not None:
+            row = slice(k % CHUNK_ROWS, k % CHUNK_ROWS + stop - k)
+            self._loop.references[row] = (self._base_deg_s(k)[row] + stick_deg_s) * RAD_PER_DEG
+
+    def _base_deg_s(self, k: int) -> Vector:
+        """The scenario's own references of the chunk that frame k is in, (rows, 3) deg/s."""
+        start = k - k % CHUNK_ROWS
+        if self._base is None or self._base[0] != start:
+            end = min(start + CHUNK_ROWS, self._loop.n_frames)
+            t = np.arange(start, end) / self._scenario.rate_hz
+            self._base = start, sample_deg_s(self._scenario.reference, t)
+        return self._base[1]
+
+    def _declare(self, faults: Sequence[Any]) -> None:
+        self._faults = tuple(faults)
+        self._loop.schedule.declare(self._faults)
+        self._turn_at = self._next
+
+    def _repaired(self, fault: Any, actuator: str | None) -> Any:
+        place = getattr(fault, "actuator", UNANTICIPATED)
+        now_s = self._now_s
+        begun, over = fault.at_s <= now_s, fault.end_s is not None and fault.end_s <= now_s
+        if not begun or over or actuator not in (None, place):
+            return fault
+        return fault.model_copy(update={"end_s": now_s})
+
+    def _take_command(self, deflections: Vector | None) -> None:
+        """Command the surfaces in the law's place, from the frame just flown on; None gives them back."""
+        loop = self._loop
+        if loop.plugged is not None:
+            loop.plugged.held_rad = deflections
+        elif deflections is None:
+            loop.fly_frame = self._own_frame
+        else:
+            held = self._held_frame = self._held_frame or HeldFrame(loop.frames, loop.references, loop.log)
+            held.deflections[:] = deflections
+            loop.fly_frame = held
+        if deflections is not None:
+            self._by_hand = True
+            loop.command_instead(deflections)
+
+    def _deflections(self, command: ArrayLike) -> Vector:
+        low, high = self.travel_rad
+        return np.clip(_vector(command, low.size, "command", "rad"), low, high)
+
+    def _near(self, name: str) -> str:
+        catalogue: Any = self._loop.plant.fdm.query_property_catalog("")
+        known = [line.split(" ")[0] for line in catalogue.splitlines()]
+        near = get_close_matches(str(name), known, n=1)
+        return f", did you mean {near[0]}?" if near else ""
+
+
+def _vector(given: ArrayLike, size: int, what: str, unit: str) -> Vector:
+    """So many finite numbers, or BadInput."""
+    try:
+        array = np.asarray(given, dtype=float)
+    except (TypeError, ValueError):
+        array = np.empty(0)
+    if array.shape != (size,) or not np.isfinite(array).all():
+        shown = " ".join(repr(given).split())
+        raise BadInput(f"{what}: {shown:.80} is not usable, allowed: {size} finite numbers, {unit}")
+    return array

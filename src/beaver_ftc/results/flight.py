@@ -1,0 +1,230 @@
+"""A flight as Python has it: its log as a table, its metrics as a document and typed, its figures."""
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property
+from html import escape
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from beaver_ftc.errors import BadInput, SimulationFailed
+from beaver_ftc.results import typed, verdict
+from beaver_ftc.results.log import Log, MemoryLog, StoredLog
+from beaver_ftc.results.metrics import Document, metrics
+from beaver_ftc.scenario.base import suggestion
+from beaver_ftc.scenario.given import ScenarioLike, load
+from beaver_ftc.scenario.schema import Scenario
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+    from pandas import DataFrame
+
+    from beaver_ftc.control.base import Law
+    from beaver_ftc.diagnosis.base import Detector
+    from beaver_ftc.loop.flight import Flight as Outcome
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Flight:
+    """A flight that has been flown.
+
+    scenario: what was flown. metrics: the document of metrics.json. The typed parts of it are attributes:
+    fault, detection, isolation, tracking, supervisor, departure, expectations, passed.
+    """
+
+    scenario: Scenario
+    metrics: Document
+    _source: Log | None = field(default=None)
+
+    @classmethod
+    def landed(cls, outcome: "Outcome", log: Log | None) -> "Flight":
+        """Of what the loop yields."""
+        return cls(outcome.scenario, metrics(outcome), log)
+
+    @cached_property
+    def log(self) -> "DataFrame":
+        """One row a frame, the columns of log.parquet; `attrs` has scenario, seed, verdict and units.
+
+        Raises BadInput for a flight that kept none.
+        """
+        from beaver_ftc.results.frame import log_frame
+
+        return log_frame(self._kept(), self.metrics)
+
+    @property
+    def name(self) -> str:
+        """The scenario's name, and that of the result folder."""
+        return self.scenario.name
+
+    @property
+    def fault(self) -> typed.Fault | None:
+        """The first fault declared."""
+        declared = self.metrics["fault"]
+        return declared and typed.Fault.of(declared)
+
+    @property
+    def detection(self) -> typed.Detection:
+        """The alarm."""
+        return typed.Detection.of(self.metrics["detection"])
+
+    @property
+    def isolation(self) -> typed.Isolation:
+        """What was named."""
+        return typed.Isolation.of(self.metrics["isolation"])
+
+    @property
+    def tracking(self) -> typed.Tracking:
+        """How well the rates were followed."""
+        return typed.Tracking.of(self.metrics["tracking"])
+
+    @property
+    def supervisor(self) -> tuple[typed.ModeChange, ...]:
+        """Who was in charge, change by change."""
+        return typed.every(typed.ModeChange, self.metrics["supervisor"])
+
+    @property
+    def departure(self) -> typed.Departure | None:
+        """When and in which signal the aircraft was lost; None if it was kept."""
+        departure = self.metrics["departure"]
+        return departure and typed.Departure.of(departure)
+
+    @property
+    def expectations(self) -> tuple[typed.Expectation, ...]:
+        """What the scenario expects, and what came out."""
+        return typed.every(typed.Expectation, self.metrics["expectations"])
+
+    @property
+    def false_alarm(self) -> bool:
+        """Whether there was an alarm before any fault."""
+        return bool(self.metrics["false_alarm"])
+
+    @property
+    def passed(self) -> bool:
+        """Whether every expectation was met."""
+        return bool(self.metrics["passed"])
+
+    def views(self) -> tuple[str, ...]:
+        """What `plot` can show of this flight."""
+        return tuple(self._views())
+
+    def plot(self, view: str = "tracking", *, closeup: bool = False) -> "Figure":
+        """One view as a matplotlib Figure; closeup: only around the fault.
+
+        Raises BadInput for a view that there is not.
+        """
+        from beaver_ftc.results.figures import draw
+        from beaver_ftc.results.looks import closeup_window, marks
+        from beaver_ftc.results.series import WHOLE, series_of
+
+        known = self._views()
+        if view not in known:
+            raise BadInput(f"view: {view!r:.60} is not known{suggestion(str(view), known)}")
+        instants = marks(self.metrics)
+        window = (closeup_window(instants) if closeup else None) or WHOLE
+        series = series_of(self._kept(), known[view].columns, window)
+        return draw(known[view], series, instants, self.name)
+
+    def save(self, out: str | PathLike[str] = "runs", *, report: bool = True) -> Path:
+        """Write `out/<name>/` as `beaver-ftc run` does, whole or not at all; returns that folder.
+
+        report: with report.html and the figures. Raises BadInput for a flight without a log,
+        SimulationFailed where the folder cannot be written.
+        """
+        from beaver_ftc.results.run import write_documents, write_report_files
+        from beaver_ftc.results.writer import result_folder
+
+        kept = self._kept()
+        with result_folder(Path(out), self.name) as folder:
+            kept.copy_to(folder / "log.parquet")
+            write_documents(folder, self.scenario, self.metrics)
+            if report:
+                write_report_files(folder, self.metrics)
+        return Path(out) / self.name
+
+    def _kept(self) -> Log:
+        if self._source is None:
+            raise BadInput(f"{self.name}: this flight kept no log, allowed: fly it with log=True")
+        return self._source
+
+    def _views(self) -> dict[str, Any]:
+        from beaver_ftc.results.views import views
+
+        shown = views(self._kept().columns, bool(self.metrics.get("engine_power")))
+        return {view.name: view for view in shown}
+
+    def __repr__(self) -> str:
+        lines = [f"{what:12} {how}" for what, how in self._facts()]
+        return "\n".join([verdict.title(self.metrics), *(f"  {line}" for line in lines)])
+
+    def _repr_html_(self) -> str:
+        cell = "style='text-align:left'"
+        rows = "".join(
+            f"<tr><th {cell}>{escape(what)}</th><td {cell}>{escape(how)}</td></tr>"
+            for what, how in self._facts()
+        )
+        return f"<b>{escape(verdict.title(self.metrics))}</b><table>{rows}</table>"
+
+    def _facts(self) -> list[tuple[str, str]]:
+        tracked = [
+            ("tracking", f"p {p}  q {q}  r {r} deg/s RMS {when} the fault")
+            for when, p, q, r in verdict.tracking(self.metrics)
+        ]
+        missed = [
+            ("missed", f"{name} {expected}, got {actual}")
+            for name, expected, actual, passed in verdict.expectations(self.metrics)
+            if not passed
+        ]
+        return [*verdict.facts(self.metrics), *tracked, *missed]
+
+
+def fly(
+    scenario: ScenarioLike,
+    *,
+    log: bool = True,
+    detector: "Detector | None" = None,
+    law: "Law | None" = None,
+    progress: Callable[[float], None] | None = None,
+) -> Flight:
+    """Fly a scenario: a name, a path, a mapping or a Scenario.
+
+    log: keep one row a frame in memory, 0.7 kB each. detector, law: plug-in objects to fly with, in place of
+    those the scenario names. progress: called with the share flown, 0 to 1. Raises BadInput when the flight
+    cannot be trimmed or asks for what there is not, SimulationFailed when a value is not finite.
+    """
+    from beaver_ftc.loop.loop import fly as fly_loop
+
+    check_plug_in("detector", detector)
+    check_plug_in("law", law)
+    sink = MemoryLog() if log else None
+    return Flight.landed(fly_loop(load(scenario), sink, progress, detector, law), sink)
+
+
+def open_run(folder: str | PathLike[str]) -> Flight:
+    """The flight in a result folder, `runs/<name>`; its log is read when it is asked for.
+
+    Raises BadInput for a folder that is no result of a run.
+    """
+    path = Path(folder)
+    try:
+        document = json.loads((path / "metrics.json").read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise BadInput(
+            f"{path}: no metrics.json can be read there, allowed: the result folder of a run"
+        ) from error
+    kept = path / "log.parquet"
+    return Flight(load(path / "scenario.yaml"), document, StoredLog(kept) if kept.exists() else None)
+
+
+def check_plug_in(what: str, plug_in: object) -> None:
+    """Refuse what is no detector or law before it flies."""
+    if plug_in is None:
+        return
+    lacking = [name for name in ("reset", "step") if not callable(getattr(plug_in, name, None))]
+    if isinstance(plug_in, type) or lacking:
+        says = "a class" if isinstance(plug_in, type) else f"{plug_in!r:.60} without {' and '.join(lacking)}"
+        raise BadInput(f"{what}: this is {says}, allowed: an object with reset and step")
+
+
+__all__ = ["Flight", "SimulationFailed", "fly", "open_run"]

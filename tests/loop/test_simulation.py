@@ -1,0 +1,229 @@
+"""A flight step by step: the same flight, however one looks; and what is done to it is kept to the bit."""
+
+import numpy as np
+import pytest
+
+import beaver_ftc as bf
+from flying import loss, scenario
+
+SHORT = {"duration_s": 4.0, "faults": [loss(at_s=1.5)]}
+
+
+def same_log(one, other):
+    return list(one.columns) == list(other.columns) and np.array_equal(one, other, equal_nan=True)
+
+
+def stepped(sim, frames=10**9):
+    while not sim.done and sim.frames < frames:
+        sim.step()
+    return sim
+
+
+@pytest.fixture(scope="module")
+def flight():
+    return bf.fly(scenario(**SHORT))
+
+
+class TestStepping:
+    def test_is_the_flight_in_one_go(self, flight):
+        sim = stepped(bf.Simulation(scenario(**SHORT)))
+        assert same_log(sim.log, flight.log)
+        assert sim.land().metrics == flight.metrics
+        assert sim.scenario_flown().duration_s == 4.0
+
+    def test_in_leaps_as_well(self, flight):
+        sim = bf.Simulation(scenario(**SHORT))
+        while not sim.done:
+            sim.step(frames=37)
+        assert same_log(sim.log, flight.log)
+
+    def test_across_the_chunks_of_the_log(self):
+        long = scenario(duration_s=90.0, faults=[loss(at_s=85.0)])
+        sim = bf.Simulation(long)
+        while not sim.done:
+            sim.step(frames=13)
+        assert same_log(sim.log, bf.fly(long).log)
+
+    def test_looking_changes_nothing(self, flight):
+        sim = bf.Simulation(scenario(**SHORT))
+        while not sim.done:
+            sim.step()
+            if sim.frames % 50 == 0:
+                assert (
+                    sim.measured,
+                    sim.verdict,
+                    sim.values,
+                    sim["velocities/p-rad_sec"],
+                    sim.log,
+                ) is not None
+                assert sim.land().metrics["frames"] == sim.frames
+        assert same_log(sim.log, flight.log)
+
+    def test_two_side_by_side(self, flight):
+        other = scenario(duration_s=4.0, seed=7, substeps=2, faults=[loss("rudder", at_s=1.0)])
+        one, two = bf.Simulation(scenario(**SHORT)), bf.Simulation(other)
+        while not one.done:
+            one.step()
+            two.step()
+        assert same_log(one.log, flight.log)
+        assert same_log(two.log, bf.fly(other).log)
+
+    def test_a_reset_leaves_no_trace(self, flight):
+        sim = bf.Simulation(scenario(**SHORT))
+        sim.inject({"type": "stuck", "actuator": "elevator"})
+        sim.step(sim.trim_rad, frames=150)
+        sim.reset()
+        assert sim.t_s == 0.0
+        assert same_log(stepped(sim).log, flight.log)
+
+    def test_ends_where_the_aircraft_is_lost(self):
+        lost = scenario(faults=[{"type": "hardover", "actuator": "elevator", "at_s": 0.5}], duration_s=20.0)
+        sim = stepped(bf.Simulation(lost))
+        assert sim.departed
+        assert sim.land().departure == bf.fly(lost).departure
+        with pytest.raises(bf.BadInput, match="the flight is over"):
+            sim.step()
+
+    def test_a_property_by_its_name(self):
+        sim = bf.Simulation(scenario())
+        sim.step(frames=20)
+        row = dict(zip(sim.columns, sim.values, strict=True))
+        assert sim["velocities/p-rad_sec"] == row["p_rad_s"] != 0.0
+        with pytest.raises(bf.BadInput, match="did you mean velocities/p-rad_sec"):
+            sim.read("velocities/p-rad_se")
+
+
+class TestBreakingThings:
+    def test_what_is_injected_now_is_a_fault_declared_for_then(self, flight):
+        sim = stepped(bf.Simulation(scenario(duration_s=4.0)), 150)
+        sim.inject({"type": "loss_of_effectiveness", "actuator": "elevator", "magnitude": 0.4})
+        assert same_log(stepped(sim).log, flight.log)
+        assert sim.land().metrics == flight.metrics
+
+    def test_a_fault_before_the_first_step_is_there_from_the_start(self):
+        sim = bf.Simulation(scenario(duration_s=2.0))
+        sim.inject({"type": "stuck", "actuator": "rudder", "position_deg": 2.0})
+        stuck = {"type": "stuck", "actuator": "rudder", "position_deg": 2.0, "at_s": 0.0}
+        assert same_log(stepped(sim).log, bf.fly(scenario(duration_s=2.0, faults=[stuck])).log)
+
+    def test_repaired_is_as_if_declared_to_end_then(self):
+        sim = stepped(bf.Simulation(scenario(**SHORT)), 230)
+        sim.repair("elevator")
+        ended = scenario(duration_s=4.0, faults=[loss(at_s=1.5, end_s=2.3)])
+        assert same_log(stepped(sim).log, bf.fly(ended).log)
+
+    def test_the_flight_as_flown_flies_again_to_the_bit(self, tmp_path):
+        sim = eventful(bf.Simulation(scenario(duration_s=30.0, substeps=2)))
+        again = bf.fly(sim.scenario_flown())
+        assert same_log(sim.log, again.log)
+        assert sim.land().metrics == again.metrics
+        folder = sim.save(tmp_path, report=False)
+        assert same_log(bf.fly(folder / "scenario.yaml").log, bf.open_run(folder).log)
+
+    def test_repaired_before_it_was_there_it_never_was(self):
+        sim = stepped(bf.Simulation(scenario(duration_s=4.0)), 100)
+        sim.inject({"type": "float", "actuator": "flap"})
+        sim.repair()
+        assert sim.scenario_flown().faults == ()
+        assert sim.land().fault is None
+
+    @pytest.mark.parametrize(
+        ("given", "key"),
+        [
+            ({"type": "stuck"}, "actuator: required key is missing"),
+            ({"type": "stuk", "actuator": "elevator"}, "type: 'stuk' is not known, did you mean stuck"),
+            ({"type": "stuck", "actuator": "elevater"}, "actuator: 'elevater' is not known, did you mean"),
+            ({"type": "bias", "actuator": "flap", "bias_rad": 0.1}, "bias_rad: unknown key"),
+            ({"type": "loss_of_effectiveness", "actuator": "flap", "magnitude": 40}, "magnitude: 40 is out"),
+            ({"type": "float", "actuator": "flap", "at_s": 3}, "at_s: has no meaning here"),
+            ("stuck", "'stuck' is no fault"),
+        ],
+    )
+    def test_a_mistake_is_named_by_its_key_and_breaks_nothing(self, given, key):
+        sim = bf.Simulation(scenario())
+        with pytest.raises(bf.BadInput, match="(?m)^" + key):
+            sim.inject(given)
+        sim.step()
+        assert sim.scenario_flown().faults == ()
+
+    def test_nothing_else_can_be_repaired(self):
+        with pytest.raises(bf.BadInput, match="actuator: 'elevatr' is not known, did you mean elevator"):
+            bf.Simulation(scenario()).repair("elevatr")
+
+
+class TestCommanding:
+    def test_the_surfaces_follow_whoever_commands(self):
+        sim = bf.Simulation(scenario(faults=[]))
+        sim.step(frames=50)
+        wanted = sim.trim_rad + np.array([0.01, -0.02, 0.03, 0.0])
+        sim.step(wanted, frames=3)
+        assert [sim[f"fcs/{s}-pos-rad"] for s in ("aileron", "elevator", "rudder", "flap")] == [*wanted]
+
+    def test_within_their_travel(self):
+        sim = bf.Simulation(scenario(faults=[]))
+        sim.step([9.0, -9.0, 9.0, -9.0])
+        low, high = sim.travel_rad
+        np.testing.assert_array_equal(
+            [sim[f"fcs/{s}-cmd-rad"] for s in ("aileron", "elevator", "rudder", "flap")],
+            [high[0], low[1], high[2], low[3]],
+        )
+
+    def test_held_over_frames_is_the_same_as_given_frame_by_frame(self):
+        one, two = bf.Simulation(scenario(**SHORT)), bf.Simulation(scenario(**SHORT))
+        wanted = one.trim_rad + np.array([0.0, 0.01, 0.0, 0.0])
+        one.step(wanted, frames=40)
+        for _ in range(40):
+            two.step(wanted)
+        assert same_log(one.log, two.log)
+
+    def test_a_flight_by_hand_is_no_scenario(self):
+        sim = bf.Simulation(scenario())
+        sim.step(sim.trim_rad)
+        with pytest.raises(bf.BadInput, match="commanded by hand"):
+            sim.scenario_flown()
+
+    @pytest.mark.parametrize("command", [[0.0, 0.0, 0.0], [np.nan] * 4, "flap", [[0.0] * 4]])
+    def test_what_is_no_command_is_refused(self, command):
+        with pytest.raises(bf.BadInput, match=r"command: .* allowed: 4 finite numbers, rad"):
+            bf.Simulation(scenario()).step(command)
+
+    def test_a_stick_is_added_to_the_reference(self):
+        sim = bf.Simulation(scenario(duration_s=2.0))
+        sim.step(frames=20)
+        sim.step(stick=[0.0, 0.02, 0.0], frames=10)
+        sim.step(frames=5)
+        q = sim.log["q_reference_rad_s"].to_numpy()
+        plain = bf.fly(scenario(duration_s=2.0)).log["q_reference_rad_s"].to_numpy()[: q.size]
+        np.testing.assert_allclose(q - plain, np.r_[np.zeros(21), np.full(10, 0.02), np.zeros(5)], atol=1e-15)
+
+    def test_a_plugged_in_detector_watches_a_commanded_flight(self):
+        class Counter:
+            """Counts frames."""
+
+            def reset(self, context):
+                self.frames = 0
+
+            def step(self, measured, command):
+                self.frames += 1
+                return bf.Verdict()
+
+        counter = Counter()
+        sim = bf.Simulation(scenario(), detector=counter)
+        sim.step(sim.trim_rad, frames=9)
+        assert counter.frames == 10
+
+
+def eventful(sim):
+    """A flight in which much is done by hand."""
+    for i in range(1100):
+        sim.step(stick=(0.01 * np.sin(i / 30), 0.0, 0.02 if i < 200 else -0.01) if 100 < i < 400 else None)
+        if i == 300:
+            sim.inject({"type": "stuck", "actuator": "rudder"})
+            sim.inject({"type": "unanticipated", "profile": "incipient", "kappa_per_s": 0.5})
+        if i == 700:
+            sim.repair("rudder")
+        if i == 800:
+            sim.inject({"type": "bias", "actuator": "aileron", "bias_deg": 3.0})
+        if i == 801:
+            sim.repair()
+    return sim

@@ -1,0 +1,135 @@
+"""A flight in Python: what a run would have written, as tables, records and figures."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import beaver_ftc as bf
+from beaver_ftc.results.run import run
+from flying import loss, scenario
+
+SHORT = {"duration_s": 3.0, "faults": [loss(at_s=1.5)], "expect": {"isolated_as": "rudder"}}
+
+
+@pytest.fixture(scope="module")
+def flight():
+    return bf.fly(scenario(**SHORT))
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    out = tmp_path_factory.mktemp("runs")
+    run(scenario(**SHORT), out)
+    return out / "test"
+
+
+class TestFlown:
+    def test_the_log_is_that_of_a_run(self, flight, folder):
+        written = pd.read_parquet(folder / "log.parquet")
+        pd.testing.assert_frame_equal(flight.log, written, check_exact=True)
+
+    def test_the_metrics_are_those_of_a_run(self, flight, folder):
+        assert flight.metrics == json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
+
+    def test_the_log_knows_its_units_and_the_verdict(self, flight):
+        attrs = flight.log.attrs
+        shown = {name: attrs["units"][name] for name in ("t_s", "q_rad_s", "airspeed_mps", "qdyn_pa", "mode")}
+        assert shown == {"t_s": "s", "q_rad_s": "rad/s", "airspeed_mps": "m/s", "qdyn_pa": "Pa", "mode": "1"}
+        assert (attrs["scenario"], attrs["verdict"]["isolated"]) == ("test", "elevator")
+        assert json.loads(json.dumps(attrs)) == attrs
+
+    def test_typed_is_what_the_document_says(self, flight):
+        for part in ("fault", "detection", "isolation"):
+            said = vars(getattr(flight, part))
+            document = {**flight.metrics[part]}
+            assert {k: list(v) if isinstance(v, tuple) else v for k, v in said.items()} == {
+                key: document[key] for key in said
+            }
+        assert (
+            flight.tracking.post_fault_rms_deg_s.q == flight.metrics["tracking"]["post_fault_rms_deg_s"]["q"]
+        )
+        assert [change.mode for change in flight.supervisor] == ["nominal", "adaptive", "reallocated"]
+        assert (flight.expectations[0].passed, flight.passed, flight.departure) == (False, False, None)
+
+    def test_says_the_verdict_in_a_few_lines(self, flight):
+        said = repr(flight)
+        assert said.startswith("test: FAILED\n")
+        assert "isolated_as rudder, got elevator" in said
+        assert len(said.splitlines()) < 12
+        assert "<b>test: FAILED</b>" in flight._repr_html_()
+
+    def test_without_a_log_there_is_the_verdict_alone(self, flight, tmp_path):
+        bare = bf.fly(scenario(**SHORT), log=False)
+        assert bare.metrics == flight.metrics
+        for asked in (lambda: bare.log, lambda: bare.plot("tracking"), lambda: bare.save(tmp_path)):
+            with pytest.raises(bf.BadInput, match="kept no log, allowed: fly it with log=True"):
+                asked()
+
+    def test_saved_is_what_a_run_writes(self, flight, folder, tmp_path):
+        saved = flight.save(tmp_path)
+        assert files(saved) == files(folder)
+        for name in files(folder):
+            assert (saved / name).read_bytes() == (folder / name).read_bytes(), name
+
+    def test_opened_is_what_was_saved(self, flight, folder, tmp_path):
+        opened = bf.open_run(folder)
+        assert opened.metrics == flight.metrics
+        assert opened.scenario == flight.scenario
+        assert repr(opened) == repr(flight)
+        pd.testing.assert_frame_equal(opened.log, flight.log, check_exact=True)
+        assert opened.log.attrs == flight.log.attrs
+        assert files(opened.save(tmp_path)) == files(folder)
+
+    @pytest.mark.parametrize("folder", ["nowhere", "."])
+    def test_what_is_no_run_is_refused(self, folder, tmp_path, monkeypatch):
+        monkeypatch.chdir(tmp_path)
+        with pytest.raises(bf.BadInput, match=r"no metrics\.json can be read there"):
+            bf.open_run(folder)
+
+
+class TestViews:
+    def test_every_view_is_a_figure(self, flight):
+        for name in flight.views():
+            figure = flight.plot(name)
+            drawn = [len(line.get_xdata()) for axes in figure.axes for line in axes.lines]
+            assert max(drawn) == 300
+
+    def test_a_closeup_is_around_the_fault(self, flight):
+        low, high = flight.plot("detection", closeup=True).axes[0].get_xlim()
+        assert 0.9 < low < 1.5 < high <= 3.0
+
+    def test_a_plot_shows_the_log(self, flight):
+        axes = flight.plot("tracking").axes[1]
+        curve = next(line for line in axes.lines if line.get_label() == "aircraft")
+        np.testing.assert_allclose(curve.get_ydata(), np.rad2deg(flight.log["q_rad_s"]))
+
+    def test_another_view_is_refused(self, flight):
+        with pytest.raises(bf.BadInput, match="view: 'trackin' is not known, did you mean tracking"):
+            flight.plot("trackin")
+
+
+class TestPlugIns:
+    class Sleepy:
+        """Never sees anything."""
+
+        def reset(self, context):
+            pass
+
+        def step(self, measured, command):
+            return bf.Verdict()
+
+    def test_an_object_diagnoses(self, flight):
+        assert flight.detection.detected
+        assert not bf.fly(scenario(**SHORT), detector=self.Sleepy()).detection.detected
+
+    @pytest.mark.parametrize("given", [Sleepy, object(), "sleepy"])
+    def test_anything_else_is_refused(self, given):
+        with pytest.raises(bf.BadInput, match=r"detector: .* allowed: an object with reset and step"):
+            bf.fly(scenario(**SHORT), detector=given)
+
+
+def files(folder: Path):
+    return sorted(str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file())

@@ -10,19 +10,25 @@ in use. It also works where the package is read-only.
 """
 
 import contextlib
+import functools
 import hashlib
 import os
+import pickle
 import shutil
+import sys
 import tempfile
 from collections.abc import Iterator
 from functools import lru_cache
 from pathlib import Path
 
 import numba
+import numpy as np
+from numba.core.caching import FunctionCache, IndexDataCacheFile
 from numba.core.dispatcher import Dispatcher
 from numba.core.runtime import rtsys
 
 _VERSIONS_KEPT = 5
+_DIGEST_BYTES = 32
 
 _PACKAGE = Path(__file__).parent
 _SOURCES = (
@@ -98,16 +104,106 @@ def kernel(function):
 def compile_into(folder: Path | None, function):
     """Compile a function when it is first called, and keep its code in `folder`.
 
+    With NUMBA_DISABLE_JIT=1 nothing is compiled: the same function, slow, for a debugger.
+    """
+    if numba.config.DISABLE_JIT:  # type: ignore[attr-defined]
+        return _interpreted(function)
+    dispatcher = numba.njit(error_model="numpy")(function)
+    if folder is not None:
+        dispatcher._cache = _KernelCache(folder, function)  # type: ignore[attr-defined]
+    return dispatcher
+
+
+def _interpreted(function):
+    """The function as it is, given records whose fields are attributes, as compiled code has them."""
+
+    @functools.wraps(function)
+    def call(*arguments):
+        with np.errstate(all="ignore"):  # as compiled: inf and nan, and no word
+            return function(*map(_with_attributes, arguments))
+
+    call.py_func = function  # type: ignore[attr-defined]
+    return call
+
+
+def _with_attributes(argument):
+    """A record, or an array of records, whose fields can be written `record.field`."""
+    if isinstance(argument, np.void) and not isinstance(argument, np.record):
+        return argument.view((np.record, argument.dtype))
+    if isinstance(argument, np.ndarray) and argument.dtype.type is np.void and argument.dtype.names:
+        return argument.view(np.dtype((np.record, argument.dtype)))
+    return argument
+
+
+class _KernelCache(FunctionCache):
+    """Numba's cache of one kernel, in a folder of our own; what is damaged in it is compiled anew.
+
     Numba is told of the folder for this function only: others' functions keep to their own.
     """
-    if folder is None:
-        return numba.njit(error_model="numpy")(function)
-    others = numba.config.CACHE_DIR  # type: ignore[attr-defined]
-    numba.config.CACHE_DIR = str(folder)  # type: ignore[attr-defined]
-    try:
-        return numba.njit(cache=True, error_model="numpy")(function)
-    finally:
-        numba.config.CACHE_DIR = others  # type: ignore[attr-defined]
+
+    def __init__(self, folder: Path, function) -> None:
+        others = numba.config.CACHE_DIR  # type: ignore[attr-defined]
+        numba.config.CACHE_DIR = str(folder)  # type: ignore[attr-defined]
+        try:
+            super().__init__(function)
+        finally:
+            numba.config.CACHE_DIR = others  # type: ignore[attr-defined]
+        stamp, base = self._cache_file._source_stamp, self._impl.filename_base
+        self._cache_file = _CheckedFiles(self._cache_path, base, stamp)
+
+    def save_overload(self, sig, data) -> None:
+        """Keep it; where that is impossible (a full disk), say so and fly without."""
+        try:
+            super().save_overload(sig, data)
+        except OSError as error:
+            reason = (error.strerror or str(error)).lower()
+            _say_once(
+                f"compiled code cannot be kept in {self._cache_path}: {reason}; each start compiles anew"
+            )
+
+
+class _CheckedFiles(IndexDataCacheFile):
+    """Index and data of one kernel, each behind its digest: machine code that is damaged must not run."""
+
+    def _load_index(self):
+        content = self._checked(self._index_path)
+        if content is None:
+            return {}
+        version, stamp, overloads = pickle.loads(content)
+        return overloads if (version, stamp) == (self._version, self._source_stamp) else {}
+
+    def _save_index(self, overloads) -> None:
+        self._write(self._index_path, self._dump((self._version, self._source_stamp, overloads)))
+
+    def _load_data(self, name):
+        content = self._checked(self._data_path(name))
+        if content is None:
+            raise FileNotFoundError(name)  # numba compiles it anew, and writes over it
+        return pickle.loads(content)
+
+    def _save_data(self, name, data) -> None:
+        self._write(self._data_path(name), self._dump(data))
+
+    def _write(self, path: str, content: bytes) -> None:
+        with self._open_for_write(path) as file:
+            file.write(hashlib.sha256(content).digest() + content)
+
+    def _checked(self, path: str) -> bytes | None:
+        """The content of a file; None if there is no such file, or it is not as it was written."""
+        try:
+            content = Path(path).read_bytes()
+        except FileNotFoundError:
+            return None
+        digest, content = content[:_DIGEST_BYTES], content[_DIGEST_BYTES:]
+        if hashlib.sha256(content).digest() == digest:
+            return content
+        _say_once(f"compiled code in {self._cache_path} is damaged; it is compiled anew")
+        return None
+
+
+@functools.cache
+def _say_once(text: str) -> None:
+    print(f"beaver-ftc: {text}", file=sys.stderr, flush=True)
 
 
 def direct(function, *arguments):
@@ -117,7 +213,7 @@ def direct(function, *arguments):
     once a frame, nowhere else.
     """
     if not isinstance(function, Dispatcher):
-        return function  # NUMBA_DISABLE_JIT: the plain form
+        return function  # NUMBA_DISABLE_JIT
     return _entry_point(function, tuple((argument.dtype, argument.ndim) for argument in arguments))
 
 

@@ -195,12 +195,62 @@ def test_reader_that_goes_away_is_no_error(short):
     assert (done.returncode, done.stderr) == (0, b"")
 
 
+def test_a_hang_up_that_is_to_be_ignored_is_ignored(short):
+    (short / "long.yaml").write_text(LONG.replace("20000", "200"))
+    command = ["nohup", BEAVER, "run", "long.yaml", "--no-report"]
+    with subprocess.Popen(command, cwd=short, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL) as running:
+        while not list(short.glob("runs/.long*/log.parquet")):
+            assert running.poll() is None
+            time.sleep(0.02)
+        running.send_signal(signal.SIGHUP)
+        assert running.wait(timeout=120) in (0, 1)
+    assert (short / "runs/long/metrics.json").exists()
+
+
+def test_a_users_file_beside_the_figures_stops_the_run_before_it_flies(short):
+    assert _beaver("run", "short.yaml", cwd=short).returncode == 0
+    note = short / "runs/short/figures/note.txt"
+    note.write_text("mine")
+    done = _beaver("run", "short.yaml", "--no-report", cwd=short)
+    assert done.returncode == 3
+    assert "it holds figures/note.txt, which is no result of beaver-ftc" in done.stderr
+    assert note.read_text() == "mine"
+    note.unlink()
+    assert _beaver("run", "short.yaml", "--no-report", cwd=short).returncode == 0
+
+
+def test_a_folder_whose_name_is_not_utf_8(short):
+    folder = os.fsdecode(b"r\xe9sultats")
+    done = _beaver("run", "short.yaml", "--csv", "--acmi", "--out", folder, cwd=short)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert (short / folder / "short" / "report.html").exists()
+    done = _beaver("compare", f"{folder}/short", "--out", folder, cwd=short)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.mark.parametrize("size", [0, 4000, -100])
+def test_a_log_cut_short_is_bad_input_to_compare(short, size):
+    assert _beaver("run", "short.yaml", "--no-report", cwd=short).returncode == 0
+    log = short / "runs/short/log.parquet"
+    log.write_bytes(log.read_bytes()[:size])
+    done = _beaver("compare", "runs/short", cwd=short)
+    assert done.returncode == 2
+    says = "is damaged or cut short, allowed: a log that a run has written"
+    assert done.stderr.splitlines() == [f"runs/short/log.parquet: {says}"]
+    assert not (short / "comparisons").exists()
+
+
 LONG = SHORT.replace("short", "long").replace("duration_s: 6", "duration_s: 20000")
 
 
 @pytest.mark.parametrize(
     ("number", "status", "left"),
-    [(signal.SIGKILL, -9, True), (signal.SIGTERM, 143, False), (signal.SIGINT, 130, False)],
+    [
+        (signal.SIGKILL, -9, True),
+        (signal.SIGTERM, 143, False),
+        (signal.SIGINT, 130, False),
+        (signal.SIGHUP, 129, False),
+    ],
 )
 def test_run_that_is_ended_leaves_no_half_result(short, number, status, left):
     (short / "long.yaml").write_text(LONG)

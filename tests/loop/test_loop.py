@@ -5,10 +5,11 @@ import dataclasses
 import numpy as np
 import pytest
 
+from beaver_ftc.control.state import ORACLE
 from beaver_ftc.errors import BadInput, SimulationFailed
-from beaver_ftc.loop import loop
+from beaver_ftc.loop import frame, loop, outcome
 from beaver_ftc.loop.loop import fly
-from beaver_ftc.plant.channels import TRUTH
+from beaver_ftc.plant.channels import ENVELOPE, TRUTH
 from beaver_ftc.results.metrics import metrics
 from beaver_ftc.results.verdict import facts
 from beaver_ftc.scenario.builtin import builtin_scenarios
@@ -18,7 +19,7 @@ from flying import Memory, flown, loss, scenario
 BUILT_IN = [name for name, _, _ in builtin_scenarios()]
 
 
-def outcome(flight):
+def yielded(flight):
     """Everything a flight yields but its scenario, comparable."""
     return {k: v for k, v in vars(flight).items() if k != "scenario"}
 
@@ -91,7 +92,7 @@ class TestEveryBuiltInScenario:
 def test_same_scenario_same_bits():
     (first, one), (second, two) = flown(faults=[loss()]), flown(faults=[loss()])
     assert np.array_equal(one.rows, two.rows, equal_nan=True)
-    assert outcome(first) == outcome(second)
+    assert yielded(first) == yielded(second)
 
 
 def test_reading_through_python_gives_the_same_bits(monkeypatch):
@@ -110,7 +111,7 @@ def test_the_log_does_not_depend_on_the_chunks(monkeypatch):
 
 def test_a_flight_without_a_log_has_the_same_outcome():
     case = scenario(faults=[loss()])
-    assert outcome(fly(case)) == outcome(fly(case, Memory()))
+    assert yielded(fly(case)) == yielded(fly(case, Memory()))
 
 
 def test_progress_ends_at_one():
@@ -151,6 +152,15 @@ class TestDepartures:
         assert np.abs(log["alpha_rad"][:-1]).max() <= 0.6
         assert flight.envelope_exits
 
+    def test_the_ground_ends_the_flight(self):
+        dive = {"q": [{"step": {"amplitude_deg_s": -3, "start_s": 1, "end_s": 7}}]}
+        for altitude_m, ground_m in ((700, 0), (200, -300)):
+            start = {"altitude_m": altitude_m}
+            flight, log = flown(duration_s=120, rate_hz=20, reference=dive, initial=start)
+            at_s, signal = flight.departure
+            assert (signal, at_s) == ("altitude", log["t_s"][-1])
+            assert log["altitude_m"][-1] < ground_m <= log["altitude_m"][-2]
+
     def test_a_truth_that_is_not_finite_is_named(self, monkeypatch):
         flying = loop.Loop(scenario(duration_s=2))
         flying.cockpit.native = False
@@ -165,6 +175,31 @@ class TestDepartures:
         monkeypatch.setattr(flying.cockpit, "read", poisoned)
         with pytest.raises(SimulationFailed, match=r"beta_rad.*0\.5 s|0\.5 s.*beta_rad"):
             list(flying.chunks())
+
+
+def test_more_events_than_there_is_room_for_are_counted_and_the_last_is_kept():
+    frames, room, stays = np.zeros(1, frame.FRAME), frame.MAX_EVENTS, 150
+    for k in range(10 * stays):
+        frames["t"], frames["truth"][0, ENVELOPE] = k, k % 10 < 7
+        frame.note_envelope(frames[0])
+        frames["k"] += 1
+    exits = outcome._envelope_exits(frames[0])
+    assert len(exits) == room
+    assert exits[:2] == ((7, 10), (17, 20))
+    assert exits[-2:] == ((10 * (room - 2) + 7, 10 * (room - 1)), (10 * stays - 3, 10 * stays - 1))
+    assert (frames["n_exits"], frames["outside_frames"]) == (stays, 3 * stays - 1)
+
+
+def test_the_final_mode_is_right_after_any_number_of_changes():
+    frames = np.zeros(1, frame.FRAME)
+    frames["control"]["law"] = ORACLE
+    for k in range(201):
+        frames["t"], frames["faulted"] = k, k % 2
+        frame.supervise(frames[0])
+        frames["k"] += 1
+    assert frames["n_modes"] > frame.MAX_EVENTS
+    last = frames["mode_at_s"][0, -1], frames["mode_is"][0, -1]
+    assert last == (frames["n_modes"][0] - 1, frames["mode"][0])
 
 
 def test_what_cannot_be_trimmed_is_bad_input():

@@ -113,3 +113,14 @@ def test_a_gust_rises_to_its_height_and_fades():
     assert at[2.0] == pytest.approx(-4.0)
     assert at[1.25] == pytest.approx(-2.0, abs=0.15)
     assert at[2.75] == pytest.approx(-2.0, abs=0.15)
+
+
+def test_turbulence_does_not_mind_a_fault_in_the_first_frame():
+    """Accelerations are settled with time standing still, where the filters of the turbulence have none."""
+    plant, _ = airborne(environment={"turbulence": "dryden", "severity": "moderate"})
+    before, _ = airborne(environment={"turbulence": "dryden", "severity": "moderate"})
+    plant.settle()
+    a, b = (flown(one, AIR + ROTATION, 50) for one in (plant, before))
+    assert np.isfinite(a).all()
+    assert np.ptp(a, axis=0).all()
+    assert (a == b).all()

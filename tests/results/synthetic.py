@@ -93,6 +93,9 @@ class Flight:
     engine_power: tuple[float, float, float, float] | None = None
     faults: tuple[dict, ...] = ()
     statistical: dict[str, float | None] | None = None
+    mode_changes: int = 3
+    exits: int = 0
+    outside_s: float = 0.0
 
 
 def rows(flight: Flight) -> np.ndarray:

@@ -8,8 +8,8 @@ from beaver_ftc.results.metrics import as_json, metrics
 
 KEYS = [
     "scenario", "seed", "frames", "fault", "detection", "isolation", "false_alarm", "tracking", "supervisor",
-    "envelope_exits", "departure", "authority", "engine_power", "saturation_s", "expectations",
-    "passed", "versions",
+    "mode_changes_left_out", "envelope_exits", "envelope", "departure", "authority", "engine_power",
+    "saturation_s", "expectations", "passed", "versions",
 ]  # fmt: skip
 
 

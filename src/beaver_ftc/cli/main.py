@@ -67,9 +67,10 @@ for _name in COMMANDS:
 
 def main() -> NoReturn:
     """Run the command line; an error becomes a line on standard error and the exit status of its kind."""
-    signal.signal(
-        signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM)
-    )  # unwind: leave nothing half written
+    for name in ("SIGTERM", "SIGHUP"):  # unwind: leave nothing half written
+        number = getattr(signal, name, None)
+        if number is not None and signal.getsignal(number) is signal.SIG_DFL:  # not under nohup
+            signal.signal(number, lambda received, _: sys.exit(128 + received))
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="replace")  # a terminal that lacks a letter is no reason to fail

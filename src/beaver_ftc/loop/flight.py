@@ -34,7 +34,9 @@ class Flight:
     down added. engine_power: if pitch was left to the engine, since when and for how long, s, and the lowest
     and highest manifold pressure, inHg. faults: of several at once (`fdi.pairs`), each as named.py has it,
     the first named first. statistical: when the statistical detector would have raised the alarm, its level
-    in standard deviations, and the largest share of it reached in healthy flight.
+    in standard deviations, and the largest share of it reached in healthy flight. mode_changes, exits: how
+    many there were of `supervisor` and `envelope_exits`, which hold the first and the last; outside_s: time
+    outside the validated envelope, all exits together.
     """
 
     scenario: Scenario
@@ -65,3 +67,6 @@ class Flight:
     engine_power: tuple[float, float, float, float] | None = None
     faults: tuple[dict[str, Any], ...] = ()
     statistical: dict[str, float | None] | None = None
+    mode_changes: int = 0
+    exits: int = 0
+    outside_s: float = 0.0

@@ -37,7 +37,7 @@ FLYING, DEPARTED, NOT_FINITE = 0, 1, 2
 SURE = 400.0  # one over the variance of an effectiveness known to 0.05
 DEPARTURE_ANGLE_RAD = 0.6
 DEPARTURE_RATE_RAD_S = 6.0
-DEPARTURE_SIGNALS = ("p", "q", "r", "alpha", "beta")
+DEPARTURE_SIGNALS = ("p", "q", "r", "alpha", "beta", "altitude")
 
 FRAME = np.dtype(
     [
@@ -73,7 +73,7 @@ FRAME = np.dtype(
         ("post_fault_square", "f8", (3,)), ("post_fault_frames", "i8"),
         ("saturated_frames", "i8", (4,)), ("travelled", "f8", (4,)), ("position_then", "f8", (4,)),
         ("demanded", "f8", (3,)), ("lacking", "f8", (3,)), ("beyond_frames", "i8", (3,)),
-        ("outside", "i8"), ("n_exits", "i8"),
+        ("outside", "i8"), ("n_exits", "i8"), ("outside_frames", "i8"), ("ground_m", "f8"),
         ("exit_at_s", "f8", (MAX_EVENTS,)), ("return_at_s", "f8", (MAX_EVENTS,)),
         ("departed", "i8"),
     ],
@@ -107,7 +107,7 @@ def measure(frame):
 
 
 @kernel
-def flight_status(truth):
+def flight_status(truth, ground_m):
     """FLYING, NOT_FINITE, or DEPARTED + the index in DEPARTURE_SIGNALS of what left its limits, times ten."""
     for i in range(ch.N_TRUTH):
         if not np.isfinite(truth[i]):
@@ -119,6 +119,8 @@ def flight_status(truth):
         return DEPARTED + 30
     if abs(truth[ch.BETA]) > DEPARTURE_ANGLE_RAD:
         return DEPARTED + 40
+    if truth[ch.ALTITUDE] < ground_m:
+        return DEPARTED + 50
     return FLYING
 
 
@@ -381,9 +383,10 @@ def supervise(frame):
     else:
         mode = mode_of(frame.control.law, fdi.detected, fdi.isolated, isolated_surface(fdi))
     mode = next_mode(frame.mode, mode)
-    if (mode != frame.mode or frame.n_modes == 0) and frame.n_modes < MAX_EVENTS:
-        frame.mode_at_s[frame.n_modes] = frame.t
-        frame.mode_is[frame.n_modes] = mode
+    if mode != frame.mode or frame.n_modes == 0:
+        last = min(frame.n_modes, MAX_EVENTS - 1)  # of more than there is room for, the latest stays
+        frame.mode_at_s[last] = frame.t
+        frame.mode_is[last] = mode
         frame.n_modes += 1
     frame.mode = mode
 
@@ -544,13 +547,14 @@ def account_authority(frame):
 def note_envelope(frame):
     """Note when the flight leaves the validated envelope and when it comes back."""
     outside = frame.truth[ch.ENVELOPE] < 0.5
+    frame.outside_frames += frame.outside
     if outside and not frame.outside:
-        if frame.n_exits < MAX_EVENTS:
-            frame.exit_at_s[frame.n_exits] = frame.t
-            frame.return_at_s[frame.n_exits] = np.inf
         frame.n_exits += 1
-    elif frame.outside and not outside and frame.n_exits <= MAX_EVENTS:
-        frame.return_at_s[frame.n_exits - 1] = frame.t
+    last = min(frame.n_exits, MAX_EVENTS) - 1  # of more than there is room for, the latest stays
+    if outside and not frame.outside:
+        frame.exit_at_s[last], frame.return_at_s[last] = frame.t, np.inf
+    elif frame.outside and not outside:
+        frame.return_at_s[last] = frame.t
     frame.outside = outside
 
 
@@ -639,7 +643,7 @@ def begin(frame):
 def sense(frame):
     """Measure, and work out what the design model makes of it. Returns the flight's status."""
     measure(frame)
-    status = flight_status(frame.truth)
+    status = flight_status(frame.truth, frame.ground_m)
     if status != NOT_FINITE:
         response(frame.design, frame.x, frame.y, frame.f, frame.G)
         fault_effect(frame)

@@ -35,6 +35,7 @@ if TYPE_CHECKING:
 CHUNK_ROWS = 8192
 IMMOVABLE = ("stuck", "hardover", "float")  # failures in which a surface does not follow its command
 EARTH_RADIUS_M = 6371000.0  # for the log's north and east: a local plane, not navigation
+LEAST_HEIGHT_M = 500.0  # above the ground at the start; the ground is at sea level, or lower if need be
 
 
 class Cockpit:
@@ -105,6 +106,7 @@ class Loop:
         frame = self.frames[0]
         frame["latitude_0"] = self.plant.read(ch.TRUTH[ch.LATITUDE][1])
         frame["longitude_0"] = self.plant.read(ch.TRUTH[ch.LONGITUDE][1])
+        frame["ground_m"] = min(0.0, self.scenario.initial.altitude_m - LEAST_HEIGHT_M)
         frame["radius_m"] = EARTH_RADIUS_M + self.scenario.initial.altitude_m
         frame["parallel_radius_m"] = frame["radius_m"] * np.cos(frame["latitude_0"])
 

@@ -12,7 +12,7 @@ from beaver_ftc.diagnosis.state import NOT_ISOLATED, UNANTICIPATED
 from beaver_ftc.diagnosis.words import found
 from beaver_ftc.loop.assembly import estimator_names
 from beaver_ftc.loop.flight import Flight
-from beaver_ftc.loop.frame import DEPARTURE_SIGNALS, DOMINANT_AXIS, isolated_theta
+from beaver_ftc.loop.frame import DEPARTURE_SIGNALS, DOMINANT_AXIS, MAX_EVENTS, isolated_theta
 from beaver_ftc.scenario.schema import Scenario
 
 
@@ -153,7 +153,7 @@ def flight_of(
     """Read the flight's outcome off its frame record; `verdict` is a plug-in detector's last one."""
     fdi, dt = frame["fdi"], float(frame["dt"])
     departed = int(frame["departed"])
-    modes = range(int(frame["n_modes"]))
+    modes = range(min(int(frame["n_modes"]), MAX_EVENTS))
     closest = tuple(float(share) for share in fdi["closest"][: max(int(fdi["n_poles"]), 1)])
     return Flight(
         scenario=scenario,
@@ -166,7 +166,10 @@ def flight_of(
         or (0.0, 0.0, 0.0),
         post_fault_rms_rad_s=_rms(frame["post_fault_square"], int(frame["post_fault_frames"])),
         supervisor=tuple((float(frame["mode_at_s"][i]), MODES[int(frame["mode_is"][i])]) for i in modes),
+        mode_changes=int(frame["n_modes"]),
         envelope_exits=_envelope_exits(frame),
+        exits=int(frame["n_exits"]),
+        outside_s=int(frame["outside_frames"]) * dt,
         departure=(float(frame["t"]), DEPARTURE_SIGNALS[departed // 10]) if departed else None,
         saturation_s={s: int(n) * dt for s, n in zip(SURFACES, frame["saturated_frames"], strict=True)},
         worst_residual_ratio=max(*closest, float(fdi["statistical"]["closest"])),

@@ -135,11 +135,19 @@ class Plant:
             raise SimulationFailed("JSBSim cannot initialise the flight")
 
     def settle(self) -> None:
-        """Run, time standing still, until accelerations belong to the state and the surfaces as commanded."""
+        """Run, time standing still, until accelerations belong to the state and the surfaces as commanded.
+
+        In still air: the filters of the turbulence divide by the time step, which is zero here.
+        """
+        turbulence = self.read("atmosphere/turb-type")
+        if turbulence:
+            self.write("atmosphere/turb-type", 0.0)
         self.fdm.suspend_integration()
         for _ in range(_RUNS_TO_SETTLE):
             self.run()
         self.fdm.resume_integration()
+        if turbulence:
+            self.write("atmosphere/turb-type", turbulence)
 
     def _command(self, state: FlightState) -> None:
         for surface in SURFACES:

@@ -20,7 +20,7 @@ from importlib import import_module
 import jsbsim
 import numpy as np
 from llvmlite import ir
-from numba.core import types
+from numba.core import config, types
 from numba.extending import intrinsic
 
 from beaver_ftc.compiled import kernel
@@ -116,8 +116,9 @@ class NodeBank:
 
 
 def available() -> bool:
-    """Whether nodes can be read and written by address here; BEAVER_FTC_NATIVE=0 says no."""
-    return os.environ.get("BEAVER_FTC_NATIVE", "1") != "0" and _layout_is_known()
+    """Whether nodes can be read and written by address here: by compiled code, unless BEAVER_FTC_NATIVE=0."""
+    wanted = os.environ.get("BEAVER_FTC_NATIVE", "1") != "0"
+    return wanted and not config.DISABLE_JIT and _layout_is_known()  # type: ignore[attr-defined]
 
 
 @lru_cache(maxsize=1)

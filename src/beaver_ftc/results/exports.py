@@ -25,11 +25,10 @@ _ACMI_COLUMNS = (
 def write_csv(log_path: Path, path: Path) -> None:
     """The log as CSV: one header line with the columns' names, then a line a frame."""
     from pyarrow.csv import CSVWriter, WriteOptions
-    from pyarrow.parquet import ParquetFile
 
     # pyarrow quotes the names in its header whatever it is told: ours is written by hand
     options = WriteOptions(include_header=False, quoting_style="none")
-    with ParquetFile(log_path, pre_buffer=False) as source:
+    with log.opened(log_path) as source:
         schema = source.schema_arrow
         with path.open("wb") as file:
             file.write((",".join(schema.names) + "\n").encode())

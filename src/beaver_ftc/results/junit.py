@@ -6,8 +6,10 @@ from typing import Any
 from xml.etree import ElementTree
 
 from beaver_ftc.errors import SimulationFailed
+from beaver_ftc.scenario.problems import one_line
 
 Document = dict[str, Any]
+_LONGEST = 10_000  # characters of one line
 
 
 def write_junit(runs: Sequence[Document], path: Path) -> None:
@@ -36,7 +38,7 @@ def _case(name: str, expectation: Document) -> ElementTree.Element:
     case = ElementTree.Element("testcase", classname=name, name=expectation["name"])
     if not expectation["passed"]:
         says = f"expected {expectation['expected']}, actual {expectation['actual']}"
-        ElementTree.SubElement(case, "failure", message=says, type="ExpectationMissed")
+        ElementTree.SubElement(case, "failure", message=_text(says), type="ExpectationMissed")
     return case
 
 
@@ -44,5 +46,10 @@ def _flight(name: str, run: Document) -> ElementTree.Element:
     """The case of a scenario that expects nothing, or could not be flown."""
     case = ElementTree.Element("testcase", classname=name, name="completes")
     if "error" in run:
-        ElementTree.SubElement(case, "error", message=run["error"], type="NotFlown")
+        ElementTree.SubElement(case, "error", message=_text(run["error"]), type="NotFlown")
     return case
+
+
+def _text(said: str) -> str:
+    """Text that XML can hold: it has no control characters, nor halves of letters, not even escaped."""
+    return "\n".join(one_line(line, _LONGEST) for line in said.splitlines())

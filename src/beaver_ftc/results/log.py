@@ -4,6 +4,7 @@ Columns are plain float64, snappy-compressed and without dictionaries: what Plot
 other reader opens as it is, and what costs the loop least.
 """
 
+import contextlib
 import shutil
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -11,6 +12,8 @@ from types import TracebackType
 from typing import Any, Self
 
 import numpy as np
+
+from beaver_ftc.errors import BadInput
 
 ROWS_PER_GROUP = 16384  # 12 MB of 90 columns: large enough to compress well, small enough to hold
 _BLOCK = 256  # rows turned into columns at a time: they fit the processor's cache, four times faster
@@ -24,6 +27,7 @@ class ParquetLog:
         self._rows_per_group = rows_per_group
         self._used = 0
         self._writer: Any = None
+        self._file: Any = None
         self._schema: Any = None
         self._buffer = np.empty((0, 0))
 
@@ -33,8 +37,10 @@ class ParquetLog:
         from pyarrow.parquet import ParquetWriter
 
         self._schema = pa.schema([pa.field(name, pa.float64(), nullable=False) for name in columns])
+        # Opened here: Arrow itself takes no path that is not UTF-8.
+        self._file = self._path.open("wb")
         self._writer = ParquetWriter(
-            self._path, self._schema, compression="snappy", use_dictionary=False, write_statistics=False
+            self._file, self._schema, compression="snappy", use_dictionary=False, write_statistics=False
         )
         self._buffer = np.empty((len(columns), self._rows_per_group))
 
@@ -59,6 +65,7 @@ class ParquetLog:
                 self._flush_to(writer)
         finally:
             writer.close()
+            self._file.close()
 
     def __enter__(self) -> Self:
         return self
@@ -158,27 +165,38 @@ class StoredLog:
 Log = MemoryLog | StoredLog
 
 
-def column_names(path: Path) -> tuple[str, ...]:
-    """Names of a log's columns, in order."""
+@contextlib.contextmanager
+def opened(path: Path) -> Iterator[Any]:
+    """A log, open. Raises BadInput where it is none, or only a part of one."""
+    from pyarrow import ArrowException
     from pyarrow.parquet import ParquetFile
 
-    with ParquetFile(path) as file:
+    with path.open("rb") as content:
+        try:
+            with ParquetFile(content, pre_buffer=False) as file:
+                yield file
+        except (ArrowException, OSError) as error:
+            if getattr(error, "errno", None) is not None:
+                raise  # of the disk, not of the file
+            says = "is damaged or cut short, allowed: a log that a run has written"
+            raise BadInput(f"{path}: {says}") from error
+
+
+def column_names(path: Path) -> tuple[str, ...]:
+    """Names of a log's columns, in order."""
+    with opened(path) as file:
         return tuple(file.schema_arrow.names)
 
 
 def row_count(path: Path) -> int:
     """Number of frames in a log."""
-    from pyarrow.parquet import ParquetFile
-
-    with ParquetFile(path) as file:
+    with opened(path) as file:
         return int(file.metadata.num_rows)
 
 
 def read_chunks(path: Path, columns: Sequence[str] | None = None) -> Iterator[dict[str, np.ndarray]]:
     """Yield the log a row group at a time, each as name -> values, shape (rows,)."""
-    from pyarrow.parquet import ParquetFile
-
-    with ParquetFile(path, pre_buffer=False) as file:
+    with opened(path) as file:
         wanted = list(columns) if columns is not None else file.schema_arrow.names
         for group in range(file.num_row_groups):
             table = file.read_row_group(group, columns=wanted)

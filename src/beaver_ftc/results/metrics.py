@@ -47,9 +47,15 @@ def metrics(flight: "Flight") -> Document:
             },
         },
         "supervisor": [{"time_s": _number(time), "mode": mode} for time, mode in flight.supervisor],
+        "mode_changes_left_out": flight.mode_changes - len(flight.supervisor),
         "envelope_exits": [
             {"start_s": _number(start), "end_s": _number(end)} for start, end in flight.envelope_exits
         ],
+        "envelope": {
+            "exits": flight.exits,
+            "outside_s": _number(flight.outside_s),
+            "exits_left_out": flight.exits - len(flight.envelope_exits),
+        },
         "departure": _departure(flight),
         "authority": _authority(flight),
         "engine_power": _engine_power(flight),
@@ -64,7 +70,8 @@ def metrics(flight: "Flight") -> Document:
 
 def as_json(document: Any) -> str:
     """`document` as JSON text, keys in the order given; raises ValueError on NaN or infinity."""
-    return json.dumps(document, indent=2, allow_nan=False, ensure_ascii=False) + "\n"
+    text = json.dumps(document, indent=2, allow_nan=False, ensure_ascii=False) + "\n"
+    return text.encode(errors="backslashreplace").decode()  # a path that is not UTF-8: JSON's own escapes
 
 
 def first_fault(scenario: "Scenario") -> Document | None:

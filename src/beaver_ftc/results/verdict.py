@@ -161,7 +161,11 @@ def _estimate(isolation: Document) -> str:
 
 
 def _supervisor(metrics: Document) -> str:
-    return " → ".join(f"{change['mode']} {_time(change['time_s'])}" for change in metrics["supervisor"])
+    changes = [f"{change['mode']} {_time(change['time_s'])}" for change in metrics["supervisor"]]
+    left_out = metrics.get("mode_changes_left_out", 0)
+    if left_out:
+        changes.insert(-1, f"({left_out} more)")
+    return " → ".join(changes)
 
 
 def _engine_power(metrics: Document) -> str:
@@ -188,8 +192,8 @@ def _envelope(metrics: Document) -> str:
     exits = metrics["envelope_exits"]
     if not exits:
         return ""
-    total_s = sum(stay["end_s"] - stay["start_s"] for stay in exits)
-    return f"left {len(exits)} time(s), {_time(total_s)} in all, first at {_time(exits[0]['start_s'])}"
+    count, total_s = metrics["envelope"]["exits"], metrics["envelope"]["outside_s"]
+    return f"left {count} time(s), {_time(total_s)} in all, first at {_time(exits[0]['start_s'])}"
 
 
 def _departure(metrics: Document) -> str:

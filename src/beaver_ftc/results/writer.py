@@ -11,7 +11,7 @@ import errno
 import os
 import shutil
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from pathlib import Path
 
 from beaver_ftc.errors import SimulationFailed
@@ -29,6 +29,8 @@ FILES_OF_A_RESULT = frozenset({
     "detectability.csv", "detectability.png", "fault-matrix.json", "fault-matrix.txt", "fault-matrix.png",
     "power.json", "power.txt", "power.parquet", "pitch-lost.json", "pitch-lost.txt",
 })  # fmt: skip
+MARK = "beaver-ftc"  # the software that a picture of ours names in its metadata
+_HEAD_BYTES = 2048  # of a picture: its metadata come first
 _AT_FDCWD = -100
 _RENAME_EXCHANGE = 2
 
@@ -65,12 +67,28 @@ def refuse_foreign(folder: Path) -> None:
         return
     if folder.is_symlink() or not folder.is_dir():
         raise SimulationFailed(f"cannot write {folder}: it exists and is not a folder")
-    strangers = sorted(entry.name for entry in folder.iterdir() if entry.name not in FILES_OF_A_RESULT)
+    strangers = strangers_in(folder, FILES_OF_A_RESULT)
     if strangers:
         raise SimulationFailed(
             f"will not replace {folder}: it holds {strangers[0]}, which is no result of beaver-ftc; "
             "move it away or choose another --out"
         )
+
+
+def strangers_in(folder: Path, known: Collection[str]) -> list[str]:
+    """What lies in a result folder and is none of ours: not of these names, or beside our pictures."""
+    strangers = [entry.name for entry in folder.iterdir() if entry.name not in known]
+    pictures = (folder / "figures").rglob("*")
+    strangers += [str(path.relative_to(folder)) for path in pictures if not _is_our_picture(path)]
+    return sorted(strangers)
+
+
+def _is_our_picture(path: Path) -> bool:
+    """Whether it bears the mark that every picture of ours is saved with."""
+    if path.is_symlink() or not path.is_file():
+        return False
+    with path.open("rb") as file:
+        return MARK.encode() in file.read(_HEAD_BYTES)
 
 
 @contextlib.contextmanager

@@ -53,3 +53,16 @@ def test_the_command_line_writes_it_whatever_the_verdict(tmp_path):
     assert done.returncode == 2
     (suite,) = ElementTree.parse(tmp_path / "j.xml").getroot()
     assert "bad.yaml:2: duration_s" in suite[0].find("error").get("message")
+
+
+def test_what_xml_cannot_hold_is_escaped(tmp_path):
+    said = "plug-in x: \x00 \x1b[31mred \ufffe \udcff\nsecond line"
+    missed = {"name": "isolated_as", "passed": False, "expected": "a\x07b", "actual": None}
+    write_junit(
+        [{"scenario": "a", "error": said}, {"scenario": "b", "expectations": [missed]}], tmp_path / "j"
+    )
+    message = ElementTree.parse(tmp_path / "j").find(".//error").get("message")
+    assert message == r"plug-in x: \x00 \x1b[31mred \ufffe \udcff" + "\nsecond line"
+    assert (
+        ElementTree.parse(tmp_path / "j").find(".//failure").get("message") == r"expected a\x07b, actual None"
+    )

@@ -1,5 +1,7 @@
 """Where compiled code is kept: it must be found again by the next process, wherever the package lies."""
 
+import errno
+import json
 import os
 import shutil
 import subprocess
@@ -146,3 +148,84 @@ def test_an_installation_nobody_can_write_to_compiles_once_into_the_temporary_fo
     assert listing(package) == before
     for path in package.rglob("*"):
         path.chmod(0o755)
+
+
+SMALL = """
+import sys
+from pathlib import Path
+from beaver_ftc.compiled import compile_into
+def inner(x):
+    return 2.0 * x
+def outer(x):
+    return compiled_inner(x) + 1.0
+folder = Path(sys.argv[1])
+compiled_inner = compile_into(folder, inner)
+compiled = compile_into(folder, outer)
+assert compiled(3.0) == 7.0
+print("loaded" if compiled.stats.cache_hits else "compiled")
+"""
+
+
+def small(folder):
+    """(how a small kernel came to be, what was said on the way), in a process of its own."""
+    (folder / "small.py").write_text(SMALL)
+    done = subprocess.run(
+        [sys.executable, folder / "small.py", folder / "cache"], capture_output=True, text=True, check=True
+    )
+    return done.stdout.strip(), done.stderr
+
+
+@pytest.mark.parametrize("ending", ["nbi", "nbc"])
+@pytest.mark.parametrize("damage", ["empty", "cut short", "one bit"])
+def test_damaged_code_is_compiled_anew_and_it_is_said_once(tmp_path, ending, damage):
+    assert small(tmp_path) == ("compiled", "")
+    assert small(tmp_path) == ("loaded", "")
+    files = list((tmp_path / "cache").rglob(f"*.{ending}"))
+    assert len(files) == 2
+    for file in files:
+        content = bytearray(file.read_bytes())
+        content[len(content) // 2] ^= 1
+        file.write_bytes({"empty": b"", "cut short": content[:100], "one bit": content}[damage])
+    how, said = small(tmp_path)
+    assert how == "compiled"
+    assert said.count("\n") == 1
+    assert "is damaged; it is compiled anew" in said
+    assert small(tmp_path) == ("loaded", "")
+
+
+def test_a_full_disk_for_the_cache_is_said_and_does_not_matter(tmp_path, monkeypatch, capsys):
+    def full(*_):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(compiled._CheckedFiles, "_write", full)
+    twice = compiled.compile_into(tmp_path, lambda x: 2 * x)
+    assert twice(3) == 6
+    assert "compiled code cannot be kept in" in capsys.readouterr().err
+
+
+def test_without_a_compiler_a_flight_comes_to_the_same(tmp_path):
+    flights = []
+    for disable in "01":
+        program = """
+import json
+from beaver_ftc.loop.loop import fly
+from beaver_ftc.scenario.schema import Scenario
+fault = {"actuator": "elevator", "type": "loss_of_effectiveness", "magnitude": 0.4, "at_s": 1}
+flight = fly(Scenario(name="short", duration_s=2, rate_hz=20, faults=[fault]))
+print(json.dumps({k: v for k, v in vars(flight).items() if k != "scenario"}))
+"""
+        done = subprocess.run(
+            [sys.executable, "-c", program],
+            env={**os.environ, "NUMBA_DISABLE_JIT": disable, "BEAVER_FTC_NATIVE": "0"},
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        assert done.stderr == ""
+        flights.append(json.loads(done.stdout))
+    compiled_one, plain = flights
+    assert plain["isolated"] == compiled_one["isolated"] == "elevator"
+    for key in ("frames", "detection_time_s", "isolation_time_s", "supervisor", "candidates", "departure"):
+        assert plain[key] == compiled_one[key]
+    for key in ("pre_fault_rms_rad_s", "post_fault_rms_rad_s", "closest_approach"):
+        assert plain[key] == pytest.approx(compiled_one[key], rel=1e-9)

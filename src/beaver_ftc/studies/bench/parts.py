@@ -26,7 +26,7 @@ def nothing(*arguments):
     """Stands in for a kernel that fills its arguments."""
 
 
-def flying(truth):
+def flying(truth, ground_m):
     """Stands in for `frame.flight_status`."""
     return FLYING
 

@@ -6,6 +6,9 @@ from pathlib import Path
 from typing import Any
 
 from beaver_ftc.errors import BadInput
+from beaver_ftc.results.log import row_count
+from beaver_ftc.results.verdict import facts
+from beaver_ftc.scenario.problems import one_line
 from beaver_ftc.studies.compare.table import aligned
 
 Document = dict[str, Any]
@@ -20,6 +23,8 @@ def read_runs(folders: Sequence[Path]) -> list[Document]:
     for folder in folders:
         try:
             runs.append(_read(folder))
+        except BadInput as error:
+            mistakes.append(str(error))
         except (OSError, ValueError, KeyError, TypeError) as error:
             mistakes.append(f"{folder}: {_why(error)}, allowed: a result folder of beaver-ftc run")
     if mistakes:
@@ -35,9 +40,10 @@ def _why(error: Exception) -> str:
 
 def _read(folder: Path) -> Document:
     document = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
-    for name in ("scenario.yaml", "log.parquet"):
-        (folder / name).stat()
+    (folder / "scenario.yaml").stat()
+    row_count(folder / "log.parquet")
     rows_of(document)  # a document that lacks a key is refused here
+    facts(document)
     return document | {"folder": str(folder)}
 
 
@@ -86,7 +92,8 @@ def as_text(runs: Sequence[Document]) -> str:
 def labels(runs: Sequence[Document]) -> list[str]:
     """What to call each run: its folder's name, or the whole path where names repeat."""
     names = [Path(run["folder"]).resolve().name for run in runs]
-    return names if len(set(names)) == len(names) else [run["folder"] for run in runs]
+    distinct = len(set(names)) == len(names)
+    return [one_line(name, 200) for name in (names if distinct else [run["folder"] for run in runs])]
 
 
 def write_figure(runs: Sequence[Document], path: Path) -> None:

@@ -28,7 +28,7 @@ def _save(figure: Any, folder: Path, name: str) -> Iterator[Path]:
 
     for kind in FORMATS:
         path = folder / f"{name}.{kind}"
-        metadata = {"Software": None} if kind == "png" else {"Date": None, "Creator": None}
+        metadata = {"Software": "beaver-ftc"} if kind == "png" else {"Date": None, "Creator": "beaver-ftc"}
         with rc_context({"svg.hashsalt": name}):  # the same bytes every time
             figure.savefig(path, dpi=120, metadata=metadata)
         yield path

@@ -61,7 +61,7 @@ def _of_pair(name: str, end: int) -> Getter:
 
 
 def _outside_s(document: Document, flight: "Flight") -> float:
-    return sum(stay["end_s"] - stay["start_s"] for stay in document["envelope_exits"])
+    return document["envelope"]["outside_s"]
 
 
 def _flown_s(document: Document, flight: "Flight") -> float:
@@ -117,7 +117,7 @@ COLUMNS: tuple[tuple[str, str, Getter], ...] = (
     *_under("float", "tracking.surface_travel_deg", *SURFACES),
     ("supervisor.mode", "text", lambda document, flight: document["supervisor"][-1]["mode"]),
     *((f"supervisor.{mode}_at_s", "float", _first_entry(mode)) for mode in MODES),
-    ("envelope_exits.count", "int", lambda document, flight: len(document["envelope_exits"])),
+    ("envelope_exits.count", "int", lambda document, flight: document["envelope"]["exits"]),
     ("envelope_exits.total_s", "float", _outside_s),
     *_under("float", "departure", "time_s"),
     *_under("text", "departure", "signal"),

@@ -47,7 +47,7 @@ def _healthy(draw: Draw) -> Row:
         "watched_s": flown_s if alarm_s is None else alarm_s,
         "alarm": alarm_s is not None,
         "departed": flight.departure is not None,
-        "outside_s": sum(end - start for start, end in flight.envelope_exits),
+        "outside_s": flight.outside_s,
         "closest": list(flight.closest_approach),
     }
 

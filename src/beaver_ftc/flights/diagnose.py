@@ -1,0 +1,185 @@
+"""Filter a recorded flight with a model: what broke, by how much, and how sure that is, sample by sample.
+
+Everything a row says comes from samples up to its own time.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from beaver_ftc.errors import BadInput
+from beaver_ftc.flights.bank import Bank, at_first, bank_of
+from beaver_ftc.flights.kernel import run_bank
+from beaver_ftc.flights.model import Model
+from beaver_ftc.flights.recording import Floats
+from beaver_ftc.flights.regressors import Regressors, build
+from beaver_ftc.flights.samples import Samples
+
+_LEAST_SCALE, _MOST_SCALE = 0.3, 6.0
+_RATE_TOLERANCE = 0.25
+UNKNOWN = "unknown"
+_NAMED = 0.5
+
+
+@dataclass(frozen=True)
+class Rows:
+    """A row a sample. t_s (n,); faulty (n,) 0 or 1; named (n,) text; estimate, low, high (n, S) effectiveness
+    of each surface; probability (n,) of any fault; healthy (n, G) probability that a group is healthy;
+    gain (n,) control gain over that of the model; scale (n,) variance of the noise over that of the model."""
+
+    t_s: Floats
+    faulty: NDArray[np.int64]
+    named: NDArray[np.object_]
+    estimate: Floats
+    low: Floats
+    high: Floats
+    probability: Floats
+    healthy: Floats
+    gain: Floats
+    scale: Floats
+
+
+def diagnose(samples: Samples, model: Model) -> Rows:
+    """The diagnosis of each sample. Raises BadInput where the log's rate is not the model's."""
+    _check_rate(samples, model)
+    bank = bank_of(model)
+    posterior, state, scale = posterior_of(samples, model, bank)
+    return _at_stamps(samples, _rows(samples, model, bank, posterior, state, scale))
+
+
+def posterior_of(samples: Samples, model: Model, bank: Bank) -> tuple[Floats, Floats, Floats]:
+    """Probability of each hypothesis (n, H), trim and gain (n, 4) and noise scale (n,) after each sample."""
+    regressors = build(samples, group_indices(model), model.history, model.lags, scaled=False)
+    return filter_with(samples, regressors, model, bank)
+
+
+def group_indices(model: Model) -> list[list[int]]:
+    """The model's groups as positions of their surfaces."""
+    names = list(model.vehicle.surfaces)
+    return [[names.index(name) for name in group] for group in model.groups]
+
+
+def filter_with(
+    samples: Samples, regressors: Regressors, model: Model, bank: Bank
+) -> tuple[Floats, Floats, Floats]:
+    """As `posterior_of`, for regressors that are there already."""
+    intercept, past, response, noise = model.arrays()
+    settings, variance = model.settings, np.diag(noise)
+    unexplained = samples.rates - regressors.past @ past
+    answers = np.einsum("ngl,glr->ngr", regressors.commands, response)
+    change = settings.changes_per_hour * samples.dt_s / 3600.0
+    result = run_bank(
+        np.ascontiguousarray(np.nan_to_num(unexplained)),
+        np.ascontiguousarray(np.nan_to_num(answers)),
+        regressors.ok,
+        bank.effectiveness,
+        change * bank.weight,
+        1.0 - change,
+        bank.offset,
+        settings.restarts_per_hour * samples.dt_s / 3600.0,
+        at_first(bank),
+        np.append(intercept, 1.0),
+        np.append(variance * settings.trim_sd**2, settings.gain_sd**2),
+        np.append(variance * settings.trim_walk**2, settings.gain_walk**2),
+        noise,
+        (
+            settings.power,
+            settings.tail,
+            settings.noise_memory_s / samples.dt_s,
+            _LEAST_SCALE,
+            _MOST_SCALE,
+        ),
+    )
+    return result  # type: ignore[no-any-return]
+
+
+def _check_rate(samples: Samples, model: Model) -> None:
+    rate_hz = 1.0 / samples.dt_s
+    if abs(rate_hz / model.rate_hz - 1.0) > _RATE_TOLERANCE:
+        raise BadInput(
+            f"{samples.name}: has samples at {rate_hz:.3g} Hz, allowed: within {_RATE_TOLERANCE:.0%} of the "
+            f"{model.rate_hz:.3g} Hz the model was identified at"
+        )
+
+
+def _rows(
+    samples: Samples, model: Model, bank: Bank, posterior: Floats, state: Floats, scale: Floats
+) -> Rows:
+    probability = 1.0 - posterior[:, 0]
+    faulty = (probability >= model.settings.alarm).astype(np.int64)
+    groups = group_indices(model)
+    estimate, low, high = (np.ones((len(posterior), len(model.vehicle.surfaces))) for _ in range(3))
+    healthy = np.empty((len(posterior), len(groups)))
+    for g, members in enumerate(groups):
+        levels, mass = _marginal(bank, posterior, g)
+        healthy[:, g] = mass[:, -1]
+        estimate[:, members] = _median(levels, mass)[:, None]
+        bounds = _bounds(levels, mass, model.settings.bounds)
+        lower, upper = bounds if len(members) == 1 else _any_of_them(bounds)
+        low[:, members], high[:, members] = lower[:, None], upper[:, None]
+    return Rows(
+        t_s=samples.t_s,
+        faulty=faulty,
+        named=_names(model, bank, posterior, faulty),
+        estimate=estimate,
+        low=low,
+        high=high,
+        probability=probability,
+        healthy=healthy,
+        gain=state[:, 3],
+        scale=scale,
+    )
+
+
+def _marginal(bank: Bank, posterior: Floats, group: int) -> tuple[Floats, Floats]:
+    """A group's levels, the last of them 1, and the probability of each, (L,) and (n, L)."""
+    levels, index = np.unique(bank.effectiveness[:, group], return_inverse=True)
+    mass = np.zeros((len(posterior), len(levels)))
+    for hypothesis, level in enumerate(index):
+        mass[:, level] += posterior[:, hypothesis]
+    return levels, mass
+
+
+def _median(levels: Floats, mass: Floats) -> Floats:
+    """The level with half of the probability on either side: the least mean absolute error."""
+    return np.asarray(levels[(np.cumsum(mass, axis=1) >= 0.5 - 1e-12).argmax(axis=1)])
+
+
+def _bounds(levels: Floats, mass: Floats, share: float) -> tuple[Floats, Floats]:
+    """The range of the fewest levels that hold a share of the probability, half a step wider each way."""
+    order = np.argsort(-mass, axis=1, kind="stable")
+    ranked = np.take_along_axis(mass, order, axis=1)
+    inside = np.cumsum(ranked, axis=1) - ranked < share
+    chosen = np.where(inside, levels[order], np.nan)
+    low, high = np.nanmin(chosen, axis=1), np.nanmax(chosen, axis=1)
+    edges = np.concatenate([[0.0], 0.5 * (levels[1:] + levels[:-1]), [1.0]])
+    return edges[np.searchsorted(levels, low)], edges[np.searchsorted(levels, high) + 1]
+
+
+def _any_of_them(bounds: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
+    """Bounds of one surface of several that move together: any of them may have lost all, or nothing."""
+    low, high = bounds
+    return np.where(low < low.max(initial=0.0), 0.0, low), np.ones_like(high)
+
+
+def _names(model: Model, bank: Bank, posterior: Floats, faulty: NDArray[np.int64]) -> NDArray[np.object_]:
+    """The surfaces of the groups that most of the fault's probability is on; `unknown` where it is split."""
+    total = np.maximum(1.0 - posterior[:, 0], 1e-300)
+    by_group = np.column_stack(
+        [posterior[:, bank.faulty(g)].sum(axis=1) / total for g in range(len(model.groups))]
+    )
+    named = np.full(len(posterior), "", dtype=object)
+    for k in np.flatnonzero(faulty):
+        surfaces = [name for g in np.flatnonzero(by_group[k] > _NAMED) for name in model.groups[g]]
+        named[k] = "+".join(surfaces) or UNKNOWN
+    return named
+
+
+def _at_stamps(samples: Samples, rows: Rows) -> Rows:
+    """The rows at the log's own stamps: each stamp has the last row up to it."""
+    if len(samples.stamps) == len(rows.t_s) and np.array_equal(samples.stamps, rows.t_s):
+        return rows
+    last = np.maximum(np.searchsorted(rows.t_s, samples.stamps, side="right") - 1, 0)
+    fields = {name: getattr(rows, name)[last] for name in Rows.__dataclass_fields__ if name != "t_s"}
+    return Rows(t_s=samples.stamps, **fields)

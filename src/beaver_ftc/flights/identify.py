@@ -1,0 +1,175 @@
+"""Identification: from recorded flights to a model, with how well it is known and how it does elsewhere.
+
+Fitted are the stretches known to be healthy; where labels say how much effectiveness was left, the faulty
+stretches too, with the commands scaled by it. Half of the choice is refused to the fit: the number of past
+samples is taken by the Bayesian information criterion, and every figure of merit comes from parts of the
+flights the fit did not see.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from beaver_ftc.errors import BadInput
+from beaver_ftc.flights.model import Model, Settings
+from beaver_ftc.flights.recording import Floats
+from beaver_ftc.flights.regression import Fit, least_squares
+from beaver_ftc.flights.regressors import Regressors, build, groups_of
+from beaver_ftc.flights.samples import Samples
+from beaver_ftc.flights.vehicle import Vehicle
+
+EDGE_S = 1.5
+"""Labels are good to about a second: what lies nearer to a change is not fitted."""
+SHORTEST_S = 3.0
+"""A label that holds for less is the edge of another."""
+HISTORIES = (1, 2, 3, 4)
+LAGS = (2, 3, 4, 6)
+_COLOUR_S = 2.0
+_AFTER_EVENT_S = 1.0
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """A flight and which of its samples may be fitted."""
+
+    samples: Samples
+    use: NDArray[np.bool_]
+
+
+def stretches_of(flights: Sequence[Samples]) -> list[Stretch]:
+    """What of each flight is known well enough to be fitted."""
+    return [Stretch(samples, known(samples)) for samples in flights]
+
+
+def known(samples: Samples) -> NDArray[np.bool_]:
+    """Which samples are known to be healthy, or faulty by a known amount, (n,)."""
+    use = np.ones(len(samples.t_s), dtype=bool)
+    if samples.events:
+        use &= samples.t_s < min(event.t_s for event in samples.events) - _AFTER_EVENT_S
+    labelled = np.isfinite(samples.labels).any(axis=0)
+    if not labelled.any():
+        return use
+    labels = samples.labels[:, labelled]
+    use &= np.isfinite(labels).all(axis=1)
+    for begin, end in constant_parts(labels):
+        short = (end - begin) * samples.dt_s < SHORTEST_S
+        edge = round(EDGE_S / samples.dt_s)
+        use[begin : end if short else begin + edge] = False
+        use[max(end - edge, begin) : end] = False
+    return use
+
+
+def constant_parts(labels: Floats) -> list[tuple[int, int]]:
+    """Begin and end of each stretch of equal rows."""
+    filled = np.nan_to_num(labels, nan=-1.0)
+    change = np.flatnonzero(np.any(np.diff(filled, axis=0) != 0.0, axis=1)) + 1
+    edges = [0, *change.tolist(), len(labels)]
+    return list(zip(edges[:-1], edges[1:], strict=True))
+
+
+def fit_model(stretches: Sequence[Stretch], vehicle: Vehicle, settings: Settings | None = None) -> Model:
+    """The model that fits these stretches. Raises BadInput where there is too little to fit."""
+    history, lags = choose_order(stretches, vehicle)
+    fit = fit_order(stretches, vehicle, history, lags)
+    model = _model(fit, stretches, vehicle, history, lags)
+    return model.model_copy(update={"settings": settings or prior(stretches, model)})
+
+
+def choose_order(stretches: Sequence[Stretch], vehicle: Vehicle) -> tuple[int, int]:
+    """Past samples of rates and commands by the Bayesian information criterion."""
+    scores = {}
+    for history in HISTORIES:
+        for lags in LAGS:
+            x, y, _ = _stacked(stretches, vehicle, history, lags)
+            residuals = y - x @ np.linalg.lstsq(x, y, rcond=None)[0]
+            log_det = np.linalg.slogdet(residuals.T @ residuals / len(y))[1]
+            scores[history, lags] = len(y) * log_det + 3 * x.shape[1] * np.log(len(y))
+    return min(scores, key=lambda order: scores[order])
+
+
+def fit_order(stretches: Sequence[Stretch], vehicle: Vehicle, history: int, lags: int) -> Fit:
+    """Least squares of given order over all stretches."""
+    x, y, run = _stacked(stretches, vehicle, history, lags)
+    if len(y) < 10 * x.shape[1]:
+        raise BadInput(
+            f"identify: {len(y)} samples known to be healthy, allowed: at least {10 * x.shape[1]} to fit "
+            f"{x.shape[1]} coefficients an axis"
+        )
+    dt_s = float(np.median([stretch.samples.dt_s for stretch in stretches]))
+    return least_squares(x, y, run, round(_COLOUR_S / dt_s))
+
+
+def _stacked(
+    stretches: Sequence[Stretch], vehicle: Vehicle, history: int, lags: int
+) -> tuple[Floats, Floats, NDArray[np.int64]]:
+    """Regressors, rates and number of the gap-free run, over all stretches. The same samples for any order."""
+    groups, reach = groups_of(vehicle), max(HISTORIES + LAGS)
+    xs, ys, runs = [], [], []
+    for number, stretch in enumerate(stretches):
+        regressors = build(stretch.samples, groups, history, lags, scaled=True)
+        use = stretch.use & regressors.ok
+        use[:reach] = False
+        xs.append(design(regressors)[use])
+        ys.append(stretch.samples.rates[use])
+        runs.append(np.cumsum(np.diff(np.flatnonzero(use), prepend=0) > 1) + 1_000_000 * number)
+    return np.vstack(xs), np.vstack(ys), np.concatenate(runs)
+
+
+def design(regressors: Regressors) -> Floats:
+    """Columns of the fit: one, the past, the commands of each group by lag."""
+    n = len(regressors.past)
+    return np.column_stack([np.ones(n), regressors.past, regressors.commands.reshape(n, -1)])
+
+
+def _model(fit: Fit, stretches: Sequence[Stretch], vehicle: Vehicle, history: int, lags: int) -> Model:
+    names, groups = list(vehicle.surfaces), groups_of(vehicle)
+    first = len(fit.coefficients) - len(groups) * lags
+    shape = (len(groups), lags, 3)
+    return Model(
+        vehicle=vehicle,
+        rate_hz=1.0 / float(np.median([stretch.samples.dt_s for stretch in stretches])),
+        groups=[[names[i] for i in group] for group in groups],
+        history=history,
+        lags=lags,
+        intercept=fit.coefficients[0].tolist(),
+        past=fit.coefficients[1:first].tolist(),
+        response=fit.coefficients[first:].reshape(shape).tolist(),
+        response_sd=fit.standard_errors[first:].reshape(shape).tolist(),
+        noise=fit.covariance.tolist(),
+    )
+
+
+def prior(stretches: Sequence[Stretch], model: Model) -> Settings:
+    """What the flights say about faults to come: levels seen, and how often they changed."""
+    hours = sum(stretch.use.sum() * stretch.samples.dt_s for stretch in stretches) / 3600.0
+    changes, repairs, levels = 0, 0, {}
+    names = list(model.vehicle.surfaces)
+    for group in model.groups:
+        column = names.index(group[0])
+        seen = [_levels(stretch, column) for stretch in stretches] if len(group) == 1 else []
+        levels["+".join(group)] = sorted({level for flight in seen for level in flight if level < 1.0})
+        changes += sum(max(len(flight) - 1, 0) for flight in seen)
+        repairs += sum(int(level == 1.0) for flight in seen for level in flight[1:])
+    settings = Settings(levels={name: found for name, found in levels.items() if found})
+    if not settings.levels:
+        return settings
+    return settings.model_copy(
+        update={"changes_per_hour": (changes + 1) / hours, "repair_share": (repairs + 1) / (changes + 4)}
+    )
+
+
+def _levels(stretch: Stretch, column: int) -> list[float]:
+    """The levels of one surface's label in their order, edges left out."""
+    values = stretch.samples.labels[:, column][stretch.use]
+    values = values[np.isfinite(values)]
+    keep = np.concatenate([[True], np.diff(values) != 0.0]) if len(values) else np.array([], dtype=bool)
+    return [round(float(value), 6) for value in values[keep]]
+
+
+def without(stretch: Stretch, begin: int, end: int) -> Stretch:
+    """The stretch less a part that is kept for testing."""
+    use = stretch.use.copy()
+    use[begin:end] = False
+    return replace(stretch, use=use)

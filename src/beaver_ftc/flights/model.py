@@ -1,0 +1,83 @@
+"""The model file: what `identify` has found about a vehicle, and what `diagnose` filters a flight with.
+
+JSON; every key is checked when it is read, as in any other file a user names.
+"""
+
+from pathlib import Path
+
+import numpy as np
+from pydantic import Field
+
+from beaver_ftc.flights.recording import Floats
+from beaver_ftc.flights.vehicle import Vehicle
+from beaver_ftc.scenario.base import Number, Section, Whole
+from beaver_ftc.scenario.document import Problem
+from beaver_ftc.scenario.files import UnreadableError, read_text
+from beaver_ftc.scenario.loader import parse_document, validate
+from beaver_ftc.scenario.problems import ScenarioError
+
+_MAX_BYTES = 20_000_000
+
+Row = list[Number]
+Matrix = list[Row]
+
+
+class Settings(Section):
+    """What the filter believes before it sees a flight."""
+
+    changes_per_hour: Number = Field(12.0, gt=0, description="how often a surface changes its effectiveness")
+    repair_share: Number = Field(0.1, ge=0, lt=1, description="share of the changes that restore health")
+    restarts_per_hour: Number = Field(0.1, ge=0, description="how often trim and gain change at once")
+    levels: dict[str, Row] = Field(default={}, description="likelier levels of effectiveness, by group")
+    level_share: Number = Field(0.9, ge=0, le=1, description="share of faults at the likelier levels")
+    trim_sd: Number = Field(0.5, gt=0, description="spread of the trim between flights, in residual sd")
+    trim_walk: Number = Field(3e-4, ge=0, description="drift of the trim a sample, in residual sd")
+    gain_sd: Number = Field(0.15, gt=0, lt=0.5, description="spread of the control gain between flights")
+    gain_walk: Number = Field(1e-4, ge=0, description="drift of the control gain a sample")
+    jam_sd: Number = Field(1.0, gt=0, description="offset of the rates a sample by a stuck surface, in sd")
+    power: Number = Field(1.0, gt=0, le=1, description="share of a white residual's information in this one")
+    tail: Number = Field(8.0, gt=2, description="degrees of freedom of the residual's t distribution")
+    noise_memory_s: Number = Field(60.0, gt=0, description="memory of the running scale of the residual, s")
+    alarm: Number = Field(0.5, gt=0, lt=1, description="probability of a fault that raises the alarm")
+    level_step: Number = Field(0.1, gt=0, le=0.5, description="step of the grid of effectiveness")
+    bounds: Number = Field(0.9, gt=0, lt=1, description="posterior mass inside the bounds")
+
+
+class Model(Section):
+    """How one vehicle's rates answer their own past and the commands, and how well that is known."""
+
+    vehicle: Vehicle
+    rate_hz: Number = Field(gt=0)
+    groups: list[list[str]] = Field(min_length=1, description="surfaces that move together when healthy")
+    history: Whole = Field(ge=1, le=50)
+    lags: Whole = Field(ge=1, le=50)
+    intercept: Row = Field(min_length=3, max_length=3)
+    past: Matrix = Field(description="(3 history + signals, 3)")
+    response: list[Matrix] = Field(description="(groups, lags, 3), a share of command to rad/s a sample")
+    response_sd: list[Matrix] = Field(description="standard errors of `response`, colour included")
+    noise: Matrix = Field(description="covariance of the residual, (3, 3), (rad/s)2")
+    settings: Settings = Settings()
+    identified: dict[str, object] = Field(default={}, description="what it was found from, and how well")
+
+    def arrays(self) -> tuple[Floats, Floats, Floats, Floats]:
+        """intercept (3,), past (m, 3), response (G, L, 3) and noise (3, 3) as arrays."""
+        return (
+            np.array(self.intercept),
+            np.array(self.past),
+            np.array(self.response),
+            np.array(self.noise),
+        )
+
+
+def load_model(path: Path) -> Model:
+    """The model in a file. Raises ScenarioError with one line a mistake."""
+    try:
+        text = read_text(path, _MAX_BYTES)
+    except UnreadableError as error:
+        raise ScenarioError(str(path), [Problem(error.line, (), str(error))]) from None
+    return validate(Model, parse_document(text, str(path)), str(path))
+
+
+def as_text(model: Model) -> str:
+    """The model as the text of its file."""
+    return model.model_dump_json(indent=1) + "\n"

@@ -1,0 +1,110 @@
+"""A flight of the ALFA data set in its processed form: a folder of CSV files, one a topic [Keipour2019].
+
+The diagnosis reads what is upstream of the frozen output: commanded and measured roll and pitch
+(`mavros-nav_info-*`), never `mavros-rc-out`, whose failed channel stands still from the fault on. The outputs
+are read for the freeze rule of the benchmark alone.
+
+Time counts from the first row of `mavros-imu-data_raw`. A fault begins at the first row of a
+`failure_status-*` topic.
+"""
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+
+from beaver_ftc.errors import BadInput
+from beaver_ftc.flights.readers.table import read_numbers
+from beaver_ftc.flights.recording import Column, Event, Floats, Recording
+
+_NS = 1e-9
+_RAW = "mavros-imu-data_raw"
+_CHANNELS = {1: "elevator", 2: "throttle", 3: "rudder", 4: "left_aileron", 5: "right_aileron"}
+_STATUS = "failure_status-"
+_SIDES = {
+    ("aileron", 1): "right_aileron",
+    ("aileron", 2): "left_aileron",
+    ("elevator", 1): "elevator",
+    ("engines", 1): "engine",
+}
+
+Table = dict[str, Floats]
+
+
+def _same(values: Floats) -> Floats:
+    return values
+
+
+def _microseconds(values: Floats) -> Floats:
+    """Pulse width about its neutral, as a share of the half range of 400 us."""
+    return (values - 1500.0) / 400.0
+
+
+_COLUMNS: tuple[tuple[str, str, str, Callable[[Floats], Floats]], ...] = (
+    *(
+        (f"{rate}_rad_s", _RAW, f"field.angular_velocity.{axis}", _same)
+        for rate, axis in zip("pqr", "xyz", strict=True)
+    ),
+    *((f"a{axis}_m_s2", _RAW, f"field.linear_acceleration.{axis}", _same) for axis in "xyz"),
+    ("roll_command_rad", "mavros-nav_info-roll", "field.commanded", np.deg2rad),
+    ("roll_rad", "mavros-nav_info-roll", "field.measured", np.deg2rad),
+    ("pitch_command_rad", "mavros-nav_info-pitch", "field.commanded", np.deg2rad),
+    ("pitch_rad", "mavros-nav_info-pitch", "field.measured", np.deg2rad),
+    ("ground_north_m_s", "mavros-nav_info-velocity", "field.meas_y", _same),
+    ("ground_east_m_s", "mavros-nav_info-velocity", "field.meas_x", _same),
+    ("wind_east_m_s", "mavros-wind_estimation", "field.twist.linear.x", _same),
+    ("wind_north_m_s", "mavros-wind_estimation", "field.twist.linear.y", _same),
+    *(
+        (f"{name}_output", "mavros-rc-out", f"field.channels{channel}", _microseconds)
+        for channel, name in _CHANNELS.items()
+    ),
+)
+
+
+def read(path: Path) -> Recording:
+    """The flight in a folder of topics. Raises BadInput if it has none of the gyro."""
+    if not path.is_dir():
+        raise BadInput(f"{path}: is a file, allowed: a folder of the ALFA data set's processed CSV files")
+    topics = dict(_topics(path))
+    if _RAW not in topics:
+        raise BadInput(f"{path}: no {_RAW} topic, allowed: a processed folder of the ALFA data set")
+    origin_ns = float(topics[_RAW]["%time"][0])
+    columns = dict(_columns(topics, origin_ns))
+    _add_errors(columns)
+    return Recording(path.name, columns, tuple(_events(topics, origin_ns)))
+
+
+def _topics(path: Path) -> Iterator[tuple[str, Table]]:
+    wanted = {topic for _, topic, _, _ in _COLUMNS}
+    for file in sorted(path.glob("*.csv")):
+        topic = file.stem.removeprefix(path.name).removeprefix("-")
+        if topic in wanted or topic.startswith(_STATUS):
+            table = read_numbers(file)
+            if "%time" in table and len(table["%time"]):
+                yield topic, table
+
+
+def _columns(topics: dict[str, Table], origin_ns: float) -> Iterator[tuple[str, Column]]:
+    for name, topic, field, convert in _COLUMNS:
+        if field in topics.get(topic, {}):
+            t_s = (topics[topic]["%time"] - origin_ns) * _NS
+            order = np.flatnonzero(np.diff(np.maximum.accumulate(t_s), prepend=-np.inf) > 0)
+            yield name, Column(t_s[order], convert(topics[topic][field])[order])
+
+
+def _add_errors(columns: dict[str, Column]) -> None:
+    """Commanded less measured attitude, rad: the demand on the surfaces, upstream of what froze."""
+    for axis in ("roll", "pitch"):
+        command, measured = columns.get(f"{axis}_command_rad"), columns.get(f"{axis}_rad")
+        if command is not None and measured is not None:
+            columns[f"{axis}_error_rad"] = Column(command.t_s, command.values - measured.values)
+
+
+def _events(topics: dict[str, Table], origin_ns: float) -> Iterator[Event]:
+    for topic, table in topics.items():
+        if topic.startswith(_STATUS):
+            part = topic.removeprefix(_STATUS)
+            for code in sorted(set(table["field.data"])):
+                first = int(np.argmax(table["field.data"] == code))
+                t_s = float((table["%time"][first] - origin_ns) * _NS)
+                yield Event(t_s, _SIDES.get((part, int(code)), part))

@@ -1,0 +1,156 @@
+"""A recording on one time base: rates, surface commands, further signals and labels, sample by sample.
+
+The time base is the stamps of the roll rate. A column with other stamps is held: its value at t is the last
+one received up to t, never a later one; the age that this adds is stated. A log faster than the vehicle's
+`max_rate_hz` is averaged over the past interval first.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from beaver_ftc.errors import BadInput
+from beaver_ftc.flights.recording import Column, Event, Floats, Recording
+from beaver_ftc.flights.vehicle import Vehicle
+
+MIN_RATE_HZ = 4.0
+_GAP = 3.5
+"""A step of more than this many median steps is a gap: nothing is predicted across it."""
+
+
+@dataclass(frozen=True)
+class Samples:
+    """One flight, ready for identification and filtering.
+
+    t_s (n,) s; rates (n, 3) rad/s; commands (n, S) what each healthy surface would make of the commands;
+    signals (n, X); labels (n, S) effectiveness, nan where unknown; run (n,) number of the gap-free stretch;
+    age_s: mean age of each held column; stamps (m,) the log's own time stamps, s.
+    """
+
+    name: str
+    t_s: Floats
+    rates: Floats
+    commands: Floats
+    signals: Floats
+    labels: Floats
+    run: NDArray[np.int64]
+    dt_s: float
+    age_s: dict[str, float]
+    events: tuple[Event, ...]
+    stamps: Floats
+
+
+def sample(recording: Recording, vehicle: Vehicle) -> Samples:
+    """Put a recording on one time base. Raises BadInput with the reason where the log cannot be used."""
+    names = [vehicle.rates.p, vehicle.rates.q, vehicle.rates.r]
+    _require(recording, [*names, *vehicle.commands, *vehicle.signals])
+    stamps = recording.columns[vehicle.rates.p].t_s
+    t_s = _time_base(recording.name, stamps, vehicle.max_rate_hz)
+    step = float(np.median(np.diff(t_s)))
+    grid = _Grid(recording, t_s, step)
+    return Samples(
+        name=recording.name,
+        t_s=t_s,
+        rates=grid.columns(names),
+        commands=grid.columns(vehicle.commands) @ mixer(vehicle).T,
+        signals=grid.columns(vehicle.signals),
+        labels=_labels(grid, vehicle),
+        run=np.cumsum(np.diff(t_s, prepend=t_s[0]) > _GAP * step),
+        dt_s=step,
+        age_s=grid.age_s,
+        events=recording.events,
+        stamps=stamps,
+    )
+
+
+def mixer(vehicle: Vehicle) -> Floats:
+    """What each surface makes of each command, (surfaces, commands)."""
+    rows = [[row.get(name, 0.0) for name in vehicle.commands] for row in vehicle.surfaces.values()]
+    return np.array(rows, dtype=float)
+
+
+def _require(recording: Recording, names: list[str]) -> None:
+    missing = [name for name in dict.fromkeys(names) if name not in recording.columns]
+    if missing:
+        known = ", ".join(sorted(recording.columns)) or "none"
+        raise BadInput(f"{recording.name}: no column {missing[0]}, allowed: a log that has it; it has {known}")
+    for name in names:
+        if not np.isfinite(recording.columns[name].values).any():
+            raise BadInput(f"{recording.name}: column {name} holds no number, allowed: a logged quantity")
+
+
+def _time_base(name: str, stamps: Floats, max_rate_hz: float) -> Floats:
+    if len(stamps) < 50:
+        raise BadInput(f"{name}: has {len(stamps)} samples of the rates, allowed: at least 50")
+    rate_hz = 1.0 / float(np.median(np.diff(stamps)))
+    if rate_hz < MIN_RATE_HZ:
+        raise BadInput(
+            f"{name}: rates are logged at {rate_hz:.2g} Hz, allowed: at least {MIN_RATE_HZ:g} Hz to tell "
+            "a surface's effect from the vehicle's own motion"
+        )
+    if rate_hz <= 1.05 * max_rate_hz:
+        return stamps
+    return np.arange(stamps[0], stamps[-1] + 0.5 / max_rate_hz, 1.0 / max_rate_hz)
+
+
+class _Grid:
+    """Columns of a recording at given times; remembers how old what it holds is."""
+
+    def __init__(self, recording: Recording, t_s: Floats, step_s: float) -> None:
+        self._recording, self._t_s, self._step_s = recording, t_s, step_s
+        self.age_s: dict[str, float] = {}
+
+    def columns(self, names: list[str]) -> Floats:
+        return np.column_stack([self.column(name) for name in names]) if names else np.empty((len(self._t_s), 0))
+
+    def column(self, name: str) -> Floats:
+        column = self._recording.columns[name]
+        if len(column.t_s) == len(self._t_s) and np.array_equal(column.t_s, self._t_s):
+            return column.values
+        faster = float(np.median(np.diff(column.t_s))) < 0.6 * self._step_s if len(column.t_s) > 2 else False
+        values, age_s = _averaged(column, self._t_s, self._step_s) if faster else _held(column, self._t_s)
+        self.age_s[name] = age_s
+        return values
+
+
+def _held(column: Column, t_s: Floats) -> tuple[Floats, float]:
+    """The last value up to each time, nan before the first; and its mean age, s."""
+    known = np.isfinite(column.values)
+    stamps, values = column.t_s[known], column.values[known]
+    last = np.searchsorted(stamps, t_s, side="right") - 1
+    held = np.where(last >= 0, values[np.maximum(last, 0)], np.nan)
+    age_s = (t_s - stamps[np.maximum(last, 0)])[last >= 0]
+    return held, float(age_s.mean()) if age_s.size else float("nan")
+
+
+def _averaged(column: Column, t_s: Floats, step_s: float) -> tuple[Floats, float]:
+    """The mean over the interval that ends at each time, and half that interval: the delay it adds, s."""
+    known = np.isfinite(column.values)
+    stamps, total = column.t_s[known], np.concatenate([[0.0], np.cumsum(column.values[known])])
+    end = np.searchsorted(stamps, t_s, side="right")
+    start = np.searchsorted(stamps, t_s - step_s, side="right")
+    count = end - start
+    held, _ = _held(column, t_s)
+    mean = (total[end] - total[start]) / np.maximum(count, 1)
+    return np.where(count > 0, mean, held), 0.5 * step_s
+
+
+def _labels(grid: _Grid, vehicle: Vehicle) -> Floats:
+    """Labels as the log gives them, nan for a surface without one and where the log says nothing."""
+    present = {
+        surface: name for surface, name in vehicle.labels.items() if name in grid._recording.columns
+    }
+    nothing = np.full(len(grid._t_s), np.nan)
+    return np.column_stack(
+        [
+            _at_stamps(grid._recording.columns[present[surface]], grid._t_s) if surface in present else nothing
+            for surface in vehicle.surfaces
+        ]
+    )
+
+
+def _at_stamps(column: Column, t_s: Floats) -> Floats:
+    """A label is held without skipping its gaps: where the log says nothing it is unknown."""
+    last = np.searchsorted(column.t_s, t_s, side="right") - 1
+    return np.where(last >= 0, column.values[np.maximum(last, 0)], np.nan)

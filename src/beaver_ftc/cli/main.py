@@ -30,6 +30,8 @@ COMMANDS = (
     "bench",
     "verify",
     "detectability",
+    "identify",
+    "diagnose",
 )
 
 app = typer.Typer(

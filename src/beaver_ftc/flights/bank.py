@@ -101,7 +101,7 @@ def _pairs(count: int) -> list[tuple[Floats, int, float, Floats]]:
 
 
 def at_first(bank: Bank) -> Floats:
-    """Probability of each hypothesis before the flight, (H,): mostly healthy, a fault from the start allowed."""
+    """Probability of each hypothesis before the flight, (H,): mostly healthy, any fault allowed."""
     start = bank.weight * (1.0 - _HEALTHY_AT_FIRST) / bank.weight[1:].sum()
     start[0] = _HEALTHY_AT_FIRST
     return np.asarray(start)

@@ -66,9 +66,9 @@ def filter_with(
     """As `posterior_of`, for regressors that are there already."""
     intercept, past, response, noise = model.arrays()
     settings, variance = model.settings, np.diag(noise)
-    unexplained = samples.rates - regressors.past @ past
-    answers = np.einsum("ngl,glr->ngr", regressors.commands, response)
-    change = settings.changes_per_hour * samples.dt_s / 3600.0
+    unexplained, answers = predict(samples.rates, regressors, past, response)
+    dt_s = 1.0 / model.rate_hz
+    change = settings.changes_per_hour * dt_s / 3600.0
     result = run_bank(
         np.ascontiguousarray(np.nan_to_num(unexplained)),
         np.ascontiguousarray(np.nan_to_num(answers)),
@@ -77,7 +77,7 @@ def filter_with(
         change * bank.weight,
         1.0 - change,
         bank.offset,
-        settings.restarts_per_hour * samples.dt_s / 3600.0,
+        settings.restarts_per_hour * dt_s / 3600.0,
         at_first(bank),
         np.append(intercept, 1.0),
         np.append(variance * settings.trim_sd**2, settings.gain_sd**2),
@@ -86,12 +86,21 @@ def filter_with(
         (
             settings.power,
             settings.tail,
-            settings.noise_memory_s / samples.dt_s,
+            settings.noise_memory_s / dt_s,
             _LEAST_SCALE,
             _MOST_SCALE,
         ),
     )
-    return result  # type: ignore[no-any-return]
+    return result
+
+
+def predict(rates: Floats, regressors: Regressors, past: Floats, response: Floats) -> tuple[Floats, Floats]:
+    """What the past leaves unexplained of the rates, (n, 3), and each group's healthy answer, (n, G, 3).
+
+    Summed in the same order whatever the length of the flight, so that a row does not depend on later ones.
+    """
+    unexplained = rates - np.einsum("nm,mr->nr", regressors.past, past)
+    return unexplained, np.einsum("ngl,glr->ngr", regressors.commands, response)
 
 
 def _check_rate(samples: Samples, model: Model) -> None:

@@ -8,6 +8,7 @@ flights the fit did not see.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,7 +67,7 @@ def constant_parts(labels: Floats) -> list[tuple[int, int]]:
     filled = np.nan_to_num(labels, nan=-1.0)
     change = np.flatnonzero(np.any(np.diff(filled, axis=0) != 0.0, axis=1)) + 1
     edges = [0, *change.tolist(), len(labels)]
-    return list(zip(edges[:-1], edges[1:], strict=True))
+    return list(pairwise(edges))
 
 
 def fit_model(stretches: Sequence[Stretch], vehicle: Vehicle, settings: Settings | None = None) -> Model:
@@ -104,7 +105,7 @@ def fit_order(stretches: Sequence[Stretch], vehicle: Vehicle, history: int, lags
 def _stacked(
     stretches: Sequence[Stretch], vehicle: Vehicle, history: int, lags: int
 ) -> tuple[Floats, Floats, NDArray[np.int64]]:
-    """Regressors, rates and number of the gap-free run, over all stretches. The same samples for any order."""
+    """Regressors, rates and run number over all stretches: the same samples for any order."""
     groups, reach = groups_of(vehicle), max(HISTORIES + LAGS)
     xs, ys, runs = [], [], []
     for number, stretch in enumerate(stretches):

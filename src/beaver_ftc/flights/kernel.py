@@ -1,12 +1,13 @@
 """A bank of filters over what may have happened to the surfaces: causal, one pass, all hypotheses at once.
 
-Under hypothesis h with effectiveness e_h of the groups the part of the rates that the past does not explain is
+Under hypothesis h with effectiveness e_h of the groups, what the past does not explain of the rates is
 
     y = c + s (sum_g e_hg F_g) + noise,      noise ~ t(0, r R)
 
-with the flight's own trim c (3,) and control gain s, which each hypothesis estimates by a Kalman filter, and r
-the running scale of the noise. A hypothesis passes to another at random times (interacting multiple models
-[Blom1988]): the one that takes over inherits trim and gain, plus an offset where the surface may be stuck.
+with the flight's own trim c (3,) and control gain s, which each hypothesis estimates by a Kalman filter,
+and r the running scale of the noise. A hypothesis passes to another at random times (interacting multiple
+models [Blom1988]): the one that takes over inherits trim and gain, plus an offset where a surface may be
+stuck.
 """
 
 import numpy as np
@@ -23,10 +24,11 @@ _EXPECTED = 0.93
 def run_bank(y, f, ok, e, reach, stay, offset, fresh, start, m0, p0, walk, noise, options):
     """Posterior probability of each hypothesis, and mean trim, gain and noise scale, after each sample.
 
-    Shapes: y (n, 3); f (n, G, 3) responses; ok (n,) the sample may be used; e (H, G) effectiveness; reach (H,)
-    probability of passing to each hypothesis in a sample; stay: of none; offset (H, 3) variance added to the
-    trim on passing to it; fresh: probability of a new trim and gain in a sample; start (H,) at first; m0 (4,)
-    and p0 (4,) mean and variance of trim and gain; walk (4,) variance added a sample; noise (3, 3).
+    Shapes: y (n, 3); f (n, G, 3) responses; ok (n,) the sample may be used; e (H, G) effectiveness;
+    reach (H,) probability of passing to each hypothesis in a sample; stay: of none; offset (H, 3) variance
+    added to the trim on passing to it; fresh: probability of a new trim and gain in a sample; start (H,) at
+    first; m0 (4,) and p0 (4,) mean and variance of trim and gain; walk (4,) variance added a sample; noise
+    (3, 3).
     options: power of the likelihood, degrees of freedom, memory in samples, least and largest noise scale.
     """
     n, hypotheses = len(y), len(e)

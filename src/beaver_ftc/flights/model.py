@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from pydantic import Field
 
+from beaver_ftc.errors import SimulationFailed
 from beaver_ftc.flights.recording import Floats
 from beaver_ftc.flights.vehicle import Vehicle
 from beaver_ftc.scenario.base import Number, Section, Whole
@@ -81,3 +82,15 @@ def load_model(path: Path) -> Model:
 def as_text(model: Model) -> str:
     """The model as the text of its file."""
     return model.model_dump_json(indent=1) + "\n"
+
+
+def write_model(path: Path, text: str) -> None:
+    """Write a model file whole or not at all. Raises SimulationFailed where it cannot be written."""
+    partial = path.with_name(f".{path.name}.partial")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        partial.write_text(text, encoding="utf-8")
+        partial.replace(path)
+    except OSError as error:
+        partial.unlink(missing_ok=True)
+        raise SimulationFailed(f"cannot write {path}: {(error.strerror or str(error)).lower()}") from error

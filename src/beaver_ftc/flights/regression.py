@@ -36,7 +36,9 @@ def least_squares(x: Floats, y: Floats, run: NDArray[np.int64], reach: int) -> F
     free = max(len(y) - x.shape[1], 1)
     covariance = residuals.T @ residuals / free
     white = np.sqrt(np.maximum(np.outer(np.diag(inverse), np.diag(covariance)), 0.0))
-    robust = np.column_stack([_newey_west(z, residuals[:, i], inverse, run, reach) for i in range(y.shape[1])])
+    robust = np.column_stack(
+        [_newey_west(z, residuals[:, i], inverse, run, reach) for i in range(y.shape[1])]
+    )
     colour = np.divide(robust, white, out=np.ones_like(robust), where=white > 0)
     return Fit(coefficients / scale[:, None], residuals, covariance, robust / scale[:, None], colour)
 

@@ -66,7 +66,9 @@ def build(samples: Samples, groups: list[list[int]], history: int, lags: int, sc
 def _lagged(values: Floats, lags: range | tuple[int, ...]) -> Floats:
     """Columns delayed by each lag, nan where there is no past: (n, len(lags) * columns)."""
     n = len(values)
-    delayed = [np.vstack([np.full((min(k, n), values.shape[1]), np.nan), values[: max(n - k, 0)]]) for k in lags]
+    delayed = [
+        np.vstack([np.full((min(k, n), values.shape[1]), np.nan), values[: max(n - k, 0)]]) for k in lags
+    ]
     return np.column_stack(delayed)
 
 

@@ -15,6 +15,7 @@ from beaver_ftc.flights.recording import Column, Event, Floats, Recording
 from beaver_ftc.flights.vehicle import Vehicle
 
 MIN_RATE_HZ = 4.0
+_FIRST = 50
 _GAP = 3.5
 """A step of more than this many median steps is a gap: nothing is predicted across it."""
 
@@ -47,15 +48,15 @@ def sample(recording: Recording, vehicle: Vehicle) -> Samples:
     _require(recording, [*names, *vehicle.commands, *vehicle.signals])
     stamps = recording.columns[vehicle.rates.p].t_s
     t_s = _time_base(recording.name, stamps, vehicle.max_rate_hz)
-    step = float(np.median(np.diff(t_s)))
+    step = _step(t_s)
     grid = _Grid(recording, t_s, step)
     return Samples(
         name=recording.name,
         t_s=t_s,
         rates=grid.columns(names),
-        commands=grid.columns(vehicle.commands) @ mixer(vehicle).T,
+        commands=np.einsum("nc,sc->ns", grid.columns(vehicle.commands), mixer(vehicle)),
         signals=grid.columns(vehicle.signals),
-        labels=_labels(grid, vehicle),
+        labels=_labels(recording, vehicle, t_s),
         run=np.cumsum(np.diff(t_s, prepend=t_s[0]) > _GAP * step),
         dt_s=step,
         age_s=grid.age_s,
@@ -74,16 +75,18 @@ def _require(recording: Recording, names: list[str]) -> None:
     missing = [name for name in dict.fromkeys(names) if name not in recording.columns]
     if missing:
         known = ", ".join(sorted(recording.columns)) or "none"
-        raise BadInput(f"{recording.name}: no column {missing[0]}, allowed: a log that has it; it has {known}")
+        raise BadInput(
+            f"{recording.name}: no column {missing[0]}, allowed: a log that has it; it has {known}"
+        )
     for name in names:
         if not np.isfinite(recording.columns[name].values).any():
             raise BadInput(f"{recording.name}: column {name} holds no number, allowed: a logged quantity")
 
 
 def _time_base(name: str, stamps: Floats, max_rate_hz: float) -> Floats:
-    if len(stamps) < 50:
-        raise BadInput(f"{name}: has {len(stamps)} samples of the rates, allowed: at least 50")
-    rate_hz = 1.0 / float(np.median(np.diff(stamps)))
+    if len(stamps) < _FIRST:
+        raise BadInput(f"{name}: has {len(stamps)} samples of the rates, allowed: at least {_FIRST}")
+    rate_hz = 1.0 / _step(stamps)
     if rate_hz < MIN_RATE_HZ:
         raise BadInput(
             f"{name}: rates are logged at {rate_hz:.2g} Hz, allowed: at least {MIN_RATE_HZ:g} Hz to tell "
@@ -94,6 +97,11 @@ def _time_base(name: str, stamps: Floats, max_rate_hz: float) -> Floats:
     return np.arange(stamps[0], stamps[-1] + 0.5 / max_rate_hz, 1.0 / max_rate_hz)
 
 
+def _step(stamps: Floats) -> float:
+    """The usual step of the first stamps, s: a log cut short later has the same."""
+    return float(np.median(np.diff(stamps[:_FIRST]))) if len(stamps) > 1 else float("inf")
+
+
 class _Grid:
     """Columns of a recording at given times; remembers how old what it holds is."""
 
@@ -102,13 +110,15 @@ class _Grid:
         self.age_s: dict[str, float] = {}
 
     def columns(self, names: list[str]) -> Floats:
-        return np.column_stack([self.column(name) for name in names]) if names else np.empty((len(self._t_s), 0))
+        return (
+            np.column_stack([self.column(name) for name in names]) if names else np.empty((len(self._t_s), 0))
+        )
 
     def column(self, name: str) -> Floats:
         column = self._recording.columns[name]
         if len(column.t_s) == len(self._t_s) and np.array_equal(column.t_s, self._t_s):
             return column.values
-        faster = float(np.median(np.diff(column.t_s))) < 0.6 * self._step_s if len(column.t_s) > 2 else False
+        faster = _step(column.t_s) < 0.6 * self._step_s
         values, age_s = _averaged(column, self._t_s, self._step_s) if faster else _held(column, self._t_s)
         self.age_s[name] = age_s
         return values
@@ -128,26 +138,23 @@ def _averaged(column: Column, t_s: Floats, step_s: float) -> tuple[Floats, float
     """The mean over the interval that ends at each time, and half that interval: the delay it adds, s."""
     known = np.isfinite(column.values)
     stamps, total = column.t_s[known], np.concatenate([[0.0], np.cumsum(column.values[known])])
-    end = np.searchsorted(stamps, t_s, side="right")
-    start = np.searchsorted(stamps, t_s - step_s, side="right")
+    rounding = 1e-6 * step_s  # of stamps that are meant to fall on the edge
+    end = np.searchsorted(stamps, t_s + rounding, side="right")
+    start = np.searchsorted(stamps, t_s - step_s + rounding, side="right")
     count = end - start
     held, _ = _held(column, t_s)
     mean = (total[end] - total[start]) / np.maximum(count, 1)
     return np.where(count > 0, mean, held), 0.5 * step_s
 
 
-def _labels(grid: _Grid, vehicle: Vehicle) -> Floats:
-    """Labels as the log gives them, nan for a surface without one and where the log says nothing."""
-    present = {
-        surface: name for surface, name in vehicle.labels.items() if name in grid._recording.columns
-    }
-    nothing = np.full(len(grid._t_s), np.nan)
-    return np.column_stack(
-        [
-            _at_stamps(grid._recording.columns[present[surface]], grid._t_s) if surface in present else nothing
-            for surface in vehicle.surfaces
-        ]
-    )
+def _labels(recording: Recording, vehicle: Vehicle, t_s: Floats) -> Floats:
+    """Labels (n, S) as the log gives them, nan for a surface without one and where the log says nothing."""
+    labels = np.full((len(t_s), len(vehicle.surfaces)), np.nan)
+    for i, surface in enumerate(vehicle.surfaces):
+        column = recording.columns.get(vehicle.labels.get(surface, ""))
+        if column is not None:
+            labels[:, i] = _at_stamps(column, t_s)
+    return labels
 
 
 def _at_stamps(column: Column, t_s: Floats) -> Floats:

@@ -4,6 +4,7 @@ It names columns, not code. Unknown keys and every other mistake are refused wit
 `FILE:LINE: key: what is wrong, what is allowed`.
 """
 
+import re
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -20,6 +21,7 @@ _MAX_BYTES = 1_000_000
 _FOLDER = Path(__file__).parent / "vehicles"
 
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+$", max_length=100)]
+_NAME = re.compile(r"[A-Za-z0-9_-]{1,100}")
 ColumnName = Annotated[str, Field(min_length=1, max_length=200)]
 Kind = Literal["loss", "stuck"]
 
@@ -46,13 +48,13 @@ class Vehicle(Section):
     signals: list[ColumnName] = Field(
         default=[], max_length=12, description="further measured columns the rates depend on"
     )
-    surfaces: dict[Name, dict[ColumnName, Number]] = Field(
+    surfaces: dict[str, dict[str, Number]] = Field(
         min_length=1, max_length=8, description="what each healthy surface makes of the commands"
     )
-    labels: dict[Name, ColumnName] = Field(
+    labels: dict[str, ColumnName] = Field(
         default={}, description="columns with each surface's true effectiveness: identification and scoring"
     )
-    outputs: dict[Name, ColumnName] = Field(
+    outputs: dict[str, ColumnName] = Field(
         default={}, description="columns of the servo outputs: read by the freeze rule of a benchmark alone"
     )
     faults: list[Kind] = Field(
@@ -64,8 +66,19 @@ class Vehicle(Section):
 
     @model_validator(mode="after")
     def _agree(self) -> "Vehicle":
-        refuse([*self._unknown_commands(), *self._unknown_surfaces()])
+        refuse([*self._bad_names(), *self._unknown_commands(), *self._unknown_surfaces()])
         return self
+
+    def _bad_names(self) -> list[Conflict]:
+        """A surface's name becomes part of a column's name, and + joins several."""
+        return [
+            (
+                ("surfaces", name),
+                f"{name!r}: a surface's name has letters, digits, - and _ only, allowed: one",
+            )
+            for name in self.surfaces
+            if not _NAME.fullmatch(name)
+        ]
 
     def _unknown_commands(self) -> list[Conflict]:
         return [

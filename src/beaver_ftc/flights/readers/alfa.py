@@ -71,7 +71,8 @@ def read(path: Path) -> Recording:
     origin_ns = float(topics[_RAW]["%time"][0])
     columns = dict(_columns(topics, origin_ns))
     _add_errors(columns)
-    return Recording(path.name, columns, tuple(_events(topics, origin_ns)))
+    events = sorted(_events(topics, origin_ns), key=lambda event: event.t_s)
+    return Recording(path.name, columns, tuple(events))
 
 
 def _topics(path: Path) -> Iterator[tuple[str, Table]]:

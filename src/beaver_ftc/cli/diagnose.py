@@ -1,0 +1,57 @@
+"""`beaver-ftc diagnose`: what broke in a recorded flight, when, and what the log cannot tell."""
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from beaver_ftc.cli.output import Format, FormatOption, emit, emit_json
+
+
+def command(
+    flights: Annotated[list[Path], typer.Argument(metavar="FLIGHT...", help="Recorded flights.")],
+    model: Annotated[Path, typer.Option(metavar="MODEL", help="The model file `identify` has written.")],
+    out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("diagnoses"),
+    score: Annotated[
+        bool, typer.Option("--score", help="Compare with the log's labels, after the fact.")
+    ] = False,
+    reader: Annotated[
+        str | None, typer.Option(help="table, alfa, ulog or ardupilot, where it is not evident.")
+    ] = None,
+    format: FormatOption = Format.text,
+) -> None:
+    """Diagnose recorded flights with an identified model.
+
+    Writes DIR/<flight>/diagnosis.parquet (a row a sample), verdict.json and report.html. A row uses nothing
+    later than its time.
+    """
+    from beaver_ftc.flights.inputs import load_flights
+    from beaver_ftc.flights.model import load_model
+    from beaver_ftc.flights.verdict import as_text
+
+    known = load_model(model)
+    verdicts = [
+        _diagnose(flight, known, out, score) for flight in load_flights(flights, known.vehicle, reader)
+    ]
+    if format is Format.json:
+        emit_json({"flights": verdicts})
+    else:
+        emit(
+            "\n".join(
+                f"{as_text(verdict)}\n  report: {verdict['folder']}/report.html" for verdict in verdicts
+            )
+        )
+
+
+def _diagnose(samples: Any, model: Any, out: Path, scored: bool) -> dict[str, Any]:
+    from beaver_ftc.flights.diagnose import diagnose
+    from beaver_ftc.flights.scoring import score
+    from beaver_ftc.flights.verdict import verdict_of
+    from beaver_ftc.flights.writing import write_diagnosis
+
+    rows = diagnose(samples, model)
+    verdict = verdict_of(samples, model, rows)
+    if scored:
+        verdict["score"] = score(samples, rows, model.groups, list(model.vehicle.surfaces))
+    folder = write_diagnosis(out, samples, model, rows, verdict)
+    return verdict | {"folder": str(folder)}

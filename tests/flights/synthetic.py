@@ -1,0 +1,106 @@
+"""A flying wing made of difference equations whose coefficients are known, and its logs in each format."""
+
+import numpy as np
+
+RATE_HZ = 10.0
+PAST = np.array([[0.5, 0.02, 0.05], [0.0, 0.6, 0.0], [-0.1, 0.0, 0.7]])
+RIGHT = np.array([[0.05, -0.02, 0.01], [0.5, 0.25, 0.06], [0.2, 0.10, 0.02]])
+LEFT = RIGHT * np.array([1.0, -1.0, 1.0])
+TRIM = np.array([-0.03, 0.04, 0.0])
+NOISE = np.array([0.05, 0.04, 0.02])
+VEHICLE = """\
+name: wing
+rates: {p: p_rad_s, q: q_rad_s, r: r_rad_s}
+commands: [roll_command, pitch_command]
+surfaces: {right: {roll_command: 0.5, pitch_command: 0.5}, left: {roll_command: 0.5, pitch_command: -0.5}}
+labels: {right: right_effectiveness, left: left_effectiveness}
+"""
+
+
+def fly(duration_s=240.0, parts=(), seed=1, trim=(0.1, -0.2), gain=1.0):
+    """Columns of a flight. parts: (from_s, to_s, right, left) effectiveness, healthy elsewhere."""
+    rng = np.random.default_rng(seed)
+    n = round(duration_s * RATE_HZ)
+    t_s = np.arange(n) / RATE_HZ
+    effectiveness = np.ones((n, 2))
+    for begin, end, *values in parts:
+        effectiveness[(t_s >= begin) & (t_s < end)] = values
+    commands = np.array(trim) + _wander(rng, n, 0.06) - np.array([0.0, 0.0])
+    surfaces = np.column_stack([commands.sum(axis=1) / 2, (commands[:, 0] - commands[:, 1]) / 2])
+    rates = np.zeros((n, 3))
+    for k in range(3, n):
+        driven = gain * sum(
+            effectiveness[k, 0] * surfaces[k - j - 1, 0] * RIGHT[j]
+            + effectiveness[k, 1] * surfaces[k - j - 1, 1] * LEFT[j]
+            for j in range(3)
+        )
+        rates[k] = TRIM + rates[k - 1] @ PAST + driven + NOISE * rng.standard_normal(3)
+    return {
+        "t_s": t_s,
+        "p_rad_s": rates[:, 0],
+        "q_rad_s": rates[:, 1],
+        "r_rad_s": rates[:, 2],
+        "roll_command": commands[:, 0],
+        "pitch_command": commands[:, 1],
+        "right_effectiveness": effectiveness[:, 0],
+        "left_effectiveness": effectiveness[:, 1],
+    }
+
+
+def _wander(rng, n, sd):
+    """Commands that wander with a time constant of half a second, (n, 2)."""
+    values = np.zeros((n, 2))
+    for k in range(1, n):
+        values[k] = 0.8 * values[k - 1] + 0.6 * sd * rng.standard_normal(2)
+    return values
+
+
+def write_csv(path, columns, rows=slice(None)):
+    """Write columns as a CSV table; nan is an empty cell."""
+    table = np.column_stack([column[rows] for column in columns.values()])
+    lines = [",".join("" if np.isnan(cell) else repr(float(cell)) for cell in row) for row in table]
+    path.write_text("\n".join([",".join(columns), *lines]) + "\n")
+    return path
+
+
+def write_parquet(path, columns):
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    parquet.write_table(pa.table(columns), path)
+    return path
+
+
+def write_alfa(folder, duration_s=60.0, failure_s=None, seed=3):
+    """A folder in the processed form of the ALFA set: gyro 10 Hz, attitude errors 12 Hz, outputs 3 Hz."""
+    folder.mkdir()
+    origin_ns = 1_538_768_543_780_097_959
+    flown = fly(duration_s, seed=seed, trim=(0.0, 0.0))
+    ns = origin_ns + np.round(flown["t_s"] * 1e9).astype(np.int64)
+
+    def write(topic, stamps, columns):
+        rows = [
+            f"{stamp},{','.join(repr(float(cell)) for cell in row)}"
+            for stamp, row in zip(stamps, np.column_stack(list(columns.values())), strict=True)
+        ]
+        header = ",".join(["%time", *columns])
+        (folder / f"{folder.name}-{topic}.csv").write_text("\n".join([header, *rows]) + "\n")
+
+    axes = dict(zip("xyz", "pqr", strict=True))
+    raw = {f"field.angular_velocity.{axis}": flown[f"{rate}_rad_s"] for axis, rate in axes.items()}
+    raw |= {f"field.linear_acceleration.{axis}": np.zeros(len(ns)) for axis in axes}
+    write("mavros-imu-data_raw", ns, raw)
+    for axis, name in (("roll", "roll_command"), ("pitch", "pitch_command")):
+        late = ns + 20_000_000
+        write(
+            f"mavros-nav_info-{axis}",
+            late,
+            {"field.commanded": np.rad2deg(flown[name]), "field.measured": np.zeros(len(ns))},
+        )
+    write(
+        "mavros-rc-out", ns[::3], {f"field.channels{i}": np.full(len(ns[::3]), 1500.0) for i in range(1, 6)}
+    )
+    if failure_s is not None:
+        stamps = origin_ns + np.round(np.arange(failure_s, duration_s, 0.5) * 1e9).astype(np.int64)
+        write("failure_status-aileron", stamps, {"field.data": np.full(len(stamps), 2.0)})
+    return folder

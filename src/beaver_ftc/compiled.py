@@ -32,6 +32,7 @@ _DIGEST_BYTES = 32
 
 _PACKAGE = Path(__file__).parent
 _SOURCES = (
+    "aircraft/schema.py",
     "design/*.py",
     "diagnosis/*.py",
     "control/*.py",
@@ -99,6 +100,14 @@ def _discard_old(base: Path) -> None:
 def kernel(function):
     """Compile a function of arrays, records and numbers; the plain form stays at `.py_func`."""
     return compile_into(cache_folder(), function)
+
+
+def plain(function):
+    """The uncompiled form of a kernel, which takes complex numbers and loads no compiler.
+
+    Kernels it calls are compiled ones all the same: use it on those that call none.
+    """
+    return getattr(function, "py_func", function)
 
 
 def compile_into(folder: Path | None, function):

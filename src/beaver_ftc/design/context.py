@@ -6,7 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from beaver_ftc.design.coefficients import SURFACES
+from beaver_ftc.aircraft import load
 
 
 class DesignModel:
@@ -18,23 +18,23 @@ class DesignModel:
         self._record, self._fill = record[0], responses
 
     def f(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Angular acceleration (3,) rad/s2 at neutral surfaces; x (3,) rad/s, y (5,). Of x (n, 3), (n, 3)."""
+        """Angular acceleration (3,) rad/s2 at neutral surfaces; x (3,) rad/s, y. Of x (n, 3), (n, 3)."""
         return self._response(np.atleast_2d(x), y)[0].reshape(np.shape(x))
 
     def G(self, y: np.ndarray) -> np.ndarray:
-        """Angular acceleration of each surface, (3, 4) rad/s2 per rad; y (5,)."""
+        """Angular acceleration of each surface, (3, surfaces) rad/s2 per rad."""
         return self._response(np.zeros((1, 3)), y)[1]
 
     def _response(self, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        f, G = np.empty(x.shape), np.zeros((3, 4))
-        self._fill(self._record, np.ascontiguousarray(x), y, f, G)
+        f, G = np.empty(x.shape), np.zeros(self._record["G0"].shape)
+        self._fill(self._record, np.ascontiguousarray(x), np.ascontiguousarray(y), f, G)
         return f, G
 
 
 SIGNALS = ("p", "q", "r", "alpha", "beta", "V", "qdyn")
 
 
-_ZEROS = {shape: partial(np.zeros, shape) for shape in (3, 4, 7, (3, 3), (3, 9))}
+_ZEROS = {shape: partial(np.zeros, shape) for shape in (0, 3, 4, 7, (3, 3))}
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class Declared:
     noise, bias, resolution, slope (7,): of the instruments, in the order of SIGNALS, SI; noise is the
     standard deviation of a sample. gust_rad_s, gust_time_s (3,): rotation of the air about each axis,
     standard deviation and correlation time; gust_effect (3, 3) 1/s: the angular acceleration it causes.
-    coefficients (3, 9): tolerance of each moment coefficient, absolute, as design.model.TERMS. inertia:
+    coefficients: tolerance of each moment coefficient, absolute, in the order of `Aircraft.moments`. inertia:
     tolerance as a share. deflection_rad: how far a surface may be from its actuator's model.
     model_rad_s2 (3,): standard deviation, at the trim, of the acceleration the model gets wrong by all of
     these but the gyros and the air. bandwidth_rad_s, rate_limit_rad_s (4,): the actuators, 0 is ideal.
@@ -57,7 +57,7 @@ class Declared:
     gust_rad_s: np.ndarray = field(default_factory=_ZEROS[3])
     gust_time_s: np.ndarray = field(default_factory=_ZEROS[3])
     gust_effect: np.ndarray = field(default_factory=_ZEROS[3, 3])
-    coefficients: np.ndarray = field(default_factory=_ZEROS[3, 9])
+    coefficients: np.ndarray = field(default_factory=_ZEROS[0])
     inertia: float = 0.0
     deflection_rad: float = 0.0
     model_rad_s2: np.ndarray = field(default_factory=_ZEROS[3])
@@ -114,5 +114,5 @@ class Context:
     inertia_coupling: np.ndarray
     seed: int = 0
     options: Mapping[str, float] = field(default_factory=dict)
-    surfaces: tuple[str, ...] = SURFACES
+    surfaces: tuple[str, ...] = field(default_factory=lambda: load().surfaces)
     declared: Declared = field(default_factory=Declared)

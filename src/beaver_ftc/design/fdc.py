@@ -13,18 +13,15 @@ from math import prod
 
 import numpy as np
 
-from beaver_ftc.design.coefficients import (
-    COEFFICIENTS,
-    GEOMETRY,
-    MASS,
-    coefficient_terms,
-    engine_power_kw,
-    inertia_coefficients,
-    slipstream,
-)
+from beaver_ftc.aircraft import load
+from beaver_ftc.aircraft.aircraft import FORCES, MOMENTS
+from beaver_ftc.design.engine import engine_power_kw, slipstream
+from beaver_ftc.design.inertia import inertia_coefficients
 
+_AIRCRAFT = load()  # the equations are those of any aircraft, the engine is that of the built-in one
+GEOMETRY, MASS = _AIRCRAFT.geometry, _AIRCRAFT.mass
 STATES = ("airspeed", "alpha", "beta", "p", "q", "r", "phi", "theta", "psi", "north", "east", "altitude")
-SURFACES = ("aileron", "elevator", "rudder", "flap")
+SURFACES = _AIRCRAFT.surfaces
 
 # Atmosphere as FDC has it: the standard troposphere over geometric altitude, with the gravity of that
 # altitude in the pressure's exponent. Next to the standard's geopotential altitude it changes density by
@@ -71,15 +68,16 @@ def aerodynamic_coefficients(
     of = {
         "alpha": alpha, "beta": beta, "ph": p * b / (2 * V), "qh": q * c / V, "rh": r * b / (2 * V),
         "dpt": slipstream(power, density, V), "betadoth": 0.0,
-        **dict(zip(("da", "de", "dr", "df"), surfaces, strict=True)),
+        **dict(zip(SURFACES, surfaces, strict=True)),
     }  # fmt: skip
     ratio = ratio or {}
     summed = {
         name: sum(
             term.value * ratio.get(term.name, 1.0) * prod(of[factor] for factor in term.factors)
-            for term in coefficient_terms(name)
+            for term in _AIRCRAFT.terms.values()
+            if term.coefficient == name
         )
-        for name in COEFFICIENTS
+        for name in (*FORCES, *MOMENTS)
     }
     return summed | {"qdyn": 0.5 * density * V * V}
 
@@ -116,13 +114,13 @@ def _flow_rates(state: np.ndarray, of: Mapping, betadot_ratio: float) -> np.ndar
     return np.array([Vdot, alphadot, betadot / (1.0 - side)])
 
 
-_CY_BETADOT = next(term.value for term in coefficient_terms("CY") if term.name == "CY_betadot")
+_CY_BETADOT = _AIRCRAFT.terms["CY_betadot"].value
 
 
 def _body_accelerations(state: np.ndarray, of: Mapping) -> np.ndarray:
     """pdot, qdot, rdot."""
     p, q, r = state[3:6]
-    i = inertia_coefficients()
+    i = inertia_coefficients(MASS)
     area = of["qdyn"] * GEOMETRY.wing_area_m2
     L, M, N = (
         area * GEOMETRY.span_m * of["Cl"],

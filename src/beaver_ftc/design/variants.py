@@ -13,9 +13,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from beaver_ftc.compiled import kernel
-from beaver_ftc.design.coefficients import MASS, MassProperties
-from beaver_ftc.design.model import ALPHA, control_effectiveness, design_record, free_response
+from beaver_ftc.aircraft import Aircraft, MassProperties, load
+from beaver_ftc.compiled import kernel, plain
+from beaver_ftc.design.model import (
+    ALPHA,
+    QDYN,
+    accelerations_of_moments,
+    accelerations_per_rad,
+    both_responses,
+    design_record,
+)
+from beaver_ftc.design.terms import MAX_MONOMIALS, N_SIGNALS, free_sum, monomials, signals, surface_sums
 
 if TYPE_CHECKING:
     from beaver_ftc.scenario.schema import DesignModel
@@ -23,53 +31,76 @@ if TYPE_CHECKING:
 _STEP = 1e-30  # of a complex step: far below rounding, so the derivative is exact to rounding
 
 
-def design_of(model: "DesignModel") -> np.ndarray:
+def design_of(model: "DesignModel", aircraft: Aircraft | None = None) -> np.ndarray:
     """The design record (1,) of a scenario's `design_model`; one tied to the trim wants `anchor` as well."""
-    design = design_record(engine_terms=model.engine_terms, scale=model.coefficients, mass=mass_of(model))
+    mass = mass_of(model, aircraft)
+    design = design_record(aircraft, engine_terms=model.engine_terms, scale=model.coefficients, mass=mass)
     design["linearised"], design["frozen_alpha"] = model.linearised, model.frozen_alpha
     return design
 
 
-def mass_of(model: "DesignModel") -> MassProperties:
+def mass_of(model: "DesignModel", aircraft: Aircraft | None = None) -> MassProperties:
     """A heavier aircraft of the same shape has its inertia in proportion."""
+    nominal = (aircraft or load()).mass
     return replace(
-        MASS,
-        mass_kg=MASS.mass_kg * model.mass,
-        Ix_kg_m2=MASS.Ix_kg_m2 * model.mass * model.inertia.Ix,
-        Iy_kg_m2=MASS.Iy_kg_m2 * model.mass * model.inertia.Iy,
-        Iz_kg_m2=MASS.Iz_kg_m2 * model.mass * model.inertia.Iz,
-        Jxz_kg_m2=MASS.Jxz_kg_m2 * model.mass * model.inertia.Jxz,
+        nominal,
+        mass_kg=nominal.mass_kg * model.mass,
+        Ix_kg_m2=nominal.Ix_kg_m2 * model.mass * model.inertia.Ix,
+        Iy_kg_m2=nominal.Iy_kg_m2 * model.mass * model.inertia.Iy,
+        Iz_kg_m2=nominal.Iz_kg_m2 * model.mass * model.inertia.Iz,
+        Jxz_kg_m2=nominal.Jxz_kg_m2 * model.mass * model.inertia.Jxz,
     )
 
 
 def anchor(design: np.void, x: np.ndarray, y: np.ndarray, u: np.ndarray) -> None:
-    """Fix the point a model is linearised about or frozen at: x (3,) rad/s, y (5,), u (4,) rad in trim."""
+    """Fix the point a model is linearised about or frozen at: x (3,) rad/s, y, u rad in trim."""
     if not (design["linearised"] or design["frozen_alpha"]):
         return
     f, G, f_x, f_y = jacobian(design, x, y, u)
     if design["frozen_alpha"]:
         f_y[:, ALPHA] = 0.0
-    design["x0"], design["y0"] = x, y
-    design["f0"], design["G0"], design["f_x"], design["f_y"] = f, G, f_x, f_y
+    design["x0"], design["y0"][: y.size] = x, y
+    design["f0"], design["G0"], design["f_x"], design["f_y"][:, : y.size] = f, G, f_x, f_y
 
 
 def jacobian(
     design: np.void, x: np.ndarray, y: np.ndarray, u: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """f (3,), G (3, 4) and the derivatives of f + G u with x (3, 3) and with y (3, 5), by complex steps."""
+    """f (3,), G (3, n) and the derivatives of f + G u with x (3, 3) and with y (3, y.size): complex steps."""
     f, G = _split(design, x.astype(complex), y.astype(complex))
     along_x = [_directional(design, x + 1j * _STEP * e, y + 0j, u) for e in np.eye(3)]
-    along_y = [_directional(design, x + 0j, y + 1j * _STEP * e, u) for e in np.eye(5)]
+    along_y = [_directional(design, x + 0j, y + 1j * _STEP * e, u) for e in np.eye(y.size)]
     return f.real, G.real, np.column_stack(along_x), np.column_stack(along_y)
 
 
 def _split(design: np.void, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The nonlinear f and G, in their plain form, which takes complex numbers."""
-    f, G = np.zeros(3, complex), np.zeros((3, 4), complex)
+    """The nonlinear f and G by the evaluator's plain functions, which take complex numbers."""
     record = np.asarray(design).view(np.recarray)
-    free_response.py_func(record, x, y, f)
-    control_effectiveness.py_func(record, y, G)
+    table = np.asarray(design["moments"]).view(np.recarray)
+    f, G = np.zeros(3, complex), np.zeros(record.G0.shape, complex)
+    signal, power = np.zeros(N_SIGNALS, complex), np.zeros(MAX_MONOMIALS, complex)
+    plain(signals)(table, x, y, signal)
+    plain(monomials)(table, signal, power)
+    arms = y[QDYN] * record.S * np.array([record.b, record.c, record.b])
+    moments = [arm * plain(free_sum)(table, i, power) for i, arm in enumerate(arms)]
+    plain(accelerations_of_moments)(record, x, *moments, f)
+    plain(surface_sums)(table, power, G)
+    plain(accelerations_per_rad)(record, y, G)
     return f, G
+
+
+def coefficient_slopes(design: np.void, x: np.ndarray, y: np.ndarray, u: np.ndarray) -> np.ndarray:
+    """d(Cl, Cm, Cn) / d signals, (3, N_SIGNALS), with the surfaces at u rad, by complex steps."""
+    table = np.asarray(design["moments"]).view(np.recarray)
+    signal, power = np.zeros(N_SIGNALS, complex), np.zeros(MAX_MONOMIALS, complex)
+    plain(signals)(table, x, y, signal)
+    slopes, per_rad = np.zeros((3, N_SIGNALS)), np.zeros((3, u.size), complex)
+    for k in range(N_SIGNALS):
+        plain(monomials)(table, signal + 1j * _STEP * np.eye(N_SIGNALS)[k], power)
+        plain(surface_sums)(table, power, per_rad)
+        free = np.array([plain(free_sum)(table, i, power) for i in range(3)])
+        slopes[:, k] = (free + per_rad @ u).imag / _STEP
+    return slopes
 
 
 def _directional(design: np.void, x: np.ndarray, y: np.ndarray, u: np.ndarray) -> np.ndarray:
@@ -79,17 +110,15 @@ def _directional(design: np.void, x: np.ndarray, y: np.ndarray, u: np.ndarray) -
 
 @kernel
 def response(design, x, y, f, G):
-    """Fill f (3,) rad/s2 and G (3, 4) rad/s2 per rad with what the designer believes at x (3,) and y (5,)."""
+    """Fill f (3,) rad/s2 and G (3, n) rad/s2 per rad with what the designer believes at x (3,) and y."""
     if design.linearised:
         linear_response(design, x, y, f, G)
     elif design.frozen_alpha:
         frozen = y.copy()
         frozen[ALPHA] = design.y0[ALPHA]
-        free_response(design, x, frozen, f)
-        control_effectiveness(design, frozen, G)
+        both_responses(design, x, frozen, f, G)
     else:
-        free_response(design, x, y, f)
-        control_effectiveness(design, y, G)
+        both_responses(design, x, y, f, G)
 
 
 @kernel
@@ -106,7 +135,7 @@ def linear_response(design, x, y, f, G):
         f[i] = design.f0[i]
         for j in range(3):
             f[i] += design.f_x[i, j] * (x[j] - design.x0[j])
-        for j in range(5):
+        for j in range(y.size):
             f[i] += design.f_y[i, j] * (y[j] - design.y0[j])
-        for s in range(4):
+        for s in range(G.shape[1]):
             G[i, s] = design.G0[i, s]

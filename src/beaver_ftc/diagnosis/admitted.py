@@ -6,8 +6,8 @@ from math import exp, log, radians, sqrt
 
 import numpy as np
 
-from beaver_ftc.design.coefficients import GEOMETRY, MASS, MassProperties, inertia_coefficients
-from beaver_ftc.design.model import TERMS
+from beaver_ftc.aircraft import Aircraft, MassProperties
+from beaver_ftc.design.inertia import inertia_coefficients
 from beaver_ftc.plant.instruments import NOISE_LIMIT_SIGMA, SIGNALS
 from beaver_ftc.scenario.diagnosis import Bounds
 from beaver_ftc.scenario.sensors import Sensors
@@ -21,13 +21,13 @@ _INERTIA = ("Ix_kg_m2", "Iy_kg_m2", "Iz_kg_m2", "Jxz_kg_m2")
 DELAYS_S = (0.1, 0.5, 2.0)  # within which a pole of the bank finds the smallest fault
 
 
-def gust_sigma_rad_s(turbulence: str) -> float:
-    """Standard deviation of the air's rotation, rad/s, on any axis."""
-    span_ft = GEOMETRY.span_m / 0.3048
+def gust_sigma_rad_s(turbulence: str, span_m: float) -> float:
+    """Standard deviation of the air's rotation, rad/s, on any axis of an aircraft of this span."""
+    span_ft = span_m / 0.3048
     return ROLLING * GUST_FT_S[turbulence] / sqrt(SCALE_FT * span_ft)
 
 
-def inertia_slack(tolerance: float, mass: MassProperties = MASS) -> np.ndarray:
+def inertia_slack(tolerance: float, mass: MassProperties) -> np.ndarray:
     """Largest change of the twelve inertia coefficients for every inertia within its tolerance.
 
     Each is monotonic in each inertia as long as the others stay put, so the corners tell.
@@ -43,21 +43,21 @@ def inertia_slack(tolerance: float, mass: MassProperties = MASS) -> np.ndarray:
     return worst
 
 
-def tolerances(given: float | dict[str, float], coefficient: np.ndarray) -> np.ndarray:
-    """Tolerance of each coefficient (3, 9), absolute."""
-    share = np.zeros((3, 9))
-    for i, names in enumerate(TERMS):
-        for j, name in enumerate(names):
-            share[i, j] = given.get(name, 0.0) if isinstance(given, dict) else given
-    return share * np.abs(coefficient)
+def tolerances(given: float | dict[str, float], aircraft: Aircraft, values: np.ndarray) -> np.ndarray:
+    """Tolerance of each moment coefficient, absolute; values: the designer's, as `Aircraft.moments`."""
+    share = [given.get(term.name, 0.0) if isinstance(given, dict) else given for term in aircraft.moments]
+    return np.array(share) * np.abs(values[: len(share)])
 
 
-def admit(admitted: np.void, bounds: Bounds, coefficient: np.ndarray, mass: MassProperties) -> None:
-    """Fill the record: coefficient (3, 9) and mass are the designer's."""
-    admitted["tolerance"] = tolerances(bounds.coefficients, coefficient)
+def admit(
+    admitted: np.void, bounds: Bounds, aircraft: Aircraft, design: np.void, mass: MassProperties
+) -> None:
+    """Fill the record; the design record and mass are the designer's."""
+    tolerance = tolerances(bounds.coefficients, aircraft, design["moments"]["value"])
+    admitted["tolerance"][: tolerance.size] = tolerance
     admitted["inertia"] = inertia_slack(bounds.inertia, mass)
     admitted["deflection"] = radians(bounds.deflection_deg)
-    admitted["gust"] = GUST_LIMIT_SIGMA * gust_sigma_rad_s(bounds.turbulence)
+    admitted["gust"] = GUST_LIMIT_SIGMA * gust_sigma_rad_s(bounds.turbulence, aircraft.geometry.span_m)
     for i, name in enumerate(SIGNALS):
         sensor = getattr(bounds.sensors, name)
         noise, bias, quantum = sensor.noise_bias_quantum

@@ -14,30 +14,36 @@ from math import pi
 
 import numpy as np
 
+from beaver_ftc.aircraft.schema import MAX_MONOMIALS
 from beaver_ftc.compiled import kernel
-from beaver_ftc.design.model import AILERON, AIRSPEED, ALPHA, BETA, DPT, ELEVATOR, FLAP, QDYN, RUDDER
+from beaver_ftc.design.model import rate_damping
+from beaver_ftc.design.terms import AIRSPEED, ALPHA, BETA, QDYN, TABLE, evaluate, whole_sum
+
+AIR = np.dtype(
+    [
+        ("moving", "i8"),
+        ("forces", TABLE), ("scratch", "f8", (MAX_MONOMIALS,)),  # force coefficients
+        ("area_per_mass", "f8"), ("gravity", "f8"), ("span", "f8"),
+        ("velocity", "f8", (3,)), ("force", "f8", (3,)), ("turn", "f8", (3, 3)), ("heading", "f8"),
+        ("gust", "f8", (3,)), ("rotation", "f8", (3,)), ("damping", "f8", (3, 3)),
+        ("acceleration", "f8", (3,)),
+        ("per_metre", "f8", (3,)),  # intensity of the rotation's drift over airspeed, rad2/s3 per m/s
+        ("unseen", "f8", (3,)),  # share of it that the vanes do not show
+        ("rolling", "f8"),  # lag of the rolling gust times airspeed, m
+    ],
+    align=True,
+)  # fmt: skip
 
 
 @kernel
 def specific_force(air, x, y, u, out):
-    """Fill out (3,) m/s2: aerodynamic and propulsive force over mass, body axes [TM88]; x (3,) rad/s, y (5,),
-    u (4,) rad. The term in the rate of sideslip is left out: it is below a hundredth of the side force."""
-    alpha, beta, V, dpt = y[ALPHA], y[BETA], y[AIRSPEED], y[DPT]
-    ph, qh, rh = x[0] * air.span / (2 * V), x[1] * air.chord / V, x[2] * air.span / (2 * V)
-    da, de, dr, df = u[AILERON], u[ELEVATOR], u[RUDDER], u[FLAP]
-    X, Y, Z = air.longitudinal, air.side, air.normal
-    scale = y[QDYN] * air.area_per_mass
-    out[0] = scale * (
-        X[0] + X[1] * alpha + X[2] * alpha * alpha + X[3] * alpha * alpha * alpha + X[4] * qh + X[5] * dr
-        + X[6] * df + X[7] * df * alpha + X[8] * dpt + X[9] * alpha * dpt * dpt
-    )  # fmt: skip
-    out[1] = scale * (
-        Y[0] + Y[1] * beta + Y[2] * ph + Y[3] * rh + Y[4] * da + Y[5] * dr + Y[6] * dr * alpha
-    )  # fmt: skip
-    out[2] = scale * (
-        Z[0] + Z[1] * alpha + Z[2] * alpha * alpha * alpha + Z[3] * qh + Z[4] * de + Z[5] * de * beta * beta
-        + Z[6] * df + Z[7] * df * alpha + Z[8] * dpt
-    )  # fmt: skip
+    """Fill out (3,) m/s2: aerodynamic and propulsive force over mass, body axes; x (3,) rad/s, y (4 +
+    declared,), u (surfaces,) rad. The term in the rate of sideslip is left out: it is below a hundredth of
+    the side force."""
+    table = air.forces
+    evaluate(table, x, y)
+    for i in range(3):
+        out[i] = y[QDYN] * air.area_per_mass * whole_sum(table, i, table.power, u)
 
 
 @kernel
@@ -60,22 +66,6 @@ def heading_change(now, then):
     """By how much the heading turned, rad, wherever north lies."""
     change = now - then
     return change - 2.0 * pi * np.floor(change / (2.0 * pi) + 0.5)
-
-
-@kernel
-def damping(design, y, out):
-    """Fill out (3, 3) 1/s: angular acceleration for each rate of the aircraft against the air; y (5,)."""
-    k, V = design.coefficient, y[AIRSPEED]
-    lateral, longitudinal = y[QDYN] * design.S * design.b, design.Qm * y[QDYN] * design.S * design.c
-    half_span, chord = design.b / (2 * V), design.c / V
-    Cl_p, Cl_r, Cn_p, Cn_q, Cn_r = k[0, 2], k[0, 3], k[2, 2], k[2, 4], k[2, 3]
-    out[0, 0] = lateral * half_span * (design.Pl * Cl_p + design.Pn * Cn_p)
-    out[0, 1] = lateral * chord * design.Pn * Cn_q
-    out[0, 2] = lateral * half_span * (design.Pl * Cl_r + design.Pn * Cn_r)
-    out[1, 0], out[1, 1], out[1, 2] = 0.0, longitudinal * chord * k[1, 3], longitudinal * half_span * k[1, 5]
-    out[2, 0] = lateral * half_span * (design.Rl * Cl_p + design.Rn * Cn_p)
-    out[2, 1] = lateral * chord * design.Rn * Cn_q
-    out[2, 2] = lateral * half_span * (design.Rl * Cl_r + design.Rn * Cn_r)
 
 
 @kernel
@@ -117,7 +107,7 @@ def effect(air, design, x, y, u):
     x (3,) rad/s, y (5,), u (4,) rad: measured, and the surfaces in effect.
     """
     specific_force(air, x, y, u, air.force)
-    damping(design, y, air.damping)
+    rate_damping(design, x, y, u, air.scratch, air.damping)
     for i in range(3):
         air.rotation[i] = air.turn[i, 1] * air.gust[1] + air.turn[i, 2] * air.gust[2]
     for i in range(3):

@@ -15,19 +15,39 @@ n[k] - m[k], m[k+1] = a m[k] + (1 - a) n[k], so no more than nbar[k] and the fil
 however fast the frames.
 """
 
+from functools import lru_cache
+
 import numpy as np
 
+from beaver_ftc.aircraft.schema import MAX_MONOMIALS, MAX_TERMS
 from beaver_ftc.compiled import kernel
-from beaver_ftc.design.model import AILERON, AIRSPEED, ALPHA, ELEVATOR, FLAP, QDYN, RUDDER, TERMS, regressors
+from beaver_ftc.design.terms import AIRSPEED, DPT, N_SIGNALS, N_Y, QDYN, monomials, signals
 
 _AIR_DATA = 3  # gyros come first among the signals, then alpha, beta, airspeed, dynamic pressure
 _LEAST_AIRSPEED_SHARE = 0.1
-_CL_DAA = TERMS[0].index("Cl_daa")
-_OF_SURFACE = {"da": AILERON, "daa": AILERON, "de": ELEVATOR, "dr": RUDDER, "df": FLAP}
-# (3, 9): the surface each term of a moment belongs to, or -1
-SURFACE_OF_TERM = np.array(
-    [[_OF_SURFACE.get(name.partition("_")[2], -1) for name in names] for names in TERMS]
-)
+
+
+@lru_cache
+def admitted_dtype(n: int) -> np.dtype:
+    """What else than the published bound is admitted, for an aircraft with n surfaces."""
+    return np.dtype(
+        [
+            ("any", "i8"),
+            ("tolerance", "f8", (MAX_TERMS,)),  # of each moment coefficient, as the design model has them
+            ("inertia", "f8", (12,)),  # of each inertia coefficient, in the order of design.inertia
+            ("offset", "f8", (7,)), ("slope", "f8", (7,)),  # error of a signal: offset + slope |signal|
+            ("steady", "f8", (3,)),  # of the offset of a gyro, what does not change
+            ("gust", "f8", (3,)), ("deflection", "f8"),
+            # scratch: magnitudes as measured, and the furthest they can be from there
+            ("near_x", "f8", (3,)), ("near_y", "f8", (N_Y,)), ("near_u", "f8", (n,)),
+            ("far_x", "f8", (3,)), ("far_y", "f8", (N_Y,)), ("far_u", "f8", (n,)), ("far_aero", "f8", (3,)),
+            ("signal", "f8", (N_SIGNALS,)),
+            ("near", "f8", (MAX_MONOMIALS,)), ("far", "f8", (MAX_MONOMIALS,)),
+            ("per_rad", "f8", (3, n)),
+            ("moment", "f8", (3,)), ("slack", "f8", (3,)),
+        ],
+        align=True,
+    )  # fmt: skip
 
 
 @kernel
@@ -50,12 +70,14 @@ def magnitudes(admitted, x, y, u):
         admitted.near_x[i] = abs(x[i])
         admitted.far_x[i] = abs(x[i]) + error(admitted, i, x[i])
         admitted.far_aero[i] = admitted.far_x[i] + admitted.gust[i]
-    for i in range(4):
+    for i in range(DPT):
         admitted.near_y[i] = abs(y[i])
         admitted.far_y[i] = abs(y[i]) + error(admitted, _AIR_DATA + i, y[i])
-        admitted.near_u[i] = abs(u[i])
-        admitted.far_u[i] = abs(u[i]) + admitted.deflection
-    admitted.near_y[4] = admitted.far_y[4] = abs(y[4])
+    for i in range(DPT, y.size):
+        admitted.near_y[i] = admitted.far_y[i] = abs(y[i])
+    for s in range(u.size):
+        admitted.near_u[s] = abs(u[s])
+        admitted.far_u[s] = abs(u[s]) + admitted.deflection
     V = y[AIRSPEED]
     admitted.far_y[AIRSPEED] = max(2.0 * V - admitted.far_y[AIRSPEED], _LEAST_AIRSPEED_SHARE * V)
 
@@ -64,12 +86,14 @@ def magnitudes(admitted, x, y, u):
 def moments(admitted, design):
     """Fill moment (3,), the sum of the magnitudes of a moment's terms, and slack (3,), their error; N m."""
     near_q, far_q = admitted.near_y[QDYN], admitted.far_y[QDYN]
+    table = design.moments
     for i in range(3):
         near, far = 0.0, 0.0
-        for j in range(9):
-            size = abs(design.coefficient[i, j])
-            near += size * admitted.near[i, j]
-            far += (size + admitted.tolerance[i, j]) * admitted.far[i, j]
+        for k in range(table.free_from[i], table.surface_to[i]):
+            size, s = abs(table.value[k]), table.surface[k]
+            near += size * admitted.near[table.monomial[k]] * (admitted.near_u[s] if s >= 0 else 1.0)
+            largest = admitted.far[table.monomial[k]] * (admitted.far_u[s] if s >= 0 else 1.0)
+            far += (size + admitted.tolerance[k]) * largest
         arm = design.S * (design.c if i == 1 else design.b)
         admitted.moment[i] = arm * near_q * near
         admitted.slack[i] = arm * (far_q * far - near_q * near)
@@ -99,12 +123,12 @@ def rate_slack(admitted, i, j, size, tolerance):
 def moment_per_rad(admitted, design, i, s):
     """Of moment i, what surface s adds per rad: its magnitude, and with all errors; N m."""
     near, far = 0.0, 0.0
-    for j in range(9):
-        if SURFACE_OF_TERM[i, j] == s:
-            size = abs(design.coefficient[i, j])
-            is_daa = i == 0 and j == _CL_DAA
-            near += size * (admitted.near_y[ALPHA] if is_daa else 1.0)
-            far += (size + admitted.tolerance[i, j]) * (admitted.far_y[ALPHA] if is_daa else 1.0)
+    table = design.moments
+    for k in range(table.free_to[i], table.surface_to[i]):
+        if table.surface[k] == s:
+            size = abs(table.value[k])
+            near += size * admitted.near[table.monomial[k]]
+            far += (size + admitted.tolerance[k]) * admitted.far[table.monomial[k]]
     arm = design.S * (design.c if i == 1 else design.b)
     return arm * admitted.near_y[QDYN] * near, arm * admitted.far_y[QDYN] * far
 
@@ -128,10 +152,12 @@ def slack_per_rad(admitted, design, s):
 
 @kernel
 def derived_bound(admitted, design, x, y, u, eta_bar):
-    """Add to eta_bar (3,) rad/s2 what the declared errors can do; x (3,), y (5,), u (4,) as measured."""
+    """Add to eta_bar (3,) rad/s2 what the declared errors can do; x (3,), y, u (surfaces,) as measured."""
     magnitudes(admitted, x, y, u)
-    regressors(design, admitted.near_x, admitted.near_y, admitted.near_u, admitted.near)
-    regressors(design, admitted.far_aero, admitted.far_y, admitted.far_u, admitted.far)
+    signals(design.moments, admitted.near_x, admitted.near_y, admitted.signal)
+    monomials(design.moments, admitted.signal, admitted.near)
+    signals(design.moments, admitted.far_aero, admitted.far_y, admitted.signal)
+    monomials(design.moments, admitted.signal, admitted.far)
     moments(admitted, design)
     t = admitted.inertia
     eta_bar[0] += moment_slack(admitted, 0, design.Pl, t[2]) + moment_slack(admitted, 2, design.Pn, t[3])

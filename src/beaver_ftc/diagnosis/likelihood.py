@@ -42,7 +42,7 @@ def start(block, slot):
         hypothesis = block.hypothesis[h]
         hypothesis.correlation[slot] = hypothesis.information[slot] = 0.0
         hypothesis.response[slot, :] = 0.0
-        hypothesis.overlap[slot, :] = 0.0
+        hypothesis.overlap[slot, : block.n_regressors] = 0.0
 
 
 @kernel

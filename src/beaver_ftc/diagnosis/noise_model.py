@@ -1,25 +1,25 @@
 """From what a scenario declares to the statistical detector's numbers: levels, noise, tolerances."""
 
+from collections.abc import Iterator
 from dataclasses import astuple
 from math import exp, hypot, pi, sqrt
 from statistics import NormalDist
 
 import numpy as np
 
-from beaver_ftc.design.coefficients import GEOMETRY, MassProperties, coefficient_terms, inertia_coefficients
-from beaver_ftc.design.model import AILERON, AIRSPEED, ALPHA, AXES, BETA, DPT, ELEVATOR, QDYN, RUDDER, TERMS
-from beaver_ftc.design.variants import jacobian
+from beaver_ftc.aircraft import AXES, Aircraft, MassProperties, Term, load
+from beaver_ftc.aircraft.aircraft import FORCES, MOMENTS
+from beaver_ftc.aircraft.schema import RATE_SIGNALS
+from beaver_ftc.design.inertia import inertia_coefficients
+from beaver_ftc.design.terms import AIRSPEED, ALPHA, BETA, QDYN, fill_table
+from beaver_ftc.design.variants import coefficient_slopes, jacobian
 from beaver_ftc.diagnosis.admitted import GUST_FT_S, SCALE_FT, inertia_slack, tolerances
-from beaver_ftc.diagnosis.air import damping
 from beaver_ftc.diagnosis.state import ALPHA3, LEAST_UNCERTAINTY_RAD_S2, LOSS, N_SLOTS, STEP
 from beaver_ftc.plant.instruments import SIGNALS
 from beaver_ftc.scenario.diagnosis import Bounds, FdiConfig, Statistical
 from beaver_ftc.scenario.sensors import Sensors
 
-# (kind, surface, axis, raises alarms); of the published class, and what it is held against.
-PITCH = ((LOSS, ELEVATOR, 1, 1), (STEP, -1, 1, 1), (ALPHA3, -1, 1, 0))
-LATERAL = ((LOSS, AILERON, 0, 1), (LOSS, RUDDER, 2, 1), (STEP, -1, 0, 1), (STEP, -1, 2, 1))
-BLOCKS = (((1,), PITCH), ((0, 2), LATERAL), ((0, 2), LATERAL))
+PITCH_AXES, LATERAL_AXES = (1,), (0, 2)
 SIDES = {LOSS: 1, STEP: 2, ALPHA3: 2}  # a loss has a sign, a step may go either way
 
 # Share of the intensity of the rolling, pitching and yawing gust that the vanes leave; on exact vanes and
@@ -28,27 +28,43 @@ UNSEEN = (1.0, 0.003, 0.03)
 PRIOR_DRIFT_RAD_S2 = 1.0  # what a drift may be at the start of a flight: soon forgotten
 LEAST_NOISE_RAD_S = 1e-9  # of a gyro: exact ones are still doubles, and a variance no difference of zeros
 Start = tuple[np.ndarray, np.ndarray, np.ndarray]  # x (3,) rad/s, y (5,) and u (4,) rad in trim
-_RATE_TERMS = ("p", "q", "r")
-_POWERS = {  # of each signal in a term, what a relative error of it counts
-    "p": (("p", 1),), "q": (("q", 1),), "r": (("r", 1),),
-    "alpha": (("alpha", 1),), "alpha2": (("alpha", 2),), "a2dpt": (("alpha", 2),), "daa": (("alpha", 1),),
-    "beta": (("beta", 1),), "beta2": (("beta", 2),), "beta3": (("beta", 3),),
-}  # fmt: skip
+_GYRO_OF = dict(zip(RATE_SIGNALS, AXES, strict=True))
+# (kind, surface, axis, raises alarms)
+Hypothesis = tuple[int, int, int, int]
 
 
-def tests_a_frame() -> int:
+def blocks_of(aircraft: Aircraft) -> tuple[tuple[tuple[int, ...], tuple[Hypothesis, ...]], ...]:
+    """Axes and hypotheses of each block: the losses of the surfaces that lead its axes, and what they are
+    held against. Roll and yaw are there twice: see statistical.py."""
+    pitch = (*_losses(aircraft, PITCH_AXES), *_steps(PITCH_AXES), (ALPHA3, -1, 1, 0))
+    lateral = (*_losses(aircraft, LATERAL_AXES), *_steps(LATERAL_AXES))
+    return (PITCH_AXES, pitch), (LATERAL_AXES, lateral), (LATERAL_AXES, lateral)
+
+
+def _losses(aircraft: Aircraft, axes: tuple[int, ...]) -> Iterator[Hypothesis]:
+    for s, (surface, axis) in enumerate(zip(aircraft.surfaces, aircraft.dominant_axis, strict=True)):
+        if surface in aircraft.primary and axis in axes:
+            yield LOSS, s, axis, 1
+
+
+def _steps(axes: tuple[int, ...]) -> Iterator[Hypothesis]:
+    return ((STEP, -1, axis, 1) for axis in axes)
+
+
+def tests_a_frame(aircraft: Aircraft | None) -> int:
     """How many one-sided tests the detector makes in a frame."""
-    return N_SLOTS * sum(SIDES[kind] for _, members in BLOCKS for kind, _, _, alarms in members if alarms)
+    blocks = blocks_of(aircraft or load())
+    return N_SLOTS * sum(SIDES[kind] for _, members in blocks for kind, _, _, alarms in members if alarms)
 
 
-def alarm_level(false_alarms_per_h: float, rate_hz: float) -> float:
+def alarm_level(false_alarms_per_h: float, rate_hz: float, aircraft: Aircraft | None = None) -> float:
     """Standard deviations at which all tests of an hour together give so many false alarms at most."""
-    return -NormalDist().inv_cdf(false_alarms_per_h / (3600.0 * rate_hz * tests_a_frame()))
+    return -NormalDist().inv_cdf(false_alarms_per_h / (3600.0 * rate_hz * tests_a_frame(aircraft)))
 
 
-def naming_level(misnaming: float, rate_hz: float) -> float:
+def naming_level(misnaming: float, rate_hz: float, aircraft: Aircraft | None = None) -> float:
     """Difference of log likelihoods that chance gives with this probability at most within a second."""
-    return 0.5 * NormalDist().inv_cdf(misnaming / (rate_hz * tests_a_frame())) ** 2
+    return 0.5 * NormalDist().inv_cdf(misnaming / (rate_hz * tests_a_frame(aircraft))) ** 2
 
 
 def set_up(
@@ -58,26 +74,28 @@ def set_up(
     mass: MassProperties,
     start: Start,
     rate_hz: float,
+    aircraft: Aircraft | None = None,
 ) -> None:
-    """Fill the statistical part of a diagnosis record; start: x (3,), y (5,) and u (4,) in trim."""
+    """Fill the statistical part of a diagnosis record; start: x (3,), y and u (surfaces,) in trim."""
+    aircraft = aircraft or load()
     statistical, given = fdi["statistical"], config.statistical
     statistical["detected_at_s"] = -1.0
     if given is None or not fdi["enabled"]:  # a plug-in, or nobody, diagnoses
         return
     statistical["enabled"] = 1
-    _set_up_air(statistical["air"], config.bounds.turbulence, mass)
-    statistical["n_blocks"] = len(BLOCKS)
-    statistical["alarm_level"] = alarm_level(given.false_alarms_per_h, rate_hz)
-    statistical["naming_level"] = naming_level(given.misnaming, rate_hz)
+    _set_up_air(statistical["air"], config.bounds.turbulence, mass, aircraft)
+    statistical["alarm_level"] = alarm_level(given.false_alarms_per_h, rate_hz, aircraft)
+    statistical["naming_level"] = naming_level(given.misnaming, rate_hz, aircraft)
     statistical["keep"] = exp(-1.0 / (rate_hz * config.forgetting_time_s))
-    _set_up_blocks(statistical, config.bounds.sensors)
+    _set_up_blocks(statistical, config.bounds.sensors, aircraft)
     _set_up_noise(statistical, given, config.bounds, design, start, 1.0 / rate_hz)
-    _set_up_tolerances(statistical, config.bounds, design, mass, start)
+    _set_up_tolerances(statistical, config.bounds, design, mass, start, aircraft)
     block = statistical["block"][-1]
     block["lag"] = returning_length(statistical, float(start[1][AIRSPEED]), rate_hz)
     if statistical["air"]["moving"]:
         block["stronger"] = (statistical["air"]["rolling"] / block["lag"]) ** 2
-        statistical["jitter"] += _gust_jitter(config.bounds.sensors, design, start[1]) ** 2
+        span_m = aircraft.geometry.span_m
+        statistical["jitter"] += _gust_jitter(config.bounds.sensors, design, start, span_m) ** 2
 
 
 def _random_error(sensors: Sensors, name: str) -> float:
@@ -86,10 +104,14 @@ def _random_error(sensors: Sensors, name: str) -> float:
     return sqrt(noise**2 + quantum**2 / 12.0)
 
 
-def _set_up_blocks(statistical: np.void, sensors: Sensors) -> None:
-    for block, (axes, members) in zip(statistical["block"], BLOCKS, strict=True):
+def _set_up_blocks(statistical: np.void, sensors: Sensors, aircraft: Aircraft) -> None:
+    blocks = blocks_of(aircraft)
+    losses = [aircraft.surfaces.index(surface) for surface in aircraft.primary]
+    statistical["n_blocks"], statistical["n_columns"] = len(blocks), len(losses) + len(AXES)
+    for block, (axes, members) in zip(statistical["block"], blocks, strict=True):
         block["n"], block["n_hypotheses"] = len(axes), len(members)
-        block["n_regressors"], block["keep"], block["stronger"] = 9 * len(axes), 1.0, 1.0
+        block["n_regressors"] = sum(_axis_of(term) in axes for term in aircraft.moments)
+        block["keep"], block["stronger"] = 1.0, 1.0
         for i, axis in enumerate(axes):
             block["axis"][i] = axis
             variance = max(_random_error(sensors, AXES[axis]), LEAST_NOISE_RAD_S) ** 2
@@ -98,6 +120,11 @@ def _set_up_blocks(statistical: np.void, sensors: Sensors) -> None:
         for hypothesis, (kind, surface, axis, alarms) in zip(block["hypothesis"], members, strict=False):
             hypothesis["kind"], hypothesis["surface"] = kind, surface
             hypothesis["axis"], hypothesis["alarms"] = axis, alarms
+            hypothesis["column"] = losses.index(surface) if kind == LOSS else len(losses) + axis
+
+
+def _axis_of(term: Term) -> int:
+    return MOMENTS.index(term.coefficient)
 
 
 def _set_up_noise(
@@ -159,32 +186,44 @@ def _set_up_tolerances(
     design: np.void,
     mass: MassProperties,
     start: Start,
+    aircraft: Aircraft,
 ) -> None:
     """What is constant but unknown, as tolerances of coefficients: theirs, inertia, steady sensor errors."""
-    tolerance = steady_tolerance(bounds, np.asarray(design["coefficient"]), mass, start[1], start[2])
-    statistical["block"][0]["tolerance"][:9] = tolerance[1]
-    statistical["block"]["tolerance"][1:] = np.concatenate([tolerance[0], tolerance[2]])
+    tolerance = steady_tolerance(bounds, aircraft, design, mass, start[1], start[2])
+    axis = np.array([_axis_of(term) for term in aircraft.moments])
+    for block, axes in zip(statistical["block"], (PITCH_AXES, LATERAL_AXES, LATERAL_AXES), strict=True):
+        of_it = tolerance[np.isin(axis, axes)]
+        block["tolerance"][: of_it.size] = of_it
     statistical["tolerated"] = bool(np.any(tolerance))
 
 
 def steady_tolerance(
-    bounds: Bounds, coefficient: np.ndarray, mass: MassProperties, y: np.ndarray, u: np.ndarray
+    bounds: Bounds, aircraft: Aircraft, design: np.void, mass: MassProperties, y: np.ndarray, u: np.ndarray
 ) -> np.ndarray:
-    """Tolerance (3, 9) of each moment coefficient that covers every declared constant error; y, u in trim."""
-    size = np.abs(coefficient)
-    share = np.full((3, 9), _inertia_share(bounds.inertia, mass))
-    for i, names in enumerate(TERMS):
-        share[i] += abs(getattr(bounds.sensors, AXES[i]).scale_error) + _steady_share(bounds, "qdyn", y[QDYN])
-        for j, name in enumerate(names):
-            if name[3:] in _RATE_TERMS:
-                share[i, j] += _steady_share(bounds, "V", y[AIRSPEED])
-            for signal, power in _POWERS.get(name[3:], ()):
-                if signal != AXES[i]:  # a gyro's slope is counted once for all terms of its own axis
-                    share[i, j] += power * abs(getattr(bounds.sensors, signal).scale_error)
-    total = tolerances(bounds.coefficients, coefficient) + share * size
-    alpha, beta = (getattr(bounds.sensors, name).noise_bias_quantum[1] for name in ("alpha", "beta"))
-    total[:, 0] += abs(alpha) * _slope_alpha(coefficient, y, u) + abs(beta) * _slope_beta(coefficient, y)
+    """Tolerance of each moment's term that covers every declared constant error; y, u in trim."""
+    size = np.abs(design["moments"]["value"][: len(aircraft.moments)])
+    share = np.full(size.shape, _inertia_share(bounds.inertia, mass))
+    share += [_measured_share(bounds, term, y) for term in aircraft.moments]
+    total = tolerances(bounds.coefficients, aircraft, size) + share * size
+    slopes = np.abs(coefficient_slopes(design, np.zeros(3), y, u))
+    alpha, beta = (abs(getattr(bounds.sensors, name).noise_bias_quantum[1]) for name in ("alpha", "beta"))
+    for k, term in enumerate(aircraft.moments):
+        if term.is_constant:
+            total[k] += alpha * slopes[_axis_of(term), ALPHA] + beta * slopes[_axis_of(term), BETA]
     return total
+
+
+def _measured_share(bounds: Bounds, term: Term, y: np.ndarray) -> float:
+    """Relative error of what a term multiplies, by constant errors of gyros, airspeed and pressure."""
+    own = AXES[_axis_of(term)]  # a gyro's slope is counted once for all terms of its own axis
+    share = abs(getattr(bounds.sensors, own).scale_error) + _steady_share(bounds, "qdyn", y[QDYN])
+    for signal, power in term.of:
+        if signal in _GYRO_OF:
+            share += power * _steady_share(bounds, "V", y[AIRSPEED])
+        sensor = getattr(bounds.sensors, _GYRO_OF.get(signal, signal), None)
+        if sensor is not None and _GYRO_OF.get(signal) != own:
+            share += power * abs(sensor.scale_error)
+    return share
 
 
 def _steady_share(bounds: Bounds, name: str, value: float) -> float:
@@ -198,48 +237,36 @@ def _inertia_share(tolerance: float, mass: MassProperties) -> float:
     return float(max(slack[i] / nominal[i] for i in (2, 7, 11)))
 
 
-def _slope_alpha(k: np.ndarray, y: np.ndarray, u: np.ndarray) -> np.ndarray:
-    """|d(Cl, Cm, Cn) / d alpha|, (3,) 1/rad."""
-    Cl = 2 * k[0, 4] * y[ALPHA] * y[DPT] + k[0, 6] * u[AILERON]
-    return np.abs([Cl, k[1, 1] + 2 * k[1, 2] * y[ALPHA], 0.0])
-
-
-def _slope_beta(k: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """|d(Cl, Cm, Cn) / d beta|, (3,) 1/rad."""
-    return np.abs([k[0, 1], 2 * k[1, 4] * y[BETA], k[2, 1] + 3 * k[2, 5] * y[BETA] ** 2])
-
-
-def _set_up_air(air: np.void, turbulence: str, mass: MassProperties) -> None:
+def _set_up_air(air: np.void, turbulence: str, mass: MassProperties, aircraft: Aircraft) -> None:
+    span_m = aircraft.geometry.span_m
     air["moving"] = turbulence != "none"
-    for name, coefficient in (("longitudinal", "CX"), ("side", "CY"), ("normal", "CZ")):
-        terms = [term.value for term in coefficient_terms(coefficient) if term.name != "CY_betadot"]
-        air[name] = terms
-    air["area_per_mass"] = GEOMETRY.wing_area_m2 / mass.mass_kg
+    fill_table(air["forces"], aircraft, aircraft.measurable_forces, FORCES)
+    air["area_per_mass"] = aircraft.geometry.wing_area_m2 / mass.mass_kg
     air["gravity"] = 9.80665  # m/s2, standard; what is constant has no part in a change of the gust
-    air["span"], air["chord"] = GEOMETRY.span_m, GEOMETRY.chord_m
-    air["per_metre"], air["unseen"] = gust_drift(turbulence), UNSEEN
-    air["rolling"] = sqrt(0.3048 * SCALE_FT * GEOMETRY.span_m) / 2.6  # [Yeager1998, eq. 10]
+    air["span"] = span_m
+    air["per_metre"], air["unseen"] = gust_drift(turbulence, span_m), UNSEEN
+    air["rolling"] = sqrt(0.3048 * SCALE_FT * span_m) / 2.6  # [Yeager1998, eq. 10]
 
 
-def gust_drift(turbulence: str) -> np.ndarray:
+def gust_drift(turbulence: str, span_m: float) -> np.ndarray:
     """Intensity of the random walk that each rotating gust is over times short beside its own, over V.
 
     (3,) rad2/s3 per m/s, for roll, pitch and yaw. The rolling gust is a first-order process with
     sigma = 1.9 sigma_w / sqrt(L b) and a lag of sqrt(L b) / 2.6 V [Yeager1998, eq. 8]: 2 sigma^2 / lag. The
     others are lagged slopes of a velocity of intensity 3 sigma_w^2 V / L [MIL-F-8785C, 3.7], over (V lag)^2.
     """
-    sigma_w, L, b = 0.3048 * GUST_FT_S[turbulence], 0.3048 * SCALE_FT, GEOMETRY.span_m
+    sigma_w, L, b = 0.3048 * GUST_FT_S[turbulence], 0.3048 * SCALE_FT, span_m
     rolling = 2.0 * 1.9**2 * 2.6 * sigma_w**2 / (L * b) ** 1.5
     velocity = 3.0 * sigma_w**2 / L
     return np.array([rolling, velocity * (pi / (4 * b)) ** 2, velocity * (pi / (3 * b)) ** 2])
 
 
-def _gust_jitter(sensors: Sensors, design: np.void, y: np.ndarray) -> np.ndarray:
+def _gust_jitter(sensors: Sensors, design: np.void, start: Start, span_m: float) -> np.ndarray:
     """Standard deviation, rad/s2 on each axis, of what the vanes' noise adds to the gust they see."""
-    V, b = y[AIRSPEED], GEOMETRY.span_m
+    _, y, u = start
+    V, b = y[AIRSPEED], span_m
     speed = 0.3 * _random_error(sensors, "V") / V  # through attitudes of up to 17 deg
     pitching = (_random_error(sensors, "alpha") + speed) * pi * V / (4 * b)
     yawing = (_random_error(sensors, "beta") + speed) * pi * V / (3 * b)
-    A = np.zeros((3, 3))
-    damping.py_func(np.asarray(design).view(np.recarray), y, A)
-    return np.sqrt((A[:, 1] * pitching) ** 2 + (A[:, 2] * yawing) ** 2)
+    damping = jacobian(design, np.zeros(3), y, u)[2]  # without rates all of it is aerodynamic
+    return np.sqrt((damping[:, 1] * pitching) ** 2 + (damping[:, 2] * yawing) ** 2)

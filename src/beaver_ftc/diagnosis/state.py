@@ -2,6 +2,9 @@
 
 import numpy as np
 
+from beaver_ftc.aircraft.schema import MAX_TERMS, MAX_TERMS_OF_ONE
+from beaver_ftc.diagnosis.air import AIR
+from beaver_ftc.diagnosis.derived import admitted_dtype
 from beaver_ftc.scenario.diagnosis import MAX_POLES
 
 MAX_ESTIMATORS = 16
@@ -71,53 +74,20 @@ SURFACE = np.dtype(
     align=True,
 )  # fmt: skip
 
-# What else than the published bound is admitted: see derived.py.
-ADMITTED = np.dtype(
-    [
-        ("any", "i8"),
-        ("tolerance", "f8", (3, 9)),  # of each moment coefficient, as design.model.TERMS
-        ("inertia", "f8", (12,)),  # of each inertia coefficient, in the order of design.coefficients
-        ("offset", "f8", (7,)), ("slope", "f8", (7,)),  # error of a signal: offset + slope |signal|
-        ("steady", "f8", (3,)),  # of the offset of a gyro, what does not change
-        ("gust", "f8", (3,)), ("deflection", "f8"),
-        # scratch: magnitudes as measured, and the furthest they can be from there
-        ("near_x", "f8", (3,)), ("near_y", "f8", (5,)), ("near_u", "f8", (4,)),
-        ("far_x", "f8", (3,)), ("far_y", "f8", (5,)), ("far_u", "f8", (4,)), ("far_aero", "f8", (3,)),
-        ("near", "f8", (3, 9)), ("far", "f8", (3, 9)),
-        ("per_rad", "f8", (3, 4)),
-        ("moment", "f8", (3,)), ("slack", "f8", (3,)),
-    ],
-    align=True,
-)  # fmt: skip
+ADMITTED = admitted_dtype(4)  # see derived.py
 
 # What the statistical detector keeps: air.py, whitening.py, likelihood.py. A block is the axes whose noise
 # goes together: pitch, and roll with yaw, the latter twice. States of a filter: what is left of the rate,
 # then the drift.
 N_SLOTS = 10
-MAX_HYPOTHESES, MAX_REGRESSORS = 4, 18
+MAX_HYPOTHESES, MAX_REGRESSORS = 4, 2 * MAX_TERMS_OF_ONE
 EITHER, WORST_CASE, STATISTICS = 0, 1, 2  # whose alarms count
 LEAST_UNCERTAINTY_RAD_S2 = 1e-3  # reckoned with: a bound that passes zero does not stay there
 STEP, ALPHA3 = 2, 3  # further kinds of hypothesis: likelihood.py
 
-AIR = np.dtype(
-    [
-        ("moving", "i8"),
-        ("longitudinal", "f8", (10,)), ("side", "f8", (7,)), ("normal", "f8", (9,)),  # force coefficients
-        ("area_per_mass", "f8"), ("gravity", "f8"), ("span", "f8"), ("chord", "f8"),
-        ("velocity", "f8", (3,)), ("force", "f8", (3,)), ("turn", "f8", (3, 3)), ("heading", "f8"),
-        ("gust", "f8", (3,)), ("rotation", "f8", (3,)), ("damping", "f8", (3, 3)),
-        ("acceleration", "f8", (3,)),
-        ("per_metre", "f8", (3,)),  # intensity of the rotation's drift over airspeed, rad2/s3 per m/s
-        ("unseen", "f8", (3,)),  # share of it that the vanes do not show
-        ("rolling", "f8"),  # lag of the rolling gust times airspeed, m
-        ("jitter", "f8"),  # standard deviation of the pitching and yawing gust as seen, rad m/s
-    ],
-    align=True,
-)  # fmt: skip
-
 HYPOTHESIS = np.dtype(
     [
-        ("kind", "i8"), ("surface", "i8"), ("axis", "i8"), ("alarms", "i8"),
+        ("kind", "i8"), ("surface", "i8"), ("axis", "i8"), ("alarms", "i8"), ("column", "i8"),
         ("signature", "f8", (2,)), ("response", "f8", (N_SLOTS, 4)),
         ("correlation", "f8", (N_SLOTS,)), ("information", "f8", (N_SLOTS,)),
         ("overlap", "f8", (N_SLOTS, MAX_REGRESSORS)),
@@ -144,9 +114,10 @@ BLOCK = np.dtype(
 STATISTICAL = np.dtype(
     [
         ("enabled", "i8"), ("alarm_level", "f8"), ("naming_level", "f8"), ("keep", "f8"),
+        ("n_columns", "i8"),  # of the log
         ("rapidity", "f8"),  # 1/s: intensity of the drift of an uncertainty over its bound squared
         ("bounded", "f8", (3,)), ("deflection", "f8", (3,)), ("jitter", "f8", (3,)), ("tolerated", "i8"),
-        ("n_blocks", "i8"), ("block", BLOCK, (3,)), ("air", AIR), ("terms", "f8", (3, 9)),
+        ("n_blocks", "i8"), ("block", BLOCK, (3,)), ("air", AIR), ("terms", "f8", (MAX_TERMS,)),
         ("score", "f8"), ("axis", "i8"), ("closest", "f8"), ("detected_at_s", "f8"),
     ],
     align=True,

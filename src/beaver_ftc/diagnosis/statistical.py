@@ -9,7 +9,7 @@ scheme beside it needs no probability at all. `fdi.authority` says whose alarms 
 import numpy as np
 
 from beaver_ftc.compiled import kernel
-from beaver_ftc.design.model import AIRSPEED, QDYN, regressors
+from beaver_ftc.design.terms import AIRSPEED, QDYN, evaluate, regressors
 from beaver_ftc.diagnosis import air, likelihood, whitening
 from beaver_ftc.diagnosis.state import LEAST_UNCERTAINTY_RAD_S2, LOSS, STEP
 from beaver_ftc.diagnosis.thresholds import uncertainty_bound
@@ -18,13 +18,12 @@ PITCH, LATERAL, RETURNING = 0, 1, 2  # blocks: the last is the second view of ro
 # Of what the best explanation explains, the part that a constant theta leaves to a loss that grows is larger
 # for every rate of growth (docs/theory.md, section 7).
 LEAST_PART = 0.25
-_TERMS = 9  # of a moment coefficient
 
 
 @kernel
 def signatures(statistical, Gu, cubic):
-    """What each fault would have done in the elapsed frame, times theta. Gu (3, 4) rad/s2: what each surface
-    gave, mean over it; cubic rad/s2: a pitching moment on alpha^3."""
+    """What each fault would have done in the elapsed frame, times theta. Gu (3, surfaces) rad/s2: what each
+    surface gave, mean over it; cubic rad/s2: a pitching moment on alpha^3."""
     for b in range(statistical.n_blocks):
         block = statistical.block[b]
         for h in range(block.n_hypotheses):
@@ -101,15 +100,14 @@ def score(statistical, t):
 @kernel
 def record(statistical, row):
     """Write the last columns of the log: each test as a share of the alarm level, losses, then steps."""
-    first = row.size - 6
-    for i in range(6):
-        row[first + i] = 0.0
+    first = row.size - statistical.n_columns
+    row[first:] = 0.0
     for b in range(statistical.n_blocks):
         block = statistical.block[b]
         for h in range(block.n_hypotheses):
             hypothesis = block.hypothesis[h]
             if hypothesis.alarms:
-                place = first + (hypothesis.surface if hypothesis.kind == LOSS else 3 + hypothesis.axis)
+                place = first + hypothesis.column
                 row[place] = max(row[place], hypothesis.score / statistical.alarm_level)
 
 
@@ -217,15 +215,21 @@ def drifts(statistical, fdi, design, x, y):
 @kernel
 def coefficients(statistical, design, x, y, u):
     """Fill each block's regressors (n, 2) rad/s2: what each moment coefficient is multiplied by."""
-    regressors(design, x, y, u, statistical.terms)
+    table = design.moments
+    evaluate(table, x, y)
+    regressors(table, table.power, u, statistical.terms)
     lateral, longitudinal = y[QDYN] * design.S * design.b, y[QDYN] * design.S * design.c
     pitch = statistical.block[PITCH]
-    for j in range(_TERMS):
-        pitch.regressor[j, 0] = design.Qm * longitudinal * statistical.terms[1, j]
+    first = table.free_from[1]
+    for j in range(table.surface_to[1] - first):
+        pitch.regressor[j, 0] = design.Qm * longitudinal * statistical.terms[first + j]
     for b in range(LATERAL, statistical.n_blocks):
         rolling = statistical.block[b]
-        for j in range(_TERMS):
-            Cl, Cn = lateral * statistical.terms[0, j], lateral * statistical.terms[2, j]
+        n_roll, first = table.surface_to[0], table.free_from[2]
+        for j in range(n_roll):
+            Cl = lateral * statistical.terms[j]
             rolling.regressor[j, 0], rolling.regressor[j, 1] = design.Pl * Cl, design.Rl * Cl
-            rolling.regressor[_TERMS + j, 0] = design.Pn * Cn
-            rolling.regressor[_TERMS + j, 1] = design.Rn * Cn
+        for j in range(table.surface_to[2] - first):
+            Cn = lateral * statistical.terms[first + j]
+            rolling.regressor[n_roll + j, 0] = design.Pn * Cn
+            rolling.regressor[n_roll + j, 1] = design.Rn * Cn

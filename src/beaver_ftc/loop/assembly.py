@@ -4,9 +4,11 @@ from math import ceil, exp, pi, radians
 
 import numpy as np
 
+from beaver_ftc.aircraft import load
 from beaver_ftc.control.reference_model import discretise
 from beaver_ftc.control.state import LAWS, NOMINAL
-from beaver_ftc.design.coefficients import SURFACES, engine_power_kw, slipstream, value
+from beaver_ftc.design.coefficients import SURFACES, value
+from beaver_ftc.design.engine import engine_power_kw, slipstream
 from beaver_ftc.design.model import AILERON, ELEVATOR, FLAP, RUDDER
 from beaver_ftc.design.variants import design_of, mass_of
 from beaver_ftc.diagnosis.admitted import admit, gyros_vary, poles_for_noise
@@ -206,8 +208,8 @@ def _assemble_actuators(actuators: np.void, given: Actuators, dt: float, travel:
 def _assemble_admitted(frame: np.void, scenario: Scenario) -> None:
     """The errors that `fdi.bounds` declares beside the published ones."""
     admitted = frame["fdi"]["admitted"]
-    coefficient, mass = frame["design"]["coefficient"], mass_of(scenario.design_model)
-    admit(admitted, scenario.fdi.bounds, coefficient, mass)
+    mass = mass_of(scenario.design_model)
+    admit(admitted, scenario.fdi.bounds, load(scenario.aircraft), frame["design"], mass)
     frame["fdi"]["own_errors"] = admitted["any"] and scenario.fdi.fault_class == "all"
     if scenario.fdi.pairs and frame["fdi"]["block"] > 1:
         raise BadInput(

@@ -21,7 +21,7 @@ from beaver_ftc.control.supervisor import (
     next_mode,
 )
 from beaver_ftc.design.actuators import ACTUATORS, move
-from beaver_ftc.design.model import ALPHA, BETA, DESIGN, ELEVATOR, unanticipated_pitch
+from beaver_ftc.design.model import ALPHA, BETA, ELEVATOR, N_Y, design_dtype, unanticipated_pitch
 from beaver_ftc.design.variants import response
 from beaver_ftc.diagnosis import air, bank, detection, fault_types, guarantee, isolation, network, statistical
 from beaver_ftc.diagnosis.derived import changing_error, derived_bound, slack_per_rad
@@ -41,7 +41,7 @@ DEPARTURE_SIGNALS = ("p", "q", "r", "alpha", "beta", "altitude")
 
 FRAME = np.dtype(
     [
-        ("design", DESIGN), ("fdi", DIAGNOSIS), ("control", CONTROL),
+        ("design", design_dtype(4)), ("fdi", DIAGNOSIS), ("control", CONTROL),
         ("instruments", INSTRUMENTS), ("actuators", ACTUATORS),
         ("k", "i8"), ("row", "i8"), ("dt", "f8"), ("t", "f8"), ("share", "f8"),
         # the truth's nodes
@@ -54,7 +54,7 @@ FRAME = np.dtype(
         ("faulted", "i8"), ("fault_at_s", "f8"), ("immovable", "i8", (4,)),
         ("Cm_alpha3", "f8"), ("phi", "f8", (3,)),
         # what is measured and believed
-        ("seen", "f8", (N_SIGNALS,)), ("x", "f8", (3,)), ("y", "f8", (5,)), ("u", "f8", (4,)),
+        ("seen", "f8", (N_SIGNALS,)), ("x", "f8", (3,)), ("y", "f8", (N_Y,)), ("u", "f8", (4,)),
         ("u_then", "f8", (4,)),
         ("commanded", "f8", (4,)),  # u is where the healthy surfaces are under it, u_then where they were
         ("f", "f8", (3,)), ("G", "f8", (3, 4)), ("G_believed", "f8", (3, 4)),

@@ -13,14 +13,8 @@ from math import asin, cos, degrees, isfinite, sin
 
 import numpy as np
 
-from beaver_ftc.design.coefficients import (
-    GEOMETRY,
-    MASS,
-    SURFACES,
-    TRAVEL,
-    Travel,
-    value,
-)
+from beaver_ftc.aircraft import Travel
+from beaver_ftc.design.coefficients import GEOMETRY, MASS, SURFACES, TRAVEL, value
 from beaver_ftc.errors import BadInput
 from beaver_ftc.plant.adapter import FT_PER_M, PA_PER_PSF, Plant
 from beaver_ftc.plant.state import FlightState

@@ -2,8 +2,8 @@
 
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from beaver_ftc.aircraft import load
 from beaver_ftc.design.coefficients import SURFACES
-from beaver_ftc.design.model import TERMS
 
 if TYPE_CHECKING:
     from beaver_ftc.scenario.schema import Scenario
@@ -65,7 +65,7 @@ def cases(airspeeds_mps: tuple[float, ...] = AIRSPEEDS_MPS, declared: bool = Fal
 
 def declared() -> dict[str, Any]:
     """Real sensors, servos, coefficients at the ends of their tolerance by turns: all of it declared."""
-    names = [name for terms in TERMS for name in terms if name]
+    names = [term.name for term in load().moments]
     wrong = {name: 1.0 + (TOLERANCE if i % 2 else -TOLERANCE) for i, name in enumerate(names)}
     return {
         "uncertainty": UNCERTAINTY | {"coefficients": wrong},

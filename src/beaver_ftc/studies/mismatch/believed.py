@@ -82,7 +82,7 @@ class Belief:
 
     def _linear(self, x: np.ndarray, y: np.ndarray, u: np.ndarray) -> np.ndarray:
         d = self.design
-        away = (x - d["x0"]) @ d["f_x"].T + (y - d["y0"]) @ d["f_y"].T
+        away = (x - d["x0"]) @ d["f_x"].T + (y - d["y0"][: y.shape[1]]) @ d["f_y"][:, : y.shape[1]].T
         return d["f0"] + away + u @ d["G0"].T
 
 

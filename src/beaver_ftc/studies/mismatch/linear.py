@@ -124,7 +124,7 @@ def believed_derivatives(
     x, y, u = np.zeros(3), measured(point), surfaces_of(point)
     anchor(design, x, y, u)
     if design["linearised"] or design["frozen_alpha"]:
-        return design["f_x"].copy(), design["f_y"].copy(), design["G0"].copy()
+        return design["f_x"].copy(), design["f_y"][:, : y.size].copy(), design["G0"].copy()
     _, G, f_x, f_y = jacobian(design, x, y, u)
     return f_x, f_y, G
 

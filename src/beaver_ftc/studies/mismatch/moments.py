@@ -8,12 +8,12 @@ from collections.abc import Iterable, Mapping
 
 import numpy as np
 
-from beaver_ftc.design.coefficients import GEOMETRY, TERMS, InertiaCoefficients, Term
+from beaver_ftc.aircraft import Term
+from beaver_ftc.design.coefficients import GEOMETRY, SURFACES, TERMS, InertiaCoefficients
 
 MOMENTS = ("Cl", "Cm", "Cn")
 MOMENT_TERMS: dict[str, Term] = {name: term for name, term in TERMS.items() if term.coefficient in MOMENTS}
 ENGINE_TERMS = tuple(name for name, term in MOMENT_TERMS.items() if "dpt" in term.factors)
-DEFLECTIONS = ("da", "de", "dr", "df")
 RATES = ("ph", "qh", "rh")
 
 
@@ -22,7 +22,7 @@ def quantities(x: np.ndarray, y: np.ndarray, u: np.ndarray) -> dict[str, np.ndar
     alpha, beta, V, _, dpt = y.T
     b, c = GEOMETRY.span_m, GEOMETRY.chord_m
     rates = {"ph": x[:, 0] * b / (2 * V), "qh": x[:, 1] * c / V, "rh": x[:, 2] * b / (2 * V)}
-    return {"alpha": alpha, "beta": beta, "dpt": dpt, **rates, **dict(zip(DEFLECTIONS, u.T, strict=True))}
+    return {"alpha": alpha, "beta": beta, "dpt": dpt, **rates, **dict(zip(SURFACES, u.T, strict=True))}
 
 
 def regressor(name: str, of: Mapping[str, np.ndarray]) -> np.ndarray:

@@ -1,0 +1,237 @@
+"""An aircraft as the rest of the package sees it: frozen, with what follows from its file worked out once."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from math import radians
+from pathlib import Path
+from types import MappingProxyType
+
+from beaver_ftc.aircraft.schema import (
+    FLOW_SIGNALS,
+    SIDESLIP_RATE,
+    AircraftFile,
+    EngineSection,
+    EnvelopeSection,
+    GeometrySection,
+    SignalSection,
+    SurfaceSection,
+    TermSection,
+    TrimSection,
+)
+
+AXES = ("p", "q", "r")
+MOMENTS, FORCES = ("Cl", "Cm", "Cn"), ("CX", "CY", "CZ")
+
+
+@dataclass(frozen=True)
+class Term:
+    """One term of a coefficient: `value` times powers of signals and, if it has one, a surface's deflection.
+
+    name: e.g. "Cm_alpha"; also the truth's input `uncertainty/<name>-scale`, where the aircraft has it.
+    coefficient: Cl, Cm, Cn, CX, CY or CZ. of: (signal, power) pairs. surface: a name, or None.
+    """
+
+    name: str
+    coefficient: str
+    value: float
+    of: tuple[tuple[str, int], ...] = ()
+    surface: str | None = None
+    source: str = ""
+    description: str = ""
+
+    @property
+    def is_constant(self) -> bool:
+        """Whether it multiplies nothing."""
+        return not self.of and self.surface is None
+
+    @property
+    def factors(self) -> tuple[str, ...]:
+        """What it multiplies, one entry a power, its surface first."""
+        powers = tuple(signal for signal, power in self.of for _ in range(power))
+        return ((self.surface,) if self.surface else ()) + powers
+
+
+@dataclass(frozen=True)
+class MassProperties:
+    """Mass kg and inertia kg m2 about the centre of gravity, body axes; Jxz is the product of inertia
+    integral of x z dm, so it enters the inertia tensor with a minus sign. Jxy and Jyz are zero."""
+
+    mass_kg: float
+    Ix_kg_m2: float
+    Iy_kg_m2: float
+    Iz_kg_m2: float
+    Jxz_kg_m2: float
+
+
+@dataclass(frozen=True)
+class Travel:
+    """Travel of one surface, rad."""
+
+    min_rad: float
+    max_rad: float
+
+
+@dataclass(frozen=True, eq=False)
+class Aircraft:
+    """One aircraft: its file's data, and the folder with its JSBSim model.
+
+    Two are equal only if they are one object: `load` gives the same one for the same unchanged file.
+    """
+
+    file: AircraftFile
+    folder: Path
+
+    @property
+    def name(self) -> str:
+        """The name the file gives it."""
+        return self.file.name
+
+    @property
+    def jsbsim(self) -> Path:
+        """Its JSBSim model."""
+        return self.folder / self.file.jsbsim
+
+    @cached_property
+    def surfaces(self) -> tuple[str, ...]:
+        """Names of the surfaces, in the order of every array and log column."""
+        return tuple(self.file.surfaces)
+
+    @property
+    def n(self) -> int:
+        """How many surfaces there are."""
+        return len(self.surfaces)
+
+    @property
+    def surface(self) -> Mapping[str, SurfaceSection]:
+        """A surface by its name."""
+        return MappingProxyType(self.file.surfaces)
+
+    @cached_property
+    def travel(self) -> Mapping[str, Travel]:
+        """How far each surface goes."""
+        return MappingProxyType({name: Travel(*of.travel_rad) for name, of in self.file.surfaces.items()})
+
+    @cached_property
+    def groups(self) -> Mapping[str, tuple[str, ...]]:
+        """Who can stand in for whom, in the order of hand-over."""
+        return MappingProxyType(dict(self.file.groups))
+
+    def group_of(self, surface: str) -> int:
+        """Index of the group a surface belongs to."""
+        return next(i for i, members in enumerate(self.groups.values()) if surface in members)
+
+    @cached_property
+    def dominant_axis(self) -> tuple[int, ...]:
+        """Of each surface, the axis (p, q, r) it turns most about, by its terms at zero signals."""
+        mass, geometry = self.mass, self.geometry
+        arms = (geometry.span_m / mass.Ix_kg_m2, geometry.chord_m / mass.Iy_kg_m2)
+        per_axis = dict(zip(MOMENTS, (*arms, geometry.span_m / mass.Iz_kg_m2), strict=True))
+        effect = {surface: [0.0, 0.0, 0.0] for surface in self.surfaces}
+        for term in self.moments:
+            if term.surface and not term.of:
+                axis = MOMENTS.index(term.coefficient)
+                effect[term.surface][axis] += abs(term.value) * per_axis[term.coefficient]
+        return tuple(max(range(3), key=effect[surface].__getitem__) for surface in self.surfaces)
+
+    @cached_property
+    def primary(self) -> tuple[str, ...]:
+        """The surface that leads each axis: of those that turn most about it, the first in its group."""
+        rank = {s: members.index(s) for members in self.groups.values() for s in members}
+        axis = dict(zip(self.surfaces, self.dominant_axis, strict=True))
+        leaders = {
+            min((s for s in self.surfaces if axis[s] == i), key=rank.__getitem__) for i in set(axis.values())
+        }
+        return tuple(s for s in self.surfaces if s in leaders)
+
+    @property
+    def signals(self) -> Mapping[str, SignalSection]:
+        """Declared signals beside rates, alpha, beta, airspeed and dynamic pressure."""
+        return MappingProxyType(self.file.signals)
+
+    @cached_property
+    def signal_names(self) -> tuple[str, ...]:
+        """What a term may multiply, in the order of the evaluator."""
+        return (*FLOW_SIGNALS, *self.file.signals)
+
+    @cached_property
+    def mass(self) -> MassProperties:
+        """Mass (nan where the file gives none) and inertia."""
+        given = self.file.mass
+        mass_kg = float("nan") if given.mass_kg is None else given.mass_kg
+        return MassProperties(mass_kg, given.Ix_kgm2, given.Iy_kgm2, given.Iz_kgm2, given.Jxz_kgm2)
+
+    @property
+    def geometry(self) -> GeometrySection:
+        """Reference dimensions."""
+        return self.file.geometry
+
+    @cached_property
+    def moments(self) -> tuple[Term, ...]:
+        """Terms of Cl, Cm and Cn: of each the constant, the others without a surface, those with one.
+
+        A coefficient without a constant term has one that is zero: errors of the sensors are counted there.
+        """
+        return _sorted(self.file.moments, MOMENTS, constants=True)
+
+    @cached_property
+    def forces(self) -> tuple[Term, ...]:
+        """Terms of CX, CY and CZ, in the same order; none where the file has none."""
+        return _sorted(self.file.forces, FORCES) if self.file.forces else ()
+
+    @cached_property
+    def measurable_forces(self) -> tuple[Term, ...]:
+        """The same without what multiplies the rate of sideslip."""
+        return tuple(term for term in self.forces if all(signal != SIDESLIP_RATE for signal, _ in term.of))
+
+    @cached_property
+    def terms(self) -> Mapping[str, Term]:
+        """Every term by its name."""
+        named = {term.name for _, _, _, term in self.file.terms()}
+        return MappingProxyType({t.name: t for t in (*self.forces, *self.moments) if t.name in named})
+
+    def index(self, term: str) -> int:
+        """Place of a moment's term in `moments`. Raises KeyError for a name the file lacks."""
+        return self._places[term]
+
+    @cached_property
+    def _places(self) -> dict[str, int]:
+        return {term.name: i for i, term in enumerate(self.moments)}
+
+    @property
+    def envelope(self) -> EnvelopeSection:
+        """Where the terms hold."""
+        return self.file.envelope
+
+    @cached_property
+    def alpha_rad(self) -> tuple[float, float]:
+        """Angles of attack of the envelope."""
+        low, high = self.file.envelope.alpha_deg
+        return radians(low), radians(high)
+
+    @property
+    def trim(self) -> TrimSection:
+        """What trim may move beside the surfaces."""
+        return self.file.trim
+
+    @property
+    def engine(self) -> EngineSection:
+        """Settings of the engine a scenario may give."""
+        return self.file.engine
+
+
+def _sorted(section: object, coefficients: tuple[str, ...], constants: bool = False) -> tuple[Term, ...]:
+    """Terms by coefficient, those without a surface first, of them the constant one."""
+    terms: list[Term] = []
+    for coefficient in coefficients:
+        given: tuple[TermSection, ...] = getattr(section, coefficient)
+        of_it = [_term(coefficient, term) for term in given]
+        if constants and not any(term.is_constant for term in of_it):
+            of_it.append(Term(f"{coefficient}_constant", coefficient, 0.0))
+        terms += sorted(of_it, key=lambda term: (term.surface is not None, not term.is_constant))
+    return tuple(terms)
+
+
+def _term(coefficient: str, given: TermSection) -> Term:
+    of = tuple(given.of.items())
+    return Term(given.name, coefficient, given.value, of, given.surface, given.source, given.description)

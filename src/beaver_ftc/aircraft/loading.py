@@ -1,0 +1,93 @@
+"""From what a scenario calls its aircraft to the aircraft: built in, of the jsbsim package, or a folder."""
+
+from functools import lru_cache
+from pathlib import Path
+
+from beaver_ftc.aircraft.aircraft import Aircraft
+from beaver_ftc.aircraft.schema import AircraftFile
+from beaver_ftc.errors import BadInput, suggestion
+from beaver_ftc.paths import data_root
+from beaver_ftc.scenario.document import Problem
+from beaver_ftc.scenario.files import UnreadableError, read_text
+from beaver_ftc.scenario.problems import ScenarioError
+from beaver_ftc.scenario.validation import parse_document, validate
+
+DEFAULT = "beaver"
+FILE = "aircraft.yaml"
+_FROM_JSBSIM = "jsbsim:"
+_MAX_BYTES = 1_000_000
+_ALLOWED = "a built-in name, jsbsim:NAME, or ./FOLDER beside the scenario"
+
+
+class UnknownAircraft(BadInput):
+    """No such aircraft; the message says what is allowed."""
+
+
+def builtin_names() -> tuple[str, ...]:
+    """Names of the built-in aircraft."""
+    return tuple(sorted(path.parent.name for path in _root().glob(f"*/{FILE}")))
+
+
+def _root() -> Path:
+    return data_root() / "aircraft"
+
+
+def load(reference: str = DEFAULT, beside: Path | None = None) -> Aircraft:
+    """The aircraft a scenario names; `beside` is the folder the scenario is in.
+
+    Raises UnknownAircraft for what is no aircraft, ScenarioError with one line a mistake in its file.
+    """
+    if reference.startswith(_FROM_JSBSIM):
+        allowed = ", ".join((*builtin_names(), "./FOLDER"))
+        raise UnknownAircraft(f"{reference!r} is not available, allowed: {allowed}")
+    if reference.startswith("./"):
+        return read(_inside(beside, reference))
+    if reference not in builtin_names():
+        raise UnknownAircraft(
+            f"{reference!r} is not known{suggestion(reference, builtin_names())}, jsbsim:NAME, ./FOLDER"
+        )
+    return read(_root() / reference)
+
+
+def _inside(beside: Path | None, reference: str) -> Path:
+    """The folder's path if it is below the scenario's own: a scenario reads nothing else."""
+    if beside is None:
+        raise UnknownAircraft(
+            f"there is no folder to find {reference!r} in, allowed: ./FOLDER in a scenario that is a file"
+        )
+    root = beside.resolve()
+    try:
+        folder = (root / reference).resolve()
+    except (OSError, ValueError, RuntimeError):
+        folder = Path("/")
+    if ".." in Path(reference).parts or not folder.is_relative_to(root):
+        raise UnknownAircraft(f"{reference!r} is outside, allowed: a folder below the scenario's own")
+    if not folder.is_dir():
+        raise UnknownAircraft(f"there is no folder {reference!r}, allowed: {_ALLOWED}")
+    return folder
+
+
+def read(folder: Path) -> Aircraft:
+    """The aircraft whose file is in a folder. Raises ScenarioError with one line a mistake."""
+    path = folder / FILE
+    try:
+        changed_ns = path.stat().st_mtime_ns
+    except OSError:
+        changed_ns = -1
+    return _read(folder, changed_ns)
+
+
+@lru_cache(maxsize=32)
+def _read(folder: Path, changed_ns: int) -> Aircraft:
+    """`changed_ns`: when the file was last written, so that a changed one is read again."""
+    path = folder / FILE
+    try:
+        text = read_text(path, _MAX_BYTES)
+    except UnreadableError as error:
+        raise ScenarioError(str(path), [Problem(error.line, (), str(error))]) from None
+    document = parse_document(text, str(path), "the keys of an aircraft file")
+    file = validate(AircraftFile, document, str(path))
+    if not (folder / file.jsbsim).resolve().is_relative_to(folder.resolve()):
+        says = f"{file.jsbsim!r} is outside, allowed: a file beside this one"
+        raise ScenarioError(str(path), [Problem(document.line(("jsbsim",)), ("jsbsim",), says)])
+    return Aircraft(file, folder)

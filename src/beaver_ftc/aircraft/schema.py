@@ -1,0 +1,228 @@
+"""`aircraft.yaml` as frozen, strict sections.
+
+A term of a coefficient is its value times powers of dimensionless signals and, where it has a surface, that
+surface's deflection in rad. Signals: alpha and beta in rad, ph = p b/2V, qh = q c/V (full chord),
+rh = r b/2V, and those the file declares.
+"""
+
+from collections.abc import Iterator
+from math import isfinite
+from typing import Annotated, Literal, Self
+
+from pydantic import AfterValidator, Field, model_validator
+
+from beaver_ftc.errors import suggestion
+from beaver_ftc.scenario.base import Conflict, Flag, Number, Section, Whole, number, refuse
+
+MAX_SURFACES, MAX_SIGNALS = 8, 4
+MAX_TERMS_OF_ONE, MAX_MONOMIALS = 32, 64
+MAX_TERMS = 3 * MAX_TERMS_OF_ONE
+FLOW_SIGNALS = ("alpha", "beta", "ph", "qh", "rh")
+RATE_SIGNALS = ("ph", "qh", "rh")
+SIDESLIP_RATE = "betadoth"  # betadot b/2V: known to linear analysis, to no instrument
+NAME_PATTERN = r"^[A-Za-z][A-Za-z0-9_-]*$"
+PROPERTY_PATTERN = r"^[A-Za-z_][A-Za-z0-9_./\[\]-]*$"
+FILE_PATTERN = r"^[A-Za-z0-9_-][A-Za-z0-9_.-]*\.xml$"
+
+Name = Annotated[str, Field(pattern=NAME_PATTERN, max_length=60)]
+Property = Annotated[str, Field(pattern=PROPERTY_PATTERN, max_length=200)]
+Text = Annotated[str, Field(max_length=2000)]
+Power = Annotated[Whole, Field(ge=1, le=9)]
+
+
+def _in_order(given: tuple[float, float]) -> tuple[float, float]:
+    if not given[0] < given[1]:
+        refuse([((), "ends out of order, allowed: [lower, upper]")])
+    return given
+
+
+Interval = Annotated[tuple[Number, Number], AfterValidator(_in_order)]
+
+
+class SurfaceSection(Section):
+    """One control surface: its properties in JSBSim, and how far it goes."""
+
+    command: Property = Field(description="property that commands the deflection")
+    position: Property = Field(description="property of the actuator's output, rad")
+    effective: Property = Field(description="property of what the aerodynamics see, rad")
+    travel_rad: Interval = Field(description="lower and upper stop, rad", json_schema_extra={"unit": "rad"})
+
+
+class SignalSection(Section):
+    """A measured dimensionless signal beside rates, alpha, beta, airspeed and dynamic pressure."""
+
+    property: Property = Field(description="property that holds it")
+    sensed: Flag = Field(default=True, description="whether an instrument measures it")
+
+
+class MassSection(Section):
+    """Mass and inertia about the centre of gravity, body axes; Jxz enters the tensor with a minus sign."""
+
+    mass_kg: Number | None = number(None, unit="kg", says="mass", gt=0, le=1e7)
+    Ix_kgm2: Number = number(unit="kg m2", says="roll inertia", gt=0, le=1e9)
+    Iy_kgm2: Number = number(unit="kg m2", says="pitch inertia", gt=0, le=1e9)
+    Iz_kgm2: Number = number(unit="kg m2", says="yaw inertia", gt=0, le=1e9)
+    Jxz_kgm2: Number = number(0.0, unit="kg m2", says="product of inertia", ge=-1e9, le=1e9)
+
+    @model_validator(mode="after")
+    def _is_a_body(self) -> Self:
+        if self.Jxz_kgm2**2 >= self.Ix_kgm2 * self.Iz_kgm2:
+            refuse([(("Jxz_kgm2",), "is too large for Ix and Iz, allowed: Jxz^2 below Ix Iz")])
+        return self
+
+
+class GeometrySection(Section):
+    """Reference dimensions."""
+
+    wing_area_m2: Number = number(unit="m2", says="wing area", gt=0, le=1e4)
+    span_m: Number = number(unit="m", says="wing span", gt=0, le=500)
+    chord_m: Number = number(unit="m", says="mean aerodynamic chord", gt=0, le=500)
+
+
+class TermSection(Section):
+    """One term of a coefficient."""
+
+    name: Name
+    value: Number = Field(description="per rad of each angle or deflection")
+    of: dict[str, Power] = Field(default_factory=dict, description="power of each signal it multiplies")
+    surface: Name | None = Field(default=None, description="the surface whose deflection it multiplies")
+    source: Text = ""
+    description: Text = ""
+
+
+class Moments(Section):
+    """Terms of the moment coefficients."""
+
+    Cl: tuple[TermSection, ...] = ()
+    Cm: tuple[TermSection, ...] = ()
+    Cn: tuple[TermSection, ...] = ()
+
+
+class Forces(Section):
+    """Terms of the force coefficients along the body axes."""
+
+    CX: tuple[TermSection, ...] = ()
+    CY: tuple[TermSection, ...] = ()
+    CZ: tuple[TermSection, ...] = ()
+
+
+class EnvelopeSection(Section):
+    """Where the terms hold."""
+
+    airspeed_mps: Interval
+    alpha_deg: Interval
+
+
+class TrimSection(Section):
+    """What trim may move beside the surfaces."""
+
+    throttle: Property = Field(description="property of the power setting")
+
+
+class LimitSection(Section):
+    """A property that must stay in a range in trim."""
+
+    property: Property
+    says: Text = ""
+    unit: Text = ""
+    range: Interval
+
+
+class SettingSection(LimitSection):
+    """An engine setting a scenario may give."""
+
+    default: Number
+
+    @model_validator(mode="after")
+    def _default_is_in_range(self) -> Self:
+        if not self.range[0] <= self.default <= self.range[1]:
+            refuse([(("default",), "is out of range, allowed: a value in `range`")])
+        return self
+
+
+class EngineSection(Section):
+    """Settings of the engine, by their key in a scenario's `initial`, and limits of what they yield."""
+
+    settings: dict[Name, SettingSection] = Field(default_factory=dict)
+    limits: dict[Name, LimitSection] = Field(default_factory=dict)
+
+
+class AircraftFile(Section):
+    """The whole file."""
+
+    name: Name
+    description: Text = ""
+    jsbsim: str = Field(pattern=FILE_PATTERN, max_length=200, description="the JSBSim model beside this file")
+    surfaces: dict[Name, SurfaceSection] = Field(min_length=3, max_length=MAX_SURFACES)
+    groups: dict[Name, tuple[Name, ...]] = Field(
+        description="who can stand in for whom, in the order of hand-over"
+    )
+    signals: dict[Name, SignalSection] = Field(default_factory=dict, max_length=MAX_SIGNALS)
+    mass: MassSection
+    geometry: GeometrySection
+    moments: Moments
+    forces: Forces | None = None
+    envelope: EnvelopeSection
+    trim: TrimSection
+    engine: EngineSection = Field(default_factory=EngineSection)
+
+    @model_validator(mode="after")
+    def _parts_fit_together(self) -> Self:
+        refuse([*self._groups(), *self._terms(), *self._names()])
+        return self
+
+    def _groups(self) -> Iterator[Conflict]:
+        """Every surface belongs to one group."""
+        seen: set[str] = set()
+        for group, members in self.groups.items():
+            for i, surface in enumerate(members):
+                if surface not in self.surfaces:
+                    yield ("groups", group, i), f"unknown surface{suggestion(surface, self.surfaces)}"
+                elif surface in seen:
+                    yield ("groups", group, i), f"{surface} is in two groups, allowed: in one"
+                seen.add(surface)
+        for surface in self.surfaces:
+            if surface not in seen:
+                yield ("groups",), f"{surface} is in no group, allowed: every surface in one"
+
+    def _terms(self) -> Iterator[Conflict]:
+        """Terms multiply signals and surfaces there are."""
+        for section, coefficient, i, term in self.terms():
+            here = (section, coefficient, i)
+            known = [*FLOW_SIGNALS, *self.signals, *([SIDESLIP_RATE] if section == "forces" else [])]
+            for signal in term.of:
+                if signal not in known:
+                    yield (*here, "of", signal), f"unknown signal{suggestion(signal, known)}"
+            if term.surface is not None and term.surface not in self.surfaces:
+                yield (*here, "surface"), f"unknown surface{suggestion(term.surface, self.surfaces)}"
+            if section == "moments" and term.surface is not None and set(term.of) & set(RATE_SIGNALS):
+                yield (
+                    (*here, "of"),
+                    "multiplies a rate and a surface, allowed: one of them, for G is that of y",
+                )
+            if not isfinite(term.value):
+                yield (*here, "value"), "is not finite, allowed: a finite number"
+
+    def _names(self) -> Iterator[Conflict]:
+        """Names are unique, and there is room for all of them."""
+        seen: set[str] = set()
+        for section, coefficient, i, term in self.terms():
+            if term.name in seen:
+                yield (section, coefficient, i, "name"), f"{term.name} is there twice, allowed: once"
+            seen.add(term.name)
+        for section in ("moments", "forces"):
+            for coefficient, terms in getattr(self, section) or ():
+                if len(terms) > MAX_TERMS_OF_ONE:
+                    says = f"{len(terms)} terms, allowed: at most {MAX_TERMS_OF_ONE}"
+                    yield (section, coefficient), says
+        for name in set(self.signals) & {*FLOW_SIGNALS, SIDESLIP_RATE}:
+            yield ("signals", name), f"{name} is measured in any case, allowed: another name"
+
+    def terms(self) -> Iterator[tuple[Literal["moments", "forces"], str, int, TermSection]]:
+        """(section, coefficient, index, term) of every term in the file."""
+        for axis, terms in self.moments:
+            for i, term in enumerate(terms):
+                yield "moments", axis, i, term
+        for axis, terms in self.forces or ():
+            for i, term in enumerate(terms):
+                yield "forces", axis, i, term

@@ -1,0 +1,160 @@
+"""The one evaluator of an aircraft's coefficients: sums of terms, by looping over their table.
+
+A term is a value times a monomial of dimensionless signals and, if it has a surface, times that surface's
+deflection. The monomials form a chain: each is an earlier one times one signal, so it costs one
+multiplication. From the same table come the sums without surfaces (f), the slopes per rad of each surface
+(G), what each value multiplies, and the derivative of everything along a signal.
+
+The table holds three coefficients: Cl, Cm, Cn of the design model, or CX, CY, CZ. Its terms are sorted by
+coefficient, of each first those without a surface.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+
+import numpy as np
+
+from beaver_ftc.aircraft import Aircraft, Term
+from beaver_ftc.aircraft.schema import FLOW_SIGNALS, MAX_MONOMIALS, MAX_SIGNALS, MAX_TERMS
+from beaver_ftc.compiled import kernel
+
+ALPHA, BETA, AIRSPEED, QDYN, DPT = range(5)  # places in y; declared signals begin at the last
+N_Y = 4 + MAX_SIGNALS
+N_SIGNALS = len(FLOW_SIGNALS) + MAX_SIGNALS
+PH, QH, RH = (FLOW_SIGNALS.index(name) for name in ("ph", "qh", "rh"))
+_DECLARED = len(FLOW_SIGNALS)  # where declared signals begin among the signals
+
+TABLE = np.dtype(
+    [
+        ("span", "f8"), ("chord", "f8"), ("n_declared", "i8"),
+        # monomial k is monomial parent[k] times signal factor[k]; the first is 1
+        ("n_monomials", "i8"), ("parent", "u8", (MAX_MONOMIALS,)), ("factor", "u8", (MAX_MONOMIALS,)),
+        # of each coefficient the terms without a surface, and those with one
+        ("n_terms", "i8"), ("free_from", "i8", (3,)), ("free_to", "i8", (3,)), ("surface_to", "i8", (3,)),
+        ("value", "f8", (MAX_TERMS,)), ("monomial", "u8", (MAX_TERMS,)), ("surface", "i8", (MAX_TERMS,)),
+        # scratch: signals and monomials of the state last evaluated
+        ("signal", "f8", (N_SIGNALS,)), ("power", "f8", (MAX_MONOMIALS,)),
+    ],
+    align=True,
+)  # fmt: skip
+
+
+def fill_table(
+    table: np.void,
+    aircraft: Aircraft,
+    terms: Sequence[Term],
+    coefficients: Sequence[str],
+    scale: Mapping[str, float] | None = None,
+) -> None:
+    """Write terms, sorted as `Aircraft.moments` are, into a record; `scale` multiplies single values."""
+    scale = scale or {}
+    table["span"], table["chord"] = aircraft.geometry.span_m, aircraft.geometry.chord_m
+    table["n_declared"], table["n_terms"] = len(aircraft.signals), len(terms)
+    chain = _chain(_monomial(term, aircraft) for term in terms)
+    table["n_monomials"] = len(chain)
+    for k, monomial in enumerate(chain[1:], start=1):
+        table["parent"][k], table["factor"][k] = chain.index(monomial[:-1]), monomial[-1]
+    for k, term in enumerate(terms):
+        table["value"][k] = term.value * scale.get(term.name, 1.0)
+        table["monomial"][k] = chain.index(_monomial(term, aircraft))
+        table["surface"][k] = aircraft.surfaces.index(term.surface) if term.surface else -1
+    first = 0
+    for i, coefficient in enumerate(coefficients):
+        of_it = [term for term in terms if term.coefficient == coefficient]
+        table["free_from"][i] = first
+        table["free_to"][i] = first + sum(term.surface is None for term in of_it)
+        first = table["surface_to"][i] = first + len(of_it)
+
+
+def _monomial(term: Term, aircraft: Aircraft) -> tuple[int, ...]:
+    """The signals a term multiplies, one entry a power, in a fixed order."""
+    return tuple(sorted(aircraft.signal_names.index(name) for name, power in term.of for _ in range(power)))
+
+
+def _chain(wanted: Iterable[tuple[int, ...]]) -> list[tuple[int, ...]]:
+    """Monomials, each one factor longer than an earlier one, that contain all wanted ones."""
+    chain: list[tuple[int, ...]] = [()]
+    for monomial in wanted:
+        for length in range(1, len(monomial) + 1):
+            if monomial[:length] not in chain:
+                chain.append(monomial[:length])
+    if len(chain) > MAX_MONOMIALS:
+        raise ValueError(f"{len(chain)} monomials, allowed: at most {MAX_MONOMIALS}")
+    return chain
+
+
+@kernel
+def signals(table, x, y, out):
+    """Fill out (N_SIGNALS,): alpha, beta rad, ph, qh, rh, declared ones. x (3,) rad/s; y (4 + declared,)."""
+    V = y[AIRSPEED]
+    out[0], out[1] = y[ALPHA], y[BETA]
+    out[2] = x[0] * table.span / (2 * V)
+    out[3] = x[1] * table.chord / V
+    out[4] = x[2] * table.span / (2 * V)
+    for k in range(table.n_declared):
+        out[_DECLARED + k] = y[DPT + k]
+
+
+@kernel
+def monomials(table, signal, out):
+    """Fill out (MAX_MONOMIALS,) with the products of powers that the terms multiply."""
+    parent, factor = table.parent, table.factor
+    out[0] = 1.0
+    for k in range(1, table.n_monomials):
+        out[k] = out[parent[k]] * signal[factor[k]]
+
+
+@kernel
+def slopes(table, signal, power, along, out):
+    """Fill out (MAX_MONOMIALS,) with the derivatives of the monomials `power` with signal `along`."""
+    parent, factor = table.parent, table.factor
+    out[0] = 0.0
+    for k in range(1, table.n_monomials):
+        out[k] = out[parent[k]] * signal[factor[k]]
+        if factor[k] == along:
+            out[k] += power[parent[k]]
+
+
+@kernel
+def evaluate(table, x, y):
+    """Bring the table's own signals and monomials to a state; x (3,) rad/s, y (4 + declared,)."""
+    signals(table, x, y, table.signal)
+    monomials(table, table.signal, table.power)
+
+
+@kernel
+def free_sum(table, i, power):
+    """Coefficient i at neutral surfaces, from the monomials."""
+    value, monomial = table.value, table.monomial
+    total = 0.0 * power[0]
+    for k in range(table.free_from[i], table.free_to[i]):
+        total += value[k] * power[monomial[k]]
+    return total
+
+
+@kernel
+def surface_sums(table, power, out):
+    """Fill out (3, surfaces) with each coefficient's slope per rad of each surface."""
+    value, monomial, surface = table.value, table.monomial, table.surface
+    for i in range(3):
+        for s in range(out.shape[1]):
+            out[i, s] = 0.0
+        for k in range(table.free_to[i], table.surface_to[i]):
+            out[i, surface[k]] += value[k] * power[monomial[k]]
+
+
+@kernel
+def whole_sum(table, i, power, u):
+    """Coefficient i with surfaces at u (surfaces,) rad, from the monomials or their derivatives."""
+    value, monomial, surface = table.value, table.monomial, table.surface
+    total = free_sum(table, i, power)
+    for k in range(table.free_to[i], table.surface_to[i]):
+        total += value[k] * power[monomial[k]] * u[surface[k]]
+    return total
+
+
+@kernel
+def regressors(table, power, u, out):
+    """Fill out (MAX_TERMS,) with what each value multiplies, from the monomials; u (surfaces,) rad."""
+    monomial, surface = table.monomial, table.surface
+    for k in range(table.n_terms):
+        out[k] = power[monomial[k]] * (u[surface[k]] if surface[k] >= 0 else 1.0)

@@ -1,0 +1,58 @@
+"""From a text to a model: every mistake at once, one line each, at its line in the file."""
+
+from collections.abc import Callable
+from functools import lru_cache
+from itertools import islice
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, ValidationError
+
+from beaver_ftc.scenario.base import Conflict
+from beaver_ftc.scenario.document import MAX_PROBLEMS, Document, MalformedDocumentError, Problem, parse
+from beaver_ftc.scenario.problems import ScenarioError, problems_of
+
+_Model = TypeVar("_Model", bound=BaseModel)
+
+
+@lru_cache
+def _schema(model: type[BaseModel]) -> dict[str, Any]:
+    return model.model_json_schema()
+
+
+def parse_document(text: str, source: str, keys: str = "the keys of `beaver-ftc schema`") -> Document:
+    """The text's one mapping; `keys` says what it should hold. Raises ScenarioError."""
+    try:
+        document = parse(text)
+    except MalformedDocumentError as error:
+        raise ScenarioError(source, [error.problem]) from None
+    if not isinstance(document.data, dict):
+        says = "is empty" if document.data is None else "is not a mapping"
+        problem = Problem(document.line(()), (), f"{says}, allowed: a mapping with {keys}")
+        raise ScenarioError(source, [*document.problems, problem])
+    return document
+
+
+def validate(
+    model: type[_Model],
+    document: Document,
+    source: str,
+    folder: Path | None = None,
+    conflicts_in: Callable[[dict[str, Any]], list[Conflict]] = lambda data: [],
+) -> _Model:
+    """The document's data as a model. Raises ScenarioError with all mistakes, duplicate keys included.
+
+    A model looks for contradictions between its sections once each is right in itself; `conflicts_in` finds
+    them in data that is not.
+    """
+    problems, instance = list(document.problems), None
+    try:
+        instance = model.model_validate(document.data, context={"folder": folder})
+    except ValidationError as error:
+        problems += islice(problems_of(error, document, _schema(model)), MAX_PROBLEMS)
+        known = {problem.location for problem in problems}
+        hidden = [(at, says) for at, says in conflicts_in(document.data) if at not in known]
+        problems += [Problem(document.line(at), at, says) for at, says in hidden]
+    if problems or instance is None:
+        raise ScenarioError(source, problems)
+    return instance

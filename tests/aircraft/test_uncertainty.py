@@ -1,7 +1,7 @@
 """Uncertainty inputs, slipstream and envelope flag: exact, and on their own axis alone."""
 
 from dataclasses import replace
-from math import sin
+from math import prod, sin
 
 import pytest
 
@@ -11,12 +11,22 @@ from beaver_ftc.design.coefficients import (
     MASS,
     TERMS,
     engine_power_kw,
-    evaluate,
     inertia_coefficients,
     slipstream,
 )
 
 AXES = "pqr"
+
+
+def evaluate(coefficient, quantities, scales=None):
+    """The sum of a coefficient's terms."""
+    return sum(
+        term.value * (scales or {}).get(term.name, 1.0) * prod(quantities[factor] for factor in term.factors)
+        for term in TERMS.values()
+        if term.coefficient == coefficient
+    )
+
+
 PA_PER_PSF = 4.4482216152605 / 0.3048**2
 
 
@@ -39,10 +49,10 @@ def quantities(plant):
         "qh": plant.read("velocities/q-rad_sec") * chord,
         "rh": plant.read("velocities/r-rad_sec") * half_span,
         "betadoth": plant.read("aero/betadot-rad_sec") * half_span,
-        "da": plant.read("fcs/aileron-effective-rad"),
-        "de": plant.read("fcs/elevator-effective-rad"),
-        "dr": plant.read("fcs/rudder-effective-rad"),
-        "df": plant.read("fcs/flap-effective-rad"),
+        "aileron": plant.read("fcs/aileron-effective-rad"),
+        "elevator": plant.read("fcs/elevator-effective-rad"),
+        "rudder": plant.read("fcs/rudder-effective-rad"),
+        "flap": plant.read("fcs/flap-effective-rad"),
         "dpt": slipstream(power, density, V),
     }
 

@@ -26,10 +26,10 @@ PROPERTY_OF = {
     "qh": "aero/q-hat",
     "rh": "aero/r-hat",
     "betadoth": "aero/betadot-hat",
-    "da": "fcs/aileron-effective-rad",
-    "de": "fcs/elevator-effective-rad",
-    "dr": "fcs/rudder-effective-rad",
-    "df": "fcs/flap-effective-rad",
+    "aileron": "fcs/aileron-effective-rad",
+    "elevator": "fcs/elevator-effective-rad",
+    "rudder": "fcs/rudder-effective-rad",
+    "flap": "fcs/flap-effective-rad",
     "dpt": "aero/dpt",
 }
 # 1 slug is 32.17404855... lbm; the international pound and foot are exact.
@@ -126,7 +126,7 @@ def test_inertia_coupling_error_has_the_table_s_coefficient(functions, axis, nam
 
 def test_envelope_is_the_table_s(functions):
     limits = numbers(functions["aero/envelope-valid"])
-    assert limits == [*ENVELOPE_AIRSPEED_MPS, *ENVELOPE_ALPHA_RAD]
+    assert limits == pytest.approx([*ENVELOPE_AIRSPEED_MPS, *ENVELOPE_ALPHA_RAD], abs=1e-9)
 
 
 @pytest.mark.parametrize("surface", SURFACES)

@@ -7,8 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from beaver_ftc.aircraft import load
+from beaver_ftc.aircraft.schema import MAX_MONOMIALS
 from beaver_ftc.design.coefficients import MASS
-from beaver_ftc.design.model import design_record
+from beaver_ftc.design.model import design_record, rate_damping
 from beaver_ftc.design.variants import jacobian
 from beaver_ftc.diagnosis import air, noise_model
 from beaver_ftc.diagnosis.state import AIR
@@ -22,7 +24,7 @@ FT = 0.3048
 def air_of(turbulence="light"):
     """The record as before a flight."""
     record = np.zeros(1, AIR).view(np.recarray)[0]
-    noise_model._set_up_air(record, turbulence, MASS)
+    noise_model._set_up_air(record, turbulence, MASS, load())
     return record
 
 
@@ -60,7 +62,7 @@ class Flown:
         """Of the random walk that differs as much over so long (3,), as a share of what is declared."""
         frames = round(over_s * self.rate_hz)
         differences = signal[frames:] - signal[:-frames]
-        declared = noise_model.gust_drift(self.turbulence) * self.airspeed
+        declared = noise_model.gust_drift(self.turbulence, 14.63) * self.airspeed
         return np.mean(differences**2, axis=0) / over_s / declared
 
 
@@ -159,7 +161,7 @@ def test_the_damping_is_the_slope_of_the_aerodynamic_moments(V, alpha, beta):
     y = np.array([alpha, beta, V, 0.5 * V * V, 0.3])
     _, _, slope, _ = jacobian(design, np.zeros(3), y, np.zeros(4))
     out = np.zeros((3, 3))
-    air.damping(design, y, out)
+    rate_damping(design, np.zeros(3), y, np.zeros(4), np.zeros(MAX_MONOMIALS), out)
     assert out == pytest.approx(slope, rel=1e-9, abs=1e-12)
 
 
@@ -180,7 +182,7 @@ def test_what_is_not_seen_drifts_in_body_axes_as_a_covariance_turns():
     y = np.array([0.1, 0.02, 45.0, 1036.0, 0.3])
     record["turn"] = turn = _turn(0.6, 0.1)
     air.effect(record, design, np.zeros(3), y, np.zeros(4))
-    spread = turn @ np.diag(45.0 * noise_model.gust_drift("light") * noise_model.UNSEEN) @ turn.T
+    spread = turn @ np.diag(45.0 * noise_model.gust_drift("light", 14.63) * noise_model.UNSEEN) @ turn.T
     expected = record["damping"] @ spread @ record["damping"].T
     found = [[air.unseen_drift(record, 45.0, i, j) for j in range(3)] for i in range(3)]
     assert np.array(found) == pytest.approx(expected, rel=1e-12)

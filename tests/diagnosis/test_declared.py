@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from beaver_ftc.design.coefficients import TERMS, value
+from beaver_ftc.aircraft import load
 from beaver_ftc.design.context import Declared
-from beaver_ftc.design.model import TERMS as ORDER
 from beaver_ftc.diagnosis.declared import gusts
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.studies.compare.replay import Recorder, record
@@ -23,7 +22,9 @@ def test_nothing_declared_is_nothing_told():
     assert not declared.air
     assert not declared.turbulence_rad_s2.any()
     for name, zeros in vars(Declared()).items():
-        if name not in ("gust_time_s", "gust_effect"):
+        if name == "coefficients":
+            assert not getattr(declared, name).any()
+        elif name not in ("gust_time_s", "gust_effect"):
             assert np.array_equal(getattr(declared, name), zeros), name
 
 
@@ -47,11 +48,11 @@ def test_one_coefficient_off_gives_its_own_share_of_the_acceleration():
     """Cm_alpha off by a tenth: a tenth of its moment, over the inertia."""
     declared = told(fdi={"bounds": {"coefficients": {"Cm_alpha": 0.1}}})
     loop = Loop(scenario(duration_s=1), Recorder())
-    alpha, _, _, qdyn, _ = loop.plugged.detector.context.trim_y
-    expected = 0.1 * abs(TERMS["Cm_alpha"].value) * alpha * qdyn * 23.23 * 1.5875 / 6928.93
+    alpha, _, _, qdyn = loop.plugged.detector.context.trim_y[:4]
+    expected = 0.1 * abs(load().terms["Cm_alpha"].value) * alpha * qdyn * 23.23 * 1.5875 / 6928.93
     assert declared.model_rad_s2 == pytest.approx([0.0, expected, 0.0], abs=1e-9)
-    place = ORDER[1].index("Cm_alpha")
-    assert declared.coefficients[1, place] == pytest.approx(0.1 * abs(value("Cm_alpha")))
+    wanted = [0.1 * abs(term.value) * (term.name == "Cm_alpha") for term in load().moments]
+    assert declared.coefficients == pytest.approx(wanted)
 
 
 def test_errors_of_air_data_add_by_their_squares():
@@ -89,17 +90,17 @@ def test_the_turbulence_told_is_the_one_flown(severity):
 
 
 def test_the_air_rolls_more_than_it_pitches_or_yaws_and_faster_flight_meets_it_sooner():
-    slow, fast = gusts("light", 40.0), gusts("light", 50.0)
+    slow, fast = gusts("light", 40.0, 14.63), gusts("light", 50.0, 14.63)
     assert slow[0][0] > slow[0][2] > slow[0][1] > 0
     assert slow[0] == pytest.approx(fast[0])
     assert slow[1] == pytest.approx(1.25 * fast[1])
-    assert gusts("moderate", 40.0)[0] == pytest.approx(10.6 / 7.4 * slow[0])
+    assert gusts("moderate", 40.0, 14.63)[0] == pytest.approx(10.6 / 7.4 * slow[0])
 
 
 def test_the_slopes_of_the_gusts_have_the_variance_of_drydens_spectrum():
     """sigma^2 of s / V / (1 + tau s) behind Dryden's vertical gusts, by numerical integration."""
     V, L, sigma = 45.0, 1750 * 0.3048, 7.4 * 0.3048
-    rotation, time_s = gusts("light", V)
+    rotation, time_s = gusts("light", V, 14.63)
     omega = np.linspace(0.0, 4000.0, 4_000_001)
     gust = sigma**2 * L / (np.pi * V) * (1 + 3 * (L * omega / V) ** 2) / (1 + (L * omega / V) ** 2) ** 2
     for axis in (1, 2):

@@ -7,7 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from test_fault_types import TYPES, shares, starts, surfaces
 
-from beaver_ftc.design.model import TERMS, control_effectiveness, design_record, free_response
+from beaver_ftc.aircraft import load
+from beaver_ftc.design.model import control_effectiveness, design_record, free_response
 from beaver_ftc.diagnosis import fault_types as ft
 from beaver_ftc.diagnosis.words import found
 from beaver_ftc.errors import BadInput
@@ -17,7 +18,7 @@ from beaver_ftc.scenario.schema import Scenario
 NOISE_DEG_S = 0.02
 TOLERANCE = 0.05
 SURFACES = ("aileron", "elevator", "rudder", "flap")
-NAMES = [name for terms in TERMS for name in terms if name]
+NAMES = [term.name for term in load().moments]
 
 
 class RealPlant(DesignPlant):

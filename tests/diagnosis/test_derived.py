@@ -106,7 +106,7 @@ def test_inertia_coefficients_are_extreme_at_the_corners(seed):
     names = ("Ix_kg_m2", "Iy_kg_m2", "Iz_kg_m2", "Jxz_kg_m2")
     change = {n: getattr(MASS, n) * (1 + rng.uniform(-tolerance, tolerance)) for n in names}
     there, nominal = (np.array(astuple(inertia_coefficients(m))) for m in (replace(MASS, **change), MASS))
-    assert (np.abs(there - nominal) <= inertia_slack(tolerance) * (1 + 1e-12)).all()
+    assert (np.abs(there - nominal) <= inertia_slack(tolerance, MASS) * (1 + 1e-12)).all()
 
 
 @settings(max_examples=100, deadline=None)

@@ -5,8 +5,11 @@ import pytest
 from innovations import LEVEL_FLIGHT, Detector, surfaces_at_work
 from scipy.stats import norm
 
+from beaver_ftc.aircraft import load
+from beaver_ftc.aircraft.schema import MAX_TERMS
 from beaver_ftc.design.coefficients import MASS
-from beaver_ftc.design.model import AXES, TERMS, design_record, regressors
+from beaver_ftc.design.model import AXES, design_record
+from beaver_ftc.design.terms import evaluate, regressors
 from beaver_ftc.design.variants import response
 from beaver_ftc.diagnosis import noise_model, statistical
 from beaver_ftc.diagnosis.state import LOSS
@@ -146,7 +149,9 @@ def test_a_steady_error_of_a_sensor_is_within_the_tolerances_it_is_turned_into(s
     i = SIGNALS.index(signal)
     _, y, _ = LEVEL_FLIGHT
     rng = np.random.default_rng(2)
-    tolerance = noise_model.steady_tolerance(bounds, np.array(design["coefficient"]), MASS, y, np.zeros(4))
+    aircraft, table = load(), design["moments"]
+    tolerance = noise_model.steady_tolerance(bounds, aircraft, design, MASS, y, np.zeros(4))
+    axis = np.array([["Cl", "Cm", "Cn"].index(term.coefficient) for term in aircraft.moments])
     for _ in range(50):
         x, u = rng.uniform(-0.02, 0.02, 3), np.append(rng.uniform(-0.005, 0.005, 3), 0.0)
         seen = np.concatenate([x, y[:4]])
@@ -156,23 +161,25 @@ def test_a_steady_error_of_a_sensor_is_within_the_tolerances_it_is_turned_into(s
         if signal in AXES:
             truth[i] *= 1 + sign * size
         told = np.append(seen[3:], y[4])
-        terms = np.zeros((3, 9))
-        regressors(design, seen[:3], told, u, terms)
-        explained = _moment_scale(design) @ np.sum(tolerance * np.abs(terms), axis=1)
+        terms = np.zeros(MAX_TERMS)
+        evaluate(table, seen[:3], told)
+        regressors(table, table["power"], u, terms)
+        parts = tolerance * np.abs(terms[: tolerance.size])
+        explained = _moment_scale(design) @ np.bincount(axis, parts, 3)
         wrong = np.abs(truth - _rates(design, seen[:3], told, u))
         assert (wrong <= 1.05 * explained + 3e-4).all(), (wrong, explained)
 
 
 def test_tolerances_of_coefficients_and_inertia_add_up():
     bounds = Bounds.model_validate({"coefficients": {"Cm_de": 0.1}, "inertia": 0.05})
-    coefficient = np.array(design_record()["coefficient"][0])
-    tolerance = noise_model.steady_tolerance(bounds, coefficient, MASS, *LEVEL_FLIGHT[1:])
+    aircraft, design = load(), design_record()[0]
+    tolerance = noise_model.steady_tolerance(bounds, aircraft, design, MASS, *LEVEL_FLIGHT[1:])
     inertia = noise_model.steady_tolerance(
-        Bounds.model_validate({"inertia": 0.05}), coefficient, MASS, *LEVEL_FLIGHT[1:]
+        Bounds.model_validate({"inertia": 0.05}), aircraft, design, MASS, *LEVEL_FLIGHT[1:]
     )
-    i = TERMS[1].index("Cm_de")
-    assert (tolerance - inertia)[1, i] == pytest.approx(0.1 * abs(coefficient[1, i]))
-    assert inertia[1, i] >= 0.05 / 1.05 * abs(coefficient[1, i])
+    i, size = aircraft.index("Cm_de"), abs(aircraft.terms["Cm_de"].value)
+    assert (tolerance - inertia)[i] == pytest.approx(0.1 * size)
+    assert inertia[i] >= 0.05 / 1.05 * size
 
 
 def test_noise_of_other_sensors_and_of_deflections_is_part_of_the_noise():

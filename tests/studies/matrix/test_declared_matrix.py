@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from test_random_faults import drawn
 
-from beaver_ftc.design.model import TERMS
+from beaver_ftc.aircraft import load
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.metrics import metrics
 from beaver_ftc.studies.matrix.cases import declared
@@ -12,7 +12,7 @@ from beaver_ftc.studies.matrix.flying import verdict
 from beaver_ftc.studies.matrix.run import DECLARED, run_matrix
 from flying import scenario
 
-NAMES = [name for terms in TERMS for name in terms if name]
+NAMES = [term.name for term in load().moments]
 FLIGHTS = 50
 
 

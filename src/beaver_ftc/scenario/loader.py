@@ -7,7 +7,7 @@ from beaver_ftc.errors import suggestion
 from beaver_ftc.scenario.base import Conflict
 from beaver_ftc.scenario.builtin import builtin_names, looks_like_a_path, resolve
 from beaver_ftc.scenario.consistency import conflicts, outline_of_data
-from beaver_ftc.scenario.document import Problem
+from beaver_ftc.scenario.document import Document, Problem
 from beaver_ftc.scenario.files import UnreadableError, read_text
 from beaver_ftc.scenario.problems import ScenarioError
 from beaver_ftc.scenario.schema import Scenario

@@ -10,7 +10,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from beaver_ftc.scenario.base import Conflict, Number, Section, number, refuse, suggestion
+from beaver_ftc.errors import suggestion
+from beaver_ftc.scenario.base import Conflict, Number, Section, number, refuse
 from beaver_ftc.scenario.builtin import looks_like_a_path
 from beaver_ftc.scenario.document import Problem
 from beaver_ftc.scenario.files import UnreadableError, read_text

@@ -3,15 +3,20 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 WORKERS ?= 2
+PYTEST := $(BIN)/python -m pytest -n $(WORKERS) --dist worksteal
+# What a change breaks most often, in less than a minute: what flies little or nothing.
+FAST := tests/aircraft tests/design tests/docs tests/plant tests/results tests/scenario $(wildcard tests/test_re*.py tests/test_arch*.py)
 
-.PHONY: demo test lint docs clean help
+.PHONY: demo test test-fast coverage lint docs clean help
 
 help:
-	@echo "make demo   set up, fly the published elevator case, print the verdict and where the report lies"
-	@echo "make test   set up and run the whole test suite"
-	@echo "make lint   set up and run the linters"
-	@echo "make docs   set up and write the generated pages and pictures of docs/ anew"
-	@echo "make clean  remove the virtual environment and what runs have written"
+	@echo "make demo       set up, fly the published elevator case, print the verdict and where the report lies"
+	@echo "make test       set up and run the whole test suite"
+	@echo "make test-fast  the tests that fly little or nothing: less than a minute"
+	@echo "make coverage   the whole test suite, and which lines of Python it has run"
+	@echo "make lint       set up and run the linters"
+	@echo "make docs       set up and write the generated pages and pictures of docs/ anew"
+	@echo "make clean      remove the virtual environment and what runs have written"
 
 $(VENV)/.demo: pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "beaver-ftc needs Python 3.11 or newer; set PYTHON=...")'
@@ -28,7 +33,14 @@ demo: $(VENV)/.demo
 	@echo "report: runs/elevator-partial-loss/report.html"
 
 test: $(VENV)/.dev
-	$(BIN)/python -m pytest -n $(WORKERS) --dist worksteal
+	$(PYTEST)
+
+test-fast: $(VENV)/.dev
+	$(PYTEST) -m "not acceptance" $(FAST)
+
+# Compiled kernels and commands that tests start as processes are not seen: what is counted is Python in the tests.
+coverage: $(VENV)/.dev
+	$(PYTEST) --cov --cov-report=term:skip-covered
 
 lint: $(VENV)/.dev
 	$(BIN)/ruff check .
@@ -39,4 +51,4 @@ docs: $(VENV)/.demo
 	$(BIN)/python -m tools.docs
 
 clean:
-	rm -rf $(VENV) runs sweeps .pytest_cache .hypothesis .mypy_cache .ruff_cache
+	rm -rf $(VENV) .coverage runs sweeps .pytest_cache .hypothesis .mypy_cache .ruff_cache

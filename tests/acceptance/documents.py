@@ -1,0 +1,84 @@
+"""The commands that README, docs/ and `--help` show, taken out of their text.
+
+A command is a line of a fenced `console` or `bash` block, a `run:` line of a fenced YAML block (a CI job), a
+line of an indented block that starts with a program, or inline code that does.
+"""
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+from .installation import ROOT
+
+PAGES = sorted([ROOT / "README.md", *(ROOT / "docs").glob("*.md"), *(ROOT / "examples").glob("*/README.md")])
+PROGRAMS = ("beaver-ftc", "pip", "pytest", "python", "make", "jsbsim", "fgfs", "ray")
+_STARTS = re.compile(rf"({'|'.join(PROGRAMS)}) \S|pytest\b")
+_FENCED = re.compile(r"^ *```(\w*)\n(.*?)^ *```$", re.MULTILINE | re.DOTALL)
+_INLINE = re.compile(rf"(?<!`)`((?:{'|'.join(PROGRAMS)})\s[^`]+)`(?!`)")
+_JOB = re.compile(r"^\s*- run: (.+)$", re.MULTILINE)
+
+
+@dataclass(frozen=True)
+class Command:
+    """A command as it is shown: the page, and the line without prompt and comment."""
+
+    page: str
+    line: str
+
+
+def commands_of(text: str) -> list[str]:
+    """The commands that a Markdown text shows, in its order, each once."""
+    found: list[tuple[int, str]] = []
+    for block in _FENCED.finditer(text):
+        found += [(block.start(), line) for line in _of_block(block[1], block[2])]
+    prose = _FENCED.sub(lambda block: " " * len(block[0]), text)  # places in the text stay what they were
+    for line in re.finditer(r"^ {4}(\S.*)$", prose, re.MULTILINE):
+        if _STARTS.match(line[1]):
+            found.append((line.start(), line[1]))
+    found += [(code.start(), " ".join(code[1].split())) for code in _INLINE.finditer(prose)]
+    return list(dict.fromkeys(_bare(line) for _, line in sorted(found, key=lambda entry: entry[0])))
+
+
+def _of_block(kind: str, body: str) -> list[str]:
+    if kind == "console":
+        return [line.strip()[2:] for line in body.splitlines() if line.strip().startswith("$ ")]
+    if kind in ("bash", "sh"):
+        return [line for line in body.splitlines() if line.strip() and not line.startswith("#")]
+    return _JOB.findall(body) if kind in ("yaml", "yml") else []
+
+
+def _bare(line: str) -> str:
+    """Without the comment that explains it."""
+    return re.sub(r"\s+#.*$", "", line).strip()
+
+
+def yaml_blocks(page: str) -> list[str]:
+    """The YAML that a page shows, in its order."""
+    text = (ROOT / page).read_text(encoding="utf-8")
+    return [block[2] for block in _FENCED.finditer(text) if block[1] == "yaml"]
+
+
+def shown() -> list[Command]:
+    """Every command of every page."""
+    return [
+        Command(_name(page), line) for page in PAGES for line in commands_of(page.read_text(encoding="utf-8"))
+    ]
+
+
+def _name(page: Path) -> str:
+    return page.relative_to(ROOT).as_posix()
+
+
+def commands_of_help(text: str) -> list[str]:
+    """The names of the commands that `beaver-ftc --help` lists."""
+    listed = text.partition("\nCommands:\n")[2]
+    return re.findall(r"^  ([a-z][\w-]*) ", listed, re.MULTILINE)
+
+
+def examples_of_help(text: str) -> list[str]:
+    """The command lines that a help text gives as examples: lines that start with the program."""
+    return [
+        _bare(line.strip().removeprefix("$ "))
+        for line in text.splitlines()
+        if re.match(r"\s+(\$ )?beaver-ftc \S", line)
+    ]

@@ -1,0 +1,107 @@
+"""Commands on the pages that are not run as they stand: the one table of them, each with its reason.
+
+`instead` is what is run for them, a template of the pattern's groups; without one, nothing is.
+"""
+
+import re
+from dataclasses import dataclass
+
+from .documents import Command
+
+
+@dataclass(frozen=True)
+class Exempt:
+    """Commands that match `pattern` as a whole."""
+
+    pattern: str
+    reason: str
+    instead: str | None = None
+
+    def matches(self, line: str) -> bool:
+        """Whether this line is one of them."""
+        return re.fullmatch(self.pattern, line) is not None
+
+    def replaced(self, line: str) -> str | None:
+        """What is run in the line's place."""
+        return None if self.instead is None else re.fullmatch(self.pattern, line).expand(self.instead)
+
+
+TABLE = (
+    Exempt(r"make (demo|test)", "sets up from the package index and runs this very suite"),
+    Exempt(
+        r"pip install (\.|beaver-ftc pytest pytest-xdist|'beaver-ftc\[\w+\]')",
+        "needs the package index; these tests install the wheel themselves",
+    ),
+    Exempt(
+        r"pip install (./examples/my-detector)",
+        "into a folder of its own, not into the environment that all tests share",
+        r"python -m pip install -q --no-deps --no-build-isolation --no-index --target plugins \1",
+    ),
+    Exempt(r"fgfs .*", "needs FlightGear"),
+    Exempt(r"(ray start|srun|sleep|head=).*|.* --ray-address .*", "needs a cluster of several machines"),
+    Exempt(r"python benchmarks/.*", "a measurement of minutes to hours, from a checkout"),
+    Exempt(r"python -m beaver_ftc.docs", "writes the pages of a checkout anew"),
+    Exempt(
+        r"beaver-ftc compare --tune( --errors)?",
+        "a search of minutes, which tests/compare does on few flights",
+        "beaver-ftc compare --help",
+    ),
+    Exempt(
+        r"beaver-ftc (run|validate|sweep|compare|detectability)",
+        "names the command without its arguments",
+        r"beaver-ftc \1 --help",
+    ),
+    Exempt(
+        r"beaver-ftc compare --benchmark( --leaderboard \S+)?",
+        "minutes: one set, one flight of each sweep",
+        "beaver-ftc compare --benchmark --set published --flights 1 --leaderboard docs/benchmark.md",
+    ),
+    Exempt(
+        r"beaver-ftc power.*",
+        "minutes: one condition, one rival",
+        "beaver-ftc power --sensors tactical-grade --turbulence none --schemes rls-monitor",
+    ),
+    Exempt(r"(beaver-ftc matrix.*)", "one airspeed for three", r"\1 --airspeed 45"),
+    Exempt(r"beaver-ftc bench.*", "two minutes of compiling", "beaver-ftc bench --rounds 3 --no-parts"),
+    Exempt(
+        r"beaver-ftc detectability fault-free",
+        "half a minute: a shorter flight",
+        "beaver-ftc detectability brief.yaml",
+    ),
+    Exempt(
+        r"beaver-ftc verify(?: --hours \d+ --faults \d+)?( --steps)?( --out \S+)?",
+        "hours: a few flights",
+        r"beaver-ftc verify --hours 0.01 --faults 2\1\2",
+    ),
+    Exempt(
+        r"(beaver-ftc sweep (?:elevator|robust)-\S+)",
+        "hundreds of flights: one of them (test_sweeps.py flies each in short)",
+        r"\1 --replay 0 --no-report",
+    ),
+    Exempt(r"(beaver-ftc sweep) FILE", "stands for any file", r"\1 my-sweep.yaml"),
+    Exempt(r"(beaver-ftc sweep my-sweep.yaml --replay) \d+", "the sweep is shortened", r"\1 1"),
+    Exempt(
+        r"(beaver-ftc mismatch elevator-partial-loss --variant) \.\.\.",
+        "stands for any models",
+        r"\1 declared,linearised",
+    ),
+    Exempt(
+        r"(beaver-ftc mismatch \S+ (?:--variant \S+,\S+|--map))",
+        "half a minute with figures, which the same command without the option draws",
+        r"\1 --no-report",
+    ),
+    Exempt(
+        r"beaver-ftc run \S+ (--flightgear \S+).*",
+        "at the pace of the clock: a shorter flight",
+        r"beaver-ftc run brief.yaml \1 --no-report",
+    ),
+    Exempt(r"(jsbsim .*) --realtime( .*)", "at the pace of the clock", r"\1\2"),
+)
+
+
+def tried(command: Command) -> str | None:
+    """What is run for a command that is shown; None where its exception says that nothing is."""
+    for exempt in TABLE:
+        if exempt.matches(command.line):
+            return exempt.replaced(command.line)
+    return command.line

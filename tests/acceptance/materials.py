@@ -1,0 +1,85 @@
+"""What the commands on the pages take for granted in their folder: files of pages and of the checkout."""
+
+import re
+import shutil
+from pathlib import Path
+
+import yaml
+
+from .documents import yaml_blocks
+from .installation import ROOT, Installation
+
+BRIEF = """\
+name: brief
+duration_s: 4
+reference: {q: [{sine: {amplitude_deg_s: 3, frequency_hz: 0.5}}]}
+"""
+
+
+def lay_out(line: str, folder: Path, installation: Installation) -> None:
+    """Put into the folder what the command names."""
+    for pattern, put in _MATERIALS.items():
+        if re.search(pattern, line):
+            put(folder)
+    for name in re.findall(r"\bruns/([\w-]+)", line):
+        if line.startswith("beaver-ftc compare"):
+            _fly(name, folder, installation)
+
+
+def _fly(name: str, folder: Path, installation: Installation) -> None:
+    given = f"{name}.yaml" if (folder / f"{name}.yaml").exists() else name
+    assert installation.beaver("run", given, "--no-report", cwd=folder).returncode == 0
+
+
+def _shown(page: str, name: str) -> str:
+    """The YAML of this name on a page."""
+    return next(block for block in yaml_blocks(page) if yaml.safe_load(block).get("name") == name)
+
+
+def _my_case(folder: Path) -> None:
+    """README's first scenario with one number changed, as README says."""
+    text = _shown("README.md", "elevator-partial-loss").replace(
+        "name: elevator-partial-loss", "name: my-case"
+    )
+    assert "magnitude: 0.4" in text
+    (folder / "my-case.yaml").write_text(text.replace("magnitude: 0.4", "magnitude: 0.5"))
+
+
+def _jammed_elevator(folder: Path) -> None:
+    (folder / "jammed-elevator.yaml").write_text(_shown("docs/scenarios.md", "jammed-elevator"))
+
+
+def _my_sweep(folder: Path) -> None:
+    """The sweep of docs/sweeps.md with two flights."""
+    text = _shown("docs/sweeps.md", "elevator-effectiveness")
+    assert "runs: 2000" in text
+    for name in ("my-sweep.yaml", "my.sweep.yaml"):
+        (folder / name).write_text(text.replace("runs: 2000", "runs: 2"))
+
+
+def _scenarios(folder: Path) -> None:
+    (folder / "scenarios").mkdir()
+    for name in ("elevator-partial-loss", "aileron-bias"):
+        shutil.copy(ROOT / "scenarios" / f"{name}.yaml", folder / "scenarios")
+
+
+def _brief(folder: Path) -> None:
+    for name in ("brief.yaml", "brief.scenario.yaml"):
+        (folder / name).write_text(BRIEF)
+
+
+def _copy(relative: str):
+    return lambda folder: shutil.copytree(ROOT / relative, folder / relative)
+
+
+_MATERIALS = {
+    r"\bmy-case\b": _my_case,
+    r"\bjammed-elevator\b": _jammed_elevator,
+    r"\bmy[-.]sweep\b": _my_sweep,
+    r"\bscenarios/": _scenarios,
+    r"\bbrief\.yaml\b|^pytest$": _brief,
+    r"\baircraft/": _copy("aircraft"),
+    r"\bdocs/": _copy("docs"),
+    r"\btests/data\b": _copy("tests/data"),
+    r"\bmy-(detector|cusum)\b": _copy("examples"),
+}

@@ -1,0 +1,95 @@
+"""Every command that the pages show works from the wheel, in a folder with the files that the pages show."""
+
+import json
+import re
+
+import pytest
+
+from .documents import commands_of, shown
+from .exceptions import TABLE, tried
+from .materials import lay_out
+
+SHOWN = shown()
+TRIED = list(dict.fromkeys(line for line in map(tried, SHOWN) if line is not None))
+# No second time in JSON: another line of the same command is shorter, or there is no such option.
+TEXT_ONLY = re.compile(
+    "power|bench|compare --|detectability|--backend|--flightgear|--search|--out|--help|schema|"
+    "--map|--variant [^ ]*,[^ ]*,|matrix --[dp]"
+)
+PLUGIN = next(line for line in TRIED if "--target plugins" in line)
+
+
+@pytest.fixture
+def shell(installation, tmp_path):
+    """Runs a line as a reader would, in bash, with `plugins` on the path for what is installed into it."""
+    plugins = str(tmp_path / "plugins")
+    return lambda line: installation.run("bash", "-c", line, cwd=tmp_path, PYTHONPATH=plugins)
+
+
+def _without_report(line):
+    """The option that leaves the report out, where the command has it and it is not given."""
+    has_it = re.match(r"beaver-ftc (run|sweep|mismatch) ", line) and "--no-report" not in line
+    return " --no-report" if has_it else ""
+
+
+def _succeeded(done):
+    """Whether the status is 0, or 1 with the missed expectation named."""
+    return done.returncode == 0 or (done.returncode == 1 and re.search("MISSED|FAILED|BROKEN", done.stdout))
+
+
+@pytest.mark.parametrize("line", TRIED)
+def test_command_of_the_pages(line, shell, installation, tmp_path):
+    lay_out(line, tmp_path, installation)
+    if "my-cusum" in line:
+        assert shell(PLUGIN).returncode == 0
+    done = shell(line)
+    assert "Traceback" not in done.stderr + done.stdout, done.stderr
+    assert _succeeded(done), f"{done.returncode}\n{done.stdout[-2000:]}\n{done.stderr[-2000:]}"
+    if line.startswith("beaver-ftc") and not TEXT_ONLY.search(line):
+        answer = shell(f"{line} --format json{_without_report(line)}")
+        assert answer.returncode == done.returncode, answer.stderr
+        assert isinstance(json.loads(answer.stdout), dict)
+
+
+def test_pages_show_commands_and_no_exception_has_become_idle():
+    assert len(SHOWN) > 60
+    assert len(TRIED) > 40
+    idle = [exempt.pattern for exempt in TABLE if not any(exempt.matches(command.line) for command in SHOWN)]
+    assert idle == []
+    assert [exempt.pattern for exempt in TABLE if not exempt.reason] == []
+
+
+def test_commands_are_taken_out_of_every_form_of_a_page():
+    text = """
+Say `beaver-ftc run
+one` or `quoted` and `beaver-ftc`.
+
+```console
+$ beaver-ftc run two   # why
+its output
+```
+
+    beaver-ftc run three       # why
+    its output
+
+```bash
+# a comment
+beaver-ftc run four | wc
+```
+
+```yaml
+    steps:
+      - run: beaver-ftc run five
+```
+
+```python
+beaver-ftc run six
+```
+"""
+    assert commands_of(text) == [
+        "beaver-ftc run one",
+        "beaver-ftc run two",
+        "beaver-ftc run three",
+        "beaver-ftc run four | wc",
+        "beaver-ftc run five",
+    ]

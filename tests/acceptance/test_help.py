@@ -1,0 +1,62 @@
+"""`--help`: it answers for every command, and the commands it shows as examples do what they say."""
+
+import re
+
+import pytest
+
+from .documents import commands_of_help, examples_of_help
+from .materials import lay_out
+
+TEXTS = {}
+
+
+@pytest.fixture
+def helps(beaver):
+    """{command: its help text}, and that of the program under the empty name; asked for once a process."""
+    if not TEXTS:
+        top = beaver("--help")
+        assert top.returncode == 0
+        TEXTS[""] = top.stdout
+        TEXTS.update({name: beaver(name, "--help").stdout for name in commands_of_help(top.stdout)})
+    return TEXTS
+
+
+def test_every_command_explains_itself(helps):
+    assert len(helps) > 14
+    for name, text in helps.items():
+        assert text.startswith(f"Usage: beaver-ftc {name}".rstrip()), name
+        assert "Show this message and exit." in text, name
+        assert re.search(r"\n\n  [A-Z].+?\.\n", text, re.DOTALL), name
+
+
+def test_the_program_says_its_exit_statuses(helps):
+    said = " ".join(helps[""].split())
+    for status in ("0 done", "1 an expectation failed", "2 bad input or usage", "3 the simulation could not"):
+        assert status in said
+
+
+def test_examples_of_help_run(helps, installation, tmp_path):
+    for name, text in helps.items():
+        for number, line in enumerate(examples_of_help(text)):
+            folder = tmp_path / f"{name}-{number}"
+            folder.mkdir()
+            lay_out(line, folder, installation)
+            done = installation.run("bash", "-c", line, cwd=folder)
+            assert done.returncode in (0, 1), f"{line}\n{done.stderr}"
+
+
+def test_examples_are_taken_out_of_a_help_text():
+    text = "Usage: beaver-ftc run SCENARIO\n\n  Fly.\n\n  $ beaver-ftc run a  # why\n  beaver-ftc list\n"
+    assert examples_of_help(text) == ["beaver-ftc run a", "beaver-ftc list"]
+
+
+def test_no_command_at_all_shows_the_help(beaver, helps):
+    done = beaver()
+    assert done.returncode == 2
+    assert "Usage: beaver-ftc" in done.stdout + done.stderr
+
+
+def test_version(beaver):
+    done = beaver("--version")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert re.fullmatch(r"beaver-ftc \d+\.\d+\.\d+\n", done.stdout)

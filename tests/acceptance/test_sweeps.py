@@ -1,0 +1,75 @@
+"""Every built-in sweep: checked and one flight of it by name, and flown whole as a shortened copy."""
+
+import json
+import re
+
+import pyarrow.parquet
+import pytest
+import yaml
+
+from .installation import ROOT
+
+SWEEPS = sorted(path.stem for path in (ROOT / "scenarios" / "sweeps").glob("*.yaml"))
+FLIGHTS = 2
+LONGEST_S = 15
+
+
+def shortened(sweep):
+    """The same sweep with two flights, or a grid of two points a key, of 15 s at most."""
+    given = {"runs": FLIGHTS} if sweep.get("sampling") != "grid" else {"vary": _coarse(sweep["vary"])}
+    changed = sweep.get("set", {})
+    return {
+        **sweep,
+        **given,
+        "set": {**changed, "duration_s": min(LONGEST_S, changed.get("duration_s", LONGEST_S))},
+    }
+
+
+def _coarse(vary):
+    return {
+        key: {"linspace": [*how["linspace"][:2], 2]} if "linspace" in how else {"choice": how["choice"][:2]}
+        for key, how in vary.items()
+    }
+
+
+def flights_of(sweep):
+    """How many flights a shortened sweep has."""
+    return 2 ** len(sweep["vary"]) if sweep.get("sampling") == "grid" else FLIGHTS
+
+
+@pytest.mark.parametrize("name", SWEEPS)
+def test_built_in_sweep(name, beaver, tmp_path):
+    one = beaver("sweep", name, "--replay", "0", "--no-report", "--format", "json")
+    assert one.returncode in (0, 1), one.stderr
+    flight = json.loads(one.stdout)
+    assert flight["passed"] is (one.returncode == 0)
+    assert (tmp_path / flight["folder"] / "log.parquet").exists()
+
+    short = shortened(yaml.safe_load((ROOT / "scenarios" / "sweeps" / f"{name}.yaml").read_text()))
+    (tmp_path / "short.yaml").write_text(yaml.safe_dump(short, sort_keys=False))
+    text = beaver("sweep", "short.yaml", "--workers", "1")
+    assert "Traceback" not in text.stderr, text.stderr
+    assert re.match(rf"{name}: (PASSED|FAILED|flown, nothing was expected)\n", text.stdout), text.stderr
+    assert (text.returncode == 1) is ("MISSED" in text.stdout)
+    assert text.returncode in (0, 1)
+
+    again = beaver(
+        "sweep", "short.yaml", "--workers", "1", "--no-report", "--format", "json", "--out", "again"
+    )
+    summary = json.loads(again.stdout)
+    assert again.returncode == text.returncode
+    assert summary["passed"] is (again.returncode == 0)
+    tables = [
+        pyarrow.parquet.read_table(tmp_path / out / name / "results.parquet") for out in ("runs", "again")
+    ]
+    assert tables[0].equals(tables[1])
+    assert tables[0].column_names[0] == "run"
+    assert tables[0]["run"].to_pylist() == list(range(flights_of(short)))
+    assert (tmp_path / "runs" / name / "report.html").read_text().rstrip().endswith("</html>")
+    assert json.loads((tmp_path / "runs" / name / "summary.json").read_text())["passed"] is summary["passed"]
+
+
+def test_every_built_in_sweep_is_valid(beaver):
+    done = beaver("validate", *SWEEPS, "--format", "json")
+    document = json.loads(done.stdout)
+    assert (done.returncode, document["valid"], len(document["files"])) == (0, True, len(SWEEPS))

@@ -40,7 +40,7 @@ TABLE = (
     Exempt(r"fgfs .*", "needs FlightGear"),
     Exempt(r"(ray start|srun|sleep|head=).*|.* --ray-address .*", "needs a cluster of several machines"),
     Exempt(r"python benchmarks/.*", "a measurement of minutes to hours, from a checkout"),
-    Exempt(r"python -m beaver_ftc.docs", "writes the pages of a checkout anew"),
+    Exempt(r"python -m tools\.docs", "writes the pages of a checkout anew"),
     Exempt(
         r"beaver-ftc compare --tune( --errors)?",
         "a search of minutes, which tests/compare does on few flights",
@@ -83,7 +83,12 @@ TABLE = (
     Exempt(
         r"(beaver-ftc mismatch elevator-partial-loss --variant) \.\.\.",
         "stands for any models",
-        r"\1 declared,linearised",
+        r"\1 declared,linearised --no-report",
+    ),
+    Exempt(
+        r"(beaver-ftc run elevator-partial-loss --(?:csv|acmi))",
+        "seconds of figures, which the same command without the option draws",
+        r"\1 --no-report",
     ),
     Exempt(
         r"(beaver-ftc mismatch \S+ (?:--variant \S+,\S+|--map))",

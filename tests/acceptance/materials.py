@@ -81,5 +81,6 @@ _MATERIALS = {
     r"\baircraft/": _copy("aircraft"),
     r"\bdocs/": _copy("docs"),
     r"\btests/data\b": _copy("tests/data"),
+    r"\btools\b": _copy("tools"),
     r"\bmy-(detector|cusum)\b": _copy("examples"),
 }

@@ -46,7 +46,7 @@ CIRCLES = {
     frozenset({"scenario.builtin", "scenario.loader"}),
     frozenset({"studies.matrix.pitch_lost", "studies.matrix.pitch_text"}),
 }
-LONG = {"diagnosis/fault_types.py", "loop/frame.py"}
+LONG = {"loop/frame.py"}
 
 
 @cache

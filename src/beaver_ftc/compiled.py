@@ -35,6 +35,7 @@ _SOURCES = (
     "aircraft/schema.py",
     "design/*.py",
     "diagnosis/*.py",
+    "diagnosis/types/*.py",
     "control/*.py",
     "plant/channels.py",
     "plant/native.py",

@@ -141,6 +141,10 @@ class DesignPlant:
         """Whether the estimator of a surface has been excluded."""
         return bool(self.fdi["estimator"][surface]["excluded"])
 
+    def position_excluded(self, surface):
+        """Whether the estimator of a surface that may be anywhere has been excluded."""
+        return self.excluded(int(self.fdi["position_of"][surface]))
+
 
 def _random(plant, bound, phi):
     return plant.rng.uniform(-bound, bound)

@@ -70,7 +70,7 @@ def test_a_loss_that_changed_inside_the_frame_stays_within_the_extremes(n, momen
     frame, fie = frames[0], frames[0]["fdi"]["estimator"][0]
     frame["Gu_first"][0, 0], frame["Gu_sum"][0, 0] = moment0, moment0 + (n - 1) * moment
     over(frames)
-    fie["Z"][0], fie["spread"][0] = frame["Gu_mean"][0, 0], frame["Gu_spread"][0, 0]
+    fie["effect"]["Z"][0], fie["effect"]["spread"][0] = frame["Gu_mean"][0, 0], frame["Gu_spread"][0, 0]
     fie["across"][0] = 1.0
     effect = (theta0 * moment0 + (n - 1) * theta * moment) / n
     for low, high in limits(frames, 0):

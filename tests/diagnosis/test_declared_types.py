@@ -9,8 +9,8 @@ from test_fault_types import TYPES, shares, starts, surfaces
 
 from beaver_ftc.aircraft import load
 from beaver_ftc.design.model import control_effectiveness, design_record, free_response
-from beaver_ftc.diagnosis import fault_types as ft
-from beaver_ftc.diagnosis.words import found
+from beaver_ftc.diagnosis.types import registry as types
+from beaver_ftc.diagnosis.types.findings import found
 from beaver_ftc.errors import BadInput
 from beaver_ftc.loop.assembly import assemble
 from beaver_ftc.scenario.schema import Scenario
@@ -67,11 +67,11 @@ def fly(seed, noisy, kind, surface, at, share, frames):
 def test_the_true_type_is_neither_excluded_nor_named_wrongly(noisy, seed, kind, surface, at, share):
     plant = fly(seed, noisy, kind, surface, at, share, 700)
     code = TYPES[kind][1]
-    assert not plant.excluded(ft.POSITION_FIRST + surface)
+    assert not plant.position_excluded(surface)
     assert not plant.fdi["surface"][surface]["type_excluded"][code]
     said = found(plant.fdi)
     assert said["isolated"] in (SURFACES[surface], None)
-    assert said["isolation_type"] in (ft.TYPES[code], None)
+    assert said["isolation_type"] in (types.NAMES[code], None)
 
 
 @pytest.mark.parametrize("noisy", [False, True])
@@ -79,16 +79,16 @@ def test_an_estimate_is_certain_to_lie_in_its_interval(noisy):
     """An aileron stuck a quarter up its travel."""
     plant = fly(4, noisy, "stuck", 0, 30, 0.25, 900)
     known = plant.fdi["surface"][0]
-    assert known["set_low"][ft.STUCK] <= -0.26 <= known["set_high"][ft.STUCK]
-    assert known["set_high"][ft.STUCK] - known["set_low"][ft.STUCK] < np.deg2rad(4)
+    assert known["set_low"][types.STUCK] <= -0.26 <= known["set_high"][types.STUCK]
+    assert known["set_high"][types.STUCK] - known["set_low"][types.STUCK] < np.deg2rad(4)
     assert found(plant.fdi)["isolated"] == "aileron"
 
 
 def test_blocks_see_what_frames_do_not():
     """With noisy gyros a frame leaves the rudder several degrees of room, a block a small part of it."""
     plant = fly(4, True, "bias", 2, 30, 0.9, 600)
-    known, estimator = plant.fdi["surface"][2], plant.fdi["estimator"][ft.POSITION_FIRST + 2]
-    of_a_frame = 2 * plant.fdi["frame_bound"][2] / abs(estimator["Z"][2])
+    known, estimator = plant.fdi["surface"][2], plant.fdi["estimator"][plant.fdi["position_of"][2]]
+    of_a_frame = 2 * plant.fdi["frame_bound"][2] / abs(estimator["effect"]["Z"][2])
     assert known["high"] - known["low"] < 0.5 * of_a_frame
 
 

@@ -6,8 +6,8 @@ from design_plant import TRAVEL_RAD, UNCERTAINTIES, DesignPlant
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from beaver_ftc.diagnosis import fault_types as ft
-from beaver_ftc.diagnosis.words import found
+from beaver_ftc.diagnosis.types import registry as types
+from beaver_ftc.diagnosis.types.findings import found
 
 FRAMES = 200
 SURFACES = ("aileron", "elevator", "rudder", "flap")
@@ -83,16 +83,16 @@ def slow(surface, at, share, dt):
 
 
 TYPES = {
-    "constant loss": (lost, ft.CONSTANT_LOSS),
-    "varying loss": (fading, ft.VARYING_LOSS),
-    "stuck": (stuck, ft.STUCK),
-    "float": (floating, ft.FLOAT),
-    "bias": (bias, ft.BIAS),
-    "growing bias": (growing, ft.GROWING_BIAS),
-    "hardover up": (runaway(1), ft.UP),
-    "hardover down": (runaway(-1), ft.DOWN),
-    "oscillatory": (swinging, ft.OSCILLATORY),
-    "rate limit": (slow, ft.SLOW),
+    "constant loss": (lost, types.CONSTANT_LOSS),
+    "varying loss": (fading, types.VARYING_LOSS),
+    "stuck": (stuck, types.STUCK),
+    "float": (floating, types.FLOAT),
+    "bias": (bias, types.BIAS),
+    "growing bias": (growing, types.GROWING_BIAS),
+    "hardover up": (runaway(1), types.UP),
+    "hardover down": (runaway(-1), types.DOWN),
+    "oscillatory": (swinging, types.OSCILLATORY),
+    "rate limit": (slow, types.SLOW),
 }
 cases = st.fixed_dictionaries({
     "seed": st.integers(0, 2**32),
@@ -116,7 +116,7 @@ def fly(case, kind, surface, at, share, uncertainty, frames=FRAMES, gone=None):
 @given(cases, surfaces, starts, shares, uncertainties)
 def test_the_true_type_is_never_excluded(kind, case, surface, at, share, uncertainty):
     plant, code = fly(case, kind, surface, at, share, uncertainty)
-    assert not plant.excluded(ft.POSITION_FIRST + surface)
+    assert not plant.position_excluded(surface)
     assert not plant.fdi["surface"][surface]["type_excluded"][code]
 
 
@@ -125,7 +125,7 @@ def test_the_true_type_is_never_excluded(kind, case, surface, at, share, uncerta
 @given(cases, surfaces, starts, shares, uncertainties)
 def test_nor_is_it_when_the_fault_goes_again(kind, case, surface, at, share, uncertainty):
     plant, code = fly(case, kind, surface, at, share, uncertainty, gone=at + 40)
-    assert not plant.excluded(ft.POSITION_FIRST + surface)
+    assert not plant.position_excluded(surface)
     assert not plant.fdi["surface"][surface]["type_excluded"][code]
 
 
@@ -137,9 +137,9 @@ def test_neither_surface_nor_type_is_ever_named_wrongly(kind, seed, surface, sha
     plant, code = fly(case, kind, surface, 30, share, uncertainty, frames=700)
     said = found(plant.fdi)
     assert said["isolated"] in (SURFACES[surface], None)
-    assert said["isolation_type"] in (ft.TYPES[code], None)
+    assert said["isolation_type"] in (types.NAMES[code], None)
     if said["isolated"]:
-        assert ft.TYPES[code] in said["candidates"]
+        assert types.NAMES[code] in said["candidates"]
 
 
 @pytest.mark.parametrize(("kind", "true"), [("stuck", -0.26), ("bias", 0.24)])

@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 from test_fault_types import TYPES, shares, uncertainties
 
-from beaver_ftc.diagnosis import fault_types as ft
-from beaver_ftc.diagnosis.words import found
+from beaver_ftc.diagnosis.types import registry as types
+from beaver_ftc.diagnosis.types.findings import found
 from beaver_ftc.scenario.schema import Scenario
 
 AILERON, ELEVATOR, RUDDER = range(3)
@@ -34,7 +34,7 @@ def fly(seed, uncertainty, faults, frames=700, pairs=True):
 
 def check(plant, faults):
     """No surface named that is healthy, no type named or excluded wrongly."""
-    true = {("aileron", "elevator", "rudder")[s]: ft.TYPES[TYPES[kind][1]] for s, kind, _, _ in faults}
+    true = {("aileron", "elevator", "rudder")[s]: types.NAMES[TYPES[kind][1]] for s, kind, _, _ in faults}
     for one in found(plant.fdi)["faults"]:
         if one["isolated"]:
             assert one["isolated"] in true

@@ -6,8 +6,6 @@ from design_plant import SURFACES, UNCERTAINTIES, DesignPlant
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from beaver_ftc.diagnosis.fault_types import POSITION_FIRST
-
 FRAMES = 160
 BOUNDS = {
     "published": {},
@@ -94,7 +92,7 @@ def test_a_surface_that_may_be_anywhere_is_never_excluded(flight, uncertainty, s
     """Jammed, biased, swinging or mad: its position estimator admits it."""
     plant = DesignPlant(surface=surface, position=position, fault_class="all", **flight)
     plant.fly(FRAMES, uncertainty)
-    assert not plant.excluded(POSITION_FIRST + surface)
+    assert not plant.position_excluded(surface)
     assert plant.detected_at_s <= plant.certain_after_s
 
 

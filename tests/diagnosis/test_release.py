@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from test_fault_types import TYPES, cases, shares, surfaces
 
-from beaver_ftc.diagnosis import fault_types as ft
+from beaver_ftc.diagnosis.types import registry as types
 
 HELD = ("stuck", "float", "hardover up", "hardover down")
 uncertainties = st.sampled_from(list(UNCERTAINTIES.values()))
@@ -46,7 +46,7 @@ def fly(case, surface, fault, uncertainty, frames=200):
 def test_a_return_excludes_neither_surface_nor_type(kind, case, surface, at, lasting, share, uncertainty):
     fault = Repaired(kind, surface, at, at + lasting, share, 1 / case["rate_hz"])
     plant = fly(case, surface, fault, uncertainty)
-    assert not plant.excluded(ft.POSITION_FIRST + surface)
+    assert not plant.position_excluded(surface)
     assert not plant.fdi["surface"][surface]["type_excluded"][fault.code]
 
 
@@ -60,7 +60,7 @@ def test_a_return_does_not_move_the_jam(case, surface, at, lasting, share, uncer
     known = plant.fdi["surface"][surface]
     healthy = not (known["wrong"] or known["wrong_then"])
     if healthy:
-        assert known["set_low"][ft.STUCK] <= low + share * (high - low) <= known["set_high"][ft.STUCK]
+        assert known["set_low"][types.STUCK] <= low + share * (high - low) <= known["set_high"][types.STUCK]
 
 
 @pytest.mark.parametrize("kind", ["stuck", "float"])
@@ -85,6 +85,6 @@ def test_a_servo_does_not_keep_a_bias_from_being_told_from_a_jam():
         **case,
     ).fly(100, UNCERTAINTIES["random"])
     excluded = plant.fdi["surface"][0]["type_excluded"]
-    assert excluded[ft.STUCK]
-    assert excluded[ft.FLOAT]
-    assert not excluded[ft.BIAS]
+    assert excluded[types.STUCK]
+    assert excluded[types.FLOAT]
+    assert not excluded[types.BIAS]

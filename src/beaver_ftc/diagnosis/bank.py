@@ -74,18 +74,19 @@ def note_closest_approach(fdi):
 @kernel
 def extremes(fie, i):
     """Least and greatest acceleration (rad/s2) of axis i: theta anywhere in its set, or no fault at all."""
-    one, other = fie.offset[i] + fie.low * fie.Z[i], fie.offset[i] + fie.high * fie.Z[i]
-    return min(0.0, one, other) - fie.spread[i], max(0.0, one, other) + fie.spread[i]
+    base, slope, spread = fie.effect.offset[i], fie.effect.Z[i], fie.effect.spread[i]
+    one, other = base + fie.low * slope, base + fie.high * slope
+    return min(0.0, one, other) - spread, max(0.0, one, other) + spread
 
 
 @kernel
 def aligned_extremes(fie):
     """The same along `fie.across` (3,), across the fault's own direction: there it can do little."""
-    base, slope, spread = 0.0, 0.0, 0.0
+    effect, base, slope, spread = fie.effect, 0.0, 0.0, 0.0
     for i in range(3):
-        spread += abs(fie.across[i]) * fie.spread[i]
-        base += fie.across[i] * fie.offset[i]
-        slope += fie.across[i] * fie.Z[i]
+        spread += abs(fie.across[i]) * effect.spread[i]
+        base += fie.across[i] * effect.offset[i]
+        slope += fie.across[i] * effect.Z[i]
     one, other = base + fie.low * slope, base + fie.high * slope
     return min(0.0, one, other) - spread, max(0.0, one, other) + spread
 

@@ -7,7 +7,7 @@ Every hypothesis is linear in one unknown parameter per axis, phi_i = base_i + t
 
 LOSS on aileron, elevator and rudder is the published class. POSITION says no more than "this surface is where
 it should not be": its parameter, the deflection rad, may move as it likes, so it covers whatever can befall
-the surface. The two together are `fdi.fault_class: all`; what has befallen it is fault_types.py's question.
+the surface. The two together are `fdi.fault_class: all`; what has befallen it is the question of types/.
 """
 
 from beaver_ftc.compiled import kernel

@@ -12,7 +12,7 @@ by the first test that fails.
 """
 
 from beaver_ftc.compiled import kernel
-from beaver_ftc.diagnosis import bank, blocks, fault_types, membership, pairs
+from beaver_ftc.diagnosis import bank, membership
 from beaver_ftc.diagnosis.fault_class import hypothesis
 from beaver_ftc.diagnosis.state import (
     INTERVAL,
@@ -25,6 +25,7 @@ from beaver_ftc.diagnosis.state import (
 )
 from beaver_ftc.diagnosis.statistical import excludes
 from beaver_ftc.diagnosis.thresholds import bound_step, interval, noise_step, published
+from beaver_ftc.diagnosis.types import blocks, examine, pairs, verdict
 
 
 @kernel
@@ -34,9 +35,10 @@ def suppose(fdi, fie, G, Gu, spread):
     G (3, 4) rad/s2 per rad; Gu (3, 4) rad/s2, the contribution of each surface; means over the frame. spread
     (3, 4) rad/s2: by how much the mean can mislead about a fault that changed in the frame.
     """
-    hypothesis(fie.kind, fie.surface, G, Gu, fie.offset, fie.Z)
+    effect = fie.effect
+    hypothesis(fie.kind, fie.surface, G, Gu, effect.offset, effect.Z)
     for i in range(3):
-        fie.spread[i] = spread[i, fie.surface]
+        effect.spread[i] = spread[i, fie.surface]
     if fdi.own_errors and fie.kind == POSITION:
         membership.allow_for_own_errors(fdi, fie)
     if fdi.memory:
@@ -62,7 +64,7 @@ def start(fdi, x):
             fie.covariance[i] = (fie.high - fie.low) ** 2 / 12.0  # of a uniform distribution
             fie.theta_low[i], fie.theta_high[i] = fie.low, fie.high
     if fdi.every_type:
-        fault_types.start(fdi)
+        examine.start(fdi)
 
 
 @kernel
@@ -117,9 +119,9 @@ def decide(fdi, t):
         if not fdi.estimator[s].excluded:
             left += 1
             last = s
-    verdict = NOT_ISOLATED if left > 1 else (last if left == 1 else UNANTICIPATED)
-    if verdict != fdi.isolated:
-        fdi.isolated = verdict
+    named = NOT_ISOLATED if left > 1 else (last if left == 1 else UNANTICIPATED)
+    if named != fdi.isolated:
+        fdi.isolated = named
         fdi.isolated_at_s = t
 
 
@@ -142,8 +144,8 @@ def isolate(fdi, x, t, started):
         if fdi.block > 1:
             blocks.examine(fdi)
         else:
-            fault_types.examine(fdi)
-    fault_types.decide(fdi, t)
+            examine.examine(fdi)
+    verdict.decide(fdi, t)
 
 
 @kernel
@@ -172,7 +174,7 @@ def adapt_jointly(fie, forgetting):
     for i in range(3):
         if i > 0:
             fie.theta[i], fie.covariance[i] = fie.theta[i - 1], fie.covariance[i - 1]
-        if fie.Z[i] != 0.0:
+        if fie.effect.Z[i] != 0.0:
             left = fie.residual[i] - fie.omega[i] * total
             total += correct(fie, i, left, forgetting, fie.theta_low[i], fie.theta_high[i])
             forgetting = 1.0  # once a frame
@@ -185,19 +187,19 @@ def adapt_jointly(fie, forgetting):
 def predict(fdi, fie, x, believed):
     """Advance one estimator by a frame.
 
-    x (3,) rad/s as the frame began; believed (3,) rad/s2 is f + G u, mean over the frame; fie.offset and
-    fie.Z are already this frame's.
+    x (3,) rad/s as the frame began; believed (3,) rad/s2 is f + G u, mean over the frame; fie.effect is
+    already this frame's.
     """
     dt = fdi.dt
     for i in range(3):
-        Z, theta, a = fie.Z[i], fie.theta[i], fdi.fie_decay[i]
-        fie.xhat[i] = x[i] + dt * (believed[i] + fie.offset[i] + Z * theta) + a * (fie.xhat[i] - x[i])
+        base, Z, theta, a = fie.effect.offset[i], fie.effect.Z[i], fie.theta[i], fdi.fie_decay[i]
+        fie.xhat[i] = x[i] + dt * (believed[i] + base + Z * theta) + a * (fie.xhat[i] - x[i])
     adapt(fdi, fie)
     for i in range(3):
-        Z, a = fie.Z[i], fdi.fie_decay[i]
+        Z, a = fie.effect.Z[i], fdi.fie_decay[i]
         fie.rise[i] = a * fie.rise[i] + dt * max(Z, 0.0)
         fie.fall[i] = a * fie.fall[i] + dt * min(Z, 0.0)
-        fie.bound_eta[i] = bound_step(fie.bound_eta[i], fdi.eta_bar[i] + fie.spread[i], a, dt)
+        fie.bound_eta[i] = bound_step(fie.bound_eta[i], fdi.eta_bar[i] + fie.effect.spread[i], a, dt)
         fie.bound_noise[i] = noise_step(fie.bound_noise[i], fdi.noise_then[i], a)
         fie.bound[i] = fie.bound_eta[i] + fie.bound_noise[i] + fdi.noise[i]
 
@@ -211,7 +213,7 @@ def adapt(fdi, fie):
             step = joint
         else:
             step = correct(fie, i, fie.residual[i], fdi.forgetting, fie.theta_low[i], fie.theta_high[i])
-        fie.omega[i] = fdi.fie_decay[i] * fie.omega[i] + fdi.dt * fie.Z[i]
+        fie.omega[i] = fdi.fie_decay[i] * fie.omega[i] + fdi.dt * fie.effect.Z[i]
         fie.xhat[i] += fie.omega[i] * step
 
 

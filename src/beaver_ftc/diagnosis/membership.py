@@ -14,11 +14,11 @@ ROUNDS = 4  # each narrows what is left of the travel to the tolerance's share o
 
 
 @kernel
-def healthy(fdi):
-    """Whether the admitted uncertainty alone explains the elapsed frame."""
+def healthy(innovation, bound):
+    """Whether the admitted uncertainty alone explains an innovation (3,) bounded by `bound` (3,), rad/s2."""
     within = True
     for i in range(3):
-        within = within and abs(fdi.innovation[i]) <= fdi.frame_bound[i]
+        within = within and abs(innovation[i]) <= bound[i]
     return within
 
 
@@ -32,21 +32,23 @@ def solve(value, bound, slope, low, high):
 
 
 @kernel
-def agreeing(fdi, fie, i):
-    """The interval of theta that agrees with the elapsed frame on axis i, if that axis is asked."""
+def agreeing(innovation, bound, fie, effect, i):
+    """The interval of theta that agrees with an innovation (3,) on axis i, if that axis is asked.
+
+    bound (3,): on the innovation without a fault, rad/s2. effect: what the fault does, of dtype EFFECT.
+    """
     if fie.unasked[i]:
         return fie.low, fie.high
-    return solve(
-        fdi.innovation[i] - fie.offset[i], fdi.frame_bound[i] + fie.spread[i], fie.Z[i], fie.low, fie.high
-    )
+    value, room = innovation[i] - effect.offset[i], bound[i] + effect.spread[i]
+    return solve(value, room, effect.Z[i], fie.low, fie.high)
 
 
 @kernel
-def dominant(fie):
-    """The axis a surface acts upon most."""
+def dominant(Z):
+    """The axis on which a regressor Z (3,) is largest."""
     axis = 0
     for i in range(1, 3):
-        if abs(fie.Z[i]) > abs(fie.Z[axis]):
+        if abs(Z[i]) > abs(Z[axis]):
             axis = i
     return axis
 
@@ -59,30 +61,31 @@ def allow_for_own_errors(fdi, fie):
     can have been follows from the frame itself, in a few rounds from its travel inwards, each of them valid.
     Of several JSBSim frames in one of ours the first may have seen it where it was a frame before.
     """
-    s, axis = fie.surface, dominant(fie)
+    s, effect = fie.surface, fie.effect
+    axis = dominant(effect.Z)
     before, reach = fie.furthest, max(abs(fie.low), abs(fie.high))
-    room = fie.spread[axis]
-    value = fdi.innovation[axis] - fie.offset[axis]
+    room = effect.spread[axis]
+    value = fdi.innovation[axis] - effect.offset[axis]
     earlier = 2.0 * before / fdi.instants if fdi.instants > 1 else 0.0
     for _ in range(ROUNDS):
         own = max(fdi.own_per_rad[axis, s] * (reach + earlier) - fdi.own[axis, s], 0.0)
-        low, high = solve(value, fdi.frame_bound[axis] + room + own, fie.Z[axis], fie.low, fie.high)
+        low, high = solve(value, fdi.frame_bound[axis] + room + own, effect.Z[axis], fie.low, fie.high)
         if low > high:
             break
         reach = min(reach, max(abs(low), abs(high)))
     fie.furthest = reach
     for i in range(3):
-        fie.spread[i] += max(fdi.own_per_rad[i, s] * (reach + earlier) - fdi.own[i, s], 0.0)
+        effect.spread[i] += max(fdi.own_per_rad[i, s] * (reach + earlier) - fdi.own[i, s], 0.0)
 
 
 @kernel
 def agree(fdi, fie):
     """Whether one theta, or no fault at all, explains the elapsed frame on every axis."""
-    if healthy(fdi):
+    if healthy(fdi.innovation, fdi.frame_bound):
         return True
     low, high = fie.low, fie.high
     for i in range(3):
-        axis_low, axis_high = agreeing(fdi, fie, i)
+        axis_low, axis_high = agreeing(fdi.innovation, fdi.frame_bound, fie, fie.effect, i)
         low, high = max(low, axis_low), min(high, axis_high)
     return low <= high
 
@@ -104,7 +107,8 @@ def narrow(fdi, fie):
     Filtered: eps + Omega thetahat = Omega theta + filtered uncertainty, whatever the estimate thetahat did.
     """
     for i in range(3):
-        intersect(fie, i, agreeing(fdi, fie, i), fdi.shared)
+        frame = agreeing(fdi.innovation, fdi.frame_bound, fie, fie.effect, i)
+        intersect(fie, i, frame, fdi.shared)
         filtered = fie.residual[i] + fie.omega[i] * fie.theta[i]
         intersect(fie, i, solve(filtered, fie.bound[i], fie.omega[i], fie.low, fie.high), fdi.shared)
     left = True

@@ -5,15 +5,14 @@ import numpy as np
 from beaver_ftc.aircraft.schema import MAX_TERMS, MAX_TERMS_OF_ONE
 from beaver_ftc.diagnosis.air import AIR
 from beaver_ftc.diagnosis.derived import admitted_dtype
+from beaver_ftc.diagnosis.types.memory import surface_dtype
 from beaver_ftc.scenario.diagnosis import MAX_POLES
 
 MAX_ESTIMATORS = 16
-MAX_BLOCK = 256  # frames of a block: blocks.py
 NOT_ISOLATED, UNANTICIPATED = -1, -2
 INTERVAL, PUBLISHED = 0, 1
 LOSS, POSITION = 0, 1  # kinds of hypothesis: fault_class.py
-N_TYPES = 10  # fault_types.py; what holds a surface comes one after the other: release.py
-CONSTANT_LOSS, STUCK, FLOAT, UP, DOWN, BIAS, VARYING_LOSS, OSCILLATORY, SLOW, GROWING_BIAS = range(N_TYPES)
+ROLL, PITCH, YAW = range(3)  # axes
 
 # Centres of the network's basis functions, rad; and its memory.
 ALPHA_CENTRES = np.linspace(-0.1, 0.5, 9)
@@ -27,6 +26,9 @@ NETWORK = np.dtype(
     align=True,
 )  # fmt: skip
 
+# What a fault adds to the angular acceleration, as its estimator supposes: offset + theta Z, give or take.
+EFFECT = np.dtype([("offset", "f8", (3,)), ("Z", "f8", (3,)), ("spread", "f8", (3,))], align=True)
+
 ESTIMATOR = np.dtype(
     [
         ("kind", "i8"), ("surface", "i8"),
@@ -36,9 +38,8 @@ ESTIMATOR = np.dtype(
         ("omega", "f8", (3,)), ("rise", "f8", (3,)), ("fall", "f8", (3,)), ("bound", "f8", (3,)),
         ("bound_eta", "f8", (3,)), ("bound_noise", "f8", (3,)),
         ("theta", "f8", (3,)), ("covariance", "f8", (3,)),
-        ("offset", "f8", (3,)), ("Z", "f8", (3,)), ("spread", "f8", (3,)),
+        ("effect", EFFECT), ("block_effect", EFFECT),  # of the frame; mean over a block
         ("furthest", "f8"),  # rad, from neutral, that the surface can have been in the frame
-        ("block_offset", "f8", (3,)), ("block_Z", "f8", (3,)), ("block_spread", "f8", (3,)),
         # what bank.py and membership.py keep
         ("across", "f8", (3,)), ("reach_low", "f8", (MAX_POLES, 4)), ("reach_high", "f8", (MAX_POLES, 4)),
         ("theta_low", "f8", (3,)), ("theta_high", "f8", (3,)),
@@ -46,35 +47,7 @@ ESTIMATOR = np.dtype(
     align=True,
 )  # fmt: skip
 
-# What fault_types.py keeps of one surface. Sets of frame and `then`, the one before: positions, rad.
-SURFACE = np.dtype(
-    [
-        ("travel_low", "f8"), ("travel_high", "f8"), ("least_runaway_rate", "f8"),
-        ("command", "f8"), ("low", "f8"), ("high", "f8"),
-        ("command_then", "f8"), ("low_then", "f8"), ("high_then", "f8"),
-        ("set_low", "f8", (N_TYPES,)), ("set_high", "f8", (N_TYPES,)), ("type_excluded", "i8", (N_TYPES,)),
-        ("start_low", "f8"), ("start_high", "f8"), ("started_at", "i8"),
-        ("sign", "i8"), ("steady_since", "i8"), ("flips", "i8"), ("first_flip", "i8"), ("last_flip", "i8"),
-        ("square", "f8"), ("squares", "f8"), ("absent", "i8"), ("quiet", "i8"),
-        ("run_low", "f8"), ("run_high", "f8"), ("run_sign", "i8"), ("run_at", "i8"),
-        ("grown_up", "f8"), ("grown_down", "f8"),
-        # what is concluded: see pairs.py for `standing` and what was known when it was named
-        ("wrong", "i8"), ("wrong_then", "i8"), ("wrong_before", "i8"), ("evidence", "i8"),
-        ("in_question", "i8"), ("measure", "i8"), ("standing", "i8"),
-        ("named", "i8"), ("named_at_s", "f8"), ("type", "i8"), ("type_at_s", "f8"),
-        ("known_low", "f8", (N_TYPES,)), ("known_high", "f8", (N_TYPES,)), ("known_not", "i8", (N_TYPES,)),
-        # its actuator, what it was ordered, and what release.py keeps: positions, rad
-        ("approach", "f8"), ("step", "f8"),
-        ("orders", "f8", (3, MAX_BLOCK)), ("order_low", "f8", (3,)), ("order_high", "f8", (3,)),
-        ("least_command", "f8", (2,)), ("greatest_command", "f8", (2,)),
-        ("low_before", "f8"), ("high_before", "f8"),
-        ("free_low", "f8", (2, N_TYPES)), ("free_high", "f8", (2, N_TYPES)), ("released", "i8", (N_TYPES,)),
-        ("kept_low", "f8", (2,)), ("kept_high", "f8", (2,)),
-    ],
-    align=True,
-)  # fmt: skip
-
-ADMITTED = admitted_dtype(4)  # see derived.py
+ADMITTED = admitted_dtype(4)  # what else than the published bound is admitted: derived.py
 
 # What the statistical detector keeps: air.py, whitening.py, likelihood.py. A block is the axes whose noise
 # goes together: pitch, and roll with yaw, the latter twice. States of a filter: what is left of the rate,
@@ -144,20 +117,24 @@ DIAGNOSIS = np.dtype(
         ("n_poles", "i8"), ("bank_decay", "f8", (MAX_POLES,)), ("innovation", "f8", (3,)),
         ("bank_residual", "f8", (MAX_POLES, 3)), ("bank_threshold", "f8", (MAX_POLES, 3)),
         ("bank_eta", "f8", (MAX_POLES, 3)), ("bank_noise", "f8", (MAX_POLES, 3)),
-        # faults of every type: fault_types.py
+        # who stands where: axes and group of each surface, the other one of a group of two, or -1; the main
+        # surface of each axis; the estimators of a surface's loss and position, or -1
+        ("dominant_axis", "i8", (4,)), ("group", "i8", (4,)), ("partner", "i8", (4,)), ("main", "i8", (3,)),
+        ("loss_of", "i8", (4,)), ("position_of", "i8", (4,)),
+        # faults of every type: types/
         ("every_type", "i8"), ("whole", "i8"), ("instants", "i8"), ("returns", "i8"),
-        ("surface", SURFACE, (4,)),
+        ("surface", surface_dtype(), (4,)),
         ("frame", "i8"), ("patience", "i8"), ("type", "i8"), ("type_at_s", "f8"),
         ("lead", "i8"), ("lead_kind", "i8"),
-        # two at once: pairs.py
+        # two at once: types/pairs.py
         ("pairs", "i8"), ("alarmed", "i8", (2,)), ("no_lateral_pair", "i8"), ("first", "i8"),
         ("unsettled", "i8"),
         ("statistical", STATISTICAL), ("authority", "i8"),
         # errors of the surfaces' own terms, per rad of deflection and at the command: means over the frame
         ("own_errors", "i8"), ("own_per_rad", "f8", (3, 4)), ("own", "f8", (3, 4)),
-        # blocks of frames: blocks.py
+        # blocks of frames: types/blocks.py
         ("block", "i8"), ("in_block", "i8"), ("span_s", "f8"),
-        ("block_innovation", "f8", (3,)), ("block_eta", "f8", (3,)), ("block_noise", "f8", (3,)),
+        ("block_innovation", "f8", (3,)), ("block_bound", "f8", (3,)), ("block_noise", "f8", (3,)),
         ("closest", "f8", (MAX_POLES,)),  # largest share of its bound each filter reached in healthy flight
         ("effect", "f8", (MAX_POLES, 3)), ("certain_after_s", "f8"),  # what guarantee.py keeps
     ],

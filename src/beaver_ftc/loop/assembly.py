@@ -23,6 +23,7 @@ from beaver_ftc.diagnosis.state import (
     STATISTICS,
     WORST_CASE,
 )
+from beaver_ftc.diagnosis.types.pairs import IN_PITCH
 from beaver_ftc.errors import BadInput
 from beaver_ftc.loop.frame import FRAME
 from beaver_ftc.plant import channels as ch
@@ -35,6 +36,8 @@ from beaver_ftc.scenario.schema import Scenario
 BLOCK_S = 0.2  # to be examined at once where gyros are noisy: short beside the slowest half-cycle, 3.1 s
 RUNAWAY_RATE_RAD_S = pi / 3.0  # of an actuator with no declared rate limit: the aircraft's default
 EARTH_RATE_RAD_S = 2.0 * pi / 86164.0905  # one turn per sidereal day [WGS84]
+GROUPS = {"pitch": ("elevator", "flap"), "lateral": ("aileron", "rudder")}  # that can stand in for each other
+MAIN = ("aileron", "elevator", "rudder")  # surface of each axis
 YAW_SHARE = 0.5  # of the rudder, that engine power may claim: the rest is there to fly with
 PUBLISHED_CLASS = (("aileron", LOSS, AILERON), ("elevator", LOSS, ELEVATOR), ("rudder", LOSS, RUDDER))
 EVERY_TYPE = (
@@ -68,6 +71,7 @@ def _assemble_diagnosis(fdi: np.void, config: FdiConfig, dt: float, travel: np.n
     fdi["authority"] = _AUTHORITIES[config.authority]
     members = FAULT_CLASSES[config.fault_class]
     fdi["n_estimators"] = len(members)
+    _assemble_surfaces(fdi, members)
     for fie, (_, kind, surface) in zip(fdi["estimator"], members, strict=False):
         fie["kind"], fie["surface"] = kind, surface
         fie["low"], fie["high"] = PARAMETER_SET[kind] if kind == LOSS else travel[:, surface]
@@ -86,7 +90,7 @@ def _assemble_types(frame: np.void, scenario: Scenario, dt: float, travel: np.nd
     fdi["instants"], fdi["returns"] = scenario.substeps, actuators["real"]
     for s, (name, place, low, high) in enumerate(zip(SURFACES, fdi["surface"], *travel, strict=True)):
         place["travel_low"], place["travel_high"] = low, high
-        place["in_question"] = not config.pairs or name in ("elevator", "flap")
+        place["in_question"] = not config.pairs or name in GROUPS["pitch"]
         place["measure"], place["type"] = -1, -1
         place["approach"], place["step"] = actuators["approach"][s], actuators["step"][s]
         rate_deg_s = getattr(scenario.actuators, name).rate_limit_deg_s
@@ -96,7 +100,20 @@ def _assemble_types(frame: np.void, scenario: Scenario, dt: float, travel: np.nd
 def _assemble_pairs(fdi: np.void) -> None:
     """Each plane is asked for itself: pitch by elevator and flap, roll and yaw by ailerons and rudder."""
     for fie in fdi["estimator"][: fdi["n_estimators"]]:
-        fie["unasked"] = (1, 0, 1) if fie["surface"] in (ELEVATOR, FLAP) else (0, 1, 0)
+        fie["unasked"] = (1, 0, 1) if fdi["group"][fie["surface"]] == IN_PITCH else (0, 1, 0)
+
+
+def _assemble_surfaces(fdi: np.void, members: tuple[tuple[str, int, int], ...]) -> None:
+    """Axes, groups and estimators of the surfaces; members: name, kind and surface of each estimator."""
+    fdi["main"] = [SURFACES.index(name) for name in MAIN]
+    fdi["partner"] = fdi["loss_of"] = fdi["position_of"] = -1
+    for g, names in enumerate(GROUPS.values()):
+        for name, other in zip(names, names[::-1], strict=True):
+            s = SURFACES.index(name)
+            fdi["group"][s], fdi["partner"][s] = g, SURFACES.index(other)
+            fdi["dominant_axis"][s] = MAIN.index(name) if name in MAIN else MAIN.index(other)
+    for e, (_, kind, surface) in enumerate(members):
+        fdi["loss_of" if kind == LOSS else "position_of"][surface] = e
 
 
 def _assemble_sharpening(fdi: np.void, config: FdiConfig, dt: float) -> None:

@@ -23,11 +23,11 @@ from beaver_ftc.control.supervisor import (
 from beaver_ftc.design.actuators import ACTUATORS, move
 from beaver_ftc.design.model import ALPHA, BETA, ELEVATOR, N_Y, design_dtype, unanticipated_pitch
 from beaver_ftc.design.variants import response
-from beaver_ftc.diagnosis import air, bank, detection, fault_types, guarantee, isolation, network, statistical
+from beaver_ftc.diagnosis import air, bank, detection, guarantee, isolation, network, statistical
 from beaver_ftc.diagnosis.derived import changing_error, derived_bound, slack_per_rad
-from beaver_ftc.diagnosis.fault_types import DOMINANT_AXIS
 from beaver_ftc.diagnosis.state import DIAGNOSIS, NOT_ISOLATED, WORST_CASE
 from beaver_ftc.diagnosis.thresholds import uncertainty_bound
+from beaver_ftc.diagnosis.types import candidates, examine, verdict
 from beaver_ftc.plant import channels as ch
 from beaver_ftc.plant.instruments import INSTRUMENTS, N_SIGNALS, read_all
 from beaver_ftc.plant.native import read_nodes, write_nodes
@@ -212,7 +212,7 @@ def predict(frame):
         compare_likelihoods(frame)
     isolation.suppose_all(fdi, frame.G_mean, frame.Gu_mean, frame.Gu_spread)
     if fdi.every_type:
-        fault_types.note_orders(fdi, frame.commanded)
+        examine.note_orders(fdi, frame.commanded)
     if fdi.detected:
         isolation.predict_all(fdi, frame.x_then, frame.believed)
         for s in range(4):
@@ -355,7 +355,7 @@ def isolated_theta(fdi, s):
     """Estimated theta of the isolated loss of surface s: under noise, the most likely one."""
     if likelihood_counts(fdi):
         return statistical.loss_of(fdi.statistical, s)[0]
-    return fdi.estimator[fdi.isolated].theta[DOMINANT_AXIS[s]]
+    return fdi.estimator[fdi.isolated].theta[fdi.dominant_axis[s]]
 
 
 @kernel
@@ -377,7 +377,7 @@ def supervise(frame):
     if frame.control.law == ORACLE:
         mode = true_mode(frame)
     elif fdi.every_type:
-        replaced = fdi.lead_kind in (fault_types.LOSES, fault_types.FIXED)
+        replaced = fdi.lead_kind in (examine.LOSES, examine.FIXED)
         isolated = fdi.lead if replaced else min(fdi.isolated, 0)
         mode = mode_of(frame.control.law, fdi.detected, isolated, fdi.lead if replaced else -1)
     else:
@@ -404,15 +404,15 @@ def tell_oracle(frame, s):
 def act_on_lead(frame, s):
     """What the diagnosis of every type makes of surface s: effectiveness and offset. A jam cannot wait."""
     fdi, control = frame.fdi, frame.control
-    surface = fdi.surface[s]
-    if surface.measure == fault_types.LOSES:
-        frame.target[s] = fault_types.effectiveness_left(fdi, s)
-    elif surface.measure == fault_types.FIXED:
+    surface, at_fault = fdi.surface[s], candidates.possible(fdi, s)
+    if surface.measure == examine.LOSES:
+        frame.target[s] = verdict.effectiveness_left(fdi, s)
+    elif surface.measure == examine.FIXED:
         frame.target[s] = control.effectiveness[s] = 0.0
-        control.offset[s] = surface.command + fault_types.deflection_error(fdi, s)
-    elif surface.measure == fault_types.SHIFTED:
-        control.offset[s] = fault_types.deflection_error(fdi, s)
-    elif surface.measure == fault_types.LAGS:
+        control.offset[s] = surface.command + verdict.deflection_error(surface, at_fault)
+    elif surface.measure == examine.SHIFTED:
+        control.offset[s] = verdict.deflection_error(surface, at_fault)
+    elif surface.measure == examine.LAGS:
         control.lag[s] = 0.5 * (surface.low + surface.high) - surface.command
         control.hedging = 1
 
@@ -443,7 +443,7 @@ def accommodate(frame):
             statistical.unknown_acceleration(fdi.statistical, frame.fhat)
         else:
             detection.unknown_acceleration(fdi, frame.fhat)
-        if fdi.lead >= 0 and fdi.lead_kind == fault_types.LAGS:
+        if fdi.lead >= 0 and fdi.lead_kind == examine.LAGS:
             frame.fhat[:] = 0.0  # to ask a slow surface for what it lacks would only wind the command up
 
 
@@ -454,7 +454,7 @@ def give_up(frame):
     control, fdi = frame.control, frame.fdi
     for s in range(4):
         told = frame.immovable[s] and control.law == ORACLE
-        fixed = fdi.every_type and fdi.surface[s].measure == fault_types.FIXED
+        fixed = fdi.every_type and fdi.surface[s].measure == examine.FIXED
         if told or (fixed and control.effectiveness[s] == 0.0):
             control.command[s] = control.trim[s]
             control.saturated[s] = 0

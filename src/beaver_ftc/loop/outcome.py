@@ -9,10 +9,10 @@ from beaver_ftc.design.coefficients import SURFACES
 from beaver_ftc.design.model import AXES
 from beaver_ftc.diagnosis.base import Verdict
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, UNANTICIPATED
-from beaver_ftc.diagnosis.words import found
+from beaver_ftc.diagnosis.types.findings import found
 from beaver_ftc.loop.assembly import estimator_names
 from beaver_ftc.loop.flight import Flight
-from beaver_ftc.loop.frame import DEPARTURE_SIGNALS, DOMINANT_AXIS, MAX_EVENTS, isolated_theta
+from beaver_ftc.loop.frame import DEPARTURE_SIGNALS, MAX_EVENTS, isolated_theta
 from beaver_ftc.scenario.schema import Scenario
 
 
@@ -32,7 +32,7 @@ def _estimate(fdi: np.void, surface: int) -> float:
     takes a quarter of a second."""
     if fdi["statistical"]["enabled"]:
         return float(isolated_theta(fdi, surface))
-    return float(fdi["estimator"][int(fdi["isolated"])]["theta"][DOMINANT_AXIS[surface]])
+    return float(fdi["estimator"][int(fdi["isolated"])]["theta"][int(fdi["dominant_axis"][surface])])
 
 
 def _isolation(fdi: np.void) -> dict:

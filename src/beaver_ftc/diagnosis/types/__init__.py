@@ -1,0 +1,24 @@
+"""Which type of fault is on a surface: exact feasible sets, frame by frame.
+
+The innovation nu = eta + G_s (p_s - u_s) and |eta| <= eta_bar put the surface's true deflection p_s of each
+frame in an interval, its axes agreeing on one. A type is a statement about p_s that holds in every frame in
+which something is wrong; the set of its one parameter is the intersection over those frames, and the type is
+excluded when nothing is left. For a bound that holds instant by instant this is the exact feasible set: no
+test can exclude a type sooner without excluding a true one at some time.
+
+    loss            p = (1 + theta) u      1 + theta in [0, 1], constant
+    varying loss    the same               1 + theta anywhere in [0, 1] in every frame (incipient)
+    stuck           p = c                  c in the travel
+    float           p = 0
+    hardover        p reaches its stop at no less than half its rate limit, and stays
+    bias            p = u + b              b constant; cut off by the stops
+    oscillatory     p - u swings about 0   no half-cycle longer than pi / slowest oscillation
+    rate limit      p moves to u only      at any rate
+    growing bias    p = u + b              b of one sign and never smaller (incipient)
+
+A frame that admits eta alone tells nothing: so a fault may be intermittent. The promise: the type, constant
+while it is there, is never excluded, and so never misnamed. What cannot be told apart stays a candidate.
+
+One file a type (contract.py says what is in it); registry.py lists them; examine.py shows them each frame;
+candidates.py and verdict.py conclude; findings.py says it in words.
+"""

@@ -1,0 +1,68 @@
+"""Frames examined in blocks, where a gyro's noise makes a single frame say little.
+
+Summed over a block the innovation holds the noise of its two ends alone, n[k+N] - n[k].
+So the mean over N frames has the bound
+
+    mean eta_bar + (nbar[k] + nbar[k+N]) / (N dt)
+
+and with it says where the surface was in the mean, weighted by its effectiveness G, whose sign stays. Of a
+constant position, offset or effectiveness the weighted mean is exact; of what varies it lies between the
+extremes. A block is then to the types what a frame is that consists of several JSBSim frames: one next to a
+healthy one is passed over.
+"""
+
+import numpy as np
+
+from beaver_ftc.compiled import kernel
+from beaver_ftc.diagnosis import membership
+from beaver_ftc.diagnosis.types.examine import judge_all, locate, note_wrong
+
+
+@kernel
+def begin(fdi):
+    """Begin a block with the elapsed frame."""
+    fdi.block_innovation[:], fdi.block_bound[:] = 0.0, 0.0
+    fdi.block_noise[:] = fdi.noise_then
+    for s in range(fdi.surface.size):
+        effect, orders = fdi.estimator[fdi.position_of[s]].block_effect, fdi.surface[s].orders
+        effect.offset[:], effect.Z[:], effect.spread[:] = 0.0, 0.0, 0.0
+        orders.least[1], orders.greatest[1] = orders.least[0], orders.greatest[0]
+        orders.least[0], orders.greatest[0] = np.inf, -np.inf
+
+
+@kernel
+def add(fdi):
+    """Add the elapsed frame to the means over the block."""
+    share = 1.0 / fdi.block
+    for i in range(3):
+        fdi.block_innovation[i] += share * fdi.innovation[i]
+        fdi.block_bound[i] += share * fdi.eta_bar[i]
+    for s in range(fdi.surface.size):
+        fie, orders = fdi.estimator[fdi.position_of[s]], fdi.surface[s].orders
+        frame, mean = fie.effect, fie.block_effect
+        for i in range(3):
+            mean.offset[i] += share * frame.offset[i]
+            mean.Z[i] += share * frame.Z[i]
+            mean.spread[i] += share * frame.spread[i]
+        axis = membership.dominant(frame.Z)
+        command = -frame.offset[axis] / frame.Z[axis]
+        orders.least[0], orders.greatest[0] = min(orders.least[0], command), max(orders.greatest[0], command)
+
+
+@kernel
+def examine(fdi):
+    """Take in the elapsed frame; with the last one of a block, take in the block and judge the one before."""
+    if fdi.in_block == 0:
+        begin(fdi)
+    add(fdi)
+    fdi.in_block += 1
+    if fdi.in_block < fdi.block:
+        return
+    fdi.in_block = 0
+    for i in range(3):
+        fdi.block_bound[i] += (fdi.block_noise[i] + fdi.noise[i]) / fdi.span_s
+    note_wrong(fdi, fdi.block_innovation, fdi.block_bound)
+    for s in range(fdi.surface.size):
+        effect = fdi.estimator[fdi.position_of[s]].block_effect
+        locate(fdi, s, fdi.block_innovation, fdi.block_bound, effect)
+    judge_all(fdi)

@@ -1,0 +1,148 @@
+"""Show the elapsed frame, or block of frames, to every type: where was each surface, and was anything wrong?
+
+A frame is judged when the next one is there: with several JSBSim frames in one of ours a fault may begin or
+end within a frame, which then shows a part of it; such a frame, next to a healthy one, is passed over.
+"""
+
+import numpy as np
+
+from beaver_ftc.compiled import kernel
+from beaver_ftc.diagnosis import membership
+from beaver_ftc.diagnosis.types.memory import HISTORY
+from beaver_ftc.diagnosis.types.registry import (
+    OSCILLATORY,
+    STUCK,
+    begin_each,
+    bring_back_each,
+    judge_each,
+    let_go_each,
+    pass_over_each,
+    watch_each,
+)
+
+# What is done about a fault: scale the command, give the surface up, add an offset, or leave it to its pace.
+LOSES, FIXED, SHIFTED, LAGS = range(4)
+
+
+@kernel
+def start(fdi):
+    """Nothing is known of any surface yet."""
+    for s in range(fdi.surface.size):
+        begin(fdi.surface[s])
+
+
+@kernel
+def begin(surface):
+    """Nothing is known of this surface yet."""
+    surface.set_low[:], surface.set_high[:] = -np.inf, np.inf
+    surface.type_excluded[:] = 0
+    surface.low, surface.high = surface.travel_low, surface.travel_high
+    surface.started_at = -1
+    surface.evidence = surface.quiet = 0
+    begin_each(surface)
+
+
+@kernel
+def note_orders(fdi, commanded):
+    """What the surfaces have been ordered to do, commanded (n,) rad, since the elapsed frame began."""
+    for s in range(fdi.surface.size):
+        surface = fdi.surface[s]
+        orders = surface.orders
+        if fdi.in_block == 0:
+            for age in range(HISTORY - 1, 0, -1):
+                orders.given[age, : fdi.block] = orders.given[age - 1, : fdi.block]
+                orders.low[age], orders.high[age] = orders.low[age - 1], orders.high[age - 1]
+            orders.low[0], orders.high[0] = np.inf, -np.inf
+        order = min(max(commanded[s], surface.travel_low), surface.travel_high)
+        orders.given[0, fdi.in_block] = order
+        orders.low[0], orders.high[0] = min(orders.low[0], order), max(orders.high[0], order)
+
+
+@kernel
+def locate(fdi, s, innovation, bound, effect):
+    """Find where surface s can have been (rad): what agrees with the innovation (3,) within its bound (3,).
+
+    effect: what the surface's estimator supposes of the same frame or block, dtype EFFECT.
+    """
+    surface, fie, axis = fdi.surface[s], fdi.estimator[fdi.position_of[s]], fdi.dominant_axis[s]
+    surface.low_before, surface.high_before = surface.low_then, surface.high_then
+    surface.low_then, surface.high_then, surface.command_then = surface.low, surface.high, surface.command
+    surface.command = -effect.offset[axis] / effect.Z[axis]
+    surface.low, surface.high = fie.low, fie.high
+    for i in range(3):
+        if fdi.block > 1 and i != axis and effect.Z[i] != 0.0:
+            continue  # over a block the axes weigh what varies differently
+        low, high = membership.agreeing(innovation, bound, fie, effect, i)
+        surface.low, surface.high = max(surface.low, low), min(surface.high, high)
+
+
+@kernel
+def note_wrong(fdi, innovation, bound):
+    """Keep for every surface whether more than the admitted uncertainty was at work."""
+    wrong = not membership.healthy(innovation, bound)
+    for s in range(fdi.surface.size):
+        surface = fdi.surface[s]
+        surface.wrong_before, surface.wrong_then, surface.wrong = surface.wrong_then, surface.wrong, wrong
+
+
+@kernel
+def take_in_frame(fdi):
+    """Find where each surface was in the elapsed frame, if it alone is at fault."""
+    note_wrong(fdi, fdi.innovation, fdi.frame_bound)
+    for s in range(fdi.surface.size):
+        effect = fdi.estimator[fdi.position_of[s]].effect
+        locate(fdi, s, fdi.innovation, fdi.frame_bound, effect)
+
+
+@kernel
+def judge(fdi, surface, frame):
+    """Hold every type of one surface against the frame before the elapsed one: something was wrong in it."""
+    if surface.low_then > surface.high_then:
+        return
+    if surface.started_at < 0:
+        surface.started_at, surface.start_low, surface.start_high = frame, surface.low_then, surface.high_then
+    judge_each(fdi, surface, frame)
+
+
+@kernel
+def judge_all(fdi):
+    """Judge the frame before the elapsed one."""
+    for s in range(fdi.surface.size):
+        surface = fdi.surface[s]
+        watch_each(fdi, surface)
+        if fdi.returns and fdi.frame > 0:
+            let_go_each(fdi, surface)
+        if surface.measure == FIXED and not surface.wrong_then:
+            note_quiet(fdi, s)
+        elif surface.wrong_then and (fdi.whole or (surface.wrong_before and surface.wrong)):
+            surface.evidence += 1
+            judge(fdi, surface, fdi.frame - 1)
+        else:
+            pass_over_each(fdi, surface)
+        if fdi.returns and fdi.frame > 0:
+            bring_back_each(fdi, surface)
+    fdi.frame += 1
+
+
+@kernel
+def examine(fdi):
+    """Take in the elapsed frame, and judge the one before."""
+    take_in_frame(fdi)
+    judge_all(fdi)
+
+
+@kernel
+def note_quiet(fdi, s):
+    """A surface given up, and commanded to where it happens to be, shows by its quiet that it does not swing.
+
+    That is evidence against the others too, as far as one of them all is in question.
+    """
+    surface = fdi.surface[s]
+    if surface.low_then > surface.set_high[STUCK] or surface.high_then < surface.set_low[STUCK]:
+        return
+    for other in range(fdi.surface.size):
+        if other == s or (surface.in_question and fdi.surface[other].in_question):
+            fdi.surface[other].evidence += 1
+    surface.quiet += 1
+    if surface.quiet > fdi.patience and not fdi.own_errors:
+        surface.type_excluded[OSCILLATORY] = 1

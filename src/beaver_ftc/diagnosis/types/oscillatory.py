@@ -1,0 +1,87 @@
+"""A surface that swings about its command, no half-cycle longer than that of the slowest oscillation.
+
+Counting half-cycles above a level that noise cannot reach is how oscillatory failures are monitored in
+service [Goupil2010].
+"""
+
+from math import pi, sqrt
+
+import numpy as np
+
+from beaver_ftc.compiled import kernel
+
+NAME = "oscillatory"
+CONSTANT = False
+MEMORY = (
+    ("sign", "i8"), ("steady_since", "i8"),
+    ("half_cycles", "i8"), ("first_end", "i8"), ("last_end", "i8"),  # ends of half-cycles, frames
+    ("square", "f8"), ("squares", "f8"),  # of the deflection error, rad2: this half-cycle, those before
+)  # fmt: skip
+HALF_CYCLES_THAT_SHOW = 3
+
+
+@kernel
+def begin(surface, kind):
+    """No half-cycle has been seen."""
+    surface.oscillatory.half_cycles = surface.oscillatory.sign = 0
+
+
+@kernel
+def watch(fdi, surface, kind):
+    """Sum the squares of the deflection error."""
+    error = 0.5 * (surface.low_then + surface.high_then) - surface.command_then
+    surface.oscillatory.square += error**2
+
+
+@kernel
+def judge(fdi, surface, kind, frame):
+    """Count half-cycles; a sign that stays for longer than the slowest half-cycle is no oscillation."""
+    swing = surface.oscillatory
+    low, high = surface.low_then - surface.command_then, surface.high_then - surface.command_then
+    sign = 1 if low > 0.0 else (-1 if high < 0.0 else 0)
+    if sign == 0:
+        swing.steady_since = frame + 1
+        return
+    if sign != swing.sign:
+        end_half_cycle(swing, frame)
+        swing.sign, swing.steady_since = sign, frame
+    if frame - swing.steady_since > fdi.patience:
+        surface.type_excluded[kind] = 1
+
+
+@kernel
+def end_half_cycle(swing, frame):
+    """A half-cycle ends here; the first one is cut off at its beginning and does not count."""
+    if swing.sign != 0:
+        if swing.half_cycles == 0:
+            swing.first_end = frame
+        else:
+            swing.squares += swing.square
+        swing.last_end = frame
+        swing.half_cycles += 1
+        swing.square = 0.0
+
+
+@kernel
+def pass_over(fdi, surface, kind):
+    """In a frame that is not judged it may have swung to the other side, unseen."""
+    surface.oscillatory.steady_since = fdi.frame
+
+
+@kernel
+def shown(surface):
+    """Whether it has swung for two half-cycles and more."""
+    return surface.oscillatory.half_cycles >= HALF_CYCLES_THAT_SHOW
+
+
+def estimate(fdi: np.void, s: int, kind: int) -> float | None:
+    """Amplitude, rad."""
+    swing = fdi["surface"][s]["oscillatory"]
+    return float(sqrt(2.0 * swing["squares"] / (swing["last_end"] - swing["first_end"])))
+
+
+def frequency_rad_s(fdi: np.void, s: int) -> float | None:
+    """From the half-cycles counted."""
+    swing = fdi["surface"][s]["oscillatory"]
+    half_cycles, frames = int(swing["half_cycles"]) - 1, int(swing["last_end"] - swing["first_end"])
+    return half_cycles * pi / (float(fdi["span_s"]) * frames)

@@ -1,0 +1,41 @@
+"""A slow surface: p moves towards its command only, at any rate."""
+
+from beaver_ftc.compiled import kernel
+
+NAME = "rate_limit"
+CONSTANT = False
+MEMORY = (
+    ("low", "f8"), ("high", "f8"),  # where it can be while it stands on one side of its command, rad
+    ("sign", "i8"), ("at", "i8"),  # which side, and the last frame of which that is known
+)  # fmt: skip
+
+
+@kernel
+def begin(surface, kind):
+    """No frame has been seen, and none before it."""
+    surface.rate_limit.at = -2
+
+
+@kernel
+def judge(fdi, surface, kind, frame):
+    """It never moves away from its command, so while it stands on one side it comes nearer.
+
+    Of several JSBSim frames in one of ours the first is the old command's.
+    """
+    low, high, run = surface.low_then, surface.high_then, surface.rate_limit
+    sign = side(fdi, surface)
+    if sign == 0 or sign != run.sign or frame != run.at + 1:
+        run.low, run.high = low, high
+    elif (sign > 0 and low > run.high) or (sign < 0 and high < run.low):
+        surface.type_excluded[kind] = 1
+    run.low, run.high = max(run.low, low), min(run.high, high)
+    run.sign, run.at = sign, frame
+
+
+@kernel
+def side(fdi, surface):
+    """1 for a surface certainly above all it was ordered to, -1 below, 0 otherwise."""
+    orders = surface.orders
+    newest = 2 if fdi.whole else 1
+    lowest, highest = min(orders.low[2], orders.low[newest]), max(orders.high[2], orders.high[newest])
+    return 1 if surface.low_then > highest else (-1 if surface.high_then < lowest else 0)

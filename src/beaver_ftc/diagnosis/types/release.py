@@ -1,0 +1,121 @@
+"""A surface that has been let go: between the fault and health it is where its actuator brings it.
+
+A jammed, trailing or runaway surface that is repaired comes back from where it was held, by lag and rate
+limit: for a while it is neither at fault nor where a healthy one would be. The actuator's step a' = f(a) is
+known and rises with a, so the set of positions a that a release within the past can have led to is an
+interval, carried along exactly by its ends. A type that no longer holds the surface is excluded only when no
+such return explains the frame either.
+
+There are two such intervals, of earlier and of later releases: see stuck.py for what the second is for.
+
+Once let go, a type does not take hold again before the surface has been seen healthy.
+"""
+
+import numpy as np
+
+from beaver_ftc.compiled import kernel
+from beaver_ftc.design.actuators import nearer
+
+EARLIER, LATER = 0, 1
+UNEVENNESS = 0.05  # a surface's effectiveness does not change by more within a block
+NOT_BACK_RAD = 1e-12  # what is nearer to a healthy surface acts within rounding as one
+
+
+@kernel
+def forget(surface, which, kind):
+    """No release of this type is possible: the empty interval."""
+    surface.release.low[which, kind], surface.release.high[which, kind] = np.inf, -np.inf
+
+
+@kernel
+def any_release(surface, which, kind):
+    """Whether a release of this type is possible."""
+    return surface.release.low[which, kind] <= surface.release.high[which, kind]
+
+
+@kernel
+def start(surface, kind):
+    """Nothing has been held yet."""
+    forget(surface, EARLIER, kind)
+    forget(surface, LATER, kind)
+
+
+@kernel
+def carried(fdi, surface, a):
+    """Mean position over the judged frame of a surface that is at a (rad) as it begins; and as it ends."""
+    total, count = 0.0, 0
+    for k in range(fdi.block):
+        order = surface.orders.given[1, k]
+        for _ in range(fdi.instants):
+            total += a
+            count += 1
+            a = nearer(a, order, surface.approach, surface.step)
+    return total / count, a
+
+
+@kernel
+def possible(fdi, surface, kind):
+    """Whether a return from this type explains the judged frame; forget those releases that do not."""
+    held, left = surface.release, False
+    for which in (EARLIER, LATER):
+        if any_release(surface, which, kind):
+            low, end = carried(fdi, surface, held.low[which, kind])
+            high, other_end = carried(fdi, surface, held.high[which, kind])
+            if fdi.block > 1:
+                low -= UNEVENNESS * abs(end - held.low[which, kind])
+                high += UNEVENNESS * abs(other_end - held.high[which, kind])
+            away = max(abs(low - surface.command_then), abs(high - surface.command_then)) > NOT_BACK_RAD
+            if away and low <= surface.high_then and high >= surface.low_then:
+                left = True
+            else:
+                forget(surface, which, kind)
+    return left
+
+
+@kernel
+def holds(fdi, surface, kind, least, greatest):
+    """Whether a type can be holding the surface between least and greatest (rad) in the judged frame.
+
+    If not, it may have let go, and the actuator be bringing the surface back; else the type is excluded.
+    """
+    returning = fdi.returns and possible(fdi, surface, kind)
+    released = surface.release.released
+    if least <= surface.high_then and greatest >= surface.low_then and not released[kind]:
+        return True
+    if returning:
+        released[kind] = 1
+    else:
+        surface.type_excluded[kind] = 1
+    return False
+
+
+@kernel
+def beginning(fdi, surface):
+    """Where the surface can have been as the judged frame began, (low, high) rad, and the frame that tells.
+
+    With several JSBSim frames in one of ours it may have been let go within it: the frame before tells.
+    """
+    if fdi.whole:
+        return surface.low_then, surface.high_then, fdi.frame - 1
+    return surface.low_before, surface.high_before, fdi.frame - 2
+
+
+@kernel
+def let_go(surface, kind, low, high):
+    """A type that holds the surface between low and high (rad) may let go of it there; none if low > high."""
+    held = surface.release
+    if low <= high and not held.released[kind]:
+        held.low[LATER, kind] = min(held.low[LATER, kind], low)
+        held.high[LATER, kind] = max(held.high[LATER, kind], high)
+
+
+@kernel
+def bring_back(fdi, surface, kind):
+    """Carry what has been let go to the next frame; a surface that looks healthy may be held again."""
+    held = surface.release
+    if not surface.wrong_then:
+        held.released[kind] = 0
+    for which in (EARLIER, LATER):
+        if any_release(surface, which, kind):
+            _, held.low[which, kind] = carried(fdi, surface, held.low[which, kind])
+            _, held.high[which, kind] = carried(fdi, surface, held.high[which, kind])

@@ -1,0 +1,202 @@
+"""From the types left to a verdict: the surface at fault, the type of its fault, and what the law does."""
+
+import numpy as np
+
+from beaver_ftc.compiled import kernel
+from beaver_ftc.diagnosis.state import NOT_ISOLATED, PITCH, UNANTICIPATED
+from beaver_ftc.diagnosis.types.candidates import (
+    NOBODY,
+    any_constant,
+    anything_left,
+    explained,
+    held_elsewhere,
+    is_fixed,
+    left,
+    loses,
+    may_be_growing,
+    may_be_slow,
+    one_type,
+    possible,
+    sole,
+    sole_type,
+    swings,
+)
+from beaver_ftc.diagnosis.types.examine import FIXED, LAGS, LOSES, SHIFTED
+from beaver_ftc.diagnosis.types.registry import (
+    BIAS,
+    CONSTANT_LOSS,
+    FLOAT,
+    GROWING_BIAS,
+    OSCILLATORY,
+    SLOW,
+    STUCK,
+    VARYING_LOSS,
+)
+from beaver_ftc.diagnosis.types.sets import middle
+
+ABSENT_FRAMES = 20
+
+
+@kernel
+def surface_at_fault(fdi):
+    """The surface the fault is on, NOT_ISOLATED or UNANTICIPATED.
+
+    What acts on pitch alone shows no direction, so a surface left over there must also have a type that
+    explains it. Of elevator and flap, each of which can do what the other does if it only moves accordingly,
+    the one is named for which a constant suffices, once a slow oscillation of the other would have shown.
+    """
+    s = sole(fdi, False)
+    if s == NOBODY:
+        return UNANTICIPATED
+    if s >= 0:
+        return s if fdi.dominant_axis[s] != PITCH or explained(fdi.surface[s]) else NOT_ISOLATED
+    s = sole(fdi, True)
+    return s if s >= 0 and others_refuted(fdi, s) else NOT_ISOLATED
+
+
+@kernel
+def others_refuted(fdi, chosen):
+    """Whether nothing but a fault that follows the chosen one's commands is left on the other surfaces.
+
+    An oscillation is given one half-cycle of the slowest to show, a whole one if still possible; where
+    errors are declared that a course can hide in, every type of the others must have been excluded.
+    """
+    waits = 1
+    for s in range(fdi.surface.size):
+        surface = fdi.surface[s]
+        if s != chosen and surface.in_question and possible(fdi, s):
+            if fdi.own_errors and anything_left(surface):
+                return False
+            if left(surface, OSCILLATORY) or left(surface, VARYING_LOSS):
+                waits = 2
+    return fdi.surface[chosen].evidence >= waits * fdi.patience
+
+
+@kernel
+def type_at_fault(fdi, surface):
+    """The type of the fault on a surface, taken to be at fault; -1 while more than one fits or an
+    oscillation may yet show."""
+    if surface.evidence < fdi.patience or may_be_slow(fdi, surface):
+        return -1
+    if fdi.own_errors:
+        return sole_type(surface)
+    patient = not left(surface, OSCILLATORY) or surface.evidence >= 2 * fdi.patience
+    if any_constant(surface):
+        found = one_type(surface)
+        return found if patient and not may_be_growing(surface, found) else -1
+    return one_course(surface, patient)
+
+
+@kernel
+def one_course(surface, patient):
+    """The same when no constant explains it: a loss, pace or bias that varies, or an oscillation."""
+    fading, slow, growing = left(surface, VARYING_LOSS), left(surface, SLOW), left(surface, GROWING_BIAS)
+    if fading + slow + growing > 1 or (slow and left(surface, OSCILLATORY)):
+        return -1
+    if slow:
+        return SLOW
+    if fading or growing:
+        return (VARYING_LOSS if fading else GROWING_BIAS) if patient else -1
+    return OSCILLATORY if swings(surface) else -1
+
+
+@kernel
+def decide(fdi, t):
+    """Name the surface and, when it is certain, the type; t s."""
+    s = surface_at_fault(fdi)
+    before = fdi.estimator[fdi.isolated].surface if fdi.isolated >= 0 else fdi.isolated
+    kind = type_at_fault(fdi, fdi.surface[s]) if s >= 0 else -1
+    if s != before:
+        fdi.isolated_at_s = t
+    if kind != fdi.type:
+        fdi.type, fdi.type_at_s = kind, t
+    fdi.isolated = estimator_for(fdi, s, kind) if s >= 0 else s
+    take_the_lead(fdi)
+
+
+@kernel
+def estimator_for(fdi, s, kind):
+    """The estimator that stands for a fault of this type (-1 if open) on surface s."""
+    return fdi.loss_of[s] if kind in (CONSTANT_LOSS, VARYING_LOSS) else fdi.position_of[s]
+
+
+@kernel
+def measure_for(surface):
+    """What is to be done about a surface at fault as far as is known: LOSES, FIXED, LAGS or SHIFTED.
+
+    To add what the last frame shows to be off is right for a bias and an oscillation, serves a loss of
+    effectiveness meanwhile, and moves the command so that a jam shows in the next frame.
+    """
+    if is_fixed(surface):
+        return FIXED
+    if not any_constant(surface) and not left(surface, VARYING_LOSS):
+        return LAGS if left(surface, SLOW) else SHIFTED
+    open_yet = held_elsewhere(surface) or left(surface, BIAS)
+    return LOSES if loses(surface) and not open_yet else SHIFTED
+
+
+@kernel
+def presumed(fdi):
+    """The surface the law acts upon: the one at fault, or the likeliest; NOBODY yet.
+
+    It acts before all doubt is gone, since it can take it back. Of elevator and flap it does not matter which
+    is thought to be off, as long as both follow their commands: the moment is the same.
+    """
+    if fdi.isolated >= 0:
+        return fdi.estimator[fdi.isolated].surface
+    s = sole(fdi, True)
+    if s >= 0:
+        return s
+    for s in range(fdi.surface.size):
+        if fdi.dominant_axis[s] == PITCH and possible(fdi, s):
+            return s
+    return NOBODY
+
+
+@kernel
+def take_the_lead(fdi):
+    """Settle on which surface the law acts and how."""
+    s = presumed(fdi)
+    for other in range(fdi.surface.size):
+        fdi.surface[other].measure = -1
+    fdi.lead, fdi.lead_kind = NOBODY, -1
+    if s >= 0:
+        surface = fdi.surface[s]
+        fdi.lead_kind = measure_for(surface)
+        if still_there(surface, fdi.lead_kind, True):
+            fdi.lead, surface.measure = s, fdi.lead_kind
+
+
+@kernel
+def still_there(surface, measure, at_fault):
+    """Whether the fault of a surface shows, or did a moment ago; one that has gone is let go."""
+    deflection = deflection_error(surface, at_fault) + surface.command
+    there = surface.low <= deflection <= surface.high or measure == LOSES
+    surface.absent = 0 if there else surface.absent + 1
+    return surface.absent < ABSENT_FRAMES
+
+
+@kernel
+def deflection_error(surface, at_fault):
+    """How far a surface is off its command, rad: by the types left if it is at fault, or as the last frame
+    shows it."""
+    if at_fault:
+        if left(surface, FLOAT):
+            return -surface.command
+        stuck, biased = left(surface, STUCK), left(surface, BIAS)
+        if stuck and not biased:
+            return middle(surface, STUCK) - surface.command
+        if biased and surface.set_high[BIAS] - surface.set_low[BIAS] < np.inf:
+            return middle(surface, BIAS)
+    return 0.5 * (surface.low + surface.high) - surface.command
+
+
+@kernel
+def effectiveness_left(fdi, s):
+    """What surface s has left of its effectiveness.
+
+    The estimator fits both axes of a surface, so beside another fault the set of the constant is asked.
+    """
+    if fdi.pairs and possible(fdi, s) and left(fdi.surface[s], CONSTANT_LOSS):
+        return middle(fdi.surface[s], CONSTANT_LOSS)
+    return 1.0 + fdi.estimator[fdi.loss_of[s]].theta[fdi.dominant_axis[s]]

@@ -10,14 +10,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from beaver_ftc.errors import BadInput
+from beaver_ftc.errors import BadInput, suggestion
 from beaver_ftc.loop.flight import Flight, LogSink
 from beaver_ftc.loop.held import HeldFrame
 from beaver_ftc.loop.loop import CHUNK_ROWS, FLYING, Loop
 from beaver_ftc.loop.outcome import verdict_of
 from beaver_ftc.loop.plugged import measured_of
 from beaver_ftc.plant.adapter import UnknownProperty
-from beaver_ftc.scenario.base import suggestion
 from beaver_ftc.scenario.given import fault_of
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.signals import RAD_PER_DEG, sample_deg_s

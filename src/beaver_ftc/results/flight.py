@@ -9,11 +9,10 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from beaver_ftc.errors import BadInput, SimulationFailed
+from beaver_ftc.errors import BadInput, SimulationFailed, suggestion
 from beaver_ftc.results import typed, verdict
 from beaver_ftc.results.log import Log, MemoryLog, StoredLog
 from beaver_ftc.results.metrics import Document, metrics
-from beaver_ftc.scenario.base import suggestion
 from beaver_ftc.scenario.given import ScenarioLike, load
 from beaver_ftc.scenario.schema import Scenario
 

@@ -247,7 +247,9 @@ def assemble(scenario: Scenario, trim: np.ndarray, travel: np.ndarray) -> np.nda
     frame["dt"] = dt
     frame["share"] = 1.0 / scenario.substeps
     frame["design"] = design_of(scenario.design_model)[0]
-    frame["factor"] = [factor for _, _, factor in ch.TRUTH]
+    channels = ch.truth_channels(load(scenario.aircraft))
+    frame["n_truth"] = len(channels)
+    frame["factor"][: len(channels)] = [factor for _, _, factor in channels]
     frame["u"] = frame["commanded"] = trim
     jsbsim_dt = dt / scenario.substeps
     _assemble_instruments(frame["instruments"], scenario, jsbsim_dt)
@@ -261,3 +263,9 @@ def assemble(scenario: Scenario, trim: np.ndarray, travel: np.ndarray) -> np.nda
     _assemble_probing(frame["control"], scenario.fdi.probing, dt)
     _assemble_power(frame["control"], scenario, dt)
     return frames
+
+
+def y_places(frame: np.void) -> list[int]:
+    """Where in the truth the measured signals beside the rates are: y without noise, (4 + declared,)."""
+    declared = range(ch.POS + 3 * frame["u"].size, int(frame["n_truth"]))
+    return [ch.ALPHA, ch.BETA, ch.AIRSPEED, ch.QDYN, *declared]

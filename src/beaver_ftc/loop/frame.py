@@ -21,7 +21,17 @@ from beaver_ftc.control.supervisor import (
     next_mode,
 )
 from beaver_ftc.design.actuators import ACTUATORS, move
-from beaver_ftc.design.model import ALPHA, BETA, ELEVATOR, N_Y, design_dtype, unanticipated_pitch
+from beaver_ftc.design.model import (
+    AIRSPEED,
+    ALPHA,
+    BETA,
+    DPT,
+    ELEVATOR,
+    N_Y,
+    QDYN,
+    design_dtype,
+    unanticipated_pitch,
+)
 from beaver_ftc.design.variants import response
 from beaver_ftc.diagnosis import air, bank, detection, guarantee, isolation, network, statistical
 from beaver_ftc.diagnosis.derived import changing_error, derived_bound, slack_per_rad
@@ -46,9 +56,9 @@ FRAME = np.dtype(
         ("k", "i8"), ("row", "i8"), ("dt", "f8"), ("t", "f8"), ("share", "f8"),
         # the truth's nodes
         ("native", "i8"), ("getter", "i8"), ("setter", "i8"),
-        ("read_pointers", "i8", (ch.N_TRUTH,)), ("write_pointers", "i8", (4,)),
+        ("n_truth", "i8"), ("read_pointers", "i8", (ch.most_channels(4),)), ("write_pointers", "i8", (4,)),
         ("engine_pointer", "i8", (1,)),
-        ("factor", "f8", (ch.N_TRUTH,)), ("truth", "f8", (ch.N_TRUTH,)),
+        ("factor", "f8", (ch.most_channels(4),)), ("truth", "f8", (ch.most_channels(4),)),
         ("latitude_0", "f8"), ("longitude_0", "f8"), ("radius_m", "f8"), ("parallel_radius_m", "f8"),
         # the truth's faults, for the oracle and for the analyst
         ("faulted", "i8"), ("fault_at_s", "f8"), ("immovable", "i8", (4,)),
@@ -86,8 +96,8 @@ def measure(frame):
     """Read the truth and form what the sensors give: x (3,) rad/s and y (5,)."""
     truth = frame.truth
     if frame.native:
-        read_nodes(frame.getter, frame.read_pointers, truth)
-    for i in range(ch.N_TRUTH):
+        read_nodes(frame.getter, frame.read_pointers[: frame.n_truth], truth)
+    for i in range(frame.n_truth):
         truth[i] *= frame.factor[i]
     seen = frame.seen
     for i in range(N_SIGNALS):
@@ -97,19 +107,16 @@ def measure(frame):
     for i in range(3):
         frame.x[i] = seen[i]
     y = frame.y
-    y[0], y[1], y[2], y[3], y[4] = (
-        seen[ch.ALPHA],
-        seen[ch.BETA],
-        seen[ch.AIRSPEED],
-        seen[ch.QDYN],
-        truth[ch.DPT],
-    )
+    y[ALPHA], y[BETA], y[AIRSPEED], y[QDYN] = seen[ch.ALPHA], seen[ch.BETA], seen[ch.AIRSPEED], seen[ch.QDYN]
+    first = ch.POS + 3 * frame.u.size
+    for k in range(frame.n_truth - first):
+        y[DPT + k] = truth[first + k]
 
 
 @kernel
 def flight_status(truth, ground_m):
     """FLYING, NOT_FINITE, or DEPARTED + the index in DEPARTURE_SIGNALS of what left its limits, times ten."""
-    for i in range(ch.N_TRUTH):
+    for i in range(truth.size):
         if not np.isfinite(truth[i]):
             return NOT_FINITE
     for i in range(3):
@@ -133,7 +140,7 @@ def fault_effect(frame):
         frame.phi[i] = 0.0
         if frame.faulted:
             for s in range(4):
-                frame.phi[i] += G[i, s] * (truth[ch.EFFECTIVE + s] - frame.u[s])
+                frame.phi[i] += G[i, s] * (truth[ch.POS + frame.u.size + s] - frame.u[s])
     if frame.faulted:
         frame.phi[1] += unanticipated_pitch(frame.design, frame.y, frame.Cm_alpha3)
 
@@ -365,7 +372,7 @@ def true_mode(frame):
         return MODE_NOMINAL
     if frame.Cm_alpha3 != 0.0:
         return MODE_UNANTICIPATED
-    if frame.truth[ch.TRUE_EFFECTIVENESS + ELEVATOR] < 1.0 or frame.immovable[ELEVATOR]:
+    if frame.truth[ch.POS + 2 * frame.u.size + ELEVATOR] < 1.0 or frame.immovable[ELEVATOR]:
         return MODE_REALLOCATED
     return MODE_ADAPTIVE
 
@@ -394,8 +401,8 @@ def supervise(frame):
 @kernel
 def tell_oracle(frame, s):
     """The true effectiveness of surface s, none if it does not move, and what it is off besides."""
-    effective = frame.truth[ch.EFFECTIVE + s]
-    frame.target[s] = 0.0 if frame.immovable[s] else frame.truth[ch.TRUE_EFFECTIVENESS + s]
+    effective = frame.truth[ch.POS + frame.u.size + s]
+    frame.target[s] = 0.0 if frame.immovable[s] else frame.truth[ch.POS + 2 * frame.u.size + s]
     if frame.faulted:
         frame.control.offset[s] = effective - frame.target[s] * frame.u[s]
 
@@ -578,8 +585,10 @@ def record_truth(frame, row):
     row[column + 1] = (truth[ch.LONGITUDE] - frame.longitude_0) * frame.parallel_radius_m
     row[column + 2] = truth[ch.ALTITUDE]
     column = put(row, column + 3, truth[ch.PDOT : ch.PDOT + 3])
-    row[column], row[column + 1], row[column + 2] = truth[ch.QDYN], truth[ch.DPT], truth[ch.ENVELOPE]
-    return column + 3
+    row[column] = truth[ch.QDYN]
+    column = put(row, column + 1, truth[ch.POS + 3 * frame.u.size : frame.n_truth])
+    row[column] = truth[ch.ENVELOPE]
+    return column + 1
 
 
 @kernel
@@ -588,7 +597,7 @@ def record_surfaces(frame, row, column):
     for s in range(4):
         row[column] = frame.commanded[s]
         row[column + 1] = frame.truth[ch.POS + s]
-        row[column + 2] = frame.truth[ch.EFFECTIVE + s]
+        row[column + 2] = frame.truth[ch.POS + frame.u.size + s]
         column += 3
     return put(row, column, frame.control.saturated)
 

@@ -13,7 +13,7 @@ from beaver_ftc.design.coefficients import SURFACES
 from beaver_ftc.design.variants import anchor, mass_of
 from beaver_ftc.diagnosis import noise_model
 from beaver_ftc.errors import SimulationFailed
-from beaver_ftc.loop.assembly import assemble, estimator_names
+from beaver_ftc.loop.assembly import assemble, estimator_names, y_places
 from beaver_ftc.loop.flight import Flight, LogSink
 from beaver_ftc.loop.frame import FLYING, NOT_FINITE, fly_frame, look
 from beaver_ftc.loop.outcome import flight_of
@@ -51,12 +51,13 @@ class Cockpit:
         frame = frames[0]
         frame["native"] = self.native
         frame["getter"], frame["setter"] = native.getter_address(), native.setter_address()
-        frame["read_pointers"], frame["write_pointers"] = self._read.pointers, self._write.pointers
+        frame["read_pointers"][: frame["n_truth"]] = self._read.pointers
+        frame["write_pointers"] = self._write.pointers
         frame["engine_pointer"] = self._engine.pointers
 
     def read(self) -> None:
         """Bring the truth into the frame record, through Python."""
-        self._read.read(self._frames["truth"][0])
+        self._read.read(self._frames["truth"][0][: self._frames["n_truth"][0]])
 
     def write(self) -> None:
         """Hand the command over, through Python."""
@@ -114,7 +115,7 @@ class Loop:
         """Show the design model the trim, which a linearised or frozen one holds on to."""
         self.cockpit.read()
         truth = self.frames["truth"][0] * self.frames["factor"][0]
-        y = truth[[ch.ALPHA, ch.BETA, ch.AIRSPEED, ch.QDYN, ch.DPT]]
+        y = truth[y_places(self.frames[0])]
         frame, scenario = self.frames[0], self.scenario
         anchor(frame["design"], truth[:3], y, surfaces)
         start, mass = (truth[:3], y, surfaces), mass_of(scenario.design_model)
@@ -237,7 +238,7 @@ class Loop:
         if status == NOT_FINITE:
             bad = [
                 name
-                for (name, _, _), value in zip(ch.TRUTH, self.frames["truth"][0], strict=True)
+                for (name, _, _), value in zip(ch.TRUTH, self.frames["truth"][0], strict=False)
                 if not np.isfinite(value)
             ]
             raise SimulationFailed(

@@ -15,9 +15,9 @@ from beaver_ftc.diagnosis.declared import declared_of
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, UNANTICIPATED
 from beaver_ftc.errors import BeaverFtcError, SimulationFailed
 from beaver_ftc.loop import stages
+from beaver_ftc.loop.assembly import y_places
 from beaver_ftc.loop.frame import NOT_FINITE
 from beaver_ftc.loop.outcome import verdict_of
-from beaver_ftc.plant import channels as ch
 from beaver_ftc.plugins import DETECTORS, LAWS, is_compiled, plugin_class
 from beaver_ftc.scenario.schema import Scenario
 
@@ -148,7 +148,7 @@ def measured_of(frame: np.void) -> Measured:
     return Measured(
         float(frame["t"]),
         frame["x"].copy(),
-        frame["y"].copy(),
+        frame["y"][: len(y_places(frame))].copy(),
         frame["believed"].copy(),
         frame["Gu_mean"].copy(),
         frame["fdi"]["eta_bar"].copy(),
@@ -161,7 +161,7 @@ def context_of(
     """What a plug-in is told before the flight; start: the truth's channels at the start, in SI."""
     frame = frames[0]
     control, fdi = frame["control"], frame["fdi"]
-    trim_y = start[[ch.ALPHA, ch.BETA, ch.AIRSPEED, ch.QDYN, ch.DPT]]
+    trim_y = start[y_places(frame)]
     return Context(
         dt_s=float(frame["dt"]),
         substeps=scenario.substeps,

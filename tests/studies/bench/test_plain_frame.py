@@ -48,7 +48,7 @@ def recording(tmp_path_factory):
     folder = tmp_path_factory.mktemp("recording")
     words = scenario(**WORDS).model_dump(mode="json", exclude_unset=True)
     loop = Loop(scenario(**WORDS))
-    truth, references = np.empty((FRAMES, ch.N_TRUTH)), np.empty((FRAMES, 3))
+    truth, references = np.empty((FRAMES, ch.most_channels(4))), np.empty((FRAMES, 3))
     for k in range(FRAMES):
         loop.fly_chunk(k, 1)
         truth[k], references[k] = loop.frames["truth"][0], loop.references[0]

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pyarrow.parquet as pq
 
-from beaver_ftc.studies.statistics import poisson, wilson
+from beaver_ftc.studies.engine.statistics import poisson, wilson
 
 SOON_S = 0.5
 FAULTS = ("sensors", "servo", "coefficients", "air", "all", "all-published")

@@ -15,7 +15,7 @@ from beaver_ftc.diagnosis import noise_model, statistical
 from beaver_ftc.diagnosis.state import LOSS
 from beaver_ftc.plant.instruments import SIGNALS
 from beaver_ftc.scenario.diagnosis import Bounds
-from beaver_ftc.studies.statistics import poisson
+from beaver_ftc.studies.engine.statistics import poisson
 
 NO_COUPLING = {"p": 0.0, "q": 0.0, "r": 0.0}
 TACTICAL = {"sensors": "tactical-grade"}

@@ -1,7 +1,6 @@
 """What is generated, and where it goes."""
 
 from collections.abc import Iterator
-from functools import partial
 from pathlib import Path
 
 from beaver_ftc.errors import BadInput
@@ -42,14 +41,15 @@ def _write_first_figure(docs: Path) -> Path:
 
 
 def _write_reproduction(docs: Path) -> Iterator[Path]:
-    from beaver_ftc.studies.compare.crew import spread
+    from beaver_ftc.studies.engine.flown import fly_all
     from beaver_ftc.studies.reproduce.document import document_of, fly_published
     from beaver_ftc.studies.reproduce.figures import write_figures
     from beaver_ftc.studies.reproduce.margins import write_margins
     from beaver_ftc.studies.reproduce.page import as_markdown
+    from beaver_ftc.studies.reproduce.sensitivity import VARIANTS, numbers_of
 
     flights = fly_published()
-    document = document_of(flights, partial(spread, workers=2))
+    document = document_of(flights, fly_all(numbers_of, VARIANTS, workers=2))
     path = docs / "reproduction.md"
     path.write_text(as_markdown(document, "images/reproduction"), encoding="utf-8")
     yield path

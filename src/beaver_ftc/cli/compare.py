@@ -62,9 +62,7 @@ def command(
     else:
         cases = _cases(sweep, only, flights)
         name = f"benchmark-{only}" if only else "benchmark" if benchmark else cases[0].set
-        document = _fly(cases, schemes, laws, workers)
-        _keep(document, out, name, format)
-        _update(document, leaderboard)
+        _say(_fly(cases, schemes, laws, workers, out, name), out / name, format, leaderboard)
 
 
 def _compare_runs(folders: list[Path], out: Path, format: Format) -> None:
@@ -106,38 +104,27 @@ def _chosen(group: str, given: str | None, ours: str) -> list[str]:
     return list(dict.fromkeys([ours, *names]))
 
 
-def _fly(cases: list[Any], schemes: str | None, laws: str | None, workers: int) -> dict[str, Any]:
+def _fly(
+    cases: list[Any], schemes: str | None, laws: str | None, workers: int, out: Path, name: str
+) -> dict[str, Any]:
     from beaver_ftc.cli.progress import progress_bar
     from beaver_ftc.plugins import DETECTORS, LAWS
-    from beaver_ftc.studies.compare.crew import fly_cases
-    from beaver_ftc.studies.compare.document import document_of
+    from beaver_ftc.studies.compare.run import run_comparison
     from beaver_ftc.studies.compare.trial import entries_of
 
     entries = entries_of(_chosen(DETECTORS, schemes, _OURS[0]), _chosen(LAWS, laws, _OURS[1]))
     with progress_bar(f"{len(cases)} flights, {len(entries)} times each") as progress:
-        return document_of(fly_cases(cases, entries, workers, progress), entries)
+        return run_comparison(out, name, cases, entries, workers, progress)
 
 
-def _keep(document: dict[str, Any], out: Path, name: str, format: Format) -> None:
-    from beaver_ftc.results.metrics import as_json
-    from beaver_ftc.results.writer import result_folder
-    from beaver_ftc.studies.compare.figure import write_figure
-    from beaver_ftc.studies.compare.page import write_page
+def _say(document: dict[str, Any], folder: Path, format: Format, leaderboard: Path | None) -> None:
+    from beaver_ftc.studies.compare.benchmark import write_leaderboard
     from beaver_ftc.studies.compare.table import as_text
 
-    with result_folder(out, name) as folder:
-        (folder / "comparison.json").write_text(as_json(document), encoding="utf-8")
-        write_figure(document, folder / "comparison.png")
-        write_page(document, folder / "comparison.png", folder / "comparison.html", f"Comparison: {name}")
     if format is Format.json:
-        emit_json(document | {"folder": str(out / name)})
+        emit_json(document | {"folder": str(folder)})
     else:
-        emit(f"{as_text(document)}page: {out / name / 'comparison.html'}")
-
-
-def _update(document: dict[str, Any], leaderboard: Path | None) -> None:
-    from beaver_ftc.studies.compare.benchmark import write_leaderboard
-
+        emit(f"{as_text(document)}page: {folder / 'comparison.html'}")
     if leaderboard is not None:
         write_leaderboard(document, leaderboard)
 

@@ -72,7 +72,7 @@ def command(
     What has been flown is kept, whatever happens: go on with --resume. With --format json: the summary.
     """
     if backend is Backend.local and replay is None:
-        from beaver_ftc.studies.sweep.processes import start_early
+        from beaver_ftc.studies.engine.processes import start_early
 
         start_early()
     from beaver_ftc.studies.sweep.run import Options

@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -14,7 +15,6 @@ from beaver_ftc.loop.loop import Loop
 from beaver_ftc.plugins import plugin_class
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.compare.benchmark import MARK, write_leaderboard
-from beaver_ftc.studies.compare.crew import fly_cases, spread
 from beaver_ftc.studies.compare.document import better_than_ours, document_of
 from beaver_ftc.studies.compare.figure import write_figure
 from beaver_ftc.studies.compare.flights import (
@@ -37,6 +37,7 @@ from beaver_ftc.studies.compare.tune import (
     alarm_level,
     candidates,
 )
+from beaver_ftc.studies.engine.flown import fly_all
 from flying import scenario
 
 BEAVER = Path(sys.executable).with_name("beaver-ftc")
@@ -96,7 +97,7 @@ def test_a_comparison_has_everything_asked_for(compared):
 def test_workers_do_not_change_the_result(sweep):
     entries = entries_of(["observer-constant"], ["lqr"])
     cases = of_sweep(sweep)
-    one, two = (document_of(fly_cases(cases, entries, n), entries) for n in (1, 2))
+    one, two = (document_of(fly_all(partial(fly_case, entries=entries), cases, n), entries) for n in (1, 2))
     for document in (one, two):
         for row in document["sets"]["few"]["lines"]:
             assert row.pop("us") > 0  # the one thing that is measured on the clock
@@ -128,7 +129,7 @@ def test_bad_usage_is_one_line_and_exit_status_2(tmp_path, arguments, says):
 
 def test_a_plug_in_that_fails_spoils_only_its_own_line(sweep):
     entries = entries_of(["json:JSONDecoder", "observer-constant"], [LAW])
-    document = document_of(fly_cases(of_sweep(sweep), entries), entries)
+    document = document_of([fly_case(case, entries) for case in of_sweep(sweep)], entries)
     part = document["sets"]["few"]
     broken, fine = part["lines"][0], part["lines"][1]
     assert (broken["flights"], broken["failed"]) == (0, 3)
@@ -268,7 +269,7 @@ def test_a_candidate_is_judged_in_each_air_at_a_level_of_its_own():
 
 
 def test_work_is_spread_in_order():
-    assert spread(abs, [-3, 2, -1], 2) == [3, 2, 1]
+    assert fly_all(abs, [-3, 2, -1], 2) == [3, 2, 1]
 
 
 def test_finished_runs_stand_side_by_side(tmp_path):

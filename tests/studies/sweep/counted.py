@@ -4,7 +4,7 @@ from pathlib import Path
 
 from beaver_ftc.scenario.sweep_loader import load_sweep_text
 from beaver_ftc.studies.sweep.flights import Flights
-from beaver_ftc.studies.sweep.store import write_parquet
+from beaver_ftc.studies.sweep.store import write_tables
 from beaver_ftc.studies.sweep.table import COLUMNS, schema_of, table_of
 
 SWEEP = """\
@@ -53,5 +53,6 @@ ROWS = [
 def flights_of(rows, folder: Path) -> Flights:
     sweep = load_sweep_text(SWEEP)
     schema = schema_of(sweep)
-    write_parquet(folder / "results.parquet", [table_of(sweep, schema, rows)], schema)
+    with (folder / "results.parquet").open("wb") as file:
+        write_tables(file, [table_of(sweep, schema, rows)], schema)
     return Flights.read(folder / "results.parquet", sweep)

@@ -10,7 +10,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from beaver_ftc.errors import BadInput, SimulationFailed
-from beaver_ftc.studies.sweep import crew
+from beaver_ftc.studies.engine import crew
 from beaver_ftc.studies.sweep.flying import Keep
 from beaver_ftc.studies.sweep.run import Options, SweepStopped, replay, run_sweep
 
@@ -38,7 +38,7 @@ def test_the_folder_holds_what_it_should(reference):
     assert table.column("run").to_pylist() == list(range(48))
     assert json.loads((folder / "summary.json").read_text()) == summary
     assert {path.name for path in folder.iterdir()} == {
-        "lock", "sweep.json", "results.parquet", "summary.json", "report.html", "figures",
+        "sweep.json", "results.parquet", "summary.json", "report.html", "figures",
     }  # fmt: skip
     assert {"detection-probability.png", "parallel-coordinates.png"} <= {
         p.name for p in (folder / "figures").iterdir()
@@ -108,19 +108,18 @@ def test_ctrl_c_ends_it_cleanly_and_says_how_to_go_on(reference, tmp_path, start
 
 def test_a_worker_that_is_killed_is_replaced(reference, tmp_path, small_batches, monkeypatch):
     hired = []
-    hire = crew.LocalCrew._hire
 
-    def watched(self):
-        worker = hire(self)
-        hired.append(worker)
-        return worker
+    class Watched(crew._Worker):
+        def __init__(self, work):
+            super().__init__(work)
+            hired.append(self)
 
-    monkeypatch.setattr(crew.LocalCrew, "_hire", watched)
+    monkeypatch.setattr(crew, "_Worker", Watched)
     seen = []
 
     def kill_the_first(tally):
         if not seen:
-            os.kill(hired[0].process.pid, signal.SIGKILL)
+            os.kill(hired[0].pid.result(), signal.SIGKILL)
         seen.append(tally.done)
 
     run_sweep(sweep_of(), Options(out=tmp_path, workers=2, report=False), kill_the_first)

@@ -32,8 +32,8 @@ TRACKING = (
 
 def document_of(trials: Sequence[Trial], entries: Sequence[Entry]) -> Document:
     """Tally every set; numbers that do not exist are null."""
-    names = list(dict.fromkeys(trial.case.set for trial in trials))
-    sets = {name: _set([t for t in trials if t.case.set == name], entries) for name in names}
+    names = list(dict.fromkeys(trial.set for trial in trials))
+    sets = {name: _set([t for t in trials if t.set == name], entries) for name in names}
     return {"sets": sets, "versions": dict(versions())}
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from beaver_ftc.studies.compare.replay import Trace
 from beaver_ftc.studies.compare.trial import ORACLE, SCHEME, Entry, Result, Trial
-from beaver_ftc.studies.statistics import CONFIDENCE, poisson_bound, quantile, wilson_bound
+from beaver_ftc.studies.engine.statistics import CONFIDENCE, poisson_bound, quantile, wilson_bound
 
 
 @dataclass(frozen=True)

@@ -49,9 +49,9 @@ class Result:
 
 @dataclass
 class Trial:
-    """All results of one case; traces by scheme, and why one is missing."""
+    """All results of one case of a set; traces by scheme, and why one is missing."""
 
-    case: Case
+    set: str
     results: list[Result] = field(default_factory=list)
     traces: dict[str, Trace] = field(default_factory=dict)
     failures: list[str] = field(default_factory=list)
@@ -85,7 +85,7 @@ def options_for(scenario: Scenario, scheme: str) -> dict[str, float]:
 
 def fly_case(case: Case, entries: Sequence[Entry]) -> Trial:
     """Fly a case with every entry; record it once under the nominal law for the trade-off of each scheme."""
-    trial = Trial(case, [_fly(case.scenario, entry) for entry in entries])
+    trial = Trial(case.set, [_fly(case.scenario, entry) for entry in entries])
     schemes = [scheme for scheme in dict.fromkeys(entry.scheme for entry in entries) if scheme != "none"]
     try:
         recording = record(case.scenario)
@@ -93,14 +93,14 @@ def fly_case(case: Case, entries: Sequence[Entry]) -> Trial:
         trial.failures.append(str(error))
         return trial
     for scheme in schemes:
-        _trace(trial, recording, scheme)
+        _trace(trial, recording, scheme, options_for(case.scenario, scheme))
     return trial
 
 
-def _trace(trial: Trial, recording: Recording, scheme: str) -> None:
+def _trace(trial: Trial, recording: Recording, scheme: str, options: dict[str, float]) -> None:
     """Play the flight to a scheme; what a plug-in fails over is not the end of the comparison."""
     try:
-        trial.traces[scheme] = replay(recording, scheme, options_for(trial.case.scenario, scheme))
+        trial.traces[scheme] = replay(recording, scheme, options)
     except Exception as error:
         trial.failures.append(f"{scheme}, on a recorded flight: {type(error).__name__}: {error}")
 

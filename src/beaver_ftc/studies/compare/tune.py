@@ -30,10 +30,10 @@ from typing import Any
 
 from beaver_ftc.diagnosis.rivals.options import TUNED, TUNED_FOR_ERRORS
 from beaver_ftc.loop.loop import fly
-from beaver_ftc.studies.compare.crew import spread
 from beaver_ftc.studies.compare.flights import CALIBRATION, CALIBRATION_ERRORS, Case, of_set
 from beaver_ftc.studies.compare.replay import Trace, record, replay
 from beaver_ftc.studies.compare.trial import SCHEME, Entry, result_of, with_entry
+from beaver_ftc.studies.engine.flown import fly_all
 
 Options = dict[str, float]
 
@@ -81,7 +81,7 @@ def tune(
     """
     cases = of_set(CALIBRATION_ERRORS if errors else CALIBRATION, most)
     grids = DETECTORS_FOR_ERRORS if errors else DETECTORS
-    played = spread(partial(_play, grids=grids), cases, workers, progress)
+    played = fly_all(partial(_play, grids=grids), cases, workers, progress)
     air = [case.scenario.fdi.bounds.turbulence for case in cases]
     options = {name: _best_detector(name, grid, played, air, target_per_h) for name, grid in grids.items()}
     faulted = [case for case in cases if case.scenario.faults]
@@ -149,7 +149,7 @@ def _cost(trace: Trace, level: float) -> float:
 
 def _best_law(name: str, faulted: Sequence[Case], workers: int) -> Options:
     costs = [
-        fmean(spread(partial(_law_cost, name=name, option=option), faulted, workers))
+        fmean(fly_all(partial(_law_cost, name=name, option=option), faulted, workers))
         for option in candidates(LAWS[name])
     ]
     return candidates(LAWS[name])[costs.index(min(costs))]

@@ -9,6 +9,7 @@ from beaver_ftc.design.model import AXES, control_effectiveness
 from beaver_ftc.design.variants import design_of
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.studies.engine.columns import Columns
 
 SETTLED_S = 2.0  # the start of a reference is a step of its own
 
@@ -24,26 +25,12 @@ class Excitation:
     dt: float
 
 
-class _Memory:
-    def open(self, columns):
-        self.columns, self.chunks = list(columns), []
-
-    def write(self, rows):
-        self.chunks.append(rows.copy())
-
-    def close(self):
-        self.rows = np.concatenate(self.chunks)
-
-    def read(self, *names: str) -> np.ndarray:
-        return np.ascontiguousarray(self.rows[:, [self.columns.index(name) for name in names]])
-
-
 def excitation(scenario: Scenario) -> Excitation:
     """Fly the scenario without its faults and weigh what the surfaces did with the design model.
 
     Raises BadInput when it cannot be trimmed, SimulationFailed when the flight ends before it has settled.
     """
-    log = _Memory()
+    log = Columns()
     fly(scenario.model_copy(update={"faults": ()}), log)
     y = log.read("alpha_rad", "beta_rad", "airspeed_mps", "qdyn_pa", "dpt")
     u = log.read(*(f"{surface}_cmd_rad" for surface in ALL_SURFACES))

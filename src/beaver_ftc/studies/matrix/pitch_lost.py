@@ -1,13 +1,14 @@
 """Elevator and flap lost at once: the same flights with engine power on pitch and without."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from math import degrees
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from beaver_ftc.studies.compare.crew import spread
+from beaver_ftc.studies.engine.columns import Columns
+from beaver_ftc.studies.engine.flown import Progress, flown
 from beaver_ftc.studies.matrix.cases import AIRSPEEDS_MPS, AT_S, REFERENCE, UNCERTAINTY
 from beaver_ftc.studies.matrix.flying import trimmed_deg
 from beaver_ftc.studies.matrix.pitch_margins import margins
@@ -45,25 +46,7 @@ class PitchCase(NamedTuple):
     law: str
 
 
-class _Kept:
-    """A log sink that keeps the few columns that are judged."""
-
-    COLUMNS = ("t_s", "q_rad_s", "theta_rad", "phi_rad", "airspeed_mps", "envelope_valid")
-
-    def open(self, columns: Sequence[str]) -> None:
-        self._places = [list(columns).index(name) for name in self.COLUMNS]
-        self._chunks: list[np.ndarray] = []
-
-    def write(self, rows: np.ndarray) -> None:
-        self._chunks.append(rows[:, self._places].copy())
-
-    def close(self) -> None:
-        self.columns = dict(zip(self.COLUMNS, np.concatenate(self._chunks).T, strict=True))
-
-    def since(self, from_s: float) -> dict[str, np.ndarray]:
-        """Every column from an instant on."""
-        late = self.columns["t_s"] >= from_s
-        return {name: column[late] for name, column in self.columns.items()}
+COLUMNS = ("t_s", "q_rad_s", "theta_rad", "phi_rad", "airspeed_mps", "envelope_valid")
 
 
 def scenario_of(case: PitchCase, enabled: bool) -> "Scenario":
@@ -102,7 +85,7 @@ def _outcome(scenario: "Scenario") -> Document:
     from beaver_ftc.loop.loop import fly
     from beaver_ftc.results.metrics import metrics
 
-    kept = _Kept()
+    kept = Columns(*COLUMNS)
     flight = fly(scenario, kept)
     document = metrics(flight)
     return {
@@ -113,7 +96,7 @@ def _outcome(scenario: "Scenario") -> Document:
     }
 
 
-def _swing(flight: "Flight", kept: _Kept) -> Document:
+def _swing(flight: "Flight", kept: Columns) -> Document:
     """RMS pitch rate and swing of the attitude once settled; null if the aircraft was lost."""
     if flight.departure is not None:
         return {"q_rms_deg_s": None, "theta_swing_deg": None}
@@ -125,7 +108,7 @@ def _swing(flight: "Flight", kept: _Kept) -> Document:
     }
 
 
-def _range(kept: _Kept) -> Document:
+def _range(kept: Columns) -> Document:
     """Airspeed, bank and stay outside the validated envelope since the fault."""
     after = kept.since(AT_S)
     return {
@@ -139,7 +122,7 @@ def run_pitch_lost(
     out: Path,
     airspeeds_mps: tuple[float, ...] = AIRSPEEDS_MPS,
     workers: int = 1,
-    progress: Callable[[float], None] | None = None,
+    progress: Progress | None = None,
 ) -> Document:
     """Write `out/pitch-lost/` (table, JSON); return the document."""
     from beaver_ftc.results.metrics import as_json
@@ -147,8 +130,9 @@ def run_pitch_lost(
     from beaver_ftc.studies.matrix.pitch_text import as_text
 
     cases = [PitchCase(name, V, law) for law in LAWS for name, _, _ in LOST for V in airspeeds_mps]
-    with result_folder(out, NAME) as folder:
-        document = document_of(spread(fly_case, cases, workers, progress), airspeeds_mps)
+    fly = flown(out / NAME, cases, fly_case, workers=workers, progress=progress)
+    with fly as rows, result_folder(out, NAME) as folder:
+        document = document_of(rows, airspeeds_mps)
         (folder / f"{NAME}.json").write_text(as_json(document), encoding="utf-8")
         (folder / f"{NAME}.txt").write_text(as_text(document) + "\n", encoding="utf-8")
     return document

@@ -1,10 +1,9 @@
 """Fly the matrix and keep it in a result folder."""
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from beaver_ftc.studies.compare.crew import spread
+from beaver_ftc.studies.engine.flown import Progress, flown
 from beaver_ftc.studies.matrix.cases import AIRSPEEDS_MPS, cases
 from beaver_ftc.studies.matrix.flying import fly_case
 from beaver_ftc.studies.matrix.summary import document_of
@@ -18,7 +17,7 @@ def run_matrix(
     out: Path,
     airspeeds_mps: tuple[float, ...] = AIRSPEEDS_MPS,
     workers: int = 1,
-    progress: Callable[[float], None] | None = None,
+    progress: Progress | None = None,
     name: str = NAME,
 ) -> Document:
     """Write `out/fault-matrix/` (table, JSON, heat map), or that of `name`; return the document."""
@@ -26,9 +25,10 @@ def run_matrix(
     from beaver_ftc.results.writer import result_folder
     from beaver_ftc.studies.matrix.figure import write_heat_map
 
-    with result_folder(out, name) as folder:
-        flown = spread(fly_case, cases(airspeeds_mps, declared=name == DECLARED), workers, progress)
-        document = document_of(flown)
+    all_cases = cases(airspeeds_mps, declared=name == DECLARED)
+    fly = flown(out / name, all_cases, fly_case, workers=workers, progress=progress)
+    with fly as rows, result_folder(out, name) as folder:
+        document = document_of(rows)
         (folder / f"{NAME}.json").write_text(as_json(document), encoding="utf-8")
         (folder / f"{NAME}.txt").write_text(as_text(document) + "\n", encoding="utf-8")
         write_heat_map(document, folder / f"{NAME}.png")

@@ -6,6 +6,7 @@ from math import isfinite
 from typing import Any
 
 from beaver_ftc.results.metrics import versions
+from beaver_ftc.studies.engine.statistics import sign_test
 from beaver_ftc.studies.power.contenders import BUILT_IN
 from beaver_ftc.studies.power.flying import Watched
 from beaver_ftc.studies.power.grid import WATCHED_S, Grid
@@ -21,7 +22,6 @@ from beaver_ftc.studies.power.tally import (
     rows_of,
     summary,
 )
-from beaver_ftc.studies.statistics import sign_test
 
 Document = dict[str, Any]
 

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from beaver_ftc.studies.compare.replay import Trace
-from beaver_ftc.studies.statistics import Estimate, poisson
+from beaver_ftc.studies.engine.statistics import Estimate, poisson
 
 
 @dataclass(frozen=True)

@@ -1,11 +1,11 @@
 """Fly the survey and keep it in a result folder."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
 
-from beaver_ftc.studies.compare.crew import spread
+from beaver_ftc.studies.engine.flown import Progress, flown
 from beaver_ftc.studies.power.contenders import Contender
 from beaver_ftc.studies.power.document import document_of
 from beaver_ftc.studies.power.flying import Watched, fly_faulted, fly_healthy
@@ -22,16 +22,22 @@ def run_power(
     grid: Grid,
     schemes: Sequence[Contender],
     workers: int = 1,
-    progress: Callable[[float], None] | None = None,
+    progress: Progress | None = None,
 ) -> Document:
     """Write `out/power/` (document, one row a flight and scheme, text, figures); return the document."""
     from beaver_ftc.results.metrics import as_json
     from beaver_ftc.results.writer import result_folder
     from beaver_ftc.studies.power.figure import write_figures
 
-    with result_folder(out, NAME) as folder:
-        healthy, faulted = fly(grid, schemes, workers, progress)
-        document, rows = document_of(grid, healthy, faulted)
+    schemes = tuple(schemes)
+    bouts = [*((bout, False) for bout in grid.healthy()), *((bout, True) for bout in grid.faulted())]
+    work, count = partial(_fly_one, grid=grid, schemes=schemes), len(grid.healthy())
+    asked = grid, schemes
+    study = flown(
+        out / NAME, bouts, work, Watched, asked=asked, workers=workers, progress=progress, lost=_lost
+    )
+    with study as watched, result_folder(out, NAME) as folder:
+        document, rows = document_of(grid, watched[:count], watched[count:])
         (folder / f"{NAME}.json").write_text(as_json(document), encoding="utf-8")
         (folder / f"{NAME}.txt").write_text(as_text(document) + "\n", encoding="utf-8")
         write_rows(rows, folder / f"{NAME}.parquet")
@@ -40,22 +46,15 @@ def run_power(
     return document
 
 
-def fly(
-    grid: Grid,
-    schemes: Sequence[Contender],
-    workers: int = 1,
-    progress: Callable[[float], None] | None = None,
-) -> tuple[list[Watched], list[Watched]]:
-    """The healthy bouts and those with faults, in order whatever the number of workers."""
-    bouts = [*((bout, False) for bout in grid.healthy()), *((bout, True) for bout in grid.faulted())]
-    watched = spread(partial(_fly_one, grid=grid, schemes=tuple(schemes)), bouts, workers, progress)
-    count = len(grid.healthy())
-    return watched[:count], watched[count:]
-
-
 def _fly_one(task: tuple[Bout, bool], grid: Grid, schemes: Sequence[Contender]) -> Watched:
     bout, faulted = task
     return (fly_faulted if faulted else fly_healthy)(bout, grid, schemes)
+
+
+def _lost(case: Any, why: str) -> Watched:
+    """A bout that ends its process: nothing was watched, and why."""
+    bout = case.what[0]
+    return Watched(bout, failures=[f"{' '.join(bout.condition)}, seed {bout.seed}: {why}"])
 
 
 def write_rows(rows: Sequence[Row], path: Path) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.metrics import Document, metrics
 from beaver_ftc.scenario.diagnosis import DEADBEAT_PER_S
+from beaver_ftc.studies.engine.columns import Columns
 from beaver_ftc.studies.reproduce.choices import ELEVATOR_LOSS, FAULT_AT_S, UNANTICIPATED, scenario
 
 AXES = ("p", "q", "r")
@@ -47,19 +48,6 @@ BESIDE = (
     Case("rudder-sharpened", "", {"faults": _loss("rudder"), **SHARPENED}),
     Case("unanticipated-interval", "", {"faults": [UNANTICIPATED], "fdi.thresholds": "interval"}),
 )
-
-
-class _Memory:
-    """A log sink that keeps the flight as columns."""
-
-    def open(self, columns: Any) -> None:
-        self._names, self._chunks = tuple(columns), list[np.ndarray]()
-
-    def write(self, rows: np.ndarray) -> None:
-        self._chunks.append(rows.copy())
-
-    def close(self) -> None:
-        self.columns = dict(zip(self._names, np.concatenate(self._chunks).T, strict=True))
 
 
 @dataclass(frozen=True)
@@ -123,6 +111,6 @@ class Flown:
 
 def fly_case(case: Case, changes: Mapping[str, Any] | None = None) -> Flown:
     """Fly a case, with further changes to the choices."""
-    memory = _Memory()
-    flight = fly(scenario(case.name, {**case.changes, **(changes or {})}), memory)
-    return Flown(metrics(flight), memory.columns)
+    log = Columns()
+    flight = fly(scenario(case.name, {**case.changes, **(changes or {})}), log)
+    return Flown(metrics(flight), log)

@@ -1,6 +1,6 @@
 """The reproduction as one document: what the tables, the page and `--format json` are made from."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict
 from math import isfinite
 
@@ -8,9 +8,7 @@ from beaver_ftc.results.metrics import Document, versions
 from beaver_ftc.studies.reproduce.cases import BESIDE, PUBLISHED, Flown, fly_case
 from beaver_ftc.studies.reproduce.choices import CHOICES
 from beaver_ftc.studies.reproduce.claims import CLAIMS, Claim
-from beaver_ftc.studies.reproduce.sensitivity import VARIANTS, study
-
-Spread = Callable[..., Sequence[list[float]]]
+from beaver_ftc.studies.reproduce.sensitivity import VARIANTS
 
 
 def fly_published() -> dict[str, Flown]:
@@ -18,9 +16,8 @@ def fly_published() -> dict[str, Flown]:
     return {case.name: fly_case(case) for case in (*PUBLISHED, *BESIDE)}
 
 
-def document_of(flights: dict[str, Flown], spread: Spread) -> Document:
-    """Judge the flights, fly the sensitivity study through `spread(work, items)`, and write it all down."""
-    numbers = study(spread)
+def document_of(flights: dict[str, Flown], numbers: Sequence[list[float]]) -> Document:
+    """Judge the flights; numbers: of every claim under each of the sensitivity study's VARIANTS."""
     claims = [_judged(claim, flights, [row[i] for row in numbers]) for i, claim in enumerate(CLAIMS)]
     return {
         "passed": all(claim["passed"] for claim in claims),

@@ -1,7 +1,7 @@
 """Do the conclusions hang on what the paper leaves open? Every choice is changed, one at a time, and every
 statement held against the flights again."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -70,8 +70,3 @@ def numbers_of(variant: Variant) -> list[float]:
     """The number of every claim, in the claims' order, with the variant's changes."""
     flights = {case.name: fly_case(case, variant.changes) for case in PUBLISHED}
     return [claim.measure(flights) for claim in CLAIMS]
-
-
-def study(spread: Callable[..., Sequence[list[float]]]) -> list[list[float]]:
-    """numbers_of every variant; `spread(work, items)` maps over them."""
-    return list(spread(numbers_of, VARIANTS))

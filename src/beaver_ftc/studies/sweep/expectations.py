@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from beaver_ftc.scenario.sweep_schema import AxisLevels, Level, QuantileLevel, SweepExpect
-from beaver_ftc.studies.statistics import (
+from beaver_ftc.studies.engine.statistics import (
     poisson,
     poisson_bound,
     quantile,

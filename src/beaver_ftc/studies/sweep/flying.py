@@ -1,7 +1,6 @@
 """One flight of a sweep: its scenario, its row, and on request its log. What runs in the workers."""
 
 import contextlib
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,7 +13,7 @@ from beaver_ftc.scenario.problems import key_path, problems_of
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.sweep_loader import Sweep
 from beaver_ftc.studies.sweep.sampling import Assignment, flight_seed
-from beaver_ftc.studies.sweep.table import BAD_INPUT, FAILED, Row, row_of, row_of_failure
+from beaver_ftc.studies.sweep.table import BAD_INPUT, CRASHED, FAILED, Row, row_of, row_of_failure
 
 if TYPE_CHECKING:
     from beaver_ftc.loop.flight import Flight
@@ -71,9 +70,9 @@ def fly_one(job: Job, assignment: Assignment) -> Row:
     return row
 
 
-def fly_all(job: Job, assignments: Sequence[Assignment]) -> list[Row]:
-    """Fly one after the other."""
-    return [fly_one(job, assignment) for assignment in assignments]
+def lost(sweep: Sweep, assignment: Assignment, why: str) -> Row:
+    """The row of a flight that ends its process."""
+    return row_of_failure(*assignment, flight_seed(sweep.file.seed, assignment.run), CRASHED, why)
 
 
 def warm_up(job: Job) -> None:

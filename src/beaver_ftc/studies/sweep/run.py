@@ -1,25 +1,26 @@
 """A sweep from beginning to end: fly what is missing, then say what it all shows."""
 
 import json
-import os
-from collections.abc import Callable, Sequence
+from collections import Counter
+from collections.abc import Callable
 from contextlib import closing
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
 from beaver_ftc.errors import BadInput, BeaverFtcError, SimulationFailed
 from beaver_ftc.results.metrics import as_json, versions
 from beaver_ftc.scenario.sweep_loader import Sweep
-from beaver_ftc.studies.sweep.crew import Crew, LocalCrew
-from beaver_ftc.studies.sweep.engine import Engine, Source
-from beaver_ftc.studies.sweep.flying import Job, Keep, keep_flight, scenario_of
-from beaver_ftc.studies.sweep.identity import Identity
+from beaver_ftc.studies.engine.campaign import Campaign, Source
+from beaver_ftc.studies.engine.crew import Crew, LocalCrew, Work
+from beaver_ftc.studies.engine.files import clear_disk_errors, write_whole
+from beaver_ftc.studies.engine.processes import cores
+from beaver_ftc.studies.sweep.flying import Job, Keep, fly_one, keep_flight, lost, scenario_of, warm_up
 from beaver_ftc.studies.sweep.sampling import Assignment, Plan
 from beaver_ftc.studies.sweep.search import SearchSource, found
 from beaver_ftc.studies.sweep.source import SweepSource
-from beaver_ftc.studies.sweep.store import Store, clear_disk_errors, write_whole
-from beaver_ftc.studies.sweep.table import RESULTS, Row, schema_of
+from beaver_ftc.studies.sweep.store import Store, identity_of
 
 if TYPE_CHECKING:
     from beaver_ftc.studies.sweep.flights import Flights
@@ -58,14 +59,12 @@ class Tally:
     faulted: int = 0
     detected: int = 0
 
-    def count(self, rows: Sequence[Row]) -> None:
-        """Take in the rows of a batch."""
-        for row in rows:
-            self.done += 1
-            self.failed += row["status"] not in RESULTS
-            if row["fault.type"] is not None:
-                self.faulted += 1
-                self.detected += bool(row["detection.detected"])
+    def count(self, counts: Counter[str]) -> None:
+        """Take in the counts of a batch."""
+        self.done += counts["done"]
+        self.failed += counts["failed"]
+        self.faulted += counts["faulted"]
+        self.detected += counts["detected"]
 
 
 class _Flown(Source, Protocol):
@@ -95,23 +94,23 @@ def run_sweep(
     tally = Tally(sweep.flights)
     folder = options.out / sweep.name
     options = replace(options, keep=replace(options.keep, folder=(folder / "flights").resolve()))
-    with Store(folder, schema_of(sweep)) as store:
-        store.begin(Identity.of(sweep, options.search), options.resume)
+    with Store(folder, sweep) as store:
+        store.begin(identity_of(sweep, options.search), options.resume)
         if not store.is_compacted(sweep.flights):
 
-            def landed(rows: Sequence[Row]) -> None:
-                tally.count(rows)
+            def landed(counts: Counter[str]) -> None:
+                tally.count(counts)
                 progress(tally)
 
             store.reopen()
             source = _source(sweep, options, store, landed)
             _fly_missing(source, sweep, options, tally, stopped)
             store.compact(source.tables())
-        store.remove_parts()
+        store.parts.remove()
         return conclude(sweep, options, store)
 
 
-def _source(sweep: Sweep, options: Options, store: Store, landed: Callable[[Sequence[Row]], None]) -> _Flown:
+def _source(sweep: Sweep, options: Options, store: Store, landed: Callable[[Counter[str]], None]) -> _Flown:
     if options.search:
         return SearchSource(sweep, options.search, store, landed)
     return SweepSource(sweep, store, landed)
@@ -122,7 +121,7 @@ def _fly_missing(
 ) -> None:
     if tally.done < tally.total:
         with closing(_crew(sweep, options)) as crew:
-            Engine(source, crew, sweep.file.seed).fly(stopped)
+            Campaign(source, crew, partial(lost, sweep)).fly(stopped)
     if tally.done < tally.total:
         raise SweepStopped(
             f"{sweep.name}: stopped, {tally.done} of {tally.total} flights are kept; "
@@ -132,16 +131,12 @@ def _fly_missing(
 
 def _crew(sweep: Sweep, options: Options) -> Crew:
     job = Job(sweep, options.keep)
+    work = Work(partial(fly_one, job), partial(warm_up, job))
     if options.backend == "ray":
-        from beaver_ftc.studies.sweep.ray_crew import RayCrew
+        from beaver_ftc.studies.engine.ray_crew import RayCrew
 
-        return RayCrew(job, options.address, options.workers)
-    return LocalCrew(job, options.workers or cores())
-
-
-def cores() -> int:
-    """The cores this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+        return RayCrew(work, options.address, options.workers)
+    return LocalCrew(work, options.workers or cores())
 
 
 def conclude(sweep: Sweep, options: Options, store: Store) -> Document:
@@ -191,7 +186,7 @@ def assignment_of(sweep: Sweep, options: Options, index: int) -> Assignment:
         raise BadInput(f"{sweep.name}: there is no flight {index}, allowed: 0 to {sweep.flights - 1}")
     if options.search is None:
         return Plan(sweep).assignments([index])[0]
-    store = Store(options.out / sweep.name, schema_of(sweep))
+    store = Store(options.out / sweep.name, sweep)
     return SearchSource(sweep, options.search, store, lambda rows: None).assignment(index)
 
 

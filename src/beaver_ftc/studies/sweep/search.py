@@ -14,11 +14,11 @@ import numpy as np
 
 from beaver_ftc.errors import BadInput
 from beaver_ftc.scenario.sweep_loader import Sweep
-from beaver_ftc.studies.sweep.engine import Batch
+from beaver_ftc.studies.engine.campaign import Batch
 from beaver_ftc.studies.sweep.sampling import Assignment, value_at
 from beaver_ftc.studies.sweep.source import Landed
 from beaver_ftc.studies.sweep.store import Store
-from beaver_ftc.studies.sweep.table import AXES, DEPARTED, Row, table_of
+from beaver_ftc.studies.sweep.table import AXES, DEPARTED, Row, counts_of_rows
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -119,11 +119,11 @@ class SearchSource:
         self._in_flight = True
         return Batch(self._evolution.generation, self._assignments(runs))
 
-    def flights_left(self) -> int:
+    def cases_left(self) -> int:
         return 0  # the next generation waits for this one: it must be spread over all workers
 
     def landed(self, batch: Batch, rows: list[Row]) -> None:
-        self._store.land(batch.number, table_of(self._sweep, self._store.schema, rows))
+        self._store.parts.land(batch.number, rows)
         self._select(rows)
         self._in_flight = False
 
@@ -156,7 +156,7 @@ class SearchSource:
 
     def _select(self, rows: list[Row]) -> None:
         self._evolution.select(np.array([score(self._objective, row) for row in rows]))
-        self._on_landed(rows)
+        self._on_landed(counts_of_rows(rows))
 
     def _assignments(self, runs: range) -> tuple[Assignment, ...]:
         if not runs:

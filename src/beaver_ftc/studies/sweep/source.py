@@ -1,13 +1,15 @@
-"""Where the batches of an ordinary sweep come from: the folder knows what is missing."""
+"""The batches of an ordinary sweep: the folder knows which are missing."""
 
-from collections.abc import Callable, Iterator, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING, Any
 
 from beaver_ftc.scenario.sweep_loader import Sweep
-from beaver_ftc.studies.sweep.engine import Batch
+from beaver_ftc.studies.engine.campaign import Batch, Batches
+from beaver_ftc.studies.engine.crew import Row
+from beaver_ftc.studies.engine.parts import batches_of
 from beaver_ftc.studies.sweep.sampling import Plan
 from beaver_ftc.studies.sweep.store import Store
-from beaver_ftc.studies.sweep.table import Row, table_of
+from beaver_ftc.studies.sweep.table import counts_of_rows, counts_of_table
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -16,7 +18,7 @@ FRAMES_A_BATCH = 50_000  # a third of a second of work: little to lose, and a fi
 MOST_A_BATCH = 256
 MOST_BATCHES = 20_000  # of a sweep of millions: so many files are still handled with ease
 
-Landed = Callable[[Sequence[Row]], None]
+Landed = Callable[[Any], None]  # takes the counts of a batch
 
 
 def batch_size(sweep: Sweep) -> int:
@@ -27,52 +29,33 @@ def batch_size(sweep: Sweep) -> int:
     return max(size, -(-sweep.flights // MOST_BATCHES))
 
 
-class SweepSource:
-    """A `Source`: the batches that have not landed yet, in order."""
+class SweepSource(Batches):
+    """The batches that have not landed yet, in order."""
 
     def __init__(self, sweep: Sweep, store: Store, on_landed: Landed) -> None:
-        self._sweep, self._store, self._on_landed = sweep, store, on_landed
-        self._size = batch_size(sweep)
-        self._plan = Plan(sweep)
-        self._missing = self._find_missing()
-        self._left = sum(len(self._runs(batch)) for batch in self._missing)
-        self._next = iter(self._missing)
+        self._store, self._on_landed = store, on_landed
+        self._batches = dict(batches_of(sweep.flights, batch_size(sweep)))
+        plan, missing = Plan(sweep), self._find_missing()
+        super().__init__(
+            (Batch(number, tuple(plan.assignments(self._batches[number]))) for number in missing),
+            sum(len(self._batches[number]) for number in missing),
+            self._land,
+        )
 
-    def next_batch(self) -> Batch | None:
-        number = next(self._next, None)
-        if number is None:
-            return None
-        runs = self._runs(number)
-        self._left -= len(runs)
-        return Batch(number, tuple(self._plan.assignments(runs)))
-
-    def flights_left(self) -> int:
-        return self._left
-
-    def landed(self, batch: Batch, rows: list[Row]) -> None:
-        self._store.land(batch.number, table_of(self._sweep, self._store.schema, rows))
-        self._on_landed(rows)
+    def _land(self, batch: Batch, rows: list[Row]) -> None:
+        self._store.parts.land(batch.number, rows)
+        self._on_landed(counts_of_rows(rows))
 
     def tables(self) -> "Iterator[pa.Table]":
         """Every batch's table, in order; all must have landed."""
-        for number in range(self._batches):
-            table = self._store.landed(number, self._runs(number))
-            assert table is not None
-            yield table
-
-    @property
-    def _batches(self) -> int:
-        return -(-self._sweep.flights // self._size)
-
-    def _runs(self, number: int) -> range:
-        return range(number * self._size, min((number + 1) * self._size, self._sweep.flights))
+        return (self._store.landed(number, runs) for number, runs in self._batches.items())
 
     def _find_missing(self) -> list[int]:
         missing = []
-        for number in range(self._batches):
-            table = self._store.landed(number, self._runs(number))
+        for number, runs in self._batches.items():
+            table = self._store.landed(number, runs)
             if table is None:
                 missing.append(number)
             else:
-                self._on_landed(table.select(["fault.type", "detection.detected", "status"]).to_pylist())
+                self._on_landed(counts_of_table(table))
         return missing

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from beaver_ftc.studies.statistics import CONFIDENCE, poisson, quantile, wilson
+from beaver_ftc.studies.engine.statistics import CONFIDENCE, poisson, quantile, wilson
 from beaver_ftc.studies.sweep import sensitivity
 from beaver_ftc.studies.sweep.flights import NO_FAULT, Flights
 from beaver_ftc.studies.sweep.table import AXES

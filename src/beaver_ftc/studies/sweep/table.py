@@ -5,6 +5,7 @@ bytes.
 """
 
 import json
+from collections import Counter
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -190,3 +191,29 @@ def table_of(sweep: "Sweep", schema: "pa.Schema", rows: Sequence[Row]) -> "pa.Ta
         [pa.array(column, type=field.type) for column, field in zip(columns, schema, strict=True)],
         schema=schema,
     )
+
+
+def counts_of_rows(rows: Sequence[Row]) -> Counter[str]:
+    """How many flights: `done`, `failed` (no metrics), `faulted`, and `detected` of these."""
+    counts: Counter[str] = Counter(done=len(rows))
+    for row in rows:
+        counts["failed"] += row["status"] not in RESULTS
+        faulted = row["fault.type"] is not None
+        counts["faulted"] += faulted
+        counts["detected"] += faulted and bool(row["detection.detected"])
+    return counts
+
+
+def counts_of_table(table: "pa.Table") -> Counter[str]:
+    """The same of a table."""
+    import pyarrow as pa
+    from pyarrow import compute
+
+    faulted = compute.is_valid(table["fault.type"])
+    found = {
+        "failed": compute.invert(compute.is_in(table["status"], value_set=pa.array(RESULTS))),
+        "faulted": faulted,
+        "detected": compute.and_(faulted, compute.fill_null(table["detection.detected"], fill_value=False)),
+    }
+    sums = {name: compute.sum(mask).as_py() or 0 for name, mask in found.items()}
+    return Counter(done=len(table), **sums)

@@ -5,28 +5,26 @@ campaign that was stopped goes on where it was, and a longer one builds on a sho
 depends on the seed and its number alone, so neither the workers nor the interruptions show in the result.
 """
 
-import contextlib
-import hashlib
 import json
-import multiprocessing
-import os
-import signal
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import cache, partial
+from functools import partial
 from math import ceil
 from pathlib import Path
 from typing import Any
 
 from beaver_ftc import __version__
 from beaver_ftc.errors import BadInput, SimulationFailed
-from beaver_ftc.paths import data_root
+from beaver_ftc.studies.engine.campaign import Batch, Batches
+from beaver_ftc.studies.engine.crew import Work
+from beaver_ftc.studies.engine.files import write_whole
+from beaver_ftc.studies.engine.flown import conduct as fly_missing
+from beaver_ftc.studies.engine.identity import fingerprint
 from beaver_ftc.studies.verify.draw import HEALTHY_S, Draw
 from beaver_ftc.studies.verify.fly import SCHEMES, STEPS, Row, fly_draw
 
 KINDS = ("healthy", "faulty")
 CHUNK = 50
-_PACKAGE = Path(__file__).parents[2]
 Progress = Callable[[float], None]
 Schemes = dict[str, dict[str, Any]]
 
@@ -61,12 +59,19 @@ def conduct(
     rows = {kind: _kept(folder, kind) for kind in KINDS}
     chunks = [chunk for kind in KINDS for chunk in _missing(campaign, kind, rows[kind])]
     done, total = sum(map(len, rows.values())), sum(campaign.wanted(kind) for kind in KINDS)
-    for chunk, flown in _fly_all(chunks, campaign.schemes, workers):
-        _keep(folder, chunk, flown)
-        rows[chunk[0].kind].update((row["index"], row) for row in flown)
-        done += len(chunk)
+
+    def land(batch: Batch, flown: list[Row]) -> None:
+        nonlocal done
+        kind = batch.cases[0].kind
+        _keep(folder, batch.cases, flown)
+        rows[kind].update((row["index"], row) for row in flown)
+        done += len(flown)
         if progress is not None:
             progress(done / total)
+
+    batches = [Batch(number, tuple(chunk)) for number, chunk in enumerate(chunks)]
+    source = Batches(batches, total - done, land)
+    fly_missing(source, Work(partial(_fly_draw, campaign.schemes)), workers, _crashed)
     return {kind: [rows[kind][i] for i in range(campaign.wanted(kind))] for kind in KINDS}
 
 
@@ -76,17 +81,8 @@ def _identity(campaign: Campaign) -> dict[str, Any]:
         "seed": campaign.seed,
         "schemes": list(campaign.schemes),
         "version": __version__,
-        "code": _fingerprint(),
+        "code": fingerprint(),
     }
-
-
-@cache
-def _fingerprint() -> str:
-    """Of the package's sources and the aircraft: any change may change a flight."""
-    digest = hashlib.sha256()
-    for source in (*sorted(_PACKAGE.rglob("*.py")), data_root() / "aircraft" / "beaver" / "beaver.xml"):
-        digest.update(source.name.encode() + source.read_bytes())
-    return digest.hexdigest()[:16]
 
 
 def _open(folder: Path, campaign: Campaign) -> None:
@@ -94,7 +90,7 @@ def _open(folder: Path, campaign: Campaign) -> None:
     try:
         folder.mkdir(parents=True, exist_ok=True)
         if not manifest.exists():
-            _write_whole(manifest, mine)
+            write_whole(manifest, json.dumps(mine).encode())
         theirs = json.loads(manifest.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
         raise SimulationFailed(f"{folder}: cannot be used for a campaign: {error}") from error
@@ -116,42 +112,17 @@ def _missing(campaign: Campaign, kind: str, kept: dict[int, Row]) -> Iterator[li
         yield [Draw(campaign.seed, kind, i) for i in indices[start : start + CHUNK]]
 
 
-def _keep(folder: Path, chunk: list[Draw], rows: list[Row]) -> None:
+def _keep(folder: Path, chunk: Sequence[Draw], rows: list[Row]) -> None:
     name = f"{chunk[0].kind}-{chunk[0].index:07d}-{chunk[-1].index:07d}.json"
     try:
-        _write_whole(folder / name, rows)
+        write_whole(folder / name, json.dumps(rows).encode())
     except OSError as error:
         raise SimulationFailed(f"{folder / name}: {error.strerror}") from error
 
 
-def _write_whole(path: Path, content: Any) -> None:
-    """Into a hidden sibling first: a reader, or the next campaign, sees all of a file or none of it."""
-    partial = path.with_name(f".{path.name}.{os.getpid()}")
-    partial.write_text(json.dumps(content), encoding="utf-8")
-    partial.replace(path)
+def _fly_draw(schemes: Schemes, draw: Draw) -> Row:
+    return fly_draw(draw, schemes)
 
 
-def _fly_chunk(schemes: Schemes, chunk: list[Draw]) -> tuple[list[Draw], list[Row]]:
-    return chunk, [fly_draw(draw, schemes) for draw in chunk]
-
-
-def _fly_all(
-    chunks: list[list[Draw]], schemes: Schemes, workers: int
-) -> Iterable[tuple[list[Draw], list[Row]]]:
-    """Chunks as they land, in no particular order."""
-    fly_chunk = partial(_fly_chunk, schemes)
-    if workers == 1 or len(chunks) < 2:
-        yield from map(fly_chunk, chunks)
-        return
-    with _pool(min(workers, len(chunks))) as pool:
-        yield from pool.imap_unordered(fly_chunk, chunks)
-
-
-@contextlib.contextmanager
-def _pool(workers: int) -> Iterator[Any]:
-    """Fresh processes: JSBSim and compiled code do not survive a fork. An interrupt reaches the parent
-    alone.
-    """
-    pool = multiprocessing.get_context("spawn").Pool(workers, signal.signal, (signal.SIGINT, signal.SIG_IGN))
-    with pool:
-        yield pool
+def _crashed(draw: Draw, why: str) -> Row:
+    raise SimulationFailed(f"{draw.kind} flight {draw.index} of seed {draw.seed}: {why}")

@@ -34,6 +34,11 @@ class Draw:
     kind: str
     index: int
 
+    @property
+    def run(self) -> tuple[str, int]:
+        """What it is known by in its campaign."""
+        return self.kind, self.index
+
     def generator(self) -> np.random.Generator:
         """This flight's own random numbers."""
         key = (_FAULTY if self.kind == "faulty" else _HEALTHY, self.index)

@@ -1,6 +1,6 @@
 """A Ray cluster as crew: each task a Ray task, a few in the queue for each CPU so that none waits.
 
-Whether a lost task is flown again is the engine's to decide, as with local processes; Ray itself does not
+Whether a lost task is flown again is the campaign's to decide, as with local processes; Ray itself does not
 retry.
 """
 
@@ -8,11 +8,8 @@ from typing import Any
 
 from beaver_ftc.errors import BadInput, SimulationFailed
 from beaver_ftc.results.metrics import versions
-from beaver_ftc.studies.sweep.crew import Outcome, Task, silence
-from beaver_ftc.studies.sweep.flying import Job, fly_all
-from beaver_ftc.studies.sweep.processes import one_thread_each
-from beaver_ftc.studies.sweep.sampling import Assignment
-from beaver_ftc.studies.sweep.table import Row
+from beaver_ftc.studies.engine.crew import Outcome, Row, Task, Work, silence
+from beaver_ftc.studies.engine.processes import one_thread_each
 
 QUEUED_A_CPU = 2
 
@@ -20,11 +17,11 @@ QUEUED_A_CPU = 2
 class RayCrew:
     """The CPUs of a Ray cluster: one that runs already, one at an address, or one started on this machine."""
 
-    def __init__(self, job: Job, address: str | None, workers: int | None) -> None:
+    def __init__(self, work: Work, address: str | None, workers: int | None) -> None:
         self._ray = _ray()
         self._ours = _join(self._ray, address)
         self._most = workers
-        self._job = self._ray.put(job)
+        self._work = self._ray.put(work)
         self._versions = dict(versions())
         self._fly = self._ray.remote(num_cpus=1, max_retries=0)(fly_task)
         self._tasks: dict[Any, Task] = {}
@@ -36,7 +33,7 @@ class RayCrew:
         return self._most or QUEUED_A_CPU * cpus
 
     def submit(self, task: Task) -> None:
-        self._tasks[self._fly.remote(self._job, self._versions, task.flights)] = task
+        self._tasks[self._fly.remote(self._work, self._versions, task.cases)] = task
 
     def outcomes(self, timeout_s: float) -> list[Outcome]:
         ready, _ = self._ray.wait(list(self._tasks), num_returns=1, timeout=timeout_s)
@@ -58,7 +55,7 @@ class RayCrew:
             return None
 
 
-def fly_task(job: Job, driver_versions: dict[str, str], flights: tuple[Assignment, ...]) -> list[Row]:
+def fly_task(work: Work, driver_versions: dict[str, str], cases: tuple[Any, ...]) -> list[Row]:
     """Fly a task on whatever node it is, if that has what the others have."""
     own = dict(versions())
     if own != driver_versions:
@@ -69,7 +66,7 @@ def fly_task(job: Job, driver_versions: dict[str, str], flights: tuple[Assignmen
         )
         raise SimulationFailed(f"a node of the cluster has {changed}: the table would mix versions")
     with silence():
-        return fly_all(job, flights)
+        return work.all(cases)
 
 
 def _ray() -> Any:

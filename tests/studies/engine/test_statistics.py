@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from beaver_ftc.studies.statistics import (
+from beaver_ftc.studies.engine.statistics import (
     binomial,
     poisson,
     poisson_bound,

@@ -1,4 +1,4 @@
-"""How worker processes come to be: forked from a clean process that has everything imported.
+"""How worker processes start: forked from a clean process that has everything imported.
 
 Importing takes that process half a second; started early, it does so while this one still reads its input.
 Nothing heavy is imported here.
@@ -11,8 +11,18 @@ from collections.abc import Iterator
 from multiprocessing import forkserver
 from typing import Any
 
-_PRELOAD = ["beaver_ftc.studies.sweep.crew", "beaver_ftc.loop.loop", "beaver_ftc.results.metrics"]
+_PRELOAD = [
+    "beaver_ftc.studies.engine.crew",
+    "beaver_ftc.studies.sweep.flying",
+    "beaver_ftc.loop.loop",
+    "beaver_ftc.results.metrics",
+]
 _ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+
+
+def cores() -> int:
+    """The cores this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def context() -> Any:

@@ -4,9 +4,8 @@ import random
 
 import pytest
 
-from beaver_ftc.studies.sweep.crew import Outcome, Task
-from beaver_ftc.studies.sweep.engine import Batch, Engine
-from beaver_ftc.studies.sweep.sampling import Assignment
+from beaver_ftc.studies.engine.campaign import Batch, Campaign
+from beaver_ftc.studies.engine.crew import Case, Outcome, Task
 
 
 class Numbers:
@@ -14,15 +13,15 @@ class Numbers:
 
     def __init__(self, flights: int, size: int) -> None:
         runs = [range(first, min(first + size, flights)) for first in range(0, flights, size)]
-        self._coming = [Batch(n, tuple(Assignment(run, {}) for run in batch)) for n, batch in enumerate(runs)]
+        self._coming = [Batch(n, tuple(Case(run, None) for run in batch)) for n, batch in enumerate(runs)]
         self.landings: list[tuple[int, list[int]]] = []
         self.rows: list[dict] = []
 
     def next_batch(self):
         return self._coming.pop(0) if self._coming else None
 
-    def flights_left(self):
-        return sum(len(batch.flights) for batch in self._coming)
+    def cases_left(self):
+        return sum(len(batch.cases) for batch in self._coming)
 
     def landed(self, batch, rows):
         self.landings.append((batch.number, [row["run"] for row in rows]))
@@ -45,17 +44,21 @@ class Unreliable:
 
     def outcomes(self, timeout_s):
         task = self._tasks.pop(self._random.randrange(len(self._tasks)))
-        runs = [flight.run for flight in task.flights]
+        runs = [flight.run for flight in task.cases]
         if self._deadly.intersection(runs) or self._random.random() < self._loses:
             return [Outcome(task, None)]
-        return [Outcome(task, [{"run": run, "status": "flown"} for run in reversed(runs)])]
+        return [Outcome(task, [{"run": run, "status": "flown"} for run in runs])]
 
     def close(self):
         pass
 
 
+def lost(case, why):
+    return {"run": case.run, "status": "crashed", "reason": why}
+
+
 def fly(source, crew):
-    Engine(source, crew, sweep_seed=1).fly()
+    Campaign(source, crew, lost).fly()
     return source
 
 
@@ -86,14 +89,14 @@ def test_the_flight_that_kills_its_process_is_found_and_only_it():
 def test_the_last_tasks_are_small_so_that_no_worker_waits_long():
     crew = Unreliable(2)
     fly(Numbers(64, 32), crew)
-    sizes = [len(task.flights) for task in crew.submitted]
+    sizes = [len(task.cases) for task in crew.submitted]
     assert sizes[0] == 8  # 64 flights left for two workers, four tasks each
     assert sizes[-1] <= 4
 
 
 def test_stopping_lands_what_is_in_the_air_and_hands_out_no_more():
     source, crew = Numbers(100, 5), Unreliable(2)
-    Engine(source, crew, 1).fly(stopped=lambda: len(crew.submitted) >= 4)
+    Campaign(source, crew, lost).fly(stopped=lambda: len(crew.submitted) >= 4)
     assert len(crew.submitted) == 4
     assert not crew._tasks
     assert all(len(runs) == 5 for _, runs in source.landings)

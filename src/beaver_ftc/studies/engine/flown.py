@@ -76,10 +76,7 @@ def conduct(source: Batches, work: Work, workers: int, lost: Callable[[Any, str]
     crew: Crew
     if not source.cases_left():
         return
-    if workers <= 1:
-        crew = ThisProcess(work)
-    else:
-        crew = LocalCrew(work, max(1, min(workers, source.cases_left())))
+    crew = ThisProcess(work) if workers <= 1 else LocalCrew(work, max(1, min(workers, source.cases_left())))
     with contextlib.closing(crew):
         Campaign(source, crew, lost).fly()
 

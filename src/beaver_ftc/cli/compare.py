@@ -66,16 +66,9 @@ def command(
 
 
 def _compare_runs(folders: list[Path], out: Path, format: Format) -> None:
-    from beaver_ftc.results.metrics import as_json
-    from beaver_ftc.results.report import write_report
-    from beaver_ftc.results.writer import result_folder
-    from beaver_ftc.studies.compare.runs import as_text, labels, read_runs, write_figure
+    from beaver_ftc.studies.compare.runs import as_text, labels, write_runs
 
-    runs = read_runs(folders)
-    with result_folder(out, "runs") as folder:
-        write_figure(runs, folder / "runs.png")
-        (folder / "runs.json").write_text(as_json(runs), encoding="utf-8")
-        write_report(folder / "runs.html", folders, labels(runs))
+    runs = write_runs(out, folders)
     if format is Format.json:
         emit_json({"runs": dict(zip(labels(runs), runs, strict=True))})
     else:

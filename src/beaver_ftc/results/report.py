@@ -6,7 +6,7 @@ resolution around the fault.
 
 import base64
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from functools import cache
 from pathlib import Path
@@ -23,7 +23,10 @@ from beaver_ftc.results.views import Panel, Trace, View, unit_of, views
 if TYPE_CHECKING:
     from jinja2 import Environment
 
+Section = Callable[[Path], str]
+
 _TEMPLATES = Path(__file__).parent / "templates"
+_SECTIONS: list[Section] = []  # studies that add to a run's report register theirs
 _PATH = ("north_m", "east_m", "altitude_m", "phi_rad", "theta_rad", "psi_rad")
 
 
@@ -49,17 +52,21 @@ def render(folders: Sequence[Path], names: Sequence[str] = ()) -> str:
         data=_harmless(json.dumps(_data(folders, documents, names), allow_nan=False, separators=(",", ":"))),
         css=_asset("report.css"),
         script=_asset("report.js"),
-        sections=[_mismatch(folder) for folder in folders],
+        sections=[_sections(folder) for folder in folders],
     )
 
 
-def _mismatch(folder: Path) -> Any:
-    """What `beaver-ftc mismatch` has found in a folder, if it has been there."""
+def register_section(section: Section) -> None:
+    """Have every report from now on show what `section` makes of its result folder: HTML, or nothing."""
+    if section not in _SECTIONS:
+        _SECTIONS.append(section)
+
+
+def _sections(folder: Path) -> Any:
+    """What studies have found in a folder, if they have been there."""
     from markupsafe import Markup
 
-    from beaver_ftc.studies.mismatch.section import mismatch_section
-
-    return Markup(mismatch_section(folder))
+    return Markup("".join(section(folder) for section in _SECTIONS))
 
 
 def _words(metrics: Document, scenario: str) -> Document:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from beaver_ftc.errors import suggestion
-from beaver_ftc.paths import data_root
+from beaver_ftc.paths import data_root, inside
 from beaver_ftc.scenario.base import Location
 from beaver_ftc.scenario.builtin import builtin_names, builtin_path, looks_like_a_path
 from beaver_ftc.scenario.document import Document, Problem
@@ -106,7 +106,11 @@ def _base(base: str | dict[str, Any], document: Document, source: str, folder: P
 def _base_path(base: str, document: Document, source: str, folder: Path | None) -> Path:
     if not looks_like_a_path(base) and base in builtin_names():
         return builtin_path(base)
-    path = (folder or Path()) / base
+    path = inside(folder or Path(), base)
+    if path is None:
+        allowed = "a file in the sweep's own folder or below it, or a built-in scenario"
+        says = f"{base[:100]!r} is outside, allowed: {allowed}"
+        raise ScenarioError(source, [Problem(document.line(("base",)), ("base",), says)])
     with contextlib.suppress(OSError):  # a name no file can have
         if path.is_file():
             return path

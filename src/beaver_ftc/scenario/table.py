@@ -7,6 +7,7 @@ from math import isfinite
 from pathlib import Path
 from typing import Any
 
+from beaver_ftc.paths import inside
 from beaver_ftc.scenario.base import refuse
 from beaver_ftc.scenario.files import UnreadableError, read_text
 
@@ -45,15 +46,12 @@ def _inside(folder: Path | None, file: str) -> Path:
             ]
         )
     assert folder is not None
-    root = folder.resolve()
-    try:
-        path = (root / file).resolve()
-    except (OSError, ValueError, RuntimeError):
-        path = Path("/")
-    if Path(file).is_absolute() or ".." in Path(file).parts or not path.is_relative_to(root):
+    path = inside(folder, file)
+    if path is None:
         refuse(
             [(("file",), f"{file!r} is outside, allowed: a file in the scenario's own folder or below it")]
         )
+    assert path is not None
     return path
 
 

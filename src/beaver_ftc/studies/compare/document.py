@@ -2,12 +2,12 @@
 
 from collections.abc import Sequence
 from dataclasses import asdict
-from math import isfinite
 from typing import Any
 
 from beaver_ftc.results.metrics import versions
 from beaver_ftc.studies.compare.tally import Line, Point, lines_of, matched, trade_off
 from beaver_ftc.studies.compare.trial import LAW, ORACLE, SCHEME, Entry, Trial
+from beaver_ftc.studies.engine.words import finite
 
 Document = dict[str, Any]
 
@@ -59,15 +59,11 @@ def _errors(trial: Trial) -> list[str]:
 def _plain(line: Line) -> Document:
     row = asdict(line)
     entry = row.pop("entry")
-    return {"scheme": entry["scheme"], "law": entry["law"], **{k: _number(v) for k, v in row.items()}}
+    return {"scheme": entry["scheme"], "law": entry["law"], **{k: finite(v) for k, v in row.items()}}
 
 
 def _point(point: Point) -> Document:
-    return {key: _number(value) for key, value in asdict(point).items()}
-
-
-def _number(value: Any) -> Any:
-    return None if isinstance(value, float) and not isfinite(value) else value
+    return {key: finite(value) for key, value in asdict(point).items()}
 
 
 def better_than_ours(lines: Sequence[Document], free: Document) -> list[str]:

@@ -6,14 +6,15 @@ from pathlib import Path
 from typing import Any
 
 from beaver_ftc.errors import BadInput
-from beaver_ftc.results.log import row_count
-from beaver_ftc.results.verdict import facts
+from beaver_ftc.results.looks import BLACK
 from beaver_ftc.scenario.problems import one_line
-from beaver_ftc.studies.compare.table import aligned
+from beaver_ftc.studies.engine.words import aligned, number
 
 Document = dict[str, Any]
 
 _AXES = ("p", "q", "r")
+NOTHING = "-"
+STAR = "* differs between the runs"
 
 
 def read_runs(folders: Sequence[Path]) -> list[Document]:
@@ -39,54 +40,65 @@ def _why(error: Exception) -> str:
 
 
 def _read(folder: Path) -> Document:
+    import yaml
+
     document = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
-    (folder / "scenario.yaml").stat()
-    row_count(folder / "log.parquet")
-    rows_of(document)  # a document that lacks a key is refused here
-    facts(document)
-    return document | {"folder": str(folder)}
+    (folder / "log.parquet").stat()
+    flown = yaml.safe_load((folder / "scenario.yaml").read_text(encoding="utf-8"))
+    run = document | {"folder": str(folder), "flown": flown}
+    rows_of(run)  # a document that lacks a key is refused here
+    return run
 
 
 def rows_of(run: Document) -> dict[str, str]:
-    """What is compared of a run, name -> text."""
+    """What is compared of a run, name -> text: what was flown, then what came of it."""
     detection, isolation, tracking = run["detection"], run["isolation"], run["tracking"]
-    fault, departure = run["fault"], run["departure"]
+    flown, departure = run["flown"], run["departure"]
+    initial = flown["initial"]
+    outside_s = sum(stay["end_s"] - stay["start_s"] for stay in run["envelope_exits"])
     return {
         "scenario": run["scenario"],
-        "fault": _fault(fault),
-        "detection delay, s": _number(detection["delay_s"]),
-        "guaranteed delay, s": _number(detection["guaranteed_delay_s"]),
-        "isolated": isolation["fault"] or "-",
-        "isolation delay, s": _number(isolation["delay_s"]),
-        "estimate": _number(isolation["estimate"]),
+        "law": flown["control"]["law"],
+        "scheme": flown["fdi"]["scheme"],
+        "flight condition": f"{initial['airspeed_mps']:g} m/s, {initial['altitude_m']:g} m",
+        "seed": str(run["seed"]),
+        "faults": "; ".join(map(fault_words, flown.get("faults", []))) or NOTHING,
+        "detection delay, s": number(detection["delay_s"]),
+        "guaranteed delay, s": number(detection["guaranteed_delay_s"]),
+        "isolated": isolation["fault"] or NOTHING,
+        "isolation delay, s": number(isolation["delay_s"]),
+        "estimate": number(isolation["estimate"]),
         "false alarm": "yes" if run["false_alarm"] else "no",
         **{
-            f"{when} RMS {axis}, deg/s": _number((tracking[f"{when}_fault_rms_deg_s"] or {}).get(axis))
+            f"{when} RMS {axis}, deg/s": number((tracking[f"{when}_fault_rms_deg_s"] or {}).get(axis))
             for when in ("pre", "post")
             for axis in _AXES
         },
-        "departure": f"{departure['signal']} at {departure['time_s']:.2f} s" if departure else "-",
+        "outside the envelope, s": number(outside_s),
+        "departure": f"{departure['signal']} at {departure['time_s']:.2f} s" if departure else NOTHING,
         "passed": "yes" if run["passed"] else "no",
     }
 
 
-def _fault(fault: Document | None) -> str:
-    return " ".join(filter(None, (fault["actuator"], fault["type"]))) if fault else "-"
-
-
-def _number(value: float | None) -> str:
-    return "-" if value is None else f"{value:.4g}"
+def fault_words(fault: Document) -> str:
+    """A fault as declared: surface, type, size, and when."""
+    sizes = [
+        f"{key} {value:g}"
+        for key, value in fault.items()
+        if key not in ("at_s", "end_s") and isinstance(value, int | float) and not isinstance(value, bool)
+    ]
+    what = [fault.get("actuator"), fault["type"].replace("_", " "), *sizes, f"at {fault['at_s']:g} s"]
+    return " ".join(filter(None, what))
 
 
 def as_text(runs: Sequence[Document]) -> str:
     """A column a run; what differs between them is marked with a star."""
     columns = [rows_of(run) for run in runs]
-    names = list(columns[0])
     table = [["", *labels(runs)]]
-    for name in names:
+    for name in columns[0]:
         values = [column[name] for column in columns]
         table.append([name + (" *" if len(set(values)) > 1 else ""), *values])
-    return aligned(table)
+    return f"{aligned(table)}\n\n{STAR}"
 
 
 def labels(runs: Sequence[Document]) -> list[str]:
@@ -97,19 +109,44 @@ def labels(runs: Sequence[Document]) -> list[str]:
 
 
 def write_figure(runs: Sequence[Document], path: Path) -> None:
-    """Rates and tracking errors of all runs over time, one above the other, into a PNG."""
+    """Tracking errors of all runs over time, one axis above the other, into a PNG; dotted: a fault begins."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(11.0, 9.0), layout="constrained")
+    figure.suptitle(f"Tracking errors of {', '.join(labels(runs))}", fontsize=11, wrap=True)
     axes = figure.subplots(3, 1, sharex=True)
     for run, label in zip(runs, labels(runs), strict=True):
         _draw(axes, Path(run["folder"]), label)
+    struck = sorted({run["fault"]["at_s"] for run in runs if run["fault"]})
     for axis, letter in zip(axes, _AXES, strict=True):
+        for at_s in struck:
+            axis.axvline(at_s, color=BLACK, linewidth=0.9, linestyle=":")
         axis.set_ylabel(f"{letter} tracking error, deg/s")
         axis.grid(alpha=0.3)
+    for at_s in struck:
+        axes[0].annotate(
+            f"fault {at_s:g} s", (at_s, 1.0), xycoords=("data", "axes fraction"), xytext=(3, -10),
+            textcoords="offset points", fontsize=8,
+        )  # fmt: skip
     axes[0].legend(fontsize=8)
     axes[-1].set_xlabel("time, s")
     figure.savefig(path, dpi=120)
+
+
+def write_runs(out: Path, folders: Sequence[Path]) -> list[Document]:
+    """Write `out/runs/` (figure, JSON, report) of finished runs; return what was read of them."""
+    from beaver_ftc.results.metrics import as_json
+    from beaver_ftc.results.report import write_report
+    from beaver_ftc.results.writer import result_folder
+    from beaver_ftc.studies.mismatch.section import show_in_reports
+
+    runs = read_runs(folders)
+    show_in_reports()
+    with result_folder(out, "runs") as folder:
+        write_figure(runs, folder / "runs.png")
+        (folder / "runs.json").write_text(as_json(runs), encoding="utf-8")
+        write_report(folder / "runs.html", folders, labels(runs))
+    return runs
 
 
 def _draw(axes: Any, folder: Path, label: str) -> None:

@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from beaver_ftc.studies.compare.trial import LAW, SCHEME
+from beaver_ftc.studies.engine.words import aligned, markdown_table
 
 Document = dict[str, Any]
 Cell = Callable[[Document, Document], str]
@@ -84,25 +85,13 @@ def as_text(document: Document) -> str:
     return "\n".join(blocks)
 
 
-def aligned(rows: Sequence[Sequence[str]]) -> str:
-    """Rows of cells as lines, in columns."""
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    lines = ("  ".join(f"{cell:{w}}" for cell, w in zip(row, widths, strict=True)) for row in rows)
-    return "\n".join(line.rstrip() for line in lines)
-
-
 def as_markdown(document: Document) -> str:
     """For the leaderboard."""
     blocks = []
     for name, part in document["sets"].items():
         blocks.append(f"## {name}: {part['flights']} flights\n")
-        blocks += [_markdown(header, rows) for header, rows in sections(part)]
+        blocks += [markdown_table(header, rows) + "\n" for header, rows in sections(part)]
         blocks.append("What loses:\n")
         losses = part["better_than_ours"] or ["nothing here: no rival does better than ours on any count"]
         blocks.append("\n".join(f"- {sentence}." for sentence in losses) + "\n")
     return "\n".join(blocks)
-
-
-def _markdown(header: list[str], rows: list[list[str]]) -> str:
-    lines = [header, ["---"] * len(header), *rows]
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines) + "\n"

@@ -1,7 +1,7 @@
 """The bound recommended for a set of runs, and what it costs the guarantee of detection."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import ceil, floor, log10
 from typing import TYPE_CHECKING
 
@@ -22,7 +22,7 @@ class Recommendation:
 
     coverage: the chance that one more run of the same kind stays within it, runs / (runs + 1): it is as
     likely as any other to be the worst of all.
-    settled: flown with it, no run that had exceeded its bound does so again.
+    settled: flown with it, no run exceeds it or raises a false alarm.
     """
 
     constant_rad_s2: PerAxis
@@ -39,6 +39,12 @@ def recommend(tallies: Iterable["Tally"]) -> Recommendation:
     needed = [[bound.smallest_constant_rad_s2 for bound in tally.bounds] for tally in tallies]
     worst = [max(column) for column in zip(*needed, strict=True)]
     return Recommendation({axis: rounded_up(c) for axis, c in zip(AXES, worst, strict=True)}, len(needed))
+
+
+def widened(recommended: Recommendation) -> Recommendation:
+    """A fifth more: for an alarm although nothing was exceeded, as rounding and noise may raise it."""
+    wider = {axis: rounded_up(1.2 * c) for axis, c in recommended.constant_rad_s2.items()}
+    return replace(recommended, constant_rad_s2=wider)
 
 
 def rounded_up(value: float, digits: int = 2) -> float:

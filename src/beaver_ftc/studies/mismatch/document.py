@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from beaver_ftc.studies.engine.words import finite
 from beaver_ftc.studies.mismatch.bound import Guarantee, Recommendation
 from beaver_ftc.studies.mismatch.sources import SOURCES
 from beaver_ftc.studies.mismatch.split import UNEXPLAINED
@@ -61,12 +62,8 @@ def _figures(figures: Figures, tally: Tally, i: int) -> Document:
         "rms": rms,
         "max": float(figures.largest[i]),
         "share": rms / whole if whole > 0.0 else 0.0,
-        "bound_share": _finite(figures.bound_share[i]),
+        "bound_share": finite(figures.bound_share[i]),
     }
-
-
-def _finite(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None
 
 
 def dominant(tally: Tally) -> Document | None:
@@ -79,7 +76,7 @@ def dominant(tally: Tally) -> Document | None:
     return {
         "source": names[which],
         "axis": AXES[i],
-        "bound_share": _finite(tally.figures[names[which]].bound_share[i]),
+        "bound_share": finite(tally.figures[names[which]].bound_share[i]),
     }
 
 
@@ -87,11 +84,11 @@ def _bound(bound: AxisBound, tally: Tally, i: int) -> Document:
     return {
         "constant_rad_s2": float(tally.constant[i]),
         "smallest_constant_rad_s2": bound.smallest_constant_rad_s2,
-        "worst_ratio": _finite(bound.worst_ratio),
+        "worst_ratio": finite(bound.worst_ratio),
         "worst_at_s": bound.worst_at_s,
         "exceeded_s": bound.exceeded_frames * tally.frame_s,
         "exceeded_times": bound.stays,
-        "exceedances": [{**vars(stay), "peak_ratio": _finite(stay.peak_ratio)} for stay in bound.exceedances],
+        "exceedances": [{**vars(stay), "peak_ratio": finite(stay.peak_ratio)} for stay in bound.exceedances],
     }
 
 

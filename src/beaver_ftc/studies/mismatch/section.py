@@ -5,9 +5,11 @@ import json
 from html import escape
 from pathlib import Path
 
+from beaver_ftc.studies.engine.words import html_table, number
 from beaver_ftc.studies.mismatch.document import Document
 from beaver_ftc.studies.mismatch.states import AXES
-from beaver_ftc.studies.mismatch.words import label, number, percent, seconds
+from beaver_ftc.studies.mismatch.text import findings
+from beaver_ftc.studies.mismatch.words import label, percent
 
 PICTURES = {
     "mismatch-sources": "What the mismatch is made of, in time",
@@ -16,6 +18,13 @@ PICTURES = {
     "mismatch-zeros": "Zeros from each surface to its rate",
     "mismatch-response": "Pulse responses of the linear models",
 }
+
+
+def show_in_reports() -> None:
+    """Add the section to the reports of folders that hold a mismatch."""
+    from beaver_ftc.results.report import register_section
+
+    register_section(mismatch_section)
 
 
 def mismatch_section(folder: Path) -> str:
@@ -30,30 +39,8 @@ def mismatch_section(folder: Path) -> str:
 
 
 def _heading(found: Document) -> str:
-    worst = found["dominant"]
-    says = "Truth and design agree." if worst is None else (
-        f"Most of a bound is used by {label(worst['source'])}: "
-        f"{percent(worst['bound_share'])} on {worst['axis']}."
-    )  # fmt: skip
-    case = found["guarantee"]["recommended"]
-    if found["false_alarm"]:
-        says += f" It raised a false alarm at {seconds(found['detection']['time_s'], 'no time')}."
-    constant = ", ".join(f"{axis} {found['recommended']['constant_rad_s2'][axis]:g}" for axis in AXES)
-    certain = seconds(case["guaranteed_delay_s"], "no time: it is not")
-    return (
-        f"<h2>Truth against design: {escape(found['scenario'])}</h2>"
-        f"<p>{says} A constant bound of {constant} rad/s² would have covered this flight; "
-        f"with it, detection of the published elevator case is certain within {certain}.</p>"
-    )
-
-
-def _table(caption: str, heads: list[str], rows: list[list[str]]) -> str:
-    head = "".join(f'<th scope="col">{escape(each)}</th>' for each in heads)
-    body = "".join(
-        f'<tr><th scope="row">{escape(first)}</th>{"".join(f"<td>{escape(cell)}</td>" for cell in rest)}</tr>'
-        for first, *rest in rows
-    )
-    return f"<table><caption>{escape(caption)}</caption><tr>{head}</tr>{body}</table>"
+    said = "".join(f"<p>{escape(line)}</p>" for line in findings(found))
+    return f"<h2>Truth against design: {escape(found['scenario'])}</h2>{said}"
 
 
 def _sources(found: Document) -> str:
@@ -63,7 +50,7 @@ def _sources(found: Document) -> str:
         for name in found["axes"]["p"]
         if any(found["axes"][axis][name]["max"] > 0.0 for axis in AXES)
     ]
-    return _table("Sources of the mismatch, 1e-3 rad/s²", heads, rows)
+    return html_table(heads, rows, "Sources of the mismatch, 1e-3 rad/s²")
 
 
 def _cells(of: Document) -> list[str]:
@@ -79,7 +66,7 @@ def _bounds(found: Document) -> str:
          percent(of["worst_ratio"]), f"{of['exceeded_s']:.2f} s in {of['exceeded_times']} times"]
         for axis, of in found["bound"].items()
     ]  # fmt: skip
-    return _table("The bound, faults aside", heads, rows)
+    return html_table(heads, rows, "The bound, faults aside")
 
 
 def _modes(found: Document) -> str:
@@ -89,7 +76,7 @@ def _modes(found: Document) -> str:
          percent(of["deviation"]["fdc"]), percent(of["deviation"]["design"])]
         for name, of in found["linear"]["modes"].items()
     ]  # fmt: skip
-    return _table("Modes at trim", heads, rows)
+    return html_table(heads, rows, "Modes at trim")
 
 
 def _picture(path: Path, says: str) -> str:

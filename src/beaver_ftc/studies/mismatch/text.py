@@ -1,11 +1,13 @@
 """The mismatch as tables for the terminal."""
 
-import io
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from beaver_ftc.studies.engine.words import number, printed, seconds
 from beaver_ftc.studies.mismatch.document import Document
 from beaver_ftc.studies.mismatch.states import AXES
-from beaver_ftc.studies.mismatch.words import label, number, percent, seconds
+from beaver_ftc.studies.mismatch.words import label, percent
+
+WIDTH = 150
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -14,23 +16,22 @@ if TYPE_CHECKING:
 def mismatch_text(found: Document, folder: str, colour: bool = False) -> str:
     """One flight: the sources, the bound, what to declare, the modes."""
     tables = [sources_table(found), bound_table(found), modes_table(found)]
-    return _printed(tables, colour) + f"\n{verdict(found)}\nresults      {folder}\n"
+    return (
+        printed(tables, WIDTH, colour) + "\n" + "\n".join([*findings(found), f"results      {folder}"]) + "\n"
+    )
 
 
-def verdict(found: Document) -> str:
-    """What it comes to, in words."""
-    lines = []
+def findings(found: Document) -> list[str]:
+    """What it comes to, in words, for the terminal and the page."""
     worst = found["dominant"]
-    if worst is not None:
-        lines.append(
-            f"dominant     {label(worst['source'])}: "
-            f"{percent(worst['bound_share'])} of the bound on {worst['axis']}"
-        )
+    dominant = "nothing: truth and design agree" if worst is None else (
+        f"{label(worst['source'])}: {percent(worst['bound_share'])} of the bound on {worst['axis']}"
+    )  # fmt: skip
+    lines = [f"dominant     {dominant}"]
     if found["false_alarm"]:
         detection = found["detection"]
         lines.append(f"FALSE ALARM  at {detection['time_s']:.2f} s on {detection['axis']}")
-    lines += [_recommendation(found["recommended"]), *_guarantee(found["guarantee"])]
-    return "\n".join(lines)
+    return [*lines, _recommendation(found["recommended"]), *_guarantee(found["guarantee"])]
 
 
 def _recommendation(recommended: Document) -> str:
@@ -139,9 +140,8 @@ def _needed(entry: Document, axis: str) -> str:
 def comparison_text(entries: list[Document], recommended: Document, folder: str, colour: bool = False) -> str:
     """Several flights side by side, and the bound that covers them all."""
     lines = [_recommendation(recommended["recommended"]), *_guarantee(recommended["guarantee"])]
-    return (
-        _printed([comparison_table(entries)], colour) + "\n" + "\n".join(lines) + f"\nresults      {folder}\n"
-    )
+    table = printed([comparison_table(entries)], WIDTH, colour)
+    return "\n".join([table, "", *lines, f"results      {folder}", ""])
 
 
 def _table(title: str, first: str) -> "Table":
@@ -150,16 +150,3 @@ def _table(title: str, first: str) -> "Table":
     table = Table(title=title, title_justify="left", box=None, pad_edge=False)
     table.add_column(first, no_wrap=True)
     return table
-
-
-def _printed(tables: list[Any], colour: bool) -> str:
-    from rich.console import Console
-
-    console = Console(
-        file=io.StringIO(), force_terminal=colour, highlight=False, emoji=False, markup=False, width=150
-    )
-    with console.capture() as captured:
-        for table in tables:
-            console.print(table)
-            console.print()
-    return "\n".join(line.rstrip() for line in captured.get().splitlines()) + "\n"

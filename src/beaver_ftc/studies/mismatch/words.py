@@ -14,13 +14,3 @@ def percent(share: float | None) -> str:
     if 0.0 < value < 0.001:
         return "<0.001 %"
     return f"{value:.0f} %" if value >= 9.95 else f"{value:.2g} %"
-
-
-def number(value: float) -> str:
-    """Three digits; what is very small says so."""
-    return "<0.001" if 0.0 < value < 0.001 else f"{value:.3g}"
-
-
-def seconds(value: float | None, otherwise: str) -> str:
-    """A time in s, or what to say where there is none."""
-    return otherwise if value is None else f"{value:.2f} s"

@@ -1,8 +1,8 @@
 """The survey for the terminal: a table a condition, then where ours is better or worse."""
 
-import io
 from typing import TYPE_CHECKING, Any
 
+from beaver_ftc.studies.engine.words import printed
 from beaver_ftc.studies.power.contenders import BUILT_IN
 from beaver_ftc.studies.power.document import JUDGED_S, SIGNIFICANT
 from beaver_ftc.studies.power.grid import WITHIN_S
@@ -18,17 +18,9 @@ TOLD = "(told the fault)"
 
 def as_text(document: Document, colour: bool = False) -> str:
     """Tables, legend, comparison and failures."""
-    from rich.console import Console
-
-    console = Console(
-        file=io.StringIO(), width=WIDTH, force_terminal=colour, highlight=False, emoji=False, markup=False
-    )
-    with console.capture() as captured:
-        for sensors, turbulence in document["grid"]["conditions"]:
-            console.print(_table(document, sensors, turbulence))
-    lines = [line.rstrip() for line in captured.get().splitlines()]
+    tables = [_table(document, *condition) for condition in document["grid"]["conditions"]]
     said = [*_legend(document), "", *comparison(document), *_failures(document)]
-    return "\n".join([*lines, *said])
+    return "\n".join([printed(tables, WIDTH, colour), *said])
 
 
 def _table(document: Document, sensors: str, turbulence: str) -> "Table":

@@ -2,9 +2,9 @@
 
 from collections.abc import Sequence
 from dataclasses import asdict
-from math import isfinite
 
 from beaver_ftc.results.metrics import Document, versions
+from beaver_ftc.studies.engine.words import finite
 from beaver_ftc.studies.reproduce.cases import BESIDE, PUBLISHED, Flown, fly_case
 from beaver_ftc.studies.reproduce.choices import CHOICES
 from beaver_ftc.studies.reproduce.claims import CLAIMS, Claim
@@ -42,13 +42,13 @@ def _judged(claim: Claim, flights: dict[str, Flown], varied: list[float]) -> Doc
         "statement": claim.statement,
         "quantity": claim.quantity,
         "unit": claim.unit,
-        "number": _finite(number),
+        "number": finite(number),
         "limit": claim.limit,
         "at_least": claim.at_least,
         "passed": claim.holds(number),
         "remark": claim.remark(flights),
-        "lowest": _finite(min(varied)),
-        "highest": _finite(max(varied)),
+        "lowest": finite(min(varied)),
+        "highest": finite(max(varied)),
         "held_in": sum(claim.holds(other) for other in varied),
     }
 
@@ -56,12 +56,7 @@ def _judged(claim: Claim, flights: dict[str, Flown], varied: list[float]) -> Doc
 def _missed(numbers: list[float]) -> list[Document]:
     """The claims that a variant does not bear out, with its number."""
     return [
-        {"where": claim.where, "statement": claim.statement, "number": _finite(number), "unit": claim.unit}
+        {"where": claim.where, "statement": claim.statement, "number": finite(number), "unit": claim.unit}
         for claim, number in zip(CLAIMS, numbers, strict=True)
         if not claim.holds(number)
     ]
-
-
-def _finite(number: float) -> float | None:
-    """A number for the document; what never happens is null."""
-    return float(number) if isfinite(number) else None

@@ -1,9 +1,9 @@
 """The reproduction for the terminal."""
 
-import io
 from typing import TYPE_CHECKING
 
 from beaver_ftc.results.metrics import Document
+from beaver_ftc.studies.engine.words import printed
 from beaver_ftc.studies.reproduce import words
 
 if TYPE_CHECKING:
@@ -14,17 +14,10 @@ WIDTH = 118
 
 def as_text(document: Document, folder: str, colour: bool = False) -> str:
     """The table of statements, what the sensitivity study says, and where the rest lies."""
-    from rich.console import Console
-
-    console = Console(
-        file=io.StringIO(), width=WIDTH, force_terminal=colour, highlight=False, emoji=False, markup=False
-    )
-    with console.capture() as captured:
-        console.print(_table(document))
-    lines = [line.rstrip() for line in captured.get().splitlines()]
     exceptions = [f"  except {sentence}" for sentence in words.exceptions(document)]
+    table = printed([_table(document)], WIDTH, colour)
     return "\n".join(
-        [*lines, "", words.summary(document), *exceptions, "", f"page: {folder}/reproduction.html"]
+        [table, "", words.summary(document), *exceptions, "", f"page: {folder}/reproduction.html"]
     )
 
 

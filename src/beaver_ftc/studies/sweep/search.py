@@ -15,6 +15,7 @@ import numpy as np
 from beaver_ftc.errors import BadInput
 from beaver_ftc.scenario.sweep_loader import Sweep
 from beaver_ftc.studies.engine.campaign import Batch
+from beaver_ftc.studies.engine.words import finite
 from beaver_ftc.studies.sweep.sampling import Assignment, value_at
 from beaver_ftc.studies.sweep.source import Landed
 from beaver_ftc.studies.sweep.store import Store
@@ -187,11 +188,7 @@ def found(objective: str, results: Path, sweep: Sweep) -> dict[str, Any]:
     return {
         "objective": objective,
         "run": rows[best]["run"],
-        "score": _finite(scores[best]),
+        "score": finite(float(scores[best])),
         "values": {key: rows[best][key] for key in sweep.keys},
-        "history": [_finite(value) for value in after],
+        "history": [finite(value) for value in after.tolist()],
     }
-
-
-def _finite(value: float) -> float | None:
-    return float(value) if math.isfinite(value) else None

@@ -3,9 +3,9 @@
 Everything is said from the summary document, so that the words and `summary.json` cannot disagree.
 """
 
-import io
 from typing import TYPE_CHECKING, Any
 
+from beaver_ftc.studies.engine.words import number, printed
 from beaver_ftc.studies.sweep.table import AXES
 
 if TYPE_CHECKING:
@@ -71,11 +71,9 @@ def expected(level: Document) -> str:
     return f"{part}{bound}{sure}"
 
 
-def value(number: Any) -> str:
+def value(of: Any) -> str:
     """A number as it is worth reading."""
-    if number is None:
-        return "none"
-    return number if isinstance(number, str) else f"{number:.3g}"
+    return number(of, none="none")
 
 
 def percent(share: float | None) -> str:
@@ -89,13 +87,8 @@ def percent(share: float | None) -> str:
 
 def summary_text(summary: Document, colour: bool = False) -> str:
     """The summary as a table for the terminal."""
-    from rich.console import Console
-
-    console = Console(file=io.StringIO(), force_terminal=colour, highlight=False, emoji=False, markup=False)
-    with console.capture() as captured:
-        console.print(_table(summary))
-    lines = [line.rstrip() for line in captured.get().splitlines()]
-    return "\n".join([*lines, *_worth_a_look(summary)]) + "\n"
+    lines = [printed([_table(summary)], colour=colour), *_worth_a_look(summary)]
+    return "\n".join(lines) + "\n"
 
 
 def _worth_a_look(summary: Document) -> list[str]:

@@ -5,7 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from beaver_ftc.studies.engine.statistics import CONFIDENCE, binomial_upper, poisson_bound
+from beaver_ftc.studies.engine.statistics import CONFIDENCE, binomial_upper, poisson_bound, quantile
+from beaver_ftc.studies.engine.words import finite, number
 from beaver_ftc.studies.verify.fly import SCHEMES, SHARPENED, STEPS, Row
 
 PROMISES = ("false_alarms", "true_fault_exclusions", "wrong_isolations", "late_detections")
@@ -82,11 +83,7 @@ def _scheme(rows: Sequence[Row]) -> dict[str, Any]:
 def _quantiles(values: Iterable[float | None]) -> dict[str, float | None]:
     """Median and 90th percentile, what never came counting as infinitely late; None stands for infinite."""
     numbers = np.sort([np.inf if value is None else value for value in values])
-    if not len(numbers):
-        return {"median": None, "p90": None}
-    shares = {"median": 0.5, "p90": 0.9}
-    found = {name: float(np.quantile(numbers, share, method="higher")) for name, share in shares.items()}
-    return {name: value if np.isfinite(value) else None for name, value in found.items()}
+    return {name: finite(quantile(numbers, share)) for name, share in (("median", 0.5), ("p90", 0.9))}
 
 
 def _shorter(schemes: dict[str, Any]) -> float | None:
@@ -139,8 +136,10 @@ def _fault_lines(document: dict[str, Any]) -> list[str]:
         ("delay / guaranteed", "delay_over_guaranteed"),
         ("error of the estimate", "estimate_error"),
     ):
-        for quantile in ("median", "p90"):
-            lines.append(_line(f"{label}, {quantile}", [_number(s[key][quantile]) for s in schemes.values()]))
+        for which in ("median", "p90"):
+            lines.append(
+                _line(f"{label}, {which}", [number(s[key][which], none="never") for s in schemes.values()])
+            )
     if document["delay_shorter_by"] is not None:
         lines += [f"  median detection delay shorter by {document['delay_shorter_by']:.0%}", ""]
     return lines
@@ -148,7 +147,3 @@ def _fault_lines(document: dict[str, Any]) -> list[str]:
 
 def _line(label: str, cells: Iterable[str]) -> str:
     return f"  {label:<32}" + "".join(f"{cell:>18}" for cell in cells)
-
-
-def _number(value: float | None) -> str:
-    return "never" if value is None else f"{value:.3f}"

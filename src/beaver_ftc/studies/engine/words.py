@@ -1,0 +1,75 @@
+"""Numbers as people read them, and tables of them for a terminal, Markdown and HTML."""
+
+import io
+from collections.abc import Sequence
+from html import escape
+from math import isfinite
+from typing import Any
+
+Rows = Sequence[Sequence[str]]
+LEAST = 1e-3  # what is smaller is said to be so: nobody reads 2.29e-07 deg/s
+
+
+def finite(value: Any) -> Any:
+    """A value for a document: what never happens, or is not known, is null."""
+    return None if isinstance(value, float) and not isfinite(value) else value
+
+
+def number(value: Any, unit: str = "", none: str = "-", digits: int = 3) -> str:
+    """A number with the digits worth reading, without an exponent, and its unit; None is `none`."""
+    if value is None or isinstance(value, str):
+        return value or none
+    return f"{_digits(float(value), digits)} {unit}".rstrip()
+
+
+def _digits(value: float, digits: int) -> str:
+    if not isfinite(value):
+        return "never"
+    if 0.0 < abs(value) < LEAST:
+        return f"<{LEAST:g}" if value > 0 else f">-{LEAST:g}"
+    return f"{value:.0f}" if abs(value) >= 10 ** (digits - 1) else f"{value:.{digits}g}"
+
+
+def seconds(value: float | None, none: str = "never") -> str:
+    """A time in s, or what to say where there is none."""
+    return none if value is None else f"{value:.2f} s"
+
+
+def aligned(rows: Rows) -> str:
+    """Rows of cells as lines, in columns."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    lines = ("  ".join(f"{cell:{w}}" for cell, w in zip(row, widths, strict=True)) for row in rows)
+    return "\n".join(line.rstrip() for line in lines)
+
+
+def markdown_table(head: Sequence[str], rows: Rows) -> str:
+    """A table in Markdown."""
+    lines = [head, ["---"] * len(head), *rows]
+    return "\n".join("| " + " | ".join(cell.replace("|", "\\|") for cell in line) + " |" for line in lines)
+
+
+def html_table(head: Sequence[str], rows: Rows, caption: str = "") -> str:
+    """A table in HTML; a cell that begins with a tick or a cross is coloured."""
+    top = "".join(f'<th scope="col">{escape(cell)}</th>' for cell in head)
+    body = "".join(f"<tr>{''.join(map(_cell, row))}</tr>" for row in rows)
+    says = f"<caption>{escape(caption)}</caption>" if caption else ""
+    table = f"<table>{says}<thead><tr>{top}</tr></thead><tbody>{body}</tbody></table>"
+    return f'<div class="wide">{table}</div>'
+
+
+def _cell(text: str) -> str:
+    kind = {"✓": ' class="met"', "✗": ' class="missed"'}.get(text[:1], "")
+    return f"<td{kind}>{escape(text)}</td>"
+
+
+def printed(tables: Sequence[Any], width: int | None = None, colour: bool = False) -> str:
+    """Tables of rich as text."""
+    from rich.console import Console
+
+    console = Console(
+        file=io.StringIO(), force_terminal=colour, highlight=False, emoji=False, markup=False, width=width
+    )
+    with console.capture() as captured:
+        for table in tables:
+            console.print(table)
+    return "\n".join(line.rstrip() for line in captured.get().splitlines())

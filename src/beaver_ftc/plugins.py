@@ -1,22 +1,33 @@
-"""Which detectors and laws there are: built in, by entry point of an installed package, or `module:Class`.
+"""Which detectors and laws there are: built in, by entry point of an installed package, or for this run only.
 
     [project.entry-points."beaver_ftc.detectors"]        # in the pyproject.toml of the package
     my-detector = "my_package:MyDetector"
 
-A scenario names them by `fdi.scheme` and `control.law`; it never names a path.
+    beaver-ftc run mine.yaml --plugin my_package:MyDetector
+
+A scenario names them by `fdi.scheme` and `control.law`. It is data: it names what is registered, never a
+module, and reading it imports nothing. What `--plugin` registers is handed on to worker processes in an
+environment variable.
 """
 
+import os
 import re
+import sys
 from collections.abc import Iterable
 from dataclasses import dataclass
-from importlib import import_module, util
-from inspect import getdoc, isclass
+from functools import lru_cache
+from importlib import import_module
+from inspect import getdoc, isclass, signature
+from typing import Any
 
-from beaver_ftc.errors import BadInput, suggestion
+from beaver_ftc.errors import BadInput, BeaverFtcError, suggestion
 
 DETECTORS, LAWS = "beaver_ftc.detectors", "beaver_ftc.laws"
 OURS = "beaver-ftc"
-_BY_CLASS = re.compile(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)*:[A-Za-z_]\w*")
+VARIABLE = "BEAVER_FTC_PLUGINS"  # what is registered for this run: NAME=MODULE:CLASS, separated by spaces
+_GIVEN = re.compile(r"(?:([A-Za-z0-9_-]+)=)?([A-Za-z_]\w*(?:\.[A-Za-z_]\w*)*):([A-Za-z_]\w*)")
+_WORDS = re.compile(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
+_ARGUMENTS = {3: DETECTORS, 4: LAWS}  # of `step`, with self
 
 # Name -> (module:Class, what `list` says of it). Without a class it is in the compiled frame itself.
 _OURS = {
@@ -103,7 +114,7 @@ def registered(group: str) -> dict[str, Registered]:
         name: Registered(group, name, target, OURS, says) for name, (target, says) in _OURS[group].items()
     }
     others = {entry.name: entry for entry in _from_packages(group) if entry.name not in ours}
-    return ours | others
+    return ours | others | {entry.name: entry for entry in _of_this_run() if entry.group == group}
 
 
 def _from_packages(group: str) -> Iterable[Registered]:
@@ -113,34 +124,108 @@ def _from_packages(group: str) -> Iterable[Registered]:
         yield Registered(group, point.name, point.value, point.dist.name if point.dist else "")
 
 
+def register(given: str) -> Registered:
+    """Register `MODULE:CLASS`, or `NAME=MODULE:CLASS`, for this process and those it starts.
+
+    Without a name it is the class's own, in lower case with hyphens: MyDetector is my-detector. (A scenario
+    may write it either way.) The module is one that is installed, or in the working folder. Raises BadInput.
+    """
+    entry = _read(given)
+    known = registered(entry.group).get(entry.name)
+    if known == entry:
+        return entry
+    if known is not None:
+        raise BadInput(f"--plugin {given}: there is a {entry.name} already, allowed: NAME=MODULE:CLASS")
+    text = f"{entry.name}={entry.target}"
+    os.environ[VARIABLE] = " ".join(filter(None, (os.environ.get(VARIABLE), text)))
+    return entry
+
+
+def _of_this_run() -> tuple[Registered, ...]:
+    return _read_all(os.environ.get(VARIABLE, ""))
+
+
+@lru_cache
+def _read_all(texts: str) -> tuple[Registered, ...]:
+    return tuple(map(_read, texts.split()))
+
+
+def _read(given: str) -> Registered:
+    """What `--plugin` says: its class is loaded, to see whether it is a detector or a law."""
+    matched = _GIVEN.fullmatch(given)
+    if not matched:
+        raise BadInput(f"--plugin: {given[:200]!r} is no class, allowed: MODULE:CLASS or NAME=MODULE:CLASS")
+    name, module, attribute = matched.groups()
+    folder = os.getcwd()
+    if folder not in sys.path:
+        sys.path.append(folder)  # last: nothing there can take the place of an installed module
+    target = f"{module}:{attribute}"
+    found = _load(f"--plugin {given}", target)
+    group = _ARGUMENTS.get(len(signature(found.step).parameters))  # type: ignore[attr-defined]
+    if group is None:
+        allowed = (
+            "allowed: step(measured, command) of a detector, step(measured, reference, verdict) of a law"
+        )
+        raise BadInput(f"--plugin {given}: step{signature(found.step)} is neither, {allowed}")  # type: ignore[attr-defined]
+    return Registered(group, name or _hyphenated(attribute), target, "--plugin")
+
+
+def _hyphenated(name: str) -> str:
+    return _WORDS.sub("-", name).lower()
+
+
+def _entry(group: str, name: str) -> Registered | None:
+    """What is registered by a name; of this run's, the class's own name will do as well."""
+    of_this_run = (entry for entry in _of_this_run() if entry.group == group)
+    by_class = (entry for entry in of_this_run if entry.target.rpartition(":")[2] == name)
+    return registered(group).get(name) or next(by_class, None)
+
+
 def refusal(group: str, name: str) -> str | None:
     """What is wrong with a scheme's or law's name in a scenario, and what is allowed; None if nothing is."""
     if name in _OURS[group]:
         return None
-    known = registered(group)
-    if name in known:
+    if _entry(group, name):
         return None
-    if not _BY_CLASS.fullmatch(name):
-        what = "scheme" if group == DETECTORS else "law"
+    known = registered(group)
+    what = "scheme" if group == DETECTORS else "law"
+    if _GIVEN.fullmatch(name):
         return (
-            f"unknown {what} {name[:100]!r}{suggestion(name, known)}, or module:Class of an installed package"
+            f"{name[:100]!r} is a class; a scenario names what is registered, allowed: {', '.join(known)}, "
+            f"or what --plugin MODULE:CLASS registers on the command line"
         )
-    module = name.partition(".")[0].partition(":")[0]
-    return None if util.find_spec(module) else f"no installed package has the module {module!r}"
+    return f"unknown {what} {name[:100]!r}{suggestion(name, known)}"
 
 
 def plugin_class(group: str, name: str) -> type:
     """The class behind a name that is not compiled in. Raises BadInput, naming it, if there is none."""
-    entry = registered(group).get(name)
-    target = entry.target if entry else name
+    entry = _entry(group, name)
+    if entry is None or not entry.target:
+        raise BadInput(f"plug-in {name}: not registered{suggestion(name, registered(group))}")
+    return _load(f"plug-in {name}", entry.target)
+
+
+def _load(what: str, target: str) -> type:
+    """The class that `module:Class` names. SystemExit is only another failure: the exit status is ours."""
     module, _, attribute = target.partition(":")
     try:
         found = getattr(import_module(module), attribute)
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         reason = " ".join(str(error).split())
-        raise BadInput(f"plug-in {name}: cannot load {target}: {type(error).__name__}: {reason}") from error
+        raise BadInput(f"{what}: cannot load {target}: {type(error).__name__}: {reason}") from error
     missing = [method for method in _METHODS if not callable(getattr(found, method, None))]
     if not isclass(found) or missing:
         needs = f"lacks {' and '.join(missing)}" if missing else "is not a class"
-        raise BadInput(f"plug-in {name}: {target} {needs}, allowed: a class with reset and step")
+        raise BadInput(f"{what}: {target} {needs}, allowed: a class with reset and step")
     return found
+
+
+def made(group: str, name: str) -> Any:
+    """An instance of the class behind a name. Raises BadInput, naming it, if there can be none."""
+    try:
+        return plugin_class(group, name)()
+    except BeaverFtcError:
+        raise
+    except (Exception, SystemExit) as error:
+        reason = " ".join(str(error).split())
+        raise BadInput(f"plug-in {name}: cannot be made: {type(error).__name__}: {reason}") from error

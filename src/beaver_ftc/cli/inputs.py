@@ -1,6 +1,11 @@
 """What a command is given: scenarios by file or name, all of them checked before the first one flies."""
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable
+from functools import wraps
+from inspect import Parameter, signature
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
 
 from beaver_ftc.errors import BadInput
 
@@ -8,6 +13,35 @@ if TYPE_CHECKING:
     from beaver_ftc.plant.adapter import Plant
     from beaver_ftc.plant.trim import TrimPoint
     from beaver_ftc.scenario.schema import Scenario
+
+
+PluginOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--plugin",
+        metavar="[NAME=]MODULE:CLASS",
+        help="Register a detector or law for this run; scenarios name it NAME, or as the class, my-class.",
+    ),
+]
+
+
+def with_plugins(command: Callable[..., None]) -> Callable[..., None]:
+    """The command with an option --plugin, whose classes are registered before it runs."""
+
+    @wraps(command)
+    def plugged(*arguments: Any, plugin: list[str] | None = None, **options: Any) -> None:
+        if plugin:
+            from beaver_ftc.plugins import register
+
+            for given in plugin:
+                register(given)
+        command(*arguments, **options)
+
+    own = signature(command)
+    option = Parameter("plugin", Parameter.KEYWORD_ONLY, default=None, annotation=PluginOption)
+    plugged.__signature__ = own.replace(parameters=[*own.parameters.values(), option])  # type: ignore[attr-defined]
+    plugged.__annotations__ = command.__annotations__ | {"plugin": PluginOption}
+    return plugged
 
 
 def load_all(names: list[str]) -> list["Scenario"]:

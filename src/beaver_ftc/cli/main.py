@@ -12,6 +12,7 @@ from typing import Annotated, NoReturn
 import typer
 
 from beaver_ftc import __version__
+from beaver_ftc.cli.inputs import with_plugins
 from beaver_ftc.cli.output import report, unexpected
 from beaver_ftc.errors import BeaverFtcError
 
@@ -33,6 +34,8 @@ COMMANDS = (
     "identify",
     "diagnose",
 )
+
+WITHOUT_SCENARIOS = ("schema", "bench", "verify", "detectability", "reproduce")
 
 app = typer.Typer(
     name="beaver-ftc",
@@ -64,7 +67,8 @@ def options(
 
 
 for _name in COMMANDS:
-    app.command(_name)(import_module(f"beaver_ftc.cli.{_name}").command)
+    _command = import_module(f"beaver_ftc.cli.{_name}").command
+    app.command(_name)(_command if _name in WITHOUT_SCENARIOS else with_plugins(_command))
 
 
 def main() -> NoReturn:

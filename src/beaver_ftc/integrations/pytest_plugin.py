@@ -17,6 +17,8 @@ import pytest
 _MARKED = (".scenario.yaml", ".scenario.yml")
 _YAML = (".yaml", ".yml")
 _COMPLETES = "completes"
+_NO_MAPPING = ("is empty", "is not a mapping")  # a YAML file of another tool
+_NEAR = 0.8
 
 
 class ExpectationMissed(Exception):
@@ -29,6 +31,28 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     group.addoption(
         "--beaver", action="store_true", help="collect scenario files (*.yaml) as tests, one an expectation"
     )
+    group.addoption(
+        "--beaver-plugin",
+        action="append",
+        default=[],
+        metavar="[NAME=]MODULE:CLASS",
+        help="register a detector or law that scenarios may name",
+    )
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """--beaver-plugin: what `beaver-ftc run --plugin` does."""
+    given = config.getoption("--beaver-plugin")
+    if not given:
+        return
+    from beaver_ftc.errors import BadInput
+    from beaver_ftc.plugins import register
+
+    try:
+        for text in given:
+            register(text)
+    except BadInput as error:
+        raise pytest.UsageError(str(error).replace("--plugin", "--beaver-plugin", 1)) from None
 
 
 def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Collector | None:
@@ -40,12 +64,32 @@ def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Col
 
 
 def _is_asked_for(path: Path, config: pytest.Config) -> bool:
-    """With --beaver, every file that looks like a scenario: it has a name, and is no sweep of one."""
+    """With --beaver, every file that is a scenario for `run`, or was meant to be one, and no sweep.
+
+    A file is read as `run` reads it. What cannot be read is collected, so that it fails and is not missed.
+    """
     if not config.getoption("--beaver"):
         return False
-    with path.open(encoding="utf-8", errors="replace") as file:
-        keys = {line.partition(":")[0] for line in file if line[:1].isalpha()}
-    return "name" in keys and not keys & {"base", "vary"}
+    from beaver_ftc.scenario.loader import parse_document, read_file
+    from beaver_ftc.scenario.problems import ScenarioError
+
+    try:
+        data = parse_document(read_file(path, str(path)), str(path)).data
+    except ScenarioError as error:
+        return not all(problem.says.startswith(_NO_MAPPING) for problem in error.problems)
+    return not data.keys() & {"base", "vary"} and _looks_like_a_scenario(list(data))
+
+
+def _looks_like_a_scenario(keys: list[str]) -> bool:
+    """Whether these are keys of a scenario, or near misses of some: other tools' files have a name too."""
+    from difflib import get_close_matches
+
+    from beaver_ftc.scenario.schema import Scenario
+
+    known = set(Scenario.model_fields)
+    own = known - {"name", "description"}
+    near = any(get_close_matches(str(key).lower(), own, n=1, cutoff=_NEAR) for key in keys)
+    return near or ("name" in keys and set(keys) <= known)
 
 
 class ScenarioFile(pytest.File):

@@ -18,7 +18,7 @@ from beaver_ftc.loop import stages
 from beaver_ftc.loop.assembly import y_places
 from beaver_ftc.loop.frame import NOT_FINITE
 from beaver_ftc.loop.outcome import verdict_of
-from beaver_ftc.plugins import DETECTORS, LAWS, is_compiled, plugin_class
+from beaver_ftc.plugins import DETECTORS, LAWS, is_compiled, made
 from beaver_ftc.scenario.schema import Scenario
 
 _AXES = {"p": 0, "q": 1, "r": 2, None: 0}
@@ -96,7 +96,7 @@ class PluggedFrame:
             return question(*arguments)
         except BeaverFtcError:
             raise
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             reason = " ".join(str(error).split())
             self._blame(name, f"{question.__name__} raised {type(error).__name__}: {reason}")
 
@@ -190,9 +190,9 @@ def plugged_frame(
     """
     fdi, control = scenario.fdi, scenario.control
     if detector is None and not is_compiled(DETECTORS, fdi.scheme):
-        detector = plugin_class(DETECTORS, fdi.scheme)()
+        detector = made(DETECTORS, fdi.scheme)
     if law is None and not is_compiled(LAWS, control.law):
-        law = plugin_class(LAWS, control.law)()
+        law = made(LAWS, control.law)
     if detector is None and law is None:
         return None
     if detector is not None:

@@ -130,3 +130,27 @@ class NoStep:
 
     def reset(self, context):
         pass
+
+
+class Odd:
+    """Neither a detector nor a law."""
+
+    def reset(self, context):
+        pass
+
+    def step(self):
+        pass
+
+
+class Quits(Silent):
+    """Wants to end the program as if all were well."""
+
+    def step(self, measured, command):
+        raise SystemExit(0)
+
+
+class CannotBeMade(Silent):
+    """Ends the program before it has begun."""
+
+    def __init__(self):
+        raise SystemExit(0)

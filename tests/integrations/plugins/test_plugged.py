@@ -12,12 +12,19 @@ from beaver_ftc.control.base import Law
 from beaver_ftc.diagnosis.base import Detector, Verdict
 from beaver_ftc.errors import BadInput, SimulationFailed
 from beaver_ftc.loop.loop import fly
-from beaver_ftc.plugins import DETECTORS, LAWS, plugin_class, registered
+from beaver_ftc.plugins import DETECTORS, LAWS, VARIABLE, _hyphenated, plugin_class, register, registered
 from beaver_ftc.results.metrics import metrics
+from beaver_ftc.scenario.loader import load_text
 from flying import Memory, scenario
 
 FAULT = {"actuator": "elevator", "type": "loss_of_effectiveness", "magnitude": 0.4, "at_s": 3}
 SHORT = {"duration_s": 6, "faults": [FAULT]}
+
+
+@pytest.fixture(autouse=True)
+def nothing_registered(monkeypatch):
+    """What a test registers goes with it."""
+    monkeypatch.setenv(VARIABLE, "")
 
 
 class PythonNominal:
@@ -185,9 +192,9 @@ def test_with_substeps_and_other_rates_the_model_still_explains_the_flight():
 )
 def test_a_bad_detector_is_named(name, says):
     with pytest.raises(SimulationFailed) as failed:
-        fly(scenario(**SHORT, fdi={"scheme": f"culprits:{name}"}))
+        fly(scenario(**SHORT, fdi={"scheme": register(f"culprits:{name}").name}))
     message = str(failed.value)
-    assert message.startswith(f"plug-in culprits:{name} at ")
+    assert message.startswith(f"plug-in {_hyphenated(name)} at ")
     assert says in message
     assert "\n" not in message
 
@@ -202,16 +209,51 @@ def test_a_bad_detector_is_named(name, says):
     ],
 )
 def test_a_bad_law_is_named(name, says):
-    with pytest.raises(SimulationFailed, match=f"plug-in culprits:{name} at 0 s: ") as failed:
-        fly(scenario(**SHORT, control={"law": f"culprits:{name}"}))
+    with pytest.raises(SimulationFailed, match=f"plug-in {_hyphenated(name)} at 0 s: ") as failed:
+        fly(scenario(**SHORT, control={"law": register(f"culprits:{name}").name}))
     assert says in str(failed.value)
 
 
-def test_a_class_that_is_no_plug_in_is_bad_input():
-    with pytest.raises(BadInput, match="culprits:NoStep lacks step, allowed: a class with reset and step"):
-        fly(scenario(**SHORT, fdi={"scheme": "culprits:NoStep"}))
-    with pytest.raises(BadInput, match="cannot load culprits:Nobody: AttributeError"):
-        fly(scenario(**SHORT, fdi={"scheme": "culprits:Nobody"}))
+@pytest.mark.parametrize(
+    ("given", "says"),
+    [
+        ("culprits:NoStep", "culprits:NoStep lacks step, allowed: a class with reset and step"),
+        ("culprits:Nobody", "cannot load culprits:Nobody: AttributeError"),
+        ("leaves:Anything", "cannot load leaves:Anything: SystemExit: 0"),
+        ("nowhere:Anything", "cannot load nowhere:Anything: ModuleNotFoundError"),
+        ("culprits:Odd", r"step\(self\) is neither, allowed: step\(measured, command\) of a detector"),
+        ("culprits", "is no class, allowed: MODULE:CLASS or NAME=MODULE:CLASS"),
+        ("lqr=culprits:Hold", "there is a lqr already, allowed: NAME=MODULE:CLASS"),
+    ],
+)
+def test_a_class_that_is_no_plug_in_is_bad_input(given, says):
+    with pytest.raises(BadInput, match=says):
+        register(given)
+
+
+def test_a_class_is_registered_by_its_name_in_words_or_by_a_name_given():
+    teller, other, law = (register(x) for x in ("culprits:Teller", "other=culprits:Teller", "culprits:Hold"))
+    assert [(x.group, x.name) for x in (teller, other, law)] == [
+        (DETECTORS, "teller"), (DETECTORS, "other"), (LAWS, "hold")
+    ]  # fmt: skip
+    assert register("culprits:Teller") == teller
+    for name in ("teller", "Teller", "other"):
+        assert fly(scenario(**SHORT, fdi={"scheme": name})).detection_time_s == 3.0
+
+
+@pytest.mark.parametrize("name", ["culprits:Teller", "leaves:Anything", "os.path:join"])
+def test_a_scenario_is_data_and_names_no_module(name):
+    for key in ("fdi: {scheme: ", "control: {law: "):
+        with pytest.raises(BadInput, match="is a class; a scenario names what is registered"):
+            load_text(f"name: x\n{key}'{name}'}}\n")
+    assert "leaves" not in sys.modules
+
+
+def test_a_plug_in_cannot_end_the_program():
+    with pytest.raises(SimulationFailed, match="plug-in quits at 0 s: step raised SystemExit: 0"):
+        fly(scenario(**SHORT, fdi={"scheme": register("culprits:Quits").name}))
+    with pytest.raises(BadInput, match="plug-in cannot-be-made: cannot be made: SystemExit: 0"):
+        fly(scenario(**SHORT, fdi={"scheme": register("culprits:CannotBeMade").name}))
 
 
 @pytest.mark.parametrize("group", [DETECTORS, LAWS])
@@ -224,10 +266,10 @@ def test_everything_registered_keeps_the_protocol(group):
 
 
 def test_a_failed_flight_leaves_nothing_behind(tmp_path):
-    (tmp_path / "s.yaml").write_text("name: s\nduration_s: 2\nfdi: {scheme: 'culprits:Raises'}\n")
-    done = _beaver(tmp_path, "run", "s.yaml", "--no-report")
+    (tmp_path / "s.yaml").write_text("name: s\nduration_s: 2\nfdi: {scheme: raises}\n")
+    done = _beaver(tmp_path, "run", "s.yaml", "--no-report", "--plugin", "culprits:Raises")
     assert done.returncode == 3
-    assert done.stderr.strip().startswith("plug-in culprits:Raises at ")
+    assert done.stderr.strip().startswith("plug-in raises at ")
     assert len(done.stderr.strip().splitlines()) == 1
     assert not (tmp_path / "runs").exists()
 
@@ -238,7 +280,7 @@ def test_a_failed_flight_leaves_nothing_behind(tmp_path):
         ("fdi", "scheme: augmented-efk", "unknown scheme 'augmented-efk', did you mean augmented-ekf?"),
         ("control", "law: lqg", "unknown law 'lqg', did you mean lqr?"),
         ("fdi", "scheme: ../mine.py", "unknown scheme '../mine.py', allowed: adaptive-estimators"),
-        ("fdi", "scheme: 'nowhere.at_all:Mine'", "no installed package has the module 'nowhere'"),
+        ("fdi", "scheme: 'nowhere.at_all:Mine'", "'nowhere.at_all:Mine' is a class; a scenario"),
     ],
 )
 def test_an_unknown_name_is_bad_input_at_its_line(tmp_path, key, value, says):

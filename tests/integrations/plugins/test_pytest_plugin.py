@@ -67,11 +67,53 @@ def test_a_file_that_is_wrong_says_where(folder):
 
 def test_a_scenario_that_expects_nothing_must_complete(folder):
     (folder / "plain.scenario.yaml").write_text("name: plain\nduration_s: 1\n")
-    (folder / "broken.scenario.yaml").write_text("name: broken\nduration_s: 1\nfdi: {scheme: 'json:tool'}\n")
-    done = _pytest(folder, "-v", "plain.scenario.yaml", "broken.scenario.yaml")
+    (folder / "broken.scenario.yaml").write_text("name: broken\nduration_s: 1\nfdi: {scheme: broken}\n")
+    (folder / "plug.py").write_text("class Broken:\n  def reset(self, c): 0/0\n  def step(self, m, c): 0\n")
+    given = ("-v", "--beaver-plugin", "plug:Broken")
+    done = _pytest(folder, "plain.scenario.yaml", "broken.scenario.yaml", *given)
     assert "plain.scenario.yaml::completes PASSED" in done.stdout
     assert "broken.scenario.yaml::completes FAILED" in done.stdout
-    assert "plug-in json:tool: cannot load json:tool" in done.stdout
+    assert "plug-in broken at 0 s: reset raised ZeroDivisionError" in done.stdout
+
+
+def test_a_plug_in_that_is_none_is_wrong_usage(folder):
+    done = _pytest(folder, "--beaver-plugin", "json:tool")
+    assert done.returncode == 4
+    assert "--beaver-plugin json:tool: cannot load json:tool: AttributeError" in done.stderr
+
+
+FORMS = {
+    "bom": "\ufeffname: bom\nduration_s: 1\n",
+    "flow": "{name: flow, duration_s: 1}\n",
+    "quoted": "\"name\": quoted\n'duration_s': 1\n",
+    "spaced": "name : spaced\nduration_s : 1\n",
+    "indented": "  name: indented\n  duration_s: 1\n",
+    "explicit": "---\n? name\n: explicit\n? duration_s\n: 1\n...\n",
+    "bare": "name: bare\n",
+}
+WRONG = {
+    "mistyped": "nmae: mistyped\nduration_s: 1\n",
+    "nameless": "faults: []\n",
+    "near": "name: near\nfautls: []\n",
+    "binary": "name: binary\0",
+    "unclosed": "name: [unclosed\n",
+}
+OTHERS = {
+    "workflow": "name: flights\non: [push]\njobs: {fly: {steps: []}}\n",
+    "compose": "name: shop\nservices: {web: {image: nginx}}\n",
+    "list": "- a\n- b\n",
+    "empty": "",
+}
+
+
+def test_what_is_a_scenario_for_run_is_one_for_pytest_and_what_cannot_be_read_is_an_error(tmp_path):
+    (tmp_path / "pytest.ini").write_text("[pytest]\n")
+    for name, text in (FORMS | WRONG | OTHERS).items():
+        (tmp_path / f"{name}.yaml").write_text(text, encoding="utf-8")
+    (tmp_path / "latin.yaml").write_bytes("name: caf\xe9\n".encode("latin-1"))
+    done = _pytest(tmp_path, "--beaver", "--collect-only", "-q", ".")
+    assert sorted(re.findall(r"(\w+)\.yaml::completes", done.stdout)) == sorted(FORMS)
+    assert sorted(re.findall(r"ERROR (\w+)\.yaml", done.stdout)) == sorted([*WRONG, "latin"])
 
 
 def test_unused_it_imports_nothing_of_the_testbed(folder):
@@ -79,7 +121,7 @@ def test_unused_it_imports_nothing_of_the_testbed(folder):
         "import sys\ndef test_lean():\n"
         "    ours = {m for m in sys.modules if m.startswith('beaver_ftc')}\n"
         "    plugin = 'beaver_ftc.integrations.pytest_plugin'\n"
-        "    assert ours <= {'beaver_ftc', 'beaver_ftc.integrations', plugin}\n"
+        "    assert ours <= {'beaver_ftc', 'beaver_ftc.errors', 'beaver_ftc.integrations', plugin}\n"
         "    assert not {'numpy', 'pydantic', 'numba', 'jsbsim'} & set(sys.modules)\n"
     )
     done = _pytest(folder, "test_nothing.py", "-p", "no:hypothesispytest")

@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -49,14 +50,15 @@ def test_it_is_listed(site, tmp_path):
 
 
 def test_it_flies_by_name_and_by_class(site, tmp_path):
-    for name, scheme in (("a", "my-cusum"), ("b", "my_detector:MyCusum")):
+    for name, scheme in (("a", "my-cusum"), ("b", "mine")):
         (tmp_path / f"{name}.yaml").write_text(
             f"name: {name}\nduration_s: 14\nfdi: {{scheme: '{scheme}'}}\n"
             "reference: {q: [{sine: {amplitude_deg_s: 3, frequency_hz: 0.2}}]}\n"
             "faults: [{actuator: elevator, type: loss_of_effectiveness, magnitude: 0.4, at_s: 12}]\n"
             "expect: {detected_within_s: 0.1, isolated_as: elevator, no_false_alarm: true}\n"
         )
-    done = _beaver(site, tmp_path, "run", "a.yaml", "b.yaml", "--no-report")
+    given = ("--plugin", "mine=my_detector:MyCusum")
+    done = _beaver(site, tmp_path, "run", "a.yaml", "b.yaml", "--no-report", *given)
     assert done.returncode == 0, done.stdout + done.stderr
 
 
@@ -76,3 +78,18 @@ def test_it_is_compared(site, tmp_path):
     rates = {row["scheme"]: row["detection_rate"] for row in part["lines"] if row["law"] == "fault-tolerant"}
     assert rates == {"adaptive-estimators": 1.0, "my-cusum": 1.0}
     assert "my-cusum" in part["trade_off"]
+
+
+def test_a_class_of_the_working_folder_flies_and_is_swept_by_several_workers(tmp_path):
+    shutil.copyfile(TEMPLATE / "src/my_detector/__init__.py", tmp_path / "mine.py")
+    (tmp_path / "s.yaml").write_text("name: s\nduration_s: 2\nrate_hz: 20\nfdi: {scheme: my-cusum}\n")
+    (tmp_path / "few.yaml").write_text(
+        "name: few\nbase: s.yaml\nruns: 4\nvary: {initial.airspeed_mps: {uniform: [44, 46]}}\n"
+    )
+    given = ("--no-report", "--plugin", "mine:MyCusum")
+    for arguments in (("run", "s.yaml"), ("sweep", "few.yaml", "--workers", "2")):
+        done = _beaver(tmp_path / "no", tmp_path, *arguments, *given)
+        assert done.returncode == 0, done.stderr
+        done = _beaver(tmp_path / "no", tmp_path, *arguments, "--no-report")
+        assert done.returncode == 2
+        assert "unknown scheme 'my-cusum'" in done.stderr

@@ -84,3 +84,18 @@ def test_keys_are_places_and_places_are_keys():
     for key in ("", "a..b", "a[", "[x]", "a.b]", "a[-1]"):
         with pytest.raises(UnusableKeyError):
             parse_key(key)
+
+
+@pytest.mark.parametrize("base", ["../outside.yaml", "link.yaml", "{outside}"])
+def test_a_base_lies_beside_the_sweep_or_below_it(tmp_path, base):
+    outside, folder = tmp_path / "outside.yaml", tmp_path / "sweeps"
+    folder.mkdir()
+    for path in (outside, folder / "beside.yaml"):
+        path.write_text("name: x\n")
+    (folder / "link.yaml").symlink_to(outside)
+    sweep = "base: '{}'\nruns: 2\nvary: {{initial.airspeed_mps: {{uniform: [40, 45]}}}}\n"
+    assert load_sweep_text(sweep.format("beside.yaml"), folder=folder).base["name"] == "x"
+    with pytest.raises(
+        ScenarioError, match=r"is outside, allowed: a file in the sweep's own folder or below"
+    ):
+        load_sweep_text(sweep.format(base.format(outside=outside)), folder=folder)

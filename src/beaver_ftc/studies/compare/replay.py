@@ -19,7 +19,7 @@ from beaver_ftc.diagnosis.base import Detector, Measured, Verdict
 from beaver_ftc.diagnosis.noise_model import UNSEEN
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.loop.stages import built_in_statistic
-from beaver_ftc.plugins import DETECTORS, plugin_class
+from beaver_ftc.plugins import DETECTORS, made
 from beaver_ftc.scenario.schema import Scenario
 
 
@@ -143,7 +143,7 @@ def replay(recording: Recording, scheme: str, options: dict[str, float] | None =
     """The trace of a scheme, built in or plugged in, over a recorded flight."""
     if scheme == "adaptive-estimators":
         return trace(recording, recording.built_in)
-    detector: Detector = plugin_class(DETECTORS, scheme)()
+    detector: Detector = made(DETECTORS, scheme)
     detector.reset(Context(**{**vars(recording.context), "options": options or {}}))
     began = process_time()
     verdicts = [detector.step(measured, command) for measured, command in recording.seen]
@@ -161,7 +161,7 @@ def replay_together(
     first = recordings[0]
     common = _frames_in_common(recordings)
     context = Context(**{**vars(first.context), "options": options or {}})
-    detector: Detector = plugin_class(DETECTORS, scheme)()
+    detector: Detector = made(DETECTORS, scheme)
     detector.reset(context)
     before = [_statistic(detector.step(*shown)) for shown in first.seen[:common]]
     traces = []

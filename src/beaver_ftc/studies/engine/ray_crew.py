@@ -4,9 +4,11 @@ Whether a lost task is flown again is the campaign's to decide, as with local pr
 retry.
 """
 
+import os
 from typing import Any
 
 from beaver_ftc.errors import BadInput, SimulationFailed
+from beaver_ftc.plugins import VARIABLE
 from beaver_ftc.results.metrics import versions
 from beaver_ftc.studies.engine.crew import Outcome, Row, Task, Work, silence
 from beaver_ftc.studies.engine.processes import one_thread_each
@@ -84,9 +86,10 @@ def _join(ray: Any, address: str | None) -> bool:
     if ray.is_initialized():
         return False
     options: dict[str, Any] = {} if address else {"include_dashboard": False}
+    environment = one_thread_each() | {VARIABLE: os.environ.get(VARIABLE, "")}
     try:
         with silence():
-            ray.init(address, log_to_driver=False, runtime_env={"env_vars": one_thread_each()}, **options)
+            ray.init(address, log_to_driver=False, runtime_env={"env_vars": environment}, **options)
     except (ConnectionError, ValueError, RuntimeError) as error:
         raise BadInput(f"--ray-address: cannot join a Ray cluster ({str(error).splitlines()[0]})") from None
     return True

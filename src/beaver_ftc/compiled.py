@@ -41,8 +41,11 @@ _SOURCES = (
     "plant/native.py",
     "plant/instruments.py",
     "compiled.py",
+    "plant/sensing.py",
     "loop/frame.py",
-    "loop/stages.py",
+    "loop/accounts.py",
+    "loop/record.py",
+    "loop/steps.py",
 )
 
 

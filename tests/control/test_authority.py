@@ -8,14 +8,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from beaver_ftc.control import allocation, authority, probing, reference_model
-from beaver_ftc.control.state import CONTROL
+from beaver_ftc.control.state import control_dtype
 
 DT = 0.01
 LOW, HIGH = np.array([-0.52, -0.49, -0.44, -0.1]), np.array([0.52, 0.49, 0.44, 1.03])
 
 
 def control_record():
-    control = np.zeros(1, CONTROL)
+    control = np.zeros(1, control_dtype(4))
+    control["main"], control["stand_in"] = [0, 1, 2], 3
     control["dt"], control["low"], control["high"] = DT, LOW, HIGH
     control["effectiveness"], control["reference_scale"] = 1.0, 1.0
     control["model_A"], control["model_B"] = reference_model.discretise(10.0, 1.0, DT)

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.linalg import expm
 
 from beaver_ftc.control import adaptive, allocation, nominal, reference_model
-from beaver_ftc.control.state import CONTROL
+from beaver_ftc.control.state import control_dtype
 from beaver_ftc.design.model import AILERON, ELEVATOR, FLAP, RUDDER
 
 DT = 0.01
@@ -15,7 +15,8 @@ G_TYPICAL = np.array([[-9.0, 0.0, 0.6, 0.0], [0.0, -10.0, 0.0, 2.1], [-0.2, 0.0,
 
 
 def control_record(Kp=2.0, Ki=1.0):
-    control = np.zeros(1, CONTROL)
+    control = np.zeros(1, control_dtype(4))
+    control["main"], control["stand_in"] = [0, 1, 2], 3
     control["Kp"], control["Ki"], control["dt"] = Kp, Ki, DT
     control["low"], control["high"] = [-0.52, -0.49, -0.44, -0.1], [0.52, 0.49, 0.44, 1.03]
     control["effectiveness"] = 1.0

@@ -6,17 +6,16 @@ import pytest
 
 from beaver_ftc.control.state import ADAPTIVE, FAULT_TOLERANT, LAWS, NOMINAL
 from beaver_ftc.control.supervisor import MODES, mode_of, next_mode
-from beaver_ftc.design.model import AILERON, ELEVATOR, FLAP, RUDDER
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, UNANTICIPATED
 
-SITUATIONS = {  # detected, isolated, surface
-    "healthy": (0, NOT_ISOLATED, -1),
-    "detected": (1, NOT_ISOLATED, -1),
-    "aileron": (1, 0, AILERON),
-    "elevator": (1, 1, ELEVATOR),
-    "rudder": (1, 2, RUDDER),
-    "flap": (1, 3, FLAP),
-    "unanticipated": (1, UNANTICIPATED, -1),
+SITUATIONS = {  # detected, isolated, whether another surface can relieve it
+    "healthy": (0, NOT_ISOLATED, False),
+    "detected": (1, NOT_ISOLATED, False),
+    "aileron": (1, 0, False),
+    "elevator": (1, 1, True),
+    "rudder": (1, 2, False),
+    "flap": (1, 3, False),
+    "unanticipated": (1, UNANTICIPATED, False),
 }
 EXPECTED = {
     "nominal": dict.fromkeys(SITUATIONS, "nominal"),

@@ -9,11 +9,11 @@ import numba
 import numpy as np
 from numba import njit
 
-from beaver_ftc.design.variants import response
 from beaver_ftc.diagnosis.bank import note_closest_approach
+from beaver_ftc.diagnosis.belief import bound_now, look_back, respond
 from beaver_ftc.diagnosis.thresholds import ROUNDING_RAD_S2
 from beaver_ftc.loop.assembly import assemble
-from beaver_ftc.loop.frame import bound_now, diagnose
+from beaver_ftc.loop.frame import diagnose
 from beaver_ftc.scenario.schema import Scenario
 
 TRAVEL_RAD = np.array([[-0.52, -0.49, -0.44, -0.1], [0.52, 0.49, 0.44, 1.03]])
@@ -24,15 +24,17 @@ SURFACES = ("aileron", "elevator", "rudder")
 def believe(frames):
     """What the design model makes of this instant."""
     frame = frames[0]
-    response(frame.design, frame.x, frame.y, frame.f, frame.G)
-    bound_now(frame)
+    respond(frame.belief, frame.measured)
+    bound_now(frame.fdi, frame.belief, frame.measured)
 
 
 @njit
 def conclude(frames):
     """The flying diagnosis of this instant."""
-    diagnose(frames[0])
-    note_closest_approach(frames[0].fdi)
+    frame = frames[0]
+    look_back(frame.fdi, frame.belief, frame.measured, frame.k)
+    diagnose(frame)
+    note_closest_approach(frame.fdi)
 
 
 class DesignPlant:
@@ -112,12 +114,13 @@ class DesignPlant:
     def _step(self, uncertainty):
         frame = self.frame
         frame["k"], frame["t"] = self.k, self.k * self.dt
-        frame["x"], frame["y"], frame["u"] = self.x, self.condition(), self.u
-        frame["commanded"] = self.commanded
+        measured, belief = frame["measured"], frame["belief"]
+        measured["x"], measured["y"], belief["u"] = self.x, self.condition(), self.u
+        belief["commanded"] = self.commanded
         believe(self.frames)
-        f, G = frame["f"].copy(), frame["G"].copy()
+        f, G = belief["f"].copy(), belief["G"].copy()
         phi = self.effect(G)
-        frame["phi"] = phi
+        frame["accounts"]["guarantee"]["phi"] = phi
         bound = np.maximum(self.fdi["eta_bar_now"] - ROUNDING_RAD_S2, 0.0)
         conclude(self.frames)
         eta = np.clip(uncertainty(self, bound, phi), -bound, bound)
@@ -134,7 +137,7 @@ class DesignPlant:
 
     @property
     def certain_after_s(self):
-        certain = float(self.fdi["certain_after_s"])
+        certain = float(self.frame["accounts"]["guarantee"]["certain_after_s"])
         return certain if certain >= 0 else np.inf
 
     def excluded(self, surface):

@@ -128,9 +128,9 @@ class Detector:
         self.frames = assemble(scenario, np.zeros(4), TRAVEL_RAD).view(np.recarray)
         frame = self.frames[0]
         self.fdi, self.dt = frame["fdi"], 1.0 / rate_hz
-        noise_model.set_up(self.fdi, scenario.fdi, frame["design"], MASS, LEVEL_FLIGHT, rate_hz)
+        noise_model.set_up(self.fdi, scenario.fdi, frame["belief"]["design"], MASS, LEVEL_FLIGHT, rate_hz)
         self.detector = self.fdi["statistical"]
-        statistical.prepare(self.detector, self.fdi, frame["design"], *LEVEL_FLIGHT)
+        statistical.prepare(self.detector, self.fdi, frame["belief"]["design"], *LEVEL_FLIGHT)
         self.frame = 0
 
     @property

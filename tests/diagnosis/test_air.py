@@ -50,7 +50,7 @@ class Flown:
             turn = np.array(record["turn"])
             true = turn.T @ [node.get_double_value() for node in nodes]
             felt = [FT * node.get_double_value() for node in accelerations]
-            V = loop.frames["y"][0][2]
+            V = loop.frames["measured"]["y"][0][2]
             rows.append([*record["gust"], *true, V, heading.get_double_value(), *record["force"], *felt])
         rows = np.array(rows)
         self.seen, self.true = rows[:, 0:3], rows[:, 3:6]

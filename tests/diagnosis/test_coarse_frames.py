@@ -8,24 +8,24 @@ from hypothesis import strategies as st
 from numba import njit
 
 from beaver_ftc.diagnosis.bank import aligned_extremes, extremes
+from beaver_ftc.diagnosis.belief import begin_frame, elapse, sum_up
 from beaver_ftc.loop.assembly import assemble
-from beaver_ftc.loop.frame import elapse, remember, sum_up
 from beaver_ftc.scenario.schema import Scenario
 
 
 @njit
 def first(frames):
-    remember(frames[0])
+    begin_frame(frames[0].fdi, frames[0].belief, frames[0].measured)
 
 
 @njit
 def another(frames):
-    sum_up(frames[0])
+    sum_up(frames[0].fdi, frames[0].belief)
 
 
 @njit
 def over(frames):
-    elapse(frames[0])
+    elapse(frames[0].fdi, frames[0].belief)
 
 
 @njit
@@ -39,10 +39,11 @@ def record(substeps):
 
 
 def fill(frame, rng):
+    belief = frame["belief"]
     for name in ("f", "G", "u"):
-        frame[name] = rng.uniform(-1, 1, frame[name].shape)
+        belief[name] = rng.uniform(-1, 1, belief[name].shape)
     frame["fdi"]["eta_bar_now"] = rng.uniform(0, 1, 3)
-    return frame["f"].copy(), frame["G"].copy(), frame["u"].copy(), frame["fdi"]["eta_bar_now"].copy()
+    return belief["f"].copy(), belief["G"].copy(), belief["u"].copy(), frame["fdi"]["eta_bar_now"].copy()
 
 
 @pytest.mark.parametrize("substeps", [1, 2, 7])
@@ -55,7 +56,7 @@ def test_what_is_believed_is_the_mean_over_the_instants(substeps):
         another(frames)
     over(frames)
     believed = np.mean([f + G @ u for f, G, u, _ in seen], axis=0)
-    assert frames[0]["believed"] == pytest.approx(believed)
+    assert frames[0]["belief"]["means"]["acceleration"] == pytest.approx(believed)
     assert frames[0]["fdi"]["eta_bar"] == pytest.approx(np.mean([bound for *_, bound in seen], axis=0))
 
 
@@ -67,10 +68,13 @@ shares = st.floats(-1, 0)
 def test_a_loss_that_changed_inside_the_frame_stays_within_the_extremes(n, moment0, moment, theta0, theta):
     """The first instant under the old command and the old fault, the others under the new ones."""
     frames = record(n)
-    frame, fie = frames[0], frames[0]["fdi"]["estimator"][0]
-    frame["Gu_first"][0, 0], frame["Gu_sum"][0, 0] = moment0, moment0 + (n - 1) * moment
+    belief, fie = frames[0]["belief"], frames[0]["fdi"]["estimator"][0]
+    belief["sums"]["Gu_first"][0, 0], belief["sums"]["Gu"][0, 0] = moment0, moment0 + (n - 1) * moment
     over(frames)
-    fie["effect"]["Z"][0], fie["effect"]["spread"][0] = frame["Gu_mean"][0, 0], frame["Gu_spread"][0, 0]
+    fie["effect"]["Z"][0], fie["effect"]["spread"][0] = (
+        belief["means"]["Gu"][0, 0],
+        belief["means"]["Gu_spread"][0, 0],
+    )
     fie["across"][0] = 1.0
     effect = (theta0 * moment0 + (n - 1) * theta * moment) / n
     for low, high in limits(frames, 0):
@@ -82,4 +86,4 @@ def test_one_instant_leaves_no_room():
     fill(frames[0], np.random.default_rng(0))
     first(frames)
     over(frames)
-    assert (frames[0]["Gu_spread"] == 0.0).all()
+    assert (frames[0]["belief"]["means"]["Gu_spread"] == 0.0).all()

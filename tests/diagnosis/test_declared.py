@@ -13,7 +13,7 @@ from flying import scenario
 
 def told(**keys):
     loop = Loop(scenario(duration_s=1, **keys), Recorder())
-    return loop.plugged.detector.context.declared
+    return loop.plugin_frame.detector.context.declared
 
 
 def test_nothing_declared_is_nothing_told():
@@ -48,7 +48,7 @@ def test_one_coefficient_off_gives_its_own_share_of_the_acceleration():
     """Cm_alpha off by a tenth: a tenth of its moment, over the inertia."""
     declared = told(fdi={"bounds": {"coefficients": {"Cm_alpha": 0.1}}})
     loop = Loop(scenario(duration_s=1), Recorder())
-    alpha, _, _, qdyn = loop.plugged.detector.context.trim_y[:4]
+    alpha, _, _, qdyn = loop.plugin_frame.detector.context.trim_y[:4]
     expected = 0.1 * abs(load().terms["Cm_alpha"].value) * alpha * qdyn * 23.23 * 1.5875 / 6928.93
     assert declared.model_rad_s2 == pytest.approx([0.0, expected, 0.0], abs=1e-9)
     wanted = [0.1 * abs(term.value) * (term.name == "Cm_alpha") for term in load().moments]

@@ -37,16 +37,13 @@ class RealPlant(DesignPlant):
         frame = self.frame
         seen = self.x + self.rng.choice([-1, 1], 3) * self.furthest
         frame["k"], frame["t"] = self.k, self.k * self.dt
-        frame["x"], frame["y"], frame["u"], frame["commanded"] = (
-            seen,
-            self.condition(),
-            self.u,
-            self.commanded,
-        )
+        belief, y = frame["belief"], self.condition()
+        frame["measured"]["x"], frame["measured"]["y"] = seen, y
+        belief["u"], belief["commanded"] = self.u, self.commanded
         believe(self.frames)
-        f, G, true_f, true_G = frame["f"].copy(), frame["G"].copy(), np.zeros(3), np.zeros((3, 4))
-        free_response(self.truth, self.x, frame["y"], true_f)
-        control_effectiveness(self.truth, frame["y"], true_G)
+        f, G, true_f, true_G = belief["f"].copy(), belief["G"].copy(), np.zeros(3), np.zeros((3, 4))
+        free_response(self.truth, self.x, y, true_f)
+        control_effectiveness(self.truth, y, true_G)
         conclude(self.frames)
         eta = self.rng.uniform(-0.02, 0.02, 3)
         self.x = self.x + self.dt * (true_f + true_G @ self.u + self.effect(true_G) + eta)

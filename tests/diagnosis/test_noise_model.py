@@ -185,7 +185,7 @@ def test_tolerances_of_coefficients_and_inertia_add_up():
 def test_noise_of_other_sensors_and_of_deflections_is_part_of_the_noise():
     """By moving each signal by its standard deviation: what that does to f + G u is the jitter."""
     alone = Detector(100.0, bounds={**TACTICAL, "deflection_deg": 0.5})
-    design = alone.frames[0]["design"]
+    design = alone.frames[0]["belief"]["design"]
     x, y, u = LEVEL_FLIGHT
     sensors = Bounds.model_validate(TACTICAL).sensors
     square, around = np.zeros(3), np.concatenate([x, y[:4]])

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from beaver_ftc.control.state import ORACLE
+from beaver_ftc.control.supervisor import MAX_EVENTS
 from beaver_ftc.errors import BadInput, SimulationFailed
-from beaver_ftc.loop import frame, loop, outcome
+from beaver_ftc.loop import accounts, frame, loop, summary
 from beaver_ftc.loop.loop import fly
-from beaver_ftc.plant.channels import ENVELOPE, TRUTH
+from beaver_ftc.plant.channels import TRUTH
 from beaver_ftc.results.metrics import metrics
 from beaver_ftc.results.verdict import facts
 from beaver_ftc.scenario.builtin import builtin_scenarios
@@ -164,13 +165,13 @@ class TestDepartures:
     def test_a_truth_that_is_not_finite_is_named(self, monkeypatch):
         flying = loop.Loop(scenario(duration_s=2))
         flying.cockpit.native = False
-        flying.frames["native"] = 0
+        flying.frames["truth"]["native"] = 0
         read = flying.cockpit.read
 
         def poisoned():
             read()
             if flying.frames["k"][0] == 50:
-                flying.frames["truth"][0, [name for name, _, _ in TRUTH].index("beta_rad")] = np.nan
+                flying.frames["truth"]["value"][0, [name for name, _, _ in TRUTH].index("beta_rad")] = np.nan
 
         monkeypatch.setattr(flying.cockpit, "read", poisoned)
         with pytest.raises(SimulationFailed, match=r"beta_rad.*0\.5 s|0\.5 s.*beta_rad"):
@@ -178,28 +179,28 @@ class TestDepartures:
 
 
 def test_more_events_than_there_is_room_for_are_counted_and_the_last_is_kept():
-    frames, room, stays = np.zeros(1, frame.FRAME), frame.MAX_EVENTS, 150
+    frames, room, stays = np.zeros(1, frame.frame_dtype(4)), MAX_EVENTS, 150
+    envelope = frames[0]["accounts"]["envelope"]
     for k in range(10 * stays):
-        frames["t"], frames["truth"][0, ENVELOPE] = k, k % 10 < 7
-        frame.note_envelope(frames[0])
-        frames["k"] += 1
-    exits = outcome._envelope_exits(frames[0])
+        accounts.note_envelope(envelope, k % 10 >= 7, float(k))
+    frames["t"] = 10 * stays - 1
+    exits = summary._envelope_exits(frames[0])
     assert len(exits) == room
     assert exits[:2] == ((7, 10), (17, 20))
     assert exits[-2:] == ((10 * (room - 2) + 7, 10 * (room - 1)), (10 * stays - 3, 10 * stays - 1))
-    assert (frames["n_exits"], frames["outside_frames"]) == (stays, 3 * stays - 1)
+    assert (envelope["n_exits"], envelope["outside_frames"]) == (stays, 3 * stays - 1)
 
 
 def test_the_final_mode_is_right_after_any_number_of_changes():
-    frames = np.zeros(1, frame.FRAME)
+    frames = np.zeros(1, frame.frame_dtype(4))
     frames["control"]["law"] = ORACLE
+    supervisor = frames[0]["supervisor"]
     for k in range(201):
-        frames["t"], frames["faulted"] = k, k % 2
-        frame.supervise(frames[0])
-        frames["k"] += 1
-    assert frames["n_modes"] > frame.MAX_EVENTS
-    last = frames["mode_at_s"][0, -1], frames["mode_is"][0, -1]
-    assert last == (frames["n_modes"][0] - 1, frames["mode"][0])
+        frames["t"], frames["truth"]["faulted"] = k, k % 2
+        frame.decide(frames[0])
+    assert supervisor["n_modes"] > MAX_EVENTS
+    assert supervisor["mode_at_s"][-1] == supervisor["n_modes"] - 1
+    assert supervisor["mode_is"][-1] == supervisor["mode"]
 
 
 def test_what_cannot_be_trimmed_is_bad_input():

@@ -2,7 +2,7 @@
 to flap."""
 
 from beaver_ftc.compiled import kernel
-from beaver_ftc.design.model import AILERON, ELEVATOR, FLAP, RUDDER
+from beaver_ftc.diagnosis.state import PITCH, ROLL, YAW
 
 
 @kernel
@@ -23,12 +23,12 @@ def divide(moment, effectiveness):
 def lateral(control, G, u):
     """Aileron and rudder for the roll and yaw demand; when one saturates the other makes the best of its
     own axis."""
-    roll, yaw = control.demand[0], control.demand[2]
-    determinant = G[0, AILERON] * G[2, RUDDER] - G[0, RUDDER] * G[2, AILERON]
-    aileron = divide(roll * G[2, RUDDER] - yaw * G[0, RUDDER], determinant)
-    u[AILERON] = clip(control, AILERON, aileron)
-    u[RUDDER] = clip(control, RUDDER, divide(yaw - G[2, AILERON] * u[AILERON], G[2, RUDDER]))
-    u[AILERON] = clip(control, AILERON, divide(roll - G[0, RUDDER] * u[RUDDER], G[0, AILERON]))
+    a, r = control.main[ROLL], control.main[YAW]
+    roll, yaw = control.demand[ROLL], control.demand[YAW]
+    determinant = G[ROLL, a] * G[YAW, r] - G[ROLL, r] * G[YAW, a]
+    u[a] = clip(control, a, divide(roll * G[YAW, r] - yaw * G[ROLL, r], determinant))
+    u[r] = clip(control, r, divide(yaw - G[YAW, a] * u[a], G[YAW, r]))
+    u[a] = clip(control, a, divide(roll - G[ROLL, r] * u[r], G[ROLL, a]))
 
 
 @kernel
@@ -43,18 +43,21 @@ def pitch(control, G, u):
 
     Before the hand-over the elevator carries all. After it, the elevator holds its trimmed moment, the flap
     carries what moves, and what the flap's short upward travel cannot give goes back to what is left of the
-    elevator.
+    elevator. Without a flap the elevator carries what it can.
     """
-    needed = control.demand[1]
-    share = smooth(control.hand_over)
-    hold = divide(G[1, ELEVATOR], control.effectiveness[ELEVATOR]) * control.trim[ELEVATOR]
-    flap = control.trim[FLAP] + share * (divide(needed - hold, G[1, FLAP]) - control.trim[FLAP])
-    u[FLAP] = clip(control, FLAP, flap + control.probe)
-    u[ELEVATOR] = clip(control, ELEVATOR, divide(needed - G[1, FLAP] * u[FLAP], G[1, ELEVATOR]))
+    e, f = control.main[PITCH], control.stand_in
+    needed = control.demand[PITCH]
+    if f >= 0:
+        share = smooth(control.hand_over)
+        hold = divide(G[PITCH, e], control.effectiveness[e]) * control.trim[e]
+        flap = control.trim[f] + share * (divide(needed - hold, G[PITCH, f]) - control.trim[f])
+        u[f] = clip(control, f, flap + control.probe)
+        needed -= G[PITCH, f] * u[f]
+    u[e] = clip(control, e, divide(needed, G[PITCH, e]))
 
 
 @kernel
 def allocate(control, G, u):
-    """Fill u (4,) rad for control.demand; G (3, 4) rad/s2 per rad with the believed effectiveness in it."""
+    """Fill u (n,) rad for control.demand; G (3, n) rad/s2 per rad with the believed effectiveness in it."""
     lateral(control, G, u)
     pitch(control, G, u)

@@ -18,9 +18,9 @@ RECOVERY_S = 30.0  # and asked for again within this time: several periods of a 
 
 @kernel
 def attainable(G, low, high, i):
-    """Least and greatest acceleration of axis i (rad/s2) for deflections from low to high (4,) rad."""
+    """Least and greatest acceleration of axis i (rad/s2) for deflections from low to high (n,) rad."""
     least, greatest = 0.0, 0.0
-    for s in range(4):
+    for s in range(low.size):
         one, other = G[i, s] * low[s], G[i, s] * high[s]
         least += min(one, other)
         greatest += max(one, other)
@@ -29,10 +29,10 @@ def attainable(G, low, high, i):
 
 @kernel
 def note_shortfall(control, G, u):
-    """What was demanded and is not given by u (4,) rad; and whether the rates could at least be held."""
+    """What was demanded and is not given by u (n,) rad; and whether the rates could at least be held."""
     for i in range(3):
         given = 0.0
-        for s in range(4):
+        for s in range(u.size):
             given += G[i, s] * (u[s] + control.lag[s])
         control.shortfall[i] = control.demand[i] - given
         least, greatest = attainable(G, control.low, control.high, i)

@@ -20,13 +20,15 @@ def demand(control, x, f, fhat):
 
 @kernel
 def integrate(control, x, G, u):
-    """Advance the integrators; what the limited surfaces u (4,) rad could not give is taken back
+    """Advance the integrators; what the limited surfaces u (n,) rad could not give is taken back
     (anti-windup).
 
-    G (3, 4) includes the believed effectiveness. The back-calculation gain 1/Kp unwinds within one
+    G (3, n) includes the believed effectiveness. The back-calculation gain 1/Kp unwinds within one
     closed-loop time constant.
     """
     for i in range(3):
-        given = G[i, 0] * u[0] + G[i, 1] * u[1] + G[i, 2] * u[2] + G[i, 3] * u[3]
+        given = 0.0
+        for s in range(u.size):
+            given += G[i, s] * u[s]
         error = control.governed_rate[i] - x[i]
         control.integral[i] += control.dt * (error + (given - control.demand[i]) / control.Kp)

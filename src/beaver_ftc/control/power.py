@@ -13,9 +13,9 @@ not make it follow a pitch rate.
 
 from beaver_ftc.compiled import kernel
 from beaver_ftc.control.state import ORACLE
-from beaver_ftc.design.model import AIRSPEED, DPT, ELEVATOR, FLAP, QDYN
+from beaver_ftc.design.model import AIRSPEED, DPT, QDYN
+from beaver_ftc.diagnosis.state import PITCH
 
-PITCH = 1
 LEAST_LACK_RAD_S2 = 0.05  # of pitch acceleration: what 2 to 3 inHg give
 
 
@@ -31,8 +31,12 @@ def pitch_is_lost(control):
 
     A flap that can still act is asked for what the elevator lacks, so a lack says that it has nothing left.
     """
-    both = max(control.effectiveness[ELEVATOR], control.effectiveness[FLAP]) < control.least_effectiveness
-    return both or (unable(control, ELEVATOR) and abs(control.shortfall[PITCH]) > LEAST_LACK_RAD_S2)
+    elevator, flap = control.main[PITCH], control.stand_in
+    most = control.effectiveness[elevator]
+    if flap >= 0:
+        most = max(most, control.effectiveness[flap])
+    lacking = unable(control, elevator) and abs(control.shortfall[PITCH]) > LEAST_LACK_RAD_S2
+    return most < control.least_effectiveness or lacking
 
 
 @kernel

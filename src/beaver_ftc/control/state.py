@@ -1,5 +1,7 @@
 """The control law's memory and gains: one record, part of the frame's."""
 
+from functools import lru_cache
+
 import numpy as np
 
 NOMINAL, ADAPTIVE, FAULT_TOLERANT, ORACLE = range(4)
@@ -20,25 +22,31 @@ POWER = np.dtype(
     ],
     align=True,
 )  # fmt: skip
-CONTROL = np.dtype(
-    [
+
+
+@lru_cache
+def control_dtype(n: int) -> np.dtype:
+    """The law's record for an aircraft with n surfaces; rad, rad/s, rad/s2."""
+    fields = [
         ("law", "i8"), ("dt", "f8"),
         ("Kp", "f8"), ("Ki", "f8"),
         ("model_A", "f8", (2, 2)), ("model_B", "f8", (2,)),
         ("model_rate", "f8", (3,)), ("model_acceleration", "f8", (3,)),
         ("integral", "f8", (3,)), ("demand", "f8", (3,)),
-        ("effectiveness", "f8", (4,)), ("effectiveness_step", "f8"), ("least_effectiveness", "f8"),
-        ("offset", "f8", (4,)), ("lag", "f8", (4,)),
+        ("main", "i8", (3,)), ("stand_in", "i8"),  # surface of each axis; who stands in for pitch's, or -1
+        ("G", "f8", (3, n)),  # effectiveness matrix with what is believed of each surface in it
+        ("fhat", "f8", (3,)), ("target", "f8", (n,)),
+        ("effectiveness", "f8", (n,)), ("effectiveness_step", "f8"), ("least_effectiveness", "f8"),
+        ("offset", "f8", (n,)), ("lag", "f8", (n,)),
         ("probe_amplitude", "f8"), ("probe_step", "f8"), ("probe_frames", "i8"),
         ("probe", "f8"), ("probed", "i8"), ("probe_from_s", "f8"), ("probe_to_s", "f8"),
         # what authority.py keeps
         ("governed_rate", "f8", (3,)), ("governed_acceleration", "f8", (3,)), ("hedging", "i8"),
         ("reference_scale", "f8", (3,)), ("hold", "f8", (3,)),
         ("shortfall", "f8", (3,)), ("beyond", "i8", (3,)),
-        ("trim", "f8", (4,)), ("low", "f8", (4,)), ("high", "f8", (4,)),
-        ("command", "f8", (4,)), ("saturated", "i8", (4,)),
+        ("trim", "f8", (n,)), ("low", "f8", (n,)), ("high", "f8", (n,)),
+        ("command", "f8", (n,)), ("saturated", "i8", (n,)),
         ("hand_over", "f8"), ("hand_over_step", "f8"),
         ("power", POWER),
-    ],
-    align=True,
-)  # fmt: skip
+    ]  # fmt: skip
+    return np.dtype(fields, align=True)

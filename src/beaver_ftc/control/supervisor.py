@@ -1,17 +1,26 @@
-"""Who is in charge: the reconfiguration supervisor [Zhang2005, sec. VI].
+"""The reconfiguration supervisor: which mode the law is in [Zhang2005, sec. VI].
 
 nominal until detection; adaptive until isolation, compensating an unknown fault; then reallocated
 (elevator, whose demand the flap can take over), or still adaptive with the isolated estimate (aileron,
 rudder: no second surface), or unanticipated (no known fault fits).
 """
 
+import numpy as np
+
 from beaver_ftc.compiled import kernel
 from beaver_ftc.control.state import FAULT_TOLERANT, NOMINAL
-from beaver_ftc.design.model import ELEVATOR
-from beaver_ftc.diagnosis.state import UNANTICIPATED
+from beaver_ftc.diagnosis.scheme import isolated_surface
+from beaver_ftc.diagnosis.state import PITCH, UNANTICIPATED
+from beaver_ftc.diagnosis.types.examine import FIXED, LOSES
 
 MODES = ("nominal", "adaptive", "reallocated", "unanticipated")
 MODE_NOMINAL, MODE_ADAPTIVE, MODE_REALLOCATED, MODE_UNANTICIPATED = range(4)
+MAX_EVENTS = 64
+
+SUPERVISOR = np.dtype(
+    [("mode", "i8"), ("n_modes", "i8"), ("mode_at_s", "f8", (MAX_EVENTS,)), ("mode_is", "i8", (MAX_EVENTS,))],
+    align=True,
+)
 
 
 @kernel
@@ -25,9 +34,9 @@ def next_mode(now, wanted):
 
 
 @kernel
-def mode_of(law, detected, isolated, surface):
-    """The mode for a law, given the diagnosis: detected 0/1, isolated (estimator index, -1 or -2) and its
-    surface.
+def mode_of(law, detected, isolated, relieved):
+    """The mode for a law, given the diagnosis: detected 0/1, isolated (estimator index, -1 or -2), and
+    whether another surface can relieve the one isolated.
 
     The nominal law has nothing to reconfigure: it stays in charge.
     """
@@ -35,6 +44,28 @@ def mode_of(law, detected, isolated, surface):
         return MODE_NOMINAL
     if isolated == UNANTICIPATED:
         return MODE_UNANTICIPATED
-    if law == FAULT_TOLERANT and isolated >= 0 and surface == ELEVATOR:
+    if law == FAULT_TOLERANT and isolated >= 0 and relieved:
         return MODE_REALLOCATED
     return MODE_ADAPTIVE
+
+
+@kernel
+def mode_from(control, fdi):
+    """The mode that the diagnosis asks for."""
+    elevator = control.main[PITCH]
+    if not fdi.every_type:
+        return mode_of(control.law, fdi.detected, fdi.isolated, isolated_surface(fdi) == elevator)
+    replaced = fdi.lead_kind in (LOSES, FIXED)
+    isolated = fdi.lead if replaced else min(fdi.isolated, 0)
+    return mode_of(control.law, fdi.detected, isolated, replaced and fdi.lead == elevator)
+
+
+@kernel
+def supervise(supervisor, wanted, t):
+    """Go to the mode wanted, as far as that is allowed, and note every change; t s."""
+    mode = next_mode(supervisor.mode, wanted)
+    if mode != supervisor.mode or supervisor.n_modes == 0:
+        last = min(supervisor.n_modes, MAX_EVENTS - 1)  # of more than there is room for, the latest stays
+        supervisor.mode_at_s[last], supervisor.mode_is[last] = t, mode
+        supervisor.n_modes += 1
+    supervisor.mode = mode

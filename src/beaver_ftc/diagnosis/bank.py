@@ -61,6 +61,17 @@ def alarm(fdi):
 
 
 @kernel
+def largest_share(fdi):
+    """The largest share of its bound that a filter of the bank reaches."""
+    largest = 0.0
+    for m in range(fdi.n_poles):
+        for i in range(3):
+            if fdi.bank_threshold[m, i] > 0.0:
+                largest = max(largest, abs(fdi.bank_residual[m, i]) / fdi.bank_threshold[m, i])
+    return largest
+
+
+@kernel
 def note_closest_approach(fdi):
     """Keep the largest share of its bound that each filter has reached."""
     for m in range(fdi.n_poles):

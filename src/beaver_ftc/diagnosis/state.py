@@ -1,5 +1,7 @@
 """The diagnosis' memory: one record, so that a frame is one call into compiled code."""
 
+from functools import lru_cache
+
 import numpy as np
 
 from beaver_ftc.aircraft.schema import MAX_TERMS, MAX_TERMS_OF_ONE
@@ -96,8 +98,21 @@ STATISTICAL = np.dtype(
     align=True,
 )  # fmt: skip
 
-DIAGNOSIS = np.dtype(
-    [
+
+@lru_cache
+def verdict_dtype(n: int) -> np.dtype:
+    """A plug-in's verdict. isolated: a surface, NOT_ISOLATED or UNANTICIPATED."""
+    fields = [
+        ("detected", "i8"), ("axis", "i8"), ("isolated", "i8"), ("theta", "f8"),
+        ("estimates", "i8"), ("effectiveness", "f8", (n,)),
+    ]  # fmt: skip
+    return np.dtype(fields, align=True)
+
+
+@lru_cache
+def diagnosis_dtype(n: int) -> np.dtype:
+    """The diagnosis' memory for an aircraft with n surfaces."""
+    fields = [
         ("enabled", "i8"), ("thresholds", "i8"), ("dt", "f8"), ("forgetting", "f8"),
         ("pole", "f8", (3,)), ("decay", "f8", (3,)), ("fie_decay", "f8", (3,)),
         ("inertia", "f8", (3,)), ("constant", "f8", (3,)), ("earth_rate", "f8"),
@@ -111,7 +126,7 @@ DIAGNOSIS = np.dtype(
         ("isolated", "i8"), ("isolated_at_s", "f8"),
         ("n_estimators", "i8"), ("estimator", ESTIMATOR, (MAX_ESTIMATORS,)),
         ("network", NETWORK),
-        ("estimates", "i8"), ("effectiveness", "f8", (4,)),  # of every surface, as a plug-in estimates it
+        ("estimates", "i8"), ("effectiveness", "f8", (n,)),  # of every surface, as a plug-in estimates it
         # the sharpened scheme's switches and its bank; filter 0 is the published one
         ("memory", "i8"), ("shared", "i8"), ("membership", "i8"), ("abrupt", "i8"),
         ("n_poles", "i8"), ("bank_decay", "f8", (MAX_POLES,)), ("innovation", "f8", (3,)),
@@ -119,11 +134,11 @@ DIAGNOSIS = np.dtype(
         ("bank_eta", "f8", (MAX_POLES, 3)), ("bank_noise", "f8", (MAX_POLES, 3)),
         # who stands where: axes and group of each surface, the other one of a group of two, or -1; the main
         # surface of each axis; the estimators of a surface's loss and position, or -1
-        ("dominant_axis", "i8", (4,)), ("group", "i8", (4,)), ("partner", "i8", (4,)), ("main", "i8", (3,)),
-        ("loss_of", "i8", (4,)), ("position_of", "i8", (4,)),
+        ("dominant_axis", "i8", (n,)), ("group", "i8", (n,)), ("partner", "i8", (n,)), ("main", "i8", (3,)),
+        ("loss_of", "i8", (n,)), ("position_of", "i8", (n,)),
         # faults of every type: types/
         ("every_type", "i8"), ("whole", "i8"), ("instants", "i8"), ("returns", "i8"),
-        ("surface", surface_dtype(), (4,)),
+        ("surface", surface_dtype(), (n,)),
         ("frame", "i8"), ("patience", "i8"), ("type", "i8"), ("type_at_s", "f8"),
         ("lead", "i8"), ("lead_kind", "i8"),
         # two at once: types/pairs.py
@@ -131,12 +146,10 @@ DIAGNOSIS = np.dtype(
         ("unsettled", "i8"),
         ("statistical", STATISTICAL), ("authority", "i8"),
         # errors of the surfaces' own terms, per rad of deflection and at the command: means over the frame
-        ("own_errors", "i8"), ("own_per_rad", "f8", (3, 4)), ("own", "f8", (3, 4)),
+        ("own_errors", "i8"), ("own_per_rad", "f8", (3, n)), ("own", "f8", (3, n)),
         # blocks of frames: types/blocks.py
         ("block", "i8"), ("in_block", "i8"), ("span_s", "f8"),
         ("block_innovation", "f8", (3,)), ("block_bound", "f8", (3,)), ("block_noise", "f8", (3,)),
         ("closest", "f8", (MAX_POLES,)),  # largest share of its bound each filter reached in healthy flight
-        ("effect", "f8", (MAX_POLES, 3)), ("certain_after_s", "f8"),  # what guarantee.py keeps
-    ],
-    align=True,
-)  # fmt: skip
+    ]  # fmt: skip
+    return np.dtype(fields, align=True)

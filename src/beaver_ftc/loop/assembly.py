@@ -25,7 +25,7 @@ from beaver_ftc.diagnosis.state import (
 )
 from beaver_ftc.diagnosis.types.pairs import IN_PITCH
 from beaver_ftc.errors import BadInput
-from beaver_ftc.loop.frame import FRAME
+from beaver_ftc.loop.frame import frame_dtype
 from beaver_ftc.plant import channels as ch
 from beaver_ftc.plant.instruments import LONGEST_DELAY, SIGNALS
 from beaver_ftc.scenario.actuators import Actuators
@@ -66,7 +66,7 @@ def _assemble_diagnosis(fdi: np.void, config: FdiConfig, dt: float, travel: np.n
     fdi["inertia"] = config.bounds.inertia_coupling.as_tuple()
     fdi["constant"] = config.bounds.constant_rad_s2.as_tuple()
     fdi["earth_rate"] = EARTH_RATE_RAD_S
-    fdi["detected_at_s"] = fdi["isolated_at_s"] = fdi["certain_after_s"] = -1.0
+    fdi["detected_at_s"] = fdi["isolated_at_s"] = -1.0
     fdi["isolated"] = NOT_ISOLATED
     fdi["authority"] = _AUTHORITIES[config.authority]
     members = FAULT_CLASSES[config.fault_class]
@@ -78,7 +78,7 @@ def _assemble_diagnosis(fdi: np.void, config: FdiConfig, dt: float, travel: np.n
 
 
 def _assemble_types(frame: np.void, scenario: Scenario, dt: float, travel: np.ndarray) -> None:
-    config, fdi, actuators = scenario.fdi, frame["fdi"], frame["actuators"]
+    config, fdi, actuators = scenario.fdi, frame["fdi"], frame["belief"]["actuators"]
     fdi["every_type"] = config.fault_class == "all"
     fdi["block"] = block = ceil(BLOCK_S / dt) if gyros_vary(config.bounds.sensors) else 1
     fdi["whole"], fdi["span_s"] = scenario.substeps == 1 and block == 1, block * dt
@@ -138,7 +138,7 @@ def _assemble_network(network: np.void, config: ControlConfig) -> None:
 def _assemble_control(
     control: np.void, config: ControlConfig, dt: float, trim: np.ndarray, travel: np.ndarray
 ) -> None:
-    control["law"] = LAWS.index(config.law) if config.law in LAWS else NOMINAL  # a plug-in: plugged.py
+    control["law"] = LAWS.index(config.law) if config.law in LAWS else NOMINAL  # a plug-in: plugin_frame.py
     control["dt"] = dt
     control["Kp"], control["Ki"] = config.proportional_per_s, config.integral_per_s2
     control["model_A"], control["model_B"] = discretise(
@@ -151,6 +151,8 @@ def _assemble_control(
     control["trim"] = control["command"] = trim
     control["low"], control["high"] = travel
     control["hand_over_step"] = dt / config.hand_over_s
+    control["main"] = [SURFACES.index(name) for name in MAIN]
+    control["stand_in"] = SURFACES.index(GROUPS["pitch"][1])
 
 
 def _assemble_probing(control: np.void, probing: Probing | None, dt: float) -> None:
@@ -226,7 +228,7 @@ def _assemble_admitted(frame: np.void, scenario: Scenario) -> None:
     """The errors that `fdi.bounds` declares beside the published ones."""
     admitted = frame["fdi"]["admitted"]
     mass = mass_of(scenario.design_model)
-    admit(admitted, scenario.fdi.bounds, load(scenario.aircraft), frame["design"], mass)
+    admit(admitted, scenario.fdi.bounds, load(scenario.aircraft), frame["belief"]["design"], mass)
     frame["fdi"]["own_errors"] = admitted["any"] and scenario.fdi.fault_class == "all"
     if scenario.fdi.pairs and frame["fdi"]["block"] > 1:
         raise BadInput(
@@ -241,19 +243,21 @@ def assemble(scenario: Scenario, trim: np.ndarray, travel: np.ndarray) -> np.nda
     trim (4,) rad: the surfaces in trim; travel (2, 4) rad: lower and upper stops. The truth's nodes are
     attached by the loop.
     """
-    frames = np.zeros(1, FRAME)
+    frames = np.zeros(1, frame_dtype(len(SURFACES)))
     frame = frames[0]
     dt = 1.0 / scenario.rate_hz
     frame["dt"] = dt
-    frame["share"] = 1.0 / scenario.substeps
-    frame["design"] = design_of(scenario.design_model)[0]
+    belief, truth = frame["belief"], frame["truth"]
+    belief["share"] = 1.0 / scenario.substeps
+    belief["design"] = design_of(scenario.design_model)[0]
+    belief["u"] = belief["commanded"] = trim
     channels = ch.truth_channels(load(scenario.aircraft))
-    frame["n_truth"] = len(channels)
-    frame["factor"][: len(channels)] = [factor for _, _, factor in channels]
-    frame["u"] = frame["commanded"] = trim
+    truth["n"] = len(channels)
+    truth["factor"][: len(channels)] = [factor for _, _, factor in channels]
+    frame["accounts"]["guarantee"]["certain_after_s"] = -1.0
     jsbsim_dt = dt / scenario.substeps
     _assemble_instruments(frame["instruments"], scenario, jsbsim_dt)
-    _assemble_actuators(frame["actuators"], scenario.actuators, jsbsim_dt, travel)
+    _assemble_actuators(belief["actuators"], scenario.actuators, jsbsim_dt, travel)
     _assemble_diagnosis(frame["fdi"], scenario.fdi, dt, travel)
     _assemble_types(frame, scenario, dt, travel)
     _assemble_admitted(frame, scenario)
@@ -267,5 +271,5 @@ def assemble(scenario: Scenario, trim: np.ndarray, travel: np.ndarray) -> np.nda
 
 def y_places(frame: np.void) -> list[int]:
     """Where in the truth the measured signals beside the rates are: y without noise, (4 + declared,)."""
-    declared = range(ch.POS + 3 * frame["u"].size, int(frame["n_truth"]))
+    declared = range(ch.POS + 3 * frame["belief"]["u"].size, int(frame["truth"]["n"]))
     return [ch.ALPHA, ch.BETA, ch.AIRSPEED, ch.QDYN, *declared]

@@ -3,7 +3,7 @@
 import numpy as np
 
 from beaver_ftc.compiled import direct
-from beaver_ftc.loop import stages
+from beaver_ftc.loop import steps
 from beaver_ftc.loop.frame import NOT_FINITE
 
 
@@ -14,20 +14,20 @@ class HeldFrame:
     """
 
     def __init__(self, frames: np.ndarray, references: np.ndarray, log: np.ndarray) -> None:
-        self.deflections = frames["commanded"][0].copy()
-        self._sense = direct(stages.sense, frames)
-        self._diagnose = direct(stages.diagnose, frames)
-        self._decide_mode = direct(stages.decide_mode, frames)
-        self._obey = direct(stages.obey, frames, self.deflections)
-        self._close = direct(stages.close, frames, references, log)
+        self.deflections = frames["belief"]["commanded"][0].copy()
+        self._measure = direct(steps.measure, frames)
+        self._diagnose = direct(steps.diagnose, frames)
+        self._decide = direct(steps.decide, frames)
+        self._command = direct(steps.take_command, frames, self.deflections)
+        self._finish = direct(steps.finish, frames, references, log)
 
     def __call__(self, frames: np.ndarray, references: np.ndarray, log: np.ndarray) -> int:
         """Fly one frame; see `frame.fly_frame`."""
-        status: int = self._sense(frames)
+        status: int = self._measure(frames)
         if status == NOT_FINITE:
             return status
         self._diagnose(frames)
-        self._decide_mode(frames)
-        self._obey(frames, self.deflections)
-        self._close(frames, references, log)
+        self._decide(frames)
+        self._command(frames, self.deflections)
+        self._finish(frames, references, log)
         return status

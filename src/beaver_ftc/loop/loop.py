@@ -15,8 +15,8 @@ from beaver_ftc.diagnosis import noise_model
 from beaver_ftc.errors import SimulationFailed
 from beaver_ftc.loop.assembly import assemble, estimator_names, y_places
 from beaver_ftc.loop.flight import Flight, LogSink
-from beaver_ftc.loop.frame import FLYING, NOT_FINITE, fly_frame, look
-from beaver_ftc.loop.outcome import flight_of
+from beaver_ftc.loop.frame import FLYING, NOT_FINITE, fly_frame, look_inside
+from beaver_ftc.loop.summary import flight_of
 from beaver_ftc.plant import channels as ch
 from beaver_ftc.plant import native
 from beaver_ftc.plant.adapter import Plant
@@ -30,7 +30,7 @@ from beaver_ftc.scenario.signals import sample
 if TYPE_CHECKING:
     from beaver_ftc.control.base import Law
     from beaver_ftc.diagnosis.base import Detector
-    from beaver_ftc.loop.plugged import PluggedFrame
+    from beaver_ftc.loop.plugin_frame import PluginFrame
 
 CHUNK_ROWS = 8192
 IMMOVABLE = ("stuck", "hardover", "float")  # failures in which a surface does not follow its command
@@ -48,20 +48,21 @@ class Cockpit:
         self._write = native.NodeBank([plant.node(name) for name in ch.COMMANDS], owner=plant)
         self._engine = native.NodeBank([plant.node(ch.MANIFOLD_PRESSURE)], owner=plant)
         self.native = native.available()
-        frame = frames[0]
-        frame["native"] = self.native
-        frame["getter"], frame["setter"] = native.getter_address(), native.setter_address()
-        frame["read_pointers"][: frame["n_truth"]] = self._read.pointers
-        frame["write_pointers"] = self._write.pointers
-        frame["engine_pointer"] = self._engine.pointers
+        truth = frames["truth"][0]
+        truth["native"] = self.native
+        truth["getter"], truth["setter"] = native.getter_address(), native.setter_address()
+        truth["read_pointers"][: truth["n"]] = self._read.pointers
+        truth["write_pointers"] = self._write.pointers
+        truth["engine_pointer"] = self._engine.pointers
 
     def read(self) -> None:
         """Bring the truth into the frame record, through Python."""
-        self._read.read(self._frames["truth"][0][: self._frames["n_truth"][0]])
+        truth = self._frames["truth"][0]
+        self._read.read(truth["value"][: truth["n"]])
 
     def write(self) -> None:
         """Hand the command over, through Python."""
-        self._write.write(self._frames["commanded"][0])
+        self._write.write(self._frames["belief"]["commanded"][0])
         power = self._frames["control"]["power"]
         if power["in_use"][0]:
             self._engine.write(power["command"][0])
@@ -92,7 +93,7 @@ class Loop:
         self.air = MovingAir(scenario.environment, self.plant)
         self.gust = GustSchedule(scenario.environment.gust, self.plant, scenario.rate_hz)
         self.n_frames = round(scenario.duration_s * scenario.rate_hz)
-        self.plugged = self._plugged(detector, law)
+        self.plugin_frame = self._with_plugins(detector, law)
         self.columns = ch.log_columns(
             estimator_names(scenario.fdi.fault_class) if self._diagnoses_itself else (),
             bool(self.frames["control"]["power"]["enabled"][0]),
@@ -100,41 +101,42 @@ class Loop:
         )
         self.log = np.empty((min(CHUNK_ROWS, self.n_frames), len(self.columns)))
         self.references = np.empty((len(self.log), 3))
-        self.fly_frame = self.plugged or self.direct(fly_frame)
+        self.fly_frame = self.plugin_frame or self.direct(fly_frame)
         self._set_origin()
 
     def _set_origin(self) -> None:
-        frame = self.frames[0]
-        frame["latitude_0"] = self.plant.read(ch.TRUTH[ch.LATITUDE][1])
-        frame["longitude_0"] = self.plant.read(ch.TRUTH[ch.LONGITUDE][1])
-        frame["ground_m"] = min(0.0, self.scenario.initial.altitude_m - LEAST_HEIGHT_M)
-        frame["radius_m"] = EARTH_RADIUS_M + self.scenario.initial.altitude_m
-        frame["parallel_radius_m"] = frame["radius_m"] * np.cos(frame["latitude_0"])
+        truth = self.frames["truth"][0]
+        truth["latitude_0"] = self.plant.read(ch.TRUTH[ch.LATITUDE][1])
+        truth["longitude_0"] = self.plant.read(ch.TRUTH[ch.LONGITUDE][1])
+        truth["ground_m"] = min(0.0, self.scenario.initial.altitude_m - LEAST_HEIGHT_M)
+        truth["radius_m"] = EARTH_RADIUS_M + self.scenario.initial.altitude_m
+        truth["parallel_radius_m"] = truth["radius_m"] * np.cos(truth["latitude_0"])
 
     def _anchor_design(self, surfaces: np.ndarray) -> None:
         """Show the design model the trim, which a linearised or frozen one holds on to."""
         self.cockpit.read()
-        truth = self.frames["truth"][0] * self.frames["factor"][0]
+        truth = self.frames["truth"]["value"][0] * self.frames["truth"]["factor"][0]
         y = truth[y_places(self.frames[0])]
         frame, scenario = self.frames[0], self.scenario
-        anchor(frame["design"], truth[:3], y, surfaces)
+        design = frame["belief"]["design"]
+        anchor(design, truth[:3], y, surfaces)
         start, mass = (truth[:3], y, surfaces), mass_of(scenario.design_model)
-        noise_model.set_up(frame["fdi"], scenario.fdi, frame["design"], mass, start, scenario.rate_hz)
+        noise_model.set_up(frame["fdi"], scenario.fdi, design, mass, start, scenario.rate_hz)
 
-    def _plugged(self, detector: "Detector | None", law: "Law | None") -> "PluggedFrame | None":
+    def _with_plugins(self, detector: "Detector | None", law: "Law | None") -> "PluginFrame | None":
         """The frame in which plug-ins take part; None, and nothing of it imported, if all is compiled in."""
         names = self.scenario.fdi.scheme, self.scenario.control.law
         if detector is law is None and is_compiled(DETECTORS, names[0]) and is_compiled(LAWS, names[1]):
             return None
-        from beaver_ftc.loop.plugged import plugged_frame
+        from beaver_ftc.loop.plugin_frame import plugin_frame
 
         self.cockpit.read()
-        start = self.frames["truth"][0] * self.frames["factor"][0]
-        return plugged_frame(self.frames, self.scenario, start, detector, law)
+        start = self.frames["truth"]["value"][0] * self.frames["truth"]["factor"][0]
+        return plugin_frame(self.frames, self.scenario, start, detector, law)
 
     @property
     def _diagnoses_itself(self) -> bool:
-        return self.plugged is None or self.plugged.detector is None
+        return self.plugin_frame is None or self.plugin_frame.detector is None
 
     def direct(self, kernel: Callable[..., int]) -> Callable[..., int]:
         """A compiled frame as this flight calls it: `frame.fly_frame`, or another in its place."""
@@ -142,14 +144,14 @@ class Loop:
 
     def land(self) -> Flight:
         """What the flight has yielded so far."""
-        verdict = self.plugged.verdict if self.plugged and self.plugged.detector else None
+        verdict = self.plugin_frame.verdict if self.plugin_frame and self.plugin_frame.detector else None
         return flight_of(self.scenario, self.frames[0], self.columns, verdict)
 
     def command_instead(self, deflections: np.ndarray) -> None:
         """Replace the command (4,) rad of the frame just flown, before anything has moved."""
-        frame = self.frames[0]
-        frame["commanded"], frame["u"] = deflections, frame["u_then"]
-        move(frame["actuators"], frame["commanded"], frame["u"])
+        belief = self.frames["belief"][0]
+        belief["commanded"], belief["u"] = deflections, belief["u_then"]
+        move(belief["actuators"], belief["commanded"], belief["u"])
         self.cockpit.write()
 
     def chunks(self) -> Iterable[np.ndarray]:
@@ -184,7 +186,7 @@ class Loop:
         """Bring faults and gusts to frame k, the next to fly; returns the frame at which to call again."""
         self.schedule.apply(k)
         self.gust.apply(k)
-        self._tell_analyst(k)
+        self._note_faults(k)
         return min(self.schedule.next_change(k), self.gust.next_change(k))
 
     def fly_segment(self, k: int, stop: int) -> int:
@@ -232,13 +234,13 @@ class Loop:
 
     @cached_property
     def _look(self) -> Callable[[np.ndarray], int]:
-        return direct(look, self.frames)
+        return direct(look_inside, self.frames)
 
     def _landed(self, status: int) -> int:
         if status == NOT_FINITE:
             bad = [
                 name
-                for (name, _, _), value in zip(ch.TRUTH, self.frames["truth"][0], strict=False)
+                for (name, _, _), value in zip(ch.TRUTH, self.frames["truth"]["value"][0], strict=False)
                 if not np.isfinite(value)
             ]
             raise SimulationFailed(
@@ -248,15 +250,15 @@ class Loop:
         self.frames["departed"] = status
         return status
 
-    def _tell_analyst(self, k: int) -> None:
-        """The oracle and the guarantee know the truth's faults; the diagnosis never looks at these fields."""
-        frame = self.frames[0]
-        if self.schedule.begun(k) and not frame["faulted"]:
-            frame["faulted"], frame["fault_at_s"] = 1, k / self.scenario.rate_hz
-        frame["immovable"] = [
+    def _note_faults(self, k: int) -> None:
+        """Keep the faults in the truth's record, for the oracle and the accounts."""
+        truth = self.frames["truth"][0]
+        if self.schedule.begun(k) and not truth["faulted"]:
+            truth["faulted"], truth["fault_at_s"] = 1, k / self.scenario.rate_hz
+        truth["immovable"] = [
             any(self.plant.read(f"failures/{s}/{how}") for how in IMMOVABLE) for s in SURFACES
         ]
-        frame["Cm_alpha3"] = self.plant.read("failures/unanticipated/Cm-alpha3")
+        truth["Cm_alpha3"] = self.plant.read("failures/unanticipated/Cm-alpha3")
 
 
 def travel_rad(plant: Plant) -> np.ndarray:

@@ -14,8 +14,8 @@ from beaver_ftc.errors import BadInput, suggestion
 from beaver_ftc.loop.flight import Flight, LogSink
 from beaver_ftc.loop.held import HeldFrame
 from beaver_ftc.loop.loop import CHUNK_ROWS, FLYING, Loop
-from beaver_ftc.loop.outcome import verdict_of
-from beaver_ftc.loop.plugged import measured_of
+from beaver_ftc.loop.plugin_frame import measured_of
+from beaver_ftc.loop.summary import verdict_of
 from beaver_ftc.plant.adapter import UnknownProperty
 from beaver_ftc.scenario.given import fault_of
 from beaver_ftc.scenario.schema import Scenario
@@ -104,8 +104,8 @@ class Stepping:
     @property
     def verdict(self) -> "Verdict":
         """What the diagnosis makes of the flight so far."""
-        plugged = self._loop.plugged
-        return plugged.verdict if plugged and plugged.detector else verdict_of(self._frame)
+        plugins = self._loop.plugin_frame
+        return plugins.verdict if plugins and plugins.detector else verdict_of(self._frame)
 
     @property
     def trim_rad(self) -> Vector:
@@ -277,8 +277,8 @@ class Stepping:
     def _take_command(self, deflections: Vector | None) -> None:
         """Command the surfaces in the law's place, from the frame just flown on; None gives them back."""
         loop = self._loop
-        if loop.plugged is not None:
-            loop.plugged.held_rad = deflections
+        if loop.plugin_frame is not None:
+            loop.plugin_frame.held_rad = deflections
         elif deflections is None:
             loop.fly_frame = self._own_frame
         else:

@@ -32,11 +32,11 @@ words = np.load(f"{folder}/words.npy", allow_pickle=True).item()
 truth, references = np.load(f"{folder}/truth.npy"), np.load(f"{folder}/references.npy")
 loop = Loop(Scenario.model_validate(words | {"control": {"law": law}}))
 frames = loop.frames.view(np.recarray) if numba.config.DISABLE_JIT else loop.frames
-frames["native"], frames["factor"] = 0, 1.0
+frames["truth"]["native"], frames["truth"]["factor"] = 0, 1.0
 log = np.empty((len(truth), len(loop.columns)))
 for k, seen in enumerate(truth):
-    frames["truth"][0] = seen
-    frames["faulted"] = k >= int(words["faults"][0]["at_s"] * words["rate_hz"])
+    frames["truth"]["value"][0] = seen
+    frames["truth"]["faulted"] = k >= int(words["faults"][0]["at_s"] * words["rate_hz"])
     fly_frame(frames, references, log)
 np.save(f"{folder}/log-{law}-{numba.config.DISABLE_JIT}.npy", log)
 """
@@ -51,7 +51,7 @@ def recording(tmp_path_factory):
     truth, references = np.empty((FRAMES, ch.most_channels(4))), np.empty((FRAMES, 3))
     for k in range(FRAMES):
         loop.fly_chunk(k, 1)
-        truth[k], references[k] = loop.frames["truth"][0], loop.references[0]
+        truth[k], references[k] = loop.frames["truth"]["value"][0], loop.references[0]
     assert loop.land().isolated == "elevator"
     np.save(folder / "words.npy", words)
     np.save(folder / "truth.npy", truth)

@@ -248,7 +248,7 @@ def test_what_is_tuned_for_errors_flies_only_where_errors_are_declared():
     seen = {}
     for name, bounds in (("none", {}), ("errors", {"turbulence": "light"})):
         flown = Loop(scenario(duration_s=1, fdi={"scheme": "augmented-ekf", "bounds": bounds}))
-        seen[name] = flown.plugged.detector.option
+        seen[name] = flown.plugin_frame.detector.option
     assert seen["none"]["drift_per_s"] == tuned()["augmented-ekf"]["drift_per_s"]
     assert seen["errors"]["drift_per_s"] == tuned(TUNED_FOR_ERRORS)["augmented-ekf"]["drift_per_s"]
 

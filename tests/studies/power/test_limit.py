@@ -17,7 +17,7 @@ LIGHT = Condition("tactical-grade", "light")
 
 @pytest.fixture(scope="module")
 def context():
-    return Loop(scenario_of(Bout(LIGHT, 3.0, 1), 1.0), Recorder()).plugged.detector.context
+    return Loop(scenario_of(Bout(LIGHT, 3.0, 1), 1.0), Recorder()).plugin_frame.detector.context
 
 
 def covariance(context, n):

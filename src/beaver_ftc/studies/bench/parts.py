@@ -53,10 +53,10 @@ class Part:
 # In the order in which they are switched on. Writing comes before the law, and hands over a held command.
 PARTS = (
     Part("reading", "the truth's properties, and whether they are finite and within limits",
-         {"loop.frame.measure": nothing, "loop.frame.flight_status": flying}),
+         {"plant.sensing.measure": nothing, "plant.sensing.flight_status": flying}),
     Part("fdae", "the design model, the detection estimator and its bank of filters",
-         {"design.variants.response": nothing, "loop.frame.fault_effect": nothing,
-          "loop.frame.diagnose": nothing}),
+         {"design.variants.response": nothing, "loop.accounts.effect_of_faults": nothing,
+          "diagnosis.belief.look_back": nothing, "loop.frame.diagnose": nothing}),
     Part("fies", "the isolation estimators, and the decision among them",
          {"diagnosis.isolation.suppose_all": nothing, "diagnosis.isolation.predict_all": nothing,
           "diagnosis.isolation.start": nothing, "diagnosis.isolation.isolate": nothing}),
@@ -65,12 +65,12 @@ PARTS = (
           "diagnosis.thresholds.interval": all_residuals, "diagnosis.thresholds.published": all_residuals}),
     Part("network", "the network of the detection estimator, which learns after the alarm",
          {"diagnosis.network.learn": nothing, "diagnosis.network.evaluate": nothing}),
-    Part("supervisor", "who is in charge", {"loop.frame.supervise": nothing}),
+    Part("supervisor", "who is in charge", {"loop.frame.decide": nothing}),
     Part("writing", "the command, into the aircraft's properties", {"plant.native.write_nodes": nothing}),
     Part("law", "reference model, feedback linearisation, accommodation, allocation, anti-windup",
          {"loop.frame.command": nothing, "control.reference_model.follow": nothing}),
     Part("logging", "every column of the log, and the sums of the metrics",
-         {"loop.frame.record": nothing, "loop.frame.account": nothing}),
+         {"loop.record.record": nothing, "loop.accounts.account": nothing}),
 )  # fmt: skip
 
 

@@ -18,7 +18,7 @@ from beaver_ftc.design.context import Context
 from beaver_ftc.diagnosis.base import Detector, Measured, Verdict
 from beaver_ftc.diagnosis.noise_model import UNSEEN
 from beaver_ftc.loop.loop import Loop
-from beaver_ftc.loop.stages import built_in_statistic
+from beaver_ftc.loop.steps import built_in_statistic
 from beaver_ftc.plugins import DETECTORS, made
 from beaver_ftc.scenario.schema import Scenario
 
@@ -88,8 +88,8 @@ class _Watch:
     """Stands in for the flight's frame: flies it, then notes the built-in statistic."""
 
     def __init__(self, loop: Loop) -> None:
-        assert loop.plugged is not None
-        self._frame, self.values, self.air = loop.plugged, list[float](), list[np.ndarray]()
+        assert loop.plugin_frame is not None
+        self._frame, self.values, self.air = loop.plugin_frame, list[float](), list[np.ndarray]()
         self._statistical = loop.frames["fdi"]["statistical"]
         self._statistical["enabled"] = loop.scenario.fdi.statistical is not None
 

@@ -4,15 +4,16 @@ from math import isfinite
 
 import numpy as np
 
-from beaver_ftc.control.supervisor import MODES
+from beaver_ftc.control.supervisor import MAX_EVENTS, MODES
 from beaver_ftc.design.coefficients import SURFACES
 from beaver_ftc.design.model import AXES
 from beaver_ftc.diagnosis.base import Verdict
+from beaver_ftc.diagnosis.scheme import isolated_theta
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, UNANTICIPATED
 from beaver_ftc.diagnosis.types.findings import found
 from beaver_ftc.loop.assembly import estimator_names
 from beaver_ftc.loop.flight import Flight
-from beaver_ftc.loop.frame import DEPARTURE_SIGNALS, MAX_EVENTS, isolated_theta
+from beaver_ftc.plant.sensing import DEPARTURE_SIGNALS
 from beaver_ftc.scenario.schema import Scenario
 
 
@@ -66,17 +67,18 @@ def _isolation(fdi: np.void) -> dict:
 
 
 def _envelope_exits(frame: np.void) -> tuple[tuple[float, float], ...]:
-    count = min(int(frame["n_exits"]), len(frame["exit_at_s"]))
-    end_s = float(frame["t"])
+    envelope, end_s = frame["accounts"]["envelope"], float(frame["t"])
+    count = min(int(envelope["n_exits"]), len(envelope["exit_at_s"]))
     return tuple(
         (float(out), float(back) if isfinite(back) else end_s)
-        for out, back in zip(frame["exit_at_s"][:count], frame["return_at_s"][:count], strict=True)
+        for out, back in zip(envelope["exit_at_s"][:count], envelope["return_at_s"][:count], strict=True)
     )
 
 
 def _guaranteed_delay(frame: np.void) -> float | None:
-    certain = _instant(frame["fdi"]["certain_after_s"])
-    return None if certain is None or not frame["faulted"] else certain - float(frame["fault_at_s"])
+    truth = frame["truth"]
+    certain = _instant(frame["accounts"]["guarantee"]["certain_after_s"])
+    return None if certain is None or not truth["faulted"] else certain - float(truth["fault_at_s"])
 
 
 def _probing_s(frame: np.void) -> tuple[float, float] | None:
@@ -90,11 +92,12 @@ def _probing_s(frame: np.void) -> tuple[float, float] | None:
 
 def _authority(frame: np.void) -> dict[str, tuple[float, float]] | None:
     """Per axis, after the fault: share of the demanded acceleration given, and seconds beyond holding."""
-    if not frame["post_fault_frames"]:
+    if not frame["accounts"]["tracking"]["frames_since"]:
         return None
-    both = zip(frame["demanded"], frame["lacking"], strict=True)
+    authority = frame["accounts"]["authority"]
+    both = zip(authority["demanded"], authority["lacking"], strict=True)
     shares = [1.0 - float(lack / asked) if asked > 0.0 else 1.0 for asked, lack in both]
-    beyond_s = [int(n) * float(frame["dt"]) for n in frame["beyond_frames"]]
+    beyond_s = [int(n) * float(frame["dt"]) for n in authority["beyond_frames"]]
     return dict(zip(AXES, zip(shares, beyond_s, strict=True), strict=True))
 
 
@@ -135,7 +138,7 @@ def verdict_of(frame: np.void) -> Verdict:
     )
 
 
-def _told(fdi: np.void, verdict: Verdict) -> dict:
+def _of_verdict(fdi: np.void, verdict: Verdict) -> dict:
     """The same of a Flight, from a plug-in's verdict."""
     isolated = verdict.isolated if fdi["detected"] else None
     return {
@@ -151,9 +154,10 @@ def flight_of(
     scenario: Scenario, frame: np.void, columns: tuple[str, ...], verdict: Verdict | None = None
 ) -> Flight:
     """Read the flight's outcome off its frame record; `verdict` is a plug-in detector's last one."""
-    fdi, dt = frame["fdi"], float(frame["dt"])
+    fdi, accounts, dt = frame["fdi"], frame["accounts"], float(frame["dt"])
+    supervisor, tracking = frame["supervisor"], accounts["tracking"]
     departed = int(frame["departed"])
-    modes = range(min(int(frame["n_modes"]), MAX_EVENTS))
+    modes = range(min(int(supervisor["n_modes"]), MAX_EVENTS))
     closest = tuple(float(share) for share in fdi["closest"][: max(int(fdi["n_poles"]), 1)])
     return Flight(
         scenario=scenario,
@@ -162,22 +166,23 @@ def flight_of(
         detection_time_s=_instant(fdi["detected_at_s"]),
         detection_axis=AXES[int(fdi["detected_axis"])] if fdi["detected"] else None,
         guaranteed_delay_s=_guaranteed_delay(frame),
-        pre_fault_rms_rad_s=_rms(frame["pre_fault_square"], int(frame["pre_fault_frames"]))
-        or (0.0, 0.0, 0.0),
-        post_fault_rms_rad_s=_rms(frame["post_fault_square"], int(frame["post_fault_frames"])),
-        supervisor=tuple((float(frame["mode_at_s"][i]), MODES[int(frame["mode_is"][i])]) for i in modes),
-        mode_changes=int(frame["n_modes"]),
+        pre_fault_rms_rad_s=_rms(tracking["before"], int(tracking["frames_before"])) or (0.0, 0.0, 0.0),
+        post_fault_rms_rad_s=_rms(tracking["since"], int(tracking["frames_since"])),
+        supervisor=tuple(
+            (float(supervisor["mode_at_s"][i]), MODES[int(supervisor["mode_is"][i])]) for i in modes
+        ),
+        mode_changes=int(supervisor["n_modes"]),
         envelope_exits=_envelope_exits(frame),
-        exits=int(frame["n_exits"]),
-        outside_s=int(frame["outside_frames"]) * dt,
+        exits=int(accounts["envelope"]["n_exits"]),
+        outside_s=int(accounts["envelope"]["outside_frames"]) * dt,
         departure=(float(frame["t"]), DEPARTURE_SIGNALS[departed // 10]) if departed else None,
-        saturation_s={s: int(n) * dt for s, n in zip(SURFACES, frame["saturated_frames"], strict=True)},
+        saturation_s={s: int(n) * dt for s, n in zip(SURFACES, accounts["saturated_frames"], strict=True)},
         worst_residual_ratio=max(*closest, float(fdi["statistical"]["closest"])),
         statistical=_statistical(fdi),
         closest_approach=closest,
         authority=_authority(frame),
         probing_s=_probing_s(frame),
         engine_power=_engine_power(frame),
-        surface_travel_rad={s: float(x) for s, x in zip(SURFACES, frame["travelled"], strict=True)},
-        **(_isolation(fdi) if verdict is None else _told(fdi, verdict)),
+        surface_travel_rad={s: float(x) for s, x in zip(SURFACES, accounts["travelled"], strict=True)},
+        **(_isolation(fdi) if verdict is None else _of_verdict(fdi, verdict)),
     )

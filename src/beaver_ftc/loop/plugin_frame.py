@@ -14,10 +14,10 @@ from beaver_ftc.diagnosis.base import Detector, Measured, Verdict
 from beaver_ftc.diagnosis.declared import declared_of
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, UNANTICIPATED
 from beaver_ftc.errors import BeaverFtcError, SimulationFailed
-from beaver_ftc.loop import stages
+from beaver_ftc.loop import steps
 from beaver_ftc.loop.assembly import y_places
 from beaver_ftc.loop.frame import NOT_FINITE
-from beaver_ftc.loop.outcome import verdict_of
+from beaver_ftc.loop.summary import verdict_of
 from beaver_ftc.plugins import DETECTORS, LAWS, is_compiled, made
 from beaver_ftc.scenario.schema import Scenario
 
@@ -25,7 +25,7 @@ _AXES = {"p": 0, "q": 1, "r": 2, None: 0}
 _ISOLATED = {None: NOT_ISOLATED, "unanticipated": UNANTICIPATED} | {s: i for i, s in enumerate(SURFACES)}
 
 
-class PluggedFrame:
+class PluginFrame:
     """One frame of the loop with a detector or a law that is not compiled in; called as `frame.fly_frame` is.
 
     detector, law: the plug-ins, None where the built-in one is in place. names: what to call them when one is
@@ -43,7 +43,6 @@ class PluggedFrame:
         self.verdict = Verdict()
         self.held_rad: np.ndarray | None = None  # a command (surfaces,) that takes the law's place
         self._names = names
-        self._told = np.zeros(1, stages.TOLD)
         self._t_s = 0.0
         if detector is not None:
             self._ask(names[0], detector.reset, context[0])
@@ -52,33 +51,33 @@ class PluggedFrame:
 
     def __call__(self, frames: np.ndarray, references: np.ndarray, log: np.ndarray) -> int:
         """Fly one frame; see `frame.fly_frame`."""
-        status = stages.sense(frames)
+        status = steps.measure(frames)
         if status == NOT_FINITE:
             return status
         frame = frames[0]
         self._t_s = float(frame["t"])
         measured = measured_of(frame)
         self._diagnose(frames, measured)
-        stages.decide_mode(frames)
+        steps.decide(frames)
         self._command(frames, references, measured)
-        stages.close(frames, references, log)
+        steps.finish(frames, references, log)
         return status
 
     def _diagnose(self, frames: np.ndarray, measured: Measured) -> None:
         if self.detector is None:
-            stages.diagnose(frames)
+            steps.diagnose(frames)
             return
-        verdict = self._ask(self._names[0], self.detector.step, measured, frames[0]["u"].copy())
-        self._tell(verdict)
+        verdict = self._ask(self._names[0], self.detector.step, measured, frames["belief"]["u"][0].copy())
+        self._check(verdict, frames["verdict"][0])
         self.verdict = verdict
-        stages.heed(frames, self._told)
+        steps.take_verdict(frames)
 
     def _command(self, frames: np.ndarray, references: np.ndarray, measured: Measured) -> None:
         if self.held_rad is not None:
-            stages.obey(frames, self.held_rad)
+            steps.take_command(frames, self.held_rad)
             return
         if self.law is None:
-            stages.act(frames, references)
+            steps.command(frames)
             return
         frame = frames[0]
         control = frame["control"]
@@ -89,7 +88,7 @@ class PluggedFrame:
         )
         verdict = self.verdict if self.detector is not None else verdict_of(frame)
         answer = self._ask(self._names[1], self.law.step, measured, reference, verdict)
-        stages.obey(frames, self._deflections(answer))
+        steps.take_command(frames, self._deflections(answer))
 
     def _ask(self, name: str, question: Any, *arguments: Any) -> Any:
         try:
@@ -103,7 +102,7 @@ class PluggedFrame:
     def _blame(self, name: str, what: str) -> None:
         raise SimulationFailed(f"plug-in {name} at {self._t_s:g} s: {what[:500]}")
 
-    def _tell(self, verdict: Any) -> None:
+    def _check(self, verdict: Any, taken: np.void) -> None:
         """Check a verdict and put it into the record that compiled code reads."""
         name = self._names[0]
         if not isinstance(verdict, Verdict):
@@ -113,13 +112,12 @@ class PluggedFrame:
         if verdict.isolated not in _ISOLATED:
             allowed = ", ".join(str(key) for key in _ISOLATED)
             self._blame(name, f"verdict.isolated is {verdict.isolated!r}, allowed: {allowed}")
-        told = self._told[0]
-        told["detected"], told["axis"] = bool(verdict.detected), _AXES[verdict.axis]
-        told["isolated"] = _ISOLATED[verdict.isolated]
-        told["theta"] = 0.0 if verdict.estimate is None else self._finite(verdict.estimate)
-        told["estimates"] = verdict.effectiveness is not None
+        taken["detected"], taken["axis"] = bool(verdict.detected), _AXES[verdict.axis]
+        taken["isolated"] = _ISOLATED[verdict.isolated]
+        taken["theta"] = 0.0 if verdict.estimate is None else self._finite(verdict.estimate)
+        taken["estimates"] = verdict.effectiveness is not None
         if verdict.effectiveness is not None:
-            told["effectiveness"] = self._four(name, "verdict.effectiveness", verdict.effectiveness)
+            taken["effectiveness"] = self._four(name, "verdict.effectiveness", verdict.effectiveness)
 
     def _finite(self, value: Any) -> float:
         if not isinstance(value, float | int | np.floating) or not isfinite(value):
@@ -147,10 +145,10 @@ def measured_of(frame: np.void) -> Measured:
     """What is known at the frame just flown."""
     return Measured(
         float(frame["t"]),
-        frame["x"].copy(),
-        frame["y"][: len(y_places(frame))].copy(),
-        frame["believed"].copy(),
-        frame["Gu_mean"].copy(),
+        frame["measured"]["x"].copy(),
+        frame["measured"]["y"][: len(y_places(frame))].copy(),
+        frame["belief"]["means"]["acceleration"].copy(),
+        frame["belief"]["means"]["Gu"].copy(),
         frame["fdi"]["eta_bar"].copy(),
     )
 
@@ -165,7 +163,7 @@ def context_of(
     return Context(
         dt_s=float(frame["dt"]),
         substeps=scenario.substeps,
-        model=DesignModel(frames["design"].copy()),
+        model=DesignModel(frames["belief"]["design"].copy()),
         trim_x=start[:3].copy(),
         trim_y=trim_y,
         trim_rad=control["trim"].copy(),
@@ -175,14 +173,14 @@ def context_of(
         seed=scenario.seed,
         options=dict(options),
         declared=declared_of(
-            scenario.fdi.bounds, scenario.actuators, frames["design"], trim_y, control["trim"]
+            scenario.fdi.bounds, scenario.actuators, frames["belief"]["design"], trim_y, control["trim"]
         ),
     )
 
 
-def plugged_frame(
+def plugin_frame(
     frames: np.ndarray, scenario: Scenario, start: np.ndarray, detector: Detector | None, law: Law | None
-) -> PluggedFrame | None:
+) -> PluginFrame | None:
     """The frame with the plug-ins the scenario names, or with these; None if everything is compiled in.
 
     frames: the assembled record, made ready for them. start: as in `context_of`. Raises BadInput for a name
@@ -205,7 +203,7 @@ def plugged_frame(
         context_of(frames, scenario, start, fdi.options),
         context_of(frames, scenario, start, control.options),
     )
-    return PluggedFrame(detector, law, _names(scenario, detector, law), contexts)
+    return PluginFrame(detector, law, _names(scenario, detector, law), contexts)
 
 
 def _names(scenario: Scenario, detector: Detector | None, law: Law | None) -> tuple[str, str]:

@@ -301,7 +301,7 @@ def test_a_flight_without_plug_ins_imports_none_of_this():
     code = (
         "import sys; from beaver_ftc.loop.loop import fly; from beaver_ftc.scenario.schema import Scenario\n"
         "fly(Scenario(name='s', duration_s=0.1))\n"
-        "print([m for m in sys.modules if 'plugged' in m or 'rivals' in m])"
+        "print([m for m in sys.modules if 'plugin_frame' in m or 'rivals' in m])"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"

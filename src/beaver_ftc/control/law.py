@@ -1,0 +1,60 @@
+"""The built-in law, one frame of it: accommodate, demand, allocate, give back what cannot be had."""
+
+from beaver_ftc.compiled import kernel
+from beaver_ftc.control import adaptive, allocation, authority, nominal, power, probing
+from beaver_ftc.control.accommodation import accommodate, give_up
+from beaver_ftc.control.state import NOMINAL, ORACLE
+from beaver_ftc.control.supervisor import MODE_REALLOCATED
+from beaver_ftc.diagnosis.state import NOT_ISOLATED, PITCH
+
+
+@kernel
+def in_doubt(control, fdi):
+    """Whether elevator or flap is at fault and it has long been open which."""
+    open_question = fdi.every_type and fdi.detected and fdi.isolated == NOT_ISOLATED
+    long = fdi.surface[control.main[PITCH]].evidence >= fdi.patience
+    return open_question and long and control.law not in (NOMINAL, ORACLE)
+
+
+@kernel
+def advance_hand_over(control, every_type, mode):
+    """Hand the pitch demand to the flap, or back. What a jammed elevator no longer carries goes at once."""
+    left = control.effectiveness[control.main[PITCH]]
+    if mode == MODE_REALLOCATED:
+        control.hand_over = min(control.hand_over + control.hand_over_step, 1.0)
+        if control.hedging or (left < control.least_effectiveness and every_type):
+            control.hand_over = max(control.hand_over, 1.0 - left)
+    elif every_type:
+        control.hand_over = max(control.hand_over - control.hand_over_step, 0.0)
+
+
+@kernel
+def command(control, fdi, belief, measured, faults, mode, t):
+    """Fill control.command (n,) rad: the law in charge. t s."""
+    accommodate(control, fdi, belief, measured, faults)
+    if control.law == NOMINAL:
+        control.G[:] = belief.G
+    else:
+        adaptive.believed_effectiveness(control, belief.G, control.G)
+    advance_hand_over(control, fdi.every_type, mode)
+    if control.probe_frames > 0:
+        probing.advance(control, in_doubt(control, fdi), t)
+    nominal.demand(control, measured.x, belief.f, control.fhat)
+    if control.law != NOMINAL:
+        adaptive.allow_for_offsets(control, belief.G)
+    allocation.allocate(control, control.G, control.command)
+    give_up(control, fdi, faults)
+    nominal.integrate(control, measured.x, control.G, control.command)
+    if faults.present or control.hedging or (control.power.enabled and fdi.detected):
+        authority.note_shortfall(control, control.G, control.command)
+    if control.power.enabled:
+        power.steer(control, measured.x, measured.y, fdi.detected, t)
+
+
+@kernel
+def take_command(control, deflections):
+    """Take a plug-in's command (n,) rad, within the travel of each surface."""
+    for s in range(deflections.size):
+        limited = min(max(deflections[s], control.low[s]), control.high[s])
+        control.saturated[s] = limited != deflections[s]
+        control.command[s] = limited

@@ -1,0 +1,181 @@
+"""The diagnosis scheme, one frame of it: predict, compare, raise the alarm, exclude, decide.
+
+fdi: dtype DIAGNOSIS, belief: dtype of belief.py, measured: MEASURED. effectiveness, offset (n,): what the law
+takes each surface for, so that what is known of a fault is no surprise; offset in rad. k: frame number, t s.
+"""
+
+from beaver_ftc.compiled import kernel
+from beaver_ftc.design.model import ALPHA, BETA, unanticipated_pitch
+from beaver_ftc.diagnosis import air, bank, detection, isolation, network, statistical
+from beaver_ftc.diagnosis.belief import begin_frame
+from beaver_ftc.diagnosis.state import NOT_ISOLATED, STATISTICS, WORST_CASE
+from beaver_ftc.diagnosis.types import examine
+
+
+@kernel
+def diagnose(fdi, belief, measured, effectiveness, offset, k, t):
+    """The built-in diagnosis of this frame; `belief.look_back` has been called for it."""
+    conclude(fdi, belief, measured, effectiveness, offset, k, t)
+    ready(fdi, belief, measured, k)
+
+
+@kernel
+def conclude(fdi, belief, measured, effectiveness, offset, k, t):
+    """From prediction to verdict; with scheme `none`, nothing."""
+    if k == 0:
+        detection.begin(fdi, measured.x)
+    if fdi.enabled:
+        if k > 0:
+            predict(fdi, belief, measured, effectiveness, offset, k, t)
+        else:
+            bank.align(fdi, belief.G)
+        decide(fdi, measured, t)
+
+
+@kernel
+def predict(fdi, belief, measured, effectiveness, offset, k, t):
+    """Bring the estimators from the frame before to this one."""
+    x, x_then, mean = measured.x, belief.x_then, belief.means
+    expected = belief.expected
+    expected[:] = mean.acceleration
+    bank.innovate(fdi, x, x_then, expected)
+    if fdi.statistical.enabled:
+        compare_likelihoods(fdi, belief, measured, k, t)
+    isolation.suppose_all(fdi, mean.G, mean.Gu, mean.Gu_spread)
+    if fdi.every_type:
+        examine.note_orders(fdi, belief.commanded)
+    if fdi.detected:
+        isolation.predict_all(fdi, x_then, expected)
+        expect_known_faults(expected, mean, effectiveness, offset, fdi.every_type)
+    if fdi.statistical.enabled:
+        for i in range(3):
+            belief.surprise[i] = (x[i] - x_then[i]) / fdi.dt - expected[i]
+        statistical.follow_rest(fdi.statistical, belief.surprise, fdi.dt)
+    detection.predict(fdi, x_then, expected, fdi.isolated >= 0 or fdi.lead >= 0)
+
+
+@kernel
+def expect_known_faults(expected, mean, effectiveness, offset, offsets_count):
+    """Take off `expected` (3,) rad/s2 what the surfaces have lost, as known; add what they give unasked."""
+    for s in range(effectiveness.size):
+        lost = 1.0 - effectiveness[s]
+        for i in range(3):
+            expected[i] -= lost * mean.Gu[i, s]
+    if offsets_count:
+        for s in range(offset.size):
+            for i in range(3):
+                expected[i] += mean.G[i, s] * offset[s]
+
+
+@kernel
+def compare_likelihoods(fdi, belief, measured, k, t):
+    """Show the statistical detector the elapsed frame."""
+    cubic = unanticipated_pitch(belief.design, measured.y, 1.0)
+    statistical.signatures(fdi.statistical, belief.means.Gu, cubic)
+    statistical.observe(fdi.statistical, fdi.innovation, fdi.dt, k, fdi.detected)
+    statistical.score(fdi.statistical, t)
+
+
+@kernel
+def decide(fdi, measured, t):
+    """From residuals to alarm, and from then on to a verdict."""
+    known = fdi.detected
+    detection.detect(fdi, measured.x, t)
+    if not fdi.detected:
+        return
+    if not known:
+        isolation.start(fdi, measured.x)
+    isolation.isolate(fdi, measured.x, t, known)
+    network.evaluate(fdi.network, measured.y[ALPHA], measured.y[BETA])
+
+
+@kernel
+def ready(fdi, belief, measured, k):
+    """Make ready for the frame to come."""
+    if fdi.statistical.enabled:
+        look_ahead(fdi, belief, measured, k)
+    begin_frame(fdi, belief, measured)
+
+
+@kernel
+def look_ahead(fdi, belief, measured, k):
+    """Ready the statistical detector for the next frame: the air as the vanes see it, noise, coefficients."""
+    if fdi.statistical.air.moving:
+        if k > 0:
+            air.observe(fdi.statistical.air, measured.y, measured.attitude, fdi.dt)
+        else:
+            air.advance_axes(fdi.statistical.air, measured.y, measured.attitude)
+    statistical.prepare(fdi.statistical, fdi, belief.design, measured.x, measured.y, belief.u)
+
+
+@kernel
+def take_verdict(fdi, belief, measured, verdict, effectiveness, offset, k, t):
+    """Take a plug-in's verdict (`verdict_dtype`), and bring the estimator that serves the laws up to date."""
+    if k == 0:
+        detection.begin(fdi, measured.x)
+    else:
+        predict(fdi, belief, measured, effectiveness, offset, k, t)
+    for i in range(3):
+        fdi.residual[i] = measured.x[i] - fdi.xhat[i]
+    note_verdict(fdi, verdict, t)
+    if fdi.detected:
+        network.evaluate(fdi.network, measured.y[ALPHA], measured.y[BETA])
+    ready(fdi, belief, measured, k)
+
+
+@kernel
+def note_verdict(fdi, verdict, t):
+    """Write a plug-in's verdict where the built-in one stands."""
+    if verdict.detected and not fdi.detected:
+        fdi.detected, fdi.detected_at_s, fdi.detected_axis = 1, t, verdict.axis
+    isolated = verdict.isolated if fdi.detected else NOT_ISOLATED
+    if isolated != fdi.isolated:
+        fdi.isolated, fdi.isolated_at_s = isolated, t
+    if isolated >= 0:
+        fdi.estimator[isolated].theta[:] = verdict.theta
+    fdi.estimates = verdict.estimates
+    fdi.effectiveness[:] = verdict.effectiveness
+
+
+@kernel
+def isolated_surface(fdi):
+    """The surface of the isolated fault, or -1."""
+    return fdi.estimator[fdi.isolated].surface if fdi.isolated >= 0 else -1
+
+
+@kernel
+def likelihood_counts(fdi):
+    """Whether the statistical detector's estimates are the ones to use."""
+    return fdi.statistical.enabled and fdi.authority != WORST_CASE
+
+
+@kernel
+def isolated_theta(fdi, s):
+    """Estimated theta of the isolated loss of surface s: under noise, the most likely one."""
+    if likelihood_counts(fdi):
+        return statistical.loss_of(fdi.statistical, s)[0]
+    return fdi.estimator[fdi.isolated].theta[fdi.dominant_axis[s]]
+
+
+@kernel
+def unknown_acceleration(fdi, out):
+    """Fill out (3,) rad/s2 with what goes on beyond the model and the known faults, as it is estimated."""
+    if likelihood_counts(fdi):
+        statistical.unknown_acceleration(fdi.statistical, out)
+    else:
+        detection.unknown_acceleration(fdi, out)
+
+
+@kernel
+def built_in_statistic(fdi):
+    """The largest share of its threshold that the built-in detection reaches at this frame.
+
+    Of two detectors, the worst-case one counts beyond its bound only: it has no rate of false alarms that a
+    lower level could trade for power.
+    """
+    chances = likelihood_counts(fdi)
+    likely = fdi.statistical.score if chances else 0.0
+    if fdi.authority == STATISTICS:
+        return likely
+    certain = bank.largest_share(fdi)
+    return max(likely, certain) if certain > 1.0 or not chances else likely

@@ -1,0 +1,148 @@
+"""The flight's accounts: what the metrics are made of. They alone, and the oracle, see the truth.
+
+One of them is the instant from which detection is certain, whatever the uncertainty does:
+if |int e^{-lam (t - tau)} phi_i dtau| > 2 ebar_i for some i, the fault has been detected by t [Zhang2002]:
+at worst an admissible eta hides ebar_i of the fault's effect. With a bank of poles, the first of theirs.
+The effect phi is the truth's, so this is an analyst's figure: the diagnosis never sees it.
+"""
+
+from functools import lru_cache
+
+import numpy as np
+
+from beaver_ftc.compiled import kernel
+from beaver_ftc.control.supervisor import MAX_EVENTS
+from beaver_ftc.design.model import unanticipated_pitch
+from beaver_ftc.diagnosis import bank
+from beaver_ftc.diagnosis.state import PITCH
+from beaver_ftc.plant import channels as ch
+from beaver_ftc.plant.sensing import effective, position
+from beaver_ftc.scenario.diagnosis import MAX_POLES
+
+GUARANTEE = np.dtype(
+    [
+        ("phi", "f8", (3,)), ("phi_sum", "f8", (3,)),  # effect of the faults, rad/s2: now, and over the frame
+        ("effect", "f8", (MAX_POLES, 3)),  # filtered as the bank filters the innovation, rad/s
+        ("certain_after_s", "f8"),
+    ],
+    align=True,
+)  # fmt: skip
+TRACKING = np.dtype(
+    [
+        ("before", "f8", (3,)), ("frames_before", "i8"),  # squared error before a fault, rad2/s2, and since
+        ("since", "f8", (3,)), ("frames_since", "i8"),
+    ],
+    align=True,
+)  # fmt: skip
+AUTHORITY = np.dtype(
+    [("demanded", "f8", (3,)), ("lacking", "f8", (3,)), ("beyond_frames", "i8", (3,))], align=True
+)
+ENVELOPE = np.dtype(
+    [
+        ("outside", "i8"), ("n_exits", "i8"), ("outside_frames", "i8"),
+        ("exit_at_s", "f8", (MAX_EVENTS,)), ("return_at_s", "f8", (MAX_EVENTS,)),
+    ],
+    align=True,
+)  # fmt: skip
+
+
+@lru_cache
+def accounts_dtype(n: int) -> np.dtype:
+    """Accounts of a flight with n surfaces; travelled (n,) rad."""
+    fields = [
+        ("guarantee", GUARANTEE), ("tracking", TRACKING), ("authority", AUTHORITY), ("envelope", ENVELOPE),
+        ("saturated_frames", "i8", (n,)), ("travelled", "f8", (n,)), ("position_then", "f8", (n,)),
+    ]  # fmt: skip
+    return np.dtype(fields, align=True)
+
+
+@kernel
+def effect_of_faults(guarantee, truth, belief, y):
+    """Fill guarantee.phi (3,) rad/s2: what the truth's faults do to the angular acceleration, as the design
+    model weighs it."""
+    phi, G, u = guarantee.phi, belief.G, belief.u
+    phi[:] = 0.0
+    if truth.faulted:
+        for i in range(3):
+            for s in range(u.size):
+                phi[i] += G[i, s] * (effective(truth, s) - u[s])
+        phi[PITCH] += unanticipated_pitch(belief.design, y, truth.Cm_alpha3)
+
+
+@kernel
+def add_effect(guarantee):
+    """Add the effect at an instant inside the frame."""
+    for i in range(3):
+        guarantee.phi_sum[i] += guarantee.phi[i]
+
+
+@kernel
+def follow_guarantee(guarantee, fdi, share, t):
+    """Advance the filtered effect by the elapsed frame and note the first instant t (s) of certainty.
+
+    share: one over the instants in a frame. The sum then begins anew with this instant.
+    """
+    for i in range(3):
+        mean = share * guarantee.phi_sum[i]
+        for m in range(fdi.n_poles):
+            effect = fdi.bank_decay[m] * guarantee.effect[m, i] + fdi.dt * mean
+            guarantee.effect[m, i] = effect
+            certain = abs(effect) > 2.0 * fdi.bank_threshold[m, i] > 0.0
+            if certain and guarantee.certain_after_s < 0.0:
+                guarantee.certain_after_s = t
+        guarantee.phi_sum[i] = guarantee.phi[i]
+
+
+@kernel
+def account(accounts, truth, fdi, control, k, t):
+    """Advance every account but the guarantee by this frame, number k, t s."""
+    tracking = accounts.tracking
+    for i in range(3):
+        square = (control.model_rate[i] - truth.value[i]) ** 2
+        if truth.faulted:
+            tracking.since[i] += square
+        else:
+            tracking.before[i] += square
+    if truth.faulted:
+        tracking.frames_since += 1
+        account_authority(accounts.authority, control)
+    else:
+        tracking.frames_before += 1
+        bank.note_closest_approach(fdi)
+    account_surfaces(accounts, truth, control.saturated, k)
+    note_envelope(accounts.envelope, truth.value[ch.ENVELOPE] < 0.5, t)
+
+
+@kernel
+def account_surfaces(accounts, truth, saturated, k):
+    """How long each surface was saturated and how far it has travelled."""
+    for s in range(saturated.size):
+        now = position(truth, s)
+        accounts.saturated_frames[s] += saturated[s]
+        if k > 0:
+            accounts.travelled[s] += abs(now - accounts.position_then[s])
+        accounts.position_then[s] = now
+
+
+@kernel
+def account_authority(authority, control):
+    """How much of what was demanded after the fault the surfaces could not give, and for how long not even
+    the rates could have been held."""
+    for i in range(3):
+        authority.demanded[i] += abs(control.demand[i])
+        authority.lacking[i] += abs(control.shortfall[i])
+        authority.beyond_frames[i] += control.beyond[i]
+
+
+@kernel
+def note_envelope(envelope, outside, t):
+    """Note when the flight leaves the validated envelope and when it comes back; t s."""
+    envelope.outside_frames += envelope.outside
+    if outside and not envelope.outside:
+        envelope.n_exits += 1
+    last = min(envelope.n_exits, MAX_EVENTS) - 1  # of more than there is room for, the latest stays
+    if outside and not envelope.outside:
+        envelope.exit_at_s[last], envelope.return_at_s[last] = t, np.inf
+    elif envelope.outside and not outside:
+        envelope.return_at_s[last] = t
+    envelope.outside = outside

@@ -1,0 +1,90 @@
+"""One row of the log, in the order of channels.log_columns."""
+
+import numpy as np
+
+from beaver_ftc.compiled import kernel
+from beaver_ftc.diagnosis import statistical
+from beaver_ftc.plant import channels as ch
+from beaver_ftc.plant.sensing import effective, first_signal, position
+
+
+@kernel
+def put(row, column, values):
+    """Write values into row from column on; returns the next column."""
+    for i in range(values.size):
+        row[column + i] = values[i]
+    return column + values.size
+
+
+@kernel
+def record_truth(truth, t, row):
+    """The first columns: time and the truth. Returns the next column."""
+    value = truth.value
+    row[0] = t
+    row[1], row[2], row[3] = value[ch.AIRSPEED], value[ch.ALPHA], value[ch.BETA]
+    column = put(row, 4, value[0:3])
+    column = put(row, column, value[ch.PHI : ch.PHI + 3])
+    row[column] = (value[ch.LATITUDE] - truth.latitude_0) * truth.radius_m
+    row[column + 1] = (value[ch.LONGITUDE] - truth.longitude_0) * truth.parallel_radius_m
+    row[column + 2] = value[ch.ALTITUDE]
+    column = put(row, column + 3, value[ch.PDOT : ch.PDOT + 3])
+    row[column] = value[ch.QDYN]
+    column = put(row, column + 1, value[first_signal(truth) : truth.n])
+    row[column] = value[ch.ENVELOPE]
+    return column + 1
+
+
+@kernel
+def record_surfaces(truth, commanded, saturated, row, column):
+    """Command in effect, position and effective deflection of each surface; then which are saturated."""
+    for s in range(commanded.size):
+        row[column] = commanded[s]
+        row[column + 1] = position(truth, s)
+        row[column + 2] = effective(truth, s)
+        column += 3
+    return put(row, column, saturated)
+
+
+@kernel
+def record_estimators(fdi, row, column):
+    """Residuals between their limits, per estimator; not a number before the estimators start."""
+    for e in range(fdi.n_estimators):
+        fie = fdi.estimator[e]
+        for i in range(3):
+            row[column] = fie.residual[i] if fdi.detected else np.nan
+            row[column + 1] = fie.lower[i] if fdi.detected else np.nan
+            row[column + 2] = fie.upper[i] if fdi.detected else np.nan
+            column += 3
+        row[column] = fie.excluded
+        column += 1
+    return column
+
+
+@kernel
+def record_diagnosis(fdi, acceleration, row, column):
+    """Residual, threshold, bound, network and the design model's mean acceleration; then the estimators."""
+    column = put(row, column, fdi.residual)
+    column = put(row, column, fdi.threshold)
+    column = put(row, column, fdi.eta_bar)
+    column = put(row, column, fdi.network.output)
+    column = put(row, column, acceleration)
+    return record_estimators(fdi, row, column)
+
+
+@kernel
+def record(frame, reference, row):
+    """Write the row of a frame (dtype of frame.py); reference (3,) rad/s."""
+    control, fdi, belief = frame.control, frame.fdi, frame.belief
+    column = record_truth(frame.truth, frame.t, row)
+    column = put(row, column, frame.measured.x)
+    column = put(row, column, reference)
+    column = put(row, column, control.model_rate)
+    column = record_surfaces(frame.truth, belief.commanded, control.saturated, row, column)
+    column = record_diagnosis(fdi, belief.means.acceleration, row, column)
+    column = put(row, column, control.effectiveness)
+    row[column] = frame.supervisor.mode
+    row[column + 1] = fdi.detected
+    if control.power.enabled:
+        row[column + 2] = control.power.command[0]
+    if fdi.statistical.enabled:
+        statistical.record(fdi.statistical, row)

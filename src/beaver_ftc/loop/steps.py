@@ -1,0 +1,63 @@
+"""The steps of the compiled frame, one call each, for flights in which a plug-in diagnoses or commands.
+
+    measure -> diagnose | take_verdict -> decide -> command | take_command -> finish
+
+left of a bar: built in, right of it: a plug-in's answer. `frame.fly_frame` is the built-in ones in one call.
+"""
+
+from beaver_ftc.compiled import kernel
+from beaver_ftc.control import law
+from beaver_ftc.control.accommodation import accommodate
+from beaver_ftc.diagnosis import scheme
+from beaver_ftc.loop import frame as whole
+
+
+@kernel
+def measure(frames):
+    """Measure, and see what the design model makes of the elapsed frame. Returns the flight's status."""
+    return whole.begin(frames[0])
+
+
+@kernel
+def diagnose(frames):
+    """The built-in diagnosis."""
+    whole.diagnose(frames[0])
+
+
+@kernel
+def take_verdict(frames):
+    """A plug-in's verdict, written to the frame's `verdict`."""
+    whole.take_verdict(frames[0])
+
+
+@kernel
+def built_in_statistic(frames):
+    """The built-in detection's statistic at this frame: see scheme.py."""
+    return scheme.built_in_statistic(frames[0].fdi)
+
+
+@kernel
+def decide(frames):
+    """The mode."""
+    whole.decide(frames[0])
+
+
+@kernel
+def command(frames):
+    """The built-in law."""
+    whole.command(frames[0])
+
+
+@kernel
+def take_command(frames, deflections):
+    """A plug-in's command (n,) rad, within the travel of each surface."""
+    frame = frames[0]
+    accommodate(frame.control, frame.fdi, frame.belief, frame.measured, frame.faults)
+    law.take_command(frame.control, deflections)
+
+
+@kernel
+def finish(frames, references, log):
+    """Account, record, hand the command over."""
+    frame = frames[0]
+    whole.finish(frame, references[frame.row], log[frame.row])

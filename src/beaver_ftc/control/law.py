@@ -30,7 +30,7 @@ def advance_hand_over(control, every_type, mode):
 
 @kernel
 def command(control, fdi, belief, measured, faults, mode, t):
-    """Fill control.command (n,) rad: the law in charge. t s."""
+    """Fill control.command (n,) rad by the law chosen. t s."""
     accommodate(control, fdi, belief, measured, faults)
     if control.law == NOMINAL:
         control.G[:] = belief.G

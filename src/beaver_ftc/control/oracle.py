@@ -1,4 +1,4 @@
-"""What the oracle is told: the true faults of this instant. The loop fills it; no other law reads it."""
+"""The oracle's knowledge: the true faults of this instant. The loop fills it; no other law reads it."""
 
 from functools import lru_cache
 
@@ -22,7 +22,7 @@ def true_faults_dtype(n: int) -> np.dtype:
 
 @kernel
 def true_mode(control, faults):
-    """The mode for one who is told the true fault the moment it occurs."""
+    """The mode for a law that knows the true fault the moment it occurs."""
     if not faults.present:
         return MODE_NOMINAL
     if faults.Cm_alpha3 != 0.0:

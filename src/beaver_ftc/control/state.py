@@ -7,7 +7,7 @@ import numpy as np
 NOMINAL, ADAPTIVE, FAULT_TOLERANT, ORACLE = range(4)
 LAWS = ("nominal", "adaptive", "fault-tolerant", "oracle")
 
-# What power.py keeps: its settings, its state, and what is told of it.
+# What power.py keeps: its settings, its state, and what is reported of it.
 POWER = np.dtype(
     [
         ("enabled", "i8"), ("impatience", "f8"), ("forgiveness", "f8"),  # shares per frame

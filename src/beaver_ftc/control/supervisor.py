@@ -38,7 +38,7 @@ def mode_of(law, detected, isolated, relieved):
     """The mode for a law, given the diagnosis: detected 0/1, isolated (estimator index, -1 or -2), and
     whether another surface can relieve the one isolated.
 
-    The nominal law has nothing to reconfigure: it stays in charge.
+    The nominal law has nothing to reconfigure: it stays as it is.
     """
     if law == NOMINAL or not detected:
         return MODE_NOMINAL

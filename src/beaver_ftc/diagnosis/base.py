@@ -1,7 +1,7 @@
 """What a detector is: the contract between the loop and a diagnosis scheme that is plugged in.
 
-A detector sees what is measured, the command in effect, and what the design model makes of the two. It never
-sees the truth.
+A detector is given what is measured, the command in effect, and what the design model makes of the two.
+Of the truth it is given dpt alone, for which there is no instrument model.
 """
 
 from math import nan
@@ -17,7 +17,7 @@ class Measured(NamedTuple):
 
     t_s: time. x (3,) rad/s: p, q, r. y (5,): alpha rad, beta rad, airspeed m/s, dynamic pressure Pa, dpt.
     Of the frame that has just elapsed, as the design model sees it (zeros at the first frame):
-    acceleration (3,) rad/s2 is its f + G u, so that x - x_before - dt acceleration is what nobody expected;
+    acceleration (3,) rad/s2 is its f + G u, so that x - x_before - dt acceleration is the innovation;
     contribution (3, 4) rad/s2 is what each commanded surface gives of it; eta_bar (3,) rad/s2 is the declared
     bound on the error.
     """

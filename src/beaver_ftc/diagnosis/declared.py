@@ -1,4 +1,4 @@
-"""From what a scenario declares to what a detector that thinks in standard deviations is told."""
+"""What a scenario declares, as standard deviations, for detectors that are designed with them."""
 
 from math import pi, radians, sqrt
 

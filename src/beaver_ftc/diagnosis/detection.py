@@ -39,7 +39,7 @@ def detect(fdi, x, t):
 
 @kernel
 def predict(fdi, x, believed, leaking):
-    """Advance the FDAE and its threshold by one frame, and teach the network what sticks out.
+    """Advance the FDAE and its threshold by one frame, and let the network learn what exceeds the threshold.
 
     x (3,) rad/s; `believed` (3,) rad/s2 is f + G u, with the isolated fault once there is one.
     """

@@ -5,9 +5,9 @@ Every hypothesis is linear in one unknown parameter per axis, phi_i = base_i + t
     loss of effectiveness   base 0          Z_i = G_is u_s      theta in [-1, 0]       [Zhang2005, eq. (4)]
     position                base -G_is u_s  Z_i = G_is          theta in the travel
 
-LOSS on aileron, elevator and rudder is the published class. POSITION says no more than "this surface is where
-it should not be": its parameter, the deflection rad, may move as it likes, so it covers whatever can befall
-the surface. The two together are `fdi.fault_class: all`; what has befallen it is the question of types/.
+LOSS on aileron, elevator and rudder is the published class. POSITION says only that the surface is not
+where its command puts it: its parameter, the deflection in rad, may change in any way, so it covers every
+fault of the surface. The two together are `fdi.fault_class: all`; types/ finds out which type of fault it is.
 """
 
 from beaver_ftc.compiled import kernel

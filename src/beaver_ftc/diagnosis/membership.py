@@ -3,7 +3,7 @@
     theta agrees with a frame on axis i if |nu_i - base_i - theta Z_i| <= eta_bar_i
 
 One surface has one parameter, so its axes must agree on one theta. Frame by frame this is the sharpest test
-there is of a parameter that may move as it likes; of one that stays put (`fdi.fault_profile: abrupt`) the
+there is of a parameter that may change in any way; of a constant one (`fdi.fault_profile: abrupt`) the
 sets of all frames since the alarm may be intersected.
 """
 

@@ -51,7 +51,7 @@ def basis(alpha, beta, out):
 
 @kernel
 def dead_zone(residual, threshold):
-    """D[eps]: nothing inside the threshold, what sticks out of it outside."""
+    """D[eps]: zero inside the threshold, the excess over it outside."""
     if residual > threshold:
         return residual - threshold
     if residual < -threshold:

@@ -80,7 +80,7 @@ def set_up(
     aircraft = aircraft or load()
     statistical, given = fdi["statistical"], config.statistical
     statistical["detected_at_s"] = -1.0
-    if given is None or not fdi["enabled"]:  # a plug-in, or nobody, diagnoses
+    if given is None or not fdi["enabled"]:  # a plug-in diagnoses, or nothing does
         return
     statistical["enabled"] = 1
     _set_up_air(statistical["air"], config.bounds.turbulence, mass, aircraft)

@@ -3,7 +3,7 @@
     x[k+1] = x[k] + dt (F[k] + d[k] + phi[k])      d[k+1] = a d[k] + drift      measured: x + gyro noise
 
 F is the design model, d what moves slowly beside it: the air's rotation, uncertainty that is merely bounded,
-constants that nobody told. phi is a fault. With a = 1 the drift is a random walk: whatever is constant has no
+unknown constants. phi is a fault. With a = 1 the drift is a random walk: whatever is constant has no
 part in the whitened innovation, and whatever drifts less than declared has less. The filter is linear: a
 fault, or the error of a coefficient, passes through it by itself, and that is what the innovation is
 compared with (likelihood.py).
@@ -58,7 +58,7 @@ def gains(block):
 
 @kernel
 def learn(block):
-    """Take off the covariances what the measurement tells."""
+    """Take off the covariances what is learnt from the measurement."""
     n = block.n
     p00, p01 = block.P_xx[0, 0], block.P_xx[0, 1]
     p10, p11 = block.P_xx[1, 0], block.P_xx[1, 1]

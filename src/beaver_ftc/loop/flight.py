@@ -32,7 +32,7 @@ class Flight:
     came. worst_residual_ratio: largest |residual| / threshold in healthy flight; closest_approach: the same
     of each filter of the bank, the published one first. surface_travel_rad: path of each surface, up and
     down added. engine_power: if pitch was left to the engine, since when and for how long, s, and the lowest
-    and highest manifold pressure, inHg. faults: of several at once (`fdi.pairs`), each as named.py has it,
+    and highest manifold pressure, inHg. faults: of several at once (`fdi.pairs`), as in types/findings.py,
     the first named first. statistical: when the statistical detector would have raised the alarm, its level
     in standard deviations, and the largest share of it reached in healthy flight. mode_changes, exits: how
     many there were of `supervisor` and `envelope_exits`, which hold the first and the last; outside_s: time

@@ -94,7 +94,7 @@ def take_verdict(frame):
 
 
 @kernel
-def tell(truth, faults, oracle):
+def share_faults(truth, faults, oracle):
     """Put into `faults` what the law may know of the truth: to the oracle all, to others whether to account
     for authority."""
     faults.present = truth.faulted
@@ -110,7 +110,7 @@ def tell(truth, faults, oracle):
 def decide(frame):
     """The mode for this frame."""
     control, oracle = frame.control, frame.control.law == ORACLE
-    tell(frame.truth, frame.faults, oracle)
+    share_faults(frame.truth, frame.faults, oracle)
     wanted = true_mode(control, frame.faults) if oracle else mode_from(control, frame.fdi)
     supervise(frame.supervisor, wanted, frame.t)
 

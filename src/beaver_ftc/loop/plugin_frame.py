@@ -1,4 +1,4 @@
-"""Flying with a plug-in: asks it, checks what it answers, names it when the answer is no good."""
+"""A frame in which a plug-in diagnoses or commands: its answers are checked, and errors name it."""
 
 from collections.abc import Mapping
 from math import isfinite
@@ -156,7 +156,7 @@ def measured_of(frame: np.void) -> Measured:
 def context_of(
     frames: np.ndarray, scenario: Scenario, start: np.ndarray, options: Mapping[str, float]
 ) -> Context:
-    """What a plug-in is told before the flight; start: the truth's channels at the start, in SI."""
+    """What a plug-in is given before the flight; start: the truth's channels at the start, in SI."""
     frame = frames[0]
     control, fdi = frame["control"], frame["fdi"]
     trim_y = start[y_places(frame)]
@@ -217,6 +217,6 @@ def _names(scenario: Scenario, detector: Detector | None, law: Law | None) -> tu
 
 
 def _clear_for_detector(fdi: np.void) -> None:
-    """No built-in isolation; instead, one place a surface for what the plug-in says of it."""
+    """No built-in isolation; instead, one estimator a surface for the plug-in's verdict."""
     fdi["enabled"] = fdi["n_estimators"] = fdi["every_type"] = fdi["statistical"]["enabled"] = 0
     fdi["estimator"]["surface"][: len(SURFACES)] = range(len(SURFACES))

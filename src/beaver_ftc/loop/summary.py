@@ -123,7 +123,7 @@ def _statistical(fdi: np.void) -> dict[str, float | None] | None:
 
 
 def verdict_of(frame: np.void) -> Verdict:
-    """What the built-in diagnosis makes of the flight so far, as a plug-in law is told."""
+    """What the built-in diagnosis makes of the flight so far, as a plug-in law is given it."""
     fdi = frame["fdi"]
     if not fdi["detected"]:
         return Verdict()

@@ -1,4 +1,4 @@
-"""The one place that talks to JSBSim: a silent executive with the Beaver loaded, its properties by name."""
+"""JSBSim for the rest of the package: a silent executive with the Beaver loaded, its properties by name."""
 
 from collections.abc import Sequence
 from math import cos, sin

@@ -16,8 +16,8 @@ test can exclude a type sooner without excluding a true one at some time.
     rate limit      p moves to u only      at any rate
     growing bias    p = u + b              b of one sign and never smaller (incipient)
 
-A frame that admits eta alone tells nothing: so a fault may be intermittent. The promise: the type, constant
-while it is there, is never excluded, and so never misnamed. What cannot be told apart stays a candidate.
+A frame that eta alone explains gives no information: so a fault may be intermittent. The promise: the type,
+constant while it is there, is never excluded, and so never misnamed. What cannot be told apart stays a candidate.
 
 One file a type (contract.py says what is in it); registry.py lists them; examine.py shows them each frame;
 candidates.py and verdict.py conclude; findings.py says it in words.

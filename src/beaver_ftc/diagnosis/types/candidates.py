@@ -21,7 +21,7 @@ from beaver_ftc.diagnosis.types.registry import (
     shown,
 )
 
-NOBODY, SEVERAL = -1, -2
+NO_SURFACE, SEVERAL = -1, -2
 # What decides whether a surface can be at fault: its estimator, or what is known of the other (pairs.py).
 BY_ESTIMATOR, BY_DEDUCTION, RULED_OUT = range(3)
 
@@ -143,10 +143,10 @@ def may_be_growing(surface, found):
 
 @kernel
 def sole(fdi, constant):
-    """The one possible surface, with a type of constant parameter left if so asked; NOBODY or SEVERAL."""
-    found = NOBODY
+    """The one possible surface, with a type of constant parameter left if so asked; NO_SURFACE or SEVERAL."""
+    found = NO_SURFACE
     for s in range(fdi.surface.size):
         surface = fdi.surface[s]
         if surface.in_question and possible(fdi, s) and (any_constant(surface) or not constant):
-            found = s if found == NOBODY else SEVERAL
+            found = s if found == NO_SURFACE else SEVERAL
     return found

@@ -3,7 +3,7 @@
 Elevator and flap move pitch alone, ailerons and rudder roll and yaw alone: each plane has its own verdict.
 
 *Roll and yaw*: two unknown deflections in two equations. Where both surfaces were follows exactly in every
-frame, whoever is at fault, and a surface is judged in those frames in which it was certainly off. One is
+frame, whichever is at fault, and a surface is judged in those frames in which it was certainly off. One is
 named when the other alone cannot explain the flight; both are when neither can and each has a type left.
 
 *Pitch*: two unknowns in one equation. A constant that explains everything on one surface is taken for one
@@ -19,7 +19,7 @@ from beaver_ftc.compiled import kernel
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, PITCH, ROLL, UNANTICIPATED, YAW
 from beaver_ftc.diagnosis.types.candidates import (
     BY_DEDUCTION,
-    NOBODY,
+    NO_SURFACE,
     RULED_OUT,
     any_constant,
     anything_left,
@@ -102,7 +102,7 @@ def whereabouts(fdi, surface):
 @kernel
 def first_is_settled(fdi):
     """Whether one pitch fault was named and a second has begun beside it."""
-    return fdi.first != NOBODY and not fdi.surface[fdi.first].in_question
+    return fdi.first != NO_SURFACE and not fdi.surface[fdi.first].in_question
 
 
 @kernel
@@ -155,7 +155,7 @@ def name(surface, named, kind, t):
 
 @kernel
 def decide_roll_and_yaw(fdi, t):
-    """Who is at fault there, if anybody. Returns whether the plane's fault is outside the class."""
+    """Which of the two is at fault, if any. Returns whether the plane's fault is outside the class."""
     a, r = fdi.main[ROLL], fdi.main[YAW]
     one, other = fdi.surface[a], fdi.surface[r]
     one_left, other_left = possible(fdi, a), possible(fdi, r)
@@ -209,7 +209,7 @@ def patient(fdi, surface):
 @kernel
 def two_in_pitch(fdi):
     """Whether a second pitch fault has shown beside one that was known."""
-    if fdi.first == NOBODY:
+    if fdi.first == NO_SURFACE:
         return False
     surface = fdi.surface[fdi.first]
     if surface.in_question and not (possible(fdi, fdi.first) and any_constant(surface)):
@@ -229,7 +229,7 @@ def type_in_pitch(fdi, surface):
 
 @kernel
 def decide_pitch(fdi, t):
-    """Who is at fault there, if anybody."""
+    """Which surface of pitch is at fault, if any."""
     if two_in_pitch(fdi):
         first, s = fdi.surface[fdi.first], fdi.partner[fdi.first]
         second = fdi.surface[s]
@@ -246,10 +246,10 @@ def decide_pitch(fdi, t):
 
 @kernel
 def one_in_pitch(fdi):
-    """The surface of pitch at fault if a constant explains everything on it, or NOBODY."""
-    s = surface_at_fault(fdi) if fdi.alarmed[IN_PITCH] else NOBODY
+    """The surface of pitch at fault if a constant explains everything on it, or NO_SURFACE."""
+    s = surface_at_fault(fdi) if fdi.alarmed[IN_PITCH] else NO_SURFACE
     if s < 0 or not any_constant(fdi.surface[s]):
-        return NOBODY
+        return NO_SURFACE
     if patient(fdi, fdi.surface[s]):
         note_first(fdi, s)
     return s
@@ -260,7 +260,7 @@ def decide(fdi, t):
     """Name surfaces and types plane by plane; t s. `isolated` is the one named first, the law acts on all."""
     outside = decide_roll_and_yaw(fdi, t)
     decide_pitch(fdi, t)
-    earliest = NOBODY
+    earliest = NO_SURFACE
     for s in range(fdi.surface.size):
         surface = fdi.surface[s]
         if surface.named and (earliest < 0 or surface.named_at_s < fdi.surface[earliest].named_at_s):
@@ -307,7 +307,7 @@ def acted_upon(fdi, s):
 @kernel
 def act(fdi):
     """What the law does about each surface. The supervisor follows the lead: a replaced elevator first."""
-    fdi.lead, fdi.lead_kind = NOBODY, -1
+    fdi.lead, fdi.lead_kind = NO_SURFACE, -1
     for s in range(fdi.surface.size):
         surface = fdi.surface[s]
         surface.measure = -1
@@ -317,5 +317,5 @@ def act(fdi):
             if still_there(surface, measure, at_fault):
                 surface.measure = measure
                 replaced = s == fdi.main[PITCH] and measure in (LOSES, FIXED)
-                if fdi.lead == NOBODY or replaced:
+                if fdi.lead == NO_SURFACE or replaced:
                     fdi.lead, fdi.lead_kind = s, measure

@@ -91,9 +91,9 @@ def holds(fdi, surface, kind, least, greatest):
 
 @kernel
 def beginning(fdi, surface):
-    """Where the surface can have been as the judged frame began, (low, high) rad, and the frame that tells.
+    """Where the surface can have been as the judged frame began, (low, high) rad, and which frame shows it.
 
-    With several JSBSim frames in one of ours it may have been let go within it: the frame before tells.
+    With several JSBSim frames in one of ours it may have been let go within it: the frame before is used.
     """
     if fdi.whole:
         return surface.low_then, surface.high_then, fdi.frame - 1

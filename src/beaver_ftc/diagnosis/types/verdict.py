@@ -5,7 +5,7 @@ import numpy as np
 from beaver_ftc.compiled import kernel
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, PITCH, UNANTICIPATED
 from beaver_ftc.diagnosis.types.candidates import (
-    NOBODY,
+    NO_SURFACE,
     any_constant,
     anything_left,
     explained,
@@ -46,7 +46,7 @@ def surface_at_fault(fdi):
     the one is named for which a constant suffices, once a slow oscillation of the other would have shown.
     """
     s = sole(fdi, False)
-    if s == NOBODY:
+    if s == NO_SURFACE:
         return UNANTICIPATED
     if s >= 0:
         return s if fdi.dominant_axis[s] != PITCH or explained(fdi.surface[s]) else NOT_ISOLATED
@@ -137,7 +137,7 @@ def measure_for(surface):
 
 @kernel
 def presumed(fdi):
-    """The surface the law acts upon: the one at fault, or the likeliest; NOBODY yet.
+    """The surface the law acts upon: the one at fault, or the likeliest; NO_SURFACE yet.
 
     It acts before all doubt is gone, since it can take it back. Of elevator and flap it does not matter which
     is thought to be off, as long as both follow their commands: the moment is the same.
@@ -150,7 +150,7 @@ def presumed(fdi):
     for s in range(fdi.surface.size):
         if fdi.dominant_axis[s] == PITCH and possible(fdi, s):
             return s
-    return NOBODY
+    return NO_SURFACE
 
 
 @kernel
@@ -159,7 +159,7 @@ def take_the_lead(fdi):
     s = presumed(fdi)
     for other in range(fdi.surface.size):
         fdi.surface[other].measure = -1
-    fdi.lead, fdi.lead_kind = NOBODY, -1
+    fdi.lead, fdi.lead_kind = NO_SURFACE, -1
     if s >= 0:
         surface = fdi.surface[s]
         fdi.lead_kind = measure_for(surface)

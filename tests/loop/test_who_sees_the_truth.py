@@ -1,0 +1,111 @@
+"""No kernel of the diagnosis or of a law is ever given the truth: neither its record nor a part of it.
+
+Shown by type and by address: flights in the plain form, in which every kernel call can be watched.
+"""
+
+import ast
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import beaver_ftc
+from beaver_ftc.control.oracle import true_faults_dtype
+from beaver_ftc.control.state import control_dtype
+from beaver_ftc.diagnosis.belief import belief_dtype
+from beaver_ftc.diagnosis.state import diagnosis_dtype
+from beaver_ftc.plant.sensing import MEASURED, truth_dtype
+
+PROGRAM = """
+import json, sys
+import numpy as np
+from beaver_ftc import compiled
+
+calls, inside = {}, [0, 0]  # kernel -> what it was given; where the truth's record is in memory
+plain = compiled.kernel
+
+def watched(function):
+    call, name = plain(function), f"{function.__module__}.{function.__name__}"
+    def spy(*arguments):
+        for argument in arguments:
+            if isinstance(argument, (np.ndarray, np.void)):
+                address = argument.__array_interface__["data"][0]
+                whose = "truth" if inside[0] <= address < inside[1] else "other"
+                kind = "record" if argument.dtype.names == truth_dtype(4).names else "plain"
+                given = calls.setdefault(name, [])
+                given += [[whose, kind]] * ([whose, kind] not in given)
+        return call(*arguments)
+    spy.py_func = function
+    return spy
+
+compiled.kernel = watched
+from beaver_ftc.loop.loop import Loop
+from beaver_ftc.plant.sensing import truth_dtype
+from beaver_ftc.scenario.schema import Scenario
+
+for words in json.loads(sys.argv[1]):
+    loop = Loop(Scenario.model_validate(words))
+    truth = loop.frames["truth"]
+    start = truth.__array_interface__["data"][0]
+    inside[:] = [start, start + truth.dtype.itemsize]
+    for _ in loop.chunks():
+        pass
+print(json.dumps(calls))
+"""
+STUCK = [{"actuator": "elevator", "type": "stuck", "at_s": 1.0}]
+LOSS = [{"actuator": "aileron", "type": "loss_of_effectiveness", "magnitude": 0.8, "at_s": 1.0}]
+COMMON = {"name": "watched", "duration_s": 4, "rate_hz": 20}
+FLIGHTS = [
+    {"faults": STUCK, "fdi": {"fault_class": "all", "pairs": True}},
+    {"faults": STUCK, "control": {"law": "oracle"}},
+    {"faults": LOSS, "fdi": {"statistical": {}, "bounds": {"turbulence": "light"}}},
+]
+
+
+@pytest.fixture(scope="module")
+def calls():
+    """Kernel -> [whose memory, which kind of record] of each array and record it was given."""
+    flights = json.dumps([COMMON | flight for flight in FLIGHTS])
+    done = subprocess.run(
+        [sys.executable, "-c", PROGRAM, flights],
+        env={**os.environ, "NUMBA_DISABLE_JIT": "1"},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    return json.loads(done.stdout.splitlines()[-1])
+
+
+def of(calls, folder):
+    return {name: given for name, given in calls.items() if name.startswith(f"beaver_ftc.{folder}.")}
+
+
+@pytest.mark.parametrize("folder", ["diagnosis", "control", "design"])
+def test_no_kernel_is_given_the_truth(calls, folder):
+    assert len(of(calls, folder)) > 5
+    for name, given in of(calls, folder).items():
+        for whose, kind in given:
+            assert (whose, kind) == ("other", "plain"), name
+
+
+def test_what_is_meant_to_see_the_truth_does(calls):
+    """The watch would notice: sensing, accounts and the log are given the record."""
+    for name in ("plant.sensing.measure", "loop.accounts.account", "loop.record.record_truth"):
+        assert ["truth", "record"] in calls[f"beaver_ftc.{name}"]
+
+
+def test_the_truth_has_a_type_of_its_own():
+    others = belief_dtype(4), diagnosis_dtype(4), control_dtype(4), true_faults_dtype(4), MEASURED
+    assert truth_dtype(4) not in others
+
+
+@pytest.mark.parametrize("folder", ["diagnosis", "control"])
+def test_no_module_knows_where_the_truth_keeps_what(folder):
+    root = Path(beaver_ftc.__path__[0]) / folder
+    for path in root.rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.ImportFrom):
+                assert node.module not in ("beaver_ftc.plant.sensing", "beaver_ftc.plant.channels"), path

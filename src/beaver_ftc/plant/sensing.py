@@ -19,8 +19,8 @@ DEPARTURE_ANGLE_RAD = 0.6
 DEPARTURE_RATE_RAD_S = 6.0
 DEPARTURE_SIGNALS = ("p", "q", "r", "alpha", "beta", "altitude")
 
-# What is known of an instant. attitude: phi, theta, psi, rad, and the declared signals in y, from dpt on, are the truth's:
-# no instrument model stands between.
+# What is known of an instant. No instrument model stands before attitude (phi, theta, psi, rad) and before
+# the declared signals in y, from dpt on: they are the truth's.
 MEASURED = np.dtype(
     [("signal", "f8", (N_SIGNALS,)), ("x", "f8", (3,)), ("y", "f8", (N_Y,)), ("attitude", "f8", (3,))],
     align=True,

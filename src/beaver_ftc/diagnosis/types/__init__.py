@@ -17,7 +17,8 @@ test can exclude a type sooner without excluding a true one at some time.
     growing bias    p = u + b              b of one sign and never smaller (incipient)
 
 A frame that eta alone explains gives no information: so a fault may be intermittent. The promise: the type,
-constant while it is there, is never excluded, and so never misnamed. What cannot be told apart stays a candidate.
+constant while it is there, is never excluded, and so never misnamed. What cannot be told apart stays a
+candidate.
 
 One file a type (contract.py says what is in it); registry.py lists them; examine.py shows them each frame;
 candidates.py and verdict.py conclude; findings.py says it in words.

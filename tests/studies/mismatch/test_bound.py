@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from beaver_ftc.studies.mismatch.bound import guarantee_with, recommend, rounded_up, with_bound
-from beaver_ftc.studies.mismatch.run import settle, tally_of_flight
+from beaver_ftc.studies.mismatch.bound import guarantee_with, recommend, rounded_up, widened, with_bound
+from beaver_ftc.studies.mismatch.run import recommended_for, settle, tally_of_flight
 from beaver_ftc.studies.mismatch.sources import SOURCES
 from beaver_ftc.studies.mismatch.split import Stretch
 from beaver_ftc.studies.mismatch.tally import AxisBound, Tally
@@ -150,3 +150,25 @@ def test_a_run_within_its_bound_is_recommended_what_it_used():
 def test_neglecting_the_engine_with_the_published_bound_raises_a_false_alarm():
     case = scenario(design_model={"engine_terms": False})
     assert guarantee_with(dict.fromkeys("pqr", 0.02), case).false_alarm
+
+
+def test_no_bound_is_recommended_under_which_a_flight_then_raises_a_false_alarm():
+    """A calm flight needs little; the published case, flown with as little, would alarm before its fault."""
+    calm = scenario(duration_s=6, uncertainty={})
+    kept, _ = tally_of_flight(calm)
+    needed = recommend([kept]).constant_rad_s2
+    assert guarantee_with(needed, calm).false_alarm
+    found = recommended_for([calm], [kept])
+    assert found["guarantee"]["recommended"]["false_alarm"] is False
+    assert found["recommended"]["settled"]
+    assert found["recommended"]["runs"] == 1
+    again, flown = tally_of_flight(with_bound(calm, found["recommended"]["constant_rad_s2"]))
+    assert not again.exceeded
+    assert not flown["false_alarm"]
+
+
+def test_what_alarms_without_being_exceeded_is_given_a_wider_bound():
+    found = widened(recommend([Tally(CONSTANT, 0.1)]))
+    assert found.constant_rad_s2 == {"p": 1e-4, "q": 1e-4, "r": 1e-4}
+    one = Tally(CONSTANT, 0.1, bounds=tuple(AxisBound(smallest_constant_rad_s2=c) for c in (0.02, 0.3, 0.05)))
+    assert widened(recommend([one])).constant_rad_s2 == {"p": 0.024, "q": 0.36, "r": 0.06}

@@ -4,6 +4,7 @@ import csv
 import json
 import subprocess
 import sys
+from html import escape
 
 import numpy as np
 import pytest
@@ -11,7 +12,9 @@ import pytest
 from beaver_ftc.errors import BadInput
 from beaver_ftc.results.log import read
 from beaver_ftc.studies.mismatch import envelope
+from beaver_ftc.studies.mismatch.section import _heading
 from beaver_ftc.studies.mismatch.sources import SOURCES
+from beaver_ftc.studies.mismatch.text import findings
 from beaver_ftc.studies.mismatch.variants import VARIANTS, variant_of
 from flying import loss, scenario
 
@@ -88,6 +91,23 @@ def test_the_report_has_a_section_of_it(flown_folder):
     page = (folder / "out" / "short" / "report.html").read_text()
     assert "Truth against design: short" in page
     assert page.count("data:image/png;base64,") >= 4
+    found = json.loads((folder / "out" / "short" / "mismatch.json").read_text())
+    for line in findings(found):  # page and terminal say the same, from the same document
+        assert escape(line) in page
+
+
+def test_a_false_alarm_of_the_published_case_is_said_on_the_page_too():
+    case = {"false_alarm": True, "detection_delay_s": None, "guaranteed_delay_s": 0.01}
+    recommended = {"constant_rad_s2": {"p": 0.1, "q": 0.2, "r": 0.3}, "runs": 1, "settled": False}
+    found = {
+        "scenario": "x", "dominant": None, "false_alarm": True, "detection": {"time_s": 3.0, "axis": "q"},
+        "recommended": recommended, "guarantee": {"declared": case, "recommended": case},
+    }  # fmt: skip
+    heading = _heading(found)
+    assert heading.count("FALSE ALARM before the fault") == 2
+    assert "FALSE ALARM  at 3.00 s on q" in heading
+    assert "still exceeded when flown" in heading
+    assert "certain within" not in heading
 
 
 def test_a_run_without_mismatch_has_no_such_section(tmp_path):

@@ -114,6 +114,14 @@ class TestLevels:
         if below:
             assert level_at(traces, max(below)).alarms > per_h * level.hours - 1e-6
 
+    def test_the_hours_end_with_the_alarm_as_in_a_sweep(self):
+        """Two flights of an hour, one alarmed at the level 2 after 900 s: 1.25 h, not 2."""
+        rising = Trace(3.0, (), False, 3600.0, rises=((0.0, 1.0), (900.0, 2.5), (1800.0, 3.0)))
+        quiet = Trace(1.5, (), False, 3600.0, rises=((0.0, 1.5),))
+        assert [rising.watched_s(level) for level in (0.5, 2.0, 2.7, 4.0)] == [0.0, 900.0, 1800.0, 3600.0]
+        found = level_at([rising, quiet], 2.0)
+        assert (found.alarms, found.hours) == (1, 1.25)
+
     def test_hours_and_limits_are_those_of_the_flights(self):
         level = level_for(healthy(*range(20)), 2.0)  # two hours
         assert (level.alarms, level.hours) == (4, 2.0)
@@ -149,6 +157,17 @@ class TestCounts:
         assert found["median_delay_s"] == 0.9
         assert summary(rows, own=True)["within"]["0.5"]["value"] == 1.0
         assert summary([rows[-1]])["flights"] == 0
+
+    def test_an_alarm_before_the_fault_at_the_schemes_own_level_is_no_detection_of_its_own(self):
+        rows = [
+            {"delay_s": 0.9, "false_alarm": False, "own_delay_s": own, "own_false_alarm": early}
+            for own, early in ((0.3, False), (0.7, False), (None, True), (0.1, True), (0.2, True))
+        ]
+        own = summary(rows, own=True)
+        assert own["flights"] == 2
+        assert [own["within"][s]["value"] for s in ("0.5", "1", "5")] == [0.5, 1.0, 1.0]
+        assert own["median_delay_s"] == 0.3
+        assert summary(rows)["flights"] == 5
 
     def test_the_limit_counts_a_flight_once_however_many_schemes_watched_it(self):
         levels = {(*STILL, scheme): level_at(healthy(2.0), 2.0) for scheme in "ab"}

@@ -12,7 +12,7 @@ from beaver_ftc.studies.sweep.expectations import evaluate
 from beaver_ftc.studies.sweep.summary import summarise
 from beaver_ftc.studies.sweep.worst import replay_command, worst_flights
 
-from .counted import ROWS, SWEEP, flights_of
+from .counted import ROWS, SWEEP, detected, flights_of
 
 
 @pytest.fixture
@@ -139,3 +139,27 @@ def test_words_say_what_the_summary_says(summary):
     assert "95 % never" in text
     assert "1 of 2 faults detected later than theory promises" in text
     assert not any(math.isnan(value) for value in summary["detection"].values() if isinstance(value, float))
+
+
+def test_each_quantile_is_its_own(tmp_path, sweep):
+    """A hundred delays of 0.01 to 1 s: the q quantile is q itself, so that no two are alike."""
+    rows = [detected(run, (run + 1) / 100) for run in range(100)]
+    found = summarise(flights_of(rows, tmp_path), sweep)["detection"]["delay_s"]
+    assert found == {"of": 100, "median": 0.5, "p90": 0.9, "p95": 0.95, "p99": 0.99, "max": 1.0}
+    text = words.facts(summarise(flights_of(rows, tmp_path), sweep) | {"expectations": [], "passed": True})
+    assert dict(text)["detection delay"] == "median 0.5 s, 95 % 0.95 s, 99 % 0.99 s, max 1 s"
+
+
+@pytest.mark.parametrize(
+    ("of", "said"),
+    [
+        (2.29e-07, "<0.001"),
+        (0.0, "0"),
+        (0.00123, "0.00123"),
+        (12345.6, "12346"),
+        (None, "none"),
+        (-3e-9, ">-0.001"),
+    ],
+)
+def test_no_number_is_printed_with_an_exponent(of, said):
+    assert words.value(of) == said

@@ -168,3 +168,22 @@ def test_the_lock_goes_with_the_sweep(store, short):
         store.begin(identity_of(short), resume=False)
         assert (store.folder / ".lock").exists()
     assert sorted(path.name for path in store.folder.iterdir()) == ["parts", "sweep.json"]
+
+
+def test_a_users_files_in_the_sweeps_folders_stay(store, short):
+    with store:
+        store.begin(identity_of(short), resume=False)
+        store.write("summary.json", "{}")
+        figures, flight = store.folder / "figures", store.folder / "flights" / "short-0001"
+        figures.mkdir()
+        flight.mkdir(parents=True)
+        (figures / "mine.png").write_text("drawn by hand")
+        (figures / "sensitivity.png").write_text("drawn by us")
+        store.begin(identity_of(short), resume=False)
+        assert [path.name for path in figures.iterdir()] == ["mine.png"]
+        flight.mkdir(parents=True)
+        (flight / "notes.txt").write_text("years of work")
+        store.write("summary.json", "{}")
+        with pytest.raises(SimulationFailed, match=r"notes\.txt"):
+            store.begin(identity_of(short), resume=False)
+        assert (flight / "notes.txt").exists()

@@ -2,7 +2,7 @@ import pytest
 
 from beaver_ftc.scenario.keys import UnusableKeyError, parse_key, with_values
 from beaver_ftc.scenario.problems import ScenarioError
-from beaver_ftc.scenario.sweep_loader import builtin_sweeps, load_sweep, load_sweep_text
+from beaver_ftc.scenario.sweep_loader import builtin_sweeps, is_sweep, load_sweep, load_sweep_text
 
 HEAD = "base: elevator-partial-loss\nruns: 3\nvary:\n  "
 SPEED = "vary.initial.airspeed_mps"
@@ -86,16 +86,31 @@ def test_keys_are_places_and_places_are_keys():
             parse_key(key)
 
 
-@pytest.mark.parametrize("base", ["../outside.yaml", "link.yaml", "{outside}"])
-def test_a_base_lies_beside_the_sweep_or_below_it(tmp_path, base):
+def test_a_sweep_without_anything_that_varies_is_a_sweep_all_the_same(tmp_path):
+    (tmp_path / "again.yaml").write_text("name: again\nbase: fault-free\nruns: 3\n")
+    (tmp_path / "once.yaml").write_text("name: once\nduration_s: 5\n")
+    assert is_sweep(tmp_path / "again.yaml")
+    assert not is_sweep(tmp_path / "once.yaml")
+    assert load_sweep(tmp_path / "again.yaml").flights == 3
+
+
+@pytest.mark.parametrize(
+    "base", ["../outside.yaml", "{outside}", "below/link.yaml", "below/../../outside.yaml"]
+)
+def test_a_base_stays_in_the_folder_of_its_sweep(tmp_path, base):
     outside, folder = tmp_path / "outside.yaml", tmp_path / "sweeps"
-    folder.mkdir()
-    for path in (outside, folder / "beside.yaml"):
-        path.write_text("name: x\n")
-    (folder / "link.yaml").symlink_to(outside)
-    sweep = "base: '{}'\nruns: 2\nvary: {{initial.airspeed_mps: {{uniform: [40, 45]}}}}\n"
-    assert load_sweep_text(sweep.format("beside.yaml"), folder=folder).base["name"] == "x"
+    (folder / "below").mkdir(parents=True)
+    outside.write_text("name: outside\nduration_s: 5\n")
+    (folder / "below" / "link.yaml").symlink_to(outside)
+    (folder / "many.yaml").write_text(f"base: {base.format(outside=outside)}\nruns: 2\n")
     with pytest.raises(
-        ScenarioError, match=r"is outside, allowed: a file in the sweep's own folder or below"
+        ScenarioError, match=r"many\.yaml:1: base: .* is outside, allowed: a file in the sweep"
     ):
-        load_sweep_text(sweep.format(base.format(outside=outside)), folder=folder)
+        load_sweep(folder / "many.yaml")
+
+
+def test_a_base_below_the_folder_is_found(tmp_path):
+    (tmp_path / "below").mkdir()
+    (tmp_path / "below" / "base.yaml").write_text("name: below\nduration_s: 5\n")
+    (tmp_path / "many.yaml").write_text("base: below/base.yaml\nruns: 2\n")
+    assert load_sweep(tmp_path / "many.yaml").base["duration_s"] == 5

@@ -45,7 +45,7 @@ class Trace:
 
     before: largest value before the fault (or in all of a healthy flight). records: (delay s, value), each
     larger than all before it since the fault. healthy_s: time without a fault. us: time a frame took,
-    microseconds.
+    microseconds. rises: (time s, value), each larger than all before it, while there is no fault.
     """
 
     before: float
@@ -53,6 +53,11 @@ class Trace:
     faulted: bool
     healthy_s: float
     us: float = 0.0
+    rises: tuple[tuple[float, float], ...] = ()
+
+    def watched_s(self, level: float = 1.0) -> float:
+        """Time in which an alarm would have been false: until the fault, the end or the alarm itself."""
+        return next((at_s for at_s, value in self.rises if value > level), self.healthy_s)
 
     def false_alarm(self, level: float = 1.0) -> bool:
         """Whether it raises an alarm without a fault, at this level of the statistic."""
@@ -193,10 +198,16 @@ def trace(recording: Recording, statistic: np.ndarray, us: float = 0.0) -> Trace
     """Boil a statistic (frames,) down to what decides about alarms at any level."""
     t = np.array([measured.t_s for measured, _ in recording.seen])
     healthy = t < recording.fault_at_s - 1e-9
-    before = float(statistic[healthy].max(initial=0.0))
-    after, delay = statistic[~healthy], t[~healthy] - recording.fault_at_s
-    largest = np.maximum.accumulate(after) if after.size else after
+    early = statistic[healthy]
+    rises = _records(t[healthy], early)
+    records = _records(t[~healthy] - recording.fault_at_s, statistic[~healthy])
+    faulted = isfinite(recording.fault_at_s) and not healthy.all()
+    healthy_s = float(healthy.sum()) * recording.context.dt_s
+    return Trace(float(early.max(initial=0.0)), records, faulted, healthy_s, us, rises)
+
+
+def _records(t: np.ndarray, values: np.ndarray) -> tuple[tuple[float, float], ...]:
+    """(time, value) of each value (n,) that is larger than all before it."""
+    largest = np.maximum.accumulate(values) if values.size else values
     news = np.flatnonzero(np.diff(largest, prepend=-inf) > 0.0)
-    records = tuple((float(delay[i]), float(after[i])) for i in news)
-    faulted = isfinite(recording.fault_at_s) and bool(after.size)
-    return Trace(before, records, faulted, float(healthy.sum()) * recording.context.dt_s, us)
+    return tuple((float(t[i]), float(values[i])) for i in news)

@@ -106,7 +106,7 @@ def point_at(traces: Sequence[Trace], level: float) -> Point:
     Detections and delays are of the flights in which the fault was still to be detected: no false alarm
     before it.
     """
-    hours = sum(trace.healthy_s for trace in traces) / 3600.0
+    hours = sum(trace.watched_s(level) for trace in traces) / 3600.0
     alarms = sum(trace.false_alarm(level) for trace in traces)
     delays = [trace.delay_s(level) for trace in traces if trace.faulted and not trace.false_alarm(level)]
     rate = sum(delay < inf for delay in delays) / len(delays) if delays else 0.0

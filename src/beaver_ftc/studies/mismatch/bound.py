@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from beaver_ftc.studies.mismatch.tally import Tally
 
 PUBLISHED_CASE = "elevator-partial-loss"
+LEAST_RAD_S2 = 1e-4  # of a bound that is widened
 PerAxis = dict[str, float]
 
 
@@ -43,7 +44,7 @@ def recommend(tallies: Iterable["Tally"]) -> Recommendation:
 
 def widened(recommended: Recommendation) -> Recommendation:
     """A fifth more: for an alarm although nothing was exceeded, as rounding and noise may raise it."""
-    wider = {axis: rounded_up(1.2 * c) for axis, c in recommended.constant_rad_s2.items()}
+    wider = {axis: rounded_up(max(1.2 * c, LEAST_RAD_S2)) for axis, c in recommended.constant_rad_s2.items()}
     return replace(recommended, constant_rad_s2=wider)
 
 

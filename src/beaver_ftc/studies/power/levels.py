@@ -23,13 +23,16 @@ class Level:
 
 def level_for(healthy: Sequence[Trace], per_h: float) -> Level:
     """The most sensitive level with no more false alarms than this; a flight raises one at most."""
-    hours = sum(trace.healthy_s for trace in healthy) / 3600.0
-    largest = sorted((trace.before for trace in healthy), reverse=True)
-    allowed = min(int(per_h * hours + 1e-9), len(largest) - 1)
-    return level_at(healthy, largest[allowed])
+    strictest, *others = sorted({trace.before for trace in healthy}, reverse=True)
+    best = level_at(healthy, strictest)
+    for found in (level_at(healthy, level) for level in others):
+        if found.alarms > per_h * found.hours + 1e-9:
+            break
+        best = found
+    return best
 
 
 def level_at(healthy: Sequence[Trace], level: float) -> Level:
-    """What a level costs in false alarms."""
-    hours = sum(trace.healthy_s for trace in healthy) / 3600.0
+    """What a level costs in false alarms, over the time until they were raised."""
+    hours = sum(trace.watched_s(level) for trace in healthy) / 3600.0
     return Level(level, sum(trace.false_alarm(level) for trace in healthy), hours)

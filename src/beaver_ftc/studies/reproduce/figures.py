@@ -34,7 +34,7 @@ def _rate(axis: str) -> Panel:
 
 
 def _errors() -> Panel:
-    traces = tuple(Trace(f"{axis}_error_rad_s", axis, axis) for axis in AXES)
+    traces = tuple(Trace(f"{axis}_error_rad_s", f"error of {axis}", f"error of {axis}") for axis in AXES)
     return Panel("tracking errors", traces)
 
 

@@ -43,8 +43,8 @@ _FAULT_LOOKS = (
 def write_figures(flights: Flights, summary: Document, folder: Path) -> list[Path]:
     """Draw what there is to draw as `<figure>.png`; return the files."""
     folder.mkdir(exist_ok=True)
-    for old in folder.glob("*.png"):
-        old.unlink()
+    for name in FIGURES:
+        (folder / f"{name}.png").unlink(missing_ok=True)
     drawn = [(name, draw(flights, summary)) for name, (_, draw) in FIGURES.items()]
     return [_save(figure, folder / f"{name}.png") for name, figure in drawn if figure is not None]
 
@@ -158,6 +158,8 @@ def confusion_matrix(flights: Flights, summary: Document) -> "Figure | None":
     counts = np.array(confusion["counts"])
     if not counts.size:
         return None
+    if len(confusion["faults"]) == 1:
+        return _diagnoses(confusion["faults"][0], confusion["diagnoses"], counts[0])
     rows, columns = confusion["faults"], confusion["diagnoses"]
     size = (2.6 + 1.15 * len(columns), 1.7 + 0.55 * len(rows))
     figure, axes = _axes("What broke (rows) against what the diagnosis said (columns)", size)
@@ -174,6 +176,20 @@ def confusion_matrix(flights: Flights, summary: Document) -> "Figure | None":
         axes.axhline(border - 0.5, color="white", linewidth=2)
     for border in range(1, len(columns)):
         axes.axvline(border - 0.5, color="white", linewidth=2)
+    return figure
+
+
+def _diagnoses(fault: str, diagnoses: list[str], counts: np.ndarray) -> "Figure":
+    """What the diagnosis said of one fault, as bars: a matrix of one row is no picture."""
+    figure, axes = _axes(f"{fault}: what the diagnosis said", (8.0, 1.5 + 0.45 * len(diagnoses)))
+    shares = counts / counts.sum()
+    axes.barh(range(len(diagnoses)), shares, 0.6, color=BLUE)
+    for row, (count, share) in enumerate(zip(counts, shares, strict=True)):
+        axes.annotate(f" {count} ({share:.0%})", (share, row), va="center", fontsize=8)
+    axes.set_yticks(range(len(diagnoses)), diagnoses)
+    axes.invert_yaxis()
+    axes.set_xlim(0, 1.18)
+    axes.set_xlabel("share of the flights", fontsize=9)
     return figure
 
 

@@ -32,9 +32,9 @@ def rank(keys: dict[str, np.ndarray], outcome: np.ndarray) -> Ranking:
 
 def ranks_of(values: np.ndarray) -> np.ndarray:
     """Ranks from 0, equal values sharing the mean of theirs."""
-    _, group, count = np.unique(values, return_inverse=True, return_counts=True)
-    last = np.cumsum(count)
-    return (last - (count + 1) / 2)[group]
+    from scipy.stats import rankdata
+
+    return rankdata(values) - 1.0
 
 
 def _entry(key: str, values: np.ndarray, ranks: np.ndarray) -> dict[str, Any]:

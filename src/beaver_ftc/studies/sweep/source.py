@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 FRAMES_A_BATCH = 50_000  # a third of a second of work: little to lose, and a file costs no share worth saying
 MOST_A_BATCH = 256
-MOST_BATCHES = 20_000  # of a sweep of millions: so many files are still handled with ease
+MOST_BATCHES = 4_000  # of a sweep of millions: so many files are read again in seconds
 
 Landed = Callable[[Any], None]  # takes the counts of a batch
 

@@ -17,9 +17,9 @@ from beaver_ftc.studies.sweep.table import schema_of, table_of
 if TYPE_CHECKING:
     import pyarrow as pa
 
+FOLDERS = frozenset({"parts", "figures", "flights"})
 OWN_FILES = frozenset({
-    "lock", files.LOCK, "sweep.json", "parts", "results.parquet", "summary.json", "report.html", "figures",
-    "flights",
+    "lock", files.LOCK, "sweep.json", "results.parquet", "summary.json", "report.html", *FOLDERS,
 })  # fmt: skip
 ROWS_PER_GROUP = 8192
 _WRITE_OPTIONS: dict[str, Any] = {"compression": "snappy", "write_statistics": False, "use_dictionary": False}
@@ -145,13 +145,34 @@ class Store:
             raise BadInput(f"{self.folder / 'sweep.json'}: is not readable, allowed: another --out") from None
 
     def _clear(self) -> None:
-        """Remove what an earlier sweep left; its identity last, by which it is known for ours."""
-        for name in (*sorted(OWN_FILES - {files.LOCK, "sweep.json"}), "sweep.json"):
-            path = self.folder / name
-            if path.is_dir():
-                shutil.rmtree(path)
-            else:
-                path.unlink(missing_ok=True)
+        """Remove what an earlier sweep left; its identity last, by which it is known for ours.
+
+        What a user has put into its folders stays: SimulationFailed for a kept flight that is no longer ours.
+        """
+        from beaver_ftc.results.writer import refuse_foreign
+
+        for flight in (self.folder / "flights").glob("*"):
+            refuse_foreign(flight)
+        _remove(self.folder / "flights")
+        _remove(self.folder / "parts")
+        for name in figures_of_a_sweep():
+            (self.folder / "figures" / name).unlink(missing_ok=True)
+        with contextlib.suppress(OSError):  # not empty: somebody else's
+            (self.folder / "figures").rmdir()
+        for name in (*sorted(OWN_FILES - FOLDERS - {files.LOCK, "sweep.json"}), "sweep.json"):
+            (self.folder / name).unlink(missing_ok=True)
+
+
+def _remove(folder: Path) -> None:
+    if folder.is_dir():
+        shutil.rmtree(folder)
+
+
+def figures_of_a_sweep() -> list[str]:
+    """The files a sweep draws."""
+    from beaver_ftc.studies.sweep.figures import FIGURES
+
+    return [f"{name}.png" for name in FIGURES]
 
 
 def write_tables(file: IO[bytes], tables: "Iterator[pa.Table] | list[pa.Table]", schema: "pa.Schema") -> None:

@@ -1,0 +1,63 @@
+"""The matrix's summary against rows that differ in everything, so that no other choice gives the same."""
+
+import pytest
+
+from beaver_ftc.design.coefficients import SURFACES
+from beaver_ftc.studies.matrix.cases import FAULTS
+from beaver_ftc.studies.matrix.summary import document_of
+from beaver_ftc.studies.matrix.text import as_text
+
+FAULT, SURFACE = FAULTS[0][0], "elevator"
+
+
+def row(fault, surface, airspeed_mps, **found):
+    nothing = {
+        "verdict": "named", "delay_s": 0.1, "false_alarm": False, "candidates": [], "ratio": 1.0,
+        "departure_s": None, "oracle_departure_s": None, "departure_signal": None, "oracle_beyond_s": 0.0,
+        "oracle_left_envelope_s": None, "axis": "q", "detected": True,
+    }  # fmt: skip
+    return {"fault": fault, "surface": surface, "airspeed_mps": airspeed_mps, **nothing, **found}
+
+
+def cell_of(*three):
+    """The cell of the first fault on the elevator, flown so; every other cell is plain."""
+    rows = [
+        row(fault, surface, V, **(found if (fault, surface) == (FAULT, SURFACE) else {}))
+        for fault, _ in FAULTS
+        for surface in SURFACES
+        for V, found in zip((38.0, 45.0, 52.0), three, strict=True)
+    ]
+    document = document_of(rows)
+    (cell,) = [c for c in document["cells"] if (c["fault"], c["surface"]) == (FAULT, SURFACE)]
+    return cell, document
+
+
+@pytest.mark.parametrize("order", [(0.2, 0.7, 0.4), (0.7, 0.4, 0.2), (0.4, 0.2, 0.7)])
+def test_a_cells_delay_and_ratio_are_the_worst_of_its_airspeeds(order):
+    cell, document = cell_of(*({"delay_s": d, "ratio": 3 * d} for d in order))
+    assert cell["delay_s"] == 0.7
+    assert cell["ratio"] == pytest.approx(2.1)
+    assert "0.70 s" in as_text(document)
+
+
+def test_never_detected_at_one_airspeed_is_the_worst_delay():
+    cell, _ = cell_of({"delay_s": 0.2}, {"delay_s": None, "verdict": "unseen", "detected": False}, {})
+    assert cell["delay_s"] is None
+    assert cell["verdict"] == "unseen"
+
+
+def test_the_worst_verdict_stands_for_the_cell_and_is_counted():
+    cell, document = cell_of(
+        {"verdict": "named"}, {"verdict": "WRONG", "false_alarm": True}, {"verdict": "open"}
+    )
+    assert cell["verdict"] == "WRONG"
+    assert (document["wrong"], document["false_alarms"], document["passed"]) == (1, 1, False)
+
+
+def test_losses_are_counted_and_told_from_the_oracles():
+    lost = {"departure_s": 20.0, "departure_signal": "alpha_rad"}
+    both = {**lost, "oracle_departure_s": 22.0, "oracle_beyond_s": 1.5}
+    cell, document = cell_of(lost, both, {})
+    assert (cell["lost"], cell["oracle_lost"], cell["flights"]) == (2, 1, 3)
+    assert cell["remark"].startswith("lost in 2 of 3 flights, the oracle in 1: for 1.5 s no deflection")
+    assert [r["airspeed_mps"] for r in document["lost_though_the_oracle_was_not"]] == [38.0]

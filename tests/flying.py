@@ -46,9 +46,10 @@ class Memory:
 
 
 def scenario(**keys):
-    """A scenario with sine references and the published uncertainty, unless said otherwise."""
+    """A scenario with sine references, the published uncertainty and law, unless said otherwise."""
+    control = {"law": "fault-tolerant-published", **keys.pop("control", {})}
     return Scenario.model_validate(
-        {"name": "test", "reference": SINES, "uncertainty": PUBLISHED_UNCERTAINTY, **keys}
+        {"name": "test", "reference": SINES, "uncertainty": PUBLISHED_UNCERTAINTY, "control": control, **keys}
     )
 
 

@@ -37,6 +37,7 @@ _SOURCES = (
     "diagnosis/*.py",
     "diagnosis/types/*.py",
     "control/*.py",
+    "control/laws/*.py",
     "plant/channels.py",
     "plant/native.py",
     "plant/instruments.py",

@@ -64,8 +64,16 @@ _OURS = {
             "",
             "Nominal, and compensates an unknown fault by what the estimators have learnt of it.",
         ),
-        "fault-tolerant": ("", "Adaptive, and hands pitch control from a weak elevator to the flap."),
+        "fault-tolerant": (
+            "",
+            "Inversion with a disturbance observer; hands pitch control from a weak elevator to the flap.",
+        ),
+        "fault-tolerant-published": (
+            "",
+            "Adaptive, and hands pitch control from a weak elevator to the flap [Zhang2005].",
+        ),
         "oracle": ("", "Fault-tolerant, and told the true fault the moment it occurs: the yardstick."),
+        "oracle-published": ("", "Fault-tolerant-published, and told the true fault the moment it occurs."),
         "indi": (
             "beaver_ftc.control.rivals.indi:IncrementalInversion",
             "Incremental nonlinear dynamic inversion on filtered angular acceleration [Sieberling2010].",

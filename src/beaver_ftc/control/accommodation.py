@@ -6,6 +6,7 @@ a slow one is left to its pace.
 
 from beaver_ftc.compiled import kernel
 from beaver_ftc.control import adaptive
+from beaver_ftc.control.laws.state import REJECTING
 from beaver_ftc.control.oracle import true_surface
 from beaver_ftc.control.state import NOMINAL, ORACLE
 from beaver_ftc.design.model import unanticipated_pitch
@@ -72,6 +73,8 @@ def act_on_type(control, fdi, s):
 def compensate(control, fdi, belief, measured, faults):
     """Fill control.fhat (3,) rad/s2: what the law takes the unknown for."""
     control.fhat[:] = 0.0
+    if control.inner == REJECTING:
+        return  # its observer finds what is unknown
     if control.law == ORACLE:
         control.fhat[PITCH] = unanticipated_pitch(belief.design, measured.y, faults.Cm_alpha3)
     elif control.law != NOMINAL and fdi.detected:

@@ -2,6 +2,7 @@
 to flap."""
 
 from beaver_ftc.compiled import kernel
+from beaver_ftc.control.laws.state import REJECTING
 from beaver_ftc.diagnosis.state import PITCH, ROLL, YAW
 
 
@@ -48,7 +49,7 @@ def pitch(control, G, u):
     e, f = control.main[PITCH], control.stand_in
     needed = control.demand[PITCH]
     if f >= 0:
-        share = smooth(control.hand_over)
+        share = control.rejection.lost if control.inner == REJECTING else smooth(control.hand_over)
         hold = divide(G[PITCH, e], control.effectiveness[e]) * control.trim[e]
         flap = control.trim[f] + share * (divide(needed - hold, G[PITCH, f]) - control.trim[f])
         u[f] = clip(control, f, flap + control.probe)

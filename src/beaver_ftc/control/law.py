@@ -3,6 +3,8 @@
 from beaver_ftc.compiled import kernel
 from beaver_ftc.control import adaptive, allocation, authority, nominal, power, probing
 from beaver_ftc.control.accommodation import accommodate, give_up
+from beaver_ftc.control.laws import rejecting
+from beaver_ftc.control.laws.state import REJECTING
 from beaver_ftc.control.state import NOMINAL, ORACLE
 from beaver_ftc.control.supervisor import MODE_REALLOCATED
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, PITCH
@@ -26,6 +28,7 @@ def advance_hand_over(control, every_type, mode):
             control.hand_over = max(control.hand_over, 1.0 - left)
     elif every_type:
         control.hand_over = max(control.hand_over - control.hand_over_step, 0.0)
+    rejecting.hand_over(control, left)
 
 
 @kernel
@@ -39,16 +42,22 @@ def command(control, fdi, belief, measured, faults, mode, t):
     advance_hand_over(control, fdi.every_type, mode)
     if control.probe_frames > 0:
         probing.advance(control, in_doubt(control, fdi), t)
-    nominal.demand(control, measured.x, belief.f, control.fhat)
+    if control.inner == REJECTING:
+        rejecting.demand(control, belief, measured)
+    else:
+        nominal.demand(control, measured.x, belief.f, control.fhat)
     if control.law != NOMINAL:
         adaptive.allow_for_offsets(control, belief.G)
     allocation.allocate(control, control.G, control.command)
     give_up(control, fdi, faults)
-    nominal.integrate(control, measured.x, control.G, control.command)
+    if control.inner != REJECTING:
+        nominal.integrate(control, measured.x, control.G, control.command)
     if faults.present or control.hedging or (control.power.enabled and fdi.detected):
         authority.note_shortfall(control, control.G, control.command)
     if control.power.enabled:
         power.steer(control, measured.x, measured.y, fdi.detected, t)
+    if control.inner == REJECTING:
+        rejecting.hurry(control, belief.u)
 
 
 @kernel

@@ -40,6 +40,7 @@ def advance(control, rate, acceleration, reference):
 @kernel
 def follow(control, reference):
     """Advance the reference model by one frame towards `reference` (3,) rad/s."""
+    control.commanded_rate[:] = reference
     for i in range(3):
         rate, acceleration = control.model_rate[i], control.model_acceleration[i]
         rate, acceleration = advance(control, rate, acceleration, reference[i])

@@ -4,8 +4,25 @@ from functools import lru_cache
 
 import numpy as np
 
+from beaver_ftc.control.laws.state import PUBLISHED, REJECTING, rejection_dtype
+
 NOMINAL, ADAPTIVE, FAULT_TOLERANT, ORACLE = range(4)
-LAWS = ("nominal", "adaptive", "fault-tolerant", "oracle")
+LAWS = ("nominal", "adaptive", "fault-tolerant", "oracle")  # what use is made of the verdict
+# A law's name -> that, and which inner law makes the demand.
+COMPILED = {
+    "nominal": (NOMINAL, PUBLISHED),
+    "adaptive": (ADAPTIVE, PUBLISHED),
+    "fault-tolerant": (FAULT_TOLERANT, REJECTING),
+    "fault-tolerant-published": (FAULT_TOLERANT, PUBLISHED),
+    "oracle": (ORACLE, REJECTING),
+    "oracle-published": (ORACLE, PUBLISHED),
+}
+
+
+def law_of(name: str) -> tuple[int, int]:
+    """What use a law makes of the verdict, and its inner law; of a plug-in those that do the least."""
+    return COMPILED.get(name, (NOMINAL, PUBLISHED))
+
 
 # What power.py keeps: its settings, its state, and what is reported of it.
 POWER = np.dtype(
@@ -28,10 +45,10 @@ POWER = np.dtype(
 def control_dtype(n: int) -> np.dtype:
     """The law's record for an aircraft with n surfaces; rad, rad/s, rad/s2."""
     fields = [
-        ("law", "i8"), ("dt", "f8"),
+        ("law", "i8"), ("inner", "i8"), ("dt", "f8"),
         ("Kp", "f8"), ("Ki", "f8"),
         ("model_A", "f8", (2, 2)), ("model_B", "f8", (2,)),
-        ("model_rate", "f8", (3,)), ("model_acceleration", "f8", (3,)),
+        ("commanded_rate", "f8", (3,)), ("model_rate", "f8", (3,)), ("model_acceleration", "f8", (3,)),
         ("integral", "f8", (3,)), ("demand", "f8", (3,)),
         ("main", "i8", (3,)), ("stand_in", "i8"),  # surface of each axis; who stands in for pitch's, or -1
         ("G", "f8", (3, n)),  # effectiveness matrix with what is believed of each surface in it
@@ -47,6 +64,6 @@ def control_dtype(n: int) -> np.dtype:
         ("trim", "f8", (n,)), ("low", "f8", (n,)), ("high", "f8", (n,)),
         ("command", "f8", (n,)), ("saturated", "i8", (n,)),
         ("hand_over", "f8"), ("hand_over_step", "f8"),
-        ("power", POWER),
+        ("power", POWER), ("rejection", rejection_dtype(n)),
     ]  # fmt: skip
     return np.dtype(fields, align=True)

@@ -103,6 +103,11 @@ def coefficient_slopes(design: np.void, x: np.ndarray, y: np.ndarray, u: np.ndar
     return slopes
 
 
+def effectiveness(design: np.void, y: np.ndarray) -> np.ndarray:
+    """G (3, 4) rad/s2 per rad at y (5,), without compiled code."""
+    return design["G0"].copy() if design["linearised"] else _split(design, np.zeros(3), y)[1].real
+
+
 def _directional(design: np.void, x: np.ndarray, y: np.ndarray, u: np.ndarray) -> np.ndarray:
     f, G = _split(design, x, y)
     return (f + G @ u).imag / _STEP

@@ -6,7 +6,7 @@ import numpy as np
 
 from beaver_ftc.aircraft import load
 from beaver_ftc.control.reference_model import discretise
-from beaver_ftc.control.state import LAWS, NOMINAL
+from beaver_ftc.control.state import FAULT_TOLERANT, ORACLE, law_of
 from beaver_ftc.design.coefficients import SURFACES, value
 from beaver_ftc.design.engine import engine_power_kw, slipstream
 from beaver_ftc.design.model import AILERON, ELEVATOR, FLAP, RUDDER
@@ -138,14 +138,14 @@ def _assemble_network(network: np.void, config: ControlConfig) -> None:
 def _assemble_control(
     control: np.void, config: ControlConfig, dt: float, trim: np.ndarray, travel: np.ndarray
 ) -> None:
-    control["law"] = LAWS.index(config.law) if config.law in LAWS else NOMINAL  # a plug-in: plugin_frame.py
+    control["law"], control["inner"] = law_of(config.law)  # a plug-in: plugin_frame.py
     control["dt"] = dt
     control["Kp"], control["Ki"] = config.proportional_per_s, config.integral_per_s2
     control["model_A"], control["model_B"] = discretise(
         config.reference_natural_frequency_rad_s, config.reference_damping, dt
     )
     control["effectiveness"] = 1.0
-    control["effectiveness_step"] = config.effectiveness_rate_per_s * dt if config.law != "oracle" else np.inf
+    control["effectiveness_step"] = config.effectiveness_rate_per_s * dt if control["law"] != ORACLE else np.inf
     control["reference_scale"] = 1.0
     control["least_effectiveness"] = config.least_effectiveness
     control["trim"] = control["command"] = trim
@@ -165,8 +165,8 @@ def _assemble_probing(control: np.void, probing: Probing | None, dt: float) -> N
 
 def power_is_at_hand(scenario: Scenario) -> bool:
     """Whether the built-in law of a scenario may use the engine."""
-    law, every_type = scenario.control.law, scenario.fdi.fault_class == "all"
-    return scenario.control.power.enabled and (law == "oracle" or (law == "fault-tolerant" and every_type))
+    law, every_type = law_of(scenario.control.law)[0], scenario.fdi.fault_class == "all"
+    return scenario.control.power.enabled and (law == ORACLE or (law == FAULT_TOLERANT and every_type))
 
 
 def _assemble_power(control: np.void, scenario: Scenario, dt: float) -> None:

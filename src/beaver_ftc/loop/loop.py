@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from beaver_ftc.compiled import direct
+from beaver_ftc.control.laws.setup import set_up
 from beaver_ftc.design.actuators import move
 from beaver_ftc.design.coefficients import SURFACES
 from beaver_ftc.design.variants import anchor, mass_of
@@ -121,6 +122,7 @@ class Loop:
         design = frame["belief"]["design"]
         anchor(design, truth[:3], y, surfaces)
         start, mass = (truth[:3], y, surfaces), mass_of(scenario.design_model)
+        set_up(frame["control"], frame["belief"], scenario, y)
         noise_model.set_up(frame["fdi"], scenario.fdi, design, mass, start, scenario.rate_hz)
 
     def _with_plugins(self, detector: "Detector | None", law: "Law | None") -> "PluginFrame | None":

@@ -73,6 +73,16 @@ class ControlConfig(BaseModel):
         "or module:Class of an installed package",
     )
     options: dict[str, float] = Field({}, description="parameters of a registered law, by name")
+    gain_margin_db: float = Field(
+        6.0, gt=0, le=40, description="of every loop of the default law, up and down, dB"
+    )
+    phase_margin_deg: float = Field(45.0, gt=0, le=80, description="of every loop of the default law, deg")
+    noise_share: float = Field(
+        0.25,
+        gt=0,
+        le=1,
+        description="of a surface's rate limit, that gyro noise may cost with the default law",
+    )
     proportional_per_s: float = Field(
         2.0, gt=0, le=50, description="Kp, 1/s: error bandwidth, well above the 0.2 Hz references"
     )

@@ -33,7 +33,9 @@ def fly_case(case: Case) -> Document:
     from beaver_ftc.loop.loop import fly
 
     off_deg = trimmed_deg(case.airspeed_mps, case.surface)
-    flight, oracle = (fly(scenario_of(case, law, off_deg)) for law in ("fault-tolerant", "oracle"))
+    flight, oracle = (
+        fly(scenario_of(case, law, off_deg)) for law in ("fault-tolerant-published", "oracle-published")
+    )
     return {**case._asdict(), **_diagnosis(flight, case), **_tracking(flight, oracle, case)}
 
 

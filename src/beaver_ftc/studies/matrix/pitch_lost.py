@@ -21,7 +21,7 @@ Document = dict[str, Any]
 NAME = "pitch-lost"
 DURATION_S = 100.0
 SETTLED_S = 30.0  # from here on the swing is judged: what the fault itself throws off is over
-LAWS = ("fault-tolerant", "oracle")
+LAWS = ("fault-tolerant-published", "oracle-published")
 
 # Name, elevator's jam off its trim in deg (None: it floats), flap's position in deg.
 LOST: tuple[tuple[str, float | None, float], ...] = (

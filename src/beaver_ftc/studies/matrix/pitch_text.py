@@ -22,7 +22,7 @@ def as_text(document: Document) -> str:
 
 def _table(document: Document, law: str, speeds: list[float]) -> list[str]:
     rows = {(row["lost"], row["airspeed_mps"]): row for row in document["flights"] if row["law"] == law}
-    head = f"{law:18}" + "".join(f"{f'{V:g} m/s':{WIDTH}}" for V in speeds)
+    head = f"{law:25}" + "".join(f"{f'{V:g} m/s':{WIDTH}}" for V in speeds)
     lines = [f"{name:18}" + "".join(f"{_cell(rows[name, V]):{WIDTH}}" for V in speeds) for name, _, _ in LOST]
     return [line.rstrip() for line in (head, *lines)]
 

@@ -23,6 +23,7 @@ GIVEN: Mapping[str, Any] = {
     "fdi.bounds.constant_rad_s2": {"p": 0.02, "q": 0.02, "r": 0.02},
     "fdi.thresholds": "published",
     "fdi.sharpen": "none",
+    "control.law": "fault-tolerant-published",
 }
 
 

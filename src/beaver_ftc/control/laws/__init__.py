@@ -1,0 +1,1 @@
+"""Inner laws, one file each: what makes surfaces of a demanded body rate."""

@@ -1,0 +1,57 @@
+"""From a scenario to the gains of its inner law, before the flight."""
+
+from math import exp, hypot, pi, radians, sqrt
+
+import numpy as np
+
+from beaver_ftc.control.laws import gains
+from beaver_ftc.control.laws.state import N_POINTS, REJECTING
+from beaver_ftc.design.coefficients import ENVELOPE_AIRSPEED_MPS, SURFACES
+from beaver_ftc.design.model import AIRSPEED, QDYN
+from beaver_ftc.design.variants import effectiveness
+from beaver_ftc.diagnosis.state import PITCH
+from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.scenario.sensors import RateGyro
+
+DEFAULT_RATE_RAD_S = pi / 3.0  # of an actuator with no declared rate limit: the aircraft's default
+AXES = ("p", "q", "r")
+
+
+def set_up(control: np.void, belief: np.void, scenario: Scenario, y: np.ndarray) -> None:
+    """Derive what the inner law needs; y: the measured signals in trim."""
+    if control["inner"] == REJECTING:
+        _set_up_rejection(control, belief, scenario, y)
+
+
+def _set_up_rejection(control: np.void, belief: np.void, scenario: Scenario, y: np.ndarray) -> None:
+    config, dt = scenario.control, 1.0 / scenario.rate_hz
+    speeds_mps = np.linspace(*ENVELOPE_AIRSPEED_MPS, N_POINTS)
+    signals = np.tile(y, (N_POINTS, 1))
+    signals[:, AIRSPEED], signals[:, QDYN] = speeds_mps, y[QDYN] * (speeds_mps / y[AIRSPEED]) ** 2
+    carriers = [(axis, int(s)) for axis, s in enumerate(control["main"])]
+    if control["stand_in"] >= 0:
+        carriers.append((PITCH, int(control["stand_in"])))
+    gains.set_up(
+        control["rejection"],
+        dt_s=dt,
+        substeps=scenario.substeps,
+        approach=belief["actuators"]["approach"],
+        speed_rad_s=config.noise_share * _rate_limits(scenario),
+        gyros=[_gyro(getattr(scenario.sensors, axis), dt) for axis in AXES],
+        margin=(config.gain_margin_db, config.phase_margin_deg),
+        qdyn=signals[:, QDYN],
+        G=np.stack([effectiveness(belief["design"], each) for each in signals]),
+        carriers=carriers,
+    )
+
+
+def _rate_limits(scenario: Scenario) -> np.ndarray:
+    """Declared rate limits (n,) rad/s, the aircraft's default where none is."""
+    limits_deg_s = [getattr(scenario.actuators, surface).rate_limit_deg_s for surface in SURFACES]
+    return np.array([radians(limit) or DEFAULT_RATE_RAD_S for limit in limits_deg_s])
+
+
+def _gyro(sensor: RateGyro, dt: float) -> gains.Gyro:
+    noise, _, quantum = sensor.noise_bias_quantum
+    lag = sensor.bandwidth_rad_s
+    return gains.Gyro(hypot(noise, quantum / sqrt(12.0)), sensor.delay_s, exp(-lag * dt) if lag else 0.0)

@@ -1,0 +1,34 @@
+"""What the disturbance-rejecting law keeps: its gains over dynamic pressure, its observer, its lead."""
+
+from functools import lru_cache
+
+import numpy as np
+
+PUBLISHED, REJECTING, INDI, LQR, L1 = range(5)  # inner laws: which file makes the demand
+N_POINTS = 5  # of the schedule over dynamic pressure
+N_LOOPS = 4  # roll, pitch, yaw, and pitch by the surface that stands in
+PITCH, STAND_IN = 1, 3
+
+
+@lru_cache
+def rejection_dtype(surfaces: int) -> np.dtype:
+    """The record of `rejecting.py` for an aircraft with so many surfaces.
+
+    qdyn (N_POINTS,) Pa: the schedule's points, ascending. Kp 1/s, pull 1, learn 1/s (N_LOOPS, N_POINTS):
+    feedback, and the observer's corrections of rate and disturbance for what it missed.
+    rate (3,) rad/s, disturbance (3,) rad/s2: its estimates. ahead (3,) rad/s: the rate when the command
+    acts. lost: share of pitch that the stand-in carries. lead (n,): command beyond the actuator's position
+    over what is wanted beyond it.
+    """
+    return np.dtype(
+        [
+            ("begun", "i8"), ("share", "f8"), ("lost", "f8"),
+            ("qdyn", "f8", (N_POINTS,)),
+            ("Kp_at", "f8", (N_LOOPS, N_POINTS)), ("pull_at", "f8", (N_LOOPS, N_POINTS)),
+            ("learn_at", "f8", (N_LOOPS, N_POINTS)),
+            ("Kp", "f8", (3,)), ("pull", "f8", (3,)), ("learn", "f8", (3,)),
+            ("rate", "f8", (3,)), ("disturbance", "f8", (3,)), ("ahead", "f8", (3,)),
+            ("lead", "f8", (surfaces,)),
+        ],
+        align=True,
+    )  # fmt: skip

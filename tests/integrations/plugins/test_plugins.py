@@ -139,7 +139,7 @@ def test_estimates_of_every_surface_reach_the_law():
 
 
 def test_being_told_the_truth_is_worth_the_oracle():
-    oracle, _ = _flown(scenario(**SHORT, control={"law": "oracle"}))
+    oracle, _ = _flown(scenario(**SHORT, control={"law": "oracle-published"}))
     told, _ = _flown(detector=culprits.Teller())
     deaf, _ = _flown(scenario(**SHORT, fdi={"scheme": "none"}))
     assert told.post_fault_rms_rad_s[1] < 2.0 * oracle.post_fault_rms_rad_s[1]

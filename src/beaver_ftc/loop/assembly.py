@@ -145,7 +145,9 @@ def _assemble_control(
         config.reference_natural_frequency_rad_s, config.reference_damping, dt
     )
     control["effectiveness"] = 1.0
-    control["effectiveness_step"] = config.effectiveness_rate_per_s * dt if control["law"] != ORACLE else np.inf
+    control["effectiveness_step"] = (
+        config.effectiveness_rate_per_s * dt if control["law"] != ORACLE else np.inf
+    )
     control["reference_scale"] = 1.0
     control["least_effectiveness"] = config.least_effectiveness
     control["trim"] = control["command"] = trim

@@ -90,7 +90,9 @@ class TestTheDiagnosisIsNotDisturbed:
         memory.open(loop.columns)
         for rows in loop.chunks():
             memory.write(rows)
-            behind = np.abs(loop.frames[0]["belief"]["u_then"] - loop.frames[0]["truth"]["value"][ch.POS : ch.POS + 4])
+            behind = np.abs(
+                loop.frames[0]["belief"]["u_then"] - loop.frames[0]["truth"]["value"][ch.POS : ch.POS + 4]
+            )
         assert behind.max() < 1e-9
 
 

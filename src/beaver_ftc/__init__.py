@@ -8,26 +8,36 @@
 What is heavy is imported when it is first used.
 """
 
+import sys
 from importlib import import_module
+from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from beaver_ftc.errors import BadInput, SimulationFailed
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from beaver_ftc.aircraft.aircraft import Aircraft
+    from beaver_ftc.aircraft.loading import load as aircraft
     from beaver_ftc.control.base import Law, Reference
     from beaver_ftc.design.context import Context
     from beaver_ftc.diagnosis.base import Detector, Measured, Verdict
+    from beaver_ftc.loop.stream import Diagnosis
+    from beaver_ftc.plant.conditions import linearise, trim
     from beaver_ftc.results.flight import Flight, fly, open_run
     from beaver_ftc.results.simulation import Simulation
     from beaver_ftc.scenario.builtin import builtin_names as scenarios
     from beaver_ftc.scenario.given import load
     from beaver_ftc.scenario.schema import Scenario
+    from beaver_ftc.studies.sweep.table_of_flights import sweep
 
 __version__ = "0.1.0"
 
 # Public name -> module:name it is found by at first use.
 _WHERE = {
     "Context": "beaver_ftc.design.context:Context",
+    "Diagnosis": "beaver_ftc.loop.stream:Diagnosis",
     "Detector": "beaver_ftc.diagnosis.base:Detector",
     "Flight": "beaver_ftc.results.flight:Flight",
     "Law": "beaver_ftc.control.base:Law",
@@ -37,15 +47,37 @@ _WHERE = {
     "Simulation": "beaver_ftc.results.simulation:Simulation",
     "Verdict": "beaver_ftc.diagnosis.base:Verdict",
     "fly": "beaver_ftc.results.flight:fly",
+    "linearise": "beaver_ftc.plant.conditions:linearise",
     "load": "beaver_ftc.scenario.given:load",
     "open_run": "beaver_ftc.results.flight:open_run",
     "scenarios": "beaver_ftc.scenario.builtin:builtin_names",
+    "sweep": "beaver_ftc.studies.sweep.table_of_flights:sweep",
+    "trim": "beaver_ftc.plant.conditions:trim",
 }
 
 __all__ = [
-    "BadInput", "Context", "Detector", "Flight", "Law", "Measured", "Reference", "Scenario", "Simulation",
-    "SimulationFailed", "Verdict", "__version__", "fly", "load", "open_run", "scenarios",
+    "BadInput", "Context", "Detector", "Diagnosis", "Flight", "Law", "Measured", "Reference", "Scenario",
+    "Simulation", "SimulationFailed", "Verdict", "__version__", "aircraft", "fly", "linearise", "load",
+    "open_run", "scenarios", "sweep", "trim",
 ]  # fmt: skip
+
+
+class _Public(ModuleType):
+    """This module: `aircraft` is the function, though a folder is called so, too."""
+
+    @property
+    def aircraft(self) -> "Callable[..., Aircraft]":
+        """The aircraft of a name, `jsbsim:NAME` or `./FOLDER`; see `beaver_ftc.aircraft.load`."""
+        from beaver_ftc.aircraft import load as load_aircraft
+
+        return load_aircraft
+
+    @aircraft.setter
+    def aircraft(self, folder: ModuleType) -> None:
+        """Importing the folder would put it in the function's place."""
+
+
+sys.modules[__name__].__class__ = _Public
 
 
 def __getattr__(name: str) -> Any:

@@ -47,6 +47,7 @@ _SOURCES = (
     "loop/accounts.py",
     "loop/record.py",
     "loop/steps.py",
+    "loop/watching.py",
 )
 
 

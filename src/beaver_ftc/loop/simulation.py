@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
 Vector = NDArray[np.float64]
 UNANTICIPATED = "unanticipated"
+SINGULAR = ("stuck", "hardover", "float")  # a second one of these changes nothing
 
 
 class Stepping:
@@ -142,9 +143,11 @@ class Stepping:
     def inject(self, fault: Mapping[str, Any]) -> None:
         """Break something now, from the next frame on: a fault as in a scenario file, without `at_s`.
 
-        Raises BadInput that names the key.
+        What is broken in just this way already cannot be broken again. Raises BadInput that names the key.
         """
-        self._declare((*self._faults, fault_of(fault, self._now_s)))
+        new = fault_of(fault, self._now_s)
+        if not any(_is_same_again(new, known) for known in self._faults):
+            self._declare((*self._faults, new))
 
     def repair(self, actuator: str | None = None) -> None:
         """End now what is wrong with a surface, with the aerodynamics (`unanticipated`), or with anything.
@@ -187,10 +190,11 @@ class Stepping:
         """The scenario of the verdict: as given if it was flown to its end and nobody interfered."""
         if self.done and self._faults is self._scenario.faults and not self._stick.moved:
             return self._scenario
-        if self._by_hand:
+        try:
+            return self.scenario_flown()
+        except BadInput:  # what no scenario can say is left out of it
             faults = in_force(self._faults, self._now_s)
             return self._scenario.model_copy(update={"faults": faults})
-        return self.scenario_flown()
 
     def outcome(self) -> Flight:
         """What the flight has yielded so far."""
@@ -298,6 +302,12 @@ class Stepping:
         known = [line.split(" ")[0] for line in catalogue.splitlines()]
         near = get_close_matches(str(name), known, n=1)
         return f", did you mean {near[0]}?" if near else ""
+
+
+def _is_same_again(new: Any, known: Any) -> bool:
+    """Whether a fault that does not add to its like is there already, to stay."""
+    begun = known.type == new.type and known.at_s <= new.at_s
+    return bool(begun and new.type in SINGULAR and known == new.model_copy(update={"at_s": known.at_s}))
 
 
 def _vector(given: ArrayLike, size: int, what: str, unit: str) -> Vector:

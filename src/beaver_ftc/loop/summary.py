@@ -10,7 +10,7 @@ from beaver_ftc.design.model import AXES
 from beaver_ftc.diagnosis.base import Verdict
 from beaver_ftc.diagnosis.scheme import isolated_theta
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, UNANTICIPATED
-from beaver_ftc.diagnosis.types.findings import found
+from beaver_ftc.diagnosis.types.findings import estimate_of, found
 from beaver_ftc.loop.assembly import estimator_names
 from beaver_ftc.loop.flight import Flight
 from beaver_ftc.plant.sensing import DEPARTURE_SIGNALS
@@ -136,6 +136,13 @@ def verdict_of(frame: np.void) -> Verdict:
         estimate=said["estimate"],
         candidates=said["candidates"],
     )
+
+
+def estimate_now(fdi: np.void, said: Verdict) -> float | None:
+    """The estimate of a verdict that otherwise still stands, of a diagnosis for every type."""
+    surface = SURFACES.index(str(said.isolated))
+    kind = fdi["surface"][surface]["type"] if fdi["pairs"] else fdi["type"]
+    return estimate_of(fdi, surface, int(kind))
 
 
 def _of_verdict(fdi: np.void, verdict: Verdict) -> dict:

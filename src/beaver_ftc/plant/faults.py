@@ -10,6 +10,7 @@ hides a runaway (that is the aircraft's own order).
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import zip_longest
 from math import ceil, exp, inf, radians
 from typing import Any
 
@@ -151,10 +152,16 @@ class FaultSchedule:
 
     def declare(self, faults: Sequence[Any]) -> None:
         """Take these faults for those declared so far: some more at the end, some that end otherwise."""
-        before, self._declared = self._declared, [_Event.of(fault, self._rate_hz) for fault in faults]
-        for event, known in zip(self._declared, before, strict=False):
-            event.was_rad, event.struck = known.was_rad, known.struck
+        before, self._declared = self._declared, []
+        for known, fault in zip_longest(before, faults):
+            self._declared.append(known if known and known.fault is fault else self._event(fault, known))
         self._events = sorted(self._declared, key=lambda event: event.first)
+
+    def _event(self, fault: Any, known: _Event | None) -> _Event:
+        event = _Event.of(fault, self._rate_hz)
+        if known is not None:
+            event.was_rad, event.struck = known.was_rad, known.struck
+        return event
 
     def begun(self, k: int) -> bool:
         """Whether some fault has struck by frame k, repaired or not."""

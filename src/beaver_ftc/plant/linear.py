@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING
 import jsbsim
 import numpy as np
 
-from beaver_ftc.errors import SimulationFailed
+from beaver_ftc.errors import BadInput, SimulationFailed
 from beaver_ftc.paths import data_root
 from beaver_ftc.plant.adapter import FT_PER_M, Plant
 from beaver_ftc.plant.configure import configure
@@ -28,6 +28,7 @@ from beaver_ftc.plant.state import FlightState
 
 if TYPE_CHECKING:
     from beaver_ftc.scenario.schema import Scenario
+    from control import StateSpace
 
 M_PER_FT = 1.0 / FT_PER_M
 _EARTH_RADIUS_M = 6371000.0
@@ -46,6 +47,7 @@ _MOVED = (
     ("psi", "psi_rad", 1e-4),
     ("altitude", "altitude_m", 10.0),
 )
+_UNITS = {name: field for name, field, _ in _MOVED} | {"north": "north_m", "east": "east_m"}
 _SURFACES = ("aileron", "elevator", "rudder", "flap")
 _SURFACE_STEP_RAD = 1e-3
 _PRESSURE_STEP_INHG = 0.1
@@ -90,6 +92,23 @@ class LinearModel:
         """The same model with these states only, the others held, in this order."""
         rows = [self.states.index(name) for name in states]
         return LinearModel(self.A[np.ix_(rows, rows)], self.B[rows], states, self.inputs)
+
+    def state_space(self) -> "StateSpace":
+        """As python-control has it, every state an output; names carry units. Wants the extra `control`.
+
+        Raises BadInput where that is not installed.
+        """
+        try:
+            import control
+        except ImportError:
+            raise BadInput(
+                "python-control is not installed, allowed: pip install 'beaver-ftc[control]'"
+            ) from None
+        states, inputs = [_UNITS[name] for name in self.states], [f"{name}_rad" for name in self.inputs]
+        n, m = self.B.shape
+        return control.ss(
+            self.A, self.B, np.eye(n), np.zeros((n, m)), states=states, inputs=inputs, outputs=states
+        )
 
 
 def differences(plant: Plant, point: FlightState) -> LinearModel:

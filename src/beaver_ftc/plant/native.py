@@ -16,14 +16,17 @@ import sys
 from collections.abc import Sequence
 from functools import lru_cache
 from importlib import import_module
+from typing import TYPE_CHECKING
 
-import jsbsim
 import numpy as np
 from llvmlite import ir
 from numba.core import config, types
 from numba.extending import intrinsic
 
 from beaver_ftc.compiled import kernel
+
+if TYPE_CHECKING:  # whoever only diagnoses has compiled code of this module, and no JSBSim
+    import jsbsim
 
 _GETTER = "_ZNK14SGPropertyNode14getDoubleValueEv"  # double SGPropertyNode::getDoubleValue() const
 _SETTER = "_ZN14SGPropertyNode14setDoubleValueEd"  # bool SGPropertyNode::setDoubleValue(double)
@@ -87,7 +90,7 @@ def write_nodes(setter, pointers, values):
         _call_setter(setter, pointers[i], values[i])  # type: ignore[call-arg]
 
 
-def _pointer(node: jsbsim.FGPropertyNode) -> int:
+def _pointer(node: "jsbsim.FGPropertyNode") -> int:
     return ctypes.c_int64.from_address(id(node) + _POINTER_OFFSET).value
 
 
@@ -98,7 +101,7 @@ class NodeBank:
     given (the Plant, whose executive the tied properties read from).
     """
 
-    def __init__(self, nodes: Sequence[jsbsim.FGPropertyNode], owner: object = None) -> None:
+    def __init__(self, nodes: "Sequence[jsbsim.FGPropertyNode]", owner: object = None) -> None:
         self.nodes = tuple(nodes)
         self.owner = owner
         native = available()
@@ -124,20 +127,24 @@ def available() -> bool:
 @lru_cache(maxsize=1)
 def _layout_is_known() -> bool:
     """Check this build of the binding, safest evidence first: nothing unknown is dereferenced."""
+    import jsbsim
+
     cpython = sys.implementation.name == "cpython" and ctypes.sizeof(ctypes.c_void_p) == 8
     if not (cpython and jsbsim.FGPropertyNode.__basicsize__ == _NODE_SIZE):
         return False
     return bool(getter_address() and setter_address()) and _pointers_are_nodes() and _values_agree()
 
 
-def _made(manager: jsbsim.FGPropertyManager, name: str) -> jsbsim.FGPropertyNode:
+def _made(manager: "jsbsim.FGPropertyManager", name: str) -> "jsbsim.FGPropertyNode":
     node = manager.get_node(name, True)
     assert node is not None
     return node
 
 
-def _trial_nodes() -> list[jsbsim.FGPropertyNode]:
+def _trial_nodes() -> "list[jsbsim.FGPropertyNode]":
     """Nodes in a property tree of their own, with no aircraft behind them."""
+    import jsbsim
+
     manager = jsbsim.FGPropertyManager()
     nodes = [_made(manager, f"trial/value-{i}") for i in range(3)]
     for i, node in enumerate(nodes):
@@ -147,6 +154,8 @@ def _trial_nodes() -> list[jsbsim.FGPropertyNode]:
 
 def _pointers_are_nodes() -> bool:
     """Two wrappers of one node hold the same aligned address, wrappers of different nodes different ones."""
+    import jsbsim
+
     manager = jsbsim.FGPropertyManager()
     first, second, again = (_made(manager, f"trial/{name}") for name in "aba")
     same = _pointer(first) == _pointer(again) and first is not again

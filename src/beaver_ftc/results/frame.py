@@ -1,6 +1,6 @@
 """Tables of a flight as pandas has them; units are in the columns' names and in `attrs`."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,10 +19,13 @@ _UNITS = (  # ending of a column's name, unit; the longest endings first
 
 
 def units(columns: Iterable[str]) -> dict[str, str]:
-    """The unit of each column, read off its name; "1" for a pure number."""
-    return {
-        column: next((unit for ending, unit in _UNITS if column.endswith(ending)), "1") for column in columns
-    }
+    """The unit of each column, read off its name or the section's it is in; "1" for a pure number."""
+    return {column: _unit(column.split(".")) for column in columns}
+
+
+def _unit(parts: Sequence[str]) -> str:
+    named = (unit for part in reversed(parts) for ending, unit in _UNITS if part.endswith(ending))
+    return next(named, "1")
 
 
 def log_frame(log: Log, metrics: Document) -> "DataFrame":

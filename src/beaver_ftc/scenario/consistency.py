@@ -40,6 +40,11 @@ def outline_of_data(data: dict[str, Any]) -> Outline:
     )
 
 
+def conflicts_in_data(data: dict[str, Any]) -> list[Conflict]:
+    """Every contradiction in a file's raw data, whatever else is wrong with it."""
+    return conflicts(outline_of_data(data))
+
+
 def conflicts(outline: Outline) -> list[Conflict]:
     """Every contradiction, at the key to change."""
     return [*_too_short(outline), *_too_late(outline), *_expected_of_no_fault(outline)]

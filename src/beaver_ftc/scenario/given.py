@@ -1,4 +1,4 @@
-"""What a Python caller gives as a scenario, a change of one, or a fault: checked as a file would be.
+"""What a Python caller gives as a scenario or a fault: checked as a file would be.
 
 A mistake is a BadInput with the key's path, `faults[0].magnitude: 30 is out of range, allowed: ...`.
 """
@@ -8,18 +8,15 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from pydantic import BaseModel
-
 from beaver_ftc.errors import BadInput
-from beaver_ftc.scenario.base import Location, Section
+from beaver_ftc.scenario.base import Section
+from beaver_ftc.scenario.changes import plain
 from beaver_ftc.scenario.document import Document, Problem
 from beaver_ftc.scenario.faults import Fault
-from beaver_ftc.scenario.keys import UnusableKeyError, parse_key, with_values
 from beaver_ftc.scenario.loader import load_scenario, validate_scenario
-from beaver_ftc.scenario.loader import validate as validated
 from beaver_ftc.scenario.problems import ScenarioError
 from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.scenario.validation import validate
 
 ScenarioLike = Scenario | str | PathLike[str] | Mapping[str, Any]
 
@@ -45,26 +42,6 @@ def load(scenario: ScenarioLike) -> Scenario:
     raise BadInput(f"{scenario!r:.60} is no scenario, allowed: a built-in name, a path or a mapping")
 
 
-def changed(scenario: Scenario, changes: Mapping[str, Any]) -> Scenario:
-    """The scenario with new values at dotted keys, `{"faults[0].magnitude": 0.2}`, checked as a whole.
-
-    Raises BadInput that names the key.
-    """
-    data = scenario.model_dump(mode="json", by_alias=True, exclude_unset=True)
-    for key, value in changes.items():
-        try:
-            data = with_values(data, {_parsed(key): plain(value)})
-        except UnusableKeyError as error:
-            raise BadInput(f"{key}: {str(error).replace('the base', scenario.name)}") from None
-    return validate_scenario(Document(data), folder=Path())
-
-
-def _parsed(key: Any) -> Location:
-    if not isinstance(key, str):
-        raise UnusableKeyError("is no dotted key, allowed: keys like faults[0].magnitude")
-    return parse_key(key)
-
-
 def fault_of(given: Mapping[str, Any], at_s: float) -> Fault:
     """The fault that a mapping without `at_s` describes, from at_s on. Raises BadInput with the key."""
     data = plain(given)
@@ -73,20 +50,7 @@ def fault_of(given: Mapping[str, Any], at_s: float) -> Fault:
     if "at_s" in data:
         raise BadInput(f"at_s: has no meaning here, allowed: a fault injected now, at {at_s:g} s")
     try:
-        return validated(_OneFault, Document({"fault": {**data, "at_s": at_s}}), "").fault
+        return validate(_OneFault, Document({"fault": {**data, "at_s": at_s}}), "").fault
     except ScenarioError as error:
         problems = [Problem(one.line, one.location[1:], one.says) for one in error.problems]
         raise ScenarioError("", problems) from None
-
-
-def plain(value: Any) -> Any:
-    """Mappings, lists and numbers as a YAML file would give them: no NumPy, no tuples, no models."""
-    if isinstance(value, BaseModel):
-        return value.model_dump(mode="json", by_alias=True, exclude_unset=True)
-    if isinstance(value, Mapping):
-        return {key: plain(entry) for key, entry in value.items()}
-    if isinstance(value, np.ndarray | np.generic):
-        return plain(value.tolist())
-    if isinstance(value, list | tuple):
-        return [plain(entry) for entry in value]
-    return str(value) if isinstance(value, PathLike) else value

@@ -1,12 +1,10 @@
 """A scenario from a file, a built-in name or a text: every mistake at once, one line each."""
 
 from pathlib import Path
-from typing import Any
 
 from beaver_ftc.errors import suggestion
-from beaver_ftc.scenario.base import Conflict
 from beaver_ftc.scenario.builtin import builtin_names, looks_like_a_path, resolve
-from beaver_ftc.scenario.consistency import conflicts, outline_of_data
+from beaver_ftc.scenario.consistency import conflicts_in_data
 from beaver_ftc.scenario.document import Document, Problem
 from beaver_ftc.scenario.files import UnreadableError, read_text
 from beaver_ftc.scenario.problems import ScenarioError
@@ -30,11 +28,7 @@ def load_text(text: str, source: str = "<text>", folder: Path | None = None) -> 
 
 def validate_scenario(document: Document, source: str = "", folder: Path | None = None) -> Scenario:
     """The scenario in a document; without a source its error lines begin with the key."""
-    return validate(Scenario, document, source, folder, _conflicts)
-
-
-def _conflicts(data: dict[str, Any]) -> list[Conflict]:
-    return conflicts(outline_of_data(data))
+    return validate(Scenario, document, source, folder, conflicts_in_data)
 
 
 def read_file(path: Path, given: str) -> str:

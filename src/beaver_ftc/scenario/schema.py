@@ -286,7 +286,7 @@ class Scenario(Section):
 
         Raises BadInput that names the key, what is wrong and what is allowed.
         """
-        from beaver_ftc.scenario.given import changed
+        from beaver_ftc.scenario.changes import changed
 
         return changed(self, changes)
 

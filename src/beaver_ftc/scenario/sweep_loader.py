@@ -13,10 +13,11 @@ from beaver_ftc.scenario.base import Location
 from beaver_ftc.scenario.builtin import builtin_names, builtin_path, looks_like_a_path
 from beaver_ftc.scenario.document import Document, Problem
 from beaver_ftc.scenario.keys import UnusableKeyError, parse_key, with_values
-from beaver_ftc.scenario.loader import load_scenario, parse_document, read_file, validate
+from beaver_ftc.scenario.loader import load_scenario, parse_document, read_file
 from beaver_ftc.scenario.problems import ScenarioError, key_path
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.sweep_schema import SweepFile, Variation
+from beaver_ftc.scenario.validation import validate
 
 _DERIVED = {"name": "follows from the sweep's name", "seed": "follows from the sweep's seed"}
 
@@ -64,6 +65,11 @@ def load_sweep_text(
     """The sweep in a text; `folder` is where its base and CSV files are, `name` its name if it says none."""
     document = parse_document(text, source)
     document.data.setdefault("name", re.sub(r"[^A-Za-z0-9_-]", "-", name.removesuffix(".sweep"))[:70])
+    return validate_sweep(document, source, folder)
+
+
+def validate_sweep(document: Document, source: str = "", folder: Path | None = None) -> Sweep:
+    """The sweep in a document; without a source its error lines begin with the key."""
     file = validate(SweepFile, document, source, folder)
     base = _base(file.base, document, source, folder)
     base, problems = _with_settings(base, file.set, document)

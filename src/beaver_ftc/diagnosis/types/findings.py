@@ -97,10 +97,16 @@ def _found_on(fdi: np.void, s: int, kind: int) -> Found:
         "isolation_type": NAMES[kind] if kind >= 0 else None,
         "type_time_s": _at_s(fdi["surface"][s]["type_at_s"], kind),
         "candidates": (NAMES[kind],) if kind >= 0 else tuple(_types_left(fdi, s)),
-        "estimate": _of_type(kind, "estimate", fdi, s, kind),
+        "estimate": estimate_of(fdi, s, kind),
         "estimate_interval": _of_type(kind, "interval", fdi, s, kind),
         "frequency_rad_s": _of_type(kind, "frequency_rad_s", fdi, s),
     }
+
+
+def estimate_of(fdi: np.void, s: int, kind: int) -> float | None:
+    """What is known of the size of a fault of this type on surface s; see the top of this file."""
+    estimate: float | None = _of_type(kind, "estimate", fdi, s, kind)
+    return estimate
 
 
 def _of_type(kind: int, what: str, *arguments: Any) -> Any:

@@ -1,0 +1,173 @@
+"""The diagnosis as a stream, without JSBSim: for another simulator, a log, an autopilot."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from beaver_ftc.aircraft import Aircraft
+from beaver_ftc.compiled import direct
+from beaver_ftc.design.model import N_Y
+from beaver_ftc.design.variants import anchor, mass_of
+from beaver_ftc.diagnosis import noise_model
+from beaver_ftc.diagnosis.base import Verdict
+from beaver_ftc.errors import BadInput
+from beaver_ftc.loop import steps, watching
+from beaver_ftc.loop.assembly import assemble
+from beaver_ftc.loop.summary import estimate_now, verdict_of
+from beaver_ftc.plugins import DETECTORS, is_compiled
+from beaver_ftc.scenario.given import load
+from beaver_ftc.scenario.schema import Scenario
+
+Vector = NDArray[np.float64]
+FLOW = ("alpha_rad", "beta_rad", "airspeed_mps", "qdyn_pa")  # signals every aircraft measures
+Start = tuple[ArrayLike, ArrayLike, ArrayLike]
+
+
+class Diagnosis:
+    """The built-in diagnosis of an aircraft, one sample at a time.
+
+        diagnosis = Diagnosis(aircraft("beaver"), rate_hz=100, fdi={"bounds": {"inertia": 0.05}})
+        verdict = diagnosis.step(rates_rad_s, signals, command_rad)
+
+    aircraft: whose surfaces and stops. rate_hz: samples a second, evenly spaced. fdi: as in a scenario file.
+    actuators, design_model: likewise, if they are not ideal. start: rates, signals and surfaces of the trim
+    that what is linearised or statistical holds on to; the first sample, if it is left out. Raises BadInput
+    that names the key. Everything it remembers is one record of fixed size.
+    """
+
+    def __init__(
+        self,
+        aircraft: Aircraft,
+        rate_hz: float = 100.0,
+        fdi: Mapping[str, Any] | None = None,
+        *,
+        actuators: Any = "ideal",
+        design_model: Mapping[str, Any] | None = None,
+        start: Start | None = None,
+    ) -> None:
+        given = {
+            "name": "stream", "rate_hz": rate_hz, "fdi": fdi or {}, "actuators": actuators,
+            "design_model": design_model or {},
+        }  # fmt: skip
+        self._scenario = _watchable(load(given))
+        self._aircraft, self._start = aircraft, start
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget everything: the next sample is the first of a flight."""
+        travel = _travel_rad(self._aircraft)
+        self._frames = assemble(self._scenario, np.zeros(travel.shape[1]), travel)
+        self._frame = self._frames[0]
+        self._fdi = self._frame["fdi"]
+        self._x, self._command, self._attitude = np.zeros(3), np.zeros(travel.shape[1]), np.zeros(3)
+        self._y = np.zeros(self._frame["measured"]["y"].size)  # beyond the aircraft's own signals it stays zero
+        self._signals = self._y[: len(FLOW) + len(self._aircraft.signals)]
+        self._take = direct(watching.take, self._frames, self._x, self._y, self._command, self._attitude)
+        self._diagnose = direct(steps.diagnose, self._frames)
+        self._believe = direct(watching.believe, self._frames)
+        self._known = np.zeros(watching.MEMORY, dtype=np.int64)
+        self._news = direct(watching.news, self._frames, self._known)
+        self._theta = direct(watching.theta, self._frames)
+        self._said = Verdict()
+        self._fresh = True
+        self._turning_air = bool(self._scenario.fdi.bounds.turbulence != "none")
+
+    @property
+    def t_s(self) -> float:
+        """Time of the last sample, s since the first."""
+        return float(self._frame["t"])
+
+    def step(
+        self,
+        rates_rad_s: ArrayLike,
+        signals: ArrayLike,
+        command_rad: ArrayLike,
+        attitude_rad: ArrayLike | None = None,
+    ) -> Verdict:
+        """Take a sample and say what it shows.
+
+        rates_rad_s (3,): p, q, r. signals: alpha rad, beta rad, airspeed m/s, dynamic pressure Pa, then the
+        aircraft's own (of the Beaver dpt). command_rad (surfaces,): in effect since the sample before; with
+        the first sample, the surfaces in trim. attitude_rad (3,): roll, pitch, yaw, wanted only where
+        `fdi.bounds` declares turbulence. Raises BadInput for what has another shape or is not finite; such a
+        sample is not taken.
+        """
+        _put("rates_rad_s", rates_rad_s, self._x)
+        _put("signals", signals, self._signals)
+        _put("command_rad", command_rad, self._command)
+        if attitude_rad is not None:
+            _put("attitude_rad", attitude_rad, self._attitude)
+        elif self._turning_air:
+            raise BadInput("attitude_rad: is missing, allowed: (3,) rad where fdi.bounds declares turbulence")
+        if self._fresh:
+            self._begin()
+        if not self._take(self._frames, self._x, self._y, self._command, self._attitude):
+            raise BadInput(f"the sample after {self.t_s:g} s is not finite, allowed: finite numbers")
+        self._diagnose(self._frames)
+        self._believe(self._frames)
+        return self._say()
+
+    def _say(self) -> Verdict:
+        """The verdict; its words are looked for only when there are others."""
+        if self._news(self._frames, self._known):
+            self._said = verdict_of(self._frame)
+        elif self._said.estimate is not None:
+            self._said = self._said._replace(estimate=self._estimate())
+        return self._said
+
+    def _estimate(self) -> float | None:
+        if self._scenario.fdi.fault_class == "published":
+            return float(self._theta(self._frames))
+        return estimate_now(self._fdi, self._said)
+
+    def _begin(self) -> None:
+        """Show the design model and the statistics the flight condition they hold on to."""
+        x, y, u = self._x.copy(), self._signals.copy(), self._command.copy()
+        if self._start is not None:
+            places = {"rates_rad_s": x, "signals": y, "command_rad": u}
+            for (what, place), given in zip(places.items(), self._start, strict=True):
+                _put(what, np.asarray(given), place)
+        if not all(np.isfinite(part).all() for part in (x, y, u)):
+            return
+        frame, scenario = self._frame, self._scenario
+        belief = frame["belief"]
+        belief["u"] = belief["commanded"] = frame["control"]["trim"] = u
+        anchor(belief["design"], x, y, u)
+        mass = mass_of(scenario.design_model)
+        noise_model.set_up(self._fdi, scenario.fdi, belief["design"], mass, (x, y, u), scenario.rate_hz)
+        self._fresh = False
+
+
+def _watchable(scenario: Scenario) -> Scenario:
+    """Refuse what a diagnosis that only looks on cannot do."""
+    fdi = scenario.fdi
+    if not is_compiled(DETECTORS, fdi.scheme):
+        raise BadInput(
+            f"fdi.scheme: {fdi.scheme} is plugged in, allowed: adaptive-estimators (step a plug-in itself)"
+        )
+    if fdi.probing is not None:
+        raise BadInput("fdi.probing: moves surfaces, allowed here: a diagnosis that only looks on")
+    return scenario
+
+
+def _put(what: str, given: Any, place: Vector) -> None:
+    """Copy so many numbers into their place, or say what is wrong with them.
+
+    The loop's own record of the signals has room for more than an aircraft declares: it fits as well.
+    """
+    try:
+        fits = len(given) in (place.size, N_Y if what == "signals" else place.size)
+        place[:] = given[: place.size]
+    except (TypeError, ValueError):
+        fits = False
+    if not fits:
+        shown = " ".join(repr(given).split())
+        raise BadInput(f"{what}: {shown:.80} does not fit, allowed: {place.size} numbers")
+
+
+def _travel_rad(aircraft: Aircraft) -> Vector:
+    """Lower and upper stops, (2, surfaces) rad."""
+    stops = [aircraft.travel[name] for name in aircraft.surfaces]
+    return np.array([[stop.min_rad for stop in stops], [stop.max_rad for stop in stops]])

@@ -1,0 +1,103 @@
+"""The compiled diagnosis fed from outside: what is measured comes as arguments, nothing is read or written.
+
+take -> steps.diagnose -> believe
+"""
+
+import numpy as np
+
+from beaver_ftc.compiled import kernel
+from beaver_ftc.control.accommodation import accommodate
+from beaver_ftc.diagnosis.belief import follow_command, look_back, respond
+from beaver_ftc.diagnosis.scheme import isolated_surface, isolated_theta
+
+MEMORY = 8 + 5 * 8  # of the verdict's words: `news`
+
+
+@kernel
+def take(frames, x, y, command, attitude):
+    """Take a sample, and see what the design model makes of the elapsed frame.
+
+    x (3,) rad/s; y signals; command (surfaces,) rad, what has been commanded since the sample before;
+    attitude (3,) rad. Returns whether all of it is finite; if not, nothing is taken.
+    """
+    if not (finite(x) and finite(y) and finite(command) and finite(attitude)):
+        return False
+    frame = frames[0]
+    belief, measured = frame.belief, frame.measured
+    frame.t = frame.k * frame.dt
+    if frame.k > 0:
+        follow_command(belief, command)
+    measured.x[:], measured.attitude[:] = x, attitude
+    for i in range(y.size):
+        measured.y[i] = y[i]
+    respond(belief, measured)
+    look_back(frame.fdi, belief, measured, frame.k)
+    return True
+
+
+@kernel
+def finite(values):
+    """Whether every one of values (n,) is a finite number."""
+    sound = True
+    for i in range(values.size):
+        sound = sound and np.isfinite(values[i])
+    return sound
+
+
+@kernel
+def believe(frames):
+    """What the diagnosis knows of the surfaces goes into its own next prediction."""
+    frame = frames[0]
+    accommodate(frame.control, frame.fdi, frame.belief, frame.measured, frame.faults)
+    frame.k += 1
+
+
+@kernel
+def theta(frames):
+    """The estimate of the isolated loss of effectiveness, of the published class."""
+    fdi = frames[0].fdi
+    return isolated_theta(fdi, isolated_surface(fdi))
+
+
+@kernel
+def news(frames, known):
+    """Whether the verdict says anything else than when `known` was filled last, but for its estimate.
+
+    known (MEMORY,) int64: what the words follow from; brought up to date.
+    """
+    fdi = frames[0].fdi
+    changed = replace(known, 0, fdi.detected)
+    if not fdi.detected:
+        return changed
+    changed |= replace(known, 1, fdi.detected_axis) | replace(known, 2, fdi.isolated)
+    excluded = 0
+    for i in range(fdi.n_estimators):
+        excluded = 2 * excluded + fdi.estimator[i].excluded
+    changed |= replace(known, 3, excluded) | replace(known, 4, fdi.type)
+    if fdi.every_type:
+        for plane in range(fdi.alarmed.size):
+            changed |= replace(known, 5 + plane, fdi.alarmed[plane])
+        for s in range(fdi.surface.size):
+            changed |= news_of(fdi, s, known)
+    return changed
+
+
+@kernel
+def news_of(fdi, s, known):
+    """The same of surface s, where every type is asked for."""
+    surface, first = fdi.surface[s], 8 + 5 * s
+    bits = 0
+    for kind in range(surface.type_excluded.size):
+        bits = 2 * bits + surface.type_excluded[kind]
+    early = surface.evidence - surface.quiet < fdi.patience
+    changed = replace(known, first, surface.named) | replace(known, first + 1, surface.standing)
+    changed |= replace(known, first + 2, surface.type) | replace(known, first + 3, bits)
+    return changed | replace(known, first + 4, 1 if early else 0)
+
+
+@kernel
+def replace(known, i, value):
+    """Put an integer into its place; whether another was there."""
+    other = known[i] != value
+    known[i] = value
+    return other

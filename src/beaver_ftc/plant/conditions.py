@@ -1,0 +1,38 @@
+"""A trimmed flight condition and the truth linearised about it, from what a scenario says of them."""
+
+from beaver_ftc.plant.adapter import Plant
+from beaver_ftc.plant.configure import configure, trim_of
+from beaver_ftc.plant.linear import LinearModel, differences
+from beaver_ftc.plant.trim import TrimPoint
+from beaver_ftc.scenario.given import ScenarioLike, load
+from beaver_ftc.scenario.schema import Scenario
+
+
+def trim(scenario: ScenarioLike | None = None, **initial: float) -> TrimPoint:
+    """Steady straight flight, wings level, on the scenario's truth with its errors.
+
+    scenario: a name, a path, a mapping or a Scenario; left out, the defaults. initial: keys of its section
+    `initial` in place of its own, e.g. airspeed_mps=40, altitude_m=300, flap_deg=10. Raises BadInput that
+    names the key, and for what cannot be trimmed.
+    """
+    return trimmed(_condition(scenario, initial))[1]
+
+
+def linearise(scenario: ScenarioLike | None = None, **initial: float) -> LinearModel:
+    """The truth about the trimmed flight that `trim` finds: xdot = A x + B u, ten states, the surfaces.
+
+    `.state_space()` gives it as python-control has it. Raises BadInput as `trim` does.
+    """
+    return differences(*trimmed(_condition(scenario, initial)))
+
+
+def trimmed(scenario: Scenario) -> tuple[Plant, TrimPoint]:
+    """An aircraft with the scenario's errors, left near the trim, and the trim. Raises BadInput."""
+    plant = Plant(scenario.rate_hz, scenario.substeps)
+    configure(plant, scenario)
+    return plant, trim_of(scenario, plant)
+
+
+def _condition(scenario: ScenarioLike | None, initial: dict[str, float]) -> Scenario:
+    base = load({} if scenario is None else scenario)
+    return base.with_({f"initial.{key}": value for key, value in initial.items()})

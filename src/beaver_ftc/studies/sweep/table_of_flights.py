@@ -1,0 +1,92 @@
+"""A sweep from Python: a scenario, what varies, and the table of its flights."""
+
+import contextlib
+import re
+import sys
+from collections.abc import Iterator, Mapping
+from os import PathLike
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any
+
+from beaver_ftc.results.frame import units
+from beaver_ftc.scenario.changes import plain
+from beaver_ftc.scenario.document import Document
+from beaver_ftc.scenario.given import ScenarioLike, load
+from beaver_ftc.scenario.sweep_loader import Sweep, validate_sweep
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+    from pandas import DataFrame
+
+
+def sweep(
+    scenario: ScenarioLike,
+    vary: Mapping[str, Mapping[str, Any]],
+    runs: int | None = None,
+    *,
+    workers: int = 1,
+    seed: int = 1,
+    sampling: str = "random",
+    expect: Mapping[str, Any] | None = None,
+    out: str | PathLike[str] | None = None,
+) -> "DataFrame":
+    """Fly a scenario many times; one row a flight, the columns of results.parquet.
+
+    vary: dotted keys to how they vary, `{"faults[0].magnitude": {"uniform": [0.2, 1.0]}}`. runs: number of
+    flights; left out, one a point of the grid. workers: processes; the same table whatever their number.
+    seed, sampling, expect: as in a sweep file. out: keep results.parquet, summary.json and report.html in
+    `out/<name>`. `attrs` has scenario, seed, what varied and the columns' units. Raises BadInput that names
+    the key; a flight that fails is a row that says why.
+    """
+    asked = {"vary": vary, "runs": runs, "seed": seed, "sampling": sampling, "expect": expect or {}}
+    made = _made(scenario, {key: value for key, value in asked.items() if value is not None})
+    table = _here(made) if workers == 1 and out is None else _kept(made, workers, out)
+    frame = table.to_pandas()
+    varied = plain(vary)
+    frame.attrs = {"scenario": made.name, "seed": seed, "vary": varied, "units": units(frame.columns)}
+    return frame
+
+
+def _made(scenario: ScenarioLike, asked: dict[str, Any]) -> Sweep:
+    base = load(scenario)
+    name = re.sub(r"[^A-Za-z0-9_-]", "-", base.name)[:64]
+    given = {"name": f"{name}-sweep", "base": plain(base), **plain(asked)}
+    return validate_sweep(Document(given), folder=Path())
+
+
+def _here(made: Sweep) -> "pa.Table":
+    """Flown one after the other in this process."""
+    from beaver_ftc.studies.sweep.flying import Job, fly_all
+    from beaver_ftc.studies.sweep.sampling import Plan
+    from beaver_ftc.studies.sweep.table import schema_of, table_of
+
+    rows = fly_all(Job(made), Plan(made).assignments(range(made.flights)))
+    return table_of(made, schema_of(made), rows)
+
+
+def _kept(made: Sweep, workers: int, out: str | PathLike[str] | None) -> "pa.Table":
+    """Flown by worker processes into a result folder, for good or to be read once."""
+    import pyarrow.parquet as pq
+
+    from beaver_ftc.studies.sweep.run import Options, run_sweep
+
+    with TemporaryDirectory(prefix="beaver-ftc-") as scratch, _main_hidden():
+        folder = Path(scratch if out is None else out)
+        run_sweep(made, Options(out=folder, workers=workers, report=out is not None))
+        return pq.read_table(folder / made.name / "results.parquet")
+
+
+@contextlib.contextmanager
+def _main_hidden() -> Iterator[None]:
+    """Workers started meanwhile do not import the caller's script, which would start the sweep again."""
+    main = sys.modules["__main__"]
+    own, spec = vars(main), main.__spec__
+    file = own.pop("__file__", None)
+    main.__spec__ = None
+    try:
+        yield
+    finally:
+        main.__spec__ = spec
+        if file is not None:
+            own["__file__"] = file

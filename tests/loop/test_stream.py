@@ -1,0 +1,175 @@
+"""The diagnosis without the loop around it: the same verdicts to the bit, sample for sample."""
+
+import subprocess
+import sys
+import tracemalloc
+from time import process_time
+
+import numpy as np
+import pytest
+
+import beaver_ftc as bf
+from flying import loss, scenario
+
+PAIR = [loss(at_s=1.0), {"type": "stuck", "actuator": "rudder", "position_deg": 3.0, "at_s": 2.0}]
+NOISY = {"p": {"noise_std_deg_s": 0.05}, "q": {"noise_std_deg_s": 0.05}, "r": {"noise_std_deg_s": 0.05}}
+CASES = {
+    "published": {"faults": [loss(at_s=1.0)]},
+    "unanticipated": {"faults": [{"type": "unanticipated", "at_s": 1.0}], "initial": {"airspeed_mps": 46}},
+    "of every type": {
+        "faults": [{"type": "bias", "actuator": "flap", "bias_deg": 3, "at_s": 1.0}],
+        "fdi": {"fault_class": "all"},
+    },
+    "two at once": {"faults": PAIR, "fdi": {"fault_class": "all", "pairs": True}},
+    "slow actuators": {
+        "faults": [loss("aileron", at_s=1.0)],
+        "actuators": {"bandwidth_rad_s": 20, "rate_limit_deg_s": 60},
+    },
+    "another model": {"faults": [loss("rudder", at_s=1.0)], "design_model": {"linearised": True}},
+    "in noise and turbulence": {
+        "faults": [loss(at_s=2.0, magnitude=0.8)],
+        "sensors": NOISY,
+        "environment": {"turbulence": "dryden", "severity": "light"},
+        "fdi": {"bounds": {"sensors": NOISY, "turbulence": "light"}, "statistical": {}},
+    },
+}
+
+
+class Flown:
+    """What a flight shows the diagnosis, sample by sample, and what the loop makes of it."""
+
+    def __init__(self, **keys):
+        self.scenario = scenario(duration_s=6.0, **keys)
+        sim = bf.Simulation(self.scenario)
+        commands = [sim.columns.index(name) for name in sim.columns if name.endswith("_cmd_rad")]
+        attitude = [sim.columns.index(f"{name}_rad") for name in ("phi", "theta", "psi")]
+        self.samples, self.verdicts = [], []
+        self.start = (start_rates(sim), start_signals(sim), sim.trim_rad)
+        while not sim.done:
+            measured, row = sim.measured, sim.values
+            self.samples.append((measured.x, measured.y, row[commands], row[attitude]))
+            self.verdicts.append(sim.verdict)
+            sim.step()
+
+    def diagnosis(self):
+        keys = self.scenario.model_dump(mode="json", exclude_unset=True)
+        others = {key: keys[key] for key in ("actuators", "design_model") if key in keys}
+        return bf.Diagnosis(bf.aircraft("beaver"), 100, keys.get("fdi"), start=self.start, **others)
+
+
+def start_rates(sim):
+    return [sim[f"velocities/{axis}-rad_sec"] for axis in "pqr"]
+
+
+def start_signals(sim):
+    psf, ft = 47.88025898033584, 0.3048
+    names = ("aero/alpha-rad", "aero/beta-rad", "velocities/vt-fps", "aero/qbar-psf", "aero/dpt")
+    return np.array([sim[name] for name in names]) * [1.0, 1.0, ft, psf, 1.0]
+
+
+@pytest.fixture(scope="module", params=CASES)
+def flown(request):
+    return Flown(**CASES[request.param])
+
+
+@pytest.fixture(scope="module")
+def published():
+    return Flown(**CASES["published"])
+
+
+def test_the_verdicts_are_those_of_the_loop_to_the_bit(flown):
+    diagnosis = flown.diagnosis()
+    said = [diagnosis.step(*sample) for sample in flown.samples]
+    assert said == flown.verdicts
+    assert flown.verdicts[-1].detected
+
+
+def test_two_side_by_side_and_a_third_after_a_reset(published):
+    other = Flown(**CASES["of every type"])
+    one, two = published.diagnosis(), other.diagnosis()
+    both = [(one.step(*a), two.step(*b)) for a, b in zip(published.samples, other.samples, strict=True)]
+    assert both == list(zip(published.verdicts, other.verdicts, strict=True))
+    one.reset()
+    assert [one.step(*sample) for sample in published.samples] == published.verdicts
+
+
+def test_the_first_sample_is_the_trim_where_no_other_is_given(published):
+    diagnosis = bf.Diagnosis(bf.aircraft("beaver"), rate_hz=100)
+    assert [diagnosis.step(*sample[:3]) for sample in published.samples] == published.verdicts
+
+
+def test_a_call_costs_at_most_15_us(flown):
+    diagnosis = flown.diagnosis()
+    spent_us = []
+    for _ in range(5):
+        diagnosis.reset()
+        diagnosis.step(*flown.samples[0])
+        began = process_time()
+        for sample in flown.samples[1:]:
+            diagnosis.step(*sample)
+        spent_us.append(1e6 * (process_time() - began) / (len(flown.samples) - 1))
+    assert min(spent_us) < 15.0
+
+
+def test_nothing_grows(published):
+    diagnosis = published.diagnosis()
+    for sample in published.samples:
+        diagnosis.step(*sample)
+    tracemalloc.start()
+    try:
+        before = tracemalloc.get_traced_memory()[0]
+        for _ in range(20_000):
+            diagnosis.step(*published.samples[-1])
+        assert tracemalloc.get_traced_memory()[0] - before < 2_000
+    finally:
+        tracemalloc.stop()
+
+
+def test_jsbsim_is_not_even_imported():
+    script = (
+        "import sys, beaver_ftc as bf\n"
+        "d = bf.Diagnosis(bf.aircraft('beaver'))\n"
+        "d.step([0, 0, 0], [0.1, 0, 45, 1000, 1], [0, 0, 0, 0])\n"
+        "sys.exit('jsbsim' in sys.modules)"
+    )
+    subprocess.run([sys.executable, "-c", script], check=True)
+
+
+@pytest.mark.parametrize(
+    ("sample", "says"),
+    [
+        (([0, 0], [0.1, 0, 45, 1000, 1], [0] * 4), "rates_rad_s: .* allowed: 3 numbers"),
+        (([0, 0, 0], [0.1, 0, 45, 1000], [0] * 4), "signals: .* allowed: 5 numbers"),
+        (([0, 0, 0], [0.1, 0, 45, 1000, 1], 0.0), "command_rad: .* allowed: 4 numbers"),
+        (([0, "q", 0], [0.1, 0, 45, 1000, 1], [0] * 4), "rates_rad_s: "),
+        (([0, np.nan, 0], [0.1, 0, 45, 1000, 1], [0] * 4), "is not finite"),
+    ],
+)
+def test_what_is_no_sample_is_refused_and_not_taken(published, sample, says):
+    diagnosis = published.diagnosis()
+    for k, good in enumerate(published.samples):
+        if k in (0, 150):
+            with pytest.raises(bf.BadInput, match=says):
+                diagnosis.step(*sample)
+        assert diagnosis.step(*good) == published.verdicts[k]
+
+
+@pytest.mark.parametrize(
+    ("keys", "says"),
+    [
+        ({"fdi": {"bound": {}}}, "^fdi.bound: unknown key, did you mean bounds"),
+        ({"rate_hz": 5}, "^rate_hz: 5 is out of range"),
+        ({"fdi": {"scheme": "rls-monitor"}}, r"^fdi\.scheme: rls-monitor is plugged in"),
+        ({"fdi": {"fault_class": "all", "probing": {}}}, r"^fdi\.probing: moves surfaces"),
+        ({"actuators": {"bandwidth": 3}}, "^actuators.bandwidth: unknown key"),
+    ],
+)
+def test_a_mistake_is_named_by_its_key(keys, says):
+    with pytest.raises(bf.BadInput, match=says):
+        bf.Diagnosis(bf.aircraft("beaver"), **keys)
+
+
+def test_turbulence_wants_the_attitude():
+    diagnosis = bf.Diagnosis(bf.aircraft("beaver"), fdi={"bounds": {"turbulence": "light"}})
+    with pytest.raises(bf.BadInput, match="attitude_rad: is missing"):
+        diagnosis.step([0, 0, 0], [0.1, 0, 45, 1000, 1], [0] * 4)

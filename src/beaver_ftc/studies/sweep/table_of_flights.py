@@ -57,11 +57,11 @@ def _made(scenario: ScenarioLike, asked: dict[str, Any]) -> Sweep:
 
 def _here(made: Sweep) -> "pa.Table":
     """Flown one after the other in this process."""
-    from beaver_ftc.studies.sweep.flying import Job, fly_all
+    from beaver_ftc.studies.sweep.flying import Job, fly_one
     from beaver_ftc.studies.sweep.sampling import Plan
     from beaver_ftc.studies.sweep.table import schema_of, table_of
 
-    rows = fly_all(Job(made), Plan(made).assignments(range(made.flights)))
+    rows = [fly_one(Job(made), flight) for flight in Plan(made).assignments(range(made.flights))]
     return table_of(made, schema_of(made), rows)
 
 

@@ -62,7 +62,9 @@ class Diagnosis:
         self._frame = self._frames[0]
         self._fdi = self._frame["fdi"]
         self._x, self._command, self._attitude = np.zeros(3), np.zeros(travel.shape[1]), np.zeros(3)
-        self._y = np.zeros(self._frame["measured"]["y"].size)  # beyond the aircraft's own signals it stays zero
+        self._y = np.zeros(
+            self._frame["measured"]["y"].size
+        )  # beyond the aircraft's own signals it stays zero
         self._signals = self._y[: len(FLOW) + len(self._aircraft.signals)]
         self._take = direct(watching.take, self._frames, self._x, self._y, self._command, self._attitude)
         self._diagnose = direct(steps.diagnose, self._frames)

@@ -1,11 +1,8 @@
 """The adapter: names are checked, nothing is printed or written, a start is the state it was given."""
 
-from dataclasses import asdict
-
 import pytest
 
 from beaver_ftc.errors import BeaverFtcError, SimulationFailed
-from beaver_ftc.plant import adapter
 from beaver_ftc.plant.adapter import Plant, UnknownProperty
 from beaver_ftc.plant.state import FlightState
 
@@ -51,7 +48,7 @@ def test_a_start_is_the_state_it_was_given():
     plant = Plant(rate_hz=100)
     plant.start(STATE)
     found = {name: plant.read(node) * factor for name, (node, factor) in WHERE.items()}
-    assert found == pytest.approx(asdict(STATE), rel=1e-12, abs=1e-12)
+    assert found == pytest.approx(STATE.as_dict(), rel=1e-12, abs=1e-12)
     assert plant.read("simulation/sim-time-sec") == 0
     assert plant.read("position/lat-geod-deg") == pytest.approx(45, abs=1e-9)
 
@@ -109,15 +106,11 @@ def test_nothing_is_printed_or_written(capfd, tmp_path, monkeypatch):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_an_aircraft_that_cannot_be_loaded_is_one_clear_line(capfd, tmp_path, monkeypatch):
-    folder = tmp_path / "aircraft" / "beaver"
-    folder.mkdir(parents=True)
-    (folder / "beaver.xml").write_text("<fdm_config><metrics></fdm_config>")
-    monkeypatch.setattr(adapter, "data_root", lambda: tmp_path)
-    with pytest.raises(
-        SimulationFailed, match=r"^JSBSim cannot load aircraft/beaver/beaver.xml: .+"
-    ) as caught:
-        Plant(rate_hz=100)
+def test_an_aircraft_that_cannot_be_loaded_is_one_clear_line(capfd, tmp_path):
+    broken = tmp_path / "broken.xml"
+    broken.write_text("<fdm_config><metrics></fdm_config>")
+    with pytest.raises(SimulationFailed, match=r"^JSBSim cannot load .+/broken.xml: .+") as caught:
+        Plant(rate_hz=100, model=broken)
     assert "\n" not in str(caught.value)
     assert capfd.readouterr() == ("", "")
 

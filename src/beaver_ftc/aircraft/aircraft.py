@@ -3,9 +3,10 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from math import radians
+from math import prod, radians
 from pathlib import Path
 from types import MappingProxyType
+from typing import Any
 
 from beaver_ftc.aircraft.schema import (
     FLOW_SIGNALS,
@@ -189,6 +190,15 @@ class Aircraft:
         """Every term by its name."""
         named = {term.name for _, _, _, term in self.file.terms()}
         return MappingProxyType({t.name: t for t in (*self.forces, *self.moments) if t.name in named})
+
+    def coefficient(self, name: str, of: Mapping[str, Any], scale: Mapping[str, float] | None = None) -> Any:
+        """One coefficient as the sum of its terms; `of` has a value for every signal and surface.
+
+        A plain sum for those who want one number now and then; `scale` multiplies single terms.
+        """
+        scale = scale or {}
+        terms = (term for term in self.terms.values() if term.coefficient == name)
+        return sum(t.value * scale.get(t.name, 1.0) * prod(of[factor] for factor in t.factors) for t in terms)
 
     def index(self, term: str) -> int:
         """Place of a moment's term in `moments`. Raises KeyError for a name the file lacks."""

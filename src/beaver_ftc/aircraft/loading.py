@@ -1,7 +1,9 @@
 """From what a scenario calls its aircraft to the aircraft: built in, of the jsbsim package, or a folder."""
 
+import copyreg
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
 from beaver_ftc.aircraft.aircraft import Aircraft
 from beaver_ftc.aircraft.schema import AircraftFile
@@ -17,6 +19,10 @@ FILE = "aircraft.yaml"
 _FROM_JSBSIM = "jsbsim:"
 _MAX_BYTES = 1_000_000
 _ALLOWED = "a built-in name, jsbsim:NAME, or ./FOLDER beside the scenario"
+
+
+# Studies make further scenarios of one that was read from a file, and these are not files themselves.
+_SEEN: dict[str, set[Path]] = {}
 
 
 class UnknownAircraft(BadInput):
@@ -52,9 +58,7 @@ def load(reference: str = DEFAULT, beside: Path | None = None) -> Aircraft:
 def _inside(beside: Path | None, reference: str) -> Path:
     """The folder's path if it is below the scenario's own: a scenario reads nothing else."""
     if beside is None:
-        raise UnknownAircraft(
-            f"there is no folder to find {reference!r} in, allowed: ./FOLDER in a scenario that is a file"
-        )
+        return _remembered(reference)
     root = beside.resolve()
     try:
         folder = (root / reference).resolve()
@@ -64,7 +68,18 @@ def _inside(beside: Path | None, reference: str) -> Path:
         raise UnknownAircraft(f"{reference!r} is outside, allowed: a folder below the scenario's own")
     if not folder.is_dir():
         raise UnknownAircraft(f"there is no folder {reference!r}, allowed: {_ALLOWED}")
+    _SEEN.setdefault(reference, set()).add(folder)
     return folder
+
+
+def _remembered(reference: str) -> Path:
+    """The folder a reference has stood for in this process, if only one has."""
+    folders = _SEEN.get(reference, set())
+    if len(folders) != 1:
+        raise UnknownAircraft(
+            f"there is no folder to find {reference!r} in, allowed: ./FOLDER in a scenario that is a file"
+        )
+    return next(iter(folders))
 
 
 def read(folder: Path) -> Aircraft:
@@ -91,3 +106,11 @@ def _read(folder: Path, changed_ns: int) -> Aircraft:
         says = f"{file.jsbsim!r} is outside, allowed: a file beside this one"
         raise ScenarioError(str(path), [Problem(document.line(("jsbsim",)), ("jsbsim",), says)])
     return Aircraft(file, folder)
+
+
+def _reduced(aircraft: Aircraft) -> tuple[Any, ...]:
+    """A process that is sent an aircraft reads its file itself."""
+    return read, (aircraft.folder,)
+
+
+copyreg.pickle(Aircraft, _reduced)

@@ -1,7 +1,6 @@
 """`beaver-ftc trim`: steady straight flight at a given condition."""
 
 import math
-from dataclasses import asdict
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -73,7 +72,7 @@ def _condition(name: str | None, asked: dict[str, float]) -> "Scenario":
 
 
 def _document(point: "TrimPoint") -> dict[str, Any]:
-    return asdict(point) | {"residual": dict(zip(_RESIDUALS, point.residual, strict=True))}
+    return point.as_dict() | {"residual": dict(zip(_RESIDUALS, point.residual, strict=True))}
 
 
 def _table(point: "TrimPoint") -> str:

@@ -9,7 +9,6 @@ east, altitude m. Surfaces (4,) rad: aileron, elevator, rudder, flap.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import prod
 
 import numpy as np
 
@@ -70,15 +69,7 @@ def aerodynamic_coefficients(
         "dpt": slipstream(power, density, V), "betadoth": 0.0,
         **dict(zip(SURFACES, surfaces, strict=True)),
     }  # fmt: skip
-    ratio = ratio or {}
-    summed = {
-        name: sum(
-            term.value * ratio.get(term.name, 1.0) * prod(of[factor] for factor in term.factors)
-            for term in _AIRCRAFT.terms.values()
-            if term.coefficient == name
-        )
-        for name in (*FORCES, *MOMENTS)
-    }
+    summed = {name: _AIRCRAFT.coefficient(name, of, ratio) for name in (*FORCES, *MOMENTS)}
     return summed | {"qdyn": 0.5 * density * V * V}
 
 

@@ -4,7 +4,6 @@ from math import ceil, exp, pi, radians
 
 import numpy as np
 
-from beaver_ftc.aircraft import load
 from beaver_ftc.control.reference_model import discretise
 from beaver_ftc.control.state import FAULT_TOLERANT, ORACLE, law_of
 from beaver_ftc.design.coefficients import SURFACES, value
@@ -229,8 +228,8 @@ def _assemble_actuators(actuators: np.void, given: Actuators, dt: float, travel:
 def _assemble_admitted(frame: np.void, scenario: Scenario) -> None:
     """The errors that `fdi.bounds` declares beside the published ones."""
     admitted = frame["fdi"]["admitted"]
-    mass = mass_of(scenario.design_model)
-    admit(admitted, scenario.fdi.bounds, load(scenario.aircraft), frame["belief"]["design"], mass)
+    mass = mass_of(scenario.design_model, scenario.airframe)
+    admit(admitted, scenario.fdi.bounds, scenario.airframe, frame["belief"]["design"], mass)
     frame["fdi"]["own_errors"] = admitted["any"] and scenario.fdi.fault_class == "all"
     if scenario.fdi.pairs and frame["fdi"]["block"] > 1:
         raise BadInput(
@@ -251,9 +250,9 @@ def assemble(scenario: Scenario, trim: np.ndarray, travel: np.ndarray) -> np.nda
     frame["dt"] = dt
     belief, truth = frame["belief"], frame["truth"]
     belief["share"] = 1.0 / scenario.substeps
-    belief["design"] = design_of(scenario.design_model)[0]
+    belief["design"] = design_of(scenario.design_model, scenario.airframe)[0]
     belief["u"] = belief["commanded"] = trim
-    channels = ch.truth_channels(load(scenario.aircraft))
+    channels = ch.truth_channels(scenario.airframe)
     truth["n"] = len(channels)
     truth["factor"][: len(channels)] = [factor for _, _, factor in channels]
     frame["accounts"]["guarantee"]["certain_after_s"] = -1.0

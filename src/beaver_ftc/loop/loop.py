@@ -10,7 +10,6 @@ import numpy as np
 from beaver_ftc.compiled import direct
 from beaver_ftc.control.laws.setup import set_up
 from beaver_ftc.design.actuators import move
-from beaver_ftc.design.coefficients import SURFACES
 from beaver_ftc.design.variants import anchor, mass_of
 from beaver_ftc.diagnosis import noise_model
 from beaver_ftc.errors import SimulationFailed
@@ -34,6 +33,7 @@ if TYPE_CHECKING:
     from beaver_ftc.loop.plugin_frame import PluginFrame
 
 CHUNK_ROWS = 8192
+UNANTICIPATED = "failures/unanticipated/Cm-alpha3"
 IMMOVABLE = ("stuck", "hardover", "float")  # failures in which a surface does not follow its command
 EARTH_RADIUS_M = 6371000.0  # for the log's north and east: a local plane, not navigation
 LEAST_HEIGHT_M = 500.0  # above the ground at the start; the ground is at sea level, or lower if need be
@@ -45,9 +45,13 @@ class Cockpit:
 
     def __init__(self, plant: Plant, frames: np.ndarray) -> None:
         self._frames = frames
-        self._read = native.NodeBank([plant.node(name) for _, name, _ in ch.TRUTH], owner=plant)
-        self._write = native.NodeBank([plant.node(name) for name in ch.COMMANDS], owner=plant)
-        self._engine = native.NodeBank([plant.node(ch.MANIFOLD_PRESSURE)], owner=plant)
+        self._read = native.NodeBank(
+            [plant.node(name) for _, name, _ in ch.truth_channels(plant.aircraft)], owner=plant
+        )
+        self._write = native.NodeBank(
+            [plant.node(name) for name in ch.command_properties(plant.aircraft)], owner=plant
+        )
+        self._engine = native.NodeBank([plant.node(plant.aircraft.trim.throttle)], owner=plant)
         self.native = native.available()
         truth = frames["truth"][0]
         truth["native"] = self.native
@@ -80,13 +84,14 @@ class Loop:
         prepare: Callable[[Plant], None] | None = None,
     ) -> None:
         self.scenario = scenario
-        self.plant = Plant(scenario.rate_hz, scenario.substeps)
+        self.aircraft = scenario.airframe
+        self.plant = Plant(scenario.rate_hz, scenario.substeps, self.aircraft)
         configure(self.plant, scenario)
         self.trim = trim_of(scenario, self.plant)
         if prepare is not None:
             prepare(self.plant)
         take_off(self.plant, scenario, self.trim)
-        surfaces = np.array([getattr(self.trim, f"{s}_rad") for s in SURFACES])
+        surfaces = np.array(list(self.trim.surfaces_rad.values()))
         self.frames = assemble(scenario, surfaces, travel_rad(self.plant))
         self.cockpit = Cockpit(self.plant, self.frames)
         self._anchor_design(surfaces)
@@ -99,6 +104,7 @@ class Loop:
             estimator_names(scenario.fdi.fault_class) if self._diagnoses_itself else (),
             bool(self.frames["control"]["power"]["enabled"][0]),
             bool(self.frames["fdi"]["statistical"]["enabled"][0]),
+            self.aircraft,
         )
         self.log = np.empty((min(CHUNK_ROWS, self.n_frames), len(self.columns)))
         self.references = np.empty((len(self.log), 3))
@@ -107,8 +113,8 @@ class Loop:
 
     def _set_origin(self) -> None:
         truth = self.frames["truth"][0]
-        truth["latitude_0"] = self.plant.read(ch.TRUTH[ch.LATITUDE][1])
-        truth["longitude_0"] = self.plant.read(ch.TRUTH[ch.LONGITUDE][1])
+        truth["latitude_0"] = self.plant.read(ch.FIXED[ch.LATITUDE][1])
+        truth["longitude_0"] = self.plant.read(ch.FIXED[ch.LONGITUDE][1])
         truth["ground_m"] = min(0.0, self.scenario.initial.altitude_m - LEAST_HEIGHT_M)
         truth["radius_m"] = EARTH_RADIUS_M + self.scenario.initial.altitude_m
         truth["parallel_radius_m"] = truth["radius_m"] * np.cos(truth["latitude_0"])
@@ -121,9 +127,10 @@ class Loop:
         frame, scenario = self.frames[0], self.scenario
         design = frame["belief"]["design"]
         anchor(design, truth[:3], y, surfaces)
-        start, mass = (truth[:3], y, surfaces), mass_of(scenario.design_model)
+        start, mass = (truth[:3], y, surfaces), mass_of(scenario.design_model, self.aircraft)
         set_up(frame["control"], frame["belief"], scenario, y)
-        noise_model.set_up(frame["fdi"], scenario.fdi, design, mass, start, scenario.rate_hz)
+        fdi, rate_hz = frame["fdi"], scenario.rate_hz
+        noise_model.set_up(fdi, scenario.fdi, design, mass, start, rate_hz, self.aircraft)
 
     def _with_plugins(self, detector: "Detector | None", law: "Law | None") -> "PluginFrame | None":
         """The frame in which plug-ins take part; None, and nothing of it imported, if all is compiled in."""
@@ -240,11 +247,9 @@ class Loop:
 
     def _landed(self, status: int) -> int:
         if status == NOT_FINITE:
-            bad = [
-                name
-                for (name, _, _), value in zip(ch.TRUTH, self.frames["truth"]["value"][0], strict=False)
-                if not np.isfinite(value)
-            ]
+            names = [name for name, _, _ in ch.truth_channels(self.aircraft)]
+            values = self.frames["truth"]["value"][0][: len(names)]
+            bad = [name for name, value in zip(names, values, strict=True) if not np.isfinite(value)]
             raise SimulationFailed(
                 f"{self.scenario.name}: not finite at {self.frames['t'][0]:g} s: {', '.join(bad)}; "
                 "the flight cannot go on"
@@ -266,7 +271,10 @@ class Loop:
 def travel_rad(plant: Plant) -> np.ndarray:
     """Lower and upper stops of the surfaces, (2, 4) rad."""
     return np.array(
-        [[plant.read(f"actuators/{s}/position-{end}-rad") for s in SURFACES] for end in ("min", "max")]
+        [
+            [plant.read(f"actuators/{s}/position-{end}-rad") for s in plant.aircraft.surfaces]
+            for end in ("min", "max")
+        ]
     )
 
 

@@ -7,7 +7,8 @@ from pathlib import Path
 import jsbsim
 import numpy as np
 
-from beaver_ftc.design.coefficients import SURFACES
+from beaver_ftc.aircraft import Aircraft
+from beaver_ftc.aircraft import load as load_aircraft
 from beaver_ftc.errors import SimulationFailed
 from beaver_ftc.paths import data_root
 from beaver_ftc.plant.state import START_LATITUDE_DEG, FlightState
@@ -50,32 +51,38 @@ class _Errors(jsbsim.FGLogger):
         pass
 
 
-def _load(errors: _Errors, root: Path) -> jsbsim.FGFDMExec:
+def _load(errors: _Errors, model: Path) -> jsbsim.FGFDMExec:
+    """An executive with a model; engines, propellers and systems are looked for beside it first."""
     jsbsim.set_logger(errors)
-    fdm = jsbsim.FGFDMExec(str(root))
+    fdm = jsbsim.FGFDMExec(str(data_root()))
     fdm.set_debug_level(0)
+    folder = model.parent
+    places = [str(folder), str(folder / "Engines"), str(folder / "Systems")]
     try:
-        loaded = fdm.load_model("beaver")
+        loaded = fdm.load_model_with_paths(model.stem, *places, add_model_to_path=False)
     except jsbsim.BaseError as error:
         errors.said.append(str(error))
         loaded = False
     if not loaded:
         reason = " ".join("".join(errors.said).split()) or "no reason given"
-        raise SimulationFailed(f"JSBSim cannot load aircraft/beaver/beaver.xml: {reason}")
+        raise SimulationFailed(f"JSBSim cannot load {folder.name}/{model.name}: {reason}")
     fdm.disable_output()
     return fdm
 
 
 class Plant:
-    """One Beaver in one JSBSim executive. Make a new one for each flight: loading takes 2 to 4 ms.
+    """One aircraft in one JSBSim executive. Make a new one for each flight: loading takes 2 to 4 ms.
 
     rate_hz:  frame rate of diagnosis and control.
     substeps: JSBSim frames per such frame; `run` advances one JSBSim frame of dt_s = 1/(rate_hz substeps).
-    root:     JSBSim's root directory, if not this package's.
+    aircraft: what flies, if not the built-in aircraft. model: another JSBSim file in place of its own.
     """
 
-    def __init__(self, rate_hz: float, substeps: int = 1, root: Path | None = None) -> None:
-        self.fdm = _load(_Errors(), root or data_root())
+    def __init__(
+        self, rate_hz: float, substeps: int = 1, aircraft: Aircraft | None = None, model: Path | None = None
+    ) -> None:
+        self.aircraft = aircraft or load_aircraft()
+        self.fdm = _load(_Errors(), model or self.aircraft.jsbsim)
         self.rate_hz, self.substeps = rate_hz, substeps
         self.dt_s = 1.0 / (rate_hz * substeps)
         self.fdm.set_dt(self.dt_s)
@@ -92,6 +99,10 @@ class Plant:
             self._nodes[name] = found
         return self._nodes[name]
 
+    def has(self, name: str) -> bool:
+        """Whether the aircraft has a property."""
+        return self._manager.get_node(name) is not None
+
     def read(self, name: str) -> float:
         """The value of a property, in the unit its name says."""
         return self.node(name).get_double_value()
@@ -103,7 +114,7 @@ class Plant:
     def start(self, state: FlightState, wind_mps: Sequence[float] = (0.0, 0.0, 0.0)) -> None:
         """Put the aircraft into a state at time 0: surfaces and engine in place, accelerations the state's.
 
-        Surfaces are commanded through `fcs/<s>-cmd-rad`; failures and uncertainties stay as they are set.
+        Surfaces are commanded through their properties; failures and uncertainties stay as they are set.
         wind_mps: steady wind towards north, east, down; the state is that relative to the air.
         """
         self._command(state)
@@ -150,10 +161,10 @@ class Plant:
             self.write("atmosphere/turb-type", turbulence)
 
     def _command(self, state: FlightState) -> None:
-        for surface in SURFACES:
-            self.write(f"fcs/{surface}-cmd-rad", getattr(state, f"{surface}_rad"))
-        self.write("engine/speed-rpm", state.engine_rpm)
-        self.write("engine/manifold-pressure-inhg", state.manifold_pressure_inhg)
+        for name, surface in self.aircraft.surface.items():
+            self.write(surface.command, state.surfaces_rad[name])
+        for name, setting in self.aircraft.engine.settings.items():
+            self.write(setting.property, state.settings[name])
 
     def _place(self, state: FlightState) -> None:
         V = state.airspeed_mps * FT_PER_M

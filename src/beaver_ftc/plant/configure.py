@@ -2,7 +2,7 @@
 
 from math import radians
 
-from beaver_ftc.design.coefficients import MASS, SURFACES
+from beaver_ftc.errors import BadInput
 from beaver_ftc.plant.adapter import FT_PER_M, Plant
 from beaver_ftc.plant.trim import TrimPoint, trim
 from beaver_ftc.scenario.schema import Scenario
@@ -24,31 +24,45 @@ def configure(plant: Plant, scenario: Scenario) -> None:
     _actuators(plant, scenario)
 
 
+def _set(plant: Plant, key: str, name: str, value: float, neutral: float = 0.0) -> None:
+    """Write a property that stands for a scenario's key; an aircraft without it can only have it neutral."""
+    if plant.has(name):
+        plant.write(name, value)
+    elif value != neutral:
+        raise BadInput(f"{key}: {plant.aircraft.name} has no property {name}, allowed: {neutral:g}")
+
+
 def _uncertainty(plant: Plant, scenario: Scenario) -> None:
     uncertainty = scenario.uncertainty
     for axis in _AXES:
-        plant.write(f"uncertainty/inertia-coupling/{axis}", getattr(uncertainty.inertia_coupling, axis))
+        theta = getattr(uncertainty.inertia_coupling, axis)
+        key, name = f"uncertainty.inertia_coupling.{axis}", f"uncertainty/inertia-coupling/{axis}"
+        _set(plant, key, name, theta)
         sinusoid = getattr(uncertainty.sinusoid, axis)
-        plant.write(f"uncertainty/sinusoid/{axis}-amplitude-rad_sec2", sinusoid.amplitude_rad_s2)
-        plant.write(f"uncertainty/sinusoid/{axis}-frequency-rad_sec", sinusoid.frequency_rad_s)
+        key, name = f"uncertainty.sinusoid.{axis}", f"uncertainty/sinusoid/{axis}"
+        _set(plant, key, f"{name}-amplitude-rad_sec2", sinusoid.amplitude_rad_s2)
+        if plant.has(f"{name}-frequency-rad_sec"):
+            plant.write(f"{name}-frequency-rad_sec", sinusoid.frequency_rad_s)
     for name, ratio in uncertainty.coefficients.items():
-        plant.write(f"uncertainty/{name}-scale", ratio)
+        _set(plant, f"uncertainty.coefficients.{name}", f"uncertainty/{name}-scale", ratio, 1.0)
 
 
 def _mass(plant: Plant, scenario: Scenario) -> None:
     """Mass and inertia by small masses about the centre of gravity, which moves against the aerodynamics."""
-    uncertainty = scenario.uncertainty
+    uncertainty, mass = scenario.uncertainty, plant.aircraft.mass
     change = {axis: getattr(uncertainty.inertia, axis) - 1.0 for axis in ("Ix", "Iy", "Iz")}
-    Ix, Iy, Iz = (change[axis] * getattr(MASS, f"{axis}_kg_m2") for axis in change)
+    Ix, Iy, Iz = (change[axis] * getattr(mass, f"{axis}_kg_m2") for axis in change)
     pairs = [(Iy + Iz - Ix) / 2, (Iz + Ix - Iy) / 2, (Ix + Iy - Iz) / 2]  # kg m2 of the x, y and z pair
-    extra_kg = MASS.mass_kg * (uncertainty.mass - 1.0)
+    extra_kg = mass.mass_kg * (uncertainty.mass - 1.0) if uncertainty.mass != 1.0 else 0.0
     masses_kg = [extra_kg - sum(pairs), *(pair / 2 for pair in pairs for _ in range(2))]  # at 1 m
     if any(masses_kg):
         for i, mass_kg in enumerate(masses_kg):
-            plant.write(f"inertia/pointmass-weight-lbs[{i}]", mass_kg * LB_PER_KG)
-    forward, right, down = uncertainty.cg_m
-    for axis, aft_right_up in zip("xyz", (forward, -right, down), strict=True):
-        plant.write(f"metrics/aero-rp-{axis}-in", aft_right_up * IN_PER_M)
+            weight = mass_kg * LB_PER_KG
+            _set(plant, "uncertainty.mass", f"inertia/pointmass-weight-lbs[{i}]", weight)
+    if any(uncertainty.cg_m):
+        for axis, toward, sign in zip("xyz", uncertainty.cg_m, (1.0, -1.0, 1.0), strict=True):
+            name = f"metrics/aero-rp-{axis}-in"  # aft, right, up
+            plant.write(name, plant.read(name) + sign * toward * IN_PER_M)
 
 
 def take_off(plant: Plant, scenario: Scenario, trim_point: TrimPoint) -> None:
@@ -65,7 +79,7 @@ def take_off(plant: Plant, scenario: Scenario, trim_point: TrimPoint) -> None:
 
 
 def _actuators(plant: Plant, scenario: Scenario) -> None:
-    for surface in SURFACES:
+    for surface in plant.aircraft.surfaces:
         dynamics = getattr(scenario.actuators, surface)
         plant.write(f"actuators/{surface}/bandwidth-rad_sec", dynamics.bandwidth_rad_s)
         plant.write(f"actuators/{surface}/rate-limit-rad_sec", radians(dynamics.rate_limit_deg_s))
@@ -77,12 +91,8 @@ def _actuators(plant: Plant, scenario: Scenario) -> None:
 
 def trim_of(scenario: Scenario, plant: Plant) -> TrimPoint:
     """The scenario's trim, on its truth with the coefficient errors; BadInput when there is none."""
-    initial = scenario.initial
-    return trim(
-        initial.airspeed_mps,
-        initial.altitude_m,
-        engine_rpm=initial.engine_rpm,
-        manifold_pressure_inhg=initial.manifold_pressure_inhg,
-        flap_rad=radians(initial.flap_deg),
-        plant=plant,
-    )
+    initial, aircraft = scenario.initial, plant.aircraft
+    given = {name: getattr(initial, name) for name in aircraft.engine.settings}
+    free = (surface for surface in aircraft.surfaces if surface not in aircraft.primary)
+    given |= {f"{surface}_rad": radians(getattr(initial, f"{surface}_deg")) for surface in free}
+    return trim(initial.airspeed_mps, initial.altitude_m, plant=plant, **given)

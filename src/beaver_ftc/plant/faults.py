@@ -182,7 +182,8 @@ class FaultSchedule:
             if event.in_force(k) and not event.struck:
                 event.struck = True
                 if event.fault.type == "stuck":
-                    event.was_rad = self._plant.read(f"fcs/{event.fault.actuator}-pos-rad")
+                    surface = self._plant.aircraft.surface[event.fault.actuator]
+                    event.was_rad = self._plant.read(surface.position)
 
     def _wanted(self, k: int) -> dict[str, float]:
         """Failure properties at frame k, of every place a fault of this flight touches."""

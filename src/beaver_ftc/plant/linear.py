@@ -20,8 +20,8 @@ from typing import TYPE_CHECKING
 import jsbsim
 import numpy as np
 
+from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.errors import BadInput, SimulationFailed
-from beaver_ftc.paths import data_root
 from beaver_ftc.plant.adapter import FT_PER_M, Plant
 from beaver_ftc.plant.configure import configure
 from beaver_ftc.plant.state import FlightState
@@ -48,7 +48,6 @@ _MOVED = (
     ("altitude", "altitude_m", 10.0),
 )
 _UNITS = {name: field for name, field, _ in _MOVED} | {"north": "north_m", "east": "east_m"}
-_SURFACES = ("aileron", "elevator", "rudder", "flap")
 _SURFACE_STEP_RAD = 1e-3
 _PRESSURE_STEP_INHG = 0.1
 
@@ -112,11 +111,12 @@ class LinearModel:
 
 
 def differences(plant: Plant, point: FlightState) -> LinearModel:
-    """The plant about a flight condition: ten states (no position over ground), four surfaces."""
+    """The plant about a flight condition: ten states (no position over ground), all surfaces."""
+    surfaces = plant.aircraft.surfaces
     A = [_slope(plant, point, field, step) for _, field, step in _MOVED]
-    B = [_slope(plant, point, f"{surface}_rad", _SURFACE_STEP_RAD) for surface in _SURFACES]
+    B = [_slope(plant, point, f"{surface}_rad", _SURFACE_STEP_RAD) for surface in surfaces]
     names = tuple(name for name, _, _ in _MOVED)
-    return LinearModel(np.column_stack(A), np.column_stack(B), names, _SURFACES)
+    return LinearModel(np.column_stack(A), np.column_stack(B), names, surfaces)
 
 
 def engine_slope(plant: Plant, point: FlightState) -> np.ndarray:
@@ -150,8 +150,8 @@ def own(scenario: "Scenario", point: FlightState) -> LinearModel:
     """
     if point.beta_rad != 0.0:
         raise SimulationFailed("JSBSim linearises rightly only with no sideslip")
-    with _aircraft_with_an_engine() as root:
-        plant = Plant(scenario.rate_hz, root=root)
+    with _aircraft_with_an_engine(scenario.airframe) as model:
+        plant = Plant(scenario.rate_hz, aircraft=scenario.airframe, model=model)
         configure(plant, scenario)
         plant.start(point)
         linear = jsbsim.FGLinearization(plant.fdm)
@@ -160,21 +160,21 @@ def own(scenario: "Scenario", point: FlightState) -> LinearModel:
 
 
 @contextmanager
-def _aircraft_with_an_engine() -> Iterator[Path]:
-    """A root directory with the Beaver in it, an inert engine added."""
-    text = (data_root() / "aircraft" / "beaver" / "beaver.xml").read_text(encoding="utf-8")
+def _aircraft_with_an_engine(aircraft: Aircraft) -> Iterator[Path]:
+    """A copy of the aircraft's model with an inert engine added."""
+    text = aircraft.jsbsim.read_text(encoding="utf-8")
     if _NO_PROPULSION not in text:
         raise SimulationFailed("the aircraft is not the one linear analysis knows: it has engines")
     with TemporaryDirectory(prefix="beaver-ftc-") as folder:
         root = Path(folder)
         for path, content in (
-            ("aircraft/beaver/beaver.xml", text.replace(_NO_PROPULSION, _INERT_PROPULSION)),
-            ("engine/inert.xml", _ENGINE),
-            ("engine/nothing.xml", _THRUSTER),
+            (aircraft.jsbsim.name, text.replace(_NO_PROPULSION, _INERT_PROPULSION)),
+            ("Engines/inert.xml", _ENGINE),
+            ("Engines/nothing.xml", _THRUSTER),
         ):
             (root / path).parent.mkdir(parents=True, exist_ok=True)
             (root / path).write_text(content, encoding="utf-8")
-        yield root
+        yield root / aircraft.jsbsim.name
 
 
 def _in_our_units(linear: jsbsim.FGLinearization, rad_per_norm: np.ndarray) -> LinearModel:

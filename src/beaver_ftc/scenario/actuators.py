@@ -2,11 +2,13 @@
 
 from typing import Any, Self
 
-from pydantic import Field, GetJsonSchemaHandler, model_validator
+from pydantic import ConfigDict, Field, GetJsonSchemaHandler, model_validator
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
-from beaver_ftc.design.coefficients import SURFACES
+from beaver_ftc.aircraft import load
+from beaver_ftc.aircraft.question import in_question
+from beaver_ftc.errors import suggestion
 from beaver_ftc.scenario.base import Number, Section, number, refuse
 
 
@@ -46,12 +48,10 @@ PRESETS: dict[str, dict[str, float]] = {
 
 
 class Actuators(Section):
-    """One set of dynamics a surface; a preset's name, or numbers beside the surfaces, stand for all four."""
+    """One set of dynamics a surface; a preset's name, or numbers beside the surfaces, stand for all."""
 
-    aileron: ActuatorDynamics = Field(default_factory=ActuatorDynamics)
-    elevator: ActuatorDynamics = Field(default_factory=ActuatorDynamics)
-    rudder: ActuatorDynamics = Field(default_factory=ActuatorDynamics)
-    flap: ActuatorDynamics = Field(default_factory=ActuatorDynamics)
+    model_config = ConfigDict(extra="allow")
+    __pydantic_extra__: dict[str, ActuatorDynamics]
 
     @model_validator(mode="before")
     @classmethod
@@ -62,21 +62,26 @@ class Actuators(Section):
 
     @property
     def is_ideal(self) -> bool:
-        return all(getattr(self, surface).is_ideal for surface in SURFACES)
+        """Whether no surface has a lag or a rate limit."""
+        return all(dynamics.is_ideal for _, dynamics in self)
 
     @classmethod
     def __get_pydantic_json_schema__(cls, core: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
         mapping = handler.resolve_ref_schema(handler(core))
-        one = handler.resolve_ref_schema({"$ref": mapping["properties"]["aileron"]["$ref"]})
-        mapping["properties"] = {**one["properties"], **mapping["properties"]}
+        reference = mapping["additionalProperties"]
+        one = handler.resolve_ref_schema(reference)
+        mapping["properties"] = {**one["properties"], **dict.fromkeys(load().surfaces, reference)}
         preset = {"enum": list(PRESETS), "type": "string", "description": "a preset"}
         return {"anyOf": [preset, mapping]}
 
 
 def _by_surface(given: dict[str, Any]) -> dict[str, Any]:
     """Numbers given for all surfaces become each surface's own, unless it has its own already."""
+    surfaces = in_question().surfaces
     for_all = {key: value for key, value in given.items() if key in ActuatorDynamics.model_fields}
     rest = {key: value for key, value in given.items() if key not in for_all}
-    own = {surface: rest.get(surface, {}) for surface in SURFACES}
-    merged = {surface: {**for_all, **it} if isinstance(it, dict) else it for surface, it in own.items()}
-    return {**rest, **merged}
+    known = (*ActuatorDynamics.model_fields, *surfaces)
+    wrong = [key for key in rest if key not in surfaces]
+    refuse([((key,), f"unknown key{suggestion(str(key), known, cutoff=0.5)}") for key in wrong])
+    own = {surface: rest.get(surface, {}) for surface in surfaces}
+    return {surface: {**for_all, **it} if isinstance(it, dict) else it for surface, it in own.items()}

@@ -4,7 +4,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, Strict, field_validator, model_validator
 
-from beaver_ftc.aircraft import load
+from beaver_ftc.aircraft.question import in_question
 from beaver_ftc.errors import suggestion
 from beaver_ftc.plugins import DETECTORS, refusal
 from beaver_ftc.scenario.base import refuse
@@ -69,7 +69,7 @@ class Bounds(BaseModel):
     @field_validator("coefficients")
     @classmethod
     def _known_terms(cls, given: float | dict[str, float]) -> float | dict[str, float]:
-        known = sorted(term.name for term in load().moments)
+        known = sorted(term.name for term in in_question().moments)
         unknown = [name for name in given if name not in known] if isinstance(given, dict) else []
         refuse([((name,), f"unknown moment coefficient{suggestion(name, known)}") for name in unknown])
         return given

@@ -5,8 +5,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from beaver_ftc.scenario.base import Conflict, Number, Section, number, order_conflicts, refuse
-
-Actuator = Literal["aileron", "elevator", "rudder", "flap"]
+from beaver_ftc.scenario.names import Actuator
 
 
 class _Fault(Section):

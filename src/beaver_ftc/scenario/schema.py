@@ -1,38 +1,34 @@
 """The scenario file as frozen, typed, strict sections; ranges are the contract's."""
 
 from collections.abc import Mapping
-from math import degrees
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import AfterValidator, BeforeValidator, ConfigDict, Field, model_validator
+from pydantic import (
+    AfterValidator,
+    ConfigDict,
+    Field,
+    ModelWrapValidatorHandler,
+    PlainValidator,
+    PrivateAttr,
+    SerializeAsAny,
+    ValidationInfo,
+    model_validator,
+)
 
-from beaver_ftc.design.coefficients import TERMS, TRAVEL
-from beaver_ftc.errors import suggestion
+from beaver_ftc.aircraft import DEFAULT, Aircraft, UnknownAircraft, load
+from beaver_ftc.aircraft.question import asked
 from beaver_ftc.scenario.actuators import Actuators
 from beaver_ftc.scenario.base import Flag, Number, Section, Whole, number, refuse
 from beaver_ftc.scenario.consistency import DURATION_S, RATE_HZ, Outline, conflicts
 from beaver_ftc.scenario.control import ControlConfig
 from beaver_ftc.scenario.diagnosis import FdiConfig
 from beaver_ftc.scenario.faults import Fault
+from beaver_ftc.scenario.initial import Initial, default_initial, given_initial, initial_schema
+from beaver_ftc.scenario.names import Ratio, Ratios, folder_of, known_aircraft, nameable
 from beaver_ftc.scenario.sensors import Sensors
 from beaver_ftc.scenario.signals import Reference
 
 NAME_PATTERN = r"^[A-Za-z0-9_-]+$"
-FLAP_TRAVEL_DEG = (degrees(TRAVEL["flap"].min_rad), degrees(TRAVEL["flap"].max_rad))
-
-
-class Initial(Section):
-    """The trimmed flight condition the run starts from."""
-
-    airspeed_mps: Number = number(
-        45.0, unit="m/s", says="true airspeed, validated from 30 to 55", ge=20, le=70
-    )
-    altitude_m: Number = number(1828.8, unit="m", says="altitude above sea level", ge=-300, le=6000)
-    engine_rpm: Number = number(1800.0, unit="rpm", says="engine speed", ge=0, le=3000)
-    manifold_pressure_inhg: Number = number(20.0, unit="inHg", says="manifold pressure", ge=0, le=50)
-    flap_deg: Number = number(
-        0.0, unit="deg", says="flap deflection", ge=FLAP_TRAVEL_DEG[0], le=FLAP_TRAVEL_DEG[1]
-    )
 
 
 class InertiaCoupling(Section):
@@ -56,24 +52,6 @@ class SinusoidAxes(Section):
     p: Sinusoid = Field(default_factory=Sinusoid)
     q: Sinusoid = Field(default_factory=Sinusoid)
     r: Sinusoid = Field(default_factory=Sinusoid)
-
-
-def _known_term(name: str) -> str:
-    if name not in TERMS:
-        refuse([((), f"unknown aerodynamic term{suggestion(name, TERMS)}")])
-    return name
-
-
-def _no_more_than_there_are(given: Any) -> Any:
-    """Refuse a mapping that cannot be right before a suggestion is made for each of its names."""
-    if isinstance(given, dict) and len(given) > len(TERMS):
-        refuse([((), f"{len(given)} terms, allowed: at most the {len(TERMS)} there are")])
-    return given
-
-
-TermName = Annotated[str, AfterValidator(_known_term)]
-Ratio = Annotated[Number, Field(ge=-10, le=10)]
-Ratios = Annotated[dict[TermName, Ratio], BeforeValidator(_no_more_than_there_are)]
 
 
 class TrueInertia(Section):
@@ -218,8 +196,8 @@ class Expect(Section):
     detected_within_s: Number | None = number(
         None, unit="s", says="delay from fault to first alarm", ge=0, le=360_000
     )
-    isolated_as: Literal["aileron", "elevator", "rudder", "flap", "unanticipated"] | None = Field(
-        default=None, description="what the diagnosis must name"
+    isolated_as: Annotated[str, AfterValidator(nameable)] | None = Field(
+        default=None, description="what the diagnosis must name: a surface, or unanticipated"
     )
     isolated_type: FaultType | None = Field(
         default=None, description="the fault type the diagnosis must name"
@@ -253,12 +231,20 @@ class Scenario(Section):
         examples=["elevator-partial-loss"],
     )
     description: str = Field(default="", max_length=2000, description="what the case shows")
-    aircraft: Literal["beaver"] = Field(default="beaver", description="a folder of aircraft/")
+    aircraft: Annotated[str, AfterValidator(known_aircraft)] = Field(
+        default=DEFAULT,
+        max_length=200,
+        description="what flies: a built-in name, or ./FOLDER beside this file",
+    )
     duration_s: Number = number(DURATION_S, unit="s", says="length of the flight", gt=0, le=360_000)
     rate_hz: Number = number(RATE_HZ, unit="Hz", says="frame rate of diagnosis and control", ge=20, le=1000)
     substeps: Whole = Field(default=1, ge=1, le=50, description="JSBSim frames per such frame")
     seed: Whole = Field(default=1, ge=0, le=2**63 - 1, description="of everything random in the flight")
-    initial: Initial = Field(default_factory=Initial, description="flight condition at the start, trimmed")
+    initial: Annotated[SerializeAsAny[Initial], PlainValidator(given_initial)] = Field(
+        default_factory=default_initial,
+        description="flight condition at the start, trimmed",
+        json_schema_extra=initial_schema,
+    )
     reference: Reference = Field(default_factory=Reference, description="body rates to follow")
     faults: tuple[Fault, ...] = Field(default=(), max_length=100, description="what breaks, and when")
     uncertainty: Uncertainty = Field(
@@ -271,6 +257,30 @@ class Scenario(Section):
     control: ControlConfig = Field(default_factory=ControlConfig, description="the control law")
     design_model: DesignModel = Field(default_factory=DesignModel, description="what the designer believes")
     expect: Expect = Field(default_factory=Expect, description="what must come out")
+
+    _airframe: Aircraft | None = PrivateAttr(default=None)
+
+    @property
+    def airframe(self) -> Aircraft:
+        """The aircraft, as data."""
+        return self._airframe or load(self.aircraft)
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _of_its_aircraft(
+        cls, given: Any, read: ModelWrapValidatorHandler[Self], info: ValidationInfo
+    ) -> Self:
+        """Check names against the scenario's own aircraft; one there is not is reported by its key."""
+        reference = given.get("aircraft", DEFAULT) if isinstance(given, dict) else DEFAULT
+        try:
+            aircraft = load(reference if isinstance(reference, str) else DEFAULT, folder_of(info))
+        except UnknownAircraft:
+            aircraft = load()
+        with asked(aircraft):
+            scenario = read(given)
+        if isinstance(given, dict):
+            scenario._airframe = aircraft
+        return scenario
 
     @model_validator(mode="after")
     def _parts_fit_together(self) -> Self:

@@ -3,7 +3,6 @@
 from collections.abc import Iterator
 from math import pi
 
-from beaver_ftc.design.coefficients import ENVELOPE_AIRSPEED_MPS
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.signals import Chirp
 
@@ -39,7 +38,7 @@ def _undeclared(scenario: Scenario) -> Iterator[str]:
 
 
 def _airspeed(scenario: Scenario) -> Iterator[str]:
-    lowest, highest = ENVELOPE_AIRSPEED_MPS
+    lowest, highest = scenario.airframe.envelope.airspeed_mps
     airspeed_mps = scenario.initial.airspeed_mps
     if not lowest <= airspeed_mps <= highest:
         yield (

@@ -1,0 +1,66 @@
+"""The trimmed flight condition a flight starts from; its keys depend on the aircraft."""
+
+from functools import lru_cache
+from math import degrees
+from typing import Any, ClassVar
+
+from pydantic import create_model
+
+from beaver_ftc.aircraft import Aircraft, load
+from beaver_ftc.aircraft.question import in_question
+from beaver_ftc.scenario.base import Number, Section, number
+
+
+class Initial(Section):
+    """The trimmed flight condition the run starts from."""
+
+    airspeed_mps: Number = number(
+        45.0, unit="m/s", says="true airspeed, validated from 30 to 55", ge=20, le=70
+    )
+    altitude_m: Number = number(1828.8, unit="m", says="altitude above sea level", ge=-300, le=6000)
+
+    _airframe: ClassVar[Aircraft | None] = None
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Classes of a single aircraft are made again where they are read."""
+        return _initial_again, (self._airframe, self.model_dump(exclude_unset=True))
+
+
+@lru_cache(maxsize=32)
+def initial_of(aircraft: Aircraft) -> type[Initial]:
+    """The flight condition of an aircraft: with its engine's settings, and the surfaces trim leaves alone."""
+    keys: dict[str, Any] = {}
+    for name, setting in aircraft.engine.settings.items():
+        low, high = setting.range
+        says = setting.says or name
+        keys[name] = Number, number(setting.default, unit=setting.unit, says=says, ge=low, le=high)
+    for surface in aircraft.surfaces:
+        if surface not in aircraft.primary:
+            travel, says = aircraft.travel[surface], f"{surface} deflection"
+            low, high = degrees(travel.min_rad), degrees(travel.max_rad)
+            keys[f"{surface}_deg"] = Number, number(0.0, unit="deg", says=says, ge=low, le=high)
+    made = create_model("Initial", __base__=Initial, __doc__=Initial.__doc__, **keys)
+    made._airframe = aircraft
+    return made
+
+
+def _initial_again(aircraft: Aircraft | None, values: dict[str, Any]) -> Initial:
+    return (initial_of(aircraft) if aircraft else Initial).model_validate(values)
+
+
+def given_initial(given: Any) -> Any:
+    """The flight condition given, as one of the aircraft in question."""
+    if isinstance(given, Initial):
+        given = given.model_dump(exclude_unset=True)
+    return initial_of(in_question()).model_validate(given)
+
+
+def default_initial() -> Initial:
+    """The default flight condition of the aircraft in question."""
+    return initial_of(in_question())()
+
+
+def initial_schema(schema: dict[str, Any]) -> None:
+    """Show an editor the keys of the built-in aircraft."""
+    schema.clear()
+    schema.update(initial_of(load()).model_json_schema())

@@ -1,0 +1,70 @@
+"""Names in a scenario that must be those of its aircraft: surfaces, terms, the aircraft itself."""
+
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo
+
+from beaver_ftc.aircraft import UnknownAircraft, load
+from beaver_ftc.aircraft.question import in_question
+from beaver_ftc.errors import suggestion
+from beaver_ftc.scenario.base import Number, refuse
+
+UNANTICIPATED = "unanticipated"
+
+
+def known_surface(name: str) -> str:
+    """Refuse what is no surface of the scenario's aircraft."""
+    surfaces = in_question().surfaces
+    if name not in surfaces:
+        refuse([((), f"{name[:100]!r} is not known{suggestion(name, surfaces)}")])
+    return name
+
+
+def _examples(schema: dict[str, Any]) -> None:
+    schema["examples"] = list(load().surfaces)
+
+
+Actuator = Annotated[str, AfterValidator(known_surface), Field(json_schema_extra=_examples)]
+
+
+def _known_term(name: str) -> str:
+    known = in_question().terms
+    if name not in known:
+        refuse([((), f"unknown aerodynamic term{suggestion(name, known)}")])
+    return name
+
+
+def _no_more_than_there_are(given: Any) -> Any:
+    """Refuse a mapping that cannot be right before a suggestion is made for each of its names."""
+    most = len(in_question().terms)
+    if isinstance(given, dict) and len(given) > most:
+        refuse([((), f"{len(given)} terms, allowed: at most the {most} there are")])
+    return given
+
+
+TermName = Annotated[str, AfterValidator(_known_term)]
+Ratio = Annotated[Number, Field(ge=-10, le=10)]
+Ratios = Annotated[dict[TermName, Ratio], BeforeValidator(_no_more_than_there_are)]
+
+
+def nameable(name: str) -> str:
+    """Refuse what a diagnosis cannot name."""
+    known = (*in_question().surfaces, UNANTICIPATED)
+    if name not in known:
+        refuse([((), f"{name[:100]!r} is not known{suggestion(name, known)}")])
+    return name
+
+
+def known_aircraft(reference: str, info: ValidationInfo) -> str:
+    """Refuse what is no aircraft."""
+    try:
+        load(reference, folder_of(info))
+    except UnknownAircraft as error:
+        refuse([((), str(error))])
+    return reference
+
+
+def folder_of(info: ValidationInfo) -> Path | None:
+    """Where the scenario's file is, if it is one."""
+    return (info.context or {}).get("folder")

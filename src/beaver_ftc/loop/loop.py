@@ -263,9 +263,9 @@ class Loop:
         if self.schedule.begun(k) and not truth["faulted"]:
             truth["faulted"], truth["fault_at_s"] = 1, k / self.scenario.rate_hz
         truth["immovable"] = [
-            any(self.plant.read(f"failures/{s}/{how}") for how in IMMOVABLE) for s in SURFACES
+            any(self.plant.read(f"failures/{s}/{how}") for how in IMMOVABLE) for s in self.aircraft.surfaces
         ]
-        truth["Cm_alpha3"] = self.plant.read("failures/unanticipated/Cm-alpha3")
+        truth["Cm_alpha3"] = self.plant.read(UNANTICIPATED)
 
 
 def travel_rad(plant: Plant) -> np.ndarray:

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from beaver_ftc.aircraft import Aircraft
+from beaver_ftc.aircraft.question import asked
 from beaver_ftc.compiled import direct
 from beaver_ftc.design.model import N_Y
 from beaver_ftc.design.variants import anchor, mass_of
@@ -51,7 +52,8 @@ class Diagnosis:
             "name": "stream", "rate_hz": rate_hz, "fdi": fdi or {}, "actuators": actuators,
             "design_model": design_model or {},
         }  # fmt: skip
-        self._scenario = _watchable(load(given))
+        with asked(aircraft):
+            self._scenario = _watchable(load(given))
         self._aircraft, self._start = aircraft, start
         self.reset()
 
@@ -137,8 +139,9 @@ class Diagnosis:
         belief = frame["belief"]
         belief["u"] = belief["commanded"] = frame["control"]["trim"] = u
         anchor(belief["design"], x, y, u)
-        mass = mass_of(scenario.design_model)
-        noise_model.set_up(self._fdi, scenario.fdi, belief["design"], mass, (x, y, u), scenario.rate_hz)
+        mass, start = mass_of(scenario.design_model, self._aircraft), (x, y, u)
+        rate_hz, design = scenario.rate_hz, belief["design"]
+        noise_model.set_up(self._fdi, scenario.fdi, design, mass, start, rate_hz, self._aircraft)
         self._fresh = False
 
 

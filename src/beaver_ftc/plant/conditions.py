@@ -28,7 +28,7 @@ def linearise(scenario: ScenarioLike | None = None, **initial: float) -> LinearM
 
 def trimmed(scenario: Scenario) -> tuple[Plant, TrimPoint]:
     """An aircraft with the scenario's errors, left near the trim, and the trim. Raises BadInput."""
-    plant = Plant(scenario.rate_hz, scenario.substeps)
+    plant = Plant(scenario.rate_hz, scenario.substeps, scenario.airframe)
     configure(plant, scenario)
     return plant, trim_of(scenario, plant)
 

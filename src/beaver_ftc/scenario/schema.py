@@ -16,7 +16,7 @@ from pydantic import (
 )
 
 from beaver_ftc.aircraft import DEFAULT, Aircraft, UnknownAircraft, load
-from beaver_ftc.aircraft.question import asked
+from beaver_ftc.aircraft.question import asked, in_question
 from beaver_ftc.scenario.actuators import Actuators
 from beaver_ftc.scenario.base import Flag, Number, Section, Whole, number, refuse
 from beaver_ftc.scenario.consistency import DURATION_S, RATE_HZ, Outline, conflicts
@@ -271,9 +271,9 @@ class Scenario(Section):
         cls, given: Any, read: ModelWrapValidatorHandler[Self], info: ValidationInfo
     ) -> Self:
         """Check names against the scenario's own aircraft; one there is not is reported by its key."""
-        reference = given.get("aircraft", DEFAULT) if isinstance(given, dict) else DEFAULT
+        reference = given.get("aircraft") if isinstance(given, dict) else None
         try:
-            aircraft = load(reference if isinstance(reference, str) else DEFAULT, folder_of(info))
+            aircraft = load(reference, folder_of(info)) if isinstance(reference, str) else in_question()
         except UnknownAircraft:
             aircraft = load()
         with asked(aircraft):

@@ -6,7 +6,6 @@ import numpy as np
 
 from beaver_ftc.control.laws import gains
 from beaver_ftc.control.laws.state import N_POINTS, REJECTING
-from beaver_ftc.design.coefficients import ENVELOPE_AIRSPEED_MPS, SURFACES
 from beaver_ftc.design.model import AIRSPEED, QDYN
 from beaver_ftc.design.variants import effectiveness
 from beaver_ftc.diagnosis.state import PITCH
@@ -25,7 +24,7 @@ def set_up(control: np.void, belief: np.void, scenario: Scenario, y: np.ndarray)
 
 def _set_up_rejection(control: np.void, belief: np.void, scenario: Scenario, y: np.ndarray) -> None:
     config, dt = scenario.control, 1.0 / scenario.rate_hz
-    speeds_mps = np.linspace(*ENVELOPE_AIRSPEED_MPS, N_POINTS)
+    speeds_mps = np.linspace(*scenario.airframe.envelope.airspeed_mps, N_POINTS)
     signals = np.tile(y, (N_POINTS, 1))
     signals[:, AIRSPEED], signals[:, QDYN] = speeds_mps, y[QDYN] * (speeds_mps / y[AIRSPEED]) ** 2
     carriers = [(axis, int(s)) for axis, s in enumerate(control["main"])]
@@ -47,7 +46,8 @@ def _set_up_rejection(control: np.void, belief: np.void, scenario: Scenario, y: 
 
 def _rate_limits(scenario: Scenario) -> np.ndarray:
     """Declared rate limits (n,) rad/s, the aircraft's default where none is."""
-    limits_deg_s = [getattr(scenario.actuators, surface).rate_limit_deg_s for surface in SURFACES]
+    surfaces = scenario.airframe.surfaces
+    limits_deg_s = [getattr(scenario.actuators, surface).rate_limit_deg_s for surface in surfaces]
     return np.array([radians(limit) or DEFAULT_RATE_RAD_S for limit in limits_deg_s])
 
 

@@ -111,7 +111,7 @@ def _fly(
 
 
 def _say(document: dict[str, Any], folder: Path, format: Format, leaderboard: Path | None) -> None:
-    from beaver_ftc.studies.compare.benchmark import write_leaderboard
+    from beaver_ftc.studies.compare.page import write_leaderboard
     from beaver_ftc.studies.compare.table import as_text
 
     if format is Format.json:

@@ -21,17 +21,14 @@ def command(
     scaled by 0.25 to 2; `median` where the fault strikes at half of all instants.
     """
     from beaver_ftc.cli.progress import progress_bar
-    from beaver_ftc.results.writer import result_folder
     from beaver_ftc.scenario.loader import load_scenario
-    from beaver_ftc.studies.detectability.output import document, text, write
-    from beaver_ftc.studies.detectability.survey import survey
+    from beaver_ftc.studies.detectability.output import document, text
+    from beaver_ftc.studies.detectability.survey import run_survey, survey_name
 
     loaded = load_scenario(scenario)
-    name = f"{loaded.name[:86]}-detectability"  # a name of at most 100 characters
-    with result_folder(out, name) as folder:
-        with progress_bar(name) as progress:
-            rows = survey(loaded, progress=progress)
-        write(folder, loaded.name, rows)
+    name = survey_name(loaded)
+    with progress_bar(name) as progress:
+        rows = run_survey(out, loaded, progress=progress)
     if format is Format.json:
         emit_json(document(loaded.name, rows) | {"folder": str(out / name)})
     else:

@@ -107,13 +107,12 @@ def _compare(
 
 def _map(scenario: "Scenario", out: Path, format: Format, report: bool) -> list[dict[str, Any]]:
     from beaver_ftc.cli.progress import progress_bar
-    from beaver_ftc.studies.mismatch.envelope import envelope_map, write_map
+    from beaver_ftc.studies.mismatch.envelope import map_name, run_map
 
     with progress_bar(f"{scenario.name}: envelope") as progress:
-        entries = envelope_map(scenario, progress)
-    folder = write_map(out, scenario, entries, report)
+        entries = run_map(out, scenario, report, progress)
     if format is Format.text:
-        emit(f"map          {folder}")
+        emit(f"map          {out / map_name(scenario)}")
     return entries
 
 

@@ -14,7 +14,6 @@ from beaver_ftc.diagnosis.rivals.options import TUNED, TUNED_FOR_ERRORS, tuned
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.plugins import plugin_class
 from beaver_ftc.scenario.schema import Scenario
-from beaver_ftc.studies.compare.benchmark import MARK, write_leaderboard
 from beaver_ftc.studies.compare.document import better_than_ours, document_of
 from beaver_ftc.studies.compare.figure import write_figure
 from beaver_ftc.studies.compare.flights import (
@@ -25,7 +24,7 @@ from beaver_ftc.studies.compare.flights import (
     of_sweep,
     set_names,
 )
-from beaver_ftc.studies.compare.page import write_page
+from beaver_ftc.studies.compare.page import MARK, write_leaderboard, write_page
 from beaver_ftc.studies.compare.replay import Trace
 from beaver_ftc.studies.compare.table import as_text
 from beaver_ftc.studies.compare.trial import LAW, ORACLE, SCHEME, Entry, entries_of, fly_case, with_entry

@@ -21,7 +21,7 @@ from beaver_ftc.studies.detectability.mismatch import (
     mismatch,
 )
 from beaver_ftc.studies.detectability.output import as_csv, draw
-from beaver_ftc.studies.detectability.survey import EXCITATIONS, FAULTS, at, judge, survey
+from beaver_ftc.studies.detectability.survey import EXCITATIONS, FAULTS, at, judge, run_survey
 from flying import loss, scenario
 
 moments = st.lists(st.floats(-1, 1), min_size=3, max_size=3)
@@ -99,25 +99,25 @@ def test_isolation_is_never_easier_than_detection(flight):
         assert row["confused_with"] != fault
 
 
-def test_what_cannot_be_trimmed_is_said_not_dropped(flight):
-    rows = survey(flight, speeds_mps=[45.0, 21.0], altitudes_m=[1000.0], excitations=[1.0])
+def test_what_cannot_be_trimmed_is_said_not_dropped(flight, tmp_path):
+    rows = run_survey(tmp_path, flight, speeds_mps=[45.0, 21.0], altitudes_m=[1000.0], excitations=[1.0])
     assert len(rows) == 2 * len(FAULTS)
     assert all(row["detected"] is None and row["why"] for row in rows[len(FAULTS) :])
 
 
-def test_another_scheme_is_refused(flight):
+def test_another_scheme_is_refused(tmp_path):
     with pytest.raises(BadInput, match="sharpened scheme"):
-        survey(scenario(fdi={"thresholds": "published"}))
+        run_survey(tmp_path, scenario(fdi={"thresholds": "published"}))
 
 
-def test_csv_and_map_hold_every_point(flight):
-    rows = survey(flight, speeds_mps=[45.0], altitudes_m=[0.0, 2000.0], excitations=[0.5, 1.0])
+def test_csv_and_map_hold_every_point(flight, tmp_path):
+    rows = run_survey(tmp_path, flight, speeds_mps=[45.0], altitudes_m=[0.0, 2000.0], excitations=[0.5, 1.0])
     assert len(list(csv.DictReader(as_csv(rows).splitlines()))) == len(rows) == 2 * 2 * len(FAULTS)
     assert len([axes for axes in draw("x", rows).axes if axes.get_title()]) == 2 * len(FAULTS)
 
 
 def test_the_command_leaves_map_csv_and_json(tmp_path, monkeypatch):
-    monkeypatch.setattr(surveying.survey, "__defaults__", ([45.0], [1000.0], EXCITATIONS[2:3], None))
+    monkeypatch.setattr(surveying.run_survey, "__defaults__", ([45.0], [1000.0], EXCITATIONS[2:3], None))
     asked = ["detectability", "fault-free", "--out", str(tmp_path), "--format", "json"]
     result = CliRunner().invoke(app, asked)
     assert result.exit_code == 0

@@ -199,7 +199,7 @@ def test_the_map_covers_the_envelope_and_names_the_reason(monkeypatch, tmp_path)
     monkeypatch.setattr(envelope, "AIRSPEEDS_MPS", (40.0, 50.0))
     monkeypatch.setattr(envelope, "ALTITUDES_M", (500.0, 2500.0))
     case = scenario(duration_s=2, faults=[loss(at_s=1)], design_model={"engine_terms": False})
-    entries = envelope.envelope_map(case)
+    entries = envelope.run_map(tmp_path, case)
     assert len(entries) == 2 * 2 * 3
     slow, fast = (
         next(e for e in entries if e["axis"] == "q" and e["airspeed_mps"] == V and e["altitude_m"] == 500.0)
@@ -207,19 +207,19 @@ def test_the_map_covers_the_envelope_and_names_the_reason(monkeypatch, tmp_path)
     )
     assert slow["dominant"] == fast["dominant"] == "engine"
     assert slow["worst_ratio"] > fast["worst_ratio"] > 1.0  # the slipstream matters more at low speed
-    folder = envelope.write_map(tmp_path, case, entries, report=True)
+    folder = tmp_path / envelope.map_name(case)
     assert (folder / "figures" / "mismatch-map.png").exists()
     with (folder / "mismatch.csv").open() as file:
         assert len(list(csv.DictReader(file))) == 12
 
 
-def test_where_there_is_no_trim_the_map_says_so(monkeypatch):
+def test_where_there_is_no_trim_the_map_says_so(monkeypatch, tmp_path):
     def refuses(case):
         raise BadInput("no trim")
 
     monkeypatch.setattr("beaver_ftc.studies.mismatch.run.tally_of_flight", refuses)
     monkeypatch.setattr(envelope, "AIRSPEEDS_MPS", (40.0,))
     monkeypatch.setattr(envelope, "ALTITUDES_M", (500.0,))
-    entries = envelope.envelope_map(scenario())
+    entries = envelope.run_map(tmp_path, scenario(), report=False)
     assert [entry["worst_ratio"] for entry in entries] == [None] * 3
     assert envelope.map_figure(entries, "x") is not None

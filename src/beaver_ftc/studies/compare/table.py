@@ -1,10 +1,10 @@
-"""The comparison as a table, for a terminal and for Markdown."""
+"""The comparison as tables."""
 
 from collections.abc import Callable, Sequence
 from typing import Any
 
 from beaver_ftc.studies.compare.trial import LAW, SCHEME
-from beaver_ftc.studies.engine.words import aligned, markdown_table
+from beaver_ftc.studies.engine.words import aligned
 
 Document = dict[str, Any]
 Cell = Callable[[Document, Document], str]
@@ -82,16 +82,4 @@ def as_text(document: Document) -> str:
         blocks += [aligned([header, *rows]) + "\n" for header, rows in sections(part)]
         blocks += part["better_than_ours"] + [f"could not fly: {error}" for error in part["errors"]]
         blocks.append("")
-    return "\n".join(blocks)
-
-
-def as_markdown(document: Document) -> str:
-    """For the leaderboard."""
-    blocks = []
-    for name, part in document["sets"].items():
-        blocks.append(f"## {name}: {part['flights']} flights\n")
-        blocks += [markdown_table(header, rows) + "\n" for header, rows in sections(part)]
-        blocks.append("What loses:\n")
-        losses = part["better_than_ours"] or ["nothing here: no rival does better than ours on any count"]
-        blocks.append("\n".join(f"- {sentence}." for sentence in losses) + "\n")
     return "\n".join(blocks)

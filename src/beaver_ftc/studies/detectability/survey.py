@@ -1,7 +1,9 @@
 """Over speed, altitude and excitation: how small a fault of each surface is certain to be found."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Sequence
+from functools import partial
 from itertools import product
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,6 +18,8 @@ from beaver_ftc.studies.detectability.mismatch import (
     exclusion_magnitude,
     mismatch,
 )
+from beaver_ftc.studies.engine.flown import Progress, flown
+from beaver_ftc.studies.engine.statistics import quantile
 
 FAULTS = {"aileron": AILERON, "elevator": ELEVATOR, "rudder": RUDDER}
 DETECT_WITHIN_S, ISOLATE_WITHIN_S = 0.5, 1.0
@@ -23,25 +27,36 @@ SPEEDS_MPS, ALTITUDES_M = (36.0, 40.0, 44.0, 48.0, 52.0), (0.0, 1000.0, 2000.0, 
 EXCITATIONS = (0.25, 0.5, 1.0, 2.0)  # of the scenario's references
 
 Row = dict[str, Any]
-Progress = Callable[[float], None]
 
 
-def survey(
+def run_survey(
+    out: Path,
     scenario: Scenario,
     speeds_mps: Sequence[float] = SPEEDS_MPS,
     altitudes_m: Sequence[float] = ALTITUDES_M,
     excitations: Sequence[float] = EXCITATIONS,
     progress: Progress | None = None,
 ) -> list[Row]:
-    """One row a fault and grid point. Raises BadInput if another scheme than the sharpened one diagnoses."""
+    """Write `out/<scenario>-detectability/`; return one row a fault and grid point.
+
+    Raises BadInput if another scheme than the sharpened one diagnoses.
+    """
+    from beaver_ftc.results.writer import result_folder
+    from beaver_ftc.studies.detectability.output import write
+
     _refuse_other_schemes(scenario)
-    rows: list[Row] = []
+    name = survey_name(scenario)
     grid = list(product(speeds_mps, altitudes_m, excitations))
-    for done, (speed, altitude, scale) in enumerate(grid, start=1):
-        rows += _point(scenario, speed, altitude, scale)
-        if progress is not None:
-            progress(done / len(grid))
+    points = flown(out / name, grid, partial(_point, scenario), list[Row], asked=scenario, progress=progress)
+    with points as found, result_folder(out, name) as folder:
+        rows = [row for point in found for row in point]
+        write(folder, scenario.name, rows)
     return rows
+
+
+def survey_name(scenario: Scenario) -> str:
+    """The name of the survey's result folder, at most 100 characters."""
+    return f"{scenario.name[:86]}-detectability"
 
 
 def _refuse_other_schemes(scenario: Scenario) -> None:
@@ -54,15 +69,14 @@ def _refuse_other_schemes(scenario: Scenario) -> None:
         )
 
 
-def _point(scenario: Scenario, speed: float, altitude: float, scale: float) -> Iterator[Row]:
+def _point(scenario: Scenario, point: tuple[float, float, float]) -> list[Row]:
+    speed, altitude, scale = point
     place = {"airspeed_mps": speed, "altitude_m": altitude, "excitation": scale}
     try:
         seen = excitation(at(scenario, speed, altitude, scale))
     except BeaverFtcError as error:
-        yield from ({**place, "fault": fault, **_nothing(str(error))} for fault in FAULTS)
-        return
-    for fault in FAULTS:
-        yield {**place, "fault": fault, **judge(seen, fault)}
+        return [{**place, "fault": fault, **_nothing(str(error))} for fault in FAULTS]
+    return [{**place, "fault": fault, **judge(seen, fault)} for fault in FAULTS]
 
 
 def at(scenario: Scenario, speed_mps: float, altitude_m: float, excitation: float) -> Scenario:
@@ -109,9 +123,9 @@ def judge(seen: Excitation, fault: str) -> Row:
     rival = max(excluded, key=lambda other: (excluded[other].max(), np.median(excluded[other])))
     return {
         "detected": _certain(found.max()),
-        "detected_median": _certain(np.median(found)),
+        "detected_median": _certain(quantile(np.sort(found), 0.5)),
         "isolated": _certain(isolated.max()),
-        "isolated_median": _certain(np.median(isolated)),
+        "isolated_median": _certain(quantile(np.sort(isolated), 0.5)),
         "confused_with": rival,
         "why": _why(seen, fault, rival, found, excluded[rival], frames[1]),
     }

@@ -62,6 +62,18 @@ def _cell(text: str) -> str:
     return f"<td{kind}>{escape(text)}</td>"
 
 
+def plain(title: str, head: Sequence[str], rows: Rows) -> Any:
+    """A table of rich: the first column to the left, the others to the right."""
+    from rich.table import Table
+
+    table = Table(title=title, title_justify="left", box=None, pad_edge=False)
+    for i, name in enumerate(head):
+        table.add_column(name, justify="right" if i else "left", no_wrap=not i)
+    for row in rows:
+        table.add_row(*row)
+    return table
+
+
 def printed(tables: Sequence[Any], width: int | None = None, colour: bool = False) -> str:
     """Tables of rich as text."""
     from rich.console import Console

@@ -6,7 +6,6 @@ at any frame.
 """
 
 import csv
-import io
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -160,19 +159,13 @@ def rows(found: Document) -> Iterator[Document]:
                     "rms_rad_s2": of["rms"],
                     "max_rad_s2": of["max"],
                     "share": of["share"],
-                    "bound_share": "" if of["bound_share"] is None else of["bound_share"],
+                    "bound_share": of["bound_share"],
                 }
 
 
-def as_csv(table: list[Document]) -> str:
-    """Rows of equal keys as CSV text with a header."""
-    text = io.StringIO()
-    writer = csv.DictWriter(text, fieldnames=list(table[0]), lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(table)
-    return text.getvalue()
-
-
 def write_csv(path: Path, table: list[Document]) -> None:
-    """Write rows as a CSV file."""
-    path.write_text(as_csv(table), encoding="utf-8")
+    """Write rows of equal keys as a CSV file with a header; null is an empty cell."""
+    with path.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.DictWriter(file, fieldnames=list(table[0]), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(table)

@@ -1,13 +1,15 @@
 """The worst mismatch over the envelope: the scenario, without faults, flown at each speed and altitude."""
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from beaver_ftc.errors import BadInput
-from beaver_ftc.studies.mismatch.document import Document, write_csv
+from beaver_ftc.studies.engine.flown import Progress, flown
+from beaver_ftc.studies.mismatch.document import Document, document, write_csv
 from beaver_ftc.studies.mismatch.figures import AXIS_NAMES, largest_sources, new_figure, save
 from beaver_ftc.studies.mismatch.states import AXES
 
@@ -22,15 +24,35 @@ AIRSPEEDS_MPS = (30.0, 35.0, 40.0, 45.0, 50.0, 55.0)  # the validated envelope
 ALTITUDES_M = (0.0, 1000.0, 2000.0, 3000.0, 4000.0)
 
 
-def envelope_map(scenario: "Scenario", progress: Callable[[float], None] | None = None) -> list[Document]:
-    """One entry per axis, speed and altitude: worst share of the bound, smallest constant, and why."""
+def run_map(
+    out: Path, scenario: "Scenario", report: bool = True, progress: Progress | None = None
+) -> list[Document]:
+    """Write `out/<scenario>-mismatch-map/`: the map as JSON and CSV, and a figure. Return its entries.
+
+    One entry per axis, speed and altitude: worst share of the bound, smallest constant, and why.
+    """
+    from beaver_ftc.results.metrics import as_json
+    from beaver_ftc.results.writer import result_folder
+
+    name = map_name(scenario)
     conditions = [(V, h) for h in ALTITUDES_M for V in AIRSPEEDS_MPS]
-    entries: list[Document] = []
-    for done, (V, h) in enumerate(conditions):
-        entries += _cell(scenario, V, h)
-        if progress is not None:
-            progress((done + 1) / len(conditions))
+    cells = flown(
+        out / name, conditions, partial(_cell, scenario), list[Document], asked=scenario, progress=progress
+    )
+    with cells as rows, result_folder(out, name) as folder:
+        entries = [entry for row in rows for entry in row]
+        document = {"scenario": scenario.name, "map": entries}
+        (folder / "mismatch.json").write_text(as_json(document), encoding="utf-8")
+        write_csv(folder / "mismatch.csv", entries)
+        if report:
+            (folder / "figures").mkdir()
+            save(map_figure(entries, scenario.name), folder / "figures" / f"{MAP}.png")
     return entries
+
+
+def map_name(scenario: "Scenario") -> str:
+    """The name of the map's result folder."""
+    return f"{scenario.name}-{MAP}"
 
 
 def at(scenario: "Scenario", airspeed_mps: float, altitude_m: float) -> "Scenario":
@@ -39,57 +61,27 @@ def at(scenario: "Scenario", airspeed_mps: float, altitude_m: float) -> "Scenari
     return scenario.model_copy(update={"initial": initial, "faults": ()})
 
 
-def _cell(scenario: "Scenario", V: float, h: float) -> Iterator[Document]:
-    from beaver_ftc.studies.mismatch.document import document
+def _cell(scenario: "Scenario", condition: tuple[float, float]) -> list[Document]:
     from beaver_ftc.studies.mismatch.run import tally_of_flight
 
+    V, h = condition
     place = {"airspeed_mps": V, "altitude_m": h}
     try:
-        kept, flown = tally_of_flight(at(scenario, V, h))
+        kept, metrics = tally_of_flight(at(scenario, V, h))
     except BadInput:
-        yield from (place | _blank(axis) for axis in AXES)
-        return
-    found = document(scenario, kept, flown)
-    for axis in AXES:
-        bound = found["bound"][axis]
-        yield place | {
-            "axis": axis,
-            "worst_ratio": bound["worst_ratio"],
-            "smallest_constant_rad_s2": bound["smallest_constant_rad_s2"],
-            "dominant": largest_sources(found, axis)[0],
-            "false_alarm": found["false_alarm"],
-        }
+        return [{**place, "axis": axis, **dict.fromkeys(_FOUND)} for axis in AXES]
+    found = document(scenario, kept, metrics)
+    return [{**place, "axis": axis, **_found(found, axis)} for axis in AXES]
 
 
-def _blank(axis: str) -> Document:
-    return {
-        "axis": axis,
-        "worst_ratio": None,
-        "smallest_constant_rad_s2": None,
-        "dominant": None,
-        "false_alarm": None,
-    }
+_FOUND = ("worst_ratio", "smallest_constant_rad_s2", "dominant", "false_alarm")
 
 
-def write_map(out: Path, scenario: "Scenario", entries: list[Document], report: bool) -> Path:
-    """Write `out/<scenario>-mismatch-map/`: the map as JSON and CSV, and a figure. Whole or not at all."""
-    from beaver_ftc.results.metrics import as_json
-    from beaver_ftc.results.writer import result_folder
-
-    name = f"{scenario.name}-{MAP}"
-    with result_folder(out, name) as folder:
-        (folder / "mismatch.json").write_text(
-            as_json({"scenario": scenario.name, "map": entries}), encoding="utf-8"
-        )
-        write_csv(folder / "mismatch.csv", [_spelled(each) for each in entries])
-        if report:
-            (folder / "figures").mkdir()
-            save(map_figure(entries, scenario.name), folder / "figures" / f"{MAP}.png")
-    return out / name
-
-
-def _spelled(each: Document) -> Document:
-    return {key: "" if value is None else value for key, value in each.items()}
+def _found(found: Document, axis: str) -> Document:
+    bound = found["bound"][axis]
+    dominant = largest_sources(found, axis)[0]
+    values = bound["worst_ratio"], bound["smallest_constant_rad_s2"], dominant, found["false_alarm"]
+    return dict(zip(_FOUND, values, strict=True))
 
 
 def map_figure(entries: Sequence[Document], name: str) -> "Figure":

@@ -1,24 +1,19 @@
 """The mismatch as tables for the terminal."""
 
-from typing import TYPE_CHECKING
-
-from beaver_ftc.studies.engine.words import number, printed, seconds
+from beaver_ftc.studies.engine.words import number, plain, printed, seconds
 from beaver_ftc.studies.mismatch.document import Document
 from beaver_ftc.studies.mismatch.states import AXES
 from beaver_ftc.studies.mismatch.words import label, percent
 
 WIDTH = 150
 
-if TYPE_CHECKING:
-    from rich.table import Table
+Table = tuple[str, list[str], list[list[str]]]
 
 
 def mismatch_text(found: Document, folder: str, colour: bool = False) -> str:
     """One flight: the sources, the bound, what to declare, the modes."""
-    tables = [sources_table(found), bound_table(found), modes_table(found)]
-    return (
-        printed(tables, WIDTH, colour) + "\n" + "\n".join([*findings(found), f"results      {folder}"]) + "\n"
-    )
+    shown = printed([plain(*table) for table in tables(found)], WIDTH, colour)
+    return "\n".join([shown, "", *findings(found), f"results      {folder}", ""])
 
 
 def findings(found: Document) -> list[str]:
@@ -57,16 +52,20 @@ def _case(case: Document) -> str:
     )
 
 
-def sources_table(found: Document) -> "Table":
-    """RMS, largest value and share of the bound of every source that there is, per axis."""
-    table = _table(f"{found['scenario']}: truth less design (1e-3 rad/s2; share of the bound)", "source")
-    for axis in AXES:
-        for what in ("rms", "max", "bound"):
-            table.add_column(f"{axis} {what}", justify="right")
-    for name, part, per_axis in _lines(found):
-        cells = [cell for of in per_axis for cell in _figures(of)]
-        table.add_row(f"  {part}" if part else label(name), *cells, style="dim" if part else None)
-    return table
+def tables(found: Document) -> list[Table]:
+    """(caption, head, rows) of the sources, the bound and the modes, for the terminal and the page."""
+    return [_sources(found), _bounds(found), _modes(found)]
+
+
+def _sources(found: Document) -> Table:
+    """RMS, largest value and share of the bound of every source that there is, and of its parts."""
+    caption = f"{found['scenario']}: truth less design (1e-3 rad/s2; share of the bound)"
+    head = ["source", *(f"{axis} {what}" for axis in AXES for what in ("rms", "max", "bound"))]
+    rows = [
+        [f"  {part}" if part else label(name), *(cell for of in per_axis for cell in _figures(of))]
+        for name, part, per_axis in _lines(found)
+    ]
+    return caption, head, rows
 
 
 def _lines(found: Document) -> list[tuple[str, str, list[Document | None]]]:
@@ -86,51 +85,51 @@ def _figures(of: Document | None) -> tuple[str, str, str]:
     return number(1e3 * of["rms"]), number(1e3 * of["max"]), percent(of["bound_share"])
 
 
-def bound_table(found: Document) -> "Table":
+def _bounds(found: Document) -> Table:
     """The bound of each axis, how far it was used and exceeded, and the smallest that would have done."""
-    table = _table("the bound, without the fault", "axis")
-    for heading in ("constant", "smallest", "worst", "at", "exceeded", "times", "because of"):
-        table.add_column(heading, justify="right")
-    for axis in AXES:
-        of = found["bound"][axis]
-        stays = of["exceedances"]
-        table.add_row(
+    head = ["axis", "constant", "smallest", "worst", "at", "exceeded", "times", "because of"]
+    rows = [
+        [
             axis, f"{of['constant_rad_s2']:.4g}", f"{of['smallest_constant_rad_s2']:.4g}",
-            percent(of["worst_ratio"]),
-            f"{of['worst_at_s']:.2f} s", f"{of['exceeded_s']:.2f} s", str(of["exceeded_times"]),
-            label(max(stays, key=lambda stay: stay["peak_ratio"] or 0.0)["source"]) if stays else "-",
-        )  # fmt: skip
-    return table
+            percent(of["worst_ratio"]), seconds(of["worst_at_s"]), seconds(of["exceeded_s"]),
+            str(of["exceeded_times"]), _reason(of["exceedances"]),
+        ]
+        for axis, of in found["bound"].items()
+    ]  # fmt: skip
+    return "the bound, without the fault (constants in rad/s2)", head, rows
 
 
-def modes_table(found: Document) -> "Table":
+def _reason(stays: list[Document]) -> str:
+    return label(max(stays, key=lambda stay: stay["peak_ratio"] or 0.0)["source"]) if stays else "-"
+
+
+def _modes(found: Document) -> Table:
     """Frequency and damping of each mode, and how far the others are from the truth."""
     linear = found["linear"]
-    table = _table(f"modes at trim, {linear['airspeed_mps']:g} m/s and {linear['altitude_m']:g} m", "mode")
-    for heading in ("truth rad/s", "damping", "FDC off by", "design off by", "JSBSim's own off by"):
-        table.add_column(heading, justify="right")
-    for name, mode in linear["modes"].items():
-        table.add_row(
-            label(name), f"{mode['truth']['frequency_rad_s']:.4g}", f"{mode['truth']['damping']:.3g}",
-            percent(mode["deviation"]["fdc"]), percent(mode["deviation"]["design"]),
-            percent(mode["jsbsim_own_deviation"]),
-        )  # fmt: skip
-    return table
+    head = ["mode", "truth rad/s", "damping", "FDC off by", "design off by", "JSBSim's own off by"]
+    rows = [
+        [
+            label(name), f"{of['truth']['frequency_rad_s']:.4g}", f"{of['truth']['damping']:.3g}",
+            percent(of["deviation"]["fdc"]), percent(of["deviation"]["design"]),
+            percent(of["jsbsim_own_deviation"]),
+        ]
+        for name, of in linear["modes"].items()
+    ]  # fmt: skip
+    return f"modes at trim, {linear['airspeed_mps']:g} m/s and {linear['altitude_m']:g} m", head, rows
 
 
-def comparison_table(entries: list[Document]) -> "Table":
+def _comparison(entries: list[Document]) -> Table:
     """Runs side by side: worst share of the bound, smallest constant, reason, alarm and guarantee."""
-    table = _table("worst share of the bound / smallest constant bound in rad/s2", "run")
-    for heading in (*AXES, "dominant", "false alarm", "certain within"):
-        table.add_column(heading, justify="right")
-    for entry in entries:
-        table.add_row(
-            entry["scenario"],
-            *(_needed(entry, axis) for axis in AXES),
+    rows = [
+        [
+            entry["scenario"], *(_needed(entry, axis) for axis in AXES),
             label(entry["dominant"] or "-"), "yes" if entry["false_alarm"] else "no",
-            "void" if entry["guarantee_void"] else seconds(entry["guaranteed_delay_s"], "never"),
-        )  # fmt: skip
-    return table
+            "void" if entry["guarantee_void"] else seconds(entry["guaranteed_delay_s"]),
+        ]
+        for entry in entries
+    ]  # fmt: skip
+    head = ["run", *AXES, "dominant", "false alarm", "certain within"]
+    return "worst share of the bound / smallest constant bound in rad/s2", head, rows
 
 
 def _needed(entry: Document, axis: str) -> str:
@@ -140,13 +139,5 @@ def _needed(entry: Document, axis: str) -> str:
 def comparison_text(entries: list[Document], recommended: Document, folder: str, colour: bool = False) -> str:
     """Several flights side by side, and the bound that covers them all."""
     lines = [_recommendation(recommended["recommended"]), *_guarantee(recommended["guarantee"])]
-    table = printed([comparison_table(entries)], WIDTH, colour)
+    table = printed([plain(*_comparison(entries))], WIDTH, colour)
     return "\n".join([table, "", *lines, f"results      {folder}", ""])
-
-
-def _table(title: str, first: str) -> "Table":
-    from rich.table import Table
-
-    table = Table(title=title, title_justify="left", box=None, pad_edge=False)
-    table.add_column(first, no_wrap=True)
-    return table

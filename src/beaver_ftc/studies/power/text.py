@@ -1,14 +1,11 @@
 """The survey for the terminal: a table a condition, then where ours is better or worse."""
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from beaver_ftc.studies.engine.words import printed
+from beaver_ftc.studies.engine.words import plain, printed
 from beaver_ftc.studies.power.contenders import BUILT_IN
 from beaver_ftc.studies.power.document import JUDGED_S, SIGNIFICANT
 from beaver_ftc.studies.power.grid import WITHIN_S
-
-if TYPE_CHECKING:
-    from rich.table import Table
 
 Document = dict[str, Any]
 WIDTH = 140
@@ -23,24 +20,19 @@ def as_text(document: Document, colour: bool = False) -> str:
     return "\n".join([printed(tables, WIDTH, colour), *said])
 
 
-def _table(document: Document, sensors: str, turbulence: str) -> "Table":
-    from rich import box
-    from rich.table import Table
-
+def _table(document: Document, sensors: str, turbulence: str) -> Any:
     surfaces = document["grid"]["surfaces"]
-    table = Table(title=title_of(sensors, turbulence), title_justify="left", box=box.SIMPLE_HEAD)
-    for head in ("scheme", "false alarms/h", "before faults/h", *surfaces):
-        table.add_column(head, no_wrap=True)
+    rows = []
     for level in document["levels"]:
         if (level["sensors"], level["turbulence"]) == (sensors, turbulence):
             cells = [_total(document, level, surface) for surface in surfaces]
-            alarms = _rate(level["calibration"]), _rate(level["before_faults"])
-            table.add_row(level["scheme"], *alarms, *cells)
+            rows.append([level["scheme"], _rate(level["calibration"]), _rate(level["before_faults"]), *cells])
             if level["scheme"] in BUILT_IN:
                 own = [_total(document, level, surface, own=True) for surface in surfaces]
-                table.add_row(OWN, _rate(level["own_level"]), "", *own)
-    table.add_row(TOLD, "", "", *(_limit(document, sensors, turbulence, surface) for surface in surfaces))
-    return table
+                rows.append([OWN, _rate(level["own_level"]), "", *own])
+    rows.append([TOLD, "", "", *(_limit(document, sensors, turbulence, surface) for surface in surfaces)])
+    head = ["scheme", "false alarms/h", "before faults/h", *surfaces]
+    return plain(title_of(sensors, turbulence), head, rows)
 
 
 def title_of(sensors: str, turbulence: str) -> str:

@@ -1,0 +1,114 @@
+"""A page from its parts: as Markdown, and as one HTML file that needs nothing else."""
+
+from base64 import b64encode
+from collections.abc import Iterator, Mapping, Sequence
+from html import escape
+from pathlib import Path
+from typing import NamedTuple
+
+from beaver_ftc.studies.engine.words import Rows, html_table, markdown_table
+
+
+class Heading(NamedTuple):
+    """A heading below the title."""
+
+    text: str
+
+
+class Table(NamedTuple):
+    """A table. verdicts: which cells are a verdict, and whether it is a good one."""
+
+    head: Sequence[str]
+    rows: Rows
+    verdicts: Mapping[str, bool] = {}
+
+
+class Bullets(NamedTuple):
+    """Sentences, one below the other."""
+
+    lead: str
+    sentences: Sequence[str]
+
+
+class Pictures(NamedTuple):
+    """Pictures side by side: (title, stem of the file)."""
+
+    shown: Sequence[tuple[str, str]]
+
+
+Part = str | Heading | Table | Bullets | Pictures
+
+
+def as_markdown(parts: Sequence[Part], figures: str = "") -> str:
+    """The parts as Markdown; figures: the folder of the pictures, as the page sees it."""
+    return "\n\n".join(text for part in parts for text in _markdown(part, figures)) + "\n"
+
+
+def _markdown(part: Part, figures: str) -> Iterator[str]:
+    match part:
+        case Heading():
+            yield f"## {part.text}"
+        case Table():
+            yield markdown_table(part.head, part.rows)
+        case Bullets():
+            yield part.lead
+            yield "\n".join(f"- {sentence}" for sentence in part.sentences)
+        case Pictures():
+            yield from (f"![{title}]({figures}/{stem}.png)" for title, stem in part.shown)
+        case _:
+            yield part
+
+
+def as_html(title: str, parts: Sequence[Part], figures: Mapping[str, Path]) -> str:
+    """The page as HTML; figures: stem to file of the pictures, which go into it."""
+    body = "\n".join(_html(part, figures) for part in parts if part)
+    return f"{_HEAD.format(title=escape(title))}\n{body}\n</main></body></html>\n"
+
+
+def _html(part: Part, figures: Mapping[str, Path]) -> str:
+    match part:
+        case Heading():
+            return f"<h2>{escape(part.text)}</h2>"
+        case Table():
+            signs = {text: f"{'✓' if good else '✗'} {text}" for text, good in part.verdicts.items()}
+            return html_table(part.head, [[signs.get(cell, cell) for cell in row] for row in part.rows])
+        case Bullets():
+            items = "".join(f"<li>{escape(sentence)}</li>" for sentence in part.sentences)
+            return f"<p>{escape(part.lead)}</p><ul>{items}</ul>"
+        case Pictures():
+            shown = "".join(_picture(name, figures[stem]) for name, stem in part.shown)
+            return f'<div class="figures">{shown}</div>'
+        case _:
+            return f"<p>{escape(part.replace('`', ''))}</p>"
+
+
+def _picture(title: str, path: Path) -> str:
+    data = b64encode(path.read_bytes()).decode("ascii")
+    return f'<img alt="{escape(title)}" src="data:image/png;base64,{data}">'
+
+
+def versions_line(versions: Mapping[str, str]) -> str:
+    """What made the numbers, in a line."""
+    return ", ".join(f"{name} {version}" for name, version in versions.items())
+
+
+_HEAD = """<!DOCTYPE html>
+<html lang="en"><head><meta charset="utf-8"><title>{title}</title>
+<meta name="viewport" content="width=device-width, initial-scale=1"><link rel="icon" href="data:,">
+<style>
+body {{ font: 15px/1.5 system-ui, sans-serif; margin: 0; color: #111; background: #fff }}
+main {{ max-width: 84rem; margin: 0 auto; padding: 0 1rem 2rem }}
+h1 {{ font-size: 1.4rem }} h2 {{ font-size: 1.15rem; margin-top: 2.2rem; break-after: avoid }}
+p, ul {{ max-width: 60rem }}
+.wide {{ overflow-x: auto }}
+table {{ border-collapse: collapse; font-size: .9rem; margin: .6rem 0 }}
+th, td {{ text-align: left; vertical-align: top; padding: .2rem .9rem .2rem 0 }}
+th, td {{ border-bottom: 1px solid #d8d8d8 }}
+tr {{ break-inside: avoid }}
+.met, .missed {{ white-space: nowrap }}
+.met {{ color: #00614a }} .missed {{ color: #a33b00; font-weight: 700 }}
+.figures {{ display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 36rem), 1fr)) }}
+img {{ width: 100%; break-inside: avoid }}
+@media print {{ body {{ font-size: 10px }} .wide {{ overflow: visible }} }}
+</style></head><body><main>
+<h1>{title}</h1>"""

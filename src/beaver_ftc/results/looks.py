@@ -33,8 +33,8 @@ LOOKS = {
     "q": Look(BLUE, (), 1.4, 5),
     "r": Look(GREEN, (2, 2), 1.6, 4),
     # beside `actual` and `target` in one legend: no colour means two things
-    "error of p": Look(PURPLE, (7, 3), 1.4, 4),
-    "error of q": Look(BLACK, (), 1.2, 5),
+    "error of p": Look(SKY, (7, 3), 1.4, 4),
+    "error of q": Look(PURPLE, (), 1.4, 5),
     "error of r": Look(GREEN, (2, 2), 1.6, 4),
     "aileron": Look(SKY, (7, 2, 1.5, 2), 1.8, 3),
     "elevator": Look(BLUE, (), 1.8, 2),

@@ -26,6 +26,7 @@ from beaver_ftc.studies.compare.flights import (
 )
 from beaver_ftc.studies.compare.page import MARK, write_leaderboard, write_page
 from beaver_ftc.studies.compare.replay import Trace
+from beaver_ftc.studies.compare.runs import figure_of, read_runs
 from beaver_ftc.studies.compare.table import as_text
 from beaver_ftc.studies.compare.trial import LAW, ORACLE, SCHEME, Entry, entries_of, fly_case, with_entry
 from beaver_ftc.studies.compare.tune import (
@@ -285,7 +286,14 @@ def test_finished_runs_stand_side_by_side(tmp_path):
     assert done.exit_code == 0
     rows = {line.split("  ")[0]: line for line in done.output.splitlines()}
     assert "post RMS q, deg/s *" in rows
-    assert "fault" in rows
+    assert "law *" in rows
+    assert "scheme" in rows
+    assert rows["faults"].count("elevator loss of effectiveness magnitude 0.5 at 2 s") == 2
+    assert "* differs between the runs" in rows
+    figure = figure_of(read_runs(folders))
+    assert figure.get_suptitle() == "Tracking errors of a, b"
+    for axes in figure.axes:
+        assert [line.get_xdata()[0] for line in axes.lines if line.get_linestyle() == ":"] == [2.0]
     assert (tmp_path / "out" / "runs" / "runs.png").stat().st_size > 10_000
     page = (tmp_path / "out" / "runs" / "runs.html").read_text()
     assert page.count('<p class="folder">') == 2

@@ -7,6 +7,7 @@ import pytest
 from typer.testing import CliRunner
 
 from beaver_ftc.cli.main import app
+from beaver_ftc.results.looks import LOOKS
 from beaver_ftc.scenario.loader import load_scenario
 from beaver_ftc.studies.reproduce import words
 from beaver_ftc.studies.reproduce.cases import BESIDE, PUBLISHED, fly_case
@@ -152,3 +153,13 @@ def test_command_writes_table_figures_and_page(tmp_path):
     assert all(f"| {claim.statement} |" in text for claim in CLAIMS)
     assert all(f"figures/{view.name}.png" in text for view, _, _ in FIGURES)
     assert all(row["held_in"] > 0.8 * len(VARIANTS) for row in document["claims"])
+
+
+def test_no_look_in_a_figures_legend_means_two_things():
+    """Curves that look alike are called alike, and so share one entry of the legend."""
+    for view, _, _ in FIGURES:
+        said = {}
+        for trace in (trace for panel in view.panels for trace in panel.traces if trace.label):
+            look = LOOKS[trace.role]
+            said.setdefault((look.colour, look.dash), set()).add(trace.label)
+        assert all(len(labels) == 1 for labels in said.values()), (view.name, said)

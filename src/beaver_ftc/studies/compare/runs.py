@@ -3,12 +3,15 @@
 import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from beaver_ftc.errors import BadInput
 from beaver_ftc.results.looks import BLACK
 from beaver_ftc.scenario.problems import one_line
 from beaver_ftc.studies.engine.words import aligned, number
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 Document = dict[str, Any]
 
@@ -108,8 +111,8 @@ def labels(runs: Sequence[Document]) -> list[str]:
     return [one_line(name, 200) for name in (names if distinct else [run["folder"] for run in runs])]
 
 
-def write_figure(runs: Sequence[Document], path: Path) -> None:
-    """Tracking errors of all runs over time, one axis above the other, into a PNG; dotted: a fault begins."""
+def figure_of(runs: Sequence[Document]) -> "Figure":
+    """Tracking errors of all runs over time, one axis above the other; dotted: a fault begins."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(11.0, 9.0), layout="constrained")
@@ -130,7 +133,7 @@ def write_figure(runs: Sequence[Document], path: Path) -> None:
         )  # fmt: skip
     axes[0].legend(fontsize=8)
     axes[-1].set_xlabel("time, s")
-    figure.savefig(path, dpi=120)
+    return figure
 
 
 def write_runs(out: Path, folders: Sequence[Path]) -> list[Document]:
@@ -143,7 +146,7 @@ def write_runs(out: Path, folders: Sequence[Path]) -> list[Document]:
     runs = read_runs(folders)
     show_in_reports()
     with result_folder(out, "runs") as folder:
-        write_figure(runs, folder / "runs.png")
+        figure_of(runs).savefig(folder / "runs.png", dpi=120)
         (folder / "runs.json").write_text(as_json(runs), encoding="utf-8")
         write_report(folder / "runs.html", folders, labels(runs))
     return runs

@@ -21,7 +21,7 @@ def _surface(name: str) -> Panel:
         f"{name} deflection",
         (
             Trace(f"{name}_cmd_rad", "command", "command"),
-            Trace(f"{name}_effective_rad", "effective", "actual"),
+            Trace(f"{name}_effective_rad", "actual", "actual"),
         ),
     )
 
@@ -29,7 +29,7 @@ def _surface(name: str) -> Panel:
 def _rate(axis: str) -> Panel:
     return Panel(
         AXIS_NAMES[axis],
-        (Trace(f"{axis}_model_rad_s", "reference", "target"), Trace(f"{axis}_rad_s", "aircraft", "actual")),
+        (Trace(f"{axis}_model_rad_s", "reference", "target"), Trace(f"{axis}_rad_s", "actual", "actual")),
     )
 
 

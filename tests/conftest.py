@@ -10,3 +10,20 @@ sys.path.insert(0, str(Path(__file__).parent))
 # No deadline: a first call compiles. Derandomised: a red build can be repeated.
 settings.register_profile("repeatable", deadline=None, derandomize=True)
 settings.load_profile("repeatable")
+
+
+def pytest_sessionstart(session):
+    """Compile what flights use before the first test: what is said meanwhile is a test by itself."""
+    from beaver_ftc.compiled import cache_folder
+
+    folder = cache_folder()
+    if hasattr(session.config, "workerinput") or folder is None or (folder / "warm").exists():
+        return
+    from beaver_ftc.control.rivals.indi import IncrementalInversion
+    from beaver_ftc.diagnosis.rivals.rls import RlsMonitor
+    from beaver_ftc.loop.loop import fly
+    from flying import scenario
+
+    for plugged in ({}, {"detector": RlsMonitor()}, {"law": IncrementalInversion()}):
+        fly(scenario(duration_s=0.2, substeps=2, fdi={"statistical": {}}), **plugged)
+    (folder / "warm").touch()

@@ -4,30 +4,41 @@ rely on.
 Division by zero gives inf or nan, as in NumPy and JSBSim: the loop looks for non-finite values once a frame
 instead of every operation doing so. No fast-math: the same flight gives the same bits.
 
-Compiled code is kept in the user's cache, in a folder named after the sources. Numba itself looks only at
-the file of the outermost function: without this, a change in an inner kernel would leave an old outer one
-in use. It also works where the package is read-only.
+Compiled code is kept in the user's cache, in a folder named after the sources. A change in
+any of them makes a new folder. It also works where the package is read-only.
+
+A kernel that another one calls is only translated: to optimise is done once, for the outermost one and all
+it calls. Numba itself does it again at each level.
 """
 
+# mypy: disable-error-code="attr-defined"
 import contextlib
 import functools
 import hashlib
 import os
 import pickle
-import shutil
 import sys
-import tempfile
+import threading
 from collections.abc import Iterator
 from functools import lru_cache
 from pathlib import Path
 
 import numba
 import numpy as np
-from numba.core.caching import FunctionCache, IndexDataCacheFile
+from numba.core import serialize, sigutils
+from numba.core.codegen import CPUCodeLibrary
+from numba.core.compiler import CompileResult
+from numba.core.compiler_lock import global_compiler_lock
+from numba.core.cpu import CPUContext
 from numba.core.dispatcher import Dispatcher
+from numba.core.registry import CPUDispatcher
 from numba.core.runtime import rtsys
 
-_VERSIONS_KEPT = 5
+from beaver_ftc.paths import cache_base, folder_of_version
+
+COMPILING = "compiling the flight code, once for this version on this machine: some 15 s on an idle one"
+PATIENCE_S = 1.0  # what takes less needs no word
+
 _DIGEST_BYTES = 32
 
 _PACKAGE = Path(__file__).parent
@@ -51,29 +62,6 @@ _SOURCES = (
 )
 
 
-def _candidates() -> Iterator[Path]:
-    """Folders that may keep compiled code, best first."""
-    if "NUMBA_CACHE_DIR" in os.environ:
-        yield Path(os.environ["NUMBA_CACHE_DIR"])
-    with contextlib.suppress(RuntimeError):  # no home at all
-        yield Path(os.environ.get("XDG_CACHE_HOME") or Path("~/.cache").expanduser()) / "beaver-ftc"
-    with contextlib.suppress(FileNotFoundError):  # nor anywhere for temporary files
-        yield Path(tempfile.gettempdir()) / f"beaver-ftc-{_user()}"
-
-
-def _user() -> int:
-    return os.getuid() if hasattr(os, "getuid") else 0
-
-
-def _is_writable(folder: Path) -> bool:
-    """Whether the folder is ours to write. Code is loaded from it, so nobody else may own it."""
-    try:
-        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-        return os.access(folder, os.W_OK) and folder.stat().st_uid == _user()
-    except OSError:
-        return False
-
-
 def _fingerprint() -> str:
     digest = hashlib.sha256()
     for pattern in _SOURCES:
@@ -86,21 +74,8 @@ def _fingerprint() -> str:
 def cache_folder() -> Path | None:
     """Where compiled kernels are kept; None where nothing can be written, and each process then compiles
     its own."""
-    base = next((folder for folder in _candidates() if _is_writable(folder)), None)
-    if base is None:
-        return None
-    folder = base / _fingerprint()
-    if not folder.exists():
-        _discard_old(base)
-    return folder
-
-
-def _discard_old(base: Path) -> None:
-    """Remove what earlier versions have left, but for the latest: someone may be flying with them."""
-    folders = [folder for folder in base.glob("[0-9a-f]" * 16) if folder.is_dir()]
-    folders.sort(key=lambda folder: folder.stat().st_mtime, reverse=True)
-    for folder in folders[_VERSIONS_KEPT:]:
-        shutil.rmtree(folder, ignore_errors=True)
+    base = cache_base()
+    return base and folder_of_version(base, _fingerprint())
 
 
 def kernel(function):
@@ -121,12 +96,159 @@ def compile_into(folder: Path | None, function):
 
     With NUMBA_DISABLE_JIT=1 nothing is compiled: the same function, slow, for a debugger.
     """
-    if numba.config.DISABLE_JIT:  # type: ignore[attr-defined]
+    if numba.config.DISABLE_JIT:
         return _interpreted(function)
-    dispatcher = numba.njit(error_model="numpy")(function)
-    if folder is not None:
-        dispatcher._cache = _KernelCache(folder, function)  # type: ignore[attr-defined]
-    return dispatcher
+    return _Kernel(folder, function)
+
+
+class _Kernel(CPUDispatcher):
+    """A compiled function: kept by itself if Python calls it, and a part of the kernels that call it."""
+
+    def __init__(self, folder: Path | None, function) -> None:
+        super().__init__(function, targetoptions={"nopython": True, "error_model": "numpy"})
+        self._folder, self._store = folder, folder and _Store(folder, function)
+
+    def compile(self, sig):
+        """Machine code for arguments of these types; inside another kernel only what stands for it."""
+        types, _ = sigutils.normalize_signature(sig)
+        with global_compiler_lock, self._compiling_counter:
+            there = self.overloads.get(tuple(types))
+            if there is not None and (_nesting or not isinstance(there.entry_point, _Inner)):
+                return there.entry_point
+            if _nesting:
+                return self._translated(types, inner=True)
+            return self._loaded(types) or self._compiled(types)
+
+    def stored(self, types):
+        """The code an earlier process has kept, or None."""
+        return self._store and self._store.load(tuple(types), self.targetctx)
+
+    def _loaded(self, types):
+        found = self.stored(types)
+        if found is None:
+            return None
+        self._cache_hits[types] += 1
+        self.targetctx.insert_user_function(found.entry_point, found.fndesc, [found.library])
+        self.add_overload(found)
+        return found.entry_point
+
+    def _compiled(self, types):
+        """Compile, one process at a time, and keep the code."""
+        with _alone(self._folder), _announced():
+            if entry_point := self._loaded(types):
+                return entry_point  # another process came first
+            self.overloads.pop(tuple(types), None)
+            entry_point = self._translated(types, inner=False)
+            if self._store:
+                self._store.save(tuple(types), self.overloads[tuple(types)])
+        return entry_point
+
+    def _translated(self, types, inner: bool):
+        wrappers = {"no_cpython_wrapper": inner, "no_cfunc_wrapper": True}
+        self._compiler.targetoptions = self.targetoptions | wrappers
+        _nesting.append(self)
+        try:
+            result = self._compiler.compile(types, None)
+        finally:
+            _nesting.pop()
+        self.add_overload(result)
+        return result.entry_point
+
+
+class _Inner:
+    """Stands for the machine code of a function that is part of others only."""
+
+
+_nesting: list["_Kernel"] = []  # the kernels being compiled, each called by the one before
+
+
+def _finalize(library) -> None:
+    """In place of numba's: optimise a library with all that it calls; leave one that is part of another."""
+    library._raise_if_finalized()
+    library._translated_only = len(_nesting) > 1
+    if library._translated_only:
+        library._finalized = True
+        return
+    library._codegen._check_llvm_bugs()
+    own = {function.name for function in _defined(library._final_module)}
+    for called in _all_called(library, {}).values():
+        library._reload_init.update(called._reload_init)
+        library._final_module.link_in(_linkable(called), preserve=True)
+    for function in _defined(library._final_module):
+        if function.name not in own:
+            function.linkage = "linkonce_odr"
+    library._optimize_final_module()
+    library._final_module.verify()
+    library._finalize_final_module()
+
+
+def _defined(module):
+    return [function for function in module.functions if not function.is_declaration]
+
+
+def _all_called(library, found: dict) -> dict:
+    """The libraries that one needs, those that were only translated with all that they need."""
+    for called in library._linking_libraries:
+        if id(called) not in found:
+            found[id(called)] = called
+            if getattr(called, "_translated_only", False):
+                _all_called(called, found)
+    return found
+
+
+def _linkable(library):
+    """Its module; every function of one that was only translated, wanted so far or not."""
+    if not getattr(library, "_translated_only", False):
+        return library._get_module_for_linking()
+    module = library._final_module.clone()
+    for function in _defined(module):
+        function.linkage = "weak_odr"
+    return module
+
+
+def _executable(context, library, function, environment):
+    """In place of numba's: what Python calls, or what stands for it."""
+    library._ensure_finalized()
+    inner = len(_nesting) > 1
+    return _Inner() if inner else _numbas_executable(context, library, function, environment)
+
+
+def _add_overload(dispatcher, result) -> None:
+    """In place of numba's: what only stands for machine code cannot be called from Python."""
+    if isinstance(result.entry_point, _Inner):
+        dispatcher.overloads[tuple(result.signature.args)] = result
+    else:
+        _numbas_add_overload(dispatcher, result)
+
+
+_numbas_executable, _numbas_add_overload = CPUContext.get_executable, Dispatcher.add_overload
+Dispatcher.add_overload = _add_overload  # type: ignore
+CPUContext.get_executable = _executable  # type: ignore[method-assign]
+CPUCodeLibrary.finalize = _finalize  # type: ignore[method-assign]
+
+
+@contextlib.contextmanager
+def _alone(folder: Path | None) -> Iterator[None]:
+    """Wait until no other process compiles into this folder: it may be the very same."""
+    with contextlib.ExitStack() as held:
+        if folder is not None:
+            with contextlib.suppress(OSError, ImportError):  # no lock: then several may compile
+                import fcntl
+
+                folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+                fcntl.flock(held.enter_context((folder / "lock").open("w")), fcntl.LOCK_EX)
+        yield
+
+
+@contextlib.contextmanager
+def _announced() -> Iterator[None]:
+    """Say what takes so long, if it does."""
+    saying = threading.Timer(PATIENCE_S, _say_once, [COMPILING])
+    saying.start()
+    try:
+        yield
+    finally:
+        saying.cancel()
 
 
 def _interpreted(function):
@@ -137,7 +259,7 @@ def _interpreted(function):
         with np.errstate(all="ignore"):  # as compiled: inf and nan, and no word
             return function(*map(_with_attributes, arguments))
 
-    call.py_func = function  # type: ignore[attr-defined]
+    call.py_func = function
     return call
 
 
@@ -150,70 +272,49 @@ def _with_attributes(argument):
     return argument
 
 
-class _KernelCache(FunctionCache):
-    """Numba's cache of one kernel, in a folder of our own; what is damaged in it is compiled anew.
-
-    Numba is told of the folder for this function only: others' functions keep to their own.
-    """
+class _Store:
+    """The machine code of one kernel on the disk: a file a set of argument types, behind its digest."""
 
     def __init__(self, folder: Path, function) -> None:
-        others = numba.config.CACHE_DIR  # type: ignore[attr-defined]
-        numba.config.CACHE_DIR = str(folder)  # type: ignore[attr-defined]
+        self._folder = folder
+        code = function.__code__
+        self._name = f"{function.__module__}.{function.__qualname__}"
+        self._of = (self._name, code.co_firstlineno, code.co_code, sys.version_info, numba.__version__)
+
+    def _path(self, types, codegen) -> Path:
+        key = repr((*self._of, types, codegen.magic_tuple()))
+        return self._folder / f"{self._name.rpartition('.')[2]}-{hashlib.sha256(key.encode()).hexdigest()}"
+
+    def load(self, types, context):
+        """What was kept, ready to run; None if there is nothing, or it is not as it was written."""
+        context.refresh()
         try:
-            super().__init__(function)
-        finally:
-            numba.config.CACHE_DIR = others  # type: ignore[attr-defined]
-        stamp, base = self._cache_file._source_stamp, self._impl.filename_base
-        self._cache_file = _CheckedFiles(self._cache_path, base, stamp)
-
-    def save_overload(self, sig, data) -> None:
-        """Keep it; where that is impossible (a full disk), say so and fly without."""
-        try:
-            super().save_overload(sig, data)
-        except OSError as error:
-            reason = (error.strerror or str(error)).lower()
-            _say_once(
-                f"compiled code cannot be kept in {self._cache_path}: {reason}; each start compiles anew"
-            )
-
-
-class _CheckedFiles(IndexDataCacheFile):
-    """Index and data of one kernel, each behind its digest: machine code that is damaged must not run."""
-
-    def _load_index(self):
-        content = self._checked(self._index_path)
-        if content is None:
-            return {}
-        version, stamp, overloads = pickle.loads(content)
-        return overloads if (version, stamp) == (self._version, self._source_stamp) else {}
-
-    def _save_index(self, overloads) -> None:
-        self._write(self._index_path, self._dump((self._version, self._source_stamp, overloads)))
-
-    def _load_data(self, name):
-        content = self._checked(self._data_path(name))
-        if content is None:
-            raise FileNotFoundError(name)  # numba compiles it anew, and writes over it
-        return pickle.loads(content)
-
-    def _save_data(self, name, data) -> None:
-        self._write(self._data_path(name), self._dump(data))
-
-    def _write(self, path: str, content: bytes) -> None:
-        with self._open_for_write(path) as file:
-            file.write(hashlib.sha256(content).digest() + content)
-
-    def _checked(self, path: str) -> bytes | None:
-        """The content of a file; None if there is no such file, or it is not as it was written."""
-        try:
-            content = Path(path).read_bytes()
-        except FileNotFoundError:
+            content = self._path(types, context.codegen()).read_bytes()
+        except OSError:
             return None
         digest, content = content[:_DIGEST_BYTES], content[_DIGEST_BYTES:]
-        if hashlib.sha256(content).digest() == digest:
-            return content
-        _say_once(f"compiled code in {self._cache_path} is damaged; it is compiled anew")
-        return None
+        if hashlib.sha256(content).digest() != digest:  # damaged machine code must not run
+            _say_once(f"compiled code in {self._folder} is damaged; it is compiled anew")
+            return None
+        return CompileResult._rebuild(context, *pickle.loads(content))
+
+    def save(self, types, result) -> None:
+        """Keep it; where that is impossible (a full disk), say so and fly without."""
+        content = serialize.dumps(result._reduce())
+        try:
+            self._write(self._path(types, result.codegen), hashlib.sha256(content).digest() + content)
+        except OSError as error:
+            reason = (error.strerror or str(error)).lower()
+            _say_once(f"compiled code cannot be kept in {self._folder}: {reason}; each start compiles anew")
+
+    def _write(self, path: Path, content: bytes) -> None:
+        self._folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        partial = path.with_name(f"{path.name}.{os.getpid()}")
+        try:
+            partial.write_bytes(content)
+            partial.replace(path)
+        finally:
+            partial.unlink(missing_ok=True)
 
 
 @functools.cache
@@ -251,7 +352,7 @@ def _stored(function, types):
     """
     try:
         rtsys.initialize(function.targetctx)
-        found = function._cache._load_overload(types, function.targetctx)
+        found = function.stored(types)
     except Exception:
         return None
     return found.entry_point if found is not None else None

@@ -6,11 +6,13 @@ import os
 import shutil
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from beaver_ftc import compiled
+from beaver_ftc import compiled, paths
 from beaver_ftc.paths import data_root
 
 REPOSITORY = data_root()
@@ -22,7 +24,7 @@ def nowhere(monkeypatch, tmp_path):
     for name in ("XDG_CACHE_HOME", "NUMBA_CACHE_DIR"):
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setenv("HOME", os.devnull)
-    monkeypatch.setattr(compiled.tempfile, "gettempdir", lambda: os.devnull)
+    monkeypatch.setattr(paths.tempfile, "gettempdir", lambda: os.devnull)
     compiled.cache_folder.cache_clear()
     yield monkeypatch
     compiled.cache_folder.cache_clear()
@@ -40,7 +42,7 @@ def test_numbas_own_setting_beats_it(nowhere, tmp_path):
 
 
 def test_without_a_home_there_is_the_folder_for_temporary_files(nowhere, tmp_path):
-    nowhere.setattr(compiled.tempfile, "gettempdir", lambda: str(tmp_path))
+    nowhere.setattr(paths.tempfile, "gettempdir", lambda: str(tmp_path))
     folder = compiled.cache_folder().parent
     assert folder.parent == tmp_path
     assert folder.stat().st_mode & 0o077 == 0, "code is loaded from it: it is nobody else's business"
@@ -57,15 +59,15 @@ def test_no_home_at_all_and_no_folder_for_temporary_files_is_no_error(nowhere):
     def no_folder():
         raise FileNotFoundError("no usable temporary directory")
 
-    nowhere.setattr(compiled.Path, "expanduser", none)
-    nowhere.setattr(compiled.tempfile, "gettempdir", no_folder)
+    nowhere.setattr(paths.Path, "expanduser", none)
+    nowhere.setattr(paths.tempfile, "gettempdir", no_folder)
     assert compiled.cache_folder() is None
 
 
 @pytest.mark.skipif(not hasattr(os, "getuid"), reason="folders have no owner here")
 def test_a_folder_somebody_else_owns_is_not_trusted(nowhere, tmp_path):
     nowhere.setenv("XDG_CACHE_HOME", str(tmp_path))
-    nowhere.setattr(compiled, "_user", lambda: os.getuid() + 1)
+    nowhere.setattr(paths, "_user", lambda: os.getuid() + 1)
     assert compiled.cache_folder() is None
 
 
@@ -80,7 +82,7 @@ def test_what_old_versions_left_goes_but_for_the_latest(nowhere, tmp_path):
     compiled.cache_folder()
     assert {path.name for path in base.iterdir()} == {
         "keep-me",
-        *(folder.name for folder in old[-compiled._VERSIONS_KEPT :]),
+        *(folder.name for folder in old[-paths._VERSIONS_KEPT :]),
     }
 
 
@@ -175,17 +177,14 @@ def small(folder):
     return done.stdout.strip(), done.stderr
 
 
-@pytest.mark.parametrize("ending", ["nbi", "nbc"])
 @pytest.mark.parametrize("damage", ["empty", "cut short", "one bit"])
-def test_damaged_code_is_compiled_anew_and_it_is_said_once(tmp_path, ending, damage):
+def test_damaged_code_is_compiled_anew_and_it_is_said_once(tmp_path, damage):
     assert small(tmp_path) == ("compiled", "")
     assert small(tmp_path) == ("loaded", "")
-    files = list((tmp_path / "cache").rglob(f"*.{ending}"))
-    assert len(files) == 2
-    for file in files:
-        content = bytearray(file.read_bytes())
-        content[len(content) // 2] ^= 1
-        file.write_bytes({"empty": b"", "cut short": content[:100], "one bit": content}[damage])
+    (file,) = (tmp_path / "cache").glob("outer-*")
+    content = bytearray(file.read_bytes())
+    content[len(content) // 2] ^= 1
+    file.write_bytes({"empty": b"", "cut short": content[:100], "one bit": content}[damage])
     how, said = small(tmp_path)
     assert how == "compiled"
     assert said.count("\n") == 1
@@ -193,11 +192,43 @@ def test_damaged_code_is_compiled_anew_and_it_is_said_once(tmp_path, ending, dam
     assert small(tmp_path) == ("loaded", "")
 
 
+def test_several_processes_compile_once(tmp_path):
+    (tmp_path / "small.py").write_text(
+        SMALL.replace("2.0 * x", "2.0 * x" + "".join(f" * {i}.0 / {i}.0" for i in range(2, 60)))
+    )
+    command = [sys.executable, tmp_path / "small.py", tmp_path / "cache"]
+    several = [subprocess.Popen(command, stdout=subprocess.PIPE, text=True) for _ in range(4)]
+    assert sorted(one.communicate()[0].strip() for one in several) == ["compiled", *["loaded"] * 3]
+
+
+def test_an_inner_kernel_can_be_called_by_itself_before_and_after(tmp_path):
+    @partial(compiled.compile_into, None)
+    def inner(x):
+        return np.sqrt(x[0]) + max(x[1], 0.5)
+
+    @partial(compiled.compile_into, None)
+    def outer(x):
+        x[:] = x * 2.0
+        return inner(x) + 1.0
+
+    assert inner(np.array([9, 4])) == 7.0
+    assert outer(np.array([2.0, 1.5])) == 6.0
+    assert inner(np.array([9.0, 0.0])) == 3.5
+    assert outer(np.array([2.0, 1.5])) == 6.0
+
+
+def test_what_takes_long_is_said(monkeypatch, capsys):
+    monkeypatch.setattr(compiled, "PATIENCE_S", 0.0)
+    compiled._say_once.cache_clear()
+    assert compiled.compile_into(None, lambda x: np.sin(x) + 1)(0.0) == 1.0
+    assert capsys.readouterr().err == f"beaver-ftc: {compiled.COMPILING}\n"
+
+
 def test_a_full_disk_for_the_cache_is_said_and_does_not_matter(tmp_path, monkeypatch, capsys):
     def full(*_):
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr(compiled._CheckedFiles, "_write", full)
+    monkeypatch.setattr(compiled._Store, "_write", full)
     twice = compiled.compile_into(tmp_path, lambda x: 2 * x)
     assert twice(3) == 6
     assert "compiled code cannot be kept in" in capsys.readouterr().err
@@ -221,7 +252,6 @@ print(json.dumps({k: v for k, v in vars(flight).items() if k != "scenario"}))
             text=True,
             check=True,
         )
-        assert done.stderr == ""
         flights.append(json.loads(done.stdout))
     compiled_one, plain = flights
     assert plain["isolated"] == compiled_one["isolated"] == "elevator"

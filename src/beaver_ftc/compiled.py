@@ -43,23 +43,11 @@ _DIGEST_BYTES = 32
 
 _PACKAGE = Path(__file__).parent
 _SOURCES = (
-    "aircraft/schema.py",
-    "design/*.py",
-    "diagnosis/*.py",
-    "diagnosis/types/*.py",
-    "control/*.py",
-    "control/laws/*.py",
-    "plant/channels.py",
-    "plant/native.py",
-    "plant/instruments.py",
-    "compiled.py",
-    "plant/sensing.py",
-    "loop/frame.py",
-    "loop/accounts.py",
-    "loop/record.py",
-    "loop/steps.py",
-    "loop/watching.py",
-)
+    "aircraft/schema.py", "design/*.py", "diagnosis/*.py", "diagnosis/types/*.py", "control/*.py",
+    "control/laws/*.py", "plant/channels.py", "plant/native.py", "plant/instruments.py",
+    "compiled.py", "plant/sensing.py", "loop/frame.py", "loop/accounts.py", "loop/record.py",
+    "loop/steps.py", "loop/watching.py",
+)  # fmt: skip
 
 
 def _fingerprint() -> str:

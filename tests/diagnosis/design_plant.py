@@ -61,7 +61,7 @@ class DesignPlant:
         if numba.config.DISABLE_JIT:
             self.frames = self.frames.view(np.recarray)
         self.frame, self.fdi = self.frames[0], self.frames[0]["fdi"]
-        self.fdi["earth_rate"] = 0.0  # this plant flies over a flat Earth at rest
+        self.fdi["bound"]["earth_rate"] = 0.0  # this plant flies over a flat Earth at rest
         self.dt, self.airspeed_mps = 1.0 / rate_hz, airspeed_mps
         self.surface = surface
         self.position = position or (lambda k, u: u * (1 + theta(k)) if theta else u)
@@ -121,7 +121,7 @@ class DesignPlant:
         f, G = belief["f"].copy(), belief["G"].copy()
         phi = self.effect(G)
         frame["accounts"]["guarantee"]["phi"] = phi
-        bound = np.maximum(self.fdi["eta_bar_now"] - ROUNDING_RAD_S2, 0.0)
+        bound = np.maximum(self.fdi["bound"]["eta_bar_now"] - ROUNDING_RAD_S2, 0.0)
         conclude(self.frames)
         eta = np.clip(uncertainty(self, bound, phi), -bound, bound)
         self.innovations.append(phi + eta)
@@ -133,7 +133,7 @@ class DesignPlant:
 
     @property
     def detected_at_s(self):
-        return float(self.fdi["detected_at_s"]) if self.fdi["detected"] else np.inf
+        return float(self.fdi["verdict"]["detected_at_s"]) if self.fdi["verdict"]["detected"] else np.inf
 
     @property
     def certain_after_s(self):
@@ -146,7 +146,7 @@ class DesignPlant:
 
     def position_excluded(self, surface):
         """Whether the estimator of a surface that may be anywhere has been excluded."""
-        return self.excluded(int(self.fdi["position_of"][surface]))
+        return self.excluded(int(self.fdi["layout"]["position_of"][surface]))
 
 
 def _random(plant, bound, phi):
@@ -160,7 +160,7 @@ def _bang_bang(plant, bound, phi):
 
 def _push(plant, bound, phi):
     """Everything in the direction in which the residual already leans."""
-    return bound * np.where(plant.fdi["bank_residual"][0] >= 0, 1.0, -1.0)
+    return bound * np.where(plant.fdi["bank"]["residual"][0] >= 0, 1.0, -1.0)
 
 
 def _hide(plant, bound, phi):

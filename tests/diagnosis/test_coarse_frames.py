@@ -42,8 +42,13 @@ def fill(frame, rng):
     belief = frame["belief"]
     for name in ("f", "G", "u"):
         belief[name] = rng.uniform(-1, 1, belief[name].shape)
-    frame["fdi"]["eta_bar_now"] = rng.uniform(0, 1, 3)
-    return belief["f"].copy(), belief["G"].copy(), belief["u"].copy(), frame["fdi"]["eta_bar_now"].copy()
+    frame["fdi"]["bound"]["eta_bar_now"] = rng.uniform(0, 1, 3)
+    return (
+        belief["f"].copy(),
+        belief["G"].copy(),
+        belief["u"].copy(),
+        frame["fdi"]["bound"]["eta_bar_now"].copy(),
+    )
 
 
 @pytest.mark.parametrize("substeps", [1, 2, 7])
@@ -57,7 +62,9 @@ def test_what_is_believed_is_the_mean_over_the_instants(substeps):
     over(frames)
     believed = np.mean([f + G @ u for f, G, u, _ in seen], axis=0)
     assert frames[0]["belief"]["means"]["acceleration"] == pytest.approx(believed)
-    assert frames[0]["fdi"]["eta_bar"] == pytest.approx(np.mean([bound for *_, bound in seen], axis=0))
+    assert frames[0]["fdi"]["bound"]["eta_bar"] == pytest.approx(
+        np.mean([bound for *_, bound in seen], axis=0)
+    )
 
 
 numbers = st.floats(-2, 2)

@@ -84,8 +84,8 @@ def test_an_estimate_is_certain_to_lie_in_its_interval(noisy):
 def test_blocks_see_what_frames_do_not():
     """With noisy gyros a frame leaves the rudder several degrees of room, a block a small part of it."""
     plant = fly(4, True, "bias", 2, 30, 0.9, 600)
-    known, estimator = plant.fdi["surface"][2], plant.fdi["estimator"][plant.fdi["position_of"][2]]
-    of_a_frame = 2 * plant.fdi["frame_bound"][2] / abs(estimator["effect"]["Z"][2])
+    known, estimator = plant.fdi["surface"][2], plant.fdi["estimator"][plant.fdi["layout"]["position_of"][2]]
+    of_a_frame = 2 * plant.fdi["bound"]["frame"][2] / abs(estimator["effect"]["Z"][2])
     assert known["high"] - known["low"] < 0.5 * of_a_frame
 
 

@@ -41,7 +41,7 @@ def bound(x, y, u, **bounds):
     scenario = Scenario.model_validate({"name": "x", "fdi": {"bounds": bounds}})
     frame = assemble(scenario, np.zeros(4), TRAVEL_RAD)[0]
     out = np.zeros(3)
-    derived_bound(frame["fdi"]["admitted"], frame["belief"]["design"], x, y, u, out)
+    derived_bound(frame["fdi"]["bound"]["admitted"], frame["belief"]["design"], x, y, u, out)
     return out
 
 
@@ -157,8 +157,8 @@ def test_a_surfaces_own_share_of_the_bound_is_its_slope(seed, surface):
     further = u.copy()
     further[surface] = np.sign(u[surface]) * (abs(u[surface]) + 1.0)
     frame = assemble(Scenario.model_validate({"name": "x", "fdi": {"bounds": bounds}}), u, TRAVEL_RAD)[0]
-    derived_bound(frame["fdi"]["admitted"], frame["belief"]["design"], x, y, u, np.zeros(3))
-    slack_per_rad(frame["fdi"]["admitted"], frame["belief"]["design"], surface)
+    derived_bound(frame["fdi"]["bound"]["admitted"], frame["belief"]["design"], x, y, u, np.zeros(3))
+    slack_per_rad(frame["fdi"]["bound"]["admitted"], frame["belief"]["design"], surface)
     rise = bound(x, y, further, **bounds) - bound(x, y, u, **bounds)
-    assert frame["fdi"]["admitted"]["per_rad"][:, surface] == pytest.approx(rise, abs=1e-9)
+    assert frame["fdi"]["bound"]["admitted"]["per_rad"][:, surface] == pytest.approx(rise, abs=1e-9)
     assert rise.max() > 0.1

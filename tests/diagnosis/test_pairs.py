@@ -50,7 +50,7 @@ def test_ailerons_and_rudder(seed, uncertainty, kind, other, at, later, share, o
     check(plant, faults)
     for surface, one, _, _ in faults:
         assert not plant.fdi["surface"][surface]["type_excluded"][TYPES[one][1]]
-    assert not plant.fdi["no_lateral_pair"]
+    assert not plant.fdi["pair"]["no_lateral_pair"]
 
 
 @settings(max_examples=40, deadline=None)

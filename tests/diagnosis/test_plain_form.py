@@ -19,8 +19,10 @@ for seed, surface, profile in ((1, 0, "any"), (2, 1, "abrupt"), (3, 2, "any")):
                         fault_profile=profile, pole_bank_per_s=[3.0, 1e6])
     plant.fly(90, UNCERTAINTIES["random"])
     fdi = plant.fdi
-    numbers += [float(fdi["detected_at_s"]), float(fdi["isolated_at_s"]), *map(float, fdi["residual"])]
-    numbers += [*map(float, fdi["bank_residual"].ravel()), *map(float, fdi["bank_threshold"].ravel())]
+    verdict = fdi["verdict"]
+    numbers += [float(verdict["detected_at_s"]), float(verdict["isolated_at_s"])]
+    numbers += map(float, fdi["fdae"]["residual"])
+    numbers += [*map(float, fdi["bank"]["residual"].ravel()), *map(float, fdi["bank"]["threshold"].ravel())]
     for fie in fdi["estimator"][:3]:
         for name in ("residual", "lower", "upper", "theta", "reach_low", "theta_low", "theta_high"):
             numbers += map(float, fie[name].ravel())

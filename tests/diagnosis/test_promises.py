@@ -61,9 +61,9 @@ any_course = st.one_of(
 @given(flights, uncertainties, st.sampled_from(["interval", "published"]))
 def test_no_admissible_uncertainty_raises_an_alarm(flight, uncertainty, thresholds):
     plant = DesignPlant(thresholds=thresholds, **flight).fly(FRAMES, uncertainty)
-    assert not plant.fdi["detected"]
+    assert not plant.fdi["verdict"]["detected"]
     assert not any(plant.excluded(s) for s in range(3))
-    assert max(plant.fdi["closest"]) <= 1.0  # of every filter, however near the uncertainty drives it
+    assert max(plant.fdi["bank"]["closest"]) <= 1.0  # of every filter, however near the uncertainty drives it
 
 
 @settings(max_examples=150, deadline=None)
@@ -106,7 +106,7 @@ def test_a_constant_true_fault_is_never_excluded_by_any_threshold(
         surface=surface, theta=theta, thresholds=thresholds, fault_profile="abrupt", **flight
     ).fly(FRAMES, uncertainty)
     assert not plant.excluded(surface)
-    if plant.fdi["detected"]:
+    if plant.fdi["verdict"]["detected"]:
         fie, true = plant.fdi["estimator"][surface], theta(FRAMES)
         assert (fie["theta_low"] <= true + 1e-9).all()
         assert (fie["theta_high"] >= true - 1e-9).all()
@@ -123,13 +123,13 @@ def test_detected_no_later_than_the_guaranteed_instant(flight, uncertainty, surf
 def test_an_uncertainty_that_hides_the_fault_delays_detection_to_the_guaranteed_instant(surface):
     """The guarantee is not slack: the worst uncertainty there is makes it come true and no earlier."""
     plant = DesignPlant(seed=3, surface=surface, theta=incipient(20, 1.0, 0.01))
-    plant.fly(2000, UNCERTAINTIES["hide"], until=lambda p: p.fdi["detected"])
+    plant.fly(2000, UNCERTAINTIES["hide"], until=lambda p: p.fdi["verdict"]["detected"])
     assert plant.detected_at_s == plant.certain_after_s < np.inf
 
 
 def test_bounds_are_attained_so_no_smaller_ones_would_do():
     plant = DesignPlant(seed=1, pole_bank_per_s=[2.0, 50.0, 1e6]).fly(400, lambda p, bound, phi: bound)
-    assert plant.fdi["closest"][:4] == pytest.approx(1.0, abs=1e-6)
+    assert plant.fdi["bank"]["closest"][:4] == pytest.approx(1.0, abs=1e-6)
 
 
 def test_filters_and_bounds_are_the_convolutions_they_stand_for():
@@ -139,8 +139,8 @@ def test_filters_and_bounds_are_the_convolutions_they_stand_for():
     weight = plant.dt * np.exp(-lam * plant.dt * np.arange(198, -1, -1))
     residual = weight @ np.array(plant.innovations[:199])
     bound = weight @ np.array(plant.bounds[:199])
-    assert plant.fdi["bank_residual"][0] == pytest.approx(residual, abs=1e-12)
-    assert plant.fdi["bank_threshold"][0] == pytest.approx(bound, abs=1e-10)
+    assert plant.fdi["bank"]["residual"][0] == pytest.approx(residual, abs=1e-12)
+    assert plant.fdi["bank"]["threshold"][0] == pytest.approx(bound, abs=1e-10)
 
 
 @settings(max_examples=60, deadline=None)
@@ -152,7 +152,7 @@ def test_no_filter_alarms_before_the_innovation_itself(seed, rate_hz, pole, surf
         plant = DesignPlant(
             seed, rate_hz, surface=surface, theta=theta, pole_bank_per_s=bank, detection_pole_per_s=lam
         )
-        return plant.fly(FRAMES, uncertainty, until=lambda p: p.fdi["detected"]).detected_at_s
+        return plant.fly(FRAMES, uncertainty, until=lambda p: p.fdi["verdict"]["detected"]).detected_at_s
 
     assert alarm([1e6], pole) <= alarm([], pole)
 
@@ -173,9 +173,9 @@ def test_more_sharpening_never_isolates_later(seed, surface, size, uncertainty):
 
 def test_a_surface_is_named_at_the_alarm_when_no_other_moves_that_axis():
     plant = DesignPlant(seed=5, surface=1, theta=constant(40, 0.5))
-    plant.fly(200, UNCERTAINTIES["random"], until=lambda p: p.fdi["detected"])
-    assert plant.fdi["isolated"] == SURFACES.index("elevator")
-    assert plant.fdi["isolated_at_s"] == plant.fdi["detected_at_s"]
+    plant.fly(200, UNCERTAINTIES["random"], until=lambda p: p.fdi["verdict"]["detected"])
+    assert plant.fdi["verdict"]["isolated"] == SURFACES.index("elevator")
+    assert plant.fdi["verdict"]["isolated_at_s"] == plant.fdi["verdict"]["detected_at_s"]
 
 
 @settings(max_examples=60, deadline=None)
@@ -185,7 +185,7 @@ def test_a_constant_parameter_stays_in_its_shrinking_set(seed, surface, size):
     plant = DesignPlant(seed, surface=surface, theta=constant(20, size), fault_profile="abrupt")
     plant.fly(200, lambda *_: np.zeros(3), until=lambda p: False)
     fie = plant.fdi["estimator"][surface]
-    if plant.fdi["detected"]:
+    if plant.fdi["verdict"]["detected"]:
         assert fie["theta_low"][0] - 1e-9 <= -size <= fie["theta_high"][0] + 1e-9
         assert fie["theta_low"][0] <= fie["theta"][0] <= fie["theta_high"][0]
         assert fie["theta_low"][0] == fie["theta_low"][2]

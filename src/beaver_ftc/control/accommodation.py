@@ -35,8 +35,8 @@ def accommodate(control, fdi, belief, measured, faults):
         control.target[s], control.offset[s], control.lag[s] = 1.0, 0.0, 0.0
         if control.law == ORACLE:
             true_surface(control, faults, s, belief.u[s])
-        elif fdi.estimates and fdi.detected:
-            control.target[s] = fdi.effectiveness[s]
+        elif fdi.verdict.estimates and fdi.verdict.detected:
+            control.target[s] = fdi.verdict.effectiveness[s]
         elif fdi.every_type and fdi.surface[s].measure >= 0:
             act_on_type(control, fdi, s)
         elif s == surface and not fdi.every_type:
@@ -77,9 +77,9 @@ def compensate(control, fdi, belief, measured, faults):
         return  # its observer finds what is unknown
     if control.law == ORACLE:
         control.fhat[PITCH] = unanticipated_pitch(belief.design, measured.y, faults.Cm_alpha3)
-    elif control.law != NOMINAL and fdi.detected:
+    elif control.law != NOMINAL and fdi.verdict.detected:
         unknown_acceleration(fdi, control.fhat)
-        if fdi.lead >= 0 and fdi.lead_kind == LAGS:
+        if fdi.verdict.lead >= 0 and fdi.verdict.lead_kind == LAGS:
             control.fhat[:] = 0.0  # to ask a slow surface for what it lacks would only wind the command up
 
 

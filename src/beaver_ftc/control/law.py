@@ -13,7 +13,7 @@ from beaver_ftc.diagnosis.state import NOT_ISOLATED, PITCH
 @kernel
 def in_doubt(control, fdi):
     """Whether elevator or flap is at fault and it has long been open which."""
-    open_question = fdi.every_type and fdi.detected and fdi.isolated == NOT_ISOLATED
+    open_question = fdi.every_type and fdi.verdict.detected and fdi.verdict.isolated == NOT_ISOLATED
     long = fdi.surface[control.main[PITCH]].evidence >= fdi.patience
     return open_question and long and control.law not in (NOMINAL, ORACLE)
 
@@ -52,10 +52,10 @@ def command(control, fdi, belief, measured, faults, mode, t):
     give_up(control, fdi, faults)
     if control.inner != REJECTING:
         nominal.integrate(control, measured.x, control.G, control.command)
-    if faults.present or control.hedging or (control.power.enabled and fdi.detected):
+    if faults.present or control.hedging or (control.power.enabled and fdi.verdict.detected):
         authority.note_shortfall(control, control.G, control.command)
     if control.power.enabled:
-        power.steer(control, measured.x, measured.y, fdi.detected, t)
+        power.steer(control, measured.x, measured.y, fdi.verdict.detected, t)
     if control.inner == REJECTING:
         rejecting.hurry(control, belief.u)
 

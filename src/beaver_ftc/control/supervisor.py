@@ -54,10 +54,12 @@ def mode_from(control, fdi):
     """The mode that the diagnosis asks for."""
     elevator = control.main[PITCH]
     if not fdi.every_type:
-        return mode_of(control.law, fdi.detected, fdi.isolated, isolated_surface(fdi) == elevator)
-    replaced = fdi.lead_kind in (LOSES, FIXED)
-    isolated = fdi.lead if replaced else min(fdi.isolated, 0)
-    return mode_of(control.law, fdi.detected, isolated, replaced and fdi.lead == elevator)
+        return mode_of(
+            control.law, fdi.verdict.detected, fdi.verdict.isolated, isolated_surface(fdi) == elevator
+        )
+    replaced = fdi.verdict.lead_kind in (LOSES, FIXED)
+    isolated = fdi.verdict.lead if replaced else min(fdi.verdict.isolated, 0)
+    return mode_of(control.law, fdi.verdict.detected, isolated, replaced and fdi.verdict.lead == elevator)
 
 
 @kernel

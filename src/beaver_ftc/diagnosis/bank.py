@@ -41,21 +41,21 @@ def innovate(fdi, x, x_then, believed):
     """
     for i in range(3):
         fdi.innovation[i] = (x[i] - x_then[i]) / fdi.dt - believed[i]
-        fdi.frame_bound[i] = fdi.eta_bar[i] + (fdi.noise[i] + fdi.noise_then[i]) / fdi.dt
-        for m in range(fdi.n_poles):
-            a = fdi.bank_decay[m]
-            fdi.bank_residual[m, i] = a * fdi.bank_residual[m, i] + fdi.dt * fdi.innovation[i]
-            fdi.bank_eta[m, i] = bound_step(fdi.bank_eta[m, i], fdi.eta_bar[i], a, fdi.dt)
-            fdi.bank_noise[m, i] = noise_step(fdi.bank_noise[m, i], fdi.noise_then[i], a)
-            fdi.bank_threshold[m, i] = fdi.bank_eta[m, i] + fdi.bank_noise[m, i] + fdi.noise[i]
+        fdi.bound.frame[i] = fdi.bound.eta_bar[i] + (fdi.bound.noise[i] + fdi.bound.noise_then[i]) / fdi.dt
+        for m in range(fdi.bank.n):
+            a = fdi.bank.decay[m]
+            fdi.bank.residual[m, i] = a * fdi.bank.residual[m, i] + fdi.dt * fdi.innovation[i]
+            fdi.bank.eta[m, i] = bound_step(fdi.bank.eta[m, i], fdi.bound.eta_bar[i], a, fdi.dt)
+            fdi.bank.noise[m, i] = noise_step(fdi.bank.noise[m, i], fdi.bound.noise_then[i], a)
+            fdi.bank.threshold[m, i] = fdi.bank.eta[m, i] + fdi.bank.noise[m, i] + fdi.bound.noise[i]
 
 
 @kernel
 def alarm(fdi):
     """The first axis on which a filter of the bank leaves its bound, or -1."""
     for i in range(3):
-        for m in range(fdi.n_poles):
-            if abs(fdi.bank_residual[m, i]) > fdi.bank_threshold[m, i]:
+        for m in range(fdi.bank.n):
+            if abs(fdi.bank.residual[m, i]) > fdi.bank.threshold[m, i]:
                 return i
     return -1
 
@@ -64,21 +64,21 @@ def alarm(fdi):
 def largest_share(fdi):
     """The largest share of its bound that a filter of the bank reaches."""
     largest = 0.0
-    for m in range(fdi.n_poles):
+    for m in range(fdi.bank.n):
         for i in range(3):
-            if fdi.bank_threshold[m, i] > 0.0:
-                largest = max(largest, abs(fdi.bank_residual[m, i]) / fdi.bank_threshold[m, i])
+            if fdi.bank.threshold[m, i] > 0.0:
+                largest = max(largest, abs(fdi.bank.residual[m, i]) / fdi.bank.threshold[m, i])
     return largest
 
 
 @kernel
 def note_closest_approach(fdi):
     """Keep the largest share of its bound that each filter has reached."""
-    for m in range(fdi.n_poles):
+    for m in range(fdi.bank.n):
         for i in range(3):
-            if fdi.bank_threshold[m, i] > 0.0:
-                share = abs(fdi.bank_residual[m, i]) / fdi.bank_threshold[m, i]
-                fdi.closest[m] = max(fdi.closest[m], share)
+            if fdi.bank.threshold[m, i] > 0.0:
+                share = abs(fdi.bank.residual[m, i]) / fdi.bank.threshold[m, i]
+                fdi.bank.closest[m] = max(fdi.bank.closest[m], share)
     fdi.statistical.closest = max(fdi.statistical.closest, fdi.statistical.score)
 
 
@@ -107,8 +107,8 @@ def remember(fdi, fie):
     """Advance what the fault can have done to each filter since the flight began; channel 3 is `across`."""
     for channel in range(4):
         low, high = extremes(fie, channel) if channel < 3 else aligned_extremes(fie)
-        for m in range(fdi.n_poles):
-            a = fdi.bank_decay[m]
+        for m in range(fdi.bank.n):
+            a = fdi.bank.decay[m]
             fie.reach_low[m, channel] = a * fie.reach_low[m, channel] + fdi.dt * low
             fie.reach_high[m, channel] = a * fie.reach_high[m, channel] + fdi.dt * high
 
@@ -119,10 +119,10 @@ def explains(fdi, fie, shared):
 
     `shared`: also across its direction, which only a parameter shared by the axes confines.
     """
-    for m in range(fdi.n_poles):
+    for m in range(fdi.bank.n):
         residual, bound = 0.0, 0.0
         for i in range(3):
-            r, b = fdi.bank_residual[m, i], fdi.bank_threshold[m, i]
+            r, b = fdi.bank.residual[m, i], fdi.bank.threshold[m, i]
             if not fie.reach_low[m, i] - b <= r <= fie.reach_high[m, i] + b and not fie.unasked[i]:
                 return False
             residual += fie.across[i] * r

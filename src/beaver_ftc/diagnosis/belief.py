@@ -63,16 +63,18 @@ def respond(belief, measured):
 
 @kernel
 def bound_now(fdi, belief, measured):
-    """Fill fdi.eta_bar_now (3,) rad/s2, the bound on the uncertainty at this instant."""
+    """Fill fdi.bound.eta_bar_now (3,) rad/s2, the bound on the uncertainty at this instant."""
     x = measured.x
-    fdi.eta_bar_now[:] = 0.0
-    if fdi.admitted.any:
-        derived_bound(fdi.admitted, belief.design, x, measured.y, belief.u, fdi.eta_bar_now)
-        if fdi.own_errors:
+    fdi.bound.eta_bar_now[:] = 0.0
+    if fdi.bound.admitted.any:
+        derived_bound(fdi.bound.admitted, belief.design, x, measured.y, belief.u, fdi.bound.eta_bar_now)
+        if fdi.bound.own_errors:
             for s in range(belief.u.size):
-                slack_per_rad(fdi.admitted, belief.design, s)
-        x = fdi.admitted.far_x
-    uncertainty_bound(x, belief.design, fdi.inertia, fdi.constant, fdi.earth_rate, fdi.eta_bar_now)
+                slack_per_rad(fdi.bound.admitted, belief.design, s)
+        x = fdi.bound.admitted.far_x
+    uncertainty_bound(
+        x, belief.design, fdi.bound.inertia, fdi.bound.constant, fdi.bound.earth_rate, fdi.bound.eta_bar_now
+    )
 
 
 @kernel
@@ -81,12 +83,12 @@ def sum_up(fdi, belief):
     total, G, u = belief.sums, belief.G, belief.u
     for i in range(3):
         total.f[i] += belief.f[i]
-        total.eta_bar[i] += fdi.eta_bar_now[i]
+        total.eta_bar[i] += fdi.bound.eta_bar_now[i]
         for s in range(u.size):
             total.G[i, s] += G[i, s]
             total.Gu[i, s] += G[i, s] * u[s]
-    if fdi.own_errors:
-        sum_up_own_errors(fdi.admitted.per_rad, u, total)
+    if fdi.bound.own_errors:
+        sum_up_own_errors(fdi.bound.admitted.per_rad, u, total)
 
 
 @kernel
@@ -109,10 +111,10 @@ def elapse(fdi, belief):
             mean.Gu[i, s] = share * total.Gu[i, s]
             rate += mean.Gu[i, s]
         mean.acceleration[i] = rate
-        fdi.eta_bar[i] = share * total.eta_bar[i]
-    if fdi.own_errors:
-        fdi.own_per_rad[:] = share * total.own_per_rad
-        fdi.own[:] = share * total.own
+        fdi.bound.eta_bar[i] = share * total.eta_bar[i]
+    if fdi.bound.own_errors:
+        fdi.bound.own_per_rad[:] = share * total.own_per_rad
+        fdi.bound.own[:] = share * total.own
     if share < 1.0:
         spread(belief)
 
@@ -138,10 +140,10 @@ def spread(belief):
 def look_back(fdi, belief, measured, k):
     """What the design model makes of the frame that has elapsed: its bound and its means; k: its number."""
     bound_now(fdi, belief, measured)
-    fdi.eta_bar[:] = fdi.eta_bar_now
-    if fdi.admitted.any:
+    fdi.bound.eta_bar[:] = fdi.bound.eta_bar_now
+    if fdi.bound.admitted.any:
         for i in range(3):
-            fdi.noise[i] = changing_error(fdi.admitted, i, measured.x[i])
+            fdi.bound.noise[i] = changing_error(fdi.bound.admitted, i, measured.x[i])
     if k > 0:
         elapse(fdi, belief)
 
@@ -150,11 +152,11 @@ def look_back(fdi, belief, measured, k):
 def begin_frame(fdi, belief, measured):
     """Begin the next frame's sums with this instant, the command in effect still the old one."""
     belief.x_then[:] = measured.x
-    fdi.noise_then[:] = fdi.noise
+    fdi.bound.noise_then[:] = fdi.bound.noise
     total = belief.sums
     total.f[:], total.eta_bar[:] = 0.0, 0.0
     total.G[:], total.Gu[:] = 0.0, 0.0
-    if fdi.own_errors:
+    if fdi.bound.own_errors:
         total.own_per_rad[:], total.own[:] = 0.0, 0.0
     sum_up(fdi, belief)
     total.Gu_first[:] = total.Gu

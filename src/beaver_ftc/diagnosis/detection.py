@@ -17,24 +17,24 @@ from beaver_ftc.diagnosis.thresholds import bound_step, noise_step
 def begin(fdi, x):
     """Start at the first measurement x (3,) rad/s: no residual, and all of the gyro's error still to come."""
     for i in range(3):
-        fdi.xhat[i] = x[i]
-        fdi.threshold_noise[i] = fdi.noise[i]
-        for m in range(fdi.n_poles):
-            fdi.bank_noise[m, i] = fdi.noise[i]
+        fdi.fdae.xhat[i] = x[i]
+        fdi.fdae.threshold_noise[i] = fdi.bound.noise[i]
+        for m in range(fdi.bank.n):
+            fdi.bank.noise[m, i] = fdi.bound.noise[i]
 
 
 @kernel
 def detect(fdi, x, t):
     """Form the residual and raise the alarm if a detector in authority does; x (3,) rad/s measured, t s."""
     for i in range(3):
-        fdi.residual[i] = x[i] - fdi.xhat[i]
+        fdi.fdae.residual[i] = x[i] - fdi.fdae.xhat[i]
     axis = bank.alarm(fdi) if fdi.authority != STATISTICS else -1
     if axis < 0 and fdi.authority != WORST_CASE and fdi.statistical.score > 1.0:
         axis = fdi.statistical.axis
-    if axis >= 0 and not fdi.detected:
-        fdi.detected = 1
-        fdi.detected_at_s = t
-        fdi.detected_axis = axis
+    if axis >= 0 and not fdi.verdict.detected:
+        fdi.verdict.detected = 1
+        fdi.verdict.detected_at_s = t
+        fdi.verdict.detected_axis = axis
 
 
 @kernel
@@ -43,14 +43,18 @@ def predict(fdi, x, believed, leaking):
 
     x (3,) rad/s; `believed` (3,) rad/s2 is f + G u, with the isolated fault once there is one.
     """
-    if fdi.detected:
-        learn(fdi.network, fdi.residual, fdi.threshold, leaking, fdi.dt)
+    if fdi.verdict.detected:
+        learn(fdi.fdae.network, fdi.fdae.residual, fdi.fdae.threshold, leaking, fdi.dt)
     for i in range(3):
-        rate = believed[i] + fdi.network.output[i]
-        fdi.xhat[i] = x[i] + fdi.dt * rate + fdi.decay[i] * (fdi.xhat[i] - x[i])
-        fdi.threshold_eta[i] = bound_step(fdi.threshold_eta[i], fdi.eta_bar[i], fdi.decay[i], fdi.dt)
-        fdi.threshold_noise[i] = noise_step(fdi.threshold_noise[i], fdi.noise_then[i], fdi.decay[i])
-        fdi.threshold[i] = fdi.threshold_eta[i] + fdi.threshold_noise[i] + fdi.noise[i]
+        rate = believed[i] + fdi.fdae.network.output[i]
+        fdi.fdae.xhat[i] = x[i] + fdi.dt * rate + fdi.fdae.decay[i] * (fdi.fdae.xhat[i] - x[i])
+        fdi.fdae.threshold_eta[i] = bound_step(
+            fdi.fdae.threshold_eta[i], fdi.bound.eta_bar[i], fdi.fdae.decay[i], fdi.dt
+        )
+        fdi.fdae.threshold_noise[i] = noise_step(
+            fdi.fdae.threshold_noise[i], fdi.bound.noise_then[i], fdi.fdae.decay[i]
+        )
+        fdi.fdae.threshold[i] = fdi.fdae.threshold_eta[i] + fdi.fdae.threshold_noise[i] + fdi.bound.noise[i]
 
 
 @kernel
@@ -62,5 +66,5 @@ def unknown_acceleration(fdi, out):
     the surfaces.
     """
     for i in range(3):
-        noise = fdi.threshold_noise[i] + fdi.noise[i]
-        out[i] = fdi.network.output[i] + fdi.pole[i] * dead_zone(fdi.residual[i], noise)
+        noise = fdi.fdae.threshold_noise[i] + fdi.bound.noise[i]
+        out[i] = fdi.fdae.network.output[i] + fdi.fdae.pole[i] * dead_zone(fdi.fdae.residual[i], noise)

@@ -39,7 +39,7 @@ def suppose(fdi, fie, G, Gu, spread):
     hypothesis(fie.kind, fie.surface, G, Gu, effect.offset, effect.Z)
     for i in range(3):
         effect.spread[i] = spread[i, fie.surface]
-    if fdi.own_errors and fie.kind == POSITION:
+    if fdi.bound.own_errors and fie.kind == POSITION:
         membership.allow_for_own_errors(fdi, fie)
     if fdi.memory:
         bank.remember(fdi, fie)
@@ -48,7 +48,7 @@ def suppose(fdi, fie, G, Gu, spread):
 @kernel
 def suppose_all(fdi, G, Gu, spread):
     """`suppose` for every estimator, where something will ask for it."""
-    if fdi.memory or fdi.detected:
+    if fdi.memory or fdi.verdict.detected:
         for s in range(fdi.n_estimators):
             suppose(fdi, fdi.estimator[s], G, Gu, spread)
 
@@ -60,7 +60,7 @@ def start(fdi, x):
         fie = fdi.estimator[s]
         for i in range(3):
             fie.xhat[i] = x[i]
-            fie.bound_noise[i] = fdi.noise[i]
+            fie.bound_noise[i] = fdi.bound.noise[i]
             fie.covariance[i] = (fie.high - fie.low) ** 2 / 12.0  # of a uniform distribution
             fie.theta_low[i], fie.theta_high[i] = fie.low, fie.high
     if fdi.every_type:
@@ -120,9 +120,9 @@ def decide(fdi, t):
             left += 1
             last = s
     named = NOT_ISOLATED if left > 1 else (last if left == 1 else UNANTICIPATED)
-    if named != fdi.isolated:
-        fdi.isolated = named
-        fdi.isolated_at_s = t
+    if named != fdi.verdict.isolated:
+        fdi.verdict.isolated = named
+        fdi.verdict.isolated_at_s = t
 
 
 @kernel
@@ -136,12 +136,12 @@ def isolate(fdi, x, t, started):
     if not fdi.every_type:
         decide(fdi, t)
         return
-    if fdi.pairs:
+    if fdi.pair.enabled:
         pairs.examine(fdi)
         pairs.decide(fdi, t)
         return
     if started or fdi.memory:
-        if fdi.block > 1:
+        if fdi.block.length > 1:
             blocks.examine(fdi)
         else:
             examine.examine(fdi)
@@ -199,9 +199,9 @@ def predict(fdi, fie, x, believed):
         Z, a = fie.effect.Z[i], fdi.fie_decay[i]
         fie.rise[i] = a * fie.rise[i] + dt * max(Z, 0.0)
         fie.fall[i] = a * fie.fall[i] + dt * min(Z, 0.0)
-        fie.bound_eta[i] = bound_step(fie.bound_eta[i], fdi.eta_bar[i] + fie.effect.spread[i], a, dt)
-        fie.bound_noise[i] = noise_step(fie.bound_noise[i], fdi.noise_then[i], a)
-        fie.bound[i] = fie.bound_eta[i] + fie.bound_noise[i] + fdi.noise[i]
+        fie.bound_eta[i] = bound_step(fie.bound_eta[i], fdi.bound.eta_bar[i] + fie.effect.spread[i], a, dt)
+        fie.bound_noise[i] = noise_step(fie.bound_noise[i], fdi.bound.noise_then[i], a)
+        fie.bound[i] = fie.bound_eta[i] + fie.bound_noise[i] + fdi.bound.noise[i]
 
 
 @kernel

@@ -68,24 +68,24 @@ def allow_for_own_errors(fdi, fie):
     value = fdi.innovation[axis] - effect.offset[axis]
     earlier = 2.0 * before / fdi.instants if fdi.instants > 1 else 0.0
     for _ in range(ROUNDS):
-        own = max(fdi.own_per_rad[axis, s] * (reach + earlier) - fdi.own[axis, s], 0.0)
-        low, high = solve(value, fdi.frame_bound[axis] + room + own, effect.Z[axis], fie.low, fie.high)
+        own = max(fdi.bound.own_per_rad[axis, s] * (reach + earlier) - fdi.bound.own[axis, s], 0.0)
+        low, high = solve(value, fdi.bound.frame[axis] + room + own, effect.Z[axis], fie.low, fie.high)
         if low > high:
             break
         reach = min(reach, max(abs(low), abs(high)))
     fie.furthest = reach
     for i in range(3):
-        effect.spread[i] += max(fdi.own_per_rad[i, s] * (reach + earlier) - fdi.own[i, s], 0.0)
+        effect.spread[i] += max(fdi.bound.own_per_rad[i, s] * (reach + earlier) - fdi.bound.own[i, s], 0.0)
 
 
 @kernel
 def agree(fdi, fie):
     """Whether one theta, or no fault at all, explains the elapsed frame on every axis."""
-    if healthy(fdi.innovation, fdi.frame_bound):
+    if healthy(fdi.innovation, fdi.bound.frame):
         return True
     low, high = fie.low, fie.high
     for i in range(3):
-        axis_low, axis_high = agreeing(fdi.innovation, fdi.frame_bound, fie, fie.effect, i)
+        axis_low, axis_high = agreeing(fdi.innovation, fdi.bound.frame, fie, fie.effect, i)
         low, high = max(low, axis_low), min(high, axis_high)
     return low <= high
 
@@ -107,7 +107,7 @@ def narrow(fdi, fie):
     Filtered: eps + Omega thetahat = Omega theta + filtered uncertainty, whatever the estimate thetahat did.
     """
     for i in range(3):
-        frame = agreeing(fdi.innovation, fdi.frame_bound, fie, fie.effect, i)
+        frame = agreeing(fdi.innovation, fdi.bound.frame, fie, fie.effect, i)
         intersect(fie, i, frame, fdi.shared)
         filtered = fie.residual[i] + fie.omega[i] * fie.theta[i]
         intersect(fie, i, solve(filtered, fie.bound[i], fie.omega[i], fie.low, fie.high), fdi.shared)

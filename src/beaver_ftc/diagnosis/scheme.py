@@ -44,14 +44,14 @@ def predict(fdi, belief, measured, effectiveness, offset, k, t):
     isolation.suppose_all(fdi, mean.G, mean.Gu, mean.Gu_spread)
     if fdi.every_type:
         examine.note_orders(fdi, belief.commanded)
-    if fdi.detected:
+    if fdi.verdict.detected:
         isolation.predict_all(fdi, x_then, expected)
         expect_known_faults(expected, mean, effectiveness, offset, fdi.every_type)
     if fdi.statistical.enabled:
         for i in range(3):
             belief.surprise[i] = (x[i] - x_then[i]) / fdi.dt - expected[i]
         statistical.follow_rest(fdi.statistical, belief.surprise, fdi.dt)
-    detection.predict(fdi, x_then, expected, fdi.isolated >= 0 or fdi.lead >= 0)
+    detection.predict(fdi, x_then, expected, fdi.verdict.isolated >= 0 or fdi.verdict.lead >= 0)
 
 
 @kernel
@@ -72,21 +72,21 @@ def compare_likelihoods(fdi, belief, measured, k, t):
     """Show the statistical detector the elapsed frame."""
     cubic = unanticipated_pitch(belief.design, measured.y, 1.0)
     statistical.signatures(fdi.statistical, belief.means.Gu, cubic)
-    statistical.observe(fdi.statistical, fdi.innovation, fdi.dt, k, fdi.detected)
+    statistical.observe(fdi.statistical, fdi.innovation, fdi.dt, k, fdi.verdict.detected)
     statistical.score(fdi.statistical, t)
 
 
 @kernel
 def decide(fdi, measured, t):
     """From residuals to alarm, and from then on to a verdict."""
-    known = fdi.detected
+    known = fdi.verdict.detected
     detection.detect(fdi, measured.x, t)
-    if not fdi.detected:
+    if not fdi.verdict.detected:
         return
     if not known:
         isolation.start(fdi, measured.x)
     isolation.isolate(fdi, measured.x, t, known)
-    network.evaluate(fdi.network, measured.y[ALPHA], measured.y[BETA])
+    network.evaluate(fdi.fdae.network, measured.y[ALPHA], measured.y[BETA])
 
 
 @kernel
@@ -116,31 +116,31 @@ def take_verdict(fdi, belief, measured, verdict, effectiveness, offset, k, t):
     else:
         predict(fdi, belief, measured, effectiveness, offset, k, t)
     for i in range(3):
-        fdi.residual[i] = measured.x[i] - fdi.xhat[i]
+        fdi.fdae.residual[i] = measured.x[i] - fdi.fdae.xhat[i]
     note_verdict(fdi, verdict, t)
-    if fdi.detected:
-        network.evaluate(fdi.network, measured.y[ALPHA], measured.y[BETA])
+    if fdi.verdict.detected:
+        network.evaluate(fdi.fdae.network, measured.y[ALPHA], measured.y[BETA])
     ready(fdi, belief, measured, k)
 
 
 @kernel
 def note_verdict(fdi, verdict, t):
     """Write a plug-in's verdict where the built-in one stands."""
-    if verdict.detected and not fdi.detected:
-        fdi.detected, fdi.detected_at_s, fdi.detected_axis = 1, t, verdict.axis
-    isolated = verdict.isolated if fdi.detected else NOT_ISOLATED
-    if isolated != fdi.isolated:
-        fdi.isolated, fdi.isolated_at_s = isolated, t
+    if verdict.detected and not fdi.verdict.detected:
+        fdi.verdict.detected, fdi.verdict.detected_at_s, fdi.verdict.detected_axis = 1, t, verdict.axis
+    isolated = verdict.isolated if fdi.verdict.detected else NOT_ISOLATED
+    if isolated != fdi.verdict.isolated:
+        fdi.verdict.isolated, fdi.verdict.isolated_at_s = isolated, t
     if isolated >= 0:
         fdi.estimator[isolated].theta[:] = verdict.theta
-    fdi.estimates = verdict.estimates
-    fdi.effectiveness[:] = verdict.effectiveness
+    fdi.verdict.estimates = verdict.estimates
+    fdi.verdict.effectiveness[:] = verdict.effectiveness
 
 
 @kernel
 def isolated_surface(fdi):
     """The surface of the isolated fault, or -1."""
-    return fdi.estimator[fdi.isolated].surface if fdi.isolated >= 0 else -1
+    return fdi.estimator[fdi.verdict.isolated].surface if fdi.verdict.isolated >= 0 else -1
 
 
 @kernel
@@ -154,7 +154,7 @@ def isolated_theta(fdi, s):
     """Estimated theta of the isolated loss of surface s: under noise, the most likely one."""
     if likelihood_counts(fdi):
         return statistical.loss_of(fdi.statistical, s)[0]
-    return fdi.estimator[fdi.isolated].theta[fdi.dominant_axis[s]]
+    return fdi.estimator[fdi.verdict.isolated].theta[fdi.layout.dominant_axis[s]]
 
 
 @kernel

@@ -109,47 +109,98 @@ def verdict_dtype(n: int) -> np.dtype:
     return np.dtype(fields, align=True)
 
 
+# The bank of detection filters; filter 0 is the published one (bank.py).
+BANK = np.dtype(
+    [
+        ("n", "i8"), ("decay", "f8", (MAX_POLES,)),
+        ("residual", "f8", (MAX_POLES, 3)), ("threshold", "f8", (MAX_POLES, 3)),
+        ("eta", "f8", (MAX_POLES, 3)), ("noise", "f8", (MAX_POLES, 3)),
+        ("closest", "f8", (MAX_POLES,)),  # largest share of its bound each filter reached in healthy flight
+    ],
+    align=True,
+)  # fmt: skip
+
+# The fault detection and approximation estimator (detection.py).
+FDAE = np.dtype(
+    [
+        ("pole", "f8", (3,)), ("decay", "f8", (3,)), ("xhat", "f8", (3,)), ("residual", "f8", (3,)),
+        ("threshold", "f8", (3,)), ("threshold_eta", "f8", (3,)), ("threshold_noise", "f8", (3,)),
+        ("network", NETWORK),
+    ],
+    align=True,
+)  # fmt: skip
+
+# Two faults at once (types/pairs.py): alarms of the groups, and what is known of the first fault in pitch.
+PAIR = np.dtype(
+    [
+        ("enabled", "i8"), ("alarmed", "i8", (2,)), ("no_lateral_pair", "i8"), ("first", "i8"),
+        ("unsettled", "i8"),
+    ],
+    align=True,
+)  # fmt: skip
+
+# Blocks of frames (types/blocks.py).
+FRAME_BLOCK = np.dtype(
+    [
+        ("length", "i8"), ("filled", "i8"), ("span_s", "f8"),
+        ("innovation", "f8", (3,)), ("bound", "f8", (3,)), ("noise", "f8", (3,)),
+    ],
+    align=True,
+)  # fmt: skip
+
+
+@lru_cache
+def conclusion_dtype(n: int) -> np.dtype:
+    """What is concluded about n surfaces. isolated: an estimator, NOT_ISOLATED or UNANTICIPATED. type: of the
+    isolated fault, -1 if open. lead: the surface the law acts upon, and what it does about it. effectiveness:
+    of every surface, where a plug-in `estimates` it."""
+    fields = [
+        ("detected", "i8"), ("detected_at_s", "f8"), ("detected_axis", "i8"),
+        ("isolated", "i8"), ("isolated_at_s", "f8"), ("type", "i8"), ("type_at_s", "f8"),
+        ("lead", "i8"), ("lead_kind", "i8"), ("estimates", "i8"), ("effectiveness", "f8", (n,)),
+    ]  # fmt: skip
+    return np.dtype(fields, align=True)
+
+
+@lru_cache
+def layout_dtype(n: int) -> np.dtype:
+    """Axis and group of each of n surfaces, the other one of a group of two, or -1; the main surface of each
+    axis; the estimators of a surface's loss and position, or -1."""
+    fields = [
+        ("dominant_axis", "i8", (n,)), ("group", "i8", (n,)), ("partner", "i8", (n,)), ("main", "i8", (3,)),
+        ("loss_of", "i8", (n,)), ("position_of", "i8", (n,)),
+    ]  # fmt: skip
+    return np.dtype(fields, align=True)
+
+
+@lru_cache
+def bound_dtype(n: int) -> np.dtype:
+    """Bounds on the uncertainty. eta_bar, eta_bar_now: over the elapsed frame and at this instant, rad/s2.
+    noise: on what a gyro's error changes by, rad/s. frame: on one frame's innovation, rad/s2. own: of the
+    errors of n surfaces' own terms, per rad of deflection and at the command, means over the frame."""
+    fields = [
+        ("inertia", "f8", (3,)), ("constant", "f8", (3,)), ("earth_rate", "f8"), ("admitted", ADMITTED),
+        ("eta_bar", "f8", (3,)), ("eta_bar_now", "f8", (3,)),
+        ("noise", "f8", (3,)), ("noise_then", "f8", (3,)), ("frame", "f8", (3,)),
+        ("own_errors", "i8"), ("own_per_rad", "f8", (3, n)), ("own", "f8", (3, n)),
+    ]  # fmt: skip
+    return np.dtype(fields, align=True)
+
+
 @lru_cache
 def diagnosis_dtype(n: int) -> np.dtype:
     """The diagnosis' memory for an aircraft with n surfaces."""
     fields = [
-        ("enabled", "i8"), ("thresholds", "i8"), ("dt", "f8"), ("forgetting", "f8"),
-        ("pole", "f8", (3,)), ("decay", "f8", (3,)), ("fie_decay", "f8", (3,)),
-        ("inertia", "f8", (3,)), ("constant", "f8", (3,)), ("earth_rate", "f8"),
-        ("eta_bar", "f8", (3,)), ("eta_bar_now", "f8", (3,)),  # over the elapsed frame, and at this instant
-        ("admitted", ADMITTED),
-        ("noise", "f8", (3,)), ("noise_then", "f8", (3,)),  # bound on what a gyro's error changes by
-        ("frame_bound", "f8", (3,)),  # rad/s2, on the innovation of one frame: eta_bar and noise
-        ("xhat", "f8", (3,)), ("residual", "f8", (3,)), ("threshold", "f8", (3,)),
-        ("threshold_eta", "f8", (3,)), ("threshold_noise", "f8", (3,)),
-        ("detected", "i8"), ("detected_at_s", "f8"), ("detected_axis", "i8"),
-        ("isolated", "i8"), ("isolated_at_s", "f8"),
+        ("enabled", "i8"), ("thresholds", "i8"), ("authority", "i8"), ("dt", "f8"),
+        ("bound", bound_dtype(n)), ("innovation", "f8", (3,)), ("bank", BANK), ("fdae", FDAE),
+        ("verdict", conclusion_dtype(n)), ("layout", layout_dtype(n)),
+        # the isolation estimators, and the sharpened scheme's switches
         ("n_estimators", "i8"), ("estimator", ESTIMATOR, (MAX_ESTIMATORS,)),
-        ("network", NETWORK),
-        ("estimates", "i8"), ("effectiveness", "f8", (n,)),  # of every surface, as a plug-in estimates it
-        # the sharpened scheme's switches and its bank; filter 0 is the published one
+        ("forgetting", "f8"), ("fie_decay", "f8", (3,)),
         ("memory", "i8"), ("shared", "i8"), ("membership", "i8"), ("abrupt", "i8"),
-        ("n_poles", "i8"), ("bank_decay", "f8", (MAX_POLES,)), ("innovation", "f8", (3,)),
-        ("bank_residual", "f8", (MAX_POLES, 3)), ("bank_threshold", "f8", (MAX_POLES, 3)),
-        ("bank_eta", "f8", (MAX_POLES, 3)), ("bank_noise", "f8", (MAX_POLES, 3)),
-        # who stands where: axes and group of each surface, the other one of a group of two, or -1; the main
-        # surface of each axis; the estimators of a surface's loss and position, or -1
-        ("dominant_axis", "i8", (n,)), ("group", "i8", (n,)), ("partner", "i8", (n,)), ("main", "i8", (3,)),
-        ("loss_of", "i8", (n,)), ("position_of", "i8", (n,)),
         # faults of every type: types/
-        ("every_type", "i8"), ("whole", "i8"), ("instants", "i8"), ("returns", "i8"),
-        ("surface", surface_dtype(), (n,)),
-        ("frame", "i8"), ("patience", "i8"), ("type", "i8"), ("type_at_s", "f8"),
-        ("lead", "i8"), ("lead_kind", "i8"),
-        # two at once: types/pairs.py
-        ("pairs", "i8"), ("alarmed", "i8", (2,)), ("no_lateral_pair", "i8"), ("first", "i8"),
-        ("unsettled", "i8"),
-        ("statistical", STATISTICAL), ("authority", "i8"),
-        # errors of the surfaces' own terms, per rad of deflection and at the command: means over the frame
-        ("own_errors", "i8"), ("own_per_rad", "f8", (3, n)), ("own", "f8", (3, n)),
-        # blocks of frames: types/blocks.py
-        ("block", "i8"), ("in_block", "i8"), ("span_s", "f8"),
-        ("block_innovation", "f8", (3,)), ("block_bound", "f8", (3,)), ("block_noise", "f8", (3,)),
-        ("closest", "f8", (MAX_POLES,)),  # largest share of its bound each filter reached in healthy flight
+        ("every_type", "i8"), ("whole", "i8"), ("instants", "i8"), ("returns", "i8"), ("patience", "i8"),
+        ("surface", surface_dtype(), (n,)), ("frame", "i8"), ("pair", PAIR), ("block", FRAME_BLOCK),
+        ("statistical", STATISTICAL),
     ]  # fmt: skip
     return np.dtype(fields, align=True)

@@ -196,7 +196,7 @@ def drifts(statistical, fdi, design, x, y):
     """Fill each block's drift and jitter: uncertainty that is merely bounded, and the air not seen."""
     bounded = statistical.bounded
     bounded[:] = 0.0
-    uncertainty_bound(x, design, fdi.inertia, fdi.constant, fdi.earth_rate, bounded)
+    uncertainty_bound(x, design, fdi.bound.inertia, fdi.bound.constant, fdi.bound.earth_rate, bounded)
     for b in range(statistical.n_blocks):
         block = statistical.block[b]
         for i in range(block.n):

@@ -84,10 +84,10 @@ def follow_guarantee(guarantee, fdi, share, t):
     """
     for i in range(3):
         mean = share * guarantee.phi_sum[i]
-        for m in range(fdi.n_poles):
-            effect = fdi.bank_decay[m] * guarantee.effect[m, i] + fdi.dt * mean
+        for m in range(fdi.bank.n):
+            effect = fdi.bank.decay[m] * guarantee.effect[m, i] + fdi.dt * mean
             guarantee.effect[m, i] = effect
-            certain = abs(effect) > 2.0 * fdi.bank_threshold[m, i] > 0.0
+            certain = abs(effect) > 2.0 * fdi.bank.threshold[m, i] > 0.0
             if certain and guarantee.certain_after_s < 0.0:
                 guarantee.certain_after_s = t
         guarantee.phi_sum[i] = guarantee.phi[i]

@@ -4,11 +4,11 @@ from math import ceil, exp, pi, radians
 
 import numpy as np
 
+from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.control.reference_model import discretise
 from beaver_ftc.control.state import FAULT_TOLERANT, ORACLE, law_of
-from beaver_ftc.design.coefficients import SURFACES, value
+from beaver_ftc.design.coefficients import value
 from beaver_ftc.design.engine import engine_power_kw, slipstream
-from beaver_ftc.design.model import AILERON, ELEVATOR, FLAP, RUDDER
 from beaver_ftc.design.variants import design_of, mass_of
 from beaver_ftc.diagnosis.admitted import admit, gyros_vary, poles_for_noise
 from beaver_ftc.diagnosis.fault_class import PARAMETER_SET
@@ -17,12 +17,14 @@ from beaver_ftc.diagnosis.state import (
     INTERVAL,
     LOSS,
     NOT_ISOLATED,
+    PITCH,
     POSITION,
     PUBLISHED,
     STATISTICS,
     WORST_CASE,
+    YAW,
 )
-from beaver_ftc.diagnosis.types.pairs import IN_PITCH
+from beaver_ftc.diagnosis.types.pairs import IN_PITCH, IN_ROLL_AND_YAW
 from beaver_ftc.errors import BadInput
 from beaver_ftc.loop.frame import frame_dtype
 from beaver_ftc.plant import channels as ch
@@ -35,42 +37,51 @@ from beaver_ftc.scenario.schema import Scenario
 BLOCK_S = 0.2  # to be examined at once where gyros are noisy: short beside the slowest half-cycle, 3.1 s
 RUNAWAY_RATE_RAD_S = pi / 3.0  # of an actuator with no declared rate limit: the aircraft's default
 EARTH_RATE_RAD_S = 2.0 * pi / 86164.0905  # one turn per sidereal day [WGS84]
-GROUPS = {"pitch": ("elevator", "flap"), "lateral": ("aileron", "rudder")}  # that can stand in for each other
-MAIN = ("aileron", "elevator", "rudder")  # surface of each axis
 YAW_SHARE = 0.5  # of the rudder, that engine power may claim: the rest is there to fly with
-PUBLISHED_CLASS = (("aileron", LOSS, AILERON), ("elevator", LOSS, ELEVATOR), ("rudder", LOSS, RUDDER))
-EVERY_TYPE = (
-    *PUBLISHED_CLASS,
-    ("flap", LOSS, FLAP),
-    *((f"{s}_position", POSITION, i) for i, s in enumerate(SURFACES)),
-)
-FAULT_CLASSES = {"published": PUBLISHED_CLASS, "all": EVERY_TYPE}
 _AUTHORITIES = {"either": EITHER, "worst-case": WORST_CASE, "statistical": STATISTICS}
 _THRESHOLDS = {"interval": INTERVAL, "published": PUBLISHED}
 
 
-def estimator_names(fault_class: str) -> tuple[str, ...]:
+Member = tuple[str, int, int]  # of a fault class: name, kind and surface of its estimator
+
+
+def members_of(fault_class: str, aircraft: Aircraft) -> tuple[Member, ...]:
+    """The isolation estimators of a fault class, in the bank's order.
+
+    published: a loss of the surface that leads each axis. all: a loss and a position of every surface.
+    """
+    index = {name: s for s, name in enumerate(aircraft.surfaces)}
+    losses = tuple((name, LOSS, index[name]) for name in aircraft.primary)
+    if fault_class == "published":
+        return losses
+    others = tuple((name, LOSS, s) for name, s in index.items() if name not in aircraft.primary)
+    return (*losses, *others, *((f"{name}_position", POSITION, s) for name, s in index.items()))
+
+
+def estimator_names(fault_class: str, aircraft: Aircraft) -> tuple[str, ...]:
     """Names of the isolation estimators of a fault class, in the bank's order."""
-    return tuple(name for name, _, _ in FAULT_CLASSES[fault_class])
+    return tuple(name for name, _, _ in members_of(fault_class, aircraft))
 
 
-def _assemble_diagnosis(fdi: np.void, config: FdiConfig, dt: float, travel: np.ndarray) -> None:
+def _assemble_diagnosis(
+    fdi: np.void, config: FdiConfig, dt: float, travel: np.ndarray, aircraft: Aircraft
+) -> None:
     fdi["enabled"] = config.scheme == "adaptive-estimators"
     fdi["thresholds"] = _THRESHOLDS[config.thresholds]
     fdi["dt"] = dt
     fdi["forgetting"] = exp(-dt / config.forgetting_time_s)
-    fdi["pole"] = config.detection_pole_per_s
-    fdi["decay"] = exp(-config.detection_pole_per_s * dt)
+    fdi["fdae"]["pole"] = config.detection_pole_per_s
+    fdi["fdae"]["decay"] = exp(-config.detection_pole_per_s * dt)
     fdi["fie_decay"] = exp(-config.isolation_pole_per_s * dt)
-    fdi["inertia"] = config.bounds.inertia_coupling.as_tuple()
-    fdi["constant"] = config.bounds.constant_rad_s2.as_tuple()
-    fdi["earth_rate"] = EARTH_RATE_RAD_S
-    fdi["detected_at_s"] = fdi["isolated_at_s"] = -1.0
-    fdi["isolated"] = NOT_ISOLATED
+    fdi["bound"]["inertia"] = config.bounds.inertia_coupling.as_tuple()
+    fdi["bound"]["constant"] = config.bounds.constant_rad_s2.as_tuple()
+    fdi["bound"]["earth_rate"] = EARTH_RATE_RAD_S
+    fdi["verdict"]["detected_at_s"] = fdi["verdict"]["isolated_at_s"] = -1.0
+    fdi["verdict"]["isolated"] = NOT_ISOLATED
     fdi["authority"] = _AUTHORITIES[config.authority]
-    members = FAULT_CLASSES[config.fault_class]
+    members = members_of(config.fault_class, aircraft)
     fdi["n_estimators"] = len(members)
-    _assemble_surfaces(fdi, members)
+    _assemble_layout(fdi["layout"], members, aircraft)
     for fie, (_, kind, surface) in zip(fdi["estimator"], members, strict=False):
         fie["kind"], fie["surface"] = kind, surface
         fie["low"], fie["high"] = PARAMETER_SET[kind] if kind == LOSS else travel[:, surface]
@@ -79,17 +90,20 @@ def _assemble_diagnosis(fdi: np.void, config: FdiConfig, dt: float, travel: np.n
 def _assemble_types(frame: np.void, scenario: Scenario, dt: float, travel: np.ndarray) -> None:
     config, fdi, actuators = scenario.fdi, frame["fdi"], frame["belief"]["actuators"]
     fdi["every_type"] = config.fault_class == "all"
-    fdi["block"] = block = ceil(BLOCK_S / dt) if gyros_vary(config.bounds.sensors) else 1
-    fdi["whole"], fdi["span_s"] = scenario.substeps == 1 and block == 1, block * dt
+    fdi["block"]["length"] = block = ceil(BLOCK_S / dt) if gyros_vary(config.bounds.sensors) else 1
+    fdi["whole"], fdi["block"]["span_s"] = scenario.substeps == 1 and block == 1, block * dt
     fdi["patience"] = ceil(pi / config.slowest_oscillation_rad_s / (block * dt))
-    fdi["type"] = fdi["lead"] = fdi["lead_kind"] = fdi["type_at_s"] = fdi["first"] = -1
-    fdi["pairs"] = config.pairs
+    verdict = fdi["verdict"]
+    verdict["type"] = verdict["lead"] = verdict["lead_kind"] = verdict["type_at_s"] = -1
+    fdi["pair"]["first"] = -1
+    fdi["pair"]["enabled"] = config.pairs
     if config.pairs:
         _assemble_pairs(fdi)
     fdi["instants"], fdi["returns"] = scenario.substeps, actuators["real"]
-    for s, (name, place, low, high) in enumerate(zip(SURFACES, fdi["surface"], *travel, strict=True)):
+    surfaces = scenario.airframe.surfaces
+    for s, (name, place, low, high) in enumerate(zip(surfaces, fdi["surface"], *travel, strict=True)):
         place["travel_low"], place["travel_high"] = low, high
-        place["in_question"] = not config.pairs or name in GROUPS["pitch"]
+        place["in_question"] = not config.pairs or fdi["layout"]["group"][s] == IN_PITCH
         place["measure"], place["type"] = -1, -1
         place["approach"], place["step"] = actuators["approach"][s], actuators["step"][s]
         rate_deg_s = getattr(scenario.actuators, name).rate_limit_deg_s
@@ -99,20 +113,37 @@ def _assemble_types(frame: np.void, scenario: Scenario, dt: float, travel: np.nd
 def _assemble_pairs(fdi: np.void) -> None:
     """Each plane is asked for itself: pitch by elevator and flap, roll and yaw by ailerons and rudder."""
     for fie in fdi["estimator"][: fdi["n_estimators"]]:
-        fie["unasked"] = (1, 0, 1) if fdi["group"][fie["surface"]] == IN_PITCH else (0, 1, 0)
+        fie["unasked"] = (1, 0, 1) if fdi["layout"]["group"][fie["surface"]] == IN_PITCH else (0, 1, 0)
 
 
-def _assemble_surfaces(fdi: np.void, members: tuple[tuple[str, int, int], ...]) -> None:
-    """Axes, groups and estimators of the surfaces; members: name, kind and surface of each estimator."""
-    fdi["main"] = [SURFACES.index(name) for name in MAIN]
-    fdi["partner"] = fdi["loss_of"] = fdi["position_of"] = -1
-    for g, names in enumerate(GROUPS.values()):
+def leaders_of(aircraft: Aircraft) -> list[int]:
+    """The surface that leads each axis, or -1."""
+    leads = {
+        aircraft.dominant_axis[s]: s for s, name in enumerate(aircraft.surfaces) if name in aircraft.primary
+    }
+    return [leads.get(axis, -1) for axis in range(3)]
+
+
+def _assemble_layout(layout: np.void, members: tuple[Member, ...], aircraft: Aircraft) -> None:
+    """Axes, groups and estimators of the surfaces."""
+    index = {name: s for s, name in enumerate(aircraft.surfaces)}
+    layout["main"] = leaders_of(aircraft)
+    layout["dominant_axis"] = aircraft.dominant_axis
+    layout["group"] = [IN_PITCH if axis == PITCH else IN_ROLL_AND_YAW for axis in aircraft.dominant_axis]
+    layout["partner"] = layout["loss_of"] = layout["position_of"] = -1
+    for names in aircraft.groups.values():
         for name, other in zip(names, names[::-1], strict=True):
-            s = SURFACES.index(name)
-            fdi["group"][s], fdi["partner"][s] = g, SURFACES.index(other)
-            fdi["dominant_axis"][s] = MAIN.index(name) if name in MAIN else MAIN.index(other)
+            layout["partner"][index[name]] = index[other] if other != name else -1
     for e, (_, kind, surface) in enumerate(members):
-        fdi["loss_of" if kind == LOSS else "position_of"][surface] = e
+        layout["loss_of" if kind == LOSS else "position_of"][surface] = e
+
+
+def _stand_in(aircraft: Aircraft) -> int:
+    """The surface that takes over from the one that leads pitch, or -1."""
+    elevator = aircraft.surfaces[leaders_of(aircraft)[PITCH]]
+    group = next(names for names in aircraft.groups.values() if elevator in names)
+    after = group[group.index(elevator) + 1 :]
+    return aircraft.surfaces.index(after[0]) if after else -1
 
 
 def _assemble_sharpening(fdi: np.void, config: FdiConfig, dt: float) -> None:
@@ -124,8 +155,8 @@ def _assemble_sharpening(fdi: np.void, config: FdiConfig, dt: float) -> None:
         *poles_for_noise(config.bounds.sensors, max(config.bounds.constant_rad_s2.as_tuple())),
     )
     poles = (config.detection_pole_per_s, *(bank if sharpen.pole_bank else ()))[:MAX_POLES]
-    fdi["n_poles"] = len(poles)
-    fdi["bank_decay"][: len(poles)] = [exp(-pole * dt) for pole in poles]
+    fdi["bank"]["n"] = len(poles)
+    fdi["bank"]["decay"][: len(poles)] = [exp(-pole * dt) for pole in poles]
 
 
 def _assemble_network(network: np.void, config: ControlConfig) -> None:
@@ -135,7 +166,12 @@ def _assemble_network(network: np.void, config: ControlConfig) -> None:
 
 
 def _assemble_control(
-    control: np.void, config: ControlConfig, dt: float, trim: np.ndarray, travel: np.ndarray
+    control: np.void,
+    config: ControlConfig,
+    dt: float,
+    trim: np.ndarray,
+    travel: np.ndarray,
+    aircraft: Aircraft,
 ) -> None:
     control["law"], control["inner"] = law_of(config.law)  # a plug-in: plugin_frame.py
     control["dt"] = dt
@@ -152,8 +188,8 @@ def _assemble_control(
     control["trim"] = control["command"] = trim
     control["low"], control["high"] = travel
     control["hand_over_step"] = dt / config.hand_over_s
-    control["main"] = [SURFACES.index(name) for name in MAIN]
-    control["stand_in"] = SURFACES.index(GROUPS["pitch"][1])
+    control["main"] = leaders_of(aircraft)
+    control["stand_in"] = _stand_in(aircraft)
 
 
 def _assemble_probing(control: np.void, probing: Probing | None, dt: float) -> None:
@@ -191,7 +227,8 @@ def _slipstream_limits(engine_rpm: float, control: np.void) -> tuple[float, floa
     """rho V^3 d dpt / d pz of the engine [FDC], kg/(m3) (m/s)^3 per inHg; and the dpt at which holding the
     propeller's yawing moment takes YAW_SHARE of the rudder's travel."""
     kw_per_inhg = engine_power_kw(engine_rpm, 1.0, 1.0) - engine_power_kw(engine_rpm, 0.0, 1.0)
-    rudder_rad = min(-control["low"][RUDDER], control["high"][RUDDER])
+    rudder = control["main"][YAW]
+    rudder_rad = min(-control["low"][rudder], control["high"][rudder])
     dpt3 = YAW_SHARE * value("Cn_dr") * rudder_rad / value("Cn_dpt3")
     return slipstream(kw_per_inhg, 1.0, 1.0) - slipstream(0.0, 1.0, 1.0), max(dpt3, 0.0) ** (1.0 / 3.0)
 
@@ -214,11 +251,13 @@ def _assemble_instruments(instruments: np.void, scenario: Scenario, dt: float) -
             )
 
 
-def _assemble_actuators(actuators: np.void, given: Actuators, dt: float, travel: np.ndarray) -> None:
-    """dt: s, a JSBSim frame; travel (2, 4) rad."""
+def _assemble_actuators(
+    actuators: np.void, given: Actuators, dt: float, travel: np.ndarray, surfaces: tuple[str, ...]
+) -> None:
+    """dt: s, a JSBSim frame; travel (2, n) rad."""
     actuators["real"] = not given.is_ideal
     actuators["low"], actuators["high"] = travel
-    for s, surface in enumerate(SURFACES):
+    for s, surface in enumerate(surfaces):
         dynamics = getattr(given, surface)
         bandwidth, rate = dynamics.bandwidth_rad_s, radians(dynamics.rate_limit_deg_s)
         actuators["approach"][s] = 1.0 - exp(-bandwidth * dt) if bandwidth else 1.0
@@ -227,11 +266,11 @@ def _assemble_actuators(actuators: np.void, given: Actuators, dt: float, travel:
 
 def _assemble_admitted(frame: np.void, scenario: Scenario) -> None:
     """The errors that `fdi.bounds` declares beside the published ones."""
-    admitted = frame["fdi"]["admitted"]
+    admitted = frame["fdi"]["bound"]["admitted"]
     mass = mass_of(scenario.design_model, scenario.airframe)
     admit(admitted, scenario.fdi.bounds, scenario.airframe, frame["belief"]["design"], mass)
-    frame["fdi"]["own_errors"] = admitted["any"] and scenario.fdi.fault_class == "all"
-    if scenario.fdi.pairs and frame["fdi"]["block"] > 1:
+    frame["fdi"]["bound"]["own_errors"] = admitted["any"] and scenario.fdi.fault_class == "all"
+    if scenario.fdi.pairs and frame["fdi"]["block"]["length"] > 1:
         raise BadInput(
             f"{scenario.name}: fdi.pairs is not available with errors of the gyros that vary declared in "
             "fdi.bounds.sensors, allowed: a bias"
@@ -244,7 +283,7 @@ def assemble(scenario: Scenario, trim: np.ndarray, travel: np.ndarray) -> np.nda
     trim (4,) rad: the surfaces in trim; travel (2, 4) rad: lower and upper stops. The truth's nodes are
     attached by the loop.
     """
-    frames = np.zeros(1, frame_dtype(len(SURFACES)))
+    frames = np.zeros(1, frame_dtype(scenario.airframe.n))
     frame = frames[0]
     dt = 1.0 / scenario.rate_hz
     frame["dt"] = dt
@@ -258,13 +297,15 @@ def assemble(scenario: Scenario, trim: np.ndarray, travel: np.ndarray) -> np.nda
     frame["accounts"]["guarantee"]["certain_after_s"] = -1.0
     jsbsim_dt = dt / scenario.substeps
     _assemble_instruments(frame["instruments"], scenario, jsbsim_dt)
-    _assemble_actuators(belief["actuators"], scenario.actuators, jsbsim_dt, travel)
-    _assemble_diagnosis(frame["fdi"], scenario.fdi, dt, travel)
+    _assemble_actuators(
+        belief["actuators"], scenario.actuators, jsbsim_dt, travel, scenario.airframe.surfaces
+    )
+    _assemble_diagnosis(frame["fdi"], scenario.fdi, dt, travel, scenario.airframe)
     _assemble_types(frame, scenario, dt, travel)
     _assemble_admitted(frame, scenario)
     _assemble_sharpening(frame["fdi"], scenario.fdi, dt)
-    _assemble_network(frame["fdi"]["network"], scenario.control)
-    _assemble_control(frame["control"], scenario.control, dt, trim, travel)
+    _assemble_network(frame["fdi"]["fdae"]["network"], scenario.control)
+    _assemble_control(frame["control"], scenario.control, dt, trim, travel, scenario.airframe)
     _assemble_probing(frame["control"], scenario.fdi.probing, dt)
     _assemble_power(frame["control"], scenario, dt)
     return frames

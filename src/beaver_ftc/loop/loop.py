@@ -101,7 +101,7 @@ class Loop:
         self.n_frames = round(scenario.duration_s * scenario.rate_hz)
         self.plugin_frame = self._with_plugins(detector, law)
         self.columns = ch.log_columns(
-            estimator_names(scenario.fdi.fault_class) if self._diagnoses_itself else (),
+            estimator_names(scenario.fdi.fault_class, scenario.airframe) if self._diagnoses_itself else (),
             bool(self.frames["control"]["power"]["enabled"][0]),
             bool(self.frames["fdi"]["statistical"]["enabled"][0]),
             self.aircraft,

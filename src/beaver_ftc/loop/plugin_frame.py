@@ -149,7 +149,7 @@ def measured_of(frame: np.void) -> Measured:
         frame["measured"]["y"][: len(y_places(frame))].copy(),
         frame["belief"]["means"]["acceleration"].copy(),
         frame["belief"]["means"]["Gu"].copy(),
-        frame["fdi"]["eta_bar"].copy(),
+        frame["fdi"]["bound"]["eta_bar"].copy(),
     )
 
 
@@ -168,8 +168,8 @@ def context_of(
         trim_y=trim_y,
         trim_rad=control["trim"].copy(),
         travel_rad=np.array([control["low"], control["high"]]),
-        constant_rad_s2=fdi["constant"].copy(),
-        inertia_coupling=fdi["inertia"].copy(),
+        constant_rad_s2=fdi["bound"]["constant"].copy(),
+        inertia_coupling=fdi["bound"]["inertia"].copy(),
         seed=scenario.seed,
         options=dict(options),
         declared=declared_of(

@@ -51,9 +51,9 @@ def record_estimators(fdi, row, column):
     for e in range(fdi.n_estimators):
         fie = fdi.estimator[e]
         for i in range(3):
-            row[column] = fie.residual[i] if fdi.detected else np.nan
-            row[column + 1] = fie.lower[i] if fdi.detected else np.nan
-            row[column + 2] = fie.upper[i] if fdi.detected else np.nan
+            row[column] = fie.residual[i] if fdi.verdict.detected else np.nan
+            row[column + 1] = fie.lower[i] if fdi.verdict.detected else np.nan
+            row[column + 2] = fie.upper[i] if fdi.verdict.detected else np.nan
             column += 3
         row[column] = fie.excluded
         column += 1
@@ -63,10 +63,10 @@ def record_estimators(fdi, row, column):
 @kernel
 def record_diagnosis(fdi, acceleration, row, column):
     """Residual, threshold, bound, network and the design model's mean acceleration; then the estimators."""
-    column = put(row, column, fdi.residual)
-    column = put(row, column, fdi.threshold)
-    column = put(row, column, fdi.eta_bar)
-    column = put(row, column, fdi.network.output)
+    column = put(row, column, fdi.fdae.residual)
+    column = put(row, column, fdi.fdae.threshold)
+    column = put(row, column, fdi.bound.eta_bar)
+    column = put(row, column, fdi.fdae.network.output)
     column = put(row, column, acceleration)
     return record_estimators(fdi, row, column)
 
@@ -83,7 +83,7 @@ def record(frame, reference, row):
     column = record_diagnosis(fdi, belief.means.acceleration, row, column)
     column = put(row, column, control.effectiveness)
     row[column] = frame.supervisor.mode
-    row[column + 1] = fdi.detected
+    row[column + 1] = fdi.verdict.detected
     if control.power.enabled:
         row[column + 2] = control.power.command[0]
     if fdi.statistical.enabled:

@@ -1,5 +1,6 @@
 """From the frame record at the end of a flight to what the flight yields."""
 
+from collections.abc import Sequence
 from math import isfinite
 
 import numpy as np
@@ -11,7 +12,6 @@ from beaver_ftc.diagnosis.base import Verdict
 from beaver_ftc.diagnosis.scheme import isolated_theta
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, UNANTICIPATED
 from beaver_ftc.diagnosis.types.findings import estimate_of, found
-from beaver_ftc.loop.assembly import estimator_names
 from beaver_ftc.loop.flight import Flight
 from beaver_ftc.plant.sensing import DEPARTURE_SIGNALS
 from beaver_ftc.scenario.schema import Scenario
@@ -33,20 +33,21 @@ def _estimate(fdi: np.void, surface: int) -> float:
     takes a quarter of a second."""
     if fdi["statistical"]["enabled"]:
         return float(isolated_theta(fdi, surface))
-    return float(fdi["estimator"][int(fdi["isolated"])]["theta"][int(fdi["dominant_axis"][surface])])
+    axis, estimator = int(fdi["layout"]["dominant_axis"][surface]), int(fdi["verdict"]["isolated"])
+    return float(fdi["estimator"][estimator]["theta"][axis])
 
 
-def _isolation(fdi: np.void) -> dict:
+def _isolation(fdi: np.void, surfaces: Sequence[str]) -> dict:
     """isolated, isolation_type, candidates, estimate, isolation_time_s of a Flight."""
     if fdi["every_type"]:
-        return found(fdi)
-    verdict = int(fdi["isolated"])
-    names = estimator_names("published")
-    left = [name for name, fie in zip(names, fdi["estimator"], strict=False) if not fie["excluded"]]
+        return found(fdi, surfaces)
+    verdict = int(fdi["verdict"]["isolated"])
+    estimators = fdi["estimator"][: int(fdi["n_estimators"])]
+    left = [surfaces[int(fie["surface"])] for fie in estimators if not fie["excluded"]]
     nothing = {"isolated": None, "isolation_type": None, "estimate": None, "isolation_time_s": None}
-    if not fdi["detected"] or verdict == NOT_ISOLATED:
-        return {**nothing, "candidates": tuple(left) if fdi["detected"] else ()}
-    at_s = float(fdi["isolated_at_s"])
+    if not fdi["verdict"]["detected"] or verdict == NOT_ISOLATED:
+        return {**nothing, "candidates": tuple(left) if fdi["verdict"]["detected"] else ()}
+    at_s = float(fdi["verdict"]["isolated_at_s"])
     if verdict == UNANTICIPATED:
         return {
             **nothing,
@@ -58,7 +59,7 @@ def _isolation(fdi: np.void) -> dict:
     fie = fdi["estimator"][verdict]
     surface = int(fie["surface"])
     return {
-        "isolated": SURFACES[surface],
+        "isolated": surfaces[surface],
         "isolation_type": "loss_of_effectiveness",
         "candidates": tuple(left),
         "estimate": _estimate(fdi, surface),
@@ -122,15 +123,15 @@ def _statistical(fdi: np.void) -> dict[str, float | None] | None:
     }
 
 
-def verdict_of(frame: np.void) -> Verdict:
+def verdict_of(frame: np.void, surfaces: Sequence[str] = SURFACES) -> Verdict:
     """What the built-in diagnosis makes of the flight so far, as a plug-in law is given it."""
     fdi = frame["fdi"]
-    if not fdi["detected"]:
+    if not fdi["verdict"]["detected"]:
         return Verdict()
-    said = _isolation(fdi)
+    said = _isolation(fdi, surfaces)
     return Verdict(
         detected=True,
-        axis=AXES[int(fdi["detected_axis"])],
+        axis=AXES[int(fdi["verdict"]["detected_axis"])],
         isolated=said["isolated"],
         type=said["isolation_type"],
         estimate=said["estimate"],
@@ -141,19 +142,19 @@ def verdict_of(frame: np.void) -> Verdict:
 def estimate_now(fdi: np.void, said: Verdict) -> float | None:
     """The estimate of a verdict that otherwise still stands, of a diagnosis for every type."""
     surface = SURFACES.index(str(said.isolated))
-    kind = fdi["surface"][surface]["type"] if fdi["pairs"] else fdi["type"]
+    kind = fdi["surface"][surface]["type"] if fdi["pair"]["enabled"] else fdi["verdict"]["type"]
     return estimate_of(fdi, surface, int(kind))
 
 
 def _of_verdict(fdi: np.void, verdict: Verdict) -> dict:
     """The same of a Flight, from a plug-in's verdict."""
-    isolated = verdict.isolated if fdi["detected"] else None
+    isolated = verdict.isolated if fdi["verdict"]["detected"] else None
     return {
         "isolated": isolated,
         "isolation_type": verdict.type if isolated else None,
-        "candidates": tuple(verdict.candidates) if fdi["detected"] else (),
+        "candidates": tuple(verdict.candidates) if fdi["verdict"]["detected"] else (),
         "estimate": verdict.estimate if isolated else None,
-        "isolation_time_s": float(fdi["isolated_at_s"]) if isolated else None,
+        "isolation_time_s": float(fdi["verdict"]["isolated_at_s"]) if isolated else None,
     }
 
 
@@ -163,15 +164,16 @@ def flight_of(
     """Read the flight's outcome off its frame record; `verdict` is a plug-in detector's last one."""
     fdi, accounts, dt = frame["fdi"], frame["accounts"], float(frame["dt"])
     supervisor, tracking = frame["supervisor"], accounts["tracking"]
+    surfaces = scenario.airframe.surfaces
     departed = int(frame["departed"])
     modes = range(min(int(supervisor["n_modes"]), MAX_EVENTS))
-    closest = tuple(float(share) for share in fdi["closest"][: max(int(fdi["n_poles"]), 1)])
+    closest = tuple(float(share) for share in fdi["bank"]["closest"][: max(int(fdi["bank"]["n"]), 1)])
     return Flight(
         scenario=scenario,
         frames=int(frame["k"]),
         columns=columns,
-        detection_time_s=_instant(fdi["detected_at_s"]),
-        detection_axis=AXES[int(fdi["detected_axis"])] if fdi["detected"] else None,
+        detection_time_s=_instant(fdi["verdict"]["detected_at_s"]),
+        detection_axis=AXES[int(fdi["verdict"]["detected_axis"])] if fdi["verdict"]["detected"] else None,
         guaranteed_delay_s=_guaranteed_delay(frame),
         pre_fault_rms_rad_s=_rms(tracking["before"], int(tracking["frames_before"])) or (0.0, 0.0, 0.0),
         post_fault_rms_rad_s=_rms(tracking["since"], int(tracking["frames_since"])),
@@ -183,13 +185,13 @@ def flight_of(
         exits=int(accounts["envelope"]["n_exits"]),
         outside_s=int(accounts["envelope"]["outside_frames"]) * dt,
         departure=(float(frame["t"]), DEPARTURE_SIGNALS[departed // 10]) if departed else None,
-        saturation_s={s: int(n) * dt for s, n in zip(SURFACES, accounts["saturated_frames"], strict=True)},
+        saturation_s={s: int(n) * dt for s, n in zip(surfaces, accounts["saturated_frames"], strict=True)},
         worst_residual_ratio=max(*closest, float(fdi["statistical"]["closest"])),
         statistical=_statistical(fdi),
         closest_approach=closest,
         authority=_authority(frame),
         probing_s=_probing_s(frame),
         engine_power=_engine_power(frame),
-        surface_travel_rad={s: float(x) for s, x in zip(SURFACES, accounts["travelled"], strict=True)},
-        **(_isolation(fdi) if verdict is None else _of_verdict(fdi, verdict)),
+        surface_travel_rad={s: float(x) for s, x in zip(surfaces, accounts["travelled"], strict=True)},
+        **(_isolation(fdi, surfaces) if verdict is None else _of_verdict(fdi, verdict)),
     )

@@ -66,17 +66,17 @@ def news(frames, known):
     known (MEMORY,) int64: what the words follow from; brought up to date.
     """
     fdi = frames[0].fdi
-    changed = replace(known, 0, fdi.detected)
-    if not fdi.detected:
+    changed = replace(known, 0, fdi.verdict.detected)
+    if not fdi.verdict.detected:
         return changed
-    changed |= replace(known, 1, fdi.detected_axis) | replace(known, 2, fdi.isolated)
+    changed |= replace(known, 1, fdi.verdict.detected_axis) | replace(known, 2, fdi.verdict.isolated)
     excluded = 0
     for i in range(fdi.n_estimators):
         excluded = 2 * excluded + fdi.estimator[i].excluded
-    changed |= replace(known, 3, excluded) | replace(known, 4, fdi.type)
+    changed |= replace(known, 3, excluded) | replace(known, 4, fdi.verdict.type)
     if fdi.every_type:
-        for plane in range(fdi.alarmed.size):
-            changed |= replace(known, 5 + plane, fdi.alarmed[plane])
+        for plane in range(fdi.pair.alarmed.size):
+            changed |= replace(known, 5 + plane, fdi.pair.alarmed[plane])
         for s in range(fdi.surface.size):
             changed |= news_of(fdi, s, known)
     return changed

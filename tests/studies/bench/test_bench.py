@@ -69,10 +69,10 @@ def test_the_phases_are_what_they_are_called(published):
     for loop, alarm in ((before, 0), (after, 1)):
         for _ in range(2):  # a second round starts where the first did
             loop.prepare()
-            assert loop.loop.frames["fdi"]["detected"][0] == alarm
+            assert loop.loop.frames["fdi"]["verdict"]["detected"][0] == alarm
             loop.fly(measure.FRAMES)
-            assert loop.loop.frames["fdi"]["detected"][0] == alarm
-    assert np.abs(after.loop.frames["fdi"]["network"]["basis"]).max() > 0
+            assert loop.loop.frames["fdi"]["verdict"]["detected"][0] == alarm
+    assert np.abs(after.loop.frames["fdi"]["fdae"]["network"]["basis"]).max() > 0
 
 
 def test_every_round_flies_what_the_flight_itself_flew():

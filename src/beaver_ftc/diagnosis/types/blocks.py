@@ -21,10 +21,10 @@ from beaver_ftc.diagnosis.types.examine import judge_all, locate, note_wrong
 @kernel
 def begin(fdi):
     """Begin a block with the elapsed frame."""
-    fdi.block_innovation[:], fdi.block_bound[:] = 0.0, 0.0
-    fdi.block_noise[:] = fdi.noise_then
+    fdi.block.innovation[:], fdi.block.bound[:] = 0.0, 0.0
+    fdi.block.noise[:] = fdi.bound.noise_then
     for s in range(fdi.surface.size):
-        effect, orders = fdi.estimator[fdi.position_of[s]].block_effect, fdi.surface[s].orders
+        effect, orders = fdi.estimator[fdi.layout.position_of[s]].block_effect, fdi.surface[s].orders
         effect.offset[:], effect.Z[:], effect.spread[:] = 0.0, 0.0, 0.0
         orders.least[1], orders.greatest[1] = orders.least[0], orders.greatest[0]
         orders.least[0], orders.greatest[0] = np.inf, -np.inf
@@ -33,12 +33,12 @@ def begin(fdi):
 @kernel
 def add(fdi):
     """Add the elapsed frame to the means over the block."""
-    share = 1.0 / fdi.block
+    share = 1.0 / fdi.block.length
     for i in range(3):
-        fdi.block_innovation[i] += share * fdi.innovation[i]
-        fdi.block_bound[i] += share * fdi.eta_bar[i]
+        fdi.block.innovation[i] += share * fdi.innovation[i]
+        fdi.block.bound[i] += share * fdi.bound.eta_bar[i]
     for s in range(fdi.surface.size):
-        fie, orders = fdi.estimator[fdi.position_of[s]], fdi.surface[s].orders
+        fie, orders = fdi.estimator[fdi.layout.position_of[s]], fdi.surface[s].orders
         frame, mean = fie.effect, fie.block_effect
         for i in range(3):
             mean.offset[i] += share * frame.offset[i]
@@ -52,17 +52,17 @@ def add(fdi):
 @kernel
 def examine(fdi):
     """Take in the elapsed frame; with the last one of a block, take in the block and judge the one before."""
-    if fdi.in_block == 0:
+    if fdi.block.filled == 0:
         begin(fdi)
     add(fdi)
-    fdi.in_block += 1
-    if fdi.in_block < fdi.block:
+    fdi.block.filled += 1
+    if fdi.block.filled < fdi.block.length:
         return
-    fdi.in_block = 0
+    fdi.block.filled = 0
     for i in range(3):
-        fdi.block_bound[i] += (fdi.block_noise[i] + fdi.noise[i]) / fdi.span_s
-    note_wrong(fdi, fdi.block_innovation, fdi.block_bound)
+        fdi.block.bound[i] += (fdi.block.noise[i] + fdi.bound.noise[i]) / fdi.block.span_s
+    note_wrong(fdi, fdi.block.innovation, fdi.block.bound)
     for s in range(fdi.surface.size):
-        effect = fdi.estimator[fdi.position_of[s]].block_effect
-        locate(fdi, s, fdi.block_innovation, fdi.block_bound, effect)
+        effect = fdi.estimator[fdi.layout.position_of[s]].block_effect
+        locate(fdi, s, fdi.block.innovation, fdi.block.bound, effect)
     judge_all(fdi)

@@ -32,7 +32,7 @@ def possible(fdi, s):
     standing = fdi.surface[s].standing
     if standing != BY_ESTIMATOR:
         return standing == BY_DEDUCTION
-    return not fdi.estimator[fdi.position_of[s]].excluded
+    return not fdi.estimator[fdi.layout.position_of[s]].excluded
 
 
 @kernel

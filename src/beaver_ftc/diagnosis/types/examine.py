@@ -48,13 +48,13 @@ def note_orders(fdi, commanded):
     for s in range(fdi.surface.size):
         surface = fdi.surface[s]
         orders = surface.orders
-        if fdi.in_block == 0:
+        if fdi.block.filled == 0:
             for age in range(HISTORY - 1, 0, -1):
-                orders.given[age, : fdi.block] = orders.given[age - 1, : fdi.block]
+                orders.given[age, : fdi.block.length] = orders.given[age - 1, : fdi.block.length]
                 orders.low[age], orders.high[age] = orders.low[age - 1], orders.high[age - 1]
             orders.low[0], orders.high[0] = np.inf, -np.inf
         order = min(max(commanded[s], surface.travel_low), surface.travel_high)
-        orders.given[0, fdi.in_block] = order
+        orders.given[0, fdi.block.filled] = order
         orders.low[0], orders.high[0] = min(orders.low[0], order), max(orders.high[0], order)
 
 
@@ -64,13 +64,13 @@ def locate(fdi, s, innovation, bound, effect):
 
     effect: what the surface's estimator supposes of the same frame or block, dtype EFFECT.
     """
-    surface, fie, axis = fdi.surface[s], fdi.estimator[fdi.position_of[s]], fdi.dominant_axis[s]
+    surface, fie, axis = fdi.surface[s], fdi.estimator[fdi.layout.position_of[s]], fdi.layout.dominant_axis[s]
     surface.low_before, surface.high_before = surface.low_then, surface.high_then
     surface.low_then, surface.high_then, surface.command_then = surface.low, surface.high, surface.command
     surface.command = -effect.offset[axis] / effect.Z[axis]
     surface.low, surface.high = fie.low, fie.high
     for i in range(3):
-        if fdi.block > 1 and i != axis and effect.Z[i] != 0.0:
+        if fdi.block.length > 1 and i != axis and effect.Z[i] != 0.0:
             continue  # over a block the axes weigh what varies differently
         low, high = membership.agreeing(innovation, bound, fie, effect, i)
         surface.low, surface.high = max(surface.low, low), min(surface.high, high)
@@ -88,10 +88,10 @@ def note_wrong(fdi, innovation, bound):
 @kernel
 def take_in_frame(fdi):
     """Find where each surface was in the elapsed frame, if it alone is at fault."""
-    note_wrong(fdi, fdi.innovation, fdi.frame_bound)
+    note_wrong(fdi, fdi.innovation, fdi.bound.frame)
     for s in range(fdi.surface.size):
-        effect = fdi.estimator[fdi.position_of[s]].effect
-        locate(fdi, s, fdi.innovation, fdi.frame_bound, effect)
+        effect = fdi.estimator[fdi.layout.position_of[s]].effect
+        locate(fdi, s, fdi.innovation, fdi.bound.frame, effect)
 
 
 @kernel
@@ -144,5 +144,5 @@ def note_quiet(fdi, s):
         if other == s or (surface.in_question and fdi.surface[other].in_question):
             fdi.surface[other].evidence += 1
     surface.quiet += 1
-    if surface.quiet > fdi.patience and not fdi.own_errors:
+    if surface.quiet > fdi.patience and not fdi.bound.own_errors:
         surface.type_excluded[OSCILLATORY] = 1

@@ -4,7 +4,7 @@ estimate, by type: theta in [-1, 0] of a loss of effectiveness; deflection in ra
 runaway surface; offset in rad of a bias; amplitude in rad of an oscillation.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -40,59 +40,69 @@ _NOTHING: Found = {
 }
 
 
-def found(fdi: np.void) -> Found:
-    """isolated, isolation_type, candidates, estimate and more of a Flight diagnosed for every type."""
-    if not fdi["detected"]:
+def found(fdi: np.void, surfaces: Sequence[str] = SURFACES) -> Found:
+    """isolated, isolation_type, candidates, estimate and more of a Flight diagnosed for every type.
+
+    surfaces: their names, by default the Beaver's.
+    """
+    if not fdi["verdict"]["detected"]:
         return dict(_NOTHING)
-    if fdi["pairs"]:
-        return _found_of_several(fdi)
-    return _found_of_one(fdi)
+    if fdi["pair"]["enabled"]:
+        return _found_of_several(fdi, surfaces)
+    return _found_of_one(fdi, surfaces)
 
 
-def _found_of_several(fdi: np.void) -> Found:
+def _found_of_several(fdi: np.void, names: Sequence[str]) -> Found:
     """The fault named first as if it were alone, and all of them; what is open in a plane where none is."""
     at_fault = sorted(
-        (s for s in range(len(SURFACES)) if fdi["surface"][s]["named"]),
+        (s for s in range(len(names)) if fdi["surface"][s]["named"]),
         key=lambda s: (fdi["surface"][s]["named_at_s"], s),
     )
-    faults = [_found_on(fdi, s, int(fdi["surface"][s]["type"])) for s in at_fault]
+    faults = [_found_on(fdi, s, int(fdi["surface"][s]["type"]), names) for s in at_fault]
     open_planes = [
-        {**_NOTHING, "candidates": tuple(_open_questions(fdi, plane))}
-        for alarmed, plane in zip(fdi["alarmed"], _planes(fdi), strict=True)
+        {**_NOTHING, "candidates": tuple(_open_questions(fdi, plane, names))}
+        for alarmed, plane in zip(fdi["pair"]["alarmed"], _planes(fdi), strict=True)
         if alarmed and not set(plane) & set(at_fault)
     ]
     if faults:
         return {**faults[0], "faults": (*faults, *open_planes)}
-    if int(fdi["isolated"]) == UNANTICIPATED:
-        return {**_found_of_one(fdi), "faults": tuple(open_planes)}
+    if int(fdi["verdict"]["isolated"]) == UNANTICIPATED:
+        return {**_found_of_one(fdi, names), "faults": tuple(open_planes)}
     left = tuple(candidate for plane in open_planes for candidate in plane["candidates"])
     return {**_NOTHING, "candidates": left, "faults": tuple(open_planes)}
 
 
 def _planes(fdi: np.void) -> list[list[int]]:
     """The surfaces of each group."""
-    return [[s for s, group in enumerate(fdi["group"]) if group == g] for g in range(len(fdi["alarmed"]))]
+    return [
+        [s for s, group in enumerate(fdi["layout"]["group"]) if group == g]
+        for g in range(len(fdi["pair"]["alarmed"]))
+    ]
 
 
-def _found_of_one(fdi: np.void) -> Found:
-    verdict, at_s = int(fdi["isolated"]), float(fdi["isolated_at_s"])
+def _found_of_one(fdi: np.void, names: Sequence[str]) -> Found:
+    verdict, at_s = int(fdi["verdict"]["isolated"]), float(fdi["verdict"]["isolated_at_s"])
     if verdict == NOT_ISOLATED:
-        return {**_NOTHING, "candidates": tuple(_open_questions(fdi))}
+        return {**_NOTHING, "candidates": tuple(_open_questions(fdi, range(len(names)), names))}
     if verdict == UNANTICIPATED:
         said = {"isolated": "unanticipated", "isolation_type": "unanticipated", "isolation_time_s": at_s}
         return {**_NOTHING, **said}
-    s, kind = int(fdi["estimator"][verdict]["surface"]), int(fdi["type"])
-    return {**_found_on(fdi, s, kind), "isolation_time_s": at_s, "type_time_s": _at_s(fdi["type_at_s"], kind)}
+    s, kind = int(fdi["estimator"][verdict]["surface"]), int(fdi["verdict"]["type"])
+    return {
+        **_found_on(fdi, s, kind, names),
+        "isolation_time_s": at_s,
+        "type_time_s": _at_s(fdi["verdict"]["type_at_s"], kind),
+    }
 
 
 def _at_s(instant_s: float, kind: int) -> float | None:
     return float(instant_s) if kind >= 0 else None
 
 
-def _found_on(fdi: np.void, s: int, kind: int) -> Found:
+def _found_on(fdi: np.void, s: int, kind: int, names: Sequence[str]) -> Found:
     """What is known of surface s, which is at fault; kind: of which type, -1 if open."""
     return {
-        "isolated": SURFACES[s],
+        "isolated": names[s],
         "isolation_time_s": float(fdi["surface"][s]["named_at_s"]),
         "isolation_type": NAMES[kind] if kind >= 0 else None,
         "type_time_s": _at_s(fdi["surface"][s]["type_at_s"], kind),
@@ -118,7 +128,9 @@ def _possible(fdi: np.void, s: int) -> bool:
     surface = fdi["surface"][s]
     if surface["named"] or surface["standing"] == BY_DEDUCTION:
         return True
-    return not (surface["standing"] == RULED_OUT or fdi["estimator"][int(fdi["position_of"][s])]["excluded"])
+    return not (
+        surface["standing"] == RULED_OUT or fdi["estimator"][int(fdi["layout"]["position_of"][s])]["excluded"]
+    )
 
 
 def _types_left(fdi: np.void, s: int) -> list[str]:
@@ -128,15 +140,15 @@ def _types_left(fdi: np.void, s: int) -> list[str]:
     """
     surface = fdi["surface"][s]
     left = [kind for kind in range(N_TYPES) if _possible(fdi, s) and not surface["type_excluded"][kind]]
-    if any(kind < N_CONSTANT for kind in left) and not fdi["own_errors"]:
+    if any(kind < N_CONSTANT for kind in left) and not fdi["bound"]["own_errors"]:
         early = surface["evidence"] - surface["quiet"] < fdi["patience"]
         left = [kind for kind in left if kind != VARYING_LOSS and (kind != SLOW or early)]
-    if fdi["pairs"] and fdi["group"][s] == IN_PITCH and {STUCK, UP, DOWN} & set(left):
+    if fdi["pair"]["enabled"] and fdi["layout"]["group"][s] == IN_PITCH and {STUCK, UP, DOWN} & set(left):
         left += [STUCK, FLOAT, UP, BIAS, CONSTANT_LOSS]  # if the other one is off as well
     return list(dict.fromkeys(NAMES[kind] for kind in left))
 
 
-def _open_questions(fdi: np.void, among: Iterable[int] = range(len(SURFACES))) -> Iterator[str]:
+def _open_questions(fdi: np.void, among: Iterable[int], names: Sequence[str]) -> Iterator[str]:
     """`surface:type` for each that is possible; bare surfaces and `unanticipated` where no type fits.
 
     Of one plane also both its surfaces, as `elevator+flap`.
@@ -144,8 +156,8 @@ def _open_questions(fdi: np.void, among: Iterable[int] = range(len(SURFACES))) -
     possible = [s for s in among if _possible(fdi, s)]
     for s in possible:
         types = _types_left(fdi, s)
-        yield from (f"{SURFACES[s]}:{kind}" for kind in types) if types else (SURFACES[s],)
-    if fdi["pairs"]:
-        yield "+".join(SURFACES[s] for s in among)
+        yield from (f"{names[s]}:{kind}" for kind in types) if types else (names[s],)
+    if fdi["pair"]["enabled"]:
+        yield "+".join(names[s] for s in among)
     if not any(_types_left(fdi, s) for s in possible):
         yield "unanticipated"

@@ -84,4 +84,4 @@ def frequency_rad_s(fdi: np.void, s: int) -> float | None:
     """From the half-cycles counted."""
     swing = fdi["surface"][s]["oscillatory"]
     half_cycles, frames = int(swing["half_cycles"]) - 1, int(swing["last_end"] - swing["first_end"])
-    return half_cycles * pi / (float(fdi["span_s"]) * frames)
+    return half_cycles * pi / (float(fdi["block"]["span_s"]) * frames)

@@ -50,15 +50,15 @@ def note_alarms(fdi):
     """In which plane a filter of the bank has left its bound."""
     for i in range(3):
         plane = IN_PITCH if i == PITCH else IN_ROLL_AND_YAW
-        for m in range(fdi.n_poles):
-            if abs(fdi.bank_residual[m, i]) > fdi.bank_threshold[m, i]:
-                fdi.alarmed[plane] = 1
+        for m in range(fdi.bank.n):
+            if abs(fdi.bank.residual[m, i]) > fdi.bank.threshold[m, i]:
+                fdi.pair.alarmed[plane] = 1
 
 
 @kernel
 def effect_of(fdi, s):
     """What the position estimator of surface s supposes of the elapsed frame."""
-    return fdi.estimator[fdi.position_of[s]].effect
+    return fdi.estimator[fdi.layout.position_of[s]].effect
 
 
 @kernel
@@ -73,18 +73,18 @@ def place(surface, middle, slack):
 @kernel
 def solve_roll_and_yaw(fdi):
     """Where ailerons and rudder were in the elapsed frame: nu = G (p - u) + eta solved for p."""
-    one, other = effect_of(fdi, fdi.main[ROLL]), effect_of(fdi, fdi.main[YAW])
+    one, other = effect_of(fdi, fdi.layout.main[ROLL]), effect_of(fdi, fdi.layout.main[YAW])
     a_p, a_r, r_p, r_r = one.Z[ROLL], one.Z[YAW], other.Z[ROLL], other.Z[YAW]
     p, r = fdi.innovation[ROLL], fdi.innovation[YAW]
-    slack_p = fdi.frame_bound[ROLL] + one.spread[ROLL] + other.spread[ROLL]
-    slack_r = fdi.frame_bound[YAW] + one.spread[YAW] + other.spread[YAW]
+    slack_p = fdi.bound.frame[ROLL] + one.spread[ROLL] + other.spread[ROLL]
+    slack_r = fdi.bound.frame[YAW] + one.spread[YAW] + other.spread[YAW]
     determinant = a_p * r_r - a_r * r_p
     size = abs(determinant)
     off, slack = (p * r_r - r * r_p) / determinant, (slack_p * abs(r_r) + slack_r * abs(r_p)) / size
-    fits = place(fdi.surface[fdi.main[ROLL]], off, slack)
+    fits = place(fdi.surface[fdi.layout.main[ROLL]], off, slack)
     off, slack = (r * a_p - p * a_r) / determinant, (slack_r * abs(a_p) + slack_p * abs(a_r)) / size
-    if not (place(fdi.surface[fdi.main[YAW]], off, slack) and fits):
-        fdi.no_lateral_pair = 1
+    if not (place(fdi.surface[fdi.layout.main[YAW]], off, slack) and fits):
+        fdi.pair.no_lateral_pair = 1
 
 
 @kernel
@@ -102,7 +102,7 @@ def whereabouts(fdi, surface):
 @kernel
 def first_is_settled(fdi):
     """Whether one pitch fault was named and a second has begun beside it."""
-    return fdi.first != NO_SURFACE and not fdi.surface[fdi.first].in_question
+    return fdi.pair.first != NO_SURFACE and not fdi.surface[fdi.pair.first].in_question
 
 
 @kernel
@@ -112,14 +112,14 @@ def solve_pitch(fdi):
         solve_beside_the_first(fdi)
         return
     for s in range(fdi.surface.size):
-        if fdi.group[s] == IN_PITCH:
-            fdi.surface[s].wrong = abs(fdi.innovation[PITCH]) > fdi.frame_bound[PITCH]
+        if fdi.layout.group[s] == IN_PITCH:
+            fdi.surface[s].wrong = abs(fdi.innovation[PITCH]) > fdi.bound.frame[PITCH]
 
 
 @kernel
 def solve_beside_the_first(fdi):
     """Where the second surface was, given what is known of the first."""
-    first, second = fdi.first, fdi.partner[fdi.first]
+    first, second = fdi.pair.first, fdi.layout.partner[fdi.pair.first]
     known, other = effect_of(fdi, first), effect_of(fdi, second)
     surface = fdi.surface[first]
     surface.low, surface.high = whereabouts(fdi, surface)
@@ -127,7 +127,7 @@ def solve_beside_the_first(fdi):
     Z, Z_known = other.Z[PITCH], known.Z[PITCH]
     share = Z_known * (0.5 * (surface.low + surface.high) - surface.command)
     slack = abs(Z_known) * 0.5 * (surface.high - surface.low)
-    slack += fdi.frame_bound[PITCH] + known.spread[PITCH] + other.spread[PITCH]
+    slack += fdi.bound.frame[PITCH] + known.spread[PITCH] + other.spread[PITCH]
     if not place(fdi.surface[second], (fdi.innovation[PITCH] - share) / Z, slack / abs(Z)):
         fdi.surface[second].standing = RULED_OUT
 
@@ -156,14 +156,14 @@ def name(surface, named, kind, t):
 @kernel
 def decide_roll_and_yaw(fdi, t):
     """Which of the two is at fault, if any. Returns whether the plane's fault is outside the class."""
-    a, r = fdi.main[ROLL], fdi.main[YAW]
+    a, r = fdi.layout.main[ROLL], fdi.layout.main[YAW]
     one, other = fdi.surface[a], fdi.surface[r]
     one_left, other_left = possible(fdi, a), possible(fdi, r)
     both = not one_left and not other_left
-    no_pair = fdi.no_lateral_pair == 1 or not anything_left(one) or not anything_left(other)
+    no_pair = fdi.pair.no_lateral_pair == 1 or not anything_left(one) or not anything_left(other)
     outside = both and no_pair
     open_yet = both and (only_a_swing(one) or only_a_swing(other))
-    certain = fdi.alarmed[IN_ROLL_AND_YAW] == 1 and not (outside or open_yet)
+    certain = fdi.pair.alarmed[IN_ROLL_AND_YAW] == 1 and not (outside or open_yet)
     name(one, certain and not other_left, type_at_fault(fdi, one), t)
     name(other, certain and not one_left, type_at_fault(fdi, other), t)
     return outside
@@ -178,9 +178,9 @@ def note_first(fdi, s):
     surface, known, changed = fdi.surface[s], fdi.surface[s].known, False
     for kind in range(N_CONSTANT):
         changed = changed or surface.type_excluded[kind] != known.excluded[kind]
-    fdi.unsettled = fdi.unsettled + 1 if changed else 0
-    if fdi.first != s or fdi.unsettled >= fdi.patience:
-        fdi.first, fdi.unsettled = s, 0
+    fdi.pair.unsettled = fdi.pair.unsettled + 1 if changed else 0
+    if fdi.pair.first != s or fdi.pair.unsettled >= fdi.patience:
+        fdi.pair.first, fdi.pair.unsettled = s, 0
         known.low[:], known.high[:] = surface.set_low, surface.set_high
         known.excluded[:] = 1
         known.excluded[:N_CONSTANT] = surface.type_excluded[:N_CONSTANT]
@@ -189,7 +189,7 @@ def note_first(fdi, s):
 @kernel
 def begin_second(fdi):
     """The one known pitch fault no longer explains the flight: there is another beside it."""
-    first, second = fdi.surface[fdi.first], fdi.surface[fdi.partner[fdi.first]]
+    first, second = fdi.surface[fdi.pair.first], fdi.surface[fdi.layout.partner[fdi.pair.first]]
     first.set_low[:], first.set_high[:] = first.known.low, first.known.high
     first.type_excluded[:] = first.known.excluded
     begin(second)
@@ -209,10 +209,10 @@ def patient(fdi, surface):
 @kernel
 def two_in_pitch(fdi):
     """Whether a second pitch fault has shown beside one that was known."""
-    if fdi.first == NO_SURFACE:
+    if fdi.pair.first == NO_SURFACE or fdi.layout.partner[fdi.pair.first] < 0:
         return False
-    surface = fdi.surface[fdi.first]
-    if surface.in_question and not (possible(fdi, fdi.first) and any_constant(surface)):
+    surface = fdi.surface[fdi.pair.first]
+    if surface.in_question and not (possible(fdi, fdi.pair.first) and any_constant(surface)):
         begin_second(fdi)
     return not surface.in_question
 
@@ -231,7 +231,7 @@ def type_in_pitch(fdi, surface):
 def decide_pitch(fdi, t):
     """Which surface of pitch is at fault, if any."""
     if two_in_pitch(fdi):
-        first, s = fdi.surface[fdi.first], fdi.partner[fdi.first]
+        first, s = fdi.surface[fdi.pair.first], fdi.layout.partner[fdi.pair.first]
         second = fdi.surface[s]
         name(first, 1, first.type, t)
         shows = second.evidence > 0 and possible(fdi, s) and explained(second)
@@ -239,7 +239,7 @@ def decide_pitch(fdi, t):
         return
     s = one_in_pitch(fdi)
     for member in range(fdi.surface.size):
-        if fdi.group[member] == IN_PITCH:
+        if fdi.layout.group[member] == IN_PITCH:
             surface = fdi.surface[member]
             name(surface, member == s, type_in_pitch(fdi, surface) if member == s else -1, t)
 
@@ -247,7 +247,7 @@ def decide_pitch(fdi, t):
 @kernel
 def one_in_pitch(fdi):
     """The surface of pitch at fault if a constant explains everything on it, or NO_SURFACE."""
-    s = surface_at_fault(fdi) if fdi.alarmed[IN_PITCH] else NO_SURFACE
+    s = surface_at_fault(fdi) if fdi.pair.alarmed[IN_PITCH] else NO_SURFACE
     if s < 0 or not any_constant(fdi.surface[s]):
         return NO_SURFACE
     if patient(fdi, fdi.surface[s]):
@@ -272,23 +272,23 @@ def decide(fdi, t):
 @kernel
 def summarise(fdi, s, outside, t):
     """The verdict on surface s, the first named, as that of a single fault."""
-    before = fdi.isolated
+    before = fdi.verdict.isolated
     if s < 0:
-        fdi.isolated, fdi.type = UNANTICIPATED if outside else NOT_ISOLATED, -1
+        fdi.verdict.isolated, fdi.verdict.type = UNANTICIPATED if outside else NOT_ISOLATED, -1
     else:
         surface = fdi.surface[s]
-        fdi.isolated = estimator_for(fdi, s, surface.type)
-        fdi.type, fdi.type_at_s = surface.type, surface.type_at_s
-        fdi.isolated_at_s = surface.named_at_s
-    if s < 0 and fdi.isolated != before:
-        fdi.isolated_at_s = t
+        fdi.verdict.isolated = estimator_for(fdi, s, surface.type)
+        fdi.verdict.type, fdi.verdict.type_at_s = surface.type, surface.type_at_s
+        fdi.verdict.isolated_at_s = surface.named_at_s
+    if s < 0 and fdi.verdict.isolated != before:
+        fdi.verdict.isolated_at_s = t
 
 
 @kernel
 def named_in_pitch(fdi):
     """Whether a surface of pitch is named."""
     for s in range(fdi.surface.size):
-        if fdi.group[s] == IN_PITCH and fdi.surface[s].named:
+        if fdi.layout.group[s] == IN_PITCH and fdi.surface[s].named:
             return True
     return False
 
@@ -298,16 +298,16 @@ def acted_upon(fdi, s):
     """Whether the law acts on surface s: it is named, or the likeliest in pitch."""
     if fdi.surface[s].named:
         return True
-    if fdi.group[s] != IN_PITCH or named_in_pitch(fdi) or not fdi.alarmed[IN_PITCH]:
+    if fdi.layout.group[s] != IN_PITCH or named_in_pitch(fdi) or not fdi.pair.alarmed[IN_PITCH]:
         return False
     likeliest = sole(fdi, True)
-    return s == (likeliest if likeliest >= 0 else fdi.main[PITCH])
+    return s == (likeliest if likeliest >= 0 else fdi.layout.main[PITCH])
 
 
 @kernel
 def act(fdi):
     """What the law does about each surface. The supervisor follows the lead: a replaced elevator first."""
-    fdi.lead, fdi.lead_kind = NO_SURFACE, -1
+    fdi.verdict.lead, fdi.verdict.lead_kind = NO_SURFACE, -1
     for s in range(fdi.surface.size):
         surface = fdi.surface[s]
         surface.measure = -1
@@ -316,6 +316,6 @@ def act(fdi):
             measure = measure_for(surface) if at_fault else SHIFTED
             if still_there(surface, measure, at_fault):
                 surface.measure = measure
-                replaced = s == fdi.main[PITCH] and measure in (LOSES, FIXED)
-                if fdi.lead == NO_SURFACE or replaced:
-                    fdi.lead, fdi.lead_kind = s, measure
+                replaced = s == fdi.layout.main[PITCH] and measure in (LOSES, FIXED)
+                if fdi.verdict.lead == NO_SURFACE or replaced:
+                    fdi.verdict.lead, fdi.verdict.lead_kind = s, measure

@@ -44,7 +44,7 @@ def start(surface, kind):
 def carried(fdi, surface, a):
     """Mean position over the judged frame of a surface that is at a (rad) as it begins; and as it ends."""
     total, count = 0.0, 0
-    for k in range(fdi.block):
+    for k in range(fdi.block.length):
         order = surface.orders.given[1, k]
         for _ in range(fdi.instants):
             total += a
@@ -61,7 +61,7 @@ def possible(fdi, surface, kind):
         if any_release(surface, which, kind):
             low, end = carried(fdi, surface, held.low[which, kind])
             high, other_end = carried(fdi, surface, held.high[which, kind])
-            if fdi.block > 1:
+            if fdi.block.length > 1:
                 low -= UNEVENNESS * abs(end - held.low[which, kind])
                 high += UNEVENNESS * abs(other_end - held.high[which, kind])
             away = max(abs(low - surface.command_then), abs(high - surface.command_then)) > NOT_BACK_RAD

@@ -36,7 +36,7 @@ def offset(fdi, surface):
     """
     low, high, u = surface.low_then, surface.high_then, surface.command_then
     least, greatest = low, high
-    if fdi.block > 1:
+    if fdi.block.length > 1:
         orders = surface.orders
         least, greatest = low - (u - orders.least[1]), high + (orders.greatest[1] - u)
     return (

@@ -49,7 +49,7 @@ def surface_at_fault(fdi):
     if s == NO_SURFACE:
         return UNANTICIPATED
     if s >= 0:
-        return s if fdi.dominant_axis[s] != PITCH or explained(fdi.surface[s]) else NOT_ISOLATED
+        return s if fdi.layout.dominant_axis[s] != PITCH or explained(fdi.surface[s]) else NOT_ISOLATED
     s = sole(fdi, True)
     return s if s >= 0 and others_refuted(fdi, s) else NOT_ISOLATED
 
@@ -65,7 +65,7 @@ def others_refuted(fdi, chosen):
     for s in range(fdi.surface.size):
         surface = fdi.surface[s]
         if s != chosen and surface.in_question and possible(fdi, s):
-            if fdi.own_errors and anything_left(surface):
+            if fdi.bound.own_errors and anything_left(surface):
                 return False
             if left(surface, OSCILLATORY) or left(surface, VARYING_LOSS):
                 waits = 2
@@ -78,7 +78,7 @@ def type_at_fault(fdi, surface):
     oscillation may yet show."""
     if surface.evidence < fdi.patience or may_be_slow(fdi, surface):
         return -1
-    if fdi.own_errors:
+    if fdi.bound.own_errors:
         return sole_type(surface)
     patient = not left(surface, OSCILLATORY) or surface.evidence >= 2 * fdi.patience
     if any_constant(surface):
@@ -104,20 +104,22 @@ def one_course(surface, patient):
 def decide(fdi, t):
     """Name the surface and, when it is certain, the type; t s."""
     s = surface_at_fault(fdi)
-    before = fdi.estimator[fdi.isolated].surface if fdi.isolated >= 0 else fdi.isolated
+    before = (
+        fdi.estimator[fdi.verdict.isolated].surface if fdi.verdict.isolated >= 0 else fdi.verdict.isolated
+    )
     kind = type_at_fault(fdi, fdi.surface[s]) if s >= 0 else -1
     if s != before:
-        fdi.isolated_at_s = t
-    if kind != fdi.type:
-        fdi.type, fdi.type_at_s = kind, t
-    fdi.isolated = estimator_for(fdi, s, kind) if s >= 0 else s
+        fdi.verdict.isolated_at_s = t
+    if kind != fdi.verdict.type:
+        fdi.verdict.type, fdi.verdict.type_at_s = kind, t
+    fdi.verdict.isolated = estimator_for(fdi, s, kind) if s >= 0 else s
     take_the_lead(fdi)
 
 
 @kernel
 def estimator_for(fdi, s, kind):
     """The estimator that stands for a fault of this type (-1 if open) on surface s."""
-    return fdi.loss_of[s] if kind in (CONSTANT_LOSS, VARYING_LOSS) else fdi.position_of[s]
+    return fdi.layout.loss_of[s] if kind in (CONSTANT_LOSS, VARYING_LOSS) else fdi.layout.position_of[s]
 
 
 @kernel
@@ -142,13 +144,13 @@ def presumed(fdi):
     It acts before all doubt is gone, since it can take it back. Of elevator and flap it does not matter which
     is thought to be off, as long as both follow their commands: the moment is the same.
     """
-    if fdi.isolated >= 0:
-        return fdi.estimator[fdi.isolated].surface
+    if fdi.verdict.isolated >= 0:
+        return fdi.estimator[fdi.verdict.isolated].surface
     s = sole(fdi, True)
     if s >= 0:
         return s
     for s in range(fdi.surface.size):
-        if fdi.dominant_axis[s] == PITCH and possible(fdi, s):
+        if fdi.layout.dominant_axis[s] == PITCH and possible(fdi, s):
             return s
     return NO_SURFACE
 
@@ -159,12 +161,12 @@ def take_the_lead(fdi):
     s = presumed(fdi)
     for other in range(fdi.surface.size):
         fdi.surface[other].measure = -1
-    fdi.lead, fdi.lead_kind = NO_SURFACE, -1
+    fdi.verdict.lead, fdi.verdict.lead_kind = NO_SURFACE, -1
     if s >= 0:
         surface = fdi.surface[s]
-        fdi.lead_kind = measure_for(surface)
-        if still_there(surface, fdi.lead_kind, True):
-            fdi.lead, surface.measure = s, fdi.lead_kind
+        fdi.verdict.lead_kind = measure_for(surface)
+        if still_there(surface, fdi.verdict.lead_kind, True):
+            fdi.verdict.lead, surface.measure = s, fdi.verdict.lead_kind
 
 
 @kernel
@@ -197,6 +199,6 @@ def effectiveness_left(fdi, s):
 
     The estimator fits both axes of a surface, so beside another fault the set of the constant is asked.
     """
-    if fdi.pairs and possible(fdi, s) and left(fdi.surface[s], CONSTANT_LOSS):
+    if fdi.pair.enabled and possible(fdi, s) and left(fdi.surface[s], CONSTANT_LOSS):
         return middle(fdi.surface[s], CONSTANT_LOSS)
-    return 1.0 + fdi.estimator[fdi.loss_of[s]].theta[fdi.dominant_axis[s]]
+    return 1.0 + fdi.estimator[fdi.layout.loss_of[s]].theta[fdi.layout.dominant_axis[s]]

@@ -1,4 +1,5 @@
-"""The hypotheses a flight is filtered under: healthy, one group of surfaces at a level, two at once, unknown.
+"""The hypotheses a flight is filtered under: healthy, one group of surfaces at a level, two at once, an
+unknown offset, or that nothing answers the commands at all.
 
 What is likelier is said by the model's settings: levels seen in labelled flights, how often things change.
 """
@@ -10,11 +11,12 @@ import numpy as np
 from beaver_ftc.flights.model import Model
 from beaver_ftc.flights.recording import Floats
 
-HEALTHY, GROUP, PAIR, UNKNOWN = range(4)
+HEALTHY, GROUP, PAIR, UNKNOWN, IDLE = range(5)
 _PAIR_SHARE = 0.02
 _UNKNOWN_SHARE = 0.05
+_IDLE_SHARE = 0.02
 _PAIR_LEVELS = (0.25, 0.5, 0.75)
-_HEALTHY_AT_FIRST = 0.9
+_HEALTHY_AT_FIRST, _IDLE_AT_FIRST = 0.7, 0.2
 
 
 @dataclass(frozen=True)
@@ -27,9 +29,19 @@ class Bank:
     weight: Floats
     offset: Floats
 
+    @property
+    def idle(self) -> int:
+        """The hypothesis that nothing answers the commands: on the ground, or everything lost."""
+        return len(self.kind) - 1
+
+    @property
+    def faults(self) -> np.ndarray:
+        """Which hypotheses say that some surface has lost effectiveness, (H,)."""
+        return np.asarray((self.kind == GROUP) | (self.kind == PAIR))
+
     def faulty(self, group: int) -> np.ndarray:
         """Which hypotheses say that a group has lost effectiveness, (H,)."""
-        return np.asarray(self.effectiveness[:, group] < 1.0)
+        return np.asarray((self.effectiveness[:, group] < 1.0) & (self.kind != IDLE))
 
 
 def bank_of(model: Model) -> Bank:
@@ -43,15 +55,16 @@ def bank_of(model: Model) -> Bank:
     single = 1.0 - (_PAIR_SHARE if pairs else 0.0) - (_UNKNOWN_SHARE if stuck else 0.0)
     for group in range(count):
         levels, weights = _levels(model, group)
-        offset = _jam(model, group) if stuck else np.zeros(3)
-        rows += [
-            (_with(count, {group: level}), GROUP, single / count * weight, offset)
-            for level, weight in zip(levels, weights, strict=True)
-        ]
+        for offset in offsets(model, group):
+            rows += [
+                (_with(count, {group: level}), GROUP, single / count * weight, offset)
+                for level, weight in zip(levels, weights, strict=True)
+            ]
     rows += _pairs(count)
     if stuck:
         unknown = np.diag(np.array(model.noise)) * settings.jam_sd**2
         rows.append((np.ones(count), UNKNOWN, _UNKNOWN_SHARE, unknown))
+    rows.append((np.zeros(count), IDLE, _IDLE_SHARE, np.zeros(3)))
     effectiveness, kind, weight, offset = (np.array(column) for column in zip(*rows, strict=True))
     weight[1:] *= (1.0 - settings.repair_share) / weight[1:].sum()
     return Bank(effectiveness, kind, weight, offset)
@@ -75,6 +88,12 @@ def _levels(model: Model, group: int) -> tuple[Floats, Floats]:
         return levels, np.full(len(levels), 1.0 / len(levels))
     share = settings.level_share
     return levels, np.where(likelier, share / likelier.sum(), (1.0 - share) / (~likelier).sum())
+
+
+def offsets(model: Model, group: int) -> list[Floats]:
+    """Variances of the rates' offset that may come with a loss: none, or that of a surface that is stuck."""
+    kinds = {"loss": np.zeros(3), "stuck": _jam(model, group)}
+    return [kinds[kind] for kind in model.vehicle.faults]
 
 
 def _jam(model: Model, group: int) -> Floats:
@@ -102,6 +121,8 @@ def _pairs(count: int) -> list[tuple[Floats, int, float, Floats]]:
 
 def at_first(bank: Bank) -> Floats:
     """Probability of each hypothesis before the flight, (H,): mostly healthy, any fault allowed."""
-    start = bank.weight * (1.0 - _HEALTHY_AT_FIRST) / bank.weight[1:].sum()
+    faults = (bank.kind != HEALTHY) & (bank.kind != IDLE)
+    start = bank.weight * (1.0 - _HEALTHY_AT_FIRST - _IDLE_AT_FIRST) / bank.weight[faults].sum()
     start[0] = _HEALTHY_AT_FIRST
+    start[bank.idle] = _IDLE_AT_FIRST
     return np.asarray(start)

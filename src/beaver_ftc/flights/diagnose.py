@@ -20,13 +20,18 @@ _LEAST_SCALE, _MOST_SCALE = 0.3, 6.0
 _RATE_TOLERANCE = 0.25
 UNKNOWN = "unknown"
 _NAMED = 0.5
+_IDLE = 0.5
+"""Probability that nothing answers the commands above which nothing is said of any surface."""
 
 
 @dataclass(frozen=True)
 class Rows:
-    """A row a sample. t_s (n,); faulty (n,) 0 or 1; named (n,) text; estimate, low, high (n, S) effectiveness
-    of each surface; probability (n,) of any fault; healthy (n, G) probability that a group is healthy;
-    gain (n,) control gain over that of the model; scale (n,) variance of the noise over that of the model."""
+    """A row a sample.
+
+    t_s (n,); faulty (n,) 0 or 1; named (n,) text; estimate, low, high (n, S) effectiveness of each surface;
+    probability (n,) of a fault of any surface; healthy (n, G) probability that a group is healthy; gain (n,)
+    over that of the model; scale (n,) variance of the noise over that of the model.
+    """
 
     t_s: Floats
     faulty: NDArray[np.int64]
@@ -45,7 +50,7 @@ def diagnose(samples: Samples, model: Model) -> Rows:
     _check_rate(samples, model)
     bank = bank_of(model)
     posterior, state, scale = posterior_of(samples, model, bank)
-    return _at_stamps(samples, _rows(samples, model, bank, posterior, state, scale))
+    return _at_stamps(samples, rows_of(samples, model, bank, posterior, state, scale))
 
 
 def posterior_of(samples: Samples, model: Model, bank: Bank) -> tuple[Floats, Floats, Floats]:
@@ -68,19 +73,22 @@ def filter_with(
     settings, variance = model.settings, np.diag(noise)
     unexplained, answers = predict(samples.rates, regressors, past, response)
     dt_s = 1.0 / model.rate_hz
+    spread = np.append(variance * settings.trim_sd**2, settings.gain_sd**2)
     change = settings.changes_per_hour * dt_s / 3600.0
     result = run_bank(
         np.ascontiguousarray(np.nan_to_num(unexplained)),
         np.ascontiguousarray(np.nan_to_num(answers)),
+        intercept,
         regressors.ok,
         bank.effectiveness,
         change * bank.weight,
         1.0 - change,
         bank.offset,
-        settings.restarts_per_hour * dt_s / 3600.0,
+        bank.idle,
         at_first(bank),
-        np.append(intercept, 1.0),
-        np.append(variance * settings.trim_sd**2, settings.gain_sd**2),
+        np.array([0.0, 0.0, 0.0, 1.0]),
+        spread,
+        np.sqrt(spread) * np.array([*[settings.trim_bound] * 3, settings.gain_bound]),
         np.append(variance * settings.trim_walk**2, settings.gain_walk**2),
         noise,
         (
@@ -112,21 +120,25 @@ def _check_rate(samples: Samples, model: Model) -> None:
         )
 
 
-def _rows(
+def rows_of(
     samples: Samples, model: Model, bank: Bank, posterior: Floats, state: Floats, scale: Floats
 ) -> Rows:
-    probability = 1.0 - posterior[:, 0]
-    faulty = (probability >= model.settings.alarm).astype(np.int64)
+    idle = posterior[:, bank.idle]
+    probability = posterior[:, bank.faults].sum(axis=1)
+    answering = posterior[:, : bank.idle] / np.maximum(1.0 - idle, 1e-300)[:, None]
+    faulty = _standing(probability >= model.settings.alarm, model).astype(np.int64)
     groups = group_indices(model)
     estimate, low, high = (np.ones((len(posterior), len(model.vehicle.surfaces))) for _ in range(3))
     healthy = np.empty((len(posterior), len(groups)))
     for g, members in enumerate(groups):
-        levels, mass = _marginal(bank, posterior, g)
+        levels, mass = _marginal(bank, answering, g)
         healthy[:, g] = mass[:, -1]
         estimate[:, members] = _median(levels, mass)[:, None]
         bounds = _bounds(levels, mass, model.settings.bounds)
         lower, upper = bounds if len(members) == 1 else _any_of_them(bounds)
         low[:, members], high[:, members] = lower[:, None], upper[:, None]
+    still = idle > _IDLE
+    estimate[still], low[still], high[still] = 1.0, 0.0, 1.0
     return Rows(
         t_s=samples.t_s,
         faulty=faulty,
@@ -141,9 +153,16 @@ def _rows(
     )
 
 
+def _standing(raised: NDArray[np.bool_], model: Model) -> NDArray[np.bool_]:
+    """Where a condition holds, and has held for long enough up to there."""
+    reach = round(model.settings.hold_s * model.rate_hz)
+    since = np.arange(len(raised)) - np.maximum.accumulate(np.where(raised, -1, np.arange(len(raised))))
+    return np.asarray(raised & (since > reach))
+
+
 def _marginal(bank: Bank, posterior: Floats, group: int) -> tuple[Floats, Floats]:
     """A group's levels, the last of them 1, and the probability of each, (L,) and (n, L)."""
-    levels, index = np.unique(bank.effectiveness[:, group], return_inverse=True)
+    levels, index = np.unique(bank.effectiveness[: bank.idle, group], return_inverse=True)
     mass = np.zeros((len(posterior), len(levels)))
     for hypothesis, level in enumerate(index):
         mass[:, level] += posterior[:, hypothesis]
@@ -174,7 +193,7 @@ def _any_of_them(bounds: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
 
 def _names(model: Model, bank: Bank, posterior: Floats, faulty: NDArray[np.int64]) -> NDArray[np.object_]:
     """The surfaces of the groups that most of the fault's probability is on; `unknown` where it is split."""
-    total = np.maximum(1.0 - posterior[:, 0], 1e-300)
+    total = np.maximum(posterior[:, bank.faults].sum(axis=1), 1e-300)
     by_group = np.column_stack(
         [posterior[:, bank.faulty(g)].sum(axis=1) / total for g in range(len(model.groups))]
     )

@@ -29,6 +29,12 @@ HISTORIES = (1, 2, 3, 4)
 LAGS = (2, 3, 4, 6)
 _COLOUR_S = 2.0
 _AFTER_EVENT_S = 1.0
+_SURE, _HOLD_S = 0.99, 0.3
+"""Where no labels say how often things break, an alarm asks for more: for how much, the benchmark decided."""
+_POWER = 0.8
+"""A coloured residual tells less than a white one: by how much, blocked tests decided."""
+_PRIOR_CHANGES = 20
+"""Changes that count as seen before the labels are read, half of them repairs."""
 
 
 @dataclass(frozen=True)
@@ -78,12 +84,19 @@ def fit_model(stretches: Sequence[Stretch], vehicle: Vehicle, settings: Settings
     return model.model_copy(update={"settings": settings or prior(stretches, model)})
 
 
+def fit_like(stretches: Sequence[Stretch], model: Model) -> Model:
+    """Another fit of the same order and settings to other stretches."""
+    fit = fit_order(stretches, model.vehicle, model.history, model.lags)
+    fitted = _model(fit, stretches, model.vehicle, model.history, model.lags)
+    return fitted.model_copy(update={"settings": model.settings})
+
+
 def choose_order(stretches: Sequence[Stretch], vehicle: Vehicle) -> tuple[int, int]:
     """Past samples of rates and commands by the Bayesian information criterion."""
     scores = {}
     for history in HISTORIES:
         for lags in LAGS:
-            x, y, _ = _stacked(stretches, vehicle, history, lags)
+            x, y, _ = stacked(stretches, vehicle, history, lags)
             residuals = y - x @ np.linalg.lstsq(x, y, rcond=None)[0]
             log_det = np.linalg.slogdet(residuals.T @ residuals / len(y))[1]
             scores[history, lags] = len(y) * log_det + 3 * x.shape[1] * np.log(len(y))
@@ -92,7 +105,7 @@ def choose_order(stretches: Sequence[Stretch], vehicle: Vehicle) -> tuple[int, i
 
 def fit_order(stretches: Sequence[Stretch], vehicle: Vehicle, history: int, lags: int) -> Fit:
     """Least squares of given order over all stretches."""
-    x, y, run = _stacked(stretches, vehicle, history, lags)
+    x, y, run = stacked(stretches, vehicle, history, lags)
     if len(y) < 10 * x.shape[1]:
         raise BadInput(
             f"identify: {len(y)} samples known to be healthy, allowed: at least {10 * x.shape[1]} to fit "
@@ -102,7 +115,7 @@ def fit_order(stretches: Sequence[Stretch], vehicle: Vehicle, history: int, lags
     return least_squares(x, y, run, round(_COLOUR_S / dt_s))
 
 
-def _stacked(
+def stacked(
     stretches: Sequence[Stretch], vehicle: Vehicle, history: int, lags: int
 ) -> tuple[Floats, Floats, NDArray[np.int64]]:
     """Regressors, rates and run number over all stretches: the same samples for any order."""
@@ -153,11 +166,14 @@ def prior(stretches: Sequence[Stretch], model: Model) -> Settings:
         levels["+".join(group)] = sorted({level for flight in seen for level in flight if level < 1.0})
         changes += sum(max(len(flight) - 1, 0) for flight in seen)
         repairs += sum(int(level == 1.0) for flight in seen for level in flight[1:])
-    settings = Settings(levels={name: found for name, found in levels.items() if found})
-    if not settings.levels:
-        return settings
-    return settings.model_copy(
-        update={"changes_per_hour": (changes + 1) / hours, "repair_share": (repairs + 1) / (changes + 4)}
+    levels = {name: found for name, found in levels.items() if found}
+    if not levels:
+        return Settings(alarm=_SURE, hold_s=_HOLD_S)
+    return Settings(
+        levels=levels,
+        changes_per_hour=(changes + 1) / hours,
+        repair_share=(repairs + _PRIOR_CHANGES / 2) / (changes + _PRIOR_CHANGES),
+        power=_POWER,
     )
 
 

@@ -2,12 +2,14 @@
 
 Under hypothesis h with effectiveness e_h of the groups, what the past does not explain of the rates is
 
-    y = c + s (sum_g e_hg F_g) + noise,      noise ~ t(0, r R)
+    y = c + s (b + sum_g e_hg F_g) + noise,      noise ~ t(0, r R)
 
-with the flight's own trim c (3,) and control gain s, which each hypothesis estimates by a Kalman filter,
-and r the running scale of the noise. A hypothesis passes to another at random times (interacting multiple
-models [Blom1988]): the one that takes over inherits trim and gain, plus an offset where a surface may be
-stuck.
+with the model's constant b, the flight's own trim c (3,) and gain s, which each hypothesis estimates by a
+Kalman filter, and r the running scale of the noise. The gain acts on what a trimmed flight balances: it shows
+by the motion alone, as dynamic pressure does, and not in the trim. A hypothesis passes to another at random
+times (interacting multiple models [Blom1988]): the one that takes over inherits trim and gain, plus an offset
+where a surface may be stuck. One hypothesis says that nothing answers the commands, as on the ground: it
+learns no trim and no gain.
 """
 
 import numpy as np
@@ -21,14 +23,14 @@ _EXPECTED = 0.93
 
 
 @kernel
-def run_bank(y, f, ok, e, reach, stay, offset, fresh, start, m0, p0, walk, noise, options):
+def run_bank(y, f, base, ok, e, reach, stay, offset, idle, start, m0, p0, bound, walk, noise, options):
     """Posterior probability of each hypothesis, and mean trim, gain and noise scale, after each sample.
 
-    Shapes: y (n, 3); f (n, G, 3) responses; ok (n,) the sample may be used; e (H, G) effectiveness;
-    reach (H,) probability of passing to each hypothesis in a sample; stay: of none; offset (H, 3) variance
-    added to the trim on passing to it; fresh: probability of a new trim and gain in a sample; start (H,) at
-    first; m0 (4,) and p0 (4,) mean and variance of trim and gain; walk (4,) variance added a sample; noise
-    (3, 3).
+    Shapes: y (n, 3); f (n, G, 3) responses; base (3,) constant; ok (n,) the sample may be used; e (H, G)
+    effectiveness; reach (H,) probability of passing to each hypothesis in a sample; stay: of none; offset
+    (H, 3) variance added to the trim on passing to it; idle: the hypothesis that nothing answers the
+    commands; start (H,) at first; m0 (4,) and p0 (4,) mean and variance of trim and gain; bound (4,) how far
+    they may go from m0; walk (4,) variance added a sample; noise (3, 3).
     options: power of the likelihood, degrees of freedom, memory in samples, least and largest noise scale.
     """
     n, hypotheses = len(y), len(e)
@@ -45,10 +47,12 @@ def run_bank(y, f, ok, e, reach, stay, offset, fresh, start, m0, p0, walk, noise
     scales = np.zeros(n)
     scale = 1.0
     for k in range(n):
-        prior = _mix(mu, m, p, reach, stay, offset, fresh, m0, p0, walk)
+        prior = _mix(mu, m, p, reach, stay, offset, walk)
+        _forget(m[idle], p[idle], m0, p0)
         if ok[k]:
-            mu, square = _correct(prior, m, p, y[k], f[k], e, noise * scale, power, dof)
-            scale *= np.exp((square / 3.0 - _EXPECTED) / memory)
+            mu, square = _correct(prior, m, p, y[k], f[k], base, e, idle, noise * scale, power, dof)
+            _bound(m, m0, bound)
+            scale *= np.exp((1.0 - mu[idle]) * (square / 3.0 - _EXPECTED) / memory)
             scale = min(max(scale, least), most)
         else:
             mu = prior
@@ -60,62 +64,138 @@ def run_bank(y, f, ok, e, reach, stay, offset, fresh, start, m0, p0, walk, noise
 
 
 @kernel
-def _mix(mu, m, p, reach, stay, offset, fresh, m0, p0, walk):
+def _mix(mu, m, p, reach, stay, offset, walk):
     """Let each hypothesis pass to any other; m and p are replaced, the prior probabilities returned."""
-    mean = np.zeros(4)
-    spread = np.zeros((4, 4))
-    for h in range(len(mu)):
-        mean += mu[h] * m[h]
-    for h in range(len(mu)):
-        d = m[h] - mean
-        spread += mu[h] * (p[h] + np.outer(d, d))
-    prior = np.empty(len(mu))
-    for h in range(len(mu)):
-        renewed = fresh if h == 0 else 0.0
-        prior[h] = stay * mu[h] + reach[h] + renewed
-        a, b, c = stay * mu[h] / prior[h], reach[h] / prior[h], renewed / prior[h]
-        centre = a * m[h] + b * mean + c * m0
-        d0, d1, d2 = m[h] - centre, mean - centre, m0 - centre
-        p[h] = a * (p[h] + np.outer(d0, d0)) + b * (spread + np.outer(d1, d1)) + c * np.outer(d2, d2)
-        for i in range(4):
-            p[h, i, i] += walk[i] + c * p0[i]
-        for i in range(3):
-            p[h, i, i] += b * offset[h, i]
-        m[h] = centre
-    return prior / prior.sum()
+    hypotheses, states = m.shape
+    mean = np.zeros(states)
+    spread = np.zeros((states, states))
+    for h in range(hypotheses):
+        for i in range(states):
+            mean[i] += mu[h] * m[h, i]
+    for h in range(hypotheses):
+        for i in range(states):
+            for j in range(states):
+                spread[i, j] += mu[h] * (p[h, i, j] + (m[h, i] - mean[i]) * (m[h, j] - mean[j]))
+    prior = np.empty(hypotheses)
+    total = 0.0
+    for h in range(hypotheses):
+        prior[h] = stay * mu[h] + reach[h]
+        total += prior[h]
+        _merge(stay * mu[h] / prior[h], m[h], p[h], mean, spread, offset[h], walk)
+    return prior / total
 
 
 @kernel
-def _correct(prior, m, p, y, f, e, noise, power, dof):
+def _merge(own, m, p, mean, spread, offset, walk):
+    """One Gaussian for two: the hypothesis' own (m, p) with weight `own`, everyone's with the rest.
+
+    m (4,) and p (4, 4) are replaced; who comes from elsewhere brings the offset (3,) along.
+    """
+    rest = 1.0 - own
+    for i in range(len(m)):
+        for j in range(len(m)):
+            between = (m[i] - mean[i]) * (m[j] - mean[j])
+            p[i, j] = own * p[i, j] + rest * spread[i, j] + own * rest * between
+    for i in range(len(m)):
+        m[i] = own * m[i] + rest * mean[i]
+        p[i, i] += walk[i]
+    for i in range(len(offset)):
+        p[i, i] += rest * offset[i]
+
+
+@kernel
+def _correct(prior, m, p, y, f, base, e, idle, noise, power, dof):
     """Kalman correction of every hypothesis by one sample; m and p are replaced.
 
     Returns the posterior probabilities and the clipped square of the residual under them.
     """
-    hypotheses, groups = e.shape
+    hypotheses = len(prior)
     log = np.empty(hypotheses)
     squares = np.empty(hypotheses)
-    c = np.zeros((3, 4))
-    for i in range(3):
-        c[i, i] = 1.0
     for h in range(hypotheses):
-        for i in range(3):
-            c[i, 3] = 0.0
-            for g in range(groups):
-                c[i, 3] += e[h, g] * f[g, i]
-        pc = p[h] @ c.T
-        s = c @ pc + noise
-        inverse = np.linalg.inv(s)
-        v = y - c @ m[h]
-        square = v @ (inverse @ v)
-        weight = min(1.0, (dof + 3.0) / (dof + square))
-        gain = pc @ inverse
-        m[h] = m[h] + weight * (gain @ v)
-        p[h] = p[h] - weight * (gain @ pc.T)
-        log[h] = power * (-0.5 * (dof + 3.0) * np.log(1.0 + square / dof) - 0.5 * np.log(np.linalg.det(s)))
-        squares[h] = square
+        if h == idle:
+            squares[h], log_det = _update(np.zeros(4), np.zeros((4, 4)), y, np.zeros(3), noise, dof)
+        else:
+            squares[h], log_det = _update(m[h], p[h], y, _answer(e[h], f, base), noise, dof)
+        log[h] = power * (-0.5 * (dof + 3.0) * np.log(1.0 + squares[h] / dof) - 0.5 * log_det)
     mu = np.maximum(prior * np.exp(log - log.max()), _FLOOR)
     mu /= mu.sum()
     clipped = 0.0
     for h in range(hypotheses):
         clipped += mu[h] * min(squares[h], 3.0 * _CLIP)
     return mu, clipped
+
+
+@kernel
+def _answer(e, f, base):
+    """The constant and the groups' answers (G, 3), each as effective as e (G,) says: nothing in trim."""
+    total = base.copy()
+    for g in range(len(e)):
+        for i in range(3):
+            total[i] += e[g] * f[g, i]
+    return total
+
+
+@kernel
+def _forget(m, p, m0, p0):
+    """Trim and gain as before any flight: while nothing answers, nothing is learnt."""
+    for i in range(len(m0)):
+        m[i] = m0[i]
+        for j in range(len(m0)):
+            p[i, j] = p0[i] if i == j else 0.0
+
+
+@kernel
+def _bound(m, m0, bound):
+    """Keep every hypothesis' trim and gain near those of the model: a fault is not to be learnt away."""
+    for h in range(len(m)):
+        for i in range(len(m0)):
+            m[h, i] = min(max(m[h, i], m0[i] - bound[i]), m0[i] + bound[i])
+
+
+@kernel
+def _update(m, p, y, answer, noise, dof):
+    """Correct one Gaussian (m (4,), p (4, 4), replaced) by y = m[:3] + m[3] answer + noise, all (3,).
+
+    Returns the square of the residual in its own covariance, and the log determinant of that. A residual far
+    out in the tail of the t distribution counts less.
+    """
+    cross = np.empty((4, 3))
+    for i in range(4):
+        for j in range(3):
+            cross[i, j] = p[i, j] + p[i, 3] * answer[j]
+    s = np.empty((3, 3))
+    for i in range(3):
+        for j in range(3):
+            s[i, j] = cross[i, j] + answer[i] * cross[3, j] + noise[i, j]
+    inverse, determinant = _inverse(s)
+    v = np.empty(3)
+    for i in range(3):
+        v[i] = y[i] - m[i] - m[3] * answer[i]
+    gain = np.zeros((4, 3))
+    square = 0.0
+    for j in range(3):
+        for k in range(3):
+            square += v[j] * inverse[j, k] * v[k]
+            for i in range(4):
+                gain[i, j] += cross[i, k] * inverse[k, j]
+    weight = min(1.0, (dof + 3.0) / (dof + square))
+    for i in range(4):
+        for j in range(3):
+            m[i] += weight * gain[i, j] * v[j]
+            for k in range(4):
+                p[i, k] -= weight * gain[i, j] * cross[k, j]
+    return square, np.log(determinant)
+
+
+@kernel
+def _inverse(s):
+    """Inverse and determinant of a symmetric (3, 3) matrix, by its cofactors."""
+    c = np.empty((3, 3))
+    for i in range(3):
+        for j in range(3):
+            a, b = (i + 1) % 3, (i + 2) % 3
+            d, e = (j + 1) % 3, (j + 2) % 3
+            c[j, i] = s[a, d] * s[b, e] - s[a, e] * s[b, d]
+    determinant = s[0, 0] * c[0, 0] + s[0, 1] * c[1, 0] + s[0, 2] * c[2, 0]
+    return c / determinant, determinant

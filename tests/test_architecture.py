@@ -44,6 +44,7 @@ UPWARD = {
 CIRCLES = {
     frozenset(f"scenario.{name}" for name in ("builtin", "given", "loader", "schema", "warnings")),
     frozenset({"studies.matrix.pitch_lost", "studies.matrix.pitch_text"}),
+    frozenset({"studies.detectability.output", "studies.detectability.survey"}),
 }
 LONG: set[str] = set()
 

@@ -9,6 +9,7 @@ import numba
 import numpy as np
 from numba import njit
 
+from beaver_ftc.design.model import N_Y
 from beaver_ftc.diagnosis.bank import note_closest_approach
 from beaver_ftc.diagnosis.belief import bound_now, look_back, respond
 from beaver_ftc.diagnosis.thresholds import ROUNDING_RAD_S2
@@ -81,7 +82,9 @@ class DesignPlant:
         """y: incidence and airspeed wander slowly."""
         w = self._waves()
         V = self.airspeed_mps * (1 + 0.05 * w[0])
-        return np.array([0.1 + 0.05 * w[1], 0.05 * w[2], V, 0.5 * V * V, 0.3 + 0.1 * w[3]])
+        y = np.zeros(N_Y)
+        y[:5] = 0.1 + 0.05 * w[1], 0.05 * w[2], V, 0.5 * V * V, 0.3 + 0.1 * w[3]
+        return y
 
     def command(self, f, G):
         """Feedback linearisation towards square and sine references, limited: it need not be a good law."""

@@ -47,6 +47,8 @@ def command(
 
     Writes comparison.json, comparison.png and comparison.html (for runs: runs.json, runs.png, runs.html)
     below --out.
+
+    Stopped or killed, a comparison on flights goes on where it was with the same command.
     """
     asked = [bool(runs), sweep is not None, benchmark, tune]
     if sum(asked) != 1:

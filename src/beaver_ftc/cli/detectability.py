@@ -19,6 +19,8 @@ def command(
 
     Certain: within 0.5 s and 1 s, whatever the declared uncertainty does, along the scenario's references
     scaled by 0.25 to 2; `median` where the fault strikes at half of all instants.
+
+    Stopped or killed, it goes on where it was with the same command.
     """
     from beaver_ftc.cli.progress import progress_bar
     from beaver_ftc.scenario.loader import load_scenario

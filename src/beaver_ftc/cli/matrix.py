@@ -39,6 +39,8 @@ def command(
 
     Exit status 1 if a fault is named wrongly or an alarm is false; with --pitch-lost, if engine power loses
     an aircraft that is kept without it.
+
+    Stopped or killed, it goes on where it was with the same command.
     """
     from beaver_ftc.cli.progress import progress_bar
     from beaver_ftc.studies.matrix.cases import AIRSPEEDS_MPS

@@ -32,6 +32,8 @@ def command(
 
     With --format json: the document of the flight, axes.{p,q,r}.{source}: rms, max, share, bound_share;
     of several flights {"runs": [...], "recommended": ..., "guarantee": ...}.
+
+    Stopped or killed, a map goes on where it was with the same command.
     """
     try:
         flown = [each for scenario in load_all(scenarios) for each in _variants(scenario, variant)]

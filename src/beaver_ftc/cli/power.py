@@ -1,6 +1,5 @@
 """`beaver-ftc power`: how likely a fault is found, by every scheme at the same false-alarm rate."""
 
-import os
 from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
@@ -60,8 +59,11 @@ def command(
 
     Every scheme watches the same flights, at the alarm level that gives all the same false-alarm rate on the
     same healthy flights. Writes power.json, power.parquet, power.txt, and maps as PNG and SVG.
+
+    Stopped or killed, it goes on where it was with the same command.
     """
     from beaver_ftc.cli.progress import progress_bar
+    from beaver_ftc.studies.engine.processes import cores
     from beaver_ftc.studies.power.contenders import contenders
     from beaver_ftc.studies.power.grid import GRIDS
     from beaver_ftc.studies.power.run import NAME, run_power
@@ -71,7 +73,7 @@ def command(
     chosen = contenders(names)
     with progress_bar(f"power, {grid.value} grid") as progress:
         survey = replace(GRIDS[grid].only(sensors, turbulence), vanes=not rates_alone)
-        document = run_power(out, survey, chosen, workers or os.cpu_count() or 1, progress)
+        document = run_power(out, survey, chosen, workers or cores(), progress)
     folder = str(out / NAME)
     if format is Format.json:
         emit_json(document | {"folder": folder})

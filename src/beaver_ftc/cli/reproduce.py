@@ -16,6 +16,8 @@ def command(
     """Fly the published study: every figure, every statement with our number and a verdict.
 
     Exit status 1 if a statement is not borne out.
+
+    Stopped or killed, it goes on where it was with the same command.
     """
     import sys
 

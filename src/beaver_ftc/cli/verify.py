@@ -1,6 +1,5 @@
 """`beaver-ftc verify`: the promises of the theory, on the truth, over many random flights."""
 
-import os
 from pathlib import Path
 from typing import Annotated
 
@@ -31,11 +30,12 @@ def command(
     Exit status 1 if a promise is broken.
     """
     from beaver_ftc.cli.progress import progress_bar
+    from beaver_ftc.studies.engine.processes import cores
     from beaver_ftc.studies.verify.campaign import Campaign, conduct
     from beaver_ftc.studies.verify.summary import summarise, summary_text
 
     with progress_bar("verify") as progress:
-        rows = conduct(Campaign(hours, faults, seed, steps), out, workers or os.cpu_count() or 1, progress)
+        rows = conduct(Campaign(hours, faults, seed, steps), out, workers or cores(), progress)
     document = summarise(rows)
     if format is Format.json:
         emit_json({"seed": seed, **document})

@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+import time
 from functools import partial
 from pathlib import Path
 
@@ -305,3 +306,24 @@ def test_entries_are_every_scheme_with_our_law_and_every_law_with_our_scheme():
     assert entries_of(["x"], ["y"]) == [
         Entry("x", LAW), Entry(SCHEME, "y"), Entry(SCHEME, LAW), Entry(SCHEME, ORACLE)
     ]  # fmt: skip
+
+
+def test_a_comparison_that_is_killed_goes_on_to_the_same_document(sweep, compared, tmp_path):
+    names = ("--schemes", "observer-constant,augmented-ekf", "--laws", "nominal,lqr", "--workers", "2")
+    command = [BEAVER, "compare", "--sweep", sweep, *names, "--out", tmp_path / "again"]
+    parts = tmp_path / "again" / ".few.flown" / "parts"
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    patience = time.monotonic() + 300
+    while process.poll() is None and not list(parts.glob("*.json")) and time.monotonic() < patience:
+        time.sleep(0.01)
+    process.kill()
+    process.wait()
+    kept = {path.name: path.stat().st_mtime_ns for path in parts.glob("*.json")}
+    assert kept
+    subprocess.run([*command, "--format", "json"], check=True, capture_output=True)
+    assert sorted(path.name for path in (tmp_path / "again").iterdir()) == ["few"]
+    document = json.loads((tmp_path / "again" / "few" / "comparison.json").read_text())
+    for each in (document, compared[0]):
+        for row in each["sets"]["few"]["lines"]:
+            row.pop("us")  # the one thing that is measured on the clock
+    assert document["sets"] == compared[0]["sets"]

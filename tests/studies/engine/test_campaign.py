@@ -100,3 +100,27 @@ def test_stopping_lands_what_is_in_the_air_and_hands_out_no_more():
     assert len(crew.submitted) == 4
     assert not crew._tasks
     assert all(len(runs) == 5 for _, runs in source.landings)
+
+
+class Unlucky(Unreliable):
+    """A crew that loses the tasks with flight 13 in them so many times, and no other."""
+
+    def __init__(self, slots, losses):
+        super().__init__(slots)
+        self._left = losses
+
+    def outcomes(self, timeout_s):
+        unlucky = any(case.run == 13 for case in self._tasks[0].cases)
+        if unlucky and self._left:
+            self._left -= 1
+            return [Outcome(self._tasks.pop(0), None)]
+        task = self._tasks.pop(0)
+        return [Outcome(task, [{"run": case.run, "status": "flown"} for case in task.cases])]
+
+
+@pytest.mark.parametrize(("losses", "status"), [(4, "flown"), (5, "crashed")])
+def test_a_flight_is_given_up_only_when_lost_alone_three_times(losses, status):
+    """Twice among others, then alone: the third time alone is the fifth loss."""
+    source = fly(Numbers(40, 20), Unlucky(1, losses))
+    assert {row["run"]: row["status"] for row in source.rows}[13] == status
+    assert sum(row["status"] == "crashed" for row in source.rows) == (status == "crashed")

@@ -108,10 +108,11 @@ def test_rows_of_another_question_or_other_code_are_not_used(tmp_path, monkeypat
     assert log.read_text().split() == [str(case) for case in cases]
 
 
-def test_a_part_that_is_damaged_is_flown_again(tmp_path):
+@pytest.mark.parametrize("content", ['[{"case"', "[]", '[{"case": 2, "delay_s": "soon"}]', "null"])
+def test_a_part_that_is_damaged_is_flown_again(tmp_path, content):
     with pytest.raises(KeyboardInterrupt):
         rows_of(tmp_path / "study", range(6), square, progress=stopped_after(4))
-    (tmp_path / ".study.flown" / "parts" / "000002.json").write_text('[{"case"')
+    (tmp_path / ".study.flown" / "parts" / "000002.json").write_text(content)
     assert rows_of(tmp_path / "study", range(6), square) == list(map(square, range(6)))
 
 
@@ -120,7 +121,7 @@ def test_a_failure_before_the_first_row_leaves_nothing(tmp_path):
         raise SimulationFailed("at once")
 
     with pytest.raises(SimulationFailed, match="at once"):
-        rows_of(tmp_path / "study", range(3), fail)
+        rows_of(tmp_path / "out" / "study", range(3), fail)
     assert hidden(tmp_path) == []
 
 

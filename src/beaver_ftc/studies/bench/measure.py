@@ -19,6 +19,7 @@ from beaver_ftc.studies.bench.plugged import InnovationDetector, ProportionalInv
 from beaver_ftc.studies.bench.stopwatch import Contender, Timing, interleave
 from beaver_ftc.studies.bench.straightforward import Straightforward
 from beaver_ftc.studies.bench.whole_flight import WholeFlight
+from beaver_ftc.studies.engine.processes import cores
 
 SCENARIO = "elevator-partial-loss"
 BEFORE_ALARM_S, AFTER_ALARM_S = 1.0, 14.0  # the fault strikes at 12 s
@@ -60,7 +61,7 @@ def machine() -> dict[str, Any]:
     """The kind of machine, without its name."""
     return {
         "processor": _processor(),
-        "cores": len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count(),
+        "cores": cores(),
         "python": platform.python_version(),
         **{package: version(package) for package in ("jsbsim", "numba", "numpy")},
         "native_properties": native.available(),
@@ -101,10 +102,7 @@ def _against(bare: np.ndarray, loop: np.ndarray) -> Document:
 def _figures(name: str, values: np.ndarray) -> dict[str, Any]:
     """The median over the rounds, and the quartiles as `<name>_quartiles`."""
     timing = Timing.of(values)
-    return {
-        name: round(timing.median, 4),
-        f"{name}_quartiles": [round(timing.low, 4), round(timing.high, 4)],
-    }
+    return {name: round(timing.median, 4), f"{name}_quartiles": [round(timing.low, 4), round(timing.high, 4)]}
 
 
 def _alternatives(scenario: Scenario, rounds: int) -> Document:

@@ -19,10 +19,7 @@ COMPARED = (
     ("delay_90_s", "90 % detection delay, s", False),
     ("isolation_rate", "isolation accuracy", True),
 )
-MATCHED = (
-    ("detection_rate", "detection rate", True),
-    ("delay_median_s", "median detection delay, s", False),
-)
+MATCHED = (("detection_rate", "detection rate", True), ("delay_median_s", "median detection delay, s", False))
 TRACKING = (
     ("ratio_median", "median tracking ratio to the oracle", False),
     ("ratio_90", "90 % tracking ratio to the oracle", False),

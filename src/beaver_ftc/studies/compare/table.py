@@ -55,10 +55,7 @@ DIAGNOSIS: tuple[tuple[str, Cell], ...] = (
     ("lost", lambda row, _: str(row["departures"])),
     ("us/frame", lambda row, _: f"{row['us']:.0f}"),
 )
-CONTROL: tuple[tuple[str, Cell], ...] = (
-    ("law", lambda row, _: row["law"]),
-    *DIAGNOSIS[6:],
-)
+CONTROL: tuple[tuple[str, Cell], ...] = (("law", lambda row, _: row["law"]), *DIAGNOSIS[6:])
 
 
 def sections(part: Document) -> list[tuple[list[str], list[list[str]]]]:

@@ -43,6 +43,7 @@ def flown(
     process each time; without it that is a SimulationFailed.
     """
     kept = folder.with_name(f".{folder.name}.flown")
+    new = not folder.parent.exists()
     with clear_disk_errors(kept):
         kept.mkdir(parents=True, exist_ok=True)
     with locked(kept):
@@ -52,9 +53,17 @@ def flown(
             yield _all_rows(parts, cases, Work(partial(_fly_case, fly)), workers, progress, lost or _fail)
         except BaseException:
             if not parts:  # nothing to go on with
-                shutil.rmtree(kept, ignore_errors=True)
+                _remove(kept, new)
             raise
         shutil.rmtree(kept, ignore_errors=True)
+
+
+def _remove(kept: Path, parent: bool) -> None:
+    """Remove the folder, and the one it is in, if that was made for it and is empty."""
+    shutil.rmtree(kept, ignore_errors=True)
+    with contextlib.suppress(OSError):
+        if parent:
+            kept.parent.rmdir()
 
 
 def fly_all(fly: Fly, cases: Sequence[Any], workers: int = 1, progress: Progress | None = None) -> list[Any]:

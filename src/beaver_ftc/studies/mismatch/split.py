@@ -6,13 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from beaver_ftc.studies.mismatch.sources import (
-    SOURCES,
-    Case,
-    Contributions,
-    instantaneous,
-    integration,
-)
+from beaver_ftc.studies.mismatch.sources import SOURCES, Case, Contributions, instantaneous, integration
 from beaver_ftc.studies.mismatch.states import Columns, States, joined, last_row, states_of
 
 if TYPE_CHECKING:

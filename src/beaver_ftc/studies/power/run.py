@@ -18,11 +18,7 @@ NAME = "power"
 
 
 def run_power(
-    out: Path,
-    grid: Grid,
-    schemes: Sequence[Contender],
-    workers: int = 1,
-    progress: Progress | None = None,
+    out: Path, grid: Grid, schemes: Sequence[Contender], workers: int = 1, progress: Progress | None = None
 ) -> Document:
     """Write `out/power/` (document, one row a flight and scheme, text, figures); return the document."""
     from beaver_ftc.results.metrics import as_json

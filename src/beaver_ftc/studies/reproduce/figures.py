@@ -19,10 +19,7 @@ CLOSE = (FAULT_AT_S - 0.5, FAULT_AT_S + 5.0)
 def _surface(name: str) -> Panel:
     return Panel(
         f"{name} deflection",
-        (
-            Trace(f"{name}_cmd_rad", "command", "command"),
-            Trace(f"{name}_effective_rad", "actual", "actual"),
-        ),
+        (Trace(f"{name}_cmd_rad", "command", "command"), Trace(f"{name}_effective_rad", "actual", "actual")),
     )
 
 

@@ -172,3 +172,19 @@ def test_what_alarms_without_being_exceeded_is_given_a_wider_bound():
     assert found.constant_rad_s2 == {"p": 1e-4, "q": 1e-4, "r": 1e-4}
     one = Tally(CONSTANT, 0.1, bounds=tuple(AxisBound(smallest_constant_rad_s2=c) for c in (0.02, 0.3, 0.05)))
     assert widened(recommend([one])).constant_rad_s2 == {"p": 0.024, "q": 0.36, "r": 0.06}
+
+
+@pytest.mark.parametrize("alarms", [1, 3])
+def test_an_alarm_without_an_excess_widens_the_bound_until_there_is_none(monkeypatch, alarms):
+    flown = []
+
+    def fly(case):
+        flown.append(case.fdi.bounds.constant_rad_s2.q)
+        return Tally(CONSTANT, 0.1), {"false_alarm": len(flown) <= alarms}
+
+    monkeypatch.setattr("beaver_ftc.studies.mismatch.run.tally_of_flight", fly)
+    needs = Tally(CONSTANT, 0.1, bounds=tuple(AxisBound(smallest_constant_rad_s2=0.1) for _ in range(3)))
+    found = settle([scenario()], [needs])
+    assert found.settled
+    assert flown == pytest.approx([0.1, 0.12, 0.15, 0.18][: alarms + 1])  # a fifth more, two digits, upwards
+    assert found.constant_rad_s2["q"] == flown[-1]

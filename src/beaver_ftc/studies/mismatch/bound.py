@@ -34,6 +34,11 @@ class Recommendation:
     def coverage(self) -> float:
         return self.runs / (self.runs + 1)
 
+    def at_least(self, constant_rad_s2: PerAxis) -> "Recommendation":
+        """The same, no axis below these."""
+        largest = {axis: max(c, constant_rad_s2[axis]) for axis, c in self.constant_rad_s2.items()}
+        return replace(self, constant_rad_s2=largest)
+
 
 def recommend(tallies: Iterable["Tally"]) -> Recommendation:
     """The smallest constants that would have covered every run, rounded up to two digits."""

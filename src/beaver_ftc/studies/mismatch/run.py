@@ -115,8 +115,8 @@ def settle(scenarios: Sequence["Scenario"], kept: Sequence["Tally"]) -> "Recomme
         if not short:
             return replace(recommended, runs=len(scenarios))
         tallies += short
-        larger = recommend(tallies)
-        recommended = larger if larger.constant_rad_s2 != constant else widened(recommended)
+        larger = recommend(tallies).at_least(constant)
+        recommended = larger if larger.constant_rad_s2 != constant else widened(larger)
     return replace(recommended, runs=len(scenarios), settled=False)
 
 

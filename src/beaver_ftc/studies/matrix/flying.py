@@ -18,14 +18,7 @@ def trimmed_deg(airspeed_mps: float, surface: str) -> float:
     from beaver_ftc.plant.trim import trim
     from beaver_ftc.scenario.schema import Initial
 
-    initial = Initial(airspeed_mps=airspeed_mps)
-    point = trim(
-        airspeed_mps,
-        initial.altitude_m,
-        engine_rpm=initial.engine_rpm,
-        manifold_pressure_inhg=initial.manifold_pressure_inhg,
-    )
-    return degrees(getattr(point, f"{surface}_rad"))
+    return degrees(trim(airspeed_mps, Initial().altitude_m).surfaces_rad[surface])
 
 
 def fly_case(case: Case) -> Document:

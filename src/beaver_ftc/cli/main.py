@@ -33,6 +33,7 @@ COMMANDS = (
     "detectability",
     "identify",
     "diagnose",
+    "live",
 )
 
 WITHOUT_SCENARIOS = ("schema", "bench", "verify", "detectability", "reproduce")

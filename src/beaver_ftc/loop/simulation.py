@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from beaver_ftc.control.supervisor import MODES
 from beaver_ftc.errors import BadInput, suggestion
 from beaver_ftc.loop.flight import Flight, LogSink
 from beaver_ftc.loop.held import HeldFrame
@@ -17,7 +18,8 @@ from beaver_ftc.loop.loop import CHUNK_ROWS, FLYING, Loop
 from beaver_ftc.loop.plugin_frame import measured_of
 from beaver_ftc.loop.summary import verdict_of
 from beaver_ftc.plant.adapter import UnknownProperty
-from beaver_ftc.scenario.given import fault_of
+from beaver_ftc.plant.gust import GustSchedule
+from beaver_ftc.scenario.given import fault_of, gust_of
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.signals import RAD_PER_DEG, sample_deg_s
 from beaver_ftc.scenario.sticks import StickTrack, flown, in_force
@@ -46,12 +48,13 @@ class Stepping:
         sink: LogSink | None = None,
         prepare: "Callable[[Plant], None] | None" = None,
     ) -> None:
-        self._scenario, self._plug_ins, self._prepare = scenario, (detector, law), prepare
+        self._given, self._plug_ins, self._prepare = scenario, (detector, law), prepare
         self._sink = sink
         self.reset()
 
     def reset(self) -> None:
         """Put the aircraft back into trim, nothing broken, the log empty: the same scenario anew."""
+        self._scenario = self._given
         self._loop = Loop(self._scenario, *self._plug_ins, self._prepare)
         self._own_frame = self._loop.fly_frame
         self._held_frame: HeldFrame | None = None
@@ -109,6 +112,11 @@ class Stepping:
         return plugins.verdict if plugins and plugins.detector else verdict_of(self._frame)
 
     @property
+    def mode(self) -> str:
+        """Who is in charge, by the supervisor's word: nominal, adaptive, reallocated or unanticipated."""
+        return MODES[int(self._frame["supervisor"]["mode"])]
+
+    @property
     def trim_rad(self) -> Vector:
         """Surfaces in trim, (surfaces,) rad."""
         trim: Vector = self._frame["control"]["trim"].copy()
@@ -158,6 +166,21 @@ class Stepping:
         if actuator is not None and actuator not in names:
             raise BadInput(f"actuator: {actuator!r:.60} is not known{suggestion(str(actuator), names)}")
         self._declare(tuple(self._repaired(fault, actuator) for fault in self._faults))
+
+    def blow(self, gust: Mapping[str, Any]) -> None:
+        """Set a gust off now, from the next frame on: as `environment.gust`, without `at_s`.
+
+        Raises BadInput that names the key, and for a second one: a scenario has one gust.
+        """
+        if self._scenario.environment.gust is not None:
+            raise BadInput("gust: this flight has one already, allowed: one a flight")
+        given = gust_of(gust, self._now_s)
+        self._begin()
+        loop = self._loop
+        loop.gust = GustSchedule(given, loop.plant, self._scenario.rate_hz)
+        self._turn_at = self._next
+        environment = self._scenario.environment.model_copy(update={"gust": given})
+        self._scenario = self._scenario.model_copy(update={"environment": environment})
 
     def read(self, name: str) -> float:
         """A property of JSBSim's, in the unit its name says. Raises BadInput if there is none such."""

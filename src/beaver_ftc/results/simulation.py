@@ -27,7 +27,7 @@ class Simulation(Stepping):
         sim.land()
 
     scenario: a name, a path, a mapping or a Scenario. detector, law: plug-in objects to fly with. log: keep
-    one row a frame in memory. prepare: called with the trimmed plant before the flight. Frame 0, in which the
+    one row a frame in memory, or in the log given, for instance a SpooledLog. prepare: called with the trimmed plant before the flight. Frame 0, in which the
     trimmed flight is measured, is flown with the first step.
     """
 
@@ -37,12 +37,12 @@ class Simulation(Stepping):
         *,
         detector: "Detector | None" = None,
         law: "Law | None" = None,
-        log: bool = True,
+        log: bool | MemoryLog = True,
         prepare: "Callable[[Plant], None] | None" = None,
     ) -> None:
         check_plug_in("detector", detector)
         check_plug_in("law", law)
-        self._kept = MemoryLog() if log else None
+        self._kept = log if isinstance(log, MemoryLog) else MemoryLog() if log else None
         super().__init__(load(scenario), detector, law, self._kept, prepare)
 
     @property

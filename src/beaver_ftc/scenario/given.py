@@ -6,7 +6,7 @@ A mistake is a BadInput with the key's path, `faults[0].magnitude: 30 is out of 
 from collections.abc import Mapping
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from beaver_ftc.errors import BadInput
 from beaver_ftc.scenario.base import Section
@@ -15,7 +15,7 @@ from beaver_ftc.scenario.document import Document, Problem
 from beaver_ftc.scenario.faults import Fault
 from beaver_ftc.scenario.loader import load_scenario, validate_scenario
 from beaver_ftc.scenario.problems import ScenarioError
-from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.scenario.schema import Gust, Scenario
 from beaver_ftc.scenario.validation import validate
 
 ScenarioLike = Scenario | str | PathLike[str] | Mapping[str, Any]
@@ -25,6 +25,13 @@ UNNAMED = "unnamed"
 
 class _OneFault(Section):
     fault: Fault
+
+
+class _OneGust(Section):
+    gust: Gust
+
+
+OneThing = TypeVar("OneThing", bound=Section)
 
 
 def load(scenario: ScenarioLike) -> Scenario:
@@ -44,13 +51,23 @@ def load(scenario: ScenarioLike) -> Scenario:
 
 def fault_of(given: Mapping[str, Any], at_s: float) -> Fault:
     """The fault that a mapping without `at_s` describes, from at_s on. Raises BadInput with the key."""
+    return _begun(_OneFault, "fault", given, at_s, "of `type`, `actuator` and its size").fault
+
+
+def gust_of(given: Mapping[str, Any], at_s: float) -> Gust:
+    """The gust that a mapping without `at_s` describes, from at_s on. Raises BadInput with the key."""
+    return _begun(_OneGust, "gust", given, at_s, "of `velocity_mps` and its times").gust
+
+
+def _begun(model: type[OneThing], what: str, given: Mapping[str, Any], at_s: float, keys: str) -> OneThing:
+    """What the mapping describes, as the only field of a model; mistakes are named without that field."""
     data = plain(given)
     if not isinstance(data, dict):
-        raise BadInput(f"{given!r:.60} is no fault, allowed: a mapping of `type`, `actuator` and its size")
+        raise BadInput(f"{given!r:.60} is no {what}, allowed: a mapping {keys}")
     if "at_s" in data:
-        raise BadInput(f"at_s: has no meaning here, allowed: a fault injected now, at {at_s:g} s")
+        raise BadInput(f"at_s: has no meaning here, allowed: a {what} that begins now, at {at_s:g} s")
     try:
-        return validate(_OneFault, Document({"fault": {**data, "at_s": at_s}}), "").fault
+        return validate(model, Document({what: {**data, "at_s": at_s}}), "")
     except ScenarioError as error:
         problems = [Problem(one.line, one.location[1:], one.says) for one in error.problems]
         raise ScenarioError("", problems) from None

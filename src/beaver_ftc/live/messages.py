@@ -1,0 +1,116 @@
+"""What a page may ask of the flight: one model a request, strict and small; anything else is refused."""
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
+
+from beaver_ftc.errors import BadInput
+
+MAX_BYTES = 2048  # of one message
+FASTEST = 20.0  # times real time
+STICK_DEG_S = 20.0  # full stick
+
+Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]{1,100}$")]
+Finite = Annotated[float, Field(ge=-1000, le=1000)]
+Rate = Annotated[float, Field(ge=-STICK_DEG_S, le=STICK_DEG_S)]
+Metres = Annotated[float, Field(ge=-25, le=25)]
+
+
+class Request(BaseModel):
+    """n: a number of the page's choice, which the answer repeats."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    n: int = Field(0, ge=0, le=2**53)
+
+
+class Break(Request):
+    """Break something now; the scenario's own rules check the fault."""
+
+    do: Literal["break"]
+    fault: dict[Name, Finite | Name] = Field(max_length=8)
+
+
+class Repair(Request):
+    """Repair a surface, or everything."""
+
+    do: Literal["repair"]
+    actuator: Name | None = None
+
+
+class Blow(Request):
+    """A gust now: m/s towards north, east, down."""
+
+    do: Literal["blow"]
+    velocity_mps: tuple[Metres, Metres, Metres]
+
+
+class Stick(Request):
+    """Rates added to the reference, deg/s, until said otherwise."""
+
+    do: Literal["stick"]
+    rates_deg_s: tuple[Rate, Rate, Rate]
+
+
+class Speed(Request):
+    """How many times real time."""
+
+    do: Literal["speed"]
+    times: float = Field(ge=1, le=FASTEST)
+
+
+class Pause(Request):
+    """Hold the flight, or let it go on."""
+
+    do: Literal["pause"]
+    on: bool
+
+
+class Fresh(Request):
+    """Begin a new flight from trim; what is left out stays as it was."""
+
+    do: Literal["fresh"]
+    scenario: Name | None = None
+    law: Name | None = None
+    scheme: Name | None = None
+    fault_class: Literal["published", "all"] | None = None
+    sensors: Literal["ideal", "tactical-grade", "consumer-grade"] | None = None
+    turbulence: Literal["none", "light", "moderate", "severe"] | None = None
+
+
+class Game(Request):
+    """You against the detector: random or second (someone else breaks it), an answer, or the end of it."""
+
+    do: Literal["game"]
+    move: Literal["random", "second", "answer", "stop"]
+    answer: Name | None = None
+
+
+class Save(Request):
+    """Write the flight so far as a result folder."""
+
+    do: Literal["save"]
+
+
+class Invite(Request):
+    """Ask for an address that lets another browser in, once."""
+
+    do: Literal["invite"]
+
+
+AnyRequest = Annotated[
+    Break | Repair | Blow | Stick | Speed | Pause | Fresh | Game | Save | Invite, Field(discriminator="do")
+]
+_ADAPTER: TypeAdapter[Any] = TypeAdapter(AnyRequest)
+
+
+def parse(text: str | bytes) -> Any:
+    """The request in a message. Raises BadInput with the first thing that is wrong, in one line."""
+    if len(text) > MAX_BYTES:
+        raise BadInput(f"a message of {len(text)} characters, allowed: {MAX_BYTES}")
+    try:
+        return _ADAPTER.validate_json(text)
+    except ValidationError as error:
+        first = error.errors(include_url=False, include_context=False, include_input=False)[0]
+        place = ".".join(str(part) for part in first["loc"]) or "message"
+        raise BadInput(f"{place:.100}: {first['msg']:.200}") from None

@@ -1,0 +1,157 @@
+"""Everything together: the flight process, the web server, the address, and a clean end."""
+
+import asyncio
+import contextlib
+import multiprocessing
+import signal
+import socket
+import threading
+from collections.abc import Callable, Iterator
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from beaver_ftc.errors import BadInput, SimulationFailed
+from beaver_ftc.live import flying, messages
+
+if TYPE_CHECKING:
+    from beaver_ftc.scenario.schema import Scenario
+
+LOOPBACK = "127.0.0.1"
+LAST_WORDS_S = 3.0  # the flight process is given so long to end
+
+
+def serve(scenario: "Scenario", out: Path, port: int, say: Callable[[str], None]) -> None:
+    """Serve the page until SIGINT or SIGTERM. say: prints the address once a page can be opened.
+
+    Raises BadInput for a port in use or a flight that cannot be begun, SimulationFailed if the flight's
+    process dies.
+    """
+    with _listening(port) as listener, _flight(scenario, out) as pipe:
+        ended = asyncio.run(_serve(listener, pipe, say))
+    if ended is not None:
+        raise SimulationFailed(ended)
+
+
+@contextlib.contextmanager
+def _listening(port: int) -> Iterator[socket.socket]:
+    """A socket on the loopback interface; port 0: whichever is free."""
+    listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+    with listener:
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            listener.bind((LOOPBACK, port))
+        except OSError as error:
+            raise BadInput(
+                f"--port: {port} cannot be had ({error.strerror}), allowed: another, 0 for any"
+            ) from None
+        yield listener
+
+
+@contextlib.contextmanager
+def _flight(scenario: "Scenario", out: Path) -> Iterator[Connection]:
+    """The flight process, and the pipe to it."""
+    context = multiprocessing.get_context("spawn")
+    ours, theirs = context.Pipe()
+    process = context.Process(
+        target=flying.main, args=(theirs, scenario, str(out)), name="beaver-ftc flight", daemon=True
+    )
+    process.start()
+    theirs.close()
+    try:
+        yield ours
+    finally:
+        with contextlib.suppress(OSError):
+            ours.send((flying.EVERYONE, "end"))
+        process.join(LAST_WORDS_S)
+        if process.is_alive():
+            process.terminate()
+            process.join()
+
+
+async def _serve(listener: socket.socket, pipe: Connection, say: Callable[[str], None]) -> str | None:
+    """Run the server; returns why it ended, None for a signal."""
+    import uvicorn
+
+    from beaver_ftc.live.gate import Gate
+    from beaver_ftc.live.pages import Pages
+    from beaver_ftc.live.server import application
+
+    gate, pages = Gate(listener.getsockname()[1]), Pages()
+    app = application(gate, pages, _asker(pipe))
+    config = uvicorn.Config(
+        app, log_level="error", access_log=False, lifespan="off", server_header=False,
+        ws_max_size=messages.MAX_BYTES, ws_ping_interval=20.0, timeout_graceful_shutdown=2,
+    )  # fmt: skip
+    server = _server(config)
+    _on_signals(server)
+    loop = asyncio.get_running_loop()
+    ready: asyncio.Future[str | None] = loop.create_future()
+    ended: list[str] = []
+
+    def heard(page: Any, told: Any) -> None:
+        if isinstance(page, int):
+            pages.tell(page, told)
+        elif page == "ready":
+            _settle(ready, None)
+        else:
+            _settle(ready, told)
+            ended.append(told)
+            server.should_exit = True
+
+    threading.Thread(target=_listen, args=(pipe, loop, heard), daemon=True, name="flight").start()
+    serving = asyncio.create_task(server.serve(sockets=[listener]))
+    await asyncio.wait({ready, serving}, return_when=asyncio.FIRST_COMPLETED)
+    if ready.done() and ready.result() is None:
+        say(gate.invitation())
+    await serving
+    return ended[0] if ended else None
+
+
+def _settle(future: "asyncio.Future[str | None]", result: str | None) -> None:
+    if not future.done():
+        future.set_result(result)
+
+
+def _asker(pipe: Connection) -> Callable[[int, str], None]:
+    def ask(page: int, text: str) -> None:
+        with contextlib.suppress(OSError):  # it has died: `_listen` says so
+            pipe.send((page, text))
+
+    return ask
+
+
+def _listen(pipe: Connection, loop: asyncio.AbstractEventLoop, heard: Callable[[Any, Any], None]) -> None:
+    """Hand on what the flight process says, from a thread of its own, until there is nothing more."""
+    with contextlib.suppress(RuntimeError):  # the loop is closed: the server has ended
+        try:
+            while True:
+                loop.call_soon_threadsafe(heard, *pipe.recv())
+        except (EOFError, OSError):
+            loop.call_soon_threadsafe(heard, "died", "the flight process has ended unexpectedly")
+
+
+def _on_signals(server: Any) -> None:
+    """SIGINT and SIGTERM end the server in good order."""
+    loop = asyncio.get_running_loop()
+
+    def end(*_: object) -> None:
+        server.should_exit = True
+
+    for number in (signal.SIGINT, signal.SIGTERM):
+        try:
+            loop.add_signal_handler(number, end)
+        except NotImplementedError:  # Windows
+            signal.signal(number, end)
+
+
+def _server(config: Any) -> Any:
+    """A uvicorn server that leaves the signals to `_on_signals`: its own raises them again at its end."""
+    import uvicorn
+
+    class Server(uvicorn.Server):
+        @contextlib.contextmanager
+        def capture_signals(self) -> Iterator[None]:
+            yield
+
+    return Server(config)

@@ -1,0 +1,253 @@
+"""The flight that the page shows: what is asked of it, what happens to it, and what is said of it."""
+
+import json
+from collections import deque
+from datetime import UTC, datetime
+from math import isfinite, radians
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import beaver_ftc as bf
+from beaver_ftc.errors import BadInput, suggestion
+from beaver_ftc.live import messages
+from beaver_ftc.live.game import NOTHING, Game, hidden_faults
+from beaver_ftc.plugins import DETECTORS, LAWS, registered
+from beaver_ftc.results.log import SpooledLog
+
+LONGEST_S = 3600.0  # of one live flight: its log is 0.3 GB then
+EVENTS_KEPT = 400
+PATIENCE_S = 10.0  # for the diagnosis, once you have spoken
+HIDDEN = ("_effective_rad", "_pos_rad", "_excluded", "_effectiveness_estimate", "mode", "detected")
+
+
+class Session:
+    """One flight at a time, begun anew by `fresh`. out: where `save` writes."""
+
+    def __init__(self, scenario: "bf.Scenario", out: Path, seed: int | None = None) -> None:
+        self._given, self._base, self._out = scenario, scenario, out
+        self._rng = np.random.default_rng(seed)
+        self.game = Game()
+        self.stick_rad_s: tuple[float, ...] | None = None
+        self._begin(scenario)
+
+    def _begin(self, scenario: "bf.Scenario", faults: bool = True) -> None:
+        """A new flight from trim. Raises BadInput, the old one going on, where it cannot be flown."""
+        stamp = datetime.now(UTC).strftime("%Y%m%d-%H%M%S-%f")[:-3]
+        changes: dict[str, Any] = {"name": f"live-{scenario.name[:60]}-{stamp}", "expect": {}}
+        changes["duration_s"] = LONGEST_S
+        flown = scenario.with_(changes if faults else {**changes, "faults": []})
+        sim = bf.Simulation(flown, log=SpooledLog())
+        sim.step()
+        self._base, self.scenario, self.sim = scenario, flown, sim
+        self.columns = sim.columns
+        self.surfaces = tuple(c.removesuffix("_cmd_rad") for c in self.columns if c.endswith("_cmd_rad"))
+        self._hidden = [i for i, name in enumerate(self.columns) if name.endswith(HIDDEN)]
+        self.events: deque[dict[str, Any]] = deque(maxlen=EVENTS_KEPT)
+        self.fresh_events: list[dict[str, Any]] = []
+        self._said = ("", None, None, (), False)
+        self._mode = sim.mode
+        self.broken = {fault.model_dump().get("actuator") or fault.type for fault in flown.faults}
+        self._tell("flight", f"{scenario.name}: trimmed, {flown.control.law} law, {flown.fdi.scheme}")
+
+    @property
+    def over(self) -> bool:
+        """Whether the flight has ended, by loss of the aircraft or by its length."""
+        return self.sim.done
+
+    def step(self) -> None:
+        """Fly one frame and notice what it brought."""
+        if self.game.is_due(self.sim.t_s):
+            self._break(self.game.fault)
+        self.sim.step(stick=self.stick_rad_s)
+        self._notice()
+        if self.game.settle(PATIENCE_S, self.sim.t_s):
+            self._tell("game", "the round is over")
+
+    def _notice(self) -> None:
+        """Events: the alarm, the name, candidates, the supervisor's mode, the end."""
+        sim, verdict, t_s = self.sim, self.sim.verdict, self.sim.t_s
+        said = (verdict.axis, verdict.isolated, verdict.type, verdict.candidates, sim.departed)
+        if said == self._said and sim.mode == self._mode:
+            return
+        before, self._said = self._said, said
+        if verdict.detected and before[0] != verdict.axis:
+            self._tell("alarm", f"residual of {verdict.axis} beyond its threshold", secret=True)
+        if verdict.isolated and before[1:3] != said[1:3]:
+            self.game.named(verdict.isolated, t_s)
+            what = f", {verdict.type.replace('_', ' ')}" if verdict.type else ""
+            self._tell("named", f"{verdict.isolated}{what}", secret=True)
+        elif verdict.detected and verdict.candidates != before[3] and not verdict.isolated:
+            self._tell("candidates", ", ".join(verdict.candidates) or "none left", secret=True)
+        if sim.mode != self._mode:
+            self._tell("supervisor", f"{self._mode} to {sim.mode}", secret=True)
+            self._mode = sim.mode
+        if sim.departed:
+            self._tell("lost", "the aircraft is lost; begin a new flight")
+
+    def _tell(self, kind: str, says: str, secret: bool = False) -> None:
+        event = {"t": round(self.sim.t_s, 2), "kind": kind, "says": says, "secret": secret}
+        self.events.append(event)
+        self.fresh_events.append(event)
+
+    def take_events(self) -> list[dict[str, Any]]:
+        """The events since the last call that a page may see now; the others wait for the end of the round."""
+        if self.game.hidden:
+            told = [event for event in self.fresh_events if not event["secret"]]
+            self.fresh_events = [event for event in self.fresh_events if event["secret"]]
+        else:
+            told, self.fresh_events = self.fresh_events, []
+        return told
+
+    def handle(self, request: messages.Request) -> str:
+        """Do what is asked; returns what to say of it. Raises BadInput."""
+        match request:
+            case messages.Break(fault=fault):
+                return self._break(dict(fault))
+            case messages.Repair(actuator=actuator):
+                return self._repair(actuator)
+            case messages.Blow(velocity_mps=velocity):
+                self.sim.blow({"velocity_mps": list(velocity), "rise_s": 0.5, "hold_s": 1.0, "fade_s": 0.5})
+                self._tell("gust", ", ".join(f"{v:g}" for v in velocity) + " m/s (north, east, down)")
+                return "gust"
+            case messages.Stick(rates_deg_s=rates):
+                self.stick_rad_s = tuple(map(radians, rates)) if any(rates) else None
+                return ""
+            case messages.Fresh():
+                return self._fresh(request)
+            case messages.Game():
+                return self._play(request)
+            case messages.Save():
+                return self._save()
+        raise BadInput(f"{type(request).__name__}: is not for the flight")
+
+    def _break(self, fault: dict[str, Any]) -> str:
+        self._check_going_on()
+        self.sim.inject(fault)
+        where = str(fault.get("actuator", fault["type"]))
+        self.broken.add(where)
+        if self.game.hidden:
+            self.game.broke(fault, self.sim.t_s)
+        sizes = ", ".join(f"{k} {v}" for k, v in fault.items() if k not in ("type", "actuator"))
+        what = str(fault["type"]).replace("_", " ")
+        self._tell("broken", f"{where}: {what}" + (f" ({sizes})" if sizes else ""), secret=True)
+        return "" if self.game.hidden else f"{where} broken"
+
+    def _repair(self, actuator: str | None) -> str:
+        self._check_going_on()
+        self.sim.repair(actuator)
+        self.broken -= {actuator} if actuator else set(self.broken)
+        self._tell("repaired", actuator or "everything", secret=True)
+        return f"{actuator or 'everything'} repaired"
+
+    def _check_going_on(self) -> None:
+        if self.over:
+            raise BadInput("the flight is over, allowed: a new flight")
+
+    def _fresh(self, asked: messages.Fresh) -> str:
+        base = self._scenario(asked.scenario)
+        changes = _changes(asked)
+        self._begin(base.with_(changes) if changes else base)
+        self.game.stop()
+        return "new flight"
+
+    def _scenario(self, name: str | None) -> "bf.Scenario":
+        """A built-in one, or the one that the command was given; a page names no files."""
+        if name is None or name == self._base.name:
+            return self._base
+        if name == self._given.name:
+            return self._given
+        if name not in bf.scenarios():
+            raise BadInput(f"scenario: {name!r} is not known{suggestion(name, bf.scenarios())}")
+        return bf.load(name)
+
+    def _play(self, asked: messages.Game) -> str:
+        if asked.move == "stop":
+            self.game.stop()
+        elif asked.move == "answer":
+            self.game.answer(asked.answer, (*self.surfaces, NOTHING), self.sim.t_s)
+            self._tell("game", f"you say: {asked.answer}")
+        else:
+            self._begin(self._base, faults=False)
+            kinds = hidden_faults(self.surfaces)
+            self.game = self.game.next_round(asked.move, self.sim.t_s, kinds, self._rng)
+            self._tell("game", "a round begins: something will break")
+        return ""
+
+    def _save(self) -> str:
+        folder = self.sim.save(self._out, report=True)
+        self._tell("saved", str(folder))
+        return f"saved: {folder}; fly it again: beaver-ftc run {folder / 'scenario.yaml'}"
+
+    def frame(self) -> dict[str, Any]:
+        """What the page draws, of the frame just flown."""
+        sim, hidden = self.sim, self.game.hidden
+        values = [_short(value) for value in sim.values]
+        for i in self._hidden if hidden else ():
+            values[i] = None
+        told: dict[str, Any] = {"k": "f", "v": values, "stick": self.stick_rad_s}
+        if hidden:
+            return told
+        verdict = sim.verdict
+        told["axis"], told["isolated"], told["type"] = verdict.axis, verdict.isolated, verdict.type
+        told["candidates"], told["estimate"] = verdict.candidates, verdict.estimate
+        told["mode"] = sim.mode
+        told["effectiveness"] = [_short(sim.read(f"failures/{s}/effectiveness")) for s in self.surfaces]
+        return told
+
+    def state(self) -> dict[str, Any]:
+        """What changes seldom."""
+        broken = [] if self.game.hidden else sorted(map(str, self.broken))
+        return {"k": "s", "over": self.over, "broken": broken, "game": self.game.shown(), "gust": self._gusty}
+
+    @property
+    def _gusty(self) -> bool:
+        return any(event["kind"] == "gust" for event in self.events)
+
+    def hello(self) -> dict[str, Any]:
+        """What a page needs to know of this flight before its first frame."""
+        low, high = self.sim.travel_rad
+        hidden = self.game.hidden
+        scenario = self.scenario
+        return {
+            "k": "hello", "columns": self.columns, "surfaces": self.surfaces,
+            "scenario": self._base.name, "description": self._base.description, "rate_hz": scenario.rate_hz,
+            "law": scenario.control.law, "scheme": scenario.fdi.scheme,
+            "fault_class": scenario.fdi.fault_class, "aircraft": str(scenario.aircraft),
+            "travel_rad": [list(map(float, low)), list(map(float, high))],
+            "trim_rad": list(map(float, self.sim.trim_rad)),
+            "scenarios": sorted({*bf.scenarios(), self._given.name}),
+            "laws": list(registered(LAWS)), "schemes": list(registered(DETECTORS)),
+            "stick_deg_s": messages.STICK_DEG_S, "fastest": messages.FASTEST,
+            "events": [event for event in self.events if not (hidden and event["secret"])],
+        }  # fmt: skip
+
+
+def _changes(asked: messages.Fresh) -> dict[str, Any]:
+    """Dotted keys of the scenario for what a new flight asks. Errors of the air and the sensors are declared
+    to the diagnosis as well: it is to live with them, not to be surprised."""
+    changes: dict[str, Any] = {}
+    for key, value in (("control.law", asked.law), ("fdi.scheme", asked.scheme)):
+        if value is not None:
+            changes[key] = value
+    if asked.fault_class is not None:
+        changes["fdi.fault_class"] = asked.fault_class
+    if asked.sensors is not None:
+        changes["sensors"] = changes["fdi.bounds.sensors"] = asked.sensors
+    if asked.turbulence is not None:
+        still = asked.turbulence == "none"
+        changes["environment.turbulence"] = "none" if still else "dryden"
+        changes["environment.severity"] = None if still else asked.turbulence
+        changes["fdi.bounds.turbulence"] = asked.turbulence
+    return changes
+
+
+def encode(told: dict[str, Any]) -> bytes:
+    """One message to a page."""
+    return json.dumps(told, separators=(",", ":"), allow_nan=False).encode()
+
+
+def _short(value: float) -> float | None:
+    """Seven digits are enough to draw; what is not finite is none."""
+    return float(f"{value:.7g}") if isfinite(value) else None

@@ -1,0 +1,105 @@
+// Breaking and repairing: one set of buttons a surface, and the same as a menu where the aircraft is clicked.
+
+import { ask } from "./link.js";
+import { notice } from "./panels.js";
+import { flight } from "./state.js";
+
+const KINDS = [
+  ["lose 40 %", { type: "loss_of_effectiveness", magnitude: 0.4 }],
+  ["jam", { type: "stuck" }],
+  ["float", { type: "float" }],
+  ["run away", { type: "hardover", direction: 1 }],
+  ["oscillate", { type: "oscillatory", amplitude_deg: 3, frequency_rad_s: 6 }],
+  ["bias", { type: "bias", bias_deg: 3 }],
+  ["slow", { type: "rate_limit", scale: 0.05 }],
+];
+const byId = (id) => document.getElementById(id);
+const active = new Map(); // surface -> Map of kind -> true, as far as this page did it
+
+export function perform(request) {
+  return ask(request).then((says) => { if (says) notice(says); return says; }, (error) => { notice(error.message); });
+}
+
+async function toggle(surface, label, fault) {
+  const broken = active.get(surface) ?? new Set();
+  if (broken.has(label)) return repair(surface);
+  if (await perform({ do: "break", fault: { ...fault, actuator: surface } }) === undefined) return undefined;
+  active.set(surface, broken.add(label));
+  return drawBroken();
+}
+
+export async function repair(surface = null) {
+  if (await perform({ do: "repair", actuator: surface }) === undefined) return;
+  if (surface) active.delete(surface); else active.clear();
+  drawBroken();
+}
+
+function buttons(surface) {
+  const made = KINDS.map(([label, fault]) => {
+    const button = Object.assign(document.createElement("button"), { textContent: label, type: "button" });
+    button.dataset.label = label;
+    button.setAttribute("aria-label", `${surface}: ${label}`);
+    button.addEventListener("click", () => { closeMenu(); toggle(surface, label, fault); });
+    return button;
+  });
+  const mend = Object.assign(document.createElement("button"), { textContent: "repair", type: "button" });
+  mend.setAttribute("aria-label", `${surface}: repair`);
+  mend.addEventListener("click", () => { closeMenu(); repair(surface); });
+  return [...made, mend];
+}
+
+export function meetSurfaces(hello) {
+  active.clear();
+  byId("surfaces").replaceChildren(...hello.surfaces.map((surface, i) => {
+    const group = document.createElement("fieldset");
+    group.dataset.surface = surface;
+    group.append(Object.assign(document.createElement("legend"), { textContent: `${i + 1} ${surface}` }), ...buttons(surface));
+    return group;
+  }));
+}
+
+export function drawBroken() {
+  const broken = new Set(flight.state?.broken ?? []);
+  for (const group of byId("surfaces").children) {
+    const surface = group.dataset.surface;
+    const hidden = flight.state?.game.phase === "waiting";
+    group.classList.toggle("broken", broken.has(surface));
+    for (const button of group.querySelectorAll("[data-label]")) {
+      button.setAttribute("aria-pressed", !hidden && Boolean(active.get(surface)?.has(button.dataset.label)));
+    }
+  }
+}
+
+let opener = null;
+
+export function openMenu(surface, x, y) {
+  const menu = byId("menu");
+  if (!surface) { closeMenu(); return; }
+  opener = document.activeElement;
+  menu.replaceChildren(Object.assign(document.createElement("b"), { textContent: surface }), ...buttons(surface));
+  for (const button of menu.querySelectorAll("button")) button.setAttribute("role", "menuitem");
+  menu.hidden = false;
+  menu.style.left = `${Math.max(4, Math.min(x, innerWidth - 190))}px`;
+  menu.style.top = `${Math.max(4, Math.min(y, innerHeight - menu.offsetHeight - 8))}px`;
+  menu.querySelector("button").focus({ preventScroll: true });
+}
+
+export function closeMenu() {
+  if (byId("menu").hidden) return;
+  byId("menu").hidden = true;
+  opener?.focus?.({ preventScroll: true });
+}
+
+export function wireMenu() {
+  const menu = byId("menu");
+  menu.addEventListener("keydown", (event) => {
+    const items = [...menu.querySelectorAll("button")], i = items.indexOf(document.activeElement);
+    if (event.key === "ArrowDown") items[(i + 1) % items.length].focus();
+    if (event.key === "ArrowUp") items[(i + items.length - 1) % items.length].focus();
+    if (event.key === "Escape" || event.key === "Tab") closeMenu();
+    event.stopPropagation();
+  });
+  document.addEventListener("pointerdown", (event) => {
+    if (!menu.hidden && !menu.contains(event.target)) closeMenu();
+  });
+}

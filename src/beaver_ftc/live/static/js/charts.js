@@ -1,0 +1,142 @@
+// Four charts with all that is compared: a ring of the last seconds, thinned to what a screen can show.
+
+import uPlot from "../vendor/uplot.min.js";
+import { AXES, DEG, flight, value } from "./state.js";
+
+const WINDOW_S = 20, POINTS = 320;
+export const COLOURS = ["#6ec1f0", "#f0a830", "#2fbf94", "#dd92c0", "#f0e442", "#ff7a4d", "#b0bec8", "#ffffff"];
+
+// A chart: curves, each with the value it shows now; solid is what is, dashed is what was asked or estimated.
+function plans(surfaces) {
+  const rad = (name) => () => { const x = value(name); return x === null ? null : x * DEG; };
+  const share = (axis) => () => {
+    const residual = value(`${axis}_residual_rad_s`), threshold = value(`${axis}_threshold_rad_s`);
+    return residual === null || !threshold ? null : Math.max(-3, Math.min(3, residual / threshold));
+  };
+  const pairs = (names, solid, dashed) => names.flatMap((name, i) => [
+    { label: name, colour: i, now: solid(name, i) }, { label: `${name} dashed`, colour: i, dash: true, now: dashed(name, i) },
+  ]);
+  return [
+    { title: "Residual / threshold", unit: "1", names: AXES, range: [-1.6, 1.6], limits: [-1, 1],
+      curves: AXES.map((axis, i) => ({ label: axis, colour: i, now: share(axis) })) },
+    { title: "Rates, deg/s (dashed: asked for)", names: AXES, floor: 4,
+      curves: pairs(AXES, (a) => rad(`${a}_measured_rad_s`), (a) => rad(`${a}_reference_rad_s`)) },
+    { title: "Surfaces, deg (dashed: commanded)", names: surfaces, floor: 3,
+      curves: pairs(surfaces, (s) => rad(`${s}_effective_rad`), (s) => rad(`${s}_cmd_rad`)) },
+    { title: "Effectiveness (dashed: estimated)", names: surfaces, range: [-0.05, 1.15],
+      curves: pairs(surfaces, (_, i) => () => flight.frame?.effectiveness?.[i] ?? null, (s) => () => value(`${s}_effectiveness_estimate`)) },
+  ];
+}
+
+class Chart {
+  constructor(parent, plan) {
+    this.plan = plan;
+    this.box = document.createElement("div");
+    this.box.className = "chart";
+    this.box.append(this.title(), this.place = Object.assign(document.createElement("div"), { className: "plot" }));
+    parent.append(this.box);
+    this.data = [[], ...plan.curves.map(() => [])];
+    this.plot = new uPlot(this.options(), this.data, this.place);
+    this.watch = new ResizeObserver(() => this.fit());
+    this.watch.observe(this.place);
+  }
+
+  title() {
+    const title = document.createElement("h2");
+    title.append(Object.assign(document.createElement("b"), { textContent: this.plan.title }));
+    this.plan.names.forEach((name, i) => {
+      const key = Object.assign(document.createElement("span"), { className: "key", textContent: `${"●■▲◆★✚▼○"[i]} ${name}` });
+      key.style.color = COLOURS[i];
+      title.append(key);
+    });
+    return title;
+  }
+
+  options() {
+    const { plan } = this, axis = { stroke: "#a9bac8", grid: { stroke: "#2a3d4e", width: 1 }, ticks: { show: false }, font: "11px sans-serif" };
+    return {
+      width: 300, height: 100, legend: { show: false }, cursor: { show: false }, padding: [4, 8, 0, 0], pxAlign: false,
+      scales: { x: { time: false, range: () => this.span ?? [0, WINDOW_S] }, y: { range: (_, low, high) => this.range(low, high) } },
+      axes: [{ ...axis, size: 20, space: 60 }, { ...axis, size: 38, space: 22 }],
+      series: [{}, ...plan.curves.map(({ label, colour, dash }) => ({
+        label, stroke: COLOURS[colour], width: dash ? 1 : 1.5, dash: dash ? [5, 4] : undefined, points: { show: false }, spanGaps: false,
+      }))],
+      hooks: plan.limits ? { draw: [(plot) => this.drawLimits(plot)] } : {},
+    };
+  }
+
+  range(low, high) {
+    if (this.plan.range) return this.plan.range;
+    const floor = this.plan.floor, reach = Math.max(floor, Math.abs(low ?? 0), Math.abs(high ?? 0));
+    const steps = Math.ceil(reach / floor) * floor * 1.05;
+    return [-steps, steps];
+  }
+
+  drawLimits(plot) {
+    const { ctx, bbox } = plot;
+    ctx.save();
+    ctx.strokeStyle = "#ff7a4d";
+    ctx.lineWidth = 2;
+    for (const limit of this.plan.limits) {
+      const y = plot.valToPos(limit, "y", true);
+      ctx.beginPath();
+      ctx.moveTo(bbox.left, y);
+      ctx.lineTo(bbox.left + bbox.width, y);
+      ctx.stroke();
+    }
+    ctx.restore();
+  }
+
+  fit() {
+    const { clientWidth: width, clientHeight: height } = this.place;
+    if (width > 40 && height > 30) this.plot.setSize({ width, height });
+  }
+
+  push(t) {
+    this.data[0].push(t);
+    this.plan.curves.forEach((curve, i) => this.data[i + 1].push(curve.now()));
+    let old = 0;
+    while (this.data[0][old] < t - WINDOW_S) old += 1;
+    if (old) for (const column of this.data) column.splice(0, old);
+  }
+
+  draw(t) {
+    this.span = t < WINDOW_S ? [0, WINDOW_S] : [t - WINDOW_S, t];
+    this.plot.setData(this.data);
+  }
+
+  end() {
+    this.watch.disconnect();
+    this.plot.destroy();
+    this.box.remove();
+  }
+}
+
+export class Charts {
+  constructor(parent) {
+    this.parent = parent;
+    this.charts = [];
+    this.turn = 0;
+  }
+
+  meet(hello) {
+    for (const chart of this.charts) chart.end();
+    this.charts = plans(hello.surfaces).map((plan) => new Chart(this.parent, plan));
+    this.newest = -Infinity;
+  }
+
+  take() {
+    const t = value("t_s");
+    if (t - this.newest < WINDOW_S / POINTS) return;
+    this.newest = t;
+    for (const chart of this.charts) chart.push(t);
+    this.stale = true;
+  }
+
+  // One chart a frame, in turn: each is drawn 15 times a second, and no frame pays for all of them.
+  draw() {
+    if (!this.charts.length || this.newest === -Infinity) return;
+    this.turn = (this.turn + 1) % this.charts.length;
+    this.charts[this.turn].draw(this.newest);
+  }
+}

@@ -1,0 +1,90 @@
+// The header, the form of a new flight, and the keyboard.
+
+import { openMenu, perform, repair } from "./breaking.js";
+import { ask } from "./link.js";
+import { notice, showTab } from "./panels.js";
+import { flight } from "./state.js";
+
+const byId = (id) => document.getElementById(id);
+
+export function wireControls(view, sticks) {
+  byId("pause").addEventListener("click", pause);
+  byId("speed").addEventListener("change", (event) => perform({ do: "speed", times: Number(event.target.value) }));
+  byId("reset").addEventListener("click", () => perform({ do: "fresh" }));
+  byId("save").addEventListener("click", save);
+  byId("help").addEventListener("click", help);
+  byId("repair-all").addEventListener("click", () => repair());
+  byId("gust-up").addEventListener("click", () => perform({ do: "blow", velocity_mps: [0, 0, -6] }));
+  byId("gust-side").addEventListener("click", () => perform({ do: "blow", velocity_mps: [0, 6, 0] }));
+  byId("invite").addEventListener("click", invite);
+  byId("fresh").addEventListener("submit", fresh);
+  document.addEventListener("keydown", (event) => keyDown(event, view, sticks));
+  document.addEventListener("keyup", (event) => sticks.release(event.key.toLowerCase()));
+}
+
+const pause = () => perform({ do: "pause", on: !flight.state?.paused });
+const help = () => byId("help-text").showModal();
+
+async function save() {
+  notice("saving; the flight waits");
+  byId("save").disabled = true;
+  await perform({ do: "save" });
+  byId("save").disabled = false;
+}
+
+async function invite() {
+  try {
+    const address = await ask({ do: "invite" });
+    await navigator.clipboard?.writeText(address).catch(() => {});
+    notice(`for one other browser of this machine: ${address}`);
+  } catch (error) { notice(error.message); }
+}
+
+function fresh(event) {
+  event.preventDefault();
+  const asked = Object.fromEntries([...new FormData(event.target)].filter(([, chosen]) => chosen));
+  perform({ do: "fresh", ...asked });
+}
+
+export function meetControls(hello) {
+  choices("scenario", hello.scenarios, hello.scenario);
+  choices("law", hello.laws, hello.law);
+  choices("scheme", hello.schemes, hello.scheme);
+  byId("description").textContent = hello.description;
+}
+
+function choices(name, values, chosen) {
+  const select = byId("fresh").elements[name];
+  select.replaceChildren(...values.map((each) => new Option(each, each, false, each === chosen)));
+}
+
+export function drawControls(state) {
+  byId("pause").textContent = state.paused ? "Go on" : "Pause";
+  const select = byId("speed");
+  if (document.activeElement !== select) select.value = String(state.speed);
+  const late = state.achieved < 0.9 * state.speed && !state.paused && !state.over;
+  byId("pace").textContent = state.paused ? "paused" : state.over ? "over"
+    : `${state.achieved.toFixed(state.achieved < 10 ? 1 : 0)}x${late ? " (machine too slow)" : ""}, jitter ${state.jitter_ms.toFixed(1)} ms`
+      + (state.pages > 1 ? `, ${state.pages} pages` : "");
+  byId("gust-up").disabled = byId("gust-side").disabled = state.gust;
+}
+
+function keyDown(event, view, sticks) {
+  const typing = /^(INPUT|SELECT|TEXTAREA)$/.test(event.target.tagName);
+  if (typing || event.ctrlKey || event.altKey || event.metaKey || byId("help-text").open) return;
+  const key = event.key.toLowerCase();
+  if (sticks.hold(key, event)) return;
+  if (key === " " && event.target.tagName !== "BUTTON") { event.preventDefault(); pause(); }
+  else if (key === "r") perform({ do: "fresh" });
+  else if (key === "c") view.nextCamera();
+  else if (key === "?") help();
+  else if (key === "0") repair();
+  else if (key >= "1" && key <= "8") chooseByKey(Number(key) - 1);
+}
+
+function chooseByKey(i) {
+  const surface = flight.hello?.surfaces[i];
+  if (!surface) return;
+  showTab("break");
+  openMenu(surface, innerWidth / 3, innerHeight / 4);
+}

@@ -1,0 +1,73 @@
+// The page: what the flight says goes into `state`; everything is drawn from there, once a screen frame.
+
+import { drawBroken, meetSurfaces, openMenu, wireMenu } from "./breaking.js";
+import { Charts } from "./charts.js";
+import { drawControls, meetControls, wireControls } from "./controls.js";
+import { drawGame, meetGame, wireGame } from "./game.js";
+import { Instruments } from "./instruments.js";
+import { connect, on, traffic } from "./link.js";
+import { addEvents, drawDiagnosis, forgetEvents, meetDiagnosis, wireTabs } from "./panels.js";
+import { View } from "./scene.js";
+import { flight, meet, value } from "./state.js";
+import { Sticks } from "./sticks.js";
+
+const byId = (id) => document.getElementById(id);
+const view = new View(byId("scene"), openMenu);
+const charts = new Charts(byId("charts"));
+const instruments = new Instruments(byId("attitude"), byId("numbers"));
+const sticks = new Sticks();
+const drawn = { frames: 0, since: performance.now() };
+let fresh = false;
+
+on("hello", (hello) => {
+  meet(hello);
+  for (const greet of [meetSurfaces, meetDiagnosis, meetGame, meetControls]) greet(hello);
+  view.meet(hello);
+  charts.meet(hello);
+  forgetEvents();
+  addEvents(hello.events);
+});
+on("f", (frame) => {
+  if (!flight.hello || frame.v.length !== flight.hello.columns.length) return;
+  flight.frame = frame;
+  fresh = true;
+  charts.take();
+});
+on("s", (state) => {
+  flight.state = state;
+  drawControls(state);
+  drawBroken();
+  drawGame();
+  banner(state.over ? "The flight is over. Save it, or press Reset for a new one." : "");
+});
+on("e", ({ events }) => addEvents(events));
+on("link", ({ up }) => banner(up ? "" : "Not connected: has beaver-ftc live ended?"));
+
+function banner(text) {
+  byId("banner").hidden = !text;
+  if (byId("banner").textContent !== text) byId("banner").textContent = text;
+}
+
+function draw(now) {
+  requestAnimationFrame(draw);
+  sticks.draw(now);
+  if (!flight.frame) return;
+  drawn.frames += 1;
+  view.draw();
+  charts.draw();
+  if (!fresh) return;
+  fresh = false;
+  instruments.draw(now);
+  drawDiagnosis();
+  byId("time").textContent = `${value("t_s").toFixed(1)} s`;
+}
+
+wireTabs();
+wireMenu();
+wireGame();
+wireControls(view, sticks);
+connect();
+requestAnimationFrame(draw);
+
+// For tests and measurements: what is shown, and how often.
+window.cockpit = { flight, value, drawn, traffic };

@@ -1,0 +1,97 @@
+// What the diagnosis says, the events, and the tabs.
+
+import { flight, value } from "./state.js";
+
+const byId = (id) => document.getElementById(id);
+
+function setText(node, text) {
+  if (node.textContent !== text) node.textContent = text;
+}
+
+export function drawDiagnosis() {
+  const frame = flight.frame, hidden = flight.state?.game.phase === "waiting";
+  const alarm = byId("alarm"), on = Boolean(frame.axis);
+  alarm.classList.toggle("on", on);
+  setText(alarm, hidden ? "hidden during the game" : on ? `ALARM: residual of ${frame.axis} beyond its threshold` : "no alarm");
+  setText(byId("verdict"), hidden ? "" : verdictText(frame));
+  setText(byId("mode"), hidden ? "hidden" : frame.mode ?? "");
+  drawCandidates(frame, hidden);
+}
+
+function verdictText(frame) {
+  if (!frame.axis) return "";
+  if (!frame.isolated) return `${frame.candidates.length} could explain it`;
+  const what = frame.type ? `, ${frame.type.replaceAll("_", " ")}` : "";
+  const loss = frame.type === "loss_of_effectiveness" && frame.estimate !== null && frame.estimate !== undefined;
+  return `Named: ${frame.isolated}${what}${loss ? ` of ${Math.round(-100 * frame.estimate)} %` : ""}`;
+}
+
+function drawCandidates(frame, hidden) {
+  const list = byId("candidates");
+  const named = hidden ? null : frame.isolated;
+  for (const item of list.children) {
+    const out = !hidden && value(`fie_${item.dataset.name}_excluded`) === 1;
+    const isNamed = Boolean(named) && item.dataset.name.split("_")[0] === named && !out;
+    item.classList.toggle("out", out);
+    item.classList.toggle("named", isNamed);
+    setText(item, item.dataset.label + (out ? " out" : isNamed ? " named" : ""));
+  }
+}
+
+export function meetDiagnosis(hello) {
+  const names = hello.columns.filter((c) => c.startsWith("fie_") && c.endsWith("_excluded")).map((c) => c.slice(4, -9));
+  byId("candidates").replaceChildren(...names.map((name) => {
+    const item = document.createElement("li");
+    item.dataset.name = name;
+    item.dataset.label = item.textContent = name.replaceAll("_", " ");
+    return item;
+  }));
+}
+
+const MARKS = { alarm: "▲", named: "◆", broken: "✕", repaired: "✓", supervisor: "⇄", lost: "✖", saved: "⤓", gust: "≋", game: "★", flight: "✈", candidates: "…" };
+
+export function addEvents(events) {
+  const list = byId("events");
+  for (const { t, kind, says } of events) {
+    const item = document.createElement("li");
+    const time = Object.assign(document.createElement("time"), { textContent: `${t.toFixed(2)} s` });
+    item.append(time, Object.assign(document.createElement("b"), { textContent: `${MARKS[kind] ?? "·"} ${kind}` }), document.createTextNode(says));
+    list.prepend(item);
+  }
+  while (list.children.length > 300) list.lastChild.remove();
+}
+
+export function forgetEvents() {
+  byId("events").replaceChildren();
+}
+
+export function showTab(name, focus = false) {
+  for (const tab of document.querySelectorAll("[role=tab]")) {
+    const chosen = tab.id === `tab-${name}`;
+    tab.setAttribute("aria-selected", chosen);
+    tab.tabIndex = chosen ? 0 : -1;
+    byId(tab.getAttribute("aria-controls")).hidden = !chosen;
+    if (chosen && focus) tab.focus();
+  }
+}
+
+export function wireTabs() {
+  const tabs = [...document.querySelectorAll("[role=tab]")];
+  tabs.forEach((tab, i) => {
+    const name = (j) => tabs[(j + tabs.length) % tabs.length].id.slice(4);
+    tab.addEventListener("click", () => showTab(name(i)));
+    tab.addEventListener("keydown", (event) => {
+      if (event.key === "ArrowRight") showTab(name(i + 1), true);
+      if (event.key === "ArrowLeft") showTab(name(i - 1), true);
+      if (event.key.startsWith("Arrow")) event.stopPropagation();
+    });
+  });
+}
+
+let clearing = 0;
+
+export function notice(text) {
+  byId("says").textContent = text;
+  clearTimeout(clearing);
+  clearing = setTimeout(() => { byId("says").textContent = ""; }, 12000);
+}

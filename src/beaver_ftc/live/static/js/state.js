@@ -1,0 +1,23 @@
+// What the page knows of the flight: the hello, the newest frame by column, the seldom changing state.
+
+export const flight = { hello: null, frame: null, state: null, at: new Map() };
+
+export function meet(hello) {
+  flight.hello = hello;
+  flight.frame = null;
+  flight.at = new Map(hello.columns.map((name, i) => [name, i]));
+}
+
+// The value of a log column in the newest frame; null where it is hidden or there is none.
+export function value(name) {
+  const i = flight.at.get(name);
+  return i === undefined || !flight.frame ? null : flight.frame.v[i];
+}
+
+export const AXES = ["p", "q", "r"];
+export const DEG = 180 / Math.PI;
+
+export function degrees(name) {
+  const rad = value(name);
+  return rad === null ? null : rad * DEG;
+}

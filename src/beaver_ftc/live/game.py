@@ -1,4 +1,4 @@
-"""You against the detector: something breaks unseen, you name it, the diagnosis names it, times are compared."""
+"""You against the detector: something breaks unseen, you name it, the diagnosis names it, times compare."""
 
 from dataclasses import dataclass, field
 from typing import Any
@@ -62,7 +62,7 @@ class Game:
         self.yours = str(name), now_s
 
     def settle(self, wait_s: float, now_s: float) -> bool:
-        """End the round once both have spoken, or you have and the detector had its time; whether it ended."""
+        """End the round once both have spoken, or you have and the detector had its time; tells if so."""
         if not self.hidden or self.yours is None:
             return False
         if self.detector is None and self.broken_s is not None and now_s < self.yours[1] + wait_s:

@@ -23,7 +23,7 @@ class Pace:
         self.next_s = now_s + TICK_S
 
     def frames_due(self, now_s: float) -> int:
-        """Frames to fly at this tick. A machine too slow for the speed asked falls behind, and is not chased."""
+        """Frames to fly at this tick. What a machine too slow for its speed cannot fly in time is let go."""
         self._late.append(now_s - self.next_s)
         self.next_s += TICK_S
         if now_s - self.next_s > BEHIND_S:

@@ -12,7 +12,7 @@ from starlette.requests import Request
 from starlette.responses import FileResponse, PlainTextResponse, RedirectResponse, Response
 from starlette.routing import Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles
-from starlette.types import ASGIApp, Receive, Scope, Send
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from beaver_ftc.errors import BadInput
@@ -25,7 +25,7 @@ MAX_PAGES = 20
 REFUSED = 4403  # a websocket's status for "forbidden"
 
 HEADERS = {
-    "content-security-policy": "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; "
+    "content-security-policy": "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; "
     "connect-src 'self' {socket}; base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
     "x-content-type-options": "nosniff",
     "referrer-policy": "no-referrer",
@@ -77,7 +77,7 @@ class Doorkeeper:
         socket = f"ws://127.0.0.1:{self._gate.port} ws://localhost:{self._gate.port}"
         extra = [(k.encode(), v.replace("{socket}", socket).encode()) for k, v in HEADERS.items()]
 
-        async def sent(message):  # type: ignore[no-untyped-def]
+        async def sent(message: Message) -> None:
             if message["type"] == "http.response.start":
                 message = {**message, "headers": [*message.get("headers", []), *extra]}
             await send(message)
@@ -99,9 +99,7 @@ def application(gate: Gate, pages: Pages, ask: Ask) -> Starlette:
         WebSocketRoute("/socket", socket),
         Mount("/static", StaticFiles(directory=STATIC)),
     ]
-    app = Starlette(
-        routes=[Mount(gate.room, routes=routes)], middleware=[Middleware(Doorkeeper, gate=gate)]
-    )
+    app = Starlette(routes=[Mount(gate.room, routes=routes)], middleware=[Middleware(Doorkeeper, gate=gate)])
     app.router.redirect_slashes = False
     return app
 

@@ -2,6 +2,7 @@
 
 import json
 from collections import deque
+from collections.abc import Callable
 from datetime import UTC, datetime
 from math import isfinite, radians
 from pathlib import Path
@@ -18,6 +19,7 @@ from beaver_ftc.results.log import SpooledLog
 
 LONGEST_S = 3600.0  # of one live flight: its log is 0.3 GB then
 EVENTS_KEPT = 400
+GUST_S = {"rise_s": 0.5, "hold_s": 1.0, "fade_s": 0.5}
 PATIENCE_S = 10.0  # for the diagnosis, once you have spoken
 HIDDEN = ("_effective_rad", "_pos_rad", "_excluded", "_effectiveness_estimate", "mode", "detected")
 
@@ -46,7 +48,7 @@ class Session:
         self._hidden = [i for i, name in enumerate(self.columns) if name.endswith(HIDDEN)]
         self.events: deque[dict[str, Any]] = deque(maxlen=EVENTS_KEPT)
         self.fresh_events: list[dict[str, Any]] = []
-        self._said = ("", None, None, (), False)
+        self._said: tuple[Any, ...] = (None, None, None, (), False)
         self._mode = sim.mode
         self.broken = {fault.model_dump().get("actuator") or fault.type for fault in flown.faults}
         self._tell("flight", f"{scenario.name}: trimmed, {flown.control.law} law, {flown.fdi.scheme}")
@@ -92,7 +94,7 @@ class Session:
         self.fresh_events.append(event)
 
     def take_events(self) -> list[dict[str, Any]]:
-        """The events since the last call that a page may see now; the others wait for the end of the round."""
+        """The events since the last call that a page may see; the others wait for the end of the round."""
         if self.game.hidden:
             told = [event for event in self.fresh_events if not event["secret"]]
             self.fresh_events = [event for event in self.fresh_events if event["secret"]]
@@ -102,25 +104,29 @@ class Session:
 
     def handle(self, request: messages.Request) -> str:
         """Do what is asked; returns what to say of it. Raises BadInput."""
-        match request:
-            case messages.Break(fault=fault):
-                return self._break(dict(fault))
-            case messages.Repair(actuator=actuator):
-                return self._repair(actuator)
-            case messages.Blow(velocity_mps=velocity):
-                self.sim.blow({"velocity_mps": list(velocity), "rise_s": 0.5, "hold_s": 1.0, "fade_s": 0.5})
-                self._tell("gust", ", ".join(f"{v:g}" for v in velocity) + " m/s (north, east, down)")
-                return "gust"
-            case messages.Stick(rates_deg_s=rates):
-                self.stick_rad_s = tuple(map(radians, rates)) if any(rates) else None
-                return ""
-            case messages.Fresh():
-                return self._fresh(request)
-            case messages.Game():
-                return self._play(request)
-            case messages.Save():
-                return self._save()
-        raise BadInput(f"{type(request).__name__}: is not for the flight")
+        return self._doing[type(request)](request)
+
+    @property
+    def _doing(self) -> dict[type[messages.Request], Callable[[Any], str]]:
+        return {
+            messages.Break: lambda asked: self._break(dict(asked.fault)),
+            messages.Repair: lambda asked: self._repair(asked.actuator),
+            messages.Blow: lambda asked: self._blow(asked.velocity_mps),
+            messages.Stick: lambda asked: self._steer(asked.rates_deg_s),
+            messages.Fresh: self._fresh,
+            messages.Game: self._play,
+            messages.Save: lambda _: self._save(),
+        }
+
+    def _steer(self, rates_deg_s: tuple[float, ...]) -> str:
+        self.stick_rad_s = tuple(map(radians, rates_deg_s)) if any(rates_deg_s) else None
+        return ""
+
+    def _blow(self, velocity_mps: tuple[float, ...]) -> str:
+        self._check_going_on()
+        self.sim.blow({"velocity_mps": list(velocity_mps), **GUST_S})
+        self._tell("gust", ", ".join(f"{v:g}" for v in velocity_mps) + " m/s (north, east, down)")
+        return "gust"
 
     def _break(self, fault: dict[str, Any]) -> str:
         self._check_going_on()

@@ -27,8 +27,9 @@ class Simulation(Stepping):
         sim.land()
 
     scenario: a name, a path, a mapping or a Scenario. detector, law: plug-in objects to fly with. log: keep
-    one row a frame in memory, or in the log given, for instance a SpooledLog. prepare: called with the trimmed plant before the flight. Frame 0, in which the
-    trimmed flight is measured, is flown with the first step.
+    one row a frame in memory, or in the log given, for instance a SpooledLog. prepare: called with the
+    trimmed plant before the flight. Frame 0, in which the trimmed flight is measured, is flown with the first
+    step.
     """
 
     def __init__(

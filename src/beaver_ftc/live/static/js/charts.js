@@ -19,11 +19,11 @@ function plans(surfaces) {
   return [
     { title: "Residual / threshold", unit: "1", names: AXES, range: [-1.6, 1.6], limits: [-1, 1],
       curves: AXES.map((axis, i) => ({ label: axis, colour: i, now: share(axis) })) },
-    { title: "Rates, deg/s (dashed: asked for)", names: AXES, floor: 4,
+    { title: "Rates, deg/s (-- asked for)", names: AXES, floor: 4,
       curves: pairs(AXES, (a) => rad(`${a}_measured_rad_s`), (a) => rad(`${a}_reference_rad_s`)) },
-    { title: "Surfaces, deg (dashed: commanded)", names: surfaces, floor: 3,
+    { title: "Surfaces, deg (-- command)", names: surfaces, floor: 3,
       curves: pairs(surfaces, (s) => rad(`${s}_effective_rad`), (s) => rad(`${s}_cmd_rad`)) },
-    { title: "Effectiveness (dashed: estimated)", names: surfaces, range: [-0.05, 1.15],
+    { title: "Effectiveness (-- estimate)", names: surfaces, range: [-0.05, 1.15],
       curves: pairs(surfaces, (_, i) => () => flight.frame?.effectiveness?.[i] ?? null, (s) => () => value(`${s}_effectiveness_estimate`)) },
   ];
 }
@@ -37,6 +37,9 @@ class Chart {
     parent.append(this.box);
     this.data = [[], ...plan.curves.map(() => [])];
     this.plot = new uPlot(this.options(), this.data, this.place);
+    const canvas = this.place.querySelector("canvas");
+    canvas.setAttribute("role", "img");
+    canvas.setAttribute("aria-label", `chart: ${plan.title}`);
     this.watch = new ResizeObserver(() => this.fit());
     this.watch.observe(this.place);
   }

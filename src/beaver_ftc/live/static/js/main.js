@@ -16,7 +16,8 @@ const view = new View(byId("scene"), openMenu);
 const charts = new Charts(byId("charts"));
 const instruments = new Instruments(byId("attitude"), byId("numbers"));
 const sticks = new Sticks();
-const drawn = { frames: 0, since: performance.now() };
+const drawn = { frames: 0, ms: 0, second: 0, inSecond: 0 };
+const SLOW_FPS = 40;
 let fresh = false;
 
 on("hello", (hello) => {
@@ -52,14 +53,29 @@ function draw(now) {
   requestAnimationFrame(draw);
   sticks.draw(now);
   if (!flight.frame) return;
-  drawn.frames += 1;
+  count(now);
+  const start = performance.now();
   view.draw();
   charts.draw();
-  if (!fresh) return;
+  if (fresh) drawNumbers(now);
+  drawn.ms += performance.now() - start;
+}
+
+function drawNumbers(now) {
   fresh = false;
   instruments.draw(now);
   drawDiagnosis();
   byId("time").textContent = `${value("t_s").toFixed(1)} s`;
+}
+
+// Frames drawn, and a softer view after a slow second.
+function count(now) {
+  drawn.frames += 1;
+  drawn.inSecond += 1;
+  if (now - drawn.second < 1000) return;
+  if (drawn.second && drawn.inSecond < SLOW_FPS && !document.hidden) view.soften();
+  drawn.second = now;
+  drawn.inSecond = 0;
 }
 
 wireTabs();

@@ -11,7 +11,7 @@ export class View {
   constructor(canvas, choose) {
     this.canvas = canvas;
     this.renderer = new THREE.WebGLRenderer({ canvas, antialias: false, powerPreference: "low-power" });
-    this.renderer.setPixelRatio(1);
+    this.sharpness = 1;
     this.scene = new THREE.Scene();
     this.scene.background = new THREE.Color(0x9cc9e6);
     this.scene.fog = new THREE.Fog(0x9cc9e6, 900, 9000);
@@ -78,9 +78,17 @@ export class View {
   resize() {
     const { clientWidth: width, clientHeight: height } = this.canvas;
     if (!width || !height) return;
+    this.renderer.setPixelRatio(this.sharpness);
     this.renderer.setSize(width, height, false);
     this.camera.aspect = width / height;
     this.camera.updateProjectionMatrix();
+  }
+
+  // A machine without a graphics card draws fewer pixels rather than fewer frames.
+  soften() {
+    if (this.sharpness <= 0.5) return;
+    this.sharpness -= 0.25;
+    this.resize();
   }
 
   nextCamera() {

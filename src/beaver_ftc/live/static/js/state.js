@@ -1,10 +1,11 @@
 // What the page knows of the flight: the hello, the newest frame by column, the seldom changing state.
 
-export const flight = { hello: null, frame: null, state: null, at: new Map() };
+export const flight = { hello: null, frame: null, state: null, at: new Map(), met: 0 };
 
 export function meet(hello) {
   flight.hello = hello;
   flight.frame = null;
+  flight.met += 1;
   flight.at = new Map(hello.columns.map((name, i) => [name, i]));
 }
 

@@ -1,0 +1,211 @@
+"""The page in a headless Chromium: it opens, flies, breaks, detects, saves, and keeps strangers out."""
+
+import functools
+import http.server
+import shutil
+import threading
+
+import numpy as np
+import pytest
+
+import beaver_ftc as bf
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+ARGUMENTS = (
+    "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
+    "--enable-precise-memory-info", "--js-flags=--expose-gc",
+)  # fmt: skip
+WAIT_S = 60.0
+SCREENS = {"laptop": (1280, 720), "small laptop": (1024, 640), "phone": (390, 844)}
+
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium on this machine")
+
+
+@pytest.fixture(scope="module")
+def chromium():
+    playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+    with playwright.sync_playwright() as driver:
+        browser = driver.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
+        yield browser
+        browser.close()
+
+
+@pytest.fixture(scope="module")
+def context(chromium, cockpit):
+    """The browser that the address has let in."""
+    context = chromium.new_context(viewport={"width": 1280, "height": 720})
+    context.new_page().goto(cockpit.address)
+    return context
+
+
+@pytest.fixture
+def page(context, cockpit):
+    """A page in flight, from trim; it must not have had anything to complain about."""
+    trouble = []
+    page = context.new_page()
+    page.on("pageerror", lambda error: trouble.append(str(error)))
+    page.on("console", lambda said: trouble.append(said.text) if said.type == "error" else None)
+    page.on("requestfailed", lambda request: trouble.append(request.url))
+    page.goto(cockpit.home)
+    until(page, "Boolean(window.cockpit && cockpit.flight.state)")
+    met = page.evaluate("cockpit.flight.met")
+    page.locator("#reset").click()
+    until(page, f"cockpit.flight.met > {met} && cockpit.value('t_s') > 0.5")
+    yield page
+    page.close()
+    assert trouble == []
+
+
+def until(page, condition, wait_s=WAIT_S):
+    """Wait for a condition in the page. Not Playwright's own: the page's policy forbids evaluating text."""
+    for _ in range(int(wait_s / 0.05)):
+        if page.evaluate(condition):
+            return
+        page.wait_for_timeout(50)
+    raise AssertionError(f"not in {wait_s:g} s: {condition}")
+
+
+def break_elevator(page):
+    page.locator("fieldset[data-surface=elevator] >> text=lose 40 %").click()
+
+
+def test_the_aircraft_moves_and_is_drawn(page):
+    before = page.evaluate("[cockpit.value('north_m'), cockpit.drawn.frames]")
+    until(page, f"cockpit.value('north_m') > {before[0] + 20}")
+    assert page.evaluate("cockpit.drawn.frames") > before[1]
+    picture = page.locator("#scene").screenshot()
+    assert len(picture) > 5000  # a picture of one colour is a tenth of it
+
+
+def test_a_broken_surface_is_detected_named_and_repaired(page):
+    break_elevator(page)
+    until(page, "document.querySelector('#verdict').textContent.includes('elevator')")
+    assert "ALARM" in page.inner_text("#alarm")
+    assert "elevator named" in page.inner_text("#candidates")
+    assert page.inner_text("#mode") == "reallocated"
+    page.locator("#tab-events").click()
+    events = page.inner_text("#events")
+    assert all(word in events for word in ("broken", "alarm", "named", "supervisor"))
+    page.keyboard.press("0")
+    until(page, "cockpit.flight.frame.effectiveness.every((x) => x === 1)")
+
+
+def test_what_is_saved_flies_again_to_the_bit(page, cockpit):
+    break_elevator(page)
+    page.keyboard.down("d")
+    page.wait_for_timeout(400)
+    page.keyboard.up("d")
+    until(page, "cockpit.flight.frame.stick === null && cockpit.value('t_s') > 2")
+    page.locator("#save").click()
+    until(page, "document.querySelector('#says').textContent.startsWith('saved')")
+    folder = max(cockpit.out.iterdir())
+    kept = bf.open_run(folder).log
+    again = bf.fly(folder / "scenario.yaml").log
+    assert np.array_equal(kept.to_numpy(), again.to_numpy(), equal_nan=True)
+    own = bf.fly("fault-free").log["p_reference_rad_s"][: len(kept)]
+    assert (kept["p_reference_rad_s"] - own).abs().max() > np.radians(4.9)  # the stick has moved
+    assert kept["elevator_effective_rad"].ne(kept["elevator_cmd_rad"]).any()
+
+
+def test_the_game_tells_nothing_before_the_answer(page):
+    page.locator("#tab-game").click()
+    page.locator("#game-second").click()
+    until(page, "cockpit.flight.state.game.phase === 'waiting' && cockpit.value('t_s') > 0.5")
+    page.locator("#tab-break").click()
+    break_elevator(page)
+    page.wait_for_timeout(1500)
+    assert page.locator("#candidates .named, #candidates .out").count() == 0
+    assert page.inner_text("#verdict") == ""
+    assert page.evaluate("cockpit.value('elevator_effective_rad')") is None
+    page.locator("#tab-game").click()
+    page.locator("#answers button", has_text="elevator").click()
+    until(page, "cockpit.flight.state.game.phase === 'over'")
+    assert "It was the elevator" in page.inner_text("#game-says")
+
+
+def test_speed_and_pause(page):
+    page.locator("#speed").select_option("20")
+    start = page.evaluate("cockpit.value('t_s')")
+    until(page, f"cockpit.value('t_s') > {start + 10}")
+    page.locator("#pause").click()
+    until(page, "cockpit.flight.state.paused")
+    page.wait_for_timeout(300)
+    held = page.evaluate("cockpit.value('t_s')")
+    page.wait_for_timeout(500)
+    assert page.evaluate("cockpit.value('t_s')") == held
+    page.locator("#pause").click()
+    page.locator("#speed").select_option("1")
+    until(page, f"cockpit.value('t_s') > {held}")
+
+
+def test_with_the_keyboard_alone(page):
+    page.locator("#tab-break").focus()
+    page.keyboard.press("ArrowRight")
+    assert page.evaluate("document.activeElement.id") == "tab-fly"
+    page.keyboard.press("3")
+    assert page.locator("#menu").is_visible()
+    page.keyboard.press("ArrowDown")
+    page.keyboard.press("Enter")  # jam
+    until(page, "cockpit.flight.state.broken.includes('rudder')")
+    assert not page.locator("#menu").is_visible()
+    page.keyboard.press("?")
+    assert page.locator("#help-text").is_visible()
+    page.keyboard.press("Escape")
+    assert not page.locator("#help-text").is_visible()
+
+
+def test_everything_that_can_be_pressed_has_a_name(page):
+    unnamed = page.evaluate(
+        """[...document.querySelectorAll("button, select, input, canvas, [role=tab]")].filter((node) =>
+        !node.textContent.trim() && !node.getAttribute("aria-label") && !node.labels?.length)
+        .map((node) => node.outerHTML)"""
+    )
+    assert unnamed == []
+
+
+@pytest.mark.parametrize("screen", SCREENS)
+def test_nothing_is_cut_off(page, screen):
+    width, height = SCREENS[screen]
+    page.set_viewport_size({"width": width, "height": height})
+    page.wait_for_timeout(300)
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    for name in ("#pause", "#save", "#scene", "#alarm", "#tab-events"):
+        page.locator(name).scroll_into_view_if_needed()
+        box = page.locator(name).bounding_box()
+        assert box["x"] >= 0
+        assert box["x"] + box["width"] <= width + 1
+
+
+def test_memory_does_not_grow_without_end(page):
+    page.locator("#speed").select_option("20")
+    until(page, "cockpit.value('t_s') > 60")  # the charts' window is full three times over
+    before = page.evaluate("(gc(), performance.memory.usedJSHeapSize)")
+    start = page.evaluate("cockpit.value('t_s')")
+    until(page, f"cockpit.value('t_s') > {start + 240}")
+    page.locator("#speed").select_option("1")
+    after = page.evaluate("(gc(), performance.memory.usedJSHeapSize)")
+    assert after - before < 3e6
+
+
+def test_a_strangers_page_on_another_port_cannot_talk_to_it(context, cockpit, tmp_path):
+    (tmp_path / "index.html").write_text("<title>a stranger</title>")
+    handler = functools.partial(http.server.SimpleHTTPRequestHandler, directory=tmp_path)
+    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        stranger = context.new_page()
+        stranger.goto(f"http://127.0.0.1:{server.server_port}/index.html")
+        outcome = stranger.evaluate(
+            """(address) => new Promise((done) => {
+              const socket = new WebSocket(address);
+              socket.onopen = () => done("open");
+              socket.onerror = () => done("refused");
+            })""",
+            cockpit.home.replace("http", "ws", 1) + "socket",
+        )
+        read = stranger.evaluate(
+            "(address) => fetch(address, {credentials: 'include'}).then(() => 'read', () => 'refused')",
+            cockpit.home,
+        )
+        stranger.close()
+        server.shutdown()
+    assert (outcome, read) == ("refused", "refused")

@@ -1,0 +1,148 @@
+"""The flight behind the page: it breaks, is diagnosed, saved, and flies again to the bit."""
+
+import json
+
+import numpy as np
+import pytest
+
+import beaver_ftc as bf
+from beaver_ftc.errors import BadInput
+from beaver_ftc.live import messages
+from beaver_ftc.live.session import Session, encode
+
+LOSS = {"type": "loss_of_effectiveness", "actuator": "elevator", "magnitude": 0.4}
+
+
+def asked(session, **request):
+    """Say it as a page does."""
+    return session.handle(messages.parse(json.dumps(request)))
+
+
+def flown(session, frames):
+    for _ in range(frames):
+        session.step()
+    return session
+
+
+@pytest.fixture
+def session(tmp_path):
+    return Session(bf.load("fault-free"), tmp_path, seed=1)
+
+
+def told(session, kind):
+    return [event for event in session.events if event["kind"] == kind]
+
+
+def test_a_loss_is_detected_named_and_told(session):
+    flown(session, 300)
+    asked(session, do="break", fault=LOSS)
+    flown(session, 200)
+    frame = session.frame()
+    assert (frame["axis"], frame["isolated"], frame["mode"]) == ("q", "elevator", "reallocated")
+    assert frame["estimate"] == pytest.approx(-0.4, abs=0.05)
+    assert [event["kind"] for event in session.events][:4] == ["flight", "broken", "alarm", "named"]
+    truth = dict(zip(session.surfaces, frame["effectiveness"], strict=True))
+    assert truth == {"aileron": 1.0, "elevator": 0.6, "rudder": 1.0, "flap": 1.0}
+    asked(session, do="repair", actuator="elevator")
+    flown(session, 2)
+    assert session.frame()["effectiveness"] == [1.0] * 4
+    assert session.state()["broken"] == []
+
+
+def test_what_is_saved_flies_again_to_the_bit(session, tmp_path):
+    flown(session, 250)
+    asked(session, do="break", fault=LOSS)
+    asked(session, do="stick", rates_deg_s=[2.5, -1, 0.5])
+    flown(session, 130)
+    asked(session, do="stick", rates_deg_s=[0, 0, 0])
+    asked(session, do="blow", velocity_mps=[0, 0, -4])
+    flown(session, 220)
+    asked(session, do="repair")
+    asked(session, do="break", fault={"type": "bias", "actuator": "rudder", "bias_deg": 2})
+    flown(session, 100)
+    says = asked(session, do="save")
+    (folder,) = tmp_path.iterdir()
+    assert str(folder) in says
+    again = bf.fly(folder / "scenario.yaml")
+    kept = bf.open_run(folder)
+    assert len(kept.log) == 702
+    assert np.array_equal(kept.log.to_numpy(), again.log.to_numpy(), equal_nan=True)
+    assert kept.metrics["detection"] == again.metrics["detection"]
+    flown(session, 10)  # and goes on
+    assert session.sim.frames == 712
+
+
+def test_the_page_may_name_scenarios_and_no_files(session, tmp_path):
+    (tmp_path / "mine.yaml").write_text("name: mine\n")
+    with pytest.raises(BadInput, match="is not known"):
+        asked(session, do="fresh", scenario="mine")
+    asked(session, do="fresh", scenario="rudder-stuck", law="adaptive", fault_class="all")
+    assert session.scenario.control.law == "adaptive"
+    assert session.scenario.faults[0].actuator == "rudder"
+    assert session.sim.frames == 2
+
+
+def test_a_flight_that_cannot_begin_leaves_the_old_one(session):
+    flown(session, 20)
+    with pytest.raises(BadInput):
+        asked(session, do="fresh", law="no-such-law")
+    assert session.sim.frames == 22
+
+
+def test_a_wrong_fault_is_refused_in_words(session):
+    with pytest.raises(BadInput, match="actuator"):
+        asked(session, do="break", fault={"type": "stuck", "actuator": "nose"})
+    assert session.state()["broken"] == []
+
+
+def test_one_gust_a_flight(session):
+    asked(session, do="blow", velocity_mps=[0, 3, 0])
+    with pytest.raises(BadInput, match="one a flight"):
+        asked(session, do="blow", velocity_mps=[0, 3, 0])
+
+
+def test_the_game_hides_what_is_broken_and_what_the_diagnosis_says(session):
+    asked(session, do="game", move="second")
+    flown(session, 100)
+    asked(session, do="break", fault=LOSS)
+    flown(session, 200)
+    frame, columns = session.frame(), session.columns
+    assert "isolated" not in frame
+    assert "effectiveness" not in frame
+    hidden = {name for name, value in zip(columns, frame["v"], strict=True) if value is None}
+    assert {"elevator_effective_rad", "elevator_pos_rad", "mode", "detected", "fie_rudder_excluded"} <= hidden
+    assert "elevator_cmd_rad" not in hidden
+    assert session.state()["broken"] == []
+    assert {event["kind"] for event in session.take_events()} == {"flight", "game"}
+    assert not any(event["secret"] for event in session.hello()["events"])
+    asked(session, do="game", move="answer", answer="elevator")
+    flown(session, 1)
+    game = session.state()["game"]
+    assert (game["phase"], game["winner"]) == ("over", "detector")
+    assert game["its_delay_s"] < game["your_delay_s"] == pytest.approx(2.0, abs=0.02)
+    assert {"broken", "alarm", "named"} <= {event["kind"] for event in session.take_events()}
+
+
+def test_by_chance_something_breaks(session):
+    asked(session, do="game", move="random")
+    flown(session, 2001)
+    assert session.game.broken_s == pytest.approx(session.game.due_s, abs=0.02)
+    assert session.game.fault["actuator"] in session.surfaces
+
+
+def test_a_lost_aircraft_ends_the_flight_and_can_still_be_saved(session, tmp_path):
+    asked(session, do="stick", rates_deg_s=[20, 0, 0])
+    while not session.over:
+        session.step()
+    assert told(session, "lost")
+    with pytest.raises(BadInput, match="is over"):
+        asked(session, do="break", fault=LOSS)
+    asked(session, do="save")
+    (folder,) = tmp_path.iterdir()
+    assert bf.fly(folder / "scenario.yaml").departure == session.sim.land().departure
+
+
+def test_every_message_is_strict_json(session):
+    flown(session, 30)
+    for message in (session.hello(), session.frame(), session.state()):
+        assert json.loads(encode(message))["k"] == message["k"]

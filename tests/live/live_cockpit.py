@@ -39,10 +39,11 @@ def started(out, *arguments):
 
 
 def ended(cockpit, number=signal.SIGINT):
-    """End it; (exit status, what it said on standard error)."""
+    """End it; (exit status, what it said on standard error, but for a cold machine's word)."""
     cockpit.process.send_signal(number)
     _, says = cockpit.process.communicate(timeout=30)
-    return cockpit.process.returncode, says
+    lines = [line for line in says.splitlines() if "compiling" not in line]
+    return cockpit.process.returncode, "\n".join(lines)
 
 
 def browser():

@@ -1,6 +1,7 @@
 """A flight made by hand: columns and summary of a run with plausible numbers, to test what shows them."""
 
 from dataclasses import dataclass, field
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,7 @@ COLUMNS = (
     *(f"{a}_model_rad_s" for a in AXES),
     *(f"{s}_{what}_rad" for s in SURFACES for what in ("cmd", "pos", "effective")),
     *(f"{s}_saturated" for s in SURFACES),
+    *(f"{a}_{what}_rad_s" for a in AXES for what in ("alarm_residual", "alarm_threshold")),
     *(f"{a}_{what}_rad_s" for a in AXES for what in ("residual", "threshold")),
     *(f"{a}_eta_bar_rad_s2" for a in AXES), *(f"{a}_network_rad_s2" for a in AXES),
     *(
@@ -38,6 +40,18 @@ class Fault:
     type: str = "loss_of_effectiveness"
     actuator: str | None = "elevator"
     magnitude: float = 0.4
+    end_s: float | None = None
+    profile: str = "abrupt"
+
+    def model_dump(self, exclude: Any, exclude_none: bool) -> dict[str, Any]:
+        assert {"actuator", "type", "at_s", "end_s", "profile"} == exclude
+        assert exclude_none
+        return {"magnitude": self.magnitude}
+
+
+FDI = SimpleNamespace(scheme="adaptive-estimators", fault_class="published", pairs=False)
+CONTROL = SimpleNamespace(law="fault-tolerant")
+INITIAL = SimpleNamespace(airspeed_mps=45.0, altitude_m=1828.8)
 
 
 class Expect:
@@ -60,6 +74,9 @@ class Scenario:
     duration_s: float = 30.0
     faults: tuple[Fault, ...] = (Fault(),)
     expect: Any = field(default_factory=Expect)
+    fdi: Any = field(default_factory=lambda: FDI)
+    control: Any = field(default_factory=lambda: CONTROL)
+    initial: Any = field(default_factory=lambda: INITIAL)
 
 
 @dataclass
@@ -96,6 +113,7 @@ class Flight:
     mode_changes: int = 3
     exits: int = 0
     outside_s: float = 0.0
+    end: tuple[float, float] | None = None
 
 
 def rows(flight: Flight) -> np.ndarray:
@@ -109,6 +127,8 @@ def rows(flight: Flight) -> np.ndarray:
     for axis in AXES:
         threshold = 0.02 * (1 - np.exp(-t))
         noise = 0.1 * threshold * np.sin(10 * t) + 1e-5 * rng.standard_normal(t.size)
+        values[f"{axis}_alarm_threshold_rad_s"] = threshold
+        values[f"{axis}_alarm_residual_rad_s"] = noise + (axis == "q") * 0.3 * np.minimum(after, 1)
         values[f"{axis}_residual_rad_s"] = noise + (axis == "q") * 0.08 * np.minimum(after, 1) * np.sin(
             1.3 * t
         )

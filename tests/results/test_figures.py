@@ -53,7 +53,7 @@ def _others(flight):
 
 def test_threshold_is_drawn_on_both_sides(flight, log_path):
     view = next(view for view in views(flight.columns) if view.name == "detection")
-    axes = _panels(flight, read_series(log_path, view.columns), "detection")[0]
+    axes = _panels(flight, read_series(log_path, view.columns), "detection")[1]
     bounds = [line.get_ydata()[-1] for line in axes.lines if line.get_label() in ("± threshold", "_")]
     assert sorted(bounds) == pytest.approx([-np.degrees(0.02), np.degrees(0.02)], rel=1e-3)
 

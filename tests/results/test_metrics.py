@@ -7,9 +7,9 @@ from synthetic import Expect, Fault, Flight, Scenario
 from beaver_ftc.results.metrics import as_json, metrics
 
 KEYS = [
-    "scenario", "seed", "frames", "fault", "detection", "isolation", "false_alarm", "tracking", "supervisor",
-    "mode_changes_left_out", "envelope_exits", "envelope", "departure", "authority", "engine_power",
-    "saturation_s", "expectations", "passed", "versions",
+    "scenario", "seed", "frames", "flight", "fault", "faults", "detection", "isolation", "false_alarm",
+    "tracking", "supervisor", "mode_changes_left_out", "envelope_exits", "envelope", "departure",
+    "authority", "engine_power", "saturation_s", "hints", "expectations", "passed", "versions",
 ]  # fmt: skip
 
 
@@ -34,6 +34,25 @@ def test_published_case_has_every_key_of_the_contract_in_order():
     assert document["false_alarm"] is False
     assert document["supervisor"][1] == {"time_s": 12.07, "mode": "adaptive"}
     assert set(document["versions"]) == {"beaver-ftc", "jsbsim", "numpy", "numba", "python"}
+
+
+def test_delays_count_from_the_first_frame_in_which_the_fault_is_there():
+    """At 20 Hz a fault at 10.001 s is there from 10.05 s on: what is seen there is seen at once."""
+    document = _of(Scenario(faults=(Fault(at_s=10.001),), rate_hz=20.0), detection_time_s=10.05)
+    assert document["fault"]["at_s"] == 10.001
+    assert document["detection"]["delay_s"] == 0.0
+    assert document["false_alarm"] is False
+
+
+def test_every_fault_is_listed_with_its_size():
+    faults = (Fault(at_s=15.0, actuator="rudder", end_s=20.0), Fault())
+    first, second = _of(Scenario(faults=faults))["faults"]
+    assert (first["actuator"], first["size"], second["actuator"]) == (
+        "elevator",
+        {"magnitude": 0.4},
+        "rudder",
+    )
+    assert second["end_s"] == 20.0
 
 
 def test_tracking_is_in_degrees():

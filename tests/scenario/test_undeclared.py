@@ -3,6 +3,7 @@
 import pytest
 
 from beaver_ftc.scenario.loader import load_text
+from beaver_ftc.scenario.schema import Scenario
 
 TOLD = """
 fdi: {bounds: {sensors: tactical-grade, turbulence: light, coefficients: {Cm_alpha: 0.05}, inertia: 0.05}}
@@ -41,3 +42,37 @@ def test_an_error_beyond_the_declared_is_said(truth, says):
 )
 def test_an_error_within_the_declared_is_not(truth):
     assert warnings(f"{TOLD}{truth}\n") == ()
+
+
+SINUSOID = {"q": {"amplitude_rad_s2": 0.03, "frequency_rad_s": 20}}
+GUST = {"at_s": 1, "velocity_mps": [0, 0, 5]}
+
+
+@pytest.mark.parametrize(
+    ("keys", "says"),
+    [
+        (
+            {"uncertainty": {"inertia_coupling": {"p": -0.3}}},
+            ["uncertainty.inertia_coupling.p: -0.3 is beyond"],
+        ),
+        ({"uncertainty": {"sinusoid": SINUSOID}}, ["uncertainty.sinusoid.q: 0.03 rad/s2 is beyond"]),
+        (
+            {"uncertainty": {"sinusoid": SINUSOID}, "fdi": {"statistical": {}}},
+            ["uncertainty.sinusoid.q: 0.03 rad/s2 is", "uncertainty.sinusoid.q: 20 rad/s is faster than"],
+        ),
+        ({"environment": {"gust": GUST}}, ["environment.gust: what a gust does"]),
+        (
+            {
+                "environment": {"turbulence": "dryden", "severity": "light"},
+                "initial": {"altitude_m": 500},
+                "fdi": {"bounds": {"turbulence": "light"}},
+            },
+            ["initial.altitude_m: 500 is below 609.6 m"],
+        ),
+    ],
+)
+def test_all_that_is_undeclared_is_said_where_there_is_a_diagnosis(keys, says):
+    said = Scenario.model_validate({"name": "x", **keys}).warnings()
+    assert [line[: len(start)] for line, start in zip(said, says, strict=True)] == says
+    silent = {**keys, "fdi": {**keys.get("fdi", {}), "scheme": "none"}}
+    assert Scenario.model_validate({"name": "x", **silent}).warnings() == ()

@@ -61,6 +61,18 @@ def alarm(fdi):
 
 
 @kernel
+def nearest(bank, i):
+    """The filter that is nearest to its bound on axis i: the one the alarm comes from, if there is one."""
+    m_nearest, largest = 0, 0.0
+    for m in range(bank.n):
+        if bank.threshold[m, i] > 0.0:
+            share = abs(bank.residual[m, i]) / bank.threshold[m, i]
+            if share > largest:
+                m_nearest, largest = m, share
+    return m_nearest
+
+
+@kernel
 def largest_share(fdi):
     """The largest share of its bound that a filter of the bank reaches."""
     largest = 0.0

@@ -36,7 +36,7 @@ class Flight:
     the first named first. statistical: when the statistical detector would have raised the alarm, its level
     in standard deviations, and the largest share of it reached in healthy flight. mode_changes, exits: how
     many there were of `supervisor` and `envelope_exits`, which hold the first and the last; outside_s: time
-    outside the validated envelope, all exits together.
+    outside the validated envelope, all exits together. end: airspeed, m/s, and altitude, m, at the end.
     """
 
     scenario: Scenario
@@ -70,3 +70,4 @@ class Flight:
     mode_changes: int = 0
     exits: int = 0
     outside_s: float = 0.0
+    end: tuple[float, float] | None = None

@@ -4,6 +4,7 @@ import numpy as np
 
 from beaver_ftc.compiled import kernel
 from beaver_ftc.diagnosis import statistical
+from beaver_ftc.diagnosis.bank import nearest
 from beaver_ftc.plant import channels as ch
 from beaver_ftc.plant.sensing import effective, first_signal, position
 
@@ -61,8 +62,18 @@ def record_estimators(fdi, row, column):
 
 
 @kernel
+def record_alarm(bank, row, column):
+    """Residual and threshold of what raises the alarm: on each axis the filter nearest to its bound."""
+    for i in range(3):
+        m = nearest(bank, i)
+        row[column + i], row[column + 3 + i] = bank.residual[m, i], bank.threshold[m, i]
+    return column + 6
+
+
+@kernel
 def record_diagnosis(fdi, acceleration, row, column):
-    """Residual, threshold, bound, network and the design model's mean acceleration; then the estimators."""
+    """Alarm test, residual, threshold, bound, network, the design model's mean acceleration; estimators."""
+    column = record_alarm(fdi.bank, row, column)
     column = put(row, column, fdi.fdae.residual)
     column = put(row, column, fdi.fdae.threshold)
     column = put(row, column, fdi.bound.eta_bar)

@@ -13,6 +13,7 @@ from beaver_ftc.diagnosis.scheme import isolated_theta
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, UNANTICIPATED
 from beaver_ftc.diagnosis.types.findings import estimate_of, found
 from beaver_ftc.loop.flight import Flight
+from beaver_ftc.plant.channels import AIRSPEED, ALTITUDE
 from beaver_ftc.plant.sensing import DEPARTURE_SIGNALS
 from beaver_ftc.scenario.schema import Scenario
 
@@ -184,6 +185,7 @@ def flight_of(
         envelope_exits=_envelope_exits(frame),
         exits=int(accounts["envelope"]["n_exits"]),
         outside_s=int(accounts["envelope"]["outside_frames"]) * dt,
+        end=(float(frame["truth"]["value"][AIRSPEED]), float(frame["truth"]["value"][ALTITUDE])),
         departure=(float(frame["t"]), DEPARTURE_SIGNALS[departed // 10]) if departed else None,
         saturation_s={s: int(n) * dt for s, n in zip(surfaces, accounts["saturated_frames"], strict=True)},
         worst_residual_ratio=max(*closest, float(fdi["statistical"]["closest"])),

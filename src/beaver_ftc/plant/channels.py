@@ -114,6 +114,7 @@ def log_columns(
         *_per_axis("{}_measured_rad_s"), *_per_axis("{}_reference_rad_s"), *_per_axis("{}_model_rad_s"),
         *(f"{s}_{what}_rad" for s in surfaces for what in ("cmd", "pos", "effective")),
         *(f"{s}_saturated" for s in surfaces),
+        *_per_axis("{}_alarm_residual_rad_s"), *_per_axis("{}_alarm_threshold_rad_s"),
         *_per_axis("{}_residual_rad_s"), *_per_axis("{}_threshold_rad_s"),
         *_per_axis("{}_eta_bar_rad_s2"), *_per_axis("{}_network_rad_s2"),
         *_per_axis("{}_design_rad_s2"),

@@ -1,6 +1,7 @@
 """What a flight amounts to: the document `metrics.json`.
 
-Times are seconds from the start of the flight, delays seconds from the first fault, rates deg/s. A quantity
+Times are seconds from the start of the flight, rates deg/s. Delays are seconds from the first frame in which
+the fault is there: `at_s`, or up to a frame later. A quantity
 that does not exist is null: a document never holds NaN. Nothing in it depends on the wall clock or the
 machine's name, so that the same scenario and seed give the same file.
 """
@@ -12,6 +13,7 @@ from functools import cache
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
+from beaver_ftc.results.about import faults_of, flown, hints
 from beaver_ftc.results.expectations import evaluate
 
 if TYPE_CHECKING:
@@ -35,7 +37,9 @@ def metrics(flight: "Flight") -> Document:
         "scenario": scenario.name,
         "seed": scenario.seed,
         "frames": flight.frames,
+        "flight": flown(flight),
         "fault": fault,
+        "faults": faults_of(scenario),
         "detection": _detection(flight, fault),
         "isolation": _isolation(flight, fault),
         "false_alarm": _false_alarm(flight.detection_time_s, fault),
@@ -61,6 +65,7 @@ def metrics(flight: "Flight") -> Document:
         "engine_power": _engine_power(flight),
         "saturation_s": {surface: _number(time) for surface, time in flight.saturation_s.items()},
     }
+    document["hints"] = hints(flight, document)
     expectations = evaluate(scenario.expect, document)
     document["expectations"] = expectations
     document["passed"] = all(expectation["passed"] for expectation in expectations)
@@ -82,6 +87,11 @@ def first_fault(scenario: "Scenario") -> Document | None:
     return {"actuator": getattr(fault, "actuator", None), "type": fault.type, "at_s": fault.at_s}
 
 
+def _in_force_s(at_s: float, scenario: "Scenario") -> float:
+    """The time of the first frame in which a fault of `at_s` is there."""
+    return math.ceil((at_s - TIME_TOLERANCE_S) * scenario.rate_hz) / scenario.rate_hz
+
+
 @cache
 def versions() -> Document:
     """Versions of what produces the numbers."""
@@ -93,7 +103,7 @@ def _detection(flight: "Flight", fault: Document | None) -> Document:
     return {
         "detected": flight.detection_time_s is not None,
         "time_s": _number(flight.detection_time_s),
-        "delay_s": _delay(flight.detection_time_s, fault),
+        "delay_s": _delay(flight.detection_time_s, fault, flight.scenario),
         "axis": flight.detection_axis,
         "guaranteed_delay_s": _number(flight.guaranteed_delay_s),
         "statistical": flight.statistical
@@ -107,12 +117,12 @@ def _isolation(flight: "Flight", fault: Document | None) -> Document:
         "fault": flight.isolated,
         "type": flight.isolation_type,
         "time_s": _number(flight.isolation_time_s),
-        "delay_s": _delay(flight.isolation_time_s, fault),
+        "delay_s": _delay(flight.isolation_time_s, fault, flight.scenario),
         "correct": _correct(flight.isolated, _meant(flight, fault)),
         "estimate": _number(flight.estimate),
         "candidates": list(flight.candidates),
         "type_correct": _type_correct(flight.isolation_type, _meant(flight, fault)),
-        "type_delay_s": _delay(flight.type_time_s, fault),
+        "type_delay_s": _delay(flight.type_time_s, fault, flight.scenario),
         "estimate_deg": _estimate_deg(flight),
         "estimate_interval": [_number(end) for end in flight.estimate_interval or ()] or None,
         "frequency_rad_s": _number(flight.frequency_rad_s),
@@ -133,11 +143,11 @@ def _one_of_several(found: Document, scenario: "Scenario") -> Document:
         "fault": surface,
         "type": kind,
         "time_s": _number(found["isolation_time_s"]),
-        "delay_s": _delay(found["isolation_time_s"], fault),
+        "delay_s": _delay(found["isolation_time_s"], fault, scenario),
         "correct": None if surface is None else bool(declared),
         "candidates": list(found["candidates"]),
         "type_correct": None if kind is None else any(kind == fault.type for fault in declared),
-        "type_delay_s": _delay(found.get("type_time_s"), fault),
+        "type_delay_s": _delay(found.get("type_time_s"), fault, scenario),
         "estimate": _number(estimate),
         "estimate_deg": _number(in_deg),
         "estimate_interval": [_number(end) for end in found.get("estimate_interval") or ()] or None,
@@ -207,11 +217,11 @@ def _before_the_fault(time_s: float, fault: Document) -> bool:
     return time_s < fault["at_s"] - TIME_TOLERANCE_S
 
 
-def _delay(time_s: float | None, fault: Document | None) -> float | None:
-    """Time since the fault; null without one, or where the event came before it."""
+def _delay(time_s: float | None, fault: Document | None, scenario: "Scenario") -> float | None:
+    """Time since the fault's first frame; null without one, or where the event came before it."""
     if time_s is None or fault is None or _before_the_fault(time_s, fault):
         return None
-    return _number(max(time_s - fault["at_s"], 0.0))
+    return _number(max(time_s - _in_force_s(fault["at_s"], scenario), 0.0))
 
 
 def _before(fault: Document | None, rms_rad_s: Rates) -> Rates | None:

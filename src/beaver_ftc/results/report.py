@@ -75,6 +75,7 @@ def _words(metrics: Document, scenario: str) -> Document:
     return {
         "metrics": metrics,
         "title": verdict.title(metrics),
+        "mood": verdict.mood(metrics),
         "description": yaml.safe_load(scenario).get("description", ""),
         "facts": verdict.facts(metrics),
         "tracking": verdict.tracking(metrics),

@@ -15,16 +15,23 @@ LEAST_BEYOND_S = 0.1
 
 
 def title(metrics: Document) -> str:
-    """The scenario's name and whether it did as expected."""
+    """The scenario's name, whether it did as expected, and whether the aircraft was lost."""
+    lost = ", the aircraft was LOST" if metrics["departure"] else ""
     if not metrics["expectations"]:
-        return f"{metrics['scenario']}: flown, nothing was expected"
-    return f"{metrics['scenario']}: {'PASSED' if metrics['passed'] else 'FAILED'}"
+        return f"{metrics['scenario']}: flown{lost}, nothing was expected"
+    return f"{metrics['scenario']}: {'PASSED' if metrics['passed'] else 'FAILED'}{lost}"
+
+
+def mood(metrics: Document) -> str:
+    """`good`, `bad`, or `lost` for an aircraft lost in a flight that did as expected: never green."""
+    return "bad" if not metrics["passed"] else "lost" if metrics["departure"] else "good"
 
 
 def facts(metrics: Document) -> list[tuple[str, str]]:
     """(what, how it went) for each thing worth knowing, in the order in which they happen."""
     said = (
-        ("fault", _fault(metrics)),
+        ("flight", _flight(metrics)),
+        *(("" if i else "fault", _fault(fault)) for i, fault in enumerate(_declared(metrics))),
         ("detection", _detection(metrics)),
         ("statistical", _statistical(metrics)),
         ("isolation", _isolation(metrics)),
@@ -36,6 +43,7 @@ def facts(metrics: Document) -> list[tuple[str, str]]:
         ("envelope", _envelope(metrics)),
         ("departure", _departure(metrics)),
         ("saturation", _saturation(metrics)),
+        *(("note", hint) for hint in metrics.get("hints", ())),
     )
     return [(what, how) for what, how in said if how]
 
@@ -44,7 +52,9 @@ def _others(metrics: Document) -> list[str]:
     """What else is at fault, of several faults at once, and what is open."""
     isolation = metrics["isolation"]
     rest = isolation.get("faults", [])[1:] if isolation["isolated"] else []
-    return [_one(fault) if fault["fault"] else _still_possible(fault["candidates"]) for fault in rest]
+    return [
+        _one(fault, metrics) if fault["fault"] else _still_possible(fault["candidates"]) for fault in rest
+    ]
 
 
 def _still_possible(candidates: list[str]) -> str:
@@ -80,7 +90,8 @@ def _table(metrics: Document, folder: str) -> "Table":
     from rich.table import Table
     from rich.text import Text
 
-    headline = Text(title(metrics), "bold green" if metrics["passed"] else "bold red")
+    style = {"good": "bold green", "lost": "bold yellow", "bad": "bold red"}[mood(metrics)]
+    headline = Text(title(metrics), style)
     table = Table(title=headline, title_justify="left", show_header=False, box=None)
     table.add_column(style="bold", no_wrap=True)
     table.add_column(overflow="fold")
@@ -97,11 +108,64 @@ def _table(metrics: Document, folder: str) -> "Table":
     return table
 
 
-def _fault(metrics: Document) -> str:
-    fault = metrics["fault"]
+def _flight(metrics: Document) -> str:
+    flown = metrics.get("flight")
+    if not flown:
+        return ""
+    condition = f"{flown['airspeed_mps']:g} m/s at {flown['altitude_m']:g} m, {_time(flown['flown_s'])}"
+    kind = ", every fault type" if flown["fault_class"] == "all" else ""
+    return f"{condition}; diagnosis {flown['scheme']}{kind}; law {flown['law']}"
+
+
+def _declared(metrics: Document) -> list[Document | None]:
+    return metrics.get("faults") or [metrics["fault"]]
+
+
+def _fault(fault: Document | None) -> str:
     if fault is None:
         return "none"
-    return f"{fault['actuator'] or ''} {fault['type'].replace('_', ' ')} at {_time(fault['at_s'])}".strip()
+    until = f" to {_time(fault['end_s'])}" if fault.get("end_s") else ""
+    what = f"{fault['actuator'] or ''} {fault['type'].replace('_', ' ')}".strip()
+    size = ", ".join(_sizes(fault))
+    return f"{what}{' (' + size + ')' if size else ''} at {_time(fault['at_s'])}{until}"
+
+
+_SIZES = {
+    "magnitude": lambda value: f"{100 * value:g} %",
+    "position_deg": lambda value: f"{value:g} deg",
+    "direction": lambda value: "to the upper stop" if value > 0 else "to the lower stop",
+    "bias_deg": lambda value: f"{value:+g} deg",
+    "scale": lambda value: f"{100 * value:g} % of its rate",
+    "amplitude_deg": lambda value: f"{value:g} deg",
+    "frequency_rad_s": lambda value: f"{value:g} rad/s",
+    "Cm_alpha3": lambda value: f"Cm_alpha3 {value:g}",
+    "kappa_per_s": lambda value: f"growing at {value:g} /s",
+}
+
+
+def _sizes(fault: Document) -> list[str]:
+    """How large a declared fault is, in words."""
+    return [_SIZES[key](value) for key, value in fault.get("size", {}).items() if key in _SIZES]
+
+
+_TRUTH = {
+    "loss_of_effectiveness": ("magnitude", -1.0), "stuck": ("position_deg", 1.0), "bias": ("bias_deg", 1.0),
+    "oscillatory": ("amplitude_deg", 1.0),
+}  # fmt: skip
+
+
+def _true(isolation: Document, metrics: Document) -> str:
+    """What the estimate ought to be, where the fault named is one that was declared."""
+    if isolation["estimate"] is None:
+        return ""
+    key, sign = _TRUTH.get(isolation["type"], ("", 1.0))
+    sizes = [
+        fault["size"][key]
+        for fault in metrics.get("faults", ())
+        if (fault["actuator"], fault["type"]) == (isolation["fault"], isolation["type"])
+        and key in fault["size"]
+    ]
+    return f" (true {_value(sign * sizes[0])})" if sizes else ""
 
 
 def _detection(metrics: Document) -> str:
@@ -130,14 +194,15 @@ def _isolation(metrics: Document) -> str:
     if not isolation["isolated"]:
         left = isolation["candidates"]
         return _still_possible(left) if metrics["detection"]["detected"] and left else "none"
-    return _one(isolation)
+    return _one(isolation, metrics)
 
 
-def _one(isolation: Document) -> str:
+def _one(isolation: Document, metrics: Document) -> str:
     """One named fault."""
     when = "" if isolation["delay_s"] is None else f" after {_time(isolation['delay_s'])}"
     right = "correct" if isolation["correct"] and isolation["type_correct"] is not False else "WRONG"
-    return f"{isolation['fault']}{when}, {right}{_type(isolation)}{_estimate(isolation)}"
+    size = _estimate(isolation) + _true(isolation, metrics)
+    return f"{isolation['fault']}{when}, {right}{_type(isolation)}{size}"
 
 
 def _probing(metrics: Document) -> str:

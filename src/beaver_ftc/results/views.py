@@ -144,9 +144,15 @@ def _surfaces() -> View:
 
 
 def _detection() -> View:
+    alarm = Panel(
+        "alarm test: |residual| / threshold",
+        tuple(Trace(f"{axis}_alarm{RATIO}", axis, axis) for axis in AXES),
+        log_scale=True,
+        level=1.0,
+    )
     panels = tuple(
         Panel(
-            f"{AXIS_NAMES[axis]}: residual",
+            f"{AXIS_NAMES[axis]}: residual of the detection estimator",
             (
                 Trace(f"{axis}_threshold_rad_s", "± threshold", "bound"),
                 Trace(f"{axis}_threshold_rad_s", "", "bound", -1.0),
@@ -155,8 +161,8 @@ def _detection() -> View:
         )
         for axis in AXES
     )
-    title = "Detection: residuals of the detection estimator against their thresholds"
-    return View("detection", title, panels, closeup=True)
+    title = "Detection: the test that raises the alarm (above 1), and the detection estimator"
+    return View("detection", title, (alarm, *panels), closeup=True)
 
 
 def _likelihood() -> View:

@@ -9,6 +9,7 @@ from beaver_ftc.scenario.signals import Chirp
 _SEVERITIES = ("none", "light", "moderate", "severe")
 _MOMENTS = ("Cl", "Cm", "Cn")
 _ROUNDING = 1e-9
+LOWEST_TURBULENCE_M = 609.6  # 2000 ft: below, its scales and strengths are others [MIL-F-8785C, 3.7]
 
 
 def warnings_of(scenario: Scenario) -> tuple[str, ...]:
@@ -18,7 +19,11 @@ def warnings_of(scenario: Scenario) -> tuple[str, ...]:
 
 def _undeclared(scenario: Scenario) -> Iterator[str]:
     """Errors of the truth that `fdi.bounds` does not cover: an alarm may then have no fault behind it."""
+    if scenario.fdi.scheme == "none":
+        return
     bounds, truth = scenario.fdi.bounds, scenario.uncertainty
+    yield from _unstructured(scenario)
+    yield from _air(scenario)
     for name, sensor in scenario.sensors:
         if not sensor.is_within(getattr(bounds.sensors, name)):
             yield f"sensors.{name}: its errors are not within fdi.bounds.sensors.{name}"
@@ -35,6 +40,40 @@ def _undeclared(scenario: Scenario) -> Iterator[str]:
             yield f"uncertainty.inertia.{axis}: {ratio:g} is beyond fdi.bounds.inertia, {bounds.inertia:g}"
     if any(truth.cg_m):
         yield "uncertainty.cg_m: a displaced centre of gravity is covered by fdi.bounds.constant_rad_s2 only"
+
+
+def _unstructured(scenario: Scenario) -> Iterator[str]:
+    """Inertia coupling and sinusoids beyond what is admitted of them."""
+    bounds, truth, statistical = scenario.fdi.bounds, scenario.uncertainty, scenario.fdi.statistical
+    for axis in ("p", "q", "r"):
+        theta, admitted = getattr(truth.inertia_coupling, axis), getattr(bounds.inertia_coupling, axis)
+        if abs(theta) > admitted + _ROUNDING:
+            beyond = f"beyond fdi.bounds.inertia_coupling.{axis}, {admitted:g}"
+            yield f"uncertainty.inertia_coupling.{axis}: {theta:g} is {beyond}"
+        sinusoid, constant = getattr(truth.sinusoid, axis), getattr(bounds.constant_rad_s2, axis)
+        if sinusoid.amplitude_rad_s2 > constant + _ROUNDING:
+            yield (
+                f"uncertainty.sinusoid.{axis}: {sinusoid.amplitude_rad_s2:g} rad/s2 is beyond "
+                f"fdi.bounds.constant_rad_s2.{axis}, {constant:g}"
+            )
+        swings = sinusoid.amplitude_rad_s2 > 0 and statistical is not None
+        if swings and statistical and sinusoid.frequency_rad_s > statistical.uncertainty_rad_s + _ROUNDING:
+            yield (
+                f"uncertainty.sinusoid.{axis}: {sinusoid.frequency_rad_s:g} rad/s is faster than "
+                f"fdi.statistical.uncertainty_rad_s, {statistical.uncertainty_rad_s:g}"
+            )
+
+
+def _air(scenario: Scenario) -> Iterator[str]:
+    """Air whose rotation no bound covers."""
+    environment = scenario.environment
+    if environment.gust is not None and any(environment.gust.velocity_mps):
+        yield "environment.gust: what a gust does is covered by fdi.bounds.constant_rad_s2 only"
+    if environment.severity is not None and scenario.initial.altitude_m < LOWEST_TURBULENCE_M:
+        yield (
+            f"initial.altitude_m: {scenario.initial.altitude_m:g} is below {LOWEST_TURBULENCE_M:g} m, where "
+            "turbulence is not as fdi.bounds.turbulence has it"
+        )
 
 
 def _airspeed(scenario: Scenario) -> Iterator[str]:

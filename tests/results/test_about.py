@@ -1,0 +1,92 @@
+"""Hints and conditions: said where a reader would be misled, and nowhere else."""
+
+import re
+from types import SimpleNamespace
+
+import pytest
+
+from beaver_ftc.results.about import faults_of, hints
+from beaver_ftc.results.verdict import facts, mood, title
+from beaver_ftc.scenario.schema import Scenario
+
+LOSS = {"type": "loss_of_effectiveness", "actuator": "elevator", "magnitude": 0.4, "at_s": 12}
+STUCK = {"type": "stuck", "actuator": "elevator", "at_s": 12}
+RUDDER = {"type": "bias", "actuator": "rudder", "bias_deg": 2, "at_s": 14}
+UNKNOWN = {"type": "unanticipated", "at_s": 12}
+ALL, PAIRS = {"fault_class": "all"}, {"fault_class": "all", "pairs": True}
+
+
+def _hints(*faults, detected=True, guaranteed=0.1, end=(45.0, 1828.8), **keys):
+    scenario = Scenario.model_validate({"name": "x", "faults": list(faults), **keys})
+    document = {"detection": {"detected": detected, "guaranteed_delay_s": guaranteed}}
+    return hints(SimpleNamespace(scenario=scenario, end=end), document)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "keys"),
+    [
+        ([], {}), ([LOSS], {}), ([UNKNOWN], {}), ([STUCK], {"fdi": ALL}), ([STUCK, RUDDER], {"fdi": PAIRS}),
+        ([STUCK], {"fdi": {"scheme": "none"}}), ([LOSS], {"end": (41.0, 1600.0)}),
+        ([LOSS | {"end_s": 13}, RUDDER], {"fdi": ALL}), ([LOSS], {"detected": False}),
+    ],
+)  # fmt: skip
+def test_nothing_is_said_without_need(arguments, keys):
+    assert _hints(*arguments, **keys) == []
+
+
+@pytest.mark.parametrize(
+    ("arguments", "keys", "says"),
+    [
+        ([STUCK], {}, "elevator stuck: outside the fault class the diagnosis looks for"),
+        ([LOSS | {"actuator": "flap"}], {}, "so it cannot be named; set fdi.fault_class: all"),
+        ([STUCK, RUDDER], {"fdi": ALL}, "faults on several surfaces at once: .*; set fdi.pairs: true"),
+        ([LOSS], {"detected": False, "guaranteed": None}, "no alarm, and none was certain"),
+        (
+            [],
+            {"end": (39.0, 1828.8)},
+            "the flight drifted in airspeed from 45 to 39 m/s: only the body rates",
+        ),
+        ([], {"end": (45.0, 1500.0)}, "the flight drifted in altitude from 1829 to 1500 m"),
+    ],
+)
+def test_a_reader_is_told(arguments, keys, says):
+    (said,) = _hints(*arguments, **keys)
+    assert re.search(says, said)
+
+
+def test_every_type_of_fault_has_a_size_in_words():
+    faults = [
+        LOSS, STUCK | {"position_deg": 3}, RUDDER, UNKNOWN,
+        {"type": "hardover", "actuator": "flap", "direction": -1, "at_s": 1},
+        {"type": "rate_limit", "actuator": "flap", "scale": 0.1, "at_s": 2, "end_s": 3},
+        {"type": "oscillatory", "actuator": "aileron", "amplitude_deg": 2, "frequency_rad_s": 5, "at_s": 4},
+        {"type": "float", "actuator": "rudder", "at_s": 5},
+    ]  # fmt: skip
+    document = _document(faults=faults_of(Scenario.model_validate({"name": "x", "faults": faults})))
+    said = [how for what, how in facts(document) if what in ("fault", "")]
+    assert said == [
+        "flap hardover (to the lower stop) at 1.00 s",
+        "flap rate limit (10 % of its rate) at 2.00 s to 3.00 s",
+        "aileron oscillatory (2 deg, 5 rad/s) at 4.00 s",
+        "rudder float at 5.00 s",
+        "elevator loss of effectiveness (40 %) at 12.00 s",
+        "elevator stuck (3 deg) at 12.00 s",
+        "unanticipated (Cm_alpha3 10) at 12.00 s",
+        "rudder bias (+2 deg) at 14.00 s",
+    ]
+
+
+def _document(**changes):
+    nothing = {"isolated": False, "candidates": []}
+    return {
+        "scenario": "x", "expectations": [], "passed": True, "departure": None, "fault": None, "faults": [],
+        "detection": {"detected": False}, "false_alarm": False, "isolation": nothing, "supervisor": [],
+        "envelope_exits": [], "saturation_s": {}, **changes,
+    }  # fmt: skip
+
+
+def test_a_lost_aircraft_is_said_and_not_green():
+    lost = _document(departure={"time_s": 3.0, "signal": "altitude"})
+    assert (title(lost), mood(lost)) == ("x: flown, the aircraft was LOST, nothing was expected", "lost")
+    assert mood(_document()) == "good"
+    assert mood(lost | {"passed": False}) == "bad"

@@ -15,6 +15,13 @@ if TYPE_CHECKING:
     from beaver_ftc.scenario.schema import Scenario
 
 
+def complete_names(incomplete: str) -> list[str]:
+    """Built-in scenarios whose names begin so, for the shell."""
+    from beaver_ftc.scenario.builtin import builtin_names
+
+    return [name for name in builtin_names() if name.startswith(incomplete)]
+
+
 PluginOption = Annotated[
     list[str] | None,
     typer.Option(

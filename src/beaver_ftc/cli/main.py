@@ -23,6 +23,8 @@ COMMANDS = (
     "schema",
     "trim",
     "list",
+    "show",
+    "new",
     "sweep",
     "compare",
     "reproduce",
@@ -36,12 +38,25 @@ COMMANDS = (
     "live",
 )
 
-WITHOUT_SCENARIOS = ("schema", "bench", "verify", "detectability", "reproduce")
+WITHOUT_SCENARIOS = ("schema", "show", "new", "bench", "verify", "detectability", "reproduce")
+
+EXAMPLES = {
+    "run": (
+        "beaver-ftc run elevator-partial-loss",
+        "beaver-ftc run elevator-partial-loss --format json --no-report",
+    ),
+    "validate": ("beaver-ftc validate elevator-partial-loss fault-free",),
+    "show": ("beaver-ftc show elevator-partial-loss",),
+    "new": ("beaver-ftc new my-case", "beaver-ftc new my-other-case --like elevator-partial-loss"),
+    "list": ("beaver-ftc list",),
+    "trim": ("beaver-ftc trim --airspeed-mps 40 --altitude-m 1000",),
+    "schema": ("beaver-ftc schema",),
+}
 
 app = typer.Typer(
     name="beaver-ftc",
     no_args_is_help=True,
-    add_completion=False,
+    add_completion=True,
     rich_markup_mode=None,  # plain help: importing rich for it would cost a third of the time to answer
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
@@ -67,9 +82,17 @@ def options(
     """
 
 
+def _examples(name: str) -> str | None:
+    """The examples at the end of a command's help, each on a line of its own."""
+    lines = EXAMPLES.get(name)
+    return "\n".join(["\b", "Examples:", *(f"  {line}" for line in lines)]) if lines else None
+
+
 for _name in COMMANDS:
     _command = import_module(f"beaver_ftc.cli.{_name}").command
-    app.command(_name)(_command if _name in WITHOUT_SCENARIOS else with_plugins(_command))
+    app.command(_name, epilog=_examples(_name))(
+        _command if _name in WITHOUT_SCENARIOS else with_plugins(_command)
+    )
 
 
 def main() -> NoReturn:

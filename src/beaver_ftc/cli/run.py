@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from beaver_ftc.cli.inputs import load_all
+from beaver_ftc.cli.inputs import complete_names, load_all
 from beaver_ftc.cli.output import Format, FormatOption, complain, emit, emit_json, report, unexpected
 from beaver_ftc.errors import BadInput, BeaverFtcError
 
@@ -20,7 +20,12 @@ if TYPE_CHECKING:
 
 def command(
     scenarios: Annotated[
-        list[str], typer.Argument(metavar="SCENARIO", help="A file, or the name of a built-in scenario.")
+        list[str],
+        typer.Argument(
+            metavar="SCENARIO",
+            help="A file, or the name of a built-in scenario.",
+            autocompletion=complete_names,
+        ),
     ],
     out: Annotated[Path, typer.Option(help="Folder for the results, one folder a scenario in it.")] = Path(
         "runs"

@@ -1,0 +1,79 @@
+"""Built-in scenarios to look at, and new ones to begin with."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from beaver_ftc.cli.main import EXAMPLES, app
+from beaver_ftc.scenario.builtin import builtin_names, builtin_path
+from beaver_ftc.scenario.loader import load_scenario
+from beaver_ftc.scenario.sweep_loader import builtin_sweeps, load_sweep_text
+
+BEAVER = Path(sys.executable).with_name("beaver-ftc")
+
+
+def _beaver(*arguments):
+    return CliRunner().invoke(app, [str(argument) for argument in arguments], catch_exceptions=True)
+
+
+def test_what_is_shown_is_the_file():
+    for name in builtin_names():
+        assert _beaver("show", name).stdout == builtin_path(name).read_text()
+    for name in builtin_sweeps():
+        assert load_sweep_text(_beaver("show", name).stdout, name=name).name == name
+
+
+def test_a_name_that_is_none_is_bad_input():
+    done = subprocess.run(
+        [BEAVER, "show", "elevator-partal-loss"], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 2
+    assert "did you mean elevator-partial-loss?" in done.stderr
+
+
+@pytest.mark.parametrize("like", [None, "rudder-stuck"])
+def test_a_new_scenario_is_one_and_replaces_nothing(tmp_path, like):
+    options = ["--like", like] if like else []
+    assert _beaver("new", "mine", "--out", tmp_path, *options).exit_code == 0
+    scenario = load_scenario(tmp_path / "mine.yaml")
+    assert scenario.name == "mine"
+    if like:
+        assert scenario.faults == load_scenario(like).faults
+    else:
+        assert scenario.expect.isolated_as == scenario.faults[0].actuator == "elevator"
+    (tmp_path / "mine.yaml").write_text("precious")
+    refused = subprocess.run(
+        [BEAVER, "new", "mine"], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert (refused.returncode, refused.stderr) == (2, "new: mine.yaml exists, allowed: another name\n")
+    assert (tmp_path / "mine.yaml").read_text() == "precious"
+
+
+@pytest.mark.parametrize(
+    ("name", "status"), [("a b", 2), ("../x", 2), ("", 2), ("x" * 101, 2), ("nowhere/x", 2)]
+)
+def test_a_name_that_cannot_be_a_scenarios_is_bad_input(tmp_path, name, status):
+    done = subprocess.run([BEAVER, "new", name], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == status
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_help_has_examples_on_lines_of_their_own():
+    for name, lines in EXAMPLES.items():
+        shown = [line.strip() for line in _beaver(name, "--help").stdout.splitlines()]
+        assert set(lines) <= set(shown)
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_the_shell_is_told_commands_and_scenarios(shell):
+    asked = {
+        "_BEAVER_FTC_COMPLETE": f"complete_{shell}",
+        "COMP_WORDS": "beaver-ftc run elevator-p", "COMP_CWORD": "2",
+        "_TYPER_COMPLETE_ARGS": "beaver-ftc run elevator-p", "_TYPER_COMPLETE_FISH_ACTION": "get-args",
+    }  # fmt: skip
+    done = subprocess.run([BEAVER], env={**os.environ, **asked}, capture_output=True, text=True, check=False)
+    assert "elevator-partial-loss" in done.stdout

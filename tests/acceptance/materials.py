@@ -68,6 +68,16 @@ def _brief(folder: Path) -> None:
         (folder / name).write_text(BRIEF)
 
 
+def _mine(folder: Path) -> None:
+    """The template's class as a module of the working folder, a scenario and a sweep that name it."""
+    shutil.copyfile(ROOT / "examples/my-detector/src/my_detector/__init__.py", folder / "mine.py")
+    (folder / "mine.yaml").write_text(BRIEF.replace("brief", "mine") + "fdi: {scheme: my-cusum}\n")
+    (folder / "other.yaml").write_text(BRIEF.replace("brief", "other") + "fdi: {scheme: cusum}\n")
+    (folder / "many.yaml").write_text(
+        "name: many\nbase: other.yaml\nruns: 2\nvary: {initial.airspeed_mps: {uniform: [44, 46]}}\n"
+    )
+
+
 def _copy(relative: str):
     return lambda folder: shutil.copytree(ROOT / relative, folder / relative)
 
@@ -78,6 +88,7 @@ _MATERIALS = {
     r"\bmy[-.]sweep\b": _my_sweep,
     r"\bscenarios/": _scenarios,
     r"\bbrief\.yaml\b|^pytest$": _brief,
+    r"\bmine:": _mine,
     r"\baircraft/": _copy("aircraft"),
     r"\bdocs/": _copy("docs"),
     r"\btests/data\b": _copy("tests/data"),

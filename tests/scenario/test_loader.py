@@ -78,7 +78,7 @@ ONE_MISTAKE = {
     ),
     "faults: [{type: unanticipated, actuator: flap, at_s: 1}]": "faults[0].actuator: unknown key",
     "reference: {q: {sine: {amplitude_deg_s: 1, frequency_hz: 1}}}": "reference.q: this is a mapping,",
-    "reference: {q: [{sin: {amplitude_deg_s: 1}}]}": "reference.q[0].sin: unknown key, did you mean sine?",
+    "reference: {q: [{sin: {amplitude_deg_s: 1, frequency_hz: 1}}]}": "reference.q[0].sin: unknown key, did you mean sine?",
     "reference: {q: [{}]}": "reference.q[0]: 0 kinds in one list item, allowed: exactly one of sine,",
     "reference: {q: [{step: {amplitude_deg_s: 1, start_s: 5, end_s: 4}}]}": (
         "reference.q[0].step.end_s: 4 is not after start_s, allowed: later than 5 s"
@@ -268,3 +268,40 @@ def test_the_error_survives_a_process_boundary():
     again = pickle.loads(pickle.dumps(caught.value))
     assert str(again) == str(caught.value)
     assert again.problems == caught.value.problems
+
+
+@pytest.mark.parametrize(
+    ("text", "keys"),
+    [
+        (
+            "faults: [{actuator: elevatr, typ: stuck, at_s: -1}]",
+            ["faults[0].typ", "faults[0].actuator", "faults[0].at_s"],
+        ),
+        (
+            "faults: [{actuator: elevatr, type: stuk, at_s: -1, bogus: 2}]",
+            ["faults[0].type", "faults[0].actuator", "faults[0].at_s", "faults[0].bogus"],
+        ),
+        (
+            "reference: {q: [{sin: {amplitude_deg_s: 3000, frequency_hz: -1}}]}",
+            [
+                "reference.q[0].sin",
+                "reference.q[0].sine.amplitude_deg_s", "reference.q[0].sine.frequency_hz"
+            ],
+        ),
+        (
+            "actuators: {bandwith_rad_s: 20, rate_limit_deg_s: -6}",
+            ["actuators.bandwith_rad_s", "actuators.rate_limit_deg_s"],
+        ),
+        ("initial: {bogus: 1, altitude_m: 99999}", ["initial.bogus", "initial.altitude_m"]),
+    ],
+)  # fmt: skip
+def test_one_wrong_key_hides_no_other_mistake_on_its_line(text, keys):
+    with pytest.raises(ScenarioError) as refused:
+        load_text(f"name: x\n{text}\n")
+    found = [line.split(": ")[1] for line in refused.value.lines if line.startswith("<text>:2: ")]
+    assert sorted(found) == sorted(keys)
+
+
+def test_a_near_miss_of_type_is_suggested():
+    with pytest.raises(ScenarioError, match=r"faults\[0\].typ: unknown key, did you mean type\?"):
+        load_text("name: x\nfaults: [{typ: stuck, actuator: elevator, at_s: 3}]\n")

@@ -169,7 +169,7 @@ def test_whole_numbers_may_be_written_as_people_do():
             "reference.p[0]: 60 Hz",
         ),
         (
-            "uncertainty: {sinusoid: {r: {amplitude_rad_s2: 0.1, frequency_rad_s: 700}}}",
+            "uncertainty: {sinusoid: {r: {amplitude_rad_s2: 0.01, frequency_rad_s: 700}}}",
             "uncertainty.sinusoid.r: 111",
         ),
         (

@@ -1,7 +1,8 @@
 """The report of one or more runs as one HTML file that needs nothing else: no network, no other file.
 
 The page draws the same views as the figures, from the log's numbers inside it: whole flight, and at full
-resolution around the fault.
+resolution around the fault. It draws them itself (report.js): a plotting library would add one to four
+megabytes to every report and still lack the marks, shades and mode bands that the figures have.
 """
 
 import base64

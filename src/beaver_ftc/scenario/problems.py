@@ -4,6 +4,7 @@ What is allowed is read from the JSON Schema, the same text an editor shows, so 
 """
 
 from collections.abc import Iterator, Sequence
+from difflib import get_close_matches
 from typing import Any
 
 from pydantic import ValidationError
@@ -75,10 +76,19 @@ def problems_of(error: ValidationError, document: Document, schema: dict[str, An
             for below, says in detail["ctx"]["conflicts"]:
                 where = _in_document((*location, *below), document.data)
                 yield Problem(document.line(where), where, says)
+        elif detail["type"] == "union_tag_not_found" and (near := _near_miss_of_type(detail["input"])):
+            where = (*location, near)
+            yield Problem(document.line(where), where, f"unknown key{suggestion(near, ['type'], cutoff=0.5)}")
         else:
             says = _says(detail, location, document.data, schema)
             where = (*location, "type") if detail["type"].startswith("union_tag") else location
             yield Problem(document.line(where), where, says)
+
+
+def _near_miss_of_type(given: Any) -> str:
+    """The key that was meant to be `type`, if there is one."""
+    keys = [key for key in given if isinstance(key, str)] if isinstance(given, dict) else []
+    return next(iter(get_close_matches("type", keys, n=1)), "")
 
 
 def _in_document(loc: Location, data: Any) -> Location:

@@ -11,6 +11,7 @@ from pydantic import BaseModel, ValidationError
 from beaver_ftc.scenario.base import Conflict
 from beaver_ftc.scenario.document import MAX_PROBLEMS, Document, MalformedDocumentError, Problem, parse
 from beaver_ftc.scenario.problems import ScenarioError, problems_of
+from beaver_ftc.scenario.repair import repaired
 
 _Model = TypeVar("_Model", bound=BaseModel)
 
@@ -33,6 +34,25 @@ def parse_document(text: str, source: str, keys: str = "the keys of `beaver-ftc 
     return document
 
 
+def _all_of(
+    error: ValidationError, model: type[BaseModel], document: Document, folder: Path | None
+) -> list[Problem]:
+    """The mistakes that an error names, and those that show once unknown keys and types are as meant."""
+    found = list(islice(problems_of(error, document, _schema(model)), MAX_PROBLEMS))
+    known = {problem.location for problem in found}
+    mended = repaired(document, found, known)
+    while mended is not None and len(found) < MAX_PROBLEMS:
+        try:
+            model.model_validate(mended.data, context={"folder": folder})
+            break
+        except ValidationError as hidden:
+            seen = list(islice(problems_of(hidden, mended, _schema(model)), MAX_PROBLEMS))
+        more = [problem for problem in seen if problem.location not in known]
+        found, known = found + more, known | {problem.location for problem in more}
+        mended = repaired(mended, more, known)
+    return found
+
+
 def validate(
     model: type[_Model],
     document: Document,
@@ -49,7 +69,7 @@ def validate(
     try:
         instance = model.model_validate(document.data, context={"folder": folder})
     except ValidationError as error:
-        problems += islice(problems_of(error, document, _schema(model)), MAX_PROBLEMS)
+        problems += _all_of(error, model, document, folder)
         known = {problem.location for problem in problems}
         hidden = [(at, says) for at, says in conflicts_in(document.data) if at not in known]
         problems += [Problem(document.line(at), at, says) for at, says in hidden]

@@ -78,7 +78,7 @@ ONE_MISTAKE = {
     ),
     "faults: [{type: unanticipated, actuator: flap, at_s: 1}]": "faults[0].actuator: unknown key",
     "reference: {q: {sine: {amplitude_deg_s: 1, frequency_hz: 1}}}": "reference.q: this is a mapping,",
-    "reference: {q: [{sin: {amplitude_deg_s: 1, frequency_hz: 1}}]}": "reference.q[0].sin: unknown key, did you mean sine?",
+    "reference: {q: [{sin: {amplitude_deg_s: 1, frequency_hz: 1}}]}": "q[0].sin: unknown key, did you mean",
     "reference: {q: [{}]}": "reference.q[0]: 0 kinds in one list item, allowed: exactly one of sine,",
     "reference: {q: [{step: {amplitude_deg_s: 1, start_s: 5, end_s: 4}}]}": (
         "reference.q[0].step.end_s: 4 is not after start_s, allowed: later than 5 s"

@@ -64,8 +64,14 @@ class Stepping:
         self._by_hand = False
         self._stick = StickTrack()
         self._base: tuple[int, Vector] | None = None
+        self._last: list[Vector] = []  # rows of the last step, a piece a segment
         if self._sink is not None:
             self._sink.open(self._loop.columns)
+
+    @property
+    def rate_hz(self) -> float:
+        """Frames a second."""
+        return self._scenario.rate_hz
 
     @property
     def t_s(self) -> float:
@@ -95,9 +101,13 @@ class Stepping:
     @property
     def values(self) -> Vector:
         """The log's row of the frame just flown, (columns,)."""
+        return self.rows[-1]
+
+    @property
+    def rows(self) -> Vector:
+        """The log's rows of the last step, (frames, columns); of the first step, frame 0 as well."""
         self._begin()
-        row: Vector = self._loop.log[int(self._frame["row"]) - 1].copy()
-        return row
+        return np.concatenate(self._last) if len(self._last) > 1 else self._last[0]
 
     @property
     def measured(self) -> "Measured":
@@ -143,6 +153,8 @@ class Stepping:
             raise BadInput(f"frames: {frames!r} is out of range, allowed: a whole number of at least 1")
         deflections = None if command is None else self._deflections(command)
         rate_deg_s = None if stick is None else _vector(stick, 3, "stick", "rad/s") / RAD_PER_DEG
+        if self._next > 0:
+            self._last.clear()
         self._begin()
         self._take_command(deflections)
         end = min(self._next + frames, self._loop.n_frames)
@@ -262,10 +274,12 @@ class Stepping:
                 self._turn_at = loop.turn_to(k)
             stop = min(end, self._turn_at, (k // CHUNK_ROWS + 1) * CHUNK_ROWS)
             self._steer(k, stop, stick_deg_s)
+            start = int(self._frame["row"])
             try:
                 self._status = loop.fly_segment(k, stop)
             finally:
                 self._next = int(self._frame["k"])
+                self._last.append(loop.log[start : int(self._frame["row"])].copy())
 
     def _begin_chunk(self, k: int) -> None:
         self.flush()

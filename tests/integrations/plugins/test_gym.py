@@ -56,6 +56,31 @@ def test_an_episode_is_a_flight():
     assert info["metrics"]["fault"]["actuator"] == "elevator"
 
 
+def test_an_action_held_over_frames_is_the_same_given_frame_by_frame():
+    flown = scenario(duration_s=2, faults=[FAULT])
+    one, ten = BeaverEnv(flown), BeaverEnv(flown, frames_per_step=10)
+    one.reset()
+    ten.reset()
+    for k in range(1, 20):
+        action = _action(10 * k)
+        singles = [one.step(action) for _ in range(10)]
+        seen, reward, departed, over, _ = ten.step(action)
+        assert np.array_equal(seen, singles[-1][0])
+        assert reward == pytest.approx(sum(single[1] for single in singles), rel=1e-12)
+        assert not departed
+        assert not over
+    *_, over, info = ten.step(_action(1))
+    assert over
+    assert info["metrics"]["frames"] == 200
+
+
+def test_a_seed_replaces_the_scenarios():
+    noisy = scenario(duration_s=2, sensors={"q": {"noise_std_deg_s": 0.1}})
+    first, again, other = (BeaverEnv(noisy).reset(seed=seed)[0] for seed in (5, 5, 6))
+    assert np.array_equal(first, again)
+    assert not np.array_equal(first, other)
+
+
 def test_a_departure_ends_the_episode_and_costs():
     env = BeaverEnv(scenario(duration_s=20))
     env.reset()

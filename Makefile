@@ -7,7 +7,7 @@ PYTEST := $(BIN)/python -m pytest -n $(WORKERS) --dist worksteal
 # What a change breaks most often, in less than a minute: what flies little or nothing.
 FAST := tests/aircraft tests/design tests/docs tests/plant tests/results tests/scenario $(wildcard tests/test_re*.py tests/test_arch*.py)
 
-.PHONY: demo test test-fast coverage lint docs clean help
+.PHONY: demo test test-fast coverage lint docs site clean help
 
 help:
 	@echo "make demo       set up, fly the published elevator case, print the verdict and where the report lies"
@@ -16,6 +16,7 @@ help:
 	@echo "make coverage   the whole test suite, and which lines of Python it has run"
 	@echo "make lint       set up and run the linters"
 	@echo "make docs       set up and write the generated pages and pictures of docs/ anew"
+	@echo "make site       set up and build docs/, with reference and notebooks, as a web site in site/"
 	@echo "make clean      remove the virtual environment and what runs have written"
 
 $(VENV)/.demo: pyproject.toml
@@ -50,5 +51,12 @@ lint: $(VENV)/.dev
 docs: $(VENV)/.demo
 	$(BIN)/python -m tools.docs
 
+$(VENV)/.site: $(VENV)/.demo
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[docs]'
+	touch $@
+
+site: $(VENV)/.site
+	$(BIN)/python -m mkdocs build --quiet
+
 clean:
-	rm -rf $(VENV) .coverage runs sweeps .pytest_cache .hypothesis .mypy_cache .ruff_cache
+	rm -rf $(VENV) site .coverage runs sweeps .pytest_cache .hypothesis .mypy_cache .ruff_cache

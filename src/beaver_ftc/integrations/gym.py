@@ -95,7 +95,8 @@ class BeaverEnv(gymnasium.Env[Vector, Vector]):
                 (self._deflections - sim.trim_rad) / ANGLE_RAD,
             )
         )
-        return np.clip(seen, -LARGEST, LARGEST)
+        clipped: Vector = np.clip(seen, -LARGEST, LARGEST)
+        return clipped
 
 
 def _places(columns: tuple[str, ...]) -> tuple[list[int], list[int]]:

@@ -101,7 +101,8 @@ class Stepping:
     @property
     def values(self) -> Vector:
         """The log's row of the frame just flown, (columns,)."""
-        return self.rows[-1]
+        row: Vector = self.rows[-1]
+        return row
 
     @property
     def rows(self) -> Vector:
@@ -221,7 +222,7 @@ class Stepping:
         self._begin()
         return flown(self._scenario, self._faults, self._stick, self._next)
 
-    def as_it_happened(self) -> Scenario:
+    def _as_it_happened(self) -> Scenario:
         """The scenario of the verdict: as given if it was flown to its end and nobody interfered."""
         if self.done and self._faults is self._scenario.faults and not self._stick.moved:
             return self._scenario
@@ -231,13 +232,13 @@ class Stepping:
             faults = in_force(self._faults, self._now_s)
             return self._scenario.model_copy(update={"faults": faults})
 
-    def outcome(self) -> Flight:
+    def _outcome(self) -> Flight:
         """What the flight has yielded so far."""
         self._begin()
-        self._loop.scenario = self.as_it_happened()
+        self._loop.scenario = self._as_it_happened()
         return self._loop.land()
 
-    def flush(self) -> None:
+    def _flush(self) -> None:
         """Hand the sink what has been flown since."""
         row = int(self._frame["row"])
         if self._sink is not None and row > self._written:
@@ -282,7 +283,7 @@ class Stepping:
                 self._last.append(loop.log[start : int(self._frame["row"])].copy())
 
     def _begin_chunk(self, k: int) -> None:
-        self.flush()
+        self._flush()
         self._written = 0
         self._loop.sample_references(k, min(CHUNK_ROWS, self._loop.n_frames - k))
 

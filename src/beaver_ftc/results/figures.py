@@ -1,6 +1,8 @@
 """The figures of a flight as PNG: the views drawn with matplotlib, without its global state."""
 
 from collections.abc import Iterable, Sequence
+from functools import cache
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -41,9 +43,7 @@ def write_figures(log_path: Path, metrics: Document, folder: Path) -> list[Path]
 
 def draw(view: View, series: Series, instants: Sequence[Mark], subtitle: str) -> "Figure":
     """One view as a matplotlib figure, over the time that `series` covers."""
-    from matplotlib.figure import Figure
-
-    figure, grid = _laid_out(view, Figure)
+    figure, grid = _laid_out(view, figure_class())
     for axes, panel in zip(grid.flat, view.panels, strict=False):
         _draw_panel(axes, panel, series, instants)
     _say_absent(view, series, list(grid.flat))
@@ -53,6 +53,22 @@ def draw(view: View, series: Series, instants: Sequence[Mark], subtitle: str) ->
     figure.suptitle(f"{view.title}\n{subtitle}", fontsize=11, y=top, va="top")
     _draw_legend(figure, list(grid.flat))
     return figure
+
+
+@cache
+def figure_class() -> "type[Figure]":
+    """matplotlib's Figure, made to show itself in a notebook without pyplot and its global state."""
+    from matplotlib.figure import Figure
+
+    class Shown(Figure):
+        """A figure that a notebook can draw."""
+
+        def _repr_png_(self) -> bytes:
+            picture = BytesIO()
+            self.savefig(picture, format="png")
+            return picture.getvalue()
+
+    return Shown
 
 
 def _columns(drawn: Sequence[View]) -> list[str]:

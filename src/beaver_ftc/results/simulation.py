@@ -53,8 +53,8 @@ class Simulation(Stepping):
 
     def land(self) -> Flight:
         """What the flight has yielded so far, as `fly` would say it; the flight may go on."""
-        outcome = self.outcome()
-        self.flush()
+        outcome = self._outcome()
+        self._flush()
         return Flight.landed(outcome, self._kept and self._kept.so_far())
 
     def save(self, out: str | PathLike[str] = "runs", *, report: bool = True) -> Path:

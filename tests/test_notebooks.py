@@ -29,8 +29,7 @@ def test_it_runs_and_shows(path, tmp_path):
     assert not any(cell.get("outputs") or cell.get("execution_count") for cell in notebook.cells)
     nbclient.NotebookClient(notebook, timeout=300, resources={"metadata": {"path": tmp_path}}).execute()
     outputs = [output for cell in notebook.cells for output in cell.get("outputs", [])]
-    texts = "
-".join(one.get("text") or one.get("data", {}).get("text/plain", "") for one in outputs)
+    texts = "\n".join(one.get("text") or one.get("data", {}).get("text/plain", "") for one in outputs)
     wanted, pictures = SHOWN[path.stem]
     assert not [text for text in wanted if text not in texts]
     assert sum("image/png" in output.get("data", {}) for output in outputs) == pictures

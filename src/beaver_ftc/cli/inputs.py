@@ -10,8 +10,6 @@ import typer
 from beaver_ftc.errors import BadInput
 
 if TYPE_CHECKING:
-    from beaver_ftc.plant.adapter import Plant
-    from beaver_ftc.plant.trim import TrimPoint
     from beaver_ftc.scenario.schema import Scenario
 
 
@@ -71,29 +69,12 @@ def load_all(names: list[str]) -> list["Scenario"]:
 
 def check_flyable(scenario: "Scenario", name: str) -> None:
     """Raise BadInput, in the form of any other mistake in a file, if the flight cannot be trimmed."""
-    from beaver_ftc.plant.configure import trim_of
+    from beaver_ftc.plant.conditions import trimmed
 
-    plant = _configured(scenario)
     try:
-        trim_of(scenario, plant)
+        trimmed(scenario)
     except BadInput as error:
         raise BadInput(f"{_place_of_initial(name)}: initial: {error}") from None
-
-
-def trim_point(scenario: "Scenario") -> "TrimPoint":
-    """The steady flight a scenario starts from; BadInput if there is none."""
-    from beaver_ftc.plant.configure import trim_of
-
-    return trim_of(scenario, _configured(scenario))
-
-
-def _configured(scenario: "Scenario") -> "Plant":
-    from beaver_ftc.plant.adapter import Plant
-    from beaver_ftc.plant.configure import configure
-
-    plant = Plant(scenario.rate_hz, scenario.substeps)
-    configure(plant, scenario)
-    return plant
 
 
 def _repeated(names: list[str]) -> list[str]:

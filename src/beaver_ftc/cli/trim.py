@@ -5,12 +5,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from beaver_ftc.cli.inputs import trim_point
 from beaver_ftc.cli.output import Format, FormatOption, emit, emit_json
 
 if TYPE_CHECKING:
     from beaver_ftc.plant.trim import TrimPoint
-    from beaver_ftc.scenario.schema import Scenario
 
 _RESIDUALS = ("udot_mps2", "vdot_mps2", "wdot_mps2", "pdot_rad_s2", "qdot_rad_s2", "rdot_rad_s2")
 _SHOWN = (  # what, attribute, unit; angles in degrees
@@ -54,21 +52,13 @@ def command(
         "manifold_pressure_inhg": manifold_pressure_inhg,
         "flap_deg": flap_deg,
     }
-    point = trim_point(
-        _condition(scenario, {key: value for key, value in asked.items() if value is not None})
-    )
+    from beaver_ftc.plant.conditions import trim
+
+    point = trim(scenario, **{key: value for key, value in asked.items() if value is not None})
     if format is Format.json:
         emit_json(_document(point))
     else:
         emit(_table(point))
-
-
-def _condition(name: str | None, asked: dict[str, float]) -> "Scenario":
-    from beaver_ftc.scenario.loader import load_scenario
-    from beaver_ftc.scenario.schema import Scenario
-
-    scenario = Scenario(name="trim") if name is None else load_scenario(name)
-    return scenario.model_copy(update={"initial": scenario.initial.model_copy(update=asked)})
 
 
 def _document(point: "TrimPoint") -> dict[str, Any]:

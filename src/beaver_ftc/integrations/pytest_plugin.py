@@ -101,10 +101,10 @@ class ScenarioFile(pytest.File):
         """One item an expectation; of a scenario that expects nothing, that it can be flown."""
         from beaver_ftc.errors import BadInput
         from beaver_ftc.results.expectations import names
-        from beaver_ftc.scenario.loader import load_scenario
+        from beaver_ftc.scenario.given import load
 
         try:
-            self.scenario = load_scenario(self.path)
+            self.scenario = load(self.path)
         except BadInput as error:
             raise self.CollectError(str(error)) from None
         for name in names(self.scenario.expect) or [_COMPLETES]:
@@ -125,14 +125,11 @@ class ScenarioFile(pytest.File):
         return self._flown
 
     def _fly(self) -> dict[str, Any]:
-        from beaver_ftc.results.run import run, write_report_files
+        from beaver_ftc.results.flight import fly
 
         out = self.config._tmp_path_factory.mktemp("beaver-ftc")  # type: ignore[attr-defined]
-        document = run(self.scenario, out, report=False)
-        folder = out / self.scenario.name
-        if not document["passed"]:
-            write_report_files(folder, document)
-        return document | {"folder": str(folder)}
+        flight = fly(self.scenario)
+        return flight.metrics | {"folder": str(flight.save(out, report=not flight.passed))}
 
 
 class ExpectationItem(pytest.Item):

@@ -53,7 +53,11 @@ class Stepping:
         self.reset()
 
     def reset(self) -> None:
-        """Put the aircraft back into trim, nothing broken, the log empty: the same scenario anew."""
+        """Put the aircraft back into trim, nothing broken, the log empty: the same scenario anew.
+
+        The aircraft is loaded again: an executive of JSBSim's that has flown, reset by JSBSim itself and in
+        trim again, differs from a fresh one in the last bits of its first frame.
+        """
         self._scenario = self._given
         self._loop = Loop(self._scenario, *self._plug_ins, self._prepare)
         self._own_frame = self._loop.fly_frame

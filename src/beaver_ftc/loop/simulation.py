@@ -19,7 +19,7 @@ from beaver_ftc.loop.plugin_frame import measured_of
 from beaver_ftc.loop.summary import verdict_of
 from beaver_ftc.plant.adapter import UnknownProperty
 from beaver_ftc.plant.gust import GustSchedule
-from beaver_ftc.scenario.given import fault_of, gust_of
+from beaver_ftc.scenario.given import fault_of, gust_of, is_same_again
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.signals import RAD_PER_DEG, sample_deg_s
 from beaver_ftc.scenario.sticks import StickTrack, flown, in_force
@@ -31,7 +31,6 @@ if TYPE_CHECKING:
 
 Vector = NDArray[np.float64]
 UNANTICIPATED = "unanticipated"
-SINGULAR = ("stuck", "hardover", "float")  # a second one of these changes nothing
 
 
 class Stepping:
@@ -171,7 +170,7 @@ class Stepping:
         What is broken in just this way already cannot be broken again. Raises BadInput that names the key.
         """
         new = fault_of(fault, self._now_s)
-        if not any(_is_same_again(new, known) for known in self._faults):
+        if not any(is_same_again(new, known) for known in self._faults):
             self._declare((*self._faults, new))
 
     def repair(self, actuator: str | None = None) -> None:
@@ -344,12 +343,6 @@ class Stepping:
         known = [line.split(" ")[0] for line in catalogue.splitlines()]
         near = get_close_matches(str(name), known, n=1)
         return f", did you mean {near[0]}?" if near else ""
-
-
-def _is_same_again(new: Any, known: Any) -> bool:
-    """Whether a fault that does not add to its like is there already, to stay."""
-    begun = known.type == new.type and known.at_s <= new.at_s
-    return bool(begun and new.type in SINGULAR and known == new.model_copy(update={"at_s": known.at_s}))
 
 
 def _vector(given: ArrayLike, size: int, what: str, unit: str) -> Vector:

@@ -21,6 +21,7 @@ from beaver_ftc.scenario.validation import validate
 ScenarioLike = Scenario | str | PathLike[str] | Mapping[str, Any]
 
 UNNAMED = "unnamed"
+SINGULAR = ("stuck", "hardover", "float")  # a second one of these changes nothing
 
 
 class _OneFault(Section):
@@ -71,3 +72,9 @@ def _begun(model: type[OneThing], what: str, given: Mapping[str, Any], at_s: flo
     except ScenarioError as error:
         problems = [Problem(one.line, one.location[1:], one.says) for one in error.problems]
         raise ScenarioError("", problems) from None
+
+
+def is_same_again(new: Any, known: Any) -> bool:
+    """Whether a fault that does not add to its like is there already, to stay."""
+    begun = known.type == new.type and known.at_s <= new.at_s
+    return bool(begun and new.type in SINGULAR and known == new.model_copy(update={"at_s": known.at_s}))

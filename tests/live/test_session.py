@@ -8,7 +8,7 @@ import pytest
 import beaver_ftc as bf
 from beaver_ftc.errors import BadInput
 from beaver_ftc.live import messages
-from beaver_ftc.live.session import Session, encode
+from beaver_ftc.live.session import Session, encode, level_turn
 
 LOSS = {"type": "loss_of_effectiveness", "actuator": "elevator", "magnitude": 0.4}
 
@@ -114,7 +114,7 @@ def test_the_game_hides_what_is_broken_and_what_the_diagnosis_says(session):
     assert "elevator_cmd_rad" not in hidden
     assert session.state()["broken"] == []
     assert {event["kind"] for event in session.take_events()} == {"flight", "game"}
-    assert not any(event["secret"] for event in session.hello()["events"])
+    assert {event["kind"] for event in session.hello()["events"]} == {"flight", "game"}
     asked(session, do="game", move="answer", answer="elevator")
     flown(session, 1)
     game = session.state()["game"]
@@ -146,3 +146,24 @@ def test_every_message_is_strict_json(session):
     flown(session, 30)
     for message in (session.hello(), session.frame(), session.state()):
         assert json.loads(encode(message))["k"] == message["k"]
+
+
+def test_the_rates_of_a_level_turn():
+    """At 60 degrees of bank, level, 98.0665 tan(60 deg) m/s: psi' is 0.1 rad/s; half of it is yaw."""
+    rates = level_turn(np.pi / 3, 0.0, 98.0665 * np.tan(np.pi / 3))
+    assert rates == pytest.approx([0.0, 0.1 * np.sin(np.pi / 3), 0.05])
+    assert np.linalg.norm(level_turn(0.4, 0.3, 45.0)) == pytest.approx(9.80665 * np.tan(0.4) / 45.0)
+
+
+def test_a_coordinated_turn_keeps_the_aircraft_and_flies_again_to_the_bit(session, tmp_path):
+    asked(session, do="stick", rates_deg_s=[5, 0, 0], coordinated=True)
+    flown(session, 400)
+    asked(session, do="stick", rates_deg_s=[0, 0, 0], coordinated=True)
+    flown(session, 1500)
+    log = session.sim.log
+    assert not session.over
+    assert log["beta_rad"].abs().max() < np.radians(10)
+    assert log["psi_rad"].iloc[-1] > np.radians(60)
+    asked(session, do="save")
+    (folder,) = tmp_path.iterdir()
+    assert np.array_equal(log.to_numpy(), bf.fly(folder / "scenario.yaml").log.to_numpy(), equal_nan=True)

@@ -46,9 +46,10 @@ class Blow(Request):
 
 
 class Stick(Request):
-    """Rates added to the reference, deg/s, until said otherwise."""
+    """Rates added to the reference, deg/s, until said otherwise; coordinated: with those of a level turn."""
 
     do: Literal["stick"]
+    coordinated: bool = False
     rates_deg_s: tuple[Rate, Rate, Rate]
 
 

@@ -4,7 +4,7 @@ import json
 from collections import deque
 from collections.abc import Callable
 from datetime import UTC, datetime
-from math import isfinite, radians
+from math import cos, isfinite, sin, tan
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +19,11 @@ from beaver_ftc.results.log import SpooledLog
 
 LONGEST_S = 3600.0  # of one live flight: its log is 0.3 GB then
 EVENTS_KEPT = 400
+STICK_FRAMES = 10  # a coordinated turn is seen to so often
+TURN_STEP = np.radians(0.1)  # rad/s
+G_MPS2 = 9.80665
+ATTITUDE = ("phi_rad", "theta_rad", "airspeed_mps")
+NO_STICK = messages.Stick(do="stick", rates_deg_s=(0.0, 0.0, 0.0))
 GUST_S = {"rise_s": 0.5, "hold_s": 1.0, "fade_s": 0.5}
 PATIENCE_S = 10.0  # for the diagnosis, once you have spoken
 HIDDEN = ("_effective_rad", "_pos_rad", "_excluded", "_effectiveness_estimate", "mode", "detected")
@@ -31,7 +36,8 @@ class Session:
         self._given, self._base, self._out = scenario, scenario, out
         self._rng = np.random.default_rng(seed)
         self.game = Game()
-        self.stick_rad_s: tuple[float, ...] | None = None
+        self.stick = NO_STICK
+        self._flown_stick: tuple[float, ...] | None = None
         self._begin(scenario)
 
     def _begin(self, scenario: "bf.Scenario", faults: bool = True) -> None:
@@ -48,6 +54,7 @@ class Session:
         self._hidden = [i for i, name in enumerate(self.columns) if name.endswith(HIDDEN)]
         self.events: deque[dict[str, Any]] = deque(maxlen=EVENTS_KEPT)
         self.fresh_events: list[dict[str, Any]] = []
+        self.told: deque[dict[str, Any]] = deque(maxlen=EVENTS_KEPT)
         self._said: tuple[Any, ...] = (None, None, None, (), False)
         self._mode = sim.mode
         self.broken = {fault.model_dump().get("actuator") or fault.type for fault in flown.faults}
@@ -62,7 +69,9 @@ class Session:
         """Fly one frame and notice what it brought."""
         if self.game.is_due(self.sim.t_s):
             self._break(self.game.fault)
-        self.sim.step(stick=self.stick_rad_s)
+        if self.sim.frames % STICK_FRAMES == 0 or not self.stick.coordinated:
+            self._flown_stick = self._rates_rad_s()
+        self.sim.step(stick=self._flown_stick)
         self._notice()
         if self.game.settle(PATIENCE_S, self.sim.t_s):
             self._tell("game", "the round is over")
@@ -100,6 +109,7 @@ class Session:
             self.fresh_events = [event for event in self.fresh_events if event["secret"]]
         else:
             told, self.fresh_events = self.fresh_events, []
+        self.told.extend(told)
         return told
 
     def handle(self, request: messages.Request) -> str:
@@ -112,15 +122,28 @@ class Session:
             messages.Break: lambda asked: self._break(dict(asked.fault)),
             messages.Repair: lambda asked: self._repair(asked.actuator),
             messages.Blow: lambda asked: self._blow(asked.velocity_mps),
-            messages.Stick: lambda asked: self._steer(asked.rates_deg_s),
+            messages.Stick: self._steer,
             messages.Fresh: self._fresh,
             messages.Game: self._play,
             messages.Save: lambda _: self._save(),
         }
 
-    def _steer(self, rates_deg_s: tuple[float, ...]) -> str:
-        self.stick_rad_s = tuple(map(radians, rates_deg_s)) if any(rates_deg_s) else None
+    def _steer(self, asked: messages.Stick) -> str:
+        self.stick = asked
         return ""
+
+    def _rates_rad_s(self) -> tuple[float, ...] | None:
+        """What the stick adds; coordinated, with the rates of a level turn at the present bank.
+
+        They are rounded: each change is a row of the scenario that flies this again.
+        """
+        rates = np.radians(self.stick.rates_deg_s)
+        if self.stick.coordinated:
+            rates = rates + np.round(level_turn(*map(self._now, ATTITUDE)) / TURN_STEP) * TURN_STEP
+        return tuple(map(float, rates)) if rates.any() else None
+
+    def _now(self, column: str) -> float:
+        return float(self.sim.values[self.columns.index(column)])
 
     def _blow(self, velocity_mps: tuple[float, ...]) -> str:
         self._check_going_on()
@@ -192,7 +215,7 @@ class Session:
         values = [_short(value) for value in sim.values]
         for i in self._hidden if hidden else ():
             values[i] = None
-        told: dict[str, Any] = {"k": "f", "v": values, "stick": self.stick_rad_s}
+        told: dict[str, Any] = {"k": "f", "v": values, "stick": self._flown_stick}
         if hidden:
             return told
         verdict = sim.verdict
@@ -214,7 +237,6 @@ class Session:
     def hello(self) -> dict[str, Any]:
         """What a page needs to know of this flight before its first frame."""
         low, high = self.sim.travel_rad
-        hidden = self.game.hidden
         scenario = self.scenario
         return {
             "k": "hello", "columns": self.columns, "surfaces": self.surfaces,
@@ -226,8 +248,14 @@ class Session:
             "scenarios": sorted({*bf.scenarios(), self._given.name}),
             "laws": list(registered(LAWS)), "schemes": list(registered(DETECTORS)),
             "stick_deg_s": messages.STICK_DEG_S, "fastest": messages.FASTEST,
-            "events": [event for event in self.events if not (hidden and event["secret"])],
+            "events": list(self.told),
         }  # fmt: skip
+
+
+def level_turn(phi_rad: float, theta_rad: float, airspeed_mps: float) -> Any:
+    """Body rates (3,) rad/s of a coordinated level turn: psi' = g tan(phi) / V, seen in body axes."""
+    turn = G_MPS2 * tan(phi_rad) / airspeed_mps
+    return turn * np.array([-sin(theta_rad), sin(phi_rad) * cos(theta_rad), cos(phi_rad) * cos(theta_rad)])
 
 
 def _changes(asked: messages.Fresh) -> dict[str, Any]:

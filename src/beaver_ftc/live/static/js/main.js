@@ -17,7 +17,7 @@ const charts = new Charts(byId("charts"));
 const instruments = new Instruments(byId("attitude"), byId("numbers"));
 const sticks = new Sticks();
 const drawn = { frames: 0, ms: 0, second: 0, inSecond: 0 };
-const SLOW_FPS = 40;
+const SLOW_FPS = 30;
 let fresh = false;
 
 on("hello", (hello) => {

@@ -12,6 +12,7 @@ export function drawDiagnosis() {
   const frame = flight.frame, hidden = flight.state?.game.phase === "waiting";
   const alarm = byId("alarm"), on = Boolean(frame.axis);
   alarm.classList.toggle("on", on);
+  alarm.classList.toggle("hidden", hidden);
   setText(alarm, hidden ? "hidden during the game" : on ? `ALARM: residual of ${frame.axis} beyond its threshold` : "no alarm");
   setText(byId("verdict"), hidden ? "" : verdictText(frame));
   setText(byId("mode"), hidden ? "hidden" : frame.mode ?? "");

@@ -4,13 +4,14 @@ import { say } from "./link.js";
 
 const KEYS = { a: [0, -1], d: [0, 1], w: [1, -1], s: [1, 1], q: [2, -1], e: [2, 1] };
 const STEP_DEG_S = 0.5, SENT_MS = 50, DEAD = 0.12;
+const AT_REST = JSON.stringify({ do: "stick", rates_deg_s: [0, 0, 0], coordinated: false }); // a page that only looks on says nothing
 const byId = (id) => document.getElementById(id);
 
 export class Sticks {
   constructor() {
     this.held = new Set();
     this.screen = [0, 0];
-    this.sent = [0, 0, 0];
+    this.sent = "";
     this.next = 0;
     this.pad = byId("stick");
     this.wireScreen();
@@ -61,9 +62,11 @@ export class Sticks {
     const reach = Number(byId("reach").value), shares = this.shares();
     byId("knob").style.transform = `translate(${shares[0] * 58}px, ${shares[1] * 58}px)`;
     const rates = shares.map((share) => Math.round((share * reach) / STEP_DEG_S) * STEP_DEG_S);
-    if (rates.every((rate, i) => rate === this.sent[i])) return;
-    this.sent = rates;
-    say({ do: "stick", rates_deg_s: rates });
+    const request = { do: "stick", rates_deg_s: rates, coordinated: byId("coordinated").checked };
+    const text = JSON.stringify(request);
+    if (text === this.sent || (!this.sent && text === AT_REST)) return;
+    this.sent = text;
+    say(request);
     byId("stick-says").textContent = rates.some(Boolean) ? `roll ${rates[0]}, pitch ${rates[1]}, yaw ${rates[2]} deg/s` : "centred";
   }
 }

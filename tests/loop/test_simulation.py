@@ -227,3 +227,37 @@ def eventful(sim):
         if i == 801:
             sim.repair()
     return sim
+
+
+def test_a_gust_begins_when_it_is_asked_for_and_is_flown_again_to_the_bit():
+    sim = bf.Simulation(scenario(duration_s=6.0))
+    sim.step(frames=200)
+    at_s = sim.t_s
+    sim.blow({"velocity_mps": [0.0, 0.0, -5.0], "rise_s": 0.5})
+    sim.step(frames=300)
+    log, still = sim.log, bf.fly(scenario(duration_s=6.0)).log[:501]
+    moved = (log["alpha_rad"] - still["alpha_rad"]).abs()
+    assert moved[log["t_s"] <= at_s].max() == 0.0
+    assert moved.max() > 0.05
+    again = bf.fly(sim.scenario_flown()).log
+    assert np.array_equal(log.to_numpy(), again.to_numpy(), equal_nan=True)
+
+
+def test_one_gust_a_flight_and_none_of_the_last_one_after_a_reset():
+    sim = bf.Simulation(scenario(duration_s=2.0))
+    sim.blow({"velocity_mps": [0.0, 3.0, 0.0]})
+    with pytest.raises(bf.BadInput, match="one a flight"):
+        sim.blow({"velocity_mps": [0.0, 3.0, 0.0]})
+    sim.reset()
+    assert sim.scenario_flown().environment.gust is None
+    with pytest.raises(bf.BadInput, match="velocity_mps"):
+        sim.blow({"velocity_mps": [0.0, 300.0, 0.0]})
+
+
+def test_the_mode_is_the_supervisors():
+    sim = bf.Simulation(scenario(duration_s=4.0))
+    sim.step(frames=200)
+    assert sim.mode == "nominal"
+    sim.inject({"type": "loss_of_effectiveness", "actuator": "elevator", "magnitude": 0.6})
+    sim.step(frames=200)
+    assert sim.mode == sim.land().supervisor[-1].mode != "nominal"

@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from beaver_ftc.results.log import ParquetLog, column_names, read, read_chunks, row_count
+from beaver_ftc.results.log import ParquetLog, SpooledLog, column_names, read, read_chunks, row_count
 
 COLUMNS = ("t_s", "q_rad_s", "residual_rad_s")
 
@@ -56,3 +56,22 @@ def test_log_that_failed_is_not_mistaken_for_a_whole_one(tmp_path):
         log.write(np.ones((12, 3)))
         raise RuntimeError
     assert row_count(path) == 8
+
+
+def test_a_spooled_log_is_kept_in_a_file_and_reads_as_it_was(tmp_path):
+    rows = np.random.default_rng(2).standard_normal((40, 3))
+    log = SpooledLog()
+    log.open(COLUMNS)
+    assert log.so_far().row_count() == 0
+    buffer = rows[:25].copy()
+    log.write(buffer)
+    buffer[:] = -1.0  # the loop reuses its buffer
+    then = log.so_far()
+    log.write(rows[25:])
+    now = log.so_far()
+    log.open(COLUMNS)  # a new flight
+    log.write(rows[:3])
+    assert then.rows.tobytes() == rows[:25].tobytes()
+    assert now.rows.tobytes() == rows.tobytes()
+    now.copy_to(tmp_path / "log.parquet")
+    assert np.array_equal(read(tmp_path / "log.parquet")["q_rad_s"], rows[:, 1])

@@ -21,7 +21,7 @@ function plans(surfaces) {
       curves: AXES.map((axis, i) => ({ label: axis, colour: i, now: share(axis) })) },
     { title: "Rates, deg/s (-- asked for)", names: AXES, floor: 4,
       curves: pairs(AXES, (a) => rad(`${a}_measured_rad_s`), (a) => rad(`${a}_reference_rad_s`)) },
-    { title: "Surfaces, deg (-- command)", names: surfaces, floor: 3,
+    { title: "Surfaces, deg (-- cmd)", names: surfaces, floor: 3,
       curves: pairs(surfaces, (s) => rad(`${s}_effective_rad`), (s) => rad(`${s}_cmd_rad`)) },
     { title: "Effectiveness (-- estimate)", names: surfaces, range: [-0.05, 1.15],
       curves: pairs(surfaces, (_, i) => () => flight.frame?.effectiveness?.[i] ?? null, (s) => () => value(`${s}_effectiveness_estimate`)) },

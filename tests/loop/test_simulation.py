@@ -120,6 +120,18 @@ class TestBreakingThings:
         folder = sim.save(tmp_path, report=False)
         assert same_log(bf.fly(folder / "scenario.yaml").log, bf.open_run(folder).log)
 
+    def test_landing_on_the_way_leaves_a_stick_alone(self):
+        """Also across a chunk of the log, for which the references are sampled anew."""
+        sims = [bf.Simulation(scenario(duration_s=84.0)) for _ in range(2)]
+        for i, sim in enumerate(sims):
+            sim.step(frames=8000, stick=(0.0, 0.002, 0.0))
+            if i:
+                assert sim.land().metrics["frames"] == 8001
+            sim.step(frames=300, stick=(0.0, 0.001, 0.0))
+            sim.step(frames=99)
+        assert same_log(sims[0].log, sims[1].log)
+        assert same_log(bf.fly(sims[0].scenario_flown()).log, sims[0].log)
+
     def test_repaired_before_it_was_there_it_never_was(self):
         sim = stepped(bf.Simulation(scenario(duration_s=4.0)), 100)
         sim.inject({"type": "float", "actuator": "flap"})

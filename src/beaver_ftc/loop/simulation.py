@@ -16,13 +16,14 @@ from beaver_ftc.loop.flight import Flight, LogSink
 from beaver_ftc.loop.held import HeldFrame
 from beaver_ftc.loop.loop import CHUNK_ROWS, FLYING, Loop
 from beaver_ftc.loop.plugin_frame import measured_of
+from beaver_ftc.loop.steering import Steering
 from beaver_ftc.loop.summary import verdict_of
 from beaver_ftc.plant.adapter import UnknownProperty
 from beaver_ftc.plant.gust import GustSchedule
 from beaver_ftc.scenario.given import fault_of, gust_of, is_same_again
 from beaver_ftc.scenario.schema import Scenario
-from beaver_ftc.scenario.signals import RAD_PER_DEG, sample_deg_s
-from beaver_ftc.scenario.sticks import StickTrack, flown, in_force
+from beaver_ftc.scenario.signals import RAD_PER_DEG
+from beaver_ftc.scenario.sticks import flown, in_force
 
 if TYPE_CHECKING:
     from beaver_ftc.control.base import Law
@@ -65,8 +66,7 @@ class Stepping:
         self._next, self._turn_at, self._written = 0, 0, 0
         self._status = FLYING
         self._by_hand = False
-        self._stick = StickTrack()
-        self._base: tuple[int, Vector] | None = None
+        self._steering = Steering(self._loop)
         self._last: list[Vector] = []  # rows of the last step, a piece a segment
         if self._sink is not None:
             self._sink.open(self._loop.columns)
@@ -223,11 +223,11 @@ class Stepping:
                 "the reference, sticks and faults"
             )
         self._begin()
-        return flown(self._scenario, self._faults, self._stick, self._next)
+        return flown(self._scenario, self._faults, self._steering.track, self._next)
 
     def _as_it_happened(self) -> Scenario:
         """The scenario of the verdict: as given if it was flown to its end and nobody interfered."""
-        if self.done and self._faults is self._scenario.faults and not self._stick.moved:
+        if self.done and self._faults is self._scenario.faults and not self._steering.track.moved:
             return self._scenario
         try:
             return self.scenario_flown()
@@ -238,8 +238,12 @@ class Stepping:
     def _outcome(self) -> Flight:
         """What the flight has yielded so far."""
         self._begin()
-        self._loop.scenario = self._as_it_happened()
-        return self._loop.land()
+        loop, flying = self._loop, self._loop.scenario
+        try:
+            loop.scenario = self._as_it_happened()
+            return loop.land()
+        finally:
+            loop.scenario = flying  # whose references are still to come, without the stick
 
     def _flush(self) -> None:
         """Hand the sink what has been flown since."""
@@ -255,9 +259,7 @@ class Stepping:
 
     @property
     def _surfaces(self) -> tuple[str, ...]:
-        from beaver_ftc.design.coefficients import SURFACES
-
-        return SURFACES
+        return self._loop.aircraft.surfaces
 
     @property
     def _now_s(self) -> float:
@@ -277,7 +279,7 @@ class Stepping:
             if k >= self._turn_at:
                 self._turn_at = loop.turn_to(k)
             stop = min(end, self._turn_at, (k // CHUNK_ROWS + 1) * CHUNK_ROWS)
-            self._steer(k, stop, stick_deg_s)
+            self._steering.put(k, stop, stick_deg_s)
             start = int(self._frame["row"])
             try:
                 self._status = loop.fly_segment(k, stop)
@@ -289,22 +291,6 @@ class Stepping:
         self._flush()
         self._written = 0
         self._loop.sample_references(k, min(CHUNK_ROWS, self._loop.n_frames - k))
-
-    def _steer(self, k: int, stop: int, stick_deg_s: Vector | None) -> None:
-        """Put the stick on top of the references of frames k to stop."""
-        self._stick.move(k, stick_deg_s)
-        if stick_deg_s is not None:
-            row = slice(k % CHUNK_ROWS, k % CHUNK_ROWS + stop - k)
-            self._loop.references[row] = (self._base_deg_s(k)[row] + stick_deg_s) * RAD_PER_DEG
-
-    def _base_deg_s(self, k: int) -> Vector:
-        """The scenario's own references of the chunk that frame k is in, (rows, 3) deg/s."""
-        start = k - k % CHUNK_ROWS
-        if self._base is None or self._base[0] != start:
-            end = min(start + CHUNK_ROWS, self._loop.n_frames)
-            t = np.arange(start, end) / self._scenario.rate_hz
-            self._base = start, sample_deg_s(self._scenario.reference, t)
-        return self._base[1]
 
     def _declare(self, faults: Sequence[Any]) -> None:
         self._faults = tuple(faults)

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import beaver_ftc
 from beaver_ftc.diagnosis.types import registry
+from beaver_ftc.paths import data_root
 
 HERE = Path(__file__).parent
 
@@ -54,6 +55,8 @@ print(said["isolated"], said["isolation_type"], said["estimate"])
 def test_a_new_type_is_found_and_named(tmp_path):
     package = tmp_path / "beaver_ftc"
     shutil.copytree(beaver_ftc.__path__[0], package, ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copytree(data_root() / "aircraft", package / "data" / "aircraft")
+    shutil.copytree(data_root() / "scenarios", package / "data" / "scenarios")
     types = package / "diagnosis" / "types"
     (types / "backwards.py").write_text(REVERSED)
     text = (types / "registry.py").read_text()

@@ -5,7 +5,7 @@ from synthetic import Flight, Scenario, rows
 
 from beaver_ftc.results.figures import draw, write_figures
 from beaver_ftc.results.log import ParquetLog
-from beaver_ftc.results.looks import closeup_window, marks
+from beaver_ftc.results.looks import LOOKS, closeup_window, marks
 from beaver_ftc.results.metrics import metrics
 from beaver_ftc.results.series import read_series
 from beaver_ftc.results.views import views
@@ -79,3 +79,15 @@ def test_views_of_a_log_without_estimators_leave_those_out(flight):
 def test_fault_that_never_came_is_not_marked():
     lost = Flight(detection_time_s=None, isolation_time_s=None, isolated=None, departure=(5.0, "beta"))
     assert [mark.name for mark in marks(metrics(lost))] == ["departure"]
+
+
+def test_no_two_curves_of_one_figure_look_the_same():
+    for view in views(Flight().columns):
+        if view.across > 1:
+            continue
+        looks = {}
+        for trace in (trace for panel in view.panels for trace in panel.traces if trace.label):
+            look = (LOOKS[trace.role].colour, LOOKS[trace.role].dash)
+            looks.setdefault(look, set()).add(trace.label)
+        if all(len(panel.traces) > 1 for panel in view.panels):
+            assert [labels for labels in looks.values() if len(labels) > 1] == [], view.name

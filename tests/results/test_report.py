@@ -143,6 +143,21 @@ def test_pointing_reads_the_value_of_the_log_with_its_unit(page, folder):
     assert said == f"{45 + 0.5 * np.sin(2.0):.2f} m/s"
 
 
+def test_the_contents_lead_to_every_section(page):
+    links = page.evaluate("[...document.querySelectorAll('#contents a')].map((a) => a.hash.slice(1))")
+    sections = page.evaluate("[...document.querySelectorAll('#views > section')].map((s) => s.id)")
+    assert links == sections
+    assert "detection" in links
+
+
+@pytest.mark.parametrize("ends", [(-4.6, 5.1), (0, 1), (-0.9, 5.2), (3.0, 3.0001), (-11, 22)])
+def test_a_value_axis_has_two_numbers_or_more_and_whole_words(page, ends):
+    low, high = ends
+    assert page.evaluate(f"valueTicks({low}, {high}, false, [], 2).length") >= 2
+    words = page.evaluate("valueTicks(0, 1, false, ['nominal', 'unanticipated'], 2).map((one) => one[1])")
+    assert words == ["nominal", "unanticipated"]
+
+
 def test_replay_moves_at_the_pace_of_the_flight_and_stops(page):
     page.evaluate("document.getElementById('play').click()")
     took = page.evaluate("""(async () => {

@@ -28,6 +28,7 @@ LOOKS = {
     "actual": Look(BLUE, (), 1.4, 4),
     "target": Look(ORANGE, (7, 3), 1.6, 5),
     "command": Look(GREY, (1.5, 2), 1.4, 3),
+    "residual": Look(BLACK, (), 1.2, 4),
     "bound": Look(VERMILION, (5, 3), 1.3, 3),
     "p": Look(ORANGE, (7, 3), 1.4, 4),
     "q": Look(BLUE, (), 1.4, 5),

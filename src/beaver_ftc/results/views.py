@@ -156,7 +156,7 @@ def _detection() -> View:
             (
                 Trace(f"{axis}_threshold_rad_s", "± threshold", "bound"),
                 Trace(f"{axis}_threshold_rad_s", "", "bound", -1.0),
-                Trace(f"{axis}_residual_rad_s", "residual", "actual"),
+                Trace(f"{axis}_residual_rad_s", "residual", "residual"),
             ),
         )
         for axis in AXES

@@ -144,7 +144,8 @@ function paintable(canvas, draw) {
 
 // ---- panels ----------------------------------------------------------------------------------------------------
 
-const MARGIN = { left: 52, right: 10, top: 12, bottom: 26 };
+const MARGIN = { left: 52, right: 10, top: 20, bottom: 26 };
+const STEPS_LEFT = 86; // room for the longest name of a mode
 const BAND = 6;
 const LOWEST = 1e-2;
 const MODE_COLOURS = DATA.modes.map(([, colour]) => colour);
@@ -154,6 +155,7 @@ class Panel {
     Object.assign(this, { spec, runs, run });
     this.canvas = make("canvas", { role: "img", ariaLabel: `${spec.label} against time` });
     this.readouts = spec.traces.map(() => make("output"));
+    this.left = spec.steps.length ? STEPS_LEFT : MARGIN.left;
     this.element = make("figure", { className: spec.steps.length ? "panel steps" : "panel" }, this.caption(), this.canvas);
     paintable(this.canvas, (pen, width, height) => this.draw(pen, width, height));
     this.listen();
@@ -197,8 +199,8 @@ class Panel {
   }
 
   timeAt(x) {
-    const width = this.canvas.clientWidth - MARGIN.left - MARGIN.right;
-    const share = Math.min(1, Math.max(0, (x - MARGIN.left) / width));
+    const width = this.canvas.clientWidth - this.left - MARGIN.right;
+    const share = Math.min(1, Math.max(0, (x - this.left) / width));
     return clock.start + share * (clock.end - clock.start);
   }
 
@@ -228,7 +230,7 @@ class Panel {
 
   draw(pen, width, height) {
     const [low, high] = this.range(), log = this.spec.log;
-    const left = MARGIN.left, right = width - MARGIN.right, top = MARGIN.top, bottom = height - MARGIN.bottom;
+    const left = this.left, right = width - MARGIN.right, top = MARGIN.top, bottom = height - MARGIN.bottom;
     const scale = log ? Math.log10 : Number;
     const x = (t) => left + ((t - clock.start) / (clock.end - clock.start)) * (right - left);
     const y = (v) => bottom - ((scale(v) - scale(low)) / (scale(high) - scale(low))) * (bottom - top);
@@ -323,22 +325,25 @@ class Panel {
   }
 
   drawMarks({ pen, x, left, right, top, bottom }) {
-    this.run.marks.forEach((mark, rank) => {
+    let free = -Infinity; // where the next badge can stand: above the panel, beside the one before
+    for (const mark of this.run.marks) {
       const at = x(mark.time_s);
-      if (at < left - 0.5 || at > right + 0.5) return;
+      if (at < left - 0.5 || at > right + 0.5) continue;
+      const badge = Math.max(at, free);
+      free = badge + 13;
       pen.strokeStyle = pen.fillStyle = mark.colour;
       pen.lineWidth = 1;
+      line(pen, badge, top - 4, at, top);
       pen.setLineDash(mark.dash);
       line(pen, at, top, at, bottom);
       pen.setLineDash([]);
-      const up = top - 6 + rank * 13;
-      pen.fillRect(at - 5.5, up, 11, 12);
+      pen.fillRect(badge - 5.5, top - 16, 11, 12);
       pen.fillStyle = "#fff";
       pen.textAlign = "center";
       pen.textBaseline = "middle";
       pen.font = "bold 9px system-ui, sans-serif";
-      pen.fillText(mark.letter, at, up + 6.5);
-    });
+      pen.fillText(mark.letter, badge, top - 9.5);
+    }
   }
 
   drawCursor({ pen, x, left, right, top, bottom }, series) {
@@ -370,13 +375,14 @@ function line(pen, x0, y0, x1, y1) {
 
 /** Values and labels along the value axis. */
 function valueTicks(low, high, log, steps, count) {
-  if (steps.length) return steps.map((name, i) => [i, name.length > 7 ? name.slice(0, 6) + "…" : name]);
+  if (steps.length) return steps.map((name, i) => [i, name]);
   if (log) {
     const decades = [];
     for (let d = Math.ceil(Math.log10(low) - 1e-9); d <= Math.log10(high) + 1e-9; d++) decades.push([10 ** d, String(+(10 ** d).toPrecision(1))]);
     return decades;
   }
-  const found = ticks(low, high, Math.max(2, count));
+  let wanted = Math.max(2, count), found = ticks(low, high, wanted);
+  while (found.values.length < 2 && wanted < 40) found = ticks(low, high, wanted *= 2);
   return found.values.map((value) => [value, value.toFixed(found.digits)]);
 }
 
@@ -630,6 +636,7 @@ function section(view) {
 
 byId("space").append(...DATA.runs.map((run) => new Space(run).element));
 byId("views").append(...DATA.views.map(section));
+byId("contents").append(...DATA.views.map((view) => make("a", { href: `#${view.name}`, textContent: view.title.split(":")[0] })));
 byId("time").max = END;
 byId("time").oninput = (event) => setTime(Number(event.target.value));
 byId("play").onclick = () => play(!clock.playing);

@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import expm
 
+from beaver_ftc.aircraft import load
 from beaver_ftc.control import power
 from beaver_ftc.control.state import ORACLE
 from beaver_ftc.design import fdc
@@ -13,7 +14,7 @@ from beaver_ftc.design.coefficients import value
 from beaver_ftc.design.model import ELEVATOR, FLAP, RUDDER
 from beaver_ftc.errors import BadInput
 from beaver_ftc.loop.assembly import assemble
-from beaver_ftc.plant.trim import MANIFOLD_PRESSURE_INHG, trim
+from beaver_ftc.plant.trim import trim
 from beaver_ftc.results.metrics import metrics
 from beaver_ftc.results.verdict import facts
 from beaver_ftc.results.views import views
@@ -175,7 +176,9 @@ class TestTheDesign:
 
     def test_the_range_is_the_engines(self):
         config = EnginePower()
-        assert (config.lowest_inhg, config.highest_inhg) == MANIFOLD_PRESSURE_INHG
+        assert (config.lowest_inhg, config.highest_inhg) == load().engine.settings[
+            "manifold_pressure_inhg"
+        ].range
 
     def test_it_is_the_loop_of_the_report(self):
         assert closed_loop(*self.plant(45.0), EnginePower()) == pytest.approx(self.loop(45.0), abs=1e-12)

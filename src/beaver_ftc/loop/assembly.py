@@ -7,7 +7,6 @@ import numpy as np
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.control.reference_model import discretise
 from beaver_ftc.control.state import FAULT_TOLERANT, ORACLE, law_of
-from beaver_ftc.design.coefficients import value
 from beaver_ftc.design.engine import engine_power_kw, slipstream
 from beaver_ftc.design.variants import design_of, mass_of
 from beaver_ftc.diagnosis.admitted import admit, gyros_vary, poles_for_noise
@@ -98,7 +97,7 @@ def _assemble_types(frame: np.void, scenario: Scenario, dt: float, travel: np.nd
     fdi["pair"]["first"] = -1
     fdi["pair"]["enabled"] = config.pairs
     if config.pairs:
-        _assemble_pairs(fdi)
+        _assemble_pairs(fdi, scenario.airframe)
     fdi["instants"], fdi["returns"] = scenario.substeps, actuators["real"]
     surfaces = scenario.airframe.surfaces
     for s, (name, place, low, high) in enumerate(zip(surfaces, fdi["surface"], *travel, strict=True)):
@@ -110,18 +109,25 @@ def _assemble_types(frame: np.void, scenario: Scenario, dt: float, travel: np.nd
         place["least_runaway_rate"] = 0.5 * (radians(rate_deg_s) or RUNAWAY_RATE_RAD_S)
 
 
-def _assemble_pairs(fdi: np.void) -> None:
-    """Each plane is asked for itself: pitch by elevator and flap, roll and yaw by ailerons and rudder."""
+def _assemble_pairs(fdi: np.void, aircraft: Aircraft) -> None:
+    """Each plane is asked for itself: pitch by its two surfaces, roll and yaw by theirs."""
+    if sorted(fdi["layout"]["group"]) != [IN_PITCH, IN_PITCH, IN_ROLL_AND_YAW, IN_ROLL_AND_YAW]:
+        raise BadInput(
+            f"fdi.pairs: {aircraft.name} has not two surfaces in pitch, two in roll and yaw, allowed: false"
+        )
     for fie in fdi["estimator"][: fdi["n_estimators"]]:
         fie["unasked"] = (1, 0, 1) if fdi["layout"]["group"][fie["surface"]] == IN_PITCH else (0, 1, 0)
 
 
 def leaders_of(aircraft: Aircraft) -> list[int]:
-    """The surface that leads each axis, or -1."""
+    """The surface that leads each of roll, pitch and yaw. Raises BadInput where none does."""
     leads = {
         aircraft.dominant_axis[s]: s for s, name in enumerate(aircraft.surfaces) if name in aircraft.primary
     }
-    return [leads.get(axis, -1) for axis in range(3)]
+    for axis, name in enumerate(("roll", "pitch", "yaw")):
+        if axis not in leads:
+            raise BadInput(f"{aircraft.name}: no surface turns it most in {name}, allowed: one for each axis")
+    return [leads[axis] for axis in range(3)]
 
 
 def _assemble_layout(layout: np.void, members: tuple[Member, ...], aircraft: Aircraft) -> None:
@@ -203,7 +209,14 @@ def _assemble_probing(control: np.void, probing: Probing | None, dt: float) -> N
 def power_is_at_hand(scenario: Scenario) -> bool:
     """Whether the built-in law of a scenario may use the engine."""
     law, every_type = law_of(scenario.control.law)[0], scenario.fdi.fault_class == "all"
-    return scenario.control.power.enabled and (law == ORACLE or (law == FAULT_TOLERANT and every_type))
+    wanted = scenario.control.power.enabled and (law == ORACLE or (law == FAULT_TOLERANT and every_type))
+    return wanted and _has_piston_engine(scenario.airframe)
+
+
+def _has_piston_engine(aircraft: Aircraft) -> bool:
+    """Whether the power law knows the engine: manifold pressure is what it moves."""
+    setting = aircraft.engine.settings.get("manifold_pressure_inhg")
+    return setting is not None and setting.property == aircraft.trim.throttle
 
 
 def _assemble_power(control: np.void, scenario: Scenario, dt: float) -> None:
@@ -216,20 +229,22 @@ def _assemble_power(control: np.void, scenario: Scenario, dt: float) -> None:
         ("smoothing", config.smoothing_s), ("washout", config.washout_s), ("leak", config.attitude_memory_s),
     ):  # fmt: skip
         power[name] = 1.0 - exp(-dt / lag_s)
+    if not _has_piston_engine(scenario.airframe):
+        return
     trim = initial.manifold_pressure_inhg
     power["trim"] = power["command"] = power["least"] = power["greatest"] = trim
     power["low"], power["high"] = min(config.lowest_inhg, trim), max(config.highest_inhg, trim)
     power["step"] = config.rate_inhg_s * dt
-    power["dpt_factor"], power["highest_dpt"] = _slipstream_limits(initial.engine_rpm, control)
+    power["dpt_factor"], power["highest_dpt"] = _slipstream_limits(scenario, control)
 
 
-def _slipstream_limits(engine_rpm: float, control: np.void) -> tuple[float, float]:
+def _slipstream_limits(scenario: Scenario, control: np.void) -> tuple[float, float]:
     """rho V^3 d dpt / d pz of the engine [FDC], kg/(m3) (m/s)^3 per inHg; and the dpt at which holding the
     propeller's yawing moment takes YAW_SHARE of the rudder's travel."""
-    kw_per_inhg = engine_power_kw(engine_rpm, 1.0, 1.0) - engine_power_kw(engine_rpm, 0.0, 1.0)
-    rudder = control["main"][YAW]
+    rpm, terms, rudder = scenario.initial.engine_rpm, scenario.airframe.terms, control["main"][YAW]
+    kw_per_inhg = engine_power_kw(rpm, 1.0, 1.0) - engine_power_kw(rpm, 0.0, 1.0)
     rudder_rad = min(-control["low"][rudder], control["high"][rudder])
-    dpt3 = YAW_SHARE * value("Cn_dr") * rudder_rad / value("Cn_dpt3")
+    dpt3 = YAW_SHARE * terms["Cn_dr"].value * rudder_rad / terms["Cn_dpt3"].value
     return slipstream(kw_per_inhg, 1.0, 1.0) - slipstream(0.0, 1.0, 1.0), max(dpt3, 0.0) ** (1.0 / 3.0)
 
 

@@ -8,7 +8,6 @@ import numpy as np
 
 from beaver_ftc.control.base import Law, Reference
 from beaver_ftc.control.state import ADAPTIVE, NOMINAL, ORACLE
-from beaver_ftc.design.coefficients import SURFACES
 from beaver_ftc.design.context import Context, DesignModel
 from beaver_ftc.diagnosis.base import Detector, Measured, Verdict
 from beaver_ftc.diagnosis.declared import declared_of
@@ -22,7 +21,6 @@ from beaver_ftc.plugins import DETECTORS, LAWS, is_compiled, made
 from beaver_ftc.scenario.schema import Scenario
 
 _AXES = {"p": 0, "q": 1, "r": 2, None: 0}
-_ISOLATED = {None: NOT_ISOLATED, "unanticipated": UNANTICIPATED} | {s: i for i, s in enumerate(SURFACES)}
 
 
 class PluginFrame:
@@ -43,6 +41,9 @@ class PluginFrame:
         self.verdict = Verdict()
         self.held_rad: np.ndarray | None = None  # a command (surfaces,) that takes the law's place
         self._names = names
+        self._surfaces = surfaces = context[0].surfaces
+        self._isolated = {None: NOT_ISOLATED, "unanticipated": UNANTICIPATED}
+        self._isolated |= {surface: s for s, surface in enumerate(surfaces)}
         self._t_s = 0.0
         if detector is not None:
             self._ask(names[0], detector.reset, context[0])
@@ -86,7 +87,7 @@ class PluginFrame:
             control["model_rate"].copy(),
             control["model_acceleration"].copy(),
         )
-        verdict = self.verdict if self.detector is not None else verdict_of(frame)
+        verdict = self.verdict if self.detector is not None else verdict_of(frame, self._surfaces)
         answer = self._ask(self._names[1], self.law.step, measured, reference, verdict)
         steps.take_command(frames, self._deflections(answer))
 
@@ -109,15 +110,15 @@ class PluginFrame:
             self._blame(name, f"step returned {type(verdict).__name__}, allowed: a Verdict")
         if verdict.axis not in _AXES:
             self._blame(name, f"verdict.axis is {verdict.axis!r}, allowed: p, q, r or None")
-        if verdict.isolated not in _ISOLATED:
-            allowed = ", ".join(str(key) for key in _ISOLATED)
+        if verdict.isolated not in self._isolated:
+            allowed = ", ".join(str(key) for key in self._isolated)
             self._blame(name, f"verdict.isolated is {verdict.isolated!r}, allowed: {allowed}")
         taken["detected"], taken["axis"] = bool(verdict.detected), _AXES[verdict.axis]
-        taken["isolated"] = _ISOLATED[verdict.isolated]
+        taken["isolated"] = self._isolated[verdict.isolated]
         taken["theta"] = 0.0 if verdict.estimate is None else self._finite(verdict.estimate)
         taken["estimates"] = verdict.effectiveness is not None
         if verdict.effectiveness is not None:
-            taken["effectiveness"] = self._four(name, "verdict.effectiveness", verdict.effectiveness)
+            taken["effectiveness"] = self._a_number_each(name, "verdict.effectiveness", verdict.effectiveness)
 
     def _finite(self, value: Any) -> float:
         if not isinstance(value, float | int | np.floating) or not isfinite(value):
@@ -125,17 +126,17 @@ class PluginFrame:
         return float(value)
 
     def _deflections(self, answer: Any) -> np.ndarray:
-        return self._four(self._names[1], "the command", answer)
+        return self._a_number_each(self._names[1], "the command", answer)
 
-    def _four(self, name: str, what: str, values: Any) -> np.ndarray:
-        """Four finite numbers, or the plug-in is to blame."""
+    def _a_number_each(self, name: str, what: str, values: Any) -> np.ndarray:
+        """A finite number for each surface, or the plug-in is to blame."""
         try:
             array = np.asarray(values, dtype=float)
         except (TypeError, ValueError):
             array = np.empty(0)
-        if array.shape != (4,):
+        if array.shape != (len(self._surfaces),):
             shape = f"shape {array.shape}" if array.size else f"type {type(values).__name__}"
-            self._blame(name, f"{what} has {shape}, allowed: four numbers")
+            self._blame(name, f"{what} has {shape}, allowed: {len(self._surfaces)} numbers")
         if not np.isfinite(array).all():
             self._blame(name, f"{what} is not finite: {array.tolist()}")
         return array
@@ -171,9 +172,15 @@ def context_of(
         constant_rad_s2=fdi["bound"]["constant"].copy(),
         inertia_coupling=fdi["bound"]["inertia"].copy(),
         seed=scenario.seed,
+        surfaces=scenario.airframe.surfaces,
         options=dict(options),
         declared=declared_of(
-            scenario.fdi.bounds, scenario.actuators, frames["belief"]["design"], trim_y, control["trim"]
+            scenario.fdi.bounds,
+            scenario.actuators,
+            frames["belief"]["design"],
+            trim_y,
+            control["trim"],
+            scenario.airframe,
         ),
     )
 
@@ -219,4 +226,4 @@ def _names(scenario: Scenario, detector: Detector | None, law: Law | None) -> tu
 def _clear_for_detector(fdi: np.void) -> None:
     """No built-in isolation; instead, one estimator a surface for the plug-in's verdict."""
     fdi["enabled"] = fdi["n_estimators"] = fdi["every_type"] = fdi["statistical"]["enabled"] = 0
-    fdi["estimator"]["surface"][: len(SURFACES)] = range(len(SURFACES))
+    fdi["estimator"]["surface"][: fdi["surface"].size] = range(fdi["surface"].size)

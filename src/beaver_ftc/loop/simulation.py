@@ -123,7 +123,7 @@ class Stepping:
     def verdict(self) -> "Verdict":
         """What the diagnosis makes of the flight so far."""
         plugins = self._loop.plugin_frame
-        return plugins.verdict if plugins and plugins.detector else verdict_of(self._frame)
+        return plugins.verdict if plugins and plugins.detector else verdict_of(self._frame, self._surfaces)
 
     @property
     def mode(self) -> str:

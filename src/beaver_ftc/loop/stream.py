@@ -116,7 +116,7 @@ class Diagnosis:
     def _say(self) -> Verdict:
         """The verdict; its words are looked for only when there are others."""
         if self._news(self._frames, self._known):
-            self._said = verdict_of(self._frame)
+            self._said = verdict_of(self._frame, self._aircraft.surfaces)
         elif self._said.estimate is not None:
             self._said = self._said._replace(estimate=self._estimate())
         return self._said
@@ -124,7 +124,7 @@ class Diagnosis:
     def _estimate(self) -> float | None:
         if self._scenario.fdi.fault_class == "published":
             return float(self._theta(self._frames))
-        return estimate_now(self._fdi, self._said)
+        return estimate_now(self._fdi, self._said, self._aircraft.surfaces)
 
     def _begin(self) -> None:
         """Show the design model and the statistics the flight condition they hold on to."""

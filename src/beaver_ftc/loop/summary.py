@@ -6,7 +6,6 @@ from math import isfinite
 import numpy as np
 
 from beaver_ftc.control.supervisor import MAX_EVENTS, MODES
-from beaver_ftc.design.coefficients import SURFACES
 from beaver_ftc.design.model import AXES
 from beaver_ftc.diagnosis.base import Verdict
 from beaver_ftc.diagnosis.scheme import isolated_theta
@@ -124,7 +123,7 @@ def _statistical(fdi: np.void) -> dict[str, float | None] | None:
     }
 
 
-def verdict_of(frame: np.void, surfaces: Sequence[str] = SURFACES) -> Verdict:
+def verdict_of(frame: np.void, surfaces: Sequence[str]) -> Verdict:
     """What the built-in diagnosis makes of the flight so far, as a plug-in law is given it."""
     fdi = frame["fdi"]
     if not fdi["verdict"]["detected"]:
@@ -140,9 +139,9 @@ def verdict_of(frame: np.void, surfaces: Sequence[str] = SURFACES) -> Verdict:
     )
 
 
-def estimate_now(fdi: np.void, said: Verdict) -> float | None:
+def estimate_now(fdi: np.void, said: Verdict, surfaces: Sequence[str]) -> float | None:
     """The estimate of a verdict that otherwise still stands, of a diagnosis for every type."""
-    surface = SURFACES.index(str(said.isolated))
+    surface = surfaces.index(str(said.isolated))
     kind = fdi["surface"][surface]["type"] if fdi["pair"]["enabled"] else fdi["verdict"]["type"]
     return estimate_of(fdi, surface, int(kind))
 

@@ -186,7 +186,7 @@ def test_with_substeps_and_other_rates_the_model_still_explains_the_flight():
         ("NotAVerdict", "step returned bool, allowed: a Verdict"),
         ("UnknownSurface", "verdict.isolated is 'canard', allowed: None, unanticipated, aileron"),
         ("NanEstimate", "verdict.estimate is nan, allowed: a finite number"),
-        ("ThreeEffectivenesses", "verdict.effectiveness has shape (3,), allowed: four numbers"),
+        ("ThreeEffectivenesses", "verdict.effectiveness has shape (3,), allowed: 4 numbers"),
         ("WrongAxis", "verdict.axis is 'yaw', allowed: p, q, r or None"),
     ],
 )
@@ -203,8 +203,8 @@ def test_a_bad_detector_is_named(name, says):
     ("name", "says"),
     [
         ("NanLaw", "the command is not finite"),
-        ("ThreeSurfaces", "the command has shape (3,), allowed: four numbers"),
-        ("TextLaw", "the command has type str, allowed: four numbers"),
+        ("ThreeSurfaces", "the command has shape (3,), allowed: 4 numbers"),
+        ("TextLaw", "the command has type str, allowed: 4 numbers"),
         ("RaisingLaw", "step raised IndexError: no such layer"),
     ],
 )

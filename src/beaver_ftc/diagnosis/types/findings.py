@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from beaver_ftc.design.coefficients import SURFACES
+from beaver_ftc.aircraft import load
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, UNANTICIPATED
 from beaver_ftc.diagnosis.types.candidates import BY_DEDUCTION, RULED_OUT
 from beaver_ftc.diagnosis.types.pairs import IN_PITCH
@@ -40,11 +40,12 @@ _NOTHING: Found = {
 }
 
 
-def found(fdi: np.void, surfaces: Sequence[str] = SURFACES) -> Found:
+def found(fdi: np.void, surfaces: Sequence[str] | None = None) -> Found:
     """isolated, isolation_type, candidates, estimate and more of a Flight diagnosed for every type.
 
-    surfaces: their names, by default the Beaver's.
+    surfaces: their names, by default the built-in aircraft's.
     """
+    surfaces = load().surfaces if surfaces is None else surfaces
     if not fdi["verdict"]["detected"]:
         return dict(_NOTHING)
     if fdi["pair"]["enabled"]:

@@ -15,9 +15,9 @@ from pathlib import Path
 
 import numpy as np
 
-from beaver_ftc.paths import data_root
-from beaver_ftc.plant import adapter
+from beaver_ftc.aircraft import load
 from beaver_ftc.plant.adapter import Plant
+from beaver_ftc.plant.model_file import with_systems
 from beaver_ftc.plant.state import FlightState
 from beaver_ftc.plant.trim import trim
 from beaver_ftc.studies.bench.stopwatch import Timing, interleave
@@ -54,10 +54,9 @@ def without_bias_and_oscillation(root: ET.Element) -> None:
 
 def without_surfaces(root: ET.Element) -> None:
     """No flight control system: the commands go to the aerodynamics."""
-    control = root.find("flight_control")
-    assert control is not None
-    for channel in control.findall("channel"):
-        control.remove(channel)
+    for system in root.findall("system"):
+        root.remove(system)
+    control = ET.SubElement(root, "flight_control")
     for s in SURFACES:
         for name in (f"fcs/{s}-pos-rad", f"fcs/{s}-effective-rad"):
             ET.SubElement(control, "property", value="0").text = name
@@ -172,14 +171,10 @@ VARIANTS: dict[str, Callable[[ET.Element], None]] = {
 
 
 class Variant:
-    """A contender: a Beaver from this folder, from a trimmed state, with the surfaces held."""
+    """A contender: an aircraft from this model, from a trimmed state, with the surfaces held."""
 
-    def __init__(self, folder: Path, state: FlightState) -> None:
-        adapter.data_root = lambda: folder  # type: ignore[assignment]
-        try:
-            self._plant = Plant(rate_hz=100)
-        finally:
-            adapter.data_root = data_root
+    def __init__(self, model: Path, state: FlightState) -> None:
+        self._plant = Plant(rate_hz=100, model=model)
         self._state = state
 
     def prepare(self) -> None:
@@ -194,13 +189,13 @@ class Variant:
 
 
 def write_variant(folder: Path, change: Callable[[ET.Element], None]) -> Path:
-    """A root folder for JSBSim with the changed aircraft in it."""
-    tree = ET.parse(data_root() / "aircraft" / "beaver" / "beaver.xml")
-    change(tree.getroot())
-    aircraft = folder / "aircraft" / "beaver"
-    aircraft.mkdir(parents=True)
-    tree.write(aircraft / "beaver.xml")
-    return folder
+    """The changed model, as one file in a folder of its own."""
+    root = with_systems(load().jsbsim)
+    change(root)
+    folder.mkdir()
+    model = folder / load().jsbsim.name
+    ET.ElementTree(root).write(model)
+    return model
 
 
 def measure(rounds: int) -> np.ndarray:
@@ -208,7 +203,7 @@ def measure(rounds: int) -> np.ndarray:
     plant = Plant(rate_hz=100)
     state = trim(45.0, 1828.8, plant=plant)
     with tempfile.TemporaryDirectory() as folder:
-        contenders = [Variant(data_root(), state)]
+        contenders = [Variant(load().jsbsim, state)]
         for i, change in enumerate(VARIANTS.values()):
             contenders.append(Variant(write_variant(Path(folder) / str(i), change), state))
         return interleave(contenders, rounds, FRAMES)

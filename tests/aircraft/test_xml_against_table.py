@@ -1,10 +1,9 @@
 """The aircraft's XML is the sourced table, term by term."""
 
-import re
-from xml.etree import ElementTree
-
 import pytest
+from tools.actuators import files
 
+from beaver_ftc.aircraft import load
 from beaver_ftc.design.coefficients import (
     COEFFICIENTS,
     ENVELOPE_AIRSPEED_MPS,
@@ -17,7 +16,7 @@ from beaver_ftc.design.coefficients import (
     coefficient_terms,
     inertia_coefficients,
 )
-from beaver_ftc.paths import data_root
+from beaver_ftc.plant.model_file import with_systems
 
 PROPERTY_OF = {
     "alpha": "aero/alpha-rad",
@@ -40,7 +39,7 @@ SLUG_FT2_PER_KG_M2 = 1 / (KG_PER_SLUG * 0.3048**2)
 
 @pytest.fixture(scope="module")
 def xml():
-    return ElementTree.parse(data_root() / "aircraft" / "beaver" / "beaver.xml").getroot()
+    return with_systems(load().jsbsim)
 
 
 @pytest.fixture(scope="module")
@@ -135,11 +134,8 @@ def test_travel_is_the_table_s(xml, surface):
     assert ends == [TRAVEL[surface].min_rad, TRAVEL[surface].max_rad]
 
 
-def test_the_four_actuators_are_one_text(xml):
-    """JSBSim has no macros: the four channels are copies, and stay copies."""
-
-    def text(surface):
-        channel = next(each for each in xml.iter("channel") if each.get("name") == surface)
-        return re.sub(rf"\b{surface}\b", "SURFACE", ElementTree.tostring(channel, encoding="unicode"))
-
-    assert len({text(surface).strip() for surface in SURFACES}) == 1
+def test_the_actuators_are_written_from_their_template():
+    """JSBSim has no macros: the files are copies of one text, and stay copies."""
+    assert {path.stem for path in files() if path.is_relative_to(load().folder)} == set(SURFACES)
+    for path, text in files().items():
+        assert path.read_text() == text, "run python -m tools.actuators"

@@ -1,6 +1,5 @@
 import re
 from pathlib import Path
-from xml.etree import ElementTree
 
 import pytest
 from tools.docs.generate import lighten
@@ -8,6 +7,7 @@ from tools.docs.properties import as_markdown, meaning_of
 
 from beaver_ftc.errors import BadInput
 from beaver_ftc.plant.adapter import Plant
+from beaver_ftc.plant.model_file import with_systems
 from beaver_ftc.studies.reproduce.claims import CLAIMS
 from beaver_ftc.studies.reproduce.figures import FIGURES
 
@@ -30,7 +30,7 @@ def test_every_property_on_the_page_is_one_the_aircraft_has():
 
 
 def test_every_named_property_of_the_xml_is_on_the_page():
-    root = ElementTree.parse(ROOT / "aircraft/beaver/beaver.xml").getroot()
+    root = with_systems(ROOT / "aircraft/beaver/beaver.xml")
     named = {e.get("name") for e in root.iter() if e.tag in ("function", "fcs_function") and e.get("name")}
     valued = {e.text.strip() for e in root.iter("property") if "value" in e.attrib}
     page = as_markdown()

@@ -2,12 +2,12 @@
 
 import re
 from collections.abc import Iterable, Sequence
-from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
 from beaver_ftc.design.coefficients import SURFACES
 from beaver_ftc.errors import BadInput
 from beaver_ftc.paths import data_root
+from beaver_ftc.plant.model_file import with_systems
 
 _XML = "aircraft/beaver/beaver.xml"
 _OPERATIONS = ("product", "sum", "max", "ifthen")
@@ -50,7 +50,7 @@ scenarios set them by `faults:`, `uncertainty:` and `actuators:` ([scenarios](sc
 
 def as_markdown() -> str:
     """The page: what can be set, what can be read, and each aerodynamic term with its scale."""
-    root = ElementTree.parse(data_root() / _XML).getroot()
+    root = with_systems(data_root() / _XML)
     inputs, functions = _inputs(root), _functions(root)
     terms = [element for element in functions if _is_term(element)]
     others = [element for element in functions if not _is_term(element)]

@@ -1,0 +1,18 @@
+"""The actuator of one surface as JSBSim's XML: written from the one template, `aircraft/actuator.xml`."""
+
+from functools import lru_cache
+
+from beaver_ftc.paths import data_root
+
+
+@lru_cache
+def _template() -> str:
+    return (data_root() / "aircraft" / "actuator.xml").read_text(encoding="utf-8")
+
+
+def actuator_system(surface: str, low_rad: float, high_rad: float) -> str:
+    """A system file for a surface that travels from low_rad to high_rad."""
+    start = _template().index("<system")
+    text = _template()[start:].replace("SURFACE", surface)
+    text = text.replace("MIN-RAD", f"{low_rad!r}").replace("MAX-RAD", f"{high_rad!r}")
+    return f'<?xml version="1.0"?>\n<!-- From aircraft/actuator.xml: change that. -->\n{text}'

@@ -55,11 +55,15 @@ def mode_from(control, fdi):
     elevator = control.main[PITCH]
     if not fdi.every_type:
         return mode_of(
-            control.law, fdi.verdict.detected, fdi.verdict.isolated, isolated_surface(fdi) == elevator
+            control.law,
+            fdi.verdict.detected,
+            fdi.verdict.isolated,
+            isolated_surface(fdi) == elevator and control.stand_in >= 0,
         )
     replaced = fdi.verdict.lead_kind in (LOSES, FIXED)
+    relieved = replaced and fdi.verdict.lead == elevator and control.stand_in >= 0
     isolated = fdi.verdict.lead if replaced else min(fdi.verdict.isolated, 0)
-    return mode_of(control.law, fdi.verdict.detected, isolated, replaced and fdi.verdict.lead == elevator)
+    return mode_of(control.law, fdi.verdict.detected, isolated, relieved)
 
 
 @kernel

@@ -2,23 +2,27 @@
 
     u[k+1] = u[k] + limited((command - u[k]) (1 - exp(-bandwidth dt))),   |limited| <= rate dt
 
-the discretisation of aircraft/beaver/beaver.xml, one step a JSBSim frame, so that a healthy surface is where
+the discretisation of aircraft/actuator.xml, one step a JSBSim frame, so that a healthy surface is where
 the model has it.
 """
+
+from functools import lru_cache
 
 import numpy as np
 
 from beaver_ftc.compiled import kernel
 
-ACTUATORS = np.dtype(
-    [
+
+@lru_cache
+def actuators_dtype(n: int) -> np.dtype:
+    """The actuators of n surfaces."""
+    fields = [
         ("real", "i8"),
-        ("approach", "f8", (4,)),  # share of the way to the command in one JSBSim frame; 1 without lag
-        ("step", "f8", (4,)),  # rad, the furthest in one JSBSim frame
-        ("low", "f8", (4,)), ("high", "f8", (4,)),
-    ],
-    align=True,
-)  # fmt: skip
+        ("approach", "f8", (n,)),  # share of the way to the command in one JSBSim frame; 1 without lag
+        ("step", "f8", (n,)),  # rad, the furthest in one JSBSim frame
+        ("low", "f8", (n,)), ("high", "f8", (n,)),
+    ]  # fmt: skip
+    return np.dtype(fields, align=True)
 
 
 @kernel
@@ -29,11 +33,11 @@ def nearer(u, wanted, approach, step):
 
 @kernel
 def move(actuators, command, u):
-    """Move the surfaces u (4,) rad by one JSBSim frame towards command (4,) rad."""
+    """Move the surfaces u (n,) rad by one JSBSim frame towards command (n,) rad."""
     if not actuators.real:
         u[:] = command
         return
-    for s in range(4):
+    for s in range(u.size):
         wanted = min(max(command[s], actuators.low[s]), actuators.high[s])
         there = nearer(u[s], wanted, actuators.approach[s], actuators.step[s])
         u[s] = min(max(there, actuators.low[s]), actuators.high[s])

@@ -11,7 +11,7 @@ from functools import lru_cache
 import numpy as np
 
 from beaver_ftc.compiled import kernel
-from beaver_ftc.design.actuators import ACTUATORS, move
+from beaver_ftc.design.actuators import actuators_dtype, move
 from beaver_ftc.design.model import design_dtype
 from beaver_ftc.design.variants import response
 from beaver_ftc.diagnosis.derived import changing_error, derived_bound, slack_per_rad
@@ -42,7 +42,7 @@ def means_dtype(n: int) -> np.dtype:
 def belief_dtype(n: int) -> np.dtype:
     """The belief about an aircraft with n surfaces; rad, rad/s, rad/s2."""
     fields = [
-        ("design", design_dtype(n)), ("actuators", ACTUATORS),
+        ("design", design_dtype(n)), ("actuators", actuators_dtype(n)),
         ("share", "f8"),  # one over the instants in a frame
         ("commanded", "f8", (n,)),
         ("u", "f8", (n,)), ("u_then", "f8", (n,)),  # where healthy surfaces are under it, and where they were

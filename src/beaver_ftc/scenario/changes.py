@@ -8,6 +8,8 @@ from typing import Any, TypeVar
 import numpy as np
 from pydantic import BaseModel
 
+from beaver_ftc.aircraft import Aircraft, load
+from beaver_ftc.aircraft.question import asked
 from beaver_ftc.errors import BadInput
 from beaver_ftc.scenario.base import Location
 from beaver_ftc.scenario.consistency import conflicts_in_data
@@ -29,7 +31,13 @@ def changed(scenario: _Model, changes: Mapping[str, Any]) -> _Model:
             data = with_values(data, {_parsed(key): plain(value)})
         except UnusableKeyError as error:
             raise BadInput(f"{key}: {str(error).replace('the base', 'the scenario')}") from None
-    return validate(type(scenario), Document(data), "", Path(), conflicts_in_data)
+    with asked(*aircraft_of(scenario)):
+        return validate(type(scenario), Document(data), "", Path(), conflicts_in_data)
+
+
+def aircraft_of(scenario: BaseModel) -> tuple[Aircraft, str | None]:
+    """The aircraft a scenario flies, and what it calls it."""
+    return getattr(scenario, "airframe", None) or load(), getattr(scenario, "aircraft", None)
 
 
 def _parsed(key: Any) -> Location:

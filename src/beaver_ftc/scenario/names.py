@@ -6,7 +6,7 @@ from typing import Annotated, Any
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo
 
 from beaver_ftc.aircraft import UnknownAircraft, load
-from beaver_ftc.aircraft.question import in_question
+from beaver_ftc.aircraft.question import in_question, named
 from beaver_ftc.errors import suggestion
 from beaver_ftc.scenario.base import Number, refuse
 
@@ -59,7 +59,7 @@ def nameable(name: str) -> str:
 def known_aircraft(reference: str, info: ValidationInfo) -> str:
     """Refuse what is no aircraft."""
     try:
-        load(reference, folder_of(info))
+        named(reference, folder_of(info))
     except UnknownAircraft as error:
         refuse([((), str(error))])
     return reference

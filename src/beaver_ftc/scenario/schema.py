@@ -16,7 +16,7 @@ from pydantic import (
 )
 
 from beaver_ftc.aircraft import DEFAULT, Aircraft, UnknownAircraft, load
-from beaver_ftc.aircraft.question import asked, in_question
+from beaver_ftc.aircraft.question import asked, named
 from beaver_ftc.scenario.actuators import Actuators
 from beaver_ftc.scenario.base import Flag, Number, Section, Whole, number, refuse
 from beaver_ftc.scenario.consistency import DURATION_S, RATE_HZ, Outline, conflicts
@@ -272,11 +272,12 @@ class Scenario(Section):
     ) -> Self:
         """Check names against the scenario's own aircraft; one there is not is reported by its key."""
         reference = given.get("aircraft") if isinstance(given, dict) else None
+        reference = reference if isinstance(reference, str) else None
         try:
-            aircraft = load(reference, folder_of(info)) if isinstance(reference, str) else in_question()
+            aircraft = named(reference, folder_of(info))
         except UnknownAircraft:
-            aircraft = load()
-        with asked(aircraft):
+            aircraft, reference = load(), None
+        with asked(aircraft, reference):
             scenario = read(given)
         if isinstance(given, dict):
             scenario._airframe = aircraft

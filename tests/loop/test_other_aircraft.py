@@ -1,0 +1,124 @@
+"""An aircraft that is only data: three surfaces, no slipstream, terms the built-in one does not have."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from beaver_ftc.aircraft import load
+from beaver_ftc.design.context import DesignModel
+from beaver_ftc.design.model import design_record
+from beaver_ftc.errors import BadInput
+from beaver_ftc.loop.loop import fly
+from beaver_ftc.plant.adapter import Plant
+from beaver_ftc.plant.state import FlightState
+from beaver_ftc.plant.trim import trim
+from beaver_ftc.scenario.loader import load_scenario, load_text
+
+FOLDER = Path(__file__).parents[1] / "data" / "aircraft"
+FLIGHT = FOLDER / "trainer-flight.yaml"
+QUIET = """
+name: trainer-quiet
+aircraft: ./trainer
+initial: {airspeed_mps: 50, altitude_m: 1500}
+duration_s: 20
+reference:
+  p: [{sine: {amplitude_deg_s: 3, frequency_hz: 0.25}}]
+  q: [{sine: {amplitude_deg_s: 3, frequency_hz: 0.2}}]
+  r: [{sine: {amplitude_deg_s: 2, frequency_hz: 0.3}}]
+uncertainty:
+  inertia_coupling: {}
+"""
+
+
+@pytest.fixture(scope="module")
+def trainer():
+    return load("./trainer", FOLDER)
+
+
+def quiet(**changes):
+    return load_text(QUIET, folder=FOLDER).with_(changes)
+
+
+def test_it_has_its_own_surfaces_groups_and_leaders(trainer):
+    assert trainer.surfaces == ("aileron", "elevator", "rudder")
+    assert trainer.dominant_axis == (0, 1, 2)
+    assert trainer.primary == trainer.surfaces
+    assert trainer.signal_names == ("alpha", "beta", "ph", "qh", "rh")
+
+
+def test_the_design_model_gives_what_jsbsim_does(trainer):
+    """At random states: f + G u is the truth's angular acceleration but for the turning Earth."""
+    model = DesignModel(design_record(trainer))
+    plant, rng = Plant(100, aircraft=trainer), np.random.default_rng(1)
+    worst = 0.0
+    for _ in range(30):
+        names = ("alpha_rad", "beta_rad", "p_rad_s", "q_rad_s", "r_rad_s")
+        values = rng.uniform((-0.05, -0.2, -0.4, -0.4, -0.4), (0.2, 0.2, 0.4, 0.4, 0.4))
+        u = rng.uniform(-0.3, 0.3, 3)
+        plant.start(FlightState(
+            rng.uniform(35, 65), rng.uniform(0, 4000), aircraft=trainer,
+            **dict(zip(names, values, strict=True)),
+            **{f"{s}_rad": d for s, d in zip(trainer.surfaces, u, strict=True)},
+        ))  # fmt: skip
+        x = np.array([plant.read(f"velocities/{axis}-rad_sec") for axis in "pqr"])
+        qdyn = plant.read("aero/qbar-psf") * 47.88025898033584
+        V = plant.read("velocities/vt-fps") * 0.3048
+        y = np.array([plant.read("aero/alpha-rad"), plant.read("aero/beta-rad"), V, qdyn])
+        truth = [plant.read(f"accelerations/{axis}dot-rad_sec2") for axis in "pqr"]
+        worst = max(worst, np.abs(model.f(x, y) + model.G(y) @ u - truth).max())
+    assert worst < 3e-4
+
+
+def test_it_is_trimmed_by_its_own_surfaces_and_engine(trainer):
+    plant = Plant(100, aircraft=trainer)
+    slow, fast = (trim(50.0, 1500.0, plant=plant, thrust_n=thrust) for thrust in (600.0, 1400.0))
+    assert max(map(abs, slow.residual)) < 1e-9
+    assert fast.gamma_rad > slow.gamma_rad + 0.02
+    assert set(slow.surfaces_rad) == set(trainer.surfaces)
+
+
+def test_a_healthy_flight_raises_no_alarm_and_follows():
+    flight = fly(quiet())
+    assert flight.detection_time_s is None
+    assert max(flight.pre_fault_rms_rad_s) < np.radians(0.3)
+    assert flight.worst_residual_ratio < 0.5
+
+
+@pytest.mark.parametrize("surface", ["aileron", "elevator", "rudder"])
+@pytest.mark.parametrize("fault_class", ["published", "all"])
+def test_the_loss_of_each_surface_is_detected_and_named(surface, fault_class):
+    loss = {"actuator": surface, "type": "loss_of_effectiveness", "magnitude": 0.4, "at_s": 8}
+    flight = fly(quiet(**{"faults": [loss], "fdi.fault_class": fault_class}))
+    assert 8.0 <= flight.detection_time_s < 8.5
+    assert flight.isolated == surface
+    assert flight.estimate == pytest.approx(-0.4, abs=0.05)
+    assert flight.departure is None
+
+
+@pytest.mark.parametrize("surface", ["aileron", "elevator", "rudder"])
+def test_a_jam_is_named_or_stays_possible(surface):
+    jam = {"actuator": surface, "type": "stuck", "at_s": 8}
+    flight = fly(quiet(**{"faults": [jam], "fdi.fault_class": "all"}))
+    assert flight.isolated == surface
+    assert "stuck" in (flight.isolation_type, *flight.candidates)
+
+
+def test_what_it_has_not_is_refused_by_its_key():
+    text = FLIGHT.read_text()
+    for change, says in (
+        ("actuator: flap", "'flap' is not known, allowed: aileron, elevator, rudder"),
+        ("actuator: aileron, magnitud: 1", "unknown key, did you mean magnitude?"),
+    ):
+        with pytest.raises(BadInput, match=re.escape(says)):
+            load_text(text.replace("actuator: elevator", change), folder=FOLDER)
+
+
+def test_pairs_are_refused_where_there_is_no_pair():
+    with pytest.raises(BadInput, match=r"fdi\.pairs: trainer has not two surfaces in pitch"):
+        fly(quiet(**{"fdi.fault_class": "all", "fdi.pairs": True}))
+
+
+def test_the_file_of_the_flight_is_a_scenario():
+    assert load_scenario(FLIGHT).airframe.name == "trainer"

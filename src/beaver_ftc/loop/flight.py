@@ -37,6 +37,8 @@ class Flight:
     in standard deviations, and the largest share of it reached in healthy flight. mode_changes, exits: how
     many there were of `supervisor` and `envelope_exits`, which hold the first and the last; outside_s: time
     outside the validated envelope, all exits together. end: airspeed, m/s, and altitude, m, at the end.
+    profile: largest deviation from the commanded one by
+    channel of the autopilot, m, m/s, rad; None where it was not flown.
     """
 
     scenario: Scenario
@@ -71,3 +73,4 @@ class Flight:
     exits: int = 0
     outside_s: float = 0.0
     end: tuple[float, float] | None = None
+    profile: dict[str, float | None] | None = None

@@ -4,6 +4,7 @@
     diagnose    diagnosis/scheme.py       what is believed of the aircraft, and whether it still holds
     decide      control/supervisor.py     the mode
     command     control/law.py            the surfaces, and the engine
+    outer loops control/outer/            the reference of the next frame, if a profile is to be flown
     record      accounts.py, record.py    the metrics' sums, a row of the log
 
 Each has records of its own; what a flight remembers is all of them in one, so that a frame is one call from
@@ -17,6 +18,8 @@ import numpy as np
 from beaver_ftc.compiled import kernel
 from beaver_ftc.control import authority, law, reference_model
 from beaver_ftc.control.oracle import true_faults_dtype, true_mode
+from beaver_ftc.control.outer.autopilot import judge, steer
+from beaver_ftc.control.outer.state import AUTOPILOT
 from beaver_ftc.control.state import ORACLE, control_dtype
 from beaver_ftc.control.supervisor import SUPERVISOR, mode_from, supervise
 from beaver_ftc.diagnosis import scheme
@@ -24,6 +27,7 @@ from beaver_ftc.diagnosis.belief import belief_dtype, follow_command, look, look
 from beaver_ftc.diagnosis.state import diagnosis_dtype, verdict_dtype
 from beaver_ftc.loop.accounts import account, accounts_dtype, add_effect, effect_of_faults, follow_guarantee
 from beaver_ftc.loop.record import record
+from beaver_ftc.plant import channels as ch
 from beaver_ftc.plant.instruments import INSTRUMENTS
 from beaver_ftc.plant.sensing import (
     FLYING,
@@ -48,6 +52,7 @@ def frame_dtype(n: int) -> np.dtype:
         ("truth", truth_dtype(n)), ("instruments", INSTRUMENTS), ("measured", MEASURED),
         ("belief", belief_dtype(n)), ("fdi", diagnosis_dtype(n)), ("verdict", verdict_dtype(n)),
         ("faults", true_faults_dtype(n)), ("supervisor", SUPERVISOR), ("control", control_dtype(n)),
+        ("autopilot", AUTOPILOT),
         ("accounts", accounts_dtype(n)), ("departed", "i8"),
     ]  # fmt: skip
     return np.dtype(fields, align=True)
@@ -123,9 +128,21 @@ def command(frame):
 
 
 @kernel
+def fly_profile(frame, reference):
+    """Add the outer loops' body rates to the reference (3,) rad/s, and set the engine."""
+    autopilot, value = frame.autopilot, frame.truth.value
+    steer(autopilot, frame.control, frame.measured, frame.t)
+    judge(autopilot, value[ch.ALTITUDE], value[ch.AIRSPEED], value[ch.PHI + 2], value[ch.PHI], frame.t)
+    for i in range(3):
+        reference[i] += autopilot.rates[i]
+
+
+@kernel
 def finish(frame, reference, row):
     """Account, record and hand the command over; the reference model moves on."""
     control, belief = frame.control, frame.belief
+    if frame.autopilot.enabled:
+        fly_profile(frame, reference)
     account(frame.accounts, frame.truth, frame.fdi, control, frame.k, frame.t)
     record(frame, reference, row)
     reference_model.follow(control, reference)

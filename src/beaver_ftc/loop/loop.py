@@ -9,6 +9,8 @@ import numpy as np
 
 from beaver_ftc.compiled import direct
 from beaver_ftc.control.laws.setup import set_up
+from beaver_ftc.control.outer.setup import set_up_autopilot
+from beaver_ftc.control.outer.state import COLUMNS
 from beaver_ftc.design.actuators import move
 from beaver_ftc.design.variants import anchor, mass_of
 from beaver_ftc.diagnosis import noise_model
@@ -102,14 +104,20 @@ class Loop:
         self.plugin_frame = self._with_plugins(detector, law)
         self.columns = ch.log_columns(
             estimator_names(scenario.fdi.fault_class, scenario.airframe) if self._diagnoses_itself else (),
-            bool(self.frames["control"]["power"]["enabled"][0]),
+            bool(self.frames["control"]["power"]["enabled"][0]) or self.has_profile,
             bool(self.frames["fdi"]["statistical"]["enabled"][0]),
             self.aircraft,
+            profile=COLUMNS if self.has_profile else (),
         )
         self.log = np.empty((min(CHUNK_ROWS, self.n_frames), len(self.columns)))
         self.references = np.empty((len(self.log), 3))
         self.fly_frame = self.plugin_frame or self.direct(fly_frame)
         self._set_origin()
+
+    @property
+    def has_profile(self) -> bool:
+        """Whether outer loops fly."""
+        return bool(self.frames["autopilot"]["enabled"][0])
 
     def _set_origin(self) -> None:
         truth = self.frames["truth"][0]
@@ -129,6 +137,7 @@ class Loop:
         anchor(design, truth[:3], y, surfaces)
         start, mass = (truth[:3], y, surfaces), mass_of(scenario.design_model, self.aircraft)
         set_up(frame["control"], frame["belief"], scenario, y)
+        set_up_autopilot(frame["autopilot"], frame["control"]["power"], scenario)
         fdi, rate_hz = frame["fdi"], scenario.rate_hz
         noise_model.set_up(fdi, scenario.fdi, design, mass, start, rate_hz, self.aircraft)
 

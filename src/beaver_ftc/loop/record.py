@@ -83,6 +83,13 @@ def record_diagnosis(fdi, acceleration, row, column):
 
 
 @kernel
+def record_profile(autopilot, row, column):
+    """The commanded profile; not a number where a channel is not flown."""
+    for c in range(autopilot.command.size):
+        row[column + c] = autopilot.command[c] if autopilot.commanded[c] else np.nan
+
+
+@kernel
 def record(frame, reference, row):
     """Write the row of a frame (dtype of frame.py); reference (3,) rad/s."""
     control, fdi, belief = frame.control, frame.fdi, frame.belief
@@ -95,7 +102,9 @@ def record(frame, reference, row):
     column = put(row, column, control.effectiveness)
     row[column] = frame.supervisor.mode
     row[column + 1] = fdi.verdict.detected
-    if control.power.enabled:
+    if control.power.enabled or frame.autopilot.enabled:
         row[column + 2] = control.power.command[0]
+    if frame.autopilot.enabled:
+        record_profile(frame.autopilot, row, column + 3)
     if fdi.statistical.enabled:
         statistical.record(fdi.statistical, row)

@@ -5,6 +5,7 @@ from math import isfinite
 
 import numpy as np
 
+from beaver_ftc.control.outer.state import CHANNELS
 from beaver_ftc.control.supervisor import MAX_EVENTS, MODES
 from beaver_ftc.design.model import AXES
 from beaver_ftc.diagnosis.base import Verdict
@@ -111,6 +112,15 @@ def _engine_power(frame: np.void) -> tuple[float, float, float, float] | None:
     return float(power["from_s"]), in_charge_s, float(power["least"]), float(power["greatest"])
 
 
+def _profile(frame: np.void) -> dict[str, float | None] | None:
+    """Largest deviation from the commanded profile, by channel; None where there is none."""
+    autopilot = frame["autopilot"]
+    if not autopilot["enabled"]:
+        return None
+    flown = zip(CHANNELS, autopilot["commanded"], autopilot["worst"], strict=True)
+    return {name: float(worst) if commanded else None for name, commanded, worst in flown}
+
+
 def _statistical(fdi: np.void) -> dict[str, float | None] | None:
     """What the statistical detector made of the flight, if there was one."""
     statistical = fdi["statistical"]
@@ -193,6 +203,7 @@ def flight_of(
         authority=_authority(frame),
         probing_s=_probing_s(frame),
         engine_power=_engine_power(frame),
+        profile=_profile(frame),
         surface_travel_rad={s: float(x) for s, x in zip(surfaces, accounts["travelled"], strict=True)},
         **(_isolation(fdi, surfaces) if verdict is None else _of_verdict(fdi, verdict)),
     )

@@ -104,9 +104,11 @@ def log_columns(
     power: bool = False,
     statistical: bool = False,
     aircraft: Aircraft | None = None,
+    profile: Iterable[str] = (),
 ) -> tuple[str, ...]:
     """The log's columns in order, for the isolation estimators of these names; power: the law may use the
-    engine; statistical: there is a statistical detector, whose tests are logged as shares of its level."""
+    engine; statistical: there is a statistical detector, whose tests are logged as shares of its level;
+    profile: columns of the commanded profile."""
     aircraft = aircraft or load()
     surfaces = aircraft.surfaces
     return (
@@ -122,5 +124,6 @@ def log_columns(
         *(f"{s}_effectiveness_estimate" for s in surfaces),
         "mode", "detected",
         *(("manifold_pressure_inhg",) if power else ()),
+        *profile,
         *(likelihoods(aircraft) if statistical else ()),
     )  # fmt: skip

@@ -19,12 +19,15 @@ DEPARTURE_ANGLE_RAD = 0.6
 DEPARTURE_RATE_RAD_S = 6.0
 DEPARTURE_SIGNALS = ("p", "q", "r", "alpha", "beta", "altitude")
 
-# What is known of an instant. No instrument model stands before attitude (phi, theta, psi, rad) and before
-# the declared signals in y, from dpt on: they are the truth's.
+# What is known of an instant. No instrument model stands before attitude (phi, theta, psi, rad), altitude (m)
+# and before the declared signals in y, from dpt on: they are the truth's.
 MEASURED = np.dtype(
-    [("signal", "f8", (N_SIGNALS,)), ("x", "f8", (3,)), ("y", "f8", (N_Y,)), ("attitude", "f8", (3,))],
+    [
+        ("signal", "f8", (N_SIGNALS,)), ("x", "f8", (3,)), ("y", "f8", (N_Y,)),
+        ("attitude", "f8", (3,)), ("altitude", "f8"),
+    ],
     align=True,
-)
+)  # fmt: skip
 
 
 @lru_cache
@@ -86,6 +89,7 @@ def measure(truth, instruments, measured):
         measured.attitude[i] = value[ch.PHI + i]
     y[ALPHA], y[BETA], y[AIRSPEED] = signal[ch.ALPHA], signal[ch.BETA], signal[ch.AIRSPEED]
     y[QDYN] = signal[ch.QDYN]
+    measured.altitude = value[ch.ALTITUDE]
     first = first_signal(truth)
     for j in range(truth.n - first):
         y[DPT + j] = value[first + j]

@@ -82,6 +82,18 @@ def _rms_at_most(name: str, axis: str) -> Rule:
     return rule
 
 
+def _profile_within(channel: str) -> Rule:
+    def rule(limit: float, metrics: Document) -> tuple[Any, bool]:
+        return _at_most((metrics["profile"] or {}).get(channel), limit)
+
+    return rule
+
+
+def _stays_in_envelope(expected: bool, metrics: Document) -> tuple[Any, bool]:
+    actual = metrics["envelope"]["exits"] == 0
+    return actual, actual == expected
+
+
 _RULES: dict[str, Rule] = {
     "detected_within_s": _detected_within,
     "isolated_as": _isolated_as,
@@ -90,4 +102,8 @@ _RULES: dict[str, Rule] = {
     "candidate_type": _candidate_type,
     "no_false_alarm": _no_false_alarm,
     "no_departure": _no_departure,
+    "altitude_within_m": _profile_within("altitude_m"),
+    "airspeed_within_mps": _profile_within("airspeed_mps"),
+    "heading_within_deg": _profile_within("heading_deg"),
+    "stays_in_envelope": _stays_in_envelope,
 }

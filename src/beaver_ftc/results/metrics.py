@@ -63,6 +63,7 @@ def metrics(flight: "Flight") -> Document:
         "departure": _departure(flight),
         "authority": _authority(flight),
         "engine_power": _engine_power(flight),
+        "profile": _profile(flight),
         "saturation_s": {surface: _number(time) for surface, time in flight.saturation_s.items()},
     }
     document["hints"] = hints(flight, document)
@@ -203,6 +204,17 @@ def _engine_power(flight: "Flight") -> Document | None:
         return None
     names = ("from_s", "in_charge_s", "lowest_inhg", "highest_inhg")
     return {name: _number(value) for name, value in zip(names, flight.engine_power, strict=True)}
+
+
+def _profile(flight: "Flight") -> Document | None:
+    """Largest deviations from the commanded profile; null without an autopilot, or where it is not flown."""
+    if flight.profile is None:
+        return None
+    in_deg = {"heading_deg": math.degrees, "bank_deg": math.degrees}
+    return {
+        name: None if worst is None else _number(in_deg.get(name, float)(worst))
+        for name, worst in flight.profile.items()
+    }
 
 
 def _false_alarm(detection_time_s: float | None, fault: Document | None) -> bool:

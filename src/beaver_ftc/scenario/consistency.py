@@ -17,6 +17,13 @@ OF_A_FAULT = (
 )  # fmt: skip
 
 
+_OF_A_PROFILE = {
+    "altitude_within_m": "altitude_m",
+    "airspeed_within_mps": "airspeed_mps",
+    "heading_within_deg": "heading_deg",
+}
+
+
 class Outline(NamedTuple):
     """The values that must fit together; None is unknown, for instance because it is itself a mistake."""
 
@@ -24,6 +31,7 @@ class Outline(NamedTuple):
     rate_hz: float | None
     starts_s: tuple[float | None, ...] | None
     expected: tuple[str, ...]
+    flown: tuple[str, ...] | None = ()  # channels of the autopilot
 
 
 def outline_of_data(data: dict[str, Any]) -> Outline:
@@ -37,6 +45,7 @@ def outline_of_data(data: dict[str, Any]) -> Outline:
         expected=tuple(key for key, value in expect.items() if value is not None)
         if isinstance(expect, dict)
         else (),
+        flown=_flown(data.get("autopilot")),
     )
 
 
@@ -47,7 +56,18 @@ def conflicts_in_data(data: dict[str, Any]) -> list[Conflict]:
 
 def conflicts(outline: Outline) -> list[Conflict]:
     """Every contradiction, at the key to change."""
-    return [*_too_short(outline), *_too_late(outline), *_expected_of_no_fault(outline)]
+    return [
+        *_too_short(outline),
+        *_too_late(outline),
+        *_expected_of_no_fault(outline),
+        *_expected_of_no_profile(outline),
+    ]
+
+
+def _flown(autopilot: Any) -> tuple[str, ...] | None:
+    if not isinstance(autopilot, dict | None):
+        return None
+    return tuple(key for key, legs in (autopilot or {}).items() if legs)
 
 
 def _too_short(outline: Outline) -> list[Conflict]:
@@ -75,6 +95,16 @@ def _expected_of_no_fault(outline: Outline) -> list[Conflict]:
         return []
     says = "there is no fault to expect it of, allowed: only with faults"
     return [(("expect", key), says) for key in outline.expected if key in OF_A_FAULT]
+
+
+def _expected_of_no_profile(outline: Outline) -> list[Conflict]:
+    if outline.flown is None:
+        return []
+    return [
+        (("expect", key), f"there is no profile to expect it of, allowed: only with autopilot.{channel}")
+        for key, channel in _OF_A_PROFILE.items()
+        if key in outline.expected and channel not in outline.flown
+    ]
 
 
 def _as_list(value: Any) -> list[Any]:

@@ -18,6 +18,7 @@ from pydantic import (
 from beaver_ftc.aircraft import DEFAULT, Aircraft, UnknownAircraft, load
 from beaver_ftc.aircraft.question import asked, named
 from beaver_ftc.scenario.actuators import Actuators
+from beaver_ftc.scenario.autopilot import Autopilot
 from beaver_ftc.scenario.base import Flag, Number, Section, Whole, number, refuse
 from beaver_ftc.scenario.consistency import DURATION_S, RATE_HZ, Outline, conflicts
 from beaver_ftc.scenario.control import ControlConfig
@@ -214,8 +215,27 @@ class Expect(Section):
     no_departure: Flag | None = Field(
         default=None, description="true: the aircraft is kept; false: it must be lost"
     )
+    pre_fault_rms_deg_s: RmsLimits | None = Field(
+        default=None, description="largest RMS tracking error before the fault, or of a flight without one"
+    )
     post_fault_rms_deg_s: RmsLimits | None = Field(
         default=None, description="largest RMS tracking error after the fault"
+    )
+    altitude_within_m: Number | None = number(
+        None, unit="m", says="largest deviation from the commanded altitude", gt=0, le=10_000
+    )
+    airspeed_within_mps: Number | None = number(
+        None, unit="m/s", says="largest deviation from the commanded airspeed", gt=0, le=100
+    )
+    heading_within_deg: Number | None = number(
+        None,
+        unit="deg",
+        says="largest deviation from the commanded heading, 30 s after a change of it and later",
+        gt=0,
+        le=180,
+    )
+    stays_in_envelope: Flag | None = Field(
+        default=None, description="true: never outside the validated envelope; false: it must leave it"
     )
 
 
@@ -246,6 +266,9 @@ class Scenario(Section):
         json_schema_extra=initial_schema,
     )
     reference: Reference = Field(default_factory=Reference, description="body rates to follow")
+    autopilot: Autopilot | None = Field(
+        default=None, description="the flight path to fly, on top of the reference; left out: no outer loops"
+    )
     faults: tuple[Fault, ...] = Field(default=(), max_length=100, description="what breaks, and when")
     uncertainty: Uncertainty = Field(
         default_factory=Uncertainty, description="how the truth differs from the design model"
@@ -290,7 +313,9 @@ class Scenario(Section):
 
     def _outline(self) -> Outline:
         expected = tuple(key for key, value in self.expect if value is not None)
-        return Outline(self.duration_s, self.rate_hz, tuple(fault.at_s for fault in self.faults), expected)
+        flown = self.autopilot.channels if self.autopilot else ()
+        starts_s = tuple(fault.at_s for fault in self.faults)
+        return Outline(self.duration_s, self.rate_hz, starts_s, expected, flown)
 
     def with_(self, changes: Mapping[str, Any]) -> "Scenario":
         """This scenario with new values at dotted keys, e.g. `{"faults[0].magnitude": 0.2}`.

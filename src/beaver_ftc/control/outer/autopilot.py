@@ -1,0 +1,208 @@
+"""The autopilot: body-rate references and an engine setting from a commanded profile.
+
+    climb    gamma_c = (h' + k (hc - h)) / V + what was found missing,   theta_c = gamma_c + alpha (smoothed)
+             theta' = k (theta_c - theta)
+    speed    a = V' + k (Vc - V) + what was found missing + g (gamma_c - gamma in trim), by manifold pressure
+    heading  phi_c = V / g k (psi_c - psi),   phi' = k (phi_c - phi)
+    turn     psi' = g tan phi / V: coordinated [Etkin1996, sec. 7.6]; and the body rates of these angles'
+             rates, with sideslip washed out by the rudder
+
+Every demand is limited, and what a limit cut off is not integrated. The limits on rates and bank shrink
+with what the surfaces that are left can give; climb and descent are bounded by the power there is, so that
+the airspeed is kept. Where the ailerons no longer act, the roll is flown by sideslip: rudder and dihedral.
+"""
+
+import numpy as np
+
+from beaver_ftc.compiled import kernel
+from beaver_ftc.control.authority import attainable
+from beaver_ftc.control.outer.profile import advance, turn
+from beaver_ftc.control.outer.state import ALTITUDE, BANK, HEADING, N_CHANNELS, SPEED
+from beaver_ftc.control.power import ceiling
+from beaver_ftc.design.model import AIRSPEED, ALPHA, BETA, DPT, QDYN
+from beaver_ftc.diagnosis.state import PITCH, ROLL, YAW
+
+MOST_PATH_RAD = 0.15
+MOST_SIDESLIP_RAD = 0.14
+MOST_MISSING = 0.1  # rad of path angle, and times gravity of acceleration
+LEAST_PUSH = 1e-3  # m/s2 per inHg
+SETTLED_S = 30.0  # after a change of heading
+MEAN_S = 10.0  # over which the airspeed is judged: what comes and goes faster is a gust, not a deviation
+
+
+@kernel
+def clamp(value, most):
+    """value within -most and most."""
+    return min(max(value, -most), most)
+
+
+@kernel
+def steer(autopilot, control, measured, t):
+    """One frame, at t s: fill autopilot.rates (3,) rad/s; move the engine where an airspeed is commanded."""
+    y, attitude = measured.y, measured.attitude
+    if not autopilot.flying:
+        take_over(autopilot, control, y, attitude)
+    advance(autopilot, (measured.altitude, y[AIRSPEED], attitude[YAW], attitude[ROLL]), t)
+    follow(autopilot, control, y)
+    limit(autopilot, control)
+    push = thrust_per_inhg(autopilot, control, y)
+    path = path_of(autopilot, measured, push)
+    to_body(autopilot, y, attitude, rolling(autopilot, attitude), pitching(autopilot, y, attitude, path))
+    if autopilot.commanded[SPEED]:
+        throttle(autopilot, control, y, path, push)
+
+
+@kernel
+def take_over(autopilot, control, y, attitude):
+    """In trim: smoothed signals and the engine as they are."""
+    autopilot.flying = 1
+    autopilot.alpha, autopilot.airspeed = y[ALPHA], y[AIRSPEED]
+    autopilot.climb_in_trim = attitude[PITCH] - y[ALPHA]
+
+
+@kernel
+def follow(autopilot, control, y):
+    """Smooth what is noisy, and note whether the ailerons are gone."""
+    dt = autopilot.dt
+    autopilot.alpha += dt / autopilot.gain.alpha_s * (y[ALPHA] - autopilot.alpha)
+    autopilot.airspeed += dt / autopilot.gain.airspeed_s * (y[AIRSPEED] - autopilot.airspeed)
+    gone = control.effectiveness[control.main[ROLL]] < control.least_effectiveness
+    autopilot.jammed += dt / autopilot.gain.jammed_s * (gone - autopilot.jammed)
+
+
+@kernel
+def limit(autopilot, control):
+    """Rates and bank that the surfaces left can give: their spare acceleration for autopilot.gain.authority_s."""
+    for i in range(3):
+        least, greatest = attainable(control.G, control.low, control.high, i)
+        spare = max(min(greatest - control.hold[i], control.hold[i] - least), 0.0)
+        autopilot.limit[i] = min(autopilot.most[i], spare * autopilot.gain.authority_s)
+    by_sideslip = autopilot.jammed * autopilot.dihedral * autopilot.airspeed * MOST_SIDESLIP_RAD
+    autopilot.limit[ROLL] = max(autopilot.limit[ROLL], by_sideslip)
+    autopilot.bank_limit = min(autopilot.most_bank, autopilot.limit[ROLL] * autopilot.gain.bank_s)
+
+
+@kernel
+def thrust_per_inhg(autopilot, control, y):
+    """Acceleration along the path per inHg of manifold pressure, m/s2."""
+    dpt_per_inhg = control.power.dpt_factor / (2.0 * y[QDYN] * autopilot.airspeed)
+    slope = autopilot.thrust[0] + 2.0 * autopilot.thrust[1] * autopilot.alpha * y[DPT]
+    return max(y[QDYN] * slope * dpt_per_inhg, LEAST_PUSH)
+
+
+@kernel
+def path_of(autopilot, measured, push):
+    """Path angle to fly, rad; the one that is flown where no altitude is commanded."""
+    if not autopilot.commanded[ALTITUDE]:
+        return measured.attitude[PITCH] - autopilot.alpha
+    V = autopilot.airspeed
+    error = autopilot.command[ALTITUDE] - measured.altitude
+    wanted = (autopilot.moving[ALTITUDE] + autopilot.gain.altitude * error) / V + autopilot.lift
+    low, high = paths(autopilot, push)
+    path = min(max(wanted, low), high)
+    if path == wanted:
+        lift = autopilot.lift + autopilot.dt * autopilot.gain.altitude_i * error / V
+        autopilot.lift = clamp(lift, MOST_MISSING)
+    return path
+
+
+@kernel
+def paths(autopilot, push):
+    """The steepest descent and climb, rad: what the engine sustains, and what airspeed there is to spare."""
+    slow = autopilot.slowest_mps
+    fast, idle, full = np.inf, autopilot.trim_inhg, autopilot.trim_inhg
+    if autopilot.commanded[SPEED]:
+        slow = max(slow, autopilot.command[SPEED] - autopilot.gain.spare_mps)
+        fast = autopilot.command[SPEED] + autopilot.gain.spare_mps
+        idle, full = autopilot.low_inhg, autopilot.high_inhg
+    at_idle = autopilot.climb_in_trim + push * (idle - autopilot.trim_inhg) / autopilot.gravity
+    at_full = autopilot.climb_in_trim + push * (full - autopilot.trim_inhg) / autopilot.gravity
+    low = at_idle - autopilot.gain.path_per_mps * (fast - autopilot.airspeed)
+    high = at_full + autopilot.gain.path_per_mps * (autopilot.airspeed - slow)
+    return max(low, -MOST_PATH_RAD), min(max(high, -MOST_PATH_RAD), MOST_PATH_RAD)
+
+
+@kernel
+def pitching(autopilot, y, attitude, path):
+    """The rate of the pitch attitude, rad/s."""
+    if not autopilot.commanded[ALTITUDE]:
+        return 0.0
+    wanted = path + autopilot.alpha * np.cos(attitude[ROLL]) - attitude[PITCH]
+    rate = clamp(autopilot.gain.attitude * wanted, autopilot.limit[PITCH])
+    return min(rate, autopilot.gain.protection * (autopilot.steepest_alpha - y[ALPHA]))
+
+
+@kernel
+def rolling(autopilot, attitude):
+    """The rate of the bank angle, rad/s."""
+    if autopilot.commanded[HEADING]:
+        error = turn(autopilot.command[HEADING] - attitude[YAW])
+        turning = autopilot.gain.heading * error + autopilot.moving[HEADING]
+        bank = autopilot.airspeed / autopilot.gravity * turning
+    elif autopilot.commanded[BANK]:
+        bank = autopilot.command[BANK]
+    else:
+        return 0.0
+    away = clamp(bank, autopilot.bank_limit) - attitude[ROLL]
+    wanted = autopilot.gain.bank * away + autopilot.jammed * autopilot.rolled
+    rate = clamp(wanted, autopilot.limit[ROLL])
+    if rate == wanted:
+        autopilot.rolled += autopilot.jammed * autopilot.dt * autopilot.gain.bank_i * away
+    return rate
+
+
+@kernel
+def to_body(autopilot, y, attitude, rolling, pitching):
+    """Body rates of the attitude's rates (rad/s) in a coordinated turn; the rudder keeps the sideslip."""
+    rates = autopilot.rates
+    sin_roll, cos_roll = np.sin(attitude[ROLL]), np.cos(attitude[ROLL])
+    sin_pitch, cos_pitch = np.sin(attitude[PITCH]), np.cos(attitude[PITCH])
+    lateral = autopilot.commanded[HEADING] or autopilot.commanded[BANK]
+    turning = 0.0
+    if lateral:
+        turning = autopilot.gravity / autopilot.airspeed * sin_roll / max(cos_roll, 0.1)
+    rates[ROLL] = rolling - turning * sin_pitch
+    rates[PITCH] = pitching * cos_roll + turning * cos_pitch * sin_roll
+    rates[YAW] = 0.0
+    if lateral:
+        sideslip = -rolling / (autopilot.dihedral * autopilot.airspeed)
+        wanted = autopilot.jammed * clamp(sideslip, MOST_SIDESLIP_RAD)
+        keeping = autopilot.gain.sideslip * (y[BETA] - wanted)
+        rates[YAW] = turning * cos_pitch * cos_roll - pitching * sin_roll + keeping
+    rates[YAW] = clamp(rates[YAW], autopilot.limit[YAW])
+
+
+@kernel
+def throttle(autopilot, control, y, path, push):
+    """Move the manifold pressure; while power stands in for a lost pitch, its law moves it about our last."""
+    power = control.power
+    power.in_use = 1
+    if power.engaged:
+        return
+    error = autopilot.command[SPEED] - autopilot.airspeed
+    along = autopilot.moving[SPEED] + autopilot.gain.speed * error + autopilot.throttle
+    climbing = autopilot.gravity * (path - autopilot.climb_in_trim)
+    wanted = autopilot.trim_inhg + (along + climbing) / push
+    high = min(autopilot.high_inhg, ceiling(power, y))
+    limited = max(min(wanted, high), autopilot.low_inhg)
+    if limited == wanted:
+        found = autopilot.throttle + autopilot.dt * autopilot.gain.speed_i * error
+        autopilot.throttle = clamp(found, MOST_MISSING * autopilot.gravity)
+    power.trim = limited
+    if not power.enabled:
+        before = power.command[0]
+        power.command[0] = min(max(limited, before - autopilot.step_inhg), before + autopilot.step_inhg)
+
+
+@kernel
+def judge(autopilot, altitude_m, airspeed_mps, heading, bank, t):
+    """Note the largest deviation of every channel from its command; of angles, once SETTLED_S have passed."""
+    where = (altitude_m, airspeed_mps, heading, bank)
+    for c in range(N_CHANNELS):
+        settled = c in (ALTITUDE, SPEED) or t >= autopilot.changed_at_s[c] + SETTLED_S
+        if autopilot.commanded[c] and settled:
+            away = where[c] - autopilot.command[c]
+            if c == SPEED:
+                autopilot.mean_off += autopilot.dt / MEAN_S * (away - autopilot.mean_off)
+                away = autopilot.mean_off
+            autopilot.worst[c] = max(autopilot.worst[c], abs(turn(away) if c == HEADING else away))

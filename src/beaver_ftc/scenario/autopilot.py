@@ -1,0 +1,87 @@
+"""What a scenario may say of the flight path (`autopilot:`): altitude, airspeed, heading or bank in time."""
+
+from collections.abc import Iterator
+from typing import Any, Self
+
+from pydantic import Field, model_validator
+
+from beaver_ftc.scenario.base import Conflict, Flag, Number, Section, number, refuse
+
+MAX_LEGS = 100
+_LATEST_S = 360_000.0
+
+
+class _Leg(Section):
+    """From a time on: a value, or hold what is flown."""
+
+    at_s: Number = number(0.0, unit="s", says="from when on", ge=0, le=_LATEST_S)
+    hold: Flag = Field(default=False, description="true: hold what is flown or commanded at that time")
+    value: Number | None = None
+
+    @model_validator(mode="after")
+    def _either_hold_or_value(self) -> Self:
+        if self.hold and self.value is not None:
+            refuse([(("hold",), "contradicts value, allowed: one of the two")])
+        if not self.hold and self.value is None:
+            refuse([(("value",), "required key is missing, allowed: value, or hold: true")])
+        return self
+
+
+class AltitudeLeg(_Leg):
+    """An altitude, reached at a steady climb or descent."""
+
+    value: Number | None = number(None, unit="m", says="altitude above sea level", ge=-300, le=6000)
+    climb_mps: Number = number(2.5, unit="m/s", says="how fast the command goes there", gt=0, le=10)
+
+
+class AirspeedLeg(_Leg):
+    """An airspeed."""
+
+    value: Number | None = number(None, unit="m/s", says="true airspeed", ge=20, le=70)
+    change_mps2: Number = number(0.2, unit="m/s2", says="how fast the command goes there", gt=0, le=5)
+
+
+class HeadingLeg(_Leg):
+    """A true heading, by the shorter turn."""
+
+    value: Number | None = number(None, unit="deg", says="true heading", ge=-360, le=360)
+
+
+class BankLeg(_Leg):
+    """A bank angle, right wing down positive."""
+
+    value: Number | None = number(None, unit="deg", says="bank angle", ge=-45, le=45)
+
+
+def _legs(says: str) -> Any:
+    return Field(default=(), max_length=MAX_LEGS, description=says)
+
+
+class Autopilot(Section):
+    """The profile to fly; a channel left out is left to the reference and the trim."""
+
+    altitude_m: tuple[AltitudeLeg, ...] = _legs("altitude in time")
+    airspeed_mps: tuple[AirspeedLeg, ...] = _legs("true airspeed in time, by engine power")
+    heading_deg: tuple[HeadingLeg, ...] = _legs("true heading in time")
+    bank_deg: tuple[BankLeg, ...] = _legs("bank angle in time")
+
+    @model_validator(mode="after")
+    def _legs_in_order(self) -> Self:
+        refuse([*self._out_of_order(), *self._both_heading_and_bank()])
+        return self
+
+    def _out_of_order(self) -> Iterator[Conflict]:
+        for name, legs in self:
+            for i in range(1, len(legs)):
+                before, at_s = legs[i - 1].at_s, legs[i].at_s
+                if at_s <= before:
+                    yield (name, i, "at_s"), f"{at_s:g} is not after {before:g}, allowed: legs in order"
+
+    def _both_heading_and_bank(self) -> Iterator[Conflict]:
+        if self.heading_deg and self.bank_deg:
+            yield ("bank_deg",), "contradicts heading_deg, allowed: one of the two"
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """The channels with something to fly."""
+        return tuple(name for name, legs in self if legs)

@@ -72,7 +72,7 @@ def follow(autopilot, control, y):
 
 @kernel
 def limit(autopilot, control):
-    """Rates and bank that the surfaces left can give: their spare acceleration for autopilot.gain.authority_s."""
+    """Rates and bank that the surfaces left can give: their spare acceleration for a while."""
     for i in range(3):
         least, greatest = attainable(control.G, control.low, control.high, i)
         spare = max(min(greatest - control.hold[i], control.hold[i] - least), 0.0)

@@ -5,7 +5,7 @@ from math import inf, nan, radians
 import numpy as np
 
 from beaver_ftc.control.outer.state import CHANNELS
-from beaver_ftc.design.coefficients import ENVELOPE_AIRSPEED_MPS, GEOMETRY, MASS, value
+from beaver_ftc.errors import BadInput
 from beaver_ftc.scenario.schema import Scenario
 
 GRAVITY_MPS2 = 9.80665
@@ -25,6 +25,7 @@ GAINS = {
     "spare_mps": 4.0, "path_per_mps": 0.02,  # airspeed off before height goes for it, and how much path, rad
     "protection": 2.0,  # 1/s: how fast the angle of attack may close on its limit
 }  # fmt: skip
+LEAST_DIHEDRAL = 0.01  # of an aircraft that hardly rolls by sideslip: it is then not flown by it
 _UNIT = {"altitude_m": 1.0, "airspeed_mps": 1.0, "heading_deg": radians(1.0), "bank_deg": radians(1.0)}
 
 
@@ -40,15 +41,26 @@ def set_up_autopilot(autopilot: np.void, power: np.void, scenario: Scenario) -> 
     for name, gain in GAINS.items():
         autopilot["gain"][name] = gain
     autopilot["gravity"] = GRAVITY_MPS2
-    per_mass = GEOMETRY.wing_area_m2 / (MASS.mass_kg * scenario.design_model.mass)
-    autopilot["thrust"] = per_mass * value("CX_dpt"), per_mass * value("CX_adpt2")
-    autopilot["dihedral"] = value("Cl_beta") / value("Cl_p") * 2.0 / GEOMETRY.span_m
-    autopilot["slowest_mps"] = ENVELOPE_AIRSPEED_MPS[0] + SPARE_MPS
+    _know(autopilot, scenario)
     autopilot["steepest_alpha"] = radians(STEEPEST_ALPHA_DEG)
     autopilot["most"], autopilot["most_bank"] = np.radians(MOST_DEG_S), radians(MOST_BANK_DEG)
     for ours, theirs in (("trim_inhg", "trim"), ("low_inhg", "low"), ("high_inhg", "high")):
         autopilot[ours] = power[theirs]
     autopilot["step_inhg"] = power["step"]
+
+
+def _know(autopilot: np.void, scenario: Scenario) -> None:
+    """What the loops take from the aircraft: thrust, roll by sideslip, slowest airspeed."""
+    aircraft = scenario.airframe
+    terms = {name: term.value for name, term in aircraft.terms.items()}
+    if scenario.autopilot and scenario.autopilot.airspeed_mps and "CX_dpt" not in terms:
+        says = f"{aircraft.name} has no term of its thrust, allowed: an aircraft with CX_dpt"
+        raise BadInput(f"{scenario.name}: autopilot.airspeed_mps: {says}")
+    per_mass = aircraft.geometry.wing_area_m2 / (aircraft.mass.mass_kg * scenario.design_model.mass)
+    autopilot["thrust"] = per_mass * np.array([terms.get("CX_dpt", 0.0), terms.get("CX_adpt2", 0.0)])
+    by_sideslip = terms.get("Cl_beta", 0.0) / terms.get("Cl_p", -1.0)
+    autopilot["dihedral"] = max(by_sideslip, LEAST_DIHEDRAL) * 2.0 / aircraft.geometry.span_m
+    autopilot["slowest_mps"] = aircraft.envelope.airspeed_mps[0] + SPARE_MPS
 
 
 def _fill(autopilot: np.void, c: int, legs: tuple, unit: float) -> None:

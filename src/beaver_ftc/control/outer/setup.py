@@ -13,12 +13,12 @@ MOST_DEG_S = (12.0, 6.0, 10.0)  # asked of a healthy aircraft: a transport's man
 MOST_BANK_DEG = 30.0
 STEEPEST_ALPHA_DEG = 15.0  # the model is valid to 16
 SPARE_MPS = 2.0  # above the validated airspeeds' end
-# A fifth of the inner loops' bandwidth for attitudes, a fifth of that for the path.
+# Attitudes a fifth as fast as the inner loops, the path a quarter of that: gusts set the pace, not comfort.
 GAINS = {
-    "altitude": 0.25, "altitude_i": 0.02, "attitude": 1.0, "speed": 0.12, "speed_i": 0.006,
+    "altitude": 0.8, "altitude_i": 0.04, "attitude": 3.0, "speed": 0.3, "speed_i": 0.015,
     "bank": 1.0, "bank_i": 0.2, "heading": 0.25,
     "sideslip": 0.5,  # the yaw damper's part beside the rate loop
-    "alpha_s": 1.0, "airspeed_s": 3.0,  # against noise and gusts
+    "alpha_s": 2.0, "airspeed_s": 3.0,  # against noise and gusts
     "jammed_s": 1.0,  # rolling is handed to the rudder within about so long
     "authority_s": 1.0,  # a rate is asked for only if it can be had, and ended, within this time
     "bank_s": 6.0,  # and a bank only if it can be left within this time

@@ -6,6 +6,7 @@ a slow one is left to its pace.
 
 from beaver_ftc.compiled import kernel
 from beaver_ftc.control import adaptive
+from beaver_ftc.control.laws import rejecting
 from beaver_ftc.control.laws.state import REJECTING
 from beaver_ftc.control.oracle import true_surface
 from beaver_ftc.control.state import NOMINAL, ORACLE
@@ -41,6 +42,8 @@ def accommodate(control, fdi, belief, measured, faults):
             act_on_type(control, fdi, s)
         elif s == surface and not fdi.every_type:
             act_on_loss(control, fdi, s)
+        if control.inner == REJECTING and control.law != ORACLE:
+            rejecting.abandon(control, s, fdi.verdict.detected and s == surface)
     adaptive.approach(control, control.target)
     compensate(control, fdi, belief, measured, faults)
 
@@ -90,7 +93,8 @@ def give_up(control, fdi, faults):
     for s in range(control.trim.size):
         truly = faults.immovable[s] and control.law == ORACLE
         fixed = fdi.every_type and fdi.surface[s].measure == FIXED
-        if truly or (fixed and control.effectiveness[s] == 0.0):
+        abandoned = control.rejection.abandoned[s]
+        if truly or abandoned or (fixed and control.effectiveness[s] == 0.0):
             control.command[s] = control.trim[s]
             control.saturated[s] = 0
             control.hedging = 1

@@ -48,7 +48,8 @@ def govern(control, reference):
         return
     for i in range(3):
         scale = control.reference_scale[i] - control.dt * abs(control.shortfall[i]) / MISSED_RAD_S
-        control.reference_scale[i] = max(scale + control.dt / RECOVERY_S * (1.0 - scale), 0.0)
+        if not control.steered:  # outer loops ask again for what was missed
+            control.reference_scale[i] = max(scale + control.dt / RECOVERY_S * (1.0 - scale), 0.0)
         rate, acceleration = control.governed_rate[i], control.governed_acceleration[i]
         rate, acceleration = advance(control, rate, acceleration, control.reference_scale[i] * reference[i])
         control.governed_rate[i] = rate - control.dt * control.shortfall[i]

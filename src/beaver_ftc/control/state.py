@@ -57,6 +57,7 @@ def control_dtype(n: int) -> np.dtype:
         ("offset", "f8", (n,)), ("lag", "f8", (n,)),
         ("probe_amplitude", "f8"), ("probe_step", "f8"), ("probe_frames", "i8"),
         ("probe", "f8"), ("probed", "i8"), ("probe_from_s", "f8"), ("probe_to_s", "f8"),
+        ("steered", "i8"),  # by outer loops
         # what authority.py keeps
         ("governed_rate", "f8", (3,)), ("governed_acceleration", "f8", (3,)), ("hedging", "i8"),
         ("reference_scale", "f8", (3,)), ("hold", "f8", (3,)),

@@ -137,7 +137,7 @@ class Loop:
         anchor(design, truth[:3], y, surfaces)
         start, mass = (truth[:3], y, surfaces), mass_of(scenario.design_model, self.aircraft)
         set_up(frame["control"], frame["belief"], scenario, y)
-        set_up_autopilot(frame["autopilot"], frame["control"]["power"], scenario)
+        set_up_autopilot(frame["autopilot"], frame["control"], scenario)
         fdi, rate_hz = frame["fdi"], scenario.rate_hz
         noise_model.set_up(fdi, scenario.fdi, design, mass, start, rate_hz, self.aircraft)
 

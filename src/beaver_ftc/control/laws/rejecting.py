@@ -17,6 +17,8 @@ from beaver_ftc.control.laws.state import PITCH, STAND_IN
 from beaver_ftc.control.reference_model import advance
 from beaver_ftc.design.model import QDYN
 
+PATIENCE_S, RETRY_S = 0.5, 20.0
+
 
 @kernel
 def schedule(rejection, qdyn):
@@ -50,9 +52,31 @@ def between(table, i, j, part):
 @kernel
 def hand_over(control, left):
     """The share of pitch its stand-in carries, once handed over: what the main surface has lost."""
-    given = control.hand_over
+    given = control.hand_over if left > 0.0 else 1.0
     lost = 1.0 - left if left >= control.least_effectiveness else 1.0
     control.rejection.lost = given * given * (3.0 - 2.0 * given) * lost
+
+
+@kernel
+def abandon(control, s, suspected):
+    """Give up surface s if it is suspected of a fault and has stood at its stop for PATIENCE_S.
+
+    It does not give what it is told, and at its stop it is told nothing that would show why: jams, offsets
+    and losses look alike. In trim it shows; after RETRY_S it is tried again.
+    """
+    rejection = control.rejection
+    rejection.at_stop_s[s] += control.dt
+    if not suspected:
+        rejection.abandoned[s], rejection.at_stop_s[s] = 0, 0.0
+    elif rejection.abandoned[s]:
+        if rejection.at_stop_s[s] > RETRY_S:
+            rejection.abandoned[s], rejection.at_stop_s[s] = 0, 0.0
+    elif not control.saturated[s]:
+        rejection.at_stop_s[s] = 0.0
+    elif rejection.at_stop_s[s] > PATIENCE_S:
+        rejection.abandoned[s], rejection.at_stop_s[s] = 1, 0.0
+    if rejection.abandoned[s]:
+        control.target[s] = control.effectiveness[s] = 0.0
 
 
 @kernel

@@ -18,7 +18,7 @@ def rejection_dtype(surfaces: int) -> np.dtype:
     feedback, and the observer's corrections of rate and disturbance for what it missed.
     rate (3,) rad/s, disturbance (3,) rad/s2: its estimates. ahead (3,) rad/s: the rate when the command
     acts. lost: share of pitch that the stand-in carries. lead (n,): command beyond the actuator's position
-    over what is wanted beyond it.
+    over what is wanted beyond it. at_stop_s, abandoned (n,): see `abandon`.
     """
     return np.dtype(
         [
@@ -29,6 +29,7 @@ def rejection_dtype(surfaces: int) -> np.dtype:
             ("Kp", "f8", (3,)), ("pull", "f8", (3,)), ("learn", "f8", (3,)),
             ("rate", "f8", (3,)), ("disturbance", "f8", (3,)), ("ahead", "f8", (3,)),
             ("lead", "f8", (surfaces,)),
+            ("at_stop_s", "f8", (surfaces,)), ("abandoned", "i8", (surfaces,)),
         ],
         align=True,
     )  # fmt: skip

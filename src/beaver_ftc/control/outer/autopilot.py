@@ -62,12 +62,14 @@ def take_over(autopilot, control, y, attitude):
 
 @kernel
 def follow(autopilot, control, y):
-    """Smooth what is noisy, and note whether the ailerons are gone."""
+    """Smooth what is noisy, and note whether the ailerons or the rudder are gone."""
     dt = autopilot.dt
     autopilot.alpha += dt / autopilot.gain.alpha_s * (y[ALPHA] - autopilot.alpha)
     autopilot.airspeed += dt / autopilot.gain.airspeed_s * (y[AIRSPEED] - autopilot.airspeed)
     gone = control.effectiveness[control.main[ROLL]] < control.least_effectiveness
     autopilot.jammed += dt / autopilot.gain.jammed_s * (gone - autopilot.jammed)
+    free = control.effectiveness[control.main[YAW]] < control.least_effectiveness
+    autopilot.loose += dt / autopilot.gain.jammed_s * (free - autopilot.loose)
 
 
 @kernel
@@ -137,7 +139,8 @@ def rolling(autopilot, attitude):
     """The rate of the bank angle, rad/s."""
     if autopilot.commanded[HEADING]:
         error = turn(autopilot.command[HEADING] - attitude[YAW])
-        turning = autopilot.gain.heading * error + autopilot.moving[HEADING]
+        left = 1.0 - autopilot.loose * (1.0 - autopilot.gain.loose)
+        turning = left * autopilot.gain.heading * error + autopilot.moving[HEADING]
         bank = autopilot.airspeed / autopilot.gravity * turning
     elif autopilot.commanded[BANK]:
         bank = autopilot.command[BANK]

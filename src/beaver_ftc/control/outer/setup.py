@@ -23,14 +23,15 @@ GAINS = {
     "authority_s": 1.0,  # a rate is asked for only if it can be had, and ended, within this time
     "bank_s": 6.0,  # and a bank only if it can be left within this time
     "spare_mps": 4.0, "path_per_mps": 0.02,  # airspeed off before height goes for it, and how much path, rad
+    "loose": 0.4,  # share of the heading loop left when nothing acts in yaw: the turn is then slow to follow
     "protection": 2.0,  # 1/s: how fast the angle of attack may close on its limit
 }  # fmt: skip
 LEAST_DIHEDRAL = 0.01  # of an aircraft that hardly rolls by sideslip: it is then not flown by it
 _UNIT = {"altitude_m": 1.0, "airspeed_mps": 1.0, "heading_deg": radians(1.0), "bank_deg": radians(1.0)}
 
 
-def set_up_autopilot(autopilot: np.void, power: np.void, scenario: Scenario) -> None:
-    """Fill the record (dtype AUTOPILOT); power: the engine's record, already assembled."""
+def set_up_autopilot(autopilot: np.void, control: np.void, scenario: Scenario) -> None:
+    """Fill the record (dtype AUTOPILOT); control: the law's, already assembled."""
     profile = scenario.autopilot
     if profile is None or not profile.channels:
         return
@@ -45,8 +46,9 @@ def set_up_autopilot(autopilot: np.void, power: np.void, scenario: Scenario) -> 
     autopilot["steepest_alpha"] = radians(STEEPEST_ALPHA_DEG)
     autopilot["most"], autopilot["most_bank"] = np.radians(MOST_DEG_S), radians(MOST_BANK_DEG)
     for ours, theirs in (("trim_inhg", "trim"), ("low_inhg", "low"), ("high_inhg", "high")):
-        autopilot[ours] = power[theirs]
-    autopilot["step_inhg"] = power["step"]
+        autopilot[ours] = control["power"][theirs]
+    autopilot["step_inhg"] = control["power"]["step"]
+    control["steered"] = 1
 
 
 def _know(autopilot: np.void, scenario: Scenario) -> None:

@@ -17,7 +17,7 @@ GAIN = np.dtype(
         ("bank", "f8"), ("bank_i", "f8"), ("heading", "f8"), ("sideslip", "f8"),
         ("alpha_s", "f8"), ("airspeed_s", "f8"), ("jammed_s", "f8"),
         ("authority_s", "f8"), ("bank_s", "f8"), ("spare_mps", "f8"), ("path_per_mps", "f8"),
-        ("protection", "f8"),
+        ("protection", "f8"), ("loose", "f8"),
     ],
     align=True,
 )  # fmt: skip
@@ -46,6 +46,7 @@ AUTOPILOT = np.dtype(
         ("lift", "f8"),  # rad of path angle found missing
         ("throttle", "f8"), ("rolled", "f8"),  # m/s2, rad/s: found missing
         ("jammed", "f8"),  # share of roll that rudder and dihedral carry
+        ("loose", "f8"),  # 1: nothing acts in yaw
         ("rates", "f8", (3,)),
         ("gain", GAIN),
         # how far off, at most; and the airspeed's mean deviation of late

@@ -25,6 +25,8 @@ from beaver_ftc.diagnosis.state import PITCH, ROLL, YAW
 MOST_PATH_RAD = 0.15
 MOST_SIDESLIP_RAD = 0.14
 MOST_MISSING = 0.1  # rad of path angle, and times gravity of acceleration
+MOST_DRIFT_RAD_S = 0.1  # of turning that a bank without a turn stands for
+USUAL_S, USUAL_MPS = 20.0, 3.0  # airspeed that power alone can hold: within so much of what it has been
 LEAST_PUSH = 1e-3  # m/s2 per inHg
 SETTLED_S = 30.0  # after a change of heading
 MEAN_S = 10.0  # over which the airspeed is judged: what comes and goes faster is a gust, not a deviation
@@ -57,6 +59,7 @@ def take_over(autopilot, control, y, attitude):
     """In trim: smoothed signals and the engine as they are."""
     autopilot.flying = 1
     autopilot.alpha, autopilot.airspeed = y[ALPHA], y[AIRSPEED]
+    autopilot.usual = y[AIRSPEED]
     autopilot.climb_in_trim = attitude[PITCH] - y[ALPHA]
 
 
@@ -140,7 +143,9 @@ def rolling(autopilot, attitude):
     if autopilot.commanded[HEADING]:
         error = turn(autopilot.command[HEADING] - attitude[YAW])
         left = 1.0 - autopilot.loose * (1.0 - autopilot.gain.loose)
-        turning = left * autopilot.gain.heading * error + autopilot.moving[HEADING]
+        found = autopilot.drift + autopilot.dt * autopilot.loose * autopilot.gain.heading_i * error
+        autopilot.drift = autopilot.loose * clamp(found, MOST_DRIFT_RAD_S)
+        turning = left * autopilot.gain.heading * error + autopilot.moving[HEADING] + autopilot.drift
         bank = autopilot.airspeed / autopilot.gravity * turning
     elif autopilot.commanded[BANK]:
         bank = autopilot.command[BANK]
@@ -177,12 +182,14 @@ def to_body(autopilot, y, attitude, rolling, pitching):
 
 @kernel
 def throttle(autopilot, control, y, path, push):
-    """Move the manifold pressure; while power stands in for a lost pitch, its law moves it about our last."""
+    """Move the manifold pressure; while power stands in for a lost pitch, give its law our airspeed."""
     power = control.power
     power.in_use = 1
-    if power.engaged:
-        return
     error = autopilot.command[SPEED] - autopilot.airspeed
+    autopilot.usual += autopilot.dt / USUAL_S * (autopilot.airspeed - autopilot.usual)
+    if power.engaged:
+        power.usual_speed = autopilot.usual + clamp(autopilot.command[SPEED] - autopilot.usual, USUAL_MPS)
+        return
     along = autopilot.moving[SPEED] + autopilot.gain.speed * error + autopilot.throttle
     climbing = autopilot.gravity * (path - autopilot.climb_in_trim)
     wanted = autopilot.trim_inhg + (along + climbing) / push

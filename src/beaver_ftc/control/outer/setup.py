@@ -16,7 +16,7 @@ SPARE_MPS = 2.0  # above the validated airspeeds' end
 # Attitudes a fifth as fast as the inner loops, the path a quarter of that: gusts set the pace, not comfort.
 GAINS = {
     "altitude": 0.8, "altitude_i": 0.04, "attitude": 3.0, "speed": 0.3, "speed_i": 0.015,
-    "bank": 1.0, "bank_i": 0.2, "heading": 0.25,
+    "bank": 1.0, "bank_i": 0.2, "heading": 0.25, "heading_i": 0.004,
     "sideslip": 0.5,  # the yaw damper's part beside the rate loop
     "alpha_s": 2.0, "airspeed_s": 3.0,  # against noise and gusts
     "jammed_s": 1.0,  # rolling is handed to the rudder within about so long

@@ -14,7 +14,7 @@ COLUMNS = (
 GAIN = np.dtype(
     [
         ("altitude", "f8"), ("altitude_i", "f8"), ("attitude", "f8"), ("speed", "f8"), ("speed_i", "f8"),
-        ("bank", "f8"), ("bank_i", "f8"), ("heading", "f8"), ("sideslip", "f8"),
+        ("bank", "f8"), ("bank_i", "f8"), ("heading", "f8"), ("heading_i", "f8"), ("sideslip", "f8"),
         ("alpha_s", "f8"), ("airspeed_s", "f8"), ("jammed_s", "f8"),
         ("authority_s", "f8"), ("bank_s", "f8"), ("spare_mps", "f8"), ("path_per_mps", "f8"),
         ("protection", "f8"), ("loose", "f8"),
@@ -43,6 +43,8 @@ AUTOPILOT = np.dtype(
         ("limit", "f8", (3,)), ("most_bank", "f8"), ("bank_limit", "f8"),
         # memory
         ("alpha", "f8"), ("airspeed", "f8"),  # smoothed, rad and m/s
+        ("usual", "f8"),  # airspeed of late, m/s
+        ("drift", "f8"),  # rad/s of turning found missing
         ("lift", "f8"),  # rad of path angle found missing
         ("throttle", "f8"), ("rolled", "f8"),  # m/s2, rad/s: found missing
         ("jammed", "f8"),  # share of roll that rudder and dihedral carry

@@ -1,0 +1,218 @@
+"""The outer loops: the commanded profile by hand, kinematics against the truth, and flights that arrive."""
+
+import numpy as np
+import pytest
+
+from beaver_ftc.control.outer.autopilot import to_body
+from beaver_ftc.control.outer.profile import advance
+from beaver_ftc.control.outer.state import ALTITUDE, AUTOPILOT, BANK, HEADING, SPEED
+from beaver_ftc.errors import BadInput
+from beaver_ftc.loop.loop import Loop, fly
+from beaver_ftc.results.metrics import metrics
+from beaver_ftc.scenario.schema import Scenario
+from flying import Memory, loss
+
+STRAIGHT = {
+    "altitude_m": [{"at_s": 0, "hold": True}],
+    "airspeed_mps": [{"at_s": 0, "value": 45}],
+    "heading_deg": [{"at_s": 0, "hold": True}],
+}
+REAL = {
+    "sensors": "tactical-grade", "actuators": "servo",
+    "environment": {"turbulence": "dryden", "severity": "light"},
+    "fdi": {"bounds": {"sensors": "tactical-grade", "turbulence": "light"}},
+}  # fmt: skip
+
+
+def flown(duration_s=60.0, autopilot=None, **keys):
+    memory = Memory()
+    profile = STRAIGHT | (autopilot or {})
+    given = {"name": "test", "duration_s": duration_s, "autopilot": profile, **keys}
+    return fly(Scenario.model_validate(given), memory), memory
+
+
+def altitude_off(log):
+    return log["altitude_m"] - log["altitude_command_m"]
+
+
+def heading_off(log):
+    return np.degrees(np.arcsin(np.sin(log["psi_rad"] - log["heading_command_rad"])))
+
+
+class TestProfile:
+    def record(self, **legs):
+        autopilot = np.zeros(1, AUTOPILOT)[0]
+        autopilot["dt"] = 0.1
+        channels = {"altitude": ALTITUDE, "speed": SPEED, "heading": HEADING, "bank": BANK}
+        for name, (at_s, value, pace) in legs.items():
+            c = channels[name]
+            autopilot["legs"][c] = len(at_s)
+            autopilot["at_s"][c, : len(at_s)], autopilot["value"][c, : len(at_s)] = at_s, value
+            autopilot["speed"][c, : len(at_s)] = pace
+        return autopilot
+
+    def at(self, autopilot, t_s, measured=(100.0, 40.0, 0.0, 0.0)):
+        for t in np.arange(round(t_s / 0.1) + 1) * 0.1:
+            advance(autopilot, measured, t)
+        return autopilot
+
+    def test_a_climb_at_its_pace_and_no_further(self):
+        climb = {"altitude": ([1.0], [110.0], [2.0])}
+        assert self.at(self.record(**climb), 0.9)["commanded"][ALTITUDE] == 0
+        # from 1 s on, 2 m/s: after 3 s of it 6 m, and the first step is taken in the frame at 1 s
+        assert self.at(self.record(**climb), 3.9)["command"][ALTITUDE] == pytest.approx(106.0)
+        assert self.at(self.record(**climb), 20.0)["command"][ALTITUDE] == pytest.approx(110.0)
+
+    def test_hold_stops_a_climb_where_it_is(self):
+        autopilot = self.record(altitude=([0.0, 2.0], [200.0, np.nan], [5.0, 5.0]))
+        assert self.at(autopilot, 30.0)["command"][ALTITUDE] == pytest.approx(110.0)
+
+    def test_hold_takes_what_is_flown_if_nothing_was_commanded(self):
+        assert self.at(self.record(speed=([0.0], [np.nan], [1.0])), 3.0)["command"][SPEED] == 40.0
+
+    @pytest.mark.parametrize(("start", "goal", "way"), [(350, 10, 20), (10, 350, -20), (0, 170, 170)])
+    def test_a_turn_goes_the_shorter_way(self, start, goal, way):
+        autopilot = self.record(heading=([0.0], [np.radians(goal)], [np.inf]))
+        self.at(autopilot, 0.0, (0.0, 0.0, np.radians(start), 0.0))
+        assert np.degrees(autopilot["command"][HEADING]) - start == pytest.approx(way)
+
+
+def test_body_rates_of_a_steady_turn():
+    """Against the derivative of the attitude's rotation matrix: omega = R^T R' [Etkin1996]."""
+    theta, phi = 0.2, 0.4
+    autopilot = np.zeros(1, AUTOPILOT)[0]
+    autopilot["gravity"], autopilot["airspeed"], autopilot["dihedral"] = 9.81, 45.0, 0.02
+    autopilot["commanded"][BANK], autopilot["limit"] = 1, 10.0
+    to_body(np.asarray(autopilot).view(np.recarray), np.zeros(8), np.array([phi, theta, 1.0]), 0.03, 0.05)
+    psidot = 9.81 / 45.0 * np.tan(phi)
+
+    def rotation(t):
+        def about(axis, angle):
+            c, s = np.cos(angle), np.sin(angle)
+            i, j = [(1, 2), (2, 0), (0, 1)][axis]
+            R = np.eye(3)
+            R[i, i], R[i, j], R[j, i], R[j, j] = c, -s, s, c
+            return R
+
+        return about(2, 1.0 + psidot * t) @ about(1, theta + 0.05 * t) @ about(0, phi + 0.03 * t)
+
+    h = 1e-6
+    cross = rotation(0.0).T @ (rotation(h) - rotation(-h)) / (2.0 * h)
+    expected = [cross[2, 1], cross[0, 2], cross[1, 0]]
+    np.testing.assert_allclose(autopilot["rates"], expected, atol=1e-8)
+
+
+class TestFlights:
+    def test_still_air_climb_turn_and_slow_down(self):
+        profile = {
+            "altitude_m": [{"at_s": 0, "hold": True}, {"at_s": 10, "value": 1878.8, "climb_mps": 2}],
+            "airspeed_mps": [{"at_s": 0, "value": 45}, {"at_s": 60, "value": 40}],
+            "heading_deg": [{"at_s": 0, "hold": True}, {"at_s": 20, "value": 60}],
+        }
+        flight, log = flown(110.0, profile, actuators="servo")
+        assert np.abs(altitude_off(log)).max() < 5.0
+        assert flight.profile["airspeed_mps"] < 1.5
+        assert np.abs(heading_off(log)[5500:]).max() < 1.0
+        assert np.degrees(np.abs(log["beta_rad"][500:])).max() < 2.5  # coordinated
+        assert flight.exits == 0
+
+    def test_bank(self):
+        profile = {"heading_deg": [], "bank_deg": [{"at_s": 5, "value": 20}]}
+        _, log = flown(30.0, profile)
+        bank, V = log["phi_rad"][-1], log["airspeed_mps"][-1]
+        assert np.degrees(bank) == pytest.approx(20.0, abs=0.2)
+        turned = np.diff(np.unwrap(log["psi_rad"]))[-500:].mean() * 100.0
+        assert turned == pytest.approx(9.81 / V * np.tan(bank), rel=0.05)
+
+    @pytest.mark.parametrize("V", [38.0, 45.0, 52.0])
+    def test_real_air(self, V):
+        profile = {"airspeed_mps": [{"value": V}]}
+        flight, _ = flown(120.0, profile, initial={"airspeed_mps": V}, **REAL)
+        found = metrics(flight)["profile"]
+        assert found["altitude_m"] < 20.0
+        assert found["airspeed_mps"] < 3.5
+        assert found["heading_deg"] < 6.0
+
+    @pytest.mark.parametrize("magnitude", [0.4, 1.0])
+    def test_an_elevator_loss_is_not_felt(self, magnitude):
+        flight, _ = flown(100.0, faults=[loss(magnitude=magnitude, at_s=30.0)], **REAL)
+        found = metrics(flight)["profile"]
+        assert found["altitude_m"] < 15.0
+        assert found["airspeed_mps"] < 3.0
+        assert found["heading_deg"] < 5.0
+
+    @pytest.mark.parametrize("off_deg", [1.0, 3.0, 5.0])
+    def test_an_elevator_jammed_nose_down_is_carried_by_the_flap(self, off_deg):
+        trimmed_deg = np.degrees(Loop(Scenario(name="trim")).trim.elevator_rad)
+        fault = {"type": "stuck", "actuator": "elevator", "at_s": 30.0, "position_deg": trimmed_deg + off_deg}
+        real = REAL | {"fdi": {"fault_class": "all", **REAL["fdi"]}}
+        found = metrics(flown(100.0, faults=[fault], **real)[0])["profile"]
+        assert found["altitude_m"] < 15.0
+        assert found["airspeed_mps"] < 3.0
+        assert found["heading_deg"] < 5.0
+
+    def test_without_ailerons_the_rudder_rolls(self):
+        flight, log = flown(120.0, faults=[loss("aileron", 1.0, at_s=20.0)], **REAL)
+        assert flight.departure is None
+        assert np.degrees(np.abs(log["phi_rad"])).max() < 20.0
+        assert metrics(flight)["profile"]["heading_deg"] < 8.0
+
+    def test_the_reference_is_added_to(self):
+        roll = {"p": [{"sine": {"amplitude_deg_s": 2, "frequency_hz": 0.5}}]}
+        _, log = flown(12.0, reference=roll)
+        _, plain = flown(12.0)
+        added = log["p_reference_rad_s"] - plain["p_reference_rad_s"]
+        assert np.degrees(np.abs(added[200:])).max() == pytest.approx(2.0, rel=0.5)
+
+
+def mistakes(keys):
+    with pytest.raises(ValidationError) as caught:
+        Scenario.model_validate({"name": "x", **keys})
+    return str(caught.value.errors())
+
+
+class TestScenario:
+    @pytest.mark.parametrize(
+        ("autopilot", "says"),
+        [
+            ({"altitude_m": [{"at_s": 0}]}, "required key is missing"),
+            ({"altitude_m": [{"hold": True, "value": 1000}]}, "contradicts value"),
+            ({"altitude_m": [{"hold": True, "at_s": 5}, {"hold": True, "at_s": 5}]}, "not after"),
+            ({"heading_deg": [{"hold": True}], "bank_deg": [{"hold": True}]}, "contradicts heading_deg"),
+            ({"climb": 3}, "climb"),
+        ],
+    )
+    def test_mistakes_are_refused(self, autopilot, says):
+        assert says in mistakes({"autopilot": autopilot})
+
+    @pytest.mark.parametrize("key", ["altitude_within_m", "airspeed_within_mps", "heading_within_deg"])
+    def test_nothing_is_expected_of_a_profile_that_is_not_flown(self, key):
+        assert "there is no profile" in mistakes({"expect": {key: 5}})
+
+    def test_expectations_are_judged(self):
+        expect = {
+            "altitude_within_m": 5, "airspeed_within_mps": 2, "heading_within_deg": 0.001,
+            "pre_fault_rms_deg_s": {"p": 0.5}, "stays_in_envelope": True,
+        }  # fmt: skip
+        flight, _ = flown(20.0, expect=expect)
+        passed = {one["name"]: one["passed"] for one in metrics(flight)["expectations"]}
+        assert passed == {
+            "altitude_within_m": True, "airspeed_within_mps": True, "heading_within_deg": False,
+            "pre_fault_rms_deg_s.p": True, "stays_in_envelope": True,
+        }  # fmt: skip
+
+
+def test_an_aircraft_without_a_term_of_thrust_is_refused():
+    from types import SimpleNamespace
+
+    from beaver_ftc.control.outer import setup
+
+    scenario = Scenario.model_validate({"name": "x", "autopilot": STRAIGHT})
+    bare = SimpleNamespace(
+        name="bare", terms={}, geometry=scenario.airframe.geometry, mass=scenario.airframe.mass
+    )
+    stand_in = SimpleNamespace(
+        name="x", airframe=bare, autopilot=scenario.autopilot, design_model=scenario.design_model
+    )
+    with pytest.raises(BadInput, match="no term of its thrust"):
+        setup._know(np.zeros(1, AUTOPILOT)[0], stand_in)

@@ -91,7 +91,7 @@ def views(columns: Sequence[str], power: bool = False) -> tuple[View, ...]:
     """Every view that a log with these columns allows; power: the law has used the engine."""
     known = set(columns)
     named = (
-        _tracking(), _surfaces(), _detection(), _likelihood(), _isolation(estimators(columns)),
+        _tracking(), _profile(), _surfaces(), _detection(), _likelihood(), _isolation(estimators(columns)),
         _ratio(estimators(columns)), _effectiveness(), _supervisor(), *((_engine(),) if power else ()),
         _states(),
     )  # fmt: skip
@@ -124,6 +124,27 @@ def _tracking() -> View:
         for axis in AXES
     )
     return View("tracking", "Tracking: body rates against their reference", panels)
+
+
+def _profile() -> View:
+    flown = (
+        ("altitude", "altitude_command_m", "altitude_m"),
+        ("airspeed", "airspeed_command_mps", "airspeed_mps"),
+        ("heading ψ", "heading_command_rad", "psi_rad"),
+        ("bank φ", "bank_command_rad", "phi_rad"),
+        ("engine: manifold pressure", "", "manifold_pressure_inhg"),
+    )
+    panels = tuple(
+        Panel(
+            label,
+            (
+                *((Trace(command, "commanded", "target"),) if command else ()),
+                Trace(actual, "flown", "actual"),
+            ),
+        )
+        for label, command, actual in flown
+    )
+    return View("profile", "Profile: what was commanded, and what was flown", panels)
 
 
 def _surfaces() -> View:

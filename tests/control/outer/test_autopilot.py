@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from pydantic import ValidationError
 
 from beaver_ftc.control.outer.autopilot import to_body
 from beaver_ftc.control.outer.profile import advance

@@ -106,6 +106,7 @@ class Flight:
     estimate_interval: tuple[float, float] | None = None
     frequency_rad_s: float | None = None
     authority: dict[str, tuple[float, float]] | None = None
+    profile: dict[str, float | None] | None = None
     probing_s: tuple[float, float] | None = None
     engine_power: tuple[float, float, float, float] | None = None
     faults: tuple[dict, ...] = ()

@@ -9,7 +9,7 @@ from beaver_ftc.results.metrics import as_json, metrics
 KEYS = [
     "scenario", "seed", "frames", "flight", "fault", "faults", "detection", "isolation", "false_alarm",
     "tracking", "supervisor", "mode_changes_left_out", "envelope_exits", "envelope", "departure",
-    "authority", "engine_power", "saturation_s", "hints", "expectations", "passed", "versions",
+    "authority", "engine_power", "profile", "saturation_s", "hints", "expectations", "passed", "versions",
 ]  # fmt: skip
 
 
@@ -179,3 +179,10 @@ def test_an_alarm_in_the_very_frame_of_the_fault_is_no_false_alarm():
     document = _of(Scenario(faults=(Fault(at_s=5.890000000000001),)), detection_time_s=5.89)
     assert document["false_alarm"] is False
     assert document["detection"]["delay_s"] == 0.0
+
+
+def test_deviations_from_the_profile_are_in_degrees_where_they_are_angles():
+    off = {"altitude_m": 3.0, "airspeed_mps": 1.5, "heading_deg": math.radians(2.0), "bank_deg": None}
+    assert _of(profile=off)["profile"] == {
+        "altitude_m": 3.0, "airspeed_mps": 1.5, "heading_deg": 2.0, "bank_deg": None
+    }  # fmt: skip

@@ -1,5 +1,7 @@
 """A flying wing made of difference equations whose coefficients are known, and its logs in each format."""
 
+import struct
+
 import numpy as np
 
 RATE_HZ = 10.0
@@ -104,3 +106,36 @@ def write_alfa(folder, duration_s=60.0, failure_s=None, seed=3):
         stamps = origin_ns + np.round(np.arange(failure_s, duration_s, 0.5) * 1e9).astype(np.int64)
         write("failure_status-aileron", stamps, {"field.data": np.full(len(stamps), 2.0)})
     return folder
+
+
+def write_ulog(path, columns, name="vehicle_rates"):
+    """A PX4 ULog file with one topic that holds these columns as doubles, stamps in us."""
+    fields = [field for field in columns if field != "t_s"]
+    layout = "uint64_t timestamp;" + "".join(f"double {field};" for field in fields)
+
+    def message(kind, body):
+        return struct.pack("<HB", len(body), ord(kind)) + body
+
+    data = b"ULog\x01\x12\x35\x01" + struct.pack("<Q", 0)
+    data += message("F", f"{name}:{layout}".encode())
+    data += message("A", struct.pack("<BH", 0, 0) + name.encode())
+    for i, t_s in enumerate(columns["t_s"]):
+        row = [columns[field][i] for field in fields]
+        data += message("D", struct.pack(f"<HQ{len(row)}d", 0, round(t_s * 1e6) + 1_000_000, *row))
+    path.write_bytes(data)
+    return path
+
+
+def write_ardupilot(path, columns, name="RATE"):
+    """An ArduPilot dataflash log (text form) with one message that holds these columns, stamps in us."""
+    fields = [field for field in columns if field != "t_s"]
+    short = [field[:12] for field in fields]
+    lines = [
+        "FMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format,Columns",
+        f"FMT, 140, {11 + 8 * len(fields)}, {name}, Q{'d' * len(fields)}, TimeUS,{','.join(short)}",
+    ]
+    for i, t_s in enumerate(columns["t_s"]):
+        row = ", ".join(repr(float(columns[field][i])) for field in fields)
+        lines.append(f"{name}, {round(t_s * 1e6) + 1_000_000}, {row}")
+    path.write_text("\n".join(lines) + "\n")
+    return path

@@ -33,38 +33,74 @@ def command(
     ] = None,
     only: Annotated[str | None, typer.Option("--set", help="With --benchmark: one set.")] = None,
     flights: Annotated[
-        int | None, typer.Option(min=1, help="At most this many flights of each sweep.")
+        str | None,
+        typer.Option(metavar="N|FOLDER", help="At most N flights of each sweep; or recorded flights."),
     ] = None,
     workers: Annotated[int, typer.Option(min=1, help="Processes.")] = 2,
     target: Annotated[float, typer.Option(min=0, help="With --tune: false alarms per hour allowed.")] = 1.0,
     out: Annotated[Path, typer.Option(help="Folder for the comparison.")] = Path("comparisons"),
     leaderboard: Annotated[
-        Path | None, typer.Option(help="With --benchmark: the Markdown file to update.")
+        Path | None, typer.Option(help="With --benchmark or recorded flights: the page to update.")
     ] = None,
     format: FormatOption = Format.text,
 ) -> None:
-    """Compare finished runs; or schemes and laws on the same flights (--sweep, --benchmark).
+    """Compare finished runs; or schemes and laws on the same flights (--sweep, --benchmark); or ways to
+    diagnose recorded flights (--flights FOLDER), each left out of the model it is diagnosed with.
 
     Writes comparison.json, comparison.png and comparison.html (for runs: runs.json, runs.png, runs.html)
-    below --out.
+    below --out; for recorded flights, flights.json and flights.md.
 
     Stopped or killed, a comparison on flights goes on where it was with the same command.
     """
-    asked = [bool(runs), sweep is not None, benchmark, tune]
+    most, folder = _most_or_folder(flights)
+    asked = [bool(runs), sweep is not None, benchmark, tune, folder is not None]
     if sum(asked) != 1:
-        raise BadInput("compare: allowed: exactly one of RUN..., --sweep FILE, --benchmark, --tune")
+        raise BadInput(
+            "compare: allowed: exactly one of RUN..., --sweep FILE, --benchmark, --tune, --flights FOLDER"
+        )
     if only is not None and not benchmark:
         raise BadInput("compare: --set: allowed: only with --benchmark")
     if errors and not tune:
         raise BadInput("compare: --errors: allowed: only with --tune")
     if runs:
         _compare_runs(runs, out, format)
+    elif folder is not None:
+        _compare_recorded(folder, out, format, leaderboard)
     elif tune:
-        _tune(target, workers, flights, errors, format)
+        _tune(target, workers, most, errors, format)
     else:
-        cases = _cases(sweep, only, flights)
+        cases = _cases(sweep, only, most)
         name = f"benchmark-{only}" if only else "benchmark" if benchmark else cases[0].set
         _say(_fly(cases, schemes, laws, workers, out, name), out / name, format, leaderboard)
+
+
+def _most_or_folder(flights: str | None) -> tuple[int | None, Path | None]:
+    """A number of flights, or the folder of recorded ones."""
+    if flights is None:
+        return None, None
+    if not flights.lstrip("-").isdigit():
+        return None, Path(flights)
+    if int(flights) < 1:
+        raise BadInput(f"compare: --flights {flights}: allowed: at least 1, or a folder of recorded flights")
+    return int(flights), None
+
+
+def _compare_recorded(folder: Path, out: Path, format: Format, page: Path | None) -> None:
+    from beaver_ftc.results.metrics import as_json
+    from beaver_ftc.results.writer import result_folder
+    from beaver_ftc.studies.recorded.run import run_benchmark
+    from beaver_ftc.studies.recorded.words import as_markdown, as_text, update_page
+
+    document = run_benchmark(folder)
+    with result_folder(out, "recorded-flights") as written:
+        (written / "flights.json").write_text(as_json(document), encoding="utf-8")
+        (written / "flights.md").write_text(as_markdown(document), encoding="utf-8")
+    if page is not None:
+        update_page(document, page)
+    if format is Format.json:
+        emit_json(document | {"folder": str(out / "recorded-flights")})
+    else:
+        emit(as_text(document))
 
 
 def _compare_runs(folders: list[Path], out: Path, format: Format) -> None:

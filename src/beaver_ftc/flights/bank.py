@@ -50,14 +50,16 @@ def bank_of(model: Model) -> Bank:
     rows: list[tuple[Floats, int, float, Floats]] = [
         (np.ones(count), HEALTHY, settings.repair_share, np.zeros(3))
     ]
+    surfaces = sum(len(group) for group in model.groups)
     stuck = "stuck" in model.vehicle.faults
     pairs = count > 1
     single = 1.0 - (_PAIR_SHARE if pairs else 0.0) - (_UNKNOWN_SHARE if stuck else 0.0)
     for group in range(count):
         levels, weights = _levels(model, group)
+        share = single * len(model.groups[group]) / surfaces / len(model.vehicle.faults)
         for offset in offsets(model, group):
             rows += [
-                (_with(count, {group: level}), GROUP, single / count * weight, offset)
+                (_with(count, {group: level}), GROUP, share * weight, offset)
                 for level, weight in zip(levels, weights, strict=True)
             ]
     rows += _pairs(count)

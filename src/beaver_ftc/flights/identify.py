@@ -29,7 +29,7 @@ HISTORIES = (1, 2, 3, 4)
 LAGS = (2, 3, 4, 6)
 _COLOUR_S = 2.0
 _AFTER_EVENT_S = 1.0
-_SURE, _HOLD_S = 0.99, 0.3
+_SURE, _HOLD_S, _POWER_ALONE = 0.995, 0.3, 0.9
 """Where no labels say how often things break, an alarm asks for more: for how much, the benchmark decided."""
 _POWER = 0.8
 """A coloured residual tells less than a white one: by how much, blocked tests decided."""
@@ -168,7 +168,7 @@ def prior(stretches: Sequence[Stretch], model: Model) -> Settings:
         repairs += sum(int(level == 1.0) for flight in seen for level in flight[1:])
     levels = {name: found for name, found in levels.items() if found}
     if not levels:
-        return Settings(alarm=_SURE, hold_s=_HOLD_S)
+        return Settings(alarm=_SURE, hold_s=_HOLD_S, power=_POWER_ALONE)
     return Settings(
         levels=levels,
         changes_per_hour=(changes + 1) / hours,

@@ -1,4 +1,4 @@
-"""A flight of the ALFA data set in its processed form: a folder of CSV files, one a topic [Keipour2019].
+"""A flight of the ALFA data set in its processed form: a folder of CSV files, one a topic [ALFA2021].
 
 The diagnosis reads what is upstream of the frozen output: commanded and measured roll and pitch
 (`mavros-nav_info-*`), never `mavros-rc-out`, whose failed channel stands still from the fault on. The outputs

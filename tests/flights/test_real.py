@@ -1,0 +1,62 @@
+"""On the recorded data sets, where they are: the bars of the product, on parts the model has not seen.
+
+Skipped with a reason where the data is absent (it is not ours to copy).
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from beaver_ftc.flights.diagnose import diagnose
+from beaver_ftc.flights.identify import fit_model, stretches_of
+from beaver_ftc.flights.inputs import load_flights
+from beaver_ftc.flights.scoring import by_event, by_labels
+from beaver_ftc.flights.testing import folds
+from beaver_ftc.flights.vehicle import load_vehicle
+
+ALFA = "carbonZ_2018-09-11-15-06-34_1_rudder_right_failure"
+
+
+@pytest.fixture(scope="module")
+def enac(real_flights):
+    vehicle = load_vehicle(real_flights / "enac" / "vehicle.yaml")
+    return vehicle, load_flights([real_flights / "enac" / "flight-21.csv"], vehicle)[0]
+
+
+def test_halves_of_a_flying_wing(enac):
+    vehicle, samples = enac
+    stretches = stretches_of([samples])
+    whole = fit_model(stretches, vehicle)
+    for fitted, kept, _ in folds(stretches):
+        model = fit_model(fitted, vehicle, whole.settings)
+        labels = np.where(kept.use[:, None], samples.labels, np.nan)
+        found = by_labels(diagnose(samples, model), labels)
+        assert found["classes"] > 0.75
+        assert found["healthy_or_faulty"] > 0.85
+        assert found["side"] > 0.85
+        assert found["mean_error"] < 0.04
+
+
+def test_cutting_a_real_flight_short_changes_no_earlier_row(enac):
+    vehicle, samples = enac
+    model = fit_model(stretches_of([samples]), vehicle)
+    whole = diagnose(samples, model)
+    for n in (2873, 9071):
+        fields = ("t_s", "rates", "commands", "signals", "labels", "run", "stamps")
+        short = diagnose(replace(samples, **{name: getattr(samples, name)[:n] for name in fields}), model)
+        assert np.array_equal(short.estimate, whole.estimate[:n])
+        assert np.array_equal(short.probability, whole.probability[:n])
+
+
+def test_a_rudder_hard_over_is_found_by_its_effect_alone(real_flights):
+    vehicle = load_vehicle("alfa")
+    folders = sorted(path for path in (real_flights / "alfa").iterdir() if path.is_dir())
+    flights = load_flights(folders, vehicle)
+    kept = next(one for one in flights if one.name == ALFA)
+    model = fit_model(stretches_of([one for one in flights if one is not kept]), vehicle)
+    assert not set(model.vehicle.outputs.values()) & {*model.vehicle.commands, *model.vehicle.signals}
+    found = by_event(diagnose(kept, model), kept.events, model.groups)
+    assert found["false_alarms"] == 0
+    assert found["delay_s"] < 5.0
+    assert found["right_group"] is True

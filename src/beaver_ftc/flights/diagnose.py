@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from beaver_ftc.errors import BadInput
+from beaver_ftc.flights.bank import UNKNOWN as UNKNOWN_OFFSET
 from beaver_ftc.flights.bank import Bank, at_first, bank_of
 from beaver_ftc.flights.kernel import run_bank
 from beaver_ftc.flights.model import Model
@@ -126,7 +127,8 @@ def rows_of(
     idle = posterior[:, bank.idle]
     probability = posterior[:, bank.faults].sum(axis=1)
     answering = posterior[:, : bank.idle] / np.maximum(1.0 - idle, 1e-300)[:, None]
-    faulty = _standing(probability >= model.settings.alarm, model).astype(np.int64)
+    well = posterior[:, 0] + idle > 0.5
+    faulty = _latched(_standing(probability >= model.settings.alarm, model), well).astype(np.int64)
     groups = group_indices(model)
     estimate, low, high = (np.ones((len(posterior), len(model.vehicle.surfaces))) for _ in range(3))
     healthy = np.empty((len(posterior), len(groups)))
@@ -158,6 +160,14 @@ def _standing(raised: NDArray[np.bool_], model: Model) -> NDArray[np.bool_]:
     reach = round(model.settings.hold_s * model.rate_hz)
     since = np.arange(len(raised)) - np.maximum.accumulate(np.where(raised, -1, np.arange(len(raised))))
     return np.asarray(raised & (since > reach))
+
+
+def _latched(raised: NDArray[np.bool_], well: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """An alarm once raised stands until health is the likelier again."""
+    order = np.arange(len(raised))
+    last_raised = np.maximum.accumulate(np.where(raised, order, -1))
+    last_well = np.maximum.accumulate(np.where(well & ~raised, order, -1))
+    return np.asarray((last_raised >= 0) & (last_raised > last_well))
 
 
 def _marginal(bank: Bank, posterior: Floats, group: int) -> tuple[Floats, Floats]:
@@ -198,7 +208,11 @@ def _names(model: Model, bank: Bank, posterior: Floats, faulty: NDArray[np.int64
         [posterior[:, bank.faulty(g)].sum(axis=1) / total for g in range(len(model.groups))]
     )
     named = np.full(len(posterior), "", dtype=object)
+    other = posterior[:, bank.kind == UNKNOWN_OFFSET].sum(axis=1) > total
     for k in np.flatnonzero(faulty):
+        if other[k] and k and named[k - 1]:
+            named[k] = named[k - 1]  # an offset of no known cause, with the alarm still standing
+            continue
         surfaces = [name for g in np.flatnonzero(by_group[k] > _NAMED) for name in model.groups[g]]
         named[k] = "+".join(surfaces) or UNKNOWN
     return named

@@ -84,3 +84,14 @@ def test_a_verdict_says_what_a_still_flight_cannot_show(wing, wing_folder, wing_
     for one, other in zip(said, lively, strict=True):
         assert one["smallest_loss"]["5"] is None
         assert 0.0 < other["smallest_loss"]["60"] < other["smallest_loss"]["5"]
+
+
+def test_events_are_as_few_as_the_faults(rows, wing):
+    from beaver_ftc.flights.verdict import events_of, lasting
+
+    events = lasting(events_of(rows, list(wing.surfaces)))
+    named = [event["named"] for event in events if event["to_s"] - event["from_s"] > 20]
+    assert named == ["left", "right"]
+    assert len(events) <= 5
+    for event, begins in zip([e for e in events if e["to_s"] - e["from_s"] > 20], (60, 160), strict=True):
+        assert begins <= event["from_s"] < begins + 5

@@ -11,6 +11,7 @@ import numpy as np
 from beaver_ftc.flights.diagnose import Rows
 from beaver_ftc.flights.model import Model
 from beaver_ftc.flights.samples import Samples
+from beaver_ftc.flights.verdict import BRIEF_S, lasting
 
 if TYPE_CHECKING:
     from jinja2 import Template
@@ -24,6 +25,8 @@ def render(samples: Samples, model: Model, rows: Rows, verdict: dict[str, Any]) 
     """The report as HTML text."""
     return _template().render(
         verdict=verdict,
+        events=lasting(verdict["events"]),
+        brief_s=BRIEF_S,
         model=model,
         picture=b64encode(picture(samples, model, rows)).decode(),
         ages=samples.age_s,

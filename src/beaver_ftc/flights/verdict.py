@@ -12,6 +12,8 @@ from beaver_ftc.flights.samples import Samples
 
 Document = dict[str, Any]
 
+BRIEF_S = 3.0
+
 
 def verdict_of(samples: Samples, model: Model, rows: Rows) -> Document:
     """The document of verdict.json."""
@@ -30,31 +32,59 @@ def verdict_of(samples: Samples, model: Model, rows: Rows) -> Document:
 
 
 def events_of(rows: Rows, surfaces: list[str]) -> list[Document]:
-    """Each uninterrupted time with the same name: when, what, how much is left."""
-    events: list[Document] = []
-    change = np.flatnonzero(rows.named[1:] != rows.named[:-1]) + 1
-    edges = [0, *change.tolist(), len(rows.named)]
-    for begin, end in pairwise(edges):
-        if rows.faulty[begin]:
-            events.append(_event(rows, begin, end, surfaces))
-    return events
+    """Each time with one name and one effectiveness: when, what, how much is left.
+
+    What lasts less than BRIEF_S between alarms is taken into the event before it; what stands alone is brief.
+    This is hindsight, for the reader; the rows have none.
+    """
+    return [
+        _event(rows, begin, end, surfaces) for begin, end in _joined(rows, _runs(rows)) if rows.faulty[begin]
+    ]
+
+
+def _runs(rows: Rows) -> list[tuple[int, int]]:
+    """Begin and end of what has one name and one estimate."""
+    changed = (rows.named[1:] != rows.named[:-1]) | (np.diff(rows.faulty) != 0)
+    changed |= (np.diff(rows.estimate, axis=0) != 0.0).any(axis=1) & (rows.faulty[1:] == 1)
+    edges = [0, *(np.flatnonzero(changed) + 1).tolist(), len(rows.named)]
+    return list(pairwise(edges))
+
+
+def _joined(rows: Rows, runs: list[tuple[int, int]]) -> list[tuple[int, int]]:
+    """Runs with the brief ones taken into the alarm before them, and alike neighbours made one."""
+    joined: list[tuple[int, int]] = []
+    for begin, end in runs:
+        last = joined[-1] if joined else None
+        brief = rows.t_s[end - 1] - rows.t_s[begin] < BRIEF_S
+        if last and rows.faulty[last[0]] and (brief or _alike(rows, last[0], begin)) and rows.faulty[begin]:
+            joined[-1] = (last[0], end)
+        else:
+            joined.append((begin, end))
+    return joined
+
+
+def _alike(rows: Rows, one: int, other: int) -> bool:
+    return bool(
+        rows.named[one] == rows.named[other] and np.array_equal(rows.estimate[one], rows.estimate[other])
+    )
 
 
 def _event(rows: Rows, begin: int, end: int, surfaces: list[str]) -> Document:
-    """One event; effectiveness as known when it ended."""
-    named = str(rows.named[begin])
+    """One event; name and effectiveness as they stood for most of it."""
+    names, count = np.unique(rows.named[begin:end].astype(str), return_counts=True)
+    named = str(names[count.argmax()])
     mentioned = surfaces if named == UNKNOWN else named.split("+")
-    last = end - 1
     return {
         "from_s": float(rows.t_s[begin]),
-        "to_s": float(rows.t_s[last]),
+        "to_s": float(rows.t_s[end - 1]),
+        "brief": bool(rows.t_s[end - 1] - rows.t_s[begin] < BRIEF_S),
         "named": named,
         "probability": float(rows.probability[begin:end].max()),
         "effectiveness": {
             name: {
-                "estimate": float(rows.estimate[last, i]),
-                "low": float(rows.low[last, i]),
-                "high": float(rows.high[last, i]),
+                "estimate": float(np.median(rows.estimate[begin:end, i])),
+                "low": float(np.median(rows.low[begin:end, i])),
+                "high": float(np.median(rows.high[begin:end, i])),
             }
             for i, name in enumerate(surfaces)
             if name in mentioned
@@ -62,10 +92,18 @@ def _event(rows: Rows, begin: int, end: int, surfaces: list[str]) -> Document:
     }
 
 
+def lasting(events: list[Document]) -> list[Document]:
+    """The events that are not brief; all of them where every one is."""
+    return [event for event in events if not event["brief"]] or events
+
+
 def as_text(verdict: Document) -> str:
     """The verdict in lines for people."""
     lines = [f"{verdict['flight']}: {_summary(verdict)}"]
-    lines += [f"  {_event_line(event)}" for event in verdict["events"]]
+    shown = lasting(verdict["events"])
+    lines += [f"  {_event_line(event)}" for event in shown]
+    if len(shown) < len(verdict["events"]):
+        lines.append(f"  and {len(verdict['events']) - len(shown)} brief alarms of under {BRIEF_S:g} s")
     lines += [f"  {sentence}" for sentence in verdict["can_separate"]]
     for key, value in verdict.get("score", {}).items():
         lines.append(f"  {key}: {_shown(value)}")
@@ -73,7 +111,7 @@ def as_text(verdict: Document) -> str:
 
 
 def _summary(verdict: Document) -> str:
-    count = len(verdict["events"])
+    count = len(lasting(verdict["events"]))
     what = f"{count} event{'s' if count > 1 else ''}" if count else "no fault shows"
     return f"{what} in {verdict['duration_s']:.0f} s"
 

@@ -1,5 +1,6 @@
 """The diagnosis without the loop around it: the same verdicts to the bit, sample for sample."""
 
+import shutil
 import subprocess
 import sys
 import tracemalloc
@@ -173,3 +174,18 @@ def test_turbulence_wants_the_attitude():
     diagnosis = bf.Diagnosis(bf.aircraft("beaver"), fdi={"bounds": {"turbulence": "light"}})
     with pytest.raises(bf.BadInput, match="attitude_rad: is missing"):
         diagnosis.step([0, 0, 0], [0.1, 0, 45, 1000, 1], [0] * 4)
+
+
+def test_of_an_aircraft_beside_the_scenario(tmp_path):
+    """Another aircraft than the built-in one: the same data in a folder of its own, whose surfaces are named
+    otherwise, gives the same verdicts under those names."""
+    own = own_aircraft(tmp_path)
+    flown = Flown(**CASES["published"])
+    diagnosis = bf.Diagnosis(own, rate_hz=100)
+    said = [diagnosis.step(*sample[:3]) for sample in flown.samples]
+    assert said == flown.verdicts
+
+
+def own_aircraft(folder):
+    shutil.copytree(bf.aircraft("beaver").folder, folder / "my-uav")
+    return bf.aircraft("./my-uav", folder)

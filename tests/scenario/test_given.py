@@ -1,5 +1,6 @@
 """Scenarios and their changes from Python: as from a file, and mistakes named by their keys."""
 
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -96,3 +97,24 @@ class TestWith:
     def test_a_mistake_names_the_key(self, changes, says):
         with pytest.raises(bf.BadInput, match=says):
             bf.load("elevator-partial-loss").with_(changes)
+
+
+class TestAnAircraftBesideTheScenario:
+    @pytest.fixture
+    def written(self, tmp_path):
+        shutil.copytree(bf.aircraft("beaver").folder, tmp_path / "my-uav")
+        data = {"name": "mine", "aircraft": "./my-uav", "duration_s": 1.0}
+        (tmp_path / "mine.yaml").write_text(yaml.dump(data), encoding="utf-8")
+        return bf.load(tmp_path / "mine.yaml")
+
+    def test_is_found_again_when_something_changes(self, written, tmp_path):
+        other = written.with_({"seed": 7, "faults": [{"type": "float", "actuator": "flap", "at_s": 0.5}]})
+        assert other.airframe.folder == tmp_path / "my-uav"
+
+    def test_is_found_again_by_the_scenario_flown(self, written, tmp_path):
+        sim = bf.Simulation(written)
+        sim.step(frames=20)
+        sim.inject({"type": "stuck", "actuator": "rudder"})
+        sim.step(frames=20)
+        assert sim.scenario_flown().airframe.folder == tmp_path / "my-uav"
+        assert bf.fly(sim.scenario_flown()).log.equals(sim.log)

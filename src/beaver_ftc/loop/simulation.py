@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from beaver_ftc.aircraft.question import asked
 from beaver_ftc.control.supervisor import MODES
 from beaver_ftc.errors import BadInput, suggestion
 from beaver_ftc.loop.flight import Flight, LogSink
@@ -169,7 +170,8 @@ class Stepping:
 
         What is broken in just this way already cannot be broken again. Raises BadInput that names the key.
         """
-        new = fault_of(fault, self._now_s)
+        with asked(self._loop.aircraft):
+            new = fault_of(fault, self._now_s)
         if not any(is_same_again(new, known) for known in self._faults):
             self._declare((*self._faults, new))
 

@@ -10,7 +10,10 @@ from beaver_ftc.cli.output import Format, FormatOption, emit, emit_json
 
 def command(
     flights: Annotated[list[Path], typer.Argument(metavar="FLIGHT...", help="Recorded flights.")],
-    model: Annotated[Path, typer.Option(metavar="MODEL", help="The model file `identify` has written.")],
+    model: Annotated[
+        Path | None,
+        typer.Option(metavar="MODEL", help="The model file `identify` has written; none for our own logs."),
+    ] = None,
     out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("diagnoses"),
     score: Annotated[
         bool, typer.Option("--score", help="Compare with the log's labels, after the fact.")
@@ -23,8 +26,11 @@ def command(
     """Diagnose recorded flights with an identified model.
 
     Writes DIR/<flight>/diagnosis.parquet (a row a sample), verdict.json and report.html. A row uses nothing
-    later than its time.
+    later than its time. The log.parquet of a run of ours needs no model: it is diagnosed as it was in flight.
     """
+    if model is None:
+        _replay(flights, out, format)
+        return
     from beaver_ftc.flights.inputs import load_flights
     from beaver_ftc.flights.model import load_model
     from beaver_ftc.flights.verdict import as_text
@@ -41,6 +47,23 @@ def command(
                 f"{as_text(verdict)}\n  report: {verdict['folder']}/report.html" for verdict in verdicts
             )
         )
+
+
+def _replay(flights: list[Path], out: Path, format: Format) -> None:
+    from beaver_ftc.errors import BadInput
+    from beaver_ftc.flights.replay import as_text, is_own_log, replay, write_replay
+
+    others = [path for path in flights if not is_own_log(path)]
+    if others:
+        says = "--model is missing, allowed without one: log.parquet beside its scenario.yaml"
+        raise BadInput(f"diagnose: {others[0]}: {says}")
+    done = [replay(path) for path in flights]
+    folders = [write_replay(out, one) for one in done]
+    verdicts = [one.verdict | {"folder": str(at)} for one, at in zip(done, folders, strict=True)]
+    if format is Format.json:
+        emit_json({"flights": verdicts})
+    else:
+        emit("\n".join(map(as_text, verdicts)))
 
 
 def _diagnose(samples: Any, model: Any, out: Path, scored: bool) -> dict[str, Any]:

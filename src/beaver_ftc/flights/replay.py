@@ -1,0 +1,166 @@
+"""A flight of our own once more through the diagnosis that flew it: its log.parquet, without JSBSim.
+
+What the log has are the measured rates, the commands and the flow as the aircraft had it: where no errors of
+the flow sensors were declared, that is what the diagnosis was given, and the verdicts are the same to the
+bit.
+"""
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from beaver_ftc.errors import BadInput
+from beaver_ftc.flights.readers.table import read_numbers
+from beaver_ftc.flights.recording import Floats
+
+Document = dict[str, Any]
+
+_FLOW = ("alpha_rad", "beta_rad", "airspeed_mps", "qdyn_pa")
+_UNKNOWN = "unknown"
+
+
+@dataclass(frozen=True)
+class Replay:
+    """Columns of diagnosis.parquet by name, and the document of verdict.json."""
+
+    name: str
+    columns: dict[str, Any]
+    verdict: Document
+
+
+def is_own_log(path: Path) -> bool:
+    """Whether a path is the log of one of our runs, with its scenario beside it."""
+    return path.name == "log.parquet" and path.with_name("scenario.yaml").is_file()
+
+
+def replay(path: Path) -> Replay:
+    """Step the diagnosis through a log. Raises BadInput where the flight's diagnosis was none of ours."""
+    from beaver_ftc.aircraft.loading import load
+    from beaver_ftc.loop.stream import Diagnosis
+    from beaver_ftc.scenario.loader import load_scenario
+
+    scenario = load_scenario(path.with_name("scenario.yaml"))
+    log = read_numbers(path)
+    aircraft = load(getattr(scenario, "aircraft", "beaver"))
+    keys = scenario.model_dump(mode="json", exclude_unset=True)
+    others = {key: keys[key] for key in ("actuators", "design_model") if key in keys}
+    diagnosis = Diagnosis(aircraft, scenario.rate_hz, keys.get("fdi"), **others)
+    samples = _samples(path, log, aircraft)
+    verdicts = [diagnosis.step(*sample) for sample in samples]
+    surfaces = list(aircraft.surfaces)
+    columns = _columns(log["t_s"], verdicts, surfaces)
+    return Replay(scenario.name, columns, _verdict(path, scenario, log, verdicts))
+
+
+def _samples(path: Path, log: dict[str, Floats], aircraft: Any) -> list[tuple[Floats, ...]]:
+    """What the diagnosis was given at each frame: rates, signals, commands, attitude."""
+    rates = [f"{axis}_measured_rad_s" for axis in "pqr"]
+    signals = [*_FLOW, *aircraft.signals]
+    commands = [f"{name}_cmd_rad" for name in aircraft.surfaces]
+    attitude = ["phi_rad", "theta_rad", "psi_rad"]
+    parts = []
+    for names in (rates, signals, commands, attitude):
+        missing = [name for name in names if name not in log]
+        if missing:
+            raise BadInput(f"{path}: no column {missing[0]}, allowed: a log.parquet as `run` writes it")
+        parts.append(np.ascontiguousarray(np.column_stack([log[name] for name in names])))
+    return list(zip(*parts, strict=True))
+
+
+def _columns(t_s: Floats, verdicts: list[Any], surfaces: list[str]) -> dict[str, Any]:
+    """The columns of diagnosis.parquet. Where the diagnosis says nothing of a surface's effectiveness, its
+    bounds are 0 and 1."""
+    named = [_name(verdict, surfaces) for verdict in verdicts]
+    columns: dict[str, Any] = {
+        "t_s": t_s,
+        "faulty": np.array([int(verdict.detected) for verdict in verdicts]),
+        "named": named,
+    }
+    for surface in surfaces:
+        left = np.array([_effectiveness(verdict, surface) for verdict in verdicts])
+        columns[f"{surface}_effectiveness"] = left
+        suspected = np.array([verdict.detected for verdict in verdicts])
+        columns[f"{surface}_low"] = np.where(suspected, 0.0, left)
+        columns[f"{surface}_high"] = np.ones(len(left))
+    return columns
+
+
+def _name(verdict: Any, surfaces: list[str]) -> str:
+    if not verdict.detected:
+        return ""
+    return str(verdict.isolated) if verdict.isolated in surfaces else _UNKNOWN
+
+
+def _effectiveness(verdict: Any, surface: str) -> float:
+    lost = verdict.isolated == surface and verdict.type in (None, "loss_of_effectiveness")
+    return 1.0 + float(verdict.estimate) if lost and verdict.estimate is not None else 1.0
+
+
+def _verdict(path: Path, scenario: Any, log: dict[str, Floats], verdicts: list[Any]) -> Document:
+    """When what was found, and whether the flight's own record says the same."""
+    t_s = log["t_s"]
+    detected = next((float(t) for t, one in zip(t_s, verdicts, strict=True) if one.detected), None)
+    isolated = next(((float(t), one) for t, one in zip(t_s, verdicts, strict=True) if one.isolated), None)
+    differ = sum(
+        bool(flag) != one.detected for flag, one in zip(log.get("detected", []), verdicts, strict=False)
+    )
+    found: Document = {
+        "flight": scenario.name,
+        "replay": True,
+        "duration_s": float(t_s[-1] - t_s[0]),
+        "faulty": detected is not None,
+        "detection_s": detected,
+        "isolation_s": isolated[0] if isolated else None,
+        "isolated": isolated[1].isolated if isolated else None,
+        "rows_that_differ": differ,
+        "left_out": _left_out(scenario),
+    }
+    return found | {"as_flown": _as_flown(path, found)}
+
+
+def _left_out(scenario: Any) -> list[str]:
+    """What the diagnosis was given in flight and the log does not have."""
+    ideal = type(scenario.sensors)()
+    flow = [
+        name
+        for name in type(scenario.sensors).model_fields
+        if name not in ("p", "q", "r") and getattr(scenario.sensors, name) != getattr(ideal, name)
+    ]
+    return [f"the declared errors of {name}: the log has the true value" for name in flow]
+
+
+def _as_flown(path: Path, found: Document) -> bool | None:
+    """Whether detection and isolation are those of metrics.json; None where there is none beside the log."""
+    beside = path.with_name("metrics.json")
+    if not beside.is_file():
+        return None
+    metrics = json.loads(beside.read_text(encoding="utf-8"))
+    same = metrics["detection"]["time_s"] == found["detection_s"]
+    return bool(same and metrics["isolation"]["time_s"] == found["isolation_s"])
+
+
+def as_text(found: Document) -> str:
+    """The verdict of a replay in lines for people."""
+    what = "nothing detected" if found["detection_s"] is None else f"detected at {found['detection_s']:.2f} s"
+    if found["isolated"]:
+        what += f", {found['isolated']} isolated at {found['isolation_s']:.2f} s"
+    same = {True: "as flown", False: "not as flown", None: "nothing beside it to compare with"}
+    lines = [f"{found['flight']}: {what}; {same[found['as_flown']]}"]
+    return "\n".join([*lines, *(f"  left out: {one}" for one in found["left_out"])])
+
+
+def write_replay(out: Path, done: Replay) -> Path:
+    """Write `out/<flight>` with diagnosis.parquet and verdict.json, whole or not at all."""
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    from beaver_ftc.results.metrics import as_json
+    from beaver_ftc.results.writer import result_folder
+
+    with result_folder(out, done.name) as folder:
+        parquet.write_table(pa.table(done.columns), folder / "diagnosis.parquet")
+        (folder / "verdict.json").write_text(as_json(done.verdict), encoding="utf-8")
+    return out / done.name

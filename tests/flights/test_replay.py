@@ -1,0 +1,66 @@
+"""The log of a flight of ours, diagnosed again: the verdicts of the flight, to the bit."""
+
+import json
+
+import pytest
+from pyarrow import parquet
+from typer.testing import CliRunner
+
+import beaver_ftc as bf
+from beaver_ftc.cli.main import app
+from beaver_ftc.errors import BadInput
+from beaver_ftc.flights.replay import replay
+
+
+@pytest.fixture(scope="module", params=["elevator-partial-loss", "rudder-partial-loss"])
+def run(request, tmp_path_factory):
+    if request.param not in bf.scenarios():
+        pytest.skip(f"no built-in scenario {request.param}")
+    folder = tmp_path_factory.mktemp("runs")
+    flight = bf.fly(bf.load(request.param).with_({"duration_s": 16.0}))
+    flight.save(folder)
+    return folder / request.param, flight
+
+
+def test_detection_and_isolation_are_those_of_the_flight(run):
+    folder, flight = run
+    done = replay(folder / "log.parquet")
+    assert done.verdict["as_flown"] is True
+    assert done.verdict["rows_that_differ"] == 0
+    assert done.verdict["left_out"] == []
+    assert done.verdict["detection_s"] == flight.detection.time_s
+    assert done.columns["faulty"].tolist() == [int(flag) for flag in flight.log["detected"]]
+
+
+def test_a_changed_log_is_not_as_flown(run, tmp_path):
+    """One rate of one row is off: the replay reads the log, it does not copy the flight's verdict."""
+    folder, flight = run
+    table = parquet.read_table(folder / "log.parquet").to_pandas()
+    at = table.index[table["t_s"] >= 5.0][0]
+    table.loc[at, "q_measured_rad_s"] += 0.2
+    for name in ("scenario.yaml", "metrics.json"):
+        (tmp_path / name).write_bytes((folder / name).read_bytes())
+    table.to_parquet(tmp_path / "log.parquet")
+    done = replay(tmp_path / "log.parquet")
+    assert done.verdict["as_flown"] is False
+    assert done.verdict["detection_s"] == pytest.approx(5.0, abs=0.02)
+    assert flight.detection.time_s > 5.1
+
+
+def test_the_command_writes_rows_and_verdict(run, tmp_path):
+    folder, flight = run
+    arguments = ["diagnose", str(folder / "log.parquet"), "--out", str(tmp_path), "--format", "json"]
+    done = CliRunner().invoke(app, arguments)
+    (verdict,) = json.loads(done.stdout)["flights"]
+    assert verdict["as_flown"] is True
+    rows = parquet.read_table(tmp_path / folder.name / "diagnosis.parquet")
+    assert rows.column_names[:3] == ["t_s", "faulty", "named"]
+    assert rows.num_rows == len(flight.log)
+
+
+def test_another_table_wants_a_model(tmp_path):
+    path = tmp_path / "flight.csv"
+    path.write_text("t_s,p\n0,1\n1,2\n")
+    done = CliRunner().invoke(app, ["diagnose", str(path), "--out", str(tmp_path)])
+    assert isinstance(done.exception, BadInput)
+    assert "--model is missing" in str(done.exception)

@@ -1,6 +1,7 @@
 """Turns a scenario into the frame record that the compiled loop works on."""
 
 from math import ceil, exp, pi, radians
+from typing import Any
 
 import numpy as np
 
@@ -220,7 +221,8 @@ def _has_piston_engine(aircraft: Aircraft) -> bool:
 
 
 def _assemble_power(control: np.void, scenario: Scenario, dt: float) -> None:
-    config, power, initial = scenario.control.power, control["power"], scenario.initial
+    config, power = scenario.control.power, control["power"]
+    initial: Any = scenario.initial  # its engine's keys are the aircraft's
     power["enabled"], power["from_s"] = power_is_at_hand(scenario), -1.0
     power["impatience"], power["forgiveness"] = dt / config.patience_s, dt / config.release_s
     power["speed_gain"] = config.speed_gain_inhg_per_mps
@@ -241,7 +243,8 @@ def _assemble_power(control: np.void, scenario: Scenario, dt: float) -> None:
 def _slipstream_limits(scenario: Scenario, control: np.void) -> tuple[float, float]:
     """rho V^3 d dpt / d pz of the engine [FDC], kg/(m3) (m/s)^3 per inHg; and the dpt at which holding the
     propeller's yawing moment takes YAW_SHARE of the rudder's travel."""
-    rpm, terms, rudder = scenario.initial.engine_rpm, scenario.airframe.terms, control["main"][YAW]
+    initial: Any = scenario.initial
+    rpm, terms, rudder = initial.engine_rpm, scenario.airframe.terms, control["main"][YAW]
     kw_per_inhg = engine_power_kw(rpm, 1.0, 1.0) - engine_power_kw(rpm, 0.0, 1.0)
     rudder_rad = min(-control["low"][rudder], control["high"][rudder])
     dpt3 = YAW_SHARE * terms["Cn_dr"].value * rudder_rad / terms["Cn_dpt3"].value

@@ -59,7 +59,7 @@ def _load(errors: _Errors, model: Path) -> jsbsim.FGFDMExec:
     folder = model.parent
     places = [str(folder), str(folder / "Engines"), str(folder / "Systems")]
     try:
-        loaded = fdm.load_model_with_paths(model.stem, *places, add_model_to_path=False)
+        loaded = fdm.load_model_with_paths(model.stem, *places, False)  # type: ignore  # its stub lacks the model
     except jsbsim.BaseError as error:
         errors.said.append(str(error))
         loaded = False

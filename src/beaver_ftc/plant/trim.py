@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from math import asin, cos, degrees, isfinite, sin
+from typing import Any
 
 import numpy as np
 
@@ -61,7 +62,8 @@ def trim(airspeed_mps: float, altitude_m: float, plant: Plant | None = None, **g
     """
     truth = plant or Plant(rate_hz=100)
     aircraft = truth.aircraft
-    wanted = FlightState(airspeed_mps, altitude_m, aircraft=aircraft, **given)
+    named: dict[str, Any] = dict(given)  # by the aircraft's own names, which FlightState checks
+    wanted = FlightState(airspeed_mps, altitude_m, aircraft=aircraft, **named)
     _check_request(wanted, aircraft)
     with _travel_lifted(truth) as travel:
         for surface in set(aircraft.surfaces) - set(aircraft.primary):

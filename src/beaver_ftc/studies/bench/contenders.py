@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from copy import copy
 from dataclasses import dataclass
+from typing import Any
 
 from beaver_ftc.control.base import Law
 from beaver_ftc.design.coefficients import SURFACES
@@ -18,9 +19,10 @@ def state_of(plant: Plant) -> FlightState:
     """Where an aircraft with ideal actuators is now: its surfaces as they were in the run just flown."""
     truth = {name: plant.read(property_) * factor for name, property_, factor in ch.TRUTH}
     names = set(FlightState.__dataclass_fields__) & set(truth)
+    values: dict[str, Any] = {name: truth[name] for name in names}
+    values |= {f"{s}_rad": truth[f"{s}_pos_rad"] for s in SURFACES}
     return FlightState(
-        **{name: truth[name] for name in names},
-        **{f"{s}_rad": truth[f"{s}_pos_rad"] for s in SURFACES},
+        **values,
         engine_rpm=plant.read("engine/speed-rpm"),
         manifold_pressure_inhg=plant.read("engine/manifold-pressure-inhg"),
     )

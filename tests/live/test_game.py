@@ -63,11 +63,18 @@ def test_the_detector_is_waited_for_and_not_for_ever():
 
 def test_the_hidden_fault_comes_within_its_times_and_is_not_always_the_same():
     rounds = [
-        Game().next_round("random", 100.0, hidden_faults(("aileron", "rudder")), np.random.default_rng(seed))
+        Game().next_round(
+            "random", 100.0, hidden_faults(("aileron", "flap"), ("aileron",)), np.random.default_rng(seed)
+        )
         for seed in range(60)
     ]
     assert all(100.0 + EARLIEST_S <= game.due_s <= 100.0 + LATEST_S for game in rounds)
-    assert {game.fault["actuator"] for game in rounds} == {"aileron", "rudder"}
+    assert {game.fault["actuator"] for game in rounds} == {"aileron", "flap"}
+
+
+def test_a_surface_that_stands_still_may_only_run_away():
+    kinds = hidden_faults(("aileron", "flap"), ("aileron",))
+    assert [kind["type"] for kind in kinds if kind["actuator"] == "flap"] == ["hardover"]
 
 
 def test_an_answer_needs_a_round_and_a_known_name():

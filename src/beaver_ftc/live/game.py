@@ -103,14 +103,16 @@ class Game:
         return told
 
 
-def hidden_faults(surfaces: tuple[str, ...]) -> list[dict[str, Any]]:
-    """What may break unseen: on each surface something a pilot can feel."""
+def hidden_faults(surfaces: tuple[str, ...], primary: tuple[str, ...]) -> list[dict[str, Any]]:
+    """What may break unseen: what can be felt. A surface that only stands in for others is still while all is
+    well: of it only a runaway shows."""
     kinds: list[dict[str, Any]] = []
     for surface in surfaces:
-        kinds += [
-            {"type": "loss_of_effectiveness", "actuator": surface, "magnitude": magnitude}
-            for magnitude in (0.4, 0.7)
-        ]
-        kinds.append({"type": "stuck", "actuator": surface})
         kinds.append({"type": "hardover", "actuator": surface, "direction": 1})
+        if surface in primary:
+            kinds.append({"type": "stuck", "actuator": surface})
+            kinds += [
+                {"type": "loss_of_effectiveness", "actuator": surface, "magnitude": share}
+                for share in (0.4, 0.7)
+            ]
     return kinds

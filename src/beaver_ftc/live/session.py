@@ -182,8 +182,8 @@ class Session:
         return "new flight"
 
     def _scenario(self, name: str | None) -> "bf.Scenario":
-        """A built-in one, or the one that the command was given; a page names no files."""
-        if name is None or name == self._base.name:
+        """The one last flown, the one the command was given, or a built-in one; a page names no files."""
+        if name is None:
             return self._base
         if name == self._given.name:
             return self._given
@@ -199,7 +199,7 @@ class Session:
             self._tell("game", f"you say: {asked.answer}")
         else:
             self._begin(self._base, faults=False)
-            kinds = hidden_faults(self.surfaces)
+            kinds = hidden_faults(self.surfaces, self.scenario.airframe.primary)
             self.game = self.game.next_round(asked.move, self.sim.t_s, kinds, self._rng)
             self._tell("game", "a round begins: something will break")
         return ""

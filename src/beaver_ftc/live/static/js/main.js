@@ -6,7 +6,7 @@ import { drawControls, meetControls, wireControls } from "./controls.js";
 import { drawGame, meetGame, wireGame } from "./game.js";
 import { Instruments } from "./instruments.js";
 import { connect, on, traffic } from "./link.js";
-import { addEvents, drawDiagnosis, forgetEvents, meetDiagnosis, wireTabs } from "./panels.js";
+import { addEvents, drawDiagnosis, forgetEvents, meetDiagnosis, notice, wireTabs } from "./panels.js";
 import { View } from "./scene.js";
 import { flight, meet, value } from "./state.js";
 import { Sticks } from "./sticks.js";
@@ -42,6 +42,7 @@ on("s", (state) => {
   banner(state.over ? "The flight is over. Save it, or press Reset for a new one." : "");
 });
 on("e", ({ events }) => addEvents(events));
+on("ack", ({ n, ok, says }) => { if (!n && !ok) notice(says); }); // what went wrong without being asked for
 on("link", ({ up }) => banner(up ? "" : "Not connected: has beaver-ftc live ended?"));
 
 function banner(text) {

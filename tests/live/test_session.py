@@ -167,3 +167,23 @@ def test_a_coordinated_turn_keeps_the_aircraft_and_flies_again_to_the_bit(sessio
     asked(session, do="save")
     (folder,) = tmp_path.iterdir()
     assert np.array_equal(log.to_numpy(), bf.fly(folder / "scenario.yaml").log.to_numpy(), equal_nan=True)
+
+
+def test_the_autopilot_goes_where_it_is_sent_and_flies_again_to_the_bit(session, tmp_path):
+    with pytest.raises(BadInput, match="this flight has none"):
+        asked(session, do="aim", altitude_m=1850)
+    asked(session, do="fresh", autopilot=True)
+    flown(session, 500)
+    start_m = session.sim.log["altitude_m"].iloc[-1]
+    asked(session, do="aim", altitude_m=start_m + 40, heading_deg=30)
+    flown(session, 6000)
+    log = session.sim.log
+    assert log["altitude_m"].iloc[-1] == pytest.approx(start_m + 40, abs=8)
+    assert np.degrees(log["psi_rad"].iloc[-1]) == pytest.approx(30, abs=5)
+    with pytest.raises(BadInput, match="airspeed_mps"):
+        asked(session, do="aim", airspeed_mps=500)
+    asked(session, do="save")
+    (folder,) = tmp_path.iterdir()
+    assert np.array_equal(log.to_numpy(), bf.fly(folder / "scenario.yaml").log.to_numpy(), equal_nan=True)
+    asked(session, do="fresh", autopilot=False)
+    assert session.hello()["autopilot"] == []

@@ -273,3 +273,30 @@ def test_the_mode_is_the_supervisors():
     sim.inject({"type": "loss_of_effectiveness", "actuator": "elevator", "magnitude": 0.6})
     sim.step(frames=200)
     assert sim.mode == sim.land().supervisor[-1].mode != "nominal"
+
+
+AUTOPILOT = {"altitude_m": [{"hold": True}, {"at_s": 50.0, "value": 1700.0}], "heading_deg": [{"hold": True}]}
+
+
+def test_the_autopilot_is_aimed_in_flight_and_it_is_flown_again_to_the_bit():
+    sim = bf.Simulation(scenario(duration_s=30.0, autopilot=AUTOPILOT))
+    sim.step(frames=500)
+    start_m = float(sim.log["altitude_m"].iloc[-1])
+    sim.aim({"altitude_m": start_m + 20.0})
+    sim.aim({"altitude_m": start_m + 25.0})  # in the same frame: the last word counts
+    sim.step(frames=2400)
+    log, flown = sim.log, sim.scenario_flown()
+    assert log["altitude_command_m"].iloc[-1] == pytest.approx(start_m + 25.0)
+    assert log["altitude_m"].iloc[-1] > start_m + 12.0
+    assert len(flown.autopilot.altitude_m) == 2  # the leg at 50 s is dropped
+    assert np.array_equal(log.to_numpy(), bf.fly(flown).log.to_numpy(), equal_nan=True)
+
+
+def test_a_target_needs_an_autopilot_and_a_channel_there_is():
+    with pytest.raises(bf.BadInput, match="this flight has none"):
+        bf.Simulation(scenario(duration_s=1.0)).aim({"altitude_m": 1900.0})
+    sim = bf.Simulation(scenario(duration_s=1.0, autopilot=AUTOPILOT))
+    with pytest.raises(bf.BadInput, match="did you mean altitude_m"):
+        sim.aim({"altitude": 1900.0})
+    with pytest.raises(bf.BadInput, match="altitude_m"):
+        sim.aim({"altitude_m": 99_000.0})

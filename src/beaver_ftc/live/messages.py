@@ -12,6 +12,7 @@ STICK_DEG_S = 20.0  # full stick
 
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]{1,100}$")]
 Finite = Annotated[float, Field(ge=-1000, le=1000)]
+Finite4 = Annotated[float, Field(ge=-10_000, le=10_000)]
 Rate = Annotated[float, Field(ge=-STICK_DEG_S, le=STICK_DEG_S)]
 Metres = Annotated[float, Field(ge=-25, le=25)]
 
@@ -43,6 +44,15 @@ class Blow(Request):
 
     do: Literal["blow"]
     velocity_mps: tuple[Metres, Metres, Metres]
+
+
+class Aim(Request):
+    """New values for the autopilot; what is left out stays."""
+
+    do: Literal["aim"]
+    altitude_m: Finite4 | None = None
+    airspeed_mps: Finite | None = None
+    heading_deg: Finite | None = None
 
 
 class Stick(Request):
@@ -77,6 +87,7 @@ class Fresh(Request):
     fault_class: Literal["published", "all"] | None = None
     sensors: Literal["ideal", "tactical-grade", "consumer-grade"] | None = None
     turbulence: Literal["none", "light", "moderate", "severe"] | None = None
+    autopilot: bool | None = None
 
 
 class Game(Request):
@@ -100,7 +111,8 @@ class Invite(Request):
 
 
 AnyRequest = Annotated[
-    Break | Repair | Blow | Stick | Speed | Pause | Fresh | Game | Save | Invite, Field(discriminator="do")
+    Break | Repair | Blow | Aim | Stick | Speed | Pause | Fresh | Game | Save | Invite,
+    Field(discriminator="do"),
 ]
 _ADAPTER: TypeAdapter[Any] = TypeAdapter(AnyRequest)
 

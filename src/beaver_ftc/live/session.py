@@ -23,6 +23,7 @@ STICK_FRAMES = 10  # a coordinated turn is seen to so often
 TURN_STEP = np.radians(0.1)  # rad/s
 G_MPS2 = 9.80665
 ATTITUDE = ("phi_rad", "theta_rad", "airspeed_mps")
+HELD = ("altitude_m", "airspeed_mps", "heading_deg")  # by the autopilot that the page asks for
 NO_STICK = messages.Stick(do="stick", rates_deg_s=(0.0, 0.0, 0.0))
 GUST_S = {"rise_s": 0.5, "hold_s": 1.0, "fade_s": 0.5}
 PATIENCE_S = 10.0  # for the diagnosis, once you have spoken
@@ -122,11 +123,21 @@ class Session:
             messages.Break: lambda asked: self._break(dict(asked.fault)),
             messages.Repair: lambda asked: self._repair(asked.actuator),
             messages.Blow: lambda asked: self._blow(asked.velocity_mps),
+            messages.Aim: self._aim,
             messages.Stick: self._steer,
             messages.Fresh: self._fresh,
             messages.Game: self._play,
             messages.Save: lambda _: self._save(),
         }
+
+    def _aim(self, asked: messages.Aim) -> str:
+        self._check_going_on()
+        given = ((channel, getattr(asked, channel)) for channel in HELD)
+        targets = {channel: value for channel, value in given if value is not None}
+        self.sim.aim(targets)
+        says = ", ".join(f"{channel} {value:g}" for channel, value in targets.items())
+        self._tell("autopilot", says)
+        return says
 
     def _steer(self, asked: messages.Stick) -> str:
         self.stick = asked
@@ -244,6 +255,7 @@ class Session:
             "law": scenario.control.law, "scheme": scenario.fdi.scheme,
             "fault_class": scenario.fdi.fault_class, "aircraft": str(scenario.aircraft),
             "travel_rad": [list(map(float, low)), list(map(float, high))],
+            "autopilot": list(scenario.autopilot.channels if scenario.autopilot else ()),
             "trim_rad": list(map(float, self.sim.trim_rad)),
             "scenarios": sorted({*bf.scenarios(), self._given.name}),
             "laws": list(registered(LAWS)), "schemes": list(registered(DETECTORS)),
@@ -269,6 +281,8 @@ def _changes(asked: messages.Fresh) -> dict[str, Any]:
         changes["fdi.fault_class"] = asked.fault_class
     if asked.sensors is not None:
         changes["sensors"] = changes["fdi.bounds.sensors"] = asked.sensors
+    if asked.autopilot is not None:
+        changes["autopilot"] = {channel: [{"hold": True}] for channel in HELD} if asked.autopilot else None
     if asked.turbulence is not None:
         still = asked.turbulence == "none"
         changes["environment.turbulence"] = "none" if still else "dryden"

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from beaver_ftc.aircraft.question import asked
+from beaver_ftc.control.outer.setup import set_up_profile
 from beaver_ftc.control.supervisor import MODES
 from beaver_ftc.errors import BadInput, suggestion
 from beaver_ftc.loop.flight import Flight, LogSink
@@ -21,7 +22,8 @@ from beaver_ftc.loop.steering import Steering
 from beaver_ftc.loop.summary import verdict_of
 from beaver_ftc.plant.adapter import UnknownProperty
 from beaver_ftc.plant.gust import GustSchedule
-from beaver_ftc.scenario.given import fault_of, gust_of, is_same_again
+from beaver_ftc.scenario.given import fault_of, is_same_again
+from beaver_ftc.scenario.in_flight import aimed, blown
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.signals import RAD_PER_DEG
 from beaver_ftc.scenario.sticks import flown, in_force
@@ -190,15 +192,19 @@ class Stepping:
 
         Raises BadInput that names the key, and for a second one: a scenario has one gust.
         """
-        if self._scenario.environment.gust is not None:
-            raise BadInput("gust: this flight has one already, allowed: one a flight")
-        given = gust_of(gust, self._now_s)
         self._begin()
-        loop = self._loop
-        loop.gust = GustSchedule(given, loop.plant, self._scenario.rate_hz)
-        self._turn_at = self._next
-        environment = self._scenario.environment.model_copy(update={"gust": given})
-        self._scenario = self._scenario.model_copy(update={"environment": environment})
+        self._scenario = blown(self._scenario, gust, self._now_s)
+        loop, given = self._loop, self._scenario.environment.gust
+        loop.gust, self._turn_at = GustSchedule(given, loop.plant, self._scenario.rate_hz), self._next
+
+    def aim(self, targets: Mapping[str, float]) -> None:
+        """Give the autopilot new values from now on, `{"altitude_m": 1900}`; its later legs are dropped.
+
+        Raises BadInput that names the key, and for a flight that has begun without an autopilot.
+        """
+        self._begin()
+        self._scenario = aimed(self._scenario, targets, self._now_s)
+        set_up_profile(self._loop.frames["autopilot"][0], self._scenario)
 
     def read(self, name: str) -> float:
         """A property of JSBSim's, in the unit its name says. Raises BadInput if there is none such."""

@@ -36,8 +36,7 @@ def set_up_autopilot(autopilot: np.void, control: np.void, scenario: Scenario) -
     if profile is None or not profile.channels:
         return
     autopilot["enabled"], autopilot["dt"] = 1, 1.0 / scenario.rate_hz
-    for c, name in enumerate(CHANNELS):
-        _fill(autopilot, c, getattr(profile, name), _UNIT[name])
+    set_up_profile(autopilot, scenario)
     autopilot["changed_at_s"] = -inf
     for name, gain in GAINS.items():
         autopilot["gain"][name] = gain
@@ -49,6 +48,12 @@ def set_up_autopilot(autopilot: np.void, control: np.void, scenario: Scenario) -
         autopilot[ours] = control["power"][theirs]
     autopilot["step_inhg"] = control["power"]["step"]
     control["steered"] = 1
+
+
+def set_up_profile(autopilot: np.void, scenario: Scenario) -> None:
+    """Fill in the legs; in flight too, where those that have been begun are the same as before."""
+    for c, name in enumerate(CHANNELS):
+        _fill(autopilot, c, getattr(scenario.autopilot, name), _UNIT[name])
 
 
 def _know(autopilot: np.void, scenario: Scenario) -> None:

@@ -18,6 +18,8 @@ export function wireControls(view, sticks) {
   byId("gust-side").addEventListener("click", () => perform({ do: "blow", velocity_mps: [0, 6, 0] }));
   byId("invite").addEventListener("click", invite);
   byId("fresh").addEventListener("submit", fresh);
+  byId("aim").addEventListener("submit", aim);
+  byId("autopilot-on").addEventListener("click", () => perform({ do: "fresh", autopilot: true }));
   document.addEventListener("keydown", (event) => keyDown(event, view, sticks));
   document.addEventListener("keyup", (event) => sticks.release(event.key.toLowerCase()));
 }
@@ -43,13 +45,24 @@ async function invite() {
 function fresh(event) {
   event.preventDefault();
   const asked = Object.fromEntries([...new FormData(event.target)].filter(([, chosen]) => chosen));
+  if (asked.autopilot) asked.autopilot = asked.autopilot === "on";
   perform({ do: "fresh", ...asked });
+}
+
+function aim(event) {
+  event.preventDefault();
+  const given = [...new FormData(event.target)].filter(([, text]) => text !== "");
+  if (!given.length) { notice("type a value first"); return; }
+  perform({ do: "aim", ...Object.fromEntries(given.map(([name, text]) => [name, Number(text)])) });
 }
 
 export function meetControls(hello) {
   choices("scenario", hello.scenarios, hello.scenario);
   choices("law", hello.laws, hello.law);
   choices("scheme", hello.schemes, hello.scheme);
+  for (const input of byId("aim").querySelectorAll("input")) input.disabled = !hello.autopilot.includes(input.name);
+  byId("aim").querySelector("[type=submit]").disabled = !hello.autopilot.length;
+  byId("autopilot-on").hidden = hello.autopilot.length > 0;
   byId("description").textContent = hello.description;
 }
 

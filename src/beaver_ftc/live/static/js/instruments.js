@@ -3,8 +3,8 @@
 import { AXES, DEG, degrees, value } from "./state.js";
 
 const NUMBERS = [
-  ["airspeed", () => [value("airspeed_mps"), 1, "m/s"]],
-  ["altitude", () => [value("altitude_m"), 0, "m"]],
+  ["airspeed", () => [value("airspeed_mps"), 1, "m/s", value("airspeed_command_mps")]],
+  ["altitude", () => [value("altitude_m"), 0, "m", value("altitude_command_m")]],
   ["heading", () => [((degrees("psi_rad") % 360) + 360) % 360, 0, "deg"]],
   ["bank", () => [degrees("phi_rad"), 1, "deg"]],
   ["pitch", () => [degrees("theta_rad"), 1, "deg"]],
@@ -31,8 +31,9 @@ export class Instruments {
     if (now < this.next) return;
     this.next = now + 100;
     for (const { now: read, text } of this.cells) {
-      const [number, digits, unit] = read();
-      text.data = number === null || Number.isNaN(number) ? "-" : `${number.toFixed(digits)} ${unit}`;
+      const [number, digits, unit, asked] = read();
+      const goal = asked === null || asked === undefined ? "" : ` (${asked.toFixed(0)})`; // of the autopilot
+      text.data = number === null || Number.isNaN(number) ? "-" : `${number.toFixed(digits)}${goal} ${unit}`;
     }
   }
 

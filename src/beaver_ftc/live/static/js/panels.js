@@ -49,7 +49,7 @@ export function meetDiagnosis(hello) {
   }));
 }
 
-const MARKS = { alarm: "▲", named: "◆", broken: "✕", repaired: "✓", supervisor: "⇄", lost: "✖", saved: "⤓", gust: "≋", game: "★", flight: "✈", candidates: "…" };
+const MARKS = { alarm: "▲", named: "◆", broken: "✕", repaired: "✓", supervisor: "⇄", lost: "✖", saved: "⤓", gust: "≋", autopilot: "➤", game: "★", flight: "✈", candidates: "…" };
 
 export function addEvents(events) {
   const list = byId("events");

@@ -60,7 +60,7 @@ export class Sticks {
     if (now < this.next) return;
     this.next = now + SENT_MS;
     const reach = Number(byId("reach").value), shares = this.shares();
-    byId("knob").style.transform = `translate(${shares[0] * 58}px, ${shares[1] * 58}px)`;
+    byId("knob").style.transform = `translate(${shares[0] * 41}px, ${shares[1] * 41}px)`;
     const rates = shares.map((share) => Math.round((share * reach) / STEP_DEG_S) * STEP_DEG_S);
     const request = { do: "stick", rates_deg_s: rates, coordinated: byId("coordinated").checked };
     const text = JSON.stringify(request);

@@ -132,6 +132,23 @@ def test_the_game_tells_nothing_before_the_answer(page):
     assert "It was the elevator" in page.inner_text("#game-says")
 
 
+def test_the_autopilot_is_sent_to_an_altitude(page):
+    page.locator("#tab-fly").click()
+    assert page.locator("[name=altitude_m]").is_disabled()  # this flight has begun without one
+    met = page.evaluate("cockpit.flight.met")
+    page.locator("#autopilot-on").click()
+    until(page, f"cockpit.flight.met > {met} && cockpit.value('t_s') > 0.5")
+    page.locator("[name=altitude_m]").fill("1850")
+    page.locator("#aim [type=submit]").click()
+    page.locator("#speed").select_option("10")
+    until(page, "cockpit.value('altitude_command_m') === 1850 && cockpit.value('altitude_m') > 1842")
+    page.locator("#speed").select_option("1")
+    page.locator("#tab-flight").click()
+    page.locator("[name=autopilot]").select_option("off")
+    page.locator("#fresh [type=submit]").click()
+    until(page, "cockpit.flight.hello.autopilot.length === 0")
+
+
 def test_speed_and_pause(page):
     page.locator("#speed").select_option("20")
     start = page.evaluate("cockpit.value('t_s')")

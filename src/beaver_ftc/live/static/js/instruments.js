@@ -18,9 +18,10 @@ export class Instruments {
     this.canvas = canvas;
     this.cells = NUMBERS.map(([name, now]) => {
       const row = document.createElement("div"), cell = document.createElement("dd");
-      row.append(Object.assign(document.createElement("dt"), { textContent: name }), cell);
+      const title = Object.assign(document.createElement("dt"), { textContent: name });
+      row.append(title, cell);
       list.append(row);
-      return { cell, now, text: document.createTextNode("") };
+      return { cell, now, name, title, text: document.createTextNode("") };
     });
     for (const { cell, text } of this.cells) cell.append(text);
     this.next = 0;
@@ -30,10 +31,11 @@ export class Instruments {
     this.drawAttitude(value("phi_rad"), value("theta_rad"));
     if (now < this.next) return;
     this.next = now + 100;
-    for (const { now: read, text } of this.cells) {
+    for (const { now: read, name, title, text } of this.cells) {
       const [number, digits, unit, asked] = read();
-      const goal = asked === null || asked === undefined ? "" : ` (${asked.toFixed(0)})`; // of the autopilot
-      text.data = number === null || Number.isNaN(number) ? "-" : `${number.toFixed(digits)}${goal} ${unit}`;
+      const label = asked === null || asked === undefined ? name : `${name} → ${asked.toFixed(0)}`; // of the autopilot
+      if (title.textContent !== label) title.textContent = label;
+      text.data = number === null || Number.isNaN(number) ? "-" : `${number.toFixed(digits)} ${unit}`;
     }
   }
 

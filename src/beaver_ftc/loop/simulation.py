@@ -198,10 +198,7 @@ class Stepping:
         loop.gust, self._turn_at = GustSchedule(given, loop.plant, self._scenario.rate_hz), self._next
 
     def aim(self, targets: Mapping[str, float]) -> None:
-        """Give the autopilot new values from now on, `{"altitude_m": 1900}`; its later legs are dropped.
-
-        Raises BadInput that names the key, and for a flight that has begun without an autopilot.
-        """
+        """Give the autopilot new values from now on, `{"altitude_m": 1900}`. Raises BadInput with the key."""
         self._begin()
         self._scenario = aimed(self._scenario, targets, self._now_s)
         set_up_profile(self._loop.frames["autopilot"][0], self._scenario)

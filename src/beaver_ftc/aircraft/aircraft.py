@@ -225,6 +225,12 @@ class Aircraft:
         return self.file.trim
 
     @property
+    def model_error_rad_s2(self) -> tuple[float, float, float]:
+        """What the terms leave of the angular accelerations, as measured; zero where nobody has."""
+        error = self.file.model_error_rad_s2
+        return error.p, error.q, error.r
+
+    @property
     def engine(self) -> EngineSection:
         """Settings of the engine a scenario may give."""
         return self.file.engine

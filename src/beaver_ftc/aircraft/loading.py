@@ -1,6 +1,8 @@
 """From what a scenario calls its aircraft to the aircraft: built in, of the jsbsim package, or a folder."""
 
 import copyreg
+import os
+import re
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -44,8 +46,7 @@ def load(reference: str = DEFAULT, beside: Path | None = None) -> Aircraft:
     Raises UnknownAircraft for what is no aircraft, ScenarioError with one line a mistake in its file.
     """
     if reference.startswith(_FROM_JSBSIM):
-        allowed = ", ".join((*builtin_names(), "./FOLDER"))
-        raise UnknownAircraft(f"{reference!r} is not available, allowed: {allowed}")
+        return read(_derived(reference.removeprefix(_FROM_JSBSIM)))
     if reference.startswith("./"):
         return read(_inside(beside, reference))
     if reference not in builtin_names():
@@ -53,6 +54,23 @@ def load(reference: str = DEFAULT, beside: Path | None = None) -> Aircraft:
             f"{reference!r} is not known{suggestion(reference, builtin_names())}, jsbsim:NAME, ./FOLDER"
         )
     return read(_root() / reference)
+
+
+def derived_folder(name: str) -> Path:
+    """Where `beaver-ftc derive` keeps what it made of an aircraft of the jsbsim package."""
+    if not re.fullmatch(r"[A-Za-z0-9_-]{1,60}", name):
+        raise UnknownAircraft(f"'jsbsim:{name[:60]}' is no name, allowed: letters, digits, - and _")
+    base = Path(os.environ.get("XDG_CACHE_HOME") or Path("~/.cache").expanduser())
+    return base / "beaver-ftc" / "aircraft" / name
+
+
+def _derived(name: str) -> Path:
+    folder = derived_folder(name)
+    if not (folder / FILE).is_file():
+        raise UnknownAircraft(
+            f"jsbsim:{name} is not derived yet, allowed: after beaver-ftc derive jsbsim:{name}"
+        )
+    return folder
 
 
 def _inside(beside: Path | None, reference: str) -> Path:

@@ -147,6 +147,21 @@ class EngineSection(Section):
     limits: dict[Name, LimitSection] = Field(default_factory=dict)
 
 
+class ModelErrorSection(Section):
+    """Largest error of the angular accelerations, as measured where the terms were derived."""
+
+    p: Number = number(0.0, unit="rad/s2", says="roll", ge=0, le=100)
+    q: Number = number(0.0, unit="rad/s2", says="pitch", ge=0, le=100)
+    r: Number = number(0.0, unit="rad/s2", says="yaw", ge=0, le=100)
+
+
+class StartSection(Section):
+    """Where a flight starts unless its scenario says otherwise."""
+
+    airspeed_mps: Number | None = number(None, unit="m/s", says="true airspeed", gt=0, le=1000)
+    altitude_m: Number | None = number(None, unit="m", says="altitude above sea level", ge=-300, le=30000)
+
+
 class AircraftFile(Section):
     """The whole file."""
 
@@ -165,6 +180,10 @@ class AircraftFile(Section):
     envelope: EnvelopeSection
     trim: TrimSection
     engine: EngineSection = Field(default_factory=EngineSection)
+    model_error_rad_s2: ModelErrorSection = Field(
+        default_factory=ModelErrorSection, description="added to the declared bound of the uncertainty"
+    )
+    start: StartSection = Field(default_factory=StartSection)
 
     @model_validator(mode="after")
     def _parts_fit_together(self) -> Self:

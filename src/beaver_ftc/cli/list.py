@@ -1,18 +1,28 @@
 """`beaver-ftc list`: what there is to choose from."""
 
-from typing import Any
+from typing import Annotated, Any
+
+import typer
 
 from beaver_ftc.cli.output import Format, FormatOption, emit, emit_json
+from beaver_ftc.errors import BadInput, suggestion
 
 Entries = list[dict[str, str]]
 
 
-def command(format: FormatOption = Format.text) -> None:
+def command(
+    kind: Annotated[str | None, typer.Argument(help="One kind only, e.g. aircraft.")] = None,
+    format: FormatOption = Format.text,
+) -> None:
     """List what there is to choose from.
 
-    Built-in scenarios and sweeps, diagnosis schemes, control laws, fault types and reference signals.
+    Built-in scenarios and sweeps, aircraft, diagnosis schemes, control laws, fault types and reference
+    signals.
     """
     available = _available()
+    if kind is not None and kind not in available:
+        raise BadInput(f"there is no list of {kind[:60]!r}{suggestion(kind, available)}")
+    available = available if kind is None else {kind: available[kind]}
     if format is Format.json:
         emit_json(available)
     else:
@@ -29,6 +39,7 @@ def _available() -> dict[str, Entries]:
     return {
         "scenarios": [{"name": name, "description": says.strip()} for name, says, _ in builtin_scenarios()],
         "sweeps": _sweeps(),
+        "aircraft": _aircraft(),
         "schemes": _registered(DETECTORS),
         "laws": _registered(LAWS),
         "faults": [entry for part in schema.values() for entry in _fault(part)],
@@ -42,6 +53,18 @@ def _sweeps() -> Entries:
     return [
         {"name": name, "description": load_sweep(name).file.description.strip()} for name in builtin_sweeps()
     ]
+
+
+def _aircraft() -> Entries:
+    """The built-in aircraft, and those of the jsbsim package that have been derived or can be."""
+    from beaver_ftc.aircraft import builtin_names, load
+    from beaver_ftc.aircraft.loading import derived_folder
+    from beaver_ftc.plant.instrumented import names
+
+    ours = [{"name": name, "description": load(name).file.description} for name in builtin_names()]
+    says = {True: "of the jsbsim package, derived", False: "of the jsbsim package: derive it first"}
+    known = [(name, (derived_folder(name) / "aircraft.yaml").is_file()) for name in names()]
+    return ours + [{"name": f"jsbsim:{name}", "description": says[made]} for name, made in known]
 
 
 def _registered(group: str) -> Entries:

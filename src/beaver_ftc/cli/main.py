@@ -31,6 +31,7 @@ COMMANDS = (
     "matrix",
     "power",
     "bench",
+    "derive",
     "verify",
     "detectability",
     "identify",
@@ -38,7 +39,7 @@ COMMANDS = (
     "live",
 )
 
-WITHOUT_SCENARIOS = ("schema", "show", "new", "bench", "verify", "detectability", "reproduce")
+WITHOUT_SCENARIOS = ("schema", "show", "new", "bench", "verify", "detectability", "reproduce", "derive")
 
 EXAMPLES = {
     "run": (

@@ -74,7 +74,7 @@ def _assemble_diagnosis(
     fdi["fdae"]["decay"] = exp(-config.detection_pole_per_s * dt)
     fdi["fie_decay"] = exp(-config.isolation_pole_per_s * dt)
     fdi["bound"]["inertia"] = config.bounds.inertia_coupling.as_tuple()
-    fdi["bound"]["constant"] = config.bounds.constant_rad_s2.as_tuple()
+    fdi["bound"]["constant"] = np.add(config.bounds.constant_rad_s2.as_tuple(), aircraft.model_error_rad_s2)
     fdi["bound"]["earth_rate"] = EARTH_RATE_RAD_S
     fdi["verdict"]["detected_at_s"] = fdi["verdict"]["isolated_at_s"] = -1.0
     fdi["verdict"]["isolated"] = NOT_ISOLATED

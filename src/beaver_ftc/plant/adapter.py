@@ -1,6 +1,6 @@
 """JSBSim for the rest of the package: a silent executive with the Beaver loaded, its properties by name."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from math import cos, sin
 from pathlib import Path
 
@@ -51,13 +51,19 @@ class _Errors(jsbsim.FGLogger):
         pass
 
 
+def _beside(folder: Path, kind: str) -> str:
+    """Where a model's engines or systems are: beside it, or where the jsbsim package keeps shared ones."""
+    own = folder / kind.capitalize() if kind == "systems" else folder / "Engines"
+    return str(own if own.is_dir() else Path(jsbsim.get_default_root_dir()) / kind)
+
+
 def _load(errors: _Errors, model: Path) -> jsbsim.FGFDMExec:
     """An executive with a model; engines, propellers and systems are looked for beside it first."""
     jsbsim.set_logger(errors)
     fdm = jsbsim.FGFDMExec(str(data_root()))
     fdm.set_debug_level(0)
     folder = model.parent
-    places = [str(folder), str(folder / "Engines"), str(folder / "Systems")]
+    places = [str(folder), *(_beside(folder, kind) for kind in ("engine", "systems"))]
     try:
         loaded = fdm.load_model_with_paths(model.stem, *places, False)  # type: ignore  # its stub lacks the model
     except jsbsim.BaseError as error:
@@ -67,6 +73,14 @@ def _load(errors: _Errors, model: Path) -> jsbsim.FGFDMExec:
         reason = " ".join("".join(errors.said).split()) or "no reason given"
         raise SimulationFailed(f"JSBSim cannot load {folder.name}/{model.name}: {reason}")
     fdm.disable_output()
+    return fdm
+
+
+def bare(model: Path) -> jsbsim.FGFDMExec:
+    """A model in an executive of its own, initialised where it is: to be looked at, not flown."""
+    fdm = _load(_Errors(), model)
+    fdm["ic/h-sl-ft"], fdm["ic/vc-kts"] = 5000.0, 100.0
+    fdm.run_ic()
     return fdm
 
 
@@ -89,6 +103,9 @@ class Plant:
         self.run = self.fdm.run
         self._manager = self.fdm.get_property_manager()
         self._nodes: dict[str, jsbsim.FGPropertyNode] = {}
+        self._settings: Mapping[str, float] = {}
+        self._engines_run = False
+        self._has_engines = self.fdm.get_propulsion().get_num_engines() > 0
 
     def node(self, name: str) -> jsbsim.FGPropertyNode:
         """The held node of a property; UnknownProperty if the aircraft lacks it."""
@@ -121,6 +138,8 @@ class Plant:
         self._place(state)
         self.fdm.set_sim_time(0.0)
         self._initialise()
+        if self._has_engines:
+            self._start_engines()
         self.settle()
         self._initialise()  # again, so that the integrator's past derivatives are the settled ones too
         if any(wind_mps):
@@ -145,6 +164,15 @@ class Plant:
         if not self.fdm.run_ic():
             raise SimulationFailed("JSBSim cannot initialise the flight")
 
+    def _start_engines(self) -> None:
+        """Let all engines run as they do in steady flight with the power as it is set."""
+        if not self._engines_run:
+            self.write("propulsion/set-running", -1)
+            self._engines_run = True
+        self._command_engines()
+        self.settle()  # the power lever reaches the engines
+        self.fdm.get_propulsion().get_steady_state()
+
     def settle(self) -> None:
         """Run, time standing still, until accelerations belong to the state and the surfaces as commanded.
 
@@ -163,8 +191,12 @@ class Plant:
     def _command(self, state: FlightState) -> None:
         for name, surface in self.aircraft.surface.items():
             self.write(surface.command, state.surfaces_rad[name])
+        self._settings = state.settings
+        self._command_engines()
+
+    def _command_engines(self) -> None:
         for name, setting in self.aircraft.engine.settings.items():
-            self.write(setting.property, state.settings[name])
+            self.write(setting.property, self._settings[name])
 
     def _place(self, state: FlightState) -> None:
         V = state.airspeed_mps * FT_PER_M

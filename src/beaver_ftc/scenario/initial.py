@@ -29,7 +29,7 @@ class Initial(Section):
 @lru_cache(maxsize=32)
 def initial_of(aircraft: Aircraft) -> type[Initial]:
     """The flight condition of an aircraft: with its engine's settings, and the surfaces trim leaves alone."""
-    keys: dict[str, Any] = {}
+    keys = _flow_keys(aircraft)
     for name, setting in aircraft.engine.settings.items():
         low, high = setting.range
         says = setting.says or name
@@ -42,6 +42,21 @@ def initial_of(aircraft: Aircraft) -> type[Initial]:
     made = create_model("Initial", __base__=Initial, __doc__=Initial.__doc__, **keys)
     made._airframe = aircraft
     return made
+
+
+def _flow_keys(aircraft: Aircraft) -> dict[str, Any]:
+    """Airspeed and altitude, whose range and default make room for the aircraft's own."""
+    (low, high), start = aircraft.envelope.airspeed_mps, aircraft.file.start
+    default = start.airspeed_mps or (45.0 if low <= 45.0 <= high else 0.5 * (low + high))
+    says = f"true airspeed, validated from {low:g} to {high:g}"
+    slowest, fastest = min(20.0, 2.0 / 3.0 * low), max(70.0, 14.0 / 11.0 * high)
+    speed = number(default, unit="m/s", says=says, ge=slowest, le=fastest)
+    keys: dict[str, Any] = {"airspeed_mps": (Number, speed)}
+    if start.altitude_m is not None:
+        highest = max(6000.0, start.altitude_m)
+        altitude = number(start.altitude_m, unit="m", says="altitude above sea level", ge=-300, le=highest)
+        keys["altitude_m"] = Number, altitude
+    return keys
 
 
 def _initial_again(aircraft: Aircraft | None, values: dict[str, Any]) -> Initial:

@@ -1,0 +1,209 @@
+"""An instrumented copy of an aircraft of the jsbsim package: the failures of the built-in one, put in between
+its actuators and its aerodynamics.
+
+The aerodynamics of the copy see the deflections of our own actuators, one system file a surface, in place of
+those of the aircraft's flight control; all else is the aircraft's own. The files on disk stay as they are.
+"""
+
+import re
+import shutil
+from collections.abc import Iterable
+from pathlib import Path
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element
+
+import jsbsim
+
+from beaver_ftc.errors import BadInput
+from beaver_ftc.plant.actuator import actuator_system
+
+PREFIX = "actuated-"
+# What aerodynamics of JSBSim's aircraft call the deflection of each surface, and the sign and shape of it.
+_SEEN = {
+    "aileron": {
+        "fcs/left-aileron-pos-rad": "rad", "fcs/right-aileron-pos-rad": "opposite",
+        "fcs/aileron-pos-rad": "rad",
+        "fcs/left-aileron-pos-norm": "norm", "fcs/left-aileron-pos-deg": "deg",
+    },
+    "elevator": {
+        "fcs/elevator-pos-rad": "rad", "fcs/mag-elevator-pos-rad": "magnitude",
+        "fcs/elevator-pos-norm": "norm",
+        "fcs/elevator-pos-deg": "deg",
+    },
+    "rudder": {
+        "fcs/rudder-pos-rad": "rad", "fcs/mag-rudder-pos-rad": "magnitude", "fcs/rudder-pos-norm": "norm",
+        "fcs/rudder-pos-deg": "deg",
+    },
+}  # fmt: skip
+_SHAPES = {
+    "opposite": "<product> <value> -1 </value> {of} </product>",
+    "magnitude": "<abs> {of} </abs>",
+    "deg": "<product> <value> 57.29577951308232 </value> {of} </product>",
+    "norm": "<quotient> {of} <property> actuators/{surface}/position-max-rad </property> </quotient>",
+}
+_EXTRA_PITCH = """<function name="aero/moment/unanticipated-lbsft">
+  <description> The unanticipated fault: extra pitching moment on alpha cubed </description>
+  <product> <property> aero/qbar-psf </property> <property> metrics/Sw-sqft </property>
+  <property> metrics/cbarw-ft </property> <property> failures/unanticipated/Cm-alpha3 </property>
+  <pow> <property> aero/alpha-rad </property> <value> 3 </value> </pow> </product>
+</function>"""
+_LEVER = """
+    <fcs_function name="fcs/actuated-throttle-{i}-norm">
+      <function> <sum> <property> fcs/actuated-throttle-norm </property> </sum> </function>
+      <output> fcs/throttle-cmd-norm[{i}] </output>
+    </fcs_function>"""
+THRUST = "aero/thrust-coefficient"
+_THRUST = """
+    <fcs_function name="aero/thrust-coefficient">
+      <description> Thrust of all engines over dynamic pressure and wing area </description>
+      <function> <quotient> <sum> {thrusts} <value> 0 </value> </sum>
+        <product> <property> metrics/Sw-sqft </property>
+          <max> <property> aero/qbar-psf </property> <value> 1 </value> </max> </product>
+      </quotient> </function>
+    </fcs_function>"""
+_COMMON = """<?xml version="1.0"?>
+<system name="envelope and faults">
+  <property value="0"> failures/unanticipated/Cm-alpha3 </property>
+  <property value="0"> envelope/airspeed-min-fps </property>
+  <property value="1e6"> envelope/airspeed-max-fps </property>
+  <property value="-3"> envelope/alpha-min-rad </property>
+  <property value="3"> envelope/alpha-max-rad </property>
+  <property value="0.7"> fcs/actuated-throttle-norm </property>
+  ENGINES
+  <channel name="envelope">
+    <fcs_function name="aero/envelope-valid">
+      <function> <and>
+        <ge> <property> velocities/vt-fps </property> <property> envelope/airspeed-min-fps </property> </ge>
+        <le> <property> velocities/vt-fps </property> <property> envelope/airspeed-max-fps </property> </le>
+        <ge> <property> aero/alpha-rad </property> <property> envelope/alpha-min-rad </property> </ge>
+        <le> <property> aero/alpha-rad </property> <property> envelope/alpha-max-rad </property> </le>
+      </and> </function>
+    </fcs_function>
+  </channel>
+</system>
+"""
+
+
+def root() -> Path:
+    """Where the jsbsim package keeps its aircraft, engines and systems."""
+    return Path(jsbsim.get_default_root_dir())
+
+
+def engines_of(name: str) -> int:
+    """How many engines an aircraft has."""
+    return _engines(ElementTree.parse(source_of(name)).getroot())
+
+
+def names() -> tuple[str, ...]:
+    """Names of the aircraft the jsbsim package ships."""
+    return tuple(sorted(p.parent.name for p in root().glob("aircraft/*/*.xml") if p.stem == p.parent.name))
+
+
+def source_of(name: str) -> Path:
+    """The model of one of them. Raises BadInput if there is none."""
+    if name not in names():
+        raise BadInput(
+            f"jsbsim:{name}: the jsbsim package has no such aircraft, allowed: {', '.join(names())}"
+        )
+    return root() / "aircraft" / name / f"{name}.xml"
+
+
+def _common(engines: int) -> str:
+    """Envelope, the unanticipated fault, and one power lever for all engines."""
+    levers = "".join(_LEVER.format(i=i) for i in range(engines))
+    thrusts = " ".join(f"<property> propulsion/engine[{i}]/thrust-lbs </property>" for i in range(engines))
+    power = f'<channel name="power">{levers}{_THRUST.format(thrusts=thrusts)}</channel>'
+    return _COMMON.replace("ENGINES", power if engines else "")
+
+
+def instrument(name: str, folder: Path, travel_rad: dict[str, tuple[float, float]]) -> Path:
+    """Write the instrumented copy into an empty folder; returns its model. travel_rad: of each surface.
+
+    Raises BadInput where the failures cannot be put in, naming what is in the way.
+    """
+    source = source_of(name)
+    tree = ElementTree.parse(source)
+    whole = tree.getroot()
+    shutil.copytree(source.parent, folder, dirs_exist_ok=True)
+    for kind, below in (("engine", "Engines"), ("systems", "Systems")):
+        _copy_missing(root() / kind, folder / below)
+    aerodynamics = _aerodynamics(whole, source)
+    surfaces = _put_in(aerodynamics, folder, travel_rad)
+    _add_pitch_fault(aerodynamics, name)
+    (folder / "Systems" / "ftc-common.xml").write_text(_common(_engines(whole)), encoding="utf-8")
+    place = list(whole).index(next(iter(whole.iter("aerodynamics"))))
+    for i, system in enumerate((*(f"ftc-{surface}" for surface in surfaces), "ftc-common")):
+        whole.insert(place + i, Element("system", file=system))
+    model = folder / f"{name}.xml"
+    tree.write(model, encoding="utf-8", xml_declaration=True)
+    return model
+
+
+def _engines(whole: Element) -> int:
+    propulsion = whole.find("propulsion")
+    return 0 if propulsion is None else len(propulsion.findall("engine"))
+
+
+def _copy_missing(source: Path, target: Path) -> None:
+    """Copy files that the aircraft shares with others, where it has none of its own."""
+    target.mkdir(exist_ok=True)
+    for path in source.glob("*.xml"):
+        if not (target / path.name).exists():
+            shutil.copy(path, target / path.name)
+
+
+def _aerodynamics(whole: Element, source: Path) -> Element:
+    """The aerodynamics, read in from their own file if they are in one."""
+    found = whole.find("aerodynamics")
+    if found is None:
+        raise BadInput(f"jsbsim:{source.stem}: has no aerodynamics, allowed: an aircraft that flies")
+    if found.get("file"):
+        named = (source.parent / str(found.get("file"))).with_suffix(".xml")
+        place = list(whole).index(found)
+        whole[place] = found = ElementTree.parse(named).getroot()
+    return found
+
+
+def surfaces_of(name: str) -> tuple[str, ...]:
+    """The surfaces whose deflection the aerodynamics of an aircraft see."""
+    source = source_of(name)
+    aerodynamics = _aerodynamics(ElementTree.parse(source).getroot(), source)
+    seen = {(element.text or "").strip().lstrip("-") for element in aerodynamics.iter()}
+    return tuple(surface for surface, known in _SEEN.items() if seen & set(known))
+
+
+def _put_in(aerodynamics: Element, folder: Path, travel_rad: dict[str, tuple[float, float]]) -> Iterable[str]:
+    """Let the aerodynamics see our deflections, and write the actuators; returns the surfaces."""
+    for surface, travel in travel_rad.items():
+        shapes = set()
+        for element in aerodynamics.iter():
+            text = (element.text or "").strip()
+            shape = _SEEN[surface].get(text.lstrip("-"))
+            if shape is not None:
+                shapes.add(shape)
+                element.text = f" {'-' if text.startswith('-') else ''}{_property(surface, shape)} "
+        system = actuator_system(surface, *travel, prefix=PREFIX)
+        extra = "".join(_component(surface, shape) for shape in sorted(shapes - {"rad"}))
+        system = re.sub(r"(\s*</channel>)", lambda end: f"{extra}{end.group(1)}", system)  # noqa: B023
+        (folder / "Systems" / f"ftc-{surface}.xml").write_text(system, encoding="utf-8")
+    return tuple(travel_rad)
+
+
+def _property(surface: str, shape: str) -> str:
+    """What the aerodynamics of the copy see."""
+    ending = "-effective-rad" if shape == "rad" else f"-effective-{shape}"
+    return f"fcs/{PREFIX}{surface}{ending}"
+
+
+def _component(surface: str, shape: str) -> str:
+    of = f"<property> {_property(surface, 'rad')} </property>"
+    formula = _SHAPES[shape].format(of=of, surface=surface)
+    name = _property(surface, shape)
+    return f'\n    <fcs_function name="{name}"> <function> {formula} </function> </fcs_function>'
+
+
+def _add_pitch_fault(aerodynamics: Element, name: str) -> None:
+    axis = next((axis for axis in aerodynamics.iter("axis") if axis.get("name") == "PITCH"), None)
+    if axis is None:
+        raise BadInput(f"jsbsim:{name}: its aerodynamics have no pitch axis, allowed: one that has")
+    axis.append(ElementTree.fromstring(_EXTRA_PITCH))

@@ -1,0 +1,49 @@
+"""What came of a derivation, as a document and as text."""
+
+from typing import Any
+
+from beaver_ftc.studies.derive.run import Derived
+
+AXES = ("p", "q", "r")
+
+
+def document_of(made: Derived) -> dict[str, Any]:
+    """Terms by coefficient, errors by axis, the envelope and the trim."""
+    aircraft = made.aircraft
+    return {
+        "aircraft": aircraft.name,
+        "folder": str(aircraft.folder),
+        "surfaces": {name: [t.min_rad, t.max_rad] for name, t in aircraft.travel.items()},
+        "terms": {c: sum(t.coefficient == c for t in aircraft.moments) for c in ("Cl", "Cm", "Cn")},
+        "envelope": aircraft.envelope.model_dump(),
+        "trim": {
+            "airspeed_mps": made.trim.airspeed_mps,
+            "altitude_m": made.trim.altitude_m,
+            "alpha_rad": made.trim.alpha_rad,
+            "gamma_rad": made.trim.gamma_rad,
+            "settings": dict(made.trim.settings),
+        },
+        "largest_error_rad_s2": {
+            "fitted": dict(zip(AXES, map(float, made.fitted_rad_s2), strict=True)),
+            "checked": dict(zip(AXES, map(float, made.checked_rad_s2), strict=True)),
+            "declared": dict(zip(AXES, aircraft.model_error_rad_s2, strict=True)),
+        },
+    }
+
+
+def text_of(document: dict[str, Any]) -> str:
+    """The document as a page of text."""
+    low, high = document["envelope"]["airspeed_mps"]
+    least, most = document["envelope"]["alpha_deg"]
+    terms = ", ".join(f"{name} {count}" for name, count in document["terms"].items())
+    lines = [
+        f"{document['aircraft']}: {terms} terms",
+        f" envelope   {low:g} to {high:g} m/s, angle of attack {least:g} to {most:g} deg",
+        f" surfaces   {', '.join(document['surfaces'])}",
+        f" {'largest error, rad/s2':24}{'p':>10}{'q':>10}{'r':>10}",
+    ]
+    says = {"fitted": "states of the fit", "checked": "states not seen", "declared": "declared bound"}
+    for kind, errors in document["largest_error_rad_s2"].items():
+        lines.append(f"   {says[kind]:22}" + "".join(f"{errors[axis]:10.4f}" for axis in AXES))
+    lines.append(f" written to {document['folder']}")
+    return "\n".join(lines)

@@ -48,7 +48,8 @@ def command(
     diagnose recorded flights (--flights FOLDER), each left out of the model it is diagnosed with.
 
     Writes comparison.json, comparison.png and comparison.html (for runs: runs.json, runs.png, runs.html)
-    below --out; for recorded flights, flights.json and flights.md.
+    below --out; for recorded flights, flights.json, flights.md and
+    flights.png.
 
     Stopped or killed, a comparison on flights goes on where it was with the same command.
     """
@@ -88,15 +89,20 @@ def _most_or_folder(flights: str | None) -> tuple[int | None, Path | None]:
 def _compare_recorded(folder: Path, out: Path, format: Format, page: Path | None) -> None:
     from beaver_ftc.results.metrics import as_json
     from beaver_ftc.results.writer import result_folder
+    from beaver_ftc.studies.recorded.figure import write_figure
     from beaver_ftc.studies.recorded.run import run_benchmark
     from beaver_ftc.studies.recorded.words import as_markdown, as_text, update_page
 
     document = run_benchmark(folder)
     with result_folder(out, "recorded-flights") as written:
+        write_figure(document, written / "flights.png")
         (written / "flights.json").write_text(as_json(document), encoding="utf-8")
         (written / "flights.md").write_text(as_markdown(document), encoding="utf-8")
     if page is not None:
         update_page(document, page)
+        picture = page.parent / "images" / "recorded-flights.png"
+        if picture.parent.is_dir():
+            picture.write_bytes((out / "recorded-flights" / "flights.png").read_bytes())
     if format is Format.json:
         emit_json(document | {"folder": str(out / "recorded-flights")})
     else:

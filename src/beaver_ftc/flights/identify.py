@@ -156,7 +156,10 @@ def _model(fit: Fit, stretches: Sequence[Stretch], vehicle: Vehicle, history: in
 
 
 def prior(stretches: Sequence[Stretch], model: Model) -> Settings:
-    """What the flights say about faults to come: levels seen, and how often they changed."""
+    """What the flights say about faults to come: levels seen, and how often they changed.
+
+    A flight may be tested less hard than these: the rate is the geometric mean of theirs and the usual.
+    """
     hours = sum(stretch.use.sum() * stretch.samples.dt_s for stretch in stretches) / 3600.0
     changes, repairs, levels = 0, 0, {}
     names = list(model.vehicle.surfaces)
@@ -171,7 +174,7 @@ def prior(stretches: Sequence[Stretch], model: Model) -> Settings:
         return Settings(alarm=_SURE, hold_s=_HOLD_S, power=_POWER_ALONE)
     return Settings(
         levels=levels,
-        changes_per_hour=(changes + 1) / hours,
+        changes_per_hour=float(np.sqrt((changes + 1) / hours * Settings().changes_per_hour)),
         repair_share=(repairs + _PRIOR_CHANGES / 2) / (changes + _PRIOR_CHANGES),
         power=_POWER,
     )

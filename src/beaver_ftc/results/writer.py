@@ -28,7 +28,7 @@ FILES_OF_A_RESULT = frozenset({
     "runs.html", "reproduction.json", "reproduction.md", "reproduction.html", "detectability.json",
     "detectability.csv", "detectability.png", "fault-matrix.json", "fault-matrix.txt", "fault-matrix.png",
     "power.json", "power.txt", "power.parquet", "pitch-lost.json", "pitch-lost.txt",
-    "diagnosis.parquet", "verdict.json", "flights.json", "flights.md",
+    "diagnosis.parquet", "verdict.json", "flights.json", "flights.md", "flights.png",
 })  # fmt: skip
 MARK = "beaver-ftc"  # the software that a picture of ours names in its metadata
 _HEAD_BYTES = 2048  # of a picture: its metadata come first

@@ -76,7 +76,7 @@ def test_the_command_writes_both_files(folder, tmp_path):
     assert done.exit_code == 0, done.output
     assert json.loads(done.stdout)["sets"][0]["set"] == "wing"
     names = {path.name for path in (tmp_path / "recorded-flights").iterdir()}
-    assert names == {"flights.json", "flights.md"}
+    assert names == {"flights.json", "flights.md", "flights.png"}
 
 
 def _flight(failure, false_alarms=0, delay=None, right=True):

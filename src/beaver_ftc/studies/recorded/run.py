@@ -11,7 +11,7 @@ from beaver_ftc.flights.identify import Stretch, fit_model, stretches_of
 from beaver_ftc.flights.model import Model, Settings
 from beaver_ftc.flights.recording import Recording
 from beaver_ftc.flights.scoring import by_event, by_labels
-from beaver_ftc.flights.testing import folds
+from beaver_ftc.flights.testing import folds, run_tests
 from beaver_ftc.studies.recorded import tally
 from beaver_ftc.studies.recorded.data import DataSet, data_sets
 from beaver_ftc.studies.recorded.rivals import forgetting, freeze, sliding
@@ -51,7 +51,7 @@ def run_benchmark(folder: Path) -> Document:
 
 def _compare(data: DataSet) -> Document:
     stretches = stretches_of(data.flights)
-    whole = fit_model(stretches, data.vehicle).settings
+    whole = _settings(stretches, data)
     flights: list[Document] = []
     for fitted, kept, name in folds(stretches):
         model = _frozen(fitted, data, whole)
@@ -72,6 +72,14 @@ def _compare(data: DataSet) -> Document:
         "published": PUBLISHED.get(data.name, []),
         "flights": flights,
     }
+
+
+def _settings(stretches: list[Stretch], data: DataSet) -> Settings:
+    """What a single flight says as a whole: levels, rate of change, and the mass of the bounds."""
+    model = fit_model(stretches, data.vehicle)
+    if len(stretches) > 1:
+        return model.settings
+    return model.settings.model_copy(update={"bounds": run_tests(stretches, model)[1]})
 
 
 def _frozen(fitted: list[Stretch], data: DataSet, whole: Settings) -> Model:

@@ -43,6 +43,7 @@ def accommodate(control, fdi, belief, measured, faults):
         elif s == surface and not fdi.every_type:
             act_on_loss(control, fdi, s)
         if control.inner == REJECTING and control.law != ORACLE:
+            rejecting.hesitate(control, s)
             rejecting.abandon(control, s, fdi.verdict.detected and s == surface)
     adaptive.approach(control, control.target)
     compensate(control, fdi, belief, measured, faults)

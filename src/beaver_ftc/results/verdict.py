@@ -39,6 +39,7 @@ def facts(metrics: Document) -> list[tuple[str, str]]:
         ("probing", _probing(metrics)),
         ("supervisor", _supervisor(metrics)),
         ("engine power", _engine_power(metrics)),
+        ("profile", _profile(metrics)),
         ("authority", _authority(metrics)),
         ("envelope", _envelope(metrics)),
         ("departure", _departure(metrics)),
@@ -128,6 +129,19 @@ def _fault(fault: Document | None) -> str:
     what = f"{fault['actuator'] or ''} {fault['type'].replace('_', ' ')}".strip()
     size = ", ".join(_sizes(fault))
     return f"{what}{' (' + size + ')' if size else ''} at {_time(fault['at_s'])}{until}"
+
+
+_CHANNELS = {
+    "altitude_m": "altitude {} m", "airspeed_mps": "airspeed {} m/s", "heading_deg": "heading {} deg",
+    "bank_deg": "bank {} deg",
+}  # fmt: skip
+
+
+def _profile(metrics: Document) -> str:
+    """Largest deviations from the commanded profile; nothing where none was flown."""
+    flown = [(name, worst) for name, worst in (metrics.get("profile") or {}).items() if worst is not None]
+    off = ", ".join(_CHANNELS[name].format(_value(worst)) for name, worst in flown)
+    return f"at most off by: {off}" if off else ""
 
 
 _SIZES = {

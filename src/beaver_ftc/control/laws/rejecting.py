@@ -18,6 +18,7 @@ from beaver_ftc.control.reference_model import advance
 from beaver_ftc.design.model import QDYN
 
 PATIENCE_S, RETRY_S = 0.5, 20.0
+LEAST_BELIEF = 0.5  # half: what a gain margin of 6 dB forgives
 
 
 @kernel
@@ -55,6 +56,17 @@ def hand_over(control, left):
     given = control.hand_over if left > 0.0 else 1.0
     lost = 1.0 - left if left >= control.least_effectiveness else 1.0
     control.rejection.lost = given * given * (3.0 - 2.0 * given) * lost
+
+
+@kernel
+def hesitate(control, s):
+    """Believe no loss worse than LEAST_BELIEF of a surface that has no stand-in.
+
+    A loss found worse than it is would make the loop faster than its margins allow, or give up a surface that
+    nothing replaces. If it is worse, the surface will be found at its stop: see `abandon`.
+    """
+    if s != control.main[PITCH] and s != control.stand_in and control.effectiveness[s] > 0.0:
+        control.target[s] = max(control.target[s], LEAST_BELIEF)
 
 
 @kernel

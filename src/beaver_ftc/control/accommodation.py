@@ -43,10 +43,19 @@ def accommodate(control, fdi, belief, measured, faults):
         elif s == surface and not fdi.every_type:
             act_on_loss(control, fdi, s)
         if control.inner == REJECTING and control.law != ORACLE:
+            suspected = fdi.verdict.detected and s == surface and is_doubtful(control, fdi, s)
             rejecting.hesitate(control, s)
-            rejecting.abandon(control, s, fdi.verdict.detected and s == surface)
+            rejecting.abandon(control, s, suspected)
     adaptive.approach(control, control.target)
     compensate(control, fdi, belief, measured, faults)
+
+
+@kernel
+def is_doubtful(control, fdi, s):
+    """Whether surface s, which is named, may be of no use: its type is open, nothing of it seems to be left, or
+    another can take its place."""
+    is_open = fdi.every_type and fdi.surface[s].measure < 0
+    return is_open or control.target[s] < control.least_effectiveness or s == control.main[PITCH]
 
 
 @kernel

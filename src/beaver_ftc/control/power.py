@@ -69,13 +69,13 @@ def follow(control, x, y):
 
 
 @kernel
-def ceiling(power, y):
+def ceiling(power, y, highest_dpt):
     """Highest manifold pressure (inHg) whose slipstream leaves the rudder enough to fly with; y (5,).
 
     The propeller yaws with dpt^3: slow and at full power, more than the rudder can hold.
     """
     per_inhg = power.dpt_factor / (2.0 * y[QDYN] * y[AIRSPEED])
-    return power.command[0] + (power.highest_dpt - y[DPT]) / per_inhg
+    return power.command[0] + (highest_dpt - y[DPT]) / per_inhg
 
 
 @kernel
@@ -85,7 +85,7 @@ def wanted(power, y):
         return power.trim
     deviation = power.speed - power.usual_speed
     pressure = power.trim - power.speed_gain * deviation + power.attitude_gain * power.attitude
-    return max(min(pressure, ceiling(power, y), power.high), power.low)
+    return max(min(pressure, ceiling(power, y, power.highest_dpt), power.high), power.low)
 
 
 @kernel

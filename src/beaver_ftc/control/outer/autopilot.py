@@ -27,6 +27,7 @@ MOST_SIDESLIP_RAD = 0.14
 MOST_MISSING = 0.1  # rad of path angle, and times gravity of acceleration
 MOST_DRIFT_RAD_S = 0.1  # of turning that a bank without a turn stands for
 USUAL_S, USUAL_MPS = 20.0, 3.0  # airspeed that power alone can hold: within so much of what it has been
+LEAST_RUDDER = 0.1  # effectiveness reckoned with
 LEAST_PUSH = 1e-3  # m/s2 per inHg
 SETTLED_S = 30.0  # after a change of heading
 MEAN_S = 10.0  # over which the airspeed is judged: what comes and goes faster is a gust, not a deviation
@@ -193,7 +194,9 @@ def throttle(autopilot, control, y, path, push):
     along = autopilot.moving[SPEED] + autopilot.gain.speed * error + autopilot.throttle
     climbing = autopilot.gravity * (path - autopilot.climb_in_trim)
     wanted = autopilot.trim_inhg + (along + climbing) / push
-    high = min(autopilot.high_inhg, ceiling(power, y))
+    rudder = max(control.effectiveness[control.main[YAW]], LEAST_RUDDER)
+    highest_dpt = power.highest_dpt * rudder ** (1.0 / 3.0)  # the propeller yaws with dpt^3
+    high = min(autopilot.high_inhg, ceiling(power, y, highest_dpt))
     limited = max(min(wanted, high), autopilot.low_inhg)
     if limited == wanted:
         found = autopilot.throttle + autopilot.dt * autopilot.gain.speed_i * error

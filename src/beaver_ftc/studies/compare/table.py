@@ -41,6 +41,15 @@ def _ratio(row: Document, _: Document) -> str:
     return f"{shown(row['ratio_median'])} / {shown(row['ratio_90'])}"
 
 
+def _rate(value: float | None) -> str:
+    return "-" if value is None else f"{value:.3g}"
+
+
+def _pair(part: str) -> Cell:
+    """Median and 90 % of the tracking error of a part of the flight."""
+    return lambda row, _: f"{_rate(row.get(part + '_median'))} / {_rate(row.get(part + '_90'))}"
+
+
 DIAGNOSIS: tuple[tuple[str, Cell], ...] = (
     ("scheme", lambda row, _: row["scheme"]),
     ("false alarms/h (95 %)", _alarms),
@@ -55,7 +64,13 @@ DIAGNOSIS: tuple[tuple[str, Cell], ...] = (
     ("lost", lambda row, _: str(row["departures"])),
     ("us/frame", lambda row, _: f"{row['us']:.0f}"),
 )
-CONTROL: tuple[tuple[str, Cell], ...] = (("law", lambda row, _: row["law"]), *DIAGNOSIS[6:])
+CONTROL: tuple[tuple[str, Cell], ...] = (
+    ("law", lambda row, _: row["law"]),
+    *DIAGNOSIS[6:],
+    ("error before, deg/s 50/90 %", _pair("before")),
+    ("after", _pair("after")),
+    ("travel deg/s", lambda row, _: _rate(row.get("travel_median"))),
+)
 
 
 def sections(part: Document) -> list[tuple[list[str], list[list[str]]]]:

@@ -34,6 +34,11 @@ class Line:
     ratio_90: float | None
     departures: int
     us: float
+    before_median: float | None = None
+    before_90: float | None = None
+    after_median: float | None = None
+    after_90: float | None = None
+    travel_median: float | None = None
 
 
 def line_of(entry: Entry, results: Sequence[Result], oracle: Sequence[Result]) -> Line:
@@ -65,6 +70,11 @@ def line_of(entry: Entry, results: Sequence[Result], oracle: Sequence[Result]) -
         ratio_90=share_within(ratios, 0.9) if ratios else None,
         departures=sum(r.departed for r in mine),
         us=median(r.us for r in mine) if mine else 0.0,
+        before_median=share_within([r.before_deg_s for r in mine], 0.5) if mine else None,
+        before_90=share_within([r.before_deg_s for r in mine], 0.9) if mine else None,
+        after_median=share_within([r.after_deg_s for r in faulted], 0.5) if faulted else None,
+        after_90=share_within([r.after_deg_s for r in faulted], 0.9) if faulted else None,
+        travel_median=share_within([r.travel_deg_s for r in mine], 0.5) if mine else None,
     )
 
 

@@ -30,7 +30,8 @@ class Result:
     """What an entry made of a case. Times in s, errors in deg/s; infinite where there is none.
 
     healthy_s: time under observation without a fault, until the first alarm. rms_deg_s: over all axes,
-    after the fault (all the flight without one), and infinite after a departure.
+    after the fault (all the flight without one), and infinite after a departure. before_deg_s, after_deg_s:
+    the same before and after it. travel_deg_s: path of all surfaces over the time flown.
     """
 
     entry: Entry
@@ -45,6 +46,9 @@ class Result:
     departed: bool = False
     us: float = 0.0
     error: str | None = None
+    before_deg_s: float = inf
+    after_deg_s: float = inf
+    travel_deg_s: float = inf
 
 
 @dataclass
@@ -136,6 +140,9 @@ def result_of(flight: Flight, entry: Entry, us: float) -> Result:
         correct=correct,
         isolation_delay_s=_or_never(isolation["delay_s"]) if correct else inf,
         rms_deg_s=_rms(document),
+        before_deg_s=_part(document, "pre_fault_rms_deg_s"),
+        after_deg_s=_part(document, "post_fault_rms_deg_s"),
+        travel_deg_s=sum(document["tracking"]["surface_travel_deg"].values()) / end_s,
         departed=document["departure"] is not None,
         us=us,
     )
@@ -143,6 +150,14 @@ def result_of(flight: Flight, entry: Entry, us: float) -> Result:
 
 def _or_never(value: float | None) -> float:
     return inf if value is None else value
+
+
+def _part(document: dict, part: str) -> float:
+    """RMS over all axes of a part of the flight; infinite after a departure in it, or where there is none."""
+    rms, after = document["tracking"][part], part.startswith("post")
+    fault = document["fault"]
+    lost = document["departure"] is not None and (after or fault is None)
+    return inf if rms is None or lost else hypot(*rms.values())
 
 
 def _rms(document: dict) -> float:

@@ -52,8 +52,8 @@ def accommodate(control, fdi, belief, measured, faults):
 
 @kernel
 def is_doubtful(control, fdi, s):
-    """Whether surface s, which is named, may be of no use: its type is open, nothing of it seems to be left, or
-    another can take its place."""
+    """Whether surface s, which is named, may be of no use: its type is open, nothing of it seems to be left,
+    or another can take its place."""
     is_open = fdi.every_type and fdi.surface[s].measure < 0
     return is_open or control.target[s] < control.least_effectiveness or s == control.main[PITCH]
 

@@ -62,10 +62,11 @@ def hand_over(control, left):
 def hesitate(control, s):
     """Believe no loss worse than LEAST_BELIEF of a surface that has no stand-in.
 
-    A loss found worse than it is would make the loop faster than its margins allow, or give up a surface that
-    nothing replaces. If it is worse, the surface will be found at its stop: see `abandon`.
+    A loss found worse than it is would make the loop faster than its margins allow. Where nothing seems to be
+    left the surface is given up as ever.
     """
-    if s != control.main[PITCH] and s != control.stand_in and control.effectiveness[s] > 0.0:
+    replaced = s == control.main[PITCH] or s == control.stand_in
+    if not replaced and control.target[s] >= control.least_effectiveness:
         control.target[s] = max(control.target[s], LEAST_BELIEF)
 
 

@@ -266,8 +266,8 @@ class Scenario(Section):
         json_schema_extra=initial_schema,
     )
     reference: Reference = Field(default_factory=Reference, description="body rates to follow")
-    autopilot: Autopilot = Field(
-        default_factory=Autopilot, description="the flight path to fly, on top of the reference"
+    autopilot: Autopilot | None = Field(
+        default=None, description="the flight path to fly, on top of the reference; left out: no outer loops"
     )
     faults: tuple[Fault, ...] = Field(default=(), max_length=100, description="what breaks, and when")
     uncertainty: Uncertainty = Field(
@@ -313,7 +313,7 @@ class Scenario(Section):
 
     def _outline(self) -> Outline:
         expected = tuple(key for key, value in self.expect if value is not None)
-        flown = self.autopilot.channels
+        flown = self.autopilot.channels if self.autopilot else ()
         starts_s = tuple(fault.at_s for fault in self.faults)
         return Outline(self.duration_s, self.rate_hz, starts_s, expected, flown)
 

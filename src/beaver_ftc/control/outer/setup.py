@@ -33,7 +33,7 @@ _UNIT = {"altitude_m": 1.0, "airspeed_mps": 1.0, "heading_deg": radians(1.0), "b
 def set_up_autopilot(autopilot: np.void, control: np.void, scenario: Scenario) -> None:
     """Fill the record (dtype AUTOPILOT); control: the law's, already assembled."""
     profile = scenario.autopilot
-    if not profile.channels:
+    if profile is None or not profile.channels:
         return
     autopilot["enabled"], autopilot["dt"] = 1, 1.0 / scenario.rate_hz
     set_up_profile(autopilot, scenario)
@@ -60,7 +60,7 @@ def _know(autopilot: np.void, scenario: Scenario) -> None:
     """What the loops take from the aircraft: thrust, roll by sideslip, slowest airspeed."""
     aircraft = scenario.airframe
     terms = {name: term.value for name, term in aircraft.terms.items()}
-    if scenario.autopilot.airspeed_mps and "CX_dpt" not in terms:
+    if scenario.autopilot and scenario.autopilot.airspeed_mps and "CX_dpt" not in terms:
         says = f"{aircraft.name} has no term of its thrust, allowed: an aircraft with CX_dpt"
         raise BadInput(f"{scenario.name}: autopilot.airspeed_mps: {says}")
     per_mass = aircraft.geometry.wing_area_m2 / (aircraft.mass.mass_kg * scenario.design_model.mass)

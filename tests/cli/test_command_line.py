@@ -243,6 +243,15 @@ def test_a_log_cut_short_is_bad_input_to_compare(short, size):
 LONG = SHORT.replace("short", "long").replace("duration_s: 6", "duration_s: 20000")
 
 
+# Undoes what nohup, or a shell that starts jobs in the background, has the tests' process ignore.
+HEARD_AGAIN = """
+import os, signal, sys
+for number in (signal.SIGHUP, signal.SIGINT, signal.SIGTERM):
+    signal.signal(number, signal.SIG_DFL)
+os.execv(sys.argv[1], sys.argv[1:])
+"""
+
+
 @pytest.mark.parametrize(
     ("number", "status", "left"),
     [
@@ -254,7 +263,8 @@ LONG = SHORT.replace("short", "long").replace("duration_s: 6", "duration_s: 2000
 )
 def test_run_that_is_ended_leaves_no_half_result(short, number, status, left):
     (short / "long.yaml").write_text(LONG)
-    with subprocess.Popen([BEAVER, "run", "long.yaml"], cwd=short, stderr=subprocess.PIPE) as running:
+    command = [sys.executable, "-c", HEARD_AGAIN, BEAVER, "run", "long.yaml"]
+    with subprocess.Popen(command, cwd=short, stderr=subprocess.PIPE) as running:
         while not list(short.glob("runs/.long*/log.parquet")):
             assert running.poll() is None
             time.sleep(0.02)

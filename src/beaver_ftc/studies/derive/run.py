@@ -30,11 +30,11 @@ from beaver_ftc.studies.derive.sample import Envelope, Samples, sample
 KG_PER_SLUG = 0.45359237 * 9.80665 / 0.3048
 KG_M2 = KG_PER_SLUG * 0.3048**2
 ALTITUDE_M = 1500.0
-SAMPLES, CHECKED = 1500, 3000
+SAMPLES, CHECKED = 2500, 5000
 MARGIN = 1.1  # of the declared bound over the largest error found
 LIFT_COEFFICIENT = 0.45  # at the speed the envelope is built about
 SPAN_OF_SPEED = (0.9, 1.1)
-SPAN_OF_ALPHA_RAD = 0.035
+SPAN_OF_ALPHA_RAD = 0.06
 _COMMANDS = {
     "aileron": "fcs/left-aileron-pos-rad",
     "elevator": "fcs/elevator-pos-rad",

@@ -19,9 +19,9 @@ class Envelope:
     airspeed_mps: tuple[float, float]
     alpha_rad: tuple[float, float]
     altitude_m: float
-    beta_rad: float = 0.06
-    rates_rad_s: tuple[float, float, float] = (0.20, 0.10, 0.10)
-    surface_share: float = 0.3
+    beta_rad: float = 0.10
+    rates_rad_s: tuple[float, float, float] = (0.30, 0.20, 0.20)
+    surface_share: float = 1.0
 
 
 @dataclass(frozen=True)

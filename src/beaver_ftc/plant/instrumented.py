@@ -127,6 +127,8 @@ def instrument(name: str, folder: Path, travel_rad: dict[str, tuple[float, float
     shutil.copytree(source.parent, folder, dirs_exist_ok=True)
     for kind, below in (("engine", "Engines"), ("systems", "Systems")):
         _copy_missing(root() / kind, folder / below)
+    for output in whole.findall("output"):  # it would write files where the flight is started
+        whole.remove(output)
     aerodynamics = _aerodynamics(whole, source)
     surfaces = _put_in(aerodynamics, folder, travel_rad)
     _add_pitch_fault(aerodynamics, name)

@@ -88,7 +88,7 @@ def derive(
     with tempfile.TemporaryDirectory(prefix="beaver-ftc-") as scratch:
         folder = Path(scratch) / name
         tell("instrument")
-        travel = travel_of(name)
+        travel = travel_of(name, Path(scratch) / "own")
         if len(travel) < 3:
             raise BadInput(
                 f"jsbsim:{name}: its aerodynamics see {', '.join(travel) or 'no surface'}, allowed: 3"
@@ -114,9 +114,12 @@ def derive(
     return Derived(Aircraft(AircraftFile.model_validate(data), target), point, *errors)
 
 
-def travel_of(name: str) -> dict[str, tuple[float, float]]:
-    """How far each surface goes when its own flight control is commanded from stop to stop, rad."""
-    fdm, travel = bare(instrumented.source_of(name)), {}
+def travel_of(name: str, scratch: Path) -> dict[str, tuple[float, float]]:
+    """How far each surface goes when its own flight control is commanded from stop to stop, rad.
+
+    scratch: a folder for a copy that writes no files.
+    """
+    fdm, travel = bare(instrumented.instrument(name, scratch, {})), {}
     for surface in instrumented.surfaces_of(name):
         ends = []
         for command in (-1.0, 1.0):

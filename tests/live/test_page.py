@@ -15,7 +15,7 @@ ARGUMENTS = (  # as on a machine without a graphics card
     "--no-sandbox", "--disable-gpu", "--enable-unsafe-swiftshader", "--enable-precise-memory-info",
     "--js-flags=--expose-gc",
 )  # fmt: skip
-WAIT_S = 60.0
+WAIT_S, COMPILED_WITHIN_S = 60.0, 600.0
 SCREENS = {"laptop": (1280, 720), "small laptop": (1024, 640), "phone": (390, 844)}
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium on this machine")
@@ -34,7 +34,9 @@ def chromium():
 def context(chromium, cockpit):
     """The browser that the address has let in."""
     context = chromium.new_context(viewport={"width": 1280, "height": 720})
-    context.new_page().goto(cockpit.address)
+    first = context.new_page()
+    first.goto(cockpit.address)
+    until(first, "Boolean(window.cockpit && cockpit.flight.state)", COMPILED_WITHIN_S)
     return context
 
 

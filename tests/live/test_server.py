@@ -48,8 +48,8 @@ def opened(cockpit, cookie, origin=None, host=None):
     )  # fmt: skip
 
 
-def until(link, kind, timeout_s=20.0):
-    """The next message of a kind."""
+def until(link, kind, timeout_s=600.0):
+    """The next message of a kind; a machine on which nothing has flown yet compiles first."""
     end_s = time.monotonic() + timeout_s
     while time.monotonic() < end_s:
         told = json.loads(link.recv(timeout=timeout_s))
@@ -190,3 +190,11 @@ def test_a_port_in_use_is_said_in_a_line(cockpit):
 def test_a_scenario_that_is_not_there_is_said_in_a_line(tmp_path):
     with pytest.raises(AssertionError, match="did you mean"):
         started(tmp_path, "fault-fre")
+
+
+def test_a_flight_that_cannot_be_trimmed_ends_it_in_a_line(tmp_path):
+    (tmp_path / "slow.yaml").write_text("name: slow\ninitial: {airspeed_mps: 20}\n")
+    cockpit = started(tmp_path, str(tmp_path / "slow.yaml"))
+    _, says = cockpit.process.communicate(timeout=600)
+    assert cockpit.process.returncode == 2
+    assert says.splitlines()[-1].startswith("slow: no steady straight flight at 20 m/s")

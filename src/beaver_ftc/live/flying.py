@@ -12,12 +12,13 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
-from beaver_ftc.errors import BeaverFtcError
+from beaver_ftc.errors import BadInput, BeaverFtcError
 from beaver_ftc.live import messages
 from beaver_ftc.live.pace import Pace
 from beaver_ftc.live.session import NO_STICK, Session, encode
 
 EVERYONE = 0
+BAD_INPUT = "bad input"  # in place of a page: the flight cannot be begun
 STATE_EVERY = 15  # ticks
 
 
@@ -28,9 +29,9 @@ def main(connection: Connection, scenario: Any, out: str) -> None:
     try:
         session = Session(scenario, Path(out))
     except BeaverFtcError as error:
-        connection.send(("failed", f"{error}"))
+        kind = BAD_INPUT if isinstance(error, BadInput) else "failed"
+        connection.send((kind, f"{scenario.name}: {error}"))
         return
-    connection.send(("ready", ""))
     with contextlib.suppress(EOFError, BrokenPipeError, ConnectionResetError):  # the server is gone
         Flying(connection, session).run()
     os._exit(0)  # to take an interpreter with compiled code apart takes a second, and nothing is left to do

@@ -30,7 +30,8 @@ def serve(scenario: "Scenario", out: Path, port: int, say: Callable[[str], None]
     with _listening(port) as listener, _flight(scenario, out) as pipe:
         ended = asyncio.run(_serve(listener, pipe, say))
     if ended is not None:
-        raise SimulationFailed(ended)
+        kind, says = ended
+        raise BadInput(says) if kind == flying.BAD_INPUT else SimulationFailed(says)
 
 
 @contextlib.contextmanager
@@ -69,8 +70,10 @@ def _flight(scenario: "Scenario", out: Path) -> Iterator[Connection]:
             process.join()
 
 
-async def _serve(listener: socket.socket, pipe: Connection, say: Callable[[str], None]) -> str | None:
-    """Run the server; returns why it ended, None for a signal."""
+async def _serve(
+    listener: socket.socket, pipe: Connection, say: Callable[[str], None]
+) -> tuple[str, str] | None:
+    """Run the server; returns why it ended, kind and words, None for a signal."""
     import uvicorn
 
     from beaver_ftc.live.gate import Gate
@@ -85,32 +88,23 @@ async def _serve(listener: socket.socket, pipe: Connection, say: Callable[[str],
     )  # fmt: skip
     server = _server(config)
     _on_signals(server)
-    loop = asyncio.get_running_loop()
-    ready: asyncio.Future[str | None] = loop.create_future()
-    ended: list[str] = []
+    ended: list[tuple[str, str]] = []
 
     def heard(page: Any, told: Any) -> None:
         if isinstance(page, int):
             pages.tell(page, told)
-        elif page == "ready":
-            _settle(ready, None)
         else:
-            _settle(ready, told)
-            ended.append(told)
+            ended.append((page, told))
             server.should_exit = True
 
-    threading.Thread(target=_listen, args=(pipe, loop, heard), daemon=True, name="flight").start()
+    arguments = pipe, asyncio.get_running_loop(), heard
+    threading.Thread(target=_listen, args=arguments, daemon=True, name="flight").start()
     serving = asyncio.create_task(server.serve(sockets=[listener]))
-    await asyncio.wait({ready, serving}, return_when=asyncio.FIRST_COMPLETED)
-    if ready.done() and ready.result() is None:
-        say(gate.invitation())
+    while not (server.started or serving.done()):
+        await asyncio.sleep(0.01)
+    say(gate.invitation())  # the page loads while the flight is being prepared
     await serving
     return ended[0] if ended else None
-
-
-def _settle(future: "asyncio.Future[str | None]", result: str | None) -> None:
-    if not future.done():
-        future.set_result(result)
 
 
 def _asker(pipe: Connection) -> Callable[[int, str], None]:

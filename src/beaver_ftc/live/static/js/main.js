@@ -43,7 +43,10 @@ on("s", (state) => {
 });
 on("e", ({ events }) => addEvents(events));
 on("ack", ({ n, ok, says }) => { if (!n && !ok) notice(says); }); // what went wrong without being asked for
-on("link", ({ up }) => banner(up ? "" : "Not connected: has beaver-ftc live ended?"));
+on("link", ({ up }) => {
+  const waiting = flight.hello ? "" : "The flight is being prepared; the first one on a machine is compiled, which takes a while.";
+  banner(up ? waiting : "Not connected: has beaver-ftc live ended?");
+});
 
 function banner(text) {
   byId("banner").hidden = !text;

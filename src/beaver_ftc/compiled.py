@@ -113,6 +113,7 @@ class _Kernel(CPUDispatcher):
         return self._store and self._store.load(tuple(types), self.targetctx)
 
     def _loaded(self, types):
+        self.targetctx.refresh()
         found = self.stored(types)
         if found is None:
             return None
@@ -276,7 +277,6 @@ class _Store:
 
     def load(self, types, context):
         """What was kept, ready to run; None if there is nothing, or it is not as it was written."""
-        context.refresh()
         try:
             content = self._path(types, context.codegen()).read_bytes()
         except OSError:

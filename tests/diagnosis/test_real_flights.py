@@ -68,8 +68,9 @@ def test_the_same_seed_flies_the_same_flight_and_another_does_not():
 
 
 def test_noise_travels_the_surfaces_little():
-    """Noise times the law's gain is all that moves a surface: the mean of |n' - n| times Kp / G a frame."""
-    still, noisy = (fly(flight(truth, bounds)) for truth, bounds in (({}, {}), CONDITIONS["tactical"]))
+    """Noise times the published law's gain is all that moves a surface: |n' - n| times Kp / G a frame."""
+    law = {"control": {"law": "fault-tolerant-published"}}
+    still, noisy = (fly(flight(truth, bounds, **law)) for truth, bounds in (({}, {}), CONDITIONS["tactical"]))
     added = noisy.surface_travel_rad["elevator"] - still.surface_travel_rad["elevator"]
     sigma, frames, gain = np.radians(0.0208), 1200, 6.0 / 9.0  # (Kp + pitch damping) / |G|, about
     assert 0.0 < added < 2.0 * gain * frames * sigma * 2 / np.sqrt(np.pi)

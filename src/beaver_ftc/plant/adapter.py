@@ -65,7 +65,7 @@ def _load(errors: _Errors, model: Path) -> jsbsim.FGFDMExec:
     folder = model.parent
     places = [str(folder), *(_beside(folder, kind) for kind in ("engine", "systems"))]
     try:
-        loaded = fdm.load_model_with_paths(model.stem, *places, False)  # type: ignore  # its stub lacks the model
+        loaded = fdm.load_model_with_paths(model.stem, *places, False)  # type: ignore  # stub: no model
     except jsbsim.BaseError as error:
         errors.said.append(str(error))
         loaded = False

@@ -14,6 +14,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from math import hypot
 from pathlib import Path
+from shutil import copytree
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
@@ -174,6 +175,9 @@ def _aircraft_with_an_engine(aircraft: Aircraft) -> Iterator[Path]:
         ):
             (root / path).parent.mkdir(parents=True, exist_ok=True)
             (root / path).write_text(content, encoding="utf-8")
+        systems = aircraft.jsbsim.parent / "Systems"
+        if systems.is_dir():
+            copytree(systems, root / "Systems")
         yield root / aircraft.jsbsim.name
 
 

@@ -135,7 +135,7 @@ def test_a_plug_in_that_fails_spoils_only_its_own_line(sweep):
     broken, fine = part["lines"][0], part["lines"][1]
     assert (broken["flights"], broken["failed"]) == (0, 3)
     assert (fine["flights"], fine["failed"], fine["detection_rate"]) == (3, 0, 1.0)
-    assert any("json:JSONDecoder lacks reset and step" in error for error in part["errors"])
+    assert any("json:JSONDecoder" in error for error in part["errors"])
     assert as_text(document)
 
 

@@ -54,12 +54,7 @@ class _Errors(jsbsim.FGLogger):
 def _beside(folder: Path, kind: str) -> str:
     """Where a model's engines or systems are: beside it, or where the jsbsim package keeps shared ones."""
     own = folder / kind.capitalize() if kind == "systems" else folder / "Engines"
-    if own.is_dir():
-        return str(own)
-    try:
-        return str(Path(jsbsim.get_default_root_dir()) / kind)
-    except OSError:  # an installation without JSBSim's own aircraft
-        return str(own)
+    return str(own if own.is_dir() else Path(jsbsim.__file__).parent / kind)
 
 
 def _load(errors: _Errors, model: Path) -> jsbsim.FGFDMExec:

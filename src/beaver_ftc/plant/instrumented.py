@@ -86,7 +86,7 @@ _COMMON = """<?xml version="1.0"?>
 
 def root() -> Path:
     """Where the jsbsim package keeps its aircraft, engines and systems."""
-    return Path(jsbsim.get_default_root_dir())
+    return Path(jsbsim.__file__).parent
 
 
 def engines_of(name: str) -> int:

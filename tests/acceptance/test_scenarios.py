@@ -17,7 +17,9 @@ UNSAID = re.compile(r"\b(None|True|False|nan|inf)\b|[\[{]['\"]|<[\w.]+ object|\w
 
 def _verdicts(text):
     """{scenario: its part of the text}, by the headlines `name: PASSED`."""
-    parts = re.split(r"^([\w-]+): (PASSED|FAILED|flown.*)$", text, flags=re.MULTILINE)
+    parts = re.split(
+        r"^([\w-]+): (PASSED|FAILED|flown[^,\n]*)(?:, the aircraft was LOST)?$", text, flags=re.MULTILINE
+    )
     assert parts[0] == ""
     return {name: (verdict, said) for name, verdict, said in zip(*[iter(parts[1:])] * 3, strict=True)}
 

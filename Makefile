@@ -7,11 +7,12 @@ PYTEST := $(BIN)/python -m pytest -n $(WORKERS) --dist worksteal
 # What a change breaks most often, in less than a minute: what flies little or nothing.
 FAST := tests/aircraft tests/design tests/docs tests/plant tests/results tests/scenario $(wildcard tests/test_re*.py tests/test_arch*.py)
 
-.PHONY: demo test test-fast coverage lint docs site clean help
+.PHONY: demo test acceptance test-fast coverage lint docs site clean help
 
 help:
 	@echo "make demo       set up, fly the published elevator case, print the verdict and where the report lies"
 	@echo "make test       set up and run the whole test suite"
+	@echo "make acceptance the installed command from outside: every scenario, page and mistake"
 	@echo "make test-fast  the tests that fly little or nothing: less than a minute"
 	@echo "make coverage   the whole test suite, and which lines of Python it has run"
 	@echo "make lint       set up and run the linters"
@@ -34,7 +35,10 @@ demo: $(VENV)/.demo
 	@echo "report: runs/elevator-partial-loss/report.html"
 
 test: $(VENV)/.dev
-	$(PYTEST)
+	$(PYTEST) -m "not acceptance"
+
+acceptance: $(VENV)/.dev
+	$(PYTEST) -m acceptance
 
 test-fast: $(VENV)/.dev
 	$(PYTEST) -m "not acceptance" $(FAST)

@@ -1,10 +1,13 @@
-"""The gains of the disturbance-rejecting law, derived: nothing here is tuned on a flight.
+"""The gains of the disturbance-rejecting law, derived from what is declared.
+
+Two numbers are chosen, by flights in turbulence beside the rivals: RATIO below, and the share of an
+actuator's rate that noise may take (`noise_share`). Everything else follows.
 
 One number s sets feedback Kp = s and observer w = RATIO s of a loop. It is the largest that leaves the
 margins asked for with the declared actuator, one JSBSim frame of delay, the frame rate, and the gyro's
 declared lag and delay; and, where gyros are noisy, that moves the surface no faster than a share of its rate
-limit. The plant of a loop is an integrator, the inversion having made it one; `margins` shows what the whole
-aircraft leaves.
+limit. The plant of a loop is an integrator, the inversion having made it one: the margins are those of this
+design loop, with a reserve for the rest of the aircraft.
 
 A loop's response is found a frequency at a time from the equations of rejecting.py, z-transformed.
 """

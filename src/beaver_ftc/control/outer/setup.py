@@ -22,7 +22,7 @@ GAINS = {
     "jammed_s": 1.0,  # rolling is handed to the rudder within about so long
     "authority_s": 1.0,  # a rate is asked for only if it can be had, and ended, within this time
     "bank_s": 6.0,  # and a bank only if it can be left within this time
-    "spare_mps": 4.0, "path_per_mps": 0.02,  # airspeed off before height goes for it, and how much path, rad
+    "spare_mps": 2.0, "path_per_mps": 0.02,  # airspeed off before height goes for it, and how much path, rad
     "loose": 0.4,  # share of the heading loop left when nothing acts in yaw: the turn is then slow to follow
     "protection": 2.0,  # 1/s: how fast the angle of attack may close on its limit
 }  # fmt: skip

@@ -17,7 +17,7 @@ from beaver_ftc.control.laws.state import PITCH, STAND_IN
 from beaver_ftc.control.reference_model import advance
 from beaver_ftc.design.model import QDYN
 
-PATIENCE_S, RETRY_S = 0.5, 20.0
+PATIENCE_S, LONG_PATIENCE_S, RETRY_S = 0.5, 2.0, 20.0
 LEAST_BELIEF = 0.5  # half: what a gain margin of 6 dB forgives
 
 
@@ -59,34 +59,40 @@ def hand_over(control, left):
 
 
 @kernel
+def is_replaced(control, s):
+    """Whether another surface can take the place of surface s."""
+    return s == control.main[PITCH] or s == control.stand_in
+
+
+@kernel
 def hesitate(control, s):
     """Believe no loss worse than LEAST_BELIEF of a surface that has no stand-in.
 
-    A loss found worse than it is would make the loop faster than its margins allow. Where nothing seems to be
-    left the surface is given up as ever.
+    A loss found worse than it is would make the loop faster than its margins allow, or give up a surface that
+    nothing replaces. One that gives less is found at its stop: see `abandon`.
     """
-    replaced = s == control.main[PITCH] or s == control.stand_in
-    if not replaced and control.target[s] >= control.least_effectiveness:
+    fixed = control.target[s] == 0.0 and control.effectiveness[s] == 0.0
+    if not (fixed or is_replaced(control, s)):
         control.target[s] = max(control.target[s], LEAST_BELIEF)
 
 
 @kernel
 def abandon(control, s, suspected):
-    """Give up surface s if it is suspected of a fault and has stood at its stop for PATIENCE_S.
+    """Give up surface s if it is suspected of a fault and has stood at its stop for a while.
 
     It does not give what it is told, and at its stop it is told nothing that would show why: jams, offsets
-    and losses look alike. In trim it shows; after RETRY_S it is tried again.
+    and losses look alike. In trim it shows; where another takes its place, it is tried again after RETRY_S.
     """
     rejection = control.rejection
     rejection.at_stop_s[s] += control.dt
     if not suspected:
         rejection.abandoned[s], rejection.at_stop_s[s] = 0, 0.0
     elif rejection.abandoned[s]:
-        if rejection.at_stop_s[s] > RETRY_S:
+        if rejection.at_stop_s[s] > RETRY_S and is_replaced(control, s):
             rejection.abandoned[s], rejection.at_stop_s[s] = 0, 0.0
     elif not control.saturated[s]:
         rejection.at_stop_s[s] = 0.0
-    elif rejection.at_stop_s[s] > PATIENCE_S:
+    elif rejection.at_stop_s[s] > (PATIENCE_S if is_replaced(control, s) else LONG_PATIENCE_S):
         rejection.abandoned[s], rejection.at_stop_s[s] = 1, 0.0
     if rejection.abandoned[s]:
         control.target[s] = control.effectiveness[s] = 0.0

@@ -17,7 +17,8 @@ from beaver_ftc.control.laws.state import PITCH, STAND_IN
 from beaver_ftc.control.reference_model import advance
 from beaver_ftc.design.model import QDYN
 
-PATIENCE_S, LONG_PATIENCE_S, RETRY_S = 0.5, 2.0, 20.0
+PATIENCE_S, LONG_PATIENCE_S, RETRY_S = 0.5, 1.0, 20.0
+NOTHING_LEFT = 0.05  # half of what the law divides by
 LEAST_BELIEF = 0.5  # half: what a gain margin of 6 dB forgives
 
 
@@ -69,10 +70,10 @@ def hesitate(control, s):
     """Believe no loss worse than LEAST_BELIEF of a surface that has no stand-in.
 
     A loss found worse than it is would make the loop faster than its margins allow, or give up a surface that
-    nothing replaces. One that gives less is found at its stop: see `abandon`.
+    nothing replaces. One that gives less is found at its stop: see `abandon`. Below NOTHING_LEFT it is
+    given up as ever.
     """
-    fixed = control.target[s] == 0.0 and control.effectiveness[s] == 0.0
-    if not (fixed or is_replaced(control, s)):
+    if control.target[s] >= NOTHING_LEFT and not is_replaced(control, s):
         control.target[s] = max(control.target[s], LEAST_BELIEF)
 
 
@@ -91,7 +92,7 @@ def abandon(control, s, suspected):
         if rejection.at_stop_s[s] > RETRY_S and is_replaced(control, s):
             rejection.abandoned[s], rejection.at_stop_s[s] = 0, 0.0
     elif not control.saturated[s]:
-        rejection.at_stop_s[s] = 0.0
+        rejection.at_stop_s[s] = max(rejection.at_stop_s[s] - 1.5 * control.dt, 0.0)  # a dead one swings
     elif rejection.at_stop_s[s] > (PATIENCE_S if is_replaced(control, s) else LONG_PATIENCE_S):
         rejection.abandoned[s], rejection.at_stop_s[s] = 1, 0.0
     if rejection.abandoned[s]:

@@ -85,7 +85,8 @@ def limit(autopilot, control):
         autopilot.limit[i] = min(autopilot.most[i], spare * autopilot.gain.authority_s)
     by_sideslip = autopilot.jammed * autopilot.dihedral * autopilot.airspeed * MOST_SIDESLIP_RAD
     autopilot.limit[ROLL] = max(autopilot.limit[ROLL], by_sideslip)
-    autopilot.bank_limit = min(autopilot.most_bank, autopilot.limit[ROLL] * autopilot.gain.bank_s)
+    steepest = autopilot.most_bank * (1.0 - 0.5 * max(autopilot.jammed, autopilot.loose))
+    autopilot.bank_limit = min(steepest, autopilot.limit[ROLL] * autopilot.gain.bank_s)
 
 
 @kernel

@@ -13,8 +13,7 @@ from beaver_ftc.loop.loop import fly
 from beaver_ftc.plant.channels import TRUTH
 from beaver_ftc.results.metrics import metrics
 from beaver_ftc.results.verdict import facts
-from beaver_ftc.scenario.builtin import builtin_scenarios
-from beaver_ftc.scenario.loader import load_scenario
+from beaver_ftc.scenario.loader import builtin_scenarios, load_scenario
 from flying import Memory, flown, loss, scenario
 
 BUILT_IN = [name for name, _, _ in builtin_scenarios()]

@@ -2,8 +2,8 @@
 
 import pytest
 
-from beaver_ftc.scenario.builtin import builtin_names, builtin_path, builtin_scenarios, resolve
-from beaver_ftc.scenario.loader import load_scenario
+from beaver_ftc.scenario.builtin import builtin_names, builtin_path, resolve
+from beaver_ftc.scenario.loader import builtin_scenarios, load_scenario
 from beaver_ftc.scenario.schema import Expect
 
 REQUIRED = {

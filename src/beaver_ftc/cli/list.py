@@ -32,7 +32,7 @@ def command(
 def _available() -> dict[str, Entries]:
     """Kind -> entries, each a name and a description."""
     from beaver_ftc.plugins import DETECTORS, LAWS
-    from beaver_ftc.scenario.builtin import builtin_scenarios
+    from beaver_ftc.scenario.loader import builtin_scenarios
     from beaver_ftc.scenario.schema import Scenario
 
     schema = Scenario.model_json_schema()["$defs"]

@@ -8,8 +8,9 @@ The linear model is that of f + G u at (x0, y0, u0): the surfaces' moments vary 
 d(G u0)/dy, and f0 + G0 u0 is the acceleration in trim.
 """
 
+from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
 
@@ -25,13 +26,40 @@ from beaver_ftc.design.model import (
 )
 from beaver_ftc.design.terms import MAX_MONOMIALS, N_SIGNALS, free_sum, monomials, signals, surface_sums
 
-if TYPE_CHECKING:
-    from beaver_ftc.scenario.schema import DesignModel
-
 _STEP = 1e-30  # of a complex step: far below rounding, so the derivative is exact to rounding
 
 
-def design_of(model: "DesignModel", aircraft: Aircraft | None = None) -> np.ndarray:
+class WrongInertia(Protocol):
+    """The designer's inertia over the table's."""
+
+    @property
+    def Ix(self) -> float: ...
+    @property
+    def Iy(self) -> float: ...
+    @property
+    def Iz(self) -> float: ...
+    @property
+    def Jxz(self) -> float: ...
+
+
+class WrongModel(Protocol):
+    """What the designer leaves out or gets wrong, as a scenario's `design_model` says it."""
+
+    @property
+    def engine_terms(self) -> bool: ...
+    @property
+    def linearised(self) -> bool: ...
+    @property
+    def frozen_alpha(self) -> bool: ...
+    @property
+    def mass(self) -> float: ...
+    @property
+    def inertia(self) -> WrongInertia: ...
+    @property
+    def coefficients(self) -> Mapping[str, float]: ...
+
+
+def design_of(model: WrongModel, aircraft: Aircraft | None = None) -> np.ndarray:
     """The design record (1,) of a scenario's `design_model`; one tied to the trim wants `anchor` as well."""
     mass = mass_of(model, aircraft)
     design = design_record(aircraft, engine_terms=model.engine_terms, scale=model.coefficients, mass=mass)
@@ -39,7 +67,7 @@ def design_of(model: "DesignModel", aircraft: Aircraft | None = None) -> np.ndar
     return design
 
 
-def mass_of(model: "DesignModel", aircraft: Aircraft | None = None) -> MassProperties:
+def mass_of(model: WrongModel, aircraft: Aircraft | None = None) -> MassProperties:
     """A heavier aircraft of the same shape has its inertia in proportion."""
     nominal = (aircraft or load()).mass
     return replace(

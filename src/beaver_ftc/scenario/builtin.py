@@ -19,17 +19,6 @@ def builtin_path(name: str) -> Path:
     return _folder() / f"{name}.yaml"
 
 
-def builtin_scenarios() -> list[tuple[str, str, Path]]:
-    """(name, description, file) of each built-in scenario."""
-    from beaver_ftc.scenario.loader import load_scenario
-
-    return [
-        (s.name, s.description, builtin_path(name))
-        for name in builtin_names()
-        for s in (load_scenario(name),)
-    ]
-
-
 def resolve(name_or_path: str | Path) -> Path:
     """The file a built-in name stands for; anything else is a path already."""
     given = str(name_or_path)

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from beaver_ftc.errors import suggestion
-from beaver_ftc.scenario.builtin import builtin_names, looks_like_a_path, resolve
+from beaver_ftc.scenario.builtin import builtin_names, builtin_path, looks_like_a_path, resolve
 from beaver_ftc.scenario.consistency import conflicts_in_data
 from beaver_ftc.scenario.document import Document, Problem
 from beaver_ftc.scenario.files import UnreadableError, read_text
@@ -19,6 +19,15 @@ def load_scenario(path_or_name: str | Path) -> Scenario:
     """The scenario in a file or of a built-in name. Raises ScenarioError with one line a mistake."""
     path = resolve(path_or_name)
     return load_text(read_file(path, str(path_or_name)), source=str(path), folder=path.parent)
+
+
+def builtin_scenarios() -> list[tuple[str, str, Path]]:
+    """(name, description, file) of each built-in scenario."""
+    return [
+        (s.name, s.description, builtin_path(name))
+        for name in builtin_names()
+        for s in (load_scenario(name),)
+    ]
 
 
 def load_text(text: str, source: str = "<text>", folder: Path | None = None) -> Scenario:

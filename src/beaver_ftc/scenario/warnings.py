@@ -1,9 +1,12 @@
-"""What a scenario may do although it is unwise: said, never refused."""
+"""What a scenario may do although it is unwise: said, never refused.
+
+scenario: a `schema.Scenario`, not named as such because the schema imports this.
+"""
 
 from collections.abc import Iterator
 from math import pi
+from typing import Any
 
-from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.signals import Chirp
 
 _SEVERITIES = ("none", "light", "moderate", "severe")
@@ -12,12 +15,12 @@ _ROUNDING = 1e-9
 LOWEST_TURBULENCE_M = 609.6  # 2000 ft: below, its scales and strengths are others [MIL-F-8785C, 3.7]
 
 
-def warnings_of(scenario: Scenario) -> tuple[str, ...]:
+def warnings_of(scenario: Any) -> tuple[str, ...]:
     """One line a warning, `key.path: what`."""
     return (*_airspeed(scenario), *_too_fast_for_the_frame(scenario), *_undeclared(scenario))
 
 
-def _undeclared(scenario: Scenario) -> Iterator[str]:
+def _undeclared(scenario: Any) -> Iterator[str]:
     """Errors of the truth that `fdi.bounds` does not cover: an alarm may then have no fault behind it."""
     if scenario.fdi.scheme == "none":
         return
@@ -42,7 +45,7 @@ def _undeclared(scenario: Scenario) -> Iterator[str]:
         yield "uncertainty.cg_m: a displaced centre of gravity is covered by fdi.bounds.constant_rad_s2 only"
 
 
-def _unstructured(scenario: Scenario) -> Iterator[str]:
+def _unstructured(scenario: Any) -> Iterator[str]:
     """Inertia coupling and sinusoids beyond what is admitted of them."""
     bounds, truth, statistical = scenario.fdi.bounds, scenario.uncertainty, scenario.fdi.statistical
     for axis in ("p", "q", "r"):
@@ -64,7 +67,7 @@ def _unstructured(scenario: Scenario) -> Iterator[str]:
             )
 
 
-def _air(scenario: Scenario) -> Iterator[str]:
+def _air(scenario: Any) -> Iterator[str]:
     """Air whose rotation no bound covers."""
     environment = scenario.environment
     if environment.gust is not None and any(environment.gust.velocity_mps):
@@ -76,7 +79,7 @@ def _air(scenario: Scenario) -> Iterator[str]:
         )
 
 
-def _airspeed(scenario: Scenario) -> Iterator[str]:
+def _airspeed(scenario: Any) -> Iterator[str]:
     lowest, highest = scenario.airframe.envelope.airspeed_mps
     airspeed_mps = scenario.initial.airspeed_mps
     if not lowest <= airspeed_mps <= highest:
@@ -86,14 +89,14 @@ def _airspeed(scenario: Scenario) -> Iterator[str]:
         )
 
 
-def _too_fast_for_the_frame(scenario: Scenario) -> Iterator[str]:
+def _too_fast_for_the_frame(scenario: Any) -> Iterator[str]:
     nyquist_hz = scenario.rate_hz / 2
     for path, frequency_hz in _frequencies_hz(scenario):
         if frequency_hz > nyquist_hz:
             yield f"{path}: {frequency_hz:g} Hz is over the Nyquist frequency of rate_hz, {nyquist_hz:g} Hz"
 
 
-def _frequencies_hz(scenario: Scenario) -> Iterator[tuple[str, float]]:
+def _frequencies_hz(scenario: Any) -> Iterator[tuple[str, float]]:
     for axis in ("p", "q", "r"):
         for i, signal in enumerate(getattr(scenario.reference, axis)):
             shape = signal.shape

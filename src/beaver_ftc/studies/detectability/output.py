@@ -8,7 +8,7 @@ from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from beaver_ftc.studies.detectability.survey import DETECT_WITHIN_S, FAULTS, ISOLATE_WITHIN_S, Row
+from beaver_ftc.studies.detectability.grid import DETECT_WITHIN_S, FAULTS, ISOLATE_WITHIN_S, Row
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -4,29 +4,30 @@ from collections.abc import Sequence
 from functools import partial
 from itertools import product
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from beaver_ftc.design.model import AILERON, ELEVATOR, RUDDER
 from beaver_ftc.errors import BadInput, BeaverFtcError
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.detectability.excitation import Excitation, excitation
+from beaver_ftc.studies.detectability.grid import (
+    ALTITUDES_M,
+    DETECT_WITHIN_S,
+    EXCITATIONS,
+    FAULTS,
+    ISOLATE_WITHIN_S,
+    SPEEDS_MPS,
+    Row,
+)
 from beaver_ftc.studies.detectability.mismatch import (
     best_in_window,
     detection_magnitude,
     exclusion_magnitude,
     mismatch,
 )
+from beaver_ftc.studies.detectability.output import write
 from beaver_ftc.studies.engine.flown import Progress, flown
 from beaver_ftc.studies.engine.statistics import quantile
-
-FAULTS = {"aileron": AILERON, "elevator": ELEVATOR, "rudder": RUDDER}
-DETECT_WITHIN_S, ISOLATE_WITHIN_S = 0.5, 1.0
-SPEEDS_MPS, ALTITUDES_M = (36.0, 40.0, 44.0, 48.0, 52.0), (0.0, 1000.0, 2000.0, 3000.0)
-EXCITATIONS = (0.25, 0.5, 1.0, 2.0)  # of the scenario's references
-
-Row = dict[str, Any]
 
 
 def run_survey(
@@ -42,7 +43,6 @@ def run_survey(
     Raises BadInput if another scheme than the sharpened one diagnoses.
     """
     from beaver_ftc.results.writer import result_folder
-    from beaver_ftc.studies.detectability.output import write
 
     _refuse_other_schemes(scenario)
     name = survey_name(scenario)

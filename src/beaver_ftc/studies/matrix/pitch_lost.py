@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from math import degrees
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -11,7 +11,9 @@ from beaver_ftc.studies.engine.columns import Columns
 from beaver_ftc.studies.engine.flown import Progress, flown
 from beaver_ftc.studies.matrix.cases import AIRSPEEDS_MPS, AT_S, REFERENCE, UNCERTAINTY
 from beaver_ftc.studies.matrix.flying import trimmed_deg
+from beaver_ftc.studies.matrix.pitch_cases import LAWS, LOST, SETTLED_S, PitchCase
 from beaver_ftc.studies.matrix.pitch_margins import margins
+from beaver_ftc.studies.matrix.pitch_text import as_text
 
 if TYPE_CHECKING:
     from beaver_ftc.loop.flight import Flight
@@ -20,31 +22,6 @@ if TYPE_CHECKING:
 Document = dict[str, Any]
 NAME = "pitch-lost"
 DURATION_S = 100.0
-SETTLED_S = 30.0  # from here on the swing is judged: what the fault itself throws off is over
-LAWS = ("fault-tolerant-published", "oracle-published")
-
-# Name, elevator's jam off its trim in deg (None: it floats), flap's position in deg.
-LOST: tuple[tuple[str, float | None, float], ...] = (
-    ("elevator at trim", 0.0, 0.0),
-    ("elevator +1 deg", 1.0, 0.0),
-    ("elevator -1 deg", -1.0, 0.0),
-    ("elevator +2 deg", 2.0, 0.0),
-    ("elevator -2 deg", -2.0, 0.0),
-    ("elevator floats", None, 0.0),
-    ("elevator -4 deg", -4.0, 0.0),
-    ("elevator -8 deg", -8.0, 0.0),
-    ("flap 10 deg down", 0.0, 10.0),
-    ("flap 20 deg down", 0.0, 20.0),
-)
-
-
-class PitchCase(NamedTuple):
-    """A pair of faults at one airspeed under one law."""
-
-    lost: str
-    airspeed_mps: float
-    law: str
-
 
 COLUMNS = ("t_s", "q_rad_s", "theta_rad", "phi_rad", "airspeed_mps", "envelope_valid")
 
@@ -127,7 +104,6 @@ def run_pitch_lost(
     """Write `out/pitch-lost/` (table, JSON); return the document."""
     from beaver_ftc.results.metrics import as_json
     from beaver_ftc.results.writer import result_folder
-    from beaver_ftc.studies.matrix.pitch_text import as_text
 
     cases = [PitchCase(name, V, law) for law in LAWS for name, _, _ in LOST for V in airspeeds_mps]
     fly = flown(out / NAME, cases, fly_case, workers=workers, progress=progress)

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from beaver_ftc.studies.matrix.pitch_lost import LAWS, LOST, SETTLED_S
+from beaver_ftc.studies.matrix.pitch_cases import LAWS, LOST, SETTLED_S
 
 Document = dict[str, Any]
 WIDTH = 25

@@ -43,7 +43,17 @@ TABLE = (
     Exempt(r"fgfs .*", "needs FlightGear"),
     Exempt(r"(ray start|srun|sleep|head=).*|.* --ray-address .*", "needs a cluster of several machines"),
     Exempt(r"python benchmarks/.*", "a measurement of minutes to hours, from a checkout"),
-    Exempt(r"python -m tools\.docs", "writes the pages of a checkout anew"),
+    Exempt(r"python -m tools\.(docs|aircraft_table)", "writes the pages of a checkout anew"),
+    Exempt(r"pytest tests/\S+", "a part of this suite, in a checkout"),
+    Exempt(
+        r"(beaver-ftc live(?: \S+)?)( --open)?",
+        "flies until it is ended, which the page's test does (tests/live): its address",
+        r"timeout --signal=INT 20 \1 | grep live:.http",
+    ),
+    Exempt(
+        r"beaver-ftc compare --flights FOLDER.*",
+        "needs the recorded flights, which are not of this project (tests/flights has some of its own)",
+    ),
     Exempt(
         r"beaver-ftc compare --tune( --errors)?",
         "a search of minutes, which tests/compare does on few flights",

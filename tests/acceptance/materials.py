@@ -6,6 +6,8 @@ from pathlib import Path
 
 import yaml
 
+from flights.synthetic import fly, write_csv
+
 from .documents import yaml_blocks
 from .installation import ROOT, Installation
 
@@ -21,6 +23,8 @@ def lay_out(line: str, folder: Path, installation: Installation) -> None:
     for pattern, put in _MATERIALS.items():
         if re.search(pattern, line):
             put(folder)
+    if "--model wing.json" in line:
+        _identified(folder, installation)
     for name in re.findall(r"\bruns/([\w-]+)", line):
         if line.startswith("beaver-ftc compare"):
             _fly(name, folder, installation)
@@ -78,6 +82,19 @@ def _mine(folder: Path) -> None:
     )
 
 
+def _recorded_flights(folder: Path) -> None:
+    """A healthy flight and one with half of the right elevon lost, of a wing made of known equations."""
+    shutil.copy(ROOT / "examples/recorded-flights/flying-wing.yaml", folder)
+    write_csv(folder / "healthy.csv", fly())
+    write_csv(folder / "suspect.csv", fly(seed=2, parts=[(60.0, 120.0, 0.5, 1.0)]))
+
+
+def _identified(folder: Path, installation: Installation) -> None:
+    """The model that the page's command before makes."""
+    given = "identify healthy.csv --vehicle flying-wing.yaml --out wing.json"
+    assert installation.beaver(*given.split(), cwd=folder).returncode == 0
+
+
 def _copy(relative: str):
     return lambda folder: shutil.copytree(ROOT / relative, folder / relative)
 
@@ -88,6 +105,7 @@ _MATERIALS = {
     r"\bmy[-.]sweep\b": _my_sweep,
     r"\bscenarios/": _scenarios,
     r"\bbrief\.yaml\b|^pytest$": _brief,
+    r"\b(healthy|suspect)\.csv\b": _recorded_flights,
     r"\bmine:": _mine,
     r"\baircraft/": _copy("aircraft"),
     r"\bdocs/": _copy("docs"),

@@ -20,19 +20,23 @@ LAW_NAMES = ("indi", "l1-adaptive", "lqr")
 
 
 class Linear:
-    """A design model xdot = A x + G u."""
+    """A design model xdot = A x + G u; order: which surface stands in each place."""
+
+    def __init__(self, order=(0, 1, 2, 3)):
+        self.order = list(order)
 
     def f(self, x, y):
         return A @ x
 
     def G(self, y):
-        return G
+        return G[:, self.order]
 
 
-def context(**options):
+def context(order=(0, 1, 2, 3), trim_rad=(0.0, 0.0, 0.0, 0.0), **options):
     travel = np.array([[-0.5] * 4, [0.5] * 4])
-    return Context(DT, 1, Linear(), np.zeros(3), np.zeros(5), np.zeros(4), travel, np.zeros(3), np.zeros(3),
-                   options=options)  # fmt: skip
+    return Context(DT, 1, Linear(order), np.zeros(3), np.zeros(5), np.array(trim_rad)[list(order)], travel,
+                   np.zeros(3), np.zeros(3), options=options,
+                   leading=tuple(order.index(s) for s in range(3)))  # fmt: skip
 
 
 def loop(name, effectiveness=1.0, disturbance=0.0, duration_s=20.0, **options):
@@ -50,6 +54,22 @@ def loop(name, effectiveness=1.0, disturbance=0.0, duration_s=20.0, **options):
         x = x + DT * (A @ x + effectiveness * (G @ u) + disturbance)
         u = command
     return np.array(errors)
+
+
+@pytest.mark.parametrize("name", LAW_NAMES)
+@pytest.mark.parametrize("order", [(3, 2, 1, 0), (1, 3, 0, 2)])
+def test_which_surface_leads_an_axis_is_not_a_matter_of_its_place(name, order):
+    law, other = plugin_class(LAWS, name)(), plugin_class(LAWS, name)()
+    law.reset(context(trim_rad=(0.01, -0.02, 0.03, 0.04)))
+    other.reset(context(order, trim_rad=(0.01, -0.02, 0.03, 0.04)))
+    rng = np.random.default_rng(2)
+    for k in range(20):
+        x, acceleration = rng.normal(size=(2, 3)) * 0.01
+        seen = (k * DT, x, np.zeros(5), acceleration, np.zeros((3, 4)), np.zeros(3))
+        asked = Reference(np.full(3, 0.02), np.full(3, 0.02), np.zeros(3))
+        given = law.step(Measured(*seen), asked, Verdict())
+        assert other.step(Measured(*seen), asked, Verdict()) == pytest.approx(given[list(order)], abs=1e-12)
+        assert given[3] == pytest.approx(0.04, abs=1e-12)
 
 
 @pytest.mark.parametrize("name", LAW_NAMES)

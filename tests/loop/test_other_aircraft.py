@@ -14,6 +14,7 @@ from beaver_ftc.loop.loop import fly
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.state import FlightState
 from beaver_ftc.plant.trim import trim
+from beaver_ftc.plugins import DETECTORS, LAWS, registered
 from beaver_ftc.scenario.loader import load_scenario, load_text
 
 FOLDER = Path(__file__).parents[1] / "data" / "aircraft"
@@ -122,3 +123,22 @@ def test_pairs_are_refused_where_there_is_no_pair():
 
 def test_the_file_of_the_flight_is_a_scenario():
     assert load_scenario(FLIGHT).airframe.name == "trainer"
+
+
+LOST = {"type": "loss_of_effectiveness", "actuator": "elevator", "magnitude": 0.6, "at_s": 10.0}
+RUNS_AWAY = {"type": "hardover", "actuator": "elevator", "direction": 1, "at_s": 10.0}
+
+
+@pytest.mark.parametrize("scheme", sorted(set(registered(DETECTORS)) - {"none"}))
+def test_every_detector_names_its_elevator(scheme):
+    fault = RUNS_AWAY if scheme == "rls-monitor" else LOST  # without a model, a loss is learnt as it comes
+    flight = fly(quiet(faults=[fault], **{"fdi.scheme": scheme}))
+    assert flight.detection_time_s is not None
+    assert flight.detection_time_s >= 10.0
+    assert flight.isolated == "elevator"
+
+
+@pytest.mark.parametrize("law", registered(LAWS))
+def test_every_law_flies_it(law):
+    flight = fly(quiet(**{"control.law": law}))
+    assert flight.departure is None

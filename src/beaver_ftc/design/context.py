@@ -101,6 +101,7 @@ class Context:
     travel_rad (2, 4): lower and upper stops. constant_rad_s2 (3,), inertia_coupling (3,): declared bounds of
     the uncertainty. seed: of everything random. options: `fdi.options` or `control.options` of the scenario.
     declared: instruments, air and tolerances, as far as `fdi.bounds` declares them, and the actuators.
+    surfaces: their names. leading: which of them leads roll, pitch and yaw.
     """
 
     dt_s: float
@@ -115,4 +116,10 @@ class Context:
     seed: int = 0
     options: Mapping[str, float] = field(default_factory=dict)
     surfaces: tuple[str, ...] = field(default_factory=lambda: load().surfaces)
+    leading: tuple[int, int, int] = (0, 1, 2)
     declared: Declared = field(default_factory=Declared)
+
+    @property
+    def leaders(self) -> tuple[str, ...]:
+        """Names of the surfaces that lead roll, pitch and yaw."""
+        return tuple(self.surfaces[s] for s in self.leading)

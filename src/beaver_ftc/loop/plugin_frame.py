@@ -173,6 +173,7 @@ def context_of(
         inertia_coupling=fdi["bound"]["inertia"].copy(),
         seed=scenario.seed,
         surfaces=scenario.airframe.surfaces,
+        leading=(int(control["main"][0]), int(control["main"][1]), int(control["main"][2])),
         options=dict(options),
         declared=declared_of(
             scenario.fdi.bounds,

@@ -14,7 +14,7 @@ from typing import ClassVar
 import numpy as np
 
 from beaver_ftc.control.base import Reference
-from beaver_ftc.control.rivals.tracking import GAINS, Demand, limited, with_flap
+from beaver_ftc.control.rivals.tracking import GAINS, Demand, limited, with_others
 from beaver_ftc.design.context import Context
 from beaver_ftc.diagnosis.base import Measured, Verdict
 from beaver_ftc.diagnosis.rivals.options import options_of
@@ -49,8 +49,10 @@ class IncrementalInversion:
         self.demand = Demand(context, self.option)
         pole, dt = self.option["filter_per_s"], context.dt_s
         self.acceleration = LowPass(pole, dt, np.zeros(3))
-        self.command = LowPass(pole, dt, context.trim_rad[:3])
-        self.given = [context.trim_rad[:3].copy()] * (DELAY_FRAMES + 1)
+        self.leading = list(context.leading)
+        trim = context.trim_rad[self.leading]
+        self.command = LowPass(pole, dt, trim)
+        self.given = [trim] * (DELAY_FRAMES + 1)
         self.before: np.ndarray | None = None
         self.saturated = False
 
@@ -60,10 +62,10 @@ class IncrementalInversion:
         xdot0 = self.acceleration.step((measured.x - before) / self.context.dt_s)
         u0 = self.command.step(self.given[-DELAY_FRAMES])
         nu = self.demand.of(measured, reference, self.saturated)
-        G = self.context.model.G(measured.y)[:, :3]
-        wanted = with_flap(u0 + np.linalg.solve(G, nu - xdot0), self.context)
+        G = self.context.model.G(measured.y)[:, self.leading]
+        wanted = with_others(u0 + np.linalg.solve(G, nu - xdot0), self.context)
         command = limited(wanted, self.context)
         self.saturated = bool((command != wanted).any())
         self.before = measured.x
-        self.given = [*self.given[1:], command[:3]]
+        self.given = [*self.given[1:], command[self.leading]]
         return command

@@ -13,7 +13,7 @@ from typing import ClassVar
 import numpy as np
 
 from beaver_ftc.control.base import Reference
-from beaver_ftc.control.rivals.tracking import GAINS, Demand, limited, with_flap
+from beaver_ftc.control.rivals.tracking import GAINS, Demand, limited, with_others
 from beaver_ftc.design.context import Context
 from beaver_ftc.diagnosis.base import Measured, Verdict
 from beaver_ftc.diagnosis.rivals.options import options_of
@@ -59,10 +59,10 @@ class L1Adaptive:
             self.compensated = self.filter * self.compensated + (1.0 - self.filter) * sigma
         self.before = measured.x
         nu = self.demand.of(measured, reference, self.saturated)
-        model, trim = self.context.model, self.context.trim_rad
-        G = model.G(measured.y)
-        rest = nu - model.f(measured.x, measured.y) - self.compensated - G[:, 3] * trim[3]
-        wanted = with_flap(np.linalg.solve(G[:, :3], rest), self.context)
+        model, G = self.context.model, self.context.model.G(measured.y)
+        others = G @ with_others(np.zeros(3), self.context)
+        rest = nu - model.f(measured.x, measured.y) - self.compensated - others
+        wanted = with_others(np.linalg.solve(G[:, self.context.leading], rest), self.context)
         command = limited(wanted, self.context)
         self.saturated = bool((command != wanted).any())
         return command

@@ -12,7 +12,7 @@ from typing import ClassVar
 import numpy as np
 
 from beaver_ftc.control.base import Reference
-from beaver_ftc.control.rivals.tracking import limited, with_flap
+from beaver_ftc.control.rivals.tracking import limited, with_others
 from beaver_ftc.design.context import Context
 from beaver_ftc.diagnosis.base import Measured, Verdict
 from beaver_ftc.diagnosis.rivals.options import options_of
@@ -58,7 +58,8 @@ class FixedGainLqr:
         needed = reference.acceleration - self.A @ (reference.rate - context.trim_x)
         ahead = np.linalg.solve(self.B, needed)
         back = self.K @ np.concatenate((error, self.integral))
-        wanted = with_flap(context.trim_rad[:3] + ahead + back, context)
+        trim = context.trim_rad[list(context.leading)]
+        wanted = with_others(trim + ahead + back, context)
         command = limited(wanted, context)
         self.saturated = bool((command != wanted).any())
         return command
@@ -69,4 +70,4 @@ def linearised(context: Context) -> tuple[np.ndarray, np.ndarray]:
     model, x, y = context.model, context.trim_x, context.trim_y
     steps = np.eye(3) * _STEP
     A = np.column_stack([(model.f(x + s, y) - model.f(x - s, y)) / (2.0 * _STEP) for s in steps])
-    return A, model.G(y)[:, :3]
+    return A, model.G(y)[:, context.leading]

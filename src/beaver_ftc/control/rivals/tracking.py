@@ -2,7 +2,8 @@
 
     nu = xm' + Kp e + Ki int e,   e = xm - x        [the built-in laws' own, with their default gains]
 
-so that the laws differ in what they make of the demand, not in what they demand. The flap stays in trim.
+so that the laws differ in what they make of the demand, not in what they demand. Only the surfaces that lead
+roll, pitch and yaw move; the others stay in trim.
 """
 
 import numpy as np
@@ -31,10 +32,12 @@ class Demand:
 
 
 def limited(deflections: np.ndarray, context: Context) -> np.ndarray:
-    """(4,) rad, within the travel."""
+    """(surfaces,) rad, within the travel."""
     return np.clip(deflections, context.travel_rad[0], context.travel_rad[1])
 
 
-def with_flap(three: np.ndarray, context: Context) -> np.ndarray:
-    """Aileron, elevator, rudder (3,) rad and the flap of the trim: (4,) rad."""
-    return np.append(three, context.trim_rad[3])
+def with_others(three: np.ndarray, context: Context) -> np.ndarray:
+    """The leaders of roll, pitch and yaw at (3,) rad, all others in trim: (surfaces,) rad."""
+    deflections = context.trim_rad.copy()
+    deflections[list(context.leading)] = three
+    return deflections

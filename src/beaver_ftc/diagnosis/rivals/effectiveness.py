@@ -1,6 +1,6 @@
 """What the effectiveness filters share: the augmented state, its noise, and how it names a fault.
 
-    z = (p, q, r, theta_aileron, theta_elevator, theta_rudder)
+    z = (p, q, r, theta of the surface that leads roll, pitch, yaw)
     x[k+1] = x[k] + dt (f + G u + sum_s theta_s G_s u_s),     theta[k+1] = theta[k] + a random walk
 
 theta is the lost effectiveness of the fault class [Zhang2005, eq. (4)]. The declared bound on the
@@ -20,8 +20,7 @@ from beaver_ftc.diagnosis.rivals.air import Air, rate_variance, unexplained
 from beaver_ftc.diagnosis.rivals.kalman import update
 from beaver_ftc.diagnosis.rivals.options import options_of
 
-SURFACES = ("aileron", "elevator", "rudder")
-N = 3 + len(SURFACES)
+N = 6
 DEFAULTS = {
     "noise": 3.0,  # standard deviation of the acceleration error over its declared bound
     "drift_per_s": 0.1,  # random walk of theta, 1/sqrt(s)
@@ -40,6 +39,7 @@ class EffectivenessFilter:
     def reset(self, context: Context) -> None:
         """Start healthy, with theta known to a tenth."""
         self.context, self.option = context, options_of(self.name, self.defaults, context)
+        self.leading = list(context.leading)
         self.air = Air(context)
         self.n = N + self.air.n
         rates = rate_variance(context.declared, self.option["measurement_rad_s"])
@@ -88,11 +88,11 @@ class EffectivenessFilter:
         self.detected = self.detected or statistic > 1.0
         if not self.detected:
             return Verdict(statistic=statistic)
-        effectiveness = np.ones(4)
-        effectiveness[:3] += np.clip(self.z[3:N], -1.0, 0.0)
+        effectiveness = np.ones(len(self.context.surfaces))
+        effectiveness[self.leading] += np.clip(self.z[3:N], -1.0, 0.0)
         worst = int(np.argmax(self.significance()))
         if self.square > 3.0 * self.option["misfit"] or self.z[3 + worst] > 0.0:
             return Verdict(True, None, "unanticipated", "unanticipated", None, None, statistic)
-        theta = float(effectiveness[worst] - 1.0)
-        axis = "pqr"[worst]
-        return Verdict(True, axis, SURFACES[worst], "loss_of_effectiveness", theta, effectiveness, statistic)
+        surface = self.leading[worst]
+        theta, name = float(effectiveness[surface] - 1.0), self.context.surfaces[surface]
+        return Verdict(True, "pqr"[worst], name, "loss_of_effectiveness", theta, effectiveness, statistic)

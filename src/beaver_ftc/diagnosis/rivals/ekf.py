@@ -23,7 +23,7 @@ class AugmentedEkf(EffectivenessFilter):
         """z- = g(z), P- = F P F' + Q with the Jacobian F at the estimate."""
         F = self.jacobian(measured)
         dt = self.context.dt_s
-        self.z[:3] += dt * (measured.acceleration + measured.contribution[:, :3] @ self.z[3:N])
+        self.z[:3] += dt * (measured.acceleration + measured.contribution[:, self.leading] @ self.z[3:N])
         if self.air.n:
             self.z[:3] += self.air.effect @ self.z[N:]
             self.z[N:] *= self.air.keep
@@ -37,7 +37,7 @@ class AugmentedEkf(EffectivenessFilter):
         step = _STEP * np.eye(3)
         there = f(np.concatenate((measured.x + step, measured.x - step)), y)
         F[:3, :3] += dt * (there[:3] - there[3:]).T / (2.0 * _STEP)
-        F[:3, 3:N] = dt * measured.contribution[:, :3]
+        F[:3, 3:N] = dt * measured.contribution[:, self.leading]
         F[:3, N:] = self.air.effect
         F[range(N, self.n), range(N, self.n)] = self.air.keep
         return F

@@ -16,12 +16,11 @@ from beaver_ftc.diagnosis.rivals.air import Air, rate_variance, unexplained
 from beaver_ftc.diagnosis.rivals.kalman import log_likelihood, update
 from beaver_ftc.diagnosis.rivals.options import options_of
 
-SURFACES = ("aileron", "elevator", "rudder")
 LEVELS = (-0.25, -0.5, -0.9)
 MODES = (
     (None, 0.0),
     *((s, level) for s in range(3) for level in LEVELS),
-)  # (surface, theta); the last one is noise
+)  # (leader of roll, pitch or yaw, theta); the last one is noise
 N_MODES = len(MODES) + 1
 _LEAST = 1e-12  # no probability below it: a mode must be able to come back
 
@@ -106,9 +105,9 @@ class InteractingMultipleModels:
     def accelerations(self, measured: Measured) -> np.ndarray:
         """What each hypothesis makes of the elapsed frame, (M, 3) rad/s2."""
         each = np.tile(measured.acceleration, (N_MODES, 1))
-        for m, (surface, theta) in enumerate(MODES):
-            if surface is not None:
-                each[m] += theta * measured.contribution[:, surface]
+        for m, (leader, theta) in enumerate(MODES):
+            if leader is not None:
+                each[m] += theta * measured.contribution[:, self.context.leading[leader]]
         return each
 
     def verdict(self) -> Verdict:
@@ -124,7 +123,9 @@ class InteractingMultipleModels:
             return Verdict(True, None, "unanticipated", "unanticipated", statistic=statistic)
         worst = int(np.argmax(likely))
         if likely[worst] < self.option["isolate"]:
-            left = tuple(s for s, p in zip(SURFACES, likely, strict=True) if p > 1.0 - self.option["isolate"])
+            least = 1.0 - self.option["isolate"]
+            left = tuple(s for s, p in zip(self.context.leaders, likely, strict=True) if p > least)
             return Verdict(True, "pqr"[worst], statistic=statistic, candidates=left)
         theta = float(known[worst] @ LEVELS / likely[worst])
-        return Verdict(True, "pqr"[worst], SURFACES[worst], "loss_of_effectiveness", theta, None, statistic)
+        name = self.context.leaders[worst]
+        return Verdict(True, "pqr"[worst], name, "loss_of_effectiveness", theta, None, statistic)

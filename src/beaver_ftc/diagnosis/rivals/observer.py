@@ -23,8 +23,6 @@ from beaver_ftc.design.context import Context
 from beaver_ftc.diagnosis.base import Measured, Verdict
 from beaver_ftc.diagnosis.rivals.options import options_of
 
-SURFACES = ("aileron", "elevator", "rudder")
-
 
 class Fit:
     """Fading sums of residual and regressors, and what each surface makes of them.
@@ -71,6 +69,7 @@ class ConstantThresholdObserver:
     def reset(self, context: Context) -> None:
         """No residual."""
         self.option = options_of(self.name, self.defaults, context)
+        self.leading, self.leaders = list(context.leading), context.leaders
         pole = self.option["pole_per_s"]
         self.dt, self.a = context.dt_s, exp(-pole * context.dt_s)
         # a declared bound of zero would make any rounding an alarm
@@ -89,7 +88,7 @@ class ConstantThresholdObserver:
             innovation = measured.x - self.before - self.dt * measured.acceleration
             self.eps = self.a * self.eps + innovation
             self.since = self.a * self.since + innovation
-            self.Omega = self.a * self.Omega + self.dt * measured.contribution[:, :3]
+            self.Omega = self.a * self.Omega + self.dt * measured.contribution[:, self.leading]
         self.before = measured.x
         share = np.abs(self.eps) / self.scale
         statistic = float(share.max())
@@ -108,4 +107,4 @@ class ConstantThresholdObserver:
         s, theta, misfit = self.fit.best()
         if misfit > 1.0:
             return Verdict(True, self.axis, "unanticipated", "unanticipated")
-        return Verdict(True, self.axis, SURFACES[s], "loss_of_effectiveness", theta)
+        return Verdict(True, self.axis, self.leaders[s], "loss_of_effectiveness", theta)

@@ -17,8 +17,6 @@ from beaver_ftc.diagnosis.base import Measured, Verdict
 from beaver_ftc.diagnosis.rivals.least_squares import RecursiveLeastSquares
 from beaver_ftc.diagnosis.rivals.options import options_of
 
-PAIRS = (("aileron", 0, "p"), ("elevator", 1, "q"), ("rudder", 2, "r"))
-
 
 class Pair:
     """One input, one output: y[k] from y[k-1], y[k-2], u[k-1], u[k-2] and a constant."""
@@ -58,20 +56,21 @@ class RlsMonitor:
         forgetting = exp(-context.dt_s / self.option["forgetting_s"])
         fade = exp(-context.dt_s / self.option["score_s"])
         floor = np.hypot(self.option["floor_rad_s"], context.declared.gyro_rad_s)
-        self.pairs = [Pair(forgetting, fade, float(floor[i])) for _, i, _ in PAIRS]
+        self.pairs = [Pair(forgetting, fade, float(floor[i])) for i in range(3)]
+        self.leading, self.leaders = context.leading, context.leaders
         self.verdict = Verdict()
 
     def step(self, measured: Measured, command: np.ndarray) -> Verdict:
         """Score every pair; the first beyond the limit is the fault."""
         scores = [
-            pair.step(float(command[i]), float(measured.x[i]))
-            for pair, (_, i, _) in zip(self.pairs, PAIRS, strict=True)
+            pair.step(float(command[s]), float(rate))
+            for pair, s, rate in zip(self.pairs, self.leading, measured.x, strict=True)
         ]
         if measured.t_s < self.option["warm_up_s"]:
             return Verdict(statistic=0.0)
         worst = int(np.argmax(scores))
         statistic = scores[worst] / self.option["alarm"]
         if statistic > 1.0 and not self.verdict.detected:
-            surface, _, axis = PAIRS[worst]
-            self.verdict = Verdict(True, axis, surface, candidates=(surface,))
+            surface = self.leaders[worst]
+            self.verdict = Verdict(True, "pqr"[worst], surface, candidates=(surface,))
         return self.verdict._replace(statistic=statistic)

@@ -36,7 +36,7 @@ class AugmentedUkf(EffectivenessFilter):
         dt, f = self.context.dt_s, self.context.model.f
         moved = points.copy()
         away = f(points[:, :3], measured.y) - f(measured.x, measured.y)
-        loss = np.array([measured.contribution[:, :3] @ point[3:N] for point in points])
+        loss = np.array([measured.contribution[:, self.leading] @ point[3:N] for point in points])
         moved[:, :3] += dt * (measured.acceleration + away + loss)
         if self.air.n:
             moved[:, :3] += points[:, N:] @ self.air.effect.T

@@ -1,5 +1,6 @@
 """What all tests share: the helpers of tests/flying.py, and property tests that repeat themselves."""
 
+import os
 import sys
 from pathlib import Path
 
@@ -17,7 +18,8 @@ def pytest_sessionstart(session):
     from beaver_ftc.compiled import cache_folder
 
     folder = cache_folder()
-    if hasattr(session.config, "workerinput") or folder is None or (folder / "warm").exists():
+    worker, plain = hasattr(session.config, "workerinput"), os.environ.get("NUMBA_DISABLE_JIT", "0") != "0"
+    if worker or plain or folder is None or (folder / "warm").exists():
         return
     from beaver_ftc.control.rivals.indi import IncrementalInversion
     from beaver_ftc.diagnosis.rivals.rls import RlsMonitor

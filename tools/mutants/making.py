@@ -1,0 +1,131 @@
+"""Mutants of a module: every small change that can be made in it, each as new source."""
+
+import ast
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+ARITHMETIC = {
+    ast.Add: (ast.Sub,),
+    ast.Sub: (ast.Add,),
+    ast.Mult: (ast.Div,),
+    ast.Div: (ast.Mult,),
+    ast.FloorDiv: (ast.Mult,),
+    ast.Mod: (ast.Mult,),
+    ast.Pow: (ast.Mult,),
+}
+COMPARISONS = {
+    ast.Lt: (ast.LtE, ast.GtE),
+    ast.LtE: (ast.Lt, ast.Gt),
+    ast.Gt: (ast.GtE, ast.LtE),
+    ast.GtE: (ast.Gt, ast.Lt),
+    ast.Eq: (ast.NotEq,),
+    ast.NotEq: (ast.Eq,),
+    ast.In: (ast.NotIn,),
+    ast.NotIn: (ast.In,),
+    ast.Is: (ast.IsNot,),
+    ast.IsNot: (ast.Is,),
+}
+FUNCTIONS = {"min": "max", "max": "min", "any": "all", "all": "any"}
+
+
+@dataclass(frozen=True)
+class Mutant:
+    """One change of a module: which node, in the order of a walk, and which of its changes."""
+
+    file: Path
+    place: int
+    number: int
+    kind: str
+    lines: tuple[int, int]  # of the node, and of the statement it is in
+    before: str
+    after: str
+
+    def source(self) -> str:
+        """The whole module with the change made."""
+        tree = ast.parse(self.file.read_text())
+        target = list(ast.walk(tree))[self.place]
+        _, new = list(_changes(target))[self.number]
+        changed = ast.fix_missing_locations(_Replace(target, new).visit(tree))
+        return ast.unparse(changed)
+
+
+def mutants(file: Path) -> list[Mutant]:
+    """All of a module."""
+    tree = ast.parse(file.read_text())
+    apart, statement = _no_code(tree), _statements(tree)
+    return [
+        Mutant(file, place, number, kind, (node.lineno, statement[node]), ast.unparse(node), ast.unparse(new))
+        for place, node in enumerate(ast.walk(tree))
+        if node in statement and node not in apart
+        for number, (kind, new) in enumerate(_changes(node))
+    ]
+
+
+def _no_code(tree: ast.Module) -> set[ast.AST]:
+    """What is within annotations and decorators."""
+    roots = []
+    for node in ast.walk(tree):
+        roots += [getattr(node, "annotation", None), getattr(node, "returns", None)]
+        roots += getattr(node, "decorator_list", [])
+    return {inner for root in roots if root is not None for inner in ast.walk(root)}
+
+
+def _statements(tree: ast.Module) -> dict[ast.AST, int]:
+    """The first line of the innermost statement around each node that has a line."""
+    found: dict[ast.AST, int] = {}
+    for outer in ast.walk(tree):
+        if isinstance(outer, ast.stmt):
+            found |= {node: outer.lineno for node in ast.walk(outer) if hasattr(node, "lineno")}
+    return found
+
+
+class _Replace(ast.NodeTransformer):
+    def __init__(self, target: ast.AST, new: ast.AST) -> None:
+        self._target, self._new = target, new
+
+    def visit(self, node: ast.AST) -> ast.AST:
+        return self._new if node is self._target else self.generic_visit(node)
+
+
+def _changes(node: ast.AST) -> Iterator[tuple[str, ast.AST]]:
+    """What could be there instead of this node: (kind, new node)."""
+    match node:
+        case ast.UnaryOp(op=ast.USub()):
+            yield "sign", node.operand
+        case ast.UnaryOp(op=ast.Not()):
+            yield "operator", node.operand
+        case ast.BinOp():
+            for other in ARITHMETIC.get(type(node.op), ()):
+                yield "operator", ast.BinOp(node.left, other(), node.right)
+        case ast.AugAssign(op=ast.Add()):
+            yield "sign", ast.AugAssign(node.target, ast.Sub(), node.value)
+        case ast.BoolOp():
+            other = ast.Or() if isinstance(node.op, ast.And) else ast.And()
+            yield "operator", ast.BoolOp(other, node.values)
+        case ast.Compare(ops=[op]):
+            for other in COMPARISONS.get(type(op), ()):
+                yield "comparison", ast.Compare(node.left, [other()], node.comparators)
+        case ast.Subscript(slice=ast.Constant(value=int(at))) if not isinstance(at, bool):
+            other = ast.Constant(at - 1 if at > 0 else at + 1)
+            yield "index", ast.Subscript(node.value, other, node.ctx)
+        case ast.Constant(value=bool(value)):
+            yield "constant", ast.Constant(not value)
+        case ast.Constant(value=int(value)):
+            yield "constant", ast.Constant(value + 1)
+        case ast.Constant(value=float(value)):
+            yield "constant", ast.Constant(2.0 * value if value else 1.0)
+        case ast.Call(func=ast.Name(id=name)) if name in FUNCTIONS:
+            yield "operator", ast.Call(ast.Name(FUNCTIONS[name], ast.Load()), node.args, node.keywords)
+    if _is_of_effect(node):
+        yield "line", ast.Pass()
+
+
+def _is_of_effect(node: ast.AST) -> bool:
+    """A line without which the others still run: a local name left unset would be found by any test."""
+    match node:
+        case ast.Assign(targets=[ast.Subscript() | ast.Attribute()]) | ast.AugAssign():
+            return True
+        case ast.Expr(value=ast.Call()):
+            return True
+    return False

@@ -1,0 +1,94 @@
+"""Which tests execute a line, and how long each of them takes."""
+
+import hashlib
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import coverage
+import pytest
+
+ROOT = Path(__file__).parents[2]
+SLOW_S = 0.8  # a test that takes longer in plain Python is none for this: hundreds of mutants run
+KEPT = ROOT / ".mutants"
+
+
+def reach(folder: str) -> dict:
+    """The tests of a folder: {"seconds": {test: s}, "lines": {file: {line: [tests]}}}.
+
+    A line with no test ran when its module was imported. Kept until a file changes.
+    """
+    kept = KEPT / f"{folder}-{_digest(folder)}.json"
+    if not kept.exists():
+        for old in KEPT.glob(f"{folder}-*.json"):
+            old.unlink()
+        subprocess.run([sys.executable, "-m", "tools.mutants.reach", folder, str(kept)], cwd=ROOT, check=True)
+    return json.loads(kept.read_text())
+
+
+def _digest(folder: str) -> str:
+    files = [*sorted((ROOT / "src").rglob("*.py")), *sorted((ROOT / "tests" / folder).rglob("*.py"))]
+    return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()[:16]
+
+
+def _measured(folder: str) -> dict:
+    watch = coverage.Coverage(data_file=None, source_pkgs=["beaver_ftc"], config_file=False)
+    timed = _Timed(watch)
+    arguments = ["-q", "-p", "no:cacheprovider", "-m", "not acceptance", "--tb=no", "-rN"]
+    with watch.collect():
+        pytest.main([*arguments, str(ROOT / "tests" / folder)], plugins=[timed])
+    data, lines = watch.get_data(), {}
+    for file in data.measured_files():
+        name = Path(file).relative_to(ROOT).as_posix()
+        by_line = data.contexts_by_lineno(file).items()
+        lines[name] = {line: [t for t in tests if t in timed.seconds] for line, tests in by_line}
+    return {"seconds": timed.seconds, "lines": lines}
+
+
+class _Timed:
+    """Notes for each test that passes how long it took, and gives up one that is slow."""
+
+    def __init__(self, watch: coverage.Coverage) -> None:
+        self._watch = watch
+        self.seconds: dict[str, float] = {}
+
+    @pytest.hookimpl(wrapper=True)
+    def pytest_runtest_protocol(self, item: pytest.Item) -> Iterator[None]:
+        self._watch.switch_context(item.nodeid)
+        self._start = time.process_time()
+        with limit(SLOW_S):
+            return (yield)
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        if report.when == "call" and report.passed:
+            self.seconds[report.nodeid] = round(time.process_time() - self._start, 4)
+        elif report.failed:
+            self.seconds.pop(report.nodeid, None)
+
+
+class limit:  # noqa: N801  # a context manager
+    """End what runs inside as a skipped test after so many seconds of processor."""
+
+    def __init__(self, seconds: float) -> None:
+        self._seconds = seconds
+
+    def __enter__(self) -> None:
+        signal.signal(signal.SIGPROF, self._give_up)
+        signal.setitimer(signal.ITIMER_PROF, self._seconds)
+
+    def __exit__(self, *_) -> None:
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
+
+    def _give_up(self, *_) -> None:
+        pytest.skip("takes too long for this", allow_module_level=True)
+
+
+if __name__ == "__main__":
+    os.environ["NUMBA_DISABLE_JIT"] = "1"
+    KEPT.mkdir(exist_ok=True)
+    Path(sys.argv[2]).write_text(json.dumps(_measured(sys.argv[1])))

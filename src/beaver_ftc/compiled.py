@@ -14,6 +14,7 @@ it calls. Numba itself does it again at each level.
 # mypy: disable-error-code="attr-defined"
 import contextlib
 import functools
+import gc
 import hashlib
 import os
 import pickle
@@ -22,7 +23,6 @@ import threading
 from collections.abc import Iterator
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
 
 import numba
 import numpy as np
@@ -33,7 +33,7 @@ from numba.core.compiler_lock import global_compiler_lock
 from numba.core.cpu import CPUContext
 from numba.core.dispatcher import Dispatcher
 from numba.core.registry import CPUDispatcher
-from numba.core.runtime import rtsys
+from numba.extending import overload
 
 from beaver_ftc.paths import cache_base, folder_of_version
 
@@ -124,7 +124,8 @@ class _Kernel(CPUDispatcher):
 
     def _compiled(self, types):
         """Compile, one process at a time, and keep the code."""
-        with _alone(self._folder), _announced():
+        _lighten()
+        with _alone(self._folder), _announced(), _without_collecting():
             if entry_point := self._loaded(types):
                 return entry_point  # another process came first
             self.overloads.pop(tuple(types), None)
@@ -155,9 +156,8 @@ _nesting: list["_Kernel"] = []  # the kernels being compiled, each called by the
 def _finalize(library) -> None:
     """In place of numba's: optimise a library with all that it calls; leave one that is part of another."""
     library._raise_if_finalized()
-    library._translated_only = len(_nesting) > 1
+    library._translated_only = library._finalized = len(_nesting) > 1
     if library._translated_only:
-        library._finalized = True
         return
     library._codegen._check_llvm_bugs()
     own = {function.name for function in _defined(library._final_module)}
@@ -241,6 +241,41 @@ def _announced() -> Iterator[None]:
         saying.cancel()
 
 
+@contextlib.contextmanager
+def _without_collecting() -> Iterator[None]:
+    """Look for garbage afterwards: a compiler leaves little, and looking costs a quarter of its time."""
+    gc.disable()
+    try:
+        yield
+    finally:
+        gc.enable()
+
+
+def _other_shape(shape, wanted):
+    """In place of numba's: what fails if an array is assigned to one of another shape."""
+    raise ValueError("an array cannot be assigned to one of another shape")
+
+
+@functools.cache
+def _lighten() -> None:
+    """Numba puts both shapes into that message, for which it compiles its strings: two seconds. And it
+    writes out a record's type, all fields of it, for each pass over each function: written once, it is kept.
+    """
+    from numba.np import arrayobj  # where nothing is compiled it is not needed
+
+    arrayobj.raise_with_shape_context = _other_shape
+    overload(_other_shape)(lambda shape, wanted: _other_shape)
+    written: dict[int, tuple] = {}
+    write = numba.types.Record.__repr__
+
+    def text(record) -> str:
+        if id(record) not in written:
+            written[id(record)] = (write(record), record)  # kept alive, its id stays its own
+        return written[id(record)][0]
+
+    numba.types.Record.__repr__ = text  # type: ignore[method-assign]
+
+
 def _interpreted(function):
     """The function as it is, given records whose fields are attributes, as compiled code has them."""
 
@@ -309,39 +344,3 @@ class _Store:
 @functools.cache
 def _say_once(text: str) -> None:
     print(f"beaver-ftc: {text}", file=sys.stderr, flush=True)
-
-
-def direct(function: Any, *arguments: np.ndarray) -> Any:
-    """The machine code of a kernel for arguments of these types, to be called with no others.
-
-    The arguments are C-ordered arrays. It skips the look-up of their types, 0.1 to 0.2 us a call: worth it
-    once a frame, nowhere else.
-    """
-    if not isinstance(function, Dispatcher):
-        return function  # NUMBA_DISABLE_JIT
-    return _entry_point(function, tuple((argument.dtype, argument.ndim) for argument in arguments))
-
-
-@lru_cache(maxsize=64)
-def _entry_point(function, kinds):
-    """The machine code for C-ordered arrays of these types and dimensions: 9 ms to find, so kept."""
-    types = tuple(numba.types.Array(numba.from_dtype(dtype), dimensions, "C") for dtype, dimensions in kinds)
-    stored = _stored(function, types)
-    if stored is not None:
-        return stored
-    function.compile(types)
-    return function.overloads[types].entry_point
-
-
-def _stored(function, types):
-    """The machine code an earlier process has kept, or None.
-
-    Numba itself would first make ready to compile, which takes 0.25 s and imports SciPy, and then find that
-    there is nothing to compile. What is used here is not a promise of Numba's: on any surprise, the long way.
-    """
-    try:
-        rtsys.initialize(function.targetctx)
-        found = function.stored(types)
-    except Exception:
-        return None
-    return found.entry_point if found is not None else None

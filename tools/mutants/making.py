@@ -6,13 +6,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 ARITHMETIC = {
-    ast.Add: (ast.Sub,),
-    ast.Sub: (ast.Add,),
-    ast.Mult: (ast.Div,),
-    ast.Div: (ast.Mult,),
-    ast.FloorDiv: (ast.Mult,),
-    ast.Mod: (ast.Mult,),
-    ast.Pow: (ast.Mult,),
+    ast.Add: ast.Sub,
+    ast.Sub: ast.Add,
+    ast.Mult: ast.Div,
+    ast.Div: ast.Mult,
+    ast.FloorDiv: ast.Mult,
+    ast.Mod: ast.Mult,
+    ast.Pow: ast.Mult,
 }
 COMPARISONS = {
     ast.Lt: (ast.LtE, ast.GtE),
@@ -90,35 +90,42 @@ class _Replace(ast.NodeTransformer):
 
 def _changes(node: ast.AST) -> Iterator[tuple[str, ast.AST]]:
     """What could be there instead of this node: (kind, new node)."""
+    yield from _of_operators(node)
+    yield from _of_numbers(node)
+    if _is_of_effect(node):
+        yield "line", ast.Pass()
+
+
+def _of_operators(node: ast.AST) -> Iterator[tuple[str, ast.AST]]:
     match node:
         case ast.UnaryOp(op=ast.USub()):
             yield "sign", node.operand
         case ast.UnaryOp(op=ast.Not()):
             yield "operator", node.operand
-        case ast.BinOp():
-            for other in ARITHMETIC.get(type(node.op), ()):
-                yield "operator", ast.BinOp(node.left, other(), node.right)
+        case ast.BinOp() if type(node.op) in ARITHMETIC:
+            yield "operator", ast.BinOp(node.left, ARITHMETIC[type(node.op)](), node.right)
         case ast.AugAssign(op=ast.Add()):
             yield "sign", ast.AugAssign(node.target, ast.Sub(), node.value)
         case ast.BoolOp():
             other = ast.Or() if isinstance(node.op, ast.And) else ast.And()
             yield "operator", ast.BoolOp(other, node.values)
         case ast.Compare(ops=[op]):
-            for other in COMPARISONS.get(type(op), ()):
-                yield "comparison", ast.Compare(node.left, [other()], node.comparators)
+            for new in COMPARISONS.get(type(op), ()):
+                yield "comparison", ast.Compare(node.left, [new()], node.comparators)
+        case ast.Call(func=ast.Name(id=name)) if name in FUNCTIONS:
+            yield "operator", ast.Call(ast.Name(FUNCTIONS[name], ast.Load()), node.args, node.keywords)
+
+
+def _of_numbers(node: ast.AST) -> Iterator[tuple[str, ast.AST]]:
+    match node:
         case ast.Subscript(slice=ast.Constant(value=int(at))) if not isinstance(at, bool):
-            other = ast.Constant(at - 1 if at > 0 else at + 1)
-            yield "index", ast.Subscript(node.value, other, node.ctx)
+            yield "index", ast.Subscript(node.value, ast.Constant(at - 1 if at > 0 else at + 1), node.ctx)
         case ast.Constant(value=bool(value)):
             yield "constant", ast.Constant(not value)
         case ast.Constant(value=int(value)):
             yield "constant", ast.Constant(value + 1)
         case ast.Constant(value=float(value)):
             yield "constant", ast.Constant(2.0 * value if value else 1.0)
-        case ast.Call(func=ast.Name(id=name)) if name in FUNCTIONS:
-            yield "operator", ast.Call(ast.Name(FUNCTIONS[name], ast.Load()), node.args, node.keywords)
-    if _is_of_effect(node):
-        yield "line", ast.Pass()
 
 
 def _is_of_effect(node: ast.AST) -> bool:

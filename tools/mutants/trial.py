@@ -33,7 +33,7 @@ def chosen(tests: list[str], seconds: dict[str, float]) -> list[str]:
 
 
 def outcome(mutant: Mutant, tests: list[str]) -> int:
-    """SURVIVED, KILLED or ENDLESS; the tests run in a child of this process, which has the libraries loaded."""
+    """SURVIVED, KILLED or ENDLESS; the tests run in a child, for which the libraries are loaded already."""
     child = os.fork()
     if child == 0:
         _run(mutant, tests)  # does not return

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from beaver_ftc.compiled import direct
 from beaver_ftc.loop import steps
+from beaver_ftc.loop.direct import direct
 from beaver_ftc.loop.frame import NOT_FINITE
 
 

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from beaver_ftc.compiled import direct
 from beaver_ftc.control.laws.setup import set_up
 from beaver_ftc.control.outer.setup import set_up_autopilot
 from beaver_ftc.control.outer.state import COLUMNS
@@ -16,6 +15,7 @@ from beaver_ftc.design.variants import anchor, mass_of
 from beaver_ftc.diagnosis import noise_model
 from beaver_ftc.errors import SimulationFailed
 from beaver_ftc.loop.assembly import assemble, estimator_names, y_places
+from beaver_ftc.loop.direct import direct
 from beaver_ftc.loop.flight import Flight, LogSink
 from beaver_ftc.loop.frame import FLYING, NOT_FINITE, fly_frame, look_inside
 from beaver_ftc.loop.summary import flight_of

@@ -8,7 +8,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.aircraft.question import asked
-from beaver_ftc.compiled import direct
 from beaver_ftc.design.model import N_Y
 from beaver_ftc.design.variants import anchor, mass_of
 from beaver_ftc.diagnosis import noise_model
@@ -16,6 +15,7 @@ from beaver_ftc.diagnosis.base import Verdict
 from beaver_ftc.errors import BadInput
 from beaver_ftc.loop import steps, watching
 from beaver_ftc.loop.assembly import assemble
+from beaver_ftc.loop.direct import direct
 from beaver_ftc.loop.summary import estimate_now, verdict_of
 from beaver_ftc.plugins import DETECTORS, is_compiled
 from beaver_ftc.scenario.given import load

@@ -3,11 +3,12 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 WORKERS ?= 2
+SEED ?= 1
 PYTEST := $(BIN)/python -m pytest -n $(WORKERS) --dist worksteal
 # What a change breaks most often, in less than a minute: what flies little or nothing.
 FAST := tests/aircraft tests/design tests/docs tests/plant tests/results tests/scenario $(wildcard tests/test_re*.py tests/test_arch*.py)
 
-.PHONY: demo test acceptance test-fast coverage lint docs site clean help
+.PHONY: demo test acceptance test-fast coverage mutants lint docs site clean help
 
 help:
 	@echo "make demo       set up, fly the published elevator case, print the verdict and where the report lies"
@@ -15,6 +16,7 @@ help:
 	@echo "make acceptance the installed command from outside: every scenario, page and mistake"
 	@echo "make test-fast  the tests that fly little or nothing: less than a minute"
 	@echo "make coverage   the whole test suite, and which lines of Python it has run"
+	@echo "make mutants    100 small defects put into the code on purpose: how many of them do tests find?"
 	@echo "make lint       set up and run the linters"
 	@echo "make docs       set up and write the generated pages and pictures of docs/ anew"
 	@echo "make site       set up and build docs/, with reference and notebooks, as a web site in site/"
@@ -47,6 +49,9 @@ test-fast: $(VENV)/.dev
 coverage: $(VENV)/.dev
 	$(PYTEST) --cov --cov-report=term:skip-covered
 
+mutants: $(VENV)/.dev
+	$(BIN)/python -m tools.mutants --seed $(SEED)
+
 lint: $(VENV)/.dev
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
@@ -63,4 +68,4 @@ site: $(VENV)/.site
 	$(BIN)/python -m mkdocs build --quiet
 
 clean:
-	rm -rf $(VENV) site .coverage runs sweeps .pytest_cache .hypothesis .mypy_cache .ruff_cache
+	rm -rf $(VENV) site .coverage .mutants runs sweeps .pytest_cache .hypothesis .mypy_cache .ruff_cache

@@ -180,6 +180,26 @@ def test_replay_turns_the_aircraft(page):
     assert np.abs(looks[0] - looks[1]).max() > 0.2
 
 
+ENDS = """((course, climb) => {
+  const [c, s] = [Math.cos(course), Math.sin(course)], of = (k) => [0, k / 2, k];
+  const level = { t_s: [0, 15, 30], north_m: of(1200 * c), east_m: of(1200 * s), altitude_m: of(climb) };
+  const space = new Space({ levels: [level], marks: [] });
+  const at = (i, side) => [level.north_m[i] - side * s, level.east_m[i] + side * c, level.altitude_m[i]];
+  const project = space.camera(900, 400, space.centre, 2 * space.extent);
+  return [at(0, 0), at(2, 0), at(1, 0), at(1, 100)].map((point) => project(space.raised(point)));
+})"""
+
+
+@pytest.mark.parametrize("course_deg", [0, 80, 135, 210, 350])
+@pytest.mark.parametrize("climb_m", [-300, -20, 20])
+def test_a_path_that_descends_goes_down_on_the_screen(page, course_deg, climb_m):
+    """Whatever its course, from left to right; what is to the right of the aircraft is nearer."""
+    start, end, middle, right = page.evaluate(f"{ENDS}({np.radians(course_deg)}, {climb_m})")
+    assert start[0] < end[0]
+    assert (start[1] < end[1]) == (climb_m < 0)
+    assert right[2] < middle[2]
+
+
 def test_phone_needs_no_sideways_scrolling(page):
     page.call("Emulation.setDeviceMetricsOverride", width=390, height=844, deviceScaleFactor=2, mobile=True)
     page.settle()

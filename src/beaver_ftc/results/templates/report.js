@@ -430,7 +430,6 @@ class Space {
   constructor(run) {
     this.run = run;
     this.follow = false;
-    this.azimuth = -2.3;
     this.elevation = 0.35;
     this.zoom = 1;
     this.canvas = make("canvas", { role: "img", ariaLabel: "flight path and attitude" });
@@ -454,6 +453,8 @@ class Space {
     this.centre = ends.map(([low, high]) => (low + high) / 2);
     this.extent = Math.max(60, ...ends.map(([low, high]) => high - low));
     this.floor = ends[2][0] - 0.06 * this.extent;
+    // Seen from abeam: from behind, the ground rises towards the horizon, and a descent looks like a climb.
+    this.azimuth = Math.atan2(e[e.length - 1] - e[0], n[n.length - 1] - n[0]) + Math.PI / 2;
     this.stretch = Math.min(8, Math.max(1, (0.25 * this.extent) / Math.max(1, ends[2][1] - ends[2][0])));
   }
 
@@ -490,7 +491,7 @@ class Space {
 
   camera(width, height, target, distance) {
     const [sa, ca, se, ce] = [Math.sin(this.azimuth), Math.cos(this.azimuth), Math.sin(this.elevation), Math.cos(this.elevation)];
-    const forward = [-ce * ca, -ce * sa, -se], right = [sa, -ca, 0].map((v) => -v), up = [-se * ca, -se * sa, ce];
+    const forward = [-ce * ca, -ce * sa, -se], right = [sa, -ca, 0], up = [-se * ca, -se * sa, ce];
     const eye = target.map((value, i) => value - forward[i] * distance), focal = 1.1 * Math.min(width, 1.6 * height);
     return (point) => {
       const ray = sub(point, eye), depth = dot(ray, forward);

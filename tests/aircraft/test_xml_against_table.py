@@ -97,9 +97,11 @@ def test_each_axis_stands_once(xml):
 
 def test_geometry_and_mass(xml):
     metrics, mass = xml.find("metrics"), xml.find("mass_balance")
-    in_metres = {name: float(metrics.find(name).text) for name in ("wingarea", "wingspan", "chord")}
+    unit = {"wingarea": ("FT2", 0.3048**2), "wingspan": ("FT", 0.3048), "chord": ("FT", 0.3048)}
     wanted = {"wingarea": GEOMETRY.wing_area_m2, "wingspan": GEOMETRY.span_m, "chord": GEOMETRY.chord_m}
-    assert in_metres == wanted
+    for name, (feet, in_si) in unit.items():
+        assert metrics.find(name).get("unit") == feet
+        assert float(metrics.find(name).text) * in_si == pytest.approx(wanted[name], rel=1e-15)
     assert float(mass.find("emptywt").text) == MASS.mass_kg
 
 
@@ -108,7 +110,7 @@ def test_inertia(xml, axes):
     table = {"xx": MASS.Ix_kg_m2, "yy": MASS.Iy_kg_m2, "zz": MASS.Iz_kg_m2, "xz": MASS.Jxz_kg_m2}
     element = xml.find("mass_balance").find(f"i{axes}")
     assert element.get("unit") == "SLUG*FT2"
-    assert float(element.text) / SLUG_FT2_PER_KG_M2 == pytest.approx(table[axes], rel=1e-10)
+    assert float(element.text) / SLUG_FT2_PER_KG_M2 == pytest.approx(table[axes], rel=1e-15)
 
 
 def test_reference_lengths_in_the_rates_are_the_table_s(functions):

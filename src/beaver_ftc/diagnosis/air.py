@@ -26,7 +26,8 @@ AIR = np.dtype(
         ("area_per_mass", "f8"), ("gravity", "f8"), ("span", "f8"),
         ("velocity", "f8", (3,)), ("force", "f8", (3,)), ("turn", "f8", (3, 3)), ("heading", "f8"),
         ("gust", "f8", (3,)), ("rotation", "f8", (3,)), ("damping", "f8", (3, 3)),
-        ("acceleration", "f8", (3,)),
+        ("acceleration", "f8", (3,)),  # at this instant
+        ("total", "f8", (3,)), ("mean", "f8", (3,)),  # over the instants of a frame; over the elapsed one
         ("per_metre", "f8", (3,)),  # intensity of the rotation's drift over airspeed, rad2/s3 per m/s
         ("unseen", "f8", (3,)),  # share of it that the vanes do not show
         ("rolling", "f8"),  # lag of the rolling gust times airspeed, m
@@ -86,7 +87,7 @@ def advance_axes(air, y, attitude):
 def observe(air, y, attitude, dt):
     """Follow the gust over the elapsed frame: `gust` (3,) rad/s in level axes, the rolling one unknown.
 
-    y (5,) and attitude (3,) rad as measured now; `force` and `turn` are still the frame's beginning.
+    y (5,) and attitude (3,) rad as measured now, dt s after `force` and `turn`.
     """
     ahead = air.velocity[0] + dt * to_level(air.turn, air.force, 0)
     right = air.velocity[1] + dt * to_level(air.turn, air.force, 1)
@@ -114,6 +115,21 @@ def effect(air, design, x, y, u):
         air.acceleration[i] = 0.0
         for j in range(3):
             air.acceleration[i] -= air.damping[i, j] * air.rotation[j]
+
+
+@kernel
+def begin_frame(air):
+    """Begin the sum over the next frame's instants with this one."""
+    air.total[:] = air.acceleration
+
+
+@kernel
+def look(air, design, x, y, u, attitude, dt):
+    """Follow the gust to an instant inside a frame, dt s after the one before; arguments as in `effect`."""
+    observe(air, y, attitude, dt)
+    effect(air, design, x, y, u)
+    for i in range(3):
+        air.total[i] += air.acceleration[i]
 
 
 @kernel

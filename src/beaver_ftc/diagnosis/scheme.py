@@ -7,7 +7,7 @@ takes each surface for, so that what is known of a fault is no surprise; offset 
 from beaver_ftc.compiled import kernel
 from beaver_ftc.design.model import ALPHA, BETA, unanticipated_pitch
 from beaver_ftc.diagnosis import air, bank, detection, isolation, network, statistical
-from beaver_ftc.diagnosis.belief import begin_frame
+from beaver_ftc.diagnosis.belief import begin_frame, look
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, STATISTICS, WORST_CASE
 from beaver_ftc.diagnosis.types import examine
 
@@ -70,6 +70,8 @@ def expect_known_faults(expected, mean, effectiveness, offset, offsets_count):
 @kernel
 def compare_likelihoods(fdi, belief, measured, k, t):
     """Show the statistical detector the elapsed frame."""
+    for i in range(3):
+        fdi.statistical.air.mean[i] = belief.share * fdi.statistical.air.total[i]
     cubic = unanticipated_pitch(belief.design, measured.y, 1.0)
     statistical.signatures(fdi.statistical, belief.means.Gu, cubic)
     statistical.observe(fdi.statistical, fdi.innovation, fdi.dt, k, fdi.verdict.detected)
@@ -102,10 +104,26 @@ def look_ahead(fdi, belief, measured, k):
     """Ready the statistical detector for the next frame: the air as the vanes see it, noise, coefficients."""
     if fdi.statistical.air.moving:
         if k > 0:
-            air.observe(fdi.statistical.air, measured.y, measured.attitude, fdi.dt)
+            air.observe(fdi.statistical.air, measured.y, measured.attitude, belief.share * fdi.dt)
         else:
             air.advance_axes(fdi.statistical.air, measured.y, measured.attitude)
     statistical.prepare(fdi.statistical, fdi, belief.design, measured.x, measured.y, belief.u)
+
+
+@kernel
+def look_inside(fdi, belief, measured):
+    """Take in an instant inside a frame: what is believed of it, and the gust that the vanes see by then."""
+    if fdi.statistical.enabled and fdi.statistical.air.moving:
+        air.look(
+            fdi.statistical.air,
+            belief.design,
+            measured.x,
+            measured.y,
+            belief.u,
+            measured.attitude,
+            belief.share * fdi.dt,
+        )
+    look(fdi, belief, measured)
 
 
 @kernel

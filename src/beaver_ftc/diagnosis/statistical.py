@@ -49,7 +49,7 @@ def observe(statistical, innovation, dt, frame, latched):
         whitening.advance(block, dt)
         for i in range(block.n):
             axis = block.axis[i]
-            block.scratch[i] = innovation[axis] - statistical.air.acceleration[axis]
+            block.scratch[i] = innovation[axis] - statistical.air.mean[axis]
         whitening.whiten(block, block.state, block.scratch, dt, block.innovation)
         if statistical.tolerated:
             for j in range(block.n_regressors):
@@ -67,7 +67,7 @@ def follow_rest(statistical, surprise, dt):
         block = statistical.block[b]
         for i in range(block.n):
             axis = block.axis[i]
-            block.scratch[i] = surprise[axis] - statistical.air.acceleration[axis]
+            block.scratch[i] = surprise[axis] - statistical.air.mean[axis]
         whitening.whiten(block, block.rest, block.scratch, dt, block.scratch)
 
 
@@ -186,6 +186,7 @@ def prepare(statistical, fdi, design, x, y, u):
     """
     if statistical.air.moving:
         air.effect(statistical.air, design, x, y, u)
+        air.begin_frame(statistical.air)
     drifts(statistical, fdi, design, x, y)
     if statistical.tolerated:
         coefficients(statistical, design, x, y, u)

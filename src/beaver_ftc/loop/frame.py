@@ -23,7 +23,7 @@ from beaver_ftc.control.outer.state import AUTOPILOT
 from beaver_ftc.control.state import ORACLE, control_dtype
 from beaver_ftc.control.supervisor import SUPERVISOR, mode_from, supervise
 from beaver_ftc.diagnosis import scheme
-from beaver_ftc.diagnosis.belief import belief_dtype, follow_command, look, look_back, respond
+from beaver_ftc.diagnosis.belief import belief_dtype, follow_command, look_back, respond
 from beaver_ftc.diagnosis.state import diagnosis_dtype, verdict_dtype
 from beaver_ftc.loop.accounts import account, accounts_dtype, add_effect, effect_of_faults, follow_guarantee
 from beaver_ftc.loop.record import record
@@ -161,7 +161,7 @@ def look_inside(frames):
     """
     frame = frames[0]
     if sense(frame) != NOT_FINITE:
-        look(frame.fdi, frame.belief, frame.measured)
+        scheme.look_inside(frame.fdi, frame.belief, frame.measured)
         add_effect(frame.accounts.guarantee)
 
 

@@ -7,6 +7,8 @@ interval, carried along exactly by its ends. A type that no longer holds the sur
 such return explains the frame either.
 
 There are two such intervals, of earlier and of later releases: see stuck.py for what the second is for.
+Nothing is seen before the alarm, so any release may have gone before it; each frame in which something is
+wrong says where it cannot have led.
 
 Once let go, a type does not take hold again before the surface has been seen healthy.
 """
@@ -18,7 +20,8 @@ from beaver_ftc.design.actuators import nearer
 
 EARLIER, LATER = 0, 1
 UNEVENNESS = 0.05  # a surface's effectiveness does not change by more within a block
-NOT_BACK_RAD = 1e-12  # what is nearer to a healthy surface acts within rounding as one
+# What is nearer to a healthy surface acts as one: it must do less than the bound allows for rounding.
+NOT_BACK_RAD = 1e-14
 
 
 @kernel
@@ -35,9 +38,10 @@ def any_release(surface, which, kind):
 
 @kernel
 def start(surface, kind):
-    """Nothing has been held yet."""
+    """It may have been let go before the alarm, anywhere."""
     forget(surface, EARLIER, kind)
-    forget(surface, LATER, kind)
+    surface.release.low[LATER, kind] = surface.travel_low
+    surface.release.high[LATER, kind] = surface.travel_high
 
 
 @kernel
@@ -56,20 +60,48 @@ def carried(fdi, surface, a):
 @kernel
 def possible(fdi, surface, kind):
     """Whether a return from this type explains the judged frame; forget those releases that do not."""
-    held, left = surface.release, False
+    left = False
     for which in (EARLIER, LATER):
         if any_release(surface, which, kind):
-            low, end = carried(fdi, surface, held.low[which, kind])
-            high, other_end = carried(fdi, surface, held.high[which, kind])
-            if fdi.block.length > 1:
-                low -= UNEVENNESS * abs(end - held.low[which, kind])
-                high += UNEVENNESS * abs(other_end - held.high[which, kind])
-            away = max(abs(low - surface.command_then), abs(high - surface.command_then)) > NOT_BACK_RAD
-            if away and low <= surface.high_then and high >= surface.low_then:
+            if agrees(fdi, surface, which, kind):
                 left = True
             else:
                 forget(surface, which, kind)
     return left
+
+
+@kernel
+def agrees(fdi, surface, which, kind):
+    """Whether the judged frame agrees with a return; drop the part of its interval that does not.
+
+    The mean over the frame rises with where the return began, and by no more than that.
+    """
+    held = surface.release
+    low, end = carried(fdi, surface, held.low[which, kind])
+    high, other_end = carried(fdi, surface, held.high[which, kind])
+    low_room = high_room = 0.0
+    if fdi.block.length > 1:
+        low_room = UNEVENNESS * abs(end - held.low[which, kind])
+        high_room = UNEVENNESS * abs(other_end - held.high[which, kind])
+    command = surface.command_then
+    if max(abs(low - low_room - command), abs(high + high_room - command)) <= NOT_BACK_RAD:
+        return False
+    if low - low_room > surface.high_then or high + high_room < surface.low_then:
+        return False
+    keep(
+        held,
+        which,
+        kind,
+        held.low[which, kind] + max(surface.low_then - low - low_room, 0.0),
+        held.high[which, kind] - max(high - high_room - surface.high_then, 0.0),
+    )
+    return True
+
+
+@kernel
+def keep(held, which, kind, low, high):
+    """Take [low, high] for where a return can be; ends that meet may have passed by rounding."""
+    held.low[which, kind], held.high[which, kind] = min(low, high), max(low, high)
 
 
 @kernel
@@ -117,5 +149,6 @@ def bring_back(fdi, surface, kind):
         held.released[kind] = 0
     for which in (EARLIER, LATER):
         if any_release(surface, which, kind):
-            _, held.low[which, kind] = carried(fdi, surface, held.low[which, kind])
-            _, held.high[which, kind] = carried(fdi, surface, held.high[which, kind])
+            _, low = carried(fdi, surface, held.low[which, kind])
+            _, high = carried(fdi, surface, held.high[which, kind])
+            keep(held, which, kind, low, high)

@@ -95,10 +95,45 @@ def test_a_wrong_fault_is_refused_in_words(session):
     assert session.state()["broken"] == []
 
 
-def test_one_gust_a_flight(session):
+def test_law_diagnosis_and_sensors_are_changed_in_flight_and_fly_again_to_the_bit(session, tmp_path):
+    flown(session, 150)
+    asked(session, do="change", law="lqr")
+    flown(session, 100)
+    asked(session, do="break", fault=LOSS)
+    flown(session, 100)
+    assert session.frame()["isolated"] == "elevator"
+    asked(session, do="change", law="fault-tolerant", scheme="adaptive-estimators", sensors="tactical-grade")
+    flown(session, 1)
+    assert session.frame()["isolated"] is None
+    assert session.state()["flying"] == {
+        "law": "fault-tolerant",
+        "scheme": "adaptive-estimators",
+        "sensors": "tactical-grade",
+    }
+    flown(session, 150)
+    assert session.frame()["isolated"] == "elevator"  # found again
+    assert len(told(session, "changed")) == 2
+    with pytest.raises(BadInput, match="unknown law"):
+        asked(session, do="change", law="none-such")
+    with pytest.raises(BadInput, match="says no change"):
+        asked(session, do="change")
+    asked(session, do="save")
+    (folder,) = tmp_path.iterdir()
+    log = session.sim.log
+    assert np.array_equal(log.to_numpy(), bf.fly(folder / "scenario.yaml").log.to_numpy(), equal_nan=True)
+    asked(session, do="game", move="second")
+    with pytest.raises(BadInput, match="a round is on"):
+        asked(session, do="change", law="lqr")
+
+
+def test_one_gust_at_a_time(session):
     asked(session, do="blow", velocity_mps=[0, 3, 0])
-    with pytest.raises(BadInput, match="one a flight"):
+    with pytest.raises(BadInput, match="one at a time"):
         asked(session, do="blow", velocity_mps=[0, 3, 0])
+    assert session.state()["gust"]
+    flown(session, 205)
+    assert not session.state()["gust"]
+    asked(session, do="blow", velocity_mps=[0, 3, 0])
 
 
 def test_the_game_hides_what_is_broken_and_what_the_diagnosis_says(session):

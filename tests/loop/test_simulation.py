@@ -255,15 +255,55 @@ def test_a_gust_begins_when_it_is_asked_for_and_is_flown_again_to_the_bit():
     assert np.array_equal(log.to_numpy(), again.to_numpy(), equal_nan=True)
 
 
-def test_one_gust_a_flight_and_none_of_the_last_one_after_a_reset():
+def test_gusts_one_after_the_other_are_flown_again_to_the_bit():
+    """The second is as strong as if it were alone; one that comes while another blows is refused."""
+    sim = bf.Simulation(scenario(duration_s=12.0))
+    sim.step(frames=200)
+    sim.blow({"velocity_mps": [0.0, 0.0, -5.0]})
+    sim.step(frames=100)
+    with pytest.raises(bf.BadInput, match=r"another one blows from 2\.01 to 4\.01 s"):
+        sim.blow({"velocity_mps": [0.0, 3.0, 0.0]})
+    sim.step(frames=500)
+    sim.blow({"velocity_mps": [0.0, 4.0, 0.0]})
+    sim.step(frames=300)
+    flown = sim.scenario_flown()
+    assert [gust.at_s for gust in flown.environment.gusts] == [2.01, 8.01]
+    assert same_log(sim.log, bf.fly(flown).log)
+    alone = bf.fly(scenario(duration_s=11.0, environment={"gust": {"at_s": 8.01, "velocity_mps": [0, 4, 0]}}))
+    still = bf.fly(scenario(duration_s=11.0)).log["beta_rad"]
+    own, other = (log["beta_rad"][:1100] - still for log in (sim.log, alone.log))
+    assert own[800:].abs().max() == pytest.approx(other[800:].abs().max(), rel=0.1)
+    assert other[800:].abs().max() > 0.05
+
+
+def test_none_of_the_last_gust_after_a_reset():
     sim = bf.Simulation(scenario(duration_s=2.0))
     sim.blow({"velocity_mps": [0.0, 3.0, 0.0]})
-    with pytest.raises(bf.BadInput, match="one a flight"):
-        sim.blow({"velocity_mps": [0.0, 3.0, 0.0]})
     sim.reset()
     assert sim.scenario_flown().environment.gust is None
     with pytest.raises(bf.BadInput, match="velocity_mps"):
         sim.blow({"velocity_mps": [0.0, 300.0, 0.0]})
+
+
+def test_gusts_in_a_scenario_do_not_overlap():
+    one = {"at_s": 2.0, "velocity_mps": [0, 0, -5], "hold_s": 3.0}
+    with pytest.raises(
+        bf.BadInput, match=r"environment.gust\[1\].at_s: 6 is before .*, allowed: 7 s or later"
+    ):
+        bf.load({"environment": {"gust": [one, {**one, "at_s": 6.0}]}})
+    with pytest.raises(
+        bf.BadInput, match=r"^environment.gust.rise_s: -1 is out of range, allowed: a number over 0"
+    ):
+        bf.load({"environment": {"gust": {**one, "rise_s": -1}}})
+    with pytest.raises(bf.BadInput, match=r"^environment.gust\[0\].rise_s: -1 is out of range, allowed"):
+        bf.load({"environment": {"gust": [{**one, "rise_s": -1}]}})
+    assert (
+        bf.load({"environment": {"gust": one}})
+        .with_({"environment.gust.at_s": 3.0})
+        .environment.gusts[0]
+        .at_s
+        == 3
+    )
 
 
 def test_the_mode_is_the_supervisors():

@@ -112,6 +112,7 @@ class Flight:
     faults: tuple[dict, ...] = ()
     statistical: dict[str, float | None] | None = None
     mode_changes: int = 3
+    changes: tuple[Any, ...] = ()
     exits: int = 0
     outside_s: float = 0.0
     end: tuple[float, float] | None = None

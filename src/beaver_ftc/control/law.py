@@ -26,7 +26,7 @@ def advance_hand_over(control, every_type, mode):
         control.hand_over = min(control.hand_over + control.hand_over_step, 1.0)
         if control.hedging or (left < control.least_effectiveness and every_type):
             control.hand_over = max(control.hand_over, 1.0 - left)
-    elif every_type:
+    elif every_type or control.hands_back:
         control.hand_over = max(control.hand_over - control.hand_over_step, 0.0)
     rejecting.hand_over(control, left)
 

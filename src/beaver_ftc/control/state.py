@@ -64,7 +64,7 @@ def control_dtype(n: int) -> np.dtype:
         ("shortfall", "f8", (3,)), ("beyond", "i8", (3,)),
         ("trim", "f8", (n,)), ("low", "f8", (n,)), ("high", "f8", (n,)),
         ("command", "f8", (n,)), ("saturated", "i8", (n,)),
-        ("hand_over", "f8"), ("hand_over_step", "f8"),
+        ("hand_over", "f8"), ("hand_over_step", "f8"), ("hands_back", "i8"),  # after a change in flight
         ("power", POWER), ("rejection", rejection_dtype(n)),
     ]  # fmt: skip
     return np.dtype(fields, align=True)

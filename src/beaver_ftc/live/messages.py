@@ -77,6 +77,18 @@ class Pause(Request):
     on: bool
 
 
+Grade = Literal["ideal", "tactical-grade", "consumer-grade"]
+
+
+class Change(Request):
+    """Another law, diagnosis or sensors now; what is left out stays."""
+
+    do: Literal["change"]
+    law: Name | None = None
+    scheme: Name | None = None
+    sensors: Grade | None = None
+
+
 class Fresh(Request):
     """Begin a new flight from trim; what is left out stays as it was."""
 
@@ -85,7 +97,7 @@ class Fresh(Request):
     law: Name | None = None
     scheme: Name | None = None
     fault_class: Literal["published", "all"] | None = None
-    sensors: Literal["ideal", "tactical-grade", "consumer-grade"] | None = None
+    sensors: Grade | None = None
     turbulence: Literal["none", "light", "moderate", "severe"] | None = None
     autopilot: bool | None = None
 
@@ -111,7 +123,7 @@ class Invite(Request):
 
 
 AnyRequest = Annotated[
-    Break | Repair | Blow | Aim | Stick | Speed | Pause | Fresh | Game | Save | Invite,
+    Break | Repair | Blow | Aim | Stick | Speed | Pause | Change | Fresh | Game | Save | Invite,
     Field(discriminator="do"),
 ]
 _ADAPTER: TypeAdapter[Any] = TypeAdapter(AnyRequest)

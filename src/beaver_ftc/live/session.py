@@ -56,6 +56,8 @@ class Session:
         self.events: deque[dict[str, Any]] = deque(maxlen=EVENTS_KEPT)
         self.fresh_events: list[dict[str, Any]] = []
         self.told: deque[dict[str, Any]] = deque(maxlen=EVENTS_KEPT)
+        self.flying = {"law": flown.control.law, "scheme": flown.fdi.scheme}
+        self._gust_until_s = 0.0
         self._said: tuple[Any, ...] = (None, None, None, (), False)
         self._mode = sim.mode
         self.broken = {fault.model_dump().get("actuator") or fault.type for fault in flown.faults}
@@ -125,6 +127,7 @@ class Session:
             messages.Blow: lambda asked: self._blow(asked.velocity_mps),
             messages.Aim: self._aim,
             messages.Stick: self._steer,
+            messages.Change: self._change,
             messages.Fresh: self._fresh,
             messages.Game: self._play,
             messages.Save: lambda _: self._save(),
@@ -159,8 +162,22 @@ class Session:
     def _blow(self, velocity_mps: tuple[float, ...]) -> str:
         self._check_going_on()
         self.sim.blow({"velocity_mps": list(velocity_mps), **GUST_S})
+        self._gust_until_s = self.sim.t_s + sum(GUST_S.values()) + 1.0 / self.sim.rate_hz
         self._tell("gust", ", ".join(f"{v:g}" for v in velocity_mps) + " m/s (north, east, down)")
         return "gust"
+
+    def _change(self, asked: messages.Change) -> str:
+        """Exchange law, diagnosis, sensors; errors of sensors are declared to the diagnosis as well."""
+        self._check_going_on()
+        if self.game.hidden:
+            raise BadInput("a round is on, allowed: changes after it")
+        change = asked.model_dump(include={"law", "scheme", "sensors"}, exclude_none=True)
+        declared = {"declared_sensors": asked.sensors} if asked.sensors is not None else {}
+        self.sim.change({**change, **declared})
+        self.flying |= change
+        says = ", ".join(f"{key} {value}" for key, value in change.items())
+        self._tell("changed", says)
+        return says
 
     def _break(self, fault: dict[str, Any]) -> str:
         self._check_going_on()
@@ -239,11 +256,9 @@ class Session:
     def state(self) -> dict[str, Any]:
         """What changes seldom."""
         broken = [] if self.game.hidden else sorted(map(str, self.broken))
-        return {"k": "s", "over": self.over, "broken": broken, "game": self.game.shown(), "gust": self._gusty}
-
-    @property
-    def _gusty(self) -> bool:
-        return any(event["kind"] == "gust" for event in self.events)
+        gust = self.sim.t_s < self._gust_until_s
+        told = {"k": "s", "over": self.over, "broken": broken, "game": self.game.shown(), "gust": gust}
+        return told | {"flying": self.flying}
 
     def hello(self) -> dict[str, Any]:
         """What a page needs to know of this flight before its first frame."""
@@ -252,7 +267,7 @@ class Session:
         return {
             "k": "hello", "columns": self.columns, "surfaces": self.surfaces,
             "scenario": self._base.name, "description": self._base.description, "rate_hz": scenario.rate_hz,
-            "law": scenario.control.law, "scheme": scenario.fdi.scheme,
+            **{key: self.flying[key] for key in ("law", "scheme")},
             "fault_class": scenario.fdi.fault_class, "aircraft": str(scenario.aircraft),
             "travel_rad": [list(map(float, low)), list(map(float, high))],
             "autopilot": list(scenario.autopilot.channels if scenario.autopilot else ()),

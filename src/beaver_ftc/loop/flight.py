@@ -38,7 +38,9 @@ class Flight:
     many there were of `supervisor` and `envelope_exits`, which hold the first and the last; outside_s: time
     outside the validated envelope, all exits together. end: airspeed, m/s, and altitude, m, at the end.
     profile: largest deviation from the commanded one by
-    channel of the autopilot, m, m/s, rad; None where it was not flown.
+    channel of the autopilot, m, m/s, rad; None where it was not flown. changes: what was changed in flight:
+    time_s; law and scheme, None for what was not; sensors, True or False; and of a diagnosis that was
+    replaced detection_time_s and isolated. The verdict above is the last diagnosis'.
     """
 
     scenario: Scenario
@@ -74,3 +76,4 @@ class Flight:
     outside_s: float = 0.0
     end: tuple[float, float] | None = None
     profile: dict[str, float | None] | None = None
+    changes: tuple[dict[str, Any], ...] = ()

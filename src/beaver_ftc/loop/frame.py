@@ -44,11 +44,16 @@ from beaver_ftc.plant.sensing import (
 __all__ = ["FLYING", "NOT_FINITE", "fly_frame", "frame_dtype", "look_inside"]
 
 
+# What the log has columns for, whatever changes in flight: estimators and statistical tests, the engine.
+LOGGED = np.dtype([("estimators", "i8"), ("power", "i8"), ("tests", "i8")], align=True)
+
+
 @lru_cache
 def frame_dtype(n: int) -> np.dtype:
     """All that a flight of an aircraft with n surfaces remembers between frames."""
     fields = [
         ("k", "i8"), ("row", "i8"), ("dt", "f8"), ("t", "f8"),  # frame, row of the log, s, s
+        ("since", "i8"), ("logged", LOGGED),  # the frame with which this diagnosis has begun
         ("truth", truth_dtype(n)), ("instruments", INSTRUMENTS), ("measured", MEASURED),
         ("belief", belief_dtype(n)), ("fdi", diagnosis_dtype(n)), ("verdict", verdict_dtype(n)),
         ("faults", true_faults_dtype(n)), ("supervisor", SUPERVISOR), ("control", control_dtype(n)),
@@ -84,16 +89,17 @@ def begin(frame):
 def diagnose(frame):
     """The built-in diagnosis; and when detection would have been certain."""
     control, fdi, belief = frame.control, frame.fdi, frame.belief
-    scheme.diagnose(fdi, belief, frame.measured, control.effectiveness, control.offset, frame.k, frame.t)
+    k = frame.k - frame.since
+    scheme.diagnose(fdi, belief, frame.measured, control.effectiveness, control.offset, k, frame.t)
     follow_guarantee(frame.accounts.guarantee, fdi, belief.share, frame.t)
 
 
 @kernel
 def take_verdict(frame):
     """Take a plug-in's verdict, which is in frame.verdict, in place of the built-in diagnosis."""
-    control, fdi, belief = frame.control, frame.fdi, frame.belief
+    control, fdi, belief, k = frame.control, frame.fdi, frame.belief, frame.k - frame.since
     scheme.take_verdict(
-        fdi, belief, frame.measured, frame.verdict, control.effectiveness, control.offset, frame.k, frame.t
+        fdi, belief, frame.measured, frame.verdict, control.effectiveness, control.offset, k, frame.t
     )
     follow_guarantee(frame.accounts.guarantee, fdi, belief.share, frame.t)
 

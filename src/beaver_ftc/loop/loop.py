@@ -32,6 +32,7 @@ from beaver_ftc.scenario.signals import sample
 if TYPE_CHECKING:
     from beaver_ftc.control.base import Law
     from beaver_ftc.diagnosis.base import Detector
+    from beaver_ftc.loop.changing import Changing
     from beaver_ftc.loop.plugin_frame import PluginFrame
 
 CHUNK_ROWS = 8192
@@ -96,10 +97,11 @@ class Loop:
         surfaces = np.array(list(self.trim.surfaces_rad.values()))
         self.frames = assemble(scenario, surfaces, travel_rad(self.plant))
         self.cockpit = Cockpit(self.plant, self.frames)
-        self._anchor_design(surfaces)
+        self.start = self._seen()
+        self.anchor(self.frames[0], scenario)
         self.schedule = FaultSchedule(scenario.faults, self.plant, scenario.rate_hz)
         self.air = MovingAir(scenario.environment, self.plant)
-        self.gust = GustSchedule(scenario.environment.gust, self.plant, scenario.rate_hz)
+        self.gust = GustSchedule(scenario.environment.gusts, self.plant, scenario.rate_hz)
         self.n_frames = round(scenario.duration_s * scenario.rate_hz)
         self.plugin_frame = self._with_plugins(detector, law)
         self.columns = ch.log_columns(
@@ -109,9 +111,11 @@ class Loop:
             self.aircraft,
             profile=COLUMNS if self.has_profile else (),
         )
+        self._lay_out()
         self.log = np.empty((min(CHUNK_ROWS, self.n_frames), len(self.columns)))
         self.references = np.empty((len(self.log), 3))
-        self.fly_frame = self.plugin_frame or self.direct(fly_frame)
+        self.own_frame = self.fly_frame = self.plugin_frame or self.direct(fly_frame)
+        self.changing = self._changing() if scenario.changes else None
         self._set_origin()
 
     @property
@@ -127,19 +131,44 @@ class Loop:
         truth["radius_m"] = EARTH_RADIUS_M + self.scenario.initial.altitude_m
         truth["parallel_radius_m"] = truth["radius_m"] * np.cos(truth["latitude_0"])
 
-    def _anchor_design(self, surfaces: np.ndarray) -> None:
-        """Show the design model the trim, which a linearised or frozen one holds on to."""
+    def _seen(self) -> np.ndarray:
+        """The truth's channels now, in SI."""
         self.cockpit.read()
-        truth = self.frames["truth"]["value"][0] * self.frames["truth"]["factor"][0]
-        y = truth[y_places(self.frames[0])]
-        frame, scenario = self.frames[0], self.scenario
+        truth = self.frames["truth"]
+        seen: np.ndarray = truth["value"][0] * truth["factor"][0]
+        return seen
+
+    def anchor(self, frame: np.void, scenario: Scenario) -> None:
+        """Show a record the trim, which a linearised or frozen design model, the law and the statistics hold
+        on to."""
+        start, y = self.start, self.start[y_places(frame)]
+        surfaces = np.array(list(self.trim.surfaces_rad.values()))
         design = frame["belief"]["design"]
-        anchor(design, truth[:3], y, surfaces)
-        start, mass = (truth[:3], y, surfaces), mass_of(scenario.design_model, self.aircraft)
+        anchor(design, start[:3], y, surfaces)
+        trim, mass = (start[:3], y, surfaces), mass_of(scenario.design_model, self.aircraft)
         set_up(frame["control"], frame["belief"], scenario, y)
         set_up_autopilot(frame["autopilot"], frame["control"], scenario)
         fdi, rate_hz = frame["fdi"], scenario.rate_hz
-        noise_model.set_up(fdi, scenario.fdi, design, mass, start, rate_hz, self.aircraft)
+        noise_model.set_up(fdi, scenario.fdi, design, mass, trim, rate_hz, self.aircraft)
+
+    def _lay_out(self) -> None:
+        """The log's columns stay as they are, whatever changes in flight."""
+        fdi, logged = self.frames["fdi"][0], self.frames["logged"][0]
+        logged["estimators"] = fdi["n_estimators"] if self._diagnoses_itself else 0
+        logged["power"] = "manifold_pressure_inhg" in self.columns
+        logged["tests"] = fdi["statistical"]["n_columns"] if fdi["statistical"]["enabled"] else 0
+
+    def _changing(self) -> "Changing":
+        """What will change law, diagnosis and sensors in flight; nothing of it is imported without need."""
+        from beaver_ftc.loop.changing import Changing
+
+        return Changing(self, self.scenario)
+
+    def change(self, scenario: Scenario, k: int) -> None:
+        """Fly on by a scenario that says more `changes`, none of them before frame k, the next to fly."""
+        if self.changing is None:
+            self.changing = self._changing()
+        self.changing.plan(scenario, k)
 
     def _with_plugins(self, detector: "Detector | None", law: "Law | None") -> "PluginFrame | None":
         """The frame in which plug-ins take part; None, and nothing of it imported, if all is compiled in."""
@@ -148,9 +177,7 @@ class Loop:
             return None
         from beaver_ftc.loop.plugin_frame import plugin_frame
 
-        self.cockpit.read()
-        start = self.frames["truth"]["value"][0] * self.frames["truth"]["factor"][0]
-        return plugin_frame(self.frames, self.scenario, start, detector, law)
+        return plugin_frame(self.frames, self.scenario, self.start, detector, law)
 
     @property
     def _diagnoses_itself(self) -> bool:
@@ -163,7 +190,8 @@ class Loop:
     def land(self) -> Flight:
         """What the flight has yielded so far."""
         verdict = self.plugin_frame.verdict if self.plugin_frame and self.plugin_frame.detector else None
-        return flight_of(self.scenario, self.frames[0], self.columns, verdict)
+        replaced = self.changing.replaced if self.changing else ()
+        return flight_of(self.scenario, self.frames[0], self.columns, verdict, tuple(replaced))
 
     def command_instead(self, deflections: np.ndarray) -> None:
         """Replace the command (4,) rad of the frame just flown, before anything has moved."""
@@ -201,11 +229,15 @@ class Loop:
         return FLYING
 
     def turn_to(self, k: int) -> int:
-        """Bring faults and gusts to frame k, the next to fly; returns the frame at which to call again."""
+        """Bring faults, gusts and changes to frame k, the next to fly; returns when to call again."""
         self.schedule.apply(k)
         self.gust.apply(k)
         self._note_faults(k)
-        return min(self.schedule.next_change(k), self.gust.next_change(k))
+        turn = min(self.schedule.next_change(k), self.gust.next_change(k))
+        if self.changing is None:
+            return turn
+        self.changing.apply(k)
+        return min(turn, self.changing.next_change(k))
 
     def fly_segment(self, k: int, stop: int) -> int:
         """Frames k to stop, in which no fault changes."""

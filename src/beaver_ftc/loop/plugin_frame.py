@@ -27,7 +27,7 @@ class PluginFrame:
     """One frame of the loop with a detector or a law that is not compiled in; called as `frame.fly_frame` is.
 
     detector, law: the plug-ins, None where the built-in one is in place. names: what to call them when one is
-    at fault.
+    at fault. begun: the frame that this one follows in flight, whose plug-ins are not begun anew.
     """
 
     def __init__(
@@ -36,6 +36,7 @@ class PluginFrame:
         law: Law | None,
         names: tuple[str, str],
         context: tuple[Context, Context],
+        begun: "PluginFrame | None" = None,
     ) -> None:
         self.detector, self.law = detector, law
         self.verdict = Verdict()
@@ -45,9 +46,9 @@ class PluginFrame:
         self._isolated = {None: NOT_ISOLATED, "unanticipated": UNANTICIPATED}
         self._isolated |= {surface: s for s, surface in enumerate(surfaces)}
         self._t_s = 0.0
-        if detector is not None:
+        if detector is not None and not (begun and begun.detector is detector):
             self._ask(names[0], detector.reset, context[0])
-        if law is not None:
+        if law is not None and not (begun and begun.law is law):
             self._ask(names[1], law.reset, context[1])
 
     def __call__(self, frames: np.ndarray, references: np.ndarray, log: np.ndarray) -> int:
@@ -194,11 +195,33 @@ def plugin_frame(
     frames: the assembled record, made ready for them. start: as in `context_of`. Raises BadInput for a name
     that cannot be loaded, SimulationFailed for a plug-in that fails at reset.
     """
-    fdi, control = scenario.fdi, scenario.control
-    if detector is None and not is_compiled(DETECTORS, fdi.scheme):
-        detector = made(DETECTORS, fdi.scheme)
-    if law is None and not is_compiled(LAWS, control.law):
-        law = made(LAWS, control.law)
+    if detector is None:
+        detector = named_detector(scenario)
+    return plugged(frames, scenario, start, detector, named_law(scenario) if law is None else law)
+
+
+def named_detector(scenario: Scenario) -> Detector | None:
+    """The plug-in a scenario names for its diagnosis; None if it is compiled in."""
+    scheme = scenario.fdi.scheme
+    return None if is_compiled(DETECTORS, scheme) else made(DETECTORS, scheme)
+
+
+def named_law(scenario: Scenario) -> Law | None:
+    """The plug-in a scenario names for its law; None if it is compiled in."""
+    law = scenario.control.law
+    return None if is_compiled(LAWS, law) else made(LAWS, law)
+
+
+def plugged(
+    frames: np.ndarray,
+    scenario: Scenario,
+    start: np.ndarray,
+    detector: Detector | None,
+    law: Law | None,
+    begun: PluginFrame | None = None,
+) -> PluginFrame | None:
+    """The frame with these plug-ins, the record made ready for them; None with none. begun: as in
+    `PluginFrame`."""
     if detector is None and law is None:
         return None
     if detector is not None:
@@ -208,10 +231,10 @@ def plugin_frame(
     if law is not None:
         frames["control"]["law"] = ADAPTIVE if getattr(law, "fault_tolerant", False) else NOMINAL
     contexts = (
-        context_of(frames, scenario, start, fdi.options),
-        context_of(frames, scenario, start, control.options),
+        context_of(frames, scenario, start, scenario.fdi.options),
+        context_of(frames, scenario, start, scenario.control.options),
     )
-    return PluginFrame(detector, law, _names(scenario, detector, law), contexts)
+    return PluginFrame(detector, law, _names(scenario, detector, law), contexts, begun)
 
 
 def _names(scenario: Scenario, detector: Detector | None, law: Law | None) -> tuple[str, str]:

@@ -47,16 +47,19 @@ def record_surfaces(truth, commanded, saturated, row, column):
 
 
 @kernel
-def record_estimators(fdi, row, column):
-    """Residuals between their limits, per estimator; not a number before the estimators start."""
-    for e in range(fdi.n_estimators):
+def record_estimators(fdi, logged, row, column):
+    """Residuals between their limits, per estimator there are columns for; not a number before the
+    estimators start, or where another diagnosis has taken their place."""
+    for e in range(logged):
         fie = fdi.estimator[e]
+        there = e < fdi.n_estimators
+        started = there and fdi.verdict.detected
         for i in range(3):
-            row[column] = fie.residual[i] if fdi.verdict.detected else np.nan
-            row[column + 1] = fie.lower[i] if fdi.verdict.detected else np.nan
-            row[column + 2] = fie.upper[i] if fdi.verdict.detected else np.nan
+            row[column] = fie.residual[i] if started else np.nan
+            row[column + 1] = fie.lower[i] if started else np.nan
+            row[column + 2] = fie.upper[i] if started else np.nan
             column += 3
-        row[column] = fie.excluded
+        row[column] = fie.excluded if there else np.nan
         column += 1
     return column
 
@@ -71,15 +74,16 @@ def record_alarm(bank, row, column):
 
 
 @kernel
-def record_diagnosis(fdi, acceleration, row, column):
-    """Alarm test, residual, threshold, bound, network, the design model's mean acceleration; estimators."""
+def record_diagnosis(fdi, acceleration, logged, row, column):
+    """Alarm test, residual, threshold, bound, network, the design model's mean acceleration; so many
+    estimators."""
     column = record_alarm(fdi.bank, row, column)
     column = put(row, column, fdi.fdae.residual)
     column = put(row, column, fdi.fdae.threshold)
     column = put(row, column, fdi.bound.eta_bar)
     column = put(row, column, fdi.fdae.network.output)
     column = put(row, column, acceleration)
-    return record_estimators(fdi, row, column)
+    return record_estimators(fdi, logged, row, column)
 
 
 @kernel
@@ -98,13 +102,15 @@ def record(frame, reference, row):
     column = put(row, column, reference)
     column = put(row, column, control.model_rate)
     column = record_surfaces(frame.truth, belief.commanded, control.saturated, row, column)
-    column = record_diagnosis(fdi, belief.means.acceleration, row, column)
+    column = record_diagnosis(fdi, belief.means.acceleration, frame.logged.estimators, row, column)
     column = put(row, column, control.effectiveness)
     row[column] = frame.supervisor.mode
     row[column + 1] = fdi.verdict.detected
-    if control.power.enabled or frame.autopilot.enabled:
+    if frame.logged.power:
         row[column + 2] = control.power.command[0]
     if frame.autopilot.enabled:
         record_profile(frame.autopilot, row, column + 3)
-    if fdi.statistical.enabled:
+    if frame.logged.tests and fdi.statistical.enabled:
         statistical.record(fdi.statistical, row)
+    elif frame.logged.tests:
+        row[row.size - frame.logged.tests :] = np.nan

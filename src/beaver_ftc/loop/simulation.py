@@ -4,7 +4,6 @@ What is done to a flight is kept, frame by frame: `scenario_flown` says it all a
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from difflib import get_close_matches
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,6 +13,7 @@ from beaver_ftc.aircraft.question import asked
 from beaver_ftc.control.outer.setup import set_up_profile
 from beaver_ftc.control.supervisor import MODES
 from beaver_ftc.errors import BadInput, suggestion
+from beaver_ftc.loop.asked import near, vector
 from beaver_ftc.loop.flight import Flight, LogSink
 from beaver_ftc.loop.held import HeldFrame
 from beaver_ftc.loop.loop import CHUNK_ROWS, FLYING, Loop
@@ -23,7 +23,7 @@ from beaver_ftc.loop.summary import verdict_of
 from beaver_ftc.plant.adapter import UnknownProperty
 from beaver_ftc.plant.gust import GustSchedule
 from beaver_ftc.scenario.given import fault_of, is_same_again
-from beaver_ftc.scenario.in_flight import aimed, blown
+from beaver_ftc.scenario.in_flight import aimed, blown, changed
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.signals import RAD_PER_DEG
 from beaver_ftc.scenario.sticks import flown, in_force
@@ -63,7 +63,6 @@ class Stepping:
         """
         self._scenario = self._given
         self._loop = Loop(self._scenario, *self._plug_ins, self._prepare)
-        self._own_frame = self._loop.fly_frame
         self._held_frame: HeldFrame | None = None
         self._faults = self._scenario.faults
         self._next, self._turn_at, self._written = 0, 0, 0
@@ -159,13 +158,13 @@ class Stepping:
         if not isinstance(frames, int) or frames < 1:
             raise BadInput(f"frames: {frames!r} is out of range, allowed: a whole number of at least 1")
         deflections = None if command is None else self._deflections(command)
-        rate_deg_s = None if stick is None else _vector(stick, 3, "stick", "rad/s") / RAD_PER_DEG
+        rate_deg_s = None if stick is None else vector(stick, 3, "stick", "rad/s") / RAD_PER_DEG
         if self._next > 0:
             self._last.clear()
         self._begin()
         self._take_command(deflections)
         end = min(self._next + frames, self._loop.n_frames)
-        self._fly_to(end, rate_deg_s)
+        self._fly_to(end, rate_deg_s, deflections)
 
     def inject(self, fault: Mapping[str, Any]) -> None:
         """Break something now, from the next frame on: a fault as in a scenario file, without `at_s`.
@@ -188,14 +187,25 @@ class Stepping:
         self._declare(tuple(self._repaired(fault, actuator) for fault in self._faults))
 
     def blow(self, gust: Mapping[str, Any]) -> None:
-        """Set a gust off now, from the next frame on: as `environment.gust`, without `at_s`.
+        """Set a gust off now, from the next frame on: as one of `environment.gust`, without `at_s`.
 
-        Raises BadInput that names the key, and for a second one: a scenario has one gust.
+        Raises BadInput that names the key, and while another one blows.
         """
         self._begin()
         self._scenario = blown(self._scenario, gust, self._now_s)
-        loop, given = self._loop, self._scenario.environment.gust
-        loop.gust, self._turn_at = GustSchedule(given, loop.plant, self._scenario.rate_hz), self._next
+        loop, gusts = self._loop, self._scenario.environment.gusts
+        loop.gust, self._turn_at = GustSchedule(gusts, loop.plant, self._scenario.rate_hz), self._next
+
+    def change(self, change: Mapping[str, Any]) -> None:
+        """Change law, diagnosis or sensors now, from the next frame on: as one of `changes`, without `at_s`.
+
+        A diagnosis that is changed begins anew; the log keeps its columns. Raises BadInput that names the
+        key, the flight going on as it was.
+        """
+        self._begin()
+        scenario = changed(self._scenario, change, self._now_s)
+        self._loop.change(scenario, self._next)
+        self._scenario, self._turn_at = scenario, self._next
 
     def aim(self, targets: Mapping[str, float]) -> None:
         """Give the autopilot new values from now on, `{"altitude_m": 1900}`. Raises BadInput with the key."""
@@ -208,8 +218,9 @@ class Stepping:
         try:
             return self._loop.plant.read(name)
         except UnknownProperty:
+            meant = near(name, self._loop.plant)
             raise BadInput(
-                f"the aircraft has no property {name!r:.80}{self._near(name)}, allowed: one that JSBSim lists"
+                f"the aircraft has no property {name!r:.80}{meant}, allowed: one that JSBSim lists"
             ) from None
 
     __getitem__ = read
@@ -272,9 +283,9 @@ class Stepping:
 
     def _begin(self) -> None:
         if self._next == 0:
-            self._fly_to(1, None)
+            self._fly_to(1)
 
-    def _fly_to(self, end: int, stick_deg_s: Vector | None) -> None:
+    def _fly_to(self, end: int, stick_deg_s: Vector | None = None, held_rad: Vector | None = None) -> None:
         """Frames up to `end`, chunk by chunk as `Loop.chunks` has them, stopping where something changes."""
         loop = self._loop
         while self._next < end and not self.departed:
@@ -283,6 +294,7 @@ class Stepping:
                 self._begin_chunk(k)
             if k >= self._turn_at:
                 self._turn_at = loop.turn_to(k)
+                self._hold(held_rad)
             stop = min(end, self._turn_at, (k // CHUNK_ROWS + 1) * CHUNK_ROWS)
             self._steering.put(k, stop, stick_deg_s)
             start = int(self._frame["row"])
@@ -312,37 +324,23 @@ class Stepping:
 
     def _take_command(self, deflections: Vector | None) -> None:
         """Command the surfaces in the law's place, from the frame just flown on; None gives them back."""
+        self._hold(deflections)
+        if deflections is not None:
+            self._by_hand = True
+            self._loop.command_instead(deflections)
+
+    def _hold(self, deflections: Vector | None) -> None:
+        """Fly frames in which these are commanded in the law's place, or with None the law's own."""
         loop = self._loop
         if loop.plugin_frame is not None:
-            loop.plugin_frame.held_rad = deflections
+            loop.plugin_frame.held_rad, loop.fly_frame = deflections, loop.own_frame
         elif deflections is None:
-            loop.fly_frame = self._own_frame
+            loop.fly_frame = loop.own_frame
         else:
             held = self._held_frame = self._held_frame or HeldFrame(loop.frames, loop.references, loop.log)
             held.deflections[:] = deflections
             loop.fly_frame = held
-        if deflections is not None:
-            self._by_hand = True
-            loop.command_instead(deflections)
 
     def _deflections(self, command: ArrayLike) -> Vector:
         low, high = self.travel_rad
-        return np.clip(_vector(command, low.size, "command", "rad"), low, high)
-
-    def _near(self, name: str) -> str:
-        catalogue: Any = self._loop.plant.fdm.query_property_catalog("")
-        known = [line.split(" ")[0] for line in catalogue.splitlines()]
-        near = get_close_matches(str(name), known, n=1)
-        return f", did you mean {near[0]}?" if near else ""
-
-
-def _vector(given: ArrayLike, size: int, what: str, unit: str) -> Vector:
-    """So many finite numbers, or BadInput."""
-    try:
-        array = np.asarray(given, dtype=float)
-    except (TypeError, ValueError):
-        array = np.empty(0)
-    if array.shape != (size,) or not np.isfinite(array).all():
-        shown = " ".join(repr(given).split())
-        raise BadInput(f"{what}: {shown:.80} is not usable, allowed: {size} finite numbers, {unit}")
-    return array
+        return np.clip(vector(command, low.size, "command", "rad"), low, high)

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from math import isfinite
+from typing import Any
 
 import numpy as np
 
@@ -169,9 +170,14 @@ def _of_verdict(fdi: np.void, verdict: Verdict) -> dict:
 
 
 def flight_of(
-    scenario: Scenario, frame: np.void, columns: tuple[str, ...], verdict: Verdict | None = None
+    scenario: Scenario,
+    frame: np.void,
+    columns: tuple[str, ...],
+    verdict: Verdict | None = None,
+    replaced: tuple[dict[str, Any], ...] = (),
 ) -> Flight:
-    """Read the flight's outcome off its frame record; `verdict` is a plug-in detector's last one."""
+    """Read the flight's outcome off its frame record; `verdict` is a plug-in detector's last one, `replaced`
+    what changes in flight have ended."""
     fdi, accounts, dt = frame["fdi"], frame["accounts"], float(frame["dt"])
     supervisor, tracking = frame["supervisor"], accounts["tracking"]
     surfaces = scenario.airframe.surfaces
@@ -204,6 +210,7 @@ def flight_of(
         probing_s=_probing_s(frame),
         engine_power=_engine_power(frame),
         profile=_profile(frame),
+        changes=replaced,
         surface_travel_rad={s: float(x) for s, x in zip(surfaces, accounts["travelled"], strict=True)},
         **(_isolation(fdi, surfaces) if verdict is None else _of_verdict(fdi, verdict)),
     )

@@ -1,12 +1,13 @@
-"""The air that moves: the one-minus-cosine gust, set off at its frame, and the axes of the turbulence.
+"""The air that moves: one-minus-cosine gusts, set off at their frames, and the axes of the turbulence.
 
 Both are JSBSim's own models.
 """
 
+from collections.abc import Sequence
 from math import ceil
 
 from beaver_ftc.plant.adapter import FT_PER_M, Plant
-from beaver_ftc.scenario.schema import Environment, Gust
+from beaver_ftc.scenario.environment import Environment, Gust
 
 NEVER = 2**62
 _LOCAL_FRAME = 3  # of atmosphere/cosine-gust/frame: north, east, down
@@ -31,14 +32,19 @@ class MovingAir:
 
 
 class GustSchedule:
-    """Sets the gust off; without one it does nothing."""
+    """Sets gusts off, one after the other; without any it does nothing."""
 
-    def __init__(self, gust: Gust | None, plant: Plant, rate_hz: float) -> None:
+    def __init__(self, gusts: Sequence[Gust], plant: Plant, rate_hz: float) -> None:
         self._plant = plant
-        self._starts = NEVER
-        if gust is None:
-            return
-        self._starts = ceil(gust.at_s * rate_hz - 1e-9)
+        self._starts = {ceil(gust.at_s * rate_hz - 1e-9): gust for gust in gusts if any(gust.velocity_mps)}
+
+    def apply(self, k: int) -> None:
+        """Set the gust off that starts with frame k."""
+        if k in self._starts:
+            self._set(self._starts[k])
+            self._plant.write("atmosphere/cosine-gust/start", 1.0)
+
+    def _set(self, gust: Gust) -> None:
         height = sum(speed**2 for speed in gust.velocity_mps) ** 0.5
         values = {
             "startup-duration-sec": gust.rise_s, "steady-duration-sec": gust.hold_s,
@@ -46,15 +52,8 @@ class GustSchedule:
         }  # fmt: skip
         values |= {f"{axis}-velocity-ft_sec": v for axis, v in zip("XYZ", gust.velocity_mps, strict=True)}
         for name, value in values.items():
-            plant.write(f"atmosphere/cosine-gust/{name}", value)
-        if height == 0.0:
-            self._starts = NEVER
-
-    def apply(self, k: int) -> None:
-        """Set the gust off if frame k is its."""
-        if k == self._starts:
-            self._plant.write("atmosphere/cosine-gust/start", 1.0)
+            self._plant.write(f"atmosphere/cosine-gust/{name}", value)
 
     def next_change(self, k: int) -> int:
         """The first frame after k at which `apply` has something to do."""
-        return self._starts if k < self._starts else NEVER
+        return min((start for start in self._starts if start > k), default=NEVER)

@@ -42,7 +42,7 @@ def metrics(flight: "Flight") -> Document:
         "faults": faults_of(scenario),
         "detection": _detection(flight, fault),
         "isolation": _isolation(flight, fault),
-        "false_alarm": _false_alarm(flight.detection_time_s, fault),
+        "false_alarm": any(_false_alarm(time_s, fault) for time_s in _alarms_s(flight)),
         "tracking": {
             "pre_fault_rms_deg_s": _per_axis_deg_s(_before(fault, flight.pre_fault_rms_rad_s)),
             "post_fault_rms_deg_s": _per_axis_deg_s(flight.post_fault_rms_rad_s),
@@ -51,6 +51,7 @@ def metrics(flight: "Flight") -> Document:
             },
         },
         "supervisor": [{"time_s": _number(time), "mode": mode} for time, mode in flight.supervisor],
+        "changes": [_change(change) for change in flight.changes],
         "mode_changes_left_out": flight.mode_changes - len(flight.supervisor),
         "envelope_exits": [
             {"start_s": _number(start), "end_s": _number(end)} for start, end in flight.envelope_exits
@@ -218,10 +219,21 @@ def _profile(flight: "Flight") -> Document | None:
 
 
 def _false_alarm(detection_time_s: float | None, fault: Document | None) -> bool:
-    """An alarm without a fault, or before it. (The alarm is latched: there is one a flight.)"""
+    """An alarm without a fault, or before it. (The alarm is latched: there is one a diagnosis.)"""
     if detection_time_s is None:
         return False
     return fault is None or _before_the_fault(detection_time_s, fault)
+
+
+def _alarms_s(flight: "Flight") -> list[float | None]:
+    """When there was an alarm: of the diagnosis at the end, and of those that changes in flight replaced."""
+    return [flight.detection_time_s, *(change.get("detection_time_s") for change in flight.changes)]
+
+
+def _change(change: Document) -> Document:
+    """What was changed in flight; detection_time_s and isolated are of a diagnosis that ended with it."""
+    times: Document = {key: _number(change[key]) for key in ("time_s", "detection_time_s") if key in change}
+    return {**change, **times}
 
 
 def _before_the_fault(time_s: float, fault: Document) -> bool:

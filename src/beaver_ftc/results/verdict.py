@@ -38,6 +38,7 @@ def facts(metrics: Document) -> list[tuple[str, str]]:
         *(("", said) for said in _others(metrics)),
         ("probing", _probing(metrics)),
         ("supervisor", _supervisor(metrics)),
+        *(("changed", _changed(change)) for change in metrics.get("changes", ())),
         ("engine power", _engine_power(metrics)),
         ("profile", _profile(metrics)),
         ("authority", _authority(metrics)),
@@ -107,6 +108,17 @@ def _table(metrics: Document, folder: str) -> "Table":
         table.add_row("expected", Text.assemble(mark, f" {name} {expected}, got {actual}"))
     table.add_row("results", folder)
     return table
+
+
+def _changed(change: Document) -> str:
+    """What was changed in flight, and what a diagnosis that ended with it had found."""
+    to = [f"{key} {change[key]}" for key in ("law", "scheme") if change[key]]
+    said = f"{', '.join([*to, *(['sensors'] if change['sensors'] else [])]) or 'declared sensors'}"
+    if change.get("detection_time_s") is None:
+        return f"{said} at {_time(change['time_s'])}"
+    found = change["isolated"] or "nothing named"
+    before = f"alarm at {_time(change['detection_time_s'])}, {found}"
+    return f"{said} at {_time(change['time_s'])}; the diagnosis before: {before}"
 
 
 def _flight(metrics: Document) -> str:

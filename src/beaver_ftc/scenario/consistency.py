@@ -4,6 +4,7 @@ Checked on an outline that a finished scenario and a half-wrong file both have, 
 reported along with the mistakes of the sections and not only after they are mended.
 """
 
+from itertools import pairwise
 from math import isfinite
 from typing import Any, NamedTuple
 
@@ -32,20 +33,21 @@ class Outline(NamedTuple):
     starts_s: tuple[float | None, ...] | None
     expected: tuple[str, ...]
     flown: tuple[str, ...] | None = ()  # channels of the autopilot
+    changes_s: tuple[float | None, ...] | None = ()
 
 
 def outline_of_data(data: dict[str, Any]) -> Outline:
     """The outline of a file's raw data, whatever it is."""
     faults, expect = data.get("faults", []), data.get("expect")
-    starts_s = [fault.get("at_s") if isinstance(fault, dict) else None for fault in _as_list(faults)]
     return Outline(
         duration_s=_positive(data.get("duration_s", DURATION_S)),
         rate_hz=_positive(data.get("rate_hz", RATE_HZ)),
-        starts_s=tuple(map(_positive, starts_s)) if isinstance(faults, list) else None,
+        starts_s=_instants(faults),
         expected=tuple(key for key, value in expect.items() if value is not None)
         if isinstance(expect, dict)
         else (),
         flown=_flown(data.get("autopilot")),
+        changes_s=_instants(data.get("changes", [])),
     )
 
 
@@ -59,6 +61,7 @@ def conflicts(outline: Outline) -> list[Conflict]:
     return [
         *_too_short(outline),
         *_too_late(outline),
+        *_out_of_order(outline),
         *_expected_of_no_fault(outline),
         *_expected_of_no_profile(outline),
     ]
@@ -82,11 +85,24 @@ def _too_late(outline: Outline) -> list[Conflict]:
     if end_s is None:
         return []
     allowed = f"allowed: earlier than duration_s, {end_s:g} s"
-    starts_s = enumerate(outline.starts_s or ())
     return [
-        (("faults", i, "at_s"), f"{at_s:g} is after the end, {allowed}")
-        for i, at_s in starts_s
+        ((section, i, "at_s"), f"{at_s:g} is after the end, {allowed}")
+        for section, starts_s in (("faults", outline.starts_s), ("changes", outline.changes_s))
+        for i, at_s in enumerate(starts_s or ())
         if at_s is not None and at_s >= end_s
+    ]
+
+
+def _out_of_order(outline: Outline) -> list[Conflict]:
+    """Changes stand in the order in which they come, so that a reader need not sort them."""
+    changes_s = outline.changes_s or ()
+    return [
+        (
+            ("changes", i, "at_s"),
+            f"{late:g} is not after the change before it, allowed: later than {early:g} s",
+        )
+        for i, (early, late) in enumerate(pairwise(changes_s), start=1)
+        if early is not None and late is not None and late <= early
     ]
 
 
@@ -107,8 +123,11 @@ def _expected_of_no_profile(outline: Outline) -> list[Conflict]:
     ]
 
 
-def _as_list(value: Any) -> list[Any]:
-    return value if isinstance(value, list) else []
+def _instants(given: Any) -> tuple[float | None, ...] | None:
+    """`at_s` of each entry of a list."""
+    if not isinstance(given, list):
+        return None
+    return tuple(_positive(entry.get("at_s")) if isinstance(entry, dict) else None for entry in given)
 
 
 def _positive(value: Any) -> float | None:

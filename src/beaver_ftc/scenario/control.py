@@ -8,7 +8,8 @@ from beaver_ftc.plugins import LAWS, refusal
 from beaver_ftc.scenario.base import refuse
 
 
-def _known_law(name: str) -> str:
+def known_law(name: str) -> str:
+    """A law there is, or a refusal."""
     wrong = refusal(LAWS, name)
     refuse([((), wrong)] if wrong else [])
     return name
@@ -67,7 +68,7 @@ class ControlConfig(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, strict=True)
 
-    law: Annotated[str, AfterValidator(_known_law)] = Field(
+    law: Annotated[str, AfterValidator(known_law)] = Field(
         "fault-tolerant",
         description="nominal | adaptive | fault-tolerant | oracle, a registered law (see `beaver-ftc list`), "
         "or module:Class of an installed package",

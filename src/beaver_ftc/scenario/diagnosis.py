@@ -33,10 +33,18 @@ class PerAxis(BaseModel):
         return self.p, self.q, self.r
 
 
-def _known_scheme(name: str) -> str:
+def known_scheme(name: str) -> str:
+    """A detector there is, or a refusal."""
     wrong = refusal(DETECTORS, name)
     refuse([((), wrong)] if wrong else [])
     return name
+
+
+def can_be_bounded(given: Sensors) -> Sensors:
+    """Errors that have a bound, or a refusal."""
+    loose = [name for name, sensor in given if not sensor.is_bounded]
+    refuse([((name,), "a lag, a delay or a lost sample has no bound, allowed: 0") for name in loose])
+    return given
 
 
 class Bounds(BaseModel):
@@ -77,9 +85,7 @@ class Bounds(BaseModel):
     @field_validator("sensors")
     @classmethod
     def _can_be_bounded(cls, given: Sensors) -> Sensors:
-        loose = [name for name, sensor in given if not sensor.is_bounded]
-        refuse([((name,), "a lag, a delay or a lost sample has no bound, allowed: 0") for name in loose])
-        return given
+        return can_be_bounded(given)
 
 
 class Statistical(BaseModel):
@@ -151,7 +157,7 @@ class FdiConfig(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, strict=True)
 
-    scheme: Annotated[str, AfterValidator(_known_scheme)] = Field(
+    scheme: Annotated[str, AfterValidator(known_scheme)] = Field(
         "adaptive-estimators",
         description="a registered detector (`beaver-ftc list`), module:Class of an installed package, none",
     )

@@ -10,12 +10,14 @@ from typing import Any, TypeVar
 
 from beaver_ftc.errors import BadInput
 from beaver_ftc.scenario.base import Section
+from beaver_ftc.scenario.change import Change
 from beaver_ftc.scenario.changes import plain
 from beaver_ftc.scenario.document import Document, Problem
+from beaver_ftc.scenario.environment import Gust
 from beaver_ftc.scenario.faults import Fault
 from beaver_ftc.scenario.loader import load_scenario, validate_scenario
 from beaver_ftc.scenario.problems import ScenarioError
-from beaver_ftc.scenario.schema import Gust, Scenario
+from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.validation import validate
 
 ScenarioLike = Scenario | str | PathLike[str] | Mapping[str, Any]
@@ -30,6 +32,10 @@ class _OneFault(Section):
 
 class _OneGust(Section):
     gust: Gust
+
+
+class _OneChange(Section):
+    change: Change
 
 
 OneThing = TypeVar("OneThing", bound=Section)
@@ -58,6 +64,11 @@ def fault_of(given: Mapping[str, Any], at_s: float) -> Fault:
 def gust_of(given: Mapping[str, Any], at_s: float) -> Gust:
     """The gust that a mapping without `at_s` describes, from at_s on. Raises BadInput with the key."""
     return _begun(_OneGust, "gust", given, at_s, "of `velocity_mps` and its times").gust
+
+
+def change_of(given: Mapping[str, Any], at_s: float) -> Change:
+    """The change that a mapping without `at_s` describes, from at_s on. Raises BadInput with the key."""
+    return _begun(_OneChange, "change", given, at_s, "of law, scheme, sensors or declared_sensors").change
 
 
 def _begun(model: type[OneThing], what: str, given: Mapping[str, Any], at_s: float, keys: str) -> OneThing:

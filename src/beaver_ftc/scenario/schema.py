@@ -20,9 +20,11 @@ from beaver_ftc.aircraft.question import asked, named
 from beaver_ftc.scenario.actuators import Actuators
 from beaver_ftc.scenario.autopilot import Autopilot
 from beaver_ftc.scenario.base import Flag, Number, Section, Whole, number, refuse
+from beaver_ftc.scenario.change import Change
 from beaver_ftc.scenario.consistency import DURATION_S, RATE_HZ, Outline, conflicts
 from beaver_ftc.scenario.control import ControlConfig
 from beaver_ftc.scenario.diagnosis import FdiConfig
+from beaver_ftc.scenario.environment import Environment
 from beaver_ftc.scenario.faults import Fault
 from beaver_ftc.scenario.initial import Initial, default_initial, given_initial, initial_schema
 from beaver_ftc.scenario.names import Ratio, Ratios, folder_of, known_aircraft, nameable
@@ -91,47 +93,6 @@ class Uncertainty(Section):
         description="centre of gravity, forward, right and down of where the designer has it, m",
         json_schema_extra={"unit": "m"},
     )
-
-
-Wind = Annotated[Number, Field(ge=-100, le=100)]
-
-
-class Gust(Section):
-    """A one-minus-cosine gust: it rises, stays and fades as JSBSim's own does."""
-
-    at_s: Number = number(unit="s", says="when it starts", ge=0, le=360_000)
-    velocity_mps: tuple[Wind, Wind, Wind] = Field(
-        description="at its height, towards north, east, down, m/s", json_schema_extra={"unit": "m/s"}
-    )
-    rise_s: Number = number(1.0, unit="s", says="duration of the rise", gt=0, le=3600)
-    hold_s: Number = number(0.0, unit="s", says="time at its height", ge=0, le=3600)
-    fade_s: Number = number(1.0, unit="s", says="duration of the decay", gt=0, le=3600)
-
-
-class Environment(Section):
-    """The air."""
-
-    turbulence: Literal["none", "dryden"] = Field(
-        default="none", description="still air or Dryden turbulence"
-    )
-    severity: Literal["light", "moderate", "severe"] | None = Field(
-        default=None, description="of the turbulence"
-    )
-    wind_mps: tuple[Wind, Wind, Wind] = Field(
-        default=(0.0, 0.0, 0.0),
-        description="steady wind towards north, east, down, m/s",
-        json_schema_extra={"unit": "m/s"},
-    )
-    gust: Gust | None = Field(default=None, description="a one-minus-cosine gust")
-
-    @model_validator(mode="after")
-    def _severity_belongs_to_turbulence(self) -> Self:
-        turbulent = self.turbulence != "none"
-        if turbulent and self.severity is None:
-            refuse([(("severity",), "required key is missing, allowed: light, moderate, severe")])
-        if self.severity is not None and not turbulent:
-            refuse([(("severity",), "has no meaning here, allowed: only with turbulence: dryden")])
-        return self
 
 
 Scale = Annotated[Number, Field(ge=0.1, le=10)]
@@ -275,9 +236,12 @@ class Scenario(Section):
     )
     actuators: Actuators = Field(default_factory=Actuators, description="actuator dynamics")
     sensors: Sensors = Field(default_factory=Sensors, description="measurement errors")
-    environment: Environment = Field(default_factory=Environment, description="wind and turbulence")
+    environment: Environment = Field(default_factory=Environment, description="wind, turbulence and gusts")
     fdi: FdiConfig = Field(default_factory=FdiConfig, description="fault detection and isolation")
     control: ControlConfig = Field(default_factory=ControlConfig, description="the control law")
+    changes: tuple[Change, ...] = Field(
+        default=(), max_length=1000, description="law, diagnosis and sensors changed in flight, and when"
+    )
     design_model: DesignModel = Field(default_factory=DesignModel, description="what the designer believes")
     expect: Expect = Field(default_factory=Expect, description="what must come out")
 
@@ -315,7 +279,8 @@ class Scenario(Section):
         expected = tuple(key for key, value in self.expect if value is not None)
         flown = self.autopilot.channels if self.autopilot else ()
         starts_s = tuple(fault.at_s for fault in self.faults)
-        return Outline(self.duration_s, self.rate_hz, starts_s, expected, flown)
+        changes_s = tuple(change.at_s for change in self.changes)
+        return Outline(self.duration_s, self.rate_hz, starts_s, expected, flown, changes_s)
 
     def with_(self, changes: Mapping[str, Any]) -> "Scenario":
         """This scenario with new values at dotted keys, e.g. `{"faults[0].magnitude": 0.2}`.

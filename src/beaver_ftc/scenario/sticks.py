@@ -63,6 +63,8 @@ def flown(scenario: Scenario, faults: Sequence[Any], stick: StickTrack, frames: 
     data = scenario.model_dump(mode="json", by_alias=True, exclude_unset=True)
     data["duration_s"] = end_s
     data["faults"] = [_dump(fault) for fault in in_force(faults, end_s)]
+    if scenario.changes:
+        data["changes"] = [_dump(change) for change in scenario.changes if change.at_s < end_s]
     if not data["faults"]:
         expect = data.get("expect", {})
         data["expect"] = {key: value for key, value in expect.items() if key not in OF_A_FAULT}
@@ -78,8 +80,8 @@ def flown(scenario: Scenario, faults: Sequence[Any], stick: StickTrack, frames: 
         return validate_scenario(Document(data))
 
 
-def _dump(fault: Any) -> Any:
-    return fault.model_dump(mode="json", exclude_unset=True)
+def _dump(entry: Any) -> Any:
+    return entry.model_dump(mode="json", exclude_unset=True)
 
 
 def in_force(faults: Sequence[Any], end_s: float) -> tuple[Any, ...]:

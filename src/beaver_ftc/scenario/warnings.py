@@ -70,7 +70,7 @@ def _unstructured(scenario: Any) -> Iterator[str]:
 def _air(scenario: Any) -> Iterator[str]:
     """Air whose rotation no bound covers."""
     environment = scenario.environment
-    if environment.gust is not None and any(environment.gust.velocity_mps):
+    if any(any(gust.velocity_mps) for gust in environment.gusts):
         yield "environment.gust: what a gust does is covered by fdi.bounds.constant_rad_s2 only"
     if environment.severity is not None and scenario.initial.altitude_m < LOWEST_TURBULENCE_M:
         yield (

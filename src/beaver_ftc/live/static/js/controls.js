@@ -18,6 +18,8 @@ export function wireControls(view, sticks) {
   byId("gust-side").addEventListener("click", () => perform({ do: "blow", velocity_mps: [0, 6, 0] }));
   byId("invite").addEventListener("click", invite);
   byId("fresh").addEventListener("submit", fresh);
+  byId("change").addEventListener("click", change);
+  byId("renew").addEventListener("click", () => perform({ do: "change", scheme: flight.state.flying.scheme }));
   byId("aim").addEventListener("submit", aim);
   byId("autopilot-on").addEventListener("click", () => perform({ do: "fresh", autopilot: true }));
   document.addEventListener("keydown", (event) => keyDown(event, view, sticks));
@@ -80,6 +82,21 @@ export function drawControls(state) {
     : `${state.achieved.toFixed(state.achieved < 10 ? 1 : 0)}x${late ? " (machine too slow)" : ""}, jitter ${state.jitter_ms.toFixed(1)} ms`
       + (state.pages > 1 ? `, ${state.pages} pages` : "");
   byId("gust-up").disabled = byId("gust-side").disabled = state.gust;
+  byId("change").disabled = byId("renew").disabled = state.over || state.game.phase === "waiting";
+  drawFlying(state.flying);
+}
+
+// What the form asks for and the flight does not do yet; what a form leaves as it is stays.
+function change() {
+  const form = new FormData(byId("fresh")), flying = flight.state?.flying ?? {};
+  const asked = ["law", "scheme", "sensors"].map((key) => [key, form.get(key)]).filter(([key, chosen]) => chosen && chosen !== flying[key]);
+  if (asked.length) perform({ do: "change", ...Object.fromEntries(asked) });
+  else notice("nothing to change: choose another law, diagnosis or sensors");
+}
+
+function drawFlying({ law, scheme, sensors }) {
+  const text = `In charge: law ${law}, diagnosis ${scheme}${sensors ? `, sensors ${sensors}` : ""}.`;
+  if (byId("flying").textContent !== text) byId("flying").textContent = text;
 }
 
 function keyDown(event, view, sticks) {

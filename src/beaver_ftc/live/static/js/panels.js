@@ -30,6 +30,8 @@ function verdictText(frame) {
 function drawCandidates(frame, hidden) {
   const list = byId("candidates");
   const named = hidden ? null : frame.isolated;
+  const first = list.children[0]; // another diagnosis than the flight began with has no such candidates
+  list.classList.toggle("gone", Boolean(first) && !hidden && value(`fie_${first.dataset.name}_excluded`) === null);
   for (const item of list.children) {
     const out = !hidden && value(`fie_${item.dataset.name}_excluded`) === 1;
     const isNamed = Boolean(named) && item.dataset.name.split("_")[0] === named && !out;
@@ -49,7 +51,7 @@ export function meetDiagnosis(hello) {
   }));
 }
 
-const MARKS = { alarm: "▲", named: "◆", broken: "✕", repaired: "✓", supervisor: "⇄", lost: "✖", saved: "⤓", gust: "≋", autopilot: "➤", game: "★", flight: "✈", candidates: "…" };
+const MARKS = { alarm: "▲", named: "◆", broken: "✕", repaired: "✓", supervisor: "⇄", lost: "✖", saved: "⤓", gust: "≋", autopilot: "➤", changed: "⇆", game: "★", flight: "✈", candidates: "…" };
 
 export function addEvents(events) {
   const list = byId("events");

@@ -1,0 +1,165 @@
+"""Law, diagnosis and sensors changed in flight.
+
+For each change the record of the flight is assembled once more, as the scenario says it from then on and from
+the same trim. At its frame the part that changes is taken from it: the law's, with what the surfaces and the
+reference stand at; the diagnosis', which begins anew; or the instruments'. Truth, belief, supervisor,
+accounts and log go on, and so do plug-ins that are not changed.
+"""
+
+from math import ceil
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from beaver_ftc.control.laws.state import REJECTING
+from beaver_ftc.control.state import NOMINAL, ORACLE
+from beaver_ftc.loop.assembly import assemble
+from beaver_ftc.loop.frame import fly_frame
+from beaver_ftc.loop.plugin_frame import PluginFrame, named_detector, named_law, plugged
+from beaver_ftc.plant.faults import NEVER, TIME_TOLERANCE_S
+from beaver_ftc.scenario.change import Change
+from beaver_ftc.scenario.in_flight import stages
+from beaver_ftc.scenario.schema import Scenario
+
+# What a law takes over from the one before it: where reference, command and engine are, and what is believed.
+KEPT_OF_CONTROL = (
+    "commanded_rate", "model_rate", "model_acceleration", "governed_rate", "governed_acceleration",
+    "command", "saturated", "effectiveness", "offset", "lag", "hand_over",
+    "probe", "probed", "probe_from_s", "probe_to_s",
+)  # fmt: skip
+KEPT_OF_POWER = (
+    "lost", "engaged", "in_use", "moved", "speed", "usual_speed", "attitude", "command",
+    "from_s", "frames", "least", "greatest",
+)  # fmt: skip
+OF_INSTRUMENTS = ("real", "gain", "bias", "noise", "quantum", "dropout", "keep", "delay")
+
+
+class Stage(NamedTuple):
+    """A change ready to be made: its frame, the record to take it from, the plug-ins from then on."""
+
+    frame: int
+    change: Change
+    frames: np.ndarray
+    plugins: PluginFrame | None
+
+
+class Changing:
+    """The changes of a flight, of a `loop.Loop`. replaced: those made, and what the diagnosis that each ended
+    had found."""
+
+    def __init__(self, loop: Any, scenario: Scenario) -> None:
+        self._loop = loop
+        self.replaced: list[dict[str, Any]] = []
+        self.plan(scenario, 0)
+
+    def plan(self, scenario: Scenario, k: int) -> None:
+        """Make ready what a scenario changes from frame k on. Raises BadInput for what cannot be flown."""
+        coming, plugins = [], self._loop.plugin_frame
+        for change, then in stages(scenario):
+            frame = ceil((change.at_s - TIME_TOLERANCE_S) * scenario.rate_hz)
+            if frame >= k:
+                coming.append(self._stage(frame, change, then, plugins))
+                plugins = coming[-1].plugins
+        self._coming = coming
+
+    def _stage(self, frame: int, change: Change, then: Scenario, before: PluginFrame | None) -> Stage:
+        loop = self._loop
+        control = loop.frames["control"][0]
+        frames = assemble(then, control["trim"], np.array([control["low"], control["high"]]))
+        loop.anchor(frames[0], then)
+        detector = before.detector if before and not change.renews_diagnosis else None
+        law = before.law if before and change.law is None else None
+        if change.renews_diagnosis:
+            detector = named_detector(then)
+        if change.law is not None:
+            law = named_law(then)
+        return Stage(frame, change, frames, plugged(frames, then, loop.start, detector, law, before))
+
+    def next_change(self, k: int) -> int:
+        """The first frame after k at which `apply` has something to do."""
+        return min((stage.frame for stage in self._coming if stage.frame > k), default=NEVER)
+
+    def apply(self, k: int) -> None:
+        """Make the changes of frame k, the next to fly."""
+        for stage in [stage for stage in self._coming if stage.frame == k]:
+            self._make(stage)
+            self._coming.remove(stage)
+
+    def _make(self, stage: Stage) -> None:
+        loop, change = self._loop, stage.change
+        frame, new = loop.frames[0], stage.frames[0]
+        self._note(stage)
+        if change.law is not None:
+            take_law(frame, new["control"])
+        if change.renews_diagnosis:
+            take_diagnosis(frame, new, stage.frame)
+        if change.sensors is not None:
+            take_instruments(frame["instruments"], new["instruments"])
+        frame["control"]["power"]["enabled"] = new["control"]["power"]["enabled"]
+        frame["control"]["hands_back"] = 1
+        take_plugins(loop, stage.plugins)
+
+    def _note(self, stage: Stage) -> None:
+        """Say what is changed, and what becomes of a verdict that ends with it."""
+        change = stage.change
+        noted = {"time_s": stage.frame / self._loop.scenario.rate_hz, "law": change.law}
+        noted |= {"scheme": change.scheme, "sensors": change.sensors is not None}
+        if change.renews_diagnosis:
+            found = self._loop.land()
+            noted |= {"detection_time_s": found.detection_time_s, "isolated": found.isolated}
+        self.replaced.append(noted)
+
+
+def take_law(frame: np.void, new: np.void) -> None:
+    """Put a law in the place of another, without a bump: its integrators begin where the demand is."""
+    control, verdict = frame["control"], frame["fdi"]["verdict"]
+    disturbance = _unexplained(control)
+    for name in KEPT_OF_CONTROL:
+        new[name] = control[name]
+    for name in KEPT_OF_POWER:
+        new["power"][name] = control["power"][name]
+    if new["inner"] == REJECTING:
+        for name in ("begun", "rate"):  # where there is no observer yet it begins with what is measured
+            new["rejection"][name] = control["rejection"][name]
+        new["rejection"]["disturbance"] = disturbance
+    elif new["Ki"] > 0.0:
+        learns = verdict["detected"] and new["law"] not in (NOMINAL, ORACLE)
+        learnt = frame["fdi"]["fdae"]["network"]["output"] if learns else 0.0
+        new["integral"] = (learnt - disturbance) / new["Ki"]
+    frame["control"] = new
+
+
+def _unexplained(control: np.void) -> np.ndarray:
+    """What the law in charge takes for acceleration that no model explains, (3,) rad/s2."""
+    if control["inner"] == REJECTING:
+        disturbance: np.ndarray = control["rejection"]["disturbance"].copy()
+        return disturbance
+    learnt: np.ndarray = control["fhat"] - control["Ki"] * control["integral"]
+    return learnt
+
+
+def take_diagnosis(frame: np.void, new: np.void, k: int) -> None:
+    """Begin the diagnosis anew with frame k; what healthy flight has shown of its margins is kept."""
+    fdi, other = frame["fdi"], new["fdi"]
+    if fdi["bank"]["n"] == other["bank"]["n"]:
+        other["bank"]["closest"] = fdi["bank"]["closest"]
+    other["statistical"]["closest"] = fdi["statistical"]["closest"]
+    frame["fdi"], frame["verdict"], frame["since"] = other, new["verdict"], k
+
+
+def take_instruments(instruments: np.void, new: np.void) -> None:
+    """Other errors; the random numbers go on, lags and delays begin with the present value."""
+    for name in OF_INSTRUMENTS:
+        instruments[name] = new[name]
+    instruments["taken"] = 0
+
+
+def take_plugins(loop: Any, plugins: PluginFrame | None) -> None:
+    """Fly on with these plug-ins; one that was there before has its last verdict still."""
+    before = loop.plugin_frame
+    if plugins is not None and before is not None:
+        plugins.held_rad = before.held_rad
+        if plugins.detector is before.detector:
+            plugins.verdict = before.verdict
+    loop.plugin_frame = plugins
+    loop.own_frame = loop.fly_frame = plugins or loop.direct(fly_frame)

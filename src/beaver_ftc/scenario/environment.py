@@ -1,0 +1,92 @@
+"""What a scenario may say of the air (`environment:`): steady wind, turbulence, gusts."""
+
+from itertools import pairwise
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import Discriminator, Field, Tag, model_validator
+
+from beaver_ftc.scenario.base import Conflict, Number, Section, number, refuse
+
+MAX_GUSTS = 100
+Wind = Annotated[Number, Field(ge=-100, le=100)]
+
+
+class Gust(Section):
+    """A one-minus-cosine gust: it rises, stays and fades as JSBSim's own does."""
+
+    at_s: Number = number(unit="s", says="when it starts", ge=0, le=360_000)
+    velocity_mps: tuple[Wind, Wind, Wind] = Field(
+        description="at its height, towards north, east, down, m/s", json_schema_extra={"unit": "m/s"}
+    )
+    rise_s: Number = number(1.0, unit="s", says="duration of the rise", gt=0, le=3600)
+    hold_s: Number = number(0.0, unit="s", says="time at its height", ge=0, le=3600)
+    fade_s: Number = number(1.0, unit="s", says="duration of the decay", gt=0, le=3600)
+
+    @property
+    def end_s(self) -> float:
+        """When it has faded."""
+        return self.at_s + self.rise_s + self.hold_s + self.fade_s
+
+
+def _one_or_several(given: Any) -> str:
+    return "several" if isinstance(given, list | tuple) else "one"
+
+
+class Environment(Section):
+    """The air."""
+
+    turbulence: Literal["none", "dryden"] = Field(
+        default="none", description="still air or Dryden turbulence"
+    )
+    severity: Literal["light", "moderate", "severe"] | None = Field(
+        default=None, description="of the turbulence"
+    )
+    wind_mps: tuple[Wind, Wind, Wind] = Field(
+        default=(0.0, 0.0, 0.0),
+        description="steady wind towards north, east, down, m/s",
+        json_schema_extra={"unit": "m/s"},
+    )
+    gust: (
+        Annotated[
+            Annotated[Gust, Tag("one")]
+            | Annotated[tuple[Gust, ...], Tag("several"), Field(max_length=MAX_GUSTS)],
+            Discriminator(_one_or_several),
+        ]
+        | None
+    ) = Field(
+        default=None,
+        description="a one-minus-cosine gust, or a list of them, each begun after the one before has faded",
+    )
+
+    @property
+    def gusts(self) -> tuple[Gust, ...]:
+        """Every gust, in the order in which they start."""
+        if self.gust is None:
+            return ()
+        return (self.gust,) if isinstance(self.gust, Gust) else self.gust
+
+    @model_validator(mode="after")
+    def _severity_belongs_to_turbulence(self) -> Self:
+        turbulent = self.turbulence != "none"
+        if turbulent and self.severity is None:
+            refuse([(("severity",), "required key is missing, allowed: light, moderate, severe")])
+        if self.severity is not None and not turbulent:
+            refuse([(("severity",), "has no meaning here, allowed: only with turbulence: dryden")])
+        return self
+
+    @model_validator(mode="after")
+    def _one_gust_at_a_time(self) -> Self:
+        refuse(_overlapping(self.gusts))
+        return self
+
+
+def _overlapping(gusts: tuple[Gust, ...]) -> list[Conflict]:
+    """JSBSim flies one gust at a time."""
+    return [
+        (
+            ("gust", i, "at_s"),
+            f"{late.at_s:g} is before the gust before it has faded, allowed: {early.end_s:g} s or later",
+        )
+        for i, (early, late) in enumerate(pairwise(gusts), start=1)
+        if late.at_s < early.end_s
+    ]

@@ -1,0 +1,208 @@
+"""Law, diagnosis and sensors changed in flight: when asked for, without a bump, and again to the bit."""
+
+import numpy as np
+import pytest
+
+import beaver_ftc as bf
+from flying import loss, scenario
+
+LAWS = ("nominal", "adaptive", "fault-tolerant", "fault-tolerant-published", "oracle", "lqr", "indi")
+SCHEMES = ("none", "augmented-ekf", "adaptive-estimators")
+
+
+def same_log(one, other):
+    return list(one.columns) == list(other.columns) and np.array_equal(one, other, equal_nan=True)
+
+
+def flown(*changes, seconds=6.0, **more):
+    """A flight on which these changes are made at their second."""
+    sim = bf.Simulation(scenario(duration_s=seconds, **more))
+    for at_s, change in changes:
+        left = round(100 * at_s) - max(sim.frames, 1)  # the first step flies frame 0 as well
+        if left:
+            sim.step(frames=left)
+        sim.change(change)
+    while not sim.done:
+        sim.step(frames=37)
+    return sim
+
+
+@pytest.fixture(scope="module")
+def unchanged():
+    return bf.fly(scenario(duration_s=6.0, faults=[loss(at_s=3.0)])).log
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_a_law_changed_is_flown_again_to_the_bit(law, unchanged):
+    sim = flown((2.0, {"law": law}), (4.5, {"law": "fault-tolerant"}), faults=[loss(at_s=3.0)])
+    log = sim.log
+    assert same_log(log, bf.fly(sim.scenario_flown()).log)
+    commands = [name for name in log.columns if name.endswith("_cmd_rad")]
+    differs = (log[commands] - unchanged[commands]).abs().max(axis=1)
+    assert differs[:201].max() == 0.0  # the command of frame 200 is in effect, and logged, from 201 on
+    same = law == "fault-tolerant-published"
+    assert (differs[201:450].max() < 1e-9) == same
+
+
+@pytest.mark.parametrize(
+    ("law", "then"),
+    [
+        ("fault-tolerant", "nominal"),
+        ("nominal", "fault-tolerant"),
+        ("adaptive", "nominal"),
+        ("fault-tolerant", "oracle"),
+    ],
+)
+def test_a_law_takes_over_what_the_one_before_it_had_learnt(law, then):
+    """Of a wrong pitching moment nobody is told. A law that began without what integrator or observer had
+    found of it jumps by 0.010 to 0.014 rad of elevator; gains that differ are allowed their part."""
+    wrong = {"design_model": {"coefficients": {"Cm_0": 1.3}}, "fdi": {"scheme": "none"}, "duration_s": 10.0}
+    log = bf.fly(scenario(**wrong, control={"law": law}, changes=[{"at_s": 8.0, "law": then}])).log
+    moved = log["elevator_cmd_rad"].diff().abs()
+    assert moved[800:803].max() < 0.006
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_a_diagnosis_changed_begins_anew_and_is_flown_again_to_the_bit(scheme):
+    sim = flown((2.0, {"scheme": scheme}), (4.5, {"scheme": "adaptive-estimators"}), faults=[loss(at_s=3.0)])
+    log = sim.log
+    assert same_log(log, bf.fly(sim.scenario_flown()).log)
+    assert log["detected"].iloc[449] == (scheme != "none")
+    assert log["detected"].iloc[450] == 0.0
+    metrics = sim.land().metrics
+    assert metrics["detection"]["time_s"] > 4.5  # the last diagnosis finds it again
+    assert metrics["isolation"]["fault"] == "elevator"
+    first, second = metrics["changes"]
+    assert (first["time_s"], first["scheme"], first["detection_time_s"]) == (2.0, scheme, None)
+    assert (second["detection_time_s"] is None) == (scheme == "none")
+
+
+def test_a_healthy_flight_has_no_alarm_whatever_is_changed():
+    ours = {"scheme": "adaptive-estimators"}
+    sim = flown(
+        (1.0, ours), (2.0, {"law": "nominal"}), (2.5, {"scheme": "none"}), (3.0, {"law": "lqr", **ours})
+    )
+    assert not sim.land().metrics["false_alarm"]
+    assert same_log(sim.log, bf.fly(sim.scenario_flown()).log)
+
+
+def test_an_alarm_before_the_fault_stays_a_false_one():
+    """Undeclared sensor errors raise it; a diagnosis begun anew does not make it undone."""
+    bad = {"sensors": {"q": {"bias_deg_s": 3.0}}}
+    sim = flown((1.0, bad), (3.0, {"scheme": "adaptive-estimators", "sensors": "ideal"}))
+    metrics = sim.land().metrics
+    assert metrics["false_alarm"]
+    assert metrics["detection"]["time_s"] is None
+    assert metrics["changes"][1]["detection_time_s"] == pytest.approx(1.0, abs=0.2)
+
+
+def test_sensors_changed_and_declared():
+    grade = {"sensors": "tactical-grade", "declared_sensors": "tactical-grade"}
+    sim = flown((2.0, grade), (4.0, {"sensors": "ideal"}))
+    log = sim.log
+    assert same_log(log, bf.fly(sim.scenario_flown()).log)
+    noise = (log["p_measured_rad_s"] - log["p_rad_s"]).abs() > 0
+    assert (noise[:200].any(), noise[200:400].all(), noise[400:].any()) == (False, True, False)
+    assert sim.land().metrics["detection"]["time_s"] is None
+
+
+def test_every_part_of_the_log_stays_in_its_column():
+    """What is not there any more is not a number."""
+    given = {"statistical": {}, "fault_class": "all"}
+    sim = flown((2.0, {"scheme": "augmented-ekf"}), fdi=given)
+    log, plain = sim.log, bf.fly(scenario(duration_s=6.0, fdi=given)).log
+    assert list(log.columns) == list(plain.columns)
+    gone = [name for name in log.columns if name.startswith("fie_") or name.endswith("_likelihood_share")]
+    assert log[gone][200:].isna().all().all()
+    there = [name for name in log.columns if name not in gone]
+    assert log[there].notna().all().all()
+    assert log["manifold_pressure_inhg"].between(10, 36.5).all()
+    assert same_log(log[:200], plain[:200])
+
+
+def test_a_plug_in_that_is_not_changed_goes_on():
+    """An EKF that diagnoses keeps what it knows when the law beside it is changed."""
+    given = {"fdi": {"scheme": "augmented-ekf"}, "control": {"law": "lqr"}, "faults": [loss(at_s=2.0)]}
+    sim = flown((4.0, {"law": "indi"}), **given)
+    assert sim.land().metrics["detection"]["time_s"] < 4.0
+    assert sim.verdict.isolated == "elevator"
+    assert same_log(sim.log, bf.fly(sim.scenario_flown()).log)
+
+
+def test_a_change_now_before_one_that_is_to_come():
+    coming = [{"at_s": 4.0, "law": "nominal"}]
+    sim = flown((2.0, {"law": "lqr"}), (2.0, {"scheme": "none"}), changes=coming)
+    changes = sim.scenario_flown().changes
+    assert [(change.at_s, change.law, change.scheme) for change in changes] == [
+        (2.0, "lqr", "none"),
+        (4.0, "nominal", None),
+    ]
+    assert same_log(sim.log, bf.fly(sim.scenario_flown()).log)
+
+
+def test_a_change_that_has_not_been_flown_is_not_kept():
+    sim = bf.Simulation(scenario(duration_s=2.0))
+    sim.step(frames=50)
+    sim.change({"law": "nominal"})
+    assert sim.scenario_flown().changes == ()
+    sim.step()
+    assert sim.scenario_flown().changes[0].at_s == 0.51
+
+
+def test_by_hand_across_a_change():
+    """Whoever commands the surfaces goes on doing so, whatever law would be in charge."""
+    sim = bf.Simulation(scenario(duration_s=2.0, changes=[{"at_s": 0.5, "law": "lqr"}]))
+    sim.step(sim.trim_rad, frames=100)
+    log = sim.log
+    assert np.ptp(log["aileron_cmd_rad"][1:]) == 0.0
+    sim.step(frames=50)
+    assert np.ptp(sim.log["aileron_cmd_rad"]) > 0.0
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({}, "says no change"),
+        ({"law": "lqrr"}, "law: unknown law 'lqrr', did you mean lqr?"),
+        ({"scheme": 3}, r"scheme: 3 is a number"),
+        ({"sensors": "perfect"}, r"sensors: 'perfect' .*tactical-grade"),
+        ({"declared_sensors": {"p": {"delay_s": 0.1}}}, "declared_sensors.p: a lag, a delay"),
+        ({"at_s": 3, "law": "lqr"}, "at_s: has no meaning here"),
+        ({"speed": 3}, "speed: unknown key"),
+    ],
+)
+def test_a_mistake_is_said_in_one_line_and_the_flight_goes_on(change, says):
+    sim = bf.Simulation(scenario(duration_s=1.0))
+    sim.step(frames=10)
+    with pytest.raises(bf.BadInput, match=says) as refusal:
+        sim.change(change)
+    assert "\n" not in str(refusal.value)
+    sim.step(frames=10)
+    assert sim.scenario_flown().changes == ()
+
+
+@pytest.mark.parametrize(
+    ("changes", "says"),
+    [
+        ([{"law": "lqr"}], r"changes\[0\].at_s: required key is missing"),
+        ([{"at_s": 40, "law": "lqr"}], r"changes\[0\].at_s: 40 is after the end"),
+        ([{"at_s": 3, "law": "lqr"}, {"at_s": 3, "law": "indi"}], r"changes\[1\].at_s: 3 is not after the"),
+        ([{"at_s": 3}], r"changes\[0\]: says no change, allowed: law"),
+        ({"at_s": 3}, "changes: this is a mapping, allowed: a list"),
+    ],
+)
+def test_a_scenario_is_told_what_is_wrong(changes, says):
+    with pytest.raises(bf.BadInput, match=says) as refusal:
+        bf.load({"changes": changes})
+    assert "\n" not in str(refusal.value)
+
+
+def test_a_plug_in_that_cannot_begin_is_said_before_the_flight():
+    with pytest.raises(bf.BadInput, match="speed_of_light"):
+        bf.fly(scenario(duration_s=1.0, control={"law": "lqr", "options": {"speed_of_light": 1.0}},
+                        changes=[{"at_s": 0.2, "law": "indi"}, {"at_s": 0.5, "law": "lqr"}]))  # fmt: skip
+
+
+def test_the_words_say_it():
+    sim = flown((2.0, {"law": "nominal", "scheme": "none"}), seconds=3.0)
+    assert "law nominal, scheme none at 2.00 s" in repr(sim.land())

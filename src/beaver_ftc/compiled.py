@@ -46,6 +46,7 @@ _PACKAGE = Path(__file__).parent
 _SOURCES = (
     "aircraft/schema.py", "design/*.py", "diagnosis/*.py", "diagnosis/types/*.py", "control/*.py",
     "control/laws/*.py", "control/outer/*.py", "plant/channels.py", "plant/native.py", "plant/instruments.py",
+    "plant/readings.py",
     "compiled.py", "plant/sensing.py", "loop/frame.py", "loop/accounts.py", "loop/record.py",
     "loop/steps.py", "loop/watching.py",
 )  # fmt: skip

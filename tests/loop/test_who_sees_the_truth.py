@@ -58,7 +58,9 @@ print(json.dumps(calls))
 STUCK = [{"actuator": "elevator", "type": "stuck", "at_s": 1.0}]
 LOSS = [{"actuator": "aileron", "type": "loss_of_effectiveness", "magnitude": 0.8, "at_s": 1.0}]
 COMMON = {"name": "watched", "duration_s": 4, "rate_hz": 20}
+GYRO = [{"sensor": "q", "type": "bias", "magnitude": 2, "at_s": 1.0}]
 FLIGHTS = [
+    {"faults": GYRO, "sensors": {"V": {"bias_mps": 1.0}}},
     {"faults": STUCK, "fdi": {"fault_class": "all", "pairs": True}},
     {"faults": STUCK, "control": {"law": "oracle"}},
     {"faults": LOSS, "fdi": {"statistical": {}, "bounds": {"turbulence": "light"}}},

@@ -44,7 +44,7 @@ class Fault:
     profile: str = "abrupt"
 
     def model_dump(self, exclude: Any, exclude_none: bool) -> dict[str, Any]:
-        assert {"actuator", "type", "at_s", "end_s", "profile"} == exclude
+        assert {"actuator", "sensor", "type", "at_s", "end_s", "profile"} == exclude
         assert exclude_none
         return {"magnitude": self.magnitude}
 

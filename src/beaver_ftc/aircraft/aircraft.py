@@ -235,6 +235,13 @@ class Aircraft:
         """Settings of the engine a scenario may give."""
         return self.file.engine
 
+    @property
+    def has_engine_instruments(self) -> bool:
+        """Whether its first signal is the slipstream of a piston engine whose speed and manifold pressure can
+        be read [FDC]."""
+        known = {"engine_rpm", "manifold_pressure_inhg"} <= self.file.engine.settings.keys()
+        return known and next(iter(self.file.signals), "") == "dpt"
+
 
 def _sorted(section: object, coefficients: tuple[str, ...], constants: bool = False) -> tuple[Term, ...]:
     """Terms by coefficient, those without a surface first, of them the constant one."""

@@ -6,7 +6,7 @@ takes each surface for, so that what is known of a fault is no surprise; offset 
 
 from beaver_ftc.compiled import kernel
 from beaver_ftc.design.model import ALPHA, BETA, unanticipated_pitch
-from beaver_ftc.diagnosis import air, bank, detection, isolation, network, statistical
+from beaver_ftc.diagnosis import air, bank, detection, instruments, isolation, network, statistical
 from beaver_ftc.diagnosis.belief import begin_frame, look
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, STATISTICS, WORST_CASE
 from beaver_ftc.diagnosis.types import examine
@@ -80,14 +80,21 @@ def compare_likelihoods(fdi, belief, measured, k, t):
 
 @kernel
 def decide(fdi, measured, t):
-    """From residuals to alarm, and from then on to a verdict."""
+    """From residuals to alarm, and from then on to a verdict.
+
+    Where instruments are watched, a surface waits a frame after the alarm: that much later the attitude shows
+    what a gyro did. Once one of them is found broken, no surface is named.
+    """
+    if instruments.speaks(fdi.watch):
+        return
     known = fdi.verdict.detected
     detection.detect(fdi, measured.x, t)
     if not fdi.verdict.detected:
         return
     if not known:
         isolation.start(fdi, measured.x)
-    isolation.isolate(fdi, measured.x, t, known)
+    if known or not fdi.watch.enabled:
+        isolation.isolate(fdi, measured.x, t, known)
     network.evaluate(fdi.fdae.network, measured.y[ALPHA], measured.y[BETA])
 
 

@@ -8,6 +8,7 @@ from beaver_ftc.aircraft.schema import MAX_TERMS, MAX_TERMS_OF_ONE
 from beaver_ftc.diagnosis.air import AIR
 from beaver_ftc.diagnosis.derived import admitted_dtype
 from beaver_ftc.diagnosis.types.memory import surface_dtype
+from beaver_ftc.diagnosis.watch import WATCH
 from beaver_ftc.scenario.diagnosis import MAX_POLES
 
 MAX_ESTIMATORS = 16
@@ -201,6 +202,6 @@ def diagnosis_dtype(n: int) -> np.dtype:
         # faults of every type: types/
         ("every_type", "i8"), ("whole", "i8"), ("instants", "i8"), ("returns", "i8"), ("patience", "i8"),
         ("surface", surface_dtype(), (n,)), ("frame", "i8"), ("pair", PAIR), ("block", FRAME_BLOCK),
-        ("statistical", STATISTICAL),
+        ("statistical", STATISTICAL), ("watch", WATCH),
     ]  # fmt: skip
     return np.dtype(fields, align=True)

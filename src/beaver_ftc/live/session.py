@@ -60,7 +60,9 @@ class Session:
         self._gust_until_s = 0.0
         self._said: tuple[Any, ...] = (None, None, None, (), False)
         self._mode = sim.mode
-        self.broken = {fault.model_dump().get("actuator") or fault.type for fault in flown.faults}
+        self.broken = {
+            getattr(fault, "sensor", getattr(fault, "actuator", fault.type)) for fault in flown.faults
+        }
         self._tell("flight", f"{scenario.name}: trimmed, {flown.control.law} law, {flown.fdi.scheme}")
 
     @property
@@ -182,11 +184,11 @@ class Session:
     def _break(self, fault: dict[str, Any]) -> str:
         self._check_going_on()
         self.sim.inject(fault)
-        where = str(fault.get("actuator", fault["type"]))
+        where = str(fault.get("sensor", fault.get("actuator", fault["type"])))
         self.broken.add(where)
         if self.game.hidden:
             self.game.broke(fault, self.sim.t_s)
-        sizes = ", ".join(f"{k} {v}" for k, v in fault.items() if k not in ("type", "actuator"))
+        sizes = ", ".join(f"{k} {v}" for k, v in fault.items() if k not in ("type", "actuator", "sensor"))
         what = str(fault["type"]).replace("_", " ")
         self._tell("broken", f"{where}: {what}" + (f" ({sizes})" if sizes else ""), secret=True)
         return "" if self.game.hidden else f"{where} broken"

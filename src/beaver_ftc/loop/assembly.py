@@ -27,8 +27,8 @@ from beaver_ftc.diagnosis.state import (
 from beaver_ftc.diagnosis.types.pairs import IN_PITCH, IN_ROLL_AND_YAW
 from beaver_ftc.errors import BadInput
 from beaver_ftc.loop.frame import frame_dtype
+from beaver_ftc.loop.instruments import assemble_instruments, assemble_watch, truth_read
 from beaver_ftc.plant import channels as ch
-from beaver_ftc.plant.instruments import LONGEST_DELAY, SIGNALS
 from beaver_ftc.scenario.actuators import Actuators
 from beaver_ftc.scenario.control import ControlConfig
 from beaver_ftc.scenario.diagnosis import MAX_POLES, FdiConfig, Probing
@@ -251,24 +251,6 @@ def _slipstream_limits(scenario: Scenario, control: np.void) -> tuple[float, flo
     return slipstream(kw_per_inhg, 1.0, 1.0) - slipstream(0.0, 1.0, 1.0), max(dpt3, 0.0) ** (1.0 / 3.0)
 
 
-def _assemble_instruments(instruments: np.void, scenario: Scenario, dt: float) -> None:
-    """dt: seconds between samples, which is a JSBSim frame."""
-    instruments["real"] = not scenario.sensors.is_ideal
-    instruments["random"] = scenario.seed
-    for i, name in enumerate(SIGNALS):
-        sensor = getattr(scenario.sensors, name)
-        noise, bias, quantum = sensor.noise_bias_quantum
-        instruments["noise"][i], instruments["bias"][i], instruments["quantum"][i] = noise, bias, quantum
-        instruments["gain"][i], instruments["dropout"][i] = 1.0 + sensor.scale_error, sensor.dropout_share
-        instruments["keep"][i] = exp(-sensor.bandwidth_rad_s * dt) if sensor.bandwidth_rad_s else 0.0
-        instruments["delay"][i] = sensor.delay_s / dt
-        if sensor.delay_s / dt > LONGEST_DELAY:
-            raise BadInput(
-                f"{scenario.name}: sensors.{name}.delay_s is {sensor.delay_s:g} s, "
-                f"allowed: {LONGEST_DELAY} JSBSim frames, {LONGEST_DELAY * dt:g} s here"
-            )
-
-
 def _assemble_actuators(
     actuators: np.void, given: Actuators, dt: float, travel: np.ndarray, surfaces: tuple[str, ...]
 ) -> None:
@@ -309,12 +291,13 @@ def assemble(scenario: Scenario, trim: np.ndarray, travel: np.ndarray) -> np.nda
     belief["share"] = 1.0 / scenario.substeps
     belief["design"] = design_of(scenario.design_model, scenario.airframe)[0]
     belief["u"] = belief["commanded"] = trim
-    channels = ch.truth_channels(scenario.airframe)
-    truth["n"] = len(channels)
+    channels = truth_read(scenario)
+    truth["n"], truth["declared"] = len(channels), len(scenario.airframe.signals)
     truth["factor"][: len(channels)] = [factor for _, _, factor in channels]
     frame["accounts"]["guarantee"]["certain_after_s"] = -1.0
     jsbsim_dt = dt / scenario.substeps
-    _assemble_instruments(frame["instruments"], scenario, jsbsim_dt)
+    assemble_instruments(frame, scenario, jsbsim_dt)
+    assemble_watch(frame["fdi"]["watch"], scenario, jsbsim_dt)
     _assemble_actuators(
         belief["actuators"], scenario.actuators, jsbsim_dt, travel, scenario.airframe.surfaces
     )
@@ -331,5 +314,5 @@ def assemble(scenario: Scenario, trim: np.ndarray, travel: np.ndarray) -> np.nda
 
 def y_places(frame: np.void) -> list[int]:
     """Where in the truth the measured signals beside the rates are: y without noise, (4 + declared,)."""
-    declared = range(ch.POS + 3 * frame["belief"]["u"].size, int(frame["truth"]["n"]))
-    return [ch.ALPHA, ch.BETA, ch.AIRSPEED, ch.QDYN, *declared]
+    first = ch.POS + 3 * frame["belief"]["u"].size
+    return [ch.ALPHA, ch.BETA, ch.AIRSPEED, ch.QDYN, *range(first, first + int(frame["truth"]["declared"]))]

@@ -15,6 +15,7 @@ from beaver_ftc.control.laws.state import REJECTING
 from beaver_ftc.control.state import NOMINAL, ORACLE
 from beaver_ftc.loop.assembly import assemble
 from beaver_ftc.loop.frame import fly_frame
+from beaver_ftc.loop.instruments import read_more
 from beaver_ftc.loop.plugin_frame import PluginFrame, named_detector, named_law, plugged
 from beaver_ftc.plant.faults import NEVER, TIME_TOLERANCE_S
 from beaver_ftc.scenario.change import Change
@@ -31,7 +32,7 @@ KEPT_OF_POWER = (
     "lost", "engaged", "in_use", "moved", "speed", "usual_speed", "attitude", "command",
     "from_s", "frames", "least", "greatest",
 )  # fmt: skip
-OF_INSTRUMENTS = ("real", "gain", "bias", "noise", "quantum", "dropout", "keep", "delay")
+OF_INSTRUMENTS = ("real", "gain", "bias", "noise", "quantum", "dropout", "drift", "keep", "delay", "engine")
 
 
 class Stage(NamedTuple):
@@ -95,6 +96,8 @@ class Changing:
             take_diagnosis(frame, new, stage.frame)
         if change.sensors is not None:
             take_instruments(frame["instruments"], new["instruments"])
+        if frame["fdi"]["watch"]["enabled"] or frame["instruments"]["engine"]:
+            read_more(loop)
         frame["control"]["power"]["enabled"] = new["control"]["power"]["enabled"]
         frame["control"]["hands_back"] = 1
         take_plugins(loop, stage.plugins)

@@ -24,6 +24,7 @@ from beaver_ftc.control.state import ORACLE, control_dtype
 from beaver_ftc.control.supervisor import SUPERVISOR, mode_from, supervise
 from beaver_ftc.diagnosis import scheme
 from beaver_ftc.diagnosis.belief import belief_dtype, follow_command, look_back, respond
+from beaver_ftc.diagnosis.instruments import attend
 from beaver_ftc.diagnosis.state import diagnosis_dtype, verdict_dtype
 from beaver_ftc.loop.accounts import account, accounts_dtype, add_effect, effect_of_faults, follow_guarantee
 from beaver_ftc.loop.record import record
@@ -64,10 +65,21 @@ def frame_dtype(n: int) -> np.dtype:
 
 
 @kernel
+def watch_instruments(frame):
+    """Hold the instruments against one another; what is known to be broken is replaced."""
+    watch, power = frame.fdi.watch, frame.control.power
+    if power.in_use:
+        watch.step.command[1] = power.command[0]
+    attend(watch, frame.fdi, frame.belief, frame.measured, frame.t)
+
+
+@kernel
 def sense(frame):
     """Measure, and see what the design model makes of this instant. Returns the flight's status."""
     truth, belief, measured = frame.truth, frame.belief, frame.measured
     measure(truth, frame.instruments, measured)
+    if frame.fdi.watch.enabled:
+        watch_instruments(frame)
     status = flight_status(truth.value, truth.ground_m)
     if status != NOT_FINITE:
         respond(belief, measured)

@@ -1,9 +1,9 @@
 """The closed loop: JSBSim flies, the compiled frame measures, diagnoses, decides and commands, the log goes
 to its sink."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from functools import cached_property, partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,16 +15,18 @@ from beaver_ftc.design.variants import anchor, mass_of
 from beaver_ftc.diagnosis import noise_model
 from beaver_ftc.errors import SimulationFailed
 from beaver_ftc.loop.assembly import assemble, estimator_names, y_places
+from beaver_ftc.loop.cockpit import Cockpit
 from beaver_ftc.loop.direct import direct
 from beaver_ftc.loop.flight import Flight, LogSink
 from beaver_ftc.loop.frame import FLYING, NOT_FINITE, fly_frame, look_inside
+from beaver_ftc.loop.instruments import anchor_watch, watch_from_now
 from beaver_ftc.loop.summary import flight_of
 from beaver_ftc.plant import channels as ch
-from beaver_ftc.plant import native
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.configure import configure, take_off, trim_of
 from beaver_ftc.plant.faults import FaultSchedule
 from beaver_ftc.plant.gust import GustSchedule, MovingAir
+from beaver_ftc.plant.sensor_faults import SensorFaultSchedule
 from beaver_ftc.plugins import DETECTORS, LAWS, is_compiled
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.signals import sample
@@ -40,40 +42,6 @@ UNANTICIPATED = "failures/unanticipated/Cm-alpha3"
 IMMOVABLE = ("stuck", "hardover", "float")  # failures in which a surface does not follow its command
 EARTH_RADIUS_M = 6371000.0  # for the log's north and east: a local plane, not navigation
 LEAST_HEIGHT_M = 500.0  # above the ground at the start; the ground is at sea level, or lower if need be
-
-
-class Cockpit:
-    """The wires between one plant and one frame record: which nodes are read and written, natively or
-    through Python."""
-
-    def __init__(self, plant: Plant, frames: np.ndarray) -> None:
-        self._frames = frames
-        self._read = native.NodeBank(
-            [plant.node(name) for _, name, _ in ch.truth_channels(plant.aircraft)], owner=plant
-        )
-        self._write = native.NodeBank(
-            [plant.node(name) for name in ch.command_properties(plant.aircraft)], owner=plant
-        )
-        self._engine = native.NodeBank([plant.node(plant.aircraft.trim.throttle)], owner=plant)
-        self.native = native.available()
-        truth = frames["truth"][0]
-        truth["native"] = self.native
-        truth["getter"], truth["setter"] = native.getter_address(), native.setter_address()
-        truth["read_pointers"][: truth["n"]] = self._read.pointers
-        truth["write_pointers"] = self._write.pointers
-        truth["engine_pointer"] = self._engine.pointers
-
-    def read(self) -> None:
-        """Bring the truth into the frame record, through Python."""
-        truth = self._frames["truth"][0]
-        self._read.read(truth["value"][: truth["n"]])
-
-    def write(self) -> None:
-        """Hand the command over, through Python."""
-        self._write.write(self._frames["belief"]["commanded"][0])
-        power = self._frames["control"]["power"]
-        if power["in_use"][0]:
-            self._engine.write(power["command"][0])
 
 
 class Loop:
@@ -100,6 +68,10 @@ class Loop:
         self.start = self._seen()
         self.anchor(self.frames[0], scenario)
         self.schedule = FaultSchedule(scenario.faults, self.plant, scenario.rate_hz)
+        instruments = self.frames["instruments"][0]
+        self.sensor_schedule = SensorFaultSchedule(
+            scenario.faults, instruments, scenario.rate_hz, self.aircraft.has_engine_instruments
+        )
         self.air = MovingAir(scenario.environment, self.plant)
         self.gust = GustSchedule(scenario.environment.gusts, self.plant, scenario.rate_hz)
         self.n_frames = round(scenario.duration_s * scenario.rate_hz)
@@ -149,6 +121,7 @@ class Loop:
         set_up(frame["control"], frame["belief"], scenario, y)
         set_up_autopilot(frame["autopilot"], frame["control"], scenario)
         fdi, rate_hz = frame["fdi"], scenario.rate_hz
+        anchor_watch(fdi["watch"], np.array([design]), y)
         noise_model.set_up(fdi, scenario.fdi, design, mass, trim, rate_hz, self.aircraft)
 
     def _lay_out(self) -> None:
@@ -230,14 +203,22 @@ class Loop:
 
     def turn_to(self, k: int) -> int:
         """Bring faults, gusts and changes to frame k, the next to fly; returns when to call again."""
-        self.schedule.apply(k)
-        self.gust.apply(k)
+        parts: tuple[Any, ...] = (self.schedule, self.sensor_schedule, self.gust)
+        for part in parts:
+            part.apply(k)
         self._note_faults(k)
-        turn = min(self.schedule.next_change(k), self.gust.next_change(k))
-        if self.changing is None:
-            return turn
-        self.changing.apply(k)
-        return min(turn, self.changing.next_change(k))
+        if self.changing is not None:
+            self.changing.apply(k)
+            parts = (*parts, self.changing)
+        return min(part.next_change(k) for part in parts)
+
+    def declare(self, faults: Sequence[Any]) -> None:
+        """Take these faults for the flight's, between two frames; from the first of an instrument's on, all
+        instruments are watched."""
+        self.schedule.declare(faults)
+        self.sensor_schedule.declare(faults)
+        if self.sensor_schedule.any:
+            watch_from_now(self)
 
     def fly_segment(self, k: int, stop: int) -> int:
         """Frames k to stop, in which no fault changes."""
@@ -301,7 +282,8 @@ class Loop:
     def _note_faults(self, k: int) -> None:
         """Keep the faults in the truth's record, for the oracle and the accounts."""
         truth = self.frames["truth"][0]
-        if self.schedule.begun(k) and not truth["faulted"]:
+        begun = self.schedule.begun(k) or self.sensor_schedule.begun(k)
+        if begun and not truth["faulted"]:
             truth["faulted"], truth["fault_at_s"] = 1, k / self.scenario.rate_hz
         truth["immovable"] = [
             any(self.plant.read(f"failures/{s}/{how}") for how in IMMOVABLE) for s in self.aircraft.surfaces

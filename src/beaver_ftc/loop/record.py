@@ -30,7 +30,8 @@ def record_truth(truth, t, row):
     row[column + 2] = value[ch.ALTITUDE]
     column = put(row, column + 3, value[ch.PDOT : ch.PDOT + 3])
     row[column] = value[ch.QDYN]
-    column = put(row, column + 1, value[first_signal(truth) : truth.n])
+    first = first_signal(truth)
+    column = put(row, column + 1, value[first : first + truth.declared])
     row[column] = value[ch.ENVELOPE]
     return column + 1
 

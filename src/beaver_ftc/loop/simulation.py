@@ -25,6 +25,7 @@ from beaver_ftc.plant.gust import GustSchedule
 from beaver_ftc.scenario.given import fault_of, is_same_again
 from beaver_ftc.scenario.in_flight import aimed, blown, changed
 from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.scenario.sensor_faults import sensors_there
 from beaver_ftc.scenario.signals import RAD_PER_DEG
 from beaver_ftc.scenario.sticks import flown, in_force
 
@@ -177,11 +178,12 @@ class Stepping:
             self._declare((*self._faults, new))
 
     def repair(self, actuator: str | None = None) -> None:
-        """End now what is wrong with a surface, with the aerodynamics (`unanticipated`), or with anything.
+        """End now what is wrong with a surface, a sensor, the aerodynamics (`unanticipated`), or anything.
 
         Faults that are yet to come stay. Raises BadInput for a name that no fault can have.
         """
-        names = (*self._surfaces, UNANTICIPATED)
+        with asked(self._loop.aircraft):
+            names = (*self._surfaces, *sensors_there(), UNANTICIPATED)
         if actuator is not None and actuator not in names:
             raise BadInput(f"actuator: {actuator!r:.60} is not known{suggestion(str(actuator), names)}")
         self._declare(tuple(self._repaired(fault, actuator) for fault in self._faults))
@@ -311,11 +313,11 @@ class Stepping:
 
     def _declare(self, faults: Sequence[Any]) -> None:
         self._faults = tuple(faults)
-        self._loop.schedule.declare(self._faults)
+        self._loop.declare(self._faults)
         self._turn_at = self._next
 
     def _repaired(self, fault: Any, actuator: str | None) -> Any:
-        place = getattr(fault, "actuator", UNANTICIPATED)
+        place = getattr(fault, "sensor", getattr(fault, "actuator", UNANTICIPATED))
         now_s = self._now_s
         begun, over = fault.at_s <= now_s, fault.end_s is not None and fault.end_s <= now_s
         if not begun or over or actuator not in (None, place):

@@ -8,7 +8,7 @@ left of a bar: built in, right of it: a plug-in's answer. `frame.fly_frame` is t
 from beaver_ftc.compiled import kernel
 from beaver_ftc.control import law
 from beaver_ftc.control.accommodation import accommodate
-from beaver_ftc.diagnosis import scheme
+from beaver_ftc.diagnosis import instruments, scheme
 from beaver_ftc.loop import frame as whole
 
 
@@ -16,6 +16,13 @@ from beaver_ftc.loop import frame as whole
 def measure(frames):
     """Measure, and see what the design model makes of the elapsed frame. Returns the flight's status."""
     return whole.begin(frames[0])
+
+
+@kernel
+def begin_watch(frames):
+    """Begin to watch the instruments, with the readings there are."""
+    frame = frames[0]
+    instruments.begin(frame.fdi.watch, frame.measured)
 
 
 @kernel

@@ -10,6 +10,7 @@ from beaver_ftc.control.outer.state import CHANNELS
 from beaver_ftc.control.supervisor import MAX_EVENTS, MODES
 from beaver_ftc.design.model import AXES
 from beaver_ftc.diagnosis.base import Verdict
+from beaver_ftc.diagnosis.instrument_words import instrument_found
 from beaver_ftc.diagnosis.scheme import isolated_theta
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, UNANTICIPATED
 from beaver_ftc.diagnosis.types.findings import estimate_of, found
@@ -134,9 +135,27 @@ def _statistical(fdi: np.void) -> dict[str, float | None] | None:
     }
 
 
+def _findings(frame: np.void, surfaces: Sequence[str]) -> dict:
+    """detection_time_s, detection_axis and what `_isolation` has, of surfaces or of an instrument."""
+    fdi = frame["fdi"]
+    broken = instrument_found(fdi["watch"], float(frame["t"]))
+    if broken is not None:
+        return {"detection_axis": None, **broken}
+    detected = fdi["verdict"]["detected"]
+    return {
+        "detection_time_s": _instant(fdi["verdict"]["detected_at_s"]),
+        "detection_axis": AXES[int(fdi["verdict"]["detected_axis"])] if detected else None,
+        **_isolation(fdi, surfaces),
+    }
+
+
 def verdict_of(frame: np.void, surfaces: Sequence[str]) -> Verdict:
     """What the built-in diagnosis makes of the flight so far, as a plug-in law is given it."""
     fdi = frame["fdi"]
+    broken = instrument_found(fdi["watch"], float(frame["t"]))
+    if broken is not None:
+        kind, left = broken["isolation_type"], broken["candidates"]
+        return Verdict(detected=True, isolated=broken["isolated"], type=kind, candidates=left)
     if not fdi["verdict"]["detected"]:
         return Verdict()
     said = _isolation(fdi, surfaces)
@@ -160,7 +179,10 @@ def estimate_now(fdi: np.void, said: Verdict, surfaces: Sequence[str]) -> float 
 def _of_verdict(fdi: np.void, verdict: Verdict) -> dict:
     """The same of a Flight, from a plug-in's verdict."""
     isolated = verdict.isolated if fdi["verdict"]["detected"] else None
+    detected = fdi["verdict"]["detected"]
     return {
+        "detection_time_s": _instant(fdi["verdict"]["detected_at_s"]),
+        "detection_axis": AXES[int(fdi["verdict"]["detected_axis"])] if detected else None,
         "isolated": isolated,
         "isolation_type": verdict.type if isolated else None,
         "candidates": tuple(verdict.candidates) if fdi["verdict"]["detected"] else (),
@@ -188,8 +210,6 @@ def flight_of(
         scenario=scenario,
         frames=int(frame["k"]),
         columns=columns,
-        detection_time_s=_instant(fdi["verdict"]["detected_at_s"]),
-        detection_axis=AXES[int(fdi["verdict"]["detected_axis"])] if fdi["verdict"]["detected"] else None,
         guaranteed_delay_s=_guaranteed_delay(frame),
         pre_fault_rms_rad_s=_rms(tracking["before"], int(tracking["frames_before"])) or (0.0, 0.0, 0.0),
         post_fault_rms_rad_s=_rms(tracking["since"], int(tracking["frames_since"])),
@@ -212,5 +232,5 @@ def flight_of(
         profile=_profile(frame),
         changes=replaced,
         surface_travel_rad={s: float(x) for s, x in zip(surfaces, accounts["travelled"], strict=True)},
-        **(_isolation(fdi, surfaces) if verdict is None else _of_verdict(fdi, verdict)),
+        **(_findings(frame, surfaces) if verdict is None else _of_verdict(fdi, verdict)),
     )

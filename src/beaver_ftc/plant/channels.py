@@ -57,9 +57,27 @@ def truth_channels(aircraft: Aircraft) -> tuple[Channel, ...]:
     )
 
 
+# What further instruments would read, where somebody asks for them: m/s2 times slug, slug; then the engine's.
+_INERTIAL: tuple[Channel, ...] = (
+    ("force_x", "forces/fbx-total-lbs", FT),
+    ("force_y", "forces/fby-total-lbs", FT),
+    ("force_z", "forces/fbz-total-lbs", FT),
+    ("mass_slug", "inertia/mass-slugs", 1.0),
+)
+_ENGINE = ("engine_rpm", "manifold_pressure_inhg")
+N_FURTHER = len(_INERTIAL) + len(_ENGINE)
+
+
+def further_channels(aircraft: Aircraft) -> tuple[Channel, ...]:
+    """What is read from the truth after `truth_channels` where there are more instruments than usual."""
+    settings = aircraft.engine.settings
+    engine = [(name, settings[name].property, 1.0) for name in _ENGINE if aircraft.has_engine_instruments]
+    return (*_INERTIAL, *engine)
+
+
 def most_channels(n: int) -> int:
     """Room for the truth of any aircraft with n surfaces."""
-    return POS + 3 * n + MAX_SIGNALS
+    return POS + 3 * n + MAX_SIGNALS + N_FURTHER
 
 
 def command_properties(aircraft: Aircraft) -> tuple[str, ...]:

@@ -140,6 +140,8 @@ class _Event:
 class FaultSchedule:
     """Sets the aircraft's failure properties, frame by frame; between changes there is nothing to do.
 
+    Faults of instruments are passed over: sensor_faults.py has them.
+
     faults: the scenario's. plant: the aircraft they happen to. rate_hz: frame rate of the loop.
     """
 
@@ -153,6 +155,7 @@ class FaultSchedule:
     def declare(self, faults: Sequence[Any]) -> None:
         """Take these faults for those declared so far: some more at the end, some that end otherwise."""
         before, self._declared = self._declared, []
+        faults = [fault for fault in faults if not hasattr(fault, "sensor")]
         for known, fault in zip_longest(before, faults):
             self._declared.append(known if known and known.fault is fault else self._event(fault, known))
         self._events = sorted(self._declared, key=lambda event: event.first)

@@ -11,20 +11,37 @@ import numpy as np
 
 from beaver_ftc.compiled import kernel
 
-SIGNALS = ("p", "q", "r", "alpha", "beta", "V", "qdyn")
+SIGNALS = ("p", "q", "r", "alpha", "beta", "V", "qdyn")  # what the diagnosis compares with its model
 N_SIGNALS = len(SIGNALS)
+SENSORS = (*SIGNALS, "phi", "theta", "psi", "altitude", "engine_rpm", "manifold_pressure")
+N_SENSORS = len(SENSORS)
+PHI, ALTITUDE, ENGINE_SPEED, MANIFOLD = (
+    SENSORS.index(name) for name in ("phi", "altitude", "engine_rpm", "manifold_pressure")
+)
 NOISE_LIMIT_SIGMA = 4.0
 LONGEST_DELAY = 1000  # JSBSim frames
 
+# What is broken of an instrument: offset, relative error, added noise; held and frozen at; no reading at all.
+SENSOR_FAULT = np.dtype(
+    [
+        ("bias", "f8"), ("scale", "f8"), ("noise", "f8"),
+        ("frozen", "i8"), ("holding", "i8"), ("held", "f8"), ("lost", "i8"),
+    ],
+    align=True,
+)  # fmt: skip
+
 INSTRUMENTS = np.dtype(
     [
-        ("real", "i8"), ("random", "u8"),
-        ("gain", "f8", (N_SIGNALS,)), ("bias", "f8", (N_SIGNALS,)), ("noise", "f8", (N_SIGNALS,)),
-        ("quantum", "f8", (N_SIGNALS,)), ("dropout", "f8", (N_SIGNALS,)),
-        ("keep", "f8", (N_SIGNALS,)),  # exp(-bandwidth dt), 0 without lag
-        ("delay", "f8", (N_SIGNALS,)),  # JSBSim frames
-        ("lagged", "f8", (N_SIGNALS,)), ("line", "f8", (LONGEST_DELAY + 2, N_SIGNALS)), ("taken", "i8"),
-        ("reading", "f8", (N_SIGNALS,)),
+        ("real", "i8"), ("random", "u8"), ("random_further", "u8"),
+        ("gain", "f8", (N_SENSORS,)), ("bias", "f8", (N_SENSORS,)), ("noise", "f8", (N_SENSORS,)),
+        ("quantum", "f8", (N_SENSORS,)), ("dropout", "f8", (N_SENSORS,)),
+        ("drift", "f8", (N_SENSORS,)),  # per sample
+        ("keep", "f8", (N_SENSORS,)),  # exp(-bandwidth dt), 0 without lag
+        ("delay", "f8", (N_SENSORS,)),  # JSBSim frames
+        ("lagged", "f8", (N_SENSORS,)), ("line", "f8", (LONGEST_DELAY + 2, N_SENSORS)), ("taken", "i8"),
+        ("reading", "f8", (N_SENSORS,)),
+        ("engine", "i8"),  # dpt is worked out from readings
+        ("broken", "i8"), ("fault", SENSOR_FAULT, (N_SENSORS,)), ("random_fault", "u8"),
     ],
     align=True,
 )  # fmt: skip
@@ -80,6 +97,8 @@ def read_one(instruments, i, true):
     if instruments.delay[i] > 0.0:
         value = delayed(instruments, i, value)
     value = instruments.gain[i] * value + instruments.bias[i]
+    if instruments.drift[i] != 0.0:
+        value += instruments.drift[i] * instruments.taken
     if instruments.noise[i] > 0.0:
         value += instruments.noise[i] * normal(instruments)
     if instruments.quantum[i] > 0.0:
@@ -88,12 +107,56 @@ def read_one(instruments, i, true):
 
 
 @kernel
-def read_all(instruments, signals):
-    """Put a sample of every signal in the place of the truth; signals (N_SIGNALS,), SI, as SIGNALS."""
-    for i in range(N_SIGNALS):
+def read_each(instruments, signals, start, end):
+    """Put a sample in the place of the truth, of the sensors from start to end."""
+    for i in range(start, end):
         value = read_one(instruments, i, signals[i])
         lost = instruments.dropout[i] > 0.0 and uniform(instruments) < instruments.dropout[i]
         if not lost or instruments.taken == 0:
             instruments.reading[i] = value
         signals[i] = instruments.reading[i]
+
+
+@kernel
+def read_all(instruments, signals):
+    """Put a sample of every signal in the place of the truth; signals (N_SENSORS,), SI, as SENSORS.
+
+    The further instruments draw from a counter of their own: they change nothing in the noise of the first.
+    """
+    read_each(instruments, signals, 0, N_SIGNALS)
+    if signals.size > N_SIGNALS:
+        first = instruments.random
+        instruments.random = instruments.random_further
+        read_each(instruments, signals, N_SIGNALS, signals.size)
+        instruments.random_further = instruments.random
+        instruments.random = first
     instruments.taken += 1
+
+
+@kernel
+def break_one(instruments, i, reading):
+    """What a broken instrument i makes of its reading. A lost one has none: the last is left standing."""
+    fault = instruments.fault[i]
+    value = (1.0 + fault.scale) * reading + fault.bias
+    if fault.noise > 0.0:
+        value += fault.noise * normal(instruments)
+    stays = fault.frozen or fault.lost
+    if stays and fault.holding:
+        value = fault.held
+    fault.held, fault.holding = value, stays
+    return value
+
+
+@kernel
+def break_all(instruments, signals, missing):
+    """Put what broken instruments say in the place of their readings; missing (N_SENSORS,): none there.
+
+    A frozen instrument stays at its first reading of the fault.
+    """
+    own = instruments.random
+    instruments.random = instruments.random_fault
+    for i in range(signals.size):
+        signals[i] = break_one(instruments, i, signals[i])
+        missing[i] = instruments.fault[i].lost
+    instruments.random_fault = instruments.random
+    instruments.random = own

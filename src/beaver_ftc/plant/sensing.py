@@ -9,25 +9,25 @@ from functools import lru_cache
 import numpy as np
 
 from beaver_ftc.compiled import kernel
-from beaver_ftc.design.model import AIRSPEED, ALPHA, BETA, DPT, N_Y, QDYN
+from beaver_ftc.design.model import DPT
 from beaver_ftc.plant import channels as ch
-from beaver_ftc.plant.instruments import N_SIGNALS, read_all
+from beaver_ftc.plant.instruments import (
+    ALTITUDE,
+    ENGINE_SPEED,
+    MANIFOLD,
+    PHI,
+    break_all,
+    read_all,
+)
 from beaver_ftc.plant.native import read_nodes, write_nodes
+from beaver_ftc.plant.readings import MEASURED, note_slipstream, share_out
+
+__all__ = ["MEASURED"]
 
 FLYING, DEPARTED, NOT_FINITE = 0, 1, 2
 DEPARTURE_ANGLE_RAD = 0.6
 DEPARTURE_RATE_RAD_S = 6.0
 DEPARTURE_SIGNALS = ("p", "q", "r", "alpha", "beta", "altitude")
-
-# What is known of an instant. No instrument model stands before attitude (phi, theta, psi, rad), altitude (m)
-# and before the declared signals in y, from dpt on: they are the truth's.
-MEASURED = np.dtype(
-    [
-        ("signal", "f8", (N_SIGNALS,)), ("x", "f8", (3,)), ("y", "f8", (N_Y,)),
-        ("attitude", "f8", (3,)), ("altitude", "f8"),
-    ],
-    align=True,
-)  # fmt: skip
 
 
 @lru_cache
@@ -36,7 +36,7 @@ def truth_dtype(n: int) -> np.dtype:
     room = ch.most_channels(n)
     fields = [
         ("native", "i8"), ("getter", "i8"), ("setter", "i8"),
-        ("n", "i8"), ("read_pointers", "i8", (room,)), ("write_pointers", "i8", (n,)),
+        ("n", "i8"), ("declared", "i8"), ("read_pointers", "i8", (room,)), ("write_pointers", "i8", (n,)),
         ("engine_pointer", "i8", (1,)),
         ("factor", "f8", (room,)), ("value", "f8", (room,)),  # the first n, in SI: see channels.py
         ("latitude_0", "f8"), ("longitude_0", "f8"), ("radius_m", "f8"), ("parallel_radius_m", "f8"),
@@ -74,25 +74,46 @@ def first_signal(truth):
 @kernel
 def measure(truth, instruments, measured):
     """Read the truth's nodes, in SI, and fill `measured` with what the instruments give."""
-    value = truth.value
+    value, signal = truth.value, measured.signal
     if truth.native:
         read_nodes(truth.getter, truth.read_pointers[: truth.n], value)
     for i in range(truth.n):
         value[i] *= truth.factor[i]
-    signal, y = measured.signal, measured.y
-    for i in range(N_SIGNALS):
+    for i in range(PHI):
         signal[i] = value[i]
+    for i in range(3):
+        signal[PHI + i] = value[ch.PHI + i]
+    signal[ALTITUDE] = value[ch.ALTITUDE]
+    further = first_signal(truth) + truth.declared
+    if truth.n > further:
+        read_further(value, further, truth.n, measured)
     if instruments.real:
         read_all(instruments, signal)
+    if instruments.broken:
+        break_all(instruments, signal, measured.missing)
+    sort(truth, instruments, measured)
+
+
+@kernel
+def read_further(value, first, n, measured):
+    """Take what further instruments there are: accelerometers, and those of the engine."""
+    measured.inertial = 1
     for i in range(3):
-        measured.x[i] = signal[i]
-        measured.attitude[i] = value[ch.PHI + i]
-    y[ALPHA], y[BETA], y[AIRSPEED] = signal[ch.ALPHA], signal[ch.BETA], signal[ch.AIRSPEED]
-    y[QDYN] = signal[ch.QDYN]
-    measured.altitude = value[ch.ALTITUDE]
-    first = first_signal(truth)
-    for j in range(truth.n - first):
-        y[DPT + j] = value[first + j]
+        measured.force[i] = value[first + i] / value[first + 3]
+    if n > first + 4:
+        measured.engine = 1
+        measured.signal[ENGINE_SPEED], measured.signal[MANIFOLD] = value[first + 4], value[first + 5]
+
+
+@kernel
+def sort(truth, instruments, measured):
+    """Put the readings where those who use them look; declared signals without an instrument are ideal."""
+    share_out(measured)
+    y, first = measured.y, first_signal(truth)
+    for j in range(truth.declared):
+        y[DPT + j] = truth.value[first + j]
+    if instruments.engine:
+        note_slipstream(measured)
 
 
 @kernel

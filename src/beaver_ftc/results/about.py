@@ -11,7 +11,8 @@ Document = dict[str, Any]
 
 OURS = "adaptive-estimators"
 DRIFT_MPS, DRIFT_M = 5.0, 300.0  # a flight that ends further from where it began has wandered off
-_NOT_SIZE = {"actuator", "type", "at_s", "end_s", "profile"}
+_NOT_SIZE = {"actuator", "sensor", "type", "at_s", "end_s", "profile"}
+_PUBLISHED = ("aileron", "elevator", "rudder")
 
 
 def flown(flight: "Flight") -> Document:
@@ -33,6 +34,7 @@ def faults_of(scenario: "Scenario") -> list[Document]:
     return [
         {
             "actuator": getattr(fault, "actuator", None),
+            **sensor_of(fault),
             "type": fault.type,
             "at_s": fault.at_s,
             "end_s": fault.end_s,
@@ -41,6 +43,11 @@ def faults_of(scenario: "Scenario") -> list[Document]:
         }
         for fault in sorted(scenario.faults, key=lambda fault: fault.at_s)
     ]
+
+
+def sensor_of(fault: Any) -> Document:
+    """The instrument that a fault is on, as the documents have it; nothing for other faults."""
+    return {"sensor": fault.sensor} if hasattr(fault, "sensor") else {}
 
 
 def hints(flight: "Flight", document: Document) -> list[str]:
@@ -55,10 +62,9 @@ def _outside_the_class(scenario: "Scenario", document: Document) -> str:
     strange = list(_strangers(scenario))
     if scenario.fdi.fault_class == "all" or not strange:
         return ""
-    *first, last = scenario.airframe.primary
     return (
         f"{' and '.join(strange)}: outside the fault class the diagnosis looks for (loss of effectiveness of "
-        f"{', '.join(first)} or {last}), so it cannot be named; set fdi.fault_class: all"
+        "aileron, elevator or rudder), so it cannot be named; set fdi.fault_class: all"
     )
 
 
@@ -66,13 +72,13 @@ def _strangers(scenario: "Scenario") -> Iterator[str]:
     """Faults that are not of the published class, but for the one that is meant to be none."""
     for fault in scenario.faults:
         actuator = getattr(fault, "actuator", None)
-        lost = fault.type == "loss_of_effectiveness" and actuator in scenario.airframe.primary
+        lost = fault.type == "loss_of_effectiveness" and actuator in _PUBLISHED
         if actuator and not lost:
             yield f"{actuator} {fault.type.replace('_', ' ')}"
 
 
 def _several(scenario: "Scenario", document: Document) -> str:
-    surfaces = {getattr(fault, "actuator", None) for fault in scenario.faults}
+    surfaces = {getattr(fault, "actuator", None) for fault in scenario.faults if not sensor_of(fault)}
     if len(surfaces) < 2 or scenario.fdi.pairs or not _together(scenario):
         return ""
     wanted = (
@@ -86,6 +92,7 @@ def _together(scenario: "Scenario") -> bool:
     spans = [
         (fault.at_s, fault.end_s or scenario.duration_s, getattr(fault, "actuator", None))
         for fault in scenario.faults
+        if not sensor_of(fault)
     ]
     return any(
         one[2] != other[2] and one[0] < other[1] and other[0] < one[1] for one in spans for other in spans

@@ -13,7 +13,7 @@ from functools import cache
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
-from beaver_ftc.results.about import faults_of, flown, hints
+from beaver_ftc.results.about import faults_of, flown, hints, sensor_of
 from beaver_ftc.results.expectations import evaluate
 
 if TYPE_CHECKING:
@@ -82,11 +82,13 @@ def as_json(document: Any) -> str:
 
 
 def first_fault(scenario: "Scenario") -> Document | None:
-    """The earliest declared fault as {actuator, type, at_s}; the actuator of an unanticipated one is null."""
+    """The earliest declared fault as {actuator, type, at_s}; the actuator of an unanticipated one is null, of
+    an instrument's too, which has `sensor` besides."""
     if not scenario.faults:
         return None
     fault = min(scenario.faults, key=lambda fault: fault.at_s)
-    return {"actuator": getattr(fault, "actuator", None), "type": fault.type, "at_s": fault.at_s}
+    where = {"actuator": getattr(fault, "actuator", None), **sensor_of(fault)}
+    return {**where, "type": fault.type, "at_s": fault.at_s}
 
 
 def _in_force_s(at_s: float, scenario: "Scenario") -> float:
@@ -172,11 +174,15 @@ def _correct(isolated: str | None, fault: Document | None) -> bool | None:
         return None
     if fault is None:
         return False
+    if "sensor" in fault:  # outside the class of surface faults is right as well
+        return isolated in (f"sensor {fault['sensor']}", UNANTICIPATED)
     return isolated == (UNANTICIPATED if fault["type"] == UNANTICIPATED else fault["actuator"])
 
 
 def _type_correct(kind: str | None, fault: Document | None) -> bool | None:
-    """Whether the type named is the declared one; null while none is named."""
+    """Whether the type named is the declared one; null while none is named, as an instrument's never is."""
+    if fault is not None and "sensor" in fault:
+        return None
     return None if kind is None else fault is not None and kind == fault["type"]
 
 

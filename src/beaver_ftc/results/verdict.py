@@ -138,7 +138,8 @@ def _fault(fault: Document | None) -> str:
     if fault is None:
         return "none"
     until = f" to {_time(fault['end_s'])}" if fault.get("end_s") else ""
-    what = f"{fault['actuator'] or ''} {fault['type'].replace('_', ' ')}".strip()
+    place = f"sensor {fault['sensor']}" if "sensor" in fault else fault["actuator"] or ""
+    what = f"{place} {fault['type'].replace('_', ' ')}".strip()
     size = ", ".join(_sizes(fault))
     return f"{what}{' (' + size + ')' if size else ''} at {_time(fault['at_s'])}{until}"
 
@@ -171,7 +172,19 @@ _SIZES = {
 
 def _sizes(fault: Document) -> list[str]:
     """How large a declared fault is, in words."""
+    if "sensor" in fault:
+        return _sensor_sizes(fault)
     return [_SIZES[key](value) for key, value in fault.get("size", {}).items() if key in _SIZES]
+
+
+def _sensor_sizes(fault: Document) -> list[str]:
+    """The same of an instrument's fault, in the unit of the instrument."""
+    from beaver_ftc.scenario.sensor_faults import UNITS
+
+    size = fault["size"].get("magnitude")
+    unit = UNITS[fault["sensor"]][0]
+    words = {"bias": "{:+g} {}", "noise": "{:g} {}", "scale": "{:+.0%}"}
+    return [] if size is None else [words[fault["type"]].format(size, unit)]
 
 
 _TRUTH = {
@@ -199,10 +212,15 @@ def _detection(metrics: Document) -> str:
     if not detection["detected"]:
         return "no alarm"
     if metrics["false_alarm"]:
-        return f"FALSE ALARM at {_time(detection['time_s'])} on {detection['axis']}"
+        return f"FALSE ALARM at {_time(detection['time_s'])} {_seen(detection)}"
     guaranteed = detection["guaranteed_delay_s"]
     within = "" if guaranteed is None else f" (certain within {_time(guaranteed)})"
-    return f"after {_time(detection['delay_s'])} on {detection['axis']}{within}"
+    return f"after {_time(detection['delay_s'])} {_seen(detection)}{within}"
+
+
+def _seen(detection: Document) -> str:
+    """Where an alarm showed: on an axis, or between the instruments."""
+    return f"on {detection['axis']}" if detection["axis"] else "between the instruments"
 
 
 def _statistical(metrics: Document) -> str:
@@ -238,6 +256,8 @@ def _probing(metrics: Document) -> str:
 
 def _type(isolation: Document) -> str:
     """The type, or those still possible; nothing where the class knows no other."""
+    if str(isolation["fault"]).startswith("sensor "):
+        return ""
     if isolation["type"] is None:
         return f", {' or '.join(isolation['candidates']).replace('_', ' ') or 'of no known type'}"
     return "" if isolation["type"] == "unanticipated" else f", {isolation['type'].replace('_', ' ')}"

@@ -172,6 +172,10 @@ class FdiConfig(BaseModel):
         description="also look for two faults at once on different surfaces (class `all`), pitch and "
         "roll-yaw each for itself",
     )
+    sensor_monitor: Literal["auto", "always", "never"] = Field(
+        "auto",
+        description="hold the instruments against one another: auto, where the scenario breaks one",
+    )
     slowest_oscillation_rad_s: float = Field(
         1.0, gt=0, le=100, description="oscillatory failures are this fast or faster (class `all`), rad/s"
     )

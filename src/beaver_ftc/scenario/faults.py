@@ -1,11 +1,12 @@
 """What can break, and when: one class a fault type, a union on `type`."""
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import Discriminator, Field, Tag, model_validator
 
 from beaver_ftc.scenario.base import Conflict, Number, Section, number, order_conflicts, refuse
 from beaver_ftc.scenario.names import Actuator
+from beaver_ftc.scenario.sensor_faults import AnySensorFault, SensorFault
 
 
 class _Fault(Section):
@@ -119,7 +120,22 @@ class Unanticipated(_Gradual):
     )
 
 
-Fault = Annotated[
+SurfaceFault = Annotated[
     LossOfEffectiveness | Stuck | Hardover | Float | Bias | RateLimit | Oscillatory | Unanticipated,
     Field(discriminator="type"),
+]
+
+
+def of_a_sensor(fault: Any) -> bool:
+    """Whether a fault, or what a file says of one, is an instrument's."""
+    return "sensor" in fault if isinstance(fault, dict) else isinstance(fault, SensorFault)
+
+
+def _tag(given: Any) -> str:
+    return "(sensor)" if of_a_sensor(given) else "(surface)"  # no keys of the file
+
+
+Fault = Annotated[
+    Annotated[SurfaceFault, Tag("(surface)")] | Annotated[AnySensorFault, Tag("(sensor)")],
+    Discriminator(_tag),
 ]

@@ -9,6 +9,7 @@ from beaver_ftc.aircraft import UnknownAircraft, load
 from beaver_ftc.aircraft.question import in_question, named
 from beaver_ftc.errors import suggestion
 from beaver_ftc.scenario.base import Number, refuse
+from beaver_ftc.scenario.sensor_faults import sensor_words, sensors_there
 
 UNANTICIPATED = "unanticipated"
 
@@ -50,7 +51,8 @@ Ratios = Annotated[dict[TermName, Ratio], BeforeValidator(_no_more_than_there_ar
 
 def nameable(name: str) -> str:
     """Refuse what a diagnosis cannot name."""
-    known = (*in_question().surfaces, UNANTICIPATED)
+    sensors = (sensor_words(name) for name in sensors_there())
+    known = (*in_question().surfaces, UNANTICIPATED, *sensors)
     if name not in known:
         refuse([((), f"{name[:100]!r} is not known{suggestion(name, known)}")])
     return name

@@ -98,9 +98,14 @@ def _in_document(loc: Location, data: Any) -> Location:
         if _has(data, part):
             location.append(part)
             data = data[part]
-        elif i == len(loc) - 1 and isinstance(data, dict) and part != "[key]":
+        elif i == len(loc) - 1 and isinstance(data, dict) and not _is_a_tag(part):
             location.append(part)
     return tuple(location)
+
+
+def _is_a_tag(part: int | str) -> bool:
+    """Whether a step of pydantic's is no key: a mapping's key itself, or which kind of fault is meant."""
+    return part == "[key]" or str(part).startswith("(")
 
 
 def _has(data: Any, part: int | str) -> bool:
@@ -212,7 +217,16 @@ def _branches(node: dict[str, Any], root: dict[str, Any], data: Any) -> list[dic
     if not union or mapping:
         return [node]
     inherited: dict[str, Any] = {key: node[key] for key in ("description", "unit") if key in node}
-    return [b for branch in union for b in _branches({**inherited, **branch}, root, data)]
+    fitting = [branch for branch in union if _fits(branch, root, data)] or union
+    return [b for branch in fitting for b in _branches({**inherited, **branch}, root, data)]
+
+
+def _fits(branch: dict[str, Any], root: dict[str, Any], data: Any) -> bool:
+    """Whether a branch of the faults' union is meant: instruments by `sensor`, surfaces by the lack of it."""
+    targets = list(branch.get("discriminator", {}).get("mapping", {}).values())
+    if not targets or not isinstance(data, dict):
+        return True
+    return ("sensor" in root["$defs"][targets[0].rsplit("/", 1)[-1]]["properties"]) == ("sensor" in data)
 
 
 def _keys(nodes: list[dict[str, Any]]) -> list[str]:

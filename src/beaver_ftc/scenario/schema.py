@@ -159,7 +159,8 @@ class Expect(Section):
         None, unit="s", says="delay from fault to first alarm", ge=0, le=360_000
     )
     isolated_as: Annotated[str, AfterValidator(nameable)] | None = Field(
-        default=None, description="what the diagnosis must name: a surface, or unanticipated"
+        default=None,
+        description="what the diagnosis must name: a surface, `sensor p` and the like, or unanticipated",
     )
     isolated_type: FaultType | None = Field(
         default=None, description="the fault type the diagnosis must name"

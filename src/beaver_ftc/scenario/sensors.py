@@ -86,9 +86,60 @@ class DynamicPressure(_Sensor):
     quantum_pa: Number = number(0.0, unit="Pa", says="resolution", ge=0, le=5000)
 
 
-def _grade(gyro: dict[str, float], vane: dict[str, float], V: dict, qdyn: dict) -> dict[str, dict]:
+class AttitudeAngle(_Sensor):
+    """Roll, pitch or yaw: a vertical or directional gyro, or integrated rates that drift away."""
+
+    si = ("noise_std_deg", "bias_deg", "quantum_deg", radians(1.0))
+
+    noise_std_deg: Number = number(0.0, unit="deg", says="standard deviation of a sample", ge=0, le=45)
+    bias_deg: Number = number(0.0, unit="deg", says="constant error", ge=-45, le=45)
+    quantum_deg: Number = number(0.0, unit="deg", says="resolution", ge=0, le=45)
+    drift_deg_h: Number = number(
+        0.0, unit="deg/h", says="growth of the error from the start on", ge=-3600, le=3600
+    )
+
+    @property
+    def drift_rad_s(self) -> float:
+        """The drift, SI."""
+        return radians(self.drift_deg_h) / 3600.0
+
+
+class Altimeter(_Sensor):
+    """Altitude above sea level."""
+
+    si = ("noise_std_m", "bias_m", "quantum_m", 1.0)
+
+    noise_std_m: Number = number(0.0, unit="m", says="standard deviation of a sample", ge=0, le=500)
+    bias_m: Number = number(0.0, unit="m", says="constant error", ge=-500, le=500)
+    quantum_m: Number = number(0.0, unit="m", says="resolution", ge=0, le=500)
+
+
+class Tachometer(_Sensor):
+    """Engine speed."""
+
+    si = ("noise_std_rpm", "bias_rpm", "quantum_rpm", 1.0)
+
+    noise_std_rpm: Number = number(0.0, unit="rpm", says="standard deviation of a sample", ge=0, le=500)
+    bias_rpm: Number = number(0.0, unit="rpm", says="constant error", ge=-500, le=500)
+    quantum_rpm: Number = number(0.0, unit="rpm", says="resolution", ge=0, le=500)
+
+
+class ManifoldGauge(_Sensor):
+    """Manifold pressure."""
+
+    si = ("noise_std_inhg", "bias_inhg", "quantum_inhg", 1.0)
+
+    noise_std_inhg: Number = number(0.0, unit="inHg", says="standard deviation of a sample", ge=0, le=10)
+    bias_inhg: Number = number(0.0, unit="inHg", says="constant error", ge=-10, le=10)
+    quantum_inhg: Number = number(0.0, unit="inHg", says="resolution", ge=0, le=10)
+
+
+ENGINE = ("engine_rpm", "manifold_pressure")  # instruments of an engine like the Beaver's
+
+
+def _grade(gyro: dict[str, float], vane: dict[str, float], V: dict, qdyn: dict, **others: dict) -> dict:
     """The same gyro on every axis, the same vane twice."""
-    return {**dict.fromkeys("pqr", gyro), "alpha": vane, "beta": vane, "V": V, "qdyn": qdyn}
+    return {**dict.fromkeys("pqr", gyro), "alpha": vane, "beta": vane, "V": V, "qdyn": qdyn, **others}
 
 
 # Each number's source is in docs/robustness.md, section 1; noise is that of a sample at 100 Hz.
@@ -119,6 +170,12 @@ class Sensors(Section):
     beta: FlowVane = Field(default_factory=FlowVane)
     V: Airspeed = Field(default_factory=Airspeed)
     qdyn: DynamicPressure = Field(default_factory=DynamicPressure)
+    phi: AttitudeAngle = Field(default_factory=AttitudeAngle)
+    theta: AttitudeAngle = Field(default_factory=AttitudeAngle)
+    psi: AttitudeAngle = Field(default_factory=AttitudeAngle)
+    altitude: Altimeter = Field(default_factory=Altimeter)
+    engine_rpm: Tachometer = Field(default_factory=Tachometer)
+    manifold_pressure: ManifoldGauge = Field(default_factory=ManifoldGauge)
 
     @model_validator(mode="before")
     @classmethod

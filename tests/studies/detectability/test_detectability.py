@@ -21,10 +21,9 @@ from beaver_ftc.studies.detectability.mismatch import (
     mismatch,
 )
 from beaver_ftc.studies.detectability.output import as_csv, draw
-from beaver_ftc.studies.detectability.survey import EXCITATIONS, at, judge, run_survey
+from beaver_ftc.studies.detectability.survey import EXCITATIONS, FAULTS, at, judge, run_survey
 from flying import loss, scenario
 
-FAULTS = ("aileron", "elevator", "rudder")
 moments = st.lists(st.floats(-1, 1), min_size=3, max_size=3)
 bounds = st.lists(st.floats(0.01, 0.5), min_size=3, max_size=3)
 
@@ -74,7 +73,7 @@ def flight():
 def test_a_fault_a_little_larger_is_found_in_time_whatever_the_uncertainty(flight, fault):
     """The map follows from the healthy flight; one with the fault must agree where it is sharpest."""
     seen = excitation(flight)
-    least = best_in_window(detection_magnitude(seen.moment[fault], seen.bound), 50)
+    least = best_in_window(detection_magnitude(seen.moment[FAULTS[fault]], seen.bound), 50)
     start = int(np.argmin(least))
     struck_s, magnitude = SETTLED_S + start * seen.dt, 1.1 * least[start]
     flown = fly(

@@ -90,7 +90,12 @@ def fault_words(fault: Document) -> str:
         for key, value in fault.items()
         if key not in ("at_s", "end_s") and isinstance(value, int | float) and not isinstance(value, bool)
     ]
-    what = [fault.get("actuator"), fault["type"].replace("_", " "), *sizes, f"at {fault['at_s']:g} s"]
+    what = [
+        fault.get("actuator") or fault.get("sensor"),
+        fault["type"].replace("_", " "),
+        *sizes,
+        f"at {fault['at_s']:g} s",
+    ]
     return " ".join(filter(None, what))
 
 

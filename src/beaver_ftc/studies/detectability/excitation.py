@@ -4,23 +4,23 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from beaver_ftc.design.model import AXES, N_Y, control_effectiveness
+from beaver_ftc.design.coefficients import SURFACES as ALL_SURFACES
+from beaver_ftc.design.model import AXES, control_effectiveness
 from beaver_ftc.design.variants import design_of
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.engine.columns import Columns
 
-AIR_DATA = ("alpha_rad", "beta_rad", "airspeed_mps", "qdyn_pa")
 SETTLED_S = 2.0  # the start of a reference is a step of its own
 
 
 @dataclass(frozen=True)
 class Excitation:
-    """Along a flight of n frames: the moment (n, 3) rad/s2 of each surface that leads an axis, the bound
-    on the uncertainty (n, 3) rad/s2, and the length of a frame dt s.
+    """Along a flight of n frames: the moment of each surface (4, n, 3) rad/s2, the bound on the uncertainty
+    (n, 3) rad/s2, and the length of a frame dt s.
     """
 
-    moment: dict[str, np.ndarray]
+    moment: np.ndarray
     bound: np.ndarray
     dt: float
 
@@ -32,15 +32,13 @@ def excitation(scenario: Scenario) -> Excitation:
     """
     log = Columns()
     fly(scenario.model_copy(update={"faults": ()}), log)
-    aircraft = scenario.airframe
-    y = np.zeros((len(log.read("t_s")), N_Y))
-    y[:, : 4 + len(aircraft.signals)] = log.read(*AIR_DATA, *aircraft.signals)
-    u = log.read(*(f"{surface}_cmd_rad" for surface in aircraft.surfaces))
+    y = log.read("alpha_rad", "beta_rad", "airspeed_mps", "qdyn_pa", "dpt")
+    u = log.read(*(f"{surface}_cmd_rad" for surface in ALL_SURFACES))
     bound = log.read(*(f"{axis}_eta_bar_rad_s2" for axis in AXES))
-    design, G = design_of(scenario.design_model, aircraft)[0], np.zeros((len(y), 3, aircraft.n))
+    design, G = design_of(scenario.design_model)[0], np.zeros((len(y), 3, 4))
     for row, at in zip(y, G, strict=True):
         control_effectiveness(design, row, at)
     first = int(SETTLED_S * scenario.rate_hz)
-    each = dict(zip(aircraft.surfaces, (G * u[:, None, :]).transpose(2, 0, 1)[:, first:], strict=True))
-    leading = {surface: each[surface] for surface in aircraft.primary}
-    return Excitation(leading, bound[first:], 1.0 / scenario.rate_hz)
+    return Excitation(
+        (G * u[:, None, :]).transpose(2, 0, 1)[:, first:], bound[first:], 1.0 / scenario.rate_hz
+    )

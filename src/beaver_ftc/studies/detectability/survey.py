@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 
-from beaver_ftc.aircraft.question import asked
 from beaver_ftc.errors import BadInput, BeaverFtcError
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.detectability.excitation import Excitation, excitation
@@ -15,8 +14,9 @@ from beaver_ftc.studies.detectability.grid import (
     ALTITUDES_M,
     DETECT_WITHIN_S,
     EXCITATIONS,
+    FAULTS,
     ISOLATE_WITHIN_S,
-    SPEEDS,
+    SPEEDS_MPS,
     Row,
 )
 from beaver_ftc.studies.detectability.mismatch import (
@@ -33,7 +33,7 @@ from beaver_ftc.studies.engine.statistics import quantile
 def run_survey(
     out: Path,
     scenario: Scenario,
-    speeds_mps: Sequence[float] | None = None,
+    speeds_mps: Sequence[float] = SPEEDS_MPS,
     altitudes_m: Sequence[float] = ALTITUDES_M,
     excitations: Sequence[float] = EXCITATIONS,
     progress: Progress | None = None,
@@ -46,18 +46,12 @@ def run_survey(
 
     _refuse_other_schemes(scenario)
     name = survey_name(scenario)
-    grid = list(product(speeds_mps or _speeds_mps(scenario), altitudes_m, excitations))
+    grid = list(product(speeds_mps, altitudes_m, excitations))
     points = flown(out / name, grid, partial(_point, scenario), list[Row], asked=scenario, progress=progress)
     with points as found, result_folder(out, name) as folder:
         rows = [row for point in found for row in point]
         write(folder, scenario.name, rows)
     return rows
-
-
-def _speeds_mps(scenario: Scenario) -> list[float]:
-    """Across the envelope, in whole m/s."""
-    low, high = scenario.airframe.envelope.airspeed_mps
-    return [float(round(low + share * (high - low))) for share in SPEEDS]
 
 
 def survey_name(scenario: Scenario) -> str:
@@ -81,8 +75,8 @@ def _point(scenario: Scenario, point: tuple[float, float, float]) -> list[Row]:
     try:
         seen = excitation(at(scenario, speed, altitude, scale))
     except BeaverFtcError as error:
-        return [{**place, "fault": fault, **_nothing(str(error))} for fault in scenario.airframe.primary]
-    return [{**place, "fault": fault, **judge(seen, fault)} for fault in seen.moment]
+        return [{**place, "fault": fault, **_nothing(str(error))} for fault in FAULTS]
+    return [{**place, "fault": fault, **judge(seen, fault)} for fault in FAULTS]
 
 
 def at(scenario: Scenario, speed_mps: float, altitude_m: float, excitation: float) -> Scenario:
@@ -93,8 +87,7 @@ def at(scenario: Scenario, speed_mps: float, altitude_m: float, excitation: floa
         axis: [_scaled(signal, excitation) for signal in signals]
         for axis, signals in document["reference"].items()
     }
-    with asked(scenario.airframe, scenario.aircraft):
-        return Scenario.model_validate({**document, "faults": [], "expect": {}})
+    return Scenario.model_validate({**document, "faults": [], "expect": {}})
 
 
 def _scaled(signal: Row, factor: float) -> Row:
@@ -117,13 +110,13 @@ def judge(seen: Excitation, fault: str) -> Row:
     detected, isolated: whenever it strikes; `_median`: in half of the instants at which it may strike;
     None: not even a total loss. confused_with: the fault that survives longest; why: in words.
     """
-    z, frames = seen.moment[fault], [_frames(s, seen.dt) for s in (DETECT_WITHIN_S, ISOLATE_WITHIN_S)]
+    z, frames = seen.moment[FAULTS[fault]], [_frames(s, seen.dt) for s in (DETECT_WITHIN_S, ISOLATE_WITHIN_S)]
     if len(z) < frames[1]:
         return _nothing("the flight ends before a fault could be isolated")
     found = best_in_window(detection_magnitude(z, seen.bound), frames[0])
     excluded = {
-        other: best_in_window(exclusion_magnitude(z, moment, seen.bound), frames[1])
-        for other, moment in seen.moment.items()
+        other: best_in_window(exclusion_magnitude(z, seen.moment[FAULTS[other]], seen.bound), frames[1])
+        for other in FAULTS
         if other != fault
     }
     isolated = np.maximum(found[: len(z) - frames[1] + 1], np.max(list(excluded.values()), axis=0))
@@ -150,7 +143,7 @@ def _why(
     seen: Excitation, fault: str, rival: str, found: np.ndarray, excluded: np.ndarray, frames: int
 ) -> str:
     """What limits this fault at the worst instant for it to strike."""
-    z, other = seen.moment[fault], seen.moment[rival]
+    z, other = seen.moment[FAULTS[fault]], seen.moment[FAULTS[rival]]
     if found.max() > 1.0:
         share = 1.0 / found.max()
         return f"{fault} hardly used: in {DETECT_WITHIN_S:g} s a total loss is {share:.0%} of twice the bound"

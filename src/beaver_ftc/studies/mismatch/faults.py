@@ -41,8 +41,8 @@ def named(scenario: "Scenario") -> list[tuple[str, Any]]:
 
 
 def _name(fault: Any) -> str:
-    place = f"{fault.actuator} " if hasattr(fault, "actuator") else ""
-    return f"{place}{fault.type.replace('_', ' ')} at {fault.at_s:g} s"
+    place = " ".join(str(getattr(fault, key)) for key in ("sensor", "actuator") if hasattr(fault, key))
+    return f"{place} {fault.type.replace('_', ' ')} at {fault.at_s:g} s".strip()
 
 
 def in_force(fault: Any, t_s: np.ndarray) -> np.ndarray:

@@ -25,6 +25,7 @@ FLOWN, DEPARTED, BAD_INPUT, FAILED, CRASHED = "flown", "departed", "bad_input", 
 RESULTS = (FLOWN, DEPARTED)  # the statuses of a flight that has metrics
 
 AXES = ("p", "q", "r")
+SURFACES = ("aileron", "elevator", "rudder", "flap")
 MODES = ("adaptive", "reallocated", "unanticipated")
 
 
@@ -34,7 +35,7 @@ def _at(*path: str) -> Getter:
     def get(document: Document, flight: "Flight") -> Any:
         here: Any = document
         for part in path:
-            here = None if here is None else here.get(part)
+            here = None if here is None else here[part]
         return here
 
     return get
@@ -88,9 +89,7 @@ def _faults(document: Document, flight: "Flight") -> str:
     return " ".join(f"{found['fault']}:{found['type'] or 'open'}" for found in named)
 
 
-Column = tuple[str, str, Getter]
-
-_FLOWN: tuple[Column, ...] = (
+COLUMNS: tuple[tuple[str, str, Getter], ...] = (
     ("frames", "int", _at("frames")),
     ("flown_s", "float", _flown_s),
     ("fault_free_s", "float", _fault_free_s),
@@ -116,8 +115,7 @@ _FLOWN: tuple[Column, ...] = (
     ("worst_residual_ratio", "float", lambda document, flight: flight.worst_residual_ratio),
     *_under("float", "tracking.pre_fault_rms_deg_s", *AXES),
     *_under("float", "tracking.post_fault_rms_deg_s", *AXES),
-)
-_ENDED: tuple[Column, ...] = (
+    *_under("float", "tracking.surface_travel_deg", *SURFACES),
     ("supervisor.mode", "text", lambda document, flight: document["supervisor"][-1]["mode"]),
     *((f"supervisor.{mode}_at_s", "float", _first_entry(mode)) for mode in MODES),
     ("envelope_exits.count", "int", lambda document, flight: document["envelope"]["exits"]),
@@ -126,22 +124,10 @@ _ENDED: tuple[Column, ...] = (
     *_under("text", "departure", "signal"),
     *(column for a in AXES for column in _under("float", f"authority.{a}", "given_share", "beyond_s")),
     *_under("float", "engine_power", "from_s", "in_charge_s", "lowest_inhg", "highest_inhg"),
-)
-_JUDGED: tuple[Column, ...] = (
+    *_under("float", "saturation_s", *SURFACES),
     ("expectations.missed", "text", _missed_expectations),
     ("passed", "flag", _at("passed")),
 )
-
-
-def columns_of(surfaces: Sequence[str]) -> tuple[Column, ...]:
-    """(name, type, where from) of what came of each flight of an aircraft with these surfaces."""
-    return (
-        *_FLOWN,
-        *_under("float", "tracking.surface_travel_deg", *surfaces),
-        *_ENDED,
-        *_under("float", "saturation_s", *surfaces),
-        *_JUDGED,
-    )
 
 
 def kind_of(how: Variation) -> str:
@@ -166,14 +152,13 @@ def row_of(run: int, values: dict[str, Any], seed: int, document: Document, flig
     departure = document["departure"]
     status = DEPARTED if departure else FLOWN
     reason = f"{departure['signal']} at {departure['time_s']:g} s" if departure else None
-    columns = columns_of(flight.scenario.airframe.surfaces)
-    metrics = {name: get(document, flight) for name, _, get in columns}
+    metrics = {name: get(document, flight) for name, _, get in COLUMNS}
     return {"run": run, **values, "seed": seed, "status": status, "reason": reason, **metrics}
 
 
 def row_of_failure(run: int, values: dict[str, Any], seed: int, status: str, reason: str) -> Row:
     """The row of a flight that has none, and why."""
-    nothing = dict.fromkeys(name for name, _, _ in columns_of(()))
+    nothing = dict.fromkeys(name for name, _, _ in COLUMNS)
     return {"run": run, **values, "seed": seed, "status": status, "reason": reason, **nothing}
 
 
@@ -183,8 +168,7 @@ def schema_of(sweep: "Sweep") -> "pa.Schema":
 
     types = {"float": pa.float64(), "int": pa.int64(), "flag": pa.bool_(), "text": pa.string()}
     varied = [pa.field(key, types[kind_of(how)]) for key, how in sweep.file.vary.items()]
-    columns = columns_of(sweep.aircraft.surfaces)
-    metrics = [pa.field(name, types[kind]) for name, kind, _ in columns]
+    metrics = [pa.field(name, types[kind]) for name, kind, _ in COLUMNS]
     return pa.schema([
         pa.field("run", pa.int64(), nullable=False), *varied, pa.field("seed", pa.int64(), nullable=False),
         pa.field("status", pa.string(), nullable=False), pa.field("reason", pa.string()), *metrics,
@@ -200,7 +184,7 @@ def table_of(sweep: "Sweep", schema: "pa.Schema", rows: Sequence[Row]) -> "pa.Ta
     columns = [
         [as_cell(row[name], kinds[name]) for row in ordered]
         if name in kinds
-        else [row.get(name) for row in ordered]
+        else [row[name] for row in ordered]
         for name in schema.names
     ]
     return pa.Table.from_arrays(

@@ -1,0 +1,299 @@
+"""Which instrument is broken: the watch over the instruments' redundancy (redundancy.py).
+
+One instrument is taken to fail at a time. The test that is furthest beyond its bound says what kind it is,
+the tests that hold say which it cannot be. A gyro and the attitude beside it move the same tests; between
+them the rates' own dynamics decide: a jump of a gyro is an acceleration that no model explains, a jump of the
+attitude is none. With D the damping of the axis, the filter W' = -D W + innovation follows a gyro's error e
+exactly, and stays within its bound for an attitude's.
+
+From the alarm on no surface is named. A broken instrument that is named is replaced by what the others say
+of it, for the diagnosis and for the laws; it is not trusted again in the flight.
+"""
+
+import numpy as np
+
+from beaver_ftc.compiled import kernel
+from beaver_ftc.diagnosis import bank, redundancy
+from beaver_ftc.diagnosis.state import NOT_ISOLATED
+from beaver_ftc.diagnosis.thresholds import bound_step
+from beaver_ftc.diagnosis.watch import (
+    AIRSPEED,
+    ALPHA,
+    ALPHA_FLOW,
+    ANGLE,
+    BETA,
+    BETA_FLOW,
+    CLIMB,
+    DENSITY,
+    N_TESTS,
+    NO,
+    NOBODY,
+    PRESSURE,
+    QDYN,
+    RPM,
+    SPEED,
+    TURN,
+    UNKNOWN,
+    YES,
+)
+from beaver_ftc.plant.instruments import ALTITUDE, ENGINE_SPEED, MANIFOLD, N_SENSORS, PHI
+from beaver_ftc.plant.readings import note_slipstream, share_out
+
+INVOLVED = 0.03  # of the largest residual of its kind: less is what a large error does to its neighbours
+BESIDE_S = 0.5  # a surface found earlier than this before the alarm was found without the broken instrument
+CROSS_DAMPING_PER_S = 10.0  # by which a gyro's own error moves the innovation
+QUICK_PER_S = 10.0  # the second of redundancy.POLES_PER_S
+FORGETTING_S = 20.0  # of a vane that is replaced, back to trim: kinematics alone drift
+
+
+@kernel
+def attend(watch, fdi, belief, measured, t):
+    """Look at the instruments at one instant, t s; replace in `measured` what is known to be broken."""
+    step, signal = watch.step, measured.signal
+    if not watch.begun:
+        begin(watch, measured)
+        return
+    if watch.past == 0:
+        follow_rates(watch, fdi)
+    redundancy.check(step, signal, watch.engine)
+    if watch.past == 0:
+        watch.error_then[:], watch.spike_then[:] = watch.error, watch.spike
+        watch.spike[:] = 0.0
+    for i in range(3):
+        error = -step.test[TURN + i].residual / step.h
+        if watch.past == 0:
+            watch.error[i] = error
+        else:
+            watch.spike[i] = max(watch.spike[i], abs(error))
+    decide(watch, fdi, measured, t)
+    replace(watch, belief, measured)
+    redundancy.look(step, signal, measured.force)
+    watch.past = (watch.past + 1) % watch.instants
+
+
+@kernel
+def begin(watch, measured):
+    """The first look: nothing to compare with."""
+    watch.begun = 1
+    step = watch.step
+    redundancy.note_declared(step, measured.signal)
+    redundancy.look(step, measured.signal, measured.force)
+    step.acceleration_then[:] = step.acceleration
+    redundancy.allow(step, measured.signal)
+    for c in range(N_TESTS):
+        step.test[c].noise_then = step.test[c].noise
+        step.test[c].bound_noise[:] = step.test[c].noise
+
+
+@kernel
+def follow_rates(watch, fdi):
+    """Bring W (3,) rad/s and its bound to the frame whose innovation is there."""
+    for i in range(3):
+        decay = np.exp(-watch.damping[i] * fdi.dt)
+        watch.W[i] = decay * watch.W[i] + fdi.dt * fdi.innovation[i]
+        watch.W_bound[i] = bound_step(watch.W_bound[i], fdi.bound.eta_bar[i], decay, fdi.dt)
+
+
+@kernel
+def decide(watch, fdi, measured, t):
+    """Raise the alarm, and name the instrument once there is but one it can be."""
+    if watch.named != NOBODY:
+        return
+    for i in range(N_SENSORS):
+        if measured.missing[i] and watch.named == NOBODY:
+            raise_alarm(watch, fdi, t)
+            name(watch, i, t)
+    if watch.named != NOBODY:
+        return
+    worst = furthest(watch.step)
+    if worst >= 0 and not watch.alarmed:
+        raise_alarm(watch, fdi, t)
+        watch.lead = worst
+    if watch.alarmed:
+        if watch.past == 0:
+            ask_rates(watch, fdi)
+        suspect(watch)
+        left, last = 0, NOBODY
+        for i in range(N_SENSORS):
+            if watch.suspect[i]:
+                left, last = left + 1, i
+        if left == 1:
+            name(watch, last, t)
+
+
+@kernel
+def furthest(step):
+    """The test furthest beyond its bound, or -1."""
+    worst, largest = -1, 1.0
+    for c in range(N_TESTS):
+        if step.test[c].share > largest:
+            worst, largest = c, step.test[c].share
+    return worst
+
+
+@kernel
+def raise_alarm(watch, fdi, t):
+    """An instrument is broken; what the diagnosis of the surfaces made of it a moment ago is void."""
+    if watch.alarmed:
+        return
+    watch.alarmed, watch.alarmed_at_s = 1, t
+    verdict = fdi.verdict
+    if verdict.detected and verdict.detected_at_s < t - BESIDE_S:
+        watch.beside = 1
+        return
+    if verdict.detected:
+        watch.alarmed_at_s = verdict.detected_at_s  # the same fault, seen first in the rates
+    watch.misnamed = verdict.isolated >= 0
+    verdict.detected, verdict.isolated, verdict.type = 0, NOT_ISOLATED, -1
+    verdict.detected_at_s = verdict.isolated_at_s = -1.0
+    verdict.lead = verdict.lead_kind = -1
+    for s in range(fdi.surface.size):
+        fdi.surface[s].measure = -1
+    fdi.fdae.network.weights[:] = 0.0
+    fdi.fdae.network.output[:] = 0.0
+
+
+@kernel
+def name(watch, i, t):
+    """Instrument i is the one."""
+    watch.named, watch.named_at_s = i, t
+    watch.replaced[i] = 1
+
+
+@kernel
+def ask_rates(watch, fdi):
+    """By axis, whether the rates' dynamics have seen what the attitude shows: YES or NO once it is certain.
+
+    What has shown inside the frame before and is gone is no gyro's: its error would have come to stay.
+    """
+    alarm = bank.alarm(fdi)
+    for i in range(3):
+        if watch.rates_say[i] != UNKNOWN:
+            continue
+        error, jump = watch.error[i], (watch.error[i] - watch.error_then[i]) / fdi.dt
+        own = CROSS_DAMPING_PER_S * max(abs(error), abs(watch.error_then[i])) + 0.1 * abs(jump)
+        blur = 4.0 * watch.step.test[TURN + i].noise / watch.step.h  # of `error`, by the attitude's noise
+        bound = fdi.bound.frame[i] + 1e-6
+        seen = abs(fdi.innovation[i]) > bound or alarm >= 0 or abs(watch.W[i]) > watch.W_bound[i] + 1e-6
+        spike = watch.spike_then[i]
+        sudden = abs(error) < INVOLVED * spike and spike > 2.0 * blur
+        explained = abs(fdi.innovation[i] - jump) <= bound + own + blur / fdi.dt
+        slow = 0.7 * abs(error) <= watch.W_bound[i] + abs(watch.W[i]) + blur
+        if not explained or (not seen and (sudden or not slow)):
+            watch.rates_say[i] = NO
+        elif seen:
+            watch.rates_say[i] = YES
+
+
+@kernel
+def involved(watch, c, first):
+    """Whether test c of three alike, from `first` on, is beyond its bound, and not for a neighbour's sake."""
+    size = 0.0
+    for i in range(3):
+        size = max(size, abs(watch.step.test[first + i].filtered[0]))
+    test = watch.step.test[c]
+    return test.share > 1.0 and abs(test.filtered[0]) > INVOLVED * size
+
+
+@kernel
+def suspect(watch):
+    """Fill suspect (N_SENSORS,) with the instruments that can have brought the tests here."""
+    who, lead = watch.suspect, watch.lead
+    for c in range(N_TESTS):
+        triple = TURN if c < ANGLE else ANGLE
+        beyond = involved(watch, c, triple) if c < SPEED else watch.step.test[c].share > 1.0
+        if beyond:
+            watch.fired[c] = 1
+    fired = watch.fired
+    who[:] = 0
+    if lead < SPEED:
+        suspect_attitude(watch)
+    who[AIRSPEED] = lead == SPEED or (lead == DENSITY and fired[SPEED] == 1)
+    who[QDYN] = lead == DENSITY and fired[SPEED] == 0
+    who[ALPHA], who[BETA] = lead == ALPHA_FLOW, lead == BETA_FLOW
+    who[ALTITUDE] = lead == CLIMB
+    who[ENGINE_SPEED], who[MANIFOLD] = lead == RPM, lead == PRESSURE
+
+
+@kernel
+def suspect_attitude(watch):
+    """The same of gyros and attitude: one axis alone, or one angle alone."""
+    fired, who = watch.fired, watch.suspect
+    turns, angles = 0, 0
+    for i in range(3):
+        turns += fired[TURN + i]
+        angles += fired[ANGLE + i]
+    for i in range(3):
+        alone = fired[TURN + i] == 1 and turns == 1
+        who[i] = alone and watch.rates_say[i] != NO
+        mine = fired[ANGLE + i] == 1 and angles == 1
+        who[PHI + i] = mine and watch.rates_say[axis_of(watch, i)] != YES
+
+
+@kernel
+def axis_of(watch, i):
+    """The body axis whose rate shows what angle i does, as things are: the one furthest beyond its bound."""
+    axis = i
+    for j in range(3):
+        if watch.step.test[TURN + j].share > watch.step.test[TURN + axis].share:
+            axis = j
+    return axis
+
+
+@kernel
+def replace(watch, belief, measured):
+    """Put what the other instruments say in the place of those that are named or missing."""
+    signal, changed = measured.signal, 0
+    for i in range(N_SENSORS):
+        if measured.missing[i]:
+            watch.replaced[i] = 1
+        if watch.replaced[i]:
+            signal[i] = stand_in(watch, belief, signal, i)
+            changed = 2 if i in (AIRSPEED, QDYN) or i >= ENGINE_SPEED else max(changed, 1)
+    if changed > 0:
+        share_out(measured)
+    if changed > 1 and watch.engine:
+        note_slipstream(measured)
+
+
+@kernel
+def stand_in(watch, belief, signal, i):
+    """What the other instruments say of instrument i."""
+    step = watch.step
+    if i < 3:
+        return rate_from_attitude(watch, belief, i)
+    if i in (ALPHA, BETA):
+        return step.predicted[i] + step.h / FORGETTING_S * (watch.trim[i] - step.predicted[i])
+    density = 2.0 * step.then[QDYN] / step.then[AIRSPEED] ** 2
+    if i == AIRSPEED:
+        return np.sqrt(max(2.0 * signal[QDYN] / density, 1.0))
+    if i == QDYN:
+        return 0.5 * density * signal[AIRSPEED] ** 2
+    if i >= ENGINE_SPEED:
+        return step.command[i - ENGINE_SPEED]
+    return step.predicted[i]
+
+
+@kernel
+def rate_from_attitude(watch, belief, i):
+    """Rate i, rad/s: what the attitude has shown of it by the look before, and the model's change since.
+
+    The rate itself is used for the next look: its own error shows there.
+    """
+    step = watch.step
+    u = belief.u_then if watch.past == 0 else belief.u
+    acceleration = belief.f[i]
+    for s in range(u.size):
+        acceleration += belief.G[i, s] * u[s]
+    shown = watch.follows * step.test[TURN + i].residual
+    if not watch.taken_over[i] and watch.follows < 1.0:
+        shown = step.h * QUICK_PER_S * step.test[TURN + i].filtered[1]
+    watch.taken_over[i] = 1
+    known = step.then[i] + shown / step.h
+    return known + step.h * acceleration
+
+
+@kernel
+def speaks(watch):
+    """Whether the watch has the word: no surface is to be named."""
+    return watch.enabled and watch.alarmed

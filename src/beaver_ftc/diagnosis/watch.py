@@ -1,0 +1,57 @@
+"""What the watch over the instruments keeps: redundancy.py, instruments.py."""
+
+import numpy as np
+
+from beaver_ftc.plant.instruments import N_SENSORS, PHI, SIGNALS
+
+TURN, ANGLE, SPEED, ALPHA_FLOW, BETA_FLOW, DENSITY, CLIMB, RPM, PRESSURE = 0, 3, 6, 7, 8, 9, 10, 11, 12
+N_TESTS = 13
+POLES_PER_S = (1e6, 10.0, 1.0)
+NOBODY = -1
+UNKNOWN, YES, NO = 0, 1, 2
+P, Q, R, ALPHA, BETA, AIRSPEED, QDYN = range(len(SIGNALS))
+THETA, PSI = PHI + 1, PHI + 2
+
+TEST = np.dtype(
+    [
+        ("residual", "f8"), ("rate", "f8"), ("noise", "f8"), ("noise_then", "f8"),  # of the elapsed step
+        ("filtered", "f8", (len(POLES_PER_S),)), ("bound_rate", "f8", (len(POLES_PER_S),)),
+        ("bound_noise", "f8", (len(POLES_PER_S),)), ("share", "f8"),
+    ],
+    align=True,
+)  # fmt: skip
+
+STEP = np.dtype(
+    [
+        ("h", "f8"), ("decay", "f8", (len(POLES_PER_S),)), ("gravity", "f8"), ("flow", "i8"),
+        # declared: the whole error of a reading, and what of it changes; drift of the attitude
+        ("offset", "f8", (N_SENSORS,)), ("slope", "f8", (N_SENSORS,)), ("steady", "f8", (N_SENSORS,)),
+        ("drift", "f8"), ("error", "f8", (N_SENSORS,)), ("changing", "f8", (N_SENSORS,)),
+        # the look before: readings, attitude as a quaternion, velocity, acceleration there and before that
+        ("then", "f8", (N_SENSORS,)), ("turned", "f8", (4,)), ("velocity", "f8", (3,)),
+        ("acceleration", "f8", (3,)), ("acceleration_then", "f8", (3,)), ("size", "f8"),
+        ("predicted", "f8", (N_SENSORS,)), ("scratch", "f8", (4,)), ("now", "f8", (4,)),
+        ("command", "f8", (2,)),  # engine speed rpm, manifold pressure inHg
+        ("test", TEST, (N_TESTS,)),
+    ],
+    align=True,
+)  # fmt: skip
+
+
+WATCH = np.dtype(
+    [
+        ("enabled", "i8"), ("begun", "i8"), ("instants", "i8"), ("past", "i8"), ("engine", "i8"),
+        ("alarmed", "i8"), ("alarmed_at_s", "f8"), ("beside", "i8"), ("lead", "i8"),
+        ("misnamed", "i8"),  # a surface had been named in the moment before the alarm
+        ("fired", "i8", (N_TESTS,)), ("suspect", "i8", (N_SENSORS,)),
+        ("named", "i8"), ("named_at_s", "f8"), ("replaced", "i8", (N_SENSORS,)),
+        ("trim", "f8", (N_SENSORS,)), ("follows", "f8"),  # share of its error a replaced rate makes up a look
+        # what tells a gyro from the attitude, by axis
+        ("error", "f8", (3,)), ("error_then", "f8", (3,)),  # of the gyro, as each frame began, rad/s
+        ("spike", "f8", (3,)), ("spike_then", "f8", (3,)),
+        ("damping", "f8", (3,)), ("W", "f8", (3,)), ("W_bound", "f8", (3,)),
+        ("rates_say", "i8", (3,)), ("taken_over", "i8", (3,)),
+        ("step", STEP),
+    ],
+    align=True,
+)  # fmt: skip

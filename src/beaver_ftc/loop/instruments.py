@@ -1,0 +1,137 @@
+"""The instruments of a flight, and the watch over them: from a scenario to their records."""
+
+from math import exp
+from typing import Any
+
+import numpy as np
+
+from beaver_ftc.design.context import DesignModel
+from beaver_ftc.diagnosis.declared import gust_effect
+from beaver_ftc.diagnosis.watch import NOBODY, POLES_PER_S
+from beaver_ftc.errors import BadInput
+from beaver_ftc.loop import steps
+from beaver_ftc.loop.direct import direct
+from beaver_ftc.plant import channels as ch
+from beaver_ftc.plant.instruments import (
+    ENGINE_SPEED,
+    LONGEST_DELAY,
+    NOISE_LIMIT_SIGMA,
+    PHI,
+    SENSORS,
+)
+from beaver_ftc.plant.sensor_faults import OF_THE_SLIPSTREAM
+from beaver_ftc.scenario.faults import of_a_sensor
+from beaver_ftc.scenario.schema import Scenario
+
+GRAVITY_M_S2, EARTH_RADIUS_M = 9.80665, 6_371_000.0
+TAKEN_OVER_PER_S = 3.0  # by the attitude, of a rate it stands in for, where its own noise is declared
+OTHER_COUNTERS = (0xD1B54A32D192ED03, 0x8CB92BA72F3D8DD7)  # apart from the seed: further noise, faults' noise
+
+
+def breaks_instruments(scenario: Scenario) -> bool:
+    """Whether an instrument fails in this flight."""
+    return any(of_a_sensor(fault) for fault in scenario.faults)
+
+
+def is_watched(scenario: Scenario) -> bool:
+    """Whether the instruments are held against one another. A flight in which none can fail is spared it:
+    sound instruments never make the watch speak."""
+    wanted = scenario.fdi.sensor_monitor
+    needed = wanted == "always" or (wanted == "auto" and breaks_instruments(scenario))
+    return needed and scenario.fdi.scheme == "adaptive-estimators"
+
+
+def has_real_engine(scenario: Scenario) -> bool:
+    """Whether dpt is to be worked out from readings that can be wrong from the start."""
+    real = any(not getattr(scenario.sensors, name).is_ideal for name in OF_THE_SLIPSTREAM)
+    return real and scenario.airframe.has_engine_instruments
+
+
+def truth_read(scenario: Scenario) -> tuple[ch.Channel, ...]:
+    """What is read from the truth in this flight."""
+    usual = ch.truth_channels(scenario.airframe)
+    further = is_watched(scenario) or breaks_instruments(scenario) or has_real_engine(scenario)
+    return (*usual, *ch.further_channels(scenario.airframe)) if further else usual
+
+
+def assemble_instruments(frame: np.void, scenario: Scenario, dt: float) -> None:
+    """dt: seconds between samples, which is a JSBSim frame."""
+    instruments = frame["instruments"]
+    instruments["real"] = not scenario.sensors.is_ideal
+    instruments["random"] = scenario.seed
+    instruments["random_further"], instruments["random_fault"] = (
+        np.uint64(scenario.seed) ^ np.uint64(counter) for counter in OTHER_COUNTERS
+    )
+    instruments["engine"] = has_real_engine(scenario)
+    for i, name in enumerate(SENSORS):
+        sensor = getattr(scenario.sensors, name)
+        noise, bias, quantum = sensor.noise_bias_quantum
+        instruments["noise"][i], instruments["bias"][i], instruments["quantum"][i] = noise, bias, quantum
+        instruments["gain"][i], instruments["dropout"][i] = 1.0 + sensor.scale_error, sensor.dropout_share
+        instruments["drift"][i] = getattr(sensor, "drift_rad_s", 0.0) * dt
+        instruments["keep"][i] = exp(-sensor.bandwidth_rad_s * dt) if sensor.bandwidth_rad_s else 0.0
+        instruments["delay"][i] = sensor.delay_s / dt
+        if sensor.delay_s / dt > LONGEST_DELAY:
+            raise BadInput(
+                f"{scenario.name}: sensors.{name}.delay_s is {sensor.delay_s:g} s, "
+                f"allowed: {LONGEST_DELAY} JSBSim frames, {LONGEST_DELAY * dt:g} s here"
+            )
+
+
+def assemble_watch(watch: np.void, scenario: Scenario, h: float) -> None:
+    """h: seconds between two looks, which is a JSBSim frame."""
+    watch["enabled"], watch["instants"] = is_watched(scenario), scenario.substeps
+    watch["named"], watch["alarmed_at_s"], watch["named_at_s"] = NOBODY, -1.0, -1.0
+    watch["engine"] = scenario.airframe.has_engine_instruments
+    step, sensors = watch["step"], scenario.fdi.bounds.sensors
+    step["h"], step["decay"] = h, [exp(-pole * h) for pole in POLES_PER_S]
+    step["gravity"] = GRAVITY_M_S2 * (1.0 + scenario.initial.altitude_m / EARTH_RADIUS_M) ** -2
+    step["flow"] = scenario.fdi.bounds.turbulence == "none"
+    if watch["engine"]:
+        initial: Any = scenario.initial  # its engine's keys are the aircraft's
+        step["command"] = initial.engine_rpm, initial.manifold_pressure_inhg
+    for i, name in enumerate(SENSORS):
+        sensor = getattr(sensors, name)
+        noise, bias, quantum = sensor.noise_bias_quantum
+        step["offset"][i] = NOISE_LIMIT_SIGMA * noise + abs(bias) + quantum / 2
+        step["slope"][i], step["steady"][i] = abs(sensor.scale_error), abs(bias)
+        step["drift"] = max(step["drift"], abs(getattr(sensor, "drift_rad_s", 0.0)))
+    blurred = np.any(step["offset"][PHI : PHI + 3] > step["steady"][PHI : PHI + 3])
+    watch["follows"] = min(1.0, h * TAKEN_OVER_PER_S) if blurred else 1.0
+
+
+def anchor_watch(watch: np.void, design: np.ndarray, y: np.ndarray) -> None:
+    """Show the watch the trim: y, and how the rates are damped there; design: the designer's record, (1,)."""
+    watch["trim"][3:7] = y[:4]
+    watch["damping"] = np.maximum(np.diag(gust_effect(DesignModel(design.copy()), y)), 0.0)
+
+
+def watch_from_now(loop: Any) -> None:
+    """Begin, between two frames of a Loop, to read further instruments and watch all; again is harmless."""
+    frame = loop.frames[0]
+    watch = frame["fdi"]["watch"]
+    read_more(loop)
+    wanted = loop.scenario.fdi.sensor_monitor != "never" and frame["fdi"]["enabled"]
+    if wanted and not watch["enabled"]:
+        watch["enabled"] = 1
+        if frame["k"] > 0:
+            _read_further(loop, frame["measured"])
+            direct(steps.begin_watch, loop.frames)(loop.frames)
+
+
+def read_more(loop: Any) -> None:
+    """Have the further instruments read from the next frame on."""
+    truth, aircraft = loop.frames[0]["truth"], loop.aircraft
+    channels = (*ch.truth_channels(aircraft), *ch.further_channels(aircraft))
+    if truth["n"] < len(channels):
+        truth["n"] = len(channels)
+        truth["factor"][: len(channels)] = [factor for _, _, factor in channels]
+        loop.cockpit = type(loop.cockpit)(loop.plant, loop.frames)
+
+
+def _read_further(loop: Any, measured: np.void) -> None:
+    """What the further instruments say of the frame just flown."""
+    values = [loop.plant.read(name) * factor for _, name, factor in ch.further_channels(loop.aircraft)]
+    measured["inertial"], measured["force"] = 1, np.array(values[:3]) / values[3]
+    if len(values) > 4:
+        measured["engine"], measured["signal"][ENGINE_SPEED:] = 1, values[4:]

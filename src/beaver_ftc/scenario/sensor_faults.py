@@ -1,0 +1,133 @@
+"""How an instrument can break: the reading goes wrong, the aircraft does not.
+
+Magnitudes are in the unit in which `sensors` has the instrument: UNITS.
+"""
+
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import AfterValidator, Field, model_validator
+
+from beaver_ftc.aircraft.question import in_question
+from beaver_ftc.errors import suggestion
+from beaver_ftc.scenario.base import Conflict, Number, Section, number, order_conflicts, refuse
+from beaver_ftc.scenario.sensors import ENGINE, Sensors
+
+# Sensor -> its unit, and the largest offset or noise that a fault may have.
+UNITS: dict[str, tuple[str, float]] = {
+    **dict.fromkeys("pqr", ("deg/s", 200.0)),
+    **dict.fromkeys(("alpha", "beta", "phi", "theta", "psi"), ("deg", 90.0)),
+    "V": ("m/s", 100.0),
+    "qdyn": ("Pa", 5000.0),
+    "altitude": ("m", 5000.0),
+    "engine_rpm": ("rpm", 3000.0),
+    "manifold_pressure": ("inHg", 50.0),
+}
+MOST_SCALE = 2.0
+
+
+def sensors_there() -> tuple[str, ...]:
+    """The instruments of the aircraft in question."""
+    engine = in_question().has_engine_instruments
+    return tuple(name for name in Sensors.model_fields if engine or name not in ENGINE)
+
+
+def sensor_words(name: str) -> str:
+    """What a verdict calls a sensor: surfaces may have the same name."""
+    return f"sensor {name}"
+
+
+def _known(name: str) -> str:
+    known = sensors_there()
+    if name not in known:
+        refuse([((), f"{name[:100]!r} is no sensor{suggestion(name, known)}")])
+    return name
+
+
+def _examples(schema: dict[str, Any]) -> None:
+    schema["examples"] = list(UNITS)
+
+
+SensorName = Annotated[
+    str,
+    AfterValidator(_known),
+    Field(description="the instrument that fails, as in `sensors`", json_schema_extra=_examples),
+]
+
+
+class SensorFault(Section):
+    """When an instrument is broken."""
+
+    sensor: SensorName
+    at_s: Number = number(unit="s", says="when the fault starts", ge=0, le=360_000)
+    end_s: Number | None = number(None, unit="s", says="when it is gone; left out: it stays", gt=0)
+    profile: Literal["abrupt"] = Field(default="abrupt", description="this type of fault is always abrupt")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _until(cls, given: Any) -> Any:
+        """`until_s` says the same as `end_s`."""
+        if isinstance(given, dict) and "until_s" in given and "end_s" not in given:
+            return {"end_s" if key == "until_s" else key: value for key, value in given.items()}
+        return given
+
+    @model_validator(mode="after")
+    def _fits_together(self) -> Self:
+        refuse([*order_conflicts(self.at_s, self.end_s, "at_s"), *self._out_of_range()])
+        return self
+
+    def _out_of_range(self) -> list[Conflict]:
+        return []
+
+
+class _Sized(SensorFault):
+    """A fault whose size is in the sensor's unit."""
+
+    def _out_of_range(self) -> list[Conflict]:
+        unit, most = UNITS[self.sensor]
+        magnitude: float = getattr(self, "magnitude", 0.0)
+        if abs(magnitude) <= most:
+            return []
+        says = f"{magnitude:g} is out of range, allowed: at most {most:g} {unit} for {self.sensor}"
+        return [(("magnitude",), says)]
+
+
+class SensorBias(_Sized):
+    """The reading is off by a constant."""
+
+    type: Literal["bias"]
+    magnitude: Number = number(unit="the sensor's unit", says="added to the reading", ge=-5000, le=5000)
+
+
+class SensorNoise(_Sized):
+    """The reading scatters."""
+
+    type: Literal["noise"]
+    magnitude: Number = number(
+        unit="the sensor's unit", says="standard deviation added to the reading", gt=0, le=5000
+    )
+
+
+class SensorScale(SensorFault):
+    """The reading is (1 + magnitude) times what it should be."""
+
+    type: Literal["scale"]
+    magnitude: Number = number(
+        unit="share of 1", says="relative error of the reading", ge=-MOST_SCALE, le=MOST_SCALE
+    )
+
+
+class SensorFreeze(SensorFault):
+    """The reading stays as it was."""
+
+    type: Literal["freeze"]
+
+
+class SensorLost(SensorFault):
+    """There is no reading any more, and whoever reads can tell."""
+
+    type: Literal["lost"]
+
+
+AnySensorFault = Annotated[
+    SensorBias | SensorNoise | SensorScale | SensorFreeze | SensorLost, Field(discriminator="type")
+]

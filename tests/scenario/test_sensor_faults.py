@@ -1,0 +1,65 @@
+"""Faults of instruments in a scenario: what is read, and one clear line for each mistake."""
+
+import pytest
+
+from beaver_ftc.errors import BadInput
+from beaver_ftc.scenario.given import load
+
+
+def faulty(**fault):
+    return {"name": "x", "faults": [{"sensor": "p", "type": "bias", "magnitude": 1, "at_s": 2} | fault]}
+
+
+@pytest.mark.parametrize(
+    ("fault", "says"),
+    [
+        ({"sensor": "pp"}, "faults[0].sensor: 'pp' is no sensor, did you mean p? allowed: p, q, r, alpha"),
+        (
+            {"type": "jammed"},
+            "faults[0].type: 'jammed' is not known, allowed: bias, noise, scale, freeze, lost",
+        ),
+        ({"magnitude": 500}, "faults[0].magnitude: 500 is out of range, allowed: at most 200 deg/s for p"),
+        (
+            {"sensor": "qdyn", "magnitude": 9e9},
+            "faults[0].magnitude: 9e+09 is out of range, allowed: a number",
+        ),
+        ({"type": "scale", "magnitude": 3}, "faults[0].magnitude: 3 is out of range"),
+        ({"type": "freeze"}, "faults[0].magnitude: unknown key"),
+        ({"bias_deg": 3}, "faults[0].bias_deg: unknown key"),
+        ({"actuator": "elevator"}, "faults[0].actuator: unknown key"),
+        ({"end_s": 1}, "faults[0].end_s: 1 is not after at_s, allowed: later than 2 s"),
+        ({"at_s": 40}, "faults[0].at_s: 40 is after the end, allowed: earlier than duration_s, 30 s"),
+        ({"magnitude": "much"}, "faults[0].magnitude: 'much' is text, allowed: a number"),
+    ],
+)
+def test_a_mistake_is_one_line(fault, says):
+    with pytest.raises(BadInput) as error:
+        load(faulty(**fault))
+    assert str(error.value).startswith(says)
+    assert len(str(error.value).splitlines()) == 1
+
+
+def test_a_size_that_is_missing_is_asked_for():
+    with pytest.raises(BadInput, match=r"faults\[0\].magnitude: required key is missing, allowed: a number"):
+        load({"name": "x", "faults": [{"sensor": "p", "type": "bias", "at_s": 2}]})
+
+
+def test_the_end_may_be_called_until():
+    (fault,) = load(faulty(until_s=5)).faults
+    assert fault.end_s == 5
+
+
+def test_the_same_type_is_another_fault_on_a_surface():
+    both = faulty()
+    both["faults"].append({"actuator": "flap", "type": "bias", "bias_deg": 2, "at_s": 3})
+    sensor, surface = load(both).faults
+    assert (sensor.sensor, surface.actuator) == ("p", "flap")
+    assert load(load(both).model_dump(mode="json", exclude_none=True)).faults == (sensor, surface)
+
+
+def test_a_sensor_may_be_expected_by_name():
+    assert load(faulty() | {"expect": {"isolated_as": "sensor p"}}).expect.isolated_as == "sensor p"
+    with pytest.raises(
+        BadInput, match=r"expect.isolated_as: 'sensor pp' is not known, did you mean sensor p"
+    ):
+        load(faulty() | {"expect": {"isolated_as": "sensor pp"}})

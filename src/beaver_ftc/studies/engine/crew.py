@@ -108,10 +108,13 @@ class _Worker:
         return self.pid.done() and self.pid.exception() is None
 
     def end(self) -> None:
-        self._pool.shutdown(wait=False, cancel_futures=True)
-        if self.started():
-            with contextlib.suppress(ProcessLookupError):
-                os.kill(self.pid.result(), signal.SIGTERM)
+        """Terminate it, started or not. Its futures are left to fail: a pool that breaks cannot fail
+        cancelled ones, and says so in a traceback.
+        """
+        running = [*(self._pool._processes or {}).values()]
+        self._pool.shutdown(wait=False)
+        for process in running:
+            process.terminate()
 
 
 class LocalCrew:

@@ -1,0 +1,77 @@
+"""How a command ends that cannot go on, or must not: a status, a line, and nothing else."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+BEAVER = Path(sys.executable).with_name("beaver-ftc")
+NOT_FINITE = """
+import sys
+import numpy as np
+from beaver_ftc.cli.main import main
+from beaver_ftc.loop.loop import Loop
+from beaver_ftc.plant.channels import TRUTH
+
+begin, beta = Loop.__init__, [name for name, *_ in TRUTH].index("beta_rad")
+
+def begin_to_fail(self, *arguments, **options):
+    begin(self, *arguments, **options)
+    self.cockpit.native = False
+    self.frames["truth"]["native"] = 0
+    read = self.cockpit.read
+
+    def read_nonsense():
+        read()
+        if self.frames["k"][0] == 50:
+            self.frames["truth"]["value"][0, beta] = np.nan
+
+    self.cockpit.read = read_nonsense
+
+Loop.__init__ = begin_to_fail
+sys.argv = ["beaver-ftc", "run", "elevator-partial-loss", "--no-report", "--out", sys.argv[1]]
+main()
+"""
+
+
+def test_a_flight_that_is_not_finite_is_status_3(tmp_path):
+    done = subprocess.run(
+        [sys.executable, "-c", NOT_FINITE, tmp_path / "runs"], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 3
+    assert done.stderr.count("\n") == 1
+    assert "beta_rad" in done.stderr
+    assert "0.5 s" in done.stderr
+    assert list(tmp_path.rglob("*.*")) == [], "nothing is left of it"
+
+
+# Undoes what nohup, or a shell that starts jobs in the background, has the tests' process ignore.
+HEARD_AGAIN = """
+import os, signal, sys
+signal.signal(signal.SIGTERM, signal.SIG_DFL)
+os.execv(sys.argv[1], sys.argv[1:])
+"""
+
+
+@pytest.mark.parametrize("seconds", [1.5, 6.0])
+def test_tuning_that_is_ended_says_nothing(tmp_path, seconds):
+    """Before its workers have started and while they fly; what the rivals ship with is as it was."""
+    from beaver_ftc.diagnosis.rivals.options import TUNED
+
+    before = TUNED.read_bytes()
+    command = [sys.executable, "-c", HEARD_AGAIN, BEAVER, "compare", "--tune", "--workers", "2"]
+    environment = {**os.environ, "COLUMNS": "80"}
+    with subprocess.Popen(command, cwd=tmp_path, env=environment, stderr=subprocess.PIPE) as running:
+        time.sleep(seconds)
+        assert running.poll() is None
+        running.send_signal(signal.SIGTERM)
+        said = running.communicate(timeout=30)[1]
+    assert running.returncode == 143
+    assert b"Traceback" not in said
+    assert b"Error" not in said
+    assert TUNED.read_bytes() == before
+    assert list(tmp_path.iterdir()) == []

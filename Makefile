@@ -6,7 +6,7 @@ WORKERS ?= 2
 SEED ?= 1
 PYTEST := $(BIN)/python -m pytest -n $(WORKERS) --dist worksteal
 # What a change breaks most often, in less than a minute: what flies little or nothing.
-FAST := tests/aircraft tests/design tests/docs tests/plant tests/results tests/scenario $(wildcard tests/test_re*.py tests/test_arch*.py)
+FAST := tests/aircraft tests/design tests/plant tests/results tests/scenario $(wildcard tests/test_re*.py tests/test_arch*.py)
 
 .PHONY: demo test acceptance test-fast coverage mutants lint docs site clean help
 

@@ -67,6 +67,14 @@ def test_a_demand_beyond_the_stops_is_noted():
     assert list(control["beyond"]) == [0, 1, 0]
 
 
+def test_what_a_lagging_surface_still_gives_is_no_shortfall():
+    control, rng = control_record(), np.random.default_rng(3)
+    G, u, lag = rng.normal(size=(3, 4)), rng.uniform(-0.1, 0.1, 4), rng.uniform(-0.1, 0.1, 4)
+    control["demand"], control["lag"] = rng.normal(size=3), lag
+    authority.note_shortfall(control, G, u)
+    assert control["shortfall"] == pytest.approx(control["demand"] - G @ (u + lag), abs=1e-12)
+
+
 class TestProbing:
     def probed(self, wanted):
         control = control_record()

@@ -61,6 +61,19 @@ class TestWhen:
         assert (history[110:] < 20.0).all()
         assert control["power"]["from_s"] == pytest.approx(0.99, abs=0.011)
 
+    def test_what_attitude_was_missed_before_is_not_its_business(self):
+        control = control_record(patience_s=0.1)
+        control["power"]["attitude"] = 0.3
+        power.watch(control, 0.0)
+        assert control["power"]["attitude"] == 0.3
+        lose_pitch(control)
+        for k in range(20):
+            power.watch(control, k * DT)
+            if not control["power"]["engaged"]:
+                control["power"]["attitude"] = 0.3
+        assert control["power"]["engaged"]
+        assert control["power"]["attitude"] == 0.0
+
     def test_one_of_the_two_is_enough_to_do_without(self):
         for surface in (ELEVATOR, FLAP):
             control = control_record()

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from beaver_ftc.control.base import Reference
-from beaver_ftc.control.rivals.indi import LowPass
+from beaver_ftc.control.rivals.indi import IncrementalInversion, LowPass
 from beaver_ftc.control.rivals.l1 import Predictor
 from beaver_ftc.control.rivals.lqr import gains
 from beaver_ftc.design.context import Context
@@ -130,6 +130,24 @@ def test_the_filter_has_its_step_response():
         value = low_pass.step(np.ones(1))
     impulse = (1 - a) * a ** np.arange(n)
     assert value[0] == pytest.approx(np.convolve(impulse, impulse)[:n].sum())
+
+
+def test_incremental_inversion_sets_what_was_measured_against_the_command_that_gave_it():
+    """A command acts on the rates two frames later: what is left then is the disturbance alone."""
+    law, d = IncrementalInversion(), np.array([0.3, -0.2, 0.1])
+    law.reset(context(**law.defaults))
+    rng = np.random.default_rng(5)
+    Kp, Ki, pole = (law.defaults[key] for key in ("proportional_per_s", "integral_per_s2", "filter_per_s"))
+    x, integral, given = np.zeros(3), np.zeros(3), [np.zeros(4)] * 2
+    disturbed = LowPass(pole, DT, np.zeros(3))
+    for k in range(30):
+        x = x + (DT * (G @ given[-2] + d) if k else 0.0)
+        rate, acceleration = rng.normal(size=(2, 3)) * 0.01
+        seen = Measured(k * DT, x.copy(), np.zeros(5), np.zeros(3), np.zeros((3, 4)), np.zeros(3))
+        given.append(law.step(seen, Reference(rate, rate, acceleration), Verdict()))
+        integral = integral + DT * (rate - x)
+        nu = acceleration + Kp * (rate - x) + Ki * integral
+        assert G @ given[-1] == pytest.approx(nu - disturbed.step(d if k else np.zeros(3)), abs=1e-9)
 
 
 @pytest.mark.parametrize("name", LAW_NAMES)

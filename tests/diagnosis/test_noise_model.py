@@ -182,6 +182,20 @@ def test_tolerances_of_coefficients_and_inertia_add_up():
     assert inertia[i] >= 0.05 / 1.05 * size
 
 
+@pytest.mark.parametrize(("vane", "axis", "lag"), [("alpha", 1, 4.0), ("beta", 2, 3.0)])
+def test_noise_of_a_vane_is_a_gust_that_rotates_by_its_slope(vane, axis, lag):
+    """pi V / 4b for pitch and pi V / 3b for yaw [MIL-F-8785C], through what a rotation of the air does."""
+    design, span_m, size = design_record()[0], 14.63, np.deg2rad(0.2)
+    sensors = Bounds.model_validate({"sensors": {vane: {"noise_std_deg": 0.2}}}).sensors
+    _, y, u = LEVEL_FLIGHT
+    turning, h = np.zeros(3), 1e-6
+    turning[axis] = h
+    damping = (_rates(design, turning, y, u) - _rates(design, np.zeros(3), y, u)) / h
+    expected = np.abs(damping) * size * np.pi * y[2] / (lag * span_m)
+    found = noise_model._gust_jitter(sensors, design, LEVEL_FLIGHT, span_m)
+    assert found == pytest.approx(expected, rel=1e-3, abs=1e-6)
+
+
 def test_noise_of_other_sensors_and_of_deflections_is_part_of_the_noise():
     """By moving each signal by its standard deviation: what that does to f + G u is the jitter."""
     alone = Detector(100.0, bounds={**TACTICAL, "deflection_deg": 0.5})

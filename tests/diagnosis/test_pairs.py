@@ -1,5 +1,8 @@
 """Pairs of faults on the plant where the theory holds exactly, against an uncertainty that fights them."""
 
+from itertools import product
+
+import numpy as np
 import pytest
 from design_plant import UNCERTAINTIES, DesignPlant
 from hypothesis import given, settings
@@ -9,6 +12,7 @@ from test_fault_types import TYPES, shares, uncertainties
 
 from beaver_ftc.diagnosis.types import registry as types
 from beaver_ftc.diagnosis.types.findings import found
+from beaver_ftc.diagnosis.types.pairs import solve_roll_and_yaw
 from beaver_ftc.scenario.schema import Scenario
 
 AILERON, ELEVATOR, RUDDER = range(3)
@@ -83,3 +87,30 @@ def test_pairs_belong_to_the_class_of_all_faults():
     ((key, why),) = refused.value.errors()[0]["ctx"]["conflicts"]
     assert key == ("pairs",)
     assert "allowed: true with fault_class: all" in why
+
+
+angles = st.floats(-0.2, 0.2)
+
+
+@given(angles, angles, st.lists(st.floats(0, 0.5), min_size=6, max_size=6))
+def test_ailerons_and_rudder_were_where_two_equations_put_them(off_a, off_r, sizes):
+    """nu = Z_a a + Z_r r + e for every admitted e: the corners of e are the ends of what is possible."""
+    plant = DesignPlant(seed=1, surface=0, position=lambda k, u: u, fault_class="all", pairs=True)
+    fdi = plant.fdi
+    Z = np.array([[-9.0, 0.6], [-0.3, -2.1]])  # of roll and yaw, by ailerons and rudder
+    frame, spread = np.array(sizes[:2]) + 0.01, np.array(sizes[2:]).reshape(2, 2)
+    for column, s in enumerate((AILERON, RUDDER)):
+        effect = fdi["estimator"][fdi["layout"]["position_of"][s]]["effect"]
+        effect["Z"][[0, 2]], effect["spread"][[0, 2]] = Z[:, column], spread[:, column]
+        fdi["surface"][s]["command"] = 0.02
+    fdi["bound"]["frame"][[0, 2]] = frame
+    fdi["innovation"][[0, 2]] = Z @ [off_a, off_r]
+    solve_roll_and_yaw(fdi)
+    e = frame + spread.sum(axis=1)
+    signs = product((-1, 1), repeat=2)
+    corners = np.array([np.linalg.solve(Z, Z @ [off_a, off_r] + e * sign) for sign in signs])
+    for column, s in enumerate((AILERON, RUDDER)):
+        surface, ends = fdi["surface"][s], corners[:, column]
+        assert surface["low"] == pytest.approx(max(surface["travel_low"], 0.02 + ends.min()), abs=1e-9)
+        assert surface["high"] == pytest.approx(min(surface["travel_high"], 0.02 + ends.max()), abs=1e-9)
+        assert surface["wrong"] == (ends.min() > 0 or ends.max() < 0)

@@ -1,5 +1,6 @@
 """A repaired surface on its way back: neither at fault nor healthy, and no reason to doubt what it was."""
 
+import numpy as np
 import pytest
 from design_plant import TRAVEL_RAD, UNCERTAINTIES, DesignPlant
 from hypothesis import example, given, settings
@@ -7,6 +8,7 @@ from hypothesis import strategies as st
 from test_fault_types import TYPES, cases, shares, surfaces
 
 from beaver_ftc.diagnosis.types import registry as types
+from beaver_ftc.diagnosis.types import stuck
 
 HELD = ("stuck", "float", "hardover up", "hardover down")
 uncertainties = st.sampled_from(list(UNCERTAINTIES.values()))
@@ -95,3 +97,22 @@ def test_a_servo_does_not_keep_a_bias_from_being_told_from_a_jam():
     assert excluded[types.STUCK]
     assert excluded[types.FLOAT]
     assert not excluded[types.BIAS]
+
+
+@pytest.mark.parametrize("earlier", [True, False])
+def test_later_releases_become_the_earlier_ones_when_of_those_none_is_left(earlier):
+    plant = DesignPlant(seed=1, surface=0, position=lambda k, u: u, fault_class="all", actuators="servo")
+    surface, kind = plant.fdi["surface"][0], types.STUCK
+    held, jam = surface["release"], surface["stuck"]
+    held["low"][:, kind] = 0.1 if earlier else np.inf, 0.2
+    held["high"][:, kind] = 0.15 if earlier else -np.inf, 0.3
+    jam["kept_low"], jam["kept_high"] = (0.01, 0.02), (0.05, 0.06)
+    surface["set_low"][kind], surface["set_high"][kind] = -0.4, 0.4
+    stuck.renew(surface, kind)
+    low, high = list(held["low"][:, kind]), list(held["high"][:, kind])
+    if earlier:
+        assert (low, high) == ([0.1, 0.2], [0.15, 0.3])
+        assert (list(jam["kept_low"]), list(jam["kept_high"])) == ([0.01, 0.02], [0.05, 0.06])
+    else:
+        assert (low, high) == ([0.2, np.inf], [0.3, -np.inf])
+        assert (list(jam["kept_low"]), list(jam["kept_high"])) == ([0.02, -0.4], [0.06, 0.4])

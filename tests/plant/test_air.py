@@ -6,7 +6,8 @@ import pytest
 from beaver_ftc.diagnosis.admitted import gust_sigma_rad_s
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.configure import configure, take_off, trim_of
-from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.plant.gust import NEVER, GustSchedule
+from beaver_ftc.scenario.schema import Gust, Scenario
 
 SPAN_FT, SCALE_FT, FT = 48.0, 1750.0, 0.3048
 AIR = [f"atmosphere/turb-{to}-fps" for to in ("north", "east", "down")]
@@ -113,6 +114,25 @@ def test_a_gust_rises_to_its_height_and_fades():
     assert at[2.0] == pytest.approx(-4.0)
     assert at[1.25] == pytest.approx(-2.0, abs=0.15)
     assert at[2.75] == pytest.approx(-2.0, abs=0.15)
+
+
+@pytest.mark.parametrize(("at_s", "frame"), [(0.0, 0), (0.07, 7), (0.071, 8), (0.0799, 8), (0.08, 8)])
+def test_a_gust_between_frames_begins_in_the_next(at_s, frame):
+    class Noted:
+        def __init__(self):
+            self.written = []
+
+        def write(self, name, value):
+            self.written.append(name)
+
+    plant = Noted()
+    schedule = GustSchedule(Gust(at_s=at_s, velocity_mps=(0, 0, 5)), plant, 100.0)
+    plant.written.clear()
+    for k in range(12):
+        schedule.apply(k)
+        assert plant.written.count("atmosphere/cosine-gust/start") == (k >= frame)
+    assert schedule.next_change(frame - 1) == frame
+    assert schedule.next_change(frame) == NEVER
 
 
 def test_turbulence_does_not_mind_a_fault_in_the_first_frame():

@@ -119,6 +119,12 @@ def test_losses_on_one_surface_multiply_and_biases_add(beaver):
     assert bias == pytest.approx([0] * 5 + [radians(1)] * 3 + [radians(3)] * 4)
 
 
+def test_two_slow_actuators_on_one_surface_are_slower_than_either(beaver):
+    faults = [elevator("rate_limit", scale=0.5), elevator("rate_limit", scale=0.2, at_s=0.07, end_s=0.1)]
+    scale = fly(beaver, faults, names=["failures/elevator/rate-scale"])
+    assert scale == pytest.approx([1] * 5 + [0.5] * 2 + [0.1] * 3 + [0.5] * 2)
+
+
 def test_faults_on_different_surfaces_do_not_touch_each_other(beaver):
     faults = [
         elevator("stuck", position_deg=1),

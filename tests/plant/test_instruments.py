@@ -82,6 +82,14 @@ def test_lost_samples_are_as_many_as_declared_and_hold_the_last():
     assert (readings <= ramp[:, 2]).all()
 
 
+def test_the_first_sample_is_never_lost():
+    """There is none before it to hold."""
+    truth = still(3) + np.arange(3)[:, None]
+    for seed in range(20):
+        readings = samples(truth, seed=seed, p={"dropout_share": 0.9}, V={"dropout_share": 0.9})
+        assert readings[0] == pytest.approx(truth[0])
+
+
 def test_a_delay_longer_than_the_line_is_refused():
     given = {"name": "x", "rate_hz": 1000, "substeps": 2, "sensors": {"p": {"delay_s": 1.0}}}
     with pytest.raises(BadInput, match=r"sensors\.p\.delay_s"):

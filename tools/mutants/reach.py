@@ -76,17 +76,27 @@ class _Timed:
 
 
 class limit:  # noqa: N801  # a context manager
-    """End what runs inside as a skipped test after so many seconds of processor."""
+    """End what runs inside as a skipped test: after so many seconds of processor, or a good while of waiting
+    for other processes.
+    """
 
     def __init__(self, seconds: float) -> None:
         self._seconds = seconds
 
     def __enter__(self) -> None:
-        signal.signal(signal.SIGPROF, self._give_up)
-        signal.setitimer(signal.ITIMER_PROF, self._seconds)
+        for number, timer, seconds in self._clocks():
+            signal.signal(number, self._give_up)
+            signal.setitimer(timer, seconds)
 
     def __exit__(self, *_) -> None:
-        signal.setitimer(signal.ITIMER_PROF, 0.0)
+        for _, timer, _ in self._clocks():
+            signal.setitimer(timer, 0.0)
+
+    def _clocks(self) -> tuple:
+        return (
+            (signal.SIGPROF, signal.ITIMER_PROF, self._seconds),
+            (signal.SIGALRM, signal.ITIMER_REAL, 10 * self._seconds),
+        )
 
     def _give_up(self, *_) -> None:
         pytest.skip("takes too long for this", allow_module_level=True)

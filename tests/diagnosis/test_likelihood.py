@@ -200,3 +200,19 @@ def test_from_the_alarm_on_old_evidence_is_forgotten():
     recent = hypothesis["correlation"][slot] / hypothesis["information"][slot]
     assert recent == pytest.approx(-0.9, abs=0.02)
     assert everything["correlation"][slot] / everything["information"][slot] > -0.85
+
+
+def test_each_frame_counts_keep_times_what_the_next_one_counts():
+    """Of the evidence, of the information, and of what the tolerances are multiplied with."""
+    frames, keep, rng = 12, 0.8, np.random.default_rng(6)
+    nu, signatures = rng.normal(size=(frames, 1)), rng.normal(size=(frames, 1, 1))
+    regressors = rng.normal(size=(frames, 2, 1))
+
+    def after(k, keep):
+        block = _block("one axis", STEP, tolerance=(0.1, 0.2))
+        one = _shown(block, nu[:k], signatures[:k], regressors[:k], keep=keep)["hypothesis"][0]
+        kept = N_SLOTS - 1
+        return np.array([one["correlation"][kept], one["information"][kept], *one["overlap"][kept][:2]])
+
+    each = np.diff([np.zeros(4), *(after(k, 1.0) for k in range(1, frames + 1))], axis=0)
+    assert after(frames, keep) == pytest.approx(keep ** np.arange(frames)[::-1] @ each, rel=1e-9)

@@ -14,7 +14,9 @@ import coverage
 import pytest
 
 ROOT = Path(__file__).parents[2]
-SLOW_S = 0.8  # a test that takes longer in plain Python is none for this: hundreds of mutants run
+# Seconds of processor: a test that takes longer in plain Python is none for this. The diagnosis needs flights.
+SLOW_S = {"diagnosis": 2.0}
+SLOW_ELSEWHERE_S = 0.4
 # What a change of shifts the lines: the rooms of the package from which mutants are made.
 ROOMS = ("design", "diagnosis", "control", "scenario", "results", "studies")
 KEPT = ROOT / ".mutants"
@@ -42,7 +44,7 @@ def _digest(folder: str) -> str:
 
 def _measured(folder: str) -> dict:
     watch = coverage.Coverage(data_file=None, source_pkgs=["beaver_ftc"], config_file=False)
-    timed = _Timed(watch)
+    timed = _Timed(watch, SLOW_S.get(folder, SLOW_ELSEWHERE_S))
     arguments = ["-q", "-p", "no:cacheprovider", "-m", "not acceptance", "--tb=no", "-rN"]
     with watch.collect():
         pytest.main([*arguments, str(ROOT / "tests" / folder)], plugins=[timed])
@@ -57,15 +59,15 @@ def _measured(folder: str) -> dict:
 class _Timed:
     """Notes for each test that passes how long it took, and gives up one that is slow."""
 
-    def __init__(self, watch: coverage.Coverage) -> None:
-        self._watch = watch
+    def __init__(self, watch: coverage.Coverage, slow_s: float) -> None:
+        self._watch, self._slow_s = watch, slow_s
         self.seconds: dict[str, float] = {}
 
     @pytest.hookimpl(wrapper=True)
     def pytest_runtest_protocol(self, item: pytest.Item) -> Iterator[None]:
         self._watch.switch_context(item.nodeid)
         self._start = time.process_time()
-        with limit(SLOW_S):
+        with limit(self._slow_s):
             return (yield)
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:

@@ -101,6 +101,7 @@ WRONG = {
 OTHERS = {
     "workflow": "name: flights\non: [push]\njobs: {fly: {steps: []}}\n",
     "compose": "name: shop\nservices: {web: {image: nginx}}\n",
+    "sweep": "name: many\nbase: elevator-partial-loss\nduration_s: 1\nflights: 4\n",
     "list": "- a\n- b\n",
     "empty": "",
 }

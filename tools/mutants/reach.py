@@ -9,6 +9,7 @@ import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from types import FrameType
 
 import coverage
 import pytest
@@ -100,8 +101,11 @@ class limit:  # noqa: N801  # a context manager
             (signal.SIGALRM, signal.ITIMER_REAL, 10 * self._seconds),
         )
 
-    def _give_up(self, *_) -> None:
-        pytest.skip("takes too long for this", allow_module_level=True)
+    def _give_up(self, number: int, frame: FrameType | None) -> None:
+        if frame and "coverage" in frame.f_code.co_filename:  # it holds a lock
+            signal.setitimer({c[0]: c[1] for c in self._clocks()}[number], 0.01)
+        else:
+            pytest.skip("takes too long for this", allow_module_level=True)
 
 
 if __name__ == "__main__":

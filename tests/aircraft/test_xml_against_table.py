@@ -149,7 +149,7 @@ def test_the_actuators_are_written_from_their_template():
 def test_every_location_is_named_as_jsbsims_own_schema_wants():
     """JSBSim.xsd: a location has a name and a unit; so does the one of a point mass."""
     root = ElementTree.parse(data_root() / "aircraft" / "beaver" / "beaver.xml").getroot()
-    locations = [place for place in root.iter("location")]
+    locations = list(root.iter("location"))
     assert len(locations) >= 7
     assert [dict(place.attrib) for place in locations if not {"name", "unit"} <= place.attrib.keys()] == []
     for mass in root.iter("pointmass"):

@@ -180,6 +180,32 @@ def test_replay_turns_the_aircraft(page):
     assert np.abs(looks[0] - looks[1]).max() > 0.2
 
 
+HEARD = """(() => {
+  const proto = CanvasRenderingContext2D.prototype, write = proto.fillText;
+  window.badges = {};
+  proto.fillText = function (text, x, y) {
+    if (this.canvas.ariaLabel?.startsWith("roll rate p") && /^[FDIX]$/.test(text)) window.badges[text] = x;
+    return write.call(this, text, x, y);
+  };
+  repaint();
+})()"""
+
+
+def test_badges_stand_at_their_instants_or_right_of_the_one_before(browser, tmp_path):
+    """A false alarm long before the fault is drawn there, and what would cover another stands beside it."""
+    flight = Flight(detection_time_s=3.0, isolation_time_s=3.05)
+    write_report(tmp_path / "early.html", [_folder(tmp_path / "early", flight)])
+    browser.open(tmp_path / "early.html")
+    browser.evaluate(HEARD)
+    browser.settle()
+    badges = browser.evaluate("window.badges")
+    width = browser.evaluate("document.querySelector('#tracking canvas').clientWidth") - 62
+    at = {t: 52 + t / browser.evaluate("END") * width for t in (3.0, 12.0)}
+    assert badges["D"] == pytest.approx(at[3.0], abs=0.5)
+    assert badges["I"] >= badges["D"] + 12
+    assert badges["F"] == pytest.approx(at[12.0], abs=0.5)
+
+
 ENDS = """((course, climb) => {
   const [c, s] = [Math.cos(course), Math.sin(course)], of = (k) => [0, k / 2, k];
   const level = { t_s: [0, 15, 30], north_m: of(1200 * c), east_m: of(1200 * s), altitude_m: of(climb) };

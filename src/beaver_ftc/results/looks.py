@@ -43,6 +43,7 @@ LOOKS = {
     "flap": Look(GREEN, (2, 3), 2.2, 5),
 }
 PLUM = "#8f4a74"  # a darker purple, for letters and thin lines
+CRIMSON = "#7d0a1e"  # the loss of the aircraft, and of nothing else
 MODE_COLOURS = {"nominal": "#bfe5d9", "adaptive": SKY, "reallocated": ORANGE, "unanticipated": PURPLE}
 
 
@@ -70,7 +71,7 @@ def marks(metrics: Document) -> list[Mark]:
         ("fault", fault and fault["at_s"], VERMILION, (), "v", "F"),
         ("detection", metrics["detection"]["time_s"], BLACK, (4, 2), "D", "D"),
         ("isolation", metrics["isolation"]["time_s"], PLUM, (6, 2, 1, 2), "s", "I"),
-        ("departure", departure and departure["time_s"], BLACK, (1, 2), "X", "X"),
+        ("departure", departure and departure["time_s"], CRIMSON, (1, 2), "X", "X"),
     )
     end_s = departure["time_s"] if departure else math.inf
     return [Mark(name, time, *look) for name, time, *look in instants if time is not None and time <= end_s]

@@ -635,9 +635,14 @@ function section(view) {
   return make("section", { id: view.name }, make("h2", { textContent: view.title }), runs);
 }
 
+for (const run of DATA.runs) run.marks.sort((one, other) => one.time_s - other.time_s); // badges are placed from left to right
 byId("space").append(...DATA.runs.map((run) => new Space(run).element));
 byId("views").append(...DATA.views.map(section));
 byId("contents").append(...DATA.views.map((view) => make("a", { href: `#${view.name}`, textContent: view.title.split(":")[0] })));
+document.querySelectorAll("main section:not([id]) > h2").forEach((title, i) => {
+  title.id = `more-${i}`;
+  byId("contents").append(make("a", { href: `#${title.id}`, textContent: title.textContent.split(":")[0] }));
+});
 byId("time").max = END;
 byId("time").oninput = (event) => setTime(Number(event.target.value));
 byId("play").onclick = () => play(!clock.playing);

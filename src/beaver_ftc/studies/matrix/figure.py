@@ -21,11 +21,16 @@ def write_heat_map(document: Document, path: Path) -> None:
     names = [fault for fault, _ in FAULTS]
     by_place = {(cell["fault"], cell["surface"]): cell for cell in document["cells"]}
     grid = np.array([[_doublings(by_place[fault, surface]) for surface in SURFACES] for fault in names])
-    figure = Figure(figsize=(9, 0.5 * len(names) + 1.5), layout="constrained")
+    figure = Figure(figsize=(11, 0.5 * len(names) + 1.8), layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.subplots()
-    image = axes.imshow(grid, cmap="cividis", vmin=0, vmax=MOST_DOUBLINGS, aspect="auto")
+    image = axes.imshow(grid, cmap="YlOrBr", vmin=0, vmax=MOST_DOUBLINGS, aspect="auto")
+    axes.set_title("Each fault on each surface: verdict, and how well the flight goes on")
     axes.set_xticks(range(len(SURFACES)), SURFACES)
+    axes.set_xticks(np.arange(0.5, len(SURFACES) - 1), minor=True)
+    axes.set_yticks(np.arange(0.5, len(names) - 1), minor=True)
+    axes.grid(which="minor", color="white", linewidth=1.5)
+    axes.tick_params(which="minor", length=0)
     axes.set_yticks(range(len(names)), names)
     for i, fault in enumerate(names):
         for j, surface in enumerate(SURFACES):
@@ -47,4 +52,4 @@ def _label(cell: Document) -> str:
 
 
 def _ink(doublings: float) -> dict[str, Any]:
-    return {"color": "black" if doublings > 0.5 * MOST_DOUBLINGS else "white", "fontsize": 9}
+    return {"color": "white" if doublings > 0.7 * MOST_DOUBLINGS else "black", "fontsize": 9}

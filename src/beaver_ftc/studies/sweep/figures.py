@@ -204,7 +204,7 @@ def sensitivity_bars(flights: Flights, summary: Document) -> "Figure | None":
         return None
     keys = [entry["key"] for entry in next(iter(rankings.values()))][:12]
     figure, axes = _axes(
-        "What drives what: share of the outcome's ranks that a key explains", (8.0, 1.5 + 0.5 * len(keys))
+        "What drives what: share of the outcome's ranks that a key explains", (8.0, 1.8 + 0.5 * len(keys))
     )
     height = 0.8 / len(rankings)
     colours = (BLUE, ORANGE, GREEN, PURPLE)
@@ -215,7 +215,7 @@ def sensitivity_bars(flights: Flights, summary: Document) -> "Figure | None":
     axes.set_yticks(range(len(keys)), keys)
     axes.invert_yaxis()
     axes.set_xlim(0, 1)
-    axes.legend(fontsize=8, loc="lower right")
+    figure.legend(loc="outside lower center", ncols=4, fontsize=8, frameon=False)
     return figure
 
 

@@ -237,3 +237,12 @@ def made(group: str, name: str) -> Any:
     except (Exception, SystemExit) as error:
         reason = " ".join(str(error).split())
         raise BadInput(f"plug-in {name}: cannot be made: {type(error).__name__}: {reason}") from error
+
+
+def derive_at_first_use(reference: str) -> None:
+    """Derive the design model of an aircraft that has none yet. Raises BadInput, SimulationFailed.
+
+    What derives flies the aircraft, so it lives far above those who name one: it is found by its name.
+    """
+    derived_if_needed = import_module("beaver_ftc.studies.derive.first_use").derived_if_needed
+    derived_if_needed(reference, lambda line: print(f"beaver-ftc: {line}", file=sys.stderr, flush=True))

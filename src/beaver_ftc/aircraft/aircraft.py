@@ -124,16 +124,27 @@ class Aircraft:
 
     @cached_property
     def dominant_axis(self) -> tuple[int, ...]:
-        """Of each surface, the axis (p, q, r) it turns most about, by its terms at zero signals."""
+        """Of each surface, the axis (p, q, r) it turns most about, by its terms at `usual_signals`."""
         mass, geometry = self.mass, self.geometry
         arms = (geometry.span_m / mass.Ix_kg_m2, geometry.chord_m / mass.Iy_kg_m2)
         per_axis = dict(zip(MOMENTS, (*arms, geometry.span_m / mass.Iz_kg_m2), strict=True))
         effect = {surface: [0.0, 0.0, 0.0] for surface in self.surfaces}
+        usual = self.usual_signals
         for term in self.moments:
-            if term.surface and not term.of:
-                axis = MOMENTS.index(term.coefficient)
-                effect[term.surface][axis] += abs(term.value) * per_axis[term.coefficient]
-        return tuple(max(range(3), key=effect[surface].__getitem__) for surface in self.surfaces)
+            if term.surface:
+                value = term.value * prod(usual[signal] ** power for signal, power in term.of)
+                effect[term.surface][MOMENTS.index(term.coefficient)] += value * per_axis[term.coefficient]
+        return tuple(max(range(3), key=lambda axis: abs(effect[s][axis])) for s in self.surfaces)
+
+    @cached_property
+    def usual_signals(self) -> Mapping[str, float]:
+        """Signals as they are in level flight where the file tells, else zero."""
+        usual = dict.fromkeys((*self.signal_names, SIDESLIP_RATE), 0.0)
+        if self.file.model_error_map:
+            box = self.file.model_error_map.boxes[0]
+            ends = {"alpha": box.alpha_rad, **box.signals}
+            usual |= {name: 0.5 * (low + high) for name, (low, high) in ends.items()}
+        return usual
 
     @cached_property
     def primary(self) -> tuple[str, ...]:

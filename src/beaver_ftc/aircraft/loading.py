@@ -4,13 +4,15 @@ import copyreg
 import os
 import re
 from functools import lru_cache
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 from beaver_ftc.aircraft.aircraft import Aircraft
 from beaver_ftc.aircraft.schema import AircraftFile
-from beaver_ftc.errors import BadInput, suggestion
+from beaver_ftc.errors import BadInput, BeaverFtcError, suggestion
 from beaver_ftc.paths import data_root
+from beaver_ftc.plugins import derive_at_first_use
 from beaver_ftc.scenario.document import Problem
 from beaver_ftc.scenario.files import UnreadableError, read_text
 from beaver_ftc.scenario.problems import ScenarioError
@@ -19,6 +21,8 @@ from beaver_ftc.scenario.validation import parse_document, validate
 DEFAULT = "beaver"
 FILE = "aircraft.yaml"
 _FROM_JSBSIM = "jsbsim:"
+DERIVED = "# Written by beaver-ftc derive"
+_FORMAT = 2  # of what is derived: files of another are derived anew
 _MAX_BYTES = 1_000_000
 _ALLOWED = "a built-in name, jsbsim:NAME, or ./FOLDER beside the scenario"
 
@@ -64,12 +68,27 @@ def derived_folder(name: str) -> Path:
     return base / "beaver-ftc" / "aircraft" / name
 
 
+def first_line() -> str:
+    """The first line of a file that was derived, by this way of deriving and of this JSBSim."""
+    return f"{DERIVED}: format {_FORMAT}, JSBSim {version('jsbsim')}.\n"
+
+
+def is_derived(name: str) -> bool:
+    """Whether the cache has an aircraft of the jsbsim package as it would be derived now."""
+    try:
+        with (derived_folder(name) / FILE).open(encoding="utf-8") as file:
+            return file.readline() == first_line()
+    except OSError:
+        return False
+
+
 def _derived(name: str) -> Path:
     folder = derived_folder(name)
-    if not (folder / FILE).is_file():
-        raise UnknownAircraft(
-            f"jsbsim:{name} is not derived yet, allowed: after beaver-ftc derive jsbsim:{name}"
-        )
+    if not is_derived(name):
+        try:
+            derive_at_first_use(f"{_FROM_JSBSIM}{name}")
+        except BeaverFtcError as error:
+            raise UnknownAircraft(str(error)) from None
     return folder
 
 

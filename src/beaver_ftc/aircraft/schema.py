@@ -14,9 +14,10 @@ from pydantic import AfterValidator, Field, model_validator
 from beaver_ftc.errors import suggestion
 from beaver_ftc.scenario.base import Conflict, Flag, Number, Section, Whole, number, refuse
 
-MAX_SURFACES, MAX_SIGNALS = 8, 4
+MAX_SURFACES, MAX_SIGNALS = 8, 6
 MAX_TERMS_OF_ONE, MAX_MONOMIALS = 32, 64
 MAX_TERMS = 3 * MAX_TERMS_OF_ONE
+MAX_BOXES, MAX_LEVELS, MAX_AGES = 6, 4, 4  # of the map of the model's error
 FLOW_SIGNALS = ("alpha", "beta", "ph", "qh", "rh")
 RATE_SIGNALS = ("ph", "qh", "rh")
 SIDESLIP_RATE = "betadoth"  # betadot b/2V: known to linear analysis, to no instrument
@@ -36,6 +37,13 @@ def _in_order(given: tuple[float, float]) -> tuple[float, float]:
     return given
 
 
+def _not_reversed(given: tuple[float, float]) -> tuple[float, float]:
+    if given[0] > given[1]:
+        refuse([((), "ends out of order, allowed: [lower, upper]")])
+    return given
+
+
+NotNegative = Annotated[Number, Field(ge=0)]
 Interval = Annotated[tuple[Number, Number], AfterValidator(_in_order)]
 
 
@@ -145,6 +153,10 @@ class EngineSection(Section):
 
     settings: dict[Name, SettingSection] = Field(default_factory=dict)
     limits: dict[Name, LimitSection] = Field(default_factory=dict)
+    start: Literal["steady", "run_up", "off"] = Field(
+        default="steady",
+        description="how they come to run: at once, by their starters with time to come to speed, or not",
+    )
 
 
 class ModelErrorSection(Section):
@@ -153,6 +165,53 @@ class ModelErrorSection(Section):
     p: Number = number(0.0, unit="rad/s2", says="roll", ge=0, le=100)
     q: Number = number(0.0, unit="rad/s2", says="pitch", ge=0, le=100)
     r: Number = number(0.0, unit="rad/s2", says="yaw", ge=0, le=100)
+
+
+Range = Annotated[tuple[Number, Number], AfterValidator(_not_reversed)]
+Shares = Annotated[tuple[NotNegative, ...], Field(min_length=1, max_length=MAX_LEVELS)]
+Ages = Annotated[tuple[NotNegative, ...], Field(min_length=1, max_length=MAX_AGES)]
+Errors = Annotated[tuple[Shares, ...], Field(min_length=1, max_length=MAX_AGES)]
+
+
+class ErrorBox(Section):
+    """A box of states, and the largest error in it: a row for each age of the flight, in it a value for each
+    share of the surfaces' travel."""
+
+    airspeed_mps: Range
+    alpha_rad: Range
+    beta_rad: Range
+    p_rad_s: Range
+    q_rad_s: Range
+    r_rad_s: Range
+    density_kg_m3: Range
+    signals: dict[Name, Range] = Field(default_factory=dict)
+    error_p_rad_s2: Errors
+    error_q_rad_s2: Errors
+    error_r_rad_s2: Errors
+
+
+class ErrorMapSection(Section):
+    """The error of the angular accelerations where it was measured, from the innermost box outwards.
+
+    Outside of all boxes nothing is known: no alarm is raised there.
+    """
+
+    travel_share: Shares = Field(description="shares of the surfaces' travel, rising")
+    until_s: Ages = Field(description="ages of a flight, s, rising: fuel burns, and the inertia changes")
+    boxes: tuple[ErrorBox, ...] = Field(min_length=1, max_length=MAX_BOXES)
+
+    @model_validator(mode="after")
+    def _sizes_agree(self) -> Self:
+        refuse(
+            [
+                (("boxes", i, f"error_{axis}_rad_s2"), "is no table of until_s by travel_share")
+                for i, box in enumerate(self.boxes)
+                for axis in "pqr"
+                if [len(row) for row in getattr(box, f"error_{axis}_rad_s2")]
+                != [len(self.travel_share)] * len(self.until_s)
+            ]
+        )
+        return self
 
 
 class StartSection(Section):
@@ -182,6 +241,9 @@ class AircraftFile(Section):
     engine: EngineSection = Field(default_factory=EngineSection)
     model_error_rad_s2: ModelErrorSection = Field(
         default_factory=ModelErrorSection, description="added to the declared bound of the uncertainty"
+    )
+    model_error_map: ErrorMapSection | None = Field(
+        default=None, description="where in the envelope the error is how large, in place of one value"
     )
     start: StartSection = Field(default_factory=StartSection)
 
@@ -234,6 +296,10 @@ class AircraftFile(Section):
                 if len(terms) > MAX_TERMS_OF_ONE:
                     says = f"{len(terms)} terms, allowed: at most {MAX_TERMS_OF_ONE}"
                     yield (section, coefficient), says
+        for i, box in enumerate(self.model_error_map.boxes if self.model_error_map else ()):
+            if set(box.signals) != set(self.signals):
+                says = "has other signals than the aircraft, allowed: a range for each of them"
+                yield ("model_error_map", "boxes", i, "signals"), says
         for name in set(self.signals) & {*FLOW_SIGNALS, SIDESLIP_RATE}:
             yield ("signals", name), f"{name} is measured in any case, allowed: another name"
 

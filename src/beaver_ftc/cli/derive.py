@@ -9,7 +9,12 @@ from beaver_ftc.cli.output import Format, FormatOption, complain, emit, emit_jso
 
 
 def command(
-    aircraft: Annotated[str, typer.Argument(help="jsbsim:NAME, of the installed jsbsim package.")],
+    aircraft: Annotated[
+        str,
+        typer.Argument(
+            help="jsbsim:NAME of the installed jsbsim package, a JSBSim model, or an aircraft's folder."
+        ),
+    ],
     envelope: Annotated[
         Path | None, typer.Option(help="YAML with airspeed_mps, alpha_deg, altitude_m: where to sample.")
     ] = None,
@@ -23,10 +28,10 @@ def command(
     It samples the aircraft over its envelope, fits sparse terms, and checks them on states the fit did not
     see: the largest error becomes the declared bound. Afterwards `aircraft: jsbsim:NAME` flies.
     """
-    from beaver_ftc.studies.derive.run import derive, name_of
+    from beaver_ftc.studies.derive.run import derive
     from beaver_ftc.studies.derive.text import document_of, text_of
 
-    made = derive(name_of(aircraft), out, envelope, tell=lambda what: complain(f"deriving: {what}"))
+    made = derive(aircraft, out, envelope, tell=lambda what: complain(f"deriving: {what}"))
     document: dict[str, Any] = document_of(made)
     if format is Format.json:
         emit_json(document)

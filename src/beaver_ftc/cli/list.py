@@ -58,12 +58,12 @@ def _sweeps() -> Entries:
 def _aircraft() -> Entries:
     """The built-in aircraft, and those of the jsbsim package that have been derived or can be."""
     from beaver_ftc.aircraft import builtin_names, load
-    from beaver_ftc.aircraft.loading import derived_folder
+    from beaver_ftc.aircraft.loading import is_derived
     from beaver_ftc.plant.instrumented import names
 
     ours = [{"name": name, "description": load(name).file.description} for name in builtin_names()]
-    says = {True: "of the jsbsim package, derived", False: "of the jsbsim package: derive it first"}
-    known = [(name, (derived_folder(name) / "aircraft.yaml").is_file()) for name in names()]
+    says = {True: "of the jsbsim package, derived", False: "of the jsbsim package: derived at first use"}
+    known = [(name, is_derived(name)) for name in names()]
     return ours + [{"name": f"jsbsim:{name}", "description": says[made]} for name, made in known]
 
 

@@ -17,7 +17,7 @@ def command(
         typer.Option(help="Folder for the results: `fault-matrix`, `fault-matrix-declared` or `pitch-lost`."),
     ] = Path("runs"),
     airspeed: Annotated[
-        list[float] | None, typer.Option(min=30, max=55, help="Airspeed, m/s; once for each. [38, 45, 52]")
+        list[float] | None, typer.Option(min=1, max=1000, help="Airspeed, m/s; once for each.")
     ] = None,
     workers: Annotated[int, typer.Option(min=1, help="Processes.")] = 1,
     pitch_lost: Annotated[
@@ -33,6 +33,9 @@ def command(
             help="With tactical-grade sensors, servos and 5 % wrong moment coefficients, and told so.",
         ),
     ] = False,
+    aircraft: Annotated[
+        str | None, typer.Option(help="Built-in name, jsbsim:NAME, or ./FOLDER in the working directory.")
+    ] = None,
     format: FormatOption = Format.text,
 ) -> None:
     """Fly every fault type on every surface: detected, named, and tracked how well beside the oracle.
@@ -43,13 +46,16 @@ def command(
     Stopped or killed, it goes on where it was with the same command.
     """
     from beaver_ftc.cli.progress import progress_bar
-    from beaver_ftc.studies.matrix.cases import AIRSPEEDS_MPS
 
     if pitch_lost and declared:
         raise typer.BadParameter("--pitch-lost and --declared exclude each other, allowed: one of them")
-    name, run, as_text = _pitch_lost() if pitch_lost else _every_fault(declared)
+    if aircraft and (pitch_lost or declared):
+        raise typer.BadParameter(
+            "--pitch-lost and --declared are for the built-in aircraft, allowed: without --aircraft"
+        )
+    name, run, as_text = _pitch_lost() if pitch_lost else _every_fault(declared, aircraft)
     with progress_bar("faults") as progress:
-        document = run(out, tuple(airspeed or AIRSPEEDS_MPS), workers, progress)
+        document = run(out, tuple(airspeed) if airspeed else None, workers, progress)
     folder = str(out / name)
     if format is Format.json:
         emit_json(document | {"folder": folder})
@@ -58,14 +64,17 @@ def command(
     raise typer.Exit(0 if document["passed"] else 1)
 
 
-def _every_fault(declared: bool) -> tuple[str, Callable[..., Document], Callable[[Document], str]]:
+def _every_fault(
+    declared: bool, aircraft: str | None
+) -> tuple[str, Callable[..., Document], Callable[[Document], str]]:
     from functools import partial
 
+    from beaver_ftc.aircraft import DEFAULT
     from beaver_ftc.studies.matrix.run import DECLARED, NAME, run_matrix
     from beaver_ftc.studies.matrix.text import as_text
 
     name = DECLARED if declared else NAME
-    return name, partial(run_matrix, name=name), as_text
+    return name, partial(run_matrix, name=name, aircraft=aircraft or DEFAULT), as_text
 
 
 def _pitch_lost() -> tuple[str, Callable[..., Document], Callable[[Document], str]]:

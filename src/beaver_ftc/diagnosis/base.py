@@ -15,7 +15,7 @@ from beaver_ftc.design.context import Context
 class Measured(NamedTuple):
     """What is known at one frame. Arrays are copies: keep them if you like.
 
-    t_s: time. x (3,) rad/s: p, q, r. y (8,): alpha rad, beta rad, airspeed m/s, dynamic pressure
+    t_s: time. x (3,) rad/s: p, q, r. y (10,): alpha rad, beta rad, airspeed m/s, dynamic pressure
     Pa, then the signals the aircraft declares (the Beaver: dpt), unused ones zero.
     Of the frame that has just elapsed, as the design model sees it (zeros at the first frame):
     acceleration (3,) rad/s2 is its f + G u, so that x - x_before - dt acceleration is the innovation;

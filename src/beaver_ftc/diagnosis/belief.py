@@ -15,6 +15,7 @@ from beaver_ftc.design.actuators import actuators_dtype, move
 from beaver_ftc.design.model import design_dtype
 from beaver_ftc.design.variants import response
 from beaver_ftc.diagnosis.derived import changing_error, derived_bound, slack_per_rad
+from beaver_ftc.diagnosis.error_map import add_model_error
 from beaver_ftc.diagnosis.thresholds import uncertainty_bound
 
 
@@ -72,6 +73,8 @@ def bound_now(fdi, belief, measured):
             for s in range(belief.u.size):
                 slack_per_rad(fdi.bound.admitted, belief.design, s)
         x = fdi.bound.admitted.far_x
+    if fdi.bound.error_map.n_boxes > 0:
+        add_model_error(fdi.bound.error_map, measured.x, measured.y, belief.u, fdi.bound.eta_bar_now)
     uncertainty_bound(
         x, belief.design, fdi.bound.inertia, fdi.bound.constant, fdi.bound.earth_rate, fdi.bound.eta_bar_now
     )
@@ -139,6 +142,7 @@ def spread(belief):
 @kernel
 def look_back(fdi, belief, measured, k):
     """What the design model makes of the frame that has elapsed: its bound and its means; k: its number."""
+    fdi.bound.error_map.time_s = k * fdi.dt
     bound_now(fdi, belief, measured)
     fdi.bound.eta_bar[:] = fdi.bound.eta_bar_now
     if fdi.bound.admitted.any:

@@ -7,6 +7,7 @@ import numpy as np
 from beaver_ftc.aircraft.schema import MAX_TERMS, MAX_TERMS_OF_ONE
 from beaver_ftc.diagnosis.air import AIR
 from beaver_ftc.diagnosis.derived import admitted_dtype
+from beaver_ftc.diagnosis.error_map import error_map_dtype
 from beaver_ftc.diagnosis.types.memory import surface_dtype
 from beaver_ftc.diagnosis.watch import WATCH
 from beaver_ftc.scenario.diagnosis import MAX_POLES
@@ -49,8 +50,6 @@ ESTIMATOR = np.dtype(
     ],
     align=True,
 )  # fmt: skip
-
-ADMITTED = admitted_dtype(4)  # what else than the published bound is admitted: derived.py
 
 # What the statistical detector keeps: air.py, whitening.py, likelihood.py. A block is the axes whose noise
 # goes together: pitch, and roll with yaw, the latter twice. States of a filter: what is left of the rate,
@@ -180,7 +179,8 @@ def bound_dtype(n: int) -> np.dtype:
     noise: on what a gyro's error changes by, rad/s. frame: on one frame's innovation, rad/s2. own: of the
     errors of n surfaces' own terms, per rad of deflection and at the command, means over the frame."""
     fields = [
-        ("inertia", "f8", (3,)), ("constant", "f8", (3,)), ("earth_rate", "f8"), ("admitted", ADMITTED),
+        ("inertia", "f8", (3,)), ("constant", "f8", (3,)), ("earth_rate", "f8"),
+        ("admitted", admitted_dtype(n)), ("error_map", error_map_dtype(n)),
         ("eta_bar", "f8", (3,)), ("eta_bar_now", "f8", (3,)),
         ("noise", "f8", (3,)), ("noise_then", "f8", (3,)), ("frame", "f8", (3,)),
         ("own_errors", "i8"), ("own_per_rad", "f8", (3, n)), ("own", "f8", (3, n)),

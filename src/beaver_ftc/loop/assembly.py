@@ -11,6 +11,7 @@ from beaver_ftc.control.state import FAULT_TOLERANT, ORACLE, law_of
 from beaver_ftc.design.engine import engine_power_kw, slipstream
 from beaver_ftc.design.variants import design_of, mass_of
 from beaver_ftc.diagnosis.admitted import admit, gyros_vary, poles_for_noise
+from beaver_ftc.diagnosis.error_map import fill_error_map
 from beaver_ftc.diagnosis.fault_class import PARAMETER_SET
 from beaver_ftc.diagnosis.state import (
     EITHER,
@@ -73,9 +74,7 @@ def _assemble_diagnosis(
     fdi["fdae"]["pole"] = config.detection_pole_per_s
     fdi["fdae"]["decay"] = exp(-config.detection_pole_per_s * dt)
     fdi["fie_decay"] = exp(-config.isolation_pole_per_s * dt)
-    fdi["bound"]["inertia"] = config.bounds.inertia_coupling.as_tuple()
-    fdi["bound"]["constant"] = np.add(config.bounds.constant_rad_s2.as_tuple(), aircraft.model_error_rad_s2)
-    fdi["bound"]["earth_rate"] = EARTH_RATE_RAD_S
+    _assemble_bound(fdi["bound"], config, aircraft)
     fdi["verdict"]["detected_at_s"] = fdi["verdict"]["isolated_at_s"] = -1.0
     fdi["verdict"]["isolated"] = NOT_ISOLATED
     fdi["authority"] = _AUTHORITIES[config.authority]
@@ -85,6 +84,15 @@ def _assemble_diagnosis(
     for fie, (_, kind, surface) in zip(fdi["estimator"], members, strict=False):
         fie["kind"], fie["surface"] = kind, surface
         fie["low"], fie["high"] = PARAMETER_SET[kind] if kind == LOSS else travel[:, surface]
+
+
+def _assemble_bound(bound: np.void, config: FdiConfig, aircraft: Aircraft) -> None:
+    """The declared bound, and what the aircraft's terms leave: where it is mapped, or everywhere the same."""
+    bound["inertia"], bound["earth_rate"] = config.bounds.inertia_coupling.as_tuple(), EARTH_RATE_RAD_S
+    bound["constant"] = config.bounds.constant_rad_s2.as_tuple()
+    fill_error_map(bound["error_map"], aircraft, whole=config.fault_class == "all")
+    if aircraft.file.model_error_map is None:
+        bound["constant"] += aircraft.model_error_rad_s2
 
 
 def _assemble_types(frame: np.void, scenario: Scenario, dt: float, travel: np.ndarray) -> None:

@@ -99,9 +99,14 @@ class Loop:
         truth = self.frames["truth"][0]
         truth["latitude_0"] = self.plant.read(ch.FIXED[ch.LATITUDE][1])
         truth["longitude_0"] = self.plant.read(ch.FIXED[ch.LONGITUDE][1])
-        truth["ground_m"] = min(0.0, self.scenario.initial.altitude_m - LEAST_HEIGHT_M)
+        truth["ground_m"] = min(self._wheels_m, self.scenario.initial.altitude_m - LEAST_HEIGHT_M)
         truth["radius_m"] = EARTH_RADIUS_M + self.scenario.initial.altitude_m
         truth["parallel_radius_m"] = truth["radius_m"] * np.cos(truth["latitude_0"])
+
+    @property
+    def _wheels_m(self) -> float:
+        """The height of its centre at which an aircraft with a landing gear is down."""
+        return self.aircraft.geometry.span_m if self.plant.has("gear/unit[0]/WOW") else 0.0
 
     def _seen(self) -> np.ndarray:
         """The truth's channels now, in SI."""

@@ -170,7 +170,7 @@ def context_of(
         trim_y=trim_y,
         trim_rad=control["trim"].copy(),
         travel_rad=np.array([control["low"], control["high"]]),
-        constant_rad_s2=fdi["bound"]["constant"].copy(),
+        constant_rad_s2=largest_constant(fdi["bound"], scenario),
         inertia_coupling=fdi["bound"]["inertia"].copy(),
         seed=scenario.seed,
         surfaces=scenario.airframe.surfaces,
@@ -185,6 +185,14 @@ def context_of(
             scenario.airframe,
         ),
     )
+
+
+def largest_constant(bound: np.void, scenario: Scenario) -> np.ndarray:
+    """The declared constant bound, (3,) rad/s2, with the most the aircraft's terms leave in it."""
+    largest: np.ndarray = bound["constant"].copy()
+    if bound["error_map"]["n_boxes"]:
+        largest += scenario.airframe.model_error_rad_s2
+    return largest
 
 
 def plugin_frame(

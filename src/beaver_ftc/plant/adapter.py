@@ -1,6 +1,8 @@
 """JSBSim for the rest of the package: a silent executive with the Beaver loaded, its properties by name."""
 
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from math import cos, sin
 from pathlib import Path
 
@@ -14,12 +16,17 @@ from beaver_ftc.paths import data_root
 from beaver_ftc.plant.state import START_LATITUDE_DEG, FlightState
 
 FT_PER_M = 1.0 / 0.3048
+_LONGEST_REASON = 300
 PA_PER_PSF = 4.4482216152605 / 0.3048**2
 
 # betadot enters the side force with the value of the previous run; each further run at the same state
 # divides the error by more than 100 (CY_betadot qdyn S b / 2 m V^2 is at most 0.01), so five leave nothing
 # above rounding.
 _RUNS_TO_SETTLE = 5
+
+_RUN_UP_S = 10.0  # in which a started engine comes to speed; a propeller's governor takes a few
+_BETWEEN_PLACINGS_S = 0.1  # the aircraft is put back where it was, so that it flies nowhere meanwhile
+_STARTING = {"propulsion/magneto_cmd": 3.0, "propulsion/cutoff_cmd": 0.0, "propulsion/starter_cmd": 1.0}
 
 
 class UnknownProperty(SimulationFailed):
@@ -33,6 +40,12 @@ class _Errors(jsbsim.FGLogger):
         super().__init__()
         self.said: list[str] = []
         self._grave = False
+
+    @property
+    def reason(self) -> str:
+        """What went wrong, as one line without paths."""
+        said = " ".join("".join(self.said).split()) or "no reason given"
+        return re.sub(r"\"?/?(?:[^ \"/]*/)+(?=[^ /\"]*\.xml)", "", said)[:_LONGEST_REASON]
 
     def set_level(self, level):
         self._grave = level in (jsbsim.LogLevel.ERROR, jsbsim.LogLevel.FATAL)
@@ -58,7 +71,10 @@ def _beside(folder: Path, kind: str) -> str:
 
 
 def _load(errors: _Errors, model: Path) -> jsbsim.FGFDMExec:
-    """An executive with a model; engines, propellers and systems are looked for beside it first."""
+    """An executive with a model; engines, propellers and systems are looked for beside it first.
+
+    Raises SimulationFailed with what JSBSim says of a model it cannot load.
+    """
     jsbsim.set_logger(errors)
     fdm = jsbsim.FGFDMExec(str(data_root()))
     fdm.set_debug_level(0)
@@ -70,18 +86,36 @@ def _load(errors: _Errors, model: Path) -> jsbsim.FGFDMExec:
         errors.said.append(str(error))
         loaded = False
     if not loaded:
-        reason = " ".join("".join(errors.said).split()) or "no reason given"
-        raise SimulationFailed(f"JSBSim cannot load {folder.name}/{model.name}: {reason}")
+        raise SimulationFailed(f"JSBSim cannot load {folder.name}/{model.name}: {errors.reason}")
     fdm.disable_output()
     return fdm
+
+
+@contextmanager
+def translated(model: Path) -> Iterator[None]:
+    """Turn what JSBSim raises while a model is initialised or run into SimulationFailed, one line."""
+    try:
+        yield
+    except jsbsim.BaseError as error:
+        says = " ".join(str(error).split())
+        raise SimulationFailed(f"JSBSim cannot fly {model.parent.name}/{model.name}: {says}") from None
 
 
 def bare(model: Path) -> jsbsim.FGFDMExec:
     """A model in an executive of its own, initialised where it is: to be looked at, not flown."""
     fdm = _load(_Errors(), model)
     fdm["ic/h-sl-ft"], fdm["ic/vc-kts"] = 5000.0, 100.0
-    fdm.run_ic()
+    with translated(model):
+        fdm.run_ic()
     return fdm
+
+
+def probe(model: Path) -> None:
+    """Load a model, start it and let it run for a few frames; raises SimulationFailed if it does not."""
+    fdm = bare(model)
+    with translated(model):
+        for _ in range(5):
+            fdm.run()
 
 
 class Plant:
@@ -105,7 +139,8 @@ class Plant:
         self._nodes: dict[str, jsbsim.FGPropertyNode] = {}
         self._settings: Mapping[str, float] = {}
         self._engines_run = False
-        self._has_engines = self.fdm.get_propulsion().get_num_engines() > 0
+        self._run_up_for: tuple[float, ...] = ()
+        self.n_engines: int = self.fdm.get_propulsion().get_num_engines()
 
     def node(self, name: str) -> jsbsim.FGPropertyNode:
         """The held node of a property; UnknownProperty if the aircraft lacks it."""
@@ -138,8 +173,8 @@ class Plant:
         self._place(state)
         self.fdm.set_sim_time(0.0)
         self._initialise()
-        if self._has_engines:
-            self._start_engines()
+        if self.n_engines:
+            self._start_engines(state)
         self.settle()
         self._initialise()  # again, so that the integrator's past derivatives are the settled ones too
         if any(wind_mps):
@@ -161,17 +196,61 @@ class Plant:
         self._initialise()
 
     def _initialise(self) -> None:
-        if not self.fdm.run_ic():
+        try:
+            initialised = self.fdm.run_ic()
+        except jsbsim.BaseError as error:
+            says = " ".join(str(error).split())
+            raise SimulationFailed(f"JSBSim cannot fly {self.aircraft.name}: {says}") from None
+        if not initialised:
             raise SimulationFailed("JSBSim cannot initialise the flight")
 
-    def _start_engines(self) -> None:
+    def hold(self, state: FlightState) -> None:
+        """Put the aircraft into a state with time standing still; the engines go on as they were.
+
+        `start` comes first. The quick way to look at many states.
+        """
+        self._command_surfaces(state)
+        self._place(state)
+        self._initialise()
+        self.settle()
+
+    def _start_engines(self, state: FlightState) -> None:
         """Let all engines run as they do in steady flight with the power as it is set."""
+        how = self.aircraft.engine.start
+        if how == "run_up":
+            self._run_up(state)
+        elif how == "steady":
+            if not self._engines_run:
+                self.write("propulsion/set-running", -1)
+                self._engines_run = True
+            self._command_engines()
+            self.settle()  # the power lever reaches the engines
+            self.fdm.get_propulsion().get_steady_state()
+
+    def _run_up(self, state: FlightState) -> None:
+        """Start the engines as a pilot does, and let time pass with the aircraft held where it is."""
+        wanted = (*self._settings.values(), state.airspeed_mps, state.altitude_m)
+        if wanted == self._run_up_for:
+            return
+        for i in range(self.n_engines):
+            self.write(f"fcs/mixture-cmd-norm[{i}]", 1.0)
+            self.write(f"fcs/advance-cmd-norm[{i}]", 1.0)
         if not self._engines_run:
             self.write("propulsion/set-running", -1)
+            for name, value in _STARTING.items():
+                if self.has(name):  # of its kind of engine
+                    self.write(name, value)
             self._engines_run = True
-        self._command_engines()
-        self.settle()  # the power lever reaches the engines
-        self.fdm.get_propulsion().get_steady_state()
+        for _ in range(round(_RUN_UP_S / _BETWEEN_PLACINGS_S)):
+            self._command_engines()
+            self._place(state)
+            self._initialise()
+            for _ in range(round(_BETWEEN_PLACINGS_S / self.dt_s)):
+                self.run()
+        self._place(state)
+        self.fdm.set_sim_time(0.0)
+        self._initialise()
+        self._run_up_for = wanted
 
     def settle(self) -> None:
         """Run, time standing still, until accelerations belong to the state and the surfaces as commanded.
@@ -189,10 +268,13 @@ class Plant:
             self.write("atmosphere/turb-type", turbulence)
 
     def _command(self, state: FlightState) -> None:
-        for name, surface in self.aircraft.surface.items():
-            self.write(surface.command, state.surfaces_rad[name])
+        self._command_surfaces(state)
         self._settings = state.settings
         self._command_engines()
+
+    def _command_surfaces(self, state: FlightState) -> None:
+        for name, surface in self.aircraft.surface.items():
+            self.write(surface.command, state.surfaces_rad[name])
 
     def _command_engines(self) -> None:
         for name, setting in self.aircraft.engine.settings.items():

@@ -52,15 +52,35 @@ _LEVER = """
       <function> <sum> <property> fcs/actuated-throttle-norm </property> </sum> </function>
       <output> fcs/throttle-cmd-norm[{i}] </output>
     </fcs_function>"""
-THRUST = "aero/thrust-coefficient"
-_THRUST = """
-    <fcs_function name="aero/thrust-coefficient">
-      <description> Thrust of all engines over dynamic pressure and wing area </description>
-      <function> <quotient> <sum> {thrusts} <value> 0 </value> </sum>
-        <product> <property> metrics/Sw-sqft </property>
-          <max> <property> aero/qbar-psf </property> <value> 1 </value> </max> </product>
-      </quotient> </function>
-    </fcs_function>"""
+# What else of the aircraft's motion and engines its moments may depend on, dimensionless: name, JSBSim
+# property, what it is. The aerodynamics reckon them themselves, so that they are those of the same instant.
+_RATE = """<quotient> <product> <property> {rate} </property> <property> metrics/{arm} </property> </product>
+    <max> <value> 1 </value>
+      <product> <value> 2 </value> <property> velocities/vt-fps </property> </product> </max>
+  </quotient>"""
+_MOMENT = """<quotient> <property> moments/{axis}-prop-lbsft </property>
+    <product> <property> metrics/Sw-sqft </property> <property> metrics/{arm} </property>
+      <max> <property> aero/qbar-psf </property> <value> 1 </value> </max> </product> </quotient>"""
+SIGNALS = {
+    "thrust": ("aero/thrust-coefficient", "thrust of all engines over dynamic pressure and wing area"),
+    "alpha_rate": ("aero/alphadot-hat", "rate of the angle of attack times c/2V"),
+    "beta_rate": ("aero/betadot-hat", "rate of sideslip times b/2V"),
+    "engines_l": ("aero/engines-roll-coefficient", "rolling moment of the engines over q S b"),
+    "engines_m": ("aero/engines-pitch-coefficient", "pitching moment of the engines over q S c"),
+    "engines_n": ("aero/engines-yaw-coefficient", "yawing moment of the engines over q S b"),
+    "mach": ("velocities/mach", "Mach number"),
+}
+_FUNCTIONS = {
+    "alpha_rate": _RATE.format(rate="aero/alphadot-rad_sec", arm="cbarw-ft"),
+    "beta_rate": _RATE.format(rate="aero/betadot-rad_sec", arm="bw-ft"),
+    "engines_l": _MOMENT.format(axis="l", arm="bw-ft"),
+    "engines_m": _MOMENT.format(axis="m", arm="cbarw-ft"),
+    "engines_n": _MOMENT.format(axis="n", arm="bw-ft"),
+}
+_THRUST = """<quotient> <sum> {thrusts} <value> 0 </value> </sum>
+    <product> <property> metrics/Sw-sqft </property>
+      <max> <property> aero/qbar-psf </property> <value> 1 </value> </max> </product>
+  </quotient>"""
 _COMMON = """<?xml version="1.0"?>
 <system name="envelope and faults">
   <property value="0"> failures/unanticipated/Cm-alpha3 </property>
@@ -89,9 +109,17 @@ def root() -> Path:
     return Path(jsbsim.__file__).parent
 
 
-def engines_of(name: str) -> int:
+def engines_of(source: Path) -> int:
     """How many engines an aircraft has."""
-    return _engines(ElementTree.parse(source_of(name)).getroot())
+    return _engines(_parsed(source))
+
+
+def _parsed(path: Path) -> Element:
+    """The root of an XML file. Raises BadInput, naming it, if it is none."""
+    try:
+        return ElementTree.parse(path).getroot()
+    except (OSError, ElementTree.ParseError) as error:
+        raise BadInput(f"{path.name}: {error}, allowed: a JSBSim model") from None
 
 
 def names() -> tuple[str, ...]:
@@ -111,19 +139,20 @@ def source_of(name: str) -> Path:
 def _common(engines: int) -> str:
     """Envelope, the unanticipated fault, and one power lever for all engines."""
     levers = "".join(_LEVER.format(i=i) for i in range(engines))
-    thrusts = " ".join(f"<property> propulsion/engine[{i}]/thrust-lbs </property>" for i in range(engines))
-    power = f'<channel name="power">{levers}{_THRUST.format(thrusts=thrusts)}</channel>'
+    power = f'<channel name="power">{levers}</channel>'
     return _COMMON.replace("ENGINES", power if engines else "")
 
 
-def instrument(name: str, folder: Path, travel_rad: dict[str, tuple[float, float]]) -> Path:
-    """Write the instrumented copy into an empty folder; returns its model. travel_rad: of each surface.
+def instrument(source: Path, folder: Path, travel_rad: dict[str, tuple[float, float]]) -> Path:
+    """Write the instrumented copy of a model and what is beside it into an empty folder; returns its model.
+
+    travel_rad: of each surface.
 
     Raises BadInput where the failures cannot be put in, naming what is in the way.
     """
-    source = source_of(name)
-    tree = ElementTree.parse(source)
-    whole = tree.getroot()
+    whole = _parsed(source)
+    if whole.tag != "fdm_config":
+        raise BadInput(f"{source.name}: is {whole.tag}, allowed: a JSBSim model, fdm_config")
     shutil.copytree(source.parent, folder, dirs_exist_ok=True)
     for kind, below in (("engine", "Engines"), ("systems", "Systems")):
         _copy_missing(root() / kind, folder / below)
@@ -131,13 +160,14 @@ def instrument(name: str, folder: Path, travel_rad: dict[str, tuple[float, float
         whole.remove(output)
     aerodynamics = _aerodynamics(whole, source)
     surfaces = _put_in(aerodynamics, folder, travel_rad)
-    _add_pitch_fault(aerodynamics, name)
+    _add_signals(aerodynamics, _engines(whole))
+    _add_pitch_fault(aerodynamics, source.stem)
     (folder / "Systems" / "ftc-common.xml").write_text(_common(_engines(whole)), encoding="utf-8")
     place = list(whole).index(next(iter(whole.iter("aerodynamics"))))
     for i, system in enumerate((*(f"ftc-{surface}" for surface in surfaces), "ftc-common")):
         whole.insert(place + i, Element("system", file=system))
-    model = folder / f"{name}.xml"
-    tree.write(model, encoding="utf-8", xml_declaration=True)
+    model = folder / source.name
+    ElementTree.ElementTree(whole).write(model, encoding="utf-8", xml_declaration=True)
     return model
 
 
@@ -158,20 +188,31 @@ def _aerodynamics(whole: Element, source: Path) -> Element:
     """The aerodynamics, read in from their own file if they are in one."""
     found = whole.find("aerodynamics")
     if found is None:
-        raise BadInput(f"jsbsim:{source.stem}: has no aerodynamics, allowed: an aircraft that flies")
+        raise BadInput(f"{source.stem}: has no aerodynamics, allowed: an aircraft that flies")
     if found.get("file"):
         named = (source.parent / str(found.get("file"))).with_suffix(".xml")
         place = list(whole).index(found)
-        whole[place] = found = ElementTree.parse(named).getroot()
+        whole[place] = found = _parsed(named)
     return found
 
 
-def surfaces_of(name: str) -> tuple[str, ...]:
-    """The surfaces whose deflection the aerodynamics of an aircraft see."""
-    source = source_of(name)
-    aerodynamics = _aerodynamics(ElementTree.parse(source).getroot(), source)
-    seen = {(element.text or "").strip().lstrip("-") for element in aerodynamics.iter()}
+def seen_by_aerodynamics(source: Path) -> frozenset[str]:
+    """Every property the aerodynamics of a model read."""
+    read = (element.text or "" for element in _aerodynamics(_parsed(source), source).iter())
+    return frozenset(text.strip().lstrip("-") for text in read if "/" in text)
+
+
+def surfaces_of(source: Path) -> tuple[str, ...]:
+    """The surfaces whose deflection the aerodynamics of a model see."""
+    seen = seen_by_aerodynamics(source)
     return tuple(surface for surface, known in _SEEN.items() if seen & set(known))
+
+
+def others_of(source: Path) -> tuple[str, ...]:
+    """What else the aerodynamics of a model see of its flight control, and its landing gear."""
+    ours = {name for known in _SEEN.values() for name in known}
+    seen = seen_by_aerodynamics(source) - ours
+    return tuple(sorted(name for name in seen if name.startswith(("fcs/", "gear/"))))
 
 
 def _put_in(aerodynamics: Element, folder: Path, travel_rad: dict[str, tuple[float, float]]) -> Iterable[str]:
@@ -204,8 +245,18 @@ def _component(surface: str, shape: str) -> str:
     return f'\n    <fcs_function name="{name}"> <function> {formula} </function> </fcs_function>'
 
 
+def _add_signals(aerodynamics: Element, engines: int) -> None:
+    """Let the aerodynamics reckon the signals first of all."""
+    thrusts = " ".join(f"<property> propulsion/engine[{i}]/thrust-lbs </property>" for i in range(engines))
+    functions = {"thrust": _THRUST.format(thrusts=thrusts), **_FUNCTIONS}
+    for signal, formula in functions.items():
+        name, says = SIGNALS[signal]
+        text = f'<function name="{name}"> <description> {says} </description> {formula} </function>'
+        aerodynamics.insert(0, ElementTree.fromstring(text))
+
+
 def _add_pitch_fault(aerodynamics: Element, name: str) -> None:
     axis = next((axis for axis in aerodynamics.iter("axis") if axis.get("name") == "PITCH"), None)
     if axis is None:
-        raise BadInput(f"jsbsim:{name}: its aerodynamics have no pitch axis, allowed: one that has")
+        raise BadInput(f"{name}: its aerodynamics have no pitch axis, allowed: one that has")
     axis.append(ElementTree.fromstring(_EXTRA_PITCH))

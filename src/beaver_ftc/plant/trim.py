@@ -176,9 +176,19 @@ def _solve(truth: Plant, state: FlightState) -> tuple[FlightState, np.ndarray]:
     low, high = truth.aircraft.envelope.airspeed_mps
     raise BadInput(
         f"no steady straight flight at {state.airspeed_mps:g} m/s, {state.altitude_m:g} m with this engine "
-        "and surface setting, allowed: an airspeed at which the wing carries the aircraft "
+        f"and surface setting{_left_over(here)}, allowed: an airspeed at which the wing carries the aircraft "
         f"(validated: {low:g} to {high:g})"
     )
+
+
+def _left_over(accelerations: np.ndarray) -> str:
+    """What keeps the aircraft from flying steadily: the largest of the six accelerations that are left."""
+    if not np.isfinite(accelerations).all():
+        return " (its accelerations are not finite)"
+    says = "forward", "to the right", "downward", "in roll", "in pitch", "in yaw"
+    worst = int(np.abs(accelerations).argmax())
+    unit = "m/s2" if worst < 3 else "rad/s2"
+    return f" ({accelerations[worst]:.2g} {unit} {says[worst]} cannot be balanced)"
 
 
 def _check_solution(solution: FlightState, travel: dict[str, Travel]) -> None:

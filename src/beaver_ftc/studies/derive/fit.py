@@ -2,9 +2,10 @@
 
 The coefficients follow from the sampled accelerations and the inertia by Euler's equations; each is then
 fitted alone. A term is taken for what it explains of the residual, all taken so far are fitted again, and it
-ends when another would explain next to nothing.
+ends when another would explain next to nothing; what turned out to be no use is then left out again.
 """
 
+from collections.abc import Sequence
 from itertools import product
 from typing import Any
 
@@ -12,19 +13,32 @@ import numpy as np
 from scipy.linalg import lstsq
 
 from beaver_ftc.aircraft import Aircraft, MassProperties
-from beaver_ftc.studies.derive.sample import Samples
+from beaver_ftc.studies.derive.sample import Samples, flow_signals
 
 MOST_TERMS = 26
-LEAST_GAIN = 2e-5  # of the variance, for another term to be taken
+LEAST_GAIN = 3e-3  # of what is left, for another term to be taken
+EXACT = 1e-10  # share of the variance at which nothing is left: the turning Earth leaves as much
+RIDGE = 1e-13  # keeps what is nearly the same twice from being nearly infinite
+NO_USE = 1e-3  # of what is left in the end, for a term to stay
+LEAST_RAD_S2 = 1e-3  # below it, how small an error is does not matter
+NOT_MISSED = 0.02  # rise of the sum of the logarithms of the errors without a signal
 _FREE: tuple[dict[str, int], ...] = (
-    {}, {"alpha": 1}, {"alpha": 2}, {"alpha": 3}, {"beta": 1}, {"beta": 2}, {"beta": 3},
-    {"alpha": 1, "beta": 1}, {"alpha": 2, "beta": 1}, {"alpha": 1, "beta": 2},
+    {}, *({"alpha": power} for power in range(1, 6)), *({"beta": power} for power in range(1, 4)),
+    {"alpha": 1, "beta": 1}, {"alpha": 2, "beta": 1}, {"alpha": 1, "beta": 2}, {"alpha": 1, "beta": 3},
     *({rate: 1} for rate in ("ph", "qh", "rh")),
     *({"alpha": power, rate: 1} for power, rate in product((1, 2), ("ph", "qh", "rh"))),
 )  # fmt: skip
-_WITH_SURFACE: tuple[dict[str, int], ...] = ({}, {"alpha": 1}, {"alpha": 2}, {"beta": 2})
-_OF_DECLARED: tuple[dict[str, int], ...] = ({}, {"alpha": 1}, {"beta": 1}, {"qh": 1}, {"rh": 1})
+_WITH_SURFACE: tuple[dict[str, int], ...] = (
+    {}, {"alpha": 1}, {"alpha": 2}, {"alpha": 3}, {"beta": 1}, {"beta": 2},
+)  # fmt: skip
+_OF_DECLARED: tuple[dict[str, int], ...] = (
+    {}, {"alpha": 1}, {"alpha": 2}, {"beta": 1}, {"ph": 1}, {"qh": 1}, {"rh": 1},
+)  # fmt: skip
+EXACT_TERMS = {"Cl": "engines_l", "Cm": "engines_m", "Cn": "engines_n"}  # with 1, by their definition
+PLAIN = ("alpha_rate", "beta_rate", *EXACT_TERMS.values())
+MATTERS_RAD_S2 = 1e-3  # what an engine's moment must do in flight to be worth a signal
 Term = dict[str, Any]
+Candidate = tuple[dict[str, int], str | None]
 
 
 def moment_coefficients(samples: Samples, mass: MassProperties, aircraft: Aircraft) -> np.ndarray:
@@ -37,66 +51,160 @@ def moment_coefficients(samples: Samples, mass: MassProperties, aircraft: Aircra
     return moments / (samples.y[:, 3:4] * geometry.wing_area_m2 * arms)
 
 
-def candidates(aircraft: Aircraft) -> list[tuple[dict[str, int], str | None]]:
-    """What a term may multiply: powers of signals, and a surface or none."""
+def candidates(signals: Sequence[str], surfaces: Sequence[str]) -> list[Candidate]:
+    """What a term may multiply: powers of signals, and a surface or none.
+
+    Rates of the flow and moments of the engines come in as they are: what feeds them back in powers or times
+    a surface would make a law that inverts the model chase itself.
+    """
     free, with_surface = list(_FREE), list(_WITH_SURFACE)
-    for signal in aircraft.signals:
-        free += [{**of, signal: 1} for of in _OF_DECLARED] + [{signal: 2}]
-        with_surface += [{signal: 1}, {signal: 2}]
-    return [(of, None) for of in free] + [(of, s) for s in aircraft.surfaces for of in with_surface]
+    for signal in signals:
+        if signal in PLAIN:
+            free += [{signal: 1}]
+            continue
+        free += [{**of, signal: 1} for of in _OF_DECLARED] + [{signal: 2}, {signal: 3}]
+        with_surface += [{signal: 1}, {signal: 2}, {"alpha": 1, signal: 1}]
+    return [(of, None) for of in free] + [(of, s) for s in surfaces for of in with_surface]
 
 
-def regressors(samples: Samples, aircraft: Aircraft) -> np.ndarray:
+def regressors(samples: Samples, aircraft: Aircraft, known: Sequence[Candidate]) -> np.ndarray:
     """What each candidate multiplies, (n, candidates)."""
-    geometry, V = aircraft.geometry, samples.y[:, 2]
-    of = {
-        "alpha": samples.y[:, 0], "beta": samples.y[:, 1],
-        "ph": samples.x[:, 0] * geometry.span_m / (2 * V), "qh": samples.x[:, 1] * geometry.chord_m / V,
-        "rh": samples.x[:, 2] * geometry.span_m / (2 * V),
-    }  # fmt: skip
-    of |= dict(zip(aircraft.signals, samples.y[:, 4:].T, strict=True))
+    of = flow_signals(samples, aircraft)
     deflection = dict(zip(aircraft.surfaces, samples.u.T, strict=True))
     columns = []
-    for powers, surface in candidates(aircraft):
-        column = np.ones(len(V)) if surface is None else deflection[surface]
+    for powers, surface in known:
+        column = np.ones(len(samples)) if surface is None else deflection[surface]
         for signal, power in powers.items():
             column = column * of[signal] ** power
         columns.append(column)
     return np.column_stack(columns)
 
 
-def pursue(A: np.ndarray, b: np.ndarray) -> tuple[list[int], np.ndarray]:
+class Products:
+    """Products of the columns of A with each other and with b: all that a pursuit needs of n rows."""
+
+    def __init__(self, A: np.ndarray, b: np.ndarray) -> None:
+        scale = np.linalg.norm(A, axis=0)
+        self.scale = np.where(scale > 0.0, scale, np.inf)  # what is zero everywhere explains nothing
+        self.gram, self.onto = (A / self.scale).T @ (A / self.scale), (A / self.scale).T @ b
+        self.total, self.square = float(np.sum((b - b.mean()) ** 2)) or 1.0, float(b @ b)
+
+    def left(self, taken: list[int]) -> float:
+        """Sum of squares that these columns leave."""
+        return max(self.square - float(self.solved(taken) @ self.onto[taken]), 0.0)
+
+    def solved(self, taken: list[int]) -> np.ndarray:
+        """Coefficients of these columns, each scaled to length 1."""
+        block = self.gram[np.ix_(taken, taken)] + RIDGE * np.eye(len(taken))
+        coefficients: np.ndarray = np.linalg.solve(block, self.onto[taken])
+        return coefficients
+
+    def pursued(self, within: Sequence[int], most: int = MOST_TERMS) -> list[int]:
+        """The columns to take of some."""
+        taken: list[int] = []
+        left, residual = self.square, self.onto
+        free = np.array(within)
+        while len(taken) < most and left > EXACT * self.total:
+            open_ = free[~np.isin(free, taken)]
+            wider = [*taken, int(open_[np.argmax(np.abs(residual[open_]))])]
+            then = self.left(wider)
+            if left - then < LEAST_GAIN * left:
+                break
+            taken, left = wider, then
+            residual = self.onto - self.gram[:, taken] @ self.solved(taken)
+        return self.of_use(taken, left + EXACT * self.total)
+
+    def exchanged(self, taken: list[int], within: Sequence[int]) -> list[int]:
+        """Columns in place of these with which less is left: a pursuit may take neighbours."""
+        best, left = list(taken), self.left(taken)
+        for place in range(len(taken)):
+            others = [[*best[:place], k, *best[place + 1 :]] for k in within if k not in best]
+            tried = [self.left(columns) for columns in others]
+            if tried and min(tried) < (1.0 - LEAST_GAIN) * left:
+                best, left = others[int(np.argmin(tried))], min(tried)
+        return best
+
+    def of_use(self, taken: list[int], left: float) -> list[int]:
+        """Leave out, one after the other, the columns without which hardly more is left."""
+        kept = list(taken)
+        for column in taken:
+            fewer = [k for k in kept if k != column]
+            if fewer and self.left(fewer) < (1.0 + NO_USE) * left:
+                kept = fewer
+        return kept
+
+
+def pursue(A: np.ndarray, b: np.ndarray, most: int = MOST_TERMS) -> tuple[list[int], np.ndarray]:
     """The columns of A taken, and their coefficients."""
-    scale = np.linalg.norm(A, axis=0)
-    scale[scale == 0.0] = np.inf  # what is zero everywhere explains nothing
-    taken: list[int] = []
-    total, residual = float(np.sum((b - b.mean()) ** 2)) or 1.0, b
-    coefficients = np.empty(0)
-    while len(taken) < MOST_TERMS:
-        gain = np.abs(A.T @ residual) / scale
-        gain[taken] = -1.0
-        best = int(np.argmax(gain))
-        solved = lstsq(A[:, [*taken, best]], b)[0]
-        left = b - A[:, [*taken, best]] @ solved
-        if (residual @ residual - left @ left) / total < LEAST_GAIN:
-            break
-        taken, coefficients, residual = [*taken, best], solved, left
-    return taken, coefficients
+    products, every = Products(A, b), [k for k in range(A.shape[1]) if A[:, k].any()]
+    taken = products.pursued(every, most)
+    taken = products.exchanged(taken, every)
+    taken = products.of_use(taken, products.left(taken) + EXACT * products.total)
+    scale = np.linalg.norm(A[:, taken], axis=0)
+    return taken, lstsq(A[:, taken] / scale, b)[0] / scale if taken else np.empty(0)
 
 
-def fitted(samples: Samples, aircraft: Aircraft) -> dict[str, list[Term]]:
-    """The terms of Cl, Cm and Cn, as an aircraft file has them."""
-    A, known = regressors(samples, aircraft), candidates(aircraft)
+def fitted(samples: Samples, aircraft: Aircraft, most: int = MOST_TERMS) -> dict[str, list[Term]]:
+    """The terms of Cl, Cm and Cn, as an aircraft file has them, with the signals the aircraft declares."""
+    known = candidates(tuple(aircraft.signals), aircraft.surfaces)
+    A = regressors(samples, aircraft, known)
     C = moment_coefficients(samples, aircraft.mass, aircraft)
     terms: dict[str, list[Term]] = {}
-    for axis, name in enumerate(("Cl", "Cm", "Cn")):
-        taken, values = pursue(A, C[:, axis])
-        of_it = sorted(zip(taken, values, strict=True))
-        terms[name] = [_term(name, *known[k], float(value)) for k, value in of_it]
+    for axis, (name, engines) in enumerate(EXACT_TERMS.items()):
+        exact = engines in aircraft.signals
+        taken, values = pursue(A, C[:, axis] - (samples.signals[engines] if exact else 0.0), most)
+        coefficients = dict(zip(taken, values, strict=True))
+        if exact:
+            linear = known.index(({engines: 1}, None))
+            coefficients[linear] = coefficients.get(linear, 0.0) + 1.0
+        terms[name] = [_term(name, *known[k], float(value)) for k, value in sorted(coefficients.items())]
     return terms
+
+
+def engine_signals(flown: Samples, aircraft: Aircraft) -> list[str]:
+    """The moments of the engines that change in flight, so that no state at which time stands still shows
+    them."""
+    per_coefficient = _accelerations(flown, aircraft)
+    return [
+        engines
+        for engines, moves in zip(EXACT_TERMS.values(), per_coefficient, strict=True)
+        if engines in flown.signals and moves * np.ptp(flown.signals[engines]) > MATTERS_RAD_S2
+    ]
+
+
+def signals_of_use(samples: Samples, aircraft: Aircraft, most: int, wanted: Sequence[str] = ()) -> list[str]:
+    """The signals that terms want, at most so many: one after the other that is missed least is left out, but
+    none of those wanted."""
+    known = candidates(tuple(samples.signals), aircraft.surfaces)
+    A = regressors(samples, aircraft, known)
+    C = moment_coefficients(samples, aircraft.mass, aircraft) * _accelerations(samples, aircraft)
+    products = [Products(A, C[:, axis]) for axis in range(3)]
+
+    def misses(signals: set[str]) -> float:
+        within = [k for k, (of, _) in enumerate(known) if not (set(of) & set(samples.signals)) - signals]
+        left = [(of.left(of.pursued(within)) / len(A)) ** 0.5 for of in products]
+        return float(np.sum(np.log(np.array(left) + LEAST_RAD_S2)))
+
+    kept, now = set(samples.signals), misses(set(samples.signals))
+    while kept - set(wanted):
+        without = {signal: misses(kept - {signal}) for signal in sorted(kept - set(wanted))}
+        least = min(without, key=without.__getitem__)
+        if len(kept) <= most and without[least] > now + NOT_MISSED:
+            break
+        kept, now = kept - {least}, without[least]
+    return [signal for signal in samples.signals if signal in kept]
+
+
+def _accelerations(samples: Samples, aircraft: Aircraft) -> np.ndarray:
+    """What one unit of Cl, Cm and Cn does, rad/s2."""
+    geometry, mass = aircraft.geometry, aircraft.mass
+    arms = np.array([geometry.span_m, geometry.chord_m, geometry.span_m])
+    inertia = np.array([mass.Ix_kg_m2, mass.Iy_kg_m2, mass.Iz_kg_m2])
+    size: np.ndarray = samples.y[:, 3].mean() * geometry.wing_area_m2 * arms / inertia
+    return size
 
 
 def _term(coefficient: str, of: dict[str, int], surface: str | None, value: float) -> Term:
     parts = [*([surface] if surface else []), *(f"{s}{p if p > 1 else ''}" for s, p in of.items())]
-    term: Term = {"name": f"{coefficient}_{'_'.join(parts) or '0'}", "value": float(f"{value:.6g}"), "of": of}
+    term: Term = {"name": f"{coefficient}_{'_'.join(parts) or '0'}", "value": float(f"{value:.8g}"), "of": of}
     return term | ({"surface": surface} if surface else {})

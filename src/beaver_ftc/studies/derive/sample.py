@@ -1,75 +1,204 @@
-"""States of an aircraft over its envelope, and the angular accelerations JSBSim has there."""
+"""States of an aircraft over its envelope, and the angular accelerations JSBSim has there.
 
-from dataclasses import dataclass
+The states fill boxes about the trim, one inside the other. The aircraft is started at some settings of its
+engines, tanks and altitudes; at each of these time stands still, and the state goes from place to place.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
-from beaver_ftc.aircraft import Aircraft
+from beaver_ftc.aircraft import AXES, Aircraft
+from beaver_ftc.aircraft.schema import FLOW_SIGNALS
 from beaver_ftc.plant.adapter import PA_PER_PSF, Plant
 from beaver_ftc.plant.state import FlightState
 
-_LOOKED_UP = ("alpha_rad", "beta_rad", "p_rad_s", "q_rad_s", "r_rad_s")
 FT = 0.3048
+REACHES = (0.25, 0.5, 0.75, 1.0)  # of the boxes, as shares of the envelope's half widths
+SHARES = (0.15, 0.35, 0.65, 1.0)  # of the surfaces' travel
+AGES_S = (120.0, 900.0, 7200.0)  # of a flight: fuel burns, and inertia with it
+FRESH = (0,)
+EVERY_AGE = (0, 0, 1, 0, 0, 2)
+STARTS = 48
+AT_AN_END = 0.3  # share of the draws that are at an end of their range: corners are where errors are large
+_BANK_RAD, _CLIMB_RAD, _ALTITUDE_M, _THROTTLE = 1.0, 0.3, 600.0, 0.35  # half widths beside the envelope's
+_MOST_BURNT = 0.9  # of the fuel
 
 
 @dataclass(frozen=True)
 class Envelope:
-    """Where to sample: low and high ends. surface_share: of the travel, about the trim."""
+    """Half widths about the trim, but for airspeed and angle of attack, of which the ends are given."""
 
     airspeed_mps: tuple[float, float]
     alpha_rad: tuple[float, float]
-    altitude_m: float
-    beta_rad: float = 0.10
-    rates_rad_s: tuple[float, float, float] = (0.30, 0.20, 0.20)
-    surface_share: float = 1.0
+    beta_rad: float = 0.15
+    rates_rad_s: tuple[float, float, float] = (0.60, 0.35, 0.35)
 
 
 @dataclass(frozen=True)
 class Samples:
-    """x (n, 3) rad/s, y (n, 4 + declared): alpha, beta, V, qdyn and declared signals, u (n, surfaces) rad,
-    rate (n, 3) rad/s2."""
+    """x (n, 3) rad/s, y (n, 4): alpha, beta, V, qdyn; signals: of each name (n,); u (n, surfaces) rad,
+    rate (n, 3) rad/s2; box, level, age (n,): of the state, the surfaces and the flight, by their index."""
 
     x: np.ndarray
     y: np.ndarray
+    signals: Mapping[str, np.ndarray]
     u: np.ndarray
     rate: np.ndarray
+    box: np.ndarray
+    level: np.ndarray
+    age: np.ndarray
+
+    def measured(self, aircraft: Aircraft) -> np.ndarray:
+        """y with the signals an aircraft declares, (n, 4 + declared)."""
+        return np.column_stack([self.y, *(self.signals[name] for name in aircraft.signals)])
+
+    def __len__(self) -> int:
+        return len(self.x)
 
 
-def sample(plant: Plant, envelope: Envelope, trim: FlightState, n: int, seed: int) -> Samples:
-    """So many random states, time standing still at each. The engines' setting is that of the trim."""
-    rng, rows = np.random.default_rng(seed), []
-    aircraft = plant.aircraft
+class Draw:
+    """Random numbers within a share of a range, often at its ends."""
+
+    def __init__(self, seed: int) -> None:
+        self.rng = np.random.default_rng(seed)
+
+    def between(self, low: float, high: float) -> float:
+        """One number between two ends."""
+        at = self.rng.random()
+        if at < AT_AN_END:
+            return low if at < 0.5 * AT_AN_END else high
+        return float(low + (high - low) * self.rng.random())
+
+    def about(self, middle: float, half: float) -> float:
+        """One number about a middle."""
+        return self.between(middle - half, middle + half)
+
+    def share(self, middle: float, ends: tuple[float, float], reach: float) -> float:
+        """One number between two ends drawn towards the middle, to that share of the way."""
+        low, high = (middle + reach * (end - middle) for end in ends)
+        return self.between(low, high)
+
+
+def sample(
+    plant: Plant,
+    envelope: Envelope,
+    trim: FlightState,
+    n: int,
+    seed: int,
+    properties: Mapping[str, str],
+    ages: tuple[int, ...] = EVERY_AGE,
+) -> Samples:
+    """So many random states; properties: of each signal to be read there; ages: of the flights."""
+    draw, rows = Draw(seed), []
+    tanks = Tanks(plant, trim)
+    for k in range(STARTS):
+        box, age = k % len(REACHES), ages[(k // len(REACHES)) % len(ages)]
+        tanks.fill(draw.between(0.0, AGES_S[age]))
+        started = _started(draw, plant, trim, envelope, REACHES[box])
+        plant.start(started)
+        for i in range(max(1, n // STARTS)):
+            level = i % len(SHARES)
+            state = _state(draw, plant.aircraft, envelope, trim, started, REACHES[box], SHARES[level])
+            rows.append((*_at(plant, state, properties), box, level, age))
+    tanks.fill(0.0)
     plant.start(trim)
-    for _ in range(n):
-        rows.append(_at(plant, _random_state(rng, envelope, trim, aircraft)))
-    x, y, u, rate = (np.array(column) for column in zip(*rows, strict=True))
-    return Samples(x, y, u, rate)
+    return as_arrays(rows, tuple(properties))
 
 
-def _random_state(
-    rng: np.random.Generator, envelope: Envelope, trim: FlightState, aircraft: Aircraft
-) -> FlightState:
-    half = np.array([envelope.beta_rad, *envelope.rates_rad_s])
-    alpha = rng.uniform(*envelope.alpha_rad)
-    values = dict(zip(_LOOKED_UP, (alpha, *rng.uniform(-half, half)), strict=True))
-    surfaces = {}
-    for name, travel in aircraft.travel.items():
-        reach = envelope.surface_share * 0.5 * (travel.max_rad - travel.min_rad)
-        deflection = trim.surfaces_rad[name] + rng.uniform(-reach, reach)
-        surfaces[name] = float(np.clip(deflection, travel.min_rad, travel.max_rad))
-    V = rng.uniform(*envelope.airspeed_mps)
-    theta = trim.theta_rad - trim.alpha_rad + alpha
-    return FlightState(
-        V, envelope.altitude_m, theta_rad=theta, surfaces_rad=surfaces, settings=trim.settings, **values
+def as_arrays(rows: list[tuple], names: tuple[str, ...]) -> Samples:
+    """Rows of x, y, signals, u, rate, box, level, age as samples; without those that are not finite."""
+    x, y, signals, u, rate, *indices = (np.array(column) for column in zip(*rows, strict=True))
+    kept = np.isfinite(rate).all(axis=1)
+    named = dict(zip(names, signals[kept].T, strict=True))
+    return Samples(x[kept], y[kept], named, u[kept], rate[kept], *(index[kept] for index in indices))
+
+
+class Tanks:
+    """The tanks of an aircraft in trim, and what flight at full power burns of them."""
+
+    def __init__(self, plant: Plant, trim: FlightState) -> None:
+        names = [f"propulsion/tank[{i}]/contents-lbs" for i in range(20)]
+        self._plant = plant
+        self.full_lbs = {name: plant.read(name) for name in names if plant.has(name)}
+        power = {name: setting.range[1] for name, setting in plant.aircraft.engine.settings.items()}
+        plant.start(replace(trim, settings=power))
+        flows = [f"propulsion/engine[{i}]/fuel-flow-rate-pps" for i in range(plant.n_engines)]
+        flow_pps, total = sum(plant.read(f) for f in flows if plant.has(f)), sum(self.full_lbs.values())
+        self.per_s = flow_pps / total if total > 0.0 and np.isfinite(flow_pps) else 0.0
+
+    def fill(self, age_s: float) -> None:
+        """As they are after so many seconds at full power."""
+        left = 1.0 - min(self.per_s * age_s, _MOST_BURNT)
+        for name, full in self.full_lbs.items():
+            self._plant.write(name, left * full)
+
+
+def _started(draw: Draw, plant: Plant, trim: FlightState, envelope: Envelope, reach: float) -> FlightState:
+    """Where the engines come to run, and the aircraft there."""
+    settings = {}
+    for name, setting in plant.aircraft.engine.settings.items():
+        (low, high), middle = setting.range, trim.settings[name]
+        half = _THROTTLE * (high - low)
+        ends = max(low, middle - half), min(high, middle + half)
+        settings[name] = draw.share(middle, ends, reach)
+    return replace(
+        trim,
+        airspeed_mps=draw.share(trim.airspeed_mps, envelope.airspeed_mps, reach),
+        altitude_m=max(draw.about(trim.altitude_m, reach * _ALTITUDE_M), 0.0),
+        settings=settings,
     )
 
 
-def _at(plant: Plant, state: FlightState) -> tuple[list[float], list[float], list[float], list[float]]:
-    plant.start(state)
+def _state(
+    draw: Draw,
+    aircraft: Aircraft,
+    envelope: Envelope,
+    trim: FlightState,
+    started: FlightState,
+    reach: float,
+    share: float,
+) -> FlightState:
+    alpha = draw.share(trim.alpha_rad, envelope.alpha_rad, reach)
+    rates: dict[str, Any] = {
+        f"{axis}_rad_s": draw.about(0.0, reach * half)
+        for axis, half in zip(AXES, envelope.rates_rad_s, strict=True)
+    }
+    surfaces = {
+        name: share * draw.between(travel.min_rad, travel.max_rad) for name, travel in aircraft.travel.items()
+    }
+    return FlightState(
+        draw.share(trim.airspeed_mps, envelope.airspeed_mps, reach), started.altitude_m,
+        alpha_rad=alpha, beta_rad=draw.about(trim.beta_rad, reach * envelope.beta_rad),
+        phi_rad=draw.about(trim.phi_rad, _BANK_RAD),
+        theta_rad=trim.theta_rad - trim.alpha_rad + alpha + draw.about(0.0, _CLIMB_RAD),
+        surfaces_rad=surfaces, settings=started.settings, **rates,
+    )  # fmt: skip
+
+
+def _at(plant: Plant, state: FlightState, properties: Mapping[str, str]) -> Iterator[list[float]]:
+    """x, y, signals, u, rate at a state."""
+    plant.hold(state)
+    return seen_at(plant, properties)
+
+
+def seen_at(plant: Plant, properties: Mapping[str, str]) -> Iterator[list[float]]:
+    """x, y, signals, u, rate where the aircraft is."""
     read = plant.read
-    x = [read(f"velocities/{axis}-rad_sec") for axis in "pqr"]
+    yield [read(f"velocities/{axis}-rad_sec") for axis in AXES]
     flow = [read("aero/alpha-rad"), read("aero/beta-rad"), read("velocities/vt-fps") * FT]
-    u = [read(surface.effective) for surface in plant.aircraft.surface.values()]
-    rate = [read(f"accelerations/{axis}dot-rad_sec2") for axis in "pqr"]
-    declared = [read(signal.property) for signal in plant.aircraft.signals.values()]
-    return x, [*flow, read("aero/qbar-psf") * PA_PER_PSF, *declared], u, rate
+    yield [*flow, read("aero/qbar-psf") * PA_PER_PSF]
+    yield [read(name) for name in properties.values()]
+    yield [read(surface.effective) for surface in plant.aircraft.surface.values()]
+    yield [read(f"accelerations/{axis}dot-rad_sec2") for axis in AXES]
+
+
+def flow_signals(samples: Samples, aircraft: Aircraft) -> dict[str, np.ndarray]:
+    """alpha, beta, ph, qh, rh of samples, and the signals they were taken with."""
+    geometry, V = aircraft.geometry, samples.y[:, 2]
+    half_span_time = geometry.span_m / (2.0 * V)
+    rates = samples.x[:, 0] * half_span_time, samples.x[:, 1] * geometry.chord_m / V
+    values = samples.y[:, 0], samples.y[:, 1], *rates, samples.x[:, 2] * half_span_time
+    return {**dict(zip(FLOW_SIGNALS, values, strict=True)), **samples.signals}

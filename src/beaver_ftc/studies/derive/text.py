@@ -2,6 +2,7 @@
 
 from typing import Any
 
+from beaver_ftc.studies.derive.page import DEFLECTION_DEG, smallest_losses
 from beaver_ftc.studies.derive.run import Derived
 
 AXES = ("p", "q", "r")
@@ -28,6 +29,8 @@ def document_of(made: Derived) -> dict[str, Any]:
             "checked": dict(zip(AXES, map(float, made.checked_rad_s2), strict=True)),
             "declared": dict(zip(AXES, aircraft.model_error_rad_s2, strict=True)),
         },
+        "smallest_certain_loss": {name: of["certain_loss"] for name, of in smallest_losses(aircraft).items()},
+        "notes": list(made.notes),
     }
 
 
@@ -42,8 +45,16 @@ def text_of(document: dict[str, Any]) -> str:
         f" surfaces   {', '.join(document['surfaces'])}",
         f" {'largest error, rad/s2':24}{'p':>10}{'q':>10}{'r':>10}",
     ]
-    says = {"fitted": "states of the fit", "checked": "states not seen", "declared": "declared bound"}
+    kinds = {"fitted": "states of the fit", "checked": "states not seen", "declared": "declared bound"}
     for kind, errors in document["largest_error_rad_s2"].items():
-        lines.append(f"   {says[kind]:22}" + "".join(f"{errors[axis]:10.4f}" for axis in AXES))
-    lines.append(f" written to {document['folder']}")
+        lines.append(f"   {kinds[kind]:22}" + "".join(f"{errors[axis]:10.4f}" for axis in AXES))
+    losses = document["smallest_certain_loss"].items()
+    says = {name: f"{loss:.0%}" if loss <= 1.0 else "none" for name, loss in losses}
+    lines.append(f" certain to be detected at {DEFLECTION_DEG:g} deg: losses from " + _listed(says))
+    lines += [f" note: {note}" for note in document["notes"]]
+    lines.append(f" written to {document['folder']}, with a page on it, derived.md")
     return "\n".join(lines)
+
+
+def _listed(values: dict[str, str]) -> str:
+    return ", ".join(f"{name} {value}" for name, value in values.items())

@@ -1,9 +1,9 @@
 """The faults of the matrix and the flights they are put in."""
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from beaver_ftc.aircraft import load
-from beaver_ftc.design.coefficients import SURFACES
+from beaver_ftc.aircraft import AXES, DEFAULT, Aircraft, load
 
 if TYPE_CHECKING:
     from beaver_ftc.scenario.schema import Scenario
@@ -12,7 +12,7 @@ TOLERANCE, SENSORS = 0.05, "tactical-grade"
 AIRSPEEDS_MPS = (38.0, 45.0, 52.0)
 AT_S = 12.0
 DURATION_S = 30.0
-OWN_AXIS = {"aileron": "p", "elevator": "q", "rudder": "r", "flap": "q"}
+SPEEDS = (0.9, 1.0, 1.1)  # of another aircraft, as shares of the speed it starts with
 REFERENCE = {
     axis: [{"sine": {"amplitude_deg_s": 3, "frequency_hz": frequency_hz}}]
     for axis, frequency_hz in (("p", 0.25), ("q", 0.2), ("r", 0.15))
@@ -51,14 +51,37 @@ class Case(NamedTuple):
     surface: str
     airspeed_mps: float
     declared: bool = False  # with the errors of `declared`
+    aircraft: str = DEFAULT
 
 
-def cases(airspeeds_mps: tuple[float, ...] = AIRSPEEDS_MPS, declared: bool = False) -> list[Case]:
+def airspeeds_of(reference: str) -> tuple[float, ...]:
+    """Airspeeds to fly an aircraft at, m/s."""
+    if reference == DEFAULT:
+        return AIRSPEEDS_MPS
+    aircraft = aircraft_of(reference)
+    start = aircraft.file.start.airspeed_mps or 0.5 * sum(aircraft.envelope.airspeed_mps)
+    return tuple(round(share * start, 1) for share in SPEEDS)
+
+
+def aircraft_of(reference: str) -> Aircraft:
+    """The aircraft of that name; a folder is looked for in the working directory."""
+    return load(reference, Path())
+
+
+def own_axis(case: Case) -> str:
+    """The axis the surface of a case turns most about: p, q or r."""
+    aircraft = aircraft_of(case.aircraft)
+    return AXES[aircraft.dominant_axis[aircraft.surfaces.index(case.surface)]]
+
+
+def cases(
+    airspeeds_mps: tuple[float, ...] = AIRSPEEDS_MPS, declared: bool = False, aircraft: str = DEFAULT
+) -> list[Case]:
     """Every fault on every surface at every airspeed, fault by fault."""
     return [
-        Case(fault, surface, V, declared)
+        Case(fault, surface, V, declared, aircraft)
         for fault, _ in FAULTS
-        for surface in SURFACES
+        for surface in aircraft_of(aircraft).surfaces
         for V in airspeeds_mps
     ]
 
@@ -77,18 +100,19 @@ def declared() -> dict[str, Any]:
 
 def scenario_of(case: Case, law: str, trimmed_deg: float) -> "Scenario":
     """The flight of a case under a law; trimmed_deg: the surface's deflection in trim."""
-    from beaver_ftc.scenario.schema import Scenario
+    from beaver_ftc.scenario.given import load as load_scenario
 
     fault = dict(dict(FAULTS)[case.fault])
     if "off_deg" in fault:
         fault["position_deg"] = trimmed_deg + fault.pop("off_deg")
-    return Scenario.model_validate(
+    return load_scenario(
         {
             "name": "matrix",
+            "aircraft": case.aircraft,
             "duration_s": DURATION_S,
             "initial": {"airspeed_mps": case.airspeed_mps},
             "reference": REFERENCE,
-            "uncertainty": UNCERTAINTY,
+            "uncertainty": UNCERTAINTY if case.aircraft == DEFAULT else {},
             "faults": [{**fault, "actuator": case.surface, "at_s": AT_S}],
             "fdi": {"fault_class": "all"},
             "control": {"law": law},

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from beaver_ftc.design.coefficients import SURFACES
 from beaver_ftc.studies.matrix.cases import FAULTS
+from beaver_ftc.studies.matrix.summary import surfaces_of
 
 Document = dict[str, Any]
 MOST_DOUBLINGS = 3.0
@@ -19,21 +19,22 @@ def write_heat_map(document: Document, path: Path) -> None:
     from matplotlib.figure import Figure
 
     names = [fault for fault, _ in FAULTS]
+    surfaces = surfaces_of(document)
     by_place = {(cell["fault"], cell["surface"]): cell for cell in document["cells"]}
-    grid = np.array([[_doublings(by_place[fault, surface]) for surface in SURFACES] for fault in names])
+    grid = np.array([[_doublings(by_place[fault, surface]) for surface in surfaces] for fault in names])
     figure = Figure(figsize=(11, 0.5 * len(names) + 1.8), layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.subplots()
     image = axes.imshow(grid, cmap="YlOrBr", vmin=0, vmax=MOST_DOUBLINGS, aspect="auto")
     axes.set_title("Each fault on each surface: verdict, and how well the flight goes on")
-    axes.set_xticks(range(len(SURFACES)), SURFACES)
-    axes.set_xticks(np.arange(0.5, len(SURFACES) - 1), minor=True)
+    axes.set_xticks(range(len(surfaces)), surfaces)
+    axes.set_xticks(np.arange(0.5, len(surfaces) - 1), minor=True)
     axes.set_yticks(np.arange(0.5, len(names) - 1), minor=True)
     axes.grid(which="minor", color="white", linewidth=1.5)
     axes.tick_params(which="minor", length=0)
     axes.set_yticks(range(len(names)), names)
     for i, fault in enumerate(names):
-        for j, surface in enumerate(SURFACES):
+        for j, surface in enumerate(surfaces):
             axes.text(j, i, _label(by_place[fault, surface]), ha="center", va="center", **_ink(grid[i, j]))
     bar = figure.colorbar(image, ticks=range(int(MOST_DOUBLINGS) + 1))
     most = int(MOST_DOUBLINGS)

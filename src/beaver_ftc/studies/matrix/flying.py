@@ -4,7 +4,8 @@ from functools import lru_cache
 from math import degrees
 from typing import TYPE_CHECKING, Any
 
-from beaver_ftc.studies.matrix.cases import OWN_AXIS, Case, scenario_of
+from beaver_ftc.aircraft import DEFAULT
+from beaver_ftc.studies.matrix.cases import Case, aircraft_of, own_axis, scenario_of
 
 if TYPE_CHECKING:
     from beaver_ftc.loop.flight import Flight
@@ -13,19 +14,23 @@ Document = dict[str, Any]
 
 
 @lru_cache
-def trimmed_deg(airspeed_mps: float, surface: str) -> float:
+def trimmed_deg(airspeed_mps: float, surface: str, aircraft: str = DEFAULT) -> float:
     """Deflection of a surface in the trim the cases start from."""
+    from beaver_ftc.plant.adapter import Plant
     from beaver_ftc.plant.trim import trim
-    from beaver_ftc.scenario.schema import Initial
+    from beaver_ftc.scenario.initial import initial_of
 
-    return degrees(trim(airspeed_mps, Initial().altitude_m).surfaces_rad[surface])
+    flown = aircraft_of(aircraft)
+    altitude_m = initial_of(flown)().altitude_m
+    point = trim(airspeed_mps, altitude_m, plant=Plant(100, aircraft=flown))
+    return degrees(point.surfaces_rad[surface])
 
 
 def fly_case(case: Case) -> Document:
     """The row of a case: fault, verdict, tracking beside the oracle's, and why it was lost, if so."""
     from beaver_ftc.loop.loop import fly
 
-    off_deg = trimmed_deg(case.airspeed_mps, case.surface)
+    off_deg = trimmed_deg(case.airspeed_mps, case.surface, case.aircraft)
     flight, oracle = (
         fly(scenario_of(case, law, off_deg)) for law in ("fault-tolerant-published", "oracle-published")
     )
@@ -68,7 +73,7 @@ def verdict(document: Document, surface: str, true_type: str) -> str:
 
 
 def _tracking(flight: "Flight", oracle: "Flight", case: Case) -> Document:
-    axis = OWN_AXIS[case.surface]
+    axis = own_axis(case)
     ours, best = (_rms_deg_s(one, axis) for one in (flight, oracle))
     return {
         "axis": axis,

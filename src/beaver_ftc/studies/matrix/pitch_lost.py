@@ -97,7 +97,7 @@ def _range(kept: Columns) -> Document:
 
 def run_pitch_lost(
     out: Path,
-    airspeeds_mps: tuple[float, ...] = AIRSPEEDS_MPS,
+    airspeeds_mps: tuple[float, ...] | None = None,
     workers: int = 1,
     progress: Progress | None = None,
 ) -> Document:
@@ -105,6 +105,7 @@ def run_pitch_lost(
     from beaver_ftc.results.metrics import as_json
     from beaver_ftc.results.writer import result_folder
 
+    airspeeds_mps = airspeeds_mps or AIRSPEEDS_MPS
     cases = [PitchCase(name, V, law) for law in LAWS for name, _, _ in LOST for V in airspeeds_mps]
     fly = flown(out / NAME, cases, fly_case, workers=workers, progress=progress)
     with fly as rows, result_folder(out, NAME) as folder:
@@ -120,7 +121,7 @@ def document_of(rows: list[Document], airspeeds_mps: Sequence[float]) -> Documen
 
     harmed = [row for row in rows if row["with"]["departure"] and not row["without"]["departure"]]
     return {
-        "margins": [margins(V, EnginePower()) for V in airspeeds_mps],
+        "margins": [margins(V, EnginePower()) for V in airspeeds_mps or AIRSPEEDS_MPS],
         "flights": rows,
         "saved": sum(bool(row["without"]["departure"] and not row["with"]["departure"]) for row in rows),
         "harmed": len(harmed),

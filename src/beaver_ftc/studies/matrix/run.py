@@ -3,8 +3,9 @@
 from pathlib import Path
 from typing import Any
 
+from beaver_ftc.aircraft import DEFAULT
 from beaver_ftc.studies.engine.flown import Progress, flown
-from beaver_ftc.studies.matrix.cases import AIRSPEEDS_MPS, cases
+from beaver_ftc.studies.matrix.cases import airspeeds_of, cases
 from beaver_ftc.studies.matrix.flying import fly_case
 from beaver_ftc.studies.matrix.summary import document_of
 from beaver_ftc.studies.matrix.text import as_text
@@ -15,17 +16,19 @@ NAME, DECLARED = "fault-matrix", "fault-matrix-declared"
 
 def run_matrix(
     out: Path,
-    airspeeds_mps: tuple[float, ...] = AIRSPEEDS_MPS,
+    airspeeds_mps: tuple[float, ...] | None = None,
     workers: int = 1,
     progress: Progress | None = None,
     name: str = NAME,
+    aircraft: str = DEFAULT,
 ) -> Document:
     """Write `out/fault-matrix/` (table, JSON, heat map), or that of `name`; return the document."""
     from beaver_ftc.results.metrics import as_json
     from beaver_ftc.results.writer import result_folder
     from beaver_ftc.studies.matrix.figure import write_heat_map
 
-    all_cases = cases(airspeeds_mps, declared=name == DECLARED)
+    airspeeds_mps = airspeeds_mps or airspeeds_of(aircraft)
+    all_cases = cases(airspeeds_mps, name == DECLARED, aircraft)
     fly = flown(out / name, all_cases, fly_case, workers=workers, progress=progress)
     with fly as rows, result_folder(out, name) as folder:
         document = document_of(rows)

@@ -2,7 +2,6 @@
 
 from typing import Any
 
-from beaver_ftc.design.coefficients import SURFACES
 from beaver_ftc.studies.matrix.cases import FAULTS
 
 Document = dict[str, Any]
@@ -11,8 +10,10 @@ WORST_FIRST = ("WRONG", "unseen", "open", "surface", "named")
 
 def document_of(rows: list[Document]) -> Document:
     """The whole matrix as a document: cells, single flights, and what went wrong anywhere."""
-    cells = [_cell(fault, surface, rows) for fault, _ in FAULTS for surface in SURFACES]
+    surfaces = list(dict.fromkeys(row["surface"] for row in rows))
+    cells = [_cell(fault, surface, rows) for fault, _ in FAULTS for surface in surfaces]
     return {
+        "aircraft": next((row["aircraft"] for row in rows), None),
         "cells": cells,
         "flights": rows,
         "wrong": sum(row["verdict"] == "WRONG" for row in rows),
@@ -20,6 +21,11 @@ def document_of(rows: list[Document]) -> Document:
         "lost_though_the_oracle_was_not": [row for row in rows if _lost_alone(row)],
         "passed": not any(row["verdict"] == "WRONG" or row["false_alarm"] for row in rows),
     }
+
+
+def surfaces_of(document: Document) -> list[str]:
+    """The surfaces in a matrix, in the aircraft's order."""
+    return list(dict.fromkeys(cell["surface"] for cell in document["cells"]))
 
 
 def _lost_alone(row: Document) -> bool:

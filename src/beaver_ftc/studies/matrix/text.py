@@ -2,8 +2,8 @@
 
 from typing import Any
 
-from beaver_ftc.design.coefficients import SURFACES
 from beaver_ftc.studies.matrix.cases import FAULTS
+from beaver_ftc.studies.matrix.summary import surfaces_of
 
 Document = dict[str, Any]
 LEGEND = (
@@ -16,10 +16,11 @@ LEGEND = (
 def as_text(document: Document) -> str:
     """Table, legend, remarks and totals."""
     width = max(len(fault) for fault, _ in FAULTS)
+    surfaces = surfaces_of(document)
     by_place = {(cell["fault"], cell["surface"]): cell for cell in document["cells"]}
-    head = " " * width + "".join(f"  {surface:21}" for surface in SURFACES)
+    head = " " * width + "".join(f"  {surface:21}" for surface in surfaces)
     lines = [
-        f"{fault:{width}}" + "".join(f"  {_cell(by_place[fault, surface]):21}" for surface in SURFACES)
+        f"{fault:{width}}" + "".join(f"  {_cell(by_place[fault, surface]):21}" for surface in surfaces)
         for fault, _ in FAULTS
     ]
     lines = [line.rstrip() for line in (head, *lines)]

@@ -1,0 +1,148 @@
+"""Whether the promises hold for aircraft nobody wrote by hand: no false alarm, no fault named wrongly.
+
+    python benchmarks/any_aircraft.py [NAMES] --flights N --seed S [--healthy-s SECONDS] [--class all]
+
+Each aircraft is derived if it has not been. Then N healthy flights, and N losses of effectiveness of 40 % and
+more of each surface, at random speeds, frame rates, references, magnitudes, times and profiles, with the
+published bound declared and no error but the aircraft's own. A row an aircraft: hours flown in health and
+their false alarms; of each fault how many were detected, named, named wrongly, and how often the true
+surface was left out of what is still possible.
+"""
+
+import argparse
+import time
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from beaver_ftc import load
+from beaver_ftc.errors import BadInput
+from beaver_ftc.loop.loop import fly
+from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.studies.derive.first_use import derived_if_needed
+
+TWELVE = ("737", "A4", "B747", "MD11", "c172p", "c310", "J3Cub", "L410", "OV10", "T37", "pa28", "p51d")
+HEALTHY_S, FAULTY_S = 60.0, 25.0
+SHAPES = ("sine", "square", "doublet", "step")
+COLUMNS = (
+    "aircraft",
+    "healthy",
+    "false",
+    "losses",
+    "detected",
+    "named",
+    "wrong",
+    "left out",
+    "departed",
+    "s",
+)
+
+
+def signal(rng: np.random.Generator) -> dict[str, Any]:
+    """One reference: amplitudes as in the built-in scenarios, up to twice that."""
+    size = float(rng.uniform(0.5, 4.0))
+    shape = str(rng.choice(SHAPES))
+    if shape in ("sine", "square"):
+        return {shape: {"amplitude_deg_s": size, "frequency_hz": float(rng.uniform(0.1, 0.6))}}
+    start_s = float(rng.uniform(1.0, 8.0))
+    if shape == "doublet":
+        return {
+            "doublet": {"amplitude_deg_s": size, "start_s": start_s, "width_s": float(rng.uniform(0.5, 2.0))}
+        }
+    return {"step": {"amplitude_deg_s": 0.2 * size, "start_s": start_s, "end_s": start_s + 3.0}}
+
+
+def scenario(
+    name: str, surface: str | None, seed: int, index: int, healthy_s: float, fault_class: str
+) -> Scenario:
+    """Flight number `index` of an aircraft: healthy, or with a loss of `surface`."""
+    rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(index, len(surface or ""))))
+    reference = f"jsbsim:{name}"
+    plain = load({"name": "plain", "aircraft": reference})
+    low, high = plain.airframe.envelope.airspeed_mps
+    middle = plain.initial.airspeed_mps
+    rate_hz = int(np.exp(rng.uniform(np.log(25), np.log(200))))
+    fault = {
+        "actuator": surface, "type": "loss_of_effectiveness", "magnitude": float(rng.uniform(0.4, 1.0)),
+        "at_s": float(rng.uniform(3.0, 10.0)),
+    }  # fmt: skip
+    if rng.random() < 0.3:
+        fault |= {"profile": "incipient", "kappa_per_s": float(np.exp(rng.uniform(-1.0, 2.0)))}
+    speed_mps = middle + 0.6 * (rng.uniform(low, high) - middle)
+    return load({
+        "name": f"{surface or 'healthy'}-{index}", "aircraft": reference, "rate_hz": rate_hz,
+        "substeps": int(rng.integers(1, 4)) if rng.random() < 0.2 else 1,
+        "duration_s": FAULTY_S if surface else healthy_s,
+        "initial": {"airspeed_mps": float(speed_mps)},
+        "reference": {axis: [signal(rng) for _ in range(rng.integers(1, 3))] for axis in "pqr"},
+        "faults": [fault] if surface else [], "fdi": {"fault_class": fault_class}, "seed": index,
+    })  # fmt: skip
+
+
+def flown(name: str, args: argparse.Namespace) -> Iterator[tuple[str | None, Any]]:
+    """Surface, or None in health, and what came of the flight; None where it has no trim."""
+    surfaces = load({"name": "plain", "aircraft": f"jsbsim:{name}"}).airframe.surfaces
+    for surface in (None, *surfaces):
+        for index in range(args.flights):
+            flight = scenario(name, surface, args.seed, index, args.healthy_s, args.fault_class)
+            try:
+                yield surface, fly(flight)
+            except BadInput as error:  # a speed at which it does not trim
+                print(f"   {name} {flight.name}: {error}")
+
+
+def row_of(name: str, args: argparse.Namespace) -> tuple[list[str], list[str]]:
+    """A row of the table, and a line on each broken promise."""
+    start, count, said = time.perf_counter(), dict.fromkeys(COLUMNS, 0), []
+    for surface, flight in flown(name, args):
+        detected = flight.detection_time_s is not None
+        label = f"{name} {flight.scenario.name}"
+        count["departed"] += flight.departure is not None
+        if surface is None:
+            count["healthy"] += (
+                flight.scenario.duration_s if flight.departure is None else flight.departure[0]
+            )
+            if detected:
+                count["false"] += 1
+                said.append(f"{label}: alarm at {flight.detection_time_s:.2f} s in health")
+            continue
+        early = detected and flight.detection_time_s < flight.scenario.faults[0].at_s
+        wrong = flight.isolated is not None and flight.isolated != surface
+        left_out = detected and not wrong and flight.isolated is None and surface not in flight.candidates
+        count["losses"] += 1
+        count["detected"] += detected
+        count["named"] += flight.isolated == surface
+        count["wrong"] += wrong
+        count["left out"] += left_out
+        count["false"] += early
+        if wrong or early or left_out:
+            said.append(f"{label}: {'early' if early else flight.isolated}, of {flight.candidates}")
+    values = [f"{count['healthy'] / 3600.0:.2f} h", *(str(count[c]) for c in COLUMNS[2:-1])]
+    return [name, *values, f"{time.perf_counter() - start:.0f}"], said
+
+
+def main() -> None:
+    """Fly them all and print the table."""
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("names", nargs="*", default=TWELVE, metavar="NAME")
+    parser.add_argument("--flights", type=int, default=20, help="in health, and with each surface")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--healthy-s", type=float, default=HEALTHY_S)
+    parser.add_argument("--class", dest="fault_class", choices=("published", "all"), default="published")
+    args = parser.parse_args()
+    table, broken = Table(*COLUMNS), []
+    for name in args.names:
+        derived_if_needed(f"jsbsim:{name}")
+        row, said = row_of(name, args)
+        table.add_row(*row)
+        broken += said
+        print("  ".join(row), *said, sep="\n   ", flush=True)
+    Console(width=120).print(table)
+    print("\n".join(broken) or "every promise held")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,132 @@
+"""The file of an instrumented aircraft but for its terms: surfaces, mass, dimensions, engines."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from beaver_ftc.aircraft.schema import Interval
+from beaver_ftc.plant import instrumented
+from beaver_ftc.plant.adapter import bare, translated
+from beaver_ftc.scenario.base import Number, Section, number
+from beaver_ftc.scenario.document import Problem
+from beaver_ftc.scenario.files import UnreadableError, read_text
+from beaver_ftc.scenario.problems import ScenarioError
+from beaver_ftc.scenario.validation import parse_document, validate
+
+KG_PER_SLUG = 0.45359237 * 9.80665 / 0.3048
+KG_M2 = KG_PER_SLUG * 0.3048**2
+ALTITUDE_M = 1500.0
+DENSITY_KG_M3 = 1.058  # there
+SPAN_OF_SPEED = (0.8, 1.25)
+THROTTLE = "fcs/actuated-throttle-norm"
+LIKELY_TRAVEL_RAD = 0.35
+MOST_TRAVEL_RAD = 1.2
+POSITIONS = {
+    "aileron": "fcs/left-aileron-pos-rad",
+    "elevator": "fcs/elevator-pos-rad",
+    "rudder": "fcs/rudder-pos-rad",
+}
+_LEAST_TRAVEL_RAD = 0.02
+_FRAMES = 400  # in which its own flight control has moved a surface
+Travel = dict[str, tuple[float, float]]
+
+
+class EnvelopeFile(Section):
+    """Where to sample, if not about level flight."""
+
+    airspeed_mps: Interval | None = None
+    alpha_deg: Interval | None = None
+    altitude_m: Number | None = number(None, unit="m", says="altitude", ge=0, le=15000)
+
+
+def read_envelope(path: Path | None) -> EnvelopeFile:
+    """The envelope file, or an empty one. Raises ScenarioError with one line a mistake."""
+    if path is None:
+        return EnvelopeFile()
+    try:
+        text = read_text(path, 100_000)
+    except UnreadableError as error:
+        raise ScenarioError(str(path), [Problem(error.line, (), str(error))]) from None
+    keys = "the keys airspeed_mps, alpha_deg, altitude_m"
+    return validate(EnvelopeFile, parse_document(text, str(path), keys), str(path))
+
+
+def travel_of(source: Path, scratch: Path, notes: list[str]) -> Travel:
+    """How far each surface goes when its own flight control is commanded from stop to stop, rad.
+
+    scratch: a folder for a copy that writes no files. What had to be supposed is added to the notes.
+    """
+    model, travel = instrumented.instrument(source, scratch, {}), {}
+    for surface in instrumented.surfaces_of(source):
+        ends = [own_deflection(model, surface, command) for command in (-1.0, 1.0)]
+        low, high = min(ends), max(ends)
+        if not (np.isfinite([low, high]).all() and high > _LEAST_TRAVEL_RAD and low < -_LEAST_TRAVEL_RAD):
+            low, high = -LIKELY_TRAVEL_RAD, LIKELY_TRAVEL_RAD
+            notes.append(
+                f"{surface}: its own flight control does not move it to both sides; {high:g} rad is supposed"
+            )
+        travel[surface] = tuple(
+            round(float(np.clip(end, -MOST_TRAVEL_RAD, MOST_TRAVEL_RAD)), 5) for end in (low, high)
+        )
+    return travel  # type: ignore[return-value]
+
+
+def own_deflection(model: Path, surface: str, command: float, rate_rad_s: float = 0.0) -> float:
+    """Where its own flight control puts a surface, rad, at a command (-1 to 1) and a rate about all axes."""
+    fdm = bare(model)
+    with translated(model):
+        for axis in "pqr":
+            fdm[f"ic/{axis}-rad_sec"] = rate_rad_s
+        fdm[f"fcs/{surface}-cmd-norm"] = command
+        fdm.run_ic()
+        for k in range(_FRAMES):
+            if k % 10 == 0:
+                fdm.run_ic()
+            fdm.run()
+    return float(fdm[POSITIONS[surface]])
+
+
+def outline(name: str, model: Path, travel: Mapping[str, tuple[float, float]], lift: float) -> dict[str, Any]:
+    """The file without its terms; lift: the lift coefficient at the speed the envelope is built about."""
+    fdm = bare(model)
+    area, mass_kg = fdm["metrics/Sw-sqft"] * 0.3048**2, fdm["inertia/mass-slugs"] * KG_PER_SLUG
+    speed_mps = (2.0 * mass_kg * 9.81 / (DENSITY_KG_M3 * area * lift)) ** 0.5
+    return {
+        "name": name if name[0].isalpha() else f"a{name}",
+        "description": f"{name}, derived from its JSBSim model",
+        "jsbsim": model.name,
+        "surfaces": {surface: _surface(surface, ends) for surface, ends in travel.items()},
+        "groups": {"pitch": ["elevator"], "lateral": ["aileron", "rudder"]},
+        "signals": {},
+        "mass": {
+            "mass_kg": mass_kg,
+            **{f"I{a}_kgm2": fdm[f"inertia/i{a}{a}-slugs_ft2"] * KG_M2 for a in "xyz"},
+            "Jxz_kgm2": -fdm["inertia/ixz-slugs_ft2"] * KG_M2,
+        },
+        "geometry": {
+            "wing_area_m2": area, "span_m": fdm["metrics/bw-ft"] * 0.3048,
+            "chord_m": fdm["metrics/cbarw-ft"] * 0.3048,
+        },
+        "moments": {"Cl": [_placeholder("Cl", "aileron")], "Cm": [_placeholder("Cm", "elevator")],
+                    "Cn": [_placeholder("Cn", "rudder")]},
+        "envelope": {"airspeed_mps": [speed_mps * share for share in SPAN_OF_SPEED], "alpha_deg": [-5, 15]},
+        "trim": {"throttle": THROTTLE},
+        "engine": {"start": "steady", "settings": {"throttle": {
+            "property": THROTTLE, "says": "throttle", "unit": "share of 1",
+            "default": 0.6, "range": [0.0, 1.0]}}},
+        "start": {"altitude_m": ALTITUDE_M},
+    }  # fmt: skip
+
+
+def _surface(surface: str, ends: tuple[float, float]) -> dict[str, Any]:
+    prefix = f"fcs/{instrumented.PREFIX}{surface}"
+    return {
+        "command": f"{prefix}-cmd-rad", "position": f"{prefix}-pos-rad",
+        "effective": f"{prefix}-effective-rad", "travel_rad": list(ends),
+    }  # fmt: skip
+
+
+def _placeholder(coefficient: str, surface: str) -> dict[str, Any]:
+    return {"name": f"{coefficient}_{surface}", "value": -0.1, "surface": surface}

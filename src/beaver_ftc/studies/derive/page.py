@@ -1,0 +1,112 @@
+"""The page of a derived aircraft: its terms, its error over the envelope, what can be diagnosed."""
+
+from math import radians
+from typing import Any
+
+import numpy as np
+
+from beaver_ftc.aircraft import AXES, Aircraft
+from beaver_ftc.aircraft.aircraft import MOMENTS
+from beaver_ftc.design.context import DesignModel
+from beaver_ftc.design.model import design_record
+from beaver_ftc.design.terms import N_Y
+from beaver_ftc.plant.trim import TrimPoint
+from beaver_ftc.scenario.diagnosis import Bounds
+
+DEFLECTION_DEG = 3.0  # beside neutral: what flight with the built-in references asks of a surface
+_NEAR = 1  # box and share of the travel of such a flight
+NAME = "derived.md"
+
+
+def smallest_losses(aircraft: Aircraft) -> dict[str, dict[str, Any]]:
+    """Of each surface: the axis it shows on, rad/s2 per rad there, and the loss of effectiveness, as a share,
+    that theory is certain to detect at DEFLECTION_DEG; above 1 none is."""
+    error_map = aircraft.file.model_error_map
+    if error_map is None:
+        return {}
+    box = error_map.boxes[min(_NEAR, len(error_map.boxes) - 1)]
+    G = DesignModel(design_record(aircraft)).G(_usual_y(aircraft))
+    found = {}
+    for s, (surface, axis) in enumerate(zip(aircraft.surfaces, aircraft.dominant_axis, strict=True)):
+        errors = getattr(box, f"error_{AXES[axis]}_rad_s2")[0]
+        eta = errors[min(_NEAR, len(errors) - 1)] + getattr(Bounds().constant_rad_s2, AXES[axis])
+        per_rad = abs(float(G[axis, s]))
+        found[surface] = {
+            "axis": AXES[axis],
+            "per_rad_rad_s2": per_rad,
+            "bound_rad_s2": eta,
+            "certain_loss": 2.0 * eta / max(per_rad * radians(DEFLECTION_DEG), 1e-12),
+        }
+    return found
+
+
+def _usual_y(aircraft: Aircraft) -> np.ndarray:
+    """The measured signals of level flight, as the innermost box has them."""
+    error_map = aircraft.file.model_error_map
+    assert error_map is not None
+    box, usual = error_map.boxes[0], aircraft.usual_signals
+    V, density = 0.5 * sum(box.airspeed_mps), 0.5 * sum(box.density_kg_m3)
+    y = np.zeros(N_Y)
+    y[:4] = usual["alpha"], 0.5 * sum(box.beta_rad), V, 0.5 * density * V * V
+    y[4 : 4 + len(aircraft.signals)] = [usual[name] for name in aircraft.signals]
+    return y
+
+
+def page_of(aircraft: Aircraft, trim: TrimPoint, notes: tuple[str, ...]) -> str:
+    """The page, Markdown."""
+    low, high = aircraft.envelope.airspeed_mps
+    least, most = aircraft.envelope.alpha_deg
+    lines = [
+        f"# {aircraft.name}", "", f"{aircraft.file.description}.", "",
+        f"Envelope {low:g} to {high:g} m/s, angle of attack {least:g} to {most:g} deg; trim at "
+        f"{trim.airspeed_mps:.1f} m/s and {trim.altitude_m:.0f} m.", "",
+        "## What is to be known", "",
+        *([f"- {note}" for note in notes] or ["Nothing unusual was found."]), "",
+        *_diagnosed(aircraft), *_errors(aircraft), *_terms(aircraft),
+    ]  # fmt: skip
+    return "\n".join(lines) + "\n"
+
+
+def _diagnosed(aircraft: Aircraft) -> list[str]:
+    lines = [
+        "## What can be diagnosed", "",
+        f"At {DEFLECTION_DEG:g} deg from neutral, in the second box below, with the published bound.", "",
+        "| surface | shows in | rad/s2 per rad | bound, rad/s2 | smallest loss certain to be detected |",
+        "|---|---|---|---|---|",
+    ]  # fmt: skip
+    for surface, of in smallest_losses(aircraft).items():
+        loss = of["certain_loss"]
+        says = f"{loss:.0%}" if loss <= 1.0 else f"none: a total one needs {DEFLECTION_DEG * loss:.1f} deg"
+        lines.append(
+            f"| {surface} | {of['axis']} | {of['per_rad_rad_s2']:.3g} | {of['bound_rad_s2']:.3g} | {says} |"
+        )
+    return [*lines, ""]
+
+
+def _errors(aircraft: Aircraft) -> list[str]:
+    error_map = aircraft.file.model_error_map
+    if error_map is None:
+        return []
+    shares = ", ".join(f"{share:g}" for share in error_map.travel_share)
+    lines = [
+        "## The error over the envelope", "",
+        f"Largest error, rad/s2, in boxes about trim, for surfaces within {shares} of their travel, in the "
+        f"first {error_map.until_s[0]:g} s of a flight. Outside of the last box nothing is concluded.", "",
+        "| airspeed, m/s | angle of attack, rad | p | q | r |", "|---|---|---|---|---|",
+    ]  # fmt: skip
+    for box in error_map.boxes:
+        errors = [
+            " ".join(f"{error:.3g}" for error in getattr(box, f"error_{axis}_rad_s2")[0]) for axis in AXES
+        ]
+        speed, alpha = (f"{low:.4g} to {high:.4g}" for low, high in (box.airspeed_mps, box.alpha_rad))
+        lines.append(f"| {speed} | {alpha} | {' | '.join(errors)} |")
+    return [*lines, ""]
+
+
+def _terms(aircraft: Aircraft) -> list[str]:
+    lines = ["## Terms", "", "| coefficient | term | value |", "|---|---|---|"]
+    for term in aircraft.moments:
+        if term.name in aircraft.terms and term.coefficient in MOMENTS:
+            factors = " ".join(term.factors) or "1"
+            lines.append(f"| {term.coefficient} | {factors} | {term.value:.6g} |")
+    return lines

@@ -1,0 +1,71 @@
+"""What is to be derived: an aircraft of the jsbsim package, any JSBSim model, or a file already there."""
+
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+from beaver_ftc.aircraft.loading import FILE, builtin_names, derived_folder, load, read
+from beaver_ftc.errors import BadInput, SimulationFailed
+from beaver_ftc.plant import instrumented
+
+FROM_JSBSIM = "jsbsim:"
+_PROBE = """import sys
+from pathlib import Path
+from beaver_ftc.plant.adapter import probe
+probe(Path(sys.argv[1]))"""
+_LONGEST_S = 60.0
+_ALLOWED = "jsbsim:NAME, a built-in name, a JSBSim model FILE.xml, or a folder with an aircraft.yaml"
+
+
+@dataclass(frozen=True)
+class Source:
+    """An aircraft to derive. name: of the folder to be written. model: JSBSim's. folder: of an aircraft file
+    whose moments are to be found anew, else None: the model is instrumented. target: where the result goes
+    unless somebody says otherwise, None if somebody must."""
+
+    name: str
+    model: Path
+    folder: Path | None = None
+    target: Path | None = None
+
+    @property
+    def says(self) -> str:
+        """What to call it."""
+        return f"{FROM_JSBSIM}{self.name}" if self.target else self.name
+
+
+def source_of(reference: str) -> Source:
+    """What a reference means. Raises BadInput for what is no aircraft."""
+    if reference.startswith(FROM_JSBSIM):
+        name = reference.removeprefix(FROM_JSBSIM)
+        target = derived_folder(name)
+        return Source(name, instrumented.source_of(name), target=target)
+    if reference in builtin_names():
+        aircraft = load(reference)
+        return Source(reference, aircraft.jsbsim, aircraft.folder)
+    path = Path(reference)
+    if (path / FILE).is_file():
+        aircraft = read(path.resolve())
+        return Source(aircraft.name, aircraft.jsbsim, aircraft.folder)
+    if path.is_dir() and (path / f"{path.resolve().name}.xml").is_file():
+        path = path / f"{path.resolve().name}.xml"
+    if path.suffix == ".xml" and path.is_file():
+        return Source(path.stem, path.resolve())
+    raise BadInput(f"{reference[:80]!r} cannot be derived, allowed: {_ALLOWED}")
+
+
+def try_out(source: Source) -> None:
+    """Load and start the model in a process of its own: some models end the process that loads them.
+
+    Raises SimulationFailed, with what JSBSim says, for one that cannot be flown.
+    """
+    command = [sys.executable, "-c", _PROBE, str(source.model)]
+    try:
+        run = subprocess.run(command, capture_output=True, text=True, timeout=_LONGEST_S, check=False)
+    except subprocess.TimeoutExpired:
+        raise SimulationFailed(f"{source.says}: JSBSim does not start it within {_LONGEST_S:g} s") from None
+    if run.returncode:
+        said = [line.strip() for line in run.stderr.splitlines() if line.strip()]
+        why = said[-1].removeprefix("what():").strip() if said else f"ended by signal {-run.returncode}"
+        raise SimulationFailed(f"{source.says}: {why.rpartition('SimulationFailed: ')[2]}")

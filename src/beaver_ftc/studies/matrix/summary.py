@@ -13,7 +13,7 @@ def document_of(rows: list[Document]) -> Document:
     surfaces = list(dict.fromkeys(row["surface"] for row in rows))
     cells = [_cell(fault, surface, rows) for fault, _ in FAULTS for surface in surfaces]
     return {
-        "aircraft": next((row["aircraft"] for row in rows), None),
+        "aircraft": next((row["aircraft"] for row in rows if "aircraft" in row), None),
         "cells": cells,
         "flights": rows,
         "wrong": sum(row["verdict"] == "WRONG" for row in rows),

@@ -18,6 +18,9 @@ def command(
     score: Annotated[
         bool, typer.Option("--score", help="Compare with the log's labels, after the fact.")
     ] = False,
+    detector: Annotated[
+        str, typer.Option(metavar="NAME", help="Who diagnoses: bank-of-filters, or a rival by its name.")
+    ] = "bank-of-filters",
     reader: Annotated[
         str | None, typer.Option(help="table, alfa, ulog or ardupilot, where it is not evident.")
     ] = None,
@@ -31,13 +34,16 @@ def command(
     if model is None:
         _replay(flights, out, format)
         return
+    from beaver_ftc.flights.detectors import check_detector
     from beaver_ftc.flights.inputs import load_flights
     from beaver_ftc.flights.model import load_model
     from beaver_ftc.flights.verdict import as_text
 
+    check_detector(detector)
     known = load_model(model)
     verdicts = [
-        _diagnose(flight, known, out, score) for flight in load_flights(flights, known.vehicle, reader)
+        _diagnose(flight, known, out, score, detector)
+        for flight in load_flights(flights, known.vehicle, reader)
     ]
     if format is Format.json:
         emit_json({"flights": verdicts})
@@ -66,14 +72,14 @@ def _replay(flights: list[Path], out: Path, format: Format) -> None:
         emit("\n".join(map(as_text, verdicts)))
 
 
-def _diagnose(samples: Any, model: Any, out: Path, scored: bool) -> dict[str, Any]:
-    from beaver_ftc.flights.diagnose import diagnose
+def _diagnose(samples: Any, model: Any, out: Path, scored: bool, detector: str) -> dict[str, Any]:
+    from beaver_ftc.flights.detectors import diagnose_with
     from beaver_ftc.flights.scoring import score
     from beaver_ftc.flights.verdict import verdict_of
     from beaver_ftc.flights.writing import write_diagnosis
 
-    rows = diagnose(samples, model)
-    verdict = verdict_of(samples, model, rows)
+    rows = diagnose_with(detector, samples, model)
+    verdict = verdict_of(samples, model, rows) | {"detector": detector}
     if scored:
         verdict["score"] = score(samples, rows, model.groups, list(model.vehicle.surfaces))
     folder = write_diagnosis(out, samples, model, rows, verdict)

@@ -1,6 +1,7 @@
 """`beaver-ftc run`: fly scenarios, keep the results, say the verdict."""
 
 from collections.abc import Callable
+from enum import StrEnum
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -16,6 +17,14 @@ if TYPE_CHECKING:
     from beaver_ftc.scenario.schema import Scenario
 
     Prepare = Callable[[Plant], None]
+
+
+class Recording(StrEnum):
+    """The formats of `results.recordings`."""
+
+    table = "table"
+    ulog = "ulog"
+    ardupilot = "ardupilot"
 
 
 def command(
@@ -37,6 +46,10 @@ def command(
     ] = None,
     csv: Annotated[bool, typer.Option("--csv", help="Also write the log as log.csv.")] = False,
     acmi: Annotated[bool, typer.Option("--acmi", help="Also write flight.acmi, for Tacview.")] = False,
+    recording: Annotated[
+        Recording | None,
+        typer.Option("--as", help="Also write the log as a recorder on board would have, with vehicle.yaml."),
+    ] = None,
     flightgear: Annotated[
         str | None, typer.Option(metavar="HOST:PORT", help="Show it in FlightGear, at the pace of the clock.")
     ] = None,
@@ -56,7 +69,12 @@ def command(
         raise
     exports = [name for name, wanted in (("csv", csv), ("acmi", acmi)) if wanted]
     run_one = partial(
-        _run_one, out=out, with_report=not no_report, exports=exports, prepare=_shown(flightgear)
+        _run_one,
+        out=out,
+        with_report=not no_report,
+        exports=exports,
+        prepare=_shown(flightgear),
+        recording=recording.value if recording else None,
     )
     raise typer.Exit(_run_all(loaded, run_one, format, junit))
 
@@ -119,7 +137,12 @@ def _write_junit(runs: list[dict[str, Any]], junit: Path) -> None:
 
 
 def _run_one(
-    scenario: "Scenario", out: Path, with_report: bool, exports: list[str], prepare: "Prepare | None"
+    scenario: "Scenario",
+    out: Path,
+    with_report: bool,
+    exports: list[str],
+    prepare: "Prepare | None",
+    recording: str | None,
 ) -> dict[str, Any]:
     from beaver_ftc.cli.progress import progress_bar
     from beaver_ftc.results.run import run
@@ -127,7 +150,7 @@ def _run_one(
     for warning in scenario.warnings():
         complain(f"{scenario.name}: warning: {warning}")
     with progress_bar(scenario.name) as progress:
-        document = run(scenario, out, with_report, progress, exports, prepare)
+        document = run(scenario, out, with_report, progress, exports, prepare, recording)
     return document | {"folder": str(out / scenario.name)}
 
 

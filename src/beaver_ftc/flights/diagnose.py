@@ -48,7 +48,7 @@ class Rows:
 
 def diagnose(samples: Samples, model: Model) -> Rows:
     """The diagnosis of each sample. Raises BadInput where the log's rate is not the model's."""
-    _check_rate(samples, model)
+    check_rate(samples, model)
     bank = bank_of(model)
     posterior, state, scale = posterior_of(samples, model, bank)
     return _at_stamps(samples, rows_of(samples, model, bank, posterior, state, scale))
@@ -75,6 +75,7 @@ def filter_with(
     unexplained, answers = predict(samples.rates, regressors, past, response)
     dt_s = 1.0 / model.rate_hz
     spread = np.append(variance * settings.trim_sd**2, settings.gain_sd**2)
+    keep = np.array([1.0, 1.0, 1.0, np.exp(-dt_s / 1e9)])
     change = settings.changes_per_hour * dt_s / 3600.0
     result = run_bank(
         np.ascontiguousarray(np.nan_to_num(unexplained)),
@@ -88,8 +89,9 @@ def filter_with(
         bank.idle,
         at_first(bank),
         np.array([0.0, 0.0, 0.0, 1.0]),
-        spread,
+        np.diag(spread),
         np.sqrt(spread) * np.array([*[settings.trim_bound] * 3, settings.gain_bound]),
+        keep,
         np.append(variance * settings.trim_walk**2, settings.gain_walk**2),
         noise,
         (
@@ -100,7 +102,7 @@ def filter_with(
             _MOST_SCALE,
         ),
     )
-    return result
+    return result[:3]
 
 
 def predict(rates: Floats, regressors: Regressors, past: Floats, response: Floats) -> tuple[Floats, Floats]:
@@ -112,7 +114,8 @@ def predict(rates: Floats, regressors: Regressors, past: Floats, response: Float
     return unexplained, np.einsum("ngl,glr->ngr", regressors.commands, response)
 
 
-def _check_rate(samples: Samples, model: Model) -> None:
+def check_rate(samples: Samples, model: Model) -> None:
+    """Raise BadInput where a log's rate is not the model's."""
     rate_hz = 1.0 / samples.dt_s
     if abs(rate_hz / model.rate_hz - 1.0) > _RATE_TOLERANCE:
         raise BadInput(

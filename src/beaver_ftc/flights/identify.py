@@ -92,15 +92,30 @@ def fit_like(stretches: Sequence[Stretch], model: Model) -> Model:
 
 
 def choose_order(stretches: Sequence[Stretch], vehicle: Vehicle) -> tuple[int, int]:
-    """Past samples of rates and commands by the Bayesian information criterion."""
+    """Past samples of rates and commands by the Bayesian information criterion.
+
+    Every order's regressors are among those of the largest: one matrix of products serves all.
+    """
+    x, y, _ = stacked(stretches, vehicle, max(HISTORIES), max(LAGS))
+    size = np.maximum(np.sqrt((x**2).mean(axis=0)), 1e-300)
+    products, cross, own = (x / size).T @ (x / size), (x / size).T @ y, y.T @ y
     scores = {}
     for history in HISTORIES:
         for lags in LAGS:
-            x, y, _ = stacked(stretches, vehicle, history, lags)
-            residuals = y - x @ np.linalg.lstsq(x, y, rcond=None)[0]
-            log_det = np.linalg.slogdet(residuals.T @ residuals / len(y))[1]
-            scores[history, lags] = len(y) * log_det + 3 * x.shape[1] * np.log(len(y))
+            columns = _columns(vehicle, history, lags)
+            found = np.linalg.lstsq(products[np.ix_(columns, columns)], cross[columns], rcond=1e-12)[0]
+            log_det = np.linalg.slogdet((own - cross[columns].T @ found) / len(y))[1]
+            scores[history, lags] = len(y) * log_det + 3 * len(columns) * np.log(len(y))
     return min(scores, key=lambda order: scores[order])
+
+
+def _columns(vehicle: Vehicle, history: int, lags: int) -> list[int]:
+    """Columns of the largest design that an order has."""
+    first = 1 + 3 * max(HISTORIES)
+    commands = first + len(vehicle.signals)
+    starts = [commands + group * max(LAGS) for group in range(len(groups_of(vehicle)))]
+    delayed = [start + lag for start in starts for lag in range(lags)]
+    return [*range(1 + 3 * history), *range(first, commands), *delayed]
 
 
 def fit_order(stretches: Sequence[Stretch], vehicle: Vehicle, history: int, lags: int) -> Fit:

@@ -23,14 +23,17 @@ _EXPECTED = 0.93
 
 
 @kernel
-def run_bank(y, f, base, ok, e, reach, stay, offset, idle, start, m0, p0, bound, walk, noise, options):
-    """Posterior probability of each hypothesis, and mean trim, gain and noise scale, after each sample.
+def run_bank(y, f, base, ok, e, reach, stay, offset, idle, start, m0, p0, bound, keep, walk, noise, options):
+    """Posterior probability of each hypothesis, mean trim and gain, noise scale, and evidence, by sample.
+
+    Evidence is the log likelihood of the sample given all before it, raised to the power.
 
     Shapes: y (n, 3); f (n, G, 3) responses; base (3,) constant; ok (n,) the sample may be used; e (H, G)
     effectiveness; reach (H,) probability of passing to each hypothesis in a sample; stay: of none; offset
     (H, 3) variance added to the trim on passing to it; idle: the hypothesis that nothing answers the
-    commands; start (H,) at first; m0 (4,) and p0 (4,) mean and variance of trim and gain; bound (4,) how far
-    they may go from m0; walk (4,) variance added a sample; noise (3, 3).
+    commands; start (H,) at first; m0 (4,) and p0 (4, 4) mean and covariance of trim and gain; bound (4,) how
+    far they may go from m0; keep (4,) share of what they are off m0 that is left a sample later; walk (4,)
+    variance added a sample; noise (3, 3).
     options: power of the likelihood, degrees of freedom, memory in samples, least and largest noise scale.
     """
     n, hypotheses = len(y), len(e)
@@ -40,17 +43,20 @@ def run_bank(y, f, base, ok, e, reach, stay, offset, idle, start, m0, p0, bound,
     p = np.zeros((hypotheses, 4, 4))
     for h in range(hypotheses):
         m[h] = m0
-        for i in range(4):
-            p[h, i, i] = p0[i]
+        p[h] = p0
     posterior = np.zeros((n, hypotheses))
     trim = np.zeros((n, 4))
     scales = np.zeros(n)
+    evidence = np.zeros(n)
     scale = 1.0
     for k in range(n):
         prior = _mix(mu, m, p, reach, stay, offset, walk)
+        _relax(m, p, m0, keep)
         _forget(m[idle], p[idle], m0, p0)
         if ok[k]:
-            mu, square = _correct(prior, m, p, y[k], f[k], base, e, idle, noise * scale, power, dof)
+            mu, square, evidence[k] = _correct(
+                prior, m, p, y[k], f[k], base, e, idle, noise * scale, power, dof
+            )
             _bound(m, m0, bound)
             scale *= np.exp((1.0 - mu[idle]) * (square / 3.0 - _EXPECTED) / memory)
             scale = min(max(scale, least), most)
@@ -60,7 +66,7 @@ def run_bank(y, f, base, ok, e, reach, stay, offset, idle, start, m0, p0, bound,
         scales[k] = scale
         for h in range(hypotheses):
             trim[k] += mu[h] * m[h]
-    return posterior, trim, scales
+    return posterior, trim, scales, evidence
 
 
 @kernel
@@ -104,10 +110,20 @@ def _merge(own, m, p, mean, spread, offset, walk):
 
 
 @kernel
+def _relax(m, p, m0, keep):
+    """Let trim and gain of every hypothesis return towards m0; m (H, 4) and p (H, 4, 4) are replaced."""
+    for h in range(len(m)):
+        for i in range(len(m0)):
+            m[h, i] = m0[i] + keep[i] * (m[h, i] - m0[i])
+            for j in range(len(m0)):
+                p[h, i, j] *= keep[i] * keep[j]
+
+
+@kernel
 def _correct(prior, m, p, y, f, base, e, idle, noise, power, dof):
     """Kalman correction of every hypothesis by one sample; m and p are replaced.
 
-    Returns the posterior probabilities and the clipped square of the residual under them.
+    Returns the posterior probabilities, the clipped square of the residual under them, and the evidence.
     """
     hypotheses = len(prior)
     log = np.empty(hypotheses)
@@ -118,12 +134,14 @@ def _correct(prior, m, p, y, f, base, e, idle, noise, power, dof):
         else:
             squares[h], log_det = _update(m[h], p[h], y, _answer(e[h], f, base), noise, dof)
         log[h] = power * (-0.5 * (dof + 3.0) * np.log(1.0 + squares[h] / dof) - 0.5 * log_det)
-    mu = np.maximum(prior * np.exp(log - log.max()), _FLOOR)
-    mu /= mu.sum()
+    most = log.max()
+    mu = np.maximum(prior * np.exp(log - most), _FLOOR)
+    total = mu.sum()
+    mu /= total
     clipped = 0.0
     for h in range(hypotheses):
         clipped += mu[h] * min(squares[h], 3.0 * _CLIP)
-    return mu, clipped
+    return mu, clipped, most + np.log(total)
 
 
 @kernel
@@ -142,7 +160,7 @@ def _forget(m, p, m0, p0):
     for i in range(len(m0)):
         m[i] = m0[i]
         for j in range(len(m0)):
-            p[i, j] = p0[i] if i == j else 0.0
+            p[i, j] = p0[i, j]
 
 
 @kernel

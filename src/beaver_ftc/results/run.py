@@ -9,6 +9,7 @@ from beaver_ftc.results.metrics import Document, as_json, metrics
 from beaver_ftc.results.writer import result_folder
 
 if TYPE_CHECKING:
+    from beaver_ftc.aircraft import Aircraft
     from beaver_ftc.plant.adapter import Plant
     from beaver_ftc.scenario.schema import Scenario
 
@@ -22,13 +23,16 @@ def run(
     progress: Progress | None = None,
     exports: Collection[str] = (),
     prepare: "Callable[[Plant], None] | None" = None,
+    recording: str | None = None,
 ) -> Document:
     """Fly `scenario`, write `out/<name>/` whole or not at all, and return the metrics document.
 
-    exports: of "csv" and "acmi". prepare: called with the trimmed plant just before the flight.
-    Raises BadInput for a flight that cannot be trimmed, SimulationFailed for one not completed or kept.
+    exports: of "csv" and "acmi". prepare: called with the trimmed plant just before the flight. recording:
+    table, ulog or ardupilot, to write the log as a recorder on board would have. Raises BadInput for a flight
+    that cannot be trimmed, SimulationFailed for one not completed or kept.
     """
     from beaver_ftc.loop.loop import fly
+    from beaver_ftc.results.recordings import write_recording
 
     with result_folder(out, scenario.name) as folder:
         with ParquetLog(folder / "log.parquet") as log:
@@ -39,6 +43,8 @@ def run(
             write_report_files(folder, document)
         if exports:
             write_exports(folder, document, exports)
+        if recording is not None:
+            write_recording(folder / "log.parquet", _travel_rad(scenario.airframe), recording, folder)
     return document
 
 
@@ -67,3 +73,8 @@ def write_exports(folder: Path, document: Document, exports: Collection[str]) ->
         write_csv(folder / "log.parquet", folder / "log.csv")
     if "acmi" in exports:
         write_acmi(folder / "log.parquet", document, folder / "flight.acmi")
+
+
+def _travel_rad(aircraft: "Aircraft") -> dict[str, float]:
+    """The farther stop of each surface."""
+    return {name: max(abs(stop.min_rad), abs(stop.max_rad)) for name, stop in aircraft.travel.items()}

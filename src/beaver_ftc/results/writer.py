@@ -29,6 +29,7 @@ FILES_OF_A_RESULT = frozenset({
     "detectability.csv", "detectability.png", "fault-matrix.json", "fault-matrix.txt", "fault-matrix.png",
     "power.json", "power.txt", "power.parquet", "pitch-lost.json", "pitch-lost.txt",
     "diagnosis.parquet", "verdict.json", "flights.json", "flights.md", "flights.png",
+    "flight.csv", "flight.ulg", "flight.bin", "vehicle.yaml",
 })  # fmt: skip
 MARK = "beaver-ftc"  # the software that a picture of ours names in its metadata
 _HEAD_BYTES = 2048  # of a picture: its metadata come first

@@ -1,31 +1,30 @@
 """Leave one flight out: identify from the others, freeze every setting, diagnose the one."""
 
-from collections.abc import Callable
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from beaver_ftc.flights.diagnose import Rows, diagnose
+from beaver_ftc.flights.detectors import detector_names, diagnose_with
+from beaver_ftc.flights.diagnose import Rows
 from beaver_ftc.flights.identify import Stretch, fit_model, stretches_of
 from beaver_ftc.flights.model import Model, Settings
+from beaver_ftc.flights.plain import freeze
 from beaver_ftc.flights.recording import Recording
 from beaver_ftc.flights.scoring import by_event, by_labels
 from beaver_ftc.flights.testing import folds, run_tests
 from beaver_ftc.studies.recorded import tally
 from beaver_ftc.studies.recorded.data import DataSet, data_sets
-from beaver_ftc.studies.recorded.rivals import forgetting, freeze, sliding
 
 Document = dict[str, Any]
 
 OURS = "bank of filters (ours)"
-METHODS: dict[str, Callable[[Recording, Stretch, Model], Rows | None]] = {
-    OURS: lambda recording, kept, model: diagnose(kept.samples, model),
-    "sliding least squares, 20 s": lambda recording, kept, model: sliding(kept.samples, model),
-    "forgetting least squares, 20 s": lambda recording, kept, model: forgetting(kept.samples, model),
-    "freeze rule, 6 s, on the logged outputs": lambda recording, kept, model: freeze(
-        recording, kept.samples, model
-    ),
+FREEZE = "freeze rule, 6 s, on the logged outputs"
+TITLES = {
+    "bank-of-filters": OURS,
+    "sliding-least-squares": "sliding least squares, 20 s",
+    "forgetting-least-squares": "forgetting least squares, 20 s",
 }
 PUBLISHED: dict[str, list[Document]] = {
     "alfa": [
@@ -56,22 +55,32 @@ def _compare(data: DataSet) -> Document:
     for fitted, kept, name in folds(stretches):
         model = _frozen(fitted, data, whole)
         recording = next(one for one in data.recordings if one.name == kept.samples.name)
-        for method, apply in METHODS.items():
-            rows = apply(recording, kept, model)
-            if rows is not None:
-                flights.append({"left_out": name, "method": method, **_score(kept, rows, model)})
+        flights += [
+            {"left_out": name, "method": method, **_score(kept, rows, model)}
+            for method, rows in _diagnosed(recording, kept, model)
+        ]
     labelled = "classes" in flights[0]
     summarise = tally.by_labels if labelled else tally.by_events
-    rows_of = {m: [one for one in flights if one["method"] == m] for m in METHODS}
+    methods = dict.fromkeys(one["method"] for one in flights)
+    rows_of = {m: [one for one in flights if one["method"] == m] for m in methods}
     return {
         "set": data.name,
         "vehicle": data.vehicle.name,
         "scored_by": "labels" if labelled else "events",
         "left_out": "halves of the one flight in turn" if len(data.flights) == 1 else "each flight in turn",
-        "rows": [{"method": method, **summarise(scores)} for method, scores in rows_of.items() if scores],
+        "rows": [{"method": method, **summarise(scores)} for method, scores in rows_of.items()],
         "published": PUBLISHED.get(data.name, []),
         "flights": flights,
     }
+
+
+def _diagnosed(recording: Recording, kept: Stretch, model: Model) -> Iterator[tuple[str, Rows]]:
+    """Every detector's rows, and the freeze rule's where the log has servo outputs."""
+    for name in detector_names():
+        yield TITLES.get(name, f"{name}, of the loop"), diagnose_with(name, kept.samples, model)
+    frozen = freeze(recording, kept.samples, model)
+    if frozen is not None:
+        yield FREEZE, frozen
 
 
 def _settings(stretches: list[Stretch], data: DataSet) -> Settings:

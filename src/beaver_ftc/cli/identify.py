@@ -20,19 +20,30 @@ def command(
     """Identify a vehicle from recorded flights and write a model file for `diagnose`.
 
     Fitted are the flights' healthy parts, and faulty ones whose effectiveness the labels tell. What the fit
-    did not see tells how good it is.
+    did not see tells how good it is: in the model file, and as a page beside it (MODEL with .html).
     """
     from beaver_ftc.flights.identification import identify, summary
     from beaver_ftc.flights.inputs import load_flights
-    from beaver_ftc.flights.model import as_text, write_model
+    from beaver_ftc.flights.model import as_text, write_text
+    from beaver_ftc.flights.model_page import check_page, render_model
     from beaver_ftc.flights.vehicle import load_vehicle
 
+    page = out.with_suffix(".html")
+    check_page(page)
     described = load_vehicle(vehicle)
-    model = identify(load_flights(flights, described, reader), described)
-    write_model(out, as_text(model))
+    loaded = load_flights(flights, described, reader)
+    model = identify(loaded, described)
+    shown = render_model(loaded, model)
+    write_text(out, as_text(model))
+    write_text(page, shown)
     if format is Format.json:
         emit_json(
-            {"model": str(out), "identified": model.identified, "settings": model.settings.model_dump()}
+            {
+                "model": str(out),
+                "page": str(page),
+                "identified": model.identified,
+                "settings": model.settings.model_dump(),
+            }
         )
     else:
-        emit(f"{summary(model)}\nmodel: {out}")
+        emit(f"{summary(model)}\nmodel: {out}\npage: {page}")

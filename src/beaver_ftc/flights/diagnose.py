@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from beaver_ftc.errors import BadInput
+from beaver_ftc.flights.adaptation import adaptation_of
 from beaver_ftc.flights.bank import UNKNOWN as UNKNOWN_OFFSET
 from beaver_ftc.flights.bank import Bank, at_first, bank_of
 from beaver_ftc.flights.kernel import run_bank
@@ -71,13 +72,11 @@ def filter_with(
 ) -> tuple[Floats, Floats, Floats]:
     """As `posterior_of`, for regressors that are there already."""
     intercept, past, response, noise = model.arrays()
-    settings, variance = model.settings, np.diag(noise)
+    settings, own = model.settings, adaptation_of(model)
     unexplained, answers = predict(samples.rates, regressors, past, response)
-    dt_s = 1.0 / model.rate_hz
-    spread = np.append(variance * settings.trim_sd**2, settings.gain_sd**2)
-    keep = np.array([1.0, 1.0, 1.0, np.exp(-dt_s / 1e9)])
-    change = settings.changes_per_hour * dt_s / 3600.0
-    result = run_bank(
+    change = settings.changes_per_hour / (3600.0 * model.rate_hz)
+    memory = settings.noise_memory_s * model.rate_hz
+    posterior, state, scale, _ = run_bank(
         np.ascontiguousarray(np.nan_to_num(unexplained)),
         np.ascontiguousarray(np.nan_to_num(answers)),
         intercept,
@@ -88,21 +87,15 @@ def filter_with(
         bank.offset,
         bank.idle,
         at_first(bank),
-        np.array([0.0, 0.0, 0.0, 1.0]),
-        np.diag(spread),
-        np.sqrt(spread) * np.array([*[settings.trim_bound] * 3, settings.gain_bound]),
-        keep,
-        np.append(variance * settings.trim_walk**2, settings.gain_walk**2),
+        own.mean,
+        own.covariance,
+        own.bound,
+        own.keep,
+        own.walk,
         noise,
-        (
-            settings.power,
-            settings.tail,
-            settings.noise_memory_s / dt_s,
-            _LEAST_SCALE,
-            _MOST_SCALE,
-        ),
+        (settings.power, settings.tail, memory, _LEAST_SCALE, _MOST_SCALE),
     )
-    return result[:3]
+    return posterior, state, scale
 
 
 def predict(rates: Floats, regressors: Regressors, past: Floats, response: Floats) -> tuple[Floats, Floats]:

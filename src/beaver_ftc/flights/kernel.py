@@ -2,11 +2,12 @@
 
 Under hypothesis h with effectiveness e_h of the groups, what the past does not explain of the rates is
 
-    y = c + s (b + sum_g e_hg F_g) + noise,      noise ~ t(0, r R)
+    y = c + s (b + sum_g e_hg F_g) + sum_g d_g e_hg F_g + noise,      noise ~ t(0, r R)
 
-with the model's constant b, the flight's own trim c (3,) and gain s, which each hypothesis estimates by a
-Kalman filter, and r the running scale of the noise. The gain acts on what a trimmed flight balances: it shows
-by the motion alone, as dynamic pressure does, and not in the trim. A hypothesis passes to another at random
+with the model's constant b, and of the flight its own trim c (3,), gain s, and what each group has more of it
+than the others, d (G,): each hypothesis estimates them by a Kalman filter. r is the running scale of the
+noise. The gain acts on what a trimmed flight balances: it shows by the motion alone, as dynamic pressure
+does, and not in the trim. A hypothesis passes to another at random
 times (interacting multiple models [Blom1988]): the one that takes over inherits trim and gain, plus an offset
 where a surface may be stuck. One hypothesis says that nothing answers the commands, as on the ground: it
 learns no trim and no gain.
@@ -31,21 +32,21 @@ def run_bank(y, f, base, ok, e, reach, stay, offset, idle, start, m0, p0, bound,
     Shapes: y (n, 3); f (n, G, 3) responses; base (3,) constant; ok (n,) the sample may be used; e (H, G)
     effectiveness; reach (H,) probability of passing to each hypothesis in a sample; stay: of none; offset
     (H, 3) variance added to the trim on passing to it; idle: the hypothesis that nothing answers the
-    commands; start (H,) at first; m0 (4,) and p0 (4, 4) mean and covariance of trim and gain; bound (4,) how
-    far they may go from m0; keep (4,) share of what they are off m0 that is left a sample later; walk (4,)
-    variance added a sample; noise (3, 3).
+    commands; start (H,) at first; m0 (N,) and p0 (N, N) mean and covariance of the N = 4 + G states: trim,
+    gain, the groups' own; bound (N,) how far they may go from m0; keep (N,) share of what they are off m0
+    that is left a sample later; walk (N,) variance added a sample; noise (3, 3).
     options: power of the likelihood, degrees of freedom, memory in samples, least and largest noise scale.
     """
     n, hypotheses = len(y), len(e)
     power, dof, memory, least, most = options
     mu = start.copy()
-    m = np.zeros((hypotheses, 4))
-    p = np.zeros((hypotheses, 4, 4))
+    m = np.zeros((hypotheses, len(m0)))
+    p = np.zeros((hypotheses, len(m0), len(m0)))
     for h in range(hypotheses):
         m[h] = m0
         p[h] = p0
     posterior = np.zeros((n, hypotheses))
-    trim = np.zeros((n, 4))
+    trim = np.zeros((n, len(m0)))
     scales = np.zeros(n)
     evidence = np.zeros(n)
     scale = 1.0
@@ -95,7 +96,7 @@ def _mix(mu, m, p, reach, stay, offset, walk):
 def _merge(own, m, p, mean, spread, offset, walk):
     """One Gaussian for two: the hypothesis' own (m, p) with weight `own`, everyone's with the rest.
 
-    m (4,) and p (4, 4) are replaced; who comes from elsewhere brings the offset (3,) along.
+    m (N,) and p (N, N) are replaced; who comes from elsewhere brings the offset (3,) along.
     """
     rest = 1.0 - own
     for i in range(len(m)):
@@ -111,7 +112,7 @@ def _merge(own, m, p, mean, spread, offset, walk):
 
 @kernel
 def _relax(m, p, m0, keep):
-    """Let trim and gain of every hypothesis return towards m0; m (H, 4) and p (H, 4, 4) are replaced."""
+    """Let trim and gain of every hypothesis return towards m0; m (H, N) and p (H, N, N) are replaced."""
     for h in range(len(m)):
         for i in range(len(m0)):
             m[h, i] = m0[i] + keep[i] * (m[h, i] - m0[i])
@@ -125,14 +126,16 @@ def _correct(prior, m, p, y, f, base, e, idle, noise, power, dof):
 
     Returns the posterior probabilities, the clipped square of the residual under them, and the evidence.
     """
-    hypotheses = len(prior)
+    hypotheses, states = m.shape
     log = np.empty(hypotheses)
     squares = np.empty(hypotheses)
+    nothing, certain = np.zeros(states), np.zeros((states, states))
     for h in range(hypotheses):
+        seen = _seen(e[h], f, base, states)
         if h == idle:
-            squares[h], log_det = _update(np.zeros(4), np.zeros((4, 4)), y, np.zeros(3), noise, dof)
+            squares[h], log_det = _update(nothing, certain, y, seen, noise, dof)
         else:
-            squares[h], log_det = _update(m[h], p[h], y, _answer(e[h], f, base), noise, dof)
+            squares[h], log_det = _update(m[h], p[h], y, seen, noise, dof)
         log[h] = power * (-0.5 * (dof + 3.0) * np.log(1.0 + squares[h] / dof) - 0.5 * log_det)
     most = log.max()
     mu = np.maximum(prior * np.exp(log - most), _FLOOR)
@@ -145,13 +148,17 @@ def _correct(prior, m, p, y, f, base, e, idle, noise, power, dof):
 
 
 @kernel
-def _answer(e, f, base):
-    """The constant and the groups' answers (G, 3), each as effective as e (G,) says: nothing in trim."""
-    total = base.copy()
-    for g in range(len(e)):
-        for i in range(3):
-            total[i] += e[g] * f[g, i]
-    return total
+def _seen(e, f, base, states):
+    """How the rates show the states, (N, 3): trim, the gain of the constant and of all groups' answers f
+    (G, 3), each as effective as e (G,) says, and of each group's own."""
+    seen = np.zeros((states, 3))
+    for i in range(3):
+        seen[i, i] = 1.0
+        seen[3, i] = base[i]
+        for g in range(len(e)):
+            seen[3, i] += e[g] * f[g, i]
+            seen[4 + g, i] = e[g] * f[g, i]
+    return seen
 
 
 @kernel
@@ -172,36 +179,38 @@ def _bound(m, m0, bound):
 
 
 @kernel
-def _update(m, p, y, answer, noise, dof):
-    """Correct one Gaussian (m (4,), p (4, 4), replaced) by y = m[:3] + m[3] answer + noise, all (3,).
+def _update(m, p, y, seen, noise, dof):
+    """Correct one Gaussian (m (N,), p (N, N), replaced) by y (3,) = seen' m + noise, seen (N, 3).
 
     Returns the square of the residual in its own covariance, and the log determinant of that. A residual far
     out in the tail of the t distribution counts less.
     """
-    cross = np.empty((4, 3))
-    for i in range(4):
+    states = len(m)
+    cross = np.zeros((states, 3))
+    s = noise.copy()
+    v = y.copy()
+    for i in range(states):
         for j in range(3):
-            cross[i, j] = p[i, j] + p[i, 3] * answer[j]
-    s = np.empty((3, 3))
-    for i in range(3):
+            v[j] -= m[i] * seen[i, j]
+            for k in range(states):
+                cross[i, j] += p[i, k] * seen[k, j]
+    for i in range(states):
         for j in range(3):
-            s[i, j] = cross[i, j] + answer[i] * cross[3, j] + noise[i, j]
+            for k in range(3):
+                s[j, k] += seen[i, j] * cross[i, k]
     inverse, determinant = _inverse(s)
-    v = np.empty(3)
-    for i in range(3):
-        v[i] = y[i] - m[i] - m[3] * answer[i]
-    gain = np.zeros((4, 3))
+    gain = np.zeros((states, 3))
     square = 0.0
     for j in range(3):
         for k in range(3):
             square += v[j] * inverse[j, k] * v[k]
-            for i in range(4):
+            for i in range(states):
                 gain[i, j] += cross[i, k] * inverse[k, j]
     weight = min(1.0, (dof + 3.0) / (dof + square))
-    for i in range(4):
+    for i in range(states):
         for j in range(3):
             m[i] += weight * gain[i, j] * v[j]
-            for k in range(4):
+            for k in range(states):
                 p[i, k] -= weight * gain[i, j] * cross[k, j]
     return square, np.log(determinant)
 

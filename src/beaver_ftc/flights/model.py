@@ -30,12 +30,17 @@ class Settings(Section):
     repair_share: Number = Field(0.1, ge=0, lt=1, description="share of the changes that restore health")
     levels: dict[str, Row] = Field(default={}, description="likelier levels of effectiveness, by group")
     level_share: Number = Field(0.9, ge=0, le=1, description="share of faults at the likelier levels")
-    trim_sd: Number = Field(0.5, gt=0, description="spread of the trim between flights, in residual sd")
-    trim_walk: Number = Field(3e-4, ge=0, description="drift of the trim a sample, in residual sd")
-    gain_sd: Number = Field(0.15, gt=0, lt=0.5, description="spread of the control gain between flights")
+    trim_sd: Number = Field(0.5, gt=0, description="free spread of the trim between flights, in residual sd")
+    trim_shift: Number = Field(0.0, ge=0, description="spread of the trim as a shift of each group's command")
+    trim_walk: Row = Field(
+        [3e-4] * 3, min_length=3, max_length=3, description="drift of the trim a sample, in residual sd"
+    )
+    gain_sd: Number = Field(0.15, gt=0, lt=0.5, description="spread of the control gain")
+    gain_time_s: Number = Field(5e4, gt=0, description="in which the control gain returns to the model's, s")
+    own_gain_sd: Number = Field(0.0, ge=0, lt=0.5, description="spread of each group's gain about the common")
+    own_gain_time_s: Number = Field(2000.0, gt=0, description="in which that returns to the common gain, s")
     trim_bound: Number = Field(4.0, gt=0, description="farthest the trim is adapted, in its spread")
     gain_bound: Number = Field(3.0, gt=0, description="farthest the gain is adapted, in its spread")
-    gain_walk: Number = Field(3e-4, ge=0, description="drift of the control gain a sample")
     jam_sd: Number = Field(2.0, gt=0, description="offset of the rates a sample by a stuck surface, in sd")
     power: Number = Field(1.0, gt=0, le=1, description="share of a white residual's information in this one")
     tail: Number = Field(8.0, gt=2, description="degrees of freedom of the residual's t distribution")
@@ -86,8 +91,8 @@ def as_text(model: Model) -> str:
     return model.model_dump_json(indent=1) + "\n"
 
 
-def write_model(path: Path, text: str) -> None:
-    """Write a model file whole or not at all. Raises SimulationFailed where it cannot be written."""
+def write_text(path: Path, text: str) -> None:
+    """Write a file whole or not at all. Raises SimulationFailed where it cannot be written."""
     partial = path.with_name(f".{path.name}.partial")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

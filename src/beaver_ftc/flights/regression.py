@@ -13,13 +13,15 @@ _RIDGE = 1e-10
 @dataclass(frozen=True)
 class Fit:
     """coefficients (m, 3); residuals (n, 3); covariance (3, 3) of the residuals; standard errors (m, 3) and
-    the factor by which the residuals' colour widens them over those of white ones, (m, 3)."""
+    the factor by which the residuals' colour widens them over those of white ones, (m, 3); correlation (m, m)
+    of the coefficients' errors, alike on every axis."""
 
     coefficients: Floats
     residuals: Floats
     covariance: Floats
     standard_errors: Floats
     colour: Floats
+    correlation: Floats
 
 
 def least_squares(x: Floats, y: Floats, run: NDArray[np.int64], reach: int) -> Fit:
@@ -40,7 +42,11 @@ def least_squares(x: Floats, y: Floats, run: NDArray[np.int64], reach: int) -> F
         [_newey_west(z, residuals[:, i], inverse, run, reach) for i in range(y.shape[1])]
     )
     colour = np.divide(robust, white, out=np.ones_like(robust), where=white > 0)
-    return Fit(coefficients / scale[:, None], residuals, covariance, robust / scale[:, None], colour)
+    size = np.sqrt(np.maximum(np.diag(inverse), 1e-300))
+    return Fit(
+        coefficients / scale[:, None], residuals, covariance, robust / scale[:, None], colour,
+        inverse / np.outer(size, size),
+    )  # fmt: skip
 
 
 def _newey_west(z: Floats, e: Floats, inverse: Floats, run: NDArray[np.int64], reach: int) -> Floats:

@@ -1,29 +1,23 @@
 """The report of one diagnosed flight: one HTML file that needs nothing else."""
 
 from base64 import b64encode
-from functools import cache
 from io import BytesIO
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from beaver_ftc.flights.diagnose import Rows
 from beaver_ftc.flights.model import Model
+from beaver_ftc.flights.page import COLOURS, template
 from beaver_ftc.flights.samples import Samples
 from beaver_ftc.flights.verdict import BRIEF_S, lasting
 
-if TYPE_CHECKING:
-    from jinja2 import Template
-
-_TEMPLATES = Path(__file__).parent / "templates"
 _MOST_POINTS = 6000
-_COLOURS = ("#0b5fa5", "#b5500b", "#2f7d32", "#7b3fa0", "#8a6d00", "#a0305a", "#3d7a8a", "#555555")
 
 
 def render(samples: Samples, model: Model, rows: Rows, verdict: dict[str, Any]) -> str:
     """The report as HTML text."""
-    return _template().render(
+    return template("flight.html.j2").render(
         verdict=verdict,
         events=lasting(verdict["events"]),
         brief_s=BRIEF_S,
@@ -32,14 +26,6 @@ def render(samples: Samples, model: Model, rows: Rows, verdict: dict[str, Any]) 
         ages=samples.age_s,
         notes=_notes(samples, model),
     )
-
-
-@cache
-def _template() -> "Template":
-    from jinja2 import Environment, FileSystemLoader, StrictUndefined
-
-    loader = Environment(loader=FileSystemLoader(_TEMPLATES), autoescape=True, undefined=StrictUndefined)
-    return loader.get_template("flight.html.j2")
 
 
 def _notes(samples: Samples, model: Model) -> list[str]:
@@ -92,7 +78,7 @@ def _thin(n: int) -> slice:
 def _lines(axis: Any, t_s: np.ndarray, values: np.ndarray, names: list[str], label: str) -> None:
     kept = _thin(len(t_s))
     for i, name in enumerate(names):
-        axis.plot(t_s[kept], values[kept, i], color=_COLOURS[i % len(_COLOURS)], linewidth=0.7, label=name)
+        axis.plot(t_s[kept], values[kept, i], color=COLOURS[i % len(COLOURS)], linewidth=0.7, label=name)
     axis.set_ylabel(label, fontsize=8)
     axis.legend(loc="upper left", fontsize=7, ncols=4, framealpha=0.8)
     axis.tick_params(labelsize=8)

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from beaver_ftc.flights.bank import bank_of
 from beaver_ftc.flights.diagnose import Rows, group_indices, posterior_of, predict, rows_of
@@ -78,8 +79,14 @@ def prediction(model: Model, kept: Stretch) -> Document:
 
 def residuals(model: Model, kept: Stretch) -> tuple[Floats, Floats]:
     """One-step residuals and rates of the samples in use, (n, 3)."""
+    rows, residual = residual_rows(model, kept)
+    return residual, kept.samples.rates[rows]
+
+
+def residual_rows(model: Model, kept: Stretch) -> tuple[NDArray[np.int64], Floats]:
+    """Places (n,) of the samples in use, and their one-step residuals (n, 3)."""
     regressors = build(kept.samples, group_indices(model), model.history, model.lags, scaled=True)
     intercept, past, response, _ = model.arrays()
     unexplained, answers = predict(kept.samples.rates, regressors, past, response)
-    use = kept.use & regressors.ok
-    return (unexplained - answers.sum(axis=1) - intercept)[use], kept.samples.rates[use]
+    rows = np.flatnonzero(kept.use & regressors.ok)
+    return rows, (unexplained - answers.sum(axis=1) - intercept)[rows]

@@ -2,7 +2,10 @@
 
 import json
 
+import numpy as np
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 from pyarrow import parquet
 from typer.testing import CliRunner
 
@@ -79,3 +82,98 @@ def test_a_model_with_a_mistake_is_one_line(folder, tmp_path):
     assert "bad.json:" in str(error.value)
     assert "rate: unknown key" in str(error.value)
     assert not list(tmp_path.glob("flight*"))
+
+
+def diagnosed(folder, path, out, *options):
+    """The rows of one flight through the command, as a table."""
+    run("diagnose", path, "--model", folder / "wing.json", "--out", out, *options)
+    return parquet.read_table(out / path.stem / "diagnosis.parquet")
+
+
+@settings(max_examples=5, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(rows=st.integers(min_value=60, max_value=1199))
+def test_cutting_a_log_changes_no_row_before_the_cut(folder, tmp_path, rows):
+    lines = (folder / "flight.csv").read_text().splitlines()
+    (tmp_path / "flight.csv").write_text("\n".join(lines[: 1 + rows]) + "\n")
+    whole = diagnosed(folder, folder / "flight.csv", tmp_path / "whole")
+    cut = diagnosed(folder, tmp_path / "flight.csv", tmp_path / "cut")
+    assert cut.num_rows == rows
+    assert cut.equals(whole.slice(0, rows))
+
+
+@pytest.mark.parametrize("options", [(), ("--score",)])
+def test_labels_are_read_for_the_score_alone(folder, tmp_path, options):
+    """Shuffled labels: the rows are the same, to the bit; only a score differs."""
+    rng = np.random.default_rng(3)
+    columns = synthetic.fly(120.0, parts=((60, 100, 1.0, 0.5),), seed=9)
+    for surface in ("right", "left"):
+        rng.shuffle(columns[f"{surface}_effectiveness"])
+    shuffled = synthetic.write_csv(tmp_path / "flight.csv", columns)
+    one = diagnosed(folder, folder / "flight.csv", tmp_path / "one", *options)
+    other = diagnosed(folder, shuffled, tmp_path / "other", *options)
+    assert one.equals(other)
+    verdicts = [
+        json.loads((tmp_path / name / "flight" / "verdict.json").read_text()) for name in ("one", "other")
+    ]
+    assert (verdicts[0].pop("score", None) == verdicts[1].pop("score", None)) is (not options)
+    assert verdicts[0] == verdicts[1]
+
+
+def test_a_rival_by_its_name(folder, tmp_path):
+    rows = diagnosed(folder, folder / "flight.csv", tmp_path, "--detector", "sliding-least-squares")
+    assert set(rows["named"].to_pylist()) <= {"", "left", "right", "right+left", "unknown"}
+    assert (
+        json.loads((tmp_path / "flight" / "verdict.json").read_text())["detector"] == "sliding-least-squares"
+    )
+
+
+def test_identify_writes_a_page_of_its_own(folder, tmp_path):
+    page = (folder / "wing.html").read_text()
+    assert "http" not in page
+    assert page.count("data:image/png") == 3
+    for said in (
+        "second half",
+        "first half",
+        "command of left[-1]",
+        "Free runs",
+        "density over that of white noise",
+    ):
+        assert said in page
+    (tmp_path / "mine.html").write_text("<p>mine</p>")
+    with pytest.raises(BadInput, match=r"will not replace .*mine.html"):
+        run(
+            "identify",
+            folder / "training.csv",
+            "--vehicle",
+            folder / "wing.yaml",
+            "--out",
+            tmp_path / "mine.json",
+        )
+    assert [path.name for path in tmp_path.iterdir()] == ["mine.html"]
+
+
+def spoilt(folder, name, change):
+    columns = synthetic.fly(120.0, seed=9)
+    return synthetic.write_csv(folder / name, change(columns) or columns)
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        (lambda c: c["p_rad_s"].fill(np.nan), "column p_rad_s holds no number"),
+        (lambda c: c["p_rad_s"].fill(0.1), "rate p does not move"),
+        (lambda c: c.pop("q_rad_s") is None, "no column q_rad_s"),
+        (lambda c: c["t_s"].__setitem__(50, 0.0), "t_s: row 51: time does not increase"),
+        (lambda c: c["p_rad_s"].__imul__(1e9), "column p_rad_s holds"),
+        (lambda c: c["p_rad_s"].__imul__(1e3), "allowed: rates in rad/s, up to 60"),
+        (lambda c: c["p_rad_s"].__setitem__(slice(30, None), np.nan), "samples known to be healthy"),
+        (lambda c: {name: values[:20] for name, values in c.items()}, "has 20 samples of the rates"),
+    ],
+)
+def test_a_spoilt_log_is_one_line_and_nothing_is_written(folder, tmp_path, change, says):
+    path = spoilt(tmp_path, "spoilt.csv", change)
+    with pytest.raises(BadInput) as error:
+        run("identify", path, "--vehicle", folder / "wing.yaml", "--out", tmp_path / "model.json")
+    assert says in str(error.value)
+    assert len(str(error.value).splitlines()) == 1
+    assert [entry.name for entry in tmp_path.iterdir()] == ["spoilt.csv"]

@@ -1,4 +1,4 @@
-"""A simulated flight as a recorder on board would have written it: what the readers find is what was logged."""
+"""A simulated flight as a recorder on board writes it: what the readers find is what was logged."""
 
 import numpy as np
 import pytest

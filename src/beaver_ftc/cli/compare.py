@@ -36,6 +36,10 @@ def command(
         str | None,
         typer.Option(metavar="N|FOLDER", help="At most N flights of each sweep; or recorded flights."),
     ] = None,
+    other_days: Annotated[
+        bool,
+        typer.Option("--other-days", help="With --flights FOLDER: on days made of the labelled flights."),
+    ] = False,
     workers: Annotated[int, typer.Option(min=1, help="Processes.")] = 2,
     target: Annotated[float, typer.Option(min=0, help="With --tune: false alarms per hour allowed.")] = 1.0,
     out: Annotated[Path, typer.Option(help="Folder for the comparison.")] = Path("comparisons"),
@@ -63,8 +67,12 @@ def command(
         raise BadInput("compare: --set: allowed: only with --benchmark")
     if errors and not tune:
         raise BadInput("compare: --errors: allowed: only with --tune")
+    if other_days and folder is None:
+        raise BadInput("compare: --other-days: allowed: only with --flights FOLDER")
     if runs:
         _compare_runs(runs, out, format)
+    elif folder is not None and other_days:
+        _compare_other_days(folder, format, leaderboard)
     elif folder is not None:
         _compare_recorded(folder, out, format, leaderboard)
     elif tune:
@@ -105,6 +113,19 @@ def _compare_recorded(folder: Path, out: Path, format: Format, page: Path | None
             picture.write_bytes((out / "recorded-flights" / "flights.png").read_bytes())
     if format is Format.json:
         emit_json(document | {"folder": str(out / "recorded-flights")})
+    else:
+        emit(as_text(document))
+
+
+def _compare_other_days(folder: Path, format: Format, page: Path | None) -> None:
+    from beaver_ftc.studies.recorded.robustness import run_other_days
+    from beaver_ftc.studies.recorded.words import as_text, update_page
+
+    document = {"other_days": run_other_days(folder)}
+    if page is not None:
+        update_page(document, page)
+    if format is Format.json:
+        emit_json(document)
     else:
         emit(as_text(document))
 

@@ -103,7 +103,7 @@ def _jam(model: Model, group: int) -> Floats:
     the group moves most."""
     _, _, response, noise = model.arrays()
     total = np.abs(response[group]).sum(axis=0) / np.sqrt(np.diag(noise))
-    share = np.clip(total / total.max(), 0.3, 1.0)
+    share = np.clip(total / max(total.max(), 1e-300), 0.3, 1.0)
     return np.asarray(np.diag(noise) * (model.settings.jam_sd * share) ** 2)
 
 

@@ -9,16 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from beaver_ftc.errors import BadInput
-from beaver_ftc.flights.adaptation import adaptation_of
 from beaver_ftc.flights.bank import UNKNOWN as UNKNOWN_OFFSET
-from beaver_ftc.flights.bank import Bank, at_first, bank_of
-from beaver_ftc.flights.kernel import run_bank
+from beaver_ftc.flights.bank import Bank, bank_of
+from beaver_ftc.flights.filtering import posterior_of
 from beaver_ftc.flights.model import Model
 from beaver_ftc.flights.recording import Floats
-from beaver_ftc.flights.regressors import Regressors, build
+from beaver_ftc.flights.regressors import group_indices
 from beaver_ftc.flights.samples import Samples
 
-_LEAST_SCALE, _MOST_SCALE = 0.3, 6.0
 _RATE_TOLERANCE = 0.25
 UNKNOWN = "unknown"
 _NAMED = 0.5
@@ -53,58 +51,6 @@ def diagnose(samples: Samples, model: Model) -> Rows:
     bank = bank_of(model)
     posterior, state, scale = posterior_of(samples, model, bank)
     return _at_stamps(samples, rows_of(samples, model, bank, posterior, state, scale))
-
-
-def posterior_of(samples: Samples, model: Model, bank: Bank) -> tuple[Floats, Floats, Floats]:
-    """Probability of each hypothesis (n, H), trim and gain (n, 4) and noise scale (n,) after each sample."""
-    regressors = build(samples, group_indices(model), model.history, model.lags, scaled=False)
-    return filter_with(samples, regressors, model, bank)
-
-
-def group_indices(model: Model) -> list[list[int]]:
-    """The model's groups as positions of their surfaces."""
-    names = list(model.vehicle.surfaces)
-    return [[names.index(name) for name in group] for group in model.groups]
-
-
-def filter_with(
-    samples: Samples, regressors: Regressors, model: Model, bank: Bank
-) -> tuple[Floats, Floats, Floats]:
-    """As `posterior_of`, for regressors that are there already."""
-    intercept, past, response, noise = model.arrays()
-    settings, own = model.settings, adaptation_of(model)
-    unexplained, answers = predict(samples.rates, regressors, past, response)
-    change = settings.changes_per_hour / (3600.0 * model.rate_hz)
-    memory = settings.noise_memory_s * model.rate_hz
-    posterior, state, scale, _ = run_bank(
-        np.ascontiguousarray(np.nan_to_num(unexplained)),
-        np.ascontiguousarray(np.nan_to_num(answers)),
-        intercept,
-        regressors.ok,
-        bank.effectiveness,
-        change * bank.weight,
-        1.0 - change,
-        bank.offset,
-        bank.idle,
-        at_first(bank),
-        own.mean,
-        own.covariance,
-        own.bound,
-        own.keep,
-        own.walk,
-        noise,
-        (settings.power, settings.tail, memory, _LEAST_SCALE, _MOST_SCALE),
-    )
-    return posterior, state, scale
-
-
-def predict(rates: Floats, regressors: Regressors, past: Floats, response: Floats) -> tuple[Floats, Floats]:
-    """What the past leaves unexplained of the rates, (n, 3), and each group's healthy answer, (n, G, 3).
-
-    Summed in the same order whatever the length of the flight, so that a row does not depend on later ones.
-    """
-    unexplained = rates - np.einsum("nm,mr->nr", regressors.past, past)
-    return unexplained, np.einsum("ngl,glr->ngr", regressors.commands, response)
 
 
 def check_rate(samples: Samples, model: Model) -> None:

@@ -5,11 +5,11 @@ from typing import Any
 
 import numpy as np
 
-from beaver_ftc.flights.diagnose import group_indices
 from beaver_ftc.flights.identify import Stretch, fit_model, fit_order, stacked, stretches_of
 from beaver_ftc.flights.model import Model
 from beaver_ftc.flights.output_error import output_error
 from beaver_ftc.flights.regression import spectrum, variance_inflation
+from beaver_ftc.flights.regressors import group_indices
 from beaver_ftc.flights.samples import Samples
 from beaver_ftc.flights.testing import residuals, run_tests
 from beaver_ftc.flights.vehicle import Vehicle

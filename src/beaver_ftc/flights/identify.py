@@ -9,6 +9,7 @@ flights the fit did not see.
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,11 +29,24 @@ SHORTEST_S = 3.0
 HISTORIES = (1, 2, 3, 4)
 LAGS = (2, 3, 4, 6)
 _COLOUR_S = 2.0
+_STILL_RAD_S = 1e-6
 _AFTER_EVENT_S = 1.0
 _SURE, _HOLD_S, _POWER_ALONE = 0.995, 0.3, 0.9
 """Where no labels say how often things break, an alarm asks for more: for how much, the benchmark decided."""
 _POWER = 0.8
 """A coloured residual tells less than a white one: by how much, blocked tests decided."""
+_OTHER_DAYS: dict[str, Any] = {
+    "trim_sd": 0.1,
+    "trim_shift": 0.03,
+    "trim_walk": [2.5e-3, 6e-4, 2e-3],
+    "gain_sd": 0.1,
+    "gain_time_s": 300.0,
+    "own_gain_sd": 0.03,
+}
+"""How far another day may be: chosen on days drawn from one flight, judged on others (`--other-days`). The
+drift of the trim is what the means of the residual over 30 s show in that flight."""
+_DELAYS = (-0.4, 0.0, 0.4)
+"""Delays beside the model's that a flight may have, in samples."""
 _PRIOR_CHANGES = 20
 """Changes that count as seen before the labels are read, half of them repairs."""
 
@@ -126,6 +140,9 @@ def fit_order(stretches: Sequence[Stretch], vehicle: Vehicle, history: int, lags
             f"identify: {len(y)} samples known to be healthy, allowed: at least {10 * x.shape[1]} to fit "
             f"{x.shape[1]} coefficients an axis"
         )
+    still = [axis for axis, spread in zip("pqr", y.std(axis=0), strict=True) if spread < _STILL_RAD_S]
+    if still:
+        raise BadInput(f"identify: rate {still[0]} does not move, allowed: flights in which every rate does")
     dt_s = float(np.median([stretch.samples.dt_s for stretch in stretches]))
     return least_squares(x, y, run, round(_COLOUR_S / dt_s))
 
@@ -190,6 +207,8 @@ def prior(stretches: Sequence[Stretch], model: Model) -> Settings:
     return Settings(
         levels=levels,
         changes_per_hour=float(np.sqrt((changes + 1) / hours * Settings().changes_per_hour)),
+        **_OTHER_DAYS,
+        delays_s=[share / model.rate_hz for share in _DELAYS],
         repair_share=(repairs + _PRIOR_CHANGES / 2) / (changes + _PRIOR_CHANGES),
         power=_POWER,
     )

@@ -10,10 +10,9 @@ from typing import Any
 import numpy as np
 
 from beaver_ftc.flights.bank import Bank, bank_of
-from beaver_ftc.flights.diagnose import group_indices
 from beaver_ftc.flights.model import Model
 from beaver_ftc.flights.recording import Floats
-from beaver_ftc.flights.regressors import build
+from beaver_ftc.flights.regressors import build, group_indices
 from beaver_ftc.flights.samples import Samples
 
 HORIZONS_S = (5.0, 20.0, 60.0)

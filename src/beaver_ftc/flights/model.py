@@ -41,6 +41,9 @@ class Settings(Section):
     own_gain_time_s: Number = Field(2000.0, gt=0, description="in which that returns to the common gain, s")
     trim_bound: Number = Field(4.0, gt=0, description="farthest the trim is adapted, in its spread")
     gain_bound: Number = Field(3.0, gt=0, description="farthest the gain is adapted, in its spread")
+    delays_s: Row = Field(
+        [0.0], min_length=1, max_length=9, description="delays tried beside the model's, each under a sample"
+    )
     jam_sd: Number = Field(2.0, gt=0, description="offset of the rates a sample by a stuck surface, in sd")
     power: Number = Field(1.0, gt=0, le=1, description="share of a white residual's information in this one")
     tail: Number = Field(8.0, gt=2, description="degrees of freedom of the residual's t distribution")

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from beaver_ftc.errors import BadInput
 from beaver_ftc.flights.identification import regressor_names
@@ -94,7 +95,7 @@ def _fits(stretches: Sequence[Stretch], model: Model) -> Any:
     return figure
 
 
-def _liveliest(rates: Floats, rows: Floats, length: int) -> int:
+def _liveliest(rates: Floats, rows: NDArray[np.int64], length: int) -> int:
     """First sample of the window in which the rates known moved most."""
     square = np.zeros(len(rates))
     square[rows] = (rates[rows] ** 2).sum(axis=1)

@@ -8,10 +8,10 @@ freeze                  a servo output that has not moved for 6 s: sees the logg
 import numpy as np
 
 from beaver_ftc.flights.bank import bank_of
-from beaver_ftc.flights.diagnose import Rows, group_indices, predict
+from beaver_ftc.flights.diagnose import Rows
 from beaver_ftc.flights.model import Model
 from beaver_ftc.flights.recording import Floats, Recording
-from beaver_ftc.flights.regressors import build
+from beaver_ftc.flights.regressors import build, group_indices, predict
 from beaver_ftc.flights.samples import Samples
 
 MEMORY_S = 20.0
@@ -85,7 +85,7 @@ def _rows(samples: Samples, model: Model, effectiveness: Floats, sd: Floats) -> 
         estimate[:, members] = value[:, None]
         low[:, members] = np.clip(effectiveness[:, g] - _NINETY * sd[:, g], 0.0, 1.0)[:, None]
         high[:, members] = np.clip(effectiveness[:, g] + _NINETY * sd[:, g], 0.0, 1.0)[:, None]
-    return _named(samples.t_s, model, lost, estimate, low, high)
+    return _named(samples.t_s, model, lost, estimate, np.minimum(low, estimate), np.maximum(high, estimate))
 
 
 def _known_levels(model: Model, all_levels: Floats, group: int) -> Floats:

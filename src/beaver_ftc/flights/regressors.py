@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from beaver_ftc.flights.model import Model
 from beaver_ftc.flights.recording import Floats
 from beaver_ftc.flights.samples import Samples, mixer
 from beaver_ftc.flights.vehicle import Vehicle
@@ -75,3 +76,18 @@ def _lagged(values: Floats, lags: range | tuple[int, ...]) -> Floats:
 def _within_run(run: NDArray[np.int64], reach: int) -> NDArray[np.bool_]:
     before = np.concatenate([np.full(min(reach, len(run)), -1), run[: max(len(run) - reach, 0)]])
     return run == before
+
+
+def group_indices(model: Model) -> list[list[int]]:
+    """The model's groups as positions of their surfaces."""
+    names = list(model.vehicle.surfaces)
+    return [[names.index(name) for name in group] for group in model.groups]
+
+
+def predict(rates: Floats, regressors: Regressors, past: Floats, response: Floats) -> tuple[Floats, Floats]:
+    """What the past leaves unexplained of the rates, (n, 3), and each group's healthy answer, (n, G, 3).
+
+    Summed in the same order whatever the length of the flight, so that a row does not depend on later ones.
+    """
+    unexplained = rates - np.einsum("nm,mr->nr", regressors.past, past)
+    return unexplained, np.einsum("ngl,glr->ngr", regressors.commands, response)

@@ -16,6 +16,7 @@ from beaver_ftc.flights.vehicle import Vehicle
 
 MIN_RATE_HZ = 4.0
 _FIRST = 50
+_LARGEST, _FASTEST_RAD_S = 1e6, 60.0
 _GAP = 3.5
 """A step of more than this many median steps is a gap: nothing is predicted across it."""
 
@@ -46,6 +47,7 @@ def sample(recording: Recording, vehicle: Vehicle) -> Samples:
     """Put a recording on one time base. Raises BadInput with the reason where the log cannot be used."""
     names = [vehicle.rates.p, vehicle.rates.q, vehicle.rates.r]
     _require(recording, [*names, *vehicle.commands, *vehicle.signals])
+    _require_rad_s(recording, names)
     stamps = recording.columns[vehicle.rates.p].t_s
     t_s = _time_base(recording.name, stamps, vehicle.max_rate_hz)
     step = _step(t_s)
@@ -79,8 +81,22 @@ def _require(recording: Recording, names: list[str]) -> None:
             f"{recording.name}: no column {missing[0]}, allowed: a log that has it; it has {known}"
         )
     for name in names:
-        if not np.isfinite(recording.columns[name].values).any():
+        values = recording.columns[name].values
+        if not np.isfinite(values).any():
             raise BadInput(f"{recording.name}: column {name} holds no number, allowed: a logged quantity")
+        if (largest := float(np.nanmax(np.abs(values)))) > _LARGEST:
+            raise BadInput(f"{recording.name}: column {name} holds {largest:g}, allowed: up to {_LARGEST:g}")
+
+
+def _require_rad_s(recording: Recording, names: list[str]) -> None:
+    """Rates that no vehicle turns at are in another unit."""
+    for name in names:
+        largest = float(np.nanmax(np.abs(recording.columns[name].values)))
+        if largest > _FASTEST_RAD_S:
+            raise BadInput(
+                f"{recording.name}: column {name} reaches {largest:g}, allowed: rates in rad/s, "
+                f"up to {_FASTEST_RAD_S:g}"
+            )
 
 
 def _time_base(name: str, stamps: Floats, max_rate_hz: float) -> Floats:

@@ -19,10 +19,10 @@ from beaver_ftc.design.context import Context, Declared
 from beaver_ftc.design.model import N_Y
 from beaver_ftc.diagnosis.base import Detector, Measured, Verdict
 from beaver_ftc.errors import BadInput
-from beaver_ftc.flights.diagnose import Rows, group_indices, predict
+from beaver_ftc.flights.diagnose import Rows
 from beaver_ftc.flights.model import Model
 from beaver_ftc.flights.recording import Floats
-from beaver_ftc.flights.regressors import build
+from beaver_ftc.flights.regressors import build, group_indices, predict
 from beaver_ftc.flights.samples import Samples
 
 PLACES = ("aileron", "elevator", "rudder")

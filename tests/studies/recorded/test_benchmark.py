@@ -8,7 +8,8 @@ from typer.testing import CliRunner
 
 from beaver_ftc.cli.main import app
 from beaver_ftc.errors import BadInput
-from beaver_ftc.studies.recorded import tally, words
+from beaver_ftc.flights.detectors import detector_names
+from beaver_ftc.studies.recorded import robustness, tally, words
 from beaver_ftc.studies.recorded.data import data_sets
 from beaver_ftc.studies.recorded.run import OURS, run_benchmark
 from flights import synthetic
@@ -35,7 +36,7 @@ def document(folder):
 def test_every_method_has_a_row_and_ours_is_right(document):
     (part,) = document["sets"]
     rows = {row["method"]: row for row in part["rows"]}
-    assert len(rows) == 3  # the freeze rule needs servo outputs, which this vehicle has none of
+    assert len(rows) == len(detector_names())  # no freeze rule: this vehicle names no servo outputs
     assert rows[OURS]["classes"] > 0.9
     assert rows[OURS]["mean_error"] < 0.03
     sliding = next(row for name, row in rows.items() if name.startswith("sliding"))
@@ -51,7 +52,8 @@ def test_tables_have_a_line_a_method(document):
 
 def test_the_page_keeps_what_stands_around_the_tables(document, tmp_path):
     page = tmp_path / "page.md"
-    page.write_text(f"before\n{words.BEGIN}\nold\n{words.END}\nafter\n")
+    begin, end = words.marks(document)
+    page.write_text(f"before\n{begin}\nold\n{end}\nafter\n")
     words.update_page(document, page)
     text = page.read_text()
     assert text.startswith("before\n")
@@ -60,6 +62,28 @@ def test_the_page_keeps_what_stands_around_the_tables(document, tmp_path):
     page.write_text("no marks")
     with pytest.raises(BadInput, match="has no place for the tables"):
         words.update_page(document, page)
+
+
+def test_other_days_have_a_row_each_and_a_worst(folder, monkeypatch, tmp_path):
+    days = robustness.drawn(2, range(2))
+    monkeypatch.setattr(robustness, "grid", lambda mixer, commands: days[:1])
+    monkeypatch.setattr(robustness, "drawn", lambda surfaces, seeds: days[1:])
+    page = tmp_path / "page.md"
+    page.write_text("<!-- other days: begin -->\n<!-- other days: end -->\n")
+    arguments = ["compare", "--flights", str(folder), "--other-days", "--format", "json"]
+    done = CliRunner().invoke(app, [*arguments, "--leaderboard", str(page)])
+    (part,) = json.loads(done.stdout)["other_days"]["sets"]
+    assert [row["day"] for row in part["rows"]] == ["drawn 0", "drawn 1", "drawn 1"]
+    assert all(row["classes"] > 0.7 for row in part["rows"])
+    for one in part["summary"]:
+        assert one["worst"]["classes"] <= one["mean"]["classes"]
+        assert one["worst"]["mean_error"] >= one["mean"]["mean_error"]
+    assert "| drawn, not looked at: worst |" in page.read_text()
+
+
+def test_other_days_without_a_folder():
+    done = CliRunner().invoke(app, ["compare", "--other-days", "--benchmark"])
+    assert "--other-days: allowed: only with --flights FOLDER" in str(done.exception)
 
 
 def test_a_folder_without_flights_is_refused(tmp_path):

@@ -105,7 +105,8 @@ def _events(topics: dict[str, Table], origin_ns: float) -> Iterator[Event]:
     for topic, table in topics.items():
         if topic.startswith(_STATUS):
             part = topic.removeprefix(_STATUS)
-            for code in sorted(set(table["field.data"])):
-                first = int(np.argmax(table["field.data"] == code))
+            codes = table.get("field.data", np.empty(0))
+            for code in sorted(set(codes[np.isfinite(codes)])):
+                first = int(np.argmax(codes == code))
                 t_s = float((table["%time"][first] - origin_ns) * _NS)
                 yield Event(t_s, _SIDES.get((part, int(code)), part))

@@ -5,7 +5,11 @@ the second on: `IMU1.GyrX`. Time counts from the first message with a stamp. Rea
 extra `flights`.
 """
 
+import os
+import sys
 from collections import defaultdict
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -36,31 +40,45 @@ def read(path: Path) -> Recording:
 def _messages(path: Path) -> Rows:
     """The numeric fields of all messages with a stamp, by message and instance."""
     found: Rows = defaultdict(list)
-    log = _open(path)
+    reader = _reader(path)
     try:
-        while (message := log.recv_msg()) is not None:
-            fields = message.to_dict()
-            if message.get_type() not in _OVERHEAD and _TIME in fields:
-                found[_name(message.get_type(), fields)].append(
-                    {key: float(value) for key, value in fields.items() if isinstance(value, int | float)}
-                )
+        with _silence():
+            log = reader(str(path))
+            while (message := log.recv_msg()) is not None:
+                fields = message.to_dict()
+                if message.get_type() not in _OVERHEAD and _TIME in fields:
+                    numbers = {
+                        k: float(value) for k, value in fields.items() if isinstance(value, int | float)
+                    }
+                    found[_name(message.get_type(), fields)].append(numbers)
     except Exception as error:  # pymavlink raises whatever a damaged file makes it stumble over
         raise _unreadable(path, error) from None
     return dict(found)
 
 
-def _open(path: Path) -> Any:
+@contextmanager
+def _silence() -> Iterator[None]:
+    """Nothing on standard error: pymavlink's indexer, in C, prints every damaged byte it skips."""
+    sys.stderr.flush()
+    kept, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, 2)
+    try:
+        yield
+    finally:
+        os.dup2(kept, 2)
+        os.close(kept)
+        os.close(nowhere)
+
+
+def _reader(path: Path) -> Any:
     try:
         from pymavlink import DFReader
     except ImportError:
         raise BadInput(
             f"{path}: reading a dataflash log needs pymavlink, allowed: pip install 'beaver-ftc[flights]'"
         ) from None
-    try:
-        text = path.suffix.lower() == ".log"
-        return DFReader.DFReader_text(str(path)) if text else DFReader.DFReader_binary(str(path))
-    except Exception as error:
-        raise _unreadable(path, error) from None
+    text = path.suffix.lower() == ".log"
+    return DFReader.DFReader_text if text else DFReader.DFReader_binary
 
 
 def _unreadable(path: Path, error: Exception) -> BadInput:

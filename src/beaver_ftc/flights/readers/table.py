@@ -12,7 +12,7 @@ TIME = "t_s"
 
 
 def read(path: Path) -> Recording:
-    """The flight in a table. Columns that hold no numbers are left out; empty cells are nan."""
+    """The flight in a table. Columns and cells that hold no number are nan."""
     table = read_numbers(path)
     if TIME not in table:
         raise BadInput(f"{path}: no column {TIME}, allowed: a table with {TIME} in seconds")
@@ -22,7 +22,7 @@ def read(path: Path) -> Recording:
 
 
 def read_numbers(path: Path) -> dict[str, Floats]:
-    """The numeric columns of a table, empty cells nan. Raises BadInput where it is no table."""
+    """The columns of a table, nan where there is no number. Raises BadInput where it is no table."""
     import pyarrow as pa
 
     try:
@@ -30,8 +30,7 @@ def read_numbers(path: Path) -> dict[str, Floats]:
     except (pa.ArrowException, OSError, ValueError) as error:
         says = " ".join(str(error).split())[:200]
         raise BadInput(f"{path}: is no table that can be read ({says}), allowed: CSV or Parquet") from None
-    numbers = {name: _numbers(table[name]) for name in table.column_names}
-    return {name: values for name, values in numbers.items() if values is not None}
+    return {name: _numbers(table[name]) for name in table.column_names}
 
 
 def check_time(path: Path, t_s: Floats) -> None:
@@ -54,11 +53,9 @@ def _open(path: Path) -> Any:
     return csv.read_csv(path)
 
 
-def _numbers(column: Any) -> Floats | None:
+def _numbers(column: Any) -> Floats:
     import pyarrow as pa
 
-    if pa.types.is_null(column.type):
-        return np.full(len(column), np.nan)
     if not (pa.types.is_integer(column.type) or pa.types.is_floating(column.type)):
-        return None
+        return np.full(len(column), np.nan)
     return np.asarray(column.to_numpy(), dtype=float)

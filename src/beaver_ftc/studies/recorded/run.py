@@ -50,7 +50,7 @@ def run_benchmark(folder: Path) -> Document:
 
 def _compare(data: DataSet) -> Document:
     stretches = stretches_of(data.flights)
-    whole = _settings(stretches, data)
+    whole = settings_of(stretches, data)
     flights: list[Document] = []
     for fitted, kept, name in folds(stretches):
         model = _frozen(fitted, data, whole)
@@ -83,7 +83,7 @@ def _diagnosed(recording: Recording, kept: Stretch, model: Model) -> Iterator[tu
         yield FREEZE, frozen
 
 
-def _settings(stretches: list[Stretch], data: DataSet) -> Settings:
+def settings_of(stretches: list[Stretch], data: DataSet) -> Settings:
     """What a single flight says as a whole: levels, rate of change, and the mass of the bounds."""
     model = fit_model(stretches, data.vehicle)
     if len(stretches) > 1:
@@ -102,11 +102,11 @@ def _frozen(fitted: list[Stretch], data: DataSet, whole: Settings) -> Model:
 
 def _score(kept: Stretch, rows: Rows, model: Model) -> Document:
     if np.isfinite(kept.samples.labels).any():
-        return by_labels(rows, np.where(_kept(kept)[:, None], kept.samples.labels, np.nan))
+        return by_labels(rows, np.where(kept_rows(kept)[:, None], kept.samples.labels, np.nan))
     return by_event(rows, kept.samples.events, model.groups)
 
 
-def _kept(kept: Stretch) -> np.ndarray:
+def kept_rows(kept: Stretch) -> np.ndarray:
     """The whole span of what is kept, edges of labels included: they count in the score."""
     used = np.flatnonzero(kept.use)
     span = np.zeros(len(kept.use), dtype=bool)

@@ -4,15 +4,16 @@ from pathlib import Path
 from typing import Any
 
 from beaver_ftc.errors import BadInput
+from beaver_ftc.studies.recorded import robustness
 
 Document = dict[str, Any]
 Table = tuple[list[str], list[list[str]]]
 
-BEGIN, END = "<!-- recorded flights: begin -->", "<!-- recorded flights: end -->"
-
 
 def tables(document: Document) -> list[tuple[str, Table]]:
     """A title and a table for each data set."""
+    if "other_days" in document:
+        return robustness.tables(document["other_days"])
     found = []
     for part in document["sets"]:
         by_labels = part["scored_by"] == "labels"
@@ -90,11 +91,18 @@ def _row(cells: list[str]) -> str:
     return f"| {' | '.join(cells)} |"
 
 
+def marks(document: Document) -> tuple[str, str]:
+    """What stands before and after the tables in a page."""
+    name = "other days" if "other_days" in document else "recorded flights"
+    return f"<!-- {name}: begin -->", f"<!-- {name}: end -->"
+
+
 def update_page(document: Document, page: Path) -> None:
     """Put the tables between the marks of a Markdown page. Raises BadInput where it has none."""
+    begin, end = marks(document)
     text = page.read_text(encoding="utf-8") if page.is_file() else ""
-    if BEGIN not in text or END not in text:
-        raise BadInput(f"{page}: has no place for the tables, allowed: a page with {BEGIN} and {END}")
-    before, _, rest = text.partition(BEGIN)
-    _, _, after = rest.partition(END)
-    page.write_text(f"{before}{BEGIN}\n{as_markdown(document)}{END}{after}", encoding="utf-8")
+    if begin not in text or end not in text:
+        raise BadInput(f"{page}: has no place for the tables, allowed: a page with {begin} and {end}")
+    before, _, rest = text.partition(begin)
+    _, _, after = rest.partition(end)
+    page.write_text(f"{before}{begin}\n{as_markdown(document)}{end}{after}", encoding="utf-8")

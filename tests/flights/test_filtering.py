@@ -1,0 +1,81 @@
+"""What of a flight is adapted: its delay, its trim, its gain; bounded, and never by looking ahead."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from beaver_ftc.flights.adaptation import adaptation_of
+from beaver_ftc.flights.bank import bank_of
+from beaver_ftc.flights.filtering import _later, _weights, posterior_of
+from beaver_ftc.flights.inputs import load_flights
+from flights import synthetic
+
+
+@pytest.fixture(scope="module")
+def healthy(wing, wing_folder):
+    columns = synthetic.fly(200.0, seed=31)
+    return load_flights([synthetic.write_csv(wing_folder / "healthy.csv", columns)], wing)[0]
+
+
+def delays_of(samples, model):
+    """Which delay explains a flight best, by running each alone."""
+    bank = bank_of(model)
+    from beaver_ftc.flights.filtering import _filtered
+
+    evidence = [_filtered(_later(samples, d), model, bank)[3] for d in model.settings.delays_s]
+    return _weights(evidence, model.rate_hz)
+
+
+@pytest.mark.parametrize(("late_s", "which"), [(-0.04, 0), (0.0, 1), (0.04, 2)])
+def test_the_delay_of_a_flight_is_found(healthy, wing_model, late_s, which):
+    at = np.arange(len(healthy.t_s)) + late_s * wing_model.rate_hz
+    columns = [np.interp(at, np.arange(len(at)), column) for column in healthy.commands.T]
+    weights = delays_of(replace(healthy, commands=np.column_stack(columns)), wing_model)
+    assert weights[:, -1].argmax() == which
+    assert weights[which, -1] > 0.9
+
+
+def test_a_delayed_flight_takes_nothing_from_later(healthy, wing_model):
+    """Changing a command changes no row before it, with every delay tried."""
+    k = 700
+    commands = healthy.commands.copy()
+    commands[k + 1 :] += 0.3
+    bank = bank_of(wing_model)
+    one = posterior_of(healthy, wing_model, bank)[0]
+    other = posterior_of(replace(healthy, commands=commands), wing_model, bank)[0]
+    assert np.array_equal(one[: k + 1], other[: k + 1])
+    assert not np.array_equal(one[k + 2], other[k + 2])
+
+
+def test_a_shift_of_a_command_is_within_the_spread_of_the_trim(wing_model):
+    """The covariance of the trim is that of many drawn shifts, through the model's own responses."""
+    settings = wing_model.settings
+    _, _, response, noise = wing_model.arrays()
+    rng = np.random.default_rng(4)
+    shifts = settings.trim_shift * rng.standard_normal((200_000, len(response)))
+    free = settings.trim_sd * np.sqrt(np.diag(noise)) * rng.standard_normal((200_000, 3))
+    drawn = np.cov((shifts @ response.sum(axis=1) + free).T)
+    np.testing.assert_allclose(adaptation_of(wing_model).covariance[:3, :3], drawn, atol=2e-2 * drawn.max())
+
+
+def test_gains_return_in_their_time(wing_model):
+    """After a long time the spread of each gain is that of the settings, whatever it was."""
+    own = adaptation_of(wing_model)
+    variance = np.zeros(len(own.mean))
+    for _ in range(200_000):
+        variance = own.keep**2 * variance + own.walk
+    assert np.sqrt(variance[3]) == pytest.approx(wing_model.settings.gain_sd, rel=1e-3)
+    assert np.sqrt(variance[4]) == pytest.approx(wing_model.settings.own_gain_sd, rel=1e-3)
+
+
+def test_a_fault_from_the_start_is_not_learnt_away(wing, wing_folder, wing_model):
+    """Weak from the first sample on, for five minutes: neither gain nor trim takes it over."""
+    from beaver_ftc.flights.diagnose import diagnose
+
+    columns = synthetic.fly(300.0, parts=((0, 300, 1.0, 0.5),), seed=33)
+    samples = load_flights([synthetic.write_csv(wing_folder / "weak.csv", columns)], wing)[0]
+    rows = diagnose(samples, wing_model)
+    late = rows.t_s > 60.0
+    assert rows.faulty[late].mean() > 0.95
+    assert np.median(rows.estimate[late, 1]) == pytest.approx(0.5, abs=0.101)

@@ -56,6 +56,8 @@ def picture(samples: Samples, model: Model, rows: Rows) -> bytes:
         height_ratios=[1.2, 1.2, *[1.0] * (len(surfaces) + 1)],
     )[:, 0]
     _lines(axes[0], samples.t_s, np.rad2deg(samples.rates), ["p", "q", "r"], "rates, deg/s")
+    limit = float(np.rad2deg(np.nanpercentile(np.abs(samples.rates), 99.9))) * 1.3
+    axes[0].set_ylim(-max(limit, 1.0), max(limit, 1.0))  # a landing's spike does not flatten the flight
     _lines(axes[1], samples.t_s, samples.commands, surfaces, "healthy surfaces'\nshare of travel")
     _lines(axes[2], rows.t_s, rows.probability[:, None], ["a fault"], "probability")
     axes[2].set_ylim(-0.05, 1.05)

@@ -120,6 +120,20 @@ def test_every_part_of_the_log_stays_in_its_column():
     assert same_log(log[:200], plain[:200])
 
 
+def test_a_diagnosis_that_begins_in_moving_air_takes_none_of_it_for_a_fault():
+    """With several instants in a frame, the first of them come before it has seen a whole frame."""
+    air = {
+        "environment": {"turbulence": "dryden", "severity": "light"},
+        "fdi": {"statistical": {}, "bounds": {"turbulence": "light"}},
+    }
+    sim = flown((2.0, {"scheme": "none"}), (3.0, {"scheme": "adaptive-estimators"}), substeps=4, **air)
+    assert sim.land().metrics["detection"]["time_s"] is None
+    shares = sim.log.filter(like="_likelihood_share")
+    assert shares[200:300].isna().all().all()
+    assert shares[300:].max().max() < 0.6
+    assert same_log(sim.log, bf.fly(sim.scenario_flown()).log)
+
+
 def test_a_plug_in_that_is_not_changed_goes_on():
     """An EKF that diagnoses keeps what it knows when the law beside it is changed."""
     given = {"fdi": {"scheme": "augmented-ekf"}, "control": {"law": "lqr"}, "faults": [loss(at_s=2.0)]}

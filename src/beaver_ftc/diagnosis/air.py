@@ -73,7 +73,7 @@ def heading_change(now, then):
 def advance_axes(air, y, attitude):
     """Bring `turn`, `heading` and the `velocity` through the air, m/s in level axes, to this frame.
 
-    y (5,) and attitude (3,) rad as measured. Of the first frame that is all: no gust has changed yet.
+    y (5,) and attitude (3,) rad as measured.
     """
     alpha, beta, V = y[ALPHA], y[BETA], y[AIRSPEED]
     level_axes(attitude[0], attitude[1], air.turn)
@@ -81,6 +81,13 @@ def advance_axes(air, y, attitude):
     u, v, w = V * np.cos(alpha) * np.cos(beta), V * np.sin(beta), V * np.sin(alpha) * np.cos(beta)
     for i in range(3):
         air.velocity[i] = air.turn[0, i] * u + air.turn[1, i] * v + air.turn[2, i] * w
+
+
+@kernel
+def begin(air, y, attitude):
+    """The first frame of a diagnosis, which may begin in flight: no gust has been seen to change yet."""
+    advance_axes(air, y, attitude)
+    air.gust[:] = 0.0
 
 
 @kernel

@@ -113,7 +113,7 @@ def look_ahead(fdi, belief, measured, k):
         if k > 0:
             air.observe(fdi.statistical.air, measured.y, measured.attitude, belief.share * fdi.dt)
         else:
-            air.advance_axes(fdi.statistical.air, measured.y, measured.attitude)
+            air.begin(fdi.statistical.air, measured.y, measured.attitude)
     statistical.prepare(fdi.statistical, fdi, belief.design, measured.x, measured.y, belief.u)
 
 

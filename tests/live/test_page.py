@@ -2,8 +2,10 @@
 
 import functools
 import http.server
+import os
 import shutil
 import threading
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -182,6 +184,69 @@ def test_with_the_keyboard_alone(page):
     assert not page.locator("#help-text").is_visible()
 
 
+def test_a_gamepads_stick_steers(page):
+    """A faked one: full stick is 5 deg/s, what is nearly centred is centred; unplugged, nothing is asked for."""
+    page.evaluate(
+        """window.pads = [null, {connected: true, axes: [0.5, -1, 0.05]}];
+        Object.defineProperty(navigator, "getGamepads", {value: () => window.pads})"""
+    )
+    until(page, "cockpit.flight.frame.stick !== null")
+    rates = page.evaluate("cockpit.flight.frame.stick")
+    assert np.degrees(rates) == pytest.approx([2.5, -5.0, 0.0])
+    page.locator("#tab-fly").click()
+    assert "roll 2.5, pitch -5, yaw 0" in page.inner_text("#stick-says")
+    until(page, "cockpit.value('p_reference_rad_s') !== null")
+    page.evaluate("window.pads = []")
+    until(page, "cockpit.flight.frame.stick === null")
+
+
+def test_law_and_diagnosis_are_changed_at_once(page):
+    break_elevator(page)
+    until(page, "document.querySelector('#verdict').textContent.includes('elevator')")
+    page.locator("#tab-flight").click()
+    page.locator("[name=law]").select_option("lqr")
+    page.locator("[name=scheme]").select_option("none")
+    page.locator("#change").click()
+    until(page, "cockpit.flight.state.flying.law === 'lqr' && cockpit.flight.frame.axis === null")
+    assert "law lqr, diagnosis none" in page.inner_text("#flying")
+    assert page.inner_text("#alarm").endswith("no alarm")
+    page.locator("[name=scheme]").select_option("adaptive-estimators")
+    page.locator("#change").click()
+    until(page, "document.querySelector('#verdict').textContent.includes('elevator')")
+    before = page.evaluate("cockpit.flight.state.flying")
+    page.locator("#renew").click()
+    until(page, "document.querySelectorAll('#events b').length >= 9")
+    until(page, "document.querySelector('#verdict').textContent.includes('elevator')")
+    assert page.evaluate("cockpit.flight.state.flying") == before
+
+
+def test_a_minute_of_flight_drops_no_frame(page, cockpit):
+    """Of the flight: its log has every frame; what the page is shown comes in order."""
+    page.evaluate(
+        """window.seen = []; window.watch = setInterval(() => {
+        const t = cockpit.value("t_s"); if (t !== window.seen.at(-1)) window.seen.push(t); }, 1)"""
+    )
+    page.locator("#speed").select_option("5")
+    until(page, "cockpit.value('t_s') > 61")
+    seen = np.array(page.evaluate("(clearInterval(window.watch), window.seen)"))
+    page.locator("#speed").select_option("1")
+    page.locator("#save").click()
+    until(page, "document.querySelector('#says').textContent.startsWith('saved')")
+    t_s = bf.open_run(max(cockpit.out.iterdir())).log["t_s"].to_numpy()
+    assert np.array_equal(np.round(100 * t_s), np.arange(t_s.size))
+    assert t_s[-1] > 61
+    assert (np.diff(seen) > 0).all()
+    assert np.isin(np.round(100 * seen), np.arange(t_s.size)).all()
+
+
+def test_what_is_broken_is_said_without_colour(page):
+    assert page.inner_text("#legend") == "click a surface to break it"
+    break_elevator(page)
+    until(page, "document.querySelector('#legend').textContent === '✕ broken: elevator'")
+    assert "broken" in page.inner_text("fieldset[data-surface=elevator] legend")
+    assert "broken" not in page.inner_text("fieldset[data-surface=rudder] legend")
+
+
 def test_everything_that_can_be_pressed_has_a_name(page):
     unnamed = page.evaluate(
         """[...document.querySelectorAll("button, select, input, canvas, [role=tab]")].filter((node) =>
@@ -204,15 +269,26 @@ def test_nothing_is_cut_off(page, screen):
         assert box["x"] + box["width"] <= width + 1
 
 
-def test_memory_does_not_grow_without_end(page):
+def resident_bytes(pid):
+    """Memory of a process and of those it started."""
+    own = int(Path(f"/proc/{pid}/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+    children = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
+    return own + sum(map(resident_bytes, children))
+
+
+def test_memory_does_not_grow_without_end(page, cockpit):
     page.locator("#speed").select_option("20")
     until(page, "cockpit.value('t_s') > 60")  # the charts' window is full three times over
     before = page.evaluate("(gc(), performance.memory.usedJSHeapSize)")
+    resident = resident_bytes(cockpit.process.pid)
     start = page.evaluate("cockpit.value('t_s')")
     until(page, f"cockpit.value('t_s') > {start + 240}")
     page.locator("#speed").select_option("1")
     after = page.evaluate("(gc(), performance.memory.usedJSHeapSize)")
     assert after - before < 3e6
+    assert (
+        resident_bytes(cockpit.process.pid) - resident < 40e6
+    )  # 24 000 rows of the log are 20 MB, in a file
 
 
 def test_a_strangers_page_on_another_port_cannot_talk_to_it(context, cockpit, tmp_path):

@@ -92,7 +92,8 @@ class Session:
             self._tell("alarm", f"residual of {verdict.axis} beyond its threshold", secret=True)
         if verdict.isolated and before[1:3] != said[1:3]:
             self.game.named(verdict.isolated, t_s)
-            what = f", {verdict.type.replace('_', ' ')}" if verdict.type else ""
+            kind = verdict.type if verdict.type != verdict.isolated else None
+            what = f", {kind.replace('_', ' ')}" if kind else ""
             self._tell("named", f"{verdict.isolated}{what}", secret=True)
         elif verdict.detected and verdict.candidates != before[3] and not verdict.isolated:
             self._tell("candidates", ", ".join(verdict.candidates) or "none left", secret=True)

@@ -53,21 +53,32 @@ export function meetSurfaces(hello) {
   byId("surfaces").replaceChildren(...hello.surfaces.map((surface, i) => {
     const group = document.createElement("fieldset");
     group.dataset.surface = surface;
-    group.append(Object.assign(document.createElement("legend"), { textContent: `${i + 1} ${surface}` }), ...buttons(surface));
+    const title = Object.assign(document.createElement("legend"), { textContent: `${i + 1} ${surface}` });
+    title.append(Object.assign(document.createElement("em"), { textContent: " ✕ broken" }));
+    group.append(title, ...buttons(surface));
     return group;
   }));
 }
 
 export function drawBroken() {
   const broken = new Set(flight.state?.broken ?? []);
+  drawLegend([...broken]);
   for (const group of byId("surfaces").children) {
     const surface = group.dataset.surface;
     const hidden = flight.state?.game.phase === "waiting";
     group.classList.toggle("broken", broken.has(surface));
+    group.querySelector("em").hidden = !broken.has(surface);
     for (const button of group.querySelectorAll("[data-label]")) {
       button.setAttribute("aria-pressed", !hidden && Boolean(active.get(surface)?.has(button.dataset.label)));
     }
   }
+}
+
+// What is broken is red in the view; said in words beside it.
+function drawLegend(broken) {
+  const legend = byId("legend"), text = broken.length ? `✕ broken: ${broken.join(", ")}` : "click a surface to break it";
+  if (legend.textContent !== text) legend.textContent = text;
+  legend.classList.toggle("broken", broken.length > 0);
 }
 
 let opener = null;

@@ -3,7 +3,8 @@
 import uPlot from "../vendor/uplot.min.js";
 import { AXES, DEG, flight, value } from "./state.js";
 
-const WINDOW_S = 20, POINTS = 320;
+const WINDOW_S = 20, POINTS = 320, MARK_S = 4;
+const MARKS = "●■▲◆★✚▼○";
 export const COLOURS = ["#6ec1f0", "#f0a830", "#2fbf94", "#dd92c0", "#f0e442", "#ff7a4d", "#b0bec8", "#ffffff"];
 
 // A chart: curves, each with the value it shows now; solid is what is, dashed is what was asked or estimated.
@@ -28,6 +29,13 @@ function plans(surfaces) {
   ];
 }
 
+// Where to mark curves: the newest point, and the first after each multiple of MARK_S.
+function marked(times) {
+  const places = [];
+  for (let j = 1; j < times.length; j += 1) if (Math.floor(times[j] / MARK_S) > Math.floor(times[j - 1] / MARK_S)) places.push(j);
+  return times.length ? [...places, times.length - 1] : places;
+}
+
 class Chart {
   constructor(parent, plan) {
     this.plan = plan;
@@ -48,7 +56,7 @@ class Chart {
     const title = document.createElement("h2");
     title.append(Object.assign(document.createElement("b"), { textContent: this.plan.title }));
     this.plan.names.forEach((name, i) => {
-      const key = Object.assign(document.createElement("span"), { className: "key", textContent: `${"●■▲◆★✚▼○"[i]} ${name}` });
+      const key = Object.assign(document.createElement("span"), { className: "key", textContent: `${MARKS[i]} ${name}` });
       key.style.color = COLOURS[i];
       title.append(key);
     });
@@ -64,7 +72,7 @@ class Chart {
       series: [{}, ...plan.curves.map(({ label, colour, dash }) => ({
         label, stroke: COLOURS[colour], width: dash ? 1 : 1.5, dash: dash ? [5, 4] : undefined, points: { show: false }, spanGaps: false,
       }))],
-      hooks: plan.limits ? { draw: [(plot) => this.drawLimits(plot)] } : {},
+      hooks: { draw: [(plot) => this.drawLimits(plot), (plot) => this.drawMarks(plot)] },
     };
   }
 
@@ -77,6 +85,7 @@ class Chart {
 
   drawLimits(plot) {
     const { ctx, bbox } = plot;
+    if (!this.plan.limits) return;
     ctx.save();
     ctx.strokeStyle = "#ff7a4d";
     ctx.lineWidth = 2;
@@ -87,6 +96,24 @@ class Chart {
       ctx.lineTo(bbox.left + bbox.width, y);
       ctx.stroke();
     }
+    ctx.restore();
+  }
+
+  // The mark of its key on each solid curve, at fixed times of flight: curves are told apart without colour.
+  drawMarks(plot) {
+    const { ctx } = plot, [times] = this.data, places = marked(times);
+    ctx.save();
+    ctx.font = `${10 * devicePixelRatio}px sans-serif`;
+    ctx.textAlign = "center";
+    ctx.textBaseline = "middle";
+    this.plan.curves.forEach(({ colour, dash }, i) => {
+      if (dash) return;
+      ctx.fillStyle = COLOURS[colour];
+      for (const j of places) {
+        const y = this.data[i + 1][j];
+        if (y !== null && y !== undefined) ctx.fillText(MARKS[colour], plot.valToPos(times[j], "x", true), plot.valToPos(y, "y", true));
+      }
+    });
     ctx.restore();
   }
 

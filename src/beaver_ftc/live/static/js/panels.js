@@ -22,6 +22,7 @@ export function drawDiagnosis() {
 function verdictText(frame) {
   if (!frame.axis) return "";
   if (!frame.isolated) return `${frame.candidates.length} could explain it`;
+  if (frame.isolated === frame.type) return `Named: ${frame.isolated}, none of the known faults`;
   const what = frame.type ? `, ${frame.type.replaceAll("_", " ")}` : "";
   const loss = frame.type === "loss_of_effectiveness" && frame.estimate !== null && frame.estimate !== undefined;
   return `Named: ${frame.isolated}${what}${loss ? ` of ${Math.round(-100 * frame.estimate)} %` : ""}`;

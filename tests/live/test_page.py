@@ -185,7 +185,7 @@ def test_with_the_keyboard_alone(page):
 
 
 def test_a_gamepads_stick_steers(page):
-    """A faked one: full stick is 5 deg/s, what is nearly centred is centred; unplugged, nothing is asked for."""
+    """A faked one: full stick is 5 deg/s, nearly centred is centred; unplugged, it asks for nothing."""
     page.evaluate(
         """window.pads = [null, {connected: true, axes: [0.5, -1, 0.05]}];
         Object.defineProperty(navigator, "getGamepads", {value: () => window.pads})"""

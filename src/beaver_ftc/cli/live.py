@@ -16,7 +16,7 @@ def command(
         str, typer.Argument(metavar="[SCENARIO]", help="A file, or the name of a built-in scenario.")
     ] = "fault-free",
     aircraft: Annotated[
-        str | None, typer.Option(metavar="AIRCRAFT", help="Fly this one instead of the scenario's.")
+        str | None, typer.Option(metavar="AIRCRAFT", help="Fly this one, without the scenario's uncertainty.")
     ] = None,
     port: Annotated[int, typer.Option(min=0, max=65535, help="Port on the loopback; 0: any.")] = 0,
     out: Annotated[Path, typer.Option(help="Folder in which the page's Save writes.")] = Path("runs"),
@@ -35,7 +35,9 @@ def _scenario(name: str, aircraft: str | None) -> "Scenario":
     from beaver_ftc.scenario.loader import load_scenario
 
     loaded = load_scenario(name)
-    return loaded if aircraft is None else loaded.with_({"aircraft": aircraft})
+    if aircraft is None or aircraft == loaded.aircraft:
+        return loaded
+    return loaded.with_({"aircraft": aircraft, "uncertainty": {}})  # it is of the aircraft that was meant
 
 
 def _say(address: str, open_browser: bool) -> None:

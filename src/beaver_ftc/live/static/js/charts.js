@@ -101,8 +101,11 @@ class Chart {
 
   // The mark of its key on each solid curve, at fixed times of flight: curves are told apart without colour.
   drawMarks(plot) {
-    const { ctx } = plot, [times] = this.data, places = marked(times);
+    const { ctx, bbox } = plot, [times] = this.data, places = marked(times);
     ctx.save();
+    ctx.beginPath();
+    ctx.rect(bbox.left, bbox.top, bbox.width + 6, bbox.height);
+    ctx.clip();
     ctx.font = `${10 * devicePixelRatio}px sans-serif`;
     ctx.textAlign = "center";
     ctx.textBaseline = "middle";

@@ -65,7 +65,7 @@ export function meetControls(hello) {
   for (const input of byId("aim").querySelectorAll("input")) input.disabled = !hello.autopilot.includes(input.name);
   byId("aim").querySelector("[type=submit]").disabled = !hello.autopilot.length;
   byId("autopilot-on").hidden = hello.autopilot.length > 0;
-  byId("description").textContent = hello.description;
+  byId("description").textContent = `Aircraft ${hello.aircraft}. ${hello.description}`;
 }
 
 function choices(name, values, chosen) {

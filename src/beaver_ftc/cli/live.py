@@ -28,7 +28,7 @@ def command(
     """
     from beaver_ftc.live.serve import serve
 
-    serve(_scenario(scenario, aircraft), out, port, lambda address: _say(address, open_browser))
+    serve(lambda: _scenario(scenario, aircraft), out, port, lambda address: _say(address, open_browser))
 
 
 def _scenario(name: str, aircraft: str | None) -> "Scenario":

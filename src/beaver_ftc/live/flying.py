@@ -6,8 +6,8 @@ text) from it, page 0 for all of them.
 
 import contextlib
 import os
-import signal
 import time
+from importlib import import_module
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
@@ -16,16 +16,20 @@ from beaver_ftc.errors import BadInput, BeaverFtcError
 from beaver_ftc.live import messages
 from beaver_ftc.live.pace import Pace
 from beaver_ftc.live.session import NO_STICK, Session, encode
+from beaver_ftc.live.words import BAD_INPUT, EVERYONE
 
-EVERYONE = 0
-BAD_INPUT = "bad input"  # in place of a page: the flight cannot be begun
 STATE_EVERY = 15  # ticks
 
 
-def main(connection: Connection, scenario: Any, out: str) -> None:
+def main(connection: Connection, out: str) -> None:
     """The process. Ends when told, or when the server is gone; a flight that cannot be begun says why."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the server ends it
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    import_module("beaver_ftc.loop.loop")  # most of the way to the first frame, while the scenario is read
+    try:
+        scenario = connection.recv()
+    except EOFError:  # the server is gone
+        return
+    if isinstance(scenario, tuple):  # told to end
+        return
     try:
         session = Session(scenario, Path(out))
     except BeaverFtcError as error:

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from beaver_ftc.errors import BadInput, SimulationFailed
-from beaver_ftc.live import flying, messages
+from beaver_ftc.live.words import BAD_INPUT, EVERYONE, MAX_BYTES
 
 if TYPE_CHECKING:
     from beaver_ftc.scenario.schema import Scenario
@@ -21,17 +21,22 @@ LOOPBACK = "127.0.0.1"
 LAST_WORDS_S = 3.0  # the flight process is given so long to end
 
 
-def serve(scenario: "Scenario", out: Path, port: int, say: Callable[[str], None]) -> None:
+def serve(load: "Callable[[], Scenario]", out: Path, port: int, say: Callable[[str], None]) -> None:
     """Serve the page until SIGINT or SIGTERM. say: prints the address once a page can be opened.
 
-    Raises BadInput for a port in use or a flight that cannot be begun, SimulationFailed if the flight's
-    process dies.
+    load: gives the scenario, while the flight's process gets ready beside. Raises BadInput for a port in use
+    or a flight that cannot be begun, SimulationFailed if the flight's process dies.
     """
-    with _listening(port) as listener, _flight(scenario, out) as pipe:
+    with _listening(port) as listener, _flight(out) as (process, pipe):
+        try:
+            pipe.send(load())
+        except BadInput:
+            process.terminate()
+            raise
         ended = asyncio.run(_serve(listener, pipe, say))
     if ended is not None:
         kind, says = ended
-        raise BadInput(says) if kind == flying.BAD_INPUT else SimulationFailed(says)
+        raise BadInput(says) if kind == BAD_INPUT else SimulationFailed(says)
 
 
 @contextlib.contextmanager
@@ -50,24 +55,31 @@ def _listening(port: int) -> Iterator[socket.socket]:
 
 
 @contextlib.contextmanager
-def _flight(scenario: "Scenario", out: Path) -> Iterator[Connection]:
-    """The flight process, and the pipe to it."""
+def _flight(out: Path) -> Iterator[tuple[Any, Connection]]:
+    """The flight process, and the pipe to it; the first thing it is sent is the scenario."""
     context = multiprocessing.get_context("spawn")
     ours, theirs = context.Pipe()
-    process = context.Process(
-        target=flying.main, args=(theirs, scenario, str(out)), name="beaver-ftc flight", daemon=True
-    )
+    process = context.Process(target=_fly, args=(theirs, str(out)), name="beaver-ftc flight", daemon=True)
     process.start()
     theirs.close()
     try:
-        yield ours
+        yield process, ours
     finally:
         with contextlib.suppress(OSError):
-            ours.send((flying.EVERYONE, "end"))
+            ours.send((EVERYONE, "end"))
         process.join(LAST_WORDS_S)
         if process.is_alive():
             process.terminate()
             process.join()
+
+
+def _fly(connection: Connection, out: str) -> None:
+    """What the process does; the server itself imports nothing of it."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the server ends it
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    from beaver_ftc.live import flying
+
+    flying.main(connection, out)
 
 
 async def _serve(
@@ -84,7 +96,7 @@ async def _serve(
     app = application(gate, pages, _asker(pipe))
     config = uvicorn.Config(
         app, log_level="error", access_log=False, lifespan="off", server_header=False,
-        ws_max_size=messages.MAX_BYTES, ws_ping_interval=20.0, timeout_graceful_shutdown=2,
+        ws_max_size=MAX_BYTES, ws_ping_interval=20.0, timeout_graceful_shutdown=2,
     )  # fmt: skip
     server = _server(config)
     _on_signals(server)

@@ -207,7 +207,7 @@ def test_law_and_diagnosis_are_changed_at_once(page):
     page.locator("[name=law]").select_option("lqr")
     page.locator("[name=scheme]").select_option("none")
     page.locator("#change").click()
-    until(page, "cockpit.flight.state.flying.law === 'lqr' && cockpit.flight.frame.axis === null")
+    until(page, "cockpit.flight.state.flying.law === 'lqr' && !cockpit.flight.frame.detected")
     assert "law lqr, diagnosis none" in page.inner_text("#flying")
     assert page.inner_text("#alarm").endswith("no alarm")
     page.locator("[name=scheme]").select_option("adaptive-estimators")
@@ -218,6 +218,16 @@ def test_law_and_diagnosis_are_changed_at_once(page):
     until(page, "document.querySelectorAll('#events b').length >= 9")
     until(page, "document.querySelector('#verdict').textContent.includes('elevator')")
     assert page.evaluate("cockpit.flight.state.flying") == before
+
+
+def test_a_sensor_is_broken_and_named(page):
+    page.locator("#sensor").select_option("q")
+    page.locator("#sensor-break").click()
+    until(page, "document.querySelector('#verdict').textContent.includes('sensor q')")
+    assert "ALARM" in page.inner_text("#alarm")
+    until(page, "document.querySelector('#sensors legend').textContent.includes('✕ q')")
+    page.locator("#sensor-repair").click()
+    until(page, "cockpit.flight.state.broken.length === 0")
 
 
 def test_a_minute_of_flight_drops_no_frame(page, cockpit):

@@ -126,6 +126,25 @@ def test_law_diagnosis_and_sensors_are_changed_in_flight_and_fly_again_to_the_bi
         asked(session, do="change", law="lqr")
 
 
+def test_a_sensor_is_broken_named_and_looked_at_anew_and_flies_again_to_the_bit(session, tmp_path):
+    assert {"p", "alpha", "V", "engine_rpm"} <= set(session.hello()["sensors"])
+    flown(session, 200)
+    asked(session, do="break", fault={"sensor": "q", "type": "bias", "magnitude": 3})
+    flown(session, 200)
+    frame = session.frame()
+    assert (frame["detected"], frame["isolated"]) == (True, "sensor q")
+    assert session.state()["broken"] == ["q"]
+    assert told(session, "alarm")
+    asked(session, do="change", scheme="adaptive-estimators")
+    flown(session, 300)
+    asked(session, do="repair", actuator="q")
+    flown(session, 50)
+    asked(session, do="save")
+    (folder,) = tmp_path.iterdir()
+    log = session.sim.log
+    assert np.array_equal(log.to_numpy(), bf.fly(folder / "scenario.yaml").log.to_numpy(), equal_nan=True)
+
+
 def test_one_gust_at_a_time(session):
     asked(session, do="blow", velocity_mps=[0, 3, 0])
     with pytest.raises(BadInput, match="one at a time"):

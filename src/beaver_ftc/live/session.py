@@ -11,11 +11,13 @@ from typing import Any
 import numpy as np
 
 import beaver_ftc as bf
+from beaver_ftc.aircraft import question
 from beaver_ftc.errors import BadInput, suggestion
 from beaver_ftc.live import messages
 from beaver_ftc.live.game import NOTHING, Game, hidden_faults
 from beaver_ftc.plugins import DETECTORS, LAWS, registered
 from beaver_ftc.results.log import SpooledLog
+from beaver_ftc.scenario.sensor_faults import sensors_there
 
 LONGEST_S = 3600.0  # of one live flight: its log is 0.3 GB then
 EVENTS_KEPT = 400
@@ -27,6 +29,7 @@ HELD = ("altitude_m", "airspeed_mps", "heading_deg")  # by the autopilot that th
 NO_STICK = messages.Stick(do="stick", rates_deg_s=(0.0, 0.0, 0.0))
 GUST_S = {"rise_s": 0.5, "hold_s": 1.0, "fade_s": 0.5}
 PATIENCE_S = 10.0  # for the diagnosis, once you have spoken
+INSTRUMENTS = "instruments"
 HIDDEN = ("_effective_rad", "_pos_rad", "_excluded", "_effectiveness_estimate", "mode", "detected")
 
 
@@ -84,12 +87,18 @@ class Session:
     def _notice(self) -> None:
         """Events: the alarm, the name, candidates, the supervisor's mode, the end."""
         sim, verdict, t_s = self.sim, self.sim.verdict, self.sim.t_s
-        said = (verdict.axis, verdict.isolated, verdict.type, verdict.candidates, sim.departed)
+        alarm = (verdict.axis or INSTRUMENTS) if verdict.detected else None
+        said = (alarm, verdict.isolated, verdict.type, verdict.candidates, sim.departed)
         if said == self._said and sim.mode == self._mode:
             return
         before, self._said = self._said, said
-        if verdict.detected and before[0] != verdict.axis:
-            self._tell("alarm", f"residual of {verdict.axis} beyond its threshold", secret=True)
+        if alarm and before[0] != alarm:
+            why = (
+                f"residual of {alarm} beyond its threshold"
+                if verdict.axis
+                else f"{alarm} contradict one another"
+            )
+            self._tell("alarm", why, secret=True)
         if verdict.isolated and before[1:3] != said[1:3]:
             self.game.named(verdict.isolated, t_s)
             kind = verdict.type if verdict.type != verdict.isolated else None
@@ -250,6 +259,7 @@ class Session:
         if hidden:
             return told
         verdict = sim.verdict
+        told["detected"] = verdict.detected
         told["axis"], told["isolated"], told["type"] = verdict.axis, verdict.isolated, verdict.type
         told["candidates"], told["estimate"] = verdict.candidates, verdict.estimate
         told["mode"] = sim.mode
@@ -263,6 +273,11 @@ class Session:
         told = {"k": "s", "over": self.over, "broken": broken, "game": self.game.shown(), "gust": gust}
         return told | {"flying": self.flying}
 
+    @property
+    def _sensors(self) -> tuple[str, ...]:
+        with question.asked(self.scenario.airframe):
+            return sensors_there()
+
     def hello(self) -> dict[str, Any]:
         """What a page needs to know of this flight before its first frame."""
         low, high = self.sim.travel_rad
@@ -272,7 +287,7 @@ class Session:
             "scenario": self._base.name, "description": self._base.description, "rate_hz": scenario.rate_hz,
             **{key: self.flying[key] for key in ("law", "scheme")},
             "fault_class": scenario.fdi.fault_class, "aircraft": str(scenario.aircraft),
-            "travel_rad": [list(map(float, low)), list(map(float, high))],
+            "sensors": self._sensors, "travel_rad": [list(map(float, low)), list(map(float, high))],
             "autopilot": list(scenario.autopilot.channels if scenario.autopilot else ()),
             "trim_rad": list(map(float, self.sim.trim_rad)),
             "scenarios": sorted({*bf.scenarios(), self._given.name}),

@@ -93,6 +93,7 @@ class Changing:
         if change.law is not None:
             take_law(frame, new["control"])
         if change.renews_diagnosis:
+            self._watch(new["fdi"])
             take_diagnosis(frame, new, stage.frame)
         if change.sensors is not None:
             take_instruments(frame["instruments"], new["instruments"])
@@ -101,6 +102,13 @@ class Changing:
         frame["control"]["power"]["enabled"] = new["control"]["power"]["enabled"]
         frame["control"]["hands_back"] = 1
         take_plugins(loop, stage.plugins)
+
+    def _watch(self, fdi: np.void) -> None:
+        """Watch the instruments as well if one has failed that the scenario had not said: it was broken in
+        flight."""
+        wanted = self._loop.scenario.fdi.sensor_monitor != "never" and fdi["enabled"]
+        if self._loop.sensor_schedule.any and wanted:
+            fdi["watch"]["enabled"] = 1
 
     def _note(self, stage: Stage) -> None:
         """Say what is changed, and what becomes of a verdict that ends with it."""

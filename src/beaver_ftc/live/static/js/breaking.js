@@ -50,6 +50,7 @@ function buttons(surface) {
 
 export function meetSurfaces(hello) {
   active.clear();
+  byId("sensor").replaceChildren(...hello.sensors.map((name) => new Option(name.replaceAll("_", " "), name)));
   byId("surfaces").replaceChildren(...hello.surfaces.map((surface, i) => {
     const group = document.createElement("fieldset");
     group.dataset.surface = surface;
@@ -60,8 +61,35 @@ export function meetSurfaces(hello) {
   }));
 }
 
+// Sizes that can be seen and flown with, in the unit in which a scenario has the sensor.
+const SIZES = { p: 3, q: 3, r: 3, alpha: 3, beta: 3, V: 6, qdyn: 200, phi: 8, theta: 8, psi: 8, altitude: 60, engine_rpm: 300, manifold_pressure: 4 };
+const SENSOR_KINDS = [
+  ["is off", (size) => ({ type: "bias", magnitude: size })],
+  ["scatters", (size) => ({ type: "noise", magnitude: size })],
+  ["a third too much", () => ({ type: "scale", magnitude: 0.33 })],
+  ["freezes", () => ({ type: "freeze" })],
+  ["is lost", () => ({ type: "lost" })],
+];
+
+export function wireSensors() {
+  byId("sensor-fault").replaceChildren(...SENSOR_KINDS.map(([label], i) => new Option(label, i)));
+  byId("sensor-break").addEventListener("click", () => {
+    const sensor = byId("sensor").value, [, fault] = SENSOR_KINDS[Number(byId("sensor-fault").value)];
+    perform({ do: "break", fault: { sensor, ...fault(SIZES[sensor] ?? 1) } });
+  });
+  byId("sensor-repair").addEventListener("click", () => repair(byId("sensor").value));
+}
+
+function drawSensors(broken) {
+  const off = (flight.hello?.sensors ?? []).filter((name) => broken.has(name)), says = byId("sensors").querySelector("em");
+  says.hidden = !off.length;
+  if (says.textContent !== `✕ ${off.join(", ")}`) says.textContent = `✕ ${off.join(", ")}`;
+  byId("sensors").classList.toggle("broken", off.length > 0);
+}
+
 export function drawBroken() {
   const broken = new Set(flight.state?.broken ?? []);
+  drawSensors(broken);
   drawLegend([...broken]);
   for (const group of byId("surfaces").children) {
     const surface = group.dataset.surface;

@@ -1,6 +1,6 @@
 // The page: what the flight says goes into `state`; everything is drawn from there, once a screen frame.
 
-import { drawBroken, meetSurfaces, openMenu, wireMenu } from "./breaking.js";
+import { drawBroken, meetSurfaces, openMenu, wireMenu, wireSensors } from "./breaking.js";
 import { Charts } from "./charts.js";
 import { drawControls, meetControls, wireControls } from "./controls.js";
 import { drawGame, meetGame, wireGame } from "./game.js";
@@ -84,6 +84,7 @@ function count(now) {
 
 wireTabs();
 wireMenu();
+wireSensors();
 wireGame();
 wireControls(view, sticks);
 connect();

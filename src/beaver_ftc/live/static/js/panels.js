@@ -10,17 +10,19 @@ function setText(node, text) {
 
 export function drawDiagnosis() {
   const frame = flight.frame, hidden = flight.state?.game.phase === "waiting";
-  const alarm = byId("alarm"), on = Boolean(frame.axis);
+  const alarm = byId("alarm"), on = Boolean(frame.detected);
   alarm.classList.toggle("on", on);
   alarm.classList.toggle("hidden", hidden);
-  setText(alarm, hidden ? "hidden during the game" : on ? `ALARM: residual of ${frame.axis} beyond its threshold` : "no alarm");
+  setText(alarm, hidden ? "hidden during the game" : on ? alarmText(frame) : "no alarm");
   setText(byId("verdict"), hidden ? "" : verdictText(frame));
   setText(byId("mode"), hidden ? "hidden" : frame.mode ?? "");
   drawCandidates(frame, hidden);
 }
 
+const alarmText = ({ axis }) => `ALARM: ${axis ? `residual of ${axis} beyond its threshold` : "instruments contradict one another"}`;
+
 function verdictText(frame) {
-  if (!frame.axis) return "";
+  if (!frame.detected) return "";
   if (!frame.isolated) return `${frame.candidates.length} could explain it`;
   if (frame.isolated === frame.type) return `Named: ${frame.isolated}, none of the known faults`;
   const what = frame.type ? `, ${frame.type.replaceAll("_", " ")}` : "";

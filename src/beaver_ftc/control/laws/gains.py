@@ -19,6 +19,8 @@ from math import inf, pi, sqrt
 
 import numpy as np
 
+from beaver_ftc.control.laws.left import fading
+
 RATIO = 6.5  # observer over feedback: of those with the same margins, near the least error in turbulence
 LEAST_LEAD_RATIO, MOST_LEAD = 1.0, 4.0  # an actuator hurried to at most this many times its bandwidth
 RESERVE_DB, RESERVE_DEG = 0.5, 2.0  # kept for what an integrator is not: the rest of the aircraft
@@ -179,6 +181,7 @@ def set_up(
     """
     whole = 1.0 - (1.0 - approach) ** substeps
     rejection["share"], rejection["qdyn"] = 1.0 / substeps, qdyn
+    rejection["found"]["fading"] = fading(dt_s)
     rejection["lead"] = [lead_of(float(a)) for a in whole]
     for row, (axis, surface) in enumerate(carriers):
         gyro = gyros[axis]

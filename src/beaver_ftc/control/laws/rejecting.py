@@ -13,13 +13,12 @@ observer missed. gains.py derives w, Kp and the lead.
 """
 
 from beaver_ftc.compiled import kernel
+from beaver_ftc.control.laws import left
 from beaver_ftc.control.laws.state import PITCH, STAND_IN
 from beaver_ftc.control.reference_model import advance
 from beaver_ftc.design.model import QDYN
 
 PATIENCE_S, LONG_PATIENCE_S, RETRY_S = 0.5, 1.0, 20.0
-NOTHING_LEFT = 0.05  # half of what the law divides by
-LEAST_BELIEF = 0.5  # half: what a gain margin of 6 dB forgives
 
 
 @kernel
@@ -52,10 +51,10 @@ def between(table, i, j, part):
 
 
 @kernel
-def hand_over(control, left):
+def hand_over(control, remains):
     """The share of pitch its stand-in carries, once handed over: what the main surface has lost."""
-    given = control.hand_over if left > 0.0 else 1.0
-    lost = 1.0 - left if left >= control.least_effectiveness else 1.0
+    given = control.hand_over if remains > 0.0 else 1.0
+    lost = 1.0 - remains if remains >= control.least_effectiveness else 1.0
     control.rejection.lost = given * given * (3.0 - 2.0 * given) * lost
 
 
@@ -67,14 +66,10 @@ def is_replaced(control, s):
 
 @kernel
 def hesitate(control, s):
-    """Believe no loss worse than LEAST_BELIEF of a surface that has no stand-in.
-
-    A loss found worse than it is would make the loop faster than its margins allow, or give up a surface that
-    nothing replaces. One that gives less is found at its stop: see `abandon`. Below NOTHING_LEFT it is
-    given up as ever.
-    """
-    if control.target[s] >= NOTHING_LEFT and not is_replaced(control, s):
-        control.target[s] = max(control.target[s], LEAST_BELIEF)
+    """Take a loss of a surface that nothing replaces for no larger than the observer sees it."""
+    for i in range(3):
+        if s == control.main[i] and control.target[s] < 1.0 and not is_replaced(control, s):
+            left.hesitate(control, s, i)
 
 
 @kernel
@@ -121,6 +116,7 @@ def observe(control, x, design, given, G):
         expected = explained(control, i, design, given, G) + rejection.disturbance[i]
         rejection.rate[i] += control.dt * expected
         missed = x[i] - rejection.rate[i]
+        left.learn(control, i, given, missed)
         rejection.rate[i] += rejection.pull[i] * missed
         rejection.disturbance[i] += rejection.learn[i] * missed
 

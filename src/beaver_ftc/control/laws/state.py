@@ -10,6 +10,17 @@ N_LOOPS = 4  # roll, pitch, yaw, and pitch by the surface that stands in
 PITCH, STAND_IN = 1, 3
 
 
+# What left.py keeps: the observer's answer to an acceleration, and the sums of its least squares.
+ANSWER = np.dtype([("rate", "f8", (3,)), ("disturbance", "f8", (3,))], align=True)
+FOUND = np.dtype(
+    [
+        ("fading", "f8"), ("product", "f8", (3,)), ("square", "f8", (3,)), ("missed", "f8", (3,)),
+        ("frames", "f8", (3,)),
+    ],
+    align=True,
+)  # fmt: skip
+
+
 @lru_cache
 def rejection_dtype(surfaces: int) -> np.dtype:
     """The record of `rejecting.py` for an aircraft with so many surfaces.
@@ -19,6 +30,7 @@ def rejection_dtype(surfaces: int) -> np.dtype:
     rate (3,) rad/s, disturbance (3,) rad/s2: its estimates. ahead (3,) rad/s: the rate when the command
     acts. lost: share of pitch that the stand-in carries. lead (n,): command beyond the actuator's position
     over what is wanted beyond it. at_stop_s, abandoned (n,): see `abandon`.
+    healthy, believed, found: see left.py.
     """
     return np.dtype(
         [
@@ -30,6 +42,7 @@ def rejection_dtype(surfaces: int) -> np.dtype:
             ("rate", "f8", (3,)), ("disturbance", "f8", (3,)), ("ahead", "f8", (3,)),
             ("lead", "f8", (surfaces,)),
             ("at_stop_s", "f8", (surfaces,)), ("abandoned", "i8", (surfaces,)),
+            ("healthy", ANSWER), ("believed", ANSWER), ("found", FOUND),
         ],
         align=True,
     )  # fmt: skip

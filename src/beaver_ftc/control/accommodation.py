@@ -43,8 +43,9 @@ def accommodate(control, fdi, belief, measured, faults):
         elif s == surface and not fdi.every_type:
             act_on_loss(control, fdi, s)
         if control.inner == REJECTING and control.law != ORACLE:
+            if not (fdi.every_type and fdi.surface[s].measure == FIXED):
+                rejecting.hesitate(control, s)
             suspected = fdi.verdict.detected and s == surface and is_doubtful(control, fdi, s)
-            rejecting.hesitate(control, s)
             rejecting.abandon(control, s, suspected)
     adaptive.approach(control, control.target)
     compensate(control, fdi, belief, measured, faults)
@@ -52,10 +53,12 @@ def accommodate(control, fdi, belief, measured, faults):
 
 @kernel
 def is_doubtful(control, fdi, s):
-    """Whether surface s, which is named, may be of no use: its type is open, nothing of it seems to be left,
-    or another can take its place."""
+    """Whether surface s, which is named, may be of no use: another can take its place, or its type is open or
+    nothing of it seems to be left, and the law's observer sees nothing of it either."""
+    if rejecting.is_replaced(control, s):
+        return True
     is_open = fdi.every_type and fdi.surface[s].measure < 0
-    return is_open or control.target[s] < control.least_effectiveness or s == control.main[PITCH]
+    return (is_open or control.target[s] < control.least_effectiveness) and not rejecting.acts(control, s)
 
 
 @kernel

@@ -59,6 +59,13 @@ def left_of(control, i, named):
 
 
 @kernel
+def acts(control, i):
+    """Whether the main surface of axis i gives enough to be divided by."""
+    found = control.rejection.found
+    return found.product[i] > (control.least_effectiveness - 1.0) * found.square[i]
+
+
+@kernel
 def hesitate(control, s, i):
     """Believe the larger of both estimates of surface s, main one of axis i; nothing of it is nothing."""
     named = control.target[s]

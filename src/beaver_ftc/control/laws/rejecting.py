@@ -73,6 +73,15 @@ def hesitate(control, s):
 
 
 @kernel
+def acts(control, s):
+    """Whether the law's observer sees surface s act."""
+    for i in range(3):
+        if s == control.main[i] and left.acts(control, i):
+            return True
+    return False
+
+
+@kernel
 def abandon(control, s, suspected):
     """Give up surface s if it is suspected of a fault and has stood at its stop for a while.
 

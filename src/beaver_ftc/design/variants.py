@@ -136,6 +136,15 @@ def effectiveness(design: np.void, y: np.ndarray) -> np.ndarray:
     return design["G0"].copy() if design["linearised"] else _split(design, np.zeros(3), y)[1].real
 
 
+def own_damping(design: np.void, y: np.ndarray) -> np.ndarray:
+    """d f_i / d x_i (3,) 1/s at y and no rate, surfaces neutral: each rate's effect on its own axis."""
+    if design["linearised"]:
+        return np.diag(design["f_x"]).copy()
+    return np.array(
+        [_split(design, 1j * _STEP * e, y + 0j)[0][i].imag / _STEP for i, e in enumerate(np.eye(3))]
+    )
+
+
 def _directional(design: np.void, x: np.ndarray, y: np.ndarray, u: np.ndarray) -> np.ndarray:
     f, G = _split(design, x, y)
     return (f + G @ u).imag / _STEP

@@ -79,10 +79,11 @@ class ControlConfig(BaseModel):
     )
     phase_margin_deg: float = Field(45.0, gt=0, le=80, description="of every loop of the default law, deg")
     noise_share: float = Field(
-        0.25,
+        0.5,
         gt=0,
         le=1,
-        description="of a surface's rate limit, that gyro noise may cost with the default law",
+        description="of a surface's rate limit, that gyro noise may cost with the default law, as a standard "
+        "deviation: it stays within the limit 95 % of the time",
     )
     proportional_per_s: float = Field(
         2.0, gt=0, le=50, description="Kp, 1/s: error bandwidth, well above the 0.2 Hz references"

@@ -7,7 +7,7 @@ import numpy as np
 from beaver_ftc.control.laws import gains
 from beaver_ftc.control.laws.state import N_POINTS, REJECTING
 from beaver_ftc.design.model import AIRSPEED, QDYN
-from beaver_ftc.design.variants import effectiveness
+from beaver_ftc.design.variants import effectiveness, own_damping
 from beaver_ftc.diagnosis.state import PITCH
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.sensors import RateGyro
@@ -35,13 +35,22 @@ def _set_up_rejection(control: np.void, belief: np.void, scenario: Scenario, y: 
         dt_s=dt,
         substeps=scenario.substeps,
         approach=belief["actuators"]["approach"],
-        speed_rad_s=config.noise_share * _rate_limits(scenario),
+        speed_rad_s=config.noise_share * _shares(belief["design"], y, carriers) * _rate_limits(scenario),
         gyros=[_gyro(getattr(scenario.sensors, axis), dt) for axis in AXES],
         margin=(config.gain_margin_db, config.phase_margin_deg),
         qdyn=signals[:, QDYN],
         G=np.stack([effectiveness(belief["design"], each) for each in signals]),
         carriers=carriers,
     )
+
+
+def _shares(design: np.void, y: np.ndarray, carriers: list[tuple[int, int]]) -> np.ndarray:
+    """What part of the noise that is allowed each surface (n,) may have: gains.py says why a root."""
+    a = np.abs(own_damping(design, y))
+    shares = np.ones(design["G0"].shape[1])
+    for axis, s in carriers:
+        shares[s] = sqrt(a[axis] / a.max())
+    return shares
 
 
 def _rate_limits(scenario: Scenario) -> np.ndarray:

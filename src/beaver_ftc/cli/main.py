@@ -22,6 +22,7 @@ COMMANDS = (
     "validate",
     "schema",
     "trim",
+    "linearise",
     "list",
     "show",
     "new",

@@ -1,0 +1,1 @@
+"""Margins of the default law on the whole aircraft: what `beaver-ftc linearise` shows."""

@@ -101,6 +101,7 @@ class Flight:
     departure: tuple[float, str] | None = None
     saturation_s: dict[str, float] = field(default_factory=lambda: dict.fromkeys(SURFACES, 0.0))
     surface_travel_rad: dict[str, float] = field(default_factory=lambda: dict.fromkeys(SURFACES, 0.5))
+    surface_energy_rad2_s: dict[str, float] = field(default_factory=lambda: dict.fromkeys(SURFACES, 0.01))
     worst_residual_ratio: float = 0.11
     type_time_s: float | None = None
     estimate_interval: tuple[float, float] | None = None

@@ -48,10 +48,12 @@ ENVELOPE = np.dtype(
 
 @lru_cache
 def accounts_dtype(n: int) -> np.dtype:
-    """Accounts of a flight with n surfaces; travelled (n,) rad."""
+    """Accounts of a flight with n surfaces; travelled (n,) rad, hurried
+    (n,) rad2/s: the integral of the speed's square."""
     fields = [
         ("guarantee", GUARANTEE), ("tracking", TRACKING), ("authority", AUTHORITY), ("envelope", ENVELOPE),
-        ("saturated_frames", "i8", (n,)), ("travelled", "f8", (n,)), ("position_then", "f8", (n,)),
+        ("saturated_frames", "i8", (n,)), ("travelled", "f8", (n,)), ("hurried", "f8", (n,)),
+        ("position_then", "f8", (n,)),
     ]  # fmt: skip
     return np.dtype(fields, align=True)
 
@@ -109,18 +111,20 @@ def account(accounts, truth, fdi, control, k, t):
     else:
         tracking.frames_before += 1
         bank.note_closest_approach(fdi)
-    account_surfaces(accounts, truth, control.saturated, k)
+    account_surfaces(accounts, truth, control.saturated, k, control.dt)
     note_envelope(accounts.envelope, truth.value[ch.ENVELOPE] < 0.5, t)
 
 
 @kernel
-def account_surfaces(accounts, truth, saturated, k):
-    """How long each surface was saturated and how far it has travelled."""
+def account_surfaces(accounts, truth, saturated, k, dt):
+    """How long each surface was saturated, how far it has travelled and how fast."""
     for s in range(saturated.size):
         now = position(truth, s)
         accounts.saturated_frames[s] += saturated[s]
         if k > 0:
-            accounts.travelled[s] += abs(now - accounts.position_then[s])
+            moved = now - accounts.position_then[s]
+            accounts.travelled[s] += abs(moved)
+            accounts.hurried[s] += moved * moved / dt
         accounts.position_then[s] = now
 
 

@@ -63,6 +63,7 @@ class Flight:
     worst_residual_ratio: float
     closest_approach: tuple[float, ...] = ()
     surface_travel_rad: dict[str, float] = field(default_factory=dict)
+    surface_energy_rad2_s: dict[str, float] = field(default_factory=dict)
     type_time_s: float | None = None
     estimate_interval: tuple[float, float] | None = None
     frequency_rad_s: float | None = None

@@ -232,5 +232,6 @@ def flight_of(
         profile=_profile(frame),
         changes=replaced,
         surface_travel_rad={s: float(x) for s, x in zip(surfaces, accounts["travelled"], strict=True)},
+        surface_energy_rad2_s={s: float(x) for s, x in zip(surfaces, accounts["hurried"], strict=True)},
         **(_findings(frame, surfaces) if verdict is None else _of_verdict(fdi, verdict)),
     )

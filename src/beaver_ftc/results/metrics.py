@@ -49,6 +49,10 @@ def metrics(flight: "Flight") -> Document:
             "surface_travel_deg": {
                 surface: _number(math.degrees(path)) for surface, path in flight.surface_travel_rad.items()
             },
+            "surface_energy_deg2_s": {
+                surface: _number(math.degrees(math.degrees(spent)))
+                for surface, spent in flight.surface_energy_rad2_s.items()
+            },
         },
         "supervisor": [{"time_s": _number(time), "mode": mode} for time, mode in flight.supervisor],
         "changes": [_change(change) for change in flight.changes],

@@ -68,7 +68,9 @@ def acts(control, i):
 @kernel
 def hesitate(control, s, i):
     """Believe the larger of both estimates of surface s, main one of axis i; nothing of it is nothing."""
-    named = control.target[s]
+    named, found = control.target[s], control.rejection.found
+    if not found.named[i]:  # it is not what it was: what was seen before counts no longer
+        found.named[i], found.product[i], found.square[i] = 1, 0.0, 0.0
     left = max(named, min(left_of(control, i, named), 1.0))
     control.target[s] = left if left < NOTHING_LEFT else max(left, control.least_effectiveness)
 

@@ -15,7 +15,7 @@ ANSWER = np.dtype([("rate", "f8", (3,)), ("disturbance", "f8", (3,))], align=Tru
 FOUND = np.dtype(
     [
         ("fading", "f8"), ("product", "f8", (3,)), ("square", "f8", (3,)), ("missed", "f8", (3,)),
-        ("frames", "f8", (3,)),
+        ("frames", "f8", (3,)), ("named", "i8", (3,)),
     ],
     align=True,
 )  # fmt: skip

@@ -70,6 +70,7 @@ CONTROL: tuple[tuple[str, Cell], ...] = (
     ("error before, deg/s 50/90 %", _pair("before")),
     ("after", _pair("after")),
     ("travel deg/s", lambda row, _: _rate(row.get("travel_median"))),
+    ("energy deg2/s2", lambda row, _: _rate(row.get("energy_median"))),
 )
 
 

@@ -39,6 +39,7 @@ class Line:
     after_median: float | None = None
     after_90: float | None = None
     travel_median: float | None = None
+    energy_median: float | None = None
 
 
 def line_of(entry: Entry, results: Sequence[Result], oracle: Sequence[Result]) -> Line:
@@ -75,6 +76,7 @@ def line_of(entry: Entry, results: Sequence[Result], oracle: Sequence[Result]) -
         after_median=share_within([r.after_deg_s for r in faulted], 0.5) if faulted else None,
         after_90=share_within([r.after_deg_s for r in faulted], 0.9) if faulted else None,
         travel_median=share_within([r.travel_deg_s for r in mine], 0.5) if mine else None,
+        energy_median=share_within([r.energy_deg2_s2 for r in mine], 0.5) if mine else None,
     )
 
 

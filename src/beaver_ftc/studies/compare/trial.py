@@ -32,6 +32,7 @@ class Result:
     healthy_s: time under observation without a fault, until the first alarm. rms_deg_s: over all axes,
     after the fault (all the flight without one), and infinite after a departure. before_deg_s, after_deg_s:
     the same before and after it. travel_deg_s: path of all surfaces over the time flown.
+    energy_deg2_s2: mean square of their speeds, summed: what moves a mass against friction spends.
     """
 
     entry: Entry
@@ -49,6 +50,7 @@ class Result:
     before_deg_s: float = inf
     after_deg_s: float = inf
     travel_deg_s: float = inf
+    energy_deg2_s2: float = inf
 
 
 @dataclass
@@ -143,6 +145,7 @@ def result_of(flight: Flight, entry: Entry, us: float) -> Result:
         before_deg_s=_part(document, "pre_fault_rms_deg_s"),
         after_deg_s=_part(document, "post_fault_rms_deg_s"),
         travel_deg_s=sum(document["tracking"]["surface_travel_deg"].values()) / end_s,
+        energy_deg2_s2=sum(document["tracking"]["surface_energy_deg2_s"].values()) / end_s,
         departed=document["departure"] is not None,
         us=us,
     )

@@ -184,15 +184,18 @@ def to_body(autopilot, y, attitude, rolling, pitching):
 
 @kernel
 def throttle(autopilot, control, y, path, push):
-    """Move the manifold pressure; while power stands in for a lost pitch, give its law our airspeed."""
+    """Move the manifold pressure; while power stands in for a lost pitch, give its law our airspeed and what
+    the path takes: it has an airspeed loop of its own."""
     power = control.power
     power.in_use = 1
     error = autopilot.command[SPEED] - autopilot.airspeed
     autopilot.usual += autopilot.dt / USUAL_S * (autopilot.airspeed - autopilot.usual)
+    along = autopilot.moving[SPEED] + autopilot.throttle
     if power.engaged:
         power.usual_speed = autopilot.usual + clamp(autopilot.command[SPEED] - autopilot.usual, USUAL_MPS)
-        return
-    along = autopilot.moving[SPEED] + autopilot.gain.speed * error + autopilot.throttle
+        error = power.usual_speed - autopilot.airspeed
+    else:
+        along += autopilot.gain.speed * error
     climbing = autopilot.gravity * (path - autopilot.climb_in_trim)
     wanted = autopilot.trim_inhg + (along + climbing) / push
     rudder = max(control.effectiveness[control.main[YAW]], LEAST_RUDDER)

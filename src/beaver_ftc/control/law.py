@@ -4,7 +4,8 @@ from beaver_ftc.compiled import kernel
 from beaver_ftc.control import adaptive, allocation, authority, nominal, power, probing
 from beaver_ftc.control.accommodation import accommodate, give_up
 from beaver_ftc.control.laws import rejecting
-from beaver_ftc.control.laws.state import REJECTING
+from beaver_ftc.control.laws.state import INDI, LQR, REJECTING
+from beaver_ftc.control.rivals import compiled
 from beaver_ftc.control.state import NOMINAL, ORACLE
 from beaver_ftc.control.supervisor import MODE_REALLOCATED
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, PITCH
@@ -35,6 +36,9 @@ def advance_hand_over(control, every_type, mode):
 def command(control, fdi, belief, measured, faults, mode, t):
     """Fill control.command (n,) rad by the law chosen. t s."""
     accommodate(control, fdi, belief, measured, faults)
+    if control.inner in (INDI, LQR):
+        compiled.command(control, belief.G, measured.x)
+        return
     if control.law == NOMINAL:
         control.G[:] = belief.G
     else:

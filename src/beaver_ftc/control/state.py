@@ -5,6 +5,7 @@ from functools import lru_cache
 import numpy as np
 
 from beaver_ftc.control.laws.state import PUBLISHED, REJECTING, rejection_dtype
+from beaver_ftc.control.rivals.state import RIVAL
 
 NOMINAL, ADAPTIVE, FAULT_TOLERANT, ORACLE = range(4)
 LAWS = ("nominal", "adaptive", "fault-tolerant", "oracle")  # what use is made of the verdict
@@ -65,6 +66,6 @@ def control_dtype(n: int) -> np.dtype:
         ("trim", "f8", (n,)), ("low", "f8", (n,)), ("high", "f8", (n,)),
         ("command", "f8", (n,)), ("saturated", "i8", (n,)),
         ("hand_over", "f8"), ("hand_over_step", "f8"), ("hands_back", "i8"),  # after a change in flight
-        ("power", POWER), ("rejection", rejection_dtype(n)),
+        ("power", POWER), ("rejection", rejection_dtype(n)), ("rival", RIVAL),
     ]  # fmt: skip
     return np.dtype(fields, align=True)

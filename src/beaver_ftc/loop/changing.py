@@ -73,7 +73,7 @@ class Changing:
         if change.renews_diagnosis:
             detector = named_detector(then)
         if change.law is not None:
-            law = named_law(then)
+            law = named_law(frames, then, loop.start)
         return Stage(frame, change, frames, plugged(frames, then, loop.start, detector, law, before))
 
     def next_change(self, k: int) -> int:

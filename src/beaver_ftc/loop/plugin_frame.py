@@ -205,7 +205,9 @@ def plugin_frame(
     """
     if detector is None:
         detector = named_detector(scenario)
-    return plugged(frames, scenario, start, detector, named_law(scenario) if law is None else law)
+    if law is None:
+        law = named_law(frames, scenario, start)
+    return plugged(frames, scenario, start, detector, law)
 
 
 def named_detector(scenario: Scenario) -> Detector | None:
@@ -214,10 +216,19 @@ def named_detector(scenario: Scenario) -> Detector | None:
     return None if is_compiled(DETECTORS, scheme) else made(DETECTORS, scheme)
 
 
-def named_law(scenario: Scenario) -> Law | None:
-    """The plug-in a scenario names for its law; None if it is compiled in."""
-    law = scenario.control.law
-    return None if is_compiled(LAWS, law) else made(LAWS, law)
+def named_law(frames: np.ndarray, scenario: Scenario, start: np.ndarray) -> Law | None:
+    """The plug-in a scenario names for its law; None if it is compiled in, or has a compiled form, which is
+    put into the record then. start: as in `context_of`."""
+    if is_compiled(LAWS, scenario.control.law):
+        return None
+    law = made(LAWS, scenario.control.law)
+    compile_into = getattr(law, "compile_into", None)
+    if compile_into is None:
+        return law
+    law.reset(context_of(frames, scenario, start, scenario.control.options))
+    frames["control"]["power"]["enabled"] = 0
+    frames["control"]["inner"] = compile_into(frames["control"]["rival"][0])
+    return None
 
 
 def plugged(

@@ -14,12 +14,12 @@ from typing import ClassVar
 import numpy as np
 
 from beaver_ftc.control.base import Reference
+from beaver_ftc.control.laws.state import INDI
+from beaver_ftc.control.rivals.state import DELAY_FRAMES
 from beaver_ftc.control.rivals.tracking import GAINS, Demand, limited, with_others
 from beaver_ftc.design.context import Context
 from beaver_ftc.diagnosis.base import Measured, Verdict
 from beaver_ftc.diagnosis.rivals.options import options_of
-
-DELAY_FRAMES = 2
 
 
 class LowPass:
@@ -55,6 +55,14 @@ class IncrementalInversion:
         self.given = [trim] * (DELAY_FRAMES + 1)
         self.before: np.ndarray | None = None
         self.saturated = False
+
+    def compile_into(self, rival: np.void) -> int:
+        """Fill the record of compiled.py (dtype RIVAL), in trim; which inner law that is."""
+        trim = self.context.trim_rad[self.leading]
+        rival["Kp"], rival["Ki"] = self.option["proportional_per_s"], self.option["integral_per_s2"]
+        rival["keep"] = exp(-self.option["filter_per_s"] * self.context.dt_s)
+        rival["given"] = rival["command_filter"] = trim
+        return INDI
 
     def step(self, measured: Measured, reference: Reference, verdict: Verdict) -> np.ndarray:
         """u0 + G^-1 (nu - xdot0)."""

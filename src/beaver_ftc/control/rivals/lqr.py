@@ -12,6 +12,7 @@ from typing import ClassVar
 import numpy as np
 
 from beaver_ftc.control.base import Reference
+from beaver_ftc.control.laws.state import LQR
 from beaver_ftc.control.rivals.tracking import limited, with_others
 from beaver_ftc.design.context import Context
 from beaver_ftc.diagnosis.base import Measured, Verdict
@@ -48,6 +49,12 @@ class FixedGainLqr:
         self.K = gains(A, B, Q, R)
         self.integral = np.zeros(3)
         self.saturated = False
+
+    def compile_into(self, rival: np.void) -> int:
+        """Fill the record of compiled.py (dtype RIVAL), in trim; which inner law that is."""
+        rival["K"], rival["A"], rival["B_inverse"] = self.K, self.A, np.linalg.inv(self.B)
+        rival["trim_x"] = self.context.trim_x
+        return LQR
 
     def step(self, measured: Measured, reference: Reference, verdict: Verdict) -> np.ndarray:
         """Trim, what the linear model asks for to follow the reference, and K times what is missing."""

@@ -8,9 +8,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from beaver_ftc.control.laws.gains import margins
+from beaver_ftc.control.laws.state import REJECTING
+from beaver_ftc.control.state import COMPILED
 from beaver_ftc.design.model import QDYN
 from beaver_ftc.design.variants import jacobian
 from beaver_ftc.diagnosis.state import PITCH
+from beaver_ftc.errors import BadInput
 from beaver_ftc.studies.engine.words import aligned
 from beaver_ftc.studies.margins.aircraft_loop import (
     RATES,
@@ -48,7 +51,14 @@ class Margin:
 
 
 def study(scenario: "Scenario") -> list[Margin]:
-    """The margins of a scenario's default law with its actuators, sensors and frame rate."""
+    """The margins of a scenario's default law with its actuators, sensors and frame rate.
+
+    Raises BadInput for another law: its loop is not this one.
+    """
+    known = [name for name, (_, inner) in COMPILED.items() if inner == REJECTING]
+    if scenario.control.law not in known:
+        says = f"margins are known of the default law's loop, allowed: {', '.join(known)}"
+        raise BadInput(f"{scenario.name}: control.law: {scenario.control.law}: {says}")
     low, high = scenario.airframe.envelope.airspeed_mps
     found: list[Margin] = []
     for V in np.linspace(low, high, N_AIRSPEEDS):

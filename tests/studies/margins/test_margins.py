@@ -1,0 +1,57 @@
+"""Margins of the whole aircraft: against the design loop, and against flights with wrong coefficients."""
+
+import numpy as np
+import pytest
+
+from beaver_ftc.control.laws import gains
+from beaver_ftc.errors import BadInput
+from beaver_ftc.studies.margins.aircraft_loop import LawGains, Parts, frequencies, loops
+from beaver_ftc.studies.margins.study import at, study
+from flying import flown, scenario
+
+OURS = {"control": {"law": "fault-tolerant"}, "uncertainty": {}}
+REAL = {**OURS, "sensors": "tactical-grade", "actuators": "servo"}
+
+
+@pytest.mark.parametrize(
+    "loop", [gains.Loop(0.01, 1.0, 1.0, 1.0), gains.Loop(0.05, 0.2, 0.6, 1.7, 0.01, 0.3)]
+)
+def test_three_integrators_are_the_design_loop(loop):
+    """No coupling, no aerodynamics: each axis is the loop that the gains were derived for."""
+    s, G = 3.0, np.diag([-9.0, -12.0, -4.0])
+    pull, learn = gains.corrections(gains.RATIO * s, loop.dt_s)
+    even = np.ones(3)
+    parts = Parts(
+        np.zeros((3, 3)), G, np.eye(3), np.zeros((3, 3)), G, even, loop.approach * even,
+        loop.delay_s * even, loop.keep * even, loop.dt_s,
+    )  # fmt: skip
+    law = LawGains(s * even, pull * even, learn * even, np.linalg.inv(G), loop.lead * even, loop.share)
+    omega = frequencies(loop.dt_s)
+    expected = gains.open_loop(loop, s, np.exp(1j * omega * loop.dt_s))
+    for axis in range(3):
+        np.testing.assert_allclose(loops(parts, law, omega)[:, axis], expected, rtol=1e-9)
+
+
+@pytest.mark.parametrize("given", [OURS, REAL], ids=["ideal", "real"])
+def test_every_loop_over_the_envelope_keeps_what_is_asked(given):
+    found = study(scenario(**given))
+    assert {each.surface for each in found} == {"aileron", "elevator", "rudder", "flap"}
+    assert len({each.airspeed_mps for each in found}) == 5
+    assert [each for each in found if not each.keeps(6.0, 45.0)] == []
+
+
+def test_a_law_that_has_no_such_loop_is_refused():
+    with pytest.raises(BadInput, match="allowed: fault-tolerant, oracle"):
+        study(scenario(control={"law": "nominal"}))
+
+
+@pytest.mark.parametrize(("share", "steady"), [(0.85, True), (1.2, False)])
+def test_an_elevator_so_much_stronger_is_where_the_flight_begins_to_shake(share, steady):
+    """The gain margin, flown: the truth's elevator is stronger than the law believes by a share of it."""
+    healthy = next(m for m in at(scenario(**REAL)) if (m.fault, m.surface) == ("none", "elevator"))
+    factor = share * 10.0 ** (healthy.up_db / 20.0)
+    wrong = {"coefficients": {"Cm_de": factor}}
+    given = {**REAL, "sensors": "ideal", "uncertainty": wrong, "fdi": {"scheme": "none"}}
+    _flight, log = flown(duration_s=6, **given)
+    speed = np.abs(np.diff(log["elevator_pos_rad"][300:])).mean() / 0.01
+    assert (np.degrees(speed) < 5.0) == steady

@@ -177,7 +177,7 @@ def test_a_saturated_surface_does_not_wind_the_integral_up(name):
 @pytest.mark.parametrize("rival", [FixedGainLqr, IncrementalInversion])
 @pytest.mark.parametrize("sensors", ["ideal", "tactical-grade"])
 def test_a_compiled_rival_commands_what_its_class_commands(rival, sensors):
-    """The class is a plug-in when it is given as one; by its name it flies compiled. A hard loss saturates."""
+    """The class is a plug-in when it is given as one; by its name it flies compiled."""
     given = {"duration_s": 12, "sensors": sensors, "faults": [loss("aileron", 0.95, at_s=5.0)]}
     by_name, by_class = Memory(), Memory()
     fly(scenario(control={"law": rival.name}, **given), by_name)

@@ -12,6 +12,7 @@ from pathlib import Path
 from types import FrameType
 
 import coverage
+import hypothesis
 import pytest
 
 ROOT = Path(__file__).parents[2]
@@ -20,6 +21,7 @@ SLOW_S = {"diagnosis": 2.0}
 SLOW_ELSEWHERE_S = 0.4
 # What a change of shifts the lines: the rooms of the package from which mutants are made.
 ROOMS = ("design", "diagnosis", "control", "scenario", "results", "studies")
+EXAMPLES = 4
 KEPT = ROOT / ".mutants"
 
 
@@ -44,6 +46,7 @@ def _digest(folder: str) -> str:
 
 
 def _measured(folder: str) -> dict:
+    few_examples()
     watch = coverage.Coverage(data_file=None, source_pkgs=["beaver_ftc"], config_file=False)
     timed = _Timed(watch, SLOW_S.get(folder, SLOW_ELSEWHERE_S))
     arguments = ["-q", "-p", "no:cacheprovider", "-m", "not acceptance", "--tb=no", "-rN"]
@@ -55,6 +58,17 @@ def _measured(folder: str) -> dict:
         by_line = data.contexts_by_lineno(file).items()
         lines[name] = {line: [t for t in tests if t in timed.seconds] for line, tests in by_line}
     return {"seconds": timed.seconds, "lines": lines}
+
+
+def few_examples() -> None:
+    """From now on no property test draws more than `EXAMPLES`: what they draw is the same each time."""
+    begin = hypothesis.settings.__init__
+
+    def begin_with_few(self, parent=None, **given) -> None:
+        wanted = given.get("max_examples", EXAMPLES)
+        begin(self, parent, **{**given, "max_examples": min(wanted, EXAMPLES)})
+
+    hypothesis.settings.__init__ = begin_with_few  # type: ignore[method-assign]
 
 
 class _Timed:

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from tools.mutants.making import Mutant
-from tools.mutants.reach import ROOT
+from tools.mutants.reach import ROOT, few_examples
 
 BUDGET_S = 20.0  # of tests for one mutant, by what they take with the true module
 ENDLESS_S = 90.0  # of processor: longer than all of them take
@@ -57,6 +57,7 @@ def _run(mutant: Mutant, tests: list[str]) -> None:
     """In the child: 0 if all tests pass. A mutant that cannot be imported, or never ends, is not 0."""
     status = 1
     try:
+        few_examples()
         signal.setitimer(signal.ITIMER_PROF, ENDLESS_S)  # its signal ends the process
         sys.meta_path.insert(0, _Instead(mutant.file, mutant.source()))
         with tempfile.TemporaryDirectory() as scratch, open(os.devnull, "w") as nowhere:

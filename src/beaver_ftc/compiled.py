@@ -126,7 +126,7 @@ class _Kernel(CPUDispatcher):
     def _compiled(self, types):
         """Compile, one process at a time, and keep the code."""
         _lighten()
-        with _alone(self._folder), _announced(), _without_collecting():
+        with _alone(self._folder), _announced():
             if entry_point := self._loaded(types):
                 return entry_point  # another process came first
             self.overloads.pop(tuple(types), None)
@@ -233,23 +233,16 @@ def _alone(folder: Path | None) -> Iterator[None]:
 
 @contextlib.contextmanager
 def _announced() -> Iterator[None]:
-    """Say what takes so long, if it does."""
+    """Say what takes so long, if it does. Garbage is looked for afterwards: a compiler leaves little, and
+    looking costs a quarter of its time."""
     saying = threading.Timer(PATIENCE_S, _say_once, [COMPILING])
     saying.start()
-    try:
-        yield
-    finally:
-        saying.cancel()
-
-
-@contextlib.contextmanager
-def _without_collecting() -> Iterator[None]:
-    """Look for garbage afterwards: a compiler leaves little, and looking costs a quarter of its time."""
     gc.disable()
     try:
         yield
     finally:
         gc.enable()
+        saying.cancel()
 
 
 def _other_shape(shape, wanted):
@@ -289,12 +282,20 @@ def _interpreted(function):
     return call
 
 
+class _Record(np.record):  # type: ignore[misc]
+    """A record whose fields come before what every scalar of NumPy has, such as `real`."""
+
+    def __getattribute__(self, name):
+        fields = np.void.__getattribute__(self, "dtype").fields
+        return _with_attributes(self[name]) if name in fields else super().__getattribute__(name)
+
+
 def _with_attributes(argument):
     """A record, or an array of records, whose fields can be written `record.field`."""
-    if isinstance(argument, np.void) and not isinstance(argument, np.record):
-        return argument.view((np.record, argument.dtype))
+    if isinstance(argument, np.void) and not isinstance(argument, _Record):
+        return argument.view((_Record, argument.dtype))
     if isinstance(argument, np.ndarray) and argument.dtype.type is np.void and argument.dtype.names:
-        return argument.view(np.dtype((np.record, argument.dtype)))
+        return argument.view(np.dtype((_Record, argument.dtype)))
     return argument
 
 

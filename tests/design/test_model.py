@@ -9,7 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from beaver_ftc.aircraft import load
-from beaver_ftc.aircraft.schema import MAX_TERMS
+from beaver_ftc.aircraft.schema import MAX_MONOMIALS, MAX_TERMS
+from beaver_ftc.design import model
 from beaver_ftc.design.engine import engine_power_kw, slipstream
 from beaver_ftc.design.model import control_effectiveness, design_record, free_response
 from beaver_ftc.design.terms import evaluate, regressors
@@ -140,3 +141,37 @@ def test_the_atmosphere_used_here_is_the_standard_one():
     assert density(0.0) == pytest.approx(1.225, rel=1e-4)
     assert density(1000.0) == pytest.approx(1.1117, rel=1e-3)
     assert density(3000.0) == pytest.approx(0.9093, rel=1e-3)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_damping_is_the_derivative_of_the_aerodynamic_moments_with_the_rates(seed):
+    """By differences; what is left without dynamic pressure is the coupling of inertia, not of the air."""
+    design, rng = design_record()[0], np.random.default_rng(seed)
+    x, u = rng.uniform(-0.3, 0.3, 3), rng.uniform(-0.3, 0.3, 4)
+    y = np.array([0.1, 0.05, 45.0, 1000.0, 0.5]) * rng.uniform(0.8, 1.2, 5)
+    still = y * [1, 1, 1, 0, 1]
+
+    def moments(x):
+        f, G = split(design, x, y)
+        return f + G @ u - split(design, x, still)[0]
+
+    found, h = np.zeros((3, 3)), 1e-5
+    model.rate_damping(design, x, y, u, np.zeros(MAX_MONOMIALS), found)
+    for j, step in enumerate(h * np.eye(3)):
+        assert found[:, j] == pytest.approx(
+            (moments(x + step) - moments(x - step)) / (2 * h), rel=1e-6, abs=1e-8
+        )
+
+
+def test_the_unanticipated_moment_grows_with_the_cube_of_alpha():
+    """10 alpha^3 qdyn S c / Iy of the Beaver."""
+    y = np.array([0.2, 0.1, 45.0, 1000.0, 0.5])
+    expected = 10.0 * 0.2**3 * 1000.0 * 23.23 * 1.5875 / 6928.93
+    assert model.unanticipated_pitch(design_record()[0], y, 10.0) == pytest.approx(expected, rel=1e-12)
+
+
+def test_acceleration_is_f_plus_G_u():
+    rng = np.random.default_rng(1)
+    f, G, u, found = rng.normal(size=3), rng.normal(size=(3, 4)), rng.normal(size=4), np.zeros(3)
+    model.acceleration(f, G, u, found)
+    assert found == pytest.approx(f + G @ u, rel=1e-12)

@@ -2,6 +2,7 @@
 
 import pytest
 
+from beaver_ftc.results import verdict
 from beaver_ftc.results.verdict import expectations
 from beaver_ftc.scenario.schema import Expect
 
@@ -35,3 +36,92 @@ def test_an_expectation_in_words(name, expected, actual, said):
 
 def test_every_key_of_expect_is_said_in_words_here():
     assert {name.partition(".")[0] for name, *_ in SAID} == set(Expect.model_fields)
+
+
+DETECTION = {"detected": True, "time_s": 12.5, "delay_s": 0.5, "guaranteed_delay_s": None, "axis": "q"}
+
+
+@pytest.mark.parametrize(
+    ("changes", "false_alarm", "said"),
+    [
+        ({"detected": False}, False, "no alarm"),
+        ({}, True, "FALSE ALARM at 12.50 s on q"),
+        ({}, False, "after 0.50 s on q"),
+        ({"guaranteed_delay_s": 0.75}, False, "after 0.50 s on q (certain within 0.75 s)"),
+        ({"axis": None}, False, "after 0.50 s between the instruments"),
+    ],
+)
+def test_the_alarm_in_words(changes, false_alarm, said):
+    assert verdict._detection({"detection": DETECTION | changes, "false_alarm": false_alarm}) == said
+
+
+@pytest.mark.parametrize(
+    ("time_s", "said"),
+    [
+        (None, "no alarm; level 6.50 standard deviations, in healthy flight at most 0.81 of it"),
+        (3.0, "alarm at 3.00 s; level 6.50 standard deviations, in healthy flight at most 0.81 of it"),
+    ],
+)
+def test_the_statistical_detector_in_words(time_s, said):
+    found = {"time_s": time_s, "alarm_level": 6.5, "closest_approach": 0.81}
+    assert verdict._statistical({"detection": {"statistical": found}}) == said
+    assert verdict._statistical({"detection": {}}) == ""
+
+
+NAMED = {
+    "isolated": True, "fault": "elevator", "delay_s": 0.25, "correct": True, "type_correct": None,
+    "type": "stuck", "candidates": ["stuck"], "estimate": None, "estimate_deg": None,
+}  # fmt: skip
+FAULTS = [
+    {"actuator": "rudder", "type": "stuck", "size": {"position_deg": 9.0}},
+    {"actuator": "elevator", "type": "stuck", "size": {"position_deg": 3.0}},
+    {"actuator": "elevator", "type": "loss_of_effectiveness", "size": {"magnitude": 0.4}},
+]
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({}, "elevator after 0.25 s, correct, stuck"),
+        ({"delay_s": None, "correct": False}, "elevator, WRONG, stuck"),
+        ({"type_correct": False}, "elevator after 0.25 s, WRONG, stuck"),
+        (
+            {"type": None, "candidates": ["stuck", "rate_limit"]},
+            "elevator after 0.25 s, correct, stuck or rate limit",
+        ),
+        ({"type": None, "candidates": []}, "elevator after 0.25 s, correct, of no known type"),
+        ({"fault": "sensor q", "type": None}, "sensor q after 0.25 s, correct"),
+        ({"type": "unanticipated"}, "elevator after 0.25 s, correct"),
+        (
+            {"estimate": 0.05, "estimate_deg": 2.9},
+            "elevator after 0.25 s, correct, stuck, estimated 2.9 deg (true 3)",
+        ),
+        (
+            {"type": "loss_of_effectiveness", "estimate": -0.39},
+            "elevator after 0.25 s, correct, loss of effectiveness, estimated theta -0.39 (true -0.4)",
+        ),
+    ],
+)
+def test_a_named_fault_in_words(changes, said):
+    assert verdict._isolation({"isolation": NAMED | changes, "faults": FAULTS}) == said
+
+
+def test_modes_left_out_are_counted_before_the_last():
+    modes = [{"mode": "nominal", "time_s": 0.0}, {"mode": "adaptive", "time_s": 2.0}]
+    assert verdict._supervisor({"supervisor": modes}) == "nominal 0.00 s → adaptive 2.00 s"
+    said = verdict._supervisor({"supervisor": modes, "mode_changes_left_out": 7})
+    assert said == "nominal 0.00 s → (7 more) → adaptive 2.00 s"
+
+
+def test_engine_and_authority_in_words():
+    power = {"from_s": 13.2, "in_charge_s": 0.9, "lowest_inhg": 20.04, "highest_inhg": 22.26}
+    assert verdict._engine_power({"engine_power": power}) == (
+        "took over pitch at 13.20 s, for 0.90 s in all, 20.0 to 22.3 inHg"
+    )
+    assert verdict._engine_power({"engine_power": None}) == ""
+    least = verdict.LEAST_BEYOND_S
+    axes = {"p": {"beyond_s": 0.5 * least}, "q": {"beyond_s": 1.89}, "r": {"beyond_s": least}}
+    assert verdict._authority({"authority": axes}) == (
+        f"no deflection at all could hold the rate: q for 1.89 s, r for {least:.2f} s"
+    )
+    assert verdict._authority({"authority": None}) == ""

@@ -17,7 +17,7 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 # Seconds of processor; a test that takes longer in plain Python is none for this. The diagnosis flies.
-SLOW_S = {"diagnosis": 2.0}
+SLOW_S = {"diagnosis": 1.2}
 SLOW_ELSEWHERE_S = 0.4
 # What a change of shifts the lines: the rooms of the package from which mutants are made.
 ROOMS = ("design", "diagnosis", "control", "scenario", "results", "studies")

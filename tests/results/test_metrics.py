@@ -186,3 +186,46 @@ def test_deviations_from_the_profile_are_in_degrees_where_they_are_angles():
     assert _of(profile=off)["profile"] == {
         "altitude_m": 3.0, "airspeed_mps": 1.5, "heading_deg": 2.0, "bank_deg": None
     }  # fmt: skip
+
+
+TWO = Scenario(faults=(
+    Fault(at_s=14.0, actuator="rudder", type="bias"), Fault(at_s=12.0),
+    Fault(at_s=13.0, actuator="rudder", type="stuck"),
+))  # fmt: skip
+FOUND = {
+    "isolated": "rudder", "isolation_type": "stuck", "isolation_time_s": 13.5, "type_time_s": 13.75,
+    "candidates": ["stuck"], "estimate": 0.1, "estimate_interval": (0.05, 0.15), "frequency_rad_s": None,
+}  # fmt: skip
+
+
+def test_each_of_several_faults_is_held_against_its_own_surfaces_first():
+    (one,) = _of(TWO, faults=(FOUND,), isolated="rudder", isolation_type="stuck")["isolation"]["faults"]
+    assert (one["fault"], one["type"], one["correct"], one["type_correct"]) == ("rudder", "stuck", True, True)
+    assert one["delay_s"] == pytest.approx(0.5)
+    assert one["type_delay_s"] == pytest.approx(0.75)
+    assert one["estimate_deg"] == pytest.approx(math.degrees(0.1))
+    assert one["estimate_interval"] == [0.05, 0.15]
+
+
+@pytest.mark.parametrize(
+    ("changes", "key", "value"),
+    [
+        ({"isolation_type": "float"}, "type_correct", False),
+        ({"isolation_type": None}, "type_correct", None),
+        ({"isolated": "aileron"}, "correct", False),
+        ({"isolated": "aileron"}, "delay_s", None),
+        ({"isolated": None}, "correct", None),
+        ({"isolation_type": "loss_of_effectiveness", "estimate": -0.4}, "estimate_deg", None),
+        ({"estimate": None}, "estimate_deg", None),
+        ({"estimate_interval": None}, "estimate_interval", None),
+    ],
+)
+def test_what_is_wrong_or_open_of_one_of_several(changes, key, value):
+    assert _of(TWO, faults=(FOUND | changes,))["isolation"]["faults"][0][key] == value
+
+
+@pytest.mark.parametrize(("surface", "kind", "right"), [("rudder", "stuck", True), ("rudder", "bias", False)])
+def test_of_several_faults_the_verdict_is_held_against_that_of_its_surface(surface, kind, right):
+    found = _of(TWO, faults=(FOUND,), isolated=surface, isolation_type=kind, isolation_time_s=13.5)
+    assert found["isolation"]["correct"] is True
+    assert found["isolation"]["type_correct"] is right

@@ -79,6 +79,7 @@ def measure(page: Page, process: "subprocess.Popen[str]", start_s: float, second
     page.goto(address)
     until(page, "Boolean(window.cockpit && cockpit.value('t_s') > 0.05 && cockpit.drawn.frames > 1)")
     say("from command to moving aircraft", time.perf_counter() - start_s, "s")
+    say("of it processor, server and flight", processor_s(process.pid), "s")
     page.wait_for_timeout(3000)
     frames = page.evaluate(FRAMES, seconds)
     say("frames drawn", frames["fps"], "1/s")
@@ -96,6 +97,18 @@ def measure(page: Page, process: "subprocess.Popen[str]", start_s: float, second
     say("from click to surface, median", statistics.median(clicks), "ms")
     say("from click to surface, longest", max(clicks), "ms")
     print(f"{'load of the machine':36} {os.getloadavg()[0]:8.1f}  on {os.cpu_count()} cores")
+
+
+def processor_s(pid: int) -> float:
+    """Processor time of a process and of those it started, s; not a number where there is no /proc."""
+    try:
+        times = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[11:13]
+        children = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
+    except OSError:
+        return float("nan")
+    return sum(map(int, times)) / os.sysconf("SC_CLK_TCK") + sum(
+        processor_s(int(child)) for child in children
+    )
 
 
 def click(page: Page) -> float:

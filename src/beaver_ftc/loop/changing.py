@@ -15,7 +15,7 @@ from beaver_ftc.control.laws.state import REJECTING
 from beaver_ftc.control.state import NOMINAL, ORACLE
 from beaver_ftc.loop.assembly import assemble
 from beaver_ftc.loop.frame import fly_frame
-from beaver_ftc.loop.instruments import read_more
+from beaver_ftc.loop.instruments import enable_watch, read_more
 from beaver_ftc.loop.plugin_frame import PluginFrame, named_detector, named_law, plugged
 from beaver_ftc.plant.faults import NEVER, TIME_TOLERANCE_S
 from beaver_ftc.scenario.change import Change
@@ -107,8 +107,8 @@ class Changing:
         """Watch the instruments as well if one has failed that the scenario had not said: it was broken in
         flight."""
         wanted = self._loop.scenario.fdi.sensor_monitor != "never" and fdi["enabled"]
-        if self._loop.sensor_schedule.any and wanted:
-            fdi["watch"]["enabled"] = 1
+        if self._loop.sensor_schedule.any and wanted and not fdi["watch"]["enabled"]:
+            enable_watch(self._loop, fdi["watch"])
 
     def _note(self, stage: Stage) -> None:
         """Say what is changed, and what becomes of a verdict that ends with it."""

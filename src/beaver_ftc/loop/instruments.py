@@ -113,10 +113,17 @@ def watch_from_now(loop: Any) -> None:
     read_more(loop)
     wanted = loop.scenario.fdi.sensor_monitor != "never" and frame["fdi"]["enabled"]
     if wanted and not watch["enabled"]:
-        watch["enabled"] = 1
+        enable_watch(loop, watch)
         if frame["k"] > 0:
             _read_further(loop, frame["measured"])
             direct(steps.begin_watch, loop.frames)(loop.frames)
+
+
+def enable_watch(loop: Any, watch: np.void) -> None:
+    """Have a watch that was not wanted before the flight; the trim is shown to it now."""
+    frame = loop.frames[0]
+    watch["enabled"] = 1
+    anchor_watch(watch, np.array([frame["belief"]["design"]]), loop.start_y)
 
 
 def read_more(loop: Any) -> None:

@@ -115,10 +115,16 @@ class Loop:
         seen: np.ndarray = truth["value"][0] * truth["factor"][0]
         return seen
 
+    @property
+    def start_y(self) -> np.ndarray:
+        """The measured signals beside the rates, in trim."""
+        y: np.ndarray = self.start[y_places(self.frames[0])]
+        return y
+
     def anchor(self, frame: np.void, scenario: Scenario) -> None:
         """Show a record the trim, which a linearised or frozen design model, the law and the statistics hold
         on to."""
-        start, y = self.start, self.start[y_places(frame)]
+        start, y = self.start, self.start_y
         surfaces = np.array(list(self.trim.surfaces_rad.values()))
         design = frame["belief"]["design"]
         anchor(design, start[:3], y, surfaces)
@@ -126,7 +132,10 @@ class Loop:
         set_up(frame["control"], frame["belief"], scenario, y)
         set_up_autopilot(frame["autopilot"], frame["control"], scenario)
         fdi, rate_hz = frame["fdi"], scenario.rate_hz
-        anchor_watch(fdi["watch"], np.array([design]), y)
+        if fdi["watch"][
+            "enabled"
+        ]:  # a call into compiled code from here: a quarter of a second, the first one
+            anchor_watch(fdi["watch"], np.array([design]), y)
         noise_model.set_up(fdi, scenario.fdi, design, mass, trim, rate_hz, self.aircraft)
 
     def _lay_out(self) -> None:

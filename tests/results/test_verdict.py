@@ -125,3 +125,9 @@ def test_engine_and_authority_in_words():
         f"no deflection at all could hold the rate: q for 1.89 s, r for {least:.2f} s"
     )
     assert verdict._authority({"authority": None}) == ""
+
+
+def test_a_probing_in_words():
+    said = "flap and elevator moved from 14.00 s to 18.50 s"
+    assert verdict._probing({"isolation": {"probing_s": [14.0, 18.5]}}) == said
+    assert verdict._probing({"isolation": {"probing_s": None}}) == ""

@@ -59,14 +59,16 @@ def _run(mutant: Mutant, tests: list[str]) -> None:
     try:
         few_examples()
         signal.setitimer(signal.ITIMER_PROF, ENDLESS_S)  # its signal ends the process
-        sys.meta_path.insert(0, _Instead(mutant.file, mutant.source()))
+        instead = _Instead(mutant.file, mutant.source())
         with tempfile.TemporaryDirectory() as scratch, open(os.devnull, "w") as nowhere:
             os.environ["HYPOTHESIS_STORAGE_DIRECTORY"] = scratch
             os.chdir(ROOT)
             os.dup2(nowhere.fileno(), 1)
             os.dup2(nowhere.fileno(), 2)
             with contextlib.redirect_stdout(nowhere), contextlib.redirect_stderr(nowhere):
-                status = int(pytest.main(["-x", "-q", "-p", "no:cacheprovider", "--tb=no", *tests]))
+                status = int(
+                    pytest.main(["-x", "-q", "-p", "no:cacheprovider", "--tb=no", *tests], [instead])
+                )
     finally:
         os._exit(status)
 
@@ -77,6 +79,10 @@ class _Instead(importlib.abc.MetaPathFinder, importlib.abc.SourceLoader):
     def __init__(self, file: Path, source: str) -> None:
         self._file, self._source = file, source
         self._name = ".".join(file.relative_to(ROOT / "src").with_suffix("").parts).removesuffix(".__init__")
+
+    def pytest_configure(self) -> None:
+        """Only now: pytest has just put its own finder, which knows this package as a plug-in, before all."""
+        sys.meta_path.insert(0, self)
 
     def find_spec(self, name, path=None, target=None):
         if name != self._name:

@@ -1,0 +1,42 @@
+"""Each rule of `expect:` on its limit and beyond it."""
+
+import pytest
+
+from beaver_ftc.results.expectations import _RULES
+
+METRICS = {
+    "isolation": {"fault": "elevator", "type": "stuck", "candidates": ["flap:stuck", "elevator:bias"]},
+    "false_alarm": False, "departure": None, "envelope": {"exits": 2},
+    "profile": {"altitude_m": 15.0, "airspeed_mps": 2.0, "heading_deg": 4.0},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("name", "expected", "actual", "met"),
+    [
+        ("isolated_as", "elevator", "elevator", True),
+        ("isolated_as", "flap", "elevator", False),
+        ("isolated_type", "stuck", "stuck", True),
+        ("isolated_type", "bias", "stuck", False),
+        ("candidate_type", "bias", ["flap:stuck", "elevator:bias"], True),
+        ("candidate_type", "float", ["flap:stuck", "elevator:bias"], False),
+        ("no_false_alarm", True, True, True),
+        ("no_false_alarm", False, True, False),
+        ("no_departure", True, True, True),
+        ("no_departure", False, True, False),
+        ("altitude_within_m", 15.0, 15.0, True),
+        ("altitude_within_m", 14.9, 15.0, False),
+        ("airspeed_within_mps", 2.0, 2.0, True),
+        ("heading_within_deg", 3.9, 4.0, False),
+        ("stays_in_envelope", True, False, False),
+        ("stays_in_envelope", False, False, True),
+    ],
+)
+def test_a_rule(name, expected, actual, met):
+    assert _RULES[name](expected, METRICS) == (actual, met)
+
+
+def test_what_was_never_flown_or_never_left():
+    assert _RULES["altitude_within_m"](15.0, {"profile": None}) == (None, False)
+    assert _RULES["stays_in_envelope"](True, {"envelope": {"exits": 0}}) == (True, True)
+    assert _RULES["no_departure"](True, {"departure": {"time_s": 3.0}}) == (False, False)

@@ -5,6 +5,7 @@ from math import pi, radians
 import numpy as np
 import pytest
 
+from beaver_ftc.scenario import signals
 from beaver_ftc.scenario.loader import load_text
 from beaver_ftc.scenario.signals import sample
 
@@ -111,3 +112,8 @@ def test_a_table_is_straight_lines_held_outside(tmp_path):
 
 def test_no_reference_is_zero():
     assert (sample(load_text("name: x").reference, FRAMES) == 0).all()
+
+
+def test_a_ramp_is_nothing_before_it_starts_and_stays_at_its_end():
+    ramp = signals.Ramp(start_s=2.0, end_s=4.0, amplitude_deg_s=3.0)
+    assert list(ramp.rate_deg_s(np.array([0.0, 2.0, 3.0, 4.0, 9.0]))) == [0.0, 0.0, 1.5, 3.0, 3.0]

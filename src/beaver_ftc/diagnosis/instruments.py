@@ -208,11 +208,21 @@ def suspect(watch):
     who[:] = 0
     if lead < SPEED:
         suspect_attitude(watch)
-    who[AIRSPEED] = lead == SPEED or (lead == DENSITY and fired[SPEED] == 1)
+    who[AIRSPEED] = lead == SPEED or (lead == DENSITY and (fired[SPEED] == 1 or not would_show(watch)))
     who[QDYN] = lead == DENSITY and fired[SPEED] == 0
     who[ALPHA], who[BETA] = lead == ALPHA_FLOW, lead == BETA_FLOW
     who[ALTITUDE] = lead == CLIMB
     who[ENGINE_SPEED], who[MANIFOLD] = lead == RPM, lead == PRESSURE
+
+
+@kernel
+def would_show(watch):
+    """Whether an airspeed as wrong as the density has it would be beyond the bound of its own test."""
+    density, speed = watch.step.test[DENSITY], watch.step.test[SPEED]
+    for m in range(density.filtered.size):
+        if 0.5 * watch.step.then[AIRSPEED] * abs(density.filtered[m]) > 2.0 * speed.bound[m]:
+            return True
+    return False
 
 
 @kernel

@@ -9,8 +9,8 @@
 h is the time between two looks, a JSBSim frame: the truth's own integrators are followed (rates held over the
 step; velocity by Adams and Bashforth's second order), so that residuals of sound instruments are what is left
 out here: the Earth turns and is round. Every residual goes through filters of several poles, with a
-bound on what the declared errors of all instruments together can make of it, as in bank.py. In declared
-turbulence flow and climb are left out: gusts do to them what a vane's fault does.
+bound on what the declared errors of all instruments together can make of it, as in bank.py. Declared
+turbulence widens the bounds of flow and climb by what its gusts do within a filter's memory.
 """
 
 from math import pi
@@ -176,12 +176,13 @@ def allow(step, signal):
         test[ANGLE + i].noise = n[PHI + i]
     acceleration = FALLING_M_S2 + step.gravity * (e[PHI] + e[THETA]) + step.size * (e[ALPHA] + e[BETA])
     flow = (acceleration + step.size * e[AIRSPEED] / V) / V + rates + turning * (e[ALPHA] + e[BETA])
+    test[SPEED].air, test[ALPHA_FLOW].air, test[BETA_FLOW].air = 1.0, 1.0 / V, 1.0 / V
     test[SPEED].rate, test[SPEED].noise = acceleration, n[AIRSPEED]
     test[ALPHA_FLOW].rate, test[ALPHA_FLOW].noise = flow, n[ALPHA]
     test[BETA_FLOW].rate, test[BETA_FLOW].noise = flow, n[BETA]
     test[DENSITY].rate = V / DENSITY_HEIGHT_M
     test[DENSITY].noise = n[QDYN] / max(signal[QDYN], 1.0) + 2.0 * n[AIRSPEED] / V
-    test[CLIMB].rate = CLIMBING_M_S + V * (tilt + e[ALPHA] + e[BETA]) + e[AIRSPEED]
+    test[CLIMB].rate = CLIMBING_M_S + step.gust + V * (tilt + e[ALPHA] + e[BETA]) + e[AIRSPEED]
     test[CLIMB].noise = n[ALTITUDE]
 
 
@@ -194,8 +195,9 @@ def follow(step, test):
         test.filtered[m] = a * test.filtered[m] + test.residual
         test.bound_rate[m] = bound_step(test.bound_rate[m], test.rate, a, step.h)
         test.bound_noise[m] = noise_step(test.bound_noise[m], test.noise_then, a)
-        bound = test.bound_rate[m] + test.bound_noise[m] + test.noise
-        test.share = max(test.share, abs(test.filtered[m]) / bound)
+        noise = test.bound_noise[m] + test.noise
+        test.bound[m] = test.bound_rate[m] + noise + test.air * step.gusts[m]
+        test.share = max(test.share, abs(test.filtered[m]) / test.bound[m])
     test.noise_then = test.noise
 
 
@@ -217,7 +219,6 @@ def check(step, signal, engine):
     compare(step, signal)
     allow(step, signal)
     for c in range(RPM):
-        if step.flow or c not in (SPEED, ALPHA_FLOW, BETA_FLOW, CLIMB):
-            follow(step, step.test[c])
+        follow(step, step.test[c])
     if engine:
         follow_engine(step, signal)

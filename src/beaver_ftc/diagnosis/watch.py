@@ -15,6 +15,7 @@ THETA, PSI = PHI + 1, PHI + 2
 TEST = np.dtype(
     [
         ("residual", "f8"), ("rate", "f8"), ("noise", "f8"), ("noise_then", "f8"),  # of the elapsed step
+        ("air", "f8"), ("bound", "f8", (len(POLES_PER_S),)),  # share of `gusts` in it; the whole bound
         ("filtered", "f8", (len(POLES_PER_S),)), ("bound_rate", "f8", (len(POLES_PER_S),)),
         ("bound_noise", "f8", (len(POLES_PER_S),)), ("share", "f8"),
     ],
@@ -23,7 +24,9 @@ TEST = np.dtype(
 
 STEP = np.dtype(
     [
-        ("h", "f8"), ("decay", "f8", (len(POLES_PER_S),)), ("gravity", "f8"), ("flow", "i8"),
+        ("h", "f8"), ("decay", "f8", (len(POLES_PER_S),)), ("gravity", "f8"),
+        # of the declared turbulence: its speed at most, m/s, and what passes each filter of a gust's changes
+        ("gust", "f8"), ("gusts", "f8", (len(POLES_PER_S),)),
         # declared: the whole error of a reading, and what of it changes; drift of the attitude
         ("offset", "f8", (N_SENSORS,)), ("slope", "f8", (N_SENSORS,)), ("steady", "f8", (N_SENSORS,)),
         ("drift", "f8"), ("error", "f8", (N_SENSORS,)), ("changing", "f8", (N_SENSORS,)),

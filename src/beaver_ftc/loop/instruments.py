@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from beaver_ftc.design.context import DesignModel
+from beaver_ftc.diagnosis.admitted import GUST_FT_S, GUST_LIMIT_SIGMA, SCALE_FT
 from beaver_ftc.diagnosis.declared import gust_effect
 from beaver_ftc.diagnosis.watch import NOBODY, POLES_PER_S
 from beaver_ftc.errors import BadInput
@@ -24,6 +25,7 @@ from beaver_ftc.scenario.faults import of_a_sensor
 from beaver_ftc.scenario.schema import Scenario
 
 GRAVITY_M_S2, EARTH_RADIUS_M = 9.80665, 6_371_000.0
+FASTER = 1.4  # than at the start a flight may become
 TAKEN_OVER_PER_S = 3.0  # by the attitude, of a rate it stands in for, where its own noise is declared
 OTHER_COUNTERS = (0xD1B54A32D192ED03, 0x8CB92BA72F3D8DD7)  # apart from the seed: further noise, faults' noise
 
@@ -86,7 +88,7 @@ def assemble_watch(watch: np.void, scenario: Scenario, h: float) -> None:
     step, sensors = watch["step"], scenario.fdi.bounds.sensors
     step["h"], step["decay"] = h, [exp(-pole * h) for pole in POLES_PER_S]
     step["gravity"] = GRAVITY_M_S2 * (1.0 + scenario.initial.altitude_m / EARTH_RADIUS_M) ** -2
-    step["flow"] = scenario.fdi.bounds.turbulence == "none"
+    step["gust"], step["gusts"] = gusts_seen(scenario.fdi.bounds.turbulence, scenario.initial.airspeed_mps, h)
     if watch["engine"]:
         initial: Any = scenario.initial  # its engine's keys are the aircraft's
         step["command"] = initial.engine_rpm, initial.manifold_pressure_inhg
@@ -98,6 +100,19 @@ def assemble_watch(watch: np.void, scenario: Scenario, h: float) -> None:
         step["drift"] = max(step["drift"], abs(getattr(sensor, "drift_rad_s", 0.0)))
     blurred = np.any(step["offset"][PHI : PHI + 3] > step["steady"][PHI : PHI + 3])
     watch["follows"] = min(1.0, h * TAKEN_OVER_PER_S) if blurred else 1.0
+
+
+def gusts_seen(turbulence: str, airspeed_mps: float, h: float) -> tuple[float, np.ndarray]:
+    """Speed of gusts, m/s, and of their changes in h s what passes each filter of the watch: bounds.
+
+    A gust of deviation sigma and length L changes like a random walk of variance 2 sigma^2 V / L a second, the
+    vertical and lateral ones of half as much again [MIL-F-8785C, 3.7.1]; a filter with a pole of lam 1/s
+    keeps 1 / 2 lam of it.
+    """
+    sigma_mps = GUST_FT_S[turbulence] * ch.FT
+    intensity = 3.0 * sigma_mps**2 * FASTER * airspeed_mps / (SCALE_FT * ch.FT)
+    kept_s = [h / (1.0 - exp(-2.0 * pole * h)) for pole in POLES_PER_S]
+    return GUST_LIMIT_SIGMA * sigma_mps, GUST_LIMIT_SIGMA * np.sqrt(intensity * np.array(kept_s))
 
 
 def anchor_watch(watch: np.void, design: np.ndarray, y: np.ndarray) -> None:

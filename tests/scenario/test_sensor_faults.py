@@ -63,3 +63,9 @@ def test_a_sensor_may_be_expected_by_name():
         BadInput, match=r"expect.isolated_as: 'sensor pp' is not known, did you mean sensor p"
     ):
         load(faulty() | {"expect": {"isolated_as": "sensor pp"}})
+
+
+@pytest.mark.parametrize("grade", ["tactical-grade", "consumer-grade"])
+def test_a_preset_has_every_instrument(grade):
+    sensors = load({"name": "x", "sensors": grade}).sensors
+    assert [name for name, sensor in sensors if sensor.is_ideal] == []

@@ -1,8 +1,10 @@
 """The R-985 Wasp Junior and its slipstream, as FDC has them [FDC, Power]."""
 
 from beaver_ftc.compiled import kernel
+from beaver_ftc.design.terms import AIRSPEED, QDYN
 
 SEA_LEVEL_DENSITY_KG_M3 = 1.225
+DPT_0, KW_TO_DPT = 0.08696, 191.18  # dpt = DPT_0 + KW_TO_DPT P / (qdyn V)
 
 
 def engine_power_kw(engine_rpm: float, manifold_pressure_inhg: float, density_kg_m3: float) -> float:
@@ -13,7 +15,7 @@ def engine_power_kw(engine_rpm: float, manifold_pressure_inhg: float, density_kg
 
 def slipstream(power_kw: float, density_kg_m3: float, airspeed_mps: float) -> float:
     """dpt, the dimensionless total pressure rise across the propeller: power in kW, not W."""
-    return 0.08696 + 191.18 * 2.0 * power_kw / (density_kg_m3 * airspeed_mps**3)
+    return DPT_0 + KW_TO_DPT * 2.0 * power_kw / (density_kg_m3 * airspeed_mps**3)
 
 
 @kernel
@@ -23,4 +25,23 @@ def measured_slipstream(engine_rpm, manifold_pressure_inhg, airspeed_mps, qdyn_p
     thin_air = (408.0 - 0.0965 * engine_rpm) * (1.0 - density / SEA_LEVEL_DENSITY_KG_M3)
     chart = 0.00412 * (manifold_pressure_inhg + 7.4) * (engine_rpm + 2010.0)
     power_kw = 0.7355 * (-326.5 + chart + thin_air)
-    return 0.08696 + 191.18 * power_kw / (qdyn_pa * airspeed_mps)
+    return DPT_0 + KW_TO_DPT * power_kw / (qdyn_pa * airspeed_mps)
+
+
+@kernel
+def density_ratio(y):
+    """Density over that at sea level, from the air data in y."""
+    return 2.0 * y[QDYN] / y[AIRSPEED] ** 2 / SEA_LEVEL_DENSITY_KG_M3
+
+
+def power_error_kw(
+    engine_rpm: float, manifold_pressure_inhg: float, rpm_error: float, inhg_error: float
+) -> tuple[float, float]:
+    """How far the power can be off, kW: for errors of the instruments, and for the whole of the density.
+
+    The readings are within the errors of what is given, the density within that at sea level.
+    """
+    rpm, pressure = engine_rpm + rpm_error, manifold_pressure_inhg + 7.4 + inhg_error
+    by_chart = 0.00412 * (pressure * rpm_error + (rpm + 2010.0) * inhg_error)
+    by_air = 408.0 - 0.0965 * (engine_rpm - rpm_error)
+    return 0.7355 * (by_chart + 0.0965 * rpm_error), 0.7355 * max(by_air, 0.0)

@@ -1,7 +1,7 @@
 """What a detector is: the contract between the loop and a diagnosis scheme that is plugged in.
 
-A detector is given what is measured, the command in effect, and what the design model makes of the two.
-Of the truth it is given dpt alone, for which there is no instrument model.
+A detector is given what is measured, the command in effect, and what the design model makes of the two; of
+the truth nothing.
 """
 
 from math import nan

@@ -21,6 +21,7 @@ import numpy as np
 
 from beaver_ftc.aircraft.schema import MAX_MONOMIALS, MAX_TERMS
 from beaver_ftc.compiled import kernel
+from beaver_ftc.design.engine import DPT_0, KW_TO_DPT, density_ratio
 from beaver_ftc.design.terms import AIRSPEED, DPT, N_SIGNALS, N_Y, QDYN, monomials, signals
 
 _AIR_DATA = 3  # gyros come first among the signals, then alpha, beta, airspeed, dynamic pressure
@@ -38,6 +39,7 @@ def admitted_dtype(n: int) -> np.dtype:
             ("offset", "f8", (7,)), ("slope", "f8", (7,)),  # error of a signal: offset + slope |signal|
             ("steady", "f8", (3,)),  # of the offset of a gyro, what does not change
             ("gust", "f8", (3,)), ("deflection", "f8"),
+            ("engine", "i8"), ("engine_kw", "f8"), ("thin_air_kw", "f8"),  # of dpt: see `slipstream_error`
             # scratch: magnitudes as measured, and the furthest they can be from there
             ("near_x", "f8", (3,)), ("near_y", "f8", (N_Y,)), ("near_u", "f8", (n,)),
             ("far_x", "f8", (3,)), ("far_y", "f8", (N_Y,)), ("far_u", "f8", (n,)), ("far_aero", "f8", (3,)),
@@ -64,6 +66,21 @@ def changing_error(admitted, i, reading):
 
 
 @kernel
+def slipstream_error(admitted, y):
+    """How far dpt can be off that is worked out from the engine's instruments and the air data.
+
+    dpt = a + b P / (qdyn V) [FDC]: the power's error, by the instruments engine_kw and by the density
+    thin_air_kw for all of it; and the share that dynamic pressure and airspeed are off.
+    """
+    pressure = error(admitted, _AIR_DATA + QDYN, y[QDYN]) / y[QDYN]
+    speed = error(admitted, _AIR_DATA + AIRSPEED, y[AIRSPEED]) / y[AIRSPEED]
+    stretch = 1.0 / ((1.0 - min(pressure, 0.9)) * (1.0 - min(speed, 0.9)))
+    density = (1.0 + pressure) / (1.0 - min(speed, 0.9)) ** 2 - 1.0
+    power_kw = admitted.engine_kw + admitted.thin_air_kw * density * density_ratio(y)
+    return stretch * KW_TO_DPT * power_kw / (y[QDYN] * y[AIRSPEED]) + (stretch - 1.0) * abs(y[DPT] - DPT_0)
+
+
+@kernel
 def magnitudes(admitted, x, y, u):
     """Fill the scratch with |signal| as measured and as large as it may be; for airspeed, as small."""
     for i in range(3):
@@ -75,6 +92,8 @@ def magnitudes(admitted, x, y, u):
         admitted.far_y[i] = abs(y[i]) + error(admitted, _AIR_DATA + i, y[i])
     for i in range(DPT, y.size):
         admitted.near_y[i] = admitted.far_y[i] = abs(y[i])
+    if admitted.engine:
+        admitted.far_y[DPT] += slipstream_error(admitted, y)
     for s in range(u.size):
         admitted.near_u[s] = abs(u[s])
         admitted.far_u[s] = abs(u[s]) + admitted.deflection

@@ -10,10 +10,9 @@ From the alarm on no surface is named. A broken instrument that is named is repl
 of it, for the diagnosis and for the laws; it is not trusted again in the flight.
 """
 
-import numpy as np
-
 from beaver_ftc.compiled import kernel
 from beaver_ftc.diagnosis import bank, redundancy
+from beaver_ftc.diagnosis.stand_in import replace
 from beaver_ftc.diagnosis.state import NOT_ISOLATED
 from beaver_ftc.diagnosis.thresholds import bound_step
 from beaver_ftc.diagnosis.watch import (
@@ -37,13 +36,12 @@ from beaver_ftc.diagnosis.watch import (
     YES,
 )
 from beaver_ftc.plant.instruments import ALTITUDE, ENGINE_SPEED, MANIFOLD, N_SENSORS, PHI
-from beaver_ftc.plant.readings import note_slipstream, share_out
 
 INVOLVED = 0.03  # of the largest residual of its kind: less is what a large error does to its neighbours
 BESIDE_S = 0.5  # a surface found earlier than this before the alarm was found without the broken instrument
+SLACK = 0.2  # of the damping, away from trim
+GONE = 0.003  # of what an attitude's jump has shown: what is left of it afterwards
 CROSS_DAMPING_PER_S = 10.0  # by which a gyro's own error moves the innovation
-QUICK_PER_S = 10.0  # the second of redundancy.POLES_PER_S
-FORGETTING_S = 20.0  # of a vane that is replaced, back to trim: kinematics alone drift
 
 
 @kernel
@@ -65,6 +63,8 @@ def attend(watch, fdi, belief, measured, t):
             watch.error[i] = error
         else:
             watch.spike[i] = max(watch.spike[i], abs(error))
+    if watch.blurred:
+        clear_gyros(watch)
     decide(watch, fdi, measured, t)
     replace(watch, belief, measured)
     redundancy.look(step, signal, measured.force)
@@ -88,10 +88,34 @@ def begin(watch, measured):
 @kernel
 def follow_rates(watch, fdi):
     """Bring W (3,) rad/s and its bound to the frame whose innovation is there."""
+    W, bound, D = watch.W, watch.W_bound, watch.damping
+    watch.W_then[:] = bound
+    before = watch.before
+    before[:] = W
     for i in range(3):
-        decay = np.exp(-watch.damping[i] * fdi.dt)
-        watch.W[i] = decay * watch.W[i] + fdi.dt * fdi.innovation[i]
-        watch.W_bound[i] = bound_step(watch.W_bound[i], fdi.bound.eta_bar[i], decay, fdi.dt)
+        lost, spread = 0.0, 0.0
+        for j in range(3):
+            lost += D[i, j] * before[j]
+            spread += (-D[i, j] if i == j else abs(D[i, j])) * watch.W_then[j]
+        W[i] += fdi.dt * (fdi.innovation[i] - lost)
+        bound[i] = max(watch.W_then[i] + fdi.dt * (fdi.bound.eta_bar[i] + spread), 0.0)
+
+
+@kernel
+def clear_gyros(watch):
+    """Note when what the rates show cannot be any gyro's error: by W it would be there, by the attitude not.
+
+    Where the attitude is blurred a surface is named only then.
+    """
+    step = watch.step
+    for i in range(3):
+        test, rate = step.test[TURN + i], watch.W_bound[i] + SLACK * abs(watch.W[i])
+        for m in range(step.decay.size):
+            a = step.decay[m]
+            watch.apart[i, m] = a * watch.apart[i, m] + test.residual + step.h * watch.W[i]
+            watch.apart_bound[i, m] = bound_step(watch.apart_bound[i, m], rate, a, step.h)
+            if abs(watch.apart[i, m]) > watch.apart_bound[i, m] + test.bound[m]:
+                watch.no_gyro = 1
 
 
 @kernel
@@ -176,7 +200,7 @@ def ask_rates(watch, fdi):
         bound = fdi.bound.frame[i] + 1e-6
         seen = abs(fdi.innovation[i]) > bound or alarm >= 0 or abs(watch.W[i]) > watch.W_bound[i] + 1e-6
         spike = watch.spike_then[i]
-        sudden = abs(error) < INVOLVED * spike and spike > 2.0 * blur
+        sudden = abs(error) < GONE * spike and spike > 2.0 * blur
         explained = abs(fdi.innovation[i] - jump) <= bound + own + blur / fdi.dt
         slow = 0.7 * abs(error) <= watch.W_bound[i] + abs(watch.W[i]) + blur
         if not explained or (not seen and (sudden or not slow)):
@@ -210,9 +234,23 @@ def suspect(watch):
         suspect_attitude(watch)
     who[AIRSPEED] = lead == SPEED or (lead == DENSITY and (fired[SPEED] == 1 or not would_show(watch)))
     who[QDYN] = lead == DENSITY and fired[SPEED] == 0
-    who[ALPHA], who[BETA] = lead == ALPHA_FLOW, lead == BETA_FLOW
+    suspect_vane(watch, ALPHA, ALPHA_FLOW, 1)
+    suspect_vane(watch, BETA, BETA_FLOW, 2)
     who[ALTITUDE] = lead == CLIMB
     who[ENGINE_SPEED], who[MANIFOLD] = lead == RPM, lead == PRESSURE
+
+
+@kernel
+def suspect_vane(watch, vane, flow, gyro):
+    """A vane, or the gyro that moves the flow as well, if its error need not show in the attitude yet."""
+    if watch.lead != flow:
+        return
+    test, turn, shown = watch.step.test[flow], watch.step.test[TURN + gyro], watch.fired[TURN + gyro] == 1
+    hidden = True
+    for m in range(test.filtered.size):
+        hidden = hidden and abs(test.filtered[m]) <= 2.0 * (turn.bound[m] + test.bound[m])
+    watch.suspect[vane] = not shown
+    watch.suspect[gyro] = shown or hidden
 
 
 @kernel
@@ -227,14 +265,15 @@ def would_show(watch):
 
 @kernel
 def suspect_attitude(watch):
-    """The same of gyros and attitude: one axis alone, or one angle alone."""
+    """The same of gyros and attitude: one axis alone, or one angle alone. An angle by itself may be the first
+    to show what a gyro does."""
     fired, who = watch.fired, watch.suspect
     turns, angles = 0, 0
     for i in range(3):
         turns += fired[TURN + i]
         angles += fired[ANGLE + i]
     for i in range(3):
-        alone = fired[TURN + i] == 1 and turns == 1
+        alone = turns == 0 or (fired[TURN + i] == 1 and turns == 1)
         who[i] = alone and watch.rates_say[i] != NO
         mine = fired[ANGLE + i] == 1 and angles == 1
         who[PHI + i] = mine and watch.rates_say[axis_of(watch, i)] != YES
@@ -251,56 +290,9 @@ def axis_of(watch, i):
 
 
 @kernel
-def replace(watch, belief, measured):
-    """Put what the other instruments say in the place of those that are named or missing."""
-    signal, changed = measured.signal, 0
-    for i in range(N_SENSORS):
-        if measured.missing[i]:
-            watch.replaced[i] = 1
-        if watch.replaced[i]:
-            signal[i] = stand_in(watch, belief, signal, i)
-            changed = 2 if i in (AIRSPEED, QDYN) or i >= ENGINE_SPEED else max(changed, 1)
-    if changed > 0:
-        share_out(measured)
-    if changed > 1 and watch.engine:
-        note_slipstream(measured)
-
-
-@kernel
-def stand_in(watch, belief, signal, i):
-    """What the other instruments say of instrument i."""
-    step = watch.step
-    if i < 3:
-        return rate_from_attitude(watch, belief, i)
-    if i in (ALPHA, BETA):
-        return step.predicted[i] + step.h / FORGETTING_S * (watch.trim[i] - step.predicted[i])
-    density = 2.0 * step.then[QDYN] / step.then[AIRSPEED] ** 2
-    if i == AIRSPEED:
-        return np.sqrt(max(2.0 * signal[QDYN] / density, 1.0))
-    if i == QDYN:
-        return 0.5 * density * signal[AIRSPEED] ** 2
-    if i >= ENGINE_SPEED:
-        return step.command[i - ENGINE_SPEED]
-    return step.predicted[i]
-
-
-@kernel
-def rate_from_attitude(watch, belief, i):
-    """Rate i, rad/s: what the attitude has shown of it by the look before, and the model's change since.
-
-    The rate itself is used for the next look: its own error shows there.
-    """
-    step = watch.step
-    u = belief.u_then if watch.past == 0 else belief.u
-    acceleration = belief.f[i]
-    for s in range(u.size):
-        acceleration += belief.G[i, s] * u[s]
-    shown = watch.follows * step.test[TURN + i].residual
-    if not watch.taken_over[i] and watch.follows < 1.0:
-        shown = step.h * QUICK_PER_S * step.test[TURN + i].filtered[1]
-    watch.taken_over[i] = 1
-    known = step.then[i] + shown / step.h
-    return known + step.h * acceleration
+def clears_surfaces(watch, known):
+    """Whether a surface may be named, a frame or more (`known`) after the alarm."""
+    return not watch.enabled or (known == 1 and (watch.no_gyro == 1 or not watch.blurred))
 
 
 @kernel

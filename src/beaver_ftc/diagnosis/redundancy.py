@@ -171,9 +171,12 @@ def allow(step, signal):
     level = 1.0 / max(np.cos(signal[THETA]), 0.1)
     for i in range(3):
         test[TURN + i].rate = TURNING_RAD_S + step.drift + e[P + i] + 2.0 * turning * tilt
-        test[TURN + i].noise = n[PHI] + n[THETA] + n[PSI]
         test[ANGLE + i].rate = level * (TURNING_RAD_S + rates + 2.0 * level * turning * tilt) + step.drift
         test[ANGLE + i].noise = n[PHI + i]
+    tilted, banked = abs(np.sin(signal[THETA])), abs(np.sin(signal[PHI]))
+    test[TURN].noise = n[PHI] + (tilted + turning * step.h) * n[PSI]
+    test[TURN + 1].noise = n[THETA] + (banked + turning * step.h) * n[PSI]
+    test[TURN + 2].noise = n[PSI] + (banked + turning * step.h) * n[THETA]
     acceleration = FALLING_M_S2 + step.gravity * (e[PHI] + e[THETA]) + step.size * (e[ALPHA] + e[BETA])
     flow = (acceleration + step.size * e[AIRSPEED] / V) / V + rates + turning * (e[ALPHA] + e[BETA])
     test[SPEED].air, test[ALPHA_FLOW].air, test[BETA_FLOW].air = 1.0, 1.0 / V, 1.0 / V

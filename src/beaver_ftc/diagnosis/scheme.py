@@ -83,7 +83,7 @@ def decide(fdi, measured, t):
     """From residuals to alarm, and from then on to a verdict.
 
     Where instruments are watched, a surface waits a frame after the alarm: that much later the attitude shows
-    what a gyro did. Once one of them is found broken, no surface is named.
+    what a gyro did; a blurred one, later. Once an instrument is found broken, no surface is named.
     """
     if instruments.speaks(fdi.watch):
         return
@@ -93,7 +93,7 @@ def decide(fdi, measured, t):
         return
     if not known:
         isolation.start(fdi, measured.x)
-    if known or not fdi.watch.enabled:
+    if instruments.clears_surfaces(fdi.watch, known):
         isolation.isolate(fdi, measured.x, t, known)
     network.evaluate(fdi.fdae.network, measured.y[ALPHA], measured.y[BETA])
 

@@ -52,7 +52,11 @@ WATCH = np.dtype(
         # what tells a gyro from the attitude, by axis
         ("error", "f8", (3,)), ("error_then", "f8", (3,)),  # of the gyro, as each frame began, rad/s
         ("spike", "f8", (3,)), ("spike_then", "f8", (3,)),
-        ("damping", "f8", (3,)), ("W", "f8", (3,)), ("W_bound", "f8", (3,)),
+        ("damping", "f8", (3, 3)), ("W", "f8", (3,)), ("W_bound", "f8", (3,)),
+        ("W_then", "f8", (3,)), ("before", "f8", (3,)),
+        # no gyro can be what the rates show: what attitude and W make of that, and how far one gyro goes
+        ("blurred", "i8"), ("no_gyro", "i8"),
+        ("apart", "f8", (3, len(POLES_PER_S))), ("apart_bound", "f8", (3, len(POLES_PER_S))),
         ("rates_say", "i8", (3,)), ("taken_over", "i8", (3,)),
         ("step", STEP),
     ],

@@ -28,7 +28,7 @@ from beaver_ftc.diagnosis.state import (
 from beaver_ftc.diagnosis.types.pairs import IN_PITCH, IN_ROLL_AND_YAW
 from beaver_ftc.errors import BadInput
 from beaver_ftc.loop.frame import frame_dtype
-from beaver_ftc.loop.instruments import assemble_instruments, assemble_watch, truth_read
+from beaver_ftc.loop.instruments import admit_engine, assemble_instruments, assemble_watch, truth_read
 from beaver_ftc.plant import channels as ch
 from beaver_ftc.scenario.actuators import Actuators
 from beaver_ftc.scenario.control import ControlConfig
@@ -277,6 +277,7 @@ def _assemble_admitted(frame: np.void, scenario: Scenario) -> None:
     admitted = frame["fdi"]["bound"]["admitted"]
     mass = mass_of(scenario.design_model, scenario.airframe)
     admit(admitted, scenario.fdi.bounds, scenario.airframe, frame["belief"]["design"], mass)
+    admit_engine(admitted, scenario)
     frame["fdi"]["bound"]["own_errors"] = admitted["any"] and scenario.fdi.fault_class == "all"
     if scenario.fdi.pairs and frame["fdi"]["block"]["length"] > 1:
         raise BadInput(

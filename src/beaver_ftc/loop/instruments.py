@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from beaver_ftc.design.context import DesignModel
+from beaver_ftc.design.engine import power_error_kw
 from beaver_ftc.diagnosis.admitted import GUST_FT_S, GUST_LIMIT_SIGMA, SCALE_FT
 from beaver_ftc.diagnosis.declared import gust_effect
 from beaver_ftc.diagnosis.watch import NOBODY, POLES_PER_S
@@ -23,6 +24,7 @@ from beaver_ftc.plant.instruments import (
 from beaver_ftc.plant.sensor_faults import OF_THE_SLIPSTREAM
 from beaver_ftc.scenario.faults import of_a_sensor
 from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.scenario.sensors import ENGINE
 
 GRAVITY_M_S2, EARTH_RADIUS_M = 9.80665, 6_371_000.0
 FASTER = 1.4  # than at the start a flight may become
@@ -99,14 +101,42 @@ def assemble_watch(watch: np.void, scenario: Scenario, h: float) -> None:
         step["slope"][i], step["steady"][i] = abs(sensor.scale_error), abs(bias)
         step["drift"] = max(step["drift"], abs(getattr(sensor, "drift_rad_s", 0.0)))
     blurred = np.any(step["offset"][PHI : PHI + 3] > step["steady"][PHI : PHI + 3])
+    watch["blurred"] = blurred
     watch["follows"] = min(1.0, h * TAKEN_OVER_PER_S) if blurred else 1.0
+
+
+def admit_engine(admitted: np.void, scenario: Scenario) -> None:
+    """Admit errors of dpt where those are declared of which it is worked out.
+
+    The engine may be set anywhere between here and its highest manifold pressure.
+    """
+    sensors = scenario.fdi.bounds.sensors
+    declared = any(not getattr(sensors, name).is_ideal for name in OF_THE_SLIPSTREAM)
+    if not (declared and scenario.airframe.has_engine_instruments):
+        return
+    initial: Any = scenario.initial
+    highest = scenario.airframe.engine.settings["manifold_pressure_inhg"].range[1]
+    errors = [
+        _whole_error(getattr(sensors, name), most)
+        for name, most in zip(ENGINE, (initial.engine_rpm, highest), strict=True)
+    ]
+    admitted["engine"] = 1
+    admitted["engine_kw"], admitted["thin_air_kw"] = power_error_kw(initial.engine_rpm, highest, *errors)
+
+
+def _whole_error(sensor: Any, largest: float) -> float:
+    """How far a reading of at most `largest` can be off."""
+    noise, bias, quantum = sensor.noise_bias_quantum
+    slope = abs(sensor.scale_error)
+    error: float = (NOISE_LIMIT_SIGMA * noise + abs(bias) + quantum / 2 + slope * largest) / (1.0 - slope)
+    return error
 
 
 def gusts_seen(turbulence: str, airspeed_mps: float, h: float) -> tuple[float, np.ndarray]:
     """Speed of gusts, m/s, and of their changes in h s what passes each filter of the watch: bounds.
 
-    A gust of deviation sigma and length L changes like a random walk of variance 2 sigma^2 V / L a second, the
-    vertical and lateral ones of half as much again [MIL-F-8785C, 3.7.1]; a filter with a pole of lam 1/s
+    A gust of deviation sigma and length L changes like a random walk of variance 2 sigma^2 V / L a second,
+    the vertical and lateral ones of half as much again [MIL-F-8785C, 3.7.1]; a filter with a pole of lam 1/s
     keeps 1 / 2 lam of it.
     """
     sigma_mps = GUST_FT_S[turbulence] * ch.FT
@@ -118,7 +148,7 @@ def gusts_seen(turbulence: str, airspeed_mps: float, h: float) -> tuple[float, n
 def anchor_watch(watch: np.void, design: np.ndarray, y: np.ndarray) -> None:
     """Show the watch the trim: y, and how the rates are damped there; design: the designer's record, (1,)."""
     watch["trim"][3:7] = y[:4]
-    watch["damping"] = np.maximum(np.diag(gust_effect(DesignModel(design.copy()), y)), 0.0)
+    watch["damping"] = gust_effect(DesignModel(design.copy()), y)
 
 
 def watch_from_now(loop: Any) -> None:

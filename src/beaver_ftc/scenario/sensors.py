@@ -137,9 +137,10 @@ class ManifoldGauge(_Sensor):
 ENGINE = ("engine_rpm", "manifold_pressure")  # instruments of an engine like the Beaver's
 
 
-def _grade(gyro: dict[str, float], vane: dict[str, float], V: dict, qdyn: dict, **others: dict) -> dict:
-    """The same gyro on every axis, the same vane twice."""
-    return {**dict.fromkeys("pqr", gyro), "alpha": vane, "beta": vane, "V": V, "qdyn": qdyn, **others}
+def _grade(gyro: dict, vane: dict, V: dict, qdyn: dict, attitude: dict, **others: dict) -> dict[str, dict]:
+    """The same gyro on every axis, the same vane twice, three angles alike."""
+    alike = {**dict.fromkeys("pqr", gyro), "alpha": vane, "beta": vane, "V": V, "qdyn": qdyn}
+    return {**alike, "phi": attitude, "theta": attitude, "psi": attitude, **others}
 
 
 # Each number's source is in docs/robustness.md, section 1; noise is that of a sample at 100 Hz.
@@ -150,12 +151,20 @@ PRESETS: dict[str, dict[str, dict[str, float]]] = {
         {"noise_std_deg": 0.025, "bias_deg": 0.1},
         {"noise_std_mps": 0.05, "bias_mps": 0.2},
         {"noise_std_pa": 2.0, "bias_pa": 5.0},
+        {"noise_std_deg": 0.005, "bias_deg": 0.2, "drift_deg_h": 1.0},
+        altitude={"noise_std_m": 0.2, "bias_m": 3.0},
+        engine_rpm={"noise_std_rpm": 1.0, "bias_rpm": 2.0},
+        manifold_pressure={"noise_std_inhg": 0.01, "bias_inhg": 0.03},
     ),
     "consumer-grade": _grade(
         {"noise_std_deg_s": 0.1, "bias_deg_s": 0.5, "scale_error": 0.03, "quantum_deg_s": 0.0153},
         {"noise_std_deg": 0.043, "bias_deg": 0.5, "quantum_deg": 0.088},
         {"noise_std_mps": 0.1, "bias_mps": 0.4},
         {"noise_std_pa": 3.0, "bias_pa": 17.0},
+        {"noise_std_deg": 0.05, "bias_deg": 1.0},
+        altitude={"noise_std_m": 0.5, "bias_m": 5.0},
+        engine_rpm={"noise_std_rpm": 5.0, "bias_rpm": 10.0},
+        manifold_pressure={"noise_std_inhg": 0.05, "bias_inhg": 0.1},
     ),
 }
 

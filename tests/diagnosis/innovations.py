@@ -119,6 +119,21 @@ def weigh_all(block, innovations, signatures, regressors, first, keep, tolerated
         likelihood.judge(block, tolerated)
 
 
+@kernel
+def bounded_all(block, d, signatures, onset, dt):
+    """Show a block an uncertainty d (k, n) up to 0.02 rad/s2, and from `onset` on signatures (k, h, n)."""
+    bounded = np.full(3, 0.02)
+    for k in range(len(d)):
+        whitening.advance(block, dt)
+        block.scratch[: block.n] = d[k]
+        whitening.whiten(block, block.state, block.scratch, dt, block.innovation)
+        for h in range(block.n_hypotheses):
+            block.hypothesis[h].signature[: block.n] = signatures[k, h]
+        likelihood.reach(block, bounded, dt)
+        if k >= onset:
+            likelihood.weigh(block, False, dt, 1.0)
+
+
 class Detector:
     """The compiled detector alone, made ready as before a flight, at one flight condition."""
 

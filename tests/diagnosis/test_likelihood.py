@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from innovations import block_of, covariance, drawn, weigh_all, with_hypotheses
+from innovations import block_of, bounded_all, covariance, drawn, weigh_all, with_hypotheses
 from scipy.stats import kstest
 
 from beaver_ftc.diagnosis import likelihood
@@ -144,6 +144,50 @@ def test_the_worst_corner_takes_all_of_the_allowance():
     seen = block["hypothesis"][0]
     slack = likelihood.tolerance(block, seen, slot)
     assert abs(seen["correlation"][slot]) - slack == pytest.approx(abs(clean["correlation"][slot]), rel=1e-9)
+
+
+@settings(max_examples=60)
+@given(
+    st.sampled_from(sorted(AXES)),
+    st.integers(0, 2**31),
+    st.sampled_from(["anyhow", "bang-bang", "against the weights", "constant"]),
+)
+def test_a_bounded_uncertainty_adds_no_more_than_is_allowed_for(case, seed, course):
+    """Any d within its bound, long after the filter has settled; the worst one goes with the signs of w."""
+    rng, settled, frames, eta_bar = np.random.default_rng(seed), 600, 90, 0.02
+    block = _block(case, STEP)
+    n = int(block["n"])
+    block["level"], block["pace"] = 6.6, np.inf
+    signature = np.zeros((settled + frames, 1, n))
+    signature[settled:] = np.cumsum(rng.normal(size=(frames, 1, n)), axis=0)
+    size = {"bang-bang": np.sign(rng.normal(size=(settled + frames, n))), "constant": np.ones(n)}.get(
+        course, rng.uniform(-1, 1, (settled + frames, n))
+    )
+    d = np.broadcast_to(eta_bar * size, (settled + frames, n)).copy()
+    if course == "against the weights":
+        d[settled:] = eta_bar * np.sign(np.gradient(signature[settled:, 0], axis=0))
+    bounded_all(block, d, signature, settled, DT)
+    hypothesis = block["hypothesis"][0]
+    for slot in range(N_SLOTS):
+        if hypothesis["information"][slot] > 0.0:
+            assert (
+                abs(hypothesis["correlation"][slot]) <= likelihood.allowance(block, hypothesis, slot) + 1e-9
+            )
+
+
+def test_the_allowance_is_not_absurdly_wide():
+    """A step against a step at its onset: the difference of two bounds, and what the ringing is given."""
+    block = _block("one axis", STEP)
+    block["level"], block["pace"] = 6.6, np.inf
+    signature = np.zeros((800, 1, 1))
+    signature[640:] = 1.0
+    d = 0.02 * np.ones((800, 1))
+    d[:640] *= -1.0
+    bounded_all(block, d, signature, 640, DT)
+    hypothesis = block["hypothesis"][0]
+    slots = [k for k in range(N_SLOTS) if hypothesis["information"][k] > 0.0]
+    used = [abs(hypothesis["correlation"][k]) / likelihood.allowance(block, hypothesis, k) for k in slots]
+    assert 0.3 < max(used) <= 1.0
 
 
 def test_there_is_always_an_onset_of_about_every_age():

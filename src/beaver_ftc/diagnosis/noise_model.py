@@ -11,21 +11,24 @@ from beaver_ftc.aircraft import AXES, Aircraft, MassProperties, Term, load
 from beaver_ftc.aircraft.aircraft import FORCES, MOMENTS
 from beaver_ftc.aircraft.schema import RATE_SIGNALS
 from beaver_ftc.design.inertia import inertia_coefficients
-from beaver_ftc.design.terms import AIRSPEED, ALPHA, BETA, QDYN, fill_table
+from beaver_ftc.design.terms import AIRSPEED, ALPHA, BETA, PH, QDYN, QH, RH, fill_table
 from beaver_ftc.design.variants import coefficient_slopes, jacobian
 from beaver_ftc.diagnosis.admitted import GUST_FT_S, SCALE_FT, inertia_slack, tolerances
-from beaver_ftc.diagnosis.state import ALPHA3, LEAST_UNCERTAINTY_RAD_S2, LOSS, N_SLOTS, STEP
+from beaver_ftc.diagnosis.state import ALPHA3, ENDING, GROWING, LEAST_UNCERTAINTY_RAD_S2, LOSS, N_SLOTS, STEP
 from beaver_ftc.plant.instruments import SIGNALS
 from beaver_ftc.scenario.diagnosis import Bounds, FdiConfig, Statistical
 from beaver_ftc.scenario.sensors import Sensors
 
 PITCH_AXES, LATERAL_AXES = (1,), (0, 2)
-SIDES = {LOSS: 1, STEP: 2, ALPHA3: 2}  # a loss has a sign, a step may go either way
+SIDES = {LOSS: 1, GROWING: 1, ENDING: 1, STEP: 2, ALPHA3: 2}  # a loss has a sign, a step may go either way
+# Of a loss that grows: of one ten times slower or faster it explains a third, the rest of it a constant one.
+GROWTH_PER_S = 1.5
 
 # Share of the intensity of the rolling, pitching and yawing gust that the vanes leave; on exact vanes and
 # over a filter's memory it is less (`tests/diagnosis/test_air.py`).
 UNSEEN = (1.0, 0.003, 0.03)
 PRIOR_DRIFT_RAD_S2 = 1.0  # what a drift may be at the start of a flight: soon forgotten
+CHANCE = 0.5  # share of the alarm level that noise is given beside an uncertainty at its bound
 LEAST_NOISE_RAD_S = 1e-9  # of a gyro: exact ones are still doubles, and a variance no difference of zeros
 Start = tuple[np.ndarray, np.ndarray, np.ndarray]  # x (3,) rad/s, y (5,) and u (4,) rad in trim
 _GYRO_OF = dict(zip(RATE_SIGNALS, AXES, strict=True))
@@ -38,6 +41,7 @@ def blocks_of(aircraft: Aircraft) -> tuple[tuple[tuple[int, ...], tuple[Hypothes
     held against. Roll and yaw are there twice: see statistical.py."""
     pitch = (*_losses(aircraft, PITCH_AXES), *_steps(PITCH_AXES), (ALPHA3, -1, 1, 0))
     lateral = (*_losses(aircraft, LATERAL_AXES), *_steps(LATERAL_AXES))
+    pitch, lateral = ((*of_it, *_of_another_course(of_it)) for of_it in (pitch, lateral))
     return (PITCH_AXES, pitch), (LATERAL_AXES, lateral), (LATERAL_AXES, lateral)
 
 
@@ -45,6 +49,11 @@ def _losses(aircraft: Aircraft, axes: tuple[int, ...]) -> Iterator[Hypothesis]:
     for s, (surface, axis) in enumerate(zip(aircraft.surfaces, aircraft.dominant_axis, strict=True)):
         if surface in aircraft.primary and axis in axes:
             yield LOSS, s, axis, 1
+
+
+def _of_another_course(members: tuple[Hypothesis, ...]) -> Iterator[Hypothesis]:
+    losses = [(surface, axis) for kind, surface, axis, _ in members if kind == LOSS]
+    return ((kind, surface, axis, 0) for surface, axis in losses for kind in (GROWING, ENDING))
 
 
 def _steps(axes: tuple[int, ...]) -> Iterator[Hypothesis]:
@@ -82,12 +91,13 @@ def set_up(
     statistical["detected_at_s"] = -1.0
     if given is None or not fdi["enabled"]:  # a plug-in diagnoses, or nothing does
         return
-    statistical["enabled"] = 1
+    statistical["enabled"], statistical["share"] = 1, 1.0 / max(int(fdi["instants"]), 1)
     _set_up_air(statistical["air"], config.bounds.turbulence, mass, aircraft)
     statistical["alarm_level"] = alarm_level(given.false_alarms_per_h, rate_hz, aircraft)
     statistical["naming_level"] = naming_level(given.misnaming, rate_hz, aircraft)
     statistical["keep"] = exp(-1.0 / (rate_hz * config.forgetting_time_s))
     _set_up_blocks(statistical, config.bounds.sensors, aircraft)
+    _set_up_bounded(statistical, given, config, 1.0 / rate_hz)
     _set_up_noise(statistical, given, config.bounds, design, start, 1.0 / rate_hz)
     _set_up_tolerances(statistical, config.bounds, design, mass, start, aircraft)
     block = statistical["block"][-1]
@@ -121,6 +131,18 @@ def _set_up_blocks(statistical: np.void, sensors: Sensors, aircraft: Aircraft) -
             hypothesis["kind"], hypothesis["surface"] = kind, surface
             hypothesis["axis"], hypothesis["alarms"] = axis, alarms
             hypothesis["column"] = losses.index(surface) if kind == LOSS else len(losses) + axis
+
+
+def _set_up_bounded(statistical: np.void, given: Statistical, config: FdiConfig, dt_s: float) -> None:
+    """What an uncertainty that is bounded may do beside chance. A loss declared constant does not grow."""
+    still = config.bounds.sensors.is_ideal and config.bounds.turbulence == "none"
+    for block in statistical["block"][: statistical["n_blocks"]]:
+        block["level"], block["chance"] = statistical["alarm_level"], 0.0 if still else CHANCE
+        block["pace"] = given.uncertainty_rad_s * dt_s
+        kinds = block["hypothesis"]["kind"][: block["n_hypotheses"]]
+        if config.fault_profile == "abrupt":
+            block["n_hypotheses"] = np.sum((kinds != GROWING) & (kinds != ENDING))
+        block["hypothesis"]["growth_keep"] = exp(-GROWTH_PER_S * dt_s)
 
 
 def _axis_of(term: Term) -> int:
@@ -206,10 +228,13 @@ def steady_tolerance(
     share += [_measured_share(bounds, term, y) for term in aircraft.moments]
     total = tolerances(bounds.coefficients, aircraft, size) + share * size
     slopes = np.abs(coefficient_slopes(design, np.zeros(3), y, u))
-    alpha, beta = (abs(getattr(bounds.sensors, name).noise_bias_quantum[1]) for name in ("alpha", "beta"))
-    for k, term in enumerate(aircraft.moments):
-        if term.is_constant:
-            total[k] += alpha * slopes[_axis_of(term), ALPHA] + beta * slopes[_axis_of(term), BETA]
+    span, chord = aircraft.geometry.span_m, aircraft.geometry.chord_m
+    lengths = {"alpha": 1.0, "beta": 1.0} | dict(zip(AXES, (span / 2, chord, span / 2), strict=True))
+    for name, place in zip(lengths, (ALPHA, BETA, PH, QH, RH), strict=True):
+        error = abs(getattr(bounds.sensors, name).noise_bias_quantum[1]) * lengths[name]
+        for k, term in enumerate(aircraft.moments):
+            if term.is_constant:
+                total[k] += error * slopes[_axis_of(term), place] / (y[AIRSPEED] if name in AXES else 1.0)
     return total
 
 

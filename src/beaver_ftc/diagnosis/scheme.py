@@ -74,7 +74,8 @@ def compare_likelihoods(fdi, belief, measured, k, t):
         fdi.statistical.air.mean[i] = belief.share * fdi.statistical.air.total[i]
     cubic = unanticipated_pitch(belief.design, measured.y, 1.0)
     statistical.signatures(fdi.statistical, belief.means.Gu, cubic)
-    statistical.observe(fdi.statistical, fdi.innovation, fdi.dt, k, fdi.verdict.detected)
+    latched = fdi.statistical.detected_at_s >= 0.0
+    statistical.observe(fdi.statistical, fdi.innovation, fdi.dt, k, latched, not fdi.abrupt)
     statistical.score(fdi.statistical, t)
 
 
@@ -120,16 +121,9 @@ def look_ahead(fdi, belief, measured, k):
 @kernel
 def look_inside(fdi, belief, measured):
     """Take in an instant inside a frame: what is believed of it, and the gust that the vanes see by then."""
-    if fdi.statistical.enabled and fdi.statistical.air.moving:
-        air.look(
-            fdi.statistical.air,
-            belief.design,
-            measured.x,
-            measured.y,
-            belief.u,
-            measured.attitude,
-            belief.share * fdi.dt,
-        )
+    if fdi.statistical.enabled:
+        x, y, dt = measured.x, measured.y, belief.share * fdi.dt
+        statistical.look(fdi.statistical, belief.design, x, y, belief.u, measured.attitude, dt)
     look(fdi, belief, measured)
 
 

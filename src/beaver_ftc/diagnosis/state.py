@@ -55,10 +55,10 @@ ESTIMATOR = np.dtype(
 # goes together: pitch, and roll with yaw, the latter twice. States of a filter: what is left of the rate,
 # then the drift.
 N_SLOTS = 10
-MAX_HYPOTHESES, MAX_REGRESSORS = 4, 2 * MAX_TERMS_OF_ONE
+MAX_HYPOTHESES, MAX_REGRESSORS = 8, 2 * MAX_TERMS_OF_ONE
 EITHER, WORST_CASE, STATISTICS = 0, 1, 2  # whose alarms count
 LEAST_UNCERTAINTY_RAD_S2 = 1e-3  # reckoned with: a bound that passes zero does not stay there
-STEP, ALPHA3 = 2, 3  # further kinds of hypothesis: likelihood.py
+STEP, ALPHA3, GROWING, ENDING = 2, 3, 4, 5  # further kinds of hypothesis: likelihood.py
 
 HYPOTHESIS = np.dtype(
     [
@@ -66,6 +66,11 @@ HYPOTHESIS = np.dtype(
         ("signature", "f8", (2,)), ("response", "f8", (N_SLOTS, 4)),
         ("correlation", "f8", (N_SLOTS,)), ("information", "f8", (N_SLOTS,)),
         ("overlap", "f8", (N_SLOTS, MAX_REGRESSORS)),
+        ("growth_keep", "f8"), ("missing", "f8", (N_SLOTS,)),  # of a loss that grows, what is yet to come
+        ("held", "f8", (N_SLOTS, 2)),  # of a loss that ends, its signature as it did
+        # what a bounded uncertainty can add to the correlation: as it stays, as it swings, at its pace
+        ("weight", "f8", (N_SLOTS, 2)), ("stays", "f8", (N_SLOTS,)),
+        ("swings", "f8", (N_SLOTS,)), ("drifts", "f8", (N_SLOTS,)),
         ("score", "f8"), ("theta", "f8"), ("certainty", "f8"), ("at_least", "f8"), ("at_most", "f8"),
     ],
     align=True,
@@ -75,9 +80,12 @@ BLOCK = np.dtype(
     [
         ("n", "i8"), ("axis", "i8", (2,)), ("lag", "f8"), ("keep", "f8"), ("stronger", "f8"),
         ("state", "f8", (4,)), ("rest", "f8", (4,)), ("innovation", "f8", (2,)), ("scratch", "f8", (2,)),
+        ("shaped", "f8", (2,)),
         ("P_xx", "f8", (2, 2)), ("P_xd", "f8", (2, 2)), ("P_dd", "f8", (2, 2)),
         ("drift", "f8", (2, 2)), ("jitter", "f8", (2,)), ("noise", "f8", (2,)),
         ("S_inverse", "f8", (2, 2)), ("K_x", "f8", (2, 2)), ("K_d", "f8", (2, 2)),
+        # alarm level; share of it that chance is given beside what is bounded; omega dt of the latter
+        ("level", "f8"), ("chance", "f8"), ("pace", "f8"), ("stay", "f8", (2,)), ("swing", "f8", (2,)),
         ("n_regressors", "i8"), ("tolerance", "f8", (MAX_REGRESSORS,)),
         ("regressor", "f8", (MAX_REGRESSORS, 2)), ("regressor_state", "f8", (MAX_REGRESSORS, 4)),
         ("regressor_response", "f8", (MAX_REGRESSORS, 2)),
@@ -88,6 +96,7 @@ BLOCK = np.dtype(
 
 STATISTICAL = np.dtype(
     [
+        ("share", "f8"),  # one over the instants in a frame
         ("enabled", "i8"), ("alarm_level", "f8"), ("naming_level", "f8"), ("keep", "f8"),
         ("n_columns", "i8"),  # of the log
         ("rapidity", "f8"),  # 1/s: intensity of the drift of an uncertainty over its bound squared

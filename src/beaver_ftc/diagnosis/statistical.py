@@ -11,13 +11,14 @@ import numpy as np
 from beaver_ftc.compiled import kernel
 from beaver_ftc.design.terms import AIRSPEED, QDYN, evaluate, regressors
 from beaver_ftc.diagnosis import air, likelihood, whitening
-from beaver_ftc.diagnosis.state import LEAST_UNCERTAINTY_RAD_S2, LOSS, STEP
+from beaver_ftc.diagnosis.state import ENDING, GROWING, LEAST_UNCERTAINTY_RAD_S2, LOSS, STEP
 from beaver_ftc.diagnosis.thresholds import uncertainty_bound
 
 PITCH, LATERAL, RETURNING = 0, 1, 2  # blocks: the last is the second view of roll and yaw
 # Of what the best explanation explains, the part that a constant theta leaves to a loss that grows is larger
 # for every rate of growth (docs/theory.md, section 7).
 LEAST_PART = 0.25
+SHOWN_BEFORE = 0.02  # of what the end of a loss explains, what the loss has explained before
 
 
 @kernel
@@ -29,7 +30,7 @@ def signatures(statistical, Gu, cubic):
         for h in range(block.n_hypotheses):
             hypothesis = block.hypothesis[h]
             for i in range(block.n):
-                if hypothesis.kind == LOSS:
+                if hypothesis.surface >= 0:
                     hypothesis.signature[i] = Gu[block.axis[i], hypothesis.surface]
                 elif hypothesis.kind == STEP:
                     hypothesis.signature[i] = 1.0 if hypothesis.axis == block.axis[i] else 0.0
@@ -38,8 +39,8 @@ def signatures(statistical, Gu, cubic):
 
 
 @kernel
-def observe(statistical, innovation, dt, frame, latched):
-    """Take in one frame: innovation (3,) rad/s2, frame number, whether the alarm is out."""
+def observe(statistical, innovation, dt, frame, latched, ends=False):
+    """Take in one frame: innovation (3,) rad/s2, frame number, whether the alarm is out; ends: a loss may."""
     keep = statistical.keep if latched else 1.0
     slot = likelihood.slot_to_start(frame)
     for b in range(statistical.n_blocks):
@@ -47,6 +48,8 @@ def observe(statistical, innovation, dt, frame, latched):
         if not latched:
             likelihood.start(block, slot)
         whitening.advance(block, dt)
+        if block.level > 0.0:
+            likelihood.reach(block, statistical.bounded, dt)
         for i in range(block.n):
             axis = block.axis[i]
             block.scratch[i] = innovation[axis] - statistical.air.mean[axis]
@@ -57,7 +60,7 @@ def observe(statistical, innovation, dt, frame, latched):
                     block, block.regressor_state[j], block.regressor[j], dt, block.regressor_response[j]
                 )
         likelihood.weigh(block, statistical.tolerated, dt, keep)
-        likelihood.judge(block, statistical.tolerated)
+        likelihood.judge(block, statistical.tolerated, statistical.keep if ends else 0.0)
 
 
 @kernel
@@ -131,6 +134,8 @@ def best_alternative(fdi, block, surface):
     best = 0.0
     for h in range(block.n_hypotheses):
         hypothesis = block.hypothesis[h]
+        if hypothesis.kind in (GROWING, ENDING):
+            continue
         if hypothesis.kind != LOSS or (hypothesis.surface != surface and is_open(fdi, hypothesis.surface)):
             best = max(best, hypothesis.at_least)
     return best
@@ -139,11 +144,23 @@ def best_alternative(fdi, block, surface):
 @kernel
 def loss_at_most(block, surface):
     """The log likelihood ratio a loss of this surface has at most; none where the block does not feel it."""
+    most = 0.0
     for h in range(block.n_hypotheses):
         hypothesis = block.hypothesis[h]
-        if hypothesis.kind == LOSS and hypothesis.surface == surface:
-            return hypothesis.at_most
-    return 0.0
+        if hypothesis.surface == surface and hypothesis.kind != ENDING:
+            most = max(most, hypothesis.at_most)
+    return most
+
+
+@kernel
+def end_at_most(block, surface):
+    """The same of the end of a loss."""
+    most = 0.0
+    for h in range(block.n_hypotheses):
+        hypothesis = block.hypothesis[h]
+        if hypothesis.surface == surface and hypothesis.kind == ENDING:
+            most = max(most, hypothesis.at_most)
+    return most
 
 
 @kernel
@@ -152,15 +169,22 @@ def excludes(fdi, surface):
 
     Each view of roll and yaw is held against that of pitch: a loss explains what it does to its own axes. A
     loss whose course is not declared `abrupt` may grow, and a constant theta then explains only part of what
-    it does: it is excluded where that part is small besides.
+    it does: it is excluded where that part is small besides; so is one that begins within a frame. The end of
+    one is a step like any other, and explains as much or nothing; in pitch, where a fault outside the class
+    is such a step, only where a loss has shown before.
     """
     statistical = fdi.statistical
-    pitch = statistical.block[PITCH]
+    pitch, exact = statistical.block[PITCH], fdi.abrupt and fdi.instants == 1
     for b in range(LATERAL, statistical.n_blocks):
         lateral = statistical.block[b]
         better = max(best_alternative(fdi, pitch, surface), best_alternative(fdi, lateral, surface))
         worse = max(loss_at_most(pitch, surface), loss_at_most(lateral, surface))
-        if better - worse > statistical.naming_level and (fdi.abrupt or worse < LEAST_PART * better):
+        ended = end_at_most(lateral, surface)
+        in_pitch = end_at_most(pitch, surface)
+        if loss_at_most(pitch, surface) > min(0.5 * statistical.naming_level, SHOWN_BEFORE * in_pitch):
+            ended = max(ended, in_pitch)
+        part = 1.0 if exact else LEAST_PART
+        if better - max(worse, ended) > statistical.naming_level and worse < part * better:
             return True
     return False
 
@@ -189,6 +213,17 @@ def prepare(statistical, fdi, design, x, y, u):
         air.begin_frame(statistical.air)
     drifts(statistical, fdi, design, x, y)
     if statistical.tolerated:
+        for b in range(statistical.n_blocks):
+            statistical.block[b].regressor[:] = 0.0
+        coefficients(statistical, design, x, y, u)
+
+
+@kernel
+def look(statistical, design, x, y, u, attitude, dt):
+    """Take in an instant inside a frame, dt s after the one before; attitude (3,) rad."""
+    if statistical.air.moving:
+        air.look(statistical.air, design, x, y, u, attitude, dt)
+    if statistical.tolerated:
         coefficients(statistical, design, x, y, u)
 
 
@@ -198,6 +233,8 @@ def drifts(statistical, fdi, design, x, y):
     bounded = statistical.bounded
     bounded[:] = 0.0
     uncertainty_bound(x, design, fdi.bound.inertia, fdi.bound.constant, fdi.bound.earth_rate, bounded)
+    for i in range(3):
+        bounded[i] += statistical.deflection[i]
     for b in range(statistical.n_blocks):
         block = statistical.block[b]
         for i in range(block.n):
@@ -207,7 +244,7 @@ def drifts(statistical, fdi, design, x, y):
                 if statistical.air.moving:
                     unseen = air.unseen_drift(statistical.air, y[AIRSPEED], axis, block.axis[j])
                     block.drift[i, j] = block.stronger * unseen
-            size = max(bounded[axis] + statistical.deflection[axis], LEAST_UNCERTAINTY_RAD_S2)
+            size = max(bounded[axis], LEAST_UNCERTAINTY_RAD_S2)
             block.drift[i, i] += statistical.rapidity * size * size
             block.jitter[i] = statistical.jitter[axis]
         block.keep = np.exp(-fdi.dt * y[AIRSPEED] / block.lag) if block.lag > 0.0 else 1.0
@@ -215,22 +252,24 @@ def drifts(statistical, fdi, design, x, y):
 
 @kernel
 def coefficients(statistical, design, x, y, u):
-    """Fill each block's regressors (n, 2) rad/s2: what each moment coefficient is multiplied by."""
+    """Add to each block's regressors (n, 2) rad/s2, means over a frame: what the coefficients multiply."""
     table = design.moments
     evaluate(table, x, y)
     regressors(table, table.power, u, statistical.terms)
-    lateral, longitudinal = y[QDYN] * design.S * design.b, y[QDYN] * design.S * design.c
+    share = statistical.share * y[QDYN] * design.S
+    lateral, longitudinal = share * design.b, share * design.c
     pitch = statistical.block[PITCH]
     first = table.free_from[1]
     for j in range(table.surface_to[1] - first):
-        pitch.regressor[j, 0] = design.Qm * longitudinal * statistical.terms[first + j]
+        pitch.regressor[j, 0] += design.Qm * longitudinal * statistical.terms[first + j]
     for b in range(LATERAL, statistical.n_blocks):
         rolling = statistical.block[b]
         n_roll, first = table.surface_to[0], table.free_from[2]
         for j in range(n_roll):
             Cl = lateral * statistical.terms[j]
-            rolling.regressor[j, 0], rolling.regressor[j, 1] = design.Pl * Cl, design.Rl * Cl
+            rolling.regressor[j, 0] += design.Pl * Cl
+            rolling.regressor[j, 1] += design.Rl * Cl
         for j in range(table.surface_to[2] - first):
             Cn = lateral * statistical.terms[first + j]
-            rolling.regressor[n_roll + j, 0] = design.Pn * Cn
-            rolling.regressor[n_roll + j, 1] = design.Rn * Cn
+            rolling.regressor[n_roll + j, 0] += design.Pn * Cn
+            rolling.regressor[n_roll + j, 1] += design.Rn * Cn

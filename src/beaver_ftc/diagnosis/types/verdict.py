@@ -58,14 +58,15 @@ def surface_at_fault(fdi):
 def others_refuted(fdi, chosen):
     """Whether nothing but a fault that follows the chosen one's commands is left on the other surfaces.
 
-    An oscillation is given one half-cycle of the slowest to show, a whole one if still possible; where
-    errors are declared that a course can hide in, every type of the others must have been excluded.
+    An oscillation is given one half-cycle of the slowest to show, a whole one if still possible. An offset
+    that grows is as good as constant in the end, whatever the commands; where errors are declared that a
+    course can hide in, every type of the others must have been excluded.
     """
     waits = 1
     for s in range(fdi.surface.size):
         surface = fdi.surface[s]
         if s != chosen and surface.in_question and possible(fdi, s):
-            if fdi.bound.own_errors and anything_left(surface):
+            if left(surface, GROWING_BIAS) or (fdi.bound.own_errors and anything_left(surface)):
                 return False
             if left(surface, OSCILLATORY) or left(surface, VARYING_LOSS):
                 waits = 2

@@ -25,6 +25,8 @@ def lay_out(line: str, folder: Path, installation: Installation) -> None:
             put(folder)
     if "--model wing.json" in line:
         _identified(folder, installation)
+    if "navion" in line and "derive" not in line:
+        _derived(folder, installation)
     for name in re.findall(r"\bruns/([\w-]+)", line):
         if line.startswith("beaver-ftc compare"):
             _fly(name, folder, installation)
@@ -95,6 +97,17 @@ def _identified(folder: Path, installation: Installation) -> None:
     assert installation.beaver(*given.split(), cwd=folder).returncode == 0
 
 
+def _own_aircraft(folder: Path) -> None:
+    """The tutorial's files; the aircraft's folder is the page's own doing."""
+    for path in (ROOT / "examples/own-aircraft").iterdir():
+        shutil.copy(path, folder)
+
+
+def _derived(folder: Path, installation: Installation) -> None:
+    """The folder that the page's command before makes."""
+    assert installation.beaver("derive", "navion.xml", "--out", "aircraft", cwd=folder).returncode == 0
+
+
 def _copy(relative: str):
     return lambda folder: shutil.copytree(ROOT / relative, folder / relative)
 
@@ -107,7 +120,8 @@ _MATERIALS = {
     r"\bbrief\.yaml\b|^pytest$": _brief,
     r"\b(healthy|suspect)\.csv\b": _recorded_flights,
     r"\bmine:": _mine,
-    r"\baircraft/": _copy("aircraft"),
+    r"\bnavion": _own_aircraft,
+    r"(?<!\./)\baircraft/": _copy("aircraft"),
     r"\bdocs/": _copy("docs"),
     r"\btests/data\b": _copy("tests/data"),
     r"\btools\b": _copy("tools"),

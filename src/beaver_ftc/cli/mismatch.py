@@ -41,12 +41,23 @@ def command(
         if format is Format.json:
             emit_json({"runs": [], "errors": str(error).splitlines()})
         raise
+    _refuse_other_aircraft(flown)
     documents, recommended = _fly_all(flown, out, format, report=not no_report)
     maps = [_map(scenario, out, format, report=not no_report) for scenario in flown if map]
     for document, entries in zip(documents, maps, strict=False):
         document["map"] = entries
     if format is Format.json:
         emit_json(documents[0] if len(documents) == 1 else {"runs": documents} | recommended)
+
+
+def _refuse_other_aircraft(scenarios: list["Scenario"]) -> None:
+    """The sources are told apart by the terms and the engine of the built-in aircraft."""
+    for scenario in scenarios:
+        if not scenario.airframe.forces or "dpt" not in scenario.airframe.signals:
+            raise BadInput(
+                f"{scenario.name}: mismatch splits by the terms and the engine of a built-in aircraft; what "
+                f"is left of {scenario.aircraft} is in the page derive writes, allowed: a built-in aircraft"
+            )
 
 
 def _variants(scenario: "Scenario", text: str) -> list["Scenario"]:

@@ -249,6 +249,8 @@ def _add_signals(aerodynamics: Element, engines: int) -> None:
     """Let the aerodynamics reckon the signals first of all."""
     thrusts = " ".join(f"<property> propulsion/engine[{i}]/thrust-lbs </property>" for i in range(engines))
     functions = {"thrust": _THRUST.format(thrusts=thrusts), **_FUNCTIONS}
+    if not engines:  # nor has the aircraft the properties
+        functions = {signal: functions[signal] for signal in ("alpha_rate", "beta_rate")}
     for signal, formula in functions.items():
         name, says = SIGNALS[signal]
         text = f'<function name="{name}"> <description> {says} </description> {formula} </function>'

@@ -203,3 +203,31 @@ def test_a_surface_off_a_straight_line_is_said(derived):
     assert any(
         note.startswith("aileron: its moment is not proportional") for note in not_affine(plant, made.trim)
     )
+
+
+def test_the_tutorials_aircraft_is_its_published_table(tmp_path):
+    """Derivatives as they are in the book; with pitch rate the book counts q c/2V."""
+    model = Path(__file__).parents[3] / "examples" / "own-aircraft" / "navion.xml"
+    found = values(derive(str(model), tmp_path).aircraft)
+    book = {
+        ("Cl", "beta"): -0.074, ("Cl", "ph"): -0.410, ("Cl", "rh"): 0.107, ("Cm", "alpha"): -0.683,
+        ("Cm", "qh"): -9.96 / 2, ("Cm", "elevator"): -0.923, ("Cn", "beta"): 0.071, ("Cn", "rudder"): -0.072,
+    }  # fmt: skip
+    assert {key: found[key] for key in book} == pytest.approx(book, rel=1e-3)
+
+
+@pytest.mark.parametrize("name", ["elevator-partial-loss", "aileron-stuck", "unanticipated", "fault-free"])
+def test_the_built_in_aircraft_as_derived_has_the_same_verdicts(name, tmp_path_factory):
+    """Its table written by hand, and the one found from its model: the same flights are judged the same."""
+    folder = tmp_path_factory.getbasetemp() / "same-verdicts"
+    if not folder.is_dir():
+        derive("beaver", folder)
+    text = (Path(__file__).parents[3] / "scenarios" / f"{name}.yaml").read_text()
+    flights = [
+        fly(load_text(f"aircraft: {aircraft}\n{text}", folder=folder)) for aircraft in ("beaver", "./beaver")
+    ]
+    assert flights[0].scenario.airframe is not flights[1].scenario.airframe
+    by_hand, derived = ((f.isolated, f.candidates, f.departure) for f in flights)
+    assert derived == by_hand
+    at = [f.detection_time_s for f in flights]
+    assert at[0] == at[1] or at[1] == pytest.approx(at[0], abs=0.05)

@@ -2,7 +2,9 @@
 
 import shutil
 from pathlib import Path
+from typing import Any
 
+from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.aircraft.loading import read
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.trim import trim
@@ -24,3 +26,17 @@ def about_known(source: Path, folder: Path) -> Level:
     }
     point = trim(data["start"]["airspeed_mps"], data["start"]["altitude_m"], plant=plant, **settings)
     return Level(data, aircraft, plant, point)
+
+
+def named_as(aircraft: Aircraft, moments: dict[str, list[dict[str, Any]]]) -> dict[str, list[dict[str, Any]]]:
+    """Terms under the names an aircraft's own file has for the same products."""
+    names = {(t.coefficient, t.surface, frozenset(t.of)): t.name for t in aircraft.terms.values()}
+
+    def name_of(coefficient: str, term: dict[str, Any]) -> str:
+        product = coefficient, term.get("surface"), frozenset(term["of"].items())
+        return names.get(product, term["name"])
+
+    return {
+        coefficient: [{**term, "name": name_of(coefficient, term)} for term in terms]
+        for coefficient, terms in moments.items()
+    }

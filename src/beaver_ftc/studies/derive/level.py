@@ -93,8 +93,8 @@ def level_flight(outlines: list[dict[str, Any]], folder: Path, notes: list[str])
         except (BadInput, SimulationFailed) as error:
             failed = failed or error
             continue
-        notes += [*choices, *_slope(point)]
         plant = plant_of(data, folder)
+        notes += [*choices, *(_slope(point) if plant.n_engines else [])]
         return Level(data, plant.aircraft, plant, point)
     raise BadInput(f"{outlines[0]['name']}: {failed}")
 

@@ -40,6 +40,16 @@ def smallest_losses(aircraft: Aircraft) -> dict[str, dict[str, Any]]:
     return found
 
 
+def near_trim(aircraft: Aircraft) -> dict[str, float]:
+    """The declared error in the second box, for surfaces within the second share of their travel, rad/s2."""
+    error_map = aircraft.file.model_error_map
+    if error_map is None:
+        return dict(zip(AXES, aircraft.model_error_rad_s2, strict=True))
+    box = error_map.boxes[min(_NEAR, len(error_map.boxes) - 1)]
+    level = min(_NEAR, len(error_map.travel_share) - 1)
+    return {axis: getattr(box, f"error_{axis}_rad_s2")[0][level] for axis in AXES}
+
+
 def _usual_y(aircraft: Aircraft) -> np.ndarray:
     """The measured signals of level flight, as the innermost box has them."""
     error_map = aircraft.file.model_error_map

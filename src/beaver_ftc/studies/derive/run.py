@@ -11,7 +11,7 @@ import numpy as np
 import yaml
 
 from beaver_ftc.aircraft import Aircraft
-from beaver_ftc.aircraft.loading import DERIVED, first_line
+from beaver_ftc.aircraft.loading import DERIVED, first_line, read
 from beaver_ftc.aircraft.schema import MAX_MONOMIALS, MAX_SIGNALS, AircraftFile
 from beaver_ftc.design.model import design_record
 from beaver_ftc.errors import BadInput
@@ -22,7 +22,7 @@ from beaver_ftc.studies.derive.check import not_affine, own_control
 from beaver_ftc.studies.derive.error import map_of
 from beaver_ftc.studies.derive.fit import MOST_TERMS, engine_signals, fitted, signals_of_use
 from beaver_ftc.studies.derive.flown import fly_about
-from beaver_ftc.studies.derive.known import about_known
+from beaver_ftc.studies.derive.known import about_known, named_as
 from beaver_ftc.studies.derive.level import LIFT_COEFFICIENTS, Level, level_flight
 from beaver_ftc.studies.derive.outline import EnvelopeFile, outline, read_envelope, travel_of
 from beaver_ftc.studies.derive.page import NAME as PAGE
@@ -46,6 +46,7 @@ class Derived:
     fitted_rad_s2: np.ndarray
     checked_rad_s2: np.ndarray
     notes: tuple[str, ...] = field(default=())
+    given: Aircraft | None = None  # as its own file has it
 
 
 def derive(
@@ -73,7 +74,8 @@ def derive(
         write(folder, level.data)
         (folder / PAGE).write_text(page_of(aircraft, level.trim, tuple(notes)), encoding="utf-8")
         move(folder, target)
-    return Derived(aircraft, level.trim, *made, tuple(notes))
+    given = read(source.folder) if source.folder else None
+    return Derived(aircraft, level.trim, *made, tuple(notes), given)
 
 
 def _prepared(source: Source, folder: Path, asked: EnvelopeFile, notes: list[str], tell: Tell) -> Level:
@@ -113,7 +115,7 @@ def _derived(level: Level, asked: EnvelopeFile, folder: Path, tell: Tell) -> tup
         useful = signals_of_use(first, level.aircraft, MAX_SIGNALS, engine_signals(flown, level.aircraft))
         data["signals"] = {name: {"property": properties[name]} for name in useful}
     tell("fit")
-    data["moments"] = _moments(first, data, folder)
+    data["moments"] = named_as(level.aircraft, _moments(first, data, folder))
     tell("check")
     other = sample(plant, where, point, CHECKED, 2, properties)
     aircraft = Aircraft(AircraftFile.model_validate(data), folder)

@@ -2,7 +2,8 @@
 
 from typing import Any
 
-from beaver_ftc.studies.derive.page import DEFLECTION_DEG, smallest_losses
+from beaver_ftc.aircraft import Aircraft
+from beaver_ftc.studies.derive.page import DEFLECTION_DEG, near_trim, smallest_losses
 from beaver_ftc.studies.derive.run import Derived
 
 AXES = ("p", "q", "r")
@@ -29,8 +30,10 @@ def document_of(made: Derived) -> dict[str, Any]:
             "checked": dict(zip(AXES, map(float, made.checked_rad_s2), strict=True)),
             "declared": dict(zip(AXES, aircraft.model_error_rad_s2, strict=True)),
         },
+        "near_trim_rad_s2": near_trim(aircraft),
         "smallest_certain_loss": {name: of["certain_loss"] for name, of in smallest_losses(aircraft).items()},
         "notes": list(made.notes),
+        "own_file": differences(made.given, made.aircraft) if made.given else None,
     }
 
 
@@ -51,9 +54,27 @@ def text_of(document: dict[str, Any]) -> str:
     losses = document["smallest_certain_loss"].items()
     says = {name: f"{loss:.0%}" if loss <= 1.0 else "none" for name, loss in losses}
     lines.append(f" certain to be detected at {DEFLECTION_DEG:g} deg: losses from " + _listed(says))
+    if document["own_file"]:
+        lines += _compared(document["own_file"])
     lines += [f" note: {note}" for note in document["notes"]]
     lines.append(f" written to {document['folder']}, with a page on it, derived.md")
     return "\n".join(lines)
+
+
+def differences(given: Aircraft, found: Aircraft) -> list[dict[str, Any]]:
+    """Each term of an aircraft's own file, and the coefficient that was found for the same product."""
+    values = {(t.coefficient, *sorted(t.factors)): t.value for t in found.moments}
+    return [
+        {"term": t.name, "own": t.value, "found": values.get((t.coefficient, *sorted(t.factors)), 0.0)}
+        for t in given.moments
+        if t.value
+    ]
+
+
+def _compared(terms: list[dict[str, Any]]) -> list[str]:
+    """The coefficients beside those of the aircraft's own file."""
+    head = f" {'coefficient':24}{'own file':>12}{'found':>12}"
+    return [head, *(f"   {of['term']:22}{of['own']:12.5g}{of['found']:12.5g}" for of in terms)]
 
 
 def _listed(values: dict[str, str]) -> str:

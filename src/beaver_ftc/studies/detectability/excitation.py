@@ -4,8 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from beaver_ftc.design.coefficients import SURFACES as ALL_SURFACES
-from beaver_ftc.design.model import AXES, control_effectiveness
+from beaver_ftc.design.model import AXES, N_Y, control_effectiveness
 from beaver_ftc.design.variants import design_of
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.scenario.schema import Scenario
@@ -16,8 +15,8 @@ SETTLED_S = 2.0  # the start of a reference is a step of its own
 
 @dataclass(frozen=True)
 class Excitation:
-    """Along a flight of n frames: the moment of each surface (4, n, 3) rad/s2, the bound on the uncertainty
-    (n, 3) rad/s2, and the length of a frame dt s.
+    """Along a flight of n frames: the moment of each surface (surfaces, n, 3) rad/s2, the bound on the
+    uncertainty (n, 3) rad/s2, and the length of a frame dt s.
     """
 
     moment: np.ndarray
@@ -32,10 +31,13 @@ def excitation(scenario: Scenario) -> Excitation:
     """
     log = Columns()
     fly(scenario.model_copy(update={"faults": ()}), log)
-    y = log.read("alpha_rad", "beta_rad", "airspeed_mps", "qdyn_pa", "dpt")
-    u = log.read(*(f"{surface}_cmd_rad" for surface in ALL_SURFACES))
+    aircraft = scenario.airframe
+    y = np.zeros((len(log.read("t_s")), N_Y))
+    seen = log.read("alpha_rad", "beta_rad", "airspeed_mps", "qdyn_pa", *aircraft.signals)
+    y[:, : seen.shape[1]] = seen
+    u = log.read(*(f"{surface}_cmd_rad" for surface in aircraft.surfaces))
     bound = log.read(*(f"{axis}_eta_bar_rad_s2" for axis in AXES))
-    design, G = design_of(scenario.design_model)[0], np.zeros((len(y), 3, 4))
+    design, G = design_of(scenario.design_model, aircraft)[0], np.zeros((len(y), 3, aircraft.n))
     for row, at in zip(y, G, strict=True):
         control_effectiveness(design, row, at)
     first = int(SETTLED_S * scenario.rate_hz)

@@ -11,13 +11,13 @@ from beaver_ftc.errors import BadInput, BeaverFtcError
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.detectability.excitation import Excitation, excitation
 from beaver_ftc.studies.detectability.grid import (
-    ALTITUDES_M,
     DETECT_WITHIN_S,
     EXCITATIONS,
     FAULTS,
     ISOLATE_WITHIN_S,
-    SPEEDS_MPS,
     Row,
+    altitudes_of,
+    speeds_of,
 )
 from beaver_ftc.studies.detectability.mismatch import (
     best_in_window,
@@ -33,8 +33,8 @@ from beaver_ftc.studies.engine.statistics import quantile
 def run_survey(
     out: Path,
     scenario: Scenario,
-    speeds_mps: Sequence[float] = SPEEDS_MPS,
-    altitudes_m: Sequence[float] = ALTITUDES_M,
+    speeds_mps: Sequence[float] = (),
+    altitudes_m: Sequence[float] = (),
     excitations: Sequence[float] = EXCITATIONS,
     progress: Progress | None = None,
 ) -> list[Row]:
@@ -46,6 +46,8 @@ def run_survey(
 
     _refuse_other_schemes(scenario)
     name = survey_name(scenario)
+    speeds_mps = speeds_mps or speeds_of(scenario.airframe)
+    altitudes_m = altitudes_m or altitudes_of(scenario.airframe)
     grid = list(product(speeds_mps, altitudes_m, excitations))
     points = flown(out / name, grid, partial(_point, scenario), list[Row], asked=scenario, progress=progress)
     with points as found, result_folder(out, name) as folder:

@@ -46,6 +46,16 @@ def _under(kind: str, section: str, *names: str) -> list[tuple[str, str, Getter]
     return [(f"{section}.{name}", kind, _at(*parts, name)) for name in names]
 
 
+def _of_surfaces(section: str) -> list[tuple[str, str, Getter]]:
+    """A column for each surface; empty where the aircraft has no such surface."""
+    of_all = _at(*section.split("."))
+
+    def getter(surface: str) -> Getter:
+        return lambda document, flight: (of_all(document, flight) or {}).get(surface)
+
+    return [(f"{section}.{surface}", "float", getter(surface)) for surface in SURFACES]
+
+
 def _first_entry(mode: str) -> Getter:
     def get(document: Document, flight: "Flight") -> Any:
         return next((change["time_s"] for change in document["supervisor"] if change["mode"] == mode), None)
@@ -115,7 +125,7 @@ COLUMNS: tuple[tuple[str, str, Getter], ...] = (
     ("worst_residual_ratio", "float", lambda document, flight: flight.worst_residual_ratio),
     *_under("float", "tracking.pre_fault_rms_deg_s", *AXES),
     *_under("float", "tracking.post_fault_rms_deg_s", *AXES),
-    *_under("float", "tracking.surface_travel_deg", *SURFACES),
+    *_of_surfaces("tracking.surface_travel_deg"),
     ("supervisor.mode", "text", lambda document, flight: document["supervisor"][-1]["mode"]),
     *((f"supervisor.{mode}_at_s", "float", _first_entry(mode)) for mode in MODES),
     ("envelope_exits.count", "int", lambda document, flight: document["envelope"]["exits"]),
@@ -124,7 +134,7 @@ COLUMNS: tuple[tuple[str, str, Getter], ...] = (
     *_under("text", "departure", "signal"),
     *(column for a in AXES for column in _under("float", f"authority.{a}", "given_share", "beyond_s")),
     *_under("float", "engine_power", "from_s", "in_charge_s", "lowest_inhg", "highest_inhg"),
-    *_under("float", "saturation_s", *SURFACES),
+    *_of_surfaces("saturation_s"),
     ("expectations.missed", "text", _missed_expectations),
     ("passed", "flag", _at("passed")),
 )

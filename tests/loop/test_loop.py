@@ -178,6 +178,7 @@ class TestDepartures:
         flying = loop.Loop(scenario(duration_s=2))
         flying.cockpit.native = False
         flying.frames["truth"]["native"] = 0
+        flying.fly_with(None)
         read = flying.cockpit.read
 
         def poisoned():

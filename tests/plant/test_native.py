@@ -4,8 +4,11 @@ import numba
 import numpy as np
 import pytest
 
+from beaver_ftc.loop.loop import Loop
 from beaver_ftc.plant import native
+from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.native import NodeBank
+from beaver_ftc.scenario.given import load
 
 READ = [
     "velocities/vt-fps",
@@ -84,3 +87,29 @@ def test_another_layout_is_recognised(monkeypatch, change):
     for name, value in change.items():
         monkeypatch.setattr(native, name, value)
     assert not native._layout_is_known.__wrapped__()
+
+
+ROUGH = {"environment": {"turbulence": "dryden", "severity": "moderate"}, "sensors": "consumer-grade"}
+
+
+@pytest.mark.parametrize("air", [{}, ROUGH])
+@pytest.mark.parametrize("substeps", [1, 3])
+def test_jsbsim_run_by_compiled_code_is_the_same_flight(air, substeps):
+    fault = {"actuator": "rudder", "type": "bias", "bias_deg": 3.0, "at_s": 1.0}
+    case = load(
+        {"name": "run", "duration_s": 4.0, "rate_hz": 50, "substeps": substeps, "faults": [fault]} | air
+    )
+    compiled, called = Loop(case), Loop(case, prepare=lambda plant: None)
+    assert compiled.fly_frame is None
+    assert called.fly_frame is not None
+    logs = [np.concatenate([rows.copy() for rows in loop.chunks()]) for loop in (compiled, called)]
+    np.testing.assert_array_equal(*logs)
+
+
+def test_an_executive_that_is_not_where_it_is_expected_is_run_through_python(monkeypatch):
+    plant = Plant(rate_hz=100)
+    monkeypatch.setattr(native, "_EXECUTIVE_SIZE", 48)
+    assert native.executive_address(plant.fdm) == 0
+    monkeypatch.undo()
+    monkeypatch.setattr(native, "_BASE_OFFSET", 32)  # where the dictionary is
+    assert native.executive_address(plant.fdm) == 0

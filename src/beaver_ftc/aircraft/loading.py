@@ -35,6 +35,7 @@ class UnknownAircraft(BadInput):
     """No such aircraft; the message says what is allowed."""
 
 
+@lru_cache
 def builtin_names() -> tuple[str, ...]:
     """Names of the built-in aircraft."""
     return tuple(sorted(path.parent.name for path in _root().glob(f"*/{FILE}")))

@@ -27,8 +27,16 @@ from beaver_ftc.diagnosis.state import (
 )
 from beaver_ftc.diagnosis.types.pairs import IN_PITCH, IN_ROLL_AND_YAW
 from beaver_ftc.errors import BadInput
+from beaver_ftc.loop import memory
 from beaver_ftc.loop.frame import frame_dtype
-from beaver_ftc.loop.instruments import admit_engine, assemble_instruments, assemble_watch, truth_read
+from beaver_ftc.loop.instruments import (
+    admit_engine,
+    assemble_instruments,
+    assemble_watch,
+    breaks_instruments,
+    seed_instruments,
+    truth_read,
+)
 from beaver_ftc.plant import channels as ch
 from beaver_ftc.scenario.actuators import Actuators
 from beaver_ftc.scenario.control import ControlConfig
@@ -181,12 +189,7 @@ def _assemble_network(network: np.void, config: ControlConfig) -> None:
 
 
 def _assemble_control(
-    control: np.void,
-    config: ControlConfig,
-    dt: float,
-    trim: np.ndarray,
-    travel: np.ndarray,
-    aircraft: Aircraft,
+    control: np.void, config: ControlConfig, dt: float, travel: np.ndarray, aircraft: Aircraft
 ) -> None:
     control["law"], control["inner"] = law_of(config.law)  # a plug-in: plugin_frame.py
     control["dt"] = dt
@@ -200,7 +203,6 @@ def _assemble_control(
     )
     control["reference_scale"] = 1.0
     control["least_effectiveness"] = config.least_effectiveness
-    control["trim"] = control["command"] = trim
     control["low"], control["high"] = travel
     control["hand_over_step"] = dt / config.hand_over_s
     control["main"] = leaders_of(aircraft)
@@ -286,20 +288,41 @@ def _assemble_admitted(frame: np.void, scenario: Scenario) -> None:
         )
 
 
+_DESIGN = {"fdi", "control", "design_model", "actuators", "sensors", "rate_hz", "substeps"}
+_MOST_DESIGNS = 32
+_designs: dict[tuple[object, ...], np.ndarray] = {}
+
+
 def assemble(scenario: Scenario, trim: np.ndarray, travel: np.ndarray) -> np.ndarray:
     """The frame record, shape (1,), of a flight about to start.
 
     trim (4,) rad: the surfaces in trim; travel (2, 4) rad: lower and upper stops. The truth's nodes are
-    attached by the loop.
+    attached by the loop. A copy of the record of its design, which is assembled once.
     """
-    frames = np.zeros(1, frame_dtype(scenario.airframe.n))
+    initial = scenario.initial.model_dump(exclude={"airspeed_mps"})
+    design = scenario.model_dump_json(include=_DESIGN)
+    failing = breaks_instruments(scenario)
+    key = scenario.airframe, design, failing, tuple(initial.values()), travel.tobytes()
+    if key not in _designs:
+        if len(_designs) >= _MOST_DESIGNS:
+            _designs.clear()
+        _designs[key] = _assemble_design(scenario, travel)
+    frames = memory.copied(_designs[key])
     frame = frames[0]
-    dt = 1.0 / scenario.rate_hz
+    frame["belief"]["u"] = frame["belief"]["commanded"] = trim
+    frame["control"]["trim"] = frame["control"]["command"] = trim
+    seed_instruments(frame["instruments"], scenario.seed)
+    return frames
+
+
+def _assemble_design(scenario: Scenario, travel: np.ndarray) -> np.ndarray:
+    """What does not depend on the trim, the seed and the truth."""
+    frames = np.zeros(1, frame_dtype(scenario.airframe.n))
+    frame, dt = frames[0], 1.0 / scenario.rate_hz
     frame["dt"] = dt
     belief, truth = frame["belief"], frame["truth"]
     belief["share"] = 1.0 / scenario.substeps
     belief["design"] = design_of(scenario.design_model, scenario.airframe)[0]
-    belief["u"] = belief["commanded"] = trim
     channels = truth_read(scenario)
     truth["n"], truth["declared"] = len(channels), len(scenario.airframe.signals)
     truth["factor"][: len(channels)] = [factor for _, _, factor in channels]
@@ -315,7 +338,7 @@ def assemble(scenario: Scenario, trim: np.ndarray, travel: np.ndarray) -> np.nda
     _assemble_admitted(frame, scenario)
     _assemble_sharpening(frame["fdi"], scenario.fdi, dt)
     _assemble_network(frame["fdi"]["fdae"]["network"], scenario.control)
-    _assemble_control(frame["control"], scenario.control, dt, trim, travel, scenario.airframe)
+    _assemble_control(frame["control"], scenario.control, dt, travel, scenario.airframe)
     _assemble_probing(frame["control"], scenario.fdi.probing, dt)
     _assemble_power(frame["control"], scenario, dt)
     return frames

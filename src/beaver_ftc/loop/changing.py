@@ -14,7 +14,6 @@ import numpy as np
 from beaver_ftc.control.laws.state import REJECTING
 from beaver_ftc.control.state import NOMINAL, ORACLE
 from beaver_ftc.loop.assembly import assemble
-from beaver_ftc.loop.frame import fly_frame
 from beaver_ftc.loop.instruments import enable_watch, read_more
 from beaver_ftc.loop.plugin_frame import PluginFrame, named_detector, named_law, plugged
 from beaver_ftc.plant.faults import NEVER, TIME_TOLERANCE_S
@@ -172,5 +171,4 @@ def take_plugins(loop: Any, plugins: PluginFrame | None) -> None:
         plugins.held_rad = before.held_rad
         if plugins.detector is before.detector:
             plugins.verdict = before.verdict
-    loop.plugin_frame = plugins
-    loop.own_frame = loop.fly_frame = plugins or loop.direct(fly_frame)
+    loop.fly_with(plugins)

@@ -7,6 +7,11 @@ from beaver_ftc.plant import channels as ch
 from beaver_ftc.plant import native
 from beaver_ftc.plant.adapter import Plant
 
+UNANTICIPATED = "failures/unanticipated/Cm-alpha3"
+IMMOVABLE = ("stuck", "hardover", "float")  # failures in which a surface does not follow its command
+EARTH_RADIUS_M = 6371000.0  # for the log's north and east: a local plane, not navigation
+LEAST_HEIGHT_M = 500.0  # above the ground at the start; the ground is at sea level, or lower if need be
+
 
 class Cockpit:
     """The wires between one plant and one frame record: which nodes are read and written, natively or
@@ -18,16 +23,22 @@ class Cockpit:
             [plant.node(name) for _, name, _ in _channels(plant.aircraft, frames["truth"][0])], owner=plant
         )
         self._write = native.NodeBank(
-            [plant.node(name) for name in ch.command_properties(plant.aircraft)], owner=plant
+            [plant.input(name) for name in ch.command_properties(plant.aircraft)], owner=plant
         )
-        self._engine = native.NodeBank([plant.node(plant.aircraft.trim.throttle)], owner=plant)
+        self._engine = native.NodeBank([plant.input(plant.aircraft.trim.throttle)], owner=plant)
+        self._air = native.NodeBank(
+            [plant.node("attitude/psi-rad"), plant.input("atmosphere/psiw-rad")], owner=plant
+        )
         self.native = native.available()
-        truth = frames["truth"][0]
+        truth, running = frames["truth"][0], frames["running"][0]
         truth["native"] = self.native
         truth["getter"], truth["setter"] = native.getter_address(), native.setter_address()
         truth["read_pointers"][: truth["n"]] = self._read.pointers
         truth["write_pointers"] = self._write.pointers
         truth["engine_pointer"] = self._engine.pointers
+        running["run"], running["executive"] = native.run_address(), plant.executive
+        running["getter"], running["setter"] = truth["getter"], truth["setter"]
+        running["heading_pointer"], running["axes_pointer"] = self._air.pointers
 
     def read(self) -> None:
         """Bring the truth into the frame record, through Python."""
@@ -45,3 +56,32 @@ class Cockpit:
 def _channels(aircraft: Aircraft, truth: np.void) -> tuple[ch.Channel, ...]:
     """What is read of the truth: as many as its record has."""
     return (*ch.truth_channels(aircraft), *ch.further_channels(aircraft))[: int(truth["n"])]
+
+
+def travel_rad(plant: Plant) -> np.ndarray:
+    """Lower and upper stops of the surfaces, (2, 4) rad."""
+    return np.array(
+        [
+            [plant.read(f"actuators/{s}/position-{end}-rad") for s in plant.aircraft.surfaces]
+            for end in ("min", "max")
+        ]
+    )
+
+
+def set_origin(truth: np.void, plant: Plant, altitude_m: float) -> None:
+    """Where the flight starts, and where the ground is."""
+    truth["latitude_0"] = plant.read(ch.FIXED[ch.LATITUDE][1])
+    truth["longitude_0"] = plant.read(ch.FIXED[ch.LONGITUDE][1])
+    has_gear = plant.has("gear/unit[0]/WOW")
+    wheels_m = plant.aircraft.geometry.span_m if has_gear else 0.0  # height at which it is down
+    truth["ground_m"] = min(wheels_m, altitude_m - LEAST_HEIGHT_M)
+    truth["radius_m"] = EARTH_RADIUS_M + altitude_m
+    truth["parallel_radius_m"] = truth["radius_m"] * np.cos(truth["latitude_0"])
+
+
+def note_failures(truth: np.void, plant: Plant) -> None:
+    """Which surfaces cannot move now, and the unanticipated fault, for the oracle and the accounts."""
+    truth["immovable"] = [
+        any(plant.read(f"failures/{s}/{how}") for how in IMMOVABLE) for s in plant.aircraft.surfaces
+    ]
+    truth["Cm_alpha3"] = plant.read(UNANTICIPATED)

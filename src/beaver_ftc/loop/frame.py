@@ -30,6 +30,7 @@ from beaver_ftc.loop.accounts import account, accounts_dtype, add_effect, effect
 from beaver_ftc.loop.record import record
 from beaver_ftc.plant import channels as ch
 from beaver_ftc.plant.instruments import INSTRUMENTS
+from beaver_ftc.plant.native import RUNNING, advance
 from beaver_ftc.plant.sensing import (
     FLYING,
     MEASURED,
@@ -42,7 +43,7 @@ from beaver_ftc.plant.sensing import (
     truth_dtype,
 )
 
-__all__ = ["FLYING", "NOT_FINITE", "fly_frame", "frame_dtype", "look_inside"]
+__all__ = ["FLYING", "NOT_FINITE", "fly_frame", "fly_on", "frame_dtype", "look_inside"]
 
 
 # What the log has columns for, whatever changes in flight: estimators and statistical tests, the engine.
@@ -54,6 +55,7 @@ def frame_dtype(n: int) -> np.dtype:
     """All that a flight of an aircraft with n surfaces remembers between frames."""
     fields = [
         ("k", "i8"), ("row", "i8"), ("dt", "f8"), ("t", "f8"),  # frame, row of the log, s, s
+        ("running", RUNNING),
         ("since", "i8"), ("logged", LOGGED),  # the frame with which this diagnosis has begun
         ("truth", truth_dtype(n)), ("instruments", INSTRUMENTS), ("measured", MEASURED),
         ("belief", belief_dtype(n)), ("fdi", diagnosis_dtype(n)), ("verdict", verdict_dtype(n)),
@@ -200,3 +202,21 @@ def fly_frame(frames, references, log):
     command(frame)
     finish(frame, references[frame.row], log[frame.row])
     return status
+
+
+@kernel
+def fly_on(frames, references, log, order):
+    """Frames of the loop one after the other, each after JSBSim's own; nothing else changes meanwhile.
+
+    order: (2,) how many, and how many of JSBSim's to each. The rest, and what is returned: see `fly_frame`.
+    """
+    running = frames[0].running
+    for _ in range(order[0]):
+        for left in range(order[1] - 1, -1, -1):
+            advance(running)
+            if left > 0:
+                look_inside(frames)
+        status = fly_frame(frames, references, log)
+        if status != FLYING:
+            return status
+    return FLYING

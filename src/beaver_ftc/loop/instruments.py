@@ -62,10 +62,6 @@ def assemble_instruments(frame: np.void, scenario: Scenario, dt: float) -> None:
     """dt: seconds between samples, which is a JSBSim frame."""
     instruments = frame["instruments"]
     instruments["real"] = not scenario.sensors.is_ideal
-    instruments["random"] = scenario.seed
-    instruments["random_further"], instruments["random_fault"] = (
-        np.uint64(scenario.seed) ^ np.uint64(counter) for counter in OTHER_COUNTERS
-    )
     instruments["engine"] = has_real_engine(scenario)
     for i, name in enumerate(SENSORS):
         sensor = getattr(scenario.sensors, name)
@@ -80,6 +76,14 @@ def assemble_instruments(frame: np.void, scenario: Scenario, dt: float) -> None:
                 f"{scenario.name}: sensors.{name}.delay_s is {sensor.delay_s:g} s, "
                 f"allowed: {LONGEST_DELAY} JSBSim frames, {LONGEST_DELAY * dt:g} s here"
             )
+
+
+def seed_instruments(instruments: np.void, seed: int) -> None:
+    """Let the random numbers of all instruments, further ones and faults, begin with a seed."""
+    instruments["random"] = seed
+    instruments["random_further"], instruments["random_fault"] = (
+        np.uint64(seed) ^ np.uint64(counter) for counter in OTHER_COUNTERS
+    )
 
 
 def assemble_watch(watch: np.void, scenario: Scenario, h: float) -> None:

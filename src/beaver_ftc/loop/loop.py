@@ -1,5 +1,4 @@
-"""The closed loop: JSBSim flies, the compiled frame measures, diagnoses, decides and commands, the log goes
-to its sink."""
+"""The closed loop: JSBSim flies, compiled frames measure, diagnose, decide and command, the log goes out."""
 
 from collections.abc import Callable, Iterable, Sequence
 from functools import cached_property, partial
@@ -14,18 +13,21 @@ from beaver_ftc.design.actuators import move
 from beaver_ftc.design.variants import anchor, mass_of
 from beaver_ftc.diagnosis import noise_model
 from beaver_ftc.errors import SimulationFailed
+from beaver_ftc.loop import memory
 from beaver_ftc.loop.assembly import assemble, estimator_names, y_places
-from beaver_ftc.loop.cockpit import Cockpit
+from beaver_ftc.loop.cockpit import Cockpit, note_failures, set_origin, travel_rad
 from beaver_ftc.loop.direct import direct
 from beaver_ftc.loop.flight import Flight, LogSink
-from beaver_ftc.loop.frame import FLYING, NOT_FINITE, fly_frame, look_inside
+from beaver_ftc.loop.frame import FLYING, NOT_FINITE, fly_frame, fly_on, look_inside
 from beaver_ftc.loop.instruments import anchor_watch, watch_from_now
 from beaver_ftc.loop.summary import flight_of
 from beaver_ftc.plant import channels as ch
 from beaver_ftc.plant.adapter import Plant
-from beaver_ftc.plant.configure import configure, take_off, trim_of
+from beaver_ftc.plant.conditions import ready
+from beaver_ftc.plant.configure import take_off
 from beaver_ftc.plant.faults import FaultSchedule
 from beaver_ftc.plant.gust import GustSchedule, MovingAir
+from beaver_ftc.plant.reuse import give_back
 from beaver_ftc.plant.sensor_faults import SensorFaultSchedule
 from beaver_ftc.plugins import DETECTORS, LAWS, is_compiled
 from beaver_ftc.scenario.schema import Scenario
@@ -38,10 +40,7 @@ if TYPE_CHECKING:
     from beaver_ftc.loop.plugin_frame import PluginFrame
 
 CHUNK_ROWS = 8192
-UNANTICIPATED = "failures/unanticipated/Cm-alpha3"
-IMMOVABLE = ("stuck", "hardover", "float")  # failures in which a surface does not follow its command
-EARTH_RADIUS_M = 6371000.0  # for the log's north and east: a local plane, not navigation
-LEAST_HEIGHT_M = 500.0  # above the ground at the start; the ground is at sea level, or lower if need be
+AT_ONCE = 256  # frames, a millisecond or two: so long a signal and other threads wait
 
 
 class Loop:
@@ -56,11 +55,11 @@ class Loop:
     ) -> None:
         self.scenario = scenario
         self.aircraft = scenario.airframe
-        self.plant = Plant(scenario.rate_hz, scenario.substeps, self.aircraft)
-        configure(self.plant, scenario)
-        self.trim = trim_of(scenario, self.plant)
+        self.plant, self.trim = ready(scenario)
+        self._may_fly_again = prepare is None
         if prepare is not None:
             prepare(self.plant)
+            self.plant.executive = 0  # whatever was done to its `run` is to be called
         take_off(self.plant, scenario, self.trim)
         surfaces = np.array(list(self.trim.surfaces_rad.values()))
         self.frames = assemble(scenario, surfaces, travel_rad(self.plant))
@@ -73,40 +72,25 @@ class Loop:
             scenario.faults, instruments, scenario.rate_hz, self.aircraft.has_engine_instruments
         )
         self.air = MovingAir(scenario.environment, self.plant)
+        self.frames["running"]["turbulent"] = self.air.turbulent
         self.gust = GustSchedule(scenario.environment.gusts, self.plant, scenario.rate_hz)
         self.n_frames = round(scenario.duration_s * scenario.rate_hz)
         self.plugin_frame = self._with_plugins(detector, law)
+        has_profile = bool(self.frames["autopilot"]["enabled"][0])
         self.columns = ch.log_columns(
             estimator_names(scenario.fdi.fault_class, scenario.airframe) if self._diagnoses_itself else (),
-            bool(self.frames["control"]["power"]["enabled"][0]) or self.has_profile,
+            bool(self.frames["control"]["power"]["enabled"][0]) or has_profile,
             bool(self.frames["fdi"]["statistical"]["enabled"][0]),
             self.aircraft,
-            profile=COLUMNS if self.has_profile else (),
+            profile=COLUMNS if has_profile else (),
         )
         self._lay_out()
-        self.log = np.empty((min(CHUNK_ROWS, self.n_frames), len(self.columns)))
+        self.log = memory.taken((min(CHUNK_ROWS, self.n_frames), len(self.columns)))
         self.references = np.empty((len(self.log), 3))
-        self.own_frame = self.fly_frame = self.plugin_frame or self.direct(fly_frame)
+        self._order = np.zeros(2, np.int64)
+        self.fly_with(self.plugin_frame)
         self.changing = self._changing() if scenario.changes else None
-        self._set_origin()
-
-    @property
-    def has_profile(self) -> bool:
-        """Whether outer loops fly."""
-        return bool(self.frames["autopilot"]["enabled"][0])
-
-    def _set_origin(self) -> None:
-        truth = self.frames["truth"][0]
-        truth["latitude_0"] = self.plant.read(ch.FIXED[ch.LATITUDE][1])
-        truth["longitude_0"] = self.plant.read(ch.FIXED[ch.LONGITUDE][1])
-        truth["ground_m"] = min(self._wheels_m, self.scenario.initial.altitude_m - LEAST_HEIGHT_M)
-        truth["radius_m"] = EARTH_RADIUS_M + self.scenario.initial.altitude_m
-        truth["parallel_radius_m"] = truth["radius_m"] * np.cos(truth["latitude_0"])
-
-    @property
-    def _wheels_m(self) -> float:
-        """The height of its centre at which an aircraft with a landing gear is down."""
-        return self.aircraft.geometry.span_m if self.plant.has("gear/unit[0]/WOW") else 0.0
+        set_origin(self.frames["truth"][0], self.plant, scenario.initial.altitude_m)
 
     def _seen(self) -> np.ndarray:
         """The truth's channels now, in SI."""
@@ -132,9 +116,7 @@ class Loop:
         set_up(frame["control"], frame["belief"], scenario, y)
         set_up_autopilot(frame["autopilot"], frame["control"], scenario)
         fdi, rate_hz = frame["fdi"], scenario.rate_hz
-        if fdi["watch"][
-            "enabled"
-        ]:  # a call into compiled code from here: a quarter of a second, the first one
+        if fdi["watch"]["enabled"]:  # compiled code called from here: a quarter of a second, the first time
             anchor_watch(fdi["watch"], np.array([design]), y)
         noise_model.set_up(fdi, scenario.fdi, design, mass, trim, rate_hz, self.aircraft)
 
@@ -166,19 +148,35 @@ class Loop:
 
         return plugin_frame(self.frames, self.scenario, self.start, detector, law)
 
+    def fly_with(self, plugins: "PluginFrame | None") -> None:
+        """Fly on with these plug-ins, or with none. fly_frame: what Python is to call, None if nothing."""
+        self.plugin_frame = plugins
+        self.own_frame: Callable[..., int] | None = plugins
+        if plugins is None and not (self.cockpit.native and self.plant.executive):
+            self.own_frame = direct(fly_frame, self.frames, self.references, self.log)
+        self.fly_frame = self.own_frame
+
     @property
     def _diagnoses_itself(self) -> bool:
         return self.plugin_frame is None or self.plugin_frame.detector is None
 
     def direct(self, kernel: Callable[..., int]) -> Callable[..., int]:
-        """A compiled frame as this flight calls it: `frame.fly_frame`, or another in its place."""
-        return direct(kernel, self.frames, self.references, self.log)
+        """Compiled frames as this flight calls them: `frame.fly_on`, or another in its place."""
+        return direct(kernel, self.frames, self.references, self.log, self._order)
 
     def land(self) -> Flight:
         """What the flight has yielded so far."""
         verdict = self.plugin_frame.verdict if self.plugin_frame and self.plugin_frame.detector else None
         replaced = self.changing.replaced if self.changing else ()
         return flight_of(self.scenario, self.frames[0], self.columns, verdict, tuple(replaced))
+
+    def release(self) -> None:
+        """Give aircraft and memory back for another flight: this one is over and not asked again."""
+        if self._may_fly_again:
+            self._may_fly_again = False
+            give_back(self.plant)
+            memory.give_back(self.frames)
+            memory.give_back(self.log)
 
     def command_instead(self, deflections: np.ndarray) -> None:
         """Replace the command (4,) rad of the frame just flown, before anything has moved."""
@@ -246,6 +244,8 @@ class Loop:
     def fly_frames(self, count: int, runs: int) -> int:
         """So many frames of the loop, each of so many JSBSim frames, in which no fault changes."""
         frames, references, log, fly_frame = self.frames, self.references, self.log, self.fly_frame
+        if fly_frame is None:
+            return self._fly_compiled(count, runs)
         advance = self._advance(runs)
         for _ in range(count):
             advance()
@@ -253,6 +253,21 @@ class Loop:
             if status:
                 return self._landed(status)
         return FLYING
+
+    def _fly_compiled(self, count: int, runs: int) -> int:
+        """The same without leaving compiled code, but for an instant now and then: others wait for it."""
+        order = self._order
+        for first in range(0, count, AT_ONCE):
+            order[:] = min(AT_ONCE, count - first), runs
+            status = self.fly_on(self.frames, self.references, self.log, order)
+            if status:
+                return self._landed(status)
+        return FLYING
+
+    @cached_property
+    def fly_on(self) -> Callable[..., int]:
+        """Frames of the loop with JSBSim's between them, as `frame.fly_on`."""
+        return self.direct(fly_on)
 
     def _advance(self, runs: int) -> Callable[[], object]:
         """What brings the truth from one frame of the loop to the next; mostly JSBSim's own `run`."""
@@ -299,20 +314,7 @@ class Loop:
         begun = self.schedule.begun(k) or self.sensor_schedule.begun(k)
         if begun and not truth["faulted"]:
             truth["faulted"], truth["fault_at_s"] = 1, k / self.scenario.rate_hz
-        truth["immovable"] = [
-            any(self.plant.read(f"failures/{s}/{how}") for how in IMMOVABLE) for s in self.aircraft.surfaces
-        ]
-        truth["Cm_alpha3"] = self.plant.read(UNANTICIPATED)
-
-
-def travel_rad(plant: Plant) -> np.ndarray:
-    """Lower and upper stops of the surfaces, (2, 4) rad."""
-    return np.array(
-        [
-            [plant.read(f"actuators/{s}/position-{end}-rad") for s in plant.aircraft.surfaces]
-            for end in ("min", "max")
-        ]
-    )
+        note_failures(truth, self.plant)
 
 
 def fly(
@@ -332,13 +334,16 @@ def fly(
     value is not finite.
     """
     loop = Loop(scenario, detector, law, prepare)
-    if sink is not None:
-        sink.open(loop.columns)
-    for rows in loop.chunks():
+    try:
         if sink is not None:
-            sink.write(rows)
-        if progress is not None:
-            progress(loop.frames["k"][0] / loop.n_frames)
-    if sink is not None:
-        sink.close()
-    return loop.land()
+            sink.open(loop.columns)
+        for rows in loop.chunks():
+            if sink is not None:
+                sink.write(rows)
+            if progress is not None:
+                progress(loop.frames["k"][0] / loop.n_frames)
+        if sink is not None:
+            sink.close()
+        return loop.land()
+    finally:
+        loop.release()

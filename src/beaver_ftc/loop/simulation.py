@@ -54,21 +54,22 @@ class Stepping:
     ) -> None:
         self._given, self._plug_ins, self._prepare = scenario, (detector, law), prepare
         self._sink = sink
-        self.reset()
+        self._make_ready()
 
     def reset(self) -> None:
         """Put the aircraft back into trim, nothing broken, the log empty: the same scenario anew.
 
-        The aircraft is loaded again: an executive of JSBSim's that has flown, reset by JSBSim itself and in
-        trim again, differs from a fresh one in the last bits of its first frame.
+        It is not loaded again, and flies as a freshly loaded one does, to the bit: see plant/reuse.py.
         """
-        self._scenario = self._given
+        self._loop.release()
+        self._make_ready()
+
+    def _make_ready(self) -> None:
+        self._scenario, self._faults = self._given, self._given.faults
         self._loop = Loop(self._scenario, *self._plug_ins, self._prepare)
         self._held_frame: HeldFrame | None = None
-        self._faults = self._scenario.faults
         self._next, self._turn_at, self._written = 0, 0, 0
-        self._status = FLYING
-        self._by_hand = False
+        self._status, self._by_hand = FLYING, False
         self._steering = Steering(self._loop)
         self._last: list[Vector] = []  # rows of the last step, a piece a segment
         if self._sink is not None:

@@ -119,7 +119,7 @@ def probe(model: Path) -> None:
 
 
 class Plant:
-    """One aircraft in one JSBSim executive. Make a new one for each flight: loading takes 2 to 4 ms.
+    """One aircraft in one JSBSim executive. Loading takes 2 to 4 ms: `reuse.borrowed` has loaded ones.
 
     rate_hz:  frame rate of diagnosis and control.
     substeps: JSBSim frames per such frame; `run` advances one JSBSim frame of dt_s = 1/(rate_hz substeps).
@@ -131,16 +131,24 @@ class Plant:
     ) -> None:
         self.aircraft = aircraft or load_aircraft()
         self.fdm = _load(_Errors(), model or self.aircraft.jsbsim)
-        self.rate_hz, self.substeps = rate_hz, substeps
-        self.dt_s = 1.0 / (rate_hz * substeps)
-        self.fdm.set_dt(self.dt_s)
+        self.set_rate(rate_hz, substeps)
         self.run = self.fdm.run
         self._manager = self.fdm.get_property_manager()
         self._nodes: dict[str, jsbsim.FGPropertyNode] = {}
+        self.as_loaded: dict[str, float] = {}  # of what has been written since
+        self._inputs: dict[str, jsbsim.FGPropertyNode] = {}
+        self.executive = 0  # its address, if compiled code may run it: see native.py
+        self.origin: object = None  # what it was loaded from, if it is to be flown again: see reuse.py
         self._settings: Mapping[str, float] = {}
         self._engines_run = False
         self._run_up_for: tuple[float, ...] = ()
         self.n_engines: int = self.fdm.get_propulsion().get_num_engines()
+
+    def set_rate(self, rate_hz: float, substeps: int) -> None:
+        """Frames a second of the loop, and JSBSim's in each of them."""
+        self.rate_hz, self.substeps = rate_hz, substeps
+        self.dt_s = 1.0 / (rate_hz * substeps)
+        self.fdm.set_dt(self.dt_s)
 
     def node(self, name: str) -> jsbsim.FGPropertyNode:
         """The held node of a property; UnknownProperty if the aircraft lacks it."""
@@ -159,9 +167,16 @@ class Plant:
         """The value of a property, in the unit its name says."""
         return self.node(name).get_double_value()
 
+    def input(self, name: str) -> jsbsim.FGPropertyNode:
+        """The held node of a property that is about to be written; what it was when loaded is kept."""
+        if name not in self._inputs:
+            node = self._inputs[name] = self.node(name)
+            self.as_loaded[name] = node.get_double_value()
+        return self._inputs[name]
+
     def write(self, name: str, value: float) -> None:
         """Set a property, in the unit its name says."""
-        self.node(name).set_double_value(value)
+        self.input(name).set_double_value(value)
 
     def start(self, state: FlightState, wind_mps: Sequence[float] = (0.0, 0.0, 0.0)) -> None:
         """Put the aircraft into a state at time 0: surfaces and engine in place, accelerations the state's.

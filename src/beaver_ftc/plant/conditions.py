@@ -1,8 +1,10 @@
 """A trimmed flight condition and the truth linearised about it, from what a scenario says of them."""
 
+from beaver_ftc.errors import BadInput
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.configure import configure, trim_of
 from beaver_ftc.plant.linear import LinearModel, differences
+from beaver_ftc.plant.reuse import borrowed, give_back
 from beaver_ftc.plant.trim import TrimPoint
 from beaver_ftc.scenario.given import ScenarioLike, load
 from beaver_ftc.scenario.schema import Scenario
@@ -24,6 +26,30 @@ def linearise(scenario: ScenarioLike | None = None, **initial: float) -> LinearM
     `.state_space()` gives it as python-control has it. Raises BadInput as `trim` does.
     """
     return differences(*trimmed(_condition(scenario, initial)))
+
+
+_TRIM_DEPENDS_ON = {"initial", "uncertainty", "actuators"}
+_MOST_TRIMS = 256
+_trims: dict[tuple[object, str], TrimPoint] = {}
+
+
+def ready(scenario: Scenario) -> tuple[Plant, TrimPoint]:
+    """A borrowed aircraft with the scenario's errors, and its trim. Raises BadInput.
+
+    A trim does not depend on what was flown before, so one that is known is not computed again.
+    """
+    plant = borrowed(scenario.rate_hz, scenario.substeps, scenario.airframe)
+    try:
+        configure(plant, scenario)
+        key = plant.origin, scenario.model_dump_json(include=_TRIM_DEPENDS_ON)
+        if key not in _trims:
+            if len(_trims) >= _MOST_TRIMS:
+                _trims.clear()
+            _trims[key] = trim_of(scenario, plant)
+    except BadInput:
+        give_back(plant)
+        raise
+    return plant, _trims[key]
 
 
 def trimmed(scenario: Scenario) -> tuple[Plant, TrimPoint]:

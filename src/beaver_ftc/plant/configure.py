@@ -4,6 +4,7 @@ from math import radians
 
 from beaver_ftc.errors import BadInput
 from beaver_ftc.plant.adapter import FT_PER_M, Plant
+from beaver_ftc.plant.reuse import forget_conditions
 from beaver_ftc.plant.trim import TrimPoint, trim
 from beaver_ftc.scenario.schema import Scenario
 
@@ -68,6 +69,7 @@ def _mass(plant: Plant, scenario: Scenario) -> None:
 def take_off(plant: Plant, scenario: Scenario, trim_point: TrimPoint) -> None:
     """Start the trimmed flight in the scenario's air: JSBSim's own wind and turbulence [MIL-F-8785C]."""
     environment = scenario.environment
+    forget_conditions(plant)  # of the trim: whether it was computed or known must not show
     plant.start(trim_point, environment.wind_mps)
     if environment.severity is not None:
         plant.write("atmosphere/randomseed", 1 + scenario.seed % (2**31 - 2))

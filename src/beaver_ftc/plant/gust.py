@@ -23,7 +23,7 @@ class MovingAir:
     def __init__(self, environment: Environment, plant: Plant) -> None:
         self.turbulent = environment.severity is not None
         self._heading = plant.node("attitude/psi-rad")
-        self._axes = plant.node("atmosphere/psiw-rad")
+        self._axes = plant.input("atmosphere/psiw-rad")
 
     def turn(self) -> None:
         """Before a JSBSim frame: axes along the present heading."""

@@ -1,10 +1,14 @@
-"""Many properties in one compiled call.
+"""Many properties in one compiled call, and JSBSim's own frame from compiled code.
 
 A property read through JSBSim's Python binding costs about 0.1 us; a frame reads and writes some forty. The
 binding exports the C++ accessors of a property node, so a compiled kernel can call them on the node's own
 address: 0.01 us each. That rests on how one build of the binding is laid out, so `available` checks it
 before it is used, and the environment variable BEAVER_FTC_NATIVE=0 turns it off; the caller then reads and
 writes through Python.
+
+Likewise the executive's `Run`, which `advance` calls: a flight then leaves compiled code only when something
+changes. An error that JSBSim raises could not be caught there. Its models of an aircraft without engines
+raise none once that is loaded and trimmed; aircraft with engines are run through Python.
 
     bank = NodeBank([plant.node(name) for name in names])
     read_nodes(getter_address(), bank.pointers, out)       # also from inside another compiled kernel
@@ -34,6 +38,21 @@ _SETTER = "_ZN14SGPropertyNode14setDoubleValueEd"  # bool SGPropertyNode::setDou
 # The Python node: reference count, type, C++ method table, then the counted pointer to the C++ node.
 _NODE_SIZE = 32
 _POINTER_OFFSET = 24
+
+_RUN = "_ZN6JSBSim9FGFDMExec3RunEv"  # bool JSBSim::FGFDMExec::Run()
+
+# The Python executive: reference count, type, the C++ executive twice (as its base, as itself), a dictionary.
+_EXECUTIVE_SIZE = 40
+_BASE_OFFSET, _EXECUTIVE_OFFSET = 16, 24
+
+# What `advance` needs: code and executive; whether turbulence is to be turned, and the nodes for that.
+RUNNING = np.dtype(
+    [
+        ("run", "i8"), ("executive", "i8"), ("turbulent", "i8"),
+        ("getter", "i8"), ("setter", "i8"), ("heading_pointer", "i8"), ("axes_pointer", "i8"),
+    ],
+    align=True,
+)  # fmt: skip
 
 
 @lru_cache(maxsize=1)
@@ -76,6 +95,24 @@ def _call_setter(typingctx, function, node, value):
     return types.boolean(types.int64, types.int64, types.float64), codegen
 
 
+@intrinsic
+def _call_run(typingctx, function, executive):
+    def codegen(context, builder, signature, args):
+        prototype = ir.FunctionType(ir.IntType(1), [ir.IntType(64)])
+        return builder.call(builder.inttoptr(args[0], prototype.as_pointer()), [args[1]])
+
+    return types.boolean(types.int64, types.int64), codegen
+
+
+@kernel
+def advance(running):
+    """One JSBSim frame; turbulence is first turned along the heading, see gust.MovingAir."""
+    if running.turbulent:
+        heading: float = _call_getter(running.getter, running.heading_pointer)  # type: ignore
+        _call_setter(running.setter, running.axes_pointer, -heading)
+    _call_run(running.run, running.executive)  # type: ignore
+
+
 @kernel
 def read_nodes(getter, pointers, out):
     """Read nodes into out. getter: getter_address(). pointers, out: (n,) int64, float64."""
@@ -92,6 +129,34 @@ def write_nodes(setter, pointers, values):
 
 def _pointer(node: "jsbsim.FGPropertyNode") -> int:
     return ctypes.c_int64.from_address(id(node) + _POINTER_OFFSET).value
+
+
+def executive_address(fdm: "jsbsim.FGFDMExec") -> int:
+    """The C++ executive for `advance`, 0 if it is not where it is expected. The aircraft flies one frame."""
+    if not (available() and _runs_by_address()):
+        return 0
+    base, executive = (
+        ctypes.c_int64.from_address(id(fdm) + at).value for at in (_BASE_OFFSET, _EXECUTIVE_OFFSET)
+    )
+    return executive if base == executive > 0 and executive % 8 == 0 and _flies(fdm, executive) else 0
+
+
+def run_address() -> int:
+    """Address of the executive's `Run`; 0 if this build does not export it."""
+    return _address(_RUN)
+
+
+def _runs_by_address() -> bool:
+    import jsbsim
+
+    return jsbsim.FGFDMExec.__basicsize__ == _EXECUTIVE_SIZE and run_address() > 0
+
+
+def _flies(fdm: "jsbsim.FGFDMExec", executive: int) -> bool:
+    """Whether a frame run by address is one more frame of this very executive."""
+    before_s = fdm.get_sim_time()
+    ctypes.PYFUNCTYPE(ctypes.c_bool, ctypes.c_void_p)(run_address())(executive)
+    return bool(fdm.get_sim_time() == before_s + fdm.get_delta_t())
 
 
 class NodeBank:

@@ -18,25 +18,17 @@ from beaver_ftc.aircraft import Aircraft, Travel
 from beaver_ftc.aircraft.schema import SIDESLIP_RATE
 from beaver_ftc.errors import BadInput
 from beaver_ftc.plant.adapter import FT_PER_M, PA_PER_PSF, Plant
+from beaver_ftc.plant.broyden import ACCELERATIONS, STEP_RAD, approach, newton_step, shortened
+from beaver_ftc.plant.reuse import forget_conditions
 from beaver_ftc.plant.state import FlightState
 
 TOLERANCE = 1e-9  # m/s2 and rad/s2, in each of the six accelerations
 
 _ALPHA_LIMIT_RAD = 0.6  # beyond it an aircraft has departed, so it cannot be trimmed there
 _MAX_ITERATIONS = 12
-_STEP = 1e-5  # rad, for differences
 _ALPHA_GUESS_RAD = 0.05  # where the file has no forces
 _LIFTED_TRAVEL_RAD = 10.0
-_MAX_CHANGE_RAD = 0.2  # a longer Newton step leaves the region its Jacobian describes
 _FLOW_UNKNOWNS = ("alpha_rad", "beta_rad", "theta_rad")
-_ACCELERATIONS = (
-    ("accelerations/udot-ft_sec2", 1.0 / FT_PER_M),
-    ("accelerations/vdot-ft_sec2", 1.0 / FT_PER_M),
-    ("accelerations/wdot-ft_sec2", 1.0 / FT_PER_M),
-    ("accelerations/pdot-rad_sec2", 1.0),
-    ("accelerations/qdot-rad_sec2", 1.0),
-    ("accelerations/rdot-rad_sec2", 1.0),
-)
 
 
 @dataclass(frozen=True, init=False)
@@ -65,6 +57,7 @@ def trim(airspeed_mps: float, altitude_m: float, plant: Plant | None = None, **g
     named: dict[str, Any] = dict(given)  # by the aircraft's own names, which FlightState checks
     wanted = FlightState(airspeed_mps, altitude_m, aircraft=aircraft, **named)
     _check_request(wanted, aircraft)
+    forget_conditions(truth)  # of what was flown before, which would show in the last bits
     with _travel_lifted(truth) as travel:
         for surface in set(aircraft.surfaces) - set(aircraft.primary):
             allowed = travel[surface].min_rad, travel[surface].max_rad
@@ -137,14 +130,14 @@ def _alpha_for_lift(aircraft: Aircraft, of: dict[str, float], truth: Plant) -> f
     weight = aircraft.mass.mass_kg * truth.read("accelerations/gravity-ft_sec2") / FT_PER_M
     lift = weight / (truth.read("aero/qbar-psf") * PA_PER_PSF * aircraft.geometry.wing_area_m2)
     at_zero = aircraft.coefficient("CZ", of)
-    slope = (aircraft.coefficient("CZ", of | {"alpha": _STEP}) - at_zero) / _STEP
+    slope = (aircraft.coefficient("CZ", of | {"alpha": STEP_RAD}) - at_zero) / STEP_RAD
     return max(-_ALPHA_LIMIT_RAD, min(_ALPHA_LIMIT_RAD, -(lift + at_zero) / slope))
 
 
 def _accelerations(truth: Plant, state: FlightState) -> np.ndarray:
     """Start the truth at a state and read its six accelerations, m/s2 and rad/s2."""
     truth.start(state)
-    return np.array([truth.read(name) * factor for name, factor in _ACCELERATIONS])
+    return np.array([truth.read(name) * factor for name, factor in ACCELERATIONS])
 
 
 def _moved(state: FlightState, names: tuple[str, ...], step: np.ndarray) -> FlightState:
@@ -155,23 +148,28 @@ def _moved(state: FlightState, names: tuple[str, ...], step: np.ndarray) -> Flig
 
 def _jacobian(truth: Plant, state: FlightState, names: tuple[str, ...], here: np.ndarray) -> np.ndarray:
     """d accelerations / d unknowns, (6, unknowns), by forward differences."""
-    steps = _STEP * np.eye(len(names))
-    columns = [(_accelerations(truth, _moved(state, names, step)) - here) / _STEP for step in steps]
+    steps = STEP_RAD * np.eye(len(names))
+    columns = [(_accelerations(truth, _moved(state, names, step)) - here) / STEP_RAD for step in steps]
     return np.column_stack(columns)
 
 
 def _solve(truth: Plant, state: FlightState) -> tuple[FlightState, np.ndarray]:
-    """Newton's method on the truth. Returns the state, left in `truth`, and its accelerations."""
+    """Broyden's method on quick looks at the truth, then Newton's on full starts until these agree.
+
+    Returns the state, left in `truth`, and its accelerations.
+    """
     names = (*_FLOW_UNKNOWNS, *(f"{surface}_rad" for surface in truth.aircraft.primary))
+    if not truth.n_engines:
+        near = approach(truth, state, names)
+        if np.isfinite(near).all():
+            state = _moved(state, names, near - np.array([getattr(state, name) for name in names]))
     here = _accelerations(truth, state)
     for _ in range(_MAX_ITERATIONS):
         if np.abs(here).max() <= TOLERANCE:
             return state, here
         if not np.isfinite(here).all():
             break
-        step = np.linalg.lstsq(_jacobian(truth, state, names, here), -here, rcond=None)[0]
-        step *= min(1.0, _MAX_CHANGE_RAD / np.abs(step).max())
-        state = _moved(state, names, step)
+        state = _moved(state, names, shortened(newton_step(_jacobian(truth, state, names, here), here)))
         here = _accelerations(truth, state)
     low, high = truth.aircraft.envelope.airspeed_mps
     raise BadInput(

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from beaver_ftc.loop.loop import EARTH_RADIUS_M
+from beaver_ftc.loop.cockpit import EARTH_RADIUS_M
 from beaver_ftc.plant.state import START_LATITUDE_DEG
 from beaver_ftc.results import log
 from beaver_ftc.results.looks import marks

@@ -88,14 +88,14 @@ def test_what_old_versions_left_goes_but_for_the_latest(nowhere, tmp_path):
 
 PROGRAM = """
 import sys
-from beaver_ftc.loop.frame import fly_frame
+from beaver_ftc.loop.frame import fly_on
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.scenario.loader import load_scenario
 import beaver_ftc
 flight = fly(load_scenario("elevator-partial-loss"))
 assert flight.isolated == "elevator"
 heavy = [name for name in ("scipy.linalg", "pandas", "matplotlib", "plotly") if name in sys.modules]
-print(beaver_ftc.__file__, "compiled" if fly_frame.overloads else "loaded", *heavy)
+print(beaver_ftc.__file__, "compiled" if fly_on.overloads else "loaded", *heavy)
 """
 
 

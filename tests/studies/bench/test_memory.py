@@ -9,7 +9,7 @@ import pytest
 PROGRAM = """
 import json, re, sys, tempfile
 from pathlib import Path
-from beaver_ftc.loop.frame import fly_frame
+from beaver_ftc.loop.frame import fly_on
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.log import ParquetLog
 from beaver_ftc.scenario.schema import Scenario
@@ -20,7 +20,7 @@ for duration_s in (60, 240):
     with tempfile.TemporaryDirectory() as folder, ParquetLog(Path(folder) / "log.parquet") as log:
         flight = fly(Scenario(name="long", duration_s=duration_s, rate_hz=1000), log)
     peaks.append([flight.frames, peak_mb()])
-print(json.dumps([peaks, len(fly_frame.overloads)]))
+print(json.dumps([peaks, len(fly_on.overloads)]))
 """
 
 

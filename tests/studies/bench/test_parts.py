@@ -12,12 +12,12 @@ from flying import scenario
 
 
 def test_all_parts_together_are_the_frame_itself():
-    assert frame_with(len(PARTS)) is frame.fly_frame
+    assert frame_with(len(PARTS)) is frame.fly_on
 
 
 def test_every_part_names_kernels_there_are():
     for i in range(len(PARTS)):
-        assert frame_with(i) is not frame.fly_frame
+        assert frame_with(i) is not frame.fly_on
 
 
 def test_an_unknown_kernel_is_refused():
@@ -28,18 +28,18 @@ def test_an_unknown_kernel_is_refused():
 def test_the_loops_own_kernels_are_left_as_they_were():
     from beaver_ftc.diagnosis import isolation
 
-    before = frame.fly_frame, isolation.predict_all, compiled.kernel
+    before = frame.fly_on, isolation.predict_all, compiled.kernel
     frame_with(1)
     from beaver_ftc.diagnosis import isolation as isolation_now
     from beaver_ftc.loop import frame as frame_now
 
-    assert (frame_now.fly_frame, isolation_now.predict_all, compiled.kernel) == before
+    assert (frame_now.fly_on, isolation_now.predict_all, compiled.kernel) == before
 
 
 def test_with_reading_alone_the_truth_is_read_and_nothing_else_happens():
     loop = Loop(scenario(duration_s=2))
     loop.fly_chunk(0, 10)
-    loop.fly_frame = loop.direct(frame_with(1))
+    loop.fly_on = loop.direct(frame_with(1))
     before = loop.frames.copy()
     commands = [loop.plant.read(f"fcs/{s}-cmd-rad") for s in SURFACES]
     loop.plant.write("fcs/elevator-cmd-rad", 0.01)

@@ -62,19 +62,20 @@ class ClosedLoop:
         self.loop.fly_chunk(0, first)
         self.loop.sample_references(first, self.loop.n_frames - first)
         self.moment, self._frames = Moment.of(self.loop.plant), self.loop.frames.copy()
-        self._fly_frame = self.loop.fly_frame
+        self._fly_on = self.loop.fly_on if self.loop.fly_frame is None else None
 
     def with_frame(self, compiled_frame: Callable[..., int]) -> "ClosedLoop":
         """The same loop and aircraft, with another compiled frame: one with parts taken out."""
         other = copy(self)
-        other._fly_frame = self.loop.direct(compiled_frame)
+        other._fly_on = self.loop.direct(compiled_frame)
         return other
 
     def prepare(self) -> None:
         """Back to `at_s`."""
         self.moment.come_back()
         self.loop.frames[:] = self._frames
-        self.loop.fly_frame = self._fly_frame
+        if self._fly_on is not None:
+            self.loop.fly_on = self._fly_on
 
     def fly(self, frames: int) -> None:
         """Fly on."""

@@ -75,9 +75,9 @@ PARTS = (
 
 
 def frame_with(switched_on: int) -> Kernel:
-    """`frame.fly_frame` with the first so many of PARTS; compiled once, into a cache of its own."""
+    """`frame.fly_on` with the first so many of PARTS; compiled once, into a cache of its own."""
     if switched_on == len(PARTS):
-        return import_module("beaver_ftc.loop.frame").fly_frame
+        return import_module("beaver_ftc.loop.frame").fly_on
     out: dict[str, Kernel] = {}
     for part in PARTS[switched_on:]:
         out |= part.kernels
@@ -85,7 +85,7 @@ def frame_with(switched_on: int) -> Kernel:
 
 
 def frame_without(stand_ins: Mapping[str, Kernel], name: str) -> Kernel:
-    """A private `frame.fly_frame` with stand-ins for the kernels named; `name` names its cache."""
+    """A private `frame.fly_on` with stand-ins for the kernels named; `name` names its cache."""
     used: set[str] = set()
     folder = compiled.cache_folder()
 
@@ -95,10 +95,10 @@ def frame_without(stand_ins: Mapping[str, Kernel], name: str) -> Kernel:
         return compiled.compile_into(folder and folder / name, stand_ins.get(full_name, function))
 
     with _fresh_kernel_modules(kernel):
-        fly_frame = import_module("beaver_ftc.loop.frame").fly_frame
+        fly_on = import_module("beaver_ftc.loop.frame").fly_on
     if unknown := set(stand_ins) - used:
         raise ValueError(f"no such kernel: {', '.join(sorted(unknown))}")
-    return fly_frame
+    return fly_on
 
 
 def _digest(path: Path) -> str:

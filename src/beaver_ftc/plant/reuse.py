@@ -1,0 +1,95 @@
+"""Aircraft loaded once and flown many times, each time as freshly loaded, to the bit.
+
+What a flight leaves behind in JSBSim (1.3.3), and what takes it away:
+
+    initial conditions   the attitude and the wind keep a rounding remainder of all that was set before;
+                         `run_ic` and a reset leave them alone. A file that states everything: at_rest.xml.
+    the models           integrators, controls, turbulence, time: `reset_to_initial_conditions`.
+    a gust               its direction, until it has blown over; no reset clears it. It is let blow over.
+    settings             written back; a property that is written through the plant is remembered.
+    random numbers       a flight in turbulence seeds its own.
+
+Aircraft with engines are loaded anew: what their engines remember is more than this.
+"""
+
+import os
+from functools import lru_cache
+from pathlib import Path
+from time import monotonic
+
+from beaver_ftc.aircraft import Aircraft
+from beaver_ftc.paths import data_root
+from beaver_ftc.plant.adapter import Plant
+from beaver_ftc.plant.native import executive_address
+
+_MODELS_ONLY = 2  # of `reset_to_initial_conditions`: initialise every model, do not run
+_GUST = "atmosphere/cosine-gust"
+_SHORTEST_S = 1e-9
+_MOST = 8  # kept of one aircraft: more than this are hardly ever in the air at the same time
+
+_AT_REST = str(data_root() / "aircraft" / "at_rest.xml")
+_free: dict[object, list[Plant]] = {}
+
+
+def borrowed(rate_hz: float, substeps: int, aircraft: Aircraft) -> Plant:
+    """An aircraft as freshly loaded: one that was given back, or a new one.
+
+    Loaded anew, within a second, when one of its files has changed.
+    """
+    origin = aircraft, _last_written_ns(aircraft.jsbsim, int(monotonic()))
+    try:
+        plant = _free.get(origin, []).pop()
+    except IndexError:
+        plant = Plant(rate_hz, substeps, aircraft)
+        plant.origin = origin
+        if not plant.n_engines:
+            plant.executive = executive_address(plant.fdm)
+    renew(plant, rate_hz, substeps)
+    return plant
+
+
+def give_back(plant: Plant) -> None:
+    """Whoever borrowed it has done with it, and keeps nothing that reads or writes its properties."""
+    if plant.origin is None or plant.n_engines:
+        return
+    others = _free.setdefault(plant.origin, [])
+    if len(others) < _MOST and plant not in others:
+        others.append(plant)
+
+
+def renew(plant: Plant, rate_hz: float, substeps: int) -> None:
+    """Take every trace of flying out of an aircraft without engines."""
+    if plant.n_engines:
+        return
+    plant.fdm.reset_to_initial_conditions(_MODELS_ONLY)
+    if f"{_GUST}/start" in plant.as_loaded:
+        _blow_over(plant)
+        plant.fdm.reset_to_initial_conditions(_MODELS_ONLY)
+    for name, value in plant.as_loaded.items():
+        if not name.startswith(("ic/", _GUST)):
+            plant.write(name, value)
+    plant.set_rate(rate_hz, substeps)
+
+
+def forget_conditions(plant: Plant) -> None:
+    """Let the initial conditions be those of an aircraft nobody has placed yet."""
+    plant.fdm.load_ic(_AT_REST, False)
+
+
+def _blow_over(plant: Plant) -> None:
+    """Let a gust of hardly any duration begin and end."""
+    for part in ("startup", "steady", "end"):
+        plant.write(f"{_GUST}/{part}-duration-sec", _SHORTEST_S)
+    plant.write(f"{_GUST}/start", 1.0)
+    plant.run()
+
+
+@lru_cache(maxsize=32)
+def _last_written_ns(model: Path, second: int) -> tuple[int, ...]:
+    """When the model and its systems were last written, as looked at in this second: looking takes time."""
+    return tuple(os.stat(file).st_mtime_ns for file in _files_of(model))
+
+
+@lru_cache(maxsize=32)
+def _files_of(model: Path) -> tuple[str, ...]:
+    return tuple(map(str, (model, *sorted((model.parent / "Systems").glob("*.xml")))))

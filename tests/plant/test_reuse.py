@@ -1,0 +1,208 @@
+"""An aircraft flown again is as freshly loaded, to the bit, whatever was flown in it before."""
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from beaver_ftc.errors import BadInput
+from beaver_ftc.loop.loop import Loop
+from beaver_ftc.plant import conditions, reuse
+from beaver_ftc.plant.conditions import ready
+from beaver_ftc.plant.configure import take_off
+from beaver_ftc.scenario.given import load
+
+SURFACES = ("aileron", "elevator", "rudder", "flap")
+KINDS = (
+    {"type": "loss_of_effectiveness", "magnitude": 0.7},
+    {"type": "stuck", "position_deg": 3.0},
+    {"type": "hardover", "direction": 1},
+    {"type": "float"},
+    {"type": "bias", "bias_deg": 2.0},
+    {"type": "rate_limit", "scale": 0.1},
+    {"type": "oscillatory", "amplitude_deg": 2.0, "frequency_rad_s": 8.0},
+)
+FAULTS = st.lists(
+    st.builds(
+        lambda surface, kind, at_s: {"actuator": surface, "at_s": at_s, **kind},
+        st.sampled_from(SURFACES),
+        st.sampled_from(KINDS),
+        st.sampled_from((0.0, 0.3, 0.9)),
+    ),
+    max_size=3,
+)
+AIR = st.sampled_from(
+    (
+        {},
+        {"wind_mps": [5.0, -3.0, 0.0]},
+        {"turbulence": "dryden", "severity": "moderate", "wind_mps": [2.0, 0.0, 0.0]},
+        {
+            "gust": {
+                "at_s": 0.2,
+                "velocity_mps": [0.0, 8.0, -4.0],
+                "rise_s": 1.0,
+                "hold_s": 5.0,
+                "fade_s": 1.0,
+            }
+        },
+    )
+)
+FLIGHTS = st.fixed_dictionaries(
+    {
+        "faults": FAULTS,
+        "environment": AIR,
+        "initial": st.fixed_dictionaries({"airspeed_mps": st.sampled_from((38.0, 45.0, 52.0))}),
+        "rate_hz": st.sampled_from((50.0, 100.0)),
+        "uncertainty": st.sampled_from(
+            ({}, {"mass": 1.1, "cg_m": [0.05, 0.0, 0.0]}, {"coefficients": {"Cm_alpha": 1.3, "CX_0": 0.8}})
+        ),
+        "actuators": st.sampled_from(
+            (
+                "ideal",
+                {"elevator": {"bandwidth_rad_s": 10.0, "rate_limit_deg_s": 20.0, "travel_deg": [-15, 12]}},
+            )
+        ),
+        "seed": st.integers(0, 3),
+    }
+)
+
+
+def scenario_of(flight, duration_s=1.5):
+    reference = {"q": [{"sine": {"amplitude_deg_s": 3, "frequency_hz": 1.0}}]}
+    return load({"name": "again", "duration_s": duration_s, "reference": reference, **flight})
+
+
+def flown(scenario):
+    """The log of a flight, and its loop, which is given back."""
+    loop = Loop(scenario)
+    log = np.concatenate([rows.copy() for rows in loop.chunks()])
+    loop.release()
+    return log
+
+
+def flown_in_a_fresh_one(scenario, monkeypatch):
+    with monkeypatch.context() as patch:
+        patch.setattr(reuse, "_free", {})
+        patch.setattr(conditions, "_trims", {})
+        return flown(scenario)
+
+
+@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(before=st.lists(FLIGHTS, min_size=1, max_size=3), flight=FLIGHTS)
+def test_the_log_is_the_same_to_the_bit(before, flight, monkeypatch):
+    expected = flown_in_a_fresh_one(scenario_of(flight), monkeypatch)
+    for other in before:
+        flown(scenario_of(other))
+    np.testing.assert_array_equal(flown(scenario_of(flight)), expected)
+
+
+def test_nor_does_a_lost_aircraft_leave_a_trace(monkeypatch):
+    healthy = scenario_of({"faults": []})
+    expected = flown_in_a_fresh_one(healthy, monkeypatch)
+    lost = scenario_of(
+        {"faults": [{"actuator": "elevator", "type": "hardover", "direction": 1, "at_s": 0.1}]}, 30
+    )
+    assert len(flown(lost)) < 3000, "it was to be lost"
+    np.testing.assert_array_equal(flown(healthy), expected)
+
+
+def test_nor_do_numbers_that_are_none(monkeypatch):
+    healthy = scenario_of({"faults": []})
+    expected = flown_in_a_fresh_one(healthy, monkeypatch)
+    plant = reuse.borrowed(100.0, 1, healthy.airframe)
+    for name in ("fcs/elevator-cmd-rad", "uncertainty/Cm_0-scale", "atmosphere/gust-north-fps"):
+        plant.write(name, np.nan)
+    plant.run()
+    assert np.isnan(plant.read("accelerations/qdot-rad_sec2"))
+    reuse.give_back(plant)
+    loop = Loop(healthy)
+    assert loop.plant is plant
+    np.testing.assert_array_equal(np.concatenate([rows.copy() for rows in loop.chunks()]), expected)
+
+
+def readable(plant):
+    """Every property JSBSim lists, but for its count of frames."""
+    lines = plant.fdm.query_property_catalog("").splitlines()
+    names = [line.split(" ")[0] for line in lines if "R" in line.rpartition("(")[2]]
+    counted = ("simulation/frame", "atmosphere/randomseed")
+    return {name: plant.read(name) for name in names if name not in counted and plant.has(name)}
+
+
+def differing(one, other):
+    """Names of properties that are not the same to the bit; not a number is the same as itself."""
+    return {name for name in one if not np.array_equal(one[name], other[name], equal_nan=True)}
+
+
+def test_every_property_of_jsbsim_is_as_in_a_fresh_one(monkeypatch):
+    scenario = scenario_of({"faults": []})
+    with monkeypatch.context() as patch:
+        patch.setattr(reuse, "_free", {})
+        fresh, trim = ready(scenario)
+        take_off(fresh, scenario, trim)
+        expected = readable(fresh)
+    gusty = {
+        "environment": {
+            "turbulence": "dryden",
+            "severity": "severe",
+            "gust": {"at_s": 0.1, "velocity_mps": [9.0, 0.0, 0.0]},
+        }
+    }
+    flown(scenario_of(gusty | {"faults": [{"actuator": "flap", "type": "float", "at_s": 0.2}]}))
+    again, trim = ready(scenario)
+    take_off(again, scenario, trim)
+    assert again is not fresh
+    assert len(expected) > 500
+    assert differing(readable(again), expected) == set()
+    for _ in range(20):
+        fresh.run()
+        again.run()
+    assert differing(readable(again), readable(fresh)) == set()
+
+
+def test_one_aircraft_is_loaded_for_flights_one_after_the_other_and_two_side_by_side():
+    scenario = scenario_of({"faults": []})
+    first = Loop(scenario)
+    beside = Loop(scenario)
+    assert beside.plant is not first.plant
+    plant = first.plant
+    first.release()
+    after = Loop(scenario)
+    assert after.plant is plant
+    after.release()
+    beside.release()
+
+
+def test_an_aircraft_that_somebody_prepared_is_not_flown_again():
+    loop = Loop(scenario_of({"faults": []}), prepare=lambda plant: plant.fdm.set_property_value("x/y", 1.0))
+    loop.release()
+    other = Loop(scenario_of({"faults": []}))
+    assert other.plant is not loop.plant
+    other.release()
+
+
+def test_a_changed_model_is_loaded_anew(tmp_path, monkeypatch):
+    aircraft = scenario_of({"faults": []}).airframe
+    plant = reuse.borrowed(100.0, 1, aircraft)
+    reuse.give_back(plant)
+    monkeypatch.setattr(reuse, "_last_written_ns", lambda model, second: (1,))
+    assert reuse.borrowed(100.0, 1, aircraft) is not plant
+
+
+def test_a_trim_that_is_known_is_the_one_that_would_be_found(monkeypatch):
+    scenario = scenario_of({"faults": [], "initial": {"airspeed_mps": 41.5}})
+    plant, first = ready(scenario)
+    reuse.give_back(plant)
+    flown(scenario_of({"faults": [], "initial": {"airspeed_mps": 50.0}}))
+    monkeypatch.setattr(conditions, "_trims", {})
+    plant, again = ready(scenario)
+    reuse.give_back(plant)
+    assert first == again
+
+
+def test_what_cannot_be_trimmed_leaves_the_aircraft_to_others():
+    plant = reuse.borrowed(100.0, 1, scenario_of({"faults": []}).airframe)
+    reuse.give_back(plant)
+    for _ in range(3):
+        with pytest.raises(BadInput, match="airspeed"):
+            ready(scenario_of({"faults": [], "initial": {"airspeed_mps": 9.0}}))
+    assert reuse.borrowed(100.0, 1, plant.aircraft) is plant

@@ -58,7 +58,7 @@ def without_surfaces(root: ET.Element) -> None:
         root.remove(system)
     control = ET.SubElement(root, "flight_control")
     for s in SURFACES:
-        for name in (f"fcs/{s}-pos-rad", f"fcs/{s}-effective-rad"):
+        for name in (f"fcs/{s}-cmd-rad", f"fcs/{s}-pos-rad", f"fcs/{s}-effective-rad"):
             ET.SubElement(control, "property", value="0").text = name
 
 

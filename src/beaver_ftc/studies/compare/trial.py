@@ -118,7 +118,9 @@ def _fly(scenario: Scenario, entry: Entry) -> Result:
         for _ in loop.chunks():
             pass
         us = 1e6 * (process_time() - began) / loop.n_frames
-        return result_of(loop.land(), entry, us)
+        flight = loop.land()
+        loop.release()
+        return result_of(flight, entry, us)
     except BeaverFtcError as error:
         return Result(entry, False, 0.0, bool(scenario.faults), error=str(error))
 

@@ -48,20 +48,20 @@ def flown(sweep: Sweep, changes: dict[str, Any], run: int) -> tuple[np.ndarray, 
     """Seconds of each part of one flight, JSBSim frames flown, and seconds of as many by JSBSim alone."""
     (assignment,) = Plan(sweep).assignments([run])
     conditions._trims.clear()
-    marks = [time.perf_counter()]
+    marks = [time.process_time()]
     scenario = scenario_of(sweep, assignment)
-    marks.append(time.perf_counter())
+    marks.append(time.process_time())
     if changes:
         scenario = scenario.with_(changes)
-        marks = [marks[0] + time.perf_counter() - marks[1], time.perf_counter()]
+        marks = [marks[0] + time.process_time() - marks[1], time.process_time()]
     loop = Loop(scenario)
-    marks.append(time.perf_counter())
+    marks.append(time.process_time())
     for _ in loop.chunks():
         pass
-    marks.append(time.perf_counter())
+    marks.append(time.process_time())
     flight = loop.land()
     row_of(assignment.run, assignment.values, scenario.seed, metrics(flight), flight)
-    marks.append(time.perf_counter())
+    marks.append(time.process_time())
     runs = flight.frames * scenario.substeps
     alone = _alone(loop.plant.run, runs)
     loop.release()
@@ -69,10 +69,10 @@ def flown(sweep: Sweep, changes: dict[str, Any], run: int) -> tuple[np.ndarray, 
 
 
 def _alone(run: Callable[[], object], runs: int) -> float:
-    began = time.perf_counter()
+    began = time.process_time()
     for _ in range(runs):
         run()
-    return time.perf_counter() - began
+    return time.process_time() - began
 
 
 def measure(rounds: int) -> dict[str, Any]:
@@ -84,9 +84,9 @@ def measure(rounds: int) -> dict[str, Any]:
         unit = Variant(write_variant(Path(folder) / "plain", jsbsim_alone), trim())
         for run in range(-1, rounds):
             unit.prepare()
-            began = time.perf_counter()
+            began = time.process_time()
             unit.fly(PLAIN_FRAMES)
-            plain.append((time.perf_counter() - began) / PLAIN_FRAMES)
+            plain.append((time.process_time() - began) / PLAIN_FRAMES)
             for kind, (_, changes) in KINDS.items():
                 taken = flown(sweeps[kind], changes, max(run, 0))
                 if run >= 0:  # the first is the warm-up

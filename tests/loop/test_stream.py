@@ -189,3 +189,8 @@ def test_of_an_aircraft_beside_the_scenario(tmp_path):
 def own_aircraft(folder):
     shutil.copytree(bf.aircraft("beaver").folder, folder / "my-uav")
     return bf.aircraft("./my-uav", folder)
+
+
+def test_a_name_is_no_aircraft_of_a_stream():
+    with pytest.raises(bf.BadInput, match=r"aircraft: 'beaver' is none, allowed: what aircraft\(\) gives"):
+        bf.Diagnosis("beaver", rate_hz=100)

@@ -4,6 +4,7 @@ import pytest
 
 from beaver_ftc.errors import BadInput
 from beaver_ftc.scenario.given import load
+from beaver_ftc.scenario.sensor_faults import fault_name
 
 
 def faulty(**fault):
@@ -29,6 +30,7 @@ def faulty(**fault):
         ({"actuator": "elevator"}, "faults[0].actuator: unknown key"),
         ({"end_s": 1}, "faults[0].end_s: 1 is not after at_s, allowed: later than 2 s"),
         ({"at_s": 40}, "faults[0].at_s: 40 is after the end, allowed: earlier than duration_s, 30 s"),
+        ({"end_s": 4, "until_s": 5}, "faults[0].until_s: says the same as end_s, allowed: one of the two"),
         ({"magnitude": "much"}, "faults[0].magnitude: 'much' is text, allowed: a number"),
     ],
 )
@@ -47,6 +49,23 @@ def test_a_size_that_is_missing_is_asked_for():
 def test_the_end_may_be_called_until():
     (fault,) = load(faulty(until_s=5)).faults
     assert fault.end_s == 5
+
+
+@pytest.mark.parametrize(("said", "meant"), [("airspeed", "V"), ("dynamic_pressure", "qdyn")])
+def test_an_instrument_may_be_called_in_words(said, meant):
+    assert load(faulty(sensor=said)) == load(faulty(sensor=meant))
+
+
+def test_what_is_repaired_may_be_said_as_a_verdict_says_it():
+    names = ("aileron", "p", "V")
+    assert [fault_name(said, names) for said in ("p", "sensor p", "airspeed", "sensor airspeed")] == [
+        "p",
+        "p",
+        "V",
+        "V",
+    ]
+    assert fault_name("nope", names) == "nope"
+    assert fault_name(None, names) is None
 
 
 def test_the_same_type_is_another_fault_on_a_surface():

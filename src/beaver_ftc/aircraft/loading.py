@@ -140,8 +140,10 @@ def _read(folder: Path, changed_ns: int) -> Aircraft:
         raise ScenarioError(str(path), [Problem(error.line, (), str(error))]) from None
     document = parse_document(text, str(path), "the keys of an aircraft file")
     file = validate(AircraftFile, document, str(path))
-    if not (folder / file.jsbsim).resolve().is_relative_to(folder.resolve()):
-        says = f"{file.jsbsim!r} is outside, allowed: a file beside this one"
+    model = (folder / file.jsbsim).resolve()
+    if not model.is_relative_to(folder.resolve()) or not model.is_file():
+        wrong = "is not there" if model.is_relative_to(folder.resolve()) else "is outside"
+        says = f"{file.jsbsim!r} {wrong}, allowed: a file beside this one"
         raise ScenarioError(str(path), [Problem(document.line(("jsbsim",)), ("jsbsim",), says)])
     return Aircraft(file, folder)
 

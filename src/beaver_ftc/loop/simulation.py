@@ -25,7 +25,7 @@ from beaver_ftc.plant.gust import GustSchedule
 from beaver_ftc.scenario.given import fault_of, is_same_again
 from beaver_ftc.scenario.in_flight import aimed, blown, changed
 from beaver_ftc.scenario.schema import Scenario
-from beaver_ftc.scenario.sensor_faults import sensors_there
+from beaver_ftc.scenario.sensor_faults import fault_name, sensors_there
 from beaver_ftc.scenario.signals import RAD_PER_DEG
 from beaver_ftc.scenario.sticks import flown, in_force
 
@@ -185,6 +185,7 @@ class Stepping:
         """
         with asked(self._loop.aircraft):
             names = (*self._surfaces, *sensors_there(), UNANTICIPATED)
+            actuator = fault_name(actuator, names)
         if actuator is not None and actuator not in names:
             raise BadInput(f"actuator: {actuator!r:.60} is not known{suggestion(str(actuator), names)}")
         self._declare(tuple(self._repaired(fault, actuator) for fault in self._faults))

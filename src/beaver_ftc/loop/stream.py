@@ -48,6 +48,8 @@ class Diagnosis:
         design_model: Mapping[str, Any] | None = None,
         start: Start | None = None,
     ) -> None:
+        if not isinstance(aircraft, Aircraft):
+            raise BadInput(f"aircraft: {aircraft!r:.60} is none, allowed: what aircraft() gives")
         given = {
             "name": "stream", "rate_hz": rate_hz, "fdi": fdi or {}, "actuators": actuators,
             "design_model": design_model or {},

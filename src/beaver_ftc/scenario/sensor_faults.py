@@ -5,7 +5,7 @@ Magnitudes are in the unit in which `sensors` has the instrument: UNITS.
 
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from beaver_ftc.aircraft.question import in_question
 from beaver_ftc.errors import suggestion
@@ -23,6 +23,8 @@ UNITS: dict[str, tuple[str, float]] = {
     "manifold_pressure": ("inHg", 50.0),
 }
 MOST_SCALE = 2.0
+# What an instrument is called in words, and in `sensors`.
+ALIASES = {"airspeed": "V", "dynamic_pressure": "qdyn"}
 
 
 def sensors_there() -> tuple[str, ...]:
@@ -36,6 +38,17 @@ def sensor_words(name: str) -> str:
     return f"sensor {name}"
 
 
+def fault_name(said: Any, names: tuple[str, ...]) -> Any:
+    """What breaks: `sensor p` as a verdict has it, or an instrument's name in words, is the instrument's."""
+    if not isinstance(said, str) or said in names:
+        return said
+    return _in_short(said.removeprefix(sensor_words("")))
+
+
+def _in_short(name: Any) -> Any:
+    return ALIASES.get(name, name) if isinstance(name, str) else name
+
+
 def _known(name: str) -> str:
     known = sensors_there()
     if name not in known:
@@ -44,11 +57,12 @@ def _known(name: str) -> str:
 
 
 def _examples(schema: dict[str, Any]) -> None:
-    schema["examples"] = list(UNITS)
+    schema["examples"] = [*UNITS, *ALIASES]
 
 
 SensorName = Annotated[
     str,
+    BeforeValidator(_in_short),
     AfterValidator(_known),
     Field(description="the instrument that fails, as in `sensors`", json_schema_extra=_examples),
 ]
@@ -66,7 +80,9 @@ class SensorFault(Section):
     @classmethod
     def _until(cls, given: Any) -> Any:
         """`until_s` says the same as `end_s`."""
-        if isinstance(given, dict) and "until_s" in given and "end_s" not in given:
+        if isinstance(given, dict) and "until_s" in given:
+            if "end_s" in given:
+                refuse([(("until_s",), "says the same as end_s, allowed: one of the two")])
             return {"end_s" if key == "until_s" else key: value for key, value in given.items()}
         return given
 

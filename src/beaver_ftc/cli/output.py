@@ -3,6 +3,7 @@
 import os
 import sys
 import traceback
+from contextlib import suppress
 from enum import StrEnum
 from typing import Annotated, Any
 
@@ -18,7 +19,19 @@ class Format(StrEnum):
     json = "json"
 
 
-FormatOption = Annotated[Format, typer.Option("--format", help="Text for people, or one JSON document.")]
+# Whether this command was asked for a document, and whether it has given one.
+_document = {"asked": False, "given": False}
+
+
+def _remember(format: Format) -> Format:
+    _document["asked"], _document["given"] = format is Format.json, False
+    return format
+
+
+FormatOption = Annotated[
+    Format,
+    typer.Option("--format", help="Text for people, or one JSON document.", callback=_remember),
+]
 
 
 def emit(text: str) -> None:
@@ -37,6 +50,7 @@ def emit_json(document: Any) -> None:
     """Write one JSON document to standard output."""
     from beaver_ftc.results.metrics import as_json
 
+    _document["given"] = True
     emit(as_json(document))
 
 
@@ -46,11 +60,17 @@ def complain(text: str) -> None:
 
 
 def report(error: BeaverFtcError) -> int:
-    """Say what went wrong, with its traceback if BEAVER_FTC_DEBUG is set; returns the exit status."""
+    """Say what went wrong, with its traceback if BEAVER_FTC_DEBUG is set; returns the exit status.
+
+    Who asked for a JSON document and has none yet gets one that holds the errors.
+    """
     if os.environ.get("BEAVER_FTC_DEBUG"):
         traceback.print_exception(error)
     else:
         complain(str(error))
+    if _document["asked"] and not _document["given"]:
+        with suppress(SimulationFailed):  # standard output that cannot be written is no second error
+            emit_json({"errors": str(error).splitlines()})
     return error.exit_code
 
 

@@ -1,0 +1,31 @@
+"""Who asks for one JSON document gets one, also of what cannot be done."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+BEAVER = str(Path(sys.executable).parent / "beaver-ftc")
+
+
+@pytest.mark.parametrize(
+    "asked",
+    [
+        ["compare", "nope"],
+        ["derive", "nope"],
+        ["trim", "nope"],
+        ["identify", "nope.csv", "--vehicle", "nope", "--out", "model.json"],
+        ["diagnose", "nope.csv", "--model", "nope.json"],
+        ["run", "nope"],
+    ],
+    ids=lambda asked: asked[0],
+)
+def test_a_refusal_is_one_document(tmp_path, asked):
+    done = subprocess.run(
+        [BEAVER, *asked, "--format", "json"], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 2
+    assert json.loads(done.stdout)["errors"] == done.stderr.splitlines()
+    assert list(tmp_path.iterdir()) == []

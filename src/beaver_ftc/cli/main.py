@@ -13,7 +13,7 @@ import typer
 
 from beaver_ftc import __version__
 from beaver_ftc.cli.inputs import with_plugins
-from beaver_ftc.cli.output import report, unexpected
+from beaver_ftc.cli.output import report_last, unexpected
 from beaver_ftc.errors import BeaverFtcError
 
 COMMANDS = (
@@ -109,7 +109,7 @@ def main() -> NoReturn:
     try:
         app()
     except BeaverFtcError as error:
-        sys.exit(report(error))
+        sys.exit(report_last(error))
     except Exception as error:
-        sys.exit(report(unexpected(error)))
+        sys.exit(report_last(unexpected(error)))
     sys.exit(0)

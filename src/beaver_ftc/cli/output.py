@@ -60,18 +60,21 @@ def complain(text: str) -> None:
 
 
 def report(error: BeaverFtcError) -> int:
-    """Say what went wrong, with its traceback if BEAVER_FTC_DEBUG is set; returns the exit status.
-
-    Who asked for a JSON document and has none yet gets one that holds the errors.
-    """
+    """Say what went wrong, with its traceback if BEAVER_FTC_DEBUG is set; returns the exit status."""
     if os.environ.get("BEAVER_FTC_DEBUG"):
         traceback.print_exception(error)
     else:
         complain(str(error))
+    return error.exit_code
+
+
+def report_last(error: BeaverFtcError) -> int:
+    """`report` what ends the command: who asked for a JSON document and has none gets the errors as one."""
+    status = report(error)
     if _document["asked"] and not _document["given"]:
         with suppress(SimulationFailed):  # standard output that cannot be written is no second error
             emit_json({"errors": str(error).splitlines()})
-    return error.exit_code
+    return status
 
 
 def unexpected(error: Exception) -> SimulationFailed:

@@ -51,14 +51,19 @@ class BeaverEnv(gymnasium.Env[Vector, Vector]):
         self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (surfaces,), np.float64)
         self.observation_space = gymnasium.spaces.Box(-LARGEST, LARGEST, (12 + surfaces,), np.float64)
         self._sim: Simulation | None = None
+        self._seed: int | None = None
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Vector, dict[str, Any]]:
         """Put the aircraft in trim; a seed replaces the scenario's."""
         super().reset(seed=seed)
-        scenario = self.scenario if seed is None else self.scenario.with_({"seed": seed})
-        sim = self._sim = Simulation(scenario, log=False)
+        if self._sim is not None and seed == self._seed:
+            self._sim.reset()  # the aircraft is not loaded again
+        else:
+            scenario = self.scenario if seed is None else self.scenario.with_({"seed": seed})
+            self._sim, self._seed = Simulation(scenario, log=False), seed
+        sim = self._sim
         self._deflections = sim.trim_rad
         self._trim_y = sim.measured.y
         self._columns = _places(sim.columns)

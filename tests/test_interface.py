@@ -183,3 +183,19 @@ class TestSweep:
         )
         done = subprocess.run([sys.executable, script], capture_output=True, text=True, check=False)
         assert done.stdout.split() == ["started", "3"], done.stderr
+
+
+@pytest.mark.parametrize(
+    "mistaken",
+    [
+        lambda: bf.load("fault-free").with_(None),
+        lambda: bf.load("fault-free").with_([1]),
+        lambda: bf.aircraft(None),
+        lambda: bf.open_run(None),
+        lambda: bf.sweep("fault-free", {"initial.airspeed_mps": {"uniform": [40, 50]}}, 2, workers=0),
+        lambda: bf.sweep("fault-free", {"initial.airspeed_mps": {"uniform": [40, 50]}}, 2, workers="a"),
+    ],
+)
+def test_what_is_of_another_type_is_bad_input(mistaken):
+    with pytest.raises(bf.BadInput, match="allowed: "):
+        mistaken()

@@ -50,6 +50,8 @@ def load(reference: str = DEFAULT, beside: Path | None = None) -> Aircraft:
 
     Raises UnknownAircraft for what is no aircraft, ScenarioError with one line a mistake in its file.
     """
+    if not isinstance(reference, str):
+        raise UnknownAircraft(f"{reference!r:.60} is no aircraft, allowed: {_ALLOWED}")
     if reference.startswith(_FROM_JSBSIM):
         return read(_derived(reference.removeprefix(_FROM_JSBSIM)))
     if reference.startswith("./"):

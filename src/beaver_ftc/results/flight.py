@@ -205,6 +205,8 @@ def open_run(folder: str | PathLike[str]) -> Flight:
 
     Raises BadInput for a folder that is no result of a run.
     """
+    if not isinstance(folder, str | PathLike):
+        raise BadInput(f"{folder!r:.60} is no folder, allowed: the result folder of a run")
     path = Path(folder)
     try:
         document = json.loads((path / "metrics.json").read_text(encoding="utf-8"))

@@ -25,6 +25,8 @@ def changed(scenario: _Model, changes: Mapping[str, Any]) -> _Model:
 
     Raises BadInput that names the key.
     """
+    if not isinstance(changes, Mapping):
+        raise BadInput(f"{changes!r:.60} is no change, allowed: a mapping of dotted keys to values")
     data = scenario.model_dump(mode="json", by_alias=True, exclude_unset=True)
     for key, value in changes.items():
         try:

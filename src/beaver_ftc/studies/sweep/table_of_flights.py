@@ -9,6 +9,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
+from beaver_ftc.errors import BadInput
 from beaver_ftc.results.frame import units
 from beaver_ftc.scenario.changes import plain
 from beaver_ftc.scenario.document import Document
@@ -41,6 +42,8 @@ def sweep(
     """
     asked = {"vary": vary, "runs": runs, "seed": seed, "sampling": sampling, "expect": expect or {}}
     made = _made(scenario, {key: value for key, value in asked.items() if value is not None})
+    if not isinstance(workers, int) or workers < 1:
+        raise BadInput(f"workers: {workers!r:.60} is not usable, allowed: a whole number of at least 1")
     table = _here(made) if workers == 1 and out is None else _kept(made, workers, out)
     frame = table.to_pandas()
     varied = plain(vary)

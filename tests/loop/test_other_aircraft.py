@@ -4,8 +4,10 @@ import re
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
+import beaver_ftc as bf
 from beaver_ftc.aircraft import load
 from beaver_ftc.design.context import DesignModel
 from beaver_ftc.design.model import design_record
@@ -15,6 +17,12 @@ from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.state import FlightState
 from beaver_ftc.plant.trim import trim
 from beaver_ftc.plugins import DETECTORS, LAWS, registered
+from beaver_ftc.results.exports import write_acmi
+from beaver_ftc.results.log import ParquetLog
+from beaver_ftc.results.log import column_names as log_columns
+from beaver_ftc.results.metrics import metrics
+from beaver_ftc.results.views import views
+from beaver_ftc.results.writer import result_folder
 from beaver_ftc.scenario.loader import load_scenario, load_text
 
 FOLDER = Path(__file__).parents[1] / "data" / "aircraft"
@@ -142,3 +150,32 @@ def test_every_detector_names_its_elevator(scheme):
 def test_every_law_flies_it(law):
     flight = fly(quiet(**{"control.law": law}))
     assert flight.departure is None
+
+
+def test_its_sweep_is_flown_by_other_processes(tmp_path):
+    table = bf.sweep(
+        load_scenario(FLIGHT), vary={"faults[0].magnitude": {"uniform": [0.5, 0.9]}}, runs=2, workers=2
+    )
+    assert set(table["isolation.fault"]) == {"elevator"}
+    travel = {c for c in table.columns if c.startswith("tracking.surface_travel_deg.")}
+    assert {column.rpartition(".")[2] for column in travel} == {"aileron", "elevator", "rudder"}
+
+
+def test_a_result_folder_flies_it_again(tmp_path):
+    kept = bf.fly(load_scenario(FLIGHT)).save(tmp_path, report=False)
+    again = bf.fly(load_scenario(kept / "scenario.yaml"))
+    pd.testing.assert_frame_equal(again.log, bf.open_run(kept).log)
+    (kept / "aircraft" / "notes.txt").write_text("mine")
+    with pytest.raises(bf.SimulationFailed, match=r"aircraft/notes\.txt"):
+        bf.fly(load_scenario(FLIGHT)).save(tmp_path, report=False)
+
+
+def test_its_recording_and_views_have_its_surfaces(tmp_path):
+    with result_folder(tmp_path, "kept") as folder:
+        with ParquetLog(folder / "log.parquet") as log:
+            flight = fly(load_scenario(FLIGHT), log)
+        write_acmi(folder / "log.parquet", metrics(flight), folder / "flight.acmi", flight.scenario.airframe)
+        shown = {view.name: view for view in views(log_columns(folder / "log.parquet"))}
+    assert "Flaps" not in (tmp_path / "kept" / "flight.acmi").read_text()
+    assert [panel.label for panel in shown["surfaces"].panels] == ["aileron", "elevator", "rudder"]
+    assert len(shown["effectiveness"].panels[0].traces) == 3

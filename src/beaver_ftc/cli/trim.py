@@ -11,19 +11,12 @@ if TYPE_CHECKING:
     from beaver_ftc.plant.trim import TrimPoint
 
 _RESIDUALS = ("udot_mps2", "vdot_mps2", "wdot_mps2", "pdot_rad_s2", "qdot_rad_s2", "rdot_rad_s2")
-_SHOWN = (  # what, attribute, unit; angles in degrees
-    ("airspeed", "airspeed_mps", "m/s"),
-    ("altitude", "altitude_m", "m"),
-    ("engine speed", "engine_rpm", "rpm"),
-    ("manifold pressure", "manifold_pressure_inhg", "inHg"),
-    ("flap", "flap_rad", "deg"),
+_CONDITION = (("airspeed", "airspeed_mps", "m/s"), ("altitude", "altitude_m", "m"))
+_ATTITUDE = (  # what, attribute, unit; angles in degrees
     ("angle of attack", "alpha_rad", "deg"),
     ("sideslip", "beta_rad", "deg"),
     ("pitch attitude", "theta_rad", "deg"),
     ("flight path", "gamma_rad", "deg"),
-    ("aileron", "aileron_rad", "deg"),
-    ("elevator", "elevator_rad", "deg"),
-    ("rudder", "rudder_rad", "deg"),
 )
 
 
@@ -31,8 +24,8 @@ def command(
     scenario: Annotated[
         str | None, typer.Argument(metavar="[SCENARIO]", help="Take the flight condition from it.")
     ] = None,
-    airspeed_mps: Annotated[float | None, typer.Option(min=20, max=70, help="True airspeed, m/s.")] = None,
-    altitude_m: Annotated[float | None, typer.Option(min=-300, max=6000, help="Altitude, m.")] = None,
+    airspeed_mps: Annotated[float | None, typer.Option(min=1, max=1000, help="True airspeed, m/s.")] = None,
+    altitude_m: Annotated[float | None, typer.Option(min=-300, max=30000, help="Altitude, m.")] = None,
     engine_rpm: Annotated[float | None, typer.Option(min=0, max=3000, help="Engine speed, rpm.")] = None,
     manifold_pressure_inhg: Annotated[
         float | None, typer.Option(min=0, max=50, help="Manifold pressure, inHg.")
@@ -44,6 +37,7 @@ def command(
 
     Steady straight flight, wings level; what cannot be trimmed is bad input (2). What is not given
     is the scenario's, or else its default: 45 m/s at 1828.8 m, 1800 rpm, 20 inHg, no flap.
+    Engine and flap are those of an aircraft that has them.
     """
     asked = {
         "airspeed_mps": airspeed_mps,
@@ -66,8 +60,13 @@ def _document(point: "TrimPoint") -> dict[str, Any]:
 
 
 def _table(point: "TrimPoint") -> str:
-    lines = [f"{what:18}{_shown(getattr(point, name), unit):>12} {unit}" for what, name, unit in _SHOWN]
-    lines.append(f"{'worst residual':18}{max(map(abs, point.residual)):>12.1e} m/s2 or rad/s2")
+    settings = tuple((name.replace("_", " "), name, "") for name in point.settings)
+    surfaces = tuple((name, f"{name}_rad", "deg") for name in point.surfaces_rad)
+    shown = (*_CONDITION, *settings, *_ATTITUDE, *surfaces)
+    lines = [
+        f"{what:22}{_shown(getattr(point, name), unit):>12} {unit}".rstrip() for what, name, unit in shown
+    ]
+    lines.append(f"{'worst residual':22}{max(map(abs, point.residual)):>12.1e} m/s2 or rad/s2")
     if not point.envelope_valid:
         lines.append("outside the flight-validated envelope")
     return "\n".join(lines)

@@ -37,10 +37,14 @@ LOOKS = {
     "error of p": Look(SKY, (7, 3), 1.4, 4),
     "error of q": Look(PURPLE, (), 1.4, 5),
     "error of r": Look(GREEN, (2, 2), 1.6, 4),
-    "aileron": Look(SKY, (7, 2, 1.5, 2), 1.8, 3),
-    "elevator": Look(BLUE, (), 1.8, 2),
-    "rudder": Look(ORANGE, (6, 4), 1.8, 4),
-    "flap": Look(GREEN, (2, 3), 2.2, 5),
+    "surface 0": Look(SKY, (7, 2, 1.5, 2), 1.8, 3),
+    "surface 1": Look(BLUE, (), 1.8, 2),
+    "surface 2": Look(ORANGE, (6, 4), 1.8, 4),
+    "surface 3": Look(GREEN, (2, 3), 2.2, 5),
+    "surface 4": Look(PURPLE, (9, 3), 1.8, 3),
+    "surface 5": Look(VERMILION, (1.5, 2), 1.8, 3),
+    "surface 6": Look(BLACK, (4, 2), 1.4, 2),
+    "surface 7": Look(GREY, (), 2.2, 1),
 }
 PLUM = "#8f4a74"  # a darker purple, for letters and thin lines
 CRIMSON = "#7d0a1e"  # the loss of the aircraft, and of nothing else

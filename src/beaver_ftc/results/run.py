@@ -1,12 +1,13 @@
 """Fly a scenario and keep what came out: the result folder of one run."""
 
+import shutil
 from collections.abc import Callable, Collection
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from beaver_ftc.results.log import ParquetLog
 from beaver_ftc.results.metrics import Document, as_json, metrics
-from beaver_ftc.results.writer import result_folder
+from beaver_ftc.results.writer import AIRCRAFT, MODEL_FILES, result_folder
 
 if TYPE_CHECKING:
     from beaver_ftc.aircraft import Aircraft
@@ -42,7 +43,7 @@ def run(
         if report:
             write_report_files(folder, document)
         if exports:
-            write_exports(folder, document, exports)
+            write_exports(folder, document, exports, scenario.airframe)
         if recording is not None:
             write_recording(folder / "log.parquet", _travel_rad(scenario.airframe), recording, folder)
     return document
@@ -52,8 +53,21 @@ def write_documents(folder: Path, scenario: "Scenario", document: Document) -> N
     """Write what was flown and what came out of it into a result folder."""
     from beaver_ftc.scenario.dump import to_yaml
 
-    (folder / "scenario.yaml").write_text(to_yaml(scenario), encoding="utf-8")
+    (folder / "scenario.yaml").write_text(to_yaml(_with_its_aircraft(folder, scenario)), encoding="utf-8")
     (folder / "metrics.json").write_text(as_json(document), encoding="utf-8")
+
+
+def _with_its_aircraft(folder: Path, scenario: "Scenario") -> "Scenario":
+    """The scenario as it can be flown again from this folder: an aircraft of the user's own is copied."""
+    if not str(scenario.aircraft).startswith("./"):
+        return scenario
+    shutil.copytree(scenario.airframe.folder, folder / AIRCRAFT, ignore=_no_model, dirs_exist_ok=True)
+    return scenario.model_copy(update={"aircraft": f"./{AIRCRAFT}"})
+
+
+def _no_model(folder: str, names: list[str]) -> set[str]:
+    """What is no part of a JSBSim model and of its description."""
+    return {n for n in names if Path(folder, n).is_file() and Path(n).suffix not in MODEL_FILES}
 
 
 def write_report_files(folder: Path, document: Document) -> None:
@@ -65,14 +79,16 @@ def write_report_files(folder: Path, document: Document) -> None:
     write_report(folder / "report.html", [folder])
 
 
-def write_exports(folder: Path, document: Document, exports: Collection[str]) -> None:
+def write_exports(
+    folder: Path, document: Document, exports: Collection[str], aircraft: "Aircraft | None" = None
+) -> None:
     """Write the log of a result folder for other tools: "csv" as log.csv, "acmi" as flight.acmi."""
     from beaver_ftc.results.exports import write_acmi, write_csv
 
     if "csv" in exports:
         write_csv(folder / "log.parquet", folder / "log.csv")
     if "acmi" in exports:
-        write_acmi(folder / "log.parquet", document, folder / "flight.acmi")
+        write_acmi(folder / "log.parquet", document, folder / "flight.acmi", aircraft)
 
 
 def _travel_rad(aircraft: "Aircraft") -> dict[str, float]:

@@ -9,10 +9,10 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 AXES = ("p", "q", "r")
-SURFACES = ("aileron", "elevator", "rudder", "flap")
 AXIS_NAMES = {"p": "roll rate p", "q": "pitch rate q", "r": "yaw rate r"}
 MODES = ("nominal", "adaptive", "reallocated", "unanticipated")
 
+SURFACE_ROLES = tuple(f"surface {i}" for i in range(8))  # looks of the surfaces, in the aircraft's order
 RATIO = "_ratio"  # ends the name of a derived column: |residual| / threshold
 
 _DEG_PER_RAD = 57.29577951308232
@@ -87,13 +87,19 @@ def estimators(columns: Sequence[str]) -> tuple[str, ...]:
     return tuple(match.group(1) for match in matches if match)
 
 
+def surfaces(columns: Sequence[str]) -> tuple[str, ...]:
+    """Names of the surfaces a log has columns of, in the aircraft's order."""
+    ending = "_cmd_rad"
+    return tuple(column.removesuffix(ending) for column in columns if column.endswith(ending))
+
+
 def views(columns: Sequence[str], power: bool = False) -> tuple[View, ...]:
     """Every view that a log with these columns allows; power: the law has used the engine."""
-    known = set(columns)
+    known, moved = set(columns), surfaces(columns)
     named = (
-        _tracking(), _profile(), _surfaces(), _detection(), _likelihood(), _isolation(estimators(columns)),
-        _ratio(estimators(columns)), _effectiveness(), _supervisor(), *((_engine(),) if power else ()),
-        _states(),
+        _tracking(), _profile(), _surfaces(moved), _detection(), _likelihood(columns),
+        _isolation(estimators(columns)), _ratio(estimators(columns)), _effectiveness(moved), _supervisor(),
+        *((_engine(),) if power else ()), _states(),
     )  # fmt: skip
     return tuple(view for view in named if view.panels and known.issuperset(sources(view.columns)))
 
@@ -147,7 +153,7 @@ def _profile() -> View:
     return View("profile", "Profile: what was commanded, and what was flown", panels)
 
 
-def _surfaces() -> View:
+def _surfaces(names: Sequence[str]) -> View:
     panels = tuple(
         Panel(
             surface,
@@ -159,7 +165,7 @@ def _surfaces() -> View:
             shade=f"{surface}_saturated",
             shade_label="saturated",
         )
-        for surface in SURFACES
+        for surface in names
     )
     return View("surfaces", "Control surfaces: commanded, reached, and as the aerodynamics see them", panels)
 
@@ -186,13 +192,20 @@ def _detection() -> View:
     return View("detection", title, (alarm, *panels), closeup=True)
 
 
-def _likelihood() -> View:
+def _likelihood(columns: Sequence[str]) -> View:
+    ending = "_loss_likelihood_share"
+    names = [column.removesuffix(ending) for column in columns if column.endswith(ending)]
     losses = tuple(
-        Trace(f"{surface}_loss_likelihood_share", f"{surface} loss", surface) for surface in SURFACES[:3]
+        Trace(f"{surface}{ending}", f"{surface} loss", role)
+        for surface, role in zip(names, SURFACE_ROLES, strict=False)
     )
     steps = tuple(Trace(f"{axis}_step_likelihood_share", f"step of {axis}'", axis) for axis in AXES)
     panels = (
-        Panel("loss of a surface: test / alarm level", losses, log_scale=True, level=1.0),
+        *(
+            [Panel("loss of a surface: test / alarm level", losses, log_scale=True, level=1.0)]
+            if losses
+            else ()
+        ),
         Panel("step of an acceleration: test / alarm level", steps, log_scale=True, level=1.0),
     )
     title = "Detection: likelihood ratio tests against their alarm level"
@@ -237,10 +250,13 @@ def _spoken(name: str) -> str:
     return name.replace("_", " ")
 
 
-def _effectiveness() -> View:
-    traces = tuple(Trace(f"{surface}_effectiveness_estimate", surface, surface) for surface in SURFACES)
-    panel = Panel("effectiveness (1 healthy)", traces, limits=(-0.05, 1.1))
-    return View("effectiveness", "Estimated effectiveness of each surface", (panel,))
+def _effectiveness(names: Sequence[str]) -> View:
+    traces = tuple(
+        Trace(f"{surface}_effectiveness_estimate", surface, role)
+        for surface, role in zip(names, SURFACE_ROLES, strict=False)
+    )
+    panels = (Panel("effectiveness (1 healthy)", traces, limits=(-0.05, 1.1)),) if traces else ()
+    return View("effectiveness", "Estimated effectiveness of each surface", panels)
 
 
 def _supervisor() -> View:

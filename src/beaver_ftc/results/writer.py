@@ -30,7 +30,9 @@ FILES_OF_A_RESULT = frozenset({
     "power.json", "power.txt", "power.parquet", "pitch-lost.json", "pitch-lost.txt",
     "diagnosis.parquet", "verdict.json", "flights.json", "flights.md", "flights.png",
     "flight.csv", "flight.ulg", "flight.bin", "vehicle.yaml",
+    "aircraft",
 })  # fmt: skip
+AIRCRAFT, MODEL_FILES = "aircraft", frozenset({".xml", ".yaml"})  # an own aircraft, to fly it again
 MARK = "beaver-ftc"  # the software that a picture of ours names in its metadata
 _HEAD_BYTES = 2048  # of a picture: its metadata come first
 _AT_FDCWD = -100
@@ -82,6 +84,8 @@ def strangers_in(folder: Path, known: Collection[str]) -> list[str]:
     strangers = [entry.name for entry in folder.iterdir() if entry.name not in known]
     pictures = (folder / "figures").rglob("*")
     strangers += [str(path.relative_to(folder)) for path in pictures if not _is_our_picture(path)]
+    copied = (path for path in (folder / AIRCRAFT).rglob("*") if not path.is_dir())
+    strangers += [str(path.relative_to(folder)) for path in copied if path.suffix not in MODEL_FILES]
     return sorted(strangers)
 
 

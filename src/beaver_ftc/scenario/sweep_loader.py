@@ -3,10 +3,12 @@
 import contextlib
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from beaver_ftc.aircraft import Aircraft, load
+from beaver_ftc.aircraft.question import asked
 from beaver_ftc.errors import suggestion
 from beaver_ftc.paths import data_root, inside
 from beaver_ftc.scenario.base import Location
@@ -24,10 +26,14 @@ _DERIVED = {"name": "follows from the sweep's name", "seed": "follows from the s
 
 @dataclass(frozen=True)
 class Sweep:
-    """A sweep ready to fly: the file's content and its base scenario's data, which names no other file."""
+    """A sweep ready to fly: the file's content and its base scenario's data, which names no other file.
+
+    aircraft: the base's, found beside its file.
+    """
 
     file: SweepFile
     base: dict[str, Any]
+    aircraft: Aircraft = field(default_factory=load)
 
     @property
     def name(self) -> str:
@@ -50,7 +56,8 @@ class Sweep:
         Raises pydantic's ValidationError if they contradict each other.
         """
         places = {parse_key(key): value for key, value in values.items()}
-        return Scenario.model_validate({**with_values(self.base, places), **settings})
+        with asked(self.aircraft, self.base.get("aircraft")):
+            return Scenario.model_validate({**with_values(self.base, places), **settings})
 
 
 def load_sweep(path_or_name: str | Path) -> Sweep:
@@ -71,12 +78,13 @@ def load_sweep_text(
 def validate_sweep(document: Document, source: str = "", folder: Path | None = None) -> Sweep:
     """The sweep in a document; without a source its error lines begin with the key."""
     file = validate(SweepFile, document, source, folder)
-    base = _base(file.base, document, source, folder)
-    base, problems = _with_settings(base, file.set, document)
-    problems = problems or [*_key_problems(base, file.vary, document)]
+    base, aircraft = _base(file.base, document, source, folder)
+    with asked(aircraft, base.get("aircraft")):
+        base, problems = _with_settings(base, file.set, document)
+        problems = problems or [*_key_problems(base, file.vary, document)]
     if problems:
         raise ScenarioError(source, problems)
-    return Sweep(file, base)
+    return Sweep(file, base, aircraft)
 
 
 def is_sweep(path_or_name: str | Path) -> bool:
@@ -101,7 +109,9 @@ def resolve_sweep(path_or_name: str | Path) -> Path:
     return Path(path_or_name)
 
 
-def _base(base: str | dict[str, Any], document: Document, source: str, folder: Path | None) -> dict[str, Any]:
+def _base(
+    base: str | dict[str, Any], document: Document, source: str, folder: Path | None
+) -> tuple[dict[str, Any], Aircraft]:
     """The base scenario's data as its author wrote it, but with the tables of its CSV files in it."""
     if isinstance(base, dict):
         return _self_contained(base, _inline(document, source, folder))
@@ -138,9 +148,9 @@ def _moved(problem: Problem, below: Location) -> Problem:
     return Problem(problem.line, (*below, *problem.location), problem.says)
 
 
-def _self_contained(data: dict[str, Any], scenario: Scenario) -> dict[str, Any]:
+def _self_contained(data: dict[str, Any], scenario: Scenario) -> tuple[dict[str, Any], Aircraft]:
     reference = scenario.model_dump(mode="json", include={"reference"}, exclude_unset=True)
-    return {"name": scenario.name, **data, **reference}
+    return {"name": scenario.name, **data, **reference}, scenario.airframe
 
 
 def _with_settings(

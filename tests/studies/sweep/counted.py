@@ -2,10 +2,11 @@
 
 from pathlib import Path
 
+from beaver_ftc.aircraft import load
 from beaver_ftc.scenario.sweep_loader import load_sweep_text
 from beaver_ftc.studies.sweep.flights import Flights
 from beaver_ftc.studies.sweep.store import write_tables
-from beaver_ftc.studies.sweep.table import COLUMNS, schema_of, table_of
+from beaver_ftc.studies.sweep.table import columns_of, schema_of, table_of
 
 SWEEP = """\
 name: counted
@@ -14,7 +15,7 @@ runs: 12
 vary:
   faults[0].magnitude: {uniform: [0.1, 1]}
 """
-NOTHING = dict.fromkeys(name for name, _, _ in COLUMNS)
+NOTHING = dict.fromkeys(name for name, _, _ in columns_of(load().surfaces))
 
 
 def row(run, status="flown", **metrics):

@@ -1,10 +1,11 @@
 import pytest
 
+from beaver_ftc.aircraft import load
 from beaver_ftc.errors import SimulationFailed
 from beaver_ftc.results.metrics import metrics
 from beaver_ftc.studies.sweep.flying import Job, Keep, fly_one, scenario_of
 from beaver_ftc.studies.sweep.sampling import Assignment, Plan, flight_seed
-from beaver_ftc.studies.sweep.table import COLUMNS
+from beaver_ftc.studies.sweep.table import columns_of
 
 from .conftest import SHORT, sweep_of
 
@@ -36,7 +37,7 @@ def test_every_metric_has_a_column(short):
         for section, below in document.items()
         for key in (below if isinstance(below, dict) else [""])
     } - {"scenario", "seed", "versions"}
-    names = {name for name, _, _ in COLUMNS}
+    names = {name for name, _, _ in columns_of(load().surfaces)}
     lists = {"supervisor", "envelope_exits", "expectations", "departure", "faults", "hints"}
     shared = {"flight", "envelope", "profile", "mode_changes_left_out"}  # the flight's own document has them
     missing = {

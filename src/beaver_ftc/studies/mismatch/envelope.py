@@ -11,6 +11,7 @@ from beaver_ftc.errors import BadInput
 from beaver_ftc.studies.engine.flown import Progress, flown
 from beaver_ftc.studies.mismatch.document import Document, document, write_csv
 from beaver_ftc.studies.mismatch.figures import AXIS_NAMES, largest_sources, new_figure, save
+from beaver_ftc.studies.mismatch.run import refuse_other_aircraft
 from beaver_ftc.studies.mismatch.states import AXES
 
 if TYPE_CHECKING:
@@ -34,6 +35,7 @@ def run_map(
     from beaver_ftc.results.metrics import as_json
     from beaver_ftc.results.writer import result_folder
 
+    refuse_other_aircraft(scenario)
     name = map_name(scenario)
     conditions = [(V, h) for h in ALTITUDES_M for V in AIRSPEEDS_MPS]
     cells = flown(

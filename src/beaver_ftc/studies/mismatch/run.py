@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from beaver_ftc.aircraft import load
+from beaver_ftc.errors import BadInput
 from beaver_ftc.studies.mismatch.document import (
     Document,
     document,
@@ -42,6 +44,7 @@ def run_mismatch(
     from beaver_ftc.results.writer import result_folder
     from beaver_ftc.scenario.dump import to_yaml
 
+    refuse_other_aircraft(scenario)
     with result_folder(out, scenario.name) as folder:
         with ParquetLog(folder / "log.parquet") as log:
             flight = fly(scenario, log, progress)
@@ -50,6 +53,15 @@ def run_mismatch(
         (folder / "metrics.json").write_text(as_json(flown), encoding="utf-8")
         found, kept = analyse_folder(scenario, folder, flown, report)
     return found, kept
+
+
+def refuse_other_aircraft(scenario: "Scenario") -> None:
+    """The study compares with a second set of equations, which there is of the built-in aircraft only."""
+    if scenario.airframe is not load():
+        raise BadInput(
+            f"{scenario.name}: aircraft: mismatch knows the equations of {load().name} alone, allowed: "
+            f"{load().name}; of others `beaver-ftc derive` measures the error"
+        )
 
 
 def analyse_folder(

@@ -4,9 +4,11 @@ import contextlib
 import json
 import shutil
 from collections.abc import Iterator, Sequence
+from hashlib import sha256
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any, Self
 
+from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.errors import BadInput, SimulationFailed
 from beaver_ftc.scenario.sweep_loader import Sweep
 from beaver_ftc.studies.engine import files
@@ -31,7 +33,17 @@ def identity_of(sweep: Sweep, search: str | None = None) -> Identity:
     """The identity of a sweep on this machine, as in `sweep.json`."""
     file = sweep.file.model_dump(mode="json", exclude_none=True)
     asked = {key: value for key, value in file.items() if key not in _NOT_FLOWN}
-    return Identity.of("sweep", {**asked, "runs": sweep.flights, "base": sweep.base, "search": search})
+    flown = {"runs": sweep.flights, "base": sweep.base, "aircraft": _digest(sweep.aircraft), "search": search}
+    return Identity.of("sweep", {**asked, **flown})
+
+
+def _digest(aircraft: Aircraft) -> str:
+    """The aircraft's files, so that a sweep is not resumed with another one of the same name."""
+    digest = sha256()
+    for path in sorted(aircraft.folder.rglob("*")):
+        if path.suffix in (".xml", ".yaml"):
+            digest.update(path.name.encode() + path.read_bytes())
+    return digest.hexdigest()
 
 
 class RowsAsParquet:

@@ -22,7 +22,7 @@ Document = dict[str, Any]
 
 QUANTILES = {"median": 0.5, "p90": 0.9, "p95": 0.95, "p99": 0.99, "max": 1.0}
 FALSE_ALARM, NO_ALARM, NOT_ISOLATED = "false alarm", "no alarm", "not isolated"
-_NAMED = ("aileron", "elevator", "rudder", "flap", "unanticipated")
+UNANTICIPATED = "unanticipated"
 MOST_REASONS = 20
 _NUMBERS = re.compile(r"-?\d+(\.\d+)?(e[-+]?\d+)?")
 
@@ -161,7 +161,8 @@ def _confusion(flights: Flights) -> Document:
     said = np.where(flights["false_alarm"] & (flights.fault_labels != NO_FAULT), FALSE_ALARM, said)
     rows = sorted(set(flights.fault_labels[flights.measured]))
     found = set(said[flights.measured])
-    columns = [name for name in (*_NAMED, NOT_ISOLATED, NO_ALARM, FALSE_ALARM) if name in found]
+    last = [name for name in (UNANTICIPATED, NOT_ISOLATED, NO_ALARM, FALSE_ALARM) if name in found]
+    columns = [*sorted(found.difference(last)), *last]
     pairs = Counter(zip(flights.fault_labels[flights.measured], said[flights.measured], strict=True))
     return {
         "faults": rows,

@@ -25,7 +25,6 @@ FLOWN, DEPARTED, BAD_INPUT, FAILED, CRASHED = "flown", "departed", "bad_input", 
 RESULTS = (FLOWN, DEPARTED)  # the statuses of a flight that has metrics
 
 AXES = ("p", "q", "r")
-SURFACES = ("aileron", "elevator", "rudder", "flap")
 MODES = ("adaptive", "reallocated", "unanticipated")
 
 
@@ -35,7 +34,7 @@ def _at(*path: str) -> Getter:
     def get(document: Document, flight: "Flight") -> Any:
         here: Any = document
         for part in path:
-            here = None if here is None else here[part]
+            here = None if here is None else here.get(part)
         return here
 
     return get
@@ -44,16 +43,6 @@ def _at(*path: str) -> Getter:
 def _under(kind: str, section: str, *names: str) -> list[tuple[str, str, Getter]]:
     parts = section.split(".")
     return [(f"{section}.{name}", kind, _at(*parts, name)) for name in names]
-
-
-def _of_surfaces(section: str) -> list[tuple[str, str, Getter]]:
-    """A column for each surface; empty where the aircraft has no such surface."""
-    of_all = _at(*section.split("."))
-
-    def getter(surface: str) -> Getter:
-        return lambda document, flight: (of_all(document, flight) or {}).get(surface)
-
-    return [(f"{section}.{surface}", "float", getter(surface)) for surface in SURFACES]
 
 
 def _first_entry(mode: str) -> Getter:
@@ -99,7 +88,9 @@ def _faults(document: Document, flight: "Flight") -> str:
     return " ".join(f"{found['fault']}:{found['type'] or 'open'}" for found in named)
 
 
-COLUMNS: tuple[tuple[str, str, Getter], ...] = (
+Column = tuple[str, str, Getter]
+
+_FLOWN: tuple[Column, ...] = (
     ("frames", "int", _at("frames")),
     ("flown_s", "float", _flown_s),
     ("fault_free_s", "float", _fault_free_s),
@@ -125,7 +116,8 @@ COLUMNS: tuple[tuple[str, str, Getter], ...] = (
     ("worst_residual_ratio", "float", lambda document, flight: flight.worst_residual_ratio),
     *_under("float", "tracking.pre_fault_rms_deg_s", *AXES),
     *_under("float", "tracking.post_fault_rms_deg_s", *AXES),
-    *_of_surfaces("tracking.surface_travel_deg"),
+)
+_ENDED: tuple[Column, ...] = (
     ("supervisor.mode", "text", lambda document, flight: document["supervisor"][-1]["mode"]),
     *((f"supervisor.{mode}_at_s", "float", _first_entry(mode)) for mode in MODES),
     ("envelope_exits.count", "int", lambda document, flight: document["envelope"]["exits"]),
@@ -134,10 +126,22 @@ COLUMNS: tuple[tuple[str, str, Getter], ...] = (
     *_under("text", "departure", "signal"),
     *(column for a in AXES for column in _under("float", f"authority.{a}", "given_share", "beyond_s")),
     *_under("float", "engine_power", "from_s", "in_charge_s", "lowest_inhg", "highest_inhg"),
-    *_of_surfaces("saturation_s"),
+)
+_JUDGED: tuple[Column, ...] = (
     ("expectations.missed", "text", _missed_expectations),
     ("passed", "flag", _at("passed")),
 )
+
+
+def columns_of(surfaces: Sequence[str]) -> tuple[Column, ...]:
+    """(name, type, where from) of what came of each flight of an aircraft with these surfaces."""
+    return (
+        *_FLOWN,
+        *_under("float", "tracking.surface_travel_deg", *surfaces),
+        *_ENDED,
+        *_under("float", "saturation_s", *surfaces),
+        *_JUDGED,
+    )
 
 
 def kind_of(how: Variation) -> str:
@@ -162,13 +166,14 @@ def row_of(run: int, values: dict[str, Any], seed: int, document: Document, flig
     departure = document["departure"]
     status = DEPARTED if departure else FLOWN
     reason = f"{departure['signal']} at {departure['time_s']:g} s" if departure else None
-    metrics = {name: get(document, flight) for name, _, get in COLUMNS}
+    columns = columns_of(flight.scenario.airframe.surfaces)
+    metrics = {name: get(document, flight) for name, _, get in columns}
     return {"run": run, **values, "seed": seed, "status": status, "reason": reason, **metrics}
 
 
 def row_of_failure(run: int, values: dict[str, Any], seed: int, status: str, reason: str) -> Row:
     """The row of a flight that has none, and why."""
-    nothing = dict.fromkeys(name for name, _, _ in COLUMNS)
+    nothing = dict.fromkeys(name for name, _, _ in columns_of(()))
     return {"run": run, **values, "seed": seed, "status": status, "reason": reason, **nothing}
 
 
@@ -178,7 +183,8 @@ def schema_of(sweep: "Sweep") -> "pa.Schema":
 
     types = {"float": pa.float64(), "int": pa.int64(), "flag": pa.bool_(), "text": pa.string()}
     varied = [pa.field(key, types[kind_of(how)]) for key, how in sweep.file.vary.items()]
-    metrics = [pa.field(name, types[kind]) for name, kind, _ in COLUMNS]
+    columns = columns_of(sweep.aircraft.surfaces)
+    metrics = [pa.field(name, types[kind]) for name, kind, _ in columns]
     return pa.schema([
         pa.field("run", pa.int64(), nullable=False), *varied, pa.field("seed", pa.int64(), nullable=False),
         pa.field("status", pa.string(), nullable=False), pa.field("reason", pa.string()), *metrics,
@@ -194,7 +200,7 @@ def table_of(sweep: "Sweep", schema: "pa.Schema", rows: Sequence[Row]) -> "pa.Ta
     columns = [
         [as_cell(row[name], kinds[name]) for row in ordered]
         if name in kinds
-        else [row[name] for row in ordered]
+        else [row.get(name) for row in ordered]
         for name in schema.names
     ]
     return pa.Table.from_arrays(

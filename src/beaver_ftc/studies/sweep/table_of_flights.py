@@ -9,6 +9,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
+from beaver_ftc.aircraft import question
 from beaver_ftc.errors import BadInput
 from beaver_ftc.results.frame import units
 from beaver_ftc.scenario.changes import plain
@@ -55,7 +56,8 @@ def _made(scenario: ScenarioLike, asked: dict[str, Any]) -> Sweep:
     base = load(scenario)
     name = re.sub(r"[^A-Za-z0-9_-]", "-", base.name)[:64]
     given = {"name": f"{name}-sweep", "base": plain(base), **plain(asked)}
-    return validate_sweep(Document(given), folder=Path())
+    with question.asked(base.airframe, base.aircraft):
+        return validate_sweep(Document(given), folder=Path())
 
 
 def _here(made: Sweep) -> "pa.Table":

@@ -12,7 +12,6 @@ Document = dict[str, Any]
 OURS = "adaptive-estimators"
 DRIFT_MPS, DRIFT_M = 5.0, 300.0  # a flight that ends further from where it began has wandered off
 _NOT_SIZE = {"actuator", "sensor", "type", "at_s", "end_s", "profile"}
-_PUBLISHED = ("aileron", "elevator", "rudder")
 
 
 def flown(flight: "Flight") -> Document:
@@ -62,9 +61,10 @@ def _outside_the_class(scenario: "Scenario", document: Document) -> str:
     strange = list(_strangers(scenario))
     if scenario.fdi.fault_class == "all" or not strange:
         return ""
+    *first, last = scenario.airframe.primary
     return (
         f"{' and '.join(strange)}: outside the fault class the diagnosis looks for (loss of effectiveness of "
-        "aileron, elevator or rudder), so it cannot be named; set fdi.fault_class: all"
+        f"{', '.join(first)} or {last}), so it cannot be named; set fdi.fault_class: all"
     )
 
 
@@ -72,7 +72,7 @@ def _strangers(scenario: "Scenario") -> Iterator[str]:
     """Faults that are not of the published class, but for the one that is meant to be none."""
     for fault in scenario.faults:
         actuator = getattr(fault, "actuator", None)
-        lost = fault.type == "loss_of_effectiveness" and actuator in _PUBLISHED
+        lost = fault.type == "loss_of_effectiveness" and actuator in scenario.airframe.primary
         if actuator and not lost:
             yield f"{actuator} {fault.type.replace('_', ' ')}"
 

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from beaver_ftc.aircraft import load
 from beaver_ftc.scenario.schema import Scenario
 
 AXES = ("p", "q", "r")
-SURFACES = ("aileron", "elevator", "rudder")
 HEALTHY_S = 100.0  # attitude is open loop: a longer flight wanders out of the validated envelope
 AFTER_FAULT_S = 15.0  # more than a period of the slowest reference
 _AIRSPEED_MPS, _ALTITUDE_M = (35.0, 52.0), (0.0, 3000.0)
@@ -68,7 +68,7 @@ def _log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
 
 def _fault(rng: np.random.Generator) -> dict[str, Any]:
     fault = {
-        "actuator": str(rng.choice(SURFACES)),
+        "actuator": str(rng.choice(load().primary)),
         "type": "loss_of_effectiveness",
         "magnitude": rng.uniform(*_MAGNITUDE),
         "at_s": rng.uniform(*_FAULT_AT_S),

@@ -7,7 +7,8 @@ from beaver_ftc.diagnosis.admitted import gust_sigma_rad_s
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.configure import configure, take_off, trim_of
 from beaver_ftc.plant.gust import NEVER, GustSchedule
-from beaver_ftc.scenario.schema import Gust, Scenario
+from beaver_ftc.scenario.environment import Gust
+from beaver_ftc.scenario.schema import Scenario
 
 SPAN_FT, SCALE_FT, FT = 48.0, 1750.0, 0.3048
 AIR = [f"atmosphere/turb-{to}-fps" for to in ("north", "east", "down")]
@@ -126,7 +127,7 @@ def test_a_gust_between_frames_begins_in_the_next(at_s, frame):
             self.written.append(name)
 
     plant = Noted()
-    schedule = GustSchedule(Gust(at_s=at_s, velocity_mps=(0, 0, 5)), plant, 100.0)
+    schedule = GustSchedule((Gust(at_s=at_s, velocity_mps=(0, 0, 5)),), plant, 100.0)
     plant.written.clear()
     for k in range(12):
         schedule.apply(k)

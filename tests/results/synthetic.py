@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from beaver_ftc.aircraft import load
+
 AXES = ("p", "q", "r")
 SURFACES = ("aileron", "elevator", "rudder", "flap")
 ESTIMATORS = ("aileron", "elevator", "rudder")
@@ -77,6 +79,7 @@ class Scenario:
     fdi: Any = field(default_factory=lambda: FDI)
     control: Any = field(default_factory=lambda: CONTROL)
     initial: Any = field(default_factory=lambda: INITIAL)
+    airframe: Any = field(default_factory=load)
 
 
 @dataclass

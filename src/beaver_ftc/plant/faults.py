@@ -12,9 +12,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import zip_longest
 from math import ceil, exp, inf, radians
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from beaver_ftc.plant.adapter import Plant
+if TYPE_CHECKING:
+    from beaver_ftc.plant.adapter import Plant
 
 TIME_TOLERANCE_S = 1e-9
 NEVER = sys.maxsize
@@ -145,7 +146,7 @@ class FaultSchedule:
     faults: the scenario's. plant: the aircraft they happen to. rate_hz: frame rate of the loop.
     """
 
-    def __init__(self, faults: Sequence[Any], plant: Plant, rate_hz: float) -> None:
+    def __init__(self, faults: Sequence[Any], plant: "Plant", rate_hz: float) -> None:
         self._plant = plant
         self._rate_hz = rate_hz
         self._declared: list[_Event] = []

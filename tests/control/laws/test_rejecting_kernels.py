@@ -67,11 +67,11 @@ def test_the_stand_in_carries_what_is_lost_and_takes_it_over_smoothly(given, lef
 @pytest.mark.parametrize(
     ("surface", "believed", "kept"),
     [
-        (AILERON, 0.3, 0.5), (RUDDER, 0.06, 0.5), (AILERON, 0.04, 0.04), (RUDDER, 0.8, 0.8),
-        (AILERON, 0.05, 0.5), (ELEVATOR, 0.3, 0.3), (FLAP, 0.3, 0.3),
+        (AILERON, 0.3, 0.3), (RUDDER, 0.06, 0.1), (AILERON, 0.04, 0.04), (RUDDER, 0.8, 0.8),
+        (AILERON, 0.05, 0.1), (ELEVATOR, 0.03, 0.03), (ELEVATOR, 0.06, 0.06), (FLAP, 0.06, 0.06),
     ],
 )  # fmt: skip
-def test_no_loss_worse_than_half_is_believed_of_what_nothing_replaces(surface, believed, kept):
+def test_what_nothing_replaces_is_divided_by_no_less_than_the_law_may_or_given_up(surface, believed, kept):
     control, _ = record()
     control["target"][surface] = believed
     rejecting.hesitate(control, surface)

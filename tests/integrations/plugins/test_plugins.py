@@ -301,7 +301,9 @@ def test_a_flight_without_plug_ins_imports_none_of_this():
     code = (
         "import sys; from beaver_ftc.loop.loop import fly; from beaver_ftc.scenario.schema import Scenario\n"
         "fly(Scenario(name='s', duration_s=0.1))\n"
-        "print([m for m in sys.modules if 'plugin_frame' in m or 'rivals' in m])"
+        "names = 'plugin_frame', 'indi', 'l1', 'lqr', 'rls', 'ekf', 'ukf', 'imm', 'observer'\n"
+        "ours = [m for m in sys.modules if m.startswith('beaver_ftc.')]\n"
+        "print([m for m in ours if m.rpartition('.')[2] in names])"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"

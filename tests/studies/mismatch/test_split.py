@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from beaver_ftc.loop import loop
+from beaver_ftc.plant import conditions
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.configure import configure
 from beaver_ftc.plant.state import FlightState
@@ -143,7 +143,7 @@ def test_what_nobody_declared_is_unexplained(monkeypatch):
         configure(plant, case)
         plant.write("uncertainty/Cm_alpha-scale", 1.1)
 
-    monkeypatch.setattr(loop, "configure", tampered)
+    monkeypatch.setattr(conditions, "configure", tampered)
     keys = {"uncertainty": NOTHING, "duration_s": 5}
     _, log = flown(**keys)
     found = stretch_of(scenario(**keys), log)

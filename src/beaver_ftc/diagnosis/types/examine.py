@@ -135,7 +135,8 @@ def examine(fdi):
 def note_quiet(fdi, s):
     """A surface given up, and commanded to where it happens to be, shows by its quiet that it does not swing.
 
-    That is evidence against the others too, as far as one of them all is in question.
+    That is evidence against the others too, as far as one of them all is in question. Where surfaces come
+    back through servos, the quiet may be that of one repaired: it then excludes nothing.
     """
     surface = fdi.surface[s]
     if surface.low_then > surface.set_high[STUCK] or surface.high_then < surface.set_low[STUCK]:
@@ -144,5 +145,5 @@ def note_quiet(fdi, s):
         if other == s or (surface.in_question and fdi.surface[other].in_question):
             fdi.surface[other].evidence += 1
     surface.quiet += 1
-    if surface.quiet > fdi.patience and not fdi.bound.own_errors:
+    if surface.quiet > fdi.patience and not fdi.bound.own_errors and not fdi.returns:
         surface.type_excluded[OSCILLATORY] = 1

@@ -138,6 +138,7 @@ def columns_of(surfaces: Sequence[str]) -> tuple[Column, ...]:
     return (
         *_FLOWN,
         *_under("float", "tracking.surface_travel_deg", *surfaces),
+        *_under("float", "tracking.surface_energy_deg2_s", *surfaces),
         *_ENDED,
         *_under("float", "saturation_s", *surfaces),
         *_JUDGED,

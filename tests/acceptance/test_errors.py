@@ -48,9 +48,9 @@ USAGE = [
     ("run", "fault-free", "--fast"),
     ("run", "fault-free", "--format", "xml"),
     ("trim", "--airspeed-mps", "fast"),
-    ("trim", "--airspeed-mps", "500"),
+    ("trim", "--airspeed-mps", "0"),
     ("sweep", "surfaces-grid", "--workers", "0"),
-    ("matrix", "--airspeed", "10"),
+    ("matrix", "--airspeed", "0"),
     ("verify", "--hours", "-1"),
     ("bench", "--rounds", "1"),
 ]

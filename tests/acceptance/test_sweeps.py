@@ -15,14 +15,25 @@ LONGEST_S = 15
 
 
 def shortened(sweep):
-    """The same sweep with two flights, or a grid of two points a key, of 15 s at most."""
+    """The same sweep with two flights, or a grid of two points a key, that end 15 s after the last fault."""
     given = {"runs": FLIGHTS} if sweep.get("sampling") != "grid" else {"vary": _coarse(sweep["vary"])}
     changed = sweep.get("set", {})
+    longest_s = LONGEST_S + max((float(at_s) for at_s in _fault_times(sweep)), default=0.0)
     return {
         **sweep,
         **given,
-        "set": {**changed, "duration_s": min(LONGEST_S, changed.get("duration_s", LONGEST_S))},
+        "set": {**changed, "duration_s": min(longest_s, changed.get("duration_s", longest_s))},
     }
+
+
+def _fault_times(sweep):
+    """When faults strike in the base that is written in the file, or in what it sets."""
+    base = sweep["base"] if isinstance(sweep["base"], dict) else {}
+    for faults in (base.get("faults", ()), sweep.get("set", {}).get("faults", ())):
+        yield from (fault["at_s"] for fault in faults)
+    for key, how in sweep["vary"].items():
+        if key.endswith(".at_s") and "uniform" in how:
+            yield max(how["uniform"])
 
 
 def _coarse(vary):

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
-from math import exp
+from math import exp, inf
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -148,9 +148,13 @@ def sensors(scenario: "Scenario", m: int, dt: float) -> tuple[np.ndarray, np.nda
 
 
 def as_document(found: list[Margin], asked: tuple[float, float]) -> dict[str, Any]:
-    """For `--format json`."""
-    rows = [{**asdict(margin), "keeps": margin.keeps(*asked)} for margin in found]
+    """For `--format json`; a margin without end is null."""
+    rows = [{**_finite(asdict(margin)), "keeps": margin.keeps(*asked)} for margin in found]
     return {"gain_margin_db": asked[0], "phase_margin_deg": asked[1], "margins": rows}
+
+
+def _finite(row: dict[str, Any]) -> dict[str, Any]:
+    return {key: None if value == inf else value for key, value in row.items()}
 
 
 def as_text(found: list[Margin], asked: tuple[float, float]) -> str:

@@ -142,23 +142,13 @@ def best_alternative(fdi, block, surface):
 
 
 @kernel
-def loss_at_most(block, surface):
-    """The log likelihood ratio a loss of this surface has at most; none where the block does not feel it."""
+def at_most(block, surface, ending):
+    """The log likelihood ratio a loss of this surface, or the end of one, has at most; 0 where the block does
+    not feel it."""
     most = 0.0
     for h in range(block.n_hypotheses):
         hypothesis = block.hypothesis[h]
-        if hypothesis.surface == surface and hypothesis.kind != ENDING:
-            most = max(most, hypothesis.at_most)
-    return most
-
-
-@kernel
-def end_at_most(block, surface):
-    """The same of the end of a loss."""
-    most = 0.0
-    for h in range(block.n_hypotheses):
-        hypothesis = block.hypothesis[h]
-        if hypothesis.surface == surface and hypothesis.kind == ENDING:
+        if hypothesis.surface == surface and (hypothesis.kind == ENDING) == ending:
             most = max(most, hypothesis.at_most)
     return most
 
@@ -178,10 +168,10 @@ def excludes(fdi, surface):
     for b in range(LATERAL, statistical.n_blocks):
         lateral = statistical.block[b]
         better = max(best_alternative(fdi, pitch, surface), best_alternative(fdi, lateral, surface))
-        worse = max(loss_at_most(pitch, surface), loss_at_most(lateral, surface))
-        ended = end_at_most(lateral, surface)
-        in_pitch = end_at_most(pitch, surface)
-        if loss_at_most(pitch, surface) > min(0.5 * statistical.naming_level, SHOWN_BEFORE * in_pitch):
+        worse = max(at_most(pitch, surface, False), at_most(lateral, surface, False))
+        ended = at_most(lateral, surface, True)
+        in_pitch = at_most(pitch, surface, True)
+        if at_most(pitch, surface, False) > min(0.5 * statistical.naming_level, SHOWN_BEFORE * in_pitch):
             ended = max(ended, in_pitch)
         part = 1.0 if exact else LEAST_PART
         if better - max(worse, ended) > statistical.naming_level and worse < part * better:

@@ -86,14 +86,9 @@ class DynamicPressure(_Sensor):
     quantum_pa: Number = number(0.0, unit="Pa", says="resolution", ge=0, le=5000)
 
 
-class AttitudeAngle(_Sensor):
+class AttitudeAngle(FlowVane):
     """Roll, pitch or yaw: a vertical or directional gyro, or integrated rates that drift away."""
 
-    si = ("noise_std_deg", "bias_deg", "quantum_deg", radians(1.0))
-
-    noise_std_deg: Number = number(0.0, unit="deg", says="standard deviation of a sample", ge=0, le=45)
-    bias_deg: Number = number(0.0, unit="deg", says="constant error", ge=-45, le=45)
-    quantum_deg: Number = number(0.0, unit="deg", says="resolution", ge=0, le=45)
     drift_deg_h: Number = number(
         0.0, unit="deg/h", says="growth of the error from the start on", ge=-3600, le=3600
     )

@@ -13,11 +13,12 @@ from beaver_ftc.errors import BadInput
 from beaver_ftc.flights.identification import regressor_names
 from beaver_ftc.flights.identify import Stretch, fit_like, fit_order, stretches_of
 from beaver_ftc.flights.model import Model
-from beaver_ftc.flights.page import COLOURS, template
+from beaver_ftc.flights.page import template
 from beaver_ftc.flights.recording import Floats
 from beaver_ftc.flights.regression import Fit, spectrum
 from beaver_ftc.flights.samples import Samples
 from beaver_ftc.flights.testing import folds, residual_rows, residuals
+from beaver_ftc.results.looks import SERIES
 
 MARK = '<meta name="generator" content="beaver-ftc identify">'
 _SHOWN_S = 40.0
@@ -83,9 +84,9 @@ def _fits(stretches: Sequence[Stretch], model: Model) -> Any:
             left = np.rad2deg(residual[inside, i])
             axis.plot(t_s, np.rad2deg(measured[:, i]), color="#888888", linewidth=2.2, label="measured")
             axis.plot(
-                t_s, np.rad2deg(measured[:, i]) - left, color=COLOURS[0], linewidth=0.9, label="predicted"
+                t_s, np.rad2deg(measured[:, i]) - left, color=SERIES[0], linewidth=0.9, label="predicted"
             )
-            axis.plot(t_s, left, color=COLOURS[1], linewidth=0.7, label="residual")
+            axis.plot(t_s, left, color=SERIES[1], linewidth=0.7, label="residual")
             axis.set_ylabel(f"{'pqr'[i]}, deg/s", fontsize=8)
             axis.tick_params(labelsize=8)
             axis.grid(color="#dddddd", linewidth=0.5)
@@ -110,9 +111,9 @@ def _spectrum(stretches: Sequence[Stretch], model: Model) -> Any:
     figure = _figure(7.5, 3.2)
     axis = figure.subplots()
     for i, name in enumerate("pqr"):
-        axis.loglog(frequency[1:], density[1:, i], color=COLOURS[i], linewidth=1.1, label=name)
+        axis.loglog(frequency[1:], density[1:, i], color=SERIES[i], linewidth=1.1, label=name)
         axis.axhline(
-            residual[:, i].var() / (0.5 * model.rate_hz), color=COLOURS[i], linewidth=0.7, linestyle=":"
+            residual[:, i].var() / (0.5 * model.rate_hz), color=SERIES[i], linewidth=0.7, linestyle=":"
         )
     axis.set_xlabel("frequency, Hz", fontsize=8)
     axis.set_ylabel("density, (rad/s)² / Hz", fontsize=8)

@@ -1,4 +1,4 @@
-"""What the pages of recorded flights share: one style, one set of colours."""
+"""What the pages of recorded flights share: one style."""
 
 from functools import cache
 from pathlib import Path
@@ -8,7 +8,6 @@ if TYPE_CHECKING:
     from jinja2 import Template
 
 _TEMPLATES = Path(__file__).parent / "templates"
-COLOURS = ("#0b5fa5", "#b5500b", "#2f7d32", "#7b3fa0", "#8a6d00", "#a0305a", "#3d7a8a", "#555555")
 
 
 @cache

@@ -8,9 +8,10 @@ import numpy as np
 
 from beaver_ftc.flights.diagnose import Rows
 from beaver_ftc.flights.model import Model
-from beaver_ftc.flights.page import COLOURS, template
+from beaver_ftc.flights.page import template
 from beaver_ftc.flights.samples import Samples
 from beaver_ftc.flights.verdict import BRIEF_S, lasting
+from beaver_ftc.results.looks import SERIES
 
 _MOST_POINTS = 6000
 
@@ -80,7 +81,7 @@ def _thin(n: int) -> slice:
 def _lines(axis: Any, t_s: np.ndarray, values: np.ndarray, names: list[str], label: str) -> None:
     kept = _thin(len(t_s))
     for i, name in enumerate(names):
-        axis.plot(t_s[kept], values[kept, i], color=COLOURS[i % len(COLOURS)], linewidth=0.7, label=name)
+        axis.plot(t_s[kept], values[kept, i], color=SERIES[i % len(SERIES)], linewidth=0.7, label=name)
     axis.set_ylabel(label, fontsize=8)
     axis.legend(loc="upper left", fontsize=7, ncols=4, framealpha=0.8)
     axis.tick_params(labelsize=8)

@@ -4,11 +4,11 @@ track."""
 from pathlib import Path
 from typing import Any
 
+from beaver_ftc.results.looks import BLUE, GREY, SERIES
 from beaver_ftc.studies.compare.trial import LAW, ORACLE, SCHEME
 
 Document = dict[str, Any]
 
-COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#8a8a8a", "#000000")
 DASHES: tuple[Any, ...] = ("-", (0, (5, 2)), (0, (2, 2)), (0, (6, 2, 1, 2)), (0, (1, 1)))
 MARKS = "osD^vPX*"
 
@@ -29,7 +29,7 @@ def write_figure(document: Document, path: Path) -> None:
 
 
 def _look(index: int) -> dict[str, Any]:
-    return {"color": COLOURS[index % len(COLOURS)], "linestyle": DASHES[index % len(DASHES)]}
+    return {"color": SERIES[index % len(SERIES)], "linestyle": DASHES[index % len(DASHES)]}
 
 
 def _draw_curves(rate: Any, delay: Any, part: Document) -> None:
@@ -57,7 +57,7 @@ def _draw_ratios(axis: Any, part: Document) -> None:
     rows = [row for row in part["lines"] if row["scheme"] == SCHEME and row["law"] != ORACLE]
     for place, row in enumerate(rows):
         median, most = row["ratio_median"], row["ratio_90"]
-        colour = COLOURS[0] if row["law"] == LAW else COLOURS[6]
+        colour = BLUE if row["law"] == LAW else GREY
         if median is not None:
             axis.plot([median, median if most is None else most], [place, place], color=colour, linewidth=3)
             axis.plot(median, place, "o", color=colour)

@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from beaver_ftc.studies.compare.figure import COLOURS, DASHES, MARKS
+from beaver_ftc.results.looks import SERIES
+from beaver_ftc.studies.compare.figure import DASHES, MARKS
 from beaver_ftc.studies.power.document import JUDGED_S
 from beaver_ftc.studies.power.tally import Row, grouped, limit, summary
 from beaver_ftc.studies.power.text import TOLD, title_of
@@ -129,7 +130,7 @@ def _draw(panel: Any, rows: Sequence[Row], schemes: Sequence[str]) -> None:
         panel.plot(
             *zip(*points, strict=True) if points else ([], []),
             label=scheme,
-            color=COLOURS[place % len(COLOURS)],
+            color=SERIES[place % len(SERIES)],
             linestyle=DASHES[place % len(DASHES)],
             marker=MARKS[place % len(MARKS)],
             markersize=5,

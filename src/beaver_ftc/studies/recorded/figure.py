@@ -3,10 +3,13 @@
 from pathlib import Path
 from typing import Any
 
+from beaver_ftc.results.looks import SERIES
+
 Document = dict[str, Any]
 
-_COLOURS = ("#0b5fa5", "#b5500b", "#2f7d32", "#7b3fa0", "#555555", "#8a6d00")
-_MARKS = ("o", "s", "^", "D", "x", "P")
+_MARKS = "os^DXPv<>*ph"
+_HATCHES = ("", "//", "..")  # where the colours begin again
+_GROUP = 0.85  # the width that all methods share at one tick
 _LATEST_S = 30.0
 
 
@@ -35,8 +38,8 @@ def _events(axis: Any, part: Document) -> None:
         mine = {one["left_out"]: one for one in part["flights"] if one["method"] == method}
         delays = [mine[name]["delay_s"] for name in failures]
         heights = [_LATEST_S if delay is None else min(delay, _LATEST_S) for delay in delays]
-        places = [k + 0.12 * (i - (len(methods) - 1) / 2) for k in range(len(failures))]
-        axis.plot(places, heights, _MARKS[i % 6], color=_COLOURS[i % 6], markersize=6, label=method)
+        places = [k + _offset(i, len(methods)) for k in range(len(failures))]
+        axis.plot(places, heights, _mark(i), color=_colour(i), markersize=6, label=method)
     named = {one["left_out"]: one["failure"] for one in part["flights"]}
     axis.set_xticks(range(len(failures)), [named[name].replace("+", "\n+ ") for name in failures])
     axis.set_ylabel("delay, s", fontsize=8)
@@ -51,10 +54,28 @@ def _labels(axis: Any, part: Document) -> None:
     keys = {"classes": "class", "healthy_or_faulty": "healthy or faulty", "side": "side"}
     rows = [*part["rows"], *part["published"]]
     for i, row in enumerate(rows):
-        places = [k + 0.14 * (i - (len(rows) - 1) / 2) for k, key in enumerate(keys) if key in row]
+        places = [k + _offset(i, len(rows)) for k, key in enumerate(keys) if key in row]
         shares = [row[key] for key in keys if key in row]
-        axis.bar(places, shares, width=0.12, color=_COLOURS[i % 6], label=row["method"])
+        look = {
+            "color": _colour(i),
+            "hatch": _HATCHES[i // len(SERIES) % len(_HATCHES)],
+            "edgecolor": "white",
+        }
+        axis.bar(places, shares, width=0.9 * _GROUP / len(rows), label=row["method"], **look)
     axis.set_xticks(range(len(keys)), list(keys.values()))
     axis.set_ylabel("share of rows right", fontsize=8)
     axis.set_ylim(0, 1)
     axis.grid(axis="y", color="#dddddd", linewidth=0.5)
+
+
+def _offset(i: int, methods: int) -> float:
+    """Where the i-th of so many methods stands beside its tick."""
+    return _GROUP / methods * (i - (methods - 1) / 2)
+
+
+def _colour(i: int) -> str:
+    return SERIES[i % len(SERIES)]
+
+
+def _mark(i: int) -> str:
+    return _MARKS[i % len(_MARKS)]

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from beaver_ftc.documents.problems import ScenarioError
 from beaver_ftc.errors import BadInput
 from beaver_ftc.scenario.loader import MAX_BYTES, load_scenario, load_text
-from beaver_ftc.scenario.problems import ScenarioError
 
 LINE = re.compile(r"^[^:\n]+:\d+: \S[^:\n]*: [^\n]+allowed: [^\n]+$")
 
@@ -223,7 +223,7 @@ def test_a_file_of_100_mb_is_refused_unread(tmp_path):
 def test_a_file_that_grows_while_it_is_read_is_refused(tmp_path, monkeypatch):
     path = tmp_path / "grows.yaml"
     path.write_bytes(b"#" * (MAX_BYTES + 1))
-    monkeypatch.setattr("beaver_ftc.scenario.files._check_kind_and_size", lambda status, limit: None)
+    monkeypatch.setattr("beaver_ftc.documents.files._check_kind_and_size", lambda status, limit: None)
     assert "is too large" in refused(path)
 
 

@@ -5,8 +5,8 @@ import re
 
 import pytest
 
+from beaver_ftc.documents.problems import ScenarioError
 from beaver_ftc.scenario.loader import load_scenario, load_text
-from beaver_ftc.scenario.problems import ScenarioError
 
 GOOD = "t_s,rate_deg_s\n0,0\n1,2\n"
 

@@ -26,7 +26,7 @@ def command(
 
     Prints an address of this machine that works once; Ctrl-C ends it.
     """
-    from beaver_ftc.live.serve import serve
+    from beaver_ftc.integrations.live.serve import serve
 
     serve(lambda: _scenario(scenario, aircraft), out, port, lambda address: _say(address, open_browser))
 

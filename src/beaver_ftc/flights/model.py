@@ -8,14 +8,14 @@ from pathlib import Path
 import numpy as np
 from pydantic import Field
 
+from beaver_ftc.documents.base import Number, Section, Whole
+from beaver_ftc.documents.document import Problem
+from beaver_ftc.documents.files import UnreadableError, read_text
+from beaver_ftc.documents.problems import ScenarioError
 from beaver_ftc.errors import SimulationFailed
 from beaver_ftc.flights.recording import Floats
 from beaver_ftc.flights.vehicle import Vehicle
-from beaver_ftc.scenario.base import Number, Section, Whole
-from beaver_ftc.scenario.document import Problem
-from beaver_ftc.scenario.files import UnreadableError, read_text
 from beaver_ftc.scenario.loader import parse_document, validate
-from beaver_ftc.scenario.problems import ScenarioError
 
 _MAX_BYTES = 20_000_000
 

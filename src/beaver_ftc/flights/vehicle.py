@@ -10,13 +10,13 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
+from beaver_ftc.documents.base import Conflict, Number, Section, number, refuse
+from beaver_ftc.documents.document import Problem
+from beaver_ftc.documents.files import UnreadableError, read_text
+from beaver_ftc.documents.problems import ScenarioError
 from beaver_ftc.errors import suggestion
-from beaver_ftc.scenario.base import Conflict, Number, Section, number, refuse
 from beaver_ftc.scenario.builtin import looks_like_a_path
-from beaver_ftc.scenario.document import Problem
-from beaver_ftc.scenario.files import UnreadableError, read_text
 from beaver_ftc.scenario.loader import parse_document, validate
-from beaver_ftc.scenario.problems import ScenarioError
 
 _MAX_BYTES = 1_000_000
 _FOLDER = Path(__file__).parent / "vehicles"

@@ -70,8 +70,8 @@ def _is_asked_for(path: Path, config: pytest.Config) -> bool:
     """
     if not config.getoption("--beaver"):
         return False
+    from beaver_ftc.documents.problems import ScenarioError
     from beaver_ftc.scenario.loader import parse_document, read_file
-    from beaver_ftc.scenario.problems import ScenarioError
 
     try:
         data = parse_document(read_file(path, str(path)), str(path)).data

@@ -8,8 +8,8 @@ from pydantic_core import CoreSchema
 
 from beaver_ftc.aircraft import load
 from beaver_ftc.aircraft.question import in_question
+from beaver_ftc.documents.base import Number, Section, number, refuse
 from beaver_ftc.errors import suggestion
-from beaver_ftc.scenario.base import Number, Section, number, refuse
 
 
 class ActuatorDynamics(Section):

@@ -5,7 +5,7 @@ from typing import Any, Self
 
 from pydantic import Field, model_validator
 
-from beaver_ftc.scenario.base import Conflict, Flag, Number, Section, number, refuse
+from beaver_ftc.documents.base import Conflict, Flag, Number, Section, number, refuse
 
 MAX_LEGS = 100
 _LATEST_S = 360_000.0

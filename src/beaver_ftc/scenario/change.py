@@ -4,7 +4,7 @@ from typing import Annotated, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
-from beaver_ftc.scenario.base import Number, Section, number, refuse
+from beaver_ftc.documents.base import Number, Section, number, refuse
 from beaver_ftc.scenario.control import known_law
 from beaver_ftc.scenario.diagnosis import can_be_bounded, known_scheme
 from beaver_ftc.scenario.sensors import Sensors

@@ -8,7 +8,7 @@ from itertools import pairwise
 from math import isfinite
 from typing import Any, NamedTuple
 
-from beaver_ftc.scenario.base import Conflict
+from beaver_ftc.documents.base import Conflict
 
 DURATION_S = 30.0
 RATE_HZ = 100.0

@@ -4,8 +4,8 @@ from typing import Annotated, Self
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
+from beaver_ftc.documents.base import refuse
 from beaver_ftc.plugins import LAWS, refusal
-from beaver_ftc.scenario.base import refuse
 
 
 def known_law(name: str) -> str:

@@ -5,9 +5,9 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, Strict, field_validator, model_validator
 
 from beaver_ftc.aircraft.question import in_question
+from beaver_ftc.documents.base import refuse
 from beaver_ftc.errors import suggestion
 from beaver_ftc.plugins import DETECTORS, refusal
-from beaver_ftc.scenario.base import refuse
 from beaver_ftc.scenario.sensors import Sensors
 
 MAX_POLES = 6  # of the bank of detection filters, the published one included

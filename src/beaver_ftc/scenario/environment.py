@@ -5,7 +5,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
-from beaver_ftc.scenario.base import Conflict, Number, Section, number, refuse
+from beaver_ftc.documents.base import Conflict, Number, Section, number, refuse
 
 MAX_GUSTS = 100
 Wind = Annotated[Number, Field(ge=-100, le=100)]

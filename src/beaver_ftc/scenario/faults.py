@@ -4,7 +4,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
-from beaver_ftc.scenario.base import Conflict, Number, Section, number, order_conflicts, refuse
+from beaver_ftc.documents.base import Conflict, Number, Section, number, order_conflicts, refuse
 from beaver_ftc.scenario.names import Actuator
 from beaver_ftc.scenario.sensor_faults import AnySensorFault, SensorFault
 

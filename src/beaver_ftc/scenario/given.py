@@ -8,17 +8,17 @@ from os import PathLike
 from pathlib import Path
 from typing import Any, TypeVar
 
+from beaver_ftc.documents.base import Section
+from beaver_ftc.documents.document import Document, Problem
+from beaver_ftc.documents.problems import ScenarioError
+from beaver_ftc.documents.validation import validate
 from beaver_ftc.errors import BadInput
-from beaver_ftc.scenario.base import Section
 from beaver_ftc.scenario.change import Change
 from beaver_ftc.scenario.changes import plain
-from beaver_ftc.scenario.document import Document, Problem
 from beaver_ftc.scenario.environment import Gust
 from beaver_ftc.scenario.faults import Fault
 from beaver_ftc.scenario.loader import load_scenario, validate_scenario
-from beaver_ftc.scenario.problems import ScenarioError
 from beaver_ftc.scenario.schema import Scenario
-from beaver_ftc.scenario.validation import validate
 
 ScenarioLike = Scenario | str | PathLike[str] | Mapping[str, Any]
 

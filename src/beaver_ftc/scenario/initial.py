@@ -8,7 +8,7 @@ from pydantic import create_model
 
 from beaver_ftc.aircraft import Aircraft, load
 from beaver_ftc.aircraft.question import in_question
-from beaver_ftc.scenario.base import Number, Section, number
+from beaver_ftc.documents.base import Number, Section, number
 
 
 class Initial(Section):

@@ -17,9 +17,9 @@ from pydantic import (
 
 from beaver_ftc.aircraft import DEFAULT, Aircraft, UnknownAircraft, load
 from beaver_ftc.aircraft.question import asked, named
+from beaver_ftc.documents.base import Flag, Number, Section, Whole, number, refuse
 from beaver_ftc.scenario.actuators import Actuators
 from beaver_ftc.scenario.autopilot import Autopilot
-from beaver_ftc.scenario.base import Flag, Number, Section, Whole, number, refuse
 from beaver_ftc.scenario.change import Change
 from beaver_ftc.scenario.consistency import DURATION_S, RATE_HZ, Outline, conflicts
 from beaver_ftc.scenario.control import ControlConfig

@@ -7,7 +7,7 @@ from pydantic import Field, GetJsonSchemaHandler, model_validator
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
-from beaver_ftc.scenario.base import Number, Section, number
+from beaver_ftc.documents.base import Number, Section, number
 
 
 class _Sensor(Section):

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ConfigDict, Field, ValidationInfo, model_validator
 
-from beaver_ftc.scenario.base import Number, Section, number, order_conflicts, refuse
+from beaver_ftc.documents.base import Number, Section, number, order_conflicts, refuse
 from beaver_ftc.scenario.table import MAX_ROWS, check_table, read_column
 
 Samples = NDArray[np.float64]

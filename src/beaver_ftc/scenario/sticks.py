@@ -7,10 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from beaver_ftc.aircraft.question import asked
+from beaver_ftc.documents.document import Document
 from beaver_ftc.errors import BadInput
 from beaver_ftc.scenario.changes import aircraft_of
 from beaver_ftc.scenario.consistency import OF_A_FAULT
-from beaver_ftc.scenario.document import Document
 from beaver_ftc.scenario.loader import validate_scenario
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.table import MAX_ROWS

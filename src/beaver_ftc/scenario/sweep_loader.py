@@ -9,17 +9,17 @@ from typing import Any
 
 from beaver_ftc.aircraft import Aircraft, load
 from beaver_ftc.aircraft.question import asked
+from beaver_ftc.documents.base import Location
+from beaver_ftc.documents.document import Document, Problem
+from beaver_ftc.documents.keys import UnusableKeyError, parse_key, with_values
+from beaver_ftc.documents.problems import ScenarioError, key_path
+from beaver_ftc.documents.validation import validate
 from beaver_ftc.errors import suggestion
 from beaver_ftc.paths import data_root, inside
-from beaver_ftc.scenario.base import Location
 from beaver_ftc.scenario.builtin import builtin_names, builtin_path, looks_like_a_path
-from beaver_ftc.scenario.document import Document, Problem
-from beaver_ftc.scenario.keys import UnusableKeyError, parse_key, with_values
 from beaver_ftc.scenario.loader import load_scenario, parse_document, read_file
-from beaver_ftc.scenario.problems import ScenarioError, key_path
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.sweep_schema import SweepFile, Variation
-from beaver_ftc.scenario.validation import validate
 
 _DERIVED = {"name": "follows from the sweep's name", "seed": "follows from the sweep's seed"}
 

@@ -4,7 +4,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import ConfigDict, Field, model_validator
 
-from beaver_ftc.scenario.base import Conflict, Number, Section, Whole, refuse
+from beaver_ftc.documents.base import Conflict, Number, Section, Whole, refuse
 from beaver_ftc.scenario.schema import NAME_PATTERN
 
 MAX_RUNS = 10_000_000

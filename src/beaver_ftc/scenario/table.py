@@ -7,9 +7,9 @@ from math import isfinite
 from pathlib import Path
 from typing import Any
 
+from beaver_ftc.documents.base import refuse
+from beaver_ftc.documents.files import UnreadableError, read_text
 from beaver_ftc.paths import inside
-from beaver_ftc.scenario.base import refuse
-from beaver_ftc.scenario.files import UnreadableError, read_text
 
 MAX_ROWS = 20_000
 _MAX_BYTES = 2_000_000

@@ -1,7 +1,7 @@
 import pytest
 
-from beaver_ftc.scenario.keys import UnusableKeyError, parse_key, with_values
-from beaver_ftc.scenario.problems import ScenarioError
+from beaver_ftc.documents.keys import UnusableKeyError, parse_key, with_values
+from beaver_ftc.documents.problems import ScenarioError
 from beaver_ftc.scenario.sweep_loader import builtin_sweeps, is_sweep, load_sweep, load_sweep_text
 
 HEAD = "base: elevator-partial-loss\nruns: 3\nvary:\n  "

@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 
 from beaver_ftc.aircraft.schema import Interval
+from beaver_ftc.documents.base import Number, Section, number
+from beaver_ftc.documents.document import Problem
+from beaver_ftc.documents.files import UnreadableError, read_text
+from beaver_ftc.documents.problems import ScenarioError
+from beaver_ftc.documents.validation import parse_document, validate
 from beaver_ftc.plant import instrumented
 from beaver_ftc.plant.adapter import bare, translated
-from beaver_ftc.scenario.base import Number, Section, number
-from beaver_ftc.scenario.document import Problem
-from beaver_ftc.scenario.files import UnreadableError, read_text
-from beaver_ftc.scenario.problems import ScenarioError
-from beaver_ftc.scenario.validation import parse_document, validate
 
 KG_PER_SLUG = 0.45359237 * 9.80665 / 0.3048
 KG_M2 = KG_PER_SLUG * 0.3048**2

@@ -35,8 +35,8 @@ def variant_of(scenario: "Scenario", text: str) -> "Scenario":
 def _validated(data: dict[str, Any], text: str) -> "Scenario":
     import yaml
 
+    from beaver_ftc.documents.problems import ScenarioError, key_path
     from beaver_ftc.scenario.loader import load_text
-    from beaver_ftc.scenario.problems import ScenarioError, key_path
 
     try:
         return load_text(yaml.safe_dump(data))

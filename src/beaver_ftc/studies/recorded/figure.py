@@ -65,6 +65,7 @@ def _labels(axis: Any, part: Document) -> None:
     axis.set_xticks(range(len(keys)), list(keys.values()))
     axis.set_ylabel("share of rows right", fontsize=8)
     axis.set_ylim(0, 1)
+    axis.set_axisbelow(True)
     axis.grid(axis="y", color="#dddddd", linewidth=0.5)
 
 

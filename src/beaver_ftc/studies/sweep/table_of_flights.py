@@ -10,10 +10,10 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 from beaver_ftc.aircraft import question
+from beaver_ftc.documents.document import Document
 from beaver_ftc.errors import BadInput
 from beaver_ftc.results.frame import units
 from beaver_ftc.scenario.changes import plain
-from beaver_ftc.scenario.document import Document
 from beaver_ftc.scenario.given import ScenarioLike, load
 from beaver_ftc.scenario.sweep_loader import Sweep, validate_sweep
 

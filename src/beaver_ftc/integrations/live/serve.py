@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from beaver_ftc.errors import BadInput, SimulationFailed
-from beaver_ftc.live.words import BAD_INPUT, EVERYONE, MAX_BYTES
+from beaver_ftc.integrations.live.words import BAD_INPUT, EVERYONE, MAX_BYTES
 
 if TYPE_CHECKING:
     from beaver_ftc.scenario.schema import Scenario
@@ -77,7 +77,7 @@ def _fly(connection: Connection, out: str) -> None:
     """What the process does; the server itself imports nothing of it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the server ends it
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    from beaver_ftc.live import flying
+    from beaver_ftc.integrations.live import flying
 
     flying.main(connection, out)
 
@@ -88,9 +88,9 @@ async def _serve(
     """Run the server; returns why it ended, kind and words, None for a signal."""
     import uvicorn
 
-    from beaver_ftc.live.gate import Gate
-    from beaver_ftc.live.pages import Pages
-    from beaver_ftc.live.server import application
+    from beaver_ftc.integrations.live.gate import Gate
+    from beaver_ftc.integrations.live.pages import Pages
+    from beaver_ftc.integrations.live.server import application
 
     gate, pages = Gate(listener.getsockname()[1]), Pages()
     app = application(gate, pages, _asker(pipe))

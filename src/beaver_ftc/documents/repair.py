@@ -8,8 +8,8 @@ from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any
 
-from beaver_ftc.scenario.base import Location
-from beaver_ftc.scenario.document import Document, Problem
+from beaver_ftc.documents.base import Location
+from beaver_ftc.documents.document import Document, Problem
 
 _MEANT = re.compile(r"did you mean ([^?\s]+)\?")
 _UNKNOWN_KEY = "unknown key"

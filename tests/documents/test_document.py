@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from beaver_ftc.scenario.document import MAX_DEPTH, MalformedDocumentError, parse, scalar
+from beaver_ftc.documents.document import MAX_DEPTH, MalformedDocumentError, parse, scalar
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 
 import yaml
 
-from beaver_ftc.scenario.base import Location
+from beaver_ftc.documents.base import Location
 
 MAX_NODES = 400_000
 MAX_DEPTH = 32

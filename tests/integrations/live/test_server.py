@@ -13,7 +13,7 @@ from live_cockpit import browser, ended, started
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
-from beaver_ftc.live import messages
+from beaver_ftc.integrations.live import messages
 
 
 @pytest.fixture(scope="module")

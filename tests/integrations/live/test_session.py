@@ -7,8 +7,8 @@ import pytest
 
 import beaver_ftc as bf
 from beaver_ftc.errors import BadInput
-from beaver_ftc.live import messages
-from beaver_ftc.live.session import Session, encode, level_turn
+from beaver_ftc.integrations.live import messages
+from beaver_ftc.integrations.live.session import Session, encode, level_turn
 
 LOSS = {"type": "loss_of_effectiveness", "actuator": "elevator", "magnitude": 0.4}
 

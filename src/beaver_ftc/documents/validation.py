@@ -8,10 +8,10 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
-from beaver_ftc.scenario.base import Conflict
-from beaver_ftc.scenario.document import MAX_PROBLEMS, Document, MalformedDocumentError, Problem, parse
-from beaver_ftc.scenario.problems import ScenarioError, problems_of
-from beaver_ftc.scenario.repair import repaired
+from beaver_ftc.documents.base import Conflict
+from beaver_ftc.documents.document import MAX_PROBLEMS, Document, MalformedDocumentError, Problem, parse
+from beaver_ftc.documents.problems import ScenarioError, problems_of
+from beaver_ftc.documents.repair import repaired
 
 _Model = TypeVar("_Model", bound=BaseModel)
 

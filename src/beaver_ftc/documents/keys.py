@@ -3,8 +3,8 @@
 import re
 from typing import Any
 
-from beaver_ftc.scenario.base import Location
-from beaver_ftc.scenario.problems import key_path
+from beaver_ftc.documents.base import Location
+from beaver_ftc.documents.problems import key_path
 
 _PART = re.compile(r"(?:^|\.)([^.\[\]]+)|\[(\d{1,6})\]")
 _IDEAL = "ideal"  # the preset that stands for a section with nothing in it

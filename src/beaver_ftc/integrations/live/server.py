@@ -16,9 +16,9 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from beaver_ftc.errors import BadInput
-from beaver_ftc.live import messages
-from beaver_ftc.live.gate import Gate
-from beaver_ftc.live.pages import Pages
+from beaver_ftc.integrations.live import messages
+from beaver_ftc.integrations.live.gate import Gate
+from beaver_ftc.integrations.live.pages import Pages
 
 STATIC = Path(__file__).parent / "static"
 MAX_PAGES = 20

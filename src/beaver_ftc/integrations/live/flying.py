@@ -13,10 +13,10 @@ from pathlib import Path
 from typing import Any
 
 from beaver_ftc.errors import BadInput, BeaverFtcError
-from beaver_ftc.live import messages
-from beaver_ftc.live.pace import Pace
-from beaver_ftc.live.session import NO_STICK, Session, encode
-from beaver_ftc.live.words import BAD_INPUT, EVERYONE
+from beaver_ftc.integrations.live import messages
+from beaver_ftc.integrations.live.pace import Pace
+from beaver_ftc.integrations.live.session import NO_STICK, Session, encode
+from beaver_ftc.integrations.live.words import BAD_INPUT, EVERYONE
 
 STATE_EVERY = 15  # ticks
 

@@ -9,9 +9,9 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from beaver_ftc.documents.base import Location
+from beaver_ftc.documents.document import MAX_PROBLEMS, Document, Problem
 from beaver_ftc.errors import BadInput, suggestion
-from beaver_ftc.scenario.base import Location
-from beaver_ftc.scenario.document import MAX_PROBLEMS, Document, Problem
 
 WHOLE_FILE = "(file)"
 _SHOWN = 48

@@ -5,7 +5,7 @@ import json
 import pytest
 
 from beaver_ftc.errors import BadInput
-from beaver_ftc.live import messages
+from beaver_ftc.integrations.live import messages
 
 
 def test_a_request_keeps_its_number_and_values():

@@ -10,22 +10,63 @@ from typing import Any
 
 import gymnasium
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from beaver_ftc.aircraft import load as aircraft
-from beaver_ftc.design.model import AIRSPEED, ALPHA, BETA
+from beaver_ftc.errors import BadInput
+from beaver_ftc.loop.agent import BESIDE_SURFACES, LARGEST, LOOK, act, cost, observe
+from beaver_ftc.loop.direct import direct
 from beaver_ftc.results.simulation import Simulation
 from beaver_ftc.scenario.given import ScenarioLike, load
+from beaver_ftc.scenario.schema import Scenario
 
 ID = "beaver_ftc/Beaver-v0"
-RATE_RAD_S = 0.1  # tracking error that costs one unit of reward a second
 DEPARTURE = -100.0
-AIRSPEED_MPS = 10.0
-ANGLE_RAD = 0.1
-LARGEST = 100.0  # of an observation: a departure is at 60
 NOBODY = {"control.law": "nominal", "control.options": {}}  # the surfaces are the agent's
 
 Vector = NDArray[np.float64]
+
+
+class Episode(Simulation):
+    """A flight of an agent, frame 0 flown: its actions, its observations, what its steps cost."""
+
+    def __init__(self, scenario: Scenario) -> None:
+        super().__init__(scenario, log=False)
+
+    def _make_ready(self) -> None:
+        super()._make_ready()
+        self._cost = 0.0
+        frames, log = self._loop.frames, self._loop.log
+        self._look = np.zeros(1, LOOK)
+        self._look["measured"], self._look["model"] = (
+            self.columns.index(f"p_{what}_rad_s") for what in ("measured", "model")
+        )
+        self._size = int(frames["held_rad"].size)
+        seen = np.empty(0)
+        self._acts = direct(act, frames, seen)
+        self._costs = direct(cost, frames, log, self._look)
+        self._observes = direct(observe, frames, log, self._look, seen)
+        self._begin()
+        for name, value in zip(("alpha", "beta", "airspeed"), self.measured.y, strict=False):
+            self._look[name] = value
+
+    def act(self, action: ArrayLike, frames: int) -> float:
+        """Fly so many frames, or to the end, with an action (surfaces,) held; returns what they cost."""
+        shares = np.ascontiguousarray(action, np.float64)
+        if shares.shape != (self._size,) or not self._acts(self._loop.frames, shares):
+            raise BadInput(f"action: {action!r:.80} is not usable, allowed: {self._size} finite numbers")
+        self._cost, self._by_hand = 0.0, True
+        self._fly_to(min(self._next + frames, self._loop.n_frames))
+        return self._cost
+
+    def _note(self, rows: Vector) -> None:
+        self._cost += self._costs(self._loop.frames, rows, self._look)
+
+    def observation(self) -> Vector:
+        """What is seen of the frame just flown, (12 + surfaces,); an array of its own."""
+        seen = np.empty(BESIDE_SURFACES + self._size)
+        self._observes(self._loop.frames, self._loop.log, self._look, seen)
+        return seen
 
 
 class BeaverEnv(gymnasium.Env[Vector, Vector]):
@@ -46,77 +87,48 @@ class BeaverEnv(gymnasium.Env[Vector, Vector]):
 
     def __init__(self, scenario: ScenarioLike = "fault-free", frames_per_step: int = 1) -> None:
         self.scenario = load(scenario).with_(NOBODY)
+        if not isinstance(frames_per_step, int) or frames_per_step < 1:
+            raise BadInput(
+                f"frames_per_step: {frames_per_step!r} is out of range, allowed: a whole number of at least 1"
+            )
         self.frames_per_step = frames_per_step
         surfaces = len(aircraft(self.scenario.aircraft).surfaces)
+        seen = (BESIDE_SURFACES + surfaces,)
         self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (surfaces,), np.float64)
-        self.observation_space = gymnasium.spaces.Box(-LARGEST, LARGEST, (12 + surfaces,), np.float64)
-        self._sim: Simulation | None = None
-        self._seed: int | None = None
+        self.observation_space = gymnasium.spaces.Box(-LARGEST, LARGEST, seen, np.float64)
+        self._episode: Episode | None = None
+        self._seeded = False
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Vector, dict[str, Any]]:
-        """Put the aircraft in trim; a seed replaces the scenario's."""
+        """Put the aircraft in trim. A seed replaces the scenario's, and those of the episodes to come follow
+        from it; without any they all have the scenario's."""
         super().reset(seed=seed)
-        if self._sim is not None and seed == self._seed:
-            self._sim.reset()  # the aircraft is not loaded again
+        self._seeded |= seed is not None
+        if seed is None and self._seeded:
+            seed = int(self.np_random.integers(2**31))
+        if self._episode is None:
+            self._episode = Episode(self.scenario if seed is None else self.scenario.with_({"seed": seed}))
         else:
-            scenario = self.scenario if seed is None else self.scenario.with_({"seed": seed})
-            self._sim, self._seed = Simulation(scenario, log=False), seed
-        sim = self._sim
-        self._deflections = sim.trim_rad
-        self._trim_y = sim.measured.y
-        self._columns = _places(sim.columns)
-        return self._observation(sim), {}
+            self._episode.reset(seed=seed)  # the aircraft is not loaded again
+        return self._episode.observation(), {}
 
     def step(self, action: Vector) -> tuple[Vector, float, bool, bool, dict[str, Any]]:
         """Command the surfaces, fly, look."""
-        sim = self._sim
-        if sim is None:
+        episode = self._episode
+        if episode is None:
             raise gymnasium.error.ResetNeeded("call reset() before step()")
-        self._deflections = _deflections(sim, np.asarray(action, dtype=float))
-        flown = sim.frames
-        sim.step(self._deflections, frames=self.frames_per_step)
-        rows = sim.rows[-(sim.frames - flown) :]
-        over = sim.done and not sim.departed
-        info = {"metrics": sim.land().metrics} if sim.done else {}
-        return self._observation(sim), self._reward(rows, sim), sim.departed, over, info
-
-    def _reward(self, rows: Vector, sim: Simulation) -> float:
-        rate, wanted = (rows[:, places] for places in self._columns)
-        errors = (wanted - rate) / RATE_RAD_S
-        return -float((errors**2).sum()) / sim.rate_hz + (DEPARTURE if sim.departed else 0.0)
-
-    def _observation(self, sim: Simulation) -> Vector:
-        y, trim_y = sim.measured.y, self._trim_y
-        rate, wanted = (sim.values[places] for places in self._columns)
-        seen = np.concatenate(
-            (
-                rate / RATE_RAD_S,
-                (y[[ALPHA, BETA]] - trim_y[[ALPHA, BETA]]) / ANGLE_RAD,
-                [(y[AIRSPEED] - trim_y[AIRSPEED]) / AIRSPEED_MPS],
-                wanted / RATE_RAD_S,
-                (wanted - rate) / RATE_RAD_S,
-                (self._deflections - sim.trim_rad) / ANGLE_RAD,
-            )
-        )
-        clipped: Vector = np.clip(seen, -LARGEST, LARGEST)
-        return clipped
+        reward = -episode.act(action, self.frames_per_step)
+        if not episode.done:
+            return episode.observation(), reward, False, False, {}
+        departed = episode.departed
+        info = {"metrics": episode.land().metrics}
+        return episode.observation(), reward + DEPARTURE * departed, departed, not departed, info
 
 
-def _places(columns: tuple[str, ...]) -> tuple[list[int], list[int]]:
-    """Where a row of the log has the measured rates and the reference model's."""
-    names = ([f"{axis}_{what}_rad_s" for axis in "pqr"] for what in ("measured", "model"))
-    measured, model = ([columns.index(name) for name in axes] for axes in names)
-    return measured, model
-
-
-def _deflections(sim: Simulation, action: Vector) -> Vector:
-    """From an action in [-1, 1] to deflections (surfaces,) rad: 0 is the trim, -1 and 1 are the stops."""
-    trim, (low, high) = sim.trim_rad, sim.travel_rad
-    action = np.clip(action, -1.0, 1.0)
-    wanted: Vector = trim + np.where(action < 0.0, action * (trim - low), action * (high - trim))
-    return wanted
-
-
-gymnasium.register(id=ID, entry_point="beaver_ftc.integrations.gym:BeaverEnv")
+gymnasium.register(
+    id=ID,
+    entry_point="beaver_ftc.integrations.gym:BeaverEnv",
+    vector_entry_point="beaver_ftc.integrations.gym_vector:BeaverVectorEnv",
+)

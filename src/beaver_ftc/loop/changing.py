@@ -167,8 +167,6 @@ def take_instruments(instruments: np.void, new: np.void) -> None:
 def take_plugins(loop: Any, plugins: PluginFrame | None) -> None:
     """Fly on with these plug-ins; one that was there before has its last verdict still."""
     before = loop.plugin_frame
-    if plugins is not None and before is not None:
-        plugins.held_rad = before.held_rad
-        if plugins.detector is before.detector:
-            plugins.verdict = before.verdict
+    if plugins is not None and before is not None and plugins.detector is before.detector:
+        plugins.verdict = before.verdict
     loop.fly_with(plugins)

@@ -17,11 +17,13 @@ import numpy as np
 
 from beaver_ftc.compiled import kernel
 from beaver_ftc.control import authority, law, reference_model
+from beaver_ftc.control.accommodation import accommodate
 from beaver_ftc.control.oracle import true_faults_dtype, true_mode
 from beaver_ftc.control.outer.autopilot import judge, steer
 from beaver_ftc.control.outer.state import AUTOPILOT
 from beaver_ftc.control.state import ORACLE, control_dtype
 from beaver_ftc.control.supervisor import SUPERVISOR, mode_from, supervise
+from beaver_ftc.design.actuators import move
 from beaver_ftc.diagnosis import scheme
 from beaver_ftc.diagnosis.belief import belief_dtype, follow_command, look_back, respond
 from beaver_ftc.diagnosis.instruments import attend
@@ -43,7 +45,7 @@ from beaver_ftc.plant.sensing import (
     truth_dtype,
 )
 
-__all__ = ["FLYING", "NOT_FINITE", "fly_frame", "fly_on", "frame_dtype", "look_inside"]
+__all__ = ["FLYING", "NOT_FINITE", "fly_frame", "fly_on", "frame_dtype", "hold", "look_inside"]
 
 
 # What the log has columns for, whatever changes in flight: estimators and statistical tests, the engine.
@@ -61,6 +63,7 @@ def frame_dtype(n: int) -> np.dtype:
         ("belief", belief_dtype(n)), ("fdi", diagnosis_dtype(n)), ("verdict", verdict_dtype(n)),
         ("faults", true_faults_dtype(n)), ("supervisor", SUPERVISOR), ("control", control_dtype(n)),
         ("autopilot", AUTOPILOT),
+        ("held", "i8"), ("held_rad", "f8", (n,)),  # whether another than the law commands, and what
         ("accounts", accounts_dtype(n)), ("departed", "i8"),
     ]  # fmt: skip
     return np.dtype(fields, align=True)
@@ -141,8 +144,18 @@ def decide(frame):
 
 
 @kernel
+def take_command(frame, deflections):
+    """A command (n,) rad from outside, within the travel of each surface."""
+    accommodate(frame.control, frame.fdi, frame.belief, frame.measured, frame.faults)
+    law.take_command(frame.control, deflections)
+
+
+@kernel
 def command(frame):
-    """The built-in law."""
+    """The built-in law; or whoever commands in its place."""
+    if frame.held:
+        take_command(frame, frame.held_rad)
+        return
     mode = frame.supervisor.mode
     law.command(frame.control, frame.fdi, frame.belief, frame.measured, frame.faults, mode, frame.t)
 
@@ -171,6 +184,18 @@ def finish(frame, reference, row):
     hand_over(frame.truth, belief.commanded, control.power)
     frame.k += 1
     frame.row += 1
+
+
+@kernel
+def hold(frames):
+    """Command frame.held_rad in the law's place, from the frame just flown on: nothing has moved since."""
+    frame = frames[0]
+    belief = frame.belief
+    frame.held = 1
+    belief.commanded[:] = frame.held_rad
+    belief.u[:] = belief.u_then
+    move(belief.actuators, belief.commanded, belief.u)
+    hand_over(frame.truth, belief.commanded, frame.control.power)
 
 
 @kernel

@@ -9,7 +9,6 @@ import numpy as np
 from beaver_ftc.control.laws.setup import set_up
 from beaver_ftc.control.outer.setup import set_up_autopilot
 from beaver_ftc.control.outer.state import COLUMNS
-from beaver_ftc.design.actuators import move
 from beaver_ftc.design.variants import anchor, mass_of
 from beaver_ftc.diagnosis import noise_model
 from beaver_ftc.errors import SimulationFailed
@@ -18,7 +17,7 @@ from beaver_ftc.loop.assembly import assemble, estimator_names, y_places
 from beaver_ftc.loop.cockpit import Cockpit, note_failures, set_origin, travel_rad
 from beaver_ftc.loop.direct import direct
 from beaver_ftc.loop.flight import Flight, LogSink
-from beaver_ftc.loop.frame import FLYING, NOT_FINITE, fly_frame, fly_on, look_inside
+from beaver_ftc.loop.frame import FLYING, NOT_FINITE, fly_frame, fly_on, hold, look_inside
 from beaver_ftc.loop.instruments import anchor_watch, watch_from_now
 from beaver_ftc.loop.summary import flight_of
 from beaver_ftc.plant import channels as ch
@@ -151,10 +150,9 @@ class Loop:
     def fly_with(self, plugins: "PluginFrame | None") -> None:
         """Fly on with these plug-ins, or with none. fly_frame: what Python is to call, None if nothing."""
         self.plugin_frame = plugins
-        self.own_frame: Callable[..., int] | None = plugins
+        self.fly_frame: Callable[..., int] | None = plugins
         if plugins is None and not (self.cockpit.native and self.plant.executive):
-            self.own_frame = direct(fly_frame, self.frames, self.references, self.log)
-        self.fly_frame = self.own_frame
+            self.fly_frame = direct(fly_frame, self.frames, self.references, self.log)
 
     @property
     def _diagnoses_itself(self) -> bool:
@@ -178,12 +176,14 @@ class Loop:
             memory.give_back(self.frames)
             memory.give_back(self.log)
 
-    def command_instead(self, deflections: np.ndarray) -> None:
-        """Replace the command (4,) rad of the frame just flown, before anything has moved."""
-        belief = self.frames["belief"][0]
-        belief["commanded"], belief["u"] = deflections, belief["u_then"]
-        move(belief["actuators"], belief["commanded"], belief["u"])
-        self.cockpit.write()
+    def hold(self, deflections: np.ndarray | None) -> None:
+        """Command (n,) rad in the law's place, from the frame just flown on; None gives it back."""
+        self.frames["held"] = deflections is not None
+        if deflections is not None:
+            self.frames["held_rad"] = deflections
+            direct(hold, self.frames)(self.frames)
+            if not self.cockpit.native:
+                self.cockpit.write()
 
     def chunks(self) -> Iterable[np.ndarray]:
         """Fly; yield the log a chunk at a time, rows (n, columns). The array is reused."""

@@ -40,7 +40,6 @@ class PluginFrame:
     ) -> None:
         self.detector, self.law = detector, law
         self.verdict = Verdict()
-        self.held_rad: np.ndarray | None = None  # a command (surfaces,) that takes the law's place
         self._names = names
         self._surfaces = surfaces = context[0].surfaces
         self._isolated = {None: NOT_ISOLATED, "unanticipated": UNANTICIPATED}
@@ -75,10 +74,7 @@ class PluginFrame:
         steps.take_verdict(frames)
 
     def _command(self, frames: np.ndarray, references: np.ndarray, measured: Measured) -> None:
-        if self.held_rad is not None:
-            steps.take_command(frames, self.held_rad)
-            return
-        if self.law is None:
+        if self.law is None or frames["held"][0]:
             steps.command(frames)
             return
         frame = frames[0]

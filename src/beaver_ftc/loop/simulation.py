@@ -15,7 +15,6 @@ from beaver_ftc.control.supervisor import MODES
 from beaver_ftc.errors import BadInput, suggestion
 from beaver_ftc.loop.asked import near, vector
 from beaver_ftc.loop.flight import Flight, LogSink
-from beaver_ftc.loop.held import HeldFrame
 from beaver_ftc.loop.loop import CHUNK_ROWS, FLYING, Loop
 from beaver_ftc.loop.plugin_frame import measured_of
 from beaver_ftc.loop.steering import Steering
@@ -56,18 +55,20 @@ class Stepping:
         self._sink = sink
         self._make_ready()
 
-    def reset(self) -> None:
-        """Put the aircraft back into trim, nothing broken, the log empty: the same scenario anew.
+    def reset(self, *, seed: int | None = None) -> None:
+        """Put the aircraft back into trim, nothing broken, the log empty: the same scenario, or a seed of it.
 
         It is not loaded again, and flies as a freshly loaded one does, to the bit: see plant/reuse.py.
         """
+        if seed is not None:
+            self._given = self._given.with_({"seed": seed})
         self._loop.release()
         self._make_ready()
 
     def _make_ready(self) -> None:
         self._scenario, self._faults = self._given, self._given.faults
         self._loop = Loop(self._scenario, *self._plug_ins, self._prepare)
-        self._held_frame: HeldFrame | None = None
+        self._frame: np.void = self._loop.frames[0]
         self._next, self._turn_at, self._written = 0, 0, 0
         self._status, self._by_hand = FLYING, False
         self._steering = Steering(self._loop)
@@ -166,7 +167,7 @@ class Stepping:
         self._begin()
         self._take_command(deflections)
         end = min(self._next + frames, self._loop.n_frames)
-        self._fly_to(end, rate_deg_s, deflections)
+        self._fly_to(end, rate_deg_s)
 
     def inject(self, fault: Mapping[str, Any]) -> None:
         """Break something now, from the next frame on: a fault as in a scenario file, without `at_s`.
@@ -273,11 +274,6 @@ class Stepping:
         self._written = row
 
     @property
-    def _frame(self) -> np.void:
-        frame: np.void = self._loop.frames[0]
-        return frame
-
-    @property
     def _surfaces(self) -> tuple[str, ...]:
         return self._loop.aircraft.surfaces
 
@@ -289,24 +285,27 @@ class Stepping:
         if self._next == 0:
             self._fly_to(1)
 
-    def _fly_to(self, end: int, stick_deg_s: Vector | None = None, held_rad: Vector | None = None) -> None:
+    def _fly_to(self, end: int, stick_deg_s: Vector | None = None) -> None:
         """Frames up to `end`, chunk by chunk as `Loop.chunks` has them, stopping where something changes."""
-        loop = self._loop
+        loop, frame = self._loop, self._frame
         while self._next < end and not self.departed:
             k = self._next
             if k % CHUNK_ROWS == 0:
                 self._begin_chunk(k)
             if k >= self._turn_at:
                 self._turn_at = loop.turn_to(k)
-                self._hold(held_rad)
             stop = min(end, self._turn_at, (k // CHUNK_ROWS + 1) * CHUNK_ROWS)
             self._steering.put(k, stop, stick_deg_s)
-            start = int(self._frame["row"])
+            start = int(frame["row"])
             try:
                 self._status = loop.fly_segment(k, stop)
             finally:
-                self._next = int(self._frame["k"])
-                self._last.append(loop.log[start : int(self._frame["row"])].copy())
+                self._next = int(frame["k"])
+                self._note(loop.log[start : int(frame["row"])])
+
+    def _note(self, rows: Vector) -> None:
+        """Keep the rows just flown, (frames, columns), until the next step."""
+        self._last.append(rows.copy())
 
     def _begin_chunk(self, k: int) -> None:
         self._flush()
@@ -328,22 +327,8 @@ class Stepping:
 
     def _take_command(self, deflections: Vector | None) -> None:
         """Command the surfaces in the law's place, from the frame just flown on; None gives them back."""
-        self._hold(deflections)
-        if deflections is not None:
-            self._by_hand = True
-            self._loop.command_instead(deflections)
-
-    def _hold(self, deflections: Vector | None) -> None:
-        """Fly frames in which these are commanded in the law's place, or with None the law's own."""
-        loop = self._loop
-        if loop.plugin_frame is not None:
-            loop.plugin_frame.held_rad, loop.fly_frame = deflections, loop.own_frame
-        elif deflections is None:
-            loop.fly_frame = loop.own_frame
-        else:
-            held = self._held_frame = self._held_frame or HeldFrame(loop.frames, loop.references, loop.log)
-            held.deflections[:] = deflections
-            loop.fly_frame = held
+        self._loop.hold(deflections)
+        self._by_hand |= deflections is not None
 
     def _deflections(self, command: ArrayLike) -> Vector:
         low, high = self.travel_rad

@@ -6,8 +6,6 @@ left of a bar: built in, right of it: a plug-in's answer. `frame.fly_frame` is t
 """
 
 from beaver_ftc.compiled import kernel
-from beaver_ftc.control import law
-from beaver_ftc.control.accommodation import accommodate
 from beaver_ftc.diagnosis import instruments, scheme
 from beaver_ftc.loop import frame as whole
 
@@ -51,16 +49,14 @@ def decide(frames):
 
 @kernel
 def command(frames):
-    """The built-in law."""
+    """The built-in law, or a command that is held in its place."""
     whole.command(frames[0])
 
 
 @kernel
 def take_command(frames, deflections):
     """A plug-in's command (n,) rad, within the travel of each surface."""
-    frame = frames[0]
-    accommodate(frame.control, frame.fdi, frame.belief, frame.measured, frame.faults)
-    law.take_command(frame.control, deflections)
+    whole.take_command(frames[0], deflections)
 
 
 @kernel

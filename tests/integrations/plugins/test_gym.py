@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from beaver_ftc.errors import BadInput
 from beaver_ftc.loop.loop import fly
 from flying import Memory, scenario
 
@@ -79,6 +80,42 @@ def test_a_seed_replaces_the_scenarios():
     first, again, other = (BeaverEnv(noisy).reset(seed=seed)[0] for seed in (5, 5, 6))
     assert np.array_equal(first, again)
     assert not np.array_equal(first, other)
+
+
+def test_episodes_after_a_seeded_one_differ_and_follow_from_the_seed():
+    noisy = scenario(duration_s=2, sensors={"q": {"noise_std_deg_s": 0.1}})
+    one, again = BeaverEnv(noisy), BeaverEnv(noisy)
+    seen = [[env.reset(seed=seed)[0] for seed in (5, None, None)] for env in (one, again)]
+    assert np.array_equal(*seen)
+    assert not np.array_equal(seen[0][0], seen[0][1])
+    assert not np.array_equal(seen[0][1], seen[0][2])
+
+
+def test_a_step_across_the_chunks_of_the_log_is_the_frames_it_has():
+    one, many = (
+        BeaverEnv(
+            scenario(duration_s=84, substeps=2, faults=[{**FAULT, "at_s": 81.9, "end_s": 81.95}]), frames
+        )
+        for frames in (1, 41)
+    )
+    one.reset()
+    many.reset()
+    action = np.zeros(4)
+    for _ in range(202):
+        singles = [one.step(action) for _ in range(41)]
+        seen, reward, *_ = many.step(action)
+        assert np.array_equal(seen, singles[-1][0])
+        assert reward == pytest.approx(sum(single[1] for single in singles), rel=1e-12)
+
+
+@pytest.mark.parametrize("action", [[0.0, np.nan, 0.0, 0.0], [0.0, 0.0], [[0.0] * 4]])
+def test_an_action_that_is_none_is_said(action):
+    env = BeaverEnv(scenario(duration_s=1))
+    env.reset()
+    with pytest.raises(BadInput, match=r"action: .* allowed: 4 finite numbers"):
+        env.step(np.array(action))
+    seen, *_ = env.step(np.zeros(4))  # and the flight goes on
+    assert env.observation_space.contains(seen)
 
 
 def test_a_departure_ends_the_episode_and_costs():

@@ -28,6 +28,8 @@ AXES, SURFACES = ("p", "q", "r"), ("aileron", "elevator", "rudder", "flap")
 ERRORS = ("perfect", "published", "sensors", "coefficients", "turbulence", "everything")
 DETECTORS = ("worst-case", "statistical", "either")
 HEALTHY_SHARE, LARGE_REFERENCES, COARSE, AT_THE_BOUND = 0.4, 0.15, 0.5, 0.3
+DIVES, GUSTS, SLOWEST_MPS = 0.1, 0.15, 35.0
+FASTEST_DAMPING_PER_S = 10.0  # of a body rate
 FASTEST_RAD_S = {"worst-case": 60.0, "statistical": 15.0, "either": 15.0}  # of the unstructured uncertainty
 ZERO = dict.fromkeys(AXES, 0.0)
 WRONG = ("false alarm", "wrong surface", "surface excluded", "wrong type", "type excluded")
@@ -48,7 +50,10 @@ def within(rng: Random, bound: float) -> float:
 
 
 def reference(rng: Random) -> Keys:
-    """One signal an axis, sometimes far beyond what an aircraft can follow."""
+    """One signal an axis, sometimes far beyond what an aircraft can follow; or a dive past the vertical."""
+    if rng.random() < DIVES:
+        away = {"amplitude_deg_s": -rng.uniform(15, 80), "start_s": rng.uniform(0, 1)}
+        return {"q": [{"step": away}]}
     largest = 140.0 if rng.random() < LARGE_REFERENCES else 5.0
     kinds = rng.choice(["sine", "square", "none"], size=3, p=[0.5, 0.3, 0.2])
     return {
@@ -104,7 +109,26 @@ def declared(rng: Random, errors: str, detector: str) -> tuple[Keys, Keys]:
         severity = str(rng.choice(["light", "moderate", "severe"]))
         truth["environment"] = {"turbulence": "dryden", "severity": severity}
         bounds["turbulence"] = severity
+    if rng.random() < GUSTS:
+        gust, steepest = drawn_gust(rng)
+        truth["environment"] = truth.get("environment", {}) | {"gust": gust}
+        if "turbulence" in bounds:
+            bounds["constant_rad_s2"] = dict.fromkeys(
+                AXES, 0.02 + FASTEST_DAMPING_PER_S * steepest / SLOWEST_MPS
+            )
     return truth, bounds
+
+
+def drawn_gust(rng: Random) -> tuple[Keys, float]:
+    """A gust and its steepest slope, m/s2. JSBSim's does not turn the air: the vanes see it and nothing else.
+
+    Who reckons with turbulence takes its slope for a rotation of the air, so that must be declared, too.
+    """
+    height, rise_s, fade_s = rng.uniform(0.5, 6.0), log_uniform(rng, 0.3, 3.0), log_uniform(rng, 0.3, 3.0)
+    way = rng.normal(size=3)
+    velocity = (height * way / np.linalg.norm(way)).tolist()
+    gust = {"at_s": rng.uniform(0.2, 3.0), "velocity_mps": velocity, "rise_s": rise_s, "fade_s": fade_s}
+    return gust, 0.5 * np.pi * height / min(rise_s, fade_s)
 
 
 def kind_of_fault(rng: Random, fault_class: str) -> Keys:
@@ -152,7 +176,7 @@ def drawn(seed: int, index: int, only: tuple[str, ...] = ERRORS) -> tuple[str, s
         "name": f"random-{seed}-{index}", "seed": index, "duration_s": rng.uniform(4.0, 8.0),
         "rate_hz": round(log_uniform(rng, 20, 500)),
         "substeps": int(rng.integers(2, 11)) if rng.random() < COARSE else 1,
-        "initial": {"airspeed_mps": rng.uniform(35, 55), "altitude_m": rng.uniform(700, 3000)},
+        "initial": {"airspeed_mps": rng.uniform(SLOWEST_MPS, 55), "altitude_m": rng.uniform(700, 3000)},
         "reference": reference(rng), "actuators": actuators(rng, errors),
         "control": {"law": str(rng.choice(["fault-tolerant", "adaptive", "nominal"]))},
         "faults": faults, "fdi": fdi, **truth,

@@ -122,6 +122,50 @@ def test_still_air_shows_no_gust():
     assert np.abs(flown.seen[:, 1:]).max() < 5e-3  # against 0.03 rad/s in light turbulence
 
 
+def test_nor_does_it_when_the_force_jumps_between_coarse_frames():
+    """Elevator and rudder from stop to stop: JSBSim gives a new force half a frame more than it has acted."""
+    jumps = {
+        "q": [{"square": {"amplitude_deg_s": 60, "frequency_hz": 0.7}}],
+        "r": [{"sine": {"amplitude_deg_s": 40, "frequency_hz": 0.2}}],
+    }
+    flown = Flown("none", duration_s=3, rate_hz=30, reference=jumps, control={"law": "nominal"})
+    assert np.abs(np.diff(flown.force[:, 2])).max() > 30.0
+    assert np.abs(np.diff(flown.seen[:, 1:], axis=0)).max() < 5e-4
+
+
+def test_a_heading_that_turns_round_as_the_nose_passes_the_vertical_is_no_gust():
+    """The turbulence turns with the heading: air from ahead, and a little from aside, turns round at once."""
+    record, dt = air_of(), 0.01
+    still, gust = np.array([45.0, 0.0, 0.0]), np.array([3.0, 1.0, 0.0])  # m/s; straight down, and level axes
+    record["turn"], record["gust"][2] = _turn(0.0, -1.56), 0.05
+    air.begin(record, readings(still - record["turn"] @ gust), np.array([0.0, -1.56, 0.3]))
+    record["gust"][2] = 0.05
+    over = np.array([np.pi, -1.56, 0.3 + np.pi])
+    record["force"] = record["turn"] @ [0.0, 0.0, -record["gravity"]]  # nothing accelerates
+    air.observe(record, readings(still - _turn(np.pi, -1.56) @ gust), over, dt)
+    assert abs(record["gust"][2]) <= 0.05
+    unseen, record["unseen"] = np.array(record["unseen"]), np.ones(3)
+    record["damping"] = np.diag([0.0, 0.0, 5.0]) @ record["turn"].T
+    everything = air.unseen_drift(record, 45.0, 2, 2)
+    record["unseen"] = unseen
+    assert air.unseen_drift(record, 45.0, 2, 2) == pytest.approx(everything)
+
+
+def readings(velocity):
+    """alpha, beta, V of a velocity (3,) through the air, m/s in body axes."""
+    u, v, w = velocity
+    V = np.linalg.norm(velocity)
+    return np.array([np.arctan2(w, u), np.arcsin(v / V), V, 0.6 * V * V, 0.3])
+
+
+def test_a_yawing_gust_is_lost_as_far_as_the_heading_turns_faster_than_it_changes():
+    """By the two variances over the lag of the yawing gust, in numbers: 14.63 m, 533.4 m."""
+    record = air_of()
+    lag_s, sigma, rate = 3 * 14.63 / (np.pi * 45), 2.0, 0.4
+    turned, walked = (rate * sigma * lag_s) ** 2, 3 * sigma**2 * 45 / 533.4 * lag_s
+    assert air.lost_by_turning(record, 45.0, rate) == pytest.approx(turned / walked, rel=1e-9)
+
+
 def test_the_specific_force_is_the_one_felt_aboard():
     """At the centre of gravity, against JSBSim's accelerometer, under references on all axes."""
     flown = Flown("none", duration_s=8)
@@ -186,6 +230,23 @@ def test_what_is_not_seen_drifts_in_body_axes_as_a_covariance_turns():
     expected = record["damping"] @ spread @ record["damping"].T
     found = [[air.unseen_drift(record, 45.0, i, j) for j in range(3)] for i in range(3)]
     assert np.array(found) == pytest.approx(expected, rel=1e-12)
+
+
+def test_a_gust_unseen_drifts_besides_as_its_axis_turns_in_the_body():
+    """A gust of the variance of its own process, kept for its own lag while the axis turns, as a walk."""
+    record, y, dt = air_of(), readings(np.array([45.0, 0.0, 2.0])), 0.01
+    before, after = np.array([0.5, -1.45, 0.2]), np.array([0.53, -1.47, 0.2])
+    air.begin(record, y, before)
+    air.observe(record, y, after, dt)
+    record["damping"] = D = np.diag([5.0, 3.0, 1.0])
+    with_it = [[air.unseen_drift(record, 45.0, i, j) for j in range(3)] for i in range(3)]
+    record["swings"] = 0
+    without = [[air.unseen_drift(record, 45.0, i, j) for j in range(3)] for i in range(3)]
+    turned = (_turn(*after[:2]) - _turn(*before[:2]))[:, 0] / dt
+    lag_s = np.sqrt(0.3048 * 1750 * 14.63) / 2.6 / 45
+    variance = 45 * noise_model.gust_drift("light", 14.63)[0] * lag_s / 2  # of a first-order process
+    expected = np.outer(D @ turned, D @ turned) * variance * lag_s
+    assert np.subtract(with_it, without) == pytest.approx(expected, rel=1e-9)
 
 
 TURN = {  # to 30 deg of bank, and round

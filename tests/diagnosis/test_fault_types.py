@@ -142,6 +142,18 @@ def test_neither_surface_nor_type_is_ever_named_wrongly(kind, seed, surface, sha
         assert types.NAMES[code] in said["candidates"]
 
 
+@pytest.mark.parametrize("kind", ["varying loss", "growing bias", "rate limit"])
+@settings(max_examples=10, deadline=None)
+@given(cases, surfaces, starts, shares, uncertainties)
+def test_a_short_fault_of_any_course_stays_among_the_candidates(kind, case, surface, at, share, uncertainty):
+    """Though a constant explains the few frames of it, too."""
+    plant, code = fly(case, kind, surface, at, share, uncertainty, gone=at + 6)
+    said = found(plant.fdi)
+    if said["candidates"]:
+        name, left = types.NAMES[code], said["candidates"]
+        assert name in left or f"{SURFACES[surface]}:{name}" in left
+
+
 @pytest.mark.parametrize(("kind", "true"), [("stuck", -0.26), ("bias", 0.24)])
 def test_the_estimate_is_certain_to_lie_in_its_interval(kind, true):
     """Stuck a quarter up the aileron's travel; biased by 0.8 (0.8) - 0.4."""

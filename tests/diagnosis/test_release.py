@@ -116,3 +116,32 @@ def test_later_releases_become_the_earlier_ones_when_of_those_none_is_left(earli
     else:
         assert (low, high) == ([0.2, np.inf], [0.3, -np.inf])
         assert (list(jam["kept_low"]), list(jam["kept_high"])) == ([0.02, -0.4], [0.06, 0.4])
+
+
+class Masked(DesignPlant):
+    """The command undoes a swing of the surface while it lasts, and then stays where that left it."""
+
+    def command(self, f, G):
+        command = super().command(f, G)
+        command[self.surface] = self.wanted(self.k + 1)
+        return command
+
+
+@pytest.mark.parametrize(("profile", "excluded"), [("any", False), ("abrupt", True)])
+@pytest.mark.parametrize("surface", [0, 1, 2])
+def test_health_after_a_swing_that_looked_like_a_jam_is_no_quiet_of_a_jam(surface, profile, excluded):
+    """p = u + A sin(wt) under u = c - A sin(wt): a jam at c, as long as it lasts; so is health under u = c.
+
+    Only a fault that is declared to stay shows by its quiet that it does not swing.
+    """
+    at, lasting, c, amplitude = 60, 150, 0.15, 0.08
+    swing = lambda k: amplitude * np.sin(1.5 * (k - at) * 0.01) * (at <= k < at + lasting)  # noqa: E731
+    plant = Masked(
+        seed=1, surface=surface, position=lambda k, u: u + swing(k), fault_class="all", fault_profile=profile
+    )
+    plant.wanted = lambda k: c - swing(k)
+    plant.fly(1000, UNCERTAINTIES["random"])
+    known = plant.fdi["surface"][surface]
+    assert not known["type_excluded"][types.STUCK]
+    assert bool(known["type_excluded"][types.OSCILLATORY]) == excluded
+    assert excluded or plant.fdi["verdict"]["type"] != types.STUCK

@@ -8,6 +8,8 @@ sideways in yaw [MIL-F-8785C, 3.7]:
 Vanes and airspeed give the velocity through the moving air; the forces, attitude and gravity say how that
 through still air would have changed. The difference is the gust's own change. The rolling gust, which
 changes across the span, is seen by no instrument.
+
+Velocity is followed as JSBSim moves it, by Adams and Bashforth's two steps: v' = v + dt (3 a - a_before) / 2.
 """
 
 from math import pi
@@ -19,18 +21,24 @@ from beaver_ftc.compiled import kernel
 from beaver_ftc.design.model import rate_damping
 from beaver_ftc.design.terms import AIRSPEED, ALPHA, BETA, QDYN, TABLE, evaluate, whole_sum
 
+LEAST_SWING = 0.01  # of a gust's own intensity: less is not reckoned with
+
 AIR = np.dtype(
     [
-        ("moving", "i8"),
+        ("moving", "i8"), ("started", "i8"),  # whether there is turbulence; whether `pull` is known
         ("forces", TABLE), ("scratch", "f8", (MAX_MONOMIALS,)),  # force coefficients
         ("area_per_mass", "f8"), ("gravity", "f8"), ("span", "f8"),
         ("velocity", "f8", (3,)), ("force", "f8", (3,)), ("turn", "f8", (3, 3)), ("heading", "f8"),
+        ("pull", "f8", (3,)),  # forces and gravity an instant before, m/s2 in the level axes of this one
         ("gust", "f8", (3,)), ("rotation", "f8", (3,)), ("damping", "f8", (3, 3)),
         ("acceleration", "f8", (3,)),  # at this instant
         ("total", "f8", (3,)), ("mean", "f8", (3,)),  # over the instants of a frame; over the elapsed one
         ("per_metre", "f8", (3,)),  # intensity of the rotation's drift over airspeed, rad2/s3 per m/s
         ("unseen", "f8", (3,)),  # share of it that the vanes do not show
         ("rolling", "f8"),  # lag of the rolling gust times airspeed, m
+        ("scale", "f8"), ("turning", "f8"),  # scale of the gusts, m; share of a yawing one lost by turning
+        # How fast the axes of the gusts turn in the body, 1/s, and whether that matters.
+        ("swing", "f8", (3, 3)), ("swings", "i8"),
     ],
     align=True,
 )  # fmt: skip
@@ -88,24 +96,68 @@ def begin(air, y, attitude):
     """The first frame of a diagnosis, which may begin in flight: no gust has been seen to change yet."""
     advance_axes(air, y, attitude)
     air.gust[:] = 0.0
+    air.started = 0
+
+
+@kernel
+def note_swing(air, dt, V):
+    """How fast the axes of the gusts have turned in the body since `swing` held `turn`, dt s ago.
+
+    A gust unseen that keeps its size, sigma = sqrt(intensity lag / 2), then changes in the body by sigma
+    times that; over its lag like a walk of (swing lag)^2 / 2 of the gust's own intensity.
+    """
+    most = 0.0
+    for i in range(3):
+        for g in range(3):
+            air.swing[i, g] = (air.turn[i, g] - air.swing[i, g]) / dt
+            most = max(most, abs(air.swing[i, g]))
+    air.swings = 0.5 * (most * air.rolling / V) ** 2 > LEAST_SWING
+
+
+@kernel
+def lost_by_turning(air, V, rate):
+    """Share of the yawing gust's changes that the vanes do not show while the heading turns, at rate rad/s.
+
+    The gusts turn with the aircraft, so one from ahead, of standard deviation sigma, is soon one from aside:
+    that is a change by rate sigma, besides a walk of intensity 3 sigma^2 V / scale. Over the lag of the
+    yawing gust, 3 span / pi V, the square of the one over that of the other.
+    """
+    return rate * rate * air.span * air.scale / (pi * V * V)
 
 
 @kernel
 def observe(air, y, attitude, dt):
     """Follow the gust over the elapsed frame: `gust` (3,) rad/s in level axes, the rolling one unknown.
 
-    y (5,) and attitude (3,) rad as measured now, dt s after `force` and `turn`.
+    y (5,) and attitude (3,) rad as measured now, dt s after `force` and `turn`. Where the heading turns so
+    fast that what the vanes show is mostly that, as it does when the nose passes the vertical, a yawing gust
+    is let fade, unseen.
     """
-    ahead = air.velocity[0] + dt * to_level(air.turn, air.force, 0)
-    right = air.velocity[1] + dt * to_level(air.turn, air.force, 1)
-    down = air.velocity[2] + dt * (to_level(air.turn, air.force, 2) + air.gravity)
+    pulled = air.scratch
+    for i in range(3):
+        pulled[i] = to_level(air.turn, air.force, i)
+    pulled[2] += air.gravity
+    if not air.started:
+        air.pull[:] = pulled[:3]
+        air.started = 1
+    for i in range(3):
+        air.velocity[i] += dt * (1.5 * pulled[i] - 0.5 * air.pull[i])
     turned = heading_change(attitude[2], air.heading)
+    sin, cos = np.sin(turned), np.cos(turned)
+    right, down = air.velocity[1] * cos - air.velocity[0] * sin, air.velocity[2]
+    air.pull[0], air.pull[1] = pulled[0] * cos + pulled[1] * sin, pulled[1] * cos - pulled[0] * sin
+    air.pull[2] = pulled[2]
+    air.swing[:] = air.turn
     advance_axes(air, y, attitude)
-    right = right * np.cos(turned) - ahead * np.sin(turned)
     V = y[AIRSPEED]
+    note_swing(air, dt, V)
     pitching, yawing = 4.0 * air.span / (pi * V), 3.0 * air.span / (pi * V)  # lags, s
+    lost = lost_by_turning(air, V, turned / dt)
+    air.turning = min(max(np.exp(-dt / yawing) * air.turning, lost), 1.0)
     air.gust[1] = np.exp(-dt / pitching) * air.gust[1] + (down - air.velocity[2]) / (V * pitching)
-    air.gust[2] = np.exp(-dt / yawing) * air.gust[2] + (right - air.velocity[1]) / (V * yawing)
+    air.gust[2] = np.exp(-dt / yawing) * air.gust[2]
+    if lost < 1.0:
+        air.gust[2] += (right - air.velocity[1]) / (V * yawing)
 
 
 @kernel
@@ -148,5 +200,19 @@ def unseen_drift(air, V, i, j):
         for k in range(3):
             on_i += air.damping[i, k] * air.turn[k, g]
             on_j += air.damping[j, k] * air.turn[k, g]
-        total += on_i * on_j * air.unseen[g] * air.per_metre[g]
+        unseen = air.unseen[g] if g != 2 else min(air.unseen[g] + air.turning, 1.0)
+        total += on_i * on_j * unseen * air.per_metre[g]
+    if air.swings:
+        total += 0.5 * (air.rolling / V) ** 2 * air.per_metre[0] * swung(air, i, j, 0)
+        total += 0.5 * (3.0 * air.span / (pi * V)) ** 2 * air.per_metre[2] * air.turning * swung(air, i, j, 2)
     return total * V
+
+
+@kernel
+def swung(air, i, j, g):
+    """How much the turning axis of gust g moves accelerations i and j together, 1/s4 of a gust of 1 rad/s."""
+    on_i, on_j = 0.0, 0.0
+    for k in range(3):
+        on_i += air.damping[i, k] * air.swing[k, g]
+        on_j += air.damping[j, k] * air.swing[k, g]
+    return on_i * on_j

@@ -270,7 +270,8 @@ def _set_up_air(air: np.void, turbulence: str, mass: MassProperties, aircraft: A
     air["gravity"] = 9.80665  # m/s2, standard; what is constant has no part in a change of the gust
     air["span"] = span_m
     air["per_metre"], air["unseen"] = gust_drift(turbulence, span_m), UNSEEN
-    air["rolling"] = sqrt(0.3048 * SCALE_FT * span_m) / 2.6  # [Yeager1998, eq. 10]
+    air["scale"] = 0.3048 * SCALE_FT
+    air["rolling"] = sqrt(air["scale"] * span_m) / 2.6  # [Yeager1998, eq. 10]
 
 
 def gust_drift(turbulence: str, span_m: float) -> np.ndarray:

@@ -200,8 +200,9 @@ def prepare(statistical, fdi, design, x, y, u):
     """
     if statistical.air.moving:
         air.effect(statistical.air, design, x, y, u)
-        air.begin_frame(statistical.air)
     drifts(statistical, fdi, design, x, y)
+    if statistical.air.moving:
+        air.begin_frame(statistical.air)
     if statistical.tolerated:
         for b in range(statistical.n_blocks):
             statistical.block[b].regressor[:] = 0.0

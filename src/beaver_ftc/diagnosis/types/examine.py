@@ -112,7 +112,7 @@ def judge_all(fdi):
         watch_each(fdi, surface)
         if fdi.returns and fdi.frame > 0:
             let_go_each(fdi, surface)
-        if surface.measure == FIXED and not surface.wrong_then:
+        if fdi.abrupt and surface.measure == FIXED and not surface.wrong_then:
             note_quiet(fdi, s)
         elif surface.wrong_then and (fdi.whole or (surface.wrong_before and surface.wrong)):
             surface.evidence += 1
@@ -135,8 +135,8 @@ def examine(fdi):
 def note_quiet(fdi, s):
     """A surface given up, and commanded to where it happens to be, shows by its quiet that it does not swing.
 
-    That is evidence against the others too, as far as one of them all is in question. Where surfaces come
-    back through servos, the quiet may be that of one repaired: it then excludes nothing.
+    That is evidence against the others too, as far as one of them all is in question. It takes a fault that
+    is declared to stay: of one that may go, the quiet may be that of health.
     """
     surface = fdi.surface[s]
     if surface.low_then > surface.set_high[STUCK] or surface.high_then < surface.set_low[STUCK]:
@@ -145,5 +145,5 @@ def note_quiet(fdi, s):
         if other == s or (surface.in_question and fdi.surface[other].in_question):
             fdi.surface[other].evidence += 1
     surface.quiet += 1
-    if surface.quiet > fdi.patience and not fdi.bound.own_errors and not fdi.returns:
+    if surface.quiet > fdi.patience and not fdi.bound.own_errors:
         surface.type_excluded[OSCILLATORY] = 1

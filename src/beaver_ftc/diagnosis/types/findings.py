@@ -137,13 +137,14 @@ def _possible(fdi: np.void, s: int) -> bool:
 def _types_left(fdi: np.void, s: int) -> list[str]:
     """Types still possible on surface s, each once.
 
-    One that may take any course counts only if no simpler does, and a slow surface until it would have moved.
+    Where a constant explains the flight, a loss that may take any course and a slow surface count only until
+    the constant has been seen for long enough.
     """
     surface = fdi["surface"][s]
     left = [kind for kind in range(N_TYPES) if _possible(fdi, s) and not surface["type_excluded"][kind]]
     if any(kind < N_CONSTANT for kind in left) and not fdi["bound"]["own_errors"]:
         early = surface["evidence"] - surface["quiet"] < fdi["patience"]
-        left = [kind for kind in left if kind != VARYING_LOSS and (kind != SLOW or early)]
+        left = [kind for kind in left if early or kind not in (VARYING_LOSS, SLOW)]
     if fdi["pair"]["enabled"] and fdi["layout"]["group"][s] == IN_PITCH and {STUCK, UP, DOWN} & set(left):
         left += [STUCK, FLOAT, UP, BIAS, CONSTANT_LOSS]  # if the other one is off as well
     return list(dict.fromkeys(NAMES[kind] for kind in left))

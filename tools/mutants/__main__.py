@@ -2,10 +2,13 @@
 
 import argparse
 import os
-import random
 import sys
 
 os.environ["NUMBA_DISABLE_JIT"] = "1"  # before anything imports Numba
+
+from collections import Counter
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
 
 import hypothesis
 import numba
@@ -14,41 +17,28 @@ import scipy.linalg
 import scipy.optimize
 import scipy.stats
 
-from tools.mutants.making import Mutant, mutants
-from tools.mutants.reach import ROOT, reach
-from tools.mutants.trial import SURVIVED, chosen, outcome
+from tools.mutants.making import Mutant
+from tools.mutants.reach import Reach, few_examples, reach
+from tools.mutants.scope import FOLDERS, PACKAGE, ROOT, SCOPE, drawn, left_out, stale
+from tools.mutants.trial import HANGS, KILLED, outcome
 
 LIBRARIES = (hypothesis, numba, pandas, scipy)  # loaded once here, not once in each child
-PACKAGE = ROOT / "src" / "beaver_ftc"
-# What computes, judges, counts and words; not what draws, reads files, talks to JSBSim or starts processes.
-SCOPE = (
-    "design/*.py", "diagnosis/**/*.py", "control/**/*.py", "studies/engine/statistics.py",
-    "studies/*/summary.py", "studies/*/tally.py", "studies/*/text.py", "studies/*/words.py",
-    "studies/*/levels.py", "studies/*/limit.py", "results/expectations.py", "results/metrics.py",
-    "results/verdict.py", "scenario/signals.py", "scenario/table.py", "scenario/warnings.py",
-)  # fmt: skip
-# Tests that reach a folder of the package: its own, and those of what stands on it.
-FOLDERS = {
-    "design": ("design", "diagnosis", "control"),
-    "diagnosis": ("diagnosis", "design"),
-    "control": ("control",),
-    "studies": ("studies",),
-    "results": ("results",),
-    "scenario": ("scenario",),
-}
 
 
 def main() -> int:
     """Exit status 0 if at least `--least` per cent of the mutants die."""
     options = _options()
-    drawn = _drawn(options.seed, options.modules)[options.start : options.count]
-    killed = 0
-    for number, mutant in enumerate(drawn, options.start + 1):
-        died = _dies(mutant)
-        killed += died
-        print(f"{number:4d} {'killed' if died else 'LIVES '} {_line(mutant)}", flush=True)
-    print(f"{killed} of {len(drawn)} mutants killed (seed {options.seed})")
-    return int(100 * killed < options.least * len(drawn))
+    for name in stale():
+        print(f"equivalent.yaml: no such mutant: {name}")
+    every, known = drawn(options.seed, options.modules)
+    taken = every[options.start : options.count]
+    _head(options, len(every), known)
+    found = _tests(taken, options.jobs)
+    ends = _trials(taken, found, options)
+    dead = ends[KILLED] + ends[HANGS]
+    print(", ".join(f"{number} {end.lower()}" for end, number in sorted(ends.items())))
+    print(f"{dead} of {len(taken)} mutants killed (seed {options.seed})")
+    return int(100 * dead < options.least * len(taken))
 
 
 def _options() -> argparse.Namespace:
@@ -57,35 +47,45 @@ def _options() -> argparse.Namespace:
     parser.add_argument("--count", type=int, default=100, help="how many of the seed's mutants")
     parser.add_argument("--start", type=int, default=0, help="leave out the first so many, to go on")
     parser.add_argument("--least", type=float, default=85.0, help="per cent that must die")
+    parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="processes side by side")
     parser.add_argument("modules", nargs="*", default=SCOPE, help="patterns below src/beaver_ftc")
     return parser.parse_args()
 
 
-def _drawn(seed: int, patterns: list[str]) -> list[Mutant]:
-    files = sorted({file for pattern in patterns for file in PACKAGE.glob(pattern)})
-    every = [mutant for file in files for mutant in mutants(file)]
-    random.Random(seed).shuffle(every)
-    return every
+def _say(text: str) -> None:
+    print(text, flush=True)
 
 
-def _dies(mutant: Mutant) -> bool:
-    name = mutant.file.relative_to(ROOT).as_posix()
-    for folder in FOLDERS[mutant.file.relative_to(PACKAGE).parts[0]]:
-        found = reach(folder)
-        tests = _tests(found["lines"].get(name, {}), mutant)
-        if tests and outcome(mutant, chosen(tests, found["seconds"])) != SURVIVED:
-            return True
-    return False
+def _head(options: argparse.Namespace, number: int, known: int) -> None:
+    _say(f"{number} mutants can be made of {', '.join(options.modules)}; {known} more make no difference")
+    _say("not of:")
+    for line in left_out():
+        _say(f"  {line}")
 
 
-def _tests(lines: dict[str, list[str]], mutant: Mutant) -> list[str]:
-    """Those that execute the line; of one that ran at import, all that execute anything of the file."""
-    for line in mutant.lines:
-        if tests := lines.get(str(line)):
-            return tests
-    if any(str(line) in lines for line in mutant.lines):
-        return sorted({test for tests in lines.values() for test in tests})
-    return []
+def _tests(taken: list[Mutant], jobs: int) -> dict[str, Reach]:
+    """What the tests that may reach the mutants execute, by the folder of the package."""
+    folders = sorted({mutant.file.relative_to(PACKAGE).parts[0] for mutant in taken})
+    of_tests = sorted({test for folder in folders for test in FOLDERS[folder]})
+    whole = reach(of_tests, jobs, _say)
+    reasons = ", ".join(f"{number} {why}" for why, number in whole.left_out.items())
+    _say(f"{len(whole.seconds)} tests take part; left out: {reasons or 'none'}")
+    return {folder: reach(FOLDERS[folder], jobs, _say) for folder in folders}
+
+
+def _trials(taken: list[Mutant], found: dict[str, Reach], options: argparse.Namespace) -> Counter[str]:
+    few_examples()
+    ends: Counter[str] = Counter()
+    given = []
+    for mutant in taken:
+        tests = found[mutant.file.relative_to(PACKAGE).parts[0]]
+        reached = tests.of(mutant.file.relative_to(ROOT).as_posix(), mutant.lines)
+        given.append((mutant, reached, {test: tests.seconds[test] for test in reached}))
+    with ProcessPoolExecutor(options.jobs, mp_context=get_context("fork")) as pool:
+        for number, end in enumerate(pool.map(outcome, *zip(*given, strict=True)), options.start):
+            ends[end] += 1
+            _say(f"{number + 1:4d} {end:7} {_line(taken[number - options.start])}")
+    return ends
 
 
 def _line(mutant: Mutant) -> str:

@@ -1,6 +1,7 @@
 """Mutants of a module: every small change that can be made in it, each as new source."""
 
 import ast
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -40,6 +41,11 @@ class Mutant:
     lines: tuple[int, int]  # of the node, and of the statement it is in
     before: str
     after: str
+    within: str  # the line of source, and of its like in this module which one it is
+
+    def name(self, package: Path) -> str:
+        """What it is called whatever else changes in its module."""
+        return f"{self.file.relative_to(package).as_posix()}: {self.within}: {self.before} -> {self.after}"
 
     def source(self) -> str:
         """The whole module with the change made."""
@@ -52,14 +58,22 @@ class Mutant:
 
 def mutants(file: Path) -> list[Mutant]:
     """All of a module."""
-    tree = ast.parse(file.read_text())
+    text = file.read_text()
+    tree, lines = ast.parse(text), text.splitlines()
     apart, statement = _no_code(tree), _statements(tree)
-    return [
-        Mutant(file, place, number, kind, (node.lineno, statement[node]), ast.unparse(node), ast.unparse(new))
-        for place, node in enumerate(ast.walk(tree))
-        if node in statement and node not in apart
-        for number, (kind, new) in enumerate(_changes(node))
-    ]
+    seen: Counter[tuple[str, str, str]] = Counter()
+    found = []
+    for place, node in enumerate(ast.walk(tree)):
+        if node not in statement or node in apart:
+            continue
+        for number, (kind, new) in enumerate(_changes(node)):
+            before, after, line = ast.unparse(node), ast.unparse(new), lines[node.lineno - 1].strip()
+            seen[line, before, after] += 1
+            which = seen[line, before, after]
+            within = f"{line} #{which}" if which > 1 else line
+            at = (node.lineno, statement[node])
+            found.append(Mutant(file, place, number, kind, at, before, after, within))
+    return found
 
 
 def _no_code(tree: ast.Module) -> set[ast.AST]:

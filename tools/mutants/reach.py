@@ -1,13 +1,15 @@
-"""Which tests execute a line, and how long each of them takes."""
+"""Which tests execute a line, and how long each of them takes in plain Python."""
 
 import hashlib
 import json
-import os
 import signal
-import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
+from multiprocessing import get_context
 from pathlib import Path
 from types import FrameType
 
@@ -15,49 +17,121 @@ import coverage
 import hypothesis
 import pytest
 
-ROOT = Path(__file__).parents[2]
-# Seconds of processor; a test that takes longer in plain Python is none for this. The diagnosis flies.
-SLOW_S = {"diagnosis": 1.2}
-SLOW_ELSEWHERE_S = 0.4
-# What a change of shifts the lines: the rooms of the package from which mutants are made.
-ROOMS = ("design", "diagnosis", "control", "scenario", "results", "studies")
+from tools.mutants.scope import ROOT
+from tools.mutants.trial import SURVIVED, in_a_child, pytest_quietly
+
+SLOW_S = 1.0  # of processor, counting lines; a test that takes longer in plain Python is none for this
+PATIENCE = 1  # so many slow cases of one test, and its other cases are not tried
+HANGS_S = 600.0  # of processor for the tests of one file, far more than the limits allow
 EXAMPLES = 4
 KEPT = ROOT / ".mutants"
 
 
-def reach(folder: str) -> dict:
-    """The tests of a folder: {"seconds": {test: s}, "lines": {file: {line: [tests]}}}.
+class Reach:
+    """The tests of some folders: what they execute, and those that are none for this."""
 
-    A line with no test ran when its module was imported. Kept until a file changes.
-    """
-    kept = KEPT / f"{folder}-{_digest(folder)}.json"
-    if not kept.exists():
-        for old in KEPT.glob(f"{folder}-*.json"):
-            old.unlink()
-        subprocess.run([sys.executable, "-m", "tools.mutants.reach", folder, str(kept)], cwd=ROOT, check=True)
-    return json.loads(kept.read_text())
+    def __init__(self, files: Iterable[dict]) -> None:
+        self.seconds: dict[str, float] = {}
+        self.left_out: Counter[str] = Counter()
+        self._lines: dict[str, dict[int, list[str]]] = {}
+        for file in files:
+            self.seconds |= file["seconds"]
+            self.left_out.update(file["left_out"])
+            for name, lines in file["lines"].items():
+                known = self._lines.setdefault(name, {})
+                for line, tests in lines.items():
+                    known.setdefault(int(line), []).extend(tests)
+
+    def of(self, name: str, lines: Iterable[int]) -> list[str]:
+        """Those that execute the first of the lines; of one that ran at import, all that execute anything."""
+        by_line = self._lines.get(name, {})
+        for line in lines:
+            if tests := by_line.get(line):
+                return tests
+        if any(line in by_line for line in lines):
+            return sorted({test for tests in by_line.values() for test in tests})
+        return []
 
 
-def _digest(folder: str) -> str:
-    package = ROOT / "src" / "beaver_ftc"
-    roots = [ROOT / "tests" / folder, *(package / room for room in ROOMS)]
-    files = [file for root in roots for file in sorted(root.rglob("*.py"))]
-    return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()[:16]
+def reach(folders: Iterable[str], jobs: int, say: Callable[[str], None]) -> Reach:
+    """What the tests of the folders execute. Kept a test file each, until a source it executes changes."""
+    files = [f for folder in folders for f in sorted((ROOT / "tests" / folder).rglob("test_*.py"))]
+    due = [file for file in files if _known(file) is None]
+    if due:
+        say(f"finding out what the tests of {len(due)} of {len(files)} files execute")
+    with ProcessPoolExecutor(jobs, mp_context=get_context("fork")) as pool:
+        for file, lost in zip(due, pool.map(_measure, due), strict=True):
+            if lost:
+                say(f"{file.relative_to(ROOT)}: its tests could not be measured, and are left out")
+    return Reach(known for file in files if (known := _known(file)))
 
 
-def _measured(folder: str) -> dict:
+def _kept(file: Path) -> Path:
+    return KEPT / file.relative_to(ROOT / "tests").with_suffix(".json")
+
+
+def _known(file: Path) -> dict | None:
+    kept = _kept(file)
+    found = json.loads(kept.read_text()) if kept.exists() else None
+    return found if found and found["sources"] == _digests(found["sources"]) else None
+
+
+def _digests(sources: Iterable[str]) -> dict[str, str]:
+    def digest(file: Path) -> str:
+        return hashlib.sha256(file.read_bytes()).hexdigest()[:16] if file.exists() else ""
+
+    return {name: digest(ROOT / name) for name in sorted(sources)}
+
+
+def _measure(file: Path) -> bool:
+    """Whether it failed, in a process of its own: what one test file imports is not there for the next."""
+    return in_a_child(lambda: _write(file), HANGS_S) != SURVIVED
+
+
+def _write(file: Path) -> int:
+    kept = _kept(file)
+    kept.parent.mkdir(parents=True, exist_ok=True)
+    kept.write_text(json.dumps(_measured(file)))
+    return 0
+
+
+def _measured(file: Path) -> dict:
     few_examples()
     watch = coverage.Coverage(data_file=None, source_pkgs=["beaver_ftc"], config_file=False)
-    timed = _Timed(watch, SLOW_S.get(folder, SLOW_ELSEWHERE_S))
-    arguments = ["-q", "-p", "no:cacheprovider", "-m", "not acceptance", "--tb=no", "-rN"]
+    timed = _Timed(watch)
     with watch.collect():
-        pytest.main([*arguments, str(ROOT / "tests" / folder)], plugins=[timed])
-    data, lines = watch.get_data(), {}
+        pytest_quietly(["-m", "not acceptance", str(file)], [timed])
+    lines = _lines(watch.get_data(), set(timed.seconds))
+    sources = {*lines, *_tests_own(), file.relative_to(ROOT).as_posix()}
+    return {
+        "sources": _digests(sources),
+        "seconds": timed.seconds,
+        "left_out": timed.left_out,
+        "lines": lines,
+    }
+
+
+def _lines(data: coverage.CoverageData, tests: set[str]) -> dict[str, dict[int, list[str]]]:
+    """{file: {line: tests}} of the files of which a test executes more than the import."""
+    found = {}
     for file in data.measured_files():
-        name = Path(file).relative_to(ROOT).as_posix()
-        by_line = data.contexts_by_lineno(file).items()
-        lines[name] = {line: [t for t in tests if t in timed.seconds] for line, tests in by_line}
-    return {"seconds": timed.seconds, "lines": lines}
+        by_line = data.contexts_by_lineno(file)
+        if any(context for contexts in by_line.values() for context in contexts):
+            name = Path(file).relative_to(ROOT).as_posix()
+            found[name] = {line: [c for c in contexts if c in tests] for line, contexts in by_line.items()}
+    return found
+
+
+def _tests_own() -> set[str]:
+    """The modules of tests/ and tools/ that are loaded."""
+    files = (getattr(module, "__file__", None) for module in list(sys.modules.values()))
+    roots = (ROOT / "tests", ROOT / "tools")
+    inside = (Path(f) for f in files if f and any(Path(f).is_relative_to(root) for root in roots))
+    return {
+        file.relative_to(ROOT).as_posix()
+        for file in inside
+        if not file.is_relative_to(ROOT / "tools" / "mutants")
+    }
 
 
 def few_examples() -> None:
@@ -74,55 +148,63 @@ def few_examples() -> None:
 class _Timed:
     """Notes for each test that passes how long it took, and gives up one that is slow."""
 
-    def __init__(self, watch: coverage.Coverage, slow_s: float) -> None:
-        self._watch, self._slow_s = watch, slow_s
+    def __init__(self, watch: coverage.Coverage) -> None:
+        self._watch = watch
         self.seconds: dict[str, float] = {}
+        self.left_out: Counter[str] = Counter()
+        self._slow: Counter[str] = Counter()
+        self._is_slow = False
 
     @pytest.hookimpl(wrapper=True)
     def pytest_runtest_protocol(self, item: pytest.Item) -> Iterator[None]:
         self._watch.switch_context(item.nodeid)
-        self._start = time.process_time()
-        with limit(self._slow_s):
-            return (yield)
+        self._start, self._is_slow = time.process_time(), False
+        if self._slow[_function(item.nodeid)] >= PATIENCE:
+            item.add_marker(pytest.mark.skip(reason="takes too long for this"))
+            self._is_slow = True
+        with _limit(self._give_up):
+            yield
+        if self._is_slow:
+            self.seconds.pop(item.nodeid, None)
+            self._slow[_function(item.nodeid)] += 1
+            self.left_out["takes too long"] += 1
+
+    def _give_up(self) -> None:
+        self._is_slow = True
+        pytest.skip("takes too long for this", allow_module_level=True)
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         if report.when == "call" and report.passed:
             self.seconds[report.nodeid] = round(time.process_time() - self._start, 4)
         elif report.failed:
             self.seconds.pop(report.nodeid, None)
+            self.left_out["fails in plain Python"] += 1
+        elif report.skipped and "takes too long for this" in str(report.longrepr):
+            self._is_slow = True  # also those that share what took too long
 
 
-class limit:  # noqa: N801  # a context manager
-    """End what runs inside as a skipped test: after so many seconds of processor, or a good while of waiting
-    for other processes.
+def _function(test: str) -> str:
+    return test.partition("[")[0]
+
+
+@contextmanager
+def _limit(give_up: Callable[[], None]) -> Iterator[None]:
+    """Give up what runs inside after so many seconds of processor, or a good while of waiting for other
+    processes; and again and again, as whoever was at work may not have let go.
     """
+    clocks = {signal.SIGPROF: (signal.ITIMER_PROF, SLOW_S), signal.SIGALRM: (signal.ITIMER_REAL, 30 * SLOW_S)}
 
-    def __init__(self, seconds: float) -> None:
-        self._seconds = seconds
-
-    def __enter__(self) -> None:
-        for number, timer, seconds in self._clocks():
-            signal.signal(number, self._give_up)
-            signal.setitimer(timer, seconds)
-
-    def __exit__(self, *_) -> None:
-        for _, timer, _ in self._clocks():
-            signal.setitimer(timer, 0.0)
-
-    def _clocks(self) -> tuple:
-        return (
-            (signal.SIGPROF, signal.ITIMER_PROF, self._seconds),
-            (signal.SIGALRM, signal.ITIMER_REAL, 10 * self._seconds),
-        )
-
-    def _give_up(self, number: int, frame: FrameType | None) -> None:
+    def over(number: int, frame: FrameType | None) -> None:
         if frame and "coverage" in frame.f_code.co_filename:  # it holds a lock
-            signal.setitimer({c[0]: c[1] for c in self._clocks()}[number], 0.01)
+            signal.setitimer(clocks[number][0], 0.01, 0.5)
         else:
-            pytest.skip("takes too long for this", allow_module_level=True)
+            give_up()
 
-
-if __name__ == "__main__":
-    os.environ["NUMBA_DISABLE_JIT"] = "1"
-    KEPT.mkdir(exist_ok=True)
-    Path(sys.argv[2]).write_text(json.dumps(_measured(sys.argv[1])))
+    for number, (timer, seconds) in clocks.items():
+        signal.signal(number, over)
+        signal.setitimer(timer, seconds, 0.5)
+    try:
+        yield
+    finally:
+        for timer, _ in clocks.values():
+            signal.setitimer(timer, 0.0)

@@ -1,5 +1,6 @@
 """One mutant on trial: a process in which it stands in for the true module, and the tests that reach it."""
 
+import ast
 import contextlib
 import importlib.abc
 import importlib.util
@@ -8,20 +9,36 @@ import signal
 import sys
 import tempfile
 import time
+from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import pytest
 
 from tools.mutants.making import Mutant
-from tools.mutants.reach import ROOT, few_examples
+from tools.mutants.scope import ROOT
 
-BUDGET_S = 20.0  # of tests for one mutant, by what they take with the true module
-ENDLESS_S = 90.0  # of processor: longer than all of them take
+BUDGET_S = 10.0  # of tests for one mutant, by what they take with the true module
+ENDLESS_S, ENDLESS = 20.0, 10.0  # of processor, and times what the tests take with the true module: it hangs
 
-SURVIVED, KILLED, ENDLESS = 0, 1, 2
+SURVIVED, KILLED, HANGS, UNREACHED = "LIVES", "killed", "hangs", "NO TEST"
 
 
-def chosen(tests: list[str], seconds: dict[str, float]) -> list[str]:
+def outcome(mutant: Mutant, tests: list[str], seconds: dict[str, float]) -> str:
+    """KILLED if one of the tests fails with the mutant, and passes, alone, with the true module."""
+    tests = _chosen(tests, seconds)
+    while tests:
+        limit_s = ENDLESS_S + ENDLESS * sum(seconds[test] for test in tests)
+        with tempfile.NamedTemporaryFile("r") as note:
+            ended = _run(mutant.file, mutant.source(), tests, Path(note.name), limit_s)
+            failed = note.read().strip()
+        if ended != KILLED or _is_sound(mutant.file, failed):
+            return ended
+        tests.remove(failed)
+    return UNREACHED
+
+
+def _chosen(tests: list[str], seconds: dict[str, float]) -> list[str]:
     """The quickest tests first, as many as the budget allows."""
     taken, spent = [], 0.0
     for test in sorted(tests, key=seconds.__getitem__):
@@ -32,45 +49,78 @@ def chosen(tests: list[str], seconds: dict[str, float]) -> list[str]:
     return taken
 
 
-def outcome(mutant: Mutant, tests: list[str]) -> int:
-    """SURVIVED, KILLED or ENDLESS; the tests run in a child, for which the libraries are loaded already."""
+@cache
+def _is_sound(file: Path, test: str) -> bool:
+    """Whether a test passes alone with the true module, put in place as a mutant is."""
+    if not test:
+        return True  # none was run: the mutant cannot be imported
+    true = ast.unparse(ast.parse(file.read_text()))
+    return _run(file, true, [test], Path(os.devnull), 1000.0) == SURVIVED
+
+
+def _run(file: Path, source: str, tests: list[str], note: Path, limit_s: float) -> str:
+    def tried() -> int:
+        return pytest_quietly(["-x", *tests], [_Instead(file, source), _Note(note)])
+
+    return in_a_child(tried, limit_s)
+
+
+def in_a_child(work: Callable[[], int], limit_s: float) -> str:
+    """SURVIVED if `work` returns 0, KILLED if it does not, HANGS if it takes so much of the processor.
+
+    A child has the libraries loaded already, and leaves nothing behind.
+    """
     child = os.fork()
     if child == 0:
-        _run(mutant, tests)  # does not return
-    return _verdict(child)
+        _work(work, limit_s)  # does not return
+    return _end(child, 20 * limit_s)
 
 
-def _verdict(child: int) -> int:
+def _work(work: Callable[[], int], limit_s: float) -> None:
+    status = 1
+    try:
+        signal.signal(signal.SIGVTALRM, signal.SIG_DFL)
+        signal.setitimer(signal.ITIMER_VIRTUAL, limit_s)  # its signal ends the process
+        status = work()
+    finally:
+        os._exit(status)
+
+
+def _end(child: int, wait_s: float) -> str:
     started = time.monotonic()
     while True:
         done, status = os.waitpid(child, os.WNOHANG)
+        if done and os.WIFSIGNALED(status):
+            return HANGS if os.WTERMSIG(status) == signal.SIGVTALRM else KILLED
         if done:
             return SURVIVED if os.waitstatus_to_exitcode(status) == 0 else KILLED
-        if time.monotonic() - started > 10 * ENDLESS_S:
+        if time.monotonic() - started > wait_s:  # it waits for what never comes
             os.kill(child, signal.SIGKILL)
             os.waitpid(child, 0)
-            return ENDLESS
-        time.sleep(0.05)
+            return HANGS
+        time.sleep(0.02)
 
 
-def _run(mutant: Mutant, tests: list[str]) -> None:
-    """In the child: 0 if all tests pass. A mutant that cannot be imported, or never ends, is not 0."""
-    status = 1
-    try:
-        few_examples()
-        signal.setitimer(signal.ITIMER_PROF, ENDLESS_S)  # its signal ends the process
-        instead = _Instead(mutant.file, mutant.source())
-        with tempfile.TemporaryDirectory() as scratch, open(os.devnull, "w") as nowhere:
-            os.environ["HYPOTHESIS_STORAGE_DIRECTORY"] = scratch
-            os.chdir(ROOT)
-            os.dup2(nowhere.fileno(), 1)
-            os.dup2(nowhere.fileno(), 2)
-            with contextlib.redirect_stdout(nowhere), contextlib.redirect_stderr(nowhere):
-                status = int(
-                    pytest.main(["-x", "-q", "-p", "no:cacheprovider", "--tb=no", *tests], [instead])
-                )
-    finally:
-        os._exit(status)
+def pytest_quietly(arguments: list[str], plugins: list) -> int:
+    """Run tests as a child of this does: without a word, and without what earlier ones have found."""
+    with tempfile.TemporaryDirectory() as scratch, open(os.devnull, "w") as nowhere:
+        os.environ["HYPOTHESIS_STORAGE_DIRECTORY"] = scratch
+        os.chdir(ROOT)
+        os.dup2(nowhere.fileno(), 1)
+        os.dup2(nowhere.fileno(), 2)
+        with contextlib.redirect_stdout(nowhere), contextlib.redirect_stderr(nowhere):
+            return int(pytest.main(["-q", "-p", "no:cacheprovider", "--tb=no", *arguments], plugins))
+
+
+class _Note:
+    """Writes down which test failed."""
+
+    def __init__(self, file: Path) -> None:
+        self._file = file
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        if report.failed:
+            self._file.write_text(report.nodeid)
 
 
 class _Instead(importlib.abc.MetaPathFinder, importlib.abc.SourceLoader):

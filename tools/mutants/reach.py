@@ -22,6 +22,7 @@ from tools.mutants.trial import SURVIVED, in_a_child, pytest_quietly
 
 SLOW_S = 1.0  # of processor, counting lines; a test that takes longer in plain Python is none for this
 PATIENCE = 1  # so many slow cases of one test, and its other cases are not tried
+FLIES = 4  # so many slow tests first in a file, and none of it is tried: all of them fly
 HANGS_S = 600.0  # of processor for the tests of one file, far more than the limits allow
 EXAMPLES = 4
 KEPT = ROOT / ".mutants"
@@ -159,7 +160,8 @@ class _Timed:
     def pytest_runtest_protocol(self, item: pytest.Item) -> Iterator[None]:
         self._watch.switch_context(item.nodeid)
         self._start, self._is_slow = time.process_time(), False
-        if self._slow[_function(item.nodeid)] >= PATIENCE:
+        all_fly = not self.seconds and len(self._slow) >= FLIES
+        if all_fly or self._slow[_function(item.nodeid)] >= PATIENCE:
             item.add_marker(pytest.mark.skip(reason="takes too long for this"))
             self._is_slow = True
         with _limit(self._give_up):

@@ -18,7 +18,7 @@ import pytest
 from tools.mutants.making import Mutant
 from tools.mutants.scope import ROOT
 
-BUDGET_S = 10.0  # of tests for one mutant, by what they take with the true module
+BUDGET_S = 6.0  # of tests for one mutant, by what they take with the true module
 ENDLESS_S, ENDLESS = 20.0, 10.0  # of processor, and times what the tests take with the true module: it hangs
 
 SURVIVED, KILLED, HANGS, UNREACHED = "LIVES", "killed", "hangs", "NO TEST"

@@ -1,0 +1,360 @@
+"""Each loop of the autopilot by itself, one frame from a known state, against the equations of its page."""
+
+import numpy as np
+import pytest
+
+from beaver_ftc.control.outer import autopilot as loops
+from beaver_ftc.control.outer import profile
+from beaver_ftc.control.outer.state import ALTITUDE, AUTOPILOT, BANK, HEADING, N_CHANNELS, SPEED
+from beaver_ftc.control.state import control_dtype
+from beaver_ftc.design.model import AIRSPEED, ALPHA, BETA, DPT, QDYN
+from beaver_ftc.diagnosis.state import PITCH, ROLL, YAW
+
+DT, G, V, ALPHA_NOW = 0.05, 9.8, 44.0, 0.08
+AILERON, ELEVATOR, RUDDER = 0, 1, 2
+GAINS = {
+    "altitude": 0.7, "altitude_i": 0.04, "attitude": 3.0, "speed": 0.3, "speed_i": 0.015, "bank": 1.1,
+    "bank_i": 0.2, "heading": 0.25, "heading_i": 0.04, "sideslip": 0.5, "alpha_s": 2.0, "airspeed_s": 3.0,
+    "jammed_s": 1.5, "authority_s": 1.2, "bank_s": 6.0, "spare_mps": 2.0, "path_per_mps": 0.02, "loose": 0.4,
+    "protection": 2.0,
+}  # fmt: skip
+MEASURED = np.dtype([("y", "f8", (8,)), ("attitude", "f8", (3,)), ("altitude", "f8")], align=True)
+
+
+def record(dtype):
+    return np.zeros(1, dtype).view(np.recarray)[0]
+
+
+def new_autopilot(*channels, **fields):
+    pilot = record(AUTOPILOT)
+    pilot["dt"], pilot["gravity"], pilot["airspeed"], pilot["alpha"] = DT, G, V, ALPHA_NOW
+    pilot["dihedral"], pilot["slowest_mps"], pilot["steepest_alpha"] = 0.02, 35.0, 0.26
+    pilot["trim_inhg"], pilot["low_inhg"], pilot["high_inhg"], pilot["step_inhg"] = 20.0, 12.0, 28.0, 0.5
+    pilot["most"], pilot["limit"], pilot["most_bank"], pilot["bank_limit"] = (0.2, 0.1, 0.15), 10.0, 0.5, 0.5
+    pilot["flying"], pilot["thrust"], pilot["climb_in_trim"] = 1, (0.2, 0.1), 0.01
+    for name, gain in GAINS.items():
+        pilot["gain"][name] = gain
+    for channel in channels:
+        pilot["commanded"][channel] = 1
+    for name, value in fields.items():
+        pilot[name] = value
+    return pilot
+
+
+def new_control(**fields):
+    control = record(control_dtype(4))
+    control["main"], control["effectiveness"], control["least_effectiveness"] = (0, 1, 2), 1.0, 0.1
+    control["power"]["dpt_factor"], control["power"]["highest_dpt"] = 40.0, 0.9
+    for name, value in fields.items():
+        control[name] = value
+    return control
+
+
+def new_y(alpha=0.1, beta=0.03, airspeed=46.0, dpt=0.4):
+    y = np.zeros(8)
+    y[[ALPHA, BETA, AIRSPEED, QDYN, DPT]] = alpha, beta, airspeed, 0.55 * airspeed**2, dpt
+    return y
+
+
+def seen(attitude=(0.0, 0.0, 0.0), altitude=1000.0, **air):
+    measured = record(MEASURED)
+    measured["y"], measured["attitude"], measured["altitude"] = new_y(**air), attitude, altitude
+    return measured
+
+
+def test_it_takes_over_in_trim():
+    pilot = new_autopilot(flying=0)
+    loops.take_over(pilot, new_control(), new_y(), np.array([0.0, 0.13, 0.0]))
+    assert pilot["flying"] == 1
+    assert pilot["alpha"] == 0.1
+    assert pilot["airspeed"] == pilot["usual"] == 46.0
+    assert pilot["climb_in_trim"] == pytest.approx(0.03)
+
+
+@pytest.mark.parametrize(("surface", "share"), [(AILERON, "jammed"), (RUDDER, "loose")])
+@pytest.mark.parametrize("left", [0.0, 0.0999, 0.1, 1.0])
+def test_signals_are_smoothed_and_a_lost_surface_is_noticed(surface, share, left):
+    pilot, control = new_autopilot(jammed=0.5, loose=0.5), new_control()
+    control["effectiveness"][surface] = left
+    loops.follow(pilot, control, new_y())
+    assert pilot["alpha"] == pytest.approx(ALPHA_NOW + DT / 2.0 * (0.1 - ALPHA_NOW))
+    assert pilot["airspeed"] == pytest.approx(V + DT / 3.0 * (46.0 - V))
+    for name in ("jammed", "loose"):
+        goal = 1.0 if name == share and left < 0.1 else 0.0
+        assert pilot[name] == pytest.approx(0.5 + DT / 1.5 * (goal - 0.5))
+
+
+def limited(jammed=0.0, loose=0.0, hold=(0.0, 0.0, 0.0)):
+    pilot, control = new_autopilot(jammed=jammed, loose=loose), new_control(hold=hold)
+    control["G"] = np.diag([0.1, 0.2, 0.05, 0.0])[:3]
+    control["low"], control["high"] = -0.5, (1.0, 0.5, 2.0, 0.0)
+    loops.limit(pilot, control)
+    return pilot
+
+
+def test_rates_are_what_the_smaller_spare_acceleration_gives():
+    pilot = limited(hold=(0.01, 0.06, -0.03))
+    # -0.05..0.1, -0.1..0.1, -0.025..0.1 rad/s2, less what holding takes; roll: 1.2 s of 0.06 is below 0.2
+    assert pilot["limit"] == pytest.approx([1.2 * 0.06, 1.2 * 0.04, 0.0])
+    assert pilot["bank_limit"] == pytest.approx(6.0 * 1.2 * 0.06)
+
+
+def test_a_healthy_aircraft_is_asked_for_no_more_than_declared():
+    pilot, control = new_autopilot(), new_control()
+    control["G"], control["low"], control["high"] = np.eye(3, 4), -1.0, 1.0
+    loops.limit(pilot, control)
+    assert pilot["limit"] == pytest.approx([0.2, 0.1, 0.15])
+    assert pilot["bank_limit"] == 0.5
+
+
+def test_without_ailerons_roll_is_what_sideslip_gives_and_banks_are_halved():
+    pilot = limited(jammed=0.9, hold=(0.2, 0.0, 0.0))
+    assert pilot["limit"][ROLL] == pytest.approx(0.9 * 0.02 * V * loops.MOST_SIDESLIP_RAD)
+    assert limited(jammed=0.9, loose=0.2)["bank_limit"] <= 0.5 * (1.0 - 0.45)
+    assert limited(loose=1.0)["bank_limit"] == pytest.approx(0.25)
+
+
+def test_thrust_per_inhg_is_the_slope_of_the_thrust():
+    """Thrust over mass q (a dpt + b alpha dpt^2), dpt affine in the pressure."""
+    pilot, control, y = new_autopilot(), new_control(), new_y()
+    slope = 40.0 / (2.0 * y[QDYN] * V)
+
+    def thrust(inhg):
+        dpt = y[DPT] + slope * inhg
+        return y[QDYN] * (0.2 * dpt + 0.1 * ALPHA_NOW * dpt**2)
+
+    numeric = (thrust(1e-4) - thrust(-1e-4)) / 2e-4
+    assert loops.thrust_per_inhg(pilot, control, y) == pytest.approx(numeric, rel=1e-6)
+    pilot["thrust"] = -1.0, 0.0
+    assert loops.thrust_per_inhg(pilot, control, y) == loops.LEAST_PUSH
+
+
+PUSH = 0.2  # m/s2 per inHg
+
+
+def test_paths_are_bounded_by_the_engine_and_the_airspeed_there_is():
+    pilot = new_autopilot(SPEED)
+    pilot["command"][SPEED] = 43.0
+    low, high = loops.paths(pilot, PUSH)
+    # idle is 8 inHg below trim, full 8 above; 44 m/s is 1 below 45 and 3 above 41
+    assert low == pytest.approx(max(0.01 - 8 * PUSH / G - 0.02 * 1.0, -loops.MOST_PATH_RAD))
+    assert high == pytest.approx(min(0.01 + 8 * PUSH / G + 0.02 * 3.0, loops.MOST_PATH_RAD))
+    low, high = loops.paths(pilot, 0.01)
+    assert low == pytest.approx(0.01 - 0.08 / G - 0.02)
+    assert high == pytest.approx(0.01 + 0.08 / G + 0.06)
+
+
+@pytest.mark.parametrize("commanded", [36.0, 43.0])
+def test_nothing_is_climbed_below_the_slowest_airspeed(commanded):
+    pilot = new_autopilot(SPEED, airspeed=33.0)
+    pilot["command"][SPEED] = commanded
+    slow = max(35.0, commanded - 2.0)
+    assert loops.paths(pilot, 0.01)[1] == pytest.approx(0.01 + 0.08 / G - 0.02 * (slow - 33.0), abs=1e-12)
+    pilot["airspeed"] = 10.0
+    assert loops.paths(pilot, 0.01)[1] == -loops.MOST_PATH_RAD
+
+
+def test_without_an_airspeed_the_engine_stays_and_descents_are_free():
+    low, high = loops.paths(new_autopilot(), PUSH)
+    assert low == -loops.MOST_PATH_RAD
+    assert high == pytest.approx(min(0.01 + 0.02 * (V - 35.0), loops.MOST_PATH_RAD))
+
+
+@pytest.mark.parametrize("error", [-2.0, 0.5, 3.0])
+def test_a_path_closes_a_height_and_integrates_what_is_missing(error):
+    pilot = new_autopilot(ALTITUDE, lift=0.004)
+    pilot["command"][ALTITUDE], pilot["moving"][ALTITUDE] = 1000.0 + error, 0.3
+    path = loops.path_of(pilot, seen(), PUSH)
+    assert path == pytest.approx((0.3 + 0.7 * error) / V + 0.004)
+    assert pilot["lift"] == pytest.approx(0.004 + DT * 0.04 * error / V)
+
+
+@pytest.mark.parametrize("error", [-100.0, 100.0])
+def test_a_path_beyond_what_can_be_flown_is_cut_and_not_integrated(error):
+    pilot = new_autopilot(ALTITUDE, lift=0.004)
+    pilot["command"][ALTITUDE] = 1000.0 + error
+    assert loops.path_of(pilot, seen(), PUSH) == loops.paths(pilot, PUSH)[int(error > 0)]
+    assert pilot["lift"] == 0.004
+
+
+def test_what_is_found_missing_has_a_limit_and_without_a_height_the_path_is_the_flown_one():
+    pilot = new_autopilot(ALTITUDE, lift=0.2, moving=(-0.15 * V, 0, 0, 0))
+    pilot["command"][ALTITUDE] = 1000.0
+    loops.path_of(pilot, seen(), PUSH)
+    assert pilot["lift"] == loops.MOST_MISSING
+    flown = loops.path_of(new_autopilot(), seen(attitude=(0, 0.12, 0)), PUSH)
+    assert flown == pytest.approx(0.12 - ALPHA_NOW)
+
+
+def test_the_pitch_attitude_is_path_and_incidence_in_the_bank():
+    pilot, attitude = new_autopilot(ALTITUDE), np.array([0.4, 0.1, 0.0])
+    wanted = 3.0 * (0.02 + ALPHA_NOW * np.cos(0.4) - 0.1)
+    assert loops.pitching(pilot, new_y(), attitude, 0.02) == pytest.approx(wanted)
+    pilot["limit"] = 0.001
+    assert loops.pitching(pilot, new_y(), attitude, 0.02) == pytest.approx(-0.001)
+    pilot["limit"] = 10.0
+    assert loops.pitching(pilot, new_y(alpha=0.25), attitude, 0.9) == pytest.approx(2.0 * 0.01)
+    assert loops.pitching(new_autopilot(), new_y(), attitude, 0.02) == 0.0
+
+
+def test_a_heading_is_flown_by_a_bank():
+    pilot = new_autopilot(HEADING, drift=0.5, most_bank=2.0, bank_limit=2.0)
+    pilot["command"][HEADING], pilot["moving"][HEADING] = 3.1, 0.01
+    rate = loops.rolling(pilot, np.array([0.02, 0.0, -3.1]))
+    error = -(2 * np.pi - 6.2)
+    assert rate == pytest.approx(1.1 * (V / G * (0.25 * error + 0.01) - 0.02))
+    assert pilot["drift"] == 0.0
+
+
+@pytest.mark.parametrize("error", [0.02, 5.0])
+def test_where_nothing_acts_in_yaw_turns_are_slow_and_a_drift_is_found(error):
+    pilot = new_autopilot(HEADING, loose=0.8, drift=0.03, bank_limit=100.0)
+    pilot["command"][HEADING] = min(error, 3.0)
+    rate = loops.rolling(pilot, np.zeros(3))
+    off = min(error, 3.0)
+    drift = 0.8 * min(0.03 + DT * 0.8 * 0.04 * off, loops.MOST_DRIFT_RAD_S)
+    assert pilot["drift"] == pytest.approx(drift)
+    assert rate == pytest.approx(1.1 * V / G * ((1 - 0.8 * 0.6) * 0.25 * off + drift))
+
+
+def test_the_drift_found_has_a_limit():
+    pilot = new_autopilot(HEADING, loose=1.0, drift=0.3)
+    loops.rolling(pilot, np.zeros(3))
+    assert pilot["drift"] == loops.MOST_DRIFT_RAD_S
+
+
+def test_a_bank_is_held_and_what_roll_misses_without_ailerons_is_integrated():
+    pilot = new_autopilot(BANK, jammed=0.5, rolled=0.02)
+    pilot["command"][BANK] = 0.3
+    rate = loops.rolling(pilot, np.array([0.1, 0.0, 0.0]))
+    assert rate == pytest.approx(1.1 * 0.2 + 0.5 * 0.02)
+    assert pilot["rolled"] == pytest.approx(0.02 + 0.5 * DT * 0.2 * 0.2)
+    pilot["bank_limit"], pilot["rolled"] = 0.05, 0.0
+    assert loops.rolling(pilot, np.array([0.1, 0.0, 0.0])) == pytest.approx(1.1 * -0.05)
+    pilot["limit"], kept = 0.01, float(pilot["rolled"])
+    assert loops.rolling(pilot, np.array([0.4, 0.0, 0.0])) == -0.01
+    assert pilot["rolled"] == kept
+    assert loops.rolling(new_autopilot(), np.array([0.1, 0.0, 0.0])) == 0.0
+
+
+@pytest.mark.parametrize("jammed", [0.0, 0.6])
+@pytest.mark.parametrize("rolling", [0.02, 1.0])
+def test_the_rudder_keeps_the_sideslip_that_rolls_where_the_ailerons_do_not(jammed, rolling):
+    pilot, attitude = new_autopilot(BANK, jammed=jammed), np.zeros(3)
+    loops.to_body(pilot, new_y(), attitude, rolling, 0.0)
+    wanted = -jammed * min(rolling / (0.02 * V), loops.MOST_SIDESLIP_RAD)
+    assert pilot["rates"] == pytest.approx([rolling, 0.0, 0.5 * (0.03 - wanted)])
+
+
+def test_without_a_lateral_command_nothing_yaws_and_a_yaw_is_limited():
+    pilot = new_autopilot(ALTITUDE)
+    loops.to_body(pilot, new_y(), np.array([0.3, 0.1, 0.0]), 0.02, 0.05)
+    assert pilot["rates"] == pytest.approx([0.02, 0.05 * np.cos(0.3), 0.0])
+    pilot = new_autopilot(HEADING, limit=(10.0, 10.0, 0.004))
+    loops.to_body(pilot, new_y(), np.zeros(3), 0.0, 0.0)
+    assert pilot["rates"][YAW] == 0.004
+
+
+def test_upside_down_the_turn_stays_finite():
+    pilot = new_autopilot(BANK)
+    loops.to_body(pilot, new_y(beta=0.0), np.array([1.55, 0.0, 0.0]), 0.0, 0.0)
+    turning = G / V * np.sin(1.55) / 0.1
+    assert pilot["rates"][PITCH] == pytest.approx(turning * np.sin(1.55))
+    assert pilot["rates"][YAW] == pytest.approx(turning * np.cos(1.55))
+
+
+def throttled(path=0.03, y=None, power=(), rudder=1.0, **fields):
+    pilot, control = new_autopilot(SPEED, **{"usual": 43.0, "throttle": 0.05, **fields}), new_control()
+    pilot["command"][SPEED], pilot["moving"][SPEED] = 45.0, 0.04
+    control["effectiveness"][RUDDER] = rudder
+    control["power"]["command"][0] = 21.0
+    for name, value in dict(power).items():
+        control["power"][name] = value
+    loops.throttle(pilot, control, new_y(dpt=0.2) if y is None else y, path, PUSH)
+    return pilot, control["power"]
+
+
+def test_power_holds_the_airspeed_and_carries_the_climb():
+    pilot, power = throttled()
+    wanted = 20.0 + (0.04 + 0.05 + 0.3 * 1.0 + G * (0.03 - 0.01)) / PUSH
+    assert power["trim"] == pytest.approx(wanted)
+    assert power["in_use"] == 1
+    assert pilot["throttle"] == pytest.approx(0.05 + DT * 0.015 * 1.0)
+    assert pilot["usual"] == pytest.approx(43.0 + DT / loops.USUAL_S * 1.0)
+    assert power["command"][0] == 21.5  # half an inHg a frame
+
+
+def test_power_goes_down_as_slowly_and_to_the_lowest():
+    pilot, power = throttled(path=-0.5)
+    assert power["trim"] == 12.0
+    assert power["command"][0] == 20.5
+    assert pilot["throttle"] == 0.05  # what a limit cuts off is not integrated
+    assert throttled(path=0.5)[1]["trim"] == 28.0
+    assert throttled(throttle=5.0, path=-0.45)[0]["throttle"] == pytest.approx(loops.MOST_MISSING * G)
+    assert throttled(power={"enabled": 1})[1]["command"][0] == 21.0
+
+
+def test_small_steps_of_power_are_taken_at_once():
+    _, power = throttled(path=0.01 + (0.9 * PUSH + 0.2 - 0.05 - 0.04 - 0.3 - 0.2 + 0.001) / G)
+    assert power["command"][0] == pytest.approx(power["trim"])
+    assert abs(power["trim"] - 21.0) < 0.5
+
+
+@pytest.mark.parametrize("rudder", [1.0, 0.5, 0.02])
+def test_power_leaves_the_rudder_enough(rudder):
+    """The propeller yaws with dpt^3, the rudder holds what is left of it; 0.1 is reckoned with at least."""
+    y = new_y(dpt=0.85)
+    _, power = throttled(path=0.5, y=y, rudder=rudder)
+    dpt = y[DPT] + (power["trim"] - 21.0) * 40.0 / (2.0 * y[QDYN] * y[AIRSPEED])
+    yawing = (dpt / 0.9) ** 3
+    assert yawing == pytest.approx(max(rudder, 0.1), rel=1e-9) or power["trim"] in (12.0, 28.0)
+
+
+def test_while_power_stands_in_for_pitch_it_gets_the_airspeed_to_hold():
+    _, power = throttled(power={"engaged": 1})
+    usual = 43.0 + DT / loops.USUAL_S
+    assert power["usual_speed"] == pytest.approx(45.0)
+    assert power["trim"] == pytest.approx(20.0 + (0.04 + 0.05 + G * 0.02) / PUSH)
+    _, power = throttled(power={"engaged": 1}, usual=38.0)
+    usual = 38.0 + DT / loops.USUAL_S * (V - 38.0)
+    assert power["usual_speed"] == pytest.approx(usual + loops.USUAL_MPS)
+
+
+def test_deviations_are_judged_once_settled_and_of_the_airspeed_the_mean():
+    pilot = new_autopilot(ALTITUDE, SPEED, HEADING, BANK)
+    pilot["command"] = 1000.0, 45.0, 3.1, 0.2
+    pilot["changed_at_s"], pilot["mean_off"] = 10.0, -0.5
+    loops.judge(pilot, 990.0, 47.0, -3.1, -0.1, 39.9)
+    mean = -0.5 + DT / loops.MEAN_S * 2.5
+    assert pilot["mean_off"] == pytest.approx(mean)
+    assert pilot["worst"] == pytest.approx([10.0, abs(mean), 0.0, 0.0])
+    loops.judge(pilot, 1001.0, 47.0, -3.1, -0.1, 40.0)
+    assert pilot["worst"][ALTITUDE] == 10.0
+    assert pilot["worst"][[HEADING, BANK]] == pytest.approx([2 * np.pi - 6.2, 0.3])
+    idle = new_autopilot()
+    loops.judge(idle, 990.0, 47.0, 1.0, 1.0, 100.0)
+    assert not idle["worst"].any()
+
+
+@pytest.mark.parametrize("angle", [-9.0, -3.2, -3.1, 0.0, 2.0, 3.2, 9.0])
+def test_a_direction_is_given_within_half_a_turn(angle):
+    assert profile.turn(angle) == pytest.approx(np.arctan2(np.sin(angle), np.cos(angle)))
+
+
+def test_a_frame_is_its_loops_one_after_the_other():
+    """From a heading and an altitude hold in trim: nothing to do but to keep the bank and the path."""
+    pilot, control = new_autopilot(flying=0), new_control()
+    control["G"], control["low"], control["high"] = np.eye(3, 4), -1.0, 1.0
+    control["power"]["command"][0] = 20.0
+    pilot["legs"], pilot["value"][:, 0] = (1, 1, 1, 0), np.nan
+    pilot["speed"] = np.inf
+    measured = seen(attitude=(0.0, 0.11, 0.5), alpha=0.1, beta=0.02)
+    loops.steer(pilot, control, measured, 0.0)
+    assert pilot["commanded"][:3].all()
+    assert pilot["command"][:3] == pytest.approx([1000.0, 46.0, 0.5])
+    assert pilot["changed_at_s"] == pytest.approx(np.zeros(N_CHANNELS))
+    # pitch: path 0 + alpha - theta; yaw: the sideslip washed out
+    assert pilot["rates"] == pytest.approx([0.0, max(3.0 * -0.01, -0.1), 0.5 * 0.02])
+    assert control["power"]["trim"] == pytest.approx(
+        20.0 - G * 0.01 / loops.thrust_per_inhg(pilot, control, measured["y"])
+    )

@@ -1,0 +1,27 @@
+"""Records that kernels of the diagnosis are tried on, one at a time."""
+
+import numpy as np
+
+from beaver_ftc.diagnosis.state import LOSS, diagnosis_dtype
+
+DT, POLES = 0.02, np.array([1e6, 4.0, 0.5])
+
+
+def new_fdi():
+    fdi = np.zeros(1, diagnosis_dtype(4)).view(np.recarray)[0]
+    fdi["dt"], fdi["bank"]["n"], fdi["bank"]["decay"][:3] = DT, 3, np.exp(-POLES * DT)
+    fdi["forgetting"], fdi["fie_decay"] = 0.98, np.exp(-np.array([3.0, 4.0, 5.0]) * DT)
+    return fdi
+
+
+def estimator(fdi, kind=LOSS, surface=0, low=-1.0, high=0.0):
+    fdi["n_estimators"] = max(int(fdi["n_estimators"]), 1)
+    fie = fdi["estimator"][0]
+    fie["kind"], fie["surface"], fie["low"], fie["high"] = kind, surface, low, high
+    fie["theta_low"], fie["theta_high"] = low, high
+    return fie
+
+
+def weights(decay, frames):
+    """What is left, at the end, of each frame's share; oldest first."""
+    return decay ** np.arange(frames)[::-1]

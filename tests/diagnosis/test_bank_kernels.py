@@ -1,0 +1,126 @@
+"""The bank of filters by itself: convolutions, and what a fault can have done to it by corners."""
+
+import numpy as np
+import pytest
+from kernels import DT, POLES, estimator, new_fdi, weights
+
+from beaver_ftc.diagnosis import bank
+
+
+def test_a_filter_and_its_bound_are_convolutions_of_what_went_in():
+    rng, frames, fdi = np.random.default_rng(1), 20, new_fdi()
+    x = rng.normal(size=(frames + 1, 3))
+    believed, eta = rng.normal(size=(frames, 3)), rng.uniform(0.1, 1.0, (frames, 3))
+    noise = rng.uniform(0.1, 1.0, (frames + 1, 3))
+    for k in range(frames):
+        fdi["bound"]["eta_bar"], fdi["bound"]["noise_then"] = eta[k], noise[k]
+        fdi["bound"]["noise"] = noise[k + 1]
+        bank.innovate(fdi, x[k + 1], x[k], believed[k])
+    innovation = np.diff(x, axis=0) / DT - believed
+    assert fdi["innovation"] == pytest.approx(innovation[-1])
+    assert fdi["bound"]["frame"] == pytest.approx(eta[-1] + (noise[-1] + noise[-2]) / DT)
+    for m, decay in enumerate(np.exp(-POLES * DT)):
+        w = weights(decay, frames)
+        assert fdi["bank"]["residual"][m] == pytest.approx(DT * w @ innovation)
+        assert fdi["bank"]["eta"][m] == pytest.approx(DT * w @ eta)
+        assert fdi["bank"]["noise"][m] == pytest.approx((1.0 - decay) * w @ noise[:-1])
+        whole = DT * w @ eta + (1.0 - decay) * w @ noise[:-1] + noise[-1]
+        assert fdi["bank"]["threshold"][m] == pytest.approx(whole)
+
+
+def with_shares(*shares):
+    """A bank whose filters (m, 3) reach these shares of their bounds."""
+    fdi = new_fdi()
+    shares = np.array(shares)
+    fdi["bank"]["threshold"][:3] = [[0.1, 0.2, 0.3], [0.4, 0.5, 0.6], [0.7, 0.8, 0.9]]
+    fdi["bank"]["residual"][:3] = shares * fdi["bank"]["threshold"][:3]
+    return fdi
+
+
+CALM, LEAVES = [[0.1, -0.2, 0.3]] * 3, [[0.1, 0.5, 0.2], [0.3, -1.5, 0.1], [0.4, 1.1, 1.2]]
+
+
+def test_the_alarm_is_of_the_first_axis_on_which_a_filter_leaves_its_bound():
+    assert bank.alarm(with_shares(*CALM)) == -1
+    assert bank.alarm(with_shares([1.0, -1.0, 1.0], *CALM[:2])) == -1  # at its bound is within
+    assert bank.alarm(with_shares(*LEAVES)) == 1
+    assert [bank.nearest(with_shares(*LEAVES)["bank"], i) for i in range(3)] == [2, 1, 2]
+    assert bank.largest_share(with_shares(*LEAVES)) == pytest.approx(1.5)
+
+
+def test_the_closest_approach_of_every_filter_is_kept():
+    fdi = with_shares(*LEAVES)
+    fdi["bank"]["closest"][:3], fdi["statistical"]["score"] = (0.6, 0.0, 0.0), 0.4
+    bank.note_closest_approach(fdi)
+    assert fdi["bank"]["closest"][:3] == pytest.approx([0.6, 1.5, 1.2])
+    assert fdi["statistical"]["closest"] == 0.4
+    silent = new_fdi()
+    bank.note_closest_approach(silent)
+    assert not silent["bank"]["closest"].any()
+    assert bank.largest_share(silent) == 0.0
+
+
+def test_the_direction_across_a_fault_is_of_unit_length_and_sees_nothing_of_it():
+    fdi = new_fdi()
+    fdi["n_estimators"] = 2
+    fdi["estimator"]["surface"][:2] = 2, 1
+    G = np.array([[0, 0, 3.0, 0], [0, 5.0, 0, 0], [0, 0, -4.0, 0]])
+    bank.align(fdi, G)
+    assert fdi["estimator"]["across"][0] == pytest.approx([-0.8, 0.0, -0.6])
+    assert fdi["estimator"]["across"][0] @ G[:, 2] == pytest.approx(0.0)
+    assert not fdi["estimator"]["across"][1].any()
+
+
+def reach_of(offset, Z, spread, low=-1.0, high=0.5, across=(0.6, 0.0, -0.8)):
+    fdi = new_fdi()
+    fie = estimator(fdi, low=low, high=high)
+    fie["effect"]["offset"], fie["effect"]["Z"], fie["effect"]["spread"] = offset, Z, spread
+    fie["across"] = across
+    return fdi, fie
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_what_a_fault_can_have_done_is_the_filtered_extreme_of_what_it_does(seed):
+    """By corners: theta at an end of its set or no fault at all, give or take the spread."""
+    rng = np.random.default_rng(seed)
+    fdi, fie = reach_of(0.2 * rng.normal(size=3), rng.normal(size=3), rng.uniform(0, 0.3, 3))
+    for _ in range(3):
+        bank.remember(fdi, fie)
+    effect, across = fie["effect"], np.vstack([np.eye(3), fie["across"]])
+    at_ends = [effect["offset"] + theta * effect["Z"] for theta in (-1.0, 0.5)]
+    does = np.array([*at_ends, np.zeros(3)]) @ across.T
+    spread = np.abs(across) @ effect["spread"]
+    for m, decay in enumerate(np.exp(-POLES * DT)):
+        kept = DT * weights(decay, 3).sum()
+        assert fie["reach_low"][m] == pytest.approx(kept * (does.min(axis=0) - spread))
+        assert fie["reach_high"][m] == pytest.approx(kept * (does.max(axis=0) + spread))
+
+
+@pytest.mark.parametrize("m", range(3))
+@pytest.mark.parametrize("axis", range(3))
+@pytest.mark.parametrize("side", [-1, 1])
+def test_a_fault_explains_what_is_within_its_reach_and_the_bound(m, axis, side):
+    def explained(beyond, unasked=False):
+        fdi, fie = reach_of(0.0, 0.0, 0.0, across=(0.0, 0.0, 0.0))
+        fie["reach_low"], fie["reach_high"], fdi["bank"]["threshold"] = -0.3, 0.5, 0.1
+        fie["unasked"][axis] = unasked
+        limit = -0.4 if side < 0 else 0.6
+        fdi["bank"]["residual"][m, axis] = limit + side * beyond
+        return bool(bank.explains(fdi, fie, True))
+
+    assert explained(-1e-9)
+    assert not explained(1e-9)
+    assert explained(1e-9, unasked=True)
+
+
+@pytest.mark.parametrize("side", [-1, 1])
+def test_across_its_direction_a_shared_parameter_confines_it_too(side):
+    fdi, fie = reach_of(0.0, 0.0, 0.0)
+    fie["reach_low"][:, :3], fie["reach_high"][:, :3] = -9.0, 9.0
+    fie["reach_low"][:, 3], fie["reach_high"][:, 3] = -0.2, 0.3
+    fdi["bank"]["threshold"][:3] = 0.1
+    limit = (0.3 if side > 0 else -0.2) + side * (0.6 + 0.8) * 0.1
+    for beyond, within in ((-1e-9, True), (1e-9, False)):
+        fdi["bank"]["residual"][1] = (limit + side * beyond) * fie["across"]  # a unit vector
+        assert bool(bank.explains(fdi, fie, True)) == within
+        assert bank.explains(fdi, fie, False)

@@ -1,0 +1,191 @@
+"""Detection estimator, network and belief, a kernel at a time: sums over instants and frames by NumPy."""
+
+import numpy as np
+import pytest
+from kernels import DT, new_fdi
+
+from beaver_ftc.diagnosis import belief as beliefs
+from beaver_ftc.diagnosis import detection, network
+from beaver_ftc.diagnosis.state import (
+    ALPHA_CENTRES,
+    BETA_CENTRES,
+    EITHER,
+    N_BASIS,
+    NETWORK,
+    STATISTICS,
+    WORST_CASE,
+)
+
+
+def new_network(**fields):
+    record = np.zeros(1, NETWORK).view(np.recarray)[0]
+    for name, value in fields.items():
+        record[name] = value
+    return record
+
+
+@pytest.mark.parametrize("alpha", [-0.3, -0.1, 0.0, 0.13, 0.5, 0.9])
+@pytest.mark.parametrize("beta", [-0.5, 0.07, 0.3, 0.4])
+def test_the_basis_is_that_of_gaussians_as_wide_as_their_spacing(alpha, beta):
+    out = np.zeros(N_BASIS)
+    network.basis(alpha, beta, out)
+    parts = []
+    for place, centres in ((alpha, ALPHA_CENTRES), (beta, BETA_CENTRES)):
+        inside = np.clip(place, centres[0], centres[-1])
+        parts.append(np.exp(-0.5 * ((inside - centres) / (centres[1] - centres[0])) ** 2))
+    both = np.concatenate(parts)
+    assert out == pytest.approx(both / np.linalg.norm(both), rel=1e-9, abs=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("residual", "left"), [(0.5, 0.2), (0.3, 0.0), (-0.3, 0.0), (-0.5, -0.2), (0.1, 0.0)]
+)
+def test_the_dead_zone_leaves_the_excess(residual, left):
+    assert network.dead_zone(residual, 0.3) == pytest.approx(left)
+
+
+def test_the_output_is_the_weights_on_the_basis():
+    rng = np.random.default_rng(1)
+    record = new_network(weights=rng.normal(size=(3, N_BASIS)))
+    network.evaluate(record, 0.1, -0.05)
+    assert record["output"] == pytest.approx(record["weights"] @ record["basis"])
+
+
+@pytest.mark.parametrize("leaking", [False, True])
+def test_weights_learn_what_exceeds_the_threshold_and_leak(leaking):
+    rng = np.random.default_rng(2)
+    before = 0.1 * rng.normal(size=(3, N_BASIS))
+    record = new_network(
+        gain=30.0, leak_per_s=2.0, weight_limit=9.0, weights=before, basis=rng.uniform(0, 1, N_BASIS)
+    )
+    network.learn(record, np.array([0.5, -0.4, 0.1]), np.full(3, 0.2), leaking, DT)
+    kept = np.exp(-2.0 * DT) if leaking else 1.0
+    learnt = DT * 30.0 * np.outer([0.3, -0.2, 0.0], record["basis"])
+    assert record["weights"] == pytest.approx(kept * before + learnt)
+    record["weight_limit"] = 0.05
+    network.learn(record, np.array([0.5, -0.4, 0.1]), np.full(3, 0.2), leaking, DT)
+    assert np.abs(record["weights"]).max() == 0.05
+    assert record["weights"].min() == -0.05
+
+
+def test_a_diagnosis_begins_with_no_residual_and_the_gyros_error_to_come():
+    fdi = new_fdi()
+    fdi["bound"]["noise"] = 0.1, 0.2, 0.3
+    detection.begin(fdi, np.array([1.0, 2.0, 3.0]))
+    assert fdi["fdae"]["xhat"] == pytest.approx([1.0, 2.0, 3.0])
+    assert fdi["fdae"]["threshold_noise"] == pytest.approx([0.1, 0.2, 0.3])
+    assert fdi["bank"]["noise"][:3] == pytest.approx(np.tile([0.1, 0.2, 0.3], (3, 1)))
+
+
+@pytest.mark.parametrize(
+    ("authority", "filters", "score", "axis"),
+    [
+        (WORST_CASE, 1.1, 9.0, 2), (WORST_CASE, 0.9, 9.0, None), (STATISTICS, 9.0, 1.1, 0),
+        (STATISTICS, 9.0, 0.9, None), (STATISTICS, 9.0, 1.0, None), (EITHER, 1.1, 9.0, 2),
+        (EITHER, 0.9, 1.1, 0), (EITHER, 0.9, 0.9, None),
+    ],
+)  # fmt: skip
+def test_who_is_in_authority_raises_the_alarm(authority, filters, score, axis):
+    fdi = new_fdi()
+    fdi["authority"], fdi["verdict"]["detected_axis"] = authority, -1
+    fdi["bank"]["threshold"][:3], fdi["bank"]["residual"][1, 2] = 0.1, 0.1 * filters
+    fdi["statistical"]["score"], fdi["statistical"]["axis"], fdi["fdae"]["xhat"] = score, 0, (1.0, 1.0, 1.0)
+    detection.detect(fdi, np.array([1.5, 0.5, 1.0]), 7.0)
+    assert fdi["fdae"]["residual"] == pytest.approx([0.5, -0.5, 0.0])
+    assert bool(fdi["verdict"]["detected"]) == (axis is not None)
+    assert fdi["verdict"]["detected_axis"] == (-1 if axis is None else axis)
+    assert fdi["verdict"]["detected_at_s"] == (0.0 if axis is None else 7.0)
+    detection.detect(fdi, np.array([1.5, 0.5, 1.0]), 8.0)
+    assert fdi["verdict"]["detected_at_s"] == (0.0 if axis is None else 7.0)  # the first alarm stays
+
+
+@pytest.mark.parametrize("detected", [0, 1])
+def test_the_detection_estimator_and_its_threshold_are_convolutions(detected):
+    rng, frames, fdi = np.random.default_rng(3), 15, new_fdi()
+    decay = np.exp(-np.array([2.0, 3.0, 4.0]) * DT)
+    fdae = fdi["fdae"]
+    fdae["decay"], fdi["verdict"]["detected"] = decay, detected
+    fdae["network"]["output"] = output = np.array([0.1, -0.2, 0.3])
+    fdae["network"]["gain"], fdae["network"]["basis"], fdae["network"]["weight_limit"] = 1.0, 1.0, 100.0
+    x, believed = rng.normal(size=(frames, 3)), rng.normal(size=(frames, 3))
+    eta, noise = rng.uniform(0.1, 0.3, (frames, 3)), rng.uniform(0.1, 0.3, (frames + 1, 3))
+    for k in range(frames):
+        fdi["bound"]["eta_bar"], fdi["bound"]["noise_then"] = eta[k], noise[k]
+        fdi["bound"]["noise"], fdae["residual"] = noise[k + 1], 99.0
+        detection.predict(fdi, x[k], believed[k], False)
+    w = decay ** np.arange(frames)[::-1, None]
+    shares = w * ((1.0 - decay) * x + DT * (believed + output))
+    assert fdae["xhat"] == pytest.approx(shares.sum(axis=0))
+    sums = DT * (w * eta).sum(axis=0), ((1.0 - decay) * w * noise[:-1]).sum(axis=0)
+    assert fdae["threshold_eta"] == pytest.approx(sums[0])
+    assert fdae["threshold_noise"] == pytest.approx(sums[1])
+    assert fdae["threshold"] == pytest.approx(sums[0] + sums[1] + noise[-1])
+    assert fdae["network"]["weights"].any() == detected
+
+
+def test_beyond_the_model_is_what_was_learnt_and_the_residual_beyond_noise():
+    fdi, out = new_fdi(), np.zeros(3)
+    fdae = fdi["fdae"]
+    fdae["network"]["output"], fdae["pole"], fdae["residual"] = 0.1, (2.0, 3.0, 4.0), (0.5, -0.5, 0.05)
+    fdae["threshold_noise"], fdi["bound"]["noise"] = 0.1, 0.2
+    detection.unknown_acceleration(fdi, out)
+    assert out == pytest.approx([0.1 + 2.0 * 0.2, 0.1 - 3.0 * 0.2, 0.1])
+
+
+def new_belief(share):
+    record = np.zeros(1, beliefs.belief_dtype(4)).view(np.recarray)[0]
+    record["share"] = share
+    return record
+
+
+def instants(count, seed=5):
+    """(f, G, u, eta_bar, per_rad) of so many instants."""
+    rng = np.random.default_rng(seed)
+    sizes = (3,), (3, 4), (4,), (3,), (3, 4)
+    return [tuple(rng.normal(size=size) for size in sizes) for _ in range(count)]
+
+
+@pytest.mark.parametrize("count", [1, 4])
+@pytest.mark.parametrize("own_errors", [0, 1])
+def test_means_over_a_frame_are_of_its_instants(count, own_errors):
+    fdi, record = new_fdi(), new_belief(1.0 / count)
+    fdi["bound"]["own_errors"] = own_errors
+    record["sums"]["f"] = record["sums"]["G"] = record["sums"]["Gu"] = 99.0  # of an earlier frame
+    record["sums"]["eta_bar"] = 99.0
+    record["sums"]["own"], record["sums"]["own_per_rad"] = (99.0, 99.0) if own_errors else (0.0, 0.0)
+    fdi["bound"]["noise"] = 0.1, 0.2, 0.3
+    measured = np.zeros(1, [("x", "f8", (3,))]).view(np.recarray)[0]
+    measured["x"] = 1.0, 2.0, 3.0
+    seen = instants(count)
+    for k, (f, G, u, eta_bar, per_rad) in enumerate(seen):
+        record["f"], record["G"], record["u"] = f, G, u
+        fdi["bound"]["eta_bar_now"], fdi["bound"]["admitted"]["per_rad"] = eta_bar, np.abs(per_rad)
+        if k == 0:
+            beliefs.begin_frame(fdi, record, measured)
+        else:
+            beliefs.sum_up(fdi, record)
+    beliefs.elapse(fdi, record)
+    Gu = np.array([G * u for _, G, u, _, _ in seen])
+    mean = record["means"]
+    assert record["x_then"] == pytest.approx([1.0, 2.0, 3.0])
+    assert fdi["bound"]["noise_then"] == pytest.approx([0.1, 0.2, 0.3])
+    assert mean["G"] == pytest.approx(np.mean([G for _, G, *_ in seen], axis=0))
+    assert mean["Gu"] == pytest.approx(Gu.mean(axis=0))
+    assert mean["acceleration"] == pytest.approx(np.mean([f + G @ u for f, G, u, *_ in seen], axis=0))
+    assert fdi["bound"]["eta_bar"] == pytest.approx(np.mean([eta for *_, eta, _ in seen], axis=0))
+    own = np.mean([np.abs(per_rad) for *_, per_rad in seen], axis=0)
+    at_command = np.mean([np.abs(per_rad * u) for _, _, u, _, per_rad in seen], axis=0)
+    assert fdi["bound"]["own_per_rad"] == pytest.approx(own if own_errors else 0.0)
+    assert fdi["bound"]["own"] == pytest.approx(at_command if own_errors else 0.0)
+    spread = np.abs(Gu[0] - Gu[1:].mean(axis=0)) / count if count > 1 else 0.0
+    assert mean["Gu_spread"] == pytest.approx(spread)
+
+
+def test_a_command_is_followed_by_surfaces_that_were_where_they_were():
+    record = new_belief(1.0)
+    record["u"], record["actuators"]["approach"] = (0.1, 0.2, 0.3, 0.0), 1.0
+    record["actuators"]["step"], record["actuators"]["low"], record["actuators"]["high"] = np.inf, -1.0, 1.0
+    beliefs.follow_command(record, np.array([0.4, 0.5, -0.6, 0.2]))
+    assert record["u_then"] == pytest.approx([0.1, 0.2, 0.3, 0.0])
+    assert record["u"] == pytest.approx(record["commanded"])
+    assert record["commanded"] == pytest.approx([0.4, 0.5, -0.6, 0.2])

@@ -1,0 +1,201 @@
+"""The isolation estimators one kernel at a time: their identity, least squares, who excludes a fault."""
+
+import numpy as np
+import pytest
+from kernels import DT, estimator, new_fdi
+
+from beaver_ftc.diagnosis import isolation
+from beaver_ftc.diagnosis.fault_class import hypothesis
+from beaver_ftc.diagnosis.state import (
+    INTERVAL,
+    LOSS,
+    NOT_ISOLATED,
+    POSITION,
+    PUBLISHED,
+    STATISTICS,
+    UNANTICIPATED,
+    WORST_CASE,
+)
+
+EITHER = 0
+
+
+def run_estimator(shared, theta, kind=LOSS, frames=25, eta_share=1.0, seed=0):
+    """An estimator beside a plant with this fault: (fdi, fie, what was fed in)."""
+    rng, fdi = np.random.default_rng(seed), new_fdi()
+    fie = estimator(fdi, kind, low=-1.0, high=0.6)
+    fdi["shared"], x = shared, rng.normal(size=3)
+    fdi["bound"]["noise"] = 0.004, 0.005, 0.006
+    isolation.start(fdi, x)
+    fed = {name: [] for name in ("Z", "eta", "eta_bar", "noise_then", "spread")}
+    for _ in range(frames):
+        Z, eta_bar, noise_then = rng.normal(size=3), rng.uniform(0.1, 0.3, 3), rng.uniform(0.01, 0.02, 3)
+        eta, believed, spread = eta_bar * rng.uniform(-1, 1, 3), rng.normal(size=3), rng.uniform(0, 0.1, 3)
+        eta *= eta_share
+        offset = rng.normal(size=3)
+        fie["effect"]["Z"], fie["effect"]["offset"], fie["effect"]["spread"] = Z, offset, spread
+        fdi["bound"]["eta_bar"], fdi["bound"]["noise_then"] = eta_bar, noise_then
+        isolation.within_limits(fdi, fie, x)
+        isolation.predict_all(fdi, x, believed)
+        x = x + DT * (believed + offset + theta * Z + eta)
+        for name, value in zip(fed, (Z, eta, eta_bar, noise_then, spread), strict=True):
+            fed[name].append(value)
+    within = isolation.within_limits(fdi, fie, x)
+    return fdi, fie, {name: np.array(value) for name, value in fed.items()}, within
+
+
+@pytest.mark.parametrize("shared", [False, True])
+def test_the_residual_is_omega_times_the_error_and_the_filtered_uncertainty(shared):
+    """Whatever the estimate does [Zhang2005, sec. IV]; and every filter is the convolution it stands for."""
+    theta, frames = -0.45, 25
+    fdi, fie, fed, within = run_estimator(shared, theta, frames=frames)
+    w = fdi["fie_decay"] ** np.arange(frames)[::-1, None]
+    omega = DT * (w * fed["Z"]).sum(axis=0)
+    uncertainty = DT * (w * fed["eta"]).sum(axis=0)
+    assert fie["omega"] == pytest.approx(omega)
+    assert fie["residual"] == pytest.approx(omega * (theta - fie["theta"]) + uncertainty, abs=1e-12)
+    assert fie["rise"] == pytest.approx(DT * (w * np.maximum(fed["Z"], 0)).sum(axis=0))
+    assert fie["fall"] == pytest.approx(DT * (w * np.minimum(fed["Z"], 0)).sum(axis=0))
+    eta = DT * (w * (fed["eta_bar"] + fed["spread"])).sum(axis=0)
+    left = fdi["fie_decay"] ** frames * np.array([0.004, 0.005, 0.006])
+    noise = left + ((1.0 - fdi["fie_decay"]) * w * fed["noise_then"]).sum(axis=0)
+    assert fie["bound_eta"] == pytest.approx(eta)
+    assert fie["bound_noise"] == pytest.approx(noise)
+    assert fie["bound"] == pytest.approx(eta + noise + [0.004, 0.005, 0.006])
+    assert within
+
+
+@pytest.mark.parametrize("shared", [False, True])
+def test_an_estimate_finds_theta_and_stays_in_its_set(shared):
+    _, fie, *_ = run_estimator(shared, -0.45, frames=120, eta_share=0.0)
+    assert fie["theta"] == pytest.approx([-0.45] * 3, abs=0.03)
+    _, fie, *_ = run_estimator(shared, -1.4, frames=60, eta_share=0.0)
+    assert fie["theta"] == pytest.approx([-1.0] * 3)
+    _, fie, *_ = run_estimator(shared, 0.9, frames=60, eta_share=0.0)
+    assert fie["theta"] == pytest.approx([0.6] * 3)
+
+
+def test_a_start_knows_nothing_but_the_set_of_theta():
+    fdi = new_fdi()
+    fie = estimator(fdi, low=-0.4, high=0.8)
+    fie["theta_low"] = fie["theta_high"] = 0.3
+    fdi["bound"]["noise"] = 0.1, 0.2, 0.3
+    isolation.start(fdi, np.array([1.0, 2.0, 3.0]))
+    assert fie["xhat"] == pytest.approx([1.0, 2.0, 3.0])
+    assert fie["bound_noise"] == pytest.approx([0.1, 0.2, 0.3])
+    assert fie["covariance"] == pytest.approx([1.2**2 / 12.0] * 3)  # of a uniform distribution
+    assert (fie["theta_low"] == -0.4).all()
+    assert (fie["theta_high"] == 0.8).all()
+
+
+def test_a_correction_is_the_step_of_weighted_least_squares():
+    """Information adds up: 1 / covariance grows by Omega^2 / noise, and is forgotten by a share."""
+    fie = estimator(new_fdi())
+    fie["bound"][1], fie["omega"][1], fie["covariance"][1], fie["theta"][1] = 0.3, 0.7, 0.05, -0.5
+    information = 1.0 / 0.05 + 0.7**2 / 0.3**2
+    step = isolation.correct(fie, 1, 0.2, 0.9, -1.0, 0.0)
+    assert step == pytest.approx(0.7 / 0.3**2 * 0.2 / information)
+    assert fie["theta"][1] == pytest.approx(-0.5 + step)
+    assert fie["covariance"][1] == pytest.approx(1.0 / information / 0.9)
+    step = isolation.correct(fie, 1, 9.0, 1e-9, -1.0, -0.1)
+    assert fie["theta"][1] == -0.1
+    assert fie["covariance"][1] == pytest.approx(1.0 / 12.0)
+    assert isolation.correct(fie, 1, -99.0, 1.0, -0.8, 0.0) == pytest.approx(-0.7)
+    assert isolation.correct(estimator(new_fdi()), 0, 1.0, 0.9, -1.0, 0.0) == 0.0  # nothing known yet
+
+
+def test_a_shared_theta_is_corrected_axis_by_axis_with_what_is_left():
+    """As one weighted least-squares problem of three equations, forgetting once."""
+    fie = estimator(new_fdi())
+    omega, noise = np.array([0.5, -0.8, 0.3]), np.array([0.2, 0.3, 0.4])
+    residual = np.array([0.02, 0.03, -0.01])
+    fie["omega"], fie["bound"], fie["residual"], fie["effect"]["Z"] = omega, noise, residual, 1.0
+    fie["theta"], fie["covariance"] = -0.5, 0.06
+    total = isolation.adapt_jointly(fie, 1.0)
+    information = 1.0 / 0.06 + np.sum(omega**2 / noise**2)
+    assert total == pytest.approx(np.sum(omega * residual / noise**2) / information)
+    assert fie["theta"] == pytest.approx([-0.5 + total] * 3)
+    assert fie["covariance"] == pytest.approx([1.0 / information] * 3)
+    fie["effect"]["Z"] = 0.0
+    assert isolation.adapt_jointly(fie, 0.5) == 0.0
+
+
+@pytest.mark.parametrize("thresholds", [INTERVAL, PUBLISHED])
+@pytest.mark.parametrize("axis", range(3))
+@pytest.mark.parametrize("side", [-1, 1])
+def test_a_residual_at_its_limit_is_within_and_beyond_it_is_not(thresholds, axis, side):
+    def within(beyond, unasked=False):
+        fdi = new_fdi()
+        fie = estimator(fdi, low=-0.9, high=0.2)
+        fdi["thresholds"] = thresholds
+        fie["rise"], fie["fall"], fie["bound"], fie["theta"] = 0.5, -0.2, 0.03, -0.3
+        fie["omega"], fie["unasked"][axis] = 0.3, unasked
+        lower, upper = -0.9 * 0.5 - 0.2 * 0.2, 0.2 * 0.5 + 0.9 * 0.2
+        limits = (lower + 0.09 - 0.03, upper + 0.09 + 0.03)
+        if thresholds == PUBLISHED:
+            limits = (-0.6 * 0.3 - 0.03, 0.6 * 0.3 + 0.03)
+        x = np.zeros(3)
+        x[axis] = limits[side > 0] + side * beyond
+        return bool(isolation.within_limits(fdi, fie, x))
+
+    assert within(-1e-12)
+    assert not within(1e-9)
+    assert within(1e-9, unasked=True)
+
+
+@pytest.mark.parametrize(
+    ("every_type", "authority", "within", "ruled_out"),
+    [
+        (0, WORST_CASE, True, False), (0, WORST_CASE, False, True), (1, STATISTICS, False, True),
+        (1, STATISTICS, True, False), (0, EITHER, False, True), (0, EITHER, True, False),
+        (0, STATISTICS, False, False),
+    ],
+)  # fmt: skip
+def test_who_rules_a_fault_out(every_type, authority, within, ruled_out):
+    fdi = new_fdi()
+    fdi["every_type"], fdi["authority"] = every_type, authority
+    assert bool(isolation.rules_out(fdi, estimator(fdi), within)) == ruled_out
+
+
+@pytest.mark.parametrize(
+    ("excluded", "isolated"),
+    [
+        ((0, 0, 0), NOT_ISOLATED), ((1, 0, 0), NOT_ISOLATED), ((1, 0, 1), 1), ((0, 1, 1), 0),
+        ((1, 1, 1), UNANTICIPATED),
+    ],
+)  # fmt: skip
+def test_the_one_left_is_the_fault(excluded, isolated):
+    fdi = new_fdi()
+    fdi["n_estimators"], fdi["estimator"]["excluded"][:3] = 3, excluded
+    fdi["verdict"]["isolated"], fdi["verdict"]["isolated_at_s"] = NOT_ISOLATED, -1.0
+    isolation.decide(fdi, 4.0)
+    assert fdi["verdict"]["isolated"] == isolated
+    assert fdi["verdict"]["isolated_at_s"] == (-1.0 if isolated == NOT_ISOLATED else 4.0)
+    isolation.decide(fdi, 5.0)
+    assert fdi["verdict"]["isolated_at_s"] != 5.0
+
+
+@pytest.mark.parametrize("kind", [LOSS, POSITION])
+def test_a_hypothesis_is_the_difference_it_makes_to_the_moment(kind):
+    """Surface 2 at u: healthy it gives G u; at share 1 + theta of it, or at the position theta."""
+    rng, u = np.random.default_rng(3), np.array([0.1, -0.2, 0.3, 0.0])
+    G, base, Z, theta = rng.normal(size=(3, 4)), np.zeros(3), np.zeros(3), -0.35
+    hypothesis(kind, 2, G, G * u, base, Z)
+    there = (1.0 + theta) * u[2] if kind == LOSS else theta
+    assert base + theta * Z == pytest.approx(G[:, 2] * (there - u[2]))
+
+
+@pytest.mark.parametrize("memory", [False, True])
+def test_what_is_supposed_of_a_frame(memory):
+    rng, fdi = np.random.default_rng(4), new_fdi()
+    estimator(fdi, surface=2)
+    G, Gu, spread = rng.normal(size=(3, 3, 4))
+    fdi["memory"], fdi["verdict"]["detected"] = memory, 0
+    isolation.suppose_all(fdi, G, Gu, np.abs(spread))
+    fie = fdi["estimator"][0]
+    assert fie["reach_low"][:3, :3].any() == memory
+    assert fie["effect"]["Z"].any() == memory
+    fdi["verdict"]["detected"] = 1
+    isolation.suppose_all(fdi, G, Gu, np.abs(spread))
+    assert fie["effect"]["Z"] == pytest.approx(Gu[:, 2])
+    assert fie["effect"]["spread"] == pytest.approx(np.abs(spread[:, 2]))

@@ -1,0 +1,393 @@
+"""The watch over the instruments a decision at a time: who is suspected, who named, what stands in."""
+
+import numpy as np
+import pytest
+from kernels import DT, new_fdi
+
+from beaver_ftc.diagnosis import instruments as watching
+from beaver_ftc.diagnosis import stand_in
+from beaver_ftc.diagnosis.belief import belief_dtype
+from beaver_ftc.diagnosis.state import NOT_ISOLATED
+from beaver_ftc.diagnosis.watch import (
+    AIRSPEED,
+    ALPHA,
+    ALPHA_FLOW,
+    ANGLE,
+    BETA,
+    BETA_FLOW,
+    CLIMB,
+    DENSITY,
+    N_TESTS,
+    NO,
+    NOBODY,
+    PRESSURE,
+    PSI,
+    QDYN,
+    RPM,
+    SPEED,
+    THETA,
+    TURN,
+    UNKNOWN,
+    WATCH,
+    YES,
+)
+from beaver_ftc.plant.instruments import ALTITUDE, ENGINE_SPEED, MANIFOLD, N_SENSORS, PHI
+
+H = 0.005
+MISSING = np.dtype([("missing", "i8", (N_SENSORS,))], align=True)
+GYROS = (0, 1, 2)
+
+
+def new_watch(**fields):
+    watch = np.zeros(1, WATCH).view(np.recarray)[0]
+    watch["enabled"], watch["instants"], watch["named"], watch["follows"] = 1, 4, NOBODY, 1.0
+    watch["step"]["h"], watch["step"]["decay"], watch["alarmed_at_s"] = H, (0.0, 0.9, 0.99), -1.0
+    watch["step"]["test"]["bound"] = 1.0
+    for name, value in fields.items():
+        watch[name] = value
+    return watch
+
+
+def seen(*missing):
+    measured = np.zeros(1, MISSING).view(np.recarray)[0]
+    measured["missing"][list(missing)] = 1
+    return measured
+
+
+def with_shares(shares, **fields):
+    """Tests {test: share of its bound}, of which the residual is as large."""
+    watch = new_watch(**fields)
+    for test, share in shares.items():
+        watch["step"]["test"]["share"][test] = share
+        watch["step"]["test"]["filtered"][test] = share
+    return watch
+
+
+@pytest.mark.parametrize(
+    ("shares", "worst"),
+    [({}, -1), ({3: 1.0}, -1), ({3: 1.1, 7: 1.3, 9: 1.2}, 7), ({0: 2.0}, 0), ({12: 2.0}, 12)],
+)
+def test_the_test_furthest_beyond_its_bound(shares, worst):
+    assert watching.furthest(with_shares(shares)["step"]) == worst
+
+
+def suspects(shares, lead=None, **fields):
+    """Who can have brought the tests here."""
+    watch = with_shares(shares, **fields)
+    watch["lead"] = max(shares, key=shares.get) if lead is None else lead
+    watching.suspect(watch)
+    return set(np.flatnonzero(watch["suspect"]).tolist())
+
+
+@pytest.mark.parametrize(
+    ("shares", "who"),
+    [
+        ({SPEED: 2.0}, {AIRSPEED}),
+        ({DENSITY: 3.0, SPEED: 2.0}, {AIRSPEED}),
+        ({CLIMB: 2.0}, {ALTITUDE}),
+        ({RPM: 2.0}, {ENGINE_SPEED}),
+        ({PRESSURE: 2.0}, {MANIFOLD}),
+        ({ALPHA_FLOW: 5.0}, {ALPHA}),
+        ({BETA_FLOW: 5.0}, {BETA}),
+        ({ALPHA_FLOW: 2.0}, {ALPHA, 1}),  # its gyro need not show yet: within twice both bounds
+        ({BETA_FLOW: 2.0}, {BETA, 2}),
+        ({ALPHA_FLOW: 5.0, TURN + 1: 2.0}, {1}),
+        ({BETA_FLOW: 5.0, TURN + 2: 2.0}, {2}),
+        ({TURN: 2.0}, {0}),
+        ({TURN + 2: 2.0}, {2}),
+        ({TURN + 1: 2.0, ANGLE + 1: 1.5}, {1, THETA}),
+        ({TURN: 2.0, TURN + 1: 1.5}, set()),
+        ({ANGLE + 2: 2.0}, {0, 1, 2, PSI}),  # an angle alone may be the first to show what a gyro does
+        ({ANGLE: 2.0, ANGLE + 2: 1.5}, {0, 1, 2}),
+    ],
+)
+def test_who_is_suspected_of_what_the_tests_show(shares, who):
+    assert suspects(shares) == who
+
+
+def test_a_large_error_moves_its_neighbours_a_little():
+    """What is below a share of the largest of its kind is beyond its bound for a neighbour's sake."""
+    assert suspects({TURN: 100.0, TURN + 1: 2.9}) == {0}
+    assert suspects({TURN: 100.0, TURN + 1: 3.1}) == set()
+    assert suspects({ANGLE: 100.0, ANGLE + 1: 2.9}) == {0, 1, 2, PHI}
+
+
+@pytest.mark.parametrize(
+    ("airspeed", "who"), [(10.0, {AIRSPEED, QDYN}), (1.0, {AIRSPEED, QDYN}), (50.0, {QDYN})]
+)
+def test_an_airspeed_as_wrong_as_the_density_has_it_would_show_in_its_own_test(airspeed, who):
+    """0.5 V ln(density ratio) against twice the bound of the airspeed's test, 2."""
+    watch = with_shares({DENSITY: 0.2})
+    watch["step"]["test"]["share"][DENSITY] = 2.0
+    watch["step"]["then"][AIRSPEED], watch["lead"] = airspeed, DENSITY
+    assert watching.would_show(watch) == (who == {QDYN})
+    watching.suspect(watch)
+    assert set(np.flatnonzero(watch["suspect"]).tolist()) == who
+
+
+@pytest.mark.parametrize(("say", "who"), [(UNKNOWN, {1, THETA}), (YES, {1}), (NO, {THETA})])
+def test_the_rates_decide_between_a_gyro_and_the_attitude(say, who):
+    assert suspects({TURN + 1: 2.0, ANGLE + 1: 1.5}, rates_say=(UNKNOWN, say, UNKNOWN)) == who
+
+
+def test_an_angle_shows_what_the_axis_furthest_beyond_its_bound_does():
+    watch = with_shares({TURN: 0.2, TURN + 1: 0.5, TURN + 2: 0.3})
+    assert [watching.axis_of(watch, i) for i in range(3)] == [1, 1, 1]
+    watch = with_shares({TURN: 0.5, TURN + 1: 0.5, TURN + 2: 0.5})
+    assert [watching.axis_of(watch, i) for i in range(3)] == [0, 1, 2]
+
+
+@pytest.mark.parametrize("known", [0, 1])
+@pytest.mark.parametrize("no_gyro", [0, 1])
+@pytest.mark.parametrize("blurred", [0, 1])
+def test_a_surface_may_be_named_where_no_gyro_can_be_it(known, no_gyro, blurred):
+    fields = {"no_gyro": no_gyro, "blurred": blurred}
+    assert watching.clears_surfaces(new_watch(enabled=0, **fields), known)
+    clear = bool(known and (no_gyro or not blurred))
+    assert bool(watching.clears_surfaces(new_watch(**fields), known)) == clear
+
+
+def test_the_watch_has_the_word_once_it_has_raised_its_alarm():
+    words = [bool(watching.speaks(new_watch(enabled=e, alarmed=a))) for e in (0, 1) for a in (0, 1)]
+    assert words == [False, False, False, True]
+
+
+def detected_fdi(at_s=-1.0, isolated=NOT_ISOLATED):
+    fdi = new_fdi()
+    verdict = fdi["verdict"]
+    verdict["detected"], verdict["detected_at_s"], verdict["isolated"] = at_s >= 0.0, at_s, isolated
+    verdict["isolated_at_s"], verdict["type"], verdict["lead"], verdict["lead_kind"] = at_s, 2, 1, 1
+    fdi["surface"]["measure"] = 1
+    fdi["fdae"]["network"]["weights"] = fdi["fdae"]["network"]["output"] = 0.3
+    return fdi
+
+
+@pytest.mark.parametrize("isolated", [NOT_ISOLATED, 0, 1])
+def test_an_alarm_voids_what_a_moment_ago_was_made_of_it(isolated):
+    watch, fdi = new_watch(), detected_fdi(9.6, isolated)
+    watching.raise_alarm(watch, fdi, 10.0)
+    assert watch["alarmed"]
+    assert watch["alarmed_at_s"] == 9.6  # the same fault, seen first in the rates
+    assert watch["misnamed"] == (isolated >= 0)
+    assert not watch["beside"]
+    verdict = fdi["verdict"]
+    assert [verdict[name] for name in ("detected", "isolated", "type")] == [0, NOT_ISOLATED, -1]
+    assert [verdict[name] for name in ("detected_at_s", "isolated_at_s")] == [-1.0, -1.0]
+    assert [verdict[name] for name in ("lead", "lead_kind")] == [-1, -1]
+    assert (fdi["surface"]["measure"] == -1).all()
+    assert not fdi["fdae"]["network"]["weights"].any()
+    assert not fdi["fdae"]["network"]["output"].any()
+    watching.raise_alarm(watch, detected_fdi(9.6, 1), 11.0)
+    assert watch["alarmed_at_s"] == 9.6
+
+
+def test_a_surface_found_long_before_stays_found():
+    watch, fdi = new_watch(), detected_fdi(9.4, 1)
+    watching.raise_alarm(watch, fdi, 10.0)
+    assert watch["beside"]
+    assert watch["alarmed_at_s"] == 10.0
+    assert fdi["verdict"]["isolated"] == 1
+    watch, fdi = new_watch(), detected_fdi(9.5, 1)
+    watching.raise_alarm(watch, fdi, 10.0)  # half a second is no long time
+    assert not watch["beside"]
+
+
+def test_with_nothing_found_before_the_alarm_is_of_now():
+    watch, fdi = new_watch(), detected_fdi()
+    watching.raise_alarm(watch, fdi, 10.0)
+    assert watch["alarmed_at_s"] == 10.0
+    assert not watch["beside"]
+    assert not watch["misnamed"]
+
+
+def test_an_instrument_without_a_reading_is_named_at_once():
+    watch = new_watch()
+    watching.decide(watch, new_fdi(), seen(BETA, PSI), 5.0)
+    assert watch["alarmed"]
+    assert watch["named"] == BETA
+    assert watch["named_at_s"] == 5.0
+    assert np.flatnonzero(watch["replaced"]).tolist() == [BETA]
+    watching.decide(watch, new_fdi(), seen(PSI), 6.0)
+    assert watch["named"] == BETA
+
+
+def test_the_one_suspect_left_is_named_and_two_are_not():
+    watch = with_shares({CLIMB: 2.0})
+    watching.decide(watch, new_fdi(), seen(), 5.0)
+    assert (watch["alarmed"], watch["lead"], watch["named"]) == (1, CLIMB, ALTITUDE)
+    watch = with_shares({ALPHA_FLOW: 2.0})
+    watching.decide(watch, new_fdi(), seen(), 5.0)
+    assert (watch["alarmed"], watch["lead"], watch["named"]) == (1, ALPHA_FLOW, NOBODY)
+    watch["step"]["test"]["share"][SPEED] = 9.0
+    watching.decide(watch, new_fdi(), seen(), 6.0)
+    assert watch["lead"] == ALPHA_FLOW  # the first alarm leads
+    quiet = new_watch()
+    watching.decide(quiet, new_fdi(), seen(), 5.0)
+    assert not quiet["alarmed"]
+
+
+def asked(
+    error=(0.0, 0.0, 0.0), then=(0.0, 0.0, 0.0), innovation=(0.0, 0.0, 0.0), noise=0.0, spike=0.0, **fields
+):
+    """What the rates say by axis; by default the bound of a frame is 1 rad/s2."""
+    watch, fdi = new_watch(error=error, error_then=then, spike_then=spike, **fields), new_fdi()
+    fdi["innovation"], fdi["bound"]["frame"] = innovation, 1.0
+    fdi["bank"]["threshold"][:3] = 1.0
+    watch["step"]["test"]["noise"] = noise
+    watching.ask_rates(watch, fdi)
+    return watch["rates_say"].tolist()
+
+
+def test_a_jump_of_a_gyro_is_an_acceleration_and_one_of_the_attitude_is_none():
+    jump = 0.3 / DT
+    assert asked(error=(0.3, 0, 0), innovation=(jump, 0, 0)) == [YES, UNKNOWN, UNKNOWN]
+    assert asked(error=(0, 0.3, 0), innovation=(0, 0, 0)) == [UNKNOWN, NO, UNKNOWN]
+    assert asked(error=(0, 0.3, 0), innovation=(0, -jump, 0)) == [UNKNOWN, NO, UNKNOWN]
+    assert asked(error=(0.3, 0, 0), then=(0.3, 0, 0), W=(0.3, 0, 0), W_bound=(0.1, 1, 1)) == [
+        YES,
+        UNKNOWN,
+        UNKNOWN,
+    ]
+
+
+@pytest.mark.parametrize(("less", "say"), [(0.999, UNKNOWN), (1.001, NO)])
+def test_how_much_an_own_error_may_explain(less, say):
+    """Of a jump a tenth, of the error ten per second, twice four noises a frame, and the bound of it."""
+    jump, noise = 0.02 / DT, 1e-5
+    own = 10.0 * 0.02 + 0.1 * jump
+    blur = 4.0 * noise / H
+    off = less * (1.0 + own + blur / DT)
+    say_ = asked(
+        error=(0.02, 0, 0), innovation=(jump - off, 0, 0), noise=noise, W_bound=(9, 9, 9), W=(0, 0, 0)
+    )
+    assert (say_[0] == NO) == (say == NO)
+
+
+@pytest.mark.parametrize(("error", "say"), [(0.0029, NO), (0.0031, UNKNOWN)])
+def test_what_has_shown_and_is_gone_is_no_gyros(error, say):
+    assert asked(error=(error, 0, 0), then=(error, 0, 0), spike=1.0, W_bound=(1, 1, 1))[0] == say
+
+
+def test_a_spike_within_the_attitudes_noise_says_nothing():
+    noise = 0.6 * H / 4.0  # a blur of 0.6: below half of which a spike of 1 is none
+    assert asked(spike=1.0, noise=noise, W_bound=(1, 1, 1))[0] == UNKNOWN
+    assert asked(spike=1.21, noise=noise, W_bound=(1, 1, 1))[0] == NO
+
+
+@pytest.mark.parametrize(("error", "say"), [(0.99, UNKNOWN), (1.01, NO)])
+def test_a_gyros_error_stays_within_what_the_filter_may_have_of_it(error, say):
+    error = error * (0.5 + 0.2 + 4.0 * 1e-4 / H) / 0.7
+    assert (
+        asked(error=(error,) * 3, then=(error,) * 3, W=(-0.2,) * 3, W_bound=(0.5,) * 3, noise=1e-4)
+        == [say] * 3
+    )
+
+
+def test_what_the_rates_have_said_stays_said():
+    assert asked(error=(0, 0.3, 0), rates_say=(YES, YES, NO)) == [YES, YES, NO]
+
+
+def test_the_filter_of_a_gyros_error_follows_it_exactly():
+    """W' = -D W + nu with nu = e' + D e, for an e of any course; and the bound of its own uncertainty."""
+    rng, frames, fdi = np.random.default_rng(3), 40, new_fdi()
+    D = np.array([[3.0, 0.4, -0.2], [0.1, 2.0, 0.3], [-0.5, 0.2, 1.0]])
+    watch = new_watch(damping=D)
+    error = np.vstack([np.zeros(3), rng.normal(size=(frames, 3))])
+    bound, eta_bar = np.zeros(3), np.array([0.3, 0.2, 0.1])
+    growing = np.abs(D)
+    growing[np.diag_indices(3)] = -np.diag(D)
+    fdi["bound"]["eta_bar"] = eta_bar
+    for k in range(frames):
+        fdi["innovation"] = (error[k + 1] - error[k]) / DT + D @ error[k]
+        watching.follow_rates(watch, fdi)
+        bound = bound + DT * (eta_bar + growing @ bound)
+    assert watch["W"] == pytest.approx(error[-1])
+    assert watch["W_bound"] == pytest.approx(bound)
+
+
+def test_a_bound_of_that_filter_is_never_below_zero():
+    watch = new_watch(damping=np.diag([200.0, 1.0, 1.0]), W_bound=(1.0, 1.0, 1.0))
+    watching.follow_rates(watch, new_fdi())
+    assert watch["W_bound"] == pytest.approx([0.0, 1 - DT, 1 - DT])
+
+
+@pytest.mark.parametrize(("size", "clear"), [(0.999, 0), (1.001, 1)])
+def test_what_no_gyro_can_be_is_further_from_w_than_all_bounds(size, clear):
+    watch = new_watch(W=(0.0, -0.5, 0.0), W_bound=(0.1, 0.3, 0.1))
+    test = watch["step"]["test"]
+    test["bound"][:] = 9.0
+    test["bound"][TURN + 1, 0] = 0.02
+    limit = 0.02 + H * (0.3 + watching.SLACK * 0.5)
+    test["residual"][TURN + 1] = size * limit + H * 0.5
+    watching.clear_gyros(watch)
+    assert watch["no_gyro"] == clear
+    assert watch["apart"][1] == pytest.approx([size * limit] * 3)
+    watching.clear_gyros(watch)
+    assert watch["apart"][1] == pytest.approx(size * limit * (1.0 + np.array([0.0, 0.9, 0.99])))
+    assert watch["apart_bound"][1] == pytest.approx(H * 0.4 * (1.0 + np.array([0.0, 0.9, 0.99])))
+
+
+def test_a_watch_begins_with_its_first_look():
+    watch = new_watch()
+    measured = np.zeros(1, [("signal", "f8", (N_SENSORS,)), ("force", "f8", (3,))]).view(np.recarray)[0]
+    measured["signal"][AIRSPEED], measured["signal"][QDYN], measured["force"] = 45.0, 1000.0, (1.0, 2.0, -9.0)
+    watch["step"]["gravity"], watch["step"]["offset"][ALTITUDE] = 9.8, 0.7
+    watching.begin(watch, measured)
+    step = watch["step"]
+    assert watch["begun"]
+    assert step["then"][AIRSPEED] == 45.0
+    assert step["acceleration_then"] == pytest.approx([1.0, 2.0, 0.8])
+    assert step["test"]["noise_then"][CLIMB] == pytest.approx(0.7)
+    assert step["test"]["bound_noise"][CLIMB] == pytest.approx([0.7] * 3)
+    assert step["test"]["noise_then"].shape == (N_TESTS,)
+
+
+def stood_in(i, signal=(), **fields):
+    watch = new_watch(**fields)
+    belief = np.zeros(1, belief_dtype(4)).view(np.recarray)[0]
+    step = watch["step"]
+    step["predicted"], step["command"] = np.arange(N_SENSORS) / 10.0, (1800.0, 20.0)
+    step["then"][[QDYN, AIRSPEED]] = 1000.0, 40.0
+    step["then"][:3], watch["trim"] = (0.1, 0.2, 0.3), 7.0
+    values = np.zeros(N_SENSORS)
+    for sensor, value in dict(signal).items():
+        values[sensor] = value
+    belief["f"], belief["G"], belief["u"], belief["u_then"] = (1, 2, 3), 0.5, (0.1, 0.2, 0, 0), (0.7, 0, 0, 0)
+    step["test"]["residual"][:3], step["test"]["filtered"][:3, 1] = (0.01, 0.02, 0.03), (0.4, 0.5, 0.6)
+    return float(stand_in.stand_in(watch, belief, values, i)), watch
+
+
+def test_vanes_are_predicted_and_drift_back_to_trim():
+    for vane in (ALPHA, BETA):
+        predicted = vane / 10.0
+        assert stood_in(vane)[0] == pytest.approx(predicted + H / 20.0 * (7.0 - predicted))
+
+
+def test_airspeed_and_pressure_stand_in_for_each_other_by_the_density_before():
+    assert stood_in(AIRSPEED, {QDYN: 1100.0})[0] == pytest.approx(40.0 * np.sqrt(1.1))
+    assert stood_in(QDYN, {AIRSPEED: 44.0})[0] == pytest.approx(1000.0 * 1.21)
+    assert stood_in(AIRSPEED, {QDYN: -5.0})[0] == 1.0
+
+
+def test_attitude_and_altitude_are_predicted_and_the_engine_is_as_commanded():
+    assert [stood_in(i)[0] for i in (PHI, PSI, ALTITUDE)] == pytest.approx(
+        [PHI / 10, PSI / 10, ALTITUDE / 10]
+    )
+    assert [stood_in(i)[0] for i in (ENGINE_SPEED, MANIFOLD)] == [1800.0, 20.0]
+
+
+@pytest.mark.parametrize("gyro", GYROS)
+@pytest.mark.parametrize("past", [0, 1])
+def test_a_rate_is_what_the_attitude_shows_and_the_models_change_since(gyro, past):
+    value, watch = stood_in(gyro, past=past)
+    u_sum = 0.7 if past == 0 else 0.3
+    acceleration = (1, 2, 3)[gyro] + 0.5 * u_sum
+    assert value == pytest.approx((0.1, 0.2, 0.3)[gyro] + (0.01, 0.02, 0.03)[gyro] / H + H * acceleration)
+    assert watch["taken_over"][gyro]
+
+
+def test_where_the_attitude_is_noisy_a_rate_follows_it_slowly_after_one_step():
+    value, _ = stood_in(1, follows=0.1)
+    assert value == pytest.approx(0.2 + 10.0 * 0.5 + H * 2.35)
+    value, _ = stood_in(1, follows=0.1, taken_over=(0, 1, 0))
+    assert value == pytest.approx(0.2 + 0.1 * 0.02 / H + H * 2.35)

@@ -1,0 +1,363 @@
+"""Likelihood ratios a kernel at a time: the bounded uncertainty's room, shapes of a loss, what is judged."""
+
+import numpy as np
+import pytest
+from innovations import block_of, with_hypotheses
+from kernels import new_fdi
+
+from beaver_ftc.diagnosis import likelihood, statistical, whitening
+from beaver_ftc.diagnosis.state import (
+    ALPHA3,
+    ENDING,
+    GROWING,
+    LOSS,
+    N_SLOTS,
+    STEP,
+)
+
+DT = 0.02
+TOGETHER = np.array([[0.04, 0.006], [0.006, 0.003]])
+
+
+def steady_block(axes=2, keep=0.97):
+    """A block whose filter has settled."""
+    drift, noise = (TOGETHER, [3e-4, 8e-4]) if axes == 2 else (TOGETHER[:1, :1], [3e-4])
+    block = block_of(drift, noise, jitter=0.05, keep=keep)
+    for _ in range(60):
+        whitening.advance(block, DT)
+    return block
+
+
+def through(block, accelerations):
+    """What the filter, from rest, leaves of accelerations (k, n)."""
+    out, state, shown = np.zeros(2), np.zeros(4), []
+    for acceleration in accelerations:
+        whitening.whiten(block, state, np.append(acceleration, 0.0)[:2], DT, out)
+        shown.append(out[: block["n"]].copy())
+    return np.array(shown)
+
+
+def test_the_slot_that_starts_anew_counts_the_twos_of_the_frame():
+    expected = [min((k & -k).bit_length() - 1, N_SLOTS - 1) for k in range(1, 2**11)]
+    assert [likelihood.slot_to_start(k) for k in range(1, 2**11)] == expected
+    assert likelihood.slot_to_start(0) == N_SLOTS - 1
+
+
+def test_an_onset_that_starts_knows_nothing_and_the_others_stay():
+    block = with_hypotheses(block_of(TOGETHER, [1e-3, 1e-3]), LOSS, STEP, tolerance=(0.1, 0.2))
+    names = (
+        "correlation",
+        "information",
+        "stays",
+        "swings",
+        "drifts",
+        "missing",
+        "response",
+        "weight",
+        "overlap",
+    )
+    for name in names:
+        block["hypothesis"][name] = 3.0
+    likelihood.start(block, 4)
+    for hypothesis in block["hypothesis"][:2]:
+        for name in names:
+            assert (np.delete(hypothesis[name], 4, axis=0) == 3.0).all(), name
+            cleared = hypothesis[name][4][:2] if name == "overlap" else hypothesis[name][4]
+            assert (cleared == (1.0 if name == "missing" else 0.0)).all(), name
+
+
+def test_of_a_constant_the_filter_leaves_what_stay_says():
+    """One axis, a drift that returns: after its transient a constant of eta_bar shows as g_0."""
+    block = steady_block(1)
+    likelihood.reach(block, np.array([0.3, 9.0, 9.0]), DT)
+    assert through(block, np.full((600, 1), 0.3))[-1] == pytest.approx(block["stay"][:1])
+    still = steady_block(1, keep=1.0)
+    likelihood.reach(still, np.array([0.3, 0.0, 0.0]), DT)
+    assert not still["stay"].any()  # a walk takes in all that is constant
+
+
+@pytest.mark.parametrize("axes", [1, 2])
+def test_a_steps_transient_sums_to_the_inverse_gain(axes):
+    """Sum of what the filter leaves of a step: K_d^-1, by axes; RINGING is kept for its swings."""
+    block, bounded = steady_block(axes, keep=1.0), np.array([0.3, 0.2, 9.0])
+    likelihood.reach(block, bounded, DT)
+    sums = np.array([through(block, np.tile(unit, (600, 1))).sum(axis=0) for unit in np.eye(axes)]).T
+    expected = likelihood.RINGING * np.abs(sums) @ bounded[:axes]
+    assert block["swing"][:axes] == pytest.approx(expected, rel=1e-6)
+    assert np.linalg.inv(block["K_d"][:axes, :axes]) == pytest.approx(sums, rel=1e-6)
+
+
+def test_the_room_of_a_bounded_uncertainty_is_summed_up_by_parts():
+    rng, frames, keep = np.random.default_rng(4), 12, 0.9
+    block = with_hypotheses(block_of(TOGETHER, [1e-3, 1e-3]), STEP)
+    block["stay"], block["swing"], block["pace"] = (0.1, 0.2), (0.3, 0.4), 0.05
+    w = rng.normal(size=(frames, 2))
+    hypothesis = block["hypothesis"][0]
+    for w0, w1 in w:
+        likelihood.allow(block, hypothesis, 2, w0, w1, keep)
+    old = keep ** np.arange(frames)[::-1]
+    changes = np.abs(np.diff(np.vstack([np.zeros(2), w]), axis=0))
+    stays, swings = old @ np.abs(w) @ [0.1, 0.2], old @ changes @ [0.3, 0.4]
+    drifts = old @ np.abs(w) @ [0.3, 0.4] * 0.05
+    assert hypothesis["stays"][2] == pytest.approx(stays)
+    assert hypothesis["swings"][2] == pytest.approx(swings)
+    assert hypothesis["drifts"][2] == pytest.approx(drifts)
+    last = np.abs(w[-1]) @ [0.3, 0.4]
+    assert likelihood.allowance(block, hypothesis, 2) == pytest.approx(stays + min(swings + last, drifts))
+    hypothesis["drifts"][2] = 99.0
+    assert likelihood.allowance(block, hypothesis, 2) == pytest.approx(stays + swings + last)
+
+
+def shapes(kind, frames=5):
+    block = with_hypotheses(block_of(TOGETHER, [1e-3, 1e-3]), kind)
+    hypothesis, out = block["hypothesis"][0], np.zeros(2)
+    hypothesis["growth_keep"], hypothesis["missing"] = 0.8, 1.0
+    found = []
+    for k in range(frames):
+        hypothesis["signature"] = 1.0 + k, -2.0 * k
+        likelihood.shape(hypothesis, 3, out)
+        found.append(out.copy())
+    return np.array(found)
+
+
+def test_a_loss_grows_stays_or_gives_back_what_it_was():
+    k = np.arange(5)
+    signature = np.column_stack([1.0 + k, -2.0 * k])
+    assert shapes(LOSS) == pytest.approx(signature)
+    assert shapes(STEP) == pytest.approx(signature)
+    assert shapes(GROWING) == pytest.approx((1.0 - 0.8 ** (k + 1.0))[:, None] * signature)
+    assert shapes(ENDING) == pytest.approx(np.tile(signature[0], (5, 1)))
+
+
+@pytest.mark.parametrize(
+    ("kind", "sided", "evidence"),
+    [
+        (LOSS, True, -3.0),
+        (GROWING, True, -3.0),
+        (ENDING, True, 3.0),
+        (STEP, False, 3.0),
+        (ALPHA3, False, 3.0),
+    ],
+)
+def test_a_loss_takes_away_and_its_end_gives_back(kind, sided, evidence):
+    assert bool(likelihood.one_sided(kind)) == sided
+    assert likelihood.speaking_for(kind, 3.0) == evidence
+    assert likelihood.speaking_for(kind, -3.0) == (3.0 if not sided else -evidence)
+
+
+@pytest.mark.parametrize("kind", [LOSS, STEP])
+@pytest.mark.parametrize("evidence", [-1.0, 0.0, 0.5, 3.9, 4.0, 6.0])
+def test_the_log_likelihood_ratio_is_the_largest_of_any_theta_allowed(kind, evidence):
+    theta = np.linspace(0.0, 1.0 if kind == LOSS else 9.0, 9001)
+    largest = np.max(theta * evidence - 0.5 * theta**2 * 4.0)
+    assert likelihood.log_likelihood(kind, evidence, 4.0) == pytest.approx(max(largest, 0.0), abs=1e-6)
+
+
+@pytest.mark.parametrize("N", [-30.0, -9.0, -5.0, 2.0])
+def test_the_estimate_of_a_loss_is_the_likeliest_with_a_prior_and_of_a_step_without(N):
+    """A normal prior of mean -1/2 and the variance of a uniform one: the mode within [-1, 0]."""
+    theta, D = np.linspace(-1.0, 0.0, 100001), 9.0
+    posterior = theta * N - 0.5 * theta**2 * D - 0.5 * 12.0 * (theta + 0.5) ** 2
+    assert likelihood.estimate(LOSS, N, D) == pytest.approx(theta[posterior.argmax()], abs=2e-5)
+    assert likelihood.estimate(STEP, N, D) == pytest.approx(N / 9.0)
+
+
+def test_a_share_is_in_standard_deviations_or_of_what_uncertainty_and_chance_allow():
+    block = block_of(TOGETHER, [1e-3, 1e-3])
+    block["level"], block["chance"] = 6.0, 0.5
+    assert likelihood.share(block, 12.0, 0.0, 9.0) == pytest.approx(4.0)
+    assert likelihood.share(block, 12.0, 24.0, 9.0) == pytest.approx(12.0 / (4.0 + 1.5))
+    assert likelihood.share(block, 12.0, 0.6, 9.0) == pytest.approx(
+        4.0
+    )  # never more than against chance alone
+
+
+def judged(kind=LOSS, tolerated=False, memory=0.0, level=0.0, at_most=0.0):
+    block = with_hypotheses(block_of(TOGETHER, [1e-3, 1e-3]), kind, tolerance=(0.1, 0.2))
+    block["level"], block["chance"] = level, 0.5
+    hypothesis = block["hypothesis"][0]
+    hypothesis["correlation"][[1, 5]], hypothesis["information"][[1, 5]] = (-3.0, -5.0), (4.0, 16.0)
+    hypothesis["correlation"][7] = -99.0  # nothing is known of that onset
+    hypothesis["overlap"][[1, 5], :2] = (1.0, -2.0), (-3.0, 4.0)
+    hypothesis["stays"][[1, 5]], hypothesis["at_most"] = (0.25, 0.5), at_most
+    hypothesis["score"] = hypothesis["at_least"] = 99.0
+    likelihood.judge(block, tolerated, memory)
+    return hypothesis
+
+
+def test_a_hypothesis_is_worth_its_best_onset():
+    hypothesis = judged()
+    assert hypothesis["score"] == pytest.approx(1.5)  # 3 / 2 beside 5 / 4
+    assert hypothesis["at_least"] == hypothesis["at_most"] == pytest.approx(9.0 / 8.0)
+    assert hypothesis["theta"] == pytest.approx(max((-3.0 - 6.0) / 16.0, -1.0))
+    assert hypothesis["certainty"] == 4.0
+
+
+def test_what_errors_of_coefficients_explain_is_taken_off_and_may_be_added():
+    hypothesis = judged(tolerated=True)  # slack 0.5 and 1.1
+    assert hypothesis["score"] == pytest.approx(max(2.5 / 2.0, 3.9 / 4.0))
+    assert hypothesis["at_least"] == pytest.approx(max(2.5**2 / 8.0, 3.9**2 / 32.0))
+    assert hypothesis["at_most"] == pytest.approx(max(3.5**2 / 8.0, 6.1**2 / 32.0))
+
+
+def test_what_a_bounded_uncertainty_explains_is_held_against_the_evidence():
+    hypothesis = judged(level=1.0)  # rooms 0.25 and 0.5
+    assert hypothesis["score"] == pytest.approx(max(3.0 / 2.0, 5.0 / 4.0))
+    assert hypothesis["at_least"] == pytest.approx(max(2.75**2 / 8.0, 4.5**2 / 32.0))
+    assert hypothesis["at_most"] == pytest.approx(max(3.25**2 / 8.0, 5.5**2 / 32.0))
+
+
+def test_where_a_loss_may_end_what_was_explained_is_remembered_and_uncertainty_casts_no_doubt():
+    hypothesis = judged(level=1.0, memory=0.9, at_most=10.0)
+    assert hypothesis["at_most"] == pytest.approx(9.0)
+    assert hypothesis["at_least"] == pytest.approx(9.0 / 8.0)
+    assert judged(memory=0.0, at_most=10.0)["at_most"] == pytest.approx(9.0 / 8.0)
+
+
+def detector(**fields):
+    fdi = new_fdi()
+    record = fdi["statistical"]
+    record["n_blocks"], record["alarm_level"], record["naming_level"], record["keep"] = 3, 5.0, 4.0, 0.9
+    for name, value in fields.items():
+        record[name] = value
+    for block, axes in zip(record["block"], ((1,), (0, 2), (0, 2)), strict=True):
+        block["n"], block["axis"][: len(axes)], block["n_hypotheses"] = len(axes), axes, 3
+    return fdi, record
+
+
+def test_signatures_are_what_surfaces_gave_steps_and_the_cubic_moment():
+    _, record = detector()
+    for hypothesis, (kind, surface, axis) in zip(
+        record["block"][1]["hypothesis"], ((LOSS, 2, 2), (STEP, -1, 2), (STEP, -1, 0)), strict=False
+    ):
+        hypothesis["kind"], hypothesis["surface"], hypothesis["axis"] = kind, surface, axis
+    record["block"][0]["hypothesis"]["kind"][:3] = LOSS, STEP, ALPHA3
+    record["block"][0]["hypothesis"]["surface"][:3] = 1, -1, -1
+    record["block"][0]["hypothesis"]["axis"][:3] = 1, 1, 1
+    Gu = np.arange(12.0).reshape(3, 4)
+    statistical.signatures(record, Gu, 0.7)
+    lateral = record["block"][1]["hypothesis"]["signature"][:3]
+    assert lateral == pytest.approx(np.array([[2.0, 10.0], [0.0, 1.0], [1.0, 0.0]]))
+    assert record["block"][0]["hypothesis"]["signature"][:3, 0] == pytest.approx([5.0, 1.0, 0.7])
+
+
+def with_scores(*scores, alarms=1):
+    _, record = detector(detected_at_s=-1.0)
+    for block, values in zip(record["block"], scores, strict=True):
+        block["hypothesis"]["score"][:3], block["hypothesis"]["alarms"][:3] = values, alarms
+        block["hypothesis"]["axis"][:3], block["hypothesis"]["column"][:3] = (0, 1, 2), (0, 1, 2)
+    return record
+
+
+def test_the_alarm_is_the_largest_share_of_the_level():
+    record = with_scores((1.0, 2.0, 0.0), (3.0, 0.0, 4.9), (0.5, 1.5, 2.5))
+    statistical.score(record, 7.0)
+    assert record["score"] == pytest.approx(4.9 / 5.0)
+    assert record["axis"] == 2
+    assert record["detected_at_s"] == -1.0
+    record["block"][1]["hypothesis"]["score"][0] = 6.0
+    statistical.score(record, 8.0)
+    statistical.score(record, 9.0)
+    assert (record["axis"], record["detected_at_s"]) == (0, 8.0)
+    silent = with_scores((9.0,) * 3, (9.0,) * 3, (9.0,) * 3, alarms=0)
+    statistical.score(silent, 7.0)
+    assert silent["score"] == 0.0
+
+
+def test_the_log_has_each_test_as_its_largest_share():
+    record, row = with_scores((1.0, 2.0, 0.0), (3.0, 0.0, 4.0), (0.5, 1.5, 2.5)), np.full(6, 9.0)
+    record["n_columns"] = 4
+    statistical.record(record, row)
+    assert row == pytest.approx([9.0, 9.0, 0.6, 0.4, 0.8, 0.0])
+    record["block"]["hypothesis"]["alarms"] = 0
+    statistical.record(record, row)
+    assert row == pytest.approx([9.0, 9.0, 0.0, 0.0, 0.0, 0.0])
+
+
+def test_the_estimate_of_a_loss_is_the_surest():
+    _, record = detector()
+    for b, (theta, certainty) in enumerate(((-0.9, 1.0), (-0.4, 5.0), (-0.3, 2.0))):
+        hypothesis = record["block"][b]["hypothesis"][1]
+        hypothesis["kind"], hypothesis["surface"] = LOSS, 2
+        hypothesis["theta"], hypothesis["certainty"] = theta, certainty
+    record["block"][2]["hypothesis"][0] = record["block"][2]["hypothesis"][1]
+    record["block"][2]["hypothesis"]["kind"][0], record["block"][2]["hypothesis"]["certainty"][0] = STEP, 9.0
+    assert statistical.loss_of(record, 2) == (-0.4, 5.0)
+    assert statistical.loss_of(record, 1) == (0.0, 0.0)
+
+
+def contested(loss=1.0, step=0.0, other=0.0, growing=0.0, ending=0.0, pitch=(0.0, 0.0, 0.0), **keys):
+    """Whether a loss of the rudder (2) is excluded, by log likelihood ratios in roll and yaw; in pitch by
+    those of (a step, a loss, its end). Naming level 4."""
+    fdi, record = detector()
+    fdi["n_estimators"] = 2
+    fdi["estimator"]["surface"][:2], fdi["estimator"]["kind"][:2] = (0, 2), LOSS
+    fdi["estimator"]["excluded"][0] = keys.get("other_excluded", 0)
+    fdi["abrupt"], fdi["instants"] = keys.get("abrupt", 0), keys.get("instants", 1)
+    for b, values in ((1, (loss, step, other, growing, ending)), (2, (99.0, 0.0, 0.0, 0.0, 0.0))):
+        block = record["block"][b]
+        block["n_hypotheses"] = 5
+        block["hypothesis"]["kind"][:5] = LOSS, STEP, LOSS, GROWING, ENDING
+        block["hypothesis"]["surface"][:5] = 2, -1, 0, 2, 2
+        block["hypothesis"]["at_least"][:5] = block["hypothesis"]["at_most"][:5] = values
+    block = record["block"][0]
+    block["hypothesis"]["kind"][:3], block["hypothesis"]["surface"][:3] = (STEP, LOSS, ENDING), (-1, 2, 2)
+    block["hypothesis"]["at_least"][:3] = block["hypothesis"]["at_most"][:3] = pitch
+    return bool(statistical.excludes(fdi, 2))
+
+
+def test_a_loss_is_excluded_by_what_explains_better_by_the_naming_level():
+    assert not contested(loss=1.0, step=4.9)
+    assert contested(loss=1.0, step=5.1)
+    assert contested(loss=1.0, other=5.1)
+    assert not contested(loss=1.0, other=9.0, other_excluded=1)
+    assert not contested(loss=1.0, growing=0.0, ending=9.0, step=9.0)  # its end explains as much
+    assert not contested(loss=1.0, step=5.1, growing=3.0)  # or a part that grows
+    assert contested(loss=0.0, pitch=(5.0, 0.0, 0.0))
+    assert not contested(loss=0.0, pitch=(3.9, 0.0, 0.0))
+    assert not contested(loss=0.0, step=5.0, pitch=(0.0, 4.0, 0.0))
+
+
+def test_a_loss_that_may_grow_keeps_a_part_and_a_constant_one_does_not():
+    assert not contested(loss=5.1, step=20.0)
+    assert contested(loss=4.9, step=20.0)
+    assert contested(loss=15.9, step=20.0, abrupt=1)
+    assert not contested(loss=16.1, step=20.0, abrupt=1)
+    assert not contested(loss=5.1, step=20.0, abrupt=1, instants=4)
+
+
+def test_in_pitch_an_end_counts_where_a_loss_has_shown_before():
+    """More than half the naming level, or a fiftieth of what the end explains."""
+    assert contested(loss=0.0, pitch=(200.0, 1.9, 199.0))
+    assert not contested(loss=0.0, pitch=(200.0, 2.1, 199.0))
+    assert not contested(loss=0.0, pitch=(60.0, 1.21, 60.0))
+    assert contested(loss=0.0, pitch=(60.0, 1.19, 60.0))
+
+
+@pytest.mark.parametrize("b", [0, 1])
+def test_what_the_beliefs_leave_unexplained_is_followed_by_the_drift(b):
+    _, record = detector()
+    rng = np.random.default_rng(b)
+    surprise, mean = rng.normal(size=3), rng.normal(size=3)
+    record["air"]["mean"], record["air"]["acceleration"] = mean, (0.1, 0.2, 0.3)
+    gains = rng.normal(size=(2, 2))
+    record["block"]["K_d"], record["block"]["keep"] = gains, 1.0
+    statistical.follow_rest(record, surprise, DT)
+    axes = [(1,), (0, 2)][b]
+    left = DT * (surprise - mean)[list(axes)]
+    drift = gains[: len(axes), : len(axes)] @ left
+    assert record["block"][b]["rest"][2 : 2 + len(axes)] == pytest.approx(drift)
+    assert not record["block"][2]["rest"].any()
+    out = np.zeros(3)
+    statistical.unknown_acceleration(record, out)
+    assert out[list(axes)] == pytest.approx(drift + np.array([0.1, 0.2, 0.3])[list(axes)])
+
+
+def test_a_loss_is_open_until_its_estimator_is_excluded():
+    fdi, _ = detector()
+    fdi["n_estimators"], fdi["estimator"]["kind"][:2] = 2, (1, LOSS)
+    fdi["estimator"]["surface"][:2], fdi["estimator"]["excluded"][:2] = 1, (1, 0)
+    assert statistical.is_open(fdi, 1)
+    assert statistical.is_open(fdi, 3)
+    fdi["estimator"]["excluded"][1] = 1
+    assert not statistical.is_open(fdi, 1)

@@ -1,0 +1,250 @@
+"""The statistical detector's numbers one by one: from what is declared, by the formulas' own conditions."""
+
+from math import exp, pi, radians, sqrt
+
+import numpy as np
+import pytest
+from innovations import LEVEL_FLIGHT, TRAVEL_RAD, Detector
+
+from beaver_ftc.aircraft import load
+from beaver_ftc.design.coefficients import MASS
+from beaver_ftc.design.model import design_record
+from beaver_ftc.design.variants import coefficient_slopes
+from beaver_ftc.diagnosis import noise_model
+from beaver_ftc.diagnosis.admitted import gust_sigma_rad_s, inertia_slack
+from beaver_ftc.diagnosis.state import ALPHA3, ENDING, GROWING, LOSS, N_SLOTS, STATISTICAL, STEP
+from beaver_ftc.loop.assembly import assemble
+from beaver_ftc.scenario.diagnosis import Bounds
+from beaver_ftc.scenario.schema import Scenario
+
+AIRCRAFT = load()
+SPAN_M, CHORD_M = AIRCRAFT.geometry.span_m, AIRCRAFT.geometry.chord_m
+_, Y, _ = LEVEL_FLIGHT
+V, QDYN_PA = 45.0, 1036.0
+GIVEN = {
+    "name": "x",
+    "rate_hz": 50,
+    "fdi": {"statistical": {}, "bounds": {"sensors": "tactical-grade", "turbulence": "light"}},
+}
+AILERON, ELEVATOR, RUDDER = 0, 1, 2
+
+
+@pytest.mark.parametrize("turbulence", ["light", "severe"])
+def test_gusts_drift_as_the_specification_has_them(turbulence):
+    """Intensity over V: of a first-order process twice its variance over its lag; of a lagged slope that of
+    the velocity over (V lag)^2 [MIL-F-8785C]."""
+    found = noise_model.gust_drift(turbulence, SPAN_M)
+    sigma_w = 0.3048 * {"light": 7.4, "severe": 23.6}[turbulence]
+    L = 0.3048 * 1750.0
+    rolling_lag_s = sqrt(L * SPAN_M) / (2.6 * V)
+    rolling = 2.0 * gust_sigma_rad_s(turbulence, SPAN_M) ** 2 / rolling_lag_s
+    velocity = 3.0 * sigma_w**2 * V / L
+    pitching, yawing = (velocity / (V * n * SPAN_M / (pi * V)) ** 2 for n in (4, 3))
+    assert found * V == pytest.approx([rolling, pitching, yawing], rel=1e-9)
+
+
+def test_a_swing_takes_half_the_level_where_gyros_are_noisy():
+    """eta_bar omega sqrt(2 sqrt 2 / i w0), w0 = (i / n)^(1/4); so fast that it hardly grows beside a loss."""
+    eta_bar, omega, noise, level, dt = 0.02, 500.0, 1e-3, 6.0, 1e-3
+    i = noise_model.rapidity(eta_bar, omega, noise, level, dt) * eta_bar**2
+    ramp = 4.0 * (1.204 * eta_bar / level) ** 2 * omega
+    walk = sqrt(i**2 - ramp**2)
+    w0 = (walk / (noise**2 * dt)) ** 0.25
+    assert eta_bar * omega * sqrt(2.0 * sqrt(2.0) / (walk * w0)) == pytest.approx(level / 2)
+
+
+def test_what_grows_beside_a_loss_takes_half_the_level():
+    """eta_bar sqrt(omega / i) times 1.204, where next to nothing is left of the swing."""
+    eta_bar, omega, level = 0.02, 3.0, 6.0
+    i = noise_model.rapidity(eta_bar, omega, 1e-12, level, 1e-12) * eta_bar**2
+    assert 1.204 * eta_bar * sqrt(omega / i) == pytest.approx(level / 2, rel=1e-4)
+
+
+def test_without_noise_the_frame_rate_is_the_bandwidth():
+    eta_bar, omega, level, dt = 0.02, 50.0, 6.0, 0.05
+    i = noise_model.rapidity(eta_bar, omega, 0.0, level, dt) * eta_bar**2
+    assert eta_bar * omega * sqrt(2.0 * sqrt(2.0) * dt / i) == pytest.approx(level / 2)
+
+
+def test_a_bound_of_zero_is_reckoned_with_as_a_small_one():
+    none, least, more = (noise_model.rapidity(bound, 10.0, 1e-4, 6.0, 0.01) for bound in (0.0, 1e-3, 2e-3))
+    assert none == least != more
+
+
+def returning(rapidity, moving=1, rolling=200.0, rate_hz=50.0):
+    record = np.zeros(1, STATISTICAL)[0]
+    record["rapidity"], record["alarm_level"] = rapidity, 6.0
+    record["air"]["moving"], record["air"]["rolling"] = moving, rolling
+    return noise_model.returning_length(record, V, rate_hz)
+
+
+def test_a_drift_returns_so_soon_that_a_swing_takes_half_the_level():
+    """eta_bar sqrt(T / 2 i) / tau over the longest window; no later than the rolling gust does."""
+    rapidity, rate_hz = 3.0, 50.0
+    tau = returning(rapidity, moving=0) / V
+    longest_s = 2 ** (N_SLOTS - 1) / rate_hz
+    assert sqrt(longest_s / (2.0 * rapidity)) / tau == pytest.approx(6.0 / 2)
+    assert returning(rapidity, rolling=2.0) == 2.0
+    assert returning(rapidity, rolling=1e6) == pytest.approx(tau * V)
+    assert returning(0.0) == 200.0
+    assert returning(0.0, moving=0) == 0.0
+
+
+@pytest.fixture(scope="module")
+def alone():
+    return Detector(50.0, forgetting_time_s=4.0, bounds={"sensors": "tactical-grade", "turbulence": "light"})
+
+
+def test_every_plane_has_its_losses_their_courses_steps_and_pitch_the_cubic_moment(alone):
+    pitch, *lateral = alone.blocks
+    column = {LOSS: {AILERON: 0, ELEVATOR: 1, RUDDER: 2}}
+
+    def hypotheses(block):
+        found = block["hypothesis"][: block["n_hypotheses"]]
+        return {(int(h["kind"]), int(h["surface"]), int(h["axis"]), int(h["alarms"])) for h in found}
+
+    assert hypotheses(pitch) == {
+        (LOSS, ELEVATOR, 1, 1), (STEP, -1, 1, 1), (ALPHA3, -1, 1, 0), (GROWING, ELEVATOR, 1, 0),
+        (ENDING, ELEVATOR, 1, 0),
+    }  # fmt: skip
+    for block in lateral:
+        assert hypotheses(block) == {
+            (LOSS, AILERON, 0, 1), (LOSS, RUDDER, 2, 1), (STEP, -1, 0, 1), (STEP, -1, 2, 1),
+            (GROWING, AILERON, 0, 0), (ENDING, AILERON, 0, 0), (GROWING, RUDDER, 2, 0), (ENDING, RUDDER, 2, 0),
+        }  # fmt: skip
+    assert [int(block["n"]) for block in alone.blocks] == [1, 2, 2]
+    assert [block["axis"][: block["n"]].tolist() for block in alone.blocks] == [[1], [0, 2], [0, 2]]
+    for block in alone.blocks:
+        for h in block["hypothesis"][: block["n_hypotheses"]]:
+            if h["alarms"]:
+                place = column[LOSS][int(h["surface"])] if h["kind"] == LOSS else 3 + h["axis"]
+                assert h["column"] == place
+    assert alone.detector["n_columns"] == 6
+    assert alone.detector["n_blocks"] == 3
+
+
+def test_a_block_begins_with_the_gyros_noise_and_a_drift_that_may_be_anything():
+    sensors = Bounds.model_validate({"sensors": "tactical-grade"}).sensors
+    record = assemble(Scenario.model_validate(GIVEN), np.zeros(4), TRAVEL_RAD)[0]["fdi"]["statistical"]
+    for block in record["block"]:
+        for i in range(block["n"]):
+            noise, _, quantum = getattr(sensors, "pqr"[block["axis"][i]]).noise_bias_quantum
+            assert block["noise"][i] == pytest.approx(noise**2 + quantum**2 / 12.0)
+            assert block["P_xx"][i, i] == block["noise"][i]
+            assert block["P_dd"][i, i] == 1.0
+    ideal = Detector(50.0).blocks[1]
+    assert ideal["noise"] == pytest.approx([1e-18, 1e-18])
+
+
+def test_the_times_and_levels_of_a_detector(alone):
+    record, blocks = alone.detector, alone.blocks
+    assert record["keep"] == pytest.approx(exp(-1.0 / (50.0 * 4.0)))
+    assert record["detected_at_s"] == -1.0
+    assert record["enabled"] == 1
+    for block in blocks:
+        assert block["level"] == record["alarm_level"]
+        assert block["chance"] == 0.5
+        assert block["pace"] == pytest.approx(15.0 / 50.0)
+        assert block["hypothesis"]["growth_keep"] == pytest.approx(exp(-1.5 / 50.0))
+    still = Detector(50.0)
+    assert all(block["chance"] == 0.0 for block in still.blocks)
+
+
+def test_a_loss_declared_constant_neither_grows_nor_ends():
+    blocks = Detector(50.0, fault_profile="abrupt").blocks
+    kinds = [set(block["hypothesis"]["kind"][: block["n_hypotheses"]]) for block in blocks]
+    assert all(not {GROWING, ENDING} & found for found in kinds)
+    assert all(LOSS in found and STEP in found for found in kinds)
+
+
+def test_the_second_view_returns_with_a_gust_as_strong_where_it_is_slow(alone):
+    air, last = alone.detector["air"], alone.blocks[-1]
+    rolling = sqrt(0.3048 * 1750.0 * SPAN_M) / 2.6
+    assert air["rolling"] == pytest.approx(rolling)
+    assert last["lag"] == pytest.approx(noise_model.returning_length(alone.detector, V, 50.0))
+    assert last["stronger"] == pytest.approx((rolling / last["lag"]) ** 2)
+    assert [float(block["stronger"]) for block in alone.blocks[:-1]] == [1.0, 1.0]
+    assert air["moving"] == 1
+    assert air["area_per_mass"] == pytest.approx(AIRCRAFT.geometry.wing_area_m2 / MASS.mass_kg)
+    assert air["unseen"] == pytest.approx([1.0, 0.003, 0.03])
+    assert air["span"] == SPAN_M
+    assert air["gravity"] == pytest.approx(9.80665)
+    assert Detector(50.0).detector["air"]["moving"] == 0
+
+
+def test_where_nothing_diagnoses_nothing_is_enabled():
+    assert Detector(50.0, statistical=None).detector["enabled"] == 0
+
+
+def _tolerance(**bounds):
+    design = design_record()[0]
+    given = Bounds.model_validate(bounds)
+    return noise_model.steady_tolerance(given, AIRCRAFT, design, MASS, Y, np.zeros(4))
+
+
+SIZE = np.array([abs(term.value) for term in AIRCRAFT.moments])
+AXIS = np.array([("Cl", "Cm", "Cn").index(term.coefficient) for term in AIRCRAFT.moments])
+CONSTANT = np.array([term.is_constant for term in AIRCRAFT.moments])
+SLOPES = np.abs(coefficient_slopes(design_record()[0], np.zeros(3), Y, np.zeros(4)))
+RATES = {"p": "ph", "q": "qh", "r": "rh"}
+
+
+def _power(*signals):
+    return np.array([sum(power for name, power in term.of if name in signals) for term in AIRCRAFT.moments])
+
+
+def test_pressure_scales_every_term():
+    assert _tolerance(sensors={"qdyn": {"scale_error": 0.02}}) == pytest.approx(0.02 * SIZE)
+    assert _tolerance(sensors={"qdyn": {"bias_pa": 10.0}}) == pytest.approx(10.0 / QDYN_PA * SIZE)
+
+
+def test_airspeed_scales_what_rates_multiply():
+    rates = _power(*RATES.values())
+    assert _tolerance(sensors={"V": {"scale_error": 0.02}}) == pytest.approx(0.02 * rates * SIZE)
+    assert _tolerance(sensors={"V": {"bias_mps": 0.4}}) == pytest.approx(0.4 / V * rates * SIZE)
+
+
+@pytest.mark.parametrize(("vane", "place"), [("alpha", 0), ("beta", 1)])
+def test_a_vane_scales_its_terms_and_its_offset_is_a_constant(vane, place):
+    assert _tolerance(sensors={vane: {"scale_error": 0.02}}) == pytest.approx(0.02 * _power(vane) * SIZE)
+    offset = _tolerance(sensors={vane: {"bias_deg": 0.3}})
+    assert offset == pytest.approx(np.where(CONSTANT, radians(0.3) * SLOPES[AXIS, place], 0.0))
+    assert offset.any()
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_a_gyro_scales_its_own_axis_once_and_its_terms_elsewhere(axis):
+    gyro = "pqr"[axis]
+    scaled = _tolerance(sensors={gyro: {"scale_error": 0.02}})
+    assert scaled == pytest.approx(0.02 * np.where(axis == AXIS, 1.0, _power(RATES[gyro])) * SIZE)
+    length = (SPAN_M / 2, CHORD_M, SPAN_M / 2)[axis]
+    offset = _tolerance(sensors={gyro: {"bias_deg_s": 0.3}})
+    slope = SLOPES[AXIS, 2 + axis] * length / V
+    assert offset == pytest.approx(np.where(CONSTANT, radians(0.3) * slope, 0.0))
+
+
+def test_inertia_scales_every_term_by_the_worst_of_its_own_axes():
+    nominal = np.abs([noise_model.astuple(noise_model.inertia_coefficients(MASS))])[0]
+    share = (inertia_slack(0.05, MASS) / nominal)[[2, 7, 11]].max()
+    assert _tolerance(inertia=0.05) == pytest.approx(share * SIZE)
+
+
+def test_blocks_get_the_tolerances_of_their_axes():
+    alone = Detector(50.0, bounds={"coefficients": 0.1})
+    assert alone.detector["tolerated"] == 1
+    for block, axes in zip(alone.blocks, ((1,), (0, 2), (0, 2)), strict=True):
+        of_it = SIZE[np.isin(AXIS, axes)]
+        assert block["n_regressors"] == of_it.size
+        assert block["tolerance"][: of_it.size] == pytest.approx(0.1 * of_it)
+    assert Detector(50.0).detector["tolerated"] == 0
+
+
+def test_the_noise_of_vanes_and_airspeed_turns_the_gust_they_see():
+    """Airspeed through attitudes of up to 17 deg, 0.3 of it."""
+    design = design_record()[0]
+    sensors = Bounds.model_validate({"sensors": {"V": {"noise_std_mps": 0.5}}}).sensors
+    speed = 0.3 * 0.5 / V
+    turning = np.array([0.0, speed * pi * V / (4 * SPAN_M), speed * pi * V / (3 * SPAN_M)])
+    damping = noise_model.jacobian(design, np.zeros(3), Y, np.zeros(4))[2]
+    found = noise_model._gust_jitter(sensors, design, LEVEL_FLIGHT, SPAN_M)
+    assert found == pytest.approx(np.sqrt(damping**2 @ turning**2))

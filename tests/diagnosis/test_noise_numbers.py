@@ -110,7 +110,8 @@ def test_every_plane_has_its_losses_their_courses_steps_and_pitch_the_cubic_mome
     for block in lateral:
         assert hypotheses(block) == {
             (LOSS, AILERON, 0, 1), (LOSS, RUDDER, 2, 1), (STEP, -1, 0, 1), (STEP, -1, 2, 1),
-            (GROWING, AILERON, 0, 0), (ENDING, AILERON, 0, 0), (GROWING, RUDDER, 2, 0), (ENDING, RUDDER, 2, 0),
+            (GROWING, AILERON, 0, 0), (ENDING, AILERON, 0, 0), (GROWING, RUDDER, 2, 0),
+            (ENDING, RUDDER, 2, 0),
         }  # fmt: skip
     assert [int(block["n"]) for block in alone.blocks] == [1, 2, 2]
     assert [block["axis"][: block["n"]].tolist() for block in alone.blocks] == [[1], [0, 2], [0, 2]]

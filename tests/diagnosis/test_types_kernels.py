@@ -1,0 +1,445 @@
+"""What each fault type makes of one frame, and how the types left become a verdict: by hand, case by case."""
+
+import numpy as np
+import pytest
+from kernels import new_fdi
+
+from beaver_ftc.diagnosis.types import (
+    bias,
+    examine,
+    floating,
+    growing_bias,
+    hardover_down,
+    hardover_up,
+    loss,
+    oscillatory,
+    rate_limit,
+    release,
+    runaway,
+    sets,
+    stuck,
+    varying_loss,
+)
+from beaver_ftc.diagnosis.types.registry import (
+    BIAS,
+    CONSTANT_LOSS,
+    DOWN,
+    FLOAT,
+    GROWING_BIAS,
+    N_TYPES,
+    OSCILLATORY,
+    SLOW,
+    STUCK,
+    UP,
+    VARYING_LOSS,
+)
+
+LOW, HIGH, DT = -0.4, 0.5, 0.02
+ALL = set(range(N_TYPES))
+
+
+def new_surface(left=ALL, low=-0.01, high=0.01, command=0.0, **fields):
+    """(fdi, surface 0) with only these types left; low to high: where it was in the judged frame, rad."""
+    fdi = new_fdi()
+    fdi["whole"], fdi["patience"], fdi["instants"] = 1, 20, 1
+    fdi["block"]["length"], fdi["block"]["span_s"], fdi["frame"] = 1, DT, 10
+    surface = fdi["surface"][0]
+    surface["travel_low"], surface["travel_high"], surface["approach"], surface["step"] = LOW, HIGH, 0.5, 0.1
+    examine.begin(surface)
+    surface["set_low"][BIAS], surface["set_high"][BIAS] = -np.inf, np.inf
+    surface["low_then"], surface["high_then"], surface["command_then"] = low, high, command
+    surface["type_excluded"] = [kind not in left for kind in range(N_TYPES)]
+    for name, value in fields.items():
+        surface[name] = value
+    return fdi, surface
+
+
+def test_what_is_known_of_a_surface_as_it_begins():
+    _, surface = new_surface(left=())
+    surface["evidence"], surface["quiet"], surface["started_at"] = 3, 4, 5
+    surface["low"], surface["high"] = 0.1, 0.2
+    examine.begin(surface)
+    assert not surface["type_excluded"].any()
+    assert (surface["evidence"], surface["quiet"], surface["started_at"]) == (0, 0, -1)
+    assert (surface["low"], surface["high"]) == (LOW, HIGH)
+    assert (surface["set_low"][STUCK], surface["set_high"][STUCK]) == (LOW, HIGH)
+    assert (surface["set_low"][CONSTANT_LOSS], surface["set_high"][CONSTANT_LOSS]) == (0.0, 1.0)
+    assert (surface["set_low"][BIAS], surface["set_high"][BIAS]) == (-np.inf, np.inf)
+    assert surface["rate_limit"]["at"] == -2
+    assert surface["oscillatory"]["half_cycles"] == 0
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "command", "expected"),
+    [
+        (0.05, 0.07, 0.1, (0.5, 0.7)), (-0.07, -0.05, -0.1, (0.5, 0.7)), (0.05, 0.3, 0.1, (0.5, 1.0)),
+        (-0.02, 0.05, 0.1, (0.0, 0.5)), (0.11, 0.2, 0.1, None), (-0.05, -0.02, 0.1, None),
+    ],
+)  # fmt: skip
+def test_a_constant_loss_keeps_the_shares_that_explain_the_frame(low, high, command, expected):
+    fdi, surface = new_surface(low=low, high=high, command=command)
+    loss.judge(fdi, surface, CONSTANT_LOSS, 5)
+    varying_loss.judge(fdi, surface, VARYING_LOSS, 5)
+    assert (
+        surface["type_excluded"][CONSTANT_LOSS]
+        == surface["type_excluded"][VARYING_LOSS]
+        == (expected is None)
+    )
+    if expected:
+        assert (surface["set_low"][CONSTANT_LOSS], surface["set_high"][CONSTANT_LOSS]) == pytest.approx(
+            expected
+        )
+
+
+def test_over_a_block_in_which_the_command_swings_any_mean_may_be_a_varying_loss():
+    for least, greatest, excluded in ((-0.1, 0.2, 0), (0.0, 0.2, 1), (-0.1, 0.0, 1)):
+        fdi, surface = new_surface(low=0.11, high=0.2, command=0.1)
+        fdi["block"]["length"], surface["orders"]["least"][1] = 5, least
+        surface["orders"]["greatest"][1] = greatest
+        varying_loss.judge(fdi, surface, VARYING_LOSS, 5)
+        assert surface["type_excluded"][VARYING_LOSS] == excluded
+
+
+def test_sets_shrink_to_what_is_left_and_end_when_nothing_is():
+    _, surface = new_surface()
+    sets.intersect(surface, STUCK, -0.1, 0.2)
+    sets.intersect(surface, STUCK, 0.0, 0.9)
+    assert (surface["set_low"][STUCK], surface["set_high"][STUCK]) == (0.0, 0.2)
+    assert sets.middle(surface, STUCK) == 0.1
+    assert not surface["type_excluded"][STUCK]
+    sets.intersect(surface, STUCK, 0.2, 0.9)  # one point is not nothing
+    assert not surface["type_excluded"][STUCK]
+    sets.intersect(surface, STUCK, 0.21, 0.9)
+    assert surface["type_excluded"][STUCK]
+
+
+def test_an_offset_is_unlimited_at_a_stop():
+    fdi, surface = new_surface(low=0.1, high=0.15, command=0.3)
+    assert sets.offset(fdi, surface) == pytest.approx((-0.2, -0.15))
+    surface["high_then"] = HIGH
+    assert sets.offset(fdi, surface) == (pytest.approx(-0.2), np.inf)
+    surface["low_then"] = LOW
+    assert sets.offset(fdi, surface)[0] == -np.inf
+
+
+def test_over_a_block_a_stop_may_have_been_met_at_its_furthest_order():
+    fdi, surface = new_surface(low=0.2, high=0.25, command=0.1)
+    fdi["block"]["length"] = 5
+    surface["orders"]["least"][1], surface["orders"]["greatest"][1] = -0.4, 0.34
+    # the lowest it was: 0.2 - (0.1 + 0.4) = -0.3; the highest: 0.25 + 0.24 = 0.49, below 0.5
+    assert sets.offset(fdi, surface) == pytest.approx((0.1, 0.15))
+    surface["orders"]["greatest"][1] = 0.36
+    assert sets.offset(fdi, surface)[1] == np.inf
+    surface["orders"]["least"][1] = -0.51
+    assert sets.offset(fdi, surface)[0] == -np.inf
+
+
+def test_a_bias_keeps_the_offsets_that_explain_every_frame():
+    fdi, surface = new_surface(low=0.1, high=0.15, command=0.3)
+    bias.judge(fdi, surface, BIAS, 5)
+    surface["low_then"], surface["high_then"], surface["command_then"] = 0.23, 0.4, 0.4
+    bias.judge(fdi, surface, BIAS, 6)
+    assert (surface["set_low"][BIAS], surface["set_high"][BIAS]) == pytest.approx((-0.17, -0.15))
+    surface["command"] = 0.05
+    assert bias.deflection(fdi, surface, BIAS) == pytest.approx((-0.12, -0.1))
+    assert bias.interval(fdi, 0, BIAS) == pytest.approx((-0.17, -0.15))
+    assert bias.estimate(fdi, 0, BIAS) == pytest.approx(-0.16)
+    surface["set_high"][BIAS] = np.inf
+    assert bias.interval(fdi, 0, BIAS) is None
+
+
+@pytest.mark.parametrize(
+    ("offsets", "excluded"),
+    [
+        ([0.1, 0.2, 0.3], 0), ([-0.1, -0.2, -0.3], 0), ([0.1, 0.2, 0.17], 1), ([-0.1, -0.2, -0.17], 1),
+        ([0.1, -0.1], 1), ([0.1, 0.085], 0), ([-0.1, -0.085], 0), ([0.005, -0.005], 0),
+    ],
+)  # fmt: skip
+def test_a_growing_bias_keeps_its_sign_and_never_shrinks(offsets, excluded):
+    """Each known to within 0.01."""
+    fdi, surface = new_surface()
+    for offset in offsets:
+        surface["low_then"], surface["high_then"] = offset - 0.01, offset + 0.01
+        growing_bias.judge(fdi, surface, GROWING_BIAS, 5)
+    assert surface["type_excluded"][GROWING_BIAS] == excluded
+
+
+def test_at_a_stop_a_growing_bias_says_nothing():
+    for low, high in ((0.45, 0.5), (-0.4, -0.35)):
+        fdi, surface = new_surface(low=low, high=high)
+        growing_bias.judge(fdi, surface, GROWING_BIAS, 5)
+        assert surface["growing_bias"]["up"] == surface["growing_bias"]["down"] == 0.0
+
+
+def slow_run(places, orders=(0.0, 0.0), whole=1, frames=None):
+    fdi, surface = new_surface()
+    fdi["whole"] = whole
+    surface["orders"]["low"], surface["orders"]["high"] = orders[0], orders[1]
+    for k, place in enumerate(places):
+        surface["low_then"], surface["high_then"] = place - 0.01, place + 0.01
+        rate_limit.judge(fdi, surface, SLOW, (frames or range(99))[k])
+    return surface["type_excluded"][SLOW]
+
+
+def test_a_slow_surface_never_moves_away_from_its_command():
+    assert not slow_run([0.3, 0.25, 0.2])
+    assert slow_run([0.2, 0.25])
+    assert not slow_run([0.2, 0.215])  # within what is known of it
+    assert slow_run([-0.2, -0.25])
+    assert not slow_run([-0.3, -0.2])
+    assert not slow_run([0.2, 0.25], orders=(0.0, 0.3))  # it was told to
+    assert not slow_run([0.2, 0.25], frames=[3, 5])  # a frame between them is not known
+    assert slow_run([0.25, 0.2, 0.23])
+    assert not slow_run([0.2, -0.2, -0.15])
+
+
+def test_which_side_of_its_orders_a_surface_stands_on():
+    fdi, surface = new_surface(low=0.1, high=0.2)
+    orders = surface["orders"]
+    for newest, whole in ((1, 0), (2, 1)):
+        fdi["whole"] = whole
+        for low, high, side in ((-0.1, 0.05, 1), (0.25, 0.3, -1), (0.05, 0.15, 0), (0.15, 0.3, 0)):
+            orders["low"], orders["high"] = 9.0, -9.0
+            orders["low"][newest], orders["high"][newest] = low, high
+            orders["low"][2] = min(orders["low"][2], low)
+            orders["high"][2] = max(orders["high"][2], high)
+            assert rate_limit.side(fdi, surface) == side
+
+
+def swung(signs, patience=20):
+    fdi, surface = new_surface()
+    fdi["patience"] = patience
+    for frame, sign in enumerate(signs):
+        fdi["frame"] = frame + 1
+        surface["low_then"], surface["high_then"] = 0.1 * sign - 0.02, 0.1 * sign + 0.02
+        oscillatory.watch(fdi, surface, OSCILLATORY)
+        oscillatory.judge(fdi, surface, OSCILLATORY, frame)
+    return fdi, surface
+
+
+def test_an_oscillation_is_counted_by_half_cycles():
+    fdi, surface = swung([1] * 5 + [-1] * 5 + [1] * 5 + [-1])
+    swing = surface["oscillatory"]
+    assert swing["half_cycles"] == 3
+    assert (swing["first_end"], swing["last_end"]) == (5, 15)
+    assert oscillatory.shown(surface)
+    assert not oscillatory.shown(swung([1] * 5 + [-1] * 5 + [1])[1])
+    assert oscillatory.frequency_rad_s(fdi, 0) == pytest.approx(2 * np.pi / (10 * DT))
+    # the first half-cycle is cut off and does not count: ten frames, each 0.1 rad off; its first frame is
+    # summed before the half-cycle before it is seen to have ended
+    assert swing["squares"] == pytest.approx(10 * 0.01)
+
+
+def test_the_amplitude_is_that_of_the_mean_square():
+    fdi, _ = swung([1] * 5 + [-1] * 5 + [1] * 5 + [-1])
+    assert oscillatory.estimate(fdi, 0, OSCILLATORY) == pytest.approx(np.sqrt(2.0 * 0.01))
+
+
+def test_a_sign_that_stays_for_longer_than_the_slowest_half_cycle_is_none():
+    assert not swung([1] * 21)[1]["type_excluded"][OSCILLATORY]
+    assert swung([1] * 22)[1]["type_excluded"][OSCILLATORY]
+    assert swung([-1] * 22)[1]["type_excluded"][OSCILLATORY]
+    assert not swung([1] * 15 + [0] + [1] * 15)[1]["type_excluded"][OSCILLATORY]
+    fdi, surface = swung([1] * 20)
+    oscillatory.pass_over(fdi, surface, OSCILLATORY)
+    assert surface["oscillatory"]["steady_since"] == 20
+
+
+@pytest.mark.parametrize(("length", "ways"), [(1, (0.0, 0.02, 0.1)), (5, (0.0, 0.0, 0.08))])
+def test_a_runaway_has_gone_at_least_its_way(length, ways):
+    fdi, surface = new_surface(started_at=3, start_low=0.1, start_high=0.2, least_runaway_rate=1.0)
+    fdi["block"]["length"] = length
+    for frame, way in zip((3, 4, 8), ways, strict=True):
+        assert runaway.way(fdi, surface, frame) == pytest.approx(way)
+        assert runaway.upwards(fdi, surface, frame) == pytest.approx(0.1 + way)
+        assert runaway.downwards(fdi, surface, frame) == pytest.approx(0.2 - way)
+    assert runaway.upwards(fdi, surface, 99) == HIGH
+    assert runaway.downwards(fdi, surface, 99) == LOW
+    surface["started_at"] = -1
+    assert (runaway.upwards(fdi, surface, 9), runaway.downwards(fdi, surface, 9)) == (LOW, HIGH)
+
+
+@pytest.mark.parametrize(
+    ("module", "kind", "inside", "outside"),
+    [
+        (stuck, STUCK, (0.1, 0.2), (0.31, 0.4)), (floating, FLOAT, (-0.1, 0.1), (0.01, 0.1)),
+        (hardover_up, UP, (0.1, 0.2), (0.0, 0.13)), (hardover_down, DOWN, (0.1, 0.2), (0.17, 0.3)),
+    ],
+)  # fmt: skip
+def test_what_holds_a_surface_is_excluded_where_it_is_not(module, kind, inside, outside):
+    for (low, high), excluded in ((inside, 0), (outside, 1)):
+        fdi, surface = new_surface(low=low, high=high, started_at=3, start_low=0.1, start_high=0.2)
+        surface["least_runaway_rate"] = 1.0
+        surface["set_low"][STUCK], surface["set_high"][STUCK] = 0.05, 0.3
+        module.judge(fdi, surface, kind, 5)
+        assert surface["type_excluded"][kind] == excluded
+    if kind == STUCK:
+        assert module.estimate(fdi, 0, kind) == pytest.approx(0.175)
+
+
+def test_a_jam_narrows_to_where_it_is_seen():
+    fdi, surface = new_surface(low=0.1, high=0.2)
+    stuck.judge(fdi, surface, STUCK, 5)
+    assert stuck.deflection(fdi, surface, STUCK) == (0.1, 0.2)
+    assert stuck.interval(fdi, 0, STUCK) == (0.1, 0.2)
+
+
+def test_where_types_have_a_surface():
+    fdi, surface = new_surface(
+        started_at=3, start_low=0.1, start_high=0.2, least_runaway_rate=1.0, command=0.2
+    )
+    surface["command"], surface["set_low"][CONSTANT_LOSS] = -0.2, 0.25
+    fdi["frame"] = 5
+    assert loss.deflection(fdi, surface, CONSTANT_LOSS) == pytest.approx((-0.2, -0.05))
+    assert floating.deflection(fdi, surface, FLOAT) == (0.0, 0.0)
+    assert hardover_up.deflection(fdi, surface, UP) == pytest.approx((0.14, HIGH))
+    assert hardover_down.deflection(fdi, surface, DOWN) == pytest.approx((LOW, 0.16))
+    assert [module.estimate(fdi, 0, 0) for module in (floating, hardover_up, hardover_down)] == [
+        0.0,
+        HIGH,
+        LOW,
+    ]
+    assert loss.interval(fdi, 0, CONSTANT_LOSS) == (-0.75, 0.0)
+
+
+def released(low=0.2, high=0.3, order=0.0, judged=(-1.0, 1.0), instants=1, **fields):
+    fdi, surface = new_surface(low=judged[0], high=judged[1], **fields)
+    fdi["returns"], fdi["instants"] = 1, instants
+    surface["orders"]["given"][1] = order
+    for which in (release.EARLIER, release.LATER):
+        release.forget(surface, which, STUCK)
+    surface["release"]["low"][release.LATER, STUCK] = low
+    surface["release"]["high"][release.LATER, STUCK] = high
+    return fdi, surface
+
+
+@pytest.mark.parametrize("instants", [1, 3])
+def test_a_return_goes_by_the_actuator(instants):
+    """Half the way to the order an instant, 0.1 rad at most."""
+    fdi, surface = released(instants=instants)
+    place, path = 0.3, []
+    for _ in range(instants):
+        path.append(place)
+        place -= min(0.5 * place, 0.1)
+    assert release.carried(fdi, surface, 0.3) == pytest.approx((np.mean(path), place))
+
+
+def test_a_return_keeps_where_it_agrees_and_ends_where_it_does_not():
+    fdi, surface = released(judged=(0.22, 0.28))
+    assert release.possible(fdi, surface, STUCK)
+    held = surface["release"]
+    assert (held["low"][1, STUCK], held["high"][1, STUCK]) == pytest.approx((0.22, 0.28))
+    for judged in ((0.31, 0.4), (0.1, 0.19)):
+        fdi, surface = released(judged=judged)
+        assert not release.possible(fdi, surface, STUCK)
+        assert not release.any_release(surface, release.LATER, STUCK)
+    fdi, surface = released(low=0.1, high=0.1, judged=(0.0, 0.2), command=0.1)
+    assert not release.possible(fdi, surface, STUCK)  # it is back: no release explains that anything is wrong
+
+
+def test_over_a_block_a_return_has_some_room():
+    """A twentieth of its way."""
+    way = 0.05 * 0.1
+    for beyond, there in ((0.9, True), (1.1, False)):
+        fdi, surface = released(low=0.2, high=0.3, judged=(0.3 + beyond * way, 0.4))
+        fdi["block"]["length"] = 1
+        assert not release.possible(fdi, surface, STUCK)
+        fdi["block"]["length"] = 2
+        surface["orders"]["given"][1] = 0.3
+        surface["release"]["low"][1, STUCK], surface["release"]["high"][1, STUCK] = 0.2, 0.3
+        assert not release.possible(fdi, surface, STUCK) or there
+
+
+def test_what_is_let_go_joins_the_later_releases_and_is_carried_on():
+    fdi, surface = released(low=np.inf, high=-np.inf)
+    release.let_go(surface, STUCK, 0.2, 0.3)
+    release.let_go(surface, STUCK, 0.1, 0.15)
+    release.let_go(surface, STUCK, 0.5, 0.4)  # nowhere
+    held = surface["release"]
+    assert (held["low"][1, STUCK], held["high"][1, STUCK]) == (0.1, 0.3)
+    held["released"][STUCK] = 1
+    release.let_go(surface, STUCK, -0.4, 0.5)
+    assert (held["low"][1, STUCK], held["high"][1, STUCK]) == (0.1, 0.3)
+    surface["wrong_then"] = 1
+    release.bring_back(fdi, surface, STUCK)
+    assert (held["low"][1, STUCK], held["high"][1, STUCK]) == pytest.approx((0.05, 0.2))
+    assert held["released"][STUCK] == 1
+    surface["wrong_then"] = 0
+    release.bring_back(fdi, surface, STUCK)
+    assert held["released"][STUCK] == 0
+
+
+@pytest.mark.parametrize("returns", [0, 1])
+def test_a_type_that_no_longer_holds_is_excluded_unless_a_return_explains_it(returns):
+    fdi, surface = released(judged=(0.2, 0.3))
+    fdi["returns"] = returns
+    assert not release.holds(fdi, surface, STUCK, -0.1, 0.1)
+    assert surface["type_excluded"][STUCK] == (not returns)
+    assert surface["release"]["released"][STUCK] == returns
+    fdi, surface = released(judged=(0.2, 0.3))
+    fdi["returns"] = returns
+    assert release.holds(fdi, surface, STUCK, 0.3, 0.4)
+    assert release.holds(fdi, surface, STUCK, 0.1, 0.2)
+    surface["release"]["released"][STUCK] = 1
+    assert not release.holds(fdi, surface, STUCK, 0.1, 0.2)
+
+
+def test_where_a_surface_was_as_the_judged_frame_began():
+    fdi, surface = new_surface(low=0.1, high=0.2, low_before=0.3, high_before=0.4)
+    assert release.beginning(fdi, surface) == (0.1, 0.2, 9)
+    fdi["whole"] = 0
+    assert release.beginning(fdi, surface) == (0.3, 0.4, 8)
+
+
+@pytest.mark.parametrize(
+    ("module", "kind"), [(stuck, STUCK), (floating, FLOAT), (hardover_up, UP), (hardover_down, DOWN)]
+)
+def test_from_where_each_type_lets_go(module, kind):
+    fdi, surface = released(low=np.inf, high=-np.inf, judged=(-0.1, 0.2), started_at=7, start_low=0.0)
+    surface["least_runaway_rate"], surface["start_high"] = 1.0, 0.1
+    surface["set_low"][STUCK], surface["set_high"][STUCK] = 0.05, 0.3
+    for which in (0, 1):
+        release.forget(surface, which, kind)
+    if kind == STUCK:
+        (
+            surface["release"]["low"][release.EARLIER, STUCK],
+            surface["release"]["high"][release.EARLIER, STUCK],
+        ) = 0.0, 0.1
+    module.let_go(fdi, surface, kind)
+    held = surface["release"]
+    expected = {STUCK: (0.05, 0.2), FLOAT: (0.0, 0.0), UP: (0.04, 0.2), DOWN: (-0.1, 0.06)}[kind]
+    assert (held["low"][1, kind], held["high"][1, kind]) == pytest.approx(expected)
+
+
+@pytest.mark.parametrize(
+    ("module", "kind", "expected"), [(hardover_up, UP, (0.02, HIGH)), (hardover_down, DOWN, (LOW, 0.08))]
+)
+def test_within_a_frame_of_several_instants_a_runaway_may_be_let_go_further_on(module, kind, expected):
+    fdi, surface = released(started_at=7, start_low=0.0, start_high=0.1, least_runaway_rate=1.0)
+    surface["low_before"], surface["high_before"], fdi["whole"] = -0.1, 0.2, 0
+    for which in (0, 1):
+        release.forget(surface, which, kind)
+    module.let_go(fdi, surface, kind)
+    held = surface["release"]
+    assert (held["low"][1, kind], held["high"][1, kind]) == pytest.approx(expected)
+
+
+def test_a_jam_that_may_have_let_go_returns_to_what_was_known_before():
+    fdi, surface = released(low=0.2, high=0.3, wrong_then=0)
+    surface["stuck"]["kept_low"], surface["stuck"]["kept_high"] = (0.0, 0.1), (0.2, 0.4)
+    surface["set_low"][STUCK], surface["set_high"][STUCK] = 0.25, 0.26
+    stuck.settle(surface, STUCK)
+    assert (surface["set_low"][STUCK], surface["set_high"][STUCK]) == (0.1, 0.4)
+    stuck.renew(surface, STUCK)  # no earlier release: the later are the earlier ones now
+    held = surface["release"]
+    assert (held["low"][0, STUCK], held["high"][0, STUCK]) == (0.2, 0.3)
+    assert not release.any_release(surface, release.LATER, STUCK)
+    assert (surface["stuck"]["kept_low"].tolist(), surface["stuck"]["kept_high"].tolist()) == (
+        [0.1, 0.1],
+        [0.4, 0.4],
+    )
+    stuck.settle(surface, STUCK)
+    assert (surface["set_low"][STUCK], surface["set_high"][STUCK]) == (0.1, 0.4)
+    surface["wrong_then"], surface["set_low"][STUCK] = 1, 0.3
+    stuck.bring_back(fdi, surface, STUCK)
+    assert surface["set_low"][STUCK] == 0.3

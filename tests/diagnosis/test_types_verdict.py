@@ -1,0 +1,706 @@
+"""From the types left to a verdict, and from frames to blocks: case by case, with the rule in the name."""
+
+import numpy as np
+import pytest
+from kernels import new_fdi
+
+from beaver_ftc.diagnosis.state import NOT_ISOLATED, PITCH, ROLL, UNANTICIPATED, YAW
+from beaver_ftc.diagnosis.types import blocks, candidates, examine, pairs, verdict
+from beaver_ftc.diagnosis.types.candidates import BY_DEDUCTION, NO_SURFACE, RULED_OUT, SEVERAL
+from beaver_ftc.diagnosis.types.examine import FIXED, LAGS, LOSES, SHIFTED
+from beaver_ftc.diagnosis.types.registry import (
+    BIAS,
+    CONSTANT_LOSS,
+    DOWN,
+    FLOAT,
+    GROWING_BIAS,
+    N_TYPES,
+    OSCILLATORY,
+    SLOW,
+    STUCK,
+    UP,
+    VARYING_LOSS,
+)
+
+AILERON, ELEVATOR, RUDDER, FLAP = range(4)
+PATIENCE, DT = 20, 0.02
+ALL = tuple(range(N_TYPES))
+COURSES = (VARYING_LOSS, OSCILLATORY, SLOW, GROWING_BIAS)
+
+
+def leave(surface, *kinds):
+    """Only these types are left of a surface."""
+    surface["type_excluded"] = [kind not in kinds for kind in range(N_TYPES)]
+
+
+def new_case(**left):
+    """Four surfaces, of which each has these types left: by default all; none: it cannot be at fault."""
+    fdi = new_fdi()
+    fdi["patience"], fdi["whole"], fdi["every_type"], fdi["instants"] = PATIENCE, 1, 1, 1
+    fdi["n_estimators"] = 8
+    fdi["block"]["length"], fdi["block"]["span_s"] = 1, DT
+    layout = fdi["layout"]
+    layout["loss_of"], layout["position_of"] = range(4), range(4, 8)
+    layout["dominant_axis"], layout["main"] = (ROLL, PITCH, YAW, PITCH), (AILERON, ELEVATOR, RUDDER)
+    layout["group"], layout["partner"] = (1, 0, 1, 0), (RUDDER, FLAP, AILERON, ELEVATOR)
+    fdi["estimator"]["surface"][:8], fdi["estimator"]["kind"][:8] = (0, 1, 2, 3) * 2, (0,) * 4 + (1,) * 4
+    fdi["surface"]["in_question"], fdi["surface"]["evidence"] = 1, 99
+    fdi["surface"]["travel_low"], fdi["surface"]["travel_high"] = -0.4, 0.5
+    fdi["estimator"]["low"][4:8], fdi["estimator"]["high"][4:8] = -0.4, 0.5
+    for s, name in enumerate(("aileron", "elevator", "rudder", "flap")):
+        kinds = left.get(name, ALL)
+        if kinds is None:
+            fdi["estimator"]["excluded"][4 + s] = 1
+        else:
+            leave(fdi["surface"][s], *kinds)
+    return fdi
+
+
+def one(*kinds, **fields):
+    fdi = new_case(rudder=kinds)
+    surface = fdi["surface"][RUDDER]
+    for name, value in fields.items():
+        surface[name] = value
+    return fdi, surface
+
+
+NOBODY_ELSE = {"aileron": None, "elevator": None, "flap": None}
+
+
+def test_questions_about_the_types_left():
+    swing = {"half_cycles": 3}
+    for kinds in [(), (STUCK,), (BIAS,), (SLOW,), (OSCILLATORY,), (VARYING_LOSS, OSCILLATORY), ALL]:
+        _, surface = one(*kinds)
+        assert [bool(candidates.left(surface, kind)) for kind in range(N_TYPES)] == [
+            k in kinds for k in range(N_TYPES)
+        ]
+        assert bool(candidates.any_constant(surface)) == bool(set(kinds) - set(COURSES))
+        assert bool(candidates.anything_left(surface)) == bool(kinds)
+        assert bool(candidates.explained(surface)) == bool(set(kinds) - {OSCILLATORY})
+        assert not candidates.swings(surface)
+        assert bool(candidates.only_a_swing(surface)) == (set(kinds) <= {OSCILLATORY})
+        surface["oscillatory"]["half_cycles"] = swing["half_cycles"]
+        assert bool(candidates.swings(surface)) == (OSCILLATORY in kinds)
+        assert bool(candidates.explained(surface)) == bool(kinds)
+        assert bool(candidates.only_a_swing(surface)) == (kinds == ())
+
+
+@pytest.mark.parametrize(
+    ("kinds", "loses", "held", "fixed", "one_type", "sole_type"),
+    [
+        ((CONSTANT_LOSS,), 1, 0, 0, CONSTANT_LOSS, CONSTANT_LOSS),
+        ((VARYING_LOSS,), 1, 0, 0, -1, CONSTANT_LOSS),
+        ((VARYING_LOSS, BIAS), 0, 0, 0, BIAS, -1),
+        ((STUCK,), 0, 1, 1, STUCK, STUCK),
+        ((STUCK, BIAS), 0, 1, 0, -1, -1),
+        ((STUCK, CONSTANT_LOSS), 1, 1, 0, -1, -1),
+        ((STUCK, CONSTANT_LOSS, FLOAT), 1, 1, 1, -1, -1),
+        ((UP, DOWN), 0, 1, 1, UP, UP),
+        ((UP, DOWN, STUCK), 0, 1, 1, -1, -1),
+        ((FLOAT,), 0, 0, 0, FLOAT, FLOAT),
+        ((OSCILLATORY,), 0, 0, 0, -1, -1),
+        ((SLOW, STUCK), 0, 1, 1, STUCK, -1),
+    ],
+)
+def test_what_kind_of_fault_it_may_be(kinds, loses, held, fixed, one_type, sole_type):
+    _, surface = one(*kinds)
+    same_name = candidates.FAMILY[sole_type] if sole_type >= 0 else -1
+    assert bool(candidates.loses(surface)) == loses
+    assert bool(candidates.held_elsewhere(surface)) == held
+    assert bool(candidates.is_fixed(surface)) == fixed
+    assert candidates.one_type(surface) == one_type
+    found = candidates.sole_type(surface)
+    assert (candidates.FAMILY[found] if found >= 0 else -1) == same_name
+
+
+def test_a_surface_is_possible_by_its_estimator_or_by_deduction():
+    fdi = new_case(rudder=None)
+    assert [bool(candidates.possible(fdi, s)) for s in range(4)] == [True, True, False, True]
+    fdi["surface"]["standing"] = RULED_OUT, BY_DEDUCTION, BY_DEDUCTION, 0
+    assert [bool(candidates.possible(fdi, s)) for s in range(4)] == [False, True, True, True]
+
+
+def test_the_sole_surface_that_is_possible():
+    assert candidates.sole(new_case(), False) == SEVERAL
+    assert candidates.sole(new_case(**NOBODY_ELSE), False) == RUDDER
+    assert candidates.sole(new_case(rudder=None, **NOBODY_ELSE), False) == NO_SURFACE
+    only = new_case(aileron=COURSES, elevator=COURSES, flap=COURSES, rudder=(STUCK,))
+    assert candidates.sole(only, True) == RUDDER
+    assert candidates.sole(only, False) == SEVERAL
+    only["surface"]["in_question"] = 0, 0, 0, 1
+    assert candidates.sole(only, False) == FLAP
+    assert candidates.sole(only, True) == NO_SURFACE
+
+
+@pytest.mark.parametrize(
+    ("evidence", "quiet", "slow"), [(19, 0, True), (20, 0, False), (30, 11, True), (30, 10, False)]
+)
+def test_what_looks_like_a_jam_may_be_slow_until_it_has_stood_off_for_long(evidence, quiet, slow):
+    fdi, surface = one(STUCK, SLOW, evidence=evidence, quiet=quiet)
+    assert bool(candidates.may_be_slow(fdi, surface)) == slow
+    assert not candidates.may_be_slow(*one(STUCK, evidence=evidence, quiet=quiet))
+    assert not candidates.may_be_slow(*one(SLOW, evidence=evidence, quiet=quiet))
+
+
+def test_a_bias_that_grows_may_look_like_a_jam_or_a_loss():
+    _, surface = one(GROWING_BIAS)
+    may = {kind for kind in range(N_TYPES) if candidates.may_be_growing(surface, kind)}
+    assert may == {CONSTANT_LOSS, STUCK, FLOAT}
+    assert not candidates.may_be_growing(one(STUCK)[1], STUCK)
+
+
+@pytest.mark.parametrize(
+    ("kinds", "evidence", "half_cycles", "found"),
+    [
+        ((STUCK,), PATIENCE, 0, STUCK),
+        ((STUCK,), PATIENCE - 1, 0, -1),
+        ((STUCK, OSCILLATORY), 2 * PATIENCE - 1, 0, -1),
+        ((STUCK, OSCILLATORY), 2 * PATIENCE, 0, STUCK),
+        ((STUCK, GROWING_BIAS), 99, 0, -1),
+        ((BIAS, GROWING_BIAS), 99, 0, BIAS),
+        ((STUCK, BIAS), 99, 0, -1),
+        ((VARYING_LOSS,), PATIENCE, 0, VARYING_LOSS),
+        ((GROWING_BIAS,), PATIENCE, 0, GROWING_BIAS),
+        ((SLOW,), PATIENCE, 0, SLOW),
+        ((VARYING_LOSS, SLOW), 99, 3, -1),
+        ((VARYING_LOSS, GROWING_BIAS), 99, 3, -1),
+        ((SLOW, GROWING_BIAS), 99, 3, -1),
+        ((SLOW, OSCILLATORY), 99, 3, -1),
+        ((VARYING_LOSS, OSCILLATORY), 2 * PATIENCE - 1, 0, -1),
+        ((VARYING_LOSS, OSCILLATORY), 2 * PATIENCE, 0, VARYING_LOSS),
+        ((GROWING_BIAS, OSCILLATORY), 2 * PATIENCE, 0, GROWING_BIAS),
+        ((OSCILLATORY,), PATIENCE, 3, OSCILLATORY),
+        ((OSCILLATORY,), 99, 2, -1),
+        ((), 99, 0, -1),
+    ],
+)
+def test_a_type_is_named_once_it_is_the_only_one(kinds, evidence, half_cycles, found):
+    fdi, surface = one(*kinds, evidence=evidence)
+    surface["oscillatory"]["half_cycles"] = half_cycles
+    assert verdict.type_at_fault(fdi, surface) == found
+    fdi["bound"]["own_errors"] = 1  # then a constant proves nothing: one type whatever its course
+    sole = kinds[0] if len(kinds) == 1 and evidence >= PATIENCE and found >= 0 else -1
+    assert verdict.type_at_fault(fdi, surface) == sole or set(kinds) == {BIAS, GROWING_BIAS}
+
+
+@pytest.mark.parametrize(
+    ("kinds", "measure"),
+    [
+        ((STUCK,), FIXED), ((UP,), FIXED), ((SLOW,), LAGS), ((OSCILLATORY,), SHIFTED),
+        ((SLOW, BIAS), SHIFTED),
+        ((CONSTANT_LOSS,), LOSES), ((VARYING_LOSS,), LOSES), ((CONSTANT_LOSS, BIAS), SHIFTED),
+        ((CONSTANT_LOSS, STUCK), SHIFTED), ((VARYING_LOSS, SLOW), LOSES), ((BIAS,), SHIFTED),
+        ((GROWING_BIAS,), SHIFTED), ((FLOAT, CONSTANT_LOSS), LOSES),
+    ],
+)  # fmt: skip
+def test_what_is_done_about_a_surface(kinds, measure):
+    assert verdict.measure_for(one(*kinds)[1]) == measure
+
+
+def test_the_surface_at_fault():
+    assert verdict.surface_at_fault(new_case()) == NOT_ISOLATED
+    assert verdict.surface_at_fault(new_case(**NOBODY_ELSE)) == RUDDER
+    assert verdict.surface_at_fault(new_case(rudder=None, **NOBODY_ELSE)) == UNANTICIPATED
+    pitch = {"aileron": None, "rudder": None, "flap": None}
+    assert verdict.surface_at_fault(new_case(elevator=(STUCK,), **pitch)) == ELEVATOR
+    assert verdict.surface_at_fault(new_case(elevator=(OSCILLATORY,), **pitch)) == NOT_ISOLATED
+    lateral = dict(NOBODY_ELSE)
+    assert verdict.surface_at_fault(new_case(rudder=(OSCILLATORY,), **lateral)) == RUDDER
+
+
+@pytest.mark.parametrize(
+    ("flap", "evidence", "own_errors", "refuted"),
+    [
+        ((), PATIENCE, 0, True), ((), PATIENCE - 1, 0, False), ((SLOW,), PATIENCE, 0, True),
+        ((OSCILLATORY,), 2 * PATIENCE - 1, 0, False), ((OSCILLATORY,), 2 * PATIENCE, 0, True),
+        ((VARYING_LOSS,), 2 * PATIENCE - 1, 0, False), ((VARYING_LOSS,), 2 * PATIENCE, 0, True),
+        ((GROWING_BIAS,), 99, 0, False), ((SLOW,), 99, 1, False), ((), PATIENCE, 1, True),
+        (None, PATIENCE, 0, True),
+    ],
+)  # fmt: skip
+def test_of_elevator_and_flap_the_one_a_constant_explains(flap, evidence, own_errors, refuted):
+    fdi = new_case(elevator=(STUCK,), aileron=None, rudder=None, flap=flap)
+    fdi["surface"]["evidence"][ELEVATOR], fdi["bound"]["own_errors"] = evidence, own_errors
+    assert bool(verdict.others_refuted(fdi, ELEVATOR)) == refuted
+    if flap is not None:
+        assert verdict.surface_at_fault(fdi) == (ELEVATOR if refuted else NOT_ISOLATED)
+    fdi["surface"]["in_question"][FLAP] = 0
+    assert bool(verdict.others_refuted(fdi, ELEVATOR)) == (evidence >= PATIENCE)
+
+
+def test_a_decision_notes_when_surface_and_type_became_certain():
+    fdi = new_case(rudder=(STUCK,), **NOBODY_ELSE)
+    fdi["verdict"]["isolated"], fdi["verdict"]["type"] = NOT_ISOLATED, -1
+    verdict.decide(fdi, 3.0)
+    assert fdi["verdict"]["isolated"] == 4 + RUDDER  # its estimator of a position
+    assert fdi["verdict"]["type"] == STUCK
+    assert (fdi["verdict"]["isolated_at_s"], fdi["verdict"]["type_at_s"]) == (3.0, 3.0)
+    leave(fdi["surface"][RUDDER], VARYING_LOSS)
+    verdict.decide(fdi, 4.0)
+    assert fdi["verdict"]["isolated"] == RUDDER  # its estimator of a loss
+    assert (fdi["verdict"]["isolated_at_s"], fdi["verdict"]["type_at_s"]) == (3.0, 4.0)
+    verdict.decide(fdi, 5.0)
+    assert (fdi["verdict"]["isolated_at_s"], fdi["verdict"]["type_at_s"]) == (3.0, 4.0)
+    fdi["estimator"]["excluded"][4 + RUDDER] = 1
+    verdict.decide(fdi, 6.0)
+    assert fdi["verdict"]["isolated"] == UNANTICIPATED
+    assert (fdi["verdict"]["isolated_at_s"], fdi["verdict"]["type_at_s"]) == (6.0, 6.0)
+    assert fdi["verdict"]["type"] == -1
+    assert fdi["verdict"]["lead"] == NO_SURFACE
+
+
+def test_the_law_acts_on_the_likeliest_before_all_doubt_is_gone():
+    fdi = new_case(**NOBODY_ELSE)
+    fdi["verdict"]["isolated"] = NOT_ISOLATED
+    assert verdict.presumed(fdi) == RUDDER
+    assert verdict.presumed(_open(new_case())) == ELEVATOR
+    assert verdict.presumed(_open(new_case(elevator=None))) == FLAP
+    assert verdict.presumed(_open(new_case(elevator=None, flap=None))) == NO_SURFACE
+    fdi["verdict"]["isolated"] = 4 + FLAP
+    assert verdict.presumed(fdi) == FLAP
+
+
+def _open(fdi):
+    fdi["verdict"]["isolated"] = NOT_ISOLATED
+    return fdi
+
+
+def test_the_lead_is_taken_on_one_surface_while_its_fault_shows():
+    fdi = _open(new_case(rudder=(STUCK,), **NOBODY_ELSE))
+    surface = fdi["surface"][RUDDER]
+    surface["set_low"][STUCK], surface["set_high"][STUCK], surface["command"] = 0.1, 0.2, 0.3
+    surface["low"], surface["high"] = 0.1, 0.2
+    fdi["surface"]["measure"] = 3
+    verdict.take_the_lead(fdi)
+    assert (fdi["verdict"]["lead"], fdi["verdict"]["lead_kind"]) == (RUDDER, FIXED)
+    assert fdi["surface"]["measure"].tolist() == [-1, -1, FIXED, -1]
+    surface["low"], surface["high"] = 0.25, 0.35  # it follows its command again
+    for _ in range(verdict.ABSENT_FRAMES - 1):
+        verdict.take_the_lead(fdi)
+    assert fdi["verdict"]["lead"] == RUDDER
+    verdict.take_the_lead(fdi)
+    assert fdi["verdict"]["lead"] == NO_SURFACE
+    assert surface["measure"] == -1
+    surface["low"] = 0.1
+    verdict.take_the_lead(fdi)
+    assert (surface["absent"], fdi["verdict"]["lead"]) == (0, RUDDER)
+    assert verdict.still_there(surface, LOSES, True)
+
+
+@pytest.mark.parametrize(
+    ("kinds", "at_fault", "off"),
+    [
+        ((FLOAT, STUCK), True, -0.3), ((STUCK,), True, 0.15 - 0.3), ((STUCK, BIAS), True, -0.05),
+        ((BIAS,), True, -0.05), ((SLOW,), True, 0.22 - 0.3), ((STUCK,), False, 0.22 - 0.3),
+    ],
+)  # fmt: skip
+def test_how_far_a_surface_is_off(kinds, at_fault, off):
+    _, surface = one(*kinds, command=0.3, low=0.2, high=0.24)
+    surface["set_low"][STUCK], surface["set_high"][STUCK] = 0.1, 0.2
+    surface["set_low"][BIAS], surface["set_high"][BIAS] = -0.1, 0.0
+    assert verdict.deflection_error(surface, at_fault) == pytest.approx(off)
+    if kinds == (BIAS,):
+        surface["set_low"][BIAS] = -np.inf
+        assert verdict.deflection_error(surface, at_fault) == pytest.approx(0.22 - 0.3)
+
+
+def test_what_a_surface_has_left():
+    fdi, surface = one(CONSTANT_LOSS)
+    fdi["estimator"]["theta"][RUDDER] = -0.1, -0.2, -0.3
+    surface["set_low"][CONSTANT_LOSS], surface["set_high"][CONSTANT_LOSS] = 0.5, 0.6
+    assert verdict.effectiveness_left(fdi, RUDDER) == pytest.approx(0.7)  # by its own axis, yaw
+    fdi["pair"]["enabled"] = 1
+    assert verdict.effectiveness_left(fdi, RUDDER) == pytest.approx(0.55)
+    leave(surface, VARYING_LOSS)
+    assert verdict.effectiveness_left(fdi, RUDDER) == pytest.approx(0.7)
+
+
+# Examining frames.
+
+
+def test_orders_are_kept_for_the_frames_before():
+    fdi = new_case()
+    for frame in ((0.1, 0.2), (0.3, -0.1), (0.9, 0.0)):
+        for k, order in enumerate(frame):
+            fdi["block"]["length"], fdi["block"]["filled"] = 2, k
+            examine.note_orders(fdi, np.full(4, order))
+    orders = fdi["surface"][0]["orders"]
+    assert orders["given"][:, :2] == pytest.approx(
+        np.array([[0.5, 0.0], [0.3, -0.1], [0.1, 0.2]])
+    )  # within the travel
+    assert orders["low"] == pytest.approx([0.0, -0.1, 0.1])
+    assert orders["high"] == pytest.approx([0.5, 0.3, 0.2])
+
+
+def test_a_surface_is_where_the_innovation_puts_it():
+    fdi = new_case()
+    effect, surface = fdi["estimator"][4 + RUDDER]["effect"], fdi["surface"][RUDDER]
+    effect["Z"], effect["offset"] = (0.5, 0.0, -2.0), (-0.05, 0.0, 0.2)  # commanded to 0.1
+    surface["low"], surface["high"], surface["command"] = 0.2, 0.3, 0.15
+    surface["low_then"], surface["high_then"] = 0.4, 0.45
+    # off by 0.2: 0.1 on roll, -0.4 on yaw, give or take
+    examine.locate(fdi, RUDDER, np.array([0.1, 0.0, -0.4]), np.array([0.005, 1.0, 0.1]), effect)
+    assert surface["command"] == pytest.approx(0.1)
+    assert (surface["low"], surface["high"]) == pytest.approx((0.29, 0.31))  # roll says it to 0.005 / 0.5
+    assert (surface["low_then"], surface["high_then"], surface["command_then"]) == (0.2, 0.3, 0.15)
+    assert (surface["low_before"], surface["high_before"]) == (0.4, 0.45)
+    fdi["block"]["length"] = 4
+    examine.locate(fdi, RUDDER, np.array([0.1, 0.0, -0.4]), np.array([0.005, 1.0, 0.1]), effect)
+    assert (surface["low"], surface["high"]) == pytest.approx((0.25, 0.35))  # its own axis alone
+
+
+def test_wrong_frames_are_remembered_for_two_more():
+    fdi, bound = new_case(), np.full(3, 0.1)
+    for innovation in (0.2, 0.05, 0.2):
+        examine.note_wrong(fdi, np.array([0.0, innovation, 0.0]), bound)
+    assert fdi["surface"]["wrong"].tolist() == [1] * 4
+    assert fdi["surface"]["wrong_then"].tolist() == [0] * 4
+    assert fdi["surface"]["wrong_before"].tolist() == [1] * 4
+
+
+@pytest.mark.parametrize("whole", [0, 1])
+@pytest.mark.parametrize("wrong", [(0, 1, 1), (1, 1, 1), (1, 1, 0), (1, 0, 1)])
+def test_a_frame_next_to_a_healthy_one_is_judged_only_if_faults_begin_between_frames(whole, wrong):
+    fdi = new_case()
+    fdi["whole"], fdi["frame"] = whole, 7
+    surface = fdi["surface"][RUDDER]
+    examine.begin(surface)
+    surface["evidence"], surface["measure"] = 5, -1
+    surface["wrong_before"], surface["wrong_then"], surface["wrong"] = wrong
+    surface["low_then"], surface["high_then"] = 0.1, 0.2
+    examine.judge_all(fdi)
+    judged = wrong[1] and (whole or (wrong[0] and wrong[2]))
+    assert surface["evidence"] == 5 + bool(judged)
+    assert surface["started_at"] == (6 if judged else -1)
+    assert (surface["start_low"], surface["start_high"]) == ((0.1, 0.2) if judged else (0.0, 0.0))
+    assert fdi["frame"] == 8
+    assert surface["oscillatory"]["steady_since"] == (6 if judged else 7)
+
+
+def test_a_frame_that_puts_a_surface_nowhere_judges_nothing():
+    fdi = new_case()
+    surface = fdi["surface"][RUDDER]
+    examine.begin(surface)
+    surface["low_then"], surface["high_then"] = 0.2, 0.1
+    examine.judge(fdi, surface, 6)
+    assert surface["started_at"] == -1
+
+
+def quiet(low=0.1, high=0.2, frames=1, **fields):
+    fdi = new_case()
+    surface = fdi["surface"][RUDDER]
+    surface["set_low"][STUCK], surface["set_high"][STUCK] = 0.15, 0.3
+    surface["low_then"], surface["high_then"] = low, high
+    fdi["surface"]["evidence"] = 0
+    for name, value in fields.items():
+        if name == "own_errors":
+            fdi["bound"][name] = value
+        else:
+            fdi[name] = value
+    for _ in range(frames):
+        examine.note_quiet(fdi, RUDDER)
+    return fdi, surface
+
+
+def test_a_quiet_surface_given_up_does_not_swing():
+    fdi, surface = quiet()
+    assert fdi["surface"]["evidence"].tolist() == [1] * 4
+    assert surface["quiet"] == 1
+    assert quiet(low=0.31, high=0.4)[1]["quiet"] == 0
+    assert quiet(low=0.0, high=0.14)[1]["quiet"] == 0
+    assert not quiet(frames=PATIENCE)[1]["type_excluded"][OSCILLATORY]
+    assert quiet(frames=PATIENCE + 1)[1]["type_excluded"][OSCILLATORY]
+    assert not quiet(frames=PATIENCE + 1, returns=1)[1]["type_excluded"][OSCILLATORY]
+    assert not quiet(frames=PATIENCE + 1, own_errors=1)[1]["type_excluded"][OSCILLATORY]
+    fdi, surface = quiet()
+    fdi["surface"]["in_question"] = 1, 1, 0, 1
+    examine.note_quiet(fdi, RUDDER)
+    assert fdi["surface"]["evidence"].tolist() == [1, 1, 2, 1]  # of another one it says nothing then
+
+
+def test_a_surface_given_up_is_quiet_where_nothing_is_wrong():
+    fdi = new_case()
+    fdi["surface"]["measure"], fdi["surface"]["set_high"] = -1, 1.0
+    fdi["surface"][RUDDER]["measure"] = FIXED
+    examine.judge_all(fdi)
+    assert fdi["surface"]["quiet"].tolist() == [0, 0, 1, 0]
+
+
+def test_a_block_is_the_mean_of_its_frames_with_the_noise_of_its_ends():
+    rng, fdi, length = np.random.default_rng(6), new_case(), 4
+    fdi["block"]["length"], fdi["block"]["span_s"] = length, length * DT
+    fdi["block"]["innovation"], fdi["block"]["bound"] = 9.0, 9.0
+    innovation, eta = rng.normal(size=(length, 3)), rng.uniform(0.1, 0.2, (length, 3))
+    noise = rng.uniform(0.01, 0.02, (length + 1, 3))
+    Z, offset = rng.uniform(1, 2, (length, 8, 3)), rng.normal(size=(length, 8, 3))
+    spread = rng.uniform(0, 0.1, (length, 8, 3))
+    Z[:, :, YAW] += 5.0
+    for k in range(length):
+        fdi["innovation"], fdi["bound"]["eta_bar"] = innovation[k], eta[k]
+        fdi["bound"]["noise_then"], fdi["bound"]["noise"] = noise[k], noise[k + 1]
+        fdi["estimator"]["effect"]["Z"][:8] = Z[k]
+        fdi["estimator"]["effect"]["offset"][:8] = offset[k]
+        fdi["estimator"]["effect"]["spread"][:8] = spread[k]
+        blocks.examine(fdi)
+        assert fdi["block"]["filled"] == (k + 1) % length
+        assert fdi["frame"] == (k + 1 == length)
+    assert fdi["block"]["innovation"] == pytest.approx(innovation.mean(axis=0))
+    ends = (noise[0] + noise[-1]) / (length * DT)
+    assert fdi["block"]["bound"] == pytest.approx(eta.mean(axis=0) + ends)
+    mean = fdi["estimator"][4 + RUDDER]["block_effect"]
+    assert mean["Z"] == pytest.approx(Z[:, 4 + RUDDER].mean(axis=0))
+    assert mean["offset"] == pytest.approx(offset[:, 4 + RUDDER].mean(axis=0))
+    assert mean["spread"] == pytest.approx(spread[:, 4 + RUDDER].mean(axis=0))
+    commands = -offset[:, 4 + RUDDER, YAW] / Z[:, 4 + RUDDER, YAW]
+    orders = fdi["surface"][RUDDER]["orders"]
+    assert (orders["least"][0], orders["greatest"][0]) == pytest.approx((commands.min(), commands.max()))
+    blocks.begin(fdi)
+    assert (orders["least"][1], orders["greatest"][1]) == pytest.approx((commands.min(), commands.max()))
+
+
+# Two faults at once.
+
+
+def test_alarms_are_noted_by_plane():
+    for axis, planes in ((ROLL, [0, 1]), (PITCH, [1, 0]), (YAW, [0, 1])):
+        fdi = new_case()
+        fdi["bank"]["threshold"], fdi["bank"]["residual"][2, axis] = 0.1, -0.11
+        pairs.note_alarms(fdi)
+        assert fdi["pair"]["alarmed"].tolist() == planes
+
+
+def lateral(one_left=True, other_left=True, alarmed=1, **pair):
+    """Who is named in roll and yaw: (aileron, rudder, whether the fault is outside the class)."""
+    left = {"aileron": (BIAS,) if one_left else None, "rudder": (BIAS,) if other_left else None}
+    fdi = new_case(**left)
+    for s, kept in ((AILERON, one_left), (RUDDER, other_left)):
+        if not kept:
+            leave(fdi["surface"][s], BIAS)
+    fdi["pair"]["alarmed"] = 0, alarmed
+    for name, value in pair.items():
+        fdi["pair"][name] = value
+    outside = pairs.decide_roll_and_yaw(fdi, 3.0)
+    return [bool(fdi["surface"]["named"][AILERON]), bool(fdi["surface"]["named"][RUDDER]), bool(outside)]
+
+
+def test_who_is_named_in_roll_and_yaw():
+    assert lateral() == [False, False, False]
+    assert lateral(one_left=False) == [False, True, False]
+    assert lateral(other_left=False) == [True, False, False]
+    assert lateral(False, False) == [True, True, False]
+    assert lateral(False, False, alarmed=0) == [False, False, False]
+    assert lateral(False, False, no_lateral_pair=1) == [False, False, True]
+
+
+def test_where_nothing_explains_both_the_fault_is_outside_the_class():
+    for s in (AILERON, RUDDER):
+        fdi = new_case(aileron=None, rudder=None)
+        leave(fdi["surface"][AILERON], BIAS)
+        leave(fdi["surface"][RUDDER], BIAS)
+        fdi["pair"]["alarmed"] = 0, 1
+        leave(fdi["surface"][s])
+        assert pairs.decide_roll_and_yaw(fdi, 3.0)
+        leave(fdi["surface"][s], OSCILLATORY)  # it may swing yet
+        assert not pairs.decide_roll_and_yaw(fdi, 3.0)
+        assert not fdi["surface"]["named"].any()
+
+
+def test_a_name_notes_when_it_was_given_and_when_its_type():
+    surface = new_case()["surface"][RUDDER]
+    surface["type"] = -1
+    pairs.name(surface, 1, STUCK, 3.0)
+    assert (surface["named"], surface["type"], surface["named_at_s"], surface["type_at_s"]) == (
+        1,
+        STUCK,
+        3.0,
+        3.0,
+    )
+    pairs.name(surface, 1, BIAS, 4.0)
+    assert (surface["named_at_s"], surface["type_at_s"]) == (3.0, 4.0)
+    pairs.name(surface, 1, BIAS, 5.0)
+    assert surface["type_at_s"] == 4.0
+    pairs.name(surface, 0, BIAS, 6.0)
+    assert (surface["named"], surface["type"], surface["type_at_s"]) == (0, -1, 6.0)
+
+
+def test_a_surface_off_its_command_is_within_its_travel():
+    surface = new_case()["surface"][RUDDER]
+    surface["command"] = 0.1
+    assert pairs.place(surface, 0.2, 0.05)
+    assert (surface["low"], surface["high"], surface["wrong"]) == (
+        pytest.approx(0.25),
+        pytest.approx(0.35),
+        1,
+    )
+    assert pairs.place(surface, 0.4, 0.05)
+    assert surface["high"] == 0.5
+    assert not pairs.place(surface, 0.5, 0.05)
+    assert pairs.place(surface, -0.49, 0.05)
+    assert surface["low"] == -0.4
+    pairs.place(surface, 0.04, 0.05)
+    assert surface["wrong"] == 0
+    pairs.place(surface, 0.05, 0.05)
+    assert surface["wrong"] == 0
+
+
+def test_whereabouts_cover_every_constant_type_left():
+    fdi, surface = one(STUCK, FLOAT, SLOW)
+    surface["set_low"][STUCK], surface["set_high"][STUCK] = 0.1, 0.2
+    assert pairs.whereabouts(fdi, surface) == (0.0, 0.2)
+    leave(surface, BIAS)
+    surface["set_low"][BIAS], surface["set_high"][BIAS] = -np.inf, 0.0
+    assert pairs.whereabouts(fdi, surface) == (-0.4, 0.0)
+    surface["set_low"][BIAS], surface["set_high"][BIAS] = 0.1, np.inf
+    assert pairs.whereabouts(fdi, surface) == (0.1, 0.5)
+
+
+def test_beside_the_first_pitch_fault_the_second_is_where_the_rest_puts_it():
+    fdi = new_case(elevator=(STUCK,))
+    elevator, flap = fdi["surface"][ELEVATOR], fdi["surface"][FLAP]
+    fdi["pair"]["first"], elevator["in_question"] = ELEVATOR, 0
+    elevator["set_low"][STUCK], elevator["set_high"][STUCK], elevator["command"] = 0.1, 0.14, 0.0
+    fdi["estimator"]["effect"]["Z"][4 + ELEVATOR, PITCH], fdi["estimator"]["effect"]["Z"][4 + FLAP, PITCH] = (
+        -10.0,
+        2.0,
+    )
+    fdi["estimator"]["effect"]["spread"][4 + ELEVATOR, PITCH] = 0.01
+    fdi["estimator"]["effect"]["spread"][4 + FLAP, PITCH] = 0.02
+    fdi["bound"]["frame"][PITCH], fdi["innovation"][PITCH], flap["command"] = 0.03, -1.2 + 0.4, 0.05
+    pairs.solve_pitch(fdi)
+    # the elevator's share is -10 * 0.12 give or take 0.2, the rest 0.4 give or take 0.26, over 2
+    assert (flap["low"], flap["high"]) == pytest.approx((0.05 + 0.2 - 0.13, 0.05 + 0.2 + 0.13))
+    assert flap["wrong"] == 1
+    assert elevator["wrong"] == 0
+    assert (elevator["low"], elevator["high"]) == (0.1, 0.14)
+    fdi["innovation"][PITCH] = 9.0
+    pairs.solve_pitch(fdi)
+    assert flap["standing"] == RULED_OUT
+
+
+@pytest.mark.parametrize(("innovation", "wrong"), [(0.03, 0), (0.031, 1), (-0.031, 1)])
+def test_before_that_pitch_shows_a_fault_or_not(innovation, wrong):
+    fdi = new_case()
+    fdi["pair"]["first"], fdi["bound"]["frame"], fdi["innovation"] = NO_SURFACE, 0.03, innovation
+    pairs.solve_pitch(fdi)
+    assert fdi["surface"]["wrong"].tolist() == [0, wrong, 0, wrong]
+
+
+def test_what_is_known_of_the_first_is_kept_once_it_has_settled():
+    fdi = new_case(elevator=(STUCK,))
+    elevator = fdi["surface"][ELEVATOR]
+    fdi["pair"]["first"] = NO_SURFACE
+    elevator["set_low"][STUCK], elevator["set_high"][STUCK] = 0.1, 0.14
+    pairs.note_first(fdi, ELEVATOR)
+    known = elevator["known"]
+    assert fdi["pair"]["first"] == ELEVATOR
+    assert (known["low"][STUCK], known["high"][STUCK]) == (0.1, 0.14)
+    assert known["excluded"].tolist() == [kind != STUCK for kind in range(N_TYPES)]
+    elevator["type_excluded"][STUCK], elevator["set_low"][STUCK] = 1, 0.12
+    for k in range(PATIENCE - 1):
+        pairs.note_first(fdi, ELEVATOR)
+        assert (known["low"][STUCK], fdi["pair"]["unsettled"]) == (0.1, k + 1)
+    pairs.note_first(fdi, ELEVATOR)
+    assert (known["low"][STUCK], fdi["pair"]["unsettled"]) == (0.12, 0)
+
+
+def test_a_second_begins_with_what_was_known_of_the_first():
+    fdi = new_case(elevator=(), flap=(BIAS,))
+    elevator, flap = fdi["surface"][ELEVATOR], fdi["surface"][FLAP]
+    fdi["pair"]["first"], elevator["known"]["low"], elevator["known"]["high"] = ELEVATOR, 0.1, 0.14
+    elevator["known"]["excluded"] = [kind != STUCK for kind in range(N_TYPES)]
+    fdi["surface"]["wrong"] = fdi["surface"]["wrong_then"] = fdi["surface"]["wrong_before"] = 1
+    assert pairs.two_in_pitch(fdi)
+    assert candidates.one_type(elevator) == STUCK
+    assert (elevator["set_low"][STUCK], elevator["set_high"][STUCK]) == (0.1, 0.14)
+    assert not flap["type_excluded"].any()
+    for surface in (elevator, flap):
+        assert (surface["in_question"], surface["standing"]) == (0, BY_DEDUCTION)
+        assert (surface["wrong"], surface["wrong_then"], surface["wrong_before"]) == (0, 0, 0)
+    assert fdi["surface"]["in_question"][[AILERON, RUDDER]].tolist() == [1, 1]
+    assert not pairs.two_in_pitch(_first(new_case(elevator=(STUCK,)), ELEVATOR))
+    assert not pairs.two_in_pitch(_first(new_case(elevator=()), NO_SURFACE))
+
+
+def _first(fdi, surface):
+    fdi["pair"]["first"] = surface
+    return fdi
+
+
+@pytest.mark.parametrize(
+    ("kinds", "evidence", "patient"),
+    [
+        ((STUCK,), PATIENCE, True), ((STUCK,), PATIENCE - 1, False),
+        ((STUCK, OSCILLATORY), 2 * PATIENCE - 1, False), ((STUCK, OSCILLATORY), 2 * PATIENCE, True),
+        ((STUCK, GROWING_BIAS), 99, False), ((STUCK, SLOW), 99, True),
+    ],
+)  # fmt: skip
+def test_when_a_first_fault_in_pitch_is_known_well_enough(kinds, evidence, patient):
+    assert bool(pairs.patient(*one(*kinds, evidence=evidence))) == patient
+
+
+def test_in_pitch_a_jam_stays_open_as_the_other_may_be_off_by_a_constant():
+    for kinds, found in (
+        ((STUCK,), -1),
+        ((UP,), -1),
+        ((DOWN,), -1),
+        ((BIAS,), BIAS),
+        ((CONSTANT_LOSS,), CONSTANT_LOSS),
+    ):
+        assert pairs.type_in_pitch(*one(*kinds)) == found
+
+
+def decided(alarmed=(1, 0), **left):
+    fdi = new_case(**left)
+    fdi["pair"]["enabled"], fdi["pair"]["first"], fdi["pair"]["alarmed"] = 1, NO_SURFACE, alarmed
+    fdi["verdict"]["isolated"] = NOT_ISOLATED
+    fdi["surface"]["type"] = -1
+    fdi["surface"]["low"], fdi["surface"]["high"] = -0.4, 0.5
+    return fdi
+
+
+def test_one_fault_in_pitch_is_named_and_acted_upon():
+    fdi = decided(elevator=(CONSTANT_LOSS,), flap=None)
+    pairs.decide(fdi, 3.0)
+    assert fdi["surface"]["named"].tolist() == [0, 0, 0, 0]  # ailerons and rudder might be it as well
+    fdi = decided(elevator=(CONSTANT_LOSS,), flap=None, aileron=None, rudder=None)
+    pairs.decide(fdi, 3.0)
+    assert fdi["surface"]["named"].tolist() == [0, 1, 0, 0]
+    assert fdi["verdict"]["isolated"] == ELEVATOR
+    assert (fdi["verdict"]["type"], fdi["verdict"]["isolated_at_s"]) == (CONSTANT_LOSS, 3.0)
+    assert (fdi["verdict"]["lead"], fdi["verdict"]["lead_kind"]) == (ELEVATOR, LOSES)
+    assert fdi["surface"]["measure"].tolist() == [-1, LOSES, -1, -1]
+    assert fdi["pair"]["first"] == ELEVATOR
+
+
+def test_without_an_alarm_in_pitch_nobody_is_named_there():
+    fdi = decided(alarmed=(0, 1), elevator=(CONSTANT_LOSS,), flap=None, aileron=None, rudder=None)
+    pairs.decide(fdi, 3.0)
+    assert not fdi["surface"]["named"][ELEVATOR]
+    assert not pairs.acted_upon(fdi, ELEVATOR)
+
+
+def test_the_likeliest_in_pitch_is_acted_upon_until_one_is_named():
+    fdi = decided()
+    assert [bool(pairs.acted_upon(fdi, s)) for s in range(4)] == [False, True, False, False]
+    only_flap = decided(aileron=None, rudder=None, elevator=COURSES)
+    assert [bool(pairs.acted_upon(only_flap, s)) for s in range(4)] == [False, False, False, True]
+    assert not pairs.named_in_pitch(fdi)
+    fdi["surface"]["named"] = 1, 0, 0, 1
+    assert pairs.named_in_pitch(fdi)
+    assert [bool(pairs.acted_upon(fdi, s)) for s in range(4)] == [True, False, False, True]
+
+
+def test_the_verdict_is_that_of_the_first_named():
+    fdi = decided(aileron=None, rudder=None)
+    fdi["surface"]["type"][RUDDER] = STUCK
+    fdi["surface"]["type_at_s"][RUDDER], fdi["surface"]["named_at_s"][RUDDER] = 2.0, 1.5
+    pairs.summarise(fdi, RUDDER, False, 3.0)
+    found = fdi["verdict"]
+    assert (found["isolated"], found["type"], found["type_at_s"]) == (4 + RUDDER, STUCK, 2.0)
+    assert found["isolated_at_s"] == 1.5
+    pairs.summarise(fdi, NO_SURFACE, True, 4.0)
+    assert (found["isolated"], found["type"], found["isolated_at_s"]) == (UNANTICIPATED, -1, 4.0)
+    pairs.summarise(fdi, NO_SURFACE, True, 5.0)
+    assert found["isolated_at_s"] == 4.0
+    pairs.summarise(fdi, NO_SURFACE, False, 6.0)
+    assert (found["isolated"], found["isolated_at_s"]) == (NOT_ISOLATED, 6.0)

@@ -1,0 +1,323 @@
+"""Air, error map, thresholds, the detector's noise of the moment and the scheme, a kernel at a time."""
+
+import numpy as np
+import pytest
+from kernels import DT, new_fdi
+from scipy.spatial.transform import Rotation
+
+from beaver_ftc.aircraft import load
+from beaver_ftc.design.model import design_record
+from beaver_ftc.design.terms import regressors
+from beaver_ftc.design.variants import response
+from beaver_ftc.diagnosis import air, error_map, noise_model, scheme, statistical, thresholds
+from beaver_ftc.diagnosis.air import AIR
+from beaver_ftc.diagnosis.error_map import error_map_dtype
+from beaver_ftc.diagnosis.state import LOSS, NOT_ISOLATED, STATISTICS, WORST_CASE, verdict_dtype
+
+AIRCRAFT = load()
+SPAN, V = 14.63, 45.0
+X, U = np.array([0.1, -0.05, 0.07]), np.array([0.1, -0.15, 0.05, 0.2])
+Y = np.array([0.1, 0.03, V, 1036.0, 0.3, 0.0, 0.0, 0.0])
+EITHER = 0
+
+
+def new_air(**fields):
+    record = np.zeros(1, AIR).view(np.recarray)[0]
+    record["span"], record["gravity"], record["moving"] = SPAN, 9.8, 1
+    for name, value in fields.items():
+        record[name] = value
+    return record
+
+
+def through_air(y, attitude, heading=None):
+    """Velocity through the air in level axes that turn with the heading: by rotations."""
+    body = y[2] * np.array([np.cos(y[0]) * np.cos(y[1]), np.sin(y[1]), np.sin(y[0]) * np.cos(y[1])])
+    return Rotation.from_euler("ZYX", [heading or 0.0, attitude[1], attitude[0]]).apply(body)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_gust_is_what_forces_and_gravity_do_not_explain(seed):
+    """Level axes of now; the vertical and lateral change of the gust through its lags."""
+    rng = np.random.default_rng(seed)
+    record, dt = new_air(), 0.02
+    then, now = rng.uniform(-0.3, 0.3, 3), rng.uniform(-0.3, 0.3, 3)
+    y_then, y_now = Y.copy(), Y.copy()
+    y_then[:2], y_now[:2] = rng.uniform(-0.1, 0.2, (2, 2))
+    y_now[2] = 47.0
+    air.begin(record, y_then, then)
+    assert record["velocity"] == pytest.approx(through_air(y_then, then))
+    assert record["heading"] == then[2]
+    assert not record["gust"].any()
+    record["gust"], record["force"] = (0.0, 0.02, -0.03), rng.normal(size=3)
+    level = Rotation.from_euler("ZYX", [0.0, then[1], then[0]])
+    expected = through_air(y_then, then) + dt * (level.apply(record["force"]) + np.array([0.0, 0.0, 9.8]))
+    expected = Rotation.from_euler("z", then[2] - now[2]).apply(expected)
+    air.observe(record, y_now, now, dt)
+    change = expected - through_air(y_now, now)
+    tau_q, tau_r = 4.0 * SPAN / (np.pi * 47.0), 3.0 * SPAN / (np.pi * 47.0)
+    pitching = 0.02 * np.exp(-dt / tau_q) + change[2] / (47.0 * tau_q)
+    yawing = -0.03 * np.exp(-dt / tau_r) + change[1] / (47.0 * tau_r)
+    assert record["gust"] == pytest.approx([0.0, pitching, yawing])
+    assert record["velocity"] == pytest.approx(through_air(y_now, now))
+
+
+def test_the_specific_force_is_that_of_the_terms():
+    record, out = new_air(area_per_mass=0.01), np.zeros(3)
+    noise_model.fill_table(record["forces"], AIRCRAFT, AIRCRAFT.measurable_forces, noise_model.FORCES)
+    air.specific_force(record, X, Y, U, out)
+    of = {
+        "alpha": Y[0], "beta": Y[1], "ph": X[0] * SPAN / (2 * V), "rh": X[2] * SPAN / (2 * V), "dpt": Y[4],
+        "qh": X[1] * AIRCRAFT.geometry.chord_m / V, **dict(zip(AIRCRAFT.surfaces, U, strict=True)),
+    }  # fmt: skip
+    expected = dict.fromkeys(noise_model.FORCES, 0.0)
+    for term in AIRCRAFT.measurable_forces:
+        size = term.value * np.prod([of[name] ** power for name, power in term.of])
+        expected[term.coefficient] += size * (of[term.surface] if term.surface else 1.0)
+    assert out == pytest.approx(1036.0 * 0.01 * np.array(list(expected.values())), rel=1e-3)
+
+
+def test_the_gusts_of_a_frame_are_summed_over_its_instants():
+    record, design = new_air(area_per_mass=0.01), design_record().view(np.recarray)[0]
+    air.begin(record, Y, np.zeros(3))
+    record["gust"] = 0.0, 0.02, -0.03
+    air.effect(record, design, X, Y, U)
+    first = record["acceleration"].copy()
+    air.begin_frame(record)
+    air.look(record, design, X, Y, U, np.zeros(3), 0.01)
+    assert record["total"] == pytest.approx(first + record["acceleration"])
+    assert np.abs(record["acceleration"] - first).max() > 1e-5
+
+
+def test_the_bound_of_a_true_estimator_covers_every_course_of_its_parameter():
+    """By corners: theta at either end at each instant, by the sign of what it multiplies."""
+    low, high = thresholds.interval(-0.9, 0.2, 0.5, -0.3, 0.2, -0.4, 0.05)
+    assert low == pytest.approx(-0.9 * 0.5 + 0.2 * -0.3 + 0.08 - 0.05)
+    assert high == pytest.approx(0.2 * 0.5 + -0.9 * -0.3 + 0.08 + 0.05)
+    assert thresholds.published(-1.0, 0.0, -0.2, -0.3, 0.05) == pytest.approx((-0.19, 0.19))
+    assert thresholds.published(-1.0, 0.0, 0.2, -0.8, 0.05) == pytest.approx((-0.21, 0.21))
+
+
+def test_the_published_bound_and_the_turning_earth():
+    design, out = design_record().view(np.recarray)[0], np.array([0.1, 0.2, 0.3])
+    inertia, constant, earth = np.array([0.25, 0.2, 0.15]), np.array([0.02, 0.03, 0.04]), 7e-5
+    thresholds.uncertainty_bound(X, design, inertia, constant, earth, out)
+    p, q, r = X
+    coupling = np.abs([design["Pqr"] * q * r, design["Qpr"] * p * r, design["Rpq"] * p * q])
+    turning = earth * (2.0 * np.abs(X).sum() + earth)
+    rounding = thresholds.ROUNDING_RAD_S2
+    assert out == pytest.approx(
+        [0.1, 0.2, 0.3] + inertia * coupling + constant + turning + rounding, rel=1e-12
+    )
+
+
+def test_filters_of_bounds_are_those_of_residuals():
+    assert thresholds.bound_step(0.3, 0.2, 0.9, 0.1) == pytest.approx(0.27 + 0.02)
+    assert thresholds.noise_step(0.3, 0.2, 0.9) == pytest.approx(0.27 + 0.02)
+
+
+def new_map(**fields):
+    record = np.zeros(1, error_map_dtype(4)).view(np.recarray)[0]
+    record["n_boxes"], record["n_levels"], record["n_ages"], record["outside"] = 2, 3, 2, 7
+    record["low"], record["high"] = -1e6, 1e6
+    record["low"][0, 0], record["high"][0, 0] = -0.1, 0.1  # the inner box by roll rate
+    record["low"][1, 5], record["high"][1, 5] = 30.0, 60.0  # the outer one by airspeed
+    record["share"][:3], record["until_s"][:2] = (0.25, 0.5, 1.0), (10.0, 60.0)
+    record["travel_low"], record["travel_high"] = (-0.4, -0.4, -0.2, -0.1), (0.2, 0.4, 0.4, 1.0)
+    record["error"] = np.arange(record["error"].size).reshape(record["error"].shape) / 1000.0
+    for name, value in fields.items():
+        record[name] = value
+    return record
+
+
+@pytest.mark.parametrize(
+    ("u", "level"),
+    [
+        ((0.0, 0, 0, 0), 0), ((0.05, 0, 0, 0), 0), ((0.0501, 0, 0, 0), 1), ((-0.1, 0, 0, 0), 0),
+        ((-0.11, 0, 0, 0), 1), ((0, 0.2, 0, 0), 1), ((0, 0.21, 0, 0), 2), ((0, 0, -0.06, 0), 1),
+        ((0, 0, 0, 0.25), 0), ((0, 0, 0, -0.1), 2),
+    ],
+)  # fmt: skip
+def test_the_level_is_the_first_share_of_the_travel_that_covers_the_surfaces(u, level):
+    assert error_map.level_of(new_map(), np.array(u)) == level
+    assert error_map.level_of(new_map(whole=1), np.array(u)) == 2
+
+
+def test_a_surface_beyond_a_travel_that_ends_at_neutral_uses_all_of_it():
+    up_only = new_map(travel_low=(-0.4, -0.4, -0.2, 0.0))
+    assert error_map.level_of(up_only, np.array([0, 0, 0, -0.01])) == 2
+    assert error_map.level_of(up_only, np.array([0, 0, 0, 0.25])) == 0
+
+
+@pytest.mark.parametrize(("time_s", "age"), [(0.0, 0), (10.0, 0), (10.1, 1), (60.0, 1), (60.1, -1)])
+def test_the_row_is_that_of_a_flight_so_old(time_s, age):
+    assert error_map.age_of(new_map(time_s=time_s)) == age
+
+
+@pytest.mark.parametrize(
+    ("roll", "airspeed", "time_s", "box"),
+    [
+        (0.1, 45.0, 5.0, 0),
+        (0.11, 45.0, 20.0, 1),
+        (-0.1, 90.0, 5.0, 0),
+        (0.11, 61.0, 5.0, None),
+        (0.0, 45.0, 61.0, None),
+    ],
+)
+def test_the_error_is_that_of_the_innermost_box_or_unknown(roll, airspeed, time_s, box):
+    record, out = new_map(time_s=time_s), np.full(3, 0.5)
+    y = Y.copy()
+    y[2] = airspeed
+    error_map.add_model_error(record, np.array([roll, 0.0, 0.0]), y, np.array([0.1, 0, 0, 0]), out)
+    age = 0 if time_s <= 10.0 else 1
+    expected = record["error"][age, box, 1] if box is not None else error_map.UNKNOWN_RAD_S2
+    assert out == pytest.approx(0.5 + expected)
+    assert record["outside"] == (box is None)
+    assert record["place"][:7] == pytest.approx([roll, 0, 0, 0.1, 0.03, airspeed, 2.0 * 1036.0 / airspeed**2])
+
+
+def new_detector(**fields):
+    fdi = new_fdi()
+    record = fdi["statistical"]
+    record["n_blocks"], record["share"], record["rapidity"] = 3, 0.25, 2.0
+    record["jitter"], record["deflection"] = (0.1, 0.2, 0.3), (0.01, 0.02, 0.03)
+    for block, axes in zip(record["block"], ((1,), (0, 2), (0, 2)), strict=True):
+        block["n"], block["axis"][: len(axes)], block["stronger"] = len(axes), axes, 1.0
+    record["block"][2]["stronger"], record["block"][2]["lag"] = 4.0, 90.0
+    for name, value in fields.items():
+        record[name] = value
+    return fdi, record, design_record().view(np.recarray)[0]
+
+
+@pytest.mark.parametrize("moving", [0, 1])
+def test_the_drift_is_of_what_is_bounded_and_of_the_air_not_seen(moving):
+    fdi, record, design = new_detector()
+    rng = np.random.default_rng(1)
+    record["air"]["moving"] = moving
+    record["air"]["damping"], record["air"]["turn"] = rng.normal(size=(2, 3, 3))
+    record["air"]["unseen"], record["air"]["per_metre"] = (1.0, 0.2, 0.3), (1e-3, 2e-3, 3e-3)
+    fdi["bound"]["constant"], fdi["bound"]["inertia"] = (0.02, 0.0, 0.04), 0.1
+    statistical.drifts(record, fdi, design, X, Y)
+    bounded = np.zeros(3)
+    thresholds.uncertainty_bound(X, design, np.full(3, 0.1), np.array([0.02, 0.0, 0.04]), 0.0, bounded)
+    bounded += [0.01, 0.02, 0.03]
+    assert record["bounded"] == pytest.approx(bounded)
+    turned = record["air"]["damping"] @ record["air"]["turn"]
+    unseen = moving * V * turned @ np.diag([1e-3, 4e-4, 9e-4]) @ turned.T
+    for block, stronger in zip(record["block"], (1.0, 1.0, 4.0), strict=True):
+        axes = block["axis"][: block["n"]]
+        drift = stronger * unseen[np.ix_(axes, axes)] + 2.0 * np.diag(bounded[axes] ** 2)
+        assert block["drift"][: len(axes), : len(axes)] == pytest.approx(drift)
+        assert block["jitter"][: len(axes)] == pytest.approx(np.array([0.1, 0.2, 0.3])[axes])
+    assert record["block"]["keep"] == pytest.approx([1.0, 1.0, np.exp(-DT * V / 90.0)])
+
+
+def test_where_nothing_is_bounded_a_little_is_reckoned_with():
+    fdi, record, design = new_detector(deflection=0.0)
+    statistical.drifts(record, fdi, design, np.zeros(3), Y)
+    assert record["block"][0]["drift"][0, 0] == pytest.approx(2.0 * 1e-6)
+
+
+def test_regressors_are_what_each_coefficient_multiplies():
+    """Coefficients times regressors give f + G u without its inertia coupling, here at no rates."""
+    fdi, record, design = new_detector(share=1.0, tolerated=1)
+    record["block"]["regressor"] = 9.0
+    x = np.zeros(3)
+    statistical.prepare(record, fdi, design, x, Y, U)
+    value = design["moments"]["value"][: len(AIRCRAFT.moments)]
+    axis = np.array([("Cl", "Cm", "Cn").index(term.coefficient) for term in AIRCRAFT.moments])
+    f, G = np.zeros(3), np.zeros((3, 4))
+    response(design, x, Y, f, G)
+    total = f + G @ U
+    for block, axes in zip(record["block"], ((1,), (0, 2), (0, 2)), strict=True):
+        of_it = value[np.isin(axis, axes)]
+        assert of_it @ block["regressor"][: of_it.size, : len(axes)] == pytest.approx(total[list(axes)])
+    terms = np.zeros_like(record["terms"])
+    regressors(design["moments"], design["moments"]["power"], U, terms)
+    assert record["terms"] == pytest.approx(terms)
+
+
+def test_instants_inside_a_frame_add_to_the_mean():
+    fdi, record, design = new_detector(tolerated=1)
+    statistical.prepare(record, fdi, design, X, Y, U)
+    once = record["block"]["regressor"].copy()
+    for _ in range(3):
+        statistical.look(record, design, X, Y, U, np.zeros(3), DT)
+    assert record["block"]["regressor"] == pytest.approx(4.0 * once)
+    statistical.prepare(record, fdi, design, X, Y, U)
+    assert record["block"]["regressor"] == pytest.approx(once)
+
+
+@pytest.mark.parametrize("offsets_count", [0, 1])
+def test_what_is_known_of_a_fault_is_expected(offsets_count):
+    rng = np.random.default_rng(2)
+    mean = np.zeros(1, [("G", "f8", (3, 4)), ("Gu", "f8", (3, 4))]).view(np.recarray)[0]
+    mean["G"], mean["Gu"] = rng.normal(size=(2, 3, 4))
+    expected, effectiveness, offset = np.ones(3), np.array([0.4, 1.0, 0.0, 1.0]), np.array([0.1, 0, -0.2, 0])
+    scheme.expect_known_faults(expected, mean, effectiveness, offset, offsets_count)
+    off = mean["G"] @ offset if offsets_count else 0.0
+    assert expected == pytest.approx(1.0 + mean["Gu"] @ (effectiveness - 1.0) + off)
+
+
+def test_a_plug_ins_verdict_takes_the_place_of_the_built_in_one():
+    fdi, given = new_fdi(), np.zeros(1, verdict_dtype(4)).view(np.recarray)[0]
+    fdi["verdict"]["isolated"] = NOT_ISOLATED
+    given["isolated"], given["axis"], given["theta"], given["estimates"] = 2, 1, -0.3, 1
+    given["effectiveness"] = 0.5
+    scheme.note_verdict(fdi, given, 3.0)
+    assert (fdi["verdict"]["detected"], fdi["verdict"]["isolated"]) == (0, NOT_ISOLATED)
+    given["detected"] = 1
+    scheme.note_verdict(fdi, given, 4.0)
+    found = fdi["verdict"]
+    assert (found["detected"], found["detected_at_s"], found["detected_axis"]) == (1, 4.0, 1)
+    assert (found["isolated"], found["isolated_at_s"], found["estimates"]) == (2, 4.0, 1)
+    assert fdi["estimator"]["theta"][2] == pytest.approx([-0.3] * 3)
+    assert found["effectiveness"] == pytest.approx([0.5] * 4)
+    scheme.note_verdict(fdi, given, 5.0)
+    assert (found["detected_at_s"], found["isolated_at_s"]) == (4.0, 4.0)
+    given["isolated"] = NOT_ISOLATED
+    scheme.note_verdict(fdi, given, 6.0)
+    assert (found["isolated"], found["isolated_at_s"]) == (NOT_ISOLATED, 6.0)
+
+
+@pytest.mark.parametrize(
+    ("enabled", "authority", "score", "share", "statistic"),
+    [
+        (0, WORST_CASE, 2.0, 0.7, 0.7), (1, WORST_CASE, 2.0, 0.7, 0.7), (1, STATISTICS, 2.0, 3.0, 2.0),
+        (1, EITHER, 0.6, 0.9, 0.6), (1, EITHER, 0.6, 1.1, 1.1), (1, EITHER, 2.0, 1.1, 2.0),
+        (0, STATISTICS, 2.0, 0.7, 0.0),
+    ],
+)  # fmt: skip
+def test_the_built_in_statistic(enabled, authority, score, share, statistic):
+    fdi = new_fdi()
+    fdi["statistical"]["enabled"], fdi["authority"], fdi["statistical"]["score"] = enabled, authority, score
+    fdi["bank"]["threshold"][0], fdi["bank"]["residual"][0, 1] = 0.5, 0.5 * share
+    assert scheme.built_in_statistic(fdi) == pytest.approx(statistic)
+    assert bool(scheme.likelihood_counts(fdi)) == (enabled == 1 and authority != WORST_CASE)
+
+
+def test_the_estimate_is_that_of_whoever_counts():
+    fdi = new_fdi()
+    fdi["verdict"]["isolated"], fdi["estimator"]["surface"][5], fdi["layout"]["dominant_axis"][2] = 5, 2, 1
+    fdi["estimator"]["theta"][5] = -0.1, -0.2, -0.3
+    fdi["statistical"]["n_blocks"] = 1
+    block = fdi["statistical"]["block"][0]
+    block["n_hypotheses"], block["n"], block["axis"][0] = 1, 1, 1
+    hypothesis = block["hypothesis"][0]
+    hypothesis["kind"], hypothesis["surface"], hypothesis["theta"], hypothesis["certainty"] = (
+        LOSS,
+        2,
+        -0.6,
+        1.0,
+    )
+    assert scheme.isolated_surface(fdi) == 2
+    assert scheme.isolated_theta(fdi, 2) == -0.2
+    out = np.zeros(3)
+    fdi["fdae"]["network"]["output"], block["rest"] = 0.3, (0, 0, 0.7, 0)
+    scheme.unknown_acceleration(fdi, out)
+    assert out == pytest.approx([0.3] * 3)
+    fdi["statistical"]["enabled"] = 1
+    assert scheme.isolated_theta(fdi, 2) == -0.6
+    scheme.unknown_acceleration(fdi, out)
+    assert out[1] == 0.7
+    fdi["verdict"]["isolated"] = NOT_ISOLATED
+    assert scheme.isolated_surface(fdi) == -1

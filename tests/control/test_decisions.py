@@ -1,0 +1,270 @@
+"""Supervisor, oracle, accommodation and what is left of a surface: a decision at a time."""
+
+import numpy as np
+import pytest
+
+from beaver_ftc.control import accommodation, oracle, supervisor
+from beaver_ftc.control.laws import gains, left
+from beaver_ftc.control.laws.state import N_POINTS, REJECTING, rejection_dtype
+from beaver_ftc.control.oracle import true_faults_dtype
+from beaver_ftc.control.state import ADAPTIVE, FAULT_TOLERANT, NOMINAL, ORACLE, control_dtype
+from beaver_ftc.control.supervisor import (
+    MAX_EVENTS,
+    MODE_ADAPTIVE,
+    MODE_NOMINAL,
+    MODE_REALLOCATED,
+    MODE_UNANTICIPATED,
+    SUPERVISOR,
+)
+from beaver_ftc.design.model import design_record, unanticipated_pitch
+from beaver_ftc.diagnosis.state import NOT_ISOLATED, UNANTICIPATED, diagnosis_dtype
+from beaver_ftc.diagnosis.types.examine import FIXED, LAGS, LOSES, SHIFTED
+
+AILERON, ELEVATOR, RUDDER, FLAP = range(4)
+DT = 0.02
+
+
+def record(dtype):
+    return np.zeros(1, dtype).view(np.recarray)[0]
+
+
+def new_control(**fields):
+    control = record(control_dtype(4))
+    control["main"], control["stand_in"], control["dt"], control["law"] = (0, 1, 2), FLAP, DT, FAULT_TOLERANT
+    control["effectiveness"], control["least_effectiveness"] = 1.0, 0.1
+    for name, value in fields.items():
+        control[name] = value
+    return control
+
+
+def new_faults(**fields):
+    faults = record(true_faults_dtype(4))
+    faults["effectiveness"] = 1.0
+    for name, value in fields.items():
+        faults[name] = value
+    return faults
+
+
+def test_every_change_of_mode_is_noted_and_of_too_many_the_latest():
+    state = record(SUPERVISOR)
+    supervisor.supervise(state, MODE_NOMINAL, 0.0)
+    supervisor.supervise(state, MODE_NOMINAL, 1.0)
+    supervisor.supervise(state, MODE_REALLOCATED, 2.0)
+    supervisor.supervise(state, MODE_REALLOCATED, 3.0)
+    assert state["n_modes"] == 3
+    assert state["mode_is"][:3].tolist() == [MODE_NOMINAL, MODE_ADAPTIVE, MODE_REALLOCATED]
+    assert state["mode_at_s"][:3].tolist() == [0.0, 2.0, 3.0]
+    assert state["mode"] == MODE_REALLOCATED
+    for k in range(MAX_EVENTS):
+        supervisor.supervise(state, MODE_ADAPTIVE if k % 2 == 0 else MODE_UNANTICIPATED, 10.0 + k)
+    assert state["n_modes"] == 3 + MAX_EVENTS
+    assert state["mode_at_s"][-1] == 9.0 + MAX_EVENTS
+    assert state["mode_is"][-1] == MODE_UNANTICIPATED
+    assert state["mode_at_s"][-2] == 10.0 + MAX_EVENTS - 5
+
+
+@pytest.mark.parametrize(
+    ("every_type", "isolated", "lead", "lead_kind", "stand_in", "mode"),
+    [
+        (0, 5, -1, -1, FLAP, MODE_REALLOCATED), (0, 5, -1, -1, -1, MODE_ADAPTIVE),
+        (0, 6, -1, -1, FLAP, MODE_ADAPTIVE), (0, UNANTICIPATED, -1, -1, FLAP, MODE_UNANTICIPATED),
+        (1, 5, ELEVATOR, LOSES, FLAP, MODE_REALLOCATED), (1, 5, ELEVATOR, FIXED, FLAP, MODE_REALLOCATED),
+        (1, 5, ELEVATOR, SHIFTED, FLAP, MODE_ADAPTIVE), (1, 5, ELEVATOR, LAGS, FLAP, MODE_ADAPTIVE),
+        (1, 5, ELEVATOR, FIXED, -1, MODE_ADAPTIVE), (1, 6, RUDDER, FIXED, FLAP, MODE_ADAPTIVE),
+        (1, UNANTICIPATED, -1, -1, FLAP, MODE_UNANTICIPATED), (1, NOT_ISOLATED, -1, -1, FLAP, MODE_ADAPTIVE),
+        (1, NOT_ISOLATED, ELEVATOR, FIXED, FLAP, MODE_REALLOCATED),
+    ],
+)  # fmt: skip
+def test_the_mode_that_the_diagnosis_asks_for(every_type, isolated, lead, lead_kind, stand_in, mode):
+    fdi = record(diagnosis_dtype(4))
+    fdi["every_type"], fdi["estimator"]["surface"][4:8] = every_type, range(4)
+    verdict = fdi["verdict"]
+    verdict["detected"], verdict["isolated"], verdict["lead"], verdict["lead_kind"] = (
+        1,
+        isolated,
+        lead,
+        lead_kind,
+    )
+    assert supervisor.mode_from(new_control(stand_in=stand_in), fdi) == mode
+    verdict["detected"] = 0
+    assert supervisor.mode_from(new_control(stand_in=stand_in), fdi) == MODE_NOMINAL
+
+
+@pytest.mark.parametrize(
+    ("faults", "mode"),
+    [
+        ({}, MODE_NOMINAL), ({"present": 1}, MODE_ADAPTIVE),
+        ({"present": 1, "Cm_alpha3": 0.1}, MODE_UNANTICIPATED),
+        ({"present": 1, "effectiveness": (1, 0.5, 1, 1)}, MODE_REALLOCATED),
+        ({"present": 1, "immovable": (0, 1, 0, 0)}, MODE_REALLOCATED),
+        ({"present": 1, "effectiveness": (0.5, 1, 0.5, 0.5)}, MODE_ADAPTIVE),
+        ({"effectiveness": (1, 0.5, 1, 1)}, MODE_NOMINAL),
+    ],
+)  # fmt: skip
+def test_the_oracles_mode_is_that_of_the_true_fault(faults, mode):
+    assert oracle.true_mode(new_control(), new_faults(**faults)) == mode
+
+
+def test_the_oracle_takes_each_surface_for_what_it_is():
+    faults = new_faults(present=1, effectiveness=(0.6, 0.7, 1, 1), immovable=(0, 1, 0, 0), effective=0.1)
+    control = new_control()
+    for s in range(2):
+        oracle.true_surface(control, faults, s, 0.2)
+    assert control["target"][:2].tolist() == [0.6, 0.0]
+    assert control["offset"][:2] == pytest.approx([0.1 - 0.6 * 0.2, 0.1])
+    faults["present"] = 0
+    control = new_control()
+    oracle.true_surface(control, faults, 0, 0.2)
+    assert control["offset"][0] == 0.0
+
+
+def compensated(law, detected=1, inner=0, lead=-1, lead_kind=-1):
+    control, fdi = new_control(law=law, inner=inner, fhat=9.0), record(diagnosis_dtype(4))
+    belief = record([("design", design_record().dtype)])
+    belief["design"] = design_record()[0]
+    measured = record([("y", "f8", (8,))])
+    measured["y"] = 0.2, 0.0, 45.0, 1000.0, 0.3, 0, 0, 0
+    fdi["verdict"]["detected"], fdi["fdae"]["network"]["output"] = detected, (0.1, 0.2, 0.3)
+    fdi["verdict"]["lead"], fdi["verdict"]["lead_kind"] = lead, lead_kind
+    accommodation.compensate(control, fdi, belief, measured, new_faults(Cm_alpha3=0.5))
+    return control["fhat"].tolist(), float(unanticipated_pitch(belief["design"], measured["y"], 0.5))
+
+
+def test_what_the_law_takes_the_unknown_for():
+    assert compensated(ADAPTIVE)[0] == pytest.approx([0.1, 0.2, 0.3])
+    assert compensated(ADAPTIVE, detected=0)[0] == [0.0] * 3
+    assert compensated(NOMINAL)[0] == [0.0] * 3
+    assert compensated(ADAPTIVE, inner=REJECTING)[0] == [0.0] * 3
+    assert compensated(ADAPTIVE, lead=ELEVATOR, lead_kind=LAGS)[0] == [0.0] * 3
+    assert compensated(ADAPTIVE, lead=ELEVATOR, lead_kind=SHIFTED)[0] == pytest.approx([0.1, 0.2, 0.3])
+    assert compensated(ADAPTIVE, lead=AILERON, lead_kind=LAGS)[0] == [0.0] * 3
+    known, expected = compensated(ORACLE)
+    assert known == [0.0, expected, 0.0]
+    assert expected != 0.0
+
+
+@pytest.mark.parametrize("which", ["healthy", "immovable", "jammed", "moving jam", "abandoned"])
+def test_a_surface_given_up_goes_to_its_trim(which):
+    control = new_control(
+        trim=0.3, command=0.1, saturated=1, law=ORACLE if which == "immovable" else ADAPTIVE
+    )
+    fdi, faults = record(diagnosis_dtype(4)), new_faults(immovable=(0, 0, 1, 0))
+    fdi["every_type"], fdi["surface"]["measure"] = 1, -1
+    if "jam" in which:
+        fdi["surface"]["measure"][RUDDER] = FIXED
+        control["effectiveness"][RUDDER] = 0.0 if which == "jammed" else 0.5
+    control["rejection"]["abandoned"][RUDDER] = which == "abandoned"
+    accommodation.give_up(control, fdi, faults)
+    up = which not in ("healthy", "moving jam")
+    assert control["command"].tolist() == [0.1, 0.1, 0.3 if up else 0.1, 0.1]
+    assert control["saturated"].tolist() == [1, 1, 0 if up else 1, 1]
+    assert control["hedging"] == up
+
+
+def test_the_answer_of_the_observer_is_its_own_error_dynamics():
+    """e' = a - dd; e is corrected by `pull`, dd by `learn` of what was missed."""
+    memory, rng = record(rejection_dtype(4))["healthy"], np.random.default_rng(1)
+    e = dd = 0.0
+    for a in rng.normal(size=10):
+        missed = e + DT * (a - dd)
+        assert left.answer(memory, 1, a, 0.3, 2.0, DT) == pytest.approx(missed)
+        e, dd = 0.7 * missed, dd + 2.0 * missed
+    assert memory["rate"].tolist()[::2] == [0.0, 0.0]
+
+
+def lost_rudder(theta, believed=1.0, frames=400, noise=0.0):
+    """What is learnt of a rudder with this loss: its moment, and what the observer misses of it."""
+    control, rng = new_control(), np.random.default_rng(2)
+    control["effectiveness"][RUDDER] = believed
+    rejection = control["rejection"]
+    rejection["pull"], rejection["learn"], rejection["found"]["fading"] = 0.3, 2.0, left.fading(DT)
+    observer = record(rejection_dtype(4))["healthy"]
+    for k in range(frames):
+        given = np.zeros((3, 4))
+        given[2, RUDDER] = 0.5 * np.sin(0.2 * k)
+        unexplained = (theta - (believed - 1.0)) * given[2, RUDDER]
+        missed = left.answer(observer, 2, unexplained, 0.3, 2.0, DT) + noise * rng.normal()
+        left.learn(control, 2, given, missed)
+    return control
+
+
+@pytest.mark.parametrize("believed", [1.0, 0.6])
+@pytest.mark.parametrize("theta", [-0.3, -0.95])
+def test_what_is_left_is_found_by_least_squares(theta, believed):
+    """Without noise exactly, but for the share of the diagnosis' own estimate, whose weight follows."""
+    control = lost_rudder(theta, believed)
+    found = control["rejection"]["found"]
+    assert found["product"][2] == pytest.approx(theta * found["square"][2], rel=1e-6)
+    assert found["missed"][2] == pytest.approx(theta**2 * found["square"][2], rel=1e-6)
+    assert found["frames"][2] == pytest.approx((1 - (1 - left.fading(DT)) ** 400) / left.fading(DT))
+    prior = found["missed"][2] / found["frames"][2] / 0.2**2
+    share = prior / (prior + found["square"][2])
+    assert left.left_of(control, 2, 0.5) == pytest.approx(1.0 + (1 - share) * theta + share * -0.5, rel=1e-6)
+    assert bool(left.acts(control, 2)) == (theta > -0.9)
+    assert left.left_of(control, 1, 0.5) == 0.5  # of pitch nothing has been seen
+
+
+@pytest.mark.parametrize(
+    ("named", "seen", "kept"),
+    [
+        (0.3, 0.6, 0.6),
+        (0.3, 0.2, 0.3),
+        (0.3, 1.5, 1.0),
+        (0.01, 0.02, 0.02),
+        (0.01, 0.06, 0.1),
+        (0.04, 0.05, 0.1),
+    ],
+)
+def test_the_larger_of_both_estimates_is_believed(named, seen, kept):
+    control = new_control(target=named)
+    found = control["rejection"]["found"]
+    found["frames"], found["square"], found["named"], found["missed"] = 10.0, 4.0, 1, 0.0
+    found["product"] = 4.0 * (seen - 1.0)
+    left.hesitate(control, RUDDER, 2)
+    assert control["target"][RUDDER] == pytest.approx(kept)
+
+
+def test_what_was_seen_before_a_surface_was_named_counts_no_longer():
+    control = new_control(target=0.3)
+    found = control["rejection"]["found"]
+    found["frames"], found["square"], found["product"], found["missed"] = 10.0, 4.0, -0.4, 1.0
+    left.hesitate(control, RUDDER, 2)
+    assert control["target"][RUDDER] == pytest.approx(0.3)
+    assert found["named"].tolist() == [0, 0, 1]
+    assert (found["square"][2], found["product"][2]) == (0.0, 0.0)
+    assert found["square"][0] == 4.0
+
+
+def test_the_schedule_has_the_fastest_loop_of_each_point_and_its_observer():
+    rejection = np.zeros(1, rejection_dtype(4))[0]
+    qdyn = np.linspace(500.0, 1500.0, N_POINTS)
+    G = np.zeros((N_POINTS, 3, 4))
+    G[:, 0, AILERON], G[:, 1, ELEVATOR], G[:, 2, RUDDER], G[:, 1, FLAP] = (
+        -qdyn / 100,
+        -qdyn / 80,
+        -qdyn / 400,
+        qdyn / 500,
+    )
+    approach = np.array([0.3, 0.3, 0.3, 0.05])
+    gyros = [gains.Gyro(), gains.Gyro(1e-3), gains.Gyro(1e-3, 0.01, 0.2)]
+    gains.set_up(
+        rejection, dt_s=DT, substeps=4, approach=approach, speed_rad_s=np.full(4, 0.05), gyros=gyros,
+        margin=(6.0, 45.0), qdyn=qdyn, G=G, carriers=[(0, AILERON), (1, ELEVATOR), (2, RUDDER), (1, FLAP)],
+    )  # fmt: skip
+    whole = 1.0 - (1.0 - approach) ** 4  # four JSBSim frames
+    assert rejection["share"] == 0.25
+    assert rejection["qdyn"] == pytest.approx(qdyn)
+    assert rejection["lead"] == pytest.approx(np.minimum(1.0 / whole, 4.0))
+    assert rejection["found"]["fading"] == pytest.approx(1.0 - np.exp(-DT / 5.0))
+    for row, (axis, surface) in enumerate([(0, AILERON), (1, ELEVATOR), (2, RUDDER), (1, FLAP)]):
+        gyro = gyros[axis]
+        loop = gains.Loop(DT, 0.25, whole[surface], min(1 / whole[surface], 4.0), gyro.delay_s, gyro.keep)
+        for j in range(N_POINTS):
+            s = gains.fastest(loop, (6.0, 45.0), gyro.noise_rad_s, G[j, axis, surface], 0.05)
+            assert rejection["Kp_at"][row, j] == pytest.approx(s)
+            pole = np.exp(-6.5 * s * DT)
+            assert rejection["pull_at"][row, j] == pytest.approx(1.0 - pole**2)
+            assert rejection["learn_at"][row, j] == pytest.approx((1.0 - pole) ** 2 / DT)
+    # without noise a loop is as fast as its margins let it, wherever it flies; with it, faster for a larger G
+    assert np.ptp(rejection["Kp_at"][0]) == 0.0
+    assert (np.diff(rejection["Kp_at"][2]) > 0.0).all()

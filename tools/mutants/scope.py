@@ -22,6 +22,7 @@ SCOPE = (
 # Why the other modules of a folder are not in the scope. A folder without a reason is a mistake.
 LEFT_OUT = {
     "": "compile, find folders, register plug-ins",
+    "documents": "reads files and says what is wrong in them",
     "aircraft": "declares the fields of a file and reads it",
     "scenario": "the other modules declare the fields of a file, read and write it",
     "plant": "flies JSBSim, partly by compiled code through ctypes: plain Python does not reach it",
@@ -29,8 +30,7 @@ LEFT_OUT = {
     "flights": "fits and filters recordings, row by row: minutes in plain Python",
     "results": "the other modules draw, and read and write files",
     "studies": "the other modules fly, draw, write files and start processes",
-    "integrations": "other people's frames around flights",
-    "live": "a page, a server and flights",
+    "integrations": "a page, a server, and other people's frames around flights",
     "cli": "reads arguments and prints",
 }
 # Tests that reach a folder of the package: its own, and those of what stands on it.

@@ -1,0 +1,81 @@
+"""Small defects on purpose: which are made, that a seed draws the same ones, and that each goes on trial."""
+
+from pathlib import Path
+
+import pytest
+from tools.mutants import reach, scope, trial
+from tools.mutants.making import mutants
+
+SOURCE = """
+def weigh(x, most: int = 3):
+    total = 0.5 * x[1] - min(x[0], most)
+    if not total < 2:
+        note(total)
+    return -total
+"""
+
+
+@pytest.fixture
+def module(tmp_path):
+    (tmp_path / "module.py").write_text(SOURCE)
+    return tmp_path / "module.py"
+
+
+def test_every_small_change_is_made_once(module):
+    made = {(m.before, m.after) for m in mutants(module)}
+    assert {
+        ("0.5 * x[1]", "0.5 / x[1]"), ("0.5", "1.0"), ("x[1]", "x[0]"), ("x[0]", "x[1]"), ("1", "2"),
+        ("min(x[0], most)", "max(x[0], most)"), ("total < 2", "total <= 2"), ("total < 2", "total >= 2"),
+        ("not total < 2", "total < 2"), ("note(total)", "pass"), ("-total", "total"), ("3", "4"), ("2", "3"),
+        ("0", "1"), ("0.5 * x[1] - min(x[0], most)", "0.5 * x[1] + min(x[0], most)"),
+    } == made  # fmt: skip
+
+
+def test_a_mutant_is_the_module_with_one_change(module):
+    (sign,) = [m for m in mutants(module) if m.before == "-total"]
+    assert "return total" in sign.source()
+    assert sign.source().replace("return total", "return -total").count("\n") == sign.source().count("\n")
+    assert sign.name(module.parent) == "module.py: return -total: -total -> total"
+
+
+def test_of_lines_that_are_alike_each_has_a_name_of_its_own(module):
+    module.write_text("def f(x):\n    x += 1\n    x += 1\n")
+    names = [m.name(module.parent) for m in mutants(module)]
+    assert len(set(names)) == len(names) == 6
+
+
+def test_a_change_elsewhere_draws_the_same_mutants(module, monkeypatch):
+    monkeypatch.setattr(scope, "PACKAGE", module.parent)
+    before = [m.name(module.parent) for m in scope.drawn(1, ("module.py",))[0]]
+    module.write_text(SOURCE + "\n\ndef further(x):\n    return x\n")
+    assert [m.name(module.parent) for m in scope.drawn(1, ("module.py",))[0]] == before
+    assert [m.name(module.parent) for m in scope.drawn(2, ("module.py",))[0]] != before
+
+
+def test_what_is_left_out_has_a_reason_and_what_is_listed_exists():
+    assert all(": " in line for line in scope.left_out())
+    assert scope.stale() == []
+
+
+def test_a_child_that_never_ends_hangs_and_one_that_fails_kills():
+    def forever():
+        while True:
+            pass
+
+    assert trial.in_a_child(forever, 0.2) == trial.HANGS
+    assert trial.in_a_child(lambda: 0, 5.0) == trial.SURVIVED
+    assert trial.in_a_child(lambda: 1, 5.0) == trial.KILLED
+
+
+def test_tests_of_a_line_are_those_that_execute_it_or_its_module():
+    known = {
+        "seconds": {"a": 0.1, "b": 0.2},
+        "left_out": {"takes too long": 2},
+        "lines": {"m.py": {"3": ["a"], "1": [], "5": ["a", "b"]}},
+    }
+    found = reach.Reach([known])
+    assert found.of("m.py", (3, 2)) == ["a"]
+    assert found.of("m.py", (1, 1)) == ["a", "b"]  # it ran at import
+    assert found.of("m.py", (9, 9)) == []
+    assert found.of(str(Path("other.py")), (3, 3)) == []
+    assert found.left_out["takes too long"] == 2

@@ -31,7 +31,7 @@ jsbsim package; its design model is derived at first use, in some seconds, and k
 
 `beaver-ftc derive AIRCRAFT [--envelope FILE] [--out DIR]` takes `jsbsim:NAME`, any JSBSim model (`FILE.xml`;
 with `--out`), or an aircraft that has a file already (a built-in name, a folder; with `--out`). An envelope
-file has the keys `airspeed_mps`, `alpha_deg` and `altitude_m`.
+file has the keys `airspeed_mps`, `alpha_deg`, `altitude_m` and `sideslip_deg`.
 
 1. The aircraft is copied, and the failures of the built-in one are put in between its actuators and its
    aerodynamics. The file on disk stays as it is. Its own flight control no longer moves the surfaces of the
@@ -49,9 +49,11 @@ file has the keys `airspeed_mps`, `alpha_deg` and `altitude_m`.
 5. The folder gets a page, `derived.md`: terms, the error over the envelope, what can be diagnosed and how
    small, and what is to be known of the aircraft.
 
-`beaver-ftc derive beaver --out DIR` prints the coefficients found beside those of the aircraft's own file.
-`python benchmarks/any_aircraft.py` flies healthy and faulty flights of twelve aircraft and counts false
-alarms, faults named wrongly and true faults left out.
+`beaver-ftc derive beaver --out DIR` prints the coefficients found beside those of the aircraft's own file;
+`python benchmarks/derived_again.py` flies every built-in scenario with both, and says where they are judged
+differently. `python benchmarks/any_aircraft.py` flies healthy and faulty flights of twelve aircraft and
+counts false alarms, faults named wrongly, true faults left out, and faults certain to be detected in 0.5 s
+that were not.
 
 `run`, `sweep`, `matrix --aircraft`, `compare`, `live` and `detectability` fly any of them. `mismatch` splits
 what is left by the terms of the built-in aircraft, and refuses others.

@@ -16,7 +16,8 @@ def command(
         ),
     ],
     envelope: Annotated[
-        Path | None, typer.Option(help="YAML with airspeed_mps, alpha_deg, altitude_m: where to sample.")
+        Path | None,
+        typer.Option(help="YAML with airspeed_mps, alpha_deg, altitude_m, sideslip_deg: where to sample."),
     ] = None,
     out: Annotated[
         Path | None, typer.Option(help="Folder to write the aircraft's folder into, if not the cache.")

@@ -8,6 +8,7 @@ those of the aircraft's flight control; all else is the aircraft's own. The file
 import re
 import shutil
 from collections.abc import Iterable
+from itertools import product
 from pathlib import Path
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
@@ -51,6 +52,17 @@ _LEVER = """
     <fcs_function name="fcs/actuated-throttle-{i}-norm">
       <function> <sum> <property> fcs/actuated-throttle-norm </property> </sum> </function>
       <output> fcs/throttle-cmd-norm[{i}] </output>
+    </fcs_function>"""
+# What FlightGear tells an aircraft of its engines, from which some take lever and governor; {i}: of each.
+_FROM_FLIGHTGEAR = {
+    "/controls/engines/engine[{i}]/throttle": "fcs/actuated-throttle-norm",
+    "/engines/engine[{i}]/mp-inhg": "propulsion/engine[{i}]/map-inhg",
+    "/engines/engine[{i}]/rpm": "propulsion/engine[{i}]/engine-rpm",
+}
+_TOLD = """
+    <fcs_function name="fcs/{name}-{i}">
+      <function> <sum> <property> {of} </property> </sum> </function>
+      <output> {told} </output>
     </fcs_function>"""
 # What else of the aircraft's motion and engines its moments may depend on, dimensionless: name, JSBSim
 # property, what it is. The aerodynamics reckon them themselves, so that they are those of the same instant.
@@ -136,11 +148,22 @@ def source_of(name: str) -> Path:
     return root() / "aircraft" / name / f"{name}.xml"
 
 
-def _common(engines: int) -> str:
-    """Envelope, the unanticipated fault, and one power lever for all engines."""
+def _common(engines: int, read: str) -> str:
+    """Envelope, the unanticipated fault, and one power lever for all engines; read: the aircraft's files."""
     levers = "".join(_LEVER.format(i=i) for i in range(engines))
-    power = f'<channel name="power">{levers}</channel>'
+    power = f'<channel name="power">{levers}{_told(engines, read)}</channel>'
     return _COMMON.replace("ENGINES", power if engines else "")
+
+
+def _told(engines: int, read: str) -> str:
+    """What FlightGear would tell the aircraft, of that which its files read."""
+    told = []
+    for i, (name, of) in product(range(engines), _FROM_FLIGHTGEAR.items()):
+        known_as = {name.format(i=i), name.format(i=i).replace("[0]", "")}
+        if any(each in read for each in known_as):
+            ending = f"told-{name.rpartition('/')[2]}"
+            told.append(_TOLD.format(name=ending, i=i, of=of.format(i=i), told=name.format(i=i)))
+    return "".join(told)
 
 
 def instrument(source: Path, folder: Path, travel_rad: dict[str, tuple[float, float]]) -> Path:
@@ -162,7 +185,8 @@ def instrument(source: Path, folder: Path, travel_rad: dict[str, tuple[float, fl
     surfaces = _put_in(aerodynamics, folder, travel_rad)
     _add_signals(aerodynamics, _engines(whole))
     _add_pitch_fault(aerodynamics, source.stem)
-    (folder / "Systems" / "ftc-common.xml").write_text(_common(_engines(whole)), encoding="utf-8")
+    read = "".join(path.read_text("utf-8", "replace") for path in sorted(source.parent.rglob("*.xml")))
+    (folder / "Systems" / "ftc-common.xml").write_text(_common(_engines(whole), read), encoding="utf-8")
     place = list(whole).index(next(iter(whole.iter("aerodynamics"))))
     for i, system in enumerate((*(f"ftc-{surface}" for surface in surfaces), "ftc-common")):
         whole.insert(place + i, Element("system", file=system))

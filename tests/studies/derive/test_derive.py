@@ -16,13 +16,13 @@ from beaver_ftc.design.model import design_record
 from beaver_ftc.errors import BadInput, SimulationFailed
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.plant import instrumented
-from beaver_ftc.plant.adapter import Plant
+from beaver_ftc.plant.adapter import Plant, bare, translated
 from beaver_ftc.scenario.loader import load_text
 from beaver_ftc.studies.derive.check import not_affine
 from beaver_ftc.studies.derive.error import errors_of
 from beaver_ftc.studies.derive.fit import pursue
 from beaver_ftc.studies.derive.flown import places
-from beaver_ftc.studies.derive.run import derive
+from beaver_ftc.studies.derive.run import SIDESLIP_RAD, derive
 from beaver_ftc.studies.derive.sample import Envelope, sample
 
 TRAINER = Path(__file__).parents[2] / "data" / "aircraft" / "trainer"
@@ -48,7 +48,7 @@ def unseen(derived):
     """A third set of states, and the aircraft."""
     made, _, _ = derived
     aircraft = made.aircraft
-    envelope = Envelope(aircraft.envelope.airspeed_mps, aircraft.alpha_rad)
+    envelope = Envelope(aircraft.envelope.airspeed_mps, aircraft.alpha_rad, SIDESLIP_RAD)
     properties = {name: signal.property for name, signal in aircraft.signals.items()}
     return sample(Plant(100, aircraft=aircraft), envelope, made.trim, 1000, 77, properties, (0,)), aircraft
 
@@ -148,6 +148,31 @@ def test_pursuit_finds_the_terms_that_made_the_data():
     assert dict(zip(taken, values, strict=True)) == pytest.approx({3: 2.0, 9: -0.5, 0: 0.1})
 
 
+def test_the_power_lever_reaches_an_engine_that_asks_flightgear_for_it(tmp_path):
+    """Its systems read FlightGear's lever and manifold pressure: in the copy they are there."""
+    model = instrumented.instrument(instrumented.source_of("p51d"), tmp_path, {})
+    fdm = bare(model)
+    with translated(model):
+        fdm.run_ic()
+        fdm["fcs/actuated-throttle-norm"] = 0.3
+        fdm.run()
+        fdm.run()
+        assert fdm["/controls/engines/engine/throttle"] == pytest.approx(0.3)
+        pressure = fdm["propulsion/engine/map-inhg"]
+        fdm.run()
+        assert fdm["/engines/engine/mp-inhg"] == pytest.approx(pressure) != 0.0
+
+
+def test_an_aircraft_with_a_file_is_derived_over_the_envelope_asked_for(tmp_path):
+    file = tmp_path / "envelope.yaml"
+    file.write_text("airspeed_mps: [40, 50]\nalpha_deg: [0, 12]\naltitude_m: 3000\nsideslip_deg: 4\n")
+    outermost = derive("beaver", tmp_path, file).aircraft.file.model_error_map.boxes[-1]
+    assert outermost.airspeed_mps == pytest.approx((40, 50), abs=0.01)
+    assert np.degrees(outermost.alpha_rad) == pytest.approx((0, 12), abs=0.01)
+    assert np.ptp(np.degrees(outermost.beta_rad)) == pytest.approx(8, abs=0.01)
+    assert outermost.density_kg_m3[0] < 0.909 < outermost.density_kg_m3[1]  # ISA at 3000 m
+
+
 def test_what_cannot_be_derived_is_refused_in_a_line(tmp_path):
     with pytest.raises(BadInput, match=r"jsbsim:nothing: the jsbsim package has no such aircraft"):
         derive("jsbsim:nothing", tmp_path)
@@ -216,7 +241,10 @@ def test_the_tutorials_aircraft_is_its_published_table(tmp_path):
     assert {key: found[key] for key in book} == pytest.approx(book, rel=1e-3)
 
 
-@pytest.mark.parametrize("name", ["elevator-partial-loss", "aileron-stuck", "unanticipated", "fault-free"])
+SAME = ["elevator-partial-loss", "aileron-stuck", "rudder-stuck", "unanticipated", "fault-free"]
+
+
+@pytest.mark.parametrize("name", SAME)
 def test_the_built_in_aircraft_as_derived_has_the_same_verdicts(name, tmp_path_factory):
     """Its table written by hand, and the one found from its model: the same flights are judged the same."""
     folder = tmp_path_factory.getbasetemp() / "same-verdicts"

@@ -7,25 +7,45 @@ from typing import Any
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.aircraft.loading import read
 from beaver_ftc.plant.adapter import Plant
-from beaver_ftc.plant.trim import trim
+from beaver_ftc.plant.trim import TrimPoint, trim
+from beaver_ftc.scenario.initial import initial_of
 from beaver_ftc.studies.derive.level import Level
+from beaver_ftc.studies.derive.outline import EnvelopeFile
+
+SIDESLIP_RAD = (
+    0.45  # what a rudder at its stop leads to: a file's own terms hold wherever the air is attached
+)
 
 
-def about_known(source: Path, folder: Path) -> Level:
-    """The aircraft in trim where its file has flights start; its folder is copied, with the systems its model
-    shares with others."""
+def about_known(source: Path, folder: Path, asked: EnvelopeFile) -> Level:
+    """The aircraft in trim where its flights start, over the envelope of its file or the one asked for; its
+    folder is copied, with the systems its model shares with others."""
     aircraft = read(source)
     shutil.copytree(source, folder)
     data = aircraft.file.model_dump(mode="json", exclude_none=True, exclude={"moments"})
-    start, (low, high) = aircraft.file.start, aircraft.envelope.airspeed_mps
+    data["envelope"] |= asked.model_dump(
+        mode="json", exclude_none=True, exclude={"altitude_m", "sideslip_deg"}
+    )
+    start = usual_start(aircraft)
+    if asked.airspeed_mps is not None:
+        start["airspeed_mps"] = 0.5 * sum(asked.airspeed_mps)
+    if asked.altitude_m is not None:
+        start["altitude_m"] = asked.altitude_m
+    data["start"] = start
     plant = Plant(100, aircraft=aircraft)
-    settings = {name: setting.default for name, setting in aircraft.engine.settings.items()}
-    data["start"] = {
-        "airspeed_mps": start.airspeed_mps or 0.5 * (low + high),
-        "altitude_m": start.altitude_m if start.altitude_m is not None else 1000.0,
-    }
-    point = trim(data["start"]["airspeed_mps"], data["start"]["altitude_m"], plant=plant, **settings)
-    return Level(data, aircraft, plant, point)
+    return Level(data, aircraft, plant, trim_at(plant, **start), asked.sideslip_rad or SIDESLIP_RAD)
+
+
+def usual_start(aircraft: Aircraft) -> dict[str, float]:
+    """Where a scenario of an aircraft starts that says nothing else."""
+    usual = initial_of(aircraft)()
+    return {"airspeed_mps": usual.airspeed_mps, "altitude_m": usual.altitude_m}
+
+
+def trim_at(plant: Plant, airspeed_mps: float, altitude_m: float) -> TrimPoint:
+    """Trim with the engine as the file has it. Raises BadInput as `trim`."""
+    settings = {name: setting.default for name, setting in plant.aircraft.engine.settings.items()}
+    return trim(airspeed_mps, altitude_m, plant=plant, **settings)
 
 
 def named_as(aircraft: Aircraft, moments: dict[str, list[dict[str, Any]]]) -> dict[str, list[dict[str, Any]]]:

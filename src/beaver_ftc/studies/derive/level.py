@@ -26,12 +26,13 @@ LB_PER_SLUG = 32.17405
 
 @dataclass(frozen=True)
 class Level:
-    """An aircraft about to be sampled: its file's data, plant and trim."""
+    """An aircraft about to be sampled: its file's data, plant and trim, and how far its sideslip goes."""
 
     data: dict[str, Any]
     aircraft: Aircraft
     plant: Plant
     trim: TrimPoint
+    sideslip_rad: float
 
 
 def plant_of(data: dict[str, Any], folder: Path) -> Plant:
@@ -81,7 +82,9 @@ def _thrust_lbs(plant: Plant) -> float:
     return sum(plant.read(f"propulsion/engine[{i}]/thrust-lbs") for i in range(plant.n_engines))
 
 
-def level_flight(outlines: list[dict[str, Any]], folder: Path, notes: list[str]) -> Level:
+def level_flight(
+    outlines: list[dict[str, Any]], folder: Path, notes: list[str], sideslip_rad: float
+) -> Level:
     """The first of several outlines, each about another speed, that trims, in flight as level as power makes
     it. Raises BadInput, saying why the first does not, if none does."""
     failed: BeaverFtcError | None = None
@@ -95,7 +98,7 @@ def level_flight(outlines: list[dict[str, Any]], folder: Path, notes: list[str])
             continue
         plant = plant_of(data, folder)
         notes += [*choices, *(_slope(point) if plant.n_engines else [])]
-        return Level(data, plant.aircraft, plant, point)
+        return Level(data, plant.aircraft, plant, point, sideslip_rad)
     raise BadInput(f"{outlines[0]['name']}: {failed}")
 
 

@@ -1,6 +1,7 @@
 """The file of an instrumented aircraft but for its terms: surfaces, mass, dimensions, engines."""
 
 from collections.abc import Mapping
+from math import radians
 from pathlib import Path
 from typing import Any
 
@@ -39,6 +40,12 @@ class EnvelopeFile(Section):
     airspeed_mps: Interval | None = None
     alpha_deg: Interval | None = None
     altitude_m: Number | None = number(None, unit="m", says="altitude", ge=0, le=15000)
+    sideslip_deg: Number | None = number(None, unit="deg", says="sideslip to either side", gt=0, le=45)
+
+    @property
+    def sideslip_rad(self) -> float | None:
+        """How far to either side, if it is said."""
+        return None if self.sideslip_deg is None else radians(self.sideslip_deg)
 
 
 def read_envelope(path: Path | None) -> EnvelopeFile:
@@ -49,7 +56,7 @@ def read_envelope(path: Path | None) -> EnvelopeFile:
         text = read_text(path, 100_000)
     except UnreadableError as error:
         raise ScenarioError(str(path), [Problem(error.line, (), str(error))]) from None
-    keys = "the keys airspeed_mps, alpha_deg, altitude_m"
+    keys = "the keys airspeed_mps, alpha_deg, altitude_m, sideslip_deg"
     return validate(EnvelopeFile, parse_document(text, str(path), keys), str(path))
 
 

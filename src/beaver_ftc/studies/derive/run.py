@@ -4,6 +4,7 @@ import shutil
 import tempfile
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from math import radians
 from pathlib import Path
 from typing import Any
 
@@ -31,7 +32,7 @@ from beaver_ftc.studies.derive.sample import FRESH, Envelope, Samples, sample
 from beaver_ftc.studies.derive.source import Source, source_of, try_out
 
 SAMPLES, CHECKED = 6000, 16000
-SPAN_OF_ALPHA_RAD = 0.10
+SPAN_OF_ALPHA_RAD, SIDESLIP_RAD = 0.10, 0.15
 FEWEST_TERMS = 6
 Tell = Callable[[str], None]
 
@@ -69,7 +70,9 @@ def derive(
         with translated(source.model):
             level = _prepared(source, folder, asked, notes, tell)
             notes += not_affine(level.plant, level.trim)
-            made = _derived(level, asked, folder, tell)
+            if source.folder is None:
+                _set_envelope(level.data, level.trim, asked)
+            made = _derived(level, folder, tell)
         aircraft = Aircraft(AircraftFile.model_validate(level.data), target)
         write(folder, level.data)
         (folder / PAGE).write_text(page_of(aircraft, level.trim, tuple(notes)), encoding="utf-8")
@@ -82,7 +85,7 @@ def _prepared(source: Source, folder: Path, asked: EnvelopeFile, notes: list[str
     """An aircraft in level flight, instrumented if need be."""
     if source.folder is not None:
         tell("trim")
-        return about_known(source.folder, folder)
+        return about_known(source.folder, folder, asked)
     tell("instrument")
     try_out(source)
     travel = travel_of(source.model, folder.parent.parent / "own", notes)
@@ -98,13 +101,15 @@ def _prepared(source: Source, folder: Path, asked: EnvelopeFile, notes: list[str
         if asked.airspeed_mps is not None:
             data["envelope"]["airspeed_mps"] = list(asked.airspeed_mps)
     tell("trim")
-    return level_flight(outlines[: 1 if asked.airspeed_mps else None], folder, notes)
+    tried = outlines[: 1 if asked.airspeed_mps else None]
+    return level_flight(tried, folder, notes, asked.sideslip_rad or SIDESLIP_RAD)
 
 
-def _derived(level: Level, asked: EnvelopeFile, folder: Path, tell: Tell) -> tuple[np.ndarray, np.ndarray]:
+def _derived(level: Level, folder: Path, tell: Tell) -> tuple[np.ndarray, np.ndarray]:
     """Sample, fit and check; the data get their terms and errors. Returns the largest errors, (3,) rad/s2."""
     data, plant, point = level.data, level.plant, level.trim
-    where = _envelope(data, point, asked)
+    low, high = map(radians, data["envelope"]["alpha_deg"])
+    where = Envelope(tuple(data["envelope"]["airspeed_mps"]), (low, high), level.sideslip_rad)
     declared = {name: of["property"] for name, of in data["signals"].items()}
     known = {name: of[0] for name, of in instrumented.SIGNALS.items() if plant.has(of[0])}
     properties = declared or known
@@ -144,15 +149,13 @@ def _placeholders(data: Mapping[str, Any]) -> dict[str, Any]:
     return {"Cl": [{"name": "Cl_placeholder", "value": -0.1, "surface": names[0]}]}
 
 
-def _envelope(data: dict[str, Any], point: TrimPoint, asked: EnvelopeFile) -> Envelope:
-    """Where to sample; the file's envelope becomes the same."""
+def _set_envelope(data: dict[str, Any], point: TrimPoint, asked: EnvelopeFile) -> None:
+    """Let the file's envelope be about trim, or what is asked for, and flights start there."""
     low, high = point.alpha_rad - SPAN_OF_ALPHA_RAD, point.alpha_rad + SPAN_OF_ALPHA_RAD
-    if asked.alpha_deg is not None:
-        low, high = (float(np.radians(end)) for end in asked.alpha_deg)
-    data["envelope"]["alpha_deg"] = [float(f"{np.degrees(end):.4g}") for end in (low, high)]
+    alpha_deg = asked.alpha_deg or tuple(float(np.degrees(end)) for end in (low, high))
+    data["envelope"]["alpha_deg"] = [float(f"{end:.4g}") for end in alpha_deg]
     data["envelope"]["airspeed_mps"] = [float(f"{end:.4g}") for end in data["envelope"]["airspeed_mps"]]
     data["start"] = data.get("start", {}) | {"airspeed_mps": float(f"{point.airspeed_mps:.4g}")}
-    return Envelope(tuple(data["envelope"]["airspeed_mps"]), (low, high))
 
 
 class _Plain(yaml.SafeDumper):

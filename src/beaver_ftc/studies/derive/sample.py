@@ -33,7 +33,7 @@ class Envelope:
 
     airspeed_mps: tuple[float, float]
     alpha_rad: tuple[float, float]
-    beta_rad: float = 0.15
+    beta_rad: float
     rates_rad_s: tuple[float, float, float] = (0.60, 0.35, 0.35)
 
 

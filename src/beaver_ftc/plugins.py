@@ -245,4 +245,13 @@ def derive_at_first_use(reference: str) -> None:
     What derives flies the aircraft, so it lives far above those who name one: it is found by its name.
     """
     derived_if_needed = import_module("beaver_ftc.studies.derive.first_use").derived_if_needed
-    derived_if_needed(reference, lambda line: print(f"beaver-ftc: {line}", file=sys.stderr, flush=True))
+    derived_if_needed(reference, _say)
+
+
+def compare_at_first_use(aircraft: Any) -> None:
+    """Say on standard error where an aircraft of the user's own flies otherwise than its file declares."""
+    import_module("beaver_ftc.studies.derive.own_file").say_once(aircraft, _say)
+
+
+def _say(line: str) -> None:
+    print(f"beaver-ftc: {line}", file=sys.stderr, flush=True)

@@ -16,7 +16,7 @@ from beaver_ftc.documents.problems import ScenarioError
 from beaver_ftc.documents.validation import parse_document, validate
 from beaver_ftc.errors import BadInput, BeaverFtcError, suggestion
 from beaver_ftc.paths import data_root
-from beaver_ftc.plugins import derive_at_first_use
+from beaver_ftc.plugins import compare_at_first_use, derive_at_first_use
 
 DEFAULT = "beaver"
 FILE = "aircraft.yaml"
@@ -55,7 +55,9 @@ def load(reference: str = DEFAULT, beside: Path | None = None) -> Aircraft:
     if reference.startswith(_FROM_JSBSIM):
         return read(_derived(reference.removeprefix(_FROM_JSBSIM)))
     if reference.startswith("./"):
-        return read(_inside(beside, reference))
+        aircraft = read(_inside(beside, reference))
+        compare_at_first_use(aircraft)
+        return aircraft
     if reference not in builtin_names():
         raise UnknownAircraft(
             f"{reference!r} is not known{suggestion(reference, builtin_names())}, jsbsim:NAME, ./FOLDER"

@@ -5,7 +5,7 @@ surface's deflection in rad. Signals: alpha and beta in rad, ph = p b/2V, qh = q
 rh = r b/2V, and those the file declares.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from math import isfinite
 from typing import Annotated, Literal, Self
 
@@ -188,6 +188,12 @@ class ErrorBox(Section):
     error_p_rad_s2: Errors
     error_q_rad_s2: Errors
     error_r_rad_s2: Errors
+
+    def ends(self, signals: Iterable[str]) -> list[Range]:
+        """Ends of the box: rates, angle of attack, sideslip, airspeed, density, then these signals."""
+        rates = self.p_rad_s, self.q_rad_s, self.r_rad_s
+        flow = self.alpha_rad, self.beta_rad, self.airspeed_mps, self.density_kg_m3
+        return [*rates, *flow, *(self.signals[name] for name in signals)]
 
 
 class ErrorMapSection(Section):

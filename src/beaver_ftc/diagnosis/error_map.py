@@ -11,7 +11,7 @@ from functools import lru_cache
 import numpy as np
 
 from beaver_ftc.aircraft import Aircraft
-from beaver_ftc.aircraft.schema import MAX_AGES, MAX_BOXES, MAX_LEVELS, ErrorBox
+from beaver_ftc.aircraft.schema import MAX_AGES, MAX_BOXES, MAX_LEVELS
 from beaver_ftc.compiled import kernel
 from beaver_ftc.design.terms import AIRSPEED, N_Y, QDYN
 
@@ -45,19 +45,12 @@ def fill_error_map(record: np.void, aircraft: Aircraft, whole: bool) -> None:
     record["travel_low"] = [travel.min_rad for travel in aircraft.travel.values()]
     record["travel_high"] = [travel.max_rad for travel in aircraft.travel.values()]
     for k, box in enumerate(given.boxes):
-        ends = np.array(_ends(box, aircraft))
+        ends = np.array(box.ends(aircraft.signals))
         record["low"][k, : len(ends)], record["high"][k, : len(ends)] = ends.T
         errors = box.error_p_rad_s2, box.error_q_rad_s2, box.error_r_rad_s2
         record["error"][: len(given.until_s), k, : len(given.travel_share)] = np.moveaxis(
             np.array(errors), 0, -1
         )
-
-
-def _ends(box: ErrorBox, aircraft: Aircraft) -> list[tuple[float, float]]:
-    """Ends of the box in the order of `place`."""
-    rates = box.p_rad_s, box.q_rad_s, box.r_rad_s
-    flow = box.alpha_rad, box.beta_rad, box.airspeed_mps, box.density_kg_m3
-    return [*rates, *flow, *(box.signals[name] for name in aircraft.signals)]
 
 
 @kernel

@@ -90,16 +90,18 @@ def sample(
     seed: int,
     properties: Mapping[str, str],
     ages: tuple[int, ...] = EVERY_AGE,
+    starts: int = STARTS,
 ) -> Samples:
-    """So many random states; properties: of each signal to be read there; ages: of the flights."""
+    """So many random states; properties: of each signal to be read there; ages: of the flights; starts: how
+    often the engines are started anew."""
     draw, rows = Draw(seed), []
     tanks = Tanks(plant, trim)
-    for k in range(STARTS):
+    for k in range(starts):
         box, age = k % len(REACHES), ages[(k // len(REACHES)) % len(ages)]
         tanks.fill(draw.between(0.0, AGES_S[age]))
         started = _started(draw, plant, trim, envelope, REACHES[box])
         plant.start(started)
-        for i in range(max(1, n // STARTS)):
+        for i in range(max(1, n // starts)):
             level = i % len(SHARES)
             state = _state(draw, plant.aircraft, envelope, trim, started, REACHES[box], SHARES[level])
             rows.append((*_at(plant, state, properties), box, level, age))

@@ -1,0 +1,113 @@
+"""Whether an aircraft's file says what its JSBSim model does: angular accelerations of both, compared.
+
+This is done when a folder is named for the first time. What was found is kept in the user's cache under the
+digest of its files, so that it costs nothing until one of them changes.
+"""
+
+import hashlib
+import json
+from collections.abc import Callable, Iterator
+from functools import lru_cache
+from importlib.metadata import version
+from math import degrees
+from pathlib import Path
+
+import numpy as np
+
+from beaver_ftc.aircraft import AXES, Aircraft
+from beaver_ftc.design.inertia import inertia_coefficients
+from beaver_ftc.errors import BeaverFtcError
+from beaver_ftc.paths import cache_base
+from beaver_ftc.plant.adapter import Plant, translated
+from beaver_ftc.scenario.diagnosis import Bounds
+from beaver_ftc.studies.derive.error import errors_of
+from beaver_ftc.studies.derive.flown import sorted_in
+from beaver_ftc.studies.derive.known import trim_at, usual_start
+from beaver_ftc.studies.derive.sample import FRESH, Envelope, Samples, sample
+
+STATES, STARTS, SEED = 800, 8, 11
+SIDESLIP_RAD = 0.15
+_FORMAT = 1  # of what is kept: files of another are compared anew
+
+
+@lru_cache(maxsize=32)
+def say_once(aircraft: Aircraft, tell: Callable[[str], None]) -> None:
+    """Tell, once a process, where the file and the model of an aircraft differ."""
+    for line in kept_or_compared(aircraft):
+        tell(f"{aircraft.folder.name}/aircraft.yaml: warning: {line}")
+
+
+def kept_or_compared(aircraft: Aircraft) -> list[str]:
+    """A line for each axis on which the model exceeds what the file declares, found now or earlier."""
+    base = cache_base()
+    if base is None:
+        return compared(aircraft)
+    file = base / "compared" / f"{_digest(aircraft.folder)}.json"
+    try:
+        return list(json.loads(file.read_text(encoding="utf-8")))
+    except (OSError, ValueError):
+        lines = compared(aircraft)
+    file.parent.mkdir(exist_ok=True)
+    fresh = file.with_suffix(".new")
+    fresh.write_text(json.dumps(lines), encoding="utf-8")
+    fresh.replace(file)
+    return lines
+
+
+def _digest(folder: Path) -> str:
+    digest = hashlib.sha256(f"{_FORMAT} {version('jsbsim')}".encode())
+    for path in sorted(p for p in folder.rglob("*") if p.suffix in (".xml", ".yaml") and p.is_file()):
+        digest.update(str(path.relative_to(folder)).encode() + path.read_bytes())
+    return digest.hexdigest()[:32]
+
+
+def compared(aircraft: Aircraft) -> list[str]:
+    """A line for each axis on which the model exceeds what the file declares; or why none is compared."""
+    try:
+        with translated(aircraft.jsbsim):
+            samples = _samples(aircraft)
+    except BeaverFtcError as error:
+        return [f"it is not compared with {aircraft.file.jsbsim}: {error}"]
+    return list(_lines(aircraft, samples))
+
+
+def _samples(aircraft: Aircraft) -> Samples:
+    """States over the envelope, in their boxes if the file has a map."""
+    plant = Plant(100, aircraft=aircraft)
+    point = trim_at(plant, **usual_start(aircraft))
+    envelope = Envelope(aircraft.envelope.airspeed_mps, aircraft.alpha_rad, SIDESLIP_RAD)
+    properties = {name: signal.property for name, signal in aircraft.signals.items()}
+    samples = sample(plant, envelope, point, STATES, SEED, properties, FRESH, STARTS)
+    error_map = aircraft.file.model_error_map
+    if error_map is None:
+        return samples
+    ends = [np.array(box.ends(aircraft.signals)).T for box in error_map.boxes]
+    return sorted_in(samples, ends, aircraft, error_map.travel_share)
+
+
+def _declared(aircraft: Aircraft, samples: Samples) -> np.ndarray:
+    """The error the file declares at each state, and what every scenario does beside it, (n, 3) rad/s2."""
+    bounds, (p, q, r), i = Bounds(), np.abs(samples.x.T), inertia_coefficients(aircraft.mass)
+    coupling = np.column_stack([abs(i.Pqr) * q * r, abs(i.Qpr) * p * r, abs(i.Rpq) * p * q])
+    published = [getattr(bounds.constant_rad_s2, axis) for axis in AXES]
+    published += coupling * [getattr(bounds.inertia_coupling, axis) for axis in AXES]
+    error_map = aircraft.file.model_error_map
+    if error_map is None:
+        return published + np.array(aircraft.model_error_rad_s2)
+    fresh = [[getattr(box, f"error_{axis}_rad_s2")[0] for axis in AXES] for box in error_map.boxes]
+    return published + np.array(fresh)[samples.box, :, samples.level]
+
+
+def _lines(aircraft: Aircraft, samples: Samples) -> Iterator[str]:
+    errors, declared = errors_of(aircraft, samples), _declared(aircraft, samples)
+    for axis, name in enumerate(AXES):
+        beyond = errors[:, axis] - declared[:, axis]
+        if len(beyond) and beyond.max() > 0.0:
+            worst = int(beyond.argmax())
+            alpha, beta, V = samples.y[worst, :3]
+            at = f"{V:.3g} m/s, angle of attack {degrees(alpha):.1f}, sideslip {degrees(beta):.1f} deg"
+            yield (
+                f"{name}: the terms are {errors[worst, axis]:.2g} rad/s2 off {aircraft.file.jsbsim} at {at}; "
+                f"{declared[worst, axis]:.2g} is declared, so alarms without a fault are possible; "
+                "`beaver-ftc derive` measures what to declare"
+            )

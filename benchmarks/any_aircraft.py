@@ -106,7 +106,7 @@ def is_certain(faulty: Scenario) -> bool:
     end_s = fault.at_s + DETECT_WITHIN_S
     healthy = faulty.with_({"duration_s": max(end_s + 0.1, SETTLED_S + 1.0)})
     seen = excitation(healthy)
-    needed = detection_magnitude(seen.moment[faulty.airframe.surfaces.index(fault.actuator)], seen.bound)
+    needed = detection_magnitude(seen.moment[fault.actuator], seen.bound)
     since_s = SETTLED_S + seen.dt * np.arange(len(needed)) - fault.at_s
     there = (since_s >= 0.0) & (since_s + seen.dt <= DETECT_WITHIN_S)
     grown = 1.0 - np.exp(-fault.kappa_per_s * since_s[there]) if fault.profile == "incipient" else 1.0

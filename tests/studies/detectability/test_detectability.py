@@ -2,6 +2,8 @@
 
 import csv
 import json
+import shutil
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,6 +14,7 @@ from typer.testing import CliRunner
 from beaver_ftc.cli.main import app
 from beaver_ftc.errors import BadInput
 from beaver_ftc.loop.loop import fly
+from beaver_ftc.scenario.loader import load_text
 from beaver_ftc.studies.detectability import survey as surveying
 from beaver_ftc.studies.detectability.excitation import SETTLED_S, excitation
 from beaver_ftc.studies.detectability.mismatch import (
@@ -21,9 +24,20 @@ from beaver_ftc.studies.detectability.mismatch import (
     mismatch,
 )
 from beaver_ftc.studies.detectability.output import as_csv, draw
-from beaver_ftc.studies.detectability.survey import EXCITATIONS, FAULTS, at, judge, run_survey
+from beaver_ftc.studies.detectability.survey import EXCITATIONS, at, judge, run_survey
 from flying import loss, scenario
 
+FAULTS = ("aileron", "elevator", "rudder")
+TRAINER = Path(__file__).parents[2] / "data" / "aircraft" / "trainer"
+FLIGHT = """
+name: elsewhere
+aircraft: ./NAME
+duration_s: 8
+reference:
+  p: [{sine: {amplitude_deg_s: 20, frequency_hz: 0.25}}]
+  q: [{sine: {amplitude_deg_s: 10, frequency_hz: 0.2}}]
+  r: [{sine: {amplitude_deg_s: 10, frequency_hz: 0.3}}]
+"""
 moments = st.lists(st.floats(-1, 1), min_size=3, max_size=3)
 bounds = st.lists(st.floats(0.01, 0.5), min_size=3, max_size=3)
 
@@ -73,7 +87,7 @@ def flight():
 def test_a_fault_a_little_larger_is_found_in_time_whatever_the_uncertainty(flight, fault):
     """The map follows from the healthy flight; one with the fault must agree where it is sharpest."""
     seen = excitation(flight)
-    least = best_in_window(detection_magnitude(seen.moment[FAULTS[fault]], seen.bound), 50)
+    least = best_in_window(detection_magnitude(seen.moment[fault], seen.bound), 50)
     start = int(np.argmin(least))
     struck_s, magnitude = SETTLED_S + start * seen.dt, 1.1 * least[start]
     flown = fly(
@@ -97,6 +111,23 @@ def test_isolation_is_never_easier_than_detection(flight):
         if row["isolated"] is not None:
             assert row["isolated"] >= row["detected"] - 1e-4
         assert row["confused_with"] != fault
+
+
+def test_a_fault_is_its_surfaces_wherever_the_file_has_it(tmp_path):
+    """Surfaces in another order: the same magnitudes under the same names."""
+    folder = tmp_path / "turned"
+    shutil.copytree(TRAINER, folder)
+    file = folder / "aircraft.yaml"
+    head, tail = file.read_text().split("surfaces:\n")
+    lines = tail.splitlines(keepends=True)
+    file.write_text(head + "surfaces:\n" + "".join([lines[2], lines[0], lines[1], *lines[3:]]))
+    as_is = load_text(FLIGHT.replace("NAME", "trainer"), folder=TRAINER.parent)
+    turned = load_text(FLIGHT.replace("NAME", "turned"), folder=tmp_path)
+    assert turned.airframe.surfaces == ("rudder", "aileron", "elevator")
+    one, other = excitation(as_is), excitation(turned)
+    assert {fault: judge(other, fault)["detected"] for fault in FAULTS} == pytest.approx(
+        {fault: judge(one, fault)["detected"] for fault in FAULTS}, rel=1e-6
+    )
 
 
 def test_what_cannot_be_trimmed_is_said_not_dropped(flight, tmp_path):

@@ -1,5 +1,6 @@
 """What a healthy flight excites: the moment of each surface, frame by frame, against the declared bound."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,11 +16,11 @@ SETTLED_S = 2.0  # the start of a reference is a step of its own
 
 @dataclass(frozen=True)
 class Excitation:
-    """Along a flight of n frames: the moment of each surface (surfaces, n, 3) rad/s2, the bound on the
-    uncertainty (n, 3) rad/s2, and the length of a frame dt s.
+    """Along a flight of n frames: the moment of each surface that leads an axis, (n, 3) rad/s2 by its name,
+    the bound on the uncertainty (n, 3) rad/s2, and the length of a frame dt s.
     """
 
-    moment: np.ndarray
+    moment: Mapping[str, np.ndarray]
     bound: np.ndarray
     dt: float
 
@@ -41,6 +42,6 @@ def excitation(scenario: Scenario) -> Excitation:
     for row, at in zip(y, G, strict=True):
         control_effectiveness(design, row, at)
     first = int(SETTLED_S * scenario.rate_hz)
-    return Excitation(
-        (G * u[:, None, :]).transpose(2, 0, 1)[:, first:], bound[first:], 1.0 / scenario.rate_hz
-    )
+    moment = (G * u[:, None, :])[first:]
+    of = {name: moment[:, :, aircraft.surfaces.index(name)] for name in aircraft.primary}
+    return Excitation(of, bound[first:], 1.0 / scenario.rate_hz)

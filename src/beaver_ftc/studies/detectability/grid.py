@@ -1,11 +1,9 @@
-"""What the survey goes over: faults, how soon they are to be found, speeds, altitudes, excitation."""
+"""What the survey goes over: how soon faults are to be found, speeds, altitudes, excitation."""
 
 from typing import Any
 
 from beaver_ftc.aircraft import Aircraft
-from beaver_ftc.design.model import AILERON, ELEVATOR, RUDDER
 
-FAULTS = {"aileron": AILERON, "elevator": ELEVATOR, "rudder": RUDDER}
 DETECT_WITHIN_S, ISOLATE_WITHIN_S = 0.5, 1.0
 SPEEDS_MPS, ALTITUDES_M = (36.0, 40.0, 44.0, 48.0, 52.0), (0.0, 1000.0, 2000.0, 3000.0)
 SHARES = (0.9, 1.0, 1.1)  # of the speed another aircraft starts with

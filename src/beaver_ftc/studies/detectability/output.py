@@ -8,7 +8,7 @@ from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from beaver_ftc.studies.detectability.grid import DETECT_WITHIN_S, FAULTS, ISOLATE_WITHIN_S, Row
+from beaver_ftc.studies.detectability.grid import DETECT_WITHIN_S, ISOLATE_WITHIN_S, Row
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -46,10 +46,10 @@ def draw(name: str, rows: Sequence[Row]) -> Any:
     """A map a fault and excitation: over speed and altitude, the magnitude certain to be found."""
     from matplotlib.figure import Figure
 
-    scales = sorted({row["excitation"] for row in rows})
+    faults, scales = _faults(rows), sorted({row["excitation"] for row in rows})
     figure = Figure(figsize=(3.4 * len(scales) + 1.2, 9.0), layout="constrained")
-    grid = figure.subplots(len(FAULTS), len(scales), squeeze=False, sharex=True, sharey=True)
-    for line, fault in zip(grid, FAULTS, strict=True):
+    grid = figure.subplots(len(faults), len(scales), squeeze=False, sharex=True, sharey=True)
+    for line, fault in zip(grid, faults, strict=True):
         for axes, scale in zip(line, scales, strict=True):
             image = _map(axes, [row for row in rows if (row["fault"], row["excitation"]) == (fault, scale)])
             axes.set_title(f"{fault}, {scale:g} x reference", fontsize=9)
@@ -64,6 +64,11 @@ def draw(name: str, rows: Sequence[Row]) -> Any:
         fontsize=11,
     )
     return figure
+
+
+def _faults(rows: Sequence[Row]) -> list[str]:
+    """The faults in the order of the rows."""
+    return list(dict.fromkeys(row["fault"] for row in rows))
 
 
 def _map(axes: "Axes", rows: Sequence[Row]) -> Any:
@@ -95,7 +100,7 @@ def text(rows: Sequence[Row]) -> str:
 def _summary(rows: Sequence[Row]) -> list[str]:
     """How many grid points each fault is certain at, and from which magnitudes on."""
     lines = [f"{'fault':<10}{'excit.':>8}{'certain at':>12}{'from':>13}{'half the time at':>18}{'from':>13}"]
-    for fault, scale in product(FAULTS, sorted({row["excitation"] for row in rows})):
+    for fault, scale in product(_faults(rows), sorted({row["excitation"] for row in rows})):
         chosen = [row for row in rows if (row["fault"], row["excitation"]) == (fault, scale)]
         always, half = (_range([row[key] for row in chosen]) for key in ("isolated", "isolated_median"))
         lines.append(f"{fault:<10}{scale:>8g}{always[0]:>12}{always[1]:>13}{half[0]:>18}{half[1]:>13}")

@@ -13,7 +13,6 @@ from beaver_ftc.studies.detectability.excitation import Excitation, excitation
 from beaver_ftc.studies.detectability.grid import (
     DETECT_WITHIN_S,
     EXCITATIONS,
-    FAULTS,
     ISOLATE_WITHIN_S,
     Row,
     altitudes_of,
@@ -77,8 +76,8 @@ def _point(scenario: Scenario, point: tuple[float, float, float]) -> list[Row]:
     try:
         seen = excitation(at(scenario, speed, altitude, scale))
     except BeaverFtcError as error:
-        return [{**place, "fault": fault, **_nothing(str(error))} for fault in FAULTS]
-    return [{**place, "fault": fault, **judge(seen, fault)} for fault in FAULTS]
+        return [{**place, "fault": fault, **_nothing(str(error))} for fault in scenario.airframe.primary]
+    return [{**place, "fault": fault, **judge(seen, fault)} for fault in seen.moment]
 
 
 def at(scenario: Scenario, speed_mps: float, altitude_m: float, excitation: float) -> Scenario:
@@ -112,13 +111,13 @@ def judge(seen: Excitation, fault: str) -> Row:
     detected, isolated: whenever it strikes; `_median`: in half of the instants at which it may strike;
     None: not even a total loss. confused_with: the fault that survives longest; why: in words.
     """
-    z, frames = seen.moment[FAULTS[fault]], [_frames(s, seen.dt) for s in (DETECT_WITHIN_S, ISOLATE_WITHIN_S)]
+    z, frames = seen.moment[fault], [_frames(s, seen.dt) for s in (DETECT_WITHIN_S, ISOLATE_WITHIN_S)]
     if len(z) < frames[1]:
         return _nothing("the flight ends before a fault could be isolated")
     found = best_in_window(detection_magnitude(z, seen.bound), frames[0])
     excluded = {
-        other: best_in_window(exclusion_magnitude(z, seen.moment[FAULTS[other]], seen.bound), frames[1])
-        for other in FAULTS
+        other: best_in_window(exclusion_magnitude(z, of_other, seen.bound), frames[1])
+        for other, of_other in seen.moment.items()
         if other != fault
     }
     isolated = np.maximum(found[: len(z) - frames[1] + 1], np.max(list(excluded.values()), axis=0))
@@ -145,7 +144,7 @@ def _why(
     seen: Excitation, fault: str, rival: str, found: np.ndarray, excluded: np.ndarray, frames: int
 ) -> str:
     """What limits this fault at the worst instant for it to strike."""
-    z, other = seen.moment[FAULTS[fault]], seen.moment[FAULTS[rival]]
+    z, other = seen.moment[fault], seen.moment[rival]
     if found.max() > 1.0:
         share = 1.0 / found.max()
         return f"{fault} hardly used: in {DETECT_WITHIN_S:g} s a total loss is {share:.0%} of twice the bound"

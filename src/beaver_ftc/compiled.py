@@ -218,6 +218,23 @@ CPUContext.get_executable = _executable  # type: ignore[method-assign]
 CPUCodeLibrary.finalize = _finalize  # type: ignore[method-assign]
 
 
+@functools.cache
+def _digest_of(record) -> str:
+    return hashlib.sha256(repr(record).encode()).hexdigest()[:16]
+
+
+def _by_contents(record):
+    """In place of numba's: what a record's type is called in the names of compiled functions.
+
+    Numba counts a process's types. Code that two processes have kept would then have the same names for
+    records of two aircraft, and a third process that loads both would run the one for the other.
+    """
+    return type(record).__name__, (_digest_of(record),)
+
+
+numba.types.Record.mangling_args = property(_by_contents)
+
+
 @contextlib.contextmanager
 def _alone(folder: Path | None) -> Iterator[None]:
     """Wait until no other process compiles into this folder: it may be the very same."""

@@ -199,6 +199,40 @@ def test_several_processes_compile_once(tmp_path):
     assert sorted(one.communicate()[0].strip() for one in several) == ["compiled", *["loaded"] * 3]
 
 
+RECORDS = """
+import sys
+from pathlib import Path
+import numpy as np
+from beaver_ftc.compiled import compile_into
+def inner(record):
+    return record.last
+def outer(records):
+    return compiled_inner(records[0])
+folder = Path(sys.argv[1])
+compiled_inner, compiled = compile_into(folder, inner), compile_into(folder, outer)
+for n in map(int, sys.argv[2:]):
+    records = np.zeros(1, [("first", "f8", (n,)), ("last", "f8")])
+    records["last"] = n
+    print(compiled(records))
+names = [result.fndesc.mangled_name for result in compiled.overloads.values()]
+print(*names, file=sys.stderr)
+"""
+
+
+def test_code_that_two_processes_kept_is_told_apart_by_a_third(tmp_path):
+    """Each has compiled for a record of its own, under a name of its own; the third runs both."""
+
+    (tmp_path / "records.py").write_text(RECORDS)
+    command = [sys.executable, tmp_path / "records.py", tmp_path / "cache"]
+    names = []
+    for sizes in (["2"], ["5"], ["2", "5"]):
+        done = subprocess.run([*command, *sizes], capture_output=True, text=True, check=True)
+        assert [float(n) for n in done.stdout.split()] == [float(n) for n in sizes]
+        names += done.stderr.split()
+    assert len(names) >= 2
+    assert len(set(names)) == 2
+
+
 def test_an_inner_kernel_can_be_called_by_itself_before_and_after(tmp_path):
     @partial(compiled.compile_into, None)
     def inner(x):

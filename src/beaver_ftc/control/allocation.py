@@ -62,3 +62,15 @@ def allocate(control, G, u):
     """Fill u (n,) rad for control.demand; G (3, n) rad/s2 per rad with the believed effectiveness in it."""
     lateral(control, G, u)
     pitch(control, G, u)
+
+
+@kernel
+def relieve(control, G, u):
+    """Give the flap what an elevator at its stop leaves of the pitch demand; u (n,) rad as allocated.
+
+    The observer has by then found what the elevator does not do, jammed or too weak, and asked it for more
+    than it can give: the flap need not wait until that has a name.
+    """
+    e, f = control.main[PITCH], control.stand_in
+    if f >= 0 and control.saturated[e]:
+        u[f] = clip(control, f, divide(control.demand[PITCH] - G[PITCH, e] * u[e], G[PITCH, f]))

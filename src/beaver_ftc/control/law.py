@@ -53,6 +53,8 @@ def command(control, fdi, belief, measured, faults, mode, t):
     if control.law != NOMINAL:
         adaptive.allow_for_offsets(control, belief.G)
     allocation.allocate(control, control.G, control.command)
+    if control.inner == REJECTING and control.law != NOMINAL and fdi.verdict.detected:
+        allocation.relieve(control, control.G, control.command)
     give_up(control, fdi, faults)
     if control.inner != REJECTING:
         nominal.integrate(control, measured.x, control.G, control.command)

@@ -164,7 +164,7 @@ def command(frame):
 def fly_profile(frame, reference):
     """Add the outer loops' body rates to the reference (3,) rad/s, and set the engine."""
     autopilot, value = frame.autopilot, frame.truth.value
-    steer(autopilot, frame.control, frame.measured, frame.t)
+    steer(autopilot, frame.control, frame.belief, frame.measured, frame.t)
     judge(autopilot, value[ch.ALTITUDE], value[ch.AIRSPEED], value[ch.PHI + 2], value[ch.PHI], frame.t)
     for i in range(3):
         reference[i] += autopilot.rates[i]

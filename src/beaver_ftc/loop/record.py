@@ -3,6 +3,7 @@
 import numpy as np
 
 from beaver_ftc.compiled import kernel
+from beaver_ftc.control.outer.state import SPEED
 from beaver_ftc.diagnosis import statistical
 from beaver_ftc.diagnosis.bank import nearest
 from beaver_ftc.plant import channels as ch
@@ -89,9 +90,11 @@ def record_diagnosis(fdi, acceleration, logged, row, column):
 
 @kernel
 def record_profile(autopilot, row, column):
-    """The commanded profile; not a number where a channel is not flown."""
+    """The commanded profile, and the airspeed of it that can be held; not a number where a channel is not
+    flown."""
     for c in range(autopilot.command.size):
         row[column + c] = autopilot.command[c] if autopilot.commanded[c] else np.nan
+    row[column + autopilot.command.size] = autopilot.held if autopilot.commanded[SPEED] else np.nan
 
 
 @kernel

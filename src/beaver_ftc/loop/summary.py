@@ -1,18 +1,18 @@
 """From the frame record at the end of a flight to what the flight yields."""
 
 from collections.abc import Sequence
-from math import isfinite
+from math import degrees, isfinite
 from typing import Any
 
 import numpy as np
 
-from beaver_ftc.control.outer.state import CHANNELS
+from beaver_ftc.control.outer.state import BANK_LIMIT, CHANNELS, FASTEST, LIMITED, SLOWEST, SPEED
 from beaver_ftc.control.supervisor import MAX_EVENTS, MODES
 from beaver_ftc.design.model import AXES
 from beaver_ftc.diagnosis.base import Verdict
 from beaver_ftc.diagnosis.instrument_words import instrument_found
 from beaver_ftc.diagnosis.scheme import isolated_theta
-from beaver_ftc.diagnosis.state import NOT_ISOLATED, UNANTICIPATED
+from beaver_ftc.diagnosis.state import NOT_ISOLATED, PITCH, ROLL, UNANTICIPATED, YAW
 from beaver_ftc.diagnosis.types.findings import estimate_of, found
 from beaver_ftc.loop.flight import Flight
 from beaver_ftc.plant.channels import AIRSPEED, ALTITUDE
@@ -120,7 +120,36 @@ def _profile(frame: np.void) -> dict[str, float | None] | None:
     if not autopilot["enabled"]:
         return None
     flown = zip(CHANNELS, autopilot["commanded"], autopilot["worst"], strict=True)
-    return {name: float(worst) if commanded else None for name, commanded, worst in flown}
+    off = {name: float(worst) if commanded else None for name, commanded, worst in flown}
+    return off | {LIMITED: float(autopilot["held_worst"]) if autopilot["commanded"][SPEED] else None}
+
+
+def _limits(frame: np.void, surfaces: Sequence[str]) -> tuple[tuple[float, str, str, float, str, bool], ...]:
+    """What envelope protection has limited, in the order in which the limits began."""
+    holding, control = frame["autopilot"]["holding"], frame["control"]
+    pitch = f"{surfaces[control['main'][PITCH]]} acts as at {degrees(holding['acting']):.1f} deg"
+    lateral = min(
+        (control["main"][ROLL], control["main"][YAW]), key=lambda s: float(control["effectiveness"][s])
+    )
+    left = f"{100 * control['effectiveness'][lateral]:.0f} % of the {surfaces[lateral]} left"
+    kinds = (
+        (FASTEST, "airspeed_mps", "at most", pitch),
+        (SLOWEST, "airspeed_mps", "at least", pitch),
+        (BANK_LIMIT, "bank_deg", "at most", left),
+    )
+    began = [
+        (
+            float(holding["from_s"][k]),
+            what,
+            side,
+            float(holding["value"][k]),
+            why,
+            bool(holding["in_force"][k]),
+        )
+        for k, what, side, why in kinds
+        if holding["from_s"][k] >= 0.0
+    ]
+    return tuple(sorted(began)) if frame["autopilot"]["enabled"] else ()
 
 
 def _statistical(fdi: np.void) -> dict[str, float | None] | None:
@@ -230,6 +259,7 @@ def flight_of(
         probing_s=_probing_s(frame),
         engine_power=_engine_power(frame),
         profile=_profile(frame),
+        limits=_limits(frame, surfaces),
         changes=replaced,
         surface_travel_rad={s: float(x) for s, x in zip(surfaces, accounts["travelled"], strict=True)},
         surface_energy_rad2_s={s: float(x) for s, x in zip(surfaces, accounts["hurried"], strict=True)},

@@ -104,6 +104,7 @@ _RULES: dict[str, Rule] = {
     "no_departure": _no_departure,
     "altitude_within_m": _profile_within("altitude_m"),
     "airspeed_within_mps": _profile_within("airspeed_mps"),
+    "airspeed_within_limits_mps": _profile_within("airspeed_limited_mps"),
     "heading_within_deg": _profile_within("heading_deg"),
     "stays_in_envelope": _stays_in_envelope,
 }

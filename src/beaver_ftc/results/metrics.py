@@ -69,6 +69,7 @@ def metrics(flight: "Flight") -> Document:
         "authority": _authority(flight),
         "engine_power": _engine_power(flight),
         "profile": _profile(flight),
+        "limits": [_limit(limit) for limit in flight.limits],
         "saturation_s": {surface: _number(time) for surface, time in flight.saturation_s.items()},
     }
     document["hints"] = hints(flight, document)
@@ -225,6 +226,19 @@ def _profile(flight: "Flight") -> Document | None:
     return {
         name: None if worst is None else _number(in_deg.get(name, float)(worst))
         for name, worst in flight.profile.items()
+    }
+
+
+def _limit(limit: tuple[float, str, str, float, str, bool]) -> Document:
+    """One limit of envelope protection: airspeed in m/s, bank in deg; value: at last."""
+    since_s, what, side, value, why, in_force = limit
+    return {
+        "time_s": _number(since_s),
+        "limits": what,
+        "side": side,
+        "value": _number(math.degrees(value) if what == "bank_deg" else value),
+        "because": why,
+        "in_force": in_force,
     }
 
 

@@ -41,6 +41,7 @@ def facts(metrics: Document) -> list[tuple[str, str]]:
         *(("changed", _changed(change)) for change in metrics.get("changes", ())),
         ("engine power", _engine_power(metrics)),
         ("profile", _profile(metrics)),
+        *(("limited", _limit(limit)) for limit in metrics.get("limits", ())),
         ("authority", _authority(metrics)),
         ("envelope", _envelope(metrics)),
         ("departure", _departure(metrics)),
@@ -153,8 +154,18 @@ _CHANNELS = {
 def _profile(metrics: Document) -> str:
     """Largest deviations from the commanded profile; nothing where none was flown."""
     flown = [(name, worst) for name, worst in (metrics.get("profile") or {}).items() if worst is not None]
-    off = ", ".join(_CHANNELS[name].format(_value(worst)) for name, worst in flown)
+    off = ", ".join(_CHANNELS[name].format(_value(worst)) for name, worst in flown if name in _CHANNELS)
     return f"at most off by: {off}" if off else ""
+
+
+_LIMITED = {"airspeed_mps": "airspeed to {} {:.1f} m/s", "bank_deg": "bank to {} {:.0f} deg"}
+
+
+def _limit(limit: Document) -> str:
+    """What envelope protection has limited, since when and why."""
+    what = _LIMITED[limit["limits"]].format(limit["side"], limit["value"])
+    until = "" if limit["in_force"] else ", no longer at the end"
+    return f"{what} from {_time(limit['time_s'])}{until}: {limit['because']}"
 
 
 _SIZES = {

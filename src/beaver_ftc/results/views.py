@@ -13,6 +13,7 @@ AXIS_NAMES = {"p": "roll rate p", "q": "pitch rate q", "r": "yaw rate r"}
 MODES = ("nominal", "adaptive", "reallocated", "unanticipated")
 
 SURFACE_ROLES = tuple(f"surface {i}" for i in range(8))  # looks of the surfaces, in the aircraft's order
+LIMITED = "airspeed_limited_mps"  # the commanded airspeed, as far as it can be held
 RATIO = "_ratio"  # ends the name of a derived column: |residual| / threshold
 
 _DEG_PER_RAD = 57.29577951308232
@@ -97,7 +98,7 @@ def views(columns: Sequence[str], power: bool = False) -> tuple[View, ...]:
     """Every view that a log with these columns allows; power: the law has used the engine."""
     known, moved = set(columns), surfaces(columns)
     named = (
-        _tracking(), _profile(), _surfaces(moved), _detection(), _likelihood(columns),
+        _tracking(), _profile(LIMITED in known), _surfaces(moved), _detection(), _likelihood(columns),
         _isolation(estimators(columns)), _ratio(estimators(columns)), _effectiveness(moved), _supervisor(),
         *((_engine(),) if power else ()), _states(),
     )  # fmt: skip
@@ -132,7 +133,7 @@ def _tracking() -> View:
     return View("tracking", "Tracking: body rates against their reference", panels)
 
 
-def _profile() -> View:
+def _profile(limited: bool) -> View:
     flown = (
         ("altitude", "altitude_command_m", "altitude_m"),
         ("airspeed", "airspeed_command_mps", "airspeed_mps"),
@@ -145,6 +146,11 @@ def _profile() -> View:
             label,
             (
                 *((Trace(command, "commanded", "target"),) if command else ()),
+                *(
+                    (Trace(LIMITED, "of it can be held", "command"),)
+                    if limited and label == "airspeed"
+                    else ()
+                ),
                 Trace(actual, "flown", "actual"),
             ),
         )

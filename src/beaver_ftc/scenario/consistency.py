@@ -21,6 +21,7 @@ OF_A_FAULT = (
 _OF_A_PROFILE = {
     "altitude_within_m": "altitude_m",
     "airspeed_within_mps": "airspeed_mps",
+    "airspeed_within_limits_mps": "airspeed_mps",
     "heading_within_deg": "heading_deg",
 }
 

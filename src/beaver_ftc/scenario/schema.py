@@ -189,6 +189,13 @@ class Expect(Section):
     airspeed_within_mps: Number | None = number(
         None, unit="m/s", says="largest deviation from the commanded airspeed", gt=0, le=100
     )
+    airspeed_within_limits_mps: Number | None = number(
+        None,
+        unit="m/s",
+        says="largest deviation from the commanded airspeed, as limited to what can still be held",
+        gt=0,
+        le=100,
+    )
     heading_within_deg: Number | None = number(
         None,
         unit="deg",

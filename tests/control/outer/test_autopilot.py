@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
+from beaver_ftc.control.laws.gains import margins
+from beaver_ftc.control.outer import setup
 from beaver_ftc.control.outer.autopilot import to_body
 from beaver_ftc.control.outer.profile import advance
 from beaver_ftc.control.outer.state import ALTITUDE, AUTOPILOT, BANK, HEADING, SPEED
@@ -101,6 +103,21 @@ def test_body_rates_of_a_steady_turn():
     cross = rotation(0.0).T @ (rotation(h) - rotation(-h)) / (2.0 * h)
     expected = [cross[2, 1], cross[0, 2], cross[1, 0]]
     np.testing.assert_allclose(autopilot["rates"], expected, atol=1e-8)
+
+
+def test_the_outer_loops_have_margins():
+    """Each broken at its demand, inside out; the inner loop a lag of 4 1/s, the airspeed's smoothing in."""
+    s = 1j * np.geomspace(1e-3, 100.0, 4000)
+    inner = 1.0 / (1.0 + s / 4.0)
+    attitude, bank = (setup.GAINS[name] / s * inner for name in ("attitude", "bank"))
+    path = (setup.GAINS["altitude"] + setup.GAINS["altitude_i"] / s) / s * attitude / (1.0 + attitude)
+    heading = setup.GAINS["heading"] / s * bank / (1.0 + bank)
+    smoothed = s * (1.0 + setup.GAINS["airspeed_s"] * s)
+    speed = (setup.GAINS["speed"] + setup.GAINS["speed_i"] / s) / smoothed
+    for loop, least_deg in ((attitude, 55.0), (bank, 55.0), (path, 55.0), (heading, 55.0), (speed, 42.0)):
+        upper, lower, phase = margins(loop)
+        assert min(upper, lower) > 13.0
+        assert phase > least_deg
 
 
 class TestFlights:
@@ -205,8 +222,6 @@ class TestScenario:
 
 def test_an_aircraft_without_a_term_of_thrust_is_refused():
     from types import SimpleNamespace
-
-    from beaver_ftc.control.outer import setup
 
     scenario = Scenario.model_validate({"name": "x", "autopilot": STRAIGHT})
     bare = SimpleNamespace(

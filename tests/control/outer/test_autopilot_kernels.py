@@ -8,6 +8,7 @@ from beaver_ftc.control.outer import profile
 from beaver_ftc.control.outer.state import ALTITUDE, AUTOPILOT, BANK, HEADING, N_CHANNELS, SPEED
 from beaver_ftc.control.state import control_dtype
 from beaver_ftc.design.model import AIRSPEED, ALPHA, BETA, DPT, QDYN
+from beaver_ftc.diagnosis.belief import belief_dtype
 from beaver_ftc.diagnosis.state import PITCH, ROLL, YAW
 
 DT, G, V, ALPHA_NOW = 0.05, 9.8, 44.0, 0.08
@@ -134,7 +135,7 @@ PUSH = 0.2  # m/s2 per inHg
 
 def test_paths_are_bounded_by_the_engine_and_the_airspeed_there_is():
     pilot = new_autopilot(SPEED)
-    pilot["command"][SPEED] = 43.0
+    pilot["held"] = 43.0
     low, high = loops.paths(pilot, PUSH)
     # idle is 8 inHg below trim, full 8 above; 44 m/s is 1 below 45 and 3 above 41
     assert low == pytest.approx(max(0.01 - 8 * PUSH / G - 0.02 * 1.0, -loops.MOST_PATH_RAD))
@@ -147,7 +148,7 @@ def test_paths_are_bounded_by_the_engine_and_the_airspeed_there_is():
 @pytest.mark.parametrize("commanded", [36.0, 43.0])
 def test_nothing_is_climbed_below_the_slowest_airspeed(commanded):
     pilot = new_autopilot(SPEED, airspeed=33.0)
-    pilot["command"][SPEED] = commanded
+    pilot["held"] = commanded
     slow = max(35.0, commanded - 2.0)
     assert loops.paths(pilot, 0.01)[1] == pytest.approx(0.01 + 0.08 / G - 0.02 * (slow - 33.0), abs=1e-12)
     pilot["airspeed"] = 10.0
@@ -265,7 +266,7 @@ def test_upside_down_the_turn_stays_finite():
 
 def throttled(path=0.03, y=None, power=(), rudder=1.0, **fields):
     pilot, control = new_autopilot(SPEED, **{"usual": 43.0, "throttle": 0.05, **fields}), new_control()
-    pilot["command"][SPEED], pilot["moving"][SPEED] = 45.0, 0.04
+    pilot["held"], pilot["held_moving"], pilot["weathercock"] = 45.0, 0.04, 0.2
     control["effectiveness"][RUDDER] = rudder
     control["power"]["command"][0] = 21.0
     for name, value in dict(power).items():
@@ -302,12 +303,13 @@ def test_small_steps_of_power_are_taken_at_once():
 
 @pytest.mark.parametrize("rudder", [1.0, 0.5, 0.02])
 def test_power_leaves_the_rudder_enough(rudder):
-    """The propeller yaws with dpt^3, the rudder holds what is left of it; 0.1 is reckoned with at least."""
+    """The propeller yaws with dpt^3; the rudder holds what is left of it, sideslip what that lacks."""
     y = new_y(dpt=0.85)
     _, power = throttled(path=0.5, y=y, rudder=rudder)
     dpt = y[DPT] + (power["trim"] - 21.0) * 40.0 / (2.0 * y[QDYN] * y[AIRSPEED])
     yawing = (dpt / 0.9) ** 3
-    assert yawing == pytest.approx(max(rudder, 0.1), rel=1e-9) or power["trim"] in (12.0, 28.0)
+    held = rudder + (1.0 - rudder) * 0.2 / 0.9**3
+    assert yawing == pytest.approx(held, rel=1e-9) or power["trim"] in (12.0, 28.0)
 
 
 def test_while_power_stands_in_for_pitch_it_gets_the_airspeed_to_hold():
@@ -324,7 +326,9 @@ def test_deviations_are_judged_once_settled_and_of_the_airspeed_the_mean():
     pilot = new_autopilot(ALTITUDE, SPEED, HEADING, BANK)
     pilot["command"] = 1000.0, 45.0, 3.1, 0.2
     pilot["changed_at_s"], pilot["mean_off"] = 10.0, -0.5
+    pilot["held"], pilot["held_off"] = 46.0, -0.2
     loops.judge(pilot, 990.0, 47.0, -3.1, -0.1, 39.9)
+    assert pilot["held_worst"] == abs(pilot["held_off"]) == pytest.approx(0.2 - DT / loops.MEAN_S * 1.2)
     mean = -0.5 + DT / loops.MEAN_S * 2.5
     assert pilot["mean_off"] == pytest.approx(mean)
     assert pilot["worst"] == pytest.approx([10.0, abs(mean), 0.0, 0.0])
@@ -349,7 +353,8 @@ def test_a_frame_is_its_loops_one_after_the_other():
     pilot["legs"], pilot["value"][:, 0] = (1, 1, 1, 0), np.nan
     pilot["speed"] = np.inf
     measured = seen(attitude=(0.0, 0.11, 0.5), alpha=0.1, beta=0.02)
-    loops.steer(pilot, control, measured, 0.0)
+    loops.steer(pilot, control, record(belief_dtype(4)), measured, 0.0)
+    assert pilot["held"] == 46.0
     assert pilot["commanded"][:3].all()
     assert pilot["command"][:3] == pytest.approx([1000.0, 46.0, 0.5])
     assert pilot["changed_at_s"] == pytest.approx(np.zeros(N_CHANNELS))

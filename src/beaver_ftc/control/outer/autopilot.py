@@ -16,6 +16,7 @@ import numpy as np
 
 from beaver_ftc.compiled import kernel
 from beaver_ftc.control.authority import attainable
+from beaver_ftc.control.outer.holding import protect
 from beaver_ftc.control.outer.profile import advance, turn
 from beaver_ftc.control.outer.state import ALTITUDE, BANK, HEADING, N_CHANNELS, SPEED
 from beaver_ftc.control.power import ceiling
@@ -27,7 +28,6 @@ MOST_SIDESLIP_RAD = 0.14
 MOST_MISSING = 0.1  # rad of path angle, and times gravity of acceleration
 MOST_DRIFT_RAD_S = 0.1  # of turning that a bank without a turn stands for
 USUAL_S, USUAL_MPS = 20.0, 3.0  # airspeed that power alone can hold: within so much of what it has been
-LEAST_RUDDER = 0.1  # effectiveness reckoned with
 LEAST_PUSH = 1e-3  # m/s2 per inHg
 SETTLED_S = 30.0  # after a change of heading
 MEAN_S = 10.0  # over which the airspeed is judged: what comes and goes faster is a gust, not a deviation
@@ -40,7 +40,7 @@ def clamp(value, most):
 
 
 @kernel
-def steer(autopilot, control, measured, t):
+def steer(autopilot, control, belief, measured, t):
     """One frame, at t s: fill autopilot.rates (3,) rad/s; move the engine where an airspeed is commanded."""
     y, attitude = measured.y, measured.attitude
     if not autopilot.flying:
@@ -48,6 +48,7 @@ def steer(autopilot, control, measured, t):
     advance(autopilot, (measured.altitude, y[AIRSPEED], attitude[YAW], attitude[ROLL]), t)
     follow(autopilot, control, y)
     limit(autopilot, control)
+    protect(autopilot, control, belief, y, t)
     push = thrust_per_inhg(autopilot, control, y)
     path = path_of(autopilot, measured, push)
     to_body(autopilot, y, attitude, rolling(autopilot, attitude), pitching(autopilot, y, attitude, path))
@@ -119,8 +120,8 @@ def paths(autopilot, push):
     slow = autopilot.slowest_mps
     fast, idle, full = np.inf, autopilot.trim_inhg, autopilot.trim_inhg
     if autopilot.commanded[SPEED]:
-        slow = max(slow, autopilot.command[SPEED] - autopilot.gain.spare_mps)
-        fast = autopilot.command[SPEED] + autopilot.gain.spare_mps
+        slow = max(slow, autopilot.held - autopilot.gain.spare_mps)
+        fast = autopilot.held + autopilot.gain.spare_mps
         idle, full = autopilot.low_inhg, autopilot.high_inhg
     at_idle = autopilot.climb_in_trim + push * (idle - autopilot.trim_inhg) / autopilot.gravity
     at_full = autopilot.climb_in_trim + push * (full - autopilot.trim_inhg) / autopilot.gravity
@@ -188,18 +189,19 @@ def throttle(autopilot, control, y, path, push):
     the path takes: it has an airspeed loop of its own."""
     power = control.power
     power.in_use = 1
-    error = autopilot.command[SPEED] - autopilot.airspeed
+    error = autopilot.held - autopilot.airspeed
     autopilot.usual += autopilot.dt / USUAL_S * (autopilot.airspeed - autopilot.usual)
-    along = autopilot.moving[SPEED] + autopilot.throttle
+    along = autopilot.held_moving + autopilot.throttle
     if power.engaged:
-        power.usual_speed = autopilot.usual + clamp(autopilot.command[SPEED] - autopilot.usual, USUAL_MPS)
+        power.usual_speed = autopilot.usual + clamp(autopilot.held - autopilot.usual, USUAL_MPS)
         error = power.usual_speed - autopilot.airspeed
     else:
         along += autopilot.gain.speed * error
     climbing = autopilot.gravity * (path - autopilot.climb_in_trim)
     wanted = autopilot.trim_inhg + (along + climbing) / push
-    rudder = max(control.effectiveness[control.main[YAW]], LEAST_RUDDER)
-    highest_dpt = power.highest_dpt * rudder ** (1.0 / 3.0)  # the propeller yaws with dpt^3
+    rudder = max(control.effectiveness[control.main[YAW]], 0.0)
+    sideslip = (1.0 - rudder) * autopilot.weathercock  # what the rudder lacks, sideslip makes up for
+    highest_dpt = (rudder * power.highest_dpt**3 + sideslip) ** (1.0 / 3.0)  # the propeller yaws with dpt^3
     high = min(autopilot.high_inhg, ceiling(power, y, highest_dpt))
     limited = max(min(wanted, high), autopilot.low_inhg)
     if limited == wanted:
@@ -222,4 +224,7 @@ def judge(autopilot, altitude_m, airspeed_mps, heading, bank, t):
             if c == SPEED:
                 autopilot.mean_off += autopilot.dt / MEAN_S * (away - autopilot.mean_off)
                 away = autopilot.mean_off
+                from_held = where[c] - autopilot.held
+                autopilot.held_off += autopilot.dt / MEAN_S * (from_held - autopilot.held_off)
+                autopilot.held_worst = max(autopilot.held_worst, abs(autopilot.held_off))
             autopilot.worst[c] = max(autopilot.worst[c], abs(turn(away) if c == HEADING else away))

@@ -4,11 +4,13 @@ from math import inf, nan, radians
 
 import numpy as np
 
-from beaver_ftc.control.outer.state import CHANNELS
+from beaver_ftc.control.outer.level import GRAVITY_MPS2, THRUST, elevator_needed
+from beaver_ftc.control.outer.state import CHANNELS, N_FLAP, N_QDYN
+from beaver_ftc.design.engine import SEA_LEVEL_DENSITY_KG_M3
+from beaver_ftc.diagnosis.state import PITCH
 from beaver_ftc.errors import BadInput
 from beaver_ftc.scenario.schema import Scenario
 
-GRAVITY_MPS2 = 9.80665
 MOST_DEG_S = (12.0, 6.0, 10.0)  # asked of a healthy aircraft: a transport's manoeuvres
 MOST_BANK_DEG = 30.0
 STEEPEST_ALPHA_DEG = 15.0  # the model is valid to 16
@@ -26,6 +28,10 @@ GAINS = {
     "loose": 0.4,  # share of the heading loop left when nothing acts in yaw: the turn is then slow to follow
     "protection": 2.0,  # 1/s: how fast the angle of attack may close on its limit
 }  # fmt: skip
+# Of 0, 0.7, 1.5 and 3 deg kept of the flap at the end of the airspeeds that can be held, the one with which
+# most jams were kept; and how fast a limit moves the command: about as fast as drag slows the aircraft down.
+MOST_SIDESLIP_RAD = 0.2  # of power with a rudder that is lost; 0.6 is a departure
+FLAP_RESERVE_DEG, PACE_MPS2 = 0.7, 1.0
 LEAST_DIHEDRAL = 0.01  # of an aircraft that hardly rolls by sideslip: it is then not flown by it
 _UNIT = {"altitude_m": 1.0, "airspeed_mps": 1.0, "heading_deg": radians(1.0), "bank_deg": radians(1.0)}
 
@@ -48,6 +54,7 @@ def set_up_autopilot(autopilot: np.void, control: np.void, scenario: Scenario) -
         autopilot[ours] = control["power"][theirs]
     autopilot["step_inhg"] = control["power"]["step"]
     control["steered"] = 1
+    _know_what_holds(autopilot["holding"], control, scenario)
 
 
 def set_up_profile(autopilot: np.void, scenario: Scenario) -> None:
@@ -67,7 +74,34 @@ def _know(autopilot: np.void, scenario: Scenario) -> None:
     autopilot["thrust"] = per_mass * np.array([terms.get("CX_dpt", 0.0), terms.get("CX_adpt2", 0.0)])
     by_sideslip = terms.get("Cl_beta", 0.0) / terms.get("Cl_p", -1.0)
     autopilot["dihedral"] = max(by_sideslip, LEAST_DIHEDRAL) * 2.0 / aircraft.geometry.span_m
+    if terms.get("Cn_dpt3"):
+        beta = MOST_SIDESLIP_RAD
+        held = terms.get("Cn_beta", 0.0) * beta + terms.get("Cn_beta3", 0.0) * beta**3
+        autopilot["weathercock"] = max(held / abs(terms["Cn_dpt3"]), 0.0)
     autopilot["slowest_mps"] = aircraft.envelope.airspeed_mps[0] + SPARE_MPS
+
+
+def _know_what_holds(holding: np.void, control: np.void, scenario: Scenario) -> None:
+    """The table of level flight, where the aircraft's file has forces and a flap for the elevator."""
+    aircraft, flap = scenario.airframe, int(control["stand_in"])
+    holding["from_s"], holding["bank"] = -1.0, radians(MOST_BANK_DEG)
+    holding["fastest"] = inf
+    if flap < 0 or not aircraft.forces or THRUST not in aircraft.signals:
+        return
+    speeds_mps = np.linspace(*aircraft.envelope.airspeed_mps, N_QDYN)
+    holding["qdyn"] = 0.5 * SEA_LEVEL_DENSITY_KG_M3 * speeds_mps**2
+    holding["flap"] = np.linspace(control["low"][flap], control["high"][flap], N_FLAP)
+    needed = elevator_needed(
+        aircraft,
+        (aircraft.surfaces[control["main"][PITCH]], aircraft.surfaces[flap]),
+        aircraft.mass.mass_kg * scenario.design_model.mass,
+        tuple(scenario.design_model.coefficients.items()),
+        tuple(holding["qdyn"]),
+        tuple(holding["flap"]),
+    )
+    holding["known"], holding["elevator"] = bool(np.isfinite(needed).all()), needed
+    holding["pace"] = PACE_MPS2
+    holding["reserve"] = radians(FLAP_RESERVE_DEG)
 
 
 def _fill(autopilot: np.void, c: int, legs: tuple, unit: float) -> None:

@@ -117,6 +117,7 @@ _FLOWN: tuple[Column, ...] = (
     *_under("float", "tracking.pre_fault_rms_deg_s", *AXES),
     *_under("float", "tracking.post_fault_rms_deg_s", *AXES),
 )
+_PROFILE = ("altitude_m", "airspeed_mps", "airspeed_limited_mps", "heading_deg", "bank_deg")
 _ENDED: tuple[Column, ...] = (
     ("supervisor.mode", "text", lambda document, flight: document["supervisor"][-1]["mode"]),
     *((f"supervisor.{mode}_at_s", "float", _first_entry(mode)) for mode in MODES),
@@ -125,6 +126,7 @@ _ENDED: tuple[Column, ...] = (
     *_under("float", "departure", "time_s"),
     *_under("text", "departure", "signal"),
     *(column for a in AXES for column in _under("float", f"authority.{a}", "given_share", "beyond_s")),
+    *_under("float", "profile", *_PROFILE),
     *_under("float", "engine_power", "from_s", "in_charge_s", "lowest_inhg", "highest_inhg"),
 )
 _JUDGED: tuple[Column, ...] = (

@@ -1,0 +1,155 @@
+"""Envelope protection: level flight against the truth's trim, limits by brute force, jams that are kept."""
+
+import numpy as np
+import pytest
+
+import beaver_ftc as bf
+from beaver_ftc.aircraft import load
+from beaver_ftc.control import allocation
+from beaver_ftc.control.outer import holding
+from beaver_ftc.control.outer.level import elevator_needed
+from beaver_ftc.control.outer.state import AUTOPILOT, FASTEST, SPEED
+from beaver_ftc.control.state import control_dtype
+from beaver_ftc.loop.loop import fly
+from beaver_ftc.results.metrics import metrics
+from beaver_ftc.results.verdict import facts
+from beaver_ftc.scenario.schema import Scenario
+from flying import Memory
+
+MASS_KG, DENSITY = 2288.231, 1.0238  # the latter at 1828.8 m
+STRAIGHT = {"altitude_m": [{"hold": True}], "airspeed_mps": [{"hold": True}], "heading_deg": [{"hold": True}]}
+
+
+def jammed(position_deg, duration_s=100.0, **keys):
+    fault = {"actuator": "elevator", "type": "stuck", "position_deg": position_deg, "at_s": 20.0}
+    given = {"name": "jam", "duration_s": duration_s, "autopilot": STRAIGHT, "faults": [fault],
+             "actuators": "servo", "fdi": {"fault_class": "all"}, **keys}  # fmt: skip
+    memory = Memory()
+    return fly(Scenario.model_validate(given), memory), memory
+
+
+@pytest.mark.parametrize(
+    ("V", "flap_deg", "inhg"), [(36, -5.7, 20.4), (45, -5.7, 20.2), (45, 0, 20.8), (42, 20, 22)]
+)
+def test_level_flight_takes_the_elevator_that_the_truth_is_trimmed_with(V, flap_deg, inhg):
+    """The truth besides has sideslip, a round Earth, and a path that is level to within a degree."""
+    trim = bf.trim(airspeed_mps=V, flap_deg=flap_deg, manifold_pressure_inhg=inhg)
+    assert abs(np.degrees(trim.gamma_rad)) < 1.0
+    qdyn = (0.5 * DENSITY * V**2,)
+    needed = elevator_needed(load(), ("elevator", "flap"), MASS_KG, (), qdyn, (np.radians(flap_deg),))
+    assert np.degrees(needed[0, 0]) == pytest.approx(np.degrees(trim.surfaces_rad["elevator"]), abs=0.1)
+
+
+def table(elevator=lambda V, flap: np.radians(-20.0 + 0.4 * V) + 0.3 * flap):
+    """An autopilot's record with the table of a made-up aircraft, at 1 kg/m3."""
+    autopilot = np.zeros(1, AUTOPILOT)
+    hold = autopilot["holding"]
+    speeds = np.linspace(30.0, 55.0, hold["qdyn"].size)
+    hold["qdyn"], hold["flap"] = 0.5 * speeds**2, np.linspace(-0.1, 1.0, hold["flap"].size)
+    hold["elevator"] = [[elevator(V, f) for f in hold["flap"][0]] for V in speeds]
+    return autopilot
+
+
+@pytest.mark.parametrize("elevator_deg", np.linspace(-12.0, 8.0, 9))
+@pytest.mark.parametrize("flap", [-0.1, 0.12, 0.95])
+def test_the_limits_are_where_the_elevator_there_is_just_suffices(elevator_deg, flap):
+    hold = table().view(np.recarray)[0].holding
+    speeds = np.linspace(30.0, 55.0, 2001)
+    can = np.radians(-20.0 + 0.4 * speeds) + 0.3 * flap <= np.radians(elevator_deg)  # at this end or beyond
+    fastest = np.sqrt(2.0 * holding.limit_of(hold, flap, np.radians(elevator_deg), True))
+    slowest = np.sqrt(2.0 * holding.limit_of(hold, flap, np.radians(elevator_deg), False))
+    if can.all():
+        assert fastest == np.inf
+    else:
+        assert fastest == pytest.approx(speeds[can].max() if can.any() else 30.0, abs=0.1)
+    if not can.any():
+        assert slowest == 0.0
+    else:
+        assert slowest == pytest.approx(speeds[~can].min() if not can.all() else 55.0, abs=0.1)
+
+
+def test_a_limit_moves_the_command_at_its_pace_and_lets_it_go_again():
+    autopilot = table()
+    record = autopilot.view(np.recarray)[0]
+    record.dt, record.holding.pace, record.command[SPEED] = 0.1, 1.0, 45.0
+    record.holding.fastest = np.inf
+    holding.approach(record)
+    assert record.held == 45.0
+    record.holding.fastest = 40.0
+    flown = [record.held]
+    for _ in range(80):
+        holding.approach(record)
+        flown.append(record.held)
+    np.testing.assert_allclose(np.diff(flown)[:50], -0.1)
+    assert flown[-1] == 40.0
+    record.holding.fastest = np.inf
+    for _ in range(60):
+        holding.approach(record)
+    assert (record.held, record.holding.limiting) == (45.0, 0)
+
+
+def test_the_flap_takes_what_an_elevator_at_its_stop_leaves():
+    control = np.zeros(1, control_dtype(4)).view(np.recarray)[0]
+    control.main, control.stand_in = [0, 1, 2], 3
+    control.low, control.high = [-0.5, -0.4, -0.4, -0.1], [0.5, 0.4, 0.4, 1.0]
+    control.demand[1] = 5.0
+    G = np.zeros((3, 4))
+    G[1, 1], G[1, 3] = -10.0, 2.5
+    u = np.array([0.0, -0.4, 0.0, 0.0])
+    control.saturated[:] = [0, 1, 0, 0]
+    allocation.relieve(control, G, u)
+    assert u[3] == pytest.approx(0.4)
+    assert (G @ u)[1] == pytest.approx(5.0)
+    control.saturated[1], u[3] = 0, 0.2
+    allocation.relieve(control, G, u)
+    assert u[3] == 0.2
+
+
+class TestFlights:
+    @pytest.mark.parametrize("position_deg", [-6.0, -7.4])
+    def test_a_jam_nose_up_is_flown_at_a_speed_that_can_be_held(self, position_deg):
+        flight, log = jammed(position_deg)
+        limits = metrics(flight)["limits"]
+        assert [(limit["limits"], limit["side"], limit["in_force"]) for limit in limits] == [
+            ("airspeed_mps", "at most", True)
+        ]
+        assert limits[0]["because"] == f"elevator acts as at {position_deg:.1f} deg"
+        trims = {-6.0: 42.2, -7.4: 39.7}  # with the flap up, by `beaver-ftc trim`
+        assert trims[position_deg] - 1.5 < limits[0]["value"] < trims[position_deg]
+        late = log["t_s"] > 70.0
+        assert np.abs(log["airspeed_mps"][late] - log["airspeed_limited_mps"][late]).max() < 2.0
+        assert np.abs(log["altitude_m"][late] - log["altitude_command_m"][late]).max() < 5.0
+        assert np.abs(np.diff(log["airspeed_limited_mps"])).max() < 0.0101  # no bump: 1 m/s2 at 100 Hz
+        said = dict(facts(metrics(flight)))["limited"]
+        assert said.startswith(f"airspeed to at most {limits[0]['value']:.1f} m/s from 2")
+
+    def test_a_jam_that_can_be_held_limits_nothing(self):
+        flight, log = jammed(0.6, 60.0)
+        assert metrics(flight)["limits"] == []
+        np.testing.assert_array_equal(log["airspeed_limited_mps"], log["airspeed_command_mps"])
+
+    def test_a_repaired_elevator_gives_the_commanded_airspeed_back(self):
+        sim = bf.Simulation({"name": "back", "duration_s": 120, "autopilot": STRAIGHT, "actuators": "servo",
+                             "fdi": {"fault_class": "all"}, "control": {"law": "oracle"}})  # fmt: skip
+        autopilot = sim._loop.frames["autopilot"][0]
+        for t_s, fault in ((10.0, True), (50.0, False), (110.0, None)):
+            while sim.t_s < t_s:
+                sim.step()
+            if fault:
+                sim.inject({"type": "stuck", "actuator": "elevator", "position_deg": -7.0})
+            elif fault is False:
+                assert autopilot["holding"]["in_force"][FASTEST]
+                assert autopilot["held"] == pytest.approx(40.0, abs=1.0)
+                sim.repair("elevator")
+        assert autopilot["held"] == autopilot["command"][SPEED]
+        assert not autopilot["holding"]["in_force"][FASTEST]
+
+    def test_a_lost_aileron_limits_the_bank_and_says_so(self):
+        fault = {"actuator": "aileron", "type": "loss_of_effectiveness", "magnitude": 1.0, "at_s": 10.0}
+        roll = [{"sine": {"amplitude_deg_s": 2, "frequency_hz": 0.3}}]
+        given = {"name": "bank", "duration_s": 30, "autopilot": STRAIGHT, "actuators": "servo",
+                 "faults": [fault], "reference": {"p": roll}}  # fmt: skip
+        (limit,) = metrics(fly(Scenario.model_validate(given)))["limits"]
+        assert (limit["limits"], limit["side"]) == ("bank_deg", "at most")
+        assert limit["value"] == pytest.approx(15.0, abs=0.5)
+        assert limit["because"].endswith("% of the aileron left")

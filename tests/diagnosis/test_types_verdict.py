@@ -410,7 +410,6 @@ def test_a_quiet_surface_given_up_does_not_swing():
     assert quiet(low=0.0, high=0.14)[1]["quiet"] == 0
     assert not quiet(frames=PATIENCE)[1]["type_excluded"][OSCILLATORY]
     assert quiet(frames=PATIENCE + 1)[1]["type_excluded"][OSCILLATORY]
-    assert not quiet(frames=PATIENCE + 1, returns=1)[1]["type_excluded"][OSCILLATORY]
     assert not quiet(frames=PATIENCE + 1, own_errors=1)[1]["type_excluded"][OSCILLATORY]
     fdi, surface = quiet()
     fdi["surface"]["in_question"] = 1, 1, 0, 1
@@ -418,12 +417,13 @@ def test_a_quiet_surface_given_up_does_not_swing():
     assert fdi["surface"]["evidence"].tolist() == [1, 1, 2, 1]  # of another one it says nothing then
 
 
-def test_a_surface_given_up_is_quiet_where_nothing_is_wrong():
+@pytest.mark.parametrize("abrupt", [0, 1])
+def test_a_surface_given_up_is_quiet_where_nothing_is_wrong_and_a_fault_stays(abrupt):
     fdi = new_case()
-    fdi["surface"]["measure"], fdi["surface"]["set_high"] = -1, 1.0
+    fdi["surface"]["measure"], fdi["surface"]["set_high"], fdi["abrupt"] = -1, 1.0, abrupt
     fdi["surface"][RUDDER]["measure"] = FIXED
     examine.judge_all(fdi)
-    assert fdi["surface"]["quiet"].tolist() == [0, 0, 1, 0]
+    assert fdi["surface"]["quiet"].tolist() == [0, 0, abrupt, 0]
 
 
 def test_a_block_is_the_mean_of_its_frames_with_the_noise_of_its_ends():

@@ -1,0 +1,57 @@
+"""The compiled rivals against their classes, frame by frame on random rates: no aircraft, no flight."""
+
+import numpy as np
+import pytest
+
+from beaver_ftc.control.base import Reference
+from beaver_ftc.control.rivals import compiled
+from beaver_ftc.control.rivals.indi import IncrementalInversion
+from beaver_ftc.control.rivals.lqr import FixedGainLqr
+from beaver_ftc.control.state import control_dtype
+from beaver_ftc.design.context import Context
+from beaver_ftc.diagnosis.base import Measured, Verdict
+
+DT = 0.02
+A = np.array([[-4.0, 0.3, 1.0], [0.2, -3.0, 0.1], [-0.2, 0.4, -0.8]])
+G = np.array([[-9.0, 0.7, 0.5, 0.1], [0.4, -12.0, 0.2, 3.0], [-0.4, 0.3, -4.0, 0.2]])
+TRIM_X, TRIM = np.array([0.01, -0.02, 0.03]), np.array([0.02, -0.05, 0.01, 0.1])
+
+
+class Linear:
+    """A design model that couples all axes: xdot = A x + G u."""
+
+    def f(self, x, y):
+        return A @ x
+
+    def G(self, y):
+        return G
+
+
+def context(most):
+    travel = np.array([[-most] * 4, [0.8 * most] * 4])
+    return Context(
+        DT, 1, Linear(), TRIM_X, np.zeros(5), TRIM, travel, np.zeros(3), np.zeros(3), leading=(0, 1, 2)
+    )
+
+
+@pytest.mark.parametrize("rival", [FixedGainLqr, IncrementalInversion])
+@pytest.mark.parametrize("most", [9.0, 0.12])
+def test_both_command_the_same_within_the_travel_and_at_the_stops(rival, most):
+    rng, law = np.random.default_rng(5), rival()
+    law.reset(context(most))
+    control = np.zeros(1, control_dtype(4)).view(np.recarray)[0]
+    control["main"], control["dt"], control["trim"] = (0, 1, 2), DT, TRIM
+    control["low"], control["high"] = -most, 0.8 * most
+    control["inner"] = law.compile_into(control["rival"])
+    stops = 0
+    for k in range(40):
+        x, rate, acceleration = 0.02 * rng.normal(size=(3, 3))
+        seen = Measured(k * DT, x, np.zeros(5), np.zeros(3), np.zeros((3, 4)), np.zeros(3))
+        wanted = law.step(seen, Reference(rate, rate, acceleration), Verdict())
+        control["model_rate"], control["model_acceleration"] = rate, acceleration
+        compiled.command(control, G, x)
+        assert control["command"] == pytest.approx(wanted, abs=1e-9)
+        at_stop = np.isclose(wanted, -most) | np.isclose(wanted, 0.8 * most)
+        assert control["saturated"].tolist() == at_stop.tolist()
+        stops += at_stop.sum()
+    assert (stops > 5) == (most < 1.0)

@@ -1,15 +1,13 @@
-"""How this package compiles its per-frame maths: once per machine, with floating-point rules a flight can
-rely on.
+"""How this package compiles its per-frame maths: once per machine, by fixed floating-point rules.
 
 Division by zero gives inf or nan, as in NumPy and JSBSim: the loop looks for non-finite values once a frame
 instead of every operation doing so. No fast-math: the same flight gives the same bits.
 
-Compiled code is kept in the user's cache, in a folder named after the sources. A change in
-any of them makes a new folder. It also works where the package is read-only.
+Compiled code is kept in the user's cache, in a folder named after the sources: a change makes a new one. It
+also works where the package is read-only.
 
 A kernel that another one calls is only translated: to optimise is done once, for the outermost one and all
-it calls. Numba itself does it again at each level.
-"""
+it calls. Numba itself does it again at each level."""
 
 # mypy: disable-error-code="attr-defined"
 import contextlib
@@ -62,8 +60,7 @@ def _fingerprint() -> str:
 
 @lru_cache(maxsize=1)
 def cache_folder() -> Path | None:
-    """Where compiled kernels are kept; None where nothing can be written, and each process then compiles
-    its own."""
+    """Where compiled kernels are kept; None where nothing can be written: each process compiles its own."""
     base = cache_base()
     return base and folder_of_version(base, _fingerprint())
 
@@ -200,8 +197,7 @@ def _linkable(library):
 def _executable(context, library, function, environment):
     """In place of numba's: what Python calls, or what stands for it."""
     library._ensure_finalized()
-    inner = len(_nesting) > 1
-    return _Inner() if inner else _numbas_executable(context, library, function, environment)
+    return _Inner() if len(_nesting) > 1 else _numbas_executable(context, library, function, environment)
 
 
 def _add_overload(dispatcher, result) -> None:
@@ -212,27 +208,17 @@ def _add_overload(dispatcher, result) -> None:
         _numbas_add_overload(dispatcher, result)
 
 
+@functools.cache
+def _by_contents(record):
+    """In place of numba's number of a process: code of two aircraft, kept by two processes, had one name."""
+    return type(record).__name__, (hashlib.sha256(repr(record).encode()).hexdigest()[:16],)
+
+
 _numbas_executable, _numbas_add_overload = CPUContext.get_executable, Dispatcher.add_overload
 Dispatcher.add_overload = _add_overload  # type: ignore
 CPUContext.get_executable = _executable  # type: ignore[method-assign]
 CPUCodeLibrary.finalize = _finalize  # type: ignore[method-assign]
-
-
-@functools.cache
-def _digest_of(record) -> str:
-    return hashlib.sha256(repr(record).encode()).hexdigest()[:16]
-
-
-def _by_contents(record):
-    """In place of numba's: what a record's type is called in the names of compiled functions.
-
-    Numba counts a process's types. Code that two processes have kept would then have the same names for
-    records of two aircraft, and a third process that loads both would run the one for the other.
-    """
-    return type(record).__name__, (_digest_of(record),)
-
-
-numba.types.Record.mangling_args = property(_by_contents)
+numba.types.Record.mangling_args = property(_by_contents)  # type: ignore
 
 
 @contextlib.contextmanager
@@ -250,8 +236,7 @@ def _alone(folder: Path | None) -> Iterator[None]:
 
 @contextlib.contextmanager
 def _announced() -> Iterator[None]:
-    """Say what takes so long, if it does. Garbage is looked for afterwards: a compiler leaves little, and
-    looking costs a quarter of its time."""
+    """Say what takes so long, if it does. Garbage is looked for afterwards: looking costs a quarter of it."""
     saying = threading.Timer(PATIENCE_S, _say_once, [COMPILING])
     saying.start()
     gc.disable()

@@ -133,7 +133,8 @@ def test_nor_does_it_when_the_force_jumps_between_coarse_frames():
     assert np.abs(np.diff(flown.seen[:, 1:], axis=0)).max() < 5e-4
 
 
-def test_a_heading_that_turns_round_as_the_nose_passes_the_vertical_is_no_gust():
+@pytest.mark.parametrize("late", [False, True])
+def test_a_heading_that_turns_round_as_the_nose_passes_the_vertical_is_no_gust(late):
     """The turbulence turns with the heading: air from ahead, and a little from aside, turns round at once."""
     record, dt = air_of(), 0.01
     still, gust = np.array([45.0, 0.0, 0.0]), np.array([3.0, 1.0, 0.0])  # m/s; straight down, and level axes
@@ -142,13 +143,32 @@ def test_a_heading_that_turns_round_as_the_nose_passes_the_vertical_is_no_gust()
     record["gust"][2] = 0.05
     over = np.array([np.pi, -1.56, 0.3 + np.pi])
     record["force"] = record["turn"] @ [0.0, 0.0, -record["gravity"]]  # nothing accelerates
+    if late:  # the wind turns a step after the heading
+        air.observe(record, readings(still - _turn(np.pi, -1.56) @ (gust * [-1, -1, 1])), over, dt)
+        record["force"] = _turn(np.pi, -1.56) @ [0.0, 0.0, -record["gravity"]]
     air.observe(record, readings(still - _turn(np.pi, -1.56) @ gust), over, dt)
     assert abs(record["gust"][2]) <= 0.05
     unseen, record["unseen"] = np.array(record["unseen"]), np.ones(3)
-    record["damping"] = np.diag([0.0, 0.0, 5.0]) @ record["turn"].T
+    record["damping"] = np.diag([0.0, 0.0, 5.0]) @ record["axes"].T
     everything = air.unseen_drift(record, 45.0, 2, 2)
     record["unseen"] = unseen
     assert air.unseen_drift(record, 45.0, 2, 2) == pytest.approx(everything)
+
+
+def test_a_gust_that_was_seen_acts_as_before_in_the_step_in_which_the_heading_turns_round():
+    """JSBSim's gusts point along the heading of the step before, in body axes as they are now."""
+    record, y = air_of(), readings(np.array([45.0, 0.0, 2.0]))
+    air.begin(record, y, np.array([0.0, -1.56, 0.3]))
+    record["gust"][1] = 0.04
+    over = np.array([np.pi, -1.56, 0.3 + np.pi])
+    air.observe(record, y, over, 1e-4)
+    now = record["gust"][1]
+    air.effect(record, design_record()[0], np.zeros(3), y, np.zeros(4))
+    assert record["rotation"][1] == pytest.approx(now)
+    air.observe(record, y, over, 1e-4)
+    now = record["gust"][1]
+    air.effect(record, design_record()[0], np.zeros(3), y, np.zeros(4))
+    assert record["rotation"][1] == pytest.approx(-now)
 
 
 def readings(velocity):
@@ -213,7 +233,7 @@ def test_a_gust_acts_through_the_damping_in_body_axes():
     """The air pitches up: against it the aircraft pitches down, and is damped as if it did."""
     record, design = air_of(), design_record()[0]
     y = np.array([0.1, 0.02, 45.0, 1036.0, 0.3])
-    record["turn"] = _turn(0.6, 0.1)
+    record["axes"] = _turn(0.6, 0.1)
     record["gust"] = [0.0, 0.02, -0.03]
     air.effect(record, design.view(), np.zeros(3), y, np.zeros(4))
     _, _, slope, _ = jacobian(design, np.zeros(3), y, np.zeros(4))
@@ -224,7 +244,7 @@ def test_a_gust_acts_through_the_damping_in_body_axes():
 def test_what_is_not_seen_drifts_in_body_axes_as_a_covariance_turns():
     record, design = air_of(), design_record()[0]
     y = np.array([0.1, 0.02, 45.0, 1036.0, 0.3])
-    record["turn"] = turn = _turn(0.6, 0.1)
+    record["axes"] = turn = _turn(0.6, 0.1)
     air.effect(record, design, np.zeros(3), y, np.zeros(4))
     spread = turn @ np.diag(45.0 * noise_model.gust_drift("light", 14.63) * noise_model.UNSEEN) @ turn.T
     expected = record["damping"] @ spread @ record["damping"].T

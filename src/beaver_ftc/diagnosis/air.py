@@ -29,6 +29,7 @@ AIR = np.dtype(
         ("forces", TABLE), ("scratch", "f8", (MAX_MONOMIALS,)),  # force coefficients
         ("area_per_mass", "f8"), ("gravity", "f8"), ("span", "f8"),
         ("velocity", "f8", (3,)), ("force", "f8", (3,)), ("turn", "f8", (3, 3)), ("heading", "f8"),
+        ("axes", "f8", (3, 3)),  # from the gusts' axes to body axes
         ("pull", "f8", (3,)),  # forces and gravity an instant before, m/s2 in the level axes of this one
         ("gust", "f8", (3,)), ("rotation", "f8", (3,)), ("damping", "f8", (3, 3)),
         ("acceleration", "f8", (3,)),  # at this instant
@@ -36,7 +37,8 @@ AIR = np.dtype(
         ("per_metre", "f8", (3,)),  # intensity of the rotation's drift over airspeed, rad2/s3 per m/s
         ("unseen", "f8", (3,)),  # share of it that the vanes do not show
         ("rolling", "f8"),  # lag of the rolling gust times airspeed, m
-        ("scale", "f8"), ("turning", "f8"),  # scale of the gusts, m; share of a yawing one lost by turning
+        # Scale of the gusts, m; share of a yawing one that turning loses at this instant, and that is lost.
+        ("scale", "f8"), ("lost", "f8"), ("turning", "f8"),
         # How fast the axes of the gusts turn in the body, 1/s, and whether that matters.
         ("swing", "f8", (3, 3)), ("swings", "i8"),
     ],
@@ -95,13 +97,27 @@ def advance_axes(air, y, attitude):
 def begin(air, y, attitude):
     """The first frame of a diagnosis, which may begin in flight: no gust has been seen to change yet."""
     advance_axes(air, y, attitude)
+    turn_gusts(air, 0.0, 1.0)
     air.gust[:] = 0.0
-    air.started = 0
+    air.started, air.lost, air.turning = 0, 0.0, 0.0
+
+
+@kernel
+def turn_gusts(air, sin, cos):
+    """Bring `axes` to this instant, and keep those of the one before in `swing`.
+
+    sin, cos: of what the heading has turned. JSBSim's gusts point along the heading of the step before.
+    """
+    air.swing[:] = air.axes
+    for i in range(3):
+        ahead, right = air.turn[i, 0], air.turn[i, 1]
+        air.axes[i, 0], air.axes[i, 1] = ahead * cos - right * sin, ahead * sin + right * cos
+        air.axes[i, 2] = air.turn[i, 2]
 
 
 @kernel
 def note_swing(air, dt, V):
-    """How fast the axes of the gusts have turned in the body since `swing` held `turn`, dt s ago.
+    """How fast the axes of the gusts have turned in the body since `swing` held them, dt s ago.
 
     A gust unseen that keeps its size, sigma = sqrt(intensity lag / 2), then changes in the body by sigma
     times that; over its lag like a walk of (swing lag)^2 / 2 of the gust's own intensity.
@@ -109,7 +125,7 @@ def note_swing(air, dt, V):
     most = 0.0
     for i in range(3):
         for g in range(3):
-            air.swing[i, g] = (air.turn[i, g] - air.swing[i, g]) / dt
+            air.swing[i, g] = (air.axes[i, g] - air.swing[i, g]) / dt
             most = max(most, abs(air.swing[i, g]))
     air.swings = 0.5 * (most * air.rolling / V) ** 2 > LEAST_SWING
 
@@ -131,7 +147,7 @@ def observe(air, y, attitude, dt):
 
     y (5,) and attitude (3,) rad as measured now, dt s after `force` and `turn`. Where the heading turns so
     fast that what the vanes show is mostly that, as it does when the nose passes the vertical, a yawing gust
-    is let fade, unseen.
+    is let fade, unseen; an instant longer, since JSBSim's gusts turn a step after the heading.
     """
     pulled = air.scratch
     for i in range(3):
@@ -147,12 +163,13 @@ def observe(air, y, attitude, dt):
     right, down = air.velocity[1] * cos - air.velocity[0] * sin, air.velocity[2]
     air.pull[0], air.pull[1] = pulled[0] * cos + pulled[1] * sin, pulled[1] * cos - pulled[0] * sin
     air.pull[2] = pulled[2]
-    air.swing[:] = air.turn
     advance_axes(air, y, attitude)
     V = y[AIRSPEED]
+    turn_gusts(air, sin, cos)
     note_swing(air, dt, V)
     pitching, yawing = 4.0 * air.span / (pi * V), 3.0 * air.span / (pi * V)  # lags, s
-    lost = lost_by_turning(air, V, turned / dt)
+    before, air.lost = air.lost, lost_by_turning(air, V, turned / dt)
+    lost = max(before, air.lost)
     air.turning = min(max(np.exp(-dt / yawing) * air.turning, lost), 1.0)
     air.gust[1] = np.exp(-dt / pitching) * air.gust[1] + (down - air.velocity[2]) / (V * pitching)
     air.gust[2] = np.exp(-dt / yawing) * air.gust[2]
@@ -169,7 +186,7 @@ def effect(air, design, x, y, u):
     specific_force(air, x, y, u, air.force)
     rate_damping(design, x, y, u, air.scratch, air.damping)
     for i in range(3):
-        air.rotation[i] = air.turn[i, 1] * air.gust[1] + air.turn[i, 2] * air.gust[2]
+        air.rotation[i] = air.axes[i, 1] * air.gust[1] + air.axes[i, 2] * air.gust[2]
     for i in range(3):
         air.acceleration[i] = 0.0
         for j in range(3):
@@ -198,8 +215,8 @@ def unseen_drift(air, V, i, j):
     for g in range(3):
         on_i, on_j = 0.0, 0.0
         for k in range(3):
-            on_i += air.damping[i, k] * air.turn[k, g]
-            on_j += air.damping[j, k] * air.turn[k, g]
+            on_i += air.damping[i, k] * air.axes[k, g]
+            on_j += air.damping[j, k] * air.axes[k, g]
         unseen = air.unseen[g] if g != 2 else min(air.unseen[g] + air.turning, 1.0)
         total += on_i * on_j * unseen * air.per_metre[g]
     if air.swings:

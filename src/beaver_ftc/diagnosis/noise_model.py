@@ -28,7 +28,9 @@ GROWTH_PER_S = 1.5
 # over a filter's memory it is less (`tests/diagnosis/test_air.py`).
 UNSEEN = (1.0, 0.003, 0.03)
 PRIOR_DRIFT_RAD_S2 = 1.0  # what a drift may be at the start of a flight: soon forgotten
-CHANCE = 0.5  # share of the alarm level that noise is given beside an uncertainty at its bound
+# Share of the alarm level that noise is given beside an uncertainty at its bound; what it is worth where both
+# matter is in docs/theory.md, section 7.
+CHANCE = 0.5
 LEAST_NOISE_RAD_S = 1e-9  # of a gyro: exact ones are still doubles, and a variance no difference of zeros
 Start = tuple[np.ndarray, np.ndarray, np.ndarray]  # x (3,) rad/s, y (5,) and u (4,) rad in trim
 _GYRO_OF = dict(zip(RATE_SIGNALS, AXES, strict=True))

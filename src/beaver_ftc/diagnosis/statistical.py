@@ -18,7 +18,9 @@ PITCH, LATERAL, RETURNING = 0, 1, 2  # blocks: the last is the second view of ro
 # Of what the best explanation explains, the part that a constant theta leaves to a loss that grows is larger
 # for every rate of growth (docs/theory.md, section 7).
 LEAST_PART = 0.25
-SHOWN_BEFORE = 0.02  # of what the end of a loss explains, what the loss has explained before
+# Of what the end of a loss explains, what the loss has explained before. Both grow with the time they have
+# lasted: this is the shortest loss reckoned with, 0.1 s, over the longest window, 5 s at 100 Hz.
+SHOWN_BEFORE = 0.02
 
 
 @kernel

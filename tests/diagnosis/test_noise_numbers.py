@@ -147,8 +147,8 @@ def test_the_times_and_levels_of_a_detector(alone):
         assert block["chance"] == 0.5
         assert block["pace"] == pytest.approx(15.0 / 50.0)
         assert block["hypothesis"]["growth_keep"] == pytest.approx(exp(-1.5 / 50.0))
-    still = Detector(50.0)
-    assert all(block["chance"] == 0.0 for block in still.blocks)
+    for bounds, chance in (({}, 0.0), ({"turbulence": "light"}, 0.5), ({"sensors": "tactical-grade"}, 0.5)):
+        assert [block["chance"] for block in Detector(50.0, bounds=bounds).blocks] == [chance] * 3
 
 
 def test_a_loss_declared_constant_neither_grows_nor_ends():

@@ -704,3 +704,102 @@ def test_the_verdict_is_that_of_the_first_named():
     assert found["isolated_at_s"] == 4.0
     pairs.summarise(fdi, NO_SURFACE, False, 6.0)
     assert (found["isolated"], found["isolated_at_s"]) == (NOT_ISOLATED, 6.0)
+
+
+def acted(**left):
+    """What the law does about each surface; each was seen where its type has it."""
+    fdi = decided(**left)
+    for surface in fdi["surface"]:
+        surface["set_low"], surface["set_high"] = -0.1, 0.1
+    return fdi
+
+
+def test_the_law_acts_on_all_that_are_named_and_the_lead_is_the_first():
+    fdi = acted(alarmed=(0, 1), aileron=(CONSTANT_LOSS,), rudder=(BIAS,), elevator=None, flap=None)
+    fdi["surface"]["named"] = 1, 0, 1, 0
+    pairs.act(fdi)
+    assert fdi["surface"]["measure"].tolist() == [LOSES, -1, SHIFTED, -1]
+    assert (fdi["verdict"]["lead"], fdi["verdict"]["lead_kind"]) == (AILERON, LOSES)
+
+
+@pytest.mark.parametrize(
+    ("kinds", "measure", "lead"),
+    [((STUCK,), FIXED, ELEVATOR), ((CONSTANT_LOSS,), LOSES, ELEVATOR), ((BIAS,), SHIFTED, AILERON)],
+)
+def test_an_elevator_that_is_replaced_comes_first(kinds, measure, lead):
+    fdi = acted(aileron=(CONSTANT_LOSS,), elevator=kinds, rudder=None, flap=None)
+    fdi["surface"]["named"] = 1, 1, 0, 0
+    pairs.act(fdi)
+    assert fdi["surface"]["measure"].tolist() == [LOSES, measure, -1, -1]
+    assert fdi["verdict"]["lead"] == lead
+
+
+def test_a_rudder_that_is_fixed_does_not_come_before_the_first():
+    fdi = acted(aileron=(BIAS,), rudder=(STUCK,), elevator=None, flap=None)
+    fdi["surface"]["named"] = 1, 0, 1, 0
+    pairs.act(fdi)
+    assert (fdi["verdict"]["lead"], fdi["verdict"]["lead_kind"]) == (AILERON, SHIFTED)
+
+
+def test_a_surface_acted_upon_that_cannot_be_at_fault_is_shifted_as_it_shows():
+    fdi = acted(elevator=None, flap=None, aileron=None, rudder=None)
+    leave(fdi["surface"][ELEVATOR], STUCK)
+    pairs.act(fdi)
+    assert fdi["surface"]["measure"].tolist() == [-1, SHIFTED, -1, -1]
+    fdi["surface"]["named"][ELEVATOR] = 1
+    pairs.act(fdi)
+    assert fdi["surface"]["measure"].tolist() == [-1, FIXED, -1, -1]
+    fdi["surface"]["low"], fdi["surface"]["high"], fdi["surface"]["absent"] = 0.3, 0.4, 99
+    pairs.act(fdi)
+    assert fdi["surface"]["measure"].tolist() == [-1, -1, -1, -1]
+    assert (fdi["verdict"]["lead"], fdi["verdict"]["lead_kind"]) == (NO_SURFACE, -1)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_two_equations_say_where_ailerons_and_rudder_were(seed):
+    """The least and greatest solution over the corners of the room, by a linear solver."""
+    rng, fdi = np.random.default_rng(seed), new_case()
+    Z = np.array([[-9.0, 0.7], [-0.5, -4.0]]) + 0.1 * rng.normal(size=(2, 2))
+    spread, room = rng.uniform(0.01, 0.02, (2, 2)), np.array([0.03, 0.02])
+    off, command = rng.uniform(-0.05, 0.05, 2), np.array([0.02, -0.03])
+    for k, s in enumerate((AILERON, RUDDER)):
+        effect = fdi["estimator"][4 + s]["effect"]
+        effect["Z"][[ROLL, YAW]], effect["spread"][[ROLL, YAW]] = Z[:, k], spread[:, k]
+        fdi["surface"][s]["command"] = command[k]
+    fdi["innovation"][[ROLL, YAW]], fdi["bound"]["frame"][[ROLL, YAW]] = Z @ off, room
+    pairs.solve_roll_and_yaw(fdi)
+    slack = room + spread.sum(axis=1)
+    corners = [np.linalg.solve(Z, Z @ off + slack * (a, b)) for a in (-1, 1) for b in (-1, 1)]
+    least, greatest = np.min(corners, axis=0) + command, np.max(corners, axis=0) + command
+    for k, s in enumerate((AILERON, RUDDER)):
+        surface = fdi["surface"][s]
+        assert (surface["low"], surface["high"]) == pytest.approx((least[k], greatest[k]))
+    assert not fdi["pair"]["no_lateral_pair"]
+    fdi["innovation"][YAW] = 9.0
+    pairs.solve_roll_and_yaw(fdi)
+    assert fdi["pair"]["no_lateral_pair"]
+
+
+def test_a_second_pitch_fault_is_named_once_it_shows():
+    fdi = decided(elevator=(BIAS,), flap=(STUCK,), aileron=None, rudder=None)
+    fdi["pair"]["first"], fdi["surface"]["in_question"] = ELEVATOR, (1, 0, 1, 0)
+    fdi["surface"]["standing"] = 0, BY_DEDUCTION, 0, BY_DEDUCTION
+    fdi["surface"]["type"][ELEVATOR], fdi["surface"]["evidence"][FLAP] = BIAS, 0
+    pairs.decide_pitch(fdi, 4.0)
+    assert fdi["surface"]["named"].tolist() == [0, 1, 0, 0]
+    fdi["surface"]["evidence"][FLAP] = 99
+    pairs.decide_pitch(fdi, 5.0)
+    assert fdi["surface"]["named"].tolist() == [0, 1, 0, 1]
+    assert fdi["surface"]["type"].tolist()[1::2] == [BIAS, STUCK]
+    fdi["surface"]["standing"][FLAP] = RULED_OUT
+    pairs.decide_pitch(fdi, 6.0)
+    assert fdi["surface"]["named"].tolist() == [0, 1, 0, 0]
+
+
+def test_the_first_named_is_the_one_the_verdict_is_about():
+    fdi = decided(alarmed=(0, 1), aileron=(BIAS,), rudder=(BIAS,), elevator=None, flap=None)
+    fdi["estimator"]["excluded"][[4 + AILERON, 4 + RUDDER]] = 1
+    fdi["surface"]["named"], fdi["surface"]["named_at_s"] = (1, 0, 1, 0), (2.0, 0.0, 1.0, 0.0)
+    pairs.decide(fdi, 3.0)
+    assert fdi["verdict"]["isolated_at_s"] == 1.0
+    assert fdi["estimator"]["surface"][fdi["verdict"]["isolated"]] == RUDDER

@@ -32,6 +32,7 @@ from beaver_ftc.diagnosis.watch import (
     YES,
 )
 from beaver_ftc.plant.instruments import ALTITUDE, ENGINE_SPEED, MANIFOLD, N_SENSORS, PHI
+from beaver_ftc.plant.readings import MEASURED
 
 H = 0.005
 MISSING = np.dtype([("missing", "i8", (N_SENSORS,))], align=True)
@@ -391,3 +392,58 @@ def test_where_the_attitude_is_noisy_a_rate_follows_it_slowly_after_one_step():
     assert value == pytest.approx(0.2 + 10.0 * 0.5 + H * 2.35)
     value, _ = stood_in(1, follows=0.1, taken_over=(0, 1, 0))
     assert value == pytest.approx(0.2 + 0.1 * 0.02 / H + H * 2.35)
+
+
+def looked(watch, fdi, **signal):
+    """A look at instruments in level flight, with some readings moved."""
+    measured = np.zeros(1, MEASURED).view(np.recarray)[0]
+    measured["signal"][AIRSPEED], measured["signal"][QDYN] = 45.0, 1000.0
+    for name, value in signal.items():
+        measured["signal"][{"phi": PHI, "altitude": ALTITUDE, "p": 0}[name]] += value
+    belief = np.zeros(1, belief_dtype(4)).view(np.recarray)[0]
+    watching.attend(watch, fdi, belief, measured, 3.0)
+    return measured
+
+
+def test_looks_of_a_frame_follow_one_another():
+    watch, fdi = new_watch(), new_fdi()
+    fdi["bank"]["threshold"], fdi["bound"]["frame"] = 1.0, 1.0
+    watch["step"]["gravity"] = watch["step"]["offset"] = 0.0
+    watch["step"]["offset"][:] = 1.0
+    fdi["innovation"] = 0.5, 0.0, 0.0
+    looked(watch, fdi)
+    assert (watch["begun"], watch["past"]) == (1, 0)
+    for k in range(4):
+        looked(watch, fdi, phi=1e-3 * (k % 2))
+        assert watch["past"] == (k + 1) % 4
+    assert watch["W"][0] == pytest.approx(0.5 * DT)  # once a frame
+    # the gyro's error as the frame began, and the largest inside it: the attitude moved, the rates did not
+    assert watch["error"] == pytest.approx(np.zeros(3), abs=1e-12)
+    assert watch["spike"][0] == pytest.approx(1e-3 / H, rel=1e-3)
+    before = watch["spike"].copy()
+    looked(watch, fdi, phi=2e-3)
+    assert watch["error"][0] == pytest.approx(-1e-3 / H, rel=1e-2)
+    assert watch["spike_then"] == pytest.approx(before)
+    assert not watch["spike"].any()
+    assert watch["error_then"] == pytest.approx(np.zeros(3), abs=1e-12)
+    assert watch["W"][0] == pytest.approx(2 * 0.5 * DT)
+
+
+def test_a_broken_altimeter_is_named_and_replaced_from_then_on():
+    watch, fdi = new_watch(), new_fdi()
+    fdi["bound"]["frame"], fdi["bank"]["threshold"] = 1.0, 1.0
+    looked(watch, fdi)
+    looked(watch, fdi)
+    assert not watch["alarmed"]
+    measured = looked(watch, fdi, altitude=50.0)
+    assert watch["named"] == ALTITUDE
+    assert abs(measured["signal"][ALTITUDE]) < 0.1
+    assert abs(measured["altitude"]) < 0.1
+
+
+@pytest.mark.parametrize(("past", "asked"), [(0, True), (1, False)])
+def test_the_rates_are_asked_once_a_frame(past, asked):
+    watch, fdi = with_shares({TURN: 2.0, ANGLE: 1.5}, past=past, error=(0, 0.3, 0)), new_fdi()
+    fdi["bank"]["threshold"], fdi["bound"]["frame"] = 1.0, 1.0
+    watching.decide(watch, fdi, seen(), 5.0)
+    assert (watch["rates_say"][1] == NO) == asked

@@ -31,6 +31,11 @@ def test_every_small_change_is_made_once(module):
     } == made  # fmt: skip
 
 
+def test_what_no_caller_can_see_is_not_changed(module):
+    module.write_text("pairs = zip(a, b, strict=True)\nsize: Box[3] = f(x, align=True)\n")
+    assert mutants(module) == []
+
+
 def test_a_mutant_is_the_module_with_one_change(module):
     (sign,) = [m for m in mutants(module) if m.before == "-total"]
     assert "return total" in sign.source()

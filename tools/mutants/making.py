@@ -27,6 +27,8 @@ COMPARISONS = {
     ast.Is: (ast.IsNot,),
     ast.IsNot: (ast.Is,),
 }
+# Keywords whose value no caller can see: zip's check of its own arguments, a record's padding.
+UNSEEN = {"strict", "align"}
 FUNCTIONS = {"min": "max", "max": "min", "any": "all", "all": "any"}
 
 
@@ -77,8 +79,8 @@ def mutants(file: Path) -> list[Mutant]:
 
 
 def _no_code(tree: ast.Module) -> set[ast.AST]:
-    """What is within annotations and decorators."""
-    roots = []
+    """What is within annotations and decorators, or makes no difference."""
+    roots = [node for node in ast.walk(tree) if isinstance(node, ast.keyword) and node.arg in UNSEEN]
     for node in ast.walk(tree):
         roots += [getattr(node, "annotation", None), getattr(node, "returns", None)]
         roots += getattr(node, "decorator_list", [])

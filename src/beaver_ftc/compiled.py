@@ -164,7 +164,7 @@ def _finalize(library) -> None:
         library._final_module.link_in(_linkable(called), preserve=True)
     for function in _defined(library._final_module):
         if function.name not in own:
-            function.linkage = "linkonce_odr"
+            function.linkage = "internal"  # what is called in one place is then put there, however long
     library._optimize_final_module()
     library._final_module.verify()
     library._finalize_final_module()

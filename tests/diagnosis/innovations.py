@@ -12,7 +12,7 @@ from scipy.signal import lfilter
 from beaver_ftc.compiled import kernel
 from beaver_ftc.design.coefficients import MASS
 from beaver_ftc.diagnosis import likelihood, noise_model, statistical, whitening
-from beaver_ftc.diagnosis.state import BLOCK, N_SLOTS
+from beaver_ftc.diagnosis.state import BLOCK, MAX_HYPOTHESES, N_SLOTS, SENSE
 from beaver_ftc.loop.assembly import assemble
 from beaver_ftc.scenario.schema import Scenario
 
@@ -36,9 +36,16 @@ def with_hypotheses(block, *kinds, tolerance=()):
     """The same with hypotheses of these kinds, and regressors of these tolerances."""
     block["n_hypotheses"], block["n_regressors"] = len(kinds), len(tolerance)
     block["tolerance"][: len(tolerance)] = tolerance
-    for hypothesis, kind in zip(block["hypothesis"], kinds, strict=False):
-        hypothesis["kind"] = kind
+    for h, kind in enumerate(kinds):
+        block["hypothesis"][h]["kind"] = kind
+        by_onset(block, "sense")[:, h] = SENSE[kind]
     return block
+
+
+def by_onset(block, name):
+    """What the lanes keep under a name, (..., slots, hypotheses)."""
+    kept = block["lane"][name]
+    return kept.reshape(*kept.shape[:-1], N_SLOTS, MAX_HYPOTHESES)
 
 
 def covariance(block, frames, dt):
@@ -116,7 +123,7 @@ def weigh_all(block, innovations, signatures, regressors, first, keep, tolerated
         for h in range(block.n_hypotheses):
             block.hypothesis[h].signature[:] = signatures[k, h]
         likelihood.weigh(block, tolerated, dt, keep)
-        likelihood.judge(block, tolerated)
+        likelihood.judge(block)
 
 
 @kernel

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from innovations import block_of, bounded_all, covariance, drawn, weigh_all, with_hypotheses
+from innovations import block_of, bounded_all, by_onset, covariance, drawn, weigh_all, with_hypotheses
 from scipy.stats import kstest
 
 from beaver_ftc.diagnosis import likelihood
-from beaver_ftc.diagnosis.state import ALPHA3, LOSS, N_SLOTS, STEP
+from beaver_ftc.diagnosis.state import ALPHA3, LANES, LOSS, MAX_HYPOTHESES, N_SLOTS, STEP
 
 DT = 0.01
 TOGETHER = np.array([[0.04, 0.006], [0.006, 0.003]])
@@ -58,13 +58,11 @@ def test_evidence_and_information_of_every_onset_are_those_of_least_squares(case
     for slot, onset in _onsets(frames).items():
         for h in range(2):
             s = np.where(np.arange(frames)[:, None] >= onset, signatures[:, h], 0.0).ravel()
-            hypothesis = block["hypothesis"][h]
-            assert hypothesis["information"][slot] == pytest.approx(s @ inverse @ s, rel=1e-6)
-            assert hypothesis["correlation"][slot] == pytest.approx(
-                s @ inverse @ nu.ravel(), rel=1e-6, abs=1e-9
-            )
+            information, correlation = by_onset(block, "information"), by_onset(block, "correlation")
+            assert information[slot, h] == pytest.approx(s @ inverse @ s, rel=1e-6)
+            assert correlation[slot, h] == pytest.approx(s @ inverse @ nu.ravel(), rel=1e-6, abs=1e-9)
             overlap = [s @ inverse @ regressors[:, j].ravel() for j in range(3)]
-            assert hypothesis["overlap"][slot][:3] == pytest.approx(overlap, rel=1e-6, abs=1e-9)
+            assert by_onset(block, "overlap")[:3, slot, h] == pytest.approx(overlap, rel=1e-6, abs=1e-9)
 
 
 def _statistics(case, theta, flights=2500, frames=24, scale=0.5):
@@ -76,8 +74,8 @@ def _statistics(case, theta, flights=2500, frames=24, scale=0.5):
         n = int(block["n"])
         signature = scale * rng.normal(size=(frames, 1, n))
         nu = drawn(block, frames, DT, rng, start=1.0) + theta * signature[:, 0]
-        hypothesis = _shown(block, nu, signature)["hypothesis"][0]
-        N, D = hypothesis["correlation"][N_SLOTS - 1], hypothesis["information"][N_SLOTS - 1]
+        _shown(block, nu, signature)
+        N, D = by_onset(block, "correlation")[-1, 0], by_onset(block, "information")[-1, 0]
         normal.append(N / np.sqrt(D))
         estimate.append(N / D)
         information.append(D)
@@ -134,16 +132,13 @@ def test_the_worst_corner_takes_all_of_the_allowance():
     signatures, regressors = rng.normal(size=(frames, 1, 2)), rng.normal(size=(frames, 2, 2))
     tolerance = np.array([0.5, 0.3])
     nu = drawn(_block("two axes"), frames, DT, rng)
-    clean = _shown(_block("two axes", STEP), nu, signatures)["hypothesis"][0]
-    slot = N_SLOTS - 1
-    blank = _shown(_block("two axes", STEP, tolerance=tolerance), nu, signatures, regressors)["hypothesis"][0]
-    overlap = blank["overlap"][slot][:2]
-    worst = np.sign(clean["correlation"][slot]) * np.sign(overlap) * tolerance
+    clean = by_onset(_shown(_block("two axes", STEP), nu, signatures), "correlation")[-1, 0]
+    blank = _shown(_block("two axes", STEP, tolerance=tolerance), nu, signatures, regressors)
+    worst = np.sign(clean) * np.sign(by_onset(blank, "overlap")[:2, -1, 0]) * tolerance
     wrong = nu + np.einsum("j,kjn->kn", worst, regressors)
     block = _shown(_block("two axes", STEP, tolerance=tolerance), wrong, signatures, regressors)
-    seen = block["hypothesis"][0]
-    slack = likelihood.tolerance(block, seen, slot)
-    assert abs(seen["correlation"][slot]) - slack == pytest.approx(abs(clean["correlation"][slot]), rel=1e-9)
+    seen, slack = by_onset(block, "correlation")[-1, 0], by_onset(block, "slack")[-1, 0]
+    assert abs(seen) - slack == pytest.approx(abs(clean), rel=1e-9)
 
 
 @settings(max_examples=60)
@@ -167,12 +162,15 @@ def test_a_bounded_uncertainty_adds_no_more_than_is_allowed_for(case, seed, cour
     if course == "against the weights":
         d[settled:] = eta_bar * np.sign(np.gradient(signature[settled:, 0], axis=0))
     bounded_all(block, d, signature, settled, DT)
-    hypothesis = block["hypothesis"][0]
-    for slot in range(N_SLOTS):
-        if hypothesis["information"][slot] > 0.0:
-            assert (
-                abs(hypothesis["correlation"][slot]) <= likelihood.allowance(block, hypothesis, slot) + 1e-9
-            )
+    known = by_onset(block, "information")[:, 0] > 0.0
+    correlation = by_onset(block, "correlation")[:, 0]
+    assert np.all((np.abs(correlation) <= _allowed(block) + 1e-9)[known])
+
+
+def _allowed(block):
+    """What a bounded uncertainty may add to the correlation of the first hypothesis, (slots,)."""
+    lanes = range(0, LANES, MAX_HYPOTHESES)
+    return np.array([likelihood.allowance(block["lane"], k, *block["swing"]) for k in lanes])
 
 
 def test_the_allowance_is_not_absurdly_wide():
@@ -184,9 +182,8 @@ def test_the_allowance_is_not_absurdly_wide():
     d = 0.02 * np.ones((800, 1))
     d[:640] *= -1.0
     bounded_all(block, d, signature, 640, DT)
-    hypothesis = block["hypothesis"][0]
-    slots = [k for k in range(N_SLOTS) if hypothesis["information"][k] > 0.0]
-    used = [abs(hypothesis["correlation"][k]) / likelihood.allowance(block, hypothesis, k) for k in slots]
+    known = by_onset(block, "information")[:, 0] > 0.0
+    used = np.abs(by_onset(block, "correlation")[known, 0]) / _allowed(block)[known]
     assert 0.3 < max(used) <= 1.0
 
 
@@ -219,7 +216,7 @@ def test_the_likelihood_of_a_loss_is_greatest_within_its_set(evidence, informati
     """By search over theta in [-1, 0] instead of cases; evidence is that for a loss."""
     theta = np.linspace(0, 1, 4001)
     best = np.max(theta * evidence - 0.5 * theta**2 * information)
-    found = likelihood.log_likelihood(LOSS, evidence, information)
+    found = likelihood.log_likelihood(True, evidence, information)
     assert found == pytest.approx(best, rel=1e-5, abs=1e-4 * information)
 
 
@@ -239,11 +236,11 @@ def test_from_the_alarm_on_old_evidence_is_forgotten():
     nu[frames // 2 :] = -0.9 * signatures[frames // 2 :, 0]
     block = _shown(_block("one axis", LOSS), nu, signatures, keep=keep)
     forever = _shown(_block("one axis", STEP), nu, signatures)
-    slot = N_SLOTS - 1
-    hypothesis, everything = block["hypothesis"][0], forever["hypothesis"][0]
-    recent = hypothesis["correlation"][slot] / hypothesis["information"][slot]
+    recent, of_all = (
+        by_onset(of, "correlation")[-1, 0] / by_onset(of, "information")[-1, 0] for of in (block, forever)
+    )
     assert recent == pytest.approx(-0.9, abs=0.02)
-    assert everything["correlation"][slot] / everything["information"][slot] > -0.85
+    assert of_all > -0.85
 
 
 def test_each_frame_counts_keep_times_what_the_next_one_counts():
@@ -254,9 +251,9 @@ def test_each_frame_counts_keep_times_what_the_next_one_counts():
 
     def after(k, keep):
         block = _block("one axis", STEP, tolerance=(0.1, 0.2))
-        one = _shown(block, nu[:k], signatures[:k], regressors[:k], keep=keep)["hypothesis"][0]
-        kept = N_SLOTS - 1
-        return np.array([one["correlation"][kept], one["information"][kept], *one["overlap"][kept][:2]])
+        _shown(block, nu[:k], signatures[:k], regressors[:k], keep=keep)
+        N, D = by_onset(block, "correlation")[-1, 0], by_onset(block, "information")[-1, 0]
+        return np.array([N, D, *by_onset(block, "overlap")[:2, -1, 0]])
 
     each = np.diff([np.zeros(4), *(after(k, 1.0) for k in range(1, frames + 1))], axis=0)
     assert after(frames, keep) == pytest.approx(keep ** np.arange(frames)[::-1] @ each, rel=1e-9)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from innovations import block_of, with_hypotheses
+from innovations import block_of, by_onset, with_hypotheses
 from kernels import new_fdi
 
 from beaver_ftc.diagnosis import likelihood, statistical, whitening
@@ -11,6 +11,7 @@ from beaver_ftc.diagnosis.state import (
     ENDING,
     GROWING,
     LOSS,
+    MAX_HYPOTHESES,
     N_SLOTS,
     STEP,
 )
@@ -57,13 +58,13 @@ def test_an_onset_that_starts_knows_nothing_and_the_others_stay():
         "overlap",
     )
     for name in names:
-        block["hypothesis"][name] = 3.0
+        block["lane"][name] = 3.0
     likelihood.start(block, 4)
-    for hypothesis in block["hypothesis"][:2]:
-        for name in names:
-            assert (np.delete(hypothesis[name], 4, axis=0) == 3.0).all(), name
-            cleared = hypothesis[name][4][:2] if name == "overlap" else hypothesis[name][4]
-            assert (cleared == (1.0 if name == "missing" else 0.0)).all(), name
+    for name in names:
+        kept = by_onset(block, name)
+        assert (np.delete(kept, 4, axis=-2) == 3.0).all(), name
+        cleared = kept[:2, 4] if name == "overlap" else kept[..., 4, :]
+        assert (cleared == (1.0 if name == "missing" else 0.0)).all(), name
 
 
 def test_of_a_constant_the_filter_leaves_what_stay_says():
@@ -92,31 +93,34 @@ def test_the_room_of_a_bounded_uncertainty_is_summed_up_by_parts():
     block = with_hypotheses(block_of(TOGETHER, [1e-3, 1e-3]), STEP)
     block["stay"], block["swing"], block["pace"] = (0.1, 0.2), (0.3, 0.4), 0.05
     w = rng.normal(size=(frames, 2))
-    hypothesis = block["hypothesis"][0]
-    for w0, w1 in w:
-        likelihood.allow(block, hypothesis, 2, w0, w1, keep)
+    block["K_x"] = block["S_inverse"] = np.eye(2)  # a filter that forgets at once: g_s is the signature
+    lane = 2 * MAX_HYPOTHESES
+    for each in w:
+        block["lane"]["shaped"][:, lane] = each
+        likelihood.respond(block, 1.0, keep)
     old = keep ** np.arange(frames)[::-1]
     changes = np.abs(np.diff(np.vstack([np.zeros(2), w]), axis=0))
     stays, swings = old @ np.abs(w) @ [0.1, 0.2], old @ changes @ [0.3, 0.4]
     drifts = old @ np.abs(w) @ [0.3, 0.4] * 0.05
-    assert hypothesis["stays"][2] == pytest.approx(stays)
-    assert hypothesis["swings"][2] == pytest.approx(swings)
-    assert hypothesis["drifts"][2] == pytest.approx(drifts)
+    assert block["lane"]["stays"][lane] == pytest.approx(stays)
+    assert block["lane"]["swings"][lane] == pytest.approx(swings)
+    assert block["lane"]["drifts"][lane] == pytest.approx(drifts)
     last = np.abs(w[-1]) @ [0.3, 0.4]
-    assert likelihood.allowance(block, hypothesis, 2) == pytest.approx(stays + min(swings + last, drifts))
-    hypothesis["drifts"][2] = 99.0
-    assert likelihood.allowance(block, hypothesis, 2) == pytest.approx(stays + swings + last)
+    allowed = likelihood.allowance(block["lane"], lane, *block["swing"])
+    assert allowed == pytest.approx(stays + min(swings + last, drifts))
+    block["lane"]["drifts"][lane] = 99.0
+    allowed = likelihood.allowance(block["lane"], lane, *block["swing"])
+    assert allowed == pytest.approx(stays + swings + last)
 
 
 def shapes(kind, frames=5):
     block = with_hypotheses(block_of(TOGETHER, [1e-3, 1e-3]), kind)
-    hypothesis, out = block["hypothesis"][0], np.zeros(2)
-    hypothesis["growth_keep"], hypothesis["missing"] = 0.8, 1.0
+    block["hypothesis"]["growth_keep"], block["lane"]["missing"] = 0.8, 1.0
     found = []
     for k in range(frames):
-        hypothesis["signature"] = 1.0 + k, -2.0 * k
-        likelihood.shape(hypothesis, 3, out)
-        found.append(out.copy())
+        block["hypothesis"]["signature"][0] = 1.0 + k, -2.0 * k
+        likelihood.shape(block, 0)
+        found.append(by_onset(block, "shaped")[:, 3, 0].copy())
     return np.array(found)
 
 
@@ -130,19 +134,23 @@ def test_a_loss_grows_stays_or_gives_back_what_it_was():
 
 
 @pytest.mark.parametrize(
-    ("kind", "sided", "evidence"),
+    ("kind", "sided", "score"),
     [
-        (LOSS, True, -3.0),
-        (GROWING, True, -3.0),
-        (ENDING, True, 3.0),
-        (STEP, False, 3.0),
-        (ALPHA3, False, 3.0),
+        (LOSS, True, -1.0),
+        (GROWING, True, -1.0),
+        (ENDING, True, 1.0),
+        (STEP, False, 1.0),
+        (ALPHA3, False, 1.0),
     ],
 )
-def test_a_loss_takes_away_and_its_end_gives_back(kind, sided, evidence):
+def test_a_loss_takes_away_and_its_end_gives_back(kind, sided, score):
+    """The score for a correlation of 3 and of -3, of information 9."""
     assert bool(likelihood.one_sided(kind)) == sided
-    assert likelihood.speaking_for(kind, 3.0) == evidence
-    assert likelihood.speaking_for(kind, -3.0) == (3.0 if not sided else -evidence)
+    block = with_hypotheses(block_of(TOGETHER, [1e-3, 1e-3]), kind)
+    for sign in (1.0, -1.0):
+        block["lane"]["correlation"][0], block["lane"]["information"][0] = 3.0 * sign, 9.0
+        likelihood.judge_lanes(block, True)
+        assert block["lane"]["score"][0] == pytest.approx(score * sign if sided else 1.0)
 
 
 @pytest.mark.parametrize("kind", [LOSS, STEP])
@@ -150,7 +158,9 @@ def test_a_loss_takes_away_and_its_end_gives_back(kind, sided, evidence):
 def test_the_log_likelihood_ratio_is_the_largest_of_any_theta_allowed(kind, evidence):
     theta = np.linspace(0.0, 1.0 if kind == LOSS else 9.0, 9001)
     largest = np.max(theta * evidence - 0.5 * theta**2 * 4.0)
-    assert likelihood.log_likelihood(kind, evidence, 4.0) == pytest.approx(max(largest, 0.0), abs=1e-6)
+    assert likelihood.log_likelihood(kind == LOSS, evidence, 4.0) == pytest.approx(
+        max(largest, 0.0), abs=1e-6
+    )
 
 
 @pytest.mark.parametrize("N", [-30.0, -9.0, -5.0, 2.0])
@@ -163,25 +173,25 @@ def test_the_estimate_of_a_loss_is_the_likeliest_with_a_prior_and_of_a_step_with
 
 
 def test_a_share_is_in_standard_deviations_or_of_what_uncertainty_and_chance_allow():
-    block = block_of(TOGETHER, [1e-3, 1e-3])
-    block["level"], block["chance"] = 6.0, 0.5
-    assert likelihood.share(block, 12.0, 0.0, 9.0) == pytest.approx(4.0)
-    assert likelihood.share(block, 12.0, 24.0, 9.0) == pytest.approx(12.0 / (4.0 + 1.5))
-    assert likelihood.share(block, 12.0, 0.6, 9.0) == pytest.approx(
-        4.0
-    )  # never more than against chance alone
+    assert likelihood.share(6.0, 0.5, 12.0, 0.0, 9.0) == pytest.approx(4.0)
+    assert likelihood.share(6.0, 0.5, 12.0, 24.0, 9.0) == pytest.approx(12.0 / (4.0 + 1.5))
+    against_chance_alone = likelihood.share(6.0, 0.5, 12.0, 0.6, 9.0)
+    assert against_chance_alone == pytest.approx(4.0)  # never more than that
 
 
-def judged(kind=LOSS, tolerated=False, memory=0.0, level=0.0, at_most=0.0):
+def judged(kind=LOSS, tolerated=False, memory=0.0, rooms=(0.0, 0.0), at_most=0.0):
     block = with_hypotheses(block_of(TOGETHER, [1e-3, 1e-3]), kind, tolerance=(0.1, 0.2))
-    block["level"], block["chance"] = level, 0.5
+    block["level"], block["chance"] = 1.0, 0.5
+    onsets, names = [1, 5], ("correlation", "information", "overlap", "stays")
+    correlation, information, overlap, stays = (by_onset(block, name) for name in names)
+    correlation[onsets, 0], information[onsets, 0] = (-3.0, -5.0), (4.0, 16.0)
+    correlation[7, 0] = -99.0  # nothing is known of that onset
+    overlap[:2, 1, 0], overlap[:2, 5, 0], stays[onsets, 0] = (1.0, -2.0), (-3.0, 4.0), rooms
     hypothesis = block["hypothesis"][0]
-    hypothesis["correlation"][[1, 5]], hypothesis["information"][[1, 5]] = (-3.0, -5.0), (4.0, 16.0)
-    hypothesis["correlation"][7] = -99.0  # nothing is known of that onset
-    hypothesis["overlap"][[1, 5], :2] = (1.0, -2.0), (-3.0, 4.0)
-    hypothesis["stays"][[1, 5]], hypothesis["at_most"] = (0.25, 0.5), at_most
-    hypothesis["score"] = hypothesis["at_least"] = 99.0
-    likelihood.judge(block, tolerated, memory)
+    hypothesis["score"], hypothesis["at_least"], hypothesis["at_most"] = 99.0, 99.0, at_most
+    if tolerated:
+        likelihood.overlap(block, 1.0)
+    likelihood.judge(block, memory)
     return hypothesis
 
 
@@ -201,14 +211,14 @@ def test_what_errors_of_coefficients_explain_is_taken_off_and_may_be_added():
 
 
 def test_what_a_bounded_uncertainty_explains_is_held_against_the_evidence():
-    hypothesis = judged(level=1.0)  # rooms 0.25 and 0.5
+    hypothesis = judged(rooms=(0.25, 0.5))
     assert hypothesis["score"] == pytest.approx(max(3.0 / 2.0, 5.0 / 4.0))
     assert hypothesis["at_least"] == pytest.approx(max(2.75**2 / 8.0, 4.5**2 / 32.0))
     assert hypothesis["at_most"] == pytest.approx(max(3.25**2 / 8.0, 5.5**2 / 32.0))
 
 
 def test_where_a_loss_may_end_what_was_explained_is_remembered_and_uncertainty_casts_no_doubt():
-    hypothesis = judged(level=1.0, memory=0.9, at_most=10.0)
+    hypothesis = judged(rooms=(0.25, 0.5), memory=0.9, at_most=10.0)
     assert hypothesis["at_most"] == pytest.approx(9.0)
     assert hypothesis["at_least"] == pytest.approx(9.0 / 8.0)
     assert judged(memory=0.0, at_most=10.0)["at_most"] == pytest.approx(9.0 / 8.0)

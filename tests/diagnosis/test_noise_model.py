@@ -12,7 +12,7 @@ from beaver_ftc.design.model import AXES, design_record
 from beaver_ftc.design.terms import evaluate, regressors
 from beaver_ftc.design.variants import response
 from beaver_ftc.diagnosis import noise_model, statistical
-from beaver_ftc.diagnosis.state import LOSS
+from beaver_ftc.diagnosis.state import LOSS, N_SLOTS
 from beaver_ftc.plant.instruments import SIGNALS
 from beaver_ftc.scenario.diagnosis import Bounds
 from beaver_ftc.studies.engine.statistics import poisson
@@ -33,8 +33,7 @@ SETTINGS = {
 def test_the_level_shares_the_declared_rate_among_all_tests_of_an_hour(rate_hz, turbulence):
     alone = Detector(rate_hz, bounds={"turbulence": turbulence})
     hypotheses = [h for block in alone.blocks for h in block["hypothesis"][: block["n_hypotheses"]]]
-    slots = len(hypotheses[0]["correlation"])
-    tests = sum(slots * (1 if h["kind"] == LOSS else 2) for h in hypotheses if h["alarms"])
+    tests = sum(N_SLOTS * (1 if h["kind"] == LOSS else 2) for h in hypotheses if h["alarms"])
     tail = norm.sf(alone.detector["alarm_level"])
     assert tail * tests * rate_hz * 3600 == pytest.approx(1e-3, rel=1e-6)
     margin = np.sqrt(2 * alone.detector["naming_level"])

@@ -30,9 +30,10 @@ Onsets: slot j starts anew every 2^(j+1) frames, so that there is always one of 
 alarm on they stay, and old evidence is forgotten slowly.
 """
 
+from math import sqrt
+
 from beaver_ftc.compiled import kernel
-from beaver_ftc.diagnosis.state import ENDING, GROWING, LOSS, N_SLOTS
-from beaver_ftc.diagnosis.whitening import whiten
+from beaver_ftc.diagnosis.state import ENDING, GROWING, LANES, LOSS, MAX_HYPOTHESES, N_SLOTS
 
 PRIOR_INFORMATION = 12.0  # of a loss uniform on [0, 1]: one over its variance
 # Magnitudes of a second-order transient of damping 0.7 add up to 1.09 times its sum; on two axes to more.
@@ -52,14 +53,17 @@ def slot_to_start(frame):
 @kernel
 def start(block, slot):
     """Forget everything about an onset."""
-    for h in range(block.n_hypotheses):
-        hypothesis = block.hypothesis[h]
-        hypothesis.correlation[slot] = hypothesis.information[slot] = 0.0
-        hypothesis.response[slot, :] = 0.0
-        hypothesis.overlap[slot, : block.n_regressors] = 0.0
-        hypothesis.weight[slot, :] = 0.0
-        hypothesis.stays[slot] = hypothesis.swings[slot] = hypothesis.drifts[slot] = 0.0
-        hypothesis.missing[slot] = 1.0
+    lane = block.lane
+    first = slot * MAX_HYPOTHESES
+    for k in range(first, first + MAX_HYPOTHESES):
+        lane.correlation[k] = lane.information[k] = 0.0
+        lane.weight[0, k] = lane.weight[1, k] = 0.0
+        lane.stays[k] = lane.swings[k] = lane.drifts[k] = 0.0
+        lane.missing[k] = 1.0
+    for i in range(4):
+        lane.response[i, first : first + MAX_HYPOTHESES] = 0.0
+    for j in range(block.n_regressors):
+        lane.overlap[j, first : first + MAX_HYPOTHESES] = 0.0
 
 
 @kernel
@@ -78,73 +82,82 @@ def reach(block, bounded, dt):
 
 
 @kernel
-def allow(block, hypothesis, slot, w0, w1, keep):
-    """Add to what a bounded uncertainty can contribute to the correlation; w = S^-1 g_s of this frame."""
-    before = hypothesis.weight[slot]
-    size = block.swing[0] * abs(w0) + block.swing[1] * abs(w1)
-    change = block.swing[0] * abs(w0 - before[0]) + block.swing[1] * abs(w1 - before[1])
-    hypothesis.stays[slot] = keep * hypothesis.stays[slot]
-    hypothesis.stays[slot] += block.stay[0] * abs(w0) + block.stay[1] * abs(w1)
-    hypothesis.swings[slot] = keep * hypothesis.swings[slot] + change
-    hypothesis.drifts[slot] = keep * hypothesis.drifts[slot] + block.pace * size
-    before[0], before[1] = w0, w1
+def shape(block, h):
+    """Fill `shaped` with the signature of hypothesis h since each onset: of growth a part, of an end what it
+    was then."""
+    lane, hypothesis = block.lane, block.hypothesis[h]
+    s0, s1 = hypothesis.signature[0], hypothesis.signature[1]
+    for slot in range(N_SLOTS):
+        k = slot * MAX_HYPOTHESES + h
+        if hypothesis.kind == ENDING:
+            if lane.missing[k] > 0.0:
+                lane.held[0, k], lane.held[1, k], lane.missing[k] = s0, s1, 0.0
+            lane.shaped[0, k], lane.shaped[1, k] = lane.held[0, k], lane.held[1, k]
+        elif hypothesis.kind == GROWING:
+            lane.missing[k] *= hypothesis.growth_keep
+            grown = 1.0 - lane.missing[k]
+            lane.shaped[0, k], lane.shaped[1, k] = grown * s0, grown * s1
+        else:
+            lane.shaped[0, k], lane.shaped[1, k] = s0, s1
 
 
 @kernel
-def allowance(block, hypothesis, slot):
-    """How much of N a bounded uncertainty can explain."""
-    weight = hypothesis.weight[slot]
-    last = block.swing[0] * abs(weight[0]) + block.swing[1] * abs(weight[1])
-    return hypothesis.stays[slot] + min(hypothesis.swings[slot] + last, hypothesis.drifts[slot])
+def respond(block, dt, keep):
+    """Whiten the shaped signatures, as `whitening.whiten` does, and bring N and D to this frame.
+
+    Of a block of one axis, what belongs to a second one is zero.
+    """
+    K_x, K_d, S, lane = block.K_x, block.K_d, block.S_inverse, block.lane
+    x00, x01, x10, x11 = K_x[0, 0], K_x[0, 1], K_x[1, 0], K_x[1, 1]
+    d00, d01, d10, d11 = K_d[0, 0], K_d[0, 1], K_d[1, 0], K_d[1, 1]
+    s00, s01, s10, s11 = S[0, 0], S[0, 1], S[1, 0], S[1, 1]
+    kept, g0, g1 = block.keep, block.innovation[0], block.innovation[1]
+    swing0, swing1, stay0, stay1 = block.swing[0], block.swing[1], block.stay[0], block.stay[1]
+    state, shaped, weight, pace = lane.response, lane.shaped, lane.weight, block.pace
+    for k in range(LANES):
+        r0 = state[0, k] + dt * (shaped[0, k] - state[2, k])
+        r1 = state[1, k] + dt * (shaped[1, k] - state[3, k])
+        state[0, k], state[1, k] = r0 - x00 * r0 - x01 * r1, r1 - x10 * r0 - x11 * r1
+        state[2, k] = kept * state[2, k] + (d00 * r0 + d01 * r1)
+        state[3, k] = kept * state[3, k] + (d10 * r0 + d11 * r1)
+        w0, w1 = s00 * r0 + s01 * r1, s10 * r0 + s11 * r1
+        lane.correlation[k] = keep * lane.correlation[k] + (w0 * g0 + w1 * g1)
+        lane.information[k] = keep * lane.information[k] + w0 * r0 + w1 * r1
+        change = swing0 * abs(w0 - weight[0, k]) + swing1 * abs(w1 - weight[1, k])
+        lane.stays[k] = keep * lane.stays[k] + (stay0 * abs(w0) + stay1 * abs(w1))
+        lane.swings[k] = keep * lane.swings[k] + change
+        lane.drifts[k] = keep * lane.drifts[k] + pace * (swing0 * abs(w0) + swing1 * abs(w1))
+        weight[0, k], weight[1, k] = w0, w1
 
 
 @kernel
-def shape(hypothesis, slot, out):
-    """Fill out (2,) with the signature since this onset: of growth a part, of an end what it was then."""
-    if hypothesis.kind == ENDING:
-        if hypothesis.missing[slot] > 0.0:
-            hypothesis.held[slot, :] = hypothesis.signature
-            hypothesis.missing[slot] = 0.0
-        out[:] = hypothesis.held[slot]
-        return
-    grown = 1.0
-    if hypothesis.kind == GROWING:
-        hypothesis.missing[slot] *= hypothesis.growth_keep
-        grown -= hypothesis.missing[slot]
-    out[0], out[1] = grown * hypothesis.signature[0], grown * hypothesis.signature[1]
+def overlap(block, keep):
+    """Bring R_j to this frame, and `slack`: how much of N the declared errors of the coefficients explain."""
+    weight, slack = block.lane.weight, block.lane.slack
+    slack[:] = 0.0
+    for j in range(block.n_regressors):
+        r0, r1 = block.regressor_response[j, 0], block.regressor_response[j, 1]
+        total, tolerance = block.lane.overlap[j], block.tolerance[j]
+        for k in range(LANES):
+            total[k] = keep * total[k] + (weight[0, k] * r0 + weight[1, k] * r1)
+            slack[k] += tolerance * abs(total[k])
 
 
 @kernel
 def weigh(block, tolerated, dt, keep):
     """Add the frame just whitened to every hypothesis and onset; `keep` is the share of what was there."""
-    response = block.scratch
     for h in range(block.n_hypotheses):
-        hypothesis = block.hypothesis[h]
-        for slot in range(N_SLOTS):
-            shape(hypothesis, slot, block.shaped)
-            whiten(block, hypothesis.response[slot], block.shaped, dt, response)
-            w0 = block.S_inverse[0, 0] * response[0] + block.S_inverse[0, 1] * response[1]
-            w1 = block.S_inverse[1, 0] * response[0] + block.S_inverse[1, 1] * response[1]
-            N = w0 * block.innovation[0] + w1 * block.innovation[1]
-            hypothesis.correlation[slot] = keep * hypothesis.correlation[slot] + N
-            hypothesis.information[slot] = (
-                keep * hypothesis.information[slot] + w0 * response[0] + w1 * response[1]
-            )
-            if block.level > 0.0:
-                allow(block, hypothesis, slot, w0, w1, keep)
-            if tolerated:
-                for j in range(block.n_regressors):
-                    R = w0 * block.regressor_response[j, 0] + w1 * block.regressor_response[j, 1]
-                    hypothesis.overlap[slot, j] = keep * hypothesis.overlap[slot, j] + R
+        shape(block, h)
+    respond(block, dt, keep)
+    if tolerated:
+        overlap(block, keep)
 
 
 @kernel
-def tolerance(block, hypothesis, slot):
-    """How much of N the declared errors of the coefficients can explain."""
-    total = 0.0
-    for j in range(block.n_regressors):
-        total += block.tolerance[j] * abs(hypothesis.overlap[slot, j])
-    return total
+def allowance(lane, k, swing0, swing1):
+    """How much of N, in lane k, a bounded uncertainty can explain; swing0, swing1: a block's `swing`."""
+    last = swing0 * abs(lane.weight[0, k]) + swing1 * abs(lane.weight[1, k])
+    return lane.stays[k] + min(lane.swings[k] + last, lane.drifts[k])
 
 
 @kernel
@@ -154,61 +167,69 @@ def one_sided(kind):
 
 
 @kernel
-def speaking_for(kind, N):
-    """The evidence for a hypothesis in its correlation N: a loss takes away, one that ends gives back."""
-    if kind == ENDING:
-        return N
-    return -N if one_sided(kind) else abs(N)
-
-
-@kernel
-def log_likelihood(kind, evidence, information):
+def log_likelihood(is_loss, evidence, information):
     """Largest log likelihood ratio for an evidence N against no fault; a loss is at most whole."""
     if evidence <= 0.0:
         return 0.0
-    if one_sided(kind) and evidence > information:
+    if is_loss and evidence > information:
         return evidence - 0.5 * information
     return 0.5 * evidence * evidence / information
 
 
 @kernel
-def share(block, evidence, room, D):
+def share(level, chance, evidence, room, D):
     """Evidence in standard deviations, or as many as it is of all that bounded uncertainty and chance allow.
 
     room: what a bounded uncertainty can add to the evidence, of information D.
     """
-    root = D**0.5
-    return evidence / (root if room <= 0.0 else max(root, room / block.level + block.chance * root))
+    root = sqrt(D)
+    return evidence / (root if room <= 0.0 else max(root, room / level + chance * root))
 
 
 @kernel
-def judge(block, tolerated, memory=0.0):
+def judge_lanes(block, certain):
+    """Find what every lane comes to; certain: what a bounded uncertainty may hide is no doubt.
+
+    A lane without information comes to nothing.
+    """
+    lane, sense, swing0, swing1 = block.lane, block.lane.sense, block.swing[0], block.swing[1]
+    level, chance, doubted = block.level, block.chance, 0.0 if certain else 1.0
+    for k in range(LANES):
+        N, D, slack = lane.correlation[k], lane.information[k], lane.slack[k]
+        is_loss, known = sense[k] != 0.0, D > 0.0
+        evidence = sense[k] * N if is_loss else abs(N)
+        room = allowance(lane, k, swing0, swing1)
+        doubt = slack + doubted * room
+        score = share(level, chance, evidence - slack, room, D)
+        likelihood = log_likelihood(is_loss, evidence, D)
+        at_least = log_likelihood(is_loss, evidence - doubt, D)
+        at_most = log_likelihood(is_loss, evidence + doubt, D)
+        lane.score[k] = score if known else 0.0
+        lane.at_least[k] = at_least if known else 0.0
+        lane.at_most[k] = at_most if known else 0.0
+        lane.likelihood[k] = likelihood if known else -1.0
+
+
+@kernel
+def judge(block, memory=0.0):
     """Fill each hypothesis' score, estimate, and the least and greatest log likelihood ratio it can have.
 
     memory: where a loss may end, what a frame leaves of what one explained before; 0 where a loss stays.
     """
+    lane = block.lane
+    judge_lanes(block, memory > 0.0)
     for h in range(block.n_hypotheses):
         hypothesis = block.hypothesis[h]
-        hypothesis.at_most *= memory
-        hypothesis.score, hypothesis.at_least, best = 0.0, 0.0, -1.0
-        for slot in range(N_SLOTS):
-            D = hypothesis.information[slot]
-            if D <= 0.0:
-                continue
-            N = hypothesis.correlation[slot]
-            evidence = speaking_for(hypothesis.kind, N)
-            slack = tolerance(block, hypothesis, slot) if tolerated else 0.0
-            room = allowance(block, hypothesis, slot) if block.level > 0.0 else 0.0
-            hypothesis.score = max(hypothesis.score, share(block, evidence - slack, room, D))
-            doubt = slack + (room if memory == 0.0 else 0.0)
-            at_least = log_likelihood(hypothesis.kind, evidence - doubt, D)
-            at_most = log_likelihood(hypothesis.kind, evidence + doubt, D)
-            hypothesis.at_least = max(hypothesis.at_least, at_least)
-            hypothesis.at_most = max(hypothesis.at_most, at_most)
-            likelihood = log_likelihood(hypothesis.kind, evidence, D)
-            if likelihood > best:
-                best = likelihood
-                hypothesis.theta, hypothesis.certainty = estimate(hypothesis.kind, N, D), D
+        score, at_least, at_most, best, likeliest = 0.0, 0.0, memory * hypothesis.at_most, -1.0, -1
+        for k in range(h, LANES, MAX_HYPOTHESES):
+            score = max(score, lane.score[k])
+            at_least, at_most = max(at_least, lane.at_least[k]), max(at_most, lane.at_most[k])
+            if lane.likelihood[k] > best:
+                best, likeliest = lane.likelihood[k], k
+        hypothesis.score, hypothesis.at_least, hypothesis.at_most = score, at_least, at_most
+        if likeliest >= 0:
+            N, D = lane.correlation[likeliest], lane.information[likeliest]
+            hypothesis.theta, hypothesis.certainty = estimate(hypothesis.kind, N, D), D
 
 
 @kernel

@@ -14,7 +14,16 @@ from beaver_ftc.design.inertia import inertia_coefficients
 from beaver_ftc.design.terms import AIRSPEED, ALPHA, BETA, PH, QDYN, QH, RH, fill_table
 from beaver_ftc.design.variants import coefficient_slopes, jacobian
 from beaver_ftc.diagnosis.admitted import GUST_FT_S, SCALE_FT, inertia_slack, tolerances
-from beaver_ftc.diagnosis.state import ALPHA3, ENDING, GROWING, LEAST_UNCERTAINTY_RAD_S2, LOSS, N_SLOTS, STEP
+from beaver_ftc.diagnosis.state import (
+    ALPHA3,
+    ENDING,
+    GROWING,
+    LEAST_UNCERTAINTY_RAD_S2,
+    LOSS,
+    N_SLOTS,
+    SENSE,
+    STEP,
+)
 from beaver_ftc.plant.instruments import SIGNALS
 from beaver_ftc.scenario.diagnosis import Bounds, FdiConfig, Statistical
 from beaver_ftc.scenario.sensors import Sensors
@@ -129,6 +138,8 @@ def _set_up_blocks(statistical: np.void, sensors: Sensors, aircraft: Aircraft) -
             variance = max(_random_error(sensors, AXES[axis]), LEAST_NOISE_RAD_S) ** 2
             block["noise"][i] = block["P_xx"][i, i] = variance
             block["P_dd"][i, i] = PRIOR_DRIFT_RAD_S2**2
+        sense = block["lane"]["sense"].reshape(N_SLOTS, -1)
+        sense[:, : len(members)] = [SENSE[kind] for kind, *_ in members]
         for hypothesis, (kind, surface, axis, alarms) in zip(block["hypothesis"], members, strict=False):
             hypothesis["kind"], hypothesis["surface"] = kind, surface
             hypothesis["axis"], hypothesis["alarms"] = axis, alarms

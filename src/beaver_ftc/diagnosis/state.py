@@ -53,25 +53,39 @@ ESTIMATOR = np.dtype(
 
 # What the statistical detector keeps: air.py, whitening.py, likelihood.py. A block is the axes whose noise
 # goes together: pitch, and roll with yaw, the latter twice. States of a filter: what is left of the rate,
-# then the drift.
+# then the drift. Every hypothesis is tried from every onset: that is a lane of a block, and what lanes keep
+# lies side by side for vector instructions, lane slot * MAX_HYPOTHESES + hypothesis.
 N_SLOTS = 10
 MAX_HYPOTHESES, MAX_REGRESSORS = 8, 2 * MAX_TERMS_OF_ONE
+LANES = N_SLOTS * MAX_HYPOTHESES
 EITHER, WORST_CASE, STATISTICS = 0, 1, 2  # whose alarms count
 LEAST_UNCERTAINTY_RAD_S2 = 1e-3  # reckoned with: a bound that passes zero does not stay there
 STEP, ALPHA3, GROWING, ENDING = 2, 3, 4, 5  # further kinds of hypothesis: likelihood.py
+# Which sign of a correlation speaks for one: a loss takes away, one that ends gives back; 0: either does.
+SENSE = {LOSS: -1.0, STEP: 0.0, ALPHA3: 0.0, GROWING: -1.0, ENDING: 1.0}
 
 HYPOTHESIS = np.dtype(
     [
         ("kind", "i8"), ("surface", "i8"), ("axis", "i8"), ("alarms", "i8"), ("column", "i8"),
-        ("signature", "f8", (2,)), ("response", "f8", (N_SLOTS, 4)),
-        ("correlation", "f8", (N_SLOTS,)), ("information", "f8", (N_SLOTS,)),
-        ("overlap", "f8", (N_SLOTS, MAX_REGRESSORS)),
-        ("growth_keep", "f8"), ("missing", "f8", (N_SLOTS,)),  # of a loss that grows, what is yet to come
-        ("held", "f8", (N_SLOTS, 2)),  # of a loss that ends, its signature as it did
-        # what a bounded uncertainty can add to the correlation: as it stays, as it swings, at its pace
-        ("weight", "f8", (N_SLOTS, 2)), ("stays", "f8", (N_SLOTS,)),
-        ("swings", "f8", (N_SLOTS,)), ("drifts", "f8", (N_SLOTS,)),
+        ("signature", "f8", (2,)), ("growth_keep", "f8"),
         ("score", "f8"), ("theta", "f8"), ("certainty", "f8"), ("at_least", "f8"), ("at_most", "f8"),
+    ],
+    align=True,
+)  # fmt: skip
+
+LANE = np.dtype(
+    [
+        ("sense", "f8", (LANES,)), ("shaped", "f8", (2, LANES)), ("response", "f8", (4, LANES)),
+        ("weight", "f8", (2, LANES)),  # S^-1 g_s of the frame
+        ("correlation", "f8", (LANES,)), ("information", "f8", (LANES,)),
+        ("overlap", "f8", (MAX_REGRESSORS, LANES)), ("slack", "f8", (LANES,)),
+        ("missing", "f8", (LANES,)),  # of a loss that grows, what is yet to come
+        ("held", "f8", (2, LANES)),  # of a loss that ends, its signature as it did
+        # what a bounded uncertainty can add to the correlation: as it stays, as it swings, at its pace
+        ("stays", "f8", (LANES,)), ("swings", "f8", (LANES,)), ("drifts", "f8", (LANES,)),
+        # what it comes to, the last three as log likelihood ratios
+        ("score", "f8", (LANES,)),
+        ("at_least", "f8", (LANES,)), ("at_most", "f8", (LANES,)), ("likelihood", "f8", (LANES,)),
     ],
     align=True,
 )  # fmt: skip
@@ -80,7 +94,6 @@ BLOCK = np.dtype(
     [
         ("n", "i8"), ("axis", "i8", (2,)), ("lag", "f8"), ("keep", "f8"), ("stronger", "f8"),
         ("state", "f8", (4,)), ("rest", "f8", (4,)), ("innovation", "f8", (2,)), ("scratch", "f8", (2,)),
-        ("shaped", "f8", (2,)),
         ("P_xx", "f8", (2, 2)), ("P_xd", "f8", (2, 2)), ("P_dd", "f8", (2, 2)),
         ("drift", "f8", (2, 2)), ("jitter", "f8", (2,)), ("noise", "f8", (2,)),
         ("S_inverse", "f8", (2, 2)), ("K_x", "f8", (2, 2)), ("K_d", "f8", (2, 2)),
@@ -90,6 +103,7 @@ BLOCK = np.dtype(
         ("regressor", "f8", (MAX_REGRESSORS, 2)), ("regressor_state", "f8", (MAX_REGRESSORS, 4)),
         ("regressor_response", "f8", (MAX_REGRESSORS, 2)),
         ("n_hypotheses", "i8"), ("hypothesis", HYPOTHESIS, (MAX_HYPOTHESES,)),
+        ("lane", LANE),
     ],
     align=True,
 )  # fmt: skip

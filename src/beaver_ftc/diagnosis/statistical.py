@@ -62,7 +62,7 @@ def observe(statistical, innovation, dt, frame, latched, ends=False):
                     block, block.regressor_state[j], block.regressor[j], dt, block.regressor_response[j]
                 )
         likelihood.weigh(block, statistical.tolerated, dt, keep)
-        likelihood.judge(block, statistical.tolerated, statistical.keep if ends else 0.0)
+        likelihood.judge(block, statistical.keep if ends else 0.0)
 
 
 @kernel

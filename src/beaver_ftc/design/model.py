@@ -126,9 +126,8 @@ def accelerations_per_rad(design, y, G):
     longitudinal = design.Qm * y[QDYN] * design.S * design.c
     for s in range(G.shape[1]):
         Cl, Cn = G[0, s], G[2, s]
-        G[0, s] = lateral * (design.Pn * Cn + design.Pl * Cl)
-        G[1, s] = longitudinal * G[1, s]
-        G[2, s] = lateral * (design.Rn * Cn + design.Rl * Cl)
+        in_roll, in_yaw = design.Pn * Cn + design.Pl * Cl, design.Rn * Cn + design.Rl * Cl
+        G[0, s], G[1, s], G[2, s] = lateral * in_roll, longitudinal * G[1, s], lateral * in_yaw
 
 
 @kernel

@@ -1,6 +1,7 @@
 """From what a scenario declares in `fdi.bounds` to the numbers of derived.py."""
 
 from dataclasses import astuple, replace
+from functools import lru_cache
 from itertools import product
 from math import exp, log, radians, sqrt
 
@@ -27,6 +28,7 @@ def gust_sigma_rad_s(turbulence: str, span_m: float) -> float:
     return ROLLING * GUST_FT_S[turbulence] / sqrt(SCALE_FT * span_ft)
 
 
+@lru_cache(maxsize=64)
 def inertia_slack(tolerance: float, mass: MassProperties) -> np.ndarray:
     """Largest change of the twelve inertia coefficients for every inertia within its tolerance.
 
@@ -40,6 +42,7 @@ def inertia_slack(tolerance: float, mass: MassProperties) -> np.ndarray:
         }
         there = np.array(astuple(inertia_coefficients(replace(mass, **change))))
         worst = np.maximum(worst, np.abs(there - nominal))
+    worst.flags.writeable = False  # kept: the same for every flight of a design
     return worst
 
 

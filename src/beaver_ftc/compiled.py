@@ -46,7 +46,7 @@ _SOURCES = (
     "control/laws/*.py", "control/outer/*.py", "plant/channels.py", "plant/native.py", "plant/instruments.py",
     "plant/readings.py",
     "compiled.py", "plant/sensing.py", "loop/frame.py", "loop/accounts.py", "loop/record.py",
-    "loop/agent.py", "loop/steps.py", "loop/watching.py",
+    "loop/agent.py", "loop/rows.py", "loop/steps.py", "loop/watching.py",
 )  # fmt: skip
 
 

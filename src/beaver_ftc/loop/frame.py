@@ -30,6 +30,7 @@ from beaver_ftc.diagnosis.instruments import attend
 from beaver_ftc.diagnosis.state import diagnosis_dtype, verdict_dtype
 from beaver_ftc.loop.accounts import account, accounts_dtype, add_effect, effect_of_faults, follow_guarantee
 from beaver_ftc.loop.record import record
+from beaver_ftc.loop.rows import row_of
 from beaver_ftc.plant import channels as ch
 from beaver_ftc.plant.instruments import INSTRUMENTS
 from beaver_ftc.plant.native import RUNNING, advance
@@ -225,7 +226,7 @@ def fly_frame(frames, references, log):
     diagnose(frame)
     decide(frame)
     command(frame)
-    finish(frame, references[frame.row], log[frame.row])
+    finish(frame, row_of(references, frame.row), row_of(log, frame.row))
     return status
 
 

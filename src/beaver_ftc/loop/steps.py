@@ -8,6 +8,7 @@ left of a bar: built in, right of it: a plug-in's answer. `frame.fly_frame` is t
 from beaver_ftc.compiled import kernel
 from beaver_ftc.diagnosis import instruments, scheme
 from beaver_ftc.loop import frame as whole
+from beaver_ftc.loop.rows import row_of
 
 
 @kernel
@@ -63,4 +64,4 @@ def take_command(frames, deflections):
 def finish(frames, references, log):
     """Account, record, hand the command over."""
     frame = frames[0]
-    whole.finish(frame, references[frame.row], log[frame.row])
+    whole.finish(frame, row_of(references, frame.row), row_of(log, frame.row))

@@ -208,8 +208,16 @@ class Aircraft:
         A plain sum for those who want one number now and then; `scale` multiplies single terms.
         """
         scale = scale or {}
-        terms = (term for term in self.terms.values() if term.coefficient == name)
-        return sum(t.value * scale.get(t.name, 1.0) * prod(of[factor] for factor in t.factors) for t in terms)
+        terms = self._terms_of.get(name, ())
+        return sum(t.value * scale.get(t.name, 1.0) * prod(of[f] for f in factors) for t, factors in terms)
+
+    @cached_property
+    def _terms_of(self) -> Mapping[str, tuple[tuple[Term, tuple[str, ...]], ...]]:
+        """The terms of each coefficient, and what they multiply."""
+        sums: dict[str, list[tuple[Term, tuple[str, ...]]]] = {}
+        for term in self.terms.values():
+            sums.setdefault(term.coefficient, []).append((term, tuple(term.factors)))
+        return {name: tuple(terms) for name, terms in sums.items()}
 
     def index(self, term: str) -> int:
         """Place of a moment's term in `moments`. Raises KeyError for a name the file lacks."""

@@ -1,6 +1,7 @@
 """Dotted keys: `faults[0].magnitude` as a place in a scenario's data."""
 
 import re
+from functools import lru_cache
 from typing import Any
 
 from beaver_ftc.documents.base import Location
@@ -14,6 +15,7 @@ class UnusableKeyError(ValueError):
     """The key is none, or the data has no such place; the message says what is allowed."""
 
 
+@lru_cache(maxsize=1024)  # a sweep asks for the same few again for each flight
 def parse_key(key: str) -> Location:
     """'faults[0].magnitude' -> ('faults', 0, 'magnitude'). Raises UnusableKeyError."""
     parts = [(name or int(index)) for name, index in _PART.findall(key)]

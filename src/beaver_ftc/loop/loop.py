@@ -30,7 +30,7 @@ from beaver_ftc.plant.reuse import give_back
 from beaver_ftc.plant.sensor_faults import SensorFaultSchedule
 from beaver_ftc.plugins import DETECTORS, LAWS, is_compiled
 from beaver_ftc.scenario.schema import Scenario
-from beaver_ftc.scenario.signals import sample
+from beaver_ftc.scenario.signals import sample_frames
 
 if TYPE_CHECKING:
     from beaver_ftc.control.base import Law
@@ -197,8 +197,7 @@ class Loop:
 
     def sample_references(self, start: int, rows: int) -> None:
         """Find the references of frames start to start + rows, for the first rows of the log to come."""
-        t = np.arange(start, start + rows) / self.scenario.rate_hz
-        self.references[:rows] = sample(self.scenario.reference, t)
+        self.references[:rows] = sample_frames(self.scenario.reference, start, rows, self.scenario.rate_hz)
         self.frames["row"] = 0
 
     def fly_chunk(self, start: int, rows: int) -> int:

@@ -4,6 +4,7 @@ One class a kind: its parameters and `rate_deg_s(t_s)`. tau = t - start_s; every
 before `start_s` and, but for the ramp, from `end_s` on. A new kind is a class here and a line in `Signal`.
 """
 
+from functools import lru_cache
 from math import pi
 from typing import Any, Self
 
@@ -231,6 +232,14 @@ def sample(reference: Reference, t_s: Samples) -> Samples:
     Shapes: t_s (n,) -> (n, 3), columns p, q, r. Units: s -> rad/s.
     """
     return sample_deg_s(reference, t_s) * RAD_PER_DEG
+
+
+@lru_cache(maxsize=4)  # flights of a sweep fly the same, as a rule
+def sample_frames(reference: Reference, first: int, frames: int, rate_hz: float) -> Samples:
+    """The commanded body rates of so many frames from one on, (frames, 3) rad/s, not to be changed."""
+    sampled = sample(reference, np.arange(first, first + frames) / rate_hz)
+    sampled.flags.writeable = False
+    return sampled
 
 
 def sample_deg_s(reference: Reference, t_s: Samples) -> Samples:

@@ -28,7 +28,7 @@ from beaver_ftc.diagnosis.state import (
 from beaver_ftc.diagnosis.types.pairs import IN_PITCH, IN_ROLL_AND_YAW
 from beaver_ftc.errors import BadInput
 from beaver_ftc.loop import memory
-from beaver_ftc.loop.frame import frame_dtype
+from beaver_ftc.loop.frame import frame_dtype, idle
 from beaver_ftc.loop.instruments import (
     admit_engine,
     assemble_instruments,
@@ -290,7 +290,7 @@ def _assemble_admitted(frame: np.void, scenario: Scenario) -> None:
 
 _DESIGN = {"fdi", "control", "design_model", "actuators", "sensors", "rate_hz", "substeps"}
 _MOST_DESIGNS = 32
-_designs: dict[tuple[object, ...], np.ndarray] = {}
+_designs: dict[tuple[object, ...], memory.Packed] = {}
 
 
 def assemble(scenario: Scenario, trim: np.ndarray, travel: np.ndarray) -> np.ndarray:
@@ -306,8 +306,8 @@ def assemble(scenario: Scenario, trim: np.ndarray, travel: np.ndarray) -> np.nda
     if key not in _designs:
         if len(_designs) >= _MOST_DESIGNS:
             _designs.clear()
-        _designs[key] = _assemble_design(scenario, travel)
-    frames = memory.copied(_designs[key])
+        _designs[key] = memory.packed(_assemble_design(scenario, travel), idle(scenario.fdi))
+    frames = memory.unpacked(_designs[key])
     frame = frames[0]
     frame["belief"]["u"] = frame["belief"]["commanded"] = trim
     frame["control"]["trim"] = frame["control"]["command"] = trim

@@ -45,8 +45,9 @@ from beaver_ftc.plant.sensing import (
     measure,
     truth_dtype,
 )
+from beaver_ftc.scenario.diagnosis import FdiConfig
 
-__all__ = ["FLYING", "NOT_FINITE", "fly_frame", "fly_on", "frame_dtype", "hold", "look_inside"]
+__all__ = ["FLYING", "NOT_FINITE", "fly_frame", "fly_on", "frame_dtype", "hold", "idle", "look_inside"]
 
 
 # What the log has columns for, whatever changes in flight: estimators and statistical tests, the engine.
@@ -68,6 +69,12 @@ def frame_dtype(n: int) -> np.dtype:
         ("accounts", accounts_dtype(n)), ("departed", "i8"),
     ]  # fmt: skip
     return np.dtype(fields, align=True)
+
+
+def idle(fdi: FdiConfig) -> list[tuple[str, ...]]:
+    """Large fields that are not read before they are written: delay lines are filled by the first sample."""
+    unused = [] if fdi.statistical else [("fdi", "statistical", "block")]
+    return [("instruments", "line"), *unused]
 
 
 @kernel

@@ -7,7 +7,7 @@ does what it lags by. The full start has the last word, in trim.py.
 """
 
 from collections.abc import Callable
-from math import cos, sin
+from math import cos, isfinite, sin
 
 import numpy as np
 
@@ -56,7 +56,7 @@ def approach(truth: Plant, state: FlightState, names: tuple[str, ...]) -> Vector
 
 def newton_step(J: Vector, here: Vector) -> Vector:
     """The step that takes `here` (6,) to zero in the least-squares sense; zero where that is not finite."""
-    if not (np.isfinite(J).all() and np.isfinite(here).all()):
+    if not isfinite(J.sum() + here.sum()):
         return np.full(J.shape[1], np.nan)
     try:
         return np.linalg.solve(J, -here)
@@ -74,20 +74,18 @@ def _looking(truth: Plant, state: FlightState, names: tuple[str, ...]) -> Look:
     fdm, speed_fps = truth.fdm, state.airspeed_mps * FT_PER_M
     theta_place, *flow = (truth.input(name) for name in ("ic/theta-rad", *_RATES_AND_FLOW))
     surfaces = [truth.input(truth.aircraft.surface[name.removesuffix("_rad")].command) for name in names[3:]]
-    results = [(truth.node(name), factor) for name, factor in ACCELERATIONS]
+    puts = [node.set_double_value for node in (theta_place, *flow, *surfaces)]
+    gets = [truth.node(name).get_double_value for name, _ in ACCELERATIONS]
+    factors = np.array([factor for _, factor in ACCELERATIONS])
 
     def look(x: Vector) -> Vector:
-        alpha, beta, theta, *deflections = map(float, x)
-        theta_place.set_double_value(theta)
+        alpha, beta, theta, *deflections = x.tolist()
         along = speed_fps * cos(beta)
-        for node, value in zip(
-            flow, (along * cos(alpha), speed_fps * sin(beta), along * sin(alpha)), strict=True
-        ):
-            node.set_double_value(value)
-        for node, value in zip(surfaces, deflections, strict=True):
-            node.set_double_value(value)
+        flow_fps = along * cos(alpha), speed_fps * sin(beta), along * sin(alpha)
+        for put, value in zip(puts, (theta, *flow_fps, *deflections), strict=True):
+            put(value)
         if not fdm.run_ic():
             raise SimulationFailed("JSBSim cannot initialise the flight")
-        return np.array([node.get_double_value() * factor for node, factor in results])
+        return np.array([get() for get in gets]) * factors
 
     return look

@@ -6,6 +6,7 @@ POS + n + s and POS + 2 n + s, and signal k at POS + 3 n + k.
 """
 
 from collections.abc import Iterable
+from functools import lru_cache
 
 from beaver_ftc.aircraft import AXES, Aircraft, load
 from beaver_ftc.aircraft.schema import MAX_SIGNALS
@@ -46,6 +47,7 @@ PDOT, ENVELOPE = _INDEX["pdot_rad_s2"], _INDEX["envelope_valid"]
 POS = len(FIXED)
 
 
+@lru_cache(maxsize=32)
 def truth_channels(aircraft: Aircraft) -> tuple[Channel, ...]:
     """What is read from the truth of an aircraft, in order."""
     return (
@@ -68,6 +70,7 @@ _ENGINE = ("engine_rpm", "manifold_pressure_inhg")
 N_FURTHER = len(_INERTIAL) + len(_ENGINE)
 
 
+@lru_cache(maxsize=32)
 def further_channels(aircraft: Aircraft) -> tuple[Channel, ...]:
     """What is read from the truth after `truth_channels` where there are more instruments than usual."""
     settings = aircraft.engine.settings

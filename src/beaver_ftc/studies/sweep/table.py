@@ -7,6 +7,7 @@ bytes.
 import json
 from collections import Counter
 from collections.abc import Callable, Sequence
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from beaver_ftc.scenario.sweep_schema import Variation
@@ -135,7 +136,8 @@ _JUDGED: tuple[Column, ...] = (
 )
 
 
-def columns_of(surfaces: Sequence[str]) -> tuple[Column, ...]:
+@cache
+def columns_of(surfaces: tuple[str, ...]) -> tuple[Column, ...]:
     """(name, type, where from) of what came of each flight of an aircraft with these surfaces."""
     return (
         *_FLOWN,

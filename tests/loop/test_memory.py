@@ -1,0 +1,42 @@
+"""Records of flights that are over become records of new ones, to the byte, but for what nobody reads."""
+
+import numpy as np
+
+from beaver_ftc.loop import memory
+
+RECORD = np.dtype(
+    [("few", "f8", (7,)), ("inside", [("kind", "i8"), ("line", "f8", (900,))]), ("rest", "u1", (3001,))],
+    align=True,
+)
+
+
+def _record(rng):
+    record = np.zeros(1, RECORD)
+    record["few"], record["inside"]["kind"] = rng.normal(size=7), 3
+    record["rest"][0, rng.integers(0, 3001, 5)] = 255
+    return record
+
+
+def _dirty():
+    """Memory of a flight that is over, of whatever it has left."""
+    old = memory.taken((1,), RECORD)
+    old.view(np.uint8)[:] = 77
+    memory.give_back(old)
+
+
+def test_a_copy_is_its_record_to_the_byte_in_whatever_memory():
+    rng = np.random.default_rng(1)
+    for record in (_record(rng), _record(rng), np.zeros(1, RECORD), np.ones(1, RECORD)):
+        kept = memory.packed(record)
+        _dirty()
+        assert memory.unpacked(kept).tobytes() == record.tobytes()
+
+
+def test_only_what_is_said_to_be_idle_is_left_as_it_was():
+    record = _record(np.random.default_rng(2))
+    _dirty()
+    copy = memory.unpacked(memory.packed(record, [("inside", "line")]))
+    assert set(copy["inside"]["line"].view(np.uint8).ravel()) <= {0, 77}
+    assert (copy["inside"]["line"][0, 200:700].view(np.uint8) == 77).all()
+    copy["inside"]["line"] = 0.0
+    assert copy.tobytes() == record.tobytes()

@@ -58,6 +58,16 @@ that were not.
 `run`, `sweep`, `matrix --aircraft`, `compare`, `live` and `detectability` fly any of them. `mismatch` splits
 what is left by the terms of the built-in aircraft, and refuses others.
 
+The surfaces are aileron, elevator and rudder. Flaps, slats, speed brakes and spoilers stay as the aircraft's
+own flight control moves them: most go in detents at a pace of their own, and no law can control with them.
+So no surface stands in for the elevator, and where trim needs much of its travel a large loss cannot be
+balanced: the P-51 in level flight holds its elevator at half its travel, and with less than half of its
+effectiveness left nothing holds the nose up.
+
+An aircraft folder of your own is compared with its JSBSim model when a scenario first names it: 800 states
+over its envelope, and a line for each axis on which the difference exceeds what the file declares beside the
+published bound. What was found is kept until a file in the folder changes.
+
 ## The aircraft of the jsbsim package
 
 Written by `python -m tools.aircraft_table`; do not edit. Error: of the angular acceleration near trim (second

@@ -38,13 +38,12 @@ def is_own_log(path: Path) -> bool:
 
 def replay(path: Path) -> Replay:
     """Step the diagnosis through a log. Raises BadInput where the flight's diagnosis was none of ours."""
-    from beaver_ftc.aircraft.loading import load
     from beaver_ftc.loop.stream import Diagnosis
     from beaver_ftc.scenario.loader import load_scenario
 
     scenario = load_scenario(path.with_name("scenario.yaml"))
     log = read_numbers(path)
-    aircraft = load(getattr(scenario, "aircraft", "beaver"))
+    aircraft = scenario.airframe
     keys = scenario.model_dump(mode="json", exclude_unset=True)
     others = {key: keys[key] for key in ("actuators", "design_model") if key in keys}
     diagnosis = Diagnosis(aircraft, scenario.rate_hz, keys.get("fdi"), **others)

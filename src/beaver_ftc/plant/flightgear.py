@@ -3,10 +3,11 @@
 import time
 from collections.abc import Callable
 
+from beaver_ftc.aircraft.loading import DEFAULT
 from beaver_ftc.errors import SimulationFailed
 from beaver_ftc.plant.adapter import Plant
 
-DIRECTIVE = "aircraft/beaver/flightgear.xml"
+DIRECTIVE = f"aircraft/{DEFAULT}/flightgear.xml"
 
 
 def show_in_flightgear(plant: Plant, host: str, port: int) -> None:

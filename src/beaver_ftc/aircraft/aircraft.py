@@ -124,7 +124,11 @@ class Aircraft:
 
     @cached_property
     def dominant_axis(self) -> tuple[int, ...]:
-        """Of each surface, the axis (p, q, r) it turns most about, by its terms at `usual_signals`."""
+        """Of each surface, the axis (p, q, r) it turns most about, by its terms at `usual_signals`.
+
+        An axis that none turns most about (a rudder high above the wing rolls more than it yaws) is that of
+        the surface that turns most about it, of those that share theirs with another.
+        """
         mass, geometry = self.mass, self.geometry
         arms = (geometry.span_m / mass.Ix_kg_m2, geometry.chord_m / mass.Iy_kg_m2)
         per_axis = dict(zip(MOMENTS, (*arms, geometry.span_m / mass.Iz_kg_m2), strict=True))
@@ -134,7 +138,13 @@ class Aircraft:
             if term.surface:
                 value = term.value * prod(usual[signal] ** power for signal, power in term.of)
                 effect[term.surface][MOMENTS.index(term.coefficient)] += value * per_axis[term.coefficient]
-        return tuple(max(range(3), key=lambda axis: abs(effect[s][axis])) for s in self.surfaces)
+        axes = [max(range(3), key=lambda axis: abs(effect[s][axis])) for s in self.surfaces]
+        for axis in set(range(3)) - set(axes):
+            turns = {s: abs(effect[name][axis]) for s, name in enumerate(self.surfaces)}
+            free = [s for s, size in turns.items() if size > 0.0 and axes.count(axes[s]) > 1]
+            if free:
+                axes[max(free, key=turns.__getitem__)] = axis
+        return tuple(axes)
 
     @cached_property
     def usual_signals(self) -> Mapping[str, float]:

@@ -73,3 +73,11 @@ def test_a_scenario_that_names_the_folder_hears_of_it_once(trainer, capsys):
         load("./trainer", trainer.parent)
     (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith("beaver-ftc: trainer/aircraft.yaml: warning: q: the terms are ")
+
+
+def test_a_rudder_that_rolls_more_than_it_yaws_leads_the_yaw_axis_all_the_same(trainer):
+    """Nobody else does: without a leader of yaw there is no trim, as an F-16 and an XB-70 had none."""
+    change(trainer / "aircraft.yaml", "name: Cl_rudder, value: 0.012", "name: Cl_rudder, value: 0.12")
+    aircraft = read(trainer)
+    assert aircraft.dominant_axis == (0, 1, 2)
+    assert aircraft.primary == ("aileron", "elevator", "rudder")

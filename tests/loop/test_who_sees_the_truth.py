@@ -55,10 +55,10 @@ for words in json.loads(sys.argv[1]):
         pass
 print(json.dumps(calls))
 """
-STUCK = [{"actuator": "elevator", "type": "stuck", "at_s": 1.0}]
-LOSS = [{"actuator": "aileron", "type": "loss_of_effectiveness", "magnitude": 0.8, "at_s": 1.0}]
-COMMON = {"name": "watched", "duration_s": 4, "rate_hz": 20}
-GYRO = [{"sensor": "q", "type": "bias", "magnitude": 2, "at_s": 1.0}]
+STUCK = [{"actuator": "elevator", "type": "stuck", "at_s": 0.3}]
+LOSS = [{"actuator": "aileron", "type": "loss_of_effectiveness", "magnitude": 0.8, "at_s": 0.3}]
+COMMON = {"name": "watched", "duration_s": 0.8, "rate_hz": 20}
+GYRO = [{"sensor": "q", "type": "bias", "magnitude": 2, "at_s": 0.3}]
 FLIGHTS = [
     {"faults": GYRO, "sensors": {"V": {"bias_mps": 1.0}}},
     {"faults": STUCK, "fdi": {"fault_class": "all", "pairs": True}},

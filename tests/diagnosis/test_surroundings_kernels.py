@@ -88,6 +88,29 @@ def test_the_gusts_of_a_frame_are_summed_over_its_instants():
     assert np.abs(record["acceleration"] - first).max() > 1e-5
 
 
+@pytest.mark.parametrize("swings", [0, 1])
+def test_axes_that_turn_move_what_is_not_seen_besides(swings):
+    """A gust that keeps its size changes in the body as its axis turns: over its lag, half that squared."""
+    rng = np.random.default_rng(7)
+    record = new_air(swings=swings, turning=0.4, rolling=30.0)
+    record["damping"], record["axes"], record["swing"] = rng.normal(size=(3, 3, 3))
+    record["unseen"], record["per_metre"] = (1.0, 0.2, 0.7), (1e-3, 2e-3, 3e-3)
+    axes, swing = record["damping"] @ record["axes"], record["damping"] @ record["swing"]
+    expected = axes @ np.diag([1e-3, 4e-4, 3e-3]) @ axes.T  # of the yawing one no more than all of it
+    lags = 30.0 / V, 0.0, 3.0 * SPAN / (np.pi * V)
+    turned = 0.5 * np.square(lags) * [1e-3, 0.0, 0.4 * 3e-3]
+    expected = V * (expected + swings * swing @ np.diag(turned) @ swing.T)
+    found = [[air.unseen_drift(record, V, i, j) for j in range(3)] for i in range(3)]
+    assert np.array(found) == pytest.approx(expected, rel=1e-12)
+
+
+def test_a_turning_heading_hides_a_yawing_gust():
+    """(rate sigma)^2 lag over the walk's 3 sigma^2 V / scale, lag 3 span / pi V."""
+    record, rate = new_air(scale=500.0), 0.3
+    lag = 3.0 * SPAN / (np.pi * V)
+    assert air.lost_by_turning(record, V, rate) == pytest.approx(rate**2 * lag / (3.0 * V / 500.0))
+
+
 def test_the_bound_of_a_true_estimator_covers_every_course_of_its_parameter():
     """By corners: theta at either end at each instant, by the sign of what it multiplies."""
     low, high = thresholds.interval(-0.9, 0.2, 0.5, -0.3, 0.2, -0.4, 0.05)
@@ -193,7 +216,7 @@ def test_the_drift_is_of_what_is_bounded_and_of_the_air_not_seen(moving):
     fdi, record, design = new_detector()
     rng = np.random.default_rng(1)
     record["air"]["moving"] = moving
-    record["air"]["damping"], record["air"]["turn"] = rng.normal(size=(2, 3, 3))
+    record["air"]["damping"], record["air"]["axes"] = rng.normal(size=(2, 3, 3))
     record["air"]["unseen"], record["air"]["per_metre"] = (1.0, 0.2, 0.3), (1e-3, 2e-3, 3e-3)
     fdi["bound"]["constant"], fdi["bound"]["inertia"] = (0.02, 0.0, 0.04), 0.1
     statistical.drifts(record, fdi, design, X, Y)
@@ -201,7 +224,7 @@ def test_the_drift_is_of_what_is_bounded_and_of_the_air_not_seen(moving):
     thresholds.uncertainty_bound(X, design, np.full(3, 0.1), np.array([0.02, 0.0, 0.04]), 0.0, bounded)
     bounded += [0.01, 0.02, 0.03]
     assert record["bounded"] == pytest.approx(bounded)
-    turned = record["air"]["damping"] @ record["air"]["turn"]
+    turned = record["air"]["damping"] @ record["air"]["axes"]
     unseen = moving * V * turned @ np.diag([1e-3, 4e-4, 9e-4]) @ turned.T
     for block, stronger in zip(record["block"], (1.0, 1.0, 4.0), strict=True):
         axes = block["axis"][: block["n"]]

@@ -20,7 +20,7 @@ PACKAGE = "beaver_ftc"
 
 # Folders from the ground up; a folder imports what is below its own floor, and itself.
 FLOORS = (
-    {"errors", "compiled", "paths", "plugins"},
+    {"errors", "compiled", "elsewhere", "paths", "plugins", "translation"},
     {"documents"},
     {"aircraft"},
     {"design"},

@@ -7,9 +7,11 @@ Compiled code is kept in the user's cache, in a folder named after the sources: 
 also works where the package is read-only.
 
 A kernel that another one calls is only translated: to optimise is done once, for the outermost one and all
-it calls. Numba itself does it again at each level."""
+it calls (translation.py). Of the largest, another process translates a half meanwhile (elsewhere.py).
+"""
 
 # mypy: disable-error-code="attr-defined"
+import atexit
 import contextlib
 import functools
 import gc
@@ -18,22 +20,21 @@ import os
 import pickle
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import lru_cache
 from pathlib import Path
 
 import numba
 import numpy as np
 from numba.core import serialize, sigutils
-from numba.core.codegen import CPUCodeLibrary
 from numba.core.compiler import CompileResult
 from numba.core.compiler_lock import global_compiler_lock
-from numba.core.cpu import CPUContext
-from numba.core.dispatcher import Dispatcher
 from numba.core.registry import CPUDispatcher
-from numba.extending import overload
+from numba.core.types import unliteral
 
+from beaver_ftc.elsewhere import Helper, Part
 from beaver_ftc.paths import cache_base, folder_of_version
+from beaver_ftc.translation import Inner, lighten, nesting
 
 COMPILING = "compiling the flight code, once for this version on this machine: some 15 s on an idle one"
 PATIENCE_S = 1.0  # what takes less needs no word
@@ -44,10 +45,13 @@ _PACKAGE = Path(__file__).parent
 _SOURCES = (
     "aircraft/schema.py", "design/*.py", "diagnosis/*.py", "diagnosis/types/*.py", "control/*.py",
     "control/laws/*.py", "control/outer/*.py", "plant/channels.py", "plant/native.py", "plant/instruments.py",
-    "plant/readings.py",
-    "compiled.py", "plant/sensing.py", "loop/frame.py", "loop/accounts.py", "loop/record.py",
-    "loop/agent.py", "loop/rows.py", "loop/steps.py", "loop/watching.py",
+    "plant/readings.py", "compiled.py", "elsewhere.py", "translation.py", "plant/sensing.py",
+    "loop/frame.py", "loop/accounts.py", "loop/record.py", "loop/agent.py",
+    "loop/rows.py", "loop/steps.py", "loop/watching.py",
 )  # fmt: skip
+
+
+Halves = Callable[..., tuple[list[Part], list[Part]]]
 
 
 def _fingerprint() -> str:
@@ -88,21 +92,33 @@ def compile_into(folder: Path | None, function):
     return _Kernel(folder, function)
 
 
+def in_two(whole, halves: Halves) -> None:
+    """Say of what a kernel mostly consists, so that two processes share the work of its first compilation.
+
+    halves: from the types of its arguments to kernels with theirs; the first for the other process, the
+    second for this one.
+    """
+    if isinstance(whole, _Kernel):
+        whole.halves = halves
+
+
 class _Kernel(CPUDispatcher):
     """A compiled function: kept by itself if Python calls it, and a part of the kernels that call it."""
 
     def __init__(self, folder: Path | None, function) -> None:
         super().__init__(function, targetoptions={"nopython": True, "error_model": "numpy"})
         self._folder, self._store = folder, folder and _Store(folder, function)
+        self.halves: Halves | None = None
 
     def compile(self, sig):
         """Machine code for arguments of these types; inside another kernel only what stands for it."""
         types, _ = sigutils.normalize_signature(sig)
+        types = tuple(map(unliteral, types))  # a number in the text makes no other function of it
         with global_compiler_lock, self._compiling_counter:
             there = self.overloads.get(tuple(types))
-            if there is not None and (_nesting or not isinstance(there.entry_point, _Inner)):
+            if there is not None and (nesting or not isinstance(there.entry_point, Inner)):
                 return there.entry_point
-            if _nesting:
+            if nesting:
                 return self._translated(types, inner=True)
             return self._loaded(types) or self._compiled(types)
 
@@ -122,7 +138,7 @@ class _Kernel(CPUDispatcher):
 
     def _compiled(self, types):
         """Compile, one process at a time, and keep the code."""
-        _lighten()
+        lighten()
         with _alone(self._folder), _announced():
             if entry_point := self._loaded(types):
                 return entry_point  # another process came first
@@ -134,91 +150,26 @@ class _Kernel(CPUDispatcher):
 
     def _translated(self, types, inner: bool):
         wrappers = {"no_cpython_wrapper": inner, "no_cfunc_wrapper": True}
-        self._compiler.targetoptions = self.targetoptions | wrappers
-        _nesting.append(self)
+        nesting.append(self)
         try:
+            if not inner and self.halves is not None:
+                self._translate_halves(*self.halves(*types))
+            self._compiler.targetoptions = self.targetoptions | wrappers
             result = self._compiler.compile(types, None)
         finally:
-            _nesting.pop()
+            nesting.pop()
         self.add_overload(result)
         return result.entry_point
 
-
-class _Inner:
-    """Stands for the machine code of a function that is part of others only."""
-
-
-_nesting: list["_Kernel"] = []  # the kernels being compiled, each called by the one before
-
-
-def _finalize(library) -> None:
-    """In place of numba's: optimise a library with all that it calls; leave one that is part of another."""
-    library._raise_if_finalized()
-    library._translated_only = library._finalized = len(_nesting) > 1
-    if library._translated_only:
-        return
-    library._codegen._check_llvm_bugs()
-    own = {function.name for function in _defined(library._final_module)}
-    for called in _all_called(library, {}).values():
-        library._reload_init.update(called._reload_init)
-        library._final_module.link_in(_linkable(called), preserve=True)
-    for function in _defined(library._final_module):
-        if function.name not in own:
-            function.linkage = "internal"  # what is called in one place is then put there, however long
-    library._optimize_final_module()
-    library._final_module.verify()
-    library._finalize_final_module()
-
-
-def _defined(module):
-    return [function for function in module.functions if not function.is_declaration]
-
-
-def _all_called(library, found: dict) -> dict:
-    """The libraries that one needs, those that were only translated with all that they need."""
-    for called in library._linking_libraries:
-        if id(called) not in found:
-            found[id(called)] = called
-            if getattr(called, "_translated_only", False):
-                _all_called(called, found)
-    return found
-
-
-def _linkable(library):
-    """Its module; every function of one that was only translated, wanted so far or not."""
-    if not getattr(library, "_translated_only", False):
-        return library._get_module_for_linking()
-    module = library._final_module.clone()
-    for function in _defined(module):
-        function.linkage = "weak_odr"
-    return module
-
-
-def _executable(context, library, function, environment):
-    """In place of numba's: what Python calls, or what stands for it."""
-    library._ensure_finalized()
-    return _Inner() if len(_nesting) > 1 else _numbas_executable(context, library, function, environment)
-
-
-def _add_overload(dispatcher, result) -> None:
-    """In place of numba's: what only stands for machine code cannot be called from Python."""
-    if isinstance(result.entry_point, _Inner):
-        dispatcher.overloads[tuple(result.signature.args)] = result
-    else:
-        _numbas_add_overload(dispatcher, result)
-
-
-@functools.cache
-def _by_contents(record):
-    """In place of numba's number of a process: code of two aircraft, kept by two processes, had one name."""
-    return type(record).__name__, (hashlib.sha256(repr(record).encode()).hexdigest()[:16],)
-
-
-_numbas_executable, _numbas_add_overload = CPUContext.get_executable, Dispatcher.add_overload
-Dispatcher.add_overload = _add_overload  # type: ignore
-CPUContext.get_executable = _executable  # type: ignore[method-assign]
-CPUCodeLibrary.finalize = _finalize  # type: ignore[method-assign]
-numba.types.Record.mangling_args = property(_by_contents)  # type: ignore
+    def _translate_halves(self, there: list[Part], here: list[Part]) -> None:
+        """What another process cannot translate is left: it is then translated where it is called."""
+        with Helper(there) as helper:
+            for kernel, types in here:
+                kernel.compile(types)
+            for (kernel, types), result in zip(there, helper.results(self.targetctx), strict=False):
+                if tuple(types) not in kernel.overloads:
+                    self.targetctx.insert_user_function(result.entry_point, result.fndesc, [result.library])
+                    kernel.add_overload(result)
 
 
 @contextlib.contextmanager
@@ -236,40 +187,19 @@ def _alone(folder: Path | None) -> Iterator[None]:
 
 @contextlib.contextmanager
 def _announced() -> Iterator[None]:
-    """Say what takes so long, if it does. Garbage is looked for afterwards: looking costs a quarter of it."""
+    """Say what takes so long, if it does. Garbage is not looked for meanwhile, nor soon in what the compiler
+    leaves: there is little, and looking costs a quarter of its time."""
     saying = threading.Timer(PATIENCE_S, _say_once, [COMPILING])
     saying.start()
     gc.disable()
     try:
         yield
     finally:
+        gc.freeze()
+        gc.unfreeze()  # into the oldest generation
         gc.enable()
         saying.cancel()
-
-
-def _other_shape(shape, wanted):
-    """In place of numba's: what fails if an array is assigned to one of another shape."""
-    raise ValueError("an array cannot be assigned to one of another shape")
-
-
-@functools.cache
-def _lighten() -> None:
-    """Numba puts both shapes into that message, for which it compiles its strings: two seconds. And it
-    writes out a record's type, all fields of it, for each pass over each function: written once, it is kept.
-    """
-    from numba.np import arrayobj  # where nothing is compiled it is not needed
-
-    arrayobj.raise_with_shape_context = _other_shape
-    overload(_other_shape)(lambda shape, wanted: _other_shape)
-    written: dict[int, tuple] = {}
-    write = numba.types.Record.__repr__
-
-    def text(record) -> str:
-        if id(record) not in written:
-            written[id(record)] = (write(record), record)  # kept alive, its id stays its own
-        return written[id(record)][0]
-
-    numba.types.Record.__repr__ = text  # type: ignore[method-assign]
+        atexit.register(gc.freeze)  # nor when the process ends
 
 
 def _interpreted(function):

@@ -112,7 +112,8 @@ def test_without_ailerons_roll_is_what_sideslip_gives_and_banks_are_halved():
     pilot = limited(jammed=0.9, hold=(0.2, 0.0, 0.0))
     assert pilot["limit"][ROLL] == pytest.approx(0.9 * 0.02 * V * loops.MOST_SIDESLIP_RAD)
     assert limited(jammed=0.9, loose=0.2)["bank_limit"] <= 0.5 * (1.0 - 0.45)
-    assert limited(loose=1.0)["bank_limit"] == pytest.approx(0.25)
+    loose = limited(loose=1.0)  # ailerons can leave a bank; a fifth less, for the sideslip
+    assert loose["bank_limit"] == pytest.approx(min(0.4, 6.0 * loose["limit"][ROLL]))
 
 
 def test_thrust_per_inhg_is_the_slope_of_the_thrust():
@@ -135,7 +136,7 @@ PUSH = 0.2  # m/s2 per inHg
 
 def test_paths_are_bounded_by_the_engine_and_the_airspeed_there_is():
     pilot = new_autopilot(SPEED)
-    pilot["held"] = 43.0
+    pilot["held"], pilot["full_inhg"] = 43.0, 28.0
     low, high = loops.paths(pilot, PUSH)
     # idle is 8 inHg below trim, full 8 above; 44 m/s is 1 below 45 and 3 above 41
     assert low == pytest.approx(max(0.01 - 8 * PUSH / G - 0.02 * 1.0, -loops.MOST_PATH_RAD))
@@ -148,7 +149,7 @@ def test_paths_are_bounded_by_the_engine_and_the_airspeed_there_is():
 @pytest.mark.parametrize("commanded", [36.0, 43.0])
 def test_nothing_is_climbed_below_the_slowest_airspeed(commanded):
     pilot = new_autopilot(SPEED, airspeed=33.0)
-    pilot["held"] = commanded
+    pilot["held"], pilot["full_inhg"] = commanded, 28.0
     slow = max(35.0, commanded - 2.0)
     assert loops.paths(pilot, 0.01)[1] == pytest.approx(0.01 + 0.08 / G - 0.02 * (slow - 33.0), abs=1e-12)
     pilot["airspeed"] = 10.0
@@ -271,6 +272,7 @@ def throttled(path=0.03, y=None, power=(), rudder=1.0, **fields):
     control["power"]["command"][0] = 21.0
     for name, value in dict(power).items():
         control["power"][name] = value
+    pilot["full_inhg"] = loops.full_power(pilot, control, new_y(dpt=0.2) if y is None else y)
     loops.throttle(pilot, control, new_y(dpt=0.2) if y is None else y, path, PUSH)
     return pilot, control["power"]
 
@@ -363,3 +365,16 @@ def test_a_frame_is_its_loops_one_after_the_other():
     assert control["power"]["trim"] == pytest.approx(
         20.0 - G * 0.01 / loops.thrust_per_inhg(pilot, control, measured["y"])
     )
+
+
+def test_a_climb_asks_for_no_more_power_than_a_lost_rudder_leaves():
+    """At 15 inHg, all that the propeller's yaw leaves, the path is bounded as if the engine ended there."""
+    pilot = new_autopilot(SPEED, held=43.0, full_inhg=15.0)
+    assert loops.paths(pilot, PUSH)[1] == pytest.approx(0.01 - 5 * PUSH / G + 0.02 * 3.0)
+    pilot["full_inhg"] = 5.0  # less than idle is idle
+    assert loops.paths(pilot, PUSH)[1] == pytest.approx(max(0.01 - 8 * PUSH / G + 0.02 * 3.0, -0.15))
+
+
+def test_a_whole_rudder_leaves_the_whole_engine():
+    pilot, control = new_autopilot(weathercock=0.2), new_control()
+    assert loops.full_power(pilot, control, new_y(dpt=2.0)) == 28.0

@@ -50,6 +50,7 @@ def steer(autopilot, control, belief, measured, t):
     limit(autopilot, control)
     protect(autopilot, control, belief, y, t)
     push = thrust_per_inhg(autopilot, control, y)
+    autopilot.full_inhg = full_power(autopilot, control, y)
     path = path_of(autopilot, measured, push)
     to_body(autopilot, y, attitude, rolling(autopilot, attitude), pitching(autopilot, y, attitude, path))
     if autopilot.commanded[SPEED]:
@@ -86,7 +87,7 @@ def limit(autopilot, control):
         autopilot.limit[i] = min(autopilot.most[i], spare * autopilot.gain.authority_s)
     by_sideslip = autopilot.jammed * autopilot.dihedral * autopilot.airspeed * MOST_SIDESLIP_RAD
     autopilot.limit[ROLL] = max(autopilot.limit[ROLL], by_sideslip)
-    steepest = autopilot.most_bank * (1.0 - 0.5 * max(autopilot.jammed, autopilot.loose))
+    steepest = autopilot.most_bank * (1.0 - max(0.5 * autopilot.jammed, 0.2 * autopilot.loose))
     autopilot.bank_limit = min(steepest, autopilot.limit[ROLL] * autopilot.gain.bank_s)
 
 
@@ -96,6 +97,19 @@ def thrust_per_inhg(autopilot, control, y):
     dpt_per_inhg = control.power.dpt_factor / (2.0 * y[QDYN] * autopilot.airspeed)
     slope = autopilot.thrust[0] + 2.0 * autopilot.thrust[1] * autopilot.alpha * y[DPT]
     return max(y[QDYN] * slope * dpt_per_inhg, LEAST_PUSH)
+
+
+@kernel
+def full_power(autopilot, control, y):
+    """The highest manifold pressure (inHg) with what is left of the rudder: the propeller yaws with dpt^3.
+
+    What the rudder lacks, sideslip makes up for. The slower, the less: a climb beyond it ends in slow flight.
+    """
+    left, power = control.effectiveness[control.main[YAW]], control.power
+    if left >= 1.0:
+        return autopilot.high_inhg
+    held = max(left, 0.0) * power.highest_dpt**3 + (1.0 - left) * autopilot.weathercock
+    return min(autopilot.high_inhg, ceiling(power, y, held ** (1.0 / 3.0)))
 
 
 @kernel
@@ -122,7 +136,7 @@ def paths(autopilot, push):
     if autopilot.commanded[SPEED]:
         slow = max(slow, autopilot.held - autopilot.gain.spare_mps)
         fast = autopilot.held + autopilot.gain.spare_mps
-        idle, full = autopilot.low_inhg, autopilot.high_inhg
+        idle, full = autopilot.low_inhg, max(autopilot.full_inhg, autopilot.low_inhg)
     at_idle = autopilot.climb_in_trim + push * (idle - autopilot.trim_inhg) / autopilot.gravity
     at_full = autopilot.climb_in_trim + push * (full - autopilot.trim_inhg) / autopilot.gravity
     low = at_idle - autopilot.gain.path_per_mps * (fast - autopilot.airspeed)
@@ -199,10 +213,7 @@ def throttle(autopilot, control, y, path, push):
         along += autopilot.gain.speed * error
     climbing = autopilot.gravity * (path - autopilot.climb_in_trim)
     wanted = autopilot.trim_inhg + (along + climbing) / push
-    rudder = max(control.effectiveness[control.main[YAW]], 0.0)
-    sideslip = (1.0 - rudder) * autopilot.weathercock  # what the rudder lacks, sideslip makes up for
-    highest_dpt = (rudder * power.highest_dpt**3 + sideslip) ** (1.0 / 3.0)  # the propeller yaws with dpt^3
-    high = min(autopilot.high_inhg, ceiling(power, y, highest_dpt))
+    high = min(autopilot.full_inhg, ceiling(power, y, power.highest_dpt))
     limited = max(min(wanted, high), autopilot.low_inhg)
     if limited == wanted:
         found = autopilot.throttle + autopilot.dt * autopilot.gain.speed_i * error

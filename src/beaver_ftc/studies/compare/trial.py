@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from math import hypot, inf
-from time import process_time
+from time import thread_time
 from typing import Any
 
 from beaver_ftc.errors import BeaverFtcError
@@ -114,10 +114,10 @@ def _trace(trial: Trial, recording: Recording, scheme: str, options: dict[str, f
 def _fly(scenario: Scenario, entry: Entry) -> Result:
     try:
         loop = Loop(with_entry(scenario, entry))
-        began = process_time()
+        began = thread_time()
         for _ in loop.chunks():
             pass
-        us = 1e6 * (process_time() - began) / loop.n_frames
+        us = 1e6 * (thread_time() - began) / loop.n_frames
         flight = loop.land()
         loop.release()
         return result_of(flight, entry, us)

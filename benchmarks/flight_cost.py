@@ -14,98 +14,36 @@ import json
 import sys
 import tempfile
 import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from aircraft_cost import Variant, jsbsim_alone, write_variant
-from beaver_ftc.loop.loop import Loop
-from beaver_ftc.plant import conditions
 from beaver_ftc.plant.conditions import trim
-from beaver_ftc.results.metrics import metrics
-from beaver_ftc.scenario.sweep_loader import Sweep, load_sweep
-from beaver_ftc.studies.sweep.flying import scenario_of
-from beaver_ftc.studies.sweep.sampling import Plan
-from beaver_ftc.studies.sweep.table import row_of
+from beaver_ftc.studies.bench.flights import by_kind
 
 ALLOWED_RISE = 0.10
 PLAIN_FRAMES = 1000
-KINDS = {
-    "published": ("elevator-effectiveness", {}),
-    "class all": ("elevator-effectiveness", {"fdi.fault_class": "all"}),
-    "real air, sensors, statistical": ("robust-elevator-all", {}),
-    "autopilot": (
-        "elevator-effectiveness",
-        {"autopilot": {"altitude_m": [{"hold": True}], "heading_deg": [{"hold": True}]}},
-    ),
-}
-PARTS = ("scenario", "aircraft, trim, record", "frames", "metrics and row")
-Clock = Callable[[], float]
-
-
-def flown(sweep: Sweep, changes: dict[str, Any], run: int) -> tuple[np.ndarray, int, float]:
-    """Seconds of each part of one flight, JSBSim frames flown, and seconds of as many by JSBSim alone."""
-    (assignment,) = Plan(sweep).assignments([run])
-    conditions._trims.clear()
-    marks = [time.process_time()]
-    scenario = scenario_of(sweep, assignment)
-    marks.append(time.process_time())
-    if changes:
-        scenario = scenario.with_(changes)
-        marks = [marks[0] + time.process_time() - marks[1], time.process_time()]
-    loop = Loop(scenario)
-    marks.append(time.process_time())
-    for _ in loop.chunks():
-        pass
-    marks.append(time.process_time())
-    flight = loop.land()
-    row_of(assignment.run, assignment.values, scenario.seed, metrics(flight), flight)
-    marks.append(time.process_time())
-    runs = flight.frames * scenario.substeps
-    alone = _alone(loop.plant.run, runs)
-    loop.release()
-    return np.diff(marks), runs, alone
-
-
-def _alone(run: Callable[[], object], runs: int) -> float:
-    began = time.process_time()
-    for _ in range(runs):
-        run()
-    return time.process_time() - began
 
 
 def measure(rounds: int) -> dict[str, Any]:
-    """By kind: parts in ms, and the ratios of frames and of the whole flight to JSBSim alone."""
-    sweeps = {kind: load_sweep(name) for kind, (name, _) in KINDS.items()}
-    seen: dict[str, list[tuple[np.ndarray, int, float]]] = {kind: [] for kind in KINDS}
+    """The unit, us, and what `by_kind` gives, the loop's own part in units."""
     plain: list[float] = []
     with tempfile.TemporaryDirectory() as folder:
         unit = Variant(write_variant(Path(folder) / "plain", jsbsim_alone), trim())
-        for run in range(-1, rounds):
+
+        def fly_plain() -> None:
             unit.prepare()
             began = time.process_time()
             unit.fly(PLAIN_FRAMES)
             plain.append((time.process_time() - began) / PLAIN_FRAMES)
-            for kind, (_, changes) in KINDS.items():
-                taken = flown(sweeps[kind], changes, max(run, 0))
-                if run >= 0:  # the first is the warm-up
-                    seen[kind].append(taken)
-    unit_s = float(np.median(plain[1:]))
-    return {"unit_us": 1e6 * unit_s, "kinds": {kind: _summary(rows, unit_s) for kind, rows in seen.items()}}
 
-
-def _summary(rows: list[tuple[np.ndarray, int, float]], unit_s: float) -> dict[str, Any]:
-    parts, runs, alone = (np.array(column) for column in zip(*rows, strict=True))
-    frames_s = parts[:, PARTS.index("frames")]
-    return {
-        "parts_ms": dict(zip(PARTS, (1e3 * np.median(parts, axis=0)).round(3).tolist(), strict=True)),
-        "bare_ms": round(1e3 * float(np.median(alone)), 3),
-        "frames_ratio": round(float(np.median(frames_s / alone)), 3),
-        "flight_ratio": round(float(np.median(parts.sum(axis=1) / alone)), 3),
-        "own_part_units": round(float(np.median((frames_s - alone) / runs)) / unit_s, 3),
-    }
+        kinds = by_kind(rounds, fly_plain)
+    unit_us = 1e6 * float(np.median(plain[1:]))
+    for of in kinds.values():
+        of["own_part_units"] = round(of.pop("own_part_us") / unit_us, 3)
+    return {"unit_us": unit_us, "kinds": kinds}
 
 
 def risen(now: dict[str, Any], recorded: dict[str, Any]) -> list[str]:

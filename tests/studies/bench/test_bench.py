@@ -9,7 +9,7 @@ import pytest
 
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.scenario.loader import load_scenario
-from beaver_ftc.studies.bench import measure
+from beaver_ftc.studies.bench import flights, measure
 from beaver_ftc.studies.bench.contenders import Bare, ClosedLoop, state_of, take_over
 from beaver_ftc.studies.bench.plugged import InnovationDetector, ProportionalInversion
 from beaver_ftc.studies.bench.text import text_of
@@ -40,8 +40,30 @@ def test_what_is_compared_with_the_loop(document):
     assert document["whole_flight"]["frames"] == 33000
 
 
+def test_every_kind_of_flight_is_taken_apart(document):
+    kinds = document["sweep_flights"]
+    assert set(kinds) == {"published", "class all", "real air, sensors, statistical", "autopilot"}
+    for of in kinds.values():
+        assert set(of["parts_ms"]) == {"scenario", "aircraft, trim, record", "frames", "metrics and row"}
+        assert of["bare_ms"] > 0
+        assert 0 < of["frames_ratio"] < of["flight_ratio"]
+
+
+def test_medians_are_over_rounds_and_ratios_within_one():
+    """Three rounds, the second on a machine half as fast: ratios are those of every round."""
+    parts = np.array([1.0, 2.0, 12.0, 1.0]) * 1e-3
+    rows = [(parts, 1000, 0.01), (2 * parts, 1000, 0.02), (parts, 1000, 0.01)]
+    found = flights._medians(rows)
+    assert found["parts_ms"]["frames"] == 12.0
+    assert (found["bare_ms"], found["frames_ratio"], found["flight_ratio"]) == (10.0, 1.2, 1.6)
+    assert found["own_part_us"] == 2.0
+
+
 def test_the_text_shows_every_figure(document):
     text = text_of(document)
+    for kind, of in document["sweep_flights"].items():
+        assert kind in text
+        assert f"{of['flight_ratio']:.3f}" in text
     assert f"{document['closed_loop_us']:.3f}" in text
     assert f"{document['alternatives']['straightforward']['us']:.3f}" in text
     assert f"{document['before_alarm']['bare_us']:.3f}" in text

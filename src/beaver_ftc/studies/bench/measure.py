@@ -14,6 +14,7 @@ from beaver_ftc.plant import native
 from beaver_ftc.scenario.loader import load_scenario
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.bench.contenders import Bare, ClosedLoop, take_over
+from beaver_ftc.studies.bench.flights import by_kind
 from beaver_ftc.studies.bench.parts import PARTS, frame_with
 from beaver_ftc.studies.bench.plugged import InnovationDetector, ProportionalInversion
 from beaver_ftc.studies.bench.stopwatch import Contender, Timing, interleave
@@ -23,7 +24,7 @@ from beaver_ftc.studies.engine.processes import cores
 
 SCENARIO = "elevator-partial-loss"
 BEFORE_ALARM_S, AFTER_ALARM_S = 1.0, 14.0  # the fault strikes at 12 s
-FRAMES = 1000  # a block: 6 ms, short against the machine's moods, long against the clock
+FRAMES = 1000  # a block: 6 ms, short against changes of its pace, long against the clock
 LONG_FLIGHT_S = 330.0  # two row groups of the log file
 
 Say = Callable[[str], None]
@@ -45,11 +46,14 @@ def bench(rounds: int = 60, with_parts: bool = True, say: Say = lambda text: Non
     alternatives = _alternatives(scenario, max(rounds // 6, 3))
     say("whole flights, with and without a log file")
     flights = _whole_flights(scenario, max(rounds // 10, 3))
+    say("flights of sweeps, taken apart, in four kinds")
+    kinds = by_kind(rounds)
     return {
         **after,
         "before_alarm": before,
         "alternatives": alternatives,
         "whole_flight": flights,
+        "sweep_flights": kinds,
         "scenario": SCENARIO,
         "rounds": rounds,
         "frames_a_round": FRAMES,

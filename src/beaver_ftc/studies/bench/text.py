@@ -27,6 +27,8 @@ def text_of(document: dict[str, Any]) -> str:
         *(_line(_ALTERNATIVES[name], figures) for name, figures in document["alternatives"].items()),
         "",
         *_flights(document["whole_flight"]),
+        "",
+        *_kinds(document["sweep_flights"]),
     ])  # fmt: skip
 
 
@@ -47,6 +49,25 @@ def _flights(flights: dict[str, Any]) -> list[str]:
         _line("closed loop", flights, "closed_loop_us"),
         _line("with a log file", with_file, "with_log_file_us"),
     ]
+
+
+def _kinds(kinds: dict[str, Any]) -> list[str]:
+    """A line a kind of flight; the parts are the same for all."""
+    parts = list(next(iter(kinds.values()))["parts_ms"])
+    head = [*parts, "frames alone", "frames, x", "flight, x", "us added a frame"]
+    widths = [max(len(word), 8) + 2 for word in head]
+    return [
+        "flights of 15 s in a sweep, ms of processor time; x: of what JSBSim alone takes for its frames",
+        " " * 32 + "".join(f"{word:>{width}}" for word, width in zip(head, widths, strict=True)),
+        *(_kind(kind, of, widths) for kind, of in kinds.items()),
+    ]
+
+
+def _kind(kind: str, of: dict[str, Any], widths: list[int]) -> str:
+    figures = (
+        *of["parts_ms"].values(), of["bare_ms"], of["frames_ratio"], of["flight_ratio"], of["own_part_us"]
+    )  # fmt: skip
+    return f"{kind:32}" + "".join(f"{f:{width}.3f}" for f, width in zip(figures, widths, strict=True))
 
 
 def _line(what: str, figures: dict[str, Any], us: str = "us") -> str:

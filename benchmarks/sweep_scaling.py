@@ -1,27 +1,38 @@
-"""How sweeps scale: workers side by side, what a sweep costs beside flying, memory, and Ray's share.
+"""How sweeps scale: workers side by side, what a sweep costs beside flying, memory, disk, and Ray's share.
 
     python benchmarks/sweep_scaling.py [--flights 2000] [--workers 2] [--ray]
+    python benchmarks/sweep_scaling.py --flights 10000 --once       # one sweep, its seconds, nothing else
 
 Bars: two workers at least 1.8 times one on 2000 flights; at most 5 % beside flying; 10,000 flights of 15 s in
-under 5 minutes on 2 cores; memory flat in the number of flights. Speed-up wants an idle machine: rounds
-alternate, and the best of each counts.
+under 60 s on 2 cores; memory flat in the number of flights. Speed-up wants an idle machine: rounds
+alternate, and the best of each counts. `--ray` goes on with clusters of one CPU up to `--workers`, started on
+this machine, and with what a batch of a million flights costs the one process that hands out and lands.
 """
 
 import argparse
 import multiprocessing
 import os
+import pickle
 import resource
 import tempfile
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 from beaver_ftc.scenario.sweep_loader import Sweep, load_sweep
+from beaver_ftc.studies.engine.crew import Crew, Row, Task, Work
+from beaver_ftc.studies.engine.parts import Parts
+from beaver_ftc.studies.engine.processes import one_thread_each
 from beaver_ftc.studies.sweep.flying import Job, fly_one, scenario_of
 from beaver_ftc.studies.sweep.run import Options, Tally, run_sweep
-from beaver_ftc.studies.sweep.sampling import Plan
+from beaver_ftc.studies.sweep.sampling import Assignment, Plan
+from beaver_ftc.studies.sweep.source import batch_size
+from beaver_ftc.studies.sweep.store import RowsAsParquet
 
 FLIGHTS_ALONE = 200
+LONG = 1_000_000  # flights of the sweep whose batches are weighed
+BATCHES = 40
 
 
 def sweep_of(flights: int) -> Sweep:
@@ -85,15 +96,14 @@ def memory_mb() -> float:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
 
 
-def compare_workers(n: int, workers: int, rounds: int) -> float:
-    """Print one worker beside several; return the time of several."""
+def compare_workers(n: int, workers: int, rounds: int) -> None:
+    """Print one worker beside several."""
     measured = [(sweep_seconds(n, workers=1), sweep_seconds(n, workers=workers)) for _ in range(rounds)]
     one, many = (min(column) for column in zip(*measured, strict=True))
     print(f"{n} flights, 1 worker     {one:8.2f} s   {n / one:6.1f}/s")
     print(f"{n} flights, {workers} workers    {many:8.2f} s   {n / many:6.1f}/s")
     print(f"speed-up                    {one / many:8.2f}     bar 1.8 for 2 workers on 2000 flights")
-    print(f"10,000 flights of 15 s      {many * 10_000 / n:8.0f} s   bar 300 s on 2 cores")
-    return many
+    print(f"10,000 flights of 15 s      {many * 10_000 / n:8.0f} s   bar 60 s on 2 cores")
 
 
 def compare_costs(n: int) -> None:
@@ -110,6 +120,70 @@ def compare_costs(n: int) -> None:
     print(f"memory                      {few:8.0f} MB before, {memory_mb():.0f} MB after {n} flights")
 
 
+def compare_ray(n: int, workers: int) -> None:
+    """Print flights a second with Ray clusters of one CPU up to `workers`, and what starting one takes."""
+    import ray
+
+    os.environ.setdefault("RAY_worker_niceness", "0")  # as local ones; Ray's default is 15
+    for cpus in range(1, workers + 1):
+        options = {"runtime_env": {"env_vars": one_thread_each()}, "include_dashboard": False}
+        started = seconds(lambda: ray.init(num_cpus=cpus, log_to_driver=False, **options))  # noqa: B023
+        ready = seconds(lambda: sweep_seconds(4 * cpus, backend="ray"))  # noqa: B023 : each worker loads the code
+        flying = sweep_seconds(n, backend="ray")
+        print(
+            f"{n} flights, Ray, {cpus} CPU    {flying:7.2f} s   {n / flying:6.1f}/s   "
+            f"start {started:.1f} s, first flights {ready:.1f} s"
+        )
+        if cpus == workers:
+            weigh_batches()
+        ray.shutdown()
+
+
+def weigh_batches() -> None:
+    """What a batch of a million flights costs beside flying it: Ray's way there and back, landing, bytes.
+
+    The rows are of real flights, flown beforehand: a task only gives them back.
+    """
+    from beaver_ftc.studies.engine.ray_crew import RayCrew
+
+    sweep = sweep_of(LONG)
+    size = batch_size(sweep)
+    cases = tuple(Plan(sweep).assignments(range(size)))
+    rows = [fly_one(Job(sweep), case) for case in cases]
+    crew = RayCrew(Work(partial(_flown_before, rows)), None, None)
+    _through(crew, cases, 4)  # a worker's first task loads the code
+    print(f"batch of {size} there and back {_each(lambda: _through(crew, cases, BATCHES))}")
+    crew.close()
+    with tempfile.TemporaryDirectory() as folder:
+        parts = Parts(Path(folder), RowsAsParquet(sweep))
+        print(f"landing it                  {_each(lambda: [parts.land(k, rows) for k in range(BATCHES)])}")
+        held = sum(path.stat().st_size for path in Path(folder).iterdir()) / BATCHES / size
+    there, back = (len(pickle.dumps(what)) / size for what in (cases, rows))
+    print(f"bytes a flight              {there:8.0f} to a worker, {back:.0f} back, {held:.0f} on disk landed")
+    print(f"memory of this process      {memory_mb():8.0f} MB at most")
+
+
+def _flown_before(rows: list[Row], case: Assignment) -> Row:
+    return rows[case.run]
+
+
+def _each(work: Callable[[], object]) -> str:
+    """The time of each of the BATCHES that this work does."""
+    before = time.process_time()
+    wall, own = seconds(work), time.process_time() - before
+    return f"{1e3 * wall / BATCHES:8.1f} ms, {1e3 * own / BATCHES:.1f} ms of this process's processor"
+
+
+def _through(crew: Crew, cases: tuple[Assignment, ...], batches: int) -> None:
+    """Send batches through a crew, as many at a time as a campaign does."""
+    sent = back = 0
+    while back < batches:
+        while sent < batches and sent - back < crew.slots:
+            crew.submit(Task(sent, cases))
+            sent += 1
+        back += len(crew.outcomes(1.0))
+
+
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(
@@ -119,14 +193,18 @@ def main() -> None:
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--ray", action="store_true")
+    parser.add_argument("--once", action="store_true")
     asked = parser.parse_args()
     sweep_seconds(32, workers=1)  # compile, if need be
+    if asked.once:
+        took = sweep_seconds(asked.flights, workers=asked.workers)
+        load = os.getloadavg()[0]
+        print(f"{asked.flights} flights, {asked.workers} workers {took:8.1f} s, load average {load:.1f}")
+        return
     compare_costs(asked.flights)
-    many = compare_workers(asked.flights, asked.workers, asked.rounds)
+    compare_workers(asked.flights, asked.workers, asked.rounds)
     if asked.ray:
-        clustered = sweep_seconds(asked.flights, backend="ray")
-        share = 100 * (clustered / many - 1)
-        print(f"Ray on the same cores       {clustered:8.2f} s   {share:+.1f} % against local")
+        compare_ray(asked.flights, asked.workers)
 
 
 if __name__ == "__main__":

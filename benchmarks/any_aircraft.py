@@ -20,7 +20,7 @@ from rich.console import Console
 from rich.table import Table
 
 from beaver_ftc import load
-from beaver_ftc.errors import BadInput
+from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.derive.first_use import derived_if_needed

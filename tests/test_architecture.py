@@ -20,8 +20,8 @@ PACKAGE = "beaver_ftc"
 
 # Folders from the ground up; a folder imports what is below its own floor, and itself.
 FLOORS = (
-    {"errors", "compiled", "elsewhere", "paths", "plugins", "translation"},
     {"documents"},
+    {"compiled", "elsewhere", "plugins", "translation"},
     {"aircraft"},
     {"design"},
     {"scenario"},
@@ -35,8 +35,8 @@ FLOORS = (
     {"integrations"},
     {"cli"},
 )
-TOOLS = FLOORS[0]
-MOST_FOLDERS, MOST_LINES = 13, 350
+TOOLS = FLOORS[1]
+MOST_FOLDERS, MOST_LOOSE, MOST_LINES = 13, 4, 350
 
 
 @cache
@@ -132,7 +132,7 @@ def test_few_folders_and_few_loose_modules():
     folders = {path.name for path in ROOT.iterdir() if (path / "__init__.py").exists()}
     loose = {path.stem for path in ROOT.glob("*.py")} - {"__init__", "__main__"}
     assert len(folders) <= MOST_FOLDERS
-    assert loose <= TOOLS
+    assert len(loose) <= MOST_LOOSE
 
 
 def test_no_file_is_long():

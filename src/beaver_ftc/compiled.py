@@ -32,8 +32,8 @@ from numba.core.compiler_lock import global_compiler_lock
 from numba.core.registry import CPUDispatcher
 from numba.core.types import unliteral
 
+from beaver_ftc.documents.paths import cache_base, folder_of_version
 from beaver_ftc.elsewhere import Helper, Part
-from beaver_ftc.paths import cache_base, folder_of_version
 from beaver_ftc.translation import Inner, lighten, nesting
 
 COMPILING = "compiling the flight code, once for this version on this machine: some 15 s on an idle one"

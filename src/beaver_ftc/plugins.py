@@ -20,7 +20,7 @@ from importlib import import_module
 from inspect import getdoc, isclass, signature
 from typing import Any
 
-from beaver_ftc.errors import BadInput, BeaverFtcError, suggestion
+from beaver_ftc.documents.errors import BadInput, BeaverFtcError, suggestion
 
 DETECTORS, LAWS = "beaver_ftc.detectors", "beaver_ftc.laws"
 OURS = "beaver-ftc"

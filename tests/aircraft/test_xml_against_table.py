@@ -18,7 +18,7 @@ from beaver_ftc.design.coefficients import (
     coefficient_terms,
     inertia_coefficients,
 )
-from beaver_ftc.paths import data_root
+from beaver_ftc.documents.paths import data_root
 from beaver_ftc.plant.model_file import with_systems
 
 PROPERTY_OF = {

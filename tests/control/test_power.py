@@ -12,7 +12,7 @@ from beaver_ftc.control.state import ORACLE
 from beaver_ftc.design import fdc
 from beaver_ftc.design.coefficients import value
 from beaver_ftc.design.model import ELEVATOR, FLAP, RUDDER
-from beaver_ftc.errors import BadInput
+from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.assembly import assemble
 from beaver_ftc.plant.trim import trim
 from beaver_ftc.results.metrics import metrics

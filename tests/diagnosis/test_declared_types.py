@@ -11,7 +11,7 @@ from beaver_ftc.aircraft import load
 from beaver_ftc.design.model import control_effectiveness, design_record, free_response
 from beaver_ftc.diagnosis.types import registry as types
 from beaver_ftc.diagnosis.types.findings import found
-from beaver_ftc.errors import BadInput
+from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.assembly import assemble
 from beaver_ftc.scenario.schema import Scenario
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import beaver_ftc
 from beaver_ftc.diagnosis.types import registry
-from beaver_ftc.paths import data_root
+from beaver_ftc.documents.paths import data_root
 
 HERE = Path(__file__).parent
 

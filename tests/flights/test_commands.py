@@ -10,7 +10,7 @@ from pyarrow import parquet
 from typer.testing import CliRunner
 
 from beaver_ftc.cli.main import app
-from beaver_ftc.errors import BadInput
+from beaver_ftc.documents.errors import BadInput
 from flights import synthetic
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from beaver_ftc.errors import BadInput
+from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.flights.identification import identify
 from beaver_ftc.flights.identify import constant_parts, known
 from beaver_ftc.flights.inputs import load_flights

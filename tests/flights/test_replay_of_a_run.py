@@ -8,7 +8,7 @@ from typer.testing import CliRunner
 
 import beaver_ftc as bf
 from beaver_ftc.cli.main import app
-from beaver_ftc.errors import BadInput
+from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.flights.replay import replay
 
 

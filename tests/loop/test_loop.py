@@ -7,7 +7,7 @@ import pytest
 
 from beaver_ftc.control.state import ORACLE
 from beaver_ftc.control.supervisor import MAX_EVENTS
-from beaver_ftc.errors import BadInput, SimulationFailed
+from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.loop import accounts, frame, loop, summary
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.plant.channels import TRUTH

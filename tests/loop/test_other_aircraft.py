@@ -11,7 +11,7 @@ import beaver_ftc as bf
 from beaver_ftc.aircraft import load
 from beaver_ftc.design.context import DesignModel
 from beaver_ftc.design.model import design_record
-from beaver_ftc.errors import BadInput
+from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.state import FlightState

@@ -2,7 +2,7 @@
 
 import pytest
 
-from beaver_ftc.errors import BeaverFtcError, SimulationFailed
+from beaver_ftc.documents.errors import BeaverFtcError, SimulationFailed
 from beaver_ftc.plant.adapter import Plant, UnknownProperty
 from beaver_ftc.plant.state import FlightState
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from beaver_ftc.errors import BadInput
+from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.assembly import assemble
 from beaver_ftc.plant.instruments import NOISE_LIMIT_SIGMA, SIGNALS, read_all
 from beaver_ftc.scenario.schema import Scenario

@@ -4,7 +4,7 @@ from math import radians
 
 import pytest
 
-from beaver_ftc.errors import BadInput
+from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.trim import trim
 

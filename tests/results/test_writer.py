@@ -7,7 +7,7 @@ import threading
 
 import pytest
 
-from beaver_ftc.errors import SimulationFailed
+from beaver_ftc.documents.errors import SimulationFailed
 from beaver_ftc.results import writer
 from beaver_ftc.results.writer import result_folder
 

@@ -4,7 +4,7 @@ import pytest
 
 from beaver_ftc.aircraft.loading import load as load_aircraft
 from beaver_ftc.aircraft.loading import read
-from beaver_ftc.errors import BadInput
+from beaver_ftc.documents.errors import BadInput
 
 
 def test_an_aircraft_without_its_model_is_bad_input(tmp_path):

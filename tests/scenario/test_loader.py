@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.documents.problems import ScenarioError
-from beaver_ftc.errors import BadInput
 from beaver_ftc.scenario.loader import MAX_BYTES, load_scenario, load_text
 
 LINE = re.compile(r"^[^:\n]+:\d+: \S[^:\n]*: [^\n]+allowed: [^\n]+$")

@@ -5,7 +5,7 @@ import pickle
 import pytest
 from pydantic import ValidationError
 
-from beaver_ftc.errors import BadInput
+from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.scenario.faults import Bias, LossOfEffectiveness, Unanticipated
 from beaver_ftc.scenario.loader import load_text
 from beaver_ftc.scenario.schema import Scenario

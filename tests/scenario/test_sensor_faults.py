@@ -2,7 +2,7 @@
 
 import pytest
 
-from beaver_ftc.errors import BadInput
+from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.scenario.given import load
 from beaver_ftc.scenario.sensor_faults import fault_name
 

@@ -5,7 +5,7 @@ import pytest
 from tools.docs.generate import lighten
 from tools.docs.properties import as_markdown, meaning_of
 
-from beaver_ftc.errors import BadInput
+from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.model_file import with_systems
 from beaver_ftc.studies.reproduce.claims import CLAIMS

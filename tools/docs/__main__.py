@@ -2,7 +2,7 @@
 
 import sys
 
-from beaver_ftc.errors import BeaverFtcError
+from beaver_ftc.documents.errors import BeaverFtcError
 from tools.docs.generate import write_docs
 
 try:

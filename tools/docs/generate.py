@@ -3,8 +3,8 @@
 from collections.abc import Iterator
 from pathlib import Path
 
-from beaver_ftc.errors import BadInput
-from beaver_ftc.paths import data_root
+from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.documents.paths import data_root
 
 
 def write_docs(folder: Path | None = None) -> Iterator[Path]:

@@ -5,8 +5,8 @@ from collections.abc import Iterable, Sequence
 from xml.etree.ElementTree import Element
 
 from beaver_ftc.design.coefficients import SURFACES
-from beaver_ftc.errors import BadInput
-from beaver_ftc.paths import data_root
+from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.documents.paths import data_root
 from beaver_ftc.plant.model_file import with_systems
 
 _XML = "aircraft/beaver/beaver.xml"

@@ -11,11 +11,11 @@ from typing import Any
 from beaver_ftc.aircraft.aircraft import Aircraft
 from beaver_ftc.aircraft.schema import AircraftFile
 from beaver_ftc.documents.document import Problem
+from beaver_ftc.documents.errors import BadInput, BeaverFtcError, suggestion
 from beaver_ftc.documents.files import UnreadableError, read_text
+from beaver_ftc.documents.paths import data_root
 from beaver_ftc.documents.problems import ScenarioError
 from beaver_ftc.documents.validation import parse_document, validate
-from beaver_ftc.errors import BadInput, BeaverFtcError, suggestion
-from beaver_ftc.paths import data_root
 from beaver_ftc.plugins import compare_at_first_use, derive_at_first_use
 
 DEFAULT = "beaver"

@@ -12,7 +12,7 @@ from typing import Annotated, Literal, Self
 from pydantic import AfterValidator, Field, model_validator
 
 from beaver_ftc.documents.base import Conflict, Flag, Number, Section, Whole, number, refuse
-from beaver_ftc.errors import suggestion
+from beaver_ftc.documents.errors import suggestion
 
 MAX_SURFACES, MAX_SIGNALS = 8, 6
 MAX_TERMS_OF_ONE, MAX_MONOMIALS = 32, 64

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 import typer
 
 from beaver_ftc.cli.output import Format, FormatOption, emit, emit_json
-from beaver_ftc.errors import BadInput
+from beaver_ftc.documents.errors import BadInput
 
 _OURS = "adaptive-estimators", "fault-tolerant"
 

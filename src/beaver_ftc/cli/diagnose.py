@@ -56,7 +56,7 @@ def command(
 
 
 def _replay(flights: list[Path], out: Path, format: Format) -> None:
-    from beaver_ftc.errors import BadInput
+    from beaver_ftc.documents.errors import BadInput
     from beaver_ftc.flights.replay import as_text, is_own_log, replay, write_replay
 
     others = [path for path in flights if not is_own_log(path)]

@@ -5,7 +5,7 @@ from typing import Annotated, Any
 import typer
 
 from beaver_ftc.cli.output import Format, FormatOption, emit, emit_json
-from beaver_ftc.errors import BadInput, suggestion
+from beaver_ftc.documents.errors import BadInput, suggestion
 
 Entries = list[dict[str, str]]
 

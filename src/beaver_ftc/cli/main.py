@@ -14,7 +14,7 @@ import typer
 from beaver_ftc import __version__
 from beaver_ftc.cli.inputs import with_plugins
 from beaver_ftc.cli.output import report_last, unexpected
-from beaver_ftc.errors import BeaverFtcError
+from beaver_ftc.documents.errors import BeaverFtcError
 
 COMMANDS = (
     "run",

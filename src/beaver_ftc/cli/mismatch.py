@@ -7,7 +7,7 @@ import typer
 
 from beaver_ftc.cli.inputs import load_all
 from beaver_ftc.cli.output import Format, FormatOption, complain, emit, emit_json
-from beaver_ftc.errors import BadInput
+from beaver_ftc.documents.errors import BadInput
 
 if TYPE_CHECKING:
     from beaver_ftc.scenario.schema import Scenario

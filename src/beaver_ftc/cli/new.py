@@ -8,7 +8,7 @@ import typer
 
 from beaver_ftc.cli.inputs import complete_names
 from beaver_ftc.cli.output import emit
-from beaver_ftc.errors import BadInput, SimulationFailed, suggestion
+from beaver_ftc.documents.errors import BadInput, SimulationFailed, suggestion
 
 _NAME = re.compile(r"[A-Za-z0-9_-]{1,100}")  # as of a scenario
 _NAME_LINE = re.compile(r"^name:.*$", re.MULTILINE)

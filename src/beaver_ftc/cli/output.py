@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
-from beaver_ftc.errors import BeaverFtcError, SimulationFailed
+from beaver_ftc.documents.errors import BeaverFtcError, SimulationFailed
 
 
 class Format(StrEnum):

@@ -10,7 +10,7 @@ import typer
 
 from beaver_ftc.cli.inputs import complete_names, load_all
 from beaver_ftc.cli.output import Format, FormatOption, complain, emit, emit_json, report, unexpected
-from beaver_ftc.errors import BadInput, BeaverFtcError
+from beaver_ftc.documents.errors import BadInput, BeaverFtcError
 
 if TYPE_CHECKING:
     from beaver_ftc.plant.adapter import Plant

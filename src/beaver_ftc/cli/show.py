@@ -7,7 +7,7 @@ import typer
 
 from beaver_ftc.cli.inputs import complete_names
 from beaver_ftc.cli.output import emit
-from beaver_ftc.errors import BadInput, suggestion
+from beaver_ftc.documents.errors import BadInput, suggestion
 
 
 def command(

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from beaver_ftc.cli.output import Format, FormatOption, complain, emit, emit_json
-from beaver_ftc.errors import BadInput, BeaverFtcError
+from beaver_ftc.documents.errors import BadInput, BeaverFtcError
 
 if TYPE_CHECKING:
     from beaver_ftc.scenario.sweep_loader import Sweep

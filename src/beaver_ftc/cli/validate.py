@@ -6,7 +6,7 @@ import typer
 
 from beaver_ftc.cli.inputs import check_flyable
 from beaver_ftc.cli.output import Format, FormatOption, complain, emit, emit_json
-from beaver_ftc.errors import BadInput
+from beaver_ftc.documents.errors import BadInput
 
 
 def command(

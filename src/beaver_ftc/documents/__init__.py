@@ -1,1 +1,1 @@
-"""From a stranger's YAML text to checked data: bounded reading, lines kept, every mistake in words."""
+"""Files and their mistakes: from a stranger's YAML text to checked data, where files lie, errors in words."""

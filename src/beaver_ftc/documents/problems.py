@@ -11,7 +11,7 @@ from pydantic import ValidationError
 
 from beaver_ftc.documents.base import Location
 from beaver_ftc.documents.document import MAX_PROBLEMS, Document, Problem
-from beaver_ftc.errors import BadInput, suggestion
+from beaver_ftc.documents.errors import BadInput, suggestion
 
 WHOLE_FILE = "(file)"
 _SHOWN = 48

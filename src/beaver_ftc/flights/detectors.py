@@ -1,7 +1,7 @@
 """Who may diagnose a recorded flight: our bank of filters, plain least squares, and the loop's detectors."""
 
 from beaver_ftc.diagnosis.base import Detector
-from beaver_ftc.errors import BadInput, suggestion
+from beaver_ftc.documents.errors import BadInput, suggestion
 from beaver_ftc.flights.diagnose import Rows, check_rate, diagnose
 from beaver_ftc.flights.model import Model
 from beaver_ftc.flights.plain import forgetting, sliding

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from beaver_ftc.errors import BadInput
+from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.flights.bank import UNKNOWN as UNKNOWN_OFFSET
 from beaver_ftc.flights.bank import Bank, bank_of
 from beaver_ftc.flights.filtering import posterior_of

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from beaver_ftc.errors import BadInput
+from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.flights.model import Model, Settings
 from beaver_ftc.flights.recording import Floats
 from beaver_ftc.flights.regression import Fit, least_squares

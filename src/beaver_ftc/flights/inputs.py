@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from beaver_ftc.errors import BadInput
+from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.flights.readers import read_flight
 from beaver_ftc.flights.samples import Samples, sample
 from beaver_ftc.flights.vehicle import Vehicle

@@ -10,9 +10,9 @@ from pydantic import Field
 
 from beaver_ftc.documents.base import Number, Section, Whole
 from beaver_ftc.documents.document import Problem
+from beaver_ftc.documents.errors import SimulationFailed
 from beaver_ftc.documents.files import UnreadableError, read_text
 from beaver_ftc.documents.problems import ScenarioError
-from beaver_ftc.errors import SimulationFailed
 from beaver_ftc.flights.recording import Floats
 from beaver_ftc.flights.vehicle import Vehicle
 from beaver_ftc.scenario.loader import parse_document, validate

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from beaver_ftc.errors import BadInput
+from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.flights.identification import regressor_names
 from beaver_ftc.flights.identify import Stretch, fit_like, fit_order, stretches_of
 from beaver_ftc.flights.model import Model

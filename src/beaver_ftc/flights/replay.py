@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from beaver_ftc.errors import BadInput
+from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.flights.readers.table import read_numbers
 from beaver_ftc.flights.recording import Floats
 

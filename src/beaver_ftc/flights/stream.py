@@ -18,7 +18,7 @@ import numpy as np
 from beaver_ftc.design.context import Context, Declared
 from beaver_ftc.design.model import N_Y
 from beaver_ftc.diagnosis.base import Detector, Measured, Verdict
-from beaver_ftc.errors import BadInput
+from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.flights.diagnose import Rows
 from beaver_ftc.flights.model import Model
 from beaver_ftc.flights.recording import Floats

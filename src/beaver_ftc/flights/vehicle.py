@@ -12,9 +12,9 @@ from pydantic import Field, model_validator
 
 from beaver_ftc.documents.base import Conflict, Number, Section, number, refuse
 from beaver_ftc.documents.document import Problem
+from beaver_ftc.documents.errors import suggestion
 from beaver_ftc.documents.files import UnreadableError, read_text
 from beaver_ftc.documents.problems import ScenarioError
-from beaver_ftc.errors import suggestion
 from beaver_ftc.scenario.builtin import looks_like_a_path
 from beaver_ftc.scenario.loader import parse_document, validate
 

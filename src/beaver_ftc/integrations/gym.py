@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from beaver_ftc.aircraft import load as aircraft
-from beaver_ftc.errors import BadInput
+from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.agent import BESIDE_SURFACES, LARGEST, LOOK, act, cost, observe
 from beaver_ftc.loop.direct import direct
 from beaver_ftc.results.simulation import Simulation

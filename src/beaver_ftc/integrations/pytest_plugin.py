@@ -45,7 +45,7 @@ def pytest_configure(config: pytest.Config) -> None:
     given = config.getoption("--beaver-plugin")
     if not given:
         return
-    from beaver_ftc.errors import BadInput
+    from beaver_ftc.documents.errors import BadInput
     from beaver_ftc.plugins import register
 
     try:
@@ -99,7 +99,7 @@ class ScenarioFile(pytest.File):
 
     def collect(self) -> Iterator[pytest.Item]:
         """One item an expectation; of a scenario that expects nothing, that it can be flown."""
-        from beaver_ftc.errors import BadInput
+        from beaver_ftc.documents.errors import BadInput
         from beaver_ftc.results.expectations import names
         from beaver_ftc.scenario.given import load
 
@@ -150,7 +150,7 @@ class ExpectationItem(pytest.Item):
 
     def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], style: Any = None) -> Any:
         """What was missed, without a traceback through the testbed."""
-        from beaver_ftc.errors import BeaverFtcError
+        from beaver_ftc.documents.errors import BeaverFtcError
 
         if isinstance(excinfo.value, ExpectationMissed | BeaverFtcError):
             return str(excinfo.value)

@@ -10,7 +10,7 @@ from beaver_ftc.design.engine import power_error_kw
 from beaver_ftc.diagnosis.admitted import GUST_FT_S, GUST_LIMIT_SIGMA, SCALE_FT
 from beaver_ftc.diagnosis.declared import gust_effect
 from beaver_ftc.diagnosis.watch import NOBODY, POLES_PER_S
-from beaver_ftc.errors import BadInput
+from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop import steps
 from beaver_ftc.loop.direct import direct
 from beaver_ftc.plant import channels as ch

@@ -11,7 +11,7 @@ from beaver_ftc.control.outer.setup import set_up_autopilot
 from beaver_ftc.control.outer.state import COLUMNS
 from beaver_ftc.design.variants import anchor, mass_of
 from beaver_ftc.diagnosis import noise_model
-from beaver_ftc.errors import SimulationFailed
+from beaver_ftc.documents.errors import SimulationFailed
 from beaver_ftc.loop import memory
 from beaver_ftc.loop.assembly import assemble, estimator_names, y_places
 from beaver_ftc.loop.cockpit import Cockpit, note_failures, set_origin, travel_rad

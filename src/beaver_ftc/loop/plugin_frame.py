@@ -12,7 +12,7 @@ from beaver_ftc.design.context import Context, DesignModel
 from beaver_ftc.diagnosis.base import Detector, Measured, Verdict
 from beaver_ftc.diagnosis.declared import declared_of
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, UNANTICIPATED
-from beaver_ftc.errors import BeaverFtcError, SimulationFailed
+from beaver_ftc.documents.errors import BeaverFtcError, SimulationFailed
 from beaver_ftc.loop import steps
 from beaver_ftc.loop.assembly import y_places
 from beaver_ftc.loop.frame import NOT_FINITE

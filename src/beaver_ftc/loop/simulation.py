@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from beaver_ftc.aircraft.question import asked
 from beaver_ftc.control.outer.setup import set_up_profile
 from beaver_ftc.control.supervisor import MODES
-from beaver_ftc.errors import BadInput, suggestion
+from beaver_ftc.documents.errors import BadInput, suggestion
 from beaver_ftc.loop.asked import near, vector
 from beaver_ftc.loop.flight import Flight, LogSink
 from beaver_ftc.loop.loop import CHUNK_ROWS, FLYING, Loop

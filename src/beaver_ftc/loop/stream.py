@@ -12,7 +12,7 @@ from beaver_ftc.design.model import N_Y
 from beaver_ftc.design.variants import anchor, mass_of
 from beaver_ftc.diagnosis import noise_model
 from beaver_ftc.diagnosis.base import Verdict
-from beaver_ftc.errors import BadInput
+from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop import steps, watching
 from beaver_ftc.loop.assembly import assemble
 from beaver_ftc.loop.direct import direct

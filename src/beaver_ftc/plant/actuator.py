@@ -2,7 +2,7 @@
 
 from functools import lru_cache
 
-from beaver_ftc.paths import data_root
+from beaver_ftc.documents.paths import data_root
 
 
 @lru_cache

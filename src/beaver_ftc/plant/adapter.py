@@ -11,8 +11,8 @@ import numpy as np
 
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.aircraft import load as load_aircraft
-from beaver_ftc.errors import SimulationFailed
-from beaver_ftc.paths import data_root
+from beaver_ftc.documents.errors import SimulationFailed
+from beaver_ftc.documents.paths import data_root
 from beaver_ftc.plant.state import START_LATITUDE_DEG, FlightState
 
 FT_PER_M = 1.0 / 0.3048

@@ -11,7 +11,7 @@ from math import cos, isfinite, sin
 
 import numpy as np
 
-from beaver_ftc.errors import SimulationFailed
+from beaver_ftc.documents.errors import SimulationFailed
 from beaver_ftc.plant.adapter import FT_PER_M, Plant
 from beaver_ftc.plant.state import FlightState
 

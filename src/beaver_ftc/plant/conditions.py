@@ -1,6 +1,6 @@
 """A trimmed flight condition and the truth linearised about it, from what a scenario says of them."""
 
-from beaver_ftc.errors import BadInput
+from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.configure import configure, trim_of
 from beaver_ftc.plant.linear import LinearModel, differences

@@ -2,7 +2,7 @@
 
 from math import radians
 
-from beaver_ftc.errors import BadInput
+from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.plant.adapter import FT_PER_M, Plant
 from beaver_ftc.plant.reuse import forget_conditions
 from beaver_ftc.plant.trim import TrimPoint, trim

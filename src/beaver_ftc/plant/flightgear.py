@@ -4,7 +4,7 @@ import time
 from collections.abc import Callable
 
 from beaver_ftc.aircraft.loading import DEFAULT
-from beaver_ftc.errors import SimulationFailed
+from beaver_ftc.documents.errors import SimulationFailed
 from beaver_ftc.plant.adapter import Plant
 
 DIRECTIVE = f"aircraft/{DEFAULT}/flightgear.xml"

@@ -15,7 +15,7 @@ from xml.etree.ElementTree import Element
 
 import jsbsim
 
-from beaver_ftc.errors import BadInput
+from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.plant.actuator import actuator_system
 
 PREFIX = "actuated-"

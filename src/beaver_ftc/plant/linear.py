@@ -22,7 +22,7 @@ import jsbsim
 import numpy as np
 
 from beaver_ftc.aircraft import Aircraft
-from beaver_ftc.errors import BadInput, SimulationFailed
+from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.plant.adapter import FT_PER_M, Plant
 from beaver_ftc.plant.configure import configure
 from beaver_ftc.plant.state import FlightState

@@ -18,7 +18,7 @@ from pathlib import Path
 from time import monotonic
 
 from beaver_ftc.aircraft import Aircraft
-from beaver_ftc.paths import data_root
+from beaver_ftc.documents.paths import data_root
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.native import executive_address
 

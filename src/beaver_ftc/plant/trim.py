@@ -16,7 +16,7 @@ import numpy as np
 
 from beaver_ftc.aircraft import Aircraft, Travel
 from beaver_ftc.aircraft.schema import SIDESLIP_RATE
-from beaver_ftc.errors import BadInput
+from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.plant.adapter import FT_PER_M, PA_PER_PSF, Plant
 from beaver_ftc.plant.broyden import ACCELERATIONS, STEP_RAD, approach, newton_step, shortened
 from beaver_ftc.plant.reuse import forget_conditions

@@ -9,7 +9,7 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from beaver_ftc.errors import BadInput, SimulationFailed, suggestion
+from beaver_ftc.documents.errors import BadInput, SimulationFailed, suggestion
 from beaver_ftc.results import typed, verdict
 from beaver_ftc.results.log import Log, MemoryLog, StoredLog
 from beaver_ftc.results.metrics import Document, metrics

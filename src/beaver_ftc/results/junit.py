@@ -5,8 +5,8 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
+from beaver_ftc.documents.errors import SimulationFailed
 from beaver_ftc.documents.problems import one_line
-from beaver_ftc.errors import SimulationFailed
 
 Document = dict[str, Any]
 _LONGEST = 10_000  # characters of one line

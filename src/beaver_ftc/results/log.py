@@ -14,7 +14,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from beaver_ftc.errors import BadInput
+from beaver_ftc.documents.errors import BadInput
 
 ROWS_PER_GROUP = 16384  # 12 MB of 90 columns: large enough to compress well, small enough to hold
 _BLOCK = 256  # rows turned into columns at a time: they fit the processor's cache, four times faster

@@ -9,7 +9,7 @@ from pydantic_core import CoreSchema
 from beaver_ftc.aircraft import load
 from beaver_ftc.aircraft.question import in_question
 from beaver_ftc.documents.base import Number, Section, number, refuse
-from beaver_ftc.errors import suggestion
+from beaver_ftc.documents.errors import suggestion
 
 
 class ActuatorDynamics(Section):

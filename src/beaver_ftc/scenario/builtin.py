@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from beaver_ftc.paths import data_root
+from beaver_ftc.documents.paths import data_root
 
 
 def _folder() -> Path:

@@ -12,9 +12,9 @@ from beaver_ftc.aircraft import Aircraft, load
 from beaver_ftc.aircraft.question import asked
 from beaver_ftc.documents.base import Location
 from beaver_ftc.documents.document import Document
+from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.documents.keys import UnusableKeyError, parse_key, with_values
 from beaver_ftc.documents.validation import validate
-from beaver_ftc.errors import BadInput
 from beaver_ftc.scenario.consistency import conflicts_in_data
 
 _Model = TypeVar("_Model", bound=BaseModel)

@@ -6,7 +6,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, Strict, field
 
 from beaver_ftc.aircraft.question import in_question
 from beaver_ftc.documents.base import refuse
-from beaver_ftc.errors import suggestion
+from beaver_ftc.documents.errors import suggestion
 from beaver_ftc.plugins import DETECTORS, refusal
 from beaver_ftc.scenario.sensors import Sensors
 

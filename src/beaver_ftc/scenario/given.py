@@ -10,9 +10,9 @@ from typing import Any, TypeVar
 
 from beaver_ftc.documents.base import Section
 from beaver_ftc.documents.document import Document, Problem
+from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.documents.problems import ScenarioError
 from beaver_ftc.documents.validation import validate
-from beaver_ftc.errors import BadInput
 from beaver_ftc.scenario.change import Change
 from beaver_ftc.scenario.changes import plain
 from beaver_ftc.scenario.environment import Gust

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from beaver_ftc.errors import BadInput, suggestion
+from beaver_ftc.documents.errors import BadInput, suggestion
 from beaver_ftc.scenario.autopilot import Autopilot
 from beaver_ftc.scenario.change import Change
 from beaver_ftc.scenario.given import change_of, gust_of

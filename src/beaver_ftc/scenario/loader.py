@@ -3,10 +3,10 @@
 from pathlib import Path
 
 from beaver_ftc.documents.document import Document, Problem
+from beaver_ftc.documents.errors import suggestion
 from beaver_ftc.documents.files import UnreadableError, read_text
 from beaver_ftc.documents.problems import ScenarioError
 from beaver_ftc.documents.validation import parse_document, validate
-from beaver_ftc.errors import suggestion
 from beaver_ftc.scenario.builtin import builtin_names, builtin_path, looks_like_a_path, resolve
 from beaver_ftc.scenario.consistency import conflicts_in_data
 from beaver_ftc.scenario.schema import Scenario

@@ -8,7 +8,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo
 from beaver_ftc.aircraft import UnknownAircraft, load
 from beaver_ftc.aircraft.question import in_question, named
 from beaver_ftc.documents.base import Number, refuse
-from beaver_ftc.errors import suggestion
+from beaver_ftc.documents.errors import suggestion
 from beaver_ftc.scenario.sensor_faults import sensor_words, sensors_there
 
 UNANTICIPATED = "unanticipated"

@@ -9,7 +9,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from beaver_ftc.aircraft.question import in_question
 from beaver_ftc.documents.base import Conflict, Number, Section, number, order_conflicts, refuse
-from beaver_ftc.errors import suggestion
+from beaver_ftc.documents.errors import suggestion
 from beaver_ftc.scenario.sensors import ENGINE, Sensors
 
 # Sensor -> its unit, and the largest offset or noise that a fault may have.

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from beaver_ftc.aircraft.question import asked
 from beaver_ftc.documents.document import Document
-from beaver_ftc.errors import BadInput
+from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.scenario.changes import aircraft_of
 from beaver_ftc.scenario.consistency import OF_A_FAULT
 from beaver_ftc.scenario.loader import validate_scenario

@@ -11,11 +11,11 @@ from beaver_ftc.aircraft import Aircraft, load
 from beaver_ftc.aircraft.question import asked
 from beaver_ftc.documents.base import Location
 from beaver_ftc.documents.document import Document, Problem
+from beaver_ftc.documents.errors import suggestion
 from beaver_ftc.documents.keys import UnusableKeyError, parse_key, with_values
+from beaver_ftc.documents.paths import data_root, inside
 from beaver_ftc.documents.problems import ScenarioError, key_path
 from beaver_ftc.documents.validation import validate
-from beaver_ftc.errors import suggestion
-from beaver_ftc.paths import data_root, inside
 from beaver_ftc.scenario.builtin import builtin_names, builtin_path, looks_like_a_path
 from beaver_ftc.scenario.loader import load_scenario, parse_document, read_file
 from beaver_ftc.scenario.schema import Scenario

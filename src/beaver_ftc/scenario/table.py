@@ -9,7 +9,7 @@ from typing import Any
 
 from beaver_ftc.documents.base import refuse
 from beaver_ftc.documents.files import UnreadableError, read_text
-from beaver_ftc.paths import inside
+from beaver_ftc.documents.paths import inside
 
 MAX_ROWS = 20_000
 _MAX_BYTES = 2_000_000

@@ -9,7 +9,7 @@ from beaver_ftc.control.outer import setup
 from beaver_ftc.control.outer.autopilot import to_body
 from beaver_ftc.control.outer.profile import advance
 from beaver_ftc.control.outer.state import ALTITUDE, AUTOPILOT, BANK, HEADING, SPEED
-from beaver_ftc.errors import BadInput
+from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.loop import Loop, fly
 from beaver_ftc.results.metrics import metrics
 from beaver_ftc.scenario.schema import Scenario

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from beaver_ftc.errors import BadInput
+from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.integrations.live.game import EARLIEST_S, LATEST_S, NOTHING, OVER, Game, hidden_faults
 
 NAMES = ("aileron", "elevator", NOTHING)

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from beaver_ftc.errors import BadInput
+from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.integrations.live import messages
 
 

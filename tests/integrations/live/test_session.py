@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import beaver_ftc as bf
-from beaver_ftc.errors import BadInput
+from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.integrations.live import messages
 from beaver_ftc.integrations.live.session import Session, encode, level_turn
 

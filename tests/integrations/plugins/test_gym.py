@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from beaver_ftc.errors import BadInput
+from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.loop import fly
 from flying import Memory, scenario
 

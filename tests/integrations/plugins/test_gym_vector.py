@@ -6,7 +6,7 @@ import signal
 import numpy as np
 import pytest
 
-from beaver_ftc.errors import BadInput, SimulationFailed
+from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from flying import scenario
 
 gymnasium = pytest.importorskip("gymnasium")

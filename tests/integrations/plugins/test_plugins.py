@@ -10,7 +10,7 @@ import pytest
 
 from beaver_ftc.control.base import Law
 from beaver_ftc.diagnosis.base import Detector, Verdict
-from beaver_ftc.errors import BadInput, SimulationFailed
+from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.plugins import DETECTORS, LAWS, VARIABLE, _hyphenated, plugin_class, register, registered
 from beaver_ftc.results.metrics import metrics

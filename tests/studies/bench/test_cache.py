@@ -12,8 +12,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from beaver_ftc import compiled, paths
-from beaver_ftc.paths import data_root
+from beaver_ftc import compiled
+from beaver_ftc.documents import paths
+from beaver_ftc.documents.paths import data_root
 
 REPOSITORY = data_root()
 

@@ -13,7 +13,7 @@ from beaver_ftc.aircraft.loading import first_line, read
 from beaver_ftc.cli.main import app
 from beaver_ftc.design.context import DesignModel
 from beaver_ftc.design.model import design_record
-from beaver_ftc.errors import BadInput, SimulationFailed
+from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.plant import instrumented
 from beaver_ftc.plant.adapter import Plant, bare, translated

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from beaver_ftc.errors import SimulationFailed
+from beaver_ftc.documents.errors import SimulationFailed
 from beaver_ftc.studies.engine.flown import flown, fly_all
 from beaver_ftc.studies.engine.identity import PACKAGE, differences, hashed_files
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from beaver_ftc.control.laws import gains
-from beaver_ftc.errors import BadInput
+from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.studies.margins.aircraft_loop import LawGains, Parts, frequencies, loops
 from beaver_ftc.studies.margins.study import at, study
 from flying import flown, scenario

@@ -9,7 +9,7 @@ from html import escape
 import numpy as np
 import pytest
 
-from beaver_ftc.errors import BadInput
+from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.results.log import read
 from beaver_ftc.studies.mismatch import envelope
 from beaver_ftc.studies.mismatch.section import _heading

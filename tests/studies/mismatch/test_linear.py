@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from beaver_ftc.design import fdc
-from beaver_ftc.errors import SimulationFailed
+from beaver_ftc.documents.errors import SimulationFailed
 from beaver_ftc.plant.linear import own
 from beaver_ftc.plant.state import FlightState
 from beaver_ftc.studies.mismatch.linear import analyse, engine_of, state_vector, surfaces_of

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from typer.testing import CliRunner
 
 from beaver_ftc.cli.main import app
-from beaver_ftc.errors import BadInput
+from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.studies.compare.replay import Trace, record
 from beaver_ftc.studies.power.contenders import BUILT_IN, ESTIMATORS, Contender, contenders
 from beaver_ftc.studies.power.document import document_of

@@ -7,7 +7,7 @@ import pytest
 from typer.testing import CliRunner
 
 from beaver_ftc.cli.main import app
-from beaver_ftc.errors import BadInput
+from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.flights.detectors import detector_names
 from beaver_ftc.studies.recorded import robustness, tally, words
 from beaver_ftc.studies.recorded.data import data_sets

@@ -1,7 +1,7 @@
 import pytest
 
 from beaver_ftc.aircraft import load
-from beaver_ftc.errors import SimulationFailed
+from beaver_ftc.documents.errors import SimulationFailed
 from beaver_ftc.results.metrics import metrics
 from beaver_ftc.studies.sweep.flying import Job, Keep, fly_one, scenario_of
 from beaver_ftc.studies.sweep.sampling import Assignment, Plan, flight_seed

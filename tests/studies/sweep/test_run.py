@@ -9,7 +9,7 @@ import time
 import pyarrow.parquet as pq
 import pytest
 
-from beaver_ftc.errors import BadInput, SimulationFailed
+from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.studies.engine import crew
 from beaver_ftc.studies.sweep.flying import Keep
 from beaver_ftc.studies.sweep.run import Options, SweepStopped, replay, run_sweep

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from beaver_ftc.errors import BadInput
+from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.studies.sweep.run import Options, assignment_of, named_for, run_sweep
 from beaver_ftc.studies.sweep.search import Evolution, score
 

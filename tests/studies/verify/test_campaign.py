@@ -10,7 +10,7 @@ from scipy.stats import binom, poisson
 from typer.testing import CliRunner
 
 from beaver_ftc.cli.main import app
-from beaver_ftc.errors import BadInput
+from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.studies.engine.statistics import binomial_upper, poisson_bound
 from beaver_ftc.studies.verify import campaign
 from beaver_ftc.studies.verify.campaign import Campaign, conduct

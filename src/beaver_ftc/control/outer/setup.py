@@ -8,7 +8,7 @@ from beaver_ftc.control.outer.level import GRAVITY_MPS2, THRUST, elevator_needed
 from beaver_ftc.control.outer.state import CHANNELS, N_FLAP, N_QDYN
 from beaver_ftc.design.engine import SEA_LEVEL_DENSITY_KG_M3
 from beaver_ftc.diagnosis.state import PITCH
-from beaver_ftc.errors import BadInput
+from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.scenario.schema import Scenario
 
 MOST_DEG_S = (12.0, 6.0, 10.0)  # asked of a healthy aircraft: a transport's manoeuvres

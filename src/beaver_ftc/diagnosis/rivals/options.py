@@ -10,7 +10,7 @@ from functools import cache
 from pathlib import Path
 
 from beaver_ftc.design.context import Context
-from beaver_ftc.errors import BadInput, suggestion
+from beaver_ftc.documents.errors import BadInput, suggestion
 
 TUNED = Path(__file__).with_name("tuned.json")
 TUNED_FOR_ERRORS = Path(__file__).with_name("tuned_for_errors.json")

@@ -3,7 +3,7 @@
 from importlib import import_module
 from pathlib import Path
 
-from beaver_ftc.errors import BadInput
+from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.flights.recording import Recording
 
 READERS = ("table", "alfa", "ulog", "ardupilot")

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from beaver_ftc.errors import BadInput
+from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.flights.readers.table import read_numbers
 from beaver_ftc.flights.recording import Column, Event, Floats, Recording
 

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from beaver_ftc.errors import BadInput
+from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.flights.recording import Column, Floats, Recording
 
 TIME = "t_s"

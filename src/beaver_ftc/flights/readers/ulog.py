@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from beaver_ftc.errors import BadInput
+from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.flights.recording import Column, Recording
 
 _US = 1e-6

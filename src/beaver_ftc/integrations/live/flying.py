@@ -12,7 +12,7 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
-from beaver_ftc.errors import BadInput, BeaverFtcError
+from beaver_ftc.documents.errors import BadInput, BeaverFtcError
 from beaver_ftc.integrations.live import messages
 from beaver_ftc.integrations.live.pace import Pace
 from beaver_ftc.integrations.live.session import NO_STICK, Session, encode

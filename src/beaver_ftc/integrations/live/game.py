@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from beaver_ftc.errors import BadInput, suggestion
+from beaver_ftc.documents.errors import BadInput, suggestion
 
 EARLIEST_S, LATEST_S = 4.0, 20.0  # of the hidden fault, after the start of the round
 IDLE, WAITING, BROKEN, OVER = "idle", "waiting", "broken", "over"

@@ -12,7 +12,7 @@ import numpy as np
 
 import beaver_ftc as bf
 from beaver_ftc.aircraft import question
-from beaver_ftc.errors import BadInput, suggestion
+from beaver_ftc.documents.errors import BadInput, suggestion
 from beaver_ftc.integrations.live import messages
 from beaver_ftc.integrations.live.game import NOTHING, Game, hidden_faults
 from beaver_ftc.plugins import DETECTORS, LAWS, registered

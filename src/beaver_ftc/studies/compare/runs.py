@@ -5,8 +5,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.documents.problems import one_line
-from beaver_ftc.errors import BadInput
 from beaver_ftc.results.looks import BLACK
 from beaver_ftc.studies.engine.words import aligned, number
 

@@ -6,7 +6,7 @@ from math import hypot, inf
 from time import thread_time
 from typing import Any
 
-from beaver_ftc.errors import BeaverFtcError
+from beaver_ftc.documents.errors import BeaverFtcError
 from beaver_ftc.loop.flight import Flight
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.results.metrics import metrics

@@ -7,7 +7,7 @@ from typing import Any
 
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.aircraft.schema import AircraftFile
-from beaver_ftc.errors import BadInput, BeaverFtcError, SimulationFailed
+from beaver_ftc.documents.errors import BadInput, BeaverFtcError, SimulationFailed
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.state import FlightState
 from beaver_ftc.plant.trim import TrimPoint, trim

@@ -16,8 +16,8 @@ import numpy as np
 
 from beaver_ftc.aircraft import AXES, Aircraft
 from beaver_ftc.design.inertia import inertia_coefficients
-from beaver_ftc.errors import BeaverFtcError
-from beaver_ftc.paths import cache_base
+from beaver_ftc.documents.errors import BeaverFtcError
+from beaver_ftc.documents.paths import cache_base
 from beaver_ftc.plant.adapter import Plant, translated
 from beaver_ftc.scenario.diagnosis import Bounds
 from beaver_ftc.studies.derive.error import errors_of

@@ -15,7 +15,7 @@ from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.aircraft.loading import DERIVED, first_line, read
 from beaver_ftc.aircraft.schema import MAX_MONOMIALS, MAX_SIGNALS, AircraftFile
 from beaver_ftc.design.model import design_record
-from beaver_ftc.errors import BadInput
+from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.plant import instrumented
 from beaver_ftc.plant.adapter import translated
 from beaver_ftc.plant.trim import TrimPoint

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from beaver_ftc.aircraft.loading import FILE, builtin_names, derived_folder, load, read
-from beaver_ftc.errors import BadInput, SimulationFailed
+from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.plant import instrumented
 
 FROM_JSBSIM = "jsbsim:"

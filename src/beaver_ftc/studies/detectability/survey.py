@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from beaver_ftc.errors import BadInput, BeaverFtcError
+from beaver_ftc.documents.errors import BadInput, BeaverFtcError
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.detectability.excitation import Excitation, excitation
 from beaver_ftc.studies.detectability.grid import (

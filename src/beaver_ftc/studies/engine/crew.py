@@ -15,7 +15,7 @@ from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wai
 from concurrent.futures.process import BrokenProcessPool
 from typing import Any, NamedTuple, Protocol
 
-from beaver_ftc.errors import SimulationFailed
+from beaver_ftc.documents.errors import SimulationFailed
 from beaver_ftc.studies.engine import processes
 
 Row = Any

@@ -12,7 +12,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from beaver_ftc.errors import SimulationFailed
+from beaver_ftc.documents.errors import SimulationFailed
 from beaver_ftc.studies.engine.campaign import Batch, Batches, Campaign
 from beaver_ftc.studies.engine.crew import Case, Crew, LocalCrew, ThisProcess, Work
 from beaver_ftc.studies.engine.files import clear_disk_errors, locked, remove_leftovers, write_whole

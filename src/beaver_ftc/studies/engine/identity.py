@@ -7,8 +7,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from beaver_ftc.errors import BadInput
-from beaver_ftc.paths import data_root
+from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.documents.paths import data_root
 from beaver_ftc.results.metrics import versions
 
 PACKAGE = Path(__file__).resolve().parents[2]

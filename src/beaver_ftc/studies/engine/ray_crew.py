@@ -7,7 +7,7 @@ retry.
 import os
 from typing import Any
 
-from beaver_ftc.errors import BadInput, SimulationFailed
+from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.plugins import VARIABLE
 from beaver_ftc.results.metrics import versions
 from beaver_ftc.studies.engine.crew import Outcome, Row, Task, Work, silence

@@ -13,7 +13,7 @@ from beaver_ftc.control.state import COMPILED
 from beaver_ftc.design.model import QDYN
 from beaver_ftc.design.variants import jacobian
 from beaver_ftc.diagnosis.state import PITCH
-from beaver_ftc.errors import BadInput
+from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.studies.engine.words import aligned
 from beaver_ftc.studies.margins.aircraft_loop import (
     RATES,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from beaver_ftc.errors import BadInput
+from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.studies.engine.flown import Progress, flown
 from beaver_ftc.studies.mismatch.document import Document, document, write_csv
 from beaver_ftc.studies.mismatch.figures import AXIS_NAMES, largest_sources, new_figure, save

@@ -6,7 +6,7 @@ A variant is a name of VARIANTS, or key=value pairs of `design_model`, joined by
 
 from typing import TYPE_CHECKING, Any
 
-from beaver_ftc.errors import BadInput
+from beaver_ftc.documents.errors import BadInput
 
 if TYPE_CHECKING:
     from beaver_ftc.scenario.schema import Scenario

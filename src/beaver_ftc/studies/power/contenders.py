@@ -2,7 +2,7 @@
 
 from typing import Any, NamedTuple
 
-from beaver_ftc.errors import BadInput
+from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.plugins import DETECTORS, is_compiled, refusal, registered
 
 ESTIMATORS = "adaptive-estimators"

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from beaver_ftc.errors import BeaverFtcError
+from beaver_ftc.documents.errors import BeaverFtcError
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.compare.replay import (
     Recording,

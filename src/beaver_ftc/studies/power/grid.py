@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from beaver_ftc.errors import BadInput
+from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.scenario.schema import Scenario
 
 STRIKES_S = (8.0, 10.0)  # a fault strikes at random in between

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from beaver_ftc.errors import BadInput
+from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.flights.readers import read_flight
 from beaver_ftc.flights.recording import Recording
 from beaver_ftc.flights.samples import Samples, sample

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from beaver_ftc.errors import BadInput
+from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.flights.detectors import BANK, diagnose_with
 from beaver_ftc.flights.identify import Stretch, fit_model, stretches_of
 from beaver_ftc.flights.model import Model

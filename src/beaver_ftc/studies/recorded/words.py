@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Any
 
-from beaver_ftc.errors import BadInput
+from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.studies.recorded import robustness
 
 Document = dict[str, Any]

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 from pydantic import ValidationError
 
 from beaver_ftc.documents.document import Document
+from beaver_ftc.documents.errors import BadInput, BeaverFtcError
 from beaver_ftc.documents.problems import key_path, problems_of
-from beaver_ftc.errors import BadInput, BeaverFtcError
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.sweep_loader import Sweep
 from beaver_ftc.studies.sweep.sampling import Assignment, flight_seed

@@ -9,7 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
-from beaver_ftc.errors import BadInput, BeaverFtcError, SimulationFailed
+from beaver_ftc.documents.errors import BadInput, BeaverFtcError, SimulationFailed
 from beaver_ftc.results.metrics import as_json, versions
 from beaver_ftc.scenario.sweep_loader import Sweep
 from beaver_ftc.studies.engine.campaign import Campaign, Source

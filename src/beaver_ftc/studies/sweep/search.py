@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from beaver_ftc.errors import BadInput
+from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.scenario.sweep_loader import Sweep
 from beaver_ftc.studies.engine.campaign import Batch
 from beaver_ftc.studies.engine.words import finite

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any, Self
 
 from beaver_ftc.aircraft import Aircraft
-from beaver_ftc.errors import BadInput, SimulationFailed
+from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.scenario.sweep_loader import Sweep
 from beaver_ftc.studies.engine import files
 from beaver_ftc.studies.engine.identity import Identity

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from beaver_ftc.aircraft import question
 from beaver_ftc.documents.document import Document
-from beaver_ftc.errors import BadInput
+from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.results.frame import units
 from beaver_ftc.scenario.changes import plain
 from beaver_ftc.scenario.given import ScenarioLike, load

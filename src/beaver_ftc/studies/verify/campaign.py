@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from beaver_ftc import __version__
-from beaver_ftc.errors import BadInput, SimulationFailed
+from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.studies.engine.campaign import Batch, Batches
 from beaver_ftc.studies.engine.crew import Work
 from beaver_ftc.studies.engine.files import write_whole

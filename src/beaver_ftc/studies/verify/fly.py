@@ -3,7 +3,7 @@
 from math import ceil, exp
 from typing import Any
 
-from beaver_ftc.errors import BadInput
+from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.flight import Flight
 from beaver_ftc.scenario.faults import LossOfEffectiveness
 from beaver_ftc.studies.verify.draw import Draw

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 _VERSIONS_KEPT = 5
-_PACKAGE = Path(__file__).resolve().parent
+_PACKAGE = Path(__file__).resolve().parents[1]
 _INSTALLED = _PACKAGE / "data"
 
 

@@ -344,6 +344,14 @@ def test_in_pitch_an_end_counts_where_a_loss_has_shown_before():
     assert contested(loss=0.0, pitch=(60.0, 1.19, 60.0))
 
 
+def test_an_end_within_a_frame_of_several_instants_keeps_a_part():
+    """Half of it shows in one frame, the rest in the next: a step in either explains half of the two."""
+    assert not contested(loss=0.0, ending=50.0, step=100.0, instants=2)
+    assert not contested(loss=0.0, pitch=(93.2, 14.9, 59.2), instants=2)
+    assert contested(loss=0.0, pitch=(93.2, 14.9, 59.2))
+    assert contested(loss=0.0, ending=24.0, step=100.0, instants=2)
+
+
 @pytest.mark.parametrize("b", [0, 1])
 def test_what_the_beliefs_leave_unexplained_is_followed_by_the_drift(b):
     _, record = detector()

@@ -162,8 +162,9 @@ def excludes(fdi, surface):
     Each view of roll and yaw is held against that of pitch: a loss explains what it does to its own axes. A
     loss whose course is not declared `abrupt` may grow, and a constant theta then explains only part of what
     it does: it is excluded where that part is small besides; so is one that begins within a frame. The end of
-    one is a step like any other, and explains as much or nothing; in pitch, where a fault outside the class
-    is such a step, only where a loss has shown before.
+    one is a step like any other, and explains as much or nothing, but within a frame of several instants a
+    part: it shows in two; in pitch, where a fault outside the class is such a step, only where a loss has
+    shown before.
     """
     statistical = fdi.statistical
     pitch, exact = statistical.block[PITCH], fdi.abrupt and fdi.instants == 1
@@ -176,7 +177,9 @@ def excludes(fdi, surface):
         if at_most(pitch, surface, False) > min(0.5 * statistical.naming_level, SHOWN_BEFORE * in_pitch):
             ended = max(ended, in_pitch)
         part = 1.0 if exact else LEAST_PART
-        if better - max(worse, ended) > statistical.naming_level and worse < part * better:
+        end_part = 1.0 if fdi.instants == 1 else LEAST_PART
+        small = worse < part * better and ended < end_part * better
+        if small and better - max(worse, ended) > statistical.naming_level:
             return True
     return False
 

@@ -38,7 +38,16 @@ def test_every_metric_has_a_column(short):
         for key in (below if isinstance(below, dict) else [""])
     } - {"scenario", "seed", "versions"}
     names = {name for name, _, _ in columns_of(load().surfaces)}
-    lists = {"supervisor", "envelope_exits", "expectations", "departure", "faults", "hints", "changes"}
+    lists = {
+        "supervisor",
+        "envelope_exits",
+        "expectations",
+        "departure",
+        "faults",
+        "hints",
+        "changes",
+        "limits",
+    }
     shared = {"flight", "envelope", "profile", "mode_changes_left_out"}  # the flight's own document has them
     missing = {
         path

@@ -356,6 +356,18 @@ def test_help_imports_nothing_heavy():
     assert done.stdout == "[]\n"
 
 
+@pytest.mark.parametrize("command", [["validate", "elevator-partial-loss"], ["trim"], ["list"]])
+def test_what_does_not_fly_loads_no_compiler(command):
+    script = (
+        "import sys, beaver_ftc.cli.main as cli\n"
+        f"sys.argv = ['beaver-ftc', *{command}]\n"
+        "try:\n    cli.main()\nexcept SystemExit as ended:\n    assert not ended.code\n"
+        "print([name for name in ('numba', 'llvmlite', 'scipy') if name in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "[]"
+
+
 def test_run_imports_neither_plots_nor_pandas(short):
     script = (
         "import sys; sys.argv = ['beaver-ftc', 'run', 'short.yaml', '--no-report']\n"

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from beaver_ftc.loop.loop import Loop
-from beaver_ftc.plant import native
+from beaver_ftc.plant import addresses, native
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.native import NodeBank
 from beaver_ftc.scenario.given import load
@@ -21,7 +21,7 @@ READ = [
 ]
 WRITTEN = ["fcs/aileron-cmd-rad", "fcs/elevator-cmd-rad", "fcs/rudder-cmd-rad", "failures/flap/effectiveness"]
 
-needs_native = pytest.mark.skipif(not native.available(), reason="this build of JSBSim has another layout")
+needs_native = pytest.mark.skipif(not addresses.available(), reason="this build of JSBSim has another layout")
 
 
 @needs_native
@@ -29,7 +29,7 @@ def test_reads_agree_to_the_bit_along_a_flight(beaver):
     bank, found = NodeBank([beaver.node(name) for name in READ], owner=beaver), np.empty(len(READ))
     for _ in range(50):
         beaver.run()
-        native.read_nodes(native.getter_address(), bank.pointers, found)
+        native.read_nodes(addresses.getter_address(), bank.pointers, found)
         assert found.tolist() == [beaver.read(name) for name in READ]
 
 
@@ -39,7 +39,7 @@ def test_writes_agree_to_the_bit(beaver):
         NodeBank([beaver.node(name) for name in WRITTEN], owner=beaver),
         np.array([0.1, -0.2, 1 / 3, 0.7]),
     )
-    native.write_nodes(native.setter_address(), bank.pointers, values)
+    native.write_nodes(addresses.setter_address(), bank.pointers, values)
     assert [beaver.read(name) for name in WRITTEN] == values.tolist()
 
 
@@ -51,7 +51,7 @@ def test_usable_inside_another_kernel(beaver):
         return out[0] + out[1]
 
     bank = NodeBank([beaver.node(name) for name in READ[:2]], owner=beaver)
-    total = first_plus_second(native.getter_address(), bank.pointers, np.empty(2))
+    total = first_plus_second(addresses.getter_address(), bank.pointers, np.empty(2))
     assert total == beaver.read(READ[0]) + beaver.read(READ[1])
 
 
@@ -59,7 +59,7 @@ def test_the_plain_path_gives_the_same(beaver, monkeypatch):
     native_bank, out = NodeBank([beaver.node(name) for name in READ], owner=beaver), np.empty(len(READ))
     native_bank.read(out)
     monkeypatch.setenv("BEAVER_FTC_NATIVE", "0")
-    assert not native.available()
+    assert not addresses.available()
     plain_bank, plain = NodeBank([beaver.node(name) for name in READ], owner=beaver), np.empty(len(READ))
     plain_bank.read(plain)
     assert plain.tolist() == out.tolist()
@@ -85,8 +85,8 @@ def test_a_bank_keeps_its_aircraft_alive(trim_point):
 def test_another_layout_is_recognised(monkeypatch, change):
     """A node of another size, a missing symbol, a word that is not the node's address."""
     for name, value in change.items():
-        monkeypatch.setattr(native, name, value)
-    assert not native._layout_is_known.__wrapped__()
+        monkeypatch.setattr(addresses, name, value)
+    assert not addresses._layout_is_known.__wrapped__()
 
 
 ROUGH = {"environment": {"turbulence": "dryden", "severity": "moderate"}, "sensors": "consumer-grade"}
@@ -108,8 +108,8 @@ def test_jsbsim_run_by_compiled_code_is_the_same_flight(air, substeps):
 
 def test_an_executive_that_is_not_where_it_is_expected_is_run_through_python(monkeypatch):
     plant = Plant(rate_hz=100)
-    monkeypatch.setattr(native, "_EXECUTIVE_SIZE", 48)
-    assert native.executive_address(plant.fdm) == 0
+    monkeypatch.setattr(addresses, "_EXECUTIVE_SIZE", 48)
+    assert addresses.executive_address(plant.fdm) == 0
     monkeypatch.undo()
-    monkeypatch.setattr(native, "_BASE_OFFSET", 32)  # where the dictionary is
-    assert native.executive_address(plant.fdm) == 0
+    monkeypatch.setattr(addresses, "_BASE_OFFSET", 32)  # where the dictionary is
+    assert addresses.executive_address(plant.fdm) == 0

@@ -3,9 +3,10 @@
 import numpy as np
 
 from beaver_ftc.aircraft import Aircraft
+from beaver_ftc.plant import addresses
 from beaver_ftc.plant import channels as ch
-from beaver_ftc.plant import native
 from beaver_ftc.plant.adapter import Plant
+from beaver_ftc.plant.native import NodeBank
 
 UNANTICIPATED = "failures/unanticipated/Cm-alpha3"
 IMMOVABLE = ("stuck", "hardover", "float")  # failures in which a surface does not follow its command
@@ -19,24 +20,24 @@ class Cockpit:
 
     def __init__(self, plant: Plant, frames: np.ndarray) -> None:
         self._frames = frames
-        self._read = native.NodeBank(
+        self._read = NodeBank(
             [plant.node(name) for _, name, _ in _channels(plant.aircraft, frames["truth"][0])], owner=plant
         )
-        self._write = native.NodeBank(
+        self._write = NodeBank(
             [plant.input(name) for name in ch.command_properties(plant.aircraft)], owner=plant
         )
-        self._engine = native.NodeBank([plant.input(plant.aircraft.trim.throttle)], owner=plant)
-        self._air = native.NodeBank(
+        self._engine = NodeBank([plant.input(plant.aircraft.trim.throttle)], owner=plant)
+        self._air = NodeBank(
             [plant.node("attitude/psi-rad"), plant.input("atmosphere/psiw-rad")], owner=plant
         )
-        self.native = native.available()
+        self.native = addresses.available()
         truth, running = frames["truth"][0], frames["running"][0]
         truth["native"] = self.native
-        truth["getter"], truth["setter"] = native.getter_address(), native.setter_address()
+        truth["getter"], truth["setter"] = addresses.getter_address(), addresses.setter_address()
         truth["read_pointers"][: truth["n"]] = self._read.pointers
         truth["write_pointers"] = self._write.pointers
         truth["engine_pointer"] = self._engine.pointers
-        running["run"], running["executive"] = native.run_address(), plant.executive
+        running["run"], running["executive"] = addresses.run_address(), plant.executive
         running["getter"], running["setter"] = truth["getter"], truth["setter"]
         running["heading_pointer"], running["axes_pointer"] = self._air.pointers
 

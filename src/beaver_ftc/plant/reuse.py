@@ -20,7 +20,7 @@ from time import monotonic
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.documents.paths import data_root
 from beaver_ftc.plant.adapter import Plant
-from beaver_ftc.plant.native import executive_address
+from beaver_ftc.plant.addresses import executive_address
 
 _MODELS_ONLY = 2  # of `reset_to_initial_conditions`: initialise every model, do not run
 _GUST = "atmosphere/cosine-gust"

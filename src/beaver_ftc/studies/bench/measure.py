@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from beaver_ftc.plant import native
+from beaver_ftc.plant import addresses
 from beaver_ftc.scenario.loader import load_scenario
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.bench.contenders import Bare, ClosedLoop, take_over
@@ -68,7 +68,7 @@ def machine() -> dict[str, Any]:
         "cores": cores(),
         "python": platform.python_version(),
         **{package: version(package) for package in ("jsbsim", "numba", "numpy")},
-        "native_properties": native.available(),
+        "native_properties": addresses.available(),
     }
 
 

@@ -59,7 +59,7 @@ TABLE = (
     ),
     Exempt(
         r"beaver-ftc compare --tune( --errors)?",
-        "a search of minutes, which tests/compare does on few flights",
+        "a search of minutes, which tests/studies/compare does on few flights",
         "beaver-ftc compare --help",
     ),
     Exempt(

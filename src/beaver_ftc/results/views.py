@@ -147,7 +147,7 @@ def _profile(limited: bool) -> View:
             (
                 *((Trace(command, "commanded", "target"),) if command else ()),
                 *(
-                    (Trace(LIMITED, "of it can be held", "command"),)
+                    (Trace(LIMITED, "what can be held", "command"),)
                     if limited and label == "airspeed"
                     else ()
                 ),

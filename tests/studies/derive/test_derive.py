@@ -22,8 +22,8 @@ from beaver_ftc.studies.derive.check import not_affine
 from beaver_ftc.studies.derive.error import errors_of
 from beaver_ftc.studies.derive.fit import pursue
 from beaver_ftc.studies.derive.flown import places
-from beaver_ftc.studies.derive.run import SIDESLIP_RAD, derive
-from beaver_ftc.studies.derive.sample import Envelope, sample
+from beaver_ftc.studies.derive.run import derive
+from beaver_ftc.studies.derive.sample import SIDESLIP_RAD, Envelope, sample
 
 TRAINER = Path(__file__).parents[2] / "data" / "aircraft" / "trainer"
 FLIGHT = """

@@ -81,3 +81,14 @@ def test_a_rudder_that_rolls_more_than_it_yaws_leads_the_yaw_axis_all_the_same(t
     aircraft = read(trainer)
     assert aircraft.dominant_axis == (0, 1, 2)
     assert aircraft.primary == ("aileron", "elevator", "rudder")
+
+
+def test_where_nothing_can_be_kept_it_is_said_all_the_same(trainer, monkeypatch):
+    """A full disk, or another process that was first: no reason not to fly."""
+
+    def full(path, content):
+        raise OSError("no space left on device")
+
+    monkeypatch.setattr(own_file, "compared", lambda aircraft: ["off"])
+    monkeypatch.setattr(own_file, "write_whole", full)
+    assert own_file.kept_or_compared(read(trainer)) == ["off"]

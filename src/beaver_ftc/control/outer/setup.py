@@ -28,9 +28,9 @@ GAINS = {
     "loose": 0.4,  # share of the heading loop left when nothing acts in yaw: the turn is then slow to follow
     "protection": 2.0,  # 1/s: how fast the angle of attack may close on its limit
 }  # fmt: skip
+POWER_SIDESLIP_RAD = 0.2  # that full power may lead to with a rudder that is lost; 0.6 is a departure
 # Of 0, 0.7, 1.5 and 3 deg kept of the flap at the end of the airspeeds that can be held, the one with which
 # most jams were kept; and how fast a limit moves the command: about as fast as drag slows the aircraft down.
-MOST_SIDESLIP_RAD = 0.2  # of power with a rudder that is lost; 0.6 is a departure
 FLAP_RESERVE_DEG, PACE_MPS2 = 0.7, 1.0
 LEAST_DIHEDRAL = 0.01  # of an aircraft that hardly rolls by sideslip: it is then not flown by it
 _UNIT = {"altitude_m": 1.0, "airspeed_mps": 1.0, "heading_deg": radians(1.0), "bank_deg": radians(1.0)}
@@ -75,7 +75,7 @@ def _know(autopilot: np.void, scenario: Scenario) -> None:
     by_sideslip = terms.get("Cl_beta", 0.0) / terms.get("Cl_p", -1.0)
     autopilot["dihedral"] = max(by_sideslip, LEAST_DIHEDRAL) * 2.0 / aircraft.geometry.span_m
     if terms.get("Cn_dpt3"):
-        beta = MOST_SIDESLIP_RAD
+        beta = POWER_SIDESLIP_RAD
         held = terms.get("Cn_beta", 0.0) * beta + terms.get("Cn_beta3", 0.0) * beta**3
         autopilot["weathercock"] = max(held / abs(terms["Cn_dpt3"]), 0.0)
     autopilot["slowest_mps"] = aircraft.envelope.airspeed_mps[0] + SPARE_MPS

@@ -12,9 +12,8 @@ from beaver_ftc.scenario.initial import initial_of
 from beaver_ftc.studies.derive.level import Level
 from beaver_ftc.studies.derive.outline import EnvelopeFile
 
-SIDESLIP_RAD = (
-    0.45  # what a rudder at its stop leads to: a file's own terms hold wherever the air is attached
-)
+# What a rudder at its stop leads to: a file's own terms hold wherever the air is attached.
+WIDE_SIDESLIP_RAD = 0.45
 
 
 def about_known(source: Path, folder: Path, asked: EnvelopeFile) -> Level:
@@ -33,7 +32,7 @@ def about_known(source: Path, folder: Path, asked: EnvelopeFile) -> Level:
         start["altitude_m"] = asked.altitude_m
     data["start"] = start
     plant = Plant(100, aircraft=aircraft)
-    return Level(data, aircraft, plant, trim_at(plant, **start), asked.sideslip_rad or SIDESLIP_RAD)
+    return Level(data, aircraft, plant, trim_at(plant, **start), asked.sideslip_rad or WIDE_SIDESLIP_RAD)
 
 
 def usual_start(aircraft: Aircraft) -> dict[str, float]:

@@ -4,6 +4,7 @@ This is done when a folder is named for the first time. What was found is kept i
 digest of its files, so that it costs nothing until one of them changes.
 """
 
+import contextlib
 import hashlib
 import json
 from collections.abc import Callable, Iterator
@@ -23,10 +24,10 @@ from beaver_ftc.scenario.diagnosis import Bounds
 from beaver_ftc.studies.derive.error import errors_of
 from beaver_ftc.studies.derive.flown import sorted_in
 from beaver_ftc.studies.derive.known import trim_at, usual_start
-from beaver_ftc.studies.derive.sample import FRESH, Envelope, Samples, sample
+from beaver_ftc.studies.derive.sample import FRESH, SIDESLIP_RAD, Envelope, Samples, sample
+from beaver_ftc.studies.engine.files import write_whole
 
 STATES, STARTS, SEED = 800, 8, 11
-SIDESLIP_RAD = 0.15
 _FORMAT = 1  # of what is kept: files of another are compared anew
 
 
@@ -47,10 +48,9 @@ def kept_or_compared(aircraft: Aircraft) -> list[str]:
         return list(json.loads(file.read_text(encoding="utf-8")))
     except (OSError, ValueError):
         lines = compared(aircraft)
-    file.parent.mkdir(exist_ok=True)
-    fresh = file.with_suffix(".new")
-    fresh.write_text(json.dumps(lines), encoding="utf-8")
-    fresh.replace(file)
+    with contextlib.suppress(OSError):  # nowhere to keep it, or another process was first
+        file.parent.mkdir(parents=True, exist_ok=True)
+        write_whole(file, json.dumps(lines).encode())
     return lines
 
 

@@ -28,11 +28,11 @@ from beaver_ftc.studies.derive.level import LIFT_COEFFICIENTS, Level, level_flig
 from beaver_ftc.studies.derive.outline import EnvelopeFile, outline, read_envelope, travel_of
 from beaver_ftc.studies.derive.page import NAME as PAGE
 from beaver_ftc.studies.derive.page import page_of
-from beaver_ftc.studies.derive.sample import FRESH, Envelope, Samples, sample
+from beaver_ftc.studies.derive.sample import FRESH, SIDESLIP_RAD, Envelope, Samples, sample
 from beaver_ftc.studies.derive.source import Source, source_of, try_out
 
 SAMPLES, CHECKED = 6000, 16000
-SPAN_OF_ALPHA_RAD, SIDESLIP_RAD = 0.10, 0.15
+SPAN_OF_ALPHA_RAD = 0.10
 FEWEST_TERMS = 6
 Tell = Callable[[str], None]
 

@@ -20,6 +20,7 @@ REACHES = (0.25, 0.5, 0.75, 1.0)  # of the boxes, as shares of the envelope's ha
 SHARES = (0.15, 0.35, 0.65, 1.0)  # of the surfaces' travel
 AGES_S = (120.0, 900.0, 7200.0)  # of a flight: fuel burns, and inertia with it
 FRESH = (0,)
+SIDESLIP_RAD = 0.15  # the usual half width
 EVERY_AGE = (0, 0, 1, 0, 0, 2)
 STARTS = 48
 AT_AN_END = 0.3  # share of the draws that are at an end of their range: corners are where errors are large

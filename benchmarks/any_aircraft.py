@@ -1,13 +1,17 @@
 """Whether the promises hold for aircraft nobody wrote by hand: no false alarm, no fault named wrongly.
 
-    python benchmarks/any_aircraft.py [NAMES] --flights N --seed S [--first K] [--healthy-s SECONDS]
+    python benchmarks/any_aircraft.py [NAMES] --flights N --seed S [--first K] [--healthy-s T] [--hours H]
 
 Each aircraft is derived if it has not been. Then N healthy flights, and N losses of effectiveness of 40 % and
 more of each surface, at random speeds, frame rates, references, magnitudes, times and profiles, with the
-published bound declared and no error but the aircraft's own. A row an aircraft: hours flown in health and
-their false alarms; of each fault how many were detected, named, named wrongly, and how often the true
-surface was left out of what is still possible; how many the theory of `detectability` is certain to detect
-within 0.5 s, weighed along the same flight in health, and how many of these were not (`late`).
+published bound declared and no error but the aircraft's own. There is no autopilot, so that some flights end
+early, out of the altitudes that are simulated: `--hours` flies further healthy ones, with the numbers that
+follow, until so many hours are full. `--flights 0 --first 200 --hours 2.5` flies these alone.
+
+A row an aircraft: hours flown in health and their false alarms; of each fault how many were detected, named,
+named wrongly, and how often the true surface was left out of what is still possible; how many the theory of
+`detectability` is certain to detect within 0.5 s, weighed along the same flight in health, and how many of
+these were not (`late`).
 """
 
 import argparse
@@ -30,6 +34,7 @@ from beaver_ftc.studies.detectability.mismatch import detection_magnitude
 
 TWELVE = ("737", "A4", "B747", "MD11", "c172p", "c310", "J3Cub", "L410", "OV10", "T37", "pa28", "p51d")
 HEALTHY_S, FAULTY_S = 60.0, 25.0
+MOST_REFUSED = 100  # flights that do not trim, before the hours are given up
 SHAPES = ("sine", "square", "doublet", "step")
 COLUMNS = (
     "aircraft",
@@ -92,12 +97,24 @@ def flown(name: str, args: argparse.Namespace) -> Iterator[tuple[str | None, Any
     """Surface, or None in health, and what came of the flight; None where it has no trim."""
     surfaces = load({"name": "plain", "aircraft": f"jsbsim:{name}"}).airframe.surfaces
     for surface in (None, *surfaces):
-        for index in range(args.first, args.first + args.flights):
+        index, flown_s, refused = args.first, 0.0, 0
+        wanted_s = 3600.0 * args.hours if surface is None else 0.0
+        while index < args.first + args.flights or (flown_s < wanted_s and refused < MOST_REFUSED):
             flight = scenario(name, surface, args.seed, index, args.healthy_s, args.fault_class)
+            index += 1
             try:
-                yield surface, fly(flight)
+                done = fly(flight)
             except BadInput as error:  # a speed at which it does not trim
                 print(f"   {name} {flight.name}: {error}")
+                refused += 1
+                continue
+            flown_s += seconds_of(done)
+            yield surface, done
+
+
+def seconds_of(flight: Any) -> float:
+    """How long it flew."""
+    return float(flight.scenario.duration_s if flight.departure is None else flight.departure[0])
 
 
 def is_certain(faulty: Scenario) -> bool:
@@ -123,9 +140,7 @@ def row_of(name: str, args: argparse.Namespace) -> tuple[list[str], list[str]]:
             count["departed"] += 1
             said.append(f"{label}: departed, {flight.departure}")
         if surface is None:
-            count["healthy"] += (
-                flight.scenario.duration_s if flight.departure is None else flight.departure[0]
-            )
+            count["healthy"] += seconds_of(flight)
             if detected:
                 count["false"] += 1
                 said.append(f"{label}: alarm at {flight.detection_time_s:.2f} s in health")
@@ -160,6 +175,7 @@ def main() -> None:
     parser.add_argument("--first", type=int, default=0, help="the number of the first flight of each")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--healthy-s", type=float, default=HEALTHY_S)
+    parser.add_argument("--hours", type=float, default=0.0, help="fly at least so long in health")
     parser.add_argument("--class", dest="fault_class", choices=("published", "all"), default="published")
     args = parser.parse_args()
     table, broken = Table(*COLUMNS), []

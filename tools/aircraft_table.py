@@ -9,7 +9,6 @@ ends, costs one line of the table.
 import argparse
 import json
 import os
-import re
 import subprocess
 import sys
 import tempfile
@@ -19,7 +18,11 @@ from pathlib import Path
 from beaver_ftc.plant.instrumented import names
 
 PAGE = Path(__file__).parents[1] / "docs" / "aircraft.md"
-LONGEST_S = 60
+LONGEST_S = 600
+PROGRAM = """import atexit, os, sys
+atexit.register(lambda: sys.stderr.write(f"cpu {sum(os.times()[:4]):.1f}"))
+from beaver_ftc.cli.main import main
+main()"""
 HEAD = """# Aircraft
 
 Three ways to name what flies: `aircraft: beaver` (built in), `aircraft: jsbsim:c172p` (of the installed
@@ -38,6 +41,7 @@ file has the keys `airspeed_mps`, `alpha_deg`, `altitude_m` and `sideslip_deg`.
    copy: what it did beside the command (dampers, other surfaces moved along) is found and said in a line.
 2. It is trimmed in level flight at a lift coefficient of 0.45, or another where that does not trim. Engines
    are started as their kind wants it; where JSBSim gives no steady thrust the aircraft is flown gliding.
+   What a model reads and only FlightGear would give it is 0 in the copy, and named.
 3. It is put into 6000 random states about trim: airspeed, angles, rates, bank, climb, altitude, power and
    surfaces. Sparse terms are fitted to its accelerations by orthogonal matching pursuit. They may multiply
    the thrust coefficient, Mach number, the rate of the angle of attack and of sideslip, and the moments of
@@ -60,6 +64,7 @@ what is left by the terms of the built-in aircraft, and refuses others.
 
 The surfaces are aileron, elevator and rudder. Flaps, slats, speed brakes and spoilers stay as the aircraft's
 own flight control moves them: most go in detents at a pace of their own, and no law can control with them.
+`derive` says in its page which of them an aircraft has, and where they stand in level flight.
 So no surface stands in for the elevator, and where trim needs much of its travel a large loss cannot be
 balanced: the P-51 in level flight holds its elevator at half its travel, and with less than half of its
 effectiveness left nothing holds the nose up.
@@ -72,37 +77,38 @@ published bound. What was found is kept until a file in the folder changes.
 
 Written by `python -m tools.aircraft_table`; do not edit. Error: of the angular acceleration near trim (second
 box, within 0.35 of the travel), rad/s2. Loss: the smallest loss of effectiveness of aileron, elevator and
-rudder that is certain to be detected 3 deg from neutral; `-` where a total one is not.
+rudder that is certain to be detected 3 deg from neutral; `-` where a total one is not. Time: of one core, for
+the whole command. A line without numbers says why there is no design model.
 
-| aircraft | level flight, m/s | terms of Cl, Cm, Cn | error p | error q | error r | loss | notes |
-|---|---|---|---|---|---|---|---|
+| aircraft | level flight, m/s | terms of Cl, Cm, Cn | error p | error q | error r | loss | time, s | notes |
+|---|---|---|---|---|---|---|---|---|
 """
 
 
 def row_of(name: str) -> str:
     """A line of the table."""
     with tempfile.TemporaryDirectory() as folder:
-        program = "from beaver_ftc.cli.main import main; main()"
-        command = [sys.executable, "-c", program, "derive", f"jsbsim:{name}"]
+        command = [sys.executable, "-c", PROGRAM, "derive", f"jsbsim:{name}"]
         try:
             run = subprocess.run(
                 [*command, "--out", folder, "--format", "json"],
                 capture_output=True, text=True, timeout=LONGEST_S, check=False,
             )  # fmt: skip
         except subprocess.TimeoutExpired:
-            return f"| {name} | not within {LONGEST_S} s | | | | | | |"
+            return f"| {name} | not within {LONGEST_S} s | | | | | | | |"
+    said, _, cpu_s = run.stderr.rpartition("cpu ")
     if run.returncode != 0:
-        said = [line for line in run.stderr.splitlines() if line.strip() and not line.startswith("deriving")]
-        why = said[-1].replace("|", "/") if said else f"ended by signal {-run.returncode}"
-        why = re.sub(r'"?/[^ ]*/[^ ]*', "...", why)  # paths of this machine
-        return f"| {name} | {why[:160]} | | | | | | |"
+        lines = [line for line in said.splitlines() if line.strip() and not line.startswith("deriving")]
+        why = lines[-1] if lines else f"ended by signal {-run.returncode}"
+        return f"| {name} | {why.removeprefix(f'jsbsim:{name}: ').replace('|', '/')} | | | | | | | |"
     document = json.loads(run.stdout)
     terms = ", ".join(str(document["terms"][c]) for c in ("Cl", "Cm", "Cn"))
     errors = " | ".join(f"{document['near_trim_rad_s2'][axis]:.2g}" for axis in "pqr")
     losses = document["smallest_certain_loss"].values()
     loss = ", ".join(f"{share:.0%}" if share <= 1.0 else "-" for share in losses)
     notes = "; ".join(document["notes"]).replace("|", "/")
-    return f"| {name} | {document['trim']['airspeed_mps']:.1f} | {terms} | {errors} | {loss} | {notes} |"
+    speed_mps = document["trim"]["airspeed_mps"]
+    return f"| {name} | {speed_mps:.1f} | {terms} | {errors} | {loss} | {cpu_s} | {notes} |"
 
 
 def main() -> None:

@@ -169,6 +169,7 @@ def test_a_surface_beyond_a_travel_that_ends_at_neutral_uses_all_of_it():
     up_only = new_map(travel_low=(-0.4, -0.4, -0.2, 0.0))
     assert error_map.level_of(up_only, np.array([0, 0, 0, -0.01])) == 2
     assert error_map.level_of(up_only, np.array([0, 0, 0, 0.25])) == 0
+    assert error_map.level_of(up_only, np.array([0, 0, 0, 0.0])) == 0  # at rest at an end it uses none
 
 
 @pytest.mark.parametrize(("time_s", "age"), [(0.0, 0), (10.0, 0), (10.1, 1), (60.0, 1), (60.1, -1)])

@@ -82,8 +82,9 @@ def level_of(error_map, u):
         return last
     used = 0.0
     for s in range(u.size):
-        end = error_map.travel_high[s] if u[s] > 0.0 else error_map.travel_low[s]
-        used = max(used, u[s] / end) if end != 0.0 else 1.0
+        if u[s] != 0.0:
+            end = error_map.travel_high[s] if u[s] > 0.0 else error_map.travel_low[s]
+            used = max(used, u[s] / end) if end != 0.0 else 1.0
     for j in range(last):
         if used <= error_map.share[j]:
             return j

@@ -1,7 +1,7 @@
 """JSBSim for the rest of the package: a silent executive with the Beaver loaded, its properties by name."""
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from math import cos, sin
 from pathlib import Path
@@ -45,6 +45,8 @@ class _Errors(jsbsim.FGLogger):
     def reason(self) -> str:
         """What went wrong, as one line without paths."""
         said = " ".join("".join(self.said).split()) or "no reason given"
+        if missing := re.search(r"Could not open file: ([^ ]+)", said):
+            said = f"it needs the file {missing[1].removesuffix('.xml')}.xml, which is not there"
         return re.sub(r"\"?/?(?:[^ \"/]*/)+(?=[^ /\"]*\.xml)", "", said)[:_LONGEST_REASON]
 
     def set_level(self, level):
@@ -101,18 +103,26 @@ def translated(model: Path) -> Iterator[None]:
         raise SimulationFailed(f"JSBSim cannot fly {model.parent.name}/{model.name}: {says}") from None
 
 
-def bare(model: Path) -> jsbsim.FGFDMExec:
-    """A model in an executive of its own, initialised where it is: to be looked at, not flown."""
+def bare(model: Path, absent: Iterable[str] = ()) -> jsbsim.FGFDMExec:
+    """A model in an executive of its own, initialised where it is: to be looked at, not flown.
+
+    absent: properties that nothing gives, at 0.
+    """
     fdm = _load(_Errors(), model)
+    for name in absent:
+        fdm[name] = 0.0
     fdm["ic/h-sl-ft"], fdm["ic/vc-kts"] = 5000.0, 100.0
     with translated(model):
         fdm.run_ic()
     return fdm
 
 
-def probe(model: Path) -> None:
-    """Load a model, start it and let it run for a few frames; raises SimulationFailed if it does not."""
-    fdm = bare(model)
+def probe(model: Path, absent: Iterable[str] = ()) -> None:
+    """Load a model, start it and let it run for a few frames; raises SimulationFailed if it does not.
+
+    absent: properties that nothing gives, at 0.
+    """
+    fdm = bare(model, absent)
     with translated(model):
         for _ in range(5):
             fdm.run()

@@ -40,7 +40,8 @@ _SHAPES = {
     "opposite": "<product> <value> -1 </value> {of} </product>",
     "magnitude": "<abs> {of} </abs>",
     "deg": "<product> <value> 57.29577951308232 </value> {of} </product>",
-    "norm": "<quotient> {of} <property> actuators/{surface}/position-max-rad </property> </quotient>",
+    # of the travel as built: a scenario, and the search for trim, may move the stops
+    "norm": "<quotient> {of} <value> {whole!r} </value> </quotient>",
 }
 _EXTRA_PITCH = """<function name="aero/moment/unanticipated-lbsft">
   <description> The unanticipated fault: extra pitching moment on alpha cubed </description>
@@ -95,6 +96,7 @@ _THRUST = """<quotient> <sum> {thrusts} <value> 0 </value> </sum>
   </quotient>"""
 _COMMON = """<?xml version="1.0"?>
 <system name="envelope and faults">
+  ABSENT
   <property value="0"> failures/unanticipated/Cm-alpha3 </property>
   <property value="0"> envelope/airspeed-min-fps </property>
   <property value="1e6"> envelope/airspeed-max-fps </property>
@@ -148,11 +150,13 @@ def source_of(name: str) -> Path:
     return root() / "aircraft" / name / f"{name}.xml"
 
 
-def _common(engines: int, read: str) -> str:
-    """Envelope, the unanticipated fault, and one power lever for all engines; read: the aircraft's files."""
+def _common(engines: int, read: str, absent: Iterable[str]) -> str:
+    """Envelope, the unanticipated fault, and one power lever for all engines; read: the aircraft's files;
+    absent: what they read and nothing gives."""
     levers = "".join(_LEVER.format(i=i) for i in range(engines))
     power = f'<channel name="power">{levers}{_told(engines, read)}</channel>'
-    return _COMMON.replace("ENGINES", power if engines else "")
+    zeros = "\n  ".join(f'<property value="0"> {name} </property>' for name in absent)
+    return _COMMON.replace("ENGINES", power if engines else "").replace("ABSENT", zeros)
 
 
 def _told(engines: int, read: str) -> str:
@@ -166,10 +170,12 @@ def _told(engines: int, read: str) -> str:
     return "".join(told)
 
 
-def instrument(source: Path, folder: Path, travel_rad: dict[str, tuple[float, float]]) -> Path:
+def instrument(
+    source: Path, folder: Path, travel_rad: dict[str, tuple[float, float]], absent: Iterable[str] = ()
+) -> Path:
     """Write the instrumented copy of a model and what is beside it into an empty folder; returns its model.
 
-    travel_rad: of each surface.
+    travel_rad: of each surface. absent: properties its files read that JSBSim alone does not give: 0 here.
 
     Raises BadInput where the failures cannot be put in, naming what is in the way.
     """
@@ -186,7 +192,7 @@ def instrument(source: Path, folder: Path, travel_rad: dict[str, tuple[float, fl
     _add_signals(aerodynamics, _engines(whole))
     _add_pitch_fault(aerodynamics, source.stem)
     read = "".join(path.read_text("utf-8", "replace") for path in sorted(source.parent.rglob("*.xml")))
-    (folder / "Systems" / "ftc-common.xml").write_text(_common(_engines(whole), read), encoding="utf-8")
+    (folder / "Systems" / "ftc-common.xml").write_text(_common(_engines(whole), read, absent), "utf-8")
     place = list(whole).index(next(iter(whole.iter("aerodynamics"))))
     for i, system in enumerate((*(f"ftc-{surface}" for surface in surfaces), "ftc-common")):
         whole.insert(place + i, Element("system", file=system))
@@ -250,7 +256,7 @@ def _put_in(aerodynamics: Element, folder: Path, travel_rad: dict[str, tuple[flo
                 shapes.add(shape)
                 element.text = f" {'-' if text.startswith('-') else ''}{_property(surface, shape)} "
         system = actuator_system(surface, *travel, prefix=PREFIX)
-        extra = "".join(_component(surface, shape) for shape in sorted(shapes - {"rad"}))
+        extra = "".join(_component(surface, shape, travel[1]) for shape in sorted(shapes - {"rad"}))
         system = re.sub(r"(\s*</channel>)", lambda end: f"{extra}{end.group(1)}", system)  # noqa: B023
         (folder / "Systems" / f"ftc-{surface}.xml").write_text(system, encoding="utf-8")
     return tuple(travel_rad)
@@ -262,9 +268,9 @@ def _property(surface: str, shape: str) -> str:
     return f"fcs/{PREFIX}{surface}{ending}"
 
 
-def _component(surface: str, shape: str) -> str:
+def _component(surface: str, shape: str, whole: float) -> str:
     of = f"<property> {_property(surface, 'rad')} </property>"
-    formula = _SHAPES[shape].format(of=of, surface=surface)
+    formula = _SHAPES[shape].format(of=of, whole=whole)
     name = _property(surface, shape)
     return f'\n    <fcs_function name="{name}"> <function> {formula} </function> </fcs_function>'
 

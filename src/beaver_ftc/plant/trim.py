@@ -25,7 +25,7 @@ from beaver_ftc.plant.state import FlightState
 TOLERANCE = 1e-9  # m/s2 and rad/s2, in each of the six accelerations
 
 _ALPHA_LIMIT_RAD = 0.6  # beyond it an aircraft has departed, so it cannot be trimmed there
-_MAX_ITERATIONS = 12
+_MAX_ITERATIONS = 40
 _ALPHA_GUESS_RAD = 0.05  # where the file has no forces
 _LIFTED_TRAVEL_RAD = 10.0
 _FLOW_UNKNOWNS = ("alpha_rad", "beta_rad", "theta_rad")

@@ -1,5 +1,6 @@
 """What of an aircraft a design model affine in its surfaces cannot hold: found at once, said in a line."""
 
+import re
 from dataclasses import replace
 from math import degrees
 from pathlib import Path
@@ -15,6 +16,7 @@ from beaver_ftc.studies.derive.outline import own_deflection
 NOT_AFFINE = 0.02  # deviation from a straight line, as a share of what the whole travel does
 _MOVED_RAD, _RATE_RAD_S = 0.003, 0.1
 _POINTS, _FRAMES = 9, 300
+_SURFACE = re.compile(r"fcs/(?!.*(cmd|throttle|thrust|gear))")
 
 
 def not_affine(plant: Plant, trim: FlightState) -> list[str]:
@@ -49,9 +51,15 @@ def _off_line(at: np.ndarray, values: np.ndarray) -> np.ndarray:
     return off
 
 
-def own_control(source: Path, scratch: Path) -> list[str]:
-    """What its own flight control does that the copy leaves out; scratch: an empty folder."""
-    model, surfaces = instrumented.instrument(source, scratch, {}), instrumented.surfaces_of(source)
+def further_surfaces(source: Path, plant: Plant) -> dict[str, float]:
+    """What else of its flight control its aerodynamics see, by property, and where it is in trim."""
+    names = [name for name in instrumented.others_of(source) if _SURFACE.match(name)]
+    return {name: round(plant.read(name), 4) for name in names if plant.has(name)}
+
+
+def own_control(source: Path, model: Path) -> list[str]:
+    """What its own flight control does that the copy leaves out; model: a copy that writes no files."""
+    surfaces = instrumented.surfaces_of(source)
     return [*_augmented(model, surfaces), *_moved_along(source, model, surfaces)]
 
 

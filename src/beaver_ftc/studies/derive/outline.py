@@ -60,12 +60,12 @@ def read_envelope(path: Path | None) -> EnvelopeFile:
     return validate(EnvelopeFile, parse_document(text, str(path), keys), str(path))
 
 
-def travel_of(source: Path, scratch: Path, notes: list[str]) -> Travel:
+def travel_of(source: Path, model: Path, notes: list[str]) -> Travel:
     """How far each surface goes when its own flight control is commanded from stop to stop, rad.
 
-    scratch: a folder for a copy that writes no files. What had to be supposed is added to the notes.
+    model: a copy that writes no files. What had to be supposed is added to the notes.
     """
-    model, travel = instrumented.instrument(source, scratch, {}), {}
+    travel = {}
     for surface in instrumented.surfaces_of(source):
         ends = [own_deflection(model, surface, command) for command in (-1.0, 1.0)]
         low, high = min(ends), max(ends)

@@ -10,12 +10,15 @@ from beaver_ftc.aircraft.aircraft import MOMENTS
 from beaver_ftc.design.context import DesignModel
 from beaver_ftc.design.model import design_record
 from beaver_ftc.design.terms import N_Y
-from beaver_ftc.plant.trim import TrimPoint
 from beaver_ftc.scenario.diagnosis import Bounds
+from beaver_ftc.studies.derive.derived import Derived
 
 DEFLECTION_DEG = 3.0  # beside neutral: what flight with the built-in references asks of a surface
 _NEAR = 1  # box and share of the travel of such a flight
 NAME = "derived.md"
+WHY_NOT_USED = (
+    "they stay where its own flight control has them; most go in detents, at a pace no law controls with"
+)
 
 
 def smallest_losses(aircraft: Aircraft) -> dict[str, dict[str, Any]]:
@@ -62,17 +65,18 @@ def _usual_y(aircraft: Aircraft) -> np.ndarray:
     return y
 
 
-def page_of(aircraft: Aircraft, trim: TrimPoint, notes: tuple[str, ...]) -> str:
+def page_of(made: Derived) -> str:
     """The page, Markdown."""
+    aircraft, trim = made.aircraft, made.trim
     low, high = aircraft.envelope.airspeed_mps
     least, most = aircraft.envelope.alpha_deg
     lines = [
         f"# {aircraft.name}", "", f"{aircraft.file.description}.", "",
         f"Envelope {low:g} to {high:g} m/s, angle of attack {least:g} to {most:g} deg; trim at "
-        f"{trim.airspeed_mps:.1f} m/s and {trim.altitude_m:.0f} m.", "",
+        f"{trim.airspeed_mps:.1f} m/s and {trim.altitude_m:.0f} m. Derived in {made.took_s:.1f} s.", "",
         "## What is to be known", "",
-        *([f"- {note}" for note in notes] or ["Nothing unusual was found."]), "",
-        *_diagnosed(aircraft), *_errors(aircraft), *_terms(aircraft),
+        *([f"- {note}" for note in made.notes] or ["Nothing unusual was found."]), "",
+        *_diagnosed(aircraft), *_not_used(made), *_errors(aircraft), *_terms(aircraft),
     ]  # fmt: skip
     return "\n".join(lines) + "\n"
 
@@ -91,6 +95,21 @@ def _diagnosed(aircraft: Aircraft) -> list[str]:
             f"| {surface} | {of['axis']} | {of['per_rad_rad_s2']:.3g} | {of['bound_rad_s2']:.3g} | {says} |"
         )
     return [*lines, ""]
+
+
+def _not_used(made: Derived) -> list[str]:
+    """Surfaces the aircraft has beside those of its file, if it was not known before."""
+    if made.given:
+        return []
+    if not made.further:
+        return ["Its aerodynamics see no other surface.", ""]
+    lines = [
+        "## Surfaces that are not used", "",
+        f"Its aerodynamics see these too: {WHY_NOT_USED}. So none of them stands in for a surface that has "
+        "failed, and their own failures are not looked for.", "",
+        "| surface | in level flight |", "|---|---|",
+    ]  # fmt: skip
+    return [*lines, *(f"| `{name}` | {value:g} |" for name, value in made.further.items()), ""]
 
 
 def _errors(aircraft: Aircraft) -> list[str]:

@@ -3,9 +3,9 @@
 import shutil
 import tempfile
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
 from math import radians
 from pathlib import Path
+from time import perf_counter
 from typing import Any
 
 import numpy as np
@@ -18,8 +18,9 @@ from beaver_ftc.design.model import design_record
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.plant import instrumented
 from beaver_ftc.plant.adapter import translated
-from beaver_ftc.plant.trim import TrimPoint
-from beaver_ftc.studies.derive.check import not_affine, own_control
+from beaver_ftc.plant.state import FlightState
+from beaver_ftc.studies.derive.check import further_surfaces, not_affine, own_control
+from beaver_ftc.studies.derive.derived import Derived
 from beaver_ftc.studies.derive.error import map_of
 from beaver_ftc.studies.derive.fit import MOST_TERMS, engine_signals, fitted, signals_of_use
 from beaver_ftc.studies.derive.flown import fly_about
@@ -37,19 +38,6 @@ FEWEST_TERMS = 6
 Tell = Callable[[str], None]
 
 
-@dataclass(frozen=True)
-class Derived:
-    """What came of it: the folder, the aircraft, its trim, the largest errors (3,) rad/s2 over the samples
-    of the fit and over those it did not see, and what is to be known of it."""
-
-    aircraft: Aircraft
-    trim: TrimPoint
-    fitted_rad_s2: np.ndarray
-    checked_rad_s2: np.ndarray
-    notes: tuple[str, ...] = field(default=())
-    given: Aircraft | None = None  # as its own file has it
-
-
 def derive(
     reference: str,
     out: Path | None = None,
@@ -62,7 +50,7 @@ def derive(
     Raises BadInput, naming what is in the way, if its failures cannot be put in or it cannot be trimmed, and
     SimulationFailed if JSBSim cannot fly it.
     """
-    asked, source = read_envelope(envelope), source_of(reference)
+    started_s, asked, source = perf_counter(), read_envelope(envelope), source_of(reference)
     target = _target(source, out)
     notes: list[str] = []
     with tempfile.TemporaryDirectory(prefix="beaver-ftc-") as scratch:
@@ -70,15 +58,18 @@ def derive(
         with translated(source.model):
             level = _prepared(source, folder, asked, notes, tell)
             notes += not_affine(level.plant, level.trim)
+            further = {} if source.folder else further_surfaces(source.model, level.plant)
             if source.folder is None:
                 _set_envelope(level.data, level.trim, asked)
             made = _derived(level, folder, tell)
         aircraft = Aircraft(AircraftFile.model_validate(level.data), target)
+        given = read(source.folder) if source.folder else None
+        took_s = perf_counter() - started_s
+        found = Derived(aircraft, level.trim, *made, tuple(notes), given, further, took_s)
         write(folder, level.data)
-        (folder / PAGE).write_text(page_of(aircraft, level.trim, tuple(notes)), encoding="utf-8")
+        (folder / PAGE).write_text(page_of(found), encoding="utf-8")
         move(folder, target)
-    given = read(source.folder) if source.folder else None
-    return Derived(aircraft, level.trim, *made, tuple(notes), given)
+    return found
 
 
 def _prepared(source: Source, folder: Path, asked: EnvelopeFile, notes: list[str], tell: Tell) -> Level:
@@ -87,13 +78,17 @@ def _prepared(source: Source, folder: Path, asked: EnvelopeFile, notes: list[str
         tell("trim")
         return about_known(source.folder, folder, asked)
     tell("instrument")
-    try_out(source)
-    travel = travel_of(source.model, folder.parent.parent / "own", notes)
-    if len(travel) < 3:
-        seen = ", ".join(travel) or "no surface"
-        raise BadInput(f"{source.says}: its aerodynamics see {seen}, allowed: aileron, elevator, rudder")
-    notes += own_control(source.model, folder.parent.parent / "bare")
-    model = instrumented.instrument(source.model, folder, travel)
+    seen = instrumented.surfaces_of(source.model)
+    if len(seen) < 3:
+        says = ", ".join(seen) or "no surface"
+        raise BadInput(f"{source.says}: its aerodynamics see {says}, allowed: aileron, elevator, rudder")
+    absent = try_out(source)
+    if absent:
+        notes.append(f"JSBSim alone gives it no {', '.join(absent)}: 0 in the copy")
+    own = instrumented.instrument(source.model, folder.parent.parent / "own", {}, absent)
+    travel = travel_of(source.model, own, notes)
+    notes += own_control(source.model, own)
+    model = instrumented.instrument(source.model, folder, travel, absent)
     outlines = [outline(source.name, model, travel, lift) for lift in LIFT_COEFFICIENTS]
     for data in outlines:
         if asked.altitude_m is not None:
@@ -149,7 +144,7 @@ def _placeholders(data: Mapping[str, Any]) -> dict[str, Any]:
     return {"Cl": [{"name": "Cl_placeholder", "value": -0.1, "surface": names[0]}]}
 
 
-def _set_envelope(data: dict[str, Any], point: TrimPoint, asked: EnvelopeFile) -> None:
+def _set_envelope(data: dict[str, Any], point: FlightState, asked: EnvelopeFile) -> None:
     """Let the file's envelope be about trim, or what is asked for, and flights start there."""
     low, high = point.alpha_rad - SPAN_OF_ALPHA_RAD, point.alpha_rad + SPAN_OF_ALPHA_RAD
     alpha_deg = asked.alpha_deg or tuple(float(np.degrees(end)) for end in (low, high))

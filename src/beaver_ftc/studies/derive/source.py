@@ -1,5 +1,6 @@
 """What is to be derived: an aircraft of the jsbsim package, any JSBSim model, or a file already there."""
 
+import re
 import subprocess
 import sys
 from dataclasses import dataclass
@@ -13,8 +14,10 @@ FROM_JSBSIM = "jsbsim:"
 _PROBE = """import sys
 from pathlib import Path
 from beaver_ftc.plant.adapter import probe
-probe(Path(sys.argv[1]))"""
+probe(Path(sys.argv[1]), sys.argv[2:])"""
 _LONGEST_S = 60.0
+_MOST_ABSENT = 20
+_ABSENT = re.compile(r"The property ([^ ]+) does not exist")
 _ALLOWED = "jsbsim:NAME, a built-in name, a JSBSim model FILE.xml, or a folder with an aircraft.yaml"
 
 
@@ -55,17 +58,31 @@ def source_of(reference: str) -> Source:
     raise BadInput(f"{reference[:80]!r} cannot be derived, allowed: {_ALLOWED}")
 
 
-def try_out(source: Source) -> None:
+def try_out(source: Source) -> tuple[str, ...]:
     """Load and start the model in a process of its own: some models end the process that loads them.
 
-    Raises SimulationFailed, with what JSBSim says, for one that cannot be flown.
+    Returns the properties that its files read and nothing gives; most are FlightGear's. Raises
+    SimulationFailed, with what JSBSim says, for a model that cannot be flown with these at 0 either.
     """
-    command = [sys.executable, "-c", _PROBE, str(source.model)]
+    absent: list[str] = []
+    while (why := _failure(source, absent)) is not None:
+        found = _ABSENT.search(why)
+        if found is None or found[1] in absent or len(absent) == _MOST_ABSENT:
+            raise SimulationFailed(f"{source.says}: {why}")
+        absent.append(found[1])
+    return tuple(absent)
+
+
+def _failure(source: Source, absent: list[str]) -> str | None:
+    """Why the model does not fly with these properties at 0; None if it does."""
+    command = [sys.executable, "-c", _PROBE, str(source.model), *absent]
     try:
         run = subprocess.run(command, capture_output=True, text=True, timeout=_LONGEST_S, check=False)
     except subprocess.TimeoutExpired:
-        raise SimulationFailed(f"{source.says}: JSBSim does not start it within {_LONGEST_S:g} s") from None
-    if run.returncode:
-        said = [line.strip() for line in run.stderr.splitlines() if line.strip()]
-        why = said[-1].removeprefix("what():").strip() if said else f"ended by signal {-run.returncode}"
-        raise SimulationFailed(f"{source.says}: {why.rpartition('SimulationFailed: ')[2]}")
+        return f"JSBSim does not start it within {_LONGEST_S:g} s"
+    if not run.returncode:
+        return None
+    said = [line.strip() for line in run.stderr.splitlines() if line.strip()]
+    ours = [line for line in said if "SimulationFailed: " in line]  # JSBSim may end the process after it
+    why = (ours or said or [f"ended by signal {-run.returncode}"])[-1]
+    return why.rpartition("SimulationFailed: ")[2].removeprefix("what():").strip()

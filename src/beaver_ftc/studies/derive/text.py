@@ -3,8 +3,8 @@
 from typing import Any
 
 from beaver_ftc.aircraft import Aircraft
-from beaver_ftc.studies.derive.page import DEFLECTION_DEG, near_trim, smallest_losses
-from beaver_ftc.studies.derive.run import Derived
+from beaver_ftc.studies.derive.derived import Derived
+from beaver_ftc.studies.derive.page import DEFLECTION_DEG, WHY_NOT_USED, near_trim, smallest_losses
 
 AXES = ("p", "q", "r")
 
@@ -32,8 +32,10 @@ def document_of(made: Derived) -> dict[str, Any]:
         },
         "near_trim_rad_s2": near_trim(aircraft),
         "smallest_certain_loss": {name: of["certain_loss"] for name, of in smallest_losses(aircraft).items()},
+        "further_surfaces": dict(made.further),
         "notes": list(made.notes),
         "own_file": differences(made.given, made.aircraft) if made.given else None,
+        "took_s": round(made.took_s, 2),
     }
 
 
@@ -57,7 +59,11 @@ def text_of(document: dict[str, Any]) -> str:
     if document["own_file"]:
         lines += _compared(document["own_file"])
     lines += [f" note: {note}" for note in document["notes"]]
-    lines.append(f" written to {document['folder']}, with a page on it, derived.md")
+    if document["further_surfaces"]:
+        lines.append(f" not used: {', '.join(document['further_surfaces'])}: {WHY_NOT_USED}")
+    lines.append(
+        f" written in {document['took_s']:.1f} s to {document['folder']}, with a page on it, derived.md"
+    )
     return "\n".join(lines)
 
 

@@ -5,11 +5,13 @@
 losses    the elevator loses 40 to 100 %, level at 45 m/s in light turbulence: 15 m, 3 m/s, 5 deg
 jams      it jams within 5 deg of its trim: the same
 missions  one of the built-in missions, in place of its faults a loss of 10 to 100 % of any one surface at any
-          time of it: the aircraft arrives within 40 m, 4 m/s, 15 deg of the commanded profile
+          time of it: 40 m, 4 m/s, 15 deg
 
-A seed draws the fault and the air. Counted are flights that held what was commanded; that held it with the
-airspeed as protection has limited it to what can still be held; and that hold it in the same air without the
-fault: what is missed there as well, the fault has not caused. Those that miss are listed.
+A seed draws the fault and the air. Counted are flights that arrive: on course, at their airspeed and in the
+envelope, by these limits, in the mean over their last 10 s; and at their altitude too. Then those that held
+what was commanded all the way; that held it with the airspeed as protection has limited it to what can
+still be held; and that hold it in the same air without the fault: what is missed there as well, the fault
+has not caused. Those that miss something are listed.
 """
 
 import argparse
@@ -31,6 +33,12 @@ LEVEL = {
     "environment": {"turbulence": "dryden", "severity": "light"},
     "fdi": {"bounds": {"sensors": "tactical-grade", "turbulence": "light"}},
 }  # fmt: skip
+
+COLUMNS = ("at the end", "its altitude too", "all the way", "airspeed as limited", "without the fault")
+COUNTED = (
+    "arrived on course, at the airspeed and in the envelope", "at the altitude too", "held it all the way",
+    "held it with the airspeed as limited", "held it without the fault",
+)  # fmt: skip
 
 Keys = dict[str, object]
 
@@ -74,6 +82,15 @@ def missed(flight: bf.Flight, limits: dict[str, float], limited: bool = False) -
     return ", ".join(f"{key} {off[key]:.1f}" for key, most in limits.items() if off[key] > most)
 
 
+def missed_at_the_end(flight: bf.Flight, limits: dict[str, float]) -> str:
+    """Where it has not arrived, in words; nothing if it has."""
+    arrival = flight.metrics["arrival"]
+    if arrival is None:
+        return "lost"
+    words = [f"{key} {arrival[key]:.1f}" for key, most in limits.items() if abs(arrival[key]) > most]
+    return ", ".join([*words, *([] if arrival["in_envelope"] else ["outside the envelope"])])
+
+
 def said(fault: Keys) -> str:
     """A fault in words."""
     if fault["type"] == "stuck":
@@ -89,20 +106,27 @@ def main() -> None:
     parser.add_argument("--first", type=int, default=1)
     args = parser.parse_args()
     draw, limits = CAMPAIGNS[args.campaign]
-    table = Table("seed", "flight", "fault", "missed", "with the airspeed as limited", "without the fault")
-    held = np.zeros(3, int)
+    table = Table(
+        "seed", "flight", "fault", "at the end", "missed", "airspeed as limited", "without the fault"
+    )
+    held = np.zeros(len(COUNTED), int)
     for seed in range(args.first, args.first + args.seeds):
         scenario, fault = draw(np.random.default_rng(seed))
         scenario = scenario.with_({"seed": seed})
         flight = bf.fly(scenario.with_({"faults": [fault]}), log=False)
         healthy = bf.fly(scenario.with_({"faults": []}), log=False)
-        words = missed(flight, limits), missed(flight, limits, limited=True), missed(healthy, limits)
+        words = (
+            missed_at_the_end(flight, {key: most for key, most in limits.items() if key != "altitude_m"}),
+            missed_at_the_end(flight, limits),
+            missed(flight, limits),
+            missed(flight, limits, limited=True),
+            missed(healthy, limits),
+        )
         held += [not each for each in words]
         if any(words):
             table.add_row(str(seed), scenario.name, said(fault), *(each or "held" for each in words))
     Console(width=180).print(table)
-    words = ("what was commanded", "with the airspeed as limited", "without the fault")
-    counts = ", ".join(f"{count} held {how}" for count, how in zip(held, words, strict=True))
+    counts = ", ".join(f"{count} {how}" for count, how in zip(held, COUNTED, strict=True))
     print(f"{args.campaign}, of {args.seeds}: {counts}")
 
 

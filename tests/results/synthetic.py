@@ -111,6 +111,7 @@ class Flight:
     frequency_rad_s: float | None = None
     authority: dict[str, tuple[float, float]] | None = None
     profile: dict[str, float | None] | None = None
+    arrival: dict[str, float | None] | None = None
     limits: tuple[tuple[float, str, str, float, str, bool], ...] = ()
     probing_s: tuple[float, float] | None = None
     engine_power: tuple[float, float, float, float] | None = None

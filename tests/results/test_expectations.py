@@ -2,7 +2,8 @@
 
 import pytest
 
-from beaver_ftc.results.expectations import _RULES
+from beaver_ftc.results.expectations import _RULES, evaluate
+from beaver_ftc.scenario.schema import Expect
 
 METRICS = {
     "isolation": {"fault": "elevator", "type": "stuck", "candidates": ["flap:stuck", "elevator:bias"]},
@@ -34,6 +35,25 @@ METRICS = {
 )
 def test_a_rule(name, expected, actual, met):
     assert _RULES[name](expected, METRICS) == (actual, met)
+
+
+@pytest.mark.parametrize(
+    ("part", "expected", "actual", "met"),
+    [
+        ("altitude_m", 12.0, -12.0, True),
+        ("altitude_m", 11.9, -12.0, False),
+        ("heading_deg", 5.0, 4.0, True),
+        ("airspeed_mps", 3.0, None, False),
+        ("in_envelope", True, False, False),
+        ("in_envelope", False, False, True),
+    ],
+)
+def test_where_a_flight_has_come_to(part, expected, actual, met):
+    arrival = {"altitude_m": -12.0, "airspeed_mps": None, "heading_deg": 4.0, "in_envelope": False}
+    expect = Expect.model_validate({"arrives": {part: expected}})
+    found = {"name": f"arrives.{part}", "passed": met, "expected": expected, "actual": actual}
+    assert evaluate(expect, {"arrival": arrival}) == [found]
+    assert not evaluate(expect, {"arrival": None})[0]["passed"]
 
 
 def test_what_was_never_flown_or_never_left():

@@ -26,6 +26,8 @@ SAID = [
     ("airspeed_within_mps", 3, None, ("≤ 3", "none")),
     ("heading_within_deg", 5, 7.0, ("≤ 5", "7")),
     ("stays_in_envelope", True, False, ("yes", "no")),
+    ("arrives.altitude_m", 20.0, -31.2, ("≤ 20", "-31.2")),
+    ("arrives.in_envelope", True, False, ("yes", "no")),
 ]
 
 

@@ -38,7 +38,8 @@ class Flight:
     many there were of `supervisor` and `envelope_exits`, which hold the first and the last; outside_s: time
     outside the validated envelope, all exits together. end: airspeed, m/s, and altitude, m, at the end.
     profile: largest deviation from the commanded one by
-    channel of the autopilot, m, m/s, rad; None where it was not flown. limits: of each limit that protection
+    channel of the autopilot, m, m/s, rad; None where it was not flown. arrival: the deviation's mean over the
+    last 10 s, with its sign. limits: of each limit that protection
     has put on the command since when, s, on what (airspeed_mps, bank_deg), "at most" or "at least", its value
     at last, SI, why, and whether it is in force at the end. changes: what was changed in flight:
     time_s; law and scheme, None for what was not; sensors, True or False; and of a diagnosis that was
@@ -79,5 +80,6 @@ class Flight:
     outside_s: float = 0.0
     end: tuple[float, float] | None = None
     profile: dict[str, float | None] | None = None
+    arrival: dict[str, float | None] | None = None
     limits: tuple[tuple[float, str, str, float, str, bool], ...] = ()
     changes: tuple[dict[str, Any], ...] = ()

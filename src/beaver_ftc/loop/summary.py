@@ -124,6 +124,15 @@ def _profile(frame: np.void) -> dict[str, float | None] | None:
     return off | {LIMITED: float(autopilot["held_worst"]) if autopilot["commanded"][SPEED] else None}
 
 
+def _arrival(frame: np.void) -> dict[str, float | None] | None:
+    """Mean deviation from the commanded profile at the end, by channel; None where there is none."""
+    autopilot = frame["autopilot"]
+    if not autopilot["enabled"]:
+        return None
+    flown = zip(CHANNELS, autopilot["commanded"], autopilot["mean_off"], strict=True)
+    return {name: float(off) if commanded else None for name, commanded, off in flown}
+
+
 def _limits(frame: np.void, surfaces: Sequence[str]) -> tuple[tuple[float, str, str, float, str, bool], ...]:
     """What envelope protection has limited, in the order in which the limits began."""
     holding, control = frame["autopilot"]["holding"], frame["control"]
@@ -259,6 +268,7 @@ def flight_of(
         probing_s=_probing_s(frame),
         engine_power=_engine_power(frame),
         profile=_profile(frame),
+        arrival=_arrival(frame),
         limits=_limits(frame, surfaces),
         changes=replaced,
         surface_travel_rad={s: float(x) for s, x in zip(surfaces, accounts["travelled"], strict=True)},

@@ -5,6 +5,7 @@ whether that will do. Where the quantity does not exist (nothing was detected, s
 """
 
 from collections.abc import Callable, Iterator
+from functools import partial
 from typing import Any
 
 Document = dict[str, Any]
@@ -30,9 +31,8 @@ def _each(expect: Any) -> Iterator[tuple[str, Rule, Any]]:
         return
     for name, expected in expect.model_dump(exclude_none=True).items():
         if isinstance(expected, dict):
-            yield from (
-                (f"{name}.{axis}", _rms_at_most(name, axis), limit) for axis, limit in expected.items()
-            )
+            rule = _arrived if name == "arrives" else partial(_rms_at_most, name)
+            yield from ((f"{name}.{part}", rule(part), limit) for part, limit in expected.items())
         else:
             yield name, _RULES[name], expected
 
@@ -85,6 +85,16 @@ def _rms_at_most(name: str, axis: str) -> Rule:
 def _profile_within(channel: str) -> Rule:
     def rule(limit: float, metrics: Document) -> tuple[Any, bool]:
         return _at_most((metrics["profile"] or {}).get(channel), limit)
+
+    return rule
+
+
+def _arrived(part: str) -> Rule:
+    def rule(expected: Any, metrics: Document) -> tuple[Any, bool]:
+        actual = (metrics["arrival"] or {}).get(part)
+        if part == "in_envelope":
+            return actual, actual == expected
+        return actual, actual is not None and abs(actual) <= expected
 
     return rule
 

@@ -68,7 +68,8 @@ def metrics(flight: "Flight") -> Document:
         "departure": _departure(flight),
         "authority": _authority(flight),
         "engine_power": _engine_power(flight),
-        "profile": _profile(flight),
+        "profile": _in_deg(flight.profile),
+        "arrival": _arrival(flight),
         "limits": [_limit(limit) for limit in flight.limits],
         "saturation_s": {surface: _number(time) for surface, time in flight.saturation_s.items()},
     }
@@ -218,15 +219,23 @@ def _engine_power(flight: "Flight") -> Document | None:
     return {name: _number(value) for name, value in zip(names, flight.engine_power, strict=True)}
 
 
-def _profile(flight: "Flight") -> Document | None:
-    """Largest deviations from the commanded profile; null without an autopilot, or where it is not flown."""
-    if flight.profile is None:
+def _in_deg(off: dict[str, float | None] | None) -> Document | None:
+    """Deviations from the commanded profile; null without an autopilot, or where a channel is not flown."""
+    if off is None:
         return None
     in_deg = {"heading_deg": math.degrees, "bank_deg": math.degrees}
     return {
-        name: None if worst is None else _number(in_deg.get(name, float)(worst))
-        for name, worst in flight.profile.items()
+        name: None if away is None else _number(in_deg.get(name, float)(away)) for name, away in off.items()
     }
+
+
+def _arrival(flight: "Flight") -> Document | None:
+    """Where a flight along a profile has come to; null without an autopilot, or if the aircraft is lost."""
+    off = _in_deg(flight.arrival)
+    if off is None or flight.departure is not None:
+        return None
+    outside = bool(flight.envelope_exits) and math.isinf(flight.envelope_exits[-1][1])
+    return {**off, "in_envelope": not outside}
 
 
 def _limit(limit: tuple[float, str, str, float, str, bool]) -> Document:

@@ -4,6 +4,7 @@ Checked on an outline that a finished scenario and a half-wrong file both have, 
 reported along with the mistakes of the sections and not only after they are mended.
 """
 
+from collections.abc import Mapping
 from itertools import pairwise
 from math import isfinite
 from typing import Any, NamedTuple
@@ -23,6 +24,7 @@ _OF_A_PROFILE = {
     "airspeed_within_mps": "airspeed_mps",
     "airspeed_within_limits_mps": "airspeed_mps",
     "heading_within_deg": "heading_deg",
+    **{f"arrives.{channel}": channel for channel in ("altitude_m", "airspeed_mps", "heading_deg")},
 }
 
 
@@ -44,11 +46,19 @@ def outline_of_data(data: dict[str, Any]) -> Outline:
         duration_s=_positive(data.get("duration_s", DURATION_S)),
         rate_hz=_positive(data.get("rate_hz", RATE_HZ)),
         starts_s=_instants(faults),
-        expected=tuple(key for key, value in expect.items() if value is not None)
-        if isinstance(expect, dict)
-        else (),
+        expected=keys_expected(expect) if isinstance(expect, dict) else (),
         flown=_flown(data.get("autopilot")),
         changes_s=_instants(data.get("changes", [])),
+    )
+
+
+def keys_expected(expect: Mapping[str, Any]) -> tuple[str, ...]:
+    """The keys of `expect` that are given; those inside another with a dot."""
+    given = [(str(key), value) for key, value in expect.items() if value is not None]
+    inside = [(key, value) for key, value in given if isinstance(value, Mapping)]
+    return (
+        *(key for key, _ in given),
+        *(f"{key}.{part}" for key, value in inside for part in value if value[part] is not None),
     )
 
 
@@ -118,7 +128,10 @@ def _expected_of_no_profile(outline: Outline) -> list[Conflict]:
     if outline.flown is None:
         return []
     return [
-        (("expect", key), f"there is no profile to expect it of, allowed: only with autopilot.{channel}")
+        (
+            ("expect", *key.split(".")),
+            f"there is no profile to expect it of, allowed: only with autopilot.{channel}",
+        )
         for key, channel in _OF_A_PROFILE.items()
         if key in outline.expected and channel not in outline.flown
     ]

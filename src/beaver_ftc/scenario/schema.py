@@ -21,7 +21,7 @@ from beaver_ftc.documents.base import Flag, Number, Section, Whole, number, refu
 from beaver_ftc.scenario.actuators import Actuators
 from beaver_ftc.scenario.autopilot import Autopilot
 from beaver_ftc.scenario.change import Change
-from beaver_ftc.scenario.consistency import DURATION_S, RATE_HZ, Outline, conflicts
+from beaver_ftc.scenario.consistency import DURATION_S, RATE_HZ, Outline, conflicts, keys_expected
 from beaver_ftc.scenario.control import ControlConfig
 from beaver_ftc.scenario.diagnosis import FdiConfig
 from beaver_ftc.scenario.environment import Environment
@@ -140,6 +140,17 @@ class RmsLimits(Section):
     r: Number | None = number(None, unit="deg/s", says="yaw rate", ge=0, le=1000)
 
 
+class Arrival(Section):
+    """What the flight has come to at its end: deviations from the commanded profile, means over 10 s."""
+
+    altitude_m: Number | None = number(None, unit="m", says="altitude", gt=0, le=10_000)
+    airspeed_mps: Number | None = number(None, unit="m/s", says="airspeed", gt=0, le=100)
+    heading_deg: Number | None = number(None, unit="deg", says="heading", gt=0, le=180)
+    in_envelope: Flag | None = Field(
+        default=None, description="true: inside the validated envelope at the end; false: outside"
+    )
+
+
 FaultType = Literal[
     "loss_of_effectiveness",
     "stuck",
@@ -205,6 +216,10 @@ class Expect(Section):
     )
     stays_in_envelope: Flag | None = Field(
         default=None, description="true: never outside the validated envelope; false: it must leave it"
+    )
+    arrives: Arrival | None = Field(
+        default=None,
+        description="how far it is from the commanded profile at its end; a lost aircraft never arrives",
     )
 
 
@@ -284,7 +299,7 @@ class Scenario(Section):
         return self
 
     def _outline(self) -> Outline:
-        expected = tuple(key for key, value in self.expect if value is not None)
+        expected = keys_expected(self.expect.model_dump())
         flown = self.autopilot.channels if self.autopilot else ()
         starts_s = tuple(fault.at_s for fault in self.faults)
         changes_s = tuple(change.at_s for change in self.changes)

@@ -327,12 +327,14 @@ def test_while_power_stands_in_for_pitch_it_gets_the_airspeed_to_hold():
 def test_deviations_are_judged_once_settled_and_of_the_airspeed_the_mean():
     pilot = new_autopilot(ALTITUDE, SPEED, HEADING, BANK)
     pilot["command"] = 1000.0, 45.0, 3.1, 0.2
-    pilot["changed_at_s"], pilot["mean_off"] = 10.0, -0.5
+    pilot["changed_at_s"], pilot["mean_off"] = 10.0, (4.0, -0.5, 0.1, 0.0)
     pilot["held"], pilot["held_off"] = 46.0, -0.2
     loops.judge(pilot, 990.0, 47.0, -3.1, -0.1, 39.9)
     assert pilot["held_worst"] == abs(pilot["held_off"]) == pytest.approx(0.2 - DT / loops.MEAN_S * 1.2)
     mean = -0.5 + DT / loops.MEAN_S * 2.5
-    assert pilot["mean_off"] == pytest.approx(mean)
+    part, off = DT / loops.MEAN_S, 2 * np.pi - 6.2
+    means = [4.0 - part * 14.0, mean, 0.1 + part * (off - 0.1), -part * 0.3]
+    assert pilot["mean_off"] == pytest.approx(means)
     assert pilot["worst"] == pytest.approx([10.0, abs(mean), 0.0, 0.0])
     loops.judge(pilot, 1001.0, 47.0, -3.1, -0.1, 40.0)
     assert pilot["worst"][ALTITUDE] == 10.0

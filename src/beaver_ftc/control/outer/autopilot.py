@@ -30,7 +30,7 @@ MOST_DRIFT_RAD_S = 0.1  # of turning that a bank without a turn stands for
 USUAL_S, USUAL_MPS = 20.0, 3.0  # airspeed that power alone can hold: within so much of what it has been
 LEAST_PUSH = 1e-3  # m/s2 per inHg
 SETTLED_S = 30.0  # after a change of heading
-MEAN_S = 10.0  # over which the airspeed is judged: what comes and goes faster is a gust, not a deviation
+MEAN_S = 10.0  # over which airspeed and arrival are judged: what comes and goes faster is a gust
 
 
 @kernel
@@ -226,16 +226,20 @@ def throttle(autopilot, control, y, path, push):
 
 @kernel
 def judge(autopilot, altitude_m, airspeed_mps, heading, bank, t):
-    """Note the largest deviation of every channel from its command; of angles, once SETTLED_S have passed."""
+    """Note the deviation of every channel from its command: its mean of late, and the largest, of angles
+    once SETTLED_S have passed."""
     where = (altitude_m, airspeed_mps, heading, bank)
     for c in range(N_CHANNELS):
-        settled = c in (ALTITUDE, SPEED) or t >= autopilot.changed_at_s[c] + SETTLED_S
-        if autopilot.commanded[c] and settled:
-            away = where[c] - autopilot.command[c]
-            if c == SPEED:
-                autopilot.mean_off += autopilot.dt / MEAN_S * (away - autopilot.mean_off)
-                away = autopilot.mean_off
-                from_held = where[c] - autopilot.held
-                autopilot.held_off += autopilot.dt / MEAN_S * (from_held - autopilot.held_off)
-                autopilot.held_worst = max(autopilot.held_worst, abs(autopilot.held_off))
-            autopilot.worst[c] = max(autopilot.worst[c], abs(turn(away) if c == HEADING else away))
+        if not autopilot.commanded[c]:
+            continue
+        away = where[c] - autopilot.command[c]
+        if c == HEADING:
+            away = turn(away)
+        autopilot.mean_off[c] += autopilot.dt / MEAN_S * (away - autopilot.mean_off[c])
+        if c == SPEED:
+            away = autopilot.mean_off[c]
+            from_held = where[c] - autopilot.held
+            autopilot.held_off += autopilot.dt / MEAN_S * (from_held - autopilot.held_off)
+            autopilot.held_worst = max(autopilot.held_worst, abs(autopilot.held_off))
+        if c in (ALTITUDE, SPEED) or t >= autopilot.changed_at_s[c] + SETTLED_S:
+            autopilot.worst[c] = max(autopilot.worst[c], abs(away))

@@ -71,8 +71,8 @@ AUTOPILOT = np.dtype(
         ("rates", "f8", (3,)),
         ("gain", GAIN),
         ("held", "f8"), ("held_moving", "f8"), ("holding", HOLDING),  # airspeed to fly, m/s, and its change
-        # how far off, at most; and the airspeed's mean deviation of late, from what is commanded and held
-        ("mean_off", "f8"), ("held_off", "f8"), ("held_worst", "f8"),
+        # how far off, at most; and the mean deviation of late, from what is commanded and, airspeed, held
+        ("mean_off", "f8", (N_CHANNELS,)), ("held_off", "f8"), ("held_worst", "f8"),
         ("worst", "f8", (N_CHANNELS,)),
     ],
     align=True,

@@ -128,6 +128,8 @@ _ENDED: tuple[Column, ...] = (
     *_under("text", "departure", "signal"),
     *(column for a in AXES for column in _under("float", f"authority.{a}", "given_share", "beyond_s")),
     *_under("float", "profile", *_PROFILE),
+    *_under("float", "arrival", "altitude_m", "airspeed_mps", "heading_deg", "bank_deg"),
+    *_under("flag", "arrival", "in_envelope"),
     *_under("float", "engine_power", "from_s", "in_charge_s", "lowest_inhg", "highest_inhg"),
 )
 _JUDGED: tuple[Column, ...] = (

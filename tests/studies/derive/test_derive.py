@@ -191,6 +191,13 @@ def test_what_flightgear_gives_is_there_in_the_copy_and_said(tmp_path):
     probe(instrumented.instrument(source.model, tmp_path, {}, absent))
 
 
+def test_trying_a_model_out_leaves_no_file_where_it_is_done(tmp_path, monkeypatch):
+    """Its model opens a CSV in the working directory when it is loaded."""
+    monkeypatch.chdir(tmp_path)
+    try_out(source_of("jsbsim:ball"))
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_an_aircraft_with_a_file_is_derived_over_the_envelope_asked_for(tmp_path):
     file = tmp_path / "envelope.yaml"
     file.write_text("airspeed_mps: [40, 50]\nalpha_deg: [0, 12]\naltitude_m: 3000\nsideslip_deg: 4\n")

@@ -3,6 +3,7 @@
 import re
 import subprocess
 import sys
+import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -77,7 +78,10 @@ def _failure(source: Source, absent: list[str]) -> str | None:
     """Why the model does not fly with these properties at 0; None if it does."""
     command = [sys.executable, "-c", _PROBE, str(source.model), *absent]
     try:
-        run = subprocess.run(command, capture_output=True, text=True, timeout=_LONGEST_S, check=False)
+        with tempfile.TemporaryDirectory(prefix="beaver-ftc-") as here:  # for what a model writes when loaded
+            run = subprocess.run(
+                command, capture_output=True, text=True, timeout=_LONGEST_S, check=False, cwd=here
+            )
     except subprocess.TimeoutExpired:
         return f"JSBSim does not start it within {_LONGEST_S:g} s"
     if not run.returncode:

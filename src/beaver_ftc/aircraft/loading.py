@@ -110,6 +110,10 @@ def _inside(beside: Path | None, reference: str) -> Path:
         raise UnknownAircraft(f"{reference!r} is outside, allowed: a folder below the scenario's own")
     if not folder.is_dir():
         raise UnknownAircraft(f"there is no folder {reference!r}, allowed: {_ALLOWED}")
+    for path in sorted(folder.rglob("*")):
+        if path.is_symlink() and not path.resolve().is_relative_to(root):
+            link = f"{reference}/{path.relative_to(folder)}"
+            raise UnknownAircraft(f"{link!r} leads outside, allowed: files below the scenario's own folder")
     _SEEN.setdefault(reference, set()).add(folder)
     return folder
 

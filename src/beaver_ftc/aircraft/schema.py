@@ -45,6 +45,8 @@ def _not_reversed(given: tuple[float, float]) -> tuple[float, float]:
 
 NotNegative = Annotated[Number, Field(ge=0)]
 Interval = Annotated[tuple[Number, Number], AfterValidator(_in_order)]
+_Stop = Annotated[Number, Field(ge=-3.2, le=3.2)]  # rad: no surface turns further, a stop in degrees does
+Stops = Annotated[tuple[_Stop, _Stop], AfterValidator(_in_order)]
 
 
 class SurfaceSection(Section):
@@ -53,7 +55,7 @@ class SurfaceSection(Section):
     command: Property = Field(description="property that commands the deflection")
     position: Property = Field(description="property of the actuator's output, rad")
     effective: Property = Field(description="property of what the aerodynamics see, rad")
-    travel_rad: Interval = Field(description="lower and upper stop, rad", json_schema_extra={"unit": "rad"})
+    travel_rad: Stops = Field(description="lower and upper stop, rad", json_schema_extra={"unit": "rad"})
 
 
 class SignalSection(Section):

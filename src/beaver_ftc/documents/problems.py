@@ -3,6 +3,7 @@
 What is allowed is read from the JSON Schema, the same text an editor shows, so the two cannot disagree.
 """
 
+import re
 from collections.abc import Iterator, Sequence
 from difflib import get_close_matches
 from typing import Any
@@ -201,6 +202,8 @@ def _children(node: dict[str, Any], part: int | str) -> Iterator[dict[str, Any]]
         yield node["properties"][part]
     elif isinstance(node.get("additionalProperties"), dict):
         yield node["additionalProperties"]
+    else:  # a mapping whose keys are names
+        yield from node.get("patternProperties", {}).values()
 
 
 def _branches(node: dict[str, Any], root: dict[str, Any], data: Any) -> list[dict[str, Any]]:
@@ -255,7 +258,10 @@ def _kind(node: dict[str, Any]) -> str:
         "boolean": lambda: "true or false",
         "array": lambda: f"a list{_length(node, 'Items', 'items')}",
         "string": lambda: f"text{_pattern(node)}{_length(node, 'Length', 'characters')}",
-        "object": lambda: f"a mapping of {', '.join(_keys([node])) or 'names to values'}",
+        "object": lambda: (
+            f"a mapping of {', '.join(_keys([node])) or 'names to values'}"
+            f"{_length(node, 'Properties', 'entries')}"
+        ),
     }.get(node.get("type", ""), lambda: node.get("description", "another value"))()
 
 
@@ -274,11 +280,21 @@ def _bound(value: float) -> str:
 
 
 def _pattern(node: dict[str, Any]) -> str:
-    return " of letters, digits, - and _" if node.get("pattern") else ""
+    """What a text may be made of: the last set of characters of its pattern, and its ending."""
+    pattern = node.get("pattern", "")
+    classes = re.findall(r"\[((?:\\.|[^\]\\])+)\]", pattern)
+    if not classes:
+        return ""
+    *others, last = sorted(set(re.sub(r"A-Z|a-z|0-9|\\", "", classes[-1])))
+    ending = re.search(r"\\(\.[a-z]+)\$$", pattern)
+    ends = f" that ends in {ending[1]}" if ending else ""
+    return f" of letters, digits, {', '.join(others)} and {last}{ends}"
 
 
 def _length(node: dict[str, Any], suffix: str, unit: str) -> str:
     low, high = node.get(f"min{suffix}"), node.get(f"max{suffix}")
     if low is not None and low == high:
         return f" of {low} {unit}"
+    if low is not None and low > 1 and high is not None:
+        return f" of {low} to {high} {unit}"
     return f" of at most {high} {unit}" if high is not None else ""

@@ -170,6 +170,12 @@ def _told(engines: int, read: str) -> str:
     return "".join(told)
 
 
+def is_told(name: str) -> bool:
+    """Whether the copy has a property of FlightGear's, from its own lever and engines."""
+    plain = re.sub(r"\[\d+\]", "", name)
+    return plain in {of.replace("[{i}]", "") for of in _FROM_FLIGHTGEAR}
+
+
 def instrument(
     source: Path, folder: Path, travel_rad: dict[str, tuple[float, float]], absent: Iterable[str] = ()
 ) -> Path:

@@ -7,7 +7,7 @@ digest of its files, so that it costs nothing until one of them changes.
 import contextlib
 import hashlib
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from functools import lru_cache
 from importlib.metadata import version
 from math import degrees
@@ -16,9 +16,15 @@ from pathlib import Path
 import numpy as np
 
 from beaver_ftc.aircraft import AXES, Aircraft
+from beaver_ftc.aircraft.loading import FILE
+from beaver_ftc.aircraft.schema import AircraftFile
 from beaver_ftc.design.inertia import inertia_coefficients
-from beaver_ftc.documents.errors import BeaverFtcError
+from beaver_ftc.documents.base import Location
+from beaver_ftc.documents.document import Problem
+from beaver_ftc.documents.errors import BeaverFtcError, SimulationFailed
 from beaver_ftc.documents.paths import cache_base
+from beaver_ftc.documents.problems import ScenarioError
+from beaver_ftc.documents.validation import parse_document
 from beaver_ftc.plant.adapter import Plant, translated
 from beaver_ftc.scenario.diagnosis import Bounds
 from beaver_ftc.studies.derive.error import errors_of
@@ -28,7 +34,7 @@ from beaver_ftc.studies.derive.sample import FRESH, SIDESLIP_RAD, Envelope, Samp
 from beaver_ftc.studies.engine.files import write_whole
 
 STATES, STARTS, SEED = 800, 8, 11
-_FORMAT = 1  # of what is kept: files of another are compared anew
+_FORMAT = 2  # of what is kept: files of another are compared anew
 
 
 @lru_cache(maxsize=32)
@@ -62,18 +68,53 @@ def _digest(folder: Path) -> str:
 
 
 def compared(aircraft: Aircraft) -> list[str]:
-    """A line for each axis on which the model exceeds what the file declares; or why none is compared."""
+    """A line for each axis on which the model exceeds what the file declares; or why none is compared.
+
+    Raises ScenarioError where JSBSim cannot load the model, or the model lacks a property of the file.
+    """
+    plant = _loaded(aircraft)
     try:
         with translated(aircraft.jsbsim):
-            samples = _samples(aircraft)
+            samples = _samples(aircraft, plant)
     except BeaverFtcError as error:
         return [f"it is not compared with {aircraft.file.jsbsim}: {error}"]
     return list(_lines(aircraft, samples))
 
 
-def _samples(aircraft: Aircraft) -> Samples:
+def _loaded(aircraft: Aircraft) -> Plant:
+    try:
+        plant = Plant(100, aircraft=aircraft)
+    except SimulationFailed as error:
+        raise _bad(aircraft, {("jsbsim",): f"{error}, allowed: a model that JSBSim loads"}) from None
+    says = f"is no property of {aircraft.file.jsbsim}, allowed: one that it has"
+    wrong = {at: f"{name!r} {says}" for at, name in _properties(aircraft.file) if not plant.has(name)}
+    if wrong:
+        raise _bad(aircraft, wrong)
+    return plant
+
+
+def _properties(file: AircraftFile) -> Iterator[tuple[Location, str]]:
+    """Each property the file names, and where."""
+    for name, surface in file.surfaces.items():
+        for key in ("command", "position", "effective"):
+            yield ("surfaces", name, key), getattr(surface, key)
+    for name, signal in file.signals.items():
+        yield ("signals", name, "property"), signal.property
+    yield ("trim", "throttle"), file.trim.throttle
+    for kind in ("settings", "limits"):
+        for name, of in getattr(file.engine, kind).items():
+            yield ("engine", kind, name, "property"), of.property
+
+
+def _bad(aircraft: Aircraft, says: Mapping[Location, str]) -> ScenarioError:
+    """These mistakes, at their lines."""
+    path = aircraft.folder / FILE
+    lines = parse_document(path.read_text(encoding="utf-8"), str(path))
+    return ScenarioError(str(path), [Problem(lines.line(at), at, what) for at, what in says.items()])
+
+
+def _samples(aircraft: Aircraft, plant: Plant) -> Samples:
     """States over the envelope, in their boxes if the file has a map."""
-    plant = Plant(100, aircraft=aircraft)
     point = trim_at(plant, **usual_start(aircraft))
     envelope = Envelope(aircraft.envelope.airspeed_mps, aircraft.alpha_rad, SIDESLIP_RAD)
     properties = {name: signal.property for name, signal in aircraft.signals.items()}

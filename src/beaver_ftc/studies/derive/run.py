@@ -82,7 +82,7 @@ def _prepared(source: Source, folder: Path, asked: EnvelopeFile, notes: list[str
     if len(seen) < 3:
         says = ", ".join(seen) or "no surface"
         raise BadInput(f"{source.says}: its aerodynamics see {says}, allowed: aileron, elevator, rudder")
-    absent = try_out(source)
+    absent = tuple(name for name in try_out(source) if not instrumented.is_told(name))
     if absent:
         notes.append(f"JSBSim alone gives it no {', '.join(absent)}: 0 in the copy")
     own = instrumented.instrument(source.model, folder.parent.parent / "own", {}, absent)

@@ -1,8 +1,10 @@
 """JSBSim for the rest of the package: a silent executive with the Beaver loaded, its properties by name."""
 
 import re
+import tempfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from functools import lru_cache
 from math import cos, sin
 from pathlib import Path
 
@@ -72,6 +74,13 @@ def _beside(folder: Path, kind: str) -> str:
     return str(own if own.is_dir() else Path(jsbsim.__file__).parent / kind)
 
 
+@lru_cache(maxsize=1)
+def _unread() -> tempfile.TemporaryDirectory[str]:
+    """Where the output files of models go: JSBSim opens them although output is disabled, and by itself in its
+    root directory. It lasts as long as the process."""
+    return tempfile.TemporaryDirectory(prefix="beaver-ftc-")
+
+
 def _load(errors: _Errors, model: Path) -> jsbsim.FGFDMExec:
     """An executive with a model; engines, propellers and systems are looked for beside it first.
 
@@ -80,6 +89,7 @@ def _load(errors: _Errors, model: Path) -> jsbsim.FGFDMExec:
     jsbsim.set_logger(errors)
     fdm = jsbsim.FGFDMExec(str(data_root()))
     fdm.set_debug_level(0)
+    fdm.set_output_path(_unread().name)
     folder = model.parent
     places = [str(folder), *(_beside(folder, kind) for kind in ("engine", "systems"))]
     try:

@@ -1,6 +1,7 @@
 """Aircraft nobody wrote by hand: derived from JSBSim, flown with the measured error as the bound."""
 
 import hashlib
+import tempfile
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from beaver_ftc.cli.main import app
 from beaver_ftc.design.context import DesignModel
 from beaver_ftc.design.model import design_record
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
+from beaver_ftc.documents.paths import data_root
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.plant import instrumented
 from beaver_ftc.plant.adapter import Plant, bare, probe, translated
@@ -191,11 +193,14 @@ def test_what_flightgear_gives_is_there_in_the_copy_and_said(tmp_path):
     probe(instrumented.instrument(source.model, tmp_path, {}, absent))
 
 
-def test_trying_a_model_out_leaves_no_file_where_it_is_done(tmp_path, monkeypatch):
-    """Its model opens a CSV in the working directory when it is loaded."""
+def test_a_models_own_output_file_is_left_nowhere(tmp_path, monkeypatch):
+    """JSBSim opens its CSV in the root directory when the model is loaded, output disabled or not."""
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     try_out(source_of("jsbsim:ball"))
     assert list(tmp_path.iterdir()) == []
+    bare(source_of("jsbsim:ball").model)
+    assert not list(data_root().glob("BallOut*"))
 
 
 def test_an_aircraft_with_a_file_is_derived_over_the_envelope_asked_for(tmp_path):

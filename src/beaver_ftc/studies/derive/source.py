@@ -1,5 +1,6 @@
 """What is to be derived: an aircraft of the jsbsim package, any JSBSim model, or a file already there."""
 
+import os
 import re
 import subprocess
 import sys
@@ -78,9 +79,10 @@ def _failure(source: Source, absent: list[str]) -> str | None:
     """Why the model does not fly with these properties at 0; None if it does."""
     command = [sys.executable, "-c", _PROBE, str(source.model), *absent]
     try:
-        with tempfile.TemporaryDirectory(prefix="beaver-ftc-") as here:  # for what a model writes when loaded
+        with tempfile.TemporaryDirectory(prefix="beaver-ftc-") as here:  # also of a process that is ended
+            around = os.environ | {"TMPDIR": here}
             run = subprocess.run(
-                command, capture_output=True, text=True, timeout=_LONGEST_S, check=False, cwd=here
+                command, capture_output=True, text=True, timeout=_LONGEST_S, check=False, env=around
             )
     except subprocess.TimeoutExpired:
         return f"JSBSim does not start it within {_LONGEST_S:g} s"

@@ -34,9 +34,9 @@ from numba.core.types import unliteral
 
 from beaver_ftc.documents.paths import cache_base, folder_of_version
 from beaver_ftc.elsewhere import Helper, Part
-from beaver_ftc.translation import Inner, lighten, nesting
+from beaver_ftc.translation import Inner, lighten, nesting, stub
 
-COMPILING = "compiling the flight code, once for this version on this machine: some 15 s on an idle one"
+COMPILING = "compiling the flight code, once for this version on this machine: some 10 s on an idle one"
 PATIENCE_S = 1.0  # what takes less needs no word
 
 _DIGEST_BYTES = 32
@@ -74,6 +74,20 @@ def kernel(function):
     return compile_into(cache_folder(), function)
 
 
+def apart(function):
+    """A kernel that returns nothing and that only some flights want: compiled when one of them calls it.
+
+    Give it records and numbers: shapes and strides of arrays are no longer constants beyond such a call.
+    """
+    called = kernel(function)
+    if not isinstance(called, _Kernel):
+        return called
+    tag = called.folder.name if called.folder else ""
+    caller = compile_into(called.folder, stub((function.__module__, function.__qualname__, tag), called))
+    caller.py_func = function
+    return functools.update_wrapper(caller, function)
+
+
 def plain(function):
     """The uncompiled form of a kernel, which takes complex numbers and loads no compiler.
 
@@ -107,7 +121,7 @@ class _Kernel(CPUDispatcher):
 
     def __init__(self, folder: Path | None, function) -> None:
         super().__init__(function, targetoptions={"nopython": True, "error_model": "numpy"})
-        self._folder, self._store = folder, folder and _Store(folder, function)
+        self.folder, self._store = folder, folder and _Store(folder, function)
         self.halves: Halves | None = None
 
     def compile(self, sig):
@@ -126,6 +140,14 @@ class _Kernel(CPUDispatcher):
         """The code an earlier process has kept, or None."""
         return self._store and self._store.load(tuple(types), self.targetctx)
 
+    def result(self, types):
+        """The code with what is known of it; where it has been kept, without making ready to compile."""
+        found = self.stored(types)
+        if found is None:
+            self.compile(types)
+            found = self.overloads[types]
+        return found
+
     def _loaded(self, types):
         self.targetctx.refresh()
         found = self.stored(types)
@@ -139,7 +161,7 @@ class _Kernel(CPUDispatcher):
     def _compiled(self, types):
         """Compile, one process at a time, and keep the code."""
         lighten()
-        with _alone(self._folder), _announced():
+        with _alone(self.folder), _announced():
             if entry_point := self._loaded(types):
                 return entry_point  # another process came first
             self.overloads.pop(tuple(types), None)

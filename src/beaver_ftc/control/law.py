@@ -1,6 +1,6 @@
 """The built-in law, one frame of it: accommodate, demand, allocate, give back what cannot be had."""
 
-from beaver_ftc.compiled import kernel
+from beaver_ftc.compiled import apart, kernel
 from beaver_ftc.control import adaptive, allocation, authority, nominal, power, probing
 from beaver_ftc.control.accommodation import accommodate, give_up
 from beaver_ftc.control.laws import rejecting
@@ -32,12 +32,18 @@ def advance_hand_over(control, every_type, mode):
     rejecting.hand_over(control, left)
 
 
+@apart
+def command_as_rival(control, belief, measured):
+    """The command of a compiled rival."""
+    compiled.command(control, belief.G, measured.x)
+
+
 @kernel
 def command(control, fdi, belief, measured, faults, mode, t):
     """Fill control.command (n,) rad by the law chosen. t s."""
     accommodate(control, fdi, belief, measured, faults)
     if control.inner in (INDI, LQR):
-        compiled.command(control, belief.G, measured.x)
+        command_as_rival(control, belief, measured)
         return
     if control.law == NOMINAL:
         control.G[:] = belief.G

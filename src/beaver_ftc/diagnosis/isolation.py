@@ -11,7 +11,7 @@ The sharpened tests (bank.py, membership.py) exclude beside it, each by its own 
 by the first test that fails.
 """
 
-from beaver_ftc.compiled import kernel
+from beaver_ftc.compiled import apart, kernel
 from beaver_ftc.diagnosis import bank, membership
 from beaver_ftc.diagnosis.fault_class import hypothesis
 from beaver_ftc.diagnosis.state import (
@@ -133,9 +133,15 @@ def isolate(fdi, x, t, started):
         if rules_out(fdi, fie, possible(fdi, fie, x, started)) and not fie.excluded:
             fie.excluded = 1
             fie.excluded_at_s = t
-    if not fdi.every_type:
+    if fdi.every_type:
+        isolate_type(fdi, t, started)
+    else:
         decide(fdi, t)
-        return
+
+
+@apart
+def isolate_type(fdi, t, started):
+    """Of faults of every type, alone or two at a time, decide which it is."""
     if fdi.pair.enabled:
         pairs.examine(fdi)
         pairs.decide(fdi, t)

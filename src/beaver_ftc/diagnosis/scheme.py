@@ -4,7 +4,7 @@ fdi: dtype DIAGNOSIS, belief: dtype of belief.py, measured: MEASURED. effectiven
 takes each surface for, so that what is known of a fault is no surprise; offset in rad. k: frame number, t s.
 """
 
-from beaver_ftc.compiled import kernel
+from beaver_ftc.compiled import apart, kernel
 from beaver_ftc.design.model import ALPHA, BETA, unanticipated_pitch
 from beaver_ftc.diagnosis import air, bank, detection, instruments, isolation, network, statistical
 from beaver_ftc.diagnosis.belief import begin_frame, look
@@ -67,7 +67,7 @@ def expect_known_faults(expected, mean, effectiveness, offset, offsets_count):
                 expected[i] += mean.G[i, s] * offset[s]
 
 
-@kernel
+@apart
 def compare_likelihoods(fdi, belief, measured, k, t):
     """Show the statistical detector the elapsed frame."""
     for i in range(3):
@@ -107,7 +107,7 @@ def ready(fdi, belief, measured, k):
     begin_frame(fdi, belief, measured)
 
 
-@kernel
+@apart
 def look_ahead(fdi, belief, measured, k):
     """Ready the statistical detector for the next frame: the air as the vanes see it, noise, coefficients."""
     if fdi.statistical.air.moving:
@@ -118,12 +118,18 @@ def look_ahead(fdi, belief, measured, k):
     statistical.prepare(fdi.statistical, fdi, belief.design, measured.x, measured.y, belief.u)
 
 
+@apart
+def look_at_air(fdi, belief, measured):
+    """Take in the gust that the vanes see by now, and what it does."""
+    x, y, dt = measured.x, measured.y, belief.share * fdi.dt
+    statistical.look(fdi.statistical, belief.design, x, y, belief.u, measured.attitude, dt)
+
+
 @kernel
 def look_inside(fdi, belief, measured):
     """Take in an instant inside a frame: what is believed of it, and the gust that the vanes see by then."""
     if fdi.statistical.enabled:
-        x, y, dt = measured.x, measured.y, belief.share * fdi.dt
-        statistical.look(fdi.statistical, belief.design, x, y, belief.u, measured.attitude, dt)
+        look_at_air(fdi, belief, measured)
     look(fdi, belief, measured)
 
 

@@ -13,9 +13,10 @@ Python. The command computed in a frame is in effect from the next on.
 
 from functools import lru_cache
 
+import numba
 import numpy as np
 
-from beaver_ftc.compiled import in_two, kernel
+from beaver_ftc.compiled import apart, in_two, kernel
 from beaver_ftc.control import authority, law, reference_model
 from beaver_ftc.control.accommodation import accommodate
 from beaver_ftc.control.oracle import true_faults_dtype, true_mode
@@ -77,7 +78,7 @@ def idle(fdi: FdiConfig) -> list[tuple[str, ...]]:
     return [("instruments", "line"), *unused]
 
 
-@kernel
+@apart
 def watch_instruments(frame):
     """Hold the instruments against one another; what is known to be broken is replaced."""
     watch, power = frame.fdi.watch, frame.control.power
@@ -168,7 +169,7 @@ def command(frame):
     law.command(frame.control, frame.fdi, frame.belief, frame.measured, frame.faults, mode, frame.t)
 
 
-@kernel
+@apart
 def fly_profile(frame, reference):
     """Add the outer loops' body rates to the reference (3,) rad/s, and set the engine."""
     autopilot, value = frame.autopilot, frame.truth.value
@@ -258,12 +259,15 @@ def fly_on(frames, references, log, order):
 def _halves_of_a_frame(frames, references, log):
     """What `fly_frame` mostly consists of, by types: halves that take about as long to compile."""
     frame, row = frames.dtype, references.copy(ndim=1)
-    return [(diagnose, (frame,))], [(command, (frame,)), (finish, (frame, row, row))]
+    parts = tuple(frame.fields[name].type for name in ("fdi", "belief", "measured"))
+    there = [(diagnose, (frame,)), (look_back, (*parts, numba.int64))]
+    return there, [(sense, (frame,)), (command, (frame,)), (finish, (frame, row, row))]
 
 
 def _halves_of_frames(frames, references, log, order):
     there, here = _halves_of_a_frame(frames, references, log)
-    return there, [(look_inside, (frames,)), *here]
+    inside = there[-1][1][:-1]
+    return [*there, (scheme.look_inside, inside)], here
 
 
 in_two(fly_frame, _halves_of_a_frame)

@@ -1,0 +1,131 @@
+"""A kernel that stands apart is compiled when it is first called, is right then, and is kept."""
+
+import importlib
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from beaver_ftc import compiled
+
+MODULE = """
+from pathlib import Path
+import numpy as np
+from beaver_ftc import compiled
+
+RECORD = np.dtype([("wanted", "i8"), ("limit", "f8"), ("value", "f8", (3,))])
+compiled.cache_folder = lambda: Path(__file__).parent / "cache"
+
+@compiled.apart
+def rare(record, by):
+    \"\"\"Take `by` off each value, down to a limit.\"\"\"
+    if by < 0.0:
+        raise ValueError("cannot take off less than nothing")
+    for i in range(record.value.size):
+        record.value[i] = max(record.value[i] - by, record.limit)
+
+@compiled.apart
+def answering(record, by):
+    return by
+
+@compiled.kernel
+def often(records, by):
+    record = records[0]
+    record.value[0] += 1.0
+    if record.wanted == 1:
+        rare(record, by)
+    if record.wanted == 2:
+        answering(record, by)
+    return record.value.sum()
+
+def records(wanted):
+    made = np.zeros(1, RECORD)
+    made["wanted"], made["value"] = wanted, (1.0, 2.0, 3.0)
+    return made
+"""
+
+
+@pytest.fixture
+def made(tmp_path, monkeypatch):
+    name = f"apart_{tmp_path.name.replace('-', '_')}"
+    (tmp_path / f"{name}.py").write_text(MODULE)
+    monkeypatch.setattr(compiled, "cache_folder", compiled.cache_folder)
+    monkeypatch.syspath_prepend(tmp_path)
+    return importlib.import_module(name)
+
+
+def kept(tmp_path):
+    return sorted(path.name.partition("-")[0] for path in (tmp_path / "cache").glob("*-*"))
+
+
+def test_it_is_compiled_only_when_it_is_called(made, tmp_path):
+    assert made.often(made.records(0), 1.5) == 7.0
+    assert kept(tmp_path) == ["often"]
+    assert made.often(made.records(1), 1.5) == 0.5 + 0.5 + 1.5
+    assert kept(tmp_path) == ["often", "rare"]
+
+
+def test_numbers_of_another_type_have_code_of_their_own(made, tmp_path):
+    for by in (1.5, 2, 1.5):
+        assert made.often(made.records(1), by) == {1.5: 2.5, 2: 1.0}[by]
+    assert kept(tmp_path) == ["often", "often", "rare", "rare"]
+
+
+def test_another_process_compiles_nothing(made, tmp_path):
+    made.often(made.records(1), 1.5)
+    before = {path: path.stat().st_mtime_ns for path in (tmp_path / "cache").iterdir()}
+    program = f"import {made.__name__} as made; print(made.often(made.records(1), 1.5))"
+    done = subprocess.run(
+        [sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True, check=True
+    )
+    assert done.stdout == "2.5\n"
+    assert {path: path.stat().st_mtime_ns for path in (tmp_path / "cache").iterdir()} == before
+
+
+def test_what_it_raises_reaches_the_caller(made):
+    with pytest.raises(ValueError, match="less than nothing"):
+        made.often(made.records(1), -1.0)
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt, MemoryError])
+def test_what_happens_while_it_is_compiled_reaches_the_caller_who_may_call_again(made, monkeypatch, error):
+    def fail(*_):
+        raise error
+
+    with monkeypatch.context() as patched:
+        patched.setattr(compiled._Kernel, "result", fail)
+        with pytest.raises(error):
+            made.often(made.records(1), 1.5)
+    assert made.often(made.records(1), 1.5) == 2.5
+
+
+def test_one_that_answers_is_refused(made):
+    with pytest.raises(TypeError, match=r"answering.* returns something"):
+        made.often(made.records(2), 1.5)
+
+
+def test_python_calls_it_like_any_kernel_and_has_its_plain_form(made):
+    there = made.records(0)
+    made.rare(there[0], 1.5)
+    assert list(there["value"][0]) == [0.0, 0.5, 1.5]
+    plain = there.view(np.recarray)[0]
+    compiled.plain(made.rare)(plain, 1.0)
+    assert list(plain.value) == [0.0, 0.0, 0.5]
+    assert made.rare.__doc__.startswith("Take `by` off")
+
+
+FLIGHTS = """
+from beaver_ftc import translation
+from beaver_ftc.loop.loop import fly
+from beaver_ftc.scenario.schema import Scenario
+for fault_class in ("published", "all"):
+    loss = {"actuator": "elevator", "type": "loss_of_effectiveness", "magnitude": 0.4, "at_s": 0.5}
+    fly(Scenario(name="short", duration_s=1, faults=[loss], fdi={"fault_class": fault_class}))
+    print(*sorted(name[1] for name, _ in translation._found))
+"""
+
+
+def test_a_flight_asks_for_what_it_uses_and_for_nothing_else():
+    done = subprocess.run([sys.executable, "-c", FLIGHTS], capture_output=True, text=True, check=True)
+    assert done.stdout.split("\n")[:2] == ["", "isolate_type"]

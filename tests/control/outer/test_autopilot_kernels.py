@@ -31,6 +31,7 @@ def new_autopilot(*channels, **fields):
     pilot["dt"], pilot["gravity"], pilot["airspeed"], pilot["alpha"] = DT, G, V, ALPHA_NOW
     pilot["dihedral"], pilot["slowest_mps"], pilot["steepest_alpha"] = 0.02, 35.0, 0.26
     pilot["trim_inhg"], pilot["low_inhg"], pilot["high_inhg"], pilot["step_inhg"] = 20.0, 12.0, 28.0, 0.5
+    pilot["allowed_inhg"] = 28.0
     pilot["most"], pilot["limit"], pilot["most_bank"], pilot["bank_limit"] = (0.2, 0.1, 0.15), 10.0, 0.5, 0.5
     pilot["flying"], pilot["thrust"], pilot["climb_in_trim"] = 1, (0.2, 0.1), 0.01
     for name, gain in GAINS.items():
@@ -380,3 +381,33 @@ def test_a_climb_asks_for_no_more_power_than_a_lost_rudder_leaves():
 def test_a_whole_rudder_leaves_the_whole_engine():
     pilot, control = new_autopilot(weathercock=0.2), new_control()
     assert loops.full_power(pilot, control, new_y(dpt=2.0)) == 28.0
+
+
+def test_power_goes_back_while_the_rudder_stands_at_its_stop():
+    """From what is commanded, to what sideslip alone holds, and slowly up again."""
+    pilot, control = new_autopilot(weathercock=0.027), new_control()
+    control["power"]["command"][0], control["saturated"][RUDDER] = 24.0, 1
+    y = new_y(dpt=0.4)
+    inhg_per_dpt = 2.0 * y[QDYN] * y[AIRSPEED] / 40.0
+    lowest = 24.0 + (0.3 - 0.4) * inhg_per_dpt
+    assert lowest < 12.0  # a low ceiling: what follows is not bounded by it
+    assert loops.full_power(pilot, control, y) == pytest.approx(24.0 - 8.0 * DT)
+    assert loops.full_power(pilot, control, y) == pytest.approx(24.0 - 16.0 * DT)
+    control["power"]["command"][0] = 20.0
+    assert loops.full_power(pilot, control, y) == pytest.approx(20.0 - 8.0 * DT)
+    pilot["weathercock"] = 0.4**3  # sideslip holds what there is: no less than that
+    assert loops.full_power(pilot, control, y) == pytest.approx(20.0)
+    control["saturated"][RUDDER] = 0
+    assert loops.full_power(pilot, control, y) == pytest.approx(20.0 + DT)
+    pilot["allowed_inhg"] = 27.9999
+    assert loops.full_power(pilot, control, y) == 28.0
+
+
+def test_ailerons_at_their_stop_are_gone_whatever_is_believed_of_them():
+    pilot, control = new_autopilot(), new_control()
+    control["saturated"][AILERON] = 1
+    loops.follow(pilot, control, new_y())
+    assert pilot["jammed"] == pytest.approx(DT / pilot["gain"]["jammed_s"])
+    control["saturated"][:] = (0, 1, 1, 1)
+    loops.follow(pilot, control, new_y())
+    assert pilot["jammed"] < DT / pilot["gain"]["jammed_s"]

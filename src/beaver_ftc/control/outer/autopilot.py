@@ -28,6 +28,7 @@ MOST_SIDESLIP_RAD = 0.14
 MOST_MISSING = 0.1  # rad of path angle, and times gravity of acceleration
 MOST_DRIFT_RAD_S = 0.1  # of turning that a bank without a turn stands for
 USUAL_S, USUAL_MPS = 20.0, 3.0  # airspeed that power alone can hold: within so much of what it has been
+CUT_INHG_S, RAISE_INHG_S = 8.0, 1.0  # about as fast as the engine follows; and slower than a gust lasts
 LEAST_PUSH = 1e-3  # m/s2 per inHg
 SETTLED_S = 30.0  # after a change of heading
 MEAN_S = 10.0  # over which airspeed and arrival are judged: what comes and goes faster is a gust
@@ -68,11 +69,13 @@ def take_over(autopilot, control, y, attitude):
 
 @kernel
 def follow(autopilot, control, y):
-    """Smooth what is noisy, and note whether the ailerons or the rudder are gone."""
+    """Smooth what is noisy, and note whether the ailerons or the rudder are gone; ailerons at their stop give
+    no more roll, whatever is believed of them."""
     dt = autopilot.dt
     autopilot.alpha += dt / autopilot.gain.alpha_s * (y[ALPHA] - autopilot.alpha)
     autopilot.airspeed += dt / autopilot.gain.airspeed_s * (y[AIRSPEED] - autopilot.airspeed)
-    gone = control.effectiveness[control.main[ROLL]] < control.least_effectiveness
+    a = control.main[ROLL]
+    gone = control.effectiveness[a] < control.least_effectiveness or control.saturated[a] == 1
     autopilot.jammed += dt / autopilot.gain.jammed_s * (gone - autopilot.jammed)
     free = control.effectiveness[control.main[YAW]] < control.least_effectiveness
     autopilot.loose += dt / autopilot.gain.jammed_s * (free - autopilot.loose)
@@ -104,12 +107,20 @@ def full_power(autopilot, control, y):
     """The highest manifold pressure (inHg) with what is left of the rudder: the propeller yaws with dpt^3.
 
     What the rudder lacks, sideslip makes up for. The slower, the less: a climb beyond it ends in slow flight.
+    A rudder at its stop holds no more, whatever is believed of it: power then goes back until it comes off.
     """
-    left, power = control.effectiveness[control.main[YAW]], control.power
+    r, power = control.main[YAW], control.power
+    left, high = control.effectiveness[r], autopilot.high_inhg
+    if control.saturated[r]:
+        lowest = ceiling(power, y, autopilot.weathercock ** (1.0 / 3.0))
+        cut = min(autopilot.allowed_inhg, power.command[0]) - CUT_INHG_S * autopilot.dt
+        autopilot.allowed_inhg = min(max(cut, lowest), high)
+    else:
+        autopilot.allowed_inhg = min(autopilot.allowed_inhg + RAISE_INHG_S * autopilot.dt, high)
     if left >= 1.0:
-        return autopilot.high_inhg
+        return autopilot.allowed_inhg
     held = max(left, 0.0) * power.highest_dpt**3 + (1.0 - left) * autopilot.weathercock
-    return min(autopilot.high_inhg, ceiling(power, y, held ** (1.0 / 3.0)))
+    return min(autopilot.allowed_inhg, ceiling(power, y, held ** (1.0 / 3.0)))
 
 
 @kernel

@@ -52,7 +52,7 @@ def set_up_autopilot(autopilot: np.void, control: np.void, scenario: Scenario) -
     autopilot["most"], autopilot["most_bank"] = np.radians(MOST_DEG_S), radians(MOST_BANK_DEG)
     for ours, theirs in (("trim_inhg", "trim"), ("low_inhg", "low"), ("high_inhg", "high")):
         autopilot[ours] = control["power"][theirs]
-    autopilot["step_inhg"] = control["power"]["step"]
+    autopilot["step_inhg"], autopilot["allowed_inhg"] = control["power"]["step"], control["power"]["high"]
     control["steered"] = 1
     _know_what_holds(autopilot["holding"], control, scenario)
 
@@ -74,6 +74,7 @@ def _know(autopilot: np.void, scenario: Scenario) -> None:
     autopilot["thrust"] = per_mass * np.array([terms.get("CX_dpt", 0.0), terms.get("CX_adpt2", 0.0)])
     by_sideslip = terms.get("Cl_beta", 0.0) / terms.get("Cl_p", -1.0)
     autopilot["dihedral"] = max(by_sideslip, LEAST_DIHEDRAL) * 2.0 / aircraft.geometry.span_m
+    autopilot["weathercock"] = inf
     if terms.get("Cn_dpt3"):
         beta = POWER_SIDESLIP_RAD
         held = terms.get("Cn_beta", 0.0) * beta + terms.get("Cn_beta3", 0.0) * beta**3

@@ -55,7 +55,7 @@ AUTOPILOT = np.dtype(
         ("trim_inhg", "f8"), ("low_inhg", "f8"), ("high_inhg", "f8"), ("step_inhg", "f8"),
         ("climb_in_trim", "f8"),  # rad, with the engine as trimmed
         ("dihedral", "f8"),  # roll rate per sideslip and airspeed, 1/m
-        ("full_inhg", "f8"),  # the highest there is now
+        ("full_inhg", "f8"), ("allowed_inhg", "f8"),  # the highest there is now, and that the rudder allows
         ("weathercock", "f8"),  # cube of the dpt whose yawing moment the largest sideslip accepted holds
         ("slowest_mps", "f8"), ("steepest_alpha", "f8"),
         ("most", "f8", (3,)),  # rad/s, of the rates asked for with all surfaces healthy

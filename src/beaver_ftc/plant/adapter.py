@@ -76,8 +76,10 @@ def _beside(folder: Path, kind: str) -> str:
 
 @lru_cache(maxsize=1)
 def _unread() -> tempfile.TemporaryDirectory[str]:
-    """Where the output files of models go: JSBSim opens them although output is disabled, and by itself in its
-    root directory. It lasts as long as the process."""
+    """Where the output files of models go, as long as the process lasts.
+
+    JSBSim opens them although output is disabled, and by itself in its root directory.
+    """
     return tempfile.TemporaryDirectory(prefix="beaver-ftc-")
 
 

@@ -39,6 +39,7 @@ file has the keys `airspeed_mps`, `alpha_deg`, `altitude_m` and `sideslip_deg`.
 1. The aircraft is copied, and the failures of the built-in one are put in between its actuators and its
    aerodynamics. The file on disk stays as it is. Its own flight control no longer moves the surfaces of the
    copy: what it did beside the command (dampers, other surfaces moved along) is found and said in a line.
+   An aircraft of which something moves by itself is refused.
 2. It is trimmed in level flight at a lift coefficient of 0.45, or another where that does not trim. Engines
    are started as their kind wants it; where JSBSim gives no steady thrust the aircraft is flown gliding.
    What a model reads and only FlightGear would give it is 0 in the copy, and named.

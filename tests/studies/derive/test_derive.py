@@ -224,6 +224,8 @@ def test_what_cannot_be_derived_is_refused_in_a_line(tmp_path):
     with pytest.raises(BadInput, match="was not derived"):
         derive("jsbsim:T37", tmp_path)
     assert list((tmp_path / "T37").iterdir()) == []
+    with pytest.raises(BadInput, match=r"^jsbsim:Pterosaur: fcs/wing-alpha-deg moves by itself in steady"):
+        derive("jsbsim:Pterosaur", tmp_path)
     file = tmp_path / "envelope.yaml"
     file.write_text("airspeed_mps: [80, 60]\n")
     with pytest.raises(BadInput, match=r"envelope.yaml:1: airspeed_mps: ends out of order"):

@@ -1,13 +1,14 @@
 """What of an aircraft a design model affine in its surfaces cannot hold: found at once, said in a line."""
 
 import re
+from collections.abc import Sequence
 from dataclasses import replace
 from math import degrees
 from pathlib import Path
 
 import numpy as np
 
-from beaver_ftc.aircraft import AXES
+from beaver_ftc.aircraft import AXES, Aircraft
 from beaver_ftc.plant import instrumented
 from beaver_ftc.plant.adapter import Plant, bare, translated
 from beaver_ftc.plant.state import FlightState
@@ -16,6 +17,7 @@ from beaver_ftc.studies.derive.outline import own_deflection
 NOT_AFFINE = 0.02  # deviation from a straight line, as a share of what the whole travel does
 _MOVED_RAD, _RATE_RAD_S = 0.003, 0.1
 _POINTS, _FRAMES = 9, 300
+_AT_REST = 0.05  # as a share of where it is
 _SURFACE = re.compile(r"fcs/(?!.*(cmd|throttle|thrust|gear))")
 
 
@@ -55,6 +57,22 @@ def further_surfaces(source: Path, plant: Plant) -> dict[str, float]:
     """What else of its flight control its aerodynamics see, by property, and where it is in trim."""
     names = [name for name in instrumented.others_of(source) if _SURFACE.match(name)]
     return {name: round(plant.read(name), 4) for name in names if plant.has(name)}
+
+
+def moved_by_itself(aircraft: Aircraft, trim: FlightState, names: Sequence[str]) -> list[str]:
+    """Which of these properties do not come to rest in steady flight, no surface commanded to move."""
+    if not names:
+        return []
+    plant, seen = Plant(100, aircraft=aircraft), []  # of its own, since fuel burns
+    plant.start(trim)
+    for k in range(_FRAMES):
+        if k % 10 == 0:
+            plant.hold(trim)  # it flies nowhere meanwhile
+        plant.run()
+        seen.append([plant.read(name) for name in names])
+    late = np.array(seen)[_FRAMES // 2 :]
+    moving = np.ptp(late, axis=0) > _AT_REST * (np.abs(late).mean(axis=0) + _AT_REST)
+    return [name for name, moves in zip(names, moving, strict=True) if moves]
 
 
 def own_control(source: Path, model: Path) -> list[str]:

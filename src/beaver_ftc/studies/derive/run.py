@@ -19,7 +19,7 @@ from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.plant import instrumented
 from beaver_ftc.plant.adapter import translated
 from beaver_ftc.plant.state import FlightState
-from beaver_ftc.studies.derive.check import further_surfaces, not_affine, own_control
+from beaver_ftc.studies.derive.check import further_surfaces, moved_by_itself, not_affine, own_control
 from beaver_ftc.studies.derive.derived import Derived
 from beaver_ftc.studies.derive.error import map_of
 from beaver_ftc.studies.derive.fit import MOST_TERMS, engine_signals, fitted, signals_of_use
@@ -59,6 +59,11 @@ def derive(
             level = _prepared(source, folder, asked, notes, tell)
             notes += not_affine(level.plant, level.trim)
             further = {} if source.folder else further_surfaces(source.model, level.plant)
+            if moving := moved_by_itself(level.aircraft, level.trim, tuple(further)):
+                raise BadInput(
+                    f"{source.says}: {', '.join(moving)} moves by itself in steady flight, and its "
+                    "aerodynamics see it, allowed: surfaces that move by command"
+                )
             if source.folder is None:
                 _set_envelope(level.data, level.trim, asked)
             made = _derived(level, folder, tell)

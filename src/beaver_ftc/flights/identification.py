@@ -83,8 +83,8 @@ def summary(model: Model) -> str:
     found: Document = dict(model.identified)
     used = sum(flight["samples"] for flight in found["flights"])
     lines = [
-        f"{model.vehicle.name}: {used} samples of {len(found['flights'])} flights at {model.rate_hz:.3g} Hz; "
-        f"{model.history} past samples of the rates, {model.lags} of the commands",
+        f"{model.vehicle.name}: {used} samples at {model.rate_hz:.3g} Hz, flights: {len(found['flights'])}; "
+        f"past samples of the rates: {model.history}, of the commands: {model.lags}",
         *(f"  together, not to be told apart: {', '.join(g)}" for g in model.groups if len(g) > 1),
         *map(_test_line, found["tests"]),
         f"  the residual's colour widens standard errors by {_axes(found['colour'])}",

@@ -37,8 +37,8 @@ def _notes(samples: Samples, model: Model) -> list[str]:
         for name, age in samples.age_s.items()
     ]
     said.append(
-        f"The model was identified at {model.rate_hz:.3g} Hz; it predicts a sample from {model.history} past "
-        f"samples of the rates and {model.lags} of the commands."
+        f"The model was identified at {model.rate_hz:.3g} Hz; it predicts a sample from past ones, "
+        f"{model.history} of the rates and {model.lags} of the commands."
     )
     return said
 

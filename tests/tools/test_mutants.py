@@ -36,6 +36,13 @@ def test_what_no_caller_can_see_is_not_changed(module):
     assert mutants(module) == []
 
 
+def test_an_array_of_a_record_becomes_shorter_since_a_longer_one_would_do_as_well(module):
+    module.write_text('dtype = [("rate", "f8", (3,)), ("axes", "f8", (2, n + 2))]\nsize = f("rate", 3)\n')
+    made = [(m.before, m.after) for m in mutants(module)]
+    assert sorted(made) == [("2", "1"), ("2", "1"), ("3", "2"), ("3", "4"), ("n + 2", "n - 2")]
+    assert sum("(2,)" in m.source() for m in mutants(module)) == 1
+
+
 def test_a_mutant_is_the_module_with_one_change(module):
     (sign,) = [m for m in mutants(module) if m.before == "-total"]
     assert "return total" in sign.source()

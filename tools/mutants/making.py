@@ -51,7 +51,7 @@ class Mutant:
 
     def source(self) -> str:
         """The whole module with the change made."""
-        tree = ast.parse(self.file.read_text())
+        tree = _parsed(self.file.read_text())
         target = list(ast.walk(tree))[self.place]
         _, new = list(_changes(target))[self.number]
         changed = ast.fix_missing_locations(_Replace(target, new).visit(tree))
@@ -61,7 +61,7 @@ class Mutant:
 def mutants(file: Path) -> list[Mutant]:
     """All of a module."""
     text = file.read_text()
-    tree, lines = ast.parse(text), text.splitlines()
+    tree, lines = _parsed(text), text.splitlines()
     apart, statement = _no_code(tree), _statements(tree)
     seen: Counter[tuple[str, str, str]] = Counter()
     found = []
@@ -76,6 +76,17 @@ def mutants(file: Path) -> list[Mutant]:
             at = (node.lineno, statement[node])
             found.append(Mutant(file, place, number, kind, at, before, after, within))
     return found
+
+
+def _parsed(text: str) -> ast.Module:
+    """A module; what is the length of a record's array knows it: to be longer makes no difference."""
+    tree = ast.parse(text)
+    for node in ast.walk(tree):
+        match node:
+            case ast.Tuple(elts=[ast.Constant(value=str()), _, shape]):
+                for inner in ast.walk(shape):
+                    inner.is_length = True  # type: ignore[attr-defined]
+    return tree
 
 
 def _no_code(tree: ast.Module) -> set[ast.AST]:
@@ -139,7 +150,7 @@ def _of_numbers(node: ast.AST) -> Iterator[tuple[str, ast.AST]]:
         case ast.Constant(value=bool(value)):
             yield "constant", ast.Constant(not value)
         case ast.Constant(value=int(value)):
-            yield "constant", ast.Constant(value + 1)
+            yield "constant", ast.Constant(value - 1 if hasattr(node, "is_length") else value + 1)
         case ast.Constant(value=float(value)):
             yield "constant", ast.Constant(2.0 * value if value else 1.0)
 

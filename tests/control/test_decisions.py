@@ -268,3 +268,48 @@ def test_the_schedule_has_the_fastest_loop_of_each_point_and_its_observer():
     # without noise a loop is as fast as its margins let it, wherever it flies; with it, faster for a larger G
     assert np.ptp(rejection["Kp_at"][0]) == 0.0
     assert (np.diff(rejection["Kp_at"][2]) > 0.0).all()
+
+
+@pytest.mark.parametrize(
+    ("inner", "law", "fixed", "kept"),
+    [
+        (REJECTING, FAULT_TOLERANT, False, 0.5), (REJECTING, FAULT_TOLERANT, True, 0.0),
+        (REJECTING, ORACLE, False, 0.2), (0, FAULT_TOLERANT, False, 0.1), (0, FAULT_TOLERANT, True, 0.0),
+    ],
+)  # fmt: skip
+def test_only_what_may_still_act_is_taken_for_what_the_observer_sees(inner, law, fixed, kept):
+    """The verdict leaves an aileron a tenth, the observer sees a half; a fixed one gives nothing."""
+    control, fdi = new_control(inner=inner, law=law, effectiveness_step=1.0), record(diagnosis_dtype(4))
+    fdi["verdict"]["detected"], fdi["verdict"]["isolated"] = 1, 0
+    fdi["estimator"]["surface"][:4], fdi["estimator"]["theta"][0] = range(4), -0.9
+    fdi["surface"]["measure"], fdi["every_type"] = -1, fixed
+    fdi["surface"]["measure"][AILERON] = FIXED if fixed else -1
+    found = control["rejection"]["found"]
+    found["named"], found["frames"], found["square"], found["product"] = 1, 1.0, 2.0, -1.0
+    belief = record([("design", design_record().dtype), ("u", "f8", (4,))])
+    belief["design"] = design_record()[0]
+    measured = record([("y", "f8", (8,))])
+    measured["y"] = 0.2, 0.0, 45.0, 1000.0, 0.3, 0, 0, 0
+    faults = new_faults(present=1, effectiveness=(0.2, 1.0, 1.0, 1.0))
+    accommodation.accommodate(control, fdi, belief, measured, faults)
+    assert control["target"] == pytest.approx([kept, 1.0, 1.0, 1.0])
+    assert control["effectiveness"] == pytest.approx(control["target"])
+    assert not control["rejection"]["abandoned"].any()
+
+
+def test_what_no_verdict_names_is_whole_and_a_plug_ins_estimates_count_from_its_alarm_on():
+    control, fdi = (
+        new_control(target=0.3, offset=0.2, lag=0.1, effectiveness_step=0.25),
+        record(diagnosis_dtype(4)),
+    )
+    fdi["verdict"]["isolated"], fdi["verdict"]["estimates"], fdi["surface"]["measure"] = NOT_ISOLATED, 1, -1
+    fdi["verdict"]["effectiveness"] = 0.9, 0.4, 1.0, 0.8
+    arguments = record([("design", design_record().dtype), ("u", "f8", (4,))]), record([("y", "f8", (8,))])
+    accommodation.accommodate(control, fdi, *arguments, new_faults())
+    assert control["target"].tolist() == [1.0] * 4
+    assert not control["offset"].any()
+    assert not control["lag"].any()
+    fdi["verdict"]["detected"] = 1
+    accommodation.accommodate(control, fdi, *arguments, new_faults())
+    assert control["target"].tolist() == [0.9, 0.4, 1.0, 0.8]
+    assert control["effectiveness"] == pytest.approx([0.9, 0.75, 1.0, 0.8])  # by no more than a step

@@ -113,6 +113,46 @@ def test_the_room_of_a_bounded_uncertainty_is_summed_up_by_parts():
     assert allowed == pytest.approx(stays + swings + last)
 
 
+def test_a_frame_is_whitened_weighed_and_summed_as_matrices_say():
+    """Every lane by itself: r = x + dt (s - d), w = S^-1 r; N, D and R by w, what was there by its share."""
+    rng, dt, keep, kept = np.random.default_rng(8), 0.05, 0.9, 0.8
+    block = with_hypotheses(block_of(TOGETHER, [1e-3, 1e-3]), LOSS, STEP, tolerance=(0.1, 0.2))
+    K_x, K_d, S = rng.normal(size=(3, 2, 2))
+    block["K_x"], block["K_d"], block["S_inverse"], block["keep"] = K_x, K_d, S, kept
+    seen, regressors = rng.normal(size=2), rng.normal(size=(2, 2))
+    block["innovation"], block["regressor_response"][:2] = seen, regressors
+    lane = block["lane"]
+    for name in ("shaped", "response", "correlation", "information", "overlap", "slack"):
+        lane[name] = rng.normal(size=lane[name].shape)
+    before = {
+        name: lane[name].copy() for name in ("shaped", "response", "correlation", "information", "overlap")
+    }
+    likelihood.respond(block, dt, keep)
+    likelihood.overlap(block, keep)
+    x, d = before["response"][:2], before["response"][2:]
+    r = x + dt * (before["shaped"] - d)
+    w = S @ r
+    assert lane["response"] == pytest.approx(np.vstack([r - K_x @ r, kept * d + K_d @ r]))
+    assert lane["weight"] == pytest.approx(w)
+    assert lane["correlation"] == pytest.approx(keep * before["correlation"] + seen @ w)
+    assert lane["information"] == pytest.approx(keep * before["information"] + (w * r).sum(axis=0))
+    overlaps = keep * before["overlap"][:2] + regressors @ w
+    assert lane["overlap"][:2] == pytest.approx(overlaps)
+    assert lane["overlap"][2:] == pytest.approx(before["overlap"][2:])
+    assert lane["slack"] == pytest.approx(np.array([0.1, 0.2]) @ np.abs(overlaps))
+
+
+def test_a_lane_without_information_comes_to_nothing():
+    block = with_hypotheses(block_of(TOGETHER, [1e-3, 1e-3]), LOSS)
+    block["lane"]["sense"], block["lane"]["correlation"], block["level"] = -1.0, -5.0, 4.0
+    block["lane"]["information"][::2] = 2.0
+    with np.errstate(divide="ignore", invalid="ignore"):
+        likelihood.judge_lanes(block, True)
+    for name, nothing in (("score", 0.0), ("at_least", 0.0), ("at_most", 0.0), ("likelihood", -1.0)):
+        assert (block["lane"][name][1::2] == nothing).all()
+        assert (block["lane"][name][::2] > 0.0).all()
+
+
 def shapes(kind, frames=5):
     block = with_hypotheses(block_of(TOGETHER, [1e-3, 1e-3]), kind)
     block["hypothesis"]["growth_keep"], block["lane"]["missing"] = 0.8, 1.0

@@ -133,6 +133,14 @@ def test_residuals_are_readings_less_predictions():
     assert residual[DENSITY] == pytest.approx(np.log(denser))
 
 
+def test_a_pressure_that_is_gone_shows_and_stays_finite():
+    signal, then = reading(), reading()
+    signal[QDYN] = 0.0
+    dense = then[QDYN] / then[AIRSPEED] ** 2
+    assert compared((0, 0, 0), signal, reading(), then)[DENSITY] == pytest.approx(np.log(1e-9 / dense))
+    assert compared((0, 0, 0), then, reading(), signal)[DENSITY] == pytest.approx(np.log(dense / 1e-9))
+
+
 @pytest.mark.parametrize(("pitch", "steep"), [(1.29, False), (-1.29, False), (1.31, True), (-1.31, True)])
 def test_near_the_vertical_roll_and_heading_are_not_compared(pitch, steep):
     residual = compared((0.1, pitch, 0.2), reading(attitude=(0.12, pitch, 0.23)), reading(), reading())
@@ -147,6 +155,19 @@ def test_an_attitude_and_its_opposite_quaternion_are_the_same():
     near = [redundancy.angle_between(one, other, axis) for axis in (1, 2, 3)]
     assert [redundancy.angle_between(one, -other, axis) for axis in (1, 2, 3)] == pytest.approx(near)
     assert np.linalg.norm(near) == pytest.approx(1e-4, rel=1e-6)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_the_rotation_between_two_attitudes_takes_the_short_way(seed):
+    """Twice the vector part of one's inverse times the other, its scalar part made positive."""
+    one, other = Rotation.from_quat(np.random.default_rng(seed).normal(size=(2, 4)))
+    between = (one.inv() * other).as_quat(canonical=True)
+    scalar_first = [np.roll(turn.as_quat(), 1) for turn in (one, other)]
+    for side in (1.0, -1.0):
+        found = [
+            redundancy.angle_between(scalar_first[0], side * scalar_first[1], axis) for axis in (1, 2, 3)
+        ]
+        assert found == pytest.approx(2.0 * between[:3])
 
 
 SIGNAL = reading()

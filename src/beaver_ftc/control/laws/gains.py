@@ -77,16 +77,16 @@ def controller(loop: Loop, s: float, z: np.ndarray) -> np.ndarray:
     # unknowns: rate, disturbance, position (times G), command (times G); driven by the measured rate
     M = np.stack(
         [
-            np.stack([one - (1 - pull) * back, -(1 - pull) * dt * back, -(1 - pull) * dt * mean, none], -1),
-            np.stack([learn * back, one - back + learn * dt * back, learn * dt * mean, none], -1),
-            np.stack([none, none, one, -actuator], -1),
+            np.stack([one - (1 - pull) * back, -(1 - pull) * dt * back, -(1 - pull) * dt * mean, none], 1),
+            np.stack([learn * back, one - back + learn * dt * back, learn * dt * mean, none], 1),
+            np.stack([none, none, one, -actuator], 1),
             np.stack(
                 [loop.lead * s * one, loop.lead * (1 + s * share * dt) * one,
-                 (loop.lead - 1 + loop.lead * s * share * dt) * one, one], -1),
+                 (loop.lead - 1 + loop.lead * s * share * dt) * one, one], 1),
         ],
-        -2,
+        1,
     )  # fmt: skip
-    driven = np.stack([pull * one, learn * one, none, none], -1)
+    driven = np.stack([pull * one, learn * one, none, none], 1)
     return -np.linalg.solve(M, driven[..., None])[..., 3, 0]
 
 
@@ -105,7 +105,6 @@ def margins(L: np.ndarray) -> tuple[float, float, float]:
     L is real: a crossing if negative.
     """
     level, phase = 20.0 * np.log10(np.abs(L)), np.degrees(np.unwrap(np.angle(L)))
-    phase += 360.0 * np.round((-135.0 - phase[0]) / 360.0)
     upper, lower = inf, inf
     if L[-1].real < -abs(L[-1].imag) * 1e6:
         upper, lower = (-level[-1], inf) if level[-1] < 0.0 else (inf, level[-1])

@@ -1,0 +1,93 @@
+"""From a scenario to what the derived gains are asked for."""
+
+import numpy as np
+import pytest
+
+from beaver_ftc.control.laws import gains, setup
+from beaver_ftc.control.laws.state import N_POINTS, REJECTING
+from beaver_ftc.control.state import control_dtype
+from beaver_ftc.design.model import AIRSPEED, QDYN, design_record
+from beaver_ftc.design.variants import response
+from beaver_ftc.diagnosis.belief import belief_dtype
+from beaver_ftc.scenario.schema import Scenario
+
+Y = np.array([0.1, 0.02, 44.0, 1000.0, 0.3, 0.0, 0.0, 0.0])
+SENSORS = {
+    "p": {"noise_std_deg_s": 0.02, "delay_s": 0.02},
+    "q": {"quantum_deg_s": 0.06, "noise_std_deg_s": 0.01, "bandwidth_rad_s": 50.0},
+}
+
+
+def given(control=None, **keys):
+    scenario = {"name": "gains", "duration_s": 10, "rate_hz": 50, "sensors": SENSORS, **keys}
+    return Scenario.model_validate(scenario | {"control": control or {}})
+
+
+@pytest.fixture
+def asked(monkeypatch):
+    """What `gains.set_up` is asked for."""
+
+    def ask(scenario, stand_in=3, inner=REJECTING):
+        found = {}
+        monkeypatch.setattr(gains, "set_up", lambda rejection, **of: found.update(of))
+        control, belief = np.zeros(1, control_dtype(4))[0], np.zeros(1, belief_dtype(4))[0]
+        control["inner"], control["main"], control["stand_in"] = inner, (0, 1, 2), stand_in
+        belief["design"] = design_record()[0]
+        belief["actuators"]["approach"] = (0.2, 0.3, 0.4, 0.05)
+        setup.set_up(control, belief, scenario, Y)
+        return found
+
+    return ask
+
+
+def test_other_laws_ask_for_nothing(asked):
+    assert asked(given(), inner=REJECTING + 1) == {}
+
+
+def test_the_points_are_airspeeds_of_the_envelope_at_the_same_density(asked):
+    scenario = given()
+    found = asked(scenario)
+    speeds = np.linspace(*scenario.airframe.envelope.airspeed_mps, N_POINTS)
+    assert found["qdyn"] == pytest.approx(0.5 * (2.0 * 1000.0 / 44.0**2) * speeds**2)
+    design = design_record().view(np.recarray)[0]
+    for V, qdyn, at in zip(speeds, found["qdyn"], found["G"], strict=True):
+        y, f, G = Y.copy(), np.zeros(3), np.zeros((3, 4))
+        y[AIRSPEED], y[QDYN] = V, qdyn
+        response(design, np.zeros(3), y, f, G)
+        assert at == pytest.approx(G)
+
+
+def test_frame_margins_and_carriers(asked):
+    found = asked(given({"gain_margin_db": 7.0, "phase_margin_deg": 50.0}))
+    assert found["dt_s"] == pytest.approx(0.02)
+    assert found["substeps"] == given().substeps
+    assert found["margin"] == (7.0, 50.0)
+    assert found["approach"] == pytest.approx([0.2, 0.3, 0.4, 0.05])
+    assert found["carriers"] == [(0, 0), (1, 1), (2, 2), (1, 3)]
+    assert asked(given(), stand_in=-1)["carriers"] == [(0, 0), (1, 1), (2, 2)]
+    assert asked(given(), stand_in=0)["carriers"][-1] == (1, 0)
+
+
+def test_the_gyros_noise_has_its_steps_and_its_lag_is_kept_a_frame_at_a_time(asked):
+    p, q, r = asked(given())["gyros"]
+    assert (p.noise_rad_s, p.delay_s, p.keep) == pytest.approx((np.radians(0.02), 0.02, 0.0))
+    assert q.noise_rad_s == pytest.approx(np.radians(np.sqrt(0.01**2 + 0.06**2 / 12.0)))
+    assert (q.delay_s, q.keep) == pytest.approx((0.0, np.exp(-50.0 * 0.02)))
+    assert (r.noise_rad_s, r.delay_s, r.keep) == (0.0, 0.0, 0.0)
+
+
+def test_noise_may_take_its_share_of_the_rate_more_where_the_aircraft_damps_itself_more(asked):
+    """The root of an axis' own damping over the largest; pi / 3 rad/s where no limit is declared."""
+    actuators = {"elevator": {"rate_limit_deg_s": 30.0}}
+    found = asked(given({"noise_share": 0.2}, actuators=actuators))
+    design, damping, step = design_record().view(np.recarray)[0], [], 1e-5
+    for i in range(3):
+        f, G = np.zeros((2, 3)), np.zeros((3, 4))
+        for k, side in enumerate((-step, step)):
+            response(design, side * np.eye(3)[i], Y, f[k], G)
+        damping.append((f[1] - f[0])[i] / (2.0 * step))
+    shares = np.sqrt(np.abs(damping) / np.abs(damping).max())[[0, 1, 2, 1]]
+    rates = np.array([np.pi / 3.0, np.radians(30.0), np.pi / 3.0, np.pi / 3.0])
+    assert found["speed_rad_s"] == pytest.approx(0.2 * shares * rates, rel=1e-6)
+    alone = asked(given({"noise_share": 0.2}, actuators=actuators), stand_in=-1)
+    assert alone["speed_rad_s"][3] == pytest.approx(0.2 * np.pi / 3.0)

@@ -1,0 +1,156 @@
+"""What the autopilot takes from the aircraft's file: each number as the balance it stands for."""
+
+from math import inf, radians
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from beaver_ftc.aircraft import load
+from beaver_ftc.control.outer import setup
+from beaver_ftc.control.outer.level import elevator_needed
+from beaver_ftc.control.outer.state import AUTOPILOT, N_FLAP, N_QDYN
+from beaver_ftc.control.state import control_dtype
+from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.scenario.schema import Scenario
+
+AIRCRAFT = load()
+LEGS = {
+    "altitude_m": [{"hold": True}, {"at_s": 20, "value": 1900, "climb_mps": 2.5}],
+    "airspeed_mps": [{"at_s": 5, "value": 42, "change_mps2": 0.4}],
+    "heading_deg": [{"value": 90}],
+}
+DESIGN = {"mass": 1.1, "coefficients": {"Cm_alpha": 1.2}}
+
+
+def set_up(stand_in=3, autopilot=LEGS, **keys):
+    """(autopilot, control) as filled for a scenario."""
+    given = {"name": "profile", "duration_s": 60, "autopilot": autopilot, "design_model": DESIGN, **keys}
+    pilot, control = np.zeros(1, AUTOPILOT)[0], np.zeros(1, control_dtype(4))[0]
+    control["main"], control["stand_in"] = (0, 1, 2), stand_in
+    control["low"], control["high"] = (-0.5, -0.4, -0.3, -0.1), (0.5, 0.4, 0.3, 1.0)
+    control["power"]["trim"], control["power"]["low"] = 20.0, 12.0
+    control["power"]["high"], control["power"]["step"] = 28.0, 0.5
+    setup.set_up_autopilot(pilot, control, Scenario.model_validate(given))
+    return pilot, control
+
+
+@pytest.fixture(scope="module")
+def filled():
+    return set_up()
+
+
+def coefficient(name, **of):
+    """A coefficient of the aircraft's file where only these signals are not zero."""
+    neutral = {factor: 0.0 for term in AIRCRAFT.terms.values() for factor in term.factors}
+    return AIRCRAFT.coefficient(name, neutral | of)
+
+
+def test_without_a_profile_it_is_off():
+    pilot, control = set_up(autopilot=None)
+    assert pilot.tobytes() == np.zeros(1, AUTOPILOT)[0].tobytes()
+    assert control["steered"] == 0
+
+
+def test_the_legs_are_in_si_and_what_is_held_has_no_value(filled):
+    pilot, control = filled
+    assert (pilot["enabled"], control["steered"]) == (1, 1)
+    assert pilot["dt"] == pytest.approx(0.01)
+    assert pilot["legs"].tolist() == [2, 1, 1, 0]
+    assert pilot["at_s"][:3, :2].tolist() == [[0.0, 20.0], [5.0, 0.0], [0.0, 0.0]]
+    assert np.isnan(pilot["value"][0, 0])
+    assert pilot["value"][0, 1] == 1900.0
+    assert pilot["value"][1:3, 0] == pytest.approx([42.0, np.pi / 2.0])
+    assert pilot["speed"][0, 1] == 2.5
+    assert pilot["speed"][1:3, 0].tolist() == [0.4, inf]
+    assert (pilot["changed_at_s"] == -inf).all()
+
+
+def test_limits_gains_and_the_engines_range_are_taken_over(filled):
+    pilot, _ = filled
+    for name, gain in setup.GAINS.items():
+        assert pilot["gain"][name] == gain
+    assert [pilot[f"{name}_inhg"] for name in ("trim", "low", "high", "step")] == [20.0, 12.0, 28.0, 0.5]
+    assert pilot["most"] == pytest.approx(np.radians([12.0, 6.0, 10.0]))
+    assert (pilot["most_bank"], pilot["steepest_alpha"]) == pytest.approx((radians(30.0), radians(15.0)))
+    assert pilot["slowest_mps"] == AIRCRAFT.envelope.airspeed_mps[0] + 2.0
+    assert pilot["gravity"] == pytest.approx(9.80665)
+
+
+def test_thrust_is_what_the_slipstream_adds_along_the_body(filled):
+    """Per dynamic pressure and dpt; the part on alpha for the square of dpt. At 1.1 times the mass."""
+    per_mass = AIRCRAFT.geometry.wing_area_m2 / (1.1 * AIRCRAFT.mass.mass_kg)
+    straight = coefficient("CX", dpt=1.0) - coefficient("CX")
+    inclined = coefficient("CX", alpha=0.1, dpt=1.0) - coefficient("CX", alpha=0.1) - straight
+    assert filled[0]["thrust"] == pytest.approx([per_mass * straight, per_mass * inclined / 0.1])
+
+
+def test_the_dihedral_is_the_roll_that_sideslip_sustains(filled):
+    beta, V = 0.05, 45.0
+    p = -filled[0]["dihedral"] * V * beta
+    ph = p * AIRCRAFT.geometry.span_m / (2.0 * V)
+    assert coefficient("Cl", beta=beta) < 0.0
+    assert coefficient("Cl", beta=beta, ph=ph) == pytest.approx(coefficient("Cl"), abs=1e-12)
+
+
+def test_the_weathercock_holds_full_power_at_the_largest_sideslip_accepted(filled):
+    dpt = filled[0]["weathercock"] ** (1.0 / 3.0)
+    pulled = coefficient("Cn", dpt=dpt) - coefficient("Cn")
+    assert abs(pulled) > 1e-4
+    beta = -np.sign(pulled) * setup.POWER_SIDESLIP_RAD
+    assert coefficient("Cn", dpt=dpt, beta=beta) == pytest.approx(coefficient("Cn"), abs=1e-12)
+
+
+def test_the_table_is_that_of_level_flight_between_the_ends_of_speed_and_flap(filled):
+    hold, (slowest, fastest) = filled[0]["holding"], AIRCRAFT.envelope.airspeed_mps
+    assert hold["qdyn"] == pytest.approx(0.5 * 1.225 * np.linspace(slowest, fastest, N_QDYN) ** 2, rel=1e-3)
+    assert hold["flap"] == pytest.approx(np.linspace(-0.1, 1.0, N_FLAP))
+    scale, mass = (("Cm_alpha", 1.2),), 1.1 * AIRCRAFT.mass.mass_kg
+    for j, k in ((0, 0), (3, 2), (N_QDYN - 1, N_FLAP - 1)):
+        at = (float(hold["qdyn"][j]),), (float(hold["flap"][k]),)
+        expected = elevator_needed(AIRCRAFT, ("elevator", "flap"), mass, scale, *at)[0, 0]
+        assert hold["elevator"][j, k] == pytest.approx(expected, nan_ok=True)
+    assert hold["known"] == np.isfinite(hold["elevator"]).all()
+    assert (hold["pace"], hold["reserve"]) == pytest.approx((1.0, radians(0.7)))
+    assert (hold["from_s"] == -1.0).all()
+    assert (hold["bank"], hold["fastest"]) == (pytest.approx(radians(30.0)), inf)
+
+
+def test_without_a_surface_that_stands_in_nothing_is_known_of_what_can_be_held():
+    hold = set_up(stand_in=-1)[0]["holding"]
+    assert (hold["known"], hold["fastest"]) == (0, inf)
+    assert not hold["qdyn"].any()
+
+
+def made_up(terms, **autopilot):
+    """A scenario of an aircraft that has these terms alone."""
+    aircraft = SimpleNamespace(
+        name="glider",
+        terms={name: SimpleNamespace(value=value) for name, value in terms.items()},
+        geometry=SimpleNamespace(wing_area_m2=20.0, span_m=10.0),
+        mass=SimpleNamespace(mass_kg=500.0),
+        envelope=SimpleNamespace(airspeed_mps=(25.0, 50.0)),
+    )
+    legs = SimpleNamespace(**({"airspeed_mps": ()} | autopilot))
+    return SimpleNamespace(
+        name="aloft", airframe=aircraft, autopilot=legs, design_model=SimpleNamespace(mass=1.0)
+    )
+
+
+def test_an_aircraft_without_thrust_flies_no_airspeed_and_says_so():
+    with pytest.raises(BadInput, match=r"aloft: autopilot\.airspeed_mps: glider has no term of its thrust"):
+        setup._know(np.zeros(1, AUTOPILOT)[0], made_up({}, airspeed_mps=(1,)))
+
+
+def test_an_aircraft_that_hardly_rolls_by_sideslip_is_not_flown_by_it():
+    pilot = np.zeros(1, AUTOPILOT)[0]
+    setup._know(pilot, made_up({}))
+    assert not pilot["thrust"].any()
+    assert pilot["dihedral"] == pytest.approx(setup.LEAST_DIHEDRAL * 2.0 / 10.0)
+    assert pilot["weathercock"] == inf  # no power yaws it
+    unstable = {"Cn_dpt3": -0.1, "Cn_beta": -0.2, "Cl_beta": -0.3, "Cl_p": -0.5}
+    setup._know(pilot, made_up(unstable))
+    assert pilot["weathercock"] == 0.0
+    assert pilot["dihedral"] == pytest.approx(0.6 * 2.0 / 10.0)
+    setup._know(pilot, made_up(unstable | {"Cn_beta": 0.2, "Cn_beta3": 1.0}))
+    assert pilot["weathercock"] == pytest.approx((0.2 * 0.2 + 0.2**3) / 0.1)

@@ -1,0 +1,204 @@
+"""What vanes and airspeed know of the air's rotation, against the same flight in the Earth's axes."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from beaver_ftc.aircraft import load
+from beaver_ftc.design.model import design_record
+from beaver_ftc.design.variants import response
+from beaver_ftc.diagnosis import air, noise_model
+from beaver_ftc.diagnosis.air import AIR
+
+AIRCRAFT = load()
+SPAN, SCALE, ROLLING, GRAVITY, DT = AIRCRAFT.geometry.span_m, 40.0, 30.0, 9.8, 0.02
+DOWN = np.array([0.0, 0.0, GRAVITY])
+X, U = np.array([0.1, -0.05, 0.07]), np.array([0.1, -0.15, 0.05, 0.2])
+Y = np.array([0.1, 0.03, 45.0, 1036.0, 0.3, 0.0, 0.0, 0.0])
+
+
+def new_air(**fields):
+    record = np.zeros(1, AIR).view(np.recarray)[0]
+    record["span"], record["gravity"], record["moving"] = SPAN, GRAVITY, 1
+    record["scale"], record["rolling"] = SCALE, ROLLING
+    for name, value in fields.items():
+        record[name] = value
+    return record
+
+
+def to_earth(attitude):
+    return Rotation.from_euler("ZYX", np.asarray(attitude)[::-1])
+
+
+def vanes(velocity):
+    """(alpha, beta, V, ...) of a velocity through the air in body axes."""
+    V = np.linalg.norm(velocity)
+    return np.array([np.arctan2(velocity[2], velocity[0]), np.arcsin(velocity[1] / V), V, 1000.0, 0, 0, 0, 0])
+
+
+class Flight:
+    """Velocity of the aircraft and of the air in axes that stay with the Earth, an instant at a time."""
+
+    def __init__(self, seed, turn_rad=0.06, climb_rad=0.02):
+        self.rng = np.random.default_rng(seed)
+        self.attitude = self.rng.uniform(-0.3, 0.3, 3)
+        self.attitude[2] = np.pi + self.rng.uniform(-0.01, 0.01)  # where the heading wraps
+        self.steps = np.array([climb_rad, climb_rad, turn_rad])
+        self.velocity = to_earth(self.attitude).apply([45.0, 1.0, 3.0])
+        self.wind, self.before = self.rng.normal(size=3), None
+
+    def reading(self):
+        attitude = self.attitude.copy()
+        attitude[2] = np.angle(np.exp(1j * attitude[2]))
+        return vanes(to_earth(self.attitude).inv().apply(self.velocity - self.wind)), attitude
+
+    def step(self):
+        """The force, m/s2 in body axes, of the step to the next instant."""
+        pulled = 10.0 * self.rng.normal(size=3)
+        force = to_earth(self.attitude).inv().apply(pulled - DOWN)
+        before = pulled if self.before is None else self.before
+        self.velocity = self.velocity + DT * (1.5 * pulled - 0.5 * before)
+        self.before = pulled
+        self.attitude = self.attitude + self.steps * self.rng.uniform(-1.0, 1.0, 3)
+        self.wind = self.wind + self.rng.normal(size=3)
+        return force
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_gust_followed_is_the_airs_own_change(seed):
+    """Whatever aircraft and heading do: each lag keeps its share, and the change of the air's velocity, seen
+    from the level axes of now, is added."""
+    flight, record = Flight(seed), new_air()
+    air.begin(record, *flight.reading())
+    pitching = yawing = 0.0
+    for _ in range(6):
+        wind, axes_then = flight.wind, record["axes"].copy()
+        psi_then = flight.attitude[2]
+        record["force"] = flight.step()
+        y, attitude = flight.reading()
+        air.observe(record, y, attitude, DT)
+        change = Rotation.from_euler("z", -flight.attitude[2]).apply(flight.wind - wind)
+        tau_q, tau_r = 4.0 * SPAN / (np.pi * y[2]), 3.0 * SPAN / (np.pi * y[2])
+        pitching = np.exp(-DT / tau_q) * pitching + change[2] / (y[2] * tau_q)
+        yawing = np.exp(-DT / tau_r) * yawing + change[1] / (y[2] * tau_r)
+        assert record["gust"] == pytest.approx([0.0, pitching, yawing])
+        # The axes of the gusts: level, along the heading of the instant before.
+        axes = (to_earth(flight.attitude).inv() * Rotation.from_euler("z", psi_then)).as_matrix()
+        assert record["axes"] == pytest.approx(axes)
+        assert record["swing"] == pytest.approx((axes - axes_then) / DT)
+
+
+@pytest.mark.parametrize(("turn_rad", "swings"), [(1e-3, False), (0.1, True)])
+def test_axes_swing_where_a_gust_that_keeps_its_size_would_be_seen_to_change(turn_rad, swings):
+    flight, record = Flight(1, 0.0, 0.0), new_air()
+    air.begin(record, *flight.reading())
+    flight.attitude[1] = 0.0
+    for _ in range(3):
+        record["force"] = flight.step()
+        flight.attitude[1] += turn_rad
+        y, attitude = flight.reading()
+        air.observe(record, y, attitude, DT)
+    fastest = turn_rad / DT  # nearly: a little less where the axis is not square to what turns it
+    walk = 0.5 * (fastest * ROLLING / y[2]) ** 2
+    assert not 0.8 * air.LEAST_SWING < walk < 1.3 * air.LEAST_SWING
+    assert bool(record["swings"]) == swings == (walk > air.LEAST_SWING)
+
+
+@pytest.mark.parametrize("share", [0.98, 1.02])
+def test_the_fastest_swing_decides(share):
+    record = new_air(axes=np.eye(3))
+    most = np.sqrt(2.0 * air.LEAST_SWING) * 45.0 / ROLLING
+    record["swing"] = np.eye(3)
+    record["swing"][1, 2] = share * most * DT
+    record["swing"][0, 0] += 0.5 * most * DT
+    air.note_swing(record, DT, 45.0)
+    assert record["swing"][1, 2] == pytest.approx(-share * most)
+    assert record["swings"] == (share > 1.0)
+
+
+def test_a_yawing_gust_that_turning_hides_fades_and_its_loss_fades_with_it():
+    """One fast turn: for that instant and the next nothing is added, and what is lost then decays."""
+    record, y = new_air(), np.array([0.0, 0.0, 45.0, 1000.0, 0, 0, 0, 0])
+    level = np.zeros(3)
+    air.begin(record, y, level)
+    record["force"], record["gust"] = (0.0, 0.0, -GRAVITY), (0.0, 0.0, 0.05)
+    tau_r, lag = 3.0 * SPAN / (np.pi * 45.0), np.exp(-DT / (3.0 * SPAN / (np.pi * 45.0)))
+    enough = np.sqrt(np.pi * 45.0**2 / (SPAN * SCALE))  # rad/s at which all of it is lost
+    turn = 1.1 * enough * DT
+    for attitude, gust, turning in (
+        ((0, 0, turn), 0.05 * lag, 1.0),
+        ((0, 0, turn), 0.05 * lag**2, 1.0),
+        ((0, 0, turn), 0.05 * lag**3, lag),
+        ((0, 0, turn), 0.05 * lag**4, lag**2),
+    ):
+        air.observe(record, y, np.array(attitude), DT)
+        assert record["gust"][2] == pytest.approx(gust)
+        assert record["turning"] == pytest.approx(turning)
+        record["force"] = 0.0, 0.0, -GRAVITY
+    part = 0.5 * enough * DT
+    air.observe(record, y, np.array([0, 0, turn + part]), DT)
+    assert record["lost"] == pytest.approx(0.25)
+    assert record["turning"] == pytest.approx(max(lag**3, 0.25))
+    aside = 45.0 * np.sin(part)  # of the old course, from the left: a gust from the right has come up
+    assert record["gust"][2] == pytest.approx(0.05 * lag**5 - aside / (45.0 * tau_r))
+
+
+@pytest.mark.parametrize(
+    ("now", "then"), [(0.1, -0.2), (3.1, -3.1), (-3.1, 3.1), (6.0, 0.1), (-6.2, 6.2), (1.0, -2.2)]
+)
+def test_a_heading_turns_the_short_way(now, then):
+    assert air.heading_change(now, then) == pytest.approx(np.angle(np.exp(1j * (now - then))))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_level_axes_are_a_rotation(seed):
+    phi, theta = np.random.default_rng(seed).uniform(-1.4, 1.4, 2)
+    turn, body = np.full((3, 3), 9.0), np.random.default_rng(seed + 10).normal(size=3)
+    air.level_axes(phi, theta, turn)
+    of_level = to_earth((phi, theta, 0.0))
+    assert turn == pytest.approx(of_level.inv().as_matrix(), abs=1e-15)
+    assert [air.to_level(turn, body, i) for i in range(3)] == pytest.approx(of_level.apply(body))
+
+
+def test_a_diagnosis_that_begins_in_flight_has_seen_no_gust():
+    flight = Flight(3)
+    record = new_air(started=1, lost=0.4, turning=0.3, gust=(0.1, 0.2, 0.3))
+    air.begin(record, *flight.reading())
+    assert (record["started"], record["lost"], record["turning"]) == (0, 0.0, 0.0)
+    assert not record["gust"].any()
+    assert record["axes"] == pytest.approx(record["turn"])
+    through = Rotation.from_euler("z", -flight.attitude[2]).apply(flight.velocity - flight.wind)
+    assert record["velocity"] == pytest.approx(through)
+
+
+def without_inertia(design):
+    """A copy of the design model whose rates act through the air alone."""
+    still = design.copy()
+    for name in ("Ppq", "Pqr", "Qpp", "Qpr", "Qrr", "Rpq", "Rqr"):
+        still[name] = 0.0
+    return still
+
+
+def test_what_a_gust_does_is_what_the_opposite_rates_would():
+    """By differences of the design model's own response, whose inertia terms the air knows nothing of."""
+    design = design_record().view(np.recarray)
+    record = new_air(area_per_mass=0.01)
+    noise_model.fill_table(record["forces"], AIRCRAFT, AIRCRAFT.measurable_forces, noise_model.FORCES)
+    air.begin(record, Y, np.array([0.3, 0.2, 1.0]))
+    record["gust"] = 0.0, 0.02, -0.03
+    air.effect(record, design[0], X, Y, U)
+    rotation = to_earth((0.3, 0.2, 0.0)).inv().apply([0.0, 0.02, -0.03])
+    assert record["rotation"] == pytest.approx(rotation)
+
+    def acceleration(x):
+        f, G = np.zeros(3), np.zeros((3, 4))
+        response(without_inertia(design)[0], x, Y, f, G)
+        return f + G @ U
+
+    step = 1e-6
+    expected = (acceleration(X - step * rotation) - acceleration(X + step * rotation)) / (2.0 * step)
+    assert record["acceleration"] == pytest.approx(expected, rel=1e-6)
+    air.effect(record, design[0], X, Y, U)
+    air.begin_frame(record)
+    record["acceleration"] = 0.0
+    assert record["total"] == pytest.approx(expected, rel=1e-6)

@@ -1,0 +1,164 @@
+"""What the diagnosis of every type says it has found: the record's verdict in words, case by case."""
+
+import numpy as np
+import pytest
+
+from beaver_ftc.diagnosis.state import NOT_ISOLATED, UNANTICIPATED, diagnosis_dtype
+from beaver_ftc.diagnosis.types import findings
+from beaver_ftc.diagnosis.types.candidates import BY_DEDUCTION, RULED_OUT
+from beaver_ftc.diagnosis.types.pairs import IN_PITCH
+from beaver_ftc.diagnosis.types.registry import (
+    BIAS,
+    CONSTANT_LOSS,
+    FLOAT,
+    N_CONSTANT,
+    NAMES,
+    SLOW,
+    STUCK,
+    UP,
+    VARYING_LOSS,
+)
+
+SURFACES = ("aileron", "elevator", "rudder", "flap")
+AILERON, ELEVATOR, RUDDER, FLAP = range(4)
+POSITION_OF = (4, 5, 6, 7)
+
+
+def new(left=None, detected=1, pairs=0, verdict=NOT_ISOLATED, **fields):
+    """A record in which these types are left, {surface: kinds}; other surfaces are excluded."""
+    fdi = np.zeros(1, diagnosis_dtype(4))[0]
+    fdi["verdict"]["detected"], fdi["verdict"]["isolated"], fdi["verdict"]["type"] = detected, verdict, -1
+    fdi["verdict"]["isolated_at_s"], fdi["pair"]["enabled"] = 12.5, pairs
+    fdi["layout"]["position_of"], fdi["estimator"]["surface"][4:8] = POSITION_OF, range(4)
+    fdi["layout"]["group"] = 1 - IN_PITCH
+    fdi["layout"]["group"][[ELEVATOR, FLAP]] = IN_PITCH
+    fdi["estimator"]["excluded"][4:8], fdi["surface"]["type_excluded"] = 1, 1
+    fdi["surface"]["type"], fdi["surface"]["type_at_s"] = -1, -1.0
+    for s, kinds in (left or {}).items():
+        fdi["estimator"]["excluded"][POSITION_OF[s]] = 0
+        fdi["surface"]["type_excluded"][s][list(kinds)] = 0
+    for name, value in fields.items():
+        fdi[name] = value
+    return fdi
+
+
+def said(*kinds):
+    return [NAMES[kind] for kind in kinds]
+
+
+def test_without_an_alarm_nothing_is_found():
+    found = findings.found(new({ELEVATOR: [STUCK]}, detected=0), SURFACES)
+    assert (found["isolated"], found["candidates"], found["faults"]) == (None, (), ())
+
+
+def test_what_is_open_is_each_type_of_each_surface_that_is_possible():
+    found = findings.found(new({AILERON: [STUCK, BIAS], RUDDER: [CONSTANT_LOSS]}), SURFACES)
+    expected = [f"aileron:{kind}" for kind in said(*sorted((STUCK, BIAS)))] + said(CONSTANT_LOSS)
+    assert found["candidates"] == (*expected[:-1], f"rudder:{expected[-1]}")
+    assert found["isolated"] is None
+
+
+def test_a_surface_of_which_no_type_fits_is_named_bare_and_the_fault_may_be_unanticipated():
+    assert findings.found(new({AILERON: []}), SURFACES)["candidates"] == ("aileron", "unanticipated")
+    assert findings.found(new(), SURFACES)["candidates"] == ("unanticipated",)
+    both = findings.found(new({AILERON: [], RUDDER: [STUCK]}), SURFACES)["candidates"]
+    assert both == ("aileron", f"rudder:{NAMES[STUCK]}")
+
+
+@pytest.mark.parametrize(
+    ("named", "standing", "excluded", "possible"),
+    [
+        (0, 0, 0, True), (0, 0, 1, False), (0, RULED_OUT, 0, False), (1, RULED_OUT, 1, True),
+        (0, BY_DEDUCTION, 1, True), (1, 0, 1, True),
+    ],
+)  # fmt: skip
+def test_a_surface_is_possible_until_it_is_excluded_or_ruled_out(named, standing, excluded, possible):
+    fdi = new({RUDDER: [STUCK]})
+    fdi["surface"]["named"][RUDDER], fdi["surface"]["standing"][RUDDER] = named, standing
+    fdi["estimator"]["excluded"][POSITION_OF[RUDDER]] = excluded
+    assert (f"rudder:{NAMES[STUCK]}" in findings.found(fdi, SURFACES)["candidates"]) == possible
+
+
+@pytest.mark.parametrize(
+    ("constant", "evidence", "own_errors", "kept"),
+    [
+        (True, 30, 0, True),
+        (True, 50, 0, False),
+        (True, 51, 0, False),
+        (False, 90, 0, True),
+        (True, 90, 1, True),
+    ],
+)
+def test_what_any_course_explains_counts_only_until_a_constant_has_been_seen_for_long(
+    constant, evidence, own_errors, kept
+):
+    assert STUCK < N_CONSTANT <= min(VARYING_LOSS, SLOW)
+    fdi = new({RUDDER: [VARYING_LOSS, SLOW, *([STUCK] if constant else [])]}, patience=40)
+    fdi["surface"]["evidence"][RUDDER], fdi["surface"]["quiet"][RUDDER] = evidence, 10
+    fdi["bound"]["own_errors"] = own_errors
+    types = findings._types_left(fdi, RUDDER)
+    expected = said(*([STUCK] if constant else []))
+    assert set(types) == set(expected) | (set(said(VARYING_LOSS, SLOW)) if kept else set())
+    assert len(types) == len(set(types))
+
+
+def test_one_fault_is_told_with_its_instant_and_what_it_may_be():
+    fdi = new({ELEVATOR: [STUCK, FLOAT]}, verdict=POSITION_OF[ELEVATOR])
+    found = findings.found(fdi, SURFACES)
+    assert (found["isolated"], found["isolation_type"]) == ("elevator", None)
+    assert (found["isolation_time_s"], found["type_time_s"]) == (12.5, None)
+    assert set(found["candidates"]) == set(said(STUCK, FLOAT))
+    assert found["estimate"] is None
+    assert found["frequency_rad_s"] is None
+    fdi["verdict"]["type"], fdi["verdict"]["type_at_s"] = 0, 14.0
+    found = findings.found(fdi, SURFACES)
+    assert (found["isolation_type"], found["type_time_s"], found["candidates"]) == (
+        NAMES[0],
+        14.0,
+        (NAMES[0],),
+    )
+
+
+def test_a_fault_outside_the_class_is_unanticipated():
+    found = findings.found(new(verdict=UNANTICIPATED), SURFACES)
+    assert (found["isolated"], found["isolation_type"]) == ("unanticipated", "unanticipated")
+    assert (found["isolation_time_s"], found["candidates"]) == (12.5, ())
+    several = findings.found(new({AILERON: [STUCK]}, verdict=UNANTICIPATED, pairs=1), SURFACES)
+    assert (several["isolated"], several["faults"]) == ("unanticipated", ())
+
+
+def several(named=(), alarmed=(0, 0), left=None):
+    fdi = new(left, pairs=1)
+    for s, at_s in named:
+        fdi["surface"]["named"][s], fdi["surface"]["named_at_s"][s] = 1, at_s
+    fdi["pair"]["alarmed"] = alarmed
+    return findings.found(fdi, SURFACES)
+
+
+def test_of_several_faults_the_first_named_is_told_first():
+    found = several(named=[(RUDDER, 9.0), (ELEVATOR, 7.0)], alarmed=(1, 1))
+    assert (found["isolated"], found["isolation_time_s"]) == ("elevator", 7.0)
+    assert [fault["isolated"] for fault in found["faults"]] == ["elevator", "rudder"]
+    assert several(named=[(RUDDER, 9.0), (ELEVATOR, 9.0)])["isolated"] == "elevator"
+
+
+def test_a_plane_that_is_alarmed_and_not_explained_stays_open():
+    alarmed = [0, 0]
+    alarmed[IN_PITCH] = 1
+    found = several(alarmed=alarmed, left={ELEVATOR: [BIAS], RUDDER: [BIAS]})
+    assert found["isolated"] is None
+    (plane,) = found["faults"]
+    assert found["candidates"] == plane["candidates"] == (f"elevator:{NAMES[BIAS]}", "elevator+flap")
+    beside = several(named=[(RUDDER, 9.0)], alarmed=(1, 1), left={ELEVATOR: [BIAS]})
+    assert [fault["isolated"] for fault in beside["faults"]] == ["rudder", None]
+    assert several(named=[(FLAP, 9.0)], alarmed=alarmed)["faults"][1:] == ()
+
+
+@pytest.mark.parametrize("kind", [STUCK, UP])
+def test_where_one_of_two_in_pitch_stands_still_the_other_may_be_off_as_well(kind):
+    fdi = new({ELEVATOR: [kind], RUDDER: [kind]}, pairs=1)
+    every = set(said(STUCK, FLOAT, UP, BIAS, CONSTANT_LOSS))
+    assert set(findings._types_left(fdi, ELEVATOR)) == every
+    assert set(findings._types_left(fdi, RUDDER)) == set(said(kind))
+    assert set(findings._types_left(new({ELEVATOR: [BIAS]}, pairs=1), ELEVATOR)) == set(said(BIAS))
+    assert set(findings._types_left(new({ELEVATOR: [kind]}), ELEVATOR)) == set(said(kind))

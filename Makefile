@@ -8,6 +8,12 @@ PYTEST := $(BIN)/python -m pytest -n $(WORKERS) --dist worksteal
 # What a change breaks most often, in less than a minute: what flies little or nothing.
 FAST := tests/aircraft tests/design tests/plant tests/results tests/scenario $(wildcard tests/test_re*.py tests/test_arch*.py)
 
+# Kernels on plain arrays, without a compiler: to compile each by itself takes ten times as long as to try it.
+PLAIN := tests/design $(wildcard tests/*/test_*_kernels.py tests/*/*/test_*_kernels.py) \
+  $(addprefix tests/diagnosis/test_,membership.py noise_numbers.py types_verdict.py) \
+  $(addprefix tests/control/test_,decisions.py law_frame.py laws.py supervisor.py compiled_rivals.py) \
+  tests/control/laws/test_gains.py tests/diagnosis/rivals/test_filters.py
+
 .PHONY: demo test acceptance cost test-fast coverage mutants lint docs site clean help
 
 help:
@@ -38,7 +44,8 @@ demo: $(VENV)/.demo
 	@echo "report: runs/elevator-partial-loss/report.html"
 
 test: $(VENV)/.dev
-	$(PYTEST) -m "not acceptance"
+	NUMBA_DISABLE_JIT=1 $(BIN)/python -m pytest $(PLAIN)
+	$(PYTEST) -m "not acceptance" $(addprefix --ignore=,$(PLAIN))
 
 acceptance: $(VENV)/.dev
 	$(PYTEST) -m acceptance

@@ -33,3 +33,43 @@ def test_workers_end_before_and_after_they_have_started(tmp_path, seconds):
     )
     assert (done.returncode, done.stderr) == (0, "")
     assert time.monotonic() - begun < 18.0
+
+
+STOPPED = """
+import os, signal, threading, time
+from beaver_ftc.studies.engine import processes
+
+def send(stop):
+    while stop.is_alive():
+        os.killpg(0, signal.SIGINT)
+        time.sleep(0.02)
+
+if __name__ == "__main__":
+    heard = []
+    signal.signal(signal.SIGINT, lambda *_: heard.append(1))
+    stop = threading.Thread(target=time.sleep, args=(1.5,))
+    stop.start()
+    threading.Thread(target=send, args=(stop,)).start()
+    processes.start_early()
+    worker = processes.context().Process(target=print, args=("worked",))
+    with processes.single_threaded():
+        worker.start()
+    worker.join()
+    stop.join()
+    print(len(heard) > 1)
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="there workers start afresh, on a terminal of their own")
+def test_ctrl_c_while_workers_are_getting_ready_is_for_the_one_who_gives_the_orders(tmp_path):
+    """Sent, as by a terminal, to the whole group, over and over while the process they fork from imports."""
+    (tmp_path / "stopped.py").write_text(STOPPED)
+    done = subprocess.run(
+        [sys.executable, "stopped.py"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+        start_new_session=True,
+    )
+    assert (done.stdout, done.stderr, done.returncode) == ("worked\nTrue\n", "", 0)

@@ -7,8 +7,9 @@ Nothing heavy is imported here.
 import contextlib
 import multiprocessing
 import os
+import signal
 from collections.abc import Iterator
-from multiprocessing import forkserver
+from multiprocessing import forkserver, resource_tracker
 from typing import Any
 
 _PRELOAD = [
@@ -48,14 +49,27 @@ def one_thread_each() -> dict[str, str]:
 
 @contextlib.contextmanager
 def single_threaded() -> Iterator[None]:
-    """Processes started meanwhile have one thread each."""
+    """Processes started meanwhile have one thread each, and never hear the terminal's Ctrl-C, not even while
+    they import: it is for the process that gives the orders.
+    """
     before = {name: os.environ.get(name) for name in _ONE_THREAD}
     os.environ.update(one_thread_each())
+    heard = _block_interrupt()
     try:
         yield
     finally:
+        if heard is not None:
+            signal.pthread_sigmask(signal.SIG_SETMASK, heard)
         for name, value in before.items():
             if value is None:
                 del os.environ[name]
             else:
                 os.environ[name] = value
+
+
+def _block_interrupt() -> set[int | signal.Signals] | None:
+    """Leave Ctrl-C waiting, which what is started inherits; what was blocked before, where that exists."""
+    if not hasattr(signal, "pthread_sigmask"):
+        return None
+    resource_tracker.ensure_running()  # it would unblock what is blocked here
+    return signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})

@@ -199,6 +199,12 @@ def test_the_error_is_that_of_the_innermost_box_or_unknown(roll, airspeed, time_
     assert record["place"][:7] == pytest.approx([roll, 0, 0, 0.1, 0.03, airspeed, 2.0 * 1036.0 / airspeed**2])
 
 
+def test_the_unknown_is_larger_than_what_terms_give_far_from_where_they_were_fitted():
+    """Those of wrightFlyer1903 are 2000 rad/s2 off at an angle of attack of -0.5 rad: a bound of half as much
+    excluded the true fault there."""
+    assert error_map.UNKNOWN_RAD_S2 > 100.0 * 2000.0
+
+
 def new_detector(**fields):
     fdi = new_fdi()
     record = fdi["statistical"]

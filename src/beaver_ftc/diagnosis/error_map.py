@@ -15,7 +15,7 @@ from beaver_ftc.aircraft.schema import MAX_AGES, MAX_BOXES, MAX_LEVELS
 from beaver_ftc.compiled import kernel
 from beaver_ftc.design.terms import AIRSPEED, N_Y, QDYN
 
-UNKNOWN_RAD_S2 = 1e3
+UNKNOWN_RAD_S2 = 1e6  # terms fitted near trim are off by thousands at 0.5 rad
 _ROUNDING = 1e-9
 _N = 3 + N_Y  # rates, then y with the density of the air in place of dynamic pressure
 

@@ -22,7 +22,7 @@ from beaver_ftc.plant.adapter import Plant, bare, probe, translated
 from beaver_ftc.scenario.loader import load_text
 from beaver_ftc.studies.derive.check import not_affine
 from beaver_ftc.studies.derive.error import errors_of
-from beaver_ftc.studies.derive.fit import pursue
+from beaver_ftc.studies.derive.fit import pursue, signals_of_use
 from beaver_ftc.studies.derive.flown import places
 from beaver_ftc.studies.derive.run import derive
 from beaver_ftc.studies.derive.sample import SIDESLIP_RAD, Envelope, sample
@@ -154,6 +154,14 @@ def test_pursuit_finds_the_terms_that_made_the_data():
     b = 2.0 * A[:, 3] - 0.5 * A[:, 9] + 0.1 * A[:, 0]
     taken, values = pursue(A, b)
     assert dict(zip(taken, values, strict=True)) == pytest.approx({3: 2.0, 9: -0.5, 0: 0.1})
+
+
+@pytest.mark.parametrize(("size", "kept"), [(1e-13, False), (1e-3, True)])
+def test_rounding_is_no_signal(unseen, size, kept):
+    """Terms of what JSBSim leaves of a thrust that is zero would fit, and fly wrong where that differs."""
+    seen, aircraft = unseen
+    explaining = {**seen.signals, "thrust": size * seen.rate[:, 0]}
+    assert ("thrust" in signals_of_use(replace(seen, signals=explaining), aircraft, 6)) == kept
 
 
 def test_the_power_lever_reaches_an_engine_that_asks_flightgear_for_it(tmp_path):

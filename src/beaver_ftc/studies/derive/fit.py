@@ -21,6 +21,7 @@ EXACT = 1e-10  # share of the variance at which nothing is left: the turning Ear
 RIDGE = 1e-13  # keeps what is nearly the same twice from being nearly infinite
 NO_USE = 1e-3  # of what is left in the end, for a term to stay
 LEAST_RAD_S2 = 1e-3  # below it, how small an error is does not matter
+LEAST_SPAN = 1e-9  # of a signal over the samples, dimensionless
 NOT_MISSED = 0.02  # rise of the sum of the logarithms of the errors without a signal
 _FREE: tuple[dict[str, int], ...] = (
     {}, *({"alpha": power} for power in range(1, 6)), *({"beta": power} for power in range(1, 4)),
@@ -174,7 +175,7 @@ def engine_signals(flown: Samples, aircraft: Aircraft) -> list[str]:
 
 def signals_of_use(samples: Samples, aircraft: Aircraft, most: int, wanted: Sequence[str] = ()) -> list[str]:
     """The signals that terms want, at most so many: one after the other that is missed least is left out, but
-    none of those wanted."""
+    none of those wanted. What is rounding alone (the thrust of engines that do not run) is no signal."""
     known = candidates(tuple(samples.signals), aircraft.surfaces)
     A = regressors(samples, aircraft, known)
     C = moment_coefficients(samples, aircraft.mass, aircraft) * _accelerations(samples, aircraft)
@@ -185,7 +186,8 @@ def signals_of_use(samples: Samples, aircraft: Aircraft, most: int, wanted: Sequ
         left = [(of.left(of.pursued(within)) / len(A)) ** 0.5 for of in products]
         return float(np.sum(np.log(np.array(left) + LEAST_RAD_S2)))
 
-    kept, now = set(samples.signals), misses(set(samples.signals))
+    kept = {name for name, values in samples.signals.items() if np.ptp(values) > LEAST_SPAN} | set(wanted)
+    now = misses(kept)
     while kept - set(wanted):
         without = {signal: misses(kept - {signal}) for signal in sorted(kept - set(wanted))}
         least = min(without, key=without.__getitem__)

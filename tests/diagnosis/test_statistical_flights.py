@@ -39,6 +39,28 @@ def test_losses_are_found_named_and_estimated_under_noise_servos_turbulence_and_
     assert flight.statistical["time_s"] == flight.detection_time_s
 
 
+@pytest.mark.parametrize(
+    ("rate_hz", "substeps", "seed", "severity", "turn_deg_s", "start_s", "airspeed_mps", "altitude_m"),
+    [
+        (265, 8, 934, "light", -19.874, 0.16, 42.5454, 2446.33),
+        (197, 1, 4162, "moderate", -69.012, 0.947, 42.3832, 1333.13),
+    ],
+)
+def test_a_dive_past_the_vertical_is_no_fault(
+    rate_hz, substeps, seed, severity, turn_deg_s, start_s, airspeed_mps, altitude_m
+):
+    """The gusts turn round with the heading: within a frame, or from one to the next."""
+    flight, log = flown(
+        rate_hz=rate_hz, substeps=substeps, seed=seed, duration_s=6,
+        initial={"airspeed_mps": airspeed_mps, "altitude_m": altitude_m},
+        reference={"q": [{"step": {"amplitude_deg_s": turn_deg_s, "start_s": start_s}}]},
+        environment={"turbulence": "dryden", "severity": severity}, uncertainty={},
+        fdi=_fdi(bounds={"turbulence": severity}), control={"law": "fault-tolerant"},
+    )  # fmt: skip
+    assert log["theta_rad"].min() < -1.56
+    assert flight.detection_time_s is None
+
+
 @pytest.mark.parametrize("noise", [{}, NOISY])
 @pytest.mark.parametrize("authority", ["either", "statistical"])
 def test_the_published_unanticipated_fault_is_named_so(authority, noise):

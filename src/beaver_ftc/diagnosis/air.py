@@ -41,6 +41,9 @@ AIR = np.dtype(
         ("scale", "f8"), ("lost", "f8"), ("turning", "f8"),
         # How fast the axes of the gusts turn in the body, 1/s, and whether that matters.
         ("swing", "f8", (3, 3)), ("swings", "i8"),
+        # Variance of what that moves the accelerations by, (rad/s2)2: in the frame that goes on, in the one
+        # before it, and in both; for how many frames there is any.
+        ("leaping", "f8", (3, 3)), ("leapt", "f8", (3, 3)), ("leap", "f8", (3, 3)), ("leaps", "i8"),
     ],
     align=True,
 )  # fmt: skip
@@ -100,6 +103,7 @@ def begin(air, y, attitude):
     turn_gusts(air, 0.0, 1.0)
     air.gust[:] = 0.0
     air.started, air.lost, air.turning = 0, 0.0, 0.0
+    air.leaping[:], air.leapt[:], air.leap[:], air.leaps = 0.0, 0.0, 0.0, 0
 
 
 @kernel
@@ -194,9 +198,10 @@ def effect(air, design, x, y, u):
 
 
 @kernel
-def begin_frame(air):
-    """Begin the sum over the next frame's instants with this one."""
+def begin_frame(air, V, dt):
+    """Begin the sums over the next frame's instants, dt s apart, with this one; V m/s."""
     air.total[:] = air.acceleration
+    note_leap(air, V, dt)
 
 
 @kernel
@@ -206,6 +211,7 @@ def look(air, design, x, y, u, attitude, dt):
     effect(air, design, x, y, u)
     for i in range(3):
         air.total[i] += air.acceleration[i]
+    note_leap(air, y[AIRSPEED], dt)
 
 
 @kernel
@@ -219,10 +225,38 @@ def unseen_drift(air, V, i, j):
             on_j += air.damping[j, k] * air.axes[k, g]
         unseen = air.unseen[g] if g != 2 else min(air.unseen[g] + air.turning, 1.0)
         total += on_i * on_j * unseen * air.per_metre[g]
-    if air.swings:
-        total += 0.5 * (air.rolling / V) ** 2 * air.per_metre[0] * swung(air, i, j, 0)
-        total += 0.5 * (3.0 * air.span / (pi * V)) ** 2 * air.per_metre[2] * air.turning * swung(air, i, j, 2)
     return total * V
+
+
+@kernel
+def note_leap(air, V, dt):
+    """Add what the swing of the gusts' axes, dt s long, does to the accelerations, while V m/s is flown."""
+    if not air.swings:
+        return
+    rolling = 0.5 * (air.rolling / V) ** 2 * air.per_metre[0]
+    yawing = 0.5 * (3.0 * air.span / (pi * V)) ** 2 * air.per_metre[2] * air.turning
+    for i in range(3):
+        for j in range(3):
+            intensity = rolling * swung(air, i, j, 0) + yawing * swung(air, i, j, 2)
+            air.leaping[i, j] += dt * V * intensity
+    air.leaps = 3
+
+
+@kernel
+def elapse(air, share):
+    """Bring `mean` and `leap` to the elapsed frame; share: one over its instants.
+
+    Axes that turn round within an instant do so in the midst of a frame: it shows a part of that, the next
+    one the rest. So unlike a drift, which goes on from where the frame ends, the leap is there in both.
+    """
+    for i in range(3):
+        air.mean[i] = share * air.total[i]
+    if air.leaps > 0:
+        air.leaps -= 1
+        for i in range(3):
+            for j in range(3):
+                air.leap[i, j] = air.leapt[i, j] + air.leaping[i, j]
+                air.leapt[i, j], air.leaping[i, j] = air.leaping[i, j], 0.0
 
 
 @kernel

@@ -70,8 +70,7 @@ def expect_known_faults(expected, mean, effectiveness, offset, offsets_count):
 @apart
 def compare_likelihoods(fdi, belief, measured, k, t):
     """Show the statistical detector the elapsed frame."""
-    for i in range(3):
-        fdi.statistical.air.mean[i] = belief.share * fdi.statistical.air.total[i]
+    air.elapse(fdi.statistical.air, belief.share)
     cubic = unanticipated_pitch(belief.design, measured.y, 1.0)
     statistical.signatures(fdi.statistical, belief.means.Gu, cubic)
     latched = fdi.statistical.detected_at_s >= 0.0

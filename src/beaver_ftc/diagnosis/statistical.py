@@ -49,6 +49,8 @@ def observe(statistical, innovation, dt, frame, latched, ends=False):
         block = statistical.block[b]
         if not latched:
             likelihood.start(block, slot)
+        if statistical.air.moving:
+            leap(statistical.air, block)
         whitening.advance(block, dt)
         if block.level > 0.0:
             likelihood.reach(block, statistical.bounded, dt)
@@ -63,6 +65,14 @@ def observe(statistical, innovation, dt, frame, latched, ends=False):
                 )
         likelihood.weigh(block, statistical.tolerated, dt, keep)
         likelihood.judge(block, statistical.keep if ends else 0.0)
+
+
+@kernel
+def leap(air, block):
+    """Let the drift be elsewhere where the axes of the gusts have swung round."""
+    for i in range(block.n):
+        for j in range(block.n):
+            block.P_dd[i, j] += block.stronger * air.leap[block.axis[i], block.axis[j]]
 
 
 @kernel
@@ -207,7 +217,7 @@ def prepare(statistical, fdi, design, x, y, u):
         air.effect(statistical.air, design, x, y, u)
     drifts(statistical, fdi, design, x, y)
     if statistical.air.moving:
-        air.begin_frame(statistical.air)
+        air.begin_frame(statistical.air, y[AIRSPEED], statistical.share * fdi.dt)
     if statistical.tolerated:
         for b in range(statistical.n_blocks):
             statistical.block[b].regressor[:] = 0.0

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 from design_plant import DesignPlant, believe, conclude
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from test_fault_types import TYPES, shares, starts, surfaces
+from test_release import HELD, Repaired
 
 from beaver_ftc.aircraft import load
 from beaver_ftc.design.model import control_effectiveness, design_record, free_response
@@ -48,7 +49,8 @@ class RealPlant(DesignPlant):
         eta = self.rng.uniform(-0.02, 0.02, 3)
         self.x = self.x + self.dt * (true_f + true_G @ self.u + self.effect(true_G) + eta)
         true_x, self.x = self.x, seen
-        self.commanded = self.u = self.command(f, G)
+        self.commanded = self.command(f, G)
+        self.u = self.moved(self.u, self.commanded)
         self.x = true_x
         self.k += 1
 
@@ -96,3 +98,18 @@ def test_pairs_are_refused_with_noisy_gyros_in_one_line():
         assemble(
             Scenario.model_validate({"name": "x", "fdi": fdi}), np.zeros(4), np.array([[-1.0] * 4, [1.0] * 4])
         )
+
+
+@pytest.mark.parametrize("kind", HELD)
+@settings(max_examples=15, deadline=None)
+@example(0, 1, 20, 30, 1.0)
+@given(st.integers(0, 2**32), surfaces, starts, st.integers(11, 60), shares)
+def test_a_release_anywhere_inside_a_block_excludes_neither_surface_nor_type(
+    kind, seed, surface, at, lasting, share
+):
+    fault = Repaired(kind, surface, at, at + lasting, share, 0.02)
+    plant = RealPlant(seed, True, rate_hz=50.0, surface=surface, position=fault, actuators="servo")
+    fault.plant = plant
+    plant.fly(at + lasting + 100, None)
+    assert not plant.position_excluded(surface)
+    assert not plant.fdi["surface"][surface]["type_excluded"][fault.code]

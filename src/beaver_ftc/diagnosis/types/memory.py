@@ -20,8 +20,12 @@ ORDERS = np.dtype(
 
 # Where a surface that a type has held and let go can be, rad: release.py.
 RELEASE = np.dtype(
-    [("low", "f8", (2, N_TYPES)), ("high", "f8", (2, N_TYPES)), ("released", "i8", (N_TYPES,))], align=True
-)
+    [
+        ("low", "f8", (2, N_TYPES)), ("high", "f8", (2, N_TYPES)), ("released", "i8", (N_TYPES,)),
+        ("held_low", "f8", (N_TYPES,)), ("held_high", "f8", (N_TYPES,)),  # where it is held by then
+    ],
+    align=True,
+)  # fmt: skip
 
 # What was known of the first of two faults when it was named: pairs.py.
 KNOWN = np.dtype(
@@ -40,7 +44,7 @@ def surface_dtype() -> np.dtype:
     fields = [
         # its actuator
         ("travel_low", "f8"), ("travel_high", "f8"), ("least_runaway_rate", "f8"),
-        ("approach", "f8"), ("step", "f8"), ("orders", ORDERS),
+        ("approach", "f8"), ("step", "f8"), ("slowest_step", "f8"), ("orders", ORDERS),
         # where it was if it alone is at fault, and whether something was wrong
         ("command", "f8"), ("low", "f8"), ("high", "f8"), ("wrong", "i8"),
         ("command_then", "f8"), ("low_then", "f8"), ("high_then", "f8"), ("wrong_then", "i8"),

@@ -11,6 +11,9 @@ Nothing is seen before the alarm, so any release may have gone before it; each f
 wrong says where it cannot have led.
 
 Once let go, a type does not take hold again before the surface has been seen healthy.
+
+In a block of frames the release may lie at any instant inside: at each, the surface is where it is held, or
+where the actuator brings it from there.
 """
 
 import numpy as np
@@ -42,6 +45,13 @@ def start(surface, kind):
     forget(surface, EARLIER, kind)
     surface.release.low[LATER, kind] = surface.travel_low
     surface.release.high[LATER, kind] = surface.travel_high
+    not_held(surface, kind)
+
+
+@kernel
+def not_held(surface, kind):
+    """This type does not hold the surface in the judged frame: the empty interval."""
+    surface.release.held_low[kind], surface.release.held_high[kind] = np.inf, -np.inf
 
 
 @kernel
@@ -58,9 +68,40 @@ def carried(fdi, surface, a):
 
 
 @kernel
+def carried_from_within(fdi, surface, held, side):
+    """The same of one let go at `held` at any instant of a block: the least if side < 0, or the greatest."""
+    total, count, a = 0.0, 0, held
+    for k in range(fdi.block.length):
+        order = surface.orders.given[1, k]
+        for _ in range(fdi.instants):
+            total += a
+            count += 1
+            a = nearer(a, order, surface.approach, surface.step)
+            a = min(a, held) if side < 0 else max(a, held)
+    return total / count, a
+
+
+@kernel
+def let_go_within(fdi, surface, kind):
+    """Whether a release inside the judged block explains it."""
+    held_low, held_high = surface.release.held_low[kind], surface.release.held_high[kind]
+    if fdi.block.length == 1 or held_low > held_high:
+        return False
+    low, _ = carried_from_within(fdi, surface, held_low, -1)
+    high, _ = carried_from_within(fdi, surface, held_high, 1)
+    _, end = carried(fdi, surface, held_low)
+    _, other_end = carried(fdi, surface, held_high)
+    low -= UNEVENNESS * abs(end - held_low)
+    high += UNEVENNESS * abs(other_end - held_high)
+    return low <= surface.high_then and high >= surface.low_then
+
+
+@kernel
 def possible(fdi, surface, kind):
     """Whether a return from this type explains the judged frame; forget those releases that do not."""
-    left = False
+    left = let_go_within(fdi, surface, kind)
+    if not left:
+        not_held(surface, kind)
     for which in (EARLIER, LATER):
         if any_release(surface, which, kind):
             if agrees(fdi, surface, which, kind):
@@ -136,7 +177,9 @@ def beginning(fdi, surface):
 def let_go(surface, kind, low, high):
     """A type that holds the surface between low and high (rad) may let go of it there; none if low > high."""
     held = surface.release
+    not_held(surface, kind)
     if low <= high and not held.released[kind]:
+        held.held_low[kind], held.held_high[kind] = low, high
         held.low[LATER, kind] = min(held.low[LATER, kind], low)
         held.high[LATER, kind] = max(held.high[LATER, kind], high)
 
@@ -152,3 +195,8 @@ def bring_back(fdi, surface, kind):
             _, low = carried(fdi, surface, held.low[which, kind])
             _, high = carried(fdi, surface, held.high[which, kind])
             keep(held, which, kind, low, high)
+    if fdi.block.length > 1 and held.held_low[kind] <= held.held_high[kind]:
+        _, low = carried_from_within(fdi, surface, held.held_low[kind], -1)
+        _, high = carried_from_within(fdi, surface, held.held_high[kind], 1)
+        held.low[LATER, kind] = min(held.low[LATER, kind], low)
+        held.high[LATER, kind] = max(held.high[LATER, kind], high)

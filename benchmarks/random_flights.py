@@ -29,6 +29,7 @@ ERRORS = ("perfect", "published", "sensors", "coefficients", "turbulence", "ever
 DETECTORS = ("worst-case", "statistical", "either")
 HEALTHY_SHARE, LARGE_REFERENCES, COARSE, AT_THE_BOUND = 0.4, 0.15, 0.5, 0.3
 DIVES, GUSTS, SLOWEST_MPS = 0.1, 0.15, 35.0
+SLOWEST_DEG_S, UNLIMITED_DEG_S = 0.5, 60.0  # rate of a slow surface, as declared; of one without a limit
 FASTEST_DAMPING_PER_S = 10.0  # of a body rate
 FASTEST_RAD_S = {"worst-case": 60.0, "statistical": 15.0, "either": 15.0}  # of the unstructured uncertainty
 ZERO = dict.fromkeys(AXES, 0.0)
@@ -172,7 +173,7 @@ def drawn(seed: int, index: int, only: tuple[str, ...] = ERRORS) -> tuple[str, s
     constant = faults and "profile" not in faults[0] and "end_s" not in faults[0]
     if constant and rng.random() < 0.3:
         fdi["fault_profile"] = "abrupt"
-    return errors, detector, bf.Scenario.model_validate({
+    words: Keys = {
         "name": f"random-{seed}-{index}", "seed": index, "duration_s": rng.uniform(4.0, 8.0),
         "rate_hz": round(log_uniform(rng, 20, 500)),
         "substeps": int(rng.integers(2, 11)) if rng.random() < COARSE else 1,
@@ -180,7 +181,20 @@ def drawn(seed: int, index: int, only: tuple[str, ...] = ERRORS) -> tuple[str, s
         "reference": reference(rng), "actuators": actuators(rng, errors),
         "control": {"law": str(rng.choice(["fault-tolerant", "adaptive", "nominal"]))},
         "faults": faults, "fdi": fdi, **truth,
-    })  # fmt: skip
+    }  # fmt: skip
+    declare_slowest(words)
+    return errors, detector, bf.Scenario.model_validate(words)
+
+
+def declare_slowest(words: Keys) -> None:
+    """A servo slower than what is declared counts as a jam: declare one that is slower still."""
+    for struck in words["faults"]:
+        if struck["type"] == "rate_limit":
+            limit = (
+                words["actuators"].get("rate_limit_deg_s") if isinstance(words["actuators"], dict) else None
+            )
+            rate = struck["scale"] * (limit or UNLIMITED_DEG_S)
+            words["fdi"]["slowest_rate_deg_s"] = min(SLOWEST_DEG_S, 0.9 * rate)
 
 
 def what_is_wrong(flight: bf.Flight) -> str | None:

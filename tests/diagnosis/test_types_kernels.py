@@ -171,8 +171,8 @@ def test_at_a_stop_a_growing_bias_says_nothing():
         assert surface["growing_bias"]["up"] == surface["growing_bias"]["down"] == 0.0
 
 
-def slow_run(places, orders=(0.0, 0.0), whole=1, frames=None):
-    fdi, surface = new_surface()
+def slow_run(places, orders=(0.0, 0.0), whole=1, frames=None, slowest_step=0.0):
+    fdi, surface = new_surface(slowest_step=slowest_step)
     fdi["whole"] = whole
     surface["orders"]["low"], surface["orders"]["high"] = orders[0], orders[1]
     for k, place in enumerate(places):
@@ -191,6 +191,20 @@ def test_a_slow_surface_never_moves_away_from_its_command():
     assert not slow_run([0.2, 0.25], frames=[3, 5])  # a frame between them is not known
     assert slow_run([0.25, 0.2, 0.23])
     assert not slow_run([0.2, -0.2, -0.15])
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_a_slow_surface_that_stands_off_its_command_comes_nearer_by_its_least_rate(side):
+    """0.02 rad is known of where it is: at 0.003 rad a frame that shows in the ninth frame."""
+    still = [side * 0.3] * 9
+    assert not slow_run(still[:8], slowest_step=0.003)
+    assert slow_run(still, slowest_step=0.003)
+    assert not slow_run(still)
+    creeping = [side * (0.3 - 0.003 * k) for k in range(20)]
+    assert not slow_run(creeping, slowest_step=0.003)
+    assert slow_run(creeping, slowest_step=0.0045)
+    arrived = [side * 0.02] * 40  # its lag takes half of what is left: a step's length off, it may stay
+    assert not slow_run(arrived, slowest_step=0.01)
 
 
 def test_which_side_of_its_orders_a_surface_stands_on():

@@ -142,6 +142,15 @@ def test_what_looks_like_a_jam_may_be_slow_until_it_has_stood_off_for_long(evide
     assert not candidates.may_be_slow(*one(SLOW, evidence=evidence, quiet=quiet))
 
 
+def test_what_stands_still_may_be_slow_until_that_is_excluded():
+    _, surface = one(SLOW)
+    assert {k for k in range(N_TYPES) if candidates.may_creep(surface, k)} == {STUCK, FLOAT, UP, DOWN}
+    assert not candidates.may_creep(one(STUCK)[1], STUCK)
+    assert verdict.type_at_fault(*one(STUCK)) == STUCK
+    assert verdict.type_at_fault(*one(STUCK, SLOW)) == -1
+    assert verdict.type_at_fault(*one(BIAS, SLOW)) == BIAS
+
+
 def test_a_bias_that_grows_may_look_like_a_jam_or_a_loss():
     _, surface = one(GROWING_BIAS)
     may = {kind for kind in range(N_TYPES) if candidates.may_be_growing(surface, kind)}

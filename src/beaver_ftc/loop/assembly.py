@@ -111,12 +111,11 @@ def _assemble_types(frame: np.void, scenario: Scenario, dt: float, travel: np.nd
     fdi["patience"] = ceil(pi / config.slowest_oscillation_rad_s / (block * dt))
     verdict = fdi["verdict"]
     verdict["type"] = verdict["lead"] = verdict["lead_kind"] = verdict["type_at_s"] = -1
-    fdi["pair"]["first"] = -1
-    fdi["pair"]["enabled"] = config.pairs
+    fdi["pair"]["first"], fdi["pair"]["enabled"] = -1, config.pairs
     if config.pairs:
         _assemble_pairs(fdi, scenario.airframe)
     fdi["instants"], fdi["returns"] = scenario.substeps, actuators["real"]
-    surfaces = scenario.airframe.surfaces
+    surfaces, instant_s = scenario.airframe.surfaces, dt / scenario.substeps
     for s, (name, place, low, high) in enumerate(zip(surfaces, fdi["surface"], *travel, strict=True)):
         place["travel_low"], place["travel_high"] = low, high
         place["in_question"] = not config.pairs or fdi["layout"]["group"][s] == IN_PITCH
@@ -124,6 +123,7 @@ def _assemble_types(frame: np.void, scenario: Scenario, dt: float, travel: np.nd
         place["approach"], place["step"] = actuators["approach"][s], actuators["step"][s]
         rate_deg_s = getattr(scenario.actuators, name).rate_limit_deg_s
         place["least_runaway_rate"] = 0.5 * (radians(rate_deg_s) or RUNAWAY_RATE_RAD_S)
+        place["slowest_step"] = min(radians(config.slowest_rate_deg_s) * instant_s, place["step"])
 
 
 def _assemble_pairs(fdi: np.void, aircraft: Aircraft) -> None:

@@ -179,6 +179,12 @@ class FdiConfig(BaseModel):
     slowest_oscillation_rad_s: float = Field(
         1.0, gt=0, le=100, description="oscillatory failures are this fast or faster (class `all`), rad/s"
     )
+    slowest_rate_deg_s: float = Field(
+        0.5,
+        gt=0,
+        le=100,
+        description="a slow surface moves this fast or faster, a slower one is a jam (class `all`), deg/s",
+    )
     probing: Probing | None = Field(
         None, description="active diagnosis (class `all`): off unless given; `{}` for its defaults"
     )

@@ -136,6 +136,12 @@ def may_be_slow(fdi, surface):
 
 
 @kernel
+def may_creep(surface, found):
+    """Whether what stands still may be a slow surface that has not been seen to do so for long enough."""
+    return found in (STUCK, FLOAT, UP, DOWN) and left(surface, SLOW)
+
+
+@kernel
 def may_be_growing(surface, found):
     """Whether what looks like a jam or a loss may be a bias that grows as the command happens to go."""
     return found in (CONSTANT_LOSS, STUCK, FLOAT) and left(surface, GROWING_BIAS)

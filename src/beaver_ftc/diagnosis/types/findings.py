@@ -138,13 +138,15 @@ def _types_left(fdi: np.void, s: int) -> list[str]:
     """Types still possible on surface s, each once.
 
     Where a constant explains the flight, a loss that may take any course and a slow surface count only until
-    the constant has been seen for long enough.
+    the constant has been seen for long enough; beside a surface that stands still, until it is excluded.
     """
     surface = fdi["surface"][s]
     left = [kind for kind in range(N_TYPES) if _possible(fdi, s) and not surface["type_excluded"][kind]]
     if any(kind < N_CONSTANT for kind in left) and not fdi["bound"]["own_errors"]:
         early = surface["evidence"] - surface["quiet"] < fdi["patience"]
-        left = [kind for kind in left if early or kind not in (VARYING_LOSS, SLOW)]
+        still = bool({STUCK, FLOAT, UP, DOWN} & set(left))  # so may a slow one
+        beside = {VARYING_LOSS: early, SLOW: early or still}
+        left = [kind for kind in left if beside.get(kind, True)]
     if fdi["pair"]["enabled"] and fdi["layout"]["group"][s] == IN_PITCH and {STUCK, UP, DOWN} & set(left):
         left += [STUCK, FLOAT, UP, BIAS, CONSTANT_LOSS]  # if the other one is off as well
     return list(dict.fromkeys(NAMES[kind] for kind in left))

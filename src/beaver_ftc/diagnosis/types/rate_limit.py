@@ -1,4 +1,7 @@
-"""A slow surface: p moves towards its command only, at any rate."""
+"""A slow surface: p moves towards its command only, at any rate down to the slowest declared.
+
+Slower than that it is a jam: the two are one another's limit, and only a least rate tells them apart.
+"""
 
 from beaver_ftc.compiled import kernel
 
@@ -26,16 +29,37 @@ def judge(fdi, surface, kind, frame):
     sign = side(fdi, surface)
     if sign == 0 or sign != run.sign or frame != run.at + 1:
         run.low, run.high = low, high
-    elif (sign > 0 and low > run.high) or (sign < 0 and high < run.low):
-        surface.type_excluded[kind] = 1
+    else:
+        if (sign > 0 and low > run.high) or (sign < 0 and high < run.low):
+            surface.type_excluded[kind] = 1
+        come_nearer(fdi, surface, run, sign)
     run.low, run.high = max(run.low, low), min(run.high, high)
     run.sign, run.at = sign, frame
 
 
 @kernel
-def side(fdi, surface):
-    """1 for a surface certainly above all it was ordered to, -1 below, 0 otherwise."""
+def come_nearer(fdi, surface, run, sign):
+    """Take off what the slowest one comes nearer by within the judged frame: a least step an instant, until
+    its lag makes the steps smaller. Where it was at an instant bounds where it is a frame later."""
+    least = fdi.instants * fdi.block.length * surface.slowest_step
+    close = surface.slowest_step / surface.approach
+    lowest, highest = ordered(fdi, surface)
+    if sign > 0:
+        run.high = min(run.high, max(run.high - least, highest + close))
+    elif sign < 0:
+        run.low = max(run.low, min(run.low + least, lowest - close))
+
+
+@kernel
+def ordered(fdi, surface):
+    """The least and greatest order that moved it towards and within the judged frame, rad."""
     orders = surface.orders
     newest = 2 if fdi.whole else 1
-    lowest, highest = min(orders.low[2], orders.low[newest]), max(orders.high[2], orders.high[newest])
+    return min(orders.low[2], orders.low[newest]), max(orders.high[2], orders.high[newest])
+
+
+@kernel
+def side(fdi, surface):
+    """1 for a surface certainly above all it was ordered to, -1 below, 0 otherwise."""
+    lowest, highest = ordered(fdi, surface)
     return 1 if surface.low_then > highest else (-1 if surface.high_then < lowest else 0)

@@ -15,6 +15,7 @@ from beaver_ftc.diagnosis.types.candidates import (
     loses,
     may_be_growing,
     may_be_slow,
+    may_creep,
     one_type,
     possible,
     sole,
@@ -84,7 +85,8 @@ def type_at_fault(fdi, surface):
     patient = not left(surface, OSCILLATORY) or surface.evidence >= 2 * fdi.patience
     if any_constant(surface):
         found = one_type(surface)
-        return found if patient and not may_be_growing(surface, found) else -1
+        open_yet = may_be_growing(surface, found) or may_creep(surface, found)
+        return found if patient and not open_yet else -1
     return one_course(surface, patient)
 
 

@@ -1,0 +1,78 @@
+"""What a kernel fills it fills anew: whatever stood there before makes no difference."""
+
+import numpy as np
+import pytest
+from kernels import new_fdi
+
+from beaver_ftc.aircraft.schema import MAX_MONOMIALS
+from beaver_ftc.design import model
+from beaver_ftc.diagnosis import air, redundancy, statistical, thresholds
+from beaver_ftc.diagnosis.air import AIR
+
+X, U = np.array([0.1, -0.05, 0.07]), np.array([0.1, -0.15, 0.05, 0.2])
+Y = np.array([0.1, 0.03, 45.0, 1036.0, 0.3, 0.0, 0.0, 0.0])
+Q, V = np.array([0.9, 0.1, -0.2, 0.3]), np.array([40.0, 2.0, -3.0])
+
+
+def design():
+    return model.design_record().view(np.recarray)[0]
+
+
+FILL = {
+    "free response": ((3,), lambda out: model.free_response(design(), X, Y, out)),
+    "control effectiveness": ((3, 4), lambda out: model.control_effectiveness(design(), Y, out)),
+    "both": ((3, 4), lambda out: model.both_responses(design(), X, Y, np.full(3, 9.0), out)),
+    "damping": ((3, 3), lambda out: model.rate_damping(design(), X, Y, U, np.full(MAX_MONOMIALS, 9.0), out)),
+    "level axes": ((3, 3), lambda out: air.level_axes(0.3, 0.2, out)),
+    "quaternion": ((4,), lambda out: redundancy.quaternion(0.3, 0.2, 0.1, out)),
+    "turned": ((4,), lambda out: redundancy.turn(Q, X, 0.02, out)),
+    "turned back": ((3,), lambda out: redundancy.turn_back(X, 0.02, V, out)),
+}
+
+
+@pytest.mark.parametrize("name", FILL)
+def test_arrays(name):
+    shape, fill = FILL[name]
+    clean, used = np.zeros(shape), np.full(shape, 9.0)
+    fill(clean)
+    fill(used)
+    assert used.tolist() == clean.tolist()
+    assert clean.any()
+
+
+@pytest.mark.parametrize("moving", [0, 1])
+def test_the_drift_of_the_detectors_blocks(moving):
+    found = []
+    for before in (0.0, 9.0):
+        fdi = new_fdi()
+        record = fdi["statistical"]
+        record["n_blocks"], record["air"]["moving"], record["deflection"] = 2, moving, 0.01
+        record["air"]["damping"], record["air"]["per_metre"], record["air"]["unseen"] = np.eye(3), 1e-3, 0.5
+        record["air"]["axes"] = np.arange(9.0).reshape(3, 3)
+        for block, axes in zip(record["block"], ((1,), (0, 2)), strict=False):
+            block["n"], block["axis"][: len(axes)], block["stronger"] = len(axes), axes, 1.0
+        record["bounded"] = record["block"]["drift"] = record["block"]["jitter"] = before
+        fdi["bound"]["constant"] = 0.02
+        statistical.drifts(record, fdi, design(), X, Y)
+        found.append([record["bounded"].tolist(), record["block"]["drift"][0, 0, 0].tolist()])
+        found[-1] += [record["block"]["drift"][1].tolist(), record["block"]["jitter"][1].tolist()]
+    assert found[0] == found[1]
+
+
+def test_the_gusts_effect():
+    found = []
+    for before in (0.0, 9.0):
+        record = np.zeros(1, AIR).view(np.recarray)[0]
+        record["span"], record["axes"], record["gust"] = 14.0, np.eye(3), (0.0, 0.02, -0.03)
+        for name in ("force", "rotation", "acceleration", "damping", "scratch"):
+            record[name] = before
+        air.effect(record, design(), X, Y, U)
+        found.append([record[name].tolist() for name in ("force", "rotation", "acceleration", "damping")])
+    assert found[0] == found[1]
+
+
+def test_the_published_bound_adds_to_what_is_there():
+    once, more = np.zeros(3), np.full(3, 0.5)
+    for out in (once, more):
+        thresholds.uncertainty_bound(X, design(), np.full(3, 0.1), np.full(3, 0.02), 7e-5, out)
+    assert more - once == pytest.approx([0.5] * 3)

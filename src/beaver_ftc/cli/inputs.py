@@ -1,6 +1,7 @@
 """What a command is given: scenarios by file or name, all of them checked before the first one flies."""
 
 from collections.abc import Callable
+from enum import StrEnum
 from functools import wraps
 from inspect import Parameter, signature
 from typing import TYPE_CHECKING, Annotated, Any
@@ -11,6 +12,14 @@ from beaver_ftc.documents.errors import BadInput
 
 if TYPE_CHECKING:
     from beaver_ftc.scenario.schema import Scenario
+
+
+class TurbulenceName(StrEnum):
+    """The air there is to fly in."""
+
+    none = "none"
+    light = "light"
+    moderate = "moderate"
 
 
 def complete_names(incomplete: str) -> list[str]:

@@ -6,6 +6,7 @@ from typing import Annotated, Any
 
 import typer
 
+from beaver_ftc.cli.inputs import TurbulenceName
 from beaver_ftc.cli.output import Format, FormatOption, emit, emit_json
 
 Document = dict[str, Any]
@@ -14,7 +15,7 @@ Document = dict[str, Any]
 def command(
     out: Annotated[
         Path,
-        typer.Option(help="Folder for the results: `fault-matrix`, `fault-matrix-declared` or `pitch-lost`."),
+        typer.Option(help="Folder for the results: `fault-matrix`, with what is declared, or `pitch-lost`."),
     ] = Path("runs"),
     airspeed: Annotated[
         list[float] | None, typer.Option(min=1, max=1000, help="Airspeed, m/s; once for each.")
@@ -33,12 +34,17 @@ def command(
             help="With tactical-grade sensors, servos and 5 % wrong moment coefficients, and told so.",
         ),
     ] = False,
+    turbulence: Annotated[
+        TurbulenceName, typer.Option(help="Of --declared: flown, and told so.")
+    ] = TurbulenceName.none,
     aircraft: Annotated[
         str | None, typer.Option(help="Built-in name, jsbsim:NAME, or ./FOLDER in the working directory.")
     ] = None,
     format: FormatOption = Format.text,
 ) -> None:
     """Fly every fault type on every surface: detected, named, and tracked how well beside the oracle.
+
+    With --declared also how many of the faults that a test told the fault sees are named.
 
     Exit status 1 if a fault is named wrongly or an alarm is false; with --pitch-lost, if engine power loses
     an aircraft that is kept without it.
@@ -53,7 +59,9 @@ def command(
         raise typer.BadParameter(
             "--pitch-lost and --declared are for the built-in aircraft, allowed: without --aircraft"
         )
-    name, run, as_text = _pitch_lost() if pitch_lost else _every_fault(declared, aircraft)
+    if turbulence is not TurbulenceName.none and not declared:
+        raise typer.BadParameter("--turbulence is declared or not flown, allowed: with --declared")
+    name, run, as_text = _pitch_lost() if pitch_lost else _every_fault(declared, aircraft, turbulence)
     with progress_bar("faults") as progress:
         document = run(out, tuple(airspeed) if airspeed else None, workers, progress)
     folder = str(out / name)
@@ -65,16 +73,17 @@ def command(
 
 
 def _every_fault(
-    declared: bool, aircraft: str | None
+    declared: bool, aircraft: str | None, turbulence: TurbulenceName
 ) -> tuple[str, Callable[..., Document], Callable[[Document], str]]:
     from functools import partial
 
     from beaver_ftc.aircraft import DEFAULT
-    from beaver_ftc.studies.matrix.run import DECLARED, NAME, run_matrix
+    from beaver_ftc.studies.matrix.run import NAME, declared_name, run_matrix
     from beaver_ftc.studies.matrix.text import as_text
 
-    name = DECLARED if declared else NAME
-    return name, partial(run_matrix, name=name, aircraft=aircraft or DEFAULT), as_text
+    name = declared_name(turbulence) if declared else NAME
+    run = partial(run_matrix, name=name, aircraft=aircraft or DEFAULT, turbulence=turbulence.value)
+    return name, run, as_text
 
 
 def _pitch_lost() -> tuple[str, Callable[..., Document], Callable[[Document], str]]:

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from beaver_ftc.cli.inputs import TurbulenceName
 from beaver_ftc.cli.output import Format, FormatOption, emit, emit_json
 
 
@@ -22,14 +23,6 @@ class SensorsName(StrEnum):
 
     ideal = "ideal"
     tactical_grade = "tactical-grade"
-
-
-class TurbulenceName(StrEnum):
-    """The air there is in a grid."""
-
-    none = "none"
-    light = "light"
-    moderate = "moderate"
 
 
 def command(

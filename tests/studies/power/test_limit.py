@@ -8,8 +8,9 @@ import pytest
 
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.studies.compare.replay import Recorder, record
+from beaver_ftc.studies.engine.told import UNEXPLAINED_S, Whitening, chance
 from beaver_ftc.studies.power.grid import Bout, Condition, loss, scenario_of, strikes_at_s
-from beaver_ftc.studies.power.limit import UNEXPLAINED_S, Whitening, chance, deflections
+from beaver_ftc.studies.power.limit import deflections
 
 DT = 0.01
 LIGHT = Condition("tactical-grade", "light")
@@ -52,6 +53,30 @@ def test_the_deflection_is_that_of_the_whole_flight_at_once(context):
     C = covariance(context, before + after)
     expected = np.sqrt(mean.ravel() @ np.linalg.solve(C, mean.ravel()))
     assert Whitening(context).deflection(phi)[-1] == pytest.approx(expected, rel=0.01)
+
+
+def test_beside_unknown_constants_as_in_the_whole_flight_at_once(context):
+    """Constants are noise of covariance R diag(sigma^2) R', added to that of the rates."""
+    n, sigma = 120, np.array([3.0, 0.5])
+    rng = np.random.default_rng(5)
+    phi = np.cumsum(rng.normal(size=(n, 3)), axis=0) * [0.02, 0.01, 0.01]
+    phi[:60] = 0.0
+    regressors = np.cumsum(rng.normal(size=(n, 3, 2)), axis=0) * 0.02
+    mean = DT * np.cumsum(phi, axis=0).T.ravel()
+    known = DT * np.cumsum(regressors, axis=0).transpose(1, 0, 2).reshape(3 * n, 2) * sigma
+    before = 150
+    C = covariance(context, before + n).reshape(3, before + n, 3, before + n)
+    # what came before tells of the noise, and nothing of fault and constants
+    late = np.zeros((3, before + n))
+    late[:, before:] = mean.reshape(3, n)
+    R = np.zeros((3, before + n, 2))
+    R[:, before:] = known.reshape(3, n, 2)
+    C, R = C.reshape(3 * (before + n), -1), R.reshape(-1, 2)
+    expected = np.sqrt(late.ravel() @ np.linalg.solve(C + R @ R.T, late.ravel()))
+    whitening = Whitening(context)
+    found = whitening.deflection_beside(phi, regressors, sigma)
+    assert found == pytest.approx(expected, rel=0.01)
+    assert found < 0.95 * whitening.deflection(phi)[-1]
 
 
 def test_twice_the_fault_stands_out_twice_as_much_and_only_grows(context):

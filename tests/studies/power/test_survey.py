@@ -14,12 +14,12 @@ from typer.testing import CliRunner
 from beaver_ftc.cli.main import app
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.studies.compare.replay import Trace, record
+from beaver_ftc.studies.engine.told import chance
 from beaver_ftc.studies.power.contenders import BUILT_IN, ESTIMATORS, Contender, contenders
 from beaver_ftc.studies.power.document import document_of
 from beaver_ftc.studies.power.flying import Watched, fly_faulted, with_fdi
 from beaver_ftc.studies.power.grid import GRIDS, Bout, Condition, loss, scenario_of, strikes_at_s
 from beaver_ftc.studies.power.levels import level_at, level_for
-from beaver_ftc.studies.power.limit import chance
 from beaver_ftc.studies.power.run import run_power
 from beaver_ftc.studies.power.tally import limit, rows_of, summary
 from beaver_ftc.studies.power.text import as_text, comparison

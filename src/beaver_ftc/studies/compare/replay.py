@@ -16,11 +16,11 @@ import numpy as np
 
 from beaver_ftc.design.context import Context
 from beaver_ftc.diagnosis.base import Detector, Measured, Verdict
-from beaver_ftc.diagnosis.noise_model import UNSEEN
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.loop.steps import built_in_statistic
 from beaver_ftc.plugins import DETECTORS, made
 from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.studies.engine import told
 
 
 class Recorder:
@@ -133,15 +133,9 @@ def aware_of_the_air(recording: Recording) -> Recording:
         (measured._replace(acceleration=measured.acceleration + air), command)
         for (measured, command), air in zip(recording.seen, recording.air, strict=True)
     ]
-    declared = recording.context.declared
-    told = replace(
-        declared,
-        gust_rad_s=declared.gust_rad_s * np.sqrt(UNSEEN),
-        model_rad_s2=np.hypot(declared.model_rad_s2, recording.air_noise)
-        if declared.air
-        else declared.model_rad_s2,
+    return replace(
+        recording, context=told.aware_of_the_air(recording.context, recording.air_noise), seen=seen
     )
-    return replace(recording, context=replace(recording.context, declared=told), seen=seen)
 
 
 def replay(recording: Recording, scheme: str, options: dict[str, float] | None = None) -> Trace:

@@ -52,6 +52,7 @@ class Case(NamedTuple):
     airspeed_mps: float
     declared: bool = False  # with the errors of `declared`
     aircraft: str = DEFAULT
+    turbulence: str = "none"  # flown and declared, with `declared`
 
 
 def airspeeds_of(reference: str) -> tuple[float, ...]:
@@ -75,26 +76,35 @@ def own_axis(case: Case) -> str:
 
 
 def cases(
-    airspeeds_mps: tuple[float, ...] = AIRSPEEDS_MPS, declared: bool = False, aircraft: str = DEFAULT
+    airspeeds_mps: tuple[float, ...] = AIRSPEEDS_MPS,
+    declared: bool = False,
+    aircraft: str = DEFAULT,
+    turbulence: str = "none",
 ) -> list[Case]:
     """Every fault on every surface at every airspeed, fault by fault."""
     return [
-        Case(fault, surface, V, declared, aircraft)
+        Case(fault, surface, V, declared, aircraft, turbulence)
         for fault, _ in FAULTS
         for surface in aircraft_of(aircraft).surfaces
         for V in airspeeds_mps
     ]
 
 
-def declared() -> dict[str, Any]:
-    """Real sensors, servos, coefficients at the ends of their tolerance by turns: all of it declared."""
+def declared(turbulence: str = "none") -> dict[str, Any]:
+    """Real sensors, servos, coefficients at the ends of their tolerance by turns, air: all of it declared."""
     names = [term.name for term in load().moments]
     wrong = {name: 1.0 + (TOLERANCE if i % 2 else -TOLERANCE) for i, name in enumerate(names)}
+    severity = {} if turbulence == "none" else {"severity": turbulence}
     return {
         "uncertainty": UNCERTAINTY | {"coefficients": wrong},
         "sensors": SENSORS,
         "actuators": "servo",
-        "fdi": {"fault_class": "all", "bounds": {"coefficients": TOLERANCE, "sensors": SENSORS}},
+        "environment": {"turbulence": "none" if turbulence == "none" else "dryden"} | severity,
+        "fdi": {
+            "fault_class": "all",
+            "bounds": {"coefficients": TOLERANCE, "sensors": SENSORS, "turbulence": turbulence},
+            "statistical": {},
+        },
     }
 
 
@@ -117,5 +127,5 @@ def scenario_of(case: Case, law: str, trimmed_deg: float) -> "Scenario":
             "fdi": {"fault_class": "all"},
             "control": {"law": law},
         }
-        | (declared() if case.declared else {})
+        | (declared(case.turbulence) if case.declared else {})
     )

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from beaver_ftc.aircraft import DEFAULT
 from beaver_ftc.studies.matrix.cases import Case, aircraft_of, own_axis, scenario_of
+from beaver_ftc.studies.matrix.told import columns_of, told
 
 if TYPE_CHECKING:
     from beaver_ftc.loop.flight import Flight
@@ -31,10 +32,11 @@ def fly_case(case: Case) -> Document:
     from beaver_ftc.loop.loop import fly
 
     off_deg = trimmed_deg(case.airspeed_mps, case.surface, case.aircraft)
-    flight, oracle = (
-        fly(scenario_of(case, law, off_deg)) for law in ("fault-tolerant-published", "oracle-published")
-    )
-    return {**case._asdict(), **_diagnosis(flight, case), **_tracking(flight, oracle, case)}
+    ours, best = (scenario_of(case, law, off_deg) for law in ("fault-tolerant-published", "oracle-published"))
+    kept = columns_of(ours.airframe)
+    flight, oracle = fly(ours, kept), fly(best)
+    seen = told(ours, kept, case.surface) if case.declared else {}
+    return {**case._asdict(), **_diagnosis(flight, case), **_tracking(flight, oracle, case), **seen}
 
 
 def _diagnosis(flight: "Flight", case: Case) -> Document:

@@ -14,6 +14,11 @@ Document = dict[str, Any]
 NAME, DECLARED = "fault-matrix", "fault-matrix-declared"
 
 
+def declared_name(turbulence: str) -> str:
+    """The result folder's name of the matrix with errors, in such air."""
+    return DECLARED if turbulence == "none" else f"{DECLARED}-{turbulence}"
+
+
 def run_matrix(
     out: Path,
     airspeeds_mps: tuple[float, ...] | None = None,
@@ -21,6 +26,7 @@ def run_matrix(
     progress: Progress | None = None,
     name: str = NAME,
     aircraft: str = DEFAULT,
+    turbulence: str = "none",
 ) -> Document:
     """Write `out/fault-matrix/` (table, JSON, heat map), or that of `name`; return the document."""
     from beaver_ftc.results.metrics import as_json
@@ -28,7 +34,7 @@ def run_matrix(
     from beaver_ftc.studies.matrix.figure import write_heat_map
 
     airspeeds_mps = airspeeds_mps or airspeeds_of(aircraft)
-    all_cases = cases(airspeeds_mps, name == DECLARED, aircraft)
+    all_cases = cases(airspeeds_mps, name.startswith(DECLARED), aircraft, turbulence)
     fly = flown(out / name, all_cases, fly_case, workers=workers, progress=progress)
     with fly as rows, result_folder(out, name) as folder:
         document = document_of(rows)

@@ -5,6 +5,8 @@ from typing import Any
 from beaver_ftc.studies.matrix.cases import FAULTS
 
 Document = dict[str, Any]
+NAMED = ("surface", "named")
+LIKELY = 0.5  # a test that finds a fault more often than not sees it
 WORST_FIRST = ("WRONG", "unseen", "open", "surface", "named")
 
 
@@ -12,6 +14,7 @@ def document_of(rows: list[Document]) -> Document:
     """The whole matrix as a document: cells, single flights, and what went wrong anywhere."""
     surfaces = list(dict.fromkeys(row["surface"] for row in rows))
     cells = [_cell(fault, surface, rows) for fault, _ in FAULTS for surface in surfaces]
+    told = [row for row in rows if "told_chance" in row]
     return {
         "aircraft": next((row["aircraft"] for row in rows if "aircraft" in row), None),
         "cells": cells,
@@ -20,6 +23,31 @@ def document_of(rows: list[Document]) -> Document:
         "false_alarms": sum(row["false_alarm"] for row in rows),
         "lost_though_the_oracle_was_not": [row for row in rows if _lost_alone(row)],
         "passed": not any(row["verdict"] == "WRONG" or row["false_alarm"] for row in rows),
+        **({"told": beside_told(told)} if told else {}),
+    }
+
+
+def beside_told(rows: list[Document]) -> Document:
+    """What becomes of the flights in which a test that is told the fault sees it.
+
+    named: the right surface, whether or not its type is still open; type_kept: the right type is named or
+    among the candidates.
+    """
+    seen = [row for row in rows if row["told_chance"] > LIKELY]
+    named = sum(row["verdict"] in NAMED for row in seen)
+    return {
+        "flights": len(rows),
+        "seen": len(seen),
+        "detected": sum(row["detected"] for row in seen),
+        "named": named,
+        "share": named / len(seen) if seen else None,
+        "type_kept": sum(row["detected"] and row["verdict"] != "WRONG" for row in seen),
+        "by_surface": {
+            surface: {"seen": len(of_it), "named": sum(row["verdict"] in NAMED for row in of_it)}
+            for surface in dict.fromkeys(row["surface"] for row in rows)
+            for of_it in [[row for row in seen if row["surface"] == surface]]
+        },
+        "detected_but_not_told": sum(row["detected"] and row["told_chance"] <= LIKELY for row in rows),
     }
 
 
@@ -47,6 +75,7 @@ def _cell(fault: str, surface: str, rows: list[Document]) -> Document:
         "oracle_lost": sum(row["oracle_departure_s"] is not None for row in here),
         "flights": len(here),
         "remark": _remark(here),
+        **({"told": sum(row["told_chance"] > LIKELY for row in here)} if "told_chance" in here[0] else {}),
     }
 
 

@@ -8,10 +8,10 @@ from typing import Any
 from beaver_ftc.studies.compare.replay import Trace
 from beaver_ftc.studies.compare.tally import share_within
 from beaver_ftc.studies.engine.statistics import Estimate, binomial
+from beaver_ftc.studies.engine.told import chance
 from beaver_ftc.studies.power.flying import Watched
 from beaver_ftc.studies.power.grid import WITHIN_S
 from beaver_ftc.studies.power.levels import Level, level_at, level_for
-from beaver_ftc.studies.power.limit import chance
 
 Row = dict[str, Any]
 Document = dict[str, Any]

@@ -1,0 +1,106 @@
+"""What can be seen at all: the test that is told the fault and the instant it strikes.
+
+With all that is declared taken as Gaussian, a Kalman filter makes of the measurements, as they are shown to
+plug-ins, independent innovations of covariance S. A fault phi, rad/s2, adds to them a known signature s, and
+the likelihood ratio of "this fault, since then" against "none" has the deflection
+
+    d^2 = sum s' S^-1 s,        s = H delta,  delta[k+1] = F (1 - K H) delta[k] + dt phi[k]
+
+so that at a false-alarm probability of alpha it finds the fault with probability Phi(d - Phi^-1(1 - alpha))
+[Kay1998, sec. 4.4], and nothing finds it more often from these measurements. Made once every T seconds, at r
+false alarms per hour, alpha = r T / 3600.
+
+Errors that are constant but unknown, c normal of standard deviation sigma, times known regressors, pass
+through the same filter as R c. What they can explain of the fault is no evidence [Kay1998, sec. 10.5]:
+
+    d^2 = s' s - s' R (R' R + diag(1 / sigma^2))^-1 R' s,
+
+with s and R scaled by S^-1/2, the frames one below the other.
+
+The unexplained acceleration of the published bound is a sinusoid of unknown frequency; here it is a
+first-order process of the same power and UNEXPLAINED_S of memory.
+"""
+
+from dataclasses import replace
+from statistics import NormalDist
+
+import numpy as np
+
+from beaver_ftc.design.context import Context
+from beaver_ftc.diagnosis.noise_model import UNSEEN
+from beaver_ftc.diagnosis.rivals.air import rate_variance
+
+UNEXPLAINED_S = 0.1
+LEAST_RATE_RAD_S = 1e-5  # what perfect instruments are taken for
+_SETTLING_FRAMES = 400
+
+
+class Whitening:
+    """The Kalman filter of rates, air and the unexplained, once it has settled."""
+
+    def __init__(self, context: Context) -> None:
+        declared, dt = context.declared, context.dt_s
+        time_s = np.concatenate((declared.gust_time_s, np.full(3, UNEXPLAINED_S)))
+        size = np.concatenate((declared.gust_rad_s, context.constant_rad_s2 / np.sqrt(2.0)))
+        keep = np.exp(-dt / time_s)
+        self.F = np.eye(9)
+        self.F[:3, 3:6], self.F[:3, 6:] = dt * declared.gust_effect, dt * np.eye(3)
+        self.F[range(3, 9), range(3, 9)] = keep
+        self.dt = dt
+        self.R = np.diag(rate_variance(declared, LEAST_RATE_RAD_S))
+        steady = (dt * declared.model_rad_s2) ** 2
+        Q = np.diag(np.concatenate((steady, (1.0 - keep**2) * size**2)))
+        P = np.diag(np.concatenate((np.diagonal(self.R), size**2)))
+        for _ in range(_SETTLING_FRAMES):
+            P = self._updated(P)
+            P = self.F @ P @ self.F.T + Q
+        self.S = P[:3, :3] + self.R
+        self.K = np.linalg.solve(self.S, P[:3]).T
+
+    def _updated(self, P: np.ndarray) -> np.ndarray:
+        K = np.linalg.solve(P[:3, :3] + self.R, P[:3]).T
+        return P - K @ P[:3]
+
+    def respond(self, phi: np.ndarray) -> np.ndarray:
+        """What accelerations phi (n, 3, ...) rad/s2 add to the innovations, scaled to variance one."""
+        step = self.F @ (np.eye(9) - self.K @ np.eye(3, 9))
+        whitener = np.linalg.cholesky(np.linalg.inv(self.S)).T
+        delta, response = np.zeros((9, *phi.shape[2:])), np.empty_like(phi)
+        for k, effect in enumerate(phi):
+            delta = step @ delta
+            delta[:3] += self.dt * effect
+            response[k] = whitener @ delta[:3]
+        return response
+
+    def deflection(self, phi: np.ndarray) -> np.ndarray:
+        """d after each frame, (n,), of a fault phi (n, 3) rad/s2 that begins with the first of them."""
+        return np.sqrt(np.cumsum(np.square(self.respond(phi)).sum(axis=1)))
+
+    def deflection_beside(self, phi: np.ndarray, regressors: np.ndarray, sigma: np.ndarray) -> float:
+        """d of a fault phi (n, 3) rad/s2 beside unknown constants of standard deviation sigma (m,) > 0 times
+        regressors (n, 3, m), from all frames."""
+        s, R = self.respond(phi).ravel(), self.respond(regressors).reshape(-1, sigma.size) * sigma
+        explained = R.T @ s
+        d2 = s @ s - explained @ np.linalg.solve(R.T @ R + np.eye(sigma.size), explained)
+        return float(np.sqrt(max(d2, 0.0)))
+
+
+def aware_of_the_air(context: Context, noise_rad_s2: np.ndarray) -> Context:
+    """What is declared to one who is shown the gusts the vanes see, with their noise (3,) rad/s2."""
+    declared = context.declared
+    if not declared.air:
+        return context
+    seen = replace(
+        declared,
+        gust_rad_s=declared.gust_rad_s * np.sqrt(UNSEEN),
+        model_rad_s2=np.hypot(declared.model_rad_s2, noise_rad_s2),
+    )
+    return replace(context, declared=seen)
+
+
+def chance(d: float, within_s: float, per_h: float) -> float:
+    """Probability of detection by that test, made once every within_s, at so many false alarms per hour."""
+    normal = NormalDist()
+    if per_h <= 0.0:
+        return 0.0  # noise that has no bound leaves nothing certain
+    return normal.cdf(d - normal.inv_cdf(1.0 - min(per_h * within_s / 3600.0, 0.5)))

@@ -1,0 +1,95 @@
+"""Whether a test that is told the fault sees it in a flight of the matrix, at the same rate of false alarms.
+
+What the fault adds to the accelerations is known from the truth: where the surface was, less where a healthy
+one would have been under the same commands. Coefficients are unknown constants, even over their tolerance.
+"""
+
+from math import prod, sqrt
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from beaver_ftc.aircraft import Aircraft, Term
+from beaver_ftc.design.context import Context
+from beaver_ftc.design.inertia import inertia_coefficients
+from beaver_ftc.studies.engine.columns import Columns
+from beaver_ftc.studies.engine.told import Whitening, aware_of_the_air, chance
+from beaver_ftc.studies.matrix.cases import AT_S, DURATION_S
+
+if TYPE_CHECKING:
+    from beaver_ftc.scenario.schema import Scenario
+
+Document = dict[str, Any]
+COLUMNS = (
+    "t_s", "p_rad_s", "q_rad_s", "r_rad_s", "alpha_rad", "beta_rad", "airspeed_mps", "qdyn_pa", "dpt",
+)  # fmt: skip
+
+
+def columns_of(aircraft: Aircraft) -> Columns:
+    """What the test needs of a flight, still empty."""
+    surfaces = [f"{s}_{of_it}_rad" for s in aircraft.surfaces for of_it in ("cmd", "effective")]
+    return Columns(*COLUMNS, *surfaces)
+
+
+def told(scenario: "Scenario", kept: Columns, surface: str) -> Document:
+    """told_deflection: of the fault of a surface since it struck; told_chance: of finding it in that time."""
+    assert scenario.fdi.statistical is not None
+    aircraft, (context, coefficients) = scenario.airframe, _declared(scenario)
+    struck = kept["t_s"] > AT_S + 0.5 * context.dt_s
+    off_rad = np.where(struck, kept[f"{surface}_effective_rad"] - healthy(context, kept, surface), 0.0)
+    own = [term for term in aircraft.moments if term.surface == surface]
+    phi = np.sum([term.value * accelerations(aircraft, term, kept, off_rad) for term in own], axis=0)
+    unknown = [(t, c) for t, c in zip(aircraft.moments, coefficients, strict=True) if c > 0.0]
+    regressors = [accelerations(aircraft, t, kept, kept.get(f"{t.surface}_cmd_rad")) for t, _ in unknown]
+    sigma = np.array([c for _, c in unknown]) / sqrt(3.0)
+    d = Whitening(context).deflection_beside(phi, np.stack(regressors, axis=-1), sigma)
+    rate = scenario.fdi.statistical.false_alarms_per_h
+    return {"told_deflection": d, "told_chance": chance(d, DURATION_S - AT_S, rate)}
+
+
+def _declared(scenario: "Scenario") -> tuple[Context, np.ndarray]:
+    """What is declared of a flight but the coefficients, the air as the vanes show it; and their tolerances,
+    absolute."""
+    from beaver_ftc.loop.loop import Loop
+    from beaver_ftc.loop.plugin_frame import context_of
+
+    loop = Loop(scenario)
+    exact = scenario.with_({"fdi.bounds.coefficients": 0.0})
+    coefficients = context_of(loop.frames, scenario, loop.start, {}).declared.coefficients
+    noise_rad_s2 = np.sqrt(loop.frames["fdi"]["statistical"]["jitter"][0])
+    context = aware_of_the_air(context_of(loop.frames, exact, loop.start, {}), noise_rad_s2)
+    loop.release()
+    return context, coefficients
+
+
+def healthy(context: Context, kept: Columns, surface: str) -> np.ndarray:
+    """Where a healthy surface would have been under the commands of a flight, (frames,) rad."""
+    s, command = context.surfaces.index(surface), kept[f"{surface}_cmd_rad"]
+    bandwidth, rate = context.declared.bandwidth_rad_s[s], context.declared.rate_limit_rad_s[s]
+    approach = 1.0 - np.exp(-bandwidth * context.dt_s) if bandwidth else 1.0
+    step = rate * context.dt_s if rate else np.inf
+    low, high = context.travel_rad[:, s]
+    there, places = kept[f"{surface}_effective_rad"][0], np.empty_like(command)
+    for k, wanted in enumerate(np.clip(command, low, high)):
+        there += min(max((wanted - there) * approach, -step), step)
+        places[k] = there
+    return places
+
+
+def accelerations(
+    aircraft: Aircraft, term: Term, kept: Columns, deflection_rad: np.ndarray | None
+) -> np.ndarray:
+    """What a coefficient's term of value one does, (frames, 3) rad/s2; deflection_rad: of its surface."""
+    V, size, i = kept["airspeed_mps"], aircraft.geometry, inertia_coefficients(aircraft.mass)
+    of = {
+        "alpha": kept["alpha_rad"], "beta": kept["beta_rad"], "dpt": kept["dpt"],
+        "ph": kept["p_rad_s"] * size.span_m / (2.0 * V), "qh": kept["q_rad_s"] * size.chord_m / V,
+        "rh": kept["r_rad_s"] * size.span_m / (2.0 * V), term.surface: deflection_rad,
+    }  # fmt: skip
+    value = kept["qdyn_pa"] * size.wing_area_m2 * prod(of[factor] for factor in term.factors)
+    along = {
+        "Cl": (i.Pl * size.span_m, 0.0, i.Rl * size.span_m),
+        "Cm": (0.0, i.Qm * size.chord_m, 0.0),
+        "Cn": (i.Pn * size.span_m, 0.0, i.Rn * size.span_m),
+    }[term.coefficient]
+    return np.multiply.outer(value, along)

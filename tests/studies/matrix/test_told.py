@@ -1,0 +1,99 @@
+"""The test that is told the fault, in a flight of the matrix: what it is shown, and what becomes of it."""
+
+import numpy as np
+import pytest
+
+from beaver_ftc.aircraft import load
+from beaver_ftc.design.context import DesignModel
+from beaver_ftc.design.variants import design_of
+from beaver_ftc.loop.loop import fly
+from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.studies.engine.columns import Columns
+from beaver_ftc.studies.matrix.cases import AT_S, Case, scenario_of
+from beaver_ftc.studies.matrix.flying import trimmed_deg
+from beaver_ftc.studies.matrix.summary import beside_told
+from beaver_ftc.studies.matrix.told import accelerations, columns_of, healthy, told
+
+AIRCRAFT = load()
+
+
+def flown(fault, surface, turbulence="none"):
+    scenario = scenario_of(
+        Case(fault, surface, 45.0, True, turbulence=turbulence), "nominal", trimmed_deg(45.0, surface)
+    )
+    kept = columns_of(scenario.airframe)
+    fly(scenario, kept)
+    return scenario, kept
+
+
+@pytest.fixture(scope="module")
+def lost():
+    return flown("40 % loss", "elevator")
+
+
+def test_terms_add_up_to_what_the_design_model_makes_of_a_surface():
+    rng = np.random.default_rng(2)
+    n = 3
+    kept = Columns()
+    kept |= {name: rng.uniform(-0.2, 0.2, n) for name in ("p_rad_s", "q_rad_s", "r_rad_s", "dpt")}
+    kept |= {"alpha_rad": rng.uniform(0, 0.2, n), "beta_rad": rng.uniform(-0.2, 0.2, n)}
+    kept |= {"airspeed_mps": rng.uniform(35, 55, n), "qdyn_pa": rng.uniform(700, 1500, n)}
+    model = DesignModel(design_of(Scenario(name="any").design_model, AIRCRAFT))
+    deflection = rng.uniform(-0.2, 0.2, n)
+    for s, surface in enumerate(AIRCRAFT.surfaces):
+        of_it = [term for term in AIRCRAFT.moments if term.surface == surface]
+        found = sum(term.value * accelerations(AIRCRAFT, term, kept, deflection) for term in of_it)
+        names = "alpha_rad", "beta_rad", "airspeed_mps", "qdyn_pa", "dpt"
+        y = np.column_stack([kept[name] for name in names])
+        expected = [model.G(one)[:, s] * u for one, u in zip(y, deflection, strict=True)]
+        assert found == pytest.approx(np.array(expected), rel=1e-9)
+
+
+def test_a_healthy_surface_is_where_the_truth_has_it(lost):
+    """Until the fault strikes, and one that is not broken for all of the flight."""
+    from beaver_ftc.studies.matrix.told import _declared
+
+    scenario, kept = lost
+    context, coefficients = _declared(scenario)
+    assert coefficients == pytest.approx([0.05 * abs(term.value) for term in AIRCRAFT.moments])
+    assert not context.declared.coefficients.any()
+    for surface, until_s in (("elevator", AT_S), ("rudder", np.inf)):
+        before = kept["t_s"] < until_s
+        true = kept[f"{surface}_effective_rad"]
+        step = context.declared.rate_limit_rad_s[0] * context.dt_s
+        assert np.abs(healthy(context, kept, surface) - true)[before].max() <= step
+
+
+def test_a_loss_of_what_stands_at_neutral_is_seen_by_nobody(lost):
+    scenario, kept = lost
+    nothing = told(*flown("total loss", "flap"), "flap")
+    assert nothing["told_deflection"] < 1e-6
+    assert nothing["told_chance"] < 1e-5
+    assert told(scenario, kept, "elevator")["told_chance"] > 0.99
+
+
+def test_rougher_air_shows_less(lost):
+    scenario, kept = lost
+    rough = scenario.with_({"fdi.bounds.turbulence": "moderate"})
+    still, moved = (told(one, kept, "elevator")["told_deflection"] for one in (scenario, rough))
+    assert moved < still
+
+
+def test_what_is_counted():
+    def row(surface, chance, verdict):
+        return {
+            "surface": surface, "told_chance": chance, "verdict": verdict, "detected": verdict != "unseen"
+        }  # fmt: skip
+
+    found = beside_told(
+        [
+            row("elevator", 0.9, "named"), row("elevator", 0.8, "surface"), row("elevator", 0.7, "unseen"),
+            row("flap", 0.6, "open"), row("flap", 0.1, "open"), row("flap", 0.0, "unseen"),
+            row("rudder", 1.0, "WRONG"),
+        ]
+    )  # fmt: skip
+    assert (found["flights"], found["seen"], found["detected"], found["named"]) == (7, 5, 4, 2)
+    assert (found["type_kept"], found["detected_but_not_told"]) == (3, 1)
+    assert found["share"] == pytest.approx(0.4)
+    assert found["by_surface"]["elevator"] == {"seen": 3, "named": 2}
+    assert beside_told([row("flap", 0.0, "unseen")])["share"] is None

@@ -260,6 +260,21 @@ def elapse(air, share):
 
 
 @kernel
+def whole_drift(air, V, i, j):
+    """Intensity, as `unseen_drift`, of all of the air's rotation: of one who does not ask the vanes."""
+    total, longest_s = 0.0, air.rolling / V
+    for g in range(3):
+        on_i, on_j = 0.0, 0.0
+        for k in range(3):
+            on_i += air.damping[i, k] * air.axes[k, g]
+            on_j += air.damping[j, k] * air.axes[k, g]
+        total += on_i * on_j * air.per_metre[g]
+        if air.swings:
+            total += 0.5 * longest_s * longest_s * air.per_metre[g] * swung(air, i, j, g)
+    return total * V
+
+
+@kernel
 def swung(air, i, j, g):
     """How much the turning axis of gust g moves accelerations i and j together, 1/s4 of a gust of 1 rad/s."""
     on_i, on_j = 0.0, 0.0

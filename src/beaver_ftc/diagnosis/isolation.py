@@ -12,7 +12,7 @@ by the first test that fails.
 """
 
 from beaver_ftc.compiled import apart, kernel
-from beaver_ftc.diagnosis import bank, membership
+from beaver_ftc.diagnosis import across, bank, membership
 from beaver_ftc.diagnosis.fault_class import hypothesis
 from beaver_ftc.diagnosis.state import (
     INTERVAL,
@@ -102,10 +102,13 @@ def possible(fdi, fie, x, started):
 def rules_out(fdi, fie, within):
     """Whether a fault is excluded by those in authority; `within`: it is possible in the worst case.
 
-    Of faults of every type the sets alone know: a jam is neither a loss nor a step.
+    Of faults of every type the sets know the course; chance, which axes are moved. Of two faults at once one
+    may move what the other does not.
     """
-    if fdi.every_type or fdi.authority == WORST_CASE:
+    if fdi.authority == WORST_CASE or (fdi.every_type and not within):
         return not within
+    if fdi.every_type:
+        return fdi.statistical.enabled and not fdi.pair.enabled and across.excludes(fdi, fie.surface)
     if fdi.authority != STATISTICS and not within:
         return True
     return fdi.statistical.enabled and excludes(fdi, fie.surface)

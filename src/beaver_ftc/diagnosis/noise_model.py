@@ -24,6 +24,7 @@ from beaver_ftc.diagnosis.state import (
     SENSE,
     STEP,
 )
+from beaver_ftc.diagnosis.views import PRIOR_DRIFT_RAD_S2, set_up_views
 from beaver_ftc.plant.instruments import SIGNALS
 from beaver_ftc.scenario.diagnosis import Bounds, FdiConfig, Statistical
 from beaver_ftc.scenario.sensors import Sensors
@@ -36,7 +37,7 @@ GROWTH_PER_S = 1.5
 # Share of the intensity of the rolling, pitching and yawing gust that the vanes leave; on exact vanes and
 # over a filter's memory it is less (`tests/diagnosis/test_air.py`).
 UNSEEN = (1.0, 0.003, 0.03)
-PRIOR_DRIFT_RAD_S2 = 1.0  # what a drift may be at the start of a flight: soon forgotten
+
 # Share of the alarm level that noise is given beside an uncertainty at its bound; what it is worth where both
 # matter is in docs/theory.md, section 7.
 CHANCE = 0.5
@@ -111,6 +112,8 @@ def set_up(
     _set_up_bounded(statistical, given, config, 1.0 / rate_hz)
     _set_up_noise(statistical, given, config.bounds, design, start, 1.0 / rate_hz)
     _set_up_tolerances(statistical, config.bounds, design, mass, start, aircraft)
+    if config.fault_class == "all":
+        set_up_views(statistical, aircraft)
     block = statistical["block"][-1]
     block["lag"] = returning_length(statistical, float(start[1][AIRSPEED]), rate_hz)
     if statistical["air"]["moving"]:

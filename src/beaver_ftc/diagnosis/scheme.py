@@ -5,8 +5,8 @@ takes each surface for, so that what is known of a fault is no surprise; offset 
 """
 
 from beaver_ftc.compiled import apart, kernel
-from beaver_ftc.design.model import ALPHA, BETA, unanticipated_pitch
-from beaver_ftc.diagnosis import air, bank, detection, instruments, isolation, network, statistical
+from beaver_ftc.design.model import AIRSPEED, ALPHA, BETA, unanticipated_pitch
+from beaver_ftc.diagnosis import across, air, bank, detection, instruments, isolation, network, statistical
 from beaver_ftc.diagnosis.belief import begin_frame, look
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, STATISTICS, WORST_CASE
 from beaver_ftc.diagnosis.types import examine
@@ -75,6 +75,8 @@ def compare_likelihoods(fdi, belief, measured, k, t):
     statistical.signatures(fdi.statistical, belief.means.Gu, cubic)
     latched = fdi.statistical.detected_at_s >= 0.0
     statistical.observe(fdi.statistical, fdi.innovation, fdi.dt, k, latched, not fdi.abrupt)
+    V, mean = measured.y[AIRSPEED], belief.means
+    across.observe(fdi, fdi.innovation, mean.G, mean.Gu, V, k, latched)
     statistical.score(fdi.statistical, t)
 
 

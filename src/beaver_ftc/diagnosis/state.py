@@ -56,7 +56,9 @@ ESTIMATOR = np.dtype(
 # then the drift. Every hypothesis is tried from every onset: that is a lane of a block, and what lanes keep
 # lies side by side for vector instructions, lane slot * MAX_HYPOTHESES + hypothesis.
 N_SLOTS = 10
-MAX_HYPOTHESES, MAX_REGRESSORS = 8, 2 * MAX_TERMS_OF_ONE
+MAX_HYPOTHESES, MAX_REGRESSORS = 8, 2 * MAX_TERMS_OF_ONE + 1
+MAX_VIEWS = 5
+PITCH_BLOCK, LATERAL, RETURNING = 0, 1, 2  # the last is the second view of roll and yaw
 LANES = N_SLOTS * MAX_HYPOTHESES
 EITHER, WORST_CASE, STATISTICS = 0, 1, 2  # whose alarms count
 LEAST_UNCERTAINTY_RAD_S2 = 1e-3  # reckoned with: a bound that passes zero does not stay there
@@ -108,6 +110,15 @@ BLOCK = np.dtype(
     align=True,
 )  # fmt: skip
 
+# The rates along a direction, `mix` (across.py), in a block of one axis. surface: whose column it is across,
+# or -1.
+VIEW = np.dtype(
+    [
+        ("surface", "i8"), ("mix", "f8", (3,)), ("bounded", "f8", (1,)), ("block", BLOCK),
+    ],
+    align=True,
+)  # fmt: skip
+
 STATISTICAL = np.dtype(
     [
         ("share", "f8"),  # one over the instants in a frame
@@ -115,7 +126,8 @@ STATISTICAL = np.dtype(
         ("n_columns", "i8"),  # of the log
         ("rapidity", "f8"),  # 1/s: intensity of the drift of an uncertainty over its bound squared
         ("bounded", "f8", (3,)), ("deflection", "f8", (3,)), ("jitter", "f8", (3,)), ("tolerated", "i8"),
-        ("n_blocks", "i8"), ("block", BLOCK, (3,)), ("air", AIR), ("terms", "f8", (MAX_TERMS,)),
+        ("n_blocks", "i8"), ("block", BLOCK, (3,)), ("n_views", "i8"), ("views", VIEW, (MAX_VIEWS,)),
+        ("air", AIR), ("terms", "f8", (MAX_TERMS,)),
         ("score", "f8"), ("axis", "i8"), ("closest", "f8"), ("detected_at_s", "f8"),
     ],
     align=True,

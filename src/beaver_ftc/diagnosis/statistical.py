@@ -11,10 +11,18 @@ import numpy as np
 from beaver_ftc.compiled import kernel
 from beaver_ftc.design.terms import AIRSPEED, QDYN, evaluate, regressors
 from beaver_ftc.diagnosis import air, likelihood, whitening
-from beaver_ftc.diagnosis.state import ENDING, GROWING, LEAST_UNCERTAINTY_RAD_S2, LOSS, STEP
+from beaver_ftc.diagnosis.state import (
+    ENDING,
+    GROWING,
+    LATERAL,
+    LEAST_UNCERTAINTY_RAD_S2,
+    LOSS,
+    RETURNING,
+    STEP,
+)
+from beaver_ftc.diagnosis.state import PITCH_BLOCK as PITCH
 from beaver_ftc.diagnosis.thresholds import uncertainty_bound
 
-PITCH, LATERAL, RETURNING = 0, 1, 2  # blocks: the last is the second view of roll and yaw
 # Of what the best explanation explains, the part that a constant theta leaves to a loss that grows is larger
 # for every rate of growth (docs/theory.md, section 7).
 LEAST_PART = 0.25

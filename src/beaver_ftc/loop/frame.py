@@ -74,7 +74,8 @@ def frame_dtype(n: int) -> np.dtype:
 
 def idle(fdi: FdiConfig) -> list[tuple[str, ...]]:
     """Large fields that are not read before they are written: delay lines are filled by the first sample."""
-    unused = [] if fdi.statistical else [("fdi", "statistical", "block")]
+    parts = {"block": bool(fdi.statistical), "views": bool(fdi.statistical) and fdi.fault_class == "all"}
+    unused = [("fdi", "statistical", part) for part, used in parts.items() if not used]
     return [("instruments", "line"), *unused]
 
 

@@ -60,7 +60,7 @@ def _told(told: Document) -> str:
         return "a test that is told the fault sees none of them"
     surfaces = ", ".join(f"{s} {of['named']} of {of['seen']}" for s, of in told["by_surface"].items())
     return (
-        f"a test that is told the fault sees {told['seen']} of {told['flights']}; {told['detected']} of these "
-        f"are detected,\nthe right surface is named in {told['named']} ({100 * told['share']:.0f} %: "
-        f"{surfaces}), the right type is kept in {told['type_kept']}"
+        f"a test that is told the fault sees {told['seen']} of {told['flights']}; {told['detected']} "
+        f"of these are detected,\nthe right surface is named in {told['named']} "
+        f"({100 * told['share']:.0f} %: {surfaces}), the right type is kept in {told['type_kept']}"
     )

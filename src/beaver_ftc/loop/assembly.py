@@ -41,6 +41,7 @@ from beaver_ftc.plant import channels as ch
 from beaver_ftc.scenario.actuators import Actuators
 from beaver_ftc.scenario.control import ControlConfig
 from beaver_ftc.scenario.diagnosis import MAX_POLES, FdiConfig, Probing
+from beaver_ftc.scenario.keys import texts_of
 from beaver_ftc.scenario.schema import Scenario
 
 BLOCK_S = 0.2  # to be examined at once where gyros are noisy: short beside the slowest half-cycle, 3.1 s
@@ -288,7 +289,7 @@ def _assemble_admitted(frame: np.void, scenario: Scenario) -> None:
         )
 
 
-_DESIGN = {"fdi", "control", "design_model", "actuators", "sensors", "rate_hz", "substeps"}
+_DESIGN = ("fdi", "control", "design_model", "actuators", "sensors")
 _MOST_DESIGNS = 32
 _designs: dict[tuple[object, ...], memory.Packed] = {}
 
@@ -299,10 +300,9 @@ def assemble(scenario: Scenario, trim: np.ndarray, travel: np.ndarray) -> np.nda
     trim (4,) rad: the surfaces in trim; travel (2, 4) rad: lower and upper stops. The truth's nodes are
     attached by the loop. A copy of the record of its design, which is assembled once.
     """
-    initial = scenario.initial.model_dump(exclude={"airspeed_mps"})
-    design = scenario.model_dump_json(include=_DESIGN)
-    failing = breaks_instruments(scenario)
-    key = scenario.airframe, design, failing, tuple(initial.values()), travel.tobytes()
+    initial = tuple(scenario.initial.model_dump(exclude={"airspeed_mps"}).values())
+    rates, failing = (scenario.rate_hz, scenario.substeps), breaks_instruments(scenario)
+    key = scenario.airframe, texts_of(scenario, _DESIGN), rates, failing, initial, travel.tobytes()
     if key not in _designs:
         if len(_designs) >= _MOST_DESIGNS:
             _designs.clear()

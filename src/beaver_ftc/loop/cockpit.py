@@ -1,8 +1,9 @@
 """What joins one plant and one frame record."""
 
+from weakref import WeakKeyDictionary
+
 import numpy as np
 
-from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.plant import addresses
 from beaver_ftc.plant import channels as ch
 from beaver_ftc.plant.adapter import Plant
@@ -13,25 +14,22 @@ IMMOVABLE = ("stuck", "hardover", "float")  # failures in which a surface does n
 EARTH_RADIUS_M = 6371000.0  # for the log's north and east: a local plane, not navigation
 LEAST_HEIGHT_M = 500.0  # above the ground at the start; the ground is at sea level, or lower if need be
 
+# Of aircraft that are flown again.
+_banks_of: "WeakKeyDictionary[Plant, dict[int, tuple[NodeBank, ...]]]" = WeakKeyDictionary()
+
 
 class Cockpit:
     """The wires between one plant and one frame record: which nodes are read and written, natively or
     through Python."""
 
     def __init__(self, plant: Plant, frames: np.ndarray) -> None:
-        self._frames = frames
-        self._read = NodeBank(
-            [plant.node(name) for _, name, _ in _channels(plant.aircraft, frames["truth"][0])], owner=plant
-        )
-        self._write = NodeBank(
-            [plant.input(name) for name in ch.command_properties(plant.aircraft)], owner=plant
-        )
-        self._engine = NodeBank([plant.input(plant.aircraft.trim.throttle)], owner=plant)
-        self._air = NodeBank(
-            [plant.node("attitude/psi-rad"), plant.input("atmosphere/psiw-rad")], owner=plant
-        )
-        self.native = addresses.available()
+        self._frames, self._plant = frames, plant  # whose executive tied properties read from
         truth, running = frames["truth"][0], frames["running"][0]
+        n, banks = int(truth["n"]), _banks_of.setdefault(plant, {})
+        if n not in banks:
+            banks[n] = _banks(plant, n)
+        self._read, self._write, self._engine, self._air = banks[n]
+        self.native = addresses.available()
         truth["native"] = self.native
         truth["getter"], truth["setter"] = addresses.getter_address(), addresses.setter_address()
         truth["read_pointers"][: truth["n"]] = self._read.pointers
@@ -54,9 +52,17 @@ class Cockpit:
             self._engine.write(power["command"][0])
 
 
-def _channels(aircraft: Aircraft, truth: np.void) -> tuple[ch.Channel, ...]:
-    """What is read of the truth: as many as its record has."""
-    return (*ch.truth_channels(aircraft), *ch.further_channels(aircraft))[: int(truth["n"])]
+def _banks(plant: Plant, n: int) -> tuple[NodeBank, ...]:
+    """What is read of the truth, n channels; where the command goes, and the engine's; heading and axes of
+    the turbulence."""
+    aircraft = plant.aircraft
+    channels = (*ch.truth_channels(aircraft), *ch.further_channels(aircraft))[:n]
+    return (
+        NodeBank([plant.node(name) for _, name, _ in channels]),
+        NodeBank([plant.input(name) for name in ch.command_properties(aircraft)]),
+        NodeBank([plant.input(aircraft.trim.throttle)]),
+        NodeBank([plant.node("attitude/psi-rad"), plant.input("atmosphere/psiw-rad")]),
+    )
 
 
 def travel_rad(plant: Plant) -> np.ndarray:

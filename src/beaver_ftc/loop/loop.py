@@ -256,8 +256,10 @@ class Loop:
     def _fly_compiled(self, count: int, runs: int) -> int:
         """The same without leaving compiled code, but for an instant now and then: others wait for it."""
         order = self._order
-        for first in range(0, count, AT_ONCE):
-            order[:] = min(AT_ONCE, count - first), runs
+        order[1] = runs
+        while count > 0:
+            order[0] = now = count if count < AT_ONCE else AT_ONCE
+            count -= now
             status = self.fly_on(self.frames, self.references, self.log, order)
             if status:
                 return self._landed(status)

@@ -69,6 +69,7 @@ class Stepping:
         self._scenario, self._faults = self._given, self._given.faults
         self._loop = Loop(self._scenario, *self._plug_ins, self._prepare)
         self._frame: np.void = self._loop.frames[0]
+        self._k_flown, self._rows_flown = (self._loop.frames[name].item for name in ("k", "row"))
         self._next, self._turn_at, self._written = 0, 0, 0
         self._status, self._by_hand = FLYING, False
         self._steering = Steering(self._loop)
@@ -287,8 +288,8 @@ class Stepping:
 
     def _fly_to(self, end: int, stick_deg_s: Vector | None = None) -> None:
         """Frames up to `end`, chunk by chunk as `Loop.chunks` has them, stopping where something changes."""
-        loop, frame = self._loop, self._frame
-        while self._next < end and not self.departed:
+        loop, k_flown, rows_flown = self._loop, self._k_flown, self._rows_flown
+        while self._next < end and self._status == FLYING:
             k = self._next
             if k % CHUNK_ROWS == 0:
                 self._begin_chunk(k)
@@ -296,12 +297,12 @@ class Stepping:
                 self._turn_at = loop.turn_to(k)
             stop = min(end, self._turn_at, (k // CHUNK_ROWS + 1) * CHUNK_ROWS)
             self._steering.put(k, stop, stick_deg_s)
-            start = int(frame["row"])
+            start = rows_flown()
             try:
                 self._status = loop.fly_segment(k, stop)
             finally:
-                self._next = int(frame["k"])
-                self._note(loop.log[start : int(frame["row"])])
+                self._next = k_flown()
+                self._note(loop.log[start : rows_flown()])
 
     def _note(self, rows: Vector) -> None:
         """Keep the rows just flown, (frames, columns), until the next step."""

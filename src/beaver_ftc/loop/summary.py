@@ -135,6 +135,8 @@ def _arrival(frame: np.void) -> dict[str, float | None] | None:
 
 def _limits(frame: np.void, surfaces: Sequence[str]) -> tuple[tuple[float, str, str, float, str, bool], ...]:
     """What envelope protection has limited, in the order in which the limits began."""
+    if not frame["autopilot"]["enabled"]:
+        return ()
     holding, control = frame["autopilot"]["holding"], frame["control"]
     pitch = f"{surfaces[control['main'][PITCH]]} acts as at {degrees(holding['acting']):.1f} deg"
     lateral = min(
@@ -158,7 +160,7 @@ def _limits(frame: np.void, surfaces: Sequence[str]) -> tuple[tuple[float, str, 
         for k, what, side, why in kinds
         if holding["from_s"][k] >= 0.0
     ]
-    return tuple(sorted(began)) if frame["autopilot"]["enabled"] else ()
+    return tuple(sorted(began))
 
 
 def _statistical(fdi: np.void) -> dict[str, float | None] | None:

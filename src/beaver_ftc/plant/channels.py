@@ -5,7 +5,6 @@ and effectiveness, then the declared signals. With n surfaces, compiled code fin
 POS + n + s and POS + 2 n + s, and signal k at POS + 3 n + k.
 """
 
-from collections.abc import Iterable
 from functools import lru_cache
 
 from beaver_ftc.aircraft import AXES, Aircraft, load
@@ -120,12 +119,13 @@ def _estimator_columns(name: str) -> list[str]:
     return [*limits, f"fie_{name}_excluded"]
 
 
+@lru_cache(maxsize=32)
 def log_columns(
-    estimators: Iterable[str],
+    estimators: tuple[str, ...],
     power: bool = False,
     statistical: bool = False,
     aircraft: Aircraft | None = None,
-    profile: Iterable[str] = (),
+    profile: tuple[str, ...] = (),
 ) -> tuple[str, ...]:
     """The log's columns in order, for the isolation estimators of these names; power: the law may use the
     engine; statistical: there is a statistical detector, whose tests are logged as shares of its level;

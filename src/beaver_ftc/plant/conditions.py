@@ -7,6 +7,7 @@ from beaver_ftc.plant.linear import LinearModel, differences
 from beaver_ftc.plant.reuse import borrowed, give_back
 from beaver_ftc.plant.trim import TrimPoint
 from beaver_ftc.scenario.given import ScenarioLike, load
+from beaver_ftc.scenario.keys import texts_of
 from beaver_ftc.scenario.schema import Scenario
 
 
@@ -28,9 +29,9 @@ def linearise(scenario: ScenarioLike | None = None, **initial: float) -> LinearM
     return differences(*trimmed(_condition(scenario, initial)))
 
 
-_TRIM_DEPENDS_ON = {"initial", "uncertainty", "actuators"}
+_TRIM_DEPENDS_ON = ("initial", "uncertainty", "actuators")
 _MOST_TRIMS = 256
-_trims: dict[tuple[object, str], TrimPoint] = {}
+_trims: dict[tuple[object, tuple[str, ...]], TrimPoint] = {}
 
 
 def ready(scenario: Scenario) -> tuple[Plant, TrimPoint]:
@@ -41,7 +42,7 @@ def ready(scenario: Scenario) -> tuple[Plant, TrimPoint]:
     plant = borrowed(scenario.rate_hz, scenario.substeps, scenario.airframe)
     try:
         configure(plant, scenario)
-        key = plant.origin, scenario.model_dump_json(include=_TRIM_DEPENDS_ON)
+        key = plant.origin, texts_of(scenario, _TRIM_DEPENDS_ON)
         if key not in _trims:
             if len(_trims) >= _MOST_TRIMS:
                 _trims.clear()

@@ -3,7 +3,8 @@
 What a flight leaves behind in JSBSim (1.3.3), and what takes it away:
 
     initial conditions   the attitude and the wind keep a rounding remainder of all that was set before;
-                         `run_ic` and a reset leave them alone. A file that states everything: at_rest.xml.
+                         `run_ic` and a reset leave them alone. A file that states everything: at_rest.xml,
+                         short, for it is read twice a flight.
     the models           integrators, controls, turbulence, time: `reset_to_initial_conditions`.
     a gust               its direction, until it has blown over; no reset clears it. It is let blow over.
     settings             written back; a property that is written through the plant is remembered.

@@ -4,8 +4,11 @@ import contextlib
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any
+
+from pydantic import BaseModel, ValidationError
 
 from beaver_ftc.aircraft import Aircraft, load
 from beaver_ftc.aircraft.question import asked
@@ -56,8 +59,24 @@ class Sweep:
         Raises pydantic's ValidationError if they contradict each other.
         """
         places = {parse_key(key): value for key, value in values.items()}
+        varied = {place[0] for place in places}
+        ready = {} if "aircraft" in varied else self._sections
+        ready = {name: section for name, section in ready.items() if name not in varied}
+        rest = {name: value for name, value in self.base.items() if name not in ready}
         with asked(self.aircraft, self.base.get("aircraft")):
-            return Scenario.model_validate({**with_values(self.base, places), **settings})
+            return Scenario.model_validate({**with_values(rest, places), **ready, **settings})
+
+    @cached_property
+    def _sections(self) -> dict[str, BaseModel]:
+        """Sections of the base, read once for the flights that do not vary them; none if it cannot fly."""
+        try:
+            with asked(self.aircraft, self.base.get("aircraft")):
+                base = Scenario.model_validate({"name": self.name, **self.base})
+        except ValidationError:
+            return {}
+        return {
+            name: section for name, section in base if name in self.base and isinstance(section, BaseModel)
+        }
 
 
 def load_sweep(path_or_name: str | Path) -> Sweep:

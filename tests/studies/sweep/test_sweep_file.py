@@ -1,8 +1,13 @@
+from dataclasses import replace
+
 import pytest
 
+from beaver_ftc.aircraft.question import asked
 from beaver_ftc.documents.keys import UnusableKeyError, parse_key, with_values
 from beaver_ftc.documents.problems import ScenarioError
+from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.sweep_loader import builtin_sweeps, is_sweep, load_sweep, load_sweep_text
+from beaver_ftc.studies.sweep.sampling import Plan
 
 HEAD = "base: elevator-partial-loss\nruns: 3\nvary:\n  "
 SPEED = "vary.initial.airspeed_mps"
@@ -54,6 +59,36 @@ def test_built_in_sweeps_load_and_say_what_they_show(name):
     assert sweep.name == name
     assert sweep.flights >= 100
     assert sweep.file.description
+
+
+@pytest.mark.parametrize("name", builtin_sweeps())
+def test_sections_read_once_make_the_scenario_that_reading_everything_makes(name):
+    sweep = load_sweep(name)
+    (assignment,) = Plan(sweep).assignments([7])
+    places = {parse_key(key): value for key, value in assignment.values.items()}
+    with asked(sweep.aircraft, sweep.base.get("aircraft")):
+        expected = Scenario.model_validate(with_values(sweep.base, places))
+    made = sweep.scenario(assignment.values)
+    assert made == expected
+    assert made.model_dump(mode="json", exclude_unset=True) == expected.model_dump(
+        mode="json", exclude_unset=True
+    )
+
+
+def test_flights_share_what_they_do_not_vary():
+    sweep = load_sweep("elevator-effectiveness")
+    one, other = (sweep.scenario({"uncertainty.inertia_coupling.p": theta}) for theta in (0.1, 0.2))
+    assert one.control is other.control
+    assert (one.uncertainty.inertia_coupling.p, other.uncertainty.inertia_coupling.p) == (0.1, 0.2)
+    assert sweep.scenario({"control.law": "nominal"}).control.law == "nominal"
+
+
+def test_a_base_that_cannot_fly_is_no_obstacle_to_flights_that_can():
+    sweep = load_sweep("elevator-effectiveness")
+    sweep = replace(sweep, base={**sweep.base, "duration_s": 1.0})  # over before its fault begins
+    with pytest.raises(ValueError, match="contradictory"):
+        sweep.scenario({})
+    assert sweep.scenario({"duration_s": 30.0}).duration_s == 30.0
 
 
 def test_a_base_beside_the_file_brings_its_tables_along(tmp_path):

@@ -199,6 +199,6 @@ def test_what_a_gust_does_is_what_the_opposite_rates_would():
     expected = (acceleration(X - step * rotation) - acceleration(X + step * rotation)) / (2.0 * step)
     assert record["acceleration"] == pytest.approx(expected, rel=1e-6)
     air.effect(record, design[0], X, Y, U)
-    air.begin_frame(record)
+    air.begin_frame(record, 45.0, 0.01)
     record["acceleration"] = 0.0
     assert record["total"] == pytest.approx(expected, rel=1e-6)

@@ -11,7 +11,6 @@ from beaver_ftc.diagnosis.types.registry import (
     BIAS,
     CONSTANT_LOSS,
     FLOAT,
-    N_CONSTANT,
     NAMES,
     SLOW,
     STUCK,
@@ -82,23 +81,22 @@ def test_a_surface_is_possible_until_it_is_excluded_or_ruled_out(named, standing
 @pytest.mark.parametrize(
     ("constant", "evidence", "own_errors", "kept"),
     [
-        (True, 30, 0, True),
-        (True, 50, 0, False),
-        (True, 51, 0, False),
-        (False, 90, 0, True),
-        (True, 90, 1, True),
+        (BIAS, 30, 0, {VARYING_LOSS, SLOW}), (BIAS, 50, 0, set()), (BIAS, 51, 0, set()),
+        (STUCK, 30, 0, {VARYING_LOSS, SLOW}), (STUCK, 50, 0, {SLOW}), (FLOAT, 51, 0, {SLOW}),
+        (UP, 90, 0, {SLOW}),
+        (None, 90, 0, {VARYING_LOSS, SLOW}), (BIAS, 90, 1, {VARYING_LOSS, SLOW}),
     ],
-)
+)  # fmt: skip
 def test_what_any_course_explains_counts_only_until_a_constant_has_been_seen_for_long(
     constant, evidence, own_errors, kept
 ):
-    assert STUCK < N_CONSTANT <= min(VARYING_LOSS, SLOW)
-    fdi = new({RUDDER: [VARYING_LOSS, SLOW, *([STUCK] if constant else [])]}, patience=40)
+    """But where a surface stands still, a slow one may stand until it is excluded."""
+    constants = set() if constant is None else {constant}
+    fdi = new({RUDDER: {VARYING_LOSS, SLOW} | constants}, patience=40)
     fdi["surface"]["evidence"][RUDDER], fdi["surface"]["quiet"][RUDDER] = evidence, 10
     fdi["bound"]["own_errors"] = own_errors
     types = findings._types_left(fdi, RUDDER)
-    expected = said(*([STUCK] if constant else []))
-    assert set(types) == set(expected) | (set(said(VARYING_LOSS, SLOW)) if kept else set())
+    assert set(types) == set(said(*constants, *kept))
     assert len(types) == len(set(types))
 
 

@@ -28,6 +28,7 @@ _ALPHA_LIMIT_RAD = 0.6  # beyond it an aircraft has departed, so it cannot be tr
 _MAX_ITERATIONS = 40
 _ALPHA_GUESS_RAD = 0.05  # where the file has no forces
 _LIFTED_TRAVEL_RAD = 10.0
+_NO_DEFLECTION_RAD = 1.6  # square to the air
 _FLOW_UNKNOWNS = ("alpha_rad", "beta_rad", "theta_rad")
 
 
@@ -63,7 +64,7 @@ def trim(airspeed_mps: float, altitude_m: float, plant: Plant | None = None, **g
             allowed = travel[surface].min_rad, travel[surface].max_rad
             _check(surface, wanted.surfaces_rad[surface], allowed, "rad")
         solution, residual = _solve(truth, _first_guess(wanted, truth))
-        _check_solution(solution, travel)
+        _check_solution(solution, travel, aircraft)
         valid = truth.read("aero/envelope-valid") == 1.0
     return TrimPoint.of(
         solution,
@@ -171,10 +172,14 @@ def _solve(truth: Plant, state: FlightState) -> tuple[FlightState, np.ndarray]:
             break
         state = _moved(state, names, shortened(newton_step(_jacobian(truth, state, names, here), here)))
         here = _accelerations(truth, state)
-    low, high = truth.aircraft.envelope.airspeed_mps
-    raise BadInput(
+    raise _not_flown(state, _left_over(here), truth.aircraft)
+
+
+def _not_flown(state: FlightState, why: str, aircraft: Aircraft) -> BadInput:
+    low, high = aircraft.envelope.airspeed_mps
+    return BadInput(
         f"no steady straight flight at {state.airspeed_mps:g} m/s, {state.altitude_m:g} m with this engine "
-        f"and surface setting{_left_over(here)}, allowed: an airspeed at which the wing carries the aircraft "
+        f"and surface setting{why}, allowed: an airspeed at which the wing carries the aircraft "
         f"(validated: {low:g} to {high:g})"
     )
 
@@ -189,9 +194,11 @@ def _left_over(accelerations: np.ndarray) -> str:
     return f" ({accelerations[worst]:.2g} {unit} {says[worst]} cannot be balanced)"
 
 
-def _check_solution(solution: FlightState, travel: dict[str, Travel]) -> None:
+def _check_solution(solution: FlightState, travel: dict[str, Travel], aircraft: Aircraft) -> None:
     for surface, needed in solution.surfaces_rad.items():
         allowed = travel[surface]
+        if abs(needed) > _NO_DEFLECTION_RAD:  # a root of the equations, but nothing that flies
+            raise _not_flown(solution, f" (nothing short of {surface} {degrees(needed):.0f} deg)", aircraft)
         if not allowed.min_rad <= needed <= allowed.max_rad:
             raise BadInput(
                 f"trim at {solution.airspeed_mps:g} m/s and {solution.altitude_m:g} m needs {surface} "

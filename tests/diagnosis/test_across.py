@@ -5,7 +5,7 @@ import pytest
 from kernels import new_fdi
 
 from beaver_ftc.aircraft import load
-from beaver_ftc.diagnosis import across, air
+from beaver_ftc.diagnosis import across, air, isolation
 from beaver_ftc.diagnosis.state import LOSS, POSITION, STEP
 from beaver_ftc.diagnosis.views import set_up_views
 from beaver_ftc.loop.loop import fly
@@ -86,6 +86,15 @@ def test_only_what_a_surface_does_not_move_excludes_it():
         assert found == [excluded[s] for s in range(4)]
         fdi["statistical"]["views"][v]["block"]["hypothesis"]["score"][0] = 4.9
         assert not any(across.excludes(fdi, s) for s in range(4))
+
+
+@pytest.mark.parametrize(("instants", "excluded"), [(1, True), (2, False)])
+def test_within_a_frame_a_column_turns_and_nothing_is_concluded(instants, excluded):
+    fdi = watching()
+    fdi["statistical"]["enabled"] = fdi["every_type"] = 1
+    fdi["instants"] = instants
+    fdi["statistical"]["views"][PITCH_AXIS]["block"]["hypothesis"]["score"][0] = 5.1
+    assert bool(isolation.rules_out(fdi, fdi["estimator"][AILERON], True)) == excluded
 
 
 def test_views_try_a_step_and_the_losses_of_those_that_move_the_axis():

@@ -103,12 +103,14 @@ def rules_out(fdi, fie, within):
     """Whether a fault is excluded by those in authority; `within`: it is possible in the worst case.
 
     Of faults of every type the sets know the course; chance, which axes are moved. Of two faults at once one
-    may move what the other does not.
+    may move what the other does not. Within a frame of several instants a column turns with the incidence
+    while the surface moves, and shows across its mean: there nothing is concluded.
     """
     if fdi.authority == WORST_CASE or (fdi.every_type and not within):
         return not within
     if fdi.every_type:
-        return fdi.statistical.enabled and not fdi.pair.enabled and across.excludes(fdi, fie.surface)
+        asked = fdi.statistical.enabled and not fdi.pair.enabled and fdi.instants == 1
+        return asked and across.excludes(fdi, fie.surface)
     if fdi.authority != STATISTICS and not within:
         return True
     return fdi.statistical.enabled and excludes(fdi, fie.surface)

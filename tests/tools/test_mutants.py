@@ -6,6 +6,8 @@ import pytest
 from tools.mutants import reach, scope, trial
 from tools.mutants.making import mutants
 
+from beaver_ftc.control.state import control_dtype
+
 SOURCE = """
 def weigh(x, most: int = 3):
     total = 0.5 * x[1] - min(x[0], most)
@@ -91,3 +93,10 @@ def test_tests_of_a_line_are_those_that_execute_it_or_its_module():
     assert found.of("m.py", (9, 9)) == []
     assert found.of(str(Path("other.py")), (3, 3)) == []
     assert found.left_out["takes too long"] == 2
+
+
+def test_what_is_kept_once_a_process_is_forgotten_so_that_each_test_is_known_to_execute_it():
+    shape = control_dtype(3)
+    reach.forget()
+    assert control_dtype.cache_info().currsize == 0
+    assert control_dtype(3) == shape

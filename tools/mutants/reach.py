@@ -1,5 +1,6 @@
 """Which tests execute a line, and how long each of them takes in plain Python."""
 
+import functools
 import hashlib
 import json
 import signal
@@ -25,6 +26,7 @@ PATIENCE = 1  # so many slow cases of one test, and its other cases are not trie
 FLIES = 4  # so many slow tests first in a file, and none of it is tried: all of them fly
 HANGS_S = 600.0  # of processor for the tests of one file, far more than the limits allow
 EXAMPLES = 4
+FORGETS = tuple(f"beaver_ftc.{folder}." for folder in ("design", "diagnosis", "control"))
 KEPT = ROOT / ".mutants"
 
 
@@ -146,6 +148,17 @@ def few_examples() -> None:
     hypothesis.settings.__init__ = begin_with_few  # type: ignore[method-assign]
 
 
+def forget() -> None:
+    """What the package keeps once a process, as the shape of a record, each test works out again: else only
+    the first of a process would be known to execute it.
+    """
+    for name, module in list(sys.modules.items()):
+        if name.startswith(FORGETS):
+            for value in list(vars(module).values()):
+                if isinstance(value, functools._lru_cache_wrapper) and value.__module__ == name:
+                    value.cache_clear()
+
+
 class _Timed:
     """Notes for each test that passes how long it took, and gives up one that is slow."""
 
@@ -159,6 +172,7 @@ class _Timed:
     @pytest.hookimpl(wrapper=True)
     def pytest_runtest_protocol(self, item: pytest.Item) -> Iterator[None]:
         self._watch.switch_context(item.nodeid)
+        forget()
         self._start, self._is_slow = time.process_time(), False
         all_fly = not self.seconds and len(self._slow) >= FLIES
         if all_fly or self._slow[_function(item.nodeid)] >= PATIENCE:

@@ -5,7 +5,7 @@ import pytest
 
 from beaver_ftc.aircraft import load
 from beaver_ftc.design.context import Declared
-from beaver_ftc.diagnosis.declared import gusts
+from beaver_ftc.diagnosis.declared import GUST_FT_S, SCALE_FT, gusts
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.studies.compare.replay import Recorder, record
 from flying import scenario
@@ -106,3 +106,18 @@ def test_the_slopes_of_the_gusts_have_the_variance_of_drydens_spectrum():
     for axis in (1, 2):
         slope = gust * (omega / V) ** 2 / (1 + (time_s[axis] * omega) ** 2)
         assert rotation[axis] ** 2 == pytest.approx(np.trapezoid(slope, omega), rel=2e-3)
+
+
+@pytest.mark.parametrize("severity", ["light", "severe"])
+def test_gusts_turn_the_air_as_drydens_spectra_say(severity):
+    """The variance of each rotation is the integral of its spectrum [MIL-F-8785C], by quadrature."""
+    V, b, L = 45.0, 14.6, SCALE_FT * 0.3048
+    deviation, time_s = gusts(severity, V, b)
+    sigma = GUST_FT_S[severity] * 0.3048
+    w = np.concatenate(([0.0], np.geomspace(1e-6, 1e6, 400_001)))
+    across = sigma**2 * L / (np.pi * V) * (1.0 + 3.0 * (L * w / V) ** 2) / (1.0 + (L * w / V) ** 2) ** 2
+    for axis, length in ((1, 4.0 * b / np.pi), (2, 3.0 * b / np.pi)):
+        turning = across * (w / V) ** 2 / (1.0 + (length * w / V) ** 2)
+        assert deviation[axis] ** 2 == pytest.approx(np.trapezoid(turning, w), rel=2e-3)
+        assert time_s[axis] == pytest.approx(length / V)
+    assert time_s[0] == pytest.approx(np.sqrt(L * b) / 2.6 / V)

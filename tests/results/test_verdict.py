@@ -134,3 +134,12 @@ def test_a_probing_in_words():
     said = "flap and elevator moved from 14.00 s to 18.50 s"
     assert verdict._probing({"isolation": {"probing_s": [14.0, 18.5]}}) == said
     assert verdict._probing({"isolation": {"probing_s": None}}) == ""
+
+
+def test_a_change_in_flight_is_said_with_what_the_diagnosis_before_it_found():
+    change = {"law": "adaptive", "scheme": None, "sensors": {}, "time_s": 6.0}
+    assert verdict._changed(change) == "law adaptive at 6.00 s"
+    assert verdict._changed({**change, "law": None}) == "declared sensors at 6.00 s"
+    said = verdict._changed({**change, "sensors": {"p": 1}, "detection_time_s": 2.5, "isolated": None})
+    assert said == "law adaptive, sensors at 6.00 s; the diagnosis before: alarm at 2.50 s, nothing named"
+    assert verdict._changed({**change, "detection_time_s": 2.5, "isolated": "rudder"}).endswith("s, rudder")

@@ -4,9 +4,11 @@ import os
 import re
 
 import pytest
+from pydantic_core import PydanticCustomError
 
 from beaver_ftc.documents.problems import ScenarioError
 from beaver_ftc.scenario.loader import load_scenario, load_text
+from beaver_ftc.scenario.table import check_table
 
 GOOD = "t_s,rate_deg_s\n0,0\n1,2\n"
 
@@ -100,3 +102,14 @@ def test_a_text_without_a_folder_has_no_files():
 def test_a_table_written_out_is_checked_too(values):
     with pytest.raises(ScenarioError, match=r"reference.q\[0\].csv: "):
         load_text(f"name: x\nreference: {{q: [{{csv: {{file: ref.csv, {values}}}}}]}}")
+
+
+@pytest.mark.parametrize("time_s", [(-0.5, 0.5), (0.0, 0.0), (0.0, 1e9)])
+def test_times_before_the_flight_or_twice_the_same_are_refused(time_s):
+    with pytest.raises(PydanticCustomError, match="contradictory"):
+        check_table(time_s, (1.0, 2.0))
+
+
+def test_the_first_row_may_be_later_than_zero():
+    check_table((0.0, 0.5, 3.0), (1.0, 2.0, 3.0))
+    check_table((0.5, 3.0), (1.0, 2.0))

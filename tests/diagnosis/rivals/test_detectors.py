@@ -282,3 +282,29 @@ def test_the_monitor_names_the_pair_that_broke():
             first = measured.t_s
     assert 15.0 <= first < 15.5
     assert verdict.isolated == "rudder"
+
+
+def test_the_multiple_models_alarm_by_the_odds_of_any_fault():
+    """Beside evens the statistic is zero; odds of e^alarm are one, and no alarm yet."""
+    models = plugin_class(DETECTORS, "multiple-models")()
+    models.reset(context(alarm=2.0))
+    assert models.probability.sum() == pytest.approx(1.0, abs=1e-14)
+    assert models.probability[0] <= 1.0
+    for odds, statistic in ((1.0, 0.0), (np.exp(1.0), 0.5), (np.exp(-2.0), -1.0)):
+        models.probability[:] = odds / (1.0 + odds) / (len(models.probability) - 1)
+        models.probability[0] = 1.0 / (1.0 + odds)
+        assert models.verdict().statistic == pytest.approx(statistic)
+        assert not models.verdict().detected
+    models.probability[0] = 1.0 / (1.0 + np.exp(2.1))
+    assert models.verdict().detected
+
+
+def test_the_observer_names_nothing_until_its_statistic_is_over_one():
+    """At the threshold itself the residual may still be a healthy one."""
+    detector = plugin_class(DETECTORS, "observer-constant")()
+    detector.reset(context(pole_per_s=10.0))
+    still = (np.zeros(5), np.zeros(3), np.zeros((3, 4)), BOUND)
+    detector.step(Measured(0.0, np.zeros(3), *still), np.zeros(4))
+    at = detector.scale * np.array([0.0, 1.0, 0.0])
+    found = detector.step(Measured(DT, at, *still), np.zeros(4))
+    assert (found.statistic, found.detected) == (1.0, False)

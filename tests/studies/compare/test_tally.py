@@ -114,3 +114,15 @@ def test_what_other_threads_do_meanwhile_is_no_cost_of_a_law(monkeypatch):
     monkeypatch.setattr(trial, "with_entry", lambda scenario, entry: None)
     monkeypatch.setattr(trial, "result_of", lambda flight, entry, us: us)
     assert trial._fly(None, None) < 25.0  # us a frame; the thread takes 50
+
+
+def test_shares_of_the_faulted_flights_and_of_all():
+    mine = [_result(healthy_s=1800.0, before_deg_s=b, after_deg_s=2 * b, us=b) for b in (1.0, 3.0)]
+    mine.append(_result(correct=False, healthy_s=1800.0, before_deg_s=5.0, after_deg_s=10.0, us=5.0))
+    line = line_of(ENTRY, mine, mine)
+    assert line.isolation_rate == pytest.approx(2 / 3)
+    assert (line.detection_rate, line.healthy_h, line.us) == (1.0, 1.5, 3.0)
+    assert (line.before_median, line.before_90) == (3.0, 5.0)
+    assert (line.after_median, line.after_90) == (6.0, 10.0)
+    assert 0.0 < line.detection_rate_lower < 1.0
+    assert line.false_alarms_per_h_upper > 0.0

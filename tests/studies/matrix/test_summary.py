@@ -4,7 +4,7 @@ import pytest
 
 from beaver_ftc.design.coefficients import SURFACES
 from beaver_ftc.studies.matrix.cases import FAULTS
-from beaver_ftc.studies.matrix.summary import document_of
+from beaver_ftc.studies.matrix.summary import beside_told, document_of
 from beaver_ftc.studies.matrix.text import as_text
 
 FAULT, SURFACE = FAULTS[0][0], "elevator"
@@ -61,3 +61,27 @@ def test_losses_are_counted_and_told_from_the_oracles():
     assert (cell["lost"], cell["oracle_lost"], cell["flights"]) == (2, 1, 3)
     assert cell["remark"].startswith("lost in 2 of 3 flights, the oracle in 1: for 1.5 s no deflection")
     assert [r["airspeed_mps"] for r in document["lost_though_the_oracle_was_not"]] == [38.0]
+
+
+@pytest.mark.parametrize("bad", [{"verdict": "WRONG"}, {"false_alarm": True}])
+def test_one_wrong_name_or_one_false_alarm_fails_the_matrix(bad):
+    assert cell_of({}, {}, {})[1]["passed"]
+    assert not cell_of({}, bad, {})[1]["passed"]
+
+
+def test_what_is_told_counts_by_what_a_test_more_often_than_not_sees():
+    told = [
+        row(FAULT, "elevator", 38.0, told_chance=0.5),
+        row(FAULT, "elevator", 45.0, told_chance=0.6, verdict="WRONG"),
+        row(FAULT, "rudder", 45.0, told_chance=0.9, verdict="surface"),
+        row(FAULT, "rudder", 52.0, told_chance=0.9, verdict="unseen", detected=False),
+    ]
+    found = beside_told(told)
+    assert (found["flights"], found["seen"], found["detected"], found["named"]) == (4, 3, 2, 1)
+    assert found["share"] == pytest.approx(1 / 3)
+    assert (found["type_kept"], found["detected_but_not_told"]) == (1, 1)
+    assert found["by_surface"] == {
+        "elevator": {"seen": 1, "named": 0},
+        "rudder": {"seen": 2, "named": 1},
+    }
+    assert beside_told(told[:1])["share"] is None

@@ -138,3 +138,12 @@ def test_labels_are_weighted_by_rows():
     found = tally.by_labels([one | {"rows": 30}, other | {"rows": 10}])
     assert found["rows"] == 40
     assert np.allclose([found[key] for key in keys], 0.75)
+
+
+def test_of_the_healthy_flights_those_with_an_alarm_are_counted():
+    quiet = {"failure": None, "false_alarms": 0, "healthy_s": 1800.0, "detected": False}
+    flights = [quiet, quiet, {**quiet, "false_alarms": 2}]
+    found = tally.by_events(flights)
+    assert (found["healthy_flights"], found["healthy_flights_with_an_alarm"]) == (3, 1)
+    assert found["false_alarms_per_hour"]["value"] == pytest.approx(2 / 1.5)
+    assert found["accuracy"] == pytest.approx(2 / 3)

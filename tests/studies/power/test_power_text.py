@@ -1,0 +1,84 @@
+"""The survey in words: each sentence of a small survey made by hand."""
+
+import pytest
+
+from beaver_ftc.studies.power.grid import WITHIN_S
+from beaver_ftc.studies.power.text import as_text, comparison, shares, title_of
+
+AT = {"sensors": "perfect", "turbulence": "none"}
+
+
+def alarms(low, value, high, hours=0.5):
+    return {"per_h": value, "per_h_low": low, "per_h_high": high, "hours": hours}
+
+
+def total(scheme, flights=4, median_s=0.25, **changes):
+    within = {f"{within_s:g}": {"value": 0.5 + 0.1 * i} for i, within_s in enumerate(WITHIN_S)}
+    found = {"flights": flights, "within": within, "median_delay_s": median_s}
+    return {**AT, "scheme": scheme, "surface": "rudder", **found, **changes}
+
+
+@pytest.fixture
+def document():
+    level = {**AT, "before_faults": alarms(1.0, 3.0, None), "own_level": None}
+    ours = total("statistical", own_level={**total("x"), "flights": 0})
+    return {
+        "grid": {
+            "conditions": [("perfect", "none")], "surfaces": ["rudder"], "magnitudes": [0.05, 0.3],
+            "excitations_deg_s": [2, 8], "vanes": True,
+        },
+        "levels": [
+            {**level, "scheme": "statistical", "calibration": alarms(1.0, 7.0, 20.0)},
+            {**level, "scheme": "other", "calibration": alarms(2.0, 8.0, 21.0, hours=0.4)},
+        ],
+        "totals": [ours, total("other", median_s=None)],
+        "limits": [{**AT, "surface": "rudder", "within": {"0.5": 0.25, "1": 0.99}}],
+        "false_alarms_per_h": 3.6,
+        "comparison": [],
+        "failures": ["other: broke"],
+    }  # fmt: skip
+
+
+def test_every_line_says_what_the_survey_found(document):
+    text = as_text(document)
+    lines = [line.split() for line in text.splitlines()]
+    assert text.splitlines()[0].strip() == "perfect sensors, still air"
+    (ours,) = [line for line in lines if line[:1] == ["statistical"]]
+    assert ours[1:7] == ["7", "(1", "to", "20)", "3", "(1)"]
+    assert ours[-3:] == ["/".join(str(50 + 10 * i) for i in range(len(WITHIN_S))), "0.25", "s"]
+    (other,) = [line for line in lines if line[:1] == ["other"]]
+    assert other[-1] == "never"
+    assert any(line[:3] == ["as", "it", "ships"] and line[-1] == "-" for line in lines)
+    assert any(line[:3] == ["(told", "the", "fault)"] and line[-1] == "25/99" for line in lines)
+    assert "losses of 5, 30 % detected" in text
+    assert "references of 2, 8 deg/s" in text
+    assert "at most 3.6 per hour, on the same 0.40 h" in text
+    assert "as the statistical scheme sees it by the vanes" in text
+    assert text.endswith("could not be judged: other: broke")
+    assert "have the rates alone" in as_text({**document, "grid": {**document["grid"], "vanes": False}})
+
+
+def test_by_chance_as_many_are_detected_as_alarms_fall_into_the_time(document):
+    """3.6 alarms an hour are 0.1 % of the seconds."""
+    (line,) = [line for line in as_text(document).splitlines() if "By chance" in line]
+    percent, seconds = line.split("By chance alone ")[1].split(" % are detected within ")
+    assert float(percent) == pytest.approx(0.1 * float(seconds.split()[0]), abs=0.051)
+
+
+def test_nothing_flown_has_no_shares():
+    assert shares(total("x", flights=0)) == "-"
+    assert title_of("tactical-grade", "light") == "tactical-grade sensors, light turbulence"
+
+
+def test_where_one_is_better_than_another_is_said_by_condition():
+    duel = {**AT, "ours": "statistical", "against": "other", "surface": "rudder", "verdict": "better"}
+    duels = [
+        duel,
+        {**duel, "surface": "elevator"},
+        {**duel, "against": "third", "verdict": "worse", "turbulence": "light"},
+        {**duel, "verdict": "even", "turbulence": "light"},
+    ]
+    worse, better, counts = comparison({"comparison": duels})
+    assert worse == "statistical is worse than third: rudder with perfect sensors, light turbulence"
+    assert better == "statistical is better than other: rudder, elevator with perfect sensors, still air"
+    assert "4 comparisons: better in 2, worse in 1, no difference" in counts

@@ -100,3 +100,10 @@ def test_what_is_kept_once_a_process_is_forgotten_so_that_each_test_is_known_to_
     reach.forget()
     assert control_dtype.cache_info().currsize == 0
     assert control_dtype(3) == shape
+
+
+def test_tests_of_a_module_without_functions_are_those_of_what_imports_it():
+    watch, user = "src/beaver_ftc/diagnosis/watch.py", "src/beaver_ftc/diagnosis/state.py"
+    lines = {user: {"1": [], "150": ["b"]}, "src/beaver_ftc/design/terms.py": {"20": ["a"]}}
+    found = reach.Reach([{"seconds": {}, "left_out": {}, "lines": lines}])
+    assert found.of(watch, (60, 40)) == ["b"]

@@ -46,14 +46,25 @@ class Reach:
                     known.setdefault(int(line), []).extend(tests)
 
     def of(self, name: str, lines: Iterable[int]) -> list[str]:
-        """Those that execute the first of the lines; of one that ran at import, all that execute anything."""
-        by_line = self._lines.get(name, {})
+        """Those that execute the first of the lines; of one that ran at import, all that execute anything;
+        of a module without functions, all that execute what imports it.
+        """
+        by_line = self._lines.get(name)
+        if by_line is None:
+            users = [file for file in self._lines if _imports(ROOT / file, name)]
+            return sorted({t for file in users for tests in self._lines[file].values() for t in tests})
         for line in lines:
             if tests := by_line.get(line):
                 return tests
         if any(line in by_line for line in lines):
             return sorted({test for tests in by_line.values() for test in tests})
         return []
+
+
+def _imports(file: Path, name: str) -> bool:
+    """Whether a module imports something of another, that of a file below src/."""
+    module = ".".join(Path(name).with_suffix("").parts[1:])
+    return file.exists() and f"from {module} import" in file.read_text()
 
 
 def reach(folders: Iterable[str], jobs: int, say: Callable[[str], None]) -> Reach:

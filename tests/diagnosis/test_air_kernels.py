@@ -202,3 +202,10 @@ def test_what_a_gust_does_is_what_the_opposite_rates_would():
     air.begin_frame(record, 45.0, 0.01)
     record["acceleration"] = 0.0
     assert record["total"] == pytest.approx(expected, rel=1e-6)
+
+
+def test_what_an_earlier_diagnosis_kept_is_gone_when_one_begins():
+    kept = dict.fromkeys(("gust", "started", "lost", "turning", "leaping", "leapt", "leap", "leaps"), 1)
+    record = new_air(**kept)
+    air.begin(record, Y, np.array([0.3, 0.2, 1.0]))
+    assert {name for name in kept if np.any(record[name])} == set()

@@ -5,7 +5,7 @@ import pytest
 
 from beaver_ftc.aircraft import load
 from beaver_ftc.design.context import Declared
-from beaver_ftc.diagnosis.declared import GUST_FT_S, SCALE_FT, gusts
+from beaver_ftc.diagnosis.declared import GUST_FT_S, SCALE_FT, gust_effect, gusts
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.studies.compare.replay import Recorder, record
 from flying import scenario
@@ -121,3 +121,13 @@ def test_gusts_turn_the_air_as_drydens_spectra_say(severity):
         assert deviation[axis] ** 2 == pytest.approx(np.trapezoid(turning, w), rel=2e-3)
         assert time_s[axis] == pytest.approx(length / V)
     assert time_s[0] == pytest.approx(np.sqrt(L * b) / 2.6 / V)
+
+
+def test_rotating_air_does_what_the_opposite_rates_would():
+    A = np.array([[-5.0, 0.1, 2.0], [0.0, -3.0, -0.3], [-0.9, 0.2, -0.5]])
+
+    class Linear:
+        def f(self, x, y):
+            return A @ x + y
+
+    assert gust_effect(Linear(), np.array([0.4, -0.2, 0.1])) == pytest.approx(-A, abs=1e-9)

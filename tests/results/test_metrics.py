@@ -230,3 +230,13 @@ def test_of_several_faults_the_verdict_is_held_against_that_of_its_surface(surfa
     found = _of(TWO, faults=(FOUND,), isolated=surface, isolation_type=kind, isolation_time_s=13.5)
     assert found["isolation"]["correct"] is True
     assert found["isolation"]["type_correct"] is right
+
+
+@pytest.mark.parametrize(
+    ("exits", "inside"), [([], True), ([(13.0, 14.5)], True), ([(3.0, 4.0), (13.0, math.inf)], False)]
+)
+def test_a_flight_arrives_in_the_envelope_if_it_has_come_back_to_it(exits, inside):
+    document = _of(arrival={"altitude_m": 2.0}, envelope_exits=exits)
+    assert document["arrival"]["in_envelope"] is inside
+    assert document["arrival"]["altitude_m"] == 2.0
+    assert _of(arrival={"altitude_m": 2.0}, departure=(14.5, "alpha_rad"))["arrival"] is None

@@ -143,3 +143,10 @@ def test_a_change_in_flight_is_said_with_what_the_diagnosis_before_it_found():
     said = verdict._changed({**change, "sensors": {"p": 1}, "detection_time_s": 2.5, "isolated": None})
     assert said == "law adaptive, sensors at 6.00 s; the diagnosis before: alarm at 2.50 s, nothing named"
     assert verdict._changed({**change, "detection_time_s": 2.5, "isolated": "rudder"}).endswith("s, rudder")
+
+
+def test_stays_outside_the_envelope_are_counted_from_the_first():
+    exits = [{"start_s": 3.0, "end_s": 4.5}, {"start_s": 8.0, "end_s": 9.0}]
+    metrics = {"envelope_exits": exits, "envelope": {"exits": 2, "outside_s": 2.5}}
+    assert verdict._envelope(metrics) == "left 2 time(s), 2.50 s in all, first at 3.00 s"
+    assert verdict._envelope({**metrics, "envelope_exits": []}) == ""

@@ -297,3 +297,11 @@ class TestVerdict:
         control["fhat"], control["inner"], control["law"] = 1.0, REJECTING, law_is
         accommodation.compensate(control, fdi, *rest)
         assert list(control["fhat"]) == [0.0] * 3
+
+
+def test_a_command_to_an_actuator_that_does_not_lag_stays_to_the_last_digit():
+    control, _ = record()
+    control["command"] = -0.1
+    control["rejection"]["lead"] = 1.0
+    rejecting.hurry(control, np.array([-0.3, 0.7, 0.11, 0.33]))
+    assert control["command"].tolist() == [-0.1] * 4

@@ -377,11 +377,37 @@ def test_a_loss_that_may_grow_keeps_a_part_and_a_constant_one_does_not():
 
 
 def test_in_pitch_an_end_counts_where_a_loss_has_shown_before():
-    """More than half the naming level, or a fiftieth of what the end explains."""
-    assert contested(loss=0.0, pitch=(200.0, 1.9, 199.0))
-    assert not contested(loss=0.0, pitch=(200.0, 2.1, 199.0))
-    assert not contested(loss=0.0, pitch=(60.0, 1.21, 60.0))
-    assert contested(loss=0.0, pitch=(60.0, 1.19, 60.0))
+    """More than half the naming level, or a fiftieth of what the end explains, or a third of that."""
+    assert contested(loss=0.0, pitch=(200.0, 1.9, 199.0), abrupt=1)
+    assert not contested(loss=0.0, pitch=(200.0, 2.1, 199.0), abrupt=1)
+    assert not contested(loss=0.0, pitch=(60.0, 1.21, 60.0), abrupt=1)
+    assert contested(loss=0.0, pitch=(60.0, 1.19, 60.0), abrupt=1)
+    assert not contested(loss=0.0, pitch=(60.0, 0.41, 60.0))
+    assert contested(loss=0.0, pitch=(60.0, 0.39, 60.0))
+
+
+@pytest.mark.parametrize(
+    ("at_least", "shown"),
+    [
+        ((9.0, 4.9, 0.0), False),  # of a step, a loss, one that grows
+        ((0.9, 4.8, 0.0), False),
+        ((0.9, 5.0, 0.0), True),
+        ((0.9, 0.0, 5.0), True),
+        ((5.0, 0.0, 9.1), True),
+    ],
+)
+def test_a_loss_shows_where_it_explains_better_than_all_else_by_the_naming_level(at_least, shown):
+    fdi, record = detector()
+    fdi["n_estimators"] = 1
+    fdi["estimator"]["surface"][0], fdi["estimator"]["kind"][0] = 2, LOSS
+    for b in range(record["n_blocks"]):
+        record["block"][b]["n_hypotheses"] = 0
+    block = record["block"][1]
+    block["n_hypotheses"] = 3
+    block["hypothesis"]["kind"][:3], block["hypothesis"]["surface"][:3] = (STEP, LOSS, GROWING), (-1, 2, 2)
+    block["hypothesis"]["at_least"][:3] = at_least
+    assert bool(statistical.shows(fdi, 2)) == shown
+    assert not statistical.shows(fdi, 0)
 
 
 def test_an_end_within_a_frame_of_several_instants_keeps_a_part():

@@ -92,6 +92,25 @@ def test_a_loss_that_grows_is_never_taken_for_something_else(surface, kappa, aut
     assert flight.isolated == surface or (flight.detection_time_s is None and authority == "statistical")
 
 
+ENDS_AFTER_THE_ALARM = {
+    "rate_hz": 36, "initial": {"airspeed_mps": 48.87, "altitude_m": 1259.5},
+    "reference": {
+        "p": [{"square": {"amplitude_deg_s": 94.1908, "frequency_hz": 0.42829, "phase_deg": 319.575}}],
+        "q": [{"sine": {"amplitude_deg_s": 85.0319, "frequency_hz": 0.14755, "phase_deg": 173.681}}],
+        "r": [{"sine": {"amplitude_deg_s": 41.5832, "frequency_hz": 0.69827, "phase_deg": 171.114}}],
+    },
+    "faults": [loss("elevator", 1.0, at_s=1.80419, end_s=2.43082, profile="incipient", kappa_per_s=2.5475)],
+}  # fmt: skip
+
+
+def test_the_end_of_a_loss_that_grows_is_not_taken_for_another_fault():
+    flight, _ = flown(
+        duration_s=4.8, control={"law": "nominal"}, fdi=_fdi("statistical"), **ENDS_AFTER_THE_ALARM
+    )
+    assert flight.detection_time_s is not None
+    assert flight.isolated in (None, "elevator")
+
+
 def test_what_grows_slowly_is_found_by_the_worst_case_beside_the_drift_that_takes_it_in():
     fault = loss("elevator", 0.6, at_s=4, profile="incipient", kappa_per_s=0.1)
     both, _ = flown(duration_s=15, faults=[fault], fdi=_fdi("either"))

@@ -23,7 +23,7 @@ from beaver_ftc.diagnosis.state import (
     UNANTICIPATED,
     WORST_CASE,
 )
-from beaver_ftc.diagnosis.statistical import excludes
+from beaver_ftc.diagnosis.statistical import excludes, shows
 from beaver_ftc.diagnosis.thresholds import bound_step, interval, noise_step, published
 from beaver_ftc.diagnosis.types import blocks, examine, pairs, verdict
 
@@ -113,7 +113,10 @@ def rules_out(fdi, fie, within):
         return asked and across.excludes(fdi, fie.surface)
     if fdi.authority != STATISTICS and not within:
         return True
-    return fdi.statistical.enabled and excludes(fdi, fie.surface)
+    if not fdi.statistical.enabled or fie.shown:
+        return False
+    fie.shown = not fdi.abrupt and shows(fdi, fie.surface)  # what comes later may be its end
+    return not fie.shown and excludes(fdi, fie.surface)
 
 
 @kernel

@@ -37,7 +37,7 @@ ESTIMATOR = np.dtype(
     [
         ("kind", "i8"), ("surface", "i8"),
         ("low", "f8"), ("high", "f8"),  # the known set of theta
-        ("excluded", "i8"), ("excluded_at_s", "f8"), ("unasked", "i8", (3,)),
+        ("excluded", "i8"), ("excluded_at_s", "f8"), ("unasked", "i8", (3,)), ("shown", "i8"),
         ("xhat", "f8", (3,)), ("residual", "f8", (3,)), ("lower", "f8", (3,)), ("upper", "f8", (3,)),
         ("omega", "f8", (3,)), ("rise", "f8", (3,)), ("fall", "f8", (3,)), ("bound", "f8", (3,)),
         ("bound_eta", "f8", (3,)), ("bound_noise", "f8", (3,)),

@@ -27,8 +27,9 @@ from beaver_ftc.diagnosis.thresholds import uncertainty_bound
 # for every rate of growth (docs/theory.md, section 7).
 LEAST_PART = 0.25
 # Of what the end of a loss explains, what the loss has explained before. Both grow with the time they have
-# lasted: this is the shortest loss reckoned with, 0.1 s, over the longest window, 5 s at 100 Hz.
-SHOWN_BEFORE = 0.02
+# lasted: this is the shortest loss reckoned with, 0.1 s, over the longest window, 5 s at 100 Hz. One that
+# grows evenly has in the mean a third of the square that it ends with.
+SHOWN_BEFORE, OF_A_RAMP = 0.02, 1.0 / 3.0
 
 
 @kernel
@@ -174,6 +175,21 @@ def at_most(block, surface, ending):
 
 
 @kernel
+def shows(fdi, surface):
+    """Whether a loss of this surface explains the flight better than all else, by the naming level."""
+    for b in range(fdi.statistical.n_blocks):
+        block = fdi.statistical.block[b]
+        least = 0.0
+        for h in range(block.n_hypotheses):
+            hypothesis = block.hypothesis[h]
+            if hypothesis.surface == surface and hypothesis.kind in (LOSS, GROWING):
+                least = max(least, hypothesis.at_least)
+        if least - best_alternative(fdi, block, surface) > fdi.statistical.naming_level:
+            return True
+    return False
+
+
+@kernel
 def excludes(fdi, surface):
     """Whether something else explains the flight better than a loss of this surface, by the naming level.
 
@@ -192,7 +208,8 @@ def excludes(fdi, surface):
         worse = max(at_most(pitch, surface, False), at_most(lateral, surface, False))
         ended = at_most(lateral, surface, True)
         in_pitch = at_most(pitch, surface, True)
-        if at_most(pitch, surface, False) > min(0.5 * statistical.naming_level, SHOWN_BEFORE * in_pitch):
+        shown = SHOWN_BEFORE if fdi.abrupt else SHOWN_BEFORE * OF_A_RAMP
+        if at_most(pitch, surface, False) > min(0.5 * statistical.naming_level, shown * in_pitch):
             ended = max(ended, in_pitch)
         part = 1.0 if exact else LEAST_PART
         end_part = 1.0 if fdi.instants == 1 else LEAST_PART

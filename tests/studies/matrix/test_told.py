@@ -1,8 +1,11 @@
 """The test that is told the fault, in a flight of the matrix: what it is shown, and what becomes of it."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+from beaver_ftc import load as load_scenario
 from beaver_ftc.aircraft import load
 from beaver_ftc.design.context import DesignModel
 from beaver_ftc.design.variants import design_of
@@ -15,6 +18,7 @@ from beaver_ftc.studies.matrix.summary import beside_told
 from beaver_ftc.studies.matrix.told import accelerations, columns_of, healthy, told
 
 AIRCRAFT = load()
+FOLDER = Path(__file__).parents[2] / "data" / "aircraft"
 
 
 def flown(fault, surface, turbulence="none"):
@@ -97,3 +101,15 @@ def test_what_is_counted():
     assert found["share"] == pytest.approx(0.4)
     assert found["by_surface"]["elevator"] == {"seen": 3, "named": 2}
     assert beside_told([row("flap", 0.0, "unseen")])["share"] is None
+
+
+def test_an_aircraft_with_signals_of_its_own_keeps_those():
+    """The trainer has no slipstream: the built-in one's `dpt` is not asked of it."""
+    quiet = {"duration_s": 0.5, "faults": [], "expect": {}}
+    scenario = load_scenario(FOLDER / "trainer-flight.yaml").with_(quiet)
+    kept = columns_of(scenario.airframe)
+    fly(scenario, kept)
+    assert "dpt" not in kept
+    for term in scenario.airframe.moments:
+        moved = kept.get(f"{term.surface}_cmd_rad")
+        assert np.isfinite(accelerations(scenario.airframe, term, kept, moved)).all()

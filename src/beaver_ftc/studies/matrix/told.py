@@ -21,14 +21,14 @@ if TYPE_CHECKING:
 
 Document = dict[str, Any]
 COLUMNS = (
-    "t_s", "p_rad_s", "q_rad_s", "r_rad_s", "alpha_rad", "beta_rad", "airspeed_mps", "qdyn_pa", "dpt",
+    "t_s", "p_rad_s", "q_rad_s", "r_rad_s", "alpha_rad", "beta_rad", "airspeed_mps", "qdyn_pa",
 )  # fmt: skip
 
 
 def columns_of(aircraft: Aircraft) -> Columns:
     """What the test needs of a flight, still empty."""
     surfaces = [f"{s}_{of_it}_rad" for s in aircraft.surfaces for of_it in ("cmd", "effective")]
-    return Columns(*COLUMNS, *surfaces)
+    return Columns(*COLUMNS, *aircraft.signals, *surfaces)
 
 
 def told(scenario: "Scenario", kept: Columns, surface: str) -> Document:
@@ -81,8 +81,9 @@ def accelerations(
 ) -> np.ndarray:
     """What a coefficient's term of value one does, (frames, 3) rad/s2; deflection_rad: of its surface."""
     V, size, i = kept["airspeed_mps"], aircraft.geometry, inertia_coefficients(aircraft.mass)
-    of = {
-        "alpha": kept["alpha_rad"], "beta": kept["beta_rad"], "dpt": kept["dpt"],
+    of: dict[str | None, Any] = {
+        **{name: kept[name] for name in aircraft.signals},
+        "alpha": kept["alpha_rad"], "beta": kept["beta_rad"],
         "ph": kept["p_rad_s"] * size.span_m / (2.0 * V), "qh": kept["q_rad_s"] * size.chord_m / V,
         "rh": kept["r_rad_s"] * size.span_m / (2.0 * V), term.surface: deflection_rad,
     }  # fmt: skip

@@ -11,6 +11,7 @@ from scipy.signal import lfilter
 
 from beaver_ftc.compiled import kernel
 from beaver_ftc.design.coefficients import MASS
+from beaver_ftc.design.engine import DPT_0, KW_TO_DPT, SEA_LEVEL_DENSITY_KG_M3
 from beaver_ftc.diagnosis import likelihood, noise_model, statistical, whitening
 from beaver_ftc.diagnosis.state import BLOCK, MAX_HYPOTHESES, N_SLOTS, SENSE
 from beaver_ftc.loop.assembly import assemble
@@ -18,6 +19,17 @@ from beaver_ftc.scenario.schema import Scenario
 
 TRAVEL_RAD = np.array([[-0.52, -0.49, -0.44, -0.1], [0.52, 0.49, 0.44, 1.03]])
 LEVEL_FLIGHT = np.zeros(3), np.array([0.1, 0.02, 45.0, 1036.0, 0.3]), np.zeros(4)  # x, y, u
+
+
+def misread(y, place, error, thin_air_kw=0.0):
+    """y (5,) with a reading of it off, and with dpt as it is then worked out from the same engine's chart."""
+    out = y.copy()
+    out[place] += error
+    density, before = 2.0 * out[3] / out[2] ** 2, 2.0 * y[3] / y[2] ** 2
+    power_kw = (y[4] - DPT_0) * y[3] * y[2] / KW_TO_DPT
+    power_kw -= thin_air_kw * (density - before) / SEA_LEVEL_DENSITY_KG_M3
+    out[4] = DPT_0 + KW_TO_DPT * power_kw / (out[3] * out[2])
+    return out
 
 
 def block_of(drift, noise, jitter=0.0, prior=1.0, keep=1.0):

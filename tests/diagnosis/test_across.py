@@ -7,8 +7,9 @@ from kernels import new_fdi
 from beaver_ftc.aircraft import load
 from beaver_ftc.diagnosis import across, air, isolation
 from beaver_ftc.diagnosis.state import LOSS, POSITION, STEP
-from beaver_ftc.diagnosis.views import set_up_views
-from beaver_ftc.loop.loop import fly
+from beaver_ftc.diagnosis.views import across_a_column, set_up_views
+from beaver_ftc.loop.loop import Loop, fly
+from beaver_ftc.scenario.diagnosis import FdiConfig
 from beaver_ftc.studies.matrix.cases import declared
 from flying import SINES, scenario
 
@@ -50,10 +51,11 @@ def shown(fdi, courses, frames=70):
 )  # fmt: skip
 def test_a_fault_of_any_course_shows_nothing_where_its_surface_moves_nothing(surface, blind):
     course = np.cumsum(np.random.default_rng(surface).normal(size=70))
-    views = shown(watching(), lambda k: course[k] * G[:, surface])
-    for v, view in enumerate(views):
+    fdi = watching()
+    views = shown(fdi, lambda k: course[k] * G[:, surface])
+    for v, view in enumerate(views[:5]):
         evidence = np.abs(view["block"]["lane"]["correlation"]).max()
-        felt = across.feels(view, surface, G[:, surface])
+        felt = across.feels(fdi, view, surface, G[:, surface])
         assert felt == (v not in blind)
         assert (evidence > 1.0) == felt
 
@@ -75,8 +77,8 @@ def test_errors_that_turn_the_column_are_tolerated(signs):
 def test_only_what_a_surface_does_not_move_excludes_it():
     for v in range(5):
         fdi = watching()
-        fdi["statistical"]["views"]["mix"][PAST_AILERON] = (0.4 / 9.0, 0.0, -1.0)
-        fdi["statistical"]["views"]["mix"][PAST_RUDDER] = (3.0 / 1.2, 0.0, 1.0)
+        fdi["statistical"]["views"]["mix"][PAST_AILERON, :3] = (0.4 / 9.0, 0.0, -1.0)
+        fdi["statistical"]["views"]["mix"][PAST_RUDDER, :3] = (3.0 / 1.2, 0.0, 1.0)
         fdi["statistical"]["views"][v]["block"]["hypothesis"]["score"][0] = 5.1
         found = [across.excludes(fdi, s) for s in range(4)]
         excluded = {
@@ -88,24 +90,71 @@ def test_only_what_a_surface_does_not_move_excludes_it():
         assert not any(across.excludes(fdi, s) for s in range(4))
 
 
-@pytest.mark.parametrize(("instants", "excluded"), [(1, True), (2, False)])
-def test_within_a_frame_a_column_turns_and_nothing_is_concluded(instants, excluded):
+@pytest.mark.parametrize(
+    ("changes", "instants", "counts"),
+    [
+        ({}, 1, True), ({"authority": "statistical"}, 1, True), ({}, 0, True), ({}, 2, False),
+        ({"pairs": True}, 1, False), ({"authority": "worst-case"}, 1, False),
+        ({"fault_class": "published"}, 1, False),
+    ],
+)  # fmt: skip
+def test_views_are_there_only_where_something_is_concluded_from_them(changes, instants, counts):
+    """Of two faults one may move what the other does not; within a frame of instants a column turns."""
+    config = FdiConfig.model_validate({"fault_class": "all", "statistical": {}, **changes})
+    assert across_a_column(config, instants) == counts
+
+
+@pytest.mark.parametrize("substeps", [1, 2])
+def test_a_flight_has_them_or_not(substeps):
+    loop = Loop(scenario(duration_s=1, substeps=substeps, **declared("light")))
+    assert loop.frames["fdi"]["statistical"]["n_views"][0] == (13 if substeps == 1 else 0)
+    loop.release()
+
+
+def test_what_a_surface_does_not_move_rules_its_faults_out():
     fdi = watching()
     fdi["statistical"]["enabled"] = fdi["every_type"] = 1
-    fdi["instants"] = instants
     fdi["statistical"]["views"][PITCH_AXIS]["block"]["hypothesis"]["score"][0] = 5.1
-    assert bool(isolation.rules_out(fdi, fdi["estimator"][AILERON], True)) == excluded
+    assert isolation.rules_out(fdi, fdi["estimator"][AILERON], True)
+    assert not isolation.rules_out(fdi, fdi["estimator"][ELEVATOR], True)
+    fdi["statistical"]["n_views"] = 0
+    assert not isolation.rules_out(fdi, fdi["estimator"][AILERON], True)
 
 
 def test_views_try_a_step_and_the_losses_of_those_that_move_the_axis():
     tried = []
-    for view in watching()["statistical"]["views"]:
+    for view in watching()["statistical"]["views"][:5]:
         of_it = view["block"]["hypothesis"][: view["block"]["n_hypotheses"]]
         tried.append((view["surface"], *zip(of_it["kind"], of_it["surface"], strict=True)))
     assert tried[PITCH_AXIS] == (-1, (STEP, -1), (LOSS, ELEVATOR), (LOSS, FLAP))
     assert tried[ROLL_AXIS] == tried[YAW_AXIS] == (-1, (STEP, -1), (LOSS, AILERON), (LOSS, RUDDER))
     assert tried[PAST_AILERON] == (AILERON, (STEP, -1), (LOSS, RUDDER))
     assert tried[PAST_RUDDER] == (RUDDER, (STEP, -1), (LOSS, AILERON))
+
+
+def test_in_moving_air_no_view_of_pitch_tries_what_answers_the_gusts():
+    """A law that goes by the vanes moves the elevator before the gyros feel a gust."""
+    loop = Loop(scenario(duration_s=1, **declared("light")))
+    views = loop.frames["fdi"]["statistical"]["views"][0]
+    assert [int(view["block"]["n_hypotheses"]) for view in views[:5]] == [1, 3, 3, 2, 2]
+    loop.release()
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_rudder_that_floats_in_a_gust_stays_a_candidate(seed):
+    """With ideal gyros at 200 Hz the elevator, which answered the gusts, ruled it out within seconds."""
+    flown = fly(scenario(
+        duration_s=6, rate_hz=201, seed=seed, initial={"airspeed_mps": 51.7, "altitude_m": 2138},
+        uncertainty={},
+        faults=[{"actuator": "rudder", "type": "float", "at_s": 2}], control={"law": "nominal"},
+        environment={"turbulence": "dryden", "severity": "light"},
+        fdi={
+            "fault_class": "all", "statistical": {}, "authority": "statistical",
+            "bounds": {"turbulence": "light"},
+        },
+    ))  # fmt: skip
+    assert flown.detection_time_s is not None
+    assert flown.isolated in ("rudder", None)
 
 
 def test_without_the_vanes_every_gust_is_reckoned_with_in_full():
@@ -115,16 +164,17 @@ def test_without_the_vanes_every_gust_is_reckoned_with_in_full():
     record["axes"], record["rolling"], record["span"] = np.linalg.qr(rng.normal(size=(3, 3)))[0], 34.0, 14.6
     record["unseen"] = 1.0
     pairs = [(i, j) for i in range(3) for j in range(3)]
-    whole = [air.whole_drift(record, 45.0, *pair) for pair in pairs]
-    assert whole == pytest.approx([air.unseen_drift(record, 45.0, *pair) for pair in pairs])
+    unseen = np.reshape([air.unseen_drift(record, 45.0, *pair) for pair in pairs], (3, 3))
     gusts = record["damping"] @ record["axes"]
-    assert np.reshape(whole, (3, 3)) == pytest.approx(45.0 * gusts @ np.diag(record["per_metre"]) @ gusts.T)
+    assert unseen == pytest.approx(45.0 * gusts @ np.diag(record["per_metre"]) @ gusts.T)
+    for m in rng.normal(size=(3, 3)):
+        assert air.whole_drift(record, 45.0, m @ record["damping"]) == pytest.approx(m @ unseen @ m)
 
 
 @pytest.mark.parametrize(
     ("fault", "left"),
     [
-        ({"actuator": "elevator", "type": "bias", "bias_deg": 3.0}, {"elevator", "flap"}),
+        ({"actuator": "elevator", "type": "bias", "bias_deg": 3.0}, {"elevator"}),
         ({"actuator": "rudder", "type": "loss_of_effectiveness", "magnitude": 0.7}, {"rudder"}),
         ({"actuator": "aileron", "type": "stuck", "position_deg": 5.0}, {"aileron"}),
     ],

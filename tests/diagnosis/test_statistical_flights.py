@@ -71,6 +71,22 @@ def test_the_published_unanticipated_fault_is_named_so(authority, noise):
     assert flight.detection_time_s < 4.5
 
 
+@pytest.mark.parametrize("substeps", [1, 3])
+@pytest.mark.parametrize("authority", ["either", "statistical"])
+def test_a_small_loss_that_nobody_sees_until_it_ends_is_not_taken_for_an_unanticipated_fault(
+    authority, substeps
+):
+    """In trim, where nothing moves, its end is a step such as many a fault would be."""
+    fault = loss("elevator", 0.15, at_s=0.9, end_s=3.8, profile="incipient", kappa_per_s=5.0)
+    flight, _ = flown(
+        duration_s=6, rate_hz=250, substeps=substeps, initial={"airspeed_mps": 44.8, "altitude_m": 1600},
+        reference={}, uncertainty={}, faults=[fault], fdi=_fdi(authority, {"coefficients": 0.05}),
+    )  # fmt: skip
+    assert flight.detection_time_s > 3.8
+    assert flight.isolated in ("elevator", None)
+    assert "elevator" in (*flight.candidates, flight.isolated)
+
+
 @pytest.mark.parametrize("noise", [{}, NOISY])
 def test_with_worst_case_authority_the_flight_is_the_one_without_it(noise):
     keys = {"duration_s": 10, "faults": [loss(at_s=4)], **noise}

@@ -62,6 +62,32 @@ def test_a_fault_is_never_taken_for_another(actuator, profile, substeps):
     assert flight.detection_time_s - 6.03 <= flight.guaranteed_delay_s + 1 / 50
 
 
+RELEASED = {
+    "flap": {
+        "rate_hz": 60, "substeps": 9, "duration_s": 3.2, "initial": {"airspeed_mps": 47.5},
+        "actuators": {"bandwidth_rad_s": 18, "rate_limit_deg_s": 160},
+        "reference": {"q": [{"square": {"amplitude_deg_s": 4, "frequency_hz": 0.4}}]},
+        "faults": [{"actuator": "flap", "type": "hardover", "direction": 1, "at_s": 1.8, "end_s": 2.6}],
+    },
+    "elevator": {
+        "rate_hz": 108, "substeps": 5, "duration_s": 3.2, "initial": {"airspeed_mps": 48},
+        "actuators": {"bandwidth_rad_s": 88},
+        "reference": {"q": [{"step": {"amplitude_deg_s": -60, "start_s": 0.4}}]},
+        "faults": [{"actuator": "elevator", "type": "stuck", "at_s": 2.1, "end_s": 2.7}],
+    },
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("surface", RELEASED)
+def test_a_surface_released_while_its_effectiveness_changes_keeps_its_type(surface):
+    """Its own drag slows the aircraft, or a dive hastens it, while the surface comes back within a frame."""
+    fdi = {"fault_class": "all", **NOTHING_DECLARED}
+    flight, _ = flown(uncertainty={}, fdi=fdi, **RELEASED[surface])
+    kind = RELEASED[surface]["faults"][0]["type"]
+    assert flight.isolated in (surface, None)
+    assert kind in flight.candidates or f"{surface}:{kind}" in flight.candidates
+
+
 def test_uncertainty_at_its_bound_is_met_and_not_exceeded():
     """The sinusoid peaks at 0.02 rad/s2 and the innovation gets there: no sharper test can be right."""
     flight, _ = flown(duration_s=60, uncertainty=PUBLISHED_UNCERTAINTY)

@@ -44,6 +44,37 @@ def test_an_error_within_the_declared_is_not(truth):
     assert warnings(f"{TOLD}{truth}\n") == ()
 
 
+WEIGHED = """
+fdi: {fault_class: all, statistical: {}, bounds: {coefficients: 0.05}}
+"""
+
+
+@pytest.mark.parametrize(
+    ("truth", "says"),
+    [
+        ("coefficients: {CZ_alpha: 1.06}", "uncertainty.coefficients.CZ_alpha: 1.06 is beyond"),
+        ("coefficients: {CY_beta: 0.9, CX_0: 1.3}", "uncertainty.coefficients.CY_beta: 0.9 is beyond"),
+        ("mass: 1.06", "uncertainty.mass: 1.06 is off the designer's"),
+    ],
+)
+def test_where_accelerometers_are_read_forces_and_mass_count(truth, says):
+    (line,) = warnings(f"{WEIGHED}uncertainty: {{{truth}}}\n")
+    assert line.startswith(says)
+    assert warnings(f"{WEIGHED}uncertainty: {{{truth}}}\nsubsteps: 2\n") == ()
+
+
+def test_a_mass_the_designer_knows_is_no_error():
+    assert warnings(f"{WEIGHED}uncertainty: {{mass: 1.2}}\ndesign_model: {{mass: 1.2}}\n") == ()
+
+
+@pytest.mark.parametrize("key", ["fault_class: published", "authority: worst-case", "pairs: true"])
+def test_where_they_are_not_read_only_moments_do(key):
+    given = (
+        WEIGHED.replace("fault_class: all", key) if "class" in key else WEIGHED.replace("all", f"all, {key}")
+    )
+    assert warnings(f"{given}uncertainty: {{coefficients: {{CZ_alpha: 1.2}}, mass: 1.2}}\n") == ()
+
+
 SINUSOID = {"q": {"amplitude_rad_s2": 0.03, "frequency_rad_s": 20}}
 GUST = {"at_s": 1, "velocity_mps": [0, 0, 5]}
 

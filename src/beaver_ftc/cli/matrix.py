@@ -78,12 +78,11 @@ def _every_fault(
     from functools import partial
 
     from beaver_ftc.aircraft import DEFAULT
-    from beaver_ftc.studies.matrix.run import NAME, declared_name, run_matrix
+    from beaver_ftc.studies.matrix.run import name_of, run_matrix
     from beaver_ftc.studies.matrix.text import as_text
 
-    name = declared_name(turbulence) if declared else NAME
-    run = partial(run_matrix, name=name, aircraft=aircraft or DEFAULT, turbulence=turbulence.value)
-    return name, run, as_text
+    run = partial(run_matrix, declared=declared, aircraft=aircraft or DEFAULT, turbulence=turbulence.value)
+    return name_of(declared, turbulence), run, as_text
 
 
 def _pitch_lost() -> tuple[str, Callable[..., Document], Callable[[Document], str]]:

@@ -115,6 +115,15 @@ def slopes(table, signal, power, along, out):
 
 
 @kernel
+def directional(table, signal, power, direction, out):
+    """Fill out (MAX_MONOMIALS,) with what the monomials `power` change by as signals go in a direction."""
+    parent, factor = table.parent, table.factor
+    out[0] = 0.0
+    for k in range(1, table.n_monomials):
+        out[k] = out[parent[k]] * signal[factor[k]] + power[parent[k]] * direction[factor[k]]
+
+
+@kernel
 def evaluate(table, x, y):
     """Bring the table's own signals and monomials to a state; x (3,) rad/s, y (4 + declared,)."""
     signals(table, x, y, table.signal)

@@ -7,76 +7,160 @@ directions m that it does not move,
 
 each by a filter and tests of its own (whitening.py, likelihood.py): a step, and losses of other surfaces.
 What is found there is another surface's doing. Directions are the axes, for the surfaces that do not move
-them at all, and in roll and yaw, which ailerons and rudder both move, across the column of each:
-m = (-g_r, g_p) / |g|.
+them at all, and in a plane that several surfaces move, across the column of each: m = (-g_2, g_1) / |g|. The
+planes are roll with yaw, and where accelerometers are read (forces.py) pitch with the normal force and yaw
+with the side force.
 
 Where declared errors may turn that column, a share of what goes along it shows across: at most
-(|m_p| e_p + |m_r| e_r) / (|g| - |m_r| e_p - |m_p| e_r), e the error of the surface's own terms per rad. That
-much is tolerated as an error of a coefficient is. The vanes are not asked: a surface that is off its command
-has forces that they would take for a gust, so every gust is reckoned with in full. What a test must reach is
-the level of the alarm: chance and bounded uncertainty exclude no oftener than they alarm.
+(|m_1| e_1 + |m_2| e_2) / (|g| - |m_2| e_1 - |m_1| e_2), e the error of the surface's own terms per rad. That
+much is tolerated as an error of a coefficient is. What a test must reach is the level of the alarm: chance
+and bounded uncertainty exclude no oftener than they alarm.
+
+The gust that the vanes show is taken off the rates only where the forces are measured: else a surface that is
+off its command has forces that would be taken for one, and every gust is reckoned with in full. So is the
+rolling one, which no vane shows.
+
+An error of a vane moves a rate and its force as well, and so do gusts that it makes up. So where vanes are
+asked a surface is excluded only once something shows that is no vane's doing: across the vane's column, the
+gust being that which the forces say, or in the force at the angle of inertial motion.
 """
 
 import numpy as np
 
 from beaver_ftc.compiled import kernel
-from beaver_ftc.diagnosis import air, likelihood, whitening
-from beaver_ftc.diagnosis.state import LATERAL, LEAST_UNCERTAINTY_RAD_S2, PITCH, PITCH_BLOCK, ROLL, STEP, YAW
+from beaver_ftc.diagnosis import air, likelihood
+from beaver_ftc.diagnosis.state import (
+    AN_AXIS,
+    LATERAL,
+    LEAST_UNCERTAINTY_RAD_S2,
+    PITCH,
+    PITCH_BLOCK,
+    ROLL,
+    SIDE,
+    STEP,
+    THE_VANE,
+    YAW,
+)
 
+VANE_TOLERANCE = 0.1  # of what a vane's error does: its column is that of the trim
+HOLDS = 5.0  # times as long as old evidence elsewhere a force is remembered
+MOSTLY = 0.9  # of a direction of length one
 LEAST_LENGTH = 0.1  # of a column: errors larger than that are not reckoned with
 
 
 @kernel
-def turn(view, G):
-    """Fill `mix` (3,), for a view across a column of G (3, n); returns the column's length."""
-    in_roll, in_yaw = G[ROLL, view.surface], G[YAW, view.surface]
-    size = np.sqrt(in_roll * in_roll + in_yaw * in_yaw)
-    if size > 0.0:
-        view.mix[ROLL], view.mix[YAW] = -in_yaw / size, in_roll / size
-    return size
+def part(fdi, view, innovation, i):
+    """Component i of what is looked at, rad/s2: of the rates' innovation (3,), or of a force's."""
+    if i < SIDE:
+        return innovation[i] - (gust_of(fdi.statistical, view).mean[i] if view.cleared_by > 0 else 0.0)
+    force = fdi.statistical.forces.component[i - SIDE]
+    return force.inertial if view.inertial else force.innovation
+
+
+@kernel
+def column_of(fdi, view, G, j):
+    """The j-th of the two components of the column a view looks across, and how far off it can be."""
+    i, s = view.plane[j], view.surface
+    if s == THE_VANE:
+        size = fdi.statistical.forces.component[view.plane[1] - SIDE].vane[j]
+        return size, VANE_TOLERANCE * abs(size)
+    if i >= SIDE:
+        force = fdi.statistical.forces.component[i - SIDE]
+        return force.column[s], force.own[s]
+    return G[i, s], fdi.bound.own_per_rad[i, s] if fdi.bound.own_errors else 0.0
+
+
+@kernel
+def turn(fdi, view, G):
+    """Fill `mix` (5,), for a view across a column, G (3, n); returns which share of what goes along it the
+    errors of the column let show across."""
+    first, second = view.plane[0], view.plane[1]
+    one, one_off = column_of(fdi, view, G, 0)
+    other, other_off = column_of(fdi, view, G, 1)
+    size = np.sqrt(one * one + other * other)
+    if size == 0.0:
+        return 0.0
+    view.mix[first], view.mix[second] = -other / size, one / size
+    across_it = abs(view.mix[first]) * one_off + abs(view.mix[second]) * other_off
+    shorter = abs(view.mix[second]) * one_off + abs(view.mix[first]) * other_off
+    return across_it / max(size - shorter, LEAST_LENGTH * size)
+
+
+@kernel
+def gust_of(statistical, view):
+    """The air by which a view knows the gust: that the vanes show, or that follows without them."""
+    return statistical.inertial_air if view.clears else statistical.air
+
+
+@kernel
+def feel_gust(view, statistical):
+    """Fill `by_rates` and `by_forces` (3,), 1/s: what the air's rotation about body axes does in a view."""
+    m, damping = view.mix, statistical.air.damping
+    for k in range(3):
+        view.by_rates[k] = (
+            m[ROLL] * damping[ROLL, k] + m[PITCH] * damping[PITCH, k] + m[YAW] * damping[YAW, k]
+        )
+        view.by_forces[k] = 0.0
+        for f in range(2):
+            force = statistical.forces.component[f]
+            view.by_forces[k] += m[SIDE + f] * force.damping[k] * statistical.forces.strength
 
 
 @kernel
 def blur(view, statistical, V):
-    """Fill noise, jitter, drift and bound of a view's block from what is declared of the axes; V m/s."""
-    block, m, bounded = view.block, view.mix, statistical.bounded
-    noise, jitter, bound, drift = 0.0, 0.0, 0.0, 0.0
+    """Fill noise, jitter, drift and bound of a view's block from what is declared; V m/s."""
+    block, m = view.block, view.mix
+    noise, jitter, bound, drift, strength = 0.0, 0.0, 0.0, 0.0, statistical.forces.strength
     for i in range(3):
         noise += m[i] * m[i] * statistical.block[PITCH_BLOCK if i == PITCH else LATERAL].noise[i // 2]
         jitter += abs(m[i]) * np.sqrt(statistical.jitter[i])
-        bound += abs(m[i]) * bounded[i]
-        if statistical.air.moving:
+        bound += abs(m[i]) * statistical.bounded[i]
+    for f in range(2):
+        force = statistical.forces.component[f]
+        jitter += abs(m[SIDE + f]) * np.sqrt(force.jitter[view.inertial])
+        if view.inertial:
+            drift += (m[SIDE + f] * strength) ** 2 * force.wander
+        bound += abs(m[SIDE + f]) * force.deflection * strength
+    if statistical.air.moving:
+        feel_gust(view, statistical)
+        if view.cleared_by > 0:
+            drift += air.drift_beside(gust_of(statistical, view), V, view.by_rates, view.by_forces)
+        else:
+            drift += air.whole_drift(statistical.air, V, view.by_rates)
+        for i in range(3):
             for j in range(3):
-                if m[i] != 0.0 and m[j] != 0.0:
-                    drift += m[i] * m[j] * air.whole_drift(statistical.air, V, i, j)
-                    block.P_dd[0, 0] += m[i] * m[j] * statistical.air.leap[i, j]
+                block.P_dd[0, 0] += m[i] * m[j] * statistical.air.leap[i, j]
     size = max(bound, LEAST_UNCERTAINTY_RAD_S2)
     block.noise[0], block.jitter[0], view.bounded[0] = noise, jitter * jitter, bound
     block.drift[0, 0] = drift + statistical.rapidity * size * size
 
 
 @kernel
-def regress(fdi, view, innovation, size):
-    """Fill what constants multiply in a view; size: of the column it looks across, 0 of none."""
-    block, m, own = view.block, view.mix, fdi.bound.own_per_rad
-    lateral, pitch = fdi.statistical.block[LATERAL], fdi.statistical.block[PITCH_BLOCK]
-    if m[PITCH] != 0.0:
-        for j in range(pitch.n_regressors):
-            block.regressor[j, 0] = m[PITCH] * pitch.regressor[j, 0]
-        return
-    for j in range(lateral.n_regressors):
-        block.regressor[j, 0] = m[ROLL] * lateral.regressor[j, 0] + m[YAW] * lateral.regressor[j, 1]
-    if size > 0.0:
-        in_roll, in_yaw = own[ROLL, view.surface], own[YAW, view.surface]
-        turned = abs(m[ROLL]) * in_roll + abs(m[YAW]) * in_yaw
-        shorter = abs(m[YAW]) * in_roll + abs(m[ROLL]) * in_yaw
-        along = m[YAW] * innovation[ROLL] - m[ROLL] * innovation[YAW]
-        share = turned / max(size - shorter, LEAST_LENGTH * size)
-        block.regressor[lateral.n_regressors, 0] = share * along if fdi.bound.own_errors else 0.0
+def regress(fdi, view, innovation, share):
+    """Fill what constants multiply in a view; share: of what goes along its column, what may show across."""
+    block, m, statistical = view.block, view.mix, fdi.statistical
+    first, second = view.plane[0], view.plane[1]
+    rates = statistical.block[PITCH_BLOCK if first == PITCH else LATERAL]
+    for j in range(rates.n_regressors):
+        if first == PITCH:
+            block.regressor[j, 0] = m[PITCH] * rates.regressor[j, 0]
+        else:
+            block.regressor[j, 0] = m[ROLL] * rates.regressor[j, 0] + m[YAW] * rates.regressor[j, 1]
+    n = rates.n_regressors
+    if second >= SIDE and m[second] != 0.0:
+        force = statistical.forces.component[second - SIDE]
+        for j in range(force.n):
+            block.regressor[n + j, 0] = m[second] * force.regressor[j]
+        n += force.n
+        if view.inertial:
+            block.regressor[n, 0], n = m[second] * force.drifted, n + 1
+    if view.surface != AN_AXIS:
+        one, other = part(fdi, view, innovation, first), part(fdi, view, innovation, second)
+        block.regressor[n, 0] = share * (m[second] * one - m[first] * other)
 
 
 @kernel
-def sign(view, Gu):
+def sign(fdi, view, Gu):
     """Fill the signatures: a step, and losses; Gu (3, n) rad/s2."""
     block, m = view.block, view.mix
     for h in range(block.n_hypotheses):
@@ -84,7 +168,10 @@ def sign(view, Gu):
         s = hypothesis.surface
         hypothesis.signature[0] = 1.0
         if hypothesis.kind != STEP:
-            hypothesis.signature[0] = m[0] * Gu[0, s] + m[1] * Gu[1, s] + m[2] * Gu[2, s]
+            moment = m[0] * Gu[0, s] + m[1] * Gu[1, s] + m[2] * Gu[2, s]
+            for f in range(2):
+                moment += m[SIDE + f] * fdi.statistical.forces.component[f].moment[s]
+            hypothesis.signature[0] = moment
 
 
 @kernel
@@ -94,34 +181,64 @@ def observe(fdi, innovation, G, Gu, V, frame, latched):
     keep, slot = statistical.keep if latched else 1.0, likelihood.slot_to_start(frame)
     for a in range(statistical.n_views):
         view = statistical.views[a]
-        block, m, size = view.block, view.mix, 0.0
-        if view.surface >= 0:
-            size = turn(view, G)
+        block, m, share = view.block, view.mix, 0.0
+        if view.surface != AN_AXIS:
+            share = turn(fdi, view, G)
         if not latched:
             likelihood.start(block, slot)
         blur(view, statistical, V)
-        whitening.advance(block, dt)
-        if block.level > 0.0:
-            likelihood.reach(block, view.bounded, dt)
-        block.scratch[0] = m[0] * innovation[0] + m[1] * innovation[1] + m[2] * innovation[2]
-        whitening.whiten(block, block.state, block.scratch, dt, block.innovation)
-        if statistical.tolerated:
-            regress(fdi, view, innovation, size)
-            for j in range(block.n_regressors):
-                whitening.whiten(
-                    block, block.regressor_state[j], block.regressor[j], dt, block.regressor_response[j]
-                )
-        sign(view, Gu)
-        likelihood.weigh(block, statistical.tolerated, dt, keep)
-        likelihood.judge(block)
+        block.scratch[0] = 0.0
+        for i in range(m.size):
+            if m[i] != 0.0:
+                block.scratch[0] += m[i] * part(fdi, view, innovation, i)
+        tolerated = statistical.tolerated or view.tolerated
+        if tolerated:
+            regress(fdi, view, innovation, share)
+        sign(fdi, view, Gu)
+        likelihood.take_in(block, view.bounded, tolerated, dt, keep)
+        view.held = max((1.0 - (1.0 - statistical.keep) / HOLDS) * view.held, best(block))
 
 
 @kernel
-def feels(view, s, column):
+def feels(fdi, view, s, column):
     """Whether a fault of surface s, of this column of G (3,), shows in a view."""
     if view.surface == s:
         return False
-    return view.mix[0] * column[0] + view.mix[1] * column[1] + view.mix[2] * column[2] != 0.0
+    m, shows = view.mix, 0.0
+    for i in range(3):
+        shows += m[i] * column[i]
+    for f in range(2):
+        shows += m[SIDE + f] * fdi.statistical.forces.component[f].column[s]
+    return shows != 0.0
+
+
+@kernel
+def best(block):
+    """The largest score in a block."""
+    found = 0.0
+    for h in range(block.n_hypotheses):
+        found = max(found, block.hypothesis[h].score)
+    return found
+
+
+@kernel
+def shown(statistical, view):
+    """The score of what goes on in a view and is no vane's doing: no vane moves the rates alone. What a force
+    shows, and what clears the vane, may come a moment apart. The latter asks for the naming level."""
+    if view.clears or view.cleared_by == 0:
+        return best(view.block)
+    cleared = 0.0
+    for a in range(statistical.n_views):
+        other = statistical.views[a]
+        if other.clears and other.plane[1] == view.cleared_by:
+            cleared = max(cleared, other.held)
+    return min(view.held, cleared * statistical.alarm_level / np.sqrt(2.0 * statistical.naming_level))
+
+
+@kernel
+def alarms(view):
+    """Whether a view raises the alarm: one of little but a force, which no block of the rates looks at."""
+    return view.surface >= 0 and view.plane[1] >= SIDE and abs(view.mix[view.plane[1]]) > MOSTLY
 
 
 @kernel
@@ -130,8 +247,7 @@ def excludes(fdi, s):
     statistical, column = fdi.statistical, fdi.estimator[fdi.layout.position_of[s]].effect.Z
     for a in range(statistical.n_views):
         view = statistical.views[a]
-        if not feels(view, s, column):
-            for h in range(view.block.n_hypotheses):
-                if view.block.hypothesis[h].score > statistical.alarm_level:
-                    return True
+        blind = not view.clears and not feels(fdi, view, s, column)
+        if blind and shown(statistical, view) > statistical.alarm_level:
+            return True
     return False

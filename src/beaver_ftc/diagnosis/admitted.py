@@ -89,7 +89,7 @@ def gyros_vary(sensors: Sensors) -> bool:
 
 
 def _pole(delay_s: float, noise: float, eta_bar: float) -> float:
-    phi, pole = eta_bar + 8.0 * noise / delay_s, 1.0 / delay_s
+    phi = eta_bar + 8.0 * noise / delay_s
     for _ in range(50):
         pole = max(log(phi * delay_s / noise) / delay_s, 0.1 / delay_s)
         phi = (noise * pole + eta_bar) / (1.0 - exp(-pole * delay_s))

@@ -26,6 +26,7 @@ LEAST_SWING = 0.01  # of a gust's own intensity: less is not reckoned with
 AIR = np.dtype(
     [
         ("moving", "i8"), ("started", "i8"),  # whether there is turbulence; whether `pull` is known
+        ("read", "i8"), ("felt", "f8", (3,)),  # whether accelerometers are read; what they say, m/s2
         ("forces", TABLE), ("scratch", "f8", (MAX_MONOMIALS,)),  # force coefficients
         ("area_per_mass", "f8"), ("gravity", "f8"), ("span", "f8"),
         ("velocity", "f8", (3,)), ("force", "f8", (3,)), ("turn", "f8", (3, 3)), ("heading", "f8"),
@@ -187,7 +188,10 @@ def effect(air, design, x, y, u):
 
     x (3,) rad/s, y (5,), u (4,) rad: measured, and the surfaces in effect.
     """
-    specific_force(air, x, y, u, air.force)
+    if air.read:
+        air.force[:] = air.felt
+    else:
+        specific_force(air, x, y, u, air.force)
     rate_damping(design, x, y, u, air.scratch, air.damping)
     for i in range(3):
         air.rotation[i] = air.axes[i, 1] * air.gust[1] + air.axes[i, 2] * air.gust[2]
@@ -219,12 +223,8 @@ def unseen_drift(air, V, i, j):
     """Intensity, (rad/s2)2/s, with which the air's unseen rotation moves accelerations i and j; V m/s."""
     total = 0.0
     for g in range(3):
-        on_i, on_j = 0.0, 0.0
-        for k in range(3):
-            on_i += air.damping[i, k] * air.axes[k, g]
-            on_j += air.damping[j, k] * air.axes[k, g]
         unseen = air.unseen[g] if g != 2 else min(air.unseen[g] + air.turning, 1.0)
-        total += on_i * on_j * unseen * air.per_metre[g]
+        total += together(air, air.axes, i, j, g) * unseen * air.per_metre[g]
     return total * V
 
 
@@ -237,8 +237,8 @@ def note_leap(air, V, dt):
     yawing = 0.5 * (3.0 * air.span / (pi * V)) ** 2 * air.per_metre[2] * air.turning
     for i in range(3):
         for j in range(3):
-            intensity = rolling * swung(air, i, j, 0) + yawing * swung(air, i, j, 2)
-            air.leaping[i, j] += dt * V * intensity
+            roll, yaw = together(air, air.swing, i, j, 0), together(air, air.swing, i, j, 2)
+            air.leaping[i, j] += dt * V * (rolling * roll + yawing * yaw)
     air.leaps = 3
 
 
@@ -260,25 +260,41 @@ def elapse(air, share):
 
 
 @kernel
-def whole_drift(air, V, i, j):
-    """Intensity, as `unseen_drift`, of all of the air's rotation: of one who does not ask the vanes."""
+def whole_drift(air, V, felt):
+    """Intensity, (rad/s2)2/s, of all of the air's rotation where it is `felt` (3,) 1/s about the body axes:
+    of one who does not ask the vanes."""
     total, longest_s = 0.0, air.rolling / V
     for g in range(3):
-        on_i, on_j = 0.0, 0.0
-        for k in range(3):
-            on_i += air.damping[i, k] * air.axes[k, g]
-            on_j += air.damping[j, k] * air.axes[k, g]
-        total += on_i * on_j * air.per_metre[g]
+        total += along(felt, air.axes, g) ** 2 * air.per_metre[g]
         if air.swings:
-            total += 0.5 * longest_s * longest_s * air.per_metre[g] * swung(air, i, j, g)
+            total += 0.5 * longest_s * longest_s * air.per_metre[g] * along(felt, air.swing, g) ** 2
     return total * V
 
 
 @kernel
-def swung(air, i, j, g):
-    """How much the turning axis of gust g moves accelerations i and j together, 1/s4 of a gust of 1 rad/s."""
+def drift_beside(air, V, by_rates, by_forces):
+    """Intensity of what the vanes leave of the rotation where rates feel it, and of all of it where forces
+    do: (3,) 1/s each, about the body axes."""
+    total = 0.0
+    for g in range(3):
+        unseen = air.unseen[g] if g != 2 else min(air.unseen[g] + air.turning, 1.0)
+        of_rates = np.sqrt(unseen) * abs(along(by_rates, air.axes, g))
+        total += (of_rates + abs(along(by_forces, air.axes, g))) ** 2 * air.per_metre[g]
+    return total * V
+
+
+@kernel
+def along(felt, axes, g):
+    """What axis g of the gusts does where rotation is `felt` (3,) about the body axes."""
+    return felt[0] * axes[0, g] + felt[1] * axes[1, g] + felt[2] * axes[2, g]
+
+
+@kernel
+def together(air, axes, i, j, g):
+    """How much axis g of the gusts moves accelerations i and j together, of 1 rad/s along it: 1/s2 of `axes`,
+    1/s4 of their `swing`."""
     on_i, on_j = 0.0, 0.0
     for k in range(3):
-        on_i += air.damping[i, k] * air.swing[k, g]
-        on_j += air.damping[j, k] * air.swing[k, g]
+        on_i += air.damping[i, k] * axes[k, g]
+        on_j += air.damping[j, k] * axes[k, g]
     return on_i * on_j

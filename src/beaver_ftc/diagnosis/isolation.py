@@ -102,31 +102,35 @@ def possible(fdi, fie, x, started):
 def rules_out(fdi, fie, within):
     """Whether a fault is excluded by those in authority; `within`: it is possible in the worst case.
 
-    Of faults of every type the sets know the course; chance, which axes are moved. Of two faults at once one
-    may move what the other does not. Within a frame of several instants a column turns with the incidence
-    while the surface moves, and shows across its mean: there nothing is concluded.
+    Of faults of every type the sets know the course; chance, which axes are moved.
     """
     if fdi.authority == WORST_CASE or (fdi.every_type and not within):
         return not within
     if fdi.every_type:
-        asked = fdi.statistical.enabled and not fdi.pair.enabled and fdi.instants == 1
-        return asked and across.excludes(fdi, fie.surface)
+        return fdi.statistical.enabled and across.excludes(fdi, fie.surface)
     if fdi.authority != STATISTICS and not within:
         return True
     if not fdi.statistical.enabled or fie.shown:
         return False
     fie.shown = not fdi.abrupt and shows(fdi, fie.surface)  # what comes later may be its end
-    return not fie.shown and excludes(fdi, fie.surface)
+    if fie.shown or not excludes(fdi, fie.surface, False):
+        return False
+    fie.doubted = 1  # only the end of a loss that nobody saw would explain it
+    return excludes(fdi, fie.surface, True)
 
 
 @kernel
 def decide(fdi, t):
-    """The generalised observer scheme: the one left is the fault; none left means it is outside the class."""
+    """The generalised observer scheme: the one left is the fault; none left means it is outside the class.
+
+    One that is left for an end alone, of a loss that was never seen, is not named.
+    """
     left, last = 0, NOT_ISOLATED
     for s in range(fdi.n_estimators):
-        if not fdi.estimator[s].excluded:
+        fie = fdi.estimator[s]
+        if not fie.excluded:
             left += 1
-            last = s
+            last = NOT_ISOLATED if fie.doubted and not fie.shown else s
     named = NOT_ISOLATED if left > 1 else (last if left == 1 else UNANTICIPATED)
     if named != fdi.verdict.isolated:
         fdi.verdict.isolated = named

@@ -33,6 +33,7 @@ alarm on they stay, and old evidence is forgotten slowly.
 from math import sqrt
 
 from beaver_ftc.compiled import kernel
+from beaver_ftc.diagnosis import whitening
 from beaver_ftc.diagnosis.state import ENDING, GROWING, LANES, LOSS, MAX_HYPOTHESES, N_SLOTS
 
 PRIOR_INFORMATION = 12.0  # of a loss uniform on [0, 1]: one over its variance
@@ -230,6 +231,25 @@ def judge(block, memory=0.0):
         if likeliest >= 0:
             N, D = lane.correlation[likeliest], lane.information[likeliest]
             hypothesis.theta, hypothesis.certainty = estimate(hypothesis.kind, N, D), D
+
+
+@kernel
+def take_in(block, bounded, tolerated, dt, keep, memory=0.0):
+    """One frame of a block: its `scratch`, rad/s2, whitened and weighed against every hypothesis.
+
+    Noise, drift and signatures are the frame's already, and so, where `tolerated`, are the regressors.
+    bounded: as of `reach`; keep, memory: as of `weigh` and `judge`.
+    """
+    whitening.advance(block, dt)
+    if block.level > 0.0:
+        reach(block, bounded, dt)
+    whitening.whiten(block, block.state, block.scratch, dt, block.innovation)
+    if tolerated:
+        for j in range(block.n_regressors):
+            state, response = block.regressor_state[j], block.regressor_response[j]
+            whitening.whiten(block, state, block.regressor[j], dt, response)
+    weigh(block, tolerated, dt, keep)
+    judge(block, memory)
 
 
 @kernel

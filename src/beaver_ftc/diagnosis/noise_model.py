@@ -14,6 +14,8 @@ from beaver_ftc.design.inertia import inertia_coefficients
 from beaver_ftc.design.terms import AIRSPEED, ALPHA, BETA, PH, QDYN, QH, RH, fill_table
 from beaver_ftc.design.variants import coefficient_slopes, jacobian
 from beaver_ftc.diagnosis.admitted import GUST_FT_S, SCALE_FT, inertia_slack, tolerances
+from beaver_ftc.diagnosis.forces import set_up_forces
+from beaver_ftc.diagnosis.readings import random_error, set_up_readings
 from beaver_ftc.diagnosis.state import (
     ALPHA3,
     ENDING,
@@ -22,9 +24,10 @@ from beaver_ftc.diagnosis.state import (
     LOSS,
     N_SLOTS,
     SENSE,
+    SIDE,
     STEP,
 )
-from beaver_ftc.diagnosis.views import PRIOR_DRIFT_RAD_S2, set_up_views
+from beaver_ftc.diagnosis.views import PRIOR_DRIFT_RAD_S2, across_a_column, set_up_views, views_of
 from beaver_ftc.plant.instruments import SIGNALS
 from beaver_ftc.scenario.diagnosis import Bounds, FdiConfig, Statistical
 from beaver_ftc.scenario.sensors import Sensors
@@ -37,10 +40,10 @@ GROWTH_PER_S = 1.5
 # Share of the intensity of the rolling, pitching and yawing gust that the vanes leave; on exact vanes and
 # over a filter's memory it is less (`tests/diagnosis/test_air.py`).
 UNSEEN = (1.0, 0.003, 0.03)
-
 # Share of the alarm level that noise is given beside an uncertainty at its bound; what it is worth where both
 # matter is in docs/theory.md, section 7.
 CHANCE = 0.5
+BY_FORCE = 0.01  # share of the intensity that errors of a tenth leave of the gusts that forces show
 LEAST_NOISE_RAD_S = 1e-9  # of a gyro: exact ones are still doubles, and a variance no difference of zeros
 Start = tuple[np.ndarray, np.ndarray, np.ndarray]  # x (3,) rad/s, y (5,) and u (4,) rad in trim
 _GYRO_OF = dict(zip(RATE_SIGNALS, AXES, strict=True))
@@ -72,20 +75,26 @@ def _steps(axes: tuple[int, ...]) -> Iterator[Hypothesis]:
     return ((STEP, -1, axis, 1) for axis in axes)
 
 
-def tests_a_frame(aircraft: Aircraft | None) -> int:
-    """How many one-sided tests the detector makes in a frame."""
-    blocks = blocks_of(aircraft or load())
-    return N_SLOTS * sum(SIDES[kind] for _, members in blocks for kind, _, _, alarms in members if alarms)
+def tests_a_frame(aircraft: Aircraft | None, *, forces: bool) -> int:
+    """How many one-sided tests the detector makes in a frame; forces: of forces too."""
+    aircraft = aircraft or load()
+    kinds = [kind for _, members in blocks_of(aircraft) for kind, _, _, alarms in members if alarms]
+    for view in views_of(aircraft, forces):
+        kinds += [STEP, *(LOSS for _ in view.tries)] if view.across >= 0 and any(view.mix[SIDE:]) else []
+    return N_SLOTS * sum(SIDES[kind] for kind in kinds)
 
 
-def alarm_level(false_alarms_per_h: float, rate_hz: float, aircraft: Aircraft | None = None) -> float:
+def alarm_level(
+    false_alarms_per_h: float, rate_hz: float, aircraft: Aircraft | None = None, forces: bool = False
+) -> float:
     """Standard deviations at which all tests of an hour together give so many false alarms at most."""
-    return -NormalDist().inv_cdf(false_alarms_per_h / (3600.0 * rate_hz * tests_a_frame(aircraft)))
+    tests = 3600.0 * rate_hz * tests_a_frame(aircraft, forces=forces)
+    return -NormalDist().inv_cdf(false_alarms_per_h / tests)
 
 
 def naming_level(misnaming: float, rate_hz: float, aircraft: Aircraft | None = None) -> float:
     """Difference of log likelihoods that chance gives with this probability at most within a second."""
-    return 0.5 * NormalDist().inv_cdf(misnaming / (rate_hz * tests_a_frame(aircraft))) ** 2
+    return 0.5 * NormalDist().inv_cdf(misnaming / (rate_hz * tests_a_frame(aircraft, forces=False))) ** 2
 
 
 def set_up(
@@ -105,27 +114,29 @@ def set_up(
         return
     statistical["enabled"], statistical["share"] = 1, 1.0 / max(int(fdi["instants"]), 1)
     _set_up_air(statistical["air"], config.bounds.turbulence, mass, aircraft)
-    statistical["alarm_level"] = alarm_level(given.false_alarms_per_h, rate_hz, aircraft)
+    forces = bool(statistical["forces"]["known"])
+    statistical["alarm_level"] = alarm_level(given.false_alarms_per_h, rate_hz, aircraft, forces)
     statistical["naming_level"] = naming_level(given.misnaming, rate_hz, aircraft)
     statistical["keep"] = exp(-1.0 / (rate_hz * config.forgetting_time_s))
     _set_up_blocks(statistical, config.bounds.sensors, aircraft)
     _set_up_bounded(statistical, given, config, 1.0 / rate_hz)
     _set_up_noise(statistical, given, config.bounds, design, start, 1.0 / rate_hz)
     _set_up_tolerances(statistical, config.bounds, design, mass, start, aircraft)
-    if config.fault_class == "all":
+    set_up_readings(statistical, config.bounds.sensors, fdi["bound"]["admitted"])
+    if across_a_column(config, int(fdi["instants"])):
+        if forces:
+            set_up_forces(statistical, config.bounds, aircraft, start, jacobian(design, *start)[3])
+            statistical["air"]["read"] = 1
+            statistical["inertial_air"] = statistical["air"]
+            statistical["inertial_air"]["unseen"] = np.minimum(np.add(UNSEEN, BY_FORCE), 1.0)
         set_up_views(statistical, aircraft)
     block = statistical["block"][-1]
     block["lag"] = returning_length(statistical, float(start[1][AIRSPEED]), rate_hz)
     if statistical["air"]["moving"]:
         block["stronger"] = (statistical["air"]["rolling"] / block["lag"]) ** 2
         span_m = aircraft.geometry.span_m
-        statistical["jitter"] += _gust_jitter(config.bounds.sensors, design, start, span_m) ** 2
-
-
-def _random_error(sensors: Sensors, name: str) -> float:
-    """Standard deviation of what changes from sample to sample: noise and rounding."""
-    noise, _, quantum = getattr(sensors, name).noise_bias_quantum
-    return sqrt(noise**2 + quantum**2 / 12.0)
+        for name in ("own_jitter", "jitter"):
+            statistical[name] += _gust_jitter(config.bounds.sensors, design, start, span_m) ** 2
 
 
 def _set_up_blocks(statistical: np.void, sensors: Sensors, aircraft: Aircraft) -> None:
@@ -138,7 +149,7 @@ def _set_up_blocks(statistical: np.void, sensors: Sensors, aircraft: Aircraft) -
         block["keep"], block["stronger"] = 1.0, 1.0
         for i, axis in enumerate(axes):
             block["axis"][i] = axis
-            variance = max(_random_error(sensors, AXES[axis]), LEAST_NOISE_RAD_S) ** 2
+            variance = max(random_error(sensors, AXES[axis]), LEAST_NOISE_RAD_S) ** 2
             block["noise"][i] = block["P_xx"][i, i] = variance
             block["P_dd"][i, i] = PRIOR_DRIFT_RAD_S2**2
         sense = block["lane"]["sense"].reshape(N_SLOTS, -1)
@@ -174,14 +185,15 @@ def _set_up_noise(
     dt_s: float,
 ) -> None:
     """What drifts, and what is white: noise of the measurements that f + G u is made of."""
-    noise = max(_random_error(bounds.sensors, axis) for axis in AXES)
+    noise = max(random_error(bounds.sensors, axis) for axis in AXES)
     largest = max(bounds.constant_rad_s2.as_tuple())
     level = float(statistical["alarm_level"])
     statistical["rapidity"] = rapidity(largest, given.uncertainty_rad_s, noise, level, dt_s)
     _, G, f_x, f_y = jacobian(design, *start)
-    errors = np.array([_random_error(bounds.sensors, name) for name in SIGNALS])
-    along = np.column_stack([f_x, f_y[:, [ALPHA, BETA, AIRSPEED, QDYN]]])
-    statistical["jitter"] = (along**2) @ errors**2
+    errors = np.array([random_error(bounds.sensors, name) for name in SIGNALS])
+    statistical["own_jitter"] = f_x**2 @ errors[:3] ** 2
+    in_trim = f_y[:, [ALPHA, BETA, AIRSPEED, QDYN]] ** 2 @ errors[3:] ** 2  # later as readings.py says
+    statistical["jitter"] = statistical["own_jitter"] + in_trim
     statistical["deflection"] = np.abs(G).sum(axis=1) * np.radians(bounds.deflection_deg)
 
 
@@ -238,38 +250,33 @@ def _set_up_tolerances(
 def steady_tolerance(
     bounds: Bounds, aircraft: Aircraft, design: np.void, mass: MassProperties, y: np.ndarray, u: np.ndarray
 ) -> np.ndarray:
-    """Tolerance of each moment's term that covers every declared constant error; y, u in trim."""
+    """Tolerance of each moment's term that covers every declared constant error but those of the air data
+    (readings.py); y, u in trim."""
     size = np.abs(design["moments"]["value"][: len(aircraft.moments)])
     share = np.full(size.shape, _inertia_share(bounds.inertia, mass))
-    share += [_measured_share(bounds, term, y) for term in aircraft.moments]
+    share += [_measured_share(bounds, term) for term in aircraft.moments]
     total = tolerances(bounds.coefficients, aircraft, size) + share * size
     slopes = np.abs(coefficient_slopes(design, np.zeros(3), y, u))
     span, chord = aircraft.geometry.span_m, aircraft.geometry.chord_m
-    lengths = {"alpha": 1.0, "beta": 1.0} | dict(zip(AXES, (span / 2, chord, span / 2), strict=True))
-    for name, place in zip(lengths, (ALPHA, BETA, PH, QH, RH), strict=True):
-        error = abs(getattr(bounds.sensors, name).noise_bias_quantum[1]) * lengths[name]
+    for name, place, length in zip(AXES, (PH, QH, RH), (span / 2, chord, span / 2), strict=True):
+        error = abs(getattr(bounds.sensors, name).noise_bias_quantum[1]) * length / y[AIRSPEED]
         for k, term in enumerate(aircraft.moments):
             if term.is_constant:
-                total[k] += error * slopes[_axis_of(term), place] / (y[AIRSPEED] if name in AXES else 1.0)
+                total[k] += error * slopes[_axis_of(term), place]
     return total
 
 
-def _measured_share(bounds: Bounds, term: Term, y: np.ndarray) -> float:
-    """Relative error of what a term multiplies, by constant errors of gyros, airspeed and pressure."""
+def _measured_share(bounds: Bounds, term: Term) -> float:
+    """Relative error of what a term multiplies, by the slopes of gyros, vanes, airspeed and pressure."""
     own = AXES[_axis_of(term)]  # a gyro's slope is counted once for all terms of its own axis
-    share = abs(getattr(bounds.sensors, own).scale_error) + _steady_share(bounds, "qdyn", y[QDYN])
+    share = abs(getattr(bounds.sensors, own).scale_error) + abs(bounds.sensors.qdyn.scale_error)
     for signal, power in term.of:
         if signal in _GYRO_OF:
-            share += power * _steady_share(bounds, "V", y[AIRSPEED])
+            share += power * abs(bounds.sensors.V.scale_error)
         sensor = getattr(bounds.sensors, _GYRO_OF.get(signal, signal), None)
         if sensor is not None and _GYRO_OF.get(signal) != own:
             share += power * abs(sensor.scale_error)
     return share
-
-
-def _steady_share(bounds: Bounds, name: str, value: float) -> float:
-    sensor = getattr(bounds.sensors, name)
-    return abs(sensor.noise_bias_quantum[1]) / value + abs(sensor.scale_error)
 
 
 def _inertia_share(tolerance: float, mass: MassProperties) -> float:
@@ -307,8 +314,8 @@ def _gust_jitter(sensors: Sensors, design: np.void, start: Start, span_m: float)
     """Standard deviation, rad/s2 on each axis, of what the vanes' noise adds to the gust they see."""
     _, y, u = start
     V, b = y[AIRSPEED], span_m
-    speed = 0.3 * _random_error(sensors, "V") / V  # through attitudes of up to 17 deg
-    pitching = (_random_error(sensors, "alpha") + speed) * pi * V / (4 * b)
-    yawing = (_random_error(sensors, "beta") + speed) * pi * V / (3 * b)
+    speed = 0.3 * random_error(sensors, "V") / V  # through attitudes of up to 17 deg
+    pitching = (random_error(sensors, "alpha") + speed) * pi * V / (4 * b)
+    yawing = (random_error(sensors, "beta") + speed) * pi * V / (3 * b)
     damping = jacobian(design, np.zeros(3), y, u)[2]  # without rates all of it is aerodynamic
     return np.sqrt((damping[:, 1] * pitching) ** 2 + (damping[:, 2] * yawing) ** 2)

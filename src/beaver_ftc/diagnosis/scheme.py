@@ -6,7 +6,17 @@ takes each surface for, so that what is known of a fault is no surprise; offset 
 
 from beaver_ftc.compiled import apart, kernel
 from beaver_ftc.design.model import AIRSPEED, ALPHA, BETA, unanticipated_pitch
-from beaver_ftc.diagnosis import across, air, bank, detection, instruments, isolation, network, statistical
+from beaver_ftc.diagnosis import (
+    across,
+    air,
+    bank,
+    detection,
+    forces,
+    instruments,
+    isolation,
+    network,
+    statistical,
+)
 from beaver_ftc.diagnosis.belief import begin_frame, look
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, STATISTICS, WORST_CASE
 from beaver_ftc.diagnosis.types import examine
@@ -43,7 +53,7 @@ def predict(fdi, belief, measured, effectiveness, offset, k, t):
         compare_likelihoods(fdi, belief, measured, k, t)
     isolation.suppose_all(fdi, mean.G, mean.Gu, mean.Gu_spread)
     if fdi.every_type:
-        examine.note_orders(fdi, belief.commanded)
+        examine.note_orders(fdi, belief.commanded, mean)
     if fdi.verdict.detected:
         isolation.predict_all(fdi, x_then, expected)
         expect_known_faults(expected, mean, effectiveness, offset, fdi.every_type)
@@ -71,6 +81,8 @@ def expect_known_faults(expected, mean, effectiveness, offset, offsets_count):
 def compare_likelihoods(fdi, belief, measured, k, t):
     """Show the statistical detector the elapsed frame."""
     air.elapse(fdi.statistical.air, belief.share)
+    if fdi.statistical.inertial_air.moving:
+        air.elapse(fdi.statistical.inertial_air, belief.share)
     cubic = unanticipated_pitch(belief.design, measured.y, 1.0)
     statistical.signatures(fdi.statistical, belief.means.Gu, cubic)
     latched = fdi.statistical.detected_at_s >= 0.0
@@ -108,6 +120,23 @@ def ready(fdi, belief, measured, k):
     begin_frame(fdi, belief, measured)
 
 
+@kernel
+def weigh_forces(fdi, belief, measured, k):
+    """Take in what the accelerometers say, and the air as it follows from them without the vanes."""
+    known, seen, inertial = fdi.statistical.forces, fdi.statistical.air, fdi.statistical.inertial_air
+    forces.look(known, seen, measured, belief.u, fdi.dt)
+    seen.felt[:] = measured.force
+    if inertial.moving:
+        forces.without_vanes(known, inertial.rotation, measured.y)
+        inertial.felt[:] = measured.force
+        if k > 0:
+            air.observe(inertial, known.y, measured.attitude, fdi.dt)
+        else:
+            air.begin(inertial, known.y, measured.attitude)
+        air.effect(inertial, belief.design, measured.x, known.y, belief.u)
+        air.begin_frame(inertial, known.y[AIRSPEED], fdi.dt)
+
+
 @apart
 def look_ahead(fdi, belief, measured, k):
     """Ready the statistical detector for the next frame: the air as the vanes see it, noise, coefficients."""
@@ -116,6 +145,8 @@ def look_ahead(fdi, belief, measured, k):
             air.observe(fdi.statistical.air, measured.y, measured.attitude, belief.share * fdi.dt)
         else:
             air.begin(fdi.statistical.air, measured.y, measured.attitude)
+    if fdi.statistical.forces.known:
+        weigh_forces(fdi, belief, measured, k)
     statistical.prepare(fdi.statistical, fdi, belief.design, measured.x, measured.y, belief.u)
 
 
@@ -123,7 +154,7 @@ def look_ahead(fdi, belief, measured, k):
 def look_at_air(fdi, belief, measured):
     """Take in the gust that the vanes see by now, and what it does."""
     x, y, dt = measured.x, measured.y, belief.share * fdi.dt
-    statistical.look(fdi.statistical, belief.design, x, y, belief.u, measured.attitude, dt)
+    statistical.look(fdi.statistical, fdi, belief.design, x, y, belief.u, measured.attitude, dt)
 
 
 @kernel

@@ -4,10 +4,12 @@ from functools import lru_cache
 
 import numpy as np
 
-from beaver_ftc.aircraft.schema import MAX_TERMS, MAX_TERMS_OF_ONE
+from beaver_ftc.aircraft.schema import MAX_MONOMIALS, MAX_TERMS, MAX_TERMS_OF_ONE
+from beaver_ftc.design.terms import N_SIGNALS
 from beaver_ftc.diagnosis.air import AIR
 from beaver_ftc.diagnosis.derived import admitted_dtype
 from beaver_ftc.diagnosis.error_map import error_map_dtype
+from beaver_ftc.diagnosis.forces import FORCES_FELT
 from beaver_ftc.diagnosis.types.memory import surface_dtype
 from beaver_ftc.diagnosis.watch import WATCH
 from beaver_ftc.scenario.diagnosis import MAX_POLES
@@ -16,7 +18,7 @@ MAX_ESTIMATORS = 16
 NOT_ISOLATED, UNANTICIPATED = -1, -2
 INTERVAL, PUBLISHED = 0, 1
 LOSS, POSITION = 0, 1  # kinds of hypothesis: fault_class.py
-ROLL, PITCH, YAW = range(3)  # axes
+ROLL, PITCH, YAW, SIDE, NORMAL = range(5)  # axes, and the accelerometers beside them: forces.py
 
 # Centres of the network's basis functions, rad; and its memory.
 ALPHA_CENTRES = np.linspace(-0.1, 0.5, 9)
@@ -37,7 +39,8 @@ ESTIMATOR = np.dtype(
     [
         ("kind", "i8"), ("surface", "i8"),
         ("low", "f8"), ("high", "f8"),  # the known set of theta
-        ("excluded", "i8"), ("excluded_at_s", "f8"), ("unasked", "i8", (3,)), ("shown", "i8"),
+        ("excluded", "i8"), ("excluded_at_s", "f8"), ("unasked", "i8", (3,)),
+        ("shown", "i8"), ("doubted", "i8"),
         ("xhat", "f8", (3,)), ("residual", "f8", (3,)), ("lower", "f8", (3,)), ("upper", "f8", (3,)),
         ("omega", "f8", (3,)), ("rise", "f8", (3,)), ("fall", "f8", (3,)), ("bound", "f8", (3,)),
         ("bound_eta", "f8", (3,)), ("bound_noise", "f8", (3,)),
@@ -56,8 +59,9 @@ ESTIMATOR = np.dtype(
 # then the drift. Every hypothesis is tried from every onset: that is a lane of a block, and what lanes keep
 # lies side by side for vector instructions, lane slot * MAX_HYPOTHESES + hypothesis.
 N_SLOTS = 10
-MAX_HYPOTHESES, MAX_REGRESSORS = 8, 2 * MAX_TERMS_OF_ONE + 1
-MAX_VIEWS = 5
+N_READINGS = 5  # alpha, beta, airspeed, dynamic pressure, engine power: readings.py
+MAX_HYPOTHESES, MAX_REGRESSORS = 8, 3 * MAX_TERMS_OF_ONE + 3 + N_READINGS
+MAX_VIEWS = 16
 PITCH_BLOCK, LATERAL, RETURNING = 0, 1, 2  # the last is the second view of roll and yaw
 LANES = N_SLOTS * MAX_HYPOTHESES
 EITHER, WORST_CASE, STATISTICS = 0, 1, 2  # whose alarms count
@@ -111,10 +115,16 @@ BLOCK = np.dtype(
 )  # fmt: skip
 
 # The rates along a direction, `mix` (across.py), in a block of one axis. surface: whose column it is across,
-# or -1.
+# AN_AXIS of none, THE_VANE of an error of the incidence. plane: of the column; tolerated: anything at all;
+# inertial: the force by an angle that no vane gave; clears: what it shows is no vane's doing; cleared_by: the
+# force of the views that clear its vane, 0 where it asks none. held: its largest score, slowly forgotten.
+AN_AXIS, THE_VANE = -1, -2
 VIEW = np.dtype(
     [
-        ("surface", "i8"), ("mix", "f8", (3,)), ("bounded", "f8", (1,)), ("block", BLOCK),
+        ("surface", "i8"), ("mix", "f8", (5,)), ("plane", "i8", (2,)), ("tolerated", "i8"),
+        ("inertial", "i8"), ("clears", "i8"), ("cleared_by", "i8"),
+        ("bounded", "f8", (1,)), ("by_rates", "f8", (3,)), ("by_forces", "f8", (3,)), ("held", "f8"),
+        ("block", BLOCK),
     ],
     align=True,
 )  # fmt: skip
@@ -127,7 +137,11 @@ STATISTICAL = np.dtype(
         ("rapidity", "f8"),  # 1/s: intensity of the drift of an uncertainty over its bound squared
         ("bounded", "f8", (3,)), ("deflection", "f8", (3,)), ("jitter", "f8", (3,)), ("tolerated", "i8"),
         ("n_blocks", "i8"), ("block", BLOCK, (3,)), ("n_views", "i8"), ("views", VIEW, (MAX_VIEWS,)),
-        ("air", AIR), ("terms", "f8", (MAX_TERMS,)),
+        ("forces", FORCES_FELT),
+        ("air", AIR), ("inertial_air", AIR), ("terms", "f8", (MAX_TERMS,)),
+        # readings.py: whether errors of the air data count; their noise, and the jitter of all else; scratch
+        ("read", "i8"), ("reading_noise", "f8", (N_READINGS,)), ("own_jitter", "f8", (3,)),
+        ("direction", "f8", (N_SIGNALS,)), ("slope", "f8", (MAX_MONOMIALS,)), ("moved", "f8", (3,)),
         ("score", "f8"), ("axis", "i8"), ("closest", "f8"), ("detected_at_s", "f8"),
     ],
     align=True,

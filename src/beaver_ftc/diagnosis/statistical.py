@@ -10,7 +10,7 @@ import numpy as np
 
 from beaver_ftc.compiled import kernel
 from beaver_ftc.design.terms import AIRSPEED, QDYN, evaluate, regressors
-from beaver_ftc.diagnosis import air, likelihood, whitening
+from beaver_ftc.diagnosis import across, air, likelihood, readings, whitening
 from beaver_ftc.diagnosis.state import (
     ENDING,
     GROWING,
@@ -26,10 +26,6 @@ from beaver_ftc.diagnosis.thresholds import uncertainty_bound
 # Of what the best explanation explains, the part that a constant theta leaves to a loss that grows is larger
 # for every rate of growth (docs/theory.md, section 7).
 LEAST_PART = 0.25
-# Of what the end of a loss explains, what the loss has explained before. Both grow with the time they have
-# lasted: this is the shortest loss reckoned with, 0.1 s, over the longest window, 5 s at 100 Hz. One that
-# grows evenly has in the mean a third of the square that it ends with.
-SHOWN_BEFORE, OF_A_RAMP = 0.02, 1.0 / 3.0
 
 
 @kernel
@@ -60,20 +56,11 @@ def observe(statistical, innovation, dt, frame, latched, ends=False):
             likelihood.start(block, slot)
         if statistical.air.moving:
             leap(statistical.air, block)
-        whitening.advance(block, dt)
-        if block.level > 0.0:
-            likelihood.reach(block, statistical.bounded, dt)
         for i in range(block.n):
             axis = block.axis[i]
             block.scratch[i] = innovation[axis] - statistical.air.mean[axis]
-        whitening.whiten(block, block.state, block.scratch, dt, block.innovation)
-        if statistical.tolerated:
-            for j in range(block.n_regressors):
-                whitening.whiten(
-                    block, block.regressor_state[j], block.regressor[j], dt, block.regressor_response[j]
-                )
-        likelihood.weigh(block, statistical.tolerated, dt, keep)
-        likelihood.judge(block, statistical.keep if ends else 0.0)
+        memory = statistical.keep if ends else 0.0
+        likelihood.take_in(block, statistical.bounded, statistical.tolerated, dt, keep, memory)
 
 
 @kernel
@@ -114,16 +101,28 @@ def score(statistical, t):
         block = statistical.block[b]
         for h in range(block.n_hypotheses):
             hypothesis = block.hypothesis[h]
-            share = hypothesis.score / statistical.alarm_level
-            if hypothesis.alarms and share > statistical.score:
-                statistical.score, statistical.axis = share, hypothesis.axis
+            if hypothesis.alarms:
+                note(statistical, hypothesis.score, hypothesis.axis)
+    for a in range(statistical.n_views):
+        view = statistical.views[a]
+        if across.alarms(view):
+            note(statistical, across.shown(statistical, view), view.plane[0])
     if statistical.score > 1.0 and statistical.detected_at_s < 0.0:
         statistical.detected_at_s = t
 
 
 @kernel
+def note(statistical, score, axis):
+    """Keep a score if it is the largest."""
+    share = score / statistical.alarm_level
+    if share > statistical.score:
+        statistical.score, statistical.axis = share, axis
+
+
+@kernel
 def record(statistical, row):
-    """Write the last columns of the log: each test as a share of the alarm level, losses, then steps."""
+    """Write the last columns of the log: each test as a share of the alarm level, losses, then steps. What
+    forces show besides is in the step of the axis."""
     first = row.size - statistical.n_columns
     row[first:] = 0.0
     for b in range(statistical.n_blocks):
@@ -133,6 +132,11 @@ def record(statistical, row):
             if hypothesis.alarms:
                 place = first + hypothesis.column
                 row[place] = max(row[place], hypothesis.score / statistical.alarm_level)
+    for a in range(statistical.n_views):
+        view = statistical.views[a]
+        if across.alarms(view):
+            place = row.size - 3 + view.plane[0]
+            row[place] = max(row[place], across.shown(statistical, view) / statistical.alarm_level)
 
 
 @kernel
@@ -190,15 +194,15 @@ def shows(fdi, surface):
 
 
 @kernel
-def excludes(fdi, surface):
+def excludes(fdi, surface, ends):
     """Whether something else explains the flight better than a loss of this surface, by the naming level.
 
     Each view of roll and yaw is held against that of pitch: a loss explains what it does to its own axes. A
     loss whose course is not declared `abrupt` may grow, and a constant theta then explains only part of what
     it does: it is excluded where that part is small besides; so is one that begins within a frame. The end of
     one is a step like any other, and explains as much or nothing, but within a frame of several instants a
-    part: it shows in two; in pitch, where a fault outside the class is such a step, only where a loss has
-    shown before.
+    part: it shows in two; in pitch, where a fault outside the class may be such a step, only where asked for,
+    by `ends`.
     """
     statistical = fdi.statistical
     pitch, exact = statistical.block[PITCH], fdi.abrupt and fdi.instants == 1
@@ -207,10 +211,8 @@ def excludes(fdi, surface):
         better = max(best_alternative(fdi, pitch, surface), best_alternative(fdi, lateral, surface))
         worse = max(at_most(pitch, surface, False), at_most(lateral, surface, False))
         ended = at_most(lateral, surface, True)
-        in_pitch = at_most(pitch, surface, True)
-        shown = SHOWN_BEFORE if fdi.abrupt else SHOWN_BEFORE * OF_A_RAMP
-        if at_most(pitch, surface, False) > min(0.5 * statistical.naming_level, shown * in_pitch):
-            ended = max(ended, in_pitch)
+        if ends:
+            ended = max(ended, at_most(pitch, surface, True))
         part = 1.0 if exact else LEAST_PART
         end_part = 1.0 if fdi.instants == 1 else LEAST_PART
         small = worse < part * better and ended < end_part * better
@@ -240,22 +242,31 @@ def prepare(statistical, fdi, design, x, y, u):
     """
     if statistical.air.moving:
         air.effect(statistical.air, design, x, y, u)
-    drifts(statistical, fdi, design, x, y)
-    if statistical.air.moving:
-        air.begin_frame(statistical.air, y[AIRSPEED], statistical.share * fdi.dt)
     if statistical.tolerated:
         for b in range(statistical.n_blocks):
             statistical.block[b].regressor[:] = 0.0
-        coefficients(statistical, design, x, y, u)
+        constants(statistical, fdi, design, x, y, u)
+    drifts(statistical, fdi, design, x, y)
+    if statistical.air.moving:
+        air.begin_frame(statistical.air, y[AIRSPEED], statistical.share * fdi.dt)
 
 
 @kernel
-def look(statistical, design, x, y, u, attitude, dt):
+def look(statistical, fdi, design, x, y, u, attitude, dt):
     """Take in an instant inside a frame, dt s after the one before; attitude (3,) rad."""
     if statistical.air.moving:
         air.look(statistical.air, design, x, y, u, attitude, dt)
     if statistical.tolerated:
-        coefficients(statistical, design, x, y, u)
+        constants(statistical, fdi, design, x, y, u)
+
+
+@kernel
+def constants(statistical, fdi, design, x, y, u):
+    """Add to the regressors what the constants that are not known multiply now."""
+    evaluate(design.moments, x, y)
+    coefficients(statistical, design, y, u)
+    if statistical.read:
+        readings.add(statistical, fdi.bound.admitted, design, y, u)
 
 
 @kernel
@@ -282,10 +293,9 @@ def drifts(statistical, fdi, design, x, y):
 
 
 @kernel
-def coefficients(statistical, design, x, y, u):
+def coefficients(statistical, design, y, u):
     """Add to each block's regressors (n, 2) rad/s2, means over a frame: what the coefficients multiply."""
     table = design.moments
-    evaluate(table, x, y)
     regressors(table, table.power, u, statistical.terms)
     share = statistical.share * y[QDYN] * design.S
     lateral, longitudinal = share * design.b, share * design.c

@@ -96,7 +96,8 @@ class Changing:
             take_diagnosis(frame, new, stage.frame)
         if change.sensors is not None:
             take_instruments(frame["instruments"], new["instruments"])
-        if frame["fdi"]["watch"]["enabled"] or frame["instruments"]["engine"]:
+        forces = frame["fdi"]["statistical"]["forces"]["known"]
+        if frame["fdi"]["watch"]["enabled"] or frame["instruments"]["engine"] or forces:
             read_more(loop)
         frame["control"]["power"]["enabled"] = new["control"]["power"]["enabled"]
         frame["control"]["hands_back"] = 1

@@ -9,6 +9,8 @@ from beaver_ftc.design.context import DesignModel
 from beaver_ftc.design.engine import power_error_kw
 from beaver_ftc.diagnosis.admitted import GUST_FT_S, GUST_LIMIT_SIGMA, SCALE_FT
 from beaver_ftc.diagnosis.declared import gust_effect
+from beaver_ftc.diagnosis.forces import tell_apart
+from beaver_ftc.diagnosis.views import across_a_column
 from beaver_ftc.diagnosis.watch import NOBODY, POLES_PER_S
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop import steps
@@ -51,10 +53,18 @@ def has_real_engine(scenario: Scenario) -> bool:
     return real and scenario.airframe.has_engine_instruments
 
 
+def weighs_forces(scenario: Scenario) -> bool:
+    """Whether accelerometers are read to tell surfaces apart by their forces."""
+    config = scenario.fdi
+    counts = config.statistical is not None and config.scheme == "adaptive-estimators"
+    return counts and across_a_column(config, scenario.substeps) and tell_apart(scenario.airframe)
+
+
 def truth_read(scenario: Scenario) -> tuple[ch.Channel, ...]:
     """What is read from the truth in this flight."""
     usual = ch.truth_channels(scenario.airframe)
-    further = is_watched(scenario) or breaks_instruments(scenario) or has_real_engine(scenario)
+    reasons = is_watched, breaks_instruments, has_real_engine, weighs_forces
+    further = any(reason(scenario) for reason in reasons)
     return (*usual, *ch.further_channels(scenario.airframe)) if further else usual
 
 
@@ -63,6 +73,7 @@ def assemble_instruments(frame: np.void, scenario: Scenario, dt: float) -> None:
     instruments = frame["instruments"]
     instruments["real"] = not scenario.sensors.is_ideal
     instruments["engine"] = has_real_engine(scenario)
+    frame["fdi"]["statistical"]["forces"]["known"] = weighs_forces(scenario)
     for i, name in enumerate(SENSORS):
         sensor = getattr(scenario.sensors, name)
         noise, bias, quantum = sensor.noise_bias_quantum

@@ -114,23 +114,20 @@ def _engine_power(frame: np.void) -> tuple[float, float, float, float] | None:
     return float(power["from_s"]), in_charge_s, float(power["least"]), float(power["greatest"])
 
 
+def _by_channel(frame: np.void, off: str) -> dict[str, float | None] | None:
+    """A deviation from the commanded profile, by channel, None where it is not flown; None without any."""
+    autopilot = frame["autopilot"]
+    if not autopilot["enabled"]:
+        return None
+    flown = zip(CHANNELS, autopilot["commanded"], autopilot[off], strict=True)
+    return {name: float(away) if commanded else None for name, commanded, away in flown}
+
+
 def _profile(frame: np.void) -> dict[str, float | None] | None:
     """Largest deviation from the commanded profile, by channel; None where there is none."""
-    autopilot = frame["autopilot"]
-    if not autopilot["enabled"]:
-        return None
-    flown = zip(CHANNELS, autopilot["commanded"], autopilot["worst"], strict=True)
-    off = {name: float(worst) if commanded else None for name, commanded, worst in flown}
-    return off | {LIMITED: float(autopilot["held_worst"]) if autopilot["commanded"][SPEED] else None}
-
-
-def _arrival(frame: np.void) -> dict[str, float | None] | None:
-    """Mean deviation from the commanded profile at the end, by channel; None where there is none."""
-    autopilot = frame["autopilot"]
-    if not autopilot["enabled"]:
-        return None
-    flown = zip(CHANNELS, autopilot["commanded"], autopilot["mean_off"], strict=True)
-    return {name: float(off) if commanded else None for name, commanded, off in flown}
+    off, autopilot = _by_channel(frame, "worst"), frame["autopilot"]
+    limited = float(autopilot["held_worst"]) if autopilot["commanded"][SPEED] else None
+    return None if off is None else off | {LIMITED: limited}
 
 
 def _limits(frame: np.void, surfaces: Sequence[str]) -> tuple[tuple[float, str, str, float, str, bool], ...]:
@@ -270,7 +267,7 @@ def flight_of(
         probing_s=_probing_s(frame),
         engine_power=_engine_power(frame),
         profile=_profile(frame),
-        arrival=_arrival(frame),
+        arrival=_by_channel(frame, "mean_off"),
         limits=_limits(frame, surfaces),
         changes=replaced,
         surface_travel_rad={s: float(x) for s, x in zip(surfaces, accounts["travelled"], strict=True)},

@@ -28,6 +28,11 @@ class Gust(Section):
         return self.at_s + self.rise_s + self.hold_s + self.fade_s
 
 
+def air_of(severity: str) -> dict[str, str]:
+    """`environment` with turbulence of a severity; or `none`."""
+    return {"turbulence": "none"} if severity == "none" else {"turbulence": "dryden", "severity": severity}
+
+
 def _one_or_several(given: Any) -> str:
     return "several" if isinstance(given, list | tuple) else "one"
 

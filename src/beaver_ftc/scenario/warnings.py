@@ -10,7 +10,8 @@ from typing import Any
 from beaver_ftc.scenario.signals import Chirp
 
 _SEVERITIES = ("none", "light", "moderate", "severe")
-_MOMENTS = ("Cl", "Cm", "Cn")
+_MOMENTS, _FORCES = ("Cl", "Cm", "Cn"), ("CY", "CZ")
+MASS_TOLERANCE = 0.05  # that accelerometers are judged with: fuel and load, which nobody declares
 _ROUNDING = 1e-9
 LOWEST_TURBULENCE_M = 609.6  # 2000 ft: below, its scales and strengths are others [MIL-F-8785C, 3.7]
 
@@ -43,6 +44,29 @@ def _undeclared(scenario: Any) -> Iterator[str]:
             yield f"uncertainty.inertia.{axis}: {ratio:g} is beyond fdi.bounds.inertia, {bounds.inertia:g}"
     if any(truth.cg_m):
         yield "uncertainty.cg_m: a displaced centre of gravity is covered by fdi.bounds.constant_rad_s2 only"
+    if _weighs_forces(scenario):
+        yield from _forces(scenario)
+
+
+def _weighs_forces(scenario: Any) -> bool:
+    """Whether accelerometers take part in the diagnosis."""
+    fdi = scenario.fdi
+    counts = fdi.statistical and fdi.fault_class == "all" and fdi.authority != "worst-case"
+    return bool(counts and not fdi.pairs and scenario.substeps == 1 and scenario.airframe.forces)
+
+
+def _forces(scenario: Any) -> Iterator[str]:
+    """Errors of the forces that the accelerometers are held against."""
+    share, truth = scenario.fdi.bounds.coefficients, scenario.uncertainty
+    allowed = max(share.values(), default=0.0) if isinstance(share, dict) else share
+    for name, ratio in truth.coefficients.items():
+        if name[:2] in _FORCES and abs(ratio - 1.0) > allowed + _ROUNDING:
+            beyond = f"beyond fdi.bounds.coefficients, {allowed:g}, by which accelerometers are judged"
+            yield f"uncertainty.coefficients.{name}: {ratio:g} is {beyond}"
+    heavier = truth.mass / scenario.design_model.mass
+    if abs(heavier - 1.0) > MASS_TOLERANCE + _ROUNDING:
+        beyond = f"off the designer's by more than {MASS_TOLERANCE:g}, by which accelerometers are judged"
+        yield f"uncertainty.mass: {heavier:g} is {beyond}"
 
 
 def _unstructured(scenario: Any) -> Iterator[str]:

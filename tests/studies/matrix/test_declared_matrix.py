@@ -9,7 +9,7 @@ from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.metrics import metrics
 from beaver_ftc.studies.matrix.cases import declared
 from beaver_ftc.studies.matrix.flying import verdict
-from beaver_ftc.studies.matrix.run import DECLARED, run_matrix
+from beaver_ftc.studies.matrix.run import run_matrix
 from flying import scenario
 
 NAMES = [term.name for term in load().moments]
@@ -18,7 +18,7 @@ FLIGHTS = 50
 
 @pytest.fixture(scope="module")
 def matrix(tmp_path_factory):
-    return run_matrix(tmp_path_factory.mktemp("matrix"), (45.0,), name=DECLARED)
+    return run_matrix(tmp_path_factory.mktemp("matrix"), (45.0,), declared=True)
 
 
 def test_no_false_alarm_no_wrong_surface_no_wrong_type(matrix):

@@ -85,3 +85,68 @@ def test_what_is_told_counts_by_what_a_test_more_often_than_not_sees():
         "rudder": {"seen": 2, "named": 1},
     }
     assert beside_told(told[:1])["share"] is None
+
+
+LEFT = "the validated envelope was left at 9.2 s, the outer loops being open"
+LOST = {"departure_s": 20.0, "departure_signal": "alpha_rad"}
+
+
+@pytest.mark.parametrize(
+    ("found", "why"),
+    [
+        (
+            {"oracle_left_envelope_s": 9.25},
+            LEFT,
+        ),
+        ({}, "alpha_rad diverged"),
+    ],
+)
+def test_why_not_even_the_oracle_kept_an_aircraft(found, why):
+    cell, _ = cell_of({}, LOST, {**LOST, **found})
+    assert cell["remark"] == f"lost in 2 of 3 flights, the oracle in 0: {why}"
+    beyond, _ = cell_of({}, {**LOST, "oracle_beyond_s": 1.0, "axis": "p"}, {**LOST, "oracle_beyond_s": 0.5})
+    assert beyond["remark"].endswith("for 1.0 s no deflection at all could hold the p rate")
+
+
+def test_where_nothing_was_lost_the_remark_is_of_what_nobody_saw():
+    assert cell_of({}, {}, {"detected": False})[0]["remark"] == ""
+    unseen, _ = cell_of(*[{"detected": False}] * 3)
+    assert unseen["remark"] == "no effect beyond the admitted uncertainty: tracking is as before"
+
+
+def told_of(*chances):
+    rows = [
+        row(fault, surface, V, told_chance=chance if (fault, surface) == (FAULT, SURFACE) else 0.9)
+        for fault, _ in FAULTS
+        for surface in SURFACES
+        for V, chance in zip((38.0, 45.0, 52.0), chances, strict=True)
+    ]
+    document = document_of(rows)
+    (cell,) = [c for c in document["cells"] if (c["fault"], c["surface"]) == (FAULT, SURFACE)]
+    return cell, as_text(document)
+
+
+def test_a_cell_that_not_even_a_told_test_sees_is_marked():
+    cell, text = told_of(0.5, 0.1, 0.2)
+    assert cell["told"] == 0
+    marked = next(line for line in text.splitlines() if line.startswith(FAULT))
+    assert marked.count("1.0xo") == 1
+    assert "o: not even a test that\nis told surface" in text
+    seen, text = told_of(0.51, 0.1, 0.2)
+    assert seen["told"] == 1
+    assert "1.0xo" not in text
+    n = 3 * len(FAULTS) * len(SURFACES)
+    assert f"a test that is told the fault sees {n - 2} of {n}; {n - 2} of these are detected" in text
+    elevators = 3 * len(FAULTS)
+    assert f"elevator {elevators - 2} of {elevators - 2}" in text
+    assert f"the right surface is named in {n - 2} (100 %:" in text
+
+
+def test_where_a_told_test_sees_nothing_it_says_so():
+    rows = [row(fault, s, 45.0, told_chance=0.1) for fault, _ in FAULTS for s in SURFACES]
+    assert as_text(document_of(rows)).endswith("a test that is told the fault sees none of them")
+    plain = as_text(document_of([row(fault, s, 45.0) for fault, _ in FAULTS for s in SURFACES]))
+    assert "told" not in plain
+    n = len(FAULTS) * len(SURFACES)
+    none = "0 named wrongly, 0 false alarms, 0 lost that the oracle kept"
+    assert plain.endswith(f"{n} faults flown: {none}")

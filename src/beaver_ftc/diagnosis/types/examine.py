@@ -43,8 +43,9 @@ def begin(surface):
 
 
 @kernel
-def note_orders(fdi, commanded):
-    """What the surfaces have been ordered to do, commanded (n,) rad, since the elapsed frame began."""
+def note_orders(fdi, commanded, means):
+    """What the surfaces have been ordered to do, commanded (n,) rad, since the elapsed frame began; and their
+    least and greatest effectiveness within it: means of a `belief.means_dtype`."""
     for s in range(fdi.surface.size):
         surface = fdi.surface[s]
         orders = surface.orders
@@ -53,9 +54,12 @@ def note_orders(fdi, commanded):
                 orders.given[age, : fdi.block.length] = orders.given[age - 1, : fdi.block.length]
                 orders.low[age], orders.high[age] = orders.low[age - 1], orders.high[age - 1]
             orders.low[0], orders.high[0] = np.inf, -np.inf
+            surface.G_least, surface.G_most = np.inf, -np.inf
         order = min(max(commanded[s], surface.travel_low), surface.travel_high)
         orders.given[0, fdi.block.filled] = order
         orders.low[0], orders.high[0] = min(orders.low[0], order), max(orders.high[0], order)
+        surface.G_least = min(surface.G_least, means.G_least[s])
+        surface.G_most = max(surface.G_most, means.G_most[s])
 
 
 @kernel
@@ -68,6 +72,8 @@ def locate(fdi, s, innovation, bound, effect):
     surface.low_before, surface.high_before = surface.low_then, surface.high_then
     surface.low_then, surface.high_then, surface.command_then = surface.low, surface.high, surface.command
     surface.command = -effect.offset[axis] / effect.Z[axis]
+    surface.uneven_then = surface.uneven
+    surface.uneven = 0.25 * (surface.G_most - surface.G_least) / abs(effect.Z[axis])
     surface.low, surface.high = fie.low, fie.high
     for i in range(3):
         if fdi.block.length > 1 and i != axis and effect.Z[i] != 0.0:

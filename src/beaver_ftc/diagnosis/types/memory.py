@@ -49,6 +49,8 @@ def surface_dtype() -> np.dtype:
         ("command", "f8"), ("low", "f8"), ("high", "f8"), ("wrong", "i8"),
         ("command_then", "f8"), ("low_then", "f8"), ("high_then", "f8"), ("wrong_then", "i8"),
         ("low_before", "f8"), ("high_before", "f8"), ("wrong_before", "i8"),
+        # its effectiveness within the frame or block, and a quarter of what that varies by, in means
+        ("G_least", "f8"), ("G_most", "f8"), ("uneven", "f8"), ("uneven_then", "f8"),
         # what the types make of it
         ("set_low", "f8", (N_TYPES,)), ("set_high", "f8", (N_TYPES,)), ("type_excluded", "i8", (N_TYPES,)),
         ("start_low", "f8"), ("start_high", "f8"), ("started_at", "i8"),

@@ -14,6 +14,11 @@ Once let go, a type does not take hold again before the surface has been seen he
 
 In a block of frames the release may lie at any instant inside: at each, the surface is where it is held, or
 where the actuator brings it from there.
+
+What a frame shows of a position a that moves within it is the mean weighted by the effectiveness G then. It
+differs from the plain mean by the covariance of G and a, over the mean of G, so by no more than
+
+    (G_max - G_min) / (4 |mean G|)  (a_max - a_min)                                        [Gruess1935]
 """
 
 import numpy as np
@@ -22,7 +27,6 @@ from beaver_ftc.compiled import kernel
 from beaver_ftc.design.actuators import nearer
 
 EARLIER, LATER = 0, 1
-UNEVENNESS = 0.05  # a surface's effectiveness does not change by more within a block
 # What is nearer to a healthy surface acts as one: it must do less than the bound allows for rounding.
 NOT_BACK_RAD = 1e-14
 
@@ -55,30 +59,24 @@ def not_held(surface, kind):
 
 
 @kernel
-def carried(fdi, surface, a):
-    """Mean position over the judged frame of a surface that is at a (rad) as it begins; and as it ends."""
-    total, count = 0.0, 0
+def carried(fdi, surface, held, side=0):
+    """Mean position over the judged frame of a surface that is at `held` (rad) as it begins; and as it ends;
+    and by how much the mean may be off, where the effectiveness changes meanwhile.
+
+    It is let go as the frame begins; or, with a side, at any instant inside: the least if side < 0, or the
+    greatest.
+    """
+    total, count, a, least, greatest = 0.0, 0, held, held, held
     for k in range(fdi.block.length):
         order = surface.orders.given[1, k]
         for _ in range(fdi.instants):
             total += a
             count += 1
+            least, greatest = min(least, a), max(greatest, a)
             a = nearer(a, order, surface.approach, surface.step)
-    return total / count, a
-
-
-@kernel
-def carried_from_within(fdi, surface, held, side):
-    """The same of one let go at `held` at any instant of a block: the least if side < 0, or the greatest."""
-    total, count, a = 0.0, 0, held
-    for k in range(fdi.block.length):
-        order = surface.orders.given[1, k]
-        for _ in range(fdi.instants):
-            total += a
-            count += 1
-            a = nearer(a, order, surface.approach, surface.step)
-            a = min(a, held) if side < 0 else max(a, held)
-    return total / count, a
+            if side != 0:
+                a = min(a, held) if side < 0 else max(a, held)
+    return total / count, a, surface.uneven_then * (greatest - least)
 
 
 @kernel
@@ -87,13 +85,9 @@ def let_go_within(fdi, surface, kind):
     held_low, held_high = surface.release.held_low[kind], surface.release.held_high[kind]
     if fdi.block.length == 1 or held_low > held_high:
         return False
-    low, _ = carried_from_within(fdi, surface, held_low, -1)
-    high, _ = carried_from_within(fdi, surface, held_high, 1)
-    _, end = carried(fdi, surface, held_low)
-    _, other_end = carried(fdi, surface, held_high)
-    low -= UNEVENNESS * abs(end - held_low)
-    high += UNEVENNESS * abs(other_end - held_high)
-    return low <= surface.high_then and high >= surface.low_then
+    low, _, low_room = carried(fdi, surface, held_low, -1)
+    high, _, high_room = carried(fdi, surface, held_high, 1)
+    return low - low_room <= surface.high_then and high + high_room >= surface.low_then
 
 
 @kernel
@@ -118,23 +112,19 @@ def agrees(fdi, surface, which, kind):
     The mean over the frame rises with where the return began, and by no more than that.
     """
     held = surface.release
-    low, end = carried(fdi, surface, held.low[which, kind])
-    high, other_end = carried(fdi, surface, held.high[which, kind])
-    low_room = high_room = 0.0
-    if fdi.block.length > 1:
-        low_room = UNEVENNESS * abs(end - held.low[which, kind])
-        high_room = UNEVENNESS * abs(other_end - held.high[which, kind])
-    command = surface.command_then
-    if max(abs(low - low_room - command), abs(high + high_room - command)) <= NOT_BACK_RAD:
+    low, _, low_room = carried(fdi, surface, held.low[which, kind])
+    high, _, high_room = carried(fdi, surface, held.high[which, kind])
+    room, command = max(low_room, high_room), surface.command_then
+    if max(abs(low - room - command), abs(high + room - command)) <= NOT_BACK_RAD:
         return False
-    if low - low_room > surface.high_then or high + high_room < surface.low_then:
+    if low - room > surface.high_then or high + room < surface.low_then:
         return False
     keep(
         held,
         which,
         kind,
-        held.low[which, kind] + max(surface.low_then - low - low_room, 0.0),
-        held.high[which, kind] - max(high - high_room - surface.high_then, 0.0),
+        held.low[which, kind] + max(surface.low_then - low - room, 0.0),
+        held.high[which, kind] - max(high - room - surface.high_then, 0.0),
     )
     return True
 
@@ -192,11 +182,11 @@ def bring_back(fdi, surface, kind):
         held.released[kind] = 0
     for which in (EARLIER, LATER):
         if any_release(surface, which, kind):
-            _, low = carried(fdi, surface, held.low[which, kind])
-            _, high = carried(fdi, surface, held.high[which, kind])
+            _, low, _ = carried(fdi, surface, held.low[which, kind])
+            _, high, _ = carried(fdi, surface, held.high[which, kind])
             keep(held, which, kind, low, high)
     if fdi.block.length > 1 and held.held_low[kind] <= held.held_high[kind]:
-        _, low = carried_from_within(fdi, surface, held.held_low[kind], -1)
-        _, high = carried_from_within(fdi, surface, held.held_high[kind], 1)
+        _, low, _ = carried(fdi, surface, held.held_low[kind], -1)
+        _, high, _ = carried(fdi, surface, held.held_high[kind], 1)
         held.low[LATER, kind] = min(held.low[LATER, kind], low)
         held.high[LATER, kind] = max(held.high[LATER, kind], high)

@@ -18,6 +18,8 @@ from typing import Any, NamedTuple, Protocol
 from beaver_ftc.documents.errors import SimulationFailed
 from beaver_ftc.studies.engine import processes
 
+LEAVES_S = 5.0  # a pool's thread, once its workers have ended: milliseconds
+
 Row = Any
 Nothing = Callable[[], None]
 
@@ -109,12 +111,16 @@ class _Worker:
 
     def end(self) -> None:
         """Terminate it, started or not. Its futures are left to fail: a pool that breaks cannot fail
-        cancelled ones, and says so in a traceback.
+        cancelled ones, and says so in a traceback. Its thread is waited for: an interpreter that exits while
+        the thread closes its pipe writes to that, and says so too.
         """
         running = [*(self._pool._processes or {}).values()]
+        thread: Any = self._pool._executor_manager_thread
         self._pool.shutdown(wait=False)
         for process in running:
             process.terminate()
+        if thread is not None:
+            thread.join(LEAVES_S)
 
 
 class LocalCrew:

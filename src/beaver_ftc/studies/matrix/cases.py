@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from beaver_ftc.aircraft import AXES, DEFAULT, Aircraft, load
+from beaver_ftc.scenario.environment import air_of
 
 if TYPE_CHECKING:
     from beaver_ftc.scenario.schema import Scenario
@@ -94,12 +95,11 @@ def declared(turbulence: str = "none") -> dict[str, Any]:
     """Real sensors, servos, coefficients at the ends of their tolerance by turns, air: all of it declared."""
     names = [term.name for term in load().moments]
     wrong = {name: 1.0 + (TOLERANCE if i % 2 else -TOLERANCE) for i, name in enumerate(names)}
-    severity = {} if turbulence == "none" else {"severity": turbulence}
     return {
         "uncertainty": UNCERTAINTY | {"coefficients": wrong},
         "sensors": SENSORS,
         "actuators": "servo",
-        "environment": {"turbulence": "none" if turbulence == "none" else "dryden"} | severity,
+        "environment": air_of(turbulence),
         "fdi": {
             "fault_class": "all",
             "bounds": {"coefficients": TOLERANCE, "sensors": SENSORS, "turbulence": turbulence},

@@ -33,9 +33,9 @@ def fly_case(case: Case) -> Document:
 
     off_deg = trimmed_deg(case.airspeed_mps, case.surface, case.aircraft)
     ours, best = (scenario_of(case, law, off_deg) for law in ("fault-tolerant-published", "oracle-published"))
-    kept = columns_of(ours.airframe)
+    kept = columns_of(ours.airframe) if case.declared else None
     flight, oracle = fly(ours, kept), fly(best)
-    seen = told(ours, kept, case.surface) if case.declared else {}
+    seen = {} if kept is None else told(ours, kept, case.surface)
     return {**case._asdict(), **_diagnosis(flight, case), **_tracking(flight, oracle, case), **seen}
 
 

@@ -14,9 +14,10 @@ Document = dict[str, Any]
 NAME, DECLARED = "fault-matrix", "fault-matrix-declared"
 
 
-def declared_name(turbulence: str) -> str:
-    """The result folder's name of the matrix with errors, in such air."""
-    return DECLARED if turbulence == "none" else f"{DECLARED}-{turbulence}"
+def name_of(declared: bool, turbulence: str) -> str:
+    """The result folder's name of the matrix, with errors or without, in such air."""
+    name = DECLARED if declared else NAME
+    return name if turbulence == "none" else f"{name}-{turbulence}"
 
 
 def run_matrix(
@@ -24,17 +25,18 @@ def run_matrix(
     airspeeds_mps: tuple[float, ...] | None = None,
     workers: int = 1,
     progress: Progress | None = None,
-    name: str = NAME,
+    declared: bool = False,
     aircraft: str = DEFAULT,
     turbulence: str = "none",
 ) -> Document:
-    """Write `out/fault-matrix/` (table, JSON, heat map), or that of `name`; return the document."""
+    """Write table, JSON and heat map into the folder that `name_of` says, in `out`; return the document."""
     from beaver_ftc.results.metrics import as_json
     from beaver_ftc.results.writer import result_folder
     from beaver_ftc.studies.matrix.figure import write_heat_map
 
     airspeeds_mps = airspeeds_mps or airspeeds_of(aircraft)
-    all_cases = cases(airspeeds_mps, name.startswith(DECLARED), aircraft, turbulence)
+    name = name_of(declared, turbulence)
+    all_cases = cases(airspeeds_mps, declared, aircraft, turbulence)
     fly = flown(out / name, all_cases, fly_case, workers=workers, progress=progress)
     with fly as rows, result_folder(out, name) as folder:
         document = document_of(rows)

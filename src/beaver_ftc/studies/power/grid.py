@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.scenario.environment import air_of
 from beaver_ftc.scenario.schema import Scenario
 
 STRIKES_S = (8.0, 10.0)  # a fault strikes at random in between
@@ -115,9 +116,6 @@ GRIDS = {
 def scenario_of(bout: Bout, duration_s: float, faults: list[dict[str, Any]] | None = None) -> Scenario:
     """A flight of a bout: everything in it but the fault follows from the bout alone."""
     sensors, turbulence = bout.condition
-    air = {"turbulence": "none" if turbulence == "none" else "dryden"}
-    if turbulence != "none":
-        air["severity"] = turbulence
     return Scenario.model_validate(
         {
             "name": "power",
@@ -127,7 +125,7 @@ def scenario_of(bout: Bout, duration_s: float, faults: list[dict[str, Any]] | No
             "reference": _reference(bout),
             "uncertainty": _uncertainty(bout),
             "sensors": sensors,
-            "environment": air,
+            "environment": air_of(turbulence),
             "faults": faults or [],
             "fdi": {"bounds": {"sensors": sensors, "turbulence": turbulence}},
             "control": {"law": "nominal"},

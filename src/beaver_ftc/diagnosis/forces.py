@@ -1,0 +1,249 @@
+"""What accelerometers say beside the rates: with which force a moment comes.
+
+Elevator and flap both pitch the aircraft, so the rates alone do not tell whose fault it is. Their forces do.
+Across and normal to the body, i = Y, Z, and as if it acted at the chord c,
+
+    e_i = (a_i - qdyn S C_i / m) / c       rad/s2
+
+with C_i at the measured flow and at the surfaces as commanded. A fault of a surface moves e beside the
+angular acceleration in the ratio of its terms, and so does a vane that is off, in a ratio of its own. Terms
+of forces have the tolerance declared of those of moments, and a force as a whole that of the mass.
+
+The side force has a term in the rate of sideslip. It follows from the accelerometers, and JSBSim takes that
+of the run before.
+"""
+
+import numpy as np
+
+from beaver_ftc.aircraft import Aircraft, Term
+from beaver_ftc.aircraft.aircraft import FORCES
+from beaver_ftc.aircraft.schema import MAX_SURFACES, MAX_TERMS_OF_ONE, SIDESLIP_RATE
+from beaver_ftc.compiled import kernel
+from beaver_ftc.design.terms import AIRSPEED, ALPHA, BETA, N_Y, QDYN, evaluate
+from beaver_ftc.diagnosis.admitted import GUST_FT_S
+from beaver_ftc.diagnosis.redundancy import FALLING_M_S2
+from beaver_ftc.plant.instruments import SIGNALS
+from beaver_ftc.scenario.diagnosis import Bounds
+from beaver_ftc.scenario.warnings import MASS_TOLERANCE
+
+SIDE, UP = range(2)  # across the body, and normal to it
+COMPONENTS = ("CY", "CZ")
+CY = FORCES.index("CY")
+EARTH_RATE_RAD_S = 7.3e-5
+LIVELY_RAD_S, STEEP_RAD = 0.2, 0.3  # rates and slope of the path that a drift is reckoned with
+CHANGES = 0.3  # what of a drift may be another a second later
+RATE_TOLERANCE = {False: 0.05, True: 0.2}  # of the term in the rate of sideslip: gusts have a part in it
+MAX_ERRORS = MAX_TERMS_OF_ONE + 2  # the rate of sideslip and the force as a whole come last
+
+FORCE = np.dtype(
+    [
+        ("innovation", "f8"),  # e as the elapsed frame began
+        # the same by the angle that follows from inertial motion; that angle, rad; how fast it may drift,
+        # rad/s, and what that comes to per rad/s; how far errors and gusts let e wander, (rad/s2)2/s
+        ("inertial", "f8"), ("angle", "f8"), ("drift", "f8"), ("drifted", "f8"), ("wander", "f8"),
+        # of each surface per rad, and at its command; of its errors per rad
+        ("column", "f8", (MAX_SURFACES,)), ("moment", "f8", (MAX_SURFACES,)), ("own", "f8", (MAX_SURFACES,)),
+        ("vane", "f8", (2,)),  # of an error of its vane: angular acceleration, and e, per rad
+        ("quiet", "f8", (2,)), ("jitter", "f8", (2,)), ("damping", "f8", (3,)), ("deflection", "f8"),
+        ("n", "i8"), ("tolerance", "f8", (MAX_ERRORS,)), ("regressor", "f8", (MAX_ERRORS,)),
+    ],
+    align=True,
+)  # fmt: skip
+FORCES_FELT = np.dtype(
+    [
+        ("known", "i8"), ("per_m", "f8"), ("gravity", "f8"), ("span", "f8"),  # one over the chord; m/s2; m
+        ("pressure", "f8"), ("pressure_noise", "f8"),  # Pa: in trim, and of its reading
+        ("strength", "f8"),  # of the pressure, as a share of trim: so much more do forces than stands here
+        # coefficient of the rate of sideslip; rates of sideslip and incidence, rad/s, of the instant before
+        ("of_rate", "f8"), ("rate", "f8", (2,)), ("begun", "i8"),
+        ("y", "f8", (N_Y,)), ("component", FORCE, (2,)),
+    ],
+    align=True,
+)  # fmt: skip
+
+
+@kernel
+def look(forces, air, measured, u, dt):
+    """Compare this instant's accelerometers with the model, surfaces at u (n,) rad, dt s after the last."""
+    evaluate(air.forces, measured.x, measured.y)
+    forces.strength = measured.y[QDYN] / forces.pressure
+    for f in range(2):
+        look_along(forces, air, f, measured, u)
+        follow(forces, forces.component[f], f, measured.y, dt)
+    flow_rates(forces, measured)
+    forces.begun = 1
+
+
+@kernel
+def without_vanes(forces, rotation, y):
+    """Fill `y` with the readings, alpha and beta being what the forces say they are; rotation (3,) rad/s: of
+    the air, in body axes, which damps as the aircraft's own does."""
+    forces.y[:] = y
+    for f in range(2):
+        force, place, damped = forces.component[f], BETA if f == SIDE else ALPHA, 0.0
+        for k in range(3):
+            damped += force.damping[k] * rotation[k]
+        forces.y[place] -= (force.innovation / forces.strength + damped) / force.vane[1]
+
+
+@kernel
+def follow(forces, force, f, y, dt):
+    """Follow the angle of a vane by inertial motion alone, and see the force with it."""
+    reading, slope = y[BETA if f == SIDE else ALPHA], force.vane[1] * forces.strength
+    force.angle = force.angle + dt * forces.rate[f] if forces.begun else reading
+    force.drifted += dt * slope
+    force.inertial = force.innovation - slope * (reading - force.angle)
+
+
+@kernel
+def look_along(forces, air, f, measured, u):
+    """The same along one direction: e, what surfaces do to it, and what the errors multiply."""
+    table, force = air.forces, forces.component[f]
+    first, last = table.free_from[CY + f], table.surface_to[CY + f]
+    scale, whole = measured.y[QDYN] * air.area_per_mass * forces.per_m, 0.0
+    force.column[:], force.own[:] = 0.0, 0.0
+    for k in range(first, last):
+        s, of_one = table.surface[k], scale * table.power[table.monomial[k]]
+        if s >= 0:
+            force.column[s] += table.value[k] * of_one
+            force.own[s] += force.tolerance[k - first] * abs(of_one)
+            of_one *= u[s]
+        force.regressor[k - first] = of_one
+        whole += table.value[k] * of_one
+    if f == SIDE:
+        turning = scale * forces.of_rate * forces.rate[SIDE] * forces.span / (2.0 * measured.y[AIRSPEED])
+        force.regressor[last - first] = turning
+        whole += turning
+    force.regressor[force.n - 1] = whole
+    for s in range(u.size):
+        force.moment[s] = force.column[s] * u[s]
+    force.innovation = measured.force[1 + f] * forces.per_m - whole
+    by_pressure = whole * forces.pressure_noise / measured.y[QDYN]
+    for k in range(2):
+        force.jitter[k] = force.quiet[k] * forces.strength**2 + by_pressure * by_pressure
+
+
+@kernel
+def flow_rates(forces, measured):
+    """Fill `rate` with d beta / dt and d alpha / dt in air at rest, rad/s: from accelerometers, rates,
+    attitude and flow."""
+    gravity, x, a = forces.gravity, measured.x, measured.force
+    phi, theta = measured.attitude[0], measured.attitude[1]
+    alpha, beta, V = measured.y[ALPHA], measured.y[BETA], measured.y[AIRSPEED]
+    ahead, right = np.cos(alpha) * np.cos(beta), np.sin(beta)
+    down = np.sin(alpha) * np.cos(beta)
+    pull = a[0] - gravity * np.sin(theta)
+    push = a[1] + gravity * np.cos(theta) * np.sin(phi)
+    fall = a[2] + gravity * np.cos(theta) * np.cos(phi)
+    faster = ahead * pull + right * push + down * fall
+    sideways = push + V * (x[0] * down - x[2] * ahead)
+    forces.rate[SIDE] = (sideways - faster * right) / (V * np.cos(beta))
+    forwards, downwards = pull + V * (x[2] * right - x[1] * down), fall + V * (x[1] * ahead - x[0] * right)
+    forces.rate[UP] = (downwards * np.cos(alpha) - forwards * np.sin(alpha)) / (V * np.cos(beta))
+
+
+def terms_of(aircraft: Aircraft, f: int) -> list[Term]:
+    """The terms of one direction, as `look` goes through them."""
+    return [term for term in aircraft.measurable_forces if term.coefficient == COMPONENTS[f]]
+
+
+def told_by_force(aircraft: Aircraft, f: int) -> list[int]:
+    """The surfaces that a force tells apart: of those that pitch by their lift, of the others by the side."""
+    with_force = {term.surface for term in terms_of(aircraft, f)}
+    lead = enumerate(zip(aircraft.surfaces, aircraft.dominant_axis, strict=True))
+    found = [s for s, (surface, axis) in lead if (axis == 1) == (f == UP) and surface in with_force]
+    return found if len(found) > 1 else []
+
+
+def tell_apart(aircraft: Aircraft) -> bool:
+    """Whether accelerometers tell any surfaces of this aircraft apart."""
+    return any(told_by_force(aircraft, f) for f in (SIDE, UP))
+
+
+def set_up_forces(
+    statistical: np.void,
+    bounds: Bounds,
+    aircraft: Aircraft,
+    trim: tuple[np.ndarray, np.ndarray, np.ndarray],
+    along_y: np.ndarray,
+) -> None:
+    """Fill the record of forces that are `known` from what is declared; trim: x (3,) rad/s, y, u rad.
+
+    along_y (3, y.size): the slopes of the angular accelerations with y.
+    """
+    y = trim[1]
+    forces, air, size = statistical["forces"], statistical["air"], aircraft.geometry
+    forces["per_m"], forces["gravity"] = 1.0 / size.chord_m, air["gravity"]
+    forces["pressure"], forces["pressure_noise"] = y[QDYN], _noise(bounds, ("qdyn",))[0]
+    rates = [t.value for t in aircraft.forces if t.coefficient == "CY" and t.of == ((SIDESLIP_RATE, 1),)]
+    forces["span"], forces["of_rate"] = size.span_m, sum(rates)
+    scale = y[QDYN] * air["area_per_mass"] * forces["per_m"]
+    for f, (vane, axis) in enumerate(((BETA, 2), (ALPHA, 1))):
+        force, terms = forces["component"][f], terms_of(aircraft, f)
+        slopes = scale * _slopes(aircraft, COMPONENTS[f], trim)
+        force["vane"] = -along_y[axis, vane], -slopes[vane]
+        force["damping"] = slopes[3:]
+        parts = (slopes * _noise(bounds, ("alpha", "beta", "V", *SIGNALS[:3]))) ** 2
+        force["quiet"] = parts.sum(), parts.sum() - parts[vane]
+        _set_up_tolerances(force, bounds, terms, y, slopes[vane] / scale, f)
+        turned = scale * sum(abs(term.value) for term in terms if term.surface)
+        force["deflection"] = turned * np.radians(bounds.deflection_deg)
+        force["drift"] = _drift(bounds, air["gravity"], y[AIRSPEED], f)
+        gusts = 3.0 * (0.3048 * GUST_FT_S[bounds.turbulence]) ** 2 / (air["scale"] * y[AIRSPEED])
+        wander = (CHANGES * force["drift"]) ** 2
+        force["wander"] = slopes[vane] ** 2 * (wander + gusts)
+
+
+def _drift(bounds: Bounds, gravity: float, airspeed_mps: float, f: int) -> float:
+    """How fast the angle that is followed can drift, rad/s. Gravity acts along the path's slope only on the
+    incidence, and in full on sideslip."""
+    sensors = bounds.sensors
+    tilt = abs(sensors.phi.noise_bias_quantum[1]) + abs(sensors.theta.noise_bias_quantum[1])
+    gyros = [getattr(sensors, name) for name in SIGNALS[:3]]
+    turning = sum(abs(gyro.noise_bias_quantum[1]) + LIVELY_RAD_S * abs(gyro.scale_error) for gyro in gyros)
+    falls = gravity * tilt * (STEEP_RAD if f == UP else 1.0) + FALLING_M_S2
+    return float(EARTH_RATE_RAD_S + turning + falls / airspeed_mps)
+
+
+def _noise(bounds: Bounds, names: tuple[str, ...]) -> np.ndarray:
+    noise, _, quantum = np.array([getattr(bounds.sensors, name).noise_bias_quantum for name in names]).T
+    return np.sqrt(noise**2 + quantum**2 / 12.0)
+
+
+def _set_up_tolerances(
+    force: np.void, bounds: Bounds, terms: list[Term], y: np.ndarray, of_vane: float, f: int
+) -> None:
+    """Of each term: that of the coefficients, and what constant errors of vane and pressure do."""
+    given, sensors = bounds.coefficients, bounds.sensors
+    vane = sensors.alpha if f == UP else sensors.beta
+    share = max(given.values(), default=0.0) if isinstance(given, dict) else given
+    pressure = abs(sensors.qdyn.noise_bias_quantum[1]) / y[QDYN] + abs(sensors.qdyn.scale_error)
+    for k, term in enumerate(terms):
+        force["tolerance"][k] = (share + pressure + abs(vane.scale_error)) * abs(term.value)
+        if term.is_constant:
+            force["tolerance"][k] += abs(vane.noise_bias_quantum[1] * of_vane)
+    n = len(terms)
+    if f == SIDE:
+        force["tolerance"][n], n = share + RATE_TOLERANCE[bounds.turbulence != "none"], n + 1
+    force["tolerance"][n], force["n"] = MASS_TOLERANCE, n + 1
+
+
+def _value(aircraft: Aircraft, name: str, at: tuple[np.ndarray, np.ndarray, np.ndarray]) -> float:
+    """A force coefficient at x (3,) rad/s, y, u rad."""
+    x, y, u = at
+    size, V = aircraft.geometry, y[AIRSPEED]
+    hats = x * (size.span_m / (2.0 * V), size.chord_m / V, size.span_m / (2.0 * V))
+    of = dict(zip(aircraft.surfaces, u, strict=True)) | dict(zip(aircraft.signals, y[4:], strict=True))
+    of |= dict(zip(("alpha", "beta", "ph", "qh", "rh", SIDESLIP_RATE), (y[0], y[1], *hats, 0.0), strict=True))
+    return float(aircraft.coefficient(name, of))
+
+
+def _slopes(
+    aircraft: Aircraft, name: str, trim: tuple[np.ndarray, np.ndarray, np.ndarray], step: float = 1e-5
+) -> np.ndarray:
+    """(6,): its derivatives with alpha, beta (1/rad), airspeed (s/m), rates (s/rad), by differences."""
+    x, y, u = trim
+    states = [(x, y + step * e, u) for e in np.eye(3, y.size)]
+    states += [(x + step * e, y, u) for e in np.eye(3)]
+    here = _value(aircraft, name, trim)
+    return np.array([(_value(aircraft, name, state) - here) / step for state in states])

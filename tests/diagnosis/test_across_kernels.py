@@ -1,0 +1,263 @@
+"""Directions that a surface does not move, a kernel at a time, against the same in matrices."""
+
+import numpy as np
+import pytest
+from kernels import DT, new_fdi
+
+from beaver_ftc.aircraft import load
+from beaver_ftc.diagnosis import across, likelihood
+from beaver_ftc.diagnosis.state import (
+    AN_AXIS,
+    LEAST_UNCERTAINTY_RAD_S2,
+    LOSS,
+    MAX_HYPOTHESES,
+    MAX_VIEWS,
+    POSITION,
+    STEP,
+)
+from beaver_ftc.diagnosis.views import set_up_views
+
+AILERON, ELEVATOR, RUDDER, FLAP = range(4)
+PITCH_AXIS, ROLL_AXIS, YAW_AXIS, PAST_AILERON, PAST_RUDDER = range(5)
+V = 45.0
+NAMES = ("n", "n_hypotheses", "n_regressors", "noise", "jitter", "drift", "P_dd", "regressor", "scratch")
+
+
+@pytest.fixture
+def rng():
+    return np.random.default_rng(5)
+
+
+@pytest.fixture
+def fdi(rng):
+    """A diagnosis with its views, something in every place that the kernels look at, and air that moves."""
+    fdi = new_fdi()
+    statistical = fdi["statistical"]
+    statistical["n_blocks"], statistical["keep"], statistical["rapidity"] = 3, 0.9, 2.0
+    statistical["jitter"], statistical["bounded"] = (1e-6, 4e-6, 9e-6), (0.02, 0.03, 0.05)
+    for block, n, regressors in zip(statistical["block"], (1, 2, 2), (3, 4, 4), strict=True):
+        block["n_regressors"], block["level"] = regressors, 5.0
+        block["noise"][:n] = rng.uniform(1e-8, 1e-7, n)
+        block["regressor"] = rng.normal(size=block["regressor"].shape)
+        block["tolerance"][:regressors] = rng.uniform(0.1, 0.2, regressors)
+    set_up_views(statistical, load())
+    air = statistical["air"]
+    air["moving"], air["rolling"], air["per_metre"] = 1, 34.0, rng.uniform(1e-5, 1e-4, 3)
+    for name in ("damping", "axes", "swing", "leap"):
+        air[name] = rng.normal(size=(3, 3))
+    air["leap"] = air["leap"] @ air["leap"].T
+    fdi["bound"]["own_per_rad"], fdi["bound"]["own_errors"] = rng.uniform(0.1, 0.4, (3, 4)), 1
+    return fdi
+
+
+def column(rng):
+    G = rng.normal(0.0, 3.0, (3, 4))
+    return G, np.array([G[0, AILERON], 0.0, G[2, AILERON]])
+
+
+def test_across_a_column_is_square_to_it_of_length_one_and_to_the_left(fdi, rng):
+    view = fdi["statistical"]["views"][PAST_AILERON]
+    G, of_it = column(rng)
+    across.turn(fdi, view, G)
+    assert view["mix"][:3] @ of_it == pytest.approx(0.0, abs=1e-12)
+    assert np.linalg.norm(view["mix"]) == pytest.approx(1.0)
+    assert np.cross(of_it, view["mix"][:3])[1] < 0.0  # from roll over yaw, as (-g_r, g_p)
+
+
+def test_a_surface_that_moves_neither_leaves_the_direction_as_it_was(fdi):
+    view = fdi["statistical"]["views"][PAST_RUDDER]
+    view["mix"][:3] = 0.6, 0.0, 0.8
+    assert across.turn(fdi, view, np.zeros((3, 4))) == 0.0
+    assert view["mix"].tolist() == [0.6, 0.0, 0.8, 0.0, 0.0]
+
+
+def declared_along(statistical, m):
+    """Noise, jitter, bound, drift of the air and its leap along a direction, by quadratic forms."""
+    air, pitch, lateral = statistical["air"], *statistical["block"][:2]
+    noise = np.array([lateral["noise"][0], pitch["noise"][0], lateral["noise"][1]])
+    bound = np.abs(m) @ statistical["bounded"]
+    gusts = air["damping"] @ air["axes"]
+    walk = gusts @ np.diag(air["per_metre"]) @ gusts.T
+    if air["swings"]:
+        turned = air["damping"] @ air["swing"]
+        longest_s = air["rolling"] / V
+        walk += 0.5 * longest_s**2 * turned @ np.diag(air["per_metre"]) @ turned.T
+    moves = float(air["moving"])
+    size = max(bound, LEAST_UNCERTAINTY_RAD_S2)
+    drift = statistical["rapidity"] * size**2 + moves * V * m @ walk @ m
+    jitter = (np.abs(m) @ np.sqrt(statistical["jitter"])) ** 2
+    return m**2 @ noise, jitter, bound, drift, moves * m @ air["leap"] @ m
+
+
+@pytest.mark.parametrize(
+    ("changes", "swings"),
+    [({}, 0), ({}, 1), ({"moving": 0}, 1)],
+)
+@pytest.mark.parametrize("mix", [(0.0, 1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (-0.6, 0.0, 0.8)])
+def test_what_is_declared_of_the_axes_is_seen_along_a_direction(fdi, mix, changes, swings):
+    statistical, view = fdi["statistical"], fdi["statistical"]["views"][PAST_AILERON]
+    view["mix"][:3], statistical["air"]["swings"], view["block"]["P_dd"][0, 0] = mix, swings, 0.7
+    for name, value in changes.items():
+        statistical["air"][name] = value
+    across.blur(view, statistical, V)
+    noise, jitter, bound, drift, leap = declared_along(statistical, np.array(mix))
+    block = view["block"]
+    assert block["noise"][0] == pytest.approx(noise)
+    assert block["jitter"][0] == pytest.approx(jitter)
+    assert view["bounded"][0] == pytest.approx(bound)
+    assert block["drift"][0, 0] == pytest.approx(drift)
+    assert block["P_dd"][0, 0] == pytest.approx(0.7 + leap)
+
+
+def test_where_no_uncertainty_is_declared_the_least_is_reckoned_with(fdi):
+    statistical, view = fdi["statistical"], fdi["statistical"]["views"][ROLL_AXIS]
+    statistical["bounded"], statistical["air"]["moving"] = 0.0, 0
+    across.blur(view, statistical, V)
+    assert view["bounded"][0] == 0.0
+    assert view["block"]["drift"][0, 0] == pytest.approx(2.0 * LEAST_UNCERTAINTY_RAD_S2**2)
+
+
+def test_what_constants_multiply_is_that_of_the_axes_along_the_direction(fdi):
+    pitch, lateral = fdi["statistical"]["block"][:2]
+    views = fdi["statistical"]["views"]
+    before = views[PAST_AILERON]["block"]["regressor"][5:].copy()
+    for v, expected in (
+        (PITCH_AXIS, pitch["regressor"][:3, 0]),
+        (ROLL_AXIS, lateral["regressor"][:4, 0]),
+        (YAW_AXIS, lateral["regressor"][:4, 1]),
+        (PAST_AILERON, lateral["regressor"][:4] @ [-0.6, 0.8]),
+    ):
+        views[v]["block"]["regressor"][:], views[v]["block"]["n_regressors"] = 9.0, 0
+        if v == PAST_AILERON:
+            views[v]["mix"][:3], views[v]["surface"] = (-0.6, 0.0, 0.8), AN_AXIS
+        across.regress(fdi, views[v], np.ones(3), 0.0)
+        found = views[v]["block"]["regressor"][:, 0]
+        assert found[: len(expected)] == pytest.approx(expected)
+        assert (found[len(expected) :] == 9.0).all(), "of no column nothing more"
+    assert not before.any()
+
+
+@pytest.mark.parametrize(("size", "own_errors"), [(2.0, 1), (2.0, 0), (0.3, 1)])
+def test_of_what_goes_along_a_column_that_may_be_turned_a_share_shows_across(fdi, size, own_errors):
+    """The column g + e, |e| up to the tolerance of either axis: the most, by its corners, of e across over
+    what is left of g + e along; where little is left, a tenth of the column is."""
+    view = fdi["statistical"]["views"][PAST_AILERON]
+    G, innovation = np.zeros((3, 4)), np.array([0.7, 5.0, -0.4])
+    G[0, AILERON], G[2, AILERON], fdi["bound"]["own_errors"] = 0.8 * size, 0.6 * size, own_errors
+    across.regress(fdi, view, innovation, across.turn(fdi, view, G))
+    m = view["mix"][[0, 2]]
+    along = np.array([m[1], -m[0]])
+    e = fdi["bound"]["own_per_rad"][[0, 2], AILERON]
+    corners = [e * (s, t) for s in (-1, 1) for t in (-1, 1)]
+    most = max(abs(m @ c) for c in corners)
+    least = max(size - max(abs(along @ c) for c in corners), across.LEAST_LENGTH * size)
+    shown = own_errors * most / least * (along @ innovation[[0, 2]])
+    n = int(fdi["statistical"]["block"][1]["n_regressors"])
+    assert view["block"]["regressor"][n, 0] == pytest.approx(shown)
+
+
+def test_a_step_signs_as_one_and_a_loss_as_what_its_surface_gives_along_the_direction(fdi, rng):
+    view, Gu = fdi["statistical"]["views"][PAST_RUDDER], rng.normal(size=(3, 4))
+    view["mix"][:3] = 0.5, 0.3, -0.7
+    hypotheses = view["block"]["hypothesis"]
+    view["block"]["n_hypotheses"], hypotheses["signature"] = 3, 9.0
+    hypotheses["kind"][:3], hypotheses["surface"][:3] = (LOSS, STEP, LOSS), (FLAP, -1, AILERON)
+    across.sign(fdi, view, Gu)
+    m = view["mix"][:3]
+    assert hypotheses["signature"][:3, 0] == pytest.approx([m @ Gu[:, FLAP], 1.0, m @ Gu[:, AILERON]])
+    assert (hypotheses["signature"][:, 1] == 9.0).all()
+    assert (hypotheses["signature"][3:] == 9.0).all()
+
+
+@pytest.mark.parametrize("axis", range(3))
+def test_a_fault_shows_along_every_axis_that_its_column_moves(fdi, axis):
+    view = fdi["statistical"]["views"][PAST_RUDDER]
+    moved = np.eye(3)[axis]
+    view["mix"][:3] = moved
+    assert across.feels(fdi, view, AILERON, 1e-6 * moved)
+    assert not across.feels(fdi, view, AILERON, 1.0 - moved)
+    assert not across.feels(fdi, view, RUDDER, moved), "across its own column it shows nothing"
+
+
+@pytest.mark.parametrize(("latched", "tolerated", "frame"), [(False, 1, 6), (True, 1, 6), (False, 0, 7)])
+def test_a_frame_is_seen_along_every_direction(fdi, rng, latched, tolerated, frame):
+    """Each view as a block of its own that is given what matrices say of the frame."""
+    statistical = fdi["statistical"]
+    statistical["tolerated"], G, Gu = tolerated, *rng.normal(0.0, 3.0, (2, 3, 4))
+    innovation = rng.normal(size=3)
+    alone, statistical["n_views"] = [], 2  # enough: the first, and one across a column
+    statistical["views"][1] = statistical["views"][PAST_AILERON].copy()
+    for view in statistical["views"][:2]:
+        lane = view["block"]["lane"]
+        for name in ("correlation", "information", "overlap", "response"):
+            lane[name] = rng.uniform(1.0, 2.0, lane[name].shape)
+        alone.append(view.copy().view(np.recarray))
+    across.observe(fdi, innovation, G, Gu, V, frame, latched)
+    for view, own in zip(statistical["views"], alone, strict=False):
+        share = across.turn(fdi, own, G) if own["surface"] >= 0 else 0.0
+        block = own["block"]
+        across.blur(own, statistical, V)
+        if tolerated:
+            across.regress(fdi, own, innovation, share)
+        across.sign(fdi, own, Gu)
+        block["scratch"][0] = own["mix"][:3] @ innovation
+        if not latched:
+            likelihood.start(block, likelihood.slot_to_start(frame))
+        likelihood.take_in(block, own["bounded"], tolerated, DT, 0.9 if latched else 1.0)
+        for name in NAMES:
+            assert view["block"][name] == pytest.approx(block[name], rel=1e-12), name
+        for name in ("correlation", "information", "overlap", "slack", "score"):
+            assert view["block"]["lane"][name] == pytest.approx(block["lane"][name], rel=1e-12), name
+
+
+def test_views_that_are_not_there_are_not_asked(fdi, rng):
+    fdi["statistical"]["n_views"] = 1
+    before = fdi["statistical"]["views"].copy()
+    across.observe(fdi, rng.normal(size=3), np.ones((3, 4)), np.ones((3, 4)), V, 3, False)
+    after = fdi["statistical"]["views"]
+    changed = [now.tobytes() != then.tobytes() for now, then in zip(after, before, strict=True)]
+    assert changed == [True] + [False] * (MAX_VIEWS - 1)
+
+
+def test_any_hypothesis_beyond_the_level_excludes_whom_it_is_not_felt_of(fdi):
+    statistical = fdi["statistical"]
+    statistical["alarm_level"], fdi["layout"]["position_of"] = 5.0, range(4)
+    for s, fie in enumerate(fdi["estimator"][:4]):
+        fie["kind"], fie["surface"], fie["effect"]["Z"] = POSITION, s, np.eye(3, 4)[:, s]
+    view = statistical["views"][ROLL_AXIS]
+    tried = int(view["block"]["n_hypotheses"])
+    for h in range(MAX_HYPOTHESES):
+        view["block"]["hypothesis"]["score"] = np.where(np.arange(MAX_HYPOTHESES) == h, 5.1, 4.9)
+        assert across.excludes(fdi, ELEVATOR) == (h < tried)
+        assert not across.excludes(fdi, AILERON)
+    view["block"]["hypothesis"]["score"] = 5.0
+    assert not across.excludes(fdi, ELEVATOR), "the level is what chance may reach"
+
+
+def test_a_view_has_levels_and_tolerances_of_the_axes_it_looks_at(fdi):
+    """And across a column one tolerance more, which is of the column itself."""
+    statistical = fdi["statistical"]
+    pitch, lateral = statistical["block"][:2]
+    for b, block in enumerate((pitch, lateral)):
+        block["level"], block["chance"], block["pace"] = 5.0 + b, 0.5 + b, 0.01 + b
+    set_up_views(statistical, load())
+    for v, view in enumerate(statistical["views"][:5]):
+        axes, column = pitch if v == PITCH_AXIS else lateral, v in (PAST_AILERON, PAST_RUDDER)
+        block, n = view["block"], int(axes["n_regressors"])
+        for name in ("level", "chance", "pace"):
+            assert block[name] == axes[name]
+        assert (block["n"], block["keep"]) == (1, 1.0)
+        assert block["n_regressors"] == n + column
+        assert block["tolerance"][:n].tolist() == axes["tolerance"][:n].tolist()
+        assert block["tolerance"][n] == float(column)
+        assert block["P_xx"][0, 0] == axes["noise"].max()
+        assert block["P_dd"][0, 0] == 1.0
+        tried = block["hypothesis"][: block["n_hypotheses"]]
+        assert tried["kind"].tolist() == [STEP] + [LOSS] * (len(tried) - 1)
+        sense = block["lane"]["sense"].reshape(-1, MAX_HYPOTHESES)
+        assert (sense == -losses(tried)).all()
+
+
+def losses(tried):
+    """1 for each loss that is tried, of which a correlation of the other sign speaks for nothing."""
+    return np.pad(tried["kind"] == LOSS, (0, MAX_HYPOTHESES - len(tried))).astype(float)

@@ -1,0 +1,412 @@
+"""What accelerometers say of the surfaces, a kernel at a time, against sums, differences and draws."""
+
+import numpy as np
+import pytest
+from kernels import new_fdi
+
+from beaver_ftc.aircraft import load
+from beaver_ftc.aircraft.aircraft import FORCES
+from beaver_ftc.aircraft.schema import SIDESLIP_RATE
+from beaver_ftc.design.terms import fill_table
+from beaver_ftc.diagnosis import across, forces
+from beaver_ftc.diagnosis.forces import SIDE, UP, look, set_up_forces
+from beaver_ftc.diagnosis.state import AN_AXIS, NORMAL, PITCH, ROLL, THE_VANE, YAW
+from beaver_ftc.diagnosis.state import SIDE as ACROSS
+from beaver_ftc.diagnosis.views import set_up_views
+from beaver_ftc.plant.readings import MEASURED
+from beaver_ftc.scenario.diagnosis import Bounds
+
+AIRCRAFT = load()
+ELEVATOR, FLAP = 1, 3
+X, U = np.array([0.05, -0.03, 0.04]), np.array([0.06, -0.08, 0.05, 0.1])
+Y = np.array([0.11, 0.07, 46.0, 1150.0, 2.1])
+ALONG_Y = np.arange(15.0).reshape(3, 5)
+DT, GRAVITY = 0.01, 9.80665
+TILTED = np.radians(1.0) * GRAVITY / Y[2]
+ROLL_VIEW = 1
+ELEVATOR_VIEW, FLAP_VIEW, ALPHA_VIEW, UP_VIEW, AILERON_VIEW, RUDDER_VIEW, BETA_VIEW, SIDE_VIEW = range(5, 13)
+
+
+def measured(x=X, y=Y, force=(0.5, 0.3, -9.5), attitude=(0.2, 0.15)):
+    record = np.zeros(1, MEASURED).view(np.recarray)[0]
+    record["x"], record["y"][:5], record["force"], record["attitude"][:2] = x, y, force, attitude
+    return record
+
+
+def felt(bounds=None):
+    """A diagnosis whose forces are set up at X, Y, U."""
+    fdi = new_fdi()
+    statistical = fdi["statistical"]
+    air = statistical["air"]
+    fill_table(air["forces"], AIRCRAFT, AIRCRAFT.measurable_forces, FORCES)
+    air["area_per_mass"], air["gravity"] = AIRCRAFT.geometry.wing_area_m2 / AIRCRAFT.mass.mass_kg, GRAVITY
+    air["scale"], statistical["forces"]["known"] = 533.4, 1
+    set_up_forces(statistical, bounds or Bounds(), AIRCRAFT, (X, Y, U), ALONG_Y)
+    return fdi
+
+
+def coefficient(name, x=X, y=Y, u=U, rate=0.0):
+    size, V = AIRCRAFT.geometry, y[2]
+    of = dict(zip(AIRCRAFT.surfaces, u, strict=True))
+    of |= {"alpha": y[0], "beta": y[1], "dpt": y[4], "ph": x[0] * size.span_m / (2 * V)}
+    of |= {"qh": x[1] * size.chord_m / V, "rh": x[2] * size.span_m / (2 * V)}
+    return AIRCRAFT.coefficient(name, of | {SIDESLIP_RATE: rate * size.span_m / (2 * V)})
+
+
+def per_coefficient(y=Y):
+    return y[3] * AIRCRAFT.geometry.wing_area_m2 / AIRCRAFT.mass.mass_kg / AIRCRAFT.geometry.chord_m
+
+
+@pytest.mark.parametrize(("f", "name"), [(SIDE, "CY"), (UP, "CZ")])
+def test_the_model_is_the_sum_of_its_terms_and_the_rest_is_the_innovation(f, name):
+    fdi, rate = felt(), 0.04
+    record, seen = fdi["statistical"]["forces"], measured()
+    record["rate"][SIDE], record["begun"] = rate, 1
+    look(record, fdi["statistical"]["air"], seen, U, DT)
+    whole = per_coefficient() * coefficient(name, rate=rate)
+    force = record["component"][f]
+    expected = seen["force"][1 + f] / AIRCRAFT.geometry.chord_m - whole
+    assert force["innovation"] == pytest.approx(expected, rel=1e-12)
+    n = int(force["n"])
+    assert force["regressor"][n - 1] == pytest.approx(whole)
+    values = [t.value for t in AIRCRAFT.measurable_forces if t.coefficient == name]
+    values += [
+        t.value for t in AIRCRAFT.forces if t.coefficient == "CY" and f == SIDE and "betadoth" in dict(t.of)
+    ]
+    terms = force["regressor"][: n - 1]
+    if f == SIDE:
+        terms = np.append(terms[:-1], terms[-1] / values[-1])
+        assert terms[-1] == pytest.approx(per_coefficient() * rate * AIRCRAFT.geometry.span_m / (2 * Y[2]))
+    assert np.dot(values, terms) == pytest.approx(whole)
+
+
+@pytest.mark.parametrize(("f", "name"), [(SIDE, "CY"), (UP, "CZ")])
+def test_a_surface_s_column_is_the_slope_along_it_and_its_errors_are_shares_of_the_terms(f, name):
+    fdi = felt(Bounds(coefficients=0.05))
+    record = fdi["statistical"]["forces"]
+    look(record, fdi["statistical"]["air"], measured(), U, DT)
+    force = record["component"][f]
+    for s in range(4):
+        ahead = U + 1e-4 * np.eye(4)[s]
+        slope = per_coefficient() * (coefficient(name, u=ahead) - coefficient(name)) / 1e-4
+        assert force["column"][s] == pytest.approx(slope, abs=1e-9)
+        assert force["moment"][s] == pytest.approx(slope * U[s], abs=1e-9)
+        own = [
+            t
+            for t in AIRCRAFT.measurable_forces
+            if t.coefficient == name and t.surface == AIRCRAFT.surfaces[s]
+        ]
+        size = sum(
+            abs(t.value) * Y[0] ** dict(t.of).get("alpha", 0) * Y[1] ** dict(t.of).get("beta", 0) for t in own
+        )
+        assert force["own"][s] == pytest.approx(0.05 * per_coefficient() * size)
+
+
+def test_the_flow_s_rates_are_those_of_a_body_that_moves_on():
+    """The velocity through air at rest a moment later, by v' = a + g - x cross v."""
+    record, a, phi, theta = felt()["statistical"]["forces"], np.array([0.5, 0.3, -9.5]), 0.2, 0.15
+    forces.flow_rates(record, measured())
+    alpha, beta, V = Y[:3]
+    v = V * np.array([np.cos(alpha) * np.cos(beta), np.sin(beta), np.sin(alpha) * np.cos(beta)])
+    g = GRAVITY * np.array([-np.sin(theta), np.cos(theta) * np.sin(phi), np.cos(theta) * np.cos(phi)])
+    step = 1e-6
+    later = v + step * (a + g - np.cross(X, v))
+    now, then = (np.array([np.arcsin(w[1] / np.linalg.norm(w)), np.arctan2(w[2], w[0])]) for w in (later, v))
+    assert record["rate"] == pytest.approx((now - then) / step, rel=1e-4)
+
+
+@pytest.mark.parametrize(("f", "place"), [(SIDE, 1), (UP, 0)])
+def test_followed_by_inertial_motion_a_force_does_not_know_its_vane(f, place):
+    """Whatever a vane says after the first frame, what is left of the force is the same but for curvature."""
+    courses = np.zeros(30), np.append(0.0, np.random.default_rng(3).normal(0.0, 0.002, 29).cumsum())
+    left = []
+    for course in courses:
+        fdi = felt()
+        record = fdi["statistical"]["forces"]
+        record["of_rate"] = 0.0
+        for error in course:
+            y = Y.copy()
+            y[place] += error
+            look(record, fdi["statistical"]["air"], measured(y=y), U, DT)
+        left.append((record["component"][f]["inertial"], record["component"][f]["innovation"]))
+    (inertial, plain), (inertial_too, other) = left
+    assert abs(plain - other) > 0.005
+    assert abs(inertial - inertial_too) < 0.05 * abs(plain - other)
+
+
+def test_the_angle_followed_is_the_sum_of_its_rates_and_its_drift_is_counted():
+    fdi = felt()
+    record = fdi["statistical"]["forces"]
+    for _ in range(11):
+        look(record, fdi["statistical"]["air"], measured(), U, DT)
+    for f, place in ((SIDE, 1), (UP, 0)):
+        force = record["component"][f]
+        assert force["angle"] == pytest.approx(Y[place] + 10 * DT * record["rate"][f])
+        assert force["drifted"] == pytest.approx(11 * DT * force["vane"][1])
+
+
+def test_noise_of_the_readings_is_jitter_of_the_forces():
+    """Against the spread of e over readings that are drawn."""
+    sensors = {
+        "alpha": {"noise_std_deg": 0.03}, "beta": {"noise_std_deg": 0.02}, "V": {"noise_std_mps": 0.1},
+        "qdyn": {"noise_std_pa": 4.0}, **{axis: {"noise_std_deg_s": 0.05} for axis in "pqr"},
+    }  # fmt: skip
+    fdi, rng = felt(Bounds(sensors=sensors)), np.random.default_rng(4)
+    record, drawn = fdi["statistical"]["forces"], []
+    std = np.radians([0.03, 0.02]), 0.1, 4.0, np.radians(0.05)
+    for _ in range(1500):
+        y = Y + np.array([*(std[0] * rng.normal(size=2)), std[1] * rng.normal(), std[2] * rng.normal(), 0.0])
+        look(record, fdi["statistical"]["air"], measured(X + std[3] * rng.normal(size=3), y), U, DT)
+        drawn.append(record["component"]["innovation"].copy())
+    look(record, fdi["statistical"]["air"], measured(), U, DT)
+    assert np.sqrt(record["component"]["jitter"][:, 0]) == pytest.approx(np.std(drawn, axis=0), rel=0.06)
+    without = record["component"]["jitter"][:, 0] - record["component"]["jitter"][:, 1]
+    slopes = record["component"]["vane"][:, 1] * np.radians([0.02, 0.03])
+    assert without == pytest.approx(slopes**2, rel=1e-6)
+
+
+def test_a_vane_s_error_moves_rate_and_force_by_their_slopes():
+    record = felt()["statistical"]["forces"]
+    for f, name, place, axis in ((SIDE, "CY", 1, 2), (UP, "CZ", 0, 1)):
+        off = Y + 1e-5 * np.eye(5)[place]
+        slope = per_coefficient() * (coefficient(name, y=off) - coefficient(name)) / 1e-5
+        assert record["component"][f]["vane"] == pytest.approx([-ALONG_Y[axis, place], -slope], rel=1e-4)
+
+
+def test_constant_errors_are_tolerated_term_by_term():
+    given = Bounds(coefficients=0.05, sensors={"alpha": {"bias_deg": 0.5}, "qdyn": {"bias_pa": 23.0}})
+    force = felt(given)["statistical"]["forces"]["component"][UP]
+    terms = forces.terms_of(AIRCRAFT, UP)
+    shares = force["tolerance"][: len(terms)] / np.abs([t.value for t in terms])
+    assert shares[1:] == pytest.approx(0.05 + 23.0 / 1150.0)
+    slope = abs(force["vane"][1]) / per_coefficient()
+    of_constant = 0.07 * abs(terms[0].value) + np.radians(0.5) * slope
+    assert terms[0].is_constant
+    assert force["tolerance"][0] == pytest.approx(of_constant)
+    assert force["tolerance"][len(terms)] == forces.MASS_TOLERANCE
+    assert force["n"] == len(terms) + 1
+
+
+@pytest.mark.parametrize(
+    ("bounds", "side", "up"),
+    [
+        ({}, 0.0, 0.0),
+        ({"r": {"bias_deg_s": 0.1}}, np.radians(0.1), np.radians(0.1)),
+        ({"phi": {"bias_deg": 1.0}}, TILTED, 0.3 * TILTED),
+    ],
+)  # fmt: skip
+def test_the_angle_followed_drifts_by_gyros_and_by_gravity_s_share(bounds, side, up):
+    drift = felt(Bounds(sensors=bounds))["statistical"]["forces"]["component"]["drift"]
+    still = felt()["statistical"]["forces"]["component"]["drift"]
+    assert still == pytest.approx(7.3e-5 + 0.03 / 46.0)
+    assert drift - still == pytest.approx([side, up], abs=1e-12)
+
+
+def test_in_turbulence_gusts_turn_the_flow():
+    """By a walk of 3 sigma^2 / (L V) [MIL-F-8785C, 3.7], against a draw of Dryden's vertical gust."""
+    wander = [
+        felt(Bounds(turbulence=air))["statistical"]["forces"]["component"] for air in ("none", "moderate")
+    ]
+    sigma, L, V, dt, rng = 10.6 * 0.3048, 533.4, 46.0, 0.01, np.random.default_rng(2)
+    more = np.sqrt(wander[1]["wander"] - wander[0]["wander"]) / np.abs(wander[1]["vane"][:, 1])
+    tau, n = L / V, 40_000  # (1 + sqrt(3) tau s) / (1 + tau s)^2, of white noise of intensity sigma^2 tau
+    noise, one, two, gust = rng.normal(0.0, sigma * np.sqrt(tau / dt), n), 0.0, 0.0, np.empty(n)
+    for k in range(n):
+        one += dt * (noise[k] - one) / tau
+        two += dt * (one - two) / tau
+        gust[k] = two + np.sqrt(3.0) * (one - two)
+    assert more == pytest.approx(np.std(np.diff(gust)) / V / np.sqrt(dt), rel=0.03)
+
+
+@pytest.fixture
+def viewed():
+    fdi = felt(Bounds(coefficients=0.05))
+    statistical = fdi["statistical"]
+    statistical["alarm_level"], statistical["naming_level"], statistical["keep"] = 6.0, 0.5 * 5.0**2, 0.99
+    set_up_views(statistical, AIRCRAFT)
+    look(statistical["forces"], statistical["air"], measured(), U, DT)
+    fdi["layout"]["position_of"] = range(4)
+    return fdi
+
+
+def test_each_surface_is_looked_past_in_the_axis_it_leads_and_its_force(viewed):
+    seen = [
+        (int(v["surface"]), *v["plane"], v["inertial"], v["clears"])
+        for v in viewed["statistical"]["views"][5:13]
+    ]
+    assert seen == [
+        (1, PITCH, NORMAL, 0, 0), (3, PITCH, NORMAL, 0, 0), (THE_VANE, PITCH, NORMAL, 0, 1),
+        (AN_AXIS, PITCH, NORMAL, 1, 1), (0, ROLL, ACROSS, 0, 0), (2, YAW, ACROSS, 0, 0),
+        (THE_VANE, YAW, ACROSS, 0, 1), (AN_AXIS, YAW, ACROSS, 1, 1),
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("v", [ELEVATOR_VIEW, FLAP_VIEW, ALPHA_VIEW, AILERON_VIEW, RUDDER_VIEW, BETA_VIEW])
+def test_what_goes_along_a_column_of_rate_and_force_is_not_seen_past_it(viewed, v):
+    view, G = viewed["statistical"]["views"][v], np.random.default_rng(7).normal(0.0, 3.0, (3, 4))
+    G[1, [0, 2]] = G[0, [1, 3]] = G[2, [1, 3]] = 0.0
+    across.turn(viewed, view, G)
+    first, second = view["plane"]
+    force = viewed["statistical"]["forces"]["component"][second - ACROSS]
+    s = int(view["surface"])
+    of_it = force["vane"] if s == THE_VANE else (G[first, s], force["column"][s])
+    assert view["mix"][[first, second]] @ of_it == pytest.approx(0.0, abs=1e-12)
+    assert np.linalg.norm(view["mix"]) == pytest.approx(1.0)
+    assert np.count_nonzero(view["mix"]) == 2
+    if s != THE_VANE:
+        assert across.feels(viewed, view, s, G[:, s]) == 0
+        assert across.feels(viewed, view, FLAP if s == ELEVATOR else ELEVATOR, G[:, 1]) == (second == NORMAL)
+
+
+def test_a_force_counts_once_the_vane_is_cleared(viewed):
+    """At the alarm level, of what clears the vane at the naming level; rates need no clearing."""
+    statistical = viewed["statistical"]
+    views = statistical["views"]
+    views["held"][ELEVATOR_VIEW], views["mix"][ELEVATOR_VIEW] = 9.0, (0.0, 0.3, 0.0, 0.0, -0.95)
+    assert across.shown(statistical, views[ELEVATOR_VIEW]) == 0.0
+    for clearing in (ALPHA_VIEW, UP_VIEW):
+        views["held"][[ALPHA_VIEW, UP_VIEW]] = 0.0
+        views["held"][clearing] = 5.0
+        assert across.shown(statistical, views[ELEVATOR_VIEW]) == pytest.approx(6.0)
+    views["held"][UP_VIEW] = 50.0
+    assert across.shown(statistical, views[ELEVATOR_VIEW]) == 9.0
+    views["held"][[ALPHA_VIEW, UP_VIEW]], views["held"][[BETA_VIEW, SIDE_VIEW]] = 0.0, 50.0
+    assert across.shown(statistical, views[ELEVATOR_VIEW]) == 0.0, "another vane"
+    views["block"]["hypothesis"]["score"][0, 0] = 7.0
+    assert across.shown(statistical, views[0]) == 7.0
+
+
+def test_only_what_is_mostly_a_force_raises_the_alarm(viewed):
+    views = viewed["statistical"]["views"]
+    for v, mix, alarms in (
+        (ELEVATOR_VIEW, (0.0, 0.3, 0.0, 0.0, -0.95), True), (FLAP_VIEW, (0.0, 0.95, 0.0, 0.0, 0.3), False),
+        (AILERON_VIEW, (0.03, 0.0, 0.0, 1.0, 0.0), True), (ALPHA_VIEW, (0.0, 0.1, 0.0, 0.0, 0.99), False),
+        (SIDE_VIEW, (0.0, 0.0, 0.0, 1.0, 0.0), False),
+    ):  # fmt: skip
+        views["mix"][v] = mix
+        assert across.alarms(views[v]) == alarms
+
+
+def test_what_clears_a_vane_excludes_nobody(viewed):
+    statistical = viewed["statistical"]
+    views = statistical["views"]
+    for v in (ALPHA_VIEW, UP_VIEW):
+        views["held"][v], views["block"]["hypothesis"]["score"][v, 0] = 50.0, 50.0
+    assert not any(across.excludes(viewed, s) for s in range(4))
+
+
+def test_old_evidence_of_a_force_is_forgotten_slowly(viewed):
+    statistical, G = viewed["statistical"], np.ones((3, 4))
+    statistical["views"]["held"][UP_VIEW] = 8.0
+    for block in statistical["block"]:
+        block["noise"] = 1e-8
+    across.observe(viewed, np.zeros(3), G, 0.0 * G, 45.0, 1, False)
+    assert statistical["views"]["held"][UP_VIEW] == pytest.approx(8.0 * (1.0 - 0.01 / across.HOLDS))
+
+
+def test_what_errors_multiply_along_a_direction_is_that_of_rate_and_force(viewed):
+    """Of the rate's block, then of the force, then how far the followed angle has drifted, or the column."""
+    statistical, rng = viewed["statistical"], np.random.default_rng(9)
+    pitch, force = statistical["block"][0], statistical["forces"]["component"][UP]
+    pitch["n_regressors"], pitch["regressor"][:3, 0] = 3, rng.normal(size=3)
+    view, n = statistical["views"][ELEVATOR_VIEW], int(force["n"])
+    view["mix"] = 0.0, 0.6, 0.0, 0.0, -0.8
+    across.regress(viewed, view, np.array([0.0, 2.0, 0.0]), 0.1)
+    found = view["block"]["regressor"][: 4 + n, 0]
+    along = 0.1 * (-0.8 * 2.0 - 0.6 * force["innovation"])
+    expected = [*(0.6 * pitch["regressor"][:3, 0]), *(-0.8 * force["regressor"][:n]), along]
+    assert found == pytest.approx(np.array(expected))
+    alone = statistical["views"][UP_VIEW]
+    across.regress(viewed, alone, np.zeros(3), 0.0)
+    assert alone["block"]["regressor"][3 : 3 + n, 0] == pytest.approx(force["regressor"][:n])
+    assert alone["block"]["regressor"][3 + n, 0] == pytest.approx(force["drifted"])
+
+
+def test_a_loss_signs_with_the_force_it_takes(viewed):
+    view, Gu = viewed["statistical"]["views"][FLAP_VIEW], np.random.default_rng(1).normal(size=(3, 4))
+    view["mix"] = 0.0, 0.9, 0.0, 0.0, 0.4
+    across.sign(viewed, view, Gu)
+    moment = viewed["statistical"]["forces"]["component"][UP]["moment"][ELEVATOR]
+    assert view["block"]["hypothesis"]["signature"][:2, 0] == pytest.approx(
+        [1.0, 0.9 * Gu[1, ELEVATOR] + 0.4 * moment]
+    )
+
+
+@pytest.mark.parametrize("v", [ELEVATOR_VIEW, UP_VIEW, RUDDER_VIEW])
+def test_what_is_declared_of_rate_and_force_is_seen_along_a_direction(viewed, v):
+    statistical, rng = viewed["statistical"], np.random.default_rng(6)
+    statistical["jitter"], statistical["bounded"], statistical["rapidity"] = (1e-6, 4e-6, 9e-6), 0.02, 2.0
+    air, view, component = statistical["air"], statistical["views"][v], statistical["forces"]["component"]
+    air["moving"], air["damping"], air["axes"] = 1, rng.normal(size=(3, 3)), np.eye(3)
+    air["per_metre"] = 1e-5, 2e-5, 3e-5
+    component["jitter"], component["deflection"] = ((2e-6, 1e-7), (3e-5, 2e-5)), (0.001, 0.002)
+    component["wander"], statistical["forces"]["strength"] = (1e-4, 2e-4), 1.2
+    for name in ("moving", "damping", "axes", "per_metre"):
+        statistical["inertial_air"][name] = air[name]
+    air["unseen"], statistical["inertial_air"]["unseen"] = (1.0, 0.25, 0.09), (1.0, 0.36, 0.16)
+    seen = statistical["inertial_air" if view["clears"] else "air"]["unseen"]
+    across.turn(viewed, view, rng.normal(size=(3, 4)))
+    across.blur(view, statistical, 45.0)
+    m, block = view["mix"], view["block"]
+    by_rates, by_forces = np.abs(m[:3] @ air["damping"]), 1.2 * np.abs(m[3:] @ component["damping"])
+    gusts = 45.0 * np.sum((np.sqrt(seen) * by_rates + by_forces) ** 2 * air["per_metre"])
+    sizes = np.sqrt([*statistical["jitter"], *component["jitter"][:, int(view["inertial"])]])
+    assert block["jitter"][0] == pytest.approx((np.abs(m) @ sizes) ** 2)
+    bound = np.abs(m) @ [0.02, 0.02, 0.02, 0.0012, 0.0024]
+    assert view["bounded"][0] == pytest.approx(bound)
+    wander = 1.2**2 * view["inertial"] * m[3:] ** 2 @ component["wander"]
+    assert block["drift"][0, 0] == pytest.approx(gusts + wander + 2.0 * max(bound, 1e-3) ** 2)
+
+
+@pytest.mark.parametrize("strength", [1.0, 2.5])
+def test_noise_and_slopes_of_forces_go_with_the_pressure(strength):
+    """A dive at more than its trim's pressure: as if trimmed there."""
+    sensors = {"alpha": {"noise_std_deg": 0.03}, "beta": {"noise_std_deg": 0.02}}
+    fdi, fast = felt(Bounds(sensors=sensors)), Y * (1.0, 1.0, 1.0, strength, 1.0)
+    record = fdi["statistical"]["forces"]
+    look(record, fdi["statistical"]["air"], measured(y=fast), U, DT)
+    slopes = strength * record["component"]["vane"][:, 1]
+    noise = np.radians([0.02, 0.03])
+    assert record["strength"] == pytest.approx(strength)
+    assert record["component"]["jitter"][:, 0] == pytest.approx((slopes * noise) ** 2, rel=0.01)
+    assert record["component"]["drifted"] == pytest.approx(DT * slopes)
+
+
+def test_without_vanes_the_flow_is_what_the_forces_say():
+    """A vane that is off by little: forces give back where the flow is."""
+    fdi = felt()
+    record, air = fdi["statistical"]["forces"], fdi["statistical"]["air"]
+    look(record, air, measured(), U, DT)
+    sound = [
+        measured().force[1 + f] - record["component"][f]["innovation"] * AIRCRAFT.geometry.chord_m
+        for f in (SIDE, UP)
+    ]
+    off = Y + np.array([0.004, -0.003, 0.0, 0.0, 0.0])
+    look(record, air, measured(y=off, force=(0.5, *sound)), U, DT)
+    forces.without_vanes(record, np.zeros(3), np.append(off, np.zeros(record["y"].size - 5)))
+    assert record["y"][:5] == pytest.approx(Y, abs=6e-4), "an eighth of what they are off"
+    still, turning = record["y"][:2].copy(), np.array([0.02, -0.03, 0.01])
+    forces.without_vanes(record, turning, np.append(off, np.zeros(record["y"].size - 5)))
+    damped = record["component"]["damping"] @ turning / record["component"]["vane"][:, 1]
+    assert still - record["y"][:2] == pytest.approx(damped[::-1])
+
+
+@pytest.mark.parametrize("v", [ELEVATOR_VIEW, ALPHA_VIEW])
+def test_a_view_takes_off_the_gust_as_it_may_know_it(viewed, v):
+    """Of surfaces by the vanes; of what clears a vane without them."""
+    statistical = viewed["statistical"]
+    statistical["air"]["mean"], statistical["inertial_air"]["mean"] = (0.1, 0.2, 0.3), (0.4, 0.5, 0.6)
+    seen = 0.5 if v == ALPHA_VIEW else 0.2
+    view = statistical["views"][v]
+    assert across.part(viewed, view, np.ones(3), PITCH) == pytest.approx(1.0 - seen)
+    force = statistical["forces"]["component"][UP]["innovation"]
+    assert across.part(viewed, view, np.ones(3), NORMAL) == force
+    assert across.part(viewed, statistical["views"][ROLL_VIEW], np.ones(3), ROLL) == 1.0
+
+
+def test_in_moving_air_the_vanes_are_asked_but_for_the_rolling_gust(viewed):
+    for moving in (0, 1):
+        viewed["statistical"]["air"]["moving"] = moving
+        set_up_views(viewed["statistical"], AIRCRAFT)
+        cleared_by = viewed["statistical"]["views"]["cleared_by"][:5].tolist()
+        assert cleared_by == [moving * NORMAL, 0, moving * ACROSS, moving * ACROSS, 0]

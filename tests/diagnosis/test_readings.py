@@ -1,0 +1,117 @@
+"""Errors of the air data: what they do where the aircraft flies, by moving each reading a little."""
+
+import numpy as np
+import pytest
+from innovations import Detector, misread
+
+from beaver_ftc.design.engine import KW_TO_DPT
+from beaver_ftc.design.variants import response
+from beaver_ftc.diagnosis import noise_model, readings, statistical
+from beaver_ftc.diagnosis.state import N_READINGS
+from beaver_ftc.scenario.diagnosis import Bounds
+from flying import flown
+
+BIASES = {
+    "alpha": {"bias_deg": 0.5},
+    "beta": {"bias_deg": 0.5},
+    "V": {"bias_mps": 0.4},
+    "qdyn": {"bias_pa": 17.0},
+}
+STEADY = (np.radians(0.5), np.radians(0.5), 0.4, 17.0)
+STEPS = (1e-5, 1e-5, 1e-4, 1e-2, 1e-3)
+POWER = 4
+STATES = [
+    ((0.0, 0.0, 0.0), (0.1, 0.02, 45.0, 1036.0, 0.3), (0.0, 0.0, 0.0, 0.0)),
+    ((-0.05, -0.8, -0.5), (-0.13, 0.15, 23.4, 251.0, 3.5), (0.1, 0.47, -0.44, 0.2)),  # slow and slipping
+    ((0.3, 0.2, 0.1), (0.25, -0.1, 30.0, 500.0, 1.2), (-0.2, -0.1, 0.3, 0.0)),
+]
+
+
+def rates(design, x, y, u):
+    f, G = np.zeros(3), np.zeros((3, 4))
+    response(design, x, y, f, G)
+    return f + G @ u
+
+
+def moved(design, x, y, u, which, thin_air_kw):
+    """What the accelerations change by per unit of a reading, by central differences."""
+    there = []
+    for error in (STEPS[which], -STEPS[which]):
+        told = misread(y, which, error, thin_air_kw) if which < POWER else y.copy()
+        told[4] += KW_TO_DPT * error / (y[3] * y[2]) if which == POWER else 0.0
+        there.append(rates(design, x, told, u))
+    return (there[0] - there[1]) / (2 * STEPS[which])
+
+
+def at(state, **bounds):
+    """A detector that has looked at a state, its design model, and the state as arrays."""
+    alone = Detector(100.0, bounds=bounds)
+    design, flown_there = alone.frames[0]["belief"]["design"], tuple(map(np.array, state))
+    statistical.prepare(alone.detector, alone.fdi, design, *flown_there)
+    return alone, design, flown_there
+
+
+@pytest.mark.parametrize("state", STATES)
+def test_a_steady_error_is_a_constant_times_what_it_moves_now(state):
+    alone, design, flown_there = at(state, sensors=BIASES)
+    admitted = alone.fdi["bound"]["admitted"]
+    for which in range(N_READINGS):
+        found = moved(design, *flown_there, which, float(admitted["thin_air_kw"]))
+        error = STEADY[which] if which < POWER else float(admitted["engine_kw"])
+        for block in alone.blocks:
+            n, axes = int(block["n_regressors"]) - N_READINGS + which, block["axis"][: block["n"]]
+            assert block["tolerance"][n] == pytest.approx(error)
+            assert block["regressor"][n, : len(axes)] == pytest.approx(found[axes], rel=1e-5, abs=1e-9)
+
+
+@pytest.mark.parametrize("state", STATES)
+def test_noise_is_jitter_as_large_as_it_is_now(state):
+    alone, design, flown_there = at(state, sensors="tactical-grade")
+    thin, detector = float(alone.fdi["bound"]["admitted"]["thin_air_kw"]), alone.detector
+    expected = detector["own_jitter"].copy()
+    for which in range(N_READINGS):
+        expected += (moved(design, *flown_there, which, thin) * detector["reading_noise"][which]) ** 2
+    assert detector["jitter"] == pytest.approx(expected, rel=1e-5)
+    for block in alone.blocks:
+        axes = block["axis"][: block["n"]]
+        assert block["jitter"][: len(axes)] == pytest.approx(expected[axes], rel=1e-5)
+
+
+def test_without_errors_of_the_air_data_nothing_is_read():
+    alone = Detector(100.0, bounds={"coefficients": 0.05})
+    assert alone.detector["read"] == 0
+    assert Detector(100.0).detector["tolerated"] == 0
+    gyros = Bounds.model_validate({"sensors": {"p": {"noise_std_deg_s": 0.1}}}).sensors
+    record = alone.detector
+    admitted = alone.fdi["bound"]["admitted"]
+    before = record["block"]["n_regressors"].copy()
+    readings.set_up_readings(record, gyros, admitted)
+    assert list(record["block"]["n_regressors"]) == list(before)
+    assert noise_model.random_error(gyros, "p") == pytest.approx(np.radians(0.1))
+
+
+SLOW_DIVES = {
+    "consumer-grade": {
+        "rate_hz": 140, "initial": {"airspeed_mps": 49.68, "altitude_m": 2836.6}, "seed": 452,
+        "reference": {"q": [{"square": {
+            "amplitude_deg_s": 42.288, "frequency_hz": 0.15056, "phase_deg": 351.99,
+        }}]},
+    },
+    "tactical-grade": {
+        "rate_hz": 55, "initial": {"airspeed_mps": 42.4, "altitude_m": 1070.3}, "seed": 776,
+        "reference": {"q": [{"sine": {
+            "amplitude_deg_s": 92.209, "frequency_hz": 0.12494, "phase_deg": 48.2055,
+        }}]},
+    },
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("grade", SLOW_DIVES)
+def test_a_slow_slipping_aircraft_with_the_declared_sensors_raises_no_alarm(grade):
+    """At half the airspeed of the trim a steady error of the dynamic pressure is four times its share."""
+    flight, log = flown(
+        duration_s=5.2, actuators="servo", sensors=grade, control={"law": "adaptive"},
+        fdi={"statistical": {}, "bounds": {"sensors": grade}}, **SLOW_DIVES[grade],
+    )  # fmt: skip
+    assert log["airspeed_mps"].min() < 24.0
+    assert flight.detection_time_s is None

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from beaver_ftc.control import accommodation, law
-from beaver_ftc.control.laws.state import PUBLISHED, REJECTING
+from beaver_ftc.control import accommodation, law, nominal
+from beaver_ftc.control.laws.state import INDI, LQR, PUBLISHED, REJECTING
+from beaver_ftc.control.rivals import compiled
 from beaver_ftc.control.state import ADAPTIVE, FAULT_TOLERANT, NOMINAL, ORACLE
 from beaver_ftc.control.supervisor import MODE_ADAPTIVE
 from beaver_ftc.diagnosis import scheme
@@ -187,3 +188,37 @@ def test_known_laws_are_those_of_the_page():
     assert inner == {"fault-tolerant": REJECTING, "fault-tolerant-published": PUBLISHED}
     assert int(new_frame("fault-tolerant")["control"]["law"]) == FAULT_TOLERANT
     assert LOSS == 0
+
+
+@pytest.mark.parametrize(("name", "share"), [("nominal", 1.0), ("adaptive", 0.5)])
+def test_all_but_the_nominal_law_reckon_with_what_is_believed_of_a_surface(name, share):
+    frame = new_frame(name)
+    control = frame["control"]
+    control["effectiveness"][RUDDER], control["effectiveness_step"] = 0.5, 0.0
+    commanded(frame)
+    assert control["G"][:, RUDDER] == pytest.approx(share * G[:, RUDDER])
+    assert control["G"][:, AILERON] == pytest.approx(G[:, AILERON])
+
+
+def test_what_the_unknown_is_taken_for_is_taken_off_the_demand():
+    control, f, fhat = new_frame()["control"], np.array([0.3, -0.2, 0.1]), np.array([0.05, 0.07, -0.09])
+    control["governed_rate"], control["governed_acceleration"], control["integral"] = 0.01, 0.02, 0.003
+    nominal.demand(control, X, f, fhat)
+    wanted = 0.02 + control["Kp"] * (0.01 - X) + control["Ki"] * 0.003 - f - fhat
+    assert control["demand"] == pytest.approx(wanted)
+
+
+@pytest.mark.parametrize("inner", [INDI, LQR])
+def test_a_compiled_rival_commands_by_itself(inner):
+    """From what is measured and G, and nothing that the law of ours keeps is moved."""
+    frame, alone = new_frame(), new_frame()
+    for each in (frame, alone):
+        control, rival = each["control"], each["control"]["rival"]
+        control["inner"], control["model_rate"], control["model_acceleration"] = inner, 0.01, 0.02
+        rival["K"], rival["B_inverse"], rival["A"] = 0.1, np.eye(3) * 0.2, np.eye(3)
+        rival["Kp"], rival["Ki"], rival["keep"], rival["given"] = 2.0, 1.0, 0.5, 0.01
+    commanded(frame)
+    compiled.command(alone["control"], G, X)
+    assert frame["control"]["command"].tolist() == alone["control"]["command"].tolist()
+    assert (frame["control"]["command"] != 0.01).any()
+    assert frame["control"]["hold"].tolist() == alone["control"]["hold"].tolist()

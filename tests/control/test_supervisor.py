@@ -43,3 +43,8 @@ def test_the_laws_are_numbered_as_they_are_named():
 def test_the_way_out_of_nominal_leads_through_adaptive(now, wanted):
     reached = MODES[next_mode(MODES.index(now), MODES.index(wanted))]
     assert reached == ("adaptive" if now == "nominal" and wanted != "nominal" else wanted)
+
+
+def test_a_relieved_surface_is_whichever_it_is():
+    """An elevator may come first among an aircraft's surfaces."""
+    assert MODES[mode_of(FAULT_TOLERANT, 1, 0, True)] == "reallocated"

@@ -124,3 +124,32 @@ def test_across_its_direction_a_shared_parameter_confines_it_too(side):
         fdi["bank"]["residual"][1] = (limit + side * beyond) * fie["across"]  # a unit vector
         assert bool(bank.explains(fdi, fie, True)) == within
         assert bank.explains(fdi, fie, False)
+
+
+def test_a_filter_without_a_bound_has_no_share_of_it():
+    """Nothing is declared: it may alarm, but is nearer to its bound than no other."""
+    fdi = with_shares(*LEAVES)
+    fdi["bank"]["threshold"][0] = 0.0
+    with np.errstate(divide="ignore"):
+        assert bank.largest_share(fdi) == pytest.approx(1.5)
+        assert [bank.nearest(fdi["bank"], i) for i in range(3)] == [2, 1, 2]
+        bank.note_closest_approach(fdi)
+    assert fdi["bank"]["closest"][:3] == pytest.approx([0.0, 1.5, 1.2])
+    assert bank.alarm(fdi) == 0
+
+
+def test_of_filters_that_are_equally_near_the_published_one_is_named():
+    assert bank.nearest(new_fdi()["bank"], 0) == 0
+    assert bank.nearest(with_shares(*[[0.0] * 3] * 3)["bank"], 1) == 0
+    assert bank.nearest(with_shares(*[[0.5] * 3] * 3)["bank"], 1) == 0
+
+
+@pytest.mark.parametrize("size", [9.0, 0.3])
+def test_across_a_fault_is_square_to_its_column_in_roll_and_yaw(size):
+    fdi, G = new_fdi(), np.zeros((3, 4))
+    fie = estimator(fdi)
+    G[:, 0] = size * np.array([0.8, 5.0, -0.6])
+    bank.align(fdi, G)
+    assert fie["across"] == pytest.approx([-0.6, 0.0, -0.8])
+    bank.align(fdi, np.zeros((3, 4)))
+    assert fie["across"] == pytest.approx([-0.6, 0.0, -0.8]), "what moves neither has no direction"

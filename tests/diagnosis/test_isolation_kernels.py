@@ -13,6 +13,7 @@ from beaver_ftc.diagnosis.state import (
     POSITION,
     PUBLISHED,
     STATISTICS,
+    STEP,
     UNANTICIPATED,
     WORST_CASE,
 )
@@ -175,6 +176,18 @@ def test_the_one_left_is_the_fault(excluded, isolated):
     assert fdi["verdict"]["isolated_at_s"] != 5.0
 
 
+@pytest.mark.parametrize(("doubted", "shown", "named"), [(1, 0, False), (1, 1, True), (0, 0, True)])
+def test_one_that_is_left_for_an_end_that_nobody_saw_begin_is_not_named(doubted, shown, named):
+    fdi = new_fdi()
+    fdi["n_estimators"], fdi["estimator"]["excluded"][:3] = 3, (1, 0, 1)
+    fdi["estimator"]["doubted"][1], fdi["estimator"]["shown"][1] = doubted, shown
+    isolation.decide(fdi, 4.0)
+    assert fdi["verdict"]["isolated"] == (1 if named else NOT_ISOLATED)
+    fdi["estimator"]["excluded"][1] = 1
+    isolation.decide(fdi, 5.0)
+    assert fdi["verdict"]["isolated"] == UNANTICIPATED
+
+
 @pytest.mark.parametrize("kind", [LOSS, POSITION])
 def test_a_hypothesis_is_the_difference_it_makes_to_the_moment(kind):
     """Surface 2 at u: healthy it gives G u; at share 1 + theta of it, or at the position theta."""
@@ -199,3 +212,135 @@ def test_what_is_supposed_of_a_frame(memory):
     isolation.suppose_all(fdi, G, Gu, np.abs(spread))
     assert fie["effect"]["Z"] == pytest.approx(Gu[:, 2])
     assert fie["effect"]["spread"] == pytest.approx(np.abs(spread[:, 2]))
+
+
+NAMING = 5.0
+
+
+def told(fdi, loss, step):
+    """A detector for which a loss of surface 0 explains so much, and a step, by log likelihood ratios."""
+    record = fdi["statistical"]
+    record["enabled"], record["n_blocks"], record["naming_level"] = 1, 3, NAMING
+    for block in record["block"][1:]:
+        block["n_hypotheses"] = 2
+        hypotheses = block["hypothesis"][:2]
+        hypotheses["kind"], hypotheses["surface"] = (LOSS, STEP), (0, -1)
+        hypotheses["at_least"] = hypotheses["at_most"] = loss, step
+    fdi["n_estimators"], fdi["instants"] = 1, 1
+    return estimator(fdi)
+
+
+@pytest.mark.parametrize("authority", [EITHER, STATISTICS])
+@pytest.mark.parametrize(("step", "ruled_out"), [(NAMING + 0.1, True), (NAMING - 0.1, False)])
+def test_statistics_rule_out_what_something_else_explains_better(authority, step, ruled_out):
+    fdi = new_fdi()
+    fie, fdi["authority"] = told(fdi, 0.0, step), authority
+    assert isolation.rules_out(fdi, fie, True) == ruled_out
+    fdi["statistical"]["enabled"] = 0
+    assert not isolation.rules_out(fdi, fie, True)
+    fdi["statistical"]["enabled"], fdi["authority"] = 1, WORST_CASE
+    assert not isolation.rules_out(fdi, fie, True)
+
+
+@pytest.mark.parametrize("abrupt", [0, 1])
+def test_a_loss_that_has_shown_is_not_ruled_out_by_what_comes_later(abrupt):
+    """That may be its end; one that is declared to stay has none."""
+    fdi = new_fdi()
+    fie, fdi["abrupt"] = told(fdi, 20.0, 0.0), abrupt
+    assert not isolation.rules_out(fdi, fie, True)
+    assert fie["shown"] == (not abrupt)
+    told(fdi, 0.0, 90.0)
+    assert isolation.rules_out(fdi, fie, True) == bool(abrupt)
+
+
+def doubtful(kind=LOSS, **switches):
+    """An estimator within its limits, whose frame no theta of its set explains, and no more the bank."""
+    fdi = new_fdi()
+    fie = estimator(fdi, kind)
+    fie["bound"], fie["effect"]["Z"] = 1.0, (1.0, 0.0, 0.0)
+    fdi["innovation"], fdi["bound"]["frame"] = (9.0, 0.0, 0.0), 1.0
+    fdi["bank"]["residual"], fdi["bank"]["threshold"] = 9.0, 1.0
+    for name, value in switches.items():
+        fdi[name] = value
+    return fdi, fie
+
+
+@pytest.mark.parametrize(
+    ("kind", "switches", "started", "possible"),
+    [
+        (LOSS, {}, True, True), (LOSS, {"memory": 1}, False, False), (LOSS, {"shared": 1}, True, False),
+        (LOSS, {"shared": 1}, False, True), (POSITION, {}, True, False), (POSITION, {}, False, True),
+        (LOSS, {"membership": 1, "abrupt": 1}, True, False), (LOSS, {"membership": 1}, True, True),
+        (LOSS, {"abrupt": 1}, True, True), (LOSS, {"membership": 1, "abrupt": 1}, False, True),
+    ],
+)  # fmt: skip
+def test_each_test_that_is_switched_on_can_exclude(kind, switches, started, possible):
+    fdi, fie = doubtful(kind, **switches)
+    assert isolation.possible(fdi, fie, np.zeros(3), started) == possible
+    assert not isolation.possible(fdi, fie, np.full(3, 9.0), started), "beyond its limits it is excluded"
+
+
+def test_a_position_is_asked_in_the_first_frame_where_the_past_is_kept():
+    fdi, fie = doubtful(POSITION, memory=1)
+    fdi["bank"]["residual"] = 0.0
+    assert not isolation.possible(fdi, fie, np.zeros(3), False)
+    fdi["innovation"] = 0.0
+    assert isolation.possible(fdi, fie, np.zeros(3), False)
+
+
+def test_what_is_learned_of_a_constant_loss_is_kept_of_no_position():
+    fdi, fie = doubtful(POSITION, membership=1, abrupt=1)
+    fdi["innovation"] = 0.0
+    isolation.possible(fdi, fie, np.zeros(3), True)
+    assert fie["theta_low"].tolist() == [-1.0] * 3
+
+
+@pytest.mark.parametrize(
+    ("kind", "errors", "wider"), [(POSITION, 1, True), (POSITION, 0, False), (LOSS, 1, False)]
+)
+def test_errors_of_a_surfaces_own_terms_widen_the_room_of_its_position(kind, errors, wider):
+    rng, fdi = np.random.default_rng(6), new_fdi()
+    fie = estimator(fdi, kind, surface=2, low=-0.5, high=0.5)
+    G, Gu = rng.normal(size=(2, 3, 4))
+    fdi["bound"]["own_errors"], fdi["bound"]["own_per_rad"], fdi["bound"]["frame"] = errors, 0.3, 1.0
+    fdi["instants"] = 1
+    isolation.suppose(fdi, fie, G, Gu, np.full((3, 4), 0.1))
+    assert (fie["effect"]["spread"] > 0.1).tolist() == [wider] * 3
+
+
+def test_every_type_starts_with_no_knowledge_of_any_surface():
+    for every_type in (0, 1):
+        fdi = new_fdi()
+        fdi["every_type"], fdi["surface"]["evidence"] = every_type, 7
+        isolation.start(fdi, np.zeros(3))
+        assert fdi["surface"]["evidence"].tolist() == [0 if every_type else 7] * 4
+
+
+@pytest.mark.parametrize(
+    ("length", "started", "memory", "frame", "filled"),
+    [(1, True, 0, 1, 0), (1, False, 1, 1, 0), (1, False, 0, 0, 0), (3, True, 0, 0, 1), (3, False, 0, 0, 0)],
+)
+def test_a_frame_is_shown_to_every_type_alone_or_in_its_block(length, started, memory, frame, filled):
+    fdi = new_fdi()
+    fdi["every_type"], fdi["memory"], fdi["block"]["length"], fdi["block"]["span_s"] = 1, memory, length, 0.1
+    fdi["layout"]["position_of"], fdi["layout"]["loss_of"] = range(4), range(4)
+    fdi["layout"]["dominant_axis"], fdi["authority"] = (0, 1, 2, 1), WORST_CASE
+    fdi["n_estimators"], fdi["patience"], fdi["instants"], fdi["whole"] = 4, 9, 1, 1
+    for s, fie in enumerate(fdi["estimator"][:4]):
+        fie["kind"], fie["surface"], fie["low"], fie["high"] = POSITION, s, -1.0, 1.0
+        fie["effect"]["Z"] = np.eye(3)[(0, 1, 2, 1)[s]]
+    isolation.isolate(fdi, np.zeros(3), 1.0, started)
+    assert (fdi["frame"], fdi["block"]["filled"]) == (frame, filled)
+
+
+def test_the_axes_of_a_shared_theta_agree_after_each_step():
+    fie = estimator(new_fdi())
+    fie["omega"], fie["bound"], fie["residual"] = (0.5, -0.8, 0.3), 0.2, (0.02, 0.03, -0.01)
+    fie["theta"], fie["covariance"], fie["effect"]["Z"] = (-0.5, -0.9, -0.1), (0.06, 0.01, 0.09), 1.0
+    isolation.adapt_jointly(fie, 1.0)
+    assert len(set(fie["theta"])) == len(set(fie["covariance"])) == 1
+    alone = estimator(new_fdi())
+    alone["omega"], alone["bound"], alone["residual"] = fie["omega"], 0.2, fie["residual"]
+    alone["theta"], alone["covariance"], alone["effect"]["Z"] = -0.5, 0.06, 1.0
+    isolation.adapt_jointly(alone, 1.0)
+    assert alone["theta"].tolist() == fie["theta"].tolist(), "that of the first axis counts"

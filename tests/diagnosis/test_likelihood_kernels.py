@@ -353,7 +353,7 @@ def contested(loss=1.0, step=0.0, other=0.0, growing=0.0, ending=0.0, pitch=(0.0
     block = record["block"][0]
     block["hypothesis"]["kind"][:3], block["hypothesis"]["surface"][:3] = (STEP, LOSS, ENDING), (-1, 2, 2)
     block["hypothesis"]["at_least"][:3] = block["hypothesis"]["at_most"][:3] = pitch
-    return bool(statistical.excludes(fdi, 2))
+    return bool(statistical.excludes(fdi, 2, keys.get("ends", False)))
 
 
 def test_a_loss_is_excluded_by_what_explains_better_by_the_naming_level():
@@ -376,14 +376,11 @@ def test_a_loss_that_may_grow_keeps_a_part_and_a_constant_one_does_not():
     assert not contested(loss=5.1, step=20.0, abrupt=1, instants=4)
 
 
-def test_in_pitch_an_end_counts_where_a_loss_has_shown_before():
-    """More than half the naming level, or a fiftieth of what the end explains, or a third of that."""
-    assert contested(loss=0.0, pitch=(200.0, 1.9, 199.0), abrupt=1)
-    assert not contested(loss=0.0, pitch=(200.0, 2.1, 199.0), abrupt=1)
-    assert not contested(loss=0.0, pitch=(60.0, 1.21, 60.0), abrupt=1)
-    assert contested(loss=0.0, pitch=(60.0, 1.19, 60.0), abrupt=1)
-    assert not contested(loss=0.0, pitch=(60.0, 0.41, 60.0))
-    assert contested(loss=0.0, pitch=(60.0, 0.39, 60.0))
+def test_in_pitch_an_end_counts_where_it_is_asked_for():
+    """It is excluded by what explains better than that, too, by the naming level."""
+    for pitch, ended in (((60.0, 0.0, 60.0), False), ((60.0, 0.0, 56.1), False), ((60.0, 0.0, 55.9), True)):
+        assert contested(loss=0.0, pitch=pitch)
+        assert contested(loss=0.0, pitch=pitch, ends=True) == ended
 
 
 @pytest.mark.parametrize(
@@ -413,8 +410,8 @@ def test_a_loss_shows_where_it_explains_better_than_all_else_by_the_naming_level
 def test_an_end_within_a_frame_of_several_instants_keeps_a_part():
     """Half of it shows in one frame, the rest in the next: a step in either explains half of the two."""
     assert not contested(loss=0.0, ending=50.0, step=100.0, instants=2)
-    assert not contested(loss=0.0, pitch=(93.2, 14.9, 59.2), instants=2)
-    assert contested(loss=0.0, pitch=(93.2, 14.9, 59.2))
+    assert not contested(loss=0.0, pitch=(93.2, 14.9, 59.2), instants=2, ends=True)
+    assert contested(loss=0.0, pitch=(93.2, 14.9, 59.2), ends=True)
     assert contested(loss=0.0, ending=24.0, step=100.0, instants=2)
 
 
@@ -445,3 +442,33 @@ def test_a_loss_is_open_until_its_estimator_is_excluded():
     assert statistical.is_open(fdi, 3)
     fdi["estimator"]["excluded"][1] = 1
     assert not statistical.is_open(fdi, 1)
+
+
+def test_what_is_just_as_much_excludes_nothing():
+    """Levels are what chance may reach, and a part that is left may be all of it."""
+    assert not contested(loss=1.0, step=5.0)
+    assert not contested(loss=5.0, step=20.0)
+    assert not contested(loss=0.0, ending=25.0, step=100.0, instants=2)
+    assert contested(loss=0.0, pitch=(200.0, 2.0, 199.0), abrupt=1)
+
+
+def test_the_first_surface_signs_as_any_other():
+    _, record = detector()
+    hypothesis = record["block"][1]["hypothesis"]
+    hypothesis["kind"][0], hypothesis["surface"][0] = LOSS, 0
+    statistical.signatures(record, np.arange(12.0).reshape(3, 4) + 1.0, 0.7)
+    assert hypothesis["signature"][0].tolist() == [1.0, 9.0]
+
+
+def test_of_equal_shares_the_first_says_the_axis():
+    record = with_scores((0.0, 3.0, 0.0), (3.0, 0.0, 3.0), (0.0, 0.0, 0.0))
+    statistical.score(record, 7.0)
+    assert record["axis"] == 1
+
+
+def test_a_loss_that_nothing_tries_does_not_show():
+    fdi, record = detector()
+    record["naming_level"] = 0.5
+    for b in range(record["n_blocks"]):
+        record["block"][b]["n_hypotheses"] = 0
+    assert not statistical.shows(fdi, 2)

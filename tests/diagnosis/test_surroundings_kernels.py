@@ -12,7 +12,7 @@ from beaver_ftc.design.variants import response
 from beaver_ftc.diagnosis import air, error_map, noise_model, scheme, statistical, thresholds
 from beaver_ftc.diagnosis.air import AIR
 from beaver_ftc.diagnosis.error_map import error_map_dtype
-from beaver_ftc.diagnosis.state import LOSS, NOT_ISOLATED, STATISTICS, WORST_CASE, verdict_dtype
+from beaver_ftc.diagnosis.state import BLOCK, LOSS, NOT_ISOLATED, STATISTICS, WORST_CASE, verdict_dtype
 
 AIRCRAFT = load()
 SPAN, V = 14.63, 45.0
@@ -279,7 +279,7 @@ def test_instants_inside_a_frame_add_to_the_mean():
     statistical.prepare(record, fdi, design, X, Y, U)
     once = record["block"]["regressor"].copy()
     for _ in range(3):
-        statistical.look(record, design, X, Y, U, np.zeros(3), DT)
+        statistical.look(record, fdi, design, X, Y, U, np.zeros(3), DT)
     assert record["block"]["regressor"] == pytest.approx(4.0 * once)
     statistical.prepare(record, fdi, design, X, Y, U)
     assert record["block"]["regressor"] == pytest.approx(once)
@@ -315,6 +315,9 @@ def test_a_plug_ins_verdict_takes_the_place_of_the_built_in_one():
     given["isolated"] = NOT_ISOLATED
     scheme.note_verdict(fdi, given, 6.0)
     assert (found["isolated"], found["isolated_at_s"]) == (NOT_ISOLATED, 6.0)
+    given["isolated"], given["theta"] = 0, -0.7  # the first is as good as any
+    scheme.note_verdict(fdi, given, 7.0)
+    assert fdi["estimator"]["theta"][0] == pytest.approx([-0.7] * 3)
 
 
 @pytest.mark.parametrize(
@@ -359,3 +362,20 @@ def test_the_estimate_is_that_of_whoever_counts():
     assert out[1] == 0.7
     fdi["verdict"]["isolated"] = NOT_ISOLATED
     assert scheme.isolated_surface(fdi) == -1
+
+
+@pytest.mark.parametrize("share", [1.0, 0.25])
+def test_the_gusts_mean_is_a_share_of_what_was_summed(share):
+    record = new_air(total=(0.4, -0.8, 1.2))
+    air.elapse(record, share)
+    assert record["mean"] == pytest.approx(share * np.array([0.4, -0.8, 1.2]))
+
+
+def test_a_leap_of_the_air_widens_what_a_drift_may_be():
+    """By the axes of the block, so much stronger as the gusts are taken to be."""
+    block = np.zeros(1, BLOCK).view(np.recarray)[0]
+    record, rng = new_air(), np.random.default_rng(2)
+    record["leap"], block["stronger"], block["P_dd"] = rng.normal(size=(3, 3)), 1.7, 0.3
+    block["n"], block["axis"] = 2, (0, 2)
+    statistical.leap(record, block)
+    assert block["P_dd"] == pytest.approx(0.3 + 1.7 * record["leap"][np.ix_((0, 2), (0, 2))])

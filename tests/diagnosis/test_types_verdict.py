@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from kernels import new_fdi
 
+from beaver_ftc.diagnosis.belief import means_dtype
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, PITCH, ROLL, UNANTICIPATED, YAW
 from beaver_ftc.diagnosis.types import blocks, candidates, examine, pairs, verdict
 from beaver_ftc.diagnosis.types.candidates import BY_DEDUCTION, NO_SURFACE, RULED_OUT, SEVERAL
@@ -328,17 +329,28 @@ def test_what_a_surface_has_left():
 
 
 def test_orders_are_kept_for_the_frames_before():
-    fdi = new_case()
+    fdi, means = new_case(), np.zeros(1, means_dtype(4)).view(np.recarray)[0]
     for frame in ((0.1, 0.2), (0.3, -0.1), (0.9, 0.0)):
         for k, order in enumerate(frame):
             fdi["block"]["length"], fdi["block"]["filled"] = 2, k
-            examine.note_orders(fdi, np.full(4, order))
+            means["G_least"], means["G_most"] = -1.0 - order, 2.0 - k
+            examine.note_orders(fdi, np.full(4, order), means)
     orders = fdi["surface"][0]["orders"]
     assert orders["given"][:, :2] == pytest.approx(
         np.array([[0.5, 0.0], [0.3, -0.1], [0.1, 0.2]])
     )  # within the travel
     assert orders["low"] == pytest.approx([0.0, -0.1, 0.1])
     assert orders["high"] == pytest.approx([0.5, 0.3, 0.2])
+    assert (fdi["surface"][0]["G_least"], fdi["surface"][0]["G_most"]) == (-1.9, 2.0)  # of the last block
+
+
+def test_what_the_effectiveness_varies_by_is_a_share_of_its_mean():
+    fdi = new_case()
+    effect, surface = fdi["estimator"][4 + RUDDER]["effect"], fdi["surface"][RUDDER]
+    effect["Z"], surface["uneven"] = (0.5, 0.0, -2.0), 0.07
+    surface["G_least"], surface["G_most"] = -2.1, -1.8
+    examine.locate(fdi, RUDDER, np.zeros(3), np.zeros(3), effect)
+    assert (surface["uneven"], surface["uneven_then"]) == pytest.approx((0.25 * 0.3 / 2.0, 0.07))
 
 
 def test_a_surface_is_where_the_innovation_puts_it():
@@ -812,3 +824,51 @@ def test_the_first_named_is_the_one_the_verdict_is_about():
     pairs.decide(fdi, 3.0)
     assert fdi["verdict"]["isolated_at_s"] == 1.0
     assert fdi["estimator"]["surface"][fdi["verdict"]["isolated"]] == RUDDER
+
+
+def test_the_first_surface_and_its_first_estimator_are_not_nobody():
+    fdi = new_case(elevator=None, rudder=None, flap=None, aileron=(CONSTANT_LOSS,))
+    fdi["verdict"]["isolated"], fdi["verdict"]["type"] = NOT_ISOLATED, -1
+    for t in (3.0, 4.0):
+        verdict.decide(fdi, t)
+        found = fdi["verdict"]
+        assert (found["isolated"], found["type"], found["lead"]) == (AILERON, CONSTANT_LOSS, AILERON)
+        assert (found["isolated_at_s"], found["type_at_s"], found["lead_kind"]) == (3.0, 3.0, LOSES)
+
+
+def test_the_one_named_is_acted_upon_though_others_are_possible():
+    fdi = new_case()
+    fdi["verdict"]["isolated"] = 0  # the estimator of the aileron's loss
+    assert verdict.presumed(fdi) == AILERON
+    fdi["verdict"]["isolated"] = NOT_ISOLATED
+    assert verdict.presumed(fdi) == ELEVATOR
+
+
+def test_without_anybody_to_act_upon_there_is_no_lead():
+    fdi = new_case(aileron=None, elevator=None, rudder=None, flap=None)
+    fdi["verdict"]["isolated"] = UNANTICIPATED
+    fdi["verdict"]["lead"], fdi["verdict"]["lead_kind"] = 2, 2
+    verdict.take_the_lead(fdi)
+    assert (fdi["verdict"]["lead"], fdi["verdict"]["lead_kind"]) == (NO_SURFACE, -1)
+    assert (fdi["surface"]["measure"] == -1).all()
+
+
+def test_the_first_surface_is_named_where_a_constant_explains_it_alone():
+    fdi = new_case(aileron=(CONSTANT_LOSS,), elevator=(VARYING_LOSS,), rudder=None, flap=None)
+    assert candidates.sole(fdi, False) == SEVERAL
+    assert verdict.surface_at_fault(fdi) == AILERON
+
+
+@pytest.mark.parametrize(("s", "outside"), [(AILERON, 0), (RUDDER, 1), (NO_SURFACE, 0), (NO_SURFACE, 1)])
+def test_of_two_faults_the_verdict_is_on_the_first_named(s, outside):
+    fdi = new_case()
+    fdi["verdict"]["isolated"], fdi["verdict"]["type"] = NOT_ISOLATED, -1
+    surface = fdi["surface"][s]
+    surface["type"], surface["type_at_s"], surface["named_at_s"] = STUCK, 4.0, 3.0
+    pairs.summarise(fdi, s, outside, 5.0)
+    found = fdi["verdict"]
+    if s < 0:
+        assert (found["isolated"], found["type"]) == (UNANTICIPATED if outside else NOT_ISOLATED, -1)
+    else:
+        assert (found["isolated"], found["isolated_at_s"]) == (4 + s, 3.0)
+        assert (found["type"], found["type_at_s"]) == (STUCK, 4.0)

@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 from kernels import DT, new_fdi
 
+from beaver_ftc.design.engine import measured_slipstream
+from beaver_ftc.design.model import DPT
 from beaver_ftc.diagnosis import instruments as watching
 from beaver_ftc.diagnosis import stand_in
 from beaver_ftc.diagnosis.belief import belief_dtype
@@ -447,3 +449,101 @@ def test_the_rates_are_asked_once_a_frame(past, asked):
     fdi["bank"]["threshold"], fdi["bound"]["frame"] = 1.0, 1.0
     watching.decide(watch, fdi, seen(), 5.0)
     assert (watch["rates_say"][1] == NO) == asked
+
+
+@pytest.mark.parametrize(
+    ("broken", "engine", "shared", "slipstream"),
+    [
+        ((), 1, False, False), ((1,), 1, True, False), ((ALPHA,), 1, True, False), ((PHI,), 1, True, False),
+        ((AIRSPEED,), 1, True, True), ((QDYN,), 1, True, True), ((ENGINE_SPEED,), 1, True, True),
+        ((MANIFOLD,), 1, True, True), ((AIRSPEED, PHI), 1, True, True), ((AIRSPEED,), 0, True, False),
+        ((ALTITUDE,), 1, True, False),
+    ],
+)  # fmt: skip
+@pytest.mark.parametrize("missing", [False, True])
+def test_what_is_replaced_is_shared_out_and_the_slipstream_is_that_of_what_it_is_made_of(
+    broken, engine, shared, slipstream, missing
+):
+    watch, measured = new_watch(engine=engine), np.zeros(1, MEASURED).view(np.recarray)[0]
+    belief = np.zeros(1, belief_dtype(4)).view(np.recarray)[0]
+    watch["step"]["predicted"], watch["step"]["command"] = 0.1, (1800.0, 20.0)
+    watch["step"]["then"][[QDYN, AIRSPEED]] = 1000.0, 44.0
+    measured["signal"], measured["y"], measured["attitude"] = 0.3, 9.0, 9.0
+    measured["signal"][[AIRSPEED, QDYN, ENGINE_SPEED, MANIFOLD]] = 45.0, 1036.0, 1900.0, 21.0
+    for i in broken:
+        if missing:
+            measured["missing"][i] = 1
+        else:
+            watch["replaced"][i] = 1
+    before = measured["signal"].copy()
+    stand_in.replace(watch, belief, measured)
+    assert np.flatnonzero(watch["replaced"]).tolist() == sorted(broken)
+    assert set(np.flatnonzero(measured["signal"] != before)) == set(broken)
+    assert (measured["attitude"][1] != 9.0) == shared
+    assert (measured["y"][DPT] != 9.0) == slipstream
+    if slipstream:
+        engine_and_air = measured["signal"][[ENGINE_SPEED, MANIFOLD, AIRSPEED, QDYN]]
+        assert measured["y"][DPT] == pytest.approx(measured_slipstream(*engine_and_air))
+
+
+def test_at_its_bound_a_test_is_within_it():
+    """Shares of exactly one, and residuals of exactly the share that neighbours explain, are no suspicion."""
+    assert suspects({TURN: 1.0, TURN + 1: 1.0}, lead=TURN) == {0, 1, 2}
+    assert suspects({ANGLE: 2.0, ANGLE + 1: 1.0}) == {0, 1, 2, PHI}
+    assert suspects({TURN: 100.0, TURN + 1: 100.0 * watching.INVOLVED}) == {0}
+    assert suspects({SPEED: 1.0, DENSITY: 1.0}, lead=DENSITY) == {AIRSPEED, QDYN}
+
+
+def test_of_a_kind_the_first_filter_says_how_large_it_is():
+    """The others have less of it, or more of what was before."""
+    watch = with_shares({TURN: 0.5, TURN + 1: 2.0}, lead=TURN + 1)
+    watch["step"]["test"]["filtered"][TURN : TURN + 3, 1:] = 1e3
+    watch["step"]["test"]["filtered"][TURN, 0] = 50.0
+    assert watching.involved(watch, TURN + 1, TURN)
+    watch["step"]["test"]["filtered"][TURN, 0] = 70.0
+    assert not watching.involved(watch, TURN + 1, TURN)
+    watch["step"]["test"]["filtered"][TURN, 0], watch["step"]["test"]["filtered"][TURN + 2, 0] = 0.0, -70.0
+    assert not watching.involved(watch, TURN + 1, TURN)
+    for c in (TURN, ANGLE):
+        small = new_watch()
+        small["step"]["test"]["share"][c], small["step"]["test"]["filtered"][c, 0] = 2.0, 1e-6
+        assert watching.involved(small, c, c), "of small residuals the largest is involved"
+
+
+def test_angles_are_held_against_angles_and_rates_against_rates():
+    assert suspects({TURN + 2: 100.0, ANGLE: 2.0}) == {2, PHI}
+    assert suspects({ANGLE: 100.0, TURN + 2: 2.0}, lead=TURN + 2) == {2, PHI}
+
+
+def test_suspicions_of_the_frame_before_are_gone():
+    watch = with_shares({CLIMB: 2.0}, lead=CLIMB)
+    watch["suspect"] = 1
+    watching.suspect(watch)
+    assert np.flatnonzero(watch["suspect"]).tolist() == [ALTITUDE]
+
+
+def test_an_alarm_on_roll_counts_as_one():
+    """The first axis of the bank has number 0, and no axis is -1."""
+    watch, fdi = new_watch(error=(0.0, 0.3, 0.0), W_bound=(9.0, 9.0, 9.0)), new_fdi()
+    fdi["bound"]["frame"], fdi["bank"]["threshold"][:3], watch["error_then"] = 1.0, 1.0, (0.0, 0.3, 0.0)
+    fdi["bank"]["residual"][0, 0] = 2.0
+    watching.ask_rates(watch, fdi)
+    assert watch["rates_say"].tolist() == [YES] * 3
+
+
+def test_what_is_named_is_replaced_and_flags_are_one():
+    watch = new_watch()
+    watching.name(watch, CLIMB, 3.0)
+    assert watch["replaced"][CLIMB] == 1
+    watch = new_watch()
+    watching.raise_alarm(watch, detected_fdi(9.4, 1), 10.0)
+    assert (watch["beside"], watch["alarmed"]) == (1, 1)
+
+
+def test_where_the_attitude_is_blurred_a_look_asks_whether_any_gyro_can_be_it():
+    for blurred in (0, 1):
+        watch, fdi = new_watch(blurred=blurred, begun=1, past=1), new_fdi()
+        watch["W"], fdi["bank"]["threshold"] = (0.5, 0.0, 0.0), 1.0
+        watch["step"]["offset"][:] = 1.0
+        looked(watch, fdi)
+        assert bool(watch["apart"].any()) == bool(blurred)

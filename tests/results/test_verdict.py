@@ -150,3 +150,72 @@ def test_stays_outside_the_envelope_are_counted_from_the_first():
     metrics = {"envelope_exits": exits, "envelope": {"exits": 2, "outside_s": 2.5}}
     assert verdict._envelope(metrics) == "left 2 time(s), 2.50 s in all, first at 3.00 s"
     assert verdict._envelope({**metrics, "envelope_exits": []}) == ""
+
+
+@pytest.mark.parametrize(
+    ("fault", "said"),
+    [
+        ({"sensor": "q", "type": "bias", "size": {"magnitude": 3.0}}, ["+3 deg/s"]),
+        ({"sensor": "altitude", "type": "noise", "size": {"magnitude": 12.0}}, ["12 m"]),
+        ({"sensor": "V", "type": "scale", "size": {"magnitude": -0.25}}, ["-25%"]),
+        ({"sensor": "V", "type": "lost", "size": {}}, []),
+    ],
+)
+def test_the_size_of_an_instruments_fault_is_in_the_instruments_unit(fault, said):
+    assert verdict._sizes(fault) == said
+
+
+@pytest.mark.parametrize(
+    ("seconds", "said"),
+    [(0.125, "0.12 s"), (999.994, "999.99 s"), (1000.0, "1000.0 s"), (1000.5, "1000.5 s")],
+)
+def test_long_times_are_told_to_a_tenth(seconds, said):
+    assert verdict._time(seconds) == said
+
+
+def flown(**changes):
+    """The metrics of a flight of which little is to be said."""
+    nothing = {
+        "detection": DETECTION | {"detected": False}, "isolation": {"isolated": False, "candidates": []},
+        "fault": None, "false_alarm": False, "supervisor": [], "authority": None, "engine_power": None,
+        "envelope_exits": [], "departure": None, "saturation_s": {}, "changes": [], "profile": None,
+    }  # fmt: skip
+    rms = {"p": 0.1, "q": 0.25, "r": 1.0}
+    tracking = {"pre_fault_rms_deg_s": None, "post_fault_rms_deg_s": rms}
+    expected = {"name": "no_false_alarm", "expected": True, "actual": True, "passed": True}
+    missed = {"name": "detected_within_s", "expected": 0.5, "actual": None, "passed": False}
+    return {
+        "scenario": "a-flight", "expectations": [expected, missed], "passed": False, "tracking": tracking,
+        **nothing, **changes,
+    }  # fmt: skip
+
+
+def test_the_verdict_is_a_line_for_each_thing_worth_knowing():
+    both = {"pre_fault_rms_deg_s": {"p": 0.5, "q": 0.6, "r": 0.7}, "post_fault_rms_deg_s": None}
+    text = verdict.verdict_text(flown(tracking=flown()["tracking"] | both), "runs/a-flight")
+    assert text.splitlines()[0] == "a-flight: FAILED"
+    assert "tracking RMS  p 0.5  q 0.6  r 0.7 deg/s before the fault" in text
+    assert "expected      met    no_false_alarm yes, got yes" in text
+    assert "expected      MISSED detected_within_s ≤ 0.5, got none" in text
+    assert text.splitlines()[-1] == " results       runs/a-flight"
+    assert "\x1b" not in text
+    for what, how in verdict.facts(flown()):
+        assert f" {what:13} {how}" in text
+    after = verdict.verdict_text(flown(), "runs/a-flight")
+    assert "            p 0.1  q 0.25  r 1 deg/s after the fault" in after
+
+
+def test_in_colour_what_is_missed_is_red_and_names_stand_out():
+    lines = verdict.verdict_text(flown(), "runs/a-flight", colour=True).splitlines()
+    assert "\x1b[1;31m" in lines[0]
+    assert any("\x1b[1;31mMISSED" in line for line in lines)
+    assert any("\x1b[32mmet" in line for line in lines)
+    assert "\x1b[1m" in lines[-1]
+    long = flown(scenario="a" * 200, passed=True)
+    assert "\x1b[1;32m" in verdict.verdict_text(long, "x", colour=True)
+
+
+def test_markup_in_a_name_is_no_markup():
+    text = verdict.verdict_text(flown(scenario="[red]x[/red] :smile:"), "runs/[bold]x")
+    assert "[red]x[/red] :smile:" in text
+    assert "runs/[bold]x" in text

@@ -1,5 +1,9 @@
 """Small defects on purpose: which are made, that a seed draws the same ones, and that each goes on trial."""
 
+import json
+import subprocess
+import tempfile
+import time
 from pathlib import Path
 
 import pytest
@@ -107,3 +111,80 @@ def test_tests_of_a_module_without_functions_are_those_of_what_imports_it():
     lines = {user: {"1": [], "150": ["b"]}, "src/beaver_ftc/design/terms.py": {"20": ["a"]}}
     found = reach.Reach([{"seconds": {}, "left_out": {}, "lines": lines}])
     assert found.of(watch, (60, 40)) == ["b"]
+
+
+SHARED = """
+import time
+import pytest
+from beaver_ftc.documents.errors import suggestion
+
+
+@pytest.fixture(scope="module")
+def found():
+    return suggestion("elevatr", ["elevator"])
+
+
+def test_first(found):
+    pass
+
+
+def test_other(found):
+    assert "elevator" in found
+
+
+def test_without():
+    pass
+
+
+@pytest.mark.parametrize("case", [0, 1])
+def test_slow(case):
+    with open(__file__ + ".tried", "a") as note:
+        note.write("x")
+    end = time.process_time() + 1.2
+    while time.process_time() < end:
+        pass
+"""
+
+
+@pytest.fixture
+def shared_file(monkeypatch):
+    """A test file inside tests/, and where what is found of it is kept."""
+    with tempfile.TemporaryDirectory(dir=scope.ROOT / "tests" / "tools") as folder:
+        file, kept = Path(folder) / "test_of_a_fixture.py", Path(folder) / "kept.json"
+        file.write_text(SHARED)
+        monkeypatch.setattr(reach, "_kept", lambda file: kept)
+        yield file, kept
+
+
+def test_what_a_shared_fixture_executes_every_test_executes_that_uses_it(shared_file):
+    """Each may be run alone. What was too slow once is not tried again while its file is the same."""
+    file, kept = shared_file
+    name = file.relative_to(scope.ROOT).as_posix()
+    for _ in range(2):
+        assert reach._measure(file) is False
+        found = json.loads(kept.read_text())
+        assert set(found["seconds"]) == {f"{name}::test_{of}" for of in ("first", "other", "without")}
+        assert found["slow"] == [f"{name}::test_slow"]
+        assert found["left_out"] == {"takes too long": 2}
+        lines = found["lines"]["src/beaver_ftc/documents/errors.py"].values()
+        assert max(lines, key=len) == [f"{name}::test_first", f"{name}::test_other"]
+    assert Path(f"{file}.tried").read_text() == "x"
+
+
+def test_a_child_leaves_no_process_behind(tmp_path):
+    """One that it has started, and that would go on for minutes."""
+    note = tmp_path / "pid"
+
+    def starts_another():
+        note.write_text(str(subprocess.Popen(["sleep", "300"]).pid))
+        return 0
+
+    assert trial.in_a_child(starts_another, 5.0) == trial.SURVIVED
+    pid = int(note.read_text())
+    for _ in range(200):
+        state = Path(f"/proc/{pid}/stat")
+        if not state.exists() or state.read_text().split()[2] == "Z":
+            break
+        time.sleep(0.02)
+    else:
+        pytest.fail("it still runs")

@@ -205,3 +205,27 @@ def test_noise_limits_the_loop_where_the_surface_is_weak():
 def test_a_lead_never_overshoots():
     for approach in (0.05, 0.2, 0.9, 1.0):
         assert 1.0 <= lead_of(approach) <= 1.0 / approach
+
+
+@pytest.mark.parametrize("dt", [0.005, 0.02])
+def test_frequencies_reach_from_far_below_any_loop_to_nyquist(dt):
+    omega = frequencies(dt)
+    assert omega[[0, -1]] == pytest.approx([0.002 / dt, pi / dt])
+    assert np.diff(np.log(omega)) == pytest.approx(np.log(500.0 * pi) / (len(omega) - 1))
+
+
+@pytest.mark.parametrize("end_deg", [-170.0, -100.0])
+def test_a_loop_that_is_not_real_at_its_last_sample_does_not_cross_there(end_deg):
+    L = np.geomspace(4.0, 0.5, 200) * np.exp(1j * np.radians(np.linspace(-90.0, end_deg, 200)))
+    assert margins(L)[:2] == (np.inf, np.inf)
+
+
+@pytest.mark.parametrize("beyond_db", [0.5, -0.5])
+def test_a_crossing_close_to_one_is_of_its_own_side(beyond_db):
+    """At -180 deg the loop is half a dB above one, or below: that is the lower margin, or the upper."""
+    level = np.linspace(6.0 + beyond_db, -6.0 + beyond_db, 401)
+    L = 10.0 ** (level / 20.0) * np.exp(1j * np.radians(np.linspace(-120.0, -240.0, 401)))
+    upper, lower, phase = margins(L)
+    assert upper == (np.inf if beyond_db > 0.0 else pytest.approx(0.5, abs=1e-6))
+    assert lower == (pytest.approx(0.5, abs=1e-6) if beyond_db > 0.0 else np.inf)
+    assert phase == pytest.approx(5.0, abs=1e-6)

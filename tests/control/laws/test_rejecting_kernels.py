@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from beaver_ftc.control import accommodation, law, reference_model
-from beaver_ftc.control.laws import rejecting
+from beaver_ftc.control.laws import left, rejecting
 from beaver_ftc.control.laws.state import REJECTING
 from beaver_ftc.control.oracle import true_faults_dtype
 from beaver_ftc.control.state import ADAPTIVE, FAULT_TOLERANT, NOMINAL, ORACLE, control_dtype
@@ -41,7 +41,8 @@ def record(seed=0):
     return control, rng
 
 
-@given(st.floats(300, 2400), st.sampled_from([0.0, 0.3, 1.0]))
+@pytest.mark.parametrize("lost", [0.0, 0.3, 1.0])
+@pytest.mark.parametrize("qdyn", [300.0, 500.0, 640.0, 700.0, 810.0, 1000.0, 1390.0, 1400.0, 1999.0, 2400.0])
 def test_the_schedule_is_interpolated_and_held_beyond_its_ends(qdyn, lost):
     control, _ = record()
     rejection = control["rejection"]
@@ -125,6 +126,8 @@ class TestAbandon:
                 tried = k + 1
                 break
         assert tried == (pytest.approx(20.0 / DT, abs=2) if again else None)
+        if again:
+            assert control["rejection"]["at_stop_s"][surface] == 0.0
 
     def test_a_suspicion_that_is_taken_back_frees_it(self):
         _, control = self.held(RUDDER, 300)
@@ -210,6 +213,8 @@ def test_pitch_is_handed_over_by_steps_and_back(mode, every_type, hedging, left,
     control["effectiveness"][ELEVATOR] = left
     law.advance_hand_over(control, every_type, mode)
     assert control["hand_over"] == pytest.approx(after)
+    lost = 1.0 - left if left >= 0.1 else 1.0
+    assert control["rejection"]["lost"] == pytest.approx((3 * after**2 - 2 * after**3) * lost)
 
 
 def test_a_plug_ins_command_is_kept_within_the_travel_and_that_is_noted():
@@ -305,3 +310,30 @@ def test_a_command_to_an_actuator_that_does_not_lag_stays_to_the_last_digit():
     control["rejection"]["lead"] = 1.0
     rejecting.hurry(control, np.array([-0.3, 0.7, 0.11, 0.33]))
     assert control["command"].tolist() == [-0.1] * 4
+
+
+def test_a_surface_that_is_whole_is_not_asked_about():
+    """What the observer has seen of it stays, for the day on which it is named."""
+    control, _ = record()
+    control["target"] = 1.0
+    control["rejection"]["found"]["product"] = 3.0
+    for s in (AILERON, RUDDER):
+        rejecting.hesitate(control, s)
+    assert control["rejection"]["found"]["product"].tolist() == [3.0] * 3
+    assert not control["rejection"]["found"]["named"].any()
+
+
+def test_only_the_main_surface_of_an_axis_is_seen_to_act():
+    control, _ = record()
+    found = control["rejection"]["found"]
+    found["square"], found["product"] = 1.0, (-0.5, -1.0, -0.95)
+    assert [bool(rejecting.acts(control, s)) for s in range(4)] == [True, False, False, False]
+    found["product"] = -0.95, -1.0, -0.5
+    assert [bool(rejecting.acts(control, s)) for s in range(4)] == [False, False, True, False]
+
+
+def test_of_nothing_seen_the_verdict_is_believed():
+    """An observer that has missed nothing yet says nothing about a surface."""
+    control, _ = record()
+    control["rejection"]["found"]["frames"] = 5.0
+    assert left.left_of(control, 0, 0.4) == 0.4

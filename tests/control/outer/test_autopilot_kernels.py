@@ -411,3 +411,19 @@ def test_ailerons_at_their_stop_are_gone_whatever_is_believed_of_them():
     control["saturated"][:] = (0, 1, 1, 1)
     loops.follow(pilot, control, new_y())
     assert pilot["jammed"] < DT / pilot["gain"]["jammed_s"]
+
+
+@pytest.mark.parametrize("left", [0.9, 0.4, 0.0, -0.2])
+def test_a_weak_rudder_and_sideslip_hold_the_propellers_yaw_together(left):
+    """dpt^3 at the ceiling: what is left of the rudder's share, and the sideslip's for what is not."""
+    pilot, control, y = new_autopilot(weathercock=0.2, high_inhg=1e9), new_control(), new_y(dpt=0.4)
+    pilot["allowed_inhg"], control["effectiveness"][RUDDER] = 1e9, left
+    control["power"]["command"][0] = 21.0
+    dpt = y[DPT] + (loops.full_power(pilot, control, y) - 21.0) * 40.0 / (2.0 * y[QDYN] * y[AIRSPEED])
+    assert dpt**3 == pytest.approx(max(left, 0.0) * 0.9**3 + (1.0 - left) * 0.2)
+
+
+def test_what_power_misses_is_integrated_by_how_much_it_is():
+    pilot, power = throttled(airspeed=43.5)
+    assert pilot["throttle"] == pytest.approx(0.05 + DT * 0.015 * 1.5)
+    assert power["trim"] == pytest.approx(20.0 + (0.04 + 0.05 + 0.3 * 1.5 + G * (0.03 - 0.01)) / PUSH)

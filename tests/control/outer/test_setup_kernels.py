@@ -154,3 +154,7 @@ def test_an_aircraft_that_hardly_rolls_by_sideslip_is_not_flown_by_it():
     assert pilot["dihedral"] == pytest.approx(0.6 * 2.0 / 10.0)
     setup._know(pilot, made_up(unstable | {"Cn_beta": 0.2, "Cn_beta3": 1.0}))
     assert pilot["weathercock"] == pytest.approx((0.2 * 0.2 + 0.2**3) / 0.1)
+
+
+def test_nothing_is_climbed_within_two_metres_a_second_of_the_slowest_flight(filled):
+    assert filled[0]["slowest_mps"] == AIRCRAFT.envelope.airspeed_mps[0] + 2.0

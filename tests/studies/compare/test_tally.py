@@ -10,6 +10,7 @@ from beaver_ftc.studies.compare import trial
 from beaver_ftc.studies.compare.replay import Trace
 from beaver_ftc.studies.compare.tally import (
     line_of,
+    lines_of,
     matched,
     point_at,
     share_within,
@@ -126,3 +127,17 @@ def test_shares_of_the_faulted_flights_and_of_all():
     assert (line.after_median, line.after_90) == (6.0, 10.0)
     assert 0.0 < line.detection_rate_lower < 1.0
     assert line.false_alarms_per_h_upper > 0.0
+
+
+def test_each_entry_is_tallied_from_its_own_flights_against_the_yardsticks():
+    other, yardstick = Entry("c", "d"), Entry(trial.SCHEME, trial.ORACLE)
+    flown = ((ENTRY, 3.0), (yardstick, 1.0), (other, 5.0)), ((ENTRY, 4.0), (yardstick, 2.0), (other, 8.0))
+    trials = [trial.Trial("set", [_result(entry=of, rms_deg_s=rms) for of, rms in one]) for one in flown]
+    mine, theirs = lines_of(trials, [ENTRY, other])
+    assert (mine.entry, mine.flights, theirs.entry, theirs.flights) == (ENTRY, 2, other, 2)
+    assert (mine.ratio_median, mine.ratio_90) == (2.0, 3.0)
+    assert (theirs.ratio_median, theirs.ratio_90) == (4.0, 5.0)
+
+
+def test_without_flights_a_level_costs_nothing():
+    assert point_at([], 1.0).false_alarms_per_h == 0.0

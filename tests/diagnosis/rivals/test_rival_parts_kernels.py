@@ -1,0 +1,255 @@
+"""Parts of the rivals a step at a time: what an effectiveness filter starts with, averages and names."""
+
+from dataclasses import replace
+from math import exp, sqrt
+
+import numpy as np
+import pytest
+
+from beaver_ftc.design.context import Context, Declared
+from beaver_ftc.diagnosis.base import Measured
+from beaver_ftc.diagnosis.rivals.air import Air, rate_variance, unexplained
+from beaver_ftc.diagnosis.rivals.effectiveness import EffectivenessFilter, N
+from beaver_ftc.diagnosis.rivals.ekf import AugmentedEkf
+from beaver_ftc.diagnosis.rivals.kalman import update
+from beaver_ftc.diagnosis.rivals.least_squares import RecursiveLeastSquares
+from beaver_ftc.diagnosis.rivals.rls import Pair, RlsMonitor
+from beaver_ftc.diagnosis.rivals.ukf import AugmentedUkf
+
+DT, BOUND = 0.02, np.array([0.02, 0.03, 0.05])
+GUSTY = Declared(
+    noise=np.array([3e-3, 2e-3, 1e-3, 0.0, 0.0, 0.0, 0.0]), resolution=np.full(7, 0.01),
+    gust_rad_s=np.array([0.05, 0.03, 0.02]), gust_time_s=np.array([0.8, 0.4, 0.3]),
+    gust_effect=np.arange(9.0).reshape(3, 3), model_rad_s2=np.array([0.04, 0.0, 0.1]),
+)  # fmt: skip
+SURFACES = ("aileron", "elevator", "rudder", "flap")
+
+
+def context(declared=None, **options):
+    travel = np.array([[-1.0] * 4, [1.0] * 4])
+    return Context(DT, 1, None, np.zeros(3), np.zeros(5), np.zeros(4), travel, BOUND, np.zeros(3),
+                   options=options, declared=declared or Declared())  # fmt: skip
+
+
+def seen(x=(0.0, 0.0, 0.0), t_s=9.0, eta_bar=BOUND):
+    return Measured(t_s, np.array(x), np.zeros(5), np.zeros(3), np.zeros((3, 4)), np.array(eta_bar))
+
+
+class Plain(EffectivenessFilter):
+    """A filter that predicts what it has."""
+
+    name = "plain"
+
+    def propagate(self, measured):
+        pass
+
+    def statistic(self, square):
+        return square / 10.0
+
+
+def started(declared=None, **options):
+    detector = Plain()
+    detector.reset(context(declared, **options))
+    return detector
+
+
+def test_the_air_is_a_first_order_process_of_each_axis():
+    air, none = Air(context(GUSTY)), Air(context())
+    keep = np.exp(-DT / GUSTY.gust_time_s)
+    assert (air.n, none.n, none.keep.size, none.effect.shape) == (3, 0, 0, (3, 0))
+    assert air.keep == pytest.approx(keep)
+    assert air.variance == pytest.approx(GUSTY.gust_rad_s**2)
+    # In the long run as large as it was at the start.
+    assert keep**2 * air.variance + air.noise == pytest.approx(air.variance)
+    assert air.effect == pytest.approx(DT * GUSTY.gust_effect)
+
+
+def test_what_is_declared_adds_by_squares():
+    gyro = np.hypot(GUSTY.noise[:3], 0.01 / sqrt(12.0))
+    assert np.sqrt(rate_variance(GUSTY, 0.004)) == pytest.approx(np.hypot(0.004, gyro))
+    assert unexplained(context(GUSTY), 9.0 * BOUND) == pytest.approx(np.hypot(BOUND, [0.04, 0.0, 0.1]))
+    assert unexplained(context(), 9.0 * BOUND).tolist() == (9.0 * BOUND).tolist()
+
+
+def test_a_filter_starts_healthy_with_theta_known_to_a_tenth():
+    detector = started(GUSTY, misfit_s=0.25, measurement_rad_s=0.004, drift_per_s=0.3)
+    rates = rate_variance(GUSTY, 0.004)
+    assert (detector.n, detector.z.tolist()) == (N + 3, [0.0] * 9)
+    assert np.diag(detector.P) == pytest.approx([*rates, 0.01, 0.01, 0.01, *GUSTY.gust_rad_s**2])
+    assert np.count_nonzero(detector.P) == 9
+    assert pytest.approx(np.diag(rates)) == detector.R
+    assert detector.Q_theta == pytest.approx(0.3**2 * DT)
+    assert detector.fade == pytest.approx(exp(-DT / 0.25))
+    assert (detector.square, detector.detected) == (3.0, False)
+    assert started().n == N
+
+
+def test_its_noise_is_the_bounds_the_walks_and_the_airs():
+    detector = started(GUSTY, noise=2.0, drift_per_s=0.3)
+    size = unexplained(detector.context, BOUND)
+    expected = [*(DT * 2.0 * size) ** 2, *[0.3**2 * DT] * 3, *detector.air.noise]
+    assert detector.process_noise(seen()) == pytest.approx(expected)
+
+
+def test_a_step_is_an_update_with_theta_kept_within_what_a_surface_can_be():
+    """First it takes over what is measured; the square of the innovation is averaged, a wild one cut."""
+    detector = started(misfit_s=0.1, measurement_rad_s=0.05)
+    first = detector.step(seen((0.1, -0.2, 0.3)), np.zeros(4))
+    assert (first.statistic, first.detected) == (0.0, False)
+    assert detector.z.tolist() == [0.1, -0.2, 0.3, 0.0, 0.0, 0.0]
+    detector.P[:3, 3:6] = detector.P[3:6, :3] = np.diag([0.01, -0.01, 0.002])
+    z, P, square = detector.z.copy(), detector.P.copy(), 3.0
+    for x in ((0.3, 0.4, 0.1), (0.2, 0.3, 0.2), (900.0, 0.0, 0.0)):
+        nu = np.array(x) - z[:3]
+        z, P, S = update(z, P, nu, detector.R)
+        z[3:6] = np.clip(z[3:6], -1.0, 1.0)
+        of_it = nu @ np.linalg.inv(S) @ nu
+        square = exp(-DT / 0.1) * square + (1.0 - exp(-DT / 0.1)) * min(of_it, 1e6)
+        detector.detected = False
+        verdict = detector.step(seen(x), np.zeros(4))
+        assert verdict.statistic == pytest.approx(of_it / 10.0)
+        assert detector.z == pytest.approx(z)
+        assert detector.square == pytest.approx(square)
+    assert np.abs(z[3:6]).max() == 1.0
+    assert of_it > 1e6
+
+
+def named(theta, variance=(0.01, 0.01, 0.01), square=3.0, statistic=2.0, **options):
+    detector = started(**{"misfit": 3.0, **options})
+    detector.z[3:6], detector.square = theta, square
+    detector.P[range(3, 6), range(3, 6)] = variance
+    return detector, detector.verdict(seen(), statistic)
+
+
+def test_the_surface_most_significantly_off_is_named():
+    detector, verdict = named((-0.2, -0.5, -0.3), (0.01, 0.25, 0.01))
+    assert detector.significance() == pytest.approx([4.0, 1.0, 9.0])
+    assert (verdict.axis, verdict.isolated, verdict.type) == ("r", "rudder", "loss_of_effectiveness")
+    assert verdict.estimate == pytest.approx(-0.3)
+    assert verdict.effectiveness == pytest.approx([0.8, 0.5, 0.7, 1.0])
+    assert verdict.statistic == 2.0
+    quiet = named((-0.2, -0.5, -0.3), statistic=1.0)[1]
+    assert (quiet.detected, quiet.isolated, quiet.statistic) == (False, None, 1.0)
+    again = detector.verdict(seen(), 0.5)
+    assert (again.detected, again.isolated) == (True, "rudder"), "an alarm is latched"
+
+
+@pytest.mark.parametrize(
+    ("theta", "square", "isolated"),
+    [
+        ((-0.5, 0.0, 0.0), 9.0, "aileron"), ((-0.5, 0.0, 0.0), 9.1, "unanticipated"),
+        ((0.5, -0.1, 0.0), 3.0, "unanticipated"), ((0.1, -0.5, 0.2), 3.0, "elevator"),
+    ],
+)  # fmt: skip
+def test_what_fits_no_surface_or_would_be_a_gain_is_outside_the_class(theta, square, isolated):
+    verdict = named(theta, square=square)[1]
+    assert verdict.isolated == isolated
+    if isolated == "elevator":
+        assert verdict.effectiveness == pytest.approx([1.0, 0.5, 1.0, 1.0]), "nothing has gained"
+
+
+def test_a_pairs_score_is_of_errors_against_those_before():
+    """The model of least_squares.py, and mean and variance of its errors, both fading."""
+    rng, fade, floor = np.random.default_rng(5), 0.9, 0.01
+    pair, model = Pair(0.98, fade, floor), RecursiveLeastSquares(5, 0.98, 1e4)
+    inputs, outputs = rng.normal(size=(2, 40))
+    mean = variance = 0.0
+    for k in range(40):
+        past = [*(outputs[k - j] if k >= j else 0.0 for j in (1, 2)),
+                *(inputs[k - j] if k >= j else 0.0 for j in (1, 2)), 1.0]  # fmt: skip
+        error = model.step(np.array(past), outputs[k])
+        assert pair.step(inputs[k], outputs[k]) == pytest.approx(
+            abs(error - mean) / np.hypot(sqrt(variance), floor)
+        )
+        mean = fade * mean + (1.0 - fade) * error
+        variance = fade * variance + (1.0 - fade) * (error - mean) ** 2
+        assert (pair.mean, pair.variance) == pytest.approx((mean, variance))
+
+
+class Scores:
+    def __init__(self, *scores):
+        self.scores = list(scores)
+
+    def step(self, u, y):
+        return self.scores.pop(0)
+
+
+def monitored(*scores, t_s=9.0, **options):
+    """A monitor whose pairs (roll, pitch, yaw) score so."""
+    monitor = RlsMonitor()
+    monitor.reset(context(alarm=4.0, warm_up_s=4.0, **options))
+    monitor.pairs = [Scores(*of) for of in scores]
+    return monitor, [monitor.step(seen(t_s=t_s), np.zeros(4)) for _ in scores[0]]
+
+
+def test_the_first_pair_beyond_the_limit_is_the_fault():
+    _, (quiet, at, alarm, later) = monitored((1.0, 4.0, 5.0, 0.1), (2.0, 1.0, 6.0, 0.2), (0.5, 1.0, 1.0, 9.0))
+    assert (quiet.statistic, quiet.detected, at.statistic, at.detected) == (0.5, False, 1.0, False)
+    assert (alarm.axis, alarm.isolated, alarm.candidates) == ("q", "elevator", ("elevator",))
+    assert (later.isolated, later.statistic) == ("elevator", 2.25)
+    _, (early,) = monitored((9.0,), (9.0,), (9.0,), t_s=3.9)
+    assert (early.statistic, early.detected) == (0.0, False)
+    _, (warm,) = monitored((9.0,), (5.0,), (5.0,), t_s=4.0)
+    assert (warm.statistic, warm.isolated) == (2.25, "aileron")
+
+
+def test_a_monitor_forgets_and_averages_over_its_times_and_doubts_a_gyro():
+    monitor = RlsMonitor()
+    monitor.reset(context(GUSTY, forgetting_s=2.0, score_s=0.5, floor_rad_s=0.004))
+    floors = np.hypot(0.004, GUSTY.gyro_rad_s)
+    assert [pair._floor for pair in monitor.pairs] == pytest.approx(list(floors))
+    assert monitor.pairs[0]._fade == pytest.approx(exp(-DT / 0.5))
+
+
+class Curved:
+    """A design model with slopes and squares of every rate."""
+
+    A = np.array([[-2.0, 0.3, 0.1], [0.2, -3.0, 0.4], [-0.5, 0.6, -1.0]])
+
+    def f(self, x, y):
+        return x @ self.A.T + 0.5 * x**2 + y[0]
+
+
+def moving():
+    """What is measured of a flight in which everything moves, and a context in which the air does."""
+    x, contribution = np.array([0.3, -0.2, 0.1]), np.random.default_rng(4).normal(size=(3, 4))
+    measured = Measured(1.0, x, np.array([0.7, 0, 0, 0, 0]), np.array([0.5, 0.6, -0.7]), contribution, BOUND)
+    return measured, replace(context(GUSTY), model=Curved())
+
+
+def test_the_extended_filters_transition_is_its_models_slopes():
+    """[[1 + dt df/dx, dt G_s u_s, dt B], [0, 1, 0], [0, 0, decay]]."""
+    measured, detector = moving()[0], AugmentedEkf()
+    detector.reset(moving()[1])
+    expected = np.eye(9)
+    expected[:3, :3] += DT * (Curved.A + np.diag(measured.x))
+    expected[:3, 3:6] = DT * measured.contribution[:, :3]
+    expected[:3, 6:] = DT * GUSTY.gust_effect
+    expected[6:, 6:] = np.diag(np.exp(-DT / GUSTY.gust_time_s))
+    assert detector.jacobian(measured) == pytest.approx(expected, abs=1e-9)
+
+
+def test_each_sigma_point_moves_by_the_model_its_losses_and_its_air():
+    measured, detector = moving()[0], AugmentedUkf()
+    detector.reset(moving()[1])
+    points, model = np.random.default_rng(5).normal(0.0, 0.3, (19, 9)), Curved()
+    expected = points.copy()
+    for point, after in zip(points, expected, strict=True):
+        turning = measured.acceleration + model.f(point[:3], measured.y) - model.f(measured.x, measured.y)
+        turning = turning + measured.contribution[:, :3] @ point[3:6] + GUSTY.gust_effect @ point[6:]
+        after[:3] += DT * turning
+        after[6:] = np.exp(-DT / GUSTY.gust_time_s) * point[6:]
+    assert detector.dynamics(points, measured) == pytest.approx(expected)
+
+
+def test_the_unscented_filters_statistic_sums_what_is_more_than_expected():
+    detector = AugmentedUkf()
+    detector.reset(context(allowance=2.0, alarm=4.0))
+    assert [detector.statistic(square) for square in (10.0, 7.0, 1.0, 9.0)] == [1.0, 1.25, 0.0, 0.75]
+    assert detector.statistic(9e9) == pytest.approx((3.0 + 1e6 - 6.0) / 4.0)
+
+
+def test_what_turbulence_turns_adds_by_squares():
+    swing = [sum((GUSTY.gust_effect[i, g] * GUSTY.gust_rad_s[g]) ** 2 for g in range(3)) for i in range(3)]
+    assert pytest.approx(np.sqrt(swing)) == GUSTY.turbulence_rad_s2
+    assert (GUSTY.errors, GUSTY.air, Declared().errors, Declared().air) == (True, True, False, False)

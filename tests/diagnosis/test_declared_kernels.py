@@ -1,0 +1,127 @@
+"""What a detector is told of errors, against the aircraft's coefficients and closed forms."""
+
+import numpy as np
+import pytest
+
+from beaver_ftc.aircraft import load
+from beaver_ftc.design.model import design_record
+from beaver_ftc.diagnosis.declared import SCALE_FT, declared_of, gust_effect, gusts, model_error
+from beaver_ftc.scenario.actuators import Actuators
+from beaver_ftc.scenario.diagnosis import Bounds
+
+AIRCRAFT = load()
+Y = np.array([0.1, 0.03, 45.0, 1036.0, 0.3, 0.0, 0.0, 0.0])
+U = np.array([0.1, -0.15, 0.05, 0.2])
+N_AIR_DATA = 4
+
+
+@pytest.fixture
+def design():
+    return design_record()
+
+
+def acceleration(design, y, u, off=()):
+    """Without rates: the aircraft's own coefficients, over the design model's inertia; rad/s2."""
+    neutral = {factor: 0.0 for term in AIRCRAFT.terms.values() for factor in term.factors}
+    of = neutral | {"alpha": y[0], "beta": y[1], "dpt": y[4]} | dict(zip(AIRCRAFT.surfaces, u, strict=True))
+    Cl, Cm, Cn = (AIRCRAFT.coefficient(name, of, dict(off)) for name in ("Cl", "Cm", "Cn"))
+    of_it, geometry = design[0], AIRCRAFT.geometry
+    force, span, chord = y[3] * geometry.wing_area_m2, geometry.span_m, geometry.chord_m
+    roll, pitch, yaw = force * span * Cl, force * chord * Cm, force * span * Cn
+    return np.array(
+        [
+            of_it["Pl"] * roll + of_it["Pn"] * yaw,
+            of_it["Qm"] * pitch,
+            of_it["Rl"] * roll + of_it["Rn"] * yaw,
+        ]
+    )
+
+
+def test_errors_of_the_model_add_by_their_squares(design):
+    """Each measurement, surface and coefficient off by itself: what that moves, one after the other."""
+    air_data, deflection = np.array([0.02, 0.03, 2.0, 60.0]), 0.03
+    tolerance = np.zeros(len(AIRCRAFT.moments))
+    tolerance[[1, 5, 8]] = 0.3 * np.abs(design["moments"]["value"][0][[1, 5, 8]])
+    here = acceleration(design, Y, U)
+    apart = [acceleration(design, Y + np.eye(8)[i] * air_data[i], U) - here for i in range(N_AIR_DATA)]
+    apart += [acceleration(design, Y, U + deflection * e) - here for e in np.eye(4)]
+    for k in (1, 5, 8):
+        term = AIRCRAFT.moments[k]
+        more = 1.0 + 0.3 * np.sign(design["moments"]["value"][0][k])
+        apart.append(acceleration(design, Y, U, {term.name: more}) - here)
+    found = model_error(design, Y, U, air_data, tolerance, deflection)
+    assert found == pytest.approx(np.sqrt(np.square(apart).sum(axis=0)), rel=1e-9)
+    assert (found > 1e-3).all()
+
+
+def test_an_error_of_an_air_datum_moves_the_model_by_it_alone(design):
+    for i in (0, 1, 3):
+        air_data = 0.04 * Y[:N_AIR_DATA] * (np.arange(N_AIR_DATA) == i)
+        found = model_error(design, Y, U, air_data, np.zeros(len(AIRCRAFT.moments)), 0.0)
+        off = Y.copy()
+        off[i] *= 1.04
+        assert found == pytest.approx(np.abs(acceleration(design, off, U) - acceleration(design, Y, U)))
+
+
+def declared(design, **bounds):
+    return declared_of(Bounds.model_validate(bounds), Actuators(), design, Y, U, AIRCRAFT)
+
+
+def test_of_an_air_datum_noise_bias_and_rounding_count(design):
+    sensors = {"alpha": {"noise_std_deg": 0.3, "bias_deg": -0.4, "quantum_deg": 0.9, "scale_error": -0.02}}
+    told = declared(design, sensors=sensors)
+    size = np.radians(np.sqrt(0.3**2 + 0.4**2 + 0.9**2 / 12.0))
+    off = Y.copy()
+    off[0] += size
+    expected = np.abs(acceleration(design, off, U) - acceleration(design, Y, U))
+    assert told.model_rad_s2 == pytest.approx(expected)
+    assert told.noise[3] == pytest.approx(np.radians(0.3))
+    assert told.bias[3] == pytest.approx(np.radians(0.4))
+    assert told.resolution[3] == pytest.approx(np.radians(0.9))
+    assert told.slope.tolist() == [0.0, 0.0, 0.0, 0.02, 0.0, 0.0, 0.0]
+    assert declared(design, sensors={"p": {"noise_std_deg_s": 0.3}}).model_rad_s2.tolist() == [0.0] * 3
+
+
+def test_deflections_inertia_and_the_air_are_told_in_si(design):
+    told = declared(design, deflection_deg=1.5, inertia=0.1, turbulence="light")
+    moved = [
+        np.radians(1.5) * (acceleration(design, Y, e) - acceleration(design, Y, 0 * e)) for e in np.eye(4)
+    ]
+    assert told.model_rad_s2 == pytest.approx(np.sqrt(np.square(moved).sum(axis=0)), rel=1e-6)
+    assert (told.deflection_rad, told.inertia) == (pytest.approx(np.radians(1.5)), 0.1)
+    rotation, time_s = gusts("light", 45.0, AIRCRAFT.geometry.span_m)
+    assert (told.gust_rad_s.tolist(), told.gust_time_s.tolist()) == (rotation.tolist(), time_s.tolist())
+
+
+def test_what_is_declared_of_no_aircraft_is_of_the_beaver(design):
+    bounds = Bounds.model_validate({"coefficients": 0.1})
+    told = declared_of(bounds, Actuators(), design, Y, U)
+    assert told.coefficients == pytest.approx([0.1 * abs(term.value) for term in AIRCRAFT.moments])
+
+
+@pytest.mark.parametrize("b", [14.6, 60.0])
+def test_gusts_turn_the_air_as_their_spectra_say(b):
+    """Pitch and yaw: the variance of a lagged slope behind Dryden's gusts, by quadrature in u = arctan of
+    the frequency; roll: 1.9 sigma / sqrt(L b), and its lag sqrt(L b) / 2.6 V [Yeager1998]."""
+    V, L, sigma = 45.0, SCALE_FT * 0.3048, 7.4 * 0.3048
+    rotation, time_s = gusts("light", V, b)
+    nodes, weights = np.polynomial.legendre.leggauss(400)
+    u = 0.25 * np.pi * (nodes + 1.0)
+    w, dw = np.tan(u) * V / L, 0.25 * np.pi * weights / np.cos(u) ** 2 * V / L
+    gust = sigma**2 * L / (np.pi * V) * (1.0 + 3.0 * (L * w / V) ** 2) / (1.0 + (L * w / V) ** 2) ** 2
+    for axis, length in ((1, 4.0 * b / np.pi), (2, 3.0 * b / np.pi)):
+        variance = (gust * (w / V) ** 2 / (1.0 + (length * w / V) ** 2)) @ dw
+        assert rotation[axis] ** 2 == pytest.approx(variance, rel=1e-6)
+        assert time_s[axis] == pytest.approx(length / V)
+    assert rotation[0] == pytest.approx(1.9 * sigma / np.sqrt(L * b))
+    assert time_s[0] == pytest.approx(np.sqrt(L * b) / 2.6 / V)
+
+
+def test_rotating_air_shows_by_a_central_difference():
+    """A cube adds step^2 to a slope taken on both sides, and nothing else."""
+
+    class Cubic:
+        def f(self, x, y):
+            return 2.0 * x + x**2 + 1e6 * x**3
+
+    assert gust_effect(Cubic(), Y) == pytest.approx(-np.eye(3) * (2.0 + 1e6 * 1e-8), abs=1e-9)

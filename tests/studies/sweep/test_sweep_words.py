@@ -1,0 +1,142 @@
+"""What a sweep says, line by line, of a summary in which no two numbers are alike."""
+
+import pytest
+
+from beaver_ftc.studies.sweep import words
+from beaver_ftc.studies.sweep.summary import summarise
+
+from .counted import ROWS, detected, flights_of, load_sweep_text, row
+from .counted import SWEEP as SWEEP_TEXT
+
+
+def rate(count, of):
+    return {"count": count, "of": of, "rate": count / max(of, 1), "low": 0.25, "high": 0.875}
+
+
+SWEEP = "a-sweep"
+QUANTILES = {"of": 9, "median": 0.25, "p90": 0.5, "p95": 1.5, "p99": None, "max": 2.5}
+RMS = {key: {"median": value} for key, value in (("pre_fault_rms_deg_s", 0.5), ("post_fault_rms_deg_s", 1.5))}
+SUMMARY = {
+    "sweep": SWEEP, "passed": False, "folder": "runs/a-sweep", "flights": 12, "flown_h": 0.1234,
+    "statuses": {"bad_input": 1, "departed": 2, "flown": 9},
+    "search": {"score": 0.123456, "objective": "false_alarm", "run": 7},
+    "detection": {**rate(6, 9), "delay_s": QUANTILES}, "isolation": {**rate(4, 9), "wrong": rate(1, 5)},
+    "false_alarms": {"count": 3, "hours": 2.5, "per_hour": 1.2, "low": 0.25, "high": 3.5,
+                     "closest_residual_ratio": 0.98765},
+    "guarantee": {"promised": 5, "broken": 2}, "departures": rate(2, 11),
+    "sensitivity": {
+        "detection_delay": [
+            {"key": "a", "p_value": 0.05, "explained": 0.5}, {"key": "b", "p_value": 0.051, "explained": 0.4},
+            {"key": "c", "p_value": 0.01, "explained": 0.01},
+            {"key": "d", "p_value": 0.01, "explained": 0.0099},
+            {"key": "e", "p_value": 0.02, "explained": 0.3}, {"key": "f", "p_value": 0.02, "explained": 0.2},
+        ],
+        "missed_detection": [],
+    },
+    "tracking": {axis: {**RMS, "ratio": {"median": None}} for axis in "pqr"},
+    "expectations": [
+        {"name": "detection_delay_s", "expected": {"quantile": 0.95, "at_most": 0.5, "confidence": 0.9},
+         "actual": 0.75, "passed": False},
+        {"name": "detection_rate", "expected": {"at_least": 0.5}, "actual": None, "passed": True},
+    ],
+    "worst": [{"why": [f"why {k}", "and why"], "replay": f"beaver-ftc sweep --replay {k}"} for k in range(5)],
+}  # fmt: skip
+
+
+RESIDUALS = "residuals came to 0.9877 of the threshold"
+
+
+def test_each_thing_worth_knowing_is_said():
+    assert words.facts(SUMMARY) == [
+        ("flights", "12, 0.123 h in the air (1 bad input, 2 departed)"),
+        ("searched for", "the worst false alarm: 0.1235 of the threshold in flight 7"),
+        ("detection", "66.7 % (25 % to 87.5 %): 6 of 9 faults detected"),
+        ("detection delay", "median 0.25 s, 95 % 1.5 s, 99 % never, max 2.5 s"),
+        ("isolation", "44.4 % (25 % to 87.5 %): 4 of 9 faults named rightly"),
+        ("wrongly named", "1 of 5 named"),
+        ("false alarms", f"3 in 2.5 h without a fault: 1.2/h (0.25 to 3.5); {RESIDUALS}"),
+        ("guarantee", "2 of 5 faults detected later than theory promises"),
+        ("departures", "18.2 % (25 % to 87.5 %): 2 of 11 flights lost"),
+        ("drives the delay", "a (50 % of the ranks), c (1 % of the ranks), e (30 % of the ranks)"),
+    ]  # fmt: skip
+
+
+def test_what_there_is_nothing_of_is_not_said():
+    nothing = {
+        "statuses": {"flown": 12}, "search": None, "departures": rate(0, 11), "guarantee": {"promised": 0},
+        "detection": {**rate(0, 0), "delay_s": {"of": 0}}, "isolation": {**rate(0, 0), "wrong": rate(0, 0)},
+        "false_alarms": {"hours": 0.0}, "sensitivity": {"detection_delay": [], "missed_detection": []},
+    }  # fmt: skip
+    assert words.facts(SUMMARY | nothing) == [("flights", "12, 0.123 h in the air")]
+    search = {"score": None, "objective": "delay", "run": 3}
+    assert ("searched for", "the worst delay: none in flight 3") in words.facts(SUMMARY | {"search": search})
+
+
+@pytest.mark.parametrize(
+    ("share", "said"),
+    [
+        (None, "none"), (0, "0 %"), (1, "100 %"), (0.01, "1 %"), (0.0099, "0.99 %"), (0.99, "99 %"),
+        (0.9901, "99.01 %"), (0.0123, "1.2 %"), (0.00012, "0.01 %"), (0.99999, "100 %"), (0.5, "50 %"),
+        (0.015, "1.5 %"), (0.98765, "98.8 %"),
+    ],
+)  # fmt: skip
+def test_a_share_has_the_digits_that_matter(share, said):
+    assert words.percent(share) == said
+
+
+def test_expectations_and_tracking_in_words():
+    assert words.expectations(SUMMARY) == [
+        ("detection_delay_s", "95 % quantile ≤ 0.5 with 90 % confidence", "0.75", False),
+        ("detection_rate", "≥ 0.5", "none", True),
+    ]
+    assert words.tracking(SUMMARY) == [
+        ("before the fault", "0.5", "0.5", "0.5"), ("after", "1.5", "1.5", "1.5"),
+    ]  # fmt: skip
+    titles = [words.title(SUMMARY | c) for c in ({}, {"passed": True}, {"expectations": []})]
+    assert titles == ["a-sweep: FAILED", "a-sweep: PASSED", "a-sweep: flown, nothing was expected"]
+
+
+def test_the_summary_is_a_line_for_each_and_three_flights_to_look_at():
+    lines = words.summary_text(SUMMARY).splitlines()
+    assert lines[0] == "a-sweep: FAILED"
+    width = len("tracking RMS, median")
+    assert f" {'tracking RMS, median':{width}}  p 0.5  q 0.5  r 0.5 deg/s before the fault" in lines
+    assert f" {'':{width}}  p 1.5  q 1.5  r 1.5 deg/s after" in lines
+    ratio = {axis: {**RMS, "ratio": {"median": 3.0}} for axis in "pqr"}
+    assert "p 3  q 3  r 3 ratio" in words.summary_text(SUMMARY | {"tracking": ratio})
+    assert f" {'expected':{width}}  met    detection_rate ≥ 0.5: none" in lines
+    assert lines[-7] == f" {'results':{width}}  runs/a-sweep"
+    assert lines[-6:-4] == [" why 0; and why:", "   beaver-ftc sweep --replay 0"]
+    assert lines[-2:] == [" why 2; and why:", "   beaver-ftc sweep --replay 2"]
+    for what, _ in words.facts(SUMMARY):
+        assert any(line.startswith(f" {what} ") for line in lines)
+
+
+def test_in_colour_a_failure_is_red_and_what_is_missed_too():
+    text = words.summary_text(SUMMARY, colour=True)
+    assert "\x1b[1;31ma-sweep" in text
+    assert "\x1b[1;31mMISSED" in text
+    assert "\x1b[32mmet" in text
+    assert "\x1b[1mresults" in text
+    assert "\x1b[1;32ma-sweep" in words.summary_text(SUMMARY | {"passed": True}, colour=True)
+
+
+def test_a_promise_counts_from_the_faults_first_frame(tmp_path):
+    """Up to a frame, of 0.01 s, after its time; by rounding no more and no less."""
+    sweep, promised = load_sweep_text(SWEEP_TEXT), {"detection.guaranteed_delay_s": 0.25}
+    delays = (0.2, 0.2599, 0.26, 0.3)
+    rows = [detected(run, delay, **promised) for run, delay in enumerate(delays)]
+    found = summarise(flights_of([*rows, row(4, **promised), row(5)], tmp_path), sweep)
+    assert found["guarantee"] == {"promised": 5, "broken": 3}
+
+
+def test_faults_of_a_kind_are_counted_by_themselves(tmp_path):
+    other = {"fault.actuator": "rudder"}
+    rows = [*ROWS[:6], detected(6, 0.1, "rudder", **other), row(7, **other)]
+    found = summarise(flights_of(rows, tmp_path), load_sweep_text(SWEEP_TEXT))
+    elevator, rudder = found["by_fault"]
+    assert (elevator["flights"], rudder["flights"]) == (6, 2)
+    assert (elevator["detection"]["count"], elevator["detection"]["of"]) == (6, 6)
+    assert (rudder["detection"]["count"], rudder["detection"]["of"]) == (1, 2)
+    assert (elevator["isolation"]["count"], rudder["isolation"]["count"]) == (4, 1)
+    assert found["false_alarms"]["closest_residual_ratio"] == 0.5

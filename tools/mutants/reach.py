@@ -22,7 +22,6 @@ from tools.mutants.scope import ROOT
 from tools.mutants.trial import SURVIVED, in_a_child, pytest_quietly
 
 SLOW_S = 1.0  # of processor, counting lines; a test that takes longer in plain Python is none for this
-PATIENCE = 1  # so many slow cases of one test, and its other cases are not tried
 FLIES = 4  # so many slow tests first in a file, and none of it is tried: all of them fly
 HANGS_S = 600.0  # of processor for the tests of one file, far more than the limits allow
 EXAMPLES = 4
@@ -112,27 +111,41 @@ def _write(file: Path) -> int:
 def _measured(file: Path) -> dict:
     few_examples()
     watch = coverage.Coverage(data_file=None, source_pkgs=["beaver_ftc"], config_file=False)
-    timed = _Timed(watch)
+    timed = _Timed(watch, _slow_before(file))
     with watch.collect():
         pytest_quietly(["-m", "not acceptance", str(file)], [timed])
-    lines = _lines(watch.get_data(), set(timed.seconds))
+    lines = _lines(watch.get_data(), timed)
     sources = {*lines, *_tests_own(), file.relative_to(ROOT).as_posix()}
     return {
         "sources": _digests(sources),
         "seconds": timed.seconds,
         "left_out": timed.left_out,
+        "slow": sorted(timed.slow),
         "lines": lines,
     }
 
 
-def _lines(data: coverage.CoverageData, tests: set[str]) -> dict[str, dict[int, list[str]]]:
+def _slow_before(file: Path) -> set[str]:
+    """Tests that took too long when the package was another, and the test file the same: not tried again."""
+    kept, name = _kept(file), file.relative_to(ROOT).as_posix()
+    before = json.loads(kept.read_text()) if kept.exists() else {}
+    same = before.get("sources", {}).get(name) == _digests([name])[name]
+    return set(before.get("slow", ()) if same else ())
+
+
+def _lines(data: coverage.CoverageData, timed: "_Timed") -> dict[str, dict[int, list[str]]]:
     """{file: {line: tests}} of the files of which a test executes more than the import."""
     found = {}
+
+    def tests(contexts: list[str]) -> list[str]:
+        users = {test for context in contexts for test in timed.users.get(context, [context])}
+        return sorted(users & timed.seconds.keys())
+
     for file in data.measured_files():
         by_line = data.contexts_by_lineno(file)
         if any(context for contexts in by_line.values() for context in contexts):
             name = Path(file).relative_to(ROOT).as_posix()
-            found[name] = {line: [c for c in contexts if c in tests] for line, contexts in by_line.items()}
+            found[name] = {line: tests(contexts) for line, contexts in by_line.items()}
     return found
 
 
@@ -173,27 +186,46 @@ def forget() -> None:
 class _Timed:
     """Notes for each test that passes how long it took, and gives up one that is slow."""
 
-    def __init__(self, watch: coverage.Coverage) -> None:
+    def __init__(self, watch: coverage.Coverage, known_slow: set[str]) -> None:
         self._watch = watch
         self.seconds: dict[str, float] = {}
         self.left_out: Counter[str] = Counter()
-        self._slow: Counter[str] = Counter()
+        self.slow: set[str] = set()  # after one slow case the other cases of a test are not tried
+        self._known_slow = known_slow
+        self.users: dict[str, list[str]] = {}  # the tests that share a fixture, by its name
         self._is_slow = False
+
+    def pytest_collection_finish(self, session: pytest.Session) -> None:
+        for item in session.items:
+            for fixture in getattr(item, "fixturenames", ()):
+                self.users.setdefault(fixture, []).append(item.nodeid)
+
+    @pytest.hookimpl(wrapper=True)
+    def pytest_fixture_setup(self, fixturedef: pytest.FixtureDef, request: pytest.FixtureRequest):
+        """What a shared fixture executes, every test executes that uses it: each may be run alone."""
+        if fixturedef.scope == "function":
+            return (yield)
+        self._watch.switch_context(fixturedef.argname)
+        try:
+            return (yield)
+        finally:
+            self._watch.switch_context(self._test)
 
     @pytest.hookimpl(wrapper=True)
     def pytest_runtest_protocol(self, item: pytest.Item) -> Iterator[None]:
-        self._watch.switch_context(item.nodeid)
+        self._test = item.nodeid
+        self._watch.switch_context(self._test)
         forget()
         self._start, self._is_slow = time.process_time(), False
-        all_fly = not self.seconds and len(self._slow) >= FLIES
-        if all_fly or self._slow[_function(item.nodeid)] >= PATIENCE:
+        all_fly = not self.seconds and len(self.slow) >= FLIES
+        if all_fly or _function(item.nodeid) in self.slow | self._known_slow:
             item.add_marker(pytest.mark.skip(reason="takes too long for this"))
             self._is_slow = True
         with _limit(self._give_up):
             yield
         if self._is_slow:
             self.seconds.pop(item.nodeid, None)
-            self._slow[_function(item.nodeid)] += 1
+            self.slow.add(_function(item.nodeid))
             self.left_out["takes too long"] += 1
 
     def _give_up(self) -> None:
@@ -219,7 +251,7 @@ def _limit(give_up: Callable[[], None]) -> Iterator[None]:
     """Give up what runs inside after so many seconds of processor, or a good while of waiting for other
     processes; and again and again, as whoever was at work may not have let go.
     """
-    clocks = {signal.SIGPROF: (signal.ITIMER_PROF, SLOW_S), signal.SIGALRM: (signal.ITIMER_REAL, 30 * SLOW_S)}
+    clocks = {signal.SIGPROF: (signal.ITIMER_PROF, SLOW_S), signal.SIGALRM: (signal.ITIMER_REAL, 10 * SLOW_S)}
 
     def over(number: int, frame: FrameType | None) -> None:
         if frame and "coverage" in frame.f_code.co_filename:  # it holds a lock

@@ -68,12 +68,17 @@ def _run(file: Path, source: str, tests: list[str], note: Path, limit_s: float) 
 def in_a_child(work: Callable[[], int], limit_s: float) -> str:
     """SURVIVED if `work` returns 0, KILLED if it does not, HANGS if it takes so much of the processor.
 
-    A child has the libraries loaded already, and leaves nothing behind.
+    A child has the libraries loaded already, and leaves nothing behind: no process that a test has started.
     """
     child = os.fork()
     if child == 0:
+        os.setpgid(0, 0)  # a group of its own
         _work(work, limit_s)  # does not return
-    return _end(child, 20 * limit_s)
+    try:
+        return _end(child, 20 * limit_s)
+    finally:
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(child, signal.SIGKILL)
 
 
 def _work(work: Callable[[], int], limit_s: float) -> None:

@@ -106,9 +106,7 @@ def main() -> None:
     parser.add_argument("--first", type=int, default=1)
     args = parser.parse_args()
     draw, limits = CAMPAIGNS[args.campaign]
-    table = Table(
-        "seed", "flight", "fault", "at the end", "missed", "airspeed as limited", "without the fault"
-    )
+    table = Table("seed", "flight", "fault", *COLUMNS)
     held = np.zeros(len(COUNTED), int)
     for seed in range(args.first, args.first + args.seeds):
         scenario, fault = draw(np.random.default_rng(seed))

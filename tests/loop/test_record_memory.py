@@ -32,6 +32,11 @@ def test_a_copy_is_its_record_to_the_byte_in_whatever_memory():
         assert memory.unpacked(kept).tobytes() == record.tobytes()
 
 
+def test_empty_memory_holds_nothing_of_the_flight_before():
+    _dirty()
+    assert memory.taken_empty((1,), RECORD).tobytes() == bytes(RECORD.itemsize)
+
+
 def test_only_what_is_said_to_be_idle_is_left_as_it_was():
     record = _record(np.random.default_rng(2))
     _dirty()

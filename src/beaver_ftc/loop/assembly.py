@@ -306,7 +306,9 @@ def assemble(scenario: Scenario, trim: np.ndarray, travel: np.ndarray) -> np.nda
     if key not in _designs:
         if len(_designs) >= _MOST_DESIGNS:
             _designs.clear()
-        _designs[key] = memory.packed(_assemble_design(scenario, travel), idle(scenario.fdi))
+        made = _assemble_design(scenario, travel)
+        _designs[key] = memory.packed(made, idle(scenario.fdi))
+        memory.give_back(made)
     frames = memory.unpacked(_designs[key])
     frame = frames[0]
     frame["belief"]["u"] = frame["belief"]["commanded"] = trim
@@ -317,7 +319,7 @@ def assemble(scenario: Scenario, trim: np.ndarray, travel: np.ndarray) -> np.nda
 
 def _assemble_design(scenario: Scenario, travel: np.ndarray) -> np.ndarray:
     """What does not depend on the trim, the seed and the truth."""
-    frames = np.zeros(1, frame_dtype(scenario.airframe.n))
+    frames = memory.taken_empty((1,), frame_dtype(scenario.airframe.n))
     frame, dt = frames[0], 1.0 / scenario.rate_hz
     frame["dt"] = dt
     belief, truth = frame["belief"], frame["truth"]

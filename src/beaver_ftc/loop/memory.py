@@ -23,6 +23,14 @@ def taken(shape: tuple[int, ...], dtype: np.dtype | type = np.float64) -> np.nda
     return np.ndarray(shape, kind, np.empty(n_bytes, np.uint8))
 
 
+def taken_empty(shape: tuple[int, ...], dtype: np.dtype | type = np.float64) -> np.ndarray:
+    """The same, every byte of it zero."""
+    array = taken(shape, dtype)
+    assert array.base is not None
+    array.base[:] = 0
+    return array
+
+
 @dataclass(frozen=True)
 class Packed:
     """A structured array of which most is zero: what is not, and where; and what has to be zero for it."""
@@ -39,7 +47,8 @@ def packed(record: np.ndarray, idle: Sequence[Sequence[str]] = ()) -> Packed:
     idle: paths of fields that are zero and that nobody reads before writing them; copies have anything there.
     """
     content = record.view(np.uint8)
-    used = np.add.reduceat(content != 0, np.arange(0, content.size, _PIECE)) > 0
+    whole = content.size - content.size % _PIECE
+    used = np.append(content[:whole].reshape(-1, _PIECE).any(axis=1), content[whole:].any())
     ends = _PIECE * np.flatnonzero(np.diff(used, prepend=False, append=False)).reshape(-1, 2)
     places = [slice(first, min(last, content.size)) for first, last in ends.tolist()]
     spared = sorted(_place(record.dtype, path) for path in idle)

@@ -20,7 +20,7 @@ help:
 	@echo "make demo       set up, fly the published elevator case, print the verdict and where the report lies"
 	@echo "make test       set up and run the whole test suite"
 	@echo "make acceptance the installed command from outside: every scenario, page and mistake"
-	@echo "make cost       what a flight costs beside bare JSBSim: no more than a tenth above what is recorded?"
+	@echo "make cost       what a flight costs beside bare JSBSim: no more than a tenth above the recorded revision?"
 	@echo "make test-fast  the tests that fly little or nothing: less than a minute"
 	@echo "make coverage   the whole test suite, and which lines of Python it has run"
 	@echo "make mutants    100 small defects put into the code on purpose: how many of them do tests find?"
@@ -51,7 +51,7 @@ acceptance: $(VENV)/.dev
 	$(PYTEST) -m acceptance
 
 cost: $(VENV)/.dev
-	$(BIN)/python benchmarks/flight_cost.py --rounds 12 --check benchmarks/ratios.json
+	$(BIN)/python benchmarks/flight_cost.py --rounds 8 --check benchmarks/ratios.json
 
 test-fast: $(VENV)/.dev
 	$(PYTEST) -m "not acceptance" $(FAST)

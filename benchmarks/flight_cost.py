@@ -1,17 +1,25 @@
 """What a flight costs beside flying: taken apart, in four kinds of flight, in units of JSBSim's plain frame.
 
-    python benchmarks/flight_cost.py [--rounds N] [--check FILE | --record FILE]
+    python benchmarks/flight_cost.py [--rounds N] [--record FILE | --check FILE]
 
 Each round flies every kind once and then lets JSBSim alone fly as many frames of the same aircraft, in the
 same air, surfaces held; ratios are formed within a round, medians over the rounds. A flight in a sweep is all
 that `sweep` does for one: scenario, aircraft, trim, record, frames, metrics, row. The trim is a new one each
-time. `--check benchmarks/ratios.json` ends with status 1 if a ratio is over a tenth above the recorded one,
-and still is when all is measured again.
+time.
+
+`--check benchmarks/ratios.json` measures in pairs: the code of the revision that the file was recorded with,
+and today's, in turn. It ends with status 1 if a ratio of today's is over a tenth above its partner, and still
+is when all is measured again. The recorded numbers themselves are of one machine: on another, what surrounds
+the frames has been seen to cost twice as much beside the same frames.
 """
 
 import argparse
+import io
 import json
+import os
+import subprocess
 import sys
+import tarfile
 import tempfile
 import time
 from pathlib import Path
@@ -23,8 +31,11 @@ from aircraft_cost import Variant, jsbsim_alone, write_variant
 from beaver_ftc.plant.conditions import trim
 from beaver_ftc.studies.bench.flights import by_kind
 
+HERE = Path(__file__).resolve()
+ROOT = HERE.parents[1]
 ALLOWED_RISE = 0.10
 PLAIN_FRAMES = 1000
+PAIRS = 4
 
 
 def measure(rounds: int) -> dict[str, Any]:
@@ -46,14 +57,65 @@ def measure(rounds: int) -> dict[str, Any]:
     return {"unit_us": unit_us, "kinds": kinds}
 
 
-def risen(now: dict[str, Any], recorded: dict[str, Any]) -> list[str]:
-    """Which ratios are more than a tenth above the recorded ones."""
-    return [
-        f"{kind}: {name} is {now['kinds'][kind][name]:.3f}, recorded {was[name]:.3f}"
-        for kind, was in recorded["kinds"].items()
+def git(*words: str) -> bytes:
+    """What git says of this checkout."""
+    return subprocess.run(["git", "-C", str(ROOT), *words], check=True, capture_output=True).stdout
+
+
+def unpack(revision: str, folder: Path) -> Path:
+    """The code of a revision, in a new folder."""
+    try:
+        code = git("archive", revision)
+    except subprocess.CalledProcessError:
+        sys.exit(f"revision {revision} is not in this clone: fetch the whole history (git fetch --unshallow)")
+    with tarfile.open(fileobj=io.BytesIO(code)) as archive:
+        archive.extractall(folder, filter="data")
+    return folder
+
+
+def measured_in(tree: Path, rounds: int, cache: Path) -> dict[str, Any]:
+    """What the code of a tree costs, measured by its own copy of this file in a process of its own."""
+    said = cache.with_suffix(".json")
+    subprocess.run(
+        [sys.executable, tree / "benchmarks" / HERE.name, "--rounds", str(rounds), "--record", said],
+        env=os.environ | {"PYTHONPATH": str(tree / "src"), "XDG_CACHE_HOME": str(cache)},
+        check=True,
+        capture_output=True,
+    )
+    return json.loads(said.read_text(encoding="utf-8"))["kinds"]
+
+
+def rises(revision: str, rounds: int) -> dict[str, float]:
+    """Each ratio, over that of the code of a revision: medians of pairs, which take turns to go first."""
+    with tempfile.TemporaryDirectory() as folder:
+        trees = (unpack(revision, Path(folder) / "then"), ROOT)
+        caches = [Path(folder) / name for name in ("then-cache", "now-cache")]
+        seen: list[tuple[dict[str, Any], dict[str, Any]]] = []
+        for pair in range(PAIRS):
+            found = [{}, {}]
+            for which in (0, 1) if pair % 2 else (1, 0):
+                found[which] = measured_in(trees[which], rounds, caches[which])
+            seen.append((found[0], found[1]))
+    return {
+        f"{kind}: {name}": float(np.median([now[kind][name] / then[kind][name] for then, now in seen]))
+        for kind in seen[0][0]
         for name in ("frames_ratio", "flight_ratio")
-        if now["kinds"][kind][name] > (1.0 + ALLOWED_RISE) * was[name]
-    ]
+    }
+
+
+def check(revision: str, rounds: int) -> int:
+    """Print how far each ratio has risen; 1 if one has by more than is allowed, twice in a row."""
+    print(f"ratios over those of {revision[:12]}, measured in {PAIRS} pairs of {rounds} rounds")
+    risen = []
+    for attempt in (1, 2):
+        found = rises(revision, rounds)
+        for name, factor in found.items():
+            print(f"    {name} times {factor:.3f}")
+        risen = [name for name, factor in found.items() if factor > 1.0 + ALLOWED_RISE]
+        if not risen:
+            return 0
+        print(f"more than a tenth, attempt {attempt} of 2:", "; ".join(risen))
+    return 1
 
 
 def main() -> int:
@@ -63,6 +125,9 @@ def main() -> int:
     parser.add_argument("--check", type=Path)
     parser.add_argument("--record", type=Path)
     given = parser.parse_args()
+    if given.check is not None:
+        recorded = json.loads(given.check.read_text(encoding="utf-8"))
+        return check(recorded["revision"], given.rounds)
     now = measure(given.rounds)
     print(f"unit, JSBSim's plain frame: {now['unit_us']:.2f} us; medians of {given.rounds} rounds, ms")
     for kind, of in now["kinds"].items():
@@ -73,13 +138,10 @@ def main() -> int:
             f"the loop's own part {of['own_part_units']:.2f} units a JSBSim frame"
         )
     if given.record:
-        given.record.write_text(json.dumps(now, indent=1) + "\n", encoding="utf-8")
-    if given.check is None:
-        return 0
-    recorded = json.loads(given.check.read_text(encoding="utf-8"))
-    found = risen(now, recorded) and risen(measure(given.rounds), recorded)
-    print(*found, sep="\n", end="\n" if found else "")
-    return 1 if found else 0
+        revision = git("rev-parse", "HEAD").decode().strip() if (ROOT / ".git").exists() else None
+        recorded = json.dumps({"revision": revision, **now}, indent=1)
+        given.record.write_text(recorded + "\n", encoding="utf-8")
+    return 0
 
 
 if __name__ == "__main__":

@@ -211,3 +211,9 @@ def surfaces_at_work(frames, rate_hz, rng, size=0.3):
     Gu[:, 1, 1] = -size * wave[:, 1]
     Gu[:, 0, 2], Gu[:, 2, 2] = 0.2 * size * wave[:, 2], -size * wave[:, 2]
     return Gu, 0.05 + 0.01 * wave[:, 1]
+
+
+def gust_jitter(sensors, design, span_m):
+    """What the noise of vanes and airspeed adds to the gust they see, in level flight."""
+    flow = noise_model._flow_noise(sensors, LEVEL_FLIGHT[1][2])
+    return noise_model._gust_jitter(flow, design, LEVEL_FLIGHT, span_m)

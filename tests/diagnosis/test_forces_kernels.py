@@ -41,7 +41,8 @@ def felt(bounds=None):
     fill_table(air["forces"], AIRCRAFT, AIRCRAFT.measurable_forces, FORCES)
     air["area_per_mass"], air["gravity"] = AIRCRAFT.geometry.wing_area_m2 / AIRCRAFT.mass.mass_kg, GRAVITY
     air["scale"], statistical["forces"]["known"] = 533.4, 1
-    set_up_forces(statistical, bounds or Bounds(), AIRCRAFT, (X, Y, U), ALONG_Y)
+    air["read"] = 1
+    set_up_forces(statistical, bounds or Bounds(), AIRCRAFT, (X, Y, U), ALONG_Y, DT)
     return fdi
 
 
@@ -165,6 +166,108 @@ def test_noise_of_the_readings_is_jitter_of_the_forces():
     assert without == pytest.approx(slopes**2, rel=1e-6)
 
 
+def test_noise_of_accelerometers_is_jitter_that_the_pressure_does_not_scale():
+    """Against a draw, at the trim's pressure and at twice as much; and how far it lets the angle wander."""
+    sensors, rng = {"ay": {"noise_std_mps2": 0.04}, "az": {"noise_std_mps2": 0.07}}, np.random.default_rng(8)
+    for strength in (1.0, 2.0):
+        fdi, y = felt(Bounds(sensors=sensors)), Y * (1.0, 1.0, 1.0, strength, 1.0)
+        record, drawn = fdi["statistical"]["forces"], []
+        for noise in rng.normal(0.0, (0.04, 0.07), (1500, 2)):
+            look(record, fdi["statistical"]["air"], measured(y=y, force=(0.5, *(noise - (0.0, 9.5)))), U, DT)
+            drawn.append(record["component"]["innovation"].copy())
+        for inertial in range(2):
+            jitter = record["component"]["jitter"][:, inertial]
+            assert np.sqrt(jitter) == pytest.approx(np.std(drawn, axis=0), rel=0.06)
+    more = record["component"]["wander"] - felt()["statistical"]["forces"]["component"]["wander"]
+    walked = [(0.04, 0.07)[f] / Y[2] * np.sqrt(DT) for f in (SIDE, UP)]
+    assert np.sqrt(more) == pytest.approx(np.abs(record["component"]["vane"][:, 1]) * walked)
+
+
+def test_bias_and_slope_of_accelerometers_are_tolerated():
+    """As one more constant, 1 / c of the bias, and as a share of the whole."""
+    sensors = {"ay": {"bias_mps2": -0.2}, "az": {"bias_mps2": 0.3, "scale_error": -0.01}}
+    record, none = (felt(Bounds(sensors=given))["statistical"]["forces"] for given in (sensors, {}))
+    look(record, felt()["statistical"]["air"], measured(), U, DT)
+    for f, bias, scale in ((SIDE, 0.2, 0.0), (UP, 0.3, 0.01)):
+        force, before = record["component"][f], none["component"][f]
+        n = int(force["n"])
+        assert n == before["n"] + 1
+        assert force["tolerance"][n - 2] == pytest.approx(bias)
+        assert force["regressor"][n - 2] == pytest.approx(1.0 / AIRCRAFT.geometry.chord_m)
+        assert force["tolerance"][n - 1] == pytest.approx(forces.MASS_TOLERANCE + scale)
+        assert force["tolerance"][: n - 2] == pytest.approx(before["tolerance"][: n - 2])
+    whole = per_coefficient() * coefficient("CZ")
+    assert record["component"][UP]["regressor"][int(record["component"][UP]["n"]) - 1] == pytest.approx(whole)
+
+
+def test_without_accelerometers_no_force_is_weighed(viewed):
+    statistical, G = viewed["statistical"], np.ones((3, 4))
+    statistical["inertial_air"]["moving"] = 1
+    views = statistical["views"]
+    views["held"], views["block"]["hypothesis"]["score"][:, 0] = 50.0, 50.0
+    forces.do_without(statistical)
+    assert not statistical["air"]["read"]
+    assert not statistical["inertial_air"]["moving"]
+    for v in (ELEVATOR_VIEW, ALPHA_VIEW, UP_VIEW, SIDE_VIEW):
+        assert across.shown(statistical, views[v]) == 0.0
+    assert across.shown(statistical, views[0]) == 50.0
+    for block in statistical["block"]:
+        block["noise"] = 1e-8
+    across.observe(viewed, np.zeros(3), G, 0.0 * G, 45.0, 1, False)
+    assert not views["held"][ELEVATOR_VIEW : SIDE_VIEW + 1].any()
+
+
+def test_accelerometers_that_may_break_raise_no_alarm_and_tell_no_gust(viewed):
+    """Their forces still count, and ask for the vane to be cleared, once the rates alone have alarmed."""
+    statistical = viewed["statistical"]
+    air, views = statistical["air"], statistical["views"]
+    air["moving"] = 1
+    set_up_views(statistical, AIRCRAFT)
+    views["mix"][ELEVATOR_VIEW], views["held"][ELEVATOR_VIEW] = (0.0, 0.3, 0.0, 0.0, -0.95), 9.0
+    air["mean"] = 0.1, 0.2, 0.3
+    views["block"]["hypothesis"]["score"][0, 0] = 7.0
+    for read in (1, 0):
+        air["read"] = read
+        assert across.alarms(statistical, views[ELEVATOR_VIEW]) == bool(read)
+        assert across.told(statistical, views[0]) == bool(read)
+        assert across.part(viewed, views[0], np.ones(3), PITCH) == pytest.approx(1.0 - 0.2 * read)
+        assert across.shown(statistical, views[0]) == (0.0 if read else 7.0), "nothing is to be cleared"
+        assert across.shown(statistical, views[ELEVATOR_VIEW]) == 0.0
+    views["held"][UP_VIEW] = 50.0
+    assert across.shown(statistical, views[ELEVATOR_VIEW]) == 9.0
+
+
+def test_a_gust_that_nobody_tells_moves_rate_and_force_in_full(viewed):
+    statistical, rng = viewed["statistical"], np.random.default_rng(6)
+    air, view, component = (
+        statistical["air"],
+        statistical["views"][RUDDER_VIEW],
+        statistical["forces"]["component"],
+    )
+    air["moving"], air["damping"], air["axes"], air["read"] = 1, rng.normal(size=(3, 3)), np.eye(3), 0
+    air["per_metre"], air["unseen"] = (1e-5, 2e-5, 3e-5), 0.0
+    across.turn(viewed, view, rng.normal(size=(3, 4)))
+    across.blur(view, statistical, 45.0)
+    m = view["mix"]
+    by_both = np.abs(m[:3] @ air["damping"]) + np.abs(m[3:] @ component["damping"])
+    still = float(view["block"]["drift"][0, 0])
+    air["per_metre"] = 0.0
+    across.blur(view, statistical, 45.0)
+    gusts = still - float(view["block"]["drift"][0, 0])
+    assert gusts == pytest.approx(45.0 * np.sum(by_both**2 * np.array([1e-5, 2e-5, 3e-5])))
+
+
+def test_noise_of_the_gust_that_forces_tell_blurs_what_clears_a_vane(viewed):
+    statistical = viewed["statistical"]
+    statistical["forces"]["blurred"] = 0.1, 0.2, 0.3
+    for v, blurred in ((ALPHA_VIEW, True), (ELEVATOR_VIEW, False)):
+        view = statistical["views"][v]
+        view["mix"] = 0.0, -0.6, 0.0, 0.0, 0.8
+        across.blur(view, statistical, 45.0)
+        own = 0.8 * np.sqrt(statistical["forces"]["component"][UP]["jitter"][0])
+        assert view["block"]["jitter"][0] == pytest.approx((own + 0.6 * 0.2 * blurred) ** 2)
+
+
 def test_a_vane_s_error_moves_rate_and_force_by_their_slopes():
     record = felt()["statistical"]["forces"]
     for f, name, place, axis in ((SIDE, "CY", 1, 2), (UP, "CZ", 0, 1)):
@@ -193,6 +296,10 @@ def test_constant_errors_are_tolerated_term_by_term():
         ({}, 0.0, 0.0),
         ({"r": {"bias_deg_s": 0.1}}, np.radians(0.1), np.radians(0.1)),
         ({"phi": {"bias_deg": 1.0}}, TILTED, 0.3 * TILTED),
+        ({"ay": {"bias_mps2": 0.46}}, 0.01, 0.0),
+        ({"az": {"bias_mps2": -0.46}}, 0.0, 0.01),
+        ({"ax": {"bias_mps2": 0.46}}, 0.003, 0.003),
+        ({"az": {"scale_error": 0.02}}, 0.0, 0.02 * GRAVITY / 46.0),
     ],
 )  # fmt: skip
 def test_the_angle_followed_drifts_by_gyros_and_by_gravity_s_share(bounds, side, up):
@@ -284,7 +391,7 @@ def test_only_what_is_mostly_a_force_raises_the_alarm(viewed):
         (SIDE_VIEW, (0.0, 0.0, 0.0, 1.0, 0.0), False),
     ):  # fmt: skip
         views["mix"][v] = mix
-        assert across.alarms(views[v]) == alarms
+        assert across.alarms(viewed["statistical"], views[v]) == alarms
 
 
 def test_what_clears_a_vane_excludes_nobody(viewed):

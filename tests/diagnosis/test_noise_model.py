@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from innovations import LEVEL_FLIGHT, Detector, misread, surfaces_at_work
+from innovations import LEVEL_FLIGHT, Detector, gust_jitter, misread, surfaces_at_work
 from scipy.stats import norm
 
 from beaver_ftc.aircraft import load
@@ -186,7 +186,7 @@ def test_noise_of_a_vane_is_a_gust_that_rotates_by_its_slope(vane, axis, lag):
     turning[axis] = h
     damping = (_rates(design, turning, y, u) - _rates(design, np.zeros(3), y, u)) / h
     expected = np.abs(damping) * size * np.pi * y[2] / (lag * span_m)
-    found = noise_model._gust_jitter(sensors, design, LEVEL_FLIGHT, span_m)
+    found = gust_jitter(sensors, design, span_m)
     assert found == pytest.approx(expected, rel=1e-3, abs=1e-6)
 
 

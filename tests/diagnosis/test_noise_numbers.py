@@ -4,7 +4,7 @@ from math import exp, pi, radians, sqrt
 
 import numpy as np
 import pytest
-from innovations import LEVEL_FLIGHT, TRAVEL_RAD, Detector
+from innovations import LEVEL_FLIGHT, TRAVEL_RAD, Detector, gust_jitter
 
 from beaver_ftc.aircraft import load
 from beaver_ftc.design.coefficients import MASS
@@ -253,7 +253,7 @@ def test_the_noise_of_vanes_and_airspeed_turns_the_gust_they_see():
     speed = 0.3 * 0.5 / V
     turning = np.array([0.0, speed * pi * V / (4 * SPAN_M), speed * pi * V / (3 * SPAN_M)])
     damping = noise_model.jacobian(design, np.zeros(3), Y, np.zeros(4))[2]
-    found = noise_model._gust_jitter(sensors, design, LEVEL_FLIGHT, SPAN_M)
+    found = gust_jitter(sensors, design, SPAN_M)
     assert found == pytest.approx(np.sqrt(damping**2 @ turning**2))
 
 
@@ -286,7 +286,7 @@ def test_the_noise_of_what_the_model_is_made_of_is_white():
         jitter += slope**2 * (noise**2 + quantum**2 / 12.0)
     still, gusty = as_set_up(UNEVEN), as_set_up({**UNEVEN, "turbulence": "light"})
     assert still["jitter"] == pytest.approx(jitter)
-    seen = noise_model._gust_jitter(given.sensors, design_record()[0], LEVEL_FLIGHT, SPAN_M)
+    seen = gust_jitter(given.sensors, design_record()[0], SPAN_M)
     assert gusty["jitter"] == pytest.approx(jitter + seen**2)
     assert still["deflection"] == pytest.approx(radians(0.5) * np.abs(G).sum(axis=1))
 
@@ -303,7 +303,7 @@ def test_vanes_and_airspeed_err_together_in_the_gust_they_see():
     pitching = (radians(0.1) + speed) * pi * V / (4 * SPAN_M)
     yawing = (radians(0.2) / sqrt(12.0) + speed) * pi * V / (3 * SPAN_M)
     damping = noise_model.jacobian(design, np.zeros(3), Y, np.zeros(4))[2]
-    found = noise_model._gust_jitter(sensors, design, LEVEL_FLIGHT, SPAN_M)
+    found = gust_jitter(sensors, design, SPAN_M)
     assert found == pytest.approx(np.hypot(damping[:, 1] * pitching, damping[:, 2] * yawing))
 
 

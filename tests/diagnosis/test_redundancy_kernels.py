@@ -24,7 +24,7 @@ from beaver_ftc.diagnosis.watch import (
     THETA,
     TURN,
 )
-from beaver_ftc.plant.instruments import ALTITUDE, ENGINE_SPEED, MANIFOLD, N_SENSORS, PHI
+from beaver_ftc.plant.instruments import ALTITUDE, AX, ENGINE_SPEED, MANIFOLD, N_SENSORS, PHI
 
 H, GRAVITY, DRIFT, GUST, SIZE = 0.02, 9.8, 2e-4, 0.7, 11.0
 FLOWS = (ALPHA_FLOW, BETA_FLOW)
@@ -219,6 +219,7 @@ SENSITIVITY = {
     AIRSPEED: dict.fromkeys(FLOWS, SIZE / V**2) | {CLIMB: 1.0},
     QDYN: {},
     ALTITUDE: {},
+    **{AX + i: {SPEED: 2.0, ALPHA_FLOW: 2.0 / V, BETA_FLOW: 2.0 / V} for i in range(3)},
 }
 # What a change of 1 of an error adds to a residual at once.
 TILTED, BANKED = np.sin(0.25) + TURNING * H, np.sin(0.4) + TURNING * H

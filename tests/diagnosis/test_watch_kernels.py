@@ -33,19 +33,19 @@ from beaver_ftc.diagnosis.watch import (
     WATCH,
     YES,
 )
-from beaver_ftc.plant.instruments import ALTITUDE, ENGINE_SPEED, MANIFOLD, N_SENSORS, PHI
+from beaver_ftc.plant.instruments import ALTITUDE, AX, ENGINE_SPEED, MANIFOLD, N_SENSORS, PHI
 from beaver_ftc.plant.readings import MEASURED
 
 H = 0.005
-MISSING = np.dtype([("missing", "i8", (N_SENSORS,))], align=True)
-GYROS = (0, 1, 2)
+MISSING = np.dtype([("missing", "i8", (N_SENSORS,)), ("signal", "f8", (N_SENSORS,))], align=True)
+GYROS, FORCES = (0, 1, 2), (AX, AX + 1, AX + 2)
 
 
 def new_watch(**fields):
     watch = np.zeros(1, WATCH).view(np.recarray)[0]
     watch["enabled"], watch["instants"], watch["named"], watch["follows"] = 1, 4, NOBODY, 1.0
     watch["step"]["h"], watch["step"]["decay"], watch["alarmed_at_s"] = H, (0.0, 0.9, 0.99), -1.0
-    watch["step"]["test"]["bound"] = 1.0
+    watch["step"]["test"]["bound"], watch["longest_still"] = 1.0, 3
     for name, value in fields.items():
         watch[name] = value
     return watch
@@ -78,6 +78,7 @@ def suspects(shares, lead=None, **fields):
     """Who can have brought the tests here."""
     watch = with_shares(shares, **fields)
     watch["lead"] = max(shares, key=shares.get) if lead is None else lead
+    watching.note_fired(watch)
     watching.suspect(watch)
     return set(np.flatnonzero(watch["suspect"]).tolist())
 
@@ -85,15 +86,15 @@ def suspects(shares, lead=None, **fields):
 @pytest.mark.parametrize(
     ("shares", "who"),
     [
-        ({SPEED: 2.0}, {AIRSPEED}),
+        ({SPEED: 2.0}, {AIRSPEED, *FORCES}),
         ({DENSITY: 3.0, SPEED: 2.0}, {AIRSPEED}),
         ({CLIMB: 2.0}, {ALTITUDE}),
         ({RPM: 2.0}, {ENGINE_SPEED}),
         ({PRESSURE: 2.0}, {MANIFOLD}),
-        ({ALPHA_FLOW: 5.0}, {ALPHA}),
-        ({BETA_FLOW: 5.0}, {BETA}),
-        ({ALPHA_FLOW: 2.0}, {ALPHA, 1}),  # its gyro need not show yet: within twice both bounds
-        ({BETA_FLOW: 2.0}, {BETA, 2}),
+        ({ALPHA_FLOW: 5.0}, {ALPHA, *FORCES}),
+        ({BETA_FLOW: 5.0}, {BETA, *FORCES}),
+        ({ALPHA_FLOW: 2.0}, {ALPHA, 1, *FORCES}),  # its gyro need not show yet: within twice both bounds
+        ({BETA_FLOW: 2.0}, {BETA, 2, *FORCES}),
         ({ALPHA_FLOW: 5.0, TURN + 1: 2.0}, {1}),
         ({BETA_FLOW: 5.0, TURN + 2: 2.0}, {2}),
         ({TURN: 2.0}, {0}),

@@ -10,6 +10,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import beaver_ftc
@@ -17,7 +18,9 @@ from beaver_ftc.control.oracle import true_faults_dtype
 from beaver_ftc.control.state import control_dtype
 from beaver_ftc.diagnosis.belief import belief_dtype
 from beaver_ftc.diagnosis.state import diagnosis_dtype
+from beaver_ftc.loop.loop import Loop
 from beaver_ftc.plant.sensing import MEASURED, truth_dtype
+from beaver_ftc.scenario.given import load
 
 PROGRAM = """
 import json, sys
@@ -59,11 +62,14 @@ STUCK = [{"actuator": "elevator", "type": "stuck", "at_s": 0.3}]
 LOSS = [{"actuator": "aileron", "type": "loss_of_effectiveness", "magnitude": 0.8, "at_s": 0.3}]
 COMMON = {"name": "watched", "duration_s": 0.8, "rate_hz": 20}
 GYRO = [{"sensor": "q", "type": "bias", "magnitude": 2, "at_s": 0.3}]
+WEIGHED = {"fault_class": "all", "statistical": {}, "bounds": {"turbulence": "light"}}
 FLIGHTS = [
     {"faults": GYRO, "sensors": {"V": {"bias_mps": 1.0}}},
     {"faults": STUCK, "fdi": {"fault_class": "all", "pairs": True}},
     {"faults": STUCK, "control": {"law": "oracle"}},
     {"faults": LOSS, "fdi": {"statistical": {}, "bounds": {"turbulence": "light"}}},
+    {"faults": STUCK, "sensors": {"az": {"bias_mps2": 0.1}}, "fdi": WEIGHED},
+    {"faults": [{"sensor": "az", "type": "scale", "magnitude": 0.3, "at_s": 0.3}], "fdi": WEIGHED},
 ]
 
 
@@ -102,6 +108,21 @@ def test_what_is_meant_to_see_the_truth_does(calls):
 def test_the_truth_has_a_type_of_its_own():
     others = belief_dtype(4), diagnosis_dtype(4), control_dtype(4), true_faults_dtype(4), MEASURED
     assert truth_dtype(4) not in others
+
+
+def test_forces_are_those_of_the_accelerometers(calls):
+    """What is weighed has the errors of the instruments, as what is compared with the model has."""
+    assert of(calls, "diagnosis")["beaver_ftc.diagnosis.forces.look"] == [["other", "plain"]]
+    errors = {"ax": {"bias_mps2": 0.3}, "ay": {"scale_error": -0.5}, "az": {"quantum_mps2": 2.0}}
+    given = {"name": "x", "duration_s": 0.5, "reference": {}, "fdi": WEIGHED}
+    true, read = (Loop(load(given | {"sensors": sensors})) for sensors in ("ideal", errors))
+    for loop in (true, read):
+        loop.fly_frames(1, 0)
+    force, seen = (loop.frames["measured"]["force"][0].copy() for loop in (true, read))
+    assert force[2] < -5.0
+    assert seen == pytest.approx([force[0] + 0.3, 0.5 * force[1], 2.0 * np.round(force[2] / 2.0)])
+    for loop in (true, read):
+        loop.release()
 
 
 @pytest.mark.parametrize("folder", ["diagnosis", "control"])

@@ -5,7 +5,7 @@ import pytest
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.assembly import assemble
-from beaver_ftc.plant.instruments import NOISE_LIMIT_SIGMA, SIGNALS, read_all
+from beaver_ftc.plant.instruments import AX, NOISE_LIMIT_SIGMA, SIGNALS, read_all, read_forces
 from beaver_ftc.scenario.schema import Scenario
 
 TRAVEL_RAD = np.array([[-0.52, -0.49, -0.44, -0.1], [0.52, 0.49, 0.44, 1.03]])
@@ -94,3 +94,58 @@ def test_a_delay_longer_than_the_line_is_refused():
     given = {"name": "x", "rate_hz": 1000, "substeps": 2, "sensors": {"p": {"delay_s": 1.0}}}
     with pytest.raises(BadInput, match=r"sensors\.p\.delay_s"):
         assemble(Scenario.model_validate(given), np.zeros(4), TRAVEL_RAD)
+
+
+def forces_read(truth, seed=1, **sensors):
+    """Readings of accelerometers (n, 3), and of the others beside them (n, 13), of truth (n, 16)."""
+    scenario = Scenario.model_validate({"name": "x", "seed": seed, "rate_hz": 100, "sensors": sensors})
+    instruments = assemble(scenario, np.zeros(4), TRAVEL_RAD)["instruments"][0]
+    readings = truth.copy()
+    for row in readings:
+        read_all(instruments, row)
+        read_forces(instruments, row)
+    return readings[:, AX:], readings[:, :AX]
+
+
+def in_flight(n):
+    return np.hstack([still(n), np.tile([0.1, 0.05, 1.0, 1800.0, 1800.0, 20.0, 0.5, 0.2, -9.8], (n, 1))])
+
+
+def test_accelerometers_have_the_errors_of_the_others():
+    n = 20_000
+    noise = forces_read(in_flight(n), ay={"noise_std_mps2": 0.3})[0][:, 1] - 0.2
+    assert noise.std() == pytest.approx(0.3, rel=5 / np.sqrt(2 * n))
+    assert np.abs(noise).max() <= NOISE_LIMIT_SIGMA * 0.3
+    errors = {"ax": {"scale_error": 0.1}, "ay": {"bias_mps2": -0.7}, "az": {"quantum_mps2": 4.0}}
+    assert forces_read(in_flight(1), **errors)[0][0] == pytest.approx([0.55, -0.5, -8.0])
+    ramp = in_flight(400)
+    ramp[:, AX] = 0.03 * np.arange(400)
+    assert ramp[399, AX] - forces_read(ramp, ax={"delay_s": 0.037})[0][399, 0] == pytest.approx(3.0 * 0.037)
+    exact, others = forces_read(in_flight(3), p={"noise_std_deg_s": 1.0})
+    assert (exact == in_flight(3)[:, AX:]).all()
+    assert (others[:, 0] != 0.1).all()
+
+
+def test_accelerometers_draw_from_a_counter_of_their_own():
+    """The noise of the others is the same to the bit whether they are noisy, or read, or not."""
+    noisy = {"q": {"noise_std_deg_s": 1.0}, "phi": {"noise_std_deg": 1.0}}
+    alone = forces_read(in_flight(50), **noisy)[1]
+    beside = forces_read(in_flight(50), **noisy, az={"noise_std_mps2": 1.0, "dropout_share": 0.5})[1]
+    assert (alone == beside).all()
+    assert (samples(still(50), q={"noise_std_deg_s": 1.0}) == alone[:, : len(SIGNALS)]).all()
+    first, again, other = (
+        forces_read(in_flight(50), seed=s, az={"noise_std_mps2": 1.0})[0] for s in (7, 7, 8)
+    )
+    assert (first == again).all()
+    assert (first[:, 2] != other[:, 2]).all()
+
+
+def test_a_first_sample_is_the_first_whenever_it_is_taken():
+    """Accelerometers that are read from some instant on do not lag behind what they never saw."""
+    scenario = Scenario.model_validate({"name": "x", "sensors": {"az": {"bandwidth_rad_s": 5.0}}})
+    instruments = assemble(scenario, np.zeros(4), TRAVEL_RAD)["instruments"][0]
+    for row in in_flight(10):
+        read_all(instruments, row)
+    last = in_flight(1)[0]
+    read_forces(instruments, last)
+    assert last[AX + 2] == -9.8

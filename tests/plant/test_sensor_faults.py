@@ -70,3 +70,10 @@ def test_it_says_when_to_come_again():
 
 def test_magnitudes_are_in_the_units_of_the_page():
     assert (si("p"), si("alpha"), si("V"), si("engine_rpm")) == (np.pi / 180, np.pi / 180, 1.0, 1.0)
+
+
+def test_an_accelerometer_s_fault_is_in_metres_a_second_squared():
+    broken, schedule = schedule_of({"sensor": "az", "type": "bias", "magnitude": 2, "at_s": 0})
+    schedule.apply(0)
+    assert si("az") == 1.0
+    assert read(broken, -9.8, "az") == (pytest.approx(-7.8), False)

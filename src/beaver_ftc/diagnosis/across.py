@@ -23,6 +23,10 @@ rolling one, which no vane shows.
 An error of a vane moves a rate and its force as well, and so do gusts that it makes up. So where vanes are
 asked a surface is excluded only once something shows that is no vane's doing: across the vane's column, the
 gust being that which the forces say, or in the force at the angle of inertial motion.
+
+A broken accelerometer moves a force and no rate. Where accelerometers may break (air.read: they are taken at
+their word) a force raises no alarm, so that it counts once the rates alone have raised it, and no gust is
+known by them. Known to be broken, or suspected of it, they count no more.
 """
 
 import numpy as np
@@ -52,7 +56,8 @@ LEAST_LENGTH = 0.1  # of a column: errors larger than that are not reckoned with
 def part(fdi, view, innovation, i):
     """Component i of what is looked at, rad/s2: of the rates' innovation (3,), or of a force's."""
     if i < SIDE:
-        return innovation[i] - (gust_of(fdi.statistical, view).mean[i] if view.cleared_by > 0 else 0.0)
+        gust = gust_of(fdi.statistical, view).mean[i] if told(fdi.statistical, view) else 0.0
+        return innovation[i] - gust
     force = fdi.statistical.forces.component[i - SIDE]
     return force.inertial if view.inertial else force.innovation
 
@@ -87,6 +92,18 @@ def turn(fdi, view, G):
 
 
 @kernel
+def told(statistical, view):
+    """Whether a view is told the gust: only one that the measured force clears of broken surfaces."""
+    return view.cleared_by > 0 and statistical.air.read == 1
+
+
+@kernel
+def weighs(view):
+    """Whether there is a force in a view."""
+    return view.mix[SIDE] != 0.0 or view.mix[SIDE + 1] != 0.0
+
+
+@kernel
 def gust_of(statistical, view):
     """The air by which a view knows the gust: that the vanes show, or that follows without them."""
     return statistical.inertial_air if view.clears else statistical.air
@@ -114,6 +131,8 @@ def blur(view, statistical, V):
     for i in range(3):
         noise += m[i] * m[i] * statistical.block[PITCH_BLOCK if i == PITCH else LATERAL].noise[i // 2]
         jitter += abs(m[i]) * np.sqrt(statistical.jitter[i])
+        if view.clears:
+            jitter += abs(m[i]) * statistical.forces.blurred[i]
         bound += abs(m[i]) * statistical.bounded[i]
     for f in range(2):
         force = statistical.forces.component[f]
@@ -123,10 +142,10 @@ def blur(view, statistical, V):
         bound += abs(m[SIDE + f]) * force.deflection * strength
     if statistical.air.moving:
         feel_gust(view, statistical)
-        if view.cleared_by > 0:
+        if told(statistical, view):
             drift += air.drift_beside(gust_of(statistical, view), V, view.by_rates, view.by_forces)
         else:
-            drift += air.whole_drift(statistical.air, V, view.by_rates)
+            drift += air.whole_drift(statistical.air, V, view.by_rates, view.by_forces)
         for i in range(3):
             for j in range(3):
                 block.P_dd[0, 0] += m[i] * m[j] * statistical.air.leap[i, j]
@@ -182,6 +201,9 @@ def observe(fdi, innovation, G, Gu, V, frame, latched):
     for a in range(statistical.n_views):
         view = statistical.views[a]
         block, m, share = view.block, view.mix, 0.0
+        if weighs(view) and not statistical.forces.known:
+            view.held = 0.0
+            continue
         if view.surface != AN_AXIS:
             share = turn(fdi, view, G)
         if not latched:
@@ -225,7 +247,9 @@ def best(block):
 def shown(statistical, view):
     """The score of what goes on in a view and is no vane's doing: no vane moves the rates alone. What a force
     shows, and what clears the vane, may come a moment apart. The latter asks for the naming level."""
-    if view.clears or view.cleared_by == 0:
+    if weighs(view) and not statistical.forces.known:
+        return 0.0
+    if view.clears or not (weighs(view) or told(statistical, view)):
         return best(view.block)
     cleared = 0.0
     for a in range(statistical.n_views):
@@ -236,9 +260,11 @@ def shown(statistical, view):
 
 
 @kernel
-def alarms(view):
-    """Whether a view raises the alarm: one of little but a force, which no block of the rates looks at."""
-    return view.surface >= 0 and view.plane[1] >= SIDE and abs(view.mix[view.plane[1]]) > MOSTLY
+def alarms(statistical, view):
+    """Whether a view raises the alarm: one of little but a force, which no block of the rates looks at, of
+    accelerometers that do not break."""
+    mostly = view.plane[1] >= SIDE and abs(view.mix[view.plane[1]]) > MOSTLY
+    return view.surface >= 0 and mostly and statistical.air.read == 1
 
 
 @kernel

@@ -260,12 +260,13 @@ def elapse(air, share):
 
 
 @kernel
-def whole_drift(air, V, felt):
-    """Intensity, (rad/s2)2/s, of all of the air's rotation where it is `felt` (3,) 1/s about the body axes:
-    of one who does not ask the vanes."""
+def whole_drift(air, V, felt, by_forces):
+    """Intensity, (rad/s2)2/s, of all of the air's rotation where rates feel it, `felt` (3,) 1/s about the
+    body axes, and forces do: of one who does not ask the vanes."""
     total, longest_s = 0.0, air.rolling / V
     for g in range(3):
-        total += along(felt, air.axes, g) ** 2 * air.per_metre[g]
+        by_both = abs(along(felt, air.axes, g)) + abs(along(by_forces, air.axes, g))
+        total += by_both**2 * air.per_metre[g]
         if air.swings:
             total += 0.5 * longest_s * longest_s * air.per_metre[g] * along(felt, air.swing, g) ** 2
     return total * V

@@ -7,7 +7,8 @@ Across and normal to the body, i = Y, Z, and as if it acted at the chord c,
 
 with C_i at the measured flow and at the surfaces as commanded. A fault of a surface moves e beside the
 angular acceleration in the ratio of its terms, and so does a vane that is off, in a ratio of its own. Terms
-of forces have the tolerance declared of those of moments, and a force as a whole that of the mass.
+of forces have the tolerance declared of those of moments, and a force as a whole that of the mass. Of the
+accelerometers themselves noise is jitter, and a bias and a slope are tolerated as declared.
 
 The side force has a term in the rate of sideslip. It follows from the accelerometers, and JSBSim takes that
 of the run before.
@@ -24,6 +25,7 @@ from beaver_ftc.diagnosis.admitted import GUST_FT_S
 from beaver_ftc.diagnosis.redundancy import FALLING_M_S2
 from beaver_ftc.plant.instruments import SIGNALS
 from beaver_ftc.scenario.diagnosis import Bounds
+from beaver_ftc.scenario.sensors import ACCELEROMETERS, Sensors
 from beaver_ftc.scenario.warnings import MASS_TOLERANCE
 
 SIDE, UP = range(2)  # across the body, and normal to it
@@ -33,7 +35,8 @@ EARTH_RATE_RAD_S = 7.3e-5
 LIVELY_RAD_S, STEEP_RAD = 0.2, 0.3  # rates and slope of the path that a drift is reckoned with
 CHANGES = 0.3  # what of a drift may be another a second later
 RATE_TOLERANCE = {False: 0.05, True: 0.2}  # of the term in the rate of sideslip: gusts have a part in it
-MAX_ERRORS = MAX_TERMS_OF_ONE + 2  # the rate of sideslip and the force as a whole come last
+# The rate of sideslip, the bias of the accelerometer and the force as a whole come last.
+MAX_ERRORS = MAX_TERMS_OF_ONE + 3
 
 FORCE = np.dtype(
     [
@@ -45,6 +48,7 @@ FORCE = np.dtype(
         ("column", "f8", (MAX_SURFACES,)), ("moment", "f8", (MAX_SURFACES,)), ("own", "f8", (MAX_SURFACES,)),
         ("vane", "f8", (2,)),  # of an error of its vane: angular acceleration, and e, per rad
         ("quiet", "f8", (2,)), ("jitter", "f8", (2,)), ("damping", "f8", (3,)), ("deflection", "f8"),
+        ("felt", "f8"),  # variance of e by noise of the accelerometer, which the pressure does not scale
         ("n", "i8"), ("tolerance", "f8", (MAX_ERRORS,)), ("regressor", "f8", (MAX_ERRORS,)),
     ],
     align=True,
@@ -56,6 +60,7 @@ FORCES_FELT = np.dtype(
         ("strength", "f8"),  # of the pressure, as a share of trim: so much more do forces than stands here
         # coefficient of the rate of sideslip; rates of sideslip and incidence, rad/s, of the instant before
         ("of_rate", "f8"), ("rate", "f8", (2,)), ("begun", "i8"),
+        ("blurred", "f8", (3,)),  # rad/s2: what their noise adds to the gust that follows from them
         ("y", "f8", (N_Y,)), ("component", FORCE, (2,)),
     ],
     align=True,
@@ -84,6 +89,12 @@ def without_vanes(forces, rotation, y):
         for k in range(3):
             damped += force.damping[k] * rotation[k]
         forces.y[place] -= (force.innovation / forces.strength + damped) / force.vane[1]
+
+
+@kernel
+def do_without(statistical):
+    """Weigh no force from now on, and follow the gust without accelerometers."""
+    statistical.forces.known = statistical.air.read = statistical.inertial_air.moving = 0
 
 
 @kernel
@@ -120,7 +131,7 @@ def look_along(forces, air, f, measured, u):
     force.innovation = measured.force[1 + f] * forces.per_m - whole
     by_pressure = whole * forces.pressure_noise / measured.y[QDYN]
     for k in range(2):
-        force.jitter[k] = force.quiet[k] * forces.strength**2 + by_pressure * by_pressure
+        force.jitter[k] = force.quiet[k] * forces.strength**2 + by_pressure * by_pressure + force.felt
 
 
 @kernel
@@ -166,10 +177,11 @@ def set_up_forces(
     aircraft: Aircraft,
     trim: tuple[np.ndarray, np.ndarray, np.ndarray],
     along_y: np.ndarray,
+    dt_s: float,
 ) -> None:
     """Fill the record of forces that are `known` from what is declared; trim: x (3,) rad/s, y, u rad.
 
-    along_y (3, y.size): the slopes of the angular accelerations with y.
+    along_y (3, y.size): the slopes of the angular accelerations with y. dt_s: of a frame.
     """
     y = trim[1]
     forces, air, size = statistical["forces"], statistical["air"], aircraft.geometry
@@ -185,12 +197,14 @@ def set_up_forces(
         force["damping"] = slopes[3:]
         parts = (slopes * _noise(bounds, ("alpha", "beta", "V", *SIGNALS[:3]))) ** 2
         force["quiet"] = parts.sum(), parts.sum() - parts[vane]
-        _set_up_tolerances(force, bounds, terms, y, slopes[vane] / scale, f)
+        noise = _noise(bounds, ACCELEROMETERS)[1 + f]
+        force["felt"] = (forces["per_m"] * noise) ** 2
+        _set_up_tolerances(force, bounds, terms, y, slopes[vane] / scale, f, forces["per_m"])
         turned = scale * sum(abs(term.value) for term in terms if term.surface)
         force["deflection"] = turned * np.radians(bounds.deflection_deg)
         force["drift"] = _drift(bounds, air["gravity"], y[AIRSPEED], f)
         gusts = 3.0 * (0.3048 * GUST_FT_S[bounds.turbulence]) ** 2 / (air["scale"] * y[AIRSPEED])
-        wander = (CHANGES * force["drift"]) ** 2
+        wander = (CHANGES * force["drift"]) ** 2 + dt_s * (noise / y[AIRSPEED]) ** 2
         force["wander"] = slopes[vane] ** 2 * (wander + gusts)
 
 
@@ -201,8 +215,16 @@ def _drift(bounds: Bounds, gravity: float, airspeed_mps: float, f: int) -> float
     tilt = abs(sensors.phi.noise_bias_quantum[1]) + abs(sensors.theta.noise_bias_quantum[1])
     gyros = [getattr(sensors, name) for name in SIGNALS[:3]]
     turning = sum(abs(gyro.noise_bias_quantum[1]) + LIVELY_RAD_S * abs(gyro.scale_error) for gyro in gyros)
-    falls = gravity * tilt * (STEEP_RAD if f == UP else 1.0) + FALLING_M_S2
+    falls = gravity * tilt * (STEEP_RAD if f == UP else 1.0) + FALLING_M_S2 + _misfelt(sensors, gravity, f)
     return float(EARTH_RATE_RAD_S + turning + falls / airspeed_mps)
+
+
+def _misfelt(sensors: Sensors, gravity: float, f: int) -> float:
+    """How far accelerometers can be off across the flow in level flight, m/s2: that of the axis, and of the
+    one ahead as much as the flow's angle lets it."""
+    ahead, own = sensors.ax, (sensors.ay, sensors.az)[f]
+    bias = abs(own.noise_bias_quantum[1]) + STEEP_RAD * abs(ahead.noise_bias_quantum[1])
+    return bias + gravity * (abs(own.scale_error) if f == UP else 0.0)
 
 
 def _noise(bounds: Bounds, names: tuple[str, ...]) -> np.ndarray:
@@ -211,9 +233,10 @@ def _noise(bounds: Bounds, names: tuple[str, ...]) -> np.ndarray:
 
 
 def _set_up_tolerances(
-    force: np.void, bounds: Bounds, terms: list[Term], y: np.ndarray, of_vane: float, f: int
+    force: np.void, bounds: Bounds, terms: list[Term], y: np.ndarray, of_vane: float, f: int, per_m: float
 ) -> None:
-    """Of each term: that of the coefficients, and what constant errors of vane and pressure do."""
+    """Of each term: that of the coefficients, and what constant errors of vane and pressure do; of the
+    accelerometer's bias, m/s2; of the whole."""
     given, sensors = bounds.coefficients, bounds.sensors
     vane = sensors.alpha if f == UP else sensors.beta
     share = max(given.values(), default=0.0) if isinstance(given, dict) else given
@@ -225,7 +248,10 @@ def _set_up_tolerances(
     n = len(terms)
     if f == SIDE:
         force["tolerance"][n], n = share + RATE_TOLERANCE[bounds.turbulence != "none"], n + 1
-    force["tolerance"][n], force["n"] = MASS_TOLERANCE, n + 1
+    felt = sensors.az if f == UP else sensors.ay
+    if felt.noise_bias_quantum[1]:
+        force["tolerance"][n], force["regressor"][n], n = abs(felt.noise_bias_quantum[1]), per_m, n + 1
+    force["tolerance"][n], force["n"] = MASS_TOLERANCE + abs(felt.scale_error), n + 1
 
 
 def _value(aircraft: Aircraft, name: str, at: tuple[np.ndarray, np.ndarray, np.ndarray]) -> float:

@@ -11,7 +11,7 @@ of it, for the diagnosis and for the laws; it is not trusted again in the flight
 """
 
 from beaver_ftc.compiled import kernel
-from beaver_ftc.diagnosis import bank, redundancy
+from beaver_ftc.diagnosis import accelerometers, bank, redundancy
 from beaver_ftc.diagnosis.stand_in import replace
 from beaver_ftc.diagnosis.state import NOT_ISOLATED
 from beaver_ftc.diagnosis.thresholds import bound_step
@@ -54,6 +54,7 @@ def attend(watch, fdi, belief, measured, t):
     if watch.past == 0:
         follow_rates(watch, fdi)
     redundancy.check(step, signal, watch.engine)
+    accelerometers.note_stillness(watch, signal)
     if watch.past == 0:
         watch.error_then[:], watch.spike_then[:] = watch.error, watch.spike
         watch.spike[:] = 0.0
@@ -67,6 +68,8 @@ def attend(watch, fdi, belief, measured, t):
         clear_gyros(watch)
     decide(watch, fdi, measured, t)
     replace(watch, belief, measured)
+    accelerometers.spoil(watch, measured)
+    watch.earlier[:] = step.then
     redundancy.look(step, signal, measured.force)
     watch.past = (watch.past + 1) % watch.instants
 
@@ -78,6 +81,7 @@ def begin(watch, measured):
     step = watch.step
     redundancy.note_declared(step, measured.signal)
     redundancy.look(step, measured.signal, measured.force)
+    watch.earlier[:] = step.then
     step.acceleration_then[:] = step.acceleration
     redundancy.allow(step, measured.signal)
     for c in range(N_TESTS):
@@ -136,6 +140,8 @@ def decide(watch, fdi, measured, t):
     if watch.alarmed:
         if watch.past == 0:
             ask_rates(watch, fdi)
+        note_fired(watch)
+        accelerometers.weigh(watch, measured.signal)
         suspect(watch)
         left, last = 0, NOBODY
         for i in range(N_SENSORS):
@@ -220,19 +226,27 @@ def involved(watch, c, first):
 
 
 @kernel
-def suspect(watch):
-    """Fill suspect (N_SENSORS,) with the instruments that can have brought the tests here."""
-    who, lead = watch.suspect, watch.lead
+def note_fired(watch):
+    """Note the tests that have been beyond their bounds since the alarm."""
     for c in range(N_TESTS):
         triple = TURN if c < ANGLE else ANGLE
         beyond = involved(watch, c, triple) if c < SPEED else watch.step.test[c].share > 1.0
         if beyond:
             watch.fired[c] = 1
-    fired = watch.fired
+
+
+@kernel
+def suspect(watch):
+    """Fill suspect (N_SENSORS,) with the instruments that can have brought the tests here."""
+    who, lead, fired = watch.suspect, watch.lead, watch.fired
     who[:] = 0
     if lead < SPEED:
         suspect_attitude(watch)
-    who[AIRSPEED] = lead == SPEED or (lead == DENSITY and (fired[SPEED] == 1 or not would_show(watch)))
+    if lead == SPEED:
+        accelerometers.suspect_accelerometers(watch, False)
+        who[AIRSPEED] = not watch.cleared[AIRSPEED]
+    elif lead == DENSITY:
+        who[AIRSPEED] = fired[SPEED] == 1 or not would_show(watch)
     who[QDYN] = lead == DENSITY and fired[SPEED] == 0
     suspect_vane(watch, ALPHA, ALPHA_FLOW, 1)
     suspect_vane(watch, BETA, BETA_FLOW, 2)
@@ -242,14 +256,16 @@ def suspect(watch):
 
 @kernel
 def suspect_vane(watch, vane, flow, gyro):
-    """A vane, or the gyro that moves the flow as well, if its error need not show in the attitude yet."""
+    """A vane, an accelerometer, or the gyro that moves the flow as well, if its error need not show in the
+    attitude yet."""
     if watch.lead != flow:
         return
     test, turn, shown = watch.step.test[flow], watch.step.test[TURN + gyro], watch.fired[TURN + gyro] == 1
     hidden = True
     for m in range(test.filtered.size):
         hidden = hidden and abs(test.filtered[m]) <= 2.0 * (turn.bound[m] + test.bound[m])
-    watch.suspect[vane] = not shown
+    accelerometers.suspect_accelerometers(watch, shown)
+    watch.suspect[vane] = not (shown or watch.cleared[vane])
     watch.suspect[gyro] = shown or hidden
 
 

@@ -44,6 +44,7 @@ UNSEEN = (1.0, 0.003, 0.03)
 # matter is in docs/theory.md, section 7.
 CHANCE = 0.5
 BY_FORCE = 0.01  # share of the intensity that errors of a tenth leave of the gusts that forces show
+TWO_STEPS = 1.6  # times its noise does an acceleration scatter by Adams and Bashforth: sqrt(1.5^2 + 0.5^2)
 LEAST_NOISE_RAD_S = 1e-9  # of a gyro: exact ones are still doubles, and a variance no difference of zeros
 Start = tuple[np.ndarray, np.ndarray, np.ndarray]  # x (3,) rad/s, y (5,) and u (4,) rad in trim
 _GYRO_OF = dict(zip(RATE_SIGNALS, AXES, strict=True))
@@ -125,9 +126,11 @@ def set_up(
     set_up_readings(statistical, config.bounds.sensors, fdi["bound"]["admitted"])
     if across_a_column(config, int(fdi["instants"])):
         if forces:
-            set_up_forces(statistical, config.bounds, aircraft, start, jacobian(design, *start)[3])
-            statistical["air"]["read"] = 1
+            along_y = jacobian(design, *start)[3]
+            set_up_forces(statistical, config.bounds, aircraft, start, along_y, 1.0 / rate_hz)
+            statistical["air"]["read"] = not fdi["watch"]["enabled"]  # which may find them broken
             statistical["inertial_air"] = statistical["air"]
+            statistical["inertial_air"]["moving"] *= statistical["air"]["read"]
             statistical["inertial_air"]["unseen"] = np.minimum(np.add(UNSEEN, BY_FORCE), 1.0)
         set_up_views(statistical, aircraft)
     block = statistical["block"][-1]
@@ -135,8 +138,7 @@ def set_up(
     if statistical["air"]["moving"]:
         block["stronger"] = (statistical["air"]["rolling"] / block["lag"]) ** 2
         span_m = aircraft.geometry.span_m
-        for name in ("own_jitter", "jitter"):
-            statistical[name] += _gust_jitter(config.bounds.sensors, design, start, span_m) ** 2
+        _set_up_gust_jitter(statistical, config.bounds.sensors, design, start, span_m, 1.0 / rate_hz)
 
 
 def _set_up_blocks(statistical: np.void, sensors: Sensors, aircraft: Aircraft) -> None:
@@ -310,12 +312,32 @@ def gust_drift(turbulence: str, span_m: float) -> np.ndarray:
     return np.array([rolling, velocity * (pi / (4 * b)) ** 2, velocity * (pi / (3 * b)) ** 2])
 
 
-def _gust_jitter(sensors: Sensors, design: np.void, start: Start, span_m: float) -> np.ndarray:
-    """Standard deviation, rad/s2 on each axis, of what the vanes' noise adds to the gust they see."""
+def _set_up_gust_jitter(
+    statistical: np.void, sensors: Sensors, design: np.void, start: Start, span_m: float, dt_s: float
+) -> None:
+    """What noise adds to the gust that is followed: that of the vanes, and of the force that moves the air's
+    velocity on from frame to frame; where the flow follows from the forces, that of the forces too."""
+    flow = _flow_noise(sensors, start[1][AIRSPEED])
+    if statistical["forces"]["known"]:
+        forces = statistical["forces"]["component"][::-1]  # normal to the body, and across
+        felt = np.array([random_error(sensors, "az"), random_error(sensors, "ay")])
+        flow += TWO_STEPS * felt * dt_s / start[1][AIRSPEED]
+        by_force = np.sqrt(forces["felt"]) / np.abs(forces["vane"][:, 1])
+        statistical["forces"]["blurred"] = _gust_jitter(by_force, design, start, span_m)
+    for name in ("own_jitter", "jitter"):
+        statistical[name] += _gust_jitter(flow, design, start, span_m) ** 2
+
+
+def _flow_noise(sensors: Sensors, airspeed_mps: float) -> np.ndarray:
+    """Of the flow's angles (2,) as the vanes and the airspeed have them, standard deviation in rad."""
+    speed = 0.3 * random_error(sensors, "V") / airspeed_mps  # through attitudes of up to 17 deg
+    return np.array([random_error(sensors, "alpha"), random_error(sensors, "beta")]) + speed
+
+
+def _gust_jitter(flow: np.ndarray, design: np.void, start: Start, span_m: float) -> np.ndarray:
+    """Standard deviation, rad/s2 on each axis, of what noise of the flow's angles (2,) rad adds to a gust."""
     _, y, u = start
     V, b = y[AIRSPEED], span_m
-    speed = 0.3 * random_error(sensors, "V") / V  # through attitudes of up to 17 deg
-    pitching = (random_error(sensors, "alpha") + speed) * pi * V / (4 * b)
-    yawing = (random_error(sensors, "beta") + speed) * pi * V / (3 * b)
+    pitching, yawing = flow * pi * V / (np.array([4.0, 3.0]) * b)
     damping = jacobian(design, np.zeros(3), y, u)[2]  # without rates all of it is aerodynamic
     return np.sqrt((damping[:, 1] * pitching) ** 2 + (damping[:, 2] * yawing) ** 2)

@@ -38,7 +38,7 @@ from beaver_ftc.diagnosis.watch import (
     Q,
     R,
 )
-from beaver_ftc.plant.instruments import ALTITUDE, ENGINE_SPEED, MANIFOLD, N_SENSORS, PHI
+from beaver_ftc.plant.instruments import ALTITUDE, AX, ENGINE_SPEED, MANIFOLD, N_SENSORS, PHI
 
 TURNING_RAD_S = 4e-5  # Earth rate is in the rates; the level turns with the flight over the round Earth
 FALLING_M_S2 = 0.03  # Coriolis, centrifugal, and gravity's change with place
@@ -162,6 +162,16 @@ def compare(step, signal):
 
 
 @kernel
+def misfelt(step):
+    """How far off accelerometers can be, m/s2: what of it changes counts twice, by the two steps of Adams and
+    Bashforth."""
+    total = 0.0
+    for i in range(3):
+        total += (2.0 * step.error[AX + i] - step.steady[AX + i]) ** 2
+    return np.sqrt(total)
+
+
+@kernel
 def allow(step, signal):
     """Fill what sound instruments with the declared errors may add to each residual: per second, at all."""
     test, e, n = step.test, step.error, step.changing
@@ -178,6 +188,7 @@ def allow(step, signal):
     test[TURN + 1].noise = n[THETA] + (banked + turning * step.h) * n[PSI]
     test[TURN + 2].noise = n[PSI] + (banked + turning * step.h) * n[THETA]
     acceleration = FALLING_M_S2 + step.gravity * (e[PHI] + e[THETA]) + step.size * (e[ALPHA] + e[BETA])
+    acceleration += misfelt(step)
     flow = (acceleration + step.size * e[AIRSPEED] / V) / V + rates + turning * (e[ALPHA] + e[BETA])
     test[SPEED].air, test[ALPHA_FLOW].air, test[BETA_FLOW].air = 1.0, 1.0 / V, 1.0 / V
     test[SPEED].rate, test[SPEED].noise = acceleration, n[AIRSPEED]

@@ -145,6 +145,8 @@ def look_ahead(fdi, belief, measured, k):
             air.observe(fdi.statistical.air, measured.y, measured.attitude, belief.share * fdi.dt)
         else:
             air.begin(fdi.statistical.air, measured.y, measured.attitude)
+    if fdi.statistical.forces.known and not measured.inertial:
+        forces.do_without(fdi.statistical)
     if fdi.statistical.forces.known:
         weigh_forces(fdi, belief, measured, k)
     statistical.prepare(fdi.statistical, fdi, belief.design, measured.x, measured.y, belief.u)

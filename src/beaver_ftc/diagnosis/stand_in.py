@@ -4,7 +4,7 @@ import numpy as np
 
 from beaver_ftc.compiled import kernel
 from beaver_ftc.diagnosis.watch import AIRSPEED, ALPHA, BETA, QDYN, TURN
-from beaver_ftc.plant.instruments import ENGINE_SPEED, N_SENSORS
+from beaver_ftc.plant.instruments import AX, ENGINE_SPEED, MANIFOLD, N_SENSORS
 from beaver_ftc.plant.readings import note_slipstream, share_out
 
 QUICK_PER_S = 10.0  # the second of watch.POLES_PER_S
@@ -13,14 +13,15 @@ FORGETTING_S = 20.0  # of a vane that is replaced, back to trim: kinematics alon
 
 @kernel
 def replace(watch, belief, measured):
-    """Put what the other instruments say in the place of those that are named or missing."""
+    """Put what the other instruments say in the place of those that are named or missing. Accelerometers are
+    not replaced: then none of them is used."""
     signal, changed = measured.signal, 0
     for i in range(N_SENSORS):
         if measured.missing[i]:
             watch.replaced[i] = 1
-        if watch.replaced[i]:
+        if watch.replaced[i] and i < AX:
             signal[i] = stand_in(watch, belief, signal, i)
-            changed = 2 if i in (AIRSPEED, QDYN) or i >= ENGINE_SPEED else max(changed, 1)
+            changed = 2 if i in (AIRSPEED, QDYN, ENGINE_SPEED, MANIFOLD) else max(changed, 1)
     if changed > 0:
         share_out(measured)
     if changed > 1 and watch.engine:

@@ -60,7 +60,7 @@ ESTIMATOR = np.dtype(
 # lies side by side for vector instructions, lane slot * MAX_HYPOTHESES + hypothesis.
 N_SLOTS = 10
 N_READINGS = 5  # alpha, beta, airspeed, dynamic pressure, engine power: readings.py
-MAX_HYPOTHESES, MAX_REGRESSORS = 8, 3 * MAX_TERMS_OF_ONE + 3 + N_READINGS
+MAX_HYPOTHESES, MAX_REGRESSORS = 8, 3 * MAX_TERMS_OF_ONE + 4 + N_READINGS
 MAX_VIEWS = 16
 PITCH_BLOCK, LATERAL, RETURNING = 0, 1, 2  # the last is the second view of roll and yaw
 LANES = N_SLOTS * MAX_HYPOTHESES

@@ -105,7 +105,7 @@ def score(statistical, t):
                 note(statistical, hypothesis.score, hypothesis.axis)
     for a in range(statistical.n_views):
         view = statistical.views[a]
-        if across.alarms(view):
+        if across.alarms(statistical, view):
             note(statistical, across.shown(statistical, view), view.plane[0])
     if statistical.score > 1.0 and statistical.detected_at_s < 0.0:
         statistical.detected_at_s = t
@@ -134,7 +134,7 @@ def record(statistical, row):
                 row[place] = max(row[place], hypothesis.score / statistical.alarm_level)
     for a in range(statistical.n_views):
         view = statistical.views[a]
-        if across.alarms(view):
+        if across.alarms(statistical, view):
             place = row.size - 3 + view.plane[0]
             row[place] = max(row[place], across.shown(statistical, view) / statistical.alarm_level)
 

@@ -58,6 +58,14 @@ WATCH = np.dtype(
         ("blurred", "i8"), ("no_gyro", "i8"),
         ("apart", "f8", (3, len(POLES_PER_S))), ("apart_bound", "f8", (3, len(POLES_PER_S))),
         ("rates_say", "i8", (3,)), ("taken_over", "i8", (3,)),
+        # accelerometers.py: looks with the very same reading, and how many say that it is frozen; readings of
+        # two looks ago; who is cleared
+        ("still", "i8", (N_SENSORS,)), ("longest_still", "i8", (N_SENSORS,)),
+        ("earlier", "f8", (N_SENSORS,)), ("cleared", "i8", (N_SENSORS,)),
+        # since the alarm: residuals of speed, incidence and sideslip, how much of them is sound, least and
+        # most of the readings; the climb that such an incidence makes up; the velocity made up, body axes
+        ("gathering", "i8"), ("gathered", "f8", (3,)), ("sound", "f8", (3,)), ("least", "f8", (3,)),
+        ("most", "f8", (3,)), ("fallen", "f8", (len(POLES_PER_S),)), ("made_up", "f8", (3,)),
         ("step", STEP),
     ],
     align=True,

@@ -108,7 +108,7 @@ class Changing:
         flight."""
         wanted = self._loop.scenario.fdi.sensor_monitor != "never" and fdi["enabled"]
         if self._loop.sensor_schedule.any and wanted and not fdi["watch"]["enabled"]:
-            enable_watch(self._loop, fdi["watch"])
+            enable_watch(self._loop, fdi)
 
     def _note(self, stage: Stage) -> None:
         """Say what is changed, and what becomes of a verdict that ends with it."""

@@ -17,6 +17,7 @@ from beaver_ftc.loop import steps
 from beaver_ftc.loop.direct import direct
 from beaver_ftc.plant import channels as ch
 from beaver_ftc.plant.instruments import (
+    AX,
     ENGINE_SPEED,
     LONGEST_DELAY,
     NOISE_LIMIT_SIGMA,
@@ -31,7 +32,8 @@ from beaver_ftc.scenario.sensors import ENGINE
 GRAVITY_M_S2, EARTH_RADIUS_M = 9.80665, 6_371_000.0
 FASTER = 1.4  # than at the start a flight may become
 TAKEN_OVER_PER_S = 3.0  # by the attitude, of a rate it stands in for, where its own noise is declared
-OTHER_COUNTERS = (0xD1B54A32D192ED03, 0x8CB92BA72F3D8DD7)  # apart from the seed: further noise, faults' noise
+# Apart from the seed: noise of further instruments, of faults, of accelerometers.
+OTHER_COUNTERS = (0xD1B54A32D192ED03, 0x8CB92BA72F3D8DD7, 0xA0761D6478BD642F)
 
 
 def breaks_instruments(scenario: Scenario) -> bool:
@@ -92,9 +94,9 @@ def assemble_instruments(frame: np.void, scenario: Scenario, dt: float) -> None:
 def seed_instruments(instruments: np.void, seed: int) -> None:
     """Let the random numbers of all instruments, further ones and faults, begin with a seed."""
     instruments["random"] = seed
-    instruments["random_further"], instruments["random_fault"] = (
-        np.uint64(seed) ^ np.uint64(counter) for counter in OTHER_COUNTERS
-    )
+    names = "random_further", "random_fault", "random_force"
+    for name, counter in zip(names, OTHER_COUNTERS, strict=True):
+        instruments[name] = np.uint64(seed) ^ np.uint64(counter)
 
 
 def assemble_watch(watch: np.void, scenario: Scenario, h: float) -> None:
@@ -114,10 +116,18 @@ def assemble_watch(watch: np.void, scenario: Scenario, h: float) -> None:
         noise, bias, quantum = sensor.noise_bias_quantum
         step["offset"][i] = NOISE_LIMIT_SIGMA * noise + abs(bias) + quantum / 2
         step["slope"][i], step["steady"][i] = abs(sensor.scale_error), abs(bias)
+        watch["longest_still"][i] = longest_still(noise, quantum)
         step["drift"] = max(step["drift"], abs(getattr(sensor, "drift_rad_s", 0.0)))
     blurred = np.any(step["offset"][PHI : PHI + 3] > step["steady"][PHI : PHI + 3])
     watch["blurred"] = blurred
     watch["follows"] = min(1.0, h * TAKEN_OVER_PER_S) if blurred else 1.0
+
+
+def longest_still(noise: float, quantum: float) -> int:
+    """For how many looks no sound instrument, of this noise and resolution, gives the very same reading."""
+    if quantum == 0.0:
+        return 3
+    return 50 if noise > quantum / 4.0 else 1_000_000_000
 
 
 def admit_engine(admitted: np.void, scenario: Scenario) -> None:
@@ -173,17 +183,20 @@ def watch_from_now(loop: Any) -> None:
     read_more(loop)
     wanted = loop.scenario.fdi.sensor_monitor != "never" and frame["fdi"]["enabled"]
     if wanted and not watch["enabled"]:
-        enable_watch(loop, watch)
+        enable_watch(loop, frame["fdi"])
         if frame["k"] > 0:
-            _read_further(loop, frame["measured"])
+            if not frame["measured"]["inertial"]:
+                _read_further(loop, frame["measured"])
             direct(steps.begin_watch, loop.frames)(loop.frames)
 
 
-def enable_watch(loop: Any, watch: np.void) -> None:
-    """Have a watch that was not wanted before the flight; the trim is shown to it now."""
+def enable_watch(loop: Any, fdi: np.void) -> None:
+    """Have a watch that was not wanted before the flight; the trim is shown to it now. Accelerometers are no
+    longer taken at their word."""
     frame = loop.frames[0]
-    watch["enabled"] = 1
-    anchor_watch(watch, np.array([frame["belief"]["design"]]), loop.start_y)
+    fdi["watch"]["enabled"], fdi["statistical"]["air"]["read"] = 1, 0
+    fdi["statistical"]["inertial_air"]["moving"] = 0
+    anchor_watch(fdi["watch"], np.array([frame["belief"]["design"]]), loop.start_y)
 
 
 def read_more(loop: Any) -> None:
@@ -197,8 +210,8 @@ def read_more(loop: Any) -> None:
 
 
 def _read_further(loop: Any, measured: np.void) -> None:
-    """What the further instruments say of the frame just flown."""
+    """Put what further instruments would say of the frame just flown among the readings, without errors."""
     values = [loop.plant.read(name) * factor for _, name, factor in ch.further_channels(loop.aircraft)]
-    measured["inertial"], measured["force"] = 1, np.array(values[:3]) / values[3]
+    measured["signal"][AX:] = np.array(values[:3]) / values[3]
     if len(values) > 4:
-        measured["engine"], measured["signal"][ENGINE_SPEED:] = 1, values[4:]
+        measured["engine"], measured["signal"][ENGINE_SPEED:AX] = 1, values[4:]

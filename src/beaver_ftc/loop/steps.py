@@ -9,6 +9,7 @@ from beaver_ftc.compiled import kernel
 from beaver_ftc.diagnosis import instruments, scheme
 from beaver_ftc.loop import frame as whole
 from beaver_ftc.loop.rows import row_of
+from beaver_ftc.plant.sensing import sample_forces
 
 
 @kernel
@@ -19,8 +20,11 @@ def measure(frames):
 
 @kernel
 def begin_watch(frames):
-    """Begin to watch the instruments, with the readings there are."""
+    """Begin to watch the instruments, with the readings there are. Where accelerometers were not read, their
+    truth stands there."""
     frame = frames[0]
+    if not frame.measured.inertial:
+        sample_forces(frame.instruments, frame.measured)
     instruments.begin(frame.fdi.watch, frame.measured)
 
 

@@ -13,10 +13,12 @@ from beaver_ftc.compiled import kernel
 
 SIGNALS = ("p", "q", "r", "alpha", "beta", "V", "qdyn")  # what the diagnosis compares with its model
 N_SIGNALS = len(SIGNALS)
-SENSORS = (*SIGNALS, "phi", "theta", "psi", "altitude", "engine_rpm", "manifold_pressure")
+SENSORS = (
+    *SIGNALS, "phi", "theta", "psi", "altitude", "engine_rpm", "manifold_pressure", "ax", "ay", "az"
+)  # fmt: skip
 N_SENSORS = len(SENSORS)
-PHI, ALTITUDE, ENGINE_SPEED, MANIFOLD = (
-    SENSORS.index(name) for name in ("phi", "altitude", "engine_rpm", "manifold_pressure")
+PHI, ALTITUDE, ENGINE_SPEED, MANIFOLD, AX = (
+    SENSORS.index(name) for name in ("phi", "altitude", "engine_rpm", "manifold_pressure", "ax")
 )
 NOISE_LIMIT_SIGMA = 4.0
 LONGEST_DELAY = 1000  # JSBSim frames
@@ -32,13 +34,14 @@ SENSOR_FAULT = np.dtype(
 
 INSTRUMENTS = np.dtype(
     [
-        ("real", "i8"), ("random", "u8"), ("random_further", "u8"),
+        ("real", "i8"), ("random", "u8"), ("random_further", "u8"), ("random_force", "u8"),
         ("gain", "f8", (N_SENSORS,)), ("bias", "f8", (N_SENSORS,)), ("noise", "f8", (N_SENSORS,)),
         ("quantum", "f8", (N_SENSORS,)), ("dropout", "f8", (N_SENSORS,)),
         ("drift", "f8", (N_SENSORS,)),  # per sample
         ("keep", "f8", (N_SENSORS,)),  # exp(-bandwidth dt), 0 without lag
         ("delay", "f8", (N_SENSORS,)),  # JSBSim frames
-        ("lagged", "f8", (N_SENSORS,)), ("line", "f8", (LONGEST_DELAY + 2, N_SENSORS)), ("taken", "i8"),
+        ("lagged", "f8", (N_SENSORS,)), ("line", "f8", (LONGEST_DELAY + 2, N_SENSORS)),
+        ("taken", "i8", (N_SENSORS,)),  # samples
         ("reading", "f8", (N_SENSORS,)),
         ("engine", "i8"),  # dpt is worked out from readings
         ("broken", "i8"), ("fault", SENSOR_FAULT, (N_SENSORS,)), ("random_fault", "u8"),
@@ -78,7 +81,7 @@ def normal(instruments):
 @kernel
 def delayed(instruments, i, value):
     """Put the value of signal i into its delay line; returns what comes out, between frames if need be."""
-    line, now = instruments.line, instruments.taken
+    line, now = instruments.line, instruments.taken[i]
     if now == 0:
         line[:, i] = value
     line[now % line.shape[0], i] = value
@@ -91,14 +94,14 @@ def delayed(instruments, i, value):
 @kernel
 def read_one(instruments, i, true):
     """The reading of signal i, SI."""
-    keep = instruments.keep[i] if instruments.taken > 0 else 0.0
+    keep = instruments.keep[i] if instruments.taken[i] > 0 else 0.0
     instruments.lagged[i] = true + keep * (instruments.lagged[i] - true)
     value = instruments.lagged[i]
     if instruments.delay[i] > 0.0:
         value = delayed(instruments, i, value)
     value = instruments.gain[i] * value + instruments.bias[i]
     if instruments.drift[i] != 0.0:
-        value += instruments.drift[i] * instruments.taken
+        value += instruments.drift[i] * instruments.taken[i]
     if instruments.noise[i] > 0.0:
         value += instruments.noise[i] * normal(instruments)
     if instruments.quantum[i] > 0.0:
@@ -112,14 +115,16 @@ def read_each(instruments, signals, start, end):
     for i in range(start, end):
         value = read_one(instruments, i, signals[i])
         lost = instruments.dropout[i] > 0.0 and uniform(instruments) < instruments.dropout[i]
-        if not lost or instruments.taken == 0:
+        if not lost or instruments.taken[i] == 0:
             instruments.reading[i] = value
+        instruments.taken[i] += 1
         signals[i] = instruments.reading[i]
 
 
 @kernel
 def read_all(instruments, signals):
-    """Put a sample of every signal in the place of the truth; signals (N_SENSORS,), SI, as SENSORS.
+    """Put a sample of every signal but the accelerometers' in the place of the truth; signals (N_SENSORS,),
+    SI, as SENSORS.
 
     The further instruments draw from a counter of their own: they change nothing in the noise of the first.
     """
@@ -127,10 +132,19 @@ def read_all(instruments, signals):
     if signals.size > N_SIGNALS:
         first = instruments.random
         instruments.random = instruments.random_further
-        read_each(instruments, signals, N_SIGNALS, signals.size)
+        read_each(instruments, signals, N_SIGNALS, AX)
         instruments.random_further = instruments.random
         instruments.random = first
-    instruments.taken += 1
+
+
+@kernel
+def read_forces(instruments, signals):
+    """The same of the accelerometers, which are not read in every flight, from a counter of their own."""
+    first = instruments.random
+    instruments.random = instruments.random_force
+    read_each(instruments, signals, AX, N_SENSORS)
+    instruments.random_force = instruments.random
+    instruments.random = first
 
 
 @kernel

@@ -13,11 +13,13 @@ from beaver_ftc.design.model import DPT
 from beaver_ftc.plant import channels as ch
 from beaver_ftc.plant.instruments import (
     ALTITUDE,
+    AX,
     ENGINE_SPEED,
     MANIFOLD,
     PHI,
     break_all,
     read_all,
+    read_forces,
 )
 from beaver_ftc.plant.native import read_nodes, write_nodes
 from beaver_ftc.plant.readings import MEASURED, note_slipstream, share_out
@@ -89,6 +91,8 @@ def measure(truth, instruments, measured):
         read_further(value, further, truth.n, measured)
     if instruments.real:
         read_all(instruments, signal)
+        if truth.n > further:
+            read_forces(instruments, signal)
     if instruments.broken:
         break_all(instruments, signal, measured.missing)
     sort(truth, instruments, measured)
@@ -99,10 +103,19 @@ def read_further(value, first, n, measured):
     """Take what further instruments there are: accelerometers, and those of the engine."""
     measured.inertial = 1
     for i in range(3):
-        measured.force[i] = value[first + i] / value[first + 3]
+        measured.signal[AX + i] = value[first + i] / value[first + 3]
     if n > first + 4:
         measured.engine = 1
         measured.signal[ENGINE_SPEED], measured.signal[MANIFOLD] = value[first + 4], value[first + 5]
+
+
+@kernel
+def sample_forces(instruments, measured):
+    """Read the accelerometers, whose truth stands among the readings, for the first time."""
+    measured.inertial = 1
+    if instruments.real:
+        read_forces(instruments, measured.signal)
+    measured.force[:] = measured.signal[AX:]
 
 
 @kernel

@@ -10,7 +10,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 from beaver_ftc.aircraft.question import in_question
 from beaver_ftc.documents.base import Conflict, Number, Section, number, order_conflicts, refuse
 from beaver_ftc.documents.errors import suggestion
-from beaver_ftc.scenario.sensors import ENGINE, Sensors
+from beaver_ftc.scenario.sensors import ACCELEROMETERS, ENGINE, Sensors
 
 # Sensor -> its unit, and the largest offset or noise that a fault may have.
 UNITS: dict[str, tuple[str, float]] = {
@@ -21,6 +21,7 @@ UNITS: dict[str, tuple[str, float]] = {
     "altitude": ("m", 5000.0),
     "engine_rpm": ("rpm", 3000.0),
     "manifold_pressure": ("inHg", 50.0),
+    **dict.fromkeys(ACCELEROMETERS, ("m/s2", 100.0)),
 }
 MOST_SCALE = 2.0
 # What an instrument is called in words, and in `sensors`.

@@ -129,13 +129,24 @@ class ManifoldGauge(_Sensor):
     quantum_inhg: Number = number(0.0, unit="inHg", says="resolution", ge=0, le=10)
 
 
+class Accelerometer(_Sensor):
+    """Specific force along a body axis at the centre of mass: all forces but gravity, over the mass."""
+
+    si = ("noise_std_mps2", "bias_mps2", "quantum_mps2", 1.0)
+
+    noise_std_mps2: Number = number(0.0, unit="m/s2", says="standard deviation of a sample", ge=0, le=100)
+    bias_mps2: Number = number(0.0, unit="m/s2", says="constant error", ge=-100, le=100)
+    quantum_mps2: Number = number(0.0, unit="m/s2", says="resolution", ge=0, le=100)
+
+
 ENGINE = ("engine_rpm", "manifold_pressure")  # instruments of an engine like the Beaver's
+ACCELEROMETERS = ("ax", "ay", "az")
 
 
-def _grade(gyro: dict, vane: dict, V: dict, qdyn: dict, attitude: dict, **others: dict) -> dict[str, dict]:
-    """The same gyro on every axis, the same vane twice, three angles alike."""
-    alike = {**dict.fromkeys("pqr", gyro), "alpha": vane, "beta": vane, "V": V, "qdyn": qdyn}
-    return {**alike, "phi": attitude, "theta": attitude, "psi": attitude, **others}
+def _grade(gyro: dict, vane: dict, V: dict, attitude: dict, force: dict, **others: dict) -> dict[str, dict]:
+    """The same gyro and accelerometer on every axis, the same vane twice, three angles alike."""
+    alike = {"pqr": gyro, ("alpha", "beta"): vane, ("phi", "theta", "psi"): attitude, ACCELEROMETERS: force}
+    return {name: errors for names, errors in alike.items() for name in names} | {"V": V, **others}
 
 
 # Each number's source is in docs/robustness.md, section 1; noise is that of a sample at 100 Hz.
@@ -145,8 +156,9 @@ PRESETS: dict[str, dict[str, dict[str, float]]] = {
         {"noise_std_deg_s": 0.0208, "bias_deg_s": 0.00028, "scale_error": 0.00015},
         {"noise_std_deg": 0.025, "bias_deg": 0.1},
         {"noise_std_mps": 0.05, "bias_mps": 0.2},
-        {"noise_std_pa": 2.0, "bias_pa": 5.0},
         {"noise_std_deg": 0.005, "bias_deg": 0.2, "drift_deg_h": 1.0},
+        {"noise_std_mps2": 0.0033, "bias_mps2": 0.0098, "scale_error": 0.0003},
+        qdyn={"noise_std_pa": 2.0, "bias_pa": 5.0},
         altitude={"noise_std_m": 0.2, "bias_m": 3.0},
         engine_rpm={"noise_std_rpm": 1.0, "bias_rpm": 2.0},
         manifold_pressure={"noise_std_inhg": 0.01, "bias_inhg": 0.03},
@@ -155,8 +167,9 @@ PRESETS: dict[str, dict[str, dict[str, float]]] = {
         {"noise_std_deg_s": 0.1, "bias_deg_s": 0.5, "scale_error": 0.03, "quantum_deg_s": 0.0153},
         {"noise_std_deg": 0.043, "bias_deg": 0.5, "quantum_deg": 0.088},
         {"noise_std_mps": 0.1, "bias_mps": 0.4},
-        {"noise_std_pa": 3.0, "bias_pa": 17.0},
         {"noise_std_deg": 0.05, "bias_deg": 1.0},
+        {"noise_std_mps2": 0.035, "bias_mps2": 0.59, "scale_error": 0.03, "quantum_mps2": 0.0012},
+        qdyn={"noise_std_pa": 3.0, "bias_pa": 17.0},
         altitude={"noise_std_m": 0.5, "bias_m": 5.0},
         engine_rpm={"noise_std_rpm": 5.0, "bias_rpm": 10.0},
         manifold_pressure={"noise_std_inhg": 0.05, "bias_inhg": 0.1},
@@ -180,6 +193,9 @@ class Sensors(Section):
     altitude: Altimeter = Field(default_factory=Altimeter)
     engine_rpm: Tachometer = Field(default_factory=Tachometer)
     manifold_pressure: ManifoldGauge = Field(default_factory=ManifoldGauge)
+    ax: Accelerometer = Field(default_factory=Accelerometer)
+    ay: Accelerometer = Field(default_factory=Accelerometer)
+    az: Accelerometer = Field(default_factory=Accelerometer)
 
     @model_validator(mode="before")
     @classmethod

@@ -1,0 +1,176 @@
+"""Is it an accelerometer that is broken, or the vane or the airspeed that it is held against?
+
+Both move the same test of the flow. An accelerometer goes on adding: an error e makes up a velocity e t. What
+a vane or the airspeed is off by comes once, and its reading has it. So from the alarm on
+
+    an accelerometer is cleared where the reading of the flow has leapt as the test has, or stands still;
+    for the airspeed, where the density shows it as well
+    a reading of the flow is cleared where the residuals add up to many times what it has moved by; where an
+    airspeed, or incidence, as wrong as that would show in density, or climb; or where an accelerometer stands
+    still
+
+Which accelerometer it is follows from the direction of the velocity that is made up. Where nothing tells, no
+instrument is named. None that may be broken is used: `measured.inertial`.
+"""
+
+import numpy as np
+
+from beaver_ftc.compiled import kernel
+from beaver_ftc.diagnosis.watch import (
+    AIRSPEED,
+    ALPHA,
+    ALPHA_FLOW,
+    BETA,
+    BETA_FLOW,
+    CLIMB,
+    DENSITY,
+    SPEED,
+)
+from beaver_ftc.plant.instruments import AX, N_SENSORS, PHI
+
+LEAP_M_S2 = 8.0  # by which no specific force changes from one look to the next
+GOES_ON = 30.0  # times what the reading has moved by: a scale error within 3 % of -1 would do that
+CLEARLY = 3.0  # beyond a bound, of what is not seen
+
+
+@kernel
+def instrument_of(test):
+    """The instrument that a test of the flow holds against the accelerometers."""
+    if test == SPEED:
+        return AIRSPEED
+    return ALPHA if test == ALPHA_FLOW else BETA
+
+
+@kernel
+def of_the_flow(test):
+    """Whether a test is one of those that accelerometers move."""
+    return SPEED <= test <= BETA_FLOW
+
+
+@kernel
+def note_stillness(watch, signal):
+    """Count the looks for which each reading (N_SENSORS,) has been the very same."""
+    for i in range(N_SENSORS):
+        watch.still[i] = watch.still[i] + 1 if signal[i] == watch.step.then[i] else 0
+
+
+@kernel
+def stands_still(watch, i):
+    """Whether instrument i is frozen: no sound one gives the same reading for so long."""
+    return watch.still[i] >= watch.longest_still[i]
+
+
+@kernel
+def weigh(watch, signal):
+    """Clear instruments of the flow, or accelerometers, by this look, that of the alarm or a later one."""
+    if not of_the_flow(watch.lead):
+        return
+    if leapt(watch, signal):
+        clear_accelerometers(watch)
+    gather(watch, signal)
+    flow = instrument_of(watch.lead)
+    if stands_still(watch, flow) or (watch.lead == SPEED and watch.fired[DENSITY]):
+        clear_accelerometers(watch)
+    frozen = False
+    for i in range(AX, N_SENSORS):
+        frozen = frozen or stands_still(watch, i)
+    if frozen or goes_on(watch) or would_show_elsewhere(watch, signal):
+        watch.cleared[flow] = 1
+
+
+@kernel
+def clear_accelerometers(watch):
+    """None of them is it."""
+    for i in range(AX, N_SENSORS):
+        watch.cleared[i] = 1
+
+
+@kernel
+def leapt(watch, signal):
+    """Whether the residual is one that no accelerometer makes in a look, and the reading has it."""
+    i, step = instrument_of(watch.lead), watch.step
+    test = step.test[watch.lead]
+    second = signal[i] - 2.0 * step.then[i] + watch.earlier[i]
+    least = test.bound[0] + LEAP_M_S2 * step.h * per_speed(watch, watch.lead)
+    return abs(test.residual) > least and abs(second) >= 0.5 * abs(test.residual)
+
+
+@kernel
+def per_speed(watch, test):
+    """A test's unit over m/s."""
+    return 1.0 if test == SPEED else 1.0 / max(watch.step.then[AIRSPEED], 1.0)
+
+
+@kernel
+def gather(watch, signal):
+    """Add up the residuals of the flow after the look of the alarm, (3,), what sound instruments may have of
+    them, and how far each reading has moved meanwhile."""
+    step = watch.step
+    for j in range(3):
+        i, test = instrument_of(SPEED + j), step.test[SPEED + j]
+        if watch.gathering == 0:
+            watch.least[j] = watch.most[j] = signal[i]
+            watch.sound[j] = 2.0 * test.noise + test.air * step.gust
+            continue
+        watch.gathered[j] += test.residual
+        watch.sound[j] += step.h * test.rate
+        watch.least[j], watch.most[j] = min(watch.least[j], signal[i]), max(watch.most[j], signal[i])
+    excess = np.sign(watch.gathered[1]) * max(abs(watch.gathered[1]) - watch.sound[1], 0.0)
+    fallen = step.h * signal[AIRSPEED] * excess * np.cos(signal[PHI]) * np.cos(signal[PHI + 1])
+    for m in range(step.decay.size):
+        watch.fallen[m] = step.decay[m] * watch.fallen[m] + fallen
+    watch.gathering = 1
+
+
+@kernel
+def goes_on(watch):
+    """Whether the residuals add up to what no error of a reading is, that has moved by so much."""
+    j = watch.lead - SPEED
+    moved = watch.most[j] - watch.least[j]
+    return moved > 0.0 and abs(watch.gathered[j]) > GOES_ON * moved + CLEARLY * watch.sound[j]
+
+
+@kernel
+def would_show_elsewhere(watch, signal):
+    """Whether an airspeed as wrong as that would show in the density, or an incidence in the climb; neither
+    does."""
+    step = watch.step
+    elsewhere = DENSITY if watch.lead == SPEED else CLIMB
+    if watch.lead == BETA_FLOW or watch.fired[elsewhere]:
+        return False
+    for m in range(step.decay.size):
+        error, speed = abs(watch.fallen[m]), step.test[SPEED]
+        if watch.lead == SPEED:
+            error = 2.0 * (abs(speed.filtered[m]) - speed.bound[m]) / max(signal[AIRSPEED], 1.0)
+        if error > CLEARLY * step.test[elsewhere].bound[m]:
+            return True
+    return False
+
+
+@kernel
+def suspect_accelerometers(watch, shown):
+    """Fill in which of them can be it: along whose axis there is most of the velocity made up; shown: a gyro
+    explains it."""
+    step, who = watch.step, watch.suspect
+    alpha, beta, V = step.then[ALPHA], step.then[BETA], max(step.then[AIRSPEED], 1.0)
+    faster, down, aside = watch.gathered[0], V * np.cos(beta) * watch.gathered[1], V * watch.gathered[2]
+    made_up, size = watch.made_up, 0.0
+    made_up[0] = np.cos(alpha) * (np.cos(beta) * faster - np.sin(beta) * aside) - np.sin(alpha) * down
+    made_up[1] = np.sin(beta) * faster + np.cos(beta) * aside
+    made_up[2] = np.sin(alpha) * (np.cos(beta) * faster - np.sin(beta) * aside) + np.cos(alpha) * down
+    doubt = watch.sound[0] + V * (watch.sound[1] + watch.sound[2])
+    frozen = -1
+    for i in range(3):
+        size = max(size, abs(made_up[i]))
+        frozen = AX + i if stands_still(watch, AX + i) else frozen
+    for i in range(AX, N_SENSORS):
+        along = frozen == i or (frozen < 0 and abs(made_up[i - AX]) + doubt >= 0.5 * size)
+        who[i] = along and not shown and not watch.cleared[i]
+
+
+@kernel
+def spoil(watch, measured):
+    """Have no accelerometer used once one may be broken."""
+    for i in range(AX, N_SENSORS):
+        if watch.replaced[i] or (watch.alarmed and watch.suspect[i]):
+            measured.inertial = 0

@@ -1,0 +1,257 @@
+"""An accelerometer, or what it is held against: each piece of evidence by itself, on courses of errors."""
+
+import numpy as np
+import pytest
+
+from beaver_ftc.diagnosis import accelerometers, redundancy
+from beaver_ftc.diagnosis.watch import (
+    AIRSPEED,
+    ALPHA,
+    ALPHA_FLOW,
+    BETA,
+    BETA_FLOW,
+    CLIMB,
+    DENSITY,
+    NOBODY,
+    QDYN,
+    SPEED,
+    WATCH,
+    P,
+)
+from beaver_ftc.plant.instruments import ALTITUDE, AX, N_SENSORS, PHI
+from beaver_ftc.plant.readings import MEASURED
+
+H, V, INCIDENCE = 0.01, 45.0, 0.12
+AY, AZ = AX + 1, AX + 2
+FORCES = (AX, AY, AZ)
+OF = {SPEED: AIRSPEED, ALPHA_FLOW: ALPHA, BETA_FLOW: BETA}
+UNIT = {SPEED: 1.0, ALPHA_FLOW: 1.0 / V, BETA_FLOW: 1.0 / V}
+
+
+def level(alpha=INCIDENCE, beta=0.02):
+    signal = np.zeros(N_SENSORS)
+    signal[[ALPHA, BETA, AIRSPEED, QDYN]] = alpha, beta, V, 1000.0
+    signal[ALTITUDE], signal[[AX, AY, AZ]] = 1800.0, (0.5, 0.1, -9.7)
+    return signal
+
+
+def new_watch(lead=ALPHA_FLOW, bound=1e-3):
+    watch = np.zeros(1, WATCH).view(np.recarray)[0]
+    watch["named"], watch["lead"], watch["alarmed"], watch["longest_still"] = NOBODY, lead, 1, 3
+    step = watch["step"]
+    step["h"], step["decay"] = H, (0.0, 0.9, 0.99)
+    step["test"]["bound"] = bound
+    step["then"] = watch["earlier"] = level()
+    return watch
+
+
+def looks(watch, readings, residuals):
+    """Each look's readings, and the residual of the test that leads."""
+    for signal, residual in zip(readings, residuals, strict=True):
+        watch["step"]["test"]["residual"][watch["lead"]] = residual
+        accelerometers.note_stillness(watch, signal)
+        accelerometers.weigh(watch, signal)
+        watch["earlier"] = watch["step"]["then"]
+        watch["step"]["then"] = signal
+
+
+def cleared(watch):
+    return set(np.flatnonzero(watch["cleared"]).tolist())
+
+
+def course(of, values):
+    """Level flight in which one reading goes along `values`; none of the others stands still."""
+    readings = [level() + 1e-9 * k for k in range(1, len(values) + 1)]
+    for signal, value in zip(readings, values, strict=True):
+        signal[of] = level()[of] + value
+    return readings
+
+
+def test_which_instrument_a_test_of_the_flow_asks():
+    assert [accelerometers.instrument_of(test) for test in OF] == list(OF.values())
+    flow = [test for test in range(13) if accelerometers.of_the_flow(test)]
+    assert flow == [SPEED, ALPHA_FLOW, BETA_FLOW]
+
+
+def test_a_reading_that_is_the_same_is_counted_until_it_is_not():
+    watch, signal = new_watch(), level()
+    for expected in (1, 2, 3):
+        accelerometers.note_stillness(watch, signal)
+        assert watch["still"][ALPHA] == expected
+    assert accelerometers.stands_still(watch, ALPHA)
+    watch["longest_still"][ALPHA] = 4
+    assert not accelerometers.stands_still(watch, ALPHA)
+    signal[ALPHA] += 1e-15
+    accelerometers.note_stillness(watch, signal)
+    assert watch["still"][[ALPHA, BETA]].tolist() == [0, 4]
+
+
+@pytest.mark.parametrize("lead", OF)
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_what_comes_at_once_and_is_in_the_reading_is_no_accelerometer_s(lead, sign):
+    """A jump by more than an accelerometer makes up in a look; one by less may be either's."""
+    least = 1e-3 + accelerometers.LEAP_M_S2 * H * UNIT[lead]
+    for size, leaps in ((1.01, True), (0.99, False)):
+        jump = sign * size * least
+        watch = new_watch(lead)
+        looks(watch, course(OF[lead], [jump]), [jump])
+        assert cleared(watch) == (set(FORCES) if leaps else set())
+    watch = new_watch(lead)
+    looks(watch, course(OF[lead], [0.49 * sign * least]), [1.01 * sign * least])
+    assert cleared(watch) == set(), "the reading has not half of it"
+
+
+def test_a_straight_course_is_no_leap():
+    """Second differences: a steady change of the reading is none, however fast."""
+    watch, rate = new_watch(), 0.1
+    watch["earlier"][ALPHA] -= rate
+    looks(watch, course(ALPHA, [rate]), [rate])
+    assert cleared(watch) == set()
+
+
+@pytest.mark.parametrize("lead", OF)
+def test_an_error_of_a_force_goes_on_and_clears_the_reading_that_has_hardly_moved(lead):
+    moving = 1e-5 * V * UNIT[lead] * np.sin(np.arange(400.0))
+    watch = new_watch(lead, bound=1.0)
+    looks(watch, course(OF[lead], moving), np.full(400, H * 1.0 * UNIT[lead]))
+    assert cleared(watch) == {OF[lead]}
+    large = new_watch(lead, bound=99.0)
+    looks(large, course(OF[lead], 1e4 * moving), np.full(400, H * 1.0 * UNIT[lead]))
+    assert cleared(large) == set()
+
+
+def test_what_goes_on_is_beyond_what_sound_instruments_may_add_up_to():
+    moving = 1e-6 * np.sin(np.arange(100.0))
+    for share, clear in ((0.9, set()), (1.1, {ALPHA})):
+        watch = new_watch(bound=1.0)
+        test = watch["step"]["test"][ALPHA_FLOW]
+        test["rate"], test["noise"] = 0.01, 1e-4
+        each = share * (accelerometers.CLEARLY * (0.01 * H * 99 + 2e-4) + 30.0 * 2e-6) / 99
+        looks(watch, course(ALPHA, moving), np.full(100, each))
+        assert cleared(watch) == clear
+
+
+def test_the_look_of_the_alarm_counts_for_a_jump_only():
+    """A vane that jumps by less than it takes is not cleared by its own jump, nor later."""
+    jump = 1.5e-3
+    watch = new_watch()
+    looks(watch, course(ALPHA, jump + 1e-7 * np.sin(np.arange(300.0))), [jump, *np.zeros(299)])
+    assert cleared(watch) == set()
+    assert watch["gathered"][1] == 0.0
+
+
+def test_scatter_of_a_vane_does_not_go_on():
+    scatter = np.random.default_rng(2).normal(0.0, 1e-3, 300)
+    watch = new_watch(bound=1.0)
+    looks(watch, course(ALPHA, scatter), np.diff(scatter, prepend=0.0))
+    assert cleared(watch) == set()
+
+
+@pytest.mark.parametrize("lead", OF)
+def test_who_stands_still_is_frozen(lead):
+    """A vane that does not move clears the accelerometers; an accelerometer that does not, the vane."""
+    for frozen, clear in ((OF[lead], set(FORCES)), (AY, {OF[lead]})):
+        watch = new_watch(lead, bound=1.0)
+        looks(watch, course(frozen, np.zeros(6)), np.full(6, 1e-5))
+        assert cleared(watch) == clear
+        accelerometers.suspect_accelerometers(watch, False)
+        who = np.flatnonzero(watch["suspect"]).tolist()
+        assert who == ([] if clear == set(FORCES) else [AY])
+
+
+def test_an_airspeed_s_error_is_in_the_density_too():
+    seen = new_watch(SPEED, bound=1.0)
+    seen["fired"][DENSITY] = 1
+    looks(seen, course(AIRSPEED, [1e-5]), [0.5])
+    assert cleared(seen) == set(FORCES)
+    for size, clear in ((0.99, set()), (1.01, {AIRSPEED})):
+        watch = new_watch(SPEED, bound=1.0)
+        test = watch["step"]["test"]
+        test["bound"][DENSITY], test["bound"][SPEED] = 1e-3, 0.2
+        test["filtered"][SPEED, 2] = -(0.2 + size * accelerometers.CLEARLY * 1e-3 * V / 2.0)
+        looks(watch, course(AIRSPEED, [1e-5]), [0.01])
+        assert cleared(watch) == clear
+
+
+def test_an_incidence_s_error_is_in_the_climb_too():
+    """The climb that the angle added up would make, through the same filters as that which is seen."""
+    for bound, clear in ((0.9, {ALPHA}), (1.1, set())):
+        watch, rng = new_watch(bound=1.0), np.random.default_rng(5)
+        readings = course(ALPHA, rng.normal(0.0, 0.02, 100))
+        for signal in readings:
+            signal[PHI : PHI + 2] = 0.3, 0.2
+        each, fallen = 1e-3, 0.0
+        for k in range(100):
+            fallen = 0.99 * fallen + H * V * each * k * np.cos(0.3) * np.cos(0.2)
+        watch["step"]["test"]["bound"][CLIMB] = 9.0, 9.0, bound * fallen / accelerometers.CLEARLY
+        looks(watch, readings, np.full(100, each))
+        assert cleared(watch) == clear
+        assert watch["fallen"][2] == pytest.approx(fallen)
+
+
+def test_a_climb_that_shows_clears_nobody():
+    watch = new_watch(bound=1.0)
+    watch["step"]["test"]["bound"][CLIMB], watch["fired"][CLIMB], watch["fallen"] = 1e-9, 1, 1.0
+    assert not accelerometers.would_show_elsewhere(watch, level())
+    watch["fired"][CLIMB] = 0
+    assert accelerometers.would_show_elsewhere(watch, level())
+    watch["lead"] = BETA_FLOW
+    assert not accelerometers.would_show_elsewhere(watch, level())
+
+
+def test_other_alarms_are_none_of_theirs():
+    for lead in (P, DENSITY, CLIMB):
+        watch = new_watch(lead)
+        watch["still"] = 9
+        looks(watch, course(ALPHA, [0.1]), [0.1])
+        assert cleared(watch) == set()
+        assert not watch["gathering"]
+
+
+@pytest.mark.parametrize("i", range(3))
+@pytest.mark.parametrize("flow", [(0.0, 0.0), (0.2, -0.3)])
+def test_the_axis_of_the_velocity_made_up_is_that_of_the_accelerometer(i, flow):
+    """By turning a step along a body axis into speed, incidence and sideslip."""
+    alpha, beta = flow
+    watch = new_watch()
+    watch["step"]["then"] = level(alpha, beta)
+    v = V * np.array([np.cos(alpha) * np.cos(beta), np.sin(beta), np.sin(alpha) * np.cos(beta)])
+    moved = v + 1e-4 * np.eye(3)[i]
+    speed = np.linalg.norm(moved)
+    watch["gathered"] = (
+        speed - V, np.arctan2(moved[2], moved[0]) - alpha, np.arcsin(moved[1] / speed) - beta
+    )  # fmt: skip
+    accelerometers.suspect_accelerometers(watch, False)
+    assert watch["made_up"] == pytest.approx(1e-4 * np.eye(3)[i], abs=1e-8)
+    assert np.flatnonzero(watch["suspect"]).tolist() == [AX + i]
+    for doubt, all_of_them in ((0.49e-4, False), (0.51e-4, True)):
+        watch["sound"] = doubt, 0.0, 0.0
+        accelerometers.suspect_accelerometers(watch, False)
+        assert bool(watch["suspect"][AX:].all()) == all_of_them
+    accelerometers.suspect_accelerometers(watch, True)
+    assert not watch["suspect"].any(), "a gyro explains it"
+    accelerometers.clear_accelerometers(watch)
+    accelerometers.suspect_accelerometers(watch, False)
+    assert not watch["suspect"].any()
+
+
+@pytest.mark.parametrize(
+    ("fields", "used"),
+    [({}, 1), ({"replaced": AZ}, 0), ({"suspect": AX}, 0), ({"replaced": ALPHA, "suspect": BETA}, 1)],
+)
+def test_none_is_used_once_one_may_be_broken(fields, used):
+    watch, measured = new_watch(), np.zeros(1, MEASURED).view(np.recarray)[0]
+    measured["inertial"] = 1
+    for name, i in fields.items():
+        watch[name][i] = 1
+    accelerometers.spoil(watch, measured)
+    assert measured["inertial"] == used
+
+
+def test_what_accelerometers_may_be_off_covers_two_steps():
+    """1.5 a - 0.5 a_then, at its worst: a bias, and noise that changes sides."""
+    watch = new_watch()
+    step = watch["step"]
+    step["steady"][list(FORCES)], step["error"][list(FORCES)] = (0.3, 0.0, 0.0), (0.3 + 0.1, 0.05, 0.0)
+    worst = [1.5 * (0.3 + 0.1) - 0.5 * (0.3 - 0.1), 1.5 * 0.05 + 0.5 * 0.05, 0.0]
+    assert redundancy.misfelt(step) == pytest.approx(np.linalg.norm(worst))

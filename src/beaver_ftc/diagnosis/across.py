@@ -32,7 +32,8 @@ known by them. Known to be broken, or suspected of it, they count no more.
 import numpy as np
 
 from beaver_ftc.compiled import kernel
-from beaver_ftc.diagnosis import air, likelihood
+from beaver_ftc.design.terms import AIRSPEED
+from beaver_ftc.diagnosis import air, likelihood, tones
 from beaver_ftc.diagnosis.state import (
     AN_AXIS,
     LATERAL,
@@ -194,9 +195,10 @@ def sign(fdi, view, Gu):
 
 
 @kernel
-def observe(fdi, innovation, G, Gu, V, frame, latched):
-    """Take in one frame, as `statistical.observe`. G, Gu (3, n): of it; V m/s."""
+def observe(fdi, innovation, G, Gu, y, frame, latched):
+    """Take in one frame, as `statistical.observe`. G, Gu (3, n): of it; y as measured."""
     statistical, dt = fdi.statistical, fdi.dt
+    V, heard = y[AIRSPEED], tones.usual(statistical.listening, y)
     keep, slot = statistical.keep if latched else 1.0, likelihood.slot_to_start(frame)
     for a in range(statistical.n_views):
         view = statistical.views[a]
@@ -218,7 +220,8 @@ def observe(fdi, innovation, G, Gu, V, frame, latched):
             regress(fdi, view, innovation, share)
         sign(fdi, view, Gu)
         likelihood.take_in(block, view.bounded, tolerated, dt, keep)
-        view.held = max((1.0 - (1.0 - statistical.keep) / HOLDS) * view.held, best(block))
+        tones.listen(view, statistical.listening, statistical.alarm_level, heard, tolerated, dt)
+        view.held = max((1.0 - (1.0 - statistical.keep) / HOLDS) * view.held, best(view))
 
 
 @kernel
@@ -235,11 +238,11 @@ def feels(fdi, view, s, column):
 
 
 @kernel
-def best(block):
-    """The largest score in a block."""
-    found = 0.0
-    for h in range(block.n_hypotheses):
-        found = max(found, block.hypothesis[h].score)
+def best(view):
+    """The largest score in a view."""
+    found = view.tones.score
+    for h in range(view.block.n_hypotheses):
+        found = max(found, view.block.hypothesis[h].score)
     return found
 
 
@@ -250,7 +253,7 @@ def shown(statistical, view):
     if weighs(view) and not statistical.forces.known:
         return 0.0
     if view.clears or not (weighs(view) or told(statistical, view)):
-        return best(view.block)
+        return best(view)
     cleared = 0.0
     for a in range(statistical.n_views):
         other = statistical.views[a]
@@ -260,11 +263,15 @@ def shown(statistical, view):
 
 
 @kernel
-def alarms(statistical, view):
-    """Whether a view raises the alarm: one of little but a force, which no block of the rates looks at, of
-    accelerometers that do not break."""
+def alarm(statistical, view):
+    """The score with which a view raises the alarm, for what no block of the rates looks at: a tone about an
+    axis, or a view of little but a force, of accelerometers that do not break."""
+    if view.surface == AN_AXIS and not view.inertial:
+        return view.tones.score
     mostly = view.plane[1] >= SIDE and abs(view.mix[view.plane[1]]) > MOSTLY
-    return view.surface >= 0 and mostly and statistical.air.read == 1
+    if view.surface >= 0 and mostly and statistical.air.read == 1:
+        return shown(statistical, view)
+    return 0.0
 
 
 @kernel

@@ -18,16 +18,25 @@ from beaver_ftc.diagnosis.forces import set_up_forces
 from beaver_ftc.diagnosis.readings import random_error, set_up_readings
 from beaver_ftc.diagnosis.state import (
     ALPHA3,
+    AN_AXIS,
     ENDING,
     GROWING,
     LEAST_UNCERTAINTY_RAD_S2,
     LOSS,
     N_SLOTS,
+    N_TONES,
     SENSE,
     SIDE,
     STEP,
 )
-from beaver_ftc.diagnosis.views import PRIOR_DRIFT_RAD_S2, across_a_column, set_up_views, views_of
+from beaver_ftc.diagnosis.tones import set_up_listening
+from beaver_ftc.diagnosis.views import (
+    PRIOR_DRIFT_RAD_S2,
+    Direction,
+    across_a_column,
+    set_up_views,
+    views_of,
+)
 from beaver_ftc.plant.instruments import SIGNALS
 from beaver_ftc.scenario.diagnosis import Bounds, FdiConfig, Statistical
 from beaver_ftc.scenario.sensors import Sensors
@@ -76,26 +85,29 @@ def _steps(axes: tuple[int, ...]) -> Iterator[Hypothesis]:
     return ((STEP, -1, axis, 1) for axis in axes)
 
 
-def tests_a_frame(aircraft: Aircraft | None, *, forces: bool) -> int:
-    """How many one-sided tests the detector makes in a frame; forces: of forces too."""
-    aircraft = aircraft or load()
+def tests_a_frame(aircraft: Aircraft, *views: Direction) -> int:
+    """How many one-sided tests the detector makes in a frame, in these views besides."""
     kinds = [kind for _, members in blocks_of(aircraft) for kind, _, _, alarms in members if alarms]
-    for view in views_of(aircraft, forces):
-        kinds += [STEP, *(LOSS for _ in view.tries)] if view.across >= 0 and any(view.mix[SIDE:]) else []
-    return N_SLOTS * sum(SIDES[kind] for kind in kinds)
+    tones = 0
+    for view in views:
+        if view.across >= 0 and any(view.mix[SIDE:]):
+            kinds += [STEP, *(LOSS for _ in view.tries)]
+            tones += N_TONES
+        elif view.across == AN_AXIS and not view.inertial:
+            tones += N_TONES
+    return N_SLOTS * sum(SIDES[kind] for kind in kinds) + tones
 
 
-def alarm_level(
-    false_alarms_per_h: float, rate_hz: float, aircraft: Aircraft | None = None, forces: bool = False
-) -> float:
-    """Standard deviations at which all tests of an hour together give so many false alarms at most."""
-    tests = 3600.0 * rate_hz * tests_a_frame(aircraft, forces=forces)
-    return -NormalDist().inv_cdf(false_alarms_per_h / tests)
+def alarm_level(false_alarms_per_h: float, rate_hz: float, tests: int | None = None) -> float:
+    """Standard deviations at which all tests of an hour together, so many in a frame, give so many false
+    alarms at most."""
+    tests = tests_a_frame(load()) if tests is None else tests
+    return -NormalDist().inv_cdf(false_alarms_per_h / (3600.0 * rate_hz * tests))
 
 
-def naming_level(misnaming: float, rate_hz: float, aircraft: Aircraft | None = None) -> float:
+def naming_level(misnaming: float, rate_hz: float, aircraft: Aircraft) -> float:
     """Difference of log likelihoods that chance gives with this probability at most within a second."""
-    return 0.5 * NormalDist().inv_cdf(misnaming / (rate_hz * tests_a_frame(aircraft, forces=False))) ** 2
+    return 0.5 * NormalDist().inv_cdf(misnaming / (rate_hz * tests_a_frame(aircraft))) ** 2
 
 
 def set_up(
@@ -116,7 +128,9 @@ def set_up(
     statistical["enabled"], statistical["share"] = 1, 1.0 / max(int(fdi["instants"]), 1)
     _set_up_air(statistical["air"], config.bounds.turbulence, mass, aircraft)
     forces = bool(statistical["forces"]["known"])
-    statistical["alarm_level"] = alarm_level(given.false_alarms_per_h, rate_hz, aircraft, forces)
+    across = across_a_column(config, int(fdi["instants"]))
+    tests = tests_a_frame(aircraft, *(views_of(aircraft, forces) if across else ()))
+    statistical["alarm_level"] = alarm_level(given.false_alarms_per_h, rate_hz, tests)
     statistical["naming_level"] = naming_level(given.misnaming, rate_hz, aircraft)
     statistical["keep"] = exp(-1.0 / (rate_hz * config.forgetting_time_s))
     _set_up_blocks(statistical, config.bounds.sensors, aircraft)
@@ -124,7 +138,10 @@ def set_up(
     _set_up_noise(statistical, given, config.bounds, design, start, 1.0 / rate_hz)
     _set_up_tolerances(statistical, config.bounds, design, mass, start, aircraft)
     set_up_readings(statistical, config.bounds.sensors, fdi["bound"]["admitted"])
-    if across_a_column(config, int(fdi["instants"])):
+    if across:
+        chance = given.false_alarms_per_h / (3600.0 * rate_hz * tests)
+        airspeed_mps, pace_rad_s = float(start[1][AIRSPEED]), given.uncertainty_rad_s
+        set_up_listening(statistical["listening"], chance, airspeed_mps, pace_rad_s, 1.0 / rate_hz)
         if forces:
             along_y = jacobian(design, *start)[3]
             set_up_forces(statistical, config.bounds, aircraft, start, along_y, 1.0 / rate_hz)

@@ -87,8 +87,8 @@ def compare_likelihoods(fdi, belief, measured, k, t):
     statistical.signatures(fdi.statistical, belief.means.Gu, cubic)
     latched = fdi.statistical.detected_at_s >= 0.0
     statistical.observe(fdi.statistical, fdi.innovation, fdi.dt, k, latched, not fdi.abrupt)
-    V, mean = measured.y[AIRSPEED], belief.means
-    across.observe(fdi, fdi.innovation, mean.G, mean.Gu, V, k, latched)
+    mean = belief.means
+    across.observe(fdi, fdi.innovation, mean.G, mean.Gu, measured.y, k, latched)
     statistical.score(fdi.statistical, t)
 
 

@@ -59,6 +59,7 @@ ESTIMATOR = np.dtype(
 # then the drift. Every hypothesis is tried from every onset: that is a lane of a block, and what lanes keep
 # lies side by side for vector instructions, lane slot * MAX_HYPOTHESES + hypothesis.
 N_SLOTS = 10
+N_TONES = 16
 N_READINGS = 5  # alpha, beta, airspeed, dynamic pressure, engine power: readings.py
 MAX_HYPOTHESES, MAX_REGRESSORS = 8, 3 * MAX_TERMS_OF_ONE + 4 + N_READINGS
 MAX_VIEWS = 16
@@ -114,17 +115,39 @@ BLOCK = np.dtype(
     align=True,
 )  # fmt: skip
 
+# Oscillations (tones.py): what all views share, and what each keeps.
+LISTENING = np.dtype(
+    [
+        ("slowest", "f8"), ("fastest", "f8"),  # m/s: beyond, nothing is heard
+        ("every", "i8"), ("level", "f8"), ("keep", "f8"),  # frames; standard deviations; of a sum
+        ("turn", "f8", (2, N_TONES)), ("turn_kept", "f8", (2, N_TONES)),  # a frame; a sum, with `keep`
+        ("heard", "f8", (N_TONES,)),  # at most, of an uncertainty within one
+        ("width", "f8", (N_TONES,)),  # larger variance of the two parts of N, of both together one
+    ],
+    align=True,
+)  # fmt: skip
+TONES = np.dtype(
+    [
+        ("count", "i8"), ("sum", "f8"), ("sums", "f8", (MAX_REGRESSORS,)),  # of frames, and of regressors
+        ("tone", "f8", (2, N_TONES)), ("overlap", "f8", (MAX_REGRESSORS, 2, N_TONES)),
+        ("slack", "f8", (N_TONES,)), ("room", "f8", (N_TONES,)), ("information", "f8"),
+        ("score", "f8"),  # of the loudest, as a score of likelihood.py of the same chance
+    ],
+    align=True,
+)  # fmt: skip
+
 # The rates along a direction, `mix` (across.py), in a block of one axis. surface: whose column it is across,
 # AN_AXIS of none, THE_VANE of an error of the incidence. plane: of the column; tolerated: anything at all;
 # inertial: the force by an angle that no vane gave; clears: what it shows is no vane's doing; cleared_by: the
 # force of the views that clear its vane, 0 where it asks none. held: its largest score, slowly forgotten.
+# axis: that an alarm of it is said to be about.
 AN_AXIS, THE_VANE = -1, -2
 VIEW = np.dtype(
     [
-        ("surface", "i8"), ("mix", "f8", (5,)), ("plane", "i8", (2,)), ("tolerated", "i8"),
+        ("surface", "i8"), ("axis", "i8"), ("mix", "f8", (5,)), ("plane", "i8", (2,)), ("tolerated", "i8"),
         ("inertial", "i8"), ("clears", "i8"), ("cleared_by", "i8"),
         ("bounded", "f8", (1,)), ("by_rates", "f8", (3,)), ("by_forces", "f8", (3,)), ("held", "f8"),
-        ("block", BLOCK),
+        ("block", BLOCK), ("tones", TONES),
     ],
     align=True,
 )  # fmt: skip
@@ -137,7 +160,7 @@ STATISTICAL = np.dtype(
         ("rapidity", "f8"),  # 1/s: intensity of the drift of an uncertainty over its bound squared
         ("bounded", "f8", (3,)), ("deflection", "f8", (3,)), ("jitter", "f8", (3,)), ("tolerated", "i8"),
         ("n_blocks", "i8"), ("block", BLOCK, (3,)), ("n_views", "i8"), ("views", VIEW, (MAX_VIEWS,)),
-        ("forces", FORCES_FELT),
+        ("forces", FORCES_FELT), ("listening", LISTENING),
         ("air", AIR), ("inertial_air", AIR), ("terms", "f8", (MAX_TERMS,)),
         # readings.py: whether errors of the air data count; their noise, and the jitter of all else; scratch
         ("read", "i8"), ("reading_noise", "f8", (N_READINGS,)), ("own_jitter", "f8", (3,)),

@@ -105,8 +105,7 @@ def score(statistical, t):
                 note(statistical, hypothesis.score, hypothesis.axis)
     for a in range(statistical.n_views):
         view = statistical.views[a]
-        if across.alarms(statistical, view):
-            note(statistical, across.shown(statistical, view), view.plane[0])
+        note(statistical, across.alarm(statistical, view), view.axis)
     if statistical.score > 1.0 and statistical.detected_at_s < 0.0:
         statistical.detected_at_s = t
 
@@ -122,7 +121,7 @@ def note(statistical, score, axis):
 @kernel
 def record(statistical, row):
     """Write the last columns of the log: each test as a share of the alarm level, losses, then steps. What
-    forces show besides is in the step of the axis."""
+    forces and tones show besides is in the step of the axis."""
     first = row.size - statistical.n_columns
     row[first:] = 0.0
     for b in range(statistical.n_blocks):
@@ -134,9 +133,8 @@ def record(statistical, row):
                 row[place] = max(row[place], hypothesis.score / statistical.alarm_level)
     for a in range(statistical.n_views):
         view = statistical.views[a]
-        if across.alarms(statistical, view):
-            place = row.size - 3 + view.plane[0]
-            row[place] = max(row[place], across.shown(statistical, view) / statistical.alarm_level)
+        place = row.size - 3 + view.axis
+        row[place] = max(row[place], across.alarm(statistical, view) / statistical.alarm_level)
 
 
 @kernel

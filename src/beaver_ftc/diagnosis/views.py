@@ -89,6 +89,7 @@ def set_up_views(statistical: np.void, aircraft: Aircraft) -> None:
     statistical["n_views"] = len(views)
     for view, (surface, mix, plane, movers, inertial, asks) in zip(statistical["views"], views, strict=False):
         view["surface"], view["mix"], view["plane"], block = surface, mix, plane, view["block"]
+        view["axis"] = mix.index(1.0) if surface == AN_AXIS and not inertial else plane[0]
         axes = statistical["block"][PITCH_BLOCK if plane == IN_PITCH else LATERAL]
         # A law answers a gust by the vanes before the gyros feel it pitch, and the vanes are not asked here:
         # what an elevator does in moving air goes along with the noise, and no test of its loss is fair.
@@ -112,7 +113,7 @@ def set_up_views(statistical: np.void, aircraft: Aircraft) -> None:
         block["n_regressors"] = n + (surface != AN_AXIS)
         block["tolerance"][n] = float(surface != AN_AXIS)  # of how far errors turn the column, in flight
         hypotheses = block["hypothesis"][: len(kinds)]
-        hypotheses["kind"], hypotheses["surface"], hypotheses["axis"] = kinds, [-1, *tried], plane[0]
+        hypotheses["kind"], hypotheses["surface"] = kinds, [-1, *tried]
         view["inertial"], view["clears"] = inertial, inertial or surface == THE_VANE
         sense = block["lane"]["sense"].reshape(N_SLOTS, -1)
         sense[:] = 0.0

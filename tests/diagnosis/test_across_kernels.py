@@ -20,6 +20,7 @@ from beaver_ftc.diagnosis.views import set_up_views
 AILERON, ELEVATOR, RUDDER, FLAP = range(4)
 PITCH_AXIS, ROLL_AXIS, YAW_AXIS, PAST_AILERON, PAST_RUDDER = range(5)
 V = 45.0
+FLOW = np.array([0.05, 0.0, V, 1200.0, 0.1])  # alpha, beta, airspeed, pressure, dpt
 NAMES = ("n", "n_hypotheses", "n_regressors", "noise", "jitter", "drift", "P_dd", "regressor", "scratch")
 
 
@@ -192,7 +193,7 @@ def test_a_frame_is_seen_along_every_direction(fdi, rng, latched, tolerated, fra
         for name in ("correlation", "information", "overlap", "response"):
             lane[name] = rng.uniform(1.0, 2.0, lane[name].shape)
         alone.append(view.copy().view(np.recarray))
-    across.observe(fdi, innovation, G, Gu, V, frame, latched)
+    across.observe(fdi, innovation, G, Gu, FLOW, frame, latched)
     for view, own in zip(statistical["views"], alone, strict=False):
         share = across.turn(fdi, own, G) if own["surface"] >= 0 else 0.0
         block = own["block"]
@@ -213,7 +214,7 @@ def test_a_frame_is_seen_along_every_direction(fdi, rng, latched, tolerated, fra
 def test_views_that_are_not_there_are_not_asked(fdi, rng):
     fdi["statistical"]["n_views"] = 1
     before = fdi["statistical"]["views"].copy()
-    across.observe(fdi, rng.normal(size=3), np.ones((3, 4)), np.ones((3, 4)), V, 3, False)
+    across.observe(fdi, rng.normal(size=3), np.ones((3, 4)), np.ones((3, 4)), FLOW, 3, False)
     after = fdi["statistical"]["views"]
     changed = [now.tobytes() != then.tobytes() for now, then in zip(after, before, strict=True)]
     assert changed == [True] + [False] * (MAX_VIEWS - 1)

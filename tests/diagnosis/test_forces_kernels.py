@@ -385,13 +385,14 @@ def test_a_force_counts_once_the_vane_is_cleared(viewed):
 
 def test_only_what_is_mostly_a_force_raises_the_alarm(viewed):
     views = viewed["statistical"]["views"]
+    viewed["statistical"]["naming_level"] = 18.0
     for v, mix, alarms in (
         (ELEVATOR_VIEW, (0.0, 0.3, 0.0, 0.0, -0.95), True), (FLAP_VIEW, (0.0, 0.95, 0.0, 0.0, 0.3), False),
         (AILERON_VIEW, (0.03, 0.0, 0.0, 1.0, 0.0), True), (ALPHA_VIEW, (0.0, 0.1, 0.0, 0.0, 0.99), False),
         (SIDE_VIEW, (0.0, 0.0, 0.0, 1.0, 0.0), False),
     ):  # fmt: skip
-        views["mix"][v] = mix
-        assert across.alarms(viewed["statistical"], views[v]) == alarms
+        views["mix"][v], views["held"][:] = mix, 9.0
+        assert (across.alarm(viewed["statistical"], views[v]) > 0.0) == alarms
 
 
 def test_what_clears_a_vane_excludes_nobody(viewed):
@@ -407,7 +408,7 @@ def test_old_evidence_of_a_force_is_forgotten_slowly(viewed):
     statistical["views"]["held"][UP_VIEW] = 8.0
     for block in statistical["block"]:
         block["noise"] = 1e-8
-    across.observe(viewed, np.zeros(3), G, 0.0 * G, 45.0, 1, False)
+    across.observe(viewed, np.zeros(3), G, 0.0 * G, Y, 1, False)
     assert statistical["views"]["held"][UP_VIEW] == pytest.approx(8.0 * (1.0 - 0.01 / across.HOLDS))
 
 

@@ -120,7 +120,8 @@ LISTENING = np.dtype(
     [
         ("slowest", "f8"), ("fastest", "f8"),  # m/s: beyond, nothing is heard
         ("every", "i8"), ("level", "f8"), ("keep", "f8"),  # frames; standard deviations; of a sum
-        ("turn", "f8", (2, N_TONES)), ("turn_kept", "f8", (2, N_TONES)),  # a frame; a sum, with `keep`
+        # by the angle of a frame; by that of a sum, and twice that, times `keep`
+        ("turn", "f8", (2, N_TONES)), ("turn_kept", "f8", (2, N_TONES)), ("turn_twice", "f8", (2, N_TONES)),
         ("heard", "f8", (N_TONES,)),  # at most, of an uncertainty within one
         ("width", "f8", (N_TONES,)),  # larger variance of the two parts of N, of both together one
     ],
@@ -130,7 +131,9 @@ TONES = np.dtype(
     [
         ("count", "i8"), ("sum", "f8"), ("sums", "f8", (MAX_REGRESSORS,)),  # of frames, and of regressors
         ("tone", "f8", (2, N_TONES)), ("overlap", "f8", (MAX_REGRESSORS, 2, N_TONES)),
-        ("slack", "f8", (N_TONES,)), ("room", "f8", (N_TONES,)), ("information", "f8"),
+        # of |N|: what coefficients and a bounded uncertainty explain; of the latter, its size and its beat
+        ("slack", "f8", (N_TONES,)), ("room", "f8", (N_TONES,)),
+        ("steady", "f8", (N_TONES,)), ("beat", "f8", (2, N_TONES)), ("information", "f8"),
         ("score", "f8"),  # of the loudest, as a score of likelihood.py of the same chance
     ],
     align=True,

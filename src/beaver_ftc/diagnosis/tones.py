@@ -8,7 +8,7 @@ leaves it one. So for each frequency w
 and without a fault both parts of N are normal, together no wider than their larger variance: |N| over its
 root is beyond x with a chance of exp(-x^2 / 2) at most. Errors of coefficients and a bounded uncertainty add
 what they do in likelihood.py: the former, through the same sums, no more than sum tol_j |R_j|; the latter, of
-|d| <= eta_bar, no more than eta_bar |W(w)| sum exp(-t / T) |cos|, W being what the filter makes of a tone; a
+|d| <= eta_bar, no more than |W(w)| sum eta_bar exp(-t / T) |cos|, W being what the filter makes of a tone; a
 little less, since d changes no faster than declared.
 
 Frames are summed a few at a time: no frequency listened to turns far within 0.04 s.
@@ -23,10 +23,13 @@ from beaver_ftc.design.terms import AIRSPEED, ALPHA, BETA
 from beaver_ftc.diagnosis.likelihood import share
 from beaver_ftc.diagnosis.state import N_TONES
 
-# A memory of T s tells frequencies 1 / T apart; between two of the grid 0.93 of a tone is heard.
+# A memory of T s tells frequencies 1 / T apart; halfway between two of the grid 0.7 of a tone is heard.
 MEMORY_S = 2.5
 FREQUENCIES_RAD_S = np.linspace(1.0, 13.0, N_TONES)
 SUMMED_S = 0.04
+# Share of the level that chance is given beside a bounded uncertainty, be there noise or not: `passes` is of
+# gains that stay, and those of a bound that swings do not.
+CHANCE = 0.5
 FASTER, WILD_RAD = 2.0, 0.5  # than in trim; incidences
 
 
@@ -58,7 +61,7 @@ def listen(view, listening, alarm_level, heard, tolerated, dt):
     tones.information = listening.keep * listening.keep * tones.information + tones.count
     allow(tones, listening, block, root * view.bounded[0], dt)
     tolerate(tones, block.tolerance, n)
-    judge(tones, listening, block.chance, alarm_level)
+    judge(tones, listening, alarm_level)
     tones.sum, tones.count = 0.0, 0
 
 
@@ -83,12 +86,20 @@ def passes(K_x, K_d, keep, cos, sin, dt):
 
 @kernel
 def allow(tones, listening, block, bounded, dt):
-    """Bring `room` to this sum: what an uncertainty within `bounded`, in whitened units, can add to |N|."""
-    most = bounded * tones.count
+    """Bring `room` to this sum: what an uncertainty within `bounded`, in whitened units, can add to |N|.
+
+    |cos x| = 2 / pi (1 + 2/3 cos 2x - 2/15 cos 4x + ...): a bound that beats at twice the frequency lets more
+    be heard, and its harmonics, which beat less, no more than a third of that again.
+    """
+    turn, keep, most = listening.turn_twice, listening.keep, bounded * tones.count
     for f in range(tones.room.size):
         cos, sin = listening.turn[0, f], listening.turn[1, f]
-        passed = passes(block.K_x[0, 0], block.K_d[0, 0], block.keep, cos, sin, dt)
-        tones.room[f] = listening.keep * tones.room[f] + most * listening.heard[f] * passed
+        passed = most * passes(block.K_x[0, 0], block.K_d[0, 0], block.keep, cos, sin, dt)
+        real, imaginary = tones.beat[0, f], tones.beat[1, f]
+        tones.beat[0, f] = turn[0, f] * real - turn[1, f] * imaginary + passed
+        tones.beat[1, f] = turn[1, f] * real + turn[0, f] * imaginary
+        tones.steady[f] = keep * tones.steady[f] + passed
+        tones.room[f] = listening.heard[f] * (tones.steady[f] + np.hypot(tones.beat[0, f], tones.beat[1, f]))
 
 
 @kernel
@@ -106,13 +117,13 @@ def tolerate(tones, tolerance, n):
 
 
 @kernel
-def judge(tones, listening, chance, alarm_level):
+def judge(tones, listening, alarm_level):
     """Fill `score`."""
     loudest = 0.0
     for f in range(tones.slack.size):
         evidence = np.hypot(tones.tone[0, f], tones.tone[1, f]) - tones.slack[f]
         variance = listening.width[f] * tones.information
-        loudest = max(loudest, share(listening.level, chance, evidence, tones.room[f], variance))
+        loudest = max(loudest, share(listening.level, CHANCE, evidence, tones.room[f], variance))
     tones.score = loudest * alarm_level / listening.level
 
 
@@ -136,6 +147,7 @@ def set_up_listening(
     listening["every"], listening["keep"], listening["level"] = every, keep, sqrt(-2.0 * np.log(chance))
     listening["turn"] = np.cos(angle), np.sin(angle)
     listening["turn_kept"] = keep * np.cos(every * angle), keep * np.sin(every * angle)
+    listening["turn_twice"] = keep * np.cos(2.0 * every * angle), keep * np.sin(2.0 * every * angle)
     # Variances of the two parts differ by the sum of exp(2 (i w - 1 / T) t), over that of exp(-2 t / T).
     apart = (1.0 - keep**2) / np.abs(1.0 - keep**2 * np.exp(2j * every * angle))
     listening["width"] = 0.5 * (1.0 + apart)

@@ -1,0 +1,265 @@
+"""Oscillations, a kernel at a time, against sums written out, a filter run through, and drawn noise."""
+
+from math import exp, pi, sqrt
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from kernels import DT, new_fdi
+
+from beaver_ftc.design.terms import AIRSPEED, ALPHA, BETA
+from beaver_ftc.diagnosis import across, tones, whitening
+from beaver_ftc.diagnosis.state import AN_AXIS, N_TONES, PITCH, SIDE, THE_VANE, YAW
+from beaver_ftc.diagnosis.tones import FREQUENCIES_RAD_S, MEMORY_S
+
+CHANCE, PACE, V = 1e-11, 15.0, 45.0
+EVERY = 2  # sums of 0.04 s at DT
+LEVEL = sqrt(-2.0 * np.log(CHANCE))
+
+
+@pytest.fixture
+def rng():
+    return np.random.default_rng(11)
+
+
+@pytest.fixture
+def view(rng):
+    view = new_fdi()["statistical"]["views"][0]
+    block = view["block"]
+    block["n"], block["n_regressors"], block["keep"], block["chance"] = 1, 3, 1.0, 0.5
+    block["S_inverse"][0, 0], block["K_x"][0, 0], block["K_d"][0, 0] = 4.0, 0.3, 0.8
+    block["tolerance"][:3], view["bounded"] = rng.uniform(0.1, 0.2, 3), 0.05
+    return view
+
+
+@pytest.fixture
+def listening():
+    listening = new_fdi()["statistical"]["listening"]
+    tones.set_up_listening(listening, CHANCE, V, PACE, DT)
+    return listening
+
+
+def listen(view, listening, samples, regressors=None, heard=True, tolerated=False, alarm_level=6.0):
+    for k, sample in enumerate(samples):
+        view["block"]["innovation"][0] = sample
+        if regressors is not None:
+            view["block"]["regressor_response"][:3, 0] = regressors[k]
+        tones.listen(view, listening, alarm_level, heard, tolerated, DT)
+
+
+def resonance(samples):
+    """The sums written out: of every two samples, the last one fresh, for each frequency."""
+    sums = np.asarray(samples).reshape(-1, EVERY).sum(axis=1)
+    age_s = EVERY * DT * np.arange(len(sums))[::-1]
+    return np.exp(np.multiply.outer(1j * FREQUENCIES_RAD_S - 1.0 / MEMORY_S, age_s)) @ sums
+
+
+def as_complex(pair):
+    return pair[0] + 1j * pair[1]
+
+
+def test_what_is_heard_is_a_sum_that_fades_over_the_whitened_frames(view, listening, rng):
+    samples, regressors = rng.normal(size=60), rng.normal(size=(60, 3))
+    listen(view, listening, samples, regressors, tolerated=True)
+    found = view["tones"]
+    assert as_complex(found["tone"]) == pytest.approx(resonance(2.0 * samples))
+    for j in range(3):
+        assert as_complex(found["overlap"][j]) == pytest.approx(resonance(2.0 * regressors[:, j]))
+    faded = np.exp(-2.0 * EVERY * DT * np.arange(30) / MEMORY_S).sum()
+    assert found["information"] == pytest.approx(EVERY * faded)
+    assert not found["overlap"][3:].any()
+
+
+def test_a_sum_is_judged_when_it_is_full_and_not_before(view, listening):
+    listen(view, listening, [50.0])
+    assert (view["tones"]["score"], view["tones"]["information"]) == (0.0, 0.0)
+    listen(view, listening, [50.0])
+    assert view["tones"]["score"] > 0.0
+    assert (view["tones"]["count"], view["tones"]["sum"]) == (0, 0.0)
+
+
+def test_what_is_not_heard_lets_the_rest_fade(view, listening, rng):
+    samples = rng.normal(size=20)
+    listen(view, listening, samples)
+    then = np.abs(as_complex(view["tones"]["tone"]))
+    listen(view, listening, np.full(10, 1e6), heard=False)
+    assert np.abs(as_complex(view["tones"]["tone"])) == pytest.approx(then * exp(-10 * DT / MEMORY_S))
+
+
+@pytest.mark.parametrize(("K_x", "K_d", "keep"), [(0.3, 0.8, 1.0), (0.05, 0.02, 1.0), (0.2, 0.5, 0.95)])
+@pytest.mark.parametrize("frequency_rad_s", [1.0, 5.0, 13.0])
+def test_the_filter_lets_pass_of_a_tone_what_it_does_when_run(view, K_x, K_d, keep, frequency_rad_s):
+    block = view["block"]
+    block["K_x"][0, 0], block["K_d"][0, 0], block["keep"] = K_x, K_d, keep
+    out, response = np.zeros(2), []
+    for k in range(6000):
+        whitening.whiten(block, block["state"], np.array([np.cos(frequency_rad_s * k * DT), 0.0]), DT, out)
+        response.append(out[0])
+    angles = frequency_rad_s * DT * np.arange(3000, 6000)
+    shares, *_ = np.linalg.lstsq(
+        np.stack([np.cos(angles), np.sin(angles)], axis=-1), response[3000:], rcond=None
+    )
+    amplitude = np.hypot(*shares)
+    angle = frequency_rad_s * DT
+    found = tones.passes(K_x, K_d, keep, np.cos(angle), np.sin(angle), DT)
+    assert found == pytest.approx(amplitude, rel=1e-9)
+
+
+def test_room_is_what_a_bounded_uncertainty_adds_summed_as_the_tone_is(view, listening):
+    bounds = [0.05, 0.02, 0.0, 0.09] * 8
+    for bound in bounds:
+        view["bounded"] = bound
+        listen(view, listening, np.zeros(EVERY))
+    angle = FREQUENCIES_RAD_S * DT
+    passed = np.array([tones.passes(0.3, 0.8, 1.0, np.cos(a), np.sin(a), DT) for a in angle])
+    age_s = EVERY * DT * np.arange(len(bounds))[::-1]
+    faded = EVERY * np.exp(-age_s / MEMORY_S) * bounds
+    beat = np.abs(np.exp(np.multiply.outer(2j * FREQUENCIES_RAD_S, age_s)) @ faded)
+    mean = tones.heard_of_bounded(FREQUENCIES_RAD_S, PACE)
+    assert view["tones"]["room"] == pytest.approx(2.0 * passed * mean * (faded.sum() + beat))
+
+
+@given(st.lists(st.floats(0.0, 1.0), min_size=4, max_size=40), st.floats(0.1, 3.0))
+def test_what_a_bound_that_changes_lets_be_heard_is_within_the_room(bounds, angle):
+    """By trying every phase: sum of bound |cos|, beside its size and what beats at twice the frequency. Its
+    harmonics reckoned as a third of that may be more of a bound of few spikes."""
+    bounds = np.repeat(bounds, 8)
+    k = angle / 8.0 * np.arange(len(bounds))
+    phases = np.linspace(0.0, pi, 61)[:, None]
+    most = np.max(np.abs(np.cos(k + phases)) @ bounds)
+    beats = [abs(np.exp(1j * n * k) @ bounds) for n in (2, 4, 6, 8)]
+    room = 2.0 / pi * (bounds.sum() + 2.0 / 3.0 * beats[0] + max(beats) / 3.0)
+    assert most <= room * (1.0 + 1e-9) + 1e-12
+
+
+@pytest.mark.parametrize(("x", "steep"), [(0.01, True), (0.5, True), (1.2, True), (2.0, False), (6.0, False)])
+def test_of_a_bounded_uncertainty_no_more_is_heard_than_of_the_steepest_wave(x, steep):
+    """A square wave whose edges take as long as its pace needs; beyond, a triangle that never gets to one."""
+    phase = (np.arange(20000) + 0.5) * 2.0 * pi / 20000
+    triangle = np.arcsin(np.cos(phase))  # of slope one
+    wave = np.clip(triangle / x, -1.0, 1.0) if steep else triangle / x
+    assert np.mean(np.cos(phase) * wave) == pytest.approx(
+        tones.heard_of_bounded(np.array([x]), 1.0)[0], rel=1e-6
+    )
+
+
+@settings(deadline=None)
+@given(st.lists(st.floats(-1.0, 1.0), min_size=8, max_size=8), st.floats(0.05, 8.0))
+def test_no_periodic_uncertainty_of_that_pace_is_heard_louder(steps, x):
+    phase = np.arange(400) * 2.0 * pi / 400
+    slope = np.repeat(steps, 50) / x
+    wave = (
+        np.cumsum(slope - slope.mean()) * 2.0 * pi / 400 / 2.0
+    )  # slopes within 1 / x, whatever the mean was
+    wave -= 0.5 * (wave.max() + wave.min())
+    wave /= max(1.0, np.abs(wave).max())
+    most = tones.heard_of_bounded(np.array([x]), 1.0)[0]
+    assert abs(np.mean(np.exp(1j * phase) * wave)) <= most * (1.0 + 1e-3)
+
+
+@given(st.lists(st.floats(-1e3, 1e3), min_size=2, max_size=2))
+def test_the_slack_of_one_coefficient_is_its_magnitude_and_at_most_a_twelfth_more(parts):
+    record = new_fdi()["statistical"]["views"][0]["tones"]
+    record["overlap"][0, :, 4], size = parts, np.hypot(*parts)
+    tones.tolerate(record, np.array([0.3]), 1)
+    assert 0.3 * size * (1.0 - 1e-12) <= record["slack"][4] <= 0.3 * 1.0825 * size + 1e-300
+    assert record["slack"][5] == 0.0
+
+
+def test_slacks_of_several_coefficients_add_up_and_only_of_those_there_are(view, rng):
+    record = view["tones"]
+    record["overlap"][:] = 9.0
+    record["overlap"][:2, 0], record["overlap"][:2, 1], record["slack"] = -3.0, 0.0, 7.0
+    tones.tolerate(record, np.array([0.1, 0.2, 0.4]), 2)
+    assert record["slack"] == pytest.approx(np.full(N_TONES, 0.9))
+
+
+def test_noise_as_declared_is_no_louder_than_a_chance_of_exp_of_minus_half_its_square(listening, rng):
+    """Of the largest of all frequencies, however far apart their parts are: each alone is within that."""
+    noise = rng.normal(size=(4000, 300))
+    loud = np.array([np.abs(resonance(row)) for row in noise.reshape(4000, -1)])
+    age_s = EVERY * DT * np.arange(150)
+    root = np.sqrt(listening["width"] * EVERY * np.exp(-2.0 * age_s / MEMORY_S).sum())
+    for x in (1.0, 2.0, 3.0):
+        share = np.mean(loud / root > x, axis=0)
+        assert (share < exp(-0.5 * x * x) + 3.0 * sqrt(exp(-0.5 * x * x) / 4000)).all()
+    assert (np.mean(loud / root > 1.0, axis=0) > 0.4).all(), "and not much quieter"
+
+
+def test_the_score_is_that_of_the_loudest_beyond_what_is_explained(view, listening):
+    record = view["tones"]
+    record["information"], record["tone"][0, 3], record["tone"][1, 3] = 100.0, 60.0, 80.0
+    record["slack"][3], record["tone"][0, 7], listening["width"][:] = 10.0, 12.0, 0.6
+    tones.judge(record, listening, 6.0)
+    root = sqrt(100.0 * listening["width"][3])
+    assert record["score"] == pytest.approx(90.0 / root * 6.0 / LEVEL)
+    record["room"][3] = 200.0
+    tones.judge(record, listening, 6.0)
+    assert record["score"] == pytest.approx(90.0 / (200.0 / LEVEL + 0.5 * root) * 6.0 / LEVEL)
+    record["tone"][:] = 0.0
+    tones.judge(record, listening, 6.0)
+    assert record["score"] == 0.0
+
+
+@pytest.mark.parametrize("frequency_rad_s", [1.0, 3.9, 9.6, 13.0])
+def test_a_tone_is_heard_on_the_grid_and_between(view, listening, frequency_rad_s):
+    view["bounded"] = 0.0
+    samples = 0.5 * 0.8 * np.cos(frequency_rad_s * DT * np.arange(1000) + 1.0)  # 0.8 standard deviations
+    listen(view, listening, samples, alarm_level=LEVEL)
+    whole = 0.8 / 2.0 * MEMORY_S / DT / sqrt(0.5 * 0.5 * MEMORY_S / DT)  # amplitude over its deviation
+    assert 0.6 * whole < view["tones"]["score"] < 1.1 * whole
+
+
+def test_an_aircraft_that_has_all_but_stopped_or_tumbles_is_not_listened_to(listening):
+    def flow(**changed):
+        y = np.zeros(5)
+        y[AIRSPEED] = V
+        for place, value in changed.items():
+            y[{"V": AIRSPEED, "alpha": ALPHA, "beta": BETA}[place]] = value
+        return tones.usual(listening, y)
+
+    assert flow()
+    assert flow(V=23.0)
+    assert flow(V=89.0)
+    assert flow(alpha=-0.49)
+    assert flow(beta=0.49)
+    for wild in (
+        {"V": 22.0},
+        {"V": 91.0},
+        {"alpha": 0.51},
+        {"alpha": -0.51},
+        {"beta": 0.51},
+        {"beta": -0.51},
+    ):
+        assert not flow(**wild)
+
+
+def test_the_loudest_tone_counts_as_the_best_test_of_a_view(view):
+    view["block"]["n_hypotheses"], view["block"]["hypothesis"]["score"] = 2, 3.0
+    view["tones"]["score"] = 2.0
+    assert across.best(view) == 3.0
+    view["tones"]["score"] = 4.0
+    assert across.best(view) == 4.0
+
+
+@pytest.mark.parametrize(
+    ("surface", "plane", "mix", "inertial", "expected"),
+    [
+        (AN_AXIS, (0, YAW), {YAW: 1.0}, 0, 4.0),  # the tone alone: blocks of the rates look for all else
+        (AN_AXIS, (YAW, SIDE), {SIDE: 1.0}, 1, 0.0),
+        (0, (0, SIDE), {SIDE: -0.95, 0: 0.3}, 0, 9.0),
+        (0, (0, SIDE), {SIDE: 0.85, 0: 0.5}, 0, 0.0),
+        (0, (0, YAW), {YAW: 1.0}, 0, 0.0),
+        (THE_VANE, (PITCH, SIDE), {SIDE: 1.0}, 0, 0.0),
+    ],
+)
+def test_what_raises_the_alarm_beside_the_blocks(surface, plane, mix, inertial, expected):
+    statistical = new_fdi()["statistical"]
+    statistical["alarm_level"], statistical["naming_level"], statistical["n_views"] = 5.0, 12.5, 1
+    view = statistical["views"][0]
+    view["surface"], view["plane"], view["inertial"], view["tones"]["score"] = surface, plane, inertial, 4.0
+    view["block"]["n_hypotheses"], view["block"]["hypothesis"]["score"] = 1, 9.0
+    for i, share in mix.items():
+        view["mix"][i] = share
+    assert across.alarm(statistical, view) == expected

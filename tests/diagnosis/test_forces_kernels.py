@@ -365,6 +365,51 @@ def test_what_goes_along_a_column_of_rate_and_force_is_not_seen_past_it(viewed, 
         assert across.feels(viewed, view, FLAP if s == ELEVATOR else ELEVATOR, G[:, 1]) == (second == NORMAL)
 
 
+def test_the_side_vane_is_cleared_across_the_rolling_gust_as_well(viewed):
+    """Of roll, yaw and side force: neither the vane's error nor a rolling gust moves what is looked at, and
+    what errors of the vane's column let show is the most that its corners do."""
+    statistical, rng = viewed["statistical"], np.random.default_rng(3)
+    statistical["air"]["moving"] = 1
+    set_up_views(statistical, AIRCRAFT)
+    view, moving = statistical["views"][BETA_VIEW], statistical["air"]
+    moving["damping"], moving["axes"] = rng.normal(size=(3, 3)), np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    force = statistical["forces"]["component"][SIDE]
+    column = np.array([force["vane_roll"], *force["vane"]])
+    share = across.turn(viewed, view, np.zeros((3, 4)))
+    mix = view["mix"][[ROLL, YAW, ACROSS]]
+    assert np.linalg.norm(view["mix"]) == pytest.approx(1.0)
+    assert mix @ column == pytest.approx(0.0, abs=1e-12)
+    gust = (moving["damping"] @ moving["axes"])[:, 0]
+    assert view["mix"][:3] @ gust == pytest.approx(0.0, abs=1e-12)
+    assert view["mix"][PITCH] == view["mix"][NORMAL] == 0.0
+    assert view["column"][[ROLL, YAW, ACROSS]] == pytest.approx(column / np.linalg.norm(column))
+    corners = np.stack(np.meshgrid(*[(-0.1, 0.1)] * 3)).reshape(3, -1).T * column
+    assert share == pytest.approx(np.max(np.abs(corners @ mix)) / (0.9 * np.linalg.norm(column)))
+    n = int(view["block"]["n_regressors"])
+    across.regress(viewed, view, np.zeros(3), share)
+    view["cleared_by"] = 0
+    across.regress(viewed, view, np.array([0.4, 7.0, -0.3]), share)
+    seen = np.array([0.4, -0.3, force["innovation"]])
+    assert view["block"]["regressor"][n - 1, 0] == pytest.approx(
+        share * seen @ column / np.linalg.norm(column)
+    )
+
+
+def test_where_no_vane_and_no_gust_moves_anything_the_direction_stays(viewed):
+    statistical = viewed["statistical"]
+    statistical["air"]["moving"] = 1
+    set_up_views(statistical, AIRCRAFT)
+    view = statistical["views"][BETA_VIEW]
+    view["mix"] = 0.6, 0.0, 0.8, 0.0, 0.0
+    statistical["air"]["damping"] = 0.0
+    assert across.turn(viewed, view, np.zeros((3, 4))) == 0.0
+    assert view["mix"].tolist() == [0.6, 0.0, 0.8, 0.0, 0.0]
+
+
+def test_in_still_air_there_is_no_gust_to_look_past(viewed):
+    assert not viewed["statistical"]["views"]["past_gust"].any()
+
+
 def test_a_force_counts_once_the_vane_is_cleared(viewed):
     """At the alarm level, of what clears the vane at the naming level; rates need no clearing."""
     statistical = viewed["statistical"]
@@ -418,7 +463,7 @@ def test_what_errors_multiply_along_a_direction_is_that_of_rate_and_force(viewed
     pitch, force = statistical["block"][0], statistical["forces"]["component"][UP]
     pitch["n_regressors"], pitch["regressor"][:3, 0] = 3, rng.normal(size=3)
     view, n = statistical["views"][ELEVATOR_VIEW], int(force["n"])
-    view["mix"] = 0.0, 0.6, 0.0, 0.0, -0.8
+    view["mix"], view["column"] = (0.0, 0.6, 0.0, 0.0, -0.8), (0.0, -0.8, 0.0, 0.0, -0.6)
     across.regress(viewed, view, np.array([0.0, 2.0, 0.0]), 0.1)
     found = view["block"]["regressor"][: 4 + n, 0]
     along = 0.1 * (-0.8 * 2.0 - 0.6 * force["innovation"])

@@ -78,8 +78,10 @@ def column_of(fdi, view, G, j):
 
 @kernel
 def turn(fdi, view, G):
-    """Fill `mix` (5,), for a view across a column, G (3, n); returns which share of what goes along it the
-    errors of the column let show across."""
+    """Fill `mix` and `column` (5,), for a view across a column, G (3, n); returns which share of what goes
+    along it the errors of the column let show across."""
+    if view.past_gust:
+        return turn_past_gust(fdi.statistical, view)
     first, second = view.plane[0], view.plane[1]
     one, one_off = column_of(fdi, view, G, 0)
     other, other_off = column_of(fdi, view, G, 1)
@@ -87,9 +89,29 @@ def turn(fdi, view, G):
     if size == 0.0:
         return 0.0
     view.mix[first], view.mix[second] = -other / size, one / size
+    view.column[first], view.column[second] = one / size, other / size
     across_it = abs(view.mix[first]) * one_off + abs(view.mix[second]) * other_off
     shorter = abs(view.mix[second]) * one_off + abs(view.mix[first]) * other_off
     return across_it / max(size - shorter, LEAST_LENGTH * size)
+
+
+@kernel
+def turn_past_gust(statistical, view):
+    """The same across the column of the side vane in roll, yaw and side force, and across what the rolling
+    gust does to the rates: the vector product of the two."""
+    force, moving = statistical.forces.component[0], statistical.air
+    roll, yaw, side = force.vane_roll, force.vane[0], force.vane[1]
+    roll_gust = air.along(moving.damping[ROLL], moving.axes, 0)
+    yaw_gust = air.along(moving.damping[YAW], moving.axes, 0)
+    by_roll, by_yaw, by_side = -side * yaw_gust, side * roll_gust, roll * yaw_gust - yaw * roll_gust
+    length = np.sqrt(by_roll * by_roll + by_yaw * by_yaw + by_side * by_side)
+    if length == 0.0:
+        return 0.0
+    size, shows = np.sqrt(roll * roll + yaw * yaw + side * side), 0.0
+    for i, of_vane, by in ((ROLL, roll, by_roll), (YAW, yaw, by_yaw), (SIDE, side, by_side)):
+        view.mix[i], view.column[i] = by / length, of_vane / size
+        shows += VANE_TOLERANCE * abs(view.mix[i] * of_vane)
+    return shows / ((1.0 - VANE_TOLERANCE) * size)
 
 
 @kernel
@@ -175,8 +197,10 @@ def regress(fdi, view, innovation, share):
         if view.inertial:
             block.regressor[n, 0], n = m[second] * force.drifted, n + 1
     if view.surface != AN_AXIS:
-        one, other = part(fdi, view, innovation, first), part(fdi, view, innovation, second)
-        block.regressor[n, 0] = share * (m[second] * one - m[first] * other)
+        block.regressor[n, 0] = 0.0
+        for i in range(m.size):
+            if view.column[i] != 0.0:
+                block.regressor[n, 0] += share * view.column[i] * part(fdi, view, innovation, i)
 
 
 @kernel

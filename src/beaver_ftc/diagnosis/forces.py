@@ -46,7 +46,8 @@ FORCE = np.dtype(
         ("inertial", "f8"), ("angle", "f8"), ("drift", "f8"), ("drifted", "f8"), ("wander", "f8"),
         # of each surface per rad, and at its command; of its errors per rad
         ("column", "f8", (MAX_SURFACES,)), ("moment", "f8", (MAX_SURFACES,)), ("own", "f8", (MAX_SURFACES,)),
-        ("vane", "f8", (2,)),  # of an error of its vane: angular acceleration, and e, per rad
+        # of an error of its vane: angular acceleration, and e, per rad; that in roll
+        ("vane", "f8", (2,)), ("vane_roll", "f8"),
         ("quiet", "f8", (2,)), ("jitter", "f8", (2,)), ("damping", "f8", (3,)), ("deflection", "f8"),
         ("felt", "f8"),  # variance of e by noise of the accelerometer, which the pressure does not scale
         ("n", "i8"), ("tolerance", "f8", (MAX_ERRORS,)), ("regressor", "f8", (MAX_ERRORS,)),
@@ -193,7 +194,7 @@ def set_up_forces(
     for f, (vane, axis) in enumerate(((BETA, 2), (ALPHA, 1))):
         force, terms = forces["component"][f], terms_of(aircraft, f)
         slopes = scale * _slopes(aircraft, COMPONENTS[f], trim)
-        force["vane"] = -along_y[axis, vane], -slopes[vane]
+        force["vane"], force["vane_roll"] = (-along_y[axis, vane], -slopes[vane]), -along_y[0, vane]
         force["damping"] = slopes[3:]
         parts = (slopes * _noise(bounds, ("alpha", "beta", "V", *SIGNALS[:3]))) ** 2
         force["quiet"] = parts.sum(), parts.sum() - parts[vane]

@@ -143,11 +143,12 @@ TONES = np.dtype(
 # AN_AXIS of none, THE_VANE of an error of the incidence. plane: of the column; tolerated: anything at all;
 # inertial: the force by an angle that no vane gave; clears: what it shows is no vane's doing; cleared_by: the
 # force of the views that clear its vane, 0 where it asks none. held: its largest score, slowly forgotten.
-# axis: that an alarm of it is said to be about.
+# axis: that an alarm of it is said to be about. past_gust: across the rolling gust too. column: of length 1.
 AN_AXIS, THE_VANE = -1, -2
 VIEW = np.dtype(
     [
-        ("surface", "i8"), ("axis", "i8"), ("mix", "f8", (5,)), ("plane", "i8", (2,)), ("tolerated", "i8"),
+        ("surface", "i8"), ("axis", "i8"), ("mix", "f8", (5,)), ("plane", "i8", (2,)),
+        ("past_gust", "i8"), ("column", "f8", (5,)), ("tolerated", "i8"),
         ("inertial", "i8"), ("clears", "i8"), ("cleared_by", "i8"),
         ("bounded", "f8", (1,)), ("by_rates", "f8", (3,)), ("by_forces", "f8", (3,)), ("held", "f8"),
         ("block", BLOCK), ("tones", TONES),

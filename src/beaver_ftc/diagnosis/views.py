@@ -114,6 +114,7 @@ def set_up_views(statistical: np.void, aircraft: Aircraft) -> None:
         block["tolerance"][n] = float(surface != AN_AXIS)  # of how far errors turn the column, in flight
         hypotheses = block["hypothesis"][: len(kinds)]
         hypotheses["kind"], hypotheses["surface"] = kinds, [-1, *tried]
+        view["past_gust"] = surface == THE_VANE and plane == IN_YAW and statistical["air"]["moving"]
         view["inertial"], view["clears"] = inertial, inertial or surface == THE_VANE
         sense = block["lane"]["sense"].reshape(N_SLOTS, -1)
         sense[:] = 0.0

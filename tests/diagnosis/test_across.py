@@ -2,11 +2,12 @@
 
 import numpy as np
 import pytest
-from kernels import new_fdi
+from kernels import DT, new_fdi
 
 from beaver_ftc.aircraft import load
 from beaver_ftc.diagnosis import across, air, isolation
 from beaver_ftc.diagnosis.state import LOSS, POSITION, STEP
+from beaver_ftc.diagnosis.tones import set_up_listening
 from beaver_ftc.diagnosis.views import across_a_column, set_up_views
 from beaver_ftc.loop.loop import Loop, fly
 from beaver_ftc.scenario.diagnosis import FdiConfig
@@ -16,6 +17,7 @@ from flying import SINES, scenario
 AIRCRAFT = load()
 AILERON, ELEVATOR, RUDDER, FLAP = range(4)
 PITCH_AXIS, ROLL_AXIS, YAW_AXIS, PAST_AILERON, PAST_RUDDER = range(5)
+FLOW = np.array([0.05, 0.0, 45.0, 1200.0, 0.1])  # alpha, beta, airspeed, pressure, dpt
 G = np.array([[-9.0, 0.0, 1.2, 0.0], [0.0, -8.0, 0.0, -1.5], [-0.4, 0.0, -3.0, 0.0]])
 
 
@@ -28,6 +30,7 @@ def watching(turns=0.0):
     for block, n in zip(statistical["block"], (1, 2, 2), strict=True):
         block["noise"][:n] = 1e-8
     set_up_views(statistical, AIRCRAFT)
+    set_up_listening(statistical["listening"], 1e-8, 45.0, 15.0, DT)
     statistical["tolerated"] = fdi["bound"]["own_errors"] = turns > 0.0
     fdi["bound"]["own_per_rad"] = turns * np.abs(G)
     fdi["layout"]["position_of"] = range(4)
@@ -40,7 +43,7 @@ def shown(fdi, courses, frames=70):
     """Show it accelerations, frames after one another: courses(k) (3,) rad/s2."""
     u = np.array([0.05, 0.03, 0.04, 0.0])
     for k in range(frames):
-        across.observe(fdi, courses(k), G, G * u, 45.0, k, False)
+        across.observe(fdi, courses(k), G, G * u, FLOW, k, False)
     return fdi["statistical"]["views"]
 
 

@@ -5,7 +5,7 @@ import pytest
 from kernels import DT, new_fdi
 
 from beaver_ftc.aircraft import load
-from beaver_ftc.diagnosis import across, likelihood
+from beaver_ftc.diagnosis import across, likelihood, tones
 from beaver_ftc.diagnosis.state import (
     AN_AXIS,
     LEAST_UNCERTAINTY_RAD_S2,
@@ -42,6 +42,7 @@ def fdi(rng):
         block["regressor"] = rng.normal(size=block["regressor"].shape)
         block["tolerance"][:regressors] = rng.uniform(0.1, 0.2, regressors)
     set_up_views(statistical, load())
+    tones.set_up_listening(statistical["listening"], 1e-8, V, 15.0, DT)
     air = statistical["air"]
     air["moving"], air["rolling"], air["per_metre"] = 1, 34.0, rng.uniform(1e-5, 1e-4, 3)
     for name in ("damping", "axes", "swing", "leap"):

@@ -12,6 +12,7 @@ from beaver_ftc.diagnosis import across, forces
 from beaver_ftc.diagnosis.forces import SIDE, UP, look, set_up_forces
 from beaver_ftc.diagnosis.state import AN_AXIS, NORMAL, PITCH, ROLL, THE_VANE, YAW
 from beaver_ftc.diagnosis.state import SIDE as ACROSS
+from beaver_ftc.diagnosis.tones import set_up_listening
 from beaver_ftc.diagnosis.views import set_up_views
 from beaver_ftc.plant.readings import MEASURED
 from beaver_ftc.scenario.diagnosis import Bounds
@@ -213,7 +214,7 @@ def test_without_accelerometers_no_force_is_weighed(viewed):
     assert across.shown(statistical, views[0]) == 50.0
     for block in statistical["block"]:
         block["noise"] = 1e-8
-    across.observe(viewed, np.zeros(3), G, 0.0 * G, 45.0, 1, False)
+    across.observe(viewed, np.zeros(3), G, 0.0 * G, Y, 1, False)
     assert not views["held"][ELEVATOR_VIEW : SIDE_VIEW + 1].any()
 
 
@@ -228,7 +229,9 @@ def test_accelerometers_that_may_break_raise_no_alarm_and_tell_no_gust(viewed):
     views["block"]["hypothesis"]["score"][0, 0] = 7.0
     for read in (1, 0):
         air["read"] = read
-        assert across.alarms(statistical, views[ELEVATOR_VIEW]) == bool(read)
+        views["held"][UP_VIEW] = 50.0
+        assert across.alarm(statistical, views[ELEVATOR_VIEW]) == 9.0 * read
+        views["held"][UP_VIEW] = 0.0
         assert across.told(statistical, views[0]) == bool(read)
         assert across.part(viewed, views[0], np.ones(3), PITCH) == pytest.approx(1.0 - 0.2 * read)
         assert across.shown(statistical, views[0]) == (0.0 if read else 7.0), "nothing is to be cleared"
@@ -331,6 +334,7 @@ def viewed():
     statistical = fdi["statistical"]
     statistical["alarm_level"], statistical["naming_level"], statistical["keep"] = 6.0, 0.5 * 5.0**2, 0.99
     set_up_views(statistical, AIRCRAFT)
+    set_up_listening(statistical["listening"], 1e-8, 45.0, 15.0, DT)
     look(statistical["forces"], statistical["air"], measured(), U, DT)
     fdi["layout"]["position_of"] = range(4)
     return fdi

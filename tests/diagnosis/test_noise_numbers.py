@@ -10,7 +10,7 @@ from beaver_ftc.aircraft import load
 from beaver_ftc.design.coefficients import MASS
 from beaver_ftc.design.model import design_record
 from beaver_ftc.design.variants import coefficient_slopes
-from beaver_ftc.diagnosis import noise_model
+from beaver_ftc.diagnosis import gusts, noise_model
 from beaver_ftc.diagnosis.admitted import gust_sigma_rad_s, inertia_slack
 from beaver_ftc.diagnosis.state import ALPHA3, ENDING, GROWING, LOSS, N_SLOTS, STATISTICAL, STEP
 from beaver_ftc.loop.assembly import assemble
@@ -33,7 +33,7 @@ AILERON, ELEVATOR, RUDDER = 0, 1, 2
 def test_gusts_drift_as_the_specification_has_them(turbulence):
     """Intensity over V: of a first-order process twice its variance over its lag; of a lagged slope that of
     the velocity over (V lag)^2 [MIL-F-8785C]."""
-    found = noise_model.gust_drift(turbulence, SPAN_M)
+    found = gusts.drift(turbulence, SPAN_M)
     sigma_w = 0.3048 * {"light": 7.4, "severe": 23.6}[turbulence]
     L = 0.3048 * 1750.0
     rolling_lag_s = sqrt(L * SPAN_M) / (2.6 * V)

@@ -256,8 +256,11 @@ def test_the_loudest_tone_counts_as_the_best_test_of_a_view(view):
 )
 def test_what_raises_the_alarm_beside_the_blocks(surface, plane, mix, inertial, expected):
     statistical = new_fdi()["statistical"]
-    statistical["alarm_level"], statistical["naming_level"], statistical["n_views"] = 5.0, 12.5, 1
-    view = statistical["views"][0]
+    statistical["alarm_level"], statistical["naming_level"], statistical["n_views"] = 5.0, 12.5, 2
+    statistical["air"]["read"] = statistical["forces"]["known"] = 1
+    view, clearing = statistical["views"][:2]
+    clearing["clears"], clearing["plane"], clearing["held"] = 1, (YAW, SIDE), 50.0
+    view["cleared_by"], view["held"] = SIDE, 9.0
     view["surface"], view["plane"], view["inertial"], view["tones"]["score"] = surface, plane, inertial, 4.0
     view["block"]["n_hypotheses"], view["block"]["hypothesis"]["score"] = 1, 9.0
     for i, share in mix.items():

@@ -2,18 +2,19 @@
 
 from collections.abc import Iterator
 from dataclasses import astuple
-from math import exp, hypot, pi, sqrt
+from math import exp, hypot, sqrt
 from statistics import NormalDist
 
 import numpy as np
 
 from beaver_ftc.aircraft import AXES, Aircraft, MassProperties, Term, load
-from beaver_ftc.aircraft.aircraft import FORCES, MOMENTS
+from beaver_ftc.aircraft.aircraft import MOMENTS
 from beaver_ftc.aircraft.schema import RATE_SIGNALS
 from beaver_ftc.design.inertia import inertia_coefficients
-from beaver_ftc.design.terms import AIRSPEED, ALPHA, BETA, PH, QDYN, QH, RH, fill_table
+from beaver_ftc.design.terms import AIRSPEED, ALPHA, BETA, PH, QDYN, QH, RH
 from beaver_ftc.design.variants import coefficient_slopes, jacobian
-from beaver_ftc.diagnosis.admitted import GUST_FT_S, SCALE_FT, inertia_slack, tolerances
+from beaver_ftc.diagnosis import gusts
+from beaver_ftc.diagnosis.admitted import inertia_slack, tolerances
 from beaver_ftc.diagnosis.forces import set_up_forces
 from beaver_ftc.diagnosis.readings import random_error, set_up_readings
 from beaver_ftc.diagnosis.state import (
@@ -46,14 +47,9 @@ SIDES = {LOSS: 1, GROWING: 1, ENDING: 1, STEP: 2, ALPHA3: 2}  # a loss has a sig
 # Of a loss that grows: of one ten times slower or faster it explains a third, the rest of it a constant one.
 GROWTH_PER_S = 1.5
 
-# Share of the intensity of the rolling, pitching and yawing gust that the vanes leave; on exact vanes and
-# over a filter's memory it is less (`tests/diagnosis/test_air.py`).
-UNSEEN = (1.0, 0.003, 0.03)
 # Share of the alarm level that noise is given beside an uncertainty at its bound; what it is worth where both
 # matter is in docs/theory.md, section 7.
 CHANCE = 0.5
-BY_FORCE = 0.01  # share of the intensity that errors of a tenth leave of the gusts that forces show
-TWO_STEPS = 1.6  # times its noise does an acceleration scatter by Adams and Bashforth: sqrt(1.5^2 + 0.5^2)
 LEAST_NOISE_RAD_S = 1e-9  # of a gyro: exact ones are still doubles, and a variance no difference of zeros
 Start = tuple[np.ndarray, np.ndarray, np.ndarray]  # x (3,) rad/s, y (5,) and u (4,) rad in trim
 _GYRO_OF = dict(zip(RATE_SIGNALS, AXES, strict=True))
@@ -126,7 +122,7 @@ def set_up(
     if given is None or not fdi["enabled"]:  # a plug-in diagnoses, or nothing does
         return
     statistical["enabled"], statistical["share"] = 1, 1.0 / max(int(fdi["instants"]), 1)
-    _set_up_air(statistical["air"], config.bounds.turbulence, mass, aircraft)
+    gusts.set_up_air(statistical["air"], config.bounds.turbulence, mass, aircraft)
     forces = bool(statistical["forces"]["known"])
     across = across_a_column(config, int(fdi["instants"]))
     tests = tests_a_frame(aircraft, *(views_of(aircraft, forces) if across else ()))
@@ -148,14 +144,14 @@ def set_up(
             statistical["air"]["read"] = not fdi["watch"]["enabled"]  # which may find them broken
             statistical["inertial_air"] = statistical["air"]
             statistical["inertial_air"]["moving"] *= statistical["air"]["read"]
-            statistical["inertial_air"]["unseen"] = np.minimum(np.add(UNSEEN, BY_FORCE), 1.0)
+            statistical["inertial_air"]["unseen"] = np.minimum(np.add(gusts.UNSEEN, gusts.BY_FORCE), 1.0)
         set_up_views(statistical, aircraft)
     block = statistical["block"][-1]
     block["lag"] = returning_length(statistical, float(start[1][AIRSPEED]), rate_hz)
     if statistical["air"]["moving"]:
         block["stronger"] = (statistical["air"]["rolling"] / block["lag"]) ** 2
         span_m = aircraft.geometry.span_m
-        _set_up_gust_jitter(statistical, config.bounds.sensors, design, start, span_m, 1.0 / rate_hz)
+        gusts.set_up_jitter(statistical, config.bounds.sensors, design, *start[1:], span_m, 1.0 / rate_hz)
 
 
 def _set_up_blocks(statistical: np.void, sensors: Sensors, aircraft: Aircraft) -> None:
@@ -302,59 +298,3 @@ def _inertia_share(tolerance: float, mass: MassProperties) -> float:
     """Largest relative error of what multiplies a moment on its own axis."""
     slack, nominal = inertia_slack(tolerance, mass), np.abs(astuple(inertia_coefficients(mass)))
     return float(max(slack[i] / nominal[i] for i in (2, 7, 11)))
-
-
-def _set_up_air(air: np.void, turbulence: str, mass: MassProperties, aircraft: Aircraft) -> None:
-    span_m = aircraft.geometry.span_m
-    air["moving"] = turbulence != "none"
-    fill_table(air["forces"], aircraft, aircraft.measurable_forces, FORCES)
-    air["area_per_mass"] = aircraft.geometry.wing_area_m2 / mass.mass_kg
-    air["gravity"] = 9.80665  # m/s2, standard; what is constant has no part in a change of the gust
-    air["span"] = span_m
-    air["per_metre"], air["unseen"] = gust_drift(turbulence, span_m), UNSEEN
-    air["scale"] = 0.3048 * SCALE_FT
-    air["rolling"] = sqrt(air["scale"] * span_m) / 2.6  # [Yeager1998, eq. 10]
-
-
-def gust_drift(turbulence: str, span_m: float) -> np.ndarray:
-    """Intensity of the random walk that each rotating gust is over times short beside its own, over V.
-
-    (3,) rad2/s3 per m/s, for roll, pitch and yaw. The rolling gust is a first-order process with
-    sigma = 1.9 sigma_w / sqrt(L b) and a lag of sqrt(L b) / 2.6 V [Yeager1998, eq. 8]: 2 sigma^2 / lag. The
-    others are lagged slopes of a velocity of intensity 3 sigma_w^2 V / L [MIL-F-8785C, 3.7], over (V lag)^2.
-    """
-    sigma_w, L, b = 0.3048 * GUST_FT_S[turbulence], 0.3048 * SCALE_FT, span_m
-    rolling = 2.0 * 1.9**2 * 2.6 * sigma_w**2 / (L * b) ** 1.5
-    velocity = 3.0 * sigma_w**2 / L
-    return np.array([rolling, velocity * (pi / (4 * b)) ** 2, velocity * (pi / (3 * b)) ** 2])
-
-
-def _set_up_gust_jitter(
-    statistical: np.void, sensors: Sensors, design: np.void, start: Start, span_m: float, dt_s: float
-) -> None:
-    """What noise adds to the gust that is followed: that of the vanes, and of the force that moves the air's
-    velocity on from frame to frame; where the flow follows from the forces, that of the forces too."""
-    flow = _flow_noise(sensors, start[1][AIRSPEED])
-    if statistical["forces"]["known"]:
-        forces = statistical["forces"]["component"][::-1]  # normal to the body, and across
-        felt = np.array([random_error(sensors, "az"), random_error(sensors, "ay")])
-        flow += TWO_STEPS * felt * dt_s / start[1][AIRSPEED]
-        by_force = np.sqrt(forces["felt"]) / np.abs(forces["vane"][:, 1])
-        statistical["forces"]["blurred"] = _gust_jitter(by_force, design, start, span_m)
-    for name in ("own_jitter", "jitter"):
-        statistical[name] += _gust_jitter(flow, design, start, span_m) ** 2
-
-
-def _flow_noise(sensors: Sensors, airspeed_mps: float) -> np.ndarray:
-    """Of the flow's angles (2,) as the vanes and the airspeed have them, standard deviation in rad."""
-    speed = 0.3 * random_error(sensors, "V") / airspeed_mps  # through attitudes of up to 17 deg
-    return np.array([random_error(sensors, "alpha"), random_error(sensors, "beta")]) + speed
-
-
-def _gust_jitter(flow: np.ndarray, design: np.void, start: Start, span_m: float) -> np.ndarray:
-    """Standard deviation, rad/s2 on each axis, of what noise of the flow's angles (2,) rad adds to a gust."""
-    _, y, u = start
-    V, b = y[AIRSPEED], span_m
-    pitching, yawing = flow * pi * V / (np.array([4.0, 3.0]) * b)
-    damping = jacobian(design, np.zeros(3), y, u)[2]  # without rates all of it is aerodynamic
-    return np.sqrt((damping[:, 1] * pitching) ** 2 + (damping[:, 2] * yawing) ** 2)

@@ -306,9 +306,7 @@ def assemble(scenario: Scenario, trim: np.ndarray, travel: np.ndarray) -> np.nda
     if key not in _designs:
         if len(_designs) >= _MOST_DESIGNS:
             _designs.clear()
-        made = _assemble_design(scenario, travel)
-        _designs[key] = memory.packed(made, idle(scenario.fdi))
-        memory.give_back(made)
+        _designs[key] = memory.packed(_assemble_design(scenario, travel), idle(scenario.fdi))
     frames = memory.unpacked(_designs[key])
     frame = frames[0]
     frame["belief"]["u"] = frame["belief"]["commanded"] = trim

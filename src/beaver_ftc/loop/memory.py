@@ -55,6 +55,7 @@ def packed(record: np.ndarray, idle: Sequence[Sequence[str]] = ()) -> Packed:
     edges = [0, *(edge for span in spared for edge in span), content.size]
     cleared = tuple(slice(*span) for span in zip(edges[::2], edges[1::2], strict=True))
     pieces = tuple((place, content[place].copy()) for place in places)
+    give_back(record)
     return Packed(record.shape, record.dtype, pieces, cleared)
 
 

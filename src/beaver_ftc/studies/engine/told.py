@@ -27,7 +27,7 @@ from statistics import NormalDist
 import numpy as np
 
 from beaver_ftc.design.context import Context
-from beaver_ftc.diagnosis.noise_model import UNSEEN
+from beaver_ftc.diagnosis.gusts import UNSEEN
 from beaver_ftc.diagnosis.rivals.air import rate_variance
 
 UNEXPLAINED_S = 0.1

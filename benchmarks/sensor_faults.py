@@ -3,8 +3,9 @@
     python benchmarks/sensor_faults.py --flights 500 --seed 1
 
 Every flight has one broken instrument, its own rate (20 to 200 Hz), JSBSim frames per frame, airspeed,
-references, fault class and law. `surface` counts a flight in which a surface was named at any time, also for
-one frame; `healthy` flies the same without a fault, all instruments watched.
+references, fault class and law, and every second one the statistical detector. `surface` counts a flight in
+which a surface was named at any time, also for one frame; `healthy` flies the same without a fault, all
+instruments watched.
 """
 
 import argparse
@@ -23,7 +24,7 @@ SIZES = {
     **dict.fromkeys("pqr", (0.3, 10.0)),
     **dict.fromkeys(("alpha", "beta", "phi", "theta", "psi"), (0.5, 10.0)),
     "V": (1.0, 10.0), "qdyn": (20.0, 300.0), "altitude": (5.0, 100.0), "engine_rpm": (20.0, 300.0),
-    "manifold_pressure": (0.3, 5.0),
+    "manifold_pressure": (0.3, 5.0), **dict.fromkeys(("ax", "ay", "az"), (0.3, 10.0)),
 }  # fmt: skip
 OUTCOMES = ("named", "unanticipated", "other sensor", "surface", "no alarm")
 
@@ -34,7 +35,7 @@ def draw(rng: np.random.Generator, bounds: str, turbulent: bool) -> dict[str, An
         axis: [{"sine": {"amplitude_deg_s": rng.uniform(1, 5), "frequency_hz": rng.uniform(0.1, 0.5)}}]
         for axis in "pqr"
     }
-    return {
+    words: dict[str, Any] = {
         "name": "sensor-fault",
         "duration_s": 20,
         "rate_hz": float(rng.choice([20, 50, 100, 200])),
@@ -51,6 +52,8 @@ def draw(rng: np.random.Generator, bounds: str, turbulent: bool) -> dict[str, An
         },
         "control": {"law": str(rng.choice(["fault-tolerant", "nominal", "fault-tolerant-published"]))},
     }
+    words["fdi"] |= {"statistical": {}} if rng.random() < 0.5 else {}
+    return words
 
 
 def fault(rng: np.random.Generator) -> dict[str, Any]:

@@ -101,6 +101,17 @@ def test_what_comes_at_once_and_is_in_the_reading_is_no_accelerometer_s(lead, si
     assert cleared(watch) == set(), "the reading has not half of it"
 
 
+@pytest.mark.parametrize("sensor", FORCES)
+def test_where_an_accelerometer_has_leapt_the_reading_s_own_says_nothing(sensor):
+    """Scatter of both at once: what the accelerometer's makes up in the look is more than half of it."""
+    jump = 0.05
+    for share, leaps in ((0.99, True), (1.01, False)):
+        watch = new_watch()
+        watch["step"]["then"][sensor] += share * 0.5 * jump / (1.5 * H / V)
+        looks(watch, course(ALPHA, [jump]), [jump])
+        assert cleared(watch) == (set(FORCES) if leaps else set())
+
+
 def test_a_straight_course_is_no_leap():
     """Second differences: a steady change of the reading is none, however fast."""
     watch, rate = new_watch(), 0.1

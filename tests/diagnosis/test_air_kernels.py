@@ -5,9 +5,11 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from beaver_ftc.aircraft import load
+from beaver_ftc.aircraft.aircraft import FORCES
 from beaver_ftc.design.model import design_record
+from beaver_ftc.design.terms import fill_table
 from beaver_ftc.design.variants import response
-from beaver_ftc.diagnosis import air, noise_model
+from beaver_ftc.diagnosis import air
 from beaver_ftc.diagnosis.air import AIR
 
 AIRCRAFT = load()
@@ -183,7 +185,7 @@ def test_what_a_gust_does_is_what_the_opposite_rates_would():
     """By differences of the design model's own response, whose inertia terms the air knows nothing of."""
     design = design_record().view(np.recarray)
     record = new_air(area_per_mass=0.01)
-    noise_model.fill_table(record["forces"], AIRCRAFT, AIRCRAFT.measurable_forces, noise_model.FORCES)
+    fill_table(record["forces"], AIRCRAFT, AIRCRAFT.measurable_forces, FORCES)
     air.begin(record, Y, np.array([0.3, 0.2, 1.0]))
     record["gust"] = 0.0, 0.02, -0.03
     air.effect(record, design[0], X, Y, U)

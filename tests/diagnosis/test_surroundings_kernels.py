@@ -6,10 +6,11 @@ from kernels import DT, new_fdi
 from scipy.spatial.transform import Rotation
 
 from beaver_ftc.aircraft import load
+from beaver_ftc.aircraft.aircraft import FORCES
 from beaver_ftc.design.model import design_record
-from beaver_ftc.design.terms import regressors
+from beaver_ftc.design.terms import fill_table, regressors
 from beaver_ftc.design.variants import response
-from beaver_ftc.diagnosis import air, error_map, noise_model, scheme, statistical, thresholds
+from beaver_ftc.diagnosis import air, error_map, scheme, statistical, thresholds
 from beaver_ftc.diagnosis.air import AIR
 from beaver_ftc.diagnosis.error_map import error_map_dtype
 from beaver_ftc.diagnosis.state import BLOCK, LOSS, NOT_ISOLATED, STATISTICS, WORST_CASE, verdict_dtype
@@ -63,13 +64,13 @@ def test_a_gust_is_what_forces_and_gravity_do_not_explain(seed):
 
 def test_the_specific_force_is_that_of_the_terms():
     record, out = new_air(area_per_mass=0.01), np.zeros(3)
-    noise_model.fill_table(record["forces"], AIRCRAFT, AIRCRAFT.measurable_forces, noise_model.FORCES)
+    fill_table(record["forces"], AIRCRAFT, AIRCRAFT.measurable_forces, FORCES)
     air.specific_force(record, X, Y, U, out)
     of = {
         "alpha": Y[0], "beta": Y[1], "ph": X[0] * SPAN / (2 * V), "rh": X[2] * SPAN / (2 * V), "dpt": Y[4],
         "qh": X[1] * AIRCRAFT.geometry.chord_m / V, **dict(zip(AIRCRAFT.surfaces, U, strict=True)),
     }  # fmt: skip
-    expected = dict.fromkeys(noise_model.FORCES, 0.0)
+    expected = dict.fromkeys(FORCES, 0.0)
     for term in AIRCRAFT.measurable_forces:
         size = term.value * np.prod([of[name] ** power for name, power in term.of])
         expected[term.coefficient] += size * (of[term.surface] if term.surface else 1.0)

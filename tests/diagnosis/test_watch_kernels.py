@@ -109,6 +109,14 @@ def test_who_is_suspected_of_what_the_tests_show(shares, who):
     assert suspects(shares) == who
 
 
+def test_an_angle_that_is_frozen_is_no_gyro_s_doing():
+    shares, still = {TURN + 1: 2.0, ANGLE + 1: 1.5}, np.zeros(N_SENSORS, int)
+    for looks, who in ((2, {1, THETA}), (3, {THETA})):
+        still[THETA] = looks
+        assert suspects(shares, still=still) == who
+    assert suspects({TURN: 2.0}, still=still) == set()
+
+
 def test_a_large_error_moves_its_neighbours_a_little():
     """What is below a share of the largest of its kind is beyond its bound for a neighbour's sake."""
     assert suspects({TURN: 100.0, TURN + 1: 2.9}) == {0}

@@ -3,8 +3,8 @@
 Both move the same test of the flow. An accelerometer goes on adding: an error e makes up a velocity e t. What
 a vane or the airspeed is off by comes once, and its reading has it. So from the alarm on
 
-    an accelerometer is cleared where the reading of the flow has leapt as the test has, or stands still;
-    for the airspeed, where the density shows it as well
+    an accelerometer is cleared where the reading of the flow has leapt as the test has, and none of theirs;
+    where the former stands still; for the airspeed, where the density shows it as well
     a reading of the flow is cleared where the residuals add up to many times what it has moved by; where an
     airspeed, or incidence, as wrong as that would show in density, or climb; or where an accelerometer stands
     still
@@ -87,12 +87,14 @@ def clear_accelerometers(watch):
 
 @kernel
 def leapt(watch, signal):
-    """Whether the residual is one that no accelerometer makes in a look, and the reading has it."""
-    i, step = instrument_of(watch.lead), watch.step
-    test = step.test[watch.lead]
+    """Whether the residual is more than accelerometers make in a look, and in the reading, not in theirs."""
+    i, step, felt = instrument_of(watch.lead), watch.step, 0.0
+    test, per_m_s2 = step.test[watch.lead], step.h * per_speed(watch, watch.lead)
     second = signal[i] - 2.0 * step.then[i] + watch.earlier[i]
-    least = test.bound[0] + LEAP_M_S2 * step.h * per_speed(watch, watch.lead)
-    return abs(test.residual) > least and abs(second) >= 0.5 * abs(test.residual)
+    for j in range(AX, N_SENSORS):
+        felt = max(felt, abs(step.then[j] - watch.earlier[j]))
+    half = 0.5 * abs(test.residual)
+    return 2.0 * half > test.bound[0] + LEAP_M_S2 * per_m_s2 and abs(second) >= half > 1.5 * felt * per_m_s2
 
 
 @kernel

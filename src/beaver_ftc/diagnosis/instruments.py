@@ -282,15 +282,16 @@ def would_show(watch):
 @kernel
 def suspect_attitude(watch):
     """The same of gyros and attitude: one axis alone, or one angle alone. An angle by itself may be the first
-    to show what a gyro does."""
+    to show what a gyro does; one that is frozen is no gyro's doing."""
     fired, who = watch.fired, watch.suspect
-    turns, angles = 0, 0
+    turns, angles, frozen = 0, 0, False
     for i in range(3):
         turns += fired[TURN + i]
         angles += fired[ANGLE + i]
+        frozen = frozen or accelerometers.stands_still(watch, PHI + i)
     for i in range(3):
         alone = turns == 0 or (fired[TURN + i] == 1 and turns == 1)
-        who[i] = alone and watch.rates_say[i] != NO
+        who[i] = alone and watch.rates_say[i] != NO and not frozen
         mine = fired[ANGLE + i] == 1 and angles == 1
         who[PHI + i] = mine and watch.rates_say[axis_of(watch, i)] != YES
 

@@ -62,7 +62,7 @@ export function meetSurfaces(hello) {
 }
 
 // Sizes that can be seen and flown with, in the unit in which a scenario has the sensor.
-const SIZES = { p: 3, q: 3, r: 3, alpha: 3, beta: 3, V: 6, qdyn: 200, phi: 8, theta: 8, psi: 8, altitude: 60, engine_rpm: 300, manifold_pressure: 4 };
+const SIZES = { p: 3, q: 3, r: 3, alpha: 3, beta: 3, V: 6, qdyn: 200, phi: 8, theta: 8, psi: 8, altitude: 60, engine_rpm: 300, manifold_pressure: 4, ax: 3, ay: 3, az: 5 };
 const SENSOR_KINDS = [
   ["is off", (size) => ({ type: "bias", magnitude: size })],
   ["scatters", (size) => ({ type: "noise", magnitude: size })],

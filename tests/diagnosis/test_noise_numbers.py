@@ -345,3 +345,23 @@ def test_forces_are_those_the_file_has_a_sensor_for(alone):
     table = alone.detector["air"]["forces"]
     values = table["value"][: len(AIRCRAFT.measurable_forces)]
     assert sorted(values) == sorted(term.value for term in AIRCRAFT.measurable_forces)
+
+
+@pytest.mark.parametrize("known", [0, 1])
+def test_where_forces_are_weighed_their_noise_is_in_the_gust_that_follows_from_them(known):
+    """In the velocity followed sqrt(1.5^2 + 0.5^2) sigma dt a frame; in the forces' flow, over the slope."""
+    sensors = Bounds.model_validate(
+        {"sensors": {"ay": {"noise_std_mps2": 0.3}, "az": {"noise_std_mps2": 0.2}}}
+    )
+    statistical, design, dt = np.zeros(1, STATISTICAL)[0], design_record()[0], 0.02
+    forces = statistical["forces"]
+    forces["known"], forces["component"]["felt"] = known, (0.3**2, 0.2**2)
+    forces["component"]["vane"][:, 1] = -6.0, 50.0
+    noise_model._set_up_gust_jitter(statistical, sensors.sensors, design, LEVEL_FLIGHT, SPAN_M, dt)
+    airspeed = LEVEL_FLIGHT[1][2]
+    walked = known * np.sqrt(1.5**2 + 0.5**2) * np.array([0.2, 0.3]) * dt / airspeed
+    added = noise_model._gust_jitter(walked, design, LEVEL_FLIGHT, SPAN_M)
+    assert np.sqrt(statistical["jitter"]) == pytest.approx(added, rel=0.02)
+    by_force = known * np.array([0.2 / 50.0, 0.3 / 6.0])
+    blurred = noise_model._gust_jitter(by_force, design, LEVEL_FLIGHT, SPAN_M)
+    assert forces["blurred"] == pytest.approx(blurred)

@@ -78,3 +78,11 @@ def test_every_number_of_a_scenario_has_a_unit_and_a_description(name):
         if "number" in kinds:
             assert node["unit"], (name, key)
             assert node["description"].endswith(node["unit"]), (name, key)
+
+
+@pytest.mark.parametrize("sensor", ["ax", "ay", "az"])
+def test_accelerometers_are_sensors(sensor):
+    known = {"name": "x", "sensors": {sensor: {"bias_mps2": 0.1, "noise_std_mps2": 0.1, "delay_s": 0.01}}}
+    assert refusals(known) == []
+    assert refusals({"name": "x", "sensors": {sensor: {"bias_deg": 0.1}}})
+    assert refusals({"name": "x", "faults": [{"sensor": sensor, "type": "freeze", "at_s": 1}]}) == []

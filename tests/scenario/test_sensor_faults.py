@@ -21,6 +21,10 @@ def faulty(**fault):
         ),
         ({"magnitude": 500}, "faults[0].magnitude: 500 is out of range, allowed: at most 200 deg/s for p"),
         (
+            {"sensor": "az", "magnitude": -101},
+            "faults[0].magnitude: -101 is out of range, allowed: at most 100 m/s2 for az",
+        ),
+        (
             {"sensor": "qdyn", "magnitude": 9e9},
             "faults[0].magnitude: 9e+09 is out of range, allowed: a number",
         ),

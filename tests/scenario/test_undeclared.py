@@ -19,6 +19,7 @@ def warnings(text):
     [
         ("sensors: {q: {noise_std_deg_s: 0.1}}", "sensors.q: "),
         ("sensors: {alpha: {delay_s: 0.01}}", "sensors.alpha: "),
+        ("sensors: {az: {bias_mps2: 0.05}}", "sensors.az: "),
         ("environment: {turbulence: dryden, severity: moderate}", "environment.severity: moderate"),
         ("uncertainty: {coefficients: {Cm_alpha: 1.06}}", "uncertainty.coefficients.Cm_alpha: 1.06"),
         ("uncertainty: {coefficients: {Cm_q: 1.01}}", "uncertainty.coefficients.Cm_q: 1.01"),

@@ -9,9 +9,8 @@ from beaver_ftc.aircraft.aircraft import FORCES
 from beaver_ftc.aircraft.schema import SIDESLIP_RATE
 from beaver_ftc.design.terms import fill_table
 from beaver_ftc.diagnosis import across, forces
-from beaver_ftc.diagnosis.forces import SIDE, UP, look, set_up_forces
-from beaver_ftc.diagnosis.state import AN_AXIS, NORMAL, PITCH, ROLL, THE_VANE, YAW
-from beaver_ftc.diagnosis.state import SIDE as ACROSS
+from beaver_ftc.diagnosis.forces import ASIDE, UP, look, set_up_forces
+from beaver_ftc.diagnosis.state import AN_AXIS, NORMAL, PITCH, ROLL, SIDE, THE_VANE, YAW
 from beaver_ftc.diagnosis.tones import set_up_listening
 from beaver_ftc.diagnosis.views import set_up_views
 from beaver_ftc.plant.readings import MEASURED
@@ -59,11 +58,11 @@ def per_coefficient(y=Y):
     return y[3] * AIRCRAFT.geometry.wing_area_m2 / AIRCRAFT.mass.mass_kg / AIRCRAFT.geometry.chord_m
 
 
-@pytest.mark.parametrize(("f", "name"), [(SIDE, "CY"), (UP, "CZ")])
+@pytest.mark.parametrize(("f", "name"), [(ASIDE, "CY"), (UP, "CZ")])
 def test_the_model_is_the_sum_of_its_terms_and_the_rest_is_the_innovation(f, name):
     fdi, rate = felt(), 0.04
     record, seen = fdi["statistical"]["forces"], measured()
-    record["rate"][SIDE], record["begun"] = rate, 1
+    record["rate"][ASIDE], record["begun"] = rate, 1
     look(record, fdi["statistical"]["air"], seen, U, DT)
     whole = per_coefficient() * coefficient(name, rate=rate)
     force = record["component"][f]
@@ -73,16 +72,16 @@ def test_the_model_is_the_sum_of_its_terms_and_the_rest_is_the_innovation(f, nam
     assert force["regressor"][n - 1] == pytest.approx(whole)
     values = [t.value for t in AIRCRAFT.measurable_forces if t.coefficient == name]
     values += [
-        t.value for t in AIRCRAFT.forces if t.coefficient == "CY" and f == SIDE and "betadoth" in dict(t.of)
+        t.value for t in AIRCRAFT.forces if t.coefficient == "CY" and f == ASIDE and "betadoth" in dict(t.of)
     ]
     terms = force["regressor"][: n - 1]
-    if f == SIDE:
+    if f == ASIDE:
         terms = np.append(terms[:-1], terms[-1] / values[-1])
         assert terms[-1] == pytest.approx(per_coefficient() * rate * AIRCRAFT.geometry.span_m / (2 * Y[2]))
     assert np.dot(values, terms) == pytest.approx(whole)
 
 
-@pytest.mark.parametrize(("f", "name"), [(SIDE, "CY"), (UP, "CZ")])
+@pytest.mark.parametrize(("f", "name"), [(ASIDE, "CY"), (UP, "CZ")])
 def test_a_surface_s_column_is_the_slope_along_it_and_its_errors_are_shares_of_the_terms(f, name):
     fdi = felt(Bounds(coefficients=0.05))
     record = fdi["statistical"]["forces"]
@@ -117,7 +116,7 @@ def test_the_flow_s_rates_are_those_of_a_body_that_moves_on():
     assert record["rate"] == pytest.approx((now - then) / step, rel=1e-4)
 
 
-@pytest.mark.parametrize(("f", "place"), [(SIDE, 1), (UP, 0)])
+@pytest.mark.parametrize(("f", "place"), [(ASIDE, 1), (UP, 0)])
 def test_followed_by_inertial_motion_a_force_does_not_know_its_vane(f, place):
     """Whatever a vane says after the first frame, what is left of the force is the same but for curvature."""
     courses = np.zeros(30), np.append(0.0, np.random.default_rng(3).normal(0.0, 0.002, 29).cumsum())
@@ -141,7 +140,7 @@ def test_the_angle_followed_is_the_sum_of_its_rates_and_its_drift_is_counted():
     record = fdi["statistical"]["forces"]
     for _ in range(11):
         look(record, fdi["statistical"]["air"], measured(), U, DT)
-    for f, place in ((SIDE, 1), (UP, 0)):
+    for f, place in ((ASIDE, 1), (UP, 0)):
         force = record["component"][f]
         assert force["angle"] == pytest.approx(Y[place] + 10 * DT * record["rate"][f])
         assert force["drifted"] == pytest.approx(11 * DT * force["vane"][1])
@@ -180,7 +179,7 @@ def test_noise_of_accelerometers_is_jitter_that_the_pressure_does_not_scale():
             jitter = record["component"]["jitter"][:, inertial]
             assert np.sqrt(jitter) == pytest.approx(np.std(drawn, axis=0), rel=0.06)
     more = record["component"]["wander"] - felt()["statistical"]["forces"]["component"]["wander"]
-    walked = [(0.04, 0.07)[f] / Y[2] * np.sqrt(DT) for f in (SIDE, UP)]
+    walked = [(0.04, 0.07)[f] / Y[2] * np.sqrt(DT) for f in (ASIDE, UP)]
     assert np.sqrt(more) == pytest.approx(np.abs(record["component"]["vane"][:, 1]) * walked)
 
 
@@ -189,7 +188,7 @@ def test_bias_and_slope_of_accelerometers_are_tolerated():
     sensors = {"ay": {"bias_mps2": -0.2}, "az": {"bias_mps2": 0.3, "scale_error": -0.01}}
     record, none = (felt(Bounds(sensors=given))["statistical"]["forces"] for given in (sensors, {}))
     look(record, felt()["statistical"]["air"], measured(), U, DT)
-    for f, bias, scale in ((SIDE, 0.2, 0.0), (UP, 0.3, 0.01)):
+    for f, bias, scale in ((ASIDE, 0.2, 0.0), (UP, 0.3, 0.01)):
         force, before = record["component"][f], none["component"][f]
         n = int(force["n"])
         assert n == before["n"] + 1
@@ -273,7 +272,7 @@ def test_noise_of_the_gust_that_forces_tell_blurs_what_clears_a_vane(viewed):
 
 def test_a_vane_s_error_moves_rate_and_force_by_their_slopes():
     record = felt()["statistical"]["forces"]
-    for f, name, place, axis in ((SIDE, "CY", 1, 2), (UP, "CZ", 0, 1)):
+    for f, name, place, axis in ((ASIDE, "CY", 1, 2), (UP, "CZ", 0, 1)):
         off = Y + 1e-5 * np.eye(5)[place]
         slope = per_coefficient() * (coefficient(name, y=off) - coefficient(name)) / 1e-5
         assert record["component"][f]["vane"] == pytest.approx([-ALONG_Y[axis, place], -slope], rel=1e-4)
@@ -347,8 +346,8 @@ def test_each_surface_is_looked_past_in_the_axis_it_leads_and_its_force(viewed):
     ]
     assert seen == [
         (1, PITCH, NORMAL, 0, 0), (3, PITCH, NORMAL, 0, 0), (THE_VANE, PITCH, NORMAL, 0, 1),
-        (AN_AXIS, PITCH, NORMAL, 1, 1), (0, ROLL, ACROSS, 0, 0), (2, YAW, ACROSS, 0, 0),
-        (THE_VANE, YAW, ACROSS, 0, 1), (AN_AXIS, YAW, ACROSS, 1, 1),
+        (AN_AXIS, PITCH, NORMAL, 1, 1), (0, ROLL, SIDE, 0, 0), (2, YAW, SIDE, 0, 0),
+        (THE_VANE, YAW, SIDE, 0, 1), (AN_AXIS, YAW, SIDE, 1, 1),
     ]  # fmt: skip
 
 
@@ -358,7 +357,7 @@ def test_what_goes_along_a_column_of_rate_and_force_is_not_seen_past_it(viewed, 
     G[1, [0, 2]] = G[0, [1, 3]] = G[2, [1, 3]] = 0.0
     across.turn(viewed, view, G)
     first, second = view["plane"]
-    force = viewed["statistical"]["forces"]["component"][second - ACROSS]
+    force = viewed["statistical"]["forces"]["component"][second - SIDE]
     s = int(view["surface"])
     of_it = force["vane"] if s == THE_VANE else (G[first, s], force["column"][s])
     assert view["mix"][[first, second]] @ of_it == pytest.approx(0.0, abs=1e-12)
@@ -377,16 +376,16 @@ def test_the_side_vane_is_cleared_across_the_rolling_gust_as_well(viewed):
     set_up_views(statistical, AIRCRAFT)
     view, moving = statistical["views"][BETA_VIEW], statistical["air"]
     moving["damping"], moving["axes"] = rng.normal(size=(3, 3)), np.linalg.qr(rng.normal(size=(3, 3)))[0]
-    force = statistical["forces"]["component"][SIDE]
+    force = statistical["forces"]["component"][ASIDE]
     column = np.array([force["vane_roll"], *force["vane"]])
     share = across.turn(viewed, view, np.zeros((3, 4)))
-    mix = view["mix"][[ROLL, YAW, ACROSS]]
+    mix = view["mix"][[ROLL, YAW, SIDE]]
     assert np.linalg.norm(view["mix"]) == pytest.approx(1.0)
     assert mix @ column == pytest.approx(0.0, abs=1e-12)
     gust = (moving["damping"] @ moving["axes"])[:, 0]
     assert view["mix"][:3] @ gust == pytest.approx(0.0, abs=1e-12)
     assert view["mix"][PITCH] == view["mix"][NORMAL] == 0.0
-    assert view["column"][[ROLL, YAW, ACROSS]] == pytest.approx(column / np.linalg.norm(column))
+    assert view["column"][[ROLL, YAW, SIDE]] == pytest.approx(column / np.linalg.norm(column))
     corners = np.stack(np.meshgrid(*[(-0.1, 0.1)] * 3)).reshape(3, -1).T * column
     assert share == pytest.approx(np.max(np.abs(corners @ mix)) / (0.9 * np.linalg.norm(column)))
     n = int(view["block"]["n_regressors"])
@@ -536,7 +535,7 @@ def test_without_vanes_the_flow_is_what_the_forces_say():
     look(record, air, measured(), U, DT)
     sound = [
         measured().force[1 + f] - record["component"][f]["innovation"] * AIRCRAFT.geometry.chord_m
-        for f in (SIDE, UP)
+        for f in (ASIDE, UP)
     ]
     off = Y + np.array([0.004, -0.003, 0.0, 0.0, 0.0])
     look(record, air, measured(y=off, force=(0.5, *sound)), U, DT)
@@ -566,4 +565,4 @@ def test_in_moving_air_the_vanes_are_asked_but_for_the_rolling_gust(viewed):
         viewed["statistical"]["air"]["moving"] = moving
         set_up_views(viewed["statistical"], AIRCRAFT)
         cleared_by = viewed["statistical"]["views"]["cleared_by"][:5].tolist()
-        assert cleared_by == [moving * NORMAL, 0, moving * ACROSS, moving * ACROSS, 0]
+        assert cleared_by == [moving * NORMAL, 0, moving * SIDE, moving * SIDE, 0]

@@ -28,7 +28,7 @@ from beaver_ftc.scenario.diagnosis import Bounds
 from beaver_ftc.scenario.sensors import ACCELEROMETERS, Sensors
 from beaver_ftc.scenario.warnings import MASS_TOLERANCE
 
-SIDE, UP = range(2)  # across the body, and normal to it
+ASIDE, UP = range(2)  # across the body, and normal to it
 COMPONENTS = ("CY", "CZ")
 CY = FORCES.index("CY")
 EARTH_RATE_RAD_S = 7.3e-5
@@ -86,7 +86,7 @@ def without_vanes(forces, rotation, y):
     the air, in body axes, which damps as the aircraft's own does."""
     forces.y[:] = y
     for f in range(2):
-        force, place, damped = forces.component[f], BETA if f == SIDE else ALPHA, 0.0
+        force, place, damped = forces.component[f], BETA if f == ASIDE else ALPHA, 0.0
         for k in range(3):
             damped += force.damping[k] * rotation[k]
         forces.y[place] -= (force.innovation / forces.strength + damped) / force.vane[1]
@@ -101,7 +101,7 @@ def do_without(statistical):
 @kernel
 def follow(forces, force, f, y, dt):
     """Follow the angle of a vane by inertial motion alone, and see the force with it."""
-    reading, slope = y[BETA if f == SIDE else ALPHA], force.vane[1] * forces.strength
+    reading, slope = y[BETA if f == ASIDE else ALPHA], force.vane[1] * forces.strength
     force.angle = force.angle + dt * forces.rate[f] if forces.begun else reading
     force.drifted += dt * slope
     force.inertial = force.innovation - slope * (reading - force.angle)
@@ -122,8 +122,8 @@ def look_along(forces, air, f, measured, u):
             of_one *= u[s]
         force.regressor[k - first] = of_one
         whole += table.value[k] * of_one
-    if f == SIDE:
-        turning = scale * forces.of_rate * forces.rate[SIDE] * forces.span / (2.0 * measured.y[AIRSPEED])
+    if f == ASIDE:
+        turning = scale * forces.of_rate * forces.rate[ASIDE] * forces.span / (2.0 * measured.y[AIRSPEED])
         force.regressor[last - first] = turning
         whole += turning
     force.regressor[force.n - 1] = whole
@@ -149,7 +149,7 @@ def flow_rates(forces, measured):
     fall = a[2] + gravity * np.cos(theta) * np.cos(phi)
     faster = ahead * pull + right * push + down * fall
     sideways = push + V * (x[0] * down - x[2] * ahead)
-    forces.rate[SIDE] = (sideways - faster * right) / (V * np.cos(beta))
+    forces.rate[ASIDE] = (sideways - faster * right) / (V * np.cos(beta))
     forwards, downwards = pull + V * (x[2] * right - x[1] * down), fall + V * (x[1] * ahead - x[0] * right)
     forces.rate[UP] = (downwards * np.cos(alpha) - forwards * np.sin(alpha)) / (V * np.cos(beta))
 
@@ -169,7 +169,7 @@ def told_by_force(aircraft: Aircraft, f: int) -> list[int]:
 
 def tell_apart(aircraft: Aircraft) -> bool:
     """Whether accelerometers tell any surfaces of this aircraft apart."""
-    return any(told_by_force(aircraft, f) for f in (SIDE, UP))
+    return any(told_by_force(aircraft, f) for f in (ASIDE, UP))
 
 
 def set_up_forces(
@@ -247,7 +247,7 @@ def _set_up_tolerances(
         if term.is_constant:
             force["tolerance"][k] += abs(vane.noise_bias_quantum[1] * of_vane)
     n = len(terms)
-    if f == SIDE:
+    if f == ASIDE:
         force["tolerance"][n], n = share + RATE_TOLERANCE[bounds.turbulence != "none"], n + 1
     felt = sensors.az if f == UP else sensors.ay
     if felt.noise_bias_quantum[1]:

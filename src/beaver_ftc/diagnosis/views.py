@@ -6,8 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from beaver_ftc.aircraft import Aircraft
-from beaver_ftc.diagnosis.forces import SIDE as OF_SIDE
-from beaver_ftc.diagnosis.forces import UP, told_by_force
+from beaver_ftc.diagnosis.forces import ASIDE, UP, told_by_force
 from beaver_ftc.diagnosis.state import (
     AN_AXIS,
     LATERAL,
@@ -56,7 +55,7 @@ def views_of(aircraft: Aircraft, with_force: bool = False) -> Iterator[Direction
             yield Direction(s, _along((ROLL,)), LATERALLY, others, asks=past_roll)
     if not with_force:
         return
-    for f, plane, movers in ((UP, IN_PITCH, in_pitch), (OF_SIDE, IN_YAW, lateral)):
+    for f, plane, movers in ((UP, IN_PITCH, in_pitch), (ASIDE, IN_YAW, lateral)):
         found = told_by_force(aircraft, f)
         for s in found:
             own = aircraft.dominant_axis[s], plane[1]
@@ -83,7 +82,7 @@ def across_a_column(config: FdiConfig, instants: int) -> bool:
 def set_up_views(statistical: np.void, aircraft: Aircraft) -> None:
     """Fill the views of a statistical record whose blocks, and normal force, are set up."""
     forces = statistical["forces"]
-    told = [told_by_force(aircraft, f) for f in (OF_SIDE, UP)]
+    told = [told_by_force(aircraft, f) for f in (ASIDE, UP)]
     with_air = forces["known"] and statistical["air"]["moving"] and all(told)
     views = list(views_of(aircraft, bool(forces["known"])))[:MAX_VIEWS]
     statistical["n_views"] = len(views)

@@ -103,13 +103,29 @@ def test_what_comes_at_once_and_is_in_the_reading_is_no_accelerometer_s(lead, si
 
 @pytest.mark.parametrize("sensor", FORCES)
 def test_where_an_accelerometer_has_leapt_the_reading_s_own_says_nothing(sensor):
-    """Scatter of both at once: what the accelerometer's makes up in the look is more than half of it."""
+    """Scatter of both: what the accelerometer's leap of late makes up in a look is more than half of it."""
     jump = 0.05
-    for share, leaps in ((0.99, True), (1.01, False)):
+    for ago in (0, 40):
+        for share, leaps in ((0.99, True), (1.01, False)):
+            watch = new_watch(bound=1.0)
+            watch["step"]["then"][sensor] += share * 0.5 * jump / (1.5 * H / V) / accelerometers.CALMED**ago
+            looks(watch, course(ALPHA, np.zeros(ago) + 1e-9 * np.arange(ago)), np.zeros(ago))
+            watch["step"]["test"]["bound"] = 1e-3
+            (signal,) = course(ALPHA, [jump])
+            signal[list(FORCES)] = (
+                watch["step"]["then"][list(FORCES)] if ago else level()[list(FORCES)] + 1e-9
+            )
+            looks(watch, [signal], [jump])
+            assert (AZ in cleared(watch)) == leaps
+
+
+def test_long_after_the_alarm_a_leap_says_nothing():
+    for gathering, clear in ((accelerometers.SOON - 1, set(FORCES)), (accelerometers.SOON, set())):
         watch = new_watch()
-        watch["step"]["then"][sensor] += share * 0.5 * jump / (1.5 * H / V)
-        looks(watch, course(ALPHA, [jump]), [jump])
-        assert cleared(watch) == (set(FORCES) if leaps else set())
+        watch["gathering"], watch["least"], watch["most"] = gathering, -1.0, 99.0
+        watch["step"]["test"]["bound"][CLIMB] = 99.0
+        looks(watch, course(ALPHA, [0.05]), [0.05])
+        assert cleared(watch) == clear
 
 
 def test_a_straight_course_is_no_leap():

@@ -3,8 +3,8 @@
 Both move the same test of the flow. An accelerometer goes on adding: an error e makes up a velocity e t. What
 a vane or the airspeed is off by comes once, and its reading has it. So from the alarm on
 
-    an accelerometer is cleared where the reading of the flow has leapt as the test has, and none of theirs;
-    where the former stands still; for the airspeed, where the density shows it as well
+    an accelerometer is cleared where the reading of the flow has leapt as the test has, soon after the alarm,
+    and none of theirs of late; where the former stands still; for the airspeed, where the density shows it
     a reading of the flow is cleared where the residuals add up to many times what it has moved by; where an
     airspeed, or incidence, as wrong as that would show in density, or climb; or where an accelerometer stands
     still
@@ -29,6 +29,8 @@ from beaver_ftc.diagnosis.watch import (
 from beaver_ftc.plant.instruments import AX, N_SENSORS, PHI
 
 LEAP_M_S2 = 8.0  # by which no specific force changes from one look to the next
+SOON = 100  # looks after the alarm: later, chance has had too many tries
+CALMED = 0.995  # of a leap of an accelerometer that counts a look later
 GOES_ON = 30.0  # times what the reading has moved by: a scale error within 3 % of -1 would do that
 CLEARLY = 3.0  # beyond a bound, of what is not seen
 
@@ -49,9 +51,13 @@ def of_the_flow(test):
 
 @kernel
 def note_stillness(watch, signal):
-    """Count the looks for which each reading (N_SENSORS,) has been the very same."""
+    """Count the looks for which each reading (N_SENSORS,) has been the very same; and how far accelerometers
+    have leapt in a look of late, m/s2."""
+    watch.restless *= CALMED
     for i in range(N_SENSORS):
         watch.still[i] = watch.still[i] + 1 if signal[i] == watch.step.then[i] else 0
+        if i >= AX:
+            watch.restless = max(watch.restless, abs(signal[i] - watch.step.then[i]))
 
 
 @kernel
@@ -65,7 +71,7 @@ def weigh(watch, signal):
     """Clear instruments of the flow, or accelerometers, by this look, that of the alarm or a later one."""
     if not of_the_flow(watch.lead):
         return
-    if leapt(watch, signal):
+    if watch.gathering < SOON and leapt(watch, signal):
         clear_accelerometers(watch)
     gather(watch, signal)
     flow = instrument_of(watch.lead)
@@ -88,13 +94,11 @@ def clear_accelerometers(watch):
 @kernel
 def leapt(watch, signal):
     """Whether the residual is more than accelerometers make in a look, and in the reading, not in theirs."""
-    i, step, felt = instrument_of(watch.lead), watch.step, 0.0
+    i, step = instrument_of(watch.lead), watch.step
     test, per_m_s2 = step.test[watch.lead], step.h * per_speed(watch, watch.lead)
     second = signal[i] - 2.0 * step.then[i] + watch.earlier[i]
-    for j in range(AX, N_SENSORS):
-        felt = max(felt, abs(step.then[j] - watch.earlier[j]))
-    half = 0.5 * abs(test.residual)
-    return 2.0 * half > test.bound[0] + LEAP_M_S2 * per_m_s2 and abs(second) >= half > 1.5 * felt * per_m_s2
+    half, theirs = 0.5 * abs(test.residual), 1.5 * watch.restless * per_m_s2
+    return 2.0 * half > test.bound[0] + LEAP_M_S2 * per_m_s2 and abs(second) >= half > theirs
 
 
 @kernel
@@ -121,7 +125,7 @@ def gather(watch, signal):
     fallen = step.h * signal[AIRSPEED] * excess * np.cos(signal[PHI]) * np.cos(signal[PHI + 1])
     for m in range(step.decay.size):
         watch.fallen[m] = step.decay[m] * watch.fallen[m] + fallen
-    watch.gathering = 1
+    watch.gathering += 1
 
 
 @kernel

@@ -62,10 +62,12 @@ WATCH = np.dtype(
         # two looks ago; who is cleared
         ("still", "i8", (N_SENSORS,)), ("longest_still", "i8", (N_SENSORS,)),
         ("earlier", "f8", (N_SENSORS,)), ("cleared", "i8", (N_SENSORS,)),
-        # since the alarm: residuals of speed, incidence and sideslip, how much of them is sound, least and
-        # most of the readings; the climb that such an incidence makes up; the velocity made up, body axes
-        ("gathering", "i8"), ("gathered", "f8", (3,)), ("sound", "f8", (3,)), ("least", "f8", (3,)),
-        ("most", "f8", (3,)), ("fallen", "f8", (len(POLES_PER_S),)), ("made_up", "f8", (3,)),
+        # how far accelerometers have leapt of late. Since the alarm: looks, residuals of speed, incidence and
+        # sideslip, how much of them is sound, least and most of the readings; the climb that such an
+        # incidence makes up; the velocity made up, body axes
+        ("restless", "f8"), ("gathering", "i8"), ("gathered", "f8", (3,)), ("sound", "f8", (3,)),
+        ("least", "f8", (3,)), ("most", "f8", (3,)), ("fallen", "f8", (len(POLES_PER_S),)),
+        ("made_up", "f8", (3,)),
         ("step", STEP),
     ],
     align=True,

@@ -357,11 +357,11 @@ def test_where_forces_are_weighed_their_noise_is_in_the_gust_that_follows_from_t
     forces = statistical["forces"]
     forces["known"], forces["component"]["felt"] = known, (0.3**2, 0.2**2)
     forces["component"]["vane"][:, 1] = -6.0, 50.0
-    noise_model._set_up_gust_jitter(statistical, sensors.sensors, design, LEVEL_FLIGHT, SPAN_M, dt)
+    gusts.set_up_jitter(statistical, sensors.sensors, design, *LEVEL_FLIGHT[1:], SPAN_M, dt)
     airspeed = LEVEL_FLIGHT[1][2]
     walked = known * np.sqrt(1.5**2 + 0.5**2) * np.array([0.2, 0.3]) * dt / airspeed
-    added = noise_model._gust_jitter(walked, design, LEVEL_FLIGHT, SPAN_M)
+    added = gusts.jitter(walked, design, *LEVEL_FLIGHT[1:], SPAN_M)
     assert np.sqrt(statistical["jitter"]) == pytest.approx(added, rel=0.02)
     by_force = known * np.array([0.2 / 50.0, 0.3 / 6.0])
-    blurred = noise_model._gust_jitter(by_force, design, LEVEL_FLIGHT, SPAN_M)
+    blurred = gusts.jitter(by_force, design, *LEVEL_FLIGHT[1:], SPAN_M)
     assert forces["blurred"] == pytest.approx(blurred)

@@ -6,7 +6,7 @@ from innovations import Detector, misread
 
 from beaver_ftc.design.engine import KW_TO_DPT
 from beaver_ftc.design.variants import response
-from beaver_ftc.diagnosis import noise_model, readings, statistical
+from beaver_ftc.diagnosis import readings, statistical
 from beaver_ftc.diagnosis.state import N_READINGS
 from beaver_ftc.scenario.diagnosis import Bounds
 from flying import flown
@@ -87,7 +87,7 @@ def test_without_errors_of_the_air_data_nothing_is_read():
     before = record["block"]["n_regressors"].copy()
     readings.set_up_readings(record, gyros, admitted)
     assert list(record["block"]["n_regressors"]) == list(before)
-    assert noise_model.random_error(gyros, "p") == pytest.approx(np.radians(0.1))
+    assert gyros.p.random_error == pytest.approx(np.radians(0.1))
 
 
 SLOW_DIVES = {

@@ -187,18 +187,19 @@ def set_up_forces(
     y = trim[1]
     forces, air, size = statistical["forces"], statistical["air"], aircraft.geometry
     forces["per_m"], forces["gravity"] = 1.0 / size.chord_m, air["gravity"]
-    forces["pressure"], forces["pressure_noise"] = y[QDYN], _noise(bounds, ("qdyn",))[0]
+    forces["pressure"], forces["pressure_noise"] = y[QDYN], bounds.sensors.qdyn.random_error
     rates = [t.value for t in aircraft.forces if t.coefficient == "CY" and t.of == ((SIDESLIP_RATE, 1),)]
     forces["span"], forces["of_rate"] = size.span_m, sum(rates)
     scale = y[QDYN] * air["area_per_mass"] * forces["per_m"]
+    errors = [getattr(bounds.sensors, name).random_error for name in ("alpha", "beta", "V", *SIGNALS[:3])]
     for f, (vane, axis) in enumerate(((BETA, 2), (ALPHA, 1))):
         force, terms = forces["component"][f], terms_of(aircraft, f)
         slopes = scale * _slopes(aircraft, COMPONENTS[f], trim)
         force["vane"], force["vane_roll"] = (-along_y[axis, vane], -slopes[vane]), -along_y[0, vane]
         force["damping"] = slopes[3:]
-        parts = (slopes * _noise(bounds, ("alpha", "beta", "V", *SIGNALS[:3]))) ** 2
+        parts = (slopes * errors) ** 2
         force["quiet"] = parts.sum(), parts.sum() - parts[vane]
-        noise = _noise(bounds, ACCELEROMETERS)[1 + f]
+        noise = getattr(bounds.sensors, ACCELEROMETERS[1 + f]).random_error
         force["felt"] = (forces["per_m"] * noise) ** 2
         _set_up_tolerances(force, bounds, terms, y, slopes[vane] / scale, f, forces["per_m"])
         turned = scale * sum(abs(term.value) for term in terms if term.surface)
@@ -226,11 +227,6 @@ def _misfelt(sensors: Sensors, gravity: float, f: int) -> float:
     ahead, own = sensors.ax, (sensors.ay, sensors.az)[f]
     bias = abs(own.noise_bias_quantum[1]) + STEEP_RAD * abs(ahead.noise_bias_quantum[1])
     return bias + gravity * (abs(own.scale_error) if f == UP else 0.0)
-
-
-def _noise(bounds: Bounds, names: tuple[str, ...]) -> np.ndarray:
-    noise, _, quantum = np.array([getattr(bounds.sensors, name).noise_bias_quantum for name in names]).T
-    return np.sqrt(noise**2 + quantum**2 / 12.0)
 
 
 def _set_up_tolerances(

@@ -9,7 +9,6 @@ from beaver_ftc.aircraft.aircraft import FORCES
 from beaver_ftc.design.terms import AIRSPEED, fill_table
 from beaver_ftc.design.variants import jacobian
 from beaver_ftc.diagnosis.admitted import GUST_FT_S, SCALE_FT
-from beaver_ftc.diagnosis.readings import random_error
 from beaver_ftc.scenario.sensors import Sensors
 
 # Share of the intensity of the rolling, pitching and yawing gust that the vanes leave; on exact vanes and
@@ -58,7 +57,7 @@ def set_up_jitter(
     flow = flow_noise(sensors, y[AIRSPEED])
     if statistical["forces"]["known"]:
         forces = statistical["forces"]["component"][::-1]  # normal to the body, and across
-        felt = np.array([random_error(sensors, "az"), random_error(sensors, "ay")])
+        felt = np.array([sensors.az.random_error, sensors.ay.random_error])
         flow += TWO_STEPS * felt * dt_s / y[AIRSPEED]
         by_force = np.sqrt(forces["felt"]) / np.abs(forces["vane"][:, 1])
         statistical["forces"]["blurred"] = jitter(by_force, design, y, u, span_m)
@@ -68,8 +67,8 @@ def set_up_jitter(
 
 def flow_noise(sensors: Sensors, airspeed_mps: float) -> np.ndarray:
     """Of the flow's angles (2,) as the vanes and the airspeed have them, standard deviation in rad."""
-    speed = 0.3 * random_error(sensors, "V") / airspeed_mps  # through attitudes of up to 17 deg
-    return np.array([random_error(sensors, "alpha"), random_error(sensors, "beta")]) + speed
+    speed = 0.3 * sensors.V.random_error / airspeed_mps  # through attitudes of up to 17 deg
+    return np.array([sensors.alpha.random_error, sensors.beta.random_error]) + speed
 
 
 def jitter(flow: np.ndarray, design: np.void, y: np.ndarray, u: np.ndarray, span_m: float) -> np.ndarray:

@@ -16,7 +16,7 @@ from beaver_ftc.design.variants import coefficient_slopes, jacobian
 from beaver_ftc.diagnosis import gusts
 from beaver_ftc.diagnosis.admitted import inertia_slack, tolerances
 from beaver_ftc.diagnosis.forces import set_up_forces
-from beaver_ftc.diagnosis.readings import random_error, set_up_readings
+from beaver_ftc.diagnosis.readings import set_up_readings
 from beaver_ftc.diagnosis.state import (
     ALPHA3,
     AN_AXIS,
@@ -164,7 +164,7 @@ def _set_up_blocks(statistical: np.void, sensors: Sensors, aircraft: Aircraft) -
         block["keep"], block["stronger"] = 1.0, 1.0
         for i, axis in enumerate(axes):
             block["axis"][i] = axis
-            variance = max(random_error(sensors, AXES[axis]), LEAST_NOISE_RAD_S) ** 2
+            variance = max(getattr(sensors, AXES[axis]).random_error, LEAST_NOISE_RAD_S) ** 2
             block["noise"][i] = block["P_xx"][i, i] = variance
             block["P_dd"][i, i] = PRIOR_DRIFT_RAD_S2**2
         sense = block["lane"]["sense"].reshape(N_SLOTS, -1)
@@ -200,12 +200,12 @@ def _set_up_noise(
     dt_s: float,
 ) -> None:
     """What drifts, and what is white: noise of the measurements that f + G u is made of."""
-    noise = max(random_error(bounds.sensors, axis) for axis in AXES)
+    noise = max(getattr(bounds.sensors, axis).random_error for axis in AXES)
     largest = max(bounds.constant_rad_s2.as_tuple())
     level = float(statistical["alarm_level"])
     statistical["rapidity"] = rapidity(largest, given.uncertainty_rad_s, noise, level, dt_s)
     _, G, f_x, f_y = jacobian(design, *start)
-    errors = np.array([random_error(bounds.sensors, name) for name in SIGNALS])
+    errors = np.array([getattr(bounds.sensors, name).random_error for name in SIGNALS])
     statistical["own_jitter"] = f_x**2 @ errors[:3] ** 2
     in_trim = f_y[:, [ALPHA, BETA, AIRSPEED, QDYN]] ** 2 @ errors[3:] ** 2  # later as readings.py says
     statistical["jitter"] = statistical["own_jitter"] + in_trim

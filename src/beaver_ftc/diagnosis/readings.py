@@ -20,18 +20,12 @@ _POWER = N_READINGS - 1  # of the engine, kW
 _SLIPSTREAM = RH + 1  # the first of the declared signals
 
 
-def random_error(sensors: Sensors, name: str) -> float:
-    """Standard deviation of what changes from sample to sample: noise and rounding."""
-    noise, _, quantum = getattr(sensors, name).noise_bias_quantum
-    return float(np.hypot(noise, quantum / np.sqrt(12.0)))
-
-
 def set_up_readings(statistical: np.void, sensors: Sensors, admitted: np.void) -> None:
     """Add the readings to the regressors of the blocks, which have those of their coefficients."""
     steady, noise = np.zeros(N_READINGS), statistical["reading_noise"]
     for name, place in _SENSORS.items():
         steady[place] = abs(getattr(sensors, name).noise_bias_quantum[1])
-        noise[place] = random_error(sensors, name)
+        noise[place] = getattr(sensors, name).random_error
     steady[_POWER] = admitted["engine_kw"]  # all of it: so many standard deviations are part of that
     noise[_POWER] = admitted["engine_kw"] / NOISE_LIMIT_SIGMA
     if not (steady.any() or noise.any()):

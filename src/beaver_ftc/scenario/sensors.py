@@ -1,6 +1,6 @@
 """What the instruments do to the truth: one section a signal; what is left out is measured perfectly."""
 
-from math import radians
+from math import hypot, radians, sqrt
 from typing import Any, ClassVar, Self
 
 from pydantic import Field, GetJsonSchemaHandler, model_validator
@@ -44,6 +44,12 @@ class _Sensor(Section):
         """Standard deviation, bias and resolution, SI."""
         noise, bias, quantum, unit = self.si
         return getattr(self, noise) * unit, getattr(self, bias) * unit, getattr(self, quantum) * unit
+
+    @property
+    def random_error(self) -> float:
+        """Standard deviation of a sample, noise and resolution together, SI."""
+        noise, _, quantum = self.noise_bias_quantum
+        return hypot(noise, quantum / sqrt(12.0))
 
 
 class RateGyro(_Sensor):

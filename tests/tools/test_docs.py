@@ -2,12 +2,14 @@ import re
 from pathlib import Path
 
 import pytest
+from tools.docs import first_figure
 from tools.docs.generate import lighten
 from tools.docs.properties import as_markdown, meaning_of
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.model_file import with_systems
+from beaver_ftc.results.looks import LOOKS
 from beaver_ftc.studies.reproduce.claims import CLAIMS
 from beaver_ftc.studies.reproduce.figures import FIGURES
 
@@ -18,6 +20,11 @@ PAGES = [ROOT / "README.md", *sorted(DOCS.glob("*.md"))]
 
 def test_property_page_is_up_to_date():
     assert (DOCS / "properties.md").read_text() == as_markdown(), "run python -m tools.docs"
+
+
+def test_the_first_picture_can_be_drawn():
+    roles = {trace.role for panel in first_figure.VIEW.panels for trace in panel.traces}
+    assert roles <= set(LOOKS)
 
 
 def test_every_property_on_the_page_is_one_the_aircraft_has():

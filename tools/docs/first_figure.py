@@ -24,8 +24,8 @@ VIEW = View(
         Panel(
             "surfaces",
             (
-                Trace("elevator_effective_rad", "elevator", "elevator"),
-                Trace("flap_effective_rad", "flap", "flap"),
+                Trace("elevator_effective_rad", "elevator", "surface 1"),
+                Trace("flap_effective_rad", "flap", "surface 3"),
             ),
         ),
     ),

@@ -205,14 +205,19 @@ def _likelihood(columns: Sequence[str]) -> View:
         Trace(f"{surface}{ending}", f"{surface} loss", role)
         for surface, role in zip(names, SURFACE_ROLES, strict=False)
     )
-    steps = tuple(Trace(f"{axis}_step_likelihood_share", f"step of {axis}'", axis) for axis in AXES)
+    steps = tuple(Trace(f"{axis}_step_likelihood_share", f"{axis}'", axis) for axis in AXES)
     panels = (
         *(
             [Panel("loss of a surface: test / alarm level", losses, log_scale=True, level=1.0)]
             if losses
             else ()
         ),
-        Panel("step of an acceleration: test / alarm level", steps, log_scale=True, level=1.0),
+        Panel(
+            "step or tone of an acceleration, or its force: test / alarm level",
+            steps,
+            log_scale=True,
+            level=1.0,
+        ),
     )
     title = "Detection: likelihood ratio tests against their alarm level"
     return View("likelihood", title, panels, closeup=True)

@@ -162,7 +162,7 @@ def blur(view, statistical, V):
         jitter += abs(m[SIDE + f]) * np.sqrt(force.jitter[view.inertial])
         if view.inertial:
             drift += (m[SIDE + f] * strength) ** 2 * force.wander
-        bound += abs(m[SIDE + f]) * force.deflection * strength
+        bound += abs(m[SIDE + f]) * (force.deflection * strength + force.unsettled)
     if statistical.air.moving:
         feel_gust(view, statistical)
         if told(statistical, view):
@@ -244,7 +244,8 @@ def observe(fdi, innovation, G, Gu, y, frame, latched):
             regress(fdi, view, innovation, share)
         sign(fdi, view, Gu)
         likelihood.take_in(block, view.bounded, tolerated, dt, keep)
-        tones.listen(view, statistical.listening, statistical.alarm_level, heard, tolerated, dt)
+        if not view.inertial:  # the angle followed is off by what integration is, which swings as the flight
+            tones.listen(view, statistical.listening, statistical.alarm_level, heard, tolerated, dt)
         view.held = max((1.0 - (1.0 - statistical.keep) / HOLDS) * view.held, best(view))
 
 

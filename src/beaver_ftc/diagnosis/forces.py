@@ -33,6 +33,7 @@ COMPONENTS = ("CY", "CZ")
 CY = FORCES.index("CY")
 EARTH_RATE_RAD_S = 7.3e-5
 LIVELY_RAD_S, STEEP_RAD = 0.2, 0.3  # rates and slope of the path that a drift is reckoned with
+UNSETTLED_S = 0.002  # that force and flow of one instant may be apart, of JSBSim's own: seen to 0.001
 CHANGES = 0.3  # what of a drift may be another a second later
 RATE_TOLERANCE = {False: 0.05, True: 0.2}  # of the term in the rate of sideslip: gusts have a part in it
 # The rate of sideslip, the bias of the accelerometer and the force as a whole come last.
@@ -49,6 +50,7 @@ FORCE = np.dtype(
         # of an error of its vane: angular acceleration, and e, per rad; that in roll
         ("vane", "f8", (2,)), ("vane_roll", "f8"),
         ("quiet", "f8", (2,)), ("jitter", "f8", (2,)), ("damping", "f8", (3,)), ("deflection", "f8"),
+        ("whole", "f8"), ("unsettled", "f8"),  # e as the model has it; how far a lag lets it be off, rad/s2
         ("felt", "f8"),  # variance of e by noise of the accelerometer, which the pressure does not scale
         ("n", "i8"), ("tolerance", "f8", (MAX_ERRORS,)), ("regressor", "f8", (MAX_ERRORS,)),
     ],
@@ -74,10 +76,18 @@ def look(forces, air, measured, u, dt):
     evaluate(air.forces, measured.x, measured.y)
     forces.strength = measured.y[QDYN] / forces.pressure
     for f in range(2):
+        before = forces.component[f].whole
         look_along(forces, air, f, measured, u)
+        settle(forces.component[f], before, forces.begun, dt)
         follow(forces, forces.component[f], f, measured.y, dt)
     flow_rates(forces, measured)
     forces.begun = 1
+
+
+@kernel
+def settle(force, before, begun, dt):
+    """Note how fast the force changes, `before` being what it was; it is not all of one instant."""
+    force.unsettled = UNSETTLED_S * abs(force.whole - before) / dt if begun else 0.0
 
 
 @kernel
@@ -126,7 +136,7 @@ def look_along(forces, air, f, measured, u):
         turning = scale * forces.of_rate * forces.rate[ASIDE] * forces.span / (2.0 * measured.y[AIRSPEED])
         force.regressor[last - first] = turning
         whole += turning
-    force.regressor[force.n - 1] = whole
+    force.regressor[force.n - 1], force.whole = whole, whole
     for s in range(u.size):
         force.moment[s] = force.column[s] * u[s]
     force.innovation = measured.force[1 + f] * forces.per_m - whole

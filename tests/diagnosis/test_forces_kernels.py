@@ -339,6 +339,35 @@ def viewed():
     return fdi
 
 
+@pytest.mark.parametrize(("before", "begun", "expected"), [(1.0, 1, 0.3), (2.2, 1, 0.3), (1.0, 0, 0.0)])
+def test_a_force_is_off_by_what_it_changes_in_two_milliseconds(before, begun, expected):
+    force = new_fdi()["statistical"]["forces"]["component"][0]
+    force["whole"] = 1.6
+    forces.settle(force, before, begun, 0.004)
+    assert force["unsettled"] == pytest.approx(expected)
+
+
+def test_what_a_force_is_off_widens_what_is_merely_bounded(viewed):
+    statistical, view = viewed["statistical"], viewed["statistical"]["views"][ELEVATOR_VIEW]
+    view["mix"] = 0.0, 0.6, 0.0, 0.0, -0.8
+    across.blur(view, statistical, 45.0)
+    before = float(view["bounded"][0])
+    statistical["forces"]["component"]["unsettled"][UP] = 0.5
+    across.blur(view, statistical, 45.0)
+    assert view["bounded"][0] == pytest.approx(before + 0.8 * 0.5)
+
+
+def test_how_fast_a_force_changes_is_told_from_one_instant_to_the_next(viewed):
+    statistical = viewed["statistical"]
+    component = statistical["forces"]["component"]
+    then, seen = component["whole"].copy(), measured()
+    seen["y"][1] += 0.01
+    look(statistical["forces"], statistical["air"], seen, U, DT)
+    changed = np.abs(component["whole"] - then)
+    assert changed[ASIDE] > 0.01
+    assert component["unsettled"] == pytest.approx(forces.UNSETTLED_S * changed / DT)
+
+
 def test_each_surface_is_looked_past_in_the_axis_it_leads_and_its_force(viewed):
     seen = [
         (int(v["surface"]), *v["plane"], v["inertial"], v["clears"])

@@ -242,6 +242,14 @@ def test_statistics_rule_out_what_something_else_explains_better(authority, step
     assert not isolation.rules_out(fdi, fie, True)
 
 
+@pytest.mark.parametrize(("detected_at_s", "ruled_out"), [(-1.0, False), (0.0, True), (2.5, True)])
+def test_statistics_that_have_raised_no_alarm_rule_out_nothing(detected_at_s, ruled_out):
+    fdi = new_fdi()
+    fie, fdi["authority"] = told(fdi, 0.0, NAMING + 0.1), EITHER
+    fdi["statistical"]["detected_at_s"] = detected_at_s
+    assert isolation.rules_out(fdi, fie, True) == ruled_out
+
+
 @pytest.mark.parametrize("abrupt", [0, 1])
 def test_a_loss_that_has_shown_is_not_ruled_out_by_what_comes_later(abrupt):
     """That may be its end; one that is declared to stay has none."""

@@ -102,7 +102,8 @@ def possible(fdi, fie, x, started):
 def rules_out(fdi, fie, within):
     """Whether a fault is excluded by those in authority; `within`: it is possible in the worst case.
 
-    Of faults of every type the sets know the course; chance, which axes are moved.
+    Of faults of every type the sets know the course; chance, which axes are moved. Within the class, chance
+    that has raised no alarm has nothing to say about the alarm of the sets.
     """
     if fdi.authority == WORST_CASE or (fdi.every_type and not within):
         return not within
@@ -110,7 +111,7 @@ def rules_out(fdi, fie, within):
         return fdi.statistical.enabled and across.excludes(fdi, fie.surface)
     if fdi.authority != STATISTICS and not within:
         return True
-    if not fdi.statistical.enabled or fie.shown:
+    if not fdi.statistical.enabled or fie.shown or fdi.statistical.detected_at_s < 0.0:
         return False
     fie.shown = not fdi.abrupt and shows(fdi, fie.surface)  # what comes later may be its end
     if fie.shown or not excludes(fdi, fie.surface, False):

@@ -33,7 +33,7 @@ from beaver_ftc.diagnosis.watch import (
     WATCH,
     YES,
 )
-from beaver_ftc.plant.instruments import ALTITUDE, AX, ENGINE_SPEED, MANIFOLD, N_SENSORS, PHI
+from beaver_ftc.plant.instruments import ALTITUDE, AX, ENGINE_SPEED, MANIFOLD, N_SENSORS, PHI, SENSORS
 from beaver_ftc.plant.readings import MEASURED
 
 H = 0.005
@@ -157,6 +157,19 @@ def test_a_surface_may_be_named_where_no_gyro_can_be_it(known, no_gyro, blurred)
     assert watching.clears_surfaces(new_watch(enabled=0, **fields), known)
     clear = bool(known and (no_gyro or not blurred))
     assert bool(watching.clears_surfaces(new_watch(**fields), known)) == clear
+
+
+@pytest.mark.parametrize("name", ["alpha", "beta", "V", "qdyn"])
+def test_no_surface_is_named_while_a_reading_of_the_flow_stands_still(name):
+    """Whatever moves the aircraft moves it; but a sideslip of zero may stay one."""
+    i = SENSORS.index(name)
+    watch = new_watch(blurred=0)
+    watch["longest_still"], watch["step"]["then"] = 3, 0.1
+    for still, value, clear in ((2, 0.1, True), (3, 0.1, False), (3, 0.0, True)):
+        watch["still"][i], watch["step"]["then"][i] = still, value
+        assert bool(watching.clears_surfaces(watch, 1)) == clear
+    watch["step"]["then"], watch["still"], watch["still"][0] = 0.1, 0, 9
+    assert watching.clears_surfaces(watch, 1), "a gyro is held against the attitude"
 
 
 def test_the_watch_has_the_word_once_it_has_raised_its_alarm():

@@ -309,7 +309,19 @@ def axis_of(watch, i):
 @kernel
 def clears_surfaces(watch, known):
     """Whether a surface may be named, a frame or more (`known`) after the alarm."""
-    return not watch.enabled or (known == 1 and (watch.no_gyro == 1 or not watch.blurred))
+    if not watch.enabled:
+        return True
+    return known == 1 and (watch.no_gyro == 1 or not watch.blurred) and not flow_stands_still(watch)
+
+
+@kernel
+def flow_stands_still(watch):
+    """Whether a reading of the flow does: a surface that moves the aircraft moves it. In symmetric flight a
+    sideslip of zero stays one."""
+    for i in (ALPHA, BETA, AIRSPEED, QDYN):
+        if watch.step.then[i] != 0.0 and accelerometers.stands_still(watch, i):
+            return True
+    return False
 
 
 @kernel

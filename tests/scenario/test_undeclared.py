@@ -68,7 +68,9 @@ def test_a_mass_the_designer_knows_is_no_error():
     assert warnings(f"{WEIGHED}uncertainty: {{mass: 1.2}}\ndesign_model: {{mass: 1.2}}\n") == ()
 
 
-@pytest.mark.parametrize("key", ["fault_class: published", "authority: worst-case", "pairs: true"])
+@pytest.mark.parametrize(
+    "key", ["fault_class: published", "authority: worst-case", "pairs: true", "scheme: multiple-models"]
+)
 def test_where_they_are_not_read_only_moments_do(key):
     given = (
         WEIGHED.replace("fault_class: all", key) if "class" in key else WEIGHED.replace("all", f"all, {key}")

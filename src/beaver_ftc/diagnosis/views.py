@@ -72,11 +72,10 @@ def _along(components: tuple[int, ...]) -> tuple[float, ...]:
 def across_a_column(config: FdiConfig, instants: int) -> bool:
     """Whether what goes on across a surface's column excludes it.
 
-    Of two faults at once one may move what the other does not. Within a frame of several instants a column
-    turns with the incidence while the surface moves, and shows across its mean.
+    Within a frame of several instants a column turns with the incidence while the surface moves, and shows
+    across its mean.
     """
-    counts = config.authority != "worst-case" and config.fault_class == "all"
-    return counts and not config.pairs and instants <= 1
+    return config.looks_across and instants <= 1
 
 
 def set_up_views(statistical: np.void, aircraft: Aircraft) -> None:

@@ -57,9 +57,8 @@ def has_real_engine(scenario: Scenario) -> bool:
 
 def weighs_forces(scenario: Scenario) -> bool:
     """Whether accelerometers are read to tell surfaces apart by their forces."""
-    config = scenario.fdi
-    counts = config.statistical is not None and config.scheme == "adaptive-estimators"
-    return counts and across_a_column(config, scenario.substeps) and tell_apart(scenario.airframe)
+    across = across_a_column(scenario.fdi, scenario.substeps)
+    return scenario.fdi.weighs_chance and across and tell_apart(scenario.airframe)
 
 
 def truth_read(scenario: Scenario) -> tuple[ch.Channel, ...]:

@@ -220,6 +220,17 @@ class FdiConfig(BaseModel):
         "any", description="what is assumed of the fault's course: nothing, or constant once it is there"
     )
 
+    @property
+    def weighs_chance(self) -> bool:
+        """Whether our scheme has its statistical detector."""
+        return self.statistical is not None and self.scheme == "adaptive-estimators"
+
+    @property
+    def looks_across(self) -> bool:
+        """Whether what a surface cannot have done may exclude it. Of two faults at once one may do what the
+        other does not."""
+        return self.authority != "worst-case" and self.fault_class == "all" and not self.pairs
+
     @model_validator(mode="after")
     def _pairs_of_what(self) -> "FdiConfig":
         wrong = self.pairs and self.fault_class != "all"

@@ -50,9 +50,8 @@ def _undeclared(scenario: Any) -> Iterator[str]:
 
 def _weighs_forces(scenario: Any) -> bool:
     """Whether accelerometers take part in the diagnosis."""
-    fdi = scenario.fdi
-    counts = fdi.statistical and fdi.fault_class == "all" and fdi.authority != "worst-case"
-    return bool(counts and not fdi.pairs and scenario.substeps == 1 and scenario.airframe.forces)
+    counts = scenario.fdi.weighs_chance and scenario.fdi.looks_across
+    return bool(counts and scenario.substeps == 1 and scenario.airframe.forces)
 
 
 def _forces(scenario: Any) -> Iterator[str]:

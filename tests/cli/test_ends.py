@@ -45,9 +45,11 @@ def test_a_flight_that_is_not_finite_is_status_3(tmp_path):
         check=False,
     )
     assert done.returncode == 3
-    assert done.stderr.count("\n") == 1
-    assert "beta_rad" in done.stderr
-    assert "0.5 s" in done.stderr
+    # On a cold cache the command says first that it compiles.
+    said = [line for line in done.stderr.splitlines() if "compiling the flight code" not in line]
+    assert len(said) == 1
+    assert "beta_rad" in said[0]
+    assert "0.5 s" in said[0]
     assert list(tmp_path.rglob("*.*")) == [], "nothing is left of it"
 
 

@@ -54,8 +54,16 @@ def _bare(line: str) -> str:
 
 def yaml_blocks(page: str) -> list[str]:
     """The YAML that a page shows, in its order."""
-    text = (ROOT / page).read_text(encoding="utf-8")
-    return [block[2] for block in _FENCED.finditer(text) if block[1] == "yaml"]
+    return _blocks(ROOT / page, "yaml")
+
+
+def python_blocks(page: Path) -> list[str]:
+    """The Python that a page shows, in its order."""
+    return _blocks(page, "python")
+
+
+def _blocks(page: Path, kind: str) -> list[str]:
+    return [block[2] for block in _FENCED.finditer(page.read_text(encoding="utf-8")) if block[1] == kind]
 
 
 def shown() -> list[Command]:

@@ -1,7 +1,10 @@
 """The Beaver as a Gymnasium environment, for those who learn laws; wants the extra `gym`.
 
-    env = gymnasium.make("beaver_ftc/Beaver-v0", scenario="elevator-partial-loss", frames_per_step=5)
+    env = gymnasium.make(
+        "beaver_ftc.integrations.gym:beaver_ftc/Beaver-v0", scenario="fault-free", frames_per_step=5
+    )
 
+Gymnasium imports what stands before the colon, and with it registers the name behind it.
 The plant, the faults, the reference model and the accounts are those of a flight: what is learnt can be
 plugged in afterwards as a law, and compared with the others.
 """

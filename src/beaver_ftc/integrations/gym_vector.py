@@ -1,4 +1,4 @@
-"""Many Beavers at a time, in processes: `gymnasium.make_vec("beaver_ftc/Beaver-v0", num_envs=16)`.
+"""Many Beavers at a time, in processes: `gymnasium.make_vec` with the name of `gym.py`, and `num_envs=16`.
 
 A step of the environment takes less than handing its arrays from process to process. So each process flies
 several episodes, one byte sets it going, and what it flies by and sees is in memory that all share. The

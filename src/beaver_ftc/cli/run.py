@@ -109,8 +109,11 @@ def _run_all(
     junit: Path | None,
 ) -> int:
     """Fly one after the other; one that fails does not stop the rest. Returns the worst exit status."""
-    runs, status = [], 0
+    import time
+
+    runs, took_s, status = [], [], 0
     for scenario in scenarios:
+        began = time.perf_counter()
         try:
             document = run_one(scenario)
         except Exception as error:
@@ -118,12 +121,14 @@ def _run_all(
             status = max(status, report(failure))
             runs.append({"scenario": scenario.name, "error": str(failure)})
             continue
+        finally:
+            took_s.append(time.perf_counter() - began)
         runs.append(document)
         status = max(status, 0 if document["passed"] else 1)
         if format is Format.text:
             _say(document)
     if junit is not None:
-        _write_junit(runs, junit)
+        _write_junit([run | {"took_s": each} for run, each in zip(runs, took_s, strict=True)], junit)
     if format is Format.json:
         first = runs[0] if len(runs) == 1 else {}
         emit_json(first | {"passed": status == 0, "runs": runs})

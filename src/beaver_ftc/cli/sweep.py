@@ -2,6 +2,7 @@
 
 import signal
 import sys
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from enum import StrEnum
@@ -10,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from beaver_ftc.cli.output import Format, FormatOption, complain, emit, emit_json
+from beaver_ftc.cli.output import Format, FormatOption, complain, emit, emit_json, unexpected
 from beaver_ftc.documents.errors import BadInput, BeaverFtcError
 
 if TYPE_CHECKING:
@@ -66,6 +67,9 @@ def command(
     ] = None,
     format: FormatOption = Format.text,
     no_report: Annotated[bool, typer.Option("--no-report", help="Skip report.html and the figures.")] = False,
+    junit: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Also write the verdict as JUnit XML, for CI.")
+    ] = None,
 ) -> None:
     """Fly a sweep: many flights of one scenario, varied, on all cores or on a cluster.
 
@@ -88,19 +92,32 @@ def command(
         search=search.value if search else None,
         source=file,
     )
+    began = time.perf_counter()
     try:
-        raise typer.Exit(_command(options, replay, format))
-    except BeaverFtcError as error:
+        verdict = _command(options, replay, format)
+    except Exception as error:
+        failure = error if isinstance(error, BeaverFtcError) else unexpected(error)
         if format is Format.json:
-            emit_json({"passed": False, "errors": str(error).splitlines()})
-        raise
+            emit_json({"passed": False, "errors": str(failure).splitlines()})
+        _write_junit({"scenario": file, "error": str(failure)}, junit, began)
+        raise failure from failure.__cause__
+    _write_junit(verdict, junit, began)
+    raise typer.Exit(0 if verdict["passed"] else 1)
 
 
-def _command(options: "Options", replay: int | None, format: Format) -> int:
+def _command(options: "Options", replay: int | None, format: Format) -> dict[str, Any]:
+    """Fly, say what came out, and return {scenario, passed, expectations} of it."""
     from beaver_ftc.scenario.sweep_loader import load_sweep
 
     sweep = load_sweep(options.source)
     return _fly(sweep, options, format) if replay is None else _replay(sweep, options, replay, format)
+
+
+def _write_junit(verdict: dict[str, Any], junit: Path | None, began: float) -> None:
+    from beaver_ftc.results.junit import write_junit
+
+    if junit is not None:
+        write_junit([verdict | {"took_s": time.perf_counter() - began}], junit)
 
 
 def _keep(asked: str) -> "Keep":
@@ -117,10 +134,10 @@ def _keep(asked: str) -> "Keep":
         ) from None
 
 
-def _fly(sweep: "Sweep", options: "Options", format: Format) -> int:
+def _fly(sweep: "Sweep", options: "Options", format: Format) -> dict[str, Any]:
     from beaver_ftc.cli.sweep_progress import live_progress
     from beaver_ftc.studies.sweep.run import named_for, run_sweep
-    from beaver_ftc.studies.sweep.words import summary_text
+    from beaver_ftc.studies.sweep.words import summary_text, verdict
 
     with _stoppable() as stopped, live_progress(sweep.name) as progress:
         document = run_sweep(sweep, options, progress, stopped)
@@ -129,10 +146,10 @@ def _fly(sweep: "Sweep", options: "Options", format: Format) -> int:
         emit_json(document)
     else:
         emit(summary_text(document, colour=sys.stdout.isatty()))
-    return 0 if document["passed"] else 1
+    return verdict(document)
 
 
-def _replay(sweep: "Sweep", options: "Options", index: int, format: Format) -> int:
+def _replay(sweep: "Sweep", options: "Options", index: int, format: Format) -> dict[str, Any]:
     from beaver_ftc.results.verdict import verdict_text
     from beaver_ftc.studies.sweep.run import replay
 
@@ -141,7 +158,7 @@ def _replay(sweep: "Sweep", options: "Options", index: int, format: Format) -> i
         emit_json(document)
     else:
         emit(verdict_text(document, document["folder"], colour=sys.stdout.isatty()))
-    return 0 if document["passed"] else 1
+    return document
 
 
 @contextmanager

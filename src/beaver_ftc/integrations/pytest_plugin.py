@@ -2,13 +2,17 @@
 
     pytest --beaver scenarios/          every scenario file below the folder
     pytest                              files named *.scenario.yaml
+    pytest my-scenario.yaml my-sweep.yaml
 
-Nothing of the testbed is imported before there is a scenario to collect. A scenario is flown once a
+A sweep is many flights: it is a test where it is named. What lies in result folders is one where it is named.
+
+Nothing of the testbed is imported before there is a scenario to collect. A scenario or sweep is flown once a
 process, when the first of its items runs; of one that fails, the whole result with its figures is kept
 below pytest's temporary folder.
 """
 
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +20,11 @@ import pytest
 
 _MARKED = (".scenario.yaml", ".scenario.yml")
 _YAML = (".yaml", ".yml")
+_OF_A_RESULT = (
+    ("scenario.yaml", "metrics.json"),
+    ("scenario.yaml", "log.parquet"),
+    ("sweep.json", "results.parquet"),
+)
 _COMPLETES = "completes"
 _NO_MAPPING = ("is empty", "is not a mapping")  # a YAML file of another tool
 _NEAR = 0.8
@@ -56,28 +65,43 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Collector | None:
-    """A scenario file becomes a collector."""
-    name = file_path.name
-    if name.endswith(_MARKED) or (name.endswith(_YAML) and _is_asked_for(file_path, parent.config)):
-        return ScenarioFile.from_parent(parent, path=file_path)
-    return None
+    """A scenario file becomes a collector, and so does a sweep file that is named."""
+    if not file_path.name.endswith(_YAML):
+        return None
+    named = parent.session.isinitpath(file_path)
+    kind = _kind(file_path, named, parent.config.getoption("--beaver"))
+    return kind.from_parent(parent, path=file_path) if kind else None
 
 
-def _is_asked_for(path: Path, config: pytest.Config) -> bool:
-    """With --beaver, every file that is a scenario for `run`, or was meant to be one, and no sweep.
+def _kind(path: Path, named: bool, all_of_them: bool) -> "type[FlownFile] | None":
+    """What a YAML file is collected as."""
+    if path.name.endswith(_MARKED):
+        return ScenarioFile
+    if not named and (not all_of_them or any(map(_is_a_result, path.parents))):
+        return None
+    return _kind_by_its_keys(path, named, all_of_them)
 
-    A file is read as `run` reads it. What cannot be read is collected, so that it fails and is not missed.
-    """
-    if not config.getoption("--beaver"):
-        return False
+
+@cache
+def _is_a_result(folder: Path) -> bool:
+    """Whether a run or a sweep has written this folder: what is in it has been flown, and is no test."""
+    return any(all((folder / name).is_file() for name in names) for names in _OF_A_RESULT)
+
+
+def _kind_by_its_keys(path: Path, named: bool, all_of_them: bool) -> "type[FlownFile] | None":
+    """A file is read as `run` reads it. What is there to be collected and cannot be read is, so that it fails
+    and is not missed; a file that is named alone may be another tool's."""
     from beaver_ftc.documents.problems import ScenarioError
     from beaver_ftc.scenario.loader import parse_document, read_file
 
     try:
-        data = parse_document(read_file(path, str(path)), str(path)).data
+        keys = list(parse_document(read_file(path, str(path)), str(path)).data)
     except ScenarioError as error:
-        return not all(problem.says.startswith(_NO_MAPPING) for problem in error.problems)
-    return not data.keys() & {"base", "vary"} and _looks_like_a_scenario(list(data))
+        none = all(problem.says.startswith(_NO_MAPPING) for problem in error.problems)
+        return ScenarioFile if all_of_them and not none else None
+    if not {"base", "vary"}.isdisjoint(keys):
+        return SweepFile if named and not {"vary", "runs", "set"}.isdisjoint(keys) else None
+    return ScenarioFile if _looks_like_a_scenario(keys) else None
 
 
 def _looks_like_a_scenario(keys: list[str]) -> bool:
@@ -92,50 +116,87 @@ def _looks_like_a_scenario(keys: list[str]) -> bool:
     return near or ("name" in keys and set(keys) <= known)
 
 
-class ScenarioFile(pytest.File):
-    """One scenario file; flown when the first of its expectations is asked about."""
+class FlownFile(pytest.File):
+    """A file of flights; flown when the first of its expectations is asked about."""
 
+    name_flown: str
     _flown: dict[str, Any] | Exception | None = None
 
     def collect(self) -> Iterator[pytest.Item]:
-        """One item an expectation; of a scenario that expects nothing, that it can be flown."""
+        """One item an expectation; of a file that expects nothing, that it can be flown."""
         from beaver_ftc.documents.errors import BadInput
-        from beaver_ftc.results.expectations import names
-        from beaver_ftc.scenario.given import load
 
         try:
-            self.scenario = load(self.path)
+            self.name_flown, names = self._read()
         except BadInput as error:
             raise self.CollectError(str(error)) from None
-        for name in names(self.scenario.expect) or [_COMPLETES]:
+        for name in names or [_COMPLETES]:
             item = ExpectationItem.from_parent(self, name=name)
-            # `pytest -n 2 --dist loadgroup` then flies a scenario in one worker only
+            # `pytest -n 2 --dist loadgroup` then flies a file in one worker only
             item.add_marker(pytest.mark.xdist_group(str(self.path)))
             yield item
 
     def flown(self) -> dict[str, Any]:
-        """The metrics of the flight; raises again what went wrong with it."""
+        """{expectations, folder} of what was flown; raises again what went wrong with it."""
         if self._flown is None:
             try:
-                self._flown = self._fly()
+                self._flown = self._fly(self.config._tmp_path_factory.mktemp("beaver-ftc"))  # type: ignore[attr-defined]
             except Exception as error:
                 self._flown = error
         if isinstance(self._flown, Exception):
             raise self._flown
         return self._flown
 
-    def _fly(self) -> dict[str, Any]:
+    def _read(self) -> tuple[str, list[str]]:
+        """Its name, and the names of what it expects. Raises BadInput."""
+        raise NotImplementedError
+
+    def _fly(self, out: Path) -> dict[str, Any]:
+        """Fly into a folder, with figures if an expectation is missed."""
+        raise NotImplementedError
+
+
+class ScenarioFile(FlownFile):
+    """One scenario."""
+
+    def _read(self) -> tuple[str, list[str]]:
+        from beaver_ftc.results.expectations import names
+        from beaver_ftc.scenario.given import load
+
+        self.scenario = load(self.path)
+        return self.scenario.name, names(self.scenario.expect)
+
+    def _fly(self, out: Path) -> dict[str, Any]:
         from beaver_ftc.results.flight import fly
 
-        out = self.config._tmp_path_factory.mktemp("beaver-ftc")  # type: ignore[attr-defined]
         flight = fly(self.scenario)
         return flight.metrics | {"folder": str(flight.save(out, report=not flight.passed))}
 
 
-class ExpectationItem(pytest.Item):
-    """One expectation of one scenario."""
+class SweepFile(FlownFile):
+    """One sweep, flown on all cores."""
 
-    parent: ScenarioFile
+    def _read(self) -> tuple[str, list[str]]:
+        from beaver_ftc.scenario.sweep_loader import load_sweep
+        from beaver_ftc.studies.sweep.expectations import names
+
+        self.sweep = load_sweep(self.path)
+        return self.sweep.name, names(self.sweep.file.expect)
+
+    def _fly(self, out: Path) -> dict[str, Any]:
+        from beaver_ftc.studies.sweep.run import Options, run_sweep
+        from beaver_ftc.studies.sweep.words import verdict
+
+        summary = run_sweep(self.sweep, Options(out, report=False, source=str(self.path)))
+        if not summary["passed"]:
+            run_sweep(self.sweep, Options(out, resume=True, source=str(self.path)))  # nothing is flown again
+        return verdict(summary) | {"folder": str(out / self.sweep.name)}
+
+
+class ExpectationItem(pytest.Item):
+    """One expectation of one file."""
+
+    parent: FlownFile
 
     def runtest(self) -> None:
         """Fly, if nobody has yet, and hold the expectation against what came out."""
@@ -145,7 +206,7 @@ class ExpectationItem(pytest.Item):
             if expectation["name"] == self.name and not expectation["passed"]:
                 raise ExpectationMissed(
                     f"{self.name}: expected {expectation['expected']}, actual {expectation['actual']}\n"
-                    f"kept: {document['folder']} (figures/, report.html, log.parquet)"
+                    f"kept: {document['folder']} (see report.html)"
                 )
 
     def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], style: Any = None) -> Any:
@@ -158,4 +219,4 @@ class ExpectationItem(pytest.Item):
 
     def reportinfo(self) -> tuple[Path, int, str]:
         """Where it stands."""
-        return self.path, 0, f"{self.parent.scenario.name}: {self.name}"
+        return self.path, 0, f"{self.parent.name_flown}: {self.name}"

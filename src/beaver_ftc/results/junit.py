@@ -1,4 +1,8 @@
-"""Runs as JUnit XML, which CI systems show: a test suite a scenario, a test case an expectation."""
+"""Runs as JUnit XML, which CI systems show: a test suite a scenario or sweep, a test case an expectation.
+
+All cases of a suite are answered by the same flights: each has an equal part of the time these took, so that
+the cases add up to the suite and the suites to what the command took.
+"""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -13,8 +17,12 @@ _LONGEST = 10_000  # characters of one line
 
 
 def write_junit(runs: Sequence[Document], path: Path) -> None:
-    """Write the runs: metrics documents, or {scenario, error} of one that could not be flown."""
-    root = ElementTree.Element("testsuites", name="beaver-ftc")
+    """Write the runs: {scenario, expectations} or, of what could not be flown, {scenario, error}.
+
+    `took_s` of each is the time that flying it took, 0 where it is left out.
+    """
+    took_s = sum(run.get("took_s", 0.0) for run in runs)
+    root = ElementTree.Element("testsuites", name="beaver-ftc", time=_seconds(took_s))
     for run in runs:
         _add_suite(root, run)
     ElementTree.indent(root)
@@ -31,7 +39,14 @@ def _add_suite(root: ElementTree.Element, run: Document) -> None:
     failures = sum(case.find("failure") is not None for case in cases)
     errors = sum(case.find("error") is not None for case in cases)
     counts = {"name": name, "tests": str(len(cases)), "failures": str(failures), "errors": str(errors)}
-    ElementTree.SubElement(root, "testsuite", counts).extend(cases)
+    took_s = run.get("took_s", 0.0)
+    for case in cases:
+        case.set("time", _seconds(took_s / len(cases)))
+    ElementTree.SubElement(root, "testsuite", counts, time=_seconds(took_s)).extend(cases)
+
+
+def _seconds(took_s: float) -> str:
+    return f"{took_s:.6f}"
 
 
 def _case(name: str, expectation: Document) -> ElementTree.Element:

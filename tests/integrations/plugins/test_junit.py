@@ -2,8 +2,11 @@
 
 import subprocess
 import sys
+import time
 from pathlib import Path
 from xml.etree import ElementTree
+
+import pytest
 
 from beaver_ftc.results.junit import write_junit
 
@@ -53,6 +56,51 @@ def test_the_command_line_writes_it_whatever_the_verdict(tmp_path):
     assert done.returncode == 2
     (suite,) = ElementTree.parse(tmp_path / "j.xml").getroot()
     assert "bad.yaml:2: duration_s" in suite[0].find("error").get("message")
+
+
+def _flown(folder, *arguments):
+    began = time.perf_counter()
+    done = subprocess.run(
+        [BEAVER, *arguments, "--no-report", "--junit", "j.xml"], cwd=folder, check=False, capture_output=True
+    )
+    return done, time.perf_counter() - began, ElementTree.parse(folder / "j.xml").getroot()
+
+
+def test_cases_have_times_that_add_up_to_what_flying_took(tmp_path):
+    flown = "name: {}\nduration_s: {}\nexpect: {{no_departure: true, no_false_alarm: true}}\n"
+    (tmp_path / "short.yaml").write_text(flown.format("short", 1))
+    (tmp_path / "long.yaml").write_text(flown.format("long", 600))
+    _, took_s, root = _flown(tmp_path, "run", "short.yaml", "long.yaml")
+    cases = [[float(case.get("time")) for case in suite] for suite in root]
+    suites = [float(suite.get("time")) for suite in root]
+    assert [len(each) for each in cases] == [2, 2]
+    assert all(seconds > 0 for each in cases for seconds in each)
+    assert [sum(each) for each in cases] == pytest.approx(suites, abs=1e-5)
+    assert float(root.get("time")) == pytest.approx(sum(suites), abs=1e-5)
+    assert sum(suites) < took_s
+
+
+def test_a_sweep_is_a_suite_and_each_of_its_bounds_a_case(tmp_path):
+    (tmp_path / "s.yaml").write_text(
+        "name: s\nbase: fault-free\nset: {duration_s: 1}\nruns: 2\n"
+        "expect: {departure_rate: {at_least: 1, at_most: 1}, pass_rate: {at_least: 1}}\n"
+    )
+    done, took_s, root = _flown(tmp_path, "sweep", "s.yaml")
+    assert done.returncode == 1
+    (suite,) = root
+    assert _attributes(suite, "name", "tests", "failures", "errors") == ("s", "3", "1", "0")
+    assert [case.get("name") for case in suite] == [
+        "departure_rate.at_least", "departure_rate.at_most", "pass_rate.at_least"
+    ]  # fmt: skip
+    assert suite[0].find("failure").get("message") == "expected ≥ 1, actual 0 of 2 flights"
+    assert 0 < float(suite.get("time")) < took_s
+
+
+def test_a_sweep_that_cannot_be_flown_is_an_error_in_it(tmp_path):
+    (tmp_path / "bad.yaml").write_text("base: fault-free\nruns: x\n")
+    done, _, root = _flown(tmp_path, "sweep", "bad.yaml")
+    assert done.returncode == 2
+    assert "bad.yaml:2: runs" in root[0][0].find("error").get("message")
 
 
 def test_what_xml_cannot_hold_is_escaped(tmp_path):

@@ -15,7 +15,15 @@ faults: [{actuator: elevator, type: loss_of_effectiveness, magnitude: 0.5, at_s:
 expect: {detected_within_s: 0.5, isolated_as: elevator, post_fault_rms_deg_s: {q: 5, p: 5}}
 """
 MISSES = MEETS.replace("meets", "misses").replace("isolated_as: elevator", "isolated_as: rudder")
-SWEEP = "name: many\nbase: fault-free\nruns: 3\nvary: {initial.airspeed_mps: {uniform: [40, 45]}}\n"
+SWEEP = """
+name: many
+base: fault-free
+set: {duration_s: 1}
+runs: 3
+vary: {initial.airspeed_mps: {uniform: [40, 45]}}
+expect: {departure_rate: {at_most: 0, at_least: 1}, pass_rate: {at_least: 1}}
+"""
+BEAVER = Path(sys.executable).with_name("beaver-ftc")
 
 
 def _pytest(folder, *arguments):
@@ -55,6 +63,43 @@ def test_a_missed_expectation_is_one_item_with_both_values_and_the_result_is_kep
     assert list((kept / "figures").glob("*.png"))
     assert "many" not in done.stdout
     assert "unrelated" not in done.stdout
+
+
+def _collected(folder, *arguments):
+    return _pytest(folder, "--collect-only", "-q", *arguments).stdout.splitlines()
+
+
+def test_result_folders_are_not_collected_unless_a_file_in_one_is_named(folder):
+    before = _collected(folder, "--beaver", ".")
+    for command in (("run", "meets.scenario.yaml"), ("sweep", "many.yaml", "--keep-logs", "1")):
+        subprocess.run([BEAVER, *command, "--no-report"], cwd=folder, check=False)
+    assert (folder / "runs" / "meets" / "scenario.yaml").is_file()
+    assert list((folder / "runs" / "many" / "flights").glob("*/scenario.yaml"))
+    assert _collected(folder, "--beaver", ".")[:-1] == before[:-1]  # the last line has the time it took
+    named = _collected(folder, "runs/meets/scenario.yaml")
+    assert "runs/meets/scenario.yaml::isolated_as" in named
+
+
+def test_a_folder_with_another_tools_metrics_is_none_of_ours(folder):
+    (folder / "metrics.json").write_text("{}")
+    assert "misses.yaml::isolated_as" in _collected(folder, "--beaver", ".")
+
+
+def test_a_sweep_that_is_named_is_a_test_bound_by_bound(folder):
+    done = _pytest(folder, "-v", "many.yaml", "unrelated.yaml", "--beaver")
+    assert "unrelated.yaml" in done.stderr  # which pytest cannot find a test in
+    done = _pytest(folder, "-v", "many.yaml")
+    assert done.returncode == 1
+    assert re.findall(r"many\.yaml::(\S+) (PASSED|FAILED) ", done.stdout) == [
+        ("departure_rate.at_least", "FAILED"),
+        ("departure_rate.at_most", "PASSED"),
+        ("pass_rate.at_least", "PASSED"),
+    ]
+    assert "departure_rate.at_least: expected ≥ 1, actual 0 of 3 flights" in done.stdout
+    assert "Traceback" not in done.stdout
+    kept = Path(re.search(r"kept: (\S+)", done.stdout)[1])
+    assert (kept / "report.html").is_file()
+    assert (kept / "results.parquet").is_file()
 
 
 def test_a_file_that_is_wrong_says_where(folder):

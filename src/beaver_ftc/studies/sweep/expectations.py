@@ -35,10 +35,20 @@ def evaluate(expect: SweepExpect, flights: Flights) -> list[Document]:
     """
     return [
         _verdict(name, level, side, *estimate_of(flights, name, level))
-        for name, level in _levels(expect)
-        for side in ("at_least", "at_most")
-        if getattr(level, side) is not None
+        for name, level, side in _bounds(expect)
     ]
+
+
+def names(expect: SweepExpect) -> list[str]:
+    """A name for each bound set, `departure_rate.at_most`, in the order of `evaluate`."""
+    return [f"{name}.{side}" for name, _, side in _bounds(expect)]
+
+
+def _bounds(expect: SweepExpect) -> Iterator[tuple[str, Level, str]]:
+    for name, level in _levels(expect):
+        for side in ("at_least", "at_most"):
+            if getattr(level, side) is not None:
+                yield name, level, side
 
 
 def _levels(expect: SweepExpect) -> Iterator[tuple[str, Level]]:

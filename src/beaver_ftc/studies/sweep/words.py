@@ -63,6 +63,20 @@ def expectations(summary: Document) -> list[tuple[str, str, str, bool]]:
     ]
 
 
+def verdict(summary: Document) -> Document:
+    """{scenario, passed, expectations} as of a run, each bound under a name of its own."""
+    bounds = [
+        {
+            "name": f"{found['name']}.{'at_least' if 'at_least' in found['expected'] else 'at_most'}",
+            "passed": found["passed"],
+            "expected": expected(found["expected"]),
+            "actual": f"{value(found['actual'])} of {found['of']} flights",
+        }
+        for found in summary["expectations"]
+    ]
+    return {"scenario": summary["sweep"], "passed": summary["passed"], "expectations": bounds}
+
+
 def expected(level: Document) -> str:
     """A bound in words: `95 % quantile ≤ 0.5 with 95 % confidence`."""
     part = f"{percent(level['quantile'])} quantile " if "quantile" in level else ""

@@ -2,7 +2,7 @@
 
 import pytest
 
-from beaver_ftc.documents.errors import BeaverFtcError, SimulationFailed
+from beaver_ftc.documents.errors import BadInput, BeaverFtcError, SimulationFailed
 from beaver_ftc.plant.adapter import Plant, UnknownProperty
 from beaver_ftc.plant.state import FlightState
 
@@ -109,6 +109,9 @@ def test_nothing_is_printed_or_written(capfd, tmp_path, monkeypatch):
 def test_an_aircraft_that_cannot_be_loaded_is_one_clear_line(capfd, tmp_path):
     broken = tmp_path / "broken.xml"
     broken.write_text("<fdm_config><metrics></fdm_config>")
+    with pytest.raises(BadInput, match=r"/broken.xml:1: is no XML .mismatched tag.+, allowed: a JSB"):
+        Plant(rate_hz=100, model=broken)
+    broken.write_text("<fdm_config/>")
     with pytest.raises(SimulationFailed, match=r"^JSBSim cannot load .+/broken.xml: .+") as caught:
         Plant(rate_hz=100, model=broken)
     assert "\n" not in str(caught.value)

@@ -18,7 +18,7 @@ def read_text(path: Path, max_bytes: int) -> str:
 
     Raises UnreadableError; never blocks on a pipe, never reads past max_bytes.
     """
-    data = _read_bytes(path, max_bytes)
+    data = read_bytes(path, max_bytes)
     if b"\0" in data:
         raise UnreadableError(
             "is a binary file, allowed: UTF-8 text", 1 + data[: data.index(b"\0")].count(b"\n")
@@ -32,7 +32,7 @@ def read_text(path: Path, max_bytes: int) -> str:
         ) from None
 
 
-def _read_bytes(path: Path, max_bytes: int) -> bytes:
+def read_bytes(path: Path, max_bytes: int) -> bytes:
     try:
         descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
     except FileNotFoundError:

@@ -1,10 +1,9 @@
 """JSBSim for the rest of the package: a silent executive with the Beaver loaded, its properties by name."""
 
+import os
 import re
-import tempfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from functools import lru_cache
 from math import cos, sin
 from pathlib import Path
 
@@ -15,6 +14,7 @@ from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.aircraft import load as load_aircraft
 from beaver_ftc.documents.errors import SimulationFailed
 from beaver_ftc.documents.paths import data_root
+from beaver_ftc.plant.model_file import refuse_deeds, shared
 from beaver_ftc.plant.state import START_LATITUDE_DEG, FlightState
 
 FT_PER_M = 1.0 / 0.3048
@@ -68,32 +68,19 @@ class _Errors(jsbsim.FGLogger):
         pass
 
 
-def _beside(folder: Path, kind: str) -> str:
-    """Where a model's engines or systems are: beside it, or where the jsbsim package keeps shared ones."""
-    own = folder / kind.capitalize() if kind == "systems" else folder / "Engines"
-    return str(own if own.is_dir() else Path(jsbsim.__file__).parent / kind)
-
-
-@lru_cache(maxsize=1)
-def _unread() -> tempfile.TemporaryDirectory[str]:
-    """Where the output files of models go, as long as the process lasts.
-
-    JSBSim opens them although output is disabled, and by itself in its root directory.
-    """
-    return tempfile.TemporaryDirectory(prefix="beaver-ftc-")
-
-
 def _load(errors: _Errors, model: Path) -> jsbsim.FGFDMExec:
     """An executive with a model; engines, propellers and systems are looked for beside it first.
 
-    Raises SimulationFailed with what JSBSim says of a model it cannot load.
+    Raises BadInput for a model that would act on the machine, SimulationFailed with what JSBSim says of one
+    it cannot load.
     """
+    refuse_deeds(model)
     jsbsim.set_logger(errors)
     fdm = jsbsim.FGFDMExec(str(data_root()))
     fdm.set_debug_level(0)
-    fdm.set_output_path(_unread().name)
+    fdm.set_output_path(os.devnull)  # which is no folder: should JSBSim write after all, it cannot
     folder = model.parent
-    places = [str(folder), *(_beside(folder, kind) for kind in ("engine", "systems"))]
+    places = [str(folder), *(str(shared(folder, kind)) for kind in ("engine", "systems"))]
     try:
         loaded = fdm.load_model_with_paths(model.stem, *places, False)  # type: ignore  # stub: no model
     except jsbsim.BaseError as error:

@@ -6,17 +6,15 @@ those of the aircraft's flight control; all else is the aircraft's own. The file
 """
 
 import re
-import shutil
 from collections.abc import Iterable
 from itertools import product
 from pathlib import Path
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
-import jsbsim
-
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.plant.actuator import actuator_system
+from beaver_ftc.plant.model_file import SYSTEMS, copy_of, package
 
 PREFIX = "actuated-"
 # What aerodynamics of JSBSim's aircraft call the deflection of each surface, and the sign and shape of it.
@@ -118,11 +116,6 @@ _COMMON = """<?xml version="1.0"?>
 """
 
 
-def root() -> Path:
-    """Where the jsbsim package keeps its aircraft, engines and systems."""
-    return Path(jsbsim.__file__).parent
-
-
 def engines_of(source: Path) -> int:
     """How many engines an aircraft has."""
     return _engines(_parsed(source))
@@ -138,7 +131,7 @@ def _parsed(path: Path) -> Element:
 
 def names() -> tuple[str, ...]:
     """Names of the aircraft the jsbsim package ships."""
-    return tuple(sorted(p.parent.name for p in root().glob("aircraft/*/*.xml") if p.stem == p.parent.name))
+    return tuple(sorted(p.parent.name for p in package().glob("aircraft/*/*.xml") if p.stem == p.parent.name))
 
 
 def source_of(name: str) -> Path:
@@ -147,7 +140,7 @@ def source_of(name: str) -> Path:
         raise BadInput(
             f"jsbsim:{name}: the jsbsim package has no such aircraft, allowed: {', '.join(names())}"
         )
-    return root() / "aircraft" / name / f"{name}.xml"
+    return package() / "aircraft" / name / f"{name}.xml"
 
 
 def _common(engines: int, read: str, absent: Iterable[str]) -> str:
@@ -188,21 +181,18 @@ def instrument(
     whole = _parsed(source)
     if whole.tag != "fdm_config":
         raise BadInput(f"{source.name}: is {whole.tag}, allowed: a JSBSim model, fdm_config")
-    shutil.copytree(source.parent, folder, dirs_exist_ok=True)
-    for kind, below in (("engine", "Engines"), ("systems", "Systems")):
-        _copy_missing(root() / kind, folder / below)
-    for output in whole.findall("output"):  # it would write files where the flight is started
-        whole.remove(output)
+    model = copy_of(source, folder)
+    whole = _parsed(model)
+    (folder / SYSTEMS).mkdir(exist_ok=True)
+    read = "".join(path.read_text("utf-8", "replace") for path in sorted(folder.rglob("*.xml")))
     aerodynamics = _aerodynamics(whole, source)
     surfaces = _put_in(aerodynamics, folder, travel_rad)
     _add_signals(aerodynamics, _engines(whole))
     _add_pitch_fault(aerodynamics, source.stem)
-    read = "".join(path.read_text("utf-8", "replace") for path in sorted(source.parent.rglob("*.xml")))
-    (folder / "Systems" / "ftc-common.xml").write_text(_common(_engines(whole), read, absent), "utf-8")
+    (folder / SYSTEMS / "ftc-common.xml").write_text(_common(_engines(whole), read, absent), "utf-8")
     place = list(whole).index(next(iter(whole.iter("aerodynamics"))))
     for i, system in enumerate((*(f"ftc-{surface}" for surface in surfaces), "ftc-common")):
         whole.insert(place + i, Element("system", file=system))
-    model = folder / source.name
     ElementTree.ElementTree(whole).write(model, encoding="utf-8", xml_declaration=True)
     return model
 
@@ -210,14 +200,6 @@ def instrument(
 def _engines(whole: Element) -> int:
     propulsion = whole.find("propulsion")
     return 0 if propulsion is None else len(propulsion.findall("engine"))
-
-
-def _copy_missing(source: Path, target: Path) -> None:
-    """Copy files that the aircraft shares with others, where it has none of its own."""
-    target.mkdir(exist_ok=True)
-    for path in source.glob("*.xml"):
-        if not (target / path.name).exists():
-            shutil.copy(path, target / path.name)
 
 
 def _aerodynamics(whole: Element, source: Path) -> Element:
@@ -264,7 +246,7 @@ def _put_in(aerodynamics: Element, folder: Path, travel_rad: dict[str, tuple[flo
         system = actuator_system(surface, *travel, prefix=PREFIX)
         extra = "".join(_component(surface, shape, travel[1]) for shape in sorted(shapes - {"rad"}))
         system = re.sub(r"(\s*</channel>)", lambda end: f"{extra}{end.group(1)}", system)  # noqa: B023
-        (folder / "Systems" / f"ftc-{surface}.xml").write_text(system, encoding="utf-8")
+        (folder / SYSTEMS / f"ftc-{surface}.xml").write_text(system, encoding="utf-8")
     return tuple(travel_rad)
 
 

@@ -14,7 +14,6 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from math import hypot
 from pathlib import Path
-from shutil import copytree
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
@@ -25,6 +24,7 @@ from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.plant.adapter import FT_PER_M, Plant
 from beaver_ftc.plant.configure import configure
+from beaver_ftc.plant.model_file import copy_of
 from beaver_ftc.plant.state import FlightState
 
 if TYPE_CHECKING:
@@ -168,6 +168,7 @@ def _aircraft_with_an_engine(aircraft: Aircraft) -> Iterator[Path]:
         raise SimulationFailed("the aircraft is not the one linear analysis knows: it has engines")
     with TemporaryDirectory(prefix="beaver-ftc-") as folder:
         root = Path(folder)
+        copy_of(aircraft.jsbsim, root)
         for path, content in (
             (aircraft.jsbsim.name, text.replace(_NO_PROPULSION, _INERT_PROPULSION)),
             ("Engines/inert.xml", _ENGINE),
@@ -175,9 +176,6 @@ def _aircraft_with_an_engine(aircraft: Aircraft) -> Iterator[Path]:
         ):
             (root / path).parent.mkdir(parents=True, exist_ok=True)
             (root / path).write_text(content, encoding="utf-8")
-        systems = aircraft.jsbsim.parent / "Systems"
-        if systems.is_dir():
-            copytree(systems, root / "Systems")
         yield root / aircraft.jsbsim.name
 
 

@@ -1,8 +1,203 @@
-"""A JSBSim model as one tree: its systems read in where it only names their files."""
+"""The files a JSBSim model is made of: found as JSBSim finds them, and refused where they are more than data.
 
+JSBSim obeys what a model says: `<output>` writes files and connects, `<input>` listens, `file` names any file
+of the machine. An aircraft may be a stranger's, so all that is looked for before JSBSim sees it, with the
+parser JSBSim has (expat, without namespaces): both see the same elements.
+"""
+
+import shutil
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from functools import lru_cache
+from importlib.util import find_spec
+from itertools import islice
 from pathlib import Path
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
+from xml.parsers import expat
+
+from beaver_ftc.documents.document import MAX_PROBLEMS
+from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.documents.files import UnreadableError, read_bytes
+from beaver_ftc.documents.problems import one_line
+
+SCRIPT = "runscript"
+ENGINES, SYSTEMS = "Engines", "Systems"
+_ENGINE_FOLDERS = (ENGINES, "engines", "Engine", "engine")  # beside a model; JSBSim knows all four
+_ENGINE_ELEMENTS = ("engine", "thruster")
+_MAX_BYTES = 20_000_000
+_LONGEST = 160
+_WRITES_STATE = "write-state-file"  # a property of JSBSim that writes a file whenever it is set
+_NAMING = {"use": ("aircraft", "initialize")}  # what names files beside `file`
+_FORBIDDEN = {
+    "output": "writes files or connects, allowed: no <output> here; what flies is logged by beaver-ftc",
+    "input": "listens on a port, allowed: no <input> here; what flies is commanded by beaver-ftc",
+    "child": "loads another aircraft, allowed: no <child>",
+}
+
+
+def package() -> Path:
+    """Where the jsbsim package keeps its aircraft, engines and systems. Found without importing it."""
+    found = find_spec("jsbsim")
+    return Path(found.origin).parent if found and found.origin else Path()
+
+
+def shared(folder: Path, kind: str) -> Path:
+    """Where JSBSim looks last for what a model in this folder names; kind: engine or systems."""
+    own = folder / (SYSTEMS if kind == "systems" else ENGINES)
+    return own if own.is_dir() else package() / kind
+
+
+@dataclass
+class _File:
+    """What a file says: its root, what it names (element, file, line), what it must not say (line, what)."""
+
+    root: str = ""
+    names: list[tuple[str, str, int]] = field(default_factory=list)
+    wrong: list[tuple[int, str]] = field(default_factory=list)
+
+
+def refuse_deeds(model: Path) -> None:
+    """Raise BadInput where a model, a file it is made of or a script beside it would act on the machine.
+
+    A line for each: FILE:LINE: what it says, what is allowed. Engines and systems that the jsbsim package
+    shares among aircraft are not looked at.
+    """
+    lines = list(islice(_deeds(model.resolve()), MAX_PROBLEMS))
+    if lines:
+        raise BadInput("\n".join(lines))
+
+
+def _deeds(model: Path) -> Iterator[str]:
+    folder = model.parent
+    used = dict.fromkeys((model, *files_of(model)))
+    for path in used:
+        if path.parent not in (package() / "engine", package() / "systems"):
+            yield from _wrong_with(path, folder)
+    if (folder / "aircraft.yaml").is_file():  # what is beside a single model may be anything
+        for path in sorted(folder.rglob("*.xml")):
+            if path not in used and (path.is_symlink() or _read(path).root == SCRIPT):
+                yield from _wrong_with(path, folder)
+
+
+def _wrong_with(path: Path, folder: Path) -> Iterator[str]:
+    where = one_line(str(path), 4096)
+    if not path.resolve().is_relative_to(folder):
+        yield f"{where}:1: is a link out of the folder, allowed: files of the aircraft's own folder"
+    else:
+        for line, says in _read(path).wrong:
+            yield f"{where}:{line}: {says}"
+
+
+def files_of(model: Path, first: bool = False) -> dict[Path, Path]:
+    """What a model is made of beside itself, and where each belongs beside a copy of the model.
+
+    Every file that has a name the model says, wherever JSBSim looks; or only the `first` of each name, which
+    it takes.
+    """
+    found: dict[Path, Path] = {}
+    ahead = [model]
+    while ahead:
+        for element, name, _ in _read(ahead.pop()).names:
+            there = [
+                (path, place) for path, place in _candidates(model.parent, element, name) if path.is_file()
+            ]
+            new = {path: place for path, place in there[: 1 if first else None] if path not in found}
+            found |= new
+            ahead += new
+    return found
+
+
+def _candidates(folder: Path, element: str, name: str) -> Iterator[tuple[Path, Path]]:
+    """Where JSBSim looks for what an element names, in its order, and where that belongs."""
+    if _leaves(name):
+        return  # refused by name
+    file = Path(name if name.endswith(".xml") else f"{name}.xml")
+    engine = element in _ENGINE_ELEMENTS
+    for place in (".", *_ENGINE_FOLDERS) if engine else (".", SYSTEMS):
+        yield folder / place / file, Path(place) / file
+    kind, home = ("engine", ENGINES) if engine else ("systems", SYSTEMS)
+    yield shared(folder, kind) / file, Path(home) / file
+
+
+def copy_of(model: Path, folder: Path) -> Path:
+    """Copy a model and the files it is made of, no others, into a folder; returns the copy.
+
+    What a file of the jsbsim package would do on the machine is left out of its copy.
+    """
+    for path, place in {model: Path(model.name), **files_of(model, first=True)}.items():
+        (folder / place).parent.mkdir(parents=True, exist_ok=True)
+        if not _read(path).wrong:
+            shutil.copyfile(path, folder / place)
+            continue
+        tree = ElementTree.parse(path)
+        for element in [each for each in tree.getroot() if each.tag in _FORBIDDEN]:
+            tree.getroot().remove(element)
+        tree.write(folder / place, encoding="utf-8", xml_declaration=True)
+    return folder / model.name
+
+
+def _read(path: Path) -> _File:
+    """What a file says; read again when it has changed."""
+    try:
+        status = path.stat()
+    except OSError:
+        return _File(wrong=[(1, "cannot be read, allowed: an XML file")])
+    return _read_at(path, status.st_mtime_ns, status.st_size, status.st_ino)
+
+
+@lru_cache(maxsize=1024)
+def _read_at(path: Path, *_state: int) -> _File:
+    says, depth, text, parser = _File(), 0, [], expat.ParserCreate()  # type: ignore[var-annotated]
+
+    def forbid(what: str) -> None:
+        says.wrong.append((parser.CurrentLineNumber, what))
+
+    def flush() -> None:
+        if _WRITES_STATE in "".join(text):
+            forbid(f"simulation/{_WRITES_STATE} writes a file, allowed: other properties")
+        text.clear()
+
+    def begin(name: str, attributes: dict[str, str]) -> None:
+        nonlocal depth
+        flush()
+        says.root = says.root or name
+        shown = one_line(" ".join([name, *(f'{key}="{of}"' for key, of in attributes.items())]), _LONGEST)
+        acts = depth <= 1 and name in _FORBIDDEN
+        if acts:
+            forbid(f"<{shown}> {_FORBIDDEN[name]}")
+        for key in ("file", *_NAMING.get(name, ())):
+            if key in attributes and not acts:
+                says.names.append((name, attributes[key], parser.CurrentLineNumber))
+                if _leaves(attributes[key]):
+                    forbid(f"<{shown}> leaves the folder, allowed: a file of the aircraft's own folder")
+        if any(_WRITES_STATE in of for of in attributes.values()):
+            forbid(f"<{shown}> writes a file, allowed: other properties")
+        depth += 1
+
+    def end(_name: str) -> None:
+        nonlocal depth
+        flush()
+        depth -= 1
+
+    def doctype(name: str, *_: object) -> None:
+        forbid(f"<!DOCTYPE {one_line(name, _LONGEST)}> may define entities, allowed: XML without a DOCTYPE")
+
+    parser.StartElementHandler, parser.EndElementHandler = begin, end
+    parser.CharacterDataHandler, parser.StartDoctypeDeclHandler = text.append, doctype
+    parser.DefaultHandler = lambda _: None  # so that expat expands no entity of the document's own
+    try:
+        parser.Parse(read_bytes(path, _MAX_BYTES), True)
+    except UnreadableError as error:
+        says.wrong.append((error.line, str(error)))
+    except (expat.ExpatError, ValueError) as error:
+        says.wrong.append((getattr(error, "lineno", 1), f"is no XML ({error}), allowed: a JSBSim file"))
+    return says
+
+
+def _leaves(name: str) -> bool:
+    """Whether what names a file may lead elsewhere, on any system."""
+    return name.startswith(("/", "~")) or any(sign in name for sign in "\\:") or ".." in Path(name).parts
 
 
 def with_systems(model: Path) -> Element:
@@ -10,7 +205,7 @@ def with_systems(model: Path) -> Element:
     root = ElementTree.parse(model).getroot()
     for place, element in enumerate(list(root)):
         name = element.get("file")
-        path = model.parent / "Systems" / f"{name}.xml"
+        path = model.parent / SYSTEMS / f"{name}.xml"
         if element.tag == "system" and name and path.is_file():
             root[place] = ElementTree.parse(path).getroot()
     return root

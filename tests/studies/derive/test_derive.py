@@ -19,6 +19,7 @@ from beaver_ftc.documents.paths import data_root
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.plant import instrumented
 from beaver_ftc.plant.adapter import Plant, bare, probe, translated
+from beaver_ftc.plant.model_file import copy_of
 from beaver_ftc.scenario.loader import load_text
 from beaver_ftc.studies.derive.check import not_affine
 from beaver_ftc.studies.derive.error import errors_of
@@ -207,8 +208,26 @@ def test_a_models_own_output_file_is_left_nowhere(tmp_path, monkeypatch):
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     try_out(source_of("jsbsim:ball"))
     assert list(tmp_path.iterdir()) == []
-    bare(source_of("jsbsim:ball").model)
+    bare(copy_of(source_of("jsbsim:ball").model, tmp_path))
+    assert [path.name for path in tmp_path.iterdir()] == ["ball.xml"]
     assert not list(data_root().glob("BallOut*"))
+
+
+def test_every_file_of_the_copy_is_needed(derived):
+    """Of the engines and systems that JSBSim's aircraft share it has those that it names: without any of
+    them it does not load."""
+    made, folder, name = derived
+    copied = set((folder / name).rglob("*.xml")) - {made.aircraft.jsbsim}
+    own = {"Systems/ftc-aileron.xml", "Systems/ftc-elevator.xml", "Systems/ftc-rudder.xml"}
+    assert {str(path.relative_to(folder / name)) for path in copied} >= own
+    for path in copied:
+        path.rename(path.with_suffix(".away"))
+        try:
+            with pytest.raises(SimulationFailed):
+                bare(made.aircraft.jsbsim)
+        finally:
+            path.with_suffix(".away").rename(path)
+    bare(made.aircraft.jsbsim)
 
 
 def test_an_aircraft_with_a_file_is_derived_over_the_envelope_asked_for(tmp_path):

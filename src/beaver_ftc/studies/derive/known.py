@@ -1,12 +1,12 @@
 """An aircraft that has a file already: its moments are found anew, all else is as the file has it."""
 
-import shutil
 from pathlib import Path
 from typing import Any
 
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.aircraft.loading import read
 from beaver_ftc.plant.adapter import Plant
+from beaver_ftc.plant.model_file import copy_of
 from beaver_ftc.plant.trim import TrimPoint, trim
 from beaver_ftc.scenario.initial import initial_of
 from beaver_ftc.studies.derive.level import Level
@@ -18,9 +18,9 @@ WIDE_SIDESLIP_RAD = 0.45
 
 def about_known(source: Path, folder: Path, asked: EnvelopeFile) -> Level:
     """The aircraft in trim where its flights start, over the envelope of its file or the one asked for; its
-    folder is copied, with the systems its model shares with others."""
+    model is copied."""
     aircraft = read(source)
-    shutil.copytree(source, folder)
+    copy_of(aircraft.jsbsim, folder)
     data = aircraft.file.model_dump(mode="json", exclude_none=True, exclude={"moments"})
     data["envelope"] |= asked.model_dump(
         mode="json", exclude_none=True, exclude={"altitude_m", "sideslip_deg"}

@@ -26,6 +26,7 @@ from beaver_ftc.documents.paths import cache_base
 from beaver_ftc.documents.problems import ScenarioError
 from beaver_ftc.documents.validation import parse_document
 from beaver_ftc.plant.adapter import Plant, translated
+from beaver_ftc.plant.model_file import refuse_deeds
 from beaver_ftc.scenario.diagnosis import Bounds
 from beaver_ftc.studies.derive.error import errors_of
 from beaver_ftc.studies.derive.flown import sorted_in
@@ -45,7 +46,11 @@ def say_once(aircraft: Aircraft, tell: Callable[[str], None]) -> None:
 
 
 def kept_or_compared(aircraft: Aircraft) -> list[str]:
-    """A line for each axis on which the model exceeds what the file declares, found now or earlier."""
+    """A line for each axis on which the model exceeds what the file declares, found now or earlier.
+
+    Raises BadInput as `refuse_deeds`, and as `compared`.
+    """
+    refuse_deeds(aircraft.jsbsim)
     base = cache_base()
     if base is None:
         return compared(aircraft)

@@ -11,6 +11,7 @@ from pathlib import Path
 from beaver_ftc.aircraft.loading import FILE, builtin_names, derived_folder, load, read
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.plant import instrumented
+from beaver_ftc.plant.model_file import copy_of, refuse_deeds
 
 FROM_JSBSIM = "jsbsim:"
 _PROBE = """import sys
@@ -41,7 +42,7 @@ class Source:
 
 
 def source_of(reference: str) -> Source:
-    """What a reference means. Raises BadInput for what is no aircraft."""
+    """What a reference means. Raises BadInput for what is no aircraft, or would act on the machine."""
     if reference.startswith(FROM_JSBSIM):
         name = reference.removeprefix(FROM_JSBSIM)
         target = derived_folder(name)
@@ -56,6 +57,7 @@ def source_of(reference: str) -> Source:
     if path.is_dir() and (path / f"{path.resolve().name}.xml").is_file():
         path = path / f"{path.resolve().name}.xml"
     if path.suffix == ".xml" and path.is_file():
+        refuse_deeds(path)
         return Source(path.stem, path.resolve())
     raise BadInput(f"{reference[:80]!r} cannot be derived, allowed: {_ALLOWED}")
 
@@ -77,10 +79,11 @@ def try_out(source: Source) -> tuple[str, ...]:
 
 def _failure(source: Source, absent: list[str]) -> str | None:
     """Why the model does not fly with these properties at 0; None if it does."""
-    command = [sys.executable, "-c", _PROBE, str(source.model), *absent]
     try:
         with tempfile.TemporaryDirectory(prefix="beaver-ftc-") as here:  # also of a process that is ended
             around = os.environ | {"TMPDIR": here}
+            model = copy_of(source.model, Path(here) / source.name)
+            command = [sys.executable, "-c", _PROBE, str(model), *absent]
             run = subprocess.run(
                 command, capture_output=True, text=True, timeout=_LONGEST_S, check=False, env=around
             )

@@ -14,7 +14,7 @@ PLAIN := tests/design $(wildcard tests/*/test_*_kernels.py tests/*/*/test_*_kern
   $(addprefix tests/control/test_,decisions.py law_frame.py laws.py supervisor.py compiled_rivals.py) \
   tests/control/laws/test_gains.py tests/diagnosis/rivals/test_filters.py
 
-.PHONY: demo test acceptance cost test-fast coverage mutants lint docs site clean help
+.PHONY: demo test acceptance cost test-fast coverage mutants drawn lint docs site clean help
 
 help:
 	@echo "make demo       set up, fly the published elevator case, print the verdict and where the report lies"
@@ -24,6 +24,7 @@ help:
 	@echo "make test-fast  the tests that fly little or nothing: less than a minute"
 	@echo "make coverage   the whole test suite, and which lines of Python it has run"
 	@echo "make mutants    100 small defects put into the code on purpose: how many of them do tests find?"
+	@echo "make drawn      600 scenarios drawn from the schema, flown: does each keep every promise?"
 	@echo "make lint       set up and run the linters"
 	@echo "make docs       set up and write the generated pages and pictures of docs/ anew"
 	@echo "make site       set up and build docs/, with reference and notebooks, as a web site in site/"
@@ -62,6 +63,9 @@ coverage: $(VENV)/.dev
 
 mutants: $(VENV)/.dev
 	$(BIN)/python -m tools.mutants --seed $(SEED)
+
+drawn: $(VENV)/.dev
+	$(BIN)/python -m tools.drawn
 
 lint: $(VENV)/.dev
 	$(BIN)/ruff check .

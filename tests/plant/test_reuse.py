@@ -206,3 +206,10 @@ def test_what_cannot_be_trimmed_leaves_the_aircraft_to_others():
         with pytest.raises(BadInput, match="airspeed"):
             ready(scenario_of({"faults": [], "initial": {"airspeed_mps": 9.0}}))
     assert reuse.borrowed(100.0, 1, plant.aircraft) is plant
+
+
+def test_an_aircraft_with_engines_flies_alike_whether_its_trim_is_known_or_searched_for(monkeypatch):
+    flight = load({"name": "again", "aircraft": "jsbsim:c172p", "duration_s": 1.5})
+    searched_for = flown_in_a_fresh_one(flight, monkeypatch)
+    flown(flight)
+    np.testing.assert_array_equal(flown(flight), searched_for)

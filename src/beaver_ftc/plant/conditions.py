@@ -37,20 +37,32 @@ _trims: dict[tuple[object, tuple[str, ...]], TrimPoint] = {}
 def ready(scenario: Scenario) -> tuple[Plant, TrimPoint]:
     """A borrowed aircraft with the scenario's errors, and its trim. Raises BadInput.
 
-    A trim does not depend on what was flown before, so one that is known is not computed again.
+    A trim does not depend on what was flown before, so one that is known is not computed again. Engines
+    remember the search for it: they take off in an aircraft that has not been through one.
     """
+    plant = _configured(scenario)
+    key = plant.origin, texts_of(scenario, _TRIM_DEPENDS_ON)
+    if key not in _trims:
+        if len(_trims) >= _MOST_TRIMS:
+            _trims.clear()
+        try:
+            _trims[key] = trim_of(scenario, plant)
+        except BadInput:
+            give_back(plant)
+            raise
+        plant = _configured(scenario) if plant.n_engines else plant
+    return plant, _trims[key]
+
+
+def _configured(scenario: Scenario) -> Plant:
+    """A borrowed aircraft with the scenario's errors. Raises BadInput."""
     plant = borrowed(scenario.rate_hz, scenario.substeps, scenario.airframe)
     try:
         configure(plant, scenario)
-        key = plant.origin, texts_of(scenario, _TRIM_DEPENDS_ON)
-        if key not in _trims:
-            if len(_trims) >= _MOST_TRIMS:
-                _trims.clear()
-            _trims[key] = trim_of(scenario, plant)
     except BadInput:
         give_back(plant)
         raise
-    return plant, _trims[key]
+    return plant
 
 
 def trimmed(scenario: Scenario) -> tuple[Plant, TrimPoint]:

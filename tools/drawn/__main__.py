@@ -1,0 +1,75 @@
+"""Whole scenarios drawn from the schema, flown: which promise does a flight break?
+
+    python -m tools.drawn [--flights N] [--seed S] [--first I] [--workers W] [--keep FOLDER]
+
+Row by row of covering arrays of everything a scenario may say (`tools/drawn`), so that any two choices meet.
+Flight I of a seed is the same whatever else is flown. Each flight is held against what it promises (exit, no
+false alarm, nothing true excluded, nothing wrong named, no later than said), every third is flown again from
+its saved text with a log, which must tell the same; every fiftieth by `beaver-ftc run`, page and all. What
+breaks is written to FOLDER, and again with as much left out as still breaks (`--shrink`).
+"""
+
+import argparse
+import itertools
+import time
+from collections import Counter
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+
+from tools.drawn.campaign import AIRCRAFT, Outcome, fly_slice
+
+WORDS = ("flights", "refused", "detected", "named", "broken")
+
+
+def main() -> None:
+    """Fly, say what is broken, and how often which promise."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("--flights", type=int, default=600)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--workers", type=int, default=1)
+    parser.add_argument("--aircraft", nargs="+", default=list(AIRCRAFT))
+    parser.add_argument("--keep", type=Path, default=Path("runs/drawn-flights"))
+    parser.add_argument("--shrink", action="store_true", help="leave out what is not needed to break it")
+    args = parser.parse_args()
+    began, count, kinds = time.monotonic(), Counter(dict.fromkeys(WORDS, 0)), Counter()
+    for outcome in outcomes(args):
+        count["flights"] += 1
+        for word in WORDS[1:]:
+            count[word] += bool(getattr(outcome, word))
+        kinds.update({line.partition(":")[0] for line in outcome.broken})
+        if outcome.broken:
+            print(f"{outcome.index}: {'; '.join(outcome.broken)[:300]}", flush=True)
+    took_s = time.monotonic() - began
+    print(*(f"{word} {count[word]}" for word in WORDS), sep=", ")
+    print(*(f"{kind}: {n}" for kind, n in kinds.most_common()), sep="\n")
+    print(f"{took_s:.0f} s, {took_s / max(count['flights'], 1):.3f} s a flight")
+    raise SystemExit(1 if count["broken"] else 0)
+
+
+def outcomes(args: argparse.Namespace) -> "itertools.chain[Outcome]":
+    """Every outcome; each worker flies every so many-th."""
+    slices = [
+        (
+            args.seed,
+            tuple(args.aircraft),
+            args.first + i,
+            args.first + args.flights,
+            args.workers,
+            args.keep,
+            args.shrink,
+        )
+        for i in range(args.workers)
+    ]
+    if args.workers == 1:
+        return itertools.chain(fly_slice(*slices[0]))
+    with ProcessPoolExecutor(args.workers) as pool:
+        return itertools.chain.from_iterable([list(pool.submit(_listed, one).result()) for one in slices])
+
+
+def _listed(one: tuple) -> list[Outcome]:
+    return list(fly_slice(*one))
+
+
+if __name__ == "__main__":
+    main()

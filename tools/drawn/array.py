@@ -1,0 +1,120 @@
+"""A covering array: rows in which every pair of levels of any two factors stands together at least once.
+
+Greedy, a row at a time: a row begins with a pair that none has yet, and each further cell takes the level
+that brings the most new pairs. The rows are few dozen more than the two largest factors multiplied.
+"""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+Row = dict[str, str]
+Forbidden = Callable[[str, str, str, str], bool]
+USUAL = 0.5
+TRIES = 20  # rows begun for a pair before it is said to be impossible
+
+
+@dataclass(frozen=True)
+class Factor:
+    """needs: the cell means something only where another factor has one of these levels, e.g. a profile only
+    where there is a fault."""
+
+    name: str
+    levels: tuple[str, ...]
+    needs: Mapping[str, frozenset[str]] = field(default_factory=dict)
+
+
+class CoveringArray:
+    """The rows for some factors. impossible: pairs that cannot stand in any row, found on the way.
+
+    forbidden(factor, level, other factor, other level): whether two levels may not stand together.
+    """
+
+    def __init__(self, factors: Sequence[Factor], forbidden: Forbidden, rng: np.random.Generator) -> None:
+        self.factors, self._rng = {factor.name: factor for factor in factors}, rng
+        self.cells = [(factor.name, level) for factor in factors for level in factor.levels]
+        self._at = {cell: i for i, cell in enumerate(self.cells)}
+        self._of = {f.name: np.array([self._at[f.name, level] for level in f.levels]) for f in factors}
+        self.impossible: list[tuple[tuple[str, str], tuple[str, str]]] = []
+        self._clash = self._clashes(forbidden)
+        self._open = ~self._clash
+        for places in self._of.values():
+            self._open[np.ix_(places, places)] = False
+
+    def _clashes(self, forbidden: Forbidden) -> np.ndarray:
+        """(cells, cells) bool: pairs that may not both count in one row."""
+        n = len(self.cells)
+        clash = np.zeros((n, n), dtype=bool)
+        for i, (name, level) in enumerate(self.cells):
+            for j, (other, level_there) in enumerate(self.cells[:i]):
+                wanted = self.factors[name].needs.get(other)
+                wanted_there = self.factors[other].needs.get(name)
+                unmet = (wanted is not None and level_there not in wanted) or (
+                    wanted_there is not None and level not in wanted_there
+                )
+                apart = forbidden(name, level, other, level_there) or forbidden(
+                    other, level_there, name, level
+                )
+                clash[i, j] = clash[j, i] = unmet or apart
+        return clash
+
+    def rows(self) -> Iterator[Row]:
+        """Until no pair is left; a cell that means nothing in a row is not in it."""
+        while (left := np.argwhere(np.triu(self._open))).size:
+            pair = left[self._rng.integers(len(left))]
+            for _ in range(TRIES):
+                chosen = self._row(pair)
+                if chosen is not None:
+                    break
+            else:
+                self._open[pair[0], pair[1]] = self._open[pair[1], pair[0]] = False
+                self.impossible.append((self.cells[pair[0]], self.cells[pair[1]]))
+                continue
+            self._open[np.ix_(chosen, chosen)] = False
+            yield dict(self.cells[i] for i in chosen)
+
+    def _row(self, pair: np.ndarray) -> list[int] | None:
+        """A row with this pair, as cells; None where it has come to a dead end."""
+        chosen: dict[str, int] = {}
+        for i in pair:
+            if not self._put(int(i), chosen):
+                return None
+        names = [name for name in self.factors if name not in chosen]
+        self._rng.shuffle(names)
+        names.sort(key=lambda name: len(self.factors[name].needs))  # what others need comes first
+        for name in names:
+            if name in chosen or not self._means_something(name, chosen):
+                continue
+            taken = list(chosen.values())
+            places = self._of[name]
+            free = places[~self._clash[places][:, taken].any(axis=1)]
+            if not free.size:
+                return None
+            gain = self._open[free][:, taken].sum(axis=1) + self._rng.random(free.size)
+            gain[free == places[0]] += USUAL  # the first level, where others bring no more
+            chosen[name] = int(free[np.argmax(gain)])
+        return list(chosen.values())
+
+    def _put(self, place: int, chosen: dict[str, int]) -> bool:
+        """Take a cell, and what it needs; whether that was possible."""
+        name, _ = self.cells[place]
+        if name in chosen:
+            return chosen[name] == place
+        if self._clash[place, list(chosen.values())].any():
+            return False
+        chosen[name] = place
+        for other, levels in self.factors[name].needs.items():
+            if other in chosen:
+                continue  # no clash, so it is one of them
+            free = [self._at[other, level] for level in sorted(levels)]
+            free = [i for i in free if not self._clash[i, list(chosen.values())].any()]
+            if not free or not self._put(int(self._rng.choice(free)), chosen):
+                return False
+        return True
+
+    def _means_something(self, name: str, chosen: dict[str, int]) -> bool:
+        return all(
+            other in chosen and self.cells[chosen[other]][1] in levels
+            for other, levels in self.factors[name].needs.items()
+        )

@@ -1,0 +1,318 @@
+"""What every flight must keep, and what of it a flight breaks.
+
+`broken` looks at the metrics alone; `told_alike` at log and verdict; `saved_alike` at a result folder and its
+page; `flown_again` at the numbers of the same scenario read back from its text.
+"""
+
+import json
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import yaml
+
+import beaver_ftc as bf
+from beaver_ftc.control.supervisor import MODES
+from beaver_ftc.results import verdict
+from beaver_ftc.scenario.dump import to_yaml
+from beaver_ftc.scenario.loader import load_text
+
+Document = dict[str, Any]
+
+OURS, NONE = "adaptive-estimators", "none"
+UNANTICIPATED = "unanticipated"
+LOSS = "loss_of_effectiveness"
+PLANES = (("elevator", "flap"), ("aileron", "rudder"))
+DUST_S = 1e-6
+
+
+def broken(scenario: bf.Scenario, metrics: Document, declared: bool) -> Iterator[str]:
+    """A line for each promise that the flight breaks. declared: whether every error of the truth is."""
+    yield from _sane(scenario, metrics)
+    if declared:
+        yield from _false_alarms(scenario, metrics)
+        yield from _late(scenario, metrics)
+        yield from _misnamed(scenario, metrics)
+
+
+def _sane(scenario: bf.Scenario, metrics: Document) -> Iterator[str]:
+    """What no document may contradict by itself."""
+    frames = round(scenario.duration_s * scenario.rate_hz)
+    if metrics["departure"] is None and abs(metrics["frames"] - frames) > 1:
+        yield f"frames: {metrics['frames']} of {frames}, and no departure"
+    detection, isolation = metrics["detection"], metrics["isolation"]
+    if detection["detected"] != (detection["time_s"] is not None):
+        yield "detection: `detected` and `time_s` disagree"
+    if isolation["isolated"] and not detection["detected"]:
+        yield f"isolation: {isolation['fault']} without an alarm"
+    elif isolation["isolated"] and isolation["time_s"] < detection["time_s"] - DUST_S:
+        yield "isolation: before the alarm"
+    if metrics["passed"] != all(one["passed"] for one in metrics["expectations"]):
+        yield "expectations: `passed` is not all of them"
+    times = [change["time_s"] for change in metrics["supervisor"]]
+    if times != sorted(times):
+        yield "supervisor: modes out of order"
+
+
+def _stages(scenario: bf.Scenario) -> list[tuple[float, str, bool]]:
+    """(from when on, scheme, whether the diagnosis begins anew there)."""
+    stages, scheme = [(0.0, scenario.fdi.scheme, True)], scenario.fdi.scheme
+    for change in scenario.changes:
+        scheme = change.scheme or scheme
+        stages.append((change.at_s, scheme, change.renews_diagnosis))
+    return stages
+
+
+def _scheme_at(scenario: bf.Scenario, time_s: float) -> str:
+    """Whose alarm at a time is: a change takes effect in the frame after it at the latest."""
+    return [scheme for at_s, scheme, _ in _stages(scenario) if at_s <= time_s + DUST_S][-1]
+
+
+def _began_s(scenario: bf.Scenario) -> float:
+    """When the diagnosis that is there at the end began."""
+    return [at_s for at_s, _, anew in _stages(scenario) if anew][-1]
+
+
+def _false_alarms(scenario: bf.Scenario, metrics: Document) -> Iterator[str]:
+    """An alarm before there is a fault."""
+    first_s = min((fault.at_s for fault in scenario.faults), default=math.inf)
+    times = [metrics["detection"]["time_s"], *(one.get("detection_time_s") for one in metrics["changes"])]
+    for time_s in times:
+        early = time_s is not None and time_s < first_s - DUST_S
+        if early and _scheme_at(scenario, time_s - 1.0 / scenario.rate_hz) == OURS:
+            yield f"false alarm: at {time_s:g} s"
+
+
+def _late(scenario: bf.Scenario, metrics: Document) -> Iterator[str]:
+    """Later than what was said to be certain. A broken instrument is an error that nothing declares."""
+    certain_s = metrics["detection"]["guaranteed_delay_s"]
+    if certain_s is None or any(map(_sensor, scenario.faults)) or metrics["false_alarm"]:
+        return
+    if scenario.fdi.scheme != OURS:
+        return
+    delay_s = metrics["detection"]["delay_s"]
+    if delay_s is None:
+        yield f"late: certain after {certain_s:g} s, and no alarm"
+    elif delay_s > certain_s + 1.0 / scenario.rate_hz + DUST_S:
+        yield f"late: certain after {certain_s:g} s, alarm after {delay_s:g} s"
+
+
+def _sensor(fault: Any) -> str | None:
+    return getattr(fault, "sensor", None)
+
+
+def _surface(fault: Any) -> str | None:
+    return getattr(fault, "actuator", None)
+
+
+def _misnamed(scenario: bf.Scenario, metrics: Document) -> Iterator[str]:
+    """Something else named than what broke, or what broke excluded, where theory promises that it is not."""
+    if not metrics["detection"]["detected"] or metrics["false_alarm"]:
+        return
+    if _scheme_at(scenario, metrics["detection"]["time_s"]) != OURS:
+        return
+    broken_sensors = [fault for fault in scenario.faults if _sensor(fault)]
+    surfaces = [fault for fault in scenario.faults if not _sensor(fault)]
+    if broken_sensors:
+        yield from _instrument(scenario, metrics, broken_sensors, surfaces)
+    elif surfaces and all(_in_class(scenario, fault) for fault in surfaces):
+        yield from _surfaces(scenario, metrics, surfaces)
+
+
+def _in_class(scenario: bf.Scenario, fault: Any) -> bool:
+    if scenario.fdi.fault_class == "all":
+        return _surface(fault) is not None
+    return fault.type == LOSS and fault.actuator in scenario.airframe.primary
+
+
+def _instrument(
+    scenario: bf.Scenario, metrics: Document, sensors: list[Any], surfaces: list[Any]
+) -> Iterator[str]:
+    """One broken instrument, watched since before it broke: no surface and no other instrument is named."""
+    fault, named = sensors[0], metrics["isolation"]["fault"]
+    watched = scenario.fdi.sensor_monitor != "never" and _began_s(scenario) < fault.at_s
+    if surfaces or len(sensors) > 1 or not watched:
+        return
+    if named not in (None, UNANTICIPATED, f"sensor {fault.sensor}"):
+        yield f"wrong name: {named}, broken is sensor {fault.sensor}"
+
+
+def _surfaces(scenario: bf.Scenario, metrics: Document, faults: list[Any]) -> Iterator[str]:
+    """Faults of the class: of one surface, or with `pairs` of two."""
+    struck = {_surface(fault) for fault in faults}
+    if _norm_bound(scenario) and any(
+        fault.profile != "abrupt" or fault.end_s is not None for fault in faults
+    ):
+        return
+    if len(struck) == 1:
+        yield from _one_surface(scenario, metrics, faults)
+    elif len(faults) == 2 and scenario.fdi.pairs:
+        yield from _pair(metrics, faults)
+
+
+def _norm_bound(scenario: bf.Scenario) -> bool:
+    """The published isolation test supposes a constant parameter."""
+    return scenario.fdi.thresholds == "published"
+
+
+def _one_surface(scenario: bf.Scenario, metrics: Document, faults: list[Any]) -> Iterator[str]:
+    isolation, surface = metrics["isolation"], _surface(faults[0])
+    named, left = isolation["fault"], isolation["candidates"]
+    if scenario.fdi.fault_profile == "abrupt" and len(faults) > 1:
+        return
+    kinds = {fault.type for fault in faults}
+    if named not in (None, surface):
+        yield f"{'excluded' if named == UNANTICIPATED else 'wrong name'}: {named}, broken is {surface}"
+    elif named is None and scenario.fdi.pairs:
+        yield from _left_of_pair(isolation, {surface: kinds})
+    elif named is None:
+        mine = [one for one in left if one.split(":")[0] == surface]
+        if not mine:
+            yield f"excluded: {surface}, left {left}"
+        elif _type_left_out(scenario, faults, mine):
+            yield f"excluded: {surface}:{faults[0].type}, left {mine}"
+    elif len(kinds) == 1:
+        kind = isolation["type"]
+        if kind not in (None, faults[0].type) or (kind is None and faults[0].type not in left):
+            yield f"wrong type: {kind or left}, broken is {faults[0].type} of {surface}"
+
+
+def _type_left_out(scenario: bf.Scenario, faults: list[Any], mine: list[str]) -> bool:
+    """Whether candidates of the true surface lack its true type."""
+    surface, kinds = _surface(faults[0]), {fault.type for fault in faults}
+    open_type = surface in mine or scenario.fdi.fault_class != "all" or len(kinds) > 1
+    return not open_type and f"{surface}:{faults[0].type}" not in mine
+
+
+def _pair(metrics: Document, faults: list[Any]) -> Iterator[str]:
+    """As tests/studies/matrix/test_random_pairs.py: none is named wrongly, no true one is excluded."""
+    yield from _left_of_pair(metrics["isolation"], {_surface(fault): {fault.type} for fault in faults})
+
+
+def _left_of_pair(isolation: Document, true: dict[Any, set[str]]) -> Iterator[str]:
+    named = {found["fault"]: found for found in isolation["faults"] if found["fault"]}
+    yield from (f"wrong name: {one}, broken are {sorted(true)}" for one in named if one not in true)
+    for surface in named.keys() & true.keys():
+        kind, left = named[surface]["type"], named[surface]["candidates"]
+        if len(true[surface]) > 1:
+            continue
+        if (kind is not None and kind not in true[surface]) or (left and not true[surface] & set(left)):
+            yield f"wrong type: {kind or left}, broken is {true[surface]} of {surface}"
+    for plane in PLANES:
+        hit = [surface for surface in plane if surface in true]
+        if hit and not named.keys() & set(plane) and isolation["fault"] == UNANTICIPATED:
+            yield f"excluded: {hit}"
+
+
+def told_alike(flight: bf.Flight) -> Iterator[str]:
+    """A line for each place where log and verdict disagree. The numbers are worked out from the columns."""
+    log, metrics, scenario = flight.log, flight.metrics, flight.scenario
+    t, dt = log["t_s"].to_numpy(), 1.0 / scenario.rate_hz
+    if len(t) != metrics["frames"]:
+        yield f"log: {len(t)} rows, {metrics['frames']} frames"
+    yield from _detected_alike(log, metrics, scenario)
+    yield from _modes_alike(log, metrics)
+    for surface, saturated_s in metrics["saturation_s"].items():
+        summed = float(log[f"{surface}_saturated"].sum()) * dt
+        if abs(summed - saturated_s) > DUST_S:
+            yield f"log: {surface} saturated for {summed:g} s, verdict {saturated_s:g} s"
+    if not np.isfinite(log["p_rad_s"]).all():
+        yield "log: rates that are not finite"
+    yield from _tracking_alike(log, metrics, scenario)
+    yield from _words_alike(metrics)
+
+
+def _detected_alike(log: Any, metrics: Document, scenario: bf.Scenario) -> Iterator[str]:
+    """`detected` of the last diagnosis rises where the verdict has its alarm. (A change of a frame's length
+    before the end leaves no row.)"""
+    t, detected = log["t_s"].to_numpy(), log["detected"].to_numpy() > 0.5
+    began_s = max((one["time_s"] for one in metrics["changes"] if "detection_time_s" in one), default=0.0)
+    since = t >= began_s - DUST_S
+    rows = t[since & detected]
+    time_s, first_s = metrics["detection"]["time_s"], float(rows[0]) if rows.size else None
+    late = time_s is not None and time_s > t[-1] + DUST_S  # found after the last row was written
+    if (time_s is None) != (first_s is None) and not late:
+        yield f"log: `detected` from {first_s}, verdict's alarm at {time_s}"
+    elif time_s is not None and first_s is not None and abs(time_s - first_s) > DUST_S:
+        yield f"log: `detected` from {first_s:g} s, verdict's alarm at {time_s:g} s"
+
+
+def _modes_alike(log: Any, metrics: Document) -> Iterator[str]:
+    """Every change of `mode` is one of the verdict's."""
+    if metrics["mode_changes_left_out"]:
+        return
+    t, mode = log["t_s"].to_numpy(), log["mode"].to_numpy().astype(int)
+    changed = [0, *(np.flatnonzero(np.diff(mode)) + 1)]
+    logged = [(round(float(t[i]), 6), MODES[mode[i]]) for i in changed]
+    said: list[tuple[float, str]] = []
+    for one in metrics["supervisor"]:
+        said = [known for known in said if known[0] < one["time_s"] - DUST_S]
+        if (not said or said[-1][1] != one["mode"]) and one["time_s"] <= t[-1] + DUST_S:
+            said.append((round(one["time_s"], 6), one["mode"]))
+    if logged != said:
+        yield f"log: modes {logged[:4]}, verdict {said[:4]}"
+
+
+def _tracking_alike(log: Any, metrics: Document, scenario: bf.Scenario) -> Iterator[str]:
+    """RMS errors of tracking before the first fault, of a flight whose fault never ends before."""
+    before = metrics["tracking"]["pre_fault_rms_deg_s"]
+    first_s = min((fault.at_s for fault in scenario.faults), default=math.inf)
+    rows = log[log["t_s"] < first_s - DUST_S]
+    if (
+        before is None
+        or rows.empty
+        or any(fault.end_s is not None or _sensor(fault) for fault in scenario.faults)
+    ):
+        return
+    for axis in "pqr":
+        error = np.rad2deg((rows[f"{axis}_model_rad_s"] - rows[f"{axis}_rad_s"]).to_numpy())
+        rms = float(np.sqrt(np.mean(error**2)))
+        if abs(rms - before[axis]) > 1e-6 * (1.0 + rms):
+            yield f"log: {axis} missed by {rms:g} deg/s before the fault, verdict {before[axis]:g}"
+
+
+def _words_alike(metrics: Document) -> Iterator[str]:
+    """The verdict in words says what the document has."""
+    words = dict(verdict.facts(metrics))
+    detection = metrics["detection"]
+    if ("FALSE ALARM" in words["detection"]) != bool(metrics["false_alarm"] and detection["detected"]):
+        yield f"verdict: {words['detection']!r}, false_alarm {metrics['false_alarm']}"
+    if (words["detection"] == "no alarm") == detection["detected"]:
+        yield f"verdict: {words['detection']!r}, detected {detection['detected']}"
+
+
+def flown_again(flight: bf.Flight) -> tuple[bf.Flight, list[str]]:
+    """The same from the text that a result folder has, with a log; and what differs."""
+    again = bf.fly(load_text(to_yaml(flight.scenario)))
+    return again, list(differences(flight.metrics, again.metrics))
+
+
+def differences(one: Any, other: Any, path: str = "again") -> Iterator[str]:
+    """Where two documents differ."""
+    if isinstance(one, dict) and isinstance(other, dict) and one.keys() == other.keys():
+        for key in one:
+            yield from differences(one[key], other[key], f"{path}.{key}")
+    elif json.dumps(one) != json.dumps(other):
+        yield f"{path}: {one!r:.80}, then {other!r:.80}"
+
+
+def saved_alike(folder: Any, metrics: Document) -> Iterator[str]:
+    """A result folder: its documents and page say what the flight was."""
+    stored = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
+    yield from differences(metrics, stored, "metrics.json")
+    if yaml.safe_load((folder / "scenario.yaml").read_text(encoding="utf-8"))["name"] != metrics["scenario"]:
+        yield "scenario.yaml: another name"
+    page = folder / "report.html"
+    if page.exists():
+        yield from _page_alike(page.read_text(encoding="utf-8"), metrics)
+
+
+def _page_alike(page: str, metrics: Document) -> Iterator[str]:
+    """Every fact of the verdict stands on the page, escaped."""
+    from markupsafe import escape
+
+    said = " ".join(page.split())
+    for what, how in verdict.facts(metrics):
+        if " ".join(str(escape(how)).split()) not in said:
+            yield f"page: does not say {what}: {how!r:.80}"

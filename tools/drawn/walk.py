@@ -1,0 +1,138 @@
+"""Any value that a JSON schema allows, drawn at random; what `ranges.py` says of a key goes first."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+from typing import Any
+
+import numpy as np
+
+Node = Mapping[str, Any]
+Random = np.random.Generator
+GIVEN_SHARE = 0.3  # of the keys of a section that may be left out
+FACTOR = 2.0  # a number with a positive default is drawn within this factor of it
+MOST_ITEMS = 2
+LARGEST = 100.0  # of a number without limits
+
+
+@dataclass(frozen=True)
+class Circumstances:
+    """What a range may depend on."""
+
+    rng: Random
+    aircraft: Any  # beaver_ftc.aircraft.Aircraft
+    duration_s: float = 5.0
+
+
+class Ranges:
+    """pattern of a key's path -> function of circumstances and path, or None for a key that is never given.
+    The first pattern that fits counts. A path has no indices: `faults.at_s`."""
+
+    def __init__(self, given: Mapping[str, Any]) -> None:
+        self._given: Mapping[str, Any] = given
+        self._known: dict[str, tuple[bool, Any]] = {}
+
+    def of(self, path: str) -> Any:
+        """What is said of a path; None where nothing is."""
+        return self._looked_up(path)[1]
+
+    def never_given(self, path: str) -> bool:
+        """Whether it is said that the key is left out."""
+        fits, ranged = self._looked_up(path)
+        return fits and ranged is None
+
+    def _looked_up(self, path: str) -> tuple[bool, Any]:
+        if path not in self._known:
+            fitting = (ranged for pattern, ranged in self._given.items() if fnmatchcase(path, pattern))
+            first = next(fitting, self)
+            self._known[path] = (False, None) if first is self else (True, first)
+        return self._known[path]
+
+
+class Undrawable(Exception):
+    """There is no telling what may stand here."""
+
+
+class Walk:
+    """Draws from a schema."""
+
+    def __init__(self, schema: Node, ranges: Ranges, now: Circumstances) -> None:
+        self._definitions = schema.get("$defs", {})
+        self._ranges, self.now = ranges, now
+
+    def value(self, node: Node, path: str) -> Any:
+        """A value for the key at this path. Raises Undrawable."""
+        ranged = self._ranges.of(path)
+        if ranged is not None:
+            return ranged(self.now, path)
+        node = self.resolved(node)
+        for kind, draw in (
+            ("const", self._const), ("enum", self._enum), ("anyOf", self._one_of), ("oneOf", self._one_of),
+        ):  # fmt: skip
+            if kind in node and not (kind == "anyOf" and "properties" in node):
+                return draw(node, path)
+        return self._by_type(node, path)
+
+    def resolved(self, node: Node) -> Node:
+        """With a reference followed."""
+        while "$ref" in node:
+            node = self._definitions[node["$ref"].rpartition("/")[2]]
+        return node
+
+    def _by_type(self, node: Node, path: str) -> Any:
+        kind = node.get("type")
+        if kind == "boolean":
+            return bool(self.now.rng.random() < 0.5)
+        if kind == "integer":
+            return round(self._number(node))
+        if kind == "number":
+            return self._number(node)
+        if kind == "array":
+            return self._array(node, path)
+        if kind == "object" or "properties" in node:
+            return self._object(node, path)
+        raise Undrawable(path)
+
+    def _const(self, node: Node, path: str) -> Any:
+        return node["const"]
+
+    def _enum(self, node: Node, path: str) -> Any:
+        return node["enum"][self.now.rng.integers(len(node["enum"]))]
+
+    def _one_of(self, node: Node, path: str) -> Any:
+        """One of several forms, and never null: that is what leaving out is for."""
+        forms = [form for form in node.get("anyOf", node.get("oneOf")) if form.get("type") != "null"]
+        return self.value(forms[self.now.rng.integers(len(forms))], path)
+
+    def _number(self, node: Node) -> float:
+        low = node.get("minimum", node.get("exclusiveMinimum", -LARGEST))
+        high = node.get("maximum", node.get("exclusiveMaximum", max(LARGEST, low + LARGEST)))
+        default = node.get("default")
+        if isinstance(default, int | float) and default > 0:
+            low, high = max(low, default / FACTOR), min(high, default * FACTOR)
+            return log_uniform(self.now.rng, low, high)
+        span = high - low
+        return float(self.now.rng.uniform(low + 1e-6 * span, high - 1e-6 * span))
+
+    def _array(self, node: Node, path: str) -> list[Any]:
+        if "prefixItems" in node:
+            return [self.value(item, path) for item in node["prefixItems"]]
+        least, most = node.get("minItems", 1), min(node.get("maxItems", MOST_ITEMS), MOST_ITEMS)
+        return [self.value(node["items"], path) for _ in range(self.now.rng.integers(least, most + 1))]
+
+    def _object(self, node: Node, path: str) -> dict[str, Any]:
+        properties, required = node.get("properties", {}), set(node.get("required", ()))
+        if not properties:
+            raise Undrawable(path)
+        names = [name for name in properties if not self._ranges.never_given(f"{path}.{name}")]
+        if node.get("maxProperties") == 1:
+            wanted = {names[self.now.rng.integers(len(names))]}
+        else:
+            wanted = required | {name for name in names if self.now.rng.random() < GIVEN_SHARE}
+            wanted |= set() if wanted else {names[self.now.rng.integers(len(names))]}
+        return {name: self.value(properties[name], f"{path}.{name}") for name in names if name in wanted}
+
+
+def log_uniform(rng: Random, low: float, high: float) -> float:
+    """Equally likely on a logarithmic scale."""
+    return float(np.exp(rng.uniform(np.log(low), np.log(high))))

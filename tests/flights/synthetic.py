@@ -19,6 +19,14 @@ labels: {right: right_effectiveness, left: left_effectiveness}
 """
 
 
+def vehicle(topic, names=None):
+    """The vehicle's file for logs whose columns stand in a topic, perhaps under other names."""
+    text = VEHICLE[: VEHICLE.index("labels")]
+    for name in ("p_rad_s", "q_rad_s", "r_rad_s", "roll_command", "pitch_command"):
+        text = text.replace(name, f"{topic}.{(names or {}).get(name, name)}")
+    return text
+
+
 def fly(duration_s=240.0, parts=(), seed=1, trim=(0.1, -0.2), gain=1.0):
     """Columns of a flight. parts: (from_s, to_s, right, left) effectiveness, healthy elsewhere."""
     rng = np.random.default_rng(seed)
@@ -138,4 +146,27 @@ def write_ardupilot(path, columns, name="RATE"):
         row = ", ".join(repr(float(columns[field][i])) for field in fields)
         lines.append(f"{name}, {round(t_s * 1e6) + 1_000_000}, {row}")
     path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+def write_dataflash(path, messages):
+    """An ArduPilot dataflash log (binary form) of (kind, row) in order; a row's names are its fields. TimeUS
+    and I are whole numbers, the others floats of eight bytes."""
+    data, kinds = b"", {}
+
+    def message(number, body):
+        return b"\xa3\x95" + bytes([number]) + body
+
+    for kind, row in messages:
+        layout = "".join({"TimeUS": "Q", "I": "B"}.get(field, "d") for field in row)
+        if kind not in kinds:
+            kinds[kind] = 130 + len(kinds)
+            size = 3 + struct.calcsize(f"<{layout}")
+            body = struct.pack(
+                "<BB4s16s64s", kinds[kind], size, kind.encode(), layout.encode(), ",".join(row).encode()
+            )
+            data += message(128, body)
+        data += message(kinds[kind], struct.pack(f"<{layout}", *row.values()))
+    own = struct.pack("<BB4s16s64s", 128, 89, b"FMT", b"BBnNZ", b"Type,Length,Name,Format,Columns")
+    path.write_bytes(message(128, own) + data)
     return path

@@ -80,6 +80,11 @@ def report_last(error: BeaverFtcError) -> int:
 def unexpected(error: Exception) -> SimulationFailed:
     """What nobody foresaw, as a line for the user; the error itself is the cause of the new one."""
     said = " ".join(str(error).split())
+    if isinstance(error, MemoryError):
+        said = f": {said}" if said else ""
+        failed = SimulationFailed(f"there is not enough memory for this{said}")
+        failed.__cause__ = error
+        return failed
     failed = SimulationFailed(f"unexpected {type(error).__name__}: {said} (BEAVER_FTC_DEBUG=1 shows where)")
     failed.__cause__ = error
     return failed

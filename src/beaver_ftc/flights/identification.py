@@ -27,7 +27,13 @@ def identify(flights: Sequence[Samples], vehicle: Vehicle) -> Model:
     tests, bounds = run_tests(stretches, model)
     found = {
         "flights": [
-            {"name": one.samples.name, "samples": int(one.use.sum()), "of": len(one.use)} for one in stretches
+            {
+                "name": one.samples.name,
+                "samples": int(one.use.sum()),
+                "of": len(one.use),
+                "notes": list(one.samples.notes),
+            }
+            for one in stretches
         ],
         "tests": tests,
         "collinear": collinear(stretches, model),
@@ -86,6 +92,7 @@ def summary(model: Model) -> str:
         f"{model.vehicle.name}: {used} samples at {model.rate_hz:.3g} Hz, flights: {len(found['flights'])}; "
         f"past samples of the rates: {model.history}, of the commands: {model.lags}",
         *(f"  together, not to be told apart: {', '.join(g)}" for g in model.groups if len(g) > 1),
+        *(f"  {flight['name']}: {note}" for flight in found["flights"] for note in flight["notes"]),
         *map(_test_line, found["tests"]),
         f"  the residual's colour widens standard errors by {_axes(found['colour'])}",
     ]

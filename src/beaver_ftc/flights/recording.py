@@ -11,10 +11,12 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Column:
-    """One logged quantity. t_s (n,) s, increasing; values (n,) in the unit its name carries."""
+    """One logged quantity. t_s (n,) s, increasing; values (n,) in the unit its name carries; note: a line on
+    rows that were left out."""
 
     t_s: Floats
     values: Floats
+    note: str = ""
 
 
 @dataclass(frozen=True)

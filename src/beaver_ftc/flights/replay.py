@@ -42,30 +42,41 @@ def replay(path: Path) -> Replay:
     from beaver_ftc.scenario.loader import load_scenario
 
     scenario = load_scenario(path.with_name("scenario.yaml"))
-    log = read_numbers(path)
     aircraft = scenario.airframe
+    given = _given(aircraft)
+    log = _columns_of(path, ["t_s", *(name for names in given for name in names)])
     keys = scenario.model_dump(mode="json", exclude_unset=True)
     others = {key: keys[key] for key in ("actuators", "design_model") if key in keys}
     diagnosis = Diagnosis(aircraft, scenario.rate_hz, keys.get("fdi"), **others)
-    samples = _samples(path, log, aircraft)
+    samples = _samples(log, given)
     verdicts = [diagnosis.step(*sample) for sample in samples]
     surfaces = list(aircraft.surfaces)
     columns = _columns(log["t_s"], verdicts, surfaces)
     return Replay(scenario.name, columns, _verdict(path, scenario, log, verdicts))
 
 
-def _samples(path: Path, log: dict[str, Floats], aircraft: Any) -> list[tuple[Floats, ...]]:
-    """What the diagnosis was given at each frame: rates, signals, commands, attitude."""
-    rates = [f"{axis}_measured_rad_s" for axis in "pqr"]
-    signals = [*_FLOW, *aircraft.signals]
-    commands = [f"{name}_cmd_rad" for name in aircraft.surfaces]
-    attitude = ["phi_rad", "theta_rad", "psi_rad"]
-    parts = []
-    for names in (rates, signals, commands, attitude):
-        missing = [name for name in names if name not in log]
-        if missing:
-            raise BadInput(f"{path}: no column {missing[0]}, allowed: a log.parquet as `run` writes it")
-        parts.append(np.ascontiguousarray(np.column_stack([log[name] for name in names])))
+def _given(aircraft: Any) -> tuple[list[str], ...]:
+    """Columns of what the diagnosis is given at each frame: rates, signals, commands, attitude."""
+    return (
+        [f"{axis}_measured_rad_s" for axis in "pqr"],
+        [*_FLOW, *aircraft.signals],
+        [f"{name}_cmd_rad" for name in aircraft.surfaces],
+        ["phi_rad", "theta_rad", "psi_rad"],
+    )
+
+
+def _columns_of(path: Path, names: list[str]) -> dict[str, Floats]:
+    """These columns of a log, and what it says of its own detection if it does."""
+    log = read_numbers(path, [*names, "detected"])
+    missing = [name for name in names if name not in log]
+    if missing:
+        raise BadInput(f"{path}: no column {missing[0]}, allowed: a log.parquet as `run` writes it")
+    return log
+
+
+def _samples(log: dict[str, Floats], given: tuple[list[str], ...]) -> list[tuple[Floats, ...]]:
+    """What the diagnosis was given at each frame."""
+    parts = [np.ascontiguousarray(np.column_stack([log[name] for name in names])) for names in given]
     return list(zip(*parts, strict=True))
 
 

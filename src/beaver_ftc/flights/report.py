@@ -36,6 +36,7 @@ def _notes(samples: Samples, model: Model) -> list[str]:
         f"{name} has its own stamps: its last value is held, {age:.2f} s old on average."
         for name, age in samples.age_s.items()
     ]
+    said += samples.notes
     said.append(
         f"The model was identified at {model.rate_hz:.3g} Hz; it predicts a sample from past ones, "
         f"{model.history} of the rates and {model.lags} of the commands."

@@ -2,7 +2,8 @@
 
 The time base is the stamps of the roll rate. A column with other stamps is held: its value at t is the last
 one received up to t, never a later one; the age that this adds is stated. A log faster than the vehicle's
-`max_rate_hz` is averaged over the past interval first.
+`max_rate_hz` is averaged over the past interval first. A gap ends a stretch: there are no samples in it, so
+that a log has as many as its rows ask for, whatever its clock does.
 """
 
 from dataclasses import dataclass
@@ -18,7 +19,7 @@ MIN_RATE_HZ = 4.0
 _FIRST = 50
 _LARGEST, _FASTEST_RAD_S = 1e6, 60.0
 _GAP = 3.5
-"""A step of more than this many median steps is a gap: nothing is predicted across it."""
+"""A step of more than this many usual steps is a gap: nothing is predicted across it."""
 
 
 @dataclass(frozen=True)
@@ -27,7 +28,8 @@ class Samples:
 
     t_s (n,) s; rates (n, 3) rad/s; commands (n, S) what each healthy surface would make of the commands;
     signals (n, X); labels (n, S) effectiveness, nan where unknown; run (n,) number of the gap-free stretch;
-    age_s: mean age of each held column; stamps (m,) the log's own time stamps, s.
+    age_s: mean age of each held column; stamps (m,) the log's own time stamps, s; notes: what is said of the
+    reading.
     """
 
     name: str
@@ -41,16 +43,17 @@ class Samples:
     age_s: dict[str, float]
     events: tuple[Event, ...]
     stamps: Floats
+    notes: tuple[str, ...] = ()
 
 
 def sample(recording: Recording, vehicle: Vehicle) -> Samples:
     """Put a recording on one time base. Raises BadInput with the reason where the log cannot be used."""
     names = [vehicle.rates.p, vehicle.rates.q, vehicle.rates.r]
-    _require(recording, [*names, *vehicle.commands, *vehicle.signals])
+    used = [*names, *vehicle.commands, *vehicle.signals]
+    _require(recording, used)
     _require_rad_s(recording, names)
     stamps = recording.columns[vehicle.rates.p].t_s
-    t_s = _time_base(recording.name, stamps, vehicle.max_rate_hz)
-    step = _step(t_s)
+    t_s, run, step = _time_base(recording.name, stamps, vehicle.max_rate_hz)
     grid = _Grid(recording, t_s, step)
     return Samples(
         name=recording.name,
@@ -59,11 +62,12 @@ def sample(recording: Recording, vehicle: Vehicle) -> Samples:
         commands=np.einsum("nc,sc->ns", grid.columns(vehicle.commands), mixer(vehicle)),
         signals=grid.columns(vehicle.signals),
         labels=_labels(recording, vehicle, t_s),
-        run=np.cumsum(np.diff(t_s, prepend=t_s[0]) > _GAP * step),
+        run=run,
         dt_s=step,
         age_s=grid.age_s,
         events=recording.events,
         stamps=stamps,
+        notes=(*recording.notes, *_left_out(recording, used)),
     )
 
 
@@ -76,9 +80,9 @@ def mixer(vehicle: Vehicle) -> Floats:
 def _require(recording: Recording, names: list[str]) -> None:
     missing = [name for name in dict.fromkeys(names) if name not in recording.columns]
     if missing:
-        known = ", ".join(sorted(recording.columns)) or "none"
+        known = ", ".join(name if name.isprintable() else repr(name) for name in sorted(recording.columns))
         raise BadInput(
-            f"{recording.name}: no column {missing[0]}, allowed: a log that has it; it has {known}"
+            f"{recording.name}: no column {missing[0]}, allowed: a log that has it; it has {known or 'none'}"
         )
     for name in names:
         values = recording.columns[name].values
@@ -86,6 +90,11 @@ def _require(recording: Recording, names: list[str]) -> None:
             raise BadInput(f"{recording.name}: column {name} holds no number, allowed: a logged quantity")
         if (largest := float(np.nanmax(np.abs(values)))) > _LARGEST:
             raise BadInput(f"{recording.name}: column {name} holds {largest:g}, allowed: up to {_LARGEST:g}")
+
+
+def _left_out(recording: Recording, names: list[str]) -> list[str]:
+    """What readers say of rows they left out, once each."""
+    return list(dict.fromkeys(note for name in names if (note := recording.columns[name].note)))
 
 
 def _require_rad_s(recording: Recording, names: list[str]) -> None:
@@ -99,18 +108,30 @@ def _require_rad_s(recording: Recording, names: list[str]) -> None:
             )
 
 
-def _time_base(name: str, stamps: Floats, max_rate_hz: float) -> Floats:
+def _time_base(name: str, stamps: Floats, max_rate_hz: float) -> tuple[Floats, NDArray[np.int64], float]:
+    """Times of the samples and the number of the gap-free stretch of each, (n,), and the usual step, s."""
     if len(stamps) < _FIRST:
         raise BadInput(f"{name}: has {len(stamps)} samples of the rates, allowed: at least {_FIRST}")
-    rate_hz = 1.0 / _step(stamps)
+    step = _step(stamps)
+    rate_hz = 1.0 / step
     if rate_hz < MIN_RATE_HZ:
         raise BadInput(
             f"{name}: rates are logged at {rate_hz:.2g} Hz, allowed: at least {MIN_RATE_HZ:g} Hz to tell "
             "a surface's effect from the vehicle's own motion"
         )
     if rate_hz <= 1.05 * max_rate_hz:
-        return stamps
-    return np.arange(stamps[0], stamps[-1] + 0.5 / max_rate_hz, 1.0 / max_rate_hz)
+        return stamps, np.cumsum(np.diff(stamps, prepend=stamps[0]) > _GAP * step), step
+    return _regular(stamps, 1.0 / max_rate_hz)
+
+
+def _regular(stamps: Floats, step: float) -> tuple[Floats, NDArray[np.int64], float]:
+    """Samples a step apart over each stretch of the log, from its first stamp on: as `_time_base`."""
+    first = np.flatnonzero(np.diff(stamps, prepend=-np.inf) > _GAP * step)
+    last = np.append(first[1:], len(stamps)) - 1
+    counts = np.ceil((stamps[last] - stamps[first]) / step + 0.5).astype(np.int64)
+    run = np.repeat(np.arange(len(first)), counts)
+    within = np.arange(len(run)) - np.repeat(np.cumsum(counts) - counts, counts)
+    return stamps[first][run] + within * step, run, step
 
 
 def _step(stamps: Floats) -> float:

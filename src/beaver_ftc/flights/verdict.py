@@ -28,6 +28,7 @@ def verdict_of(samples: Samples, model: Model, rows: Rows) -> Document:
         "can_separate": sentences(found),
         "isolability": found,
         "settings": model.settings.model_dump(),
+        "notes": list(samples.notes),
     }
 
 
@@ -104,7 +105,7 @@ def as_text(verdict: Document) -> str:
     lines += [f"  {_event_line(event)}" for event in shown]
     if len(shown) < len(verdict["events"]):
         lines.append(f"  and {len(verdict['events']) - len(shown)} brief alarms of under {BRIEF_S:g} s")
-    lines += [f"  {sentence}" for sentence in verdict["can_separate"]]
+    lines += [f"  {sentence}" for sentence in (*verdict["can_separate"], *verdict["notes"])]
     for key, value in verdict.get("score", {}).items():
         lines.append(f"  {key}: {_shown(value)}")
     return "\n".join(lines)

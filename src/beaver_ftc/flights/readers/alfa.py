@@ -12,12 +12,15 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.flights.readers.stamps import in_order
 from beaver_ftc.flights.readers.table import read_numbers
 from beaver_ftc.flights.recording import Column, Event, Floats, Recording
 
 _NS = 1e-9
+_TIME = "%time"
 _RAW = "mavros-imu-data_raw"
 _CHANNELS = {1: "elevator", 2: "throttle", 3: "rudder", 4: "left_aileron", 5: "right_aileron"}
 _STATUS = "failure_status-"
@@ -68,8 +71,9 @@ def read(path: Path) -> Recording:
     topics = dict(_topics(path))
     if _RAW not in topics:
         raise BadInput(f"{path}: no {_RAW} topic, allowed: a processed folder of the ALFA data set")
-    origin_ns = float(topics[_RAW]["%time"][0])
-    columns = dict(_columns(topics, origin_ns))
+    ordered = {topic: in_order(topic, table[_TIME]) for topic, table in topics.items()}
+    origin_ns = float(topics[_RAW][_TIME][ordered[_RAW][0][0]])
+    columns = dict(_columns(topics, ordered, origin_ns))
     _add_errors(columns)
     events = sorted(_events(topics, origin_ns), key=lambda event: event.t_s)
     return Recording(path.name, columns, tuple(events))
@@ -81,16 +85,18 @@ def _topics(path: Path) -> Iterator[tuple[str, Table]]:
         topic = file.stem.removeprefix(path.name).removeprefix("-")
         if topic in wanted or topic.startswith(_STATUS):
             table = read_numbers(file)
-            if "%time" in table and len(table["%time"]):
+            if np.isfinite(table.get(_TIME, np.empty(0))).any():
                 yield topic, table
 
 
-def _columns(topics: dict[str, Table], origin_ns: float) -> Iterator[tuple[str, Column]]:
+def _columns(
+    topics: dict[str, Table], ordered: dict[str, tuple[NDArray[np.int64], str]], origin_ns: float
+) -> Iterator[tuple[str, Column]]:
     for name, topic, field, convert in _COLUMNS:
         if field in topics.get(topic, {}):
-            t_s = (topics[topic]["%time"] - origin_ns) * _NS
-            order = np.flatnonzero(np.diff(np.maximum.accumulate(t_s), prepend=-np.inf) > 0)
-            yield name, Column(t_s[order], convert(topics[topic][field])[order])
+            kept, note = ordered[topic]
+            t_s = (topics[topic][_TIME][kept] - origin_ns) * _NS
+            yield name, Column(t_s, convert(topics[topic][field])[kept], note)
 
 
 def _add_errors(columns: dict[str, Column]) -> None:
@@ -98,7 +104,7 @@ def _add_errors(columns: dict[str, Column]) -> None:
     for axis in ("roll", "pitch"):
         command, measured = columns.get(f"{axis}_command_rad"), columns.get(f"{axis}_rad")
         if command is not None and measured is not None:
-            columns[f"{axis}_error_rad"] = Column(command.t_s, command.values - measured.values)
+            columns[f"{axis}_error_rad"] = Column(command.t_s, command.values - measured.values, command.note)
 
 
 def _events(topics: dict[str, Table], origin_ns: float) -> Iterator[Event]:
@@ -108,5 +114,5 @@ def _events(topics: dict[str, Table], origin_ns: float) -> Iterator[Event]:
             codes = table.get("field.data", np.empty(0))
             for code in sorted(set(codes[np.isfinite(codes)])):
                 first = int(np.argmax(codes == code))
-                t_s = float((table["%time"][first] - origin_ns) * _NS)
+                t_s = float((table[_TIME][first] - origin_ns) * _NS)
                 yield Event(t_s, _SIDES.get((part, int(code)), part))

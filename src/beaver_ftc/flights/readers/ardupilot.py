@@ -7,22 +7,22 @@ extra `flights`.
 
 import os
 import sys
-from collections import defaultdict
+from array import array
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stdout
+from io import StringIO
+from math import nan
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.flights.recording import Column, Recording
+from beaver_ftc.flights.readers.stamps import columns_of
+from beaver_ftc.flights.recording import Recording
 
-_US = 1e-6
 _TIME, _INSTANCES = "TimeUS", ("I", "C", "Instance")
 _OVERHEAD = {"FMT", "FMTU", "UNIT", "MULT", "PARM", "MSG"}
 
-Rows = dict[str, list[dict[str, float]]]
+Fields = dict[str, Any]
 
 
 def read(path: Path) -> Recording:
@@ -30,40 +30,37 @@ def read(path: Path) -> Recording:
     messages = _messages(path)
     if not messages:
         raise BadInput(f"{path}: holds no message with a time stamp, allowed: a dataflash log of a flight")
-    origin_us = min(rows[0][_TIME] for rows in messages.values())
-    columns: dict[str, Column] = {}
-    for name, rows in messages.items():
-        columns |= _columns(name, rows, origin_us)
-    return Recording(path.stem, columns)
+    return Recording(path.stem, columns_of(messages, _TIME)[0])
 
 
-def _messages(path: Path) -> Rows:
-    """The numeric fields of all messages with a stamp, by message and instance."""
-    found: Rows = defaultdict(list)
+def _messages(path: Path) -> dict[str, Fields]:
+    """The numeric fields of all messages with a stamp, by message and instance: those of its first."""
+    found: dict[str, Fields] = {}
     reader = _reader(path)
     try:
         with _silence():
             log = reader(str(path))
             while (message := log.recv_msg()) is not None:
                 fields = message.to_dict()
-                if message.get_type() not in _OVERHEAD and _TIME in fields:
-                    numbers = {
-                        k: float(value) for k, value in fields.items() if isinstance(value, int | float)
-                    }
-                    found[_name(message.get_type(), fields)].append(numbers)
+                numbers = {k: float(value) for k, value in fields.items() if isinstance(value, int | float)}
+                if message.get_type() not in _OVERHEAD and _TIME in numbers:
+                    name = _name(message.get_type(), fields)
+                    for field, values in found.setdefault(name, {k: array("d") for k in numbers}).items():
+                        values.append(numbers.get(field, nan))
     except Exception as error:  # pymavlink raises whatever a damaged file makes it stumble over
         raise _unreadable(path, error) from None
-    return dict(found)
+    return found
 
 
 @contextmanager
 def _silence() -> Iterator[None]:
-    """Nothing on standard error: pymavlink's indexer, in C, prints every damaged byte it skips."""
+    """Nothing on standard error or output: pymavlink, and its indexer in C, print what they skip."""
     sys.stderr.flush()
     kept, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, 2)
     try:
-        yield
+        with redirect_stdout(StringIO()):
+            yield
     finally:
         os.dup2(kept, 2)
         os.close(kept)
@@ -91,13 +88,3 @@ def _unreadable(path: Path, error: Exception) -> BadInput:
 def _name(kind: str, fields: dict[str, Any]) -> str:
     number = next((fields[key] for key in _INSTANCES if isinstance(fields.get(key), int)), 0)
     return kind if number == 0 else f"{kind}{number}"
-
-
-def _columns(name: str, rows: list[dict[str, float]], origin_us: float) -> dict[str, Column]:
-    t_s = (np.array([row[_TIME] for row in rows]) - origin_us) * _US
-    kept = np.flatnonzero(np.diff(np.maximum.accumulate(t_s), prepend=-np.inf) > 0)
-    fields = [field for field in rows[0] if field != _TIME]
-    return {
-        f"{name}.{field}": Column(t_s[kept], np.array([row.get(field, np.nan) for row in rows])[kept])
-        for field in fields
-    }

@@ -3,29 +3,32 @@
 Time counts from the first message of the log. Reading needs pyulog: the extra `flights`.
 """
 
+from contextlib import redirect_stdout
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.flights.recording import Column, Recording
+from beaver_ftc.flights.readers.stamps import columns_of
+from beaver_ftc.flights.recording import Recording
 
-_US = 1e-6
+_STAMP = "timestamp"
+_LONGEST = 65535
+"""Bytes of a message: its length is written in 16 bits."""
 
 
 def read(path: Path) -> Recording:
     """The flight in a .ulg file. Raises BadInput where it is none, or pyulog is missing."""
-    topics = _topics(path)
-    stamps = [topic.data["timestamp"] for topic in topics if len(topic.data["timestamp"])]
-    if not stamps:
+    topics = {_name(topic): topic.data for topic in _topics(path) if len(topic.data.get(_STAMP, ()))}
+    if not topics:
         raise BadInput(f"{path}: holds no message, allowed: a log of a flight")
-    origin_us = min(int(one[0]) for one in stamps)
-    columns: dict[str, Column] = {}
-    for topic in topics:
-        columns |= _columns(topic, origin_us)
-    notes = (f"time counts from {origin_us * _US:.3f} s of the autopilot's clock",)
+    columns, origin_s = columns_of(topics, _STAMP)
+    notes = (f"time counts from {origin_s:.3f} s of the autopilot's clock",)
     return Recording(path.stem, columns, notes=notes)
+
+
+def _name(topic: Any) -> str:
+    return str(topic.name) if topic.multi_id == 0 else f"{topic.name}_{topic.multi_id}"
 
 
 def _topics(path: Path) -> list[Any]:
@@ -36,19 +39,28 @@ def _topics(path: Path) -> list[Any]:
             f"{path}: reading a ULog needs pyulog, allowed: pip install 'beaver-ftc[flights]'"
         ) from None
     try:
-        return list(ULog(str(path)).data_list)
+        with redirect_stdout(StringIO()):  # pyulog prints what is damaged where the answer belongs
+            formats = ULog(str(path), parse_header_only=True).message_formats
+            _check_lengths(formats)
+            return list(ULog(str(path)).data_list)
     except Exception as error:  # pyulog raises whatever a damaged file makes it stumble over
         says = " ".join(str(error).split()) or type(error).__name__
         raise BadInput(f"{path}: is no ULog that can be read ({says}), allowed: a .ulg file of PX4") from None
 
 
-def _columns(topic: Any, origin_us: int) -> dict[str, Column]:
-    """The fields of one topic, in the order of their stamps, each stamp once."""
-    name = topic.name if topic.multi_id == 0 else f"{topic.name}_{topic.multi_id}"
-    t_s = (topic.data["timestamp"].astype(np.int64) - origin_us) * _US
-    kept = np.flatnonzero(np.diff(np.maximum.accumulate(t_s), prepend=-np.inf) > 0)
-    return {
-        f"{name}.{field}": Column(t_s[kept], np.asarray(values, dtype=float)[kept])
-        for field, values in topic.data.items()
-        if field != "timestamp"
-    }
+def _check_lengths(formats: dict[str, Any]) -> None:
+    """Raise ValueError for a format that no message can have: pyulog writes every field of one out."""
+    for name in formats:
+        if _length(formats, name, ()) > _LONGEST:
+            raise ValueError(f"a message {name} would have more than {_LONGEST} bytes")
+
+
+def _length(formats: dict[str, Any], name: str, within: tuple[str, ...]) -> int:
+    """Bytes of a message at least, its nested messages in it."""
+    if name in within:
+        raise ValueError(f"a message {name} holds itself")
+    if name not in formats:  # a number, or a type that pyulog complains about
+        return 1
+    return sum(
+        max(count, 1) * _length(formats, kind, (*within, name)) for kind, count, _ in formats[name].fields
+    )

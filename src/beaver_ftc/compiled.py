@@ -37,9 +37,11 @@ from beaver_ftc.elsewhere import Helper, Part
 from beaver_ftc.translation import Inner, lighten, nesting, stub
 
 COMPILING = "compiling the flight code, once for this version on this machine: some 10 s on an idle one"
+MORE = "making ready what this flight is the first to use, once for this version on this machine: some 10 s"
 PATIENCE_S = 1.0  # what takes less needs no word
 
 _DIGEST_BYTES = 32
+_LOCK = "lock"
 
 _PACKAGE = Path(__file__).parent
 _SOURCES = (
@@ -161,7 +163,7 @@ class _Kernel(CPUDispatcher):
     def _compiled(self, types):
         """Compile, one process at a time, and keep the code."""
         lighten()
-        with _alone(self.folder), _announced():
+        with _alone(self.folder), _announced(self.folder):
             if entry_point := self._loaded(types):
                 return entry_point  # another process came first
             self.overloads.pop(tuple(types), None)
@@ -203,15 +205,22 @@ def _alone(folder: Path | None) -> Iterator[None]:
                 import fcntl
 
                 folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-                fcntl.flock(held.enter_context((folder / "lock").open("w")), fcntl.LOCK_EX)
+                fcntl.flock(held.enter_context((folder / _LOCK).open("w")), fcntl.LOCK_EX)
         yield
 
 
+@functools.cache
+def _say_compiling(folder: Path | None) -> None:
+    """A word a process: of all the flight code, or of the part that earlier flights have had no use for."""
+    kept = folder is not None and any(path.name != _LOCK for path in folder.glob("*"))
+    _say_once(MORE if kept else COMPILING)
+
+
 @contextlib.contextmanager
-def _announced() -> Iterator[None]:
+def _announced(folder: Path | None) -> Iterator[None]:
     """Say what takes so long, if it does. Garbage is not looked for meanwhile, nor soon in what the compiler
     leaves: there is little, and looking costs a quarter of its time."""
-    saying = threading.Timer(PATIENCE_S, _say_once, [COMPILING])
+    saying = threading.Timer(PATIENCE_S, _say_compiling, [folder])
     saying.start()
     gc.disable()
     try:

@@ -8,7 +8,7 @@ import typer
 
 from beaver_ftc.cli.inputs import complete_names
 from beaver_ftc.cli.output import emit
-from beaver_ftc.documents.errors import BadInput, SimulationFailed, suggestion
+from beaver_ftc.documents.errors import BadInput, SimulationFailed
 
 _NAME = re.compile(r"[A-Za-z0-9_-]{1,100}")  # as of a scenario
 _NAME_LINE = re.compile(r"^name:.*$", re.MULTILINE)
@@ -38,7 +38,7 @@ def command(
             "--like", metavar="SCENARIO", help="Begin with a built-in one.", autocompletion=complete_names
         ),
     ] = None,
-    out: Annotated[Path, typer.Option(help="Folder of the new file.")] = Path(),
+    out: Annotated[Path, typer.Option(help="Folder of the new file; made if need be.")] = Path(),
 ) -> None:
     """Write NAME.yaml, a scenario to begin with.
 
@@ -47,24 +47,28 @@ def command(
     if not _NAME.fullmatch(name):
         raise BadInput(f"new: {name[:100]!r} is no name, allowed: letters, digits, - and _, at most 100")
     text = TEMPLATE.format(name=name) if like is None else _renamed(like, name)
+    if out.suffix in (".yaml", ".yml") and not out.is_dir():
+        says = f"{str(out)!r} is a file's name, allowed: a folder; the file in it is {name}.yaml"
+        raise BadInput(f"new: --out: {says}")
     path = out / f"{name}.yaml"
     _write(path, text)
     emit(f"{path}: written; fly it with `beaver-ftc run {path}`")
 
 
 def _renamed(like: str, name: str) -> str:
-    from beaver_ftc.scenario.builtin import builtin_names, builtin_path
+    from beaver_ftc.scenario.builtin import builtin_names, builtin_path, no_such
 
     if like not in builtin_names():
-        raise BadInput(f"new: --like: no built-in scenario {like[:100]!r}{suggestion(like, builtin_names())}")
+        raise BadInput(f"new: --like: {no_such(like, 'scenario')}")
     return _NAME_LINE.sub(f"name: {name}", builtin_path(like).read_text(encoding="utf-8"), count=1)
 
 
 def _write(path: Path, text: str) -> None:
     try:
+        path.parent.mkdir(parents=True, exist_ok=True)
         with path.open("x", encoding="utf-8") as file:
             file.write(text)
-    except FileExistsError:
-        raise BadInput(f"new: {path} exists, allowed: another name") from None
     except OSError as error:
+        if path.exists():
+            raise BadInput(f"new: {path} exists, allowed: another name") from None
         raise SimulationFailed(f"cannot write {path}: {(error.strerror or str(error)).lower()}") from error

@@ -97,11 +97,11 @@ class Context:
     """Everything a plug-in may know before the flight; arrays are its own.
 
     dt_s: length of a frame. substeps: JSBSim frames in it. model: what the designer believes.
-    trim_x (3,) rad/s, trim_y (5,), trim_rad (4,): the flight condition at the start.
-    travel_rad (2, 4): lower and upper stops. constant_rad_s2 (3,), inertia_coupling (3,): declared bounds of
-    the uncertainty. seed: of everything random. options: `fdi.options` or `control.options` of the scenario.
-    declared: instruments, air and tolerances, as far as `fdi.bounds` declares them, and the actuators.
-    surfaces: their names. leading: which of them leads roll, pitch and yaw.
+    trim_x (3,) rad/s, trim_y (4 + signals,), trim_rad (surfaces,): the flight condition at the start.
+    travel_rad (2, surfaces): lower and upper stops. constant_rad_s2 (3,), inertia_coupling (3,): declared
+    bounds of the uncertainty. seed: of everything random. options: `fdi.options` or `control.options` of the
+    scenario. declared: instruments, air and tolerances, as far as `fdi.bounds` declares them, and the
+    actuators. surfaces: their names. leading: which of them leads roll, pitch and yaw.
     """
 
     dt_s: float

@@ -15,12 +15,12 @@ from beaver_ftc.design.context import Context
 class Measured(NamedTuple):
     """What is known at one frame. Arrays are copies: keep them if you like.
 
-    t_s: time. x (3,) rad/s: p, q, r. y (10,): alpha rad, beta rad, airspeed m/s, dynamic pressure
-    Pa, then the signals the aircraft declares (the Beaver: dpt), unused ones zero.
+    t_s: time. x (3,) rad/s: p, q, r. y (4 + signals,): alpha rad, beta rad, airspeed m/s, dynamic
+    pressure Pa, then the signals the aircraft declares (the Beaver: dpt).
     Of the frame that has just elapsed, as the design model sees it (zeros at the first frame):
     acceleration (3,) rad/s2 is its f + G u, so that x - x_before - dt acceleration is the innovation;
-    contribution (3, 4) rad/s2 is what each commanded surface gives of it; eta_bar (3,) rad/s2 is the declared
-    bound on the error.
+    contribution (3, surfaces) rad/s2 is what each commanded surface gives of it; eta_bar (3,) rad/s2 is the
+    declared bound on the error.
     """
 
     t_s: float

@@ -1,7 +1,7 @@
 """What can go wrong, the exit status each kind ends with, and what was perhaps meant."""
 
 from collections.abc import Iterable
-from difflib import get_close_matches
+from difflib import SequenceMatcher, get_close_matches
 
 
 class BeaverFtcError(Exception):
@@ -25,7 +25,18 @@ class SimulationFailed(BeaverFtcError):
 def suggestion(given: str, known: Iterable[str], cutoff: float = 0.6) -> str:
     """`, did you mean x?` if something known is near to what was given, and what is allowed."""
     names = list(known)
-    lower = {name.lower(): name for name in reversed(names)}
-    near = get_close_matches(given.lower()[:100], lower, n=1, cutoff=cutoff)
-    hint = f", did you mean {lower[near[0]]}?" if near else ","
+    near = nearest(given, names, cutoff)
+    hint = f", did you mean {near}?" if near else ","
     return f"{hint} allowed: {', '.join(names)}"
+
+
+def nearest(given: str, names: Iterable[str], cutoff: float = 0.6) -> str | None:
+    """The name that is nearest to what was given, of several equally near the first; None if none is near."""
+    meant = given.lower()[:100]
+    lower: dict[str, str] = {}
+    for name in names:
+        lower.setdefault(name.lower(), name)
+    near = set(get_close_matches(meant, lower, n=len(lower) or 1, cutoff=cutoff))
+    ranked = (name for name in lower if name in near)
+    best = max(ranked, key=lambda name: SequenceMatcher(None, name, meant).ratio(), default=None)
+    return None if best is None else lower[best]

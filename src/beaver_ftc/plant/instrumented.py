@@ -12,7 +12,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
-from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.documents.errors import BadInput, suggestion
 from beaver_ftc.plant.actuator import actuator_system
 from beaver_ftc.plant.model_file import SYSTEMS, copy_of, package
 
@@ -137,9 +137,7 @@ def names() -> tuple[str, ...]:
 def source_of(name: str) -> Path:
     """The model of one of them. Raises BadInput if there is none."""
     if name not in names():
-        raise BadInput(
-            f"jsbsim:{name}: the jsbsim package has no such aircraft, allowed: {', '.join(names())}"
-        )
+        raise BadInput(f"jsbsim:{name}: the jsbsim package has no such aircraft{suggestion(name, names())}")
     return package() / "aircraft" / name / f"{name}.xml"
 
 

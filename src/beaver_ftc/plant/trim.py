@@ -197,13 +197,13 @@ def _left_over(accelerations: np.ndarray) -> str:
 def _check_solution(solution: FlightState, travel: dict[str, Travel], aircraft: Aircraft) -> None:
     for surface, needed in solution.surfaces_rad.items():
         allowed = travel[surface]
+        stops = f"{degrees(allowed.min_rad):.1f} to {degrees(allowed.max_rad):.1f} deg"
         if abs(needed) > _NO_DEFLECTION_RAD:  # a root of the equations, but nothing that flies
-            raise _not_flown(solution, f" (nothing short of {surface} {degrees(needed):.0f} deg)", aircraft)
+            raise _not_flown(solution, f" (no {surface} within its travel, {stops}, balances it)", aircraft)
         if not allowed.min_rad <= needed <= allowed.max_rad:
             raise BadInput(
                 f"trim at {solution.airspeed_mps:g} m/s and {solution.altitude_m:g} m needs {surface} "
-                f"{degrees(needed):.1f} deg, allowed: {degrees(allowed.min_rad):.1f} to "
-                f"{degrees(allowed.max_rad):.1f} deg, its travel"
+                f"{degrees(needed):.1f} deg, allowed: {stops}, its travel"
             )
     _check("angle of attack in trim", solution.alpha_rad, (-_ALPHA_LIMIT_RAD, _ALPHA_LIMIT_RAD), "rad")
 

@@ -10,6 +10,7 @@ if TYPE_CHECKING:
 Document = dict[str, Any]
 
 OURS = "adaptive-estimators"
+TAKEN_OVER, LONG_S = "reallocated", 1.0  # a change of mode that comes later than this is explained
 DRIFT_MPS, DRIFT_M = 5.0, 300.0  # a flight that ends further from where it began has wandered off
 _NOT_SIZE = {"actuator", "sensor", "type", "at_s", "end_s", "profile"}
 
@@ -53,7 +54,7 @@ def hints(flight: "Flight", document: Document) -> list[str]:
     """What would mislead a reader who is not told of it: one sentence each."""
     scenario = flight.scenario
     of_diagnosis = (_outside_the_class, _several, _too_small) if scenario.fdi.scheme == OURS else ()
-    said = [*(says(scenario, document) for says in of_diagnosis), _drift(flight)]
+    said = [*(says(scenario, document) for says in of_diagnosis), _waited(document), _drift(flight)]
     return [sentence for sentence in said if sentence]
 
 
@@ -106,6 +107,20 @@ def _too_small(scenario: "Scenario", document: Document) -> str:
     return (
         "no alarm, and none was certain: what the fault did stayed within what fdi.bounds declares as "
         "uncertainty; a larger fault, a livelier reference or tighter bounds would show it"
+    )
+
+
+def _waited(document: Document) -> str:
+    """Why the law goes on with a surface that has been named long since: another takes over only where it is
+    weak or stuck, which the name alone does not say."""
+    isolation = document.get("isolation", {})
+    taken_s = [change["time_s"] for change in document.get("supervisor", ()) if change["mode"] == TAKEN_OVER]
+    if not taken_s or isolation["time_s"] is None or taken_s[0] - isolation["time_s"] < LONG_S:
+        return ""
+    return (
+        f"{isolation['fault']} was named at {isolation['time_s']:.2f} s, and its demand handed over at "
+        f"{taken_s[0]:.2f} s, once it was certain to be weak or stuck: an offset or a slow surface the law "
+        "would have corrected instead"
     )
 
 

@@ -100,10 +100,8 @@ def _table(metrics: Document, folder: str) -> "Table":
     table.add_column(overflow="fold")
     for what, how in facts(metrics):
         table.add_row(what, how)
-    for when, p, q, r in tracking(metrics):
-        table.add_row(
-            "tracking RMS" if when == "before" else "", f"p {p}  q {q}  r {r} deg/s {when} the fault"
-        )
+    for i, (when, p, q, r) in enumerate(tracking(metrics)):
+        table.add_row("" if i else "tracking RMS", f"p {p}  q {q}  r {r} deg/s {when} the fault")
     for name, expected, actual, passed in expectations(metrics):
         mark = Text("met   " if passed else "MISSED", "green" if passed else "bold red")
         table.add_row("expected", Text.assemble(mark, f" {name} {expected}, got {actual}"))

@@ -5,9 +5,11 @@ from typing import Any, Self
 
 from pydantic import Field, model_validator
 
+from beaver_ftc.aircraft.question import in_question
 from beaver_ftc.documents.base import Conflict, Flag, Number, Section, number, refuse
 
 MAX_LEGS = 100
+THRUST_TERM = "CX_dpt"  # what engine power adds to the force along the path, in an aircraft's file
 _LATEST_S = 360_000.0
 
 
@@ -67,7 +69,7 @@ class Autopilot(Section):
 
     @model_validator(mode="after")
     def _legs_in_order(self) -> Self:
-        refuse([*self._out_of_order(), *self._both_heading_and_bank()])
+        refuse([*self._out_of_order(), *self._both_heading_and_bank(), *self._no_thrust()])
         return self
 
     def _out_of_order(self) -> Iterator[Conflict]:
@@ -80,6 +82,15 @@ class Autopilot(Section):
     def _both_heading_and_bank(self) -> Iterator[Conflict]:
         if self.heading_deg and self.bank_deg:
             yield ("bank_deg",), "contradicts heading_deg, allowed: one of the two"
+
+    def _no_thrust(self) -> Iterator[Conflict]:
+        aircraft = in_question()
+        if self.airspeed_mps and THRUST_TERM not in aircraft.terms:
+            yield (
+                ("airspeed_mps",),
+                f"the file of {aircraft.name} does not say what thrust does (no term {THRUST_TERM} among its "
+                f"forces), so no airspeed can be held, allowed: altitude_m, heading_deg, bank_deg",
+            )
 
     @property
     def channels(self) -> tuple[str, ...]:

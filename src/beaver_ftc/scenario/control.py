@@ -70,8 +70,7 @@ class ControlConfig(BaseModel):
 
     law: Annotated[str, AfterValidator(known_law)] = Field(
         "fault-tolerant",
-        description="nominal | adaptive | fault-tolerant | oracle, a registered law (see `beaver-ftc list`), "
-        "or module:Class of an installed package",
+        description="a registered law, `beaver-ftc list laws` names them, e.g. nominal, adaptive, oracle",
     )
     options: dict[str, float] = Field({}, description="parameters of a registered law, by name")
     gain_margin_db: float = Field(

@@ -159,7 +159,7 @@ class FdiConfig(BaseModel):
 
     scheme: Annotated[str, AfterValidator(known_scheme)] = Field(
         "adaptive-estimators",
-        description="a registered detector (`beaver-ftc list`), module:Class of an installed package, none",
+        description="a registered detector, `beaver-ftc list schemes` names them; none: nobody diagnoses",
     )
     options: dict[str, float] = Field({}, description="parameters of a registered detector, by name")
     fault_class: Literal["published", "all"] = Field(

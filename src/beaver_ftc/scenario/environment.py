@@ -1,9 +1,9 @@
 """What a scenario may say of the air (`environment:`): steady wind, turbulence, gusts."""
 
 from itertools import pairwise
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal, Self, get_args
 
-from pydantic import Discriminator, Field, Tag, model_validator
+from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
 
 from beaver_ftc.documents.base import Conflict, Number, Section, number, refuse
 
@@ -37,15 +37,24 @@ def _one_or_several(given: Any) -> str:
     return "several" if isinstance(given, list | tuple) else "one"
 
 
+Severity = Literal["light", "moderate", "severe"]
+
+
+def _no_severity(given: Any) -> Any:
+    """`turbulence: moderate` is what many write; say where that belongs."""
+    if given in get_args(Severity):
+        says = f"{given!r} is a severity, allowed: none, or turbulence: dryden with severity: {given}"
+        refuse([((), says)])
+    return given
+
+
 class Environment(Section):
     """The air."""
 
-    turbulence: Literal["none", "dryden"] = Field(
+    turbulence: Annotated[Literal["none", "dryden"], BeforeValidator(_no_severity)] = Field(
         default="none", description="still air or Dryden turbulence"
     )
-    severity: Literal["light", "moderate", "severe"] | None = Field(
-        default=None, description="of the turbulence"
-    )
+    severity: Severity | None = Field(default=None, description="of the turbulence")
     wind_mps: tuple[Wind, Wind, Wind] = Field(
         default=(0.0, 0.0, 0.0),
         description="steady wind towards north, east, down, m/s",

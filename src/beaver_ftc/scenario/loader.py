@@ -3,11 +3,10 @@
 from pathlib import Path
 
 from beaver_ftc.documents.document import Document, Problem
-from beaver_ftc.documents.errors import suggestion
 from beaver_ftc.documents.files import UnreadableError, read_text
 from beaver_ftc.documents.problems import ScenarioError
 from beaver_ftc.documents.validation import parse_document, validate
-from beaver_ftc.scenario.builtin import builtin_names, builtin_path, looks_like_a_path, resolve
+from beaver_ftc.scenario.builtin import builtin_names, builtin_path, looks_like_a_path, no_such, resolve
 from beaver_ftc.scenario.consistency import conflicts_in_data
 from beaver_ftc.scenario.schema import Scenario
 
@@ -40,12 +39,12 @@ def validate_scenario(document: Document, source: str = "", folder: Path | None 
     return validate(Scenario, document, source, folder, conflicts_in_data)
 
 
-def read_file(path: Path, given: str) -> str:
+def read_file(path: Path, given: str, kind: str = "scenario") -> str:
     """The text of a file, or a ScenarioError: why not and, for a bare name, which built-in it is near."""
     try:
         return read_text(path, MAX_BYTES)
     except UnreadableError as error:
         says = str(error)
         if says.startswith("no such file") and not looks_like_a_path(given):
-            says = f"no such file or built-in scenario{suggestion(given, builtin_names())}"
+            says = no_such(given, kind)
         raise ScenarioError(str(path), [Problem(error.line, (), says)]) from None

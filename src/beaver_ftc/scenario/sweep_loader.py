@@ -14,12 +14,17 @@ from beaver_ftc.aircraft import Aircraft, load
 from beaver_ftc.aircraft.question import asked
 from beaver_ftc.documents.base import Location
 from beaver_ftc.documents.document import Document, Problem
-from beaver_ftc.documents.errors import suggestion
 from beaver_ftc.documents.keys import UnusableKeyError, parse_key, with_values
 from beaver_ftc.documents.paths import data_root, inside
 from beaver_ftc.documents.problems import ScenarioError, key_path
 from beaver_ftc.documents.validation import validate
-from beaver_ftc.scenario.builtin import builtin_names, builtin_path, looks_like_a_path
+from beaver_ftc.scenario.builtin import (
+    builtin_names,
+    builtin_path,
+    builtin_sweeps,
+    looks_like_a_path,
+    no_such,
+)
 from beaver_ftc.scenario.loader import load_scenario, parse_document, read_file
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.sweep_schema import SweepFile, Variation
@@ -82,7 +87,8 @@ class Sweep:
 def load_sweep(path_or_name: str | Path) -> Sweep:
     """The sweep in a file or of a built-in name. Raises ScenarioError with one line a mistake."""
     path = resolve_sweep(path_or_name)
-    return load_sweep_text(read_file(path, str(path)), source=str(path), folder=path.parent, name=path.stem)
+    text = read_file(path, str(path), "sweep")
+    return load_sweep_text(text, source=str(path), folder=path.parent, name=path.stem)
 
 
 def load_sweep_text(
@@ -115,11 +121,6 @@ def is_sweep(path_or_name: str | Path) -> bool:
         return False
 
 
-def builtin_sweeps() -> list[str]:
-    """Names of the sweeps that come with the project."""
-    return sorted(path.stem for path in (data_root() / "scenarios" / "sweeps").glob("*.yaml"))
-
-
 def resolve_sweep(path_or_name: str | Path) -> Path:
     """The file a built-in sweep's name stands for; anything else is a path already."""
     given = str(path_or_name)
@@ -149,8 +150,8 @@ def _base_path(base: str, document: Document, source: str, folder: Path | None) 
     with contextlib.suppress(OSError):  # a name no file can have
         if path.is_file():
             return path
-    names = suggestion(base, builtin_names()) if not looks_like_a_path(base) else ", allowed: a scenario file"
-    says = f"no such file or built-in scenario: {base[:100]!r}{names}"
+    says = f"no such file: {base[:100]!r}, allowed: a scenario file"
+    says = says if looks_like_a_path(base) else no_such(base, "scenario")
     raise ScenarioError(source, [Problem(document.line(("base",)), ("base",), says)])
 
 

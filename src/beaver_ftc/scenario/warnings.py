@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from math import pi
 from typing import Any
 
+from beaver_ftc.scenario.sensors import PRESETS, Sensors
 from beaver_ftc.scenario.signals import Chirp
 
 _SEVERITIES = ("none", "light", "moderate", "severe")
@@ -28,9 +29,7 @@ def _undeclared(scenario: Any) -> Iterator[str]:
     bounds, truth = scenario.fdi.bounds, scenario.uncertainty
     yield from _unstructured(scenario)
     yield from _air(scenario)
-    for name, sensor in scenario.sensors:
-        if not sensor.is_within(getattr(bounds.sensors, name)):
-            yield f"sensors.{name}: its errors are not within fdi.bounds.sensors.{name}"
+    yield from _instruments(scenario)
     severity, declared = scenario.environment.severity, bounds.turbulence
     if _SEVERITIES.index(severity or "none") > _SEVERITIES.index(declared):
         yield f"environment.severity: {severity} is more than fdi.bounds.turbulence, {declared}"
@@ -46,6 +45,23 @@ def _undeclared(scenario: Any) -> Iterator[str]:
         yield "uncertainty.cg_m: a displaced centre of gravity is covered by fdi.bounds.constant_rad_s2 only"
     if _weighs_forces(scenario):
         yield from _forces(scenario)
+
+
+def _instruments(scenario: Any) -> Iterator[str]:
+    """One line for all instruments, and what would declare them."""
+    beyond = _not_within(scenario.sensors, scenario.fdi.bounds.sensors)
+    if not beyond:
+        return
+    enough = (name for name in PRESETS if not _not_within(scenario.sensors, Sensors.model_validate(name)))
+    preset = next(enough, None)
+    cure = f"`fdi.bounds.sensors: {preset}` declares them" if preset else "the same keys there declare them"
+    many = f": the errors of {', '.join(beyond)}"
+    whose = f".{beyond[0]}: its errors" if len(beyond) == 1 else many
+    yield f"sensors{whose} are not within fdi.bounds.sensors, so alarms without a fault may come; {cure}"
+
+
+def _not_within(sensors: Sensors, declared: Sensors) -> list[str]:
+    return [name for name, sensor in sensors if not sensor.is_within(getattr(declared, name))]
 
 
 def _weighs_forces(scenario: Any) -> bool:

@@ -9,7 +9,6 @@ from beaver_ftc.control.outer import setup
 from beaver_ftc.control.outer.autopilot import to_body
 from beaver_ftc.control.outer.profile import advance
 from beaver_ftc.control.outer.state import ALTITUDE, AUTOPILOT, BANK, HEADING, SPEED
-from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.loop import Loop, fly
 from beaver_ftc.results.metrics import metrics
 from beaver_ftc.scenario.schema import Scenario
@@ -242,17 +241,3 @@ class TestScenario:
             "altitude_within_m": True, "airspeed_within_mps": True, "heading_within_deg": False,
             "pre_fault_rms_deg_s.p": True, "stays_in_envelope": True,
         }  # fmt: skip
-
-
-def test_an_aircraft_without_a_term_of_thrust_is_refused():
-    from types import SimpleNamespace
-
-    scenario = Scenario.model_validate({"name": "x", "autopilot": STRAIGHT})
-    bare = SimpleNamespace(
-        name="bare", terms={}, geometry=scenario.airframe.geometry, mass=scenario.airframe.mass
-    )
-    stand_in = SimpleNamespace(
-        name="x", airframe=bare, autopilot=scenario.autopilot, design_model=scenario.design_model
-    )
-    with pytest.raises(BadInput, match="no term of its thrust"):
-        setup._know(np.zeros(1, AUTOPILOT)[0], stand_in)

@@ -11,7 +11,6 @@ from beaver_ftc.control.outer import setup
 from beaver_ftc.control.outer.level import elevator_needed
 from beaver_ftc.control.outer.state import AUTOPILOT, N_FLAP, N_QDYN
 from beaver_ftc.control.state import control_dtype
-from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.scenario.schema import Scenario
 
 AIRCRAFT = load()
@@ -135,11 +134,6 @@ def made_up(terms, **autopilot):
     return SimpleNamespace(
         name="aloft", airframe=aircraft, autopilot=legs, design_model=SimpleNamespace(mass=1.0)
     )
-
-
-def test_an_aircraft_without_thrust_flies_no_airspeed_and_says_so():
-    with pytest.raises(BadInput, match=r"aloft: autopilot\.airspeed_mps: glider has no term of its thrust"):
-        setup._know(np.zeros(1, AUTOPILOT)[0], made_up({}, airspeed_mps=(1,)))
 
 
 def test_an_aircraft_that_hardly_rolls_by_sideslip_is_not_flown_by_it():

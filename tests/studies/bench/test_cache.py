@@ -259,11 +259,24 @@ def test_an_inner_kernel_can_be_called_by_itself_before_and_after(tmp_path):
     assert outer(np.array([2.0, 1.5])) == 6.0
 
 
-def test_what_takes_long_is_said(monkeypatch, capsys):
+def test_what_takes_long_is_said(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(compiled, "PATIENCE_S", 0.0)
-    compiled._say_once.cache_clear()
-    assert compiled.compile_into(None, lambda x: np.sin(x) + 1)(0.0) == 1.0
-    assert capsys.readouterr().err == f"beaver-ftc: {compiled.COMPILING}\n"
+    kernels = [
+        lambda x: x + 1,
+        lambda x: x - 2,
+        lambda x: x * 3,
+        lambda x: x * x,
+    ]
+    for said, folder, new in (
+        (compiled.COMPILING, None, kernels[:2]),  # two kernels, one word
+        (compiled.COMPILING, tmp_path, kernels[:2]),
+        (compiled.MORE, tmp_path, kernels[2:]),
+    ):
+        compiled._say_once.cache_clear()
+        compiled._say_compiling.cache_clear()
+        for kernel in new:
+            assert compiled.compile_into(folder, kernel)(0.0) == kernel(0.0)
+        assert capsys.readouterr().err == f"beaver-ftc: {said}\n"
 
 
 def test_a_full_disk_for_the_cache_is_said_and_does_not_matter(tmp_path, monkeypatch, capsys):

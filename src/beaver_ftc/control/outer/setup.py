@@ -8,7 +8,7 @@ from beaver_ftc.control.outer.level import GRAVITY_MPS2, THRUST, elevator_needed
 from beaver_ftc.control.outer.state import CHANNELS, N_FLAP, N_QDYN
 from beaver_ftc.design.engine import SEA_LEVEL_DENSITY_KG_M3
 from beaver_ftc.diagnosis.state import PITCH
-from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.scenario.autopilot import THRUST_TERM
 from beaver_ftc.scenario.schema import Scenario
 
 MOST_DEG_S = (12.0, 6.0, 10.0)  # asked of a healthy aircraft: a transport's manoeuvres
@@ -67,11 +67,8 @@ def _know(autopilot: np.void, scenario: Scenario) -> None:
     """What the loops take from the aircraft: thrust, roll by sideslip, slowest airspeed."""
     aircraft = scenario.airframe
     terms = {name: term.value for name, term in aircraft.terms.items()}
-    if scenario.autopilot and scenario.autopilot.airspeed_mps and "CX_dpt" not in terms:
-        says = f"{aircraft.name} has no term of its thrust, allowed: an aircraft with CX_dpt"
-        raise BadInput(f"{scenario.name}: autopilot.airspeed_mps: {says}")
     per_mass = aircraft.geometry.wing_area_m2 / (aircraft.mass.mass_kg * scenario.design_model.mass)
-    autopilot["thrust"] = per_mass * np.array([terms.get("CX_dpt", 0.0), terms.get("CX_adpt2", 0.0)])
+    autopilot["thrust"] = per_mass * np.array([terms.get(THRUST_TERM, 0.0), terms.get("CX_adpt2", 0.0)])
     by_sideslip = terms.get("Cl_beta", 0.0) / terms.get("Cl_p", -1.0)
     autopilot["dihedral"] = max(by_sideslip, LEAST_DIHEDRAL) * 2.0 / aircraft.geometry.span_m
     autopilot["weathercock"] = inf

@@ -37,5 +37,5 @@ def _sets(document: Document) -> Iterator[page.Part]:
         yield page.Heading(f"{name}: {part['flights']} flights")
         yield from (page.Table(header, rows) for header, rows in sections(part))
         losses = [f"{sentence}." for sentence in part["better_than_ours"]]
-        nothing = "nothing here: no rival does better than ours on any count."
+        nothing = "nothing here: in these tables no rival has a better number than ours, us/frame aside."
         yield page.Bullets("What loses:", losses or [nothing])

@@ -219,3 +219,20 @@ def test_markup_in_a_name_is_no_markup():
     text = verdict.verdict_text(flown(scenario="[red]x[/red] :smile:"), "runs/[bold]x")
     assert "[red]x[/red] :smile:" in text
     assert "runs/[bold]x" in text
+
+
+@pytest.mark.parametrize(
+    ("limit", "said"),
+    [
+        (("airspeed_mps", "at least", 38.04, True), "airspeed to at least 38.0 m/s from 20.00 s: trim"),
+        (
+            ("bank_deg", "at most", 30.0, False),
+            "bank to at most 30 deg from 20.00 s, no longer at the end: trim",
+        ),
+    ],
+)
+def test_a_limit_that_was_lifted_is_said_to_be_gone(limit, said):
+    """Only of a limit that is not in force when the flight ends is it said that it is gone."""
+    keys = ("limits", "side", "value", "in_force")
+    entry = {"time_s": 20.0, "because": "trim", **dict(zip(keys, limit, strict=True))}
+    assert ("limited", said) in list(verdict.facts(flown(limits=[entry])))

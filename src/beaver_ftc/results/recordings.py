@@ -65,7 +65,6 @@ def _as_ardupilot(known: Columns, shares: Columns) -> Topics:
     return {"IMU": gyros, "SRFC": controls, "ARSP": {"Airspeed": known["airspeed_mps"]}, "ATT": attitude}
 
 
-_COMMANDS = ("_command", ".control[", "SRFC.")
 _ATT = {"Roll": "phi", "Pitch": "theta", "Yaw": "psi"}
 
 

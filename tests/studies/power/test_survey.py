@@ -18,7 +18,7 @@ from beaver_ftc.studies.engine.told import chance
 from beaver_ftc.studies.power.contenders import BUILT_IN, ESTIMATORS, Contender, contenders
 from beaver_ftc.studies.power.document import document_of
 from beaver_ftc.studies.power.flying import Watched, fly_faulted, with_fdi
-from beaver_ftc.studies.power.grid import GRIDS, Bout, Condition, loss, scenario_of, strikes_at_s
+from beaver_ftc.studies.power.grid import GRIDS, WITHIN_S, Bout, Condition, loss, scenario_of, strikes_at_s
 from beaver_ftc.studies.power.levels import level_at, level_for
 from beaver_ftc.studies.power.run import run_power
 from beaver_ftc.studies.power.tally import limit, rows_of, summary
@@ -318,3 +318,25 @@ def test_the_command_refuses_what_it_does_not_know(tmp_path):
     assert done.exit_code != 0
     assert isinstance(done.exception, BadInput)
     assert not any(tmp_path.iterdir())
+
+
+def test_held_out_alarms_are_counted_at_the_common_level_before_the_faults():
+    """By hand: of four bouts with faults two pass the level 0.8 before the fault, one the own level 1."""
+
+    def watched(before, faults):
+        rises = ((3.0, before),)
+        traces = [Trace(before, (), bool(faults), 9.0, rises=rises) for _ in faults or (None,)]
+        fault_deflections = [[1.0] * len(WITHIN_S) for _ in faults]
+        return Watched(Bout(STILL, 3.0, 1), faults, {ESTIMATORS: traces}, fault_deflections)
+
+    healthy = [watched(before, ()) for before in (0.8, 0.3, 0.2)]
+    faulted = [watched(before, (("aileron", 0.5), ("elevator", 0.5))) for before in (0.5, 0.9, 1.2, 0.1)]
+    document, _ = document_of(replace(SMALL, per_h=1e-3), healthy, faulted)
+    (line,) = document["levels"]
+    assert line["level"] == 0.8
+    assert line["calibration"]["alarms"] == 0
+    assert (
+        line["before_faults"]["alarms"] == 2
+    )  # a bout's flights are the same until the fault: each counts once
+    assert line["before_faults"]["hours"] == pytest.approx((9.0 + 3.0 + 3.0 + 9.0) / 3600.0)
+    assert line["own_level"]["alarms"] == 0

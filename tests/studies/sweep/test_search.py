@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from pyarrow.parquet import read_table
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.studies.sweep.run import Options, assignment_of, named_for, run_sweep
@@ -85,3 +86,16 @@ def test_nothing_to_vary_is_nothing_to_search(tmp_path):
     sweep = sweep_of("base: fault-free\nruns: 4")
     with pytest.raises(BadInput, match="nothing varies"):
         run_sweep(sweep, Options(out=tmp_path, search="delay"))
+
+
+@pytest.mark.parametrize("flights", [5, 20])
+def test_a_search_that_ends_within_a_generation_says_its_worst_flight(tmp_path, flights):
+    """Fewer flights than a generation has members, or a few more: the last ones count as all others do."""
+    sweep = sweep_of(SHORT.replace("runs: 48", f"runs: {flights}"))
+    done = run_sweep(sweep, Options(out=tmp_path, workers=1, search="delay", report=False))["search"]
+    rows = read_table(tmp_path / "short-search-delay" / "results.parquet").to_pylist()
+    scores = [score("delay", row) for row in rows]
+    assert len(scores) == flights
+    assert done["score"] == pytest.approx(max(scores))
+    assert done["run"] == int(np.argmax(scores))
+    assert done["history"] == pytest.approx([max(scores[:16]), max(scores)][-(1 + (flights > 16)) :])

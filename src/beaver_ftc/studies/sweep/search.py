@@ -93,8 +93,7 @@ class Evolution:
         """Let each trial that is no worse take its parent's place; a last generation may be cut short."""
         trials = self.trials()[: scores.size]
         if self.generation == 0:
-            missing = self.members - scores.size
-            self._points, self._scores = trials, np.append(scores, [-math.inf] * missing)
+            self._points, self._scores = trials, scores.copy()
         else:
             better = np.flatnonzero(scores >= self._scores[: scores.size])
             self._points[better], self._scores[better] = trials[better], scores[better]
@@ -184,7 +183,8 @@ def found(objective: str, results: Path, sweep: Sweep) -> dict[str, Any]:
     scores = np.array([score(objective, row) for row in rows])
     best = int(scores.argmax())
     members = Evolution(sweep.file.seed, len(sweep.keys)).members
-    after = np.maximum.accumulate(scores)[min(members, scores.size) - 1 :: members]
+    ends = [*range(members - 1, scores.size - 1, members), scores.size - 1]  # the last may be cut short
+    after = np.maximum.accumulate(scores)[ends]
     return {
         "objective": objective,
         "run": rows[best]["run"],

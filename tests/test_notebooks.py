@@ -1,5 +1,6 @@
 """The notebooks run from top to bottom, show what they say they show, and are kept without their output."""
 
+import subprocess
 from pathlib import Path
 
 import pytest
@@ -16,6 +17,16 @@ SHOWN = {
     "my-own-detector": (["adaptive-estimators", "named_rightly"], 1),
     "sweep-and-statistics": (["(0, 0)", "flown, nothing was expected"], 2),
 }
+
+
+def test_what_the_web_site_is_made_into_leaves_the_clone_clean():
+    root = FOLDER.parents[1]
+    for made in ("site", ".cache/mkdocs-jupyter"):  # mkdocs, and its plug-in that keeps what it has run
+        ignored = subprocess.run(["git", "check-ignore", "-q", f"{made}/x"], cwd=root, check=False)
+        kept = subprocess.run(["git", "ls-files", made], cwd=root, capture_output=True, check=False)
+        if kept.returncode == 128:
+            pytest.skip("no clone")
+        assert (ignored.returncode, kept.stdout) == (0, b""), made
 
 
 def test_there_are_four():

@@ -29,6 +29,15 @@ def test_every_command_explains_itself(helps):
         assert re.search(r"\n\n  [A-Z].+?\.\n", text, re.DOTALL), name
 
 
+def test_no_line_of_the_list_of_commands_is_cut_short_and_no_argument_is_bracketed_twice(helps):
+    listed = helps[""].partition("\nCommands:\n")[2].strip().splitlines()
+    assert len(listed) == len(helps) - 1
+    assert [line for line in listed if not re.search(r"[^.][.?]$", line)] == []
+    for text in helps.values():
+        usage = text.partition("\n\n")[0]
+        assert not re.search(r"\[\[|\.\.\.[\]})]+\.\.\.|\[[a-z]", usage), usage
+
+
 def test_the_program_says_its_exit_statuses(helps):
     said = " ".join(helps[""].split())
     for status in ("0 done", "1 an expectation failed", "2 bad input or usage", "3 the simulation could not"):

@@ -97,6 +97,17 @@ def test_a_scenario_given_for_a_sweep_and_the_other_way_round_are_told(beaver, a
     assert len(said.splitlines()) == 1
 
 
+def test_a_file_of_the_other_kind_is_told_from_one_with_mistakes(beaver):
+    Path("many.yaml").write_text(
+        "name: many\nbase: fault-free\nruns: 2\nexpect: {pass_rate: {at_least: 1}}\n"
+    )
+    Path("one.yaml").write_text("name: one\nduration_s: 1\n")
+    says = "base: this is a sweep file, allowed: a scenario; `beaver-ftc sweep many.yaml` flies it"
+    assert beaver("run", "many.yaml") == (2, "", f"many.yaml:2: {says}\n")
+    says = "(file): this is a scenario, allowed: a sweep file; `beaver-ftc run one.yaml` flies it"
+    assert beaver("sweep", "one.yaml") == (2, "", f"one.yaml:1: {says}\n")
+
+
 def test_an_airspeed_that_nothing_can_hold_is_said_at_its_key_by_validate(beaver):
     shutil.copytree(ROOT / "tests/data/aircraft/trainer", "trainer")  # its forces have no term of thrust
     status, _, said = _validated(

@@ -14,9 +14,10 @@ def command(
     ] = False,
     format: FormatOption = Format.text,
 ) -> None:
-    """Time the closed loop against the bare aircraft, side by side, and part by part.
+    """Time the closed loop against the bare aircraft.
 
-    The first time, the frame is compiled once more for each part that is taken out: about two minutes.
+    Side by side, and part by part. The first time, the frame is compiled once more for each part that
+    is taken out: about two minutes.
     """
     from beaver_ftc.studies.bench.measure import bench
 

@@ -12,9 +12,7 @@ _OURS = "adaptive-estimators", "fault-tolerant"
 
 
 def command(
-    runs: Annotated[
-        list[Path] | None, typer.Argument(metavar="[RUN...]", help="Result folders of `run`.")
-    ] = None,
+    runs: Annotated[list[Path] | None, typer.Argument(metavar="RUN", help="Result folders of `run`.")] = None,
     sweep: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Compare on the flights of a sweep.")
     ] = None,
@@ -48,8 +46,10 @@ def command(
     ] = None,
     format: FormatOption = Format.text,
 ) -> None:
-    """Compare finished runs; or schemes and laws on the same flights (--sweep, --benchmark); or ways to
-    diagnose recorded flights (--flights FOLDER), each left out of the model it is diagnosed with.
+    """Compare runs; or schemes and laws on the same flights.
+
+    Finished runs; or schemes and laws (--sweep, --benchmark); or ways to diagnose recorded flights
+    (--flights FOLDER), each left out of the model it is diagnosed with.
 
     Writes comparison.json, comparison.png and comparison.html (for runs: runs.json, runs.png, runs.html)
     below --out; for recorded flights, flights.json, flights.md and

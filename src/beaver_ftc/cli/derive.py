@@ -12,7 +12,8 @@ def command(
     aircraft: Annotated[
         str,
         typer.Argument(
-            help="jsbsim:NAME of the installed jsbsim package, a JSBSim model, or an aircraft's folder."
+            metavar="AIRCRAFT",
+            help="jsbsim:NAME of the installed jsbsim package, a JSBSim model, or an aircraft's folder.",
         ),
     ],
     envelope: Annotated[
@@ -24,10 +25,11 @@ def command(
     ] = None,
     format: FormatOption = Format.text,
 ) -> None:
-    """Derive an aircraft's design model from JSBSim and measure the error that is left.
+    """Derive an aircraft's design model from JSBSim.
 
-    It samples the aircraft over its envelope, fits sparse terms, and checks them on states the fit did not
-    see: the largest error becomes the declared bound. Afterwards `aircraft: jsbsim:NAME` flies.
+    And measure the error that is left. It samples the aircraft over its envelope, fits sparse terms,
+    and checks them on states the fit did not see: the largest error becomes the declared bound.
+    Afterwards `aircraft: jsbsim:NAME` flies.
     """
     from beaver_ftc.studies.derive.run import derive
     from beaver_ftc.studies.derive.text import document_of, text_of

@@ -15,7 +15,9 @@ def command(
     out: Annotated[Path, typer.Option(help="Folder for the map, the CSV and the JSON.")] = Path("runs"),
     format: FormatOption = Format.text,
 ) -> None:
-    """Survey speed, altitude and excitation for the smallest fault certain to be detected and isolated.
+    """Survey the smallest fault that is certain to be found.
+
+    Over speed, altitude and excitation: the smallest loss certain to be detected, and to be isolated.
 
     Certain: within 0.5 s and 1 s, whatever the declared uncertainty does, along the scenario's references
     scaled by 0.25 to 2; `median` where the fault strikes at half of all instants.

@@ -9,7 +9,7 @@ from beaver_ftc.cli.output import Format, FormatOption, emit, emit_json
 
 
 def command(
-    flights: Annotated[list[Path], typer.Argument(metavar="FLIGHT...", help="Recorded flights.")],
+    flights: Annotated[list[Path], typer.Argument(metavar="FLIGHT", help="Recorded flights.")],
     model: Annotated[
         Path | None,
         typer.Option(metavar="MODEL", help="The model file `identify` has written; none for our own logs."),

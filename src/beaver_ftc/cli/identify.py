@@ -9,7 +9,7 @@ from beaver_ftc.cli.output import Format, FormatOption, emit, emit_json
 
 
 def command(
-    flights: Annotated[list[Path], typer.Argument(metavar="FLIGHT...", help="Recorded flights.")],
+    flights: Annotated[list[Path], typer.Argument(metavar="FLIGHT", help="Recorded flights.")],
     vehicle: Annotated[str, typer.Option(metavar="FILE", help="Vehicle file, or the built-in `alfa`.")],
     out: Annotated[Path, typer.Option(metavar="MODEL", help="The model file to write.")],
     reader: Annotated[
@@ -17,10 +17,11 @@ def command(
     ] = None,
     format: FormatOption = Format.text,
 ) -> None:
-    """Identify a vehicle from recorded flights and write a model file for `diagnose`.
+    """Identify a vehicle from recorded flights.
 
-    Fitted are the flights' healthy parts, and faulty ones whose effectiveness the labels tell. What the fit
-    did not see tells how good it is: in the model file, and as a page beside it (MODEL with .html).
+    Writes a model file for `diagnose`. Fitted are the flights' healthy parts, and faulty ones whose
+    effectiveness the labels tell. What the fit did not see tells how good it is: in the model file, and
+    as a page beside it (MODEL with .html).
     """
     from beaver_ftc.flights.identification import identify, summary
     from beaver_ftc.flights.inputs import load_flights

@@ -34,7 +34,7 @@ PluginOption = Annotated[
     typer.Option(
         "--plugin",
         metavar="[NAME=]MODULE:CLASS",
-        help="Register a detector or law for this run; scenarios name it NAME, or as the class, my-class.",
+        help="Register a detector or law for this run, under NAME; if left out, MyClass is my-class.",
     ),
 ]
 

@@ -9,14 +9,15 @@ from beaver_ftc.cli.output import Format, FormatOption, emit, emit_json
 
 def command(
     scenario: Annotated[
-        str | None, typer.Argument(metavar="[SCENARIO]", help="Take sensors, actuators and law from it.")
+        str | None, typer.Argument(metavar="SCENARIO", help="Take sensors, actuators and law from it.")
     ] = None,
     format: FormatOption = Format.text,
 ) -> None:
-    """Linearise the closed loop over the airspeeds of the envelope and print its margins.
+    """Linearise the closed loop and print its margins.
 
-    Aircraft, actuators, sensors' lag and delay, frame rate and the default law, broken at each surface in
-    turn; healthy, and with losses of each surface that the law knows.
+    Over the airspeeds of the envelope. Aircraft, actuators, sensors' lag and delay, frame rate and the
+    default law, broken at each surface in turn; healthy, and with losses of each surface that the law
+    knows.
     """
     from beaver_ftc.scenario.given import load
     from beaver_ftc.studies.margins.study import as_document, as_text, study

@@ -11,7 +11,7 @@ Entries = list[dict[str, str]]
 
 
 def command(
-    kind: Annotated[str | None, typer.Argument(help="One kind only, e.g. aircraft.")] = None,
+    kind: Annotated[str | None, typer.Argument(metavar="KIND", help="One kind only, e.g. aircraft.")] = None,
     format: FormatOption = Format.text,
 ) -> None:
     """List what there is to choose from.

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 def command(
     scenario: Annotated[
-        str, typer.Argument(metavar="[SCENARIO]", help="A file, or the name of a built-in scenario.")
+        str, typer.Argument(metavar="SCENARIO", help="A file, or the name of a built-in scenario.")
     ] = "fault-free",
     aircraft: Annotated[
         str | None, typer.Option(metavar="AIRCRAFT", help="Fly this one, without the scenario's uncertainty.")
@@ -22,7 +22,7 @@ def command(
     out: Annotated[Path, typer.Option(help="Folder in which the page's Save writes.")] = Path("runs"),
     open_browser: Annotated[bool, typer.Option("--open", help="Also open the page in a browser.")] = False,
 ) -> None:
-    """Fly in the browser: break it, repair it, watch the diagnosis.
+    """Fly in the browser: break it and watch the diagnosis.
 
     Prints an address of this machine that works once; Ctrl-C ends it.
     """

@@ -42,7 +42,9 @@ def command(
     ] = None,
     format: FormatOption = Format.text,
 ) -> None:
-    """Fly every fault type on every surface: detected, named, and tracked how well beside the oracle.
+    """Fly every fault type on every surface.
+
+    Says which are detected and named, and how well the rates are tracked beside the oracle's.
 
     With --declared also how many of the faults that a test told the fault sees are named.
 

@@ -28,7 +28,7 @@ def command(
     map: Annotated[bool, typer.Option("--map", help="Worst mismatch over speed and altitude, too.")] = False,
     no_report: Annotated[bool, typer.Option("--no-report", help="Skip report.html and the figures.")] = False,
 ) -> None:
-    """Split the difference between truth and design model into its sources.
+    """Split truth less design model into its sources.
 
     With --format json: the document of the flight, axes.{p,q,r}.{source}: rms, max, share, bound_share;
     of several flights {"runs": [...], "recommended": ..., "guarantee": ...}.

@@ -48,7 +48,9 @@ def command(
     out: Annotated[Path, typer.Option(help="Folder for the results: `power` in it.")] = Path("runs"),
     format: FormatOption = Format.text,
 ) -> None:
-    """Map detection probability and delay over surface, magnitude, excitation, sensors and turbulence.
+    """Map how likely and how soon faults are detected.
+
+    Over surface, magnitude, excitation, sensors and turbulence.
 
     Every scheme watches the same flights, at the alarm level that gives all the same false-alarm rate on the
     same healthy flights. Writes power.json, power.parquet, power.txt, and maps as PNG and SVG.

@@ -13,7 +13,9 @@ def command(
     workers: Annotated[int, typer.Option(min=1, help="Processes for the sensitivity study.")] = 2,
     format: FormatOption = Format.text,
 ) -> None:
-    """Fly the published study: every figure, every statement with our number and a verdict.
+    """Fly the published study and judge its statements.
+
+    Every figure, and every statement with our number and a verdict.
 
     Exit status 1 if a statement is not borne out.
 

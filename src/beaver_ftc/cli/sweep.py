@@ -71,9 +71,10 @@ def command(
         Path | None, typer.Option(metavar="FILE", help="Also write the verdict as JUnit XML, for CI.")
     ] = None,
 ) -> None:
-    """Fly a sweep: many flights of one scenario, varied, on all cores or on a cluster.
+    """Fly a sweep: many flights of one scenario, varied.
 
-    What has been flown is kept, whatever happens: go on with --resume. With --format json: the summary.
+    On all cores, or on a cluster. What has been flown is kept, whatever happens: go on with --resume.
+    With --format json: the summary.
     """
     if backend is Backend.local and replay is None:
         from beaver_ftc.studies.engine.processes import start_early

@@ -22,7 +22,7 @@ _ATTITUDE = (  # what, attribute, unit; angles in degrees
 
 def command(
     scenario: Annotated[
-        str | None, typer.Argument(metavar="[SCENARIO]", help="Take the flight condition from it.")
+        str | None, typer.Argument(metavar="SCENARIO", help="Take the flight condition from it.")
     ] = None,
     airspeed_mps: Annotated[float | None, typer.Option(min=1, max=1000, help="True airspeed, m/s.")] = None,
     altitude_m: Annotated[float | None, typer.Option(min=-300, max=30000, help="Altitude, m.")] = None,

@@ -23,11 +23,11 @@ def command(
     ] = False,
     format: FormatOption = Format.text,
 ) -> None:
-    """Fly at random inside all that is declared and count broken promises, with exact confidence limits.
+    """Fly at random inside all that is declared: what breaks?
 
-    Counts false alarms, true faults excluded, wrong isolations and detections later than guaranteed plus a
-    frame, for the published and the sharpened scheme on the same flights. Stopped, it goes on where it was.
-    Exit status 1 if a promise is broken.
+    Counts, with exact confidence limits, broken promises: false alarms, true faults excluded, wrong
+    isolations and detections later than guaranteed plus a frame, for the published and the sharpened
+    scheme on the same flights. Stopped, it goes on where it was. Exit status 1 if a promise is broken.
     """
     from beaver_ftc.cli.progress import progress_bar
     from beaver_ftc.studies.engine.processes import cores

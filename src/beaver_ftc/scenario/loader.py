@@ -1,6 +1,7 @@
 """A scenario from a file, a built-in name or a text: every mistake at once, one line each."""
 
 from pathlib import Path
+from typing import Any
 
 from beaver_ftc.documents.document import Document, Problem
 from beaver_ftc.documents.files import UnreadableError, read_text
@@ -31,7 +32,16 @@ def builtin_scenarios() -> list[tuple[str, str, Path]]:
 
 def load_text(text: str, source: str = "<text>", folder: Path | None = None) -> Scenario:
     """The scenario in a text; `source` begins its error lines, `folder` is where its CSV files are."""
-    return validate_scenario(parse_document(text, source), source, folder)
+    document = parse_document(text, source)
+    if is_of_a_sweep(document.data):
+        says = f"this is a sweep file, allowed: a scenario; `beaver-ftc sweep {source}` flies it"
+        raise ScenarioError(source, [Problem(document.line(("base",)), ("base",), says)])
+    return validate_scenario(document, source, folder)
+
+
+def is_of_a_sweep(data: dict[str, Any]) -> bool:
+    """Whether a file's keys are those of a sweep: a base, and what becomes of it."""
+    return "base" in data and not {"runs", "vary", "set", "expect"}.isdisjoint(data)
 
 
 def validate_scenario(document: Document, source: str = "", folder: Path | None = None) -> Scenario:

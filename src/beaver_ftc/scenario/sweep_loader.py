@@ -96,6 +96,10 @@ def load_sweep_text(
 ) -> Sweep:
     """The sweep in a text; `folder` is where its base and CSV files are, `name` its name if it says none."""
     document = parse_document(text, source)
+    keys = document.data.keys()
+    if {"base", "vary", "runs"}.isdisjoint(keys) and keys <= Scenario.model_fields.keys():
+        says = f"this is a scenario, allowed: a sweep file; `beaver-ftc run {source}` flies it"
+        raise ScenarioError(source, [Problem(1, (), says)])
     document.data.setdefault("name", re.sub(r"[^A-Za-z0-9_-]", "-", name.removesuffix(".sweep"))[:70])
     return validate_sweep(document, source, folder)
 

@@ -150,15 +150,15 @@ def write_ardupilot(path, columns, name="RATE"):
 
 
 def write_dataflash(path, messages):
-    """An ArduPilot dataflash log (binary form) of (kind, row) in order; a row's names are its fields. TimeUS
-    and I are whole numbers, the others floats of eight bytes."""
+    """An ArduPilot dataflash log (binary form) of (kind, row) in order; a row's names are its fields. TimeUS,
+    I and C are whole numbers, the others floats of eight bytes."""
     data, kinds = b"", {}
 
     def message(number, body):
         return b"\xa3\x95" + bytes([number]) + body
 
     for kind, row in messages:
-        layout = "".join({"TimeUS": "Q", "I": "B"}.get(field, "d") for field in row)
+        layout = "".join({"TimeUS": "Q", "I": "B", "C": "B"}.get(field, "d") for field in row)
         if kind not in kinds:
             kinds[kind] = 130 + len(kinds)
             size = 3 + struct.calcsize(f"<{layout}")

@@ -79,3 +79,51 @@ def test_a_fault_from_the_start_is_not_learnt_away(wing, wing_folder, wing_model
     late = rows.t_s > 60.0
     assert rows.faulty[late].mean() > 0.95
     assert np.median(rows.estimate[late, 1]) == pytest.approx(0.5, abs=0.101)
+
+
+def with_settings(model, **changes):
+    return model.model_copy(update={"settings": model.settings.model_copy(update=changes)})
+
+
+def test_the_trim_wanders_as_far_as_the_settings_say(wing_model):
+    """A walk of so many residual sd a sample has gone 30 times that after 900 samples."""
+    walk = [2e-3, 1e-3, 4e-3]
+    own = adaptation_of(with_settings(wing_model, trim_walk=walk))
+    noise_sd = np.sqrt(np.diag(np.array(wing_model.noise)))
+    drawn = np.random.default_rng(6).standard_normal((4000, 900, 3)).sum(axis=1) * np.array(walk) * noise_sd
+    np.testing.assert_allclose(np.sqrt(900 * own.walk[:3]), drawn.std(axis=0), rtol=0.05)
+
+
+def test_a_trim_that_drifts_is_followed_if_it_may(healthy, wing_model):
+    """A pitching moment that grows: where the settings let the trim wander it is found there."""
+    sd, past = np.sqrt(np.diag(np.array(wing_model.noise)))[1], np.array(wing_model.past)
+    moment = np.clip((healthy.t_s - 60.0) / 100.0, 0.0, 1.0) * 0.8 * sd
+    answer = np.zeros((len(moment) + wing_model.history, 3))  # of the rates, by the model's own past
+    for k, off in enumerate(moment, wing_model.history):
+        before = np.concatenate([answer[k - lag] for lag in range(1, wing_model.history + 1)])
+        answer[k] = before @ past + [0.0, off, 0.0]
+    drifting = replace(healthy, rates=healthy.rates + answer[wing_model.history :])
+    found = {}
+    for walk in (1e-6, 2e-2):
+        model = with_settings(wing_model, trim_walk=[walk] * 3, trim_bound=40.0, delays_s=[0.0])
+        one, other = (posterior_of(flight, model, bank_of(model))[1][-1, 1] for flight in (drifting, healthy))
+        found[walk] = one - other
+    assert found[2e-2] == pytest.approx(moment[-1], rel=0.15)
+    assert found[1e-6] < 0.8 * moment[-1]
+
+
+@pytest.mark.parametrize("memory_s", [20.0, 60.0])
+def test_the_scale_of_the_noise_has_the_memory_of_the_settings(healthy, wing_model, memory_s):
+    """Residuals far beyond what is clipped, at 3 times what is expected: the scale grows by e in
+    memory / (3 - 0.93), whatever they are."""
+    rng = np.random.default_rng(8)
+    rates = healthy.rates.copy()
+    rates[600:] += 5.0 * rng.choice([-1.0, 1.0], (len(rates) - 600, 3))
+    model = with_settings(wing_model, noise_memory_s=memory_s, delays_s=[0.0])
+    bank = bank_of(model)
+    posterior, _, scale = posterior_of(replace(healthy, rates=rates), model, bank)
+    begin, end = 620, 620 + round(0.4 * memory_s * wing_model.rate_hz)
+    answering = 1.0 - posterior[begin + 1 : end + 1, bank.idle].mean()
+    grown = np.log(scale[end] / scale[begin])
+    assert scale[end] < 6.0
+    assert grown == pytest.approx(0.4 * (3.0 - 0.93) * answering, rel=0.02)

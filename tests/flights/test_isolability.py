@@ -1,11 +1,15 @@
 """The isolability statement against flights: what it says would show shows, and what would not does not."""
 
-import numpy as np
+from dataclasses import replace
 
+import numpy as np
+import pytest
+
+from beaver_ftc.flights.bank import bank_of
 from beaver_ftc.flights.diagnose import diagnose
 from beaver_ftc.flights.identification import identify
 from beaver_ftc.flights.inputs import load_flights
-from beaver_ftc.flights.isolability import statement
+from beaver_ftc.flights.isolability import sentences, statement
 from beaver_ftc.flights.vehicle import load_vehicle
 from flights import synthetic
 
@@ -56,3 +60,40 @@ def test_surfaces_that_move_together_are_said_to_and_named_together(wing_folder)
         suspected = rows.faulty == 1
         assert (rows.low[suspected] == 0.0).mean() > 0.9
     assert named[0] == named[1] == {"right+left"}
+
+
+@pytest.mark.parametrize(("sign", "named"), [(1.0, "1.00"), (-1.0, "-1.00")])
+def test_groups_that_act_alike_or_opposed_are_not_separable(wing, wing_folder, wing_model, sign, named):
+    """The left elevon's response made that of the right one, or its opposite, under the same commands."""
+    samples = sampled(wing, wing_folder, "opposed", duration_s=40.0, seed=47)
+    right = np.array(wing_model.response[0])
+    model = wing_model.model_copy(update={"response": [right.tolist(), (sign * right).tolist()]})
+    moved = replace(samples, commands=samples.commands[:, [0, 0]])
+    found = statement(moved, model)
+    (pair,) = found["alike"]
+    assert pair["separable"] is False
+    assert pair["cosine"] == pytest.approx(sign)
+    assert f"nearly proportional (cosine {named}): one may be named for the other." in sentences(found)[-1]
+    assert statement(samples, wing_model)["alike"][0]["separable"] is True
+
+
+def test_the_smallest_loss_by_its_closed_form(wing, wing_folder, wing_model):
+    """d^2 / 2 times the information gathered equals the odds, sample by sample from the model file; the same
+    samples taken for half as long each carry twice as much a second."""
+    samples = sampled(wing, wing_folder, "closed", duration_s=40.0, seed=46)
+    inverse = np.linalg.inv(np.array(wing_model.noise))
+    response, lags = np.array(wing_model.response), wing_model.lags
+    first = max(lags, wing_model.history)
+    information = []
+    for k in range(first, len(samples.t_s)):
+        moved = sum(samples.commands[k - j, 0] * response[0][j - 1] for j in range(1, lags + 1))
+        information.append(moved @ inverse @ moved)
+    settings = wing_model.settings
+    for rate_hz in (10.0, 20.0):
+        found = statement(replace(samples, dt_s=1.0 / rate_hz), wing_model)["groups"][0]
+        per_s = settings.power * np.mean(information) * rate_hz
+        assert found["information_per_s"] == pytest.approx(per_s, rel=1e-9)
+        odds = 0.5 * found["smallest_loss"]["60"] ** 2 * per_s * 60.0
+        share = np.median(bank_of(wing_model).weight[bank_of(wing_model).faulty(0)])
+        change = settings.changes_per_hour / 3600.0 / rate_hz * share
+        assert odds == pytest.approx(np.log(settings.alarm / (1.0 - settings.alarm) / change), rel=1e-9)

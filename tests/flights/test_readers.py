@@ -147,3 +147,20 @@ def test_a_log_in_another_format_gives_the_same_samples(tmp_path, wing):
     other = load_flights([synthetic.write_csv(tmp_path / "flight.csv", columns)], wing)[0]
     np.testing.assert_array_equal(one.commands, other.commands)
     np.testing.assert_array_equal(one.rates, other.rates)
+
+
+@pytest.mark.parametrize("number", ["I", "C"])
+def test_two_instances_of_a_message_are_two_sets_of_columns(tmp_path, number):
+    """Two gyros that log in turn, the second with its own bias, a tenth of a step later."""
+    pytest.importorskip("pymavlink")
+    t_s = np.arange(80) * 0.1
+    rows = [
+        ("IMU", {"TimeUS": round((t + 1.0 + 0.01 * i) * 1e6), number: i, "GyrX": np.sin(t) + 0.5 * i})
+        for t in t_s
+        for i in (0, 1)
+    ]
+    columns = read_flight(synthetic.write_dataflash(tmp_path / "flight.bin", rows)).columns
+    for i, name in enumerate(("IMU.GyrX", "IMU1.GyrX")):
+        np.testing.assert_allclose(columns[name].t_s, t_s + 0.01 * i, atol=1e-6)
+        np.testing.assert_array_equal(columns[name].values, np.sin(t_s) + 0.5 * i)
+        assert columns[name].note == ""

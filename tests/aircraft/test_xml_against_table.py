@@ -1,7 +1,5 @@
 """The aircraft's XML is the sourced table, term by term."""
 
-from xml.etree import ElementTree
-
 import pytest
 from tools.actuators import files
 
@@ -18,7 +16,6 @@ from beaver_ftc.design.coefficients import (
     coefficient_terms,
     inertia_coefficients,
 )
-from beaver_ftc.documents.paths import data_root
 from beaver_ftc.plant.model_file import with_systems
 
 PROPERTY_OF = {
@@ -144,13 +141,3 @@ def test_the_actuators_are_written_from_their_template():
     assert {path.stem for path in files() if path.is_relative_to(load().folder)} == set(SURFACES)
     for path, text in files().items():
         assert path.read_text() == text, "run python -m tools.actuators"
-
-
-def test_every_location_is_named_as_jsbsims_own_schema_wants():
-    """JSBSim.xsd: a location has a name and a unit; so does the one of a point mass."""
-    root = ElementTree.parse(data_root() / "aircraft" / "beaver" / "beaver.xml").getroot()
-    locations = list(root.iter("location"))
-    assert len(locations) >= 7
-    assert [dict(place.attrib) for place in locations if not {"name", "unit"} <= place.attrib.keys()] == []
-    for mass in root.iter("pointmass"):
-        assert mass.find("location").get("name") == mass.get("name")

@@ -1,5 +1,6 @@
 """The actuator of one surface as JSBSim's XML: written from the one template, `aircraft/actuator.xml`."""
 
+import re
 from functools import lru_cache
 
 from beaver_ftc.documents.paths import data_root
@@ -22,5 +23,7 @@ def actuator_system(surface: str, low_rad: float, high_rad: float, prefix: str =
         command = f'<property value="0"> fcs/{prefix}SURFACE-cmd-norm </property>'
         text = text.replace("<property", f"{command}\n  <property", 1)
     text = text.replace("SURFACE", surface)
-    text = text.replace("MIN-RAD", f"{low_rad!r}").replace("MAX-RAD", f"{high_rad!r}")
+    for end, stop_rad in (("min", low_rad), ("max", high_rad)):
+        stop = f'"> actuators/{surface}/position-{end}-rad </property>'
+        text = re.sub(rf'[^"]*(?={stop})', f"{stop_rad!r}", text, count=1)
     return f'<?xml version="1.0"?>\n<!-- From aircraft/actuator.xml: change that. -->\n{text}'

@@ -49,7 +49,7 @@ _EXTRA_PITCH = """<function name="aero/moment/unanticipated-lbsft">
 </function>"""
 _LEVER = """
     <fcs_function name="fcs/actuated-throttle-{i}-norm">
-      <function> <sum> <property> fcs/actuated-throttle-norm </property> </sum> </function>
+      <function> <property> fcs/actuated-throttle-norm </property> </function>
       <output> fcs/throttle-cmd-norm[{i}] </output>
     </fcs_function>"""
 # What FlightGear tells an aircraft of its engines, from which some take lever and governor; {i}: of each.
@@ -60,7 +60,7 @@ _FROM_FLIGHTGEAR = {
 }
 _TOLD = """
     <fcs_function name="fcs/{name}-{i}">
-      <function> <sum> <property> {of} </property> </sum> </function>
+      <function> <property> {of} </property> </function>
       <output> {told} </output>
     </fcs_function>"""
 # What else of the aircraft's motion and engines its moments may depend on, dimensionless: name, JSBSim
@@ -114,6 +114,10 @@ _COMMON = """<?xml version="1.0"?>
   </channel>
 </system>
 """
+
+
+# What stands before all functions in aerodynamics, by JSBSim's own schema.
+_BEFORE_FUNCTIONS = ("description", "alphalimits", "hysteresis_limits", "aero_ref_pt_shift_x")
 
 
 def engines_of(source: Path) -> int:
@@ -267,10 +271,11 @@ def _add_signals(aerodynamics: Element, engines: int) -> None:
     functions = {"thrust": _THRUST.format(thrusts=thrusts), **_FUNCTIONS}
     if not engines:  # nor has the aircraft the properties
         functions = {signal: functions[signal] for signal in ("alpha_rate", "beta_rate")}
+    first = sum(element.tag in _BEFORE_FUNCTIONS for element in aerodynamics)
     for signal, formula in functions.items():
         name, says = SIGNALS[signal]
         text = f'<function name="{name}"> <description> {says} </description> {formula} </function>'
-        aerodynamics.insert(0, ElementTree.fromstring(text))
+        aerodynamics.insert(first, ElementTree.fromstring(text))
 
 
 def _add_pitch_fault(aerodynamics: Element, name: str) -> None:

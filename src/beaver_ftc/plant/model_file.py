@@ -201,11 +201,29 @@ def _leaves(name: str) -> bool:
 
 
 def with_systems(model: Path) -> Element:
-    """The root of a model; each `<system file="x"/>` of the folder `Systems` beside it is replaced by x."""
-    root = ElementTree.parse(model).getroot()
+    """The root of a model; each `<system file="x"/>` of the folder `Systems` beside it is replaced by x.
+
+    JSBSim's schema lets only functions have a description: a comment that stands first in an operation reads
+    as one here.
+    """
+    root = _described(model)
     for place, element in enumerate(list(root)):
         name = element.get("file")
         path = model.parent / SYSTEMS / f"{name}.xml"
         if element.tag == "system" and name and path.is_file():
-            root[place] = ElementTree.parse(path).getroot()
+            root[place] = _described(path)
+    return root
+
+
+def _described(path: Path) -> Element:
+    builder = ElementTree.TreeBuilder(insert_comments=True)
+    root: Element = ElementTree.parse(path, ElementTree.XMLParser(target=builder)).getroot()
+    for element in list(root.iter()):
+        for place, comment in reversed([*enumerate(element)]):
+            if comment.tag is ElementTree.Comment:
+                element.remove(comment)
+                if place == 0 and element.get("name") and element.find("description") is None:
+                    says = Element("description")
+                    says.text = comment.text
+                    element.insert(0, says)
     return root

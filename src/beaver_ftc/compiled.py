@@ -4,7 +4,7 @@ Division by zero gives inf or nan, as in NumPy and JSBSim: the loop looks for no
 instead of every operation doing so. No fast-math: the same flight gives the same bits.
 
 Compiled code is kept in the user's cache, in a folder named after the sources: a change makes a new one. It
-also works where the package is read-only.
+also works where the package is read-only. Nobody else may write there: what is kept is run.
 
 A kernel that another one calls is only translated: to optimise is done once, for the outermost one and all
 it calls (translation.py). Of the largest, another process translates a half meanwhile (elsewhere.py).
@@ -32,7 +32,8 @@ from numba.core.compiler_lock import global_compiler_lock
 from numba.core.registry import CPUDispatcher
 from numba.core.types import unliteral
 
-from beaver_ftc.documents.paths import cache_base, folder_of_version
+from beaver_ftc.documents.paths import cache_of_version
+from beaver_ftc.documents.sources import digest_of, fingerprint
 from beaver_ftc.elsewhere import Helper, Part
 from beaver_ftc.translation import Inner, lighten, nesting, stub
 
@@ -44,31 +45,13 @@ _DIGEST_BYTES = 32
 _LOCK = "lock"
 
 _PACKAGE = Path(__file__).parent
-_SOURCES = (
-    "aircraft/schema.py", "design/*.py", "diagnosis/*.py", "diagnosis/types/*.py", "control/*.py",
-    "control/laws/*.py", "control/outer/*.py", "plant/channels.py", "plant/native.py", "plant/instruments.py",
-    "plant/readings.py", "compiled.py", "elsewhere.py", "translation.py", "plant/sensing.py",
-    "loop/frame.py", "loop/accounts.py", "loop/record.py", "loop/agent.py",
-    "loop/rows.py", "loop/steps.py", "loop/watching.py",
-)  # fmt: skip
-
-
 Halves = Callable[..., tuple[list[Part], list[Part]]]
-
-
-def _fingerprint() -> str:
-    digest = hashlib.sha256()
-    for pattern in _SOURCES:
-        for source in sorted(_PACKAGE.glob(pattern)):
-            digest.update(source.name.encode() + source.read_bytes())
-    return digest.hexdigest()[:16]
 
 
 @lru_cache(maxsize=1)
 def cache_folder() -> Path | None:
     """Where compiled kernels are kept; None where nothing can be written: each process compiles its own."""
-    base = cache_base()
-    return base and folder_of_version(base, _fingerprint())
+    return cache_of_version(fingerprint(_PACKAGE))
 
 
 def kernel(function):
@@ -266,10 +249,14 @@ class _Store:
     """The machine code of one kernel on the disk: a file a set of argument types, behind its digest."""
 
     def __init__(self, folder: Path, function) -> None:
-        self._folder = folder
-        code = function.__code__
+        self._folder, self._function = folder, function
         self._name = f"{function.__module__}.{function.__qualname__}"
-        self._of = (self._name, code.co_firstlineno, code.co_code, sys.version_info, numba.__version__)
+
+    @functools.cached_property
+    def _of(self):
+        """Found when code is first asked for: what is named in a kernel may be defined after it."""
+        line = self._function.__code__.co_firstlineno
+        return self._name, line, digest_of(self._function), sys.version_info, numba.__version__
 
     def _path(self, types, codegen) -> Path:
         key = repr((*self._of, types, codegen.magic_tuple()))

@@ -3,11 +3,16 @@
 import contextlib
 import os
 import shutil
+import stat
+import sys
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
 _VERSIONS_KEPT = 5
+_ROOT = 0
+_OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
+_REFUSED = "BEAVER_FTC_REFUSED"  # folders that were refused, and said so
 _PACKAGE = Path(__file__).resolve().parents[1]
 _INSTALLED = _PACKAGE / "data"
 
@@ -33,7 +38,21 @@ def inside(folder: Path, file: str) -> Path | None:
 
 def cache_base() -> Path | None:
     """The user's folder for compiled code; None where nothing can be written."""
-    return next((folder for folder in _candidates() if _is_writable(folder)), None)
+    return next(_bases(), None)
+
+
+def cache_of_version(version: str) -> Path | None:
+    """The folder of one version's code, made if need be: then old ones go. None where none can be trusted."""
+    for base in _bases():
+        if not (base / version).exists():
+            _discard_old(base)
+        if _is_ours(base / version):
+            return base / version
+    return None
+
+
+def _bases() -> Iterator[Path]:
+    return (folder for folder in _candidates() if _is_ours(folder, base=True))
 
 
 def _candidates() -> Iterator[Path]:
@@ -50,20 +69,45 @@ def _user() -> int:
     return os.getuid() if hasattr(os, "getuid") else 0
 
 
-def _is_writable(folder: Path) -> bool:
-    """Whether the folder is ours to write. Code is loaded from it, so nobody else may own it."""
+def _is_ours(folder: Path, base: bool = False) -> bool:
+    """Whether the folder, made if need be, is one we can write and nobody else can: code is run from it.
+
+    A refusal is said. base: the folder is one that holds the versions' folders.
+    """
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-        return os.access(folder, os.W_OK) and folder.stat().st_uid == _user()
+        if not os.access(folder, os.W_OK):
+            return False
+        why = _not_ours(folder, base) if os.name == "posix" else ""
     except OSError:
         return False
+    if why:
+        _say_refused(folder, why)
+    return not why
 
 
-def folder_of_version(base: Path, version: str) -> Path:
-    """The folder of one version's code. Before a new one comes, old ones go."""
-    if not (base / version).exists():
-        _discard_old(base)
-    return base / version
+def _not_ours(folder: Path, base: bool) -> str:
+    """Who else may put code into a folder, in words; nothing if nobody."""
+    itself, status, trusted = folder.lstat(), folder.stat(), (_user(), _ROOT)
+    if itself.st_uid not in trusted or (folder.is_symlink() and not base):
+        return "it is a link"
+    if base and status.st_mode & stat.S_ISVTX and status.st_uid in trusted:
+        return ""  # as /tmp: what we make in it nobody else can replace
+    if status.st_uid != _user():
+        return f"it belongs to user {status.st_uid}"
+    return f"its mode is {status.st_mode & 0o7777:04o}" if status.st_mode & _OTHERS_WRITE else ""
+
+
+def _say_refused(folder: Path, why: str) -> None:
+    """One line a program: processes that are started later know what has been said."""
+    said = os.environ.get(_REFUSED, "").split(os.pathsep)
+    if str(folder) not in said:
+        os.environ[_REFUSED] = os.pathsep.join([*filter(None, said), str(folder)])
+        print(
+            f"beaver-ftc: no compiled code is run from {folder}: {why}, "
+            "allowed: a folder of your own that neither group nor others can write (chmod go-w)",
+            file=sys.stderr, flush=True,
+        )  # fmt: skip
 
 
 def _discard_old(base: Path) -> None:

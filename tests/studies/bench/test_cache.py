@@ -26,6 +26,7 @@ def nowhere(monkeypatch, tmp_path):
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setenv("HOME", os.devnull)
     monkeypatch.setattr(paths.tempfile, "gettempdir", lambda: os.devnull)
+    monkeypatch.setenv("BEAVER_FTC_REFUSED", "")
     compiled.cache_folder.cache_clear()
     yield monkeypatch
     compiled.cache_folder.cache_clear()
@@ -66,10 +67,60 @@ def test_no_home_at_all_and_no_folder_for_temporary_files_is_no_error(nowhere):
 
 
 @pytest.mark.skipif(not hasattr(os, "getuid"), reason="folders have no owner here")
-def test_a_folder_somebody_else_owns_is_not_trusted(nowhere, tmp_path):
+def test_a_folder_somebody_else_owns_is_not_trusted(nowhere, tmp_path, capsys):
     nowhere.setenv("XDG_CACHE_HOME", str(tmp_path))
     nowhere.setattr(paths, "_user", lambda: os.getuid() + 1)
     assert compiled.cache_folder() is None
+    assert (
+        f"{tmp_path / 'beaver-ftc'}: it belongs to user {os.getuid()}, allowed: " in capsys.readouterr().err
+    )
+
+
+@pytest.fixture
+def where(nowhere, capsys):
+    """Which folder for compiled code a process takes, and what it says."""
+
+    def look(**environment):
+        for name, value in {"BEAVER_FTC_REFUSED": "", **environment}.items():
+            nowhere.setenv(name, value)
+        compiled.cache_folder.cache_clear()
+        return compiled.cache_folder(), capsys.readouterr().err
+
+    return look
+
+
+@pytest.mark.skipif(os.name != "posix", reason="folders have no mode here")
+@pytest.mark.parametrize("mode", [0o777, 0o770, 0o702])
+@pytest.mark.parametrize("which", ["base", "version"])
+def test_no_code_is_run_from_a_folder_that_others_may_write(where, tmp_path, mode, which):
+    given = {"NUMBA_CACHE_DIR": str(tmp_path / "numba"), "XDG_CACHE_HOME": str(tmp_path / "cache")}
+    first, said = where(**given)
+    assert (first.parent, said) == (tmp_path / "numba", "")
+    bad = first if which == "version" else first.parent
+    bad.chmod(mode)
+    second, said = where(**given)
+    assert second.parent == tmp_path / "cache" / "beaver-ftc"
+    assert said == (
+        f"beaver-ftc: no compiled code is run from {bad}: its mode is {mode:04o}, "
+        "allowed: a folder of your own that neither group nor others can write (chmod go-w)\n"
+    )
+
+
+@pytest.mark.skipif(os.name != "posix", reason="folders have no mode here")
+def test_in_a_folder_where_everybody_keeps_his_own_ours_is_what_counts(where, tmp_path):
+    shared = tmp_path / "shared"
+    shared.mkdir()
+    shared.chmod(0o1777)  # as /tmp
+    ours, said = where(NUMBA_CACHE_DIR=str(shared))
+    assert (ours.parent, said) == (shared, "")
+    assert ours.stat().st_mode & 0o077 == 0
+    ours.rmdir()
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    ours.symlink_to(elsewhere)
+    other, said = where(NUMBA_CACHE_DIR=str(shared), XDG_CACHE_HOME=str(tmp_path))
+    assert other.parent == tmp_path / "beaver-ftc"
+    assert said.startswith(f"beaver-ftc: no compiled code is run from {ours}: it is a link, allowed: ")
 
 
 def test_what_old_versions_left_goes_but_for_the_latest(nowhere, tmp_path):
@@ -80,8 +131,9 @@ def test_what_old_versions_left_goes_but_for_the_latest(nowhere, tmp_path):
         os.utime(folder, (i, i))
     (base / "keep-me").mkdir()
     nowhere.setenv("XDG_CACHE_HOME", str(tmp_path))
-    compiled.cache_folder()
+    new = compiled.cache_folder().name
     assert {path.name for path in base.iterdir()} == {
+        new,
         "keep-me",
         *(folder.name for folder in old[-paths._VERSIONS_KEPT :]),
     }

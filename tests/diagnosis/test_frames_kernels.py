@@ -101,27 +101,20 @@ def test_the_estimator_of_the_true_loss_stays_and_is_named_once_it_is_alone(surf
 
 
 def test_an_estimator_filters_what_its_fault_does_not_explain():
-    """Its residual: what is kept of it, and dt times what the fault does beyond theta times its moment."""
-    flown = plant(ELEVATOR)
-    then = None
+    """Since the alarm its residual is Omega (theta - thetahat), Omega the filtered moment [Zhang2005, IV]."""
+    flown, steps = plant(ELEVATOR), []
     for k in range(60):
         flown.fly(1, exactly)
-        fie = flown.fdi["estimator"][ELEVATOR]
-        if then is not None:
-            keep = flown.fdi["fie_decay"]
-            moment, theta = then["moment"], then["theta"]
-            phi = np.array(flown.innovations[k - 1])
-            expected = keep * then["residual"] + (phi - fie["theta"] * moment) / RATE_HZ
-            learned = keep * then["residual"] + (phi - theta * moment) / RATE_HZ
-            adapted = learned - (fie["theta"] - theta) * then["omega"]
-            found = fie["residual"]
-            assert min(np.abs(found - e).max() for e in (expected, learned, adapted)) < 2e-3
-        if flown.fdi["verdict"]["detected"]:
-            then = {
-                "residual": fie["residual"].copy(), "theta": fie["theta"].copy(),
-                "omega": fie["omega"].copy(),
-                "moment": flown.frame["belief"]["G"][:, ELEVATOR] * flown.frame["belief"]["u"][ELEVATOR],
-            }  # fmt: skip
+        fie, verdict = flown.fdi["estimator"][ELEVATOR], flown.fdi["verdict"]
+        if verdict["detected"]:
+            alarm = round(float(verdict["detected_at_s"]) * RATE_HZ)
+            moments = np.array(flown.innovations[alarm:k]).reshape(-1, 3) / THETA
+            omega = summed(flown.fdi["fie_decay"][ELEVATOR], moments)
+            assert fie["omega"] == pytest.approx(omega, abs=1e-15)
+            assert fie["residual"] == pytest.approx(omega * (THETA - fie["theta"]), abs=1e-12)
+            steps.append(np.abs(fie["residual"]).max())
+    assert len(steps) > 40
+    assert max(steps) > 5e-4
     assert fie["theta"][1] == pytest.approx(THETA, abs=0.02)
 
 

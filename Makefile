@@ -14,7 +14,7 @@ PLAIN := tests/design $(wildcard tests/*/test_*_kernels.py tests/*/*/test_*_kern
   $(addprefix tests/control/test_,decisions.py law_frame.py laws.py supervisor.py compiled_rivals.py) \
   tests/control/laws/test_gains.py tests/diagnosis/rivals/test_filters.py
 
-.PHONY: demo test acceptance cost test-fast coverage mutants drawn lint docs site clean help
+.PHONY: demo test plain acceptance cost test-fast coverage mutants drawn lint docs site clean help
 
 help:
 	@echo "make demo       set up, fly the published elevator case, print the verdict and where the report lies"
@@ -47,6 +47,9 @@ demo: $(VENV)/.demo
 test: $(VENV)/.dev
 	NUMBA_DISABLE_JIT=1 $(BIN)/python -m pytest $(PLAIN)
 	$(PYTEST) -m "not acceptance" $(addprefix --ignore=,$(PLAIN))
+
+plain:
+	@echo $(PLAIN)
 
 acceptance: $(VENV)/.dev
 	$(PYTEST) -m acceptance

@@ -64,15 +64,33 @@ def test_of_lines_that_are_alike_each_has_a_name_of_its_own(module):
 
 def test_a_change_elsewhere_draws_the_same_mutants(module, monkeypatch):
     monkeypatch.setattr(scope, "PACKAGE", module.parent)
-    before = [m.name(module.parent) for m in scope.drawn(1, ("module.py",))[0]]
+    before = [m.name(module.parent) for _, m in scope.drawn(1, ("module.py",))[0]]
     module.write_text(SOURCE + "\n\ndef further(x):\n    return x\n")
-    assert [m.name(module.parent) for m in scope.drawn(1, ("module.py",))[0]] == before
-    assert [m.name(module.parent) for m in scope.drawn(2, ("module.py",))[0]] != before
+    assert [m.name(module.parent) for _, m in scope.drawn(1, ("module.py",))[0]] == before
+    assert [m.name(module.parent) for _, m in scope.drawn(2, ("module.py",))[0]] != before
+
+
+def test_half_of_what_is_drawn_is_glue_and_a_kernel_is_what_compiled_code_is_made_of():
+    pairs, numbers = scope.drawn(1, ("loop/changing.py", "diagnosis/isolation.py", "loop/frame.py"))
+    assert [kind for kind, _ in pairs[:60]] == [scope.KERNELS, scope.GLUE] * 30
+    files = {kind: {m.file.name for of, m in pairs if of == kind} for kind in numbers}
+    assert files == {scope.KERNELS: {"isolation.py"}, scope.GLUE: {"changing.py"}}
+    assert sum(numbers.values()) == len(pairs)
 
 
 def test_what_is_left_out_has_a_reason_and_what_is_listed_exists():
-    assert all(": " in line for line in scope.left_out())
+    assert sum(int(line.split()[0]) for line in scope.left_out()) < 30
+    assert scope.kind(scope.PACKAGE / "compiled.py") == "compile"
+    assert scope.kind(scope.PACKAGE / "loop" / "frame.py") == "fly"
     assert scope.stale() == []
+
+
+def test_every_test_file_runs_plain_or_compiled_and_none_in_both():
+    plain, compiled = map(set, map(scope.tests, (scope.PLAIN, scope.COMPILED)))
+    assert not plain & compiled
+    assert scope.TESTS / "diagnosis" / "test_isolation_kernels.py" in plain
+    every = {file for file in scope.TESTS.rglob("test_*.py") if "acceptance" not in file.parts}
+    assert plain | compiled == every
 
 
 def test_a_child_that_never_ends_hangs_and_one_that_fails_kills():
@@ -85,17 +103,19 @@ def test_a_child_that_never_ends_hangs_and_one_that_fails_kills():
     assert trial.in_a_child(lambda: 1, 5.0) == trial.KILLED
 
 
-def test_tests_of_a_line_are_those_that_execute_it_or_its_module():
+def test_tests_of_a_line_are_those_that_execute_it_or_its_module(module, monkeypatch):
+    monkeypatch.setattr(reach, "ROOT", module.parent)
+    module.write_text("LIMIT = 3\n\n\ndef weigh(x):\n    if x:\n        return 1\n    return 2\n")
     known = {
         "seconds": {"a": 0.1, "b": 0.2},
         "left_out": {"takes too long": 2},
-        "lines": {"m.py": {"3": ["a"], "1": [], "5": ["a", "b"]}},
+        "lines": {"module.py": {"5": ["a", "b"], "6": ["a"]}},
     }
     found = reach.Reach([known])
-    assert found.of("m.py", (3, 2)) == ["a"]
-    assert found.of("m.py", (1, 1)) == ["a", "b"]  # it ran at import
-    assert found.of("m.py", (9, 9)) == []
-    assert found.of(str(Path("other.py")), (3, 3)) == []
+    assert found.of("module.py", (6, 5)) == {"a"}
+    assert found.of("module.py", (7, 7)) == set()
+    assert found.of("module.py", (1, 1)) == {"a", "b"}  # it runs at import
+    assert found.of("other.py", (3, 3)) == set()
     assert found.left_out["takes too long"] == 2
 
 
@@ -110,7 +130,7 @@ def test_tests_of_a_module_without_functions_are_those_of_what_imports_it():
     watch, user = "src/beaver_ftc/diagnosis/watch.py", "src/beaver_ftc/diagnosis/state.py"
     lines = {user: {"1": [], "150": ["b"]}, "src/beaver_ftc/design/terms.py": {"20": ["a"]}}
     found = reach.Reach([{"seconds": {}, "left_out": {}, "lines": lines}])
-    assert found.of(watch, (60, 40)) == ["b"]
+    assert found.of(watch, (60, 40)) == {"b"}
 
 
 SHARED = """
@@ -152,7 +172,7 @@ def shared_file(monkeypatch):
     with tempfile.TemporaryDirectory(dir=scope.ROOT / "tests" / "tools") as folder:
         file, kept = Path(folder) / "test_of_a_fixture.py", Path(folder) / "kept.json"
         file.write_text(SHARED)
-        monkeypatch.setattr(reach, "_kept", lambda file: kept)
+        monkeypatch.setattr(reach, "_kept", lambda mode, file: kept)
         yield file, kept
 
 
@@ -161,7 +181,7 @@ def test_what_a_shared_fixture_executes_every_test_executes_that_uses_it(shared_
     file, kept = shared_file
     name = file.relative_to(scope.ROOT).as_posix()
     for _ in range(2):
-        assert reach._measure(file) is False
+        assert reach._measure(scope.PLAIN, file) is False
         found = json.loads(kept.read_text())
         assert set(found["seconds"]) == {f"{name}::test_{of}" for of in ("first", "other", "without")}
         assert found["slow"] == [f"{name}::test_slow"]

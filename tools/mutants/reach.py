@@ -1,15 +1,19 @@
-"""Which tests execute a line, and how long each of them takes in plain Python."""
+"""Which tests execute a line, and how long each of them takes."""
 
 import functools
 import hashlib
+import importlib
 import json
+import os
+import pkgutil
 import signal
 import sys
-import time
+import tempfile
+import warnings
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from multiprocessing import get_context
 from pathlib import Path
 from types import FrameType
@@ -18,46 +22,53 @@ import coverage
 import hypothesis
 import pytest
 
-from tools.mutants.scope import ROOT
-from tools.mutants.trial import SURVIVED, in_a_child, pytest_quietly
+from tools.mutants.making import Mutant
+from tools.mutants.scope import COMPILED, PACKAGE, PLAIN, ROOT, runs_at_import, tests
+from tools.mutants.trial import SURVIVED, in_a_child, processor_s, pytest_quietly, turn_to
 
-SLOW_S = 1.0  # of processor, counting lines; a test that takes longer in plain Python is none for this
-FLIES = 4  # so many slow tests first in a file, and none of it is tried: all of them fly
-HANGS_S = 600.0  # of processor for the tests of one file, far more than the limits allow
+SLOW_S = {
+    PLAIN: 1.0,
+    COMPILED: 3.0,
+}  # of processor, counting lines; a test that takes longer is none for this
+WAITS_S = 20.0  # nor is what waits so long, for other processes
+HANGS_S = 900.0  # of processor for the tests of one file, far more than the limits allow
 EXAMPLES = 4
-FORGETS = tuple(f"beaver_ftc.{folder}." for folder in ("design", "diagnosis", "control"))
+APART = ("beaver_ftc.compiled", "beaver_ftc.translation", "beaver_ftc.elsewhere")
 KEPT = ROOT / ".mutants"
 
 
 class Reach:
-    """The tests of some folders: what they execute, and those that are none for this."""
+    """The tests of some files: what they execute, and those that are none for this."""
 
     def __init__(self, files: Iterable[dict]) -> None:
         self.seconds: dict[str, float] = {}
         self.left_out: Counter[str] = Counter()
-        self._lines: dict[str, dict[int, list[str]]] = {}
+        self._lines: dict[str, dict[int, set[str]]] = {}
         for file in files:
             self.seconds |= file["seconds"]
             self.left_out.update(file["left_out"])
             for name, lines in file["lines"].items():
                 known = self._lines.setdefault(name, {})
-                for line, tests in lines.items():
-                    known.setdefault(int(line), []).extend(tests)
+                for line, of in lines.items():
+                    known.setdefault(int(line), set()).update(of)
 
-    def of(self, name: str, lines: Iterable[int]) -> list[str]:
-        """Those that execute the first of the lines; of one that ran at import, all that execute anything;
+    def reaching(self, mutant: Mutant) -> dict[str, float]:
+        """The tests that execute the changed line, and how long each takes."""
+        reached = self.of(mutant.file.relative_to(ROOT).as_posix(), mutant.lines)
+        return {test: self.seconds[test] for test in sorted(reached)}
+
+    def of(self, name: str, lines: Iterable[int]) -> set[str]:
+        """Those that execute the first of the lines; of one that runs at import, all that execute anything;
         of a module without functions, all that execute what imports it.
         """
         by_line = self._lines.get(name)
-        if by_line is None:
+        if not by_line:
             users = [file for file in self._lines if _imports(ROOT / file, name)]
-            return sorted({t for file in users for tests in self._lines[file].values() for t in tests})
-        for line in lines:
-            if tests := by_line.get(line):
-                return tests
-        if any(line in by_line for line in lines):
-            return sorted({test for tests in by_line.values() for test in tests})
-        return []
+            return {test for file in users for of in self._lines[file].values() for test in of}
+        lines = list(lines)
+        if all(runs_at_import(ROOT / name, line) for line in lines):
+            return {test for of in by_line.values() for test in of}
+        return next((of for line in lines if (of := by_line.get(line))), set())
 
 
 def _imports(file: Path, name: str) -> bool:
@@ -66,25 +77,39 @@ def _imports(file: Path, name: str) -> bool:
     return file.exists() and f"from {module} import" in file.read_text()
 
 
-def reach(folders: Iterable[str], jobs: int, say: Callable[[str], None]) -> Reach:
-    """What the tests of the folders execute. Kept a test file each, until a source it executes changes."""
-    files = [f for folder in folders for f in sorted((ROOT / "tests" / folder).rglob("test_*.py"))]
-    due = [file for file in files if _known(file) is None]
+def reach(mode: str, jobs: int, say: Callable[[str], None]) -> Reach:
+    """What the tests of a mode execute. Kept a test file each, until a source it executes changes."""
+    files = tests(mode)
+    due = [file for file in files if _known(mode, file) is None]
     if due:
-        say(f"finding out what the tests of {len(due)} of {len(files)} files execute")
-    with ProcessPoolExecutor(jobs, mp_context=get_context("fork")) as pool:
-        for file, lost in zip(due, pool.map(_measure, due), strict=True):
-            if lost:
-                say(f"{file.relative_to(ROOT)}: its tests could not be measured, and are left out")
-    return Reach(known for file in files if (known := _known(file)))
+        say(f"finding out what the tests of {len(due)} of {len(files)} files execute ({mode})")
+        with ProcessPoolExecutor(jobs, get_context("fork"), _load, (mode,)) as pool:
+            for file, lost in zip(due, pool.map(_measure, [mode] * len(due), due), strict=True):
+                if lost:
+                    say(f"{file.relative_to(ROOT)}: its tests could not be measured, and are left out")
+    return Reach(known for file in files if (known := _known(mode, file)))
 
 
-def _kept(file: Path) -> Path:
-    return KEPT / file.relative_to(ROOT / "tests").with_suffix(".json")
+def _load(mode: str) -> None:
+    """The whole package, and compiled code: once, not once a test file."""
+    turn_to(mode)
+    few_examples()
+    for module in pkgutil.walk_packages([str(PACKAGE)], "beaver_ftc."):
+        with suppress(ImportError), warnings.catch_warnings(action="ignore"):
+            importlib.import_module(module.name)
+    if mode == COMPILED:
+        from beaver_ftc.loop.loop import fly
+        from beaver_ftc.scenario.schema import Scenario
+
+        fly(Scenario(name="short", duration_s=0.2))
 
 
-def _known(file: Path) -> dict | None:
-    kept = _kept(file)
+def _kept(mode: str, file: Path) -> Path:
+    return KEPT / mode / file.relative_to(ROOT / "tests").with_suffix(".json")
+
+
+def _known(mode: str, file: Path) -> dict | None:
+    kept = _kept(mode, file)
     found = json.loads(kept.read_text()) if kept.exists() else None
     return found if found and found["sources"] == _digests(found["sources"]) else None
 
@@ -96,25 +121,31 @@ def _digests(sources: Iterable[str]) -> dict[str, str]:
     return {name: digest(ROOT / name) for name in sorted(sources)}
 
 
-def _measure(file: Path) -> bool:
-    """Whether it failed, in a process of its own: what one test file imports is not there for the next."""
-    return in_a_child(lambda: _write(file), HANGS_S) != SURVIVED
+def _measure(mode: str, file: Path) -> bool:
+    """Whether it failed, in a process of its own: what one test file leaves is not there for the next."""
+    return in_a_child(lambda: _write(mode, file), HANGS_S) != SURVIVED
 
 
-def _write(file: Path) -> int:
-    kept = _kept(file)
+def _write(mode: str, file: Path) -> int:
+    kept = _kept(mode, file)
     kept.parent.mkdir(parents=True, exist_ok=True)
-    kept.write_text(json.dumps(_measured(file)))
+    kept.write_text(json.dumps(_measured(mode, file)))
     return 0
 
 
-def _measured(file: Path) -> dict:
-    few_examples()
-    watch = coverage.Coverage(data_file=None, source_pkgs=["beaver_ftc"], config_file=False)
-    timed = _Timed(watch, _slow_before(file))
-    with watch.collect():
-        pytest_quietly(["-m", "not acceptance", str(file)], [timed])
-    lines = _lines(watch.get_data(), timed)
+def _measured(mode: str, file: Path) -> dict:
+    watch = coverage.Coverage(data_file=None, source_pkgs=["beaver_ftc"], config_file=False, messages=False)
+    timed = _Timed(watch, SLOW_S[mode], _slow_before(mode, file))
+    with tempfile.TemporaryDirectory() as others:
+        os.environ["MUTANTS_LINES"] = f"{others}/lines"
+        os.environ["PYTHONPATH"] = os.pathsep.join([str(Path(__file__).parent), str(ROOT / "src")])
+        with watch.collect():
+            pytest_quietly([str(file)], [timed])
+        data = watch.get_data()
+        for lines in Path(others).iterdir():
+            with suppress(coverage.exceptions.DataError):  # of a process that was ended while it wrote
+                data.update(_read(lines))
+    lines = _lines(data, timed)
     sources = {*lines, *_tests_own(), file.relative_to(ROOT).as_posix()}
     return {
         "sources": _digests(sources),
@@ -125,27 +156,32 @@ def _measured(file: Path) -> dict:
     }
 
 
-def _slow_before(file: Path) -> set[str]:
+def _read(file: Path) -> coverage.CoverageData:
+    data = coverage.CoverageData(basename=str(file))
+    data.read()
+    return data
+
+
+def _slow_before(mode: str, file: Path) -> set[str]:
     """Tests that took too long when the package was another, and the test file the same: not tried again."""
-    kept, name = _kept(file), file.relative_to(ROOT).as_posix()
+    kept, name = _kept(mode, file), file.relative_to(ROOT).as_posix()
     before = json.loads(kept.read_text()) if kept.exists() else {}
     same = before.get("sources", {}).get(name) == _digests([name])[name]
     return set(before.get("slow", ()) if same else ())
 
 
 def _lines(data: coverage.CoverageData, timed: "_Timed") -> dict[str, dict[int, list[str]]]:
-    """{file: {line: tests}} of the files of which a test executes more than the import."""
+    """{file: {line: tests}} of the files of which a test executes anything."""
     found = {}
 
-    def tests(contexts: list[str]) -> list[str]:
+    def known(contexts: list[str]) -> list[str]:
         users = {test for context in contexts for test in timed.users.get(context, [context])}
         return sorted(users & timed.seconds.keys())
 
     for file in data.measured_files():
-        by_line = data.contexts_by_lineno(file)
-        if any(context for contexts in by_line.values() for context in contexts):
-            name = Path(file).relative_to(ROOT).as_posix()
-            found[name] = {line: tests(contexts) for line, contexts in by_line.items()}
+        by_line = {line: known(contexts) for line, contexts in data.contexts_by_lineno(file).items()}
+        if any(by_line.values()):
+            found[Path(file).relative_to(ROOT).as_posix()] = by_line
     return found
 
 
@@ -177,7 +213,7 @@ def forget() -> None:
     the first of a process would be known to execute it.
     """
     for name, module in list(sys.modules.items()):
-        if name.startswith(FORGETS):
+        if name.startswith("beaver_ftc.") and name not in APART:
             for value in list(vars(module).values()):
                 if isinstance(value, functools._lru_cache_wrapper) and value.__module__ == name:
                     value.cache_clear()
@@ -186,8 +222,8 @@ def forget() -> None:
 class _Timed:
     """Notes for each test that passes how long it took, and gives up one that is slow."""
 
-    def __init__(self, watch: coverage.Coverage, known_slow: set[str]) -> None:
-        self._watch = watch
+    def __init__(self, watch: coverage.Coverage, slow_s: float, known_slow: set[str]) -> None:
+        self._watch, self._slow_s = watch, slow_s
         self.seconds: dict[str, float] = {}
         self.left_out: Counter[str] = Counter()
         self.slow: set[str] = set()  # after one slow case the other cases of a test are not tried
@@ -200,28 +236,31 @@ class _Timed:
             for fixture in getattr(item, "fixturenames", ()):
                 self.users.setdefault(fixture, []).append(item.nodeid)
 
+    def _count_for(self, context: str) -> None:
+        self._watch.switch_context(context)
+        os.environ["MUTANTS_TEST"] = context
+
     @pytest.hookimpl(wrapper=True)
     def pytest_fixture_setup(self, fixturedef: pytest.FixtureDef, request: pytest.FixtureRequest):
         """What a shared fixture executes, every test executes that uses it: each may be run alone."""
         if fixturedef.scope == "function":
             return (yield)
-        self._watch.switch_context(fixturedef.argname)
+        self._count_for(fixturedef.argname)
         try:
             return (yield)
         finally:
-            self._watch.switch_context(self._test)
+            self._count_for(self._test)
 
     @pytest.hookimpl(wrapper=True)
     def pytest_runtest_protocol(self, item: pytest.Item) -> Iterator[None]:
         self._test = item.nodeid
-        self._watch.switch_context(self._test)
+        self._count_for(self._test)
         forget()
-        self._start, self._is_slow = time.process_time(), False
-        all_fly = not self.seconds and len(self.slow) >= FLIES
-        if all_fly or _function(item.nodeid) in self.slow | self._known_slow:
+        self._start, self._is_slow = processor_s(), False
+        if _function(item.nodeid) in self.slow | self._known_slow:
             item.add_marker(pytest.mark.skip(reason="takes too long for this"))
             self._is_slow = True
-        with _limit(self._give_up):
+        with _limit(self._give_up, self._slow_s):
             yield
         if self._is_slow:
             self.seconds.pop(item.nodeid, None)
@@ -234,10 +273,10 @@ class _Timed:
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         if report.when == "call" and report.passed:
-            self.seconds[report.nodeid] = round(time.process_time() - self._start, 4)
+            self.seconds[report.nodeid] = round(processor_s() - self._start, 4)
         elif report.failed:
             self.seconds.pop(report.nodeid, None)
-            self.left_out["fails in plain Python"] += 1
+            self.left_out["fails here"] += 1
         elif report.skipped and "takes too long for this" in str(report.longrepr):
             self._is_slow = True  # also those that share what took too long
 
@@ -247,11 +286,11 @@ def _function(test: str) -> str:
 
 
 @contextmanager
-def _limit(give_up: Callable[[], None]) -> Iterator[None]:
+def _limit(give_up: Callable[[], None], slow_s: float) -> Iterator[None]:
     """Give up what runs inside after so many seconds of processor, or a good while of waiting for other
     processes; and again and again, as whoever was at work may not have let go.
     """
-    clocks = {signal.SIGPROF: (signal.ITIMER_PROF, SLOW_S), signal.SIGALRM: (signal.ITIMER_REAL, 10 * SLOW_S)}
+    clocks = {signal.SIGPROF: (signal.ITIMER_PROF, slow_s), signal.SIGALRM: (signal.ITIMER_REAL, WAITS_S)}
 
     def over(number: int, frame: FrameType | None) -> None:
         if frame and "coverage" in frame.f_code.co_filename:  # it holds a lock

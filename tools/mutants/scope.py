@@ -1,7 +1,12 @@
 """Which modules mutants are made of, why not of the others, which tests reach each, what a seed draws."""
 
+import ast
 import hashlib
+import subprocess
 from collections import Counter
+from collections.abc import Sequence
+from functools import cache
+from itertools import chain, zip_longest
 from pathlib import Path
 
 import yaml
@@ -10,61 +15,97 @@ from tools.mutants.making import Mutant, mutants
 
 ROOT = Path(__file__).parents[2]
 PACKAGE = ROOT / "src" / "beaver_ftc"
+TESTS = ROOT / "tests"
 EQUIVALENT = Path(__file__).with_name("equivalent.yaml")
 
-# What computes, judges, counts and words.
-SCOPE = (
-    "design/*.py", "diagnosis/**/*.py", "control/**/*.py", "studies/engine/statistics.py",
-    "studies/*/summary.py", "studies/*/tally.py", "studies/*/text.py", "studies/*/words.py",
-    "studies/*/levels.py", "studies/*/limit.py", "results/expectations.py", "results/metrics.py",
-    "results/verdict.py", "scenario/signals.py", "scenario/table.py", "scenario/warnings.py",
-)  # fmt: skip
-# Why the other modules of a folder are not in the scope. A folder without a reason is a mistake.
+KERNELS, GLUE = "kernels", "glue"
+# How tests run: kernels in plain Python, since to compile each mutant would take all day; or compiled, once
+# for all, where no source of a kernel changes.
+PLAIN, COMPILED = "plain", "compiled"
+MODES = {KERNELS: (PLAIN,), GLUE: (PLAIN, COMPILED)}
+
+# Compiled modules that plain Python reaches in a second.
+QUICK = ("design", "diagnosis", "control")
+COMPILERS = ("compiled.py", "translation.py", "elsewhere.py")
 LEFT_OUT = {
-    "": "compile, find folders, register plug-ins",
-    "documents": "reads files and says what is wrong in them",
-    "aircraft": "declares the fields of a file and reads it",
-    "scenario": "the other modules declare the fields of a file, read and write it",
-    "plant": "flies JSBSim, partly by compiled code through ctypes: plain Python does not reach it",
-    "loop": "joins what flies: a test of it flies, for minutes in plain Python",
-    "flights": "fits and filters recordings, row by row: minutes in plain Python",
-    "results": "the other modules draw, and read and write files",
-    "studies": "the other modules fly, draw, write files and start processes",
-    "integrations": "a page, a server, and other people's frames around flights",
-    "cli": "reads arguments and prints",
+    "compile": "what compiles and keeps code: a mistake in it would be kept",
+    "fly": "compiled into the whole flight: plain Python takes minutes to reach it, a compiler half of one",
 }
-# Tests that reach a folder of the package: its own, and those of what stands on it.
-FOLDERS = {
-    "design": ("design", "diagnosis", "control"),
-    "diagnosis": ("diagnosis", "design"),
-    "control": ("control",),
-    "studies": ("studies",),
-    "results": ("results",),
-    "scenario": ("scenario",),
-}
+
+
+def kind(file: Path) -> str:
+    """KERNELS, GLUE, or why no mutants are made of a module (a key of LEFT_OUT)."""
+    inside = file.relative_to(PACKAGE)
+    if inside.as_posix() in COMPILERS:
+        return "compile"
+    if file not in _compiled(PACKAGE):
+        return GLUE
+    return KERNELS if _is_quick(file) else "fly"
+
+
+def _is_quick(file: Path) -> bool:
+    return any(file.is_relative_to(PACKAGE / folder) for folder in QUICK)
+
+
+@cache
+def _compiled(package: Path) -> frozenset[Path]:
+    """The modules with kernels, and those whose constants they have in them."""
+    found = {file for file in package.rglob("*.py") if "beaver_ftc.compiled" in _imports(file)}
+    due = list(found)
+    while due:
+        for module, names in _imports(due.pop()).items():
+            file = (package.parent / module.replace(".", "/")).with_suffix(".py")
+            constants = any(name.lstrip("_").isupper() for name in names)
+            if constants and _is_quick(file) and file not in found and file.exists():
+                found.add(file)
+                due.append(file)
+    return frozenset(found)
+
+
+def _imports(file: Path) -> dict[str, list[str]]:
+    """{module: names} of what a module imports from others."""
+    nodes = (node for node in ast.walk(_tree(file)) if isinstance(node, ast.ImportFrom))
+    return {node.module or "": [alias.name for alias in node.names] for node in nodes}
 
 
 def left_out() -> list[str]:
-    """A line a folder: how many modules are not in the scope, and why."""
-    within = {file for pattern in SCOPE for file in PACKAGE.glob(pattern)}
-    others = Counter(
-        file.relative_to(PACKAGE).parts[0] if file.parent != PACKAGE else ""
-        for file in PACKAGE.rglob("*.py")
-        if file not in within and file.name != "__init__.py"
-    )
-    return [f"{folder or '.'} ({number} modules): {LEFT_OUT[folder]}" for folder, number in others.items()]
+    """A line a reason: how many modules no mutants are made of, and why."""
+    kinds = Counter(kind(file) for file in PACKAGE.rglob("*.py"))
+    return [f"{kinds[reason]} modules: {text}" for reason, text in LEFT_OUT.items() if kinds[reason]]
 
 
-def drawn(seed: int, patterns: tuple[str, ...]) -> tuple[list[Mutant], int]:
-    """The mutants of a seed, those listed as equivalent left out, and how many these are.
+def tests(mode: str) -> list[Path]:
+    """The test files of a mode: those that `make test` runs in plain Python, or all others."""
+    plain = {
+        file for entry in _plain() for file in ([entry] if entry.is_file() else entry.rglob("test_*.py"))
+    }
+    if mode == PLAIN:
+        return sorted(plain)
+    return sorted(set(TESTS.rglob("test_*.py")) - plain - set((TESTS / "acceptance").rglob("*.py")))
 
-    The order depends on each mutant alone: a change elsewhere in the package changes nothing in it.
+
+@cache
+def _plain() -> list[Path]:
+    asked = ["make", "--silent", "plain"]
+    done = subprocess.run(asked, capture_output=True, text=True, check=True, cwd=ROOT)
+    return [ROOT / name for name in done.stdout.split()]
+
+
+def drawn(seed: int, patterns: Sequence[str]) -> tuple[list[tuple[str, Mutant]], Counter[str]]:
+    """(kind, mutant) of a seed, one of the kernels and one of the glue by turns; how many there are of each.
+
+    The order depends on each mutant alone: a change elsewhere in the package changes nothing in it. Those
+    listed as equivalent are left out.
     """
-    files = sorted({file for pattern in patterns for file in PACKAGE.glob(pattern)})
-    every = [mutant for file in files for mutant in mutants(file)]
-    every.sort(key=lambda mutant: hashlib.sha256(f"{seed} {mutant.name(PACKAGE)}".encode()).digest())
     known = equivalent()
-    return [m for m in every if m.name(PACKAGE) not in known], len(known)
+    files = sorted({file for pattern in patterns for file in PACKAGE.glob(pattern)})
+    every: dict[str, list[Mutant]] = {KERNELS: [], GLUE: []}
+    for file in files:
+        every.get(kind(file), []).extend(m for m in mutants(file) if m.name(PACKAGE) not in known)
+    for found in every.values():
+        found.sort(key=lambda mutant: hashlib.sha256(f"{seed} {mutant.name(PACKAGE)}".encode()).digest())
+    turns = zip_longest(*([(of, mutant) for mutant in found] for of, found in every.items()))
+    return [pair for pair in chain(*turns) if pair], Counter({of: len(found) for of, found in every.items()})
 
 
 def equivalent() -> set[str]:
@@ -79,3 +120,14 @@ def stale() -> list[str]:
     files = {PACKAGE / name.split(":")[0] for name in known}
     there = {mutant.name(PACKAGE) for file in files if file.exists() for mutant in mutants(file)}
     return sorted(known - there)
+
+
+def runs_at_import(file: Path, line: int) -> bool:
+    """Whether a line is in no function: whoever uses the module uses what it did."""
+    functions = (node for node in ast.walk(_tree(file)) if isinstance(node, ast.FunctionDef))
+    return not any(node.body[0].lineno <= line <= (node.end_lineno or 0) for node in functions)
+
+
+@cache
+def _tree(file: Path) -> ast.Module:
+    return ast.parse(file.read_text())

@@ -1,68 +1,125 @@
-"""One mutant on trial: a process in which it stands in for the true module, and the tests that reach it."""
+"""One mutant on trial: a package in which it stands in for the true module, and the tests that reach it."""
 
-import ast
 import contextlib
-import importlib.abc
-import importlib.util
 import os
 import signal
 import sys
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
 
+import numba
 import pytest
 
 from tools.mutants.making import Mutant
-from tools.mutants.scope import ROOT
+from tools.mutants.scope import COMPILED, PACKAGE, PLAIN, ROOT
 
-BUDGET_S = 6.0  # of tests for one mutant, by what they take with the true module
-ENDLESS_S, ENDLESS = 20.0, 10.0  # of processor, and times what the tests take with the true module: it hangs
+BUDGET_S = {PLAIN: 6.0, COMPILED: 20.0}  # of tests for one mutant, by what they take with the true module
+ENDLESS_S, ENDLESS = 30.0, 3.0  # of processor, and times what the tests take with the true module: it hangs
 
 SURVIVED, KILLED, HANGS, UNREACHED = "LIVES", "killed", "hangs", "NO TEST"
 
 
-def outcome(mutant: Mutant, tests: list[str], seconds: dict[str, float]) -> str:
-    """KILLED if one of the tests fails with the mutant, and passes, alone, with the true module."""
-    tests = _chosen(tests, seconds)
+def outcome(mutant: Mutant, tests: dict[str, dict[str, float]]) -> str:
+    """KILLED if a test fails with the mutant, and passes, alone, with the true module.
+
+    tests: of each mode the seconds that those take which reach it.
+    """
+    ends = [UNREACHED]
+    for mode, seconds in tests.items():
+        ends.append(_outcome(mutant, mode, seconds))
+        if ends[-1] in (KILLED, HANGS):
+            return ends[-1]
+    return SURVIVED if SURVIVED in ends else UNREACHED
+
+
+def _outcome(mutant: Mutant, mode: str, seconds: dict[str, float]) -> str:
+    tests = _chosen(mutant.file, seconds, BUDGET_S[mode])
     while tests:
         limit_s = ENDLESS_S + ENDLESS * sum(seconds[test] for test in tests)
         with tempfile.NamedTemporaryFile("r") as note:
-            ended = _run(mutant.file, mutant.source(), tests, Path(note.name), limit_s)
+            ended = _run(mode, mutant.file, mutant.source(), tests, Path(note.name), limit_s)
             failed = note.read().strip()
-        if ended != KILLED or _is_sound(mutant.file, failed):
+        if ended != KILLED or _is_sound(mode, failed):
             return ended
         tests.remove(failed)
     return UNREACHED
 
 
-def _chosen(tests: list[str], seconds: dict[str, float]) -> list[str]:
-    """The quickest tests first, as many as the budget allows."""
+def _chosen(file: Path, seconds: dict[str, float], budget_s: float) -> list[str]:
+    """As many as the budget allows: those of the module's own folder first, and the quickest of them."""
+    own = f"tests/{file.relative_to(PACKAGE).parent.as_posix()}/"
     taken, spent = [], 0.0
-    for test in sorted(tests, key=seconds.__getitem__):
+    for test in sorted(seconds, key=lambda test: (not test.startswith(own), seconds[test])):
         spent += seconds[test]
-        if spent > BUDGET_S and taken:
+        if spent > budget_s and taken:
             break
         taken.append(test)
     return taken
 
 
 @cache
-def _is_sound(file: Path, test: str) -> bool:
-    """Whether a test passes alone with the true module, put in place as a mutant is."""
+def _is_sound(mode: str, test: str) -> bool:
+    """Whether a test passes alone with the true package, put in place as one with a mutant is."""
     if not test:
         return True  # none was run: the mutant cannot be imported
-    true = ast.unparse(ast.parse(file.read_text()))
-    return _run(file, true, [test], Path(os.devnull), 1000.0) == SURVIVED
+    true = PACKAGE / "__init__.py"
+    return _run(mode, true, true.read_text(), [test], Path(os.devnull), 1000.0) == SURVIVED
 
 
-def _run(file: Path, source: str, tests: list[str], note: Path, limit_s: float) -> str:
+def _run(mode: str, file: Path, source: str, tests: list[str], note: Path, limit_s: float) -> str:
     def tried() -> int:
-        return pytest_quietly(["-x", *tests], [_Instead(file, source), _Note(note)])
+        turn_to(mode)
+        return pytest_quietly(["-x", *tests], [_Note(note)])
 
-    return in_a_child(tried, limit_s)
+    with _instead(file, source):
+        return in_a_child(tried, limit_s)
+
+
+@contextlib.contextmanager
+def _instead(file: Path, source: str) -> Iterator[None]:
+    """A package of links to the true one but for one file comes first, for what tests start as well."""
+    with tempfile.TemporaryDirectory() as folder:
+        package = Path(folder) / "src" / PACKAGE.name
+        package.mkdir(parents=True)
+        for true in PACKAGE.rglob("*"):
+            place = package / true.relative_to(PACKAGE)
+            if true.is_dir() and true.name != "__pycache__":
+                place.mkdir()
+            elif true.parent.name != "__pycache__":
+                place.symlink_to(true)  # what Python keeps of its modules as well: it is read alone
+        for data in ("aircraft", "scenarios"):
+            (Path(folder) / data).symlink_to(ROOT / data)
+        mutant = package / file.relative_to(PACKAGE)
+        mutant.unlink()
+        mutant.write_text(source)
+        with _first(str(package.parent)):
+            yield
+
+
+@contextlib.contextmanager
+def _first(folder: str) -> Iterator[None]:
+    before = os.environ.get("PYTHONPATH")
+    os.environ["PYTHONPATH"] = folder
+    sys.path.insert(0, folder)
+    try:
+        yield
+    finally:
+        sys.path.remove(folder)
+        os.environ.pop("PYTHONPATH") if before is None else os.environ.update(PYTHONPATH=before)
+
+
+def turn_to(mode: str) -> None:
+    """From now on this process, and those that it starts, compile kernels or do not."""
+    os.environ["NUMBA_DISABLE_JIT"] = "1" if mode == PLAIN else "0"
+    numba.config.reload_config()
+
+
+def processor_s() -> float:
+    """What this process has taken, and those that it has started."""
+    return sum(os.times()[:4])
 
 
 def in_a_child(work: Callable[[], int], limit_s: float) -> str:
@@ -75,7 +132,7 @@ def in_a_child(work: Callable[[], int], limit_s: float) -> str:
         os.setpgid(0, 0)  # a group of its own
         _work(work, limit_s)  # does not return
     try:
-        return _end(child, 20 * limit_s)
+        return _end(child, 5 * limit_s)
     finally:
         with contextlib.suppress(ProcessLookupError):
             os.killpg(child, signal.SIGKILL)
@@ -110,6 +167,8 @@ def pytest_quietly(arguments: list[str], plugins: list) -> int:
     """Run tests as a child of this does: without a word, and without what earlier ones have found."""
     with tempfile.TemporaryDirectory() as scratch, open(os.devnull, "w") as nowhere:
         os.environ["HYPOTHESIS_STORAGE_DIRECTORY"] = scratch
+        os.environ["PYTHONDONTWRITEBYTECODE"] = "1"
+        sys.dont_write_bytecode = True
         os.chdir(ROOT)
         os.dup2(nowhere.fileno(), 1)
         os.dup2(nowhere.fileno(), 2)
@@ -126,34 +185,3 @@ class _Note:
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         if report.failed:
             self._file.write_text(report.nodeid)
-
-
-class _Instead(importlib.abc.MetaPathFinder, importlib.abc.SourceLoader):
-    """Finds one module, and gives the mutant's source for it."""
-
-    def __init__(self, file: Path, source: str) -> None:
-        self._file, self._source = file, source
-        self._name = ".".join(file.relative_to(ROOT / "src").with_suffix("").parts).removesuffix(".__init__")
-
-    def pytest_configure(self) -> None:
-        """Only now: pytest has just put its own finder, which knows this package as a plug-in, before all."""
-        sys.meta_path.insert(0, self)
-
-    def find_spec(self, name, path=None, target=None):
-        if name != self._name:
-            return None
-        package = [str(self._file.parent)] if self._file.name == "__init__.py" else None
-        spec = importlib.util.spec_from_file_location(
-            name, self._file, loader=self, submodule_search_locations=package
-        )
-        spec.cached = None
-        return spec
-
-    def get_filename(self, name):
-        return str(self._file)
-
-    def get_data(self, path):
-        return self._source.encode()
-
-    def path_stats(self, path):
-        raise OSError("never from a cache")

@@ -1,0 +1,17 @@
+"""Counts lines in every Python that a test starts, while it is found out what tests execute.
+
+Python loads it first, by PYTHONPATH (reach.py); the environment names the test.
+"""
+
+import atexit
+import os
+
+if "MUTANTS_TEST" in os.environ:
+    import coverage
+
+    _watch = coverage.Coverage(
+        data_file=os.environ["MUTANTS_LINES"], data_suffix=True, context=os.environ["MUTANTS_TEST"],
+        source_pkgs=["beaver_ftc"], config_file=False, messages=False,
+    )  # fmt: skip
+    _watch.start()
+    atexit.register(_watch.save)

@@ -172,6 +172,7 @@ class Loop:
         """Give aircraft and memory back for another flight: this one is over and not asked again."""
         if self._may_fly_again:
             self._may_fly_again = False
+            self.changing = None  # it refers back: only a collector would find the two
             give_back(self.plant)
             memory.give_back(self.frames)
             memory.give_back(self.log)

@@ -20,9 +20,12 @@ from beaver_ftc.loop.plugin_frame import measured_of
 from beaver_ftc.loop.steering import Steering
 from beaver_ftc.loop.summary import verdict_of
 from beaver_ftc.plant.adapter import UnknownProperty
+from beaver_ftc.plant.faults import is_there
 from beaver_ftc.plant.gust import GustSchedule
+from beaver_ftc.scenario.faults import MOST_FAULTS, place_of
 from beaver_ftc.scenario.given import fault_of, is_same_again
 from beaver_ftc.scenario.in_flight import aimed, blown, changed
+from beaver_ftc.scenario.names import UNANTICIPATED
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.sensor_faults import fault_name, sensors_there
 from beaver_ftc.scenario.signals import RAD_PER_DEG
@@ -34,7 +37,6 @@ if TYPE_CHECKING:
     from beaver_ftc.plant.adapter import Plant
 
 Vector = NDArray[np.float64]
-UNANTICIPATED = "unanticipated"
 
 
 class Stepping:
@@ -62,8 +64,12 @@ class Stepping:
         """
         if seed is not None:
             self._given = self._given.with_({"seed": seed})
-        self._loop.release()
+        self.release()
         self._make_ready()
+
+    def release(self) -> None:
+        """Give aircraft and memory back for another flight: this one is over and not asked again."""
+        self._loop.release()
 
     def _make_ready(self) -> None:
         self._scenario, self._faults = self._given, self._given.faults
@@ -177,8 +183,11 @@ class Stepping:
         """
         with asked(self._loop.aircraft):
             new = fault_of(fault, self._now_s)
-        if not any(is_same_again(new, known) for known in self._faults):
-            self._declare((*self._faults, new))
+        if any(is_same_again(new, known) for known in self._faults):
+            return
+        if len(self._faults) >= MOST_FAULTS:
+            raise BadInput(f"faults: this flight has had {MOST_FAULTS}, allowed: a new flight, or fewer")
+        self._declare((*self._faults, new))
 
     def repair(self, actuator: str | None = None) -> None:
         """End now what is wrong with a surface, a sensor, the aerodynamics (`unanticipated`), or anything.
@@ -191,6 +200,11 @@ class Stepping:
         if actuator is not None and actuator not in names:
             raise BadInput(f"actuator: {actuator!r:.60} is not known{suggestion(str(actuator), names)}")
         self._declare(tuple(self._repaired(fault, actuator) for fault in self._faults))
+
+    @property
+    def in_force(self) -> tuple[Any, ...]:
+        """The faults that are there in the next frame: begun, and neither repaired nor over."""
+        return tuple(fault for fault in self._faults if is_there(fault, self._next, self.rate_hz))
 
     def blow(self, gust: Mapping[str, Any]) -> None:
         """Set a gust off now, from the next frame on: as one of `environment.gust`, without `at_s`.
@@ -319,12 +333,8 @@ class Stepping:
         self._turn_at = self._next
 
     def _repaired(self, fault: Any, actuator: str | None) -> Any:
-        place = getattr(fault, "sensor", getattr(fault, "actuator", UNANTICIPATED))
-        now_s = self._now_s
-        begun, over = fault.at_s <= now_s, fault.end_s is not None and fault.end_s <= now_s
-        if not begun or over or actuator not in (None, place):
-            return fault
-        return fault.model_copy(update={"end_s": now_s})
+        ends = actuator in (None, place_of(fault)) and is_there(fault, self._next, self.rate_hz)
+        return fault.model_copy(update={"end_s": self._now_s}) if ends else fault
 
     def _take_command(self, deflections: Vector | None) -> None:
         """Command the surfaces in the law's place, from the frame just flown on; None gives them back."""

@@ -95,6 +95,12 @@ def frame_of(time_s: float, rate_hz: float) -> int:
     return ceil((time_s - TIME_TOLERANCE_S) * rate_hz)
 
 
+def is_there(fault: Any, k: int, rate_hz: float) -> bool:
+    """Whether a fault is in force in frame k: begun, and neither repaired nor over."""
+    begun = frame_of(fault.at_s, rate_hz) <= k
+    return begun and (fault.end_s is None or frame_of(fault.end_s, rate_hz) > k)
+
+
 @dataclass
 class _Event:
     """One fault as frames: in force from `first` to before `last`, still growing before `grown`."""

@@ -5,8 +5,10 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Discriminator, Field, Tag, model_validator
 
 from beaver_ftc.documents.base import Conflict, Number, Section, number, order_conflicts, refuse
-from beaver_ftc.scenario.names import Actuator
+from beaver_ftc.scenario.names import UNANTICIPATED, Actuator
 from beaver_ftc.scenario.sensor_faults import AnySensorFault, SensorFault
+
+MOST_FAULTS = 1000  # of one flight: an hour of breaking and repairing by hand has room
 
 
 class _Fault(Section):
@@ -124,6 +126,11 @@ SurfaceFault = Annotated[
     LossOfEffectiveness | Stuck | Hardover | Float | Bias | RateLimit | Oscillatory | Unanticipated,
     Field(discriminator="type"),
 ]
+
+
+def place_of(fault: Any) -> str:
+    """What a fault is of: a surface, a sensor, or the aerodynamics (`unanticipated`)."""
+    return str(getattr(fault, "sensor", getattr(fault, "actuator", UNANTICIPATED)))
 
 
 def of_a_sensor(fault: Any) -> bool:

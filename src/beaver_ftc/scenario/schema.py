@@ -25,7 +25,7 @@ from beaver_ftc.scenario.consistency import DURATION_S, RATE_HZ, Outline, confli
 from beaver_ftc.scenario.control import ControlConfig
 from beaver_ftc.scenario.diagnosis import FdiConfig
 from beaver_ftc.scenario.environment import Environment
-from beaver_ftc.scenario.faults import Fault
+from beaver_ftc.scenario.faults import MOST_FAULTS, Fault
 from beaver_ftc.scenario.initial import Initial, default_initial, given_initial, initial_schema
 from beaver_ftc.scenario.names import Ratio, Ratios, folder_of, known_aircraft, nameable
 from beaver_ftc.scenario.sensors import Sensors
@@ -253,7 +253,7 @@ class Scenario(Section):
     autopilot: Autopilot | None = Field(
         default=None, description="the flight path to fly, on top of the reference; left out: no outer loops"
     )
-    faults: tuple[Fault, ...] = Field(default=(), max_length=100, description="what breaks, and when")
+    faults: tuple[Fault, ...] = Field(default=(), max_length=MOST_FAULTS, description="what breaks, and when")
     uncertainty: Uncertainty = Field(
         default_factory=Uncertainty, description="how the truth differs from the design model"
     )

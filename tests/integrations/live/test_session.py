@@ -1,6 +1,8 @@
 """The flight behind the page: it breaks, is diagnosed, saved, and flies again to the bit."""
 
+import gc
 import json
+import tracemalloc
 
 import numpy as np
 import pytest
@@ -8,7 +10,8 @@ import pytest
 import beaver_ftc as bf
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.integrations.live import messages
-from beaver_ftc.integrations.live.session import Session, encode, level_turn
+from beaver_ftc.integrations.live.session import Session, level_turn
+from beaver_ftc.integrations.live.telling import encode
 
 LOSS = {"type": "loss_of_effectiveness", "actuator": "elevator", "magnitude": 0.4}
 
@@ -36,11 +39,12 @@ def told(session, kind):
 def test_a_loss_is_detected_named_and_told(session):
     flown(session, 300)
     asked(session, do="break", fault=LOSS)
-    flown(session, 200)
+    flown(session, 500)
     frame = session.frame()
     assert (frame["axis"], frame["isolated"], frame["mode"]) == ("q", "elevator", "reallocated")
     assert frame["estimate"] == pytest.approx(-0.4, abs=0.05)
-    assert [event["kind"] for event in session.events][:4] == ["flight", "broken", "alarm", "named"]
+    kinds = [event["kind"] for event in session.events if event["kind"] != "candidates"]
+    assert kinds[:4] == ["flight", "broken", "alarm", "named"]
     truth = dict(zip(session.surfaces, frame["effectiveness"], strict=True))
     assert truth == {"aileron": 1.0, "elevator": 0.6, "rudder": 1.0, "flap": 1.0}
     asked(session, do="repair", actuator="elevator")
@@ -110,7 +114,7 @@ def test_law_diagnosis_and_sensors_are_changed_in_flight_and_fly_again_to_the_bi
         "scheme": "adaptive-estimators",
         "sensors": "tactical-grade",
     }
-    flown(session, 150)
+    flown(session, 350)
     assert session.frame()["isolated"] == "elevator"  # found again
     assert len(told(session, "changed")) == 2
     with pytest.raises(BadInput, match="unknown law"):
@@ -143,6 +147,203 @@ def test_a_sensor_is_broken_named_and_looked_at_anew_and_flies_again_to_the_bit(
     (folder,) = tmp_path.iterdir()
     log = session.sim.log
     assert np.array_equal(log.to_numpy(), bf.fly(folder / "scenario.yaml").log.to_numpy(), equal_nan=True)
+
+
+def by_surface(session, values):
+    return dict(zip(session.surfaces, values, strict=True))
+
+
+def test_what_breaks_later_is_not_broken_from_the_start(tmp_path):
+    """The scenario's own faults, at 0.2 s and from 0.3 to 0.5 s: each is shown while it is there."""
+    jam = {"type": "stuck", "actuator": "rudder", "at_s": 0.3, "end_s": 0.5}
+    faults = [{**LOSS, "at_s": 0.2}, jam, {"type": "bias", "sensor": "q", "magnitude": 1, "at_s": 9.0}]
+    session = Session(bf.load({"name": "later", "faults": faults}), tmp_path)
+    seen = {}
+    while session.sim.t_s < 0.6:
+        now = {fault["type"] for fault in session.state()["faults"]}
+        seen.setdefault(tuple(session.state()["broken"]), session.sim.frames)
+        assert len(now) == len(session.state()["broken"])
+        flown(session, 1)
+    assert seen == {(): 2, ("elevator",): 20, ("elevator", "rudder"): 30}
+    assert session.state()["broken"] == ["elevator"]
+    own = [(event["t"], event["kind"], event["says"]) for event in session.events][1:]
+    assert own[:2] == [
+        (0.2, "broken", "elevator: loss of effectiveness (magnitude 0.4)"),
+        (0.3, "broken", "rudder: stuck"),
+    ]
+    assert (0.5, "repaired", "rudder: stuck") in own
+
+
+def test_repair_all_leaves_nothing_broken(session):
+    for fault in (
+        LOSS,
+        {"type": "stuck", "actuator": "rudder"},
+        {"type": "noise", "sensor": "p", "magnitude": 1},
+    ):
+        asked(session, do="break", fault=fault)
+    flown(session, 5)
+    assert session.state()["broken"] == ["elevator", "p", "rudder"]
+    assert {fault["type"] for fault in session.state()["faults"]} == {
+        "loss_of_effectiveness", "stuck", "noise"
+    }  # fmt: skip
+    asked(session, do="repair", actuator="rudder")
+    assert session.state()["broken"] == ["elevator", "p"]
+    asked(session, do="repair")
+    assert (session.state()["broken"], session.state()["faults"]) == ([], [])
+    flown(session, 2)
+    assert session.frame()["effectiveness"] == [1.0] * 4
+    assert [event["says"] for event in told(session, "repaired")] == ["rudder", "everything"]
+
+
+@pytest.mark.parametrize(
+    ("fault", "left"),
+    [
+        ({"type": "stuck"}, 0.0),
+        ({"type": "float"}, 0.0),
+        ({"type": "hardover", "direction": -1}, 0.0),
+        ({"type": "loss_of_effectiveness", "magnitude": 0.25}, 0.75),
+        ({"type": "bias", "bias_deg": 2}, 1.0),
+    ],
+)
+def test_a_surface_that_does_not_follow_its_command_has_no_effectiveness(session, fault, left):
+    asked(session, do="break", fault={**fault, "actuator": "rudder"})
+    flown(session, 1)
+    expected = dict.fromkeys(session.surfaces, 1.0) | {"rudder": left}
+    assert by_surface(session, session.frame()["effectiveness"]) == expected
+
+
+@pytest.mark.parametrize(
+    ("given", "knows"),
+    [
+        ({}, "all"),
+        ({"fdi": {"fault_class": "published"}}, "published"),
+        ({"fdi": {"scheme": "rls-monitor"}}, "all"),
+    ],
+)
+def test_the_diagnosis_knows_what_can_be_broken_unless_told_otherwise(tmp_path, given, knows):
+    session = Session(bf.load({"name": "one", **given}), tmp_path)
+    says = {"all": "knows every fault type", "published": "knows partial loss alone"}
+    assert session.hello()["fault_class"] == knows
+    assert session.state()["knows"] == ("" if "scheme" in given.get("fdi", {}) else says[knows])
+    asked(session, do="fresh", scheme="adaptive-estimators")
+    assert session.state()["knows"] == says[knows]
+    asked(session, do="fresh", fault_class="published")
+    assert session.state()["knows"] == says["published"]
+    asked(session, do="change", scheme="none")
+    assert session.state()["knows"] == ""
+
+
+def test_a_jam_is_named_as_one(session):
+    flown(session, 300)
+    asked(session, do="break", fault={"type": "stuck", "actuator": "elevator"})
+    flown(session, 700)
+    frame = session.frame()
+    where = session.columns.index("elevator_effective_rad")
+    assert (frame["isolated"], frame["type"]) == ("elevator", "stuck")
+    assert frame["estimate"] == pytest.approx(frame["v"][where], abs=np.radians(0.2))
+
+
+# What is asked of a new flight, and what of its scenario is then other than the default.
+FRESH = {
+    "law": ("lqr", {"control.law": "lqr"}),
+    "scheme": ("none", {"fdi.scheme": "none"}),
+    "fault_class": ("published", {"fdi.fault_class": "published"}),
+    "sensors": ("tactical-grade", {"sensors.p.noise_std_deg_s": 0.02, "fdi.bounds.sensors.p.noise_std_deg_s": 0.02}),
+    "turbulence": ("light", {
+        "environment.turbulence": "dryden", "environment.severity": "light", "fdi.bounds.turbulence": "light",
+    }),
+    "autopilot": (True, {f"autopilot.{held}": 1 for held in ("altitude_m", "airspeed_mps", "heading_deg")}),
+}  # fmt: skip
+
+
+def value_at(scenario, key):
+    """At a dotted key; of a list its length."""
+    for part in key.split("."):
+        scenario = getattr(scenario, part)
+    return len(scenario) if isinstance(scenario, tuple) else scenario
+
+
+@pytest.mark.parametrize("key", FRESH)
+def test_a_new_flight_is_what_was_asked_for_and_declared(session, key):
+    value, expected = FRESH[key]
+    assert set(FRESH) == set(messages.Fresh.model_fields) - {"do", "n", "scenario"}
+    asked(session, do="fresh", **{key: value})
+    assert {place: value_at(session.scenario, place) for place in expected} == expected
+    again = session.scenario.with_({"name": "fault-free"})
+    asked(session, do="fresh")  # and stays so
+    assert session.scenario.with_({"name": "fault-free"}) == again
+
+
+def test_turbulence_that_is_asked_for_raises_no_alarm_and_can_be_ended(session):
+    asked(session, do="fresh", turbulence="moderate")
+    flown(session, 1500)
+    assert not session.frame()["detected"]
+    asked(session, do="fresh", turbulence="none")
+    given = session.scenario
+    assert (given.environment.turbulence, given.environment.severity) == ("none", None)
+    assert given.fdi.bounds.turbulence == "none"
+
+
+def test_the_score_goes_on_from_round_to_round(session):
+    for won in (1, 2):
+        asked(session, do="game", move="second")
+        flown(session, 20)
+        asked(session, do="break", fault={"type": "bias", "actuator": "rudder", "bias_deg": 0.01})
+        flown(session, 20)
+        asked(session, do="game", move="answer", answer="rudder")
+        flown(session, 1005)
+        assert session.state()["game"]["score"] == [won, 0]
+        assert session.state()["game"]["winner"] == "you"
+
+
+def test_a_stick_left_is_centred_by_no_stick(session):
+    asked(session, do="stick", rates_deg_s=[5, 0, 0])
+    flown(session, 3)
+    assert session.frame()["stick"] == pytest.approx([np.radians(5), 0.0, 0.0])
+    asked(session, do="stick", rates_deg_s=[0, 0, 0])
+    flown(session, 1)
+    assert session.frame()["stick"] is None
+
+
+def test_what_broke_and_was_mended_a_hundred_times_and_more_flies_again(session, tmp_path):
+    for i in range(130):
+        surface = session.surfaces[i % 4]
+        asked(session, do="break", fault={"type": "bias", "actuator": surface, "bias_deg": 0.5})
+        flown(session, 1)
+        asked(session, do="repair", actuator=surface)
+        flown(session, i % 2)
+    asked(session, do="save")
+    (folder,) = tmp_path.iterdir()
+    kept = bf.open_run(folder)
+    again = bf.fly(folder / "scenario.yaml")
+    assert len(bf.load(folder / "scenario.yaml").faults) == 130
+    assert np.array_equal(kept.log.to_numpy(), again.log.to_numpy(), equal_nan=True)
+
+
+def test_more_faults_than_a_scenario_holds_are_refused_in_words(session, monkeypatch):
+    monkeypatch.setattr("beaver_ftc.loop.simulation.MOST_FAULTS", 3)
+    for _ in range(3):
+        asked(session, do="break", fault=LOSS)
+    with pytest.raises(BadInput, match="this flight has had 3, allowed: a new flight"):
+        asked(session, do="break", fault=LOSS)
+    assert len(session.state()["faults"]) == 3
+
+
+def test_a_new_flight_gives_back_the_memory_of_the_one_before(session):
+    """Changes of sensors tie a flight's parts together, so that only a collector would find it."""
+    gc.collect()
+    gc.disable()
+    tracemalloc.start()
+    try:
+        for _ in range(12):
+            asked(session, do="change", sensors="tactical-grade")
+            flown(session, 2)
+            asked(session, do="fresh")
+        grown, _ = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+        gc.enable()
+    assert grown < 4 * session.sim.values.nbytes * 8192  # the log of a flight in progress has 8192 rows
 
 
 def test_one_gust_at_a_time(session):

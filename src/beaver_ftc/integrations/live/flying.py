@@ -15,7 +15,8 @@ from typing import Any
 from beaver_ftc.documents.errors import BadInput, BeaverFtcError
 from beaver_ftc.integrations.live import messages
 from beaver_ftc.integrations.live.pace import Pace
-from beaver_ftc.integrations.live.session import NO_STICK, Session, encode
+from beaver_ftc.integrations.live.session import NO_STICK, Session
+from beaver_ftc.integrations.live.telling import encode
 from beaver_ftc.integrations.live.words import BAD_INPUT, EVERYONE
 
 STATE_EVERY = 15  # ticks

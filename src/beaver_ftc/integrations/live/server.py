@@ -1,7 +1,6 @@
 """The web side: the page, its files, and the websocket; nothing else can be reached."""
 
 import asyncio
-import contextlib
 import json
 from collections.abc import Callable
 from pathlib import Path
@@ -13,7 +12,7 @@ from starlette.responses import FileResponse, PlainTextResponse, RedirectRespons
 from starlette.routing import Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
-from starlette.websockets import WebSocket, WebSocketDisconnect
+from starlette.websockets import WebSocket
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.integrations.live import messages
@@ -22,6 +21,7 @@ from beaver_ftc.integrations.live.pages import Pages
 
 STATIC = Path(__file__).parent / "static"
 MAX_PAGES = 20
+UNSUPPORTED = 1003  # a websocket's status for a kind of data that is not taken
 REFUSED = 4403  # a websocket's status for "forbidden"
 
 HEADERS = {
@@ -115,9 +115,14 @@ async def _serve(websocket: WebSocket, gate: Gate, pages: Pages, ask: Ask) -> No
     sending = asyncio.create_task(page.send())
     ask(0, f"joined {page.number}")
     try:
-        with contextlib.suppress(WebSocketDisconnect):
-            while not sending.done():
-                _hear(await websocket.receive_text(), page.number, gate, pages, ask)
+        while not sending.done():
+            message = await websocket.receive()
+            if message["type"] == "websocket.disconnect":
+                break
+            if message.get("text") is None:  # a page of ours sends none such
+                await websocket.close(UNSUPPORTED, "a binary message, allowed: JSON as text")
+                break
+            _hear(message["text"], page.number, gate, pages, ask)
     finally:
         pages.remove(page)
         ask(0, f"left {page.number}")

@@ -1,10 +1,8 @@
 """The flight that the page shows: what is asked of it, what happens to it, and what is said of it."""
 
-import json
 from collections import deque
 from collections.abc import Callable
-from datetime import UTC, datetime
-from math import cos, isfinite, sin, tan
+from math import cos, sin, tan
 from pathlib import Path
 from typing import Any
 
@@ -14,18 +12,20 @@ import beaver_ftc as bf
 from beaver_ftc.aircraft import question
 from beaver_ftc.documents.errors import BadInput, suggestion
 from beaver_ftc.integrations.live import messages
+from beaver_ftc.integrations.live.fresh import HELD, as_live, changes_of
 from beaver_ftc.integrations.live.game import NOTHING, Game, hidden_faults
-from beaver_ftc.plugins import DETECTORS, LAWS, registered
+from beaver_ftc.integrations.live.telling import WHEN, in_words, short
+from beaver_ftc.loop.cockpit import IMMOVABLE
+from beaver_ftc.plugins import DETECTORS, LAWS, is_compiled, registered
 from beaver_ftc.results.log import SpooledLog
+from beaver_ftc.scenario.faults import place_of
 from beaver_ftc.scenario.sensor_faults import sensors_there
 
-LONGEST_S = 3600.0  # of one live flight: its log is 0.3 GB then
 EVENTS_KEPT = 400
 STICK_FRAMES = 10  # a coordinated turn is seen to so often
 TURN_STEP = np.radians(0.1)  # rad/s
 G_MPS2 = 9.80665
 ATTITUDE = ("phi_rad", "theta_rad", "airspeed_mps")
-HELD = ("altitude_m", "airspeed_mps", "heading_deg")  # by the autopilot that the page asks for
 NO_STICK = messages.Stick(do="stick", rates_deg_s=(0.0, 0.0, 0.0))
 GUST_S = {"rise_s": 0.5, "hold_s": 1.0, "fade_s": 0.5}
 PATIENCE_S = 10.0  # for the diagnosis, once you have spoken
@@ -46,12 +46,12 @@ class Session:
 
     def _begin(self, scenario: "bf.Scenario", faults: bool = True) -> None:
         """A new flight from trim. Raises BadInput, the old one going on, where it cannot be flown."""
-        stamp = datetime.now(UTC).strftime("%Y%m%d-%H%M%S-%f")[:-3]
-        changes: dict[str, Any] = {"name": f"live-{scenario.name[:60]}-{stamp}", "expect": {}}
-        changes["duration_s"] = LONGEST_S
-        flown = scenario.with_(changes if faults else {**changes, "faults": []})
+        flown = as_live(scenario if faults else scenario.with_({"faults": []}))
         sim = bf.Simulation(flown, log=SpooledLog())
         sim.step()
+        before: bf.Simulation | None = getattr(self, "sim", None)
+        if before is not None:
+            before.release()
         self._base, self.scenario, self.sim = scenario, flown, sim
         self.columns = sim.columns
         self.surfaces = tuple(c.removesuffix("_cmd_rad") for c in self.columns if c.endswith("_cmd_rad"))
@@ -63,9 +63,9 @@ class Session:
         self._gust_until_s = 0.0
         self._said: tuple[Any, ...] = (None, None, None, (), False)
         self._mode = sim.mode
-        self.broken = {
-            getattr(fault, "sensor", getattr(fault, "actuator", fault.type)) for fault in flown.faults
-        }
+        turns = {at_s for fault in flown.faults for at_s in (fault.at_s, fault.end_s) if at_s is not None}
+        self._turns_s = deque(sorted(turns))
+        self._known: tuple[Any, ...] = ()
         self._tell("flight", f"{scenario.name}: trimmed, {flown.control.law} law, {flown.fdi.scheme}")
 
     @property
@@ -80,9 +80,23 @@ class Session:
         if self.sim.frames % STICK_FRAMES == 0 or not self.stick.coordinated:
             self._flown_stick = self._rates_rad_s()
         self.sim.step(stick=self._flown_stick)
+        self._notice_faults()
         self._notice()
         if self.game.settle(PATIENCE_S, self.sim.t_s):
             self._tell("game", "the round is over")
+
+    def _notice_faults(self) -> None:
+        """Events: what breaks and ends by the scenario itself."""
+        if not self._turns_s or self.sim.t_s < self._turns_s[0]:
+            return
+        self._turns_s.popleft()
+        before, self._known = self._known, self.sim.in_force
+        for fault in self._known:
+            if fault not in before:
+                self._tell("broken", in_words(fault.model_dump(include=fault.model_fields_set)), secret=True)
+        for fault in before:
+            if fault not in self._known:
+                self._tell("repaired", f"{place_of(fault)}: {fault.type.replace('_', ' ')}", secret=True)
 
     def _notice(self) -> None:
         """Events: the alarm, the name, candidates, the supervisor's mode, the end."""
@@ -194,19 +208,17 @@ class Session:
     def _break(self, fault: dict[str, Any]) -> str:
         self._check_going_on()
         self.sim.inject(fault)
-        where = str(fault.get("sensor", fault.get("actuator", fault["type"])))
-        self.broken.add(where)
+        self._known = self.sim.in_force
         if self.game.hidden:
             self.game.broke(fault, self.sim.t_s)
-        sizes = ", ".join(f"{k} {v}" for k, v in fault.items() if k not in ("type", "actuator", "sensor"))
-        what = str(fault["type"]).replace("_", " ")
-        self._tell("broken", f"{where}: {what}" + (f" ({sizes})" if sizes else ""), secret=True)
-        return "" if self.game.hidden else f"{where} broken"
+        says = in_words(fault)
+        self._tell("broken", says, secret=True)
+        return "" if self.game.hidden else f"{says.partition(':')[0]} broken"
 
     def _repair(self, actuator: str | None) -> str:
         self._check_going_on()
         self.sim.repair(actuator)
-        self.broken -= {actuator} if actuator else set(self.broken)
+        self._known = self.sim.in_force
         self._tell("repaired", actuator or "everything", secret=True)
         return f"{actuator or 'everything'} repaired"
 
@@ -216,7 +228,7 @@ class Session:
 
     def _fresh(self, asked: messages.Fresh) -> str:
         base = self._scenario(asked.scenario)
-        changes = _changes(asked)
+        changes = changes_of(asked)
         self._begin(base.with_(changes) if changes else base)
         self.game.stop()
         return "new flight"
@@ -252,7 +264,7 @@ class Session:
     def frame(self) -> dict[str, Any]:
         """What the page draws, of the frame just flown."""
         sim, hidden = self.sim, self.game.hidden
-        values = [_short(value) for value in sim.values]
+        values = [short(value) for value in sim.values]
         for i in self._hidden if hidden else ():
             values[i] = None
         told: dict[str, Any] = {"k": "f", "v": values, "stick": self._flown_stick}
@@ -263,15 +275,32 @@ class Session:
         told["axis"], told["isolated"], told["type"] = verdict.axis, verdict.isolated, verdict.type
         told["candidates"], told["estimate"] = verdict.candidates, verdict.estimate
         told["mode"] = sim.mode
-        told["effectiveness"] = [_short(sim.read(f"failures/{s}/effectiveness")) for s in self.surfaces]
+        told["effectiveness"] = [short(self._effectiveness(surface)) for surface in self.surfaces]
         return told
+
+    def _effectiveness(self, surface: str) -> float:
+        """How much of its moment a surface gives for its command: none while it does not follow that."""
+        failures = f"failures/{surface}"
+        if any(self.sim.read(f"{failures}/{how}") for how in IMMOVABLE):
+            return 0.0
+        return self.sim.read(f"{failures}/effectiveness")
 
     def state(self) -> dict[str, Any]:
         """What changes seldom."""
-        broken = [] if self.game.hidden else sorted(map(str, self.broken))
+        there = () if self.game.hidden else self.sim.in_force
         gust = self.sim.t_s < self._gust_until_s
-        told = {"k": "s", "over": self.over, "broken": broken, "game": self.game.shown(), "gust": gust}
-        return told | {"flying": self.flying}
+        told = {"k": "s", "over": self.over, "game": self.game.shown(), "gust": gust, "flying": self.flying}
+        told["knows"] = self._knows
+        told["broken"] = sorted({place_of(fault) for fault in there})
+        return told | {"faults": [fault.model_dump(exclude=WHEN, exclude_none=True) for fault in there]}
+
+    @property
+    def _knows(self) -> str:
+        """Which faults the diagnosis in charge can name; empty of one that is not ours."""
+        if self.flying["scheme"] == "none" or not is_compiled(DETECTORS, self.flying["scheme"]):
+            return ""
+        every = self.scenario.fdi.fault_class == "all"
+        return "knows every fault type" if every else "knows partial loss alone"
 
     @property
     def _sensors(self) -> tuple[str, ...]:
@@ -301,34 +330,3 @@ def level_turn(phi_rad: float, theta_rad: float, airspeed_mps: float) -> Any:
     """Body rates (3,) rad/s of a coordinated level turn: psi' = g tan(phi) / V, seen in body axes."""
     turn = G_MPS2 * tan(phi_rad) / airspeed_mps
     return turn * np.array([-sin(theta_rad), sin(phi_rad) * cos(theta_rad), cos(phi_rad) * cos(theta_rad)])
-
-
-def _changes(asked: messages.Fresh) -> dict[str, Any]:
-    """Dotted keys of the scenario for what a new flight asks. Errors of the air and the sensors are declared
-    to the diagnosis as well: it is to live with them, not to be surprised."""
-    changes: dict[str, Any] = {}
-    for key, value in (("control.law", asked.law), ("fdi.scheme", asked.scheme)):
-        if value is not None:
-            changes[key] = value
-    if asked.fault_class is not None:
-        changes["fdi.fault_class"] = asked.fault_class
-    if asked.sensors is not None:
-        changes["sensors"] = changes["fdi.bounds.sensors"] = asked.sensors
-    if asked.autopilot is not None:
-        changes["autopilot"] = {channel: [{"hold": True}] for channel in HELD} if asked.autopilot else None
-    if asked.turbulence is not None:
-        still = asked.turbulence == "none"
-        changes["environment.turbulence"] = "none" if still else "dryden"
-        changes["environment.severity"] = None if still else asked.turbulence
-        changes["fdi.bounds.turbulence"] = asked.turbulence
-    return changes
-
-
-def encode(told: dict[str, Any]) -> bytes:
-    """One message to a page."""
-    return json.dumps(told, separators=(",", ":"), allow_nan=False).encode()
-
-
-def _short(value: float) -> float | None:
-    """Seven digits are enough to draw; what is not finite is none."""
-    return float(f"{value:.7g}") if isfinite(value) else None

@@ -14,32 +14,28 @@ const KINDS = [
   ["slow", { type: "rate_limit", scale: 0.05 }],
 ];
 const byId = (id) => document.getElementById(id);
-const active = new Map(); // surface -> Map of kind -> true, as far as this page did it
 
 export function perform(request) {
   return ask(request).then((says) => { if (says) notice(says); return says; }, (error) => { notice(error.message); });
 }
 
-async function toggle(surface, label, fault) {
-  const broken = active.get(surface) ?? new Set();
-  if (broken.has(label)) return repair(surface);
-  if (await perform({ do: "break", fault: { ...fault, actuator: surface } }) === undefined) return undefined;
-  active.set(surface, broken.add(label));
-  return drawBroken();
+const faultsOf = (surface) => (flight.state?.faults ?? []).filter((fault) => fault.actuator === surface);
+
+// Whether a surface is broken in just this way now, whoever broke it.
+function isThere(surface, kind) {
+  return faultsOf(surface).some((fault) => Object.entries(kind).every(([key, size]) => fault[key] === size));
 }
 
-export async function repair(surface = null) {
-  if (await perform({ do: "repair", actuator: surface }) === undefined) return;
-  if (surface) active.delete(surface); else active.clear();
-  drawBroken();
-}
+const toggle = (surface, kind) => (isThere(surface, kind) ? repair(surface) : perform({ do: "break", fault: { ...kind, actuator: surface } }));
+
+export const repair = (surface = null) => perform({ do: "repair", actuator: surface });
 
 function buttons(surface) {
   const made = KINDS.map(([label, fault]) => {
     const button = Object.assign(document.createElement("button"), { textContent: label, type: "button" });
     button.dataset.label = label;
     button.setAttribute("aria-label", `${surface}: ${label}`);
-    button.addEventListener("click", () => { closeMenu(); toggle(surface, label, fault); });
+    button.addEventListener("click", () => { closeMenu(); toggle(surface, fault); });
     return button;
   });
   const mend = Object.assign(document.createElement("button"), { textContent: "repair", type: "button" });
@@ -49,13 +45,12 @@ function buttons(surface) {
 }
 
 export function meetSurfaces(hello) {
-  active.clear();
   byId("sensor").replaceChildren(...hello.sensors.map((name) => new Option(name.replaceAll("_", " "), name)));
   byId("surfaces").replaceChildren(...hello.surfaces.map((surface, i) => {
     const group = document.createElement("fieldset");
     group.dataset.surface = surface;
     const title = Object.assign(document.createElement("legend"), { textContent: `${i + 1} ${surface}` });
-    title.append(Object.assign(document.createElement("em"), { textContent: " ✕ broken" }));
+    title.append(document.createElement("em"));
     group.append(title, ...buttons(surface));
     return group;
   }));
@@ -93,12 +88,10 @@ export function drawBroken() {
   drawLegend([...broken]);
   for (const group of byId("surfaces").children) {
     const surface = group.dataset.surface;
-    const hidden = flight.state?.game.phase === "waiting";
+    const says = broken.has(surface) ? ` ✕ broken: ${[...new Set(faultsOf(surface).map(({ type }) => type.replaceAll("_", " ")))].join(", ")}` : "";
     group.classList.toggle("broken", broken.has(surface));
-    group.querySelector("em").hidden = !broken.has(surface);
-    for (const button of group.querySelectorAll("[data-label]")) {
-      button.setAttribute("aria-pressed", !hidden && Boolean(active.get(surface)?.has(button.dataset.label)));
-    }
+    if (group.querySelector("em").textContent !== says) group.querySelector("em").textContent = says;
+    for (const [label, kind] of KINDS) group.querySelector(`[data-label="${label}"]`).setAttribute("aria-pressed", isThere(surface, kind));
   }
 }
 

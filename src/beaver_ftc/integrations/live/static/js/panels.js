@@ -1,6 +1,6 @@
 // What the diagnosis says, the events, and the tabs.
 
-import { flight, value } from "./state.js";
+import { DEG, flight, value } from "./state.js";
 
 const byId = (id) => document.getElementById(id);
 
@@ -15,6 +15,7 @@ export function drawDiagnosis() {
   alarm.classList.toggle("hidden", hidden);
   setText(alarm, hidden ? "hidden during the game" : on ? alarmText(frame) : "no alarm");
   setText(byId("verdict"), hidden ? "" : verdictText(frame));
+  setText(byId("knows"), flight.state?.knows ?? "");
   setText(byId("mode"), hidden ? "hidden" : frame.mode ?? "");
   drawCandidates(frame, hidden);
 }
@@ -25,10 +26,19 @@ function verdictText(frame) {
   if (!frame.detected) return "";
   if (!frame.isolated) return `${frame.candidates.length} could explain it`;
   if (frame.isolated === frame.type) return `Named: ${frame.isolated}, none of the known faults`;
-  const what = frame.type ? `, ${frame.type.replaceAll("_", " ")}` : "";
-  const loss = frame.type === "loss_of_effectiveness" && frame.estimate !== null && frame.estimate !== undefined;
-  return `Named: ${frame.isolated}${what}${loss ? ` of ${Math.round(-100 * frame.estimate)} %` : ""}`;
+  const kinds = (frame.type ? [frame.type] : frame.candidates).map((kind) => kind.replaceAll("_", " "));
+  const size = frame.estimate === null || frame.estimate === undefined ? "" : SIZES[frame.type]?.(frame.estimate) ?? "";
+  return `Named: ${frame.isolated}${kinds.length ? `, ${kinds.join(" or ")}` : ""}${size}`;
 }
+
+const inDegrees = (rad) => `${(rad * DEG).toFixed(1)} deg`;
+const SIZES = { // what the diagnosis makes of it
+  loss_of_effectiveness: (theta) => ` of ${Math.round(-100 * theta)} %`,
+  stuck: (rad) => ` at ${inDegrees(rad)}`,
+  hardover: (rad) => ` at ${inDegrees(rad)}`,
+  bias: (rad) => ` of ${inDegrees(rad)}`,
+  oscillatory: (rad) => ` by ${inDegrees(rad)}`,
+};
 
 function drawCandidates(frame, hidden) {
   const list = byId("candidates");

@@ -43,7 +43,7 @@ def test_a_loss_is_detected_named_and_told(session):
     frame = session.frame()
     assert (frame["axis"], frame["isolated"], frame["mode"]) == ("q", "elevator", "reallocated")
     assert frame["estimate"] == pytest.approx(-0.4, abs=0.05)
-    kinds = [event["kind"] for event in session.events if event["kind"] != "candidates"]
+    kinds = [event["kind"] for event in session.events if event["kind"] not in ("candidates", "supervisor")]
     assert kinds[:4] == ["flight", "broken", "alarm", "named"]
     truth = dict(zip(session.surfaces, frame["effectiveness"], strict=True))
     assert truth == {"aileron": 1.0, "elevator": 0.6, "rudder": 1.0, "flap": 1.0}
@@ -166,12 +166,12 @@ def test_what_breaks_later_is_not_broken_from_the_start(tmp_path):
         flown(session, 1)
     assert seen == {(): 2, ("elevator",): 20, ("elevator", "rudder"): 30}
     assert session.state()["broken"] == ["elevator"]
-    own = [(event["t"], event["kind"], event["says"]) for event in session.events][1:]
-    assert own[:2] == [
-        (0.2, "broken", "elevator: loss of effectiveness (magnitude 0.4)"),
-        (0.3, "broken", "rudder: stuck"),
+    own = [(event["t"], event["says"]) for event in session.events if event["kind"] in ("broken", "repaired")]
+    assert own == [
+        (0.2, "elevator: loss of effectiveness (magnitude 0.4)"),
+        (0.3, "rudder: stuck"),
+        (0.5, "rudder: stuck"),
     ]
-    assert (0.5, "repaired", "rudder: stuck") in own
 
 
 def test_repair_all_leaves_nothing_broken(session):
@@ -234,9 +234,9 @@ def test_the_diagnosis_knows_what_can_be_broken_unless_told_otherwise(tmp_path, 
 
 
 def test_a_jam_is_named_as_one(session):
-    flown(session, 300)
+    flown(session, 400)
     asked(session, do="break", fault={"type": "stuck", "actuator": "elevator"})
-    flown(session, 700)
+    flown(session, 900)
     frame = session.frame()
     where = session.columns.index("elevator_effective_rad")
     assert (frame["isolated"], frame["type"]) == ("elevator", "stuck")
@@ -248,7 +248,9 @@ FRESH = {
     "law": ("lqr", {"control.law": "lqr"}),
     "scheme": ("none", {"fdi.scheme": "none"}),
     "fault_class": ("published", {"fdi.fault_class": "published"}),
-    "sensors": ("tactical-grade", {"sensors.p.noise_std_deg_s": 0.02, "fdi.bounds.sensors.p.noise_std_deg_s": 0.02}),
+    "sensors": ("tactical-grade", {"sensors.p.noise_std_deg_s": 0.0208,
+        "fdi.bounds.sensors.p.noise_std_deg_s": 0.0208,
+    }),
     "turbulence": ("light", {
         "environment.turbulence": "dryden", "environment.severity": "light", "fdi.bounds.turbulence": "light",
     }),
@@ -343,7 +345,8 @@ def test_a_new_flight_gives_back_the_memory_of_the_one_before(session):
     finally:
         tracemalloc.stop()
         gc.enable()
-    assert grown < 4 * session.sim.values.nbytes * 8192  # the log of a flight in progress has 8192 rows
+    log = session.sim.values.nbytes * 8192  # of a flight in progress; some are kept for flights to come
+    assert grown < 6 * log
 
 
 def test_one_gust_at_a_time(session):

@@ -171,8 +171,7 @@ class Loop:
     def release(self) -> None:
         """Give aircraft and memory back for another flight: this one is over and not asked again."""
         if self._may_fly_again:
-            self._may_fly_again = False
-            self.changing = None  # it refers back: only a collector would find the two
+            self._may_fly_again, self.changing = False, None  # which refers back: a collector's work
             give_back(self.plant)
             memory.give_back(self.frames)
             memory.give_back(self.log)

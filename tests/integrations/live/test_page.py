@@ -18,7 +18,12 @@ ARGUMENTS = (  # as on a machine without a graphics card
     "--js-flags=--expose-gc",
 )  # fmt: skip
 WAIT_S, COMPILED_WITHIN_S = 60.0, 600.0
-SCREENS = {"laptop": (1280, 720), "small laptop": (1024, 640), "phone": (390, 844)}
+SCREENS = {
+    "laptop": (1280, 720),
+    "small laptop": (1024, 640),
+    "phone": (390, 844),
+    "phone sideways": (844, 390),
+}
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium on this machine")
 
@@ -127,7 +132,8 @@ def test_the_game_tells_nothing_before_the_answer(page):
     until(page, "cockpit.flight.state.game.phase === 'waiting' && cockpit.value('t_s') > 0.5")
     page.locator("#tab-break").click()
     break_elevator(page)
-    page.wait_for_timeout(1500)
+    broken_s = page.evaluate("cockpit.value('t_s')")
+    until(page, f"cockpit.value('t_s') > {broken_s} + 1.5")
     assert page.locator("#candidates .named, #candidates .out").count() == 0
     assert page.inner_text("#verdict") == ""
     assert page.evaluate("cockpit.value('elevator_effective_rad')") is None
@@ -258,6 +264,41 @@ def test_what_is_broken_is_said_without_colour(page):
     assert "broken" not in page.inner_text("fieldset[data-surface=rudder] legend")
 
 
+def test_a_fault_of_the_scenario_is_shown_while_it_is_there(page):
+    """It comes at 12 s: badge, frame and button say nothing before, and nothing once all is repaired."""
+    pressed = page.locator("#surfaces [aria-pressed=true]")
+    page.locator("#tab-flight").click()
+    met = page.evaluate("cockpit.flight.met")
+    page.locator("[name=scenario]").select_option("rudder-stuck")
+    page.locator("#fresh [type=submit]").click()
+    until(page, f"cockpit.flight.met > {met} && cockpit.value('t_s') > 0.5")
+    assert page.inner_text("#legend") == "click a surface to break it"
+    assert page.locator("fieldset.broken").count() == pressed.count() == 0
+    page.locator("#speed").select_option("20")
+    until(page, "cockpit.flight.state.broken.includes('rudder')")
+    page.locator("#speed").select_option("1")
+    assert page.evaluate("cockpit.value('t_s')") >= 12
+    until(page, "document.querySelector('#legend').textContent === '✕ broken: rudder'")
+    page.locator("#tab-break").click()
+    assert "broken: stuck" in page.inner_text("fieldset.broken legend")
+    assert [button.get_attribute("aria-label") for button in pressed.all()] == ["rudder: jam"]
+    assert page.evaluate("cockpit.flight.frame.effectiveness") == [1, 1, 0, 1]
+    page.locator("#repair-all").click()
+    until(page, "document.querySelector('#legend').textContent === 'click a surface to break it'")
+    assert page.locator("fieldset.broken").count() == pressed.count() == 0
+    met = page.evaluate("cockpit.flight.met")
+    page.locator("#tab-flight").click()
+    page.locator("[name=scenario]").select_option("fault-free")
+    page.locator("#fresh [type=submit]").click()
+    until(page, f"cockpit.flight.met > {met} && cockpit.flight.hello.scenario === 'fault-free'")
+
+
+def test_the_page_says_which_faults_the_diagnosis_knows(page):
+    until(page, "document.querySelector('#knows').textContent === 'knows every fault type'")
+    page.locator("fieldset[data-surface=elevator] >> text=jam").click()
+    until(page, "/^Named: elevator, .*stuck/.test(document.querySelector('#verdict').textContent)")
+
+
 def test_everything_that_can_be_pressed_has_a_name(page):
     unnamed = page.evaluate(
         """[...document.querySelectorAll("button, select, input, canvas, [role=tab]")].filter((node) =>
@@ -267,12 +308,31 @@ def test_everything_that_can_be_pressed_has_a_name(page):
     assert unnamed == []
 
 
+# What is wider than its box, and which parts of the page lie upon one another.
+STICKS_OUT = """(name) => [...document.querySelectorAll(name)].filter((node) => {
+  const own = node.getBoundingClientRect(), box = node.closest("section").getBoundingClientRect();
+  return own.left < box.left - 1 || own.right > box.right + 1 || node.scrollWidth > node.clientWidth + 1;
+}).map((node) => node.textContent)"""
+OVERLAPPING = """(() => {
+  const nodes = [...document.querySelectorAll(
+    "#scene, #attitude, #numbers dd, .chart .plot, #diagnosis, #tabs, .panel:not([hidden])")];
+  const boxes = nodes.map((node) => node.getBoundingClientRect());
+  const over = (a, b) => Math.min(a.right, b.right) - Math.max(a.left, b.left) > 1
+    && Math.min(a.bottom, b.bottom) - Math.max(a.top, b.top) > 1;
+  const under = (a, i) => nodes.slice(0, i).filter((_, j) => over(a, boxes[j]));
+  return boxes.flatMap((a, i) => under(a, i).map((node) => [nodes[i].id, node.id]));
+})()"""
+
+
 @pytest.mark.parametrize("screen", SCREENS)
 def test_nothing_is_cut_off(page, screen):
     width, height = SCREENS[screen]
     page.set_viewport_size({"width": width, "height": height})
     page.wait_for_timeout(300)
     assert page.evaluate("document.documentElement.scrollWidth") <= width
+    for name in ("#numbers dd, #numbers dt", ".chart"):
+        assert page.evaluate(STICKS_OUT, name) == []
+    assert page.evaluate(OVERLAPPING) == []
     for name in ("#pause", "#save", "#scene", "#alarm", "#tab-events"):
         page.locator(name).scroll_into_view_if_needed()
         box = page.locator(name).bounding_box()

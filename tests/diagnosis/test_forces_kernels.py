@@ -5,11 +5,11 @@ import pytest
 from kernels import new_fdi
 
 from beaver_ftc.aircraft import load
-from beaver_ftc.aircraft.aircraft import FORCES
+from beaver_ftc.aircraft.aircraft import FORCES, Aircraft
 from beaver_ftc.aircraft.schema import SIDESLIP_RATE
 from beaver_ftc.design.terms import fill_table
 from beaver_ftc.diagnosis import across, forces
-from beaver_ftc.diagnosis.forces import ASIDE, UP, look, set_up_forces
+from beaver_ftc.diagnosis.forces import ASIDE, UP, look, set_up_forces, tell_apart
 from beaver_ftc.diagnosis.state import AN_AXIS, NORMAL, PITCH, ROLL, SIDE, THE_VANE, YAW
 from beaver_ftc.diagnosis.tones import set_up_listening
 from beaver_ftc.diagnosis.views import set_up_views
@@ -595,3 +595,39 @@ def test_in_moving_air_the_vanes_are_asked_but_for_the_rolling_gust(viewed):
         set_up_views(viewed["statistical"], AIRCRAFT)
         cleared_by = viewed["statistical"]["views"]["cleared_by"][:5].tolist()
         assert cleared_by == [moving * NORMAL, 0, moving * SIDE, moving * SIDE, 0]
+
+
+def without_force(coefficient, surface):
+    """The aircraft without what this surface does to this force."""
+    own = getattr(AIRCRAFT.file.forces, coefficient)
+    rest = tuple(term for term in own if term.surface != surface)
+    assert len(rest) < len(own)
+    changed = AIRCRAFT.file.forces.model_copy(update={coefficient: rest})
+    return Aircraft(AIRCRAFT.file.model_copy(update={"forces": changed}), AIRCRAFT.folder)
+
+
+UP_VIEWS = [(ELEVATOR, (PITCH, NORMAL)), (FLAP, (PITCH, NORMAL)), (THE_VANE, (PITCH, NORMAL)),
+            (AN_AXIS, (PITCH, NORMAL))]  # fmt: skip
+SIDE_VIEWS = [(0, (ROLL, SIDE)), (2, (YAW, SIDE)), (THE_VANE, (YAW, SIDE)), (AN_AXIS, (YAW, SIDE))]
+
+
+@pytest.mark.parametrize(
+    ("aircraft", "expected", "asked"),
+    [
+        (AIRCRAFT, UP_VIEWS + SIDE_VIEWS, True),
+        (without_force("CZ", "flap"), SIDE_VIEWS, False),
+        (without_force("CY", "aileron"), UP_VIEWS, False),
+    ],
+)
+def test_an_aircraft_told_apart_in_one_plane_only_has_the_views_of_that_plane(aircraft, expected, asked):
+    """And no vane is asked in moving air: none looks at both planes."""
+    fdi = felt()
+    statistical = fdi["statistical"]
+    statistical["air"]["moving"] = 1
+    set_up_views(statistical, aircraft)
+    views = statistical["views"][: statistical["n_views"]]
+    found = [(int(view["surface"]), tuple(view["plane"].tolist())) for view in views[5:]]
+    assert found == expected
+    asking = [asked and view in (0, 2, 3) for view in range(5)]  # pitch, yaw, and past the aileron
+    assert [bool(view["cleared_by"]) for view in views[:5]] == asking
+    assert tell_apart(aircraft)

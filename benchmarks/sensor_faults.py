@@ -1,14 +1,21 @@
 """Random faults of instruments, flown: what the diagnosis makes of each, by sensor and by type of fault.
 
     python benchmarks/sensor_faults.py --flights 500 --seed 1
+    python benchmarks/sensor_faults.py --flights 500 --seed 1 --sound
 
 Every flight has one broken instrument, its own rate (20 to 200 Hz), JSBSim frames per frame, airspeed,
 references, fault class and law, and every second one the statistical detector. `surface` counts a flight in
 which a surface was named at any time, also for one frame; `healthy` flies the same without a fault, all
 instruments watched.
+
+With --sound no instrument breaks. Each has errors of its own, as large as declared, at 20 to 500 Hz and 1 to
+10 JSBSim frames per frame, in hard manoeuvres, wind and turbulence, while law, diagnosis and sensors are
+changed, in every third flight with a broken surface. Each scenario with an alarm between the instruments, or
+with any but no fault, is printed: `beaver-ftc run` flies it.
 """
 
 import argparse
+import json
 from collections import Counter
 from collections.abc import Iterator
 from typing import Any
@@ -18,6 +25,7 @@ import numpy as np
 from beaver_ftc.diagnosis.instrument_words import instrument_found
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.scenario.given import load
+from beaver_ftc.scenario.sensors import PRESETS, Sensors
 
 TYPES = ("bias", "freeze", "noise", "scale", "lost")
 SIZES = {
@@ -96,6 +104,133 @@ def flights(count: int, seed: int, bounds: str, turbulent: bool) -> Iterator[dic
         yield draw(np.random.default_rng([seed, i]), bounds, turbulent)
 
 
+def errors(rng: np.random.Generator) -> Any:
+    """Errors of instruments, of any keys that can be declared; or a preset."""
+    if rng.random() < 0.3:
+        return str(rng.choice(list(PRESETS)))
+    fields = Sensors.model_fields.items()
+    return {name: _errors_of(rng, name, field.annotation) for name, field in fields if rng.random() < 0.4}
+
+
+def _errors_of(rng: np.random.Generator, name: str, kind: Any) -> dict[str, float]:
+    noise, bias, quantum, _ = kind.si
+    size = SIZES[name][0]
+    sizes = {noise: 0.2 * size, bias: 2.0 * size, quantum: 0.5 * size, "scale_error": 0.05}
+    sizes |= {"drift_deg_h": 1000.0} if "drift_deg_h" in kind.model_fields else {}
+    drawn = {
+        key: most * float(10.0 ** rng.uniform(-2, 0)) for key, most in sizes.items() if rng.random() < 0.5
+    }
+    signed = (bias, "scale_error", "drift_deg_h")
+    return {
+        key: value * float(rng.choice([-1, 1])) if key in signed else value for key, value in drawn.items()
+    }
+
+
+def sizes_of(sensors: Any) -> Any:
+    """The same errors as bounds: a drift or a slope of either sign is declared by its size."""
+    if isinstance(sensors, str):
+        return sensors
+    return {name: {key: abs(value) for key, value in of.items()} for name, of in sensors.items()}
+
+
+def _manoeuvres(rng: np.random.Generator) -> dict[str, Any]:
+    kinds = (
+        lambda a: {
+            "doublet": {"amplitude_deg_s": a, "start_s": rng.uniform(0, 3), "width_s": rng.uniform(0.3, 2)}
+        },
+        lambda a: {"sine": {"amplitude_deg_s": a, "frequency_hz": rng.uniform(0.1, 3)}},
+        lambda a: {"step": {"amplitude_deg_s": a / 3, "start_s": rng.uniform(0, 4)}},
+    )
+    hardest = {"p": 40.0, "q": 12.0, "r": 15.0}
+    return {
+        axis: [kinds[int(rng.integers(3))](float(rng.uniform(-most, most)))]
+        for axis, most in hardest.items()
+        if rng.random() < 0.8
+    }
+
+
+def _changes(rng: np.random.Generator, duration_s: float, sensors: Any) -> Iterator[dict[str, Any]]:
+    """Changes in flight; sensors: those it begins with. Other ones may come without another declaration."""
+    for at_s in np.sort(rng.uniform(0.2, duration_s, int(rng.integers(0, 4)))):
+        kind = int(rng.integers(4))
+        if kind == 0:
+            sensors = errors(rng)
+        yield {
+            "at_s": float(at_s),
+            **(
+                {"sensors": sensors, "declared_sensors": sizes_of(sensors)},
+                {"sensors": _others(rng, sensors)},
+                {"scheme": "adaptive-estimators"},
+                {"law": str(rng.choice(["nominal", "lqr", "oracle"]))},
+            )[kind],
+        }
+
+
+def _others(rng: np.random.Generator, sensors: Any) -> Any:
+    """Other instruments within the same declaration."""
+    if isinstance(sensors, str):
+        return str(rng.choice(["ideal", sensors]))
+    return {
+        name: {
+            key: rng.uniform(0, value) if value > 0 else -rng.uniform(0, -value) for key, value in of.items()
+        }
+        for name, of in sensors.items()
+    }
+
+
+def draw_sound(rng: np.random.Generator) -> dict[str, Any]:
+    """A flight whose instruments are as declared."""
+    sensors, severity = errors(rng), str(rng.choice(["none", "none", "light", "moderate"]))
+    substeps, duration_s = int(rng.integers(1, 11)), float(rng.uniform(5, 20))
+    rate_hz = float(20.0 * 25.0 ** rng.uniform() if substeps < 4 else rng.uniform(20, 200))
+    words: dict[str, Any] = {
+        "name": "sound",
+        "duration_s": duration_s,
+        "rate_hz": rate_hz,
+        "substeps": substeps,
+        "seed": int(rng.integers(2**31)),
+        "initial": {"airspeed_mps": rng.uniform(35, 60), "altitude_m": rng.uniform(600, 4000)},
+        "reference": _manoeuvres(rng),
+        "sensors": sensors,
+        "actuators": str(rng.choice(["ideal", "servo"])),
+        "environment": {"wind_mps": [*rng.uniform(-20, 20, 2).tolist(), float(rng.choice([-1, 0, 1]))]},
+        "fdi": {
+            "sensor_monitor": "always",
+            "fault_class": str(rng.choice(["published", "all"])),
+            "bounds": {"sensors": sizes_of(sensors), "turbulence": severity},
+        },
+        "changes": list(_changes(rng, duration_s, sensors)),
+    }
+    words["environment"] |= {"turbulence": "dryden", "severity": severity} if severity != "none" else {}
+    if rng.random() < 0.33:
+        at_s = float(rng.choice([0.0, rng.uniform(0, duration_s)]))
+        bias = {"type": "bias", "actuator": str(rng.choice(["elevator", "aileron", "rudder"])), "at_s": at_s}
+        words["faults"] = [{**bias, "bias_deg": float(rng.uniform(-6, 6))}]
+    return words
+
+
+def speaks(words: dict[str, Any]) -> bool:
+    """Whether a flight raises an alarm between the instruments, at any time, or any without a fault."""
+    loop = Loop(load(words))
+    alarmed = False
+    for _ in loop.chunks():
+        alarmed |= bool(loop.frames["fdi"]["watch"]["alarmed"][0])
+    landed = loop.land()
+    found = [landed.detection_time_s, *(change.get("detection_time_s") for change in landed.changes)]
+    return alarmed or (not words.get("faults") and any(time_s is not None for time_s in found))
+
+
+def fly_sound(count: int, seed: int) -> None:
+    """Fly so many with sound instruments; print those with an alarm, and how many they were."""
+    alarms = 0
+    for i in range(count):
+        words = draw_sound(np.random.default_rng([seed, i]))
+        if speaks(words):
+            alarms += 1
+            print(json.dumps(words), flush=True)
+    print(f"alarms in {count} flights with sound instruments: {alarms}")
+
+
 def table(found: dict[tuple[str, str], Counter[str]]) -> Iterator[str]:
     """The table by sensor and by type, line by line."""
     yield f"{'':18} {'flights':>8}" + "".join(f"{outcome:>15}" for outcome in OUTCOMES)
@@ -114,8 +249,12 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--declared", default="ideal", help="errors of all instruments, had and declared")
     parser.add_argument("--turbulence", action="store_true", help="light turbulence, had and declared")
+    parser.add_argument("--sound", action="store_true", help="no broken instrument: nothing may alarm")
     parser.add_argument("--verbose", action="store_true", help="every flight that is not `named`")
     given = parser.parse_args()
+    if given.sound:
+        fly_sound(given.flights, given.seed)
+        return
     found: dict[tuple[str, str], Counter[str]] = {}
     losses = alarms = 0
     for i, words in enumerate(flights(given.flights, given.seed, given.declared, given.turbulence)):

@@ -275,10 +275,14 @@ def test_none_is_used_once_one_may_be_broken(fields, used):
     assert measured["inertial"] == used
 
 
-def test_what_accelerometers_may_be_off_covers_two_steps():
+@pytest.mark.parametrize(("steady", "changing"), [(0.3, 0.1), (0.0, 0.05)])
+def test_what_a_reading_may_be_off_covers_two_steps(steady, changing):
     """1.5 a - 0.5 a_then, at its worst: a bias, and noise that changes sides."""
-    watch = new_watch()
-    step = watch["step"]
-    step["steady"][list(FORCES)], step["error"][list(FORCES)] = (0.3, 0.0, 0.0), (0.3 + 0.1, 0.05, 0.0)
-    worst = [1.5 * (0.3 + 0.1) - 0.5 * (0.3 - 0.1), 1.5 * 0.05 + 0.5 * 0.05, 0.0]
-    assert redundancy.misfelt(step) == pytest.approx(np.linalg.norm(worst))
+    step = new_watch()["step"]
+    step["steady"][AX], step["error_then"][AX], step["error_before"][AX] = (
+        steady,
+        steady + changing,
+        steady + changing,
+    )
+    worst = 1.5 * (steady + changing) - 0.5 * (steady - changing)
+    assert redundancy.stepped(step, AX) == pytest.approx(worst)

@@ -334,7 +334,8 @@ def viewed():
     statistical["alarm_level"], statistical["naming_level"], statistical["keep"] = 6.0, 0.5 * 5.0**2, 0.99
     set_up_views(statistical, AIRCRAFT)
     set_up_listening(statistical["listening"], 1e-8, 45.0, 15.0, DT)
-    look(statistical["forces"], statistical["air"], measured(), U, DT)
+    for _ in range(2):
+        look(statistical["forces"], statistical["air"], measured(), U, DT)
     fdi["layout"]["position_of"] = range(4)
     return fdi
 
@@ -478,6 +479,22 @@ def test_what_clears_a_vane_excludes_nobody(viewed):
     for v in (ALPHA_VIEW, UP_VIEW):
         views["held"][v], views["block"]["hypothesis"]["score"][v, 0] = 50.0, 50.0
     assert not any(across.excludes(viewed, s) for s in range(4))
+
+
+def test_a_force_is_weighed_once_the_rate_of_sideslip_of_the_run_before_is_known():
+    """A diagnosis begun in a slip that swings: the first force has the rate of its own run."""
+    fdi = felt()
+    statistical, swinging = fdi["statistical"], measured()
+    statistical["alarm_level"], statistical["keep"] = 6.0, 0.99
+    set_up_views(statistical, AIRCRAFT)
+    set_up_listening(statistical["listening"], 1e-8, 45.0, 15.0, DT)
+    swinging["force"][1] += 20.0
+    for looks in (1, 2):
+        look(statistical["forces"], statistical["air"], swinging, U, DT)
+        assert statistical["forces"]["begun"] == looks
+        across.observe(fdi, np.zeros(3), np.ones((3, 4)), np.zeros((3, 4)), Y, looks, False)
+        weighed = [v for v in statistical["views"] if across.weighs(v) and across.best(v) > 0.0]
+        assert bool(weighed) == (looks == 2)
 
 
 def test_old_evidence_of_a_force_is_forgotten_slowly(viewed):

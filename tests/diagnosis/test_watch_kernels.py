@@ -45,7 +45,7 @@ def new_watch(**fields):
     watch = np.zeros(1, WATCH).view(np.recarray)[0]
     watch["enabled"], watch["instants"], watch["named"], watch["follows"] = 1, 4, NOBODY, 1.0
     watch["step"]["h"], watch["step"]["decay"], watch["alarmed_at_s"] = H, (0.0, 0.9, 0.99), -1.0
-    watch["step"]["test"]["bound"], watch["longest_still"] = 1.0, 3
+    watch["step"]["test"]["bound"], watch["longest_still"], watch["step"]["swift"] = 1.0, 3, 80.0
     for name, value in fields.items():
         watch[name] = value
     return watch
@@ -67,11 +67,14 @@ def with_shares(shares, **fields):
 
 
 @pytest.mark.parametrize(
-    ("shares", "worst"),
-    [({}, -1), ({3: 1.0}, -1), ({3: 1.1, 7: 1.3, 9: 1.2}, 7), ({0: 2.0}, 0), ({12: 2.0}, 12)],
-)
-def test_the_test_furthest_beyond_its_bound(shares, worst):
-    assert watching.furthest(with_shares(shares)["step"]) == worst
+    ("shares", "past", "furthest"),
+    [({}, 0, (0, 0.0)), ({3: 1.1, 7: 1.3, 9: 1.2}, 0, (7, 1.3)), ({0: 2.0}, 0, (0, 2.0)),
+     ({12: 2.0}, 1, (12, 2.0)), ({3: 0.4}, 1, (5, 0.7)), ({3: 0.4}, 0, (3, 0.4))],
+)  # fmt: skip
+def test_of_the_looks_of_a_frame_the_test_furthest_towards_its_bound_is_kept(shares, past, furthest):
+    watch = with_shares(shares, furthest=5, share=0.7, past=past)
+    watching.note_furthest(watch)
+    assert (watch["furthest"], watch["share"]) == furthest
 
 
 def suspects(shares, lead=None, **fields):
@@ -353,13 +356,16 @@ def test_what_no_gyro_can_be_is_further_from_w_than_all_bounds(size, clear):
 
 
 def test_a_watch_begins_with_its_first_look():
-    watch = new_watch()
+    watch = new_watch(past=3)
     measured = np.zeros(1, [("signal", "f8", (N_SENSORS,)), ("force", "f8", (3,))]).view(np.recarray)[0]
     measured["signal"][AIRSPEED], measured["signal"][QDYN], measured["force"] = 45.0, 1000.0, (1.0, 2.0, -9.0)
     watch["step"]["gravity"], watch["step"]["offset"][ALTITUDE] = 9.8, 0.7
-    watching.begin(watch, measured)
+    watch["step"]["drift"], watch["step"]["swift"] = 2e-3, 80.0
+    watching.begin(watch, measured, 5.0)
     step = watch["step"]
-    assert watch["begun"]
+    assert (watch["begun"], watch["past"]) == (1, 0)
+    assert step["error_then"][[PHI, ALTITUDE]] == pytest.approx([0.01, 0.7])  # drifted since the flight began
+    assert (step["error_before"] == step["error_then"]).all()
     assert step["then"][AIRSPEED] == 45.0
     assert step["acceleration_then"] == pytest.approx([1.0, 2.0, 0.8])
     assert step["test"]["noise_then"][CLIMB] == pytest.approx(0.7)
@@ -430,7 +436,7 @@ def looked(watch, fdi, **signal):
 
 
 def test_looks_of_a_frame_follow_one_another():
-    watch, fdi = new_watch(), new_fdi()
+    watch, fdi = new_watch(past=3), new_fdi()
     fdi["bank"]["threshold"], fdi["bound"]["frame"] = 1.0, 1.0
     watch["step"]["gravity"] = watch["step"]["offset"] = 0.0
     watch["step"]["offset"][:] = 1.0

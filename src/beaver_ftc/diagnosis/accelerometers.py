@@ -24,11 +24,11 @@ from beaver_ftc.diagnosis.watch import (
     BETA_FLOW,
     CLIMB,
     DENSITY,
+    LEAP_M_S2,
     SPEED,
 )
 from beaver_ftc.plant.instruments import AX, N_SENSORS, PHI
 
-LEAP_M_S2 = 8.0  # by which no specific force changes from one look to the next
 SOON = 100  # looks after the alarm: later, chance has had too many tries
 CALMED = 0.995  # of a leap of an accelerometer that counts a look later
 GOES_ON = 30.0  # times what the reading has moved by: a scale error within 3 % of -1 would do that

@@ -34,6 +34,7 @@ import numpy as np
 from beaver_ftc.compiled import kernel
 from beaver_ftc.design.terms import AIRSPEED
 from beaver_ftc.diagnosis import air, likelihood, tones
+from beaver_ftc.diagnosis.forces import SETTLED
 from beaver_ftc.diagnosis.state import (
     AN_AXIS,
     LATERAL,
@@ -227,7 +228,7 @@ def observe(fdi, innovation, G, Gu, y, frame, latched):
     for a in range(statistical.n_views):
         view = statistical.views[a]
         block, m, share = view.block, view.mix, 0.0
-        if weighs(view) and not statistical.forces.known:
+        if weighs(view) and not (statistical.forces.known and statistical.forces.begun == SETTLED):
             view.held = 0.0
             continue
         if view.surface != AN_AXIS:

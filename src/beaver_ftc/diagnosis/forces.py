@@ -33,6 +33,7 @@ COMPONENTS = ("CY", "CZ")
 CY = FORCES.index("CY")
 EARTH_RATE_RAD_S = 7.3e-5
 LIVELY_RAD_S, STEEP_RAD = 0.2, 0.3  # rates and slope of the path that a drift is reckoned with
+SETTLED = 2  # looks: from the second on the rate of sideslip is that of the run before
 UNSETTLED_S = 0.002  # that force and flow of one instant may be apart, of JSBSim's own: seen to 0.001
 CHANGES = 0.3  # what of a drift may be another a second later
 RATE_TOLERANCE = {False: 0.05, True: 0.2}  # of the term in the rate of sideslip: gusts have a part in it
@@ -62,7 +63,7 @@ FORCES_FELT = np.dtype(
         ("pressure", "f8"), ("pressure_noise", "f8"),  # Pa: in trim, and of its reading
         ("strength", "f8"),  # of the pressure, as a share of trim: so much more do forces than stands here
         # coefficient of the rate of sideslip; rates of sideslip and incidence, rad/s, of the instant before
-        ("of_rate", "f8"), ("rate", "f8", (2,)), ("begun", "i8"),
+        ("of_rate", "f8"), ("rate", "f8", (2,)), ("begun", "i8"),  # looks, up to SETTLED
         ("blurred", "f8", (3,)),  # rad/s2: what their noise adds to the gust that follows from them
         ("y", "f8", (N_Y,)), ("component", FORCE, (2,)),
     ],
@@ -72,7 +73,12 @@ FORCES_FELT = np.dtype(
 
 @kernel
 def look(forces, air, measured, u, dt):
-    """Compare this instant's accelerometers with the model, surfaces at u (n,) rad, dt s after the last."""
+    """Compare this instant's accelerometers with the model, surfaces at u (n,) rad, dt s after the last.
+
+    Of the first instant the rate of sideslip of the run before is not known: that of the instant stands in.
+    """
+    if forces.begun == 0:
+        flow_rates(forces, measured)
     evaluate(air.forces, measured.x, measured.y)
     forces.strength = measured.y[QDYN] / forces.pressure
     for f in range(2):
@@ -81,7 +87,7 @@ def look(forces, air, measured, u, dt):
         settle(forces.component[f], before, forces.begun, dt)
         follow(forces, forces.component[f], f, measured.y, dt)
     flow_rates(forces, measured)
-    forces.begun = 1
+    forces.begun = min(forces.begun + 1, SETTLED)
 
 
 @kernel

@@ -49,7 +49,7 @@ def attend(watch, fdi, belief, measured, t):
     """Look at the instruments at one instant, t s; replace in `measured` what is known to be broken."""
     step, signal = watch.step, measured.signal
     if not watch.begun:
-        begin(watch, measured)
+        begin(watch, measured, t)
         return
     if watch.past == 0:
         follow_rates(watch, fdi)
@@ -75,18 +75,13 @@ def attend(watch, fdi, belief, measured, t):
 
 
 @kernel
-def begin(watch, measured):
-    """The first look: nothing to compare with."""
+def begin(watch, measured, t):
+    """The first look, at t s: nothing to compare with."""
     watch.begun = 1
-    step = watch.step
-    redundancy.note_declared(step, measured.signal)
-    redundancy.look(step, measured.signal, measured.force)
-    watch.earlier[:] = step.then
-    step.acceleration_then[:] = step.acceleration
-    redundancy.allow(step, measured.signal)
-    for c in range(N_TESTS):
-        step.test[c].noise_then = step.test[c].noise
-        step.test[c].bound_noise[:] = step.test[c].noise
+    watch.step.drifted = watch.step.drift * t
+    redundancy.begin(watch.step, measured.signal, measured.force)
+    watch.earlier[:] = watch.step.then
+    watch.past = (watch.past + 1) % watch.instants
 
 
 @kernel
@@ -125,6 +120,7 @@ def clear_gyros(watch):
 @kernel
 def decide(watch, fdi, measured, t):
     """Raise the alarm, and name the instrument once there is but one it can be."""
+    note_furthest(watch)
     if watch.named != NOBODY:
         return
     for i in range(N_SENSORS):
@@ -133,10 +129,9 @@ def decide(watch, fdi, measured, t):
             name(watch, i, t)
     if watch.named != NOBODY:
         return
-    worst = furthest(watch.step)
-    if worst >= 0 and not watch.alarmed:
+    if watch.share > 1.0 and not watch.alarmed:
         raise_alarm(watch, fdi, t)
-        watch.lead = worst
+        watch.lead = watch.furthest
     if watch.alarmed:
         if watch.past == 0:
             ask_rates(watch, fdi)
@@ -152,13 +147,13 @@ def decide(watch, fdi, measured, t):
 
 
 @kernel
-def furthest(step):
-    """The test furthest beyond its bound, or -1."""
-    worst, largest = -1, 1.0
+def note_furthest(watch):
+    """Keep the test furthest towards its bound, or beyond it, of the looks of this frame."""
+    if watch.past == 0:
+        watch.furthest, watch.share = 0, 0.0
     for c in range(N_TESTS):
-        if step.test[c].share > largest:
-            worst, largest = c, step.test[c].share
-    return worst
+        if watch.step.test[c].share > watch.share:
+            watch.furthest, watch.share = c, watch.step.test[c].share
 
 
 @kernel

@@ -28,6 +28,7 @@ from beaver_ftc.diagnosis.watch import (
     BETA_FLOW,
     CLIMB,
     DENSITY,
+    LEAP_M_S2,
     PSI,
     QDYN,
     RPM,
@@ -43,7 +44,7 @@ from beaver_ftc.plant.instruments import ALTITUDE, AX, ENGINE_SPEED, MANIFOLD, N
 TURNING_RAD_S = 4e-5  # Earth rate is in the rates; the level turns with the flight over the round Earth
 FALLING_M_S2 = 0.03  # Coriolis, centrifugal, and gravity's change with place
 CLIMBING_M_S = 1.0  # vertical wind
-DENSITY_HEIGHT_M = 7000.0  # over which the density falls by no more than a factor e
+DENSITY_HEIGHT_M = 6300.0  # over which the density falls by no more than a factor e: in the stratosphere
 STEEPEST_RAD = 1.3  # beyond, roll and heading are not to be told apart
 
 
@@ -105,12 +106,15 @@ def note_declared(step, signal):
         whole = (step.offset[i] + step.slope[i] * abs(signal[i])) / (1.0 - step.slope[i])
         step.error[i] = whole
         step.changing[i] = whole - step.steady[i] + 1e-10 * abs(signal[i])
+    for i in range(PHI, PHI + 3):
+        step.error[i] += step.drifted
 
 
 @kernel
 def look(step, signal, force):
     """Keep this instant for the next look; signal (N_SENSORS,) SI, force (3,) m/s2."""
-    step.then[:] = signal
+    step.then[:], step.error_before[:] = signal, step.error_then
+    step.error_then[:] = step.error
     quaternion(signal[PHI], signal[THETA], signal[PSI], step.turned)
     alpha, beta, V = signal[ALPHA], signal[BETA], signal[AIRSPEED]
     step.velocity[0] = V * np.cos(alpha) * np.cos(beta)
@@ -119,7 +123,12 @@ def look(step, signal, force):
     step.acceleration[0] = force[0] - step.gravity * np.sin(tilt)
     step.acceleration[1] = force[1] + step.gravity * np.cos(tilt) * np.sin(bank)
     step.acceleration[2] = force[2] + step.gravity * np.cos(tilt) * np.cos(bank)
-    step.size = np.sqrt(step.acceleration[0] ** 2 + step.acceleration[1] ** 2 + step.acceleration[2] ** 2)
+
+
+@kernel
+def length(vector):
+    """The length of a vector (3,)."""
+    return np.sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2)
 
 
 @kernel
@@ -134,11 +143,16 @@ def predict(step):
     tilt, bank, v = step.then[THETA], step.then[PHI], step.velocity
     up = v[0] * np.sin(tilt) - v[1] * np.sin(bank) * np.cos(tilt) - v[2] * np.cos(bank) * np.cos(tilt)
     out[ALTITUDE] = step.then[ALTITUDE] + h * up
+    step.pulled[1], step.pulled[0] = step.pulled[0], step.pull
+    step.felt_then = length(step.acceleration_then)
     for i in range(3):
-        moved[i] = v[i] + h * (1.5 * step.acceleration[i] - 0.5 * step.acceleration_then[i])
+        moved[i] = 1.5 * step.acceleration[i] - 0.5 * step.acceleration_then[i]
+    step.pull = length(moved)
+    for i in range(3):
+        moved[i] = v[i] + h * moved[i]
     turn_back(rates, h, moved, v)
     turn_back(rates, h, step.acceleration, step.acceleration_then)
-    speed = np.sqrt(v[0] ** 2 + v[1] ** 2 + v[2] ** 2)
+    speed = length(v)
     out[AIRSPEED] = speed
     out[ALPHA], out[BETA] = np.arctan2(v[2], v[0]), np.arcsin(v[1] / max(speed, 1e-3))
 
@@ -148,11 +162,9 @@ def compare(step, signal):
     """Fill the residual of each test with what the readings (N_SENSORS,) are beyond what was predicted."""
     test, predicted = step.test, step.predicted
     quaternion(signal[PHI], signal[THETA], signal[PSI], step.scratch)
-    steep = abs(signal[THETA]) > STEEPEST_RAD
     for i in range(3):
-        test[TURN + i].residual = 0.0 if steep else angle_between(step.now, step.scratch, i + 1)
-        apart = wrapped(signal[PHI + i] - predicted[PHI + i])
-        test[ANGLE + i].residual = 0.0 if steep else apart
+        test[TURN + i].residual = angle_between(step.now, step.scratch, i + 1)
+        test[ANGLE + i].residual = wrapped(signal[PHI + i] - predicted[PHI + i])
     test[SPEED].residual = signal[AIRSPEED] - predicted[AIRSPEED]
     test[ALPHA_FLOW].residual = signal[ALPHA] - predicted[ALPHA]
     test[BETA_FLOW].residual = signal[BETA] - predicted[BETA]
@@ -162,42 +174,103 @@ def compare(step, signal):
 
 
 @kernel
-def misfelt(step):
-    """How far off accelerometers can be, m/s2: what of it changes counts twice, by the two steps of Adams and
-    Bashforth."""
-    total = 0.0
+def steepest(step, signal):
+    """How far from level the nose can have been since the look before, rad."""
+    return max(abs(signal[THETA]) + step.error[THETA], abs(step.then[THETA]) + step.error_then[THETA])
+
+
+@kernel
+def stepped(step, i):
+    """How far off 3/2 a - 1/2 a_then can be by what reading i is off at the two instants: a constant counts
+    once."""
+    return 1.5 * step.error_then[i] + 0.5 * step.error_before[i] - step.steady[i]
+
+
+@kernel
+def misjudged(step, turning, rates):
+    """How far off the acceleration of the elapsed step can be, m/s2: by accelerometers, by gravity sought
+    where the attitude has it, by turning the one before back. turning; rates: of gyros, errors; rad/s."""
+    tilt, g = stepped(step, PHI) + stepped(step, THETA), step.gravity
+    felt, steady = 0.0, g * (step.steady[PHI] + step.steady[THETA])
+    for i in range(AX, AX + 3):
+        felt += stepped(step, i) ** 2
+        steady += step.steady[i]
+    back = step.h * (turning * steady + 0.5 * rates * step.felt_then)
+    return FALLING_M_S2 + step.unknown + g * tilt + np.sqrt(felt) + back
+
+
+@kernel
+def allow_turning(step, signal, turning, rates):
+    """The same as `allow`, of attitude. That a constant error of it turns with the aircraft: of the rates
+    J(phi, theta) (phi', theta', psi') it changes J."""
+    test, E, n = step.test, step.error_then, step.changing
+    level = 1.0 / np.cos(min(steepest(step, signal), STEEPEST_RAD))
+    tilt, around = E[PHI] + E[THETA] + E[PSI], step.h * turning
     for i in range(3):
-        total += (2.0 * step.error[AX + i] - step.steady[AX + i]) ** 2
-    return np.sqrt(total)
+        by_attitude = turning * (tilt + level * E[THETA])
+        test[TURN + i].rate = TURNING_RAD_S + 2.0 * step.drift + E[P + i] + around * rates + by_attitude
+        by_attitude = 2.0 * level * turning * (E[PHI] + E[THETA])
+        off = TURNING_RAD_S + (1.0 + level * around) * rates + by_attitude
+        test[ANGLE + i].rate, test[ANGLE + i].noise = level * off + step.drift, n[PHI + i]
+    tilted, banked = abs(np.sin(signal[THETA])) + n[THETA], abs(np.sin(signal[PHI])) + n[PHI]
+    test[TURN].noise = n[PHI] + tilted * n[PSI]
+    test[TURN + 1].noise = n[THETA] + banked * n[PSI]
+    test[TURN + 2].noise = n[PSI] + banked * n[THETA]
+
+
+@kernel
+def allow_flow(step, signal, turning, rates):
+    """The same, of flow and climb: slopes of their kinematics with each reading, where they are greatest."""
+    test, e, E, n = step.test, step.error, step.error_then, step.changing
+    slow = max(min(signal[AIRSPEED] - e[AIRSPEED], step.then[AIRSPEED] - E[AIRSPEED]), 1.0)
+    slip = max(abs(signal[BETA]) + e[BETA], abs(step.then[BETA]) + E[BETA])
+    aslant, vanes = 1.0 / np.cos(min(slip, STEEPEST_RAD)), E[ALPHA] + E[BETA]
+    off = misjudged(step, turning, rates)
+    pull, coarse = step.pull + off, 1.0 + step.h * (2.0 * step.pull / slow + turning)
+    gusty = np.sqrt(max(signal[AIRSPEED] / step.swift, 1.0))
+    flow = aslant**2 * ((off + pull * (vanes + E[AIRSPEED] / slow)) / slow + turning * vanes) + aslant * rates
+    test[SPEED].air, test[SPEED].noise = gusty, n[AIRSPEED]
+    test[SPEED].rate = off + coarse * pull * vanes + step.h * (pull / slow) ** 2 * E[AIRSPEED]
+    for c, vane in ((ALPHA_FLOW, ALPHA), (BETA_FLOW, BETA)):
+        test[c].air, test[c].noise, test[c].rate = gusty * aslant / slow, n[vane], coarse * flow
+    tilt, hardest = E[PHI] + E[THETA], max(pull, step.pulled[0], step.pulled[1])
+    climb = (step.then[AIRSPEED] + E[AIRSPEED]) * (tilt + vanes) + E[AIRSPEED]
+    test[CLIMB].rate = CLIMBING_M_S + step.gust + climb + 4.0 / 3.0 * step.h * hardest
+    test[CLIMB].noise = n[ALTITUDE]
+
+
+@kernel
+def reciprocal_moved(step, signal, i):
+    """How far the logarithm of a quantity can seem to move, the reading of which is off by a constant."""
+    least = max(min(signal[i], step.then[i]), 1.0)
+    moved = step.steady[i] * abs(1.0 / max(signal[i], 1.0) - 1.0 / max(step.then[i], 1.0))
+    return moved / max(1.0 - step.steady[i] / least, 0.01)
+
+
+@kernel
+def allow_density(step, signal):
+    """The same, of the logarithm of the density."""
+    test, e, n = step.test[DENSITY], step.error, step.changing
+    fastest = step.then[AIRSPEED] + step.error_then[AIRSPEED] + CLIMBING_M_S + step.gust
+    seems = reciprocal_moved(step, signal, QDYN) + 2.0 * reciprocal_moved(step, signal, AIRSPEED)
+    test.rate = fastest / DENSITY_HEIGHT_M + seems / step.h
+    test.noise = n[QDYN] / max(signal[QDYN] - e[QDYN], 1.0)
+    test.noise += 2.0 * n[AIRSPEED] / max(signal[AIRSPEED] - e[AIRSPEED], 1.0)
 
 
 @kernel
 def allow(step, signal):
-    """Fill what sound instruments with the declared errors may add to each residual: per second, at all."""
-    test, e, n = step.test, step.error, step.changing
-    V = max(signal[AIRSPEED], 1.0)
-    turning = abs(step.then[P]) + abs(step.then[Q]) + abs(step.then[R])
-    rates, tilt = e[P] + e[Q] + e[R], e[PHI] + e[THETA] + e[PSI]
-    level = 1.0 / max(np.cos(signal[THETA]), 0.1)
-    for i in range(3):
-        test[TURN + i].rate = TURNING_RAD_S + step.drift + e[P + i] + 2.0 * turning * tilt
-        test[ANGLE + i].rate = level * (TURNING_RAD_S + rates + 2.0 * level * turning * tilt) + step.drift
-        test[ANGLE + i].noise = n[PHI + i]
-    tilted, banked = abs(np.sin(signal[THETA])), abs(np.sin(signal[PHI]))
-    test[TURN].noise = n[PHI] + (tilted + turning * step.h) * n[PSI]
-    test[TURN + 1].noise = n[THETA] + (banked + turning * step.h) * n[PSI]
-    test[TURN + 2].noise = n[PSI] + (banked + turning * step.h) * n[THETA]
-    acceleration = FALLING_M_S2 + step.gravity * (e[PHI] + e[THETA]) + step.size * (e[ALPHA] + e[BETA])
-    acceleration += misfelt(step)
-    flow = (acceleration + step.size * e[AIRSPEED] / V) / V + rates + turning * (e[ALPHA] + e[BETA])
-    test[SPEED].air, test[ALPHA_FLOW].air, test[BETA_FLOW].air = 1.0, 1.0 / V, 1.0 / V
-    test[SPEED].rate, test[SPEED].noise = acceleration, n[AIRSPEED]
-    test[ALPHA_FLOW].rate, test[ALPHA_FLOW].noise = flow, n[ALPHA]
-    test[BETA_FLOW].rate, test[BETA_FLOW].noise = flow, n[BETA]
-    test[DENSITY].rate = V / DENSITY_HEIGHT_M
-    test[DENSITY].noise = n[QDYN] / max(signal[QDYN], 1.0) + 2.0 * n[AIRSPEED] / V
-    test[CLIMB].rate = CLIMBING_M_S + step.gust + V * (tilt + e[ALPHA] + e[BETA]) + e[AIRSPEED]
-    test[CLIMB].noise = n[ALTITUDE]
+    """Fill what sound instruments with the declared errors may add to each residual: per second, at all.
+
+    What was predicted is off by the errors of the readings it was predicted from (E, of the look before),
+    what it is held against by those of now.
+    """
+    E = step.error_then
+    rates = E[P] + E[Q] + E[R]
+    turning = abs(step.then[P]) + abs(step.then[Q]) + abs(step.then[R]) + rates
+    allow_turning(step, signal, turning, rates)
+    allow_flow(step, signal, turning, rates)
+    allow_density(step, signal)
 
 
 @kernel
@@ -216,6 +289,14 @@ def follow(step, test):
 
 
 @kernel
+def start(test):
+    """Begin a test with this look: there is nothing in its filters yet, and all of the noise to come."""
+    test.share = test.residual = 0.0
+    test.filtered[:], test.bound_rate[:], test.bound_noise[:] = 0.0, 0.0, test.noise
+    test.noise_then = test.noise
+
+
+@kernel
 def follow_engine(step, signal):
     """The engine's instruments against what was commanded: no filter, an error is there or not."""
     step.test[RPM].residual = signal[ENGINE_SPEED] - step.command[0]
@@ -226,13 +307,32 @@ def follow_engine(step, signal):
 
 
 @kernel
+def begin(step, signal, force):
+    """The first look: what was before it is not known."""
+    note_declared(step, signal)
+    look(step, signal, force)
+    step.error_before[:], step.acceleration_then[:] = step.error_then, step.acceleration
+    step.pull = step.pulled[0] = length(step.acceleration) + LEAP_M_S2
+    step.unknown = 0.5 * LEAP_M_S2
+    allow(step, signal)
+    for c in range(RPM):
+        start(step.test[c])
+
+
+@kernel
 def check(step, signal, engine):
     """Hold this instant's readings (N_SENSORS,) against the look before; engine: it has instruments."""
+    step.drifted += step.h * step.drift
     note_declared(step, signal)
     predict(step)
     compare(step, signal)
     allow(step, signal)
+    step.unknown = 0.0
+    steep = steepest(step, signal) > STEEPEST_RAD
     for c in range(RPM):
-        follow(step, step.test[c])
+        if steep and c < SPEED:
+            start(step.test[c])
+        else:
+            follow(step, step.test[c])
     if engine:
         follow_engine(step, signal)

@@ -8,6 +8,7 @@ TURN, ANGLE, SPEED, ALPHA_FLOW, BETA_FLOW, DENSITY, CLIMB, RPM, PRESSURE = 0, 3,
 N_TESTS = 13
 POLES_PER_S = (1e6, 10.0, 1.0)
 NOBODY = -1
+LEAP_M_S2 = 8.0  # by which no specific force changes from one look to the next
 UNKNOWN, YES, NO = 0, 1, 2
 P, Q, R, ALPHA, BETA, AIRSPEED, QDYN = range(len(SIGNALS))
 THETA, PSI = PHI + 1, PHI + 2
@@ -26,13 +27,19 @@ STEP = np.dtype(
     [
         ("h", "f8"), ("decay", "f8", (len(POLES_PER_S),)), ("gravity", "f8"),
         # of the declared turbulence: its speed at most, m/s, and what passes each filter of a gust's changes
-        ("gust", "f8"), ("gusts", "f8", (len(POLES_PER_S),)),
+        # up to an airspeed m/s
+        ("gust", "f8"), ("gusts", "f8", (len(POLES_PER_S),)), ("swift", "f8"),
         # declared: the whole error of a reading, and what of it changes; drift of the attitude
         ("offset", "f8", (N_SENSORS,)), ("slope", "f8", (N_SENSORS,)), ("steady", "f8", (N_SENSORS,)),
         ("drift", "f8"), ("error", "f8", (N_SENSORS,)), ("changing", "f8", (N_SENSORS,)),
+        # drift so far, rad; the errors of the look before, and of the one before that
+        ("drifted", "f8"), ("error_then", "f8", (N_SENSORS,)), ("error_before", "f8", (N_SENSORS,)),
         # the look before: readings, attitude as a quaternion, velocity, acceleration there and before that
         ("then", "f8", (N_SENSORS,)), ("turned", "f8", (4,)), ("velocity", "f8", (3,)),
-        ("acceleration", "f8", (3,)), ("acceleration_then", "f8", (3,)), ("size", "f8"),
+        ("acceleration", "f8", (3,)), ("acceleration_then", "f8", (3,)),
+        # m/s2: size of the acceleration of the elapsed step, and of those before it; of acceleration_then
+        ("pull", "f8"), ("pulled", "f8", (2,)), ("felt_then", "f8"),
+        ("unknown", "f8"),  # of the acceleration of the first step, for want of the instant before
         ("predicted", "f8", (N_SENSORS,)), ("scratch", "f8", (4,)), ("now", "f8", (4,)),
         ("command", "f8", (2,)),  # engine speed rpm, manifold pressure inHg
         ("test", TEST, (N_TESTS,)),
@@ -46,6 +53,7 @@ WATCH = np.dtype(
         ("enabled", "i8"), ("begun", "i8"), ("instants", "i8"), ("past", "i8"), ("engine", "i8"),
         ("alarmed", "i8"), ("alarmed_at_s", "f8"), ("beside", "i8"), ("lead", "i8"),
         ("misnamed", "i8"),  # a surface had been named in the moment before the alarm
+        ("furthest", "i8"), ("share", "f8"),  # of this frame: the test nearest its bound, and how near
         ("fired", "i8", (N_TESTS,)), ("suspect", "i8", (N_SENSORS,)),
         ("named", "i8"), ("named_at_s", "f8"), ("replaced", "i8", (N_SENSORS,)),
         ("trim", "f8", (N_SENSORS,)), ("follows", "f8"),  # share of its error a replaced rate makes up a look

@@ -35,10 +35,12 @@ OF_INSTRUMENTS = ("real", "gain", "bias", "noise", "quantum", "dropout", "drift"
 
 
 class Stage(NamedTuple):
-    """A change ready to be made: its frame, the record to take it from, the plug-ins from then on."""
+    """A change ready to be made: its frame, whether the diagnosis begins anew, the record to take it from,
+    the plug-ins from then on."""
 
     frame: int
     change: Change
+    renews: bool
     frames: np.ndarray
     plugins: PluginFrame | None
 
@@ -67,13 +69,14 @@ class Changing:
         control = loop.frames["control"][0]
         frames = assemble(then, control["trim"], np.array([control["low"], control["high"]]))
         loop.anchor(frames[0], then)
-        detector = before.detector if before and not change.renews_diagnosis else None
+        renews = begins_anew(change, then)
+        detector = before.detector if before and not renews else None
         law = before.law if before and change.law is None else None
-        if change.renews_diagnosis:
+        if renews:
             detector = named_detector(then)
         if change.law is not None:
             law = named_law(frames, then, loop.start)
-        return Stage(frame, change, frames, plugged(frames, then, loop.start, detector, law, before))
+        return Stage(frame, change, renews, frames, plugged(frames, then, loop.start, detector, law, before))
 
     def next_change(self, k: int) -> int:
         """The first frame after k at which `apply` has something to do."""
@@ -91,7 +94,7 @@ class Changing:
         self._note(stage)
         if change.law is not None:
             take_law(frame, new["control"])
-        if change.renews_diagnosis:
+        if stage.renews:
             self._watch(new["fdi"])
             take_diagnosis(frame, new, stage.frame)
         if change.sensors is not None:
@@ -115,10 +118,17 @@ class Changing:
         change = stage.change
         noted = {"time_s": stage.frame / self._loop.scenario.rate_hz, "law": change.law}
         noted |= {"scheme": change.scheme, "sensors": change.sensors is not None}
-        if change.renews_diagnosis:
+        if stage.renews:
             found = self._loop.land()
             noted |= {"detection_time_s": found.detection_time_s, "isolated": found.isolated}
         self.replaced.append(noted)
+
+
+def begins_anew(change: Change, then: Scenario) -> bool:
+    """Whether the diagnosis does, in a flight that goes on as `then`: with other sensors of declared errors
+    as well, since a constant error is then another, and our thresholds hold for one that stays."""
+    declared = change.sensors is not None and not then.fdi.bounds.sensors.is_ideal
+    return change.renews_diagnosis or (declared and then.fdi.scheme == "adaptive-estimators")
 
 
 def take_law(frame: np.void, new: np.void) -> None:
@@ -152,6 +162,7 @@ def _unexplained(control: np.void) -> np.ndarray:
 def take_diagnosis(frame: np.void, new: np.void, k: int) -> None:
     """Begin the diagnosis anew with frame k; what healthy flight has shown of its margins is kept."""
     fdi, other = frame["fdi"], new["fdi"]
+    other["watch"]["past"] = 0  # its first look begins a frame
     if fdi["bank"]["n"] == other["bank"]["n"]:
         other["bank"]["closest"] = fdi["bank"]["closest"]
     other["statistical"]["closest"] = fdi["statistical"]["closest"]

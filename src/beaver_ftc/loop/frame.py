@@ -51,8 +51,8 @@ from beaver_ftc.scenario.diagnosis import FdiConfig
 __all__ = ["FLYING", "NOT_FINITE", "fly_frame", "fly_on", "frame_dtype", "hold", "idle", "look_inside"]
 
 
-# What the log has columns for, whatever changes in flight: estimators and statistical tests, the engine.
-LOGGED = np.dtype([("estimators", "i8"), ("power", "i8"), ("tests", "i8")], align=True)
+# What the log has columns for: estimators, the watch, the engine, statistical tests.
+LOGGED = np.dtype([("estimators", "i8"), ("watch", "i8"), ("power", "i8"), ("tests", "i8")], align=True)
 
 
 @lru_cache
@@ -81,11 +81,12 @@ def idle(fdi: FdiConfig) -> list[tuple[str, ...]]:
 
 @apart
 def watch_instruments(frame):
-    """Hold the instruments against one another; what is known to be broken is replaced."""
+    """Hold the instruments against one another; what is known to be broken is replaced. What an instant
+    inside a frame shows is known with that frame."""
     watch, power = frame.fdi.watch, frame.control.power
     if power.in_use:
         watch.step.command[1] = power.command[0]
-    attend(watch, frame.fdi, frame.belief, frame.measured, frame.t)
+    attend(watch, frame.fdi, frame.belief, frame.measured, frame.k * frame.dt)
 
 
 @kernel

@@ -26,6 +26,7 @@ from beaver_ftc.plant.instruments import (
 )
 from beaver_ftc.plant.sensor_faults import OF_THE_SLIPSTREAM
 from beaver_ftc.scenario.faults import of_a_sensor
+from beaver_ftc.scenario.in_flight import stages
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.sensors import ENGINE
 
@@ -47,6 +48,11 @@ def is_watched(scenario: Scenario) -> bool:
     wanted = scenario.fdi.sensor_monitor
     needed = wanted == "always" or (wanted == "auto" and breaks_instruments(scenario))
     return needed and scenario.fdi.scheme == "adaptive-estimators"
+
+
+def comes_to_be_watched(scenario: Scenario) -> bool:
+    """Whether they are at some time of the flight."""
+    return any(is_watched(then) for then in (scenario, *(then for _, then in stages(scenario))))
 
 
 def has_real_engine(scenario: Scenario) -> bool:
@@ -101,12 +107,14 @@ def seed_instruments(instruments: np.void, seed: int) -> None:
 def assemble_watch(watch: np.void, scenario: Scenario, h: float) -> None:
     """h: seconds between two looks, which is a JSBSim frame."""
     watch["enabled"], watch["instants"] = is_watched(scenario), scenario.substeps
+    watch["past"] = scenario.substeps - 1  # the first look ends a frame
     watch["named"], watch["alarmed_at_s"], watch["named_at_s"] = NOBODY, -1.0, -1.0
     watch["engine"] = scenario.airframe.has_engine_instruments
     step, sensors = watch["step"], scenario.fdi.bounds.sensors
     step["h"], step["decay"] = h, [exp(-pole * h) for pole in POLES_PER_S]
     step["gravity"] = GRAVITY_M_S2 * (1.0 + scenario.initial.altitude_m / EARTH_RADIUS_M) ** -2
     step["gust"], step["gusts"] = gusts_seen(scenario.fdi.bounds.turbulence, scenario.initial.airspeed_mps, h)
+    step["swift"] = FASTER * scenario.initial.airspeed_mps
     if watch["engine"]:
         initial: Any = scenario.initial  # its engine's keys are the aircraft's
         step["command"] = initial.engine_rpm, initial.manifold_pressure_inhg

@@ -8,13 +8,13 @@ import numpy as np
 
 from beaver_ftc.control.laws.setup import set_up
 from beaver_ftc.control.outer.setup import set_up_autopilot
-from beaver_ftc.control.outer.state import COLUMNS
 from beaver_ftc.design.variants import anchor, mass_of
 from beaver_ftc.diagnosis import noise_model
 from beaver_ftc.documents.errors import SimulationFailed
 from beaver_ftc.loop import memory
-from beaver_ftc.loop.assembly import assemble, estimator_names, y_places
+from beaver_ftc.loop.assembly import assemble, y_places
 from beaver_ftc.loop.cockpit import Cockpit, note_failures, set_origin, travel_rad
+from beaver_ftc.loop.columns import lay_out
 from beaver_ftc.loop.direct import direct
 from beaver_ftc.loop.flight import Flight, LogSink
 from beaver_ftc.loop.frame import FLYING, NOT_FINITE, fly_frame, fly_on, hold, look_inside
@@ -75,15 +75,7 @@ class Loop:
         self.gust = GustSchedule(scenario.environment.gusts, self.plant, scenario.rate_hz)
         self.n_frames = round(scenario.duration_s * scenario.rate_hz)
         self.plugin_frame = self._with_plugins(detector, law)
-        has_profile = bool(self.frames["autopilot"]["enabled"][0])
-        self.columns = ch.log_columns(
-            estimator_names(scenario.fdi.fault_class, scenario.airframe) if self._diagnoses_itself else (),
-            bool(self.frames["control"]["power"]["enabled"][0]) or has_profile,
-            bool(self.frames["fdi"]["statistical"]["enabled"][0]),
-            self.aircraft,
-            profile=COLUMNS if has_profile else (),
-        )
-        self._lay_out()
+        self.columns = lay_out(self.frames[0], scenario, self._diagnoses_itself)
         self.log = memory.taken((min(CHUNK_ROWS, self.n_frames), len(self.columns)))
         self.references = np.empty((len(self.log), 3))
         self._order = np.zeros(2, np.int64)
@@ -118,13 +110,6 @@ class Loop:
         if fdi["watch"]["enabled"]:  # compiled code called from here: a quarter of a second, the first time
             anchor_watch(fdi["watch"], np.array([design]), y)
         noise_model.set_up(fdi, scenario.fdi, design, mass, trim, rate_hz, self.aircraft)
-
-    def _lay_out(self) -> None:
-        """The log's columns stay as they are, whatever changes in flight."""
-        fdi, logged = self.frames["fdi"][0], self.frames["logged"][0]
-        logged["estimators"] = fdi["n_estimators"] if self._diagnoses_itself else 0
-        logged["power"] = "manifold_pressure_inhg" in self.columns
-        logged["tests"] = fdi["statistical"]["n_columns"] if fdi["statistical"]["enabled"] else 0
 
     def _changing(self) -> "Changing":
         """What will change law, diagnosis and sensors in flight; nothing of it is imported without need."""

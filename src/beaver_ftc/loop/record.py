@@ -89,6 +89,15 @@ def record_diagnosis(fdi, acceleration, logged, row, column):
 
 
 @kernel
+def record_watch(watch, row, column):
+    """How near a test between the instruments came to its bound in this frame, and which; not a number where
+    they are not watched."""
+    watched = watch.enabled and watch.begun
+    row[column] = watch.share if watched else np.nan
+    row[column + 1] = watch.furthest if watched else np.nan
+
+
+@kernel
 def record_profile(autopilot, row, column):
     """The commanded profile, and the airspeed of it that can be held; not a number where a channel is not
     flown."""
@@ -109,11 +118,15 @@ def record(frame, reference, row):
     column = record_diagnosis(fdi, belief.means.acceleration, frame.logged.estimators, row, column)
     column = put(row, column, control.effectiveness)
     row[column] = frame.supervisor.mode
-    row[column + 1] = fdi.verdict.detected
+    row[column + 1] = fdi.verdict.detected or fdi.watch.alarmed
+    column += 2
+    if frame.logged.watch:
+        record_watch(fdi.watch, row, column)
+        column += 2
     if frame.logged.power:
-        row[column + 2] = control.power.command[0]
+        row[column] = control.power.command[0]
     if frame.autopilot.enabled:
-        record_profile(frame.autopilot, row, column + 3)
+        record_profile(frame.autopilot, row, column + 1)
     if frame.logged.tests and fdi.statistical.enabled:
         statistical.record(fdi.statistical, row)
     elif frame.logged.tests:

@@ -25,7 +25,7 @@ def begin_watch(frames):
     frame = frames[0]
     if not frame.measured.inertial:
         sample_forces(frame.instruments, frame.measured)
-    instruments.begin(frame.fdi.watch, frame.measured)
+    instruments.begin(frame.fdi.watch, frame.measured, frame.t)
 
 
 @kernel

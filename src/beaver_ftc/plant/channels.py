@@ -126,10 +126,11 @@ def log_columns(
     statistical: bool = False,
     aircraft: Aircraft | None = None,
     profile: tuple[str, ...] = (),
+    watch: bool = False,
 ) -> tuple[str, ...]:
     """The log's columns in order, for the isolation estimators of these names; power: the law may use the
     engine; statistical: there is a statistical detector, whose tests are logged as shares of its level;
-    profile: columns of the commanded profile."""
+    profile: columns of the commanded profile; watch: the instruments are held against one another."""
     aircraft = aircraft or load()
     surfaces = aircraft.surfaces
     return (
@@ -144,6 +145,7 @@ def log_columns(
         *(column for name in estimators for column in _estimator_columns(name)),
         *(f"{s}_effectiveness_estimate" for s in surfaces),
         "mode", "detected",
+        *(("watch_share", "watch_test") if watch else ()),
         *(("manifold_pressure_inhg",) if power else ()),
         *profile,
         *(likelihoods(aircraft) if statistical else ()),

@@ -98,9 +98,9 @@ def views(columns: Sequence[str], power: bool = False) -> tuple[View, ...]:
     """Every view that a log with these columns allows; power: the law has used the engine."""
     known, moved = set(columns), surfaces(columns)
     named = (
-        _tracking(), _profile(LIMITED in known), _surfaces(moved), _detection(), _likelihood(columns),
-        _isolation(estimators(columns)), _ratio(estimators(columns)), _effectiveness(moved), _supervisor(),
-        *((_engine(),) if power else ()), _states(),
+        _tracking(), _profile(LIMITED in known), _surfaces(moved), _detection(), _watch(),
+        _likelihood(columns), _isolation(estimators(columns)), _ratio(estimators(columns)),
+        _effectiveness(moved), _supervisor(), *((_engine(),) if power else ()), _states(),
     )  # fmt: skip
     return tuple(view for view in named if view.panels and known.issuperset(sources(view.columns)))
 
@@ -196,6 +196,13 @@ def _detection() -> View:
     )
     title = "Detection: the test that raises the alarm (above 1), and the detection estimator"
     return View("detection", title, (alarm, *panels), closeup=True)
+
+
+def _watch() -> View:
+    label = "largest residual between two instruments / bound"
+    panel = Panel(label, (Trace("watch_share", "largest", "actual"),), log_scale=True, level=1.0)
+    title = "Detection: the instruments against one another; above 1 one of them is broken"
+    return View("watch", title, (panel,), closeup=True)
 
 
 def _likelihood(columns: Sequence[str]) -> View:

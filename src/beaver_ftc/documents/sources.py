@@ -87,7 +87,7 @@ def _parts(function: FunctionType, seen: set[int]) -> Iterator[str]:
                 yield from _value(known[name], seen)
                 if isinstance(known[name], ModuleType) and not _is_numeric(known[name].__name__):
                     for below in code.co_names:  # a constant or a kernel may be one of its names
-                        yield from _value(getattr(known[name], below, None), seen)
+                        yield from _value(vars(known[name]).get(below), seen)
 
 
 def _is_numeric(module: str) -> bool:

@@ -108,6 +108,31 @@ def test_a_file_of_the_other_kind_is_told_from_one_with_mistakes(beaver):
     assert beaver("sweep", "one.yaml") == (2, "", f"one.yaml:1: {says}\n")
 
 
+@pytest.mark.parametrize(
+    ("written", "says"),
+    [
+        ("sensors: tactical", "'tactical' is not known, did you mean tactical-grade?"),
+        ("faults: [{actuator: elevator, type: loss, at_s: 1}]", "did you mean loss_of_effectiveness?"),
+        ("fdi: {scheme: adaptive}", "did you mean adaptive-estimators?"),
+        ("aircraft: c172p", "jsbsim:NAME as `beaver-ftc list aircraft` has them"),
+        (
+            "faults: {actuator: elevator, type: float, at_s: 1}",
+            "a list of at most 100 items, each begun with `- `",
+        ),
+    ],
+)
+def test_what_was_meant_is_said_of_a_beginning_a_lone_name_and_a_missing_dash(beaver, written, says):
+    status, _, said = _validated(beaver, f"name: x\n{written}\n")
+    assert status == 2
+    assert says in said
+
+
+def test_fault_types_of_surfaces_and_of_sensors_are_told_apart(beaver):
+    listed = re.findall(r"^  (\w+) +(of a sensor: )?", beaver("list", "faults")[1], re.MULTILINE)
+    assert len(set(listed)) == len(listed)
+    assert [bool(of) for _, of in listed] == [False] * 8 + [True] * 5
+
+
 def test_an_airspeed_that_nothing_can_hold_is_said_at_its_key_by_validate(beaver):
     shutil.copytree(ROOT / "tests/data/aircraft/trainer", "trainer")  # its forces have no term of thrust
     status, _, said = _validated(

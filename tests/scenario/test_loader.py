@@ -89,7 +89,7 @@ ONE_MISTAKE = {
     "uncertainty: {coefficients: {Cm_alfa: 1.05}}": (
         "uncertainty.coefficients.Cm_alfa: unknown aerodynamic term, did you mean Cm_alpha?"
     ),
-    "actuators: servos": "s.yaml:2: actuators: 'servos' is text, allowed: ideal, servo or a mapping of",
+    "actuators: servos": "s.yaml:2: actuators: 'servos' is not known, did you mean servo? allowed: ideal,",
     "actuators: {bandwidth_rad_s: -1}": "s.yaml:2: actuators.bandwidth_rad_s: -1 is out of range,",
     "actuators: {bandwidth: 1}": "s.yaml:2: actuators.bandwidth: unknown key, did you mean bandwidth_rad_s?",
     "actuators: {flap: {travel_deg: [5, 1]}}": "actuators.flap.travel_deg: stops out of order or range,",

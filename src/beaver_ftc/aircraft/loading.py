@@ -60,7 +60,8 @@ def load(reference: str = DEFAULT, beside: Path | None = None) -> Aircraft:
         return aircraft
     if reference not in builtin_names():
         raise UnknownAircraft(
-            f"{reference!r} is not known{suggestion(reference, builtin_names())}, jsbsim:NAME, ./FOLDER"
+            f"{reference!r} is not known{suggestion(reference, builtin_names())}, jsbsim:NAME as "
+            "`beaver-ftc list aircraft` has them, ./FOLDER beside the scenario"
         )
     return read(_root() / reference)
 

@@ -1,5 +1,6 @@
 """`beaver-ftc list`: what there is to choose from."""
 
+from collections.abc import Iterator
 from typing import Annotated, Any
 
 import typer
@@ -42,7 +43,7 @@ def _available() -> dict[str, Entries]:
         "aircraft": _aircraft(),
         "schemes": _registered(DETECTORS),
         "laws": _registered(LAWS),
-        "faults": [entry for part in schema.values() for entry in _fault(part)],
+        "faults": [entry for key in ("actuator", "sensor") for entry in _faults(schema, key)],
         "signals": [_kind(schema, name, part) for name, part in schema["Signal"]["properties"].items()],
     }
 
@@ -80,10 +81,14 @@ def _registered(group: str) -> Entries:
     ]
 
 
-def _fault(part: dict[str, Any]) -> Entries:
-    """A part of the schema as a fault type, if it is one: it has a fixed `type`."""
-    kind = part.get("properties", {}).get("type", {}).get("const")
-    return [{"name": kind, "description": _first_line(part)}] if kind else []
+def _faults(schema: dict[str, Any], key: str) -> Iterator[dict[str, str]]:
+    """The parts of the schema that are fault types, with a fixed `type`; key: actuator or sensor."""
+    of = "of a sensor: " if key == "sensor" else ""
+    for part in schema.values():
+        has = part.get("properties", {})
+        kind = has.get("type", {}).get("const")
+        if kind and ("sensor" in has) == (key == "sensor"):
+            yield {"name": kind, "description": of + _first_line(part)}
 
 
 def _kind(schema: dict[str, Any], name: str, node: dict[str, Any]) -> dict[str, str]:

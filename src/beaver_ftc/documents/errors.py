@@ -3,6 +3,8 @@
 from collections.abc import Iterable
 from difflib import SequenceMatcher, get_close_matches
 
+SHORTEST_BEGINNING = 3  # of a name, to be taken for it
+
 
 class BeaverFtcError(Exception):
     """A failure with a message fit for the user: one line, no traceback."""
@@ -31,7 +33,7 @@ def suggestion(given: str, known: Iterable[str], cutoff: float = 0.6) -> str:
 
 
 def nearest(given: str, names: Iterable[str], cutoff: float = 0.6) -> str | None:
-    """The name that is nearest to what was given, of several equally near the first; None if none is near."""
+    """The name that is nearest to what was given, or else begins so; of several the first, of none None."""
     meant = given.lower()[:100]
     lower: dict[str, str] = {}
     for name in names:
@@ -39,4 +41,6 @@ def nearest(given: str, names: Iterable[str], cutoff: float = 0.6) -> str | None
     near = set(get_close_matches(meant, lower, n=len(lower) or 1, cutoff=cutoff))
     ranked = (name for name in lower if name in near)
     best = max(ranked, key=lambda name: SequenceMatcher(None, name, meant).ratio(), default=None)
+    if best is None and len(meant) >= SHORTEST_BEGINNING:
+        best = next((name for name in lower if name.startswith(meant)), None)
     return None if best is None else lower[best]

@@ -12,7 +12,7 @@ from pydantic import ValidationError
 
 from beaver_ftc.documents.base import Location
 from beaver_ftc.documents.document import MAX_PROBLEMS, Document, Problem
-from beaver_ftc.documents.errors import BadInput, suggestion
+from beaver_ftc.documents.errors import BadInput, nearest, suggestion
 
 WHOLE_FILE = "(file)"
 _SHOWN = 48
@@ -127,7 +127,14 @@ def _says(detail: Any, location: Location, data: Any, schema: dict[str, Any]) ->
         return _missing(kind, here, location)
     if kind in ("literal_error", "enum", "union_tag_invalid"):
         return _not_one_of(detail, given, here)
-    return f"{_wrong(detail, given)}, allowed: {_allowed(here, detail)}"
+    near = nearest(given, map(str, _choices(here))) if isinstance(given, str) else None
+    if near:
+        return f"{_shown(given)} is not known, did you mean {near}? allowed: {_allowed(here, detail)}"
+    items = ", each begun with `- `" if kind in _NO_LIST and isinstance(given, dict) else ""
+    return f"{_wrong(detail, given)}, allowed: {_allowed(here, detail)}{items}"
+
+
+_NO_LIST = ("list_type", "tuple_type")
 
 
 def _missing(kind: str, here: list[dict[str, Any]], location: Location) -> str:

@@ -307,6 +307,21 @@ def test_a_stick_left_is_centred_by_no_stick(session):
     assert session.frame()["stick"] is None
 
 
+def test_instruments_are_watched_from_the_start_so_that_it_flies_again_to_the_bit(session, tmp_path):
+    """A surface breaks, and only then an instrument: what was found before is found again."""
+    asked(session, do="break", fault={"type": "float", "actuator": "aileron"})
+    flown(session, 40)
+    asked(session, do="break", fault={"sensor": "q", "type": "bias", "magnitude": 0.3})
+    flown(session, 40)
+    asked(session, do="save")
+    (folder,) = tmp_path.iterdir()
+    log = session.sim.log
+    assert np.array_equal(log.to_numpy(), bf.fly(folder / "scenario.yaml").log.to_numpy(), equal_nan=True)
+    assert session.scenario.fdi.sensor_monitor == "always"
+    own = {"fdi": {"sensor_monitor": "never"}}
+    assert Session(bf.load({"name": "one", **own}), tmp_path).scenario.fdi.sensor_monitor == "never"
+
+
 def test_what_broke_and_was_mended_a_hundred_times_and_more_flies_again(session, tmp_path):
     for i in range(130):
         surface = session.surfaces[i % 4]

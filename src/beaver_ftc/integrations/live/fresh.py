@@ -12,11 +12,17 @@ HELD = ("altitude_m", "airspeed_mps", "heading_deg")  # by the autopilot that th
 
 
 def as_live(scenario: "Scenario") -> "Scenario":
-    """The flight of a page: it is long and expects nothing, and its diagnosis knows every fault type that can
-    be broken there, unless the scenario says what it knows."""
+    """The flight of a page: it is long and expects nothing; its diagnosis knows every fault type that can be
+    broken there, and watches the instruments, which can be broken too, unless the scenario says otherwise.
+
+    A watch that began with the first instrument broken would make of the flight before it another than the
+    saved scenario's, in which that fault is said from the start.
+    """
     stamp = datetime.now(UTC).strftime("%Y%m%d-%H%M%S-%f")[:-3]
     changes: dict[str, Any] = {"name": f"live-{scenario.name[:60]}-{stamp}", "expect": {}}
     changes["duration_s"] = LONGEST_S
+    if "sensor_monitor" not in scenario.fdi.model_fields_set:
+        changes["fdi.sensor_monitor"] = "always"
     if "fault_class" not in scenario.fdi.model_fields_set:
         changes["fdi.fault_class"] = "all"
     return scenario.with_(changes)

@@ -7,7 +7,7 @@ import pytest
 from pydantic import Field
 from tools.drawn.array import CoveringArray, Factor
 from tools.drawn.campaign import fly
-from tools.drawn.compose import array_of, drawn_flights
+from tools.drawn.compose import EVERYTHING, array_of, drawn_flights
 from tools.drawn.promises import broken, told_alike
 
 import beaver_ftc as bf
@@ -84,7 +84,7 @@ def test_the_scenarios_have_every_pair_of_what_the_issue_names():
 
 
 def rows_of(seed):
-    return array_of(json_schema(), AIRCRAFT, True, False, np.random.default_rng([seed, 0])).rows()
+    return array_of(json_schema(), AIRCRAFT, EVERYTHING, np.random.default_rng([seed, 0])).rows()
 
 
 def scheme_pairs(found):
@@ -149,7 +149,7 @@ def paths(words, path=""):
 def test_what_is_declared_covers_the_truth():
     """By the scenario's own warnings, which know another way."""
     loose = []
-    for drawn in islice(drawn_flights(4, AIRCRAFT, declared=True), 120):
+    for drawn in islice(drawn_flights(4, AIRCRAFT, kinds=(EVERYTHING,)), 120):
         said = drawn.scenario().warnings()
         loose += [line for line in said if "fdi.bounds" in line and not line.startswith("environment.gust")]
     assert loose == []

@@ -77,22 +77,26 @@ def fly(drawn: Drawn, again: bool | None = None, by_command: bool | None = None)
 
 
 def commanded(flight: bf.Flight) -> Iterator[str]:
-    """The same by `beaver-ftc run`: exit status, documents and page, and the folder opened."""
+    """The same by `beaver-ftc run`: exit status, documents and page, and the folder opened. The figures, which
+    take ten times as long as the flight, are left out."""
     from typer.testing import CliRunner
 
     from beaver_ftc.cli.main import app
+    from beaver_ftc.results.report import write_report
     from beaver_ftc.scenario.dump import to_yaml
 
     with tempfile.TemporaryDirectory() as place, contextlib.redirect_stderr(io.StringIO()):
         file = Path(place) / "drawn.yaml"
         file.write_text(to_yaml(flight.scenario), encoding="utf-8")
-        ended = CliRunner().invoke(app, ["run", str(file), "--out", place])
+        ended = CliRunner().invoke(app, ["run", str(file), "--out", place, "--no-report"])
         expected = 0 if flight.passed else 1
         if ended.exit_code != expected:
             yield f"exit: {ended.exit_code}, expected {expected}: {ended.output[-200:]!r} {ended.exception!r}"
             return
-        yield from saved_alike(Path(place) / flight.name, flight.metrics)
-        opened = bf.open_run(Path(place) / flight.name)
+        folder = Path(place) / flight.name
+        write_report(folder / "report.html", [folder])
+        yield from saved_alike(folder, flight.metrics)
+        opened = bf.open_run(folder)
         yield from told_alike(opened)
 
 

@@ -1,7 +1,7 @@
 """From a row of the covering array to a scenario."""
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from itertools import pairwise
 from typing import Any
@@ -31,7 +31,23 @@ from tools.drawn.walk import Circumstances, Node, Undrawable, Walk, log_uniform
 SHORTEST_S, LONGEST_S = 3.0, 6.0
 RATES_HZ = {"slow": (20, 40), "usual": (50, 150), "fast": (200, 500)}
 COUNTS = {"one": (1, 2), "two": (2, 3), "many": (3, 7)}
-EVERY_SCHEME, BEYOND, ARRAYS = 0, 4, 5  # of five arrays one has every scheme, one errors not declared
+
+
+@dataclass(frozen=True)
+class Kind:
+    """Of an array. declared: every error of the truth is. only: what a factor is restricted to."""
+
+    declared: bool
+    only: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+
+
+EVERYTHING = Kind(declared=True)
+OURS = Kind(declared=True, only={"scheme": ("adaptive-estimators",)})  # the scheme that promises something
+PLAIN = Kind(
+    declared=True, only={**OURS.only, "changes": ("-",), "sensor fault": ("-",), "faults": ("one", "none")}
+)
+UNDECLARED = Kind(declared=False)
+KINDS = (EVERYTHING, OURS, PLAIN, PLAIN, UNDECLARED)  # one array after the other
 
 
 @dataclass(frozen=True)
@@ -49,30 +65,30 @@ class Drawn:
 
 
 def drawn_flights(
-    seed: int, aircraft: Sequence[str], schema: Node | None = None, declared: bool | None = None
+    seed: int, aircraft: Sequence[str], schema: Node | None = None, kinds: Sequence[Kind] = KINDS
 ) -> Iterator[Drawn]:
     """One covering array after the other, without end. Flight I of a seed is always the same."""
     schema, index, arrays = schema or json_schema(), 0, 0
     keys = tuple(keys_of(schema))
     while True:
-        covered = arrays % ARRAYS != BEYOND if declared is None else declared
-        ours = arrays % ARRAYS not in (EVERY_SCHEME, BEYOND)
-        array = array_of(schema, aircraft, covered, ours, np.random.default_rng([seed, arrays]))
+        kind = kinds[arrays % len(kinds)]
+        array = array_of(schema, aircraft, kind, np.random.default_rng([seed, arrays]))
         for row in array.rows():
             rng = np.random.default_rng([seed, arrays, index])
-            words = Composer(schema, keys, row, covered, rng).words()
+            words = Composer(schema, keys, row, kind.declared, rng).words()
             words |= {"name": f"drawn-{seed}-{index}", "seed": index}
-            yield Drawn(index, row, words, covered)
+            yield Drawn(index, row, words, kind.declared)
             index += 1
         arrays += 1
 
 
-def array_of(
-    schema: Node, aircraft: Sequence[str], declared: bool, ours: bool, rng: np.random.Generator
-) -> CoveringArray:
-    """The array of every factor there is. ours: with no scheme but the one that promises something."""
-    together = Together(schema, declared)
-    return CoveringArray(factors_of(schema, aircraft, declared, ours), together.forbidden, rng)
+def array_of(schema: Node, aircraft: Sequence[str], kind: Kind, rng: np.random.Generator) -> CoveringArray:
+    """The array of every factor there is."""
+    factors = [
+        replace(factor, levels=kind.only.get(factor.name, factor.levels))
+        for factor in factors_of(schema, aircraft, kind.declared)
+    ]
+    return CoveringArray(factors, Together(schema, kind.declared).forbidden, rng)
 
 
 @lru_cache(maxsize=8)

@@ -24,15 +24,15 @@ SPOKEN_FOR = (
 )  # fmt: skip
 
 
-def factors_of(schema: Node, aircraft: Sequence[str], declared: bool, ours: bool) -> list[Factor]:
-    """Every factor. declared: of flights whose every error is declared; ours: of no scheme but ours."""
+def factors_of(schema: Node, aircraft: Sequence[str], declared: bool) -> list[Factor]:
+    """Every factor. declared: of flights whose every error is declared."""
     ranges = DECLARED_ONLY if declared else RANGES
     of_keys = [
         Factor(path, (LEFT_OUT, *levels))
         for path, node in keys_of(schema)
         if path not in SPOKEN_FOR and not ranges.never_given(path) and (levels := levels_of(schema, node))
     ]
-    return [*_own(schema, aircraft, ours), *of_keys]
+    return [*_own(schema, aircraft), *of_keys]
 
 
 def keys_of(schema: Node, node: Node | None = None, path: str = "") -> Iterator[tuple[str, Node]]:
@@ -74,7 +74,7 @@ def levels_of(schema: Node, node: Node) -> tuple[str, ...]:
     return tuple(dict.fromkeys(levels))
 
 
-def _own(schema: Node, aircraft: Sequence[str], ours: bool) -> Iterator[Factor]:
+def _own(schema: Node, aircraft: Sequence[str]) -> Iterator[Factor]:
     at_fault = {"faults": STRUCK}
     change = schema["$defs"]["Change"]["properties"]
     yield Factor("aircraft", tuple(aircraft))
@@ -84,7 +84,7 @@ def _own(schema: Node, aircraft: Sequence[str], ours: bool) -> Iterator[Factor]:
     yield Factor("air", (LEFT_OUT, *severities(schema)))
     yield Factor("gusts", (LEFT_OUT, "one", "several"))
     yield Factor("detector", ("worst-case", "statistical", "either", "both, worst-case counts"))
-    yield Factor("scheme", registered_of(DETECTORS)[: 1 if ours else None])
+    yield Factor("scheme", registered_of(DETECTORS))
     yield Factor("law", registered_of(LAWS))
     yield Factor("changes", (LEFT_OUT, *(key for key in change if key != "at_s"), "several"))
     yield Factor("faults", ("none", *sorted(STRUCK)))
@@ -151,6 +151,10 @@ class Together:
         lacking = (*MOVING_AIR, "autopilot.airspeed_mps", "fdi.probing")
         if other in lacking or other.startswith("uncertainty."):
             return there != LEFT_OUT
+        if (
+            other == "fdi.bounds.turbulence"
+        ):  # declared: the vanes are asked, and the forces are not known well
+            return there not in (LEFT_OUT, "none")
         return (other, there) in (("surface", "4"), ("fdi.pairs", "true"))
 
     def _faults(self, name: str, level: str, other: str, there: str) -> bool:

@@ -34,6 +34,11 @@ def either(*values: Any) -> Ranged:
     return lambda now, path: values[now.rng.integers(len(values))]
 
 
+def none_or(ranged: Ranged) -> Ranged:
+    """0 now and then."""
+    return lambda now, path: 0.0 if now.rng.random() < AT_THE_BOUND else ranged(now, path)
+
+
 def up_to(bound: float) -> Ranged:
     """Of either sign, and often right at the bound."""
     return lambda now, path: signed(now, bound)
@@ -192,8 +197,8 @@ _PATTERNS: dict[str, Ranged | None] = {
     "fdi.pole_bank_per_s": _poles,
     "fdi.bounds.coefficients": within(0.0, 0.1),
     "fdi.bounds.inertia": within(0.0, 0.05),
-    "fdi.bounds.constant_rad_s2.?": within(0.0, 0.1),
-    "fdi.bounds.inertia_coupling.?": within(0.0, 0.5),
+    "fdi.bounds.constant_rad_s2.?": none_or(within(0.0, 0.1)),
+    "fdi.bounds.inertia_coupling.?": none_or(within(0.0, 0.5)),
     "fdi.bounds.deflection_deg": within(0.0, 0.5),
     "control.power.lowest_inhg": within(8.0, 15.0),
     "control.power.highest_inhg": within(25.0, 36.5),

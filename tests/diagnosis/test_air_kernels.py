@@ -9,8 +9,9 @@ from beaver_ftc.aircraft.aircraft import FORCES
 from beaver_ftc.design.model import design_record
 from beaver_ftc.design.terms import fill_table
 from beaver_ftc.design.variants import response
-from beaver_ftc.diagnosis import air
+from beaver_ftc.diagnosis import air, gusts
 from beaver_ftc.diagnosis.air import AIR
+from beaver_ftc.scenario.sensors import Sensors
 
 AIRCRAFT = load()
 SPAN, SCALE, ROLLING, GRAVITY, DT = AIRCRAFT.geometry.span_m, 40.0, 30.0, 9.8, 0.02
@@ -211,3 +212,26 @@ def test_what_an_earlier_diagnosis_kept_is_gone_when_one_begins():
     record = new_air(**kept)
     air.begin(record, Y, np.array([0.3, 0.2, 1.0]))
     assert {name for name in kept if np.any(record[name])} == set()
+
+
+@pytest.mark.parametrize(("angle", "axis"), [("phi", None), ("theta", 1), ("psi", 2)])
+def test_the_noise_of_an_attitude_is_in_the_gust_that_is_followed(angle, axis):
+    """Counted in steady flight through still air: pitch attitude and heading turn the flow as
+    vanes do, a bank by what stands across it."""
+    std_deg, rng, place = 0.2, np.random.default_rng(5), ("phi", "theta", "psi").index(angle)
+    sensors = Sensors.model_validate({angle: {"noise_std_deg": std_deg}})
+    alpha = 0.15
+    y, level = np.array([alpha, 0.0, 45.0, 1036.0, 0.3, 0.0, 0.0, 0.0]), np.array([0.0, alpha, 1.0])
+    record, seen = new_air(), []
+    air.begin(record, y, level)
+    for _ in range(4000):
+        record["force"] = -GRAVITY * np.array([-np.sin(alpha), 0.0, np.cos(alpha)])
+        blurred = level.copy()
+        blurred[place] += np.radians(std_deg) * rng.normal()
+        air.observe(record, y, blurred, DT)
+        seen.append(record["gust"].copy())
+    lags = np.array([4.0, 3.0]) * SPAN / (np.pi * 45.0)
+    counted, reckoned = np.std(seen, axis=0)[1:] * lags, gusts.flow_noise(sensors, 45.0)
+    assert (counted <= 1.02 * reckoned).all()
+    if axis is not None:
+        assert counted[axis - 1] == pytest.approx(reckoned[axis - 1], rel=0.05)

@@ -107,7 +107,7 @@ class CoveringArray:
         for other, levels in self.factors[name].needs.items():
             if other in chosen:
                 continue  # no clash, so it is one of them
-            free = [self._at[other, level] for level in sorted(levels)]
+            free = [self._at[other, level] for level in self.factors[other].levels if level in levels]
             free = [i for i in free if not self._clash[i, list(chosen.values())].any()]
             if not free or not self._put(int(self._rng.choice(free)), chosen):
                 return False

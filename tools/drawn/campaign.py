@@ -77,8 +77,8 @@ def fly(drawn: Drawn, again: bool | None = None, by_command: bool | None = None)
 
 
 def commanded(flight: bf.Flight) -> Iterator[str]:
-    """The same by `beaver-ftc run`: exit status, documents and page, and the folder opened. The figures, which
-    take ten times as long as the flight, are left out."""
+    """The same by `beaver-ftc run`: exit status, documents, page, and the folder opened. Without the figures,
+    which take ten times as long as the flight."""
     from typer.testing import CliRunner
 
     from beaver_ftc.cli.main import app

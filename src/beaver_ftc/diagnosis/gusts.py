@@ -1,6 +1,6 @@
 """From the turbulence that a scenario declares, and its instruments, to what the air does unseen (air.py)."""
 
-from math import pi, sqrt
+from math import hypot, pi, sqrt
 
 import numpy as np
 
@@ -66,9 +66,14 @@ def set_up_jitter(
 
 
 def flow_noise(sensors: Sensors, airspeed_mps: float) -> np.ndarray:
-    """Of the flow's angles (2,) as the vanes and the airspeed have them, standard deviation in rad."""
-    speed = 0.3 * sensors.V.random_error / airspeed_mps  # through attitudes of up to 17 deg
-    return np.array([sensors.alpha.random_error, sensors.beta.random_error]) + speed
+    """Of the flow's angles (2,) against the level axes, as vanes, airspeed and attitude have them, standard
+    deviation in rad: what pitch attitude and heading are off turns the flow as much as what a vane is off."""
+    through = 0.3  # attitudes and incidences of up to 17 deg
+    vanes = (
+        hypot(sensors.alpha.random_error, sensors.theta.random_error),
+        hypot(sensors.beta.random_error, sensors.psi.random_error),
+    )
+    return np.array(vanes) + through * (sensors.V.random_error / airspeed_mps + sensors.phi.random_error)
 
 
 def jitter(flow: np.ndarray, design: np.void, y: np.ndarray, u: np.ndarray, span_m: float) -> np.ndarray:

@@ -149,7 +149,7 @@ def instants(count, seed=5):
 @pytest.mark.parametrize("own_errors", [0, 1])
 def test_means_over_a_frame_are_of_its_instants(count, own_errors):
     fdi, record = new_fdi(), new_belief(1.0 / count)
-    fdi["bound"]["own_errors"], fdi["returns"] = own_errors, 1
+    fdi["bound"]["own_errors"], fdi["every_type"] = own_errors, 1
     fdi["layout"]["dominant_axis"] = 0, 1, 2, 1
     record["sums"]["f"] = record["sums"]["G"] = record["sums"]["Gu"] = 99.0  # of an earlier frame
     record["sums"]["eta_bar"] = 99.0
@@ -183,6 +183,9 @@ def test_means_over_a_frame_are_of_its_instants(count, own_errors):
     own_axis = np.array([G[(0, 1, 2, 1), range(4)] for _, G, *_ in seen])
     assert mean["G_least"] == pytest.approx(own_axis.min(axis=0))
     assert mean["G_most"] == pytest.approx(own_axis.max(axis=0))
+    deflections = np.array([u for _, _, u, *_ in seen])
+    assert mean["u_least"] == pytest.approx(deflections.min(axis=0))
+    assert mean["u_most"] == pytest.approx(deflections.max(axis=0))
 
 
 def test_a_command_is_followed_by_surfaces_that_were_where_they_were():

@@ -152,6 +152,13 @@ def test_a_plane_that_is_alarmed_and_not_explained_stays_open():
     assert several(named=[(FLAP, 9.0)], alarmed=alarmed)["faults"][1:] == ()
 
 
+def test_where_no_plane_is_alarmed_both_stay_open():
+    found = several(left={ELEVATOR: [BIAS], RUDDER: [STUCK]})
+    assert found["candidates"] == (
+        f"elevator:{NAMES[BIAS]}", "elevator+flap", f"rudder:{NAMES[STUCK]}", "aileron+rudder",
+    )  # fmt: skip
+
+
 @pytest.mark.parametrize("kind", [STUCK, UP])
 def test_where_one_of_two_in_pitch_stands_still_the_other_may_be_off_as_well(kind):
     fdi = new({ELEVATOR: [kind], RUDDER: [kind]}, pairs=1)

@@ -47,6 +47,7 @@ def new_surface(left=ALL, low=-0.01, high=0.01, command=0.0, **fields):
     fdi["block"]["length"], fdi["block"]["span_s"], fdi["frame"] = 1, DT, 10
     surface = fdi["surface"][0]
     surface["travel_low"], surface["travel_high"], surface["approach"], surface["step"] = LOW, HIGH, 0.5, 0.1
+    surface["reach_low"], surface["reach_high"] = min(LOW, 0.0), max(HIGH, 0.0)
     examine.begin(surface)
     surface["set_low"][BIAS], surface["set_high"][BIAS] = -np.inf, np.inf
     surface["low_then"], surface["high_then"], surface["command_then"] = low, high, command
@@ -124,9 +125,10 @@ def test_an_offset_is_unlimited_at_a_stop():
     assert sets.offset(fdi, surface)[0] == -np.inf
 
 
-def test_over_a_block_a_stop_may_have_been_met_at_its_furthest_order():
+@pytest.mark.parametrize("length", [1, 5])  # frames; one may have several instants
+def test_within_what_is_seen_at_once_a_stop_may_have_been_met_at_its_furthest_order(length):
     fdi, surface = new_surface(low=0.2, high=0.25, command=0.1)
-    fdi["block"]["length"] = 5
+    fdi["block"]["length"] = length
     surface["orders"]["least"][1], surface["orders"]["greatest"][1] = -0.4, 0.34
     # the lowest it was: 0.2 - (0.1 + 0.4) = -0.3; the highest: 0.25 + 0.24 = 0.49, below 0.5
     assert sets.offset(fdi, surface) == pytest.approx((0.1, 0.15))
@@ -144,6 +146,10 @@ def test_a_bias_keeps_the_offsets_that_explain_every_frame():
     assert (surface["set_low"][BIAS], surface["set_high"][BIAS]) == pytest.approx((-0.17, -0.15))
     surface["command"] = 0.05
     assert bias.deflection(fdi, surface, BIAS) == pytest.approx((-0.12, -0.1))
+    orders, surface["command"] = surface["orders"], -0.2
+    orders["least"][0], orders["greatest"][0] = -0.24, -0.1  # where it was meanwhile: to -0.41 and to -0.25
+    assert bias.deflection(fdi, surface, BIAS) == pytest.approx((LOW, -0.35))
+    orders["least"][0] = orders["greatest"][0] = 0.0
     assert bias.interval(fdi, 0, BIAS) == pytest.approx((-0.17, -0.15))
     assert bias.estimate(fdi, 0, BIAS) == pytest.approx(-0.16)
     surface["set_high"][BIAS] = np.inf
@@ -293,6 +299,28 @@ def test_what_holds_a_surface_is_excluded_where_it_is_not(module, kind, inside, 
         assert module.estimate(fdi, 0, kind) == pytest.approx(0.175)
 
 
+@pytest.mark.parametrize(
+    ("whole", "hides", "excluded"),
+    [(1, (0, 0), 1), (0, (0, 0), 1), (1, (0, 1), 1), (0, (0, 1), 0), (0, (1, 0), 1)],
+)
+def test_at_a_stop_the_mean_of_a_quick_swing_keeps_its_sign(whole, hides, excluded):
+    fdi, surface = new_surface(low=-0.2, high=-0.1, command=0.1)  # below its command all the time
+    fdi["whole"], surface["hides_then"] = whole, hides
+    for frame in range(30):
+        oscillatory.judge(fdi, surface, OSCILLATORY, frame)
+    assert surface["type_excluded"][OSCILLATORY] == excluded
+
+
+@pytest.mark.parametrize(("least", "greatest", "hides"), [
+    (-0.3, 0.4, [0, 0]), (-0.31, 0.3, [1, 0]), (0.0, 0.41, [0, 1]), (-0.35, 0.45, [1, 1]), (LOW, LOW, [1, 0]),
+])  # fmt: skip
+def test_a_stop_hides_what_is_no_wider_than_the_interval_of_a_deflection(least, greatest, hides):
+    _, surface = new_surface()
+    surface["orders"]["least"][0], surface["orders"]["greatest"][0] = least, greatest
+    examine.note_stops(surface, 0.0999)
+    assert surface["hides"].tolist() == hides
+
+
 def test_a_jam_narrows_to_where_it_is_seen():
     fdi, surface = new_surface(low=0.1, high=0.2)
     stuck.judge(fdi, surface, STUCK, 5)
@@ -308,6 +336,10 @@ def test_where_types_have_a_surface():
     fdi["frame"] = 5
     assert loss.deflection(fdi, surface, CONSTANT_LOSS) == pytest.approx((-0.2, -0.05))
     assert floating.deflection(fdi, surface, FLOAT) == (0.0, 0.0)
+    surface["travel_low"] = 0.1  # the lower stop is as near to neutral as it comes
+    assert floating.deflection(fdi, surface, FLOAT) == (0.1, 0.1)
+    assert floating.estimate(fdi, 0, FLOAT) == 0.1
+    surface["travel_low"] = LOW
     assert hardover_up.deflection(fdi, surface, UP) == pytest.approx((0.14, HIGH))
     assert hardover_down.deflection(fdi, surface, DOWN) == pytest.approx((LOW, 0.16))
     assert [module.estimate(fdi, 0, 0) for module in (floating, hardover_up, hardover_down)] == [

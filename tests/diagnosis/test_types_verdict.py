@@ -45,8 +45,9 @@ def new_case(**left):
     layout["dominant_axis"], layout["main"] = (ROLL, PITCH, YAW, PITCH), (AILERON, ELEVATOR, RUDDER)
     layout["group"], layout["partner"] = (1, 0, 1, 0), (RUDDER, FLAP, AILERON, ELEVATOR)
     fdi["estimator"]["surface"][:8], fdi["estimator"]["kind"][:8] = (0, 1, 2, 3) * 2, (0,) * 4 + (1,) * 4
-    fdi["surface"]["in_question"], fdi["surface"]["evidence"] = 1, 99
+    fdi["surface"]["in_question"], fdi["surface"]["evidence"], fdi["surface"]["unhidden"] = 1, 99, 99
     fdi["surface"]["travel_low"], fdi["surface"]["travel_high"] = -0.4, 0.5
+    fdi["surface"]["reach_low"], fdi["surface"]["reach_high"] = -0.4, 0.5
     fdi["estimator"]["low"][4:8], fdi["estimator"]["high"][4:8] = -0.4, 0.5
     for s, name in enumerate(("aileron", "elevator", "rudder", "flap")):
         kinds = left.get(name, ALL)
@@ -195,11 +196,19 @@ def test_a_bias_that_grows_may_look_like_a_jam_or_a_loss():
 )
 def test_a_type_is_named_once_it_is_the_only_one(kinds, evidence, half_cycles, found, in_coarse_sets):
     """In sets that errors declared of our own make coarse, a constant proves nothing: one type of all."""
-    fdi, surface = one(*kinds, evidence=evidence)
+    fdi, surface = one(*kinds, evidence=evidence, unhidden=evidence)
     surface["oscillatory"]["half_cycles"] = half_cycles
     assert verdict.type_at_fault(fdi, surface) == found
     fdi["bound"]["own_errors"] = 1
     assert verdict.type_at_fault(fdi, surface) == in_coarse_sets
+
+
+@pytest.mark.parametrize("kind", [STUCK, VARYING_LOSS, GROWING_BIAS])
+def test_what_a_stop_may_have_hidden_is_waited_for(kind):
+    fdi, surface = one(kind, OSCILLATORY, evidence=99, unhidden=2 * PATIENCE - 1)
+    assert verdict.type_at_fault(fdi, surface) == -1
+    leave(surface, kind)  # an oscillation that has been excluded is not
+    assert verdict.type_at_fault(fdi, surface) == kind
 
 
 @pytest.mark.parametrize(
@@ -240,6 +249,7 @@ def test_the_surface_at_fault():
 def test_of_elevator_and_flap_the_one_a_constant_explains(flap, evidence, own_errors, refuted):
     fdi = new_case(elevator=(STUCK,), aileron=None, rudder=None, flap=flap)
     fdi["surface"]["evidence"][ELEVATOR], fdi["bound"]["own_errors"] = evidence, own_errors
+    fdi["surface"]["unhidden"][FLAP] = evidence
     assert bool(verdict.others_refuted(fdi, ELEVATOR)) == refuted
     if flap is not None:
         assert verdict.surface_at_fault(fdi) == (ELEVATOR if refuted else NOT_ISOLATED)
@@ -343,6 +353,7 @@ def test_orders_are_kept_for_the_frames_before():
         for k, order in enumerate(frame):
             fdi["block"]["length"], fdi["block"]["filled"] = 2, k
             means["G_least"], means["G_most"] = -1.0 - order, 2.0 - k
+            means["u_least"], means["u_most"] = order - 0.01, order + 0.02
             examine.note_orders(fdi, np.full(4, order), means)
     orders = fdi["surface"][0]["orders"]
     assert orders["given"][:, :2] == pytest.approx(
@@ -351,6 +362,8 @@ def test_orders_are_kept_for_the_frames_before():
     assert orders["low"] == pytest.approx([0.0, -0.1, 0.1])
     assert orders["high"] == pytest.approx([0.5, 0.3, 0.2])
     assert (fdi["surface"][0]["G_least"], fdi["surface"][0]["G_most"]) == (-1.9, 2.0)  # of the last block
+    assert orders["least"] == pytest.approx([-0.01, -0.11])  # of a healthy one
+    assert orders["greatest"] == pytest.approx([0.92, 0.32])
 
 
 def test_what_the_effectiveness_varies_by_is_a_share_of_its_mean():
@@ -409,6 +422,31 @@ def test_a_frame_next_to_a_healthy_one_is_judged_only_if_faults_begin_between_fr
     assert (surface["start_low"], surface["start_high"]) == ((0.1, 0.2) if judged else (0.0, 0.0))
     assert fdi["frame"] == 8
     assert surface["oscillatory"]["steady_since"] == (6 if judged else 7)
+
+
+def test_evidence_counts_for_a_swing_since_a_stop_could_last_hide_one():
+    fdi = new_case()
+    surface = fdi["surface"][RUDDER]
+    examine.begin(surface)
+    counted = []
+    for hides in ((0, 0), (0, 0), (0, 1), (0, 0), (1, 0), (0, 0), (0, 0), (0, 0)):
+        surface["wrong_then"], surface["hides_then"] = 1, hides
+        surface["low_then"], surface["high_then"] = 0.1, 0.2
+        examine.judge_all(fdi)
+        counted.append(int(surface["unhidden"]))
+    assert counted == [1, 2, 0, 1, 0, 1, 2, 3]
+    assert surface["evidence"] == 8
+
+
+def test_where_a_stop_is_follows_the_surface_by_a_frame():
+    fdi = new_case()
+    surface, effect = fdi["surface"][RUDDER], fdi["estimator"][4 + RUDDER]["effect"]
+    effect["Z"], effect["spread"], bound = (0.5, 0.0, -2.0), (9.0, 9.0, 0.02), np.array([9.0, 9.0, 0.08])
+    for at, now in ((0.41, 1), (0.39, 0)):  # 2 (0.08 + 0.02) / 2 is 0.1 rad, the stop at 0.5
+        surface["orders"]["greatest"][0], then = at, surface["hides"].copy()
+        examine.locate(fdi, RUDDER, np.zeros(3), bound, effect)
+        assert surface["hides"].tolist() == [0, now]
+        assert surface["hides_then"].tolist() == then.tolist()
 
 
 def test_a_frame_that_puts_a_surface_nowhere_judges_nothing():
@@ -485,11 +523,6 @@ def test_a_block_is_the_mean_of_its_frames_with_the_noise_of_its_ends():
     assert mean["Z"] == pytest.approx(Z[:, 4 + RUDDER].mean(axis=0))
     assert mean["offset"] == pytest.approx(offset[:, 4 + RUDDER].mean(axis=0))
     assert mean["spread"] == pytest.approx(spread[:, 4 + RUDDER].mean(axis=0))
-    commands = -offset[:, 4 + RUDDER, YAW] / Z[:, 4 + RUDDER, YAW]
-    orders = fdi["surface"][RUDDER]["orders"]
-    assert (orders["least"][0], orders["greatest"][0]) == pytest.approx((commands.min(), commands.max()))
-    blocks.begin(fdi)
-    assert (orders["least"][1], orders["greatest"][1]) == pytest.approx((commands.min(), commands.max()))
 
 
 # Two faults at once.
@@ -669,7 +702,7 @@ def _first(fdi, surface):
     ],
 )  # fmt: skip
 def test_when_a_first_fault_in_pitch_is_known_well_enough(kinds, evidence, patient):
-    assert bool(pairs.patient(*one(*kinds, evidence=evidence))) == patient
+    assert bool(pairs.patient(*one(*kinds, evidence=evidence, unhidden=evidence))) == patient
 
 
 def test_in_pitch_a_jam_stays_open_as_the_other_may_be_off_by_a_constant():

@@ -27,17 +27,19 @@ def sums_dtype(n: int) -> np.dtype:
         ("own_per_rad", "f8", (3, n)), ("own", "f8", (3, n)),
         ("Gu_first", "f8", (3, n)),  # of the first instant alone
         ("G_least", "f8", (n,)), ("G_most", "f8", (n,)),  # on each surface's dominant axis
+        ("u_least", "f8", (n,)), ("u_most", "f8", (n,)),  # rad
     ]  # fmt: skip
     return np.dtype(fields, align=True)
 
 
 @lru_cache
 def means_dtype(n: int) -> np.dtype:
-    """Means over the elapsed frame. acceleration: f + G u; Gu_spread: see `spread`. G_least, G_most: within
-    it, on each surface's dominant axis; where a surface let go may be on its way back."""
+    """Means over the elapsed frame. acceleration: f + G u; Gu_spread: see `spread`. Within it, where faults
+    of every type are in question: G_least, G_most on each surface's dominant axis, and u_least, u_most, where
+    a healthy one was."""
     fields = [
         ("G", "f8", (3, n)), ("Gu", "f8", (3, n)), ("Gu_spread", "f8", (3, n)), ("acceleration", "f8", (3,)),
-        ("G_least", "f8", (n,)), ("G_most", "f8", (n,)),
+        ("G_least", "f8", (n,)), ("G_most", "f8", (n,)), ("u_least", "f8", (n,)), ("u_most", "f8", (n,)),
     ]  # fmt: skip
     return np.dtype(fields, align=True)
 
@@ -93,18 +95,19 @@ def sum_up(fdi, belief):
         for s in range(u.size):
             total.G[i, s] += G[i, s]
             total.Gu[i, s] += G[i, s] * u[s]
-    if fdi.returns:
-        note_extremes(fdi.layout.dominant_axis, G, total)
+    if fdi.every_type:
+        note_extremes(fdi.layout.dominant_axis, G, u, total)
     if fdi.bound.own_errors:
         sum_up_own_errors(fdi.bound.admitted.per_rad, u, total)
 
 
 @kernel
-def note_extremes(dominant_axis, G, total):
-    """Keep the least and greatest effectiveness within the frame."""
+def note_extremes(dominant_axis, G, u, total):
+    """Keep the least and greatest effectiveness and deflection within the frame."""
     for s in range(dominant_axis.size):
         now = G[dominant_axis[s], s]
         total.G_least[s], total.G_most[s] = min(total.G_least[s], now), max(total.G_most[s], now)
+        total.u_least[s], total.u_most[s] = min(total.u_least[s], u[s]), max(total.u_most[s], u[s])
 
 
 @kernel
@@ -129,6 +132,7 @@ def elapse(fdi, belief):
         mean.acceleration[i] = rate
         fdi.bound.eta_bar[i] = share * total.eta_bar[i]
     mean.G_least[:], mean.G_most[:] = total.G_least, total.G_most
+    mean.u_least[:], mean.u_most[:] = total.u_least, total.u_most
     if fdi.bound.own_errors:
         fdi.bound.own_per_rad[:] = share * total.own_per_rad
         fdi.bound.own[:] = share * total.own
@@ -175,6 +179,7 @@ def begin_frame(fdi, belief, measured):
     total.f[:], total.eta_bar[:] = 0.0, 0.0
     total.G[:], total.Gu[:] = 0.0, 0.0
     total.G_least[:], total.G_most[:] = np.inf, -np.inf
+    total.u_least[:], total.u_most[:] = np.inf, -np.inf
     if fdi.bound.own_errors:
         total.own_per_rad[:], total.own[:] = 0.0, 0.0
     sum_up(fdi, belief)

@@ -74,7 +74,7 @@ def estimator_names(fault_class: str, aircraft: Aircraft) -> tuple[str, ...]:
 
 
 def _assemble_diagnosis(
-    fdi: np.void, config: FdiConfig, dt: float, travel: np.ndarray, aircraft: Aircraft
+    fdi: np.void, config: FdiConfig, dt: float, reach: np.ndarray, aircraft: Aircraft
 ) -> None:
     fdi["enabled"] = config.scheme == "adaptive-estimators"
     fdi["thresholds"] = _THRESHOLDS[config.thresholds]
@@ -92,7 +92,7 @@ def _assemble_diagnosis(
     _assemble_layout(fdi["layout"], members, aircraft)
     for fie, (_, kind, surface) in zip(fdi["estimator"], members, strict=False):
         fie["kind"], fie["surface"] = kind, surface
-        fie["low"], fie["high"] = PARAMETER_SET[kind] if kind == LOSS else travel[:, surface]
+        fie["low"], fie["high"] = PARAMETER_SET[kind] if kind == LOSS else reach[:, surface]
 
 
 def _assemble_bound(bound: np.void, config: FdiConfig, aircraft: Aircraft) -> None:
@@ -119,6 +119,7 @@ def _assemble_types(frame: np.void, scenario: Scenario, dt: float, travel: np.nd
     surfaces, instant_s = scenario.airframe.surfaces, dt / scenario.substeps
     for s, (name, place, low, high) in enumerate(zip(surfaces, fdi["surface"], *travel, strict=True)):
         place["travel_low"], place["travel_high"] = low, high
+        place["reach_low"], place["reach_high"] = min(low, 0.0), max(high, 0.0)
         place["in_question"] = not config.pairs or fdi["layout"]["group"][s] == IN_PITCH
         place["measure"], place["type"] = -1, -1
         place["approach"], place["step"] = actuators["approach"][s], actuators["step"][s]
@@ -317,28 +318,27 @@ def assemble(scenario: Scenario, trim: np.ndarray, travel: np.ndarray) -> np.nda
 
 def _assemble_design(scenario: Scenario, travel: np.ndarray) -> np.ndarray:
     """What does not depend on the trim, the seed and the truth."""
-    frames = memory.taken_empty((1,), frame_dtype(scenario.airframe.n))
+    airframe = scenario.airframe
+    frames = memory.taken_empty((1,), frame_dtype(airframe.n))
     frame, dt = frames[0], 1.0 / scenario.rate_hz
-    frame["dt"] = dt
     belief, truth = frame["belief"], frame["truth"]
-    belief["share"] = 1.0 / scenario.substeps
-    belief["design"] = design_of(scenario.design_model, scenario.airframe)[0]
+    frame["dt"], belief["share"] = dt, 1.0 / scenario.substeps
+    belief["design"] = design_of(scenario.design_model, airframe)[0]
     channels = truth_read(scenario)
-    truth["n"], truth["declared"] = len(channels), len(scenario.airframe.signals)
+    truth["n"], truth["declared"] = len(channels), len(airframe.signals)
     truth["factor"][: len(channels)] = [factor for _, _, factor in channels]
     frame["accounts"]["guarantee"]["certain_after_s"] = -1.0
     jsbsim_dt = dt / scenario.substeps
     assemble_instruments(frame, scenario, jsbsim_dt)
     assemble_watch(frame["fdi"]["watch"], scenario, jsbsim_dt)
-    _assemble_actuators(
-        belief["actuators"], scenario.actuators, jsbsim_dt, travel, scenario.airframe.surfaces
-    )
-    _assemble_diagnosis(frame["fdi"], scenario.fdi, dt, travel, scenario.airframe)
+    _assemble_actuators(belief["actuators"], scenario.actuators, jsbsim_dt, travel, airframe.surfaces)
+    reach = np.array([np.minimum(travel[0], 0.0), np.maximum(travel[1], 0.0)])  # a share of it can be left
+    _assemble_diagnosis(frame["fdi"], scenario.fdi, dt, reach, airframe)
     _assemble_types(frame, scenario, dt, travel)
     _assemble_admitted(frame, scenario)
     _assemble_sharpening(frame["fdi"], scenario.fdi, dt)
     _assemble_network(frame["fdi"]["fdae"]["network"], scenario.control)
-    _assemble_control(frame["control"], scenario.control, dt, travel, scenario.airframe)
+    _assemble_control(frame["control"], scenario.control, dt, travel, airframe)
     _assemble_probing(frame["control"], scenario.fdi.probing, dt)
     _assemble_power(frame["control"], scenario, dt)
     return frames

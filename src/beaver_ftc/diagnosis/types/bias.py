@@ -18,8 +18,17 @@ def judge(fdi, surface, kind, frame):
 
 @kernel
 def deflection(fdi, surface, kind):
-    """The command and the offset."""
-    return surface.command + surface.set_low[kind], surface.command + surface.set_high[kind]
+    """The command and the offset, cut off by the stops."""
+    low = cut_off(surface, surface.set_low[kind], surface.orders.least[0])
+    return low, cut_off(surface, surface.set_high[kind], surface.orders.greatest[0])
+
+
+@kernel
+def cut_off(surface, offset, extreme):
+    """Where an offset (rad) takes a surface in the mean; if a stop is met at an instant, at the `extreme`."""
+    orders, mean = surface.orders, surface.command + offset
+    met = orders.least[0] + offset < surface.travel_low or orders.greatest[0] + offset > surface.travel_high
+    return sets.within_travel(surface, extreme + offset) if met else mean
 
 
 def estimate(fdi: np.void, s: int, kind: int) -> float | None:

@@ -11,10 +11,7 @@ extremes. A block is then to the types what a frame is that consists of several 
 healthy one is passed over.
 """
 
-import numpy as np
-
 from beaver_ftc.compiled import kernel
-from beaver_ftc.diagnosis import membership
 from beaver_ftc.diagnosis.types.examine import judge_all, locate, note_wrong
 
 
@@ -24,10 +21,8 @@ def begin(fdi):
     fdi.block.innovation[:], fdi.block.bound[:] = 0.0, 0.0
     fdi.block.noise[:] = fdi.bound.noise_then
     for s in range(fdi.surface.size):
-        effect, orders = fdi.estimator[fdi.layout.position_of[s]].block_effect, fdi.surface[s].orders
+        effect = fdi.estimator[fdi.layout.position_of[s]].block_effect
         effect.offset[:], effect.Z[:], effect.spread[:] = 0.0, 0.0, 0.0
-        orders.least[1], orders.greatest[1] = orders.least[0], orders.greatest[0]
-        orders.least[0], orders.greatest[0] = np.inf, -np.inf
 
 
 @kernel
@@ -38,15 +33,12 @@ def add(fdi):
         fdi.block.innovation[i] += share * fdi.innovation[i]
         fdi.block.bound[i] += share * fdi.bound.eta_bar[i]
     for s in range(fdi.surface.size):
-        fie, orders = fdi.estimator[fdi.layout.position_of[s]], fdi.surface[s].orders
+        fie = fdi.estimator[fdi.layout.position_of[s]]
         frame, mean = fie.effect, fie.block_effect
         for i in range(3):
             mean.offset[i] += share * frame.offset[i]
             mean.Z[i] += share * frame.Z[i]
             mean.spread[i] += share * frame.spread[i]
-        axis = membership.dominant(frame.Z)
-        command = -frame.offset[axis] / frame.Z[axis]
-        orders.least[0], orders.greatest[0] = min(orders.least[0], command), max(orders.greatest[0], command)
 
 
 @kernel

@@ -75,6 +75,12 @@ def swings(surface):
 
 
 @kernel
+def would_have_swung(fdi, surface):
+    """Whether there is no oscillation, or a whole one of the slowest would have shown, hidden by no stop."""
+    return not left(surface, OSCILLATORY) or surface.unhidden >= 2 * fdi.patience
+
+
+@kernel
 def only_a_swing(surface):
     """Whether nothing but an oscillation is left, and it has not swung for long enough."""
     for kind in range(N_TYPES):

@@ -65,8 +65,8 @@ def shown(surface):
 
 @kernel
 def deflection(fdi, surface, kind):
-    """Anywhere in the travel."""
-    return surface.travel_low, surface.travel_high
+    """Anywhere within reach."""
+    return surface.reach_low, surface.reach_high
 
 
 def estimate(fdi: np.void, s: int, kind: int) -> float | None:

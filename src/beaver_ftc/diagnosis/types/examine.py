@@ -36,16 +36,17 @@ def begin(surface):
     """Nothing is known of this surface yet."""
     surface.set_low[:], surface.set_high[:] = -np.inf, np.inf
     surface.type_excluded[:] = 0
-    surface.low, surface.high = surface.travel_low, surface.travel_high
+    surface.low, surface.high = surface.reach_low, surface.reach_high
     surface.started_at = -1
-    surface.evidence = surface.quiet = 0
+    surface.evidence = surface.quiet = surface.unhidden = 0
     begin_each(surface)
 
 
 @kernel
 def note_orders(fdi, commanded, means):
-    """What the surfaces have been ordered to do, commanded (n,) rad, since the elapsed frame began; and their
-    least and greatest effectiveness within it: means of a `belief.means_dtype`."""
+    """What the surfaces have been ordered to do, commanded (n,) rad, since the elapsed frame began; where
+    healthy ones were, and their least and greatest effectiveness, within it: means of a `belief.means_dtype`.
+    """
     for s in range(fdi.surface.size):
         surface = fdi.surface[s]
         orders = surface.orders
@@ -54,10 +55,14 @@ def note_orders(fdi, commanded, means):
                 orders.given[age, : fdi.block.length] = orders.given[age - 1, : fdi.block.length]
                 orders.low[age], orders.high[age] = orders.low[age - 1], orders.high[age - 1]
             orders.low[0], orders.high[0] = np.inf, -np.inf
+            orders.least[1], orders.greatest[1] = orders.least[0], orders.greatest[0]
+            orders.least[0], orders.greatest[0] = np.inf, -np.inf
             surface.G_least, surface.G_most = np.inf, -np.inf
         order = min(max(commanded[s], surface.travel_low), surface.travel_high)
         orders.given[0, fdi.block.filled] = order
         orders.low[0], orders.high[0] = min(orders.low[0], order), max(orders.high[0], order)
+        orders.least[0] = min(orders.least[0], means.u_least[s])
+        orders.greatest[0] = max(orders.greatest[0], means.u_most[s])
         surface.G_least = min(surface.G_least, means.G_least[s])
         surface.G_most = max(surface.G_most, means.G_most[s])
 
@@ -80,6 +85,16 @@ def locate(fdi, s, innovation, bound, effect):
             continue  # over a block the axes weigh what varies differently
         low, high = membership.agreeing(innovation, bound, fie, effect, i)
         surface.low, surface.high = max(surface.low, low), min(surface.high, high)
+    surface.hides_then[:] = surface.hides
+    note_stops(surface, 2.0 * (bound[axis] + effect.spread[axis]) / abs(effect.Z[axis]))
+
+
+@kernel
+def note_stops(surface, width):
+    """Which stops can cut a deflection off unseen: those nearer to a healthy surface than `width` (rad), that
+    of the interval which holds the true deflection."""
+    surface.hides[0] = surface.orders.least[0] - surface.travel_low < width
+    surface.hides[1] = surface.travel_high - surface.orders.greatest[0] < width
 
 
 @kernel
@@ -98,6 +113,13 @@ def take_in_frame(fdi):
     for s in range(fdi.surface.size):
         effect = fdi.estimator[fdi.layout.position_of[s]].effect
         locate(fdi, s, fdi.innovation, fdi.bound.frame, effect)
+
+
+@kernel
+def note_evidence(surface):
+    """Count a frame as evidence; see `judge_all` for that which no stop can have hidden."""
+    surface.evidence += 1
+    surface.unhidden += 1
 
 
 @kernel
@@ -121,12 +143,14 @@ def judge_all(fdi):
         if fdi.abrupt and surface.measure == FIXED and not surface.wrong_then:
             note_quiet(fdi, s)
         elif surface.wrong_then and (fdi.whole or (surface.wrong_before and surface.wrong)):
-            surface.evidence += 1
+            note_evidence(surface)
             judge(fdi, surface, fdi.frame - 1)
         else:
             pass_over_each(fdi, surface)
         if fdi.returns and fdi.frame > 0:
             bring_back_each(fdi, surface)
+        if surface.hides_then[0] or surface.hides_then[1]:
+            surface.unhidden = 0
     fdi.frame += 1
 
 
@@ -149,7 +173,7 @@ def note_quiet(fdi, s):
         return
     for other in range(fdi.surface.size):
         if other == s or (surface.in_question and fdi.surface[other].in_question):
-            fdi.surface[other].evidence += 1
+            note_evidence(fdi.surface[other])
     surface.quiet += 1
     if surface.quiet > fdi.patience and not fdi.bound.own_errors:
         surface.type_excluded[OSCILLATORY] = 1

@@ -60,9 +60,12 @@ def _found_of_several(fdi: np.void, names: Sequence[str]) -> Found:
         key=lambda s: (fdi["surface"][s]["named_at_s"], s),
     )
     faults = [_found_on(fdi, s, int(fdi["surface"][s]["type"]), names) for s in at_fault]
+    planes = fdi["pair"]["alarmed"]
+    if not planes.any() and not faults and int(fdi["verdict"]["isolated"]) == NOT_ISOLATED:
+        planes = np.ones_like(planes)  # a statistical alarm by itself says of no plane that it is there
     open_planes = [
         {**_NOTHING, "candidates": tuple(_open_questions(fdi, plane, names))}
-        for alarmed, plane in zip(fdi["pair"]["alarmed"], _planes(fdi), strict=True)
+        for alarmed, plane in zip(planes, _planes(fdi), strict=True)
         if alarmed and not set(plane) & set(at_fault)
     ]
     if faults:

@@ -1,9 +1,9 @@
-"""A surface that trails freely: p = 0."""
+"""A surface that trails freely: p = 0, or the stop that is nearest to it."""
 
 import numpy as np
 
 from beaver_ftc.compiled import kernel
-from beaver_ftc.diagnosis.types import release
+from beaver_ftc.diagnosis.types import release, sets
 
 NAME = "float"
 CONSTANT = True
@@ -18,14 +18,16 @@ def begin(surface, kind):
 @kernel
 def judge(fdi, surface, kind, frame):
     """It is at neutral."""
-    release.holds(fdi, surface, kind, 0.0, 0.0)
+    neutral = sets.within_travel(surface, 0.0)
+    release.holds(fdi, surface, kind, neutral, neutral)
 
 
 @kernel
 def let_go(fdi, surface, kind):
     """It may be let go at neutral."""
     low, high, _ = release.beginning(fdi, surface)
-    release.let_go(surface, kind, max(low, 0.0), min(high, 0.0))
+    neutral = sets.within_travel(surface, 0.0)
+    release.let_go(surface, kind, max(low, neutral), min(high, neutral))
 
 
 @kernel
@@ -37,9 +39,11 @@ def bring_back(fdi, surface, kind):
 @kernel
 def deflection(fdi, surface, kind):
     """At neutral."""
-    return 0.0, 0.0
+    neutral = sets.within_travel(surface, 0.0)
+    return neutral, neutral
 
 
 def estimate(fdi: np.void, s: int, kind: int) -> float | None:
     """Deflection, rad."""
-    return 0.0
+    surface = fdi["surface"][s]
+    return float(min(max(0.0, surface["travel_low"]), surface["travel_high"]))

@@ -13,7 +13,7 @@ HISTORY = 3  # frames, or blocks, of which the orders are kept: the elapsed one 
 ORDERS = np.dtype(
     [
         ("given", "f8", (HISTORY, MAX_BLOCK)), ("low", "f8", (HISTORY,)), ("high", "f8", (HISTORY,)),
-        ("least", "f8", (2,)), ("greatest", "f8", (2,)),  # where a healthy surface was within the block
+        ("least", "f8", (2,)), ("greatest", "f8", (2,)),  # where a healthy surface was within it
     ],
     align=True,
 )  # fmt: skip
@@ -44,6 +44,7 @@ def surface_dtype() -> np.dtype:
     fields = [
         # its actuator
         ("travel_low", "f8"), ("travel_high", "f8"), ("least_runaway_rate", "f8"),
+        ("reach_low", "f8"), ("reach_high", "f8"),  # where it can act: a part of its travel is nearer to zero
         ("approach", "f8"), ("step", "f8"), ("slowest_step", "f8"), ("orders", ORDERS),
         # where it was if it alone is at fault, and whether something was wrong
         ("command", "f8"), ("low", "f8"), ("high", "f8"), ("wrong", "i8"),
@@ -54,7 +55,9 @@ def surface_dtype() -> np.dtype:
         # what the types make of it
         ("set_low", "f8", (N_TYPES,)), ("set_high", "f8", (N_TYPES,)), ("type_excluded", "i8", (N_TYPES,)),
         ("start_low", "f8"), ("start_high", "f8"), ("started_at", "i8"),
+        ("hides", "i8", (2,)), ("hides_then", "i8", (2,)),  # lower and upper stop: examine.note_stops
         ("evidence", "i8"), ("quiet", "i8"), ("absent", "i8"),  # frames
+        ("unhidden", "i8"),  # of the evidence, what has come since a stop could last hide something
         ("release", RELEASE), *own,
         # what is concluded
         ("in_question", "i8"), ("standing", "i8"), ("measure", "i8"),

@@ -35,11 +35,15 @@ def watch(fdi, surface, kind):
 
 @kernel
 def judge(fdi, surface, kind, frame):
-    """Count half-cycles; a sign that stays for longer than the slowest half-cycle is no oscillation."""
+    """Count half-cycles; a sign that stays for longer than the slowest half-cycle is no oscillation.
+
+    At a stop half of a swing is hidden: where several instants are seen at once, the mean of a quick one
+    keeps its sign.
+    """
     swing = surface.oscillatory
     low, high = surface.low_then - surface.command_then, surface.high_then - surface.command_then
     sign = 1 if low > 0.0 else (-1 if high < 0.0 else 0)
-    if sign == 0:
+    if sign == 0 or (not fdi.whole and surface.hides_then[0 if sign > 0 else 1]):
         swing.steady_since = frame + 1
         return
     if sign != swing.sign:

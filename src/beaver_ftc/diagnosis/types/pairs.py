@@ -31,9 +31,18 @@ from beaver_ftc.diagnosis.types.candidates import (
     only_a_swing,
     possible,
     sole,
+    would_have_swung,
 )
-from beaver_ftc.diagnosis.types.examine import FIXED, LOSES, SHIFTED, begin, judge_all, take_in_frame
-from beaver_ftc.diagnosis.types.registry import DOWN, N_CONSTANT, OSCILLATORY, STUCK, UP, deflection
+from beaver_ftc.diagnosis.types.examine import (
+    FIXED,
+    LOSES,
+    SHIFTED,
+    begin,
+    judge_all,
+    note_stops,
+    take_in_frame,
+)
+from beaver_ftc.diagnosis.types.registry import DOWN, N_CONSTANT, STUCK, UP, deflection
 from beaver_ftc.diagnosis.types.verdict import (
     estimator_for,
     measure_for,
@@ -63,10 +72,11 @@ def effect_of(fdi, s):
 
 @kernel
 def place(surface, middle, slack):
-    """A surface was off its command by middle +- slack (rad). False: nowhere in its travel."""
-    surface.low = max(surface.travel_low, surface.command + middle - slack)
-    surface.high = min(surface.travel_high, surface.command + middle + slack)
+    """A surface was off its command by middle +- slack (rad). False: nowhere within its reach."""
+    surface.low = max(surface.reach_low, surface.command + middle - slack)
+    surface.high = min(surface.reach_high, surface.command + middle + slack)
     surface.wrong = abs(middle) > slack
+    note_stops(surface, 2.0 * slack)
     return surface.low <= surface.high
 
 
@@ -95,7 +105,7 @@ def whereabouts(fdi, surface):
         if left(surface, kind):
             low, high = deflection(fdi, surface, kind)
             least, greatest = min(least, low), max(greatest, high)
-    low, high = surface.travel_low, surface.travel_high
+    low, high = surface.reach_low, surface.reach_high
     return min(max(least, low), high), min(max(greatest, low), high)
 
 
@@ -201,9 +211,8 @@ def begin_second(fdi):
 @kernel
 def patient(fdi, surface):
     """Whether a slow oscillation, a slow surface or a growing bias would have shown by now."""
-    waits = 2 if left(surface, OSCILLATORY) else 1
-    growing = may_be_growing(surface, one_type(surface))
-    return surface.evidence >= waits * fdi.patience and not growing and not may_be_slow(fdi, surface)
+    growing = may_be_growing(surface, one_type(surface)) or may_be_slow(fdi, surface)
+    return surface.evidence >= fdi.patience and would_have_swung(fdi, surface) and not growing
 
 
 @kernel

@@ -16,6 +16,12 @@ def intersect(surface, kind, low, high):
 
 
 @kernel
+def within_travel(surface, deflection):
+    """A deflection (rad), cut off by the stops."""
+    return min(max(deflection, surface.travel_low), surface.travel_high)
+
+
+@kernel
 def middle(surface, kind):
     """The middle of a type's set."""
     return 0.5 * (surface.set_low[kind] + surface.set_high[kind])
@@ -32,13 +38,10 @@ def effectiveness(surface):
 def offset(fdi, surface):
     """How far off its command the surface was in the judged frame, (low, high) rad: unlimited at a stop.
 
-    A surface at its stop may be off by more than it shows.
+    A surface at its stop may be off by more than it shows; so may one that was there at an instant of it.
     """
-    low, high, u = surface.low_then, surface.high_then, surface.command_then
-    least, greatest = low, high
-    if fdi.block.length > 1:
-        orders = surface.orders
-        least, greatest = low - (u - orders.least[1]), high + (orders.greatest[1] - u)
+    low, high, u, orders = surface.low_then, surface.high_then, surface.command_then, surface.orders
+    least, greatest = low - max(u - orders.least[1], 0.0), high + max(orders.greatest[1] - u, 0.0)
     return (
         low - u if least > surface.travel_low else -np.inf,
         high - u if greatest < surface.travel_high else np.inf,

@@ -21,6 +21,7 @@ from beaver_ftc.diagnosis.types.candidates import (
     sole,
     sole_type,
     swings,
+    would_have_swung,
 )
 from beaver_ftc.diagnosis.types.examine import FIXED, LAGS, LOSES, SHIFTED
 from beaver_ftc.diagnosis.types.registry import (
@@ -33,7 +34,7 @@ from beaver_ftc.diagnosis.types.registry import (
     STUCK,
     VARYING_LOSS,
 )
-from beaver_ftc.diagnosis.types.sets import middle
+from beaver_ftc.diagnosis.types.sets import middle, within_travel
 
 ABSENT_FRAMES = 20
 
@@ -69,7 +70,9 @@ def others_refuted(fdi, chosen):
         if s != chosen and surface.in_question and possible(fdi, s):
             if left(surface, GROWING_BIAS) or (fdi.bound.own_errors and anything_left(surface)):
                 return False
-            if left(surface, OSCILLATORY) or left(surface, VARYING_LOSS):
+            if not would_have_swung(fdi, surface):
+                return False
+            if left(surface, VARYING_LOSS):
                 waits = 2
     return fdi.surface[chosen].evidence >= waits * fdi.patience
 
@@ -82,7 +85,7 @@ def type_at_fault(fdi, surface):
         return -1
     if fdi.bound.own_errors:
         return sole_type(surface)
-    patient = not left(surface, OSCILLATORY) or surface.evidence >= 2 * fdi.patience
+    patient = would_have_swung(fdi, surface)
     if any_constant(surface):
         found = one_type(surface)
         open_yet = may_be_growing(surface, found) or may_creep(surface, found)
@@ -187,7 +190,7 @@ def deflection_error(surface, at_fault):
     shows it."""
     if at_fault:
         if left(surface, FLOAT):
-            return -surface.command
+            return within_travel(surface, 0.0) - surface.command
         stuck, biased = left(surface, STUCK), left(surface, BIAS)
         if stuck and not biased:
             return middle(surface, STUCK) - surface.command

@@ -1,0 +1,98 @@
+"""What a stop hides excludes nothing: every type of fault on a surface whose command is at its stop."""
+
+from functools import cache
+from math import degrees
+
+import pytest
+
+import beaver_ftc as bf
+
+SURFACES = {"aileron": "p", "elevator": "q", "rudder": "r", "flap": None}
+FAULTS = {
+    "loss": {"type": "loss_of_effectiveness", "magnitude": 0.4},
+    "growing loss": {
+        "type": "loss_of_effectiveness", "magnitude": 0.8, "profile": "incipient", "kappa_per_s": 0.3,
+    },
+    "stuck": {"type": "stuck"},
+    "float": {"type": "float"},
+    "hardover up": {"type": "hardover", "direction": 1},
+    "hardover down": {"type": "hardover", "direction": -1},
+    "bias up": {"type": "bias", "bias_deg": 1.5},
+    "bias down": {"type": "bias", "bias_deg": -1.5},
+    "growing bias": {"type": "bias", "bias_deg": -1.5, "profile": "incipient", "kappa_per_s": 0.5},
+    "slow": {"type": "rate_limit", "scale": 0.02},
+    "swing": {"type": "oscillatory", "amplitude_deg": 1.5, "frequency_rad_s": 6.0},
+    "small swing": {"type": "oscillatory", "amplitude_deg": 0.4, "frequency_rad_s": 1.5},
+    "quick swing": {"type": "oscillatory", "amplitude_deg": 1.5, "frequency_rad_s": 40.0},
+}  # fmt: skip
+# Beyond what the surface can do: for good, or now and then.
+ORDERS = {
+    "one stop": [{"step": {"amplitude_deg_s": 25, "start_s": 0.5}}],
+    "other stop": [{"step": {"amplitude_deg_s": -25, "start_s": 0.5}}],
+    "both stops": [{"square": {"amplitude_deg_s": 25, "frequency_hz": 0.15}}],
+}
+HARDER = {
+    "instants": {"rate_hz": 20, "substeps": 5, "actuators": {"bandwidth_rad_s": 15, "rate_limit_deg_s": 60}},
+    "noise": {"sensors": "tactical-grade", "bounds": {"sensors": "tactical-grade"}},
+    "neutral out of reach": {"room_deg": (-0.6, 0.6)},
+}
+
+
+@cache
+def trim_deg(surface):
+    return degrees(bf.trim("fault-free").surfaces_rad[surface])
+
+
+def flown(surface, orders, fault, rate_hz=50, substeps=1, sensors="ideal", bounds=None, room_deg=(-1, 2),
+          actuators=None):  # fmt: skip
+    axis, at = SURFACES[surface], trim_deg(surface)
+    stops = [at + room_deg[0], at + room_deg[1]]
+    if axis is None:  # nobody commands it: it stays where it is, at this stop or that
+        stops = [0.0, 4.0] if orders == "one stop" else [-4.0, 0.0]
+    return bf.fly({
+        "name": "at-a-stop", "duration_s": 11.0, "rate_hz": rate_hz, "substeps": substeps, "sensors": sensors,
+        "reference": {axis: ORDERS[orders]} if axis else {},
+        "actuators": {**(actuators or {}), surface: {"travel_deg": stops, **(actuators or {})}},
+        "fdi": {"fault_class": "all", "bounds": bounds or {}, "slowest_rate_deg_s": 0.5},
+        "faults": [{"actuator": surface, "at_s": 2.0, **FAULTS[fault]}],
+    }, log=False)  # fmt: skip
+
+
+def is_possible(flight, surface, kind):
+    """Whether the diagnosis has named surface and type, or left them open; or seen nothing."""
+    said = flight.isolation
+    if not flight.detection.detected:
+        return True
+    if said.fault is not None:
+        return said.fault == surface and kind in (said.type, *said.candidates)
+    return surface in said.candidates or f"{surface}:{kind}" in said.candidates
+
+
+@pytest.mark.parametrize("orders", ORDERS)
+@pytest.mark.parametrize("fault", FAULTS)
+def test_the_true_surface_and_type_stay_possible(fault, orders):
+    flights = {surface: flown(surface, orders, fault) for surface in SURFACES}
+    assert any(flight.metrics["saturation_s"][surface] > 1.0 for surface, flight in flights.items())
+    for surface, flight in flights.items():
+        assert not flight.false_alarm
+        assert is_possible(flight, surface, FAULTS[fault]["type"]), (surface, flight.isolation)
+
+
+@pytest.mark.parametrize("harder", HARDER)
+@pytest.mark.parametrize("fault", ["loss", "float", "bias up", "bias down", "quick swing", "small swing"])
+def test_so_they_do_where_less_is_seen(fault, harder):
+    for surface in ("aileron", "elevator", "rudder"):
+        flight = flown(surface, "one stop", fault, **HARDER[harder])
+        assert is_possible(flight, surface, FAULTS[fault]["type"]), (surface, flight.isolation)
+
+
+def test_a_swing_of_which_a_stop_hides_half_is_never_named_a_loss():
+    scenario = {
+        "name": "half-a-swing", "duration_s": 24, "actuators": {"aileron": {"travel_deg": [-3, 3]}},
+        "reference": {"p": [{"step": {"amplitude_deg_s": 20, "start_s": 1}}]}, "fdi": {"fault_class": "all"},
+        "faults": [{"type": "oscillatory", "actuator": "aileron", "amplitude_deg": 2, "frequency_rad_s": 6,
+                    "at_s": 8}],
+    }  # fmt: skip
+    said = bf.fly(scenario, log=False).isolation
+    assert (said.fault, said.type) == ("aileron", None)
+    assert set(said.candidates) == {"loss_of_effectiveness", "oscillatory"}

@@ -125,6 +125,15 @@ def test_an_offset_is_unlimited_at_a_stop():
     assert sets.offset(fdi, surface)[0] == -np.inf
 
 
+@pytest.mark.parametrize(("low", "high"), [(0.0, 0.09), (0.51, 0.6)])
+def test_no_offset_takes_a_surface_beyond_its_stops(low, high):
+    """A loss does, where neutral is out of reach."""
+    fdi, surface = new_surface(low=low, high=high, command=0.2, travel_low=0.1)
+    for kind, module in ((BIAS, bias), (GROWING_BIAS, growing_bias)):
+        module.judge(fdi, surface, kind, 5)
+        assert surface["type_excluded"][kind]
+
+
 @pytest.mark.parametrize("length", [1, 5])  # frames; one may have several instants
 def test_within_what_is_seen_at_once_a_stop_may_have_been_met_at_its_furthest_order(length):
     fdi, surface = new_surface(low=0.2, high=0.25, command=0.1)

@@ -25,7 +25,12 @@ def judge(fdi, surface, kind, frame):
     grown = surface.growing_bias
     grown.up, grown.down = max(grown.up, least), min(grown.down, greatest)
     above, below = grown.up > 0.0, grown.down < 0.0
-    if (above and below) or (above and greatest < grown.up) or (below and least > grown.down):
+    if (
+        least > greatest
+        or (above and below)
+        or (above and greatest < grown.up)
+        or (below and least > grown.down)
+    ):
         surface.type_excluded[kind] = 1
 
 

@@ -39,8 +39,11 @@ def offset(fdi, surface):
     """How far off its command the surface was in the judged frame, (low, high) rad: unlimited at a stop.
 
     A surface at its stop may be off by more than it shows; so may one that was there at an instant of it.
+    Nothing but a loss takes it beyond.
     """
     low, high, u, orders = surface.low_then, surface.high_then, surface.command_then, surface.orders
+    if high < surface.travel_low or low > surface.travel_high:
+        return membership.NOTHING
     least, greatest = low - max(u - orders.least[1], 0.0), high + max(orders.greatest[1] - u, 0.0)
     return (
         low - u if least > surface.travel_low else -np.inf,

@@ -16,19 +16,23 @@ from beaver_ftc.compiled import kernel
 from beaver_ftc.design.terms import AIRSPEED, N_Y, QDYN
 
 UNKNOWN_RAD_S2 = 1e6  # terms fitted near trim are off by thousands at 0.5 rad
+# The same to filters that carry a covariance, beside noise of 1e-4: more than any aircraft does, and no more.
+UNKNOWN_TO_FILTERS_RAD_S2 = 100.0
 _ROUNDING = 1e-9
 _N = 3 + N_Y  # rates, then y with the density of the air in place of dynamic pressure
 
 
 @lru_cache
 def error_map_dtype(n: int) -> np.dtype:
-    """The map for an aircraft with n surfaces. whole: surfaces may be anywhere. outside: of all boxes."""
+    """The map for an aircraft with n surfaces. whole: surfaces may be anywhere. outside: of all boxes. now:
+    the error here, rad/s2."""
     fields = [
         ("n_boxes", "i8"), ("n_levels", "i8"), ("n_ages", "i8"), ("whole", "i8"), ("outside", "i8"),
         ("time_s", "f8"), ("until_s", "f8", (MAX_AGES,)),
         ("low", "f8", (MAX_BOXES, _N)), ("high", "f8", (MAX_BOXES, _N)),
         ("share", "f8", (MAX_LEVELS,)), ("error", "f8", (MAX_AGES, MAX_BOXES, MAX_LEVELS, 3)),
         ("travel_low", "f8", (n,)), ("travel_high", "f8", (n,)), ("place", "f8", (_N,)),
+        ("now", "f8", (3,)),
     ]  # fmt: skip
     return np.dtype(fields, align=True)
 
@@ -101,16 +105,20 @@ def age_of(error_map):
 
 
 @kernel
-def add_model_error(error_map, x, y, u, eta_bar):
-    """Add to eta_bar (3,) rad/s2 the error measured about this state; x (3,) rad/s, y, u (n,) rad."""
+def look_up(error_map, x, y, u):
+    """Fill `now` with the error measured about this state; x (3,) rad/s, y, u (n,) rad."""
     find_place(error_map, x, y)
     level, age = level_of(error_map, u), age_of(error_map)
     for k in range(error_map.n_boxes if age >= 0 else 0):
         if is_inside(error_map, k):
-            error_map.outside = 0
-            for i in range(3):
-                eta_bar[i] += error_map.error[age, k, level, i]
+            error_map.outside, error_map.now[:] = 0, error_map.error[age, k, level]
             return
-    error_map.outside = 1
+    error_map.outside, error_map.now[:] = 1, UNKNOWN_RAD_S2
+
+
+@kernel
+def add_model_error(error_map, x, y, u, eta_bar):
+    """Add to eta_bar (3,) rad/s2 the error measured about this state; x (3,) rad/s, y, u (n,) rad."""
+    look_up(error_map, x, y, u)
     for i in range(3):
-        eta_bar[i] += UNKNOWN_RAD_S2
+        eta_bar[i] += error_map.now[i]

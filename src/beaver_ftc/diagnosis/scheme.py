@@ -89,7 +89,7 @@ def compare_likelihoods(fdi, belief, measured, k, t):
     statistical.observe(fdi.statistical, fdi.innovation, fdi.dt, k, latched, not fdi.abrupt)
     mean = belief.means
     across.observe(fdi, fdi.innovation, mean.G, mean.Gu, measured.y, k, latched)
-    statistical.score(fdi.statistical, t)
+    statistical.score(fdi.statistical, t, fdi.bound.error_map.outside == 0)
 
 
 @kernel

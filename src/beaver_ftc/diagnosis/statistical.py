@@ -11,6 +11,7 @@ import numpy as np
 from beaver_ftc.compiled import kernel
 from beaver_ftc.design.terms import AIRSPEED, QDYN, evaluate, regressors
 from beaver_ftc.diagnosis import across, air, likelihood, readings, whitening
+from beaver_ftc.diagnosis.error_map import UNKNOWN_TO_FILTERS_RAD_S2
 from beaver_ftc.diagnosis.state import (
     ENDING,
     GROWING,
@@ -94,9 +95,12 @@ def unknown_acceleration(statistical, out):
 
 
 @kernel
-def score(statistical, t):
-    """Find the largest share of the alarm level that any hypothesis reaches, and its axis; at t s."""
+def score(statistical, t, known=True):
+    """Find the largest share of the alarm level that any hypothesis reaches, and its axis; at t s. Where the
+    model's error is not `known`, none does."""
     statistical.score = 0.0
+    if not known:
+        return
     for b in range(statistical.n_blocks):
         block = statistical.block[b]
         for h in range(block.n_hypotheses):
@@ -273,8 +277,11 @@ def drifts(statistical, fdi, design, x, y):
     bounded = statistical.bounded
     bounded[:] = 0.0
     uncertainty_bound(x, design, fdi.bound.inertia, fdi.bound.constant, fdi.bound.earth_rate, bounded)
+    mapped = fdi.bound.error_map.n_boxes > 0
     for i in range(3):
         bounded[i] += statistical.deflection[i]
+        if mapped:
+            bounded[i] += min(fdi.bound.error_map.now[i], UNKNOWN_TO_FILTERS_RAD_S2)
     for b in range(statistical.n_blocks):
         block = statistical.block[b]
         for i in range(block.n):

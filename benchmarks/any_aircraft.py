@@ -26,6 +26,7 @@ from rich.table import Table
 from beaver_ftc import load
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.loop import fly
+from beaver_ftc.results.metrics import fault_free_s
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.derive.first_use import derived_if_needed
 from beaver_ftc.studies.detectability.excitation import SETTLED_S, excitation
@@ -140,7 +141,7 @@ def row_of(name: str, args: argparse.Namespace) -> tuple[list[str], list[str]]:
             count["departed"] += 1
             said.append(f"{label}: departed, {flight.departure}")
         if surface is None:
-            count["healthy"] += seconds_of(flight)
+            count["healthy"] += fault_free_s(flight)
             if detected:
                 count["false"] += 1
                 said.append(f"{label}: alarm at {flight.detection_time_s:.2f} s in health")

@@ -108,7 +108,7 @@ def test_where_an_accelerometer_has_leapt_the_reading_s_own_says_nothing(sensor)
     for ago in (0, 40):
         for share, leaps in ((0.99, True), (1.01, False)):
             watch = new_watch(bound=1.0)
-            watch["step"]["then"][sensor] += share * 0.5 * jump / (1.5 * H / V) / accelerometers.CALMED**ago
+            watch["step"]["then"][sensor] += share * 0.5 * jump / (1.5 * H / V) / 0.995**ago
             looks(watch, course(ALPHA, np.zeros(ago) + 1e-9 * np.arange(ago)), np.zeros(ago))
             watch["step"]["test"]["bound"] = 1e-3
             (signal,) = course(ALPHA, [jump])
@@ -119,10 +119,23 @@ def test_where_an_accelerometer_has_leapt_the_reading_s_own_says_nothing(sensor)
             assert (AZ in cleared(watch)) == leaps
 
 
-def test_long_after_the_alarm_a_leap_says_nothing():
-    for gathering, clear in ((accelerometers.SOON - 1, set(FORCES)), (accelerometers.SOON, set())):
+def test_what_accelerometers_have_leapt_is_forgotten_in_two_seconds_at_any_rate():
+    for h in (0.002, 0.01, 0.02):
         watch = new_watch()
-        watch["gathering"], watch["least"], watch["most"] = gathering, -1.0, 99.0
+        watch["step"]["h"], watch["restless"] = h, 3.0
+        for _ in range(round(2.0 / h)):
+            accelerometers.note_stillness(watch, watch["step"]["then"].copy())
+        assert watch["restless"] == pytest.approx(3.0 * np.exp(-1.0), rel=0.02)
+
+
+def test_long_after_the_alarm_a_leap_says_nothing():
+    """A second after it, whatever the rate of the looks."""
+    for h, gathering, clear in (
+        (0.01, 99, set(FORCES)), (0.01, 100, set()), (0.002, 499, set(FORCES)), (0.002, 500, set()),
+    ):  # fmt: skip
+        watch = new_watch()
+        watch["step"]["h"], watch["gathering"] = h, gathering
+        watch["least"], watch["most"] = -1.0, 99.0
         watch["step"]["test"]["bound"][CLIMB] = 99.0
         looks(watch, course(ALPHA, [0.05]), [0.05])
         assert cleared(watch) == clear

@@ -309,6 +309,8 @@ def test_the_alarm_is_the_largest_share_of_the_level():
     statistical.score(record, 8.0)
     statistical.score(record, 9.0)
     assert (record["axis"], record["detected_at_s"]) == (0, 8.0)
+    statistical.score(record, 10.0, False)  # where the model's error is not known
+    assert record["score"] == 0.0
     silent = with_scores((9.0,) * 3, (9.0,) * 3, (9.0,) * 3, alarms=0)
     statistical.score(silent, 7.0)
     assert silent["score"] == 0.0

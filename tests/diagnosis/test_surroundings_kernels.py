@@ -204,6 +204,7 @@ def test_the_error_is_that_of_the_innermost_box_or_unknown(roll, airspeed, time_
     age = 0 if time_s <= 10.0 else 1
     expected = record["error"][age, box, 1] if box is not None else error_map.UNKNOWN_RAD_S2
     assert out == pytest.approx(0.5 + expected)
+    assert record["now"] == pytest.approx(np.full(3, expected))
     assert record["outside"] == (box is None)
     assert record["place"][:7] == pytest.approx([roll, 0, 0, 0.1, 0.03, airspeed, 2.0 * 1036.0 / airspeed**2])
 

@@ -304,7 +304,8 @@ def test_the_lead_is_taken_on_one_surface_while_its_fault_shows():
     assert (fdi["verdict"]["lead"], fdi["verdict"]["lead_kind"]) == (RUDDER, FIXED)
     assert fdi["surface"]["measure"].tolist() == [-1, -1, FIXED, -1]
     surface["low"], surface["high"] = 0.25, 0.35  # it follows its command again
-    for _ in range(verdict.ABSENT_FRAMES - 1):
+    fdi["dt"] = 0.01
+    for _ in range(19):
         verdict.take_the_lead(fdi)
     assert fdi["verdict"]["lead"] == RUDDER
     verdict.take_the_lead(fdi)
@@ -313,7 +314,17 @@ def test_the_lead_is_taken_on_one_surface_while_its_fault_shows():
     surface["low"] = 0.1
     verdict.take_the_lead(fdi)
     assert (surface["absent"], fdi["verdict"]["lead"]) == (0, RUDDER)
-    assert verdict.still_there(surface, LOSES, True)
+    assert verdict.still_there(fdi, surface, LOSES, True)
+
+
+@pytest.mark.parametrize("dt", [0.01, 0.002, 0.05])
+def test_a_fault_that_has_gone_is_let_go_after_a_fifth_of_a_second_at_any_rate(dt):
+    fdi, surface = one(STUCK, command=0.3, low=0.29, high=0.31, absent=0)
+    fdi["dt"] = dt
+    surface["set_low"][STUCK], surface["set_high"][STUCK] = 0.1, 0.2
+    there = [bool(verdict.still_there(fdi, surface, FIXED, True)) for _ in range(round(0.3 / dt))]
+    assert there.index(False) + 1 == round(0.2 / dt)
+    assert not any(there[there.index(False) :])
 
 
 @pytest.mark.parametrize(

@@ -29,10 +29,11 @@ from beaver_ftc.diagnosis.watch import (
 )
 from beaver_ftc.plant.instruments import AX, N_SENSORS, PHI
 
-SOON = 100  # looks after the alarm: later, chance has had too many tries
-CALMED = 0.995  # of a leap of an accelerometer that counts a look later
+SOON_S = 1.0  # after the alarm: later, chance has had too many tries
+CALMED_S = 2.0  # in which a leap of an accelerometer is forgotten
 GOES_ON = 30.0  # times what the reading has moved by: a scale error within 3 % of -1 would do that
 CLEARLY = 3.0  # beyond a bound, of what is not seen
+_ROUNDING_S = 1e-9
 
 
 @kernel
@@ -53,7 +54,7 @@ def of_the_flow(test):
 def note_stillness(watch, signal):
     """Count the looks for which each reading (N_SENSORS,) has been the very same; and how far accelerometers
     have leapt in a look of late, m/s2."""
-    watch.restless *= CALMED
+    watch.restless *= 1.0 - watch.step.h / CALMED_S
     for i in range(N_SENSORS):
         watch.still[i] = watch.still[i] + 1 if signal[i] == watch.step.then[i] else 0
         if i >= AX:
@@ -71,7 +72,7 @@ def weigh(watch, signal):
     """Clear instruments of the flow, or accelerometers, by this look, that of the alarm or a later one."""
     if not of_the_flow(watch.lead):
         return
-    if watch.gathering < SOON and leapt(watch, signal):
+    if watch.gathering * watch.step.h < SOON_S - _ROUNDING_S and leapt(watch, signal):
         clear_accelerometers(watch)
     gather(watch, signal)
     flow = instrument_of(watch.lead)

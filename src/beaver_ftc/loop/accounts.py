@@ -79,11 +79,15 @@ def add_effect(guarantee):
 
 
 @kernel
-def follow_guarantee(guarantee, fdi, share, t):
+def follow_guarantee(guarantee, fdi, share, k, t):
     """Advance the filtered effect by the elapsed frame and note the first instant t (s) of certainty.
 
-    share: one over the instants in a frame. The sum then begins anew with this instant.
+    share: one over the instants in a frame. The sum then begins anew with this instant. k: number of the
+    diagnosis' frame; with its first one, of 0, its filters are empty, whatever went before.
     """
+    if k == 0:
+        guarantee.effect[:], guarantee.phi_sum[:], guarantee.certain_after_s = 0.0, guarantee.phi, -1.0
+        return
     for i in range(3):
         mean = share * guarantee.phi_sum[i]
         for m in range(fdi.bank.n):

@@ -119,7 +119,7 @@ def diagnose(frame):
     control, fdi, belief = frame.control, frame.fdi, frame.belief
     k = frame.k - frame.since
     scheme.diagnose(fdi, belief, frame.measured, control.effectiveness, control.offset, k, frame.t)
-    follow_guarantee(frame.accounts.guarantee, fdi, belief.share, frame.t)
+    follow_guarantee(frame.accounts.guarantee, fdi, belief.share, k, frame.t)
 
 
 @kernel
@@ -129,7 +129,7 @@ def take_verdict(frame):
     scheme.take_verdict(
         fdi, belief, frame.measured, frame.verdict, control.effectiveness, control.offset, k, frame.t
     )
-    follow_guarantee(frame.accounts.guarantee, fdi, belief.share, frame.t)
+    follow_guarantee(frame.accounts.guarantee, fdi, belief.share, k, frame.t)
 
 
 @kernel

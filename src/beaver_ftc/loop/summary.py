@@ -15,6 +15,7 @@ from beaver_ftc.diagnosis.scheme import isolated_theta
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, PITCH, ROLL, UNANTICIPATED, YAW
 from beaver_ftc.diagnosis.types.findings import estimate_of, found
 from beaver_ftc.loop.flight import Flight
+from beaver_ftc.loop.guarantee import guaranteed_delay_s
 from beaver_ftc.plant.channels import AIRSPEED, ALTITUDE
 from beaver_ftc.plant.sensing import DEPARTURE_SIGNALS
 from beaver_ftc.scenario.schema import Scenario
@@ -77,12 +78,6 @@ def _envelope_exits(frame: np.void) -> tuple[tuple[float, float], ...]:
         (float(out), float(back) if isfinite(back) else end_s)
         for out, back in zip(envelope["exit_at_s"][:count], envelope["return_at_s"][:count], strict=True)
     )
-
-
-def _guaranteed_delay(frame: np.void) -> float | None:
-    truth = frame["truth"]
-    certain = _instant(frame["accounts"]["guarantee"]["certain_after_s"])
-    return None if certain is None or not truth["faulted"] else certain - float(truth["fault_at_s"])
 
 
 def _probing_s(frame: np.void) -> tuple[float, float] | None:
@@ -247,7 +242,7 @@ def flight_of(
         scenario=scenario,
         frames=int(frame["k"]),
         columns=columns,
-        guaranteed_delay_s=_guaranteed_delay(frame),
+        guaranteed_delay_s=guaranteed_delay_s(frame, scenario, verdict is not None),
         pre_fault_rms_rad_s=_rms(tracking["before"], int(tracking["frames_before"])) or (0.0, 0.0, 0.0),
         post_fault_rms_rad_s=_rms(tracking["since"], int(tracking["frames_since"])),
         supervisor=tuple(

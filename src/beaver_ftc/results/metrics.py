@@ -43,6 +43,7 @@ def metrics(flight: "Flight") -> Document:
         "detection": _detection(flight, fault),
         "isolation": _isolation(flight, fault),
         "false_alarm": any(_false_alarm(time_s, fault) for time_s in _alarms_s(flight)),
+        "fault_free_s": _number(fault_free_s(flight)),
         "tracking": {
             "pre_fault_rms_deg_s": _per_axis_deg_s(_before(fault, flight.pre_fault_rms_rad_s)),
             "post_fault_rms_deg_s": _per_axis_deg_s(flight.post_fault_rms_rad_s),
@@ -261,6 +262,14 @@ def _false_alarm(detection_time_s: float | None, fault: Document | None) -> bool
 def _alarms_s(flight: "Flight") -> list[float | None]:
     """When there was an alarm: of the diagnosis at the end, and of those that changes in flight replaced."""
     return [flight.detection_time_s, *(change.get("detection_time_s") for change in flight.changes)]
+
+
+def fault_free_s(flight: "Flight") -> float:
+    """Time under observation in which an alarm is a false one: until the first fault, the first alarm of any
+    diagnosis, or the end. Rates of false alarms are per this time."""
+    scenario, fault = flight.scenario, first_fault(flight.scenario)
+    ends = [flight.frames / scenario.rate_hz, *(time_s for time_s in _alarms_s(flight) if time_s is not None)]
+    return min(ends if fault is None else [*ends, fault["at_s"]])
 
 
 def _change(change: Document) -> Document:

@@ -19,10 +19,10 @@ LOWEST_TURBULENCE_M = 609.6  # 2000 ft: below, its scales and strengths are othe
 
 def warnings_of(scenario: Any) -> tuple[str, ...]:
     """One line a warning, `key.path: what`."""
-    return (*_airspeed(scenario), *_too_fast_for_the_frame(scenario), *_undeclared(scenario))
+    return (*_airspeed(scenario), *_too_fast_for_the_frame(scenario), *undeclared(scenario))
 
 
-def _undeclared(scenario: Any) -> Iterator[str]:
+def undeclared(scenario: Any) -> Iterator[str]:
     """Errors of the truth that `fdi.bounds` does not cover: an alarm may then have no fault behind it."""
     if scenario.fdi.scheme == "none":
         return

@@ -67,6 +67,15 @@ def flight(derived, **changes):
     return fly(load_text(FLIGHT.replace("NAME", name), folder=folder).with_(changes))
 
 
+def test_in_a_dive_beyond_what_was_measured_the_statistical_test_concludes_nothing(derived):
+    dive = {"q": [{"ramp": {"amplitude_deg_s": -8, "start_s": 0, "end_s": 8}}]}
+    fdi = {"statistical": {}, "authority": "statistical"}
+    changes = {"duration_s": 20, "rate_hz": 50, "substeps": 2, "actuators": "servo"}
+    dived = flight(derived, reference=dive, fdi=fdi, **changes)
+    assert dived.detection_time_s is None
+    assert dived.statistical["closest_approach"] < 1.0
+
+
 def test_the_declared_error_holds_on_states_neither_fit_nor_check_has_seen(unseen):
     """Box by box and share by share of the travel: hardly any state may exceed what covers 18000 others."""
     seen, aircraft = unseen

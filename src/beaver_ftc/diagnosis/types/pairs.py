@@ -323,7 +323,7 @@ def act(fdi):
         if acted_upon(fdi, s):
             at_fault = surface.named == 1 or possible(fdi, s)
             measure = measure_for(surface) if at_fault else SHIFTED
-            if still_there(surface, measure, at_fault):
+            if still_there(fdi, surface, measure, at_fault):
                 surface.measure = measure
                 replaced = s == fdi.layout.main[PITCH] and measure in (LOSES, FIXED)
                 if fdi.verdict.lead == NO_SURFACE or replaced:

@@ -36,7 +36,8 @@ from beaver_ftc.diagnosis.types.registry import (
 )
 from beaver_ftc.diagnosis.types.sets import middle, within_travel
 
-ABSENT_FRAMES = 20
+ABSENT_S = 0.2  # a fault that has not shown for so long is let go
+_ROUNDING = 1e-9
 
 
 @kernel
@@ -171,17 +172,17 @@ def take_the_lead(fdi):
     if s >= 0:
         surface = fdi.surface[s]
         fdi.verdict.lead_kind = measure_for(surface)
-        if still_there(surface, fdi.verdict.lead_kind, True):
+        if still_there(fdi, surface, fdi.verdict.lead_kind, True):
             fdi.verdict.lead, surface.measure = s, fdi.verdict.lead_kind
 
 
 @kernel
-def still_there(surface, measure, at_fault):
+def still_there(fdi, surface, measure, at_fault):
     """Whether the fault of a surface shows, or did a moment ago; one that has gone is let go."""
     deflection = deflection_error(surface, at_fault) + surface.command
     there = surface.low <= deflection <= surface.high or measure == LOSES
     surface.absent = 0 if there else surface.absent + 1
-    return surface.absent < ABSENT_FRAMES
+    return surface.absent * fdi.dt < ABSENT_S - _ROUNDING
 
 
 @kernel

@@ -130,14 +130,11 @@ def result_of(flight: Flight, entry: Entry, us: float) -> Result:
     document = metrics(flight)
     fault, detection, isolation = document["fault"], document["detection"], document["isolation"]
     end_s = flight.frames / flight.scenario.rate_hz
-    healthy_s = min(end_s, fault["at_s"]) if fault else end_s
-    if document["false_alarm"]:
-        healthy_s = detection["time_s"]
     correct = bool(isolation["correct"]) and not document["false_alarm"]
     return Result(
         entry=entry,
         false_alarm=document["false_alarm"],
-        healthy_s=healthy_s,
+        healthy_s=document["fault_free_s"],
         faulted=fault is not None and end_s > fault["at_s"],
         delay_s=_or_never(detection["delay_s"]),
         isolated=isolation["fault"],

@@ -69,16 +69,6 @@ def _flown_s(document: Document, flight: "Flight") -> float:
     return flight.frames / flight.scenario.rate_hz
 
 
-def _fault_free_s(document: Document, flight: "Flight") -> float:
-    """Time in which an alarm would have been false: until the fault, the alarm or the end."""
-    ends = [_flown_s(document, flight)]
-    if document["fault"] is not None:
-        ends.append(document["fault"]["at_s"])
-    if document["detection"]["time_s"] is not None:
-        ends.append(document["detection"]["time_s"])
-    return min(ends)
-
-
 def _missed_expectations(document: Document, flight: "Flight") -> str:
     return " ".join(found["name"] for found in document["expectations"] if not found["passed"])
 
@@ -94,7 +84,7 @@ Column = tuple[str, str, Getter]
 _FLOWN: tuple[Column, ...] = (
     ("frames", "int", _at("frames")),
     ("flown_s", "float", _flown_s),
-    ("fault_free_s", "float", _fault_free_s),
+    ("fault_free_s", "float", _at("fault_free_s")),
     *_under("text", "fault", "actuator", "type"),
     *_under("float", "fault", "at_s"),
     *_under("flag", "detection", "detected"),

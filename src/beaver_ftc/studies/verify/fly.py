@@ -5,6 +5,7 @@ from typing import Any
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.flight import Flight
+from beaver_ftc.results.metrics import fault_free_s
 from beaver_ftc.scenario.faults import LossOfEffectiveness
 from beaver_ftc.studies.verify.draw import Draw
 
@@ -40,12 +41,10 @@ def _healthy(draw: Draw) -> Row:
 
     scenario = draw.scenario()
     flight = fly(scenario)
-    flown_s = flight.frames / scenario.rate_hz
-    alarm_s = flight.detection_time_s
     return {
         "index": draw.index,
-        "watched_s": flown_s if alarm_s is None else alarm_s,
-        "alarm": alarm_s is not None,
+        "watched_s": fault_free_s(flight),
+        "alarm": flight.detection_time_s is not None,
         "departed": flight.departure is not None,
         "outside_s": flight.outside_s,
         "closest": list(flight.closest_approach),

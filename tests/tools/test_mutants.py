@@ -38,7 +38,7 @@ def test_every_small_change_is_made_once(module):
 
 
 def test_what_no_caller_can_see_is_not_changed(module):
-    module.write_text("pairs = zip(a, b, strict=True)\nsize: Box[3] = f(x, align=True)\n")
+    module.write_text("pairs = zip(a, b, strict=True)\nsize: Box[3] = f(x, align=True, linewidth=0.8)\n")
     assert mutants(module) == []
 
 
@@ -103,18 +103,33 @@ def test_a_child_that_never_ends_hangs_and_one_that_fails_kills():
     assert trial.in_a_child(lambda: 1, 5.0) == trial.KILLED
 
 
-def test_tests_of_a_line_are_those_that_execute_it_or_its_module(module, monkeypatch):
+OF_LINES = """
+LIMIT, OTHER = 3, 4
+TWICE = 2 * OTHER
+
+
+def weigh(x):
+    if x:
+        return LIMIT
+    return TWICE
+"""
+
+
+def test_tests_of_a_line_are_those_that_execute_it_or_read_what_it_gives_a_value(module, monkeypatch):
     monkeypatch.setattr(reach, "ROOT", module.parent)
-    module.write_text("LIMIT = 3\n\n\ndef weigh(x):\n    if x:\n        return 1\n    return 2\n")
+    module.write_text(OF_LINES)
     known = {
         "seconds": {"a": 0.1, "b": 0.2},
         "left_out": {"takes too long": 2},
-        "lines": {"module.py": {"5": ["a", "b"], "6": ["a"]}},
+        "lines": {"module.py": {"7": ["a", "b"], "8": ["a"]}},
     }
     found = reach.Reach([known])
-    assert found.of("module.py", (6, 5)) == {"a"}
-    assert found.of("module.py", (7, 7)) == set()
-    assert found.of("module.py", (1, 1)) == {"a", "b"}  # it runs at import
+    assert found.of("module.py", (8, 7)) == {"a"}
+    assert found.of("module.py", (9, 9)) == set()
+    assert found.of("module.py", (3, 3)) == {"a", "b"}  # nobody is known to read it
+    module.write_text(OF_LINES.replace("LIMIT, OTHER = 3, 4", "LIMIT = 3"))
+    scope._tree.cache_clear()
+    assert found.of("module.py", (2, 2)) == {"a"}
     assert found.of("other.py", (3, 3)) == set()
     assert found.left_out["takes too long"] == 2
 

@@ -29,6 +29,12 @@ COMPARISONS = {
 }
 # Keywords whose value no caller can see: zip's check of its own arguments, a record's padding.
 UNSEEN = {"strict", "align"}
+# Keywords of what draws, whose value only the eye can judge.
+LOOKS = {
+    "bbox_to_anchor", "capsize", "columnspacing", "dashes", "dpi", "elinewidth", "figsize", "fontsize",
+    "framealpha", "frameon", "gridspec_kw", "height_ratios", "labelsize", "linewidth", "markersize", "pad",
+    "rotation", "shrink", "width_ratios", "xytext", "zorder",
+}  # fmt: skip
 FUNCTIONS = {"min": "max", "max": "min", "any": "all", "all": "any"}
 
 
@@ -91,7 +97,8 @@ def _parsed(text: str) -> ast.Module:
 
 def _no_code(tree: ast.Module) -> set[ast.AST]:
     """What is within annotations and decorators, or makes no difference."""
-    roots = [node for node in ast.walk(tree) if isinstance(node, ast.keyword) and node.arg in UNSEEN]
+    unseen = UNSEEN | LOOKS
+    roots = [node for node in ast.walk(tree) if isinstance(node, ast.keyword) and node.arg in unseen]
     for node in ast.walk(tree):
         roots += [getattr(node, "annotation", None), getattr(node, "returns", None)]
         roots += getattr(node, "decorator_list", [])

@@ -23,7 +23,7 @@ import hypothesis
 import pytest
 
 from tools.mutants.making import Mutant
-from tools.mutants.scope import COMPILED, PACKAGE, PLAIN, ROOT, runs_at_import, tests
+from tools.mutants.scope import COMPILED, PACKAGE, PLAIN, ROOT, assigned, runs_at_import, tests, uses
 from tools.mutants.trial import SURVIVED, in_a_child, processor_s, pytest_quietly, turn_to
 
 SLOW_S = {
@@ -58,17 +58,32 @@ class Reach:
         return {test: self.seconds[test] for test in sorted(reached)}
 
     def of(self, name: str, lines: Iterable[int]) -> set[str]:
-        """Those that execute the first of the lines; of one that runs at import, all that execute anything;
-        of a module without functions, all that execute what imports it.
+        """Those that execute the first of the lines; of one that runs at import, those it concerns; of a
+        module without functions, all that execute what imports it.
         """
-        by_line = self._lines.get(name)
+        by_line, lines = self._lines.get(name), list(lines)
         if not by_line:
             users = [file for file in self._lines if _imports(ROOT / file, name)]
-            return {test for file in users for of in self._lines[file].values() for test in of}
-        lines = list(lines)
+            return {test for file in users for test in self._any(file)}
         if all(runs_at_import(ROOT / name, line) for line in lines):
-            return {test for of in by_line.values() for test in of}
+            return self._readers(name, assigned(ROOT / name, lines[-1])) or self._any(name)
         return next((of for line in lines if (of := by_line.get(line))), set())
+
+    def _readers(self, name: str, constants: set[str]) -> set[str]:
+        """The tests that execute a line with one of a module's constants in it; none where one is worked out
+        from it at import.
+        """
+        found: set[str] = set()
+        for file in self._lines:
+            if file == name or _imports(ROOT / file, name):
+                lines = uses(ROOT / file, constants)
+                if any(runs_at_import(ROOT / file, line) for line in lines):
+                    return set()
+                found.update(test for line in lines for test in self._lines[file].get(line, ()))
+        return found
+
+    def _any(self, name: str) -> set[str]:
+        return {test for of in self._lines[name].values() for test in of}
 
 
 def _imports(file: Path, name: str) -> bool:

@@ -1,0 +1,151 @@
+"""From a scenario to the record a flight is flown by: numbers in their units, per frame or JSBSim frame."""
+
+from math import exp, pi, radians
+
+import numpy as np
+import pytest
+
+from beaver_ftc.loop.assembly import assemble, estimator_names
+from beaver_ftc.scenario.schema import Scenario
+
+TRAVEL = np.array([[-0.5, -0.4, -0.3, -0.1], [0.5, 0.45, 0.35, 1.0]])
+TRIM = np.array([0.01, -0.02, 0.03, 0.04])
+AILERON, ELEVATOR, RUDDER, FLAP = range(4)
+DT, SUBSTEPS = 0.02, 2
+GIVEN = {
+    "name": "assembled", "rate_hz": 50, "substeps": SUBSTEPS, "duration_s": 5,
+    "initial": {"engine_rpm": 2000, "manifold_pressure_inhg": 21.0},
+    "actuators": {"elevator": {"bandwidth_rad_s": 25.0, "rate_limit_deg_s": 90.0},
+                  "rudder": {"bandwidth_rad_s": 12.0}},
+    "control": {
+        "law": "fault-tolerant", "proportional_per_s": 3.0, "integral_per_s2": 1.5,
+        "network_gain_per_s2": 45.0, "network_leak_per_s": 0.8, "network_weight_limit_rad_s2": 15.0,
+        "effectiveness_rate_per_s": 2.5, "least_effectiveness": 0.15, "hand_over_s": 1.6,
+        "power": {"lowest_inhg": 11.0, "highest_inhg": 30.0, "rate_inhg_s": 4.0, "patience_s": 1.25,
+                  "release_s": 8.0, "smoothing_s": 0.4, "speed_gain_inhg_per_mps": 0.7,
+                  "attitude_gain_inhg_per_deg": 0.3, "washout_s": 9.0, "attitude_memory_s": 7.0},
+    },
+    "fdi": {
+        "fault_class": "all", "thresholds": "published", "authority": "statistical", "statistical": {},
+        "forgetting_time_s": 2.0, "detection_pole_per_s": 1.5, "isolation_pole_per_s": 2.5,
+        "slowest_oscillation_rad_s": 1.2, "slowest_rate_deg_s": 3.0, "pole_bank_per_s": [0.5, 4.0],
+        "sharpen": {"pole_bank": True, "memory": False, "set_membership": True},
+        "probing": {"amplitude_deg": 1.5, "frequency_hz": 1.25, "duration_s": 3.0},
+        "bounds": {"inertia_coupling": {"p": 0.1, "q": 0.2, "r": 0.3},
+                   "constant_rad_s2": {"p": 0.01, "q": 0.02, "r": 0.03}},
+    },
+}  # fmt: skip
+
+
+def assembled(**keys):
+    return assemble(Scenario.model_validate(GIVEN | keys), TRIM, TRAVEL)[0]
+
+
+@pytest.fixture(scope="module")
+def frame():
+    return assembled()
+
+
+def at(record, path):
+    for name in path.split("."):
+        record = record[int(name)] if name.isdigit() else record[name]
+    return record
+
+
+EXPECTED = {
+    "dt": DT, "belief.share": 0.5, "belief.u": TRIM, "belief.commanded": TRIM, "control.trim": TRIM,
+    "control.command": TRIM,
+    "fdi.enabled": 1, "fdi.dt": DT, "fdi.forgetting": exp(-DT / 2.0), "fdi.fie_decay": exp(-2.5 * DT),
+    "fdi.fdae.pole": 1.5, "fdi.fdae.decay": exp(-1.5 * DT), "fdi.n_estimators": 8,
+    "fdi.fdae.network.gain": 45.0, "fdi.fdae.network.leak_per_s": 0.8, "fdi.fdae.network.weight_limit": 15.0,
+    "fdi.bound.inertia": (0.1, 0.2, 0.3), "fdi.bound.constant": (0.01, 0.02, 0.03),
+    "fdi.bound.earth_rate": 7.292115e-5,  # rad/s [WGS84]
+    "fdi.verdict.detected_at_s": -1.0, "fdi.verdict.isolated_at_s": -1.0, "fdi.verdict.type": -1,
+    "fdi.verdict.type_at_s": -1.0, "fdi.verdict.lead": -1, "fdi.verdict.lead_kind": -1,
+    "accounts.guarantee.certain_after_s": -1.0,
+    "fdi.layout.main": (AILERON, ELEVATOR, RUDDER), "fdi.layout.dominant_axis": (0, 1, 2, 1),
+    "fdi.layout.partner": (RUDDER, FLAP, AILERON, ELEVATOR),
+    "fdi.every_type": 1, "fdi.block.length": 1, "fdi.block.span_s": DT, "fdi.whole": 0, "fdi.instants": 2,
+    "fdi.returns": 1, "fdi.patience": 131,  # half a cycle at 1.2 rad/s is 2.618 s
+    "fdi.pair.enabled": 0, "fdi.pair.first": -1,
+    "fdi.surface.0.travel_low": -0.5, "fdi.surface.3.travel_high": 1.0, "fdi.surface.1.measure": -1,
+    "fdi.surface.1.type": -1, "fdi.surface.0.in_question": 1,
+    "fdi.surface.1.approach": 1.0 - exp(-25.0 * DT / 2), "fdi.surface.1.step": pi / 2 * DT / 2,
+    "fdi.surface.1.least_runaway_rate": pi / 4,
+    "fdi.surface.1.slowest_step": radians(3.0) * DT / 2,
+    "fdi.bank.n": 3, "fdi.memory": 0, "fdi.membership": 1,
+    "control.dt": DT, "control.Kp": 3.0, "control.Ki": 1.5, "control.effectiveness": 1.0,
+    "control.effectiveness_step": 2.5 * DT, "control.reference_scale": 1.0,
+    "control.least_effectiveness": 0.15, "control.low": TRAVEL[0], "control.high": TRAVEL[1],
+    "control.hand_over_step": DT / 1.6, "control.main": (AILERON, ELEVATOR, RUDDER), "control.stand_in": FLAP,
+    "control.probe_amplitude": radians(1.5), "control.probe_step": 2 * pi * 1.25 * DT,
+    "control.probe_frames": 150, "control.probe_from_s": -1.0, "control.probe_to_s": -1.0,
+    "belief.actuators.real": 1, "belief.actuators.low": TRAVEL[0], "belief.actuators.high": TRAVEL[1],
+    "belief.actuators.approach.2": 1.0 - exp(-12.0 * DT / 2), "belief.actuators.approach.1": 1 - exp(-0.25),
+    "belief.actuators.step.1": pi / 2 * DT / 2,
+    "control.power.enabled": 1, "control.power.from_s": -1.0, "control.power.impatience": DT / 1.25,
+    "control.power.forgiveness": DT / 8.0, "control.power.speed_gain": 0.7,
+    "control.power.attitude_gain": 0.3 * 180 / pi, "control.power.smoothing": 1 - exp(-DT / 0.4),
+    "control.power.washout": 1 - exp(-DT / 9.0), "control.power.leak": 1 - exp(-DT / 7.0),
+    "control.power.trim": 21.0, "control.power.command": 21.0, "control.power.least": 21.0,
+    "control.power.greatest": 21.0, "control.power.low": 11.0, "control.power.high": 30.0,
+    "control.power.step": 4.0 * DT,
+    # half of the rudder's smaller travel holds the propeller: 0.08265 0.3 / 2 = 0.003026 dpt^3 [TM88]
+    "control.power.highest_dpt": (0.08265 * 0.15 / 0.003026) ** (1 / 3),
+    "truth.declared": 1,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("path", EXPECTED)
+def test_a_number_of_the_record(path, frame):
+    found, rel = np.array(at(frame, path)), 1e-6 if path.endswith("earth_rate") else 1e-9
+    assert found == pytest.approx(np.broadcast_to(EXPECTED[path], found.shape), rel=rel)
+
+
+def test_poles_are_that_of_detection_and_the_bank(frame):
+    assert frame["fdi"]["bank"]["decay"][:3] == pytest.approx(np.exp(-DT * np.array([1.5, 0.5, 4.0])))
+
+
+def test_the_slipstream_per_manifold_pressure_is_that_of_the_engine(frame):
+    """dpt = 0.08696 + 191.18 P / (rho V^3 / 2), P = 0.7355 (0.00412 (pz + 7.4) (n + 2010) + ...) [FDC]."""
+    per_inhg_kw = 0.7355 * 0.00412 * (2000 + 2010)
+    assert frame["control"]["power"]["dpt_factor"] == pytest.approx(2 * 191.18 * per_inhg_kw, rel=1e-6)
+
+
+def test_the_model_of_the_reference_is_a_critically_damped_second_order():
+    """x'' = w^2 (r - x) - 2 w x': its step response after a second is 1 - (1 + w) e^-w."""
+    control = assembled()["control"]
+    A, B, x = control["model_A"], control["model_B"], np.zeros(2)
+    for _ in range(50):
+        x = A @ x + B.ravel()
+    assert x[0] == pytest.approx(1 - 11 * np.exp(-10.0))
+
+
+def test_losses_of_the_leading_surfaces_come_first_then_the_others_and_every_position(frame):
+    aircraft = Scenario.model_validate(GIVEN).airframe
+    assert estimator_names("published", aircraft) == ("aileron", "elevator", "rudder")
+    names = estimator_names("all", aircraft)
+    assert names == (
+        "aileron", "elevator", "rudder", "flap",
+        "aileron_position", "elevator_position", "rudder_position", "flap_position",
+    )  # fmt: skip
+    fies = frame["fdi"]["estimator"][:8]
+    assert fies["surface"].tolist() == [0, 1, 2, 3] * 2
+    assert fies["low"].tolist() == [-1.0] * 4 + TRAVEL[0].tolist()
+    assert fies["high"].tolist() == [0.0] * 4 + TRAVEL[1].tolist()
+    assert frame["fdi"]["layout"]["loss_of"].tolist() == [0, 1, 2, 3]
+    assert frame["fdi"]["layout"]["position_of"].tolist() == [4, 5, 6, 7]
+
+
+def test_in_pairs_each_plane_is_asked_for_itself():
+    fdi = assembled(substeps=1, fdi={**GIVEN["fdi"], "pairs": True, "authority": "worst-case"})["fdi"]
+    assert fdi["surface"]["in_question"].tolist() == [0, 1, 0, 1]
+    pitch, others = [1, 0, 1], [0, 1, 0]
+    assert fdi["estimator"]["unasked"][:4].tolist() == [others, pitch, others, pitch]
+
+
+def test_what_is_trimmed_beyond_the_engines_range_is_within_it():
+    power = assembled(initial={"manifold_pressure_inhg": 10.5})["control"]["power"]
+    assert (power["low"], power["high"]) == (10.5, 30.0)
+    power = assembled(initial={"manifold_pressure_inhg": 33.0})["control"]["power"]
+    assert (power["low"], power["high"]) == (11.0, 33.0)

@@ -109,3 +109,18 @@ def test_without_a_watch_there_is_no_column_of_it_and_before_one_no_number():
                         "changes": [{"at_s": 1.0, "scheme": "adaptive-estimators"}]})).log  # fmt: skip
     assert late["watch_share"][:100].isna().all()
     assert late["watch_share"][100:].between(0.0, 1.0).all()
+
+
+def test_an_angle_that_freezes_in_noise_is_no_gyros_fault():
+    """It stands still for two looks when the alarm comes: a third has to say whether it is frozen."""
+    turning = {axis: [{"sine": {"amplitude_deg_s": 3, "frequency_hz": 0.4}}] for axis in "pqr"}
+    grade = {"sensors": "tactical-grade", "fdi": {"bounds": {"sensors": "tactical-grade"}}}
+    frozen = {"sensor": "psi", "type": "freeze"}
+    names = {
+        bf.fly(
+            load({"name": "x", "duration_s": 5, "rate_hz": 50, "seed": seed, "reference": turning,
+                  "faults": [{**frozen, "at_s": 2.0 + 0.26 * seed}], **grade}), log=False
+        ).isolation.fault
+        for seed in range(10)
+    }  # fmt: skip
+    assert names <= {"sensor psi", "unanticipated", None}

@@ -31,6 +31,7 @@ from beaver_ftc.plant.instruments import AX, N_SENSORS, PHI
 
 SOON_S = 1.0  # after the alarm: later, chance has had too many tries
 CALMED_S = 2.0  # in which a leap of an accelerometer is forgotten
+NEVER_STILL = 1_000_000_000  # looks: of a reading that resolves less than it scatters
 GOES_ON = 30.0  # times what the reading has moved by: a scale error within 3 % of -1 would do that
 CLEARLY = 3.0  # beyond a bound, of what is not seen
 _ROUNDING_S = 1e-9
@@ -65,6 +66,12 @@ def note_stillness(watch, signal):
 def stands_still(watch, i):
     """Whether instrument i is frozen: no sound one gives the same reading for so long."""
     return watch.still[i] >= watch.longest_still[i]
+
+
+@kernel
+def may_stand_still(watch, i):
+    """Whether it is too early to say: the reading has not moved, and may be frozen."""
+    return 0 < watch.still[i] < watch.longest_still[i] < NEVER_STILL
 
 
 @kernel

@@ -277,7 +277,7 @@ def would_show(watch):
 @kernel
 def suspect_attitude(watch):
     """The same of gyros and attitude: one axis alone, or one angle alone. An angle by itself may be the first
-    to show what a gyro does; one that is frozen is no gyro's doing."""
+    to show what a gyro does; one that is frozen is no gyro's doing, and until that is seen it may be."""
     fired, who = watch.fired, watch.suspect
     turns, angles, frozen = 0, 0, False
     for i in range(3):
@@ -288,7 +288,8 @@ def suspect_attitude(watch):
         alone = turns == 0 or (fired[TURN + i] == 1 and turns == 1)
         who[i] = alone and watch.rates_say[i] != NO and not frozen
         mine = fired[ANGLE + i] == 1 and angles == 1
-        who[PHI + i] = mine and watch.rates_say[axis_of(watch, i)] != YES
+        moved = mine and watch.rates_say[axis_of(watch, i)] != YES
+        who[PHI + i] = moved or accelerometers.may_stand_still(watch, PHI + i)
 
 
 @kernel

@@ -7,6 +7,7 @@ import numpy as np
 
 from beaver_ftc.design.context import DesignModel
 from beaver_ftc.design.engine import power_error_kw
+from beaver_ftc.diagnosis.accelerometers import NEVER_STILL
 from beaver_ftc.diagnosis.admitted import GUST_FT_S, GUST_LIMIT_SIGMA, SCALE_FT
 from beaver_ftc.diagnosis.declared import gust_effect
 from beaver_ftc.diagnosis.forces import tell_apart
@@ -134,7 +135,7 @@ def longest_still(noise: float, quantum: float) -> int:
     """For how many looks no sound instrument, of this noise and resolution, gives the very same reading."""
     if quantum == 0.0:
         return 3
-    return 50 if noise > quantum / 4.0 else 1_000_000_000
+    return 50 if noise > quantum / 4.0 else NEVER_STILL
 
 
 def admit_engine(admitted: np.void, scenario: Scenario) -> None:

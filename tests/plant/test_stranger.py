@@ -105,6 +105,12 @@ DEEDS = [
     ("Systems/rudder.xml", "<channel name='w'> <pure_gain name='g'> <input> fcs/rudder-cmd-rad </input>"
      "<gain> 1 </gain> <output> simulation/write-state-<!-- -->file </output> </pure_gain> </channel>",
      "simulation/write-state-file writes a file"),
+    ("Systems/rudder.xml", "<channel name='l'> <pure_gain name='g'> <input> fcs/rudder-cmd-rad </input>"
+     "<gain> 1 </gain> <output> simulation/do_linearization </output> </pure_gain> </channel>",
+     "simulation/do_linearization writes a file"),
+    ("scripts/fly.xml", '<runscript name="r"> <use aircraft="trainer" initialize="reset"/>'
+     '<run start="0" end="1" dt="0.1"> <event name="e"> <set name="simulation/do_linearization" value="1"/>'
+     "</event> </run> </runscript>", '<set name="simulation/do_linearization" value="1"> writes a file'),
     ("Systems/rudder.xml", '<system file="/etc/passwd"/>', '<system file="/etc/passwd"> leaves the folder'),
     ("Systems/rudder.xml", '<output name="{precious}" type="CSV"/>', "<output name="),
     ("scripts/fly.xml", '<runscript name="r"> <use aircraft="trainer" initialize="reset"/>'
@@ -200,14 +206,13 @@ def test_a_namespace_hides_nothing(machine):
     machine.untouched()
 
 
-def test_a_property_of_the_aircraft_file_writes_nothing_either(machine, monkeypatch, tmp_path):
-    """JSBSim writes its state whenever that property is set: there is no folder it could do so in."""
-    monkeypatch.chdir(machine.root)
+@pytest.mark.parametrize("name", ["simulation/write-state-file", "simulation/do_linearization"])
+def test_a_property_of_the_aircraft_file_writes_nothing_either(machine, name):
+    """The second writes where the model's name says, which may be an absolute path."""
     file = machine.folder / "aircraft.yaml"
-    file.write_text(file.read_text().replace("fcs/aileron-cmd-rad", "simulation/write-state-file"))
-    CliRunner().invoke(app, ["run", str(machine.scenario), "--out", str(tmp_path / "out")])
-    assert not list(tmp_path.rglob("initfile*"))
-    machine.untouched()
+    file.write_text(file.read_text().replace("fcs/aileron-cmd-rad", name))
+    says = "surfaces.aileron.command: makes JSBSim write a file, allowed: other properties"
+    assert says in refused("validate", machine.scenario)
 
 
 @pytest.mark.parametrize("name", ["c172x", "737", "ball"])

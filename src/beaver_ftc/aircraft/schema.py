@@ -26,9 +26,24 @@ PROPERTY_PATTERN = r"^[A-Za-z_][A-Za-z0-9_./\[\]-]*$"
 FILE_PATTERN = r"^[A-Za-z0-9_-][A-Za-z0-9_.-]*\.xml$"
 
 Name = Annotated[str, Field(pattern=NAME_PATTERN, max_length=60)]
-Property = Annotated[str, Field(pattern=PROPERTY_PATTERN, max_length=200)]
+# Properties of JSBSim that write a file whenever they are set; the second where the model's name says.
+WRITING_PROPERTIES = ("simulation/write-state-file", "simulation/do_linearization")
 Text = Annotated[str, Field(max_length=2000)]
 Power = Annotated[Whole, Field(ge=1, le=9)]
+
+
+def writing_property(text: str) -> str:
+    """The property of JSBSim that writes a file and is named in a text; empty if none is."""
+    return next((name for name in WRITING_PROPERTIES if name.rpartition("/")[2] in text), "")
+
+
+def _only_data(name: str) -> str:
+    if writing_property(name):
+        refuse([((), "makes JSBSim write a file, allowed: other properties")])
+    return name
+
+
+Property = Annotated[str, Field(pattern=PROPERTY_PATTERN, max_length=200), AfterValidator(_only_data)]
 
 
 def _in_order(given: tuple[float, float]) -> tuple[float, float]:

@@ -16,6 +16,7 @@ from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 from xml.parsers import expat
 
+from beaver_ftc.aircraft.schema import writing_property
 from beaver_ftc.documents.document import MAX_PROBLEMS
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.documents.files import UnreadableError, read_bytes
@@ -27,7 +28,6 @@ _ENGINE_FOLDERS = (ENGINES, "engines", "Engine", "engine")  # beside a model; JS
 _ENGINE_ELEMENTS = ("engine", "thruster")
 _MAX_BYTES = 20_000_000
 _LONGEST = 160
-_WRITES_STATE = "write-state-file"  # a property of JSBSim that writes a file whenever it is set
 _NAMING = {"use": ("aircraft", "initialize")}  # what names files beside `file`
 _FORBIDDEN = {
     "output": "writes files or connects, allowed: no <output> here; what flies is logged by beaver-ftc",
@@ -154,8 +154,8 @@ def _read_at(path: Path, *_state: int) -> _File:
         says.wrong.append((parser.CurrentLineNumber, what))
 
     def flush() -> None:
-        if _WRITES_STATE in "".join(text):
-            forbid(f"simulation/{_WRITES_STATE} writes a file, allowed: other properties")
+        if says_it := writing_property("".join(text)):
+            forbid(f"{says_it} writes a file, allowed: other properties")
         text.clear()
 
     def begin(name: str, attributes: dict[str, str]) -> None:
@@ -171,7 +171,7 @@ def _read_at(path: Path, *_state: int) -> _File:
                 says.names.append((name, attributes[key], parser.CurrentLineNumber))
                 if _leaves(attributes[key]):
                     forbid(f"<{shown}> leaves the folder, allowed: a file of the aircraft's own folder")
-        if any(_WRITES_STATE in of for of in attributes.values()):
+        if any(map(writing_property, attributes.values())):
             forbid(f"<{shown}> writes a file, allowed: other properties")
         depth += 1
 

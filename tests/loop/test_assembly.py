@@ -5,6 +5,8 @@ from math import exp, pi, radians
 import numpy as np
 import pytest
 
+from beaver_ftc.diagnosis.rivals.rls import RlsMonitor
+from beaver_ftc.loop import plugin_frame
 from beaver_ftc.loop.assembly import assemble, estimator_names
 from beaver_ftc.scenario.schema import Scenario
 
@@ -149,3 +151,18 @@ def test_what_is_trimmed_beyond_the_engines_range_is_within_it():
     assert (power["low"], power["high"]) == (10.5, 30.0)
     power = assembled(initial={"manifold_pressure_inhg": 33.0})["control"]["power"]
     assert (power["low"], power["high"]) == (11.0, 33.0)
+
+
+def test_a_plug_in_that_diagnoses_has_the_record_to_itself():
+    """An estimator a surface for its verdicts; nothing built in diagnoses, watches, weighs chance or acts."""
+    given = {**GIVEN, "fdi": {"fault_class": "all", "statistical": {}, "sensor_monitor": "always"}}
+    scenario = Scenario.model_validate(given)
+    frames = assemble(scenario, TRIM, TRAVEL)
+    before = frames["fdi"][0]
+    assert (before["enabled"], before["watch"]["enabled"], before["every_type"]) == (1, 1, 1)
+    plugin_frame.plugged(frames, scenario, np.ones(40), RlsMonitor(), None)
+    fdi = frames["fdi"][0]
+    off = fdi["enabled"], fdi["n_estimators"], fdi["every_type"], fdi["watch"]["enabled"]
+    assert (*off, fdi["statistical"]["enabled"], frames["control"]["power"]["enabled"][0]) == (0,) * 6
+    assert fdi["estimator"]["surface"][:4].tolist() == [AILERON, ELEVATOR, RUDDER, FLAP]
+    assert plugin_frame.plugged(frames, scenario, np.ones(40), None, None) is None

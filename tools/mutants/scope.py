@@ -26,8 +26,12 @@ MODES = {KERNELS: (PLAIN,), GLUE: (PLAIN, COMPILED)}
 
 # Compiled modules that plain Python reaches in a second.
 QUICK = ("design", "diagnosis", "control")
-COMPILERS = ("compiled.py", "translation.py", "elsewhere.py")
+APART = {
+    "compiled.py": "compile", "translation.py": "compile", "elsewhere.py": "compile",
+    "results/looks.py": "looks",
+}  # fmt: skip
 LEFT_OUT = {
+    "looks": "how lines look: only the eye can judge it",
     "compile": "what compiles and keeps code: a mistake in it would be kept",
     "fly": "compiled into the whole flight: plain Python takes minutes to reach it, a compiler half of one",
 }
@@ -35,9 +39,8 @@ LEFT_OUT = {
 
 def kind(file: Path) -> str:
     """KERNELS, GLUE, or why no mutants are made of a module (a key of LEFT_OUT)."""
-    inside = file.relative_to(PACKAGE)
-    if inside.as_posix() in COMPILERS:
-        return "compile"
+    if reason := APART.get(file.relative_to(PACKAGE).as_posix()):
+        return reason
     if file not in _compiled(PACKAGE):
         return GLUE
     return KERNELS if _is_quick(file) else "fly"

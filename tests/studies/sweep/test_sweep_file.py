@@ -1,12 +1,14 @@
 from dataclasses import replace
 
 import pytest
+from pydantic import ValidationError
 
 from beaver_ftc.aircraft.question import asked
 from beaver_ftc.documents.keys import UnusableKeyError, parse_key, with_values
 from beaver_ftc.documents.problems import ScenarioError
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.sweep_loader import builtin_sweeps, is_sweep, load_sweep, load_sweep_text
+from beaver_ftc.scenario.sweep_schema import SweepFile
 from beaver_ftc.studies.sweep.sampling import Plan
 
 HEAD = "base: elevator-partial-loss\nruns: 3\nvary:\n  "
@@ -149,3 +151,66 @@ def test_a_base_below_the_folder_is_found(tmp_path):
     (tmp_path / "below" / "base.yaml").write_text("name: below\nduration_s: 5\n")
     (tmp_path / "many.yaml").write_text("base: below/base.yaml\nruns: 2\n")
     assert load_sweep(tmp_path / "many.yaml").base["duration_s"] == 5
+
+
+def _file(**given):
+    return SweepFile.model_validate({"name": "limits", "base": "fault-free", "runs": 3, **given})
+
+
+def _vary(**how):
+    return {"vary": {"initial.airspeed_mps": how}}
+
+
+@pytest.mark.parametrize(
+    ("inside", "outside"),
+    [
+        ({"runs": 1}, {"runs": 0}), ({"runs": 10_000_000}, {"runs": 10_000_001}),
+        ({"seed": 0}, {"seed": -1}), ({"seed": 2**63 - 1}, {"seed": 2**63}),
+        ({"name": "n" * 70}, {"name": "n" * 71}), ({"description": "d" * 2000}, {"description": "d" * 2001}),
+        (_vary(linspace=(1, 2, 1)), _vary(linspace=(1, 2, 0))),
+        (_vary(linspace=(1, 2, 1_000_000)), _vary(linspace=(1, 2, 1_000_001))),
+        (_vary(choice=(1,)), _vary(choice=())),
+        (_vary(uniform=(1, 2)), _vary(uniform=(2, 2))),
+        (_vary(normal=(1, 1e-9)), _vary(normal=(1, 0))),
+        (_vary(loguniform=(1e-9, 2)), _vary(loguniform=(0, 2))),
+        (_vary(normal=(1, 1), within=(0, 2)), _vary(uniform=(0, 3), within=(0, 2))),
+        *(
+            (
+                {"expect": {"detection_rate": {"at_least": 0.5, "confidence": inside}}},
+                {"expect": {"detection_rate": {"at_least": 0.5, "confidence": outside}}},
+            )
+            for inside, outside in ((0.5, 0.49), (0.999, 1.0))
+        ),
+        *(
+            (
+                {"expect": {"detection_delay_s": {"at_most": 0.5, "quantile": inside}}},
+                {"expect": {"detection_delay_s": {"at_most": 0.5, "quantile": outside}}},
+            )
+            for inside, outside in ((0.001, 0.0), (0.999, 1.0))
+        ),
+    ],
+)  # fmt: skip
+def test_what_is_at_a_limit_is_read_and_what_is_beyond_is_not(inside, outside):
+    _file(**inside)
+    with pytest.raises(ValidationError):
+        _file(**outside)
+
+
+@pytest.mark.parametrize(
+    ("given", "flights"),
+    [
+        ({"vary": {"a": {"linspace": (1, 2, 5)}, "b": {"uniform": (1, 2)}}}, 5),
+        ({"vary": {"a": {"linspace": (1, 2, 5)}, "b": {"choice": (1, 2)}}}, 5),
+        ({"sampling": "grid", "vary": {"a": {"linspace": (1, 2, 5)}, "b": {"choice": (1, 2)}}}, 10),
+        ({"runs": 7, "sampling": "grid", "vary": {"a": {"linspace": (1, 2, 5)}}}, 7),
+    ],
+)
+def test_a_grid_gives_the_number_of_flights_unless_it_is_said(given, flights):
+    assert SweepFile.model_validate({"name": "grid", "base": "fault-free", **given}).flights == flights
+
+
+def test_without_a_grid_the_number_of_flights_is_asked_for_and_a_huge_one_is_refused():
+    huge = {"a": {"linspace": (1, 2, 1_000_000)}, "b": {"linspace": (1, 2, 11)}}
+    for vary in ({"a": {"uniform": (1, 2)}}, huge):
+        with pytest.raises(ValidationError, match="contradictory"):
+            SweepFile.model_validate({"name": "grid", "base": "fault-free", "vary": vary})

@@ -1,6 +1,7 @@
 """The statistical detector's numbers one by one: from what is declared, by the formulas' own conditions."""
 
 from math import exp, pi, radians, sqrt
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from beaver_ftc.diagnosis import gusts, noise_model
 from beaver_ftc.diagnosis.admitted import gust_sigma_rad_s, inertia_slack
 from beaver_ftc.diagnosis.state import ALPHA3, ENDING, GROWING, LOSS, N_SLOTS, STATISTICAL, STEP
 from beaver_ftc.loop.assembly import assemble
-from beaver_ftc.scenario.diagnosis import Bounds
+from beaver_ftc.scenario.diagnosis import Bounds, Statistical
 from beaver_ftc.scenario.schema import Scenario
 
 AIRCRAFT = load()
@@ -365,3 +366,10 @@ def test_where_forces_are_weighed_their_noise_is_in_the_gust_that_follows_from_t
     by_force = known * np.array([0.2 / 50.0, 0.3 / 6.0])
     blurred = gusts.jitter(by_force, design, *LEVEL_FLIGHT[1:], SPAN_M)
     assert forces["blurred"] == pytest.approx(blurred)
+
+
+@pytest.mark.parametrize(("error", "pace"), [((0.0, 0.0, 0.0), 15.0 * 0.02), ((0.1, 0.0, 0.0), 2.0)])
+def test_what_an_aircrafts_terms_are_off_may_change_sides_within_a_frame(error, pace):
+    """A square wave of the frame rate, -1 and 1 by turns: its largest change is twice its bound."""
+    aircraft = SimpleNamespace(model_error_rad_s2=error)
+    assert noise_model.pace_of(Statistical(uncertainty_rad_s=15.0), aircraft, 0.02) == pytest.approx(pace)

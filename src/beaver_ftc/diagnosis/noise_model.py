@@ -130,13 +130,16 @@ def set_up(
     statistical["naming_level"] = naming_level(given.misnaming, rate_hz, aircraft)
     statistical["keep"] = exp(-1.0 / (rate_hz * config.forgetting_time_s))
     _set_up_blocks(statistical, config.bounds.sensors, aircraft)
-    _set_up_bounded(statistical, given, config, 1.0 / rate_hz)
+    _set_up_bounded(statistical, config, pace_of(given, aircraft, 1.0 / rate_hz), 1.0 / rate_hz)
     _set_up_noise(statistical, given, config.bounds, design, start, 1.0 / rate_hz)
     _set_up_tolerances(statistical, config.bounds, design, mass, start, aircraft)
     set_up_readings(statistical, config.bounds.sensors, fdi["bound"]["admitted"])
     if across:
         chance = given.false_alarms_per_h / (3600.0 * rate_hz * tests)
-        airspeed_mps, pace_rad_s = float(start[1][AIRSPEED]), given.uncertainty_rad_s
+        airspeed_mps, pace_rad_s = (
+            float(start[1][AIRSPEED]),
+            pace_of(given, aircraft, 1.0 / rate_hz) * rate_hz,
+        )
         set_up_listening(statistical["listening"], chance, airspeed_mps, pace_rad_s, 1.0 / rate_hz)
         if forces:
             along_y = jacobian(design, *start)[3]
@@ -175,12 +178,21 @@ def _set_up_blocks(statistical: np.void, sensors: Sensors, aircraft: Aircraft) -
             hypothesis["column"] = losses.index(surface) if kind == LOSS else len(losses) + axis
 
 
-def _set_up_bounded(statistical: np.void, given: Statistical, config: FdiConfig, dt_s: float) -> None:
+def pace_of(given: Statistical, aircraft: Aircraft, dt_s: float) -> float:
+    """By what share of its bound an uncertainty that is merely bounded changes within a frame, at most.
+
+    What an aircraft's own terms are off moves with its surfaces, which a law may throw from frame to frame:
+    there from one end of the bound to the other.
+    """
+    return 2.0 if any(aircraft.model_error_rad_s2) else given.uncertainty_rad_s * dt_s
+
+
+def _set_up_bounded(statistical: np.void, config: FdiConfig, pace: float, dt_s: float) -> None:
     """What an uncertainty that is bounded may do beside chance. A loss declared constant does not grow."""
     still = config.bounds.sensors.is_ideal and config.bounds.turbulence == "none"
     for block in statistical["block"][: statistical["n_blocks"]]:
         block["level"], block["chance"] = statistical["alarm_level"], 0.0 if still else CHANCE
-        block["pace"] = given.uncertainty_rad_s * dt_s
+        block["pace"] = pace
         kinds = block["hypothesis"]["kind"][: block["n_hypotheses"]]
         if config.fault_profile == "abrupt":
             block["n_hypotheses"] = np.sum((kinds != GROWING) & (kinds != ENDING))

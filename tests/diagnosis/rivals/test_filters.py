@@ -137,3 +137,12 @@ def test_a_chain_keeps_probability():
     chain = transition(0.99, 5)
     assert chain.sum(axis=1) == pytest.approx(np.ones(5))
     assert np.linalg.matrix_power(chain, 5000)[0] == pytest.approx(np.full(5, 0.2), abs=1e-6)
+
+
+def test_sigma_points_of_a_covariance_that_rounding_has_bent_are_still_those_of_it():
+    """1e6 along one direction and, by rounding, a little less than nothing along another."""
+    turn = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0]
+    P = turn @ np.diag([1e6, 1.0, -1e-9]) @ turn.T
+    points, weights = sigma_points(np.array([1.0, 2.0, 3.0]), P, 3.0)
+    off = points - weights @ points
+    assert (off.T * weights) @ off == pytest.approx(P, rel=1e-6, abs=1e-6)

@@ -39,8 +39,19 @@ def sigma_points(z: np.ndarray, P: np.ndarray, spread: float) -> tuple[np.ndarra
     spread is n + kappa [Julier2004, eq. 12]; 3 matches the fourth moment of a Gaussian in one dimension.
     """
     n = len(z)
-    root = np.linalg.cholesky(spread * P).T
+    root = _root(spread * P).T
     points = np.concatenate((z[None], z + root, z - root))
     weights = np.full(2 * n + 1, 0.5 / spread)
     weights[0] = 1.0 - n / spread
     return points, weights
+
+
+def _root(P: np.ndarray) -> np.ndarray:
+    """L with L L' = P. Where rounding has cost P its definiteness, as after a reading far beyond what the
+    filter expects, what is below zero counts as nothing."""
+    try:
+        return np.linalg.cholesky(P)
+    except np.linalg.LinAlgError:
+        values, vectors = np.linalg.eigh(P)
+        root: np.ndarray = vectors * np.sqrt(np.maximum(values, 0.0))
+        return root

@@ -188,3 +188,13 @@ def test_an_alarm_without_an_excess_widens_the_bound_until_there_is_none(monkeyp
     assert found.settled
     assert flown == pytest.approx([0.1, 0.12, 0.15, 0.18][: alarms + 1])  # a fifth more, two digits, upwards
     assert found.constant_rad_s2["q"] == flown[-1]
+
+
+@pytest.mark.parametrize(
+    ("value", "digits", "up"),
+    [(0.0121, 2, 0.013), (0.012, 2, 0.012), (1.21, 2, 1.3), (12.1, 2, 13.0), (121.0, 2, 130.0),
+     (1200.0, 2, 1200.0),
+     (9910.0, 2, 10000.0), (1211.0, 3, 1220.0), (-1.0, 2, 0.0), (0.0, 2, 0.0)],
+)  # fmt: skip
+def test_two_digits_that_are_not_below(value, digits, up):
+    assert rounded_up(value, digits) == pytest.approx(up, rel=1e-12)

@@ -84,12 +84,22 @@ def test_a_gap_is_a_gap_however_long(wing, wing_model, tmp_path):
         samples = load_flights([path], wing)[0]
         model = wing_model.model_copy(update={"rate_hz": 20.0})
         rows.append((samples, diagnose(samples, model)))
+        text = as_text(verdict_of(samples, model, rows[-1][1]))
+        assert text.splitlines()[0].endswith(" in 30 s, 1 gap in the log left out")
     (one, said), (other, said_too) = rows
     assert one.run[0] == 0
     assert one.run[-1] == 1
     np.testing.assert_array_equal(one.run, other.run)
     np.testing.assert_allclose(one.rates, other.rates, atol=1e-12)
     np.testing.assert_allclose(said.probability, said_too.probability, atol=1e-9)
+
+
+def test_a_time_in_another_unit_is_told(wing, tmp_path):
+    """In units of 1e9 s the flight lasts no time at all."""
+    columns = fast(0.0)
+    columns["t_s"] = columns["t_s"] * 1e-9
+    with pytest.raises(BadInput, match=r"logged at 5e\+10 Hz, allowed: up to 100000 Hz, time in seconds"):
+        load_flights([synthetic.write_csv(tmp_path / "tiny.csv", columns)], wing)
 
 
 def test_each_side_of_a_gap_is_sampled_as_if_alone(wing, tmp_path):

@@ -10,7 +10,7 @@ from beaver_ftc.flights.diagnose import Rows
 from beaver_ftc.flights.model import Model
 from beaver_ftc.flights.page import template
 from beaver_ftc.flights.samples import Samples
-from beaver_ftc.flights.verdict import BRIEF_S, lasting
+from beaver_ftc.flights.verdict import BRIEF_S, lasting, looked_at
 from beaver_ftc.results.looks import SERIES
 
 _MOST_POINTS = 6000
@@ -20,6 +20,7 @@ def render(samples: Samples, model: Model, rows: Rows, verdict: dict[str, Any]) 
     """The report as HTML text."""
     return template("flight.html.j2").render(
         verdict=verdict,
+        looked_at=looked_at(verdict),
         events=lasting(verdict["events"]),
         brief_s=BRIEF_S,
         model=model,

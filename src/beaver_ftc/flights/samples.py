@@ -15,7 +15,7 @@ from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.flights.recording import Column, Event, Floats, Recording
 from beaver_ftc.flights.vehicle import Vehicle
 
-MIN_RATE_HZ = 4.0
+MIN_RATE_HZ, _MAX_RATE_HZ = 4.0, 1e5
 _FIRST = 50
 _LARGEST, _FASTEST_RAD_S = 1e6, 60.0
 _GAP = 3.5
@@ -118,6 +118,11 @@ def _time_base(name: str, stamps: Floats, max_rate_hz: float) -> tuple[Floats, N
         raise BadInput(
             f"{name}: rates are logged at {rate_hz:.2g} Hz, allowed: at least {MIN_RATE_HZ:g} Hz to tell "
             "a surface's effect from the vehicle's own motion"
+        )
+    if rate_hz > _MAX_RATE_HZ:
+        raise BadInput(
+            f"{name}: rates are logged at {rate_hz:.2g} Hz, allowed: up to {_MAX_RATE_HZ:g} Hz, "
+            "time in seconds"
         )
     if rate_hz <= 1.05 * max_rate_hz:
         return stamps, np.cumsum(np.diff(stamps, prepend=stamps[0]) > _GAP * step), step

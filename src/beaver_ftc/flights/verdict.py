@@ -22,6 +22,8 @@ def verdict_of(samples: Samples, model: Model, rows: Rows) -> Document:
         "flight": samples.name,
         "vehicle": model.vehicle.name,
         "duration_s": float(samples.t_s[-1] - samples.t_s[0]),
+        "recorded_s": len(samples.t_s) * samples.dt_s,
+        "gaps": int(samples.run[-1]),
         "rate_hz": 1.0 / samples.dt_s,
         "faulty": bool(rows.faulty.any()),
         "events": events_of(rows, list(model.vehicle.surfaces)),
@@ -114,7 +116,14 @@ def as_text(verdict: Document) -> str:
 def _summary(verdict: Document) -> str:
     count = len(lasting(verdict["events"]))
     what = f"{count} event{'s' if count > 1 else ''}" if count else "no fault shows"
-    return f"{what} in {verdict['duration_s']:.0f} s"
+    return f"{what} in {looked_at(verdict)}"
+
+
+def looked_at(verdict: Document) -> str:
+    """How much flight was diagnosed, in words: a gap in the log is no flight."""
+    if not (gaps := verdict["gaps"]):
+        return f"{verdict['duration_s']:.0f} s"
+    return f"{verdict['recorded_s']:.0f} s, {gaps} gap{'s' if gaps > 1 else ''} in the log left out"
 
 
 def _event_line(event: Document) -> str:

@@ -47,6 +47,22 @@ def test_a_changed_log_is_not_as_flown(run, tmp_path):
     assert flight.detection.time_s > 5.1
 
 
+@pytest.mark.parametrize(
+    ("rows", "stamp", "says"),
+    [(0, None, "has 0 rows, allowed: at least 2"), (600, 3.0, "t_s: row 501: time does not increase")],
+    ids=["empty", "back"],
+)
+def test_a_damaged_log_is_told(run, tmp_path, rows, stamp, says):
+    folder, _ = run
+    table = parquet.read_table(folder / "log.parquet").to_pandas()[:rows]
+    if stamp is not None:
+        table.loc[500, "t_s"] = stamp
+    (tmp_path / "scenario.yaml").write_bytes((folder / "scenario.yaml").read_bytes())
+    table.to_parquet(tmp_path / "log.parquet")
+    with pytest.raises(BadInput, match=says):
+        replay(tmp_path / "log.parquet")
+
+
 def test_the_command_writes_rows_and_verdict(run, tmp_path):
     folder, flight = run
     arguments = ["diagnose", str(folder / "log.parquet"), "--out", str(tmp_path), "--format", "json"]

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.flights.readers.table import read_numbers
+from beaver_ftc.flights.readers.table import check_time, read_numbers
 from beaver_ftc.flights.recording import Floats
 
 Document = dict[str, Any]
@@ -71,6 +71,7 @@ def _columns_of(path: Path, names: list[str]) -> dict[str, Floats]:
     missing = [name for name in names if name not in log]
     if missing:
         raise BadInput(f"{path}: no column {missing[0]}, allowed: a log.parquet as `run` writes it")
+    check_time(path, log["t_s"])
     return log
 
 

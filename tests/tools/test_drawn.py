@@ -1,12 +1,15 @@
 """Scenarios drawn from the schema: every pair is there, new keys take part, flights keep their promises."""
 
+from argparse import Namespace
 from itertools import combinations, islice
+from multiprocessing import Barrier, get_context
 
 import numpy as np
 import pytest
 from pydantic import Field
+from tools.drawn import __main__ as command
 from tools.drawn.array import CoveringArray, Factor
-from tools.drawn.campaign import fly
+from tools.drawn.campaign import Outcome, fly
 from tools.drawn.compose import EVERYTHING, array_of, drawn_flights
 from tools.drawn.promises import broken, told_alike
 
@@ -206,3 +209,18 @@ def test_a_covering_array_of_flights_breaks_no_promise():
     rows = len(list(rows_of(SEED)))
     found = [fly(drawn) for drawn in islice(drawn_flights(SEED, AIRCRAFT), rows)]
     assert [(one.index, one.broken) for one in found if one.broken] == []
+
+
+def test_workers_fly_at_the_same_time(monkeypatch):
+    """Each waits for the other before every flight."""
+    together = Barrier(2)
+
+    def slices(seed, aircraft, first, end, step, keep, shrink):
+        for index in range(first, end, step):
+            together.wait(timeout=10)
+            yield Outcome(index, declared=True)
+
+    monkeypatch.setattr(command, "fly_slice", slices)
+    monkeypatch.setattr(command, "WORKERS_BEGIN_AS", get_context("fork"))  # so that they have this `slices`
+    args = Namespace(seed=1, aircraft=AIRCRAFT, first=3, flights=4, workers=2, keep=None, shrink=False)
+    assert sorted(outcome.index for outcome in command.outcomes(args)) == [3, 4, 5, 6]

@@ -10,14 +10,17 @@ breaks is written to FOLDER, and again with as much left out as still breaks (`-
 """
 
 import argparse
-import itertools
 import time
 from collections import Counter
+from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
 from pathlib import Path
+from queue import Queue
 
 from tools.drawn.campaign import AIRCRAFT, Outcome, fly_slice
 
+WORKERS_BEGIN_AS = get_context()
 WORDS = ("flights", "refused", "detected", "named", "broken")
 
 
@@ -47,8 +50,8 @@ def main() -> None:
     raise SystemExit(1 if count["broken"] else 0)
 
 
-def outcomes(args: argparse.Namespace) -> "itertools.chain[Outcome]":
-    """Every outcome; each worker flies every so many-th."""
+def outcomes(args: argparse.Namespace) -> Iterator[Outcome]:
+    """Every outcome as it comes; each worker flies every so many-th, and tells of each flight at once."""
     slices = [
         (
             args.seed,
@@ -62,13 +65,25 @@ def outcomes(args: argparse.Namespace) -> "itertools.chain[Outcome]":
         for i in range(args.workers)
     ]
     if args.workers == 1:
-        return itertools.chain(fly_slice(*slices[0]))
-    with ProcessPoolExecutor(args.workers) as pool:
-        return itertools.chain.from_iterable([list(pool.submit(_listed, one).result()) for one in slices])
+        yield from fly_slice(*slices[0])
+        return
+    with (
+        WORKERS_BEGIN_AS.Manager() as manager,
+        ProcessPoolExecutor(args.workers, WORKERS_BEGIN_AS) as pool,
+    ):
+        told = manager.Queue()
+        flying = [pool.submit(_tell, one, told) for one in slices]
+        for one in flying:
+            one.add_done_callback(lambda _: told.put(None))  # however it ended
+        for _ in flying:
+            yield from iter(told.get, None)
+        for one in flying:
+            one.result()  # raises what ended it
 
 
-def _listed(one: tuple) -> list[Outcome]:
-    return list(fly_slice(*one))
+def _tell(one: tuple, told: Queue) -> None:
+    for outcome in fly_slice(*one):
+        told.put(outcome)
 
 
 if __name__ == "__main__":

@@ -96,3 +96,17 @@ def test_a_swing_of_which_a_stop_hides_half_is_never_named_a_loss():
     said = bf.fly(scenario, log=False).isolation
     assert (said.fault, said.type) == ("aileron", None)
     assert set(said.candidates) == {"loss_of_effectiveness", "oscillatory"}
+
+
+@pytest.mark.parametrize("kappa_per_s", [10, 12])
+def test_a_bias_that_has_grown_into_its_stop_is_no_hardover(kappa_per_s):
+    """It grows at 60 or 72 deg/s at most, and after 1.5 deg is cut off as a runaway at 60 deg/s is."""
+    fault = {"type": "bias", "bias_deg": 6, "profile": "incipient", "kappa_per_s": kappa_per_s}
+    scenario = {
+        "name": "grown", "duration_s": 6, "actuators": {"aileron": {"travel_deg": [-1.5, 1.5]}},
+        "reference": {"p": [{"sine": {"amplitude_deg_s": 3, "frequency_hz": 0.2}}]},
+        "fdi": {"fault_class": "all"}, "faults": [{"actuator": "aileron", "at_s": 2, **fault}],
+    }  # fmt: skip
+    said = bf.fly(scenario, log=False).isolation
+    assert (said.fault, said.type) == ("aileron", None)
+    assert {"bias", "hardover"} <= set(said.candidates)

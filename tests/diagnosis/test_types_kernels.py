@@ -188,6 +188,37 @@ def test_at_a_stop_a_growing_bias_says_nothing():
         assert surface["growing_bias"]["up"] == surface["growing_bias"]["down"] == 0.0
 
 
+@pytest.mark.parametrize(
+    ("places", "ran"),
+    [
+        # a runaway's least pace is 0.05 rad a frame here, so 0.09 is as fast; each place is known to 0.01
+        ([0.0, 0.1, 0.2], [0, 0]), ([0.0, 0.1, 0.2, 0.31], [0, 1]), ([0.0, -0.1, -0.2, -0.31], [1, 0]),
+        ([0.0, 0.1, None, 0.31], [0, 1]),  # a frame that says nothing of this surface takes its time as well
+        ([0.0, "well", 0.31], [0, 0]), ([0.25, 0.34, 0.43, 0.5, 0.5], [0, 0]), ([0.15, 0.5], [0, 1]),
+    ],
+)  # fmt: skip
+def test_a_growing_bias_is_as_fast_as_a_runaway_only_where_that_is_certain(places, ran):
+    fdi, surface = new_surface(least_runaway_rate=0.05 / DT)
+    for place in places:
+        growing_bias.watch(fdi, surface, GROWING_BIAS)
+        if place == "well":
+            growing_bias.pass_over(fdi, surface, GROWING_BIAS)
+        elif place is not None:
+            surface["low_then"], surface["high_then"] = place - 0.01, min(place + 0.01, HIGH)
+            growing_bias.judge(fdi, surface, GROWING_BIAS, 5)
+    assert surface["growing_bias"]["ran"].tolist() == ran
+
+
+def test_of_several_instants_a_mean_may_be_that_of_the_last():
+    fdi, surface = new_surface(least_runaway_rate=0.05 / DT)
+    fdi["whole"] = 0
+    for place, ran in ((0.0, 0), (0.19, 0), (0.31, 1)):  # beyond 0.01 + 3 * 0.09 after two frames
+        growing_bias.watch(fdi, surface, GROWING_BIAS)
+        surface["low_then"], surface["high_then"] = place - 0.01, place + 0.01
+        growing_bias.judge(fdi, surface, GROWING_BIAS, 5)
+        assert surface["growing_bias"]["ran"][1] == ran
+
+
 def slow_run(places, orders=(0.0, 0.0), whole=1, frames=None, slowest_step=0.0):
     fdi, surface = new_surface(slowest_step=slowest_step)
     fdi["whole"] = whole

@@ -25,6 +25,7 @@ UNANTICIPATED = "unanticipated"
 LOSS = "loss_of_effectiveness"
 PLANES = (("elevator", "flap"), ("aileron", "rudder"))
 DUST_S = 1e-6
+DEFAULT_LIMIT_DEG_S = 60.0
 
 
 def broken(scenario: bf.Scenario, metrics: Document, declared: bool) -> Iterator[str]:
@@ -174,8 +175,18 @@ def _one_surface(scenario: bf.Scenario, metrics: Document, faults: list[Any]) ->
             yield f"excluded: {surface}:{faults[0].type}, left {mine}"
     elif len(kinds) == 1:
         kind = isolation["type"]
+        if kind == "hardover" and _runs_away(scenario, faults[0]):
+            return
         if kind not in (None, faults[0].type) or (kind is None and faults[0].type not in left):
             yield f"wrong type: {kind or left}, broken is {faults[0].type} of {surface}"
+
+
+def _runs_away(scenario: bf.Scenario, fault: Any) -> bool:
+    """Whether a bias grows so fast that at its stop it counts as a runaway (docs/fault-types.md)."""
+    if fault.type != "bias" or fault.profile == "abrupt":
+        return False
+    limit_deg_s = getattr(scenario.actuators, fault.actuator).rate_limit_deg_s or DEFAULT_LIMIT_DEG_S
+    return abs(fault.bias_deg) * fault.kappa_per_s > 0.9 * limit_deg_s
 
 
 def _type_left_out(scenario: bf.Scenario, faults: list[Any], mine: list[str]) -> bool:

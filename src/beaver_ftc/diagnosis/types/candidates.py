@@ -149,7 +149,12 @@ def may_creep(surface, found):
 
 @kernel
 def may_be_growing(surface, found):
-    """Whether what looks like a jam or a loss may be a bias that grows as the command happens to go."""
+    """Whether what looks like a jam or a loss may be a bias that grows as the command happens to go; or what
+    looks like a runaway, one that has come to the stop by and by."""
+    if found in (UP, DOWN):
+        ran = surface.growing_bias.ran
+        slowly = (left(surface, UP) and not ran[1]) or (left(surface, DOWN) and not ran[0])
+        return slowly and left(surface, GROWING_BIAS)
     return found in (CONSTANT_LOSS, STUCK, FLOAT) and left(surface, GROWING_BIAS)
 
 

@@ -104,6 +104,17 @@ def test_a_prediction_turns_attitude_and_velocity_by_the_rates(seed):
     assert predicted[ALTITUDE] == pytest.approx(900.0 - H * sinking, rel=1e-12)
 
 
+@pytest.mark.parametrize("i", range(3))
+def test_what_each_angle_turns_the_axes_by(i):
+    """By a small step of the angle, as a rotation vector in body axes."""
+    step, angles, small = new_step(), np.array([0.4, -0.3, 2.0]), 1e-6
+    step["then"][PHI : PHI + 3] = angles
+    moved = angles + small * (np.arange(3) == i)
+    one, other = (Rotation.from_euler("ZYX", of[::-1]) for of in (angles, moved))
+    turned = (one.inv() * other).as_rotvec() / small
+    assert [redundancy.turned_by(step, axis, i) for axis in range(3)] == pytest.approx(turned, abs=1e-5)
+
+
 def test_axes_that_do_not_turn_leave_a_vector_as_it_is():
     out = np.zeros(3)
     redundancy.turn_back(np.zeros(3), H, np.array([1.0, -2.0, 3.0]), out)

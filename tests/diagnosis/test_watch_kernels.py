@@ -100,8 +100,10 @@ def suspects(shares, lead=None, **fields):
         ({BETA_FLOW: 2.0}, {BETA, 2, *FORCES}),
         ({ALPHA_FLOW: 5.0, TURN + 1: 2.0}, {1}),
         ({BETA_FLOW: 5.0, TURN + 2: 2.0}, {2}),
-        ({TURN: 2.0}, {0}),
-        ({TURN + 2: 2.0}, {2}),
+        ({TURN: 2.1}, {0}),
+        ({TURN + 2: 2.1}, {2}),
+        ({TURN: 1.9}, {0, PHI}),  # the angle's own test may hide as much: both bounds together
+        ({TURN + 1: 1.9}, {1, THETA}),
         ({TURN + 1: 2.0, ANGLE + 1: 1.5}, {1, THETA}),
         ({TURN: 2.0, TURN + 1: 1.5}, set()),
         ({ANGLE + 2: 2.0}, {0, 1, 2, PSI}),  # an angle alone may be the first to show what a gyro does
@@ -117,7 +119,7 @@ def test_an_angle_that_is_frozen_is_no_gyro_s_doing():
     for looks, who in ((2, {1, THETA}), (3, {THETA})):
         still[THETA] = looks
         assert suspects(shares, still=still) == who
-    assert suspects({TURN: 2.0}, still=still) == set()
+    assert suspects({TURN: 2.1}, still=still) == set()
 
 
 def test_a_large_error_moves_its_neighbours_a_little():
@@ -516,7 +518,7 @@ def test_what_is_replaced_is_shared_out_and_the_slipstream_is_that_of_what_it_is
 
 def test_at_its_bound_a_test_is_within_it():
     """Shares of exactly one, and residuals of exactly the share that neighbours explain, are no suspicion."""
-    assert suspects({TURN: 1.0, TURN + 1: 1.0}, lead=TURN) == {0, 1, 2}
+    assert suspects({TURN: 1.0, TURN + 1: 1.0}, lead=TURN) == {0, 1, 2, PHI, THETA, PSI}
     assert suspects({ANGLE: 2.0, ANGLE + 1: 1.0}) == {0, 1, 2, PHI}
     assert suspects({TURN: 100.0, TURN + 1: 100.0 * watching.INVOLVED}) == {0}
     assert suspects({SPEED: 1.0, DENSITY: 1.0}, lead=DENSITY) == {AIRSPEED, QDYN}

@@ -7,6 +7,7 @@ import pytest
 import beaver_ftc as bf
 from beaver_ftc.diagnosis.watch import ALPHA_FLOW, BETA_FLOW, RPM
 from beaver_ftc.scenario.given import load
+from beaver_ftc.scenario.sensors import PRESETS
 
 SWINGING = {
     "p": [{"sine": {"amplitude_deg_s": 10, "frequency_hz": 0.5}}],
@@ -124,3 +125,32 @@ def test_an_angle_that_freezes_in_noise_is_no_gyros_fault():
         for seed in range(10)
     }  # fmt: skip
     assert names <= {"sensor psi", "unanticipated", None}
+
+
+@pytest.mark.parametrize(
+    ("seed", "rate_hz", "broken", "coarse", "swings"),
+    [
+        (4, 100, ("psi", 1.2437), {"alpha": 0.0392, "beta": 0.4518, "p": 0.0039, "phi": 0.01303},
+         {"p": (0.245, 0.451), "q": (1.83, 0.571), "r": (0.034, 0.233)}),
+        (128, 30, ("theta", 1.6477),
+         {"beta": 0.0507, "p": 0.0294, "psi": 0.51137, "r": 0.0996, "theta": 0.06574},
+         {"p": (4.653, 0.989), "q": (2.7, 0.412), "r": (0.385, 0.813)}),
+    ],
+)  # fmt: skip
+def test_no_other_is_named_for_a_frozen_angle_that_its_own_test_still_hides(
+    seed, rate_hz, broken, coarse, swings
+):
+    sensors = {name: dict(errors) for name, errors in PRESETS["tactical-grade"].items()}
+    for name, quantum in coarse.items():
+        sensors[name]["quantum_deg_s" if name in "pqr" else "quantum_deg"] = quantum
+    sines = {
+        axis: [{"sine": {"amplitude_deg_s": size, "frequency_hz": f}}] for axis, (size, f) in swings.items()
+    }
+    flight = bf.fly({
+        "name": "hidden", "duration_s": broken[1] + 0.6, "rate_hz": rate_hz, "seed": seed, "reference": sines,
+        "environment": {"turbulence": "dryden", "severity": "severe"}, "sensors": sensors,
+        "fdi": {"fault_class": "all", "bounds": {"sensors": sensors, "turbulence": "severe"}},
+        "faults": [{"sensor": broken[0], "type": "freeze", "at_s": broken[1]}],
+    }, log=False)  # fmt: skip
+    assert flight.detection.detected
+    assert flight.isolation.fault in (None, f"sensor {broken[0]}")

@@ -277,7 +277,8 @@ def would_show(watch):
 @kernel
 def suspect_attitude(watch):
     """The same of gyros and attitude: one axis alone, or one angle alone. An angle by itself may be the first
-    to show what a gyro does; one that is frozen is no gyro's doing, and until that is seen it may be."""
+    to show what a gyro does; one that is frozen is no gyro's doing, and until that is seen it may be.
+    Nor is it a gyro's as long as an angle's own test leaves room for all that has shown."""
     fired, who = watch.fired, watch.suspect
     turns, angles, frozen = 0, 0, False
     for i in range(3):
@@ -287,9 +288,24 @@ def suspect_attitude(watch):
     for i in range(3):
         alone = turns == 0 or (fired[TURN + i] == 1 and turns == 1)
         who[i] = alone and watch.rates_say[i] != NO and not frozen
-        mine = fired[ANGLE + i] == 1 and angles == 1
+        fits = explains(watch, i)
+        mine = angles == 1 if fired[ANGLE + i] == 1 else angles == 0 and fits
         moved = mine and watch.rates_say[axis_of(watch, i)] != YES
-        who[PHI + i] = moved or accelerometers.may_stand_still(watch, PHI + i)
+        who[PHI + i] = moved or (fits and accelerometers.may_stand_still(watch, PHI + i))
+
+
+@kernel
+def explains(watch, i):
+    """Whether what shows about the axes can be what angle i is off by, as far as its own test can hide it."""
+    step, angle = watch.step, watch.step.test[ANGLE + i]
+    unsure = step.error[PHI] + step.error[PHI + 1]
+    for j in range(3):
+        turn, per_angle = step.test[TURN + j], abs(redundancy.turned_by(step, j, i)) + unsure
+        for m in range(step.decay.size):
+            most = abs(angle.filtered[m]) + angle.bound[m]
+            if watch.fired[TURN + j] and abs(turn.filtered[m]) > per_angle * most + turn.bound[m]:
+                return False
+    return True
 
 
 @kernel

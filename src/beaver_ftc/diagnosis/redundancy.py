@@ -80,6 +80,17 @@ def angle_between(one, other, axis):
 
 
 @kernel
+def turned_by(step, axis, i):
+    """By how much a body axis turns for what angle i changes by."""
+    bank, tilt = step.then[PHI], step.then[THETA]
+    if axis == 0:
+        return (1.0, 0.0, -np.sin(tilt))[i]
+    if axis == 1:
+        return (0.0, np.cos(bank), np.sin(bank) * np.cos(tilt))[i]
+    return (0.0, -np.sin(bank), np.cos(bank) * np.cos(tilt))[i]
+
+
+@kernel
 def wrapped(angle):
     """The angle within -pi and pi."""
     return angle - 2.0 * pi * np.floor(angle / (2.0 * pi) + 0.5)

@@ -117,7 +117,7 @@ def test_a_file_of_the_other_kind_is_told_from_one_with_mistakes(beaver):
         ("aircraft: c172p", "jsbsim:NAME as `beaver-ftc list aircraft` has them"),
         (
             "faults: {actuator: elevator, type: float, at_s: 1}",
-            "a list of at most 100 items, each begun with `- `",
+            "a list of at most 1000 items, each begun with `- `",
         ),
     ],
 )

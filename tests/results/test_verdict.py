@@ -202,7 +202,7 @@ def test_the_verdict_is_a_line_for_each_thing_worth_knowing():
     for what, how in verdict.facts(flown()):
         assert f" {what:13} {how}" in text
     after = verdict.verdict_text(flown(), "runs/a-flight")
-    assert "            p 0.1  q 0.25  r 1 deg/s after the fault" in after
+    assert "tracking RMS  p 0.1  q 0.25  r 1 deg/s after the fault" in after
 
 
 def test_in_colour_what_is_missed_is_red_and_names_stand_out():

@@ -189,6 +189,16 @@ def test_a_broken_promise_is_seen(published, sections, kind):
     assert kind in {line.partition(":")[0] for line in found}
 
 
+def test_an_alarm_is_held_against_the_diagnosis_that_raised_it(published):
+    """One of our own early in a flight, and that of a rival which took its place: only the first promises."""
+    to_rival = {"time_s": 2.0, "law": None, "scheme": "rls-monitor", "sensors": False}
+    for ours_s, rivals_s, broken_then in ((1.0, 12.01, True), (None, 2.0, False)):
+        told = altered(published.metrics, detection={"time_s": rivals_s})
+        told["changes"] = [{**to_rival, "detection_time_s": ours_s, "isolated": None}]
+        found = list(broken(published.scenario, told, True))
+        assert any(line.startswith("false alarm") for line in found) == broken_then
+
+
 @pytest.mark.parametrize(
     ("column", "says"),
     [

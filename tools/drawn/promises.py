@@ -65,9 +65,13 @@ def _stages(scenario: bf.Scenario) -> list[tuple[float, str, bool]]:
     return stages
 
 
-def _scheme_at(scenario: bf.Scenario, time_s: float) -> str:
-    """Whose alarm at a time is: a change takes effect in the frame after it at the latest."""
-    return [scheme for at_s, scheme, _ in _stages(scenario) if at_s <= time_s + DUST_S][-1]
+def _alarms(scenario: bf.Scenario, metrics: Document) -> Iterator[tuple[float | None, str]]:
+    """(when or None, whose alarm) of each diagnosis of a flight in turn, that of its end last."""
+    scheme = scenario.fdi.scheme
+    for change in metrics["changes"]:
+        yield change.get("detection_time_s"), scheme
+        scheme = change["scheme"] or scheme
+    yield metrics["detection"]["time_s"], scheme
 
 
 def _began_s(scenario: bf.Scenario) -> float:
@@ -78,10 +82,8 @@ def _began_s(scenario: bf.Scenario) -> float:
 def _false_alarms(scenario: bf.Scenario, metrics: Document) -> Iterator[str]:
     """An alarm before there is a fault."""
     first_s = min((fault.at_s for fault in scenario.faults), default=math.inf)
-    times = [metrics["detection"]["time_s"], *(one.get("detection_time_s") for one in metrics["changes"])]
-    for time_s in times:
-        early = time_s is not None and time_s < first_s - DUST_S
-        if early and _scheme_at(scenario, time_s - 1.0 / scenario.rate_hz) == OURS:
+    for time_s, scheme in _alarms(scenario, metrics):
+        if time_s is not None and time_s < first_s - DUST_S and scheme == OURS:
             yield f"false alarm: at {time_s:g} s"
 
 
@@ -111,7 +113,7 @@ def _misnamed(scenario: bf.Scenario, metrics: Document) -> Iterator[str]:
     """Something else named than what broke, or what broke excluded, where theory promises that it is not."""
     if not metrics["detection"]["detected"] or metrics["false_alarm"]:
         return
-    if _scheme_at(scenario, metrics["detection"]["time_s"]) != OURS:
+    if list(_alarms(scenario, metrics))[-1][1] != OURS:
         return
     broken_sensors = [fault for fault in scenario.faults if _sensor(fault)]
     surfaces = [fault for fault in scenario.faults if not _sensor(fault)]

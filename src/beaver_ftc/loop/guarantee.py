@@ -10,6 +10,7 @@ import numpy as np
 
 from beaver_ftc.diagnosis.state import STATISTICS
 from beaver_ftc.plant.faults import TIME_TOLERANCE_S
+from beaver_ftc.scenario.faults import of_a_sensor
 from beaver_ftc.scenario.in_flight import stages
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.warnings import undeclared
@@ -34,7 +35,7 @@ def guaranteed_delay_s(frame: np.void, scenario: Scenario, plugged: bool) -> flo
 
 def _is_off(scenario: Scenario, certain_s: float) -> bool:
     """Whether by then the diagnosis was told something that is off by more than it reckons with."""
-    if any(hasattr(fault, "sensor") and fault.at_s <= certain_s for fault in scenario.faults):
+    if any(of_a_sensor(fault) and fault.at_s <= certain_s for fault in scenario.faults):
         return True
     flown = [scenario, *(then for change, then in stages(scenario) if change.at_s <= certain_s)]
     return any(any(undeclared(each)) for each in flown)

@@ -201,7 +201,7 @@ def _detection() -> View:
 def _watch() -> View:
     label = "largest residual between two instruments / bound"
     panel = Panel(label, (Trace("watch_share", "largest", "actual"),), log_scale=True, level=1.0)
-    title = "Detection: the instruments against one another; above 1 one of them is broken"
+    title = "Instruments: held against one another; above 1 one of them is broken"
     return View("watch", title, (panel,), closeup=True)
 
 

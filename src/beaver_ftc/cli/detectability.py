@@ -26,8 +26,7 @@ def command(
     """
     from beaver_ftc.cli.progress import progress_bar
     from beaver_ftc.scenario.loader import load_scenario
-    from beaver_ftc.studies.detectability.output import document, text
-    from beaver_ftc.studies.detectability.survey import run_survey, survey_name
+    from beaver_ftc.studies.detectability import document, run_survey, survey_name, text
 
     loaded = load_scenario(scenario)
     name = survey_name(loaded)

@@ -20,7 +20,7 @@ def command(
     knows.
     """
     from beaver_ftc.scenario.given import load
-    from beaver_ftc.studies.margins.study import as_document, as_text, study
+    from beaver_ftc.studies.margins import as_document, as_text, study
 
     given = load({} if scenario is None else scenario)
     asked = given.control.gain_margin_db, given.control.phase_margin_deg

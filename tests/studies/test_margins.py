@@ -5,8 +5,7 @@ import pytest
 
 from beaver_ftc.control.laws import gains
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.studies.margins.aircraft_loop import LawGains, Parts, frequencies, loops
-from beaver_ftc.studies.margins.study import at, study
+from beaver_ftc.studies.margins import LawGains, OpenLoop, at, frequencies, loops, study
 from flying import flown, scenario
 
 OURS = {"control": {"law": "fault-tolerant"}, "uncertainty": {}}
@@ -21,7 +20,7 @@ def test_three_integrators_are_the_design_loop(loop):
     s, G = 3.0, np.diag([-9.0, -12.0, -4.0])
     pull, learn = gains.corrections(gains.RATIO * s, loop.dt_s)
     even = np.ones(3)
-    parts = Parts(
+    opened = OpenLoop(
         np.zeros((3, 3)), G, np.eye(3), np.zeros((3, 3)), G, even, loop.approach * even,
         loop.delay_s * even, loop.keep * even, loop.dt_s,
     )  # fmt: skip
@@ -29,7 +28,7 @@ def test_three_integrators_are_the_design_loop(loop):
     omega = frequencies(loop.dt_s)
     expected = gains.open_loop(loop, s, np.exp(1j * omega * loop.dt_s))
     for axis in range(3):
-        np.testing.assert_allclose(loops(parts, law, omega)[:, axis], expected, rtol=1e-9)
+        np.testing.assert_allclose(loops(opened, law, omega)[:, axis], expected, rtol=1e-9)
 
 
 @pytest.mark.parametrize("given", [OURS, REAL], ids=["ideal", "real"])

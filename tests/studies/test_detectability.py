@@ -15,20 +15,25 @@ from beaver_ftc.cli.main import app
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.scenario.loader import load_text
-from beaver_ftc.studies.detectability import survey as surveying
-from beaver_ftc.studies.detectability.excitation import SETTLED_S, excitation
-from beaver_ftc.studies.detectability.mismatch import (
+from beaver_ftc.studies import detectability as surveying
+from beaver_ftc.studies.detectability import (
+    EXCITATIONS,
+    SETTLED_S,
+    as_csv,
+    at,
     best_in_window,
     detection_magnitude,
+    draw,
+    excitation,
     exclusion_magnitude,
+    judge,
     mismatch,
+    run_survey,
 )
-from beaver_ftc.studies.detectability.output import as_csv, draw
-from beaver_ftc.studies.detectability.survey import EXCITATIONS, at, judge, run_survey
 from flying import loss, scenario
 
 FAULTS = ("aileron", "elevator", "rudder")
-TRAINER = Path(__file__).parents[2] / "data" / "aircraft" / "trainer"
+TRAINER = Path(__file__).parents[1] / "data" / "aircraft" / "trainer"
 FLIGHT = """
 name: elsewhere
 aircraft: ./NAME

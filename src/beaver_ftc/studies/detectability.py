@@ -1,0 +1,374 @@
+"""How small a fault is certain to be found, and what it can be taken for: over speed, altitude, excitation.
+
+The fault mismatch function and the magnitudes from which detection and isolation are certain: a loss of
+effectiveness of surface s, of magnitude m, changes the innovation by -m z_s. An admissible
+uncertainty can hide eta_bar_i of it on axis i, and another fault, or none, survives as long as what is left
+is within eta_bar_i of what it predicts. So
+
+    detection is certain at a frame where    max_i  m |z_s,i| / 2 eta_bar_i  > 1
+    fault j is excluded for certain where    M_sj(m) = min_{0 <= b <= 1} max_i |m z_s,i - b z_j,i| / 2
+    eta_bar_i  > 1
+
+M_sj is the fault mismatch function [Zhang2002] of the sharpened scheme; it grows with m. Both hold for the
+frame-by-frame test of the innovation, whatever the fault's course; z is taken along the healthy flight, so
+the loop's answer to the fault within the window is neglected.
+"""
+
+import csv
+import io
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from itertools import combinations, product
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from beaver_ftc.aircraft import Aircraft
+from beaver_ftc.design.model import AXES, N_Y, control_effectiveness
+from beaver_ftc.design.variants import design_of
+from beaver_ftc.documents.errors import BadInput, BeaverFtcError
+from beaver_ftc.loop.loop import fly
+from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.studies.engine.columns import Columns
+from beaver_ftc.studies.engine.flown import Progress, flown
+from beaver_ftc.studies.engine.statistics import quantile
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+DETECT_WITHIN_S, ISOLATE_WITHIN_S = 0.5, 1.0
+SPEEDS_MPS, ALTITUDES_M = (36.0, 40.0, 44.0, 48.0, 52.0), (0.0, 1000.0, 2000.0, 3000.0)
+SHARES = (0.9, 1.0, 1.1)  # of the speed another aircraft starts with
+EXCITATIONS = (0.25, 0.5, 1.0, 2.0)  # of the scenario's references
+SETTLED_S = 2.0  # the start of a reference is a step of its own
+BISECTIONS = 16  # magnitudes to 2^-16
+Row = dict[str, Any]
+
+
+def speeds_of(aircraft: Aircraft) -> tuple[float, ...]:
+    """Speeds to survey, m/s: those of the built-in aircraft, or about where another one starts."""
+    start_mps = aircraft.file.start.airspeed_mps
+    return SPEEDS_MPS if start_mps is None else tuple(round(share * start_mps, 1) for share in SHARES)
+
+
+def altitudes_of(aircraft: Aircraft) -> tuple[float, ...]:
+    """Altitudes to survey, m: another aircraft's error is known about the one it starts at."""
+    start_m = aircraft.file.start.altitude_m
+    return ALTITUDES_M if start_m is None else (start_m,)
+
+
+@dataclass(frozen=True)
+class Excitation:
+    """Along a flight of n frames: the moment of each surface that leads an axis, (n, 3) rad/s2 by its name,
+    the bound on the uncertainty (n, 3) rad/s2, and the length of a frame dt s.
+    """
+
+    moment: Mapping[str, np.ndarray]
+    bound: np.ndarray
+    dt: float
+
+
+def excitation(scenario: Scenario) -> Excitation:
+    """Fly the scenario without its faults and weigh what the surfaces did with the design model.
+
+    Raises BadInput when it cannot be trimmed, SimulationFailed when the flight ends before it has settled.
+    """
+    log = Columns()
+    fly(scenario.model_copy(update={"faults": ()}), log)
+    aircraft = scenario.airframe
+    y = np.zeros((len(log.read("t_s")), N_Y))
+    seen = log.read("alpha_rad", "beta_rad", "airspeed_mps", "qdyn_pa", *aircraft.signals)
+    y[:, : seen.shape[1]] = seen
+    u = log.read(*(f"{surface}_cmd_rad" for surface in aircraft.surfaces))
+    bound = log.read(*(f"{axis}_eta_bar_rad_s2" for axis in AXES))
+    design, G = design_of(scenario.design_model, aircraft)[0], np.zeros((len(y), 3, aircraft.n))
+    for row, at in zip(y, G, strict=True):
+        control_effectiveness(design, row, at)
+    first = int(SETTLED_S * scenario.rate_hz)
+    moment = (G * u[:, None, :])[first:]
+    of = {name: moment[:, :, aircraft.surfaces.index(name)] for name in aircraft.primary}
+    return Excitation(of, bound[first:], 1.0 / scenario.rate_hz)
+
+
+def detection_magnitude(z: np.ndarray, bound: np.ndarray) -> np.ndarray:
+    """Smallest magnitude (n,) certain to be detected by each frame alone; above 1 where a total loss is not.
+
+    z, bound (n, 3) rad/s2.
+    """
+    with np.errstate(divide="ignore", over="ignore"):
+        return np.min(2.0 * bound / np.abs(z), axis=1)
+
+
+def mismatch(z: np.ndarray, other: np.ndarray, bound: np.ndarray) -> np.ndarray:
+    """M_sj (n,) of m z_s = `z` and z_j = `other`, (n, 3): convex and piecewise linear in b."""
+    a, b = z / (2.0 * bound), other / (2.0 * bound)
+    best = np.full(len(a), np.inf)
+    for candidate in _corners(a, b):
+        b_share = np.clip(np.nan_to_num(candidate, nan=0.0, posinf=1.0, neginf=0.0), 0.0, 1.0)
+        best = np.minimum(best, np.abs(a - b_share[:, None] * b).max(axis=1))
+    return best
+
+
+def _corners(a: np.ndarray, b: np.ndarray):
+    """Where max_i |a_i - b_i t| may be least: the ends, the zeros, where two axes are equal; (n,) each."""
+    yield np.zeros(len(a))
+    yield np.ones(len(a))
+    with np.errstate(all="ignore"):
+        for i in range(3):
+            yield a[:, i] / b[:, i]
+        for i, j in combinations(range(3), 2):
+            yield (a[:, i] - a[:, j]) / (b[:, i] - b[:, j])
+            yield (a[:, i] + a[:, j]) / (b[:, i] + b[:, j])
+
+
+def exclusion_magnitude(z: np.ndarray, other: np.ndarray, bound: np.ndarray) -> np.ndarray:
+    """Smallest magnitude (n,) for which each frame alone excludes the other fault; inf where 1 does not."""
+    low, high = np.zeros(len(z)), np.ones(len(z))
+    possible = mismatch(z, other, bound) > 1.0
+    for _ in range(BISECTIONS):
+        middle = 0.5 * (low + high)
+        enough = mismatch(middle[:, None] * z, other, bound) > 1.0
+        low, high = np.where(enough, low, middle), np.where(enough, middle, high)
+    return np.where(possible, high, np.inf)
+
+
+def best_in_window(values: np.ndarray, frames: int) -> np.ndarray:
+    """The smallest of each run of so many values, (n - frames + 1,)."""
+    return np.lib.stride_tricks.sliding_window_view(values, frames).min(axis=1)
+
+
+def run_survey(
+    out: Path,
+    scenario: Scenario,
+    speeds_mps: Sequence[float] = (),
+    altitudes_m: Sequence[float] = (),
+    excitations: Sequence[float] = EXCITATIONS,
+    progress: Progress | None = None,
+) -> list[Row]:
+    """Write `out/<scenario>-detectability/`; return one row a fault and grid point.
+
+    Raises BadInput if another scheme than the sharpened one diagnoses.
+    """
+    from beaver_ftc.results.writer import result_folder
+
+    _refuse_other_schemes(scenario)
+    name = survey_name(scenario)
+    speeds_mps = speeds_mps or speeds_of(scenario.airframe)
+    altitudes_m = altitudes_m or altitudes_of(scenario.airframe)
+    grid = list(product(speeds_mps, altitudes_m, excitations))
+    points = flown(out / name, grid, partial(_point, scenario), list[Row], asked=scenario, progress=progress)
+    with points as found, result_folder(out, name) as folder:
+        rows = [row for point in found for row in point]
+        write(folder, scenario.name, rows)
+    return rows
+
+
+def survey_name(scenario: Scenario) -> str:
+    """The name of the survey's result folder, at most 100 characters."""
+    return f"{scenario.name[:86]}-detectability"
+
+
+def _refuse_other_schemes(scenario: Scenario) -> None:
+    fdi = scenario.fdi
+    sharp = fdi.sharpen.pole_bank and fdi.sharpen.memory and fdi.sharpen.shared_effectiveness
+    if fdi.scheme != "adaptive-estimators" or not sharp or max(fdi.pole_bank_per_s, default=0.0) < 1e6:
+        raise BadInput(
+            f"{scenario.name}: fdi: detectability is worked out for the sharpened scheme, allowed: "
+            "scheme adaptive-estimators, sharpen all, a filter of 1e6 in pole_bank_per_s"
+        )
+
+
+def _point(scenario: Scenario, point: tuple[float, float, float]) -> list[Row]:
+    speed, altitude, scale = point
+    place = {"airspeed_mps": speed, "altitude_m": altitude, "excitation": scale}
+    try:
+        seen = excitation(at(scenario, speed, altitude, scale))
+    except BeaverFtcError as error:
+        return [{**place, "fault": fault, **_nothing(str(error))} for fault in scenario.airframe.primary]
+    return [{**place, "fault": fault, **judge(seen, fault)} for fault in seen.moment]
+
+
+def at(scenario: Scenario, speed_mps: float, altitude_m: float, excitation: float) -> Scenario:
+    """The scenario flown elsewhere, its references scaled."""
+    document = scenario.model_dump(mode="json", exclude_none=True)
+    document["initial"] |= {"airspeed_mps": speed_mps, "altitude_m": altitude_m}
+    document["reference"] = {
+        axis: [_scaled(signal, excitation) for signal in signals]
+        for axis, signals in document["reference"].items()
+    }
+    return Scenario.model_validate({**document, "faults": [], "expect": {}})
+
+
+def _scaled(signal: Row, factor: float) -> Row:
+    (kind, parameters), *_ = signal.items()
+    scaled = dict(parameters)
+    for name in ("amplitude_deg_s", "values_deg_s"):
+        if name in scaled:
+            scaled[name] = (np.asarray(scaled[name]) * factor).tolist()
+    return {kind: scaled}
+
+
+def _nothing(why: str) -> Row:
+    magnitudes = dict.fromkeys(("detected", "detected_median", "isolated", "isolated_median"))
+    return {**magnitudes, "confused_with": None, "why": why}
+
+
+def judge(seen: Excitation, fault: str) -> Row:
+    """Magnitudes from which a fault is certain to be found along a flight.
+
+    detected, isolated: whenever it strikes; `_median`: in half of the instants at which it may strike;
+    None: not even a total loss. confused_with: the fault that survives longest; why: in words.
+    """
+    z, frames = seen.moment[fault], [_frames(s, seen.dt) for s in (DETECT_WITHIN_S, ISOLATE_WITHIN_S)]
+    if len(z) < frames[1]:
+        return _nothing("the flight ends before a fault could be isolated")
+    found = best_in_window(detection_magnitude(z, seen.bound), frames[0])
+    excluded = {
+        other: best_in_window(exclusion_magnitude(z, of_other, seen.bound), frames[1])
+        for other, of_other in seen.moment.items()
+        if other != fault
+    }
+    isolated = np.maximum(found[: len(z) - frames[1] + 1], np.max(list(excluded.values()), axis=0))
+    rival = max(excluded, key=lambda other: (excluded[other].max(), np.median(excluded[other])))
+    return {
+        "detected": _certain(found.max()),
+        "detected_median": _certain(quantile(np.sort(found), 0.5)),
+        "isolated": _certain(isolated.max()),
+        "isolated_median": _certain(quantile(np.sort(isolated), 0.5)),
+        "confused_with": rival,
+        "why": _why(seen, fault, rival, found, excluded[rival], frames[1]),
+    }
+
+
+def _frames(seconds: float, dt: float) -> int:
+    return max(round(seconds / dt), 1)
+
+
+def _certain(magnitude: float) -> float | None:
+    return float(magnitude) if magnitude <= 1.0 else None
+
+
+def _why(
+    seen: Excitation, fault: str, rival: str, found: np.ndarray, excluded: np.ndarray, frames: int
+) -> str:
+    """What limits this fault at the worst instant for it to strike."""
+    z, other = seen.moment[fault], seen.moment[rival]
+    if found.max() > 1.0:
+        share = 1.0 / found.max()
+        return f"{fault} hardly used: in {DETECT_WITHIN_S:g} s a total loss is {share:.0%} of twice the bound"
+    if excluded.max() > 1.0:
+        start = int(excluded.argmax())
+        window = slice(start, start + frames)
+        rest = mismatch(z[window], other[window], seen.bound[window]).max()
+        return (
+            f"for {ISOLATE_WITHIN_S:g} s {rival} explains a total loss but for {rest:.0%} of twice the bound"
+        )
+    if excluded.max() <= found.max():
+        return "isolated once detected"
+    return f"{rival} explains smaller ones"
+
+
+def document(name: str, rows: Sequence[Row]) -> dict[str, Any]:
+    """What the command answers and `detectability.json` holds."""
+    return {
+        "scenario": name,
+        "detect_within_s": DETECT_WITHIN_S,
+        "isolate_within_s": ISOLATE_WITHIN_S,
+        "points": list(rows),
+    }
+
+
+def write(folder: Path, name: str, rows: Sequence[Row]) -> None:
+    """Fill `folder` with detectability.json, .csv and .png."""
+    (folder / "detectability.json").write_text(
+        json.dumps(document(name, rows), indent=1) + "\n", encoding="utf-8"
+    )
+    (folder / "detectability.csv").write_text(as_csv(rows), encoding="utf-8")
+    draw(name, rows).savefig(folder / "detectability.png", dpi=110)
+
+
+def as_csv(rows: Sequence[Row]) -> str:
+    """One line a fault and grid point; empty where nothing is certain."""
+    text = io.StringIO()
+    writer = csv.DictWriter(text, fieldnames=list(rows[0]), lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    return text.getvalue()
+
+
+def draw(name: str, rows: Sequence[Row]) -> Any:
+    """A map a fault and excitation: over speed and altitude, the magnitude certain to be found."""
+    from matplotlib.figure import Figure
+
+    faults, scales = _faults(rows), sorted({row["excitation"] for row in rows})
+    figure = Figure(figsize=(3.4 * len(scales) + 1.2, 9.0), layout="constrained")
+    grid = figure.subplots(len(faults), len(scales), squeeze=False, sharex=True, sharey=True)
+    for line, fault in zip(grid, faults, strict=True):
+        for axes, scale in zip(line, scales, strict=True):
+            image = _map(axes, [row for row in rows if (row["fault"], row["excitation"]) == (fault, scale)])
+            axes.set_title(f"{fault}, {scale:g} x reference", fontsize=9)
+    for axes in grid[-1]:
+        axes.set_xlabel("airspeed (m/s)", fontsize=9)
+    for line in grid:
+        line[0].set_ylabel("altitude (m)", fontsize=9)
+    figure.colorbar(image, ax=grid, label="magnitude certain to be detected, whenever it strikes", shrink=0.6)
+    figure.suptitle(
+        f"{name}: loss of effectiveness certain to be detected within {DETECT_WITHIN_S:g} s / "
+        f"isolated within {ISOLATE_WITHIN_S:g} s (-: not even a total loss)",
+        fontsize=11,
+    )
+    return figure
+
+
+def _faults(rows: Sequence[Row]) -> list[str]:
+    """The faults in the order of the rows."""
+    return list(dict.fromkeys(row["fault"] for row in rows))
+
+
+def _map(axes: "Axes", rows: Sequence[Row]) -> Any:
+    speeds, altitudes = (sorted({row[key] for row in rows}) for key in ("airspeed_mps", "altitude_m"))
+    values = np.full((len(altitudes), len(speeds)), np.nan)
+    for row in rows:
+        at = altitudes.index(row["altitude_m"]), speeds.index(row["airspeed_mps"])
+        values[at] = np.nan if row["detected"] is None else row["detected"]
+        label = f"{_short(row['detected'])}\n{_short(row['isolated'])}"
+        axes.text(at[1], at[0], label, ha="center", va="center", fontsize=7)
+    axes.set_xticks(range(len(speeds)), [f"{speed:g}" for speed in speeds], fontsize=8)
+    axes.set_yticks(range(len(altitudes)), [f"{altitude:g}" for altitude in altitudes], fontsize=8)
+    return axes.imshow(values, origin="lower", aspect="auto", cmap="viridis_r", vmin=0.0, vmax=1.0, alpha=0.6)
+
+
+def _short(magnitude: float | None) -> str:
+    return "-" if magnitude is None else f"{magnitude:.2f}"
+
+
+def text(rows: Sequence[Row]) -> str:
+    """A line a fault and grid point, then one a fault and excitation."""
+    place = f"{'fault':<10}{'m/s':>6}{'m':>7}{'excit.':>8}"
+    head = f"{place}{'detected':>10}{'median':>8}{'isolated':>10}{'median':>8}   why"
+    return "\n".join([head, *map(_line, rows), "", *_summary(rows)])
+
+
+def _summary(rows: Sequence[Row]) -> list[str]:
+    """How many grid points each fault is certain at, and from which magnitudes on."""
+    lines = [f"{'fault':<10}{'excit.':>8}{'certain at':>12}{'from':>13}{'half the time at':>18}{'from':>13}"]
+    for fault, scale in product(_faults(rows), sorted({row["excitation"] for row in rows})):
+        chosen = [row for row in rows if (row["fault"], row["excitation"]) == (fault, scale)]
+        always, half = (_range([row[key] for row in chosen]) for key in ("isolated", "isolated_median"))
+        lines.append(f"{fault:<10}{scale:>8g}{always[0]:>12}{always[1]:>13}{half[0]:>18}{half[1]:>13}")
+    return [*lines, "certain: detected and isolated in time, from some magnitude on; of so many grid points"]
+
+
+def _range(magnitudes: Sequence[float | None]) -> tuple[str, str]:
+    certain = [magnitude for magnitude in magnitudes if magnitude is not None]
+    span = f"{min(certain):.2f} - {max(certain):.2f}" if certain else "-"
+    return f"{len(certain)} of {len(magnitudes)}", span
+
+
+def _line(row: Row) -> str:
+    place = f"{row['fault']:<10}{row['airspeed_mps']:>6g}{row['altitude_m']:>7g}{row['excitation']:>8g}"
+    found = f"{_short(row['detected']):>10}{_short(row['detected_median']):>8}"
+    return place + found + f"{_short(row['isolated']):>10}{_short(row['isolated_median']):>8}   {row['why']}"

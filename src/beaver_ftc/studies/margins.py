@@ -1,0 +1,305 @@
+"""Margins of the default law on the whole aircraft: what `beaver-ftc linearise` shows.
+
+Every surface's loop over the envelope, healthy and with each fault that is accommodated, broken at that
+surface, a frequency at a time:
+
+    u_s = L_s v_s,   v_s the deflection of surface s, u_s where the loop then wants it, all others closed
+
+The aircraft is the truth linearised by differences (plant/linear.py), held over a frame; the law is that of
+control/laws/rejecting.py with the design model's own derivatives. A loss of effectiveness that is known
+scales the surface and what the law takes it for alike; of a surface that is given up nothing is asked.
+"""
+
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from math import exp, inf
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from beaver_ftc.control.laws.gains import margins
+from beaver_ftc.control.laws.state import REJECTING, STAND_IN
+from beaver_ftc.control.state import COMPILED
+from beaver_ftc.design.model import QDYN
+from beaver_ftc.design.variants import jacobian
+from beaver_ftc.diagnosis.state import PITCH, ROLL, YAW
+from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.studies.engine.words import aligned
+
+if TYPE_CHECKING:
+    from beaver_ftc.plant.linear import LinearModel
+    from beaver_ftc.scenario.schema import Scenario
+
+N_FREQUENCIES = 600
+LOWEST_RAD_S = 0.3  # below, the autopilot flies: a body rate says little of a phugoid
+RATES = ("p", "q", "r")
+
+
+@dataclass(frozen=True)
+class LawGains:
+    """Of one flight condition. Kp 1/s, pull 1, learn 1/s (3,); demand (n, 3): command of each surface for a
+    demanded acceleration, rad per rad/s2; lead (n,); share: of a frame until a command acts."""
+
+    Kp: np.ndarray
+    pull: np.ndarray
+    learn: np.ndarray
+    demand: np.ndarray
+    lead: np.ndarray
+    share: float
+
+
+@dataclass(frozen=True)
+class OpenLoop:
+    """What the law is closed around at one condition; n surfaces, m measured signals, the rates first.
+
+    A, B: aircraft; C (m, states). f (3, m): the law's model of the rates' accelerations; G (3, n) with the
+    effectiveness (n,) in it. approach (n,): of the actuators in a frame. delay_s, keep (m,): of the sensors.
+    """
+
+    A: np.ndarray
+    B: np.ndarray
+    C: np.ndarray
+    f: np.ndarray
+    G: np.ndarray
+    effectiveness: np.ndarray
+    approach: np.ndarray
+    delay_s: np.ndarray
+    keep: np.ndarray
+    dt_s: float
+
+
+def interpolated(rejection: np.void, qdyn: float, lost: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Kp, pull and learn (3,) of the schedule at a dynamic pressure (Pa), a share `lost` of pitch handed
+    over."""
+    found = []
+    for name in ("Kp_at", "pull_at", "learn_at"):
+        rows = np.array([np.interp(qdyn, rejection["qdyn"], row) for row in rejection[name]])
+        rows[PITCH] += lost * (rows[STAND_IN] - rows[PITCH])
+        found.append(rows[:3])
+    return found[0], found[1], found[2]
+
+
+def allocation(G: np.ndarray, main: np.ndarray, stand_in: int, lost: float) -> np.ndarray:
+    """Commands per demanded acceleration, (n, 3), as control/allocation.py gives them within the travels."""
+    a, e, r = main[ROLL], main[PITCH], main[YAW]
+    commands = np.zeros((G.shape[1], 3))
+    determinant = G[ROLL, a] * G[YAW, r] - G[ROLL, r] * G[YAW, a]
+    if determinant != 0.0:
+        commands[a, [ROLL, YAW]] = G[YAW, r] / determinant, -G[ROLL, r] / determinant
+        commands[r, [ROLL, YAW]] = -G[YAW, a] / determinant, G[ROLL, a] / determinant
+    else:
+        for axis, s in ((ROLL, a), (YAW, r)):
+            commands[s, axis] = 1.0 / G[axis, s] if G[axis, s] else 0.0
+    flap = lost if stand_in >= 0 else 0.0
+    if flap:
+        commands[stand_in, PITCH] = flap / G[PITCH, stand_in]
+    if G[PITCH, e]:
+        commands[e, PITCH] = (1.0 - flap) / G[PITCH, e]
+    return commands
+
+
+def held_over_frame(A: np.ndarray, B: np.ndarray, dt_s: float) -> tuple[np.ndarray, np.ndarray]:
+    """The discrete aircraft for inputs held over a frame."""
+    from scipy.linalg import expm
+
+    n, m = B.shape
+    whole = expm(np.block([[A, B], [np.zeros((m, n + m))]]) * dt_s)
+    return whole[:n, :n], whole[:n, n:]
+
+
+def law_response(loop: OpenLoop, law: LawGains, z: complex) -> np.ndarray:
+    """Where the surfaces go for what is measured, (n, m), at z."""
+    n, dt, one = len(loop.effectiveness), loop.dt_s, np.eye(3)
+    back = 1.0 / z
+    mean = law.share * back + 1.0 - law.share  # of what acts over the elapsed frame
+    keep, learn, Kp = np.diag(1.0 - law.pull), np.diag(law.learn), np.diag(law.Kp)
+    actuator = np.diag(loop.approach / (z - 1.0 + loop.approach))
+    ahead = one + law.share * dt * Kp
+    lead, none = np.diag(law.lead), np.zeros
+    of_position = lead @ law.demand @ Kp @ loop.G * law.share * dt + lead - np.eye(n)
+    # unknowns: rate, disturbance, position, command; driven by what is measured
+    M = np.block(
+        [
+            [one - keep * back, -keep * dt * back, -keep @ loop.G * dt * mean, none((3, n))],
+            [learn * back, one - one * back + learn * dt * back, learn @ loop.G * dt * mean, none((3, n))],
+            [none((n, 3)), none((n, 3)), np.eye(n), -actuator],
+            [lead @ law.demand @ Kp, lead @ law.demand @ ahead, of_position, np.eye(n)],
+        ]
+    )
+    rates = np.eye(3, loop.C.shape[0])
+    driven = np.vstack(
+        [
+            np.diag(law.pull) @ rates + keep @ loop.f * dt * mean,
+            learn @ (rates - loop.f * dt * mean),
+            none((n, len(loop.C))),
+            -lead @ law.demand @ ahead @ loop.f,
+        ]
+    )
+    return np.linalg.solve(M, driven)[6 : 6 + n]
+
+
+def loops(loop: OpenLoop, law: LawGains, omega: np.ndarray) -> np.ndarray:
+    """L_s (omega, n) of every surface, the others' loops closed."""
+    Ad, Bd = held_over_frame(loop.A, loop.B * loop.effectiveness, loop.dt_s)
+    found = np.empty((len(omega), len(loop.effectiveness)), complex)
+    for k, z in enumerate(np.exp(1j * omega * loop.dt_s)):
+        sensors = z ** (-loop.delay_s / loop.dt_s) * (1.0 - loop.keep) / (1.0 - loop.keep / z)
+        aircraft = (
+            loop.C @ np.linalg.solve(z * np.eye(len(Ad)) - Ad, Bd) * (law.share + (1.0 - law.share) * z)
+        )
+        around = law_response(loop, law, z) @ (sensors[:, None] * aircraft)
+        for s in range(len(loop.effectiveness)):
+            found[k, s] = -_others_closed(around, s)
+    return found
+
+
+def _others_closed(around: np.ndarray, s: int) -> complex:
+    rest = np.delete(np.arange(len(around)), s)
+    inner = np.eye(len(rest)) - around[np.ix_(rest, rest)]
+    return around[s, s] + around[s, rest] @ np.linalg.solve(inner, around[rest, s])
+
+
+def frequencies(dt_s: float) -> np.ndarray:
+    """From LOWEST_RAD_S to Nyquist, rad/s."""
+    return np.geomspace(LOWEST_RAD_S, np.pi / dt_s, N_FREQUENCIES)
+
+
+N_AIRSPEEDS = 5
+REMAINING = (0.5, 0.1)  # effectiveness after the losses that are judged; 0: given up
+LEAST_LOOP = 1e-3  # of a surface that hardly moves there is no loop to speak of
+
+
+@dataclass(frozen=True)
+class Margin:
+    """Of one surface's loop: how much its gain may grow and shrink, dB, and its phase lag, deg."""
+
+    airspeed_mps: float
+    fault: str
+    surface: str
+    up_db: float
+    down_db: float
+    phase_deg: float
+
+    def keeps(self, gain_db: float, phase_deg: float) -> bool:
+        """Whether all are at least these."""
+        return min(self.up_db, self.down_db) >= gain_db and self.phase_deg >= phase_deg
+
+
+def study(scenario: "Scenario") -> list[Margin]:
+    """The margins of a scenario's default law with its actuators, sensors and frame rate.
+
+    Raises BadInput for another law: its loop is not this one.
+    """
+    allowed = [name for name, (_, inner) in COMPILED.items() if inner == REJECTING]
+    if scenario.control.law not in allowed:
+        says = f"margins are known of the default law's loop, allowed: {', '.join(allowed)}"
+        raise BadInput(f"{scenario.name}: control.law: {scenario.control.law}: {says}")
+    low, high = scenario.airframe.envelope.airspeed_mps
+    found: list[Margin] = []
+    for V in np.linspace(low, high, N_AIRSPEEDS):
+        found += at(scenario.with_({"initial.airspeed_mps": float(V)}))
+    return found
+
+
+def at(scenario: "Scenario") -> Iterator[Margin]:
+    """The margins at a scenario's flight condition."""
+    from beaver_ftc.loop.assembly import y_places
+    from beaver_ftc.loop.loop import Loop
+    from beaver_ftc.plant.conditions import trimmed
+    from beaver_ftc.plant.linear import differences
+
+    plant, point = trimmed(scenario)
+    linear = differences(plant, point)
+    frame = Loop(scenario).frames[0]
+    truth = frame["truth"]["value"] * frame["truth"]["factor"]
+    y = truth[y_places(frame)]
+    omega = frequencies(1.0 / scenario.rate_hz)
+    for fault, effectiveness in cases(frame["control"], scenario.airframe.surfaces):
+        loop, law = open_loop(scenario, frame, linear, y, effectiveness)
+        L = loops(loop, law, omega)
+        for s, surface in enumerate(scenario.airframe.surfaces):
+            if np.abs(L[:, s]).max() > LEAST_LOOP:
+                V = scenario.initial.airspeed_mps
+                yield Margin(V, fault, surface, *(float(value) for value in margins(L[:, s])))
+
+
+def cases(control: np.void, surfaces: tuple[str, ...]) -> Iterator[tuple[str, np.ndarray]]:
+    """What a fault is called, and the effectiveness (n,) it leaves."""
+    healthy = np.ones(len(surfaces))
+    yield "none", healthy
+    for s in control["main"]:
+        for share in REMAINING:
+            yield f"{surfaces[s]} {100 * (1 - share):.0f} % lost", _with(healthy, s, share)
+        yield f"{surfaces[s]} given up", _with(healthy, s, 0.0)
+
+
+def _with(effectiveness: np.ndarray, s: int, value: float) -> np.ndarray:
+    changed = effectiveness.copy()
+    changed[s] = value
+    return changed
+
+
+def open_loop(
+    scenario: "Scenario", frame: np.void, linear: "LinearModel", y: np.ndarray, effectiveness: np.ndarray
+) -> tuple[OpenLoop, LawGains]:
+    """The loop with this effectiveness (n,), the law knowing it; y: the measured signals in trim."""
+    control, belief, dt = frame["control"], frame["belief"], 1.0 / scenario.rate_hz
+    rejection = control["rejection"]
+    _, G, f_x, f_y = jacobian(belief["design"], np.zeros(3), y, control["trim"])
+    lost = 1.0 - effectiveness[control["main"][PITCH]] if control["stand_in"] >= 0 else 0.0
+    whole = 1.0 - (1.0 - belief["actuators"]["approach"]) ** scenario.substeps
+    C = outputs(linear.states, y)
+    loop = OpenLoop(
+        linear.A, linear.B, C, np.hstack((f_x, f_y[:, : len(C) - 3])), G * effectiveness, effectiveness,
+        whole, *sensors(scenario, len(C), dt), dt,
+    )  # fmt: skip
+    demand = allocation(G * effectiveness, control["main"], control["stand_in"], lost)
+    lead, share = np.array(rejection["lead"]), float(rejection["share"])
+    return loop, LawGains(*interpolated(rejection, y[QDYN], lost), demand, lead, share)
+
+
+def outputs(states: tuple[str, ...], y: np.ndarray) -> np.ndarray:
+    """What is measured, (7 + declared signals, states): rates, alpha, beta, V, qdyn, and what goes with V.
+
+    qdyn goes with V^2, the slipstream (the Beaver's one declared signal) with V^-3; with altitude neither.
+    """
+    C = np.zeros((3 + len(y), len(states)))
+    for row, name in enumerate((*RATES, "alpha", "beta", "airspeed")):
+        C[row, states.index(name)] = 1.0
+    V = states.index("airspeed")
+    C[6, V] = 2.0 * y[QDYN] / y[2]
+    C[7:, V] = -3.0 * y[4:] / y[2]
+    return C
+
+
+def sensors(scenario: "Scenario", m: int, dt: float) -> tuple[np.ndarray, np.ndarray]:
+    """delay_s and keep (m,) of what is measured."""
+    delay, keep = np.zeros(m), np.zeros(m)
+    for i, name in enumerate((*RATES, "alpha", "beta", "V", "qdyn")):
+        sensor = getattr(scenario.sensors, name)
+        delay[i] = sensor.delay_s
+        keep[i] = exp(-sensor.bandwidth_rad_s * dt) if sensor.bandwidth_rad_s else 0.0
+    return delay, keep
+
+
+def as_document(found: list[Margin], required: tuple[float, float]) -> dict[str, Any]:
+    """For `--format json`; a margin without end is null."""
+    rows = [{**_finite(asdict(margin)), "keeps": margin.keeps(*required)} for margin in found]
+    return {"gain_margin_db": required[0], "phase_margin_deg": required[1], "margins": rows}
+
+
+def _finite(row: dict[str, Any]) -> dict[str, Any]:
+    return {key: None if value == inf else value for key, value in row.items()}
+
+
+def as_text(found: list[Margin], required: tuple[float, float]) -> str:
+    """A line for each fault and surface, the least over the airspeeds."""
+    table = [["fault", "surface", "gain up, dB", "down, dB", "phase, deg", "least at, m/s"]]
+    for fault, surface in dict.fromkeys((each.fault, each.surface) for each in found):
+        rows = [each for each in found if (each.fault, each.surface) == (fault, surface)]
+        least = min(rows, key=lambda each: each.phase_deg)
+        numbers = [min(getattr(each, of) for each in rows) for of in ("up_db", "down_db", "phase_deg")]
+        table.append([fault, surface, *(f"{n:.1f}" for n in numbers), f"{least.airspeed_mps:.0f}"])
+    short = sum(not each.keeps(*required) for each in found)
+    end = f"{len(found)} loops, {short} with less than {required[0]:g} dB or {required[1]:g} deg"
+    return f"{aligned(table)}\n\n{end}"

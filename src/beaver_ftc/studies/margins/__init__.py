@@ -1,1 +1,0 @@
-"""Margins of the default law on the whole aircraft: what `beaver-ftc linearise` shows."""

@@ -20,9 +20,8 @@ from beaver_ftc.results.verdict import facts
 from beaver_ftc.results.views import views
 from beaver_ftc.scenario.control import EnginePower
 from beaver_ftc.scenario.loader import load_text
-from beaver_ftc.studies.matrix.cases import REFERENCE
-from beaver_ftc.studies.matrix.flying import trimmed_deg
-from beaver_ftc.studies.matrix.pitch_margins import closed_loop
+from beaver_ftc.studies.matrix.fault_matrix import REFERENCE, trimmed_deg
+from beaver_ftc.studies.matrix.pitch_lost import closed_loop
 from beaver_ftc.studies.mismatch.linear import engine_of, state_vector, surfaces_of
 from flying import flown, scenario
 

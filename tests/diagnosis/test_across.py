@@ -11,7 +11,7 @@ from beaver_ftc.diagnosis.tones import set_up_listening
 from beaver_ftc.diagnosis.views import across_a_column, set_up_views
 from beaver_ftc.loop.loop import Loop, fly
 from beaver_ftc.scenario.diagnosis import FdiConfig
-from beaver_ftc.studies.matrix.cases import declared
+from beaver_ftc.studies.matrix.fault_matrix import declared
 from flying import SINES, scenario
 
 AIRCRAFT = load()

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from beaver_ftc.loop.loop import Loop, fly
-from beaver_ftc.studies.matrix.cases import declared
+from beaver_ftc.studies.matrix.fault_matrix import declared
 from flying import SINES, scenario
 
 FAULTS = {

@@ -80,15 +80,13 @@ def _every_fault(
     from functools import partial
 
     from beaver_ftc.aircraft import DEFAULT
-    from beaver_ftc.studies.matrix.run import name_of, run_matrix
-    from beaver_ftc.studies.matrix.text import as_text
+    from beaver_ftc.studies.matrix.fault_matrix import as_text, name_of, run_matrix
 
     run = partial(run_matrix, declared=declared, aircraft=aircraft or DEFAULT, turbulence=turbulence.value)
     return name_of(declared, turbulence), run, as_text
 
 
 def _pitch_lost() -> tuple[str, Callable[..., Document], Callable[[Document], str]]:
-    from beaver_ftc.studies.matrix.pitch_lost import NAME, run_pitch_lost
-    from beaver_ftc.studies.matrix.pitch_text import as_text
+    from beaver_ftc.studies.matrix.pitch_lost import NAME, as_text, run_pitch_lost
 
     return NAME, run_pitch_lost, as_text

@@ -25,6 +25,7 @@ from beaver_ftc.design.variants import jacobian
 from beaver_ftc.diagnosis.state import PITCH, ROLL, YAW
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.studies.engine.words import aligned
+from beaver_ftc.studies.linear_systems import held_over_frame
 
 if TYPE_CHECKING:
     from beaver_ftc.plant.linear import LinearModel
@@ -96,15 +97,6 @@ def allocation(G: np.ndarray, main: np.ndarray, stand_in: int, lost: float) -> n
     if G[PITCH, e]:
         commands[e, PITCH] = (1.0 - flap) / G[PITCH, e]
     return commands
-
-
-def held_over_frame(A: np.ndarray, B: np.ndarray, dt_s: float) -> tuple[np.ndarray, np.ndarray]:
-    """The discrete aircraft for inputs held over a frame."""
-    from scipy.linalg import expm
-
-    n, m = B.shape
-    whole = expm(np.block([[A, B], [np.zeros((m, n + m))]]) * dt_s)
-    return whole[:n, :n], whole[:n, n:]
 
 
 def law_response(loop: OpenLoop, law: LawGains, z: complex) -> np.ndarray:

@@ -7,9 +7,7 @@ from test_random_faults import drawn
 from beaver_ftc.aircraft import load
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.metrics import metrics
-from beaver_ftc.studies.matrix.cases import declared
-from beaver_ftc.studies.matrix.flying import verdict
-from beaver_ftc.studies.matrix.run import run_matrix
+from beaver_ftc.studies.matrix.fault_matrix import declared, run_matrix, verdict
 from flying import scenario
 
 NAMES = [term.name for term in load().moments]

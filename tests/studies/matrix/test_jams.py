@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from beaver_ftc.results.metrics import metrics
-from beaver_ftc.studies.matrix.cases import REFERENCE
-from beaver_ftc.studies.matrix.flying import trimmed_deg
+from beaver_ftc.studies.matrix.fault_matrix import REFERENCE, trimmed_deg
 from flying import flown
 
 AT_S = 12.0

@@ -5,10 +5,15 @@ import json
 import pytest
 
 from beaver_ftc.design.coefficients import SURFACES
-from beaver_ftc.studies.matrix.cases import AIRSPEEDS_MPS, FAULTS, cases
-from beaver_ftc.studies.matrix.flying import fly_case, verdict
-from beaver_ftc.studies.matrix.run import run_matrix
-from beaver_ftc.studies.matrix.text import as_text
+from beaver_ftc.studies.matrix.fault_matrix import (
+    AIRSPEEDS_MPS,
+    FAULTS,
+    as_text,
+    cases,
+    fly_case,
+    run_matrix,
+    verdict,
+)
 
 ALLOWED_S = {"aileron": 0.5, "elevator": 0.5, "rudder": 1.0}
 PERIODS_S = {"1 rad/s": 6.283, "5 rad/s": 1.257, "10 rad/s": 0.628}

@@ -7,9 +7,19 @@ import pytest
 
 from beaver_ftc.results.writer import FILES_OF_A_RESULT
 from beaver_ftc.scenario.control import EnginePower
-from beaver_ftc.studies.matrix.pitch_lost import LAWS, LOST, PitchCase, document_of, fly_case, run_pitch_lost
-from beaver_ftc.studies.matrix.pitch_margins import about_trim, closed_loop, loop_response, margins
-from beaver_ftc.studies.matrix.pitch_text import as_text
+from beaver_ftc.studies.matrix.pitch_lost import (
+    LAWS,
+    LOST,
+    PitchCase,
+    about_trim,
+    as_text,
+    closed_loop,
+    document_of,
+    fly_case,
+    loop_response,
+    margins,
+    run_pitch_lost,
+)
 
 
 @pytest.fixture(scope="module")

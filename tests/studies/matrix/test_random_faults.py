@@ -4,7 +4,7 @@ import numpy as np
 
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.metrics import metrics
-from beaver_ftc.studies.matrix.flying import verdict
+from beaver_ftc.studies.matrix.fault_matrix import verdict
 from flying import scenario
 
 FAULTS = 100

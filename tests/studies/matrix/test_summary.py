@@ -3,9 +3,7 @@
 import pytest
 
 from beaver_ftc.design.coefficients import SURFACES
-from beaver_ftc.studies.matrix.cases import FAULTS
-from beaver_ftc.studies.matrix.summary import beside_told, document_of
-from beaver_ftc.studies.matrix.text import as_text
+from beaver_ftc.studies.matrix.fault_matrix import FAULTS, as_text, beside_told, document_of
 
 FAULT, SURFACE = FAULTS[0][0], "elevator"
 

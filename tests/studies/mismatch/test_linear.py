@@ -12,8 +12,7 @@ from beaver_ftc.design import fdc
 from beaver_ftc.documents.errors import SimulationFailed
 from beaver_ftc.plant.linear import own
 from beaver_ftc.plant.state import FlightState
-from beaver_ftc.studies.mismatch.linear import analyse, engine_of, state_vector, surfaces_of
-from beaver_ftc.studies.mismatch.modes import (
+from beaver_ftc.studies.linear_systems import (
     CLASSICAL,
     MODES,
     deviation,
@@ -22,6 +21,7 @@ from beaver_ftc.studies.mismatch.modes import (
     response,
     zeros,
 )
+from beaver_ftc.studies.mismatch.linear import analyse, engine_of, state_vector, surfaces_of
 from flying import scenario
 
 ENVELOPE = [(30, 0), (35, 1828.8), (45, 1828.8), (50, 3000), (55, 4000)]

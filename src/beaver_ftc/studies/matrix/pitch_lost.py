@@ -1,29 +1,59 @@
-"""Elevator and flap lost at once: the same flights with engine power on pitch and without."""
+"""Elevator and flap lost at once: the same flights with engine power on pitch and without.
+
+Beside them engine power as a pitch effector about the trim, linear: what it is worth, and the margins of its
+law.
+"""
 
 from collections.abc import Sequence
 from math import degrees
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from beaver_ftc.scenario.control import EnginePower
 from beaver_ftc.studies.engine.columns import Columns
 from beaver_ftc.studies.engine.flown import Progress, flown
-from beaver_ftc.studies.matrix.cases import AIRSPEEDS_MPS, AT_S, REFERENCE, UNCERTAINTY
-from beaver_ftc.studies.matrix.flying import trimmed_deg
-from beaver_ftc.studies.matrix.pitch_cases import LAWS, LOST, SETTLED_S, PitchCase
-from beaver_ftc.studies.matrix.pitch_margins import margins
-from beaver_ftc.studies.matrix.pitch_text import as_text
+from beaver_ftc.studies.linear_systems import zeros
+from beaver_ftc.studies.matrix.fault_matrix import AIRSPEEDS_MPS, AT_S, REFERENCE, UNCERTAINTY, trimmed_deg
 
 if TYPE_CHECKING:
     from beaver_ftc.loop.flight import Flight
+    from beaver_ftc.plant.linear import LinearModel
     from beaver_ftc.scenario.schema import Scenario
 
 Document = dict[str, Any]
 NAME = "pitch-lost"
 DURATION_S = 100.0
-
 COLUMNS = ("t_s", "q_rad_s", "theta_rad", "phi_rad", "airspeed_mps", "envelope_valid")
+STATES = ("airspeed", "alpha", "q", "theta")
+FREQUENCIES_RAD_S = np.geomspace(1e-3, 1e2, 20001)
+SLOW_RAD_S = 1.0  # the phugoid is slower than this, the short period faster
+WIDTH = 25  # of a column
+SETTLED_S = 30.0  # from here on the swing is judged: what the fault itself throws off is over
+LAWS = ("fault-tolerant-published", "oracle-published")
+
+# Name, elevator's jam off its trim in deg (None: it floats), flap's position in deg.
+LOST: tuple[tuple[str, float | None, float], ...] = (
+    ("elevator at trim", 0.0, 0.0),
+    ("elevator +1 deg", 1.0, 0.0),
+    ("elevator -1 deg", -1.0, 0.0),
+    ("elevator +2 deg", 2.0, 0.0),
+    ("elevator -2 deg", -2.0, 0.0),
+    ("elevator floats", None, 0.0),
+    ("elevator -4 deg", -4.0, 0.0),
+    ("elevator -8 deg", -8.0, 0.0),
+    ("flap 10 deg down", 0.0, 10.0),
+    ("flap 20 deg down", 0.0, 20.0),
+)
+
+
+class PitchCase(NamedTuple):
+    """A pair of faults at one airspeed under one law."""
+
+    lost: str
+    airspeed_mps: float
+    law: str
 
 
 def scenario_of(case: PitchCase, enabled: bool) -> "Scenario":
@@ -127,3 +157,154 @@ def document_of(rows: list[Document], airspeeds_mps: Sequence[float]) -> Documen
         "harmed": len(harmed),
         "passed": not harmed,
     }
+
+
+def margins(airspeed_mps: float, config: EnginePower) -> Document:
+    """Of the loop through engine power at one airspeed, elevator and flap standing still.
+
+    phugoid_damping: without and with the law. gain_margin_db, phase_margin_deg: the least of all crossings,
+    null where there is none. attitude_zero_rad_s: the right-half-plane zero from power to attitude.
+    worth_deg: pitching moment of the throttle closed and opened, in deg of elevator.
+    """
+    model, power, trim_inhg = about_trim(airspeed_mps)
+    gain_db, phase_deg = _least_margins(loop_response(model.A, power, config))
+    elevator = model.B[STATES.index("q"), model.inputs.index("elevator")]
+    ends = np.array([config.lowest_inhg, config.highest_inhg]) - trim_inhg
+    return {
+        "airspeed_mps": airspeed_mps,
+        "phugoid_damping": [
+            _phugoid_damping(system) for system in (model.A, closed_loop(model.A, power, config))
+        ],
+        "gain_margin_db": gain_db,
+        "phase_margin_deg": phase_deg,
+        "attitude_zero_rad_s": float(zeros(model.A, power, STATES.index("theta")).real.max()),
+        "worth_deg": np.rad2deg(ends * power[STATES.index("q")] / elevator).tolist(),
+    }
+
+
+def about_trim(airspeed_mps: float) -> tuple["LinearModel", np.ndarray, float]:
+    """The four longitudinal states, the column (4,) of manifold pressure in inHg, and its trim."""
+    from beaver_ftc.plant.adapter import Plant
+    from beaver_ftc.plant.linear import differences, engine_slope
+    from beaver_ftc.plant.trim import trim
+    from beaver_ftc.scenario.schema import Initial
+
+    plant, point = Plant(100), trim(airspeed_mps, Initial().altitude_m)
+    model = differences(plant, point)
+    rows = [model.states.index(name) for name in STATES]
+    return model.of(STATES), engine_slope(plant, point)[rows], point.manifold_pressure_inhg
+
+
+def _law(config: EnginePower) -> tuple[float, float]:
+    """Gains: inHg per m/s, inHg per rad."""
+    return config.speed_gain_inhg_per_mps, float(np.rad2deg(config.attitude_gain_inhg_per_deg))
+
+
+def loop_response(A: np.ndarray, power: np.ndarray, config: EnginePower) -> np.ndarray:
+    """The loop cut at the manifold pressure, over FREQUENCIES_RAD_S; 1 + L = 0 is the closed loop's."""
+    speed_gain, attitude_gain = _law(config)
+    s = 1j * FREQUENCIES_RAD_S
+    x = np.linalg.solve(s[:, None, None] * np.eye(4) - A, np.broadcast_to(power, (len(s), 4))[..., None])
+    V, q = x[:, STATES.index("airspeed"), 0], x[:, STATES.index("q"), 0]
+    smooth, slow = 1.0 / (1.0 + s * config.smoothing_s), 1.0 / (1.0 + s * config.washout_s)
+    remembered = 1.0 / (s + 1.0 / config.attitude_memory_s)
+    return speed_gain * smooth * (1.0 - slow) * V - attitude_gain * remembered * q
+
+
+def closed_loop(A: np.ndarray, power: np.ndarray, config: EnginePower) -> np.ndarray:
+    """System matrix (7, 7) of the aircraft, the smoothed airspeed, its slow mean, and the attitude missed."""
+    speed_gain, attitude_gain = _law(config)
+    F = np.zeros((7, 7))
+    F[:4, :4] = A
+    F[4, [0, 4]] = np.array([1.0, -1.0]) / config.smoothing_s
+    F[5, [4, 5]] = np.array([1.0, -1.0]) / config.washout_s
+    F[6, 2], F[6, 6] = 1.0, -1.0 / config.attitude_memory_s
+    F[:4] += np.outer(power, [0, 0, 0, 0, -speed_gain, speed_gain, attitude_gain])
+    return F
+
+
+def _phugoid_damping(system: np.ndarray) -> float:
+    """Damping ratio of the slow oscillation; 1 if there is none."""
+    poles = np.linalg.eigvals(system)
+    slow = poles[(np.abs(poles) < SLOW_RAD_S) & (poles.imag > 1e-6)]
+    return float(min(-slow.real / np.abs(slow), default=1.0))
+
+
+def _least_margins(response: np.ndarray) -> tuple[float | None, float | None]:
+    """Gain margin (dB, either way) and phase margin (deg) over all crossings."""
+    through = (np.diff(np.sign(response.imag)) != 0) & (response.real[1:] < 0.0)
+    gains = np.abs(20.0 * np.log10(np.abs(response.real[1:][through])))
+    crossed = np.diff(np.sign(np.abs(response) - 1.0)) != 0
+    phases = np.abs(np.rad2deg(np.angle(-response[1:][crossed])))
+    return (float(gains.min()) if gains.size else None), (float(phases.min()) if phases.size else None)
+
+
+LEGEND = (
+    f"cell: RMS pitch rate in deg/s, and swing of the pitch attitude in deg, from {SETTLED_S:g} s on;\n"
+    "without engine power > with it. lost: the aircraft departed. *: outside the validated envelope for a\n"
+    "while, even with power."
+)
+
+
+def as_text(document: Document) -> str:
+    """A table for each law, then what the linear model says, and the totals."""
+    speeds = [found["airspeed_mps"] for found in document["margins"]]
+    tables = [line for law in LAWS for line in [*_table(document, law, speeds), ""]]
+    return "\n".join([*tables, LEGEND, "", *_margins(document["margins"]), "", _totals(document)])
+
+
+def _table(document: Document, law: str, speeds: list[float]) -> list[str]:
+    rows = {(row["lost"], row["airspeed_mps"]): row for row in document["flights"] if row["law"] == law}
+    head = f"{law:25}" + "".join(f"{f'{V:g} m/s':{WIDTH}}" for V in speeds)
+    lines = [f"{name:18}" + "".join(f"{_cell(rows[name, V]):{WIDTH}}" for V in speeds) for name, _, _ in LOST]
+    return [line.rstrip() for line in (head, *lines)]
+
+
+def _cell(row: Document) -> str:
+    star = "*" if row["with"]["outside_share"] > 0.0 else ""
+    return f"{_half(row['without'])} > {_half(row['with'])}{star}"
+
+
+def _half(outcome: Document) -> str:
+    if outcome["departure"]:
+        return f"lost {outcome['departure']['time_s']:.1f} s"
+    return f"{outcome['q_rms_deg_s']:.2f} {outcome['theta_swing_deg']:4.1f}"
+
+
+def _margins(found: list[Document]) -> list[str]:
+    heads = (
+        "airspeed",
+        "phugoid damping",
+        "gain margin",
+        "phase margin",
+        "power to attitude",
+        "its range as elevator",
+    )
+    return [_row(heads), *(_margin(one) for one in found)]
+
+
+def _margin(one: Document) -> str:
+    alone, damped = one["phugoid_damping"]
+    gain = "unlimited" if one["gain_margin_db"] is None else f"{one['gain_margin_db']:.1f} dB"
+    phase = "unlimited" if one["phase_margin_deg"] is None else f"{one['phase_margin_deg']:.0f} deg"
+    closed, opened = one["worth_deg"]
+    cells = (
+        f"{one['airspeed_mps']:g} m/s",
+        f"{alone:.2f} > {damped:.2f}",
+        gain,
+        phase,
+        f"zero at +{one['attitude_zero_rad_s']:.2f} rad/s",
+        f"{closed:+.1f} to {opened:+.1f} deg",
+    )
+    return _row(cells)
+
+
+def _row(cells: tuple[str, ...]) -> str:
+    return "".join(f"{cell:{width}}" for cell, width in zip(cells, (11, 18, 14, 15, 22, 0), strict=True))
+
+
+def _totals(document: Document) -> str:
+    return (
+        f"{len(document['flights'])} pairs of faults flown: {document['saved']} aircraft kept that are lost "
+        f"without engine power, {document['harmed']} lost that are kept without"
+    )

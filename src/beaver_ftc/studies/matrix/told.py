@@ -14,7 +14,6 @@ from beaver_ftc.design.context import Context
 from beaver_ftc.design.inertia import inertia_coefficients
 from beaver_ftc.studies.engine.columns import Columns
 from beaver_ftc.studies.engine.told import Whitening, aware_of_the_air, chance
-from beaver_ftc.studies.matrix.cases import AT_S, DURATION_S
 
 if TYPE_CHECKING:
     from beaver_ftc.scenario.schema import Scenario
@@ -35,7 +34,8 @@ def told(scenario: "Scenario", kept: Columns, surface: str) -> Document:
     """told_deflection: of the fault of a surface since it struck; told_chance: of finding it in that time."""
     assert scenario.fdi.statistical is not None
     aircraft, (context, coefficients) = scenario.airframe, _declared(scenario)
-    struck = kept["t_s"] > AT_S + 0.5 * context.dt_s
+    at_s = scenario.faults[0].at_s
+    struck = kept["t_s"] > at_s + 0.5 * context.dt_s
     off_rad = np.where(struck, kept[f"{surface}_effective_rad"] - healthy(context, kept, surface), 0.0)
     own = [term for term in aircraft.moments if term.surface == surface]
     phi = np.sum([term.value * accelerations(aircraft, term, kept, off_rad) for term in own], axis=0)
@@ -44,7 +44,7 @@ def told(scenario: "Scenario", kept: Columns, surface: str) -> Document:
     sigma = np.array([c for _, c in unknown]) / sqrt(3.0)
     d = Whitening(context).deflection_beside(phi, np.stack(regressors, axis=-1), sigma)
     rate = scenario.fdi.statistical.false_alarms_per_h
-    return {"told_deflection": d, "told_chance": chance(d, DURATION_S - AT_S, rate)}
+    return {"told_deflection": d, "told_chance": chance(d, scenario.duration_s - at_s, rate)}
 
 
 def _declared(scenario: "Scenario") -> tuple[Context, np.ndarray]:

@@ -21,8 +21,8 @@ from beaver_ftc.studies.mismatch.tally import TOTAL, AxisBound, Figures, Tally
 
 if TYPE_CHECKING:
     from beaver_ftc.scenario.schema import Scenario
+    from beaver_ftc.studies.linear_systems import Mode
     from beaver_ftc.studies.mismatch.linear import LinearAnalysis
-    from beaver_ftc.studies.mismatch.modes import Mode
 
 Document = dict[str, Any]
 NAMES = (*SOURCES, UNEXPLAINED, TOTAL)
@@ -108,7 +108,7 @@ def guarantee_document(declared: Guarantee, recommended: Guarantee) -> Document:
 
 def linear_document(analysis: "LinearAnalysis") -> Document:
     """Modes side by side, how far the models are apart, zeros of the surface-to-rate channels."""
-    from beaver_ftc.studies.mismatch.modes import CHANNELS, MODES, zeros
+    from beaver_ftc.studies.linear_systems import CHANNELS, MODES, zeros
 
     apart = {name: analysis.deviation(name) for name in analysis.models if name != "truth"}
     return {

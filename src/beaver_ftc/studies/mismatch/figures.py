@@ -11,9 +11,9 @@ import numpy as np
 
 from beaver_ftc.results.looks import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILION, Mark, marks
 from beaver_ftc.results.series import read_series
+from beaver_ftc.studies.linear_systems import CHANNELS, pulse_response, response, zeros
 from beaver_ftc.studies.mismatch.document import Document
 from beaver_ftc.studies.mismatch.frames import column
-from beaver_ftc.studies.mismatch.modes import CHANNELS, pulse_response, response, zeros
 from beaver_ftc.studies.mismatch.sources import SOURCES
 from beaver_ftc.studies.mismatch.split import UNEXPLAINED
 from beaver_ftc.studies.mismatch.states import AXES

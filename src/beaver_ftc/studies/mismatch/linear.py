@@ -13,7 +13,7 @@ import numpy as np
 from beaver_ftc.design import fdc
 from beaver_ftc.design.coefficients import engine_power_kw, slipstream
 from beaver_ftc.design.variants import anchor, design_of, jacobian
-from beaver_ftc.studies.mismatch.modes import CLASSICAL, MODES, Mode, deviation, modes
+from beaver_ftc.studies.linear_systems import CLASSICAL, MODES, Mode, deviation, modes
 
 if TYPE_CHECKING:
     from beaver_ftc.plant.linear import LinearModel

@@ -1,4 +1,4 @@
-"""Eigenmodes and transfer functions of a linear aircraft: names, frequencies, dampings, zeros, responses.
+"""Linear systems, and a linear aircraft as one: modes by name, zeros, frequency and pulse responses.
 
 Classical eight states: position, altitude and heading are left out. On a flat Earth nothing depends on
 heading; on a turning one lift does a little (2 Omega cos(latitude) per rad), which moves the slow spiral
@@ -85,14 +85,21 @@ def zeros(A: np.ndarray, b: np.ndarray, row: int) -> np.ndarray:
     return finite[np.argsort(np.abs(finite))]
 
 
-def pulse_response(A: np.ndarray, b: np.ndarray, row: int, t_s: np.ndarray, pulse_s: float) -> np.ndarray:
-    """State `row` at evenly spaced times t_s (n,) after a unit pulse of length pulse_s at time 0; exact."""
+def held_over_frame(A: np.ndarray, B: np.ndarray, dt_s: float) -> tuple[np.ndarray, np.ndarray]:
+    """The discrete system (n, n), (n, m) for inputs held over a frame; exact."""
     from scipy.linalg import expm
 
-    dt, n = t_s[1] - t_s[0], len(A)
-    step = expm(np.block([[A, b[:, None]], [np.zeros((1, n + 1))]]) * dt)
-    state, out = np.zeros(n), []
+    n, m = B.shape
+    whole = expm(np.block([[A, B], [np.zeros((m, n + m))]]) * dt_s)
+    return whole[:n, :n], whole[:n, n:]
+
+
+def pulse_response(A: np.ndarray, b: np.ndarray, row: int, t_s: np.ndarray, pulse_s: float) -> np.ndarray:
+    """State `row` at evenly spaced times t_s (n,) after a unit pulse of length pulse_s at time 0; exact."""
+    dt = t_s[1] - t_s[0]
+    step, push = held_over_frame(A, b[:, None], dt)
+    state, out = np.zeros(len(A)), []
     for t in t_s:
         out.append(state[row])
-        state = step[:n, :n] @ state + step[:n, n] * (t < pulse_s - 0.5 * dt)
+        state = step @ state + push[:, 0] * (t < pulse_s - 0.5 * dt)
     return np.array(out)

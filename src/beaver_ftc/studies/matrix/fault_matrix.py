@@ -1,0 +1,454 @@
+"""Every fault type on every surface: what the diagnosis makes of it, and what the flight costs.
+
+Each flight is flown with the fault-tolerant law and with the oracle; a cell of the matrix is a fault on a
+surface, the worst of its airspeeds.
+"""
+
+from functools import lru_cache
+from math import degrees, log2
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from beaver_ftc.aircraft import AXES, DEFAULT, Aircraft, load
+from beaver_ftc.scenario.environment import air_of
+from beaver_ftc.studies.engine.flown import Progress, flown
+from beaver_ftc.studies.matrix.told import columns_of, told
+
+if TYPE_CHECKING:
+    from beaver_ftc.loop.flight import Flight
+    from beaver_ftc.scenario.schema import Scenario
+
+Document = dict[str, Any]
+NAME, DECLARED = "fault-matrix", "fault-matrix-declared"
+TOLERANCE, SENSORS = 0.05, "tactical-grade"
+AIRSPEEDS_MPS = (38.0, 45.0, 52.0)
+AT_S = 12.0
+DURATION_S = 30.0
+NAMED = ("surface", "named")
+LIKELY = 0.5  # a test that finds a fault more often than not sees it
+WORST_FIRST = ("WRONG", "unseen", "open", "surface", "named")
+MOST_DOUBLINGS = 3.0  # of the tracking error, where the heat map is darkest
+SPEEDS = (0.9, 1.0, 1.1)  # of another aircraft, as shares of the speed it starts with
+REFERENCE = {
+    axis: [{"sine": {"amplitude_deg_s": 3, "frequency_hz": frequency_hz}}]
+    for axis, frequency_hz in (("p", 0.25), ("q", 0.2), ("r", 0.15))
+}
+# [Zhang2005, sec. VII]
+UNCERTAINTY = {
+    "inertia_coupling": {"p": 0.25, "q": -0.25, "r": 0.25},
+    "sinusoid": {
+        axis: {"amplitude_rad_s2": 0.02, "frequency_rad_s": frequency_rad_s}
+        for axis, frequency_rad_s in (("p", 10), ("q", 15), ("r", 10))
+    },
+}
+
+# Name in the table, and the fault; off_deg: a jam this far off the trimmed command.
+FAULTS: tuple[tuple[str, dict[str, Any]], ...] = (
+    ("40 % loss", {"type": "loss_of_effectiveness", "magnitude": 0.4}),
+    ("total loss", {"type": "loss_of_effectiveness", "magnitude": 1.0}),
+    ("stuck +3 deg", {"type": "stuck", "off_deg": 3.0}),
+    ("stuck -3 deg", {"type": "stuck", "off_deg": -3.0}),
+    ("hardover +", {"type": "hardover", "direction": 1}),
+    ("hardover -", {"type": "hardover", "direction": -1}),
+    ("float", {"type": "float"}),
+    ("bias +2 deg", {"type": "bias", "bias_deg": 2.0}),
+    ("bias -2 deg", {"type": "bias", "bias_deg": -2.0}),
+    ("rate limit 1.2 deg/s", {"type": "rate_limit", "scale": 0.02}),
+    ("oscillation 0.5 deg, 1 rad/s", {"type": "oscillatory", "amplitude_deg": 0.5, "frequency_rad_s": 1.0}),
+    ("oscillation 0.5 deg, 10 rad/s", {"type": "oscillatory", "amplitude_deg": 0.5, "frequency_rad_s": 10.0}),
+    ("oscillation 2 deg, 5 rad/s", {"type": "oscillatory", "amplitude_deg": 2.0, "frequency_rad_s": 5.0}),
+)
+
+
+class Case(NamedTuple):
+    """One cell of the matrix at one airspeed."""
+
+    fault: str
+    surface: str
+    airspeed_mps: float
+    declared: bool = False  # with the errors of `declared`
+    aircraft: str = DEFAULT
+    turbulence: str = "none"  # flown and declared, with `declared`
+
+
+def airspeeds_of(reference: str) -> tuple[float, ...]:
+    """Airspeeds to fly an aircraft at, m/s."""
+    if reference == DEFAULT:
+        return AIRSPEEDS_MPS
+    aircraft = aircraft_of(reference)
+    start = aircraft.file.start.airspeed_mps or 0.5 * sum(aircraft.envelope.airspeed_mps)
+    return tuple(round(share * start, 1) for share in SPEEDS)
+
+
+def aircraft_of(reference: str) -> Aircraft:
+    """The aircraft of that name; a folder is looked for in the working directory."""
+    return load(reference, Path())
+
+
+def own_axis(case: Case) -> str:
+    """The axis the surface of a case turns most about: p, q or r."""
+    aircraft = aircraft_of(case.aircraft)
+    return AXES[aircraft.dominant_axis[aircraft.surfaces.index(case.surface)]]
+
+
+def cases(
+    airspeeds_mps: tuple[float, ...] = AIRSPEEDS_MPS,
+    declared: bool = False,
+    aircraft: str = DEFAULT,
+    turbulence: str = "none",
+) -> list[Case]:
+    """Every fault on every surface at every airspeed, fault by fault."""
+    return [
+        Case(fault, surface, V, declared, aircraft, turbulence)
+        for fault, _ in FAULTS
+        for surface in aircraft_of(aircraft).surfaces
+        for V in airspeeds_mps
+    ]
+
+
+def declared(turbulence: str = "none") -> dict[str, Any]:
+    """Real sensors, servos, coefficients at the ends of their tolerance by turns, air: all of it declared."""
+    names = [term.name for term in load().moments]
+    wrong = {name: 1.0 + (TOLERANCE if i % 2 else -TOLERANCE) for i, name in enumerate(names)}
+    return {
+        "uncertainty": UNCERTAINTY | {"coefficients": wrong},
+        "sensors": SENSORS,
+        "actuators": "servo",
+        "environment": air_of(turbulence),
+        "fdi": {
+            "fault_class": "all",
+            "bounds": {"coefficients": TOLERANCE, "sensors": SENSORS, "turbulence": turbulence},
+            "statistical": {},
+        },
+    }
+
+
+def scenario_of(case: Case, law: str, trimmed_deg: float) -> "Scenario":
+    """The flight of a case under a law; trimmed_deg: the surface's deflection in trim."""
+    from beaver_ftc.scenario.given import load as load_scenario
+
+    fault = dict(dict(FAULTS)[case.fault])
+    if "off_deg" in fault:
+        fault["position_deg"] = trimmed_deg + fault.pop("off_deg")
+    return load_scenario(
+        {
+            "name": "matrix",
+            "aircraft": case.aircraft,
+            "duration_s": DURATION_S,
+            "initial": {"airspeed_mps": case.airspeed_mps},
+            "reference": REFERENCE,
+            "uncertainty": UNCERTAINTY if case.aircraft == DEFAULT else {},
+            "faults": [{**fault, "actuator": case.surface, "at_s": AT_S}],
+            "fdi": {"fault_class": "all"},
+            "control": {"law": law},
+        }
+        | (declared(case.turbulence) if case.declared else {})
+    )
+
+
+@lru_cache
+def trimmed_deg(airspeed_mps: float, surface: str, aircraft: str = DEFAULT) -> float:
+    """Deflection of a surface in the trim the cases start from."""
+    from beaver_ftc.plant.adapter import Plant
+    from beaver_ftc.plant.trim import trim
+    from beaver_ftc.scenario.initial import initial_of
+
+    flown = aircraft_of(aircraft)
+    altitude_m = initial_of(flown)().altitude_m
+    point = trim(airspeed_mps, altitude_m, plant=Plant(100, aircraft=flown))
+    return degrees(point.surfaces_rad[surface])
+
+
+def fly_case(case: Case) -> Document:
+    """The row of a case: fault, verdict, tracking beside the oracle's, and why it was lost, if so."""
+    from beaver_ftc.loop.loop import fly
+
+    off_deg = trimmed_deg(case.airspeed_mps, case.surface, case.aircraft)
+    ours, best = (scenario_of(case, law, off_deg) for law in ("fault-tolerant-published", "oracle-published"))
+    kept = columns_of(ours.airframe) if case.declared else None
+    flight, oracle = fly(ours, kept), fly(best)
+    seen = {} if kept is None else told(ours, kept, case.surface)
+    return {**case._asdict(), **_diagnosis(flight, case), **_tracking(flight, oracle, case), **seen}
+
+
+def _diagnosis(flight: "Flight", case: Case) -> Document:
+    from beaver_ftc.results.metrics import metrics
+
+    document = metrics(flight)
+    isolation, true_type = document["isolation"], flight.scenario.faults[0].type
+    return {
+        "detected": document["detection"]["detected"],
+        "delay_s": document["detection"]["delay_s"],
+        "false_alarm": document["false_alarm"],
+        "isolated": isolation["fault"],
+        "isolation_delay_s": isolation["delay_s"],
+        "type": isolation["type"],
+        "candidates": isolation["candidates"],
+        "estimate": isolation["estimate"],
+        "verdict": verdict(document, case.surface, true_type),
+    }
+
+
+def verdict(document: Document, surface: str, true_type: str) -> str:
+    """named (surface and type right), surface (right, type open), open (still possible), unseen or WRONG."""
+    isolation = document["isolation"]
+    if not document["detection"]["detected"]:
+        return "unseen"
+    if document["false_alarm"]:
+        return "WRONG"
+    if isolation["fault"] is None:
+        left = isolation["candidates"]
+        return "open" if surface in left or f"{surface}:{true_type}" in left else "WRONG"
+    if isolation["fault"] != surface or isolation["type_correct"] is False:
+        return "WRONG"
+    if isolation["type"] is None:
+        return "surface" if true_type in isolation["candidates"] or not isolation["candidates"] else "WRONG"
+    return "named"
+
+
+def _tracking(flight: "Flight", oracle: "Flight", case: Case) -> Document:
+    axis = own_axis(case)
+    ours, best = (_rms_deg_s(one, axis) for one in (flight, oracle))
+    return {
+        "axis": axis,
+        "rms_deg_s": ours,
+        "oracle_rms_deg_s": best,
+        "ratio": ours / best if best else None,
+        "departure_s": flight.departure[0] if flight.departure else None,
+        "oracle_departure_s": oracle.departure[0] if oracle.departure else None,
+        "departure_signal": flight.departure[1] if flight.departure else None,
+        "oracle_beyond_s": oracle.authority[axis][1] if oracle.authority else 0.0,
+        "oracle_left_envelope_s": oracle.envelope_exits[0][0] if oracle.envelope_exits else None,
+    }
+
+
+def _rms_deg_s(flight: "Flight", axis: str) -> float:
+    return degrees((flight.post_fault_rms_rad_s or (0.0,) * 3)["pqr".index(axis)])
+
+
+def document_of(rows: list[Document]) -> Document:
+    """The whole matrix as a document: cells, single flights, and what went wrong anywhere."""
+    surfaces = list(dict.fromkeys(row["surface"] for row in rows))
+    cells = [_cell(fault, surface, rows) for fault, _ in FAULTS for surface in surfaces]
+    told = [row for row in rows if "told_chance" in row]
+    return {
+        "aircraft": next((row["aircraft"] for row in rows if "aircraft" in row), None),
+        "cells": cells,
+        "flights": rows,
+        "wrong": sum(row["verdict"] == "WRONG" for row in rows),
+        "false_alarms": sum(row["false_alarm"] for row in rows),
+        "lost_though_the_oracle_was_not": [row for row in rows if _lost_alone(row)],
+        "passed": not any(row["verdict"] == "WRONG" or row["false_alarm"] for row in rows),
+        **({"told": beside_told(told)} if told else {}),
+    }
+
+
+def beside_told(rows: list[Document]) -> Document:
+    """What becomes of the flights in which a test that is told the fault sees it.
+
+    named: the right surface, whether or not its type is still open; type_kept: the right type is named or
+    among the candidates.
+    """
+    seen = [row for row in rows if row["told_chance"] > LIKELY]
+    named = sum(row["verdict"] in NAMED for row in seen)
+    return {
+        "flights": len(rows),
+        "seen": len(seen),
+        "detected": sum(row["detected"] for row in seen),
+        "named": named,
+        "share": named / len(seen) if seen else None,
+        "type_kept": sum(row["detected"] and row["verdict"] != "WRONG" for row in seen),
+        "by_surface": {
+            surface: {"seen": len(of_it), "named": sum(row["verdict"] in NAMED for row in of_it)}
+            for surface in dict.fromkeys(row["surface"] for row in rows)
+            for of_it in [[row for row in seen if row["surface"] == surface]]
+        },
+        "detected_but_not_told": sum(row["detected"] and row["told_chance"] <= LIKELY for row in rows),
+    }
+
+
+def surfaces_of(document: Document) -> list[str]:
+    """The surfaces in a matrix, in the aircraft's order."""
+    return list(dict.fromkeys(cell["surface"] for cell in document["cells"]))
+
+
+def _lost_alone(row: Document) -> bool:
+    return row["departure_s"] is not None and row["oracle_departure_s"] is None
+
+
+def _cell(fault: str, surface: str, rows: list[Document]) -> Document:
+    here = [row for row in rows if (row["fault"], row["surface"]) == (fault, surface)]
+    delays = [row["delay_s"] for row in here]
+    ratios = [row["ratio"] for row in here if row["ratio"] is not None]
+    return {
+        "fault": fault,
+        "surface": surface,
+        "verdict": min((row["verdict"] for row in here), key=WORST_FIRST.index),
+        "delay_s": None if None in delays else max(delays),
+        "candidates": sorted({candidate for row in here for candidate in row["candidates"]}),
+        "ratio": max(ratios, default=None),
+        "lost": sum(row["departure_s"] is not None for row in here),
+        "oracle_lost": sum(row["oracle_departure_s"] is not None for row in here),
+        "flights": len(here),
+        "remark": _remark(here),
+        **({"told": sum(row["told_chance"] > LIKELY for row in here)} if "told_chance" in here[0] else {}),
+    }
+
+
+def _reason(lost: list[Document]) -> str:
+    """Why not even the oracle kept the aircraft."""
+    beyond_s = max(row["oracle_beyond_s"] for row in lost)
+    if beyond_s > 0.0:
+        return f"for {beyond_s:.1f} s no deflection at all could hold the {lost[0]['axis']} rate"
+    left_s = [row["oracle_left_envelope_s"] for row in lost if row["oracle_left_envelope_s"] is not None]
+    if left_s:
+        return f"the validated envelope was left at {min(left_s):.1f} s, the outer loops being open"
+    return f"{lost[0]['departure_signal']} diverged"
+
+
+def _remark(here: list[Document]) -> str:
+    """Why no law could keep the aircraft, where it was lost; why nothing was seen, where nothing was."""
+    lost = [row for row in here if row["departure_s"] is not None]
+    if lost:
+        also = sum(row["oracle_departure_s"] is not None for row in lost)
+        return f"lost in {len(lost)} of {len(here)} flights, the oracle in {also}: {_reason(lost)}"
+    if all(not row["detected"] for row in here):
+        return "no effect beyond the admitted uncertainty: tracking is as before"
+    return ""
+
+
+def name_of(declared: bool, turbulence: str) -> str:
+    """The result folder's name of the matrix, with errors or without, in such air."""
+    name = DECLARED if declared else NAME
+    return name if turbulence == "none" else f"{name}-{turbulence}"
+
+
+def run_matrix(
+    out: Path,
+    airspeeds_mps: tuple[float, ...] | None = None,
+    workers: int = 1,
+    progress: Progress | None = None,
+    declared: bool = False,
+    aircraft: str = DEFAULT,
+    turbulence: str = "none",
+) -> Document:
+    """Write table, JSON and heat map into the folder that `name_of` says, in `out`; return the document."""
+    from beaver_ftc.results.metrics import as_json
+    from beaver_ftc.results.writer import result_folder
+    from beaver_ftc.studies.matrix.fault_matrix import write_heat_map
+
+    airspeeds_mps = airspeeds_mps or airspeeds_of(aircraft)
+    name = name_of(declared, turbulence)
+    all_cases = cases(airspeeds_mps, declared, aircraft, turbulence)
+    fly = flown(out / name, all_cases, fly_case, workers=workers, progress=progress)
+    with fly as rows, result_folder(out, name) as folder:
+        document = document_of(rows)
+        (folder / f"{NAME}.json").write_text(as_json(document), encoding="utf-8")
+        (folder / f"{NAME}.txt").write_text(as_text(document) + "\n", encoding="utf-8")
+        write_heat_map(document, folder / f"{NAME}.png")
+    return document
+
+
+LEGEND = (
+    "cell: verdict, delay of the alarm, tracking RMS of the surface's own axis over the oracle's; the worst\n"
+    "of all airspeeds. named: surface and type. surface: type still open. open: surface still open. unseen:\n"
+    "no alarm, no effect beyond the admitted uncertainty. *: aircraft lost (remarks)."
+)
+TOLD_LEGEND = (
+    " o: not even a test that\nis told surface, course and instant sees it at any airspeed, at the same rate "
+    "of false alarms."
+)
+
+
+def as_text(document: Document) -> str:
+    """Table, legend, remarks and totals."""
+    width = max(len(fault) for fault, _ in FAULTS)
+    surfaces = surfaces_of(document)
+    by_place = {(cell["fault"], cell["surface"]): cell for cell in document["cells"]}
+    head = " " * width + "".join(f"  {surface:21}" for surface in surfaces)
+    lines = [
+        f"{fault:{width}}" + "".join(f"  {_cell_text(by_place[fault, surface]):21}" for surface in surfaces)
+        for fault, _ in FAULTS
+    ]
+    lines = [line.rstrip() for line in (head, *lines)]
+    told = document.get("told")
+    legend, share = (LEGEND + TOLD_LEGEND, [_told(told)]) if told else (LEGEND, [])
+    return "\n".join([*lines, "", legend, "", *_remarks(document), _totals(document), *share])
+
+
+def _cell_text(cell: Document) -> str:
+    delay = "     -" if cell["delay_s"] is None else f"{cell['delay_s']:4.2f} s"
+    ratio = "" if cell["ratio"] is None else f"{cell['ratio']:.1f}x"
+    unseen = "o" if cell.get("told") == 0 else ""
+    return f"{cell['verdict']:7} {delay} {ratio:>5}{'*' if cell['lost'] else ''}{unseen}"
+
+
+def _remarks(document: Document) -> list[str]:
+    said = [cell for cell in document["cells"] if cell["lost"]]
+    lines = [f"* {cell['surface']} {cell['fault']}: {cell['remark']}" for cell in said]
+    return [*lines, ""] if lines else []
+
+
+def _totals(document: Document) -> str:
+    return (
+        f"{len(document['flights'])} faults flown: {document['wrong']} named wrongly, "
+        f"{document['false_alarms']} false alarms, "
+        f"{len(document['lost_though_the_oracle_was_not'])} lost that the oracle kept"
+    )
+
+
+def _told(told: Document) -> str:
+    """How many of the faults that can be seen are named."""
+    if not told["seen"]:
+        return "a test that is told the fault sees none of them"
+    surfaces = ", ".join(f"{s} {of['named']} of {of['seen']}" for s, of in told["by_surface"].items())
+    return (
+        f"a test that is told the fault sees {told['seen']} of {told['flights']}; {told['detected']} "
+        f"of these are detected,\nthe right surface is named in {told['named']} "
+        f"({100 * told['share']:.0f} %: {surfaces}), the right type is kept in {told['type_kept']}"
+    )
+
+
+def write_heat_map(document: Document, path: Path) -> None:
+    """Draw the matrix into a PNG."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    names = [fault for fault, _ in FAULTS]
+    surfaces = surfaces_of(document)
+    by_place = {(cell["fault"], cell["surface"]): cell for cell in document["cells"]}
+    grid = np.array([[_doublings(by_place[fault, surface]) for surface in surfaces] for fault in names])
+    figure = Figure(figsize=(11, 0.5 * len(names) + 1.8), layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = figure.subplots()
+    image = axes.imshow(grid, cmap="YlOrBr", vmin=0, vmax=MOST_DOUBLINGS, aspect="auto")
+    axes.set_title("Each fault on each surface: verdict, and how well the flight goes on")
+    axes.set_xticks(range(len(surfaces)), surfaces)
+    axes.set_xticks(np.arange(0.5, len(surfaces) - 1), minor=True)
+    axes.set_yticks(np.arange(0.5, len(names) - 1), minor=True)
+    axes.grid(which="minor", color="white", linewidth=1.5)
+    axes.tick_params(which="minor", length=0)
+    axes.set_yticks(range(len(names)), names)
+    for i, fault in enumerate(names):
+        for j, surface in enumerate(surfaces):
+            axes.text(j, i, _label(by_place[fault, surface]), ha="center", va="center", **_ink(grid[i, j]))
+    bar = figure.colorbar(image, ticks=range(int(MOST_DOUBLINGS) + 1))
+    most = int(MOST_DOUBLINGS)
+    bar.ax.set_yticklabels([f"{2**n}" for n in range(most)] + [f"{2**most} or more"])
+    bar.set_label("tracking RMS over the oracle's, worst airspeed")
+    figure.savefig(path, dpi=120, metadata={"Software": None})
+
+
+def _doublings(cell: Document) -> float:
+    return 0.0 if cell["ratio"] is None else min(max(log2(cell["ratio"]), 0.0), MOST_DOUBLINGS)
+
+
+def _label(cell: Document) -> str:
+    delay = "" if cell["delay_s"] is None else f", {cell['delay_s']:.2f} s"
+    return f"{cell['verdict']}{delay}{', lost' if cell['lost'] else ''}"
+
+
+def _ink(doublings: float) -> dict[str, Any]:
+    return {"color": "white" if doublings > 0.7 * MOST_DOUBLINGS else "black", "fontsize": 9}

@@ -17,7 +17,8 @@ from beaver_ftc.control.supervisor import (
     SUPERVISOR,
 )
 from beaver_ftc.design.model import design_record, unanticipated_pitch
-from beaver_ftc.diagnosis.state import NOT_ISOLATED, UNANTICIPATED, diagnosis_dtype
+from beaver_ftc.diagnosis.scheme import diagnosis_dtype
+from beaver_ftc.diagnosis.state import NOT_ISOLATED, UNANTICIPATED
 from beaver_ftc.diagnosis.types.examine import FIXED, LAGS, LOSES, SHIFTED
 
 AILERON, ELEVATOR, RUDDER, FLAP = range(4)

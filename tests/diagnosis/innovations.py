@@ -13,7 +13,7 @@ from beaver_ftc.compiled import kernel
 from beaver_ftc.design.coefficients import MASS
 from beaver_ftc.design.engine import DPT_0, KW_TO_DPT, SEA_LEVEL_DENSITY_KG_M3
 from beaver_ftc.diagnosis import gusts, likelihood, noise_model, statistical, whitening
-from beaver_ftc.diagnosis.state import BLOCK, MAX_HYPOTHESES, N_SLOTS, SENSE
+from beaver_ftc.diagnosis.likelihood import BLOCK, MAX_HYPOTHESES, N_SLOTS, SENSE
 from beaver_ftc.loop.assembly import assemble
 from beaver_ftc.scenario.schema import Scenario
 

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from beaver_ftc.diagnosis.state import LOSS, diagnosis_dtype
+from beaver_ftc.diagnosis.scheme import diagnosis_dtype
+from beaver_ftc.diagnosis.state import LOSS
 
 DT, POLES = 0.02, np.array([1e6, 4.0, 0.5])
 

@@ -6,7 +6,8 @@ from kernels import DT, new_fdi
 
 from beaver_ftc.aircraft import load
 from beaver_ftc.diagnosis import across, air, isolation
-from beaver_ftc.diagnosis.state import LOSS, POSITION, STEP
+from beaver_ftc.diagnosis.likelihood import STEP
+from beaver_ftc.diagnosis.state import LOSS, POSITION
 from beaver_ftc.diagnosis.tones import set_up_listening
 from beaver_ftc.diagnosis.views import across_a_column, set_up_views
 from beaver_ftc.loop.loop import Loop, fly

@@ -6,15 +6,9 @@ from kernels import DT, new_fdi
 
 from beaver_ftc.aircraft import load
 from beaver_ftc.diagnosis import across, likelihood, tones
-from beaver_ftc.diagnosis.state import (
-    AN_AXIS,
-    LEAST_UNCERTAINTY_RAD_S2,
-    LOSS,
-    MAX_HYPOTHESES,
-    MAX_VIEWS,
-    POSITION,
-    STEP,
-)
+from beaver_ftc.diagnosis.across import AN_AXIS, MAX_VIEWS
+from beaver_ftc.diagnosis.likelihood import LEAST_UNCERTAINTY_RAD_S2, MAX_HYPOTHESES, STEP
+from beaver_ftc.diagnosis.state import LOSS, POSITION
 from beaver_ftc.diagnosis.views import set_up_views
 
 AILERON, ELEVATOR, RUDDER, FLAP = range(4)

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from beaver_ftc.diagnosis.state import NOT_ISOLATED, UNANTICIPATED, diagnosis_dtype
+from beaver_ftc.diagnosis.scheme import diagnosis_dtype
+from beaver_ftc.diagnosis.state import NOT_ISOLATED, UNANTICIPATED
 from beaver_ftc.diagnosis.types import findings
 from beaver_ftc.diagnosis.types.candidates import BY_DEDUCTION, RULED_OUT
 from beaver_ftc.diagnosis.types.pairs import IN_PITCH

@@ -6,6 +6,7 @@ from kernels import DT, estimator, new_fdi
 
 from beaver_ftc.diagnosis import isolation
 from beaver_ftc.diagnosis.fault_class import hypothesis
+from beaver_ftc.diagnosis.likelihood import STEP
 from beaver_ftc.diagnosis.state import (
     INTERVAL,
     LOSS,
@@ -13,7 +14,6 @@ from beaver_ftc.diagnosis.state import (
     POSITION,
     PUBLISHED,
     STATISTICS,
-    STEP,
     UNANTICIPATED,
     WORST_CASE,
 )

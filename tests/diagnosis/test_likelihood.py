@@ -8,7 +8,8 @@ from innovations import block_of, bounded_all, by_onset, covariance, drawn, weig
 from scipy.stats import kstest
 
 from beaver_ftc.diagnosis import likelihood
-from beaver_ftc.diagnosis.state import ALPHA3, LANES, LOSS, MAX_HYPOTHESES, N_SLOTS, STEP
+from beaver_ftc.diagnosis.likelihood import ALPHA3, LANES, MAX_HYPOTHESES, N_SLOTS, STEP
+from beaver_ftc.diagnosis.state import LOSS
 
 DT = 0.01
 TOGETHER = np.array([[0.04, 0.006], [0.006, 0.003]])

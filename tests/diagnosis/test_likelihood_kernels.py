@@ -6,15 +6,8 @@ from innovations import block_of, by_onset, with_hypotheses
 from kernels import new_fdi
 
 from beaver_ftc.diagnosis import likelihood, statistical, whitening
-from beaver_ftc.diagnosis.state import (
-    ALPHA3,
-    ENDING,
-    GROWING,
-    LOSS,
-    MAX_HYPOTHESES,
-    N_SLOTS,
-    STEP,
-)
+from beaver_ftc.diagnosis.likelihood import ALPHA3, ENDING, GROWING, MAX_HYPOTHESES, N_SLOTS, STEP
+from beaver_ftc.diagnosis.state import LOSS
 
 DT = 0.02
 TOGETHER = np.array([[0.04, 0.006], [0.006, 0.003]])

@@ -13,7 +13,8 @@ from beaver_ftc.design.model import AXES, design_record
 from beaver_ftc.design.terms import evaluate, regressors
 from beaver_ftc.design.variants import response
 from beaver_ftc.diagnosis import noise_model, statistical
-from beaver_ftc.diagnosis.state import LOSS, N_SLOTS
+from beaver_ftc.diagnosis.likelihood import N_SLOTS
+from beaver_ftc.diagnosis.state import LOSS
 from beaver_ftc.plant.instruments import SIGNALS
 from beaver_ftc.scenario.diagnosis import Bounds
 from beaver_ftc.studies.engine.statistics import poisson

@@ -13,7 +13,9 @@ from beaver_ftc.design.model import design_record
 from beaver_ftc.design.variants import coefficient_slopes
 from beaver_ftc.diagnosis import gusts, noise_model
 from beaver_ftc.diagnosis.admitted import gust_sigma_rad_s, inertia_slack
-from beaver_ftc.diagnosis.state import ALPHA3, ENDING, GROWING, LOSS, N_SLOTS, STATISTICAL, STEP
+from beaver_ftc.diagnosis.likelihood import ALPHA3, ENDING, GROWING, N_SLOTS, STEP
+from beaver_ftc.diagnosis.state import LOSS
+from beaver_ftc.diagnosis.statistical import STATISTICAL
 from beaver_ftc.loop.assembly import assemble
 from beaver_ftc.scenario.diagnosis import Bounds, Statistical
 from beaver_ftc.scenario.schema import Scenario

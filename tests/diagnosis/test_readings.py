@@ -7,7 +7,7 @@ from innovations import Detector, misread
 from beaver_ftc.design.engine import KW_TO_DPT
 from beaver_ftc.design.variants import response
 from beaver_ftc.diagnosis import readings, statistical
-from beaver_ftc.diagnosis.state import N_READINGS
+from beaver_ftc.diagnosis.likelihood import N_READINGS
 from beaver_ftc.scenario.diagnosis import Bounds
 from flying import flown
 

@@ -13,7 +13,8 @@ from beaver_ftc.design.variants import response
 from beaver_ftc.diagnosis import air, error_map, scheme, statistical, thresholds
 from beaver_ftc.diagnosis.air import AIR
 from beaver_ftc.diagnosis.error_map import error_map_dtype
-from beaver_ftc.diagnosis.state import BLOCK, LOSS, NOT_ISOLATED, STATISTICS, WORST_CASE, verdict_dtype
+from beaver_ftc.diagnosis.likelihood import BLOCK
+from beaver_ftc.diagnosis.state import LOSS, NOT_ISOLATED, STATISTICS, WORST_CASE, verdict_dtype
 
 AIRCRAFT = load()
 SPAN, V = 14.63, 45.0

@@ -10,8 +10,9 @@ from kernels import DT, new_fdi
 
 from beaver_ftc.design.terms import AIRSPEED, ALPHA, BETA
 from beaver_ftc.diagnosis import across, tones, whitening
-from beaver_ftc.diagnosis.state import AN_AXIS, N_TONES, PITCH, SIDE, THE_VANE, YAW
-from beaver_ftc.diagnosis.tones import FREQUENCIES_RAD_S, MEMORY_S
+from beaver_ftc.diagnosis.across import AN_AXIS, THE_VANE
+from beaver_ftc.diagnosis.state import PITCH, SIDE, YAW
+from beaver_ftc.diagnosis.tones import FREQUENCIES_RAD_S, MEMORY_S, N_TONES
 
 CHANCE, PACE, V = 1e-11, 15.0, 45.0
 EVERY = 2  # sums of 0.04 s at DT

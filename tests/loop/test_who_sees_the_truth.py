@@ -17,7 +17,7 @@ import beaver_ftc
 from beaver_ftc.control.oracle import true_faults_dtype
 from beaver_ftc.control.state import control_dtype
 from beaver_ftc.diagnosis.belief import belief_dtype
-from beaver_ftc.diagnosis.state import diagnosis_dtype
+from beaver_ftc.diagnosis.scheme import diagnosis_dtype
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.plant.sensing import MEASURED, truth_dtype
 from beaver_ftc.scenario.given import load

@@ -142,7 +142,7 @@ def test_what_is_kept_once_a_process_is_forgotten_so_that_each_test_is_known_to_
 
 
 def test_tests_of_a_module_without_functions_are_those_of_what_imports_it():
-    watch, user = "src/beaver_ftc/diagnosis/watch.py", "src/beaver_ftc/diagnosis/state.py"
+    watch, user = "src/beaver_ftc/diagnosis/watch.py", "src/beaver_ftc/diagnosis/scheme.py"
     lines = {user: {"1": [], "150": ["b"]}, "src/beaver_ftc/design/terms.py": {"20": ["a"]}}
     found = reach.Reach([{"seconds": {}, "left_out": {}, "lines": lines}])
     assert found.of(watch, (60, 40)) == {"b"}

@@ -35,23 +35,32 @@ from beaver_ftc.compiled import kernel
 from beaver_ftc.design.terms import AIRSPEED
 from beaver_ftc.diagnosis import air, likelihood, tones
 from beaver_ftc.diagnosis.forces import SETTLED
-from beaver_ftc.diagnosis.state import (
-    AN_AXIS,
-    LATERAL,
-    LEAST_UNCERTAINTY_RAD_S2,
-    PITCH,
-    PITCH_BLOCK,
-    ROLL,
-    SIDE,
-    STEP,
-    THE_VANE,
-    YAW,
-)
+from beaver_ftc.diagnosis.likelihood import BLOCK, LATERAL, LEAST_UNCERTAINTY_RAD_S2, PITCH_BLOCK, STEP
+from beaver_ftc.diagnosis.state import PITCH, ROLL, SIDE, YAW
+from beaver_ftc.diagnosis.tones import TONES
 
 VANE_TOLERANCE = 0.1  # of what a vane's error does: its column is that of the trim
 HOLDS = 5.0  # times as long as old evidence elsewhere a force is remembered
 MOSTLY = 0.9  # of a direction of length one
 LEAST_LENGTH = 0.1  # of a column: errors larger than that are not reckoned with
+MAX_VIEWS = 16
+
+# The rates along a direction, `mix`, in a block of one axis. surface: whose column it is across,
+# AN_AXIS of none, THE_VANE of an error of the incidence. plane: of the column; tolerated: anything at all;
+# inertial: the force by an angle that no vane gave; clears: what it shows is no vane's doing; cleared_by: the
+# force of the views that clear its vane, 0 where it asks none. held: its largest score, slowly forgotten.
+# axis: that an alarm of it is said to be about. past_gust: across the rolling gust too. column: of length 1.
+AN_AXIS, THE_VANE = -1, -2
+VIEW = np.dtype(
+    [
+        ("surface", "i8"), ("axis", "i8"), ("mix", "f8", (5,)), ("plane", "i8", (2,)),
+        ("past_gust", "i8"), ("column", "f8", (5,)), ("tolerated", "i8"),
+        ("inertial", "i8"), ("clears", "i8"), ("cleared_by", "i8"),
+        ("bounded", "f8", (1,)), ("by_rates", "f8", (3,)), ("by_forces", "f8", (3,)), ("held", "f8"),
+        ("block", BLOCK), ("tones", TONES),
+    ],
+    align=True,
+)  # fmt: skip
 
 
 @kernel

@@ -32,13 +32,74 @@ alarm on they stay, and old evidence is forgotten slowly.
 
 from math import sqrt
 
+import numpy as np
+
+from beaver_ftc.aircraft.schema import MAX_TERMS_OF_ONE
 from beaver_ftc.compiled import kernel
 from beaver_ftc.diagnosis import whitening
-from beaver_ftc.diagnosis.state import ENDING, GROWING, LANES, LOSS, MAX_HYPOTHESES, N_SLOTS
+from beaver_ftc.diagnosis.state import LOSS
+
+# A block is the axes whose noise goes together: pitch, and roll with yaw, the latter twice. States of a
+# filter: what is left of the rate, then the drift. Every hypothesis is tried from every onset: that is a lane
+# of a block, and what lanes keep lies side by side for vector instructions, lane slot * MAX_HYPOTHESES +
+# hypothesis.
+PITCH_BLOCK, LATERAL, RETURNING = 0, 1, 2  # the last is the second view of roll and yaw
+N_SLOTS = 10
+N_READINGS = 5  # alpha, beta, airspeed, dynamic pressure, engine power: readings.py
+MAX_HYPOTHESES, MAX_REGRESSORS = 8, 3 * MAX_TERMS_OF_ONE + 4 + N_READINGS
+LANES = N_SLOTS * MAX_HYPOTHESES
+LEAST_UNCERTAINTY_RAD_S2 = 1e-3  # reckoned with: a bound that passes zero does not stay there
+STEP, ALPHA3, GROWING, ENDING = 2, 3, 4, 5  # further kinds of hypothesis
+# Which sign of a correlation speaks for one: a loss takes away, one that ends gives back; 0: either does.
+SENSE = {LOSS: -1.0, STEP: 0.0, ALPHA3: 0.0, GROWING: -1.0, ENDING: 1.0}
 
 PRIOR_INFORMATION = 12.0  # of a loss uniform on [0, 1]: one over its variance
 # Magnitudes of a second-order transient of damping 0.7 add up to 1.09 times its sum; on two axes to more.
 RINGING = 1.2
+
+HYPOTHESIS = np.dtype(
+    [
+        ("kind", "i8"), ("surface", "i8"), ("axis", "i8"), ("alarms", "i8"), ("column", "i8"),
+        ("signature", "f8", (2,)), ("growth_keep", "f8"),
+        ("score", "f8"), ("theta", "f8"), ("certainty", "f8"), ("at_least", "f8"), ("at_most", "f8"),
+    ],
+    align=True,
+)  # fmt: skip
+
+LANE = np.dtype(
+    [
+        ("sense", "f8", (LANES,)), ("shaped", "f8", (2, LANES)), ("response", "f8", (4, LANES)),
+        ("weight", "f8", (2, LANES)),  # S^-1 g_s of the frame
+        ("correlation", "f8", (LANES,)), ("information", "f8", (LANES,)),
+        ("overlap", "f8", (MAX_REGRESSORS, LANES)), ("slack", "f8", (LANES,)),
+        ("missing", "f8", (LANES,)),  # of a loss that grows, what is yet to come
+        ("held", "f8", (2, LANES)),  # of a loss that ends, its signature as it did
+        # what a bounded uncertainty can add to the correlation: as it stays, as it swings, at its pace
+        ("stays", "f8", (LANES,)), ("swings", "f8", (LANES,)), ("drifts", "f8", (LANES,)),
+        # what it comes to, the last three as log likelihood ratios
+        ("score", "f8", (LANES,)),
+        ("at_least", "f8", (LANES,)), ("at_most", "f8", (LANES,)), ("likelihood", "f8", (LANES,)),
+    ],
+    align=True,
+)  # fmt: skip
+
+BLOCK = np.dtype(
+    [
+        ("n", "i8"), ("axis", "i8", (2,)), ("lag", "f8"), ("keep", "f8"), ("stronger", "f8"),
+        ("state", "f8", (4,)), ("rest", "f8", (4,)), ("innovation", "f8", (2,)), ("scratch", "f8", (2,)),
+        ("P_xx", "f8", (2, 2)), ("P_xd", "f8", (2, 2)), ("P_dd", "f8", (2, 2)),
+        ("drift", "f8", (2, 2)), ("jitter", "f8", (2,)), ("noise", "f8", (2,)),
+        ("S_inverse", "f8", (2, 2)), ("K_x", "f8", (2, 2)), ("K_d", "f8", (2, 2)),
+        # alarm level; share of it that chance is given beside what is bounded; omega dt of the latter
+        ("level", "f8"), ("chance", "f8"), ("pace", "f8"), ("stay", "f8", (2,)), ("swing", "f8", (2,)),
+        ("n_regressors", "i8"), ("tolerance", "f8", (MAX_REGRESSORS,)),
+        ("regressor", "f8", (MAX_REGRESSORS, 2)), ("regressor_state", "f8", (MAX_REGRESSORS, 4)),
+        ("regressor_response", "f8", (MAX_REGRESSORS, 2)),
+        ("n_hypotheses", "i8"), ("hypothesis", HYPOTHESIS, (MAX_HYPOTHESES,)),
+        ("lane", LANE),
+    ],
+    align=True,
+)  # fmt: skip
 
 
 @kernel

@@ -14,23 +14,21 @@ from beaver_ftc.design.inertia import inertia_coefficients
 from beaver_ftc.design.terms import AIRSPEED, ALPHA, BETA, PH, QDYN, QH, RH
 from beaver_ftc.design.variants import coefficient_slopes, jacobian
 from beaver_ftc.diagnosis import gusts
+from beaver_ftc.diagnosis.across import AN_AXIS
 from beaver_ftc.diagnosis.admitted import inertia_slack, tolerances
 from beaver_ftc.diagnosis.forces import set_up_forces
-from beaver_ftc.diagnosis.readings import set_up_readings
-from beaver_ftc.diagnosis.state import (
+from beaver_ftc.diagnosis.likelihood import (
     ALPHA3,
-    AN_AXIS,
     ENDING,
     GROWING,
     LEAST_UNCERTAINTY_RAD_S2,
-    LOSS,
     N_SLOTS,
-    N_TONES,
     SENSE,
-    SIDE,
     STEP,
 )
-from beaver_ftc.diagnosis.tones import set_up_listening
+from beaver_ftc.diagnosis.readings import set_up_readings
+from beaver_ftc.diagnosis.state import LOSS, SIDE
+from beaver_ftc.diagnosis.tones import N_TONES, set_up_listening
 from beaver_ftc.diagnosis.views import (
     PRIOR_DRIFT_RAD_S2,
     Direction,

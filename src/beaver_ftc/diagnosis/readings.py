@@ -11,7 +11,7 @@ import numpy as np
 from beaver_ftc.compiled import kernel
 from beaver_ftc.design.engine import DPT_0, KW_TO_DPT, density_ratio
 from beaver_ftc.design.terms import AIRSPEED, ALPHA, BETA, DPT, PH, QDYN, RH, directional, whole_sum
-from beaver_ftc.diagnosis.state import LATERAL, N_READINGS, PITCH_BLOCK
+from beaver_ftc.diagnosis.likelihood import LATERAL, N_READINGS, PITCH_BLOCK
 from beaver_ftc.plant.instruments import NOISE_LIMIT_SIGMA
 from beaver_ftc.scenario.sensors import Sensors
 

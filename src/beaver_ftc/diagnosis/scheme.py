@@ -4,6 +4,10 @@ fdi: dtype DIAGNOSIS, belief: dtype of belief.py, measured: MEASURED. effectiven
 takes each surface for, so that what is known of a fault is no surprise; offset in rad. k: frame number, t s.
 """
 
+from functools import lru_cache
+
+import numpy as np
+
 from beaver_ftc.compiled import apart, kernel
 from beaver_ftc.design.model import AIRSPEED, ALPHA, BETA, unanticipated_pitch
 from beaver_ftc.diagnosis import (
@@ -18,8 +22,43 @@ from beaver_ftc.diagnosis import (
     statistical,
 )
 from beaver_ftc.diagnosis.belief import begin_frame, look
-from beaver_ftc.diagnosis.state import NOT_ISOLATED, STATISTICS, WORST_CASE
+from beaver_ftc.diagnosis.state import (
+    BANK,
+    ESTIMATOR,
+    FDAE,
+    FRAME_BLOCK,
+    MAX_ESTIMATORS,
+    NOT_ISOLATED,
+    PAIR,
+    STATISTICS,
+    WORST_CASE,
+    bound_dtype,
+    conclusion_dtype,
+    layout_dtype,
+)
+from beaver_ftc.diagnosis.statistical import STATISTICAL
 from beaver_ftc.diagnosis.types import examine
+from beaver_ftc.diagnosis.types.memory import surface_dtype
+from beaver_ftc.diagnosis.watch import WATCH
+
+
+@lru_cache
+def diagnosis_dtype(n: int) -> np.dtype:
+    """The diagnosis' memory for an aircraft with n surfaces."""
+    fields = [
+        ("enabled", "i8"), ("thresholds", "i8"), ("authority", "i8"), ("dt", "f8"),
+        ("bound", bound_dtype(n)), ("innovation", "f8", (3,)), ("bank", BANK), ("fdae", FDAE),
+        ("verdict", conclusion_dtype(n)), ("layout", layout_dtype(n)),
+        # the isolation estimators, and the sharpened scheme's switches
+        ("n_estimators", "i8"), ("estimator", ESTIMATOR, (MAX_ESTIMATORS,)),
+        ("forgetting", "f8"), ("fie_decay", "f8", (3,)),
+        ("memory", "i8"), ("shared", "i8"), ("membership", "i8"), ("abrupt", "i8"),
+        # faults of every type: types/
+        ("every_type", "i8"), ("whole", "i8"), ("instants", "i8"), ("returns", "i8"), ("patience", "i8"),
+        ("surface", surface_dtype(), (n,)), ("frame", "i8"), ("pair", PAIR), ("block", FRAME_BLOCK),
+        ("statistical", STATISTICAL), ("watch", WATCH),
+    ]  # fmt: skip
+    return np.dtype(fields, align=True)
 
 
 @kernel

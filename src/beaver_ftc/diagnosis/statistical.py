@@ -8,25 +8,50 @@ scheme beside it needs no probability at all. `fdi.authority` says whose alarms 
 
 import numpy as np
 
+from beaver_ftc.aircraft.schema import MAX_MONOMIALS, MAX_TERMS
 from beaver_ftc.compiled import kernel
-from beaver_ftc.design.terms import AIRSPEED, QDYN, evaluate, regressors
+from beaver_ftc.design.terms import AIRSPEED, N_SIGNALS, QDYN, evaluate, regressors
 from beaver_ftc.diagnosis import across, air, likelihood, readings, whitening
+from beaver_ftc.diagnosis.across import MAX_VIEWS, VIEW
+from beaver_ftc.diagnosis.air import AIR
 from beaver_ftc.diagnosis.error_map import UNKNOWN_TO_FILTERS_RAD_S2
-from beaver_ftc.diagnosis.state import (
+from beaver_ftc.diagnosis.forces import FORCES_FELT
+from beaver_ftc.diagnosis.likelihood import (
+    BLOCK,
     ENDING,
     GROWING,
     LATERAL,
     LEAST_UNCERTAINTY_RAD_S2,
-    LOSS,
+    N_READINGS,
     RETURNING,
     STEP,
 )
-from beaver_ftc.diagnosis.state import PITCH_BLOCK as PITCH
+from beaver_ftc.diagnosis.likelihood import PITCH_BLOCK as PITCH
+from beaver_ftc.diagnosis.state import LOSS
 from beaver_ftc.diagnosis.thresholds import uncertainty_bound
+from beaver_ftc.diagnosis.tones import LISTENING
 
 # Of what the best explanation explains, the part that a constant theta leaves to a loss that grows is larger
 # for every rate of growth (docs/theory.md, section 7).
 LEAST_PART = 0.25
+
+STATISTICAL = np.dtype(
+    [
+        ("share", "f8"),  # one over the instants in a frame
+        ("enabled", "i8"), ("alarm_level", "f8"), ("naming_level", "f8"), ("keep", "f8"),
+        ("n_columns", "i8"),  # of the log
+        ("rapidity", "f8"),  # 1/s: intensity of the drift of an uncertainty over its bound squared
+        ("bounded", "f8", (3,)), ("deflection", "f8", (3,)), ("jitter", "f8", (3,)), ("tolerated", "i8"),
+        ("n_blocks", "i8"), ("block", BLOCK, (3,)), ("n_views", "i8"), ("views", VIEW, (MAX_VIEWS,)),
+        ("forces", FORCES_FELT), ("listening", LISTENING),
+        ("air", AIR), ("inertial_air", AIR), ("terms", "f8", (MAX_TERMS,)),
+        # readings.py: whether errors of the air data count; their noise, and the jitter of all else; scratch
+        ("read", "i8"), ("reading_noise", "f8", (N_READINGS,)), ("own_jitter", "f8", (3,)),
+        ("direction", "f8", (N_SIGNALS,)), ("slope", "f8", (MAX_MONOMIALS,)), ("moved", "f8", (3,)),
+        ("score", "f8"), ("axis", "i8"), ("closest", "f8"), ("detected_at_s", "f8"),
+    ],
+    align=True,
+)  # fmt: skip
 
 
 @kernel

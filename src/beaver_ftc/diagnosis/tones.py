@@ -20,9 +20,9 @@ import numpy as np
 
 from beaver_ftc.compiled import kernel
 from beaver_ftc.design.terms import AIRSPEED, ALPHA, BETA
-from beaver_ftc.diagnosis.likelihood import share
-from beaver_ftc.diagnosis.state import N_TONES
+from beaver_ftc.diagnosis.likelihood import MAX_REGRESSORS, share
 
+N_TONES = 16
 # A memory of T s tells frequencies 1 / T apart; halfway between two of the grid 0.7 of a tone is heard.
 MEMORY_S = 2.5
 FREQUENCIES_RAD_S = np.linspace(1.0, 13.0, N_TONES)
@@ -31,6 +31,30 @@ SUMMED_S = 0.04
 # gains that stay, and those of a bound that swings do not.
 CHANCE = 0.5
 FASTER, WILD_RAD = 2.0, 0.5  # than in trim; incidences
+
+# What all views share, and what each keeps.
+LISTENING = np.dtype(
+    [
+        ("slowest", "f8"), ("fastest", "f8"),  # m/s: beyond, nothing is heard
+        ("every", "i8"), ("level", "f8"), ("keep", "f8"),  # frames; standard deviations; of a sum
+        # by the angle of a frame; by that of a sum, and twice that, times `keep`
+        ("turn", "f8", (2, N_TONES)), ("turn_kept", "f8", (2, N_TONES)), ("turn_twice", "f8", (2, N_TONES)),
+        ("heard", "f8", (N_TONES,)),  # at most, of an uncertainty within one
+        ("width", "f8", (N_TONES,)),  # larger variance of the two parts of N, of both together one
+    ],
+    align=True,
+)  # fmt: skip
+TONES = np.dtype(
+    [
+        ("count", "i8"), ("sum", "f8"), ("sums", "f8", (MAX_REGRESSORS,)),  # of frames, and of regressors
+        ("tone", "f8", (2, N_TONES)), ("overlap", "f8", (MAX_REGRESSORS, 2, N_TONES)),
+        # of |N|: what coefficients and a bounded uncertainty explain; of the latter, its size and its beat
+        ("slack", "f8", (N_TONES,)), ("room", "f8", (N_TONES,)),
+        ("steady", "f8", (N_TONES,)), ("beat", "f8", (2, N_TONES)), ("information", "f8"),
+        ("score", "f8"),  # of the loudest, as a score of likelihood.py of the same chance
+    ],
+    align=True,
+)  # fmt: skip
 
 
 @kernel

@@ -6,24 +6,10 @@ from typing import NamedTuple
 import numpy as np
 
 from beaver_ftc.aircraft import Aircraft
+from beaver_ftc.diagnosis.across import AN_AXIS, MAX_VIEWS, THE_VANE
 from beaver_ftc.diagnosis.forces import ASIDE, UP, told_by_force
-from beaver_ftc.diagnosis.state import (
-    AN_AXIS,
-    LATERAL,
-    LOSS,
-    MAX_HYPOTHESES,
-    MAX_VIEWS,
-    N_SLOTS,
-    NORMAL,
-    PITCH,
-    PITCH_BLOCK,
-    ROLL,
-    SENSE,
-    SIDE,
-    STEP,
-    THE_VANE,
-    YAW,
-)
+from beaver_ftc.diagnosis.likelihood import LATERAL, MAX_HYPOTHESES, N_SLOTS, PITCH_BLOCK, SENSE, STEP
+from beaver_ftc.diagnosis.state import LOSS, NORMAL, PITCH, ROLL, SIDE, YAW
 from beaver_ftc.scenario.diagnosis import FdiConfig
 
 PRIOR_DRIFT_RAD_S2 = 1.0  # what a drift may be at the start of a flight: soon forgotten

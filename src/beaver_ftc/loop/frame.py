@@ -28,7 +28,8 @@ from beaver_ftc.design.actuators import move
 from beaver_ftc.diagnosis import scheme
 from beaver_ftc.diagnosis.belief import belief_dtype, follow_command, look_back, respond
 from beaver_ftc.diagnosis.instruments import attend
-from beaver_ftc.diagnosis.state import diagnosis_dtype, verdict_dtype
+from beaver_ftc.diagnosis.scheme import diagnosis_dtype
+from beaver_ftc.diagnosis.state import verdict_dtype
 from beaver_ftc.loop.accounts import account, accounts_dtype, add_effect, effect_of_faults, follow_guarantee
 from beaver_ftc.loop.record import record
 from beaver_ftc.loop.rows import row_of

@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from beaver_ftc.flights.adaptation import adaptation_of
-from beaver_ftc.flights.bank import bank_of
+from beaver_ftc.flights.bank import adaptation_of, bank_of
 from beaver_ftc.flights.filtering import _later, _weights, posterior_of
 from beaver_ftc.flights.inputs import load_flights
 from flights import synthetic

@@ -1,10 +1,16 @@
-"""The hypotheses a flight is filtered under: healthy, one group of surfaces at a level, two at once, an
-unknown offset, or that nothing answers the commands at all.
+"""What the bank of filters is given: its hypotheses, what of a flight may differ from the model, the noise.
 
-What is likelier is said by the model's settings: levels seen in labelled flights, how often things change.
+The hypotheses: healthy, one group of surfaces at a level, two at once, an unknown offset, or that nothing
+answers the commands at all. What is likelier is said by the model's settings: levels seen in labelled
+flights, how often things change.
+
+Trim, gain, and each group's own gain may differ from the model. All start from it and are bounded, so that a
+fault from the start is not learnt away. The trim differs as another loading or rigging would make it (a shift
+of each group's command) and a little freely; it wanders. Gains return to the model's in time: airspeed varies
+about what it was when the model was identified.
 """
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,17 +23,20 @@ _UNKNOWN_SHARE = 0.05
 _IDLE_SHARE = 0.02
 _PAIR_LEVELS = (0.25, 0.5, 0.75)
 _HEALTHY_AT_FIRST, _IDLE_AT_FIRST = 0.7, 0.2
+_LEAST_SCALE, _LARGEST_SCALE = 0.3, 6.0
 
 
-@dataclass(frozen=True)
-class Bank:
+class Bank(NamedTuple):
     """H hypotheses. effectiveness (H, G); kind (H,); weight (H,) share of the changes that lead there, the
-    first is healthy; offset (H, 3) variance of the rates' offset that comes with it, (rad/s)2."""
+    first is healthy; offset (H, 3) variance of the rates' offset that comes with it, (rad/s)2; start (H,)
+    probability of each before the flight; change: probability of a change in a sample."""
 
     effectiveness: Floats
     kind: np.ndarray
     weight: Floats
     offset: Floats
+    start: Floats
+    change: float
 
     @property
     def idle(self) -> int:
@@ -69,7 +78,8 @@ def bank_of(model: Model) -> Bank:
     rows.append((np.zeros(count), IDLE, _IDLE_SHARE, np.zeros(3)))
     effectiveness, kind, weight, offset = (np.array(column) for column in zip(*rows, strict=True))
     weight[1:] *= (1.0 - settings.repair_share) / weight[1:].sum()
-    return Bank(effectiveness, kind, weight, offset)
+    change = settings.changes_per_hour / (3600.0 * model.rate_hz)
+    return Bank(effectiveness, kind, weight, offset, _at_first(kind, weight), change)
 
 
 def _with(count: int, levels: dict[int, float]) -> Floats:
@@ -121,10 +131,68 @@ def _pairs(count: int) -> list[tuple[Floats, int, float, Floats]]:
     ]
 
 
-def at_first(bank: Bank) -> Floats:
+def _at_first(kind: np.ndarray, weight: Floats) -> Floats:
     """Probability of each hypothesis before the flight, (H,): mostly healthy, any fault allowed."""
-    faults = (bank.kind != HEALTHY) & (bank.kind != IDLE)
-    start = bank.weight * (1.0 - _HEALTHY_AT_FIRST - _IDLE_AT_FIRST) / bank.weight[faults].sum()
+    faults = (kind != HEALTHY) & (kind != IDLE)
+    start = weight * (1.0 - _HEALTHY_AT_FIRST - _IDLE_AT_FIRST) / weight[faults].sum()
     start[0] = _HEALTHY_AT_FIRST
-    start[bank.idle] = _IDLE_AT_FIRST
+    start[-1] = _IDLE_AT_FIRST
     return np.asarray(start)
+
+
+class Adaptation(NamedTuple):
+    """Of the N = 4 + G states: trim (3,) rad/s a sample, gain, own gain of each group.
+
+    mean (N,) and covariance (N, N) before the flight; bound (N,) on the distance from the mean; keep (N,)
+    share of that distance left a sample later; walk (N,) variance added a sample.
+    """
+
+    mean: Floats
+    covariance: Floats
+    bound: Floats
+    keep: Floats
+    walk: Floats
+
+
+def adaptation_of(model: Model) -> Adaptation:
+    """The bounds of adaptation that a model's settings say."""
+    settings, groups = model.settings, len(model.groups)
+    _, _, response, noise = model.arrays()
+    variance = np.diag(noise)
+    shift = response.sum(axis=1) * settings.trim_shift
+    covariance = np.zeros((4 + groups, 4 + groups))
+    covariance[:3, :3] = np.diag(variance * settings.trim_sd**2) + shift.T @ shift
+    covariance[3, 3] = settings.gain_sd**2
+    covariance[range(4, 4 + groups), range(4, 4 + groups)] = settings.own_gain_sd**2
+    times_s = np.array([np.inf] * 3 + [settings.gain_time_s] + [settings.own_gain_time_s] * groups)
+    keep = np.exp(-1.0 / (model.rate_hz * times_s))
+    walk = (1.0 - keep**2) * np.diag(covariance)
+    walk[:3] = variance * np.array(settings.trim_walk) ** 2
+    reach = np.array([settings.trim_bound] * 3 + [settings.gain_bound] * (1 + groups))
+    mean = np.array([0.0, 0.0, 0.0, 1.0] + [0.0] * groups)
+    return Adaptation(mean, covariance, np.sqrt(np.diag(covariance)) * reach, keep, walk)
+
+
+class Noise(NamedTuple):
+    """What of a sample is noise.
+
+    constant (3,) of the model, rad/s; covariance (3, 3) of a sample, (rad/s)2; power: share of a white
+    residual's information in this one; tail: degrees of freedom of its t distribution; memory in samples, and
+    least and largest value, of the running scale of the covariance.
+    """
+
+    constant: Floats
+    covariance: Floats
+    power: float
+    tail: float
+    memory: float
+    least: float
+    largest: float
+
+
+def noise_of(model: Model) -> Noise:
+    """The noise that a model's settings say."""
+    settings = model.settings
+    constant, _, _, covariance = model.arrays()
+    memory = settings.noise_memory_s * model.rate_hz
+    return Noise(constant, covariance, settings.power, settings.tail, memory, _LEAST_SCALE, _LARGEST_SCALE)

@@ -1,19 +1,36 @@
-"""A flight through the bank of filters, once for each delay it may have; the likelier delay counts more."""
+"""A flight through the bank of filters: causal, one pass, all hypotheses at once.
+
+Under hypothesis h with effectiveness e_h of the groups, what the past does not explain of the rates is
+
+    y = c + s (b + sum_g e_hg F_g) + sum_g d_g e_hg F_g + noise,      noise ~ t(0, r R)
+
+with the model's constant b, and of the flight its own trim c (3,), gain s, and what each group has more of it
+than the others, d (G,): each hypothesis estimates them by a Kalman filter. r is the running scale of the
+noise. The gain acts on what a trimmed flight balances: it shows by the motion alone, as dynamic pressure
+does, and not in the trim. A hypothesis passes to another at random
+times (interacting multiple models [Blom1988]): the one that takes over inherits trim and gain, plus an offset
+where a surface may be stuck. The last hypothesis says that nothing answers the commands, as on the ground: it
+learns no trim and no gain.
+
+This is done once for each delay the flight may have; the likelier delay counts more.
+"""
 
 from dataclasses import replace
 
 import numpy as np
 
-from beaver_ftc.flights.adaptation import adaptation_of
-from beaver_ftc.flights.bank import Bank, at_first
-from beaver_ftc.flights.kernel import run_bank
+from beaver_ftc.compiled import kernel
+from beaver_ftc.flights.bank import Bank, adaptation_of, noise_of
 from beaver_ftc.flights.model import Model
 from beaver_ftc.flights.recording import Floats
 from beaver_ftc.flights.regressors import build, group_indices, predict
 from beaver_ftc.flights.samples import Samples
 
-_LEAST_SCALE, _MOST_SCALE = 0.3, 6.0
 _DELAY_MEMORY_S = 600.0
+_FLOOR = 1e-15
+_CLIP = 3.0
+_EXPECTED = 0.93
+"""Mean of the clipped square of a residual per axis when the scale is right."""
 
 
 def posterior_of(samples: Samples, model: Model, bank: Bank) -> tuple[Floats, Floats, Floats]:
@@ -55,28 +72,214 @@ def _weights(evidence: list[Floats], rate_hz: float) -> Floats:
 def _filtered(samples: Samples, model: Model, bank: Bank) -> tuple[Floats, Floats, Floats, Floats]:
     """As the kernel gives it."""
     regressors = build(samples, group_indices(model), model.history, model.lags, scaled=False)
-    intercept, past, response, noise = model.arrays()
-    settings, own = model.settings, adaptation_of(model)
-    unexplained, answers = predict(samples.rates, regressors, past, response)
-    change = settings.changes_per_hour / (3600.0 * model.rate_hz)
-    memory = settings.noise_memory_s * model.rate_hz
+    _, past, response, _ = model.arrays()
+    unexplained, answers = (
+        np.ascontiguousarray(np.nan_to_num(part))
+        for part in predict(samples.rates, regressors, past, response)
+    )
     found: tuple[Floats, Floats, Floats, Floats] = run_bank(
-        np.ascontiguousarray(np.nan_to_num(unexplained)),
-        np.ascontiguousarray(np.nan_to_num(answers)),
-        intercept,
-        regressors.ok,
-        bank.effectiveness,
-        change * bank.weight,
-        1.0 - change,
-        bank.offset,
-        bank.idle,
-        at_first(bank),
-        own.mean,
-        own.covariance,
-        own.bound,
-        own.keep,
-        own.walk,
-        noise,
-        (settings.power, settings.tail, memory, _LEAST_SCALE, _MOST_SCALE),
+        unexplained, answers, regressors.ok, bank, adaptation_of(model), noise_of(model)
     )
     return found
+
+
+@kernel
+def run_bank(y, f, ok, bank, own, noise):
+    """Posterior probability of each hypothesis, mean trim and gain, noise scale, and evidence, by sample.
+
+    Evidence is the log likelihood of the sample given all before it, raised to the power.
+
+    Shapes: y (n, 3); f (n, G, 3) responses; ok (n,) the sample may be used. bank: Bank, own: Adaptation,
+    noise: Noise (bank.py).
+    """
+    n, hypotheses, states = len(y), len(bank.weight), len(own.mean)
+    idle = hypotheses - 1
+    mu = bank.start.copy()
+    m = np.zeros((hypotheses, states))
+    p = np.zeros((hypotheses, states, states))
+    for h in range(hypotheses):
+        m[h] = own.mean
+        p[h] = own.covariance
+    posterior = np.zeros((n, hypotheses))
+    trim = np.zeros((n, states))
+    scales = np.zeros(n)
+    evidence = np.zeros(n)
+    scale = 1.0
+    for k in range(n):
+        prior = _mix(mu, m, p, bank, own.walk)
+        _relax(m, p, own)
+        _forget(m[idle], p[idle], own)
+        if ok[k]:
+            mu, square, evidence[k] = _correct(prior, m, p, y[k], f[k], bank, noise, scale)
+            _bound(m, own)
+            scale *= np.exp((1.0 - mu[idle]) * (square / 3.0 - _EXPECTED) / noise.memory)
+            scale = min(max(scale, noise.least), noise.largest)
+        else:
+            mu = prior
+        posterior[k] = mu
+        scales[k] = scale
+        for h in range(hypotheses):
+            trim[k] += mu[h] * m[h]
+    return posterior, trim, scales, evidence
+
+
+@kernel
+def _mix(mu, m, p, bank, walk):
+    """Let each hypothesis pass to any other; m and p are replaced, the prior probabilities returned."""
+    hypotheses, states = m.shape
+    stay = 1.0 - bank.change
+    mean = np.zeros(states)
+    spread = np.zeros((states, states))
+    for h in range(hypotheses):
+        for i in range(states):
+            mean[i] += mu[h] * m[h, i]
+    for h in range(hypotheses):
+        for i in range(states):
+            for j in range(states):
+                spread[i, j] += mu[h] * (p[h, i, j] + (m[h, i] - mean[i]) * (m[h, j] - mean[j]))
+    prior = np.empty(hypotheses)
+    total = 0.0
+    for h in range(hypotheses):
+        prior[h] = stay * mu[h] + bank.change * bank.weight[h]
+        total += prior[h]
+        _merge(stay * mu[h] / prior[h], m[h], p[h], mean, spread, bank.offset[h], walk)
+    return prior / total
+
+
+@kernel
+def _merge(own, m, p, mean, spread, offset, walk):
+    """One Gaussian for two: the hypothesis' own (m, p) with weight `own`, everyone's with the rest.
+
+    m (N,) and p (N, N) are replaced; who comes from elsewhere brings the offset (3,) along.
+    """
+    rest = 1.0 - own
+    for i in range(len(m)):
+        for j in range(len(m)):
+            between = (m[i] - mean[i]) * (m[j] - mean[j])
+            p[i, j] = own * p[i, j] + rest * spread[i, j] + own * rest * between
+    for i in range(len(m)):
+        m[i] = own * m[i] + rest * mean[i]
+        p[i, i] += walk[i]
+    for i in range(len(offset)):
+        p[i, i] += rest * offset[i]
+
+
+@kernel
+def _relax(m, p, own):
+    """Let all trims and gains return towards the model's; m (H, N) and p (H, N, N) are replaced."""
+    m0, keep = own.mean, own.keep
+    for h in range(len(m)):
+        for i in range(len(m0)):
+            m[h, i] = m0[i] + keep[i] * (m[h, i] - m0[i])
+            for j in range(len(m0)):
+                p[h, i, j] *= keep[i] * keep[j]
+
+
+@kernel
+def _correct(prior, m, p, y, f, bank, noise, scale):
+    """Kalman correction of every hypothesis by one sample; m and p are replaced.
+
+    Returns the posterior probabilities, the clipped square of the residual under them, and the evidence.
+    """
+    hypotheses, states = m.shape
+    log = np.empty(hypotheses)
+    squares = np.empty(hypotheses)
+    nothing, certain = np.zeros(states), np.zeros((states, states))
+    covariance, dof = noise.covariance * scale, noise.tail
+    for h in range(hypotheses):
+        seen = _seen(bank.effectiveness[h], f, noise.constant, states)
+        if h == hypotheses - 1:
+            squares[h], log_det = _update(nothing, certain, y, seen, covariance, dof)
+        else:
+            squares[h], log_det = _update(m[h], p[h], y, seen, covariance, dof)
+        log[h] = noise.power * (-0.5 * (dof + 3.0) * np.log(1.0 + squares[h] / dof) - 0.5 * log_det)
+    most = log.max()
+    mu = np.maximum(prior * np.exp(log - most), _FLOOR)
+    total = mu.sum()
+    mu /= total
+    clipped = 0.0
+    for h in range(hypotheses):
+        clipped += mu[h] * min(squares[h], 3.0 * _CLIP)
+    return mu, clipped, most + np.log(total)
+
+
+@kernel
+def _seen(e, f, base, states):
+    """How the rates show the states, (N, 3): trim, the gain of the constant and of all groups' answers f
+    (G, 3), each as effective as e (G,) says, and of each group's own."""
+    seen = np.zeros((states, 3))
+    for i in range(3):
+        seen[i, i] = 1.0
+        seen[3, i] = base[i]
+        for g in range(len(e)):
+            seen[3, i] += e[g] * f[g, i]
+            seen[4 + g, i] = e[g] * f[g, i]
+    return seen
+
+
+@kernel
+def _forget(m, p, own):
+    """Trim and gain as before any flight: while nothing answers, nothing is learnt."""
+    for i in range(len(m)):
+        m[i] = own.mean[i]
+        for j in range(len(m)):
+            p[i, j] = own.covariance[i, j]
+
+
+@kernel
+def _bound(m, own):
+    """Keep every hypothesis' trim and gain near those of the model: a fault is not to be learnt away."""
+    m0, bound = own.mean, own.bound
+    for h in range(len(m)):
+        for i in range(len(m0)):
+            m[h, i] = min(max(m[h, i], m0[i] - bound[i]), m0[i] + bound[i])
+
+
+@kernel
+def _update(m, p, y, seen, noise, dof):
+    """Correct one Gaussian (m (N,), p (N, N), replaced) by y (3,) = seen' m + noise, seen (N, 3).
+
+    Returns the square of the residual in its own covariance, and the log determinant of that. A residual far
+    out in the tail of the t distribution counts less.
+    """
+    states = len(m)
+    cross = np.zeros((states, 3))
+    s = noise.copy()
+    v = y.copy()
+    for i in range(states):
+        for j in range(3):
+            v[j] -= m[i] * seen[i, j]
+            for k in range(states):
+                cross[i, j] += p[i, k] * seen[k, j]
+    for i in range(states):
+        for j in range(3):
+            for k in range(3):
+                s[j, k] += seen[i, j] * cross[i, k]
+    inverse, determinant = _inverse(s)
+    gain = np.zeros((states, 3))
+    square = 0.0
+    for j in range(3):
+        for k in range(3):
+            square += v[j] * inverse[j, k] * v[k]
+            for i in range(states):
+                gain[i, j] += cross[i, k] * inverse[k, j]
+    weight = min(1.0, (dof + 3.0) / (dof + square))
+    for i in range(states):
+        for j in range(3):
+            m[i] += weight * gain[i, j] * v[j]
+            for k in range(states):
+                p[i, k] -= weight * gain[i, j] * cross[k, j]
+    return square, np.log(determinant)
+
+
+@kernel
+def _inverse(s):
+    """Inverse and determinant of a symmetric (3, 3) matrix, by its cofactors."""
+    c = np.empty((3, 3))
+    for i in range(3):
+        for j in range(3):
+            a, b = (i + 1) % 3, (i + 2) % 3
+            d, e = (j + 1) % 3, (j + 2) % 3
+            c[j, i] = s[a, d] * s[b, e] - s[a, e] * s[b, d]
+    determinant = s[0, 0] * c[0, 0] + s[0, 1] * c[1, 0] + s[0, 2] * c[2, 0]
+    return c / determinant, determinant

@@ -41,7 +41,7 @@ def _write_first_figure(docs: Path) -> Path:
 
 
 def _write_reproduction(docs: Path) -> Iterator[Path]:
-    from beaver_ftc.studies.engine.flown import fly_all
+    from beaver_ftc.studies.engine.study import fly_all
     from beaver_ftc.studies.reproduce.document import document_of, fly_published
     from beaver_ftc.studies.reproduce.figures import write_figures
     from beaver_ftc.studies.reproduce.margins import write_margins

@@ -33,8 +33,8 @@ from beaver_ftc.documents.errors import BadInput, BeaverFtcError
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.engine.columns import Columns
-from beaver_ftc.studies.engine.flown import Progress, flown
 from beaver_ftc.studies.engine.statistics import quantile
+from beaver_ftc.studies.engine.study import Progress, flown
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -159,7 +159,9 @@ def run_survey(
     speeds_mps = speeds_mps or speeds_of(scenario.airframe)
     altitudes_m = altitudes_m or altitudes_of(scenario.airframe)
     grid = list(product(speeds_mps, altitudes_m, excitations))
-    points = flown(out / name, grid, partial(_point, scenario), list[Row], asked=scenario, progress=progress)
+    points = flown(
+        out / name, grid, partial(_point, scenario), list[Row], follows_from=scenario, progress=progress
+    )
     with points as found, result_folder(out, name) as folder:
         rows = [row for point in found for row in point]
         write(folder, scenario.name, rows)

@@ -24,8 +24,8 @@ from beaver_ftc.design.model import QDYN
 from beaver_ftc.design.variants import jacobian
 from beaver_ftc.diagnosis.state import PITCH, ROLL, YAW
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.studies.engine.words import aligned
 from beaver_ftc.studies.linear_systems import held_over_frame
+from beaver_ftc.studies.present.tables import aligned
 
 if TYPE_CHECKING:
     from beaver_ftc.plant.linear import LinearModel

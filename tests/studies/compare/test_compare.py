@@ -16,7 +16,6 @@ from beaver_ftc.loop.loop import Loop
 from beaver_ftc.plugins import plugin_class
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.compare.document import better_than_ours, document_of
-from beaver_ftc.studies.compare.figure import write_figure
 from beaver_ftc.studies.compare.flights import (
     CALIBRATION,
     CALIBRATION_ERRORS,
@@ -25,8 +24,9 @@ from beaver_ftc.studies.compare.flights import (
     of_sweep,
     set_names,
 )
-from beaver_ftc.studies.compare.page import MARK, write_leaderboard, write_page
+from beaver_ftc.studies.compare.page import MARK, write_leaderboard
 from beaver_ftc.studies.compare.replay import Trace
+from beaver_ftc.studies.compare.run import files_of
 from beaver_ftc.studies.compare.runs import figure_of, read_runs
 from beaver_ftc.studies.compare.table import CONTROL, DIAGNOSIS, as_text
 from beaver_ftc.studies.compare.trial import LAW, ORACLE, SCHEME, Entry, entries_of, fly_case, with_entry
@@ -38,7 +38,8 @@ from beaver_ftc.studies.compare.tune import (
     alarm_level,
     candidates,
 )
-from beaver_ftc.studies.engine.flown import fly_all
+from beaver_ftc.studies.engine.study import fly_all
+from beaver_ftc.studies.present.files import write_files
 from flying import scenario
 
 BEAVER = Path(sys.executable).with_name("beaver-ftc")
@@ -165,10 +166,9 @@ def test_a_set_without_faults_can_be_drawn(tmp_path):
     document = document_of([fly_case(Case("healthy", scenario), entries)], entries)
     row = document["sets"]["healthy"]["lines"][0]
     assert (row["detection_rate"], row["false_alarms_per_h"]) == (None, 0.0)
-    write_figure(document, tmp_path / "figure.png")
-    write_page(document, tmp_path / "figure.png", tmp_path / "page.html", "Still")
+    write_files(tmp_path, files_of(document, "still"))
     assert as_text(document)
-    assert "Still" in (tmp_path / "page.html").read_text()
+    assert "Comparison: still" in (tmp_path / "comparison.html").read_text()
 
 
 def test_what_is_better_than_ours_is_said_and_nothing_else():

@@ -7,7 +7,7 @@ from typing import Any
 from beaver_ftc.results.metrics import versions
 from beaver_ftc.studies.compare.tally import Line, Point, lines_of, matched, trade_off
 from beaver_ftc.studies.compare.trial import LAW, ORACLE, SCHEME, Entry, Trial
-from beaver_ftc.studies.engine.words import finite
+from beaver_ftc.studies.present.tables import finite
 
 Document = dict[str, Any]
 

@@ -1,47 +1,37 @@
 """The comparison as one figure: a row a set; what a false alarm buys, how soon, and how well the laws
 track."""
 
-from pathlib import Path
 from typing import Any
 
-from beaver_ftc.results.looks import BLUE, GREY, SERIES
+from beaver_ftc.results.looks import BLUE, GREY
 from beaver_ftc.studies.compare.trial import LAW, ORACLE, SCHEME
+from beaver_ftc.studies.present.figures import curve_look, marker, panels
 
 Document = dict[str, Any]
 
-DASHES: tuple[Any, ...] = ("-", (0, (5, 2)), (0, (2, 2)), (0, (6, 2, 1, 2)), (0, (1, 1)))
-MARKS = "osD^vPX*"
 
-
-def write_figure(document: Document, path: Path) -> None:
-    """Draw the document into a PNG."""
-    from matplotlib.figure import Figure
-
+def figure_of(document: Document) -> Any:
+    """A row a set."""
     sets = document["sets"]
-    figure = Figure(figsize=(13.0, 3.4 * len(sets)), layout="constrained")
-    axes = figure.subplots(len(sets), 3, squeeze=False)
+    figure, axes = panels(len(sets), 3, 13.0, 3.4 * len(sets), dpi=120)
     for row, (name, part) in zip(axes, sets.items(), strict=True):
         _draw_curves(row[0], row[1], part)
         _draw_ratios(row[2], part)
         row[0].set_title(f"{name}: {part['flights']} flights", loc="left", fontsize=10)
     axes[0][0].legend(fontsize=7)
-    figure.savefig(path, dpi=120)
-
-
-def _look(index: int) -> dict[str, Any]:
-    return {"color": SERIES[index % len(SERIES)], "linestyle": DASHES[index % len(DASHES)]}
+    return figure
 
 
 def _draw_curves(rate: Any, delay: Any, part: Document) -> None:
     for index, (scheme, points) in enumerate(part["trade_off"].items()):
-        look = _look(index)
+        look = curve_look(index)
         alarms = [point["false_alarms_per_h"] for point in points]
         own = next(point for point in points if point["level"] == 1.0)
         for axis, key in ((rate, "detection_rate"), (delay, "delay_median_s")):
             values = [float("nan") if point[key] is None else point[key] for point in points]
             axis.plot(alarms, values, label=scheme, drawstyle="steps-post", **look)
             if own[key] is not None:
-                axis.plot(own["false_alarms_per_h"], own[key], MARKS[index % len(MARKS)], color=look["color"])
+                axis.plot(own["false_alarms_per_h"], own[key], marker(index), color=look["color"])
     for axis, label in ((rate, "detection rate"), (delay, "median detection delay, s")):
         axis.set_xlabel("false alarms per hour")
         axis.set_ylabel(label)

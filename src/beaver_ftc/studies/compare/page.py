@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from beaver_ftc.studies.compare.table import sections
-from beaver_ftc.studies.engine import page
+from beaver_ftc.studies.present import page
 
 Document = dict[str, Any]
 
@@ -15,14 +15,15 @@ _SAYS = (
     "Lines in the figure run over all alarm levels of a scheme's statistic, on flights under the nominal "
     "law; the mark is the level it ships with."
 )
+_STEM = "comparison"
 _FIGURE = "Detection rate and delay against false alarms, and tracking against the oracle"
 
 
-def write_page(document: Document, figure: Path, path: Path, title: str) -> None:
-    """Write the page; the figure goes into it."""
+def page_of(document: Document, title: str, folder: Path) -> str:
+    """The page; the figure in the folder goes into it."""
     versions = page.versions_line(document["versions"])
-    parts = [_SAYS, page.Pictures([(_FIGURE, figure.stem)]), *_sets(document), versions]
-    path.write_text(page.as_html(title, parts, {figure.stem: figure}), encoding="utf-8")
+    parts = [_SAYS, page.Pictures([(_FIGURE, _STEM)]), *_sets(document), versions]
+    return page.as_html(title, parts, {_STEM: folder / f"{_STEM}.png"})
 
 
 def write_leaderboard(document: Document, path: Path) -> None:

@@ -5,10 +5,14 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from beaver_ftc.results.metrics import as_json
 from beaver_ftc.studies.compare.document import document_of
+from beaver_ftc.studies.compare.figure import figure_of
 from beaver_ftc.studies.compare.flights import Case
+from beaver_ftc.studies.compare.page import page_of
 from beaver_ftc.studies.compare.trial import Entry, Trial, fly_case
-from beaver_ftc.studies.engine.flown import Progress, flown
+from beaver_ftc.studies.engine.study import Progress, Study, run_study
+from beaver_ftc.studies.present.files import Files
 
 Document = dict[str, Any]
 
@@ -22,19 +26,20 @@ def run_comparison(
     progress: Progress | None = None,
 ) -> Document:
     """Write `out/<name>/` (document, figure, page) of every case with every entry; return the document."""
-    from beaver_ftc.results.metrics import as_json
-    from beaver_ftc.results.writer import result_folder
-    from beaver_ftc.studies.compare.figure import write_figure
-    from beaver_ftc.studies.compare.page import write_page
+    study = Study(
+        name, cases, partial(fly_case, entries=tuple(entries)), partial(document_of, entries=entries),
+        partial(files_of, name=name), row=Trial, follows_from=entries, lost=lost,
+    )  # fmt: skip
+    return run_study(study, out, workers, progress)
 
-    work = partial(fly_case, entries=tuple(entries))
-    fly = flown(out / name, cases, work, Trial, asked=entries, workers=workers, progress=progress, lost=lost)
-    with fly as trials, result_folder(out, name) as folder:
-        document = document_of(trials, entries)
-        (folder / "comparison.json").write_text(as_json(document), encoding="utf-8")
-        write_figure(document, folder / "comparison.png")
-        write_page(document, folder / "comparison.png", folder / "comparison.html", f"Comparison: {name}")
-    return document
+
+def files_of(document: Document, name: str) -> Files:
+    """Document, figure and page."""
+    return {
+        "comparison.json": as_json(document),
+        "comparison.png": figure_of(document),
+        "comparison.html": partial(page_of, document, f"Comparison: {name}"),
+    }
 
 
 def lost(case: Any, why: str) -> Trial:

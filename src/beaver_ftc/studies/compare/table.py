@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from beaver_ftc.studies.compare.trial import LAW, SCHEME
-from beaver_ftc.studies.engine.words import aligned
+from beaver_ftc.studies.present.tables import aligned
 
 Document = dict[str, Any]
 Cell = Callable[[Document, Document], str]

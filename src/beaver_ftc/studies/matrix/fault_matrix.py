@@ -13,7 +13,7 @@ import numpy as np
 
 from beaver_ftc.aircraft import AXES, DEFAULT, Aircraft, load
 from beaver_ftc.scenario.environment import air_of
-from beaver_ftc.studies.engine.flown import Progress, flown
+from beaver_ftc.studies.engine.study import Progress, flown
 from beaver_ftc.studies.matrix.told import columns_of, told
 
 if TYPE_CHECKING:

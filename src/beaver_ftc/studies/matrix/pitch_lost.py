@@ -13,7 +13,7 @@ import numpy as np
 
 from beaver_ftc.scenario.control import EnginePower
 from beaver_ftc.studies.engine.columns import Columns
-from beaver_ftc.studies.engine.flown import Progress, flown
+from beaver_ftc.studies.engine.study import Progress, flown
 from beaver_ftc.studies.linear_systems import zeros
 from beaver_ftc.studies.matrix.fault_matrix import AIRSPEEDS_MPS, AT_S, REFERENCE, UNCERTAINTY, trimmed_deg
 

@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from beaver_ftc.studies.engine.words import finite
 from beaver_ftc.studies.mismatch.bound import Guarantee, Recommendation
 from beaver_ftc.studies.mismatch.sources import SOURCES
 from beaver_ftc.studies.mismatch.split import UNEXPLAINED
 from beaver_ftc.studies.mismatch.states import AXES
 from beaver_ftc.studies.mismatch.tally import TOTAL, AxisBound, Figures, Tally
+from beaver_ftc.studies.present.tables import finite
 
 if TYPE_CHECKING:
     from beaver_ftc.scenario.schema import Scenario

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.studies.engine.flown import Progress, flown
+from beaver_ftc.studies.engine.study import Progress, flown
 from beaver_ftc.studies.mismatch.document import Document, document, write_csv
 from beaver_ftc.studies.mismatch.figures import AXIS_NAMES, largest_sources, new_figure, save
 from beaver_ftc.studies.mismatch.run import refuse_other_aircraft
@@ -39,7 +39,12 @@ def run_map(
     name = map_name(scenario)
     conditions = [(V, h) for h in ALTITUDES_M for V in AIRSPEEDS_MPS]
     cells = flown(
-        out / name, conditions, partial(_cell, scenario), list[Document], asked=scenario, progress=progress
+        out / name,
+        conditions,
+        partial(_cell, scenario),
+        list[Document],
+        follows_from=scenario,
+        progress=progress,
     )
     with cells as rows, result_folder(out, name) as folder:
         entries = [entry for row in rows for entry in row]

@@ -5,9 +5,9 @@ import json
 from html import escape
 from pathlib import Path
 
-from beaver_ftc.studies.engine.words import html_table
 from beaver_ftc.studies.mismatch.document import Document
 from beaver_ftc.studies.mismatch.text import findings, tables
+from beaver_ftc.studies.present.tables import html_table
 
 PICTURES = {
     "mismatch-sources": "What the mismatch is made of, in time",

@@ -1,9 +1,9 @@
 """The mismatch as tables for the terminal."""
 
-from beaver_ftc.studies.engine.words import number, plain, printed, seconds
 from beaver_ftc.studies.mismatch.document import Document
 from beaver_ftc.studies.mismatch.states import AXES
 from beaver_ftc.studies.mismatch.words import label, percent
+from beaver_ftc.studies.present.tables import number, plain, printed, seconds
 
 WIDTH = 150
 

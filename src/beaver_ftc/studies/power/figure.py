@@ -6,11 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from beaver_ftc.results.looks import SERIES
-from beaver_ftc.studies.compare.figure import DASHES, MARKS
 from beaver_ftc.studies.power.document import JUDGED_S
 from beaver_ftc.studies.power.tally import Row, grouped, limit, summary
 from beaver_ftc.studies.power.text import TOLD, title_of
+from beaver_ftc.studies.present.figures import curve_look, marker
 
 Document = dict[str, Any]
 FORMATS = ("png", "svg")
@@ -130,9 +129,8 @@ def _draw(panel: Any, rows: Sequence[Row], schemes: Sequence[str]) -> None:
         panel.plot(
             *zip(*points, strict=True) if points else ([], []),
             label=scheme,
-            color=SERIES[place % len(SERIES)],
-            linestyle=DASHES[place % len(DASHES)],
-            marker=MARKS[place % len(MARKS)],
+            marker=marker(place),
+            **curve_look(place),
             markersize=5,
             linewidth=1.6,
         )

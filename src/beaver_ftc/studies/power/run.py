@@ -5,7 +5,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from beaver_ftc.studies.engine.flown import Progress, flown
+from beaver_ftc.studies.engine.study import Progress, flown
 from beaver_ftc.studies.power.contenders import Contender
 from beaver_ftc.studies.power.document import document_of
 from beaver_ftc.studies.power.flying import Watched, fly_faulted, fly_healthy
@@ -30,7 +30,7 @@ def run_power(
     work, count = partial(_fly_one, grid=grid, schemes=schemes), len(grid.healthy())
     asked = grid, schemes
     study = flown(
-        out / NAME, bouts, work, Watched, asked=asked, workers=workers, progress=progress, lost=_lost
+        out / NAME, bouts, work, Watched, follows_from=asked, workers=workers, progress=progress, lost=_lost
     )
     with study as watched, result_folder(out, NAME) as folder:
         document, rows = document_of(grid, watched[:count], watched[count:])

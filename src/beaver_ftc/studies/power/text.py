@@ -2,10 +2,10 @@
 
 from typing import Any
 
-from beaver_ftc.studies.engine.words import plain, printed
 from beaver_ftc.studies.power.contenders import BUILT_IN
 from beaver_ftc.studies.power.document import JUDGED_S, SIGNIFICANT
 from beaver_ftc.studies.power.grid import WITHIN_S
+from beaver_ftc.studies.present.tables import plain, printed
 
 Document = dict[str, Any]
 WIDTH = 140

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import asdict
 
 from beaver_ftc.results.metrics import Document, versions
-from beaver_ftc.studies.engine.words import finite
+from beaver_ftc.studies.present.tables import finite
 from beaver_ftc.studies.reproduce.cases import BESIDE, PUBLISHED, Flown, fly_case
 from beaver_ftc.studies.reproduce.choices import CHOICES
 from beaver_ftc.studies.reproduce.claims import CLAIMS, Claim

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from beaver_ftc.results.metrics import Document
-from beaver_ftc.studies.engine import page
+from beaver_ftc.studies.present import page
 from beaver_ftc.studies.reproduce import margins, words
 from beaver_ftc.studies.reproduce.figures import FIGURES
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from beaver_ftc.results.metrics import Document, as_json
 from beaver_ftc.results.writer import result_folder
-from beaver_ftc.studies.engine.flown import Progress, flown
+from beaver_ftc.studies.engine.study import Progress, flown
 from beaver_ftc.studies.reproduce.document import document_of, fly_published
 from beaver_ftc.studies.reproduce.figures import write_figures
 from beaver_ftc.studies.reproduce.margins import write_margins

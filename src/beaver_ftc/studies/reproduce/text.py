@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING
 
 from beaver_ftc.results.metrics import Document
-from beaver_ftc.studies.engine.words import printed
+from beaver_ftc.studies.present.tables import printed
 from beaver_ftc.studies.reproduce import words
 
 if TYPE_CHECKING:

@@ -5,7 +5,7 @@ Everything is said from the summary document, so that the words and `summary.jso
 
 from typing import TYPE_CHECKING, Any
 
-from beaver_ftc.studies.engine.words import number, printed
+from beaver_ftc.studies.present.tables import number, printed
 from beaver_ftc.studies.sweep.table import AXES
 
 if TYPE_CHECKING:

@@ -18,8 +18,8 @@ from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.studies.engine.campaign import Batch, Batches
 from beaver_ftc.studies.engine.crew import Work
 from beaver_ftc.studies.engine.files import write_whole
-from beaver_ftc.studies.engine.flown import conduct as fly_missing
 from beaver_ftc.studies.engine.identity import fingerprint
+from beaver_ftc.studies.engine.study import conduct as fly_missing
 from beaver_ftc.studies.verify.draw import HEALTHY_S, Draw
 from beaver_ftc.studies.verify.fly import SCHEMES, STEPS, Row, fly_draw
 

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from beaver_ftc.studies.engine.statistics import CONFIDENCE, binomial_upper, poisson_bound, quantile
-from beaver_ftc.studies.engine.words import finite, number
+from beaver_ftc.studies.present.tables import finite, number
 from beaver_ftc.studies.verify.fly import SCHEMES, SHARPENED, STEPS, Row
 
 PROMISES = ("false_alarms", "true_fault_exclusions", "wrong_isolations", "late_detections")

@@ -2,7 +2,7 @@
 
 import pytest
 
-from beaver_ftc.studies.engine import words
+from beaver_ftc.studies.present import tables
 
 
 @pytest.mark.parametrize(
@@ -17,41 +17,41 @@ from beaver_ftc.studies.engine import words
     ],
 )  # fmt: skip
 def test_a_number_has_the_digits_worth_reading_and_no_exponent(value, digits, said):
-    assert words.number(value, digits=digits) == said
+    assert tables.number(value, digits=digits) == said
 
 
 def test_units_follow_and_what_is_missing_has_a_word_of_its_own():
-    assert words.number(1.5, "deg/s") == "1.5 deg/s"
-    assert words.number(None, "deg/s", none="never") == "never"
-    assert words.seconds(1.234) == "1.23 s"
-    assert words.seconds(None) == "never"
-    assert [words.finite(x) for x in (1.5, float("inf"), "inf", 3)] == [1.5, None, "inf", 3]
+    assert tables.number(1.5, "deg/s") == "1.5 deg/s"
+    assert tables.number(None, "deg/s", none="never") == "never"
+    assert tables.seconds(1.234) == "1.23 s"
+    assert tables.seconds(None) == "never"
+    assert [tables.finite(x) for x in (1.5, float("inf"), "inf", 3)] == [1.5, None, "inf", 3]
 
 
 def test_columns_are_as_wide_as_their_widest_cell():
-    assert words.aligned([["a", "bb", "c"], ["long", "b", ""]]) == "a     bb  c\nlong  b"
+    assert tables.aligned([["a", "bb", "c"], ["long", "b", ""]]) == "a     bb  c\nlong  b"
 
 
 def test_a_table_in_markdown_and_html():
-    assert words.markdown_table(["a", "b|c"], [["1", "2"]]) == "| a | b\\|c |\n| --- | --- |\n| 1 | 2 |"
-    table = words.html_table(["<a>", "b"], [["✓ yes", "✗ no"], ["1", "2"]], "so & so")
+    assert tables.markdown_table(["a", "b|c"], [["1", "2"]]) == "| a | b\\|c |\n| --- | --- |\n| 1 | 2 |"
+    table = tables.html_table(["<a>", "b"], [["✓ yes", "✗ no"], ["1", "2"]], "so & so")
     assert "<caption>so &amp; so</caption>" in table
     assert '<th scope="col">&lt;a&gt;</th><th scope="col">b</th>' in table
     assert '<td class="met">✓ yes</td><td class="missed">✗ no</td>' in table
     assert "<tr><td>1</td><td>2</td></tr>" in table
-    assert "caption" not in words.html_table(["a"], [["1"]])
+    assert "caption" not in tables.html_table(["a"], [["1"]])
 
 
 def test_names_stand_to_the_left_unbroken_and_numbers_to_the_right():
-    table = words.plain(
+    table = tables.plain(
         "of [b]names[/b]", ["name", "value"], [["a long name", "1.5"], [":smile: [red]b[/red]", "22"]]
     )
-    text = words.printed([table], width=60).splitlines()
+    text = tables.printed([table], width=60).splitlines()
     assert text[0] == "of [b]names[/b]"
     assert [len(line) for line in text[1:]] == [len(text[1])] * 3
     assert [line[:4] for line in text[1:]] == ["name", "a lo", ":smi"]
     assert text[3].startswith(":smile: [red]b[/red]")
     assert "\x1b" not in "".join(text)
-    narrow = words.plain("", ["name", "value"], [["a long name", "1.5 of a great many"]])
-    assert "a long name" in words.printed([narrow], width=24)
-    assert "\x1b" in words.printed([words.plain("t", ["n"], [["1"]])], width=20, colour=True)
+    narrow = tables.plain("", ["name", "value"], [["a long name", "1.5 of a great many"]])
+    assert "a long name" in tables.printed([narrow], width=24)
+    assert "\x1b" in tables.printed([tables.plain("t", ["n"], [["1"]])], width=20, colour=True)

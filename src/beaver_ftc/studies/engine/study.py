@@ -8,20 +8,56 @@ import contextlib
 import json
 import shutil
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 from beaver_ftc.documents.errors import SimulationFailed
+from beaver_ftc.results.writer import result_folder
 from beaver_ftc.studies.engine.campaign import Batch, Batches, Campaign
 from beaver_ftc.studies.engine.crew import Case, Crew, LocalCrew, ThisProcess, Work
 from beaver_ftc.studies.engine.files import clear_disk_errors, locked, remove_leftovers, write_whole
 from beaver_ftc.studies.engine.identity import Identity
 from beaver_ftc.studies.engine.parts import Parts, RowsAsJson
+from beaver_ftc.studies.present.files import Files, write_files
 
 Progress = Callable[[float], None]
 Fly = Callable[[Any], Any]
+Lost = Callable[[Any, str], Any]
 _GO_ON = "; what has been flown is kept, the same command goes on with it"
+
+
+@dataclass(frozen=True)
+class Study:
+    """What is a study's own: its cases, how each is flown, what their rows amount to, and its files.
+
+    name: of the result folder. fly: from a case to its row, a value of the type `row`; it can be pickled, as
+    the cases can. document: of all rows. files: of the document. follows_from: what the rows follow from
+    beside the cases. lost: the row of a case that kills its process each time; without it that is a
+    SimulationFailed.
+    """
+
+    name: str
+    cases: Sequence[Any]
+    fly: Fly
+    document: Callable[[list[Any]], Any]
+    files: Callable[[Any], Files]
+    row: Any = dict
+    follows_from: Any = None
+    lost: Lost | None = None
+
+
+def run_study(study: Study, out: Path, workers: int = 1, progress: Progress | None = None) -> Any:
+    """Fly a study and write `out/<name>/`; return its document."""
+    rows = flown(
+        out / study.name, study.cases, study.fly, study.row, follows_from=study.follows_from,
+        workers=workers, progress=progress, lost=study.lost,
+    )  # fmt: skip
+    with rows as found, result_folder(out, study.name) as folder:
+        document = study.document(found)
+        write_files(folder, study.files(document))
+    return document
 
 
 @contextlib.contextmanager
@@ -31,23 +67,21 @@ def flown(
     fly: Fly,
     row: Any = dict,
     *,
-    asked: Any = None,
+    follows_from: Any = None,
     workers: int = 1,
     progress: Progress | None = None,
-    lost: Callable[[Any, str], Any] | None = None,
+    lost: Lost | None = None,
 ) -> Iterator[list[Any]]:
     """Yield the rows of all cases, in their order whatever the number of workers; on success they go.
 
-    folder: of the result. fly: from a case to its row, a value of the type `row`; it can be pickled, as the
-    cases can. asked: what the rows follow from beside the cases. lost: the row of a case that kills its
-    process each time; without it that is a SimulationFailed.
+    folder: of the result; the rest as in `Study`.
     """
     kept = folder.with_name(f".{folder.name}.flown")
     new = not folder.parent.exists()
     with clear_disk_errors(kept):
         kept.mkdir(parents=True, exist_ok=True)
     with locked(kept):
-        identity = Identity.of("study", {"cases": repr(list(cases)), "asked": repr(asked)})
+        identity = Identity.of("study", {"cases": repr(list(cases)), "asked": repr(follows_from)})
         parts = _begin(kept, identity, RowsAsJson(row))
         try:
             yield _all_rows(parts, cases, Work(partial(_fly_case, fly)), workers, progress, lost or _fail)

@@ -6,7 +6,8 @@ from html import escape
 from pathlib import Path
 from typing import NamedTuple
 
-from beaver_ftc.studies.engine.words import Rows, html_table, markdown_table
+from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.studies.present.tables import Rows, html_table, markdown_table
 
 
 class Heading(NamedTuple):
@@ -83,8 +84,22 @@ def _html(part: Part, figures: Mapping[str, Path]) -> str:
 
 
 def _picture(title: str, path: Path) -> str:
-    data = b64encode(path.read_bytes()).decode("ascii")
-    return f'<img alt="{escape(title)}" src="data:image/png;base64,{data}">'
+    return f'<img alt="{escape(title)}" src="data:image/png;base64,{picture_data(path)}">'
+
+
+def picture_data(path: Path) -> str:
+    """A picture as it stands in a page."""
+    return b64encode(path.read_bytes()).decode("ascii")
+
+
+def replace_between(path: Path, begin: str, end: str, text: str) -> None:
+    """Put text between two marks of a page, whose other parts stay. Raises BadInput where it has none."""
+    page = path.read_text(encoding="utf-8") if path.is_file() else ""
+    if begin not in page or end not in page:
+        raise BadInput(f"{path}: has no place for the tables, allowed: a page with {begin} and {end}")
+    before, _, rest = page.partition(begin)
+    after = rest.partition(end)[2]
+    path.write_text(f"{before}{begin}\n{text}{end}{after}", encoding="utf-8")
 
 
 def versions_line(versions: Mapping[str, str]) -> str:

@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 
 from beaver_ftc.documents.errors import SimulationFailed
-from beaver_ftc.studies.engine.flown import flown, fly_all
 from beaver_ftc.studies.engine.identity import PACKAGE, differences, hashed_files
+from beaver_ftc.studies.engine.study import Study, flown, fly_all, run_study
 
 
 @dataclass
@@ -54,6 +54,16 @@ def test_rows_come_in_order_and_nothing_is_left(tmp_path):
     assert rows_of(tmp_path / "study", range(6), square, progress=seen.append) == list(map(square, range(6)))
     assert seen == [pytest.approx((i + 1) / 6) for i in range(6)]
     assert hidden(tmp_path) == []
+
+
+def test_a_study_leaves_its_files_and_gives_its_document(tmp_path):
+    study = Study(
+        "squares", range(3), square, lambda rows: {"sum": sum(row.delay_s for row in rows)},
+        lambda document: {"sum.txt": f"{document['sum']:.4f}"}, Row,
+    )  # fmt: skip
+    assert run_study(study, tmp_path) == {"sum": pytest.approx(5 / 7)}
+    assert hidden(tmp_path) == ["squares"]
+    assert (tmp_path / "squares" / "sum.txt").read_text() == "0.7143"
 
 
 def test_several_workers_give_the_same(tmp_path):
@@ -99,12 +109,12 @@ def test_rows_of_another_question_or_other_code_are_not_used(tmp_path, monkeypat
     log = tmp_path / "log"
     fly = partial(square, log=log)
     with pytest.raises(KeyboardInterrupt):
-        rows_of(tmp_path / "study", range(6), fly, asked=1, progress=stopped_after(4))
+        rows_of(tmp_path / "study", range(6), fly, follows_from=1, progress=stopped_after(4))
     log.unlink()
     if change == "code":
         monkeypatch.setattr("beaver_ftc.studies.engine.identity.fingerprint", lambda: "edited")
     cases = range(1, 7) if change == "cases" else range(6)
-    rows_of(tmp_path / "study", cases, fly, asked=2 if change == "asked" else 1)
+    rows_of(tmp_path / "study", cases, fly, follows_from=2 if change == "asked" else 1)
     assert log.read_text().split() == [str(case) for case in cases]
 
 

@@ -1,0 +1,1 @@
+"""What a document looks like: numbers and tables in words, figures, pages, and the files they go into."""

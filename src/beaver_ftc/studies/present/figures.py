@@ -1,0 +1,84 @@
+"""How figures of a study are begun, what they have in common, and how they are saved."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from beaver_ftc.results.looks import SERIES
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+DPI = 110
+DASHES: tuple[Any, ...] = ("-", (0, (5, 2)), (0, (2, 2)), (0, (6, 2, 1, 2)), (0, (1, 1)))
+MARKS = "osD^vPX*"
+GRID = "#dddddd"
+
+
+def new_figure(width: float, height: float, title: str = "", dpi: int = DPI) -> "Figure":
+    """An empty figure, inches, without matplotlib's global state."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width, height), dpi=dpi, layout="constrained")
+    if title:
+        figure.suptitle(title, fontsize=11)
+    return figure
+
+
+def panels(
+    down: int, across: int, width: float, height: float, title: str = "", dpi: int = DPI, **subplots: Any
+) -> tuple["Figure", Any]:
+    """A figure, inches, with its panels (down, across)."""
+    figure = new_figure(width, height, title, dpi)
+    return figure, figure.subplots(down, across, squeeze=False, **subplots)
+
+
+def label_edges(grid: Any, x: str | None = None, y: Sequence[str] = (), titles: Sequence[str] = ()) -> None:
+    """Write along the edges of panels (down, across): below, to the left of each row, above each column."""
+    for axes in grid[-1]:
+        axes.set_xlabel(x or "", fontsize=9)
+    for axes, text in zip(grid[:, 0], y, strict=False):
+        axes.set_ylabel(text, fontsize=9)
+    for axes, text in zip(grid[0], titles, strict=False):
+        axes.set_title(text, fontsize=9)
+
+
+def curve_look(place: int) -> dict[str, Any]:
+    """Colour and dashes of one of several curves."""
+    return {"color": SERIES[place % len(SERIES)], "linestyle": DASHES[place % len(DASHES)]}
+
+
+def marker(place: int) -> str:
+    """The marker of one of several curves."""
+    return MARKS[place % len(MARKS)]
+
+
+def heat_map(
+    axes: "Axes",
+    values: np.ndarray,
+    labels: dict[tuple[int, int], tuple[str, str]],
+    columns: Sequence[str],
+    rows: Sequence[str],
+    fontsize: float = 8,
+    **image: Any,
+) -> Any:
+    """An image of values (rows, columns) with a (text, colour) on some of its cells; returns the image."""
+    for (row, column), (text, ink) in labels.items():
+        axes.text(column, row, text, ha="center", va="center", fontsize=fontsize, color=ink)
+    axes.set_xticks(range(len(columns)), columns, fontsize=fontsize)
+    axes.set_yticks(range(len(rows)), rows, fontsize=fontsize)
+    return axes.imshow(values, aspect="auto", **image)
+
+
+def save(figure: "Figure", path: Path) -> Path:
+    """Write a figure as PNG or SVG; the same figure gives the same bytes."""
+    from matplotlib import rc_context
+
+    svg = path.suffix == ".svg"
+    metadata = {"Date": None, "Creator": "beaver-ftc"} if svg else {"Software": "beaver-ftc"}
+    with rc_context({"svg.hashsalt": path.stem}):
+        figure.savefig(path, metadata=metadata)
+    return path

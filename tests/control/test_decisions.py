@@ -78,7 +78,7 @@ def test_every_change_of_mode_is_noted_and_of_too_many_the_latest():
 )  # fmt: skip
 def test_the_mode_that_the_diagnosis_asks_for(every_type, isolated, lead, lead_kind, stand_in, mode):
     fdi = record(diagnosis_dtype(4))
-    fdi["every_type"], fdi["estimator"]["surface"][4:8] = every_type, range(4)
+    fdi["config"]["every_type"], fdi["isolation"]["estimator"]["surface"][4:8] = every_type, range(4)
     verdict = fdi["verdict"]
     verdict["detected"], verdict["isolated"], verdict["lead"], verdict["lead_kind"] = (
         1,
@@ -150,9 +150,9 @@ def test_a_surface_given_up_goes_to_its_trim(which):
         trim=0.3, command=0.1, saturated=1, law=ORACLE if which == "immovable" else ADAPTIVE
     )
     fdi, faults = record(diagnosis_dtype(4)), new_faults(immovable=(0, 0, 1, 0))
-    fdi["every_type"], fdi["surface"]["measure"] = 1, -1
+    fdi["config"]["every_type"], fdi["types"]["surface"]["measure"] = 1, -1
     if "jam" in which:
-        fdi["surface"]["measure"][RUDDER] = FIXED
+        fdi["types"]["surface"]["measure"][RUDDER] = FIXED
         control["effectiveness"][RUDDER] = 0.0 if which == "jammed" else 0.5
     control["rejection"]["abandoned"][RUDDER] = which == "abandoned"
     accommodation.give_up(control, fdi, faults)
@@ -282,9 +282,9 @@ def test_only_what_may_still_act_is_taken_for_what_the_observer_sees(inner, law,
     """The verdict leaves an aileron a tenth, the observer sees a half; a fixed one gives nothing."""
     control, fdi = new_control(inner=inner, law=law, effectiveness_step=1.0), record(diagnosis_dtype(4))
     fdi["verdict"]["detected"], fdi["verdict"]["isolated"] = 1, 0
-    fdi["estimator"]["surface"][:4], fdi["estimator"]["theta"][0] = range(4), -0.9
-    fdi["surface"]["measure"], fdi["every_type"] = -1, fixed
-    fdi["surface"]["measure"][AILERON] = FIXED if fixed else -1
+    fdi["isolation"]["estimator"]["surface"][:4], fdi["isolation"]["estimator"]["theta"][0] = range(4), -0.9
+    fdi["types"]["surface"]["measure"], fdi["config"]["every_type"] = -1, fixed
+    fdi["types"]["surface"]["measure"][AILERON] = FIXED if fixed else -1
     found = control["rejection"]["found"]
     found["named"], found["frames"], found["square"], found["product"] = 1, 1.0, 2.0, -1.0
     belief = record([("design", design_record().dtype), ("u", "f8", (4,))])
@@ -303,7 +303,11 @@ def test_what_no_verdict_names_is_whole_and_a_plug_ins_estimates_count_from_its_
         new_control(target=0.3, offset=0.2, lag=0.1, effectiveness_step=0.25),
         record(diagnosis_dtype(4)),
     )
-    fdi["verdict"]["isolated"], fdi["verdict"]["estimates"], fdi["surface"]["measure"] = NOT_ISOLATED, 1, -1
+    fdi["verdict"]["isolated"], fdi["verdict"]["estimates"], fdi["types"]["surface"]["measure"] = (
+        NOT_ISOLATED,
+        1,
+        -1,
+    )
     fdi["verdict"]["effectiveness"] = 0.9, 0.4, 1.0, 0.8
     arguments = record([("design", design_record().dtype), ("u", "f8", (4,))]), record([("y", "f8", (8,))])
     accommodation.accommodate(control, fdi, *arguments, new_faults())

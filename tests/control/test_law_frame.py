@@ -76,9 +76,11 @@ def test_the_rejecting_law_has_no_integral_and_begins_with_what_is_measured():
 def believed(frame, surface, theta=-0.6, detected=1):
     """The isolated loss of a surface, by its estimator."""
     fdi = frame["fdi"]
-    place = next(s for s in range(fdi["n_estimators"]) if fdi["estimator"][s]["surface"] == surface)
+    place = next(
+        s for s in range(fdi["isolation"]["n"]) if fdi["isolation"]["estimator"][s]["surface"] == surface
+    )
     fdi["verdict"]["detected"], fdi["verdict"]["isolated"] = detected, place
-    fdi["estimator"][place]["theta"] = theta
+    fdi["isolation"]["estimator"][place]["theta"] = theta
     return fdi
 
 
@@ -111,14 +113,14 @@ def test_the_oracle_knows_and_no_other_law_looks():
 def test_what_is_done_about_each_kind_of_fault(measure):
     frame = new_frame("fault-tolerant-published", fault_class="all")
     fdi, control = frame["fdi"], frame["control"]
-    surface = fdi["surface"][RUDDER]
+    surface = fdi["types"]["surface"][RUDDER]
     kind = {LOSES: CONSTANT_LOSS, FIXED: STUCK, SHIFTED: BIAS, LAGS: BIAS}[measure]
-    fdi["surface"]["measure"], surface["measure"] = -1, measure
+    fdi["types"]["surface"]["measure"], surface["measure"] = -1, measure
     surface["type_excluded"] = [other != kind for other in range(N_TYPES)]
     surface["set_low"][kind], surface["set_high"][kind] = 0.1, 0.2
     surface["command"], surface["low"], surface["high"] = 0.05, 0.3, 0.34
     loss = fdi["layout"]["loss_of"][RUDDER]
-    fdi["estimator"][int(loss)]["theta"] = -0.3
+    fdi["isolation"]["estimator"][int(loss)]["theta"] = -0.3
     accommodation.accommodate(control, fdi, frame["belief"], frame["measured"], faults())
     target = {LOSES: 0.7, FIXED: 0.0}.get(measure, 1.0)
     assert control["target"] == pytest.approx([1.0, 1.0, target, 1.0])
@@ -143,8 +145,12 @@ def test_when_it_has_long_been_open_whether_elevator_or_flap(
 ):
     frame = new_frame(name)
     fdi = frame["fdi"]
-    fdi["every_type"], fdi["patience"], fdi["surface"]["evidence"] = every_type, 4, 0
-    fdi["surface"]["evidence"][ELEVATOR] = evidence
+    fdi["config"]["every_type"], fdi["types"]["config"]["patience"], fdi["types"]["surface"]["evidence"] = (
+        every_type,
+        4,
+        0,
+    )
+    fdi["types"]["surface"]["evidence"][ELEVATOR] = evidence
     fdi["verdict"]["detected"], fdi["verdict"]["isolated"] = detected, isolated
     assert bool(law.in_doubt(frame["control"], fdi)) == doubt
 
@@ -152,23 +158,23 @@ def test_when_it_has_long_been_open_whether_elevator_or_flap(
 def alarmed(known=0, speaks=0, score=2.0):
     frame = new_frame()
     fdi = frame["fdi"]
-    fdi["verdict"]["detected"], fdi["authority"] = known, WORST_CASE
+    fdi["verdict"]["detected"], fdi["config"]["authority"] = known, WORST_CASE
     fdi["watch"]["enabled"] = fdi["watch"]["alarmed"] = speaks
     fdi["bank"]["threshold"] = 0.1
     fdi["bank"]["residual"][0, 1] = 0.1 * score
     fdi["fdae"]["network"]["weights"], fdi["fdae"]["network"]["output"] = 1.0, 0.0
-    fdi["estimator"]["xhat"] = 9.0
+    fdi["isolation"]["estimator"]["xhat"] = 9.0
     scheme.decide(fdi, frame["measured"], 5.0)
     return fdi
 
 
 def test_the_alarm_starts_the_estimators_once_and_the_network_answers():
     fdi = alarmed()
-    first = int(fdi["n_estimators"])
+    first = int(fdi["isolation"]["n"])
     assert fdi["verdict"]["detected"] == 1
-    assert fdi["estimator"]["xhat"][:first] == pytest.approx(np.tile(X, (first, 1)))
+    assert fdi["isolation"]["estimator"]["xhat"][:first] == pytest.approx(np.tile(X, (first, 1)))
     assert fdi["fdae"]["network"]["output"].all()
-    assert (alarmed(known=1)["estimator"]["xhat"][:first] == 9.0).all()
+    assert (alarmed(known=1)["isolation"]["estimator"]["xhat"][:first] == 9.0).all()
     quiet = alarmed(score=0.5)
     assert quiet["verdict"]["detected"] == 0
     assert not quiet["fdae"]["network"]["output"].any()

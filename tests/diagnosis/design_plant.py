@@ -145,7 +145,7 @@ class DesignPlant:
 
     def excluded(self, surface):
         """Whether the estimator of a surface has been excluded."""
-        return bool(self.fdi["estimator"][surface]["excluded"])
+        return bool(self.fdi["isolation"]["estimator"][surface]["excluded"])
 
     def position_excluded(self, surface):
         """Whether the estimator of a surface that may be anywhere has been excluded."""

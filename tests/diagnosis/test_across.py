@@ -35,7 +35,7 @@ def watching(turns=0.0):
     statistical["tolerated"] = fdi["bound"]["own_errors"] = turns > 0.0
     fdi["bound"]["own_per_rad"] = turns * np.abs(G)
     fdi["layout"]["position_of"] = range(4)
-    for s, fie in enumerate(fdi["estimator"][:4]):
+    for s, fie in enumerate(fdi["isolation"]["estimator"][:4]):
         fie["kind"], fie["surface"], fie["effect"]["Z"] = POSITION, s, G[:, s]
     return fdi
 
@@ -117,12 +117,12 @@ def test_a_flight_has_them_or_not(substeps):
 
 def test_what_a_surface_does_not_move_rules_its_faults_out():
     fdi = watching()
-    fdi["statistical"]["enabled"] = fdi["every_type"] = 1
+    fdi["statistical"]["enabled"] = fdi["config"]["every_type"] = 1
     fdi["statistical"]["views"][PITCH_AXIS]["block"]["hypothesis"]["score"][0] = 5.1
-    assert isolation.rules_out(fdi, fdi["estimator"][AILERON], True)
-    assert not isolation.rules_out(fdi, fdi["estimator"][ELEVATOR], True)
+    assert isolation.rules_out(fdi, fdi["isolation"]["estimator"][AILERON], True)
+    assert not isolation.rules_out(fdi, fdi["isolation"]["estimator"][ELEVATOR], True)
     fdi["statistical"]["n_views"] = 0
-    assert not isolation.rules_out(fdi, fdi["estimator"][AILERON], True)
+    assert not isolation.rules_out(fdi, fdi["isolation"]["estimator"][AILERON], True)
 
 
 def test_views_try_a_step_and_the_losses_of_those_that_move_the_axis():

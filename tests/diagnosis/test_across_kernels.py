@@ -218,7 +218,7 @@ def test_views_that_are_not_there_are_not_asked(fdi, rng):
 def test_any_hypothesis_beyond_the_level_excludes_whom_it_is_not_felt_of(fdi):
     statistical = fdi["statistical"]
     statistical["alarm_level"], fdi["layout"]["position_of"] = 5.0, range(4)
-    for s, fie in enumerate(fdi["estimator"][:4]):
+    for s, fie in enumerate(fdi["isolation"]["estimator"][:4]):
         fie["kind"], fie["surface"], fie["effect"]["Z"] = POSITION, s, np.eye(3, 4)[:, s]
     view = statistical["views"][ROLL_AXIS]
     tried = int(view["block"]["n_hypotheses"])

@@ -17,7 +17,7 @@ def test_a_filter_and_its_bound_are_convolutions_of_what_went_in():
         fdi["bound"]["noise"] = noise[k + 1]
         bank.innovate(fdi, x[k + 1], x[k], believed[k])
     innovation = np.diff(x, axis=0) / DT - believed
-    assert fdi["innovation"] == pytest.approx(innovation[-1])
+    assert fdi["bank"]["innovation"] == pytest.approx(innovation[-1])
     assert fdi["bound"]["frame"] == pytest.approx(eta[-1] + (noise[-1] + noise[-2]) / DT)
     for m, decay in enumerate(np.exp(-POLES * DT)):
         w = weights(decay, frames)
@@ -62,13 +62,13 @@ def test_the_closest_approach_of_every_filter_is_kept():
 
 def test_the_direction_across_a_fault_is_of_unit_length_and_sees_nothing_of_it():
     fdi = new_fdi()
-    fdi["n_estimators"] = 2
-    fdi["estimator"]["surface"][:2] = 2, 1
+    fdi["isolation"]["n"] = 2
+    fdi["isolation"]["estimator"]["surface"][:2] = 2, 1
     G = np.array([[0, 0, 3.0, 0], [0, 5.0, 0, 0], [0, 0, -4.0, 0]])
     bank.align(fdi, G)
-    assert fdi["estimator"]["across"][0] == pytest.approx([-0.8, 0.0, -0.6])
-    assert fdi["estimator"]["across"][0] @ G[:, 2] == pytest.approx(0.0)
-    assert not fdi["estimator"]["across"][1].any()
+    assert fdi["isolation"]["estimator"]["across"][0] == pytest.approx([-0.8, 0.0, -0.6])
+    assert fdi["isolation"]["estimator"]["across"][0] @ G[:, 2] == pytest.approx(0.0)
+    assert not fdi["isolation"]["estimator"]["across"][1].any()
 
 
 def reach_of(offset, Z, spread, low=-1.0, high=0.5, across=(0.6, 0.0, -0.8)):

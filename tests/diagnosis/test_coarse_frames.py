@@ -30,7 +30,7 @@ def over(frames):
 
 @njit
 def limits(frames, surface):
-    fie = frames[0].fdi.estimator[surface]
+    fie = frames[0].fdi.isolation.estimator[surface]
     return extremes(fie, 0), aligned_extremes(fie)
 
 
@@ -75,7 +75,7 @@ shares = st.floats(-1, 0)
 def test_a_loss_that_changed_inside_the_frame_stays_within_the_extremes(n, moment0, moment, theta0, theta):
     """The first instant under the old command and the old fault, the others under the new ones."""
     frames = record(n)
-    belief, fie = frames[0]["belief"], frames[0]["fdi"]["estimator"][0]
+    belief, fie = frames[0]["belief"], frames[0]["fdi"]["isolation"]["estimator"][0]
     belief["sums"]["Gu_first"][0, 0], belief["sums"]["Gu"][0, 0] = moment0, moment0 + (n - 1) * moment
     over(frames)
     fie["effect"]["Z"][0], fie["effect"]["spread"][0] = (

@@ -67,7 +67,7 @@ def test_the_true_type_is_neither_excluded_nor_named_wrongly(noisy, seed, kind, 
     plant = fly(seed, noisy, kind, surface, at, share, 700)
     code = TYPES[kind][1]
     assert not plant.position_excluded(surface)
-    assert not plant.fdi["surface"][surface]["type_excluded"][code]
+    assert not plant.fdi["types"]["surface"][surface]["type_excluded"][code]
     said = found(plant.fdi)
     assert said["isolated"] in (SURFACES[surface], None)
     assert said["isolation_type"] in (types.NAMES[code], None)
@@ -77,7 +77,7 @@ def test_the_true_type_is_neither_excluded_nor_named_wrongly(noisy, seed, kind, 
 def test_an_estimate_is_certain_to_lie_in_its_interval(noisy):
     """An aileron stuck a quarter up its travel."""
     plant = fly(4, noisy, "stuck", 0, 30, 0.25, 900)
-    known = plant.fdi["surface"][0]
+    known = plant.fdi["types"]["surface"][0]
     assert known["set_low"][types.STUCK] <= -0.26 <= known["set_high"][types.STUCK]
     assert known["set_high"][types.STUCK] - known["set_low"][types.STUCK] < np.deg2rad(4)
     assert found(plant.fdi)["isolated"] == "aileron"
@@ -86,7 +86,10 @@ def test_an_estimate_is_certain_to_lie_in_its_interval(noisy):
 def test_blocks_see_what_frames_do_not():
     """With noisy gyros a frame leaves the rudder several degrees of room, a block a small part of it."""
     plant = fly(4, True, "bias", 2, 30, 0.9, 600)
-    known, estimator = plant.fdi["surface"][2], plant.fdi["estimator"][plant.fdi["layout"]["position_of"][2]]
+    known, estimator = (
+        plant.fdi["types"]["surface"][2],
+        plant.fdi["isolation"]["estimator"][plant.fdi["layout"]["position_of"][2]],
+    )
     of_a_frame = 2 * plant.fdi["bound"]["frame"][2] / abs(estimator["effect"]["Z"][2])
     assert known["high"] - known["low"] < 0.5 * of_a_frame
 
@@ -112,4 +115,4 @@ def test_a_release_anywhere_inside_a_block_excludes_neither_surface_nor_type(
     fault.plant = plant
     plant.fly(at + lasting + 100, None)
     assert not plant.position_excluded(surface)
-    assert not plant.fdi["surface"][surface]["type_excluded"][fault.code]
+    assert not plant.fdi["types"]["surface"][surface]["type_excluded"][fault.code]

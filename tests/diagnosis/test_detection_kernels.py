@@ -87,7 +87,7 @@ def test_a_diagnosis_begins_with_no_residual_and_the_gyros_error_to_come():
 )  # fmt: skip
 def test_who_is_in_authority_raises_the_alarm(authority, filters, score, axis):
     fdi = new_fdi()
-    fdi["authority"], fdi["verdict"]["detected_axis"] = authority, -1
+    fdi["config"]["authority"], fdi["verdict"]["detected_axis"] = authority, -1
     fdi["bank"]["threshold"][:3], fdi["bank"]["residual"][1, 2] = 0.1, 0.1 * filters
     fdi["statistical"]["score"], fdi["statistical"]["axis"], fdi["fdae"]["xhat"] = score, 0, (1.0, 1.0, 1.0)
     detection.detect(fdi, np.array([1.5, 0.5, 1.0]), 7.0)
@@ -149,7 +149,7 @@ def instants(count, seed=5):
 @pytest.mark.parametrize("own_errors", [0, 1])
 def test_means_over_a_frame_are_of_its_instants(count, own_errors):
     fdi, record = new_fdi(), new_belief(1.0 / count)
-    fdi["bound"]["own_errors"], fdi["every_type"] = own_errors, 1
+    fdi["bound"]["own_errors"], fdi["config"]["every_type"] = own_errors, 1
     fdi["layout"]["dominant_axis"] = 0, 1, 2, 1
     record["sums"]["f"] = record["sums"]["G"] = record["sums"]["Gu"] = 99.0  # of an earlier frame
     record["sums"]["eta_bar"] = 99.0

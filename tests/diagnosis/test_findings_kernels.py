@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from kernels import put
 
 from beaver_ftc.diagnosis.scheme import diagnosis_dtype
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, UNANTICIPATED
@@ -28,17 +29,16 @@ def new(left=None, detected=1, pairs=0, verdict=NOT_ISOLATED, **fields):
     """A record in which these types are left, {surface: kinds}; other surfaces are excluded."""
     fdi = np.zeros(1, diagnosis_dtype(4))[0]
     fdi["verdict"]["detected"], fdi["verdict"]["isolated"], fdi["verdict"]["type"] = detected, verdict, -1
-    fdi["verdict"]["isolated_at_s"], fdi["pair"]["enabled"] = 12.5, pairs
-    fdi["layout"]["position_of"], fdi["estimator"]["surface"][4:8] = POSITION_OF, range(4)
+    fdi["verdict"]["isolated_at_s"], fdi["types"]["pair"]["enabled"] = 12.5, pairs
+    fdi["layout"]["position_of"], fdi["isolation"]["estimator"]["surface"][4:8] = POSITION_OF, range(4)
     fdi["layout"]["group"] = 1 - IN_PITCH
     fdi["layout"]["group"][[ELEVATOR, FLAP]] = IN_PITCH
-    fdi["estimator"]["excluded"][4:8], fdi["surface"]["type_excluded"] = 1, 1
-    fdi["surface"]["type"], fdi["surface"]["type_at_s"] = -1, -1.0
+    fdi["isolation"]["estimator"]["excluded"][4:8], fdi["types"]["surface"]["type_excluded"] = 1, 1
+    fdi["types"]["surface"]["type"], fdi["types"]["surface"]["type_at_s"] = -1, -1.0
     for s, kinds in (left or {}).items():
-        fdi["estimator"]["excluded"][POSITION_OF[s]] = 0
-        fdi["surface"]["type_excluded"][s][list(kinds)] = 0
-    for name, value in fields.items():
-        fdi[name] = value
+        fdi["isolation"]["estimator"]["excluded"][POSITION_OF[s]] = 0
+        fdi["types"]["surface"]["type_excluded"][s][list(kinds)] = 0
+    put(fdi, **fields)
     return fdi
 
 
@@ -74,8 +74,8 @@ def test_a_surface_of_which_no_type_fits_is_named_bare_and_the_fault_may_be_unan
 )  # fmt: skip
 def test_a_surface_is_possible_until_it_is_excluded_or_ruled_out(named, standing, excluded, possible):
     fdi = new({RUDDER: [STUCK]})
-    fdi["surface"]["named"][RUDDER], fdi["surface"]["standing"][RUDDER] = named, standing
-    fdi["estimator"]["excluded"][POSITION_OF[RUDDER]] = excluded
+    fdi["types"]["surface"]["named"][RUDDER], fdi["types"]["surface"]["standing"][RUDDER] = named, standing
+    fdi["isolation"]["estimator"]["excluded"][POSITION_OF[RUDDER]] = excluded
     assert (f"rudder:{NAMES[STUCK]}" in findings.found(fdi, SURFACES)["candidates"]) == possible
 
 
@@ -94,7 +94,7 @@ def test_what_any_course_explains_counts_only_until_a_constant_has_been_seen_for
     """But where a surface stands still, a slow one may stand until it is excluded."""
     constants = set() if constant is None else {constant}
     fdi = new({RUDDER: {VARYING_LOSS, SLOW} | constants}, patience=40)
-    fdi["surface"]["evidence"][RUDDER], fdi["surface"]["quiet"][RUDDER] = evidence, 10
+    fdi["types"]["surface"]["evidence"][RUDDER], fdi["types"]["surface"]["quiet"][RUDDER] = evidence, 10
     fdi["bound"]["own_errors"] = own_errors
     types = findings._types_left(fdi, RUDDER)
     assert set(types) == set(said(*constants, *kept))
@@ -129,8 +129,8 @@ def test_a_fault_outside_the_class_is_unanticipated():
 def several(named=(), alarmed=(0, 0), left=None):
     fdi = new(left, pairs=1)
     for s, at_s in named:
-        fdi["surface"]["named"][s], fdi["surface"]["named_at_s"][s] = 1, at_s
-    fdi["pair"]["alarmed"] = alarmed
+        fdi["types"]["surface"]["named"][s], fdi["types"]["surface"]["named_at_s"][s] = 1, at_s
+    fdi["types"]["pair"]["alarmed"] = alarmed
     return findings.found(fdi, SURFACES)
 
 

@@ -32,7 +32,7 @@ def test_until_an_alarm_all_is_sums_of_what_the_model_does_not_explain(kind):
     fdi, n = flown.fdi, int(flown.fdi["bank"]["n"])
     missed, bounds = np.array(flown.innovations[:-1]), np.array(flown.bounds[:-1]) + ROUNDING_RAD_S2
     assert not fdi["verdict"]["detected"]
-    assert fdi["innovation"] == pytest.approx(missed[-1])
+    assert fdi["bank"]["innovation"] == pytest.approx(missed[-1])
     keeps = fdi["bank"]["decay"][:n]
     assert fdi["bank"]["residual"][:n] == pytest.approx(summed(keeps, missed))
     assert fdi["bank"]["threshold"][:n] == pytest.approx(summed(keeps, bounds))
@@ -41,7 +41,7 @@ def test_until_an_alarm_all_is_sums_of_what_the_model_does_not_explain(kind):
         assert fdi["fdae"]["residual"][i] == pytest.approx(summed(keep, missed[:, [i]])[0])
         assert fdi["fdae"]["threshold"][i] == pytest.approx(summed(keep, bounds[:, [i]])[0])
     assert not fdi["fdae"]["network"]["weights"].any()
-    assert not fdi["estimator"]["xhat"].any()
+    assert not fdi["isolation"]["estimator"]["xhat"].any()
     assert ((fdi["bank"]["closest"][:n] > 0.0) & (fdi["bank"]["closest"][:n] < 1.0)).all()
 
 
@@ -62,7 +62,7 @@ def test_an_alarm_is_of_the_frame_in_which_a_residual_leaves_its_bound(surface):
     assert flown.fdi["verdict"]["detected_axis"] == int(np.flatnonzero(seen[first])[0])
     assert seen[first][axis] or surface != ELEVATOR
     # Every estimator starts there, with no residual and all of its set.
-    fie = flown.fdi["estimator"][surface]
+    fie = flown.fdi["isolation"]["estimator"][surface]
     assert fie["xhat"] == pytest.approx(flown.frame["measured"]["x"])
     assert not fie["excluded"]
     assert fie["covariance"] == pytest.approx([1.0 / 12.0] * 3)
@@ -74,7 +74,7 @@ def loss_flown(surface, kind=exactly, frames=60, **fdi):
     flown = plant(surface, **fdi)
     for _ in range(frames):
         flown.fly(1, kind)
-        fie, verdict = flown.fdi["estimator"][surface], flown.fdi["verdict"]
+        fie, verdict = flown.fdi["isolation"]["estimator"][surface], flown.fdi["verdict"]
         assert not fie["excluded"]
         if verdict["detected"]:
             asked = fie["unasked"] == 0
@@ -90,7 +90,10 @@ def loss_flown(surface, kind=exactly, frames=60, **fdi):
 @pytest.mark.parametrize("kind", ["none", "random", "push"])
 def test_the_estimator_of_the_true_loss_stays_and_is_named_once_it_is_alone(surface, kind):
     flown = loss_flown(surface, exactly if kind == "none" else UNCERTAINTIES[kind])
-    verdict, fies = flown.fdi["verdict"], flown.fdi["estimator"][: int(flown.fdi["n_estimators"])]
+    verdict, fies = (
+        flown.fdi["verdict"],
+        flown.fdi["isolation"]["estimator"][: int(flown.fdi["isolation"]["n"])],
+    )
     left = np.flatnonzero(fies["excluded"] == 0)
     assert surface in left
     assert verdict["isolated"] == (surface if len(left) == 1 else -1)
@@ -105,11 +108,11 @@ def test_an_estimator_filters_what_its_fault_does_not_explain():
     flown, steps = plant(ELEVATOR), []
     for k in range(60):
         flown.fly(1, exactly)
-        fie, verdict = flown.fdi["estimator"][ELEVATOR], flown.fdi["verdict"]
+        fie, verdict = flown.fdi["isolation"]["estimator"][ELEVATOR], flown.fdi["verdict"]
         if verdict["detected"]:
             alarm = round(float(verdict["detected_at_s"]) * RATE_HZ)
             moments = np.array(flown.innovations[alarm:k]).reshape(-1, 3) / THETA
-            omega = summed(flown.fdi["fie_decay"][ELEVATOR], moments)
+            omega = summed(flown.fdi["isolation"]["decay"][ELEVATOR], moments)
             assert fie["omega"] == pytest.approx(omega, abs=1e-15)
             assert fie["residual"] == pytest.approx(omega * (THETA - fie["theta"]), abs=1e-12)
             steps.append(np.abs(fie["residual"]).max())
@@ -158,6 +161,11 @@ def test_of_faults_of_every_kind_the_true_position_is_never_excluded(name, surfa
     assert verdict["detected"]
     assert verdict["lead"] in (-1, surface)
     named = int(verdict["isolated"])
-    assert named == -1 or flown.fdi["estimator"]["surface"][named] == surface
+    assert named == -1 or flown.fdi["isolation"]["estimator"]["surface"][named] == surface
     if name != "oscillation" or surface != RUDDER:
-        assert surface in flown.fdi["estimator"]["surface"][flown.fdi["estimator"]["excluded"] == 0]
+        assert (
+            surface
+            in flown.fdi["isolation"]["estimator"]["surface"][
+                flown.fdi["isolation"]["estimator"]["excluded"] == 0
+            ]
+        )

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from kernels import DT, estimator, new_fdi
+from kernels import DT, estimator, new_fdi, put
 
 from beaver_ftc.diagnosis import isolation
 from beaver_ftc.diagnosis.fault_class import hypothesis
@@ -25,7 +25,7 @@ def run_estimator(shared, theta, kind=LOSS, frames=25, eta_share=1.0, seed=0):
     """An estimator beside a plant with this fault: (fdi, fie, what was fed in)."""
     rng, fdi = np.random.default_rng(seed), new_fdi()
     fie = estimator(fdi, kind, low=-1.0, high=0.6)
-    fdi["shared"], x = shared, rng.normal(size=3)
+    fdi["isolation"]["shared"], x = shared, rng.normal(size=3)
     fdi["bound"]["noise"] = 0.004, 0.005, 0.006
     isolation.start(fdi, x)
     fed = {name: [] for name in ("Z", "eta", "eta_bar", "noise_then", "spread")}
@@ -50,7 +50,7 @@ def test_the_residual_is_omega_times_the_error_and_the_filtered_uncertainty(shar
     """Whatever the estimate does [Zhang2005, sec. IV]; and every filter is the convolution it stands for."""
     theta, frames = -0.45, 25
     fdi, fie, fed, within = run_estimator(shared, theta, frames=frames)
-    w = fdi["fie_decay"] ** np.arange(frames)[::-1, None]
+    w = fdi["isolation"]["decay"] ** np.arange(frames)[::-1, None]
     omega = DT * (w * fed["Z"]).sum(axis=0)
     uncertainty = DT * (w * fed["eta"]).sum(axis=0)
     assert fie["omega"] == pytest.approx(omega)
@@ -58,8 +58,8 @@ def test_the_residual_is_omega_times_the_error_and_the_filtered_uncertainty(shar
     assert fie["rise"] == pytest.approx(DT * (w * np.maximum(fed["Z"], 0)).sum(axis=0))
     assert fie["fall"] == pytest.approx(DT * (w * np.minimum(fed["Z"], 0)).sum(axis=0))
     eta = DT * (w * (fed["eta_bar"] + fed["spread"])).sum(axis=0)
-    left = fdi["fie_decay"] ** frames * np.array([0.004, 0.005, 0.006])
-    noise = left + ((1.0 - fdi["fie_decay"]) * w * fed["noise_then"]).sum(axis=0)
+    left = fdi["isolation"]["decay"] ** frames * np.array([0.004, 0.005, 0.006])
+    noise = left + ((1.0 - fdi["isolation"]["decay"]) * w * fed["noise_then"]).sum(axis=0)
     assert fie["bound_eta"] == pytest.approx(eta)
     assert fie["bound_noise"] == pytest.approx(noise)
     assert fie["bound"] == pytest.approx(eta + noise + [0.004, 0.005, 0.006])
@@ -128,7 +128,7 @@ def test_a_residual_at_its_limit_is_within_and_beyond_it_is_not(thresholds, axis
     def within(beyond, unasked=False):
         fdi = new_fdi()
         fie = estimator(fdi, low=-0.9, high=0.2)
-        fdi["thresholds"] = thresholds
+        fdi["isolation"]["thresholds"] = thresholds
         fie["rise"], fie["fall"], fie["bound"], fie["theta"] = 0.5, -0.2, 0.03, -0.3
         fie["omega"], fie["unasked"][axis] = 0.3, unasked
         lower, upper = -0.9 * 0.5 - 0.2 * 0.2, 0.2 * 0.5 + 0.9 * 0.2
@@ -154,7 +154,7 @@ def test_a_residual_at_its_limit_is_within_and_beyond_it_is_not(thresholds, axis
 )  # fmt: skip
 def test_who_rules_a_fault_out(every_type, authority, within, ruled_out):
     fdi = new_fdi()
-    fdi["every_type"], fdi["authority"] = every_type, authority
+    fdi["config"]["every_type"], fdi["config"]["authority"] = every_type, authority
     assert bool(isolation.rules_out(fdi, estimator(fdi), within)) == ruled_out
 
 
@@ -167,7 +167,7 @@ def test_who_rules_a_fault_out(every_type, authority, within, ruled_out):
 )  # fmt: skip
 def test_the_one_left_is_the_fault(excluded, isolated):
     fdi = new_fdi()
-    fdi["n_estimators"], fdi["estimator"]["excluded"][:3] = 3, excluded
+    fdi["isolation"]["n"], fdi["isolation"]["estimator"]["excluded"][:3] = 3, excluded
     fdi["verdict"]["isolated"], fdi["verdict"]["isolated_at_s"] = NOT_ISOLATED, -1.0
     isolation.decide(fdi, 4.0)
     assert fdi["verdict"]["isolated"] == isolated
@@ -179,11 +179,11 @@ def test_the_one_left_is_the_fault(excluded, isolated):
 @pytest.mark.parametrize(("doubted", "shown", "named"), [(1, 0, False), (1, 1, True), (0, 0, True)])
 def test_one_that_is_left_for_an_end_that_nobody_saw_begin_is_not_named(doubted, shown, named):
     fdi = new_fdi()
-    fdi["n_estimators"], fdi["estimator"]["excluded"][:3] = 3, (1, 0, 1)
-    fdi["estimator"]["doubted"][1], fdi["estimator"]["shown"][1] = doubted, shown
+    fdi["isolation"]["n"], fdi["isolation"]["estimator"]["excluded"][:3] = 3, (1, 0, 1)
+    fdi["isolation"]["estimator"]["doubted"][1], fdi["isolation"]["estimator"]["shown"][1] = doubted, shown
     isolation.decide(fdi, 4.0)
     assert fdi["verdict"]["isolated"] == (1 if named else NOT_ISOLATED)
-    fdi["estimator"]["excluded"][1] = 1
+    fdi["isolation"]["estimator"]["excluded"][1] = 1
     isolation.decide(fdi, 5.0)
     assert fdi["verdict"]["isolated"] == UNANTICIPATED
 
@@ -203,9 +203,9 @@ def test_what_is_supposed_of_a_frame(memory):
     rng, fdi = np.random.default_rng(4), new_fdi()
     estimator(fdi, surface=2)
     G, Gu, spread = rng.normal(size=(3, 3, 4))
-    fdi["memory"], fdi["verdict"]["detected"] = memory, 0
+    fdi["isolation"]["memory"], fdi["verdict"]["detected"] = memory, 0
     isolation.suppose_all(fdi, G, Gu, np.abs(spread))
-    fie = fdi["estimator"][0]
+    fie = fdi["isolation"]["estimator"][0]
     assert fie["reach_low"][:3, :3].any() == memory
     assert fie["effect"]["Z"].any() == memory
     fdi["verdict"]["detected"] = 1
@@ -226,7 +226,7 @@ def told(fdi, loss, step):
         hypotheses = block["hypothesis"][:2]
         hypotheses["kind"], hypotheses["surface"] = (LOSS, STEP), (0, -1)
         hypotheses["at_least"] = hypotheses["at_most"] = loss, step
-    fdi["n_estimators"], fdi["instants"] = 1, 1
+    fdi["isolation"]["n"], fdi["config"]["instants"] = 1, 1
     return estimator(fdi)
 
 
@@ -234,18 +234,18 @@ def told(fdi, loss, step):
 @pytest.mark.parametrize(("step", "ruled_out"), [(NAMING + 0.1, True), (NAMING - 0.1, False)])
 def test_statistics_rule_out_what_something_else_explains_better(authority, step, ruled_out):
     fdi = new_fdi()
-    fie, fdi["authority"] = told(fdi, 0.0, step), authority
+    fie, fdi["config"]["authority"] = told(fdi, 0.0, step), authority
     assert isolation.rules_out(fdi, fie, True) == ruled_out
     fdi["statistical"]["enabled"] = 0
     assert not isolation.rules_out(fdi, fie, True)
-    fdi["statistical"]["enabled"], fdi["authority"] = 1, WORST_CASE
+    fdi["statistical"]["enabled"], fdi["config"]["authority"] = 1, WORST_CASE
     assert not isolation.rules_out(fdi, fie, True)
 
 
 @pytest.mark.parametrize(("detected_at_s", "ruled_out"), [(-1.0, False), (0.0, True), (2.5, True)])
 def test_statistics_that_have_raised_no_alarm_rule_out_nothing(detected_at_s, ruled_out):
     fdi = new_fdi()
-    fie, fdi["authority"] = told(fdi, 0.0, NAMING + 0.1), EITHER
+    fie, fdi["config"]["authority"] = told(fdi, 0.0, NAMING + 0.1), EITHER
     fdi["statistical"]["detected_at_s"] = detected_at_s
     assert isolation.rules_out(fdi, fie, True) == ruled_out
 
@@ -254,7 +254,7 @@ def test_statistics_that_have_raised_no_alarm_rule_out_nothing(detected_at_s, ru
 def test_a_loss_that_has_shown_is_not_ruled_out_by_what_comes_later(abrupt):
     """That may be its end; one that is declared to stay has none."""
     fdi = new_fdi()
-    fie, fdi["abrupt"] = told(fdi, 20.0, 0.0), abrupt
+    fie, fdi["config"]["abrupt"] = told(fdi, 20.0, 0.0), abrupt
     assert not isolation.rules_out(fdi, fie, True)
     assert fie["shown"] == (not abrupt)
     told(fdi, 0.0, 90.0)
@@ -266,10 +266,9 @@ def doubtful(kind=LOSS, **switches):
     fdi = new_fdi()
     fie = estimator(fdi, kind)
     fie["bound"], fie["effect"]["Z"] = 1.0, (1.0, 0.0, 0.0)
-    fdi["innovation"], fdi["bound"]["frame"] = (9.0, 0.0, 0.0), 1.0
+    fdi["bank"]["innovation"], fdi["bound"]["frame"] = (9.0, 0.0, 0.0), 1.0
     fdi["bank"]["residual"], fdi["bank"]["threshold"] = 9.0, 1.0
-    for name, value in switches.items():
-        fdi[name] = value
+    put(fdi, **switches)
     return fdi, fie
 
 
@@ -292,13 +291,13 @@ def test_a_position_is_asked_in_the_first_frame_where_the_past_is_kept():
     fdi, fie = doubtful(POSITION, memory=1)
     fdi["bank"]["residual"] = 0.0
     assert not isolation.possible(fdi, fie, np.zeros(3), False)
-    fdi["innovation"] = 0.0
+    fdi["bank"]["innovation"] = 0.0
     assert isolation.possible(fdi, fie, np.zeros(3), False)
 
 
 def test_what_is_learned_of_a_constant_loss_is_kept_of_no_position():
     fdi, fie = doubtful(POSITION, membership=1, abrupt=1)
-    fdi["innovation"] = 0.0
+    fdi["bank"]["innovation"] = 0.0
     isolation.possible(fdi, fie, np.zeros(3), True)
     assert fie["theta_low"].tolist() == [-1.0] * 3
 
@@ -311,7 +310,7 @@ def test_errors_of_a_surfaces_own_terms_widen_the_room_of_its_position(kind, err
     fie = estimator(fdi, kind, surface=2, low=-0.5, high=0.5)
     G, Gu = rng.normal(size=(2, 3, 4))
     fdi["bound"]["own_errors"], fdi["bound"]["own_per_rad"], fdi["bound"]["frame"] = errors, 0.3, 1.0
-    fdi["instants"] = 1
+    fdi["config"]["instants"] = 1
     isolation.suppose(fdi, fie, G, Gu, np.full((3, 4), 0.1))
     assert (fie["effect"]["spread"] > 0.1).tolist() == [wider] * 3
 
@@ -319,9 +318,9 @@ def test_errors_of_a_surfaces_own_terms_widen_the_room_of_its_position(kind, err
 def test_every_type_starts_with_no_knowledge_of_any_surface():
     for every_type in (0, 1):
         fdi = new_fdi()
-        fdi["every_type"], fdi["surface"]["evidence"] = every_type, 7
+        fdi["config"]["every_type"], fdi["types"]["surface"]["evidence"] = every_type, 7
         isolation.start(fdi, np.zeros(3))
-        assert fdi["surface"]["evidence"].tolist() == [0 if every_type else 7] * 4
+        assert fdi["types"]["surface"]["evidence"].tolist() == [0 if every_type else 7] * 4
 
 
 @pytest.mark.parametrize(
@@ -330,15 +329,25 @@ def test_every_type_starts_with_no_knowledge_of_any_surface():
 )
 def test_a_frame_is_shown_to_every_type_alone_or_in_its_block(length, started, memory, frame, filled):
     fdi = new_fdi()
-    fdi["every_type"], fdi["memory"], fdi["block"]["length"], fdi["block"]["span_s"] = 1, memory, length, 0.1
+    (
+        fdi["config"]["every_type"],
+        fdi["isolation"]["memory"],
+        fdi["types"]["config"]["length"],
+        fdi["types"]["config"]["span_s"],
+    ) = 1, memory, length, 0.1
     fdi["layout"]["position_of"], fdi["layout"]["loss_of"] = range(4), range(4)
-    fdi["layout"]["dominant_axis"], fdi["authority"] = (0, 1, 2, 1), WORST_CASE
-    fdi["n_estimators"], fdi["patience"], fdi["instants"], fdi["whole"] = 4, 9, 1, 1
-    for s, fie in enumerate(fdi["estimator"][:4]):
+    fdi["layout"]["dominant_axis"], fdi["config"]["authority"] = (0, 1, 2, 1), WORST_CASE
+    (
+        fdi["isolation"]["n"],
+        fdi["types"]["config"]["patience"],
+        fdi["config"]["instants"],
+        fdi["types"]["config"]["whole"],
+    ) = 4, 9, 1, 1
+    for s, fie in enumerate(fdi["isolation"]["estimator"][:4]):
         fie["kind"], fie["surface"], fie["low"], fie["high"] = POSITION, s, -1.0, 1.0
         fie["effect"]["Z"] = np.eye(3)[(0, 1, 2, 1)[s]]
     isolation.isolate(fdi, np.zeros(3), 1.0, started)
-    assert (fdi["frame"], fdi["block"]["filled"]) == (frame, filled)
+    assert (fdi["types"]["frame"], fdi["types"]["block"]["filled"]) == (frame, filled)
 
 
 def test_the_axes_of_a_shared_theta_agree_after_each_step():

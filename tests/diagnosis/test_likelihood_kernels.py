@@ -335,10 +335,10 @@ def contested(loss=1.0, step=0.0, other=0.0, growing=0.0, ending=0.0, pitch=(0.0
     """Whether a loss of the rudder (2) is excluded, by log likelihood ratios in roll and yaw; in pitch by
     those of (a step, a loss, its end). Naming level 4."""
     fdi, record = detector()
-    fdi["n_estimators"] = 2
-    fdi["estimator"]["surface"][:2], fdi["estimator"]["kind"][:2] = (0, 2), LOSS
-    fdi["estimator"]["excluded"][0] = keys.get("other_excluded", 0)
-    fdi["abrupt"], fdi["instants"] = keys.get("abrupt", 0), keys.get("instants", 1)
+    fdi["isolation"]["n"] = 2
+    fdi["isolation"]["estimator"]["surface"][:2], fdi["isolation"]["estimator"]["kind"][:2] = (0, 2), LOSS
+    fdi["isolation"]["estimator"]["excluded"][0] = keys.get("other_excluded", 0)
+    fdi["config"]["abrupt"], fdi["config"]["instants"] = keys.get("abrupt", 0), keys.get("instants", 1)
     for b, values in ((1, (loss, step, other, growing, ending)), (2, (99.0, 0.0, 0.0, 0.0, 0.0))):
         block = record["block"][b]
         block["n_hypotheses"] = 5
@@ -390,8 +390,8 @@ def test_in_pitch_an_end_counts_where_it_is_asked_for():
 )
 def test_a_loss_shows_where_it_explains_better_than_all_else_by_the_naming_level(at_least, shown):
     fdi, record = detector()
-    fdi["n_estimators"] = 1
-    fdi["estimator"]["surface"][0], fdi["estimator"]["kind"][0] = 2, LOSS
+    fdi["isolation"]["n"] = 1
+    fdi["isolation"]["estimator"]["surface"][0], fdi["isolation"]["estimator"]["kind"][0] = 2, LOSS
     for b in range(record["n_blocks"]):
         record["block"][b]["n_hypotheses"] = 0
     block = record["block"][1]
@@ -431,11 +431,11 @@ def test_what_the_beliefs_leave_unexplained_is_followed_by_the_drift(b):
 
 def test_a_loss_is_open_until_its_estimator_is_excluded():
     fdi, _ = detector()
-    fdi["n_estimators"], fdi["estimator"]["kind"][:2] = 2, (1, LOSS)
-    fdi["estimator"]["surface"][:2], fdi["estimator"]["excluded"][:2] = 1, (1, 0)
+    fdi["isolation"]["n"], fdi["isolation"]["estimator"]["kind"][:2] = 2, (1, LOSS)
+    fdi["isolation"]["estimator"]["surface"][:2], fdi["isolation"]["estimator"]["excluded"][:2] = 1, (1, 0)
     assert statistical.is_open(fdi, 1)
     assert statistical.is_open(fdi, 3)
-    fdi["estimator"]["excluded"][1] = 1
+    fdi["isolation"]["estimator"]["excluded"][1] = 1
     assert not statistical.is_open(fdi, 1)
 
 

@@ -313,7 +313,7 @@ def test_vanes_and_airspeed_err_together_in_the_gust_they_see():
 @pytest.mark.parametrize(("instants", "share"), [(0, 1.0), (1, 1.0), (4, 0.25)])
 def test_means_over_a_frame_are_shared_among_its_instants(instants, share):
     alone, config = Detector(50.0), Scenario.model_validate(GIVEN).fdi
-    alone.fdi["instants"] = instants
+    alone.fdi["config"]["instants"] = instants
     design = alone.frames[0]["belief"]["design"]
     noise_model.set_up(alone.fdi, config, design, MASS, LEVEL_FLIGHT, 50.0)
     assert alone.detector["share"] == share

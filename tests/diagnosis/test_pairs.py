@@ -53,8 +53,8 @@ def test_ailerons_and_rudder(seed, uncertainty, kind, other, at, later, share, o
     plant = fly(seed, uncertainty, faults)
     check(plant, faults)
     for surface, one, _, _ in faults:
-        assert not plant.fdi["surface"][surface]["type_excluded"][TYPES[one][1]]
-    assert not plant.fdi["pair"]["no_lateral_pair"]
+        assert not plant.fdi["types"]["surface"][surface]["type_excluded"][TYPES[one][1]]
+    assert not plant.fdi["types"]["pair"]["no_lateral_pair"]
 
 
 @settings(max_examples=40, deadline=None)
@@ -100,17 +100,17 @@ def test_ailerons_and_rudder_were_where_two_equations_put_them(off_a, off_r, siz
     Z = np.array([[-9.0, 0.6], [-0.3, -2.1]])  # of roll and yaw, by ailerons and rudder
     frame, spread = np.array(sizes[:2]) + 0.01, np.array(sizes[2:]).reshape(2, 2)
     for column, s in enumerate((AILERON, RUDDER)):
-        effect = fdi["estimator"][fdi["layout"]["position_of"][s]]["effect"]
+        effect = fdi["isolation"]["estimator"][fdi["layout"]["position_of"][s]]["effect"]
         effect["Z"][[0, 2]], effect["spread"][[0, 2]] = Z[:, column], spread[:, column]
-        fdi["surface"][s]["command"] = 0.02
+        fdi["types"]["surface"][s]["command"] = 0.02
     fdi["bound"]["frame"][[0, 2]] = frame
-    fdi["innovation"][[0, 2]] = Z @ [off_a, off_r]
+    fdi["bank"]["innovation"][[0, 2]] = Z @ [off_a, off_r]
     solve_roll_and_yaw(fdi)
     e = frame + spread.sum(axis=1)
     signs = product((-1, 1), repeat=2)
     corners = np.array([np.linalg.solve(Z, Z @ [off_a, off_r] + e * sign) for sign in signs])
     for column, s in enumerate((AILERON, RUDDER)):
-        surface, ends = fdi["surface"][s], corners[:, column]
+        surface, ends = fdi["types"]["surface"][s], corners[:, column]
         assert surface["low"] == pytest.approx(max(surface["travel_low"], 0.02 + ends.min()), abs=1e-9)
         assert surface["high"] == pytest.approx(min(surface["travel_high"], 0.02 + ends.max()), abs=1e-9)
         assert surface["wrong"] == (ends.min() > 0 or ends.max() < 0)

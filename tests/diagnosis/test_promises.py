@@ -107,7 +107,7 @@ def test_a_constant_true_fault_is_never_excluded_by_any_threshold(
     ).fly(FRAMES, uncertainty)
     assert not plant.excluded(surface)
     if plant.fdi["verdict"]["detected"]:
-        fie, true = plant.fdi["estimator"][surface], theta(FRAMES)
+        fie, true = plant.fdi["isolation"]["estimator"][surface], theta(FRAMES)
         assert (fie["theta_low"] <= true + 1e-9).all()
         assert (fie["theta_high"] >= true - 1e-9).all()
 
@@ -184,7 +184,7 @@ def test_a_constant_parameter_stays_in_its_shrinking_set(seed, surface, size):
     """Without any uncertainty the set closes on the parameter, and so does the estimate."""
     plant = DesignPlant(seed, surface=surface, theta=constant(20, size), fault_profile="abrupt")
     plant.fly(200, lambda *_: np.zeros(3), until=lambda p: False)
-    fie = plant.fdi["estimator"][surface]
+    fie = plant.fdi["isolation"]["estimator"][surface]
     if plant.fdi["verdict"]["detected"]:
         assert fie["theta_low"][0] - 1e-9 <= -size <= fie["theta_high"][0] + 1e-9
         assert fie["theta_low"][0] <= fie["theta"][0] <= fie["theta_high"][0]

@@ -56,7 +56,7 @@ def test_a_return_excludes_neither_surface_nor_type(kind, case, surface, at, las
     fault = Repaired(kind, surface, at, at + lasting, share, 1 / case["rate_hz"])
     plant = fly(case, surface, fault, uncertainty)
     assert not plant.position_excluded(surface)
-    assert not plant.fdi["surface"][surface]["type_excluded"][fault.code]
+    assert not plant.fdi["types"]["surface"][surface]["type_excluded"][fault.code]
 
 
 @settings(max_examples=60, deadline=None)
@@ -66,7 +66,7 @@ def test_a_return_does_not_move_the_jam(case, surface, at, lasting, share, uncer
     fault = Repaired("stuck", surface, at, at + lasting, share, 1 / case["rate_hz"])
     plant = fly(case, surface, fault, uncertainty, frames=at + lasting + int(3 * case["rate_hz"]))
     low, high = TRAVEL_RAD[:, surface]
-    known = plant.fdi["surface"][surface]
+    known = plant.fdi["types"]["surface"][surface]
     healthy = not (known["wrong"] or known["wrong_then"])
     if healthy:
         assert known["set_low"][types.STUCK] <= low + share * (high - low) <= known["set_high"][types.STUCK]
@@ -80,7 +80,7 @@ def test_a_surface_that_comes_back_otherwise_than_its_actuator_could_was_not_hel
     for back, excluded in ((None, False), (crawling, True)):
         fault = Repaired(kind, 1, 30, 80, 0.1, 0.01, back)
         plant = fly(case, 1, fault, UNCERTAINTIES["random"], frames=300)
-        assert bool(plant.fdi["surface"][1]["type_excluded"][fault.code]) == excluded
+        assert bool(plant.fdi["types"]["surface"][1]["type_excluded"][fault.code]) == excluded
 
 
 def test_a_servo_does_not_keep_a_bias_from_being_told_from_a_jam():
@@ -93,7 +93,7 @@ def test_a_servo_does_not_keep_a_bias_from_being_told_from_a_jam():
         actuators="servo",
         **case,
     ).fly(100, UNCERTAINTIES["random"])
-    excluded = plant.fdi["surface"][0]["type_excluded"]
+    excluded = plant.fdi["types"]["surface"][0]["type_excluded"]
     assert excluded[types.STUCK]
     assert excluded[types.FLOAT]
     assert not excluded[types.BIAS]
@@ -102,7 +102,7 @@ def test_a_servo_does_not_keep_a_bias_from_being_told_from_a_jam():
 @pytest.mark.parametrize("earlier", [True, False])
 def test_later_releases_become_the_earlier_ones_when_of_those_none_is_left(earlier):
     plant = DesignPlant(seed=1, surface=0, position=lambda k, u: u, fault_class="all", actuators="servo")
-    surface, kind = plant.fdi["surface"][0], types.STUCK
+    surface, kind = plant.fdi["types"]["surface"][0], types.STUCK
     held, jam = surface["release"], surface["stuck"]
     held["low"][:, kind] = 0.1 if earlier else np.inf, 0.2
     held["high"][:, kind] = 0.15 if earlier else -np.inf, 0.3
@@ -141,7 +141,7 @@ def test_health_after_a_swing_that_looked_like_a_jam_is_no_quiet_of_a_jam(surfac
     )
     plant.wanted = lambda k: c - swing(k)
     plant.fly(1000, UNCERTAINTIES["random"])
-    known = plant.fdi["surface"][surface]
+    known = plant.fdi["types"]["surface"][surface]
     assert not known["type_excluded"][types.STUCK]
     assert bool(known["type_excluded"][types.OSCILLATORY]) == excluded
     assert excluded or plant.fdi["verdict"]["type"] != types.STUCK

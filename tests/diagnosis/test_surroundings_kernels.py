@@ -311,7 +311,7 @@ def test_a_plug_ins_verdict_takes_the_place_of_the_built_in_one():
     found = fdi["verdict"]
     assert (found["detected"], found["detected_at_s"], found["detected_axis"]) == (1, 4.0, 1)
     assert (found["isolated"], found["isolated_at_s"], found["estimates"]) == (2, 4.0, 1)
-    assert fdi["estimator"]["theta"][2] == pytest.approx([-0.3] * 3)
+    assert fdi["isolation"]["estimator"]["theta"][2] == pytest.approx([-0.3] * 3)
     assert found["effectiveness"] == pytest.approx([0.5] * 4)
     scheme.note_verdict(fdi, given, 5.0)
     assert (found["detected_at_s"], found["isolated_at_s"]) == (4.0, 4.0)
@@ -320,7 +320,7 @@ def test_a_plug_ins_verdict_takes_the_place_of_the_built_in_one():
     assert (found["isolated"], found["isolated_at_s"]) == (NOT_ISOLATED, 6.0)
     given["isolated"], given["theta"] = 0, -0.7  # the first is as good as any
     scheme.note_verdict(fdi, given, 7.0)
-    assert fdi["estimator"]["theta"][0] == pytest.approx([-0.7] * 3)
+    assert fdi["isolation"]["estimator"]["theta"][0] == pytest.approx([-0.7] * 3)
 
 
 @pytest.mark.parametrize(
@@ -333,7 +333,11 @@ def test_a_plug_ins_verdict_takes_the_place_of_the_built_in_one():
 )  # fmt: skip
 def test_the_built_in_statistic(enabled, authority, score, share, statistic):
     fdi = new_fdi()
-    fdi["statistical"]["enabled"], fdi["authority"], fdi["statistical"]["score"] = enabled, authority, score
+    fdi["statistical"]["enabled"], fdi["config"]["authority"], fdi["statistical"]["score"] = (
+        enabled,
+        authority,
+        score,
+    )
     fdi["bank"]["threshold"][0], fdi["bank"]["residual"][0, 1] = 0.5, 0.5 * share
     assert scheme.built_in_statistic(fdi) == pytest.approx(statistic)
     assert bool(scheme.likelihood_counts(fdi)) == (enabled == 1 and authority != WORST_CASE)
@@ -341,8 +345,12 @@ def test_the_built_in_statistic(enabled, authority, score, share, statistic):
 
 def test_the_estimate_is_that_of_whoever_counts():
     fdi = new_fdi()
-    fdi["verdict"]["isolated"], fdi["estimator"]["surface"][5], fdi["layout"]["dominant_axis"][2] = 5, 2, 1
-    fdi["estimator"]["theta"][5] = -0.1, -0.2, -0.3
+    (
+        fdi["verdict"]["isolated"],
+        fdi["isolation"]["estimator"]["surface"][5],
+        fdi["layout"]["dominant_axis"][2],
+    ) = 5, 2, 1
+    fdi["isolation"]["estimator"]["theta"][5] = -0.1, -0.2, -0.3
     fdi["statistical"]["n_blocks"] = 1
     block = fdi["statistical"]["block"][0]
     block["n_hypotheses"], block["n"], block["axis"][0] = 1, 1, 1

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from kernels import new_fdi
+from kernels import new_fdi, put
 
 from beaver_ftc.diagnosis.types import (
     bias,
@@ -43,9 +43,9 @@ ALL = set(range(N_TYPES))
 def new_surface(left=ALL, low=-0.01, high=0.01, command=0.0, **fields):
     """(fdi, surface 0) with only these types left; low to high: where it was in the judged frame, rad."""
     fdi = new_fdi()
-    fdi["whole"], fdi["patience"], fdi["instants"] = 1, 20, 1
-    fdi["block"]["length"], fdi["block"]["span_s"], fdi["frame"] = 1, DT, 10
-    surface = fdi["surface"][0]
+    put(fdi, whole=1, patience=20, instants=1)
+    fdi["types"]["config"]["length"], fdi["types"]["config"]["span_s"], fdi["types"]["frame"] = 1, DT, 10
+    surface = fdi["types"]["surface"][0]
     surface["travel_low"], surface["travel_high"], surface["approach"], surface["step"] = LOW, HIGH, 0.5, 0.1
     surface["reach_low"], surface["reach_high"] = min(LOW, 0.0), max(HIGH, 0.0)
     examine.begin(surface)
@@ -97,7 +97,7 @@ def test_a_constant_loss_keeps_the_shares_that_explain_the_frame(low, high, comm
 def test_over_a_block_in_which_the_command_swings_any_mean_may_be_a_varying_loss():
     for least, greatest, excluded in ((-0.1, 0.2, 0), (0.0, 0.2, 1), (-0.1, 0.0, 1)):
         fdi, surface = new_surface(low=0.11, high=0.2, command=0.1)
-        fdi["block"]["length"], surface["orders"]["least"][1] = 5, least
+        fdi["types"]["config"]["length"], surface["orders"]["least"][1] = 5, least
         surface["orders"]["greatest"][1] = greatest
         varying_loss.judge(fdi, surface, VARYING_LOSS, 5)
         assert surface["type_excluded"][VARYING_LOSS] == excluded
@@ -137,7 +137,7 @@ def test_no_offset_takes_a_surface_beyond_its_stops(low, high):
 @pytest.mark.parametrize("length", [1, 5])  # frames; one may have several instants
 def test_within_what_is_seen_at_once_a_stop_may_have_been_met_at_its_furthest_order(length):
     fdi, surface = new_surface(low=0.2, high=0.25, command=0.1)
-    fdi["block"]["length"] = length
+    fdi["types"]["config"]["length"] = length
     surface["orders"]["least"][1], surface["orders"]["greatest"][1] = -0.4, 0.34
     # the lowest it was: 0.2 - (0.1 + 0.4) = -0.3; the highest: 0.25 + 0.24 = 0.49, below 0.5
     assert sets.offset(fdi, surface) == pytest.approx((0.1, 0.15))
@@ -211,7 +211,7 @@ def test_a_growing_bias_is_as_fast_as_a_runaway_only_where_that_is_certain(place
 
 def test_of_several_instants_a_mean_may_be_that_of_the_last():
     fdi, surface = new_surface(least_runaway_rate=0.05 / DT)
-    fdi["whole"] = 0
+    fdi["types"]["config"]["whole"] = 0
     for place, ran in ((0.0, 0), (0.19, 0), (0.31, 1)):  # beyond 0.01 + 3 * 0.09 after two frames
         growing_bias.watch(fdi, surface, GROWING_BIAS)
         surface["low_then"], surface["high_then"] = place - 0.01, place + 0.01
@@ -221,7 +221,7 @@ def test_of_several_instants_a_mean_may_be_that_of_the_last():
 
 def slow_run(places, orders=(0.0, 0.0), whole=1, frames=None, slowest_step=0.0):
     fdi, surface = new_surface(slowest_step=slowest_step)
-    fdi["whole"] = whole
+    fdi["types"]["config"]["whole"] = whole
     surface["orders"]["low"], surface["orders"]["high"] = orders[0], orders[1]
     for k, place in enumerate(places):
         surface["low_then"], surface["high_then"] = place - 0.01, place + 0.01
@@ -259,7 +259,7 @@ def test_which_side_of_its_orders_a_surface_stands_on():
     fdi, surface = new_surface(low=0.1, high=0.2)
     orders = surface["orders"]
     for newest, whole in ((1, 0), (2, 1)):
-        fdi["whole"] = whole
+        fdi["types"]["config"]["whole"] = whole
         for low, high, side in ((-0.1, 0.05, 1), (0.25, 0.3, -1), (0.05, 0.15, 0), (0.15, 0.3, 0)):
             orders["low"], orders["high"] = 9.0, -9.0
             orders["low"][newest], orders["high"][newest] = low, high
@@ -270,9 +270,9 @@ def test_which_side_of_its_orders_a_surface_stands_on():
 
 def swung(signs, patience=20):
     fdi, surface = new_surface()
-    fdi["patience"] = patience
+    fdi["types"]["config"]["patience"] = patience
     for frame, sign in enumerate(signs):
-        fdi["frame"] = frame + 1
+        fdi["types"]["frame"] = frame + 1
         surface["low_then"], surface["high_then"] = 0.1 * sign - 0.02, 0.1 * sign + 0.02
         oscillatory.watch(fdi, surface, OSCILLATORY)
         oscillatory.judge(fdi, surface, OSCILLATORY, frame)
@@ -310,7 +310,7 @@ def test_a_sign_that_stays_for_longer_than_the_slowest_half_cycle_is_none():
 @pytest.mark.parametrize(("length", "ways"), [(1, (0.0, 0.02, 0.1)), (5, (0.0, 0.0, 0.08))])
 def test_a_runaway_has_gone_at_least_its_way(length, ways):
     fdi, surface = new_surface(started_at=3, start_low=0.1, start_high=0.2, least_runaway_rate=1.0)
-    fdi["block"]["length"] = length
+    fdi["types"]["config"]["length"] = length
     for frame, way in zip((3, 4, 8), ways, strict=True):
         assert runaway.way(fdi, surface, frame) == pytest.approx(way)
         assert runaway.upwards(fdi, surface, frame) == pytest.approx(0.1 + way)
@@ -345,7 +345,7 @@ def test_what_holds_a_surface_is_excluded_where_it_is_not(module, kind, inside, 
 )
 def test_at_a_stop_the_mean_of_a_quick_swing_keeps_its_sign(whole, hides, excluded):
     fdi, surface = new_surface(low=-0.2, high=-0.1, command=0.1)  # below its command all the time
-    fdi["whole"], surface["hides_then"] = whole, hides
+    fdi["types"]["config"]["whole"], surface["hides_then"] = whole, hides
     for frame in range(30):
         oscillatory.judge(fdi, surface, OSCILLATORY, frame)
     assert surface["type_excluded"][OSCILLATORY] == excluded
@@ -373,7 +373,7 @@ def test_where_types_have_a_surface():
         started_at=3, start_low=0.1, start_high=0.2, least_runaway_rate=1.0, command=0.2
     )
     surface["command"], surface["set_low"][CONSTANT_LOSS] = -0.2, 0.25
-    fdi["frame"] = 5
+    fdi["types"]["frame"] = 5
     assert loss.deflection(fdi, surface, CONSTANT_LOSS) == pytest.approx((-0.2, -0.05))
     assert floating.deflection(fdi, surface, FLOAT) == (0.0, 0.0)
     surface["travel_low"] = 0.1  # the lower stop is as near to neutral as it comes
@@ -392,7 +392,7 @@ def test_where_types_have_a_surface():
 
 def released(low=0.2, high=0.3, order=0.0, judged=(-1.0, 1.0), instants=1, **fields):
     fdi, surface = new_surface(low=judged[0], high=judged[1], **fields)
-    fdi["returns"], fdi["instants"] = 1, instants
+    fdi["types"]["config"]["returns"], fdi["types"]["config"]["instants"] = 1, instants
     surface["orders"]["given"][1] = order
     for which in (release.EARLIER, release.LATER):
         release.forget(surface, which, STUCK)
@@ -447,7 +447,7 @@ def test_a_return_has_the_room_that_an_uneven_effectiveness_gives_it(length, ins
     for beyond, there in ((0.9, True), (1.1, False), (-0.9, True), (-1.1, False)):
         shown = 0.25 + beyond * 0.2 * 0.1
         fdi, surface = released(low=0.2, high=0.2, order=0.9, judged=(shown, shown), instants=instants)
-        fdi["block"]["length"], surface["approach"], surface["step"] = length, 1.0, 0.05
+        fdi["types"]["config"]["length"], surface["approach"], surface["step"] = length, 1.0, 0.05
         surface["uneven_then"] = 0.2
         assert release.possible(fdi, surface, STUCK) == there
 
@@ -474,12 +474,12 @@ def test_what_is_let_go_joins_the_later_releases_and_is_carried_on():
 @pytest.mark.parametrize("returns", [0, 1])
 def test_a_type_that_no_longer_holds_is_excluded_unless_a_return_explains_it(returns):
     fdi, surface = released(judged=(0.2, 0.3))
-    fdi["returns"] = returns
+    fdi["types"]["config"]["returns"] = returns
     assert not release.holds(fdi, surface, STUCK, -0.1, 0.1)
     assert surface["type_excluded"][STUCK] == (not returns)
     assert surface["release"]["released"][STUCK] == returns
     fdi, surface = released(judged=(0.2, 0.3))
-    fdi["returns"] = returns
+    fdi["types"]["config"]["returns"] = returns
     assert release.holds(fdi, surface, STUCK, 0.3, 0.4)
     assert release.holds(fdi, surface, STUCK, 0.1, 0.2)
     surface["release"]["released"][STUCK] = 1
@@ -489,7 +489,7 @@ def test_a_type_that_no_longer_holds_is_excluded_unless_a_return_explains_it(ret
 def test_where_a_surface_was_as_the_judged_frame_began():
     fdi, surface = new_surface(low=0.1, high=0.2, low_before=0.3, high_before=0.4)
     assert release.beginning(fdi, surface) == (0.1, 0.2, 9)
-    fdi["whole"] = 0
+    fdi["types"]["config"]["whole"] = 0
     assert release.beginning(fdi, surface) == (0.3, 0.4, 8)
 
 
@@ -518,7 +518,7 @@ def test_from_where_each_type_lets_go(module, kind):
 )
 def test_within_a_frame_of_several_instants_a_runaway_may_be_let_go_further_on(module, kind, expected):
     fdi, surface = released(started_at=7, start_low=0.0, start_high=0.1, least_runaway_rate=1.0)
-    surface["low_before"], surface["high_before"], fdi["whole"] = -0.1, 0.2, 0
+    surface["low_before"], surface["high_before"], fdi["types"]["config"]["whole"] = -0.1, 0.2, 0
     for which in (0, 1):
         release.forget(surface, which, kind)
     module.let_go(fdi, surface, kind)
@@ -550,7 +550,7 @@ def test_a_jam_that_may_have_let_go_returns_to_what_was_known_before():
 def within_block(orders, held=(0.2, 0.3), judged=(-1.0, 1.0)):
     """A block of frames in which the surface may be let go at any instant."""
     fdi, surface = released(low=np.inf, high=-np.inf, judged=judged, wrong_then=1)
-    fdi["block"]["length"] = len(orders)
+    fdi["types"]["config"]["length"] = len(orders)
     surface["orders"]["given"][1, : len(orders)] = orders
     surface["release"]["held_low"][STUCK], surface["release"]["held_high"][STUCK] = held
     surface["uneven_then"] = UNEVEN
@@ -597,7 +597,7 @@ def test_a_release_within_the_block_explains_what_lies_between_with_some_room(en
     assert release.possible(fdi, surface, STUCK) == inside
     held = surface["release"]["held_low"][STUCK] <= surface["release"]["held_high"][STUCK]
     assert held == inside, "what explains nothing is forgotten"
-    fdi["block"]["length"] = 1
+    fdi["types"]["config"]["length"] = 1
     assert not release.let_go_within(fdi, surface, STUCK)
 
 
@@ -616,7 +616,7 @@ def test_after_a_block_releases_within_it_join_the_later_ones(joined):
     low, high = (release.carried(fdi, surface, *of)[1] for of in ((0.2, -1), (0.3, 1)))
     assert (held["low"][1, STUCK], held["high"][1, STUCK]) == pytest.approx((low, high))
     assert not release.any_release(surface, release.EARLIER, STUCK)
-    fdi["block"]["length"], before = 1, held["high"][1, STUCK].copy()
+    fdi["types"]["config"]["length"], before = 1, held["high"][1, STUCK].copy()
     release.forget(surface, release.LATER, STUCK)
     release.bring_back(fdi, surface, STUCK)
     assert not release.any_release(surface, release.LATER, STUCK), "in one frame nothing is let go within"
@@ -627,7 +627,7 @@ def test_after_a_block_releases_within_it_join_the_later_ones(joined):
 @pytest.mark.parametrize("inside", [True, False])
 def test_where_the_effectiveness_changes_a_return_has_a_share_of_its_way_as_room(side, inside):
     fdi, surface = released(low=0.2, high=0.3, command=-0.2)
-    fdi["block"]["length"], surface["orders"]["given"][1, :4] = 4, ORDERS
+    fdi["types"]["config"]["length"], surface["orders"]["given"][1, :4] = 4, ORDERS
     held, start = surface["release"], 0.2 if side == "low" else 0.3
     surface["uneven_then"], path = UNEVEN, way(start, ORDERS)
     mean = path[:-1].mean()

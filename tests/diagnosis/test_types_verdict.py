@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from kernels import new_fdi
+from kernels import new_fdi, put
 
 from beaver_ftc.diagnosis.belief import means_dtype
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, PITCH, ROLL, UNANTICIPATED, YAW
@@ -37,30 +37,42 @@ def leave(surface, *kinds):
 def new_case(**left):
     """Four surfaces, of which each has these types left: by default all; none: it cannot be at fault."""
     fdi = new_fdi()
-    fdi["patience"], fdi["whole"], fdi["every_type"], fdi["instants"] = PATIENCE, 1, 1, 1
-    fdi["n_estimators"] = 8
-    fdi["block"]["length"], fdi["block"]["span_s"] = 1, DT
+    (
+        fdi["types"]["config"]["patience"],
+        fdi["types"]["config"]["whole"],
+        fdi["config"]["every_type"],
+        fdi["types"]["config"]["instants"],
+    ) = PATIENCE, 1, 1, 1
+    fdi["isolation"]["n"] = 8
+    fdi["types"]["config"]["length"], fdi["types"]["config"]["span_s"] = 1, DT
     layout = fdi["layout"]
     layout["loss_of"], layout["position_of"] = range(4), range(4, 8)
     layout["dominant_axis"], layout["main"] = (ROLL, PITCH, YAW, PITCH), (AILERON, ELEVATOR, RUDDER)
     layout["group"], layout["partner"] = (1, 0, 1, 0), (RUDDER, FLAP, AILERON, ELEVATOR)
-    fdi["estimator"]["surface"][:8], fdi["estimator"]["kind"][:8] = (0, 1, 2, 3) * 2, (0,) * 4 + (1,) * 4
-    fdi["surface"]["in_question"], fdi["surface"]["evidence"], fdi["surface"]["unhidden"] = 1, 99, 99
-    fdi["surface"]["travel_low"], fdi["surface"]["travel_high"] = -0.4, 0.5
-    fdi["surface"]["reach_low"], fdi["surface"]["reach_high"] = -0.4, 0.5
-    fdi["estimator"]["low"][4:8], fdi["estimator"]["high"][4:8] = -0.4, 0.5
+    fdi["isolation"]["estimator"]["surface"][:8], fdi["isolation"]["estimator"]["kind"][:8] = (
+        (0, 1, 2, 3) * 2,
+        (0,) * 4 + (1,) * 4,
+    )
+    (
+        fdi["types"]["surface"]["in_question"],
+        fdi["types"]["surface"]["evidence"],
+        fdi["types"]["surface"]["unhidden"],
+    ) = 1, 99, 99
+    fdi["types"]["surface"]["travel_low"], fdi["types"]["surface"]["travel_high"] = -0.4, 0.5
+    fdi["types"]["surface"]["reach_low"], fdi["types"]["surface"]["reach_high"] = -0.4, 0.5
+    fdi["isolation"]["estimator"]["low"][4:8], fdi["isolation"]["estimator"]["high"][4:8] = -0.4, 0.5
     for s, name in enumerate(("aileron", "elevator", "rudder", "flap")):
         kinds = left.get(name, ALL)
         if kinds is None:
-            fdi["estimator"]["excluded"][4 + s] = 1
+            fdi["isolation"]["estimator"]["excluded"][4 + s] = 1
         else:
-            leave(fdi["surface"][s], *kinds)
+            leave(fdi["types"]["surface"][s], *kinds)
     return fdi
 
 
 def one(*kinds, **fields):
     fdi = new_case(rudder=kinds)
-    surface = fdi["surface"][RUDDER]
+    surface = fdi["types"]["surface"][RUDDER]
     for name, value in fields.items():
         surface[name] = value
     return fdi, surface
@@ -127,7 +139,7 @@ def test_what_kind_of_fault_it_may_be(kinds, loses, held, fixed, one_type, sole_
 def test_a_surface_is_possible_by_its_estimator_or_by_deduction():
     fdi = new_case(rudder=None)
     assert [bool(candidates.possible(fdi, s)) for s in range(4)] == [True, True, False, True]
-    fdi["surface"]["standing"] = RULED_OUT, BY_DEDUCTION, BY_DEDUCTION, 0
+    fdi["types"]["surface"]["standing"] = RULED_OUT, BY_DEDUCTION, BY_DEDUCTION, 0
     assert [bool(candidates.possible(fdi, s)) for s in range(4)] == [False, True, True, True]
 
 
@@ -138,7 +150,7 @@ def test_the_sole_surface_that_is_possible():
     only = new_case(aileron=COURSES, elevator=COURSES, flap=COURSES, rudder=(STUCK,))
     assert candidates.sole(only, True) == RUDDER
     assert candidates.sole(only, False) == SEVERAL
-    only["surface"]["in_question"] = 0, 0, 0, 1
+    only["types"]["surface"]["in_question"] = 0, 0, 0, 1
     assert candidates.sole(only, False) == FLAP
     assert candidates.sole(only, True) == NO_SURFACE
 
@@ -248,12 +260,12 @@ def test_the_surface_at_fault():
 )  # fmt: skip
 def test_of_elevator_and_flap_the_one_a_constant_explains(flap, evidence, own_errors, refuted):
     fdi = new_case(elevator=(STUCK,), aileron=None, rudder=None, flap=flap)
-    fdi["surface"]["evidence"][ELEVATOR], fdi["bound"]["own_errors"] = evidence, own_errors
-    fdi["surface"]["unhidden"][FLAP] = evidence
+    fdi["types"]["surface"]["evidence"][ELEVATOR], fdi["bound"]["own_errors"] = evidence, own_errors
+    fdi["types"]["surface"]["unhidden"][FLAP] = evidence
     assert bool(verdict.others_refuted(fdi, ELEVATOR)) == refuted
     if flap is not None:
         assert verdict.surface_at_fault(fdi) == (ELEVATOR if refuted else NOT_ISOLATED)
-    fdi["surface"]["in_question"][FLAP] = 0
+    fdi["types"]["surface"]["in_question"][FLAP] = 0
     assert bool(verdict.others_refuted(fdi, ELEVATOR)) == (evidence >= PATIENCE)
 
 
@@ -264,13 +276,13 @@ def test_a_decision_notes_when_surface_and_type_became_certain():
     assert fdi["verdict"]["isolated"] == 4 + RUDDER  # its estimator of a position
     assert fdi["verdict"]["type"] == STUCK
     assert (fdi["verdict"]["isolated_at_s"], fdi["verdict"]["type_at_s"]) == (3.0, 3.0)
-    leave(fdi["surface"][RUDDER], VARYING_LOSS)
+    leave(fdi["types"]["surface"][RUDDER], VARYING_LOSS)
     verdict.decide(fdi, 4.0)
     assert fdi["verdict"]["isolated"] == RUDDER  # its estimator of a loss
     assert (fdi["verdict"]["isolated_at_s"], fdi["verdict"]["type_at_s"]) == (3.0, 4.0)
     verdict.decide(fdi, 5.0)
     assert (fdi["verdict"]["isolated_at_s"], fdi["verdict"]["type_at_s"]) == (3.0, 4.0)
-    fdi["estimator"]["excluded"][4 + RUDDER] = 1
+    fdi["isolation"]["estimator"]["excluded"][4 + RUDDER] = 1
     verdict.decide(fdi, 6.0)
     assert fdi["verdict"]["isolated"] == UNANTICIPATED
     assert (fdi["verdict"]["isolated_at_s"], fdi["verdict"]["type_at_s"]) == (6.0, 6.0)
@@ -296,15 +308,15 @@ def _open(fdi):
 
 def test_the_lead_is_taken_on_one_surface_while_its_fault_shows():
     fdi = _open(new_case(rudder=(STUCK,), **NOBODY_ELSE))
-    surface = fdi["surface"][RUDDER]
+    surface = fdi["types"]["surface"][RUDDER]
     surface["set_low"][STUCK], surface["set_high"][STUCK], surface["command"] = 0.1, 0.2, 0.3
     surface["low"], surface["high"] = 0.1, 0.2
-    fdi["surface"]["measure"] = 3
+    fdi["types"]["surface"]["measure"] = 3
     verdict.take_the_lead(fdi)
     assert (fdi["verdict"]["lead"], fdi["verdict"]["lead_kind"]) == (RUDDER, FIXED)
-    assert fdi["surface"]["measure"].tolist() == [-1, -1, FIXED, -1]
+    assert fdi["types"]["surface"]["measure"].tolist() == [-1, -1, FIXED, -1]
     surface["low"], surface["high"] = 0.25, 0.35  # it follows its command again
-    fdi["dt"] = 0.01
+    fdi["config"]["dt"] = 0.01
     for _ in range(19):
         verdict.take_the_lead(fdi)
     assert fdi["verdict"]["lead"] == RUDDER
@@ -320,7 +332,7 @@ def test_the_lead_is_taken_on_one_surface_while_its_fault_shows():
 @pytest.mark.parametrize("dt", [0.01, 0.002, 0.05])
 def test_a_fault_that_has_gone_is_let_go_after_a_fifth_of_a_second_at_any_rate(dt):
     fdi, surface = one(STUCK, command=0.3, low=0.29, high=0.31, absent=0)
-    fdi["dt"] = dt
+    fdi["config"]["dt"] = dt
     surface["set_low"][STUCK], surface["set_high"][STUCK] = 0.1, 0.2
     there = [bool(verdict.still_there(fdi, surface, FIXED, True)) for _ in range(round(0.3 / dt))]
     assert there.index(False) + 1 == round(0.2 / dt)
@@ -346,10 +358,10 @@ def test_how_far_a_surface_is_off(kinds, at_fault, off):
 
 def test_what_a_surface_has_left():
     fdi, surface = one(CONSTANT_LOSS)
-    fdi["estimator"]["theta"][RUDDER] = -0.1, -0.2, -0.3
+    fdi["isolation"]["estimator"]["theta"][RUDDER] = -0.1, -0.2, -0.3
     surface["set_low"][CONSTANT_LOSS], surface["set_high"][CONSTANT_LOSS] = 0.5, 0.6
     assert verdict.effectiveness_left(fdi, RUDDER) == pytest.approx(0.7)  # by its own axis, yaw
-    fdi["pair"]["enabled"] = 1
+    fdi["types"]["pair"]["enabled"] = 1
     assert verdict.effectiveness_left(fdi, RUDDER) == pytest.approx(0.55)
     leave(surface, VARYING_LOSS)
     assert verdict.effectiveness_left(fdi, RUDDER) == pytest.approx(0.7)
@@ -362,24 +374,27 @@ def test_orders_are_kept_for_the_frames_before():
     fdi, means = new_case(), np.zeros(1, means_dtype(4)).view(np.recarray)[0]
     for frame in ((0.1, 0.2), (0.3, -0.1), (0.9, 0.0)):
         for k, order in enumerate(frame):
-            fdi["block"]["length"], fdi["block"]["filled"] = 2, k
+            fdi["types"]["config"]["length"], fdi["types"]["block"]["filled"] = 2, k
             means["G_least"], means["G_most"] = -1.0 - order, 2.0 - k
             means["u_least"], means["u_most"] = order - 0.01, order + 0.02
             examine.note_orders(fdi, np.full(4, order), means)
-    orders = fdi["surface"][0]["orders"]
+    orders = fdi["types"]["surface"][0]["orders"]
     assert orders["given"][:, :2] == pytest.approx(
         np.array([[0.5, 0.0], [0.3, -0.1], [0.1, 0.2]])
     )  # within the travel
     assert orders["low"] == pytest.approx([0.0, -0.1, 0.1])
     assert orders["high"] == pytest.approx([0.5, 0.3, 0.2])
-    assert (fdi["surface"][0]["G_least"], fdi["surface"][0]["G_most"]) == (-1.9, 2.0)  # of the last block
+    assert (fdi["types"]["surface"][0]["G_least"], fdi["types"]["surface"][0]["G_most"]) == (
+        -1.9,
+        2.0,
+    )  # of the last block
     assert orders["least"] == pytest.approx([-0.01, -0.11])  # of a healthy one
     assert orders["greatest"] == pytest.approx([0.92, 0.32])
 
 
 def test_what_the_effectiveness_varies_by_is_a_share_of_its_mean():
     fdi = new_case()
-    effect, surface = fdi["estimator"][4 + RUDDER]["effect"], fdi["surface"][RUDDER]
+    effect, surface = fdi["isolation"]["estimator"][4 + RUDDER]["effect"], fdi["types"]["surface"][RUDDER]
     effect["Z"], surface["uneven"] = (0.5, 0.0, -2.0), 0.07
     surface["G_least"], surface["G_most"] = -2.1, -1.8
     examine.locate(fdi, RUDDER, np.zeros(3), np.zeros(3), effect)
@@ -388,7 +403,7 @@ def test_what_the_effectiveness_varies_by_is_a_share_of_its_mean():
 
 def test_a_surface_is_where_the_innovation_puts_it():
     fdi = new_case()
-    effect, surface = fdi["estimator"][4 + RUDDER]["effect"], fdi["surface"][RUDDER]
+    effect, surface = fdi["isolation"]["estimator"][4 + RUDDER]["effect"], fdi["types"]["surface"][RUDDER]
     effect["Z"], effect["offset"] = (0.5, 0.0, -2.0), (-0.05, 0.0, 0.2)  # commanded to 0.1
     surface["low"], surface["high"], surface["command"] = 0.2, 0.3, 0.15
     surface["low_then"], surface["high_then"] = 0.4, 0.45
@@ -398,7 +413,7 @@ def test_a_surface_is_where_the_innovation_puts_it():
     assert (surface["low"], surface["high"]) == pytest.approx((0.29, 0.31))  # roll says it to 0.005 / 0.5
     assert (surface["low_then"], surface["high_then"], surface["command_then"]) == (0.2, 0.3, 0.15)
     assert (surface["low_before"], surface["high_before"]) == (0.4, 0.45)
-    fdi["block"]["length"] = 4
+    fdi["types"]["config"]["length"] = 4
     examine.locate(fdi, RUDDER, np.array([0.1, 0.0, -0.4]), np.array([0.005, 1.0, 0.1]), effect)
     assert (surface["low"], surface["high"]) == pytest.approx((0.25, 0.35))  # its own axis alone
 
@@ -407,9 +422,9 @@ def test_wrong_frames_are_remembered_for_two_more():
     fdi, bound = new_case(), np.full(3, 0.1)
     for innovation in (0.2, 0.05, 0.2):
         examine.note_wrong(fdi, np.array([0.0, innovation, 0.0]), bound)
-    assert fdi["surface"]["wrong"].tolist() == [1] * 4
-    assert fdi["surface"]["wrong_then"].tolist() == [0] * 4
-    assert fdi["surface"]["wrong_before"].tolist() == [1] * 4
+    assert fdi["types"]["surface"]["wrong"].tolist() == [1] * 4
+    assert fdi["types"]["surface"]["wrong_then"].tolist() == [0] * 4
+    assert fdi["types"]["surface"]["wrong_before"].tolist() == [1] * 4
 
 
 @pytest.mark.parametrize(
@@ -421,8 +436,8 @@ def test_wrong_frames_are_remembered_for_two_more():
 )  # fmt: skip
 def test_a_frame_next_to_a_healthy_one_is_judged_only_if_faults_begin_between_frames(whole, wrong, judged):
     fdi = new_case()
-    fdi["whole"], fdi["frame"] = whole, 7
-    surface = fdi["surface"][RUDDER]
+    fdi["types"]["config"]["whole"], fdi["types"]["frame"] = whole, 7
+    surface = fdi["types"]["surface"][RUDDER]
     examine.begin(surface)
     surface["evidence"], surface["measure"] = 5, -1
     surface["wrong_before"], surface["wrong_then"], surface["wrong"] = wrong
@@ -431,13 +446,13 @@ def test_a_frame_next_to_a_healthy_one_is_judged_only_if_faults_begin_between_fr
     assert surface["evidence"] == (6 if judged else 5)
     assert surface["started_at"] == (6 if judged else -1)
     assert (surface["start_low"], surface["start_high"]) == ((0.1, 0.2) if judged else (0.0, 0.0))
-    assert fdi["frame"] == 8
+    assert fdi["types"]["frame"] == 8
     assert surface["oscillatory"]["steady_since"] == (6 if judged else 7)
 
 
 def test_evidence_counts_for_a_swing_since_a_stop_could_last_hide_one():
     fdi = new_case()
-    surface = fdi["surface"][RUDDER]
+    surface = fdi["types"]["surface"][RUDDER]
     examine.begin(surface)
     counted = []
     for hides in ((0, 0), (0, 0), (0, 1), (0, 0), (1, 0), (0, 0), (0, 0), (0, 0)):
@@ -451,7 +466,7 @@ def test_evidence_counts_for_a_swing_since_a_stop_could_last_hide_one():
 
 def test_where_a_stop_is_follows_the_surface_by_a_frame():
     fdi = new_case()
-    surface, effect = fdi["surface"][RUDDER], fdi["estimator"][4 + RUDDER]["effect"]
+    surface, effect = fdi["types"]["surface"][RUDDER], fdi["isolation"]["estimator"][4 + RUDDER]["effect"]
     effect["Z"], effect["spread"], bound = (0.5, 0.0, -2.0), (9.0, 9.0, 0.02), np.array([9.0, 9.0, 0.08])
     for at, now in ((0.41, 1), (0.39, 0)):  # 2 (0.08 + 0.02) / 2 is 0.1 rad, the stop at 0.5
         surface["orders"]["greatest"][0], then = at, surface["hides"].copy()
@@ -462,7 +477,7 @@ def test_where_a_stop_is_follows_the_surface_by_a_frame():
 
 def test_a_frame_that_puts_a_surface_nowhere_judges_nothing():
     fdi = new_case()
-    surface = fdi["surface"][RUDDER]
+    surface = fdi["types"]["surface"][RUDDER]
     examine.begin(surface)
     surface["low_then"], surface["high_then"] = 0.2, 0.1
     examine.judge(fdi, surface, 6)
@@ -471,15 +486,11 @@ def test_a_frame_that_puts_a_surface_nowhere_judges_nothing():
 
 def quiet(low=0.1, high=0.2, frames=1, **fields):
     fdi = new_case()
-    surface = fdi["surface"][RUDDER]
+    surface = fdi["types"]["surface"][RUDDER]
     surface["set_low"][STUCK], surface["set_high"][STUCK] = 0.15, 0.3
     surface["low_then"], surface["high_then"] = low, high
-    fdi["surface"]["evidence"] = 0
-    for name, value in fields.items():
-        if name == "own_errors":
-            fdi["bound"][name] = value
-        else:
-            fdi[name] = value
+    fdi["types"]["surface"]["evidence"] = 0
+    put(fdi, **fields)
     for _ in range(frames):
         examine.note_quiet(fdi, RUDDER)
     return fdi, surface
@@ -487,7 +498,7 @@ def quiet(low=0.1, high=0.2, frames=1, **fields):
 
 def test_a_quiet_surface_given_up_does_not_swing():
     fdi, surface = quiet()
-    assert fdi["surface"]["evidence"].tolist() == [1] * 4
+    assert fdi["types"]["surface"]["evidence"].tolist() == [1] * 4
     assert surface["quiet"] == 1
     assert quiet(low=0.31, high=0.4)[1]["quiet"] == 0
     assert quiet(low=0.0, high=0.14)[1]["quiet"] == 0
@@ -495,42 +506,46 @@ def test_a_quiet_surface_given_up_does_not_swing():
     assert quiet(frames=PATIENCE + 1)[1]["type_excluded"][OSCILLATORY]
     assert not quiet(frames=PATIENCE + 1, own_errors=1)[1]["type_excluded"][OSCILLATORY]
     fdi, surface = quiet()
-    fdi["surface"]["in_question"] = 1, 1, 0, 1
+    fdi["types"]["surface"]["in_question"] = 1, 1, 0, 1
     examine.note_quiet(fdi, RUDDER)
-    assert fdi["surface"]["evidence"].tolist() == [1, 1, 2, 1]  # of another one it says nothing then
+    assert fdi["types"]["surface"]["evidence"].tolist() == [1, 1, 2, 1]  # of another one it says nothing then
 
 
 @pytest.mark.parametrize("abrupt", [0, 1])
 def test_a_surface_given_up_is_quiet_where_nothing_is_wrong_and_a_fault_stays(abrupt):
     fdi = new_case()
-    fdi["surface"]["measure"], fdi["surface"]["set_high"], fdi["abrupt"] = -1, 1.0, abrupt
-    fdi["surface"][RUDDER]["measure"] = FIXED
+    fdi["types"]["surface"]["measure"], fdi["types"]["surface"]["set_high"], fdi["config"]["abrupt"] = (
+        -1,
+        1.0,
+        abrupt,
+    )
+    fdi["types"]["surface"][RUDDER]["measure"] = FIXED
     examine.judge_all(fdi)
-    assert fdi["surface"]["quiet"].tolist() == [0, 0, abrupt, 0]
+    assert fdi["types"]["surface"]["quiet"].tolist() == [0, 0, abrupt, 0]
 
 
 def test_a_block_is_the_mean_of_its_frames_with_the_noise_of_its_ends():
     rng, fdi, length = np.random.default_rng(6), new_case(), 4
-    fdi["block"]["length"], fdi["block"]["span_s"] = length, length * DT
-    fdi["block"]["innovation"], fdi["block"]["bound"] = 9.0, 9.0
+    fdi["types"]["config"]["length"], fdi["types"]["config"]["span_s"] = length, length * DT
+    fdi["types"]["block"]["innovation"], fdi["types"]["block"]["bound"] = 9.0, 9.0
     innovation, eta = rng.normal(size=(length, 3)), rng.uniform(0.1, 0.2, (length, 3))
     noise = rng.uniform(0.01, 0.02, (length + 1, 3))
     Z, offset = rng.uniform(1, 2, (length, 8, 3)), rng.normal(size=(length, 8, 3))
     spread = rng.uniform(0, 0.1, (length, 8, 3))
     Z[:, :, YAW] += 5.0
     for k in range(length):
-        fdi["innovation"], fdi["bound"]["eta_bar"] = innovation[k], eta[k]
+        fdi["bank"]["innovation"], fdi["bound"]["eta_bar"] = innovation[k], eta[k]
         fdi["bound"]["noise_then"], fdi["bound"]["noise"] = noise[k], noise[k + 1]
-        fdi["estimator"]["effect"]["Z"][:8] = Z[k]
-        fdi["estimator"]["effect"]["offset"][:8] = offset[k]
-        fdi["estimator"]["effect"]["spread"][:8] = spread[k]
+        fdi["isolation"]["estimator"]["effect"]["Z"][:8] = Z[k]
+        fdi["isolation"]["estimator"]["effect"]["offset"][:8] = offset[k]
+        fdi["isolation"]["estimator"]["effect"]["spread"][:8] = spread[k]
         blocks.examine(fdi)
-        assert fdi["block"]["filled"] == (k + 1) % length
-        assert fdi["frame"] == (k + 1 == length)
-    assert fdi["block"]["innovation"] == pytest.approx(innovation.mean(axis=0))
+        assert fdi["types"]["block"]["filled"] == (k + 1) % length
+        assert fdi["types"]["frame"] == (k + 1 == length)
+    assert fdi["types"]["block"]["innovation"] == pytest.approx(innovation.mean(axis=0))
     ends = (noise[0] + noise[-1]) / (length * DT)
-    assert fdi["block"]["bound"] == pytest.approx(eta.mean(axis=0) + ends)
-    mean = fdi["estimator"][4 + RUDDER]["block_effect"]
+    assert fdi["types"]["block"]["bound"] == pytest.approx(eta.mean(axis=0) + ends)
+    mean = fdi["isolation"]["estimator"][4 + RUDDER]["block_effect"]
     assert mean["Z"] == pytest.approx(Z[:, 4 + RUDDER].mean(axis=0))
     assert mean["offset"] == pytest.approx(offset[:, 4 + RUDDER].mean(axis=0))
     assert mean["spread"] == pytest.approx(spread[:, 4 + RUDDER].mean(axis=0))
@@ -544,7 +559,7 @@ def test_alarms_are_noted_by_plane():
         fdi = new_case()
         fdi["bank"]["threshold"], fdi["bank"]["residual"][2, axis] = 0.1, -0.11
         pairs.note_alarms(fdi)
-        assert fdi["pair"]["alarmed"].tolist() == planes
+        assert fdi["types"]["pair"]["alarmed"].tolist() == planes
 
 
 def lateral(one_left=True, other_left=True, alarmed=1, **pair):
@@ -553,12 +568,16 @@ def lateral(one_left=True, other_left=True, alarmed=1, **pair):
     fdi = new_case(**left)
     for s, kept in ((AILERON, one_left), (RUDDER, other_left)):
         if not kept:
-            leave(fdi["surface"][s], BIAS)
-    fdi["pair"]["alarmed"] = 0, alarmed
+            leave(fdi["types"]["surface"][s], BIAS)
+    fdi["types"]["pair"]["alarmed"] = 0, alarmed
     for name, value in pair.items():
-        fdi["pair"][name] = value
+        fdi["types"]["pair"][name] = value
     outside = pairs.decide_roll_and_yaw(fdi, 3.0)
-    return [bool(fdi["surface"]["named"][AILERON]), bool(fdi["surface"]["named"][RUDDER]), bool(outside)]
+    return [
+        bool(fdi["types"]["surface"]["named"][AILERON]),
+        bool(fdi["types"]["surface"]["named"][RUDDER]),
+        bool(outside),
+    ]
 
 
 def test_who_is_named_in_roll_and_yaw():
@@ -573,18 +592,18 @@ def test_who_is_named_in_roll_and_yaw():
 def test_where_nothing_explains_both_the_fault_is_outside_the_class():
     for s in (AILERON, RUDDER):
         fdi = new_case(aileron=None, rudder=None)
-        leave(fdi["surface"][AILERON], BIAS)
-        leave(fdi["surface"][RUDDER], BIAS)
-        fdi["pair"]["alarmed"] = 0, 1
-        leave(fdi["surface"][s])
+        leave(fdi["types"]["surface"][AILERON], BIAS)
+        leave(fdi["types"]["surface"][RUDDER], BIAS)
+        fdi["types"]["pair"]["alarmed"] = 0, 1
+        leave(fdi["types"]["surface"][s])
         assert pairs.decide_roll_and_yaw(fdi, 3.0)
-        leave(fdi["surface"][s], OSCILLATORY)  # it may swing yet
+        leave(fdi["types"]["surface"][s], OSCILLATORY)  # it may swing yet
         assert not pairs.decide_roll_and_yaw(fdi, 3.0)
-        assert not fdi["surface"]["named"].any()
+        assert not fdi["types"]["surface"]["named"].any()
 
 
 def test_a_name_notes_when_it_was_given_and_when_its_type():
-    surface = new_case()["surface"][RUDDER]
+    surface = new_case()["types"]["surface"][RUDDER]
     surface["type"] = -1
     pairs.name(surface, 1, STUCK, 3.0)
     assert (surface["named"], surface["type"], surface["named_at_s"], surface["type_at_s"]) == (
@@ -602,7 +621,7 @@ def test_a_name_notes_when_it_was_given_and_when_its_type():
 
 
 def test_a_surface_off_its_command_is_within_its_travel():
-    surface = new_case()["surface"][RUDDER]
+    surface = new_case()["types"]["surface"][RUDDER]
     surface["command"] = 0.1
     assert pairs.place(surface, 0.2, 0.05)
     assert (surface["low"], surface["high"], surface["wrong"]) == (
@@ -634,23 +653,26 @@ def test_whereabouts_cover_every_constant_type_left():
 
 def test_beside_the_first_pitch_fault_the_second_is_where_the_rest_puts_it():
     fdi = new_case(elevator=(STUCK,))
-    elevator, flap = fdi["surface"][ELEVATOR], fdi["surface"][FLAP]
-    fdi["pair"]["first"], elevator["in_question"] = ELEVATOR, 0
+    elevator, flap = fdi["types"]["surface"][ELEVATOR], fdi["types"]["surface"][FLAP]
+    fdi["types"]["pair"]["first"], elevator["in_question"] = ELEVATOR, 0
     elevator["set_low"][STUCK], elevator["set_high"][STUCK], elevator["command"] = 0.1, 0.14, 0.0
-    fdi["estimator"]["effect"]["Z"][4 + ELEVATOR, PITCH], fdi["estimator"]["effect"]["Z"][4 + FLAP, PITCH] = (
+    (
+        fdi["isolation"]["estimator"]["effect"]["Z"][4 + ELEVATOR, PITCH],
+        fdi["isolation"]["estimator"]["effect"]["Z"][4 + FLAP, PITCH],
+    ) = (
         -10.0,
         2.0,
     )
-    fdi["estimator"]["effect"]["spread"][4 + ELEVATOR, PITCH] = 0.01
-    fdi["estimator"]["effect"]["spread"][4 + FLAP, PITCH] = 0.02
-    fdi["bound"]["frame"][PITCH], fdi["innovation"][PITCH], flap["command"] = 0.03, -1.2 + 0.4, 0.05
+    fdi["isolation"]["estimator"]["effect"]["spread"][4 + ELEVATOR, PITCH] = 0.01
+    fdi["isolation"]["estimator"]["effect"]["spread"][4 + FLAP, PITCH] = 0.02
+    fdi["bound"]["frame"][PITCH], fdi["bank"]["innovation"][PITCH], flap["command"] = 0.03, -1.2 + 0.4, 0.05
     pairs.solve_pitch(fdi)
     # the elevator's share is -10 * 0.12 give or take 0.2, the rest 0.4 give or take 0.26, over 2
     assert (flap["low"], flap["high"]) == pytest.approx((0.05 + 0.2 - 0.13, 0.05 + 0.2 + 0.13))
     assert flap["wrong"] == 1
     assert elevator["wrong"] == 0
     assert (elevator["low"], elevator["high"]) == (0.1, 0.14)
-    fdi["innovation"][PITCH] = 9.0
+    fdi["bank"]["innovation"][PITCH] = 9.0
     pairs.solve_pitch(fdi)
     assert flap["standing"] == RULED_OUT
 
@@ -658,35 +680,41 @@ def test_beside_the_first_pitch_fault_the_second_is_where_the_rest_puts_it():
 @pytest.mark.parametrize(("innovation", "wrong"), [(0.03, 0), (0.031, 1), (-0.031, 1)])
 def test_before_that_pitch_shows_a_fault_or_not(innovation, wrong):
     fdi = new_case()
-    fdi["pair"]["first"], fdi["bound"]["frame"], fdi["innovation"] = NO_SURFACE, 0.03, innovation
+    fdi["types"]["pair"]["first"], fdi["bound"]["frame"], fdi["bank"]["innovation"] = (
+        NO_SURFACE,
+        0.03,
+        innovation,
+    )
     pairs.solve_pitch(fdi)
-    assert fdi["surface"]["wrong"].tolist() == [0, wrong, 0, wrong]
+    assert fdi["types"]["surface"]["wrong"].tolist() == [0, wrong, 0, wrong]
 
 
 def test_what_is_known_of_the_first_is_kept_once_it_has_settled():
     fdi = new_case(elevator=(STUCK,))
-    elevator = fdi["surface"][ELEVATOR]
-    fdi["pair"]["first"] = NO_SURFACE
+    elevator = fdi["types"]["surface"][ELEVATOR]
+    fdi["types"]["pair"]["first"] = NO_SURFACE
     elevator["set_low"][STUCK], elevator["set_high"][STUCK] = 0.1, 0.14
     pairs.note_first(fdi, ELEVATOR)
     known = elevator["known"]
-    assert fdi["pair"]["first"] == ELEVATOR
+    assert fdi["types"]["pair"]["first"] == ELEVATOR
     assert (known["low"][STUCK], known["high"][STUCK]) == (0.1, 0.14)
     assert known["excluded"].tolist() == [kind != STUCK for kind in range(N_TYPES)]
     elevator["type_excluded"][STUCK], elevator["set_low"][STUCK] = 1, 0.12
     for k in range(PATIENCE - 1):
         pairs.note_first(fdi, ELEVATOR)
-        assert (known["low"][STUCK], fdi["pair"]["unsettled"]) == (0.1, k + 1)
+        assert (known["low"][STUCK], fdi["types"]["pair"]["unsettled"]) == (0.1, k + 1)
     pairs.note_first(fdi, ELEVATOR)
-    assert (known["low"][STUCK], fdi["pair"]["unsettled"]) == (0.12, 0)
+    assert (known["low"][STUCK], fdi["types"]["pair"]["unsettled"]) == (0.12, 0)
 
 
 def test_a_second_begins_with_what_was_known_of_the_first():
     fdi = new_case(elevator=(), flap=(BIAS,))
-    elevator, flap = fdi["surface"][ELEVATOR], fdi["surface"][FLAP]
-    fdi["pair"]["first"], elevator["known"]["low"], elevator["known"]["high"] = ELEVATOR, 0.1, 0.14
+    elevator, flap = fdi["types"]["surface"][ELEVATOR], fdi["types"]["surface"][FLAP]
+    fdi["types"]["pair"]["first"], elevator["known"]["low"], elevator["known"]["high"] = ELEVATOR, 0.1, 0.14
     elevator["known"]["excluded"] = [kind != STUCK for kind in range(N_TYPES)]
-    fdi["surface"]["wrong"] = fdi["surface"]["wrong_then"] = fdi["surface"]["wrong_before"] = 1
+    fdi["types"]["surface"]["wrong"] = fdi["types"]["surface"]["wrong_then"] = fdi["types"]["surface"][
+        "wrong_before"
+    ] = 1
     assert pairs.two_in_pitch(fdi)
     assert candidates.one_type(elevator) == STUCK
     assert (elevator["set_low"][STUCK], elevator["set_high"][STUCK]) == (0.1, 0.14)
@@ -694,13 +722,13 @@ def test_a_second_begins_with_what_was_known_of_the_first():
     for surface in (elevator, flap):
         assert (surface["in_question"], surface["standing"]) == (0, BY_DEDUCTION)
         assert (surface["wrong"], surface["wrong_then"], surface["wrong_before"]) == (0, 0, 0)
-    assert fdi["surface"]["in_question"][[AILERON, RUDDER]].tolist() == [1, 1]
+    assert fdi["types"]["surface"]["in_question"][[AILERON, RUDDER]].tolist() == [1, 1]
     assert not pairs.two_in_pitch(_first(new_case(elevator=(STUCK,)), ELEVATOR))
     assert not pairs.two_in_pitch(_first(new_case(elevator=()), NO_SURFACE))
 
 
 def _first(fdi, surface):
-    fdi["pair"]["first"] = surface
+    fdi["types"]["pair"]["first"] = surface
     return fdi
 
 
@@ -729,31 +757,40 @@ def test_in_pitch_a_jam_stays_open_as_the_other_may_be_off_by_a_constant():
 
 def decided(alarmed=(1, 0), **left):
     fdi = new_case(**left)
-    fdi["pair"]["enabled"], fdi["pair"]["first"], fdi["pair"]["alarmed"] = 1, NO_SURFACE, alarmed
+    fdi["types"]["pair"]["enabled"], fdi["types"]["pair"]["first"], fdi["types"]["pair"]["alarmed"] = (
+        1,
+        NO_SURFACE,
+        alarmed,
+    )
     fdi["verdict"]["isolated"] = NOT_ISOLATED
-    fdi["surface"]["type"] = -1
-    fdi["surface"]["low"], fdi["surface"]["high"] = -0.4, 0.5
+    fdi["types"]["surface"]["type"] = -1
+    fdi["types"]["surface"]["low"], fdi["types"]["surface"]["high"] = -0.4, 0.5
     return fdi
 
 
 def test_one_fault_in_pitch_is_named_and_acted_upon():
     fdi = decided(elevator=(CONSTANT_LOSS,), flap=None)
     pairs.decide(fdi, 3.0)
-    assert fdi["surface"]["named"].tolist() == [0, 0, 0, 0]  # ailerons and rudder might be it as well
+    assert fdi["types"]["surface"]["named"].tolist() == [
+        0,
+        0,
+        0,
+        0,
+    ]  # ailerons and rudder might be it as well
     fdi = decided(elevator=(CONSTANT_LOSS,), flap=None, aileron=None, rudder=None)
     pairs.decide(fdi, 3.0)
-    assert fdi["surface"]["named"].tolist() == [0, 1, 0, 0]
+    assert fdi["types"]["surface"]["named"].tolist() == [0, 1, 0, 0]
     assert fdi["verdict"]["isolated"] == ELEVATOR
     assert (fdi["verdict"]["type"], fdi["verdict"]["isolated_at_s"]) == (CONSTANT_LOSS, 3.0)
     assert (fdi["verdict"]["lead"], fdi["verdict"]["lead_kind"]) == (ELEVATOR, LOSES)
-    assert fdi["surface"]["measure"].tolist() == [-1, LOSES, -1, -1]
-    assert fdi["pair"]["first"] == ELEVATOR
+    assert fdi["types"]["surface"]["measure"].tolist() == [-1, LOSES, -1, -1]
+    assert fdi["types"]["pair"]["first"] == ELEVATOR
 
 
 def test_without_an_alarm_in_pitch_nobody_is_named_there():
     fdi = decided(alarmed=(0, 1), elevator=(CONSTANT_LOSS,), flap=None, aileron=None, rudder=None)
     pairs.decide(fdi, 3.0)
-    assert not fdi["surface"]["named"][ELEVATOR]
+    assert not fdi["types"]["surface"]["named"][ELEVATOR]
     assert not pairs.acted_upon(fdi, ELEVATOR)
 
 
@@ -763,15 +800,15 @@ def test_the_likeliest_in_pitch_is_acted_upon_until_one_is_named():
     only_flap = decided(aileron=None, rudder=None, elevator=COURSES)
     assert [bool(pairs.acted_upon(only_flap, s)) for s in range(4)] == [False, False, False, True]
     assert not pairs.named_in_pitch(fdi)
-    fdi["surface"]["named"] = 1, 0, 0, 1
+    fdi["types"]["surface"]["named"] = 1, 0, 0, 1
     assert pairs.named_in_pitch(fdi)
     assert [bool(pairs.acted_upon(fdi, s)) for s in range(4)] == [True, False, False, True]
 
 
 def test_the_verdict_is_that_of_the_first_named():
     fdi = decided(aileron=None, rudder=None)
-    fdi["surface"]["type"][RUDDER] = STUCK
-    fdi["surface"]["type_at_s"][RUDDER], fdi["surface"]["named_at_s"][RUDDER] = 2.0, 1.5
+    fdi["types"]["surface"]["type"][RUDDER] = STUCK
+    fdi["types"]["surface"]["type_at_s"][RUDDER], fdi["types"]["surface"]["named_at_s"][RUDDER] = 2.0, 1.5
     pairs.summarise(fdi, RUDDER, False, 3.0)
     found = fdi["verdict"]
     assert (found["isolated"], found["type"], found["type_at_s"]) == (4 + RUDDER, STUCK, 2.0)
@@ -787,16 +824,16 @@ def test_the_verdict_is_that_of_the_first_named():
 def acted(**left):
     """What the law does about each surface; each was seen where its type has it."""
     fdi = decided(**left)
-    for surface in fdi["surface"]:
+    for surface in fdi["types"]["surface"]:
         surface["set_low"], surface["set_high"] = -0.1, 0.1
     return fdi
 
 
 def test_the_law_acts_on_all_that_are_named_and_the_lead_is_the_first():
     fdi = acted(alarmed=(0, 1), aileron=(CONSTANT_LOSS,), rudder=(BIAS,), elevator=None, flap=None)
-    fdi["surface"]["named"] = 1, 0, 1, 0
+    fdi["types"]["surface"]["named"] = 1, 0, 1, 0
     pairs.act(fdi)
-    assert fdi["surface"]["measure"].tolist() == [LOSES, -1, SHIFTED, -1]
+    assert fdi["types"]["surface"]["measure"].tolist() == [LOSES, -1, SHIFTED, -1]
     assert (fdi["verdict"]["lead"], fdi["verdict"]["lead_kind"]) == (AILERON, LOSES)
 
 
@@ -806,30 +843,34 @@ def test_the_law_acts_on_all_that_are_named_and_the_lead_is_the_first():
 )
 def test_an_elevator_that_is_replaced_comes_first(kinds, measure, lead):
     fdi = acted(aileron=(CONSTANT_LOSS,), elevator=kinds, rudder=None, flap=None)
-    fdi["surface"]["named"] = 1, 1, 0, 0
+    fdi["types"]["surface"]["named"] = 1, 1, 0, 0
     pairs.act(fdi)
-    assert fdi["surface"]["measure"].tolist() == [LOSES, measure, -1, -1]
+    assert fdi["types"]["surface"]["measure"].tolist() == [LOSES, measure, -1, -1]
     assert fdi["verdict"]["lead"] == lead
 
 
 def test_a_rudder_that_is_fixed_does_not_come_before_the_first():
     fdi = acted(aileron=(BIAS,), rudder=(STUCK,), elevator=None, flap=None)
-    fdi["surface"]["named"] = 1, 0, 1, 0
+    fdi["types"]["surface"]["named"] = 1, 0, 1, 0
     pairs.act(fdi)
     assert (fdi["verdict"]["lead"], fdi["verdict"]["lead_kind"]) == (AILERON, SHIFTED)
 
 
 def test_a_surface_acted_upon_that_cannot_be_at_fault_is_shifted_as_it_shows():
     fdi = acted(elevator=None, flap=None, aileron=None, rudder=None)
-    leave(fdi["surface"][ELEVATOR], STUCK)
+    leave(fdi["types"]["surface"][ELEVATOR], STUCK)
     pairs.act(fdi)
-    assert fdi["surface"]["measure"].tolist() == [-1, SHIFTED, -1, -1]
-    fdi["surface"]["named"][ELEVATOR] = 1
+    assert fdi["types"]["surface"]["measure"].tolist() == [-1, SHIFTED, -1, -1]
+    fdi["types"]["surface"]["named"][ELEVATOR] = 1
     pairs.act(fdi)
-    assert fdi["surface"]["measure"].tolist() == [-1, FIXED, -1, -1]
-    fdi["surface"]["low"], fdi["surface"]["high"], fdi["surface"]["absent"] = 0.3, 0.4, 99
+    assert fdi["types"]["surface"]["measure"].tolist() == [-1, FIXED, -1, -1]
+    fdi["types"]["surface"]["low"], fdi["types"]["surface"]["high"], fdi["types"]["surface"]["absent"] = (
+        0.3,
+        0.4,
+        99,
+    )
     pairs.act(fdi)
-    assert fdi["surface"]["measure"].tolist() == [-1, -1, -1, -1]
+    assert fdi["types"]["surface"]["measure"].tolist() == [-1, -1, -1, -1]
     assert (fdi["verdict"]["lead"], fdi["verdict"]["lead_kind"]) == (NO_SURFACE, -1)
 
 
@@ -841,46 +882,49 @@ def test_two_equations_say_where_ailerons_and_rudder_were(seed):
     spread, room = rng.uniform(0.01, 0.02, (2, 2)), np.array([0.03, 0.02])
     off, command = rng.uniform(-0.05, 0.05, 2), np.array([0.02, -0.03])
     for k, s in enumerate((AILERON, RUDDER)):
-        effect = fdi["estimator"][4 + s]["effect"]
+        effect = fdi["isolation"]["estimator"][4 + s]["effect"]
         effect["Z"][[ROLL, YAW]], effect["spread"][[ROLL, YAW]] = Z[:, k], spread[:, k]
-        fdi["surface"][s]["command"] = command[k]
-    fdi["innovation"][[ROLL, YAW]], fdi["bound"]["frame"][[ROLL, YAW]] = Z @ off, room
+        fdi["types"]["surface"][s]["command"] = command[k]
+    fdi["bank"]["innovation"][[ROLL, YAW]], fdi["bound"]["frame"][[ROLL, YAW]] = Z @ off, room
     pairs.solve_roll_and_yaw(fdi)
     slack = room + spread.sum(axis=1)
     corners = [np.linalg.solve(Z, Z @ off + slack * (a, b)) for a in (-1, 1) for b in (-1, 1)]
     least, greatest = np.min(corners, axis=0) + command, np.max(corners, axis=0) + command
     for k, s in enumerate((AILERON, RUDDER)):
-        surface = fdi["surface"][s]
+        surface = fdi["types"]["surface"][s]
         assert (surface["low"], surface["high"]) == pytest.approx((least[k], greatest[k]))
-    assert not fdi["pair"]["no_lateral_pair"]
-    fdi["innovation"][YAW] = 9.0
+    assert not fdi["types"]["pair"]["no_lateral_pair"]
+    fdi["bank"]["innovation"][YAW] = 9.0
     pairs.solve_roll_and_yaw(fdi)
-    assert fdi["pair"]["no_lateral_pair"]
+    assert fdi["types"]["pair"]["no_lateral_pair"]
 
 
 def test_a_second_pitch_fault_is_named_once_it_shows():
     fdi = decided(elevator=(BIAS,), flap=(STUCK,), aileron=None, rudder=None)
-    fdi["pair"]["first"], fdi["surface"]["in_question"] = ELEVATOR, (1, 0, 1, 0)
-    fdi["surface"]["standing"] = 0, BY_DEDUCTION, 0, BY_DEDUCTION
-    fdi["surface"]["type"][ELEVATOR], fdi["surface"]["evidence"][FLAP] = BIAS, 0
+    fdi["types"]["pair"]["first"], fdi["types"]["surface"]["in_question"] = ELEVATOR, (1, 0, 1, 0)
+    fdi["types"]["surface"]["standing"] = 0, BY_DEDUCTION, 0, BY_DEDUCTION
+    fdi["types"]["surface"]["type"][ELEVATOR], fdi["types"]["surface"]["evidence"][FLAP] = BIAS, 0
     pairs.decide_pitch(fdi, 4.0)
-    assert fdi["surface"]["named"].tolist() == [0, 1, 0, 0]
-    fdi["surface"]["evidence"][FLAP] = 99
+    assert fdi["types"]["surface"]["named"].tolist() == [0, 1, 0, 0]
+    fdi["types"]["surface"]["evidence"][FLAP] = 99
     pairs.decide_pitch(fdi, 5.0)
-    assert fdi["surface"]["named"].tolist() == [0, 1, 0, 1]
-    assert fdi["surface"]["type"].tolist()[1::2] == [BIAS, STUCK]
-    fdi["surface"]["standing"][FLAP] = RULED_OUT
+    assert fdi["types"]["surface"]["named"].tolist() == [0, 1, 0, 1]
+    assert fdi["types"]["surface"]["type"].tolist()[1::2] == [BIAS, STUCK]
+    fdi["types"]["surface"]["standing"][FLAP] = RULED_OUT
     pairs.decide_pitch(fdi, 6.0)
-    assert fdi["surface"]["named"].tolist() == [0, 1, 0, 0]
+    assert fdi["types"]["surface"]["named"].tolist() == [0, 1, 0, 0]
 
 
 def test_the_first_named_is_the_one_the_verdict_is_about():
     fdi = decided(alarmed=(0, 1), aileron=(BIAS,), rudder=(BIAS,), elevator=None, flap=None)
-    fdi["estimator"]["excluded"][[4 + AILERON, 4 + RUDDER]] = 1
-    fdi["surface"]["named"], fdi["surface"]["named_at_s"] = (1, 0, 1, 0), (2.0, 0.0, 1.0, 0.0)
+    fdi["isolation"]["estimator"]["excluded"][[4 + AILERON, 4 + RUDDER]] = 1
+    fdi["types"]["surface"]["named"], fdi["types"]["surface"]["named_at_s"] = (
+        (1, 0, 1, 0),
+        (2.0, 0.0, 1.0, 0.0),
+    )
     pairs.decide(fdi, 3.0)
     assert fdi["verdict"]["isolated_at_s"] == 1.0
-    assert fdi["estimator"]["surface"][fdi["verdict"]["isolated"]] == RUDDER
+    assert fdi["isolation"]["estimator"]["surface"][fdi["verdict"]["isolated"]] == RUDDER
 
 
 def test_the_first_surface_and_its_first_estimator_are_not_nobody():
@@ -907,7 +951,7 @@ def test_without_anybody_to_act_upon_there_is_no_lead():
     fdi["verdict"]["lead"], fdi["verdict"]["lead_kind"] = 2, 2
     verdict.take_the_lead(fdi)
     assert (fdi["verdict"]["lead"], fdi["verdict"]["lead_kind"]) == (NO_SURFACE, -1)
-    assert (fdi["surface"]["measure"] == -1).all()
+    assert (fdi["types"]["surface"]["measure"] == -1).all()
 
 
 def test_the_first_surface_is_named_where_a_constant_explains_it_alone():
@@ -920,7 +964,7 @@ def test_the_first_surface_is_named_where_a_constant_explains_it_alone():
 def test_of_two_faults_the_verdict_is_on_the_first_named(s, outside):
     fdi = new_case()
     fdi["verdict"]["isolated"], fdi["verdict"]["type"] = NOT_ISOLATED, -1
-    surface = fdi["surface"][s]
+    surface = fdi["types"]["surface"][s]
     surface["type"], surface["type_at_s"], surface["named_at_s"] = STUCK, 4.0, 3.0
     pairs.summarise(fdi, s, outside, 5.0)
     found = fdi["verdict"]

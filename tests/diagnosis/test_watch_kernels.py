@@ -187,7 +187,7 @@ def detected_fdi(at_s=-1.0, isolated=NOT_ISOLATED):
     verdict = fdi["verdict"]
     verdict["detected"], verdict["detected_at_s"], verdict["isolated"] = at_s >= 0.0, at_s, isolated
     verdict["isolated_at_s"], verdict["type"], verdict["lead"], verdict["lead_kind"] = at_s, 2, 1, 1
-    fdi["surface"]["measure"] = 1
+    fdi["types"]["surface"]["measure"] = 1
     fdi["fdae"]["network"]["weights"] = fdi["fdae"]["network"]["output"] = 0.3
     return fdi
 
@@ -204,7 +204,7 @@ def test_an_alarm_voids_what_a_moment_ago_was_made_of_it(isolated):
     assert [verdict[name] for name in ("detected", "isolated", "type")] == [0, NOT_ISOLATED, -1]
     assert [verdict[name] for name in ("detected_at_s", "isolated_at_s")] == [-1.0, -1.0]
     assert [verdict[name] for name in ("lead", "lead_kind")] == [-1, -1]
-    assert (fdi["surface"]["measure"] == -1).all()
+    assert (fdi["types"]["surface"]["measure"] == -1).all()
     assert not fdi["fdae"]["network"]["weights"].any()
     assert not fdi["fdae"]["network"]["output"].any()
     watching.raise_alarm(watch, detected_fdi(9.6, 1), 11.0)
@@ -261,7 +261,7 @@ def asked(
 ):
     """What the rates say by axis; by default the bound of a frame is 1 rad/s2."""
     watch, fdi = new_watch(error=error, error_then=then, spike_then=spike, **fields), new_fdi()
-    fdi["innovation"], fdi["bound"]["frame"] = innovation, 1.0
+    fdi["bank"]["innovation"], fdi["bound"]["frame"] = innovation, 1.0
     fdi["bank"]["threshold"][:3] = 1.0
     watch["step"]["test"]["noise"] = noise
     watching.ask_rates(watch, fdi)
@@ -328,7 +328,7 @@ def test_the_filter_of_a_gyros_error_follows_it_exactly():
     growing[np.diag_indices(3)] = -np.diag(D)
     fdi["bound"]["eta_bar"] = eta_bar
     for k in range(frames):
-        fdi["innovation"] = (error[k + 1] - error[k]) / DT + D @ error[k]
+        fdi["bank"]["innovation"] = (error[k + 1] - error[k]) / DT + D @ error[k]
         watching.follow_rates(watch, fdi)
         bound = bound + DT * (eta_bar + growing @ bound)
     assert watch["W"] == pytest.approx(error[-1])
@@ -442,7 +442,7 @@ def test_looks_of_a_frame_follow_one_another():
     fdi["bank"]["threshold"], fdi["bound"]["frame"] = 1.0, 1.0
     watch["step"]["gravity"] = watch["step"]["offset"] = 0.0
     watch["step"]["offset"][:] = 1.0
-    fdi["innovation"] = 0.5, 0.0, 0.0
+    fdi["bank"]["innovation"] = 0.5, 0.0, 0.0
     looked(watch, fdi)
     assert (watch["begun"], watch["past"]) == (1, 0)
     for k in range(4):

@@ -57,8 +57,9 @@ def at(record, path):
 EXPECTED = {
     "dt": DT, "belief.share": 0.5, "belief.u": TRIM, "belief.commanded": TRIM, "control.trim": TRIM,
     "control.command": TRIM,
-    "fdi.enabled": 1, "fdi.dt": DT, "fdi.forgetting": exp(-DT / 2.0), "fdi.fie_decay": exp(-2.5 * DT),
-    "fdi.fdae.pole": 1.5, "fdi.fdae.decay": exp(-1.5 * DT), "fdi.n_estimators": 8,
+    "fdi.config.enabled": 1, "fdi.config.dt": DT, "fdi.isolation.forgetting": exp(-DT / 2.0),
+    "fdi.isolation.decay": exp(-2.5 * DT),
+    "fdi.fdae.pole": 1.5, "fdi.fdae.decay": exp(-1.5 * DT), "fdi.isolation.n": 8,
     "fdi.fdae.network.gain": 45.0, "fdi.fdae.network.leak_per_s": 0.8, "fdi.fdae.network.weight_limit": 15.0,
     "fdi.bound.inertia": (0.1, 0.2, 0.3), "fdi.bound.constant": (0.01, 0.02, 0.03),
     "fdi.bound.earth_rate": 7.292115e-5,  # rad/s [WGS84]
@@ -67,15 +68,17 @@ EXPECTED = {
     "accounts.guarantee.certain_after_s": -1.0,
     "fdi.layout.main": (AILERON, ELEVATOR, RUDDER), "fdi.layout.dominant_axis": (0, 1, 2, 1),
     "fdi.layout.partner": (RUDDER, FLAP, AILERON, ELEVATOR),
-    "fdi.every_type": 1, "fdi.block.length": 1, "fdi.block.span_s": DT, "fdi.whole": 0, "fdi.instants": 2,
-    "fdi.returns": 1, "fdi.patience": 131,  # half a cycle at 1.2 rad/s is 2.618 s
-    "fdi.pair.enabled": 0, "fdi.pair.first": -1,
-    "fdi.surface.0.travel_low": -0.5, "fdi.surface.3.travel_high": 1.0, "fdi.surface.1.measure": -1,
-    "fdi.surface.1.type": -1, "fdi.surface.0.in_question": 1,
-    "fdi.surface.1.approach": 1.0 - exp(-25.0 * DT / 2), "fdi.surface.1.step": pi / 2 * DT / 2,
-    "fdi.surface.1.least_runaway_rate": pi / 4,
-    "fdi.surface.1.slowest_step": radians(3.0) * DT / 2,
-    "fdi.bank.n": 3, "fdi.memory": 0, "fdi.membership": 1,
+    "fdi.config.every_type": 1, "fdi.types.config.length": 1, "fdi.types.config.span_s": DT,
+    "fdi.types.config.whole": 0, "fdi.config.instants": 2,
+    "fdi.types.config.returns": 1, "fdi.types.config.patience": 131,  # half a cycle at 1.2 rad/s is 2.618 s
+    "fdi.types.pair.enabled": 0, "fdi.types.pair.first": -1,
+    "fdi.types.surface.0.travel_low": -0.5, "fdi.types.surface.3.travel_high": 1.0,
+    "fdi.types.surface.1.measure": -1,
+    "fdi.types.surface.1.type": -1, "fdi.types.surface.0.in_question": 1,
+    "fdi.types.surface.1.approach": 1.0 - exp(-25.0 * DT / 2), "fdi.types.surface.1.step": pi / 2 * DT / 2,
+    "fdi.types.surface.1.least_runaway_rate": pi / 4,
+    "fdi.types.surface.1.slowest_step": radians(3.0) * DT / 2,
+    "fdi.bank.n": 3, "fdi.isolation.memory": 0, "fdi.isolation.membership": 1,
     "control.dt": DT, "control.Kp": 3.0, "control.Ki": 1.5, "control.effectiveness": 1.0,
     "control.effectiveness_step": 2.5 * DT, "control.reference_scale": 1.0,
     "control.least_effectiveness": 0.15, "control.low": TRAVEL[0], "control.high": TRAVEL[1],
@@ -131,7 +134,7 @@ def test_losses_of_the_leading_surfaces_come_first_then_the_others_and_every_pos
         "aileron", "elevator", "rudder", "flap",
         "aileron_position", "elevator_position", "rudder_position", "flap_position",
     )  # fmt: skip
-    fies = frame["fdi"]["estimator"][:8]
+    fies = frame["fdi"]["isolation"]["estimator"][:8]
     assert fies["surface"].tolist() == [0, 1, 2, 3] * 2
     assert fies["low"].tolist() == [-1.0] * 4 + TRAVEL[0].tolist()
     assert fies["high"].tolist() == [0.0] * 4 + TRAVEL[1].tolist()
@@ -141,9 +144,9 @@ def test_losses_of_the_leading_surfaces_come_first_then_the_others_and_every_pos
 
 def test_in_pairs_each_plane_is_asked_for_itself():
     fdi = assembled(substeps=1, fdi={**GIVEN["fdi"], "pairs": True, "authority": "worst-case"})["fdi"]
-    assert fdi["surface"]["in_question"].tolist() == [0, 1, 0, 1]
+    assert fdi["types"]["surface"]["in_question"].tolist() == [0, 1, 0, 1]
     pitch, others = [1, 0, 1], [0, 1, 0]
-    assert fdi["estimator"]["unasked"][:4].tolist() == [others, pitch, others, pitch]
+    assert fdi["isolation"]["estimator"]["unasked"][:4].tolist() == [others, pitch, others, pitch]
 
 
 def test_what_is_trimmed_beyond_the_engines_range_is_within_it():
@@ -159,10 +162,16 @@ def test_a_plug_in_that_diagnoses_has_the_record_to_itself():
     scenario = Scenario.model_validate(given)
     frames = assemble(scenario, TRIM, TRAVEL)
     before = frames["fdi"][0]
-    assert (before["enabled"], before["watch"]["enabled"], before["every_type"]) == (1, 1, 1)
+    switches = before["config"]["enabled"], before["watch"]["enabled"], before["config"]["every_type"]
+    assert switches == (1, 1, 1)
     plugin_frame.plugged(frames, scenario, np.ones(40), RlsMonitor(), None)
     fdi = frames["fdi"][0]
-    off = fdi["enabled"], fdi["n_estimators"], fdi["every_type"], fdi["watch"]["enabled"]
+    off = (
+        fdi["config"]["enabled"],
+        fdi["isolation"]["n"],
+        fdi["config"]["every_type"],
+        fdi["watch"]["enabled"],
+    )
     assert (*off, fdi["statistical"]["enabled"], frames["control"]["power"]["enabled"][0]) == (0,) * 6
-    assert fdi["estimator"]["surface"][:4].tolist() == [AILERON, ELEVATOR, RUDDER, FLAP]
+    assert fdi["isolation"]["estimator"]["surface"][:4].tolist() == [AILERON, ELEVATOR, RUDDER, FLAP]
     assert plugin_frame.plugged(frames, scenario, np.ones(40), None, None) is None

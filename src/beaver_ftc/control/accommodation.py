@@ -38,12 +38,12 @@ def accommodate(control, fdi, belief, measured, faults):
             true_surface(control, faults, s, belief.u[s])
         elif fdi.verdict.estimates and fdi.verdict.detected:
             control.target[s] = fdi.verdict.effectiveness[s]
-        elif fdi.every_type and fdi.surface[s].measure >= 0:
+        elif fdi.config.every_type and fdi.types.surface[s].measure >= 0:
             act_on_type(control, fdi, s)
-        elif s == surface and not fdi.every_type:
+        elif s == surface and not fdi.config.every_type:
             act_on_loss(control, fdi, s)
         if control.inner == REJECTING and control.law != ORACLE:
-            if not (fdi.every_type and fdi.surface[s].measure == FIXED):
+            if not (fdi.config.every_type and fdi.types.surface[s].measure == FIXED):
                 rejecting.hesitate(control, s)
             suspected = fdi.verdict.detected and s == surface and is_doubtful(control, fdi, s)
             rejecting.abandon(control, s, suspected)
@@ -57,7 +57,7 @@ def is_doubtful(control, fdi, s):
     nothing of it seems to be left, and the law's observer sees nothing of it either."""
     if rejecting.is_replaced(control, s):
         return True
-    is_open = fdi.every_type and fdi.surface[s].measure < 0
+    is_open = fdi.config.every_type and fdi.types.surface[s].measure < 0
     return (is_open or control.target[s] < control.least_effectiveness) and not rejecting.acts(control, s)
 
 
@@ -72,7 +72,7 @@ def act_on_loss(control, fdi, s):
 @kernel
 def act_on_type(control, fdi, s):
     """What the diagnosis of every type makes of surface s. Jams bypass the rate limit."""
-    surface, at_fault = fdi.surface[s], candidates.possible(fdi, s)
+    surface, at_fault = fdi.types.surface[s], candidates.possible(fdi, s)
     if surface.measure == LOSES:
         control.target[s] = verdict.effectiveness_left(fdi, s)
     elif surface.measure == FIXED:
@@ -105,7 +105,7 @@ def give_up(control, fdi, faults):
     shows. From then on the reference is bent to what is left."""
     for s in range(control.trim.size):
         truly = faults.immovable[s] and control.law == ORACLE
-        fixed = fdi.every_type and fdi.surface[s].measure == FIXED
+        fixed = fdi.config.every_type and fdi.types.surface[s].measure == FIXED
         abandoned = control.rejection.abandoned[s]
         if truly or abandoned or (fixed and control.effectiveness[s] == 0.0):
             control.command[s] = control.trim[s]

@@ -14,8 +14,8 @@ from beaver_ftc.diagnosis.state import NOT_ISOLATED, PITCH
 @kernel
 def in_doubt(control, fdi):
     """Whether elevator or flap is at fault and it has long been open which."""
-    open_question = fdi.every_type and fdi.verdict.detected and fdi.verdict.isolated == NOT_ISOLATED
-    long = fdi.surface[control.main[PITCH]].evidence >= fdi.patience
+    open_question = fdi.config.every_type and fdi.verdict.detected and fdi.verdict.isolated == NOT_ISOLATED
+    long = fdi.types.surface[control.main[PITCH]].evidence >= fdi.types.config.patience
     return open_question and long and control.law not in (NOMINAL, ORACLE)
 
 
@@ -49,7 +49,7 @@ def command(control, fdi, belief, measured, faults, mode, t):
         control.G[:] = belief.G
     else:
         adaptive.believed_effectiveness(control, belief.G, control.G)
-    advance_hand_over(control, fdi.every_type, mode)
+    advance_hand_over(control, fdi.config.every_type, mode)
     if control.probe_frames > 0:
         probing.advance(control, in_doubt(control, fdi), t)
     if control.inner == REJECTING:

@@ -53,7 +53,7 @@ def mode_of(law, detected, isolated, relieved):
 def mode_from(control, fdi):
     """The mode that the diagnosis asks for."""
     elevator = control.main[PITCH]
-    if not fdi.every_type:
+    if not fdi.config.every_type:
         return mode_of(
             control.law,
             fdi.verdict.detected,

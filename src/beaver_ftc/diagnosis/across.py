@@ -231,7 +231,7 @@ def sign(fdi, view, Gu):
 @kernel
 def observe(fdi, innovation, G, Gu, y, frame, latched):
     """Take in one frame, as `statistical.observe`. G, Gu (3, n): of it; y as measured."""
-    statistical, dt = fdi.statistical, fdi.dt
+    statistical, dt = fdi.statistical, fdi.config.dt
     V, heard = y[AIRSPEED], tones.usual(statistical.listening, y)
     keep, slot = statistical.keep if latched else 1.0, likelihood.slot_to_start(frame)
     for a in range(statistical.n_views):
@@ -312,7 +312,7 @@ def alarm(statistical, view):
 @kernel
 def excludes(fdi, s):
     """Whether something is going on that no fault of surface s does."""
-    statistical, column = fdi.statistical, fdi.estimator[fdi.layout.position_of[s]].effect.Z
+    statistical, column = fdi.statistical, fdi.isolation.estimator[fdi.layout.position_of[s]].effect.Z
     for a in range(statistical.n_views):
         view = statistical.views[a]
         blind = not view.clears and not feels(fdi, view, s, column)

@@ -24,8 +24,8 @@ def align(fdi, G):
     The bound is exact for any fixed direction; this one has power while G keeps its direction, which
     depends on alpha alone, and weakly.
     """
-    for s in range(fdi.n_estimators):
-        fie = fdi.estimator[s]
+    for s in range(fdi.isolation.n):
+        fie = fdi.isolation.estimator[s]
         p, r = G[0, fie.surface], G[2, fie.surface]
         length = np.hypot(p, r)
         if length > 0.0:
@@ -40,12 +40,14 @@ def innovate(fdi, x, x_then, believed):
     aircraft, mean over the frame.
     """
     for i in range(3):
-        fdi.innovation[i] = (x[i] - x_then[i]) / fdi.dt - believed[i]
-        fdi.bound.frame[i] = fdi.bound.eta_bar[i] + (fdi.bound.noise[i] + fdi.bound.noise_then[i]) / fdi.dt
+        fdi.bank.innovation[i] = (x[i] - x_then[i]) / fdi.config.dt - believed[i]
+        fdi.bound.frame[i] = (
+            fdi.bound.eta_bar[i] + (fdi.bound.noise[i] + fdi.bound.noise_then[i]) / fdi.config.dt
+        )
         for m in range(fdi.bank.n):
             a = fdi.bank.decay[m]
-            fdi.bank.residual[m, i] = a * fdi.bank.residual[m, i] + fdi.dt * fdi.innovation[i]
-            fdi.bank.eta[m, i] = bound_step(fdi.bank.eta[m, i], fdi.bound.eta_bar[i], a, fdi.dt)
+            fdi.bank.residual[m, i] = a * fdi.bank.residual[m, i] + fdi.config.dt * fdi.bank.innovation[i]
+            fdi.bank.eta[m, i] = bound_step(fdi.bank.eta[m, i], fdi.bound.eta_bar[i], a, fdi.config.dt)
             fdi.bank.noise[m, i] = noise_step(fdi.bank.noise[m, i], fdi.bound.noise_then[i], a)
             fdi.bank.threshold[m, i] = fdi.bank.eta[m, i] + fdi.bank.noise[m, i] + fdi.bound.noise[i]
 
@@ -121,8 +123,8 @@ def remember(fdi, fie):
         low, high = extremes(fie, channel) if channel < 3 else aligned_extremes(fie)
         for m in range(fdi.bank.n):
             a = fdi.bank.decay[m]
-            fie.reach_low[m, channel] = a * fie.reach_low[m, channel] + fdi.dt * low
-            fie.reach_high[m, channel] = a * fie.reach_high[m, channel] + fdi.dt * high
+            fie.reach_low[m, channel] = a * fie.reach_low[m, channel] + fdi.config.dt * low
+            fie.reach_high[m, channel] = a * fie.reach_high[m, channel] + fdi.config.dt * high
 
 
 @kernel

@@ -95,7 +95,7 @@ def sum_up(fdi, belief):
         for s in range(u.size):
             total.G[i, s] += G[i, s]
             total.Gu[i, s] += G[i, s] * u[s]
-    if fdi.every_type:
+    if fdi.config.every_type:
         note_extremes(fdi.layout.dominant_axis, G, u, total)
     if fdi.bound.own_errors:
         sum_up_own_errors(fdi.bound.admitted.per_rad, u, total)
@@ -160,7 +160,7 @@ def spread(belief):
 @kernel
 def look_back(fdi, belief, measured, k):
     """What the design model makes of the frame that has elapsed: its bound and its means; k: its number."""
-    fdi.bound.error_map.time_s = k * fdi.dt
+    fdi.bound.error_map.time_s = k * fdi.config.dt
     bound_now(fdi, belief, measured)
     fdi.bound.eta_bar[:] = fdi.bound.eta_bar_now
     if fdi.bound.admitted.any:

@@ -28,8 +28,8 @@ def detect(fdi, x, t):
     """Form the residual and raise the alarm if a detector in authority does; x (3,) rad/s measured, t s."""
     for i in range(3):
         fdi.fdae.residual[i] = x[i] - fdi.fdae.xhat[i]
-    axis = bank.alarm(fdi) if fdi.authority != STATISTICS else -1
-    if axis < 0 and fdi.authority != WORST_CASE and fdi.statistical.score > 1.0:
+    axis = bank.alarm(fdi) if fdi.config.authority != STATISTICS else -1
+    if axis < 0 and fdi.config.authority != WORST_CASE and fdi.statistical.score > 1.0:
         axis = fdi.statistical.axis
     if axis >= 0 and not fdi.verdict.detected:
         fdi.verdict.detected = 1
@@ -44,12 +44,12 @@ def predict(fdi, x, believed, leaking):
     x (3,) rad/s; `believed` (3,) rad/s2 is f + G u, with the isolated fault once there is one.
     """
     if fdi.verdict.detected:
-        learn(fdi.fdae.network, fdi.fdae.residual, fdi.fdae.threshold, leaking, fdi.dt)
+        learn(fdi.fdae.network, fdi.fdae.residual, fdi.fdae.threshold, leaking, fdi.config.dt)
     for i in range(3):
         rate = believed[i] + fdi.fdae.network.output[i]
-        fdi.fdae.xhat[i] = x[i] + fdi.dt * rate + fdi.fdae.decay[i] * (fdi.fdae.xhat[i] - x[i])
+        fdi.fdae.xhat[i] = x[i] + fdi.config.dt * rate + fdi.fdae.decay[i] * (fdi.fdae.xhat[i] - x[i])
         fdi.fdae.threshold_eta[i] = bound_step(
-            fdi.fdae.threshold_eta[i], fdi.bound.eta_bar[i], fdi.fdae.decay[i], fdi.dt
+            fdi.fdae.threshold_eta[i], fdi.bound.eta_bar[i], fdi.fdae.decay[i], fdi.config.dt
         )
         fdi.fdae.threshold_noise[i] = noise_step(
             fdi.fdae.threshold_noise[i], fdi.bound.noise_then[i], fdi.fdae.decay[i]

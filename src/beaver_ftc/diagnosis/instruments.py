@@ -96,8 +96,8 @@ def follow_rates(watch, fdi):
         for j in range(3):
             lost += D[i, j] * before[j]
             spread += (-D[i, j] if i == j else abs(D[i, j])) * watch.W_then[j]
-        W[i] += fdi.dt * (fdi.innovation[i] - lost)
-        bound[i] = max(watch.W_then[i] + fdi.dt * (fdi.bound.eta_bar[i] + spread), 0.0)
+        W[i] += fdi.config.dt * (fdi.bank.innovation[i] - lost)
+        bound[i] = max(watch.W_then[i] + fdi.config.dt * (fdi.bound.eta_bar[i] + spread), 0.0)
 
 
 @kernel
@@ -172,8 +172,8 @@ def raise_alarm(watch, fdi, t):
     verdict.detected, verdict.isolated, verdict.type = 0, NOT_ISOLATED, -1
     verdict.detected_at_s = verdict.isolated_at_s = -1.0
     verdict.lead = verdict.lead_kind = -1
-    for s in range(fdi.surface.size):
-        fdi.surface[s].measure = -1
+    for s in range(fdi.types.surface.size):
+        fdi.types.surface[s].measure = -1
     fdi.fdae.network.weights[:] = 0.0
     fdi.fdae.network.output[:] = 0.0
 
@@ -195,14 +195,14 @@ def ask_rates(watch, fdi):
     for i in range(3):
         if watch.rates_say[i] != UNKNOWN:
             continue
-        error, jump = watch.error[i], (watch.error[i] - watch.error_then[i]) / fdi.dt
+        error, jump = watch.error[i], (watch.error[i] - watch.error_then[i]) / fdi.config.dt
         own = CROSS_DAMPING_PER_S * max(abs(error), abs(watch.error_then[i])) + 0.1 * abs(jump)
         blur = 4.0 * watch.step.test[TURN + i].noise / watch.step.h  # of `error`, by the attitude's noise
         bound = fdi.bound.frame[i] + 1e-6
-        seen = abs(fdi.innovation[i]) > bound or alarm >= 0 or abs(watch.W[i]) > watch.W_bound[i] + 1e-6
+        seen = abs(fdi.bank.innovation[i]) > bound or alarm >= 0 or abs(watch.W[i]) > watch.W_bound[i] + 1e-6
         spike = watch.spike_then[i]
         sudden = abs(error) < GONE * spike and spike > 2.0 * blur
-        explained = abs(fdi.innovation[i] - jump) <= bound + own + blur / fdi.dt
+        explained = abs(fdi.bank.innovation[i] - jump) <= bound + own + blur / fdi.config.dt
         slow = 0.7 * abs(error) <= watch.W_bound[i] + abs(watch.W[i]) + blur
         if not explained or (not seen and (sudden or not slow)):
             watch.rates_say[i] = NO

@@ -41,29 +41,29 @@ def suppose(fdi, fie, G, Gu, spread):
         effect.spread[i] = spread[i, fie.surface]
     if fdi.bound.own_errors and fie.kind == POSITION:
         membership.allow_for_own_errors(fdi, fie)
-    if fdi.memory:
+    if fdi.isolation.memory:
         bank.remember(fdi, fie)
 
 
 @kernel
 def suppose_all(fdi, G, Gu, spread):
     """`suppose` for every estimator, where something will ask for it."""
-    if fdi.memory or fdi.verdict.detected:
-        for s in range(fdi.n_estimators):
-            suppose(fdi, fdi.estimator[s], G, Gu, spread)
+    if fdi.isolation.memory or fdi.verdict.detected:
+        for s in range(fdi.isolation.n):
+            suppose(fdi, fdi.isolation.estimator[s], G, Gu, spread)
 
 
 @kernel
 def start(fdi, x):
     """Start every estimator at the measured x (3,) rad/s, with no residual and no knowledge of theta."""
-    for s in range(fdi.n_estimators):
-        fie = fdi.estimator[s]
+    for s in range(fdi.isolation.n):
+        fie = fdi.isolation.estimator[s]
         for i in range(3):
             fie.xhat[i] = x[i]
             fie.bound_noise[i] = fdi.bound.noise[i]
             fie.covariance[i] = (fie.high - fie.low) ** 2 / 12.0  # of a uniform distribution
             fie.theta_low[i], fie.theta_high[i] = fie.low, fie.high
-    if fdi.every_type:
+    if fdi.config.every_type:
         examine.start(fdi)
 
 
@@ -73,7 +73,7 @@ def within_limits(fdi, fie, x):
     within = True
     for i in range(3):
         fie.residual[i] = x[i] - fie.xhat[i]
-        if fdi.thresholds == INTERVAL:
+        if fdi.isolation.thresholds == INTERVAL:
             fie.lower[i], fie.upper[i] = interval(
                 fie.low, fie.high, fie.rise[i], fie.fall[i], fie.omega[i], fie.theta[i], fie.bound[i]
             )
@@ -89,11 +89,11 @@ def within_limits(fdi, fie, x):
 def possible(fdi, fie, x, started):
     """Whether the fault can be the one, by every test switched on. `started`: a frame or more ago."""
     can_be = within_limits(fdi, fie, x)
-    if fdi.memory:
-        can_be = can_be and bank.explains(fdi, fie, fdi.shared)
-    if (fdi.shared or fie.kind == POSITION) and (started or fdi.memory):
+    if fdi.isolation.memory:
+        can_be = can_be and bank.explains(fdi, fie, fdi.isolation.shared)
+    if (fdi.isolation.shared or fie.kind == POSITION) and (started or fdi.isolation.memory):
         can_be = can_be and membership.agree(fdi, fie)
-    if fdi.membership and fdi.abrupt and started and fie.kind == LOSS:
+    if fdi.isolation.membership and fdi.config.abrupt and started and fie.kind == LOSS:
         can_be = can_be and membership.narrow(fdi, fie)
     return can_be
 
@@ -105,15 +105,15 @@ def rules_out(fdi, fie, within):
     Of faults of every type the sets know the course; chance, which axes are moved. Within the class, chance
     that has raised no alarm has nothing to say about the alarm of the sets.
     """
-    if fdi.authority == WORST_CASE or (fdi.every_type and not within):
+    if fdi.config.authority == WORST_CASE or (fdi.config.every_type and not within):
         return not within
-    if fdi.every_type:
+    if fdi.config.every_type:
         return fdi.statistical.enabled and across.excludes(fdi, fie.surface)
-    if fdi.authority != STATISTICS and not within:
+    if fdi.config.authority != STATISTICS and not within:
         return True
     if not fdi.statistical.enabled or fie.shown or fdi.statistical.detected_at_s < 0.0:
         return False
-    fie.shown = not fdi.abrupt and shows(fdi, fie.surface)  # what comes later may be its end
+    fie.shown = not fdi.config.abrupt and shows(fdi, fie.surface)  # what comes later may be its end
     if fie.shown or not excludes(fdi, fie.surface, False):
         return False
     fie.doubted = 1  # only the end of a loss that nobody saw would explain it
@@ -127,8 +127,8 @@ def decide(fdi, t):
     One that is left for an end alone, of a loss that was never seen, is not named.
     """
     left, last = 0, NOT_ISOLATED
-    for s in range(fdi.n_estimators):
-        fie = fdi.estimator[s]
+    for s in range(fdi.isolation.n):
+        fie = fdi.isolation.estimator[s]
         if not fie.excluded:
             left += 1
             last = NOT_ISOLATED if fie.doubted and not fie.shown else s
@@ -141,12 +141,12 @@ def decide(fdi, t):
 @kernel
 def isolate(fdi, x, t, started):
     """Test every estimator against the measured x (3,) rad/s at time t (s), and decide; as `possible`."""
-    for s in range(fdi.n_estimators):
-        fie = fdi.estimator[s]
+    for s in range(fdi.isolation.n):
+        fie = fdi.isolation.estimator[s]
         if rules_out(fdi, fie, possible(fdi, fie, x, started)) and not fie.excluded:
             fie.excluded = 1
             fie.excluded_at_s = t
-    if fdi.every_type:
+    if fdi.config.every_type:
         isolate_type(fdi, t, started)
     else:
         decide(fdi, t)
@@ -155,12 +155,12 @@ def isolate(fdi, x, t, started):
 @apart
 def isolate_type(fdi, t, started):
     """Of faults of every type, alone or two at a time, decide which it is."""
-    if fdi.pair.enabled:
+    if fdi.types.pair.enabled:
         pairs.examine(fdi)
         pairs.decide(fdi, t)
         return
-    if started or fdi.memory:
-        if fdi.block.length > 1:
+    if started or fdi.isolation.memory:
+        if fdi.types.config.length > 1:
             blocks.examine(fdi)
         else:
             examine.examine(fdi)
@@ -209,13 +209,13 @@ def predict(fdi, fie, x, believed):
     x (3,) rad/s as the frame began; believed (3,) rad/s2 is f + G u, mean over the frame; fie.effect is
     already this frame's.
     """
-    dt = fdi.dt
+    dt = fdi.config.dt
     for i in range(3):
-        base, Z, theta, a = fie.effect.offset[i], fie.effect.Z[i], fie.theta[i], fdi.fie_decay[i]
+        base, Z, theta, a = fie.effect.offset[i], fie.effect.Z[i], fie.theta[i], fdi.isolation.decay[i]
         fie.xhat[i] = x[i] + dt * (believed[i] + base + Z * theta) + a * (fie.xhat[i] - x[i])
     adapt(fdi, fie)
     for i in range(3):
-        Z, a = fie.effect.Z[i], fdi.fie_decay[i]
+        Z, a = fie.effect.Z[i], fdi.isolation.decay[i]
         fie.rise[i] = a * fie.rise[i] + dt * max(Z, 0.0)
         fie.fall[i] = a * fie.fall[i] + dt * min(Z, 0.0)
         fie.bound_eta[i] = bound_step(fie.bound_eta[i], fdi.bound.eta_bar[i] + fie.effect.spread[i], a, dt)
@@ -226,18 +226,20 @@ def predict(fdi, fie, x, believed):
 @kernel
 def adapt(fdi, fie):
     """Move the estimate by the residual the frame began with, and the prediction along Omega[k+1]."""
-    joint = adapt_jointly(fie, fdi.forgetting) if fdi.shared else 0.0
+    joint = adapt_jointly(fie, fdi.isolation.forgetting) if fdi.isolation.shared else 0.0
     for i in range(3):
-        if fdi.shared:
+        if fdi.isolation.shared:
             step = joint
         else:
-            step = correct(fie, i, fie.residual[i], fdi.forgetting, fie.theta_low[i], fie.theta_high[i])
-        fie.omega[i] = fdi.fie_decay[i] * fie.omega[i] + fdi.dt * fie.effect.Z[i]
+            step = correct(
+                fie, i, fie.residual[i], fdi.isolation.forgetting, fie.theta_low[i], fie.theta_high[i]
+            )
+        fie.omega[i] = fdi.isolation.decay[i] * fie.omega[i] + fdi.config.dt * fie.effect.Z[i]
         fie.xhat[i] += fie.omega[i] * step
 
 
 @kernel
 def predict_all(fdi, x, believed):
     """Advance the estimators by a frame; arguments as in `predict`."""
-    for s in range(fdi.n_estimators):
-        predict(fdi, fdi.estimator[s], x, believed)
+    for s in range(fdi.isolation.n):
+        predict(fdi, fdi.isolation.estimator[s], x, believed)

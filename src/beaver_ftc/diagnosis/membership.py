@@ -65,8 +65,8 @@ def allow_for_own_errors(fdi, fie):
     axis = dominant(effect.Z)
     before, reach = fie.furthest, max(abs(fie.low), abs(fie.high))
     room = effect.spread[axis]
-    value = fdi.innovation[axis] - effect.offset[axis]
-    earlier = 2.0 * before / fdi.instants if fdi.instants > 1 else 0.0
+    value = fdi.bank.innovation[axis] - effect.offset[axis]
+    earlier = 2.0 * before / fdi.config.instants if fdi.config.instants > 1 else 0.0
     for _ in range(ROUNDS):
         own = max(fdi.bound.own_per_rad[axis, s] * (reach + earlier) - fdi.bound.own[axis, s], 0.0)
         low, high = solve(value, fdi.bound.frame[axis] + room + own, effect.Z[axis], fie.low, fie.high)
@@ -81,11 +81,11 @@ def allow_for_own_errors(fdi, fie):
 @kernel
 def agree(fdi, fie):
     """Whether one theta, or no fault at all, explains the elapsed frame on every axis."""
-    if healthy(fdi.innovation, fdi.bound.frame):
+    if healthy(fdi.bank.innovation, fdi.bound.frame):
         return True
     low, high = fie.low, fie.high
     for i in range(3):
-        axis_low, axis_high = agreeing(fdi.innovation, fdi.bound.frame, fie, fie.effect, i)
+        axis_low, axis_high = agreeing(fdi.bank.innovation, fdi.bound.frame, fie, fie.effect, i)
         low, high = max(low, axis_low), min(high, axis_high)
     return low <= high
 
@@ -107,10 +107,12 @@ def narrow(fdi, fie):
     Filtered: eps + Omega thetahat = Omega theta + filtered uncertainty, whatever the estimate thetahat did.
     """
     for i in range(3):
-        frame = agreeing(fdi.innovation, fdi.bound.frame, fie, fie.effect, i)
-        intersect(fie, i, frame, fdi.shared)
+        frame = agreeing(fdi.bank.innovation, fdi.bound.frame, fie, fie.effect, i)
+        intersect(fie, i, frame, fdi.isolation.shared)
         filtered = fie.residual[i] + fie.omega[i] * fie.theta[i]
-        intersect(fie, i, solve(filtered, fie.bound[i], fie.omega[i], fie.low, fie.high), fdi.shared)
+        intersect(
+            fie, i, solve(filtered, fie.bound[i], fie.omega[i], fie.low, fie.high), fdi.isolation.shared
+        )
     left = True
     for i in range(3):
         left = left and fie.theta_low[i] <= fie.theta_high[i]

@@ -117,12 +117,12 @@ def set_up(
     aircraft = aircraft or load()
     statistical, given = fdi["statistical"], config.statistical
     statistical["detected_at_s"] = -1.0
-    if given is None or not fdi["enabled"]:  # a plug-in diagnoses, or nothing does
+    if given is None or not fdi["config"]["enabled"]:  # a plug-in diagnoses, or nothing does
         return
-    statistical["enabled"], statistical["share"] = 1, 1.0 / max(int(fdi["instants"]), 1)
+    statistical["enabled"], statistical["share"] = 1, 1.0 / max(int(fdi["config"]["instants"]), 1)
     gusts.set_up_air(statistical["air"], config.bounds.turbulence, mass, aircraft)
     forces = bool(statistical["forces"]["known"])
-    across = across_a_column(config, int(fdi["instants"]))
+    across = across_a_column(config, int(fdi["config"]["instants"]))
     tests = tests_a_frame(aircraft, *(views_of(aircraft, forces) if across else ()))
     statistical["alarm_level"] = alarm_level(given.false_alarms_per_h, rate_hz, tests)
     statistical["naming_level"] = naming_level(given.misnaming, rate_hz, aircraft)

@@ -24,12 +24,10 @@ from beaver_ftc.diagnosis import (
 from beaver_ftc.diagnosis.belief import begin_frame, look
 from beaver_ftc.diagnosis.state import (
     BANK,
-    ESTIMATOR,
+    CONFIG,
     FDAE,
-    FRAME_BLOCK,
-    MAX_ESTIMATORS,
+    ISOLATION,
     NOT_ISOLATED,
-    PAIR,
     STATISTICS,
     WORST_CASE,
     bound_dtype,
@@ -38,25 +36,17 @@ from beaver_ftc.diagnosis.state import (
 )
 from beaver_ftc.diagnosis.statistical import STATISTICAL
 from beaver_ftc.diagnosis.types import examine
-from beaver_ftc.diagnosis.types.memory import surface_dtype
+from beaver_ftc.diagnosis.types.memory import types_dtype
 from beaver_ftc.diagnosis.watch import WATCH
 
 
 @lru_cache
 def diagnosis_dtype(n: int) -> np.dtype:
-    """The diagnosis' memory for an aircraft with n surfaces."""
+    """The stages of the diagnosis of an aircraft with n surfaces."""
     fields = [
-        ("enabled", "i8"), ("thresholds", "i8"), ("authority", "i8"), ("dt", "f8"),
-        ("bound", bound_dtype(n)), ("innovation", "f8", (3,)), ("bank", BANK), ("fdae", FDAE),
-        ("verdict", conclusion_dtype(n)), ("layout", layout_dtype(n)),
-        # the isolation estimators, and the sharpened scheme's switches
-        ("n_estimators", "i8"), ("estimator", ESTIMATOR, (MAX_ESTIMATORS,)),
-        ("forgetting", "f8"), ("fie_decay", "f8", (3,)),
-        ("memory", "i8"), ("shared", "i8"), ("membership", "i8"), ("abrupt", "i8"),
-        # faults of every type: types/
-        ("every_type", "i8"), ("whole", "i8"), ("instants", "i8"), ("returns", "i8"), ("patience", "i8"),
-        ("surface", surface_dtype(), (n,)), ("frame", "i8"), ("pair", PAIR), ("block", FRAME_BLOCK),
-        ("statistical", STATISTICAL), ("watch", WATCH),
+        ("config", CONFIG), ("bound", bound_dtype(n)), ("bank", BANK), ("fdae", FDAE),
+        ("verdict", conclusion_dtype(n)), ("layout", layout_dtype(n)), ("isolation", ISOLATION),
+        ("types", types_dtype(n)), ("statistical", STATISTICAL), ("watch", WATCH),
     ]  # fmt: skip
     return np.dtype(fields, align=True)
 
@@ -73,7 +63,7 @@ def conclude(fdi, belief, measured, effectiveness, offset, k, t):
     """From prediction to verdict; with scheme `none`, nothing."""
     if k == 0:
         detection.begin(fdi, measured.x)
-    if fdi.enabled:
+    if fdi.config.enabled:
         if k > 0:
             predict(fdi, belief, measured, effectiveness, offset, k, t)
         else:
@@ -91,15 +81,15 @@ def predict(fdi, belief, measured, effectiveness, offset, k, t):
     if fdi.statistical.enabled:
         compare_likelihoods(fdi, belief, measured, k, t)
     isolation.suppose_all(fdi, mean.G, mean.Gu, mean.Gu_spread)
-    if fdi.every_type:
+    if fdi.config.every_type:
         examine.note_orders(fdi, belief.commanded, mean)
     if fdi.verdict.detected:
         isolation.predict_all(fdi, x_then, expected)
-        expect_known_faults(expected, mean, effectiveness, offset, fdi.every_type)
+        expect_known_faults(expected, mean, effectiveness, offset, fdi.config.every_type)
     if fdi.statistical.enabled:
         for i in range(3):
-            belief.surprise[i] = (x[i] - x_then[i]) / fdi.dt - expected[i]
-        statistical.follow_rest(fdi.statistical, belief.surprise, fdi.dt)
+            belief.surprise[i] = (x[i] - x_then[i]) / fdi.config.dt - expected[i]
+        statistical.follow_rest(fdi.statistical, belief.surprise, fdi.config.dt)
     detection.predict(fdi, x_then, expected, fdi.verdict.isolated >= 0 or fdi.verdict.lead >= 0)
 
 
@@ -125,9 +115,11 @@ def compare_likelihoods(fdi, belief, measured, k, t):
     cubic = unanticipated_pitch(belief.design, measured.y, 1.0)
     statistical.signatures(fdi.statistical, belief.means.Gu, cubic)
     latched = fdi.statistical.detected_at_s >= 0.0
-    statistical.observe(fdi.statistical, fdi.innovation, fdi.dt, k, latched, not fdi.abrupt)
+    statistical.observe(
+        fdi.statistical, fdi.bank.innovation, fdi.config.dt, k, latched, not fdi.config.abrupt
+    )
     mean = belief.means
-    across.observe(fdi, fdi.innovation, mean.G, mean.Gu, measured.y, k, latched)
+    across.observe(fdi, fdi.bank.innovation, mean.G, mean.Gu, measured.y, k, latched)
     statistical.score(fdi.statistical, t, fdi.bound.error_map.outside == 0)
 
 
@@ -163,17 +155,17 @@ def ready(fdi, belief, measured, k):
 def weigh_forces(fdi, belief, measured, k):
     """Take in what the accelerometers say, and the air as it follows from them without the vanes."""
     known, seen, inertial = fdi.statistical.forces, fdi.statistical.air, fdi.statistical.inertial_air
-    forces.look(known, seen, measured, belief.u, fdi.dt)
+    forces.look(known, seen, measured, belief.u, fdi.config.dt)
     seen.felt[:] = measured.force
     if inertial.moving:
         forces.without_vanes(known, inertial.rotation, measured.y)
         inertial.felt[:] = measured.force
         if k > 0:
-            air.observe(inertial, known.y, measured.attitude, fdi.dt)
+            air.observe(inertial, known.y, measured.attitude, fdi.config.dt)
         else:
             air.begin(inertial, known.y, measured.attitude)
         air.effect(inertial, belief.design, measured.x, known.y, belief.u)
-        air.begin_frame(inertial, known.y[AIRSPEED], fdi.dt)
+        air.begin_frame(inertial, known.y[AIRSPEED], fdi.config.dt)
 
 
 @apart
@@ -181,7 +173,7 @@ def look_ahead(fdi, belief, measured, k):
     """Ready the statistical detector for the next frame: the air as the vanes see it, noise, coefficients."""
     if fdi.statistical.air.moving:
         if k > 0:
-            air.observe(fdi.statistical.air, measured.y, measured.attitude, belief.share * fdi.dt)
+            air.observe(fdi.statistical.air, measured.y, measured.attitude, belief.share * fdi.config.dt)
         else:
             air.begin(fdi.statistical.air, measured.y, measured.attitude)
     if fdi.statistical.forces.known and not measured.inertial:
@@ -194,7 +186,7 @@ def look_ahead(fdi, belief, measured, k):
 @apart
 def look_at_air(fdi, belief, measured):
     """Take in the gust that the vanes see by now, and what it does."""
-    x, y, dt = measured.x, measured.y, belief.share * fdi.dt
+    x, y, dt = measured.x, measured.y, belief.share * fdi.config.dt
     statistical.look(fdi.statistical, fdi, belief.design, x, y, belief.u, measured.attitude, dt)
 
 
@@ -230,7 +222,7 @@ def note_verdict(fdi, verdict, t):
     if isolated != fdi.verdict.isolated:
         fdi.verdict.isolated, fdi.verdict.isolated_at_s = isolated, t
     if isolated >= 0:
-        fdi.estimator[isolated].theta[:] = verdict.theta
+        fdi.isolation.estimator[isolated].theta[:] = verdict.theta
     fdi.verdict.estimates = verdict.estimates
     fdi.verdict.effectiveness[:] = verdict.effectiveness
 
@@ -238,13 +230,13 @@ def note_verdict(fdi, verdict, t):
 @kernel
 def isolated_surface(fdi):
     """The surface of the isolated fault, or -1."""
-    return fdi.estimator[fdi.verdict.isolated].surface if fdi.verdict.isolated >= 0 else -1
+    return fdi.isolation.estimator[fdi.verdict.isolated].surface if fdi.verdict.isolated >= 0 else -1
 
 
 @kernel
 def likelihood_counts(fdi):
     """Whether the statistical detector's estimates are the ones to use."""
-    return fdi.statistical.enabled and fdi.authority != WORST_CASE
+    return fdi.statistical.enabled and fdi.config.authority != WORST_CASE
 
 
 @kernel
@@ -252,7 +244,7 @@ def isolated_theta(fdi, s):
     """Estimated theta of the isolated loss of surface s: under noise, the most likely one."""
     if likelihood_counts(fdi):
         return statistical.loss_of(fdi.statistical, s)[0]
-    return fdi.estimator[fdi.verdict.isolated].theta[fdi.layout.dominant_axis[s]]
+    return fdi.isolation.estimator[fdi.verdict.isolated].theta[fdi.layout.dominant_axis[s]]
 
 
 @kernel
@@ -273,7 +265,7 @@ def built_in_statistic(fdi):
     """
     chances = likelihood_counts(fdi)
     likely = fdi.statistical.score if chances else 0.0
-    if fdi.authority == STATISTICS:
+    if fdi.config.authority == STATISTICS:
         return likely
     certain = bank.largest_share(fdi)
     return max(likely, certain) if certain > 1.0 or not chances else likely

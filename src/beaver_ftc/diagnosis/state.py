@@ -63,7 +63,7 @@ def verdict_dtype(n: int) -> np.dtype:
 # The bank of detection filters; filter 0 is the published one (bank.py).
 BANK = np.dtype(
     [
-        ("n", "i8"), ("decay", "f8", (MAX_POLES,)),
+        ("n", "i8"), ("decay", "f8", (MAX_POLES,)), ("innovation", "f8", (3,)),
         ("residual", "f8", (MAX_POLES, 3)), ("threshold", "f8", (MAX_POLES, 3)),
         ("eta", "f8", (MAX_POLES, 3)), ("noise", "f8", (MAX_POLES, 3)),
         ("closest", "f8", (MAX_POLES,)),  # largest share of its bound each filter reached in healthy flight
@@ -81,20 +81,12 @@ FDAE = np.dtype(
     align=True,
 )  # fmt: skip
 
-# Two faults at once (types/pairs.py): alarms of the groups, and what is known of the first fault in pitch.
-PAIR = np.dtype(
+# The isolation estimators, and how the decision among them is sharpened (isolation.py).
+ISOLATION = np.dtype(
     [
-        ("enabled", "i8"), ("alarmed", "i8", (2,)), ("no_lateral_pair", "i8"), ("first", "i8"),
-        ("unsettled", "i8"),
-    ],
-    align=True,
-)  # fmt: skip
-
-# Blocks of frames (types/blocks.py).
-FRAME_BLOCK = np.dtype(
-    [
-        ("length", "i8"), ("filled", "i8"), ("span_s", "f8"),
-        ("innovation", "f8", (3,)), ("bound", "f8", (3,)), ("noise", "f8", (3,)),
+        ("n", "i8"), ("thresholds", "i8"), ("forgetting", "f8"), ("decay", "f8", (3,)),
+        ("memory", "i8"), ("shared", "i8"), ("membership", "i8"),
+        ("estimator", ESTIMATOR, (MAX_ESTIMATORS,)),
     ],
     align=True,
 )  # fmt: skip
@@ -137,3 +129,14 @@ def bound_dtype(n: int) -> np.dtype:
         ("own_errors", "i8"), ("own_per_rad", "f8", (3, n)), ("own", "f8", (3, n)),
     ]  # fmt: skip
     return np.dtype(fields, align=True)
+
+
+# What several stages go by. authority: whose alarms count; every_type: faults of every type; abrupt: a fault
+# is declared to stay as it is; instants: of JSBSim, in a frame; dt s.
+CONFIG = np.dtype(
+    [
+        ("enabled", "i8"), ("authority", "i8"), ("every_type", "i8"), ("abrupt", "i8"),
+        ("instants", "i8"), ("dt", "f8"),
+    ],
+    align=True,
+)  # fmt: skip

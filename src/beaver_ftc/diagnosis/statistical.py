@@ -3,7 +3,7 @@
 Pitch is one block, roll and yaw another, whose noise goes together. Roll and yaw are looked at twice: by a
 drift that may go anywhere, which is quick and knows nothing of constants, and by one that returns, which
 gathers evidence for longer. The declared rate of false alarms holds for the declared noise; the worst-case
-scheme beside it needs no probability at all. `fdi.authority` says whose alarms and exclusions count.
+scheme beside it needs no probability at all. `fdi.config.authority` says whose alarms and exclusions count.
 """
 
 import numpy as np
@@ -169,8 +169,8 @@ def record(statistical, row):
 @kernel
 def is_open(fdi, surface):
     """Whether a loss of this surface has not been excluded."""
-    for s in range(fdi.n_estimators):
-        fie = fdi.estimator[s]
+    for s in range(fdi.isolation.n):
+        fie = fdi.isolation.estimator[s]
         if fie.kind == LOSS and fie.surface == surface:
             return not fie.excluded
     return True
@@ -232,7 +232,7 @@ def excludes(fdi, surface, ends):
     by `ends`.
     """
     statistical = fdi.statistical
-    pitch, exact = statistical.block[PITCH], fdi.abrupt and fdi.instants == 1
+    pitch, exact = statistical.block[PITCH], fdi.config.abrupt and fdi.config.instants == 1
     for b in range(LATERAL, statistical.n_blocks):
         lateral = statistical.block[b]
         better = max(best_alternative(fdi, pitch, surface), best_alternative(fdi, lateral, surface))
@@ -241,7 +241,7 @@ def excludes(fdi, surface, ends):
         if ends:
             ended = max(ended, at_most(pitch, surface, True))
         part = 1.0 if exact else LEAST_PART
-        end_part = 1.0 if fdi.instants == 1 else LEAST_PART
+        end_part = 1.0 if fdi.config.instants == 1 else LEAST_PART
         small = worse < part * better and ended < end_part * better
         if small and better - max(worse, ended) > statistical.naming_level:
             return True
@@ -275,7 +275,7 @@ def prepare(statistical, fdi, design, x, y, u):
         constants(statistical, fdi, design, x, y, u)
     drifts(statistical, fdi, design, x, y)
     if statistical.air.moving:
-        air.begin_frame(statistical.air, y[AIRSPEED], statistical.share * fdi.dt)
+        air.begin_frame(statistical.air, y[AIRSPEED], statistical.share * fdi.config.dt)
 
 
 @kernel
@@ -319,7 +319,7 @@ def drifts(statistical, fdi, design, x, y):
             size = max(bounded[axis], LEAST_UNCERTAINTY_RAD_S2)
             block.drift[i, i] += statistical.rapidity * size * size
             block.jitter[i] = statistical.jitter[axis]
-        block.keep = np.exp(-fdi.dt * y[AIRSPEED] / block.lag) if block.lag > 0.0 else 1.0
+        block.keep = np.exp(-fdi.config.dt * y[AIRSPEED] / block.lag) if block.lag > 0.0 else 1.0
 
 
 @kernel

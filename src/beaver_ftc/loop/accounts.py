@@ -91,7 +91,7 @@ def follow_guarantee(guarantee, fdi, share, k, t):
     for i in range(3):
         mean = share * guarantee.phi_sum[i]
         for m in range(fdi.bank.n):
-            effect = fdi.bank.decay[m] * guarantee.effect[m, i] + fdi.dt * mean
+            effect = fdi.bank.decay[m] * guarantee.effect[m, i] + fdi.config.dt * mean
             guarantee.effect[m, i] = effect
             certain = abs(effect) > 2.0 * fdi.bank.threshold[m, i] > 0.0
             if certain and guarantee.certain_after_s < 0.0:

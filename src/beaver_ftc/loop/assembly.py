@@ -76,21 +76,22 @@ def estimator_names(fault_class: str, aircraft: Aircraft) -> tuple[str, ...]:
 def _assemble_diagnosis(
     fdi: np.void, config: FdiConfig, dt: float, reach: np.ndarray, aircraft: Aircraft
 ) -> None:
-    fdi["enabled"] = config.scheme == "adaptive-estimators"
-    fdi["thresholds"] = _THRESHOLDS[config.thresholds]
-    fdi["dt"] = dt
-    fdi["forgetting"] = exp(-dt / config.forgetting_time_s)
+    shared, isolation = fdi["config"], fdi["isolation"]
+    shared["enabled"], shared["dt"] = config.scheme == "adaptive-estimators", dt
+    shared["authority"], shared["every_type"] = _AUTHORITIES[config.authority], config.fault_class == "all"
+    shared["abrupt"] = config.fault_profile == "abrupt"
+    isolation["thresholds"] = _THRESHOLDS[config.thresholds]
+    isolation["forgetting"] = exp(-dt / config.forgetting_time_s)
     fdi["fdae"]["pole"] = config.detection_pole_per_s
     fdi["fdae"]["decay"] = exp(-config.detection_pole_per_s * dt)
-    fdi["fie_decay"] = exp(-config.isolation_pole_per_s * dt)
+    isolation["decay"] = exp(-config.isolation_pole_per_s * dt)
     _assemble_bound(fdi["bound"], config, aircraft)
     fdi["verdict"]["detected_at_s"] = fdi["verdict"]["isolated_at_s"] = -1.0
     fdi["verdict"]["isolated"] = NOT_ISOLATED
-    fdi["authority"] = _AUTHORITIES[config.authority]
     members = members_of(config.fault_class, aircraft)
-    fdi["n_estimators"] = len(members)
+    isolation["n"] = len(members)
     _assemble_layout(fdi["layout"], members, aircraft)
-    for fie, (_, kind, surface) in zip(fdi["estimator"], members, strict=False):
+    for fie, (_, kind, surface) in zip(isolation["estimator"], members, strict=False):
         fie["kind"], fie["surface"] = kind, surface
         fie["low"], fie["high"] = PARAMETER_SET[kind] if kind == LOSS else reach[:, surface]
 
@@ -106,18 +107,20 @@ def _assemble_bound(bound: np.void, config: FdiConfig, aircraft: Aircraft) -> No
 
 def _assemble_types(frame: np.void, scenario: Scenario, dt: float, travel: np.ndarray) -> None:
     config, fdi, actuators = scenario.fdi, frame["fdi"], frame["belief"]["actuators"]
-    fdi["every_type"] = config.fault_class == "all"
-    fdi["block"]["length"] = block = ceil(BLOCK_S / dt) if gyros_vary(config.bounds.sensors) else 1
-    fdi["whole"], fdi["block"]["span_s"] = scenario.substeps == 1 and block == 1, block * dt
-    fdi["patience"] = ceil(pi / config.slowest_oscillation_rad_s / (block * dt))
+    types = fdi["types"]
+    going_by = types["config"]
+    going_by["length"] = block = ceil(BLOCK_S / dt) if gyros_vary(config.bounds.sensors) else 1
+    going_by["whole"], going_by["span_s"] = scenario.substeps == 1 and block == 1, block * dt
+    going_by["patience"] = ceil(pi / config.slowest_oscillation_rad_s / (block * dt))
     verdict = fdi["verdict"]
     verdict["type"] = verdict["lead"] = verdict["lead_kind"] = verdict["type_at_s"] = -1
-    fdi["pair"]["first"], fdi["pair"]["enabled"] = -1, config.pairs
+    types["pair"]["first"], types["pair"]["enabled"] = -1, config.pairs
     if config.pairs:
         _assemble_pairs(fdi, scenario.airframe)
-    fdi["instants"], fdi["returns"] = scenario.substeps, actuators["real"]
+    fdi["config"]["instants"] = going_by["instants"] = scenario.substeps
+    going_by["returns"] = actuators["real"]
     surfaces, instant_s = scenario.airframe.surfaces, dt / scenario.substeps
-    for s, (name, place, low, high) in enumerate(zip(surfaces, fdi["surface"], *travel, strict=True)):
+    for s, (name, place, low, high) in enumerate(zip(surfaces, types["surface"], *travel, strict=True)):
         place["travel_low"], place["travel_high"] = low, high
         place["reach_low"], place["reach_high"] = min(low, 0.0), max(high, 0.0)
         place["in_question"] = not config.pairs or fdi["layout"]["group"][s] == IN_PITCH
@@ -134,7 +137,7 @@ def _assemble_pairs(fdi: np.void, aircraft: Aircraft) -> None:
         raise BadInput(
             f"fdi.pairs: {aircraft.name} has not two surfaces in pitch, two in roll and yaw, allowed: false"
         )
-    for fie in fdi["estimator"][: fdi["n_estimators"]]:
+    for fie in fdi["isolation"]["estimator"][: fdi["isolation"]["n"]]:
         fie["unasked"] = (1, 0, 1) if fdi["layout"]["group"][fie["surface"]] == IN_PITCH else (0, 1, 0)
 
 
@@ -173,8 +176,9 @@ def _stand_in(aircraft: Aircraft) -> int:
 
 def _assemble_sharpening(fdi: np.void, config: FdiConfig, dt: float) -> None:
     sharpen = config.sharpen
-    fdi["memory"], fdi["shared"] = sharpen.memory, sharpen.shared_effectiveness
-    fdi["membership"], fdi["abrupt"] = sharpen.set_membership, config.fault_profile == "abrupt"
+    isolation = fdi["isolation"]
+    isolation["memory"], isolation["shared"] = sharpen.memory, sharpen.shared_effectiveness
+    isolation["membership"] = sharpen.set_membership
     bank = (
         *config.pole_bank_per_s,
         *poles_for_noise(config.bounds.sensors, max(config.bounds.constant_rad_s2.as_tuple())),
@@ -283,7 +287,7 @@ def _assemble_admitted(frame: np.void, scenario: Scenario) -> None:
     admit(admitted, scenario.fdi.bounds, scenario.airframe, frame["belief"]["design"], mass)
     admit_engine(admitted, scenario)
     frame["fdi"]["bound"]["own_errors"] = admitted["any"] and scenario.fdi.fault_class == "all"
-    if scenario.fdi.pairs and frame["fdi"]["block"]["length"] > 1:
+    if scenario.fdi.pairs and frame["fdi"]["types"]["config"]["length"] > 1:
         raise BadInput(
             f"{scenario.name}: fdi.pairs is not available with errors of the gyros that vary declared in "
             "fdi.bounds.sensors, allowed: a bias"

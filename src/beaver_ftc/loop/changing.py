@@ -109,7 +109,7 @@ class Changing:
     def _watch(self, fdi: np.void) -> None:
         """Watch the instruments as well if one has failed that the scenario had not said: it was broken in
         flight."""
-        wanted = self._loop.scenario.fdi.sensor_monitor != "never" and fdi["enabled"]
+        wanted = self._loop.scenario.fdi.sensor_monitor != "never" and fdi["config"]["enabled"]
         if self._loop.sensor_schedule.any and wanted and not fdi["watch"]["enabled"]:
             enable_watch(self._loop, fdi)
 

@@ -13,7 +13,7 @@ def lay_out(frame: np.void, scenario: Scenario, diagnoses_itself: bool) -> tuple
     """Note in a flight's record what there are columns for; returns their names."""
     fdi, logged, profile = frame["fdi"], frame["logged"], bool(frame["autopilot"]["enabled"])
     tested = bool(fdi["statistical"]["enabled"])
-    logged["estimators"] = fdi["n_estimators"] if diagnoses_itself else 0
+    logged["estimators"] = fdi["isolation"]["n"] if diagnoses_itself else 0
     logged["watch"] = comes_to_be_watched(scenario)
     logged["power"] = frame["control"]["power"]["enabled"] or profile
     logged["tests"] = fdi["statistical"]["n_columns"] if tested else 0

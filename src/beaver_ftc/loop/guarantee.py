@@ -28,7 +28,7 @@ def guaranteed_delay_s(frame: np.void, scenario: Scenario, plugged: bool) -> flo
         return None
     fault_s, verdict = float(truth["fault_at_s"]), fdi["verdict"]
     early = verdict["detected"] and verdict["detected_at_s"] < fault_s - TIME_TOLERANCE_S
-    if early or fdi["authority"] == STATISTICS or fdi["watch"]["alarmed"]:
+    if early or fdi["config"]["authority"] == STATISTICS or fdi["watch"]["alarmed"]:
         return None
     return None if _is_off(scenario, certain_s) else certain_s - fault_s
 

@@ -189,7 +189,7 @@ def watch_from_now(loop: Any) -> None:
     frame = loop.frames[0]
     watch = frame["fdi"]["watch"]
     read_more(loop)
-    wanted = loop.scenario.fdi.sensor_monitor != "never" and frame["fdi"]["enabled"]
+    wanted = loop.scenario.fdi.sensor_monitor != "never" and frame["fdi"]["config"]["enabled"]
     if wanted and not watch["enabled"]:
         enable_watch(loop, frame["fdi"])
         if frame["k"] > 0:

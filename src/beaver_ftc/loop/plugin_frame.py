@@ -264,6 +264,7 @@ def _names(scenario: Scenario, detector: Detector | None, law: Law | None) -> tu
 
 def _clear_for_detector(fdi: np.void) -> None:
     """No built-in isolation; instead, one estimator a surface for the plug-in's verdict."""
-    fdi["enabled"] = fdi["n_estimators"] = fdi["every_type"] = fdi["statistical"]["enabled"] = 0
-    fdi["watch"]["enabled"] = 0
-    fdi["estimator"]["surface"][: fdi["surface"].size] = range(fdi["surface"].size)
+    config, isolation, n = fdi["config"], fdi["isolation"], fdi["types"]["surface"].size
+    config["enabled"] = config["every_type"] = isolation["n"] = 0
+    fdi["statistical"]["enabled"] = fdi["watch"]["enabled"] = 0
+    isolation["estimator"]["surface"][:n] = range(n)

@@ -53,8 +53,8 @@ def record_estimators(fdi, logged, row, column):
     """Residuals between their limits, per estimator there are columns for; not a number before the
     estimators start, or where another diagnosis has taken their place."""
     for e in range(logged):
-        fie = fdi.estimator[e]
-        there = e < fdi.n_estimators
+        fie = fdi.isolation.estimator[e]
+        there = e < fdi.isolation.n
         started = there and fdi.verdict.detected
         for i in range(3):
             row[column] = fie.residual[i] if started else np.nan

@@ -38,15 +38,15 @@ def _estimate(fdi: np.void, surface: int) -> float:
     if fdi["statistical"]["enabled"]:
         return float(isolated_theta(fdi, surface))
     axis, estimator = int(fdi["layout"]["dominant_axis"][surface]), int(fdi["verdict"]["isolated"])
-    return float(fdi["estimator"][estimator]["theta"][axis])
+    return float(fdi["isolation"]["estimator"][estimator]["theta"][axis])
 
 
 def _isolation(fdi: np.void, surfaces: Sequence[str]) -> dict:
     """isolated, isolation_type, candidates, estimate, isolation_time_s of a Flight."""
-    if fdi["every_type"]:
+    if fdi["config"]["every_type"]:
         return found(fdi, surfaces)
     verdict = int(fdi["verdict"]["isolated"])
-    estimators = fdi["estimator"][: int(fdi["n_estimators"])]
+    estimators = fdi["isolation"]["estimator"][: int(fdi["isolation"]["n"])]
     left = [surfaces[int(fie["surface"])] for fie in estimators if not fie["excluded"]]
     nothing = {"isolated": None, "isolation_type": None, "estimate": None, "isolation_time_s": None}
     if not fdi["verdict"]["detected"] or verdict == NOT_ISOLATED:
@@ -60,7 +60,7 @@ def _isolation(fdi: np.void, surfaces: Sequence[str]) -> dict:
             "candidates": (),
             "isolation_time_s": at_s,
         }
-    fie = fdi["estimator"][verdict]
+    fie = fdi["isolation"]["estimator"][verdict]
     surface = int(fie["surface"])
     return {
         "isolated": surfaces[surface],
@@ -204,7 +204,11 @@ def verdict_of(frame: np.void, surfaces: Sequence[str]) -> Verdict:
 def estimate_now(fdi: np.void, said: Verdict, surfaces: Sequence[str]) -> float | None:
     """The estimate of a verdict that otherwise still stands, of a diagnosis for every type."""
     surface = surfaces.index(str(said.isolated))
-    kind = fdi["surface"][surface]["type"] if fdi["pair"]["enabled"] else fdi["verdict"]["type"]
+    kind = (
+        fdi["types"]["surface"][surface]["type"]
+        if fdi["types"]["pair"]["enabled"]
+        else fdi["verdict"]["type"]
+    )
     return estimate_of(fdi, surface, int(kind))
 
 

@@ -71,13 +71,13 @@ def news(frames, known):
         return changed
     changed |= replace(known, 1, fdi.verdict.detected_axis) | replace(known, 2, fdi.verdict.isolated)
     excluded = 0
-    for i in range(fdi.n_estimators):
-        excluded = 2 * excluded + fdi.estimator[i].excluded
+    for i in range(fdi.isolation.n):
+        excluded = 2 * excluded + fdi.isolation.estimator[i].excluded
     changed |= replace(known, 3, excluded) | replace(known, 4, fdi.verdict.type)
-    if fdi.every_type:
-        for plane in range(fdi.pair.alarmed.size):
-            changed |= replace(known, 5 + plane, fdi.pair.alarmed[plane])
-        for s in range(fdi.surface.size):
+    if fdi.config.every_type:
+        for plane in range(fdi.types.pair.alarmed.size):
+            changed |= replace(known, 5 + plane, fdi.types.pair.alarmed[plane])
+        for s in range(fdi.types.surface.size):
             changed |= news_of(fdi, s, known)
     return changed
 
@@ -85,11 +85,11 @@ def news(frames, known):
 @kernel
 def news_of(fdi, s, known):
     """The same of surface s, where every type is asked for."""
-    surface, first = fdi.surface[s], 8 + 5 * s
+    surface, first = fdi.types.surface[s], 8 + 5 * s
     bits = 0
     for kind in range(surface.type_excluded.size):
         bits = 2 * bits + surface.type_excluded[kind]
-    early = surface.evidence - surface.quiet < fdi.patience
+    early = surface.evidence - surface.quiet < fdi.types.config.patience
     changed = replace(known, first, surface.named) | replace(known, first + 1, surface.standing)
     changed |= replace(known, first + 2, surface.type) | replace(known, first + 3, bits)
     return changed | replace(known, first + 4, 1 if early else 0)

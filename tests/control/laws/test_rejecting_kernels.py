@@ -260,7 +260,7 @@ class TestVerdict:
 
     def test_a_slow_surface_is_left_to_its_pace(self, frame):
         control, fdi, *_ = self.told(frame)
-        surface = fdi["surface"][RUDDER]
+        surface = fdi["types"]["surface"][RUDDER]
         surface["measure"], surface["command"], surface["low"], surface["high"] = LAGS, 0.1, 0.02, 0.06
         accommodation.act_on_type(control, fdi, RUDDER)
         assert control["lag"] == pytest.approx([0, 0, 0.04 - 0.1, 0])
@@ -276,7 +276,7 @@ class TestVerdict:
     )  # fmt: skip
     def test_what_may_be_of_no_use(self, frame, every_type, measure, target, surface, doubtful):
         control, fdi, *_ = self.told(frame)
-        fdi["every_type"], fdi["surface"][surface]["measure"] = every_type, measure
+        fdi["config"]["every_type"], fdi["types"]["surface"][surface]["measure"] = every_type, measure
         control["target"], control["least_effectiveness"] = 1.0, 0.1
         control["target"][surface] = target
         assert bool(accommodation.is_doubtful(control, fdi, surface)) is doubtful
@@ -288,7 +288,7 @@ class TestVerdict:
         control["law"] = ORACLE if why == "truth" else ADAPTIVE
         faults["immovable"][RUDDER] = 1  # which only the oracle may know
         control["rejection"]["abandoned"][RUDDER] = why == "abandoned"
-        fdi["every_type"], fdi["surface"][RUDDER]["measure"] = 1, FIXED
+        fdi["config"]["every_type"], fdi["types"]["surface"][RUDDER]["measure"] = 1, FIXED
         control["effectiveness"][RUDDER] = 0.0 if why == "fixed" else 0.5
         accommodation.give_up(control, fdi, faults)
         given_up = why is not None

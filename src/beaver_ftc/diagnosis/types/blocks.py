@@ -18,22 +18,22 @@ from beaver_ftc.diagnosis.types.examine import judge_all, locate, note_wrong
 @kernel
 def begin(fdi):
     """Begin a block with the elapsed frame."""
-    fdi.block.innovation[:], fdi.block.bound[:] = 0.0, 0.0
-    fdi.block.noise[:] = fdi.bound.noise_then
-    for s in range(fdi.surface.size):
-        effect = fdi.estimator[fdi.layout.position_of[s]].block_effect
+    fdi.types.block.innovation[:], fdi.types.block.bound[:] = 0.0, 0.0
+    fdi.types.block.noise[:] = fdi.bound.noise_then
+    for s in range(fdi.types.surface.size):
+        effect = fdi.isolation.estimator[fdi.layout.position_of[s]].block_effect
         effect.offset[:], effect.Z[:], effect.spread[:] = 0.0, 0.0, 0.0
 
 
 @kernel
 def add(fdi):
     """Add the elapsed frame to the means over the block."""
-    share = 1.0 / fdi.block.length
+    share = 1.0 / fdi.types.config.length
     for i in range(3):
-        fdi.block.innovation[i] += share * fdi.innovation[i]
-        fdi.block.bound[i] += share * fdi.bound.eta_bar[i]
-    for s in range(fdi.surface.size):
-        fie = fdi.estimator[fdi.layout.position_of[s]]
+        fdi.types.block.innovation[i] += share * fdi.bank.innovation[i]
+        fdi.types.block.bound[i] += share * fdi.bound.eta_bar[i]
+    for s in range(fdi.types.surface.size):
+        fie = fdi.isolation.estimator[fdi.layout.position_of[s]]
         frame, mean = fie.effect, fie.block_effect
         for i in range(3):
             mean.offset[i] += share * frame.offset[i]
@@ -44,17 +44,17 @@ def add(fdi):
 @kernel
 def examine(fdi):
     """Take in the elapsed frame; with the last one of a block, take in the block and judge the one before."""
-    if fdi.block.filled == 0:
+    if fdi.types.block.filled == 0:
         begin(fdi)
     add(fdi)
-    fdi.block.filled += 1
-    if fdi.block.filled < fdi.block.length:
+    fdi.types.block.filled += 1
+    if fdi.types.block.filled < fdi.types.config.length:
         return
-    fdi.block.filled = 0
+    fdi.types.block.filled = 0
     for i in range(3):
-        fdi.block.bound[i] += (fdi.block.noise[i] + fdi.bound.noise[i]) / fdi.block.span_s
-    note_wrong(fdi, fdi.block.innovation, fdi.block.bound)
-    for s in range(fdi.surface.size):
-        effect = fdi.estimator[fdi.layout.position_of[s]].block_effect
-        locate(fdi, s, fdi.block.innovation, fdi.block.bound, effect)
+        fdi.types.block.bound[i] += (fdi.types.block.noise[i] + fdi.bound.noise[i]) / fdi.types.config.span_s
+    note_wrong(fdi, fdi.types.block.innovation, fdi.types.block.bound)
+    for s in range(fdi.types.surface.size):
+        effect = fdi.isolation.estimator[fdi.layout.position_of[s]].block_effect
+        locate(fdi, s, fdi.types.block.innovation, fdi.types.block.bound, effect)
     judge_all(fdi)

@@ -29,10 +29,10 @@ BY_ESTIMATOR, BY_DEDUCTION, RULED_OUT = range(3)
 @kernel
 def possible(fdi, s):
     """Whether anything on surface s can be the fault."""
-    standing = fdi.surface[s].standing
+    standing = fdi.types.surface[s].standing
     if standing != BY_ESTIMATOR:
         return standing == BY_DEDUCTION
-    return not fdi.estimator[fdi.layout.position_of[s]].excluded
+    return not fdi.isolation.estimator[fdi.layout.position_of[s]].excluded
 
 
 @kernel
@@ -77,7 +77,7 @@ def swings(surface):
 @kernel
 def would_have_swung(fdi, surface):
     """Whether there is no oscillation, or a whole one of the slowest would have shown, hidden by no stop."""
-    return not left(surface, OSCILLATORY) or surface.unhidden >= 2 * fdi.patience
+    return not left(surface, OSCILLATORY) or surface.unhidden >= 2 * fdi.types.config.patience
 
 
 @kernel
@@ -138,7 +138,7 @@ def may_be_slow(fdi, surface):
     """Whether what looks like a jam may be a slow surface that has come to where it is commanded: it has not
     stood off its command for long."""
     loud = surface.evidence - surface.quiet
-    return any_constant(surface) and left(surface, SLOW) and loud < fdi.patience
+    return any_constant(surface) and left(surface, SLOW) and loud < fdi.types.config.patience
 
 
 @kernel
@@ -162,8 +162,8 @@ def may_be_growing(surface, found):
 def sole(fdi, constant):
     """The one possible surface, with a type of constant parameter left if so asked; NO_SURFACE or SEVERAL."""
     found = NO_SURFACE
-    for s in range(fdi.surface.size):
-        surface = fdi.surface[s]
+    for s in range(fdi.types.surface.size):
+        surface = fdi.types.surface[s]
         if surface.in_question and possible(fdi, s) and (any_constant(surface) or not constant):
             found = s if found == NO_SURFACE else SEVERAL
     return found

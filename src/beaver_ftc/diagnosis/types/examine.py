@@ -27,8 +27,8 @@ LOSES, FIXED, SHIFTED, LAGS = range(4)
 @kernel
 def start(fdi):
     """Nothing is known of any surface yet."""
-    for s in range(fdi.surface.size):
-        begin(fdi.surface[s])
+    for s in range(fdi.types.surface.size):
+        begin(fdi.types.surface[s])
 
 
 @kernel
@@ -47,19 +47,21 @@ def note_orders(fdi, commanded, means):
     """What the surfaces have been ordered to do, commanded (n,) rad, since the elapsed frame began; where
     healthy ones were, and their least and greatest effectiveness, within it: means of a `belief.means_dtype`.
     """
-    for s in range(fdi.surface.size):
-        surface = fdi.surface[s]
+    for s in range(fdi.types.surface.size):
+        surface = fdi.types.surface[s]
         orders = surface.orders
-        if fdi.block.filled == 0:
+        if fdi.types.block.filled == 0:
             for age in range(HISTORY - 1, 0, -1):
-                orders.given[age, : fdi.block.length] = orders.given[age - 1, : fdi.block.length]
+                orders.given[age, : fdi.types.config.length] = orders.given[
+                    age - 1, : fdi.types.config.length
+                ]
                 orders.low[age], orders.high[age] = orders.low[age - 1], orders.high[age - 1]
             orders.low[0], orders.high[0] = np.inf, -np.inf
             orders.least[1], orders.greatest[1] = orders.least[0], orders.greatest[0]
             orders.least[0], orders.greatest[0] = np.inf, -np.inf
             surface.G_least, surface.G_most = np.inf, -np.inf
         order = min(max(commanded[s], surface.travel_low), surface.travel_high)
-        orders.given[0, fdi.block.filled] = order
+        orders.given[0, fdi.types.block.filled] = order
         orders.low[0], orders.high[0] = min(orders.low[0], order), max(orders.high[0], order)
         orders.least[0] = min(orders.least[0], means.u_least[s])
         orders.greatest[0] = max(orders.greatest[0], means.u_most[s])
@@ -73,7 +75,11 @@ def locate(fdi, s, innovation, bound, effect):
 
     effect: what the surface's estimator supposes of the same frame or block, dtype EFFECT.
     """
-    surface, fie, axis = fdi.surface[s], fdi.estimator[fdi.layout.position_of[s]], fdi.layout.dominant_axis[s]
+    surface, fie, axis = (
+        fdi.types.surface[s],
+        fdi.isolation.estimator[fdi.layout.position_of[s]],
+        fdi.layout.dominant_axis[s],
+    )
     surface.low_before, surface.high_before = surface.low_then, surface.high_then
     surface.low_then, surface.high_then, surface.command_then = surface.low, surface.high, surface.command
     surface.command = -effect.offset[axis] / effect.Z[axis]
@@ -81,7 +87,7 @@ def locate(fdi, s, innovation, bound, effect):
     surface.uneven = 0.25 * (surface.G_most - surface.G_least) / abs(effect.Z[axis])
     surface.low, surface.high = fie.low, fie.high
     for i in range(3):
-        if fdi.block.length > 1 and i != axis and effect.Z[i] != 0.0:
+        if fdi.types.config.length > 1 and i != axis and effect.Z[i] != 0.0:
             continue  # over a block the axes weigh what varies differently
         low, high = membership.agreeing(innovation, bound, fie, effect, i)
         surface.low, surface.high = max(surface.low, low), min(surface.high, high)
@@ -101,18 +107,18 @@ def note_stops(surface, width):
 def note_wrong(fdi, innovation, bound):
     """Keep for every surface whether more than the admitted uncertainty was at work."""
     wrong = not membership.healthy(innovation, bound)
-    for s in range(fdi.surface.size):
-        surface = fdi.surface[s]
+    for s in range(fdi.types.surface.size):
+        surface = fdi.types.surface[s]
         surface.wrong_before, surface.wrong_then, surface.wrong = surface.wrong_then, surface.wrong, wrong
 
 
 @kernel
 def take_in_frame(fdi):
     """Find where each surface was in the elapsed frame, if it alone is at fault."""
-    note_wrong(fdi, fdi.innovation, fdi.bound.frame)
-    for s in range(fdi.surface.size):
-        effect = fdi.estimator[fdi.layout.position_of[s]].effect
-        locate(fdi, s, fdi.innovation, fdi.bound.frame, effect)
+    note_wrong(fdi, fdi.bank.innovation, fdi.bound.frame)
+    for s in range(fdi.types.surface.size):
+        effect = fdi.isolation.estimator[fdi.layout.position_of[s]].effect
+        locate(fdi, s, fdi.bank.innovation, fdi.bound.frame, effect)
 
 
 @kernel
@@ -135,23 +141,23 @@ def judge(fdi, surface, frame):
 @kernel
 def judge_all(fdi):
     """Judge the frame before the elapsed one."""
-    for s in range(fdi.surface.size):
-        surface = fdi.surface[s]
+    for s in range(fdi.types.surface.size):
+        surface = fdi.types.surface[s]
         watch_each(fdi, surface)
-        if fdi.returns and fdi.frame > 0:
+        if fdi.types.config.returns and fdi.types.frame > 0:
             let_go_each(fdi, surface)
-        if fdi.abrupt and surface.measure == FIXED and not surface.wrong_then:
+        if fdi.config.abrupt and surface.measure == FIXED and not surface.wrong_then:
             note_quiet(fdi, s)
-        elif surface.wrong_then and (fdi.whole or (surface.wrong_before and surface.wrong)):
+        elif surface.wrong_then and (fdi.types.config.whole or (surface.wrong_before and surface.wrong)):
             note_evidence(surface)
-            judge(fdi, surface, fdi.frame - 1)
+            judge(fdi, surface, fdi.types.frame - 1)
         else:
             pass_over_each(fdi, surface)
-        if fdi.returns and fdi.frame > 0:
+        if fdi.types.config.returns and fdi.types.frame > 0:
             bring_back_each(fdi, surface)
         if surface.hides_then[0] or surface.hides_then[1]:
             surface.unhidden = 0
-    fdi.frame += 1
+    fdi.types.frame += 1
 
 
 @kernel
@@ -168,12 +174,12 @@ def note_quiet(fdi, s):
     That is evidence against the others too, as far as one of them all is in question. It takes a fault that
     is declared to stay: of one that may go, the quiet may be that of health.
     """
-    surface = fdi.surface[s]
+    surface = fdi.types.surface[s]
     if surface.low_then > surface.set_high[STUCK] or surface.high_then < surface.set_low[STUCK]:
         return
-    for other in range(fdi.surface.size):
-        if other == s or (surface.in_question and fdi.surface[other].in_question):
-            note_evidence(fdi.surface[other])
+    for other in range(fdi.types.surface.size):
+        if other == s or (surface.in_question and fdi.types.surface[other].in_question):
+            note_evidence(fdi.types.surface[other])
     surface.quiet += 1
-    if surface.quiet > fdi.patience and not fdi.bound.own_errors:
+    if surface.quiet > fdi.types.config.patience and not fdi.bound.own_errors:
         surface.type_excluded[OSCILLATORY] = 1

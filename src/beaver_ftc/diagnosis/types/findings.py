@@ -48,7 +48,7 @@ def found(fdi: np.void, surfaces: Sequence[str] | None = None) -> Found:
     surfaces = load().surfaces if surfaces is None else surfaces
     if not fdi["verdict"]["detected"]:
         return dict(_NOTHING)
-    if fdi["pair"]["enabled"]:
+    if fdi["types"]["pair"]["enabled"]:
         return _found_of_several(fdi, surfaces)
     return _found_of_one(fdi, surfaces)
 
@@ -56,11 +56,11 @@ def found(fdi: np.void, surfaces: Sequence[str] | None = None) -> Found:
 def _found_of_several(fdi: np.void, names: Sequence[str]) -> Found:
     """The fault named first as if it were alone, and all of them; what is open in a plane where none is."""
     at_fault = sorted(
-        (s for s in range(len(names)) if fdi["surface"][s]["named"]),
-        key=lambda s: (fdi["surface"][s]["named_at_s"], s),
+        (s for s in range(len(names)) if fdi["types"]["surface"][s]["named"]),
+        key=lambda s: (fdi["types"]["surface"][s]["named_at_s"], s),
     )
-    faults = [_found_on(fdi, s, int(fdi["surface"][s]["type"]), names) for s in at_fault]
-    planes = fdi["pair"]["alarmed"]
+    faults = [_found_on(fdi, s, int(fdi["types"]["surface"][s]["type"]), names) for s in at_fault]
+    planes = fdi["types"]["pair"]["alarmed"]
     if not planes.any() and not faults and int(fdi["verdict"]["isolated"]) == NOT_ISOLATED:
         planes = np.ones_like(planes)  # a statistical alarm by itself says of no plane that it is there
     open_planes = [
@@ -80,7 +80,7 @@ def _planes(fdi: np.void) -> list[list[int]]:
     """The surfaces of each group."""
     return [
         [s for s, group in enumerate(fdi["layout"]["group"]) if group == g]
-        for g in range(len(fdi["pair"]["alarmed"]))
+        for g in range(len(fdi["types"]["pair"]["alarmed"]))
     ]
 
 
@@ -91,7 +91,7 @@ def _found_of_one(fdi: np.void, names: Sequence[str]) -> Found:
     if verdict == UNANTICIPATED:
         said = {"isolated": "unanticipated", "isolation_type": "unanticipated", "isolation_time_s": at_s}
         return {**_NOTHING, **said}
-    s, kind = int(fdi["estimator"][verdict]["surface"]), int(fdi["verdict"]["type"])
+    s, kind = int(fdi["isolation"]["estimator"][verdict]["surface"]), int(fdi["verdict"]["type"])
     return {
         **_found_on(fdi, s, kind, names),
         "isolation_time_s": at_s,
@@ -107,9 +107,9 @@ def _found_on(fdi: np.void, s: int, kind: int, names: Sequence[str]) -> Found:
     """What is known of surface s, which is at fault; kind: of which type, -1 if open."""
     return {
         "isolated": names[s],
-        "isolation_time_s": float(fdi["surface"][s]["named_at_s"]),
+        "isolation_time_s": float(fdi["types"]["surface"][s]["named_at_s"]),
         "isolation_type": NAMES[kind] if kind >= 0 else None,
-        "type_time_s": _at_s(fdi["surface"][s]["type_at_s"], kind),
+        "type_time_s": _at_s(fdi["types"]["surface"][s]["type_at_s"], kind),
         "candidates": (NAMES[kind],) if kind >= 0 else tuple(_types_left(fdi, s)),
         "estimate": estimate_of(fdi, s, kind),
         "estimate_interval": _of_type(kind, "interval", fdi, s, kind),
@@ -129,11 +129,12 @@ def _of_type(kind: int, what: str, *arguments: Any) -> Any:
 
 
 def _possible(fdi: np.void, s: int) -> bool:
-    surface = fdi["surface"][s]
+    surface = fdi["types"]["surface"][s]
     if surface["named"] or surface["standing"] == BY_DEDUCTION:
         return True
     return not (
-        surface["standing"] == RULED_OUT or fdi["estimator"][int(fdi["layout"]["position_of"][s])]["excluded"]
+        surface["standing"] == RULED_OUT
+        or fdi["isolation"]["estimator"][int(fdi["layout"]["position_of"][s])]["excluded"]
     )
 
 
@@ -143,14 +144,18 @@ def _types_left(fdi: np.void, s: int) -> list[str]:
     Where a constant explains the flight, a loss that may take any course and a slow surface count only until
     the constant has been seen for long enough; beside a surface that stands still, until it is excluded.
     """
-    surface = fdi["surface"][s]
+    surface = fdi["types"]["surface"][s]
     left = [kind for kind in range(N_TYPES) if _possible(fdi, s) and not surface["type_excluded"][kind]]
     if any(kind < N_CONSTANT for kind in left) and not fdi["bound"]["own_errors"]:
-        early = surface["evidence"] - surface["quiet"] < fdi["patience"]
+        early = surface["evidence"] - surface["quiet"] < fdi["types"]["config"]["patience"]
         still = bool({STUCK, FLOAT, UP, DOWN} & set(left))  # so may a slow one
         beside = {VARYING_LOSS: early, SLOW: early or still}
         left = [kind for kind in left if beside.get(kind, True)]
-    if fdi["pair"]["enabled"] and fdi["layout"]["group"][s] == IN_PITCH and {STUCK, UP, DOWN} & set(left):
+    if (
+        fdi["types"]["pair"]["enabled"]
+        and fdi["layout"]["group"][s] == IN_PITCH
+        and {STUCK, UP, DOWN} & set(left)
+    ):
         left += [STUCK, FLOAT, UP, BIAS, CONSTANT_LOSS]  # if the other one is off as well
     return list(dict.fromkeys(NAMES[kind] for kind in left))
 
@@ -164,7 +169,7 @@ def _open_questions(fdi: np.void, among: Iterable[int], names: Sequence[str]) ->
     for s in possible:
         types = _types_left(fdi, s)
         yield from (f"{names[s]}:{kind}" for kind in types) if types else (names[s],)
-    if fdi["pair"]["enabled"]:
+    if fdi["types"]["pair"]["enabled"]:
         yield "+".join(names[s] for s in among)
     if not any(_types_left(fdi, s) for s in possible):
         yield "unanticipated"

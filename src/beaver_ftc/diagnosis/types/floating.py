@@ -45,5 +45,5 @@ def deflection(fdi, surface, kind):
 
 def estimate(fdi: np.void, s: int, kind: int) -> float | None:
     """Deflection, rad."""
-    surface = fdi["surface"][s]
+    surface = fdi["types"]["surface"][s]
     return float(min(max(0.0, surface["travel_low"]), surface["travel_high"]))

@@ -37,7 +37,7 @@ def forget_pace(grown):
 @kernel
 def pace(fdi, surface):
     """How far one that is slower than a runaway moves from one judged frame to the next, rad at most."""
-    return AS_FAST * surface.least_runaway_rate * fdi.block.span_s
+    return AS_FAST * surface.least_runaway_rate * fdi.types.config.span_s
 
 
 @kernel
@@ -63,7 +63,7 @@ def note_pace(fdi, surface, least, greatest):
         grown.ran[0] = 1
     if least > grown.greatest:
         grown.ran[1] = 1
-    spare = 0.0 if fdi.whole else pace(fdi, surface)
+    spare = 0.0 if fdi.types.config.whole else pace(fdi, surface)
     grown.least, grown.greatest = max(grown.least, least - spare), min(grown.greatest, greatest + spare)
 
 
@@ -89,5 +89,5 @@ def judge(fdi, surface, kind, frame):
 
 def estimate(fdi: np.void, s: int, kind: int) -> float | None:
     """Offset in the last frame, rad."""
-    surface = fdi["surface"][s]
+    surface = fdi["types"]["surface"][s]
     return float(0.5 * (surface["low"] + surface["high"]) - surface["command"])

@@ -27,7 +27,7 @@ def let_go(fdi, surface, kind):
     """It may be let go on its way; within a frame of several instants, further on."""
     low, high, frame = release.beginning(fdi, surface)
     high = min(high, runaway.downwards(fdi, surface, frame))
-    if not fdi.whole and low <= high:
+    if not fdi.types.config.whole and low <= high:
         low = surface.travel_low
     release.let_go(surface, kind, low, high)
 
@@ -41,9 +41,9 @@ def bring_back(fdi, surface, kind):
 @kernel
 def deflection(fdi, surface, kind):
     """Between its least way and the stop."""
-    return surface.travel_low, runaway.downwards(fdi, surface, fdi.frame)
+    return surface.travel_low, runaway.downwards(fdi, surface, fdi.types.frame)
 
 
 def estimate(fdi: np.void, s: int, kind: int) -> float | None:
     """Deflection, rad: the stop."""
-    return float(fdi["surface"][s]["travel_low"])
+    return float(fdi["types"]["surface"][s]["travel_low"])

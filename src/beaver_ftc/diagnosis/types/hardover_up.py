@@ -27,7 +27,7 @@ def let_go(fdi, surface, kind):
     """It may be let go on its way; within a frame of several instants, further on."""
     low, high, frame = release.beginning(fdi, surface)
     low = max(low, runaway.upwards(fdi, surface, frame))
-    if not fdi.whole and low <= high:
+    if not fdi.types.config.whole and low <= high:
         high = surface.travel_high
     release.let_go(surface, kind, low, high)
 
@@ -41,9 +41,9 @@ def bring_back(fdi, surface, kind):
 @kernel
 def deflection(fdi, surface, kind):
     """Between its least way and the stop."""
-    return runaway.upwards(fdi, surface, fdi.frame), surface.travel_high
+    return runaway.upwards(fdi, surface, fdi.types.frame), surface.travel_high
 
 
 def estimate(fdi: np.void, s: int, kind: int) -> float | None:
     """Deflection, rad: the stop."""
-    return float(fdi["surface"][s]["travel_high"])
+    return float(fdi["types"]["surface"][s]["travel_high"])

@@ -31,12 +31,12 @@ def deflection(fdi, surface, kind):
 
 def estimate(fdi: np.void, s: int, kind: int) -> float | None:
     """theta; beside another fault the estimator, which fits all axes of its surface, is not asked."""
-    return sets.middle_of(fdi, s, kind) - 1.0 if fdi["pair"]["enabled"] else fitted(fdi, s)
+    return sets.middle_of(fdi, s, kind) - 1.0 if fdi["types"]["pair"]["enabled"] else fitted(fdi, s)
 
 
 def fitted(fdi: np.void, s: int) -> float:
     """theta as the estimator of a loss has it."""
-    estimator = fdi["estimator"][int(fdi["layout"]["loss_of"][s])]
+    estimator = fdi["isolation"]["estimator"][int(fdi["layout"]["loss_of"][s])]
     return float(estimator["theta"][int(fdi["layout"]["dominant_axis"][s])])
 
 

@@ -32,6 +32,34 @@ KNOWN = np.dtype(
     [("low", "f8", (N_TYPES,)), ("high", "f8", (N_TYPES,)), ("excluded", "i8", (N_TYPES,))], align=True
 )
 
+# What the fault types go by: whether a frame shows one instant, instants in it, whether a surface returns by
+# its actuator, frames of half of the slowest oscillation; frames of a block, and its duration (types/).
+TYPES_CONFIG = np.dtype(
+    [
+        ("whole", "i8"), ("instants", "i8"), ("returns", "i8"), ("patience", "i8"),
+        ("length", "i8"), ("span_s", "f8"),
+    ],
+    align=True,
+)  # fmt: skip
+
+# Two faults at once (types/pairs.py): alarms of the groups, and what is known of the first fault in pitch.
+PAIR = np.dtype(
+    [
+        ("enabled", "i8"), ("alarmed", "i8", (2,)), ("no_lateral_pair", "i8"), ("first", "i8"),
+        ("unsettled", "i8"),
+    ],
+    align=True,
+)  # fmt: skip
+
+# Blocks of frames (types/blocks.py).
+FRAME_BLOCK = np.dtype(
+    [
+        ("filled", "i8"),
+        ("innovation", "f8", (3,)), ("bound", "f8", (3,)), ("noise", "f8", (3,)),
+    ],
+    align=True,
+)  # fmt: skip
+
 
 @lru_cache
 def surface_dtype() -> np.dtype:
@@ -62,5 +90,15 @@ def surface_dtype() -> np.dtype:
         # what is concluded
         ("in_question", "i8"), ("standing", "i8"), ("measure", "i8"),
         ("named", "i8"), ("named_at_s", "f8"), ("type", "i8"), ("type_at_s", "f8"), ("known", KNOWN),
+    ]  # fmt: skip
+    return np.dtype(fields, align=True)
+
+
+@lru_cache
+def types_dtype(n: int) -> np.dtype:
+    """Faults of every type on n surfaces: types/."""
+    fields = [
+        ("config", TYPES_CONFIG), ("frame", "i8"), ("pair", PAIR), ("block", FRAME_BLOCK),
+        ("surface", surface_dtype(), (n,)),
     ]  # fmt: skip
     return np.dtype(fields, align=True)

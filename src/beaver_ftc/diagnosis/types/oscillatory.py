@@ -43,13 +43,13 @@ def judge(fdi, surface, kind, frame):
     swing = surface.oscillatory
     low, high = surface.low_then - surface.command_then, surface.high_then - surface.command_then
     sign = 1 if low > 0.0 else (-1 if high < 0.0 else 0)
-    if sign == 0 or (not fdi.whole and surface.hides_then[0 if sign > 0 else 1]):
+    if sign == 0 or (not fdi.types.config.whole and surface.hides_then[0 if sign > 0 else 1]):
         swing.steady_since = frame + 1
         return
     if sign != swing.sign:
         end_half_cycle(swing, frame)
         swing.sign, swing.steady_since = sign, frame
-    if frame - swing.steady_since > fdi.patience:
+    if frame - swing.steady_since > fdi.types.config.patience:
         surface.type_excluded[kind] = 1
 
 
@@ -69,7 +69,7 @@ def end_half_cycle(swing, frame):
 @kernel
 def pass_over(fdi, surface, kind):
     """In a frame that is not judged it may have swung to the other side, unseen."""
-    surface.oscillatory.steady_since = fdi.frame
+    surface.oscillatory.steady_since = fdi.types.frame
 
 
 @kernel
@@ -80,12 +80,12 @@ def shown(surface):
 
 def estimate(fdi: np.void, s: int, kind: int) -> float | None:
     """Amplitude, rad."""
-    swing = fdi["surface"][s]["oscillatory"]
+    swing = fdi["types"]["surface"][s]["oscillatory"]
     return float(sqrt(2.0 * swing["squares"] / (swing["last_end"] - swing["first_end"])))
 
 
 def frequency_rad_s(fdi: np.void, s: int) -> float | None:
     """From the half-cycles counted."""
-    swing = fdi["surface"][s]["oscillatory"]
+    swing = fdi["types"]["surface"][s]["oscillatory"]
     half_cycles, frames = int(swing["half_cycles"]) - 1, int(swing["last_end"] - swing["first_end"])
-    return half_cycles * pi / (float(fdi["block"]["span_s"]) * frames)
+    return half_cycles * pi / (float(fdi["types"]["config"]["span_s"]) * frames)

@@ -61,13 +61,13 @@ def note_alarms(fdi):
         plane = IN_PITCH if i == PITCH else IN_ROLL_AND_YAW
         for m in range(fdi.bank.n):
             if abs(fdi.bank.residual[m, i]) > fdi.bank.threshold[m, i]:
-                fdi.pair.alarmed[plane] = 1
+                fdi.types.pair.alarmed[plane] = 1
 
 
 @kernel
 def effect_of(fdi, s):
     """What the position estimator of surface s supposes of the elapsed frame."""
-    return fdi.estimator[fdi.layout.position_of[s]].effect
+    return fdi.isolation.estimator[fdi.layout.position_of[s]].effect
 
 
 @kernel
@@ -85,16 +85,16 @@ def solve_roll_and_yaw(fdi):
     """Where ailerons and rudder were in the elapsed frame: nu = G (p - u) + eta solved for p."""
     one, other = effect_of(fdi, fdi.layout.main[ROLL]), effect_of(fdi, fdi.layout.main[YAW])
     a_p, a_r, r_p, r_r = one.Z[ROLL], one.Z[YAW], other.Z[ROLL], other.Z[YAW]
-    p, r = fdi.innovation[ROLL], fdi.innovation[YAW]
+    p, r = fdi.bank.innovation[ROLL], fdi.bank.innovation[YAW]
     slack_p = fdi.bound.frame[ROLL] + one.spread[ROLL] + other.spread[ROLL]
     slack_r = fdi.bound.frame[YAW] + one.spread[YAW] + other.spread[YAW]
     determinant = a_p * r_r - a_r * r_p
     size = abs(determinant)
     off, slack = (p * r_r - r * r_p) / determinant, (slack_p * abs(r_r) + slack_r * abs(r_p)) / size
-    fits = place(fdi.surface[fdi.layout.main[ROLL]], off, slack)
+    fits = place(fdi.types.surface[fdi.layout.main[ROLL]], off, slack)
     off, slack = (r * a_p - p * a_r) / determinant, (slack_r * abs(a_p) + slack_p * abs(a_r)) / size
-    if not (place(fdi.surface[fdi.layout.main[YAW]], off, slack) and fits):
-        fdi.pair.no_lateral_pair = 1
+    if not (place(fdi.types.surface[fdi.layout.main[YAW]], off, slack) and fits):
+        fdi.types.pair.no_lateral_pair = 1
 
 
 @kernel
@@ -112,7 +112,7 @@ def whereabouts(fdi, surface):
 @kernel
 def first_is_settled(fdi):
     """Whether one pitch fault was named and a second has begun beside it."""
-    return fdi.pair.first != NO_SURFACE and not fdi.surface[fdi.pair.first].in_question
+    return fdi.types.pair.first != NO_SURFACE and not fdi.types.surface[fdi.types.pair.first].in_question
 
 
 @kernel
@@ -121,25 +121,25 @@ def solve_pitch(fdi):
     if first_is_settled(fdi):
         solve_beside_the_first(fdi)
         return
-    for s in range(fdi.surface.size):
+    for s in range(fdi.types.surface.size):
         if fdi.layout.group[s] == IN_PITCH:
-            fdi.surface[s].wrong = abs(fdi.innovation[PITCH]) > fdi.bound.frame[PITCH]
+            fdi.types.surface[s].wrong = abs(fdi.bank.innovation[PITCH]) > fdi.bound.frame[PITCH]
 
 
 @kernel
 def solve_beside_the_first(fdi):
     """Where the second surface was, given what is known of the first."""
-    first, second = fdi.pair.first, fdi.layout.partner[fdi.pair.first]
+    first, second = fdi.types.pair.first, fdi.layout.partner[fdi.types.pair.first]
     known, other = effect_of(fdi, first), effect_of(fdi, second)
-    surface = fdi.surface[first]
+    surface = fdi.types.surface[first]
     surface.low, surface.high = whereabouts(fdi, surface)
     surface.wrong = 0
     Z, Z_known = other.Z[PITCH], known.Z[PITCH]
     share = Z_known * (0.5 * (surface.low + surface.high) - surface.command)
     slack = abs(Z_known) * 0.5 * (surface.high - surface.low)
     slack += fdi.bound.frame[PITCH] + known.spread[PITCH] + other.spread[PITCH]
-    if not place(fdi.surface[second], (fdi.innovation[PITCH] - share) / Z, slack / abs(Z)):
-        fdi.surface[second].standing = RULED_OUT
+    if not place(fdi.types.surface[second], (fdi.bank.innovation[PITCH] - share) / Z, slack / abs(Z)):
+        fdi.types.surface[second].standing = RULED_OUT
 
 
 @kernel
@@ -167,13 +167,13 @@ def name(surface, named, kind, t):
 def decide_roll_and_yaw(fdi, t):
     """Which of the two is at fault, if any. Returns whether the plane's fault is outside the class."""
     a, r = fdi.layout.main[ROLL], fdi.layout.main[YAW]
-    one, other = fdi.surface[a], fdi.surface[r]
+    one, other = fdi.types.surface[a], fdi.types.surface[r]
     one_left, other_left = possible(fdi, a), possible(fdi, r)
     both = not one_left and not other_left
-    no_pair = fdi.pair.no_lateral_pair == 1 or not anything_left(one) or not anything_left(other)
+    no_pair = fdi.types.pair.no_lateral_pair == 1 or not anything_left(one) or not anything_left(other)
     outside = both and no_pair
     open_yet = both and (only_a_swing(one) or only_a_swing(other))
-    certain = fdi.pair.alarmed[IN_ROLL_AND_YAW] == 1 and not (outside or open_yet)
+    certain = fdi.types.pair.alarmed[IN_ROLL_AND_YAW] == 1 and not (outside or open_yet)
     name(one, certain and not other_left, type_at_fault(fdi, one), t)
     name(other, certain and not one_left, type_at_fault(fdi, other), t)
     return outside
@@ -185,12 +185,12 @@ def note_first(fdi, s):
 
     What refutes a type may be a second fault that begins to show, and is about to refute all of them.
     """
-    surface, known, changed = fdi.surface[s], fdi.surface[s].known, False
+    surface, known, changed = fdi.types.surface[s], fdi.types.surface[s].known, False
     for kind in range(N_CONSTANT):
         changed = changed or surface.type_excluded[kind] != known.excluded[kind]
-    fdi.pair.unsettled = fdi.pair.unsettled + 1 if changed else 0
-    if fdi.pair.first != s or fdi.pair.unsettled >= fdi.patience:
-        fdi.pair.first, fdi.pair.unsettled = s, 0
+    fdi.types.pair.unsettled = fdi.types.pair.unsettled + 1 if changed else 0
+    if fdi.types.pair.first != s or fdi.types.pair.unsettled >= fdi.types.config.patience:
+        fdi.types.pair.first, fdi.types.pair.unsettled = s, 0
         known.low[:], known.high[:] = surface.set_low, surface.set_high
         known.excluded[:] = 1
         known.excluded[:N_CONSTANT] = surface.type_excluded[:N_CONSTANT]
@@ -199,7 +199,10 @@ def note_first(fdi, s):
 @kernel
 def begin_second(fdi):
     """The one known pitch fault no longer explains the flight: there is another beside it."""
-    first, second = fdi.surface[fdi.pair.first], fdi.surface[fdi.layout.partner[fdi.pair.first]]
+    first, second = (
+        fdi.types.surface[fdi.types.pair.first],
+        fdi.types.surface[fdi.layout.partner[fdi.types.pair.first]],
+    )
     first.set_low[:], first.set_high[:] = first.known.low, first.known.high
     first.type_excluded[:] = first.known.excluded
     begin(second)
@@ -212,16 +215,16 @@ def begin_second(fdi):
 def patient(fdi, surface):
     """Whether a slow oscillation, a slow surface or a growing bias would have shown by now."""
     growing = may_be_growing(surface, one_type(surface)) or may_be_slow(fdi, surface)
-    return surface.evidence >= fdi.patience and would_have_swung(fdi, surface) and not growing
+    return surface.evidence >= fdi.types.config.patience and would_have_swung(fdi, surface) and not growing
 
 
 @kernel
 def two_in_pitch(fdi):
     """Whether a second pitch fault has shown beside one that was known."""
-    if fdi.pair.first == NO_SURFACE or fdi.layout.partner[fdi.pair.first] < 0:
+    if fdi.types.pair.first == NO_SURFACE or fdi.layout.partner[fdi.types.pair.first] < 0:
         return False
-    surface = fdi.surface[fdi.pair.first]
-    if surface.in_question and not (possible(fdi, fdi.pair.first) and any_constant(surface)):
+    surface = fdi.types.surface[fdi.types.pair.first]
+    if surface.in_question and not (possible(fdi, fdi.types.pair.first) and any_constant(surface)):
         begin_second(fdi)
     return not surface.in_question
 
@@ -240,26 +243,26 @@ def type_in_pitch(fdi, surface):
 def decide_pitch(fdi, t):
     """Which surface of pitch is at fault, if any."""
     if two_in_pitch(fdi):
-        first, s = fdi.surface[fdi.pair.first], fdi.layout.partner[fdi.pair.first]
-        second = fdi.surface[s]
+        first, s = fdi.types.surface[fdi.types.pair.first], fdi.layout.partner[fdi.types.pair.first]
+        second = fdi.types.surface[s]
         name(first, 1, first.type, t)
         shows = second.evidence > 0 and possible(fdi, s) and explained(second)
         name(second, shows, type_at_fault(fdi, second), t)
         return
     s = one_in_pitch(fdi)
-    for member in range(fdi.surface.size):
+    for member in range(fdi.types.surface.size):
         if fdi.layout.group[member] == IN_PITCH:
-            surface = fdi.surface[member]
+            surface = fdi.types.surface[member]
             name(surface, member == s, type_in_pitch(fdi, surface) if member == s else -1, t)
 
 
 @kernel
 def one_in_pitch(fdi):
     """The surface of pitch at fault if a constant explains everything on it, or NO_SURFACE."""
-    s = surface_at_fault(fdi) if fdi.pair.alarmed[IN_PITCH] else NO_SURFACE
-    if s < 0 or not any_constant(fdi.surface[s]):
+    s = surface_at_fault(fdi) if fdi.types.pair.alarmed[IN_PITCH] else NO_SURFACE
+    if s < 0 or not any_constant(fdi.types.surface[s]):
         return NO_SURFACE
-    if patient(fdi, fdi.surface[s]):
+    if patient(fdi, fdi.types.surface[s]):
         note_first(fdi, s)
     return s
 
@@ -270,9 +273,9 @@ def decide(fdi, t):
     outside = decide_roll_and_yaw(fdi, t)
     decide_pitch(fdi, t)
     earliest = NO_SURFACE
-    for s in range(fdi.surface.size):
-        surface = fdi.surface[s]
-        if surface.named and (earliest < 0 or surface.named_at_s < fdi.surface[earliest].named_at_s):
+    for s in range(fdi.types.surface.size):
+        surface = fdi.types.surface[s]
+        if surface.named and (earliest < 0 or surface.named_at_s < fdi.types.surface[earliest].named_at_s):
             earliest = s
     summarise(fdi, earliest, outside, t)
     act(fdi)
@@ -285,7 +288,7 @@ def summarise(fdi, s, outside, t):
     if s < 0:
         fdi.verdict.isolated, fdi.verdict.type = UNANTICIPATED if outside else NOT_ISOLATED, -1
     else:
-        surface = fdi.surface[s]
+        surface = fdi.types.surface[s]
         fdi.verdict.isolated = estimator_for(fdi, s, surface.type)
         fdi.verdict.type, fdi.verdict.type_at_s = surface.type, surface.type_at_s
         fdi.verdict.isolated_at_s = surface.named_at_s
@@ -296,8 +299,8 @@ def summarise(fdi, s, outside, t):
 @kernel
 def named_in_pitch(fdi):
     """Whether a surface of pitch is named."""
-    for s in range(fdi.surface.size):
-        if fdi.layout.group[s] == IN_PITCH and fdi.surface[s].named:
+    for s in range(fdi.types.surface.size):
+        if fdi.layout.group[s] == IN_PITCH and fdi.types.surface[s].named:
             return True
     return False
 
@@ -305,9 +308,9 @@ def named_in_pitch(fdi):
 @kernel
 def acted_upon(fdi, s):
     """Whether the law acts on surface s: it is named, or the likeliest in pitch."""
-    if fdi.surface[s].named:
+    if fdi.types.surface[s].named:
         return True
-    if fdi.layout.group[s] != IN_PITCH or named_in_pitch(fdi) or not fdi.pair.alarmed[IN_PITCH]:
+    if fdi.layout.group[s] != IN_PITCH or named_in_pitch(fdi) or not fdi.types.pair.alarmed[IN_PITCH]:
         return False
     likeliest = sole(fdi, True)
     return s == (likeliest if likeliest >= 0 else fdi.layout.main[PITCH])
@@ -317,8 +320,8 @@ def acted_upon(fdi, s):
 def act(fdi):
     """What the law does about each surface. The supervisor follows the lead: a replaced elevator first."""
     fdi.verdict.lead, fdi.verdict.lead_kind = NO_SURFACE, -1
-    for s in range(fdi.surface.size):
-        surface = fdi.surface[s]
+    for s in range(fdi.types.surface.size):
+        surface = fdi.types.surface[s]
         surface.measure = -1
         if acted_upon(fdi, s):
             at_fault = surface.named == 1 or possible(fdi, s)

@@ -41,7 +41,7 @@ def judge(fdi, surface, kind, frame):
 def come_nearer(fdi, surface, run, sign):
     """Take off what the slowest one comes nearer by within the judged frame: a least step an instant, until
     its lag makes the steps smaller. Where it was at an instant bounds where it is a frame later."""
-    least = fdi.instants * fdi.block.length * surface.slowest_step
+    least = fdi.types.config.instants * fdi.types.config.length * surface.slowest_step
     close = surface.slowest_step / surface.approach
     lowest, highest = ordered(fdi, surface)
     if sign > 0:
@@ -54,7 +54,7 @@ def come_nearer(fdi, surface, run, sign):
 def ordered(fdi, surface):
     """The least and greatest order that moved it towards and within the judged frame, rad."""
     orders = surface.orders
-    newest = 2 if fdi.whole else 1
+    newest = 2 if fdi.types.config.whole else 1
     return min(orders.low[2], orders.low[newest]), max(orders.high[2], orders.high[newest])
 
 

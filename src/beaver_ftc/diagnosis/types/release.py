@@ -67,9 +67,9 @@ def carried(fdi, surface, held, side=0):
     greatest.
     """
     total, count, a, least, greatest = 0.0, 0, held, held, held
-    for k in range(fdi.block.length):
+    for k in range(fdi.types.config.length):
         order = surface.orders.given[1, k]
-        for _ in range(fdi.instants):
+        for _ in range(fdi.types.config.instants):
             total += a
             count += 1
             least, greatest = min(least, a), max(greatest, a)
@@ -83,7 +83,7 @@ def carried(fdi, surface, held, side=0):
 def let_go_within(fdi, surface, kind):
     """Whether a release inside the judged block explains it."""
     held_low, held_high = surface.release.held_low[kind], surface.release.held_high[kind]
-    if fdi.block.length == 1 or held_low > held_high:
+    if fdi.types.config.length == 1 or held_low > held_high:
         return False
     low, _, low_room = carried(fdi, surface, held_low, -1)
     high, _, high_room = carried(fdi, surface, held_high, 1)
@@ -141,7 +141,7 @@ def holds(fdi, surface, kind, least, greatest):
 
     If not, it may have let go, and the actuator be bringing the surface back; else the type is excluded.
     """
-    returning = fdi.returns and possible(fdi, surface, kind)
+    returning = fdi.types.config.returns and possible(fdi, surface, kind)
     released = surface.release.released
     if least <= surface.high_then and greatest >= surface.low_then and not released[kind]:
         return True
@@ -158,9 +158,9 @@ def beginning(fdi, surface):
 
     With several JSBSim frames in one of ours it may have been let go within it: the frame before is used.
     """
-    if fdi.whole:
-        return surface.low_then, surface.high_then, fdi.frame - 1
-    return surface.low_before, surface.high_before, fdi.frame - 2
+    if fdi.types.config.whole:
+        return surface.low_then, surface.high_then, fdi.types.frame - 1
+    return surface.low_before, surface.high_before, fdi.types.frame - 2
 
 
 @kernel
@@ -185,7 +185,7 @@ def bring_back(fdi, surface, kind):
             _, low, _ = carried(fdi, surface, held.low[which, kind])
             _, high, _ = carried(fdi, surface, held.high[which, kind])
             keep(held, which, kind, low, high)
-    if fdi.block.length > 1 and held.held_low[kind] <= held.held_high[kind]:
+    if fdi.types.config.length > 1 and held.held_low[kind] <= held.held_high[kind]:
         _, low, _ = carried(fdi, surface, held.held_low[kind], -1)
         _, high, _ = carried(fdi, surface, held.held_high[kind], 1)
         held.low[LATER, kind] = min(held.low[LATER, kind], low)

@@ -7,9 +7,9 @@ from beaver_ftc.compiled import kernel
 def way(fdi, surface, frame):
     """The least way (rad) a runaway has gone by a frame; over a block the mean was reached within it."""
     elapsed = frame - surface.started_at
-    if fdi.block.length > 1:
+    if fdi.types.config.length > 1:
         elapsed = max(elapsed - 1, 0)
-    return surface.least_runaway_rate * fdi.block.span_s * elapsed
+    return surface.least_runaway_rate * fdi.types.config.span_s * elapsed
 
 
 @kernel

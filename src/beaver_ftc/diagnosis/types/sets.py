@@ -53,11 +53,11 @@ def offset(fdi, surface):
 
 def set_of(fdi: np.void, s: int, kind: int) -> tuple[float, float]:
     """The set of a type's parameter on surface s."""
-    surface = fdi["surface"][s]
+    surface = fdi["types"]["surface"][s]
     return float(surface["set_low"][kind]), float(surface["set_high"][kind])
 
 
 def middle_of(fdi: np.void, s: int, kind: int) -> float:
     """The middle of that set."""
-    surface = fdi["surface"][s]
+    surface = fdi["types"]["surface"][s]
     return float(0.5 * (surface["set_low"][kind] + surface["set_high"][kind]))

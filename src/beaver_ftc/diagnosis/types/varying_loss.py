@@ -17,7 +17,7 @@ CONSTANT = False
 def judge(fdi, surface, kind, frame):
     """Some effectiveness explains this frame; over a block in which the command changes sign, any mean."""
     low, high = sets.effectiveness(surface)
-    swung = fdi.block.length > 1 and surface.orders.least[1] < 0.0 < surface.orders.greatest[1]
+    swung = fdi.types.config.length > 1 and surface.orders.least[1] < 0.0 < surface.orders.greatest[1]
     if low > high and not swung:
         surface.type_excluded[kind] = 1
 

@@ -52,7 +52,7 @@ def surface_at_fault(fdi):
     if s == NO_SURFACE:
         return UNANTICIPATED
     if s >= 0:
-        return s if fdi.layout.dominant_axis[s] != PITCH or explained(fdi.surface[s]) else NOT_ISOLATED
+        return s if fdi.layout.dominant_axis[s] != PITCH or explained(fdi.types.surface[s]) else NOT_ISOLATED
     s = sole(fdi, True)
     return s if s >= 0 and others_refuted(fdi, s) else NOT_ISOLATED
 
@@ -66,8 +66,8 @@ def others_refuted(fdi, chosen):
     course can hide in, every type of the others must have been excluded.
     """
     waits = 1
-    for s in range(fdi.surface.size):
-        surface = fdi.surface[s]
+    for s in range(fdi.types.surface.size):
+        surface = fdi.types.surface[s]
         if s != chosen and surface.in_question and possible(fdi, s):
             if left(surface, GROWING_BIAS) or (fdi.bound.own_errors and anything_left(surface)):
                 return False
@@ -75,14 +75,14 @@ def others_refuted(fdi, chosen):
                 return False
             if left(surface, VARYING_LOSS):
                 waits = 2
-    return fdi.surface[chosen].evidence >= waits * fdi.patience
+    return fdi.types.surface[chosen].evidence >= waits * fdi.types.config.patience
 
 
 @kernel
 def type_at_fault(fdi, surface):
     """The type of the fault on a surface, taken to be at fault; -1 while more than one fits or an
     oscillation may yet show."""
-    if surface.evidence < fdi.patience or may_be_slow(fdi, surface):
+    if surface.evidence < fdi.types.config.patience or may_be_slow(fdi, surface):
         return -1
     if fdi.bound.own_errors:
         return sole_type(surface)
@@ -112,9 +112,11 @@ def decide(fdi, t):
     """Name the surface and, when it is certain, the type; t s."""
     s = surface_at_fault(fdi)
     before = (
-        fdi.estimator[fdi.verdict.isolated].surface if fdi.verdict.isolated >= 0 else fdi.verdict.isolated
+        fdi.isolation.estimator[fdi.verdict.isolated].surface
+        if fdi.verdict.isolated >= 0
+        else fdi.verdict.isolated
     )
-    kind = type_at_fault(fdi, fdi.surface[s]) if s >= 0 else -1
+    kind = type_at_fault(fdi, fdi.types.surface[s]) if s >= 0 else -1
     if s != before:
         fdi.verdict.isolated_at_s = t
     if kind != fdi.verdict.type:
@@ -152,11 +154,11 @@ def presumed(fdi):
     is thought to be off, as long as both follow their commands: the moment is the same.
     """
     if fdi.verdict.isolated >= 0:
-        return fdi.estimator[fdi.verdict.isolated].surface
+        return fdi.isolation.estimator[fdi.verdict.isolated].surface
     s = sole(fdi, True)
     if s >= 0:
         return s
-    for s in range(fdi.surface.size):
+    for s in range(fdi.types.surface.size):
         if fdi.layout.dominant_axis[s] == PITCH and possible(fdi, s):
             return s
     return NO_SURFACE
@@ -166,11 +168,11 @@ def presumed(fdi):
 def take_the_lead(fdi):
     """Settle on which surface the law acts and how."""
     s = presumed(fdi)
-    for other in range(fdi.surface.size):
-        fdi.surface[other].measure = -1
+    for other in range(fdi.types.surface.size):
+        fdi.types.surface[other].measure = -1
     fdi.verdict.lead, fdi.verdict.lead_kind = NO_SURFACE, -1
     if s >= 0:
-        surface = fdi.surface[s]
+        surface = fdi.types.surface[s]
         fdi.verdict.lead_kind = measure_for(surface)
         if still_there(fdi, surface, fdi.verdict.lead_kind, True):
             fdi.verdict.lead, surface.measure = s, fdi.verdict.lead_kind
@@ -182,7 +184,7 @@ def still_there(fdi, surface, measure, at_fault):
     deflection = deflection_error(surface, at_fault) + surface.command
     there = surface.low <= deflection <= surface.high or measure == LOSES
     surface.absent = 0 if there else surface.absent + 1
-    return surface.absent * fdi.dt < ABSENT_S - _ROUNDING
+    return surface.absent * fdi.config.dt < ABSENT_S - _ROUNDING
 
 
 @kernel
@@ -206,6 +208,6 @@ def effectiveness_left(fdi, s):
 
     The estimator fits both axes of a surface, so beside another fault the set of the constant is asked.
     """
-    if fdi.pair.enabled and possible(fdi, s) and left(fdi.surface[s], CONSTANT_LOSS):
-        return middle(fdi.surface[s], CONSTANT_LOSS)
-    return 1.0 + fdi.estimator[fdi.layout.loss_of[s]].theta[fdi.layout.dominant_axis[s]]
+    if fdi.types.pair.enabled and possible(fdi, s) and left(fdi.types.surface[s], CONSTANT_LOSS):
+        return middle(fdi.types.surface[s], CONSTANT_LOSS)
+    return 1.0 + fdi.isolation.estimator[fdi.layout.loss_of[s]].theta[fdi.layout.dominant_axis[s]]

@@ -1,7 +1,7 @@
 """The house rules that keep the package readable: floors, sizes, no circles, one importer of JSBSim.
 
 CONTRIBUTING.md has the same map in words. What a file imports is read from its syntax tree, imports inside
-functions and under TYPE_CHECKING included: an arrow is an arrow.
+functions, under TYPE_CHECKING and by a string included: an arrow is an arrow.
 """
 
 import ast
@@ -36,6 +36,7 @@ FLOORS = (
     {"cli"},
 )
 TOOLS = FLOORS[1]
+REGISTRY = "plugins"  # its rows name classes far above it, for those who ask: the same for other packages
 MOST_FOLDERS, MOST_LOOSE, MOST_LINES = 13, 4, 600
 
 
@@ -59,7 +60,18 @@ def imports(name: str) -> frozenset[str]:
         elif isinstance(node, ast.ImportFrom):
             assert node.level == 0, f"{name} imports relatively"
             found |= {f"{node.module}.{alias.name}" for alias in node.names}
-    return frozenset(found)
+    return frozenset(found | strings(name))
+
+
+def strings(name: str) -> set[str]:
+    """Every string of a module that names something of this package: `beaver_ftc.loop.frame:fly_frame`."""
+    tree = ast.parse(modules()[name].read_text(encoding="utf-8"))
+    constants = (node.value for node in ast.walk(tree) if isinstance(node, ast.Constant))
+    return {
+        value.replace(":", ".")
+        for value in constants
+        if isinstance(value, str) and re.fullmatch(rf"{PACKAGE}(\.\w+)+(:\w+)?", value)
+    }
 
 
 def own_imports(name: str) -> set[str]:
@@ -69,7 +81,10 @@ def own_imports(name: str) -> set[str]:
         if not target.startswith(f"{PACKAGE}."):
             continue
         inner = target.removeprefix(f"{PACKAGE}.")
-        found.add(inner if inner in modules() else inner.rpartition(".")[0])
+        if inner not in modules():
+            inner = inner.rpartition(".")[0]
+        if inner in modules():  # else it names no module: a group of entry points, a logger
+            found.add(inner)
     return found - {name, ""}
 
 
@@ -88,10 +103,15 @@ def test_every_room_is_on_the_plan():
 def test_imports_run_downwards_only(name):
     file = modules()[name].relative_to(ROOT).as_posix()
     room = name.partition(".")[0]
-    for target in own_imports(name):
+    for target in own_imports(name) if name != REGISTRY else imported_by_registry():
         other = target.partition(".")[0]
         allowed = other == room or floor_of(other) < floor_of(room) or {room, other} <= TOOLS
         assert allowed, f"{file} imports {other}"
+
+
+def imported_by_registry() -> set[str]:
+    named = {target.removeprefix(f"{PACKAGE}.").rpartition(".")[0] for target in strings(REGISTRY)}
+    return own_imports(REGISTRY) - named
 
 
 def test_no_two_modules_import_each_other_in_a_circle():

@@ -14,12 +14,12 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
+from beaver_ftc.plugins import first_use
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from beaver_ftc.aircraft.aircraft import Aircraft
-    from beaver_ftc.aircraft.loading import load as aircraft
     from beaver_ftc.control.base import Law, Reference
     from beaver_ftc.design.context import Context
     from beaver_ftc.diagnosis.base import Detector, Measured, Verdict
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from beaver_ftc.plant.conditions import linearise, trim
     from beaver_ftc.results.flight import Flight, fly, open_run
     from beaver_ftc.results.simulation import Simulation
+    from beaver_ftc.scenario.airframe import find_aircraft as aircraft
     from beaver_ftc.scenario.builtin import builtin_names as scenarios
     from beaver_ftc.scenario.given import load
     from beaver_ftc.scenario.schema import Scenario
@@ -54,7 +55,6 @@ _WHERE = {
     "sweep": "beaver_ftc.studies.sweep.table_of_flights:sweep",
     "trim": "beaver_ftc.plant.conditions:trim",
 }
-
 __all__ = [
     "BadInput", "Context", "Detector", "Diagnosis", "Flight", "Law", "Measured", "Reference", "Scenario",
     "Simulation", "SimulationFailed", "Verdict", "__version__", "aircraft", "fly", "linearise", "load",
@@ -67,10 +67,10 @@ class _Public(ModuleType):
 
     @property
     def aircraft(self) -> "Callable[..., Aircraft]":
-        """The aircraft of a name, `jsbsim:NAME` or `./FOLDER`; see `beaver_ftc.aircraft.load`."""
-        from beaver_ftc.aircraft import load as load_aircraft
+        """The aircraft of a name, `jsbsim:NAME` or `./FOLDER`; see `scenario.airframe`."""
+        from beaver_ftc.scenario.airframe import find_aircraft
 
-        return load_aircraft
+        return find_aircraft
 
     @aircraft.setter
     def aircraft(self, folder: ModuleType) -> None:
@@ -87,6 +87,21 @@ def __getattr__(name: str) -> Any:
     module, _, attribute = _WHERE[name].partition(":")
     found = globals()[name] = getattr(import_module(module), attribute)
     return found
+
+
+def _derive(reference: str) -> None:
+    from beaver_ftc.studies.derive.first_use import derive_if_needed
+
+    derive_if_needed(reference)
+
+
+def _compare(aircraft: "Aircraft") -> None:
+    from beaver_ftc.studies.derive.first_use import compare_once
+
+    compare_once(aircraft)
+
+
+first_use.derive, first_use.compare = _derive, _compare
 
 
 def __dir__() -> list[str]:

@@ -13,7 +13,7 @@ environment variable.
 import os
 import re
 import sys
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib import import_module
@@ -239,19 +239,16 @@ def made(group: str, name: str) -> Any:
         raise BadInput(f"plug-in {name}: cannot be made: {type(error).__name__}: {reason}") from error
 
 
-def derive_at_first_use(reference: str) -> None:
-    """Derive the design model of an aircraft that has none yet. Raises BadInput, SimulationFailed.
+@dataclass
+class FirstUse:
+    """What is done when a scenario names an aircraft for the first time: it is flown, far above.
 
-    What derives flies the aircraft, so it lives far above those who name one: it is found by its name.
+    derive: make the file of `jsbsim:NAME`; raises BeaverFtcError. compare: say on standard error where an
+    aircraft of the user's own (an `Aircraft`) flies otherwise than its file declares.
     """
-    derived_if_needed = import_module("beaver_ftc.studies.derive.first_use").derived_if_needed
-    derived_if_needed(reference, _say)
+
+    derive: Callable[[str], None] = lambda reference: None
+    compare: Callable[[Any], None] = lambda aircraft: None
 
 
-def compare_at_first_use(aircraft: Any) -> None:
-    """Say on standard error where an aircraft of the user's own flies otherwise than its file declares."""
-    import_module("beaver_ftc.studies.derive.own_file").say_once(aircraft, _say)
-
-
-def _say(line: str) -> None:
-    print(f"beaver-ftc: {line}", file=sys.stderr, flush=True)
+first_use = FirstUse()  # filled when the package is imported

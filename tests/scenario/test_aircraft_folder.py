@@ -8,6 +8,7 @@ import pytest
 from beaver_ftc.aircraft.loading import load as load_aircraft
 from beaver_ftc.aircraft.loading import read
 from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.scenario.airframe import find_aircraft
 
 TRAINER = Path(__file__).parents[1] / "data" / "aircraft" / "trainer"
 
@@ -37,7 +38,7 @@ def changed(folder, old, new):
     assert old in text
     file.write_text(text.replace(old, new, 1))
     with pytest.raises(BadInput) as error:
-        load_aircraft("./trainer", folder)
+        find_aircraft("./trainer", folder)
     return [line.removeprefix(f"{file}:") for line in str(error.value).splitlines()]
 
 
@@ -85,4 +86,4 @@ def test_a_link_out_of_the_scenarios_folder_is_refused(folder, linked):
     (folder / "trainer" / linked).unlink(missing_ok=True)
     (folder / "trainer" / linked).symlink_to(TRAINER / linked)
     with pytest.raises(BadInput, match=f"'./trainer/{linked}' leads outside, allowed: files below"):
-        load_aircraft("./trainer", folder)
+        find_aircraft("./trainer", folder)

@@ -11,16 +11,15 @@ from typing import Any
 from beaver_ftc.aircraft.aircraft import Aircraft
 from beaver_ftc.aircraft.schema import AircraftFile
 from beaver_ftc.documents.document import Problem
-from beaver_ftc.documents.errors import BadInput, BeaverFtcError, suggestion
+from beaver_ftc.documents.errors import BadInput, suggestion
 from beaver_ftc.documents.files import UnreadableError, read_text
 from beaver_ftc.documents.paths import data_root
 from beaver_ftc.documents.problems import ScenarioError
 from beaver_ftc.documents.validation import parse_document, validate
-from beaver_ftc.plugins import compare_at_first_use, derive_at_first_use
 
 DEFAULT = "beaver"
 FILE = "aircraft.yaml"
-_FROM_JSBSIM = "jsbsim:"
+BESIDE, FROM_JSBSIM = "./", "jsbsim:"
 DERIVED = "# Written by beaver-ftc derive"
 _FORMAT = 5  # of what is derived: files of another are derived anew
 _MAX_BYTES = 1_000_000
@@ -35,6 +34,10 @@ class UnknownAircraft(BadInput):
     """No such aircraft; the message says what is allowed."""
 
 
+class NotDerived(UnknownAircraft):
+    """An aircraft of the jsbsim package that has no design model in the cache."""
+
+
 @lru_cache
 def builtin_names() -> tuple[str, ...]:
     """Names of the built-in aircraft."""
@@ -46,18 +49,17 @@ def _root() -> Path:
 
 
 def load(reference: str = DEFAULT, beside: Path | None = None) -> Aircraft:
-    """The aircraft a scenario names; `beside` is the folder the scenario is in.
+    """The aircraft a scenario names, as its file says; `beside` is the folder the scenario is in.
 
-    Raises UnknownAircraft for what is no aircraft, ScenarioError with one line a mistake in its file.
+    Raises UnknownAircraft for what is no aircraft, NotDerived for one whose file is yet to be made, and
+    ScenarioError with one line a mistake in its file.
     """
     if not isinstance(reference, str):
         raise UnknownAircraft(f"{reference!r:.60} is no aircraft, allowed: {_ALLOWED}")
-    if reference.startswith(_FROM_JSBSIM):
-        return read(_derived(reference.removeprefix(_FROM_JSBSIM)))
-    if reference.startswith("./"):
-        aircraft = read(_inside(beside, reference))
-        compare_at_first_use(aircraft)
-        return aircraft
+    if reference.startswith(FROM_JSBSIM):
+        return read(_derived(reference.removeprefix(FROM_JSBSIM)))
+    if reference.startswith(BESIDE):
+        return read(_inside(beside, reference))
     if reference not in builtin_names():
         raise UnknownAircraft(
             f"{reference!r} is not known{suggestion(reference, builtin_names())}, jsbsim:NAME as "
@@ -91,10 +93,8 @@ def is_derived(name: str) -> bool:
 def _derived(name: str) -> Path:
     folder = derived_folder(name)
     if not is_derived(name):
-        try:
-            derive_at_first_use(f"{_FROM_JSBSIM}{name}")
-        except BeaverFtcError as error:
-            raise UnknownAircraft(str(error)) from None
+        here = f"{FROM_JSBSIM}{name}"
+        raise NotDerived(f"{here!r} has no design model yet, allowed: what `beaver-ftc derive {here}` makes")
     return folder
 
 

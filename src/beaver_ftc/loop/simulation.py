@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from beaver_ftc.aircraft.question import asked
 from beaver_ftc.control.outer.setup import set_up_profile
 from beaver_ftc.control.supervisor import MODES
 from beaver_ftc.documents.errors import BadInput, suggestion
@@ -22,6 +21,7 @@ from beaver_ftc.loop.summary import verdict_of
 from beaver_ftc.plant.adapter import UnknownProperty
 from beaver_ftc.plant.faults import is_there
 from beaver_ftc.plant.gust import GustSchedule
+from beaver_ftc.scenario.airframe import checked_against
 from beaver_ftc.scenario.faults import MOST_FAULTS, place_of
 from beaver_ftc.scenario.given import fault_of, is_same_again
 from beaver_ftc.scenario.in_flight import aimed, blown, changed
@@ -181,7 +181,7 @@ class Stepping:
 
         What is broken in just this way already cannot be broken again. Raises BadInput that names the key.
         """
-        with asked(self._loop.aircraft):
+        with checked_against(self._loop.aircraft):
             new = fault_of(fault, self._now_s)
         if any(is_same_again(new, known) for known in self._faults):
             return
@@ -194,7 +194,7 @@ class Stepping:
 
         Faults that are yet to come stay. Raises BadInput for a name that no fault can have.
         """
-        with asked(self._loop.aircraft):
+        with checked_against(self._loop.aircraft):
             names = (*self._surfaces, *sensors_there(), UNANTICIPATED)
             actuator = fault_name(actuator, names)
         if actuator is not None and actuator not in names:

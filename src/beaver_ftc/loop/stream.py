@@ -7,7 +7,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from beaver_ftc.aircraft import Aircraft
-from beaver_ftc.aircraft.question import asked
 from beaver_ftc.design.model import N_Y
 from beaver_ftc.design.variants import anchor, mass_of
 from beaver_ftc.diagnosis import noise_model
@@ -18,6 +17,7 @@ from beaver_ftc.loop.assembly import assemble
 from beaver_ftc.loop.direct import direct
 from beaver_ftc.loop.summary import estimate_now, verdict_of
 from beaver_ftc.plugins import DETECTORS, is_compiled
+from beaver_ftc.scenario.airframe import checked_against
 from beaver_ftc.scenario.given import load
 from beaver_ftc.scenario.schema import Scenario
 
@@ -54,7 +54,7 @@ class Diagnosis:
             "name": "stream", "rate_hz": rate_hz, "fdi": fdi or {}, "actuators": actuators,
             "design_model": design_model or {},
         }  # fmt: skip
-        with asked(aircraft):
+        with checked_against(aircraft):
             self._scenario = _watchable(load(given))
         self._aircraft, self._start = aircraft, start
         self.reset()

@@ -7,9 +7,9 @@ from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
 from beaver_ftc.aircraft import load
-from beaver_ftc.aircraft.question import in_question
 from beaver_ftc.documents.base import Number, Section, number, refuse
 from beaver_ftc.documents.errors import suggestion
+from beaver_ftc.scenario.airframe import checked_aircraft
 
 
 class ActuatorDynamics(Section):
@@ -77,7 +77,7 @@ class Actuators(Section):
 
 def _by_surface(given: dict[str, Any]) -> dict[str, Any]:
     """Numbers given for all surfaces become each surface's own, unless it has its own already."""
-    surfaces = in_question().surfaces
+    surfaces = checked_aircraft().surfaces
     for_all = {key: value for key, value in given.items() if key in ActuatorDynamics.model_fields}
     rest = {key: value for key, value in given.items() if key not in for_all}
     known = (*ActuatorDynamics.model_fields, *surfaces)

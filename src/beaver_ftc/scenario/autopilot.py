@@ -5,8 +5,8 @@ from typing import Any, Self
 
 from pydantic import Field, model_validator
 
-from beaver_ftc.aircraft.question import in_question
 from beaver_ftc.documents.base import Conflict, Flag, Number, Section, number, refuse
+from beaver_ftc.scenario.airframe import checked_aircraft
 
 MAX_LEGS = 100
 THRUST_TERM = "CX_dpt"  # what engine power adds to the force along the path, in an aircraft's file
@@ -84,7 +84,7 @@ class Autopilot(Section):
             yield ("bank_deg",), "contradicts heading_deg, allowed: one of the two"
 
     def _no_thrust(self) -> Iterator[Conflict]:
-        aircraft = in_question()
+        aircraft = checked_aircraft()
         if self.airspeed_mps and THRUST_TERM not in aircraft.terms:
             yield (
                 ("airspeed_mps",),

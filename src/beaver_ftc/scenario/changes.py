@@ -9,12 +9,12 @@ import numpy as np
 from pydantic import BaseModel
 
 from beaver_ftc.aircraft import Aircraft, load
-from beaver_ftc.aircraft.question import asked
 from beaver_ftc.documents.base import Location
 from beaver_ftc.documents.document import Document
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.documents.keys import UnusableKeyError, parse_key, with_values
 from beaver_ftc.documents.validation import validate
+from beaver_ftc.scenario.airframe import checked_against
 from beaver_ftc.scenario.consistency import conflicts_in_data
 
 _Model = TypeVar("_Model", bound=BaseModel)
@@ -33,7 +33,7 @@ def changed(scenario: _Model, changes: Mapping[str, Any]) -> _Model:
             data = with_values(data, {_parsed(key): plain(value)})
         except UnusableKeyError as error:
             raise BadInput(f"{key}: {str(error).replace('the base', 'the scenario')}") from None
-    with asked(*aircraft_of(scenario)):
+    with checked_against(*aircraft_of(scenario)):
         return validate(type(scenario), Document(data), "", Path(), conflicts_in_data)
 
 

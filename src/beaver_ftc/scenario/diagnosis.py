@@ -4,10 +4,10 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, Strict, field_validator, model_validator
 
-from beaver_ftc.aircraft.question import in_question
 from beaver_ftc.documents.base import refuse
 from beaver_ftc.documents.errors import suggestion
 from beaver_ftc.plugins import DETECTORS, refusal
+from beaver_ftc.scenario.airframe import checked_aircraft
 from beaver_ftc.scenario.sensors import Sensors
 
 MAX_POLES = 6  # of the bank of detection filters, the published one included
@@ -77,7 +77,7 @@ class Bounds(BaseModel):
     @field_validator("coefficients")
     @classmethod
     def _known_terms(cls, given: float | dict[str, float]) -> float | dict[str, float]:
-        known = sorted(term.name for term in in_question().moments)
+        known = sorted(term.name for term in checked_aircraft().moments)
         unknown = [name for name in given if name not in known] if isinstance(given, dict) else []
         refuse([((name,), f"unknown moment coefficient{suggestion(name, known)}") for name in unknown])
         return given

@@ -7,8 +7,8 @@ from typing import Any, ClassVar
 from pydantic import create_model
 
 from beaver_ftc.aircraft import Aircraft, load
-from beaver_ftc.aircraft.question import in_question
 from beaver_ftc.documents.base import Number, Section, number
+from beaver_ftc.scenario.airframe import checked_aircraft
 
 
 class Initial(Section):
@@ -67,12 +67,12 @@ def given_initial(given: Any) -> Any:
     """The flight condition given, as one of the aircraft in question."""
     if isinstance(given, Initial):
         given = given.model_dump(exclude_unset=True)
-    return initial_of(in_question()).model_validate(given)
+    return initial_of(checked_aircraft()).model_validate(given)
 
 
 def default_initial() -> Initial:
     """The default flight condition of the aircraft in question."""
-    return initial_of(in_question())()
+    return initial_of(checked_aircraft())()
 
 
 def initial_schema(schema: dict[str, Any]) -> None:

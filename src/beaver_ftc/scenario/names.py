@@ -6,9 +6,9 @@ from typing import Annotated, Any
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo
 
 from beaver_ftc.aircraft import UnknownAircraft, load
-from beaver_ftc.aircraft.question import in_question, named
 from beaver_ftc.documents.base import Number, refuse
 from beaver_ftc.documents.errors import suggestion
+from beaver_ftc.scenario.airframe import aircraft_called, checked_aircraft
 from beaver_ftc.scenario.sensor_faults import sensor_words, sensors_there
 
 UNANTICIPATED = "unanticipated"
@@ -16,7 +16,7 @@ UNANTICIPATED = "unanticipated"
 
 def known_surface(name: str) -> str:
     """Refuse what is no surface of the scenario's aircraft."""
-    surfaces = in_question().surfaces
+    surfaces = checked_aircraft().surfaces
     if name not in surfaces:
         refuse([((), f"{name[:100]!r} is not known{suggestion(name, surfaces)}")])
     return name
@@ -30,7 +30,7 @@ Actuator = Annotated[str, AfterValidator(known_surface), Field(json_schema_extra
 
 
 def _known_term(name: str) -> str:
-    known = in_question().terms
+    known = checked_aircraft().terms
     if name not in known:
         refuse([((), f"unknown aerodynamic term{suggestion(name, known)}")])
     return name
@@ -38,7 +38,7 @@ def _known_term(name: str) -> str:
 
 def _no_more_than_there_are(given: Any) -> Any:
     """Refuse a mapping that cannot be right before a suggestion is made for each of its names."""
-    most = len(in_question().terms)
+    most = len(checked_aircraft().terms)
     if isinstance(given, dict) and len(given) > most:
         refuse([((), f"{len(given)} terms, allowed: at most the {most} there are")])
     return given
@@ -52,7 +52,7 @@ Ratios = Annotated[dict[TermName, Ratio], BeforeValidator(_no_more_than_there_ar
 def nameable(name: str) -> str:
     """Refuse what a diagnosis cannot name."""
     sensors = (sensor_words(name) for name in sensors_there())
-    known = (*in_question().surfaces, UNANTICIPATED, *sensors)
+    known = (*checked_aircraft().surfaces, UNANTICIPATED, *sensors)
     if name not in known:
         refuse([((), f"{name[:100]!r} is not known{suggestion(name, known)}")])
     return name
@@ -61,7 +61,7 @@ def nameable(name: str) -> str:
 def known_aircraft(reference: str, info: ValidationInfo) -> str:
     """Refuse what is no aircraft."""
     try:
-        named(reference, folder_of(info))
+        aircraft_called(reference, folder_of(info))
     except UnknownAircraft as error:
         refuse([((), str(error))])
     return reference

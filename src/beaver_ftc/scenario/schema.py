@@ -16,9 +16,9 @@ from pydantic import (
 )
 
 from beaver_ftc.aircraft import DEFAULT, Aircraft, UnknownAircraft, load
-from beaver_ftc.aircraft.question import asked, named
 from beaver_ftc.documents.base import Flag, Number, Section, Whole, number, refuse
 from beaver_ftc.scenario.actuators import Actuators
+from beaver_ftc.scenario.airframe import aircraft_called, checked_against, find_aircraft
 from beaver_ftc.scenario.autopilot import Autopilot
 from beaver_ftc.scenario.change import Change
 from beaver_ftc.scenario.consistency import DURATION_S, RATE_HZ, Outline, conflicts, keys_expected
@@ -273,7 +273,7 @@ class Scenario(Section):
     @property
     def airframe(self) -> Aircraft:
         """The aircraft, as data."""
-        return self._airframe or load(self.aircraft)
+        return self._airframe or find_aircraft(self.aircraft)
 
     @model_validator(mode="wrap")
     @classmethod
@@ -284,10 +284,10 @@ class Scenario(Section):
         reference = given.get("aircraft") if isinstance(given, dict) else None
         reference = reference if isinstance(reference, str) else None
         try:
-            aircraft = named(reference, folder_of(info))
+            aircraft = aircraft_called(reference, folder_of(info))
         except UnknownAircraft:
             aircraft, reference = load(), None
-        with asked(aircraft, reference):
+        with checked_against(aircraft, reference):
             scenario = read(given)
         if isinstance(given, dict):
             scenario._airframe = aircraft

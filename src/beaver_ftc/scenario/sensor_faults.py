@@ -7,9 +7,9 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
-from beaver_ftc.aircraft.question import in_question
 from beaver_ftc.documents.base import Conflict, Number, Section, number, order_conflicts, refuse
 from beaver_ftc.documents.errors import suggestion
+from beaver_ftc.scenario.airframe import checked_aircraft
 from beaver_ftc.scenario.sensors import ACCELEROMETERS, ENGINE, Sensors
 
 # Sensor -> its unit, and the largest offset or noise that a fault may have.
@@ -30,7 +30,7 @@ ALIASES = {"airspeed": "V", "dynamic_pressure": "qdyn"}
 
 def sensors_there() -> tuple[str, ...]:
     """The instruments of the aircraft in question."""
-    engine = in_question().has_engine_instruments
+    engine = checked_aircraft().has_engine_instruments
     return tuple(name for name in Sensors.model_fields if engine or name not in ENGINE)
 
 

@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from beaver_ftc.aircraft.question import asked
 from beaver_ftc.documents.document import Document
 from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.scenario.airframe import checked_against
 from beaver_ftc.scenario.changes import aircraft_of
 from beaver_ftc.scenario.consistency import OF_A_FAULT
 from beaver_ftc.scenario.loader import validate_scenario
@@ -76,7 +76,7 @@ def flown(scenario: Scenario, faults: Sequence[Any], stick: StickTrack, frames: 
         table = {"file": FILE, "column": axis, "time_s": times_s, "values_deg_s": rates_deg_s}
         reference = data.setdefault("reference", {})
         reference[axis] = [*reference.get(axis, []), {"csv": table}]
-    with asked(*aircraft_of(scenario)):
+    with checked_against(*aircraft_of(scenario)):
         return validate_scenario(Document(data))
 
 

@@ -11,13 +11,13 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 
 from beaver_ftc.aircraft import Aircraft, load
-from beaver_ftc.aircraft.question import asked
 from beaver_ftc.documents.base import Location
 from beaver_ftc.documents.document import Document, Problem
 from beaver_ftc.documents.keys import UnusableKeyError, parse_key, with_values
 from beaver_ftc.documents.paths import data_root, inside
 from beaver_ftc.documents.problems import ScenarioError, key_path
 from beaver_ftc.documents.validation import validate
+from beaver_ftc.scenario.airframe import checked_against
 from beaver_ftc.scenario.builtin import (
     builtin_names,
     builtin_path,
@@ -68,14 +68,14 @@ class Sweep:
         ready = {} if "aircraft" in varied else self._sections
         ready = {name: section for name, section in ready.items() if name not in varied}
         rest = {name: value for name, value in self.base.items() if name not in ready}
-        with asked(self.aircraft, self.base.get("aircraft")):
+        with checked_against(self.aircraft, self.base.get("aircraft")):
             return Scenario.model_validate({**with_values(rest, places), **ready, **settings})
 
     @cached_property
     def _sections(self) -> dict[str, BaseModel]:
         """Sections of the base, read once for the flights that do not vary them; none if it cannot fly."""
         try:
-            with asked(self.aircraft, self.base.get("aircraft")):
+            with checked_against(self.aircraft, self.base.get("aircraft")):
                 base = Scenario.model_validate({"name": self.name, **self.base})
         except ValidationError:
             return {}
@@ -108,7 +108,7 @@ def validate_sweep(document: Document, source: str = "", folder: Path | None = N
     """The sweep in a document; without a source its error lines begin with the key."""
     file = validate(SweepFile, document, source, folder)
     base, aircraft = _base(file.base, document, source, folder)
-    with asked(aircraft, base.get("aircraft")):
+    with checked_against(aircraft, base.get("aircraft")):
         base, problems = _with_settings(base, file.set, document)
         problems = problems or [*_key_problems(base, file.vary, document)]
     if problems:

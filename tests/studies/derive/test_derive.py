@@ -20,6 +20,7 @@ from beaver_ftc.loop.loop import fly
 from beaver_ftc.plant import instrumented
 from beaver_ftc.plant.adapter import Plant, bare, probe, translated
 from beaver_ftc.plant.model_file import copy_of
+from beaver_ftc.scenario.airframe import find_aircraft
 from beaver_ftc.scenario.loader import load_text
 from beaver_ftc.studies.derive.check import not_affine
 from beaver_ftc.studies.derive.error import errors_of
@@ -278,11 +279,11 @@ def test_what_jsbsim_cannot_fly_is_said_in_a_line(tmp_path):
 
 def test_a_scenario_derives_its_aircraft_at_first_use(tmp_path, monkeypatch, capsys):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    file = load("jsbsim:A4").folder / "aircraft.yaml"
+    file = find_aircraft("jsbsim:A4").folder / "aircraft.yaml"
     assert file.is_relative_to(tmp_path)
     assert file.read_text().startswith(first_line())
     assert capsys.readouterr().err.startswith("beaver-ftc: jsbsim:A4: deriving its design model")
-    load("jsbsim:A4")
+    find_aircraft("jsbsim:A4")
     assert capsys.readouterr().err == ""
 
 

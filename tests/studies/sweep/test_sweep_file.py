@@ -3,9 +3,9 @@ from dataclasses import replace
 import pytest
 from pydantic import ValidationError
 
-from beaver_ftc.aircraft.question import asked
 from beaver_ftc.documents.keys import UnusableKeyError, parse_key, with_values
 from beaver_ftc.documents.problems import ScenarioError
+from beaver_ftc.scenario.airframe import checked_against
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.sweep_loader import builtin_sweeps, is_sweep, load_sweep, load_sweep_text
 from beaver_ftc.scenario.sweep_schema import SweepFile
@@ -68,7 +68,7 @@ def test_sections_read_once_make_the_scenario_that_reading_everything_makes(name
     sweep = load_sweep(name)
     (assignment,) = Plan(sweep).assignments([7])
     places = {parse_key(key): value for key, value in assignment.values.items()}
-    with asked(sweep.aircraft, sweep.base.get("aircraft")):
+    with checked_against(sweep.aircraft, sweep.base.get("aircraft")):
         expected = Scenario.model_validate(with_values(sweep.base, places))
     made = sweep.scenario(assignment.values)
     assert made == expected

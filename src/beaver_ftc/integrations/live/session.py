@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 import beaver_ftc as bf
-from beaver_ftc.aircraft import question
 from beaver_ftc.documents.errors import BadInput, suggestion
 from beaver_ftc.integrations.live import messages
 from beaver_ftc.integrations.live.fresh import HELD, as_live, changes_of
@@ -18,6 +17,7 @@ from beaver_ftc.integrations.live.telling import WHEN, in_words, short
 from beaver_ftc.loop.cockpit import IMMOVABLE
 from beaver_ftc.plugins import DETECTORS, LAWS, is_compiled, registered
 from beaver_ftc.results.log import SpooledLog
+from beaver_ftc.scenario.airframe import checked_against
 from beaver_ftc.scenario.faults import place_of
 from beaver_ftc.scenario.sensor_faults import sensors_there
 
@@ -304,7 +304,7 @@ class Session:
 
     @property
     def _sensors(self) -> tuple[str, ...]:
-        with question.asked(self.scenario.airframe):
+        with checked_against(self.scenario.airframe):
             return sensors_there()
 
     def hello(self) -> dict[str, Any]:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from beaver_ftc.aircraft import AXES, DEFAULT, Aircraft, load
+from beaver_ftc.scenario.airframe import find_aircraft
 from beaver_ftc.scenario.environment import air_of
 from beaver_ftc.studies.engine.study import Progress, flown
 from beaver_ftc.studies.matrix.told import columns_of, told
@@ -84,7 +85,7 @@ def airspeeds_of(reference: str) -> tuple[float, ...]:
 
 def aircraft_of(reference: str) -> Aircraft:
     """The aircraft of that name; a folder is looked for in the working directory."""
-    return load(reference, Path())
+    return find_aircraft(reference, Path())
 
 
 def own_axis(case: Case) -> str:

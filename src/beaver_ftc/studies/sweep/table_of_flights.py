@@ -9,10 +9,10 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
-from beaver_ftc.aircraft import question
 from beaver_ftc.documents.document import Document
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.results.frame import units
+from beaver_ftc.scenario.airframe import checked_against
 from beaver_ftc.scenario.changes import plain
 from beaver_ftc.scenario.given import ScenarioLike, load
 from beaver_ftc.scenario.sweep_loader import Sweep, validate_sweep
@@ -56,7 +56,7 @@ def _made(scenario: ScenarioLike, asked: dict[str, Any]) -> Sweep:
     base = load(scenario)
     name = re.sub(r"[^A-Za-z0-9_-]", "-", base.name)[:64]
     given = {"name": f"{name}-sweep", "base": plain(base), **plain(asked)}
-    with question.asked(base.airframe, base.aircraft):
+    with checked_against(base.airframe, base.aircraft):
         return validate_sweep(Document(given), folder=Path())
 
 

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from beaver_ftc.aircraft import load
 from beaver_ftc.aircraft.loading import read
-from beaver_ftc.studies.derive import own_file
+from beaver_ftc.scenario.airframe import find_aircraft
+from beaver_ftc.studies.derive import first_use
 
 TRAINER = Path(__file__).parents[2] / "data" / "aircraft" / "trainer"
 
@@ -27,13 +27,13 @@ def change(file, old, new):
 
 
 def test_a_file_that_says_what_the_model_does_is_said_nothing_of(trainer):
-    assert own_file.kept_or_compared(read(trainer)) == []
+    assert first_use.kept_or_compared(read(trainer)) == []
 
 
 def test_a_wrong_term_is_said_with_its_axis_and_size(trainer):
     """Roll damping 30 % too large: at p = 0.6 rad/s roll is off by what it says; Jxz hands yaw a share."""
     change(trainer / "aircraft.yaml", "name: Cl_p, value: -0.47", "name: Cl_p, value: -0.61")
-    line, yaw = own_file.kept_or_compared(read(trainer))
+    line, yaw = first_use.kept_or_compared(read(trainer))
     assert yaw.startswith("r: ")
     assert line.startswith("p: the terms are ")
     off, density, V = float(line.split()[4]), 1.12, float(line.split(" m/s")[0].split()[-1])
@@ -47,30 +47,30 @@ def test_another_inertia_of_the_model_is_said(trainer):
     model = trainer / "trainer.xml"
     iyy = next(part for part in model.read_text().split("<iyy")[1].split("<")[0].split(">")[1:])
     change(model, iyy, f" {1.5 * float(iyy)} ")
-    assert "q" in [line[0] for line in own_file.kept_or_compared(read(trainer))]
+    assert "q" in [line[0] for line in first_use.kept_or_compared(read(trainer))]
 
 
 def test_it_is_compared_once_for_each_state_of_the_files(trainer, monkeypatch):
     asked = []
-    monkeypatch.setattr(own_file, "compared", lambda aircraft: asked.append(aircraft) or ["off"])
+    monkeypatch.setattr(first_use, "compared", lambda aircraft: asked.append(aircraft) or ["off"])
     aircraft = read(trainer)
-    assert [own_file.kept_or_compared(aircraft) for _ in range(3)] == [["off"]] * 3
+    assert [first_use.kept_or_compared(aircraft) for _ in range(3)] == [["off"]] * 3
     assert len(asked) == 1
     change(trainer / "trainer.xml", "<fdm_config", "<!-- another state --><fdm_config")
-    own_file.kept_or_compared(aircraft)
+    first_use.kept_or_compared(aircraft)
     assert len(asked) == 2
 
 
 def test_what_cannot_be_trimmed_is_said_not_to_be_compared(trainer):
     change(trainer / "aircraft.yaml", "airspeed_mps: [35, 65]", "airspeed_mps: [5, 8]")
-    (line,) = own_file.kept_or_compared(read(trainer))
+    (line,) = first_use.kept_or_compared(read(trainer))
     assert line.startswith("it is not compared with trainer.xml: ")
 
 
 def test_a_scenario_that_names_the_folder_hears_of_it_once(trainer, capsys):
     change(trainer / "aircraft.yaml", "name: Cm_alpha, value: -0.72", "name: Cm_alpha, value: -0.5")
     for _ in range(2):
-        load("./trainer", trainer.parent)
+        find_aircraft("./trainer", trainer.parent)
     (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith("beaver-ftc: trainer/aircraft.yaml: warning: q: the terms are ")
 
@@ -89,6 +89,6 @@ def test_where_nothing_can_be_kept_it_is_said_all_the_same(trainer, monkeypatch)
     def full(path, content):
         raise OSError("no space left on device")
 
-    monkeypatch.setattr(own_file, "compared", lambda aircraft: ["off"])
-    monkeypatch.setattr(own_file, "write_whole", full)
-    assert own_file.kept_or_compared(read(trainer)) == ["off"]
+    monkeypatch.setattr(first_use, "compared", lambda aircraft: ["off"])
+    monkeypatch.setattr(first_use, "write_whole", full)
+    assert first_use.kept_or_compared(read(trainer)) == ["off"]

@@ -1,0 +1,56 @@
+"""The aircraft of a scenario: found by what the scenario calls it, and what its names are checked against."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from pathlib import Path
+
+from beaver_ftc.aircraft import DEFAULT, Aircraft, load
+from beaver_ftc.aircraft.loading import BESIDE, NotDerived, UnknownAircraft
+from beaver_ftc.documents.errors import BeaverFtcError
+from beaver_ftc.plugins import first_use
+
+_CHECKED: ContextVar[tuple[Aircraft, str | None] | None] = ContextVar("aircraft", default=None)
+
+
+def find_aircraft(reference: str = DEFAULT, beside: Path | None = None) -> Aircraft:
+    """The aircraft of a name, `jsbsim:NAME` or `./FOLDER`; `beside` is the folder to find that in.
+
+    One of the jsbsim package is derived at its first use, one of the user's own compared with its model then;
+    both say so on standard error. Raises as `beaver_ftc.aircraft.load`.
+    """
+    try:
+        aircraft = load(reference, beside)
+    except NotDerived:
+        try:
+            first_use.derive(reference)
+        except BeaverFtcError as error:
+            raise UnknownAircraft(str(error)) from None
+        aircraft = load(reference, beside)
+    if reference.startswith(BESIDE):
+        first_use.compare(aircraft)
+    return aircraft
+
+
+def checked_aircraft() -> Aircraft:
+    """The aircraft of the scenario being read; outside of one, the built-in aircraft."""
+    checked = _CHECKED.get()
+    return checked[0] if checked else load()
+
+
+def aircraft_called(reference: str | None, beside: Path | None) -> Aircraft:
+    """What a scenario calls its aircraft, if anything: the one checked against if that is its name."""
+    checked = _CHECKED.get()
+    if reference is None or (checked and checked[1] == reference):
+        return checked_aircraft()
+    return find_aircraft(reference, beside)
+
+
+@contextmanager
+def checked_against(aircraft: Aircraft, reference: str | None = None) -> Iterator[None]:
+    """Check names against this aircraft; `reference` is what a scenario calls it."""
+    token = _CHECKED.set((aircraft, reference))
+    try:
+        yield
+    finally:
+        _CHECKED.reset(token)

@@ -167,6 +167,17 @@ def test_noise_of_the_readings_is_jitter_of_the_forces():
     assert without == pytest.approx(slopes**2, rel=1e-6)
 
 
+def test_noise_of_the_pressure_is_jitter_as_the_innovation_moves_with_it():
+    """Its slope by a difference, times the declared noise."""
+    fdi = felt(Bounds(sensors={"qdyn": {"noise_std_pa": 4.0}}))
+    record, innovation = fdi["statistical"]["forces"], []
+    for more in (0.5, -0.5, 0.0):
+        look(record, fdi["statistical"]["air"], measured(y=Y + np.array([0, 0, 0, more, 0])), U, DT)
+        innovation.append(record["component"]["innovation"].copy())
+    slopes = innovation[0] - innovation[1]
+    assert record["component"]["jitter"] == pytest.approx(np.outer((4.0 * slopes) ** 2, [1, 1]), rel=1e-6)
+
+
 def test_noise_of_accelerometers_is_jitter_that_the_pressure_does_not_scale():
     """Against a draw, at the trim's pressure and at twice as much; and how far it lets the angle wander."""
     sensors, rng = {"ay": {"noise_std_mps2": 0.04}, "az": {"noise_std_mps2": 0.07}}, np.random.default_rng(8)

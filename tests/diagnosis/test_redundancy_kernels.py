@@ -398,3 +398,17 @@ def test_near_the_vertical_attitude_is_not_compared_and_its_tests_begin_anew():
     assert shares[0] > 1.0  # 0.03 rad in a look, and no rates
     assert shares[1:3] == [0.0, 0.0]  # that of now, or that of before, is beyond 1.3 rad
     assert step["test"]["filtered"][ANGLE + 1] == pytest.approx([-0.03] * 3)  # nothing of what was before
+
+
+def test_the_bound_of_a_climb_knows_the_hardest_of_three_pulls_whichever_it_was():
+    """Adams and Bashforth's weights of an acceleration over the three latest steps add up to 4/3 at most."""
+
+    def rate(*pulled):
+        step, signal = new_step(), reading()
+        redundancy.look(step, signal, np.array([0.0, 0.0, -GRAVITY]))
+        step["pull"], step["pulled"] = 1.0, pulled
+        redundancy.allow(step, signal)
+        return step["test"]["rate"][CLIMB]
+
+    assert rate(50.0, 20.0) == rate(20.0, 50.0) == rate(50.0, 50.0)
+    assert rate(20.0, 80.0) - rate(20.0, 50.0) == pytest.approx(4.0 / 3.0 * H * 30.0)

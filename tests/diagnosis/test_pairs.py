@@ -14,6 +14,7 @@ from beaver_ftc.diagnosis.types import registry as types
 from beaver_ftc.diagnosis.types.findings import found
 from beaver_ftc.diagnosis.types.pairs import solve_roll_and_yaw
 from beaver_ftc.scenario.schema import Scenario
+from flying import flown
 
 AILERON, ELEVATOR, RUDDER = range(3)
 kinds = st.sampled_from(list(TYPES))
@@ -114,3 +115,16 @@ def test_ailerons_and_rudder_were_where_two_equations_put_them(off_a, off_r, siz
         assert surface["low"] == pytest.approx(max(surface["travel_low"], 0.02 + ends.min()), abs=1e-9)
         assert surface["high"] == pytest.approx(min(surface["travel_high"], 0.02 + ends.max()), abs=1e-9)
         assert surface["wrong"] == (ends.min() > 0 or ends.max() < 0)
+
+
+@pytest.mark.parametrize("thresholds", ["published", "interval"])
+def test_what_the_estimators_suppose_is_there_in_the_frame_of_the_alarm(thresholds):
+    """Without it, 0/0: where the surface was is not a number, and the law commands it."""
+    flight, log = flown(
+        duration_s=6,
+        fdi={"fault_class": "all", "pairs": True, "thresholds": thresholds},
+        control={"law": "fault-tolerant"},
+        faults=[{"type": "hardover", "actuator": "elevator", "direction": 1, "at_s": 3}],
+    )
+    assert flight.isolated == "elevator"
+    assert np.isfinite(log["elevator_cmd_rad"]).all()

@@ -24,6 +24,17 @@ def _fdi(authority="either", bounds=None, **more):
     return {"statistical": {}, "authority": authority, "bounds": bounds or {}, **more}
 
 
+@pytest.mark.parametrize("fault", [{"type": "hardover", "direction": 1}, {"type": "float"}])
+@pytest.mark.parametrize("thresholds", ["published", "interval"])
+def test_statistics_alone_name_the_elevator_whatever_the_thresholds_of_the_sets(thresholds, fault):
+    """In the frame of the alarm each surface's own direction is asked: no surface may be without one."""
+    flight, _ = flown(
+        duration_s=6, sensors="tactical-grade", faults=[{**fault, "actuator": "elevator", "at_s": 3}],
+        fdi=_fdi("statistical", {"sensors": "tactical-grade"}, fault_class="all", thresholds=thresholds),
+    )  # fmt: skip
+    assert flight.isolated == "elevator"
+
+
 @pytest.mark.parametrize(("surface", "magnitude"), [("elevator", 0.3), ("aileron", 0.8), ("rudder", 0.6)])
 def test_losses_are_found_named_and_estimated_under_noise_servos_turbulence_and_tolerances(
     surface, magnitude

@@ -48,7 +48,7 @@ def suppose(fdi, fie, G, Gu, spread):
 @kernel
 def suppose_all(fdi, G, Gu, spread):
     """`suppose` for every estimator, where something will ask for it."""
-    if fdi.isolation.memory or fdi.verdict.detected:
+    if fdi.isolation.memory or fdi.config.every_type or fdi.verdict.detected:
         for s in range(fdi.isolation.n):
             suppose(fdi, fdi.isolation.estimator[s], G, Gu, spread)
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from beaver_ftc.cli.main import EXAMPLES, app
+from beaver_ftc.cli.main import COMMANDS, app
 from beaver_ftc.scenario.builtin import builtin_names, builtin_path
 from beaver_ftc.scenario.loader import load_scenario
 from beaver_ftc.scenario.sweep_loader import builtin_sweeps, load_sweep_text
@@ -63,9 +63,9 @@ def test_a_name_that_cannot_be_a_scenarios_is_bad_input(tmp_path, name, status):
 
 
 def test_help_has_examples_on_lines_of_their_own():
-    for name, lines in EXAMPLES.items():
+    for name, command in COMMANDS.items():
         shown = [line.strip() for line in _beaver(name, "--help").stdout.splitlines()]
-        assert set(lines) <= set(shown)
+        assert set(command.examples) <= set(shown)
 
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])

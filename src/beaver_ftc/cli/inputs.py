@@ -1,9 +1,10 @@
-"""What a command is given: scenarios by file or name, all of them checked before the first one flies."""
+"""What commands are given: options that several share, and scenarios, checked before the first one flies."""
 
 from collections.abc import Callable
 from enum import StrEnum
 from functools import wraps
-from inspect import Parameter, signature
+from inspect import Parameter, Signature, signature
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -29,6 +30,17 @@ def complete_names(incomplete: str) -> list[str]:
     return [name for name in builtin_names() if name.startswith(incomplete)]
 
 
+_SCENARIO = typer.Argument(
+    metavar="SCENARIO", help="A file, or the name of a built-in scenario.", autocompletion=complete_names
+)
+ScenarioArgument = Annotated[str, _SCENARIO]
+ScenariosArgument = Annotated[list[str], _SCENARIO]
+ResultsOption = Annotated[Path, typer.Option(help="Folder for the results, one folder a scenario in it.")]
+NoReportOption = Annotated[bool, typer.Option("--no-report", help="Skip report.html and the figures.")]
+JunitOption = Annotated[
+    Path | None, typer.Option(metavar="FILE", help="Also write the verdict as JUnit XML, for CI.")
+]
+WorkersOption = Annotated[int | None, typer.Option(min=1, max=1024, help="Processes; default: one a core.")]
 PluginOption = Annotated[
     list[str] | None,
     typer.Option(
@@ -53,9 +65,36 @@ def with_plugins(command: Callable[..., None]) -> Callable[..., None]:
 
     own = signature(command)
     option = Parameter("plugin", Parameter.KEYWORD_ONLY, default=None, annotation=PluginOption)
-    plugged.__signature__ = own.replace(parameters=[*own.parameters.values(), option])  # type: ignore[attr-defined]
-    plugged.__annotations__ = command.__annotations__ | {"plugin": PluginOption}
-    return plugged
+    return _signed(plugged, own.replace(parameters=[*own.parameters.values(), option]))
+
+
+def taking(record: type[Any]) -> Callable[[Callable[[Any], None]], Callable[..., None]]:
+    """A command that takes its arguments and options as one record: the fields of a dataclass, in its order.
+
+    @dataclass(frozen=True)
+    class Options:
+        files: Annotated[list[str], typer.Argument(help="...")]
+        out: ResultsOption = Path("runs")
+
+    @taking(Options)
+    def command(options: Options) -> None: ...
+    """
+
+    def made(command: Callable[[Any], None]) -> Callable[..., None]:
+        @wraps(command)
+        def called(**given: Any) -> None:
+            command(record(**given))
+
+        return _signed(called, signature(record))
+
+    return made
+
+
+def _signed(command: Callable[..., None], own: Signature) -> Callable[..., None]:
+    """The command as typer is to read it: its parameters, with what is annotated of them."""
+    command.__signature__ = own  # type: ignore[attr-defined]
+    command.__annotations__ = {name: each.annotation for name, each in own.parameters.items()}
+    return command
 
 
 def load_all(names: list[str]) -> list["Scenario"]:

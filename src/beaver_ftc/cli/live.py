@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from beaver_ftc.cli.inputs import ScenarioArgument
 from beaver_ftc.cli.output import emit
 
 if TYPE_CHECKING:
@@ -12,9 +13,7 @@ if TYPE_CHECKING:
 
 
 def command(
-    scenario: Annotated[
-        str, typer.Argument(metavar="SCENARIO", help="A file, or the name of a built-in scenario.")
-    ] = "fault-free",
+    scenario: ScenarioArgument = "fault-free",
     aircraft: Annotated[
         str | None, typer.Option(metavar="AIRCRAFT", help="Fly this one, without the scenario's uncertainty.")
     ] = None,

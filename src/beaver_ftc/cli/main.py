@@ -1,13 +1,13 @@
 """The command `beaver-ftc`: its commands, and what becomes of errors.
 
-A command is one module of this package with a function `command`, thin, importing what it needs when it runs,
-and one name here. `--help` must answer at once.
+A command is one thin function of a module of this package, that imports what it needs when it runs, and one
+row here. `--help` must answer at once.
 """
 
 import signal
 import sys
 from importlib import import_module
-from typing import Annotated, NoReturn
+from typing import Annotated, NamedTuple, NoReturn
 
 import typer
 
@@ -16,44 +16,44 @@ from beaver_ftc.cli.inputs import with_plugins
 from beaver_ftc.cli.output import report_last, unexpected
 from beaver_ftc.documents.errors import BeaverFtcError
 
-COMMANDS = (
-    "run",
-    "mismatch",
-    "validate",
-    "schema",
-    "trim",
-    "linearise",
-    "list",
-    "show",
-    "new",
-    "sweep",
-    "compare",
-    "reproduce",
-    "matrix",
-    "power",
-    "bench",
-    "derive",
-    "verify",
-    "detectability",
-    "identify",
-    "diagnose",
-    "live",
-)
 
-WITHOUT_SCENARIOS = ("schema", "show", "new", "bench", "verify", "detectability", "reproduce", "derive")
+class Command(NamedTuple):
+    """Where a command is, whether it flies scenarios (then plug-ins can be registered), examples of it."""
 
-EXAMPLES = {
-    "run": (
+    module: str
+    function: str = "command"
+    flies: bool = True
+    examples: tuple[str, ...] = ()
+
+
+COMMANDS = {
+    "run": Command("run", examples=(
         "beaver-ftc run elevator-partial-loss",
         "beaver-ftc run elevator-partial-loss --format json --no-report",
-    ),
-    "validate": ("beaver-ftc validate elevator-partial-loss fault-free",),
-    "show": ("beaver-ftc show elevator-partial-loss",),
-    "new": ("beaver-ftc new my-case", "beaver-ftc new my-other-case --like elevator-partial-loss"),
-    "list": ("beaver-ftc list",),
-    "trim": ("beaver-ftc trim --airspeed-mps 40 --altitude-m 1000",),
-    "schema": ("beaver-ftc schema",),
-}
+    )),
+    "mismatch": Command("mismatch"),
+    "validate": Command("validate", examples=("beaver-ftc validate elevator-partial-loss fault-free",)),
+    "schema": Command("catalogue", "schema", False, ("beaver-ftc schema",)),
+    "trim": Command("trim", examples=("beaver-ftc trim --airspeed-mps 40 --altitude-m 1000",)),
+    "linearise": Command("studies", "linearise"),
+    "list": Command("catalogue", "list_choices", examples=("beaver-ftc list",)),
+    "show": Command("catalogue", "show", False, ("beaver-ftc show elevator-partial-loss",)),
+    "new": Command("new", flies=False, examples=(
+        "beaver-ftc new my-case", "beaver-ftc new my-other-case --like elevator-partial-loss",
+    )),
+    "sweep": Command("sweep"),
+    "compare": Command("compare"),
+    "reproduce": Command("studies", "reproduce", False),
+    "matrix": Command("matrix"),
+    "power": Command("power"),
+    "bench": Command("studies", "bench", False),
+    "derive": Command("studies", "derive", False),
+    "verify": Command("studies", "verify", False),
+    "detectability": Command("studies", "detectability", False),
+    "identify": Command("recorded", "identify"),
+    "diagnose": Command("recorded", "diagnose"),
+    "live": Command("live"),
+}  # fmt: skip
 
 app = typer.Typer(
     name="beaver-ftc",
@@ -84,16 +84,12 @@ def options(
     """
 
 
-def _examples(name: str) -> str | None:
-    """The examples at the end of a command's help, each on a line of its own."""
-    lines = EXAMPLES.get(name)
-    return "\n".join(["\b", "Examples:", *(f"  {line}" for line in lines)]) if lines else None
-
-
-for _name in COMMANDS:
-    _command = import_module(f"beaver_ftc.cli.{_name}").command
-    app.command(_name, epilog=_examples(_name))(
-        _command if _name in WITHOUT_SCENARIOS else with_plugins(_command)
+for _name, _command in COMMANDS.items():
+    _function = getattr(import_module(f"beaver_ftc.cli.{_command.module}"), _command.function)
+    # the examples at the end of its help, each on a line of its own
+    _epilog = "\n".join(["\b", "Examples:", *(f"  {line}" for line in _command.examples)])
+    app.command(_name, epilog=_epilog if _command.examples else None)(
+        with_plugins(_function) if _command.flies else _function
     )
 
 

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 import typer
 
 from beaver_ftc.cli.inputs import TurbulenceName
-from beaver_ftc.cli.output import Format, FormatOption, emit, emit_json
+from beaver_ftc.cli.output import Format, FormatOption, answer
 
 Document = dict[str, Any]
 
@@ -67,10 +67,7 @@ def command(
     with progress_bar("faults") as progress:
         document = run(out, tuple(airspeed) if airspeed else None, workers, progress)
     folder = str(out / name)
-    if format is Format.json:
-        emit_json(document | {"folder": folder})
-    else:
-        emit(as_text(document) + f"\n\nresults: {folder}")
+    answer(format, document | {"folder": folder}, lambda: as_text(document) + f"\n\nresults: {folder}")
     raise typer.Exit(0 if document["passed"] else 1)
 
 

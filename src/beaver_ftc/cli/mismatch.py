@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from beaver_ftc.cli.inputs import load_all
+from beaver_ftc.cli.inputs import NoReportOption, ResultsOption, ScenariosArgument, load_all
 from beaver_ftc.cli.output import Format, FormatOption, complain, emit, emit_json
 from beaver_ftc.documents.errors import BadInput
 
@@ -14,19 +14,15 @@ if TYPE_CHECKING:
 
 
 def command(
-    scenarios: Annotated[
-        list[str], typer.Argument(metavar="SCENARIO", help="A file, or the name of a built-in scenario.")
-    ],
-    out: Annotated[Path, typer.Option(help="Folder for the results, one folder a scenario in it.")] = Path(
-        "runs"
-    ),
+    scenarios: ScenariosArgument,
+    out: ResultsOption = Path("runs"),
     format: FormatOption = Format.text,
     variant: Annotated[
         str,
         typer.Option(help="Design models to compare, e.g. declared,engine-neglected,linearised,mass=1.1."),
     ] = "",
     map: Annotated[bool, typer.Option("--map", help="Worst mismatch over speed and altitude, too.")] = False,
-    no_report: Annotated[bool, typer.Option("--no-report", help="Skip report.html and the figures.")] = False,
+    no_report: NoReportOption = False,
 ) -> None:
     """Split truth less design model into its sources.
 

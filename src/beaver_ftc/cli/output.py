@@ -3,6 +3,7 @@
 import os
 import sys
 import traceback
+from collections.abc import Callable
 from contextlib import suppress
 from enum import StrEnum
 from typing import Annotated, Any
@@ -52,6 +53,14 @@ def emit_json(document: Any) -> None:
 
     _document["given"] = True
     emit(as_json(document))
+
+
+def answer(format: Format, document: Any, text: Callable[[], str]) -> None:
+    """What a command has found, in the form that was asked for."""
+    if format is Format.json:
+        emit_json(document)
+    else:
+        emit(text())
 
 
 def complain(text: str) -> None:

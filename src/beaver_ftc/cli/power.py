@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
-from beaver_ftc.cli.inputs import TurbulenceName
-from beaver_ftc.cli.output import Format, FormatOption, emit, emit_json
+from beaver_ftc.cli.inputs import TurbulenceName, WorkersOption
+from beaver_ftc.cli.output import Format, FormatOption, answer
 
 
 class GridName(StrEnum):
@@ -42,9 +42,7 @@ def command(
             "--rates-alone", help="Do not show plug-ins the air as our detector sees it by the vanes."
         ),
     ] = False,
-    workers: Annotated[
-        int | None, typer.Option(min=1, max=1024, help="Processes; default: one a core.")
-    ] = None,
+    workers: WorkersOption = None,
     out: Annotated[Path, typer.Option(help="Folder for the results: `power` in it.")] = Path("runs"),
     format: FormatOption = Format.text,
 ) -> None:
@@ -70,7 +68,4 @@ def command(
         survey = replace(GRIDS[grid].only(sensors, turbulence), vanes=not rates_alone)
         document = run_power(out, survey, chosen, workers or cores(), progress)
     folder = str(out / NAME)
-    if format is Format.json:
-        emit_json(document | {"folder": folder})
-    else:
-        emit(as_text(document) + f"\n\nresults: {folder}")
+    answer(format, document | {"folder": folder}, lambda: as_text(document) + f"\n\nresults: {folder}")

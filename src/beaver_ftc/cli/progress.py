@@ -1,11 +1,20 @@
-"""A progress bar on standard error, for a run long enough to be waited for, on a terminal only."""
+"""How far a command has come, on standard error.
+
+A run or a study: a bar, on a terminal only, once it takes long enough to be waited for. A sweep: a moving
+line on a terminal, one now and then in a log.
+"""
 
 import contextlib
 import sys
 import time
 from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from beaver_ftc.studies.sweep.run import Tally
 
 PATIENCE_S = 1.0
+TERMINAL_S, LOG_S = 0.2, 30.0  # time between two lines of a sweep
 
 
 @contextlib.contextmanager
@@ -39,3 +48,63 @@ class _Bar:
         progress = self._stack.enter_context(Progress(console=Console(stderr=True), transient=True))
         task = progress.add_task(self._label, total=1.0)
         return lambda done: progress.update(task, completed=done)
+
+
+@contextlib.contextmanager
+def live_progress(name: str) -> Iterator[Callable[["Tally"], None]]:
+    """Yield what a sweep tells its tally to."""
+    progress = _Progress(name, sys.stderr.isatty())
+    try:
+        yield progress
+    finally:
+        progress.end()
+
+
+class _Progress:
+    def __init__(self, name: str, terminal: bool) -> None:
+        self._name, self._terminal = name, terminal
+        self._last = self._begun = time.monotonic()
+        self._first: int | None = None
+        self._shown = ""
+
+    def __call__(self, tally: "Tally") -> None:
+        now = time.monotonic()
+        if self._first is None:
+            self._first, self._begun = tally.done, now
+        if now - self._last < (TERMINAL_S if self._terminal else LOG_S):
+            return
+        self._last = now
+        self._show(self.line(tally, now))
+
+    def line(self, tally: "Tally", now: float) -> str:
+        """Done, rate, time left, running detection rate."""
+        assert self._first is not None
+        rate = (tally.done - self._first) / max(now - self._begun, 1e-9)
+        left = f", {_span((tally.total - tally.done) / rate)} left" if rate > 0 else ""
+        parts = [f"{self._name}: {tally.done} of {tally.total} flights, {rate:.0f}/s{left}"]
+        if tally.faulted:
+            parts.append(f"detected {tally.detected / tally.faulted:.1%}")
+        if tally.failed:
+            parts.append(f"{tally.failed} not flown")
+        return ", ".join(parts)
+
+    def _show(self, line: str) -> None:
+        if self._terminal:
+            sys.stderr.write("\r" + line.ljust(len(self._shown)))
+            self._shown = line
+        else:
+            sys.stderr.write(line + "\n")
+        sys.stderr.flush()
+
+    def end(self) -> None:
+        """Leave the terminal's line clean."""
+        if self._shown:
+            sys.stderr.write("\r" + " " * len(self._shown) + "\r")
+            sys.stderr.flush()
+
+
+def _span(seconds: float) -> str:
+    if seconds < 100:
+        return f"{seconds:.0f} s"
+    minutes = round(seconds / 60)
+    return f"{minutes} min" if minutes < 100 else f"{minutes // 60} h {minutes % 60:02d} min"

@@ -1,6 +1,9 @@
 """`beaver-ftc run`: fly scenarios, keep the results, say the verdict."""
 
+import sys
+import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from enum import StrEnum
 from functools import partial
 from pathlib import Path
@@ -8,8 +11,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from beaver_ftc.cli.inputs import complete_names, load_all
+from beaver_ftc.cli.inputs import (
+    JunitOption,
+    NoReportOption,
+    ResultsOption,
+    ScenariosArgument,
+    load_all,
+    taking,
+)
 from beaver_ftc.cli.output import Format, FormatOption, complain, emit, emit_json, report, unexpected
+from beaver_ftc.cli.progress import progress_bar
 from beaver_ftc.documents.errors import BadInput, BeaverFtcError
 
 if TYPE_CHECKING:
@@ -27,56 +38,41 @@ class Recording(StrEnum):
     ardupilot = "ardupilot"
 
 
-def command(
-    scenarios: Annotated[
-        list[str],
-        typer.Argument(
-            metavar="SCENARIO",
-            help="A file, or the name of a built-in scenario.",
-            autocompletion=complete_names,
-        ),
-    ],
-    out: Annotated[Path, typer.Option(help="Folder for the results, one folder a scenario in it.")] = Path(
-        "runs"
-    ),
-    format: FormatOption = Format.text,
-    no_report: Annotated[bool, typer.Option("--no-report", help="Skip report.html and the figures.")] = False,
-    junit: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Also write the verdict as JUnit XML, for CI.")
-    ] = None,
-    csv: Annotated[bool, typer.Option("--csv", help="Also write the log as log.csv.")] = False,
-    acmi: Annotated[bool, typer.Option("--acmi", help="Also write flight.acmi, for Tacview.")] = False,
+@dataclass(frozen=True)
+class Options:
+    """What is asked of it."""
+
+    scenarios: ScenariosArgument
+    out: ResultsOption = Path("runs")
+    format: FormatOption = Format.text
+    no_report: NoReportOption = False
+    junit: JunitOption = None
+    csv: Annotated[bool, typer.Option("--csv", help="Also write the log as log.csv.")] = False
+    acmi: Annotated[bool, typer.Option("--acmi", help="Also write flight.acmi, for Tacview.")] = False
     recording: Annotated[
         Recording | None,
         typer.Option("--as", help="Also write the log as a recorder on board would have, with vehicle.yaml."),
-    ] = None,
+    ] = None
     flightgear: Annotated[
         str | None, typer.Option(metavar="HOST:PORT", help="Show it in FlightGear, at the pace of the clock.")
-    ] = None,
-) -> None:
+    ] = None
+
+
+@taking(Options)
+def command(options: Options) -> None:
     """Fly scenarios and say the verdict.
 
     With --format json: the metrics and `folder` of the run (or its `error`), with `runs`, a list of it; of
     several scenarios {"passed": ..., "runs": [...]}.
     """
     try:
-        loaded = load_all(scenarios)
+        loaded = load_all(options.scenarios)
     except BadInput as error:
-        if format is Format.json:
+        if options.format is Format.json:
             emit_json({"passed": False, "runs": [], "errors": str(error).splitlines()})
-        if junit is not None:
-            _write_junit([{"scenario": "scenarios", "error": str(error)}], junit)
+        _write_junit([{"scenario": "scenarios", "error": str(error)}], options.junit)
         raise
-    exports = [name for name, wanted in (("csv", csv), ("acmi", acmi)) if wanted]
-    run_one = partial(
-        _run_one,
-        out=out,
-        with_report=not no_report,
-        exports=exports,
-        prepare=_shown(flightgear),
-        recording=recording.value if recording else None,
-    )
-    raise typer.Exit(_run_all(loaded, run_one, format, junit))
+    raise typer.Exit(_run_all(loaded, options))
 
 
 def _shown(flightgear: str | None) -> "Prepare | None":
@@ -102,20 +98,14 @@ def _address(given: str) -> tuple[str, int]:
     return host, int(port)
 
 
-def _run_all(
-    scenarios: list["Scenario"],
-    run_one: Callable[["Scenario"], dict[str, Any]],
-    format: Format,
-    junit: Path | None,
-) -> int:
+def _run_all(scenarios: list["Scenario"], options: Options) -> int:
     """Fly one after the other; one that fails does not stop the rest. Returns the worst exit status."""
-    import time
-
+    prepare = _shown(options.flightgear)
     runs, took_s, status = [], [], 0
     for scenario in scenarios:
         began = time.perf_counter()
         try:
-            document = run_one(scenario)
+            document = _run_one(scenario, options, prepare)
         except Exception as error:
             failure = error if isinstance(error, BeaverFtcError) else unexpected(error)
             status = max(status, report(failure))
@@ -125,43 +115,35 @@ def _run_all(
             took_s.append(time.perf_counter() - began)
         runs.append(document)
         status = max(status, 0 if document["passed"] else 1)
-        if format is Format.text:
+        if options.format is Format.text:
             _say(document)
-    if junit is not None:
-        _write_junit([run | {"took_s": each} for run, each in zip(runs, took_s, strict=True)], junit)
-    if format is Format.json:
+    _write_junit([run | {"took_s": each} for run, each in zip(runs, took_s, strict=True)], options.junit)
+    if options.format is Format.json:
         first = runs[0] if len(runs) == 1 else {}
         emit_json(first | {"passed": status == 0, "runs": runs})
     return status
 
 
-def _write_junit(runs: list[dict[str, Any]], junit: Path) -> None:
+def _write_junit(runs: list[dict[str, Any]], junit: Path | None) -> None:
     from beaver_ftc.results.junit import write_junit
 
-    write_junit(runs, junit)
+    if junit is not None:
+        write_junit(runs, junit)
 
 
-def _run_one(
-    scenario: "Scenario",
-    out: Path,
-    with_report: bool,
-    exports: list[str],
-    prepare: "Prepare | None",
-    recording: str | None,
-) -> dict[str, Any]:
-    from beaver_ftc.cli.progress import progress_bar
+def _run_one(scenario: "Scenario", options: Options, prepare: "Prepare | None") -> dict[str, Any]:
     from beaver_ftc.results.run import run
 
     for warning in scenario.warnings():
         complain(f"{scenario.name}: warning: {warning}")
+    exports = [name for name, wanted in (("csv", options.csv), ("acmi", options.acmi)) if wanted]
+    recording = options.recording.value if options.recording else None
     with progress_bar(scenario.name) as progress:
-        document = run(scenario, out, with_report, progress, exports, prepare, recording)
-    return document | {"folder": str(out / scenario.name)}
+        document = run(scenario, options.out, not options.no_report, progress, exports, prepare, recording)
+    return document | {"folder": str(options.out / scenario.name)}
 
 
 def _say(document: dict[str, Any]) -> None:
-    import sys
-
     from beaver_ftc.results.verdict import verdict_text
 
     emit(verdict_text(document, document["folder"], colour=sys.stdout.isatty()))

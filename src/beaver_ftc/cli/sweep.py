@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from beaver_ftc.cli.inputs import JunitOption, NoReportOption
 from beaver_ftc.cli.output import Format, FormatOption, complain, emit, emit_json, unexpected
 from beaver_ftc.documents.errors import BadInput, BeaverFtcError
 
@@ -66,10 +67,8 @@ def command(
         Objective | None, typer.Option(help="Look for the worst flight instead of sampling.")
     ] = None,
     format: FormatOption = Format.text,
-    no_report: Annotated[bool, typer.Option("--no-report", help="Skip report.html and the figures.")] = False,
-    junit: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Also write the verdict as JUnit XML, for CI.")
-    ] = None,
+    no_report: NoReportOption = False,
+    junit: JunitOption = None,
 ) -> None:
     """Fly a sweep: many flights of one scenario, varied.
 
@@ -136,7 +135,7 @@ def _keep(asked: str) -> "Keep":
 
 
 def _fly(sweep: "Sweep", options: "Options", format: Format) -> dict[str, Any]:
-    from beaver_ftc.cli.sweep_progress import live_progress
+    from beaver_ftc.cli.progress import live_progress
     from beaver_ftc.studies.sweep.run import named_for, run_sweep
     from beaver_ftc.studies.sweep.words import summary_text, verdict
 

@@ -1,11 +1,11 @@
 """`beaver-ftc trim`: steady straight flight at a given condition."""
 
 import math
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from beaver_ftc.cli.output import Format, FormatOption, emit, emit_json
+from beaver_ftc.cli.output import Format, FormatOption, answer
 
 if TYPE_CHECKING:
     from beaver_ftc.plant.trim import TrimPoint
@@ -49,14 +49,8 @@ def command(
     from beaver_ftc.plant.conditions import trim
 
     point = trim(scenario, **{key: value for key, value in asked.items() if value is not None})
-    if format is Format.json:
-        emit_json(_document(point))
-    else:
-        emit(_table(point))
-
-
-def _document(point: "TrimPoint") -> dict[str, Any]:
-    return point.as_dict() | {"residual": dict(zip(_RESIDUALS, point.residual, strict=True))}
+    residual = dict(zip(_RESIDUALS, point.residual, strict=True))
+    answer(format, point.as_dict() | {"residual": residual}, lambda: _table(point))
 
 
 def _table(point: "TrimPoint") -> str:

@@ -1,7 +1,7 @@
 import pytest
 
-from beaver_ftc.cli import sweep_progress
-from beaver_ftc.cli.sweep_progress import live_progress
+from beaver_ftc.cli import progress as shown
+from beaver_ftc.cli.progress import live_progress
 from beaver_ftc.studies.sweep.run import Tally
 
 
@@ -15,7 +15,7 @@ class Clock:
 @pytest.fixture
 def clock(monkeypatch):
     clock = Clock()
-    monkeypatch.setattr(sweep_progress, "time", clock)
+    monkeypatch.setattr(shown, "time", clock)
     return clock
 
 
@@ -38,4 +38,4 @@ def test_a_log_is_not_flooded(clock, capsys):
 
 @pytest.mark.parametrize(("seconds", "said"), [(5, "5 s"), (150, "2 min"), (20_000, "5 h 33 min")])
 def test_time_left_is_said_as_people_say_it(seconds, said):
-    assert sweep_progress._span(seconds) == said
+    assert shown._span(seconds) == said

@@ -1,17 +1,19 @@
-"""`beaver-ftc list`: what there is to choose from."""
+"""`beaver-ftc list`, `show` and `schema`: what there is to choose from, and what a file may say."""
 
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from beaver_ftc.cli.output import Format, FormatOption, emit, emit_json
+from beaver_ftc.cli.inputs import complete_names
+from beaver_ftc.cli.output import Format, FormatOption, answer, emit, emit_json
 from beaver_ftc.documents.errors import BadInput, suggestion
 
 Entries = list[dict[str, str]]
 
 
-def command(
+def list_choices(
     kind: Annotated[str | None, typer.Argument(metavar="KIND", help="One kind only, e.g. aircraft.")] = None,
     format: FormatOption = Format.text,
 ) -> None:
@@ -24,10 +26,7 @@ def command(
     if kind is not None and kind not in available:
         raise BadInput(f"there is no list of {kind[:60]!r}{suggestion(kind, available)}")
     available = available if kind is None else {kind: available[kind]}
-    if format is Format.json:
-        emit_json(available)
-    else:
-        emit("\n\n".join(_section(kind, entries) for kind, entries in available.items()))
+    answer(format, available, lambda: "\n\n".join(map(_section, available, available.values())))
 
 
 def _available() -> dict[str, Entries]:
@@ -36,15 +35,15 @@ def _available() -> dict[str, Entries]:
     from beaver_ftc.scenario.loader import builtin_scenarios
     from beaver_ftc.scenario.schema import Scenario
 
-    schema = Scenario.model_json_schema()["$defs"]
+    parts = Scenario.model_json_schema()["$defs"]
     return {
         "scenarios": [{"name": name, "description": says.strip()} for name, says, _ in builtin_scenarios()],
         "sweeps": _sweeps(),
         "aircraft": _aircraft(),
         "schemes": _registered(DETECTORS),
         "laws": _registered(LAWS),
-        "faults": [entry for key in ("actuator", "sensor") for entry in _faults(schema, key)],
-        "signals": [_kind(schema, name, part) for name, part in schema["Signal"]["properties"].items()],
+        "faults": [entry for key in ("actuator", "sensor") for entry in _faults(parts, key)],
+        "signals": [_kind(parts, name, part) for name, part in parts["Signal"]["properties"].items()],
     }
 
 
@@ -105,3 +104,45 @@ def _section(kind: str, entries: Entries) -> str:
     width = max((len(entry["name"]) for entry in entries), default=0)
     lines = (f"  {entry['name']:{width}}  {entry['description']}".rstrip() for entry in entries)
     return "\n".join((kind, *lines))
+
+
+def show(
+    name: Annotated[
+        str,
+        typer.Argument(metavar="NAME", help="A built-in scenario or sweep.", autocompletion=complete_names),
+    ],
+) -> None:
+    """Print a built-in scenario or sweep.
+
+    What is printed is a file that `run` or `sweep` takes.
+    """
+    emit(_file(name).read_text(encoding="utf-8"))
+
+
+def _file(name: str) -> Path:
+    from beaver_ftc.scenario.builtin import builtin_names, builtin_path
+    from beaver_ftc.scenario.sweep_loader import builtin_sweeps, resolve_sweep
+
+    if name in builtin_names():
+        return builtin_path(name)
+    if name in builtin_sweeps():
+        return resolve_sweep(name)
+    known = [*builtin_names(), *builtin_sweeps()]
+    raise BadInput(f"show: no built-in scenario or sweep {name[:100]!r}{suggestion(name, known)}")
+
+
+def schema(
+    sweep: Annotated[bool, typer.Option("--sweep", help="Of a sweep file instead of a scenario.")] = False,
+) -> None:
+    """Print the JSON Schema of a scenario.
+
+    Editors that know it complete and check a scenario as it is written.
+    """
+    if sweep:
+        from beaver_ftc.scenario.sweep_schema import sweep_json_schema
+
+        emit_json(sweep_json_schema())
+        return
+    from beaver_ftc.scenario.schema import Scenario
+
+    emit_json({"$schema": "https://json-schema.org/draft/2020-12/schema", **Scenario.model_json_schema()})

@@ -1,15 +1,57 @@
-"""`beaver-ftc diagnose`: what broke in a recorded flight, when, and what the log cannot tell."""
+"""`beaver-ftc identify` and `diagnose`: from recorded flights to a model, and to what broke in a flight."""
 
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from beaver_ftc.cli.output import Format, FormatOption, emit, emit_json
+from beaver_ftc.cli.output import Format, FormatOption, answer
+from beaver_ftc.documents.errors import BadInput
+
+FlightsArgument = Annotated[list[Path], typer.Argument(metavar="FLIGHT", help="Recorded flights.")]
+ReaderOption = Annotated[
+    str | None, typer.Option(help="table, alfa, ulog or ardupilot, where it is not evident.")
+]
 
 
-def command(
-    flights: Annotated[list[Path], typer.Argument(metavar="FLIGHT", help="Recorded flights.")],
+def identify(
+    flights: FlightsArgument,
+    vehicle: Annotated[str, typer.Option(metavar="FILE", help="Vehicle file, or the built-in `alfa`.")],
+    out: Annotated[Path, typer.Option(metavar="MODEL", help="The model file to write.")],
+    reader: ReaderOption = None,
+    format: FormatOption = Format.text,
+) -> None:
+    """Identify a vehicle from recorded flights.
+
+    Writes a model file for `diagnose`. Fitted are the flights' healthy parts, and faulty ones whose
+    effectiveness the labels tell. What the fit did not see tells how good it is: in the model file, and
+    as a page beside it (MODEL with .html).
+    """
+    from beaver_ftc.flights.identification import identify, summary
+    from beaver_ftc.flights.inputs import load_flights
+    from beaver_ftc.flights.model import as_text, write_text
+    from beaver_ftc.flights.model_page import check_page, render_model
+    from beaver_ftc.flights.vehicle import load_vehicle
+
+    page = out.with_suffix(".html")
+    check_page(page)
+    described = load_vehicle(vehicle)
+    loaded = load_flights(flights, described, reader)
+    model = identify(loaded, described)
+    shown = render_model(loaded, model)
+    write_text(out, as_text(model))
+    write_text(page, shown)
+    document = {
+        "model": str(out),
+        "page": str(page),
+        "identified": model.identified,
+        "settings": model.settings.model_dump(),
+    }
+    answer(format, document, lambda: f"{summary(model)}\nmodel: {out}\npage: {page}")
+
+
+def diagnose(
+    flights: FlightsArgument,
     model: Annotated[
         Path | None,
         typer.Option(metavar="MODEL", help="The model file `identify` has written; none for our own logs."),
@@ -21,9 +63,7 @@ def command(
     detector: Annotated[
         str, typer.Option(metavar="NAME", help="Who diagnoses: bank-of-filters, or a rival by its name.")
     ] = "bank-of-filters",
-    reader: Annotated[
-        str | None, typer.Option(help="table, alfa, ulog or ardupilot, where it is not evident.")
-    ] = None,
+    reader: ReaderOption = None,
     format: FormatOption = Format.text,
 ) -> None:
     """Diagnose recorded flights with an identified model.
@@ -45,18 +85,14 @@ def command(
         _diagnose(flight, known, out, score, detector)
         for flight in load_flights(flights, known.vehicle, reader)
     ]
-    if format is Format.json:
-        emit_json({"flights": verdicts})
-    else:
-        emit(
-            "\n".join(
-                f"{as_text(verdict)}\n  report: {verdict['folder']}/report.html" for verdict in verdicts
-            )
-        )
+    answer(
+        format,
+        {"flights": verdicts},
+        lambda: "\n".join(f"{as_text(each)}\n  report: {each['folder']}/report.html" for each in verdicts),
+    )
 
 
 def _replay(flights: list[Path], out: Path, format: Format) -> None:
-    from beaver_ftc.documents.errors import BadInput
     from beaver_ftc.flights.replay import as_text, is_own_log, replay, write_replay
 
     others = [path for path in flights if not is_own_log(path)]
@@ -66,10 +102,7 @@ def _replay(flights: list[Path], out: Path, format: Format) -> None:
     done = [replay(path) for path in flights]
     folders = [write_replay(out, one) for one in done]
     verdicts = [one.verdict | {"folder": str(at)} for one, at in zip(done, folders, strict=True)]
-    if format is Format.json:
-        emit_json({"flights": verdicts})
-    else:
-        emit("\n".join(map(as_text, verdicts)))
+    answer(format, {"flights": verdicts}, lambda: "\n".join(map(as_text, verdicts)))
 
 
 def _diagnose(samples: Any, model: Any, out: Path, scored: bool, detector: str) -> dict[str, Any]:

@@ -1,0 +1,160 @@
+"""Studies that are one call: `bench`, `linearise`, `derive`, `reproduce`, `verify` and `detectability`."""
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from beaver_ftc.cli.inputs import ScenarioArgument, WorkersOption
+from beaver_ftc.cli.output import Format, FormatOption, answer, complain
+from beaver_ftc.cli.progress import progress_bar
+
+
+def bench(
+    rounds: Annotated[int, typer.Option(min=3, max=10000, help="How often everything is timed.")] = 60,
+    no_parts: Annotated[
+        bool, typer.Option("--no-parts", help="Time the whole loop only, not part by part.")
+    ] = False,
+    format: FormatOption = Format.text,
+) -> None:
+    """Time the closed loop against the bare aircraft.
+
+    Side by side, and part by part. The first time, the frame is compiled once more for each part that
+    is taken out: about two minutes.
+    """
+    from beaver_ftc.studies.bench.measure import bench
+    from beaver_ftc.studies.bench.text import text_of
+
+    document = bench(rounds, not no_parts, say=lambda what: complain(f"timing {what}"))
+    answer(format, document, lambda: text_of(document))
+
+
+def linearise(
+    scenario: Annotated[
+        str | None, typer.Argument(metavar="SCENARIO", help="Take sensors, actuators and law from it.")
+    ] = None,
+    format: FormatOption = Format.text,
+) -> None:
+    """Linearise the closed loop and print its margins.
+
+    Over the airspeeds of the envelope. Aircraft, actuators, sensors' lag and delay, frame rate and the
+    default law, broken at each surface in turn; healthy, and with losses of each surface that the law
+    knows.
+    """
+    from beaver_ftc.scenario.given import load
+    from beaver_ftc.studies.margins import as_document, as_text, study
+
+    given = load({} if scenario is None else scenario)
+    asked = given.control.gain_margin_db, given.control.phase_margin_deg
+    found = study(given)
+    answer(format, as_document(found, asked), lambda: as_text(found, asked))
+
+
+def derive(
+    aircraft: Annotated[
+        str,
+        typer.Argument(
+            metavar="AIRCRAFT",
+            help="jsbsim:NAME of the installed jsbsim package, a JSBSim model, or an aircraft's folder.",
+        ),
+    ],
+    envelope: Annotated[
+        Path | None,
+        typer.Option(help="YAML with airspeed_mps, alpha_deg, altitude_m, sideslip_deg: where to sample."),
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder to write the aircraft's folder into, if not the cache.")
+    ] = None,
+    format: FormatOption = Format.text,
+) -> None:
+    """Derive an aircraft's design model from JSBSim.
+
+    And measure the error that is left. It samples the aircraft over its envelope, fits sparse terms,
+    and checks them on states the fit did not see: the largest error becomes the declared bound.
+    Afterwards `aircraft: jsbsim:NAME` flies.
+    """
+    from beaver_ftc.studies.derive.run import derive
+    from beaver_ftc.studies.derive.text import document_of, text_of
+
+    made = derive(aircraft, out, envelope, tell=lambda what: complain(f"deriving: {what}"))
+    document = document_of(made)
+    answer(format, document, lambda: text_of(document))
+
+
+def reproduce(
+    out: Annotated[Path, typer.Option(help="Folder for the results: `reproduction` in it.")] = Path("runs"),
+    workers: Annotated[int, typer.Option(min=1, help="Processes for the sensitivity study.")] = 2,
+    format: FormatOption = Format.text,
+) -> None:
+    """Fly the published study and judge its statements.
+
+    Every figure, and every statement with our number and a verdict.
+
+    Exit status 1 if a statement is not borne out.
+
+    Stopped or killed, it goes on where it was with the same command.
+    """
+    from beaver_ftc.studies.reproduce.run import NAME, reproduce
+    from beaver_ftc.studies.reproduce.text import as_text
+
+    with progress_bar("changes to what the paper leaves open") as progress:
+        document = reproduce(out, workers, progress)
+    folder = str(out / NAME)
+    answer(format, document | {"folder": folder}, lambda: as_text(document, folder, sys.stdout.isatty()))
+    raise typer.Exit(0 if document["passed"] else 1)
+
+
+def verify(
+    hours: Annotated[float, typer.Option(min=0.0, max=1e6, help="Flight hours without a fault.")] = 2.0,
+    faults: Annotated[int, typer.Option(min=0, max=10_000_000, help="Flights with one random fault.")] = 200,
+    seed: Annotated[int, typer.Option(min=0, help="Of everything drawn.")] = 1,
+    workers: WorkersOption = None,
+    out: Annotated[
+        Path, typer.Option(help="Folder of the flights flown; a campaign goes on from it.")
+    ] = Path("runs/verification"),
+    steps: Annotated[
+        bool, typer.Option("--steps", help="Also fly every step from the published scheme on.")
+    ] = False,
+    format: FormatOption = Format.text,
+) -> None:
+    """Fly at random inside all that is declared: what breaks?
+
+    Counts, with exact confidence limits, broken promises: false alarms, true faults excluded, wrong
+    isolations and detections later than guaranteed plus a frame, for the published and the sharpened
+    scheme on the same flights. Stopped, it goes on where it was. Exit status 1 if a promise is broken.
+    """
+    from beaver_ftc.studies.engine.processes import cores
+    from beaver_ftc.studies.verify.campaign import Campaign, conduct
+    from beaver_ftc.studies.verify.summary import summarise, summary_text
+
+    with progress_bar("verify") as progress:
+        rows = conduct(Campaign(hours, faults, seed, steps), out, workers or cores(), progress)
+    document = summarise(rows)
+    answer(format, {"seed": seed, **document}, lambda: summary_text(document))
+    raise typer.Exit(0 if document["kept"] else 1)
+
+
+def detectability(
+    scenario: ScenarioArgument,
+    out: Annotated[Path, typer.Option(help="Folder for the map, the CSV and the JSON.")] = Path("runs"),
+    format: FormatOption = Format.text,
+) -> None:
+    """Survey the smallest fault that is certain to be found.
+
+    Over speed, altitude and excitation: the smallest loss certain to be detected, and to be isolated.
+
+    Certain: within 0.5 s and 1 s, whatever the declared uncertainty does, along the scenario's references
+    scaled by 0.25 to 2; `median` where the fault strikes at half of all instants.
+
+    Stopped or killed, it goes on where it was with the same command.
+    """
+    from beaver_ftc.scenario.loader import load_scenario
+    from beaver_ftc.studies.detectability import document, run_survey, survey_name, text
+
+    loaded = load_scenario(scenario)
+    name = survey_name(loaded)
+    with progress_bar(name) as progress:
+        rows = run_survey(out, loaded, progress=progress)
+    found = document(loaded.name, rows) | {"folder": str(out / name)}
+    answer(format, found, lambda: f"{text(rows)}\n{out / name}")

@@ -18,7 +18,7 @@ from functools import partial
 from pathlib import Path
 
 from beaver_ftc.scenario.sweep_loader import Sweep, load_sweep_text
-from beaver_ftc.studies.engine.crew import ThisProcess, Work
+from beaver_ftc.studies.engine.workers import ThisProcess, Work
 from beaver_ftc.studies.sweep import run
 from beaver_ftc.studies.sweep.flying import Job, fly_one
 from beaver_ftc.studies.sweep.sampling import Assignment, Plan
@@ -51,7 +51,7 @@ def sweep_of(runs: int) -> Sweep:
 def go_on(sweep: Sweep, out: Path, until: float) -> None:
     """Land rows until a share of them is there, then end this process as a kill would; or conclude."""
     template = fly_one(Job(sweep), Plan(sweep).assignments([0])[0])
-    run._crew = lambda *_: ThisProcess(Work(partial(made_up, template)))
+    run._workers = lambda *_: ThisProcess(Work(partial(made_up, template)))
     began = time.perf_counter()
 
     def progress(tally: run.Tally) -> None:

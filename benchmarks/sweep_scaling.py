@@ -21,9 +21,8 @@ from functools import partial
 from pathlib import Path
 
 from beaver_ftc.scenario.sweep_loader import Sweep, load_sweep
-from beaver_ftc.studies.engine.crew import Crew, Row, Task, Work
-from beaver_ftc.studies.engine.parts import Parts
-from beaver_ftc.studies.engine.processes import one_thread_each
+from beaver_ftc.studies.engine.store import Parts
+from beaver_ftc.studies.engine.workers import Row, Task, Work, Workers, one_thread_each
 from beaver_ftc.studies.sweep.flying import Job, fly_one, scenario_of
 from beaver_ftc.studies.sweep.run import Options, Tally, run_sweep
 from beaver_ftc.studies.sweep.sampling import Assignment, Plan
@@ -144,16 +143,16 @@ def weigh_batches() -> None:
 
     The rows are of real flights, flown beforehand: a task only gives them back.
     """
-    from beaver_ftc.studies.engine.ray_crew import RayCrew
+    from beaver_ftc.studies.engine.ray_workers import RayWorkers
 
     sweep = sweep_of(LONG)
     size = batch_size(sweep)
     cases = tuple(Plan(sweep).assignments(range(size)))
     rows = [fly_one(Job(sweep), case) for case in cases]
-    crew = RayCrew(Work(partial(_flown_before, rows)), None, None)
-    _through(crew, cases, 4)  # a worker's first task loads the code
-    print(f"batch of {size} there and back {_each(lambda: _through(crew, cases, BATCHES))}")
-    crew.close()
+    workers = RayWorkers(Work(partial(_flown_before, rows)), None, None)
+    _through(workers, cases, 4)  # a worker's first task loads the code
+    print(f"batch of {size} there and back {_each(lambda: _through(workers, cases, BATCHES))}")
+    workers.close()
     with tempfile.TemporaryDirectory() as folder:
         parts = Parts(Path(folder), RowsAsParquet(sweep))
         print(f"landing it                  {_each(lambda: [parts.land(k, rows) for k in range(BATCHES)])}")
@@ -174,14 +173,14 @@ def _each(work: Callable[[], object]) -> str:
     return f"{1e3 * wall / BATCHES:8.1f} ms, {1e3 * own / BATCHES:.1f} ms of this process's processor"
 
 
-def _through(crew: Crew, cases: tuple[Assignment, ...], batches: int) -> None:
-    """Send batches through a crew, as many at a time as a campaign does."""
+def _through(workers: Workers, cases: tuple[Assignment, ...], batches: int) -> None:
+    """Send batches through workers, as many at a time as a campaign does."""
     sent = back = 0
     while back < batches:
-        while sent < batches and sent - back < crew.slots:
-            crew.submit(Task(sent, cases))
+        while sent < batches and sent - back < workers.slots:
+            workers.submit(Task(sent, cases))
             sent += 1
-        back += len(crew.outcomes(1.0))
+        back += len(workers.outcomes(1.0))
 
 
 def main() -> None:

@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from beaver_ftc.loop.loop import fly
-from beaver_ftc.studies.verify.draw import Draw
+from beaver_ftc.studies.verify import Draw
 from flying import PUBLISHED_UNCERTAINTY, flown, loss
 
 NOTHING_DECLARED = {

@@ -56,7 +56,7 @@ def command(
     Stopped or killed, it goes on where it was with the same command.
     """
     from beaver_ftc.cli.progress import progress_bar
-    from beaver_ftc.studies.engine.processes import cores
+    from beaver_ftc.studies.engine.workers import cores
     from beaver_ftc.studies.power.contenders import contenders
     from beaver_ftc.studies.power.grid import GRIDS
     from beaver_ftc.studies.power.run import NAME, run_power

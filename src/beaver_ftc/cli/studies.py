@@ -124,9 +124,8 @@ def verify(
     isolations and detections later than guaranteed plus a frame, for the published and the sharpened
     scheme on the same flights. Stopped, it goes on where it was. Exit status 1 if a promise is broken.
     """
-    from beaver_ftc.studies.engine.processes import cores
-    from beaver_ftc.studies.verify.campaign import Campaign, conduct
-    from beaver_ftc.studies.verify.summary import summarise, summary_text
+    from beaver_ftc.studies.engine.workers import cores
+    from beaver_ftc.studies.verify import Campaign, conduct, summarise, summary_text
 
     with progress_bar("verify") as progress:
         rows = conduct(Campaign(hours, faults, seed, steps), out, workers or cores(), progress)

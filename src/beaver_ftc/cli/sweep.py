@@ -76,7 +76,7 @@ def command(
     With --format json: the summary.
     """
     if backend is Backend.local and replay is None:
-        from beaver_ftc.studies.engine.processes import start_early
+        from beaver_ftc.studies.engine.workers import start_early
 
         start_early()
     from beaver_ftc.studies.sweep.run import Options

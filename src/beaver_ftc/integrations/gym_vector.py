@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.integrations.gym import BeaverEnv
-from beaver_ftc.studies.engine import processes
+from beaver_ftc.studies.engine.workers import context, cores, single_threaded
 
 _STEP, _NOTHING = b"", b""  # to a worker, and from one that has no more to say
 _PATIENCE_S = 5.0  # for a worker to end by itself
@@ -63,11 +63,11 @@ class BeaverVectorEnv(gymnasium.vector.VectorEnv[NDArray[np.float64], NDArray[np
         self.action_space = batch_space(one.action_space, num_envs)
         self.observation_space = batch_space(one.observation_space, num_envs)
         sizes = one.action_space.shape[0], one.observation_space.shape[0]
-        block = processes.context().RawArray(c_double, num_envs * (sum(sizes) + 3))
+        block = context().RawArray(c_double, num_envs * (sum(sizes) + 3))
         self._shared = _Shared(block, sizes, slice(None))
-        parts = _parts(num_envs, min(num_envs, workers or processes.cores()))
+        parts = _parts(num_envs, min(num_envs, workers or cores()))
         options |= {"scenario": one.scenario}
-        self._crew: list[_Worker | _Here] = [
+        self._workers: list[_Worker | _Here] = [
             *(_Worker(block, sizes, part, options) for part in parts[:-1]),
             _Here(block, sizes, parts[-1], options),  # comes last, when all others fly
         ]
@@ -82,7 +82,7 @@ class BeaverVectorEnv(gymnasium.vector.VectorEnv[NDArray[np.float64], NDArray[np
             seeds = [seeds + i for i in range(self.num_envs)]
         if len(seeds) != self.num_envs:
             raise BadInput(f"seed: {len(seeds)} of them, allowed: {self.num_envs}, or one")
-        for worker in self._crew:
+        for worker in self._workers:
             worker.tell(pickle.dumps(seeds[worker.part]))
         infos = self._answers()
         return self._shared.seen.copy(), infos
@@ -95,7 +95,7 @@ class BeaverVectorEnv(gymnasium.vector.VectorEnv[NDArray[np.float64], NDArray[np
         if given.shape != shared.actions.shape:
             raise BadInput(f"actions: shape {given.shape}, allowed: {shared.actions.shape}")
         shared.actions[:] = given
-        for worker in self._crew:
+        for worker in self._workers:
             worker.tell(_STEP)
         infos = self._answers()
         ended = shared.terminated != 0.0, shared.truncated != 0.0
@@ -103,14 +103,14 @@ class BeaverVectorEnv(gymnasium.vector.VectorEnv[NDArray[np.float64], NDArray[np
 
     def close_extras(self, **kwargs: Any) -> None:
         """End the processes."""
-        for worker in getattr(self, "_crew", ()):
+        for worker in getattr(self, "_workers", ()):
             worker.end()
 
     def _answers(self) -> dict[str, Any]:
         """Wait for all; what they have to say, by Gymnasium's rule, but a document stays one."""
         infos: dict[str, Any] = {}
         failed: Exception | None = None
-        for worker in self._crew:
+        for worker in self._workers:
             answer = worker.answer()
             if isinstance(answer, Exception):
                 failed = answer
@@ -195,12 +195,10 @@ class _Worker:
 
     def __init__(self, block: Any, sizes: tuple[int, int], part: slice, options: dict[str, Any]) -> None:
         self.part = part
-        context = processes.context()
-        self._line, far_end = context.Pipe()
-        self.process = context.Process(
-            target=_serve, args=(far_end, block, sizes, part, options), daemon=True
-        )
-        with processes.single_threaded():
+        start = context()
+        self._line, far_end = start.Pipe()
+        self.process = start.Process(target=_serve, args=(far_end, block, sizes, part, options), daemon=True)
+        with single_threaded():
             self.process.start()
         far_end.close()
 

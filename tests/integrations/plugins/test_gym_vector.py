@@ -86,7 +86,7 @@ def test_counts_that_are_none_are_said(given):
 def test_a_process_that_dies_is_said():
     two = BeaverVectorEnv(2, scenario=scenario(**FLOWN), workers=2)
     two.reset()
-    os.kill(two._crew[0].process.pid, signal.SIGKILL)
+    os.kill(two._workers[0].process.pid, signal.SIGKILL)
     with pytest.raises(SimulationFailed, match="has ended"):
         two.step(np.zeros((2, 4)))
 
@@ -96,7 +96,7 @@ def test_what_goes_wrong_in_a_process_is_raised_here_and_ends_them_all():
     two.reset()
     with pytest.raises(BadInput, match="allowed: 4 finite numbers"):
         two.step([[np.nan] * 4, [0.0] * 4])
-    assert not two._crew[0].process.is_alive()
+    assert not two._workers[0].process.is_alive()
 
 
 def test_one_process_alone_is_this_one(three):

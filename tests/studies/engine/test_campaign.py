@@ -1,11 +1,11 @@
-"""The engine with crews that lose workers, shuffle their outcomes, or die over one flight."""
+"""The engine with workers that are lost, shuffle their outcomes, or die over one flight."""
 
 import random
 
 import pytest
 
-from beaver_ftc.studies.engine.campaign import Batch, Campaign
-from beaver_ftc.studies.engine.crew import Case, Outcome, Task
+from beaver_ftc.studies.engine.study import Batch, Campaign
+from beaver_ftc.studies.engine.workers import Case, Outcome, Task
 
 
 class Numbers:
@@ -29,7 +29,7 @@ class Numbers:
 
 
 class Unreliable:
-    """A crew that loses a share of its tasks, and every one with a deadly flight in it."""
+    """Workers who lose a share of its tasks, and every one with a deadly flight in it."""
 
     def __init__(self, slots: int, loses: float = 0.0, deadly: frozenset[int] = frozenset()) -> None:
         self.slots, self._loses, self._deadly = slots, loses, deadly
@@ -57,8 +57,8 @@ def lost(case, why):
     return {"run": case.run, "status": "crashed", "reason": why}
 
 
-def fly(source, crew):
-    Campaign(source, crew, lost).fly()
+def fly(source, workers):
+    Campaign(source, workers, lost).fly()
     return source
 
 
@@ -78,8 +78,8 @@ def test_lost_tasks_are_flown_again():
 
 
 def test_the_flight_that_kills_its_process_is_found_and_only_it():
-    crew = Unreliable(4, deadly=frozenset({13, 77}))
-    source = fly(Numbers(100, 20), crew)
+    workers = Unreliable(4, deadly=frozenset({13, 77}))
+    source = fly(Numbers(100, 20), workers)
     crashed = [row for row in source.rows if row["status"] == "crashed"]
     assert sorted(row["run"] for row in crashed) == [13, 77]
     assert all("each time it is tried" in row["reason"] for row in crashed)
@@ -87,23 +87,23 @@ def test_the_flight_that_kills_its_process_is_found_and_only_it():
 
 
 def test_the_last_tasks_are_small_so_that_no_worker_waits_long():
-    crew = Unreliable(2)
-    fly(Numbers(64, 32), crew)
-    sizes = [len(task.cases) for task in crew.submitted]
+    workers = Unreliable(2)
+    fly(Numbers(64, 32), workers)
+    sizes = [len(task.cases) for task in workers.submitted]
     assert sizes[0] == 8  # 64 flights left for two workers, four tasks each
     assert sizes[-1] <= 4
 
 
 def test_stopping_lands_what_is_in_the_air_and_hands_out_no_more():
-    source, crew = Numbers(100, 5), Unreliable(2)
-    Campaign(source, crew, lost).fly(stopped=lambda: len(crew.submitted) >= 4)
-    assert len(crew.submitted) == 4
-    assert not crew._tasks
+    source, workers = Numbers(100, 5), Unreliable(2)
+    Campaign(source, workers, lost).fly(stopped=lambda: len(workers.submitted) >= 4)
+    assert len(workers.submitted) == 4
+    assert not workers._tasks
     assert all(len(runs) == 5 for _, runs in source.landings)
 
 
 class Unlucky(Unreliable):
-    """A crew that loses the tasks with flight 13 in them so many times, and no other."""
+    """Workers who lose the tasks with flight 13 in them so many times, and no other."""
 
     def __init__(self, slots, losses):
         super().__init__(slots)

@@ -10,7 +10,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
-from beaver_ftc.studies.engine import crew
+from beaver_ftc.studies.engine import workers
 from beaver_ftc.studies.sweep.flying import Keep
 from beaver_ftc.studies.sweep.run import Options, SweepStopped, replay, run_sweep
 
@@ -109,12 +109,12 @@ def test_ctrl_c_ends_it_cleanly_and_says_how_to_go_on(reference, tmp_path, start
 def test_a_worker_that_is_killed_is_replaced(reference, tmp_path, small_batches, monkeypatch):
     hired = []
 
-    class Watched(crew._Worker):
+    class Watched(workers._Worker):
         def __init__(self, work):
             super().__init__(work)
             hired.append(self)
 
-    monkeypatch.setattr(crew, "_Worker", Watched)
+    monkeypatch.setattr(workers, "_Worker", Watched)
     seen = []
 
     def kill_the_first(tally):
@@ -130,7 +130,7 @@ def test_a_worker_that_is_killed_is_replaced(reference, tmp_path, small_batches,
 def test_a_finished_sweep_is_not_flown_again_when_resumed(reference, tmp_path, small_batches, monkeypatch):
     options = Options(out=tmp_path, workers=2, report=False)
     run_sweep(sweep_of(), options)
-    monkeypatch.setattr("beaver_ftc.studies.sweep.run._crew", lambda *_: pytest.fail("nothing is missing"))
+    monkeypatch.setattr("beaver_ftc.studies.sweep.run._workers", lambda *_: pytest.fail("nothing is missing"))
     asked = sweep_of(**{"seed: 3": "seed: 3\nexpect: {detection_rate: {at_least: 0.999, confidence: 0.99}}"})
     again = run_sweep(asked, Options(out=tmp_path, resume=True, report=False))
     assert [entry["passed"] for entry in again["expectations"]] == [False]  # 48 flights cannot show that

@@ -20,7 +20,7 @@ from beaver_ftc.studies.bench.plugged import InnovationDetector, ProportionalInv
 from beaver_ftc.studies.bench.stopwatch import Contender, Timing, interleave
 from beaver_ftc.studies.bench.straightforward import Straightforward
 from beaver_ftc.studies.bench.whole_flight import WholeFlight
-from beaver_ftc.studies.engine.processes import cores
+from beaver_ftc.studies.engine.workers import cores
 
 SCENARIO = "elevator-partial-loss"
 BEFORE_ALARM_S, AFTER_ALARM_S = 1.0, 14.0  # the fault strikes at 12 s

@@ -35,7 +35,7 @@ from beaver_ftc.studies.derive.known import trim_at, usual_start
 from beaver_ftc.studies.derive.run import derive
 from beaver_ftc.studies.derive.sample import FRESH, SIDESLIP_RAD, Envelope, Samples, sample
 from beaver_ftc.studies.derive.source import source_of
-from beaver_ftc.studies.engine.files import write_whole
+from beaver_ftc.studies.engine.store import write_whole
 
 STATES, STARTS, SEED = 800, 8, 11
 _FORMAT = 2  # of what is kept: files of another are compared anew

@@ -1,1 +1,1 @@
-"""What every study has in common: cases flown by a crew, kept as they land, resumed, tabulated and shown."""
+"""What every study has in common: cases flown by workers, kept as they land, resumed, and counted."""

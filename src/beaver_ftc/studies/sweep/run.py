@@ -12,10 +12,9 @@ from typing import TYPE_CHECKING, Any, Protocol
 from beaver_ftc.documents.errors import BadInput, BeaverFtcError, SimulationFailed
 from beaver_ftc.results.metrics import as_json, versions
 from beaver_ftc.scenario.sweep_loader import Sweep
-from beaver_ftc.studies.engine.campaign import Campaign, Source
-from beaver_ftc.studies.engine.crew import Crew, LocalCrew, Work
-from beaver_ftc.studies.engine.files import clear_disk_errors, write_whole
-from beaver_ftc.studies.engine.processes import cores
+from beaver_ftc.studies.engine.store import clear_disk_errors, write_whole
+from beaver_ftc.studies.engine.study import Campaign, Source
+from beaver_ftc.studies.engine.workers import LocalWorkers, Work, Workers, cores
 from beaver_ftc.studies.sweep.flying import Job, Keep, fly_one, keep_flight, lost, scenario_of, warm_up
 from beaver_ftc.studies.sweep.sampling import Assignment, Plan
 from beaver_ftc.studies.sweep.search import SearchSource, found
@@ -120,8 +119,8 @@ def _fly_missing(
     source: _Flown, sweep: Sweep, options: Options, tally: Tally, stopped: Callable[[], bool]
 ) -> None:
     if tally.done < tally.total:
-        with closing(_crew(sweep, options)) as crew:
-            Campaign(source, crew, partial(lost, sweep)).fly(stopped)
+        with closing(_workers(sweep, options)) as workers:
+            Campaign(source, workers, partial(lost, sweep)).fly(stopped)
     if tally.done < tally.total:
         raise SweepStopped(
             f"{sweep.name}: stopped, {tally.done} of {tally.total} flights are kept; "
@@ -129,14 +128,14 @@ def _fly_missing(
         )
 
 
-def _crew(sweep: Sweep, options: Options) -> Crew:
+def _workers(sweep: Sweep, options: Options) -> Workers:
     job = Job(sweep, options.keep)
     work = Work(partial(fly_one, job), partial(warm_up, job))
     if options.backend == "ray":
-        from beaver_ftc.studies.engine.ray_crew import RayCrew
+        from beaver_ftc.studies.engine.ray_workers import RayWorkers
 
-        return RayCrew(work, options.address, options.workers)
-    return LocalCrew(work, options.workers or cores())
+        return RayWorkers(work, options.address, options.workers)
+    return LocalWorkers(work, options.workers or cores())
 
 
 def conclude(sweep: Sweep, options: Options, store: Store) -> Document:

@@ -14,7 +14,7 @@ import numpy as np
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.scenario.sweep_loader import Sweep
-from beaver_ftc.studies.engine.campaign import Batch
+from beaver_ftc.studies.engine.study import Batch
 from beaver_ftc.studies.present.tables import finite
 from beaver_ftc.studies.sweep.sampling import Assignment, value_at
 from beaver_ftc.studies.sweep.source import Landed

@@ -4,9 +4,8 @@ from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any
 
 from beaver_ftc.scenario.sweep_loader import Sweep
-from beaver_ftc.studies.engine.campaign import Batch, Batches
-from beaver_ftc.studies.engine.crew import Row
-from beaver_ftc.studies.engine.parts import batches_of
+from beaver_ftc.studies.engine.store import batches_of
+from beaver_ftc.studies.engine.study import Batch, Batches
 from beaver_ftc.studies.sweep.sampling import Plan
 from beaver_ftc.studies.sweep.store import Store
 from beaver_ftc.studies.sweep.table import counts_of_rows, counts_of_table
@@ -39,12 +38,9 @@ class SweepSource(Batches):
         super().__init__(
             (Batch(number, tuple(plan.assignments(self._batches[number]))) for number in missing),
             sum(len(self._batches[number]) for number in missing),
-            self._land,
+            lambda batch, rows: on_landed(counts_of_rows(rows)),
+            store.parts,
         )
-
-    def _land(self, batch: Batch, rows: list[Row]) -> None:
-        self._store.parts.land(batch.number, rows)
-        self._on_landed(counts_of_rows(rows))
 
     def tables(self) -> "Iterator[pa.Table]":
         """Every batch's table, in order; all must have landed."""

@@ -11,9 +11,8 @@ from typing import IO, TYPE_CHECKING, Any, Self
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.scenario.sweep_loader import Sweep
-from beaver_ftc.studies.engine import files
-from beaver_ftc.studies.engine.identity import Identity
-from beaver_ftc.studies.engine.parts import KEPT, Parts
+from beaver_ftc.studies.engine import store as files
+from beaver_ftc.studies.engine.store import KEPT, Identity, Parts
 from beaver_ftc.studies.sweep.table import schema_of, table_of
 
 if TYPE_CHECKING:

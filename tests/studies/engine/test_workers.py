@@ -1,4 +1,4 @@
-"""A crew that is dismissed leaves at once and in silence, whatever its workers are doing."""
+"""Workers that is dismissed leaves at once and in silence, whatever its workers are doing."""
 
 import subprocess
 import sys
@@ -8,7 +8,7 @@ import pytest
 
 PROGRAM = """
 import sys, time
-from beaver_ftc.studies.engine.crew import Case, Task, Work, _Worker
+from beaver_ftc.studies.engine.workers import Case, Task, Work, _Worker
 
 def nap(case):
     time.sleep(20.0)
@@ -37,7 +37,7 @@ def test_workers_end_before_and_after_they_have_started(tmp_path, seconds):
 
 STOPPED = """
 import os, signal, threading, time
-from beaver_ftc.studies.engine import processes
+from beaver_ftc.studies.engine import workers
 
 def send(stop):
     while stop.is_alive():
@@ -50,9 +50,9 @@ if __name__ == "__main__":
     stop = threading.Thread(target=time.sleep, args=(1.5,))
     stop.start()
     threading.Thread(target=send, args=(stop,)).start()
-    processes.start_early()
-    worker = processes.context().Process(target=print, args=("worked",))
-    with processes.single_threaded():
+    workers.start_early()
+    worker = workers.context().Process(target=print, args=("worked",))
+    with workers.single_threaded():
         worker.start()
     worker.join()
     stop.join()

@@ -1,7 +1,9 @@
 """Who flies: the contract of a backend, worker processes on this machine, and this very process.
 
-A task is some cases of a batch. A crew flies tasks and hands back their rows, or says that the worker was
-lost.
+A task is some cases of a batch. Workers fly tasks and hand back their rows, or say that one was lost over it.
+
+Processes are forked from a clean one that has everything imported. Importing takes that process half a
+second; started early, it does so while this one still reads its input. Nothing heavy is imported here.
 """
 
 import contextlib
@@ -13,14 +15,15 @@ from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
+from multiprocessing import forkserver, resource_tracker
 from typing import Any, NamedTuple, Protocol
 
 from beaver_ftc.documents.errors import SimulationFailed
-from beaver_ftc.studies.engine import processes
 
 LEAVES_S = 5.0  # a pool's thread, once its workers have ended: milliseconds
 
 Row = Any
+Number = int | str  # of a batch: what its file is called
 Nothing = Callable[[], None]
 
 
@@ -34,7 +37,7 @@ class Case(NamedTuple):
 class Task(NamedTuple):
     """Cases to be flown one after the other by one worker; each has a `run`."""
 
-    batch: int
+    batch: Number
     cases: tuple[Any, ...]
 
 
@@ -56,7 +59,7 @@ class Work(NamedTuple):
         return [self.fly(case) for case in cases]
 
 
-class Crew(Protocol):
+class Workers(Protocol):
     """A backend."""
 
     @property
@@ -74,7 +77,7 @@ class Crew(Protocol):
 
 
 class ThisProcess:
-    """A crew of one that needs no other process, and so does not survive a flight that kills it."""
+    """The one worker that needs no other process, and so does not survive a flight that kills it."""
 
     slots = 1
 
@@ -97,10 +100,8 @@ class _Worker:
     """A process of its own: one that dies takes nobody else's task with it."""
 
     def __init__(self, work: Work) -> None:
-        self._pool = ProcessPoolExecutor(
-            1, mp_context=processes.context(), initializer=_begin, initargs=(work,)
-        )
-        with processes.single_threaded():
+        self._pool = ProcessPoolExecutor(1, mp_context=context(), initializer=_begin, initargs=(work,))
+        with single_threaded():
             self.pid: Future[int] = self._pool.submit(os.getpid)
 
     def fly(self, task: Task) -> "Future[list[Row]]":
@@ -123,7 +124,7 @@ class _Worker:
             thread.join(LEAVES_S)
 
 
-class LocalCrew:
+class LocalWorkers:
     """Processes on this machine. One that dies is replaced, and its task handed back as lost."""
 
     def __init__(self, work: Work, workers: int) -> None:
@@ -215,3 +216,66 @@ def silence() -> Iterator[None]:
         for stream, copy in kept.items():
             os.dup2(copy, stream)
             os.close(copy)
+
+
+_PRELOAD = [
+    "beaver_ftc.studies.engine.workers",
+    "beaver_ftc.studies.sweep.flying",
+    "beaver_ftc.loop.loop",
+    "beaver_ftc.results.metrics",
+]
+_ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+
+
+def cores() -> int:
+    """The cores this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def context() -> Any:
+    """The way to start workers here; where they cannot be forked, they start afresh."""
+    if "forkserver" not in multiprocessing.get_all_start_methods():
+        return multiprocessing.get_context("spawn")
+    chosen = multiprocessing.get_context("forkserver")
+    chosen.set_forkserver_preload(_PRELOAD)
+    return chosen
+
+
+def start_early() -> None:
+    """Let the process that workers are forked from begin its imports."""
+    if context().get_start_method() == "forkserver":
+        with single_threaded():
+            forkserver.ensure_running()
+
+
+def one_thread_each() -> dict[str, str]:
+    """Environment of a worker: one thread for linear algebra, since the cores are taken by the flights."""
+    return dict.fromkeys(_ONE_THREAD, "1")
+
+
+@contextlib.contextmanager
+def single_threaded() -> Iterator[None]:
+    """Processes started meanwhile have one thread each, and never hear the terminal's Ctrl-C, not even while
+    they import: it is for the process that gives the orders.
+    """
+    before = {name: os.environ.get(name) for name in _ONE_THREAD}
+    os.environ.update(one_thread_each())
+    heard = _block_interrupt()
+    try:
+        yield
+    finally:
+        if heard is not None:
+            signal.pthread_sigmask(signal.SIG_SETMASK, heard)
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
+
+
+def _block_interrupt() -> set[int | signal.Signals] | None:
+    """Leave Ctrl-C waiting, which what is started inherits; what was blocked before, where that exists."""
+    if not hasattr(signal, "pthread_sigmask"):
+        return None
+    resource_tracker.ensure_running()  # it would unblock what is blocked here
+    return signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})

@@ -11,11 +11,9 @@ from typer.testing import CliRunner
 
 from beaver_ftc.cli.main import app
 from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.studies import verify
 from beaver_ftc.studies.engine.statistics import binomial_upper, poisson_bound
-from beaver_ftc.studies.verify import campaign
-from beaver_ftc.studies.verify.campaign import Campaign, conduct
-from beaver_ftc.studies.verify.draw import Draw
-from beaver_ftc.studies.verify.summary import PROMISES, summarise, summary_text
+from beaver_ftc.studies.verify import PROMISES, Campaign, Draw, conduct, summarise, summary_text
 
 SMALL = Campaign(hours=0.1, faults=6, seed=4)
 
@@ -55,12 +53,12 @@ def test_draws_reach_the_declared_bounds_and_both_profiles():
 
 
 def test_rows_do_not_depend_on_the_workers(flown, tmp_path, monkeypatch):
-    monkeypatch.setattr(campaign, "CHUNK", 2)
+    monkeypatch.setattr(verify, "CHUNK", 2)
     assert conduct(SMALL, tmp_path, workers=2) == flown[0]
 
 
 def test_a_stopped_campaign_goes_on_and_a_longer_one_builds_on_it(flown, tmp_path, monkeypatch):
-    monkeypatch.setattr(campaign, "CHUNK", 2)
+    monkeypatch.setattr(verify, "CHUNK", 2)
     conduct(Campaign(hours=0.0, faults=3, seed=4), tmp_path, workers=1)
     kept = {file.name: file.stat().st_mtime_ns for file in tmp_path.glob("faulty-*.json")}
     progress = []
@@ -77,7 +75,7 @@ def test_a_chunk_half_written_is_flown_again(flown, tmp_path):
 
 def test_nothing_left_to_fly_flies_nothing(flown, monkeypatch):
     rows, folder = flown
-    monkeypatch.setattr(campaign, "fly_draw", pytest.fail)
+    monkeypatch.setattr(verify, "fly_draw", pytest.fail)
     assert conduct(SMALL, folder, workers=1) == rows
 
 

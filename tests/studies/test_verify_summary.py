@@ -3,8 +3,7 @@
 import pytest
 
 from beaver_ftc.studies.engine.statistics import binomial_upper, poisson_bound
-from beaver_ftc.studies.verify.fly import SCHEMES
-from beaver_ftc.studies.verify.summary import PROMISES, summarise, summary_text
+from beaver_ftc.studies.verify import PROMISES, SCHEMES, summarise, summary_text
 
 
 def healthy(alarm=False, departed=False, outside_s=0.0, closest=(0.5, 0.75)):

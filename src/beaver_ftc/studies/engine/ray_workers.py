@@ -1,4 +1,4 @@
-"""A Ray cluster as crew: each task a Ray task, a few in the queue for each CPU so that none waits.
+"""A Ray cluster as workers: each task a Ray task, a few in the queue for each CPU so that none waits.
 
 Whether a lost task is flown again is the campaign's to decide, as with local processes; Ray itself does not
 retry.
@@ -10,13 +10,12 @@ from typing import Any
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.plugins import VARIABLE
 from beaver_ftc.results.metrics import versions
-from beaver_ftc.studies.engine.crew import Outcome, Row, Task, Work, silence
-from beaver_ftc.studies.engine.processes import one_thread_each
+from beaver_ftc.studies.engine.workers import Outcome, Row, Task, Work, one_thread_each, silence
 
 QUEUED_A_CPU = 2
 
 
-class RayCrew:
+class RayWorkers:
     """The CPUs of a Ray cluster: one that runs already, one at an address, or one started on this machine."""
 
     def __init__(self, work: Work, address: str | None, workers: int | None) -> None:

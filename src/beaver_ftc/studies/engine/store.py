@@ -1,0 +1,245 @@
+"""What has been flown is there to stay: files whole or not at all, folders locked while in use, and what rows
+follow from, since those of an earlier start go with new ones only if nothing of it has changed.
+"""
+
+import contextlib
+import hashlib
+import json
+import os
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import IO, Any, Protocol
+
+from beaver_ftc.documents.errors import BadInput, SimulationFailed
+from beaver_ftc.documents.paths import data_root
+from beaver_ftc.results.metrics import versions
+
+LOCK = ".lock"
+
+
+def write_whole(path: Path, content: bytes) -> None:
+    """Write a file so that after any crash it is there with all of its content, or as it was before."""
+    replace_whole(path, lambda file: file.write(content))
+
+
+def replace_whole(path: Path, fill: Callable[[IO[bytes]], object]) -> None:
+    """The same for a file that `fill` writes."""
+    partial = path.with_name(f".{path.name}.partial")
+    try:
+        with partial.open("wb") as file:
+            fill(file)
+            file.flush()
+            os.fsync(file.fileno())
+        os.replace(partial, path)
+    except BaseException:
+        partial.unlink(missing_ok=True)
+        raise
+    sync_folder(path.parent)
+
+
+def sync_folder(folder: Path) -> None:
+    """Bring the names in a folder to the disk."""
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def remove_leftovers(folder: Path) -> None:
+    """Remove what a process that was killed had half written."""
+    for partial in folder.rglob(".*.partial"):
+        partial.unlink(missing_ok=True)
+
+
+@contextlib.contextmanager
+def locked(folder: Path) -> Iterator[None]:
+    """Hold a folder for this process alone; what marks it goes with it, or with the process.
+
+    Raises SimulationFailed where another process has it.
+    """
+    from filelock import FileLock, Timeout
+
+    lock = FileLock(folder / LOCK)
+    try:
+        lock.acquire(timeout=0)
+    except Timeout:
+        raise SimulationFailed(
+            f"cannot write {folder}: another beaver-ftc is flying into it; "
+            "wait for it or choose another --out"
+        ) from None
+    try:
+        yield
+    finally:
+        (folder / LOCK).unlink(missing_ok=True)  # while it is held: the next one makes its own
+        lock.release()
+
+
+@contextlib.contextmanager
+def clear_disk_errors(folder: Path, but: str = "") -> Iterator[None]:
+    """Turn an operating system's error into one line, which may end with a word of comfort."""
+    try:
+        yield
+    except OSError as error:
+        reason = os.strerror(error.errno) if error.errno else str(error)
+        raise SimulationFailed(f"cannot write {folder}: {reason[:1].lower()}{reason[1:]}{but}") from error
+
+
+KEPT = "; what has been flown is kept, go on with --resume"
+
+
+class Codec(Protocol):
+    """How the rows of a batch are written and read."""
+
+    suffix: str
+
+    def write(self, rows: Any, file: IO[bytes]) -> None:
+        """Fill a file with rows."""
+
+    def read(self, path: Path, runs: Sequence[int]) -> Any:
+        """The rows of these runs; any exception, or None, for a file that holds anything else."""
+
+
+class Parts:
+    """A folder of batches that have landed. kept: what a message about a full disk ends with."""
+
+    def __init__(self, folder: Path, codec: Codec, kept: str = KEPT) -> None:
+        self.folder, self._codec, self._kept = folder, codec, kept
+
+    def __bool__(self) -> bool:
+        """Whether anything has landed."""
+        return self.folder.is_dir() and any(self.folder.glob(f"*{self._codec.suffix}"))
+
+    def land(self, batch: int | str, rows: Any) -> None:
+        """Keep a batch. Raises SimulationFailed if the disk will not have it."""
+        with clear_disk_errors(self.folder.parent, self._kept):
+            replace_whole(self._path(batch), lambda file: self._codec.write(rows, file))
+
+    def landed(self, batch: int | str, runs: Sequence[int]) -> Any:
+        """The rows of a batch if it has landed whole; what cannot be read is removed, to be flown again."""
+        path = self._path(batch)
+        if not path.exists():
+            return None
+        with contextlib.suppress(Exception):
+            rows = self._codec.read(path, runs)
+            if rows is not None:
+                return rows
+        path.unlink()
+        return None
+
+    def remove(self) -> None:
+        """Remove all parts."""
+        for part in self.folder.glob(f"*{self._codec.suffix}"):
+            part.unlink()
+        with contextlib.suppress(OSError):
+            self.folder.rmdir()
+
+    def _path(self, batch: int | str) -> Path:
+        return self.folder / f"{batch:0>6}{self._codec.suffix}"
+
+
+class RowsAsJson:
+    """Rows of one type, a dataclass or a dictionary, as JSON; numbers may be infinite."""
+
+    suffix = ".json"
+
+    def __init__(self, row: Any) -> None:
+        from pydantic import TypeAdapter
+
+        self._adapter = TypeAdapter(list[row])
+
+    def write(self, rows: Any, file: IO[bytes]) -> None:
+        file.write(json.dumps(self._adapter.dump_python(rows), default=_plain).encode())
+
+    def read(self, path: Path, runs: Sequence[int]) -> Any:
+        rows = self._adapter.validate_python(json.loads(path.read_text(encoding="utf-8")))
+        return rows if len(rows) == len(runs) else None
+
+
+def _plain(value: Any) -> Any:
+    """A number of NumPy's as Python's."""
+    return value.item()
+
+
+def batches_of(count: int, size: int) -> Iterator[tuple[int, range]]:
+    """(number, runs) of each batch of `size` of so many cases."""
+    for number in range(-(-count // size)):
+        yield number, range(number * size, min((number + 1) * size, count))
+
+
+PACKAGE = Path(__file__).resolve().parents[2]
+NO_ROWS = ("cli", "live", "integrations")  # rooms that ask for rows, or show them, and make none
+
+
+@dataclass(frozen=True)
+class Identity:
+    """What was asked, resolved, and what flew it."""
+
+    document: dict[str, Any]
+
+    @classmethod
+    def of(cls, what: str, asked: dict[str, Any]) -> "Identity":
+        """The identity of what was asked, under its name, on this machine."""
+        document = {what: asked, "versions": {**versions(), **plug_ins(), "flight code": fingerprint()}}
+        return cls(json.loads(json.dumps(document)))
+
+    def refuse_other(self, there: dict[str, Any], folder: Path) -> None:
+        """Raise BadInput if the flights in a folder follow from anything else."""
+        what = next(iter(self.document))
+        changed = differences(there.get(what, {}), self.document[what])
+        if changed:
+            raise BadInput(
+                f"{folder}: the {what} file has changed since these flights ({', '.join(changed)}): "
+                f"resuming would mix two {what}s, allowed: the unchanged file, or another --out"
+            )
+        then, now = there.get("versions", {}), self.document["versions"]
+        changed = differences(then, now)
+        if changed:
+            said = ", ".join(f"{name} {then.get(name)} then, {now.get(name)} now" for name in changed)
+            raise BadInput(
+                f"{folder}: flown by other versions ({said}): resuming would mix them, "
+                "allowed: the same versions, or another --out"
+            )
+
+
+def differences(then: dict[str, Any], now: dict[str, Any]) -> list[str]:
+    """The keys whose values differ, those that have gone included."""
+    return [name for name in dict.fromkeys([*now, *then]) if then.get(name) != now.get(name)]
+
+
+def plug_ins() -> dict[str, str]:
+    """Versions of the other packages whose detectors and laws may fly."""
+    from importlib.metadata import PackageNotFoundError, version
+
+    from beaver_ftc.plugins import DETECTORS, LAWS, OURS, registered
+
+    packages = {entry.package for group in (DETECTORS, LAWS) for entry in registered(group).values()}
+    found = {}
+    for package in sorted(packages - {OURS, ""}):
+        try:
+            found[package] = version(package)
+        except PackageNotFoundError:
+            found[package] = "unknown"
+    return found
+
+
+def hashed_files() -> list[Path]:
+    """The sources and data that rows may follow from: all but the rooms that make none."""
+    sources = [
+        path
+        for path in (*PACKAGE.rglob("*.py"), *PACKAGE.rglob("*.json"))
+        if path.relative_to(PACKAGE).parts[0] not in NO_ROWS
+    ]
+    aircraft = [path for path in (data_root() / "aircraft").rglob("*") if path.is_file()]
+    return sorted({*sources, *aircraft})
+
+
+@cache
+def fingerprint() -> str:
+    """A digest of those files: a version number sees no edit."""
+    digest = hashlib.sha256()
+    for path in hashed_files():
+        digest.update(path.name.encode() + path.read_bytes())
+    return digest.hexdigest()[:16]

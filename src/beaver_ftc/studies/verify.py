@@ -1,0 +1,458 @@
+"""The promises of the theory, on random flights inside everything the diagnosis declares: the flight
+condition, the references, the uncertainty, the fault.
+
+Flight number i of a seed is the same whatever else is flown, by whom, and in which order. A campaign that was
+stopped goes on where it was, and a longer one builds on a shorter one.
+"""
+
+import json
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+from math import ceil, exp
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from beaver_ftc import __version__
+from beaver_ftc.aircraft import load
+from beaver_ftc.documents.errors import BadInput, SimulationFailed
+from beaver_ftc.loop.flight import Flight
+from beaver_ftc.results.metrics import fault_free_s
+from beaver_ftc.scenario.faults import LossOfEffectiveness
+from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.studies.engine.statistics import CONFIDENCE, binomial_upper, poisson_bound, quantile
+from beaver_ftc.studies.engine.store import Parts, RowsAsJson, fingerprint, write_whole
+from beaver_ftc.studies.engine.study import GO_ON, Batch, Batches
+from beaver_ftc.studies.engine.study import conduct as fly_missing
+from beaver_ftc.studies.engine.workers import Work
+from beaver_ftc.studies.present.tables import finite, number
+
+AXES = ("p", "q", "r")
+HEALTHY_S = 100.0  # attitude is open loop: a longer flight wanders out of the validated envelope
+AFTER_FAULT_S = 15.0  # more than a period of the slowest reference
+_AIRSPEED_MPS, _ALTITUDE_M = (35.0, 52.0), (0.0, 3000.0)
+_RATE_HZ = {"healthy": (20, 50), "faulty": (20, 100)}  # a slow hour flies sooner
+_MAGNITUDE, _KAPPA_PER_S, _FAULT_AT_S = (0.05, 1.0), (0.2, 10.0), (3.0, 8.0)
+_INERTIA, _AMPLITUDE_RAD_S2, _FREQUENCY_RAD_S = 0.25, 0.02, (0.1, 60.0)
+_AT_THE_BOUND = 0.3  # share of flights with an uncertainty at its very bound
+
+_COARSE = 0.05  # share of flights with several JSBSim frames in a frame of the loop
+
+_HEALTHY, _FAULTY = 0, 1
+
+
+@dataclass(frozen=True)
+class Draw:
+    """One flight's place in a campaign: kind is `healthy` or `faulty`, index counts from 0."""
+
+    seed: int
+    kind: str
+    index: int
+
+    @property
+    def run(self) -> tuple[str, int]:
+        """What it is known by in its campaign."""
+        return self.kind, self.index
+
+    def generator(self) -> np.random.Generator:
+        """This flight's own random numbers."""
+        key = (_FAULTY if self.kind == "faulty" else _HEALTHY, self.index)
+        return np.random.default_rng(np.random.SeedSequence(self.seed, spawn_key=key))
+
+    def scenario(self, fdi: dict[str, Any] | None = None) -> Scenario:
+        """The flight, diagnosed as `fdi` says."""
+        rng = self.generator()
+        faulty = self.kind == "faulty"
+        fault = _fault(rng) if faulty else None
+        return Scenario.model_validate({
+            "name": f"{self.kind}-{self.index}",
+            "duration_s": fault["at_s"] + AFTER_FAULT_S if fault else HEALTHY_S,
+            "rate_hz": round(_log_uniform(rng, *_RATE_HZ[self.kind])),
+            "substeps": int(rng.integers(2, 5)) if rng.random() < _COARSE else 1,
+            "initial": {"airspeed_mps": rng.uniform(*_AIRSPEED_MPS), "altitude_m": rng.uniform(*_ALTITUDE_M)},
+            "reference": {axis: [_signal(rng) for _ in range(rng.integers(1, 3))] for axis in AXES},
+            "faults": [fault] if fault else [],
+            "uncertainty": _uncertainty(rng),
+            "fdi": fdi or {},
+        })  # fmt: skip
+
+
+def _log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
+    return float(np.exp(rng.uniform(np.log(low), np.log(high))))
+
+
+def _fault(rng: np.random.Generator) -> dict[str, Any]:
+    fault = {
+        "actuator": str(rng.choice(load().primary)),
+        "type": "loss_of_effectiveness",
+        "magnitude": rng.uniform(*_MAGNITUDE),
+        "at_s": rng.uniform(*_FAULT_AT_S),
+    }
+    if rng.random() < 0.5:
+        fault |= {"profile": "incipient", "kappa_per_s": _log_uniform(rng, *_KAPPA_PER_S)}
+    return fault
+
+
+def _signal(rng: np.random.Generator) -> dict[str, Any]:
+    """Zero on average, or the attitude would run away under open outer loops."""
+    amplitude = {"amplitude_deg_s": rng.uniform(0.5, 5.0)}
+    wave = {**amplitude, "frequency_hz": _log_uniform(rng, 0.1, 0.7), "phase_deg": rng.uniform(0, 360)}
+    kind = rng.choice(["sine", "square", "doublet", "chirp"], p=[0.5, 0.2, 0.15, 0.15])
+    if kind == "doublet":
+        return {"doublet": {**amplitude, "start_s": rng.uniform(0, 15), "width_s": rng.uniform(0.5, 3)}}
+    if kind == "chirp":
+        sweep = {"start_s": 0.0, "end_s": rng.uniform(20, HEALTHY_S), "start_frequency_hz": 0.1}
+        return {"chirp": {**amplitude, **sweep, "end_frequency_hz": rng.uniform(0.2, 1.0)}}
+    return {str(kind): wave}
+
+
+def _within(rng: np.random.Generator, bound: float) -> float:
+    """Anywhere within the bound, and often right at it."""
+    return bound if rng.random() < _AT_THE_BOUND else rng.uniform(0.0, bound)
+
+
+def _uncertainty(rng: np.random.Generator) -> dict[str, Any]:
+    """All that the published bounds admit [Zhang2005, sec. VII]."""
+    sign = {axis: rng.choice([-1.0, 1.0]) for axis in AXES}
+    return {
+        "inertia_coupling": {axis: sign[axis] * _within(rng, _INERTIA) for axis in AXES},
+        "sinusoid": {
+            axis: {
+                "amplitude_rad_s2": _within(rng, _AMPLITUDE_RAD_S2),
+                "frequency_rad_s": _log_uniform(rng, *_FREQUENCY_RAD_S),
+            }
+            for axis in AXES
+        },
+    }
+
+
+PUBLISHED, SHARPENED = "published", "sharpened"
+_OFF = {"pole_bank": False, "memory": False, "shared_effectiveness": False}
+SCHEMES: dict[str, dict[str, Any]] = {PUBLISHED: {"thresholds": "published"}, SHARPENED: {}}
+# From the published scheme to the default, and on to what takes a declaration, one step after the other.
+STEPS: dict[str, dict[str, Any]] = {
+    PUBLISHED: SCHEMES[PUBLISHED],
+    "interval": {"sharpen": _OFF},
+    "pole bank": {"sharpen": {**_OFF, "pole_bank": True}},
+    "memory": {"sharpen": {"shared_effectiveness": False}},
+    SHARPENED: SCHEMES[SHARPENED],
+    "constant": {"fault_profile": "abrupt"},
+}
+_CONSTANT_ONLY = "constant"  # for faults that are: one that grows is outside what this step declares
+_LATE_S = 1e-9  # rounding of frame times
+
+Row = dict[str, Any]
+
+
+def fly_draw(draw: Draw, schemes: dict[str, dict[str, Any]] = SCHEMES) -> Row:
+    """The row of a flight. A fault is flown once with each scheme, in all else the same flight."""
+    try:
+        return _faulty(draw, schemes) if draw.kind == "faulty" else _healthy(draw)
+    except BadInput as error:  # a draw without a trim: said, not counted
+        return {"index": draw.index, "skipped": str(error)}
+
+
+def _healthy(draw: Draw) -> Row:
+    """The published filter is the sharpened scheme's first, so one flight tells of both."""
+    from beaver_ftc.loop.loop import fly
+
+    scenario = draw.scenario()
+    flight = fly(scenario)
+    return {
+        "index": draw.index,
+        "watched_s": fault_free_s(flight),
+        "alarm": flight.detection_time_s is not None,
+        "departed": flight.departure is not None,
+        "outside_s": flight.outside_s,
+        "closest": list(flight.closest_approach),
+    }
+
+
+def _faulty(draw: Draw, schemes: dict[str, dict[str, Any]]) -> Row:
+    from beaver_ftc.loop.loop import fly
+
+    row: Row = {"index": draw.index}
+    for scheme, fdi in schemes.items():
+        scenario = draw.scenario(fdi)
+        abrupt = scenario.faults[0].profile == "abrupt"
+        row[scheme] = judge(fly(scenario)) if abrupt or scheme != _CONSTANT_ONLY else row[SHARPENED]
+    fault = scenario.faults[0]
+    return row | {
+        "rate_hz": scenario.rate_hz,
+        "substeps": scenario.substeps,
+        **fault.model_dump(exclude_none=True),
+    }
+
+
+def judge(flight: Flight) -> Row:
+    """What became of the promises in a flight with one fault; delays in s from the first frame that bears
+    it.
+    """
+    scenario = flight.scenario
+    fault, frame_s = scenario.faults[0], 1.0 / scenario.rate_hz
+    actuator = getattr(fault, "actuator", "unanticipated")
+    struck_s = ceil((fault.at_s - _LATE_S) * scenario.rate_hz) * frame_s
+    delay_s = None if flight.detection_time_s is None else flight.detection_time_s - struck_s
+    earliest_s = frame_s if scenario.substeps == 1 else 0.0  # of one JSBSim frame a fault shows in the next
+    guaranteed_s = flight.guaranteed_delay_s
+    late = guaranteed_s is not None and (delay_s is None or delay_s > guaranteed_s + frame_s + _LATE_S)
+    return {
+        "delay_s": delay_s,
+        "false_alarm": delay_s is not None and delay_s < earliest_s - _LATE_S,
+        "guaranteed_s": guaranteed_s,
+        "late": late,
+        "isolation_s": flight.isolation_time_s - struck_s if flight.isolation_time_s is not None else None,
+        "excluded": delay_s is not None and actuator not in (*flight.candidates, flight.isolated),
+        "wrong": flight.isolated not in (None, actuator),
+        "estimate_error": _estimate_error(flight) if flight.isolated == actuator else None,
+    }
+
+
+def _estimate_error(flight: Flight) -> float | None:
+    """How far the estimated parameter is from the true one as the flight ends."""
+    fault = flight.scenario.faults[0]
+    if flight.estimate is None or not isinstance(fault, LossOfEffectiveness):
+        return None
+    age_s = flight.frames / flight.scenario.rate_hz - fault.at_s
+    grown = 1.0 if fault.kappa_per_s is None else 1.0 - exp(-fault.kappa_per_s * age_s)
+    return abs(flight.estimate + fault.magnitude * grown)
+
+
+KINDS = ("healthy", "faulty")
+CHUNK = 50
+Progress = Callable[[float], None]
+Schemes = dict[str, dict[str, Any]]
+
+
+@dataclass(frozen=True)
+class Campaign:
+    """Flight hours without a fault, flights with one, and whether each step of sharpening flies these too."""
+
+    hours: float
+    faults: int
+    seed: int
+    steps: bool = False
+
+    @property
+    def schemes(self) -> Schemes:
+        """The diagnoses each faulty flight is flown with."""
+        return STEPS if self.steps else SCHEMES
+
+    def wanted(self, kind: str) -> int:
+        """Number of flights of a kind."""
+        return ceil(self.hours * 3600.0 / HEALTHY_S) if kind == "healthy" else self.faults
+
+
+def conduct(
+    campaign: Campaign, folder: Path, workers: int, progress: Progress | None = None
+) -> dict[str, list[Row]]:
+    """Fly what `folder` does not hold yet; return the rows of every flight wanted, in order, by kind.
+
+    Raises BadInput if the folder holds another seed's flights, or another version's.
+    """
+    _open(folder, campaign)
+    rows = {kind: _kept(folder, kind) for kind in KINDS}
+    chunks = [chunk for kind in KINDS for chunk in _missing(campaign, kind, rows[kind])]
+    done, total = sum(map(len, rows.values())), sum(campaign.wanted(kind) for kind in KINDS)
+
+    def note(batch: Batch, flown: list[Row]) -> None:
+        nonlocal done
+        kind = batch.cases[0].kind
+        rows[kind].update((row["index"], row) for row in flown)
+        done += len(flown)
+        if progress is not None:
+            progress(done / total)
+
+    source = Batches(chunks, total - done, note, Parts(folder, RowsAsJson(dict), GO_ON))
+    fly_missing(source, Work(partial(_fly_draw, campaign.schemes)), workers, _crashed)
+    return {kind: [rows[kind][i] for i in range(campaign.wanted(kind))] for kind in KINDS}
+
+
+def _identity(campaign: Campaign) -> dict[str, Any]:
+    """What must be the same for rows to belong together: the seed, the version and the code that flies."""
+    return {
+        "seed": campaign.seed,
+        "schemes": list(campaign.schemes),
+        "version": __version__,
+        "code": fingerprint(),
+    }
+
+
+def _open(folder: Path, campaign: Campaign) -> None:
+    manifest, mine = folder / "campaign.json", _identity(campaign)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        if not manifest.exists():
+            write_whole(manifest, json.dumps(mine).encode())
+        theirs = json.loads(manifest.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise SimulationFailed(f"{folder}: cannot be used for a campaign: {error}") from error
+    if theirs != mine:
+        differs = ", ".join(key for key in mine if theirs.get(key) != mine[key])
+        raise BadInput(f"--out {folder}: holds flights of another {differs}, allowed: a new folder")
+
+
+def _kept(folder: Path, kind: str) -> dict[int, Row]:
+    rows: dict[int, Row] = {}
+    for file in sorted(folder.glob(f"{kind}-*.json")):
+        rows.update((row["index"], row) for row in json.loads(file.read_text(encoding="utf-8")))
+    return rows
+
+
+def _missing(campaign: Campaign, kind: str, kept: dict[int, Row]) -> Iterator[Batch]:
+    """Chunks of what is still to be flown, each called as its file is."""
+    indices = [i for i in range(campaign.wanted(kind)) if i not in kept]
+    for start in range(0, len(indices), CHUNK):
+        chunk = indices[start : start + CHUNK]
+        name = f"{kind}-{chunk[0]:07d}-{chunk[-1]:07d}"
+        yield Batch(name, tuple(Draw(campaign.seed, kind, i) for i in chunk))
+
+
+def _fly_draw(schemes: Schemes, draw: Draw) -> Row:
+    return fly_draw(draw, schemes)
+
+
+def _crashed(draw: Draw, why: str) -> Row:
+    raise SimulationFailed(f"{draw.kind} flight {draw.index} of seed {draw.seed}: {why}")
+
+
+PROMISES = ("false_alarms", "true_fault_exclusions", "wrong_isolations", "late_detections")
+
+
+def summarise(rows: dict[str, list[Row]]) -> dict[str, Any]:
+    """The document of a campaign; `kept`: whether every promise of the sharpened scheme, the default, held.
+
+    The published one is there for comparison: its isolation threshold presumes a constant parameter.
+    """
+    healthy = [row for row in rows["healthy"] if "skipped" not in row]
+    faulty = [row for row in rows["faulty"] if "skipped" not in row]
+    document: dict[str, Any] = {
+        "healthy": _healthy_document(healthy),
+        "faults": len(faulty),
+        "skipped": len(rows["healthy"]) + len(rows["faulty"]) - len(healthy) - len(faulty),
+        "schemes": {
+            scheme: _scheme([row[scheme] for row in faulty])
+            for scheme in STEPS
+            if faulty and scheme in faulty[0]
+        },
+    }
+    if faulty:
+        document["delay_shorter_by"] = _shorter(document["schemes"])
+    document["kept"] = document["healthy"]["false_alarms"] == 0 and all(
+        document["schemes"][SHARPENED][promise] == 0 for promise in PROMISES if faulty
+    )
+    return document
+
+
+def _healthy_document(rows: Sequence[Row]) -> dict[str, Any]:
+    hours = sum(row["watched_s"] for row in rows) / 3600.0
+    alarms = sum(row["alarm"] for row in rows)
+    closest = np.max([row["closest"] for row in rows], axis=0).tolist() if rows else []
+    return {
+        "flights": len(rows),
+        "hours": hours,
+        "false_alarms": alarms,
+        "false_alarms_per_hour": alarms / hours if hours else None,
+        "false_alarms_per_hour_upper_95": poisson_bound(alarms, hours, CONFIDENCE, upper=True)
+        if hours
+        else None,
+        "departures": sum(row["departed"] for row in rows),
+        "hours_outside_envelope": sum(row["outside_s"] for row in rows) / 3600.0,
+        "closest_approach": dict(zip(SCHEMES, closest, strict=False)) if len(rows) else {},
+    }
+
+
+def _scheme(rows: Sequence[Row]) -> dict[str, Any]:
+    n = len(rows)
+    counts = {
+        "false_alarms": sum(row["false_alarm"] for row in rows),
+        "true_fault_exclusions": sum(row["excluded"] for row in rows),
+        "wrong_isolations": sum(row["wrong"] for row in rows),
+        "late_detections": sum(row["late"] for row in rows),
+    }
+    certain = [row for row in rows if row["guaranteed_s"] is not None]
+    ratios = [row["delay_s"] / row["guaranteed_s"] for row in certain if row["delay_s"]]
+    return {
+        **counts,
+        **{f"{name}_probability_upper_95": binomial_upper(count, n) for name, count in counts.items()},
+        "detected": sum(row["delay_s"] is not None for row in rows),
+        "isolated": sum(row["isolation_s"] is not None for row in rows),
+        "detection_certain": len(certain),
+        "delay_s": _quantiles(row["delay_s"] for row in rows),
+        "isolation_delay_s": _quantiles(row["isolation_s"] for row in rows),
+        "delay_over_guaranteed": _quantiles(ratios),
+        "estimate_error": _quantiles(
+            row["estimate_error"] for row in rows if row["estimate_error"] is not None
+        ),
+    }
+
+
+def _quantiles(values: Iterable[float | None]) -> dict[str, float | None]:
+    """Median and 90th percentile, what never came counting as infinitely late; None stands for infinite."""
+    numbers = np.sort([np.inf if value is None else value for value in values])
+    return {name: finite(quantile(numbers, share)) for name, share in (("median", 0.5), ("p90", 0.9))}
+
+
+def _shorter(schemes: dict[str, Any]) -> float | None:
+    """By what share the sharpened scheme's median delay is shorter than the published one's."""
+    published, sharpened = (schemes[name]["delay_s"]["median"] for name in SCHEMES)
+    return 1.0 - sharpened / published if published and sharpened is not None else None
+
+
+def summary_text(document: dict[str, Any]) -> str:
+    """The document for people."""
+    lines = [*_healthy_lines(document["healthy"]), *_fault_lines(document)]
+    if document["skipped"]:
+        lines.append(f"{document['skipped']} flights drawn could not be trimmed and are not counted")
+    lines.append("every promise of the sharpened scheme kept" if document["kept"] else "A PROMISE IS BROKEN")
+    return "\n".join(lines)
+
+
+def _healthy_lines(healthy: dict[str, Any]) -> list[str]:
+    if not healthy["flights"]:
+        return []
+    closest = ", ".join(f"{name} {share:.6f}" for name, share in healthy["closest_approach"].items())
+    outside = f"{healthy['hours_outside_envelope']:.2f} h outside the validated envelope"
+    rate = f"at most {healthy['false_alarms_per_hour_upper_95']:.2g} per hour, 95 % confidence"
+    return [
+        f"{healthy['hours']:.2f} flight hours without a fault: {healthy['flights']} flights, {outside}, "
+        f"{healthy['departures']} departures",
+        f"  false alarms                    {healthy['false_alarms']} ({rate})",
+        f"  closest approach to threshold   {closest}",
+        "",
+    ]
+
+
+def _fault_lines(document: dict[str, Any]) -> list[str]:
+    schemes = document["schemes"]
+    if not schemes:
+        return []
+    lines = [f"{document['faults']} random faults{'':17}" + "".join(f"{name:>18}" for name in schemes)]
+    for promise in PROMISES:
+        cells = [f"{s[promise]} (p < {s[promise + '_probability_upper_95']:.1e})" for s in schemes.values()]
+        lines.append(_line(promise.replace("_", " "), cells))
+    for label, key in (
+        ("detected", "detected"),
+        ("detection certain", "detection_certain"),
+        ("isolated", "isolated"),
+    ):
+        lines.append(_line(label, [str(s[key]) for s in schemes.values()]))
+    for label, key in (
+        ("detection delay, s", "delay_s"),
+        ("isolation delay, s", "isolation_delay_s"),
+        ("delay / guaranteed", "delay_over_guaranteed"),
+        ("error of the estimate", "estimate_error"),
+    ):
+        for which in ("median", "p90"):
+            lines.append(
+                _line(f"{label}, {which}", [number(s[key][which], none="never") for s in schemes.values()])
+            )
+    if document["delay_shorter_by"] is not None:
+        lines += [f"  median detection delay shorter by {document['delay_shorter_by']:.0%}", ""]
+    return lines
+
+
+def _line(label: str, cells: Iterable[str]) -> str:
+    return f"  {label:<32}" + "".join(f"{cell:>18}" for cell in cells)

@@ -8,6 +8,7 @@ with w, v, and n over its own standard deviation, independent and standard norma
 import numpy as np
 from scipy.linalg import block_diag
 from scipy.signal import lfilter
+from statistics_of import Statistical
 
 from beaver_ftc.compiled import kernel
 from beaver_ftc.design.coefficients import MASS
@@ -164,12 +165,12 @@ class Detector:
         self.fdi, self.dt = frame["fdi"], 1.0 / rate_hz
         noise_model.set_up(self.fdi, scenario.fdi, frame["belief"]["design"], MASS, LEVEL_FLIGHT, rate_hz)
         self.detector = self.fdi["statistical"]
-        statistical.prepare(self.detector, self.fdi, frame["belief"]["design"], *LEVEL_FLIGHT)
+        Statistical.prepare(self.detector, self.fdi, frame["belief"]["design"], *LEVEL_FLIGHT)
         self.frame = 0
 
     @property
     def blocks(self):
-        return self.detector["block"][: self.detector["n_blocks"]]
+        return self.detector["block"]
 
     def innovations(self, frames, rng):
         """Healthy ones (frames, 3), as declared."""
@@ -192,14 +193,17 @@ class Detector:
 def watch_all(detector, innovations, Gu, cubic, first, renew, dt, scores):
     """The frames of a flight without one: innovations (k, 3), Gu (k, 3, 4) rad/s2, cubic (k,)."""
     for k in range(len(innovations)):
-        statistical.signatures(detector, Gu[k], cubic[k])
-        statistical.observe(detector, innovations[k], dt, first + k, 0)
-        statistical.score(detector, (first + k) * dt)
-        scores[k] = detector.score
-        if renew and detector.score > 1.0:
+        blocks, alarm, tests = detector.block, detector.alarm, detector.tests
+        statistical.signatures(blocks, Gu[k], cubic[k])
+        bounded, still = detector.noise.bounded, detector.air
+        statistical.observe(tests, bounded, blocks, still, innovations[k], dt, first + k, 0)
+        views = detector.views[: detector.n_views]
+        statistical.score(alarm, tests, blocks, views, detector.forces, still, (first + k) * dt)
+        scores[k] = alarm.score
+        if renew and alarm.score > 1.0:
             for slot in range(N_SLOTS):
-                for b in range(detector.n_blocks):
-                    likelihood.start(detector.block[b], slot)
+                for b in range(detector.block.size):
+                    likelihood.start(blocks[b], slot)
 
 
 def surfaces_at_work(frames, rate_hz, rng, size=0.3):

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 from kernels import DT, new_fdi
+from statistics_of import Across
 
 from beaver_ftc.aircraft import load
-from beaver_ftc.diagnosis import across, air, isolation
+from beaver_ftc.diagnosis import air, isolation
 from beaver_ftc.diagnosis.likelihood import STEP
 from beaver_ftc.diagnosis.state import LOSS, POSITION
 from beaver_ftc.diagnosis.tones import set_up_listening
@@ -26,13 +27,17 @@ def watching(turns=0.0):
     """A diagnosis with its views; turns: errors of a surface's own terms, as a share of them."""
     fdi = new_fdi()
     statistical = fdi["statistical"]
-    statistical["n_blocks"], statistical["keep"], statistical["alarm_level"] = 3, 0.99, 5.0
-    statistical["rapidity"], statistical["jitter"], statistical["bounded"] = 2.0, 1e-6, 0.02
+    statistical["tests"]["keep"], statistical["tests"]["alarm_level"] = 0.99, 5.0
+    statistical["noise"]["rapidity"], statistical["noise"]["jitter"], statistical["noise"]["bounded"] = (
+        2.0,
+        1e-6,
+        0.02,
+    )
     for block, n in zip(statistical["block"], (1, 2, 2), strict=True):
         block["noise"][:n] = 1e-8
     set_up_views(statistical, AIRCRAFT)
     set_up_listening(statistical["listening"], 1e-8, 45.0, 15.0, DT)
-    statistical["tolerated"] = fdi["bound"]["own_errors"] = turns > 0.0
+    statistical["tests"]["tolerated"] = fdi["bound"]["own_errors"] = turns > 0.0
     fdi["bound"]["own_per_rad"] = turns * np.abs(G)
     fdi["layout"]["position_of"] = range(4)
     for s, fie in enumerate(fdi["isolation"]["estimator"][:4]):
@@ -44,7 +49,7 @@ def shown(fdi, courses, frames=70):
     """Show it accelerations, frames after one another: courses(k) (3,) rad/s2."""
     u = np.array([0.05, 0.03, 0.04, 0.0])
     for k in range(frames):
-        across.observe(fdi, courses(k), G, G * u, FLOW, k, False)
+        Across.observe(fdi, courses(k), G, G * u, FLOW, k, False)
     return fdi["statistical"]["views"]
 
 
@@ -59,7 +64,7 @@ def test_a_fault_of_any_course_shows_nothing_where_its_surface_moves_nothing(sur
     views = shown(fdi, lambda k: course[k] * G[:, surface])
     for v, view in enumerate(views[:5]):
         evidence = np.abs(view["block"]["lane"]["correlation"]).max()
-        felt = across.feels(fdi, view, surface, G[:, surface])
+        felt = Across.feels(fdi, view, surface, G[:, surface])
         assert felt == (v not in blind)
         assert (evidence > 1.0) == felt
 
@@ -84,14 +89,14 @@ def test_only_what_a_surface_does_not_move_excludes_it():
         fdi["statistical"]["views"]["mix"][PAST_AILERON, :3] = (0.4 / 9.0, 0.0, -1.0)
         fdi["statistical"]["views"]["mix"][PAST_RUDDER, :3] = (3.0 / 1.2, 0.0, 1.0)
         fdi["statistical"]["views"][v]["block"]["hypothesis"]["score"][0] = 5.1
-        found = [across.excludes(fdi, s) for s in range(4)]
+        found = [Across.excludes(fdi, s) for s in range(4)]
         excluded = {
             AILERON: v in (PITCH_AXIS, PAST_AILERON), ELEVATOR: v != PITCH_AXIS,
             RUDDER: v in (PITCH_AXIS, PAST_RUDDER), FLAP: v != PITCH_AXIS,
         }  # fmt: skip
         assert found == [excluded[s] for s in range(4)]
         fdi["statistical"]["views"][v]["block"]["hypothesis"]["score"][0] = 4.9
-        assert not any(across.excludes(fdi, s) for s in range(4))
+        assert not any(Across.excludes(fdi, s) for s in range(4))
 
 
 @pytest.mark.parametrize(
@@ -117,7 +122,7 @@ def test_a_flight_has_them_or_not(substeps):
 
 def test_what_a_surface_does_not_move_rules_its_faults_out():
     fdi = watching()
-    fdi["statistical"]["enabled"] = fdi["config"]["every_type"] = 1
+    fdi["statistical"]["tests"]["enabled"] = fdi["config"]["every_type"] = 1
     fdi["statistical"]["views"][PITCH_AXIS]["block"]["hypothesis"]["score"][0] = 5.1
     assert isolation.rules_out(fdi, fdi["isolation"]["estimator"][AILERON], True)
     assert not isolation.rules_out(fdi, fdi["isolation"]["estimator"][ELEVATOR], True)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from kernels import DT, new_fdi
+from statistics_of import Across
 
 from beaver_ftc.aircraft import load
 from beaver_ftc.diagnosis import across, likelihood, tones
@@ -28,8 +29,8 @@ def fdi(rng):
     """A diagnosis with its views, something in every place that the kernels look at, and air that moves."""
     fdi = new_fdi()
     statistical = fdi["statistical"]
-    statistical["n_blocks"], statistical["keep"], statistical["rapidity"] = 3, 0.9, 2.0
-    statistical["jitter"], statistical["bounded"] = (1e-6, 4e-6, 9e-6), (0.02, 0.03, 0.05)
+    statistical["tests"]["keep"], statistical["noise"]["rapidity"] = 0.9, 2.0
+    statistical["noise"]["jitter"], statistical["noise"]["bounded"] = (1e-6, 4e-6, 9e-6), (0.02, 0.03, 0.05)
     for block, n, regressors in zip(statistical["block"], (1, 2, 2), (3, 4, 4), strict=True):
         block["n_regressors"], block["level"] = regressors, 5.0
         block["noise"][:n] = rng.uniform(1e-8, 1e-7, n)
@@ -54,7 +55,7 @@ def column(rng):
 def test_across_a_column_is_square_to_it_of_length_one_and_to_the_left(fdi, rng):
     view = fdi["statistical"]["views"][PAST_AILERON]
     G, of_it = column(rng)
-    across.turn(fdi, view, G)
+    Across.turn(fdi, view, G)
     assert view["mix"][:3] @ of_it == pytest.approx(0.0, abs=1e-12)
     assert np.linalg.norm(view["mix"]) == pytest.approx(1.0)
     assert np.cross(of_it, view["mix"][:3])[1] < 0.0  # from roll over yaw, as (-g_r, g_p)
@@ -63,7 +64,7 @@ def test_across_a_column_is_square_to_it_of_length_one_and_to_the_left(fdi, rng)
 def test_a_surface_that_moves_neither_leaves_the_direction_as_it_was(fdi):
     view = fdi["statistical"]["views"][PAST_RUDDER]
     view["mix"][:3] = 0.6, 0.0, 0.8
-    assert across.turn(fdi, view, np.zeros((3, 4))) == 0.0
+    assert Across.turn(fdi, view, np.zeros((3, 4))) == 0.0
     assert view["mix"].tolist() == [0.6, 0.0, 0.8, 0.0, 0.0]
 
 
@@ -71,7 +72,7 @@ def declared_along(statistical, m):
     """Noise, jitter, bound, drift of the air and its leap along a direction, by quadratic forms."""
     air, pitch, lateral = statistical["air"], *statistical["block"][:2]
     noise = np.array([lateral["noise"][0], pitch["noise"][0], lateral["noise"][1]])
-    bound = np.abs(m) @ statistical["bounded"]
+    bound = np.abs(m) @ statistical["noise"]["bounded"]
     gusts = air["damping"] @ air["axes"]
     walk = gusts @ np.diag(air["per_metre"]) @ gusts.T
     if air["swings"]:
@@ -80,8 +81,8 @@ def declared_along(statistical, m):
         walk += 0.5 * longest_s**2 * turned @ np.diag(air["per_metre"]) @ turned.T
     moves = float(air["moving"])
     size = max(bound, LEAST_UNCERTAINTY_RAD_S2)
-    drift = statistical["rapidity"] * size**2 + moves * V * m @ walk @ m
-    jitter = (np.abs(m) @ np.sqrt(statistical["jitter"])) ** 2
+    drift = statistical["noise"]["rapidity"] * size**2 + moves * V * m @ walk @ m
+    jitter = (np.abs(m) @ np.sqrt(statistical["noise"]["jitter"])) ** 2
     return m**2 @ noise, jitter, bound, drift, moves * m @ air["leap"] @ m
 
 
@@ -95,7 +96,7 @@ def test_what_is_declared_of_the_axes_is_seen_along_a_direction(fdi, mix, change
     view["mix"][:3], statistical["air"]["swings"], view["block"]["P_dd"][0, 0] = mix, swings, 0.7
     for name, value in changes.items():
         statistical["air"][name] = value
-    across.blur(view, statistical, V)
+    Across.blur(view, statistical, V)
     noise, jitter, bound, drift, leap = declared_along(statistical, np.array(mix))
     block = view["block"]
     assert block["noise"][0] == pytest.approx(noise)
@@ -107,8 +108,8 @@ def test_what_is_declared_of_the_axes_is_seen_along_a_direction(fdi, mix, change
 
 def test_where_no_uncertainty_is_declared_the_least_is_reckoned_with(fdi):
     statistical, view = fdi["statistical"], fdi["statistical"]["views"][ROLL_AXIS]
-    statistical["bounded"], statistical["air"]["moving"] = 0.0, 0
-    across.blur(view, statistical, V)
+    statistical["noise"]["bounded"], statistical["air"]["moving"] = 0.0, 0
+    Across.blur(view, statistical, V)
     assert view["bounded"][0] == 0.0
     assert view["block"]["drift"][0, 0] == pytest.approx(2.0 * LEAST_UNCERTAINTY_RAD_S2**2)
 
@@ -126,7 +127,7 @@ def test_what_constants_multiply_is_that_of_the_axes_along_the_direction(fdi):
         views[v]["block"]["regressor"][:], views[v]["block"]["n_regressors"] = 9.0, 0
         if v == PAST_AILERON:
             views[v]["mix"][:3], views[v]["surface"] = (-0.6, 0.0, 0.8), AN_AXIS
-        across.regress(fdi, views[v], np.ones(3), 0.0)
+        Across.regress(fdi, views[v], np.ones(3), 0.0)
         found = views[v]["block"]["regressor"][:, 0]
         assert found[: len(expected)] == pytest.approx(expected)
         assert (found[len(expected) :] == 9.0).all(), "of no column nothing more"
@@ -140,7 +141,7 @@ def test_of_what_goes_along_a_column_that_may_be_turned_a_share_shows_across(fdi
     view = fdi["statistical"]["views"][PAST_AILERON]
     G, innovation = np.zeros((3, 4)), np.array([0.7, 5.0, -0.4])
     G[0, AILERON], G[2, AILERON], fdi["bound"]["own_errors"] = 0.8 * size, 0.6 * size, own_errors
-    across.regress(fdi, view, innovation, across.turn(fdi, view, G))
+    Across.regress(fdi, view, innovation, Across.turn(fdi, view, G))
     m = view["mix"][[0, 2]]
     along = np.array([m[1], -m[0]])
     e = fdi["bound"]["own_per_rad"][[0, 2], AILERON]
@@ -158,7 +159,7 @@ def test_a_step_signs_as_one_and_a_loss_as_what_its_surface_gives_along_the_dire
     hypotheses = view["block"]["hypothesis"]
     view["block"]["n_hypotheses"], hypotheses["signature"] = 3, 9.0
     hypotheses["kind"][:3], hypotheses["surface"][:3] = (LOSS, STEP, LOSS), (FLAP, -1, AILERON)
-    across.sign(fdi, view, Gu)
+    Across.sign(fdi, view, Gu)
     m = view["mix"][:3]
     assert hypotheses["signature"][:3, 0] == pytest.approx([m @ Gu[:, FLAP], 1.0, m @ Gu[:, AILERON]])
     assert (hypotheses["signature"][:, 1] == 9.0).all()
@@ -170,16 +171,16 @@ def test_a_fault_shows_along_every_axis_that_its_column_moves(fdi, axis):
     view = fdi["statistical"]["views"][PAST_RUDDER]
     moved = np.eye(3)[axis]
     view["mix"][:3] = moved
-    assert across.feels(fdi, view, AILERON, 1e-6 * moved)
-    assert not across.feels(fdi, view, AILERON, 1.0 - moved)
-    assert not across.feels(fdi, view, RUDDER, moved), "across its own column it shows nothing"
+    assert Across.feels(fdi, view, AILERON, 1e-6 * moved)
+    assert not Across.feels(fdi, view, AILERON, 1.0 - moved)
+    assert not Across.feels(fdi, view, RUDDER, moved), "across its own column it shows nothing"
 
 
 @pytest.mark.parametrize(("latched", "tolerated", "frame"), [(False, 1, 6), (True, 1, 6), (False, 0, 7)])
 def test_a_frame_is_seen_along_every_direction(fdi, rng, latched, tolerated, frame):
     """Each view as a block of its own that is given what matrices say of the frame."""
     statistical = fdi["statistical"]
-    statistical["tolerated"], G, Gu = tolerated, *rng.normal(0.0, 3.0, (2, 3, 4))
+    statistical["tests"]["tolerated"], G, Gu = tolerated, *rng.normal(0.0, 3.0, (2, 3, 4))
     innovation = rng.normal(size=3)
     alone, statistical["n_views"] = [], 2  # enough: the first, and one across a column
     statistical["views"][1] = statistical["views"][PAST_AILERON].copy()
@@ -188,14 +189,14 @@ def test_a_frame_is_seen_along_every_direction(fdi, rng, latched, tolerated, fra
         for name in ("correlation", "information", "overlap", "response"):
             lane[name] = rng.uniform(1.0, 2.0, lane[name].shape)
         alone.append(view.copy().view(np.recarray))
-    across.observe(fdi, innovation, G, Gu, FLOW, frame, latched)
+    Across.observe(fdi, innovation, G, Gu, FLOW, frame, latched)
     for view, own in zip(statistical["views"], alone, strict=False):
-        share = across.turn(fdi, own, G) if own["surface"] >= 0 else 0.0
+        share = Across.turn(fdi, own, G) if own["surface"] >= 0 else 0.0
         block = own["block"]
-        across.blur(own, statistical, V)
+        Across.blur(own, statistical, V)
         if tolerated:
-            across.regress(fdi, own, innovation, share)
-        across.sign(fdi, own, Gu)
+            Across.regress(fdi, own, innovation, share)
+        Across.sign(fdi, own, Gu)
         block["scratch"][0] = own["mix"][:3] @ innovation
         if not latched:
             likelihood.start(block, likelihood.slot_to_start(frame))
@@ -209,7 +210,7 @@ def test_a_frame_is_seen_along_every_direction(fdi, rng, latched, tolerated, fra
 def test_views_that_are_not_there_are_not_asked(fdi, rng):
     fdi["statistical"]["n_views"] = 1
     before = fdi["statistical"]["views"].copy()
-    across.observe(fdi, rng.normal(size=3), np.ones((3, 4)), np.ones((3, 4)), FLOW, 3, False)
+    Across.observe(fdi, rng.normal(size=3), np.ones((3, 4)), np.ones((3, 4)), FLOW, 3, False)
     after = fdi["statistical"]["views"]
     changed = [now.tobytes() != then.tobytes() for now, then in zip(after, before, strict=True)]
     assert changed == [True] + [False] * (MAX_VIEWS - 1)
@@ -217,17 +218,17 @@ def test_views_that_are_not_there_are_not_asked(fdi, rng):
 
 def test_any_hypothesis_beyond_the_level_excludes_whom_it_is_not_felt_of(fdi):
     statistical = fdi["statistical"]
-    statistical["alarm_level"], fdi["layout"]["position_of"] = 5.0, range(4)
+    statistical["tests"]["alarm_level"], fdi["layout"]["position_of"] = 5.0, range(4)
     for s, fie in enumerate(fdi["isolation"]["estimator"][:4]):
         fie["kind"], fie["surface"], fie["effect"]["Z"] = POSITION, s, np.eye(3, 4)[:, s]
     view = statistical["views"][ROLL_AXIS]
     tried = int(view["block"]["n_hypotheses"])
     for h in range(MAX_HYPOTHESES):
         view["block"]["hypothesis"]["score"] = np.where(np.arange(MAX_HYPOTHESES) == h, 5.1, 4.9)
-        assert across.excludes(fdi, ELEVATOR) == (h < tried)
-        assert not across.excludes(fdi, AILERON)
+        assert Across.excludes(fdi, ELEVATOR) == (h < tried)
+        assert not Across.excludes(fdi, AILERON)
     view["block"]["hypothesis"]["score"] = 5.0
-    assert not across.excludes(fdi, ELEVATOR), "the level is what chance may reach"
+    assert not Across.excludes(fdi, ELEVATOR), "the level is what chance may reach"
 
 
 def test_a_view_has_levels_and_tolerances_of_the_axes_it_looks_at(fdi):

@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 from kernels import new_fdi
+from statistics_of import Statistical
 
 from beaver_ftc.aircraft.schema import MAX_MONOMIALS
 from beaver_ftc.design import model
-from beaver_ftc.diagnosis import air, redundancy, statistical, thresholds
+from beaver_ftc.diagnosis import air, redundancy, thresholds
 from beaver_ftc.diagnosis.air import AIR
 
 X, U = np.array([0.1, -0.05, 0.07]), np.array([0.1, -0.15, 0.05, 0.2])
@@ -46,15 +47,15 @@ def test_the_drift_of_the_detectors_blocks(moving):
     for before in (0.0, 9.0):
         fdi = new_fdi()
         record = fdi["statistical"]
-        record["n_blocks"], record["air"]["moving"], record["deflection"] = 2, moving, 0.01
+        record["air"]["moving"], record["noise"]["deflection"] = moving, 0.01
         record["air"]["damping"], record["air"]["per_metre"], record["air"]["unseen"] = np.eye(3), 1e-3, 0.5
         record["air"]["axes"] = np.arange(9.0).reshape(3, 3)
         for block, axes in zip(record["block"], ((1,), (0, 2)), strict=False):
             block["n"], block["axis"][: len(axes)], block["stronger"] = len(axes), axes, 1.0
-        record["bounded"] = record["block"]["drift"] = record["block"]["jitter"] = before
+        record["noise"]["bounded"] = record["block"]["drift"] = record["block"]["jitter"] = before
         fdi["bound"]["constant"] = 0.02
-        statistical.drifts(record, fdi, design(), X, Y)
-        found.append([record["bounded"].tolist(), record["block"]["drift"][0, 0, 0].tolist()])
+        Statistical.drifts(record, fdi, design(), X, Y)
+        found.append([record["noise"]["bounded"].tolist(), record["block"]["drift"][0, 0, 0].tolist()])
         found[-1] += [record["block"]["drift"][1].tolist(), record["block"]["jitter"][1].tolist()]
     assert found[0] == found[1]
 

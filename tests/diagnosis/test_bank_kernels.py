@@ -50,10 +50,10 @@ def test_the_alarm_is_of_the_first_axis_on_which_a_filter_leaves_its_bound():
 
 def test_the_closest_approach_of_every_filter_is_kept():
     fdi = with_shares(*LEAVES)
-    fdi["bank"]["closest"][:3], fdi["statistical"]["score"] = (0.6, 0.0, 0.0), 0.4
+    fdi["bank"]["closest"][:3], fdi["statistical"]["alarm"]["score"] = (0.6, 0.0, 0.0), 0.4
     bank.note_closest_approach(fdi)
     assert fdi["bank"]["closest"][:3] == pytest.approx([0.6, 1.5, 1.2])
-    assert fdi["statistical"]["closest"] == 0.4
+    assert fdi["statistical"]["alarm"]["closest"] == 0.4
     silent = new_fdi()
     bank.note_closest_approach(silent)
     assert not silent["bank"]["closest"].any()

@@ -89,7 +89,11 @@ def test_who_is_in_authority_raises_the_alarm(authority, filters, score, axis):
     fdi = new_fdi()
     fdi["config"]["authority"], fdi["verdict"]["detected_axis"] = authority, -1
     fdi["bank"]["threshold"][:3], fdi["bank"]["residual"][1, 2] = 0.1, 0.1 * filters
-    fdi["statistical"]["score"], fdi["statistical"]["axis"], fdi["fdae"]["xhat"] = score, 0, (1.0, 1.0, 1.0)
+    fdi["statistical"]["alarm"]["score"], fdi["statistical"]["alarm"]["axis"], fdi["fdae"]["xhat"] = (
+        score,
+        0,
+        (1.0, 1.0, 1.0),
+    )
     detection.detect(fdi, np.array([1.5, 0.5, 1.0]), 7.0)
     assert fdi["fdae"]["residual"] == pytest.approx([0.5, -0.5, 0.0])
     assert bool(fdi["verdict"]["detected"]) == (axis is not None)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from kernels import new_fdi
+from statistics_of import Across
 
 from beaver_ftc.aircraft import load
 from beaver_ftc.aircraft.aircraft import FORCES, Aircraft
@@ -217,15 +218,15 @@ def test_without_accelerometers_no_force_is_weighed(viewed):
     statistical["inertial_air"]["moving"] = 1
     views = statistical["views"]
     views["held"], views["block"]["hypothesis"]["score"][:, 0] = 50.0, 50.0
-    forces.do_without(statistical)
+    forces.do_without(*(statistical[name] for name in ("forces", "air", "inertial_air")))
     assert not statistical["air"]["read"]
     assert not statistical["inertial_air"]["moving"]
     for v in (ELEVATOR_VIEW, ALPHA_VIEW, UP_VIEW, SIDE_VIEW):
-        assert across.shown(statistical, views[v]) == 0.0
-    assert across.shown(statistical, views[0]) == 50.0
+        assert Across.shown(statistical, views[v]) == 0.0
+    assert Across.shown(statistical, views[0]) == 50.0
     for block in statistical["block"]:
         block["noise"] = 1e-8
-    across.observe(viewed, np.zeros(3), G, 0.0 * G, Y, 1, False)
+    Across.observe(viewed, np.zeros(3), G, 0.0 * G, Y, 1, False)
     assert not views["held"][ELEVATOR_VIEW : SIDE_VIEW + 1].any()
 
 
@@ -241,14 +242,14 @@ def test_accelerometers_that_may_break_raise_no_alarm_and_tell_no_gust(viewed):
     for read in (1, 0):
         air["read"] = read
         views["held"][UP_VIEW] = 50.0
-        assert across.alarm(statistical, views[ELEVATOR_VIEW]) == 9.0 * read
+        assert Across.alarm(statistical, views[ELEVATOR_VIEW]) == 9.0 * read
         views["held"][UP_VIEW] = 0.0
-        assert across.told(statistical, views[0]) == bool(read)
-        assert across.part(viewed, views[0], np.ones(3), PITCH) == pytest.approx(1.0 - 0.2 * read)
-        assert across.shown(statistical, views[0]) == (0.0 if read else 7.0), "nothing is to be cleared"
-        assert across.shown(statistical, views[ELEVATOR_VIEW]) == 0.0
+        assert Across.told(statistical, views[0]) == bool(read)
+        assert Across.part(viewed, views[0], np.ones(3), PITCH) == pytest.approx(1.0 - 0.2 * read)
+        assert Across.shown(statistical, views[0]) == (0.0 if read else 7.0), "nothing is to be cleared"
+        assert Across.shown(statistical, views[ELEVATOR_VIEW]) == 0.0
     views["held"][UP_VIEW] = 50.0
-    assert across.shown(statistical, views[ELEVATOR_VIEW]) == 9.0
+    assert Across.shown(statistical, views[ELEVATOR_VIEW]) == 9.0
 
 
 def test_a_gust_that_nobody_tells_moves_rate_and_force_in_full(viewed):
@@ -260,13 +261,13 @@ def test_a_gust_that_nobody_tells_moves_rate_and_force_in_full(viewed):
     )
     air["moving"], air["damping"], air["axes"], air["read"] = 1, rng.normal(size=(3, 3)), np.eye(3), 0
     air["per_metre"], air["unseen"] = (1e-5, 2e-5, 3e-5), 0.0
-    across.turn(viewed, view, rng.normal(size=(3, 4)))
-    across.blur(view, statistical, 45.0)
+    Across.turn(viewed, view, rng.normal(size=(3, 4)))
+    Across.blur(view, statistical, 45.0)
     m = view["mix"]
     by_both = np.abs(m[:3] @ air["damping"]) + np.abs(m[3:] @ component["damping"])
     still = float(view["block"]["drift"][0, 0])
     air["per_metre"] = 0.0
-    across.blur(view, statistical, 45.0)
+    Across.blur(view, statistical, 45.0)
     gusts = still - float(view["block"]["drift"][0, 0])
     assert gusts == pytest.approx(45.0 * np.sum(by_both**2 * np.array([1e-5, 2e-5, 3e-5])))
 
@@ -277,7 +278,7 @@ def test_noise_of_the_gust_that_forces_tell_blurs_what_clears_a_vane(viewed):
     for v, blurred in ((ALPHA_VIEW, True), (ELEVATOR_VIEW, False)):
         view = statistical["views"][v]
         view["mix"] = 0.0, -0.6, 0.0, 0.0, 0.8
-        across.blur(view, statistical, 45.0)
+        Across.blur(view, statistical, 45.0)
         own = 0.8 * np.sqrt(statistical["forces"]["component"][UP]["jitter"][0])
         assert view["block"]["jitter"][0] == pytest.approx((own + 0.6 * 0.2 * blurred) ** 2)
 
@@ -343,7 +344,11 @@ def test_in_turbulence_gusts_turn_the_flow():
 def viewed():
     fdi = felt(Bounds(coefficients=0.05))
     statistical = fdi["statistical"]
-    statistical["alarm_level"], statistical["naming_level"], statistical["keep"] = 6.0, 0.5 * 5.0**2, 0.99
+    (
+        statistical["tests"]["alarm_level"],
+        statistical["tests"]["naming_level"],
+        statistical["tests"]["keep"],
+    ) = 6.0, 0.5 * 5.0**2, 0.99
     set_up_views(statistical, AIRCRAFT)
     set_up_listening(statistical["listening"], 1e-8, 45.0, 15.0, DT)
     for _ in range(2):
@@ -363,10 +368,10 @@ def test_a_force_is_off_by_what_it_changes_in_two_milliseconds(before, begun, ex
 def test_what_a_force_is_off_widens_what_is_merely_bounded(viewed):
     statistical, view = viewed["statistical"], viewed["statistical"]["views"][ELEVATOR_VIEW]
     view["mix"] = 0.0, 0.6, 0.0, 0.0, -0.8
-    across.blur(view, statistical, 45.0)
+    Across.blur(view, statistical, 45.0)
     before = float(view["bounded"][0])
     statistical["forces"]["component"]["unsettled"][UP] = 0.5
-    across.blur(view, statistical, 45.0)
+    Across.blur(view, statistical, 45.0)
     assert view["bounded"][0] == pytest.approx(before + 0.8 * 0.5)
 
 
@@ -397,7 +402,7 @@ def test_each_surface_is_looked_past_in_the_axis_it_leads_and_its_force(viewed):
 def test_what_goes_along_a_column_of_rate_and_force_is_not_seen_past_it(viewed, v):
     view, G = viewed["statistical"]["views"][v], np.random.default_rng(7).normal(0.0, 3.0, (3, 4))
     G[1, [0, 2]] = G[0, [1, 3]] = G[2, [1, 3]] = 0.0
-    across.turn(viewed, view, G)
+    Across.turn(viewed, view, G)
     first, second = view["plane"]
     force = viewed["statistical"]["forces"]["component"][second - SIDE]
     s = int(view["surface"])
@@ -406,8 +411,8 @@ def test_what_goes_along_a_column_of_rate_and_force_is_not_seen_past_it(viewed, 
     assert np.linalg.norm(view["mix"]) == pytest.approx(1.0)
     assert np.count_nonzero(view["mix"]) == 2
     if s != THE_VANE:
-        assert across.feels(viewed, view, s, G[:, s]) == 0
-        assert across.feels(viewed, view, FLAP if s == ELEVATOR else ELEVATOR, G[:, 1]) == (second == NORMAL)
+        assert Across.feels(viewed, view, s, G[:, s]) == 0
+        assert Across.feels(viewed, view, FLAP if s == ELEVATOR else ELEVATOR, G[:, 1]) == (second == NORMAL)
 
 
 def test_the_side_vane_is_cleared_across_the_rolling_gust_as_well(viewed):
@@ -420,7 +425,7 @@ def test_the_side_vane_is_cleared_across_the_rolling_gust_as_well(viewed):
     moving["damping"], moving["axes"] = rng.normal(size=(3, 3)), np.linalg.qr(rng.normal(size=(3, 3)))[0]
     force = statistical["forces"]["component"][ASIDE]
     column = np.array([force["vane_roll"], *force["vane"]])
-    share = across.turn(viewed, view, np.zeros((3, 4)))
+    share = Across.turn(viewed, view, np.zeros((3, 4)))
     mix = view["mix"][[ROLL, YAW, SIDE]]
     assert np.linalg.norm(view["mix"]) == pytest.approx(1.0)
     assert mix @ column == pytest.approx(0.0, abs=1e-12)
@@ -431,9 +436,9 @@ def test_the_side_vane_is_cleared_across_the_rolling_gust_as_well(viewed):
     corners = np.stack(np.meshgrid(*[(-0.1, 0.1)] * 3)).reshape(3, -1).T * column
     assert share == pytest.approx(np.max(np.abs(corners @ mix)) / (0.9 * np.linalg.norm(column)))
     n = int(view["block"]["n_regressors"])
-    across.regress(viewed, view, np.zeros(3), share)
+    Across.regress(viewed, view, np.zeros(3), share)
     view["cleared_by"] = 0
-    across.regress(viewed, view, np.array([0.4, 7.0, -0.3]), share)
+    Across.regress(viewed, view, np.array([0.4, 7.0, -0.3]), share)
     seen = np.array([0.4, -0.3, force["innovation"]])
     assert view["block"]["regressor"][n - 1, 0] == pytest.approx(
         share * seen @ column / np.linalg.norm(column)
@@ -447,7 +452,7 @@ def test_where_no_vane_and_no_gust_moves_anything_the_direction_stays(viewed):
     view = statistical["views"][BETA_VIEW]
     view["mix"] = 0.6, 0.0, 0.8, 0.0, 0.0
     statistical["air"]["damping"] = 0.0
-    assert across.turn(viewed, view, np.zeros((3, 4))) == 0.0
+    assert Across.turn(viewed, view, np.zeros((3, 4))) == 0.0
     assert view["mix"].tolist() == [0.6, 0.0, 0.8, 0.0, 0.0]
 
 
@@ -460,29 +465,29 @@ def test_a_force_counts_once_the_vane_is_cleared(viewed):
     statistical = viewed["statistical"]
     views = statistical["views"]
     views["held"][ELEVATOR_VIEW], views["mix"][ELEVATOR_VIEW] = 9.0, (0.0, 0.3, 0.0, 0.0, -0.95)
-    assert across.shown(statistical, views[ELEVATOR_VIEW]) == 0.0
+    assert Across.shown(statistical, views[ELEVATOR_VIEW]) == 0.0
     for clearing in (ALPHA_VIEW, UP_VIEW):
         views["held"][[ALPHA_VIEW, UP_VIEW]] = 0.0
         views["held"][clearing] = 5.0
-        assert across.shown(statistical, views[ELEVATOR_VIEW]) == pytest.approx(6.0)
+        assert Across.shown(statistical, views[ELEVATOR_VIEW]) == pytest.approx(6.0)
     views["held"][UP_VIEW] = 50.0
-    assert across.shown(statistical, views[ELEVATOR_VIEW]) == 9.0
+    assert Across.shown(statistical, views[ELEVATOR_VIEW]) == 9.0
     views["held"][[ALPHA_VIEW, UP_VIEW]], views["held"][[BETA_VIEW, SIDE_VIEW]] = 0.0, 50.0
-    assert across.shown(statistical, views[ELEVATOR_VIEW]) == 0.0, "another vane"
+    assert Across.shown(statistical, views[ELEVATOR_VIEW]) == 0.0, "another vane"
     views["block"]["hypothesis"]["score"][0, 0] = 7.0
-    assert across.shown(statistical, views[0]) == 7.0
+    assert Across.shown(statistical, views[0]) == 7.0
 
 
 def test_only_what_is_mostly_a_force_raises_the_alarm(viewed):
     views = viewed["statistical"]["views"]
-    viewed["statistical"]["naming_level"] = 18.0
+    viewed["statistical"]["tests"]["naming_level"] = 18.0
     for v, mix, alarms in (
         (ELEVATOR_VIEW, (0.0, 0.3, 0.0, 0.0, -0.95), True), (FLAP_VIEW, (0.0, 0.95, 0.0, 0.0, 0.3), False),
         (AILERON_VIEW, (0.03, 0.0, 0.0, 1.0, 0.0), True), (ALPHA_VIEW, (0.0, 0.1, 0.0, 0.0, 0.99), False),
         (SIDE_VIEW, (0.0, 0.0, 0.0, 1.0, 0.0), False),
     ):  # fmt: skip
         views["mix"][v], views["held"][:] = mix, 9.0
-        assert (across.alarm(viewed["statistical"], views[v]) > 0.0) == alarms
+        assert (Across.alarm(viewed["statistical"], views[v]) > 0.0) == alarms
 
 
 def test_what_clears_a_vane_excludes_nobody(viewed):
@@ -490,21 +495,21 @@ def test_what_clears_a_vane_excludes_nobody(viewed):
     views = statistical["views"]
     for v in (ALPHA_VIEW, UP_VIEW):
         views["held"][v], views["block"]["hypothesis"]["score"][v, 0] = 50.0, 50.0
-    assert not any(across.excludes(viewed, s) for s in range(4))
+    assert not any(Across.excludes(viewed, s) for s in range(4))
 
 
 def test_a_force_is_weighed_once_the_rate_of_sideslip_of_the_run_before_is_known():
     """A diagnosis begun in a slip that swings: the first force has the rate of its own run."""
     fdi = felt()
     statistical, swinging = fdi["statistical"], measured()
-    statistical["alarm_level"], statistical["keep"] = 6.0, 0.99
+    statistical["tests"]["alarm_level"], statistical["tests"]["keep"] = 6.0, 0.99
     set_up_views(statistical, AIRCRAFT)
     set_up_listening(statistical["listening"], 1e-8, 45.0, 15.0, DT)
     swinging["force"][1] += 20.0
     for looks in (1, 2):
         look(statistical["forces"], statistical["air"], swinging, U, DT)
         assert statistical["forces"]["begun"] == looks
-        across.observe(fdi, np.zeros(3), np.ones((3, 4)), np.zeros((3, 4)), Y, looks, False)
+        Across.observe(fdi, np.zeros(3), np.ones((3, 4)), np.zeros((3, 4)), Y, looks, False)
         weighed = [v for v in statistical["views"] if across.weighs(v) and across.best(v) > 0.0]
         assert bool(weighed) == (looks == 2)
 
@@ -514,7 +519,7 @@ def test_old_evidence_of_a_force_is_forgotten_slowly(viewed):
     statistical["views"]["held"][UP_VIEW] = 8.0
     for block in statistical["block"]:
         block["noise"] = 1e-8
-    across.observe(viewed, np.zeros(3), G, 0.0 * G, Y, 1, False)
+    Across.observe(viewed, np.zeros(3), G, 0.0 * G, Y, 1, False)
     assert statistical["views"]["held"][UP_VIEW] == pytest.approx(8.0 * (1.0 - 0.01 / across.HOLDS))
 
 
@@ -525,13 +530,13 @@ def test_what_errors_multiply_along_a_direction_is_that_of_rate_and_force(viewed
     pitch["n_regressors"], pitch["regressor"][:3, 0] = 3, rng.normal(size=3)
     view, n = statistical["views"][ELEVATOR_VIEW], int(force["n"])
     view["mix"], view["column"] = (0.0, 0.6, 0.0, 0.0, -0.8), (0.0, -0.8, 0.0, 0.0, -0.6)
-    across.regress(viewed, view, np.array([0.0, 2.0, 0.0]), 0.1)
+    Across.regress(viewed, view, np.array([0.0, 2.0, 0.0]), 0.1)
     found = view["block"]["regressor"][: 4 + n, 0]
     along = 0.1 * (-0.8 * 2.0 - 0.6 * force["innovation"])
     expected = [*(0.6 * pitch["regressor"][:3, 0]), *(-0.8 * force["regressor"][:n]), along]
     assert found == pytest.approx(np.array(expected))
     alone = statistical["views"][UP_VIEW]
-    across.regress(viewed, alone, np.zeros(3), 0.0)
+    Across.regress(viewed, alone, np.zeros(3), 0.0)
     assert alone["block"]["regressor"][3 : 3 + n, 0] == pytest.approx(force["regressor"][:n])
     assert alone["block"]["regressor"][3 + n, 0] == pytest.approx(force["drifted"])
 
@@ -539,7 +544,7 @@ def test_what_errors_multiply_along_a_direction_is_that_of_rate_and_force(viewed
 def test_a_loss_signs_with_the_force_it_takes(viewed):
     view, Gu = viewed["statistical"]["views"][FLAP_VIEW], np.random.default_rng(1).normal(size=(3, 4))
     view["mix"] = 0.0, 0.9, 0.0, 0.0, 0.4
-    across.sign(viewed, view, Gu)
+    Across.sign(viewed, view, Gu)
     moment = viewed["statistical"]["forces"]["component"][UP]["moment"][ELEVATOR]
     assert view["block"]["hypothesis"]["signature"][:2, 0] == pytest.approx(
         [1.0, 0.9 * Gu[1, ELEVATOR] + 0.4 * moment]
@@ -549,7 +554,11 @@ def test_a_loss_signs_with_the_force_it_takes(viewed):
 @pytest.mark.parametrize("v", [ELEVATOR_VIEW, UP_VIEW, RUDDER_VIEW])
 def test_what_is_declared_of_rate_and_force_is_seen_along_a_direction(viewed, v):
     statistical, rng = viewed["statistical"], np.random.default_rng(6)
-    statistical["jitter"], statistical["bounded"], statistical["rapidity"] = (1e-6, 4e-6, 9e-6), 0.02, 2.0
+    statistical["noise"]["jitter"], statistical["noise"]["bounded"], statistical["noise"]["rapidity"] = (
+        (1e-6, 4e-6, 9e-6),
+        0.02,
+        2.0,
+    )
     air, view, component = statistical["air"], statistical["views"][v], statistical["forces"]["component"]
     air["moving"], air["damping"], air["axes"] = 1, rng.normal(size=(3, 3)), np.eye(3)
     air["per_metre"] = 1e-5, 2e-5, 3e-5
@@ -559,12 +568,12 @@ def test_what_is_declared_of_rate_and_force_is_seen_along_a_direction(viewed, v)
         statistical["inertial_air"][name] = air[name]
     air["unseen"], statistical["inertial_air"]["unseen"] = (1.0, 0.25, 0.09), (1.0, 0.36, 0.16)
     seen = statistical["inertial_air" if view["clears"] else "air"]["unseen"]
-    across.turn(viewed, view, rng.normal(size=(3, 4)))
-    across.blur(view, statistical, 45.0)
+    Across.turn(viewed, view, rng.normal(size=(3, 4)))
+    Across.blur(view, statistical, 45.0)
     m, block = view["mix"], view["block"]
     by_rates, by_forces = np.abs(m[:3] @ air["damping"]), 1.2 * np.abs(m[3:] @ component["damping"])
     gusts = 45.0 * np.sum((np.sqrt(seen) * by_rates + by_forces) ** 2 * air["per_metre"])
-    sizes = np.sqrt([*statistical["jitter"], *component["jitter"][:, int(view["inertial"])]])
+    sizes = np.sqrt([*statistical["noise"]["jitter"], *component["jitter"][:, int(view["inertial"])]])
     assert block["jitter"][0] == pytest.approx((np.abs(m) @ sizes) ** 2)
     bound = np.abs(m) @ [0.02, 0.02, 0.02, 0.0012, 0.0024]
     assert view["bounded"][0] == pytest.approx(bound)
@@ -612,10 +621,10 @@ def test_a_view_takes_off_the_gust_as_it_may_know_it(viewed, v):
     statistical["air"]["mean"], statistical["inertial_air"]["mean"] = (0.1, 0.2, 0.3), (0.4, 0.5, 0.6)
     seen = 0.5 if v == ALPHA_VIEW else 0.2
     view = statistical["views"][v]
-    assert across.part(viewed, view, np.ones(3), PITCH) == pytest.approx(1.0 - seen)
+    assert Across.part(viewed, view, np.ones(3), PITCH) == pytest.approx(1.0 - seen)
     force = statistical["forces"]["component"][UP]["innovation"]
-    assert across.part(viewed, view, np.ones(3), NORMAL) == force
-    assert across.part(viewed, statistical["views"][ROLL_VIEW], np.ones(3), ROLL) == 1.0
+    assert Across.part(viewed, view, np.ones(3), NORMAL) == force
+    assert Across.part(viewed, statistical["views"][ROLL_VIEW], np.ones(3), ROLL) == 1.0
 
 
 def test_in_moving_air_the_vanes_are_asked_but_for_the_rolling_gust(viewed):

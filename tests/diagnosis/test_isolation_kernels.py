@@ -220,13 +220,13 @@ NAMING = 5.0
 def told(fdi, loss, step):
     """A detector for which a loss of surface 0 explains so much, and a step, by log likelihood ratios."""
     record = fdi["statistical"]
-    record["enabled"], record["n_blocks"], record["naming_level"] = 1, 3, NAMING
+    record["tests"]["enabled"], record["tests"]["naming_level"] = 1, NAMING
     for block in record["block"][1:]:
         block["n_hypotheses"] = 2
         hypotheses = block["hypothesis"][:2]
         hypotheses["kind"], hypotheses["surface"] = (LOSS, STEP), (0, -1)
         hypotheses["at_least"] = hypotheses["at_most"] = loss, step
-    fdi["isolation"]["n"], fdi["config"]["instants"] = 1, 1
+    fdi["isolation"]["n"], record["tests"]["share"] = 1, 1.0
     return estimator(fdi)
 
 
@@ -236,9 +236,9 @@ def test_statistics_rule_out_what_something_else_explains_better(authority, step
     fdi = new_fdi()
     fie, fdi["config"]["authority"] = told(fdi, 0.0, step), authority
     assert isolation.rules_out(fdi, fie, True) == ruled_out
-    fdi["statistical"]["enabled"] = 0
+    fdi["statistical"]["tests"]["enabled"] = 0
     assert not isolation.rules_out(fdi, fie, True)
-    fdi["statistical"]["enabled"], fdi["config"]["authority"] = 1, WORST_CASE
+    fdi["statistical"]["tests"]["enabled"], fdi["config"]["authority"] = 1, WORST_CASE
     assert not isolation.rules_out(fdi, fie, True)
 
 
@@ -246,7 +246,7 @@ def test_statistics_rule_out_what_something_else_explains_better(authority, step
 def test_statistics_that_have_raised_no_alarm_rule_out_nothing(detected_at_s, ruled_out):
     fdi = new_fdi()
     fie, fdi["config"]["authority"] = told(fdi, 0.0, NAMING + 0.1), EITHER
-    fdi["statistical"]["detected_at_s"] = detected_at_s
+    fdi["statistical"]["alarm"]["detected_at_s"] = detected_at_s
     assert isolation.rules_out(fdi, fie, True) == ruled_out
 
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from innovations import block_of, by_onset, with_hypotheses
 from kernels import new_fdi
+from statistics_of import Statistical, put
 
 from beaver_ftc.diagnosis import likelihood, statistical, whitening
 from beaver_ftc.diagnosis.likelihood import ALPHA3, ENDING, GROWING, MAX_HYPOTHESES, N_SLOTS, STEP
@@ -260,9 +261,8 @@ def test_where_a_loss_may_end_what_was_explained_is_remembered_and_uncertainty_c
 def detector(**fields):
     fdi = new_fdi()
     record = fdi["statistical"]
-    record["n_blocks"], record["alarm_level"], record["naming_level"], record["keep"] = 3, 5.0, 4.0, 0.9
-    for name, value in fields.items():
-        record[name] = value
+    record["tests"]["alarm_level"], record["tests"]["naming_level"], record["tests"]["keep"] = 5.0, 4.0, 0.9
+    put(record, **fields)
     for block, axes in zip(record["block"], ((1,), (0, 2), (0, 2)), strict=True):
         block["n"], block["axis"][: len(axes)], block["n_hypotheses"] = len(axes), axes, 3
     return fdi, record
@@ -278,7 +278,7 @@ def test_signatures_are_what_surfaces_gave_steps_and_the_cubic_moment():
     record["block"][0]["hypothesis"]["surface"][:3] = 1, -1, -1
     record["block"][0]["hypothesis"]["axis"][:3] = 1, 1, 1
     Gu = np.arange(12.0).reshape(3, 4)
-    statistical.signatures(record, Gu, 0.7)
+    Statistical.signatures(record, Gu, 0.7)
     lateral = record["block"][1]["hypothesis"]["signature"][:3]
     assert lateral == pytest.approx(np.array([[2.0, 10.0], [0.0, 1.0], [1.0, 0.0]]))
     assert record["block"][0]["hypothesis"]["signature"][:3, 0] == pytest.approx([5.0, 1.0, 0.7])
@@ -294,28 +294,28 @@ def with_scores(*scores, alarms=1):
 
 def test_the_alarm_is_the_largest_share_of_the_level():
     record = with_scores((1.0, 2.0, 0.0), (3.0, 0.0, 4.9), (0.5, 1.5, 2.5))
-    statistical.score(record, 7.0)
-    assert record["score"] == pytest.approx(4.9 / 5.0)
-    assert record["axis"] == 2
-    assert record["detected_at_s"] == -1.0
+    Statistical.score(record, 7.0)
+    assert record["alarm"]["score"] == pytest.approx(4.9 / 5.0)
+    assert record["alarm"]["axis"] == 2
+    assert record["alarm"]["detected_at_s"] == -1.0
     record["block"][1]["hypothesis"]["score"][0] = 6.0
-    statistical.score(record, 8.0)
-    statistical.score(record, 9.0)
-    assert (record["axis"], record["detected_at_s"]) == (0, 8.0)
-    statistical.score(record, 10.0, False)  # where the model's error is not known
-    assert record["score"] == 0.0
+    Statistical.score(record, 8.0)
+    Statistical.score(record, 9.0)
+    assert (record["alarm"]["axis"], record["alarm"]["detected_at_s"]) == (0, 8.0)
+    Statistical.score(record, 10.0, False)  # where the model's error is not known
+    assert record["alarm"]["score"] == 0.0
     silent = with_scores((9.0,) * 3, (9.0,) * 3, (9.0,) * 3, alarms=0)
-    statistical.score(silent, 7.0)
-    assert silent["score"] == 0.0
+    Statistical.score(silent, 7.0)
+    assert silent["alarm"]["score"] == 0.0
 
 
 def test_the_log_has_each_test_as_its_largest_share():
     record, row = with_scores((1.0, 2.0, 0.0), (3.0, 0.0, 4.0), (0.5, 1.5, 2.5)), np.full(6, 9.0)
-    record["n_columns"] = 4
-    statistical.record(record, row)
+    record["tests"]["n_columns"] = 4
+    Statistical.record(record, row)
     assert row == pytest.approx([9.0, 9.0, 0.6, 0.4, 0.8, 0.0])
     record["block"]["hypothesis"]["alarms"] = 0
-    statistical.record(record, row)
+    Statistical.record(record, row)
     assert row == pytest.approx([9.0, 9.0, 0.0, 0.0, 0.0, 0.0])
 
 
@@ -327,18 +327,17 @@ def test_the_estimate_of_a_loss_is_the_surest():
         hypothesis["theta"], hypothesis["certainty"] = theta, certainty
     record["block"][2]["hypothesis"][0] = record["block"][2]["hypothesis"][1]
     record["block"][2]["hypothesis"]["kind"][0], record["block"][2]["hypothesis"]["certainty"][0] = STEP, 9.0
-    assert statistical.loss_of(record, 2) == (-0.4, 5.0)
-    assert statistical.loss_of(record, 1) == (0.0, 0.0)
+    assert statistical.estimated_loss(record["block"], 2) == (-0.4, 5.0)
+    assert statistical.estimated_loss(record["block"], 1) == (0.0, 0.0)
 
 
 def contested(loss=1.0, step=0.0, other=0.0, growing=0.0, ending=0.0, pitch=(0.0, 0.0, 0.0), **keys):
     """Whether a loss of the rudder (2) is excluded, by log likelihood ratios in roll and yaw; in pitch by
     those of (a step, a loss, its end). Naming level 4."""
     fdi, record = detector()
-    fdi["isolation"]["n"] = 2
-    fdi["isolation"]["estimator"]["surface"][:2], fdi["isolation"]["estimator"]["kind"][:2] = (0, 2), LOSS
+    fdi["layout"]["loss_of"] = 0, -1, 1, -1
     fdi["isolation"]["estimator"]["excluded"][0] = keys.get("other_excluded", 0)
-    fdi["config"]["abrupt"], fdi["config"]["instants"] = keys.get("abrupt", 0), keys.get("instants", 1)
+    fdi["config"]["abrupt"], record["tests"]["share"] = keys.get("abrupt", 0), 1.0 / keys.get("instants", 1)
     for b, values in ((1, (loss, step, other, growing, ending)), (2, (99.0, 0.0, 0.0, 0.0, 0.0))):
         block = record["block"][b]
         block["n_hypotheses"] = 5
@@ -348,7 +347,7 @@ def contested(loss=1.0, step=0.0, other=0.0, growing=0.0, ending=0.0, pitch=(0.0
     block = record["block"][0]
     block["hypothesis"]["kind"][:3], block["hypothesis"]["surface"][:3] = (STEP, LOSS, ENDING), (-1, 2, 2)
     block["hypothesis"]["at_least"][:3] = block["hypothesis"]["at_most"][:3] = pitch
-    return bool(statistical.excludes(fdi, 2, keys.get("ends", False)))
+    return bool(Statistical.excludes(fdi, 2, keys.get("ends", False)))
 
 
 def test_a_loss_is_excluded_by_what_explains_better_by_the_naming_level():
@@ -390,16 +389,15 @@ def test_in_pitch_an_end_counts_where_it_is_asked_for():
 )
 def test_a_loss_shows_where_it_explains_better_than_all_else_by_the_naming_level(at_least, shown):
     fdi, record = detector()
-    fdi["isolation"]["n"] = 1
-    fdi["isolation"]["estimator"]["surface"][0], fdi["isolation"]["estimator"]["kind"][0] = 2, LOSS
-    for b in range(record["n_blocks"]):
+    fdi["layout"]["loss_of"] = -1, -1, 0, -1
+    for b in range(3):
         record["block"][b]["n_hypotheses"] = 0
     block = record["block"][1]
     block["n_hypotheses"] = 3
     block["hypothesis"]["kind"][:3], block["hypothesis"]["surface"][:3] = (STEP, LOSS, GROWING), (-1, 2, 2)
     block["hypothesis"]["at_least"][:3] = at_least
-    assert bool(statistical.shows(fdi, 2)) == shown
-    assert not statistical.shows(fdi, 0)
+    assert bool(Statistical.shows(fdi, 2)) == shown
+    assert not Statistical.shows(fdi, 0)
 
 
 def test_an_end_within_a_frame_of_several_instants_keeps_a_part():
@@ -418,25 +416,25 @@ def test_what_the_beliefs_leave_unexplained_is_followed_by_the_drift(b):
     record["air"]["mean"], record["air"]["acceleration"] = mean, (0.1, 0.2, 0.3)
     gains = rng.normal(size=(2, 2))
     record["block"]["K_d"], record["block"]["keep"] = gains, 1.0
-    statistical.follow_rest(record, surprise, DT)
+    Statistical.follow_rest(record, surprise, DT)
     axes = [(1,), (0, 2)][b]
     left = DT * (surprise - mean)[list(axes)]
     drift = gains[: len(axes), : len(axes)] @ left
     assert record["block"][b]["rest"][2 : 2 + len(axes)] == pytest.approx(drift)
     assert not record["block"][2]["rest"].any()
     out = np.zeros(3)
-    statistical.unknown_acceleration(record, out)
+    Statistical.unknown_acceleration(record, out)
     assert out[list(axes)] == pytest.approx(drift + np.array([0.1, 0.2, 0.3])[list(axes)])
 
 
 def test_a_loss_is_open_until_its_estimator_is_excluded():
     fdi, _ = detector()
-    fdi["isolation"]["n"], fdi["isolation"]["estimator"]["kind"][:2] = 2, (1, LOSS)
-    fdi["isolation"]["estimator"]["surface"][:2], fdi["isolation"]["estimator"]["excluded"][:2] = 1, (1, 0)
-    assert statistical.is_open(fdi, 1)
-    assert statistical.is_open(fdi, 3)
-    fdi["isolation"]["estimator"]["excluded"][1] = 1
-    assert not statistical.is_open(fdi, 1)
+    estimators, loss_of = fdi["isolation"]["estimator"], np.array([-1, 1, -1, -1])
+    estimators["excluded"][:2] = 1, 0
+    assert statistical.is_open(estimators, loss_of, 1)
+    assert statistical.is_open(estimators, loss_of, 3)
+    estimators["excluded"][1] = 1
+    assert not statistical.is_open(estimators, loss_of, 1)
 
 
 def test_what_is_just_as_much_excludes_nothing():
@@ -451,19 +449,19 @@ def test_the_first_surface_signs_as_any_other():
     _, record = detector()
     hypothesis = record["block"][1]["hypothesis"]
     hypothesis["kind"][0], hypothesis["surface"][0] = LOSS, 0
-    statistical.signatures(record, np.arange(12.0).reshape(3, 4) + 1.0, 0.7)
+    Statistical.signatures(record, np.arange(12.0).reshape(3, 4) + 1.0, 0.7)
     assert hypothesis["signature"][0].tolist() == [1.0, 9.0]
 
 
 def test_of_equal_shares_the_first_says_the_axis():
     record = with_scores((0.0, 3.0, 0.0), (3.0, 0.0, 3.0), (0.0, 0.0, 0.0))
-    statistical.score(record, 7.0)
-    assert record["axis"] == 1
+    Statistical.score(record, 7.0)
+    assert record["alarm"]["axis"] == 1
 
 
 def test_a_loss_that_nothing_tries_does_not_show():
     fdi, record = detector()
-    record["naming_level"] = 0.5
-    for b in range(record["n_blocks"]):
+    record["tests"]["naming_level"] = 0.5
+    for b in range(3):
         record["block"][b]["n_hypotheses"] = 0
-    assert not statistical.shows(fdi, 2)
+    assert not Statistical.shows(fdi, 2)

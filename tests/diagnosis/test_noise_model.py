@@ -36,9 +36,9 @@ def test_the_level_shares_the_declared_rate_among_all_tests_of_an_hour(rate_hz, 
     alone = Detector(rate_hz, bounds={"turbulence": turbulence})
     hypotheses = [h for block in alone.blocks for h in block["hypothesis"][: block["n_hypotheses"]]]
     tests = sum(N_SLOTS * (1 if h["kind"] == LOSS else 2) for h in hypotheses if h["alarms"])
-    tail = norm.sf(alone.detector["alarm_level"])
+    tail = norm.sf(alone.detector["tests"]["alarm_level"])
     assert tail * tests * rate_hz * 3600 == pytest.approx(1e-3, rel=1e-6)
-    margin = np.sqrt(2 * alone.detector["naming_level"])
+    margin = np.sqrt(2 * alone.detector["tests"]["naming_level"])
     assert norm.sf(margin) * tests * rate_hz == pytest.approx(1e-4, rel=1e-6)
 
 
@@ -49,7 +49,7 @@ def test_false_alarms_are_no_more_than_declared_and_not_absurdly_fewer(setting, 
     """On innovations as declared, a new flight after every alarm. The union bound costs a factor of six or
     so: tests of neighbouring onsets and frames go together."""
     alone = Detector(rate_hz, bounds=SETTINGS[setting])
-    alone.detector["alarm_level"] = noise_model.alarm_level(per_h, rate_hz)
+    alone.detector["tests"]["alarm_level"] = noise_model.alarm_level(per_h, rate_hz)
     hours, rng = 240.0 / 3600.0, np.random.default_rng(8)
     frames = round(hours * 3600.0 * rate_hz)
     scores = alone.watch(alone.innovations(frames, rng), *surfaces_at_work(frames, rate_hz, rng), renew=True)
@@ -204,14 +204,16 @@ def test_noise_of_other_sensors_and_of_deflections_is_part_of_the_noise():
         moved[i] += error if i < 3 else 0.0
         told = misread(y, i - 3, error, thin_kw) if i >= 3 else y
         square += (_rates(design, moved[:3], told, u) - _rates(design, x, y, u)) ** 2
-    by_power = np.append(y[:4], y[4] + KW_TO_DPT * float(alone.detector["reading_noise"][4]) / (y[3] * y[2]))
+    by_power = np.append(
+        y[:4], y[4] + KW_TO_DPT * float(alone.detector["noise"]["reading"][4]) / (y[3] * y[2])
+    )
     square += (_rates(design, x, by_power, u) - _rates(design, x, y, u)) ** 2
-    assert alone.detector["jitter"] == pytest.approx(square, rel=0.02)
+    assert alone.detector["noise"]["jitter"] == pytest.approx(square, rel=0.02)
     for block in alone.blocks:
         n = block["n"]
         assert block["jitter"][:n] == pytest.approx(square[block["axis"][:n]], rel=0.02)
     half_a_degree = np.abs(_rates(design, x, y, u) - _rates(design, x, y, u + np.deg2rad([0, 0.5, 0, 0])))[1]
-    assert alone.detector["deflection"][1] >= half_a_degree
+    assert alone.detector["noise"]["deflection"][1] >= half_a_degree
     calm = Detector(100.0, bounds=TACTICAL)
     assert alone.blocks[0]["drift"][0, 0] > calm.blocks[0]["drift"][0, 0]
     assert statistical.PITCH == 0

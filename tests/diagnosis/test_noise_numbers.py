@@ -76,7 +76,7 @@ def test_a_bound_of_zero_is_reckoned_with_as_a_small_one():
 
 def returning(rapidity, moving=1, rolling=200.0, rate_hz=50.0):
     record = np.zeros(1, STATISTICAL)[0]
-    record["rapidity"], record["alarm_level"] = rapidity, 6.0
+    record["noise"]["rapidity"], record["tests"]["alarm_level"] = rapidity, 6.0
     record["air"]["moving"], record["air"]["rolling"] = moving, rolling
     return noise_model.returning_length(record, V, rate_hz)
 
@@ -123,8 +123,8 @@ def test_every_plane_has_its_losses_their_courses_steps_and_pitch_the_cubic_mome
             if h["alarms"]:
                 place = column[LOSS][int(h["surface"])] if h["kind"] == LOSS else 3 + h["axis"]
                 assert h["column"] == place
-    assert alone.detector["n_columns"] == 6
-    assert alone.detector["n_blocks"] == 3
+    assert alone.detector["tests"]["n_columns"] == 6
+    assert alone.detector["block"]["n_hypotheses"].all()
 
 
 def test_a_block_begins_with_the_gyros_noise_and_a_drift_that_may_be_anything():
@@ -141,18 +141,18 @@ def test_a_block_begins_with_the_gyros_noise_and_a_drift_that_may_be_anything():
             assert block["P_xx"][i, i] == block["noise"][i]
             assert block["P_dd"][i, i] == 1.0
     start = assemble(Scenario.model_validate(GIVEN), np.zeros(4), TRAVEL_RAD)[0]["fdi"]["statistical"]
-    assert start["n_blocks"] == 0, "before a trim nothing of it is set up"
+    assert not start["block"]["n_hypotheses"].any(), "before a trim nothing of it is set up"
     ideal = Detector(50.0).blocks[1]
     assert ideal["noise"] == pytest.approx([1e-18, 1e-18])
 
 
 def test_the_times_and_levels_of_a_detector(alone):
     record, blocks = alone.detector, alone.blocks
-    assert record["keep"] == pytest.approx(exp(-1.0 / (50.0 * 4.0)))
-    assert record["detected_at_s"] == -1.0
-    assert record["enabled"] == 1
+    assert record["tests"]["keep"] == pytest.approx(exp(-1.0 / (50.0 * 4.0)))
+    assert record["alarm"]["detected_at_s"] == -1.0
+    assert record["tests"]["enabled"] == 1
     for block in blocks:
-        assert block["level"] == record["alarm_level"]
+        assert block["level"] == record["tests"]["alarm_level"]
         assert block["chance"] == 0.5
         assert block["pace"] == pytest.approx(15.0 / 50.0)
         assert block["hypothesis"]["growth_keep"] == pytest.approx(exp(-1.5 / 50.0))
@@ -183,7 +183,7 @@ def test_the_second_view_returns_with_a_gust_as_strong_where_it_is_slow(alone):
 
 
 def test_where_nothing_diagnoses_nothing_is_enabled():
-    assert Detector(50.0, statistical=None).detector["enabled"] == 0
+    assert Detector(50.0, statistical=None).detector["tests"]["enabled"] == 0
 
 
 def _tolerance(**bounds):
@@ -241,12 +241,12 @@ def test_inertia_scales_every_term_by_the_worst_of_its_own_axes():
 
 def test_blocks_get_the_tolerances_of_their_axes():
     alone = Detector(50.0, bounds={"coefficients": 0.1})
-    assert alone.detector["tolerated"] == 1
+    assert alone.detector["tests"]["tolerated"] == 1
     for block, axes in zip(alone.blocks, ((1,), (0, 2), (0, 2)), strict=True):
         of_it = SIZE[np.isin(AXIS, axes)]
         assert block["n_regressors"] == of_it.size
         assert block["tolerance"][: of_it.size] == pytest.approx(0.1 * of_it)
-    assert Detector(50.0).detector["tolerated"] == 0
+    assert Detector(50.0).detector["tests"]["tolerated"] == 0
 
 
 def test_the_noise_of_vanes_and_airspeed_turns_the_gust_they_see():
@@ -288,16 +288,16 @@ def test_the_noise_of_what_the_model_is_made_of_is_white():
         noise, _, quantum = getattr(given.sensors, name).noise_bias_quantum
         jitter += slope**2 * (noise**2 + quantum**2 / 12.0)
     still, gusty = as_set_up(UNEVEN), as_set_up({**UNEVEN, "turbulence": "light"})
-    assert still["jitter"] == pytest.approx(jitter)
+    assert still["noise"]["jitter"] == pytest.approx(jitter)
     seen = gust_jitter(given.sensors, design_record()[0], SPAN_M)
-    assert gusty["jitter"] == pytest.approx(jitter + seen**2)
-    assert still["deflection"] == pytest.approx(radians(0.5) * np.abs(G).sum(axis=1))
+    assert gusty["noise"]["jitter"] == pytest.approx(jitter + seen**2)
+    assert still["noise"]["deflection"] == pytest.approx(radians(0.5) * np.abs(G).sum(axis=1))
 
 
 def test_the_walk_is_that_of_the_largest_bound_and_the_noisiest_gyro():
     record = Detector(50.0, bounds=UNEVEN).detector
-    expected = noise_model.rapidity(0.05, 15.0, radians(0.2), float(record["alarm_level"]), 0.02)
-    assert record["rapidity"] == pytest.approx(expected)
+    expected = noise_model.rapidity(0.05, 15.0, radians(0.2), float(record["tests"]["alarm_level"]), 0.02)
+    assert record["noise"]["rapidity"] == pytest.approx(expected)
 
 
 def test_vanes_and_airspeed_err_together_in_the_gust_they_see():
@@ -316,7 +316,7 @@ def test_means_over_a_frame_are_shared_among_its_instants(instants, share):
     alone.fdi["config"]["instants"] = instants
     design = alone.frames[0]["belief"]["design"]
     noise_model.set_up(alone.fdi, config, design, MASS, LEVEL_FLIGHT, 50.0)
-    assert alone.detector["share"] == share
+    assert alone.detector["tests"]["share"] == share
 
 
 def test_an_elevator_off_trim_is_in_what_constants_multiply():
@@ -364,7 +364,7 @@ def test_where_forces_are_weighed_their_noise_is_in_the_gust_that_follows_from_t
     airspeed = LEVEL_FLIGHT[1][2]
     walked = known * np.sqrt(1.5**2 + 0.5**2) * np.array([0.2, 0.3]) * dt / airspeed
     added = gusts.jitter(walked, design, *LEVEL_FLIGHT[1:], SPAN_M)
-    assert np.sqrt(statistical["jitter"]) == pytest.approx(added, rel=0.02)
+    assert np.sqrt(statistical["noise"]["jitter"]) == pytest.approx(added, rel=0.02)
     by_force = known * np.array([0.2 / 50.0, 0.3 / 6.0])
     blurred = gusts.jitter(by_force, design, *LEVEL_FLIGHT[1:], SPAN_M)
     assert forces["blurred"] == pytest.approx(blurred)

@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 from innovations import Detector, misread
+from statistics_of import Statistical
 
 from beaver_ftc.design.engine import KW_TO_DPT
 from beaver_ftc.design.variants import response
-from beaver_ftc.diagnosis import readings, statistical
+from beaver_ftc.diagnosis import readings
 from beaver_ftc.diagnosis.likelihood import N_READINGS
 from beaver_ftc.scenario.diagnosis import Bounds
 from flying import flown
@@ -47,7 +48,7 @@ def at(state, **bounds):
     """A detector that has looked at a state, its design model, and the state as arrays."""
     alone = Detector(100.0, bounds=bounds)
     design, flown_there = alone.frames[0]["belief"]["design"], tuple(map(np.array, state))
-    statistical.prepare(alone.detector, alone.fdi, design, *flown_there)
+    Statistical.prepare(alone.detector, alone.fdi, design, *flown_there)
     return alone, design, flown_there
 
 
@@ -68,10 +69,10 @@ def test_a_steady_error_is_a_constant_times_what_it_moves_now(state):
 def test_noise_is_jitter_as_large_as_it_is_now(state):
     alone, design, flown_there = at(state, sensors="tactical-grade")
     thin, detector = float(alone.fdi["bound"]["admitted"]["thin_air_kw"]), alone.detector
-    expected = detector["own_jitter"].copy()
+    expected = detector["noise"]["own_jitter"].copy()
     for which in range(N_READINGS):
-        expected += (moved(design, *flown_there, which, thin) * detector["reading_noise"][which]) ** 2
-    assert detector["jitter"] == pytest.approx(expected, rel=1e-5)
+        expected += (moved(design, *flown_there, which, thin) * detector["noise"]["reading"][which]) ** 2
+    assert detector["noise"]["jitter"] == pytest.approx(expected, rel=1e-5)
     for block in alone.blocks:
         axes = block["axis"][: block["n"]]
         assert block["jitter"][: len(axes)] == pytest.approx(expected[axes], rel=1e-5)
@@ -79,8 +80,8 @@ def test_noise_is_jitter_as_large_as_it_is_now(state):
 
 def test_without_errors_of_the_air_data_nothing_is_read():
     alone = Detector(100.0, bounds={"coefficients": 0.05})
-    assert alone.detector["read"] == 0
-    assert Detector(100.0).detector["tolerated"] == 0
+    assert alone.detector["noise"]["read"] == 0
+    assert Detector(100.0).detector["tests"]["tolerated"] == 0
     gyros = Bounds.model_validate({"sensors": {"p": {"noise_std_deg_s": 0.1}}}).sensors
     record = alone.detector
     admitted = alone.fdi["bound"]["admitted"]

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from kernels import DT, new_fdi
 from scipy.spatial.transform import Rotation
+from statistics_of import Statistical, put
 
 from beaver_ftc.aircraft import load
 from beaver_ftc.aircraft.aircraft import FORCES
@@ -219,13 +220,12 @@ def test_the_unknown_is_larger_than_what_terms_give_far_from_where_they_were_fit
 def new_detector(**fields):
     fdi = new_fdi()
     record = fdi["statistical"]
-    record["n_blocks"], record["share"], record["rapidity"] = 3, 0.25, 2.0
-    record["jitter"], record["deflection"] = (0.1, 0.2, 0.3), (0.01, 0.02, 0.03)
+    record["tests"]["share"], record["noise"]["rapidity"] = 0.25, 2.0
+    record["noise"]["jitter"], record["noise"]["deflection"] = (0.1, 0.2, 0.3), (0.01, 0.02, 0.03)
     for block, axes in zip(record["block"], ((1,), (0, 2), (0, 2)), strict=True):
         block["n"], block["axis"][: len(axes)], block["stronger"] = len(axes), axes, 1.0
     record["block"][2]["stronger"], record["block"][2]["lag"] = 4.0, 90.0
-    for name, value in fields.items():
-        record[name] = value
+    put(record, **fields)
     return fdi, record, design_record().view(np.recarray)[0]
 
 
@@ -237,11 +237,11 @@ def test_the_drift_is_of_what_is_bounded_and_of_the_air_not_seen(moving):
     record["air"]["damping"], record["air"]["axes"] = rng.normal(size=(2, 3, 3))
     record["air"]["unseen"], record["air"]["per_metre"] = (1.0, 0.2, 0.3), (1e-3, 2e-3, 3e-3)
     fdi["bound"]["constant"], fdi["bound"]["inertia"] = (0.02, 0.0, 0.04), 0.1
-    statistical.drifts(record, fdi, design, X, Y)
+    Statistical.drifts(record, fdi, design, X, Y)
     bounded = np.zeros(3)
     thresholds.uncertainty_bound(X, design, np.full(3, 0.1), np.array([0.02, 0.0, 0.04]), 0.0, bounded)
     bounded += [0.01, 0.02, 0.03]
-    assert record["bounded"] == pytest.approx(bounded)
+    assert record["noise"]["bounded"] == pytest.approx(bounded)
     turned = record["air"]["damping"] @ record["air"]["axes"]
     unseen = moving * V * turned @ np.diag([1e-3, 4e-4, 9e-4]) @ turned.T
     for block, stronger in zip(record["block"], (1.0, 1.0, 4.0), strict=True):
@@ -254,7 +254,7 @@ def test_the_drift_is_of_what_is_bounded_and_of_the_air_not_seen(moving):
 
 def test_where_nothing_is_bounded_a_little_is_reckoned_with():
     fdi, record, design = new_detector(deflection=0.0)
-    statistical.drifts(record, fdi, design, np.zeros(3), Y)
+    Statistical.drifts(record, fdi, design, np.zeros(3), Y)
     assert record["block"][0]["drift"][0, 0] == pytest.approx(2.0 * 1e-6)
 
 
@@ -263,7 +263,7 @@ def test_regressors_are_what_each_coefficient_multiplies():
     fdi, record, design = new_detector(share=1.0, tolerated=1)
     record["block"]["regressor"] = 9.0
     x = np.zeros(3)
-    statistical.prepare(record, fdi, design, x, Y, U)
+    Statistical.prepare(record, fdi, design, x, Y, U)
     value = design["moments"]["value"][: len(AIRCRAFT.moments)]
     axis = np.array([("Cl", "Cm", "Cn").index(term.coefficient) for term in AIRCRAFT.moments])
     f, G = np.zeros(3), np.zeros((3, 4))
@@ -272,19 +272,19 @@ def test_regressors_are_what_each_coefficient_multiplies():
     for block, axes in zip(record["block"], ((1,), (0, 2), (0, 2)), strict=True):
         of_it = value[np.isin(axis, axes)]
         assert of_it @ block["regressor"][: of_it.size, : len(axes)] == pytest.approx(total[list(axes)])
-    terms = np.zeros_like(record["terms"])
+    terms = np.zeros_like(record["noise"]["terms"])
     regressors(design["moments"], design["moments"]["power"], U, terms)
-    assert record["terms"] == pytest.approx(terms)
+    assert record["noise"]["terms"] == pytest.approx(terms)
 
 
 def test_instants_inside_a_frame_add_to_the_mean():
     fdi, record, design = new_detector(tolerated=1)
-    statistical.prepare(record, fdi, design, X, Y, U)
+    Statistical.prepare(record, fdi, design, X, Y, U)
     once = record["block"]["regressor"].copy()
     for _ in range(3):
-        statistical.look(record, fdi, design, X, Y, U, np.zeros(3), DT)
+        Statistical.look(record, fdi, design, X, Y, U, np.zeros(3), DT)
     assert record["block"]["regressor"] == pytest.approx(4.0 * once)
-    statistical.prepare(record, fdi, design, X, Y, U)
+    Statistical.prepare(record, fdi, design, X, Y, U)
     assert record["block"]["regressor"] == pytest.approx(once)
 
 
@@ -333,7 +333,11 @@ def test_a_plug_ins_verdict_takes_the_place_of_the_built_in_one():
 )  # fmt: skip
 def test_the_built_in_statistic(enabled, authority, score, share, statistic):
     fdi = new_fdi()
-    fdi["statistical"]["enabled"], fdi["config"]["authority"], fdi["statistical"]["score"] = (
+    (
+        fdi["statistical"]["tests"]["enabled"],
+        fdi["config"]["authority"],
+        fdi["statistical"]["alarm"]["score"],
+    ) = (
         enabled,
         authority,
         score,
@@ -351,7 +355,6 @@ def test_the_estimate_is_that_of_whoever_counts():
         fdi["layout"]["dominant_axis"][2],
     ) = 5, 2, 1
     fdi["isolation"]["estimator"]["theta"][5] = -0.1, -0.2, -0.3
-    fdi["statistical"]["n_blocks"] = 1
     block = fdi["statistical"]["block"][0]
     block["n_hypotheses"], block["n"], block["axis"][0] = 1, 1, 1
     hypothesis = block["hypothesis"][0]
@@ -367,7 +370,7 @@ def test_the_estimate_is_that_of_whoever_counts():
     fdi["fdae"]["network"]["output"], block["rest"] = 0.3, (0, 0, 0.7, 0)
     scheme.unknown_acceleration(fdi, out)
     assert out == pytest.approx([0.3] * 3)
-    fdi["statistical"]["enabled"] = 1
+    fdi["statistical"]["tests"]["enabled"] = 1
     assert scheme.isolated_theta(fdi, 2) == -0.6
     scheme.unknown_acceleration(fdi, out)
     assert out[1] == 0.7

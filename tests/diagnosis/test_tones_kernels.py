@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from kernels import DT, new_fdi
+from statistics_of import Across
 
 from beaver_ftc.design.terms import AIRSPEED, ALPHA, BETA
 from beaver_ftc.diagnosis import across, tones, whitening
@@ -257,7 +258,11 @@ def test_the_loudest_tone_counts_as_the_best_test_of_a_view(view):
 )
 def test_what_raises_the_alarm_beside_the_blocks(surface, plane, mix, inertial, expected):
     statistical = new_fdi()["statistical"]
-    statistical["alarm_level"], statistical["naming_level"], statistical["n_views"] = 5.0, 12.5, 2
+    statistical["tests"]["alarm_level"], statistical["tests"]["naming_level"], statistical["n_views"] = (
+        5.0,
+        12.5,
+        2,
+    )
     statistical["air"]["read"] = statistical["forces"]["known"] = 1
     view, clearing = statistical["views"][:2]
     clearing["clears"], clearing["plane"], clearing["held"] = 1, (YAW, SIDE), 50.0
@@ -266,4 +271,4 @@ def test_what_raises_the_alarm_beside_the_blocks(surface, plane, mix, inertial, 
     view["block"]["n_hypotheses"], view["block"]["hypothesis"]["score"] = 1, 9.0
     for i, share in mix.items():
         view["mix"][i] = share
-    assert across.alarm(statistical, view) == expected
+    assert Across.alarm(statistical, view) == expected

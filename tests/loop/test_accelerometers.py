@@ -159,4 +159,4 @@ def test_where_one_breaks_forces_are_weighed_no_more():
     for _ in loop.chunks():
         pass
     assert not statistical["forces"]["known"]
-    assert np.isfinite(statistical["score"])
+    assert np.isfinite(statistical["alarm"]["score"])

@@ -172,6 +172,8 @@ def test_a_plug_in_that_diagnoses_has_the_record_to_itself():
         fdi["config"]["every_type"],
         fdi["watch"]["enabled"],
     )
-    assert (*off, fdi["statistical"]["enabled"], frames["control"]["power"]["enabled"][0]) == (0,) * 6
+    assert (*off, fdi["statistical"]["tests"]["enabled"], frames["control"]["power"]["enabled"][0]) == (
+        0,
+    ) * 6
     assert fdi["isolation"]["estimator"]["surface"][:4].tolist() == [AILERON, ELEVATOR, RUDDER, FLAP]
     assert plugin_frame.plugged(frames, scenario, np.ones(40), None, None) is None

@@ -26,7 +26,7 @@ GOES_ON = {
         *(f"control.{name}" for name in REFERENCE_AND_COMMAND),
         *(f"control.power.{name}" for name in ENGINE),
     },
-    "scheme": {"fdi.bank.closest", "fdi.statistical.closest"},
+    "scheme": {"fdi.bank.closest", "fdi.statistical.alarm.closest"},
     "sensors": {
         f"instruments.{name}"
         for name in ("random", "random_further", "random_force", "random_fault", "lagged", "line", "reading",

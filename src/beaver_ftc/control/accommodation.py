@@ -65,7 +65,7 @@ def is_doubtful(control, fdi, s):
 def act_on_loss(control, fdi, s):
     """Surface s has lost effectiveness; what is known well need not be eased in."""
     control.target[s] = 1.0 + isolated_theta(fdi, s)
-    if likelihood_counts(fdi) and statistical.loss_of(fdi.statistical, s)[1] > SURE:
+    if likelihood_counts(fdi) and statistical.estimated_loss(fdi.statistical.block, s)[1] > SURE:
         control.effectiveness[s] = control.target[s]
 
 

@@ -32,8 +32,8 @@ known by them. Known to be broken, or suspected of it, they count no more.
 import numpy as np
 
 from beaver_ftc.compiled import kernel
-from beaver_ftc.design.terms import AIRSPEED
-from beaver_ftc.diagnosis import air, likelihood, tones
+from beaver_ftc.diagnosis import likelihood, tones
+from beaver_ftc.diagnosis.air import along, drift_beside, whole_drift
 from beaver_ftc.diagnosis.forces import SETTLED
 from beaver_ftc.diagnosis.likelihood import BLOCK, LATERAL, LEAST_UNCERTAINTY_RAD_S2, PITCH_BLOCK, STEP
 from beaver_ftc.diagnosis.state import PITCH, ROLL, SIDE, YAW
@@ -50,12 +50,14 @@ MAX_VIEWS = 16
 # inertial: the force by an angle that no vane gave; clears: what it shows is no vane's doing; cleared_by: the
 # force of the views that clear its vane, 0 where it asks none. held: its largest score, slowly forgotten.
 # axis: that an alarm of it is said to be about. past_gust: across the rolling gust too. column: of length 1.
+# Of the frame: whether it is weighed; which share of what goes along its column may show across.
 AN_AXIS, THE_VANE = -1, -2
 VIEW = np.dtype(
     [
         ("surface", "i8"), ("axis", "i8"), ("mix", "f8", (5,)), ("plane", "i8", (2,)),
         ("past_gust", "i8"), ("column", "f8", (5,)), ("tolerated", "i8"),
         ("inertial", "i8"), ("clears", "i8"), ("cleared_by", "i8"),
+        ("weighed", "i8"), ("shows_across", "f8"),
         ("bounded", "f8", (1,)), ("by_rates", "f8", (3,)), ("by_forces", "f8", (3,)), ("held", "f8"),
         ("block", BLOCK), ("tones", TONES),
     ],
@@ -64,37 +66,36 @@ VIEW = np.dtype(
 
 
 @kernel
-def part(fdi, view, innovation, i):
+def part(view, forces, air, inertial_air, innovation, i):
     """Component i of what is looked at, rad/s2: of the rates' innovation (3,), or of a force's."""
     if i < SIDE:
-        gust = gust_of(fdi.statistical, view).mean[i] if told(fdi.statistical, view) else 0.0
-        return innovation[i] - gust
-    force = fdi.statistical.forces.component[i - SIDE]
+        return innovation[i] - (gust_of(view, air, inertial_air).mean[i] if told(view, air) else 0.0)
+    force = forces.component[i - SIDE]
     return force.inertial if view.inertial else force.innovation
 
 
 @kernel
-def column_of(fdi, view, G, j):
+def column_of(view, forces, bound, G, j):
     """The j-th of the two components of the column a view looks across, and how far off it can be."""
     i, s = view.plane[j], view.surface
     if s == THE_VANE:
-        size = fdi.statistical.forces.component[view.plane[1] - SIDE].vane[j]
+        size = forces.component[view.plane[1] - SIDE].vane[j]
         return size, VANE_TOLERANCE * abs(size)
     if i >= SIDE:
-        force = fdi.statistical.forces.component[i - SIDE]
+        force = forces.component[i - SIDE]
         return force.column[s], force.own[s]
-    return G[i, s], fdi.bound.own_per_rad[i, s] if fdi.bound.own_errors else 0.0
+    return G[i, s], bound.own_per_rad[i, s] if bound.own_errors else 0.0
 
 
 @kernel
-def turn(fdi, view, G):
+def turn(view, forces, air, bound, G):
     """Fill `mix` and `column` (5,), for a view across a column, G (3, n); returns which share of what goes
     along it the errors of the column let show across."""
     if view.past_gust:
-        return turn_past_gust(fdi.statistical, view)
+        return turn_past_gust(view, forces, air)
     first, second = view.plane[0], view.plane[1]
-    one, one_off = column_of(fdi, view, G, 0)
-    other, other_off = column_of(fdi, view, G, 1)
+    one, one_off = column_of(view, forces, bound, G, 0)
+    other, other_off = column_of(view, forces, bound, G, 1)
     size = np.sqrt(one * one + other * other)
     if size == 0.0:
         return 0.0
@@ -106,13 +107,13 @@ def turn(fdi, view, G):
 
 
 @kernel
-def turn_past_gust(statistical, view):
+def turn_past_gust(view, forces, air):
     """The same across the column of the side vane in roll, yaw and side force, and across what the rolling
     gust does to the rates: the vector product of the two."""
-    force, moving = statistical.forces.component[0], statistical.air
+    force = forces.component[0]
     roll, yaw, side = force.vane_roll, force.vane[0], force.vane[1]
-    roll_gust = air.along(moving.damping[ROLL], moving.axes, 0)
-    yaw_gust = air.along(moving.damping[YAW], moving.axes, 0)
+    roll_gust = along(air.damping[ROLL], air.axes, 0)
+    yaw_gust = along(air.damping[YAW], air.axes, 0)
     by_roll, by_yaw, by_side = -side * yaw_gust, side * roll_gust, roll * yaw_gust - yaw * roll_gust
     length = np.sqrt(by_roll * by_roll + by_yaw * by_yaw + by_side * by_side)
     if length == 0.0:
@@ -125,9 +126,9 @@ def turn_past_gust(statistical, view):
 
 
 @kernel
-def told(statistical, view):
+def told(view, air):
     """Whether a view is told the gust: only one that the measured force clears of broken surfaces."""
-    return view.cleared_by > 0 and statistical.air.read == 1
+    return view.cleared_by > 0 and air.read == 1
 
 
 @kernel
@@ -137,62 +138,62 @@ def weighs(view):
 
 
 @kernel
-def gust_of(statistical, view):
+def gust_of(view, air, inertial_air):
     """The air by which a view knows the gust: that the vanes show, or that follows without them."""
-    return statistical.inertial_air if view.clears else statistical.air
+    return inertial_air if view.clears else air
 
 
 @kernel
-def feel_gust(view, statistical):
-    """Fill `by_rates` and `by_forces` (3,), 1/s: what the air's rotation about body axes does in a view."""
-    m, damping = view.mix, statistical.air.damping
+def feel_gust(view, forces, damping):
+    """Fill `by_rates` and `by_forces` (3,), 1/s: what the air's rotation about body axes does in a view;
+    damping (3, 3) 1/s: to the rates."""
+    m = view.mix
     for k in range(3):
         view.by_rates[k] = (
             m[ROLL] * damping[ROLL, k] + m[PITCH] * damping[PITCH, k] + m[YAW] * damping[YAW, k]
         )
         view.by_forces[k] = 0.0
         for f in range(2):
-            force = statistical.forces.component[f]
-            view.by_forces[k] += m[SIDE + f] * force.damping[k] * statistical.forces.strength
+            view.by_forces[k] += m[SIDE + f] * forces.component[f].damping[k] * forces.strength
 
 
 @kernel
-def blur(view, statistical, V):
+def blur(view, noise, blocks, forces, air, inertial_air, V):
     """Fill noise, jitter, drift and bound of a view's block from what is declared; V m/s."""
     block, m = view.block, view.mix
-    noise, jitter, bound, drift, strength = 0.0, 0.0, 0.0, 0.0, statistical.forces.strength
+    variance, jitter, bound, drift = 0.0, 0.0, 0.0, 0.0
     for i in range(3):
-        noise += m[i] * m[i] * statistical.block[PITCH_BLOCK if i == PITCH else LATERAL].noise[i // 2]
-        jitter += abs(m[i]) * np.sqrt(statistical.jitter[i])
+        variance += m[i] * m[i] * blocks[PITCH_BLOCK if i == PITCH else LATERAL].noise[i // 2]
+        jitter += abs(m[i]) * np.sqrt(noise.jitter[i])
         if view.clears:
-            jitter += abs(m[i]) * statistical.forces.blurred[i]
-        bound += abs(m[i]) * statistical.bounded[i]
+            jitter += abs(m[i]) * forces.blurred[i]
+        bound += abs(m[i]) * noise.bounded[i]
     for f in range(2):
-        force = statistical.forces.component[f]
+        force = forces.component[f]
         jitter += abs(m[SIDE + f]) * np.sqrt(force.jitter[view.inertial])
         if view.inertial:
-            drift += (m[SIDE + f] * strength) ** 2 * force.wander
-        bound += abs(m[SIDE + f]) * (force.deflection * strength + force.unsettled)
-    if statistical.air.moving:
-        feel_gust(view, statistical)
-        if told(statistical, view):
-            drift += air.drift_beside(gust_of(statistical, view), V, view.by_rates, view.by_forces)
+            drift += (m[SIDE + f] * forces.strength) ** 2 * force.wander
+        bound += abs(m[SIDE + f]) * (force.deflection * forces.strength + force.unsettled)
+    if air.moving:
+        feel_gust(view, forces, air.damping)
+        if told(view, air):
+            drift += drift_beside(gust_of(view, air, inertial_air), V, view.by_rates, view.by_forces)
         else:
-            drift += air.whole_drift(statistical.air, V, view.by_rates, view.by_forces)
+            drift += whole_drift(air, V, view.by_rates, view.by_forces)
         for i in range(3):
             for j in range(3):
-                block.P_dd[0, 0] += m[i] * m[j] * statistical.air.leap[i, j]
+                block.P_dd[0, 0] += m[i] * m[j] * air.leap[i, j]
     size = max(bound, LEAST_UNCERTAINTY_RAD_S2)
-    block.noise[0], block.jitter[0], view.bounded[0] = noise, jitter * jitter, bound
-    block.drift[0, 0] = drift + statistical.rapidity * size * size
+    block.noise[0], block.jitter[0], view.bounded[0] = variance, jitter * jitter, bound
+    block.drift[0, 0] = drift + noise.rapidity * size * size
 
 
 @kernel
-def regress(fdi, view, innovation, share):
-    """Fill what constants multiply in a view; share: of what goes along its column, what may show across."""
-    block, m, statistical = view.block, view.mix, fdi.statistical
+def regress(view, blocks, forces, air, inertial_air, innovation):
+    """Fill what constants multiply in a view; innovation (3,) rad/s2."""
+    block, m = view.block, view.mix
     first, second = view.plane[0], view.plane[1]
-    rates = statistical.block[PITCH_BLOCK if first == PITCH else LATERAL]
+    rates = blocks[PITCH_BLOCK if first == PITCH else LATERAL]
     for j in range(rates.n_regressors):
         if first == PITCH:
             block.regressor[j, 0] = m[PITCH] * rates.regressor[j, 0]
@@ -200,7 +201,7 @@ def regress(fdi, view, innovation, share):
             block.regressor[j, 0] = m[ROLL] * rates.regressor[j, 0] + m[YAW] * rates.regressor[j, 1]
     n = rates.n_regressors
     if second >= SIDE and m[second] != 0.0:
-        force = statistical.forces.component[second - SIDE]
+        force = forces.component[second - SIDE]
         for j in range(force.n):
             block.regressor[n + j, 0] = m[second] * force.regressor[j]
         n += force.n
@@ -210,11 +211,12 @@ def regress(fdi, view, innovation, share):
         block.regressor[n, 0] = 0.0
         for i in range(m.size):
             if view.column[i] != 0.0:
-                block.regressor[n, 0] += share * view.column[i] * part(fdi, view, innovation, i)
+                one = part(view, forces, air, inertial_air, innovation, i)
+                block.regressor[n, 0] += view.shows_across * view.column[i] * one
 
 
 @kernel
-def sign(fdi, view, Gu):
+def sign(view, forces, Gu):
     """Fill the signatures: a step, and losses; Gu (3, n) rad/s2."""
     block, m = view.block, view.mix
     for h in range(block.n_hypotheses):
@@ -224,43 +226,60 @@ def sign(fdi, view, Gu):
         if hypothesis.kind != STEP:
             moment = m[0] * Gu[0, s] + m[1] * Gu[1, s] + m[2] * Gu[2, s]
             for f in range(2):
-                moment += m[SIDE + f] * fdi.statistical.forces.component[f].moment[s]
+                moment += m[SIDE + f] * forces.component[f].moment[s]
             hypothesis.signature[0] = moment
 
 
 @kernel
-def observe(fdi, innovation, G, Gu, y, frame, latched):
-    """Take in one frame, as `statistical.observe`. G, Gu (3, n): of it; y as measured."""
-    statistical, dt = fdi.statistical, fdi.config.dt
-    V, heard = y[AIRSPEED], tones.usual(statistical.listening, y)
-    keep, slot = statistical.keep if latched else 1.0, likelihood.slot_to_start(frame)
-    for a in range(statistical.n_views):
-        view = statistical.views[a]
-        block, m, share = view.block, view.mix, 0.0
-        if weighs(view) and not (statistical.forces.known and statistical.forces.begun == SETTLED):
-            view.held = 0.0
-            continue
-        if view.surface != AN_AXIS:
-            share = turn(fdi, view, G)
-        if not latched:
-            likelihood.start(block, slot)
-        blur(view, statistical, V)
-        block.scratch[0] = 0.0
-        for i in range(m.size):
-            if m[i] != 0.0:
-                block.scratch[0] += m[i] * part(fdi, view, innovation, i)
-        tolerated = statistical.tolerated or view.tolerated
-        if tolerated:
-            regress(fdi, view, innovation, share)
-        sign(fdi, view, Gu)
-        likelihood.take_in(block, view.bounded, tolerated, dt, keep)
-        if not view.inertial:  # the angle followed is off by what integration is, which swings as the flight
-            tones.listen(view, statistical.listening, statistical.alarm_level, heard, tolerated, dt)
-        view.held = max((1.0 - (1.0 - statistical.keep) / HOLDS) * view.held, best(view))
+def face(views, forces, air, bound, G, Gu):
+    """Turn each view to where it looks in this frame, with its signatures; G, Gu (3, n): of it."""
+    for a in range(views.size):
+        view = views[a]
+        view.weighed = not weighs(view) or (forces.known and forces.begun == SETTLED)
+        if view.weighed:
+            view.shows_across = turn(view, forces, air, bound, G) if view.surface != AN_AXIS else 0.0
+            sign(view, forces, Gu)
 
 
 @kernel
-def feels(fdi, view, s, column):
+def compose(views, tolerated, noise, blocks, forces, air, inertial_air, innovation, V):
+    """Put together what each view sees of the frame, and what it may owe to noise and to constants that are
+    `tolerated`; V m/s."""
+    for a in range(views.size):
+        view = views[a]
+        if not view.weighed:
+            continue
+        blur(view, noise, blocks, forces, air, inertial_air, V)
+        m, seen = view.mix, view.block.scratch
+        seen[0] = 0.0
+        for i in range(m.size):
+            if m[i] != 0.0:
+                seen[0] += m[i] * part(view, forces, air, inertial_air, innovation, i)
+        if tolerated or view.tolerated:
+            regress(view, blocks, forces, air, inertial_air, innovation)
+
+
+@kernel
+def observe(views, tests, listening, y, dt, frame, latched):
+    """Take in one frame of what the views see, as `statistical.observe`; y as measured."""
+    heard = tones.usual(listening, y)
+    keep, slot = tests.keep if latched else 1.0, likelihood.slot_to_start(frame)
+    for a in range(views.size):
+        view = views[a]
+        if not view.weighed:
+            view.held = 0.0
+            continue
+        if not latched:
+            likelihood.start(view.block, slot)
+        tolerated = tests.tolerated or view.tolerated
+        likelihood.take_in(view.block, view.bounded, tolerated, dt, keep)
+        if not view.inertial:  # the angle followed is off by what integration is, which swings as the flight
+            tones.listen(view, listening, tests.alarm_level, heard, tolerated, dt)
+        view.held = max((1.0 - (1.0 - tests.keep) / HOLDS) * view.held, best(view))
+
+
+@kernel
+def feels(view, forces, s, column):
     """Whether a fault of surface s, of this column of G (3,), shows in a view."""
     if view.surface == s:
         return False
@@ -268,7 +287,7 @@ def feels(fdi, view, s, column):
     for i in range(3):
         shows += m[i] * column[i]
     for f in range(2):
-        shows += m[SIDE + f] * fdi.statistical.forces.component[f].column[s]
+        shows += m[SIDE + f] * forces.component[f].column[s]
     return shows != 0.0
 
 
@@ -282,40 +301,39 @@ def best(view):
 
 
 @kernel
-def shown(statistical, view):
+def shown(view, views, tests, forces, air):
     """The score of what goes on in a view and is no vane's doing: no vane moves the rates alone. What a force
     shows, and what clears the vane, may come a moment apart. The latter asks for the naming level."""
-    if weighs(view) and not statistical.forces.known:
+    if weighs(view) and not forces.known:
         return 0.0
-    if view.clears or not (weighs(view) or told(statistical, view)):
+    if view.clears or not (weighs(view) or told(view, air)):
         return best(view)
     cleared = 0.0
-    for a in range(statistical.n_views):
-        other = statistical.views[a]
+    for a in range(views.size):
+        other = views[a]
         if other.clears and other.plane[1] == view.cleared_by:
             cleared = max(cleared, other.held)
-    return min(view.held, cleared * statistical.alarm_level / np.sqrt(2.0 * statistical.naming_level))
+    return min(view.held, cleared * tests.alarm_level / np.sqrt(2.0 * tests.naming_level))
 
 
 @kernel
-def alarm(statistical, view):
+def alarm(view, views, tests, forces, air):
     """The score with which a view raises the alarm, for what no block of the rates looks at: a tone about an
     axis, or a view of little but a force, of accelerometers that do not break."""
     if view.surface == AN_AXIS and not view.inertial:
         return view.tones.score
     mostly = view.plane[1] >= SIDE and abs(view.mix[view.plane[1]]) > MOSTLY
-    if view.surface >= 0 and mostly and statistical.air.read == 1:
-        return shown(statistical, view)
+    if view.surface >= 0 and mostly and air.read == 1:
+        return shown(view, views, tests, forces, air)
     return 0.0
 
 
 @kernel
-def excludes(fdi, s):
-    """Whether something is going on that no fault of surface s does."""
-    statistical, column = fdi.statistical, fdi.isolation.estimator[fdi.layout.position_of[s]].effect.Z
-    for a in range(statistical.n_views):
-        view = statistical.views[a]
-        blind = not view.clears and not feels(fdi, view, s, column)
-        if blind and shown(statistical, view) > statistical.alarm_level:
+def excludes(views, tests, forces, air, s, column):
+    """Whether something is going on that no fault of surface s does, of this column of G (3,)."""
+    for a in range(views.size):
+        view = views[a]
+        blind = not view.clears and not feels(view, forces, s, column)
+        if blind and shown(view, views, tests, forces, air) > tests.alarm_level:
             return True
     return False

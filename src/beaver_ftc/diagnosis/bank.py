@@ -93,7 +93,8 @@ def note_closest_approach(fdi):
             if fdi.bank.threshold[m, i] > 0.0:
                 share = abs(fdi.bank.residual[m, i]) / fdi.bank.threshold[m, i]
                 fdi.bank.closest[m] = max(fdi.bank.closest[m], share)
-    fdi.statistical.closest = max(fdi.statistical.closest, fdi.statistical.score)
+    alarm = fdi.statistical.alarm
+    alarm.closest = max(alarm.closest, alarm.score)
 
 
 @kernel

@@ -29,8 +29,8 @@ def detect(fdi, x, t):
     for i in range(3):
         fdi.fdae.residual[i] = x[i] - fdi.fdae.xhat[i]
     axis = bank.alarm(fdi) if fdi.config.authority != STATISTICS else -1
-    if axis < 0 and fdi.config.authority != WORST_CASE and fdi.statistical.score > 1.0:
-        axis = fdi.statistical.axis
+    if axis < 0 and fdi.config.authority != WORST_CASE and fdi.statistical.alarm.score > 1.0:
+        axis = fdi.statistical.alarm.axis
     if axis >= 0 and not fdi.verdict.detected:
         fdi.verdict.detected = 1
         fdi.verdict.detected_at_s = t

@@ -109,9 +109,9 @@ def without_vanes(forces, rotation, y):
 
 
 @kernel
-def do_without(statistical):
+def do_without(forces, air, inertial_air):
     """Weigh no force from now on, and follow the gust without accelerometers."""
-    statistical.forces.known = statistical.air.read = statistical.inertial_air.moving = 0
+    forces.known = air.read = inertial_air.moving = 0
 
 
 @kernel

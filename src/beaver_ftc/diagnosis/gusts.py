@@ -62,7 +62,7 @@ def set_up_jitter(
         by_force = np.sqrt(forces["felt"]) / np.abs(forces["vane"][:, 1])
         statistical["forces"]["blurred"] = jitter(by_force, design, y, u, span_m)
     for name in ("own_jitter", "jitter"):
-        statistical[name] += jitter(flow, design, y, u, span_m) ** 2
+        statistical["noise"][name] += jitter(flow, design, y, u, span_m) ** 2
 
 
 def flow_noise(sensors: Sensors, airspeed_mps: float) -> np.ndarray:

@@ -108,16 +108,24 @@ def rules_out(fdi, fie, within):
     if fdi.config.authority == WORST_CASE or (fdi.config.every_type and not within):
         return not within
     if fdi.config.every_type:
-        return fdi.statistical.enabled and across.excludes(fdi, fie.surface)
+        chances, places = fdi.statistical, fdi.layout.position_of
+        column = fdi.isolation.estimator[places[fie.surface]].effect.Z
+        views = chances.views[: chances.n_views]
+        return chances.tests.enabled and across.excludes(
+            views, chances.tests, chances.forces, chances.air, fie.surface, column
+        )
     if fdi.config.authority != STATISTICS and not within:
         return True
-    if not fdi.statistical.enabled or fie.shown or fdi.statistical.detected_at_s < 0.0:
+    tests, blocks, others, loss_of, s = (
+        fdi.statistical.tests, fdi.statistical.block, fdi.isolation.estimator, fdi.layout.loss_of, fie.surface
+    )  # fmt: skip
+    if not tests.enabled or fie.shown or fdi.statistical.alarm.detected_at_s < 0.0:
         return False
-    fie.shown = not fdi.config.abrupt and shows(fdi, fie.surface)  # what comes later may be its end
-    if fie.shown or not excludes(fdi, fie.surface, False):
+    fie.shown = not fdi.config.abrupt and shows(tests, blocks, others, loss_of, s)  # later may be its end
+    if fie.shown or not excludes(tests, blocks, others, loss_of, s, False, fdi.config.abrupt):
         return False
     fie.doubted = 1  # only the end of a loss that nobody saw would explain it
-    return excludes(fdi, fie.surface, True)
+    return excludes(tests, blocks, others, loss_of, s, True, fdi.config.abrupt)
 
 
 @kernel

@@ -44,6 +44,7 @@ from beaver_ftc.diagnosis.state import LOSS
 # of a block, and what lanes keep lies side by side for vector instructions, lane slot * MAX_HYPOTHESES +
 # hypothesis.
 PITCH_BLOCK, LATERAL, RETURNING = 0, 1, 2  # the last is the second view of roll and yaw
+N_BLOCKS = 3
 N_SLOTS = 10
 N_READINGS = 5  # alpha, beta, airspeed, dynamic pressure, engine power: readings.py
 MAX_HYPOTHESES, MAX_REGRESSORS = 8, 3 * MAX_TERMS_OF_ONE + 4 + N_READINGS

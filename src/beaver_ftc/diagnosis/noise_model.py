@@ -116,17 +116,20 @@ def set_up(
     """Fill the statistical part of a diagnosis record; start: x (3,), y and u (surfaces,) in trim."""
     aircraft = aircraft or load()
     statistical, given = fdi["statistical"], config.statistical
-    statistical["detected_at_s"] = -1.0
+    statistical["alarm"]["detected_at_s"] = -1.0
     if given is None or not fdi["config"]["enabled"]:  # a plug-in diagnoses, or nothing does
         return
-    statistical["enabled"], statistical["share"] = 1, 1.0 / max(int(fdi["config"]["instants"]), 1)
+    statistical["tests"]["enabled"], statistical["tests"]["share"] = (
+        1,
+        1.0 / max(int(fdi["config"]["instants"]), 1),
+    )
     gusts.set_up_air(statistical["air"], config.bounds.turbulence, mass, aircraft)
     forces = bool(statistical["forces"]["known"])
     across = across_a_column(config, int(fdi["config"]["instants"]))
     tests = tests_a_frame(aircraft, *(views_of(aircraft, forces) if across else ()))
-    statistical["alarm_level"] = alarm_level(given.false_alarms_per_h, rate_hz, tests)
-    statistical["naming_level"] = naming_level(given.misnaming, rate_hz, aircraft)
-    statistical["keep"] = exp(-1.0 / (rate_hz * config.forgetting_time_s))
+    statistical["tests"]["alarm_level"] = alarm_level(given.false_alarms_per_h, rate_hz, tests)
+    statistical["tests"]["naming_level"] = naming_level(given.misnaming, rate_hz, aircraft)
+    statistical["tests"]["keep"] = exp(-1.0 / (rate_hz * config.forgetting_time_s))
     _set_up_blocks(statistical, config.bounds.sensors, aircraft)
     _set_up_bounded(statistical, config, pace_of(given, aircraft, 1.0 / rate_hz), 1.0 / rate_hz)
     _set_up_noise(statistical, given, config.bounds, design, start, 1.0 / rate_hz)
@@ -158,7 +161,7 @@ def set_up(
 def _set_up_blocks(statistical: np.void, sensors: Sensors, aircraft: Aircraft) -> None:
     blocks = blocks_of(aircraft)
     losses = [aircraft.surfaces.index(surface) for surface in aircraft.primary]
-    statistical["n_blocks"], statistical["n_columns"] = len(blocks), len(losses) + len(AXES)
+    statistical["tests"]["n_columns"] = len(losses) + len(AXES)
     for block, (axes, members) in zip(statistical["block"], blocks, strict=True):
         block["n"], block["n_hypotheses"] = len(axes), len(members)
         block["n_regressors"] = sum(_axis_of(term) in axes for term in aircraft.moments)
@@ -188,8 +191,8 @@ def pace_of(given: Statistical, aircraft: Aircraft, dt_s: float) -> float:
 def _set_up_bounded(statistical: np.void, config: FdiConfig, pace: float, dt_s: float) -> None:
     """What an uncertainty that is bounded may do beside chance. A loss declared constant does not grow."""
     still = config.bounds.sensors.is_ideal and config.bounds.turbulence == "none"
-    for block in statistical["block"][: statistical["n_blocks"]]:
-        block["level"], block["chance"] = statistical["alarm_level"], 0.0 if still else CHANCE
+    for block in statistical["block"]:
+        block["level"], block["chance"] = statistical["tests"]["alarm_level"], 0.0 if still else CHANCE
         block["pace"] = pace
         kinds = block["hypothesis"]["kind"][: block["n_hypotheses"]]
         if config.fault_profile == "abrupt":
@@ -212,14 +215,14 @@ def _set_up_noise(
     """What drifts, and what is white: noise of the measurements that f + G u is made of."""
     noise = max(getattr(bounds.sensors, axis).random_error for axis in AXES)
     largest = max(bounds.constant_rad_s2.as_tuple())
-    level = float(statistical["alarm_level"])
-    statistical["rapidity"] = rapidity(largest, given.uncertainty_rad_s, noise, level, dt_s)
+    level = float(statistical["tests"]["alarm_level"])
+    statistical["noise"]["rapidity"] = rapidity(largest, given.uncertainty_rad_s, noise, level, dt_s)
     _, G, f_x, f_y = jacobian(design, *start)
     errors = np.array([getattr(bounds.sensors, name).random_error for name in SIGNALS])
-    statistical["own_jitter"] = f_x**2 @ errors[:3] ** 2
+    statistical["noise"]["own_jitter"] = f_x**2 @ errors[:3] ** 2
     in_trim = f_y[:, [ALPHA, BETA, AIRSPEED, QDYN]] ** 2 @ errors[3:] ** 2  # later as readings.py says
-    statistical["jitter"] = statistical["own_jitter"] + in_trim
-    statistical["deflection"] = np.abs(G).sum(axis=1) * np.radians(bounds.deflection_deg)
+    statistical["noise"]["jitter"] = statistical["noise"]["own_jitter"] + in_trim
+    statistical["noise"]["deflection"] = np.abs(G).sum(axis=1) * np.radians(bounds.deflection_deg)
 
 
 def rapidity(eta_bar: float, omega: float, noise: float, level: float, dt_s: float) -> float:
@@ -248,10 +251,12 @@ def returning_length(statistical: np.void, airspeed_mps: float, rate_hz: float) 
     stronger one, with the same power where it is slow and more where it is fast.
     """
     rolling = float(statistical["air"]["rolling"]) if statistical["air"]["moving"] else 0.0
-    if statistical["rapidity"] == 0.0:
+    if statistical["noise"]["rapidity"] == 0.0:
         return rolling  # 0 in still air: nothing is declared that drifts, and the two views are one
     longest_s = 2 ** (N_SLOTS - 1) / rate_hz
-    lag_s = sqrt(2.0 * longest_s / statistical["rapidity"]) / float(statistical["alarm_level"])
+    lag_s = sqrt(2.0 * longest_s / statistical["noise"]["rapidity"]) / float(
+        statistical["tests"]["alarm_level"]
+    )
     return min(airspeed_mps * lag_s, rolling or np.inf)
 
 
@@ -269,7 +274,7 @@ def _set_up_tolerances(
     for block, axes in zip(statistical["block"], (PITCH_AXES, LATERAL_AXES, LATERAL_AXES), strict=True):
         of_it = tolerance[np.isin(axis, axes)]
         block["tolerance"][: of_it.size] = of_it
-    statistical["tolerated"] = bool(np.any(tolerance))
+    statistical["tests"]["tolerated"] = bool(np.any(tolerance))
 
 
 def steady_tolerance(

@@ -22,7 +22,7 @@ _SLIPSTREAM = RH + 1  # the first of the declared signals
 
 def set_up_readings(statistical: np.void, sensors: Sensors, admitted: np.void) -> None:
     """Add the readings to the regressors of the blocks, which have those of their coefficients."""
-    steady, noise = np.zeros(N_READINGS), statistical["reading_noise"]
+    steady, noise = np.zeros(N_READINGS), statistical["noise"]["reading"]
     for name, place in _SENSORS.items():
         steady[place] = abs(getattr(sensors, name).noise_bias_quantum[1])
         noise[place] = getattr(sensors, name).random_error
@@ -30,8 +30,8 @@ def set_up_readings(statistical: np.void, sensors: Sensors, admitted: np.void) -
     noise[_POWER] = admitted["engine_kw"] / NOISE_LIMIT_SIGMA
     if not (steady.any() or noise.any()):
         return
-    statistical["read"] = statistical["tolerated"] = 1
-    for block in statistical["block"][: statistical["n_blocks"]]:
+    statistical["noise"]["read"] = statistical["tests"]["tolerated"] = 1
+    for block in statistical["block"]:
         n = int(block["n_regressors"])
         block["n_regressors"], block["tolerance"][n : n + N_READINGS] = n + N_READINGS, steady
 
@@ -71,21 +71,21 @@ def moved(design, y, u, which, slope, out):
 
 
 @kernel
-def add(statistical, admitted, design, y, u):
-    """Add this instant to the readings' regressors, rad/s2 per unit, and fill the jitter, rad2/s4, as it is
-    now; `design.moments` is evaluated there."""
-    table, out = design.moments, statistical.moved
-    statistical.jitter[:] = statistical.own_jitter
+def add(share, noise, blocks, admitted, design, y, u):
+    """Add this instant, a `share` of the frame, to the readings' regressors, rad/s2 per unit, and fill the
+    jitter, rad2/s4, as it is now; `design.moments` is evaluated there."""
+    table, out = design.moments, noise.moved
+    noise.jitter[:] = noise.own_jitter
     for which in range(N_READINGS):
-        sensitivity(table, admitted, y, which, statistical.direction)
-        directional(table, table.signal, table.power, statistical.direction, statistical.slope)
-        moved(design, y, u, which, statistical.slope, out)
+        sensitivity(table, admitted, y, which, noise.direction)
+        directional(table, table.signal, table.power, noise.direction, noise.slope)
+        moved(design, y, u, which, noise.slope, out)
         for i in range(3):
-            statistical.jitter[i] += (out[i] * statistical.reading_noise[which]) ** 2
-        pitch = statistical.block[PITCH_BLOCK]
-        pitch.regressor[pitch.n_regressors - N_READINGS + which, 0] += statistical.share * out[1]
-        for b in range(LATERAL, statistical.n_blocks):
-            block = statistical.block[b]
+            noise.jitter[i] += (out[i] * noise.reading[which]) ** 2
+        pitch = blocks[PITCH_BLOCK]
+        pitch.regressor[pitch.n_regressors - N_READINGS + which, 0] += share * out[1]
+        for b in range(LATERAL, blocks.size):
+            block = blocks[b]
             j = block.n_regressors - N_READINGS + which
-            block.regressor[j, 0] += statistical.share * out[0]
-            block.regressor[j, 1] += statistical.share * out[2]
+            block.regressor[j, 0] += share * out[0]
+            block.regressor[j, 1] += share * out[2]

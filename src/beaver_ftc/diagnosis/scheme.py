@@ -78,7 +78,7 @@ def predict(fdi, belief, measured, effectiveness, offset, k, t):
     expected = belief.expected
     expected[:] = mean.acceleration
     bank.innovate(fdi, x, x_then, expected)
-    if fdi.statistical.enabled:
+    if fdi.statistical.tests.enabled:
         compare_likelihoods(fdi, belief, measured, k, t)
     isolation.suppose_all(fdi, mean.G, mean.Gu, mean.Gu_spread)
     if fdi.config.every_type:
@@ -86,10 +86,11 @@ def predict(fdi, belief, measured, effectiveness, offset, k, t):
     if fdi.verdict.detected:
         isolation.predict_all(fdi, x_then, expected)
         expect_known_faults(expected, mean, effectiveness, offset, fdi.config.every_type)
-    if fdi.statistical.enabled:
+    if fdi.statistical.tests.enabled:
         for i in range(3):
             belief.surprise[i] = (x[i] - x_then[i]) / fdi.config.dt - expected[i]
-        statistical.follow_rest(fdi.statistical, belief.surprise, fdi.config.dt)
+        chances = fdi.statistical
+        statistical.follow_rest(chances.block, chances.air, belief.surprise, fdi.config.dt)
     detection.predict(fdi, x_then, expected, fdi.verdict.isolated >= 0 or fdi.verdict.lead >= 0)
 
 
@@ -109,18 +110,24 @@ def expect_known_faults(expected, mean, effectiveness, offset, offsets_count):
 @apart
 def compare_likelihoods(fdi, belief, measured, k, t):
     """Show the statistical detector the elapsed frame."""
-    air.elapse(fdi.statistical.air, belief.share)
-    if fdi.statistical.inertial_air.moving:
-        air.elapse(fdi.statistical.inertial_air, belief.share)
-    cubic = unanticipated_pitch(belief.design, measured.y, 1.0)
-    statistical.signatures(fdi.statistical, belief.means.Gu, cubic)
-    latched = fdi.statistical.detected_at_s >= 0.0
+    chances, mean, y = fdi.statistical, belief.means, measured.y
+    tests, noise, blocks, forces_felt = chances.tests, chances.noise, chances.block, chances.forces
+    seen, inertial, views = chances.air, chances.inertial_air, chances.views[: chances.n_views]
+    air.elapse(seen, belief.share)
+    if inertial.moving:
+        air.elapse(inertial, belief.share)
+    statistical.signatures(blocks, mean.Gu, unanticipated_pitch(belief.design, y, 1.0))
+    latched, ends = chances.alarm.detected_at_s >= 0.0, not fdi.config.abrupt
     statistical.observe(
-        fdi.statistical, fdi.bank.innovation, fdi.config.dt, k, latched, not fdi.config.abrupt
+        tests, noise.bounded, blocks, seen, fdi.bank.innovation, fdi.config.dt, k, latched, ends
     )
-    mean = belief.means
-    across.observe(fdi, fdi.bank.innovation, mean.G, mean.Gu, measured.y, k, latched)
-    statistical.score(fdi.statistical, t, fdi.bound.error_map.outside == 0)
+    across.face(views, forces_felt, seen, fdi.bound, mean.G, mean.Gu)
+    across.compose(
+        views, tests.tolerated, noise, blocks, forces_felt, seen, inertial, fdi.bank.innovation, y[AIRSPEED]
+    )
+    across.observe(views, tests, chances.listening, y, fdi.config.dt, k, latched)
+    known = fdi.bound.error_map.outside == 0
+    statistical.score(chances.alarm, tests, blocks, views, forces_felt, seen, t, known)
 
 
 @kernel
@@ -146,7 +153,7 @@ def decide(fdi, measured, t):
 @kernel
 def ready(fdi, belief, measured, k):
     """Make ready for the frame to come."""
-    if fdi.statistical.enabled:
+    if fdi.statistical.tests.enabled:
         look_ahead(fdi, belief, measured, k)
     begin_frame(fdi, belief, measured)
 
@@ -177,23 +184,30 @@ def look_ahead(fdi, belief, measured, k):
         else:
             air.begin(fdi.statistical.air, measured.y, measured.attitude)
     if fdi.statistical.forces.known and not measured.inertial:
-        forces.do_without(fdi.statistical)
+        forces.do_without(fdi.statistical.forces, fdi.statistical.air, fdi.statistical.inertial_air)
     if fdi.statistical.forces.known:
         weigh_forces(fdi, belief, measured, k)
-    statistical.prepare(fdi.statistical, fdi, belief.design, measured.x, measured.y, belief.u)
+    chances = fdi.statistical
+    statistical.prepare(
+        chances.tests, chances.noise, chances.block, chances.air, fdi.bound, belief.design, measured,
+        belief.u, fdi.config.dt,
+    )  # fmt: skip
 
 
 @apart
 def look_at_air(fdi, belief, measured):
     """Take in the gust that the vanes see by now, and what it does."""
-    x, y, dt = measured.x, measured.y, belief.share * fdi.config.dt
-    statistical.look(fdi.statistical, fdi, belief.design, x, y, belief.u, measured.attitude, dt)
+    chances, dt = fdi.statistical, belief.share * fdi.config.dt
+    statistical.look(
+        chances.tests, chances.noise, chances.block, chances.air, fdi.bound, belief.design, measured,
+        belief.u, dt,
+    )  # fmt: skip
 
 
 @kernel
 def look_inside(fdi, belief, measured):
     """Take in an instant inside a frame: what is believed of it, and the gust that the vanes see by then."""
-    if fdi.statistical.enabled:
+    if fdi.statistical.tests.enabled:
         look_at_air(fdi, belief, measured)
     look(fdi, belief, measured)
 
@@ -236,14 +250,14 @@ def isolated_surface(fdi):
 @kernel
 def likelihood_counts(fdi):
     """Whether the statistical detector's estimates are the ones to use."""
-    return fdi.statistical.enabled and fdi.config.authority != WORST_CASE
+    return fdi.statistical.tests.enabled and fdi.config.authority != WORST_CASE
 
 
 @kernel
 def isolated_theta(fdi, s):
     """Estimated theta of the isolated loss of surface s: under noise, the most likely one."""
     if likelihood_counts(fdi):
-        return statistical.loss_of(fdi.statistical, s)[0]
+        return statistical.estimated_loss(fdi.statistical.block, s)[0]
     return fdi.isolation.estimator[fdi.verdict.isolated].theta[fdi.layout.dominant_axis[s]]
 
 
@@ -251,7 +265,7 @@ def isolated_theta(fdi, s):
 def unknown_acceleration(fdi, out):
     """Fill out (3,) rad/s2 with what goes on beyond the model and the known faults, as it is estimated."""
     if likelihood_counts(fdi):
-        statistical.unknown_acceleration(fdi.statistical, out)
+        statistical.unknown_acceleration(fdi.statistical.block, fdi.statistical.air, out)
     else:
         detection.unknown_acceleration(fdi, out)
 
@@ -264,7 +278,7 @@ def built_in_statistic(fdi):
     lower level could trade for power.
     """
     chances = likelihood_counts(fdi)
-    likely = fdi.statistical.score if chances else 0.0
+    likely = fdi.statistical.alarm.score if chances else 0.0
     if fdi.config.authority == STATISTICS:
         return likely
     certain = bank.largest_share(fdi)

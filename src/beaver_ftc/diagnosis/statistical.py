@@ -11,7 +11,8 @@ import numpy as np
 from beaver_ftc.aircraft.schema import MAX_MONOMIALS, MAX_TERMS
 from beaver_ftc.compiled import kernel
 from beaver_ftc.design.terms import AIRSPEED, N_SIGNALS, QDYN, evaluate, regressors
-from beaver_ftc.diagnosis import across, air, likelihood, readings, whitening
+from beaver_ftc.diagnosis import across, likelihood, readings, whitening
+from beaver_ftc.diagnosis import air as gusts
 from beaver_ftc.diagnosis.across import MAX_VIEWS, VIEW
 from beaver_ftc.diagnosis.air import AIR
 from beaver_ftc.diagnosis.error_map import UNKNOWN_TO_FILTERS_RAD_S2
@@ -22,6 +23,7 @@ from beaver_ftc.diagnosis.likelihood import (
     GROWING,
     LATERAL,
     LEAST_UNCERTAINTY_RAD_S2,
+    N_BLOCKS,
     N_READINGS,
     RETURNING,
     STEP,
@@ -35,31 +37,52 @@ from beaver_ftc.diagnosis.tones import LISTENING
 # for every rate of growth (docs/theory.md, section 7).
 LEAST_PART = 0.25
 
+# What the scenario asks of the tests: whether there are any, levels, what of the evidence a frame after the
+# alarm leaves, columns of the log, whether constants are tolerated; one over the instants in a frame.
+TESTS = np.dtype(
+    [
+        ("enabled", "i8"), ("alarm_level", "f8"), ("naming_level", "f8"), ("keep", "f8"),
+        ("n_columns", "i8"), ("tolerated", "i8"), ("share", "f8"),
+    ],
+    align=True,
+)  # fmt: skip
+
+# What moves the rates besides a fault. rapidity, 1/s: intensity of the drift of an uncertainty over its bound
+# squared; bounded, rad/s2: that bound now; deflection: its part by that of the surfaces; jitter, (rad/s2)2:
+# noise of the model's own inputs, `own_jitter` what of it is none of readings.py. read: whether errors of the
+# air data count. The last are scratch.
+NOISE = np.dtype(
+    [
+        ("rapidity", "f8"), ("bounded", "f8", (3,)), ("deflection", "f8", (3,)),
+        ("jitter", "f8", (3,)), ("own_jitter", "f8", (3,)), ("read", "i8"), ("reading", "f8", (N_READINGS,)),
+        ("terms", "f8", (MAX_TERMS,)), ("direction", "f8", (N_SIGNALS,)),
+        ("slope", "f8", (MAX_MONOMIALS,)), ("moved", "f8", (3,)),
+    ],
+    align=True,
+)  # fmt: skip
+
+# What the tests say: the largest share of the alarm level and its axis, how close healthy flight came to it,
+# and when it was first passed.
+ALARM = np.dtype(
+    [("score", "f8"), ("axis", "i8"), ("closest", "f8"), ("detected_at_s", "f8")], align=True
+)  # fmt: skip
+
 STATISTICAL = np.dtype(
     [
-        ("share", "f8"),  # one over the instants in a frame
-        ("enabled", "i8"), ("alarm_level", "f8"), ("naming_level", "f8"), ("keep", "f8"),
-        ("n_columns", "i8"),  # of the log
-        ("rapidity", "f8"),  # 1/s: intensity of the drift of an uncertainty over its bound squared
-        ("bounded", "f8", (3,)), ("deflection", "f8", (3,)), ("jitter", "f8", (3,)), ("tolerated", "i8"),
-        ("n_blocks", "i8"), ("block", BLOCK, (3,)), ("n_views", "i8"), ("views", VIEW, (MAX_VIEWS,)),
-        ("forces", FORCES_FELT), ("listening", LISTENING),
-        ("air", AIR), ("inertial_air", AIR), ("terms", "f8", (MAX_TERMS,)),
-        # readings.py: whether errors of the air data count; their noise, and the jitter of all else; scratch
-        ("read", "i8"), ("reading_noise", "f8", (N_READINGS,)), ("own_jitter", "f8", (3,)),
-        ("direction", "f8", (N_SIGNALS,)), ("slope", "f8", (MAX_MONOMIALS,)), ("moved", "f8", (3,)),
-        ("score", "f8"), ("axis", "i8"), ("closest", "f8"), ("detected_at_s", "f8"),
+        ("tests", TESTS), ("noise", NOISE), ("alarm", ALARM), ("block", BLOCK, (N_BLOCKS,)),
+        ("n_views", "i8"), ("views", VIEW, (MAX_VIEWS,)), ("listening", LISTENING),
+        ("forces", FORCES_FELT), ("air", AIR), ("inertial_air", AIR),
     ],
     align=True,
 )  # fmt: skip
 
 
 @kernel
-def signatures(statistical, Gu, cubic):
+def signatures(blocks, Gu, cubic):
     """What each fault would have done in the elapsed frame, times theta. Gu (3, surfaces) rad/s2: what each
     surface gave, mean over it; cubic rad/s2: a pitching moment on alpha^3."""
-    for b in range(statistical.n_blocks):
-        block = statistical.block[b]
+    for b in range(blocks.size):
+        block = blocks[b]
         for h in range(block.n_hypotheses):
             hypothesis = block.hypothesis[h]
             for i in range(block.n):
@@ -72,21 +95,22 @@ def signatures(statistical, Gu, cubic):
 
 
 @kernel
-def observe(statistical, innovation, dt, frame, latched, ends=False):
-    """Take in one frame: innovation (3,) rad/s2, frame number, whether the alarm is out; ends: a loss may."""
-    keep = statistical.keep if latched else 1.0
+def observe(tests, bounded, blocks, air, innovation, dt, frame, latched, ends=False):
+    """Take in one frame: innovation and `bounded` (3,) rad/s2, frame number, whether the alarm is out; ends:
+    a loss may."""
+    keep = tests.keep if latched else 1.0
     slot = likelihood.slot_to_start(frame)
-    for b in range(statistical.n_blocks):
-        block = statistical.block[b]
+    for b in range(blocks.size):
+        block = blocks[b]
         if not latched:
             likelihood.start(block, slot)
-        if statistical.air.moving:
-            leap(statistical.air, block)
+        if air.moving:
+            leap(air, block)
         for i in range(block.n):
             axis = block.axis[i]
-            block.scratch[i] = innovation[axis] - statistical.air.mean[axis]
-        memory = statistical.keep if ends else 0.0
-        likelihood.take_in(block, statistical.bounded, statistical.tolerated, dt, keep, memory)
+            block.scratch[i] = innovation[axis] - air.mean[axis]
+        memory = tests.keep if ends else 0.0
+        likelihood.take_in(block, bounded, tests.tolerated, dt, keep, memory)
 
 
 @kernel
@@ -98,86 +122,82 @@ def leap(air, block):
 
 
 @kernel
-def follow_rest(statistical, surprise, dt):
+def follow_rest(blocks, air, surprise, dt):
     """Filter what the law's beliefs leave unexplained: surprise (3,) rad/s2, known faults taken off."""
     for b in range(RETURNING):
-        block = statistical.block[b]
+        block = blocks[b]
         for i in range(block.n):
             axis = block.axis[i]
-            block.scratch[i] = surprise[axis] - statistical.air.mean[axis]
+            block.scratch[i] = surprise[axis] - air.mean[axis]
         whitening.whiten(block, block.rest, block.scratch, dt, block.scratch)
 
 
 @kernel
-def unknown_acceleration(statistical, out):
+def unknown_acceleration(blocks, air, out):
     """Fill out (3,) rad/s2 with what goes on beyond the law's beliefs: the drift that explains the rates
     best, and the gust the vanes see."""
     for b in range(RETURNING):
-        block = statistical.block[b]
+        block = blocks[b]
         for i in range(block.n):
             axis = block.axis[i]
-            out[axis] = block.rest[2 + i] + statistical.air.acceleration[axis]
+            out[axis] = block.rest[2 + i] + air.acceleration[axis]
 
 
 @kernel
-def score(statistical, t, known=True):
+def score(alarm, tests, blocks, views, forces, air, t, known=True):
     """Find the largest share of the alarm level that any hypothesis reaches, and its axis; at t s. Where the
     model's error is not `known`, none does."""
-    statistical.score = 0.0
+    alarm.score = 0.0
     if not known:
         return
-    for b in range(statistical.n_blocks):
-        block = statistical.block[b]
+    for b in range(blocks.size):
+        block = blocks[b]
         for h in range(block.n_hypotheses):
             hypothesis = block.hypothesis[h]
             if hypothesis.alarms:
-                note(statistical, hypothesis.score, hypothesis.axis)
-    for a in range(statistical.n_views):
-        view = statistical.views[a]
-        note(statistical, across.alarm(statistical, view), view.axis)
-    if statistical.score > 1.0 and statistical.detected_at_s < 0.0:
-        statistical.detected_at_s = t
+                note(alarm, tests.alarm_level, hypothesis.score, hypothesis.axis)
+    for a in range(views.size):
+        view = views[a]
+        note(alarm, tests.alarm_level, across.alarm(view, views, tests, forces, air), view.axis)
+    if alarm.score > 1.0 and alarm.detected_at_s < 0.0:
+        alarm.detected_at_s = t
 
 
 @kernel
-def note(statistical, score, axis):
+def note(alarm, level, score, axis):
     """Keep a score if it is the largest."""
-    share = score / statistical.alarm_level
-    if share > statistical.score:
-        statistical.score, statistical.axis = share, axis
+    share = score / level
+    if share > alarm.score:
+        alarm.score, alarm.axis = share, axis
 
 
 @kernel
-def record(statistical, row):
+def record(tests, blocks, views, forces, air, row):
     """Write the last columns of the log: each test as a share of the alarm level, losses, then steps. What
     forces and tones show besides is in the step of the axis."""
-    first = row.size - statistical.n_columns
+    first = row.size - tests.n_columns
     row[first:] = 0.0
-    for b in range(statistical.n_blocks):
-        block = statistical.block[b]
+    for b in range(blocks.size):
+        block = blocks[b]
         for h in range(block.n_hypotheses):
             hypothesis = block.hypothesis[h]
             if hypothesis.alarms:
                 place = first + hypothesis.column
-                row[place] = max(row[place], hypothesis.score / statistical.alarm_level)
-    for a in range(statistical.n_views):
-        view = statistical.views[a]
+                row[place] = max(row[place], hypothesis.score / tests.alarm_level)
+    for a in range(views.size):
+        view = views[a]
         place = row.size - 3 + view.axis
-        row[place] = max(row[place], across.alarm(statistical, view) / statistical.alarm_level)
+        row[place] = max(row[place], across.alarm(view, views, tests, forces, air) / tests.alarm_level)
 
 
 @kernel
-def is_open(fdi, surface):
+def is_open(estimators, loss_of, surface):
     """Whether a loss of this surface has not been excluded."""
-    for s in range(fdi.isolation.n):
-        fie = fdi.isolation.estimator[s]
-        if fie.kind == LOSS and fie.surface == surface:
-            return not fie.excluded
-    return True
+    return loss_of[surface] < 0 or not estimators[loss_of[surface]].excluded
 
 
 @kernel
-def best_alternative(fdi, block, surface):
+def best_alternative(block, estimators, loss_of, surface):
     """The greatest log likelihood ratio that any hypothesis but the loss of a surface has at least.
 
     What has been excluded is no alternative: as the evidence for that fades, uncertainty that goes along with
@@ -188,7 +208,8 @@ def best_alternative(fdi, block, surface):
         hypothesis = block.hypothesis[h]
         if hypothesis.kind in (GROWING, ENDING):
             continue
-        if hypothesis.kind != LOSS or (hypothesis.surface != surface and is_open(fdi, hypothesis.surface)):
+        other = hypothesis.surface
+        if hypothesis.kind != LOSS or (other != surface and is_open(estimators, loss_of, other)):
             best = max(best, hypothesis.at_least)
     return best
 
@@ -206,22 +227,25 @@ def at_most(block, surface, ending):
 
 
 @kernel
-def shows(fdi, surface):
-    """Whether a loss of this surface explains the flight better than all else, by the naming level."""
-    for b in range(fdi.statistical.n_blocks):
-        block = fdi.statistical.block[b]
+def shows(tests, blocks, estimators, loss_of, surface):
+    """Whether a loss of this surface explains the flight better than all else, by the naming level.
+
+    estimators: of isolation; loss_of (surfaces,): which of them is of a surface's loss, or -1.
+    """
+    for b in range(blocks.size):
+        block = blocks[b]
         least = 0.0
         for h in range(block.n_hypotheses):
             hypothesis = block.hypothesis[h]
             if hypothesis.surface == surface and hypothesis.kind in (LOSS, GROWING):
                 least = max(least, hypothesis.at_least)
-        if least - best_alternative(fdi, block, surface) > fdi.statistical.naming_level:
+        if least - best_alternative(block, estimators, loss_of, surface) > tests.naming_level:
             return True
     return False
 
 
 @kernel
-def excludes(fdi, surface, ends):
+def excludes(tests, blocks, estimators, loss_of, surface, ends, abrupt):
     """Whether something else explains the flight better than a loss of this surface, by the naming level.
 
     Each view of roll and yaw is held against that of pitch: a loss explains what it does to its own axes. A
@@ -229,31 +253,33 @@ def excludes(fdi, surface, ends):
     it does: it is excluded where that part is small besides; so is one that begins within a frame. The end of
     one is a step like any other, and explains as much or nothing, but within a frame of several instants a
     part: it shows in two; in pitch, where a fault outside the class may be such a step, only where asked for,
-    by `ends`.
+    by `ends`. Arguments as in `shows`.
     """
-    statistical = fdi.statistical
-    pitch, exact = statistical.block[PITCH], fdi.config.abrupt and fdi.config.instants == 1
-    for b in range(LATERAL, statistical.n_blocks):
-        lateral = statistical.block[b]
-        better = max(best_alternative(fdi, pitch, surface), best_alternative(fdi, lateral, surface))
+    pitch, at_once = blocks[PITCH], tests.share == 1.0
+    part = 1.0 if abrupt and at_once else LEAST_PART
+    end_part = 1.0 if at_once else LEAST_PART
+    for b in range(LATERAL, blocks.size):
+        lateral = blocks[b]
+        better = max(
+            best_alternative(pitch, estimators, loss_of, surface),
+            best_alternative(lateral, estimators, loss_of, surface),
+        )
         worse = max(at_most(pitch, surface, False), at_most(lateral, surface, False))
         ended = at_most(lateral, surface, True)
         if ends:
             ended = max(ended, at_most(pitch, surface, True))
-        part = 1.0 if exact else LEAST_PART
-        end_part = 1.0 if fdi.config.instants == 1 else LEAST_PART
         small = worse < part * better and ended < end_part * better
-        if small and better - max(worse, ended) > statistical.naming_level:
+        if small and better - max(worse, ended) > tests.naming_level:
             return True
     return False
 
 
 @kernel
-def loss_of(statistical, surface):
+def estimated_loss(blocks, surface):
     """Estimated theta of a loss of effectiveness of a surface, in [-1, 0], and one over its variance."""
     theta, certainty = 0.0, 0.0
-    for b in range(statistical.n_blocks):
-        block = statistical.block[b]
+    for b in range(blocks.size):
+        block = blocks[b]
         for h in range(block.n_hypotheses):
             hypothesis = block.hypothesis[h]
             if hypothesis.kind == LOSS and hypothesis.surface == surface and hypothesis.certainty > certainty:
@@ -262,85 +288,86 @@ def loss_of(statistical, surface):
 
 
 @kernel
-def prepare(statistical, fdi, design, x, y, u):
-    """Make ready for the frame to come: noise as it is now, and what the coefficients multiply.
+def prepare(tests, noise, blocks, air, bound, design, measured, u, dt):
+    """Make ready for the frame to come, of dt s: noise as it is now, and what the coefficients multiply.
 
-    x (3,) rad/s, y (5,) as measured, u (4,) rad the surfaces in effect.
+    bound: what is declared; u (surfaces,) rad: in effect.
     """
-    if statistical.air.moving:
-        air.effect(statistical.air, design, x, y, u)
-    if statistical.tolerated:
-        for b in range(statistical.n_blocks):
-            statistical.block[b].regressor[:] = 0.0
-        constants(statistical, fdi, design, x, y, u)
-    drifts(statistical, fdi, design, x, y)
-    if statistical.air.moving:
-        air.begin_frame(statistical.air, y[AIRSPEED], statistical.share * fdi.config.dt)
+    x, y = measured.x, measured.y
+    if air.moving:
+        gusts.effect(air, design, x, y, u)
+    if tests.tolerated:
+        for b in range(blocks.size):
+            blocks[b].regressor[:] = 0.0
+        constants(tests.share, noise, blocks, bound.admitted, design, measured, u)
+    drifts(noise, blocks, air, bound, design, measured, dt)
+    if air.moving:
+        gusts.begin_frame(air, y[AIRSPEED], tests.share * dt)
 
 
 @kernel
-def look(statistical, fdi, design, x, y, u, attitude, dt):
-    """Take in an instant inside a frame, dt s after the one before; attitude (3,) rad."""
-    if statistical.air.moving:
-        air.look(statistical.air, design, x, y, u, attitude, dt)
-    if statistical.tolerated:
-        constants(statistical, fdi, design, x, y, u)
+def look(tests, noise, blocks, air, bound, design, measured, u, dt):
+    """Take in an instant inside a frame, dt s after the one before."""
+    if air.moving:
+        gusts.look(air, design, measured.x, measured.y, u, measured.attitude, dt)
+    if tests.tolerated:
+        constants(tests.share, noise, blocks, bound.admitted, design, measured, u)
 
 
 @kernel
-def constants(statistical, fdi, design, x, y, u):
-    """Add to the regressors what the constants that are not known multiply now."""
-    evaluate(design.moments, x, y)
-    coefficients(statistical, design, y, u)
-    if statistical.read:
-        readings.add(statistical, fdi.bound.admitted, design, y, u)
+def constants(share, noise, blocks, admitted, design, measured, u):
+    """Add to the regressors what the constants that are not known multiply now, a `share` of the frame."""
+    y = measured.y
+    evaluate(design.moments, measured.x, y)
+    coefficients(share, noise.terms, blocks, design, y, u)
+    if noise.read:
+        readings.add(share, noise, blocks, admitted, design, y, u)
 
 
 @kernel
-def drifts(statistical, fdi, design, x, y):
+def drifts(noise, blocks, air, bound, design, measured, dt):
     """Fill each block's drift and jitter: uncertainty that is merely bounded, and the air not seen."""
-    bounded = statistical.bounded
+    bounded, V = noise.bounded, measured.y[AIRSPEED]
     bounded[:] = 0.0
-    uncertainty_bound(x, design, fdi.bound.inertia, fdi.bound.constant, fdi.bound.earth_rate, bounded)
-    mapped = fdi.bound.error_map.n_boxes > 0
+    uncertainty_bound(measured.x, design, bound.inertia, bound.constant, bound.earth_rate, bounded)
+    mapped = bound.error_map.n_boxes > 0
     for i in range(3):
-        bounded[i] += statistical.deflection[i]
+        bounded[i] += noise.deflection[i]
         if mapped:
-            bounded[i] += min(fdi.bound.error_map.now[i], UNKNOWN_TO_FILTERS_RAD_S2)
-    for b in range(statistical.n_blocks):
-        block = statistical.block[b]
+            bounded[i] += min(bound.error_map.now[i], UNKNOWN_TO_FILTERS_RAD_S2)
+    for b in range(blocks.size):
+        block = blocks[b]
         for i in range(block.n):
             axis = block.axis[i]
             for j in range(block.n):
                 block.drift[i, j] = 0.0
-                if statistical.air.moving:
-                    unseen = air.unseen_drift(statistical.air, y[AIRSPEED], axis, block.axis[j])
-                    block.drift[i, j] = block.stronger * unseen
+                if air.moving:
+                    block.drift[i, j] = block.stronger * gusts.unseen_drift(air, V, axis, block.axis[j])
             size = max(bounded[axis], LEAST_UNCERTAINTY_RAD_S2)
-            block.drift[i, i] += statistical.rapidity * size * size
-            block.jitter[i] = statistical.jitter[axis]
-        block.keep = np.exp(-fdi.config.dt * y[AIRSPEED] / block.lag) if block.lag > 0.0 else 1.0
+            block.drift[i, i] += noise.rapidity * size * size
+            block.jitter[i] = noise.jitter[axis]
+        block.keep = np.exp(-dt * V / block.lag) if block.lag > 0.0 else 1.0
 
 
 @kernel
-def coefficients(statistical, design, y, u):
+def coefficients(share, terms, blocks, design, y, u):
     """Add to each block's regressors (n, 2) rad/s2, means over a frame: what the coefficients multiply."""
     table = design.moments
-    regressors(table, table.power, u, statistical.terms)
-    share = statistical.share * y[QDYN] * design.S
-    lateral, longitudinal = share * design.b, share * design.c
-    pitch = statistical.block[PITCH]
+    regressors(table, table.power, u, terms)
+    force = share * y[QDYN] * design.S
+    lateral, longitudinal = force * design.b, force * design.c
+    pitch = blocks[PITCH]
     first = table.free_from[1]
     for j in range(table.surface_to[1] - first):
-        pitch.regressor[j, 0] += design.Qm * longitudinal * statistical.terms[first + j]
-    for b in range(LATERAL, statistical.n_blocks):
-        rolling = statistical.block[b]
+        pitch.regressor[j, 0] += design.Qm * longitudinal * terms[first + j]
+    for b in range(LATERAL, blocks.size):
+        rolling = blocks[b]
         n_roll, first = table.surface_to[0], table.free_from[2]
         for j in range(n_roll):
-            Cl = lateral * statistical.terms[j]
+            Cl = lateral * terms[j]
             rolling.regressor[j, 0] += design.Pl * Cl
             rolling.regressor[j, 1] += design.Rl * Cl
         for j in range(table.surface_to[2] - first):
-            Cn = lateral * statistical.terms[first + j]
+            Cn = lateral * terms[first + j]
             rolling.regressor[n_roll + j, 0] += design.Pn * Cn
             rolling.regressor[n_roll + j, 1] += design.Rn * Cn

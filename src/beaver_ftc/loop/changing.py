@@ -165,7 +165,7 @@ def take_diagnosis(frame: np.void, new: np.void, k: int) -> None:
     other["watch"]["past"] = 0  # its first look begins a frame
     if fdi["bank"]["n"] == other["bank"]["n"]:
         other["bank"]["closest"] = fdi["bank"]["closest"]
-    other["statistical"]["closest"] = fdi["statistical"]["closest"]
+    other["statistical"]["alarm"]["closest"] = fdi["statistical"]["alarm"]["closest"]
     frame["fdi"], frame["verdict"], frame["since"] = other, new["verdict"], k
 
 

@@ -12,11 +12,11 @@ from beaver_ftc.scenario.schema import Scenario
 def lay_out(frame: np.void, scenario: Scenario, diagnoses_itself: bool) -> tuple[str, ...]:
     """Note in a flight's record what there are columns for; returns their names."""
     fdi, logged, profile = frame["fdi"], frame["logged"], bool(frame["autopilot"]["enabled"])
-    tested = bool(fdi["statistical"]["enabled"])
+    tested = bool(fdi["statistical"]["tests"]["enabled"])
     logged["estimators"] = fdi["isolation"]["n"] if diagnoses_itself else 0
     logged["watch"] = comes_to_be_watched(scenario)
     logged["power"] = frame["control"]["power"]["enabled"] or profile
-    logged["tests"] = fdi["statistical"]["n_columns"] if tested else 0
+    logged["tests"] = fdi["statistical"]["tests"]["n_columns"] if tested else 0
     return log_columns(
         estimator_names(scenario.fdi.fault_class, scenario.airframe) if diagnoses_itself else (),
         bool(logged["power"]),

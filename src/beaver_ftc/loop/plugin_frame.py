@@ -266,5 +266,5 @@ def _clear_for_detector(fdi: np.void) -> None:
     """No built-in isolation; instead, one estimator a surface for the plug-in's verdict."""
     config, isolation, n = fdi["config"], fdi["isolation"], fdi["types"]["surface"].size
     config["enabled"] = config["every_type"] = isolation["n"] = 0
-    fdi["statistical"]["enabled"] = fdi["watch"]["enabled"] = 0
+    fdi["statistical"]["tests"]["enabled"] = fdi["watch"]["enabled"] = 0
     isolation["estimator"]["surface"][:n] = range(n)

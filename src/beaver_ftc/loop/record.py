@@ -127,7 +127,9 @@ def record(frame, reference, row):
         row[column] = control.power.command[0]
     if frame.autopilot.enabled:
         record_profile(frame.autopilot, row, column + 1)
-    if frame.logged.tests and fdi.statistical.enabled:
-        statistical.record(fdi.statistical, row)
+    chances = fdi.statistical
+    if frame.logged.tests and chances.tests.enabled:
+        views = chances.views[: chances.n_views]
+        statistical.record(chances.tests, chances.block, views, chances.forces, chances.air, row)
     elif frame.logged.tests:
         row[row.size - frame.logged.tests :] = np.nan

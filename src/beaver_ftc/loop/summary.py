@@ -35,7 +35,7 @@ def _rms(square_sum: np.ndarray, frames: int) -> tuple[float, float, float] | No
 def _estimate(fdi: np.void, surface: int) -> float:
     """theta of the isolated loss. Compiled code is asked only where it must be: the first call from Python
     takes a quarter of a second."""
-    if fdi["statistical"]["enabled"]:
+    if fdi["statistical"]["tests"]["enabled"]:
         return float(isolated_theta(fdi, surface))
     axis, estimator = int(fdi["layout"]["dominant_axis"][surface]), int(fdi["verdict"]["isolated"])
     return float(fdi["isolation"]["estimator"][estimator]["theta"][axis])
@@ -157,13 +157,13 @@ def _limits(frame: np.void, surfaces: Sequence[str]) -> tuple[tuple[float, str, 
 
 def _statistical(fdi: np.void) -> dict[str, float | None] | None:
     """What the statistical detector made of the flight, if there was one."""
-    statistical = fdi["statistical"]
-    if not statistical["enabled"]:
+    tests, alarm = fdi["statistical"]["tests"], fdi["statistical"]["alarm"]
+    if not tests["enabled"]:
         return None
     return {
-        "time_s": _instant(statistical["detected_at_s"]),
-        "alarm_level": float(statistical["alarm_level"]),
-        "closest_approach": float(statistical["closest"]),
+        "time_s": _instant(alarm["detected_at_s"]),
+        "alarm_level": float(tests["alarm_level"]),
+        "closest_approach": float(alarm["closest"]),
     }
 
 
@@ -259,7 +259,7 @@ def flight_of(
         end=(float(frame["truth"]["value"][AIRSPEED]), float(frame["truth"]["value"][ALTITUDE])),
         departure=(float(frame["t"]), DEPARTURE_SIGNALS[departed // 10]) if departed else None,
         saturation_s={s: int(n) * dt for s, n in zip(surfaces, accounts["saturated_frames"], strict=True)},
-        worst_residual_ratio=max(*closest, float(fdi["statistical"]["closest"])),
+        worst_residual_ratio=max(*closest, float(fdi["statistical"]["alarm"]["closest"])),
         statistical=_statistical(fdi),
         closest_approach=closest,
         authority=_authority(frame),

@@ -96,7 +96,7 @@ class _Watch:
         assert loop.plugin_frame is not None
         self._frame, self.values, self.air = loop.plugin_frame, list[float](), list[np.ndarray]()
         self._statistical = loop.frames["fdi"]["statistical"]
-        self._statistical["enabled"] = loop.scenario.fdi.statistical is not None
+        self._statistical["tests"]["enabled"] = loop.scenario.fdi.statistical is not None
 
     def __call__(self, frames: np.ndarray, references: np.ndarray, log: np.ndarray) -> int:
         self.air.append(self._statistical["air"]["acceleration"][0].copy())
@@ -118,7 +118,7 @@ def record(scenario: Scenario) -> Recording:
     recording = Recording(recorder.context, recorder.seen, np.array(watch.values), fault_at_s)
     if scenario.fdi.statistical is not None:
         recording.air = np.array(watch.air)
-        recording.air_noise = np.sqrt(loop.frames["fdi"]["statistical"]["jitter"][0])
+        recording.air_noise = np.sqrt(loop.frames["fdi"]["statistical"]["noise"]["jitter"][0])
     return recording
 
 

@@ -56,7 +56,7 @@ def _declared(scenario: "Scenario") -> tuple[Context, np.ndarray]:
     loop = Loop(scenario)
     exact = scenario.with_({"fdi.bounds.coefficients": 0.0})
     coefficients = context_of(loop.frames, scenario, loop.start, {}).declared.coefficients
-    noise_rad_s2 = np.sqrt(loop.frames["fdi"]["statistical"]["jitter"][0])
+    noise_rad_s2 = np.sqrt(loop.frames["fdi"]["statistical"]["noise"]["jitter"][0])
     context = aware_of_the_air(context_of(loop.frames, exact, loop.start, {}), noise_rad_s2)
     loop.release()
     return context, coefficients

@@ -1,0 +1,147 @@
+"""Kernels of the statistics, given a whole diagnosis: each takes what it wants of that."""
+
+import numpy as np
+
+from beaver_ftc.diagnosis import across, statistical
+from beaver_ftc.plant.sensing import MEASURED
+
+
+def views_of(record):
+    """Those that there are."""
+    return record["views"][: int(record["n_views"])]
+
+
+def _measured(x, y, attitude=(0.0, 0.0, 0.0)):
+    measured = np.zeros(1, MEASURED)[0]
+    measured["x"], measured["attitude"] = x, attitude
+    measured["y"][: len(y)] = y
+    return measured
+
+
+class Statistical:
+    """Of `statistical.py`; record: fdi["statistical"]."""
+
+    @staticmethod
+    def signatures(record, Gu, cubic):
+        statistical.signatures(record["block"], Gu, cubic)
+
+    @staticmethod
+    def score(record, t, known=True):
+        tests, blocks, views = record["tests"], record["block"], views_of(record)
+        statistical.score(record["alarm"], tests, blocks, views, record["forces"], record["air"], t, known)
+
+    @staticmethod
+    def record(record, row):
+        tests, blocks, views = record["tests"], record["block"], views_of(record)
+        statistical.record(tests, blocks, views, record["forces"], record["air"], row)
+
+    @staticmethod
+    def follow_rest(record, surprise, dt):
+        statistical.follow_rest(record["block"], record["air"], surprise, dt)
+
+    @staticmethod
+    def unknown_acceleration(record, out):
+        statistical.unknown_acceleration(record["block"], record["air"], out)
+
+    @staticmethod
+    def drifts(record, fdi, design, x, y):
+        noise, blocks, air = record["noise"], record["block"], record["air"]
+        statistical.drifts(noise, blocks, air, fdi["bound"], design, _measured(x, y), fdi["config"]["dt"])
+
+    @staticmethod
+    def prepare(record, fdi, design, x, y, u):
+        parts = (record[name] for name in ("tests", "noise", "block", "air"))
+        statistical.prepare(*parts, fdi["bound"], design, _measured(x, y), u, fdi["config"]["dt"])
+
+    @staticmethod
+    def look(record, fdi, design, x, y, u, attitude, dt):
+        parts = (record[name] for name in ("tests", "noise", "block", "air"))
+        statistical.look(*parts, fdi["bound"], design, _measured(x, y, attitude), u, dt)
+
+    @staticmethod
+    def shows(fdi, surface):
+        tests, blocks = fdi["statistical"]["tests"], fdi["statistical"]["block"]
+        return statistical.shows(
+            tests, blocks, fdi["isolation"]["estimator"], fdi["layout"]["loss_of"], surface
+        )
+
+    @staticmethod
+    def excludes(fdi, surface, ends):
+        tests, blocks, loss_of = (
+            fdi["statistical"]["tests"],
+            fdi["statistical"]["block"],
+            fdi["layout"]["loss_of"],
+        )
+        return statistical.excludes(
+            tests, blocks, fdi["isolation"]["estimator"], loss_of, surface, ends, fdi["config"]["abrupt"]
+        )
+
+
+class Across:
+    """Of `across.py`."""
+
+    @staticmethod
+    def part(fdi, view, innovation, i):
+        parts = (fdi["statistical"][name] for name in ("forces", "air", "inertial_air"))
+        return across.part(view, *parts, innovation, i)
+
+    @staticmethod
+    def turn(fdi, view, G):
+        record = fdi["statistical"]
+        return across.turn(view, record["forces"], record["air"], fdi["bound"], G)
+
+    @staticmethod
+    def told(record, view):
+        return across.told(view, record["air"])
+
+    @staticmethod
+    def blur(view, record, V):
+        parts = (record[name] for name in ("noise", "block", "forces", "air", "inertial_air"))
+        across.blur(view, *parts, V)
+
+    @staticmethod
+    def regress(fdi, view, innovation, share):
+        view["shows_across"] = share
+        parts = (fdi["statistical"][name] for name in ("block", "forces", "air", "inertial_air"))
+        across.regress(view, *parts, innovation)
+
+    @staticmethod
+    def sign(fdi, view, Gu):
+        across.sign(view, fdi["statistical"]["forces"], Gu)
+
+    @staticmethod
+    def observe(fdi, innovation, G, Gu, y, frame, latched):
+        record, bound = fdi["statistical"], fdi["bound"]
+        views, tests = views_of(record), record["tests"]
+        across.face(views, record["forces"], record["air"], bound, G, Gu)
+        parts = (record[name] for name in ("noise", "block", "forces", "air", "inertial_air"))
+        across.compose(views, int(tests["tolerated"]), *parts, innovation, y[2])
+        across.observe(views, tests, record["listening"], y, fdi["config"]["dt"], frame, latched)
+
+    @staticmethod
+    def feels(fdi, view, s, column):
+        return across.feels(view, fdi["statistical"]["forces"], s, column)
+
+    @staticmethod
+    def shown(record, view):
+        return across.shown(view, views_of(record), record["tests"], record["forces"], record["air"])
+
+    @staticmethod
+    def alarm(record, view):
+        return across.alarm(view, views_of(record), record["tests"], record["forces"], record["air"])
+
+    @staticmethod
+    def excludes(fdi, s):
+        record, column = (
+            fdi["statistical"],
+            fdi["isolation"]["estimator"]["effect"]["Z"][fdi["layout"]["position_of"][s]],
+        )
+        views = views_of(record)
+        return across.excludes(views, record["tests"], record["forces"], record["air"], s, column)
+
+
+def put(record, **fields):
+    """Write loose numbers where they belong: tests, noise, alarm."""
+    for name, value in fields.items():
+        (part,) = [part for part in ("tests", "noise", "alarm") if name in record[part].dtype.names]
+        record[part][name] = value

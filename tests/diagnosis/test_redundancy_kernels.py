@@ -412,3 +412,17 @@ def test_the_bound_of_a_climb_knows_the_hardest_of_three_pulls_whichever_it_was(
 
     assert rate(50.0, 20.0) == rate(20.0, 50.0) == rate(50.0, 50.0)
     assert rate(20.0, 80.0) - rate(20.0, 50.0) == pytest.approx(4.0 / 3.0 * H * 30.0)
+
+
+def test_a_wrong_airspeed_turns_the_flow_at_most_by_what_it_makes_of_the_pull():
+    """In level flight a pull turns the path by pull / V: 2 m/s less, by pull (1/(V - 2) - 1/V) more."""
+    signal, pull, rates = reading(rates=np.zeros(3), attitude=np.zeros(3), alpha=0.0, beta=0.0), 30.0, []
+    for off in (0.0, 2.0):
+        step = new_step()
+        redundancy.look(step, signal, np.array([0.0, 0.0, -GRAVITY]))
+        step["pull"] = pull
+        rates.append(allowed(step, signal, AIRSPEED, off, 0.0)[0][list(FLOWS)])
+    V = signal[AIRSPEED]
+    turned = pull * (1.0 / (V - 2.0) - 1.0 / V)
+    assert (turned < rates[1] - rates[0]).all()
+    assert rates[1] - rates[0] == pytest.approx(turned, rel=0.3)

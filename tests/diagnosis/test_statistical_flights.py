@@ -220,3 +220,30 @@ def test_small_oscillations_are_heard_and_named_in_turbulence(surface, amplitude
     assert flight.detection_time_s > 4.0
     assert flight.isolated == surface
     assert any("oscillatory" in candidate for candidate in (flight.isolation_type or "", *flight.candidates))
+
+
+SLOW_DIVES = {
+    "consumer-grade": {
+        "rate_hz": 140, "initial": {"airspeed_mps": 49.68, "altitude_m": 2836.6}, "seed": 452,
+        "reference": {"q": [{"square": {
+            "amplitude_deg_s": 42.288, "frequency_hz": 0.15056, "phase_deg": 351.99,
+        }}]},
+    },
+    "tactical-grade": {
+        "rate_hz": 55, "initial": {"airspeed_mps": 42.4, "altitude_m": 1070.3}, "seed": 776,
+        "reference": {"q": [{"sine": {
+            "amplitude_deg_s": 92.209, "frequency_hz": 0.12494, "phase_deg": 48.2055,
+        }}]},
+    },
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("grade", SLOW_DIVES)
+def test_a_slow_slipping_aircraft_with_the_declared_sensors_raises_no_alarm(grade):
+    """At half the airspeed of the trim a steady error of the dynamic pressure is four times its share."""
+    flight, log = flown(
+        duration_s=5.2, actuators="servo", sensors=grade, control={"law": "adaptive"},
+        fdi={"statistical": {}, "bounds": {"sensors": grade}}, **SLOW_DIVES[grade],
+    )  # fmt: skip
+    assert log["airspeed_mps"].min() < 24.0
+    assert flight.detection_time_s is None

@@ -10,7 +10,6 @@ from beaver_ftc.design.variants import response
 from beaver_ftc.diagnosis import readings
 from beaver_ftc.diagnosis.likelihood import N_READINGS
 from beaver_ftc.scenario.diagnosis import Bounds
-from flying import flown
 
 BIASES = {
     "alpha": {"bias_deg": 0.5},
@@ -91,28 +90,18 @@ def test_without_errors_of_the_air_data_nothing_is_read():
     assert gyros.p.random_error == pytest.approx(np.radians(0.1))
 
 
-SLOW_DIVES = {
-    "consumer-grade": {
-        "rate_hz": 140, "initial": {"airspeed_mps": 49.68, "altitude_m": 2836.6}, "seed": 452,
-        "reference": {"q": [{"square": {
-            "amplitude_deg_s": 42.288, "frequency_hz": 0.15056, "phase_deg": 351.99,
-        }}]},
-    },
-    "tactical-grade": {
-        "rate_hz": 55, "initial": {"airspeed_mps": 42.4, "altitude_m": 1070.3}, "seed": 776,
-        "reference": {"q": [{"sine": {
-            "amplitude_deg_s": 92.209, "frequency_hz": 0.12494, "phase_deg": 48.2055,
-        }}]},
-    },
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("grade", SLOW_DIVES)
-def test_a_slow_slipping_aircraft_with_the_declared_sensors_raises_no_alarm(grade):
-    """At half the airspeed of the trim a steady error of the dynamic pressure is four times its share."""
-    flight, log = flown(
-        duration_s=5.2, actuators="servo", sensors=grade, control={"law": "adaptive"},
-        fdi={"statistical": {}, "bounds": {"sensors": grade}}, **SLOW_DIVES[grade],
-    )  # fmt: skip
-    assert log["airspeed_mps"].min() < 24.0
-    assert flight.detection_time_s is None
+def test_what_the_vanes_show_of_the_gust_is_taken_off_the_innovation():
+    """Both moved by the same: whatever is kept of the frames stays as it is."""
+    gust, rng = np.array([0.05, -0.03, 0.02]), np.random.default_rng(1)
+    innovations, Gu = rng.normal(0.0, 0.1, (2, 3)), rng.normal(size=(2, 3, 4))
+    kept = []
+    for mean in (np.zeros(3), gust):
+        alone = Detector(100.0, bounds={"turbulence": "light"})
+        alone.detector["air"]["mean"] = mean
+        alone.watch(innovations + mean, Gu, np.ones(2))
+        kept.append([block["lane"] for block in alone.blocks])
+    still, moving = kept
+    assert any(np.abs(lane["held"]).max() > 0.01 for lane in still)
+    for one, other in zip(still, moving, strict=True):
+        for name in one.dtype.names:
+            assert other[name] == pytest.approx(one[name], abs=1e-9), name

@@ -9,7 +9,7 @@ from beaver_ftc.aircraft import load
 from beaver_ftc.aircraft.aircraft import FORCES, Aircraft
 from beaver_ftc.aircraft.schema import SIDESLIP_RATE
 from beaver_ftc.design.terms import fill_table
-from beaver_ftc.diagnosis import across, forces
+from beaver_ftc.diagnosis import across, forces, statistical
 from beaver_ftc.diagnosis.across import AN_AXIS, THE_VANE
 from beaver_ftc.diagnosis.forces import ASIDE, UP, look, set_up_forces, tell_apart
 from beaver_ftc.diagnosis.state import NORMAL, PITCH, ROLL, SIDE, YAW
@@ -488,6 +488,21 @@ def test_only_what_is_mostly_a_force_raises_the_alarm(viewed):
     ):  # fmt: skip
         views["mix"][v], views["held"][:] = mix, 9.0
         assert (Across.alarm(viewed["statistical"], views[v]) > 0.0) == alarms
+
+
+@pytest.mark.parametrize(("v", "mix", "axis"), [
+    (ELEVATOR_VIEW, (0.0, 0.3, 0.0, 0.0, -0.95), PITCH), (AILERON_VIEW, (0.03, 0.0, 0.0, 1.0, 0.0), ROLL),
+])  # fmt: skip
+def test_the_alarm_of_a_force_is_the_scores_and_the_logs_and_has_its_time(viewed, v, mix, axis):
+    """Held at 9 where 6 raise it: one and a half, of the axis that its surface leads."""
+    record, row = viewed["statistical"], np.full(5, 7.0)
+    record["views"]["mix"] = 0.0
+    record["views"]["mix"][v], record["views"]["held"], record["naming_level"] = mix, 9.0, 18.0
+    record["detected_at_s"], record["n_columns"] = -1.0, 4
+    statistical.score(record, 2.5)
+    assert (record["score"], record["axis"], record["detected_at_s"]) == (1.5, axis, 2.5)
+    statistical.record(record, row)
+    assert row.tolist() == [7.0, 0.0, *(1.5 if i == axis else 0.0 for i in (ROLL, PITCH, YAW))]
 
 
 def test_what_clears_a_vane_excludes_nobody(viewed):

@@ -111,7 +111,7 @@ def test_a_healthy_aircraft_is_asked_for_no_more_than_declared():
 
 def test_without_ailerons_roll_is_what_sideslip_gives_and_banks_are_halved():
     pilot = limited(jammed=0.9, hold=(0.2, 0.0, 0.0))
-    assert pilot["limit"][ROLL] == pytest.approx(0.9 * 0.02 * V * loops.MOST_SIDESLIP_RAD)
+    assert pilot["limit"][ROLL] == pytest.approx(0.9 * 0.02 * V * 0.14)
     assert limited(jammed=0.9, loose=0.2)["bank_limit"] <= 0.5 * (1.0 - 0.45)
     loose = limited(loose=1.0)  # ailerons can leave a bank; a fifth less, for the sideslip
     assert loose["bank_limit"] == pytest.approx(min(0.4, 6.0 * loose["limit"][ROLL]))
@@ -129,7 +129,7 @@ def test_thrust_per_inhg_is_the_slope_of_the_thrust():
     numeric = (thrust(1e-4) - thrust(-1e-4)) / 2e-4
     assert loops.thrust_per_inhg(pilot, control, y) == pytest.approx(numeric, rel=1e-6)
     pilot["thrust"] = -1.0, 0.0
-    assert loops.thrust_per_inhg(pilot, control, y) == loops.LEAST_PUSH
+    assert loops.thrust_per_inhg(pilot, control, y) == 1e-3
 
 
 PUSH = 0.2  # m/s2 per inHg
@@ -140,8 +140,8 @@ def test_paths_are_bounded_by_the_engine_and_the_airspeed_there_is():
     pilot["held"], pilot["full_inhg"] = 43.0, 28.0
     low, high = loops.paths(pilot, PUSH)
     # idle is 8 inHg below trim, full 8 above; 44 m/s is 1 below 45 and 3 above 41
-    assert low == pytest.approx(max(0.01 - 8 * PUSH / G - 0.02 * 1.0, -loops.MOST_PATH_RAD))
-    assert high == pytest.approx(min(0.01 + 8 * PUSH / G + 0.02 * 3.0, loops.MOST_PATH_RAD))
+    assert low == pytest.approx(max(0.01 - 8 * PUSH / G - 0.02 * 1.0, -0.15))
+    assert high == pytest.approx(min(0.01 + 8 * PUSH / G + 0.02 * 3.0, 0.15))
     low, high = loops.paths(pilot, 0.01)
     assert low == pytest.approx(0.01 - 0.08 / G - 0.02)
     assert high == pytest.approx(0.01 + 0.08 / G + 0.06)
@@ -154,13 +154,13 @@ def test_nothing_is_climbed_below_the_slowest_airspeed(commanded):
     slow = max(35.0, commanded - 2.0)
     assert loops.paths(pilot, 0.01)[1] == pytest.approx(0.01 + 0.08 / G - 0.02 * (slow - 33.0), abs=1e-12)
     pilot["airspeed"] = 10.0
-    assert loops.paths(pilot, 0.01)[1] == -loops.MOST_PATH_RAD
+    assert loops.paths(pilot, 0.01)[1] == -0.15
 
 
 def test_without_an_airspeed_the_engine_stays_and_descents_are_free():
     low, high = loops.paths(new_autopilot(), PUSH)
-    assert low == -loops.MOST_PATH_RAD
-    assert high == pytest.approx(min(0.01 + 0.02 * (V - 35.0), loops.MOST_PATH_RAD))
+    assert low == -0.15
+    assert high == pytest.approx(min(0.01 + 0.02 * (V - 35.0), 0.15))
 
 
 @pytest.mark.parametrize("error", [-2.0, 0.5, 3.0])
@@ -184,7 +184,7 @@ def test_what_is_found_missing_has_a_limit_and_without_a_height_the_path_is_the_
     pilot = new_autopilot(ALTITUDE, lift=0.2, moving=(-0.15 * V, 0, 0, 0))
     pilot["command"][ALTITUDE] = 1000.0
     loops.path_of(pilot, seen(), PUSH)
-    assert pilot["lift"] == loops.MOST_MISSING
+    assert pilot["lift"] == 0.1
     flown = loops.path_of(new_autopilot(), seen(attitude=(0, 0.12, 0)), PUSH)
     assert flown == pytest.approx(0.12 - ALPHA_NOW)
 
@@ -215,7 +215,7 @@ def test_where_nothing_acts_in_yaw_turns_are_slow_and_a_drift_is_found(error):
     pilot["command"][HEADING] = min(error, 3.0)
     rate = loops.rolling(pilot, np.zeros(3))
     off = min(error, 3.0)
-    drift = 0.8 * min(0.03 + DT * 0.8 * 0.04 * off, loops.MOST_DRIFT_RAD_S)
+    drift = 0.8 * min(0.03 + DT * 0.8 * 0.04 * off, 0.1)
     assert pilot["drift"] == pytest.approx(drift)
     assert rate == pytest.approx(1.1 * V / G * ((1 - 0.8 * 0.6) * 0.25 * off + drift))
 
@@ -223,7 +223,7 @@ def test_where_nothing_acts_in_yaw_turns_are_slow_and_a_drift_is_found(error):
 def test_the_drift_found_has_a_limit():
     pilot = new_autopilot(HEADING, loose=1.0, drift=0.3)
     loops.rolling(pilot, np.zeros(3))
-    assert pilot["drift"] == loops.MOST_DRIFT_RAD_S
+    assert pilot["drift"] == 0.1
 
 
 def test_a_bank_is_held_and_what_roll_misses_without_ailerons_is_integrated():
@@ -245,7 +245,7 @@ def test_a_bank_is_held_and_what_roll_misses_without_ailerons_is_integrated():
 def test_the_rudder_keeps_the_sideslip_that_rolls_where_the_ailerons_do_not(jammed, rolling):
     pilot, attitude = new_autopilot(BANK, jammed=jammed), np.zeros(3)
     loops.to_body(pilot, new_y(), attitude, rolling, 0.0)
-    wanted = -jammed * min(rolling / (0.02 * V), loops.MOST_SIDESLIP_RAD)
+    wanted = -jammed * min(rolling / (0.02 * V), 0.14)
     assert pilot["rates"] == pytest.approx([rolling, 0.0, 0.5 * (0.03 - wanted)])
 
 
@@ -284,7 +284,7 @@ def test_power_holds_the_airspeed_and_carries_the_climb():
     assert power["trim"] == pytest.approx(wanted)
     assert power["in_use"] == 1
     assert pilot["throttle"] == pytest.approx(0.05 + DT * 0.015 * 1.0)
-    assert pilot["usual"] == pytest.approx(43.0 + DT / loops.USUAL_S * 1.0)
+    assert pilot["usual"] == pytest.approx(43.0 + DT / 20.0 * 1.0)
     assert power["command"][0] == 21.5  # half an inHg a frame
 
 
@@ -294,7 +294,7 @@ def test_power_goes_down_as_slowly_and_to_the_lowest():
     assert power["command"][0] == 20.5
     assert pilot["throttle"] == 0.05  # what a limit cuts off is not integrated
     assert throttled(path=0.5)[1]["trim"] == 28.0
-    assert throttled(throttle=5.0, path=-0.45)[0]["throttle"] == pytest.approx(loops.MOST_MISSING * G)
+    assert throttled(throttle=5.0, path=-0.45)[0]["throttle"] == pytest.approx(0.1 * G)
     assert throttled(power={"enabled": 1})[1]["command"][0] == 21.0
 
 
@@ -317,12 +317,12 @@ def test_power_leaves_the_rudder_enough(rudder):
 
 def test_while_power_stands_in_for_pitch_it_gets_the_airspeed_to_hold():
     _, power = throttled(power={"engaged": 1})
-    usual = 43.0 + DT / loops.USUAL_S
+    usual = 43.0 + DT / 20.0
     assert power["usual_speed"] == pytest.approx(45.0)
     assert power["trim"] == pytest.approx(20.0 + (0.04 + 0.05 + G * 0.02) / PUSH)
     _, power = throttled(power={"engaged": 1}, usual=38.0)
-    usual = 38.0 + DT / loops.USUAL_S * (V - 38.0)
-    assert power["usual_speed"] == pytest.approx(usual + loops.USUAL_MPS)
+    usual = 38.0 + DT / 20.0 * (V - 38.0)
+    assert power["usual_speed"] == pytest.approx(usual + 3.0)
 
 
 def test_deviations_are_judged_once_settled_and_of_the_airspeed_the_mean():
@@ -331,9 +331,9 @@ def test_deviations_are_judged_once_settled_and_of_the_airspeed_the_mean():
     pilot["changed_at_s"], pilot["mean_off"] = 10.0, (4.0, -0.5, 0.1, 0.0)
     pilot["held"], pilot["held_off"] = 46.0, -0.2
     loops.judge(pilot, 990.0, 47.0, -3.1, -0.1, 39.9)
-    assert pilot["held_worst"] == abs(pilot["held_off"]) == pytest.approx(0.2 - DT / loops.MEAN_S * 1.2)
-    mean = -0.5 + DT / loops.MEAN_S * 2.5
-    part, off = DT / loops.MEAN_S, 2 * np.pi - 6.2
+    assert pilot["held_worst"] == abs(pilot["held_off"]) == pytest.approx(0.2 - DT / 10.0 * 1.2)
+    mean = -0.5 + DT / 10.0 * 2.5
+    part, off = DT / 10.0, 2 * np.pi - 6.2
     means = [4.0 - part * 14.0, mean, 0.1 + part * (off - 0.1), -part * 0.3]
     assert pilot["mean_off"] == pytest.approx(means)
     assert pilot["worst"] == pytest.approx([10.0, abs(mean), 0.0, 0.0])

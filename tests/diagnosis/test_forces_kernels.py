@@ -495,13 +495,14 @@ def test_only_what_is_mostly_a_force_raises_the_alarm(viewed):
 ])  # fmt: skip
 def test_the_alarm_of_a_force_is_the_scores_and_the_logs_and_has_its_time(viewed, v, mix, axis):
     """Held at 9 where 6 raise it: one and a half, of the axis that its surface leads."""
-    record, row = viewed["statistical"], np.full(5, 7.0)
-    record["views"]["mix"] = 0.0
-    record["views"]["mix"][v], record["views"]["held"], record["naming_level"] = mix, 9.0, 18.0
-    record["detected_at_s"], record["n_columns"] = -1.0, 4
-    statistical.score(record, 2.5)
-    assert (record["score"], record["axis"], record["detected_at_s"]) == (1.5, axis, 2.5)
-    statistical.record(record, row)
+    chances, row = viewed["statistical"], np.full(5, 7.0)
+    views, tests, alarm = chances["views"][: chances["n_views"]], chances["tests"], chances["alarm"]
+    views["mix"] = 0.0
+    views["mix"][v], views["held"], tests["naming_level"] = mix, 9.0, 18.0
+    alarm["detected_at_s"], tests["n_columns"] = -1.0, 4
+    statistical.score(alarm, tests, chances["block"], views, chances["forces"], chances["air"], 2.5)
+    assert (alarm["score"], alarm["axis"], alarm["detected_at_s"]) == (1.5, axis, 2.5)
+    statistical.record(tests, chances["block"], views, chances["forces"], chances["air"], row)
     assert row.tolist() == [7.0, 0.0, *(1.5 if i == axis else 0.0 for i in (ROLL, PITCH, YAW))]
 
 

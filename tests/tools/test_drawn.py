@@ -199,6 +199,27 @@ def test_an_alarm_is_held_against_the_diagnosis_that_raised_it(published):
         assert any(line.startswith("false alarm") for line in found) == broken_then
 
 
+def test_an_instrument_is_held_against_the_diagnosis_that_has_watched_it():
+    """One that was broken before the diagnosis began anew, with other sensors, may be taken for another."""
+    fault = {"type": "bias", "sensor": "q", "at_s": 1.0, "magnitude": 4.0}
+    flight = bf.fly({"duration_s": 2.0, "faults": [fault]}, log=False)
+    wrong = altered(flight.metrics, isolation={"fault": "sensor theta"})
+    change = {"time_s": 1.5, "law": None, "scheme": None, "sensors": True}
+    for changes, misnamed in (([], True), ([change], True), ([{**change, "detection_time_s": 1.1}], False)):
+        found = list(broken(flight.scenario, {**wrong, "changes": changes}, True))
+        assert any(line.startswith("wrong name") for line in found) == misnamed
+
+
+def test_a_surface_that_ran_to_both_stops_has_no_one_type(published):
+    up = {"type": "hardover", "actuator": "elevator", "direction": 1, "at_s": 12.0}
+    for direction, promised in ((1, True), (-1, False)):
+        faults = [up, {**up, "direction": direction, "at_s": 12.4}]
+        fdi = {"fault_class": "all", "fault_profile": "any"}
+        scenario = published.scenario.with_({"faults": faults, "fdi": fdi})
+        told = altered(published.metrics, isolation={"fault": "elevator", "type": "bias", "candidates": []})
+        assert any(line.startswith("wrong type") for line in broken(scenario, told, True)) == promised
+
+
 @pytest.mark.parametrize(
     ("column", "says"),
     [

@@ -56,15 +56,6 @@ def _sane(scenario: bf.Scenario, metrics: Document) -> Iterator[str]:
         yield "supervisor: modes out of order"
 
 
-def _stages(scenario: bf.Scenario) -> list[tuple[float, str, bool]]:
-    """(from when on, scheme, whether the diagnosis begins anew there)."""
-    stages, scheme = [(0.0, scenario.fdi.scheme, True)], scenario.fdi.scheme
-    for change in scenario.changes:
-        scheme = change.scheme or scheme
-        stages.append((change.at_s, scheme, change.renews_diagnosis))
-    return stages
-
-
 def _alarms(scenario: bf.Scenario, metrics: Document) -> Iterator[tuple[float | None, str]]:
     """(when or None, whose alarm) of each diagnosis of a flight in turn, that of its end last."""
     scheme = scenario.fdi.scheme
@@ -74,9 +65,11 @@ def _alarms(scenario: bf.Scenario, metrics: Document) -> Iterator[tuple[float | 
     yield metrics["detection"]["time_s"], scheme
 
 
-def _began_s(scenario: bf.Scenario) -> float:
-    """When the diagnosis that is there at the end began."""
-    return [at_s for at_s, _, anew in _stages(scenario) if anew][-1]
+def _began_s(metrics: Document) -> float:
+    """When the diagnosis that is there at the end began: a change that says what came of the one before."""
+    return max(
+        (change["time_s"] for change in metrics["changes"] if "detection_time_s" in change), default=0.0
+    )
 
 
 def _false_alarms(scenario: bf.Scenario, metrics: Document) -> Iterator[str]:
@@ -134,7 +127,7 @@ def _instrument(
 ) -> Iterator[str]:
     """One broken instrument, watched since before it broke: no surface and no other instrument is named."""
     fault, named = sensors[0], metrics["isolation"]["fault"]
-    watched = scenario.fdi.sensor_monitor != "never" and _began_s(scenario) < fault.at_s
+    watched = scenario.fdi.sensor_monitor != "never" and _began_s(metrics) < fault.at_s
     if surfaces or len(sensors) > 1 or not watched:
         return
     if named not in (None, UNANTICIPATED, f"sensor {fault.sensor}"):
@@ -164,7 +157,7 @@ def _one_surface(scenario: bf.Scenario, metrics: Document, faults: list[Any]) ->
     named, left = isolation["fault"], isolation["candidates"]
     if scenario.fdi.fault_profile == "abrupt" and len(faults) > 1:
         return
-    kinds = {fault.type for fault in faults}
+    kinds = _kinds(faults)
     if named not in (None, surface):
         yield f"{'excluded' if named == UNANTICIPATED else 'wrong name'}: {named}, broken is {surface}"
     elif named is None and scenario.fdi.pairs:
@@ -181,6 +174,12 @@ def _one_surface(scenario: bf.Scenario, metrics: Document, faults: list[Any]) ->
             return
         if kind not in (None, faults[0].type) or (kind is None and faults[0].type not in left):
             yield f"wrong type: {kind or left}, broken is {faults[0].type} of {surface}"
+
+
+def _kinds(faults: list[Any]) -> set[Any]:
+    """The types of the faults of a surface; to both stops is more than one."""
+    stops = {fault.direction for fault in faults if fault.type == "hardover"}
+    return {fault.type for fault in faults} | (stops if len(stops) > 1 else set())
 
 
 def _runs_away(scenario: bf.Scenario, fault: Any) -> bool:

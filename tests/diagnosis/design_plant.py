@@ -11,8 +11,8 @@ from numba import njit
 
 from beaver_ftc.design.model import N_Y
 from beaver_ftc.diagnosis.bank import note_closest_approach
-from beaver_ftc.diagnosis.belief import bound_now, look_back, respond
-from beaver_ftc.diagnosis.thresholds import ROUNDING_RAD_S2
+from beaver_ftc.diagnosis.belief import look_back, respond
+from beaver_ftc.diagnosis.bounds.worst_case import ROUNDING_RAD_S2, bound_now
 from beaver_ftc.loop.assembly import assemble
 from beaver_ftc.loop.frame import diagnose
 from beaver_ftc.scenario.schema import Scenario
@@ -26,14 +26,14 @@ def believe(frames):
     """What the design model makes of this instant."""
     frame = frames[0]
     respond(frame.belief, frame.measured)
-    bound_now(frame.fdi, frame.belief, frame.measured)
+    bound_now(frame.fdi.bound, frame.belief.design, frame.measured, frame.belief.u)
 
 
 @njit
 def conclude(frames):
     """The flying diagnosis of this instant."""
     frame = frames[0]
-    look_back(frame.fdi, frame.belief, frame.measured, frame.k)
+    look_back(frame.belief, frame.fdi.bound, frame.measured, frame.k, frame.dt)
     diagnose(frame)
     note_closest_approach(frame.fdi)
 

@@ -9,7 +9,7 @@ from beaver_ftc.aircraft import load
 from beaver_ftc.design.inertia import inertia_coefficients
 from beaver_ftc.design.model import design_record
 from beaver_ftc.diagnosis import admitted
-from beaver_ftc.diagnosis.derived import admitted_dtype
+from beaver_ftc.diagnosis.bounds.worst_case import admitted_dtype
 from beaver_ftc.scenario.given import load as scenario
 
 AIRCRAFT = load()

@@ -7,8 +7,9 @@ from statistics_of import Statistical
 
 from beaver_ftc.aircraft.schema import MAX_MONOMIALS
 from beaver_ftc.design import model
-from beaver_ftc.diagnosis import air, redundancy, thresholds
+from beaver_ftc.diagnosis import air, redundancy
 from beaver_ftc.diagnosis.air import AIR
+from beaver_ftc.diagnosis.bounds import worst_case
 
 X, U = np.array([0.1, -0.05, 0.07]), np.array([0.1, -0.15, 0.05, 0.2])
 Y = np.array([0.1, 0.03, 45.0, 1036.0, 0.3, 0.0, 0.0, 0.0])
@@ -75,5 +76,5 @@ def test_the_gusts_effect():
 def test_the_published_bound_adds_to_what_is_there():
     once, more = np.zeros(3), np.full(3, 0.5)
     for out in (once, more):
-        thresholds.uncertainty_bound(X, design(), np.full(3, 0.1), np.full(3, 0.02), 7e-5, out)
+        worst_case.uncertainty_bound(X, design(), np.full(3, 0.1), np.full(3, 0.02), 7e-5, out)
     assert more - once == pytest.approx([0.5] * 3)

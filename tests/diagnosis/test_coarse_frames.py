@@ -15,17 +15,19 @@ from beaver_ftc.scenario.schema import Scenario
 
 @njit
 def first(frames):
-    begin_frame(frames[0].fdi, frames[0].belief, frames[0].measured)
+    fdi = frames[0].fdi
+    begin_frame(frames[0].belief, fdi.bound, fdi.layout, fdi.config.every_type, frames[0].measured)
 
 
 @njit
 def another(frames):
-    sum_up(frames[0].fdi, frames[0].belief)
+    fdi = frames[0].fdi
+    sum_up(frames[0].belief, fdi.bound, fdi.layout, fdi.config.every_type)
 
 
 @njit
 def over(frames):
-    elapse(frames[0].fdi, frames[0].belief)
+    elapse(frames[0].belief, frames[0].fdi.bound)
 
 
 @njit

@@ -11,9 +11,10 @@ from beaver_ftc.aircraft.aircraft import FORCES
 from beaver_ftc.design.model import design_record
 from beaver_ftc.design.terms import fill_table, regressors
 from beaver_ftc.design.variants import response
-from beaver_ftc.diagnosis import air, error_map, scheme, statistical, thresholds
+from beaver_ftc.diagnosis import air, scheme, statistical, thresholds
 from beaver_ftc.diagnosis.air import AIR
-from beaver_ftc.diagnosis.error_map import error_map_dtype
+from beaver_ftc.diagnosis.bounds import worst_case
+from beaver_ftc.diagnosis.bounds.worst_case import error_map_dtype
 from beaver_ftc.diagnosis.likelihood import BLOCK
 from beaver_ftc.diagnosis.state import LOSS, NOT_ISOLATED, STATISTICS, WORST_CASE, verdict_dtype
 
@@ -134,11 +135,11 @@ def test_the_bound_of_a_true_estimator_covers_every_course_of_its_parameter():
 def test_the_published_bound_and_the_turning_earth():
     design, out = design_record().view(np.recarray)[0], np.array([0.1, 0.2, 0.3])
     inertia, constant, earth = np.array([0.25, 0.2, 0.15]), np.array([0.02, 0.03, 0.04]), 7e-5
-    thresholds.uncertainty_bound(X, design, inertia, constant, earth, out)
+    worst_case.uncertainty_bound(X, design, inertia, constant, earth, out)
     p, q, r = X
     coupling = np.abs([design["Pqr"] * q * r, design["Qpr"] * p * r, design["Rpq"] * p * q])
     turning = earth * (2.0 * np.abs(X).sum() + earth)
-    rounding = thresholds.ROUNDING_RAD_S2
+    rounding = worst_case.ROUNDING_RAD_S2
     assert out == pytest.approx(
         [0.1, 0.2, 0.3] + inertia * coupling + constant + turning + rounding, rel=1e-12
     )
@@ -172,20 +173,20 @@ def new_map(**fields):
     ],
 )  # fmt: skip
 def test_the_level_is_the_first_share_of_the_travel_that_covers_the_surfaces(u, level):
-    assert error_map.level_of(new_map(), np.array(u)) == level
-    assert error_map.level_of(new_map(whole=1), np.array(u)) == 2
+    assert worst_case.level_of(new_map(), np.array(u)) == level
+    assert worst_case.level_of(new_map(whole=1), np.array(u)) == 2
 
 
 def test_a_surface_beyond_a_travel_that_ends_at_neutral_uses_all_of_it():
     up_only = new_map(travel_low=(-0.4, -0.4, -0.2, 0.0))
-    assert error_map.level_of(up_only, np.array([0, 0, 0, -0.01])) == 2
-    assert error_map.level_of(up_only, np.array([0, 0, 0, 0.25])) == 0
-    assert error_map.level_of(up_only, np.array([0, 0, 0, 0.0])) == 0  # at rest at an end it uses none
+    assert worst_case.level_of(up_only, np.array([0, 0, 0, -0.01])) == 2
+    assert worst_case.level_of(up_only, np.array([0, 0, 0, 0.25])) == 0
+    assert worst_case.level_of(up_only, np.array([0, 0, 0, 0.0])) == 0  # at rest at an end it uses none
 
 
 @pytest.mark.parametrize(("time_s", "age"), [(0.0, 0), (10.0, 0), (10.1, 1), (60.0, 1), (60.1, -1)])
 def test_the_row_is_that_of_a_flight_so_old(time_s, age):
-    assert error_map.age_of(new_map(time_s=time_s)) == age
+    assert worst_case.age_of(new_map(time_s=time_s)) == age
 
 
 @pytest.mark.parametrize(
@@ -202,9 +203,9 @@ def test_the_error_is_that_of_the_innermost_box_or_unknown(roll, airspeed, time_
     record, out = new_map(time_s=time_s), np.full(3, 0.5)
     y = Y.copy()
     y[2] = airspeed
-    error_map.add_model_error(record, np.array([roll, 0.0, 0.0]), y, np.array([0.1, 0, 0, 0]), out)
+    worst_case.add_model_error(record, np.array([roll, 0.0, 0.0]), y, np.array([0.1, 0, 0, 0]), out)
     age = 0 if time_s <= 10.0 else 1
-    expected = record["error"][age, box, 1] if box is not None else error_map.UNKNOWN_RAD_S2
+    expected = record["error"][age, box, 1] if box is not None else worst_case.UNKNOWN_RAD_S2
     assert out == pytest.approx(0.5 + expected)
     assert record["now"] == pytest.approx(np.full(3, expected))
     assert record["outside"] == (box is None)
@@ -214,7 +215,7 @@ def test_the_error_is_that_of_the_innermost_box_or_unknown(roll, airspeed, time_
 def test_the_unknown_is_larger_than_what_terms_give_far_from_where_they_were_fitted():
     """Those of wrightFlyer1903 are 2000 rad/s2 off at an angle of attack of -0.5 rad: a bound of half as much
     excluded the true fault there."""
-    assert error_map.UNKNOWN_RAD_S2 > 100.0 * 2000.0
+    assert worst_case.UNKNOWN_RAD_S2 > 100.0 * 2000.0
 
 
 def new_detector(**fields):
@@ -239,7 +240,7 @@ def test_the_drift_is_of_what_is_bounded_and_of_the_air_not_seen(moving):
     fdi["bound"]["constant"], fdi["bound"]["inertia"] = (0.02, 0.0, 0.04), 0.1
     Statistical.drifts(record, fdi, design, X, Y)
     bounded = np.zeros(3)
-    thresholds.uncertainty_bound(X, design, np.full(3, 0.1), np.array([0.02, 0.0, 0.04]), 0.0, bounded)
+    worst_case.uncertainty_bound(X, design, np.full(3, 0.1), np.array([0.02, 0.0, 0.04]), 0.0, bounded)
     bounded += [0.01, 0.02, 0.03]
     assert record["noise"]["bounded"] == pytest.approx(bounded)
     turned = record["air"]["damping"] @ record["air"]["axes"]

@@ -14,9 +14,7 @@ from beaver_ftc.compiled import kernel
 from beaver_ftc.design.actuators import actuators_dtype, move
 from beaver_ftc.design.model import design_dtype
 from beaver_ftc.design.variants import response
-from beaver_ftc.diagnosis.derived import changing_error, derived_bound, slack_per_rad
-from beaver_ftc.diagnosis.error_map import add_model_error
-from beaver_ftc.diagnosis.thresholds import uncertainty_bound
+from beaver_ftc.diagnosis.bounds.worst_case import bound_now, changing_error
 
 
 @lru_cache
@@ -68,37 +66,20 @@ def respond(belief, measured):
 
 
 @kernel
-def bound_now(fdi, belief, measured):
-    """Fill fdi.bound.eta_bar_now (3,) rad/s2, the bound on the uncertainty at this instant."""
-    x = measured.x
-    fdi.bound.eta_bar_now[:] = 0.0
-    if fdi.bound.admitted.any:
-        derived_bound(fdi.bound.admitted, belief.design, x, measured.y, belief.u, fdi.bound.eta_bar_now)
-        if fdi.bound.own_errors:
-            for s in range(belief.u.size):
-                slack_per_rad(fdi.bound.admitted, belief.design, s)
-        x = fdi.bound.admitted.far_x
-    if fdi.bound.error_map.n_boxes > 0:
-        add_model_error(fdi.bound.error_map, measured.x, measured.y, belief.u, fdi.bound.eta_bar_now)
-    uncertainty_bound(
-        x, belief.design, fdi.bound.inertia, fdi.bound.constant, fdi.bound.earth_rate, fdi.bound.eta_bar_now
-    )
-
-
-@kernel
-def sum_up(fdi, belief):
-    """Add what the design model makes of this instant to the sums over the frame."""
+def sum_up(belief, bound, layout, every_type):
+    """Add what the design model makes of this instant to the sums over the frame, with extremes where faults
+    of every type are in question."""
     total, G, u = belief.sums, belief.G, belief.u
     for i in range(3):
         total.f[i] += belief.f[i]
-        total.eta_bar[i] += fdi.bound.eta_bar_now[i]
+        total.eta_bar[i] += bound.eta_bar_now[i]
         for s in range(u.size):
             total.G[i, s] += G[i, s]
             total.Gu[i, s] += G[i, s] * u[s]
-    if fdi.config.every_type:
-        note_extremes(fdi.layout.dominant_axis, G, u, total)
-    if fdi.bound.own_errors:
-        sum_up_own_errors(fdi.bound.admitted.per_rad, u, total)
+    if every_type:
+        note_extremes(layout.dominant_axis, G, u, total)
+    if bound.own_errors:
+        sum_up_own_errors(bound.admitted.per_rad, u, total)
 
 
 @kernel
@@ -120,7 +101,7 @@ def sum_up_own_errors(per_rad, u, total):
 
 
 @kernel
-def elapse(fdi, belief):
+def elapse(belief, bound):
     """Means over the frame that has elapsed: G, the moment of each surface, f + G u, and the bound."""
     share, total, mean = belief.share, belief.sums, belief.means
     for i in range(3):
@@ -130,12 +111,12 @@ def elapse(fdi, belief):
             mean.Gu[i, s] = share * total.Gu[i, s]
             rate += mean.Gu[i, s]
         mean.acceleration[i] = rate
-        fdi.bound.eta_bar[i] = share * total.eta_bar[i]
+        bound.eta_bar[i] = share * total.eta_bar[i]
     mean.G_least[:], mean.G_most[:] = total.G_least, total.G_most
     mean.u_least[:], mean.u_most[:] = total.u_least, total.u_most
-    if fdi.bound.own_errors:
-        fdi.bound.own_per_rad[:] = share * total.own_per_rad
-        fdi.bound.own[:] = share * total.own
+    if bound.own_errors:
+        bound.own_per_rad[:] = share * total.own_per_rad
+        bound.own[:] = share * total.own
     if share < 1.0:
         spread(belief)
 
@@ -158,39 +139,40 @@ def spread(belief):
 
 
 @kernel
-def look_back(fdi, belief, measured, k):
-    """What the design model makes of the frame that has elapsed: its bound and its means; k: its number."""
-    fdi.bound.error_map.time_s = k * fdi.config.dt
-    bound_now(fdi, belief, measured)
-    fdi.bound.eta_bar[:] = fdi.bound.eta_bar_now
-    if fdi.bound.admitted.any:
+def look_back(belief, bound, measured, k, dt):
+    """What the design model makes of the frame that has elapsed, of dt s: its bound and its means; k: its
+    number."""
+    bound.error_map.time_s = k * dt
+    bound_now(bound, belief.design, measured, belief.u)
+    bound.eta_bar[:] = bound.eta_bar_now
+    if bound.admitted.any:
         for i in range(3):
-            fdi.bound.noise[i] = changing_error(fdi.bound.admitted, i, measured.x[i])
+            bound.noise[i] = changing_error(bound.admitted, i, measured.x[i])
     if k > 0:
-        elapse(fdi, belief)
+        elapse(belief, bound)
 
 
 @kernel
-def begin_frame(fdi, belief, measured):
+def begin_frame(belief, bound, layout, every_type, measured):
     """Begin the next frame's sums with this instant, the command in effect still the old one."""
     belief.x_then[:] = measured.x
-    fdi.bound.noise_then[:] = fdi.bound.noise
+    bound.noise_then[:] = bound.noise
     total = belief.sums
     total.f[:], total.eta_bar[:] = 0.0, 0.0
     total.G[:], total.Gu[:] = 0.0, 0.0
     total.G_least[:], total.G_most[:] = np.inf, -np.inf
     total.u_least[:], total.u_most[:] = np.inf, -np.inf
-    if fdi.bound.own_errors:
+    if bound.own_errors:
         total.own_per_rad[:], total.own[:] = 0.0, 0.0
-    sum_up(fdi, belief)
+    sum_up(belief, bound, layout, every_type)
     total.Gu_first[:] = total.Gu
 
 
 @kernel
-def look(fdi, belief, measured):
+def look(belief, bound, layout, every_type, measured):
     """Take an instant inside the frame into the means over it; the surfaces move on."""
-    bound_now(fdi, belief, measured)
-    sum_up(fdi, belief)
+    bound_now(bound, belief.design, measured, belief.u)
+    sum_up(belief, bound, layout, every_type)
     move(belief.actuators, belief.commanded, belief.u)
 
 

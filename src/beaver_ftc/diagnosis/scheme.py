@@ -22,6 +22,7 @@ from beaver_ftc.diagnosis import (
     statistical,
 )
 from beaver_ftc.diagnosis.belief import begin_frame, look
+from beaver_ftc.diagnosis.bounds.worst_case import bound_dtype
 from beaver_ftc.diagnosis.state import (
     BANK,
     CONFIG,
@@ -30,7 +31,6 @@ from beaver_ftc.diagnosis.state import (
     NOT_ISOLATED,
     STATISTICS,
     WORST_CASE,
-    bound_dtype,
     conclusion_dtype,
     layout_dtype,
 )
@@ -155,7 +155,7 @@ def ready(fdi, belief, measured, k):
     """Make ready for the frame to come."""
     if fdi.statistical.tests.enabled:
         look_ahead(fdi, belief, measured, k)
-    begin_frame(fdi, belief, measured)
+    begin_frame(belief, fdi.bound, fdi.layout, fdi.config.every_type, measured)
 
 
 @kernel
@@ -209,7 +209,7 @@ def look_inside(fdi, belief, measured):
     """Take in an instant inside a frame: what is believed of it, and the gust that the vanes see by then."""
     if fdi.statistical.tests.enabled:
         look_at_air(fdi, belief, measured)
-    look(fdi, belief, measured)
+    look(belief, fdi.bound, fdi.layout, fdi.config.every_type, measured)
 
 
 @kernel

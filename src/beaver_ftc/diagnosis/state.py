@@ -4,8 +4,6 @@ from functools import lru_cache
 
 import numpy as np
 
-from beaver_ftc.diagnosis.derived import admitted_dtype
-from beaver_ftc.diagnosis.error_map import error_map_dtype
 from beaver_ftc.scenario.diagnosis import MAX_POLES
 
 MAX_ESTIMATORS = 16
@@ -112,21 +110,6 @@ def layout_dtype(n: int) -> np.dtype:
     fields = [
         ("dominant_axis", "i8", (n,)), ("group", "i8", (n,)), ("partner", "i8", (n,)), ("main", "i8", (3,)),
         ("loss_of", "i8", (n,)), ("position_of", "i8", (n,)),
-    ]  # fmt: skip
-    return np.dtype(fields, align=True)
-
-
-@lru_cache
-def bound_dtype(n: int) -> np.dtype:
-    """Bounds on the uncertainty. eta_bar, eta_bar_now: over the elapsed frame and at this instant, rad/s2.
-    noise: on what a gyro's error changes by, rad/s. frame: on one frame's innovation, rad/s2. own: of the
-    errors of n surfaces' own terms, per rad of deflection and at the command, means over the frame."""
-    fields = [
-        ("inertia", "f8", (3,)), ("constant", "f8", (3,)), ("earth_rate", "f8"),
-        ("admitted", admitted_dtype(n)), ("error_map", error_map_dtype(n)),
-        ("eta_bar", "f8", (3,)), ("eta_bar_now", "f8", (3,)),
-        ("noise", "f8", (3,)), ("noise_then", "f8", (3,)), ("frame", "f8", (3,)),
-        ("own_errors", "i8"), ("own_per_rad", "f8", (3, n)), ("own", "f8", (3, n)),
     ]  # fmt: skip
     return np.dtype(fields, align=True)
 

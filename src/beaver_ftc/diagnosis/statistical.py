@@ -15,7 +15,7 @@ from beaver_ftc.diagnosis import across, likelihood, readings, whitening
 from beaver_ftc.diagnosis import air as gusts
 from beaver_ftc.diagnosis.across import MAX_VIEWS, VIEW
 from beaver_ftc.diagnosis.air import AIR
-from beaver_ftc.diagnosis.error_map import UNKNOWN_TO_FILTERS_RAD_S2
+from beaver_ftc.diagnosis.bounds.worst_case import UNKNOWN_TO_FILTERS_RAD_S2, uncertainty_bound
 from beaver_ftc.diagnosis.forces import FORCES_FELT
 from beaver_ftc.diagnosis.likelihood import (
     BLOCK,
@@ -30,7 +30,6 @@ from beaver_ftc.diagnosis.likelihood import (
 )
 from beaver_ftc.diagnosis.likelihood import PITCH_BLOCK as PITCH
 from beaver_ftc.diagnosis.state import LOSS
-from beaver_ftc.diagnosis.thresholds import uncertainty_bound
 from beaver_ftc.diagnosis.tones import LISTENING
 
 # Of what the best explanation explains, the part that a constant theta leaves to a loss that grows is larger

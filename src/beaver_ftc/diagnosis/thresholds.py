@@ -7,10 +7,6 @@ promises of the theory therefore hold at any frame rate, with no allowance for d
 
 from beaver_ftc.compiled import kernel
 
-# Double precision leaves 1e-16 of a rate below 6 rad/s, divided by a frame of 1 ms or more, and of the terms
-# of f + G u, which stay below 100 rad/s2; a few operations each.
-ROUNDING_RAD_S2 = 1e-11
-
 
 @kernel
 def bound_step(bound, eta_bar, decay, dt):
@@ -25,7 +21,7 @@ def bound_step(bound, eta_bar, decay, dt):
 def noise_step(noise, nbar, decay):
     """Advance the filtered bound on a gyro's changing error, rad/s, by one frame; nbar as the frame began.
 
-    See derived.py: what a residual may owe to the gyro is this and the present nbar.
+    See bounds/worst_case.py: what a residual may owe to the gyro is this and the present nbar.
     """
     return decay * noise + (1.0 - decay) * nbar
 
@@ -51,19 +47,3 @@ def published(low, high, omega, theta, bound):
     """
     mu = max(theta - low, high - theta) * abs(omega) + bound
     return -mu, mu
-
-
-@kernel
-def uncertainty_bound(x, design, inertia, constant, earth_rate, eta_bar):
-    """Add to eta_bar (3,) rad/s2 the published bound, and what the Earth's rotation adds.
-
-    Published: inertia_i |cross term_i| + constant_i [Zhang2005, sec. VII]. JSBSim integrates rates against
-    inertial space and reports them against the Earth: the difference turns with the body, at no more than
-    earth_rate |x| on any axis, and the same again through the inertia coupling, whose constants are below
-    1.
-    """
-    p, q, r = x[0], x[1], x[2]
-    earth = earth_rate * (2.0 * (abs(p) + abs(q) + abs(r)) + earth_rate) + ROUNDING_RAD_S2
-    eta_bar[0] += inertia[0] * abs(design.Pqr * q * r) + constant[0] + earth
-    eta_bar[1] += inertia[1] * abs(design.Qpr * p * r) + constant[1] + earth
-    eta_bar[2] += inertia[2] * abs(design.Rpq * p * q) + constant[2] + earth

@@ -11,7 +11,7 @@ from beaver_ftc.control.state import FAULT_TOLERANT, ORACLE, law_of
 from beaver_ftc.design.engine import engine_power_kw, slipstream
 from beaver_ftc.design.variants import design_of, mass_of
 from beaver_ftc.diagnosis.admitted import admit, gyros_vary, poles_for_noise
-from beaver_ftc.diagnosis.error_map import fill_error_map
+from beaver_ftc.diagnosis.bounds.worst_case import fill_error_map
 from beaver_ftc.diagnosis.fault_class import PARAMETER_SET
 from beaver_ftc.diagnosis.state import (
     EITHER,

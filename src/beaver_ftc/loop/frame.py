@@ -110,7 +110,7 @@ def begin(frame):
     frame.t = frame.k * frame.dt
     status = sense(frame)
     if status != NOT_FINITE:
-        look_back(frame.fdi, frame.belief, frame.measured, frame.k)
+        look_back(frame.belief, frame.fdi.bound, frame.measured, frame.k, frame.dt)
     return status
 
 
@@ -263,7 +263,9 @@ def _halves_of_a_frame(frames, references, log):
     """What `fly_frame` mostly consists of, by types: halves that take about as long to compile."""
     frame, row = frames.dtype, references.copy(ndim=1)
     parts = tuple(frame.fields[name].type for name in ("fdi", "belief", "measured"))
-    there = [(diagnose, (frame,)), (look_back, (*parts, numba.int64))]
+    fdi, belief, measured = parts
+    bound = fdi.fields["bound"].type
+    there = [(diagnose, (frame,)), (look_back, (belief, bound, measured, numba.int64, numba.float64))]
     return there, [(sense, (frame,)), (command, (frame,)), (finish, (frame, row, row))]
 
 

@@ -31,7 +31,7 @@ def take(frames, x, y, command, attitude):
     for i in range(y.size):
         measured.y[i] = y[i]
     respond(belief, measured)
-    look_back(frame.fdi, belief, measured, frame.k)
+    look_back(belief, frame.fdi.bound, measured, frame.k, frame.dt)
     return True
 
 

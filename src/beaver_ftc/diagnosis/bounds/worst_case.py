@@ -13,19 +13,34 @@ A gyro's error enters once more, as xdot is taken from its readings. Its constan
 difference; of what changes, n with |n| <= nbar, the filter eps[k+1] = a eps[k] + n[k+1] - n[k] keeps
 n[k] - m[k], m[k+1] = a m[k] + (1 - a) n[k], so no more than nbar[k] and the filtered nbar: twice nbar,
 however fast the frames.
+
+The error of a derived design model, where in the envelope the aircraft is, is measured, and looked up here.
+Its map is a few boxes of states, one inside the other, with the largest error found in each for surfaces
+within a share of their travel. A surface that has lost effectiveness gives no more than what it is taken to
+be at, so its error is within the same share; one that is stuck may be anywhere, so that the whole travel
+counts where such faults are in question. Outside of all boxes nobody has measured: nothing is concluded.
 """
 
 from functools import lru_cache
 
 import numpy as np
 
-from beaver_ftc.aircraft.schema import MAX_MONOMIALS, MAX_TERMS
+from beaver_ftc.aircraft import Aircraft
+from beaver_ftc.aircraft.schema import MAX_AGES, MAX_BOXES, MAX_LEVELS, MAX_MONOMIALS, MAX_TERMS
 from beaver_ftc.compiled import kernel
 from beaver_ftc.design.engine import DPT_0, KW_TO_DPT, density_ratio
 from beaver_ftc.design.terms import AIRSPEED, DPT, N_SIGNALS, N_Y, QDYN, monomials, signals
 
 _AIR_DATA = 3  # gyros come first among the signals, then alpha, beta, airspeed, dynamic pressure
 _LEAST_AIRSPEED_SHARE = 0.1
+# Double precision leaves 1e-16 of a rate below 6 rad/s, divided by a frame of 1 ms or more, and of the terms
+# of f + G u, which stay below 100 rad/s2; a few operations each.
+ROUNDING_RAD_S2 = 1e-11
+UNKNOWN_RAD_S2 = 1e6  # terms fitted near trim are off by thousands at 0.5 rad
+# The same to filters that carry a covariance, beside noise of 1e-4: more than any aircraft does, and no more.
+UNKNOWN_TO_FILTERS_RAD_S2 = 100.0
+_ROUNDING = 1e-9
+_N = 3 + N_Y  # rates, then y with the density of the air in place of dynamic pressure
 
 
 @lru_cache
@@ -50,6 +65,56 @@ def admitted_dtype(n: int) -> np.dtype:
         ],
         align=True,
     )  # fmt: skip
+
+
+@lru_cache
+def error_map_dtype(n: int) -> np.dtype:
+    """The map for an aircraft with n surfaces. whole: surfaces may be anywhere. outside: of all boxes. now:
+    the error here, rad/s2."""
+    fields = [
+        ("n_boxes", "i8"), ("n_levels", "i8"), ("n_ages", "i8"), ("whole", "i8"), ("outside", "i8"),
+        ("time_s", "f8"), ("until_s", "f8", (MAX_AGES,)),
+        ("low", "f8", (MAX_BOXES, _N)), ("high", "f8", (MAX_BOXES, _N)),
+        ("share", "f8", (MAX_LEVELS,)), ("error", "f8", (MAX_AGES, MAX_BOXES, MAX_LEVELS, 3)),
+        ("travel_low", "f8", (n,)), ("travel_high", "f8", (n,)), ("place", "f8", (_N,)),
+        ("now", "f8", (3,)),
+    ]  # fmt: skip
+    return np.dtype(fields, align=True)
+
+
+@lru_cache
+def bound_dtype(n: int) -> np.dtype:
+    """Bounds on the uncertainty. eta_bar, eta_bar_now: over the elapsed frame and at this instant, rad/s2.
+    noise: on what a gyro's error changes by, rad/s. frame: on one frame's innovation, rad/s2. own: of the
+    errors of n surfaces' own terms, per rad of deflection and at the command, means over the frame."""
+    fields = [
+        ("inertia", "f8", (3,)), ("constant", "f8", (3,)), ("earth_rate", "f8"),
+        ("admitted", admitted_dtype(n)), ("error_map", error_map_dtype(n)),
+        ("eta_bar", "f8", (3,)), ("eta_bar_now", "f8", (3,)),
+        ("noise", "f8", (3,)), ("noise_then", "f8", (3,)), ("frame", "f8", (3,)),
+        ("own_errors", "i8"), ("own_per_rad", "f8", (3, n)), ("own", "f8", (3, n)),
+    ]  # fmt: skip
+    return np.dtype(fields, align=True)
+
+
+def fill_error_map(record: np.void, aircraft: Aircraft, whole: bool) -> None:
+    """Write an aircraft's map, if it has one; whole: surfaces may be anywhere in their travel."""
+    given = aircraft.file.model_error_map
+    if given is None:
+        return
+    record["whole"], record["n_boxes"], record["n_levels"] = whole, len(given.boxes), len(given.travel_share)
+    record["n_ages"] = len(given.until_s)
+    record["until_s"][: len(given.until_s)] = given.until_s
+    record["share"][: len(given.travel_share)] = given.travel_share
+    record["travel_low"] = [travel.min_rad for travel in aircraft.travel.values()]
+    record["travel_high"] = [travel.max_rad for travel in aircraft.travel.values()]
+    for k, box in enumerate(given.boxes):
+        ends = np.array(box.ends(aircraft.signals))
+        record["low"][k, : len(ends)], record["high"][k, : len(ends)] = ends.T
+        errors = box.error_p_rad_s2, box.error_q_rad_s2, box.error_r_rad_s2
+        record["error"][: len(given.until_s), k, : len(given.travel_share)] = np.moveaxis(
+            np.array(errors), 0, -1
+        )
 
 
 @kernel
@@ -185,3 +250,102 @@ def derived_bound(admitted, design, x, y, u, eta_bar):
     eta_bar[1] += rate_slack(admitted, 0, 0, design.Qpp, t[4]) + rate_slack(admitted, 2, 2, design.Qrr, t[6])
     eta_bar[2] += moment_slack(admitted, 0, design.Rl, t[10]) + moment_slack(admitted, 2, design.Rn, t[11])
     eta_bar[2] += rate_slack(admitted, 0, 1, design.Rpq, t[8]) + rate_slack(admitted, 1, 2, design.Rqr, t[9])
+
+
+@kernel
+def find_place(error_map, x, y):
+    """Fill `place` from x (3,) rad/s and y (4 + declared,)."""
+    place = error_map.place
+    for i in range(3):
+        place[i] = x[i]
+    for i in range(y.size):
+        place[3 + i] = y[i]
+    place[3 + QDYN] = 2.0 * y[QDYN] / (y[AIRSPEED] * y[AIRSPEED])
+
+
+@kernel
+def is_inside(error_map, k):
+    """Whether `place` is in box k."""
+    inside = True
+    for i in range(error_map.place.size):
+        room = _ROUNDING * (1.0 + abs(error_map.place[i]))
+        inside = inside and error_map.low[k, i] - room <= error_map.place[i] <= error_map.high[k, i] + room
+    return inside
+
+
+@kernel
+def level_of(error_map, u):
+    """The first share of the travel that covers surfaces u (n,) rad; the last if all of it may be used."""
+    last = error_map.n_levels - 1
+    if error_map.whole:
+        return last
+    used = 0.0
+    for s in range(u.size):
+        if u[s] != 0.0:
+            end = error_map.travel_high[s] if u[s] > 0.0 else error_map.travel_low[s]
+            used = max(used, u[s] / end) if end != 0.0 else 1.0
+    for j in range(last):
+        if used <= error_map.share[j]:
+            return j
+    return last
+
+
+@kernel
+def age_of(error_map):
+    """The row for the flight as old as it is, -1 if none was measured so late."""
+    for a in range(error_map.n_ages):
+        if error_map.time_s <= error_map.until_s[a]:
+            return a
+    return -1
+
+
+@kernel
+def look_up(error_map, x, y, u):
+    """Fill `now` with the error measured about this state; x (3,) rad/s, y, u (n,) rad."""
+    find_place(error_map, x, y)
+    level, age = level_of(error_map, u), age_of(error_map)
+    for k in range(error_map.n_boxes if age >= 0 else 0):
+        if is_inside(error_map, k):
+            error_map.outside, error_map.now[:] = 0, error_map.error[age, k, level]
+            return
+    error_map.outside, error_map.now[:] = 1, UNKNOWN_RAD_S2
+
+
+@kernel
+def add_model_error(error_map, x, y, u, eta_bar):
+    """Add to eta_bar (3,) rad/s2 the error measured about this state; x (3,) rad/s, y, u (n,) rad."""
+    look_up(error_map, x, y, u)
+    for i in range(3):
+        eta_bar[i] += error_map.now[i]
+
+
+@kernel
+def uncertainty_bound(x, design, inertia, constant, earth_rate, eta_bar):
+    """Add to eta_bar (3,) rad/s2 the published bound, and what the Earth's rotation adds.
+
+    Published: inertia_i |cross term_i| + constant_i [Zhang2005, sec. VII]. JSBSim integrates rates against
+    inertial space and reports them against the Earth: the difference turns with the body, at no more than
+    earth_rate |x| on any axis, and the same again through the inertia coupling, whose constants are below
+    1.
+    """
+    p, q, r = x[0], x[1], x[2]
+    earth = earth_rate * (2.0 * (abs(p) + abs(q) + abs(r)) + earth_rate) + ROUNDING_RAD_S2
+    eta_bar[0] += inertia[0] * abs(design.Pqr * q * r) + constant[0] + earth
+    eta_bar[1] += inertia[1] * abs(design.Qpr * p * r) + constant[1] + earth
+    eta_bar[2] += inertia[2] * abs(design.Rpq * p * q) + constant[2] + earth
+
+
+@kernel
+def bound_now(bound, design, measured, u):
+    """Fill eta_bar_now (3,) rad/s2, the bound on the uncertainty at this instant; u (n,) rad."""
+    x, y = measured.x, measured.y
+    bound.eta_bar_now[:] = 0.0
+    if bound.admitted.any:
+        derived_bound(bound.admitted, design, x, y, u, bound.eta_bar_now)
+        if bound.own_errors:
+            for s in range(u.size):
+                slack_per_rad(bound.admitted, design, s)
+    if bound.error_map.n_boxes > 0:
+        add_model_error(bound.error_map, x, y, u, bound.eta_bar_now)
+    far = bound.admitted.far_x if bound.admitted.any else x
+    uncertainty_bound(far, design, bound.inertia, bound.constant, bound.earth_rate, bound.eta_bar_now)

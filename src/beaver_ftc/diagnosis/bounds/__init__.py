@@ -1,0 +1,1 @@
+"""What a scenario declares in `fdi.bounds`, read once: as a worst case, as variances, as a test's limit."""

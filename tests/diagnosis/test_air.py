@@ -13,7 +13,7 @@ from beaver_ftc.design.coefficients import MASS
 from beaver_ftc.design.model import design_record, rate_damping
 from beaver_ftc.design.variants import jacobian
 from beaver_ftc.diagnosis import air, gusts
-from beaver_ftc.diagnosis.state import AIR
+from beaver_ftc.diagnosis.air import AIR
 from beaver_ftc.loop.loop import Loop
 from flying import scenario
 

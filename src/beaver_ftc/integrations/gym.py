@@ -1,4 +1,6 @@
-"""The Beaver as a Gymnasium environment, for those who learn laws; wants the extra `gym`.
+"""The Beaver as a Gymnasium environment, alone or many at a time; for those who learn laws.
+
+It wants the extra `gym`.
 
     env = gymnasium.make(
         "beaver_ftc.integrations.gym:beaver_ftc/Beaver-v0", scenario="fault-free", frames_per_step=5
@@ -7,27 +9,47 @@
 Gymnasium imports what stands before the colon, and with it registers the name behind it.
 The plant, the faults, the reference model and the accounts are those of a flight: what is learnt can be
 plugged in afterwards as a law, and compared with the others.
+
+Many at a time, in processes: `gymnasium.make_vec` with the same name and `num_envs=16`. A step of the
+environment takes less than handing its arrays from process to process. So each process flies several
+episodes, one byte sets it going, and what it flies by and sees is in memory that all share. The process that
+asks flies a part itself instead of waiting.
 """
 
-from typing import Any
+import contextlib
+import pickle
+import signal
+from collections.abc import Mapping, Sequence
+from ctypes import c_double
+from itertools import pairwise
+from multiprocessing.connection import Connection
+from typing import Any, NamedTuple
 
 import gymnasium
 import numpy as np
+from gymnasium.vector import AutoresetMode
+from gymnasium.vector.utils import batch_space
 from numpy.typing import ArrayLike, NDArray
 
 from beaver_ftc.aircraft import load as aircraft
-from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.loop.agent import BESIDE_SURFACES, LARGEST, LOOK, act, cost, observe
 from beaver_ftc.loop.direct import direct
 from beaver_ftc.results.simulation import Simulation
 from beaver_ftc.scenario.given import ScenarioLike, load
 from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.studies.engine.workers import context, cores, single_threaded
 
 ID = "beaver_ftc/Beaver-v0"
 DEPARTURE = -100.0
 NOBODY = {"control.law": "nominal", "control.options": {}}  # the surfaces are the agent's
 
+_STEP, _NOTHING = b"", b""  # to a worker, and from one that has no more to say
+_PATIENCE_S = 5.0  # for a worker to end by itself
+
 Vector = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+Infos = dict[int, dict[str, Any]]  # of the episodes that have any
 
 
 class Episode(Simulation):
@@ -90,10 +112,7 @@ class BeaverEnv(gymnasium.Env[Vector, Vector]):
 
     def __init__(self, scenario: ScenarioLike = "fault-free", frames_per_step: int = 1) -> None:
         self.scenario = load(scenario).with_(NOBODY)
-        if not isinstance(frames_per_step, int) or frames_per_step < 1:
-            raise BadInput(
-                f"frames_per_step: {frames_per_step!r} is out of range, allowed: a whole number of at least 1"
-            )
+        _check_count("frames_per_step", frames_per_step)
         self.frames_per_step = frames_per_step
         surfaces = len(aircraft(self.scenario.aircraft).surfaces)
         seen = (BESIDE_SURFACES + surfaces,)
@@ -130,8 +149,216 @@ class BeaverEnv(gymnasium.Env[Vector, Vector]):
         return episode.observation(), reward + DEPARTURE * departed, departed, not departed, info
 
 
+class _Part(NamedTuple):
+    """Some of the episodes: the memory that all share, how many numbers an action and an observation have,
+    which of its rows they are, and the options of their environments."""
+
+    block: Any
+    sizes: tuple[int, int]
+    rows: slice
+    options: dict[str, Any]
+
+
+class _Shared:
+    """A row an episode: its action, its observation, reward, whether it is terminated, whether truncated."""
+
+    def __init__(self, block: Any, sizes: tuple[int, int], rows: slice) -> None:
+        actions, seen = sizes
+        values = np.frombuffer(block).reshape(-1, actions + seen + 3)[rows]
+        self.actions, self.seen = values[:, :actions], values[:, actions : actions + seen]
+        self.rewards, self.terminated, self.truncated = values[:, -3], values[:, -2], values[:, -1]
+
+
+class BeaverVectorEnv(gymnasium.vector.VectorEnv[NDArray[np.float64], NDArray[np.float64], Any]):
+    """`num_envs` environments as one, flown by `workers` processes, this one among them; as many as there are
+    cores if left out.
+
+    options: those of BeaverEnv. An episode that is over begins anew with the next step, whose action is not
+    looked at (AutoresetMode.NEXT_STEP). `infos["metrics"][i]` is the document metrics.json of an episode that
+    has ended with this step, `infos["_metrics"]` says which have.
+    """
+
+    metadata = {"autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012  (the form Gymnasium looks for)
+
+    def __init__(self, num_envs: int = 1, *, workers: int | None = None, **options: Any) -> None:
+        _check_count("num_envs", num_envs)
+        _check_count("workers", 1 if workers is None else workers)
+        self.num_envs = num_envs
+        one = BeaverEnv(**options)
+        assert one.action_space.shape is not None
+        assert one.observation_space.shape is not None
+        self.single_action_space, self.single_observation_space = one.action_space, one.observation_space
+        self.action_space = batch_space(one.action_space, num_envs)
+        self.observation_space = batch_space(one.observation_space, num_envs)
+        sizes = one.action_space.shape[0], one.observation_space.shape[0]
+        block = context().RawArray(c_double, num_envs * (sum(sizes) + 3))
+        self._shared = _Shared(block, sizes, slice(None))
+        options |= {"scenario": one.scenario}
+        workers = min(num_envs, workers or cores())
+        *others, own = (_Part(block, sizes, rows, options) for rows in _shares(num_envs, workers))
+        self._workers: list[_Worker | _Episodes] = [
+            *map(_Worker, others),
+            _Episodes(own),  # comes last, when all others fly
+        ]
+
+    def reset(
+        self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[NDArray[np.float64], dict[str, Any]]:
+        """Put every aircraft in trim. A seed is the first one's, the others have those after it."""
+        seeds = [seed] * self.num_envs if seed is None else seed
+        if isinstance(seeds, int):
+            super().reset(seed=seeds)
+            seeds = [seeds + i for i in range(self.num_envs)]
+        if len(seeds) != self.num_envs:
+            raise BadInput(f"seed: {len(seeds)} of them, allowed: {self.num_envs}, or one")
+        for worker in self._workers:
+            worker.tell(pickle.dumps(seeds[worker.part.rows]))
+        infos = self._answers()
+        return self._shared.seen.copy(), infos
+
+    def step(
+        self, actions: ArrayLike
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], Flags, Flags, dict[str, Any]]:
+        """Command the surfaces, fly, look: all at the same time."""
+        shared, given = self._shared, np.asarray(actions, np.float64)
+        if given.shape != shared.actions.shape:
+            raise BadInput(f"actions: shape {given.shape}, allowed: {shared.actions.shape}")
+        shared.actions[:] = given
+        for worker in self._workers:
+            worker.tell(_STEP)
+        infos = self._answers()
+        ended = shared.terminated != 0.0, shared.truncated != 0.0
+        return shared.seen.copy(), shared.rewards.copy(), *ended, infos
+
+    def close_extras(self, **kwargs: Any) -> None:
+        """End the """
+        for worker in getattr(self, "_workers", ()):
+            worker.end()
+
+    def _answers(self) -> dict[str, Any]:
+        """Wait for all; what they have to say, by Gymnasium's rule, but a document stays one."""
+        infos: dict[str, Any] = {}
+        failed: Exception | None = None
+        for worker in self._workers:
+            answer = worker.answer()
+            if isinstance(answer, Exception):
+                failed = answer
+            else:
+                for i, info in answer.items():
+                    self._put(infos, i, info)
+        if failed is not None:
+            self.close()
+            raise failed
+        return infos
+
+    def _put(self, infos: dict[str, Any], i: int, info: Mapping[str, Any]) -> None:
+        for key, value in info.items():
+            infos.setdefault(key, np.full(self.num_envs, None, object))[i] = value
+            infos.setdefault(f"_{key}", np.zeros(self.num_envs, np.bool_))[i] = True
+
+
+def _shares(count: int, workers: int) -> list[slice]:
+    """Which episodes each worker flies, as even as can be."""
+    ends = [count * w // workers for w in range(workers + 1)]
+    return [slice(start, end) for start, end in pairwise(ends)]
+
+
+class _Episodes:
+    """Some of the episodes, flown in this process, when it is told to."""
+
+    def __init__(self, part: _Part) -> None:
+        self.part = part
+        self._shared = _Shared(part.block, part.sizes, part.rows)
+        self._envs = [BeaverEnv(**part.options) for _ in range(part.rows.stop - part.rows.start)]
+        self._answer: Infos | Exception = {}
+
+    def tell(self, what: bytes) -> None:
+        """A step, or a reset by the seeds given."""
+        try:
+            self._answer = self._step() if what == _STEP else self._reset(pickle.loads(what))
+        except Exception as error:
+            self._answer = error
+
+    def answer(self) -> Infos | Exception:
+        """What it has to say of that, or why it could not be done."""
+        return self._answer
+
+    def end(self) -> None:
+        """This process goes on."""
+
+    def _reset(self, seeds: Sequence[int | None]) -> Infos:
+        for i, seed in enumerate(seeds):
+            self._begin(i, seed)
+        return {}
+
+    def _begin(self, i: int, seed: int | None = None) -> None:
+        shared = self._shared
+        shared.seen[i], _ = self._envs[i].reset(seed=seed)
+        shared.rewards[i] = shared.terminated[i] = shared.truncated[i] = 0.0
+
+    def _step(self) -> Infos:
+        shared, infos = self._shared, {}
+        for i, env in enumerate(self._envs):
+            if shared.terminated[i] or shared.truncated[i]:
+                self._begin(i)
+                continue
+            seen, reward, terminated, truncated, info = env.step(shared.actions[i])
+            shared.seen[i], shared.rewards[i] = seen, reward
+            if terminated or truncated:
+                shared.terminated[i], shared.truncated[i] = terminated, truncated
+                infos[self.part.rows.start + i] = info
+        return infos
+
+
+class _Worker:
+    """A process that flies some of the episodes. Told anything, it has to be asked for its answer."""
+
+    def __init__(self, part: _Part) -> None:
+        self.part = part
+        start = context()
+        self._line, far_end = start.Pipe()
+        self.process = start.Process(target=_serve, args=(far_end, part), daemon=True)
+        with single_threaded():
+            self.process.start()
+        far_end.close()
+
+    def tell(self, what: bytes) -> None:
+        with contextlib.suppress(OSError):  # it has ended: its answer will say so
+            self._line.send_bytes(what)
+
+    def answer(self) -> Infos | Exception:
+        """What it has to say, or why it could not go on."""
+        try:
+            said = self._line.recv_bytes()
+        except (EOFError, OSError):
+            return SimulationFailed("a process of the vector environment has ended; make a new one")
+        return pickle.loads(said) if said != _NOTHING else {}
+
+    def end(self) -> None:
+        self._line.close()
+        self.process.join(_PATIENCE_S)
+        if self.process.is_alive():
+            self.process.terminate()
+
+
+def _serve(line: Connection, part: _Part) -> None:
+    """What a worker does: fly when told to, until nobody is there to tell it."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # it is for the process that gives the orders
+    episodes = _Episodes(part)
+    with contextlib.suppress(EOFError, OSError):
+        while True:
+            episodes.tell(line.recv_bytes())
+            said = episodes.answer()
+            line.send_bytes(pickle.dumps(said) if said else _NOTHING)
+
+
+def _check_count(name: str, count: object) -> None:
+    if not isinstance(count, int) or count < 1:
+        raise BadInput(f"{name}: {count!r} is out of range, allowed: a whole number of at least 1")
+
+
 gymnasium.register(
     id=ID,
     entry_point="beaver_ftc.integrations.gym:BeaverEnv",
-    vector_entry_point="beaver_ftc.integrations.gym_vector:BeaverVectorEnv",
+    vector_entry_point="beaver_ftc.integrations.gym:BeaverVectorEnv",
 )

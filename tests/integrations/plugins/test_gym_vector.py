@@ -11,8 +11,7 @@ from flying import scenario
 
 gymnasium = pytest.importorskip("gymnasium")
 
-from beaver_ftc.integrations.gym import ID, BeaverEnv  # noqa: E402
-from beaver_ftc.integrations.gym_vector import BeaverVectorEnv  # noqa: E402
+from beaver_ftc.integrations.gym import ID, BeaverEnv, BeaverVectorEnv  # noqa: E402
 
 FLOWN = {
     "duration_s": 0.5,

@@ -231,7 +231,7 @@ class BeaverVectorEnv(gymnasium.vector.VectorEnv[NDArray[np.float64], NDArray[np
         return shared.seen.copy(), shared.rewards.copy(), *ended, infos
 
     def close_extras(self, **kwargs: Any) -> None:
-        """End the """
+        """End the processes."""
         for worker in getattr(self, "_workers", ()):
             worker.end()
 

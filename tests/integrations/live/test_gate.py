@@ -3,7 +3,7 @@
 import pytest
 from starlette.datastructures import Headers
 
-from beaver_ftc.integrations.live.gate import TOKENS_OPEN, Gate
+from beaver_ftc.integrations.live.server import TOKENS_OPEN, Gate
 
 
 def token_of(address):

@@ -2,7 +2,7 @@
 
 import pytest
 
-from beaver_ftc.integrations.live.pace import TICK_S, Pace
+from beaver_ftc.integrations.live.flying import TICK_S, Pace
 
 
 def flown(pace, ticks, from_s=0.0, late_s=0.0):

@@ -10,8 +10,8 @@ import pytest
 import beaver_ftc as bf
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.integrations.live import messages
+from beaver_ftc.integrations.live.messages import encode
 from beaver_ftc.integrations.live.session import Session, level_turn
-from beaver_ftc.integrations.live.telling import encode
 
 LOSS = {"type": "loss_of_effectiveness", "actuator": "elevator", "magnitude": 0.4}
 

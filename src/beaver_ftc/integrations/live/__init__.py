@@ -2,6 +2,11 @@
 
     page (static/)  <- websocket ->  server  <- pipe ->  flight process
 
-`messages` is what a page may say, `session` the flight and what is said of it, `pace` its clock, `game` the
-hidden fault, `flying` the process, `gate` who is let in, `pages` who looks on, `server` and `serve` the rest.
+`messages` is what a page may say and how it is answered, `session` the flight and what is said of it, `game`
+the hidden fault, `flying` the process and its clock, `server` the web side: who is let in, who looks on;
+`serve` starts and ends it all. What server and flight process have to agree on stands here.
 """
+
+EVERYONE = 0  # in place of a page's number
+BAD_INPUT = "bad input"  # in place of a page: the flight cannot be begun
+MAX_BYTES = 2048  # of one message of a page

@@ -1,4 +1,4 @@
-"""The flight process: it owns the simulation, keeps its pace, answers what pages ask.
+"""The flight process: it owns the simulation, keeps its pace by a clock, answers what pages ask.
 
 The pipe carries (page, text) to it, page 0 for the server's own words `joined`, `left` and `end`; and (page,
 text) from it, page 0 for all of them.
@@ -7,19 +7,61 @@ text) from it, page 0 for all of them.
 import contextlib
 import os
 import time
+from collections import deque
 from importlib import import_module
+from math import sqrt
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
 from beaver_ftc.documents.errors import BadInput, BeaverFtcError
-from beaver_ftc.integrations.live import messages
-from beaver_ftc.integrations.live.pace import Pace
+from beaver_ftc.integrations.live import BAD_INPUT, EVERYONE, messages
 from beaver_ftc.integrations.live.session import NO_STICK, Session
-from beaver_ftc.integrations.live.telling import encode
-from beaver_ftc.integrations.live.words import BAD_INPUT, EVERYONE
 
 STATE_EVERY = 15  # ticks
+TICK_S = 1 / 60  # a page draws as often
+BEHIND_S = 0.25  # real time: what cannot be caught up with is let go
+
+
+class Pace:
+    """Real time to flight time. Times of `now_s` are the machine's monotonic clock, s."""
+
+    def __init__(self, rate_hz: float, now_s: float) -> None:
+        self.rate_hz, self.times = rate_hz, 1.0
+        self._late = deque([0.0], maxlen=60)
+        self._flown = deque([(now_s, 0)], maxlen=60)
+        self._total = 0
+        self.hold(now_s)
+
+    def hold(self, now_s: float) -> None:
+        """Begin anew from here: after a pause, or a change of speed."""
+        self._from_s, self._frames = now_s, 0
+        self.next_s = now_s + TICK_S
+
+    def frames_due(self, now_s: float) -> int:
+        """Frames to fly at this tick. What a machine too slow for its speed cannot fly in time is let go."""
+        self._late.append(now_s - self.next_s)
+        self.next_s += TICK_S
+        if now_s - self.next_s > BEHIND_S:
+            self.hold(now_s)
+            return 0
+        due = int((now_s - self._from_s) * self.times * self.rate_hz) - self._frames
+        due = min(due, int(BEHIND_S * self.times * self.rate_hz) + 1)
+        self._frames += due
+        self._total += due
+        self._flown.append((now_s, self._total))
+        return due
+
+    @property
+    def jitter_ms(self) -> float:
+        """Root mean square lateness of the last second's ticks, ms."""
+        return 1e3 * sqrt(sum(late * late for late in self._late) / len(self._late))
+
+    @property
+    def achieved(self) -> float:
+        """Times real time of the last second."""
+        (from_s, before), (to_s, after) = self._flown[0], self._flown[-1]
+        return (after - before) / self.rate_hz / (to_s - from_s) if to_s > from_s else 0.0
 
 
 def main(connection: Connection, out: str) -> None:
@@ -80,7 +122,7 @@ class Flying:
                 session.step()
         except BeaverFtcError as error:
             self._paused = True
-            self._send(EVERYONE, {"k": "ack", "n": 0, "ok": False, "says": str(error)})
+            self._send(EVERYONE, messages.acknowledged(0, False, str(error)))
 
     def _listen(self) -> None:
         """Take requests until the next tick; with nobody looking on, for as long as it takes."""
@@ -109,7 +151,7 @@ class Flying:
     def _answer(self, page: int, request: Any, ok: bool, says: str) -> None:
         if isinstance(request, messages.Stick) and ok:
             return
-        self._send(page, {"k": "ack", "n": request.n if request else 0, "ok": ok, "says": says})
+        self._send(page, messages.acknowledged(request.n if request else 0, ok, says))
         self._ticks = 0  # the state with the next frame
 
     def _handle(self, page: int, request: messages.Request) -> str:
@@ -154,12 +196,14 @@ class Flying:
             self._send(EVERYONE, {"k": "e", "events": events})
         if self._ticks % STATE_EVERY == 0 or events:
             pace = self._pace
-            told = self._session.state() | {"paused": self._paused, "speed": pace.times}
-            told |= {"jitter_ms": round(pace.jitter_ms, 2), "achieved": round(pace.achieved, 2)}
-            self._send(EVERYONE, told | {"pages": len(self._pages)})
+            clock = {
+                "paused": self._paused, "speed": pace.times, "jitter_ms": round(pace.jitter_ms, 2),
+                "achieved": round(pace.achieved, 2), "pages": len(self._pages),
+            }  # fmt: skip
+            self._send(EVERYONE, self._session.state() | clock)
         if not self._holding or self._ticks % STATE_EVERY == 0:
             self._send(EVERYONE, self._session.frame())
         self._ticks += 1
 
     def _send(self, page: int, told: dict[str, Any]) -> None:
-        self._pipe.send((page, encode(told)))
+        self._pipe.send((page, messages.encode(told)))

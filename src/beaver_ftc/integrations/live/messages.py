@@ -1,14 +1,22 @@
-"""What a page may ask of the flight: one model a request, strict and small; anything else is refused."""
+"""What a page may ask of the flight, and how it is answered.
 
+One model a request, strict and small; anything else is refused. Faults are put in words, numbers short,
+answers as JSON.
+"""
+
+import json
+from collections.abc import Mapping
+from math import isfinite
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.integrations.live.words import MAX_BYTES
+from beaver_ftc.integrations.live import MAX_BYTES
 
 FASTEST = 20.0  # times real time
 STICK_DEG_S = 20.0  # full stick
+WHEN = {"at_s", "end_s"}  # of a fault: not what it is
 
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]{1,100}$")]
 Finite = Annotated[float, Field(ge=-1000, le=1000)]
@@ -139,3 +147,26 @@ def parse(text: str | bytes) -> Any:
         first = error.errors(include_url=False, include_context=False, include_input=False)[0]
         place = ".".join(str(part) for part in first["loc"]) or "message"
         raise BadInput(f"{place:.100}: {first['msg']:.200}") from None
+
+
+def acknowledged(n: int, ok: bool, says: str) -> dict[str, Any]:
+    """The answer to the request of this number."""
+    return {"k": "ack", "n": n, "ok": ok, "says": says}
+
+
+def in_words(fault: Mapping[str, Any]) -> str:
+    """What is broken, how, and by how much."""
+    where = fault.get("sensor", fault.get("actuator", fault["type"]))
+    unsaid = {"type", "actuator", "sensor", *WHEN}
+    sizes = ", ".join(f"{key} {value}" for key, value in fault.items() if key not in unsaid)
+    return f"{where}: {str(fault['type']).replace('_', ' ')}" + (f" ({sizes})" if sizes else "")
+
+
+def encode(message: dict[str, Any]) -> bytes:
+    """One message to a page."""
+    return json.dumps(message, separators=(",", ":"), allow_nan=False).encode()
+
+
+def short(value: float) -> float | None:
+    """Seven digits are enough to draw; what is not finite is none."""
+    return float(f"{value:.7g}") if isfinite(value) else None

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
-from beaver_ftc.integrations.live.words import BAD_INPUT, EVERYONE, MAX_BYTES
+from beaver_ftc.integrations.live import BAD_INPUT, EVERYONE, MAX_BYTES
 
 if TYPE_CHECKING:
     from beaver_ftc.scenario.schema import Scenario
@@ -88,9 +88,7 @@ async def _serve(
     """Run the server; returns why it ended, kind and words, None for a signal."""
     import uvicorn
 
-    from beaver_ftc.integrations.live.gate import Gate
-    from beaver_ftc.integrations.live.pages import Pages
-    from beaver_ftc.integrations.live.server import application
+    from beaver_ftc.integrations.live.server import Gate, Pages, application
 
     gate, pages = Gate(listener.getsockname()[1]), Pages()
     app = application(gate, pages, _asker(pipe))

@@ -1,11 +1,23 @@
-"""The web side: the page, its files, and the websocket; nothing else can be reached."""
+"""The web side: the page, its files, and the websocket; nothing else can be reached.
+
+Who is let in: a one-time token becomes a cookie, and only this server's own page may use it. Cookies know no
+ports: a browser would hand one for 127.0.0.1 to whatever else listens there. So ours is bound to a path
+nobody else can know. Host and Origin are checked against the one address there is, which keeps out pages of
+other ports and names that were made to resolve to this machine.
+
+Who looks on: a slow page misses frames; it never holds up the flight, nor the others.
+"""
 
 import asyncio
-import json
+import secrets
+from collections import deque
 from collections.abc import Callable
+from hmac import compare_digest
+from itertools import count
 from pathlib import Path
 
 from starlette.applications import Starlette
+from starlette.datastructures import Headers
 from starlette.middleware import Middleware
 from starlette.requests import Request
 from starlette.responses import FileResponse, PlainTextResponse, RedirectResponse, Response
@@ -15,12 +27,14 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from starlette.websockets import WebSocket
 
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.integrations.live import messages
-from beaver_ftc.integrations.live.gate import Gate
-from beaver_ftc.integrations.live.pages import Pages
+from beaver_ftc.integrations.live import EVERYONE, messages
 
 STATIC = Path(__file__).parent / "static"
+HOSTS = ("127.0.0.1", "localhost")
+TOKENS_OPEN = 16  # addresses given out and not yet used
 MAX_PAGES = 20
+MAX_WAITING = 1000  # messages that must not be missed; a page that lets more pile up is let go
+FRAME = b'{"k":"f"'
 UNSUPPORTED = 1003  # a websocket's status for a kind of data that is not taken
 REFUSED = 4403  # a websocket's status for "forbidden"
 
@@ -35,6 +49,106 @@ HEADERS = {
 }
 
 Ask = Callable[[int, str], None]
+
+
+class Gate:
+    """The secrets of one run of the server."""
+
+    def __init__(self, port: int) -> None:
+        self.port = port
+        self.room = "/" + secrets.token_urlsafe(12)  # the path everything is under
+        self.cookie = "beaver-ftc-live"
+        self._session = secrets.token_urlsafe(32)
+        self._tokens: list[str] = []
+
+    def invitation(self) -> str:
+        """An address that lets one browser in, once."""
+        self._tokens = [*self._tokens, secrets.token_urlsafe(24)][-TOKENS_OPEN:]
+        return f"http://{HOSTS[0]}:{self.port}{self.room}/?token={self._tokens[-1]}"
+
+    def redeem(self, token: str) -> str | None:
+        """The cookie's value for a token that has not been used, else None."""
+        match = [known for known in self._tokens if compare_digest(known.encode(), token.encode())]
+        if not match:
+            return None
+        self._tokens.remove(match[0])
+        return self._session
+
+    def knows(self, cookie: str | None) -> bool:
+        """Whether a cookie is ours."""
+        return cookie is not None and compare_digest(cookie.encode(), self._session.encode())
+
+    def is_addressed(self, headers: Headers) -> bool:
+        """Whether a request is meant for this server by its right name."""
+        return headers.get("host") in {f"{host}:{self.port}" for host in HOSTS}
+
+    def is_own_page(self, headers: Headers) -> bool:
+        """Whether a websocket is opened by a page of this server."""
+        return headers.get("origin") == f"http://{headers.get('host')}" and self.is_addressed(headers)
+
+
+class Page:
+    """One page: what it must be told, in order, and the newest frame."""
+
+    def __init__(self, number: int, socket: WebSocket) -> None:
+        self.number, self._socket = number, socket
+        self._waiting: deque[bytes] = deque()
+        self._frame: bytes | None = None
+        self._news = asyncio.Event()
+
+    def tell(self, told: bytes) -> None:
+        """Have it sent as soon as the page takes it."""
+        if told.startswith(FRAME):
+            self._frame = told
+        else:
+            if not self._waiting:
+                self._flush_frame_first()
+            self._waiting.append(told)
+        self._news.set()
+
+    def _flush_frame_first(self) -> None:
+        """A frame flown before an event is drawn before it, and one of another flight not after its hello."""
+        if self._frame is not None:
+            self._waiting.append(self._frame)
+            self._frame = None
+
+    async def send(self) -> None:
+        """Send until the page is gone."""
+        while len(self._waiting) < MAX_WAITING:
+            await self._news.wait()
+            self._news.clear()
+            while self._waiting:
+                await self._socket.send_text(self._waiting.popleft().decode())
+            if self._frame is not None:
+                frame, self._frame = self._frame, None
+                await self._socket.send_text(frame.decode())
+
+
+class Pages:
+    """All of them."""
+
+    def __init__(self) -> None:
+        self._pages: dict[int, Page] = {}
+        self._numbers = count(1)
+
+    def __len__(self) -> int:
+        return len(self._pages)
+
+    def add(self, socket: WebSocket) -> Page:
+        """A page more."""
+        page = Page(next(self._numbers), socket)
+        self._pages[page.number] = page
+        return page
+
+    def remove(self, page: Page) -> None:
+        """It is gone."""
+        self._pages.pop(page.number, None)
+
+    def tell(self, number: int, told: bytes) -> None:
+        """Tell one page, or with 0 all of them."""
+        for page in list(self._pages.values()):
+            if number in (EVERYONE, page.number):
+                page.tell(told)
 
 
 class Doorkeeper:
@@ -135,13 +249,9 @@ def _hear(text: str, number: int, gate: Gate, pages: Pages, ask: Ask) -> None:
     try:
         request = messages.parse(text)
     except BadInput as error:
-        pages.tell(number, _answer(0, False, str(error)))
+        pages.tell(number, messages.encode(messages.acknowledged(0, False, str(error))))
         return
     if isinstance(request, messages.Invite):
-        pages.tell(number, _answer(request.n, True, gate.invitation()))
+        pages.tell(number, messages.encode(messages.acknowledged(request.n, True, gate.invitation())))
     else:
         ask(number, text)
-
-
-def _answer(n: int, ok: bool, says: str) -> bytes:
-    return json.dumps({"k": "ack", "n": n, "ok": ok, "says": says}).encode()

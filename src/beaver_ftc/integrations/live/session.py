@@ -2,6 +2,7 @@
 
 from collections import deque
 from collections.abc import Callable
+from datetime import UTC, datetime
 from math import cos, sin, tan
 from pathlib import Path
 from typing import Any
@@ -11,9 +12,8 @@ import numpy as np
 import beaver_ftc as bf
 from beaver_ftc.documents.errors import BadInput, suggestion
 from beaver_ftc.integrations.live import messages
-from beaver_ftc.integrations.live.fresh import HELD, as_live, changes_of
 from beaver_ftc.integrations.live.game import NOTHING, Game, hidden_faults
-from beaver_ftc.integrations.live.telling import WHEN, in_words, short
+from beaver_ftc.integrations.live.messages import WHEN, in_words, short
 from beaver_ftc.loop.cockpit import IMMOVABLE
 from beaver_ftc.plugins import DETECTORS, LAWS, is_compiled, registered
 from beaver_ftc.results.log import SpooledLog
@@ -21,6 +21,8 @@ from beaver_ftc.scenario.airframe import checked_against
 from beaver_ftc.scenario.faults import place_of
 from beaver_ftc.scenario.sensor_faults import sensors_there
 
+LONGEST_S = 3600.0  # of one live flight: its log is 0.4 GB then
+HELD = ("altitude_m", "airspeed_mps", "heading_deg")  # by the autopilot that the page asks for
 EVENTS_KEPT = 400
 STICK_FRAMES = 10  # a coordinated turn is seen to so often
 TURN_STEP = np.radians(0.1)  # rad/s
@@ -330,3 +332,42 @@ def level_turn(phi_rad: float, theta_rad: float, airspeed_mps: float) -> Any:
     """Body rates (3,) rad/s of a coordinated level turn: psi' = g tan(phi) / V, seen in body axes."""
     turn = G_MPS2 * tan(phi_rad) / airspeed_mps
     return turn * np.array([-sin(theta_rad), sin(phi_rad) * cos(theta_rad), cos(phi_rad) * cos(theta_rad)])
+
+
+def as_live(scenario: "bf.Scenario") -> "bf.Scenario":
+    """The flight of a page: it is long and expects nothing; its diagnosis knows every fault type that can be
+    broken there, and watches the instruments, which can be broken too, unless the scenario says otherwise.
+
+    A watch that began with the first instrument broken would make of the flight before it another than the
+    saved scenario's, in which that fault is said from the start.
+    """
+    stamp = datetime.now(UTC).strftime("%Y%m%d-%H%M%S-%f")[:-3]
+    changes: dict[str, Any] = {
+        "name": f"live-{scenario.name[:60]}-{stamp}", "expect": {}, "duration_s": LONGEST_S,
+    }  # fmt: skip
+    if "sensor_monitor" not in scenario.fdi.model_fields_set:
+        changes["fdi.sensor_monitor"] = "always"
+    if "fault_class" not in scenario.fdi.model_fields_set:
+        changes["fdi.fault_class"] = "all"
+    return scenario.with_(changes)
+
+
+def changes_of(request: messages.Fresh) -> dict[str, Any]:
+    """Dotted keys of the scenario for what a new flight asks. Errors of the air and the sensors are declared
+    to the diagnosis as well: it is to live with them, not to be surprised."""
+    keys = (
+        ("control.law", request.law),
+        ("fdi.scheme", request.scheme),
+        ("fdi.fault_class", request.fault_class),
+        ("sensors", request.sensors),
+        ("fdi.bounds.sensors", request.sensors),
+        ("fdi.bounds.turbulence", request.turbulence),
+    )
+    changes: dict[str, Any] = {key: value for key, value in keys if value is not None}
+    if request.autopilot is not None:
+        changes["autopilot"] = {channel: [{"hold": True}] for channel in HELD} if request.autopilot else None
+    if request.turbulence is not None:
+        still = request.turbulence == "none"
+        changes["environment.turbulence"] = "none" if still else "dryden"
+        changes["environment.severity"] = None if still else request.turbulence
+    return changes

@@ -7,9 +7,9 @@ from beaver_ftc.control.base import Reference
 from beaver_ftc.control.rivals import compiled
 from beaver_ftc.control.rivals.indi import IncrementalInversion
 from beaver_ftc.control.rivals.lqr import FixedGainLqr
-from beaver_ftc.control.state import control_dtype
 from beaver_ftc.design.context import Context
 from beaver_ftc.diagnosis.base import Measured, Verdict
+from law_records import new_control
 
 DT = 0.02
 A = np.array([[-4.0, 0.3, 1.0], [0.2, -3.0, 0.1], [-0.2, 0.4, -0.8]])
@@ -39,19 +39,20 @@ def context(most):
 def test_both_command_the_same_within_the_travel_and_at_the_stops(rival, most):
     rng, law = np.random.default_rng(5), rival()
     law.reset(context(most))
-    control = np.zeros(1, control_dtype(4)).view(np.recarray)[0]
-    control["main"], control["dt"], control["trim"] = (0, 1, 2), DT, TRIM
-    control["low"], control["high"] = -most, 0.8 * most
+    control = new_control(main=(0, 1, 2), dt=DT)
+    control["layout"]["trim"] = TRIM
+    control["layout"]["low"], control["layout"]["high"] = -most, 0.8 * most
     control["inner"] = law.compile_into(control["rival"])
     stops = 0
     for k in range(40):
         x, rate, acceleration = 0.02 * rng.normal(size=(3, 3))
         seen = Measured(k * DT, x, np.zeros(5), np.zeros(3), np.zeros((3, 4)), np.zeros(3))
         wanted = law.step(seen, Reference(rate, rate, acceleration), Verdict())
-        control["model_rate"], control["model_acceleration"] = rate, acceleration
-        compiled.command(control, G, x)
-        assert control["command"] == pytest.approx(wanted, abs=1e-9)
+        control["reference"]["model_rate"], control["reference"]["model_acceleration"] = rate, acceleration
+        parts = (control[part] for part in ("rival", "reference", "axes", "allocation", "layout"))
+        compiled.command(int(control["inner"]), *parts, G, x)
+        assert control["allocation"]["command"] == pytest.approx(wanted, abs=1e-9)
         at_stop = np.isclose(wanted, -most) | np.isclose(wanted, 0.8 * most)
-        assert control["saturated"].tolist() == at_stop.tolist()
+        assert control["allocation"]["saturated"].tolist() == at_stop.tolist()
         stops += at_stop.sum()
     assert (stops > 5) == (most < 1.0)

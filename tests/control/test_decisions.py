@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from beaver_ftc.control import accommodation, oracle, supervisor
-from beaver_ftc.control.laws import gains, left
-from beaver_ftc.control.laws.state import N_POINTS, REJECTING, rejection_dtype
-from beaver_ftc.control.oracle import true_faults_dtype
-from beaver_ftc.control.state import ADAPTIVE, FAULT_TOLERANT, NOMINAL, ORACLE, control_dtype
+import law_records
+from beaver_ftc.control import accommodation, supervisor
+from beaver_ftc.control.accommodation import true_faults_dtype
+from beaver_ftc.control.laws import ADAPTIVE, FAULT_TOLERANT, NOMINAL, ORACLE, REJECTING, gains, rejecting
+from beaver_ftc.control.laws.rejecting import N_POINTS, rejection_dtype
 from beaver_ftc.control.supervisor import (
     MAX_EVENTS,
     MODE_ADAPTIVE,
@@ -17,9 +17,11 @@ from beaver_ftc.control.supervisor import (
     SUPERVISOR,
 )
 from beaver_ftc.design.model import design_record, unanticipated_pitch
-from beaver_ftc.diagnosis.scheme import diagnosis_dtype
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, UNANTICIPATED
 from beaver_ftc.diagnosis.types.examine import FIXED, LAGS, LOSES, SHIFTED
+from beaver_ftc.loop import frame as whole
+from beaver_ftc.loop.frame import frame_dtype
+from law_records import put
 
 AILERON, ELEVATOR, RUDDER, FLAP = range(4)
 DT = 0.02
@@ -30,12 +32,40 @@ def record(dtype):
 
 
 def new_control(**fields):
-    control = record(control_dtype(4))
-    control["main"], control["stand_in"], control["dt"], control["law"] = (0, 1, 2), FLAP, DT, FAULT_TOLERANT
-    control["effectiveness"], control["least_effectiveness"] = 1.0, 0.1
-    for name, value in fields.items():
-        control[name] = value
-    return control
+    control = law_records.new_control(main=(0, 1, 2), stand_in=FLAP, dt=DT, law=FAULT_TOLERANT)
+    return put(control, **({"effectiveness": 1.0, "least_effectiveness": 0.1} | fields))
+
+
+def new_frame(faults=None, **fields):
+    """A frame whose law has these fields; of the diagnosis and the truth, nothing but whole surfaces."""
+    frame = record(frame_dtype(4))
+    frame["control"], frame["faults"] = new_control(**fields), new_faults(**(faults or {}))
+    frame["fdi"]["types"]["surface"]["measure"] = -1
+    return frame
+
+
+def given_up(frame):
+    """The command, once what does not follow is given up."""
+    whole.assess(frame["fdi"], frame["assessment"])
+    control = frame["control"]
+    accommodation.give_up(
+        control["law"],
+        frame["assessment"],
+        control["surfaces"],
+        control["rejection"]["withdrawn"],
+        frame["faults"],
+        control["layout"],
+        control["allocation"],
+        control["reference"],
+    )
+    return control["allocation"]
+
+
+def accommodated(frame):
+    """The surfaces as the law takes them, from what the diagnosis says."""
+    whole.assess(frame["fdi"], frame["assessment"])
+    whole.accommodate(frame)
+    return frame["control"]["surfaces"]
 
 
 def new_faults(**fields):
@@ -77,7 +107,8 @@ def test_every_change_of_mode_is_noted_and_of_too_many_the_latest():
     ],
 )  # fmt: skip
 def test_the_mode_that_the_diagnosis_asks_for(every_type, isolated, lead, lead_kind, stand_in, mode):
-    fdi = record(diagnosis_dtype(4))
+    frame = new_frame(stand_in=stand_in)
+    fdi = frame["fdi"]
     fdi["config"]["every_type"], fdi["isolation"]["estimator"]["surface"][4:8] = every_type, range(4)
     verdict = fdi["verdict"]
     verdict["detected"], verdict["isolated"], verdict["lead"], verdict["lead_kind"] = (
@@ -86,9 +117,16 @@ def test_the_mode_that_the_diagnosis_asks_for(every_type, isolated, lead, lead_k
         lead,
         lead_kind,
     )
-    assert supervisor.mode_from(new_control(stand_in=stand_in), fdi) == mode
+    assert asked_for(frame) == mode
     verdict["detected"] = 0
-    assert supervisor.mode_from(new_control(stand_in=stand_in), fdi) == MODE_NOMINAL
+    assert asked_for(frame) == MODE_NOMINAL
+
+
+def asked_for(frame):
+    """The mode that the diagnosis asks for."""
+    whole.assess(frame["fdi"], frame["assessment"])
+    law, layout = frame["control"]["law"], frame["control"]["layout"]
+    return supervisor.mode_from(law, layout, frame["fdi"]["verdict"], frame["assessment"])
 
 
 @pytest.mark.parametrize(
@@ -103,32 +141,31 @@ def test_the_mode_that_the_diagnosis_asks_for(every_type, isolated, lead, lead_k
     ],
 )  # fmt: skip
 def test_the_oracles_mode_is_that_of_the_true_fault(faults, mode):
-    assert oracle.true_mode(new_control(), new_faults(**faults)) == mode
+    assert supervisor.true_mode(ELEVATOR, new_faults(**faults)) == mode
 
 
 def test_the_oracle_takes_each_surface_for_what_it_is():
     faults = new_faults(present=1, effectiveness=(0.6, 0.7, 1, 1), immovable=(0, 1, 0, 0), effective=0.1)
-    control = new_control()
+    surfaces = new_control()["surfaces"]
     for s in range(2):
-        oracle.true_surface(control, faults, s, 0.2)
-    assert control["target"][:2].tolist() == [0.6, 0.0]
-    assert control["offset"][:2] == pytest.approx([0.1 - 0.6 * 0.2, 0.1])
+        accommodation.take_truth(surfaces, faults, s, 0.2)
+    assert surfaces["target"][:2].tolist() == [0.6, 0.0]
+    assert surfaces["offset"][:2] == pytest.approx([0.1 - 0.6 * 0.2, 0.1])
     faults["present"] = 0
-    control = new_control()
-    oracle.true_surface(control, faults, 0, 0.2)
-    assert control["offset"][0] == 0.0
+    surfaces = new_control()["surfaces"]
+    accommodation.take_truth(surfaces, faults, 0, 0.2)
+    assert surfaces["offset"][0] == 0.0
 
 
 def compensated(law, detected=1, inner=0, lead=-1, lead_kind=-1):
-    control, fdi = new_control(law=law, inner=inner, fhat=9.0), record(diagnosis_dtype(4))
-    belief = record([("design", design_record().dtype)])
-    belief["design"] = design_record()[0]
-    measured = record([("y", "f8", (8,))])
-    measured["y"] = 0.2, 0.0, 45.0, 1000.0, 0.3, 0, 0, 0
+    frame = new_frame({"Cm_alpha3": 0.5}, law=law, inner=inner, fhat=9.0)
+    fdi, belief, measured = frame["fdi"], frame["belief"], frame["measured"]
+    belief["design"], measured["y"][:5] = design_record()[0], (0.2, 0.0, 45.0, 1000.0, 0.3)
     fdi["verdict"]["detected"], fdi["fdae"]["network"]["output"] = detected, (0.1, 0.2, 0.3)
     fdi["verdict"]["lead"], fdi["verdict"]["lead_kind"] = lead, lead_kind
-    accommodation.compensate(control, fdi, belief, measured, new_faults(Cm_alpha3=0.5))
-    return control["fhat"].tolist(), float(unanticipated_pitch(belief["design"], measured["y"], 0.5))
+    whole.compensate(frame)
+    expected = unanticipated_pitch(belief["design"], measured["y"], 0.5)
+    return frame["control"]["feedback"]["fhat"].tolist(), float(expected)
 
 
 def test_what_the_law_takes_the_unknown_for():
@@ -146,20 +183,19 @@ def test_what_the_law_takes_the_unknown_for():
 
 @pytest.mark.parametrize("which", ["healthy", "immovable", "jammed", "moving jam", "abandoned"])
 def test_a_surface_given_up_goes_to_its_trim(which):
-    control = new_control(
-        trim=0.3, command=0.1, saturated=1, law=ORACLE if which == "immovable" else ADAPTIVE
-    )
-    fdi, faults = record(diagnosis_dtype(4)), new_faults(immovable=(0, 0, 1, 0))
-    fdi["config"]["every_type"], fdi["types"]["surface"]["measure"] = 1, -1
+    frame = new_frame({"immovable": (0, 0, 1, 0)}, law=ORACLE if which == "immovable" else ADAPTIVE)
+    control, fdi = frame["control"], frame["fdi"]
+    control["layout"]["trim"], out = 0.3, control["allocation"]
+    out["command"], out["saturated"], fdi["config"]["every_type"] = 0.1, 1, 1
     if "jam" in which:
         fdi["types"]["surface"]["measure"][RUDDER] = FIXED
-        control["effectiveness"][RUDDER] = 0.0 if which == "jammed" else 0.5
-    control["rejection"]["abandoned"][RUDDER] = which == "abandoned"
-    accommodation.give_up(control, fdi, faults)
+        control["surfaces"]["effectiveness"][RUDDER] = 0.0 if which == "jammed" else 0.5
+    control["rejection"]["withdrawn"][RUDDER] = which == "abandoned"
+    given_up(frame)
     up = which not in ("healthy", "moving jam")
-    assert control["command"].tolist() == [0.1, 0.1, 0.3 if up else 0.1, 0.1]
-    assert control["saturated"].tolist() == [1, 1, 0 if up else 1, 1]
-    assert control["hedging"] == up
+    assert out["command"].tolist() == [0.1, 0.1, 0.3 if up else 0.1, 0.1]
+    assert out["saturated"].tolist() == [1, 1, 0 if up else 1, 1]
+    assert control["reference"]["hedging"] == up
 
 
 def test_the_answer_of_the_observer_is_its_own_error_dynamics():
@@ -168,7 +204,7 @@ def test_the_answer_of_the_observer_is_its_own_error_dynamics():
     e = dd = 0.0
     for a in rng.normal(size=10):
         missed = e + DT * (a - dd)
-        assert left.answer(memory, 1, a, 0.3, 2.0, DT) == pytest.approx(missed)
+        assert rejecting.answer(memory, 1, a, 0.3, 2.0, DT) == pytest.approx(missed)
         e, dd = 0.7 * missed, dd + 2.0 * missed
     assert memory["rate"].tolist()[::2] == [0.0, 0.0]
 
@@ -176,33 +212,32 @@ def test_the_answer_of_the_observer_is_its_own_error_dynamics():
 def lost_rudder(theta, believed=1.0, frames=400, noise=0.0):
     """What is learnt of a rudder with this loss: its moment, and what the observer misses of it."""
     control, rng = new_control(), np.random.default_rng(2)
-    control["effectiveness"][RUDDER] = believed
     rejection = control["rejection"]
-    rejection["pull"], rejection["learn"], rejection["found"]["fading"] = 0.3, 2.0, left.fading(DT)
+    rejection["pull"], rejection["learn"], rejection["found"]["fading"] = 0.3, 2.0, rejecting.fading(DT)
     observer = record(rejection_dtype(4))["healthy"]
     for k in range(frames):
         given = np.zeros((3, 4))
         given[2, RUDDER] = 0.5 * np.sin(0.2 * k)
         unexplained = (theta - (believed - 1.0)) * given[2, RUDDER]
-        missed = left.answer(observer, 2, unexplained, 0.3, 2.0, DT) + noise * rng.normal()
-        left.learn(control, 2, given, missed)
-    return control
+        missed = rejecting.answer(observer, 2, unexplained, 0.3, 2.0, DT) + noise * rng.normal()
+        rejecting.learn(rejection, 2, believed, given[2, RUDDER], missed)
+    return rejection["found"]
 
 
 @pytest.mark.parametrize("believed", [1.0, 0.6])
 @pytest.mark.parametrize("theta", [-0.3, -0.95])
 def test_what_is_left_is_found_by_least_squares(theta, believed):
     """Without noise exactly, but for the share of the diagnosis' own estimate, whose weight follows."""
-    control = lost_rudder(theta, believed)
-    found = control["rejection"]["found"]
+    found = lost_rudder(theta, believed)
     assert found["product"][2] == pytest.approx(theta * found["square"][2], rel=1e-6)
     assert found["missed"][2] == pytest.approx(theta**2 * found["square"][2], rel=1e-6)
-    assert found["frames"][2] == pytest.approx((1 - (1 - left.fading(DT)) ** 400) / left.fading(DT))
+    assert found["frames"][2] == pytest.approx((1 - (1 - rejecting.fading(DT)) ** 400) / rejecting.fading(DT))
     prior = found["missed"][2] / found["frames"][2] / 0.2**2
     share = prior / (prior + found["square"][2])
-    assert left.left_of(control, 2, 0.5) == pytest.approx(1.0 + (1 - share) * theta + share * -0.5, rel=1e-6)
-    assert bool(left.acts(control, 2)) == (theta > -0.9)
-    assert left.left_of(control, 1, 0.5) == 0.5  # of pitch nothing has been seen
+    expected = 1.0 + (1 - share) * theta + share * -0.5
+    assert rejecting.effectiveness_seen(found, 2, 0.5) == pytest.approx(expected, rel=1e-6)
+    assert bool(rejecting.acts(found, (0, 1, 2), RUDDER, 0.1)) == (theta > -0.9)
+    assert rejecting.effectiveness_seen(found, 1, 0.5) == 0.5  # of pitch nothing has been seen
 
 
 @pytest.mark.parametrize(
@@ -221,16 +256,16 @@ def test_the_larger_of_both_estimates_is_believed(named, seen, kept):
     found = control["rejection"]["found"]
     found["frames"], found["square"], found["named"], found["missed"] = 10.0, 4.0, 1, 0.0
     found["product"] = 4.0 * (seen - 1.0)
-    left.hesitate(control, RUDDER, 2)
-    assert control["target"][RUDDER] == pytest.approx(kept)
+    rejecting.believe_larger_of(found, control["surfaces"], RUDDER, 2)
+    assert control["surfaces"]["target"][RUDDER] == pytest.approx(kept)
 
 
 def test_what_was_seen_before_a_surface_was_named_counts_no_longer():
     control = new_control(target=0.3)
     found = control["rejection"]["found"]
     found["frames"], found["square"], found["product"], found["missed"] = 10.0, 4.0, -0.4, 1.0
-    left.hesitate(control, RUDDER, 2)
-    assert control["target"][RUDDER] == pytest.approx(0.3)
+    rejecting.believe_larger_of(found, control["surfaces"], RUDDER, 2)
+    assert control["surfaces"]["target"][RUDDER] == pytest.approx(0.3)
     assert found["named"].tolist() == [0, 0, 1]
     assert (found["square"][2], found["product"][2]) == (0.0, 0.0)
     assert found["square"][0] == 4.0
@@ -280,41 +315,31 @@ def test_the_schedule_has_the_fastest_loop_of_each_point_and_its_observer():
 )  # fmt: skip
 def test_only_what_may_still_act_is_taken_for_what_the_observer_sees(inner, law, fixed, kept):
     """The verdict leaves an aileron a tenth, the observer sees a half; a fixed one gives nothing."""
-    control, fdi = new_control(inner=inner, law=law, effectiveness_step=1.0), record(diagnosis_dtype(4))
+    true = {"present": 1, "effectiveness": (0.2, 1.0, 1.0, 1.0)}
+    frame = new_frame(true, inner=inner, law=law, effectiveness_step=1.0)
+    fdi, control = frame["fdi"], frame["control"]
     fdi["verdict"]["detected"], fdi["verdict"]["isolated"] = 1, 0
     fdi["isolation"]["estimator"]["surface"][:4], fdi["isolation"]["estimator"]["theta"][0] = range(4), -0.9
-    fdi["types"]["surface"]["measure"], fdi["config"]["every_type"] = -1, fixed
-    fdi["types"]["surface"]["measure"][AILERON] = FIXED if fixed else -1
+    fdi["types"]["surface"]["measure"][AILERON], fdi["config"]["every_type"] = FIXED if fixed else -1, fixed
     found = control["rejection"]["found"]
     found["named"], found["frames"], found["square"], found["product"] = 1, 1.0, 2.0, -1.0
-    belief = record([("design", design_record().dtype), ("u", "f8", (4,))])
-    belief["design"] = design_record()[0]
-    measured = record([("y", "f8", (8,))])
-    measured["y"] = 0.2, 0.0, 45.0, 1000.0, 0.3, 0, 0, 0
-    faults = new_faults(present=1, effectiveness=(0.2, 1.0, 1.0, 1.0))
-    accommodation.accommodate(control, fdi, belief, measured, faults)
-    assert control["target"] == pytest.approx([kept, 1.0, 1.0, 1.0])
-    assert control["effectiveness"] == pytest.approx(control["target"])
-    assert not control["rejection"]["abandoned"].any()
+    frame["belief"]["design"], frame["measured"]["y"][:4] = design_record()[0], (0.2, 0.0, 45.0, 1000.0)
+    surfaces = accommodated(frame)
+    assert surfaces["target"] == pytest.approx([kept, 1.0, 1.0, 1.0])
+    assert surfaces["effectiveness"] == pytest.approx(surfaces["target"])
+    assert not control["rejection"]["withdrawn"].any()
 
 
 def test_what_no_verdict_names_is_whole_and_a_plug_ins_estimates_count_from_its_alarm_on():
-    control, fdi = (
-        new_control(target=0.3, offset=0.2, lag=0.1, effectiveness_step=0.25),
-        record(diagnosis_dtype(4)),
-    )
-    fdi["verdict"]["isolated"], fdi["verdict"]["estimates"], fdi["types"]["surface"]["measure"] = (
-        NOT_ISOLATED,
-        1,
-        -1,
-    )
-    fdi["verdict"]["effectiveness"] = 0.9, 0.4, 1.0, 0.8
-    arguments = record([("design", design_record().dtype), ("u", "f8", (4,))]), record([("y", "f8", (8,))])
-    accommodation.accommodate(control, fdi, *arguments, new_faults())
-    assert control["target"].tolist() == [1.0] * 4
-    assert not control["offset"].any()
-    assert not control["lag"].any()
-    fdi["verdict"]["detected"] = 1
-    accommodation.accommodate(control, fdi, *arguments, new_faults())
-    assert control["target"].tolist() == [0.9, 0.4, 1.0, 0.8]
-    assert control["effectiveness"] == pytest.approx([0.9, 0.75, 1.0, 0.8])  # by no more than a step
+    frame = new_frame(target=0.3, offset=0.2, lag=0.1, effectiveness_step=0.25)
+    verdict = frame["fdi"]["verdict"]
+    verdict["isolated"], verdict["estimates"] = NOT_ISOLATED, 1
+    verdict["effectiveness"] = 0.9, 0.4, 1.0, 0.8
+    surfaces = accommodated(frame)
+    assert surfaces["target"].tolist() == [1.0] * 4
+    assert not surfaces["offset"].any()
+    assert not surfaces["lag"].any()
+    verdict["detected"] = 1
+    surfaces = accommodated(frame)
+    assert surfaces["target"].tolist() == [0.9, 0.4, 1.0, 0.8]
+    assert surfaces["effectiveness"] == pytest.approx([0.9, 0.75, 1.0, 0.8])  # by no more than a step

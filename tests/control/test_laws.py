@@ -6,29 +6,46 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.linalg import expm
 
-from beaver_ftc.control import adaptive, allocation, nominal, reference_model
-from beaver_ftc.control.state import control_dtype
+from beaver_ftc.control import accommodation, allocation, reference
+from beaver_ftc.control.laws import published
 from beaver_ftc.design.model import AILERON, ELEVATOR, FLAP, RUDDER
+from law_records import new_control
 
 DT = 0.01
 G_TYPICAL = np.array([[-9.0, 0.0, 0.6, 0.0], [0.0, -10.0, 0.0, 2.1], [-0.2, 0.0, -2.0, 0.0]])
 
 
 def control_record(Kp=2.0, Ki=1.0):
-    control = np.zeros(1, control_dtype(4))
-    control["main"], control["stand_in"] = [0, 1, 2], 3
-    control["Kp"], control["Ki"], control["dt"] = Kp, Ki, DT
-    control["low"], control["high"] = [-0.52, -0.49, -0.44, -0.1], [0.52, 0.49, 0.44, 1.03]
-    control["effectiveness"] = 1.0
-    control["least_effectiveness"] = 0.1
-    control["hand_over_step"] = DT
-    return control[0]
+    control = new_control(
+        main=(0, 1, 2), stand_in=3, dt=DT, effectiveness=1.0, least_effectiveness=0.1, hand_over_step=DT
+    )
+    control["feedback"]["Kp"], control["feedback"]["Ki"] = Kp, Ki
+    layout = control["layout"]
+    layout["low"], layout["high"] = [-0.52, -0.49, -0.44, -0.1], [0.52, 0.49, 0.44, 1.03]
+    return control
+
+
+def allocated(control, G):
+    """The surfaces, rad, for the demand in the record."""
+    out, effectiveness = control["allocation"], control["surfaces"]["effectiveness"]
+    out["G"], share = G, allocation.smooth(out["hand_over"])
+    allocation.allocate(out, control["layout"], control["axes"]["demand"], effectiveness, share, 0.0)
+    return out["command"]
+
+
+def pulled(control, x, f):
+    """The surfaces, rad, by the published law for measured rates x; its integrators go a frame on."""
+    feedback, axes, model = control["feedback"], control["axes"], control["reference"]
+    published.demand(feedback, axes, model, x, f)
+    u = allocated(control, G_TYPICAL)
+    published.integrate(feedback, axes, model, control["allocation"], x)
+    return u
 
 
 class TestReferenceModel:
     @given(wn=st.floats(0.5, 50), zeta=st.floats(0.2, 3), dt=st.floats(0.001, 0.05))
     def test_discretisation_is_the_matrix_exponential(self, wn, zeta, dt):
-        A, B = reference_model.discretise(wn, zeta, dt)
+        A, B = reference.discretise(wn, zeta, dt)
         F = np.array([[0, 1, 0], [-wn * wn, -2 * zeta * wn, wn * wn], [0, 0, 0]])
         expected = expm(F * dt)
         assert pytest.approx(expected[:2, :2], rel=1e-7, abs=1e-7) == A
@@ -36,11 +53,11 @@ class TestReferenceModel:
 
     def test_a_step_is_reached_without_overshoot_when_critically_damped(self):
         control = control_record()
-        control["model_A"], control["model_B"] = reference_model.discretise(10.0, 1.0, DT)
+        control["reference"]["A"], control["reference"]["B"] = reference.discretise(10.0, 1.0, DT)
         history = []
         for _ in range(200):
-            reference_model.follow(control, np.array([0.1, 0.0, -0.2]))
-            history.append(control["model_rate"].copy())
+            reference.follow(control["reference"], np.array([0.1, 0.0, -0.2]))
+            history.append(control["reference"]["model_rate"].copy())
         t = DT * np.arange(1, 201)
         assert np.array(history)[:, 0] == pytest.approx(0.1 * (1 - (1 + 10 * t) * np.exp(-10 * t)), abs=1e-9)
         assert np.array(history)[-1] == pytest.approx([0.1, 0, -0.2], abs=1e-6)
@@ -52,29 +69,23 @@ class TestNominal:
         control = control_record()
         f = np.array([0.3, -0.2, 0.1])
         x = np.array([0.05, -0.03, 0.02])
-        u, demands = np.zeros(4), np.zeros(3)
         expected = np.array([-x, np.zeros(3)])  # error and its integral
         step = np.array([[1 - 2.0 * DT, -1.0 * DT], [DT, 1.0]])
         for _ in range(300):
-            nominal.demand(control, x, f, np.zeros(3))
-            allocation.allocate(control, G_TYPICAL, u)
-            nominal.integrate(control, x, G_TYPICAL, u)
-            demands = f + G_TYPICAL @ u
+            demands = f + G_TYPICAL @ pulled(control, x, f)
             x = x + DT * demands
             expected = step @ expected
             assert -x == pytest.approx(expected[0], abs=1e-12)
 
     def test_the_integrator_does_not_wind_up_at_a_stop(self):
         control = control_record()
-        u, x = np.zeros(4), np.array([0.0, -3.0, 0.0])  # far more than the elevator can give
+        x = np.array([0.0, -3.0, 0.0])  # far more than the elevator can give
         for _ in range(3000):
-            nominal.demand(control, x, np.zeros(3), np.zeros(3))
-            allocation.allocate(control, G_TYPICAL, u)
-            nominal.integrate(control, x, G_TYPICAL, u)
+            pulled(control, x, np.zeros(3))
         attainable = 10 * 0.49
-        assert control["saturated"][ELEVATOR] == 1
+        assert control["allocation"]["saturated"][ELEVATOR] == 1
         # in equilibrium the demand stands off what can be given by Kp times the error, and no further
-        assert control["demand"][1] == pytest.approx(attainable + 2.0 * 3.0, rel=1e-3)
+        assert control["axes"]["demand"][1] == pytest.approx(attainable + 2.0 * 3.0, rel=1e-3)
 
 
 small = st.floats(-0.5, 0.5)
@@ -84,65 +95,62 @@ class TestAllocation:
     @given(demand=st.tuples(small, small, small), hand_over=st.floats(0, 1), loss=st.floats(0, 0.8))
     def test_what_is_demanded_is_what_the_surfaces_give(self, demand, hand_over, loss):
         control = control_record()
-        control["demand"], control["hand_over"] = demand, hand_over
-        control["effectiveness"][ELEVATOR] = 1 - loss
-        G, u = np.zeros((3, 4)), np.zeros(4)
-        adaptive.believed_effectiveness(control, G_TYPICAL, G)
-        allocation.allocate(control, G, u)
-        if not control["saturated"][[AILERON, ELEVATOR, RUDDER]].any():
+        control["axes"]["demand"], control["allocation"]["hand_over"] = demand, hand_over
+        control["surfaces"]["effectiveness"][ELEVATOR] = 1 - loss
+        G = np.zeros((3, 4))
+        accommodation.believed_effectiveness(control["surfaces"], G_TYPICAL, G)
+        u = allocated(control, G)
+        if not control["allocation"]["saturated"][[AILERON, ELEVATOR, RUDDER]].any():
             assert G @ u == pytest.approx(demand, abs=1e-12)
 
     def test_after_the_hand_over_the_elevator_keeps_its_trimmed_moment(self):
         control = control_record()
-        control["trim"][ELEVATOR], control["hand_over"] = -0.04, 1.0
-        control["effectiveness"][ELEVATOR] = 0.6
-        control["demand"] = [0.0, 0.4 + 0.2, 0.0]
-        G, u = np.zeros((3, 4)), np.zeros(4)
-        adaptive.believed_effectiveness(control, G_TYPICAL, G)
-        allocation.allocate(control, G, u)
+        control["layout"]["trim"][ELEVATOR], control["allocation"]["hand_over"] = -0.04, 1.0
+        control["surfaces"]["effectiveness"][ELEVATOR] = 0.6
+        control["axes"]["demand"] = [0.0, 0.4 + 0.2, 0.0]
+        G = np.zeros((3, 4))
+        accommodation.believed_effectiveness(control["surfaces"], G_TYPICAL, G)
+        u = allocated(control, G)
         assert u[ELEVATOR] == pytest.approx(-0.04 / 0.6)
         assert u[FLAP] == pytest.approx(0.2 / 2.1)
 
     def test_the_hand_over_is_continuous(self):
         control = control_record()
-        control["trim"][ELEVATOR] = -0.04
-        control["demand"] = [0.0, 0.55, 0.0]
+        control["layout"]["trim"][ELEVATOR] = -0.04
+        control["axes"]["demand"] = [0.0, 0.55, 0.0]
         shares = np.linspace(0, 1, 101)
         flap = []
         for share in shares:
-            control["hand_over"] = share
-            u = np.zeros(4)
-            allocation.allocate(control, G_TYPICAL, u)
-            flap.append(u[FLAP])
+            control["allocation"]["hand_over"] = share
+            flap.append(float(allocated(control, G_TYPICAL)[FLAP]))
         assert np.max(np.abs(np.diff(flap))) < 0.02 * np.ptp(flap)
         assert np.abs(np.diff(flap)[[0, -1]]).max() < 0.001 * np.ptp(flap)  # no kink at either end
 
     def test_a_lost_elevator_is_not_asked_for_anything(self):
         control = control_record()
-        control["effectiveness"][ELEVATOR], control["hand_over"] = 0.05, 1.0
-        control["demand"] = [0.0, 0.3, 0.0]
-        G, u = np.zeros((3, 4)), np.zeros(4)
-        adaptive.believed_effectiveness(control, G_TYPICAL, G)
-        allocation.allocate(control, G, u)
+        control["surfaces"]["effectiveness"][ELEVATOR], control["allocation"]["hand_over"] = 0.05, 1.0
+        control["axes"]["demand"] = [0.0, 0.3, 0.0]
+        G = np.zeros((3, 4))
+        accommodation.believed_effectiveness(control["surfaces"], G_TYPICAL, G)
+        u = allocated(control, G)
         assert u[ELEVATOR] == 0.0
         assert u[FLAP] == pytest.approx(0.3 / 2.1)
 
     def test_a_saturated_rudder_leaves_the_roll_demand_met(self):
         control = control_record()
-        control["demand"] = [0.5, 0.0, 3.0]
-        u = np.zeros(4)
-        allocation.allocate(control, G_TYPICAL, u)
-        assert control["saturated"][RUDDER] == 1
+        control["axes"]["demand"] = [0.5, 0.0, 3.0]
+        u = allocated(control, G_TYPICAL)
+        assert control["allocation"]["saturated"][RUDDER] == 1
         assert (G_TYPICAL @ u)[0] == pytest.approx(0.5, abs=1e-12)
 
 
 def test_believed_effectiveness_moves_no_faster_than_allowed():
     control = control_record()
-    control["effectiveness_step"] = 0.04
-    target = np.array([1.0, 0.5, 1.0, 0.98])
+    control["surfaces"]["effectiveness_step"] = 0.04
+    control["surfaces"]["target"] = target = np.array([1.0, 0.5, 1.0, 0.98])
     seen = []
     for _ in range(20):
-        adaptive.approach(control, target)
-        seen.append(control["effectiveness"].copy())
+        accommodation.approach(control["surfaces"])
+        seen.append(control["surfaces"]["effectiveness"].copy())
     assert seen[0] == pytest.approx([1, 0.96, 1, 0.98])
     assert seen[-1] == pytest.approx(target)

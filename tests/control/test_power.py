@@ -8,7 +8,7 @@ from scipy.linalg import expm
 
 from beaver_ftc.aircraft import load
 from beaver_ftc.control import power
-from beaver_ftc.control.state import ORACLE
+from beaver_ftc.control.laws import ORACLE
 from beaver_ftc.design import fdc
 from beaver_ftc.design.coefficients import value
 from beaver_ftc.design.model import ELEVATOR, FLAP, RUDDER
@@ -38,7 +38,18 @@ def control_record(**keys):
 
 
 def lose_pitch(control):
-    control["effectiveness"][[ELEVATOR, FLAP]] = 0.0
+    control["surfaces"]["effectiveness"][[ELEVATOR, FLAP]] = 0.0
+
+
+def is_lost(control):
+    parts = control["layout"], control["surfaces"], control["allocation"]["saturated"]
+    return power.pitch_is_lost(*parts, control["axes"]["shortfall"])
+
+
+def steer(control, x, y, known, t):
+    """A frame of the law; known: there is an alarm."""
+    watched = known or control["law"] == ORACLE
+    power.steer(control["power"], control["reference"], x, y, watched, is_lost(control), t)
 
 
 def steered(control, frames, V=lambda t: 45.0, q=lambda t: 0.0):
@@ -46,7 +57,7 @@ def steered(control, frames, V=lambda t: 45.0, q=lambda t: 0.0):
     history, y = [], Y.copy()
     for k in range(frames):
         y[2] = V(k * DT)
-        power.steer(control, np.array([0.0, q(k * DT), 0.0]), y, 1, k * DT)
+        steer(control, np.array([0.0, q(k * DT), 0.0]), y, 1, k * DT)
         history.append(float(control["power"]["command"][0]))
     return np.array(history)
 
@@ -63,11 +74,11 @@ class TestWhen:
     def test_what_attitude_was_missed_before_is_not_its_business(self):
         control = control_record(patience_s=0.1)
         control["power"]["attitude"] = 0.3
-        power.watch(control, 0.0)
+        power.watch(control["power"], is_lost(control), 0.0)
         assert control["power"]["attitude"] == 0.3
         lose_pitch(control)
         for k in range(20):
-            power.watch(control, k * DT)
+            power.watch(control["power"], is_lost(control), k * DT)
             if not control["power"]["engaged"]:
                 control["power"]["attitude"] = 0.3
         assert control["power"]["engaged"]
@@ -76,21 +87,21 @@ class TestWhen:
     def test_one_of_the_two_is_enough_to_do_without(self):
         for surface in (ELEVATOR, FLAP):
             control = control_record()
-            control["effectiveness"][surface] = 0.0
+            control["surfaces"]["effectiveness"][surface] = 0.0
             assert (steered(control, 300, V=lambda t: 45 + t) == 20.0).all()
 
     @pytest.mark.parametrize(("lack", "stop", "engaged"), [(0.3, 1, 1), (0.3, 0, 0), (0.04, 1, 0)])
     def test_a_lack_that_lasts_counts_when_the_elevator_has_nothing_left(self, lack, stop, engaged):
         control = control_record()
-        control["shortfall"][1], control["saturated"][ELEVATOR] = lack, stop
+        control["axes"]["shortfall"][1], control["allocation"]["saturated"][ELEVATOR] = lack, stop
         steered(control, 200)
         assert control["power"]["engaged"] == engaged
 
     def test_a_lack_that_changes_sign_is_no_less_of_one(self):
         control = control_record()
-        control["saturated"][ELEVATOR] = 1
+        control["allocation"]["saturated"][ELEVATOR] = 1
         for k in range(40):
-            control["shortfall"][1] = 0.2 * np.sign(np.sin(k))
+            control["axes"]["shortfall"][1] = 0.2 * np.sign(np.sin(k))
             steered(control, 5)
         assert control["power"]["engaged"] == 1
 
@@ -98,7 +109,7 @@ class TestWhen:
         control = control_record(release_s=2.0)
         lose_pitch(control)
         steered(control, 300, V=lambda t: 45 + t)
-        control["effectiveness"][FLAP] = 1.0
+        control["surfaces"]["effectiveness"][FLAP] = 1.0
         history = steered(control, 600)
         assert history[150] != 20.0
         assert history[-1] == 20.0
@@ -110,7 +121,7 @@ class TestWhen:
         for law, engaged in ((ORACLE - 1, 0), (ORACLE, 1)):
             control["law"] = law
             for _ in range(200):
-                power.steer(control, np.zeros(3), Y, 0, 0.0)
+                steer(control, np.zeros(3), Y, 0, 0.0)
             assert control["power"]["engaged"] == engaged
 
 
@@ -124,7 +135,7 @@ class TestWithin:
         for V, q, dpt in told:
             y[2], y[3], y[4] = V, 0.5 * 1.02 * V * V, dpt
             for _ in range(60):
-                power.steer(control, np.array([0.0, q, 0.0]), y, 1, 0.0)
+                steer(control, np.array([0.0, q, 0.0]), y, 1, 0.0)
                 history.append(float(control["power"]["command"][0]))
         assert min(history) >= 10.0
         assert max(history) <= 36.5
@@ -144,7 +155,7 @@ class TestWithin:
                 + (408 - 0.0965 * 1800) * (1 - density / 1.225)
             )
             y[4] = 0.08696 + 191.18 * 2 * kw / (density * V**3)
-            power.steer(control, np.array([0.0, 0.5, 0.0]), y, 1, 0.0)
+            steer(control, np.array([0.0, 0.5, 0.0]), y, 1, 0.0)
         rudder = -value("Cn_dpt3") * y[4] ** 3 / -value("Cn_dr")
         assert 25.0 < pressure < 36.0
         assert rudder == pytest.approx(0.5 * TRAVEL[1, RUDDER], rel=0.01)
@@ -224,7 +235,7 @@ class TestTheDesign:
         y = Y.copy()
         for _ in range(3000):
             y[2] = 45.0 + x[0]
-            power.steer(control, np.array([0.0, x[2], 0.0]), y, 1, 0.0)
+            steer(control, np.array([0.0, x[2], 0.0]), y, 1, 0.0)
             x = step[:4, :4] @ x + step[:4, 4] * (float(control["power"]["command"][0]) - 20.0)
             z = exact @ z
             assert (np.abs(x - z[:4]) < [0.03, 3e-4, 3e-4, 1e-3]).all()

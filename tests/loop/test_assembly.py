@@ -55,8 +55,8 @@ def at(record, path):
 
 
 EXPECTED = {
-    "dt": DT, "belief.share": 0.5, "belief.u": TRIM, "belief.commanded": TRIM, "control.trim": TRIM,
-    "control.command": TRIM,
+    "dt": DT, "belief.share": 0.5, "belief.u": TRIM, "belief.commanded": TRIM, "control.layout.trim": TRIM,
+    "control.allocation.command": TRIM,
     "fdi.config.enabled": 1, "fdi.config.dt": DT, "fdi.isolation.forgetting": exp(-DT / 2.0),
     "fdi.isolation.decay": exp(-2.5 * DT),
     "fdi.fdae.pole": 1.5, "fdi.fdae.decay": exp(-1.5 * DT), "fdi.isolation.n": 8,
@@ -79,12 +79,15 @@ EXPECTED = {
     "fdi.types.surface.1.least_runaway_rate": pi / 4,
     "fdi.types.surface.1.slowest_step": radians(3.0) * DT / 2,
     "fdi.bank.n": 3, "fdi.isolation.memory": 0, "fdi.isolation.membership": 1,
-    "control.dt": DT, "control.Kp": 3.0, "control.Ki": 1.5, "control.effectiveness": 1.0,
-    "control.effectiveness_step": 2.5 * DT, "control.reference_scale": 1.0,
-    "control.least_effectiveness": 0.15, "control.low": TRAVEL[0], "control.high": TRAVEL[1],
-    "control.hand_over_step": DT / 1.6, "control.main": (AILERON, ELEVATOR, RUDDER), "control.stand_in": FLAP,
-    "control.probe_amplitude": radians(1.5), "control.probe_step": 2 * pi * 1.25 * DT,
-    "control.probe_frames": 150, "control.probe_from_s": -1.0, "control.probe_to_s": -1.0,
+    "control.reference.dt": DT, "control.feedback.Kp": 3.0, "control.feedback.Ki": 1.5,
+    "control.surfaces.effectiveness": 1.0,
+    "control.surfaces.effectiveness_step": 2.5 * DT, "control.reference.scale": 1.0,
+    "control.surfaces.least_effectiveness": 0.15,
+    "control.layout.low": TRAVEL[0], "control.layout.high": TRAVEL[1],
+    "control.allocation.hand_over_step": DT / 1.6,
+    "control.layout.main": (AILERON, ELEVATOR, RUDDER), "control.layout.stand_in": FLAP,
+    "control.probe.amplitude": radians(1.5), "control.probe.step": 2 * pi * 1.25 * DT,
+    "control.probe.frames": 150, "control.probe.from_s": -1.0, "control.probe.to_s": -1.0,
     "belief.actuators.real": 1, "belief.actuators.low": TRAVEL[0], "belief.actuators.high": TRAVEL[1],
     "belief.actuators.approach.2": 1.0 - exp(-12.0 * DT / 2), "belief.actuators.approach.1": 1 - exp(-0.25),
     "belief.actuators.step.1": pi / 2 * DT / 2,
@@ -120,7 +123,7 @@ def test_the_slipstream_per_manifold_pressure_is_that_of_the_engine(frame):
 def test_the_model_of_the_reference_is_a_critically_damped_second_order():
     """x'' = w^2 (r - x) - 2 w x': its step response after a second is 1 - (1 + w) e^-w."""
     control = assembled()["control"]
-    A, B, x = control["model_A"], control["model_B"], np.zeros(2)
+    A, B, x = control["reference"]["A"], control["reference"]["B"], np.zeros(2)
     for _ in range(50):
         x = A @ x + B.ravel()
     assert x[0] == pytest.approx(1 - 11 * np.exp(-10.0))

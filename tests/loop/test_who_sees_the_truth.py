@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import beaver_ftc
-from beaver_ftc.control.oracle import true_faults_dtype
+from beaver_ftc.control.accommodation import true_faults_dtype
 from beaver_ftc.control.state import control_dtype
 from beaver_ftc.diagnosis.belief import belief_dtype
 from beaver_ftc.diagnosis.scheme import diagnosis_dtype
@@ -101,7 +101,7 @@ def test_no_kernel_is_given_the_truth(calls, folder):
 
 def test_what_is_meant_to_see_the_truth_does(calls):
     """The watch would notice: sensing, accounts and the log are given the record."""
-    for name in ("plant.sensing.measure", "loop.accounts.account", "loop.record.record_truth"):
+    for name in ("plant.sensing.measure", "loop.accounts.track", "loop.record.record_truth"):
         assert ["truth", "record"] in calls[f"beaver_ftc.{name}"]
 
 

@@ -1,113 +1,159 @@
-"""What the law takes each surface for, from the verdict: effectiveness, offset, lag, and the unknown.
+"""What the law takes each surface for: effectiveness, offset and lag, moved smoothly.
 
-An isolated loss scales the command, a surface that does not follow is given up, one that is off is corrected,
-a slow one is left to its pace.
+From the diagnosis (`assessment_dtype`): an isolated loss scales the command, a surface that does not follow
+is given up, one that is off is corrected, a slow one is left to its pace. The oracle has it from the truth:
+its true faults of this instant are filled in by the loop, and no other law reads them.
+
+What becomes of it is the effectiveness that the laws divide by. It is rate limited, so that a decision never
+kicks the surfaces, and projected: a surface weaker than `least_effectiveness` is given up.
 """
 
+from functools import lru_cache
+
+import numpy as np
+
 from beaver_ftc.compiled import kernel
-from beaver_ftc.control import adaptive
-from beaver_ftc.control.laws import rejecting
-from beaver_ftc.control.laws.state import REJECTING
-from beaver_ftc.control.oracle import true_surface
-from beaver_ftc.control.state import NOMINAL, ORACLE
-from beaver_ftc.design.model import unanticipated_pitch
-from beaver_ftc.diagnosis import statistical
-from beaver_ftc.diagnosis.scheme import (
-    isolated_surface,
-    isolated_theta,
-    likelihood_counts,
-    unknown_acceleration,
-)
-from beaver_ftc.diagnosis.state import PITCH
-from beaver_ftc.diagnosis.types import candidates, verdict
-from beaver_ftc.diagnosis.types.examine import FIXED, LAGS, LOSES, SHIFTED
+from beaver_ftc.control.laws import ORACLE, REJECTING, rejecting
+from beaver_ftc.diagnosis.types.examine import FIXED
+from beaver_ftc.scenario.control import ControlConfig
 
-SURE = 400.0  # one over the variance of an effectiveness known to 0.05
+
+@lru_cache
+def surfaces_dtype(n: int) -> np.dtype:
+    """What n surfaces are taken for: effectiveness, on its way to target by at most a step a frame; offset
+    and lag, rad."""
+    fields = [
+        ("target", "f8", (n,)), ("effectiveness", "f8", (n,)),
+        ("effectiveness_step", "f8"), ("least_effectiveness", "f8"),
+        ("offset", "f8", (n,)), ("lag", "f8", (n,)),
+    ]  # fmt: skip
+    return np.dtype(fields, align=True)
+
+
+@lru_cache
+def assessment_dtype(n: int) -> np.dtype:
+    """What the diagnosis says of n surfaces: whether it has detected a fault, and which surface it names, -1
+    for none. measure: what is to be done about each, -1 where that is open, or for faults of every type not
+    asked; effectiveness; offset, lag rad; at_once: whether its effectiveness need not be eased in. hedge: a
+    surface is slow."""
+    fields = [
+        ("detected", "i8"), ("every_type", "i8"), ("named", "i8"), ("hedge", "i8"),
+        ("measure", "i8", (n,)), ("effectiveness", "f8", (n,)), ("at_once", "i8", (n,)),
+        ("offset", "f8", (n,)), ("lag", "f8", (n,)),
+    ]  # fmt: skip
+    return np.dtype(fields, align=True)
+
+
+@lru_cache
+def true_faults_dtype(n: int) -> np.dtype:
+    """present: 1 from the first fault on. effectiveness (n,): 1 healthy. immovable (n,): does not follow its
+    command. effective (n,) rad: the deflection that acts. Cm_alpha3: the unanticipated pitching moment."""
+    fields = [
+        ("present", "i8"), ("Cm_alpha3", "f8"),
+        ("effectiveness", "f8", (n,)), ("immovable", "i8", (n,)), ("effective", "f8", (n,)),
+    ]  # fmt: skip
+    return np.dtype(fields, align=True)
+
+
+def configure(surfaces: np.void, config: ControlConfig, law: int, dt_s: float) -> None:
+    """Fill the record (`surfaces_dtype`); law: what use is made of the verdict."""
+    surfaces["effectiveness"], surfaces["least_effectiveness"] = 1.0, config.least_effectiveness
+    surfaces["effectiveness_step"] = config.effectiveness_rate_per_s * dt_s if law != ORACLE else np.inf
 
 
 @kernel
-def accommodate(control, fdi, belief, measured, faults):
-    """Bring control.effectiveness, offset, lag (n,) and fhat (3,) rad/s2 to this frame.
+def accommodate(law, inner, assessment, surfaces, rejection, layout, saturated, faults, u):
+    """Bring effectiveness, offset and lag (n,) to this frame.
 
-    faults: dtype of oracle.py, looked at by the oracle alone.
+    faults: `true_faults_dtype`, looked at by the oracle alone. u (n,) rad: where healthy surfaces would be.
     """
-    surface = isolated_surface(fdi)
-    for s in range(control.target.size):
-        control.target[s], control.offset[s], control.lag[s] = 1.0, 0.0, 0.0
-        if control.law == ORACLE:
-            true_surface(control, faults, s, belief.u[s])
-        elif fdi.verdict.estimates and fdi.verdict.detected:
-            control.target[s] = fdi.verdict.effectiveness[s]
-        elif fdi.config.every_type and fdi.types.surface[s].measure >= 0:
-            act_on_type(control, fdi, s)
-        elif s == surface and not fdi.config.every_type:
-            act_on_loss(control, fdi, s)
-        if control.inner == REJECTING and control.law != ORACLE:
-            if not (fdi.config.every_type and fdi.types.surface[s].measure == FIXED):
-                rejecting.hesitate(control, s)
-            suspected = fdi.verdict.detected and s == surface and is_doubtful(control, fdi, s)
-            rejecting.abandon(control, s, suspected)
-    adaptive.approach(control, control.target)
-    compensate(control, fdi, belief, measured, faults)
+    for s in range(surfaces.target.size):
+        surfaces.target[s], surfaces.offset[s], surfaces.lag[s] = 1.0, 0.0, 0.0
+        if law == ORACLE:
+            take_truth(surfaces, faults, s, u[s])
+        else:
+            take_assessment(surfaces, assessment, s)
+        if inner == REJECTING and law != ORACLE:
+            if assessment.measure[s] != FIXED:
+                rejecting.believe_larger(rejection, surfaces, layout, s)
+            suspected = (
+                assessment.detected
+                and s == assessment.named
+                and is_doubtful(assessment, surfaces, rejection, layout, s)
+            )
+            rejecting.withdraw(rejection, surfaces, layout, s, saturated[s], suspected)
+    approach(surfaces)
 
 
 @kernel
-def is_doubtful(control, fdi, s):
+def take_truth(surfaces, faults, s, u):
+    """Take the true effectiveness of surface s, none if it does not move, and what it is off besides.
+
+    u rad: where it would be if healthy.
+    """
+    surfaces.target[s] = 0.0 if faults.immovable[s] else faults.effectiveness[s]
+    if faults.present:
+        surfaces.offset[s] = faults.effective[s] - surfaces.target[s] * u
+
+
+@kernel
+def take_assessment(surfaces, assessment, s):
+    """Take surface s for what the diagnosis says. Jams bypass the rate limit, as does what is well known."""
+    surfaces.target[s] = assessment.effectiveness[s]
+    surfaces.offset[s], surfaces.lag[s] = assessment.offset[s], assessment.lag[s]
+    if assessment.at_once[s]:
+        surfaces.effectiveness[s] = surfaces.target[s]
+
+
+@kernel
+def is_doubtful(assessment, surfaces, rejection, layout, s):
     """Whether surface s, which is named, may be of no use: another can take its place, or its type is open or
     nothing of it seems to be left, and the law's observer sees nothing of it either."""
-    if rejecting.is_replaced(control, s):
+    if rejecting.is_replaced(layout, s):
         return True
-    is_open = fdi.config.every_type and fdi.types.surface[s].measure < 0
-    return (is_open or control.target[s] < control.least_effectiveness) and not rejecting.acts(control, s)
+    least = surfaces.least_effectiveness
+    is_open = assessment.every_type and assessment.measure[s] < 0
+    useless = is_open or surfaces.target[s] < least
+    return useless and not rejecting.acts(rejection.found, layout.main, s, least)
 
 
 @kernel
-def act_on_loss(control, fdi, s):
-    """Surface s has lost effectiveness; what is known well need not be eased in."""
-    control.target[s] = 1.0 + isolated_theta(fdi, s)
-    if likelihood_counts(fdi) and statistical.estimated_loss(fdi.statistical.block, s)[1] > SURE:
-        control.effectiveness[s] = control.target[s]
+def approach(surfaces):
+    """Move the effectiveness the law uses towards its target by at most one step."""
+    step = surfaces.effectiveness_step
+    for s in range(surfaces.target.size):
+        change = surfaces.target[s] - surfaces.effectiveness[s]
+        surfaces.effectiveness[s] += min(max(change, -step), step)
 
 
 @kernel
-def act_on_type(control, fdi, s):
-    """What the diagnosis of every type makes of surface s. Jams bypass the rate limit."""
-    surface, at_fault = fdi.types.surface[s], candidates.possible(fdi, s)
-    if surface.measure == LOSES:
-        control.target[s] = verdict.effectiveness_left(fdi, s)
-    elif surface.measure == FIXED:
-        control.target[s] = control.effectiveness[s] = 0.0
-        control.offset[s] = surface.command + verdict.deflection_error(surface, at_fault)
-    elif surface.measure == SHIFTED:
-        control.offset[s] = verdict.deflection_error(surface, at_fault)
-    elif surface.measure == LAGS:
-        control.lag[s] = 0.5 * (surface.low + surface.high) - surface.command
-        control.hedging = 1
+def allow_for_offsets(axes, offset, G):
+    """Take off the demand what the surfaces give unasked: G (3, n) rad/s2 per rad times the offsets (n,)."""
+    for i in range(3):
+        for s in range(G.shape[1]):
+            axes.demand[i] -= G[i, s] * offset[s]
+            axes.hold[i] -= G[i, s] * offset[s]
 
 
 @kernel
-def compensate(control, fdi, belief, measured, faults):
-    """Fill control.fhat (3,) rad/s2: what the law takes the unknown for."""
-    control.fhat[:] = 0.0
-    if control.inner == REJECTING:
-        return  # its observer finds what is unknown
-    if control.law == ORACLE:
-        control.fhat[PITCH] = unanticipated_pitch(belief.design, measured.y, faults.Cm_alpha3)
-    elif control.law != NOMINAL and fdi.verdict.detected:
-        unknown_acceleration(fdi, control.fhat)
-        if fdi.verdict.lead >= 0 and fdi.verdict.lead_kind == LAGS:
-            control.fhat[:] = 0.0  # to ask a slow surface for what it lacks would only wind the command up
+def believed_effectiveness(surfaces, G, G_believed):
+    """Fill G_believed (3, n): G with each column scaled by its surface's effectiveness, or given up."""
+    for s in range(G.shape[1]):
+        effectiveness = surfaces.effectiveness[s]
+        if effectiveness < surfaces.least_effectiveness:
+            effectiveness = 0.0
+        for i in range(3):
+            G_believed[i, s] = G[i, s] * effectiveness
 
 
 @kernel
-def give_up(control, fdi, faults):
+def give_up(law, assessment, surfaces, withdrawn, faults, layout, allocation, reference):
     """Command a surface that does not follow to its trim: should it come loose, that is where it goes, and it
-    shows. From then on the reference is bent to what is left."""
-    for s in range(control.trim.size):
-        truly = faults.immovable[s] and control.law == ORACLE
-        fixed = fdi.config.every_type and fdi.types.surface[s].measure == FIXED
-        abandoned = control.rejection.abandoned[s]
-        if truly or abandoned or (fixed and control.effectiveness[s] == 0.0):
-            control.command[s] = control.trim[s]
-            control.saturated[s] = 0
-            control.hedging = 1
+    shows. From then on the reference is bent to what is left. withdrawn (n,): by the law's observer."""
+    for s in range(layout.trim.size):
+        truly = faults.immovable[s] and law == ORACLE
+        fixed = assessment.measure[s] == FIXED
+        if truly or withdrawn[s] or (fixed and surfaces.effectiveness[s] == 0.0):
+            allocation.command[s] = layout.trim[s]
+            allocation.saturated[s] = 0
+            reference.hedging = 1

@@ -1,16 +1,106 @@
-"""From demanded angular accelerations to surfaces: lateral pair, elevator, and the hand-over from elevator
-to flap."""
+"""From demanded angular accelerations to surfaces: lateral pair, elevator, the hand-over from elevator to
+flap, the probe that moves both against each other; and what the surfaces can give at all.
 
+The attainable moment set is the image of the travels under G, with what is given up and what is off already
+in it [Durham1993]; here the interval it spans on each axis. A demand outside it no law can meet.
+
+The probe is active diagnosis: a healthy aircraft feels nothing of it. The flap goes down and back by
+(1 - cos) / 2; the allocation gives the elevator what the flap does not leave. A surface that does not follow
+then shows.
+"""
+
+from functools import lru_cache
+from math import pi, radians
+
+import numpy as np
+
+from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.compiled import kernel
-from beaver_ftc.control.laws.state import REJECTING
 from beaver_ftc.diagnosis.state import PITCH, ROLL, YAW
+from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.scenario.control import ControlConfig
+from beaver_ftc.scenario.diagnosis import Probing
+
+# Of each axis, rad/s2: what is demanded, what of it only holds the rates, what of it was not given; and
+# whether not even the rates can be held.
+AXES = np.dtype(
+    [("demand", "f8", (3,)), ("hold", "f8", (3,)), ("shortfall", "f8", (3,)), ("beyond", "i8", (3,))],
+    align=True,
+)
+
+# deflection rad of the flap, by step rad of phase a frame; frames: how many at most, 0 for no probe at all;
+# probed: those of the present movement.
+PROBE = np.dtype(
+    [
+        ("amplitude", "f8"), ("step", "f8"), ("frames", "i8"),
+        ("deflection", "f8"), ("probed", "i8"), ("from_s", "f8"), ("to_s", "f8"),
+    ],
+    align=True,
+)  # fmt: skip
+
+
+@lru_cache
+def layout_dtype(n: int) -> np.dtype:
+    """n surfaces: the one that leads each axis, who stands in for pitch's, or -1; trim and stops, rad."""
+    fields = [
+        ("main", "i8", (3,)), ("stand_in", "i8"),
+        ("trim", "f8", (n,)), ("low", "f8", (n,)), ("high", "f8", (n,)),
+    ]  # fmt: skip
+    return np.dtype(fields, align=True)
+
+
+@lru_cache
+def allocation_dtype(n: int) -> np.dtype:
+    """n surfaces: effectiveness matrix with what is believed of each in it; the command, rad, and which stand
+    at a stop; how far pitch is handed over, and whether it is handed back, after a change in flight."""
+    fields = [
+        ("G", "f8", (3, n)), ("command", "f8", (n,)), ("saturated", "i8", (n,)),
+        ("hand_over", "f8"), ("hand_over_step", "f8"), ("hands_back", "i8"),
+    ]  # fmt: skip
+    return np.dtype(fields, align=True)
+
+
+def configure(control: np.void, config: ControlConfig, travel: np.ndarray, aircraft: Aircraft) -> None:
+    """Fill `layout` and `allocation` of a law's record; travel (2, n) rad."""
+    layout = control["layout"]
+    layout["low"], layout["high"] = travel
+    layout["main"], layout["stand_in"] = leaders_of(aircraft), _stand_in(aircraft)
+    control["allocation"]["hand_over_step"] = control["reference"]["dt"] / config.hand_over_s
+
+
+def configure_probe(probe: np.void, probing: Probing | None, dt: float) -> None:
+    """Fill the record (dtype PROBE) for frames of dt s."""
+    if probing is not None:
+        probe["amplitude"] = radians(probing.amplitude_deg)
+        probe["step"] = 2.0 * pi * probing.frequency_hz * dt
+        probe["frames"] = round(probing.duration_s / dt)
+        probe["from_s"] = probe["to_s"] = -1.0
+
+
+def leaders_of(aircraft: Aircraft) -> list[int]:
+    """The surface that leads each of roll, pitch and yaw. Raises BadInput where none does."""
+    leads = {
+        aircraft.dominant_axis[s]: s for s, name in enumerate(aircraft.surfaces) if name in aircraft.primary
+    }
+    for axis, name in enumerate(("roll", "pitch", "yaw")):
+        if axis not in leads:
+            raise BadInput(f"{aircraft.name}: no surface turns it most in {name}, allowed: one for each axis")
+    return [leads[axis] for axis in range(3)]
+
+
+def _stand_in(aircraft: Aircraft) -> int:
+    """The surface that takes over from the one that leads pitch, or -1."""
+    elevator = aircraft.surfaces[leaders_of(aircraft)[PITCH]]
+    group = next(names for names in aircraft.groups.values() if elevator in names)
+    after = group[group.index(elevator) + 1 :]
+    return aircraft.surfaces.index(after[0]) if after else -1
 
 
 @kernel
-def clip(control, surface, deflection):
-    """Limit a deflection (rad) to the surface's travel and note saturation."""
-    limited = min(max(deflection, control.low[surface]), control.high[surface])
-    control.saturated[surface] = limited != deflection
+def clip(allocation, layout, s, deflection):
+    """Limit a deflection (rad) to the travel of surface s and note saturation."""
+    limited = min(max(deflection, layout.low[s]), layout.high[s])
+    allocation.saturated[s] = limited != deflection
     return limited
 
 
@@ -21,15 +111,16 @@ def divide(moment, effectiveness):
 
 
 @kernel
-def lateral(control, G, u):
+def lateral(allocation, layout, demand):
     """Aileron and rudder for the roll and yaw demand; when one saturates the other makes the best of its
     own axis."""
-    a, r = control.main[ROLL], control.main[YAW]
-    roll, yaw = control.demand[ROLL], control.demand[YAW]
+    G, u = allocation.G, allocation.command
+    a, r = layout.main[ROLL], layout.main[YAW]
+    roll, yaw = demand[ROLL], demand[YAW]
     determinant = G[ROLL, a] * G[YAW, r] - G[ROLL, r] * G[YAW, a]
-    u[a] = clip(control, a, divide(roll * G[YAW, r] - yaw * G[ROLL, r], determinant))
-    u[r] = clip(control, r, divide(yaw - G[YAW, a] * u[a], G[YAW, r]))
-    u[a] = clip(control, a, divide(roll - G[ROLL, r] * u[r], G[ROLL, a]))
+    u[a] = clip(allocation, layout, a, divide(roll * G[YAW, r] - yaw * G[ROLL, r], determinant))
+    u[r] = clip(allocation, layout, r, divide(yaw - G[YAW, a] * u[a], G[YAW, r]))
+    u[a] = clip(allocation, layout, a, divide(roll - G[ROLL, r] * u[r], G[ROLL, a]))
 
 
 @kernel
@@ -39,38 +130,98 @@ def smooth(share):
 
 
 @kernel
-def pitch(control, G, u):
-    """Elevator and flap for the pitch demand.
+def pitch(allocation, layout, needed, effectiveness, share, probe):
+    """Elevator and flap for the pitch demand `needed`, rad/s2.
 
-    Before the hand-over the elevator carries all. After it, the elevator holds its trimmed moment, the flap
-    carries what moves, and what the flap's short upward travel cannot give goes back to what is left of the
-    elevator. Without a flap the elevator carries what it can.
+    Before the hand-over (share 0) the elevator carries all. After it (1), the elevator holds its trimmed
+    moment, the flap carries what moves, and what the flap's short upward travel cannot give goes back to what
+    is left of the elevator. Without a flap the elevator carries what it can. effectiveness: of the elevator;
+    probe: rad of the flap.
     """
-    e, f = control.main[PITCH], control.stand_in
-    needed = control.demand[PITCH]
+    G, u = allocation.G, allocation.command
+    e, f = layout.main[PITCH], layout.stand_in
     if f >= 0:
-        share = control.rejection.lost if control.inner == REJECTING else smooth(control.hand_over)
-        hold = divide(G[PITCH, e], control.effectiveness[e]) * control.trim[e]
-        flap = control.trim[f] + share * (divide(needed - hold, G[PITCH, f]) - control.trim[f])
-        u[f] = clip(control, f, flap + control.probe)
+        hold = divide(G[PITCH, e], effectiveness) * layout.trim[e]
+        flap = layout.trim[f] + share * (divide(needed - hold, G[PITCH, f]) - layout.trim[f])
+        u[f] = clip(allocation, layout, f, flap + probe)
         needed -= G[PITCH, f] * u[f]
-    u[e] = clip(control, e, divide(needed, G[PITCH, e]))
+    u[e] = clip(allocation, layout, e, divide(needed, G[PITCH, e]))
 
 
 @kernel
-def allocate(control, G, u):
-    """Fill u (n,) rad for control.demand; G (3, n) rad/s2 per rad with the believed effectiveness in it."""
-    lateral(control, G, u)
-    pitch(control, G, u)
+def allocate(allocation, layout, demand, effectiveness, share, probe):
+    """Fill the command (n,) rad for a demand (3,) rad/s2; effectiveness (n,); the rest: see `pitch`."""
+    lateral(allocation, layout, demand)
+    pitch(allocation, layout, demand[PITCH], effectiveness[layout.main[PITCH]], share, probe)
 
 
 @kernel
-def relieve(control, G, u):
-    """Give the flap what an elevator at its stop leaves of the pitch demand; u (n,) rad as allocated.
+def relieve(allocation, layout, demand):
+    """Give the flap what an elevator at its stop leaves of the pitch demand (rad/s2), as allocated.
 
     The observer has by then found what the elevator does not do, jammed or too weak, and asked it for more
     than it can give: the flap need not wait until that has a name.
     """
-    e, f = control.main[PITCH], control.stand_in
-    if f >= 0 and control.saturated[e]:
-        u[f] = clip(control, f, divide(control.demand[PITCH] - G[PITCH, e] * u[e], G[PITCH, f]))
+    G, u = allocation.G, allocation.command
+    e, f = layout.main[PITCH], layout.stand_in
+    if f >= 0 and allocation.saturated[e]:
+        u[f] = clip(allocation, layout, f, divide(demand - G[PITCH, e] * u[e], G[PITCH, f]))
+
+
+@kernel
+def advance_hand_over(allocation, reallocated, at_once, lost, every_type):
+    """Hand the pitch demand to the flap, or back. `at_once`: the share that is lost, by a jam."""
+    if reallocated:
+        allocation.hand_over = min(allocation.hand_over + allocation.hand_over_step, 1.0)
+        if at_once:
+            allocation.hand_over = max(allocation.hand_over, lost)
+    elif every_type or allocation.hands_back:
+        allocation.hand_over = max(allocation.hand_over - allocation.hand_over_step, 0.0)
+
+
+@kernel
+def attainable(G, layout, i):
+    """Least and greatest acceleration of axis i, rad/s2, within the travel; G (3, n)."""
+    least, greatest = 0.0, 0.0
+    for s in range(layout.low.size):
+        one, other = G[i, s] * layout.low[s], G[i, s] * layout.high[s]
+        least += min(one, other)
+        greatest += max(one, other)
+    return least, greatest
+
+
+@kernel
+def note_shortfall(axes, allocation, layout, lag):
+    """What was demanded and is not given; and whether the rates could at least be held. lag (n,) rad: of
+    surfaces behind their command."""
+    G, u = allocation.G, allocation.command
+    for i in range(3):
+        given = 0.0
+        for s in range(u.size):
+            given += G[i, s] * (u[s] + lag[s])
+        axes.shortfall[i] = axes.demand[i] - given
+        least, greatest = attainable(G, layout, i)
+        axes.beyond[i] = not least <= axes.hold[i] <= greatest
+
+
+@kernel
+def advance_probe(probe, wanted, t):
+    """Bring the probe to the next frame, t s: begin when wanted, end with the movement when no longer."""
+    if probe.probed == 0:
+        if not wanted or probe.from_s >= 0.0:
+            return
+        probe.from_s = t
+    phase = probe.step * probe.probed
+    at_rest = phase % (2.0 * np.pi) < probe.step
+    if probe.probed > 0 and at_rest and (not wanted or probe.probed >= probe.frames):
+        probe.deflection, probe.probed, probe.to_s = 0.0, 0, t
+        return
+    probe.deflection = 0.5 * probe.amplitude * (1.0 - np.cos(phase))
+    probe.probed += 1
+
+
+@kernel
+def take_command(allocation, layout, deflections):
+    """Take a plug-in's command (n,) rad, within the travel of each surface."""
+    for s in range(deflections.size):
+        allocation.command[s] = clip(allocation, layout, s, deflections[s])

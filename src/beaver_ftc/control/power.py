@@ -11,42 +11,112 @@ Power has little moment and a right-half-plane zero from there to the attitude: 
 not make it follow a pitch rate.
 """
 
+from math import exp, radians
+from typing import Any
+
+import numpy as np
+
+from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.compiled import kernel
-from beaver_ftc.control.state import ORACLE
+from beaver_ftc.control.laws import FAULT_TOLERANT, ORACLE, law_of
+from beaver_ftc.design.engine import engine_power_kw, slipstream
 from beaver_ftc.design.model import AIRSPEED, DPT, QDYN
-from beaver_ftc.diagnosis.state import PITCH
+from beaver_ftc.diagnosis.state import PITCH, YAW
+from beaver_ftc.scenario.schema import Scenario
 
 LEAST_LACK_RAD_S2 = 0.05  # of pitch acceleration: what 2 to 3 inHg give
+YAW_SHARE = 0.5  # of the rudder, that engine power may claim: the rest is there to fly with
+
+# Settings, state, and what is reported of it.
+POWER = np.dtype(
+    [
+        ("enabled", "i8"), ("impatience", "f8"), ("forgiveness", "f8"),  # shares per frame
+        ("speed_gain", "f8"), ("attitude_gain", "f8"),  # inHg per m/s, inHg per rad
+        ("smoothing", "f8"), ("washout", "f8"), ("leak", "f8"),  # shares per frame
+        ("trim", "f8"), ("low", "f8"), ("high", "f8"), ("step", "f8"),  # inHg
+        ("dpt_factor", "f8"), ("highest_dpt", "f8"),
+        ("lost", "f8"), ("engaged", "i8"), ("in_use", "i8"), ("moved", "i8"),
+        ("speed", "f8"), ("usual_speed", "f8"), ("attitude", "f8"),
+        ("command", "f8", (1,)),  # inHg
+        ("from_s", "f8"), ("frames", "i8"), ("least", "f8"), ("greatest", "f8"),
+    ],
+    align=True,
+)  # fmt: skip
+
+
+def is_at_hand(scenario: Scenario) -> bool:
+    """Whether the built-in law of a scenario may use the engine."""
+    law, every_type = law_of(scenario.control.law)[0], scenario.fdi.fault_class == "all"
+    wanted = scenario.control.power.enabled and (law == ORACLE or (law == FAULT_TOLERANT and every_type))
+    return wanted and _has_piston_engine(scenario.airframe)
+
+
+def _has_piston_engine(aircraft: Aircraft) -> bool:
+    """Whether the power law knows the engine: manifold pressure is what it moves."""
+    setting = aircraft.engine.settings.get("manifold_pressure_inhg")
+    return setting is not None and setting.property == aircraft.trim.throttle
+
+
+def configure(power: np.void, layout: np.void, scenario: Scenario) -> None:
+    """Fill the record (dtype POWER); layout: of the surfaces."""
+    config, dt = scenario.control.power, 1.0 / scenario.rate_hz
+    initial: Any = scenario.initial  # its engine's keys are the aircraft's
+    power["enabled"], power["from_s"] = is_at_hand(scenario), -1.0
+    power["impatience"], power["forgiveness"] = dt / config.patience_s, dt / config.release_s
+    power["speed_gain"] = config.speed_gain_inhg_per_mps
+    power["attitude_gain"] = config.attitude_gain_inhg_per_deg / radians(1.0)
+    for name, lag_s in (
+        ("smoothing", config.smoothing_s), ("washout", config.washout_s), ("leak", config.attitude_memory_s),
+    ):  # fmt: skip
+        power[name] = 1.0 - exp(-dt / lag_s)
+    if not _has_piston_engine(scenario.airframe):
+        return
+    trim = initial.manifold_pressure_inhg
+    power["trim"] = power["command"] = power["least"] = power["greatest"] = trim
+    power["low"], power["high"] = min(config.lowest_inhg, trim), max(config.highest_inhg, trim)
+    power["step"] = config.rate_inhg_s * dt
+    power["dpt_factor"], power["highest_dpt"] = _slipstream_limits(scenario, layout)
+
+
+def _slipstream_limits(scenario: Scenario, layout: np.void) -> tuple[float, float]:
+    """rho V^3 d dpt / d pz of the engine [FDC], kg/(m3) (m/s)^3 per inHg; and the dpt at which holding the
+    propeller's yawing moment takes YAW_SHARE of the rudder's travel."""
+    initial: Any = scenario.initial
+    rpm, terms, rudder = initial.engine_rpm, scenario.airframe.terms, layout["main"][YAW]
+    kw_per_inhg = engine_power_kw(rpm, 1.0, 1.0) - engine_power_kw(rpm, 0.0, 1.0)
+    rudder_rad = min(-layout["low"][rudder], layout["high"][rudder])
+    dpt3 = YAW_SHARE * terms["Cn_dr"].value * rudder_rad / terms["Cn_dpt3"].value
+    return slipstream(kw_per_inhg, 1.0, 1.0) - slipstream(0.0, 1.0, 1.0), max(dpt3, 0.0) ** (1.0 / 3.0)
 
 
 @kernel
-def unable(control, surface):
-    """Whether a surface is given up or stands at a stop."""
-    return control.effectiveness[surface] < control.least_effectiveness or control.saturated[surface] == 1
+def unable(surfaces, saturated, s):
+    """Whether surface s is given up or stands at a stop."""
+    return surfaces.effectiveness[s] < surfaces.least_effectiveness or saturated[s] == 1
 
 
 @kernel
-def pitch_is_lost(control):
+def pitch_is_lost(layout, surfaces, saturated, shortfall):
     """Whether elevator and flap are given up, or cannot between them give what pitch demands.
 
     A flap that can still act is asked for what the elevator lacks, so a lack says that it has nothing left.
+    shortfall (3,) rad/s2; saturated (n,).
     """
-    elevator, flap = control.main[PITCH], control.stand_in
-    most = control.effectiveness[elevator]
+    elevator, flap = layout.main[PITCH], layout.stand_in
+    most = surfaces.effectiveness[elevator]
     if flap >= 0:
-        most = max(most, control.effectiveness[flap])
-    lacking = unable(control, elevator) and abs(control.shortfall[PITCH]) > LEAST_LACK_RAD_S2
-    return most < control.least_effectiveness or lacking
+        most = max(most, surfaces.effectiveness[flap])
+    lacking = unable(surfaces, saturated, elevator) and abs(shortfall[PITCH]) > LEAST_LACK_RAD_S2
+    return most < surfaces.least_effectiveness or lacking
 
 
 @kernel
-def watch(control, t):
+def watch(power, is_lost, t):
     """Take over once pitch has been lost for a while, hand back once it has not been for longer. t s.
 
     lost counts up while it is and down while it is not, between 0 and 1: swings past zero keep what they add.
     """
-    power = control.power
-    change = power.impatience if pitch_is_lost(control) else -power.forgiveness
+    change = power.impatience if is_lost else -power.forgiveness
     power.lost = min(max(power.lost + change, 0.0), 1.0)
     if power.lost == 1.0 and not power.engaged:
         power.engaged, power.attitude = 1, 0.0
@@ -57,15 +127,14 @@ def watch(control, t):
 
 
 @kernel
-def follow(control, x, y):
+def follow(power, reference, x, y):
     """Bring airspeed, its slow mean and the attitude missed to this frame; x (3,) rad/s, y (5,)."""
-    power = control.power
     if power.usual_speed == 0.0:
         power.speed = power.usual_speed = y[AIRSPEED]
     power.speed += power.smoothing * (y[AIRSPEED] - power.speed)
     power.usual_speed += power.washout * (power.speed - power.usual_speed)
-    error = x[PITCH] - control.governed_rate[PITCH]
-    power.attitude += control.dt * error - power.leak * power.attitude
+    error = x[PITCH] - reference.governed_rate[PITCH]
+    power.attitude += reference.dt * error - power.leak * power.attitude
 
 
 @kernel
@@ -89,12 +158,14 @@ def wanted(power, y):
 
 
 @kernel
-def steer(control, x, y, known, t):
-    """Move the manifold pressure by one frame; x (3,) rad/s, y (5,), known: there is an alarm, t s."""
-    power = control.power
-    follow(control, x, y)
-    if known or control.law == ORACLE:
-        watch(control, t)
+def steer(power, reference, x, y, watched, is_lost, t):
+    """Move the manifold pressure by one frame; x (3,) rad/s, y (5,), t s.
+
+    watched: whether it may take over, since there is an alarm; is_lost: `pitch_is_lost` now.
+    """
+    follow(power, reference, x, y)
+    if watched:
+        watch(power, is_lost, t)
     before = power.command[0]
     power.command[0] = min(max(wanted(power, y), before - power.step), before + power.step)
     power.in_use = power.engaged or power.moved

@@ -8,8 +8,7 @@ rudder: no second surface), or unanticipated (no known fault fits).
 import numpy as np
 
 from beaver_ftc.compiled import kernel
-from beaver_ftc.control.state import FAULT_TOLERANT, NOMINAL
-from beaver_ftc.diagnosis.scheme import isolated_surface
+from beaver_ftc.control.laws import FAULT_TOLERANT, NOMINAL
 from beaver_ftc.diagnosis.state import PITCH, UNANTICIPATED
 from beaver_ftc.diagnosis.types.examine import FIXED, LOSES
 
@@ -50,20 +49,29 @@ def mode_of(law, detected, isolated, relieved):
 
 
 @kernel
-def mode_from(control, fdi):
-    """The mode that the diagnosis asks for."""
-    elevator = control.main[PITCH]
-    if not fdi.config.every_type:
-        return mode_of(
-            control.law,
-            fdi.verdict.detected,
-            fdi.verdict.isolated,
-            isolated_surface(fdi) == elevator and control.stand_in >= 0,
-        )
-    replaced = fdi.verdict.lead_kind in (LOSES, FIXED)
-    relieved = replaced and fdi.verdict.lead == elevator and control.stand_in >= 0
-    isolated = fdi.verdict.lead if replaced else min(fdi.verdict.isolated, 0)
-    return mode_of(control.law, fdi.verdict.detected, isolated, relieved)
+def mode_from(law, layout, verdict, assessment):
+    """The mode that the diagnosis asks for; verdict: what it concludes."""
+    elevator, relievable = layout.main[PITCH], layout.stand_in >= 0
+    if not assessment.every_type:
+        relieved = assessment.named == elevator and relievable
+        return mode_of(law, verdict.detected, verdict.isolated, relieved)
+    replaced = verdict.lead_kind in (LOSES, FIXED)
+    relieved = replaced and verdict.lead == elevator and relievable
+    isolated = verdict.lead if replaced else min(verdict.isolated, 0)
+    return mode_of(law, verdict.detected, isolated, relieved)
+
+
+@kernel
+def true_mode(elevator, faults):
+    """The mode for a law that knows the true fault the moment it occurs; elevator: the surface that leads
+    pitch."""
+    if not faults.present:
+        return MODE_NOMINAL
+    if faults.Cm_alpha3 != 0.0:
+        return MODE_UNANTICIPATED
+    if faults.effectiveness[elevator] < 1.0 or faults.immovable[elevator]:
+        return MODE_REALLOCATED
+    return MODE_ADAPTIVE
 
 
 @kernel

@@ -13,9 +13,7 @@ import numpy as np
 from beaver_ftc.compiled import kernel
 from beaver_ftc.control.supervisor import MAX_EVENTS
 from beaver_ftc.design.model import unanticipated_pitch
-from beaver_ftc.diagnosis import bank
 from beaver_ftc.diagnosis.state import PITCH
-from beaver_ftc.plant import channels as ch
 from beaver_ftc.plant.sensing import effective, position
 from beaver_ftc.scenario.diagnosis import MAX_POLES
 
@@ -79,7 +77,7 @@ def add_effect(guarantee):
 
 
 @kernel
-def follow_guarantee(guarantee, fdi, share, k, t):
+def follow_guarantee(guarantee, bank, dt, share, k, t):
     """Advance the filtered effect by the elapsed frame and note the first instant t (s) of certainty.
 
     share: one over the instants in a frame. The sum then begins anew with this instant. k: number of the
@@ -90,33 +88,28 @@ def follow_guarantee(guarantee, fdi, share, k, t):
         return
     for i in range(3):
         mean = share * guarantee.phi_sum[i]
-        for m in range(fdi.bank.n):
-            effect = fdi.bank.decay[m] * guarantee.effect[m, i] + fdi.config.dt * mean
+        for m in range(bank.n):
+            effect = bank.decay[m] * guarantee.effect[m, i] + dt * mean
             guarantee.effect[m, i] = effect
-            certain = abs(effect) > 2.0 * fdi.bank.threshold[m, i] > 0.0
+            certain = abs(effect) > 2.0 * bank.threshold[m, i] > 0.0
             if certain and guarantee.certain_after_s < 0.0:
                 guarantee.certain_after_s = t
         guarantee.phi_sum[i] = guarantee.phi[i]
 
 
 @kernel
-def account(accounts, truth, fdi, control, k, t):
-    """Advance every account but the guarantee by this frame, number k, t s."""
-    tracking = accounts.tracking
+def track(tracking, truth, model_rate):
+    """Add this frame's squared error of the rates, rad2/s2; model_rate (3,) rad/s."""
     for i in range(3):
-        square = (control.model_rate[i] - truth.value[i]) ** 2
+        square = (model_rate[i] - truth.value[i]) ** 2
         if truth.faulted:
             tracking.since[i] += square
         else:
             tracking.before[i] += square
     if truth.faulted:
         tracking.frames_since += 1
-        account_authority(accounts.authority, control)
     else:
         tracking.frames_before += 1
-        bank.note_closest_approach(fdi)
-    account_surfaces(accounts, truth, control.saturated, k, control.dt)
-    note_envelope(accounts.envelope, truth.value[ch.ENVELOPE] < 0.5, t)
 
 
 @kernel
@@ -133,13 +126,13 @@ def account_surfaces(accounts, truth, saturated, k, dt):
 
 
 @kernel
-def account_authority(authority, control):
+def account_authority(authority, axes):
     """How much of what was demanded after the fault the surfaces could not give, and for how long not even
     the rates could have been held."""
     for i in range(3):
-        authority.demanded[i] += abs(control.demand[i])
-        authority.lacking[i] += abs(control.shortfall[i])
-        authority.beyond_frames[i] += control.beyond[i]
+        authority.demanded[i] += abs(axes.demand[i])
+        authority.lacking[i] += abs(axes.shortfall[i])
+        authority.beyond_frames[i] += axes.beyond[i]
 
 
 @kernel

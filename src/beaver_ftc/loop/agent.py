@@ -28,13 +28,13 @@ def act(frames, action):
     Returns whether the action (n,) is finite; if not, nothing is commanded.
     """
     frame = frames[0]
-    control = frame.control
+    layout = frame.control.layout
     for s in range(action.size):
         if not np.isfinite(action[s]):
             return False
         share = min(max(action[s], -1.0), 1.0)
-        trim = control.trim[s]
-        reach = trim - control.low[s] if share < 0.0 else control.high[s] - trim
+        trim = layout.trim[s]
+        reach = trim - layout.low[s] if share < 0.0 else layout.high[s] - trim
         frame.held_rad[s] = trim + share * reach
     hold(frames)
     return True
@@ -68,7 +68,7 @@ def observe(frames, log, look, seen):
     seen[4] = (y[BETA] - where.beta) / ANGLE_RAD
     seen[5] = (y[AIRSPEED] - where.airspeed) / AIRSPEED_MPS
     for s in range(frame.held_rad.size):
-        held = frame.held_rad[s] if frame.held else frame.control.trim[s]
-        seen[BESIDE_SURFACES + s] = (held - frame.control.trim[s]) / ANGLE_RAD
+        held = frame.held_rad[s] if frame.held else frame.control.layout.trim[s]
+        seen[BESIDE_SURFACES + s] = (held - frame.control.layout.trim[s]) / ANGLE_RAD
     for i in range(seen.size):
         seen[i] = min(max(seen[i], -LARGEST), LARGEST)

@@ -1,14 +1,12 @@
 """Turns a scenario into the frame record that the compiled loop works on."""
 
 from math import ceil, exp, pi, radians
-from typing import Any
 
 import numpy as np
 
 from beaver_ftc.aircraft import Aircraft
-from beaver_ftc.control.reference_model import discretise
-from beaver_ftc.control.state import FAULT_TOLERANT, ORACLE, law_of
-from beaver_ftc.design.engine import engine_power_kw, slipstream
+from beaver_ftc.control.allocation import leaders_of
+from beaver_ftc.control.state import configure
 from beaver_ftc.design.variants import design_of, mass_of
 from beaver_ftc.diagnosis.admitted import admit, gyros_vary, poles_for_noise
 from beaver_ftc.diagnosis.bounds.worst_case import fill_error_map
@@ -23,7 +21,6 @@ from beaver_ftc.diagnosis.state import (
     PUBLISHED,
     STATISTICS,
     WORST_CASE,
-    YAW,
 )
 from beaver_ftc.diagnosis.types.pairs import IN_PITCH, IN_ROLL_AND_YAW
 from beaver_ftc.documents.errors import BadInput
@@ -40,14 +37,13 @@ from beaver_ftc.loop.instruments import (
 from beaver_ftc.plant import channels as ch
 from beaver_ftc.scenario.actuators import Actuators
 from beaver_ftc.scenario.control import ControlConfig
-from beaver_ftc.scenario.diagnosis import MAX_POLES, FdiConfig, Probing
+from beaver_ftc.scenario.diagnosis import MAX_POLES, FdiConfig
 from beaver_ftc.scenario.keys import texts_of
 from beaver_ftc.scenario.schema import Scenario
 
 BLOCK_S = 0.2  # to be examined at once where gyros are noisy: short beside the slowest half-cycle, 3.1 s
 RUNAWAY_RATE_RAD_S = pi / 3.0  # of an actuator with no declared rate limit: the aircraft's default
 EARTH_RATE_RAD_S = 2.0 * pi / 86164.0905  # one turn per sidereal day [WGS84]
-YAW_SHARE = 0.5  # of the rudder, that engine power may claim: the rest is there to fly with
 _AUTHORITIES = {"either": EITHER, "worst-case": WORST_CASE, "statistical": STATISTICS}
 _THRESHOLDS = {"interval": INTERVAL, "published": PUBLISHED}
 
@@ -141,17 +137,6 @@ def _assemble_pairs(fdi: np.void, aircraft: Aircraft) -> None:
         fie["unasked"] = (1, 0, 1) if fdi["layout"]["group"][fie["surface"]] == IN_PITCH else (0, 1, 0)
 
 
-def leaders_of(aircraft: Aircraft) -> list[int]:
-    """The surface that leads each of roll, pitch and yaw. Raises BadInput where none does."""
-    leads = {
-        aircraft.dominant_axis[s]: s for s, name in enumerate(aircraft.surfaces) if name in aircraft.primary
-    }
-    for axis, name in enumerate(("roll", "pitch", "yaw")):
-        if axis not in leads:
-            raise BadInput(f"{aircraft.name}: no surface turns it most in {name}, allowed: one for each axis")
-    return [leads[axis] for axis in range(3)]
-
-
 def _assemble_layout(layout: np.void, members: tuple[Member, ...], aircraft: Aircraft) -> None:
     """Axes, groups and estimators of the surfaces."""
     index = {name: s for s, name in enumerate(aircraft.surfaces)}
@@ -164,14 +149,6 @@ def _assemble_layout(layout: np.void, members: tuple[Member, ...], aircraft: Air
             layout["partner"][index[name]] = index[other] if other != name else -1
     for e, (_, kind, surface) in enumerate(members):
         layout["loss_of" if kind == LOSS else "position_of"][surface] = e
-
-
-def _stand_in(aircraft: Aircraft) -> int:
-    """The surface that takes over from the one that leads pitch, or -1."""
-    elevator = aircraft.surfaces[leaders_of(aircraft)[PITCH]]
-    group = next(names for names in aircraft.groups.values() if elevator in names)
-    after = group[group.index(elevator) + 1 :]
-    return aircraft.surfaces.index(after[0]) if after else -1
 
 
 def _assemble_sharpening(fdi: np.void, config: FdiConfig, dt: float) -> None:
@@ -192,79 +169,6 @@ def _assemble_network(network: np.void, config: ControlConfig) -> None:
     network["gain"] = config.network_gain_per_s2
     network["leak_per_s"] = config.network_leak_per_s
     network["weight_limit"] = config.network_weight_limit_rad_s2
-
-
-def _assemble_control(
-    control: np.void, config: ControlConfig, dt: float, travel: np.ndarray, aircraft: Aircraft
-) -> None:
-    control["law"], control["inner"] = law_of(config.law)  # a plug-in: plugin_frame.py
-    control["dt"] = dt
-    control["Kp"], control["Ki"] = config.proportional_per_s, config.integral_per_s2
-    control["model_A"], control["model_B"] = discretise(
-        config.reference_natural_frequency_rad_s, config.reference_damping, dt
-    )
-    control["effectiveness"] = 1.0
-    control["effectiveness_step"] = (
-        config.effectiveness_rate_per_s * dt if control["law"] != ORACLE else np.inf
-    )
-    control["reference_scale"] = 1.0
-    control["least_effectiveness"] = config.least_effectiveness
-    control["low"], control["high"] = travel
-    control["hand_over_step"] = dt / config.hand_over_s
-    control["main"] = leaders_of(aircraft)
-    control["stand_in"] = _stand_in(aircraft)
-
-
-def _assemble_probing(control: np.void, probing: Probing | None, dt: float) -> None:
-    if probing is not None:
-        control["probe_amplitude"] = radians(probing.amplitude_deg)
-        control["probe_step"] = 2.0 * pi * probing.frequency_hz * dt
-        control["probe_frames"] = round(probing.duration_s / dt)
-        control["probe_from_s"] = control["probe_to_s"] = -1.0
-
-
-def power_is_at_hand(scenario: Scenario) -> bool:
-    """Whether the built-in law of a scenario may use the engine."""
-    law, every_type = law_of(scenario.control.law)[0], scenario.fdi.fault_class == "all"
-    wanted = scenario.control.power.enabled and (law == ORACLE or (law == FAULT_TOLERANT and every_type))
-    return wanted and _has_piston_engine(scenario.airframe)
-
-
-def _has_piston_engine(aircraft: Aircraft) -> bool:
-    """Whether the power law knows the engine: manifold pressure is what it moves."""
-    setting = aircraft.engine.settings.get("manifold_pressure_inhg")
-    return setting is not None and setting.property == aircraft.trim.throttle
-
-
-def _assemble_power(control: np.void, scenario: Scenario, dt: float) -> None:
-    config, power = scenario.control.power, control["power"]
-    initial: Any = scenario.initial  # its engine's keys are the aircraft's
-    power["enabled"], power["from_s"] = power_is_at_hand(scenario), -1.0
-    power["impatience"], power["forgiveness"] = dt / config.patience_s, dt / config.release_s
-    power["speed_gain"] = config.speed_gain_inhg_per_mps
-    power["attitude_gain"] = config.attitude_gain_inhg_per_deg / radians(1.0)
-    for name, lag_s in (
-        ("smoothing", config.smoothing_s), ("washout", config.washout_s), ("leak", config.attitude_memory_s),
-    ):  # fmt: skip
-        power[name] = 1.0 - exp(-dt / lag_s)
-    if not _has_piston_engine(scenario.airframe):
-        return
-    trim = initial.manifold_pressure_inhg
-    power["trim"] = power["command"] = power["least"] = power["greatest"] = trim
-    power["low"], power["high"] = min(config.lowest_inhg, trim), max(config.highest_inhg, trim)
-    power["step"] = config.rate_inhg_s * dt
-    power["dpt_factor"], power["highest_dpt"] = _slipstream_limits(scenario, control)
-
-
-def _slipstream_limits(scenario: Scenario, control: np.void) -> tuple[float, float]:
-    """rho V^3 d dpt / d pz of the engine [FDC], kg/(m3) (m/s)^3 per inHg; and the dpt at which holding the
-    propeller's yawing moment takes YAW_SHARE of the rudder's travel."""
-    initial: Any = scenario.initial
-    rpm, terms, rudder = initial.engine_rpm, scenario.airframe.terms, control["main"][YAW]
-    kw_per_inhg = engine_power_kw(rpm, 1.0, 1.0) - engine_power_kw(rpm, 0.0, 1.0)
-    rudder_rad = min(-control["low"][rudder], control["high"][rudder])
-    dpt3 = YAW_SHARE * terms["Cn_dr"].value * rudder_rad / terms["Cn_dpt3"].value
-    return slipstream(kw_per_inhg, 1.0, 1.0) - slipstream(0.0, 1.0, 1.0), max(dpt3, 0.0) ** (1.0 / 3.0)
 
 
 def _assemble_actuators(
@@ -315,7 +219,7 @@ def assemble(scenario: Scenario, trim: np.ndarray, travel: np.ndarray) -> np.nda
     frames = memory.unpacked(_designs[key])
     frame = frames[0]
     frame["belief"]["u"] = frame["belief"]["commanded"] = trim
-    frame["control"]["trim"] = frame["control"]["command"] = trim
+    frame["control"]["layout"]["trim"] = frame["control"]["allocation"]["command"] = trim
     seed_instruments(frame["instruments"], scenario.seed)
     return frames
 
@@ -342,9 +246,7 @@ def _assemble_design(scenario: Scenario, travel: np.ndarray) -> np.ndarray:
     _assemble_admitted(frame, scenario)
     _assemble_sharpening(frame["fdi"], scenario.fdi, dt)
     _assemble_network(frame["fdi"]["fdae"]["network"], scenario.control)
-    _assemble_control(frame["control"], scenario.control, dt, travel, airframe)
-    _assemble_probing(frame["control"], scenario.fdi.probing, dt)
-    _assemble_power(frame["control"], scenario, dt)
+    configure(frame["control"], scenario, travel)
     return frames
 
 

@@ -11,8 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from beaver_ftc.control.laws.state import REJECTING
-from beaver_ftc.control.state import NOMINAL, ORACLE
+from beaver_ftc.control.laws import NOMINAL, ORACLE, REJECTING
 from beaver_ftc.loop.assembly import assemble
 from beaver_ftc.loop.instruments import enable_watch, read_more
 from beaver_ftc.loop.plugin_frame import PluginFrame, named_detector, named_law, plugged
@@ -22,15 +21,18 @@ from beaver_ftc.scenario.in_flight import stages
 from beaver_ftc.scenario.schema import Scenario
 
 # What a law takes over from the one before it: where reference, command and engine are, and what is believed.
-KEPT_OF_CONTROL = (
-    "commanded_rate", "model_rate", "model_acceleration", "governed_rate", "governed_acceleration",
-    "command", "saturated", "effectiveness", "offset", "lag", "hand_over",
-    "probe", "probed", "probe_from_s", "probe_to_s",
-)  # fmt: skip
-KEPT_OF_POWER = (
-    "lost", "engaged", "in_use", "moved", "speed", "usual_speed", "attitude", "command",
-    "from_s", "frames", "least", "greatest",
-)  # fmt: skip
+KEPT = {
+    "reference": (
+        "commanded_rate", "model_rate", "model_acceleration", "governed_rate", "governed_acceleration",
+    ),
+    "surfaces": ("effectiveness", "offset", "lag"),
+    "allocation": ("command", "saturated", "hand_over"),
+    "probe": ("deflection", "probed", "from_s", "to_s"),
+    "power": (
+        "lost", "engaged", "in_use", "moved", "speed", "usual_speed", "attitude", "command",
+        "from_s", "frames", "least", "greatest",
+    ),
+}  # fmt: skip
 OF_INSTRUMENTS = ("real", "gain", "bias", "noise", "quantum", "dropout", "drift", "keep", "delay", "engine")
 
 
@@ -66,8 +68,8 @@ class Changing:
 
     def _stage(self, frame: int, change: Change, then: Scenario, before: PluginFrame | None) -> Stage:
         loop = self._loop
-        control = loop.frames["control"][0]
-        frames = assemble(then, control["trim"], np.array([control["low"], control["high"]]))
+        layout = loop.frames["control"]["layout"][0]
+        frames = assemble(then, layout["trim"], np.array([layout["low"], layout["high"]]))
         loop.anchor(frames[0], then)
         renews = begins_anew(change, then)
         detector = before.detector if before and not renews else None
@@ -103,7 +105,7 @@ class Changing:
         if frame["fdi"]["watch"]["enabled"] or frame["instruments"]["engine"] or forces:
             read_more(loop)
         frame["control"]["power"]["enabled"] = new["control"]["power"]["enabled"]
-        frame["control"]["hands_back"] = 1
+        frame["control"]["allocation"]["hands_back"] = 1
         take_plugins(loop, stage.plugins)
 
     def _watch(self, fdi: np.void) -> None:
@@ -135,18 +137,17 @@ def take_law(frame: np.void, new: np.void) -> None:
     """Put a law in the place of another, without a bump: its integrators begin where the demand is."""
     control, verdict = frame["control"], frame["fdi"]["verdict"]
     disturbance = _unexplained(control)
-    for name in KEPT_OF_CONTROL:
-        new[name] = control[name]
-    for name in KEPT_OF_POWER:
-        new["power"][name] = control["power"][name]
+    for part, names in KEPT.items():
+        for name in names:
+            new[part][name] = control[part][name]
     if new["inner"] == REJECTING:
         for name in ("begun", "rate"):  # where there is no observer yet it begins with what is measured
             new["rejection"][name] = control["rejection"][name]
         new["rejection"]["disturbance"] = disturbance
-    elif new["Ki"] > 0.0:
+    elif new["feedback"]["Ki"] > 0.0:
         learns = verdict["detected"] and new["law"] not in (NOMINAL, ORACLE)
         learnt = frame["fdi"]["fdae"]["network"]["output"] if learns else 0.0
-        new["integral"] = (learnt - disturbance) / new["Ki"]
+        new["feedback"]["integral"] = (learnt - disturbance) / new["feedback"]["Ki"]
     frame["control"] = new
 
 
@@ -155,7 +156,8 @@ def _unexplained(control: np.void) -> np.ndarray:
     if control["inner"] == REJECTING:
         disturbance: np.ndarray = control["rejection"]["disturbance"].copy()
         return disturbance
-    learnt: np.ndarray = control["fhat"] - control["Ki"] * control["integral"]
+    feedback = control["feedback"]
+    learnt: np.ndarray = feedback["fhat"] - feedback["Ki"] * feedback["integral"]
     return learnt
 
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from beaver_ftc.control.laws.setup import set_up
+from beaver_ftc.control import state
 from beaver_ftc.control.outer.setup import set_up_autopilot
 from beaver_ftc.design.variants import anchor, mass_of
 from beaver_ftc.diagnosis import noise_model
@@ -104,7 +104,7 @@ class Loop:
         design = frame["belief"]["design"]
         anchor(design, start[:3], y, surfaces)
         trim, mass = (start[:3], y, surfaces), mass_of(scenario.design_model, self.aircraft)
-        set_up(frame["control"], frame["belief"], scenario, y)
+        state.anchor(frame["control"], frame["belief"], scenario, y)
         set_up_autopilot(frame["autopilot"], frame["control"], scenario)
         fdi, rate_hz = frame["fdi"], scenario.rate_hz
         if fdi["watch"]["enabled"]:  # compiled code called from here: a quarter of a second, the first time

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from beaver_ftc.control.base import Law, Reference
-from beaver_ftc.control.state import ADAPTIVE, NOMINAL, ORACLE
+from beaver_ftc.control.laws import ADAPTIVE, NOMINAL, ORACLE
 from beaver_ftc.design.context import Context, DesignModel
 from beaver_ftc.diagnosis.base import Detector, Measured, Verdict
 from beaver_ftc.diagnosis.declared import declared_of
@@ -81,8 +81,8 @@ class PluginFrame:
         control = frame["control"]
         reference = Reference(
             references[int(frame["row"])].copy(),
-            control["model_rate"].copy(),
-            control["model_acceleration"].copy(),
+            control["reference"]["model_rate"].copy(),
+            control["reference"]["model_acceleration"].copy(),
         )
         verdict = self.verdict if self.detector is not None else verdict_of(frame, self._surfaces)
         answer = self._ask(self._names[1], self.law.step, measured, reference, verdict)
@@ -156,7 +156,7 @@ def context_of(
 ) -> Context:
     """What a plug-in is given before the flight; start: the truth's channels at the start, in SI."""
     frame = frames[0]
-    control, fdi = frame["control"], frame["fdi"]
+    layout, fdi = frame["control"]["layout"], frame["fdi"]
     trim_y = start[y_places(frame)]
     return Context(
         dt_s=float(frame["dt"]),
@@ -164,20 +164,20 @@ def context_of(
         model=DesignModel(frames["belief"]["design"].copy()),
         trim_x=start[:3].copy(),
         trim_y=trim_y,
-        trim_rad=control["trim"].copy(),
-        travel_rad=np.array([control["low"], control["high"]]),
+        trim_rad=layout["trim"].copy(),
+        travel_rad=np.array([layout["low"], layout["high"]]),
         constant_rad_s2=largest_constant(fdi["bound"], scenario),
         inertia_coupling=fdi["bound"]["inertia"].copy(),
         seed=scenario.seed,
         surfaces=scenario.airframe.surfaces,
-        leading=(int(control["main"][0]), int(control["main"][1]), int(control["main"][2])),
+        leading=(int(layout["main"][0]), int(layout["main"][1]), int(layout["main"][2])),
         options=dict(options),
         declared=declared_of(
             scenario.fdi.bounds,
             scenario.actuators,
             frames["belief"]["design"],
             trim_y,
-            control["trim"],
+            layout["trim"],
             scenario.airframe,
         ),
     )

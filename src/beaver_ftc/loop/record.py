@@ -1,10 +1,9 @@
-"""One row of the log, in the order of channels.log_columns."""
+"""What goes into a row of the log, a stage at a time; frame.py has the order."""
 
 import numpy as np
 
 from beaver_ftc.compiled import kernel
 from beaver_ftc.control.outer.state import SPEED
-from beaver_ftc.diagnosis import statistical
 from beaver_ftc.diagnosis.bank import nearest
 from beaver_ftc.plant import channels as ch
 from beaver_ftc.plant.sensing import effective, first_signal, position
@@ -49,21 +48,17 @@ def record_surfaces(truth, commanded, saturated, row, column):
 
 
 @kernel
-def record_estimators(fdi, logged, row, column):
-    """Residuals between their limits, per estimator there are columns for; not a number before the
-    estimators start, or where another diagnosis has taken their place."""
-    for e in range(logged):
-        fie = fdi.isolation.estimator[e]
-        there = e < fdi.isolation.n
-        started = there and fdi.verdict.detected
-        for i in range(3):
-            row[column] = fie.residual[i] if started else np.nan
-            row[column + 1] = fie.lower[i] if started else np.nan
-            row[column + 2] = fie.upper[i] if started else np.nan
-            column += 3
-        row[column] = fie.excluded if there else np.nan
-        column += 1
-    return column
+def record_estimator(fie, there, detected, row, column):
+    """Residuals between their limits; not a number before the estimators start, or where another diagnosis
+    has taken their place. Returns the next column."""
+    started = there and detected
+    for i in range(3):
+        row[column] = fie.residual[i] if started else np.nan
+        row[column + 1] = fie.lower[i] if started else np.nan
+        row[column + 2] = fie.upper[i] if started else np.nan
+        column += 3
+    row[column] = fie.excluded if there else np.nan
+    return column + 1
 
 
 @kernel
@@ -73,19 +68,6 @@ def record_alarm(bank, row, column):
         m = nearest(bank, i)
         row[column + i], row[column + 3 + i] = bank.residual[m, i], bank.threshold[m, i]
     return column + 6
-
-
-@kernel
-def record_diagnosis(fdi, acceleration, logged, row, column):
-    """Alarm test, residual, threshold, bound, network, the design model's mean acceleration; so many
-    estimators."""
-    column = record_alarm(fdi.bank, row, column)
-    column = put(row, column, fdi.fdae.residual)
-    column = put(row, column, fdi.fdae.threshold)
-    column = put(row, column, fdi.bound.eta_bar)
-    column = put(row, column, fdi.fdae.network.output)
-    column = put(row, column, acceleration)
-    return record_estimators(fdi, logged, row, column)
 
 
 @kernel
@@ -104,32 +86,3 @@ def record_profile(autopilot, row, column):
     for c in range(autopilot.command.size):
         row[column + c] = autopilot.command[c] if autopilot.commanded[c] else np.nan
     row[column + autopilot.command.size] = autopilot.held if autopilot.commanded[SPEED] else np.nan
-
-
-@kernel
-def record(frame, reference, row):
-    """Write the row of a frame (dtype of frame.py); reference (3,) rad/s."""
-    control, fdi, belief = frame.control, frame.fdi, frame.belief
-    column = record_truth(frame.truth, frame.t, row)
-    column = put(row, column, frame.measured.x)
-    column = put(row, column, reference)
-    column = put(row, column, control.model_rate)
-    column = record_surfaces(frame.truth, belief.commanded, control.saturated, row, column)
-    column = record_diagnosis(fdi, belief.means.acceleration, frame.logged.estimators, row, column)
-    column = put(row, column, control.effectiveness)
-    row[column] = frame.supervisor.mode
-    row[column + 1] = fdi.verdict.detected or fdi.watch.alarmed
-    column += 2
-    if frame.logged.watch:
-        record_watch(fdi.watch, row, column)
-        column += 2
-    if frame.logged.power:
-        row[column] = control.power.command[0]
-    if frame.autopilot.enabled:
-        record_profile(frame.autopilot, row, column + 1)
-    chances = fdi.statistical
-    if frame.logged.tests and chances.tests.enabled:
-        views = chances.views[: chances.n_views]
-        statistical.record(chances.tests, chances.block, views, chances.forces, chances.air, row)
-    elif frame.logged.tests:
-        row[row.size - frame.logged.tests :] = np.nan

@@ -145,14 +145,14 @@ class Stepping:
     @property
     def trim_rad(self) -> Vector:
         """Surfaces in trim, (surfaces,) rad."""
-        trim: Vector = self._frame["control"]["trim"].copy()
+        trim: Vector = self._frame["control"]["layout"]["trim"].copy()
         return trim
 
     @property
     def travel_rad(self) -> Vector:
         """Lower and upper stops, (2, surfaces) rad."""
-        control = self._frame["control"]
-        return np.array([control["low"], control["high"]])
+        layout = self._frame["control"]["layout"]
+        return np.array([layout["low"], layout["high"]])
 
     def step(
         self, command: ArrayLike | None = None, *, frames: int = 1, stick: ArrayLike | None = None

@@ -139,7 +139,7 @@ class Diagnosis:
             return
         frame, scenario = self._frame, self._scenario
         belief = frame["belief"]
-        belief["u"] = belief["commanded"] = frame["control"]["trim"] = u
+        belief["u"] = belief["commanded"] = frame["control"]["layout"]["trim"] = u
         anchor(belief["design"], x, y, u)
         mass, start = mass_of(scenario.design_model, self._aircraft), (x, y, u)
         rate_hz, design = scenario.rate_hz, belief["design"]

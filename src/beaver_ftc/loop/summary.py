@@ -82,10 +82,10 @@ def _envelope_exits(frame: np.void) -> tuple[tuple[float, float], ...]:
 
 def _probing_s(frame: np.void) -> tuple[float, float] | None:
     """When the active diagnosis began and ended."""
-    control = frame["control"]
-    if not control["probe_frames"] or control["probe_from_s"] < 0.0:
+    probe = frame["control"]["probe"]
+    if not probe["frames"] or probe["from_s"] < 0.0:
         return None
-    began, ended = float(control["probe_from_s"]), float(control["probe_to_s"])
+    began, ended = float(probe["from_s"]), float(probe["to_s"])
     return began, (ended if ended >= 0.0 else float(frame["t"]))
 
 
@@ -129,12 +129,11 @@ def _limits(frame: np.void, surfaces: Sequence[str]) -> tuple[tuple[float, str, 
     """What envelope protection has limited, in the order in which the limits began."""
     if not frame["autopilot"]["enabled"]:
         return ()
-    holding, control = frame["autopilot"]["holding"], frame["control"]
-    pitch = f"{surfaces[control['main'][PITCH]]} acts as at {degrees(holding['acting']):.1f} deg"
-    lateral = min(
-        (control["main"][ROLL], control["main"][YAW]), key=lambda s: float(control["effectiveness"][s])
-    )
-    left = f"{100 * control['effectiveness'][lateral]:.0f} % of the {surfaces[lateral]} left"
+    holding, main = frame["autopilot"]["holding"], frame["control"]["layout"]["main"]
+    effectiveness = frame["control"]["surfaces"]["effectiveness"]
+    pitch = f"{surfaces[main[PITCH]]} acts as at {degrees(holding['acting']):.1f} deg"
+    lateral = min((main[ROLL], main[YAW]), key=lambda s: float(effectiveness[s]))
+    left = f"{100 * effectiveness[lateral]:.0f} % of the {surfaces[lateral]} left"
     kinds = (
         (FASTEST, "airspeed_mps", "at most", pitch),
         (SLOWEST, "airspeed_mps", "at least", pitch),

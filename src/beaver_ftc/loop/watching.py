@@ -6,9 +6,9 @@ take -> steps.diagnose -> believe
 import numpy as np
 
 from beaver_ftc.compiled import kernel
-from beaver_ftc.control.accommodation import accommodate
 from beaver_ftc.diagnosis.belief import follow_command, look_back, respond
 from beaver_ftc.diagnosis.scheme import isolated_surface, isolated_theta
+from beaver_ftc.loop.frame import accommodate
 
 MEMORY = 8 + 5 * 8  # of the verdict's words: `news`
 
@@ -48,7 +48,7 @@ def finite(values):
 def believe(frames):
     """What the diagnosis knows of the surfaces goes into its own next prediction."""
     frame = frames[0]
-    accommodate(frame.control, frame.fdi, frame.belief, frame.measured, frame.faults)
+    accommodate(frame)
     frame.k += 1
 
 

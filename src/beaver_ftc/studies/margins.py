@@ -17,9 +17,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from beaver_ftc.control.laws import COMPILED, REJECTING
 from beaver_ftc.control.laws.gains import margins
-from beaver_ftc.control.laws.state import REJECTING, STAND_IN
-from beaver_ftc.control.state import COMPILED
+from beaver_ftc.control.laws.rejecting import STAND_IN
 from beaver_ftc.design.model import QDYN
 from beaver_ftc.design.variants import jacobian
 from beaver_ftc.diagnosis.state import PITCH, ROLL, YAW
@@ -206,7 +206,7 @@ def at(scenario: "Scenario") -> Iterator[Margin]:
     truth = frame["truth"]["value"] * frame["truth"]["factor"]
     y = truth[y_places(frame)]
     omega = frequencies(1.0 / scenario.rate_hz)
-    for fault, effectiveness in cases(frame["control"], scenario.airframe.surfaces):
+    for fault, effectiveness in cases(frame["control"]["layout"]["main"], scenario.airframe.surfaces):
         loop, law = open_loop(scenario, frame, linear, y, effectiveness)
         L = loops(loop, law, omega)
         for s, surface in enumerate(scenario.airframe.surfaces):
@@ -215,11 +215,11 @@ def at(scenario: "Scenario") -> Iterator[Margin]:
                 yield Margin(V, fault, surface, *(float(value) for value in margins(L[:, s])))
 
 
-def cases(control: np.void, surfaces: tuple[str, ...]) -> Iterator[tuple[str, np.ndarray]]:
+def cases(main: np.ndarray, surfaces: tuple[str, ...]) -> Iterator[tuple[str, np.ndarray]]:
     """What a fault is called, and the effectiveness (n,) it leaves."""
     healthy = np.ones(len(surfaces))
     yield "none", healthy
-    for s in control["main"]:
+    for s in main:
         for share in REMAINING:
             yield f"{surfaces[s]} {100 * (1 - share):.0f} % lost", _with(healthy, s, share)
         yield f"{surfaces[s]} given up", _with(healthy, s, 0.0)
@@ -236,16 +236,16 @@ def open_loop(
 ) -> tuple[OpenLoop, LawGains]:
     """The loop with this effectiveness (n,), the law knowing it; y: the measured signals in trim."""
     control, belief, dt = frame["control"], frame["belief"], 1.0 / scenario.rate_hz
-    rejection = control["rejection"]
-    _, G, f_x, f_y = jacobian(belief["design"], np.zeros(3), y, control["trim"])
-    lost = 1.0 - effectiveness[control["main"][PITCH]] if control["stand_in"] >= 0 else 0.0
+    rejection, layout = control["rejection"], control["layout"]
+    _, G, f_x, f_y = jacobian(belief["design"], np.zeros(3), y, layout["trim"])
+    lost = 1.0 - effectiveness[layout["main"][PITCH]] if layout["stand_in"] >= 0 else 0.0
     whole = 1.0 - (1.0 - belief["actuators"]["approach"]) ** scenario.substeps
     C = outputs(linear.states, y)
     loop = OpenLoop(
         linear.A, linear.B, C, np.hstack((f_x, f_y[:, : len(C) - 3])), G * effectiveness, effectiveness,
         whole, *sensors(scenario, len(C), dt), dt,
     )  # fmt: skip
-    demand = allocation(G * effectiveness, control["main"], control["stand_in"], lost)
+    demand = allocation(G * effectiveness, layout["main"], layout["stand_in"], lost)
     lead, share = np.array(rejection["lead"]), float(rejection["share"])
     return loop, LawGains(*interpolated(rejection, y[QDYN], lost), demand, lead, share)
 

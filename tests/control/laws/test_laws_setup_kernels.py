@@ -3,13 +3,14 @@
 import numpy as np
 import pytest
 
-from beaver_ftc.control.laws import gains, setup
-from beaver_ftc.control.laws.state import N_POINTS, REJECTING
-from beaver_ftc.control.state import control_dtype
+from beaver_ftc.control import state
+from beaver_ftc.control.laws import REJECTING, gains
+from beaver_ftc.control.laws.rejecting import N_POINTS
 from beaver_ftc.design.model import AIRSPEED, QDYN, design_record
 from beaver_ftc.design.variants import response
 from beaver_ftc.diagnosis.belief import belief_dtype
 from beaver_ftc.scenario.schema import Scenario
+from law_records import new_control
 
 Y = np.array([0.1, 0.02, 44.0, 1000.0, 0.3, 0.0, 0.0, 0.0])
 SENSORS = {
@@ -30,11 +31,11 @@ def asked(monkeypatch):
     def ask(scenario, stand_in=3, inner=REJECTING):
         found = {}
         monkeypatch.setattr(gains, "set_up", lambda rejection, **of: found.update(of))
-        control, belief = np.zeros(1, control_dtype(4))[0], np.zeros(1, belief_dtype(4))[0]
-        control["inner"], control["main"], control["stand_in"] = inner, (0, 1, 2), stand_in
+        control = new_control(inner=inner, main=(0, 1, 2), stand_in=stand_in)
+        belief = np.zeros(1, belief_dtype(4))[0]
         belief["design"] = design_record()[0]
         belief["actuators"]["approach"] = (0.2, 0.3, 0.4, 0.05)
-        setup.set_up(control, belief, scenario, Y)
+        state.anchor(control, belief, scenario, Y)
         return found
 
     return ask

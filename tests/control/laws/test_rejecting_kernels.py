@@ -5,16 +5,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from beaver_ftc.control import accommodation, law, reference_model
-from beaver_ftc.control.laws import left, rejecting
-from beaver_ftc.control.laws.state import REJECTING
-from beaver_ftc.control.oracle import true_faults_dtype
-from beaver_ftc.control.state import ADAPTIVE, FAULT_TOLERANT, NOMINAL, ORACLE, control_dtype
+from beaver_ftc.control import accommodation, allocation, reference
+from beaver_ftc.control.laws import ADAPTIVE, FAULT_TOLERANT, NOMINAL, ORACLE, REJECTING, rejecting
 from beaver_ftc.control.supervisor import MODE_ADAPTIVE, MODE_NOMINAL, MODE_REALLOCATED
 from beaver_ftc.diagnosis.state import NOT_ISOLATED
 from beaver_ftc.diagnosis.types.examine import FIXED, LAGS, LOSES, SHIFTED
+from beaver_ftc.loop import frame as whole
 from beaver_ftc.loop.assembly import assemble
 from flying import scenario
+from law_records import new_control, put
 
 AILERON, ELEVATOR, RUDDER, FLAP = range(4)
 DT = 0.01
@@ -23,14 +22,14 @@ TRAVEL = np.array([[-0.52, -0.49, -0.44, -0.1], [0.52, 0.49, 0.44, 1.03]])
 
 def record(seed=0):
     """A control record with something in every place that the kernels look at."""
-    rng, control = np.random.default_rng(seed), np.zeros(1, control_dtype(4))[0]
-    control["main"], control["stand_in"], control["dt"] = [0, 1, 2], FLAP, DT
-    control["low"], control["high"] = TRAVEL
-    control["least_effectiveness"] = 0.1
-    control["effectiveness"], control["offset"] = rng.uniform(0.2, 1.0, 4), rng.normal(0, 0.02, 4)
-    control["model_A"], control["model_B"] = reference_model.discretise(10.0, 1.0, DT)
-    for name in ("governed_rate", "governed_acceleration", "commanded_rate", "reference_scale"):
-        control[name] = rng.normal(0, 0.1, 3)
+    rng = np.random.default_rng(seed)
+    control = new_control(main=(0, 1, 2), stand_in=FLAP, dt=DT, least_effectiveness=0.1)
+    control["layout"]["low"], control["layout"]["high"] = TRAVEL
+    put(control, effectiveness=rng.uniform(0.2, 1.0, 4), offset=rng.normal(0, 0.02, 4))
+    model = control["reference"]
+    model["A"], model["B"] = reference.discretise(10.0, 1.0, DT)
+    for name in ("governed_rate", "governed_acceleration", "commanded_rate", "scale"):
+        model[name] = rng.normal(0, 0.1, 3)
     rejection = control["rejection"]
     rejection["qdyn"] = [500.0, 700.0, 1000.0, 1400.0, 2000.0]
     for name in ("Kp_at", "pull_at", "learn_at"):
@@ -59,8 +58,7 @@ def test_the_schedule_is_interpolated_and_held_beyond_its_ends(qdyn, lost):
 @pytest.mark.parametrize(("left", "lost"), [(1.0, 0.0), (0.6, 0.4), (0.1, 0.9), (0.09, 1.0), (0.0, 1.0)])
 def test_the_stand_in_carries_what_is_lost_and_takes_it_over_smoothly(given, left, lost):
     control, _ = record()
-    control["hand_over"] = given
-    rejecting.hand_over(control, left)
+    rejecting.hand_over(control["rejection"], given, left, 0.1)
     part = 1.0 if left == 0.0 else 3 * given**2 - 2 * given**3
     assert control["rejection"]["lost"] == pytest.approx(part * lost, abs=1e-15)
 
@@ -74,20 +72,25 @@ def test_the_stand_in_carries_what_is_lost_and_takes_it_over_smoothly(given, lef
 )  # fmt: skip
 def test_what_nothing_replaces_is_divided_by_no_less_than_the_law_may_or_given_up(surface, believed, kept):
     control, _ = record()
-    control["target"][surface] = believed
-    rejecting.hesitate(control, surface)
-    assert control["target"][surface] == kept
+    control["surfaces"]["target"][surface] = believed
+    rejecting.believe_larger(control["rejection"], control["surfaces"], control["layout"], surface)
+    assert control["surfaces"]["target"][surface] == kept
 
 
-class TestAbandon:
+def withdraw(control, s, suspected):
+    parts, saturated = (control["rejection"], control["surfaces"], control["layout"]), control["allocation"]
+    rejecting.withdraw(*parts, s, saturated["saturated"][s], suspected)
+
+
+class TestWithdraw:
     def held(self, surface, frames, saturated=True, suspected=True):
         """(frames until it is given up or None, the record) of a surface at its stop."""
         control, _ = record()
-        control["target"] = control["effectiveness"] = 1.0
-        control["saturated"][surface] = saturated
+        put(control, target=1.0, effectiveness=1.0)
+        control["allocation"]["saturated"][surface] = saturated
         for k in range(frames):
-            rejecting.abandon(control, surface, suspected)
-            if control["rejection"]["abandoned"][surface]:
+            withdraw(control, surface, suspected)
+            if control["rejection"]["withdrawn"][surface]:
                 return k + 1, control
         return None, control
 
@@ -95,34 +98,34 @@ class TestAbandon:
     def test_a_suspect_at_its_stop_is_given_up_in_time(self, surface, patience_s):
         frames, control = self.held(surface, 300)
         assert frames == pytest.approx(patience_s / DT, abs=2)
-        assert control["target"][surface] == control["effectiveness"][surface] == 0.0
+        assert control["surfaces"]["target"][surface] == control["surfaces"]["effectiveness"][surface] == 0.0
         assert control["rejection"]["at_stop_s"][surface] == 0.0
-        assert control["rejection"]["abandoned"].sum() == 1
+        assert control["rejection"]["withdrawn"].sum() == 1
 
     def test_neither_a_healthy_one_nor_one_within_its_travel(self):
         assert self.held(RUDDER, 300, suspected=False)[0] is None
         none, control = self.held(RUDDER, 300, saturated=False)
         assert none is None
-        assert control["target"][RUDDER] == 1.0
+        assert control["surfaces"]["target"][RUDDER] == 1.0
 
     def test_time_within_the_travel_counts_back_by_half_of_what_it_lasts(self):
         control, _ = record()
-        control["saturated"][RUDDER] = 1
+        control["allocation"]["saturated"][RUDDER] = 1
         for _ in range(60):
-            rejecting.abandon(control, RUDDER, True)
-        control["saturated"][RUDDER] = 0
+            withdraw(control, RUDDER, True)
+        control["allocation"]["saturated"][RUDDER] = 0
         for _ in range(40):
-            rejecting.abandon(control, RUDDER, True)
+            withdraw(control, RUDDER, True)
         assert control["rejection"]["at_stop_s"][RUDDER] == pytest.approx(0.6 - 0.5 * 0.4)
 
     @pytest.mark.parametrize(("surface", "again"), [(ELEVATOR, True), (RUDDER, False)])
     def test_only_what_is_replaced_is_tried_again(self, surface, again):
         _, control = self.held(surface, 300)
-        control["saturated"][surface] = 0
+        control["allocation"]["saturated"][surface] = 0
         tried = None
         for k in range(2500):
-            rejecting.abandon(control, surface, True)
-            if not control["rejection"]["abandoned"][surface]:
+            withdraw(control, surface, True)
+            if not control["rejection"]["withdrawn"][surface]:
                 tried = k + 1
                 break
         assert tried == (pytest.approx(20.0 / DT, abs=2) if again else None)
@@ -131,27 +134,23 @@ class TestAbandon:
 
     def test_a_suspicion_that_is_taken_back_frees_it(self):
         _, control = self.held(RUDDER, 300)
-        rejecting.abandon(control, RUDDER, False)
-        assert control["rejection"]["abandoned"][RUDDER] == 0
+        withdraw(control, RUDDER, False)
+        assert control["rejection"]["withdrawn"][RUDDER] == 0
         assert control["rejection"]["at_stop_s"][RUDDER] == 0.0
 
 
 @given(st.integers(0, 50))
 def test_the_observer_is_that_of_its_equations(seed):
     control, rng = record(seed)
-    x, design, Gu, G = (
-        rng.normal(0, 0.1, 3),
-        rng.normal(0, 1, 3),
-        rng.normal(0, 1, (3, 4)),
-        rng.normal(0, 5, (3, 4)),
-    )
-    rejection = control["rejection"]
-    rejecting.observe(control, x, design, Gu, G)
+    x, design = rng.normal(0, 0.1, 3), rng.normal(0, 1, 3)
+    Gu, G = rng.normal(0, 1, (3, 4)), rng.normal(0, 5, (3, 4))
+    rejection, surfaces, main = control["rejection"], control["surfaces"], control["layout"]["main"]
+    rejecting.observe(rejection, surfaces, main, x, design, Gu, G)
     assert list(rejection["rate"]) == list(x), "it begins with what is measured"
     z, d = rejection["rate"].copy(), rejection["disturbance"].copy()
     x = x + 0.01
-    rejecting.observe(control, x, design, Gu, G)
-    z = z + DT * (design + Gu @ (control["effectiveness"] - 1.0) + G @ control["offset"] + d)
+    rejecting.observe(rejection, surfaces, main, x, design, Gu, G)
+    z = z + DT * (design + Gu @ (surfaces["effectiveness"] - 1.0) + G @ surfaces["offset"] + d)
     assert rejection["disturbance"] == pytest.approx(d + rejection["learn"] * (x - z), abs=1e-12)
     assert rejection["rate"] == pytest.approx(z + rejection["pull"] * (x - z), abs=1e-12)
 
@@ -160,38 +159,41 @@ def test_the_observer_is_that_of_its_equations(seed):
 def test_the_demand_is_that_of_its_equation(seed):
     """demand = xm' + Kp (xm - x+) - f - d, xm and x+ when the command acts."""
     control, rng = record(seed)
-    frames = assemble(scenario(), np.zeros(4), TRAVEL)
+    frames = assemble(scenario(), np.zeros(4), TRAVEL).view(np.recarray)
     belief, measured, rejection = frames[0]["belief"], frames[0]["measured"], control["rejection"]
-    belief["f"], belief["G"], belief["u"] = (
-        rng.normal(0, 1, 3),
-        rng.normal(0, 5, (3, 4)),
-        rng.normal(0, 0.1, 4),
-    )
+    f, G, u = rng.normal(0, 1, 3), rng.normal(0, 5, (3, 4)), rng.normal(0, 0.1, 4)
+    belief["f"], belief["G"], belief["u"] = f, G, u
     measured["x"], measured["y"][3] = rng.normal(0, 0.1, 3), 900.0
-    rejecting.demand(control, belief, measured)  # the first frame: the observer begins with x
+    axes, model, surfaces = control["axes"], control["reference"], control["surfaces"]
+    main = control["layout"]["main"]
+    rejecting.demand(rejection, axes, model, surfaces, main, belief, measured)  # the observer begins with x
     share, d, x = rejection["share"], rejection["disturbance"], measured["x"]
-    now = belief["f"] + d + belief["G"] @ (control["effectiveness"] * belief["u"] + control["offset"])
-    ahead = x + share * DT * now
-    A, B = control["model_A"], control["model_B"]
-    wanted = control["reference_scale"] * control["commanded_rate"]
-    state = np.array([control["governed_rate"], control["governed_acceleration"]])
+    ahead = x + share * DT * (f + d + G @ (surfaces["effectiveness"] * u + surfaces["offset"]))
+    A, B = model["A"], model["B"]
+    wanted = model["scale"] * model["commanded_rate"]
+    state = np.array([model["governed_rate"], model["governed_acceleration"]])
     first = A @ state + np.outer(B, wanted)
     second = A @ first + np.outer(B, wanted)
     target = (1 - share) * state[0] + share * first[0]
     after = (1 - share) * first[0] + share * second[0]
-    hold = -belief["f"] - d
-    assert control["hold"] == pytest.approx(hold, abs=1e-12)
-    assert control["demand"] == pytest.approx(
-        (after - target) / DT + rejection["Kp"] * (target - ahead) + hold, abs=1e-9
-    )
+    hold = -f - d
+    assert axes["hold"] == pytest.approx(hold, abs=1e-12)
+    expected = (after - target) / DT + rejection["Kp"] * (target - ahead) + hold
+    assert axes["demand"] == pytest.approx(expected, abs=1e-9)
+
+
+def led(lead, command, u):
+    """What becomes of a command (4,) rad to actuators that are at u."""
+    control, _ = record()
+    control["allocation"]["command"], control["rejection"]["lead"] = command, lead
+    command = control["allocation"]["command"]
+    rejecting.lead_actuators(control["rejection"], control["layout"], command, np.array(u))
+    return command
 
 
 def test_a_command_leads_a_lagging_actuator_within_the_travel():
-    control, _ = record()
-    control["command"] = [0.1, -0.1, 0.4, 0.5]
-    control["rejection"]["lead"] = [3.0, 1.0, 4.0, 0.0]
-    rejecting.hurry(control, np.array([0.05, -0.2, 0.3, 0.4]))
-    assert control["command"] == pytest.approx([0.05 + 3 * 0.05, -0.1, 0.44, 0.5])
+    command = led([3.0, 1.0, 4.0, 0.0], [0.1, -0.1, 0.4, 0.5], [0.05, -0.2, 0.3, 0.4])
+    assert command == pytest.approx([0.05 + 3 * 0.05, -0.1, 0.44, 0.5])
 
 
 @pytest.mark.parametrize(
@@ -208,20 +210,22 @@ def test_a_command_leads_a_lagging_actuator_within_the_travel():
     ],
 )
 def test_pitch_is_handed_over_by_steps_and_back(mode, every_type, hedging, left, before, after):
-    control, _ = record()
-    control["hand_over"], control["hand_over_step"], control["hedging"] = before, 0.1, hedging
-    control["effectiveness"][ELEVATOR] = left
-    law.advance_hand_over(control, every_type, mode)
-    assert control["hand_over"] == pytest.approx(after)
+    frame = assemble(scenario(), np.zeros(4), TRAVEL).view(np.recarray)[0]
+    control = put(frame["control"], hand_over=before, hand_over_step=0.1, hedging=hedging)
+    control["surfaces"]["effectiveness"][ELEVATOR] = left
+    frame["fdi"]["config"]["every_type"], frame["supervisor"]["mode"] = every_type, mode
+    whole.hand_over_pitch(frame)
+    assert control["allocation"]["hand_over"] == pytest.approx(after)
     lost = 1.0 - left if left >= 0.1 else 1.0
     assert control["rejection"]["lost"] == pytest.approx((3 * after**2 - 2 * after**3) * lost)
 
 
 def test_a_plug_ins_command_is_kept_within_the_travel_and_that_is_noted():
     control, _ = record()
-    law.take_command(control, np.array([0.6, 0.1, -0.5, -0.1]))
-    assert list(control["command"]) == [0.52, 0.1, -0.44, -0.1]
-    assert list(control["saturated"]) == [1, 0, 1, 0]
+    out = control["allocation"]
+    allocation.take_command(out, control["layout"], np.array([0.6, 0.1, -0.5, -0.1]))
+    assert list(out["command"]) == [0.52, 0.1, -0.44, -0.1]
+    assert list(out["saturated"]) == [1, 0, 1, 0]
 
 
 class TestVerdict:
@@ -229,42 +233,41 @@ class TestVerdict:
 
     @pytest.fixture
     def frame(self):
-        frame = assemble(scenario(control={"law": "fault-tolerant-published"}), np.zeros(4), TRAVEL)[0]
-        frame["control"]["trim"] = [0.01, -0.04, 0.02, 0.0]
+        given = scenario(control={"law": "fault-tolerant-published"})
+        frame = assemble(given, np.zeros(4), TRAVEL).view(np.recarray)[0]
+        frame["control"]["layout"]["trim"] = [0.01, -0.04, 0.02, 0.0]
         return frame
 
-    def told(self, frame):
-        faults = np.zeros(1, true_faults_dtype(4))[0]
-        return frame["control"], frame["fdi"], frame["belief"], frame["measured"], faults
+    def taken(self, frame):
+        """What the law takes the surfaces for."""
+        whole.assess(frame["fdi"], frame["assessment"])
+        whole.accommodate(frame)
+        return frame["control"]["surfaces"]
 
     def test_of_a_plug_ins_estimates_once_it_has_detected(self, frame):
-        control, fdi, *rest = self.told(frame)
-        fdi["verdict"]["estimates"], fdi["verdict"]["effectiveness"] = 1, [0.9, 0.4, 1.0, 0.7]
-        fdi["verdict"]["isolated"] = NOT_ISOLATED
-        accommodation.accommodate(control, fdi, *rest)
-        assert list(control["target"]) == [1.0] * 4
-        fdi["verdict"]["detected"] = 1
-        accommodation.accommodate(control, fdi, *rest)
-        assert list(control["target"]) == [0.9, 0.4, 1.0, 0.7]
+        verdict = frame["fdi"]["verdict"]
+        verdict["estimates"], verdict["effectiveness"] = 1, [0.9, 0.4, 1.0, 0.7]
+        verdict["isolated"] = NOT_ISOLATED
+        assert list(self.taken(frame)["target"]) == [1.0] * 4
+        verdict["detected"] = 1
+        assert list(self.taken(frame)["target"]) == [0.9, 0.4, 1.0, 0.7]
 
     @pytest.mark.parametrize("effectiveness", [0.0, 0.6])
     def test_of_the_truth_for_the_oracle(self, frame, effectiveness):
-        control, fdi, belief, measured, faults = self.told(frame)
-        control["law"], faults["present"] = ORACLE, 1
+        faults = frame["faults"]
+        frame["control"]["law"], faults["present"] = ORACLE, 1
         faults["effectiveness"], faults["effective"] = [1.0, effectiveness, 1.0, 1.0], [0.1, 0.2, 0.3, 0.4]
         faults["immovable"][FLAP] = 1
-        belief["u"] = [0.1, 0.25, 0.3, 0.05]
-        accommodation.accommodate(control, fdi, belief, measured, faults)
-        assert control["target"] == pytest.approx([1.0, effectiveness, 1.0, 0.0])
-        assert control["offset"] == pytest.approx([0.0, 0.2 - effectiveness * 0.25, 0.0, 0.4])
+        frame["belief"]["u"] = [0.1, 0.25, 0.3, 0.05]
+        surfaces = self.taken(frame)
+        assert surfaces["target"] == pytest.approx([1.0, effectiveness, 1.0, 0.0])
+        assert surfaces["offset"] == pytest.approx([0.0, 0.2 - effectiveness * 0.25, 0.0, 0.4])
 
     def test_a_slow_surface_is_left_to_its_pace(self, frame):
-        control, fdi, *_ = self.told(frame)
-        surface = fdi["types"]["surface"][RUDDER]
+        surface, frame["fdi"]["config"]["every_type"] = frame["fdi"]["types"]["surface"][RUDDER], 1
         surface["measure"], surface["command"], surface["low"], surface["high"] = LAGS, 0.1, 0.02, 0.06
-        accommodation.act_on_type(control, fdi, RUDDER)
-        assert control["lag"] == pytest.approx([0, 0, 0.04 - 0.1, 0])
-        assert control["hedging"] == 1
+        assert self.taken(frame)["lag"] == pytest.approx([0, 0, 0.04 - 0.1, 0])
+        assert frame["control"]["reference"]["hedging"] == 1
 
     @pytest.mark.parametrize(
         ("every_type", "measure", "target", "surface", "doubtful"),
@@ -275,50 +278,55 @@ class TestVerdict:
         ],
     )  # fmt: skip
     def test_what_may_be_of_no_use(self, frame, every_type, measure, target, surface, doubtful):
-        control, fdi, *_ = self.told(frame)
-        fdi["config"]["every_type"], fdi["types"]["surface"][surface]["measure"] = every_type, measure
-        control["target"], control["least_effectiveness"] = 1.0, 0.1
-        control["target"][surface] = target
-        assert bool(accommodation.is_doubtful(control, fdi, surface)) is doubtful
+        control, assessment = frame["control"], frame["assessment"]
+        assessment["every_type"], assessment["measure"][surface] = every_type, measure
+        control["surfaces"]["target"], control["surfaces"]["least_effectiveness"] = 1.0, 0.1
+        control["surfaces"]["target"][surface] = target
+        parts = assessment, control["surfaces"], control["rejection"], control["layout"]
+        assert bool(accommodation.is_doubtful(*parts, surface)) is doubtful
 
-    @pytest.mark.parametrize("why", ["truth", "abandoned", "fixed", None])
+    @pytest.mark.parametrize("why", ["truth", "withdrawn", "fixed", None])
     def test_what_does_not_follow_is_commanded_to_its_trim(self, frame, why):
-        control, fdi, _, _, faults = self.told(frame)
-        control["command"], control["saturated"], control["effectiveness"] = 0.3, 1, 1.0
-        control["law"] = ORACLE if why == "truth" else ADAPTIVE
-        faults["immovable"][RUDDER] = 1  # which only the oracle may know
-        control["rejection"]["abandoned"][RUDDER] = why == "abandoned"
-        fdi["config"]["every_type"], fdi["types"]["surface"][RUDDER]["measure"] = 1, FIXED
-        control["effectiveness"][RUDDER] = 0.0 if why == "fixed" else 0.5
-        accommodation.give_up(control, fdi, faults)
+        control, assessment, law = (
+            frame["control"],
+            frame["assessment"],
+            ORACLE if why == "truth" else ADAPTIVE,
+        )
+        out, surfaces, withdrawn = (
+            control["allocation"],
+            control["surfaces"],
+            control["rejection"]["withdrawn"],
+        )
+        out["command"], out["saturated"], surfaces["effectiveness"] = 0.3, 1, 1.0
+        frame["faults"]["immovable"][RUDDER] = 1  # which only the oracle may know
+        withdrawn[RUDDER] = why == "withdrawn"
+        assessment["measure"], assessment["measure"][RUDDER] = -1, FIXED
+        surfaces["effectiveness"][RUDDER] = 0.0 if why == "fixed" else 0.5
+        rest = frame["faults"], control["layout"], out, control["reference"]
+        accommodation.give_up(law, assessment, surfaces, withdrawn, *rest)
         given_up = why is not None
-        assert list(control["command"]) == [0.3, 0.3, 0.02 if given_up else 0.3, 0.3]
-        assert list(control["saturated"]) == [1, 1, 0 if given_up else 1, 1]
-        assert control["hedging"] == given_up
+        assert list(out["command"]) == [0.3, 0.3, 0.02 if given_up else 0.3, 0.3]
+        assert list(out["saturated"]) == [1, 1, 0 if given_up else 1, 1]
+        assert control["reference"]["hedging"] == given_up
 
     @pytest.mark.parametrize("law_is", [NOMINAL, FAULT_TOLERANT])
     def test_the_unknown_is_for_the_observer_where_there_is_one(self, frame, law_is):
-        control, fdi, *rest = self.told(frame)
-        control["fhat"], control["inner"], control["law"] = 1.0, REJECTING, law_is
-        accommodation.compensate(control, fdi, *rest)
-        assert list(control["fhat"]) == [0.0] * 3
+        control = put(frame["control"], fhat=1.0, inner=REJECTING, law=law_is)
+        whole.compensate(frame)
+        assert list(control["feedback"]["fhat"]) == [0.0] * 3
 
 
 def test_a_command_to_an_actuator_that_does_not_lag_stays_to_the_last_digit():
-    control, _ = record()
-    control["command"] = -0.1
-    control["rejection"]["lead"] = 1.0
-    rejecting.hurry(control, np.array([-0.3, 0.7, 0.11, 0.33]))
-    assert control["command"].tolist() == [-0.1] * 4
+    assert led(1.0, -0.1, [-0.3, 0.7, 0.11, 0.33]).tolist() == [-0.1] * 4
 
 
 def test_a_surface_that_is_whole_is_not_asked_about():
     """What the observer has seen of it stays, for the day on which it is named."""
     control, _ = record()
-    control["target"] = 1.0
+    control["surfaces"]["target"] = 1.0
     control["rejection"]["found"]["product"] = 3.0
     for s in (AILERON, RUDDER):
-        rejecting.hesitate(control, s)
+        rejecting.believe_larger(control["rejection"], control["surfaces"], control["layout"], s)
     assert control["rejection"]["found"]["product"].tolist() == [3.0] * 3
     assert not control["rejection"]["found"]["named"].any()
 
@@ -327,13 +335,13 @@ def test_only_the_main_surface_of_an_axis_is_seen_to_act():
     control, _ = record()
     found = control["rejection"]["found"]
     found["square"], found["product"] = 1.0, (-0.5, -1.0, -0.95)
-    assert [bool(rejecting.acts(control, s)) for s in range(4)] == [True, False, False, False]
+    assert [bool(rejecting.acts(found, (0, 1, 2), s, 0.1)) for s in range(4)] == [True, False, False, False]
     found["product"] = -0.95, -1.0, -0.5
-    assert [bool(rejecting.acts(control, s)) for s in range(4)] == [False, False, True, False]
+    assert [bool(rejecting.acts(found, (0, 1, 2), s, 0.1)) for s in range(4)] == [False, False, True, False]
 
 
 def test_of_nothing_seen_the_verdict_is_believed():
     """An observer that has missed nothing yet says nothing about a surface."""
     control, _ = record()
     control["rejection"]["found"]["frames"] = 5.0
-    assert left.left_of(control, 0, 0.4) == 0.4
+    assert rejecting.effectiveness_seen(control["rejection"]["found"], 0, 0.4) == 0.4

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
+import law_records
 from beaver_ftc.control.outer import autopilot as loops
 from beaver_ftc.control.outer import profile
 from beaver_ftc.control.outer.state import ALTITUDE, AUTOPILOT, BANK, HEADING, N_CHANNELS, SPEED
-from beaver_ftc.control.state import control_dtype
 from beaver_ftc.design.model import AIRSPEED, ALPHA, BETA, DPT, QDYN
-from beaver_ftc.diagnosis.belief import belief_dtype
 from beaver_ftc.diagnosis.state import PITCH, ROLL, YAW
+from law_records import put
 
 DT, G, V, ALPHA_NOW = 0.05, 9.8, 44.0, 0.08
 AILERON, ELEVATOR, RUDDER = 0, 1, 2
@@ -44,12 +44,22 @@ def new_autopilot(*channels, **fields):
 
 
 def new_control(**fields):
-    control = record(control_dtype(4))
-    control["main"], control["effectiveness"], control["least_effectiveness"] = (0, 1, 2), 1.0, 0.1
+    control = law_records.new_control(main=(0, 1, 2), effectiveness=1.0, least_effectiveness=0.1)
     control["power"]["dpt_factor"], control["power"]["highest_dpt"] = 40.0, 0.9
-    for name, value in fields.items():
-        control[name] = value
-    return control
+    return put(control, **fields)
+
+
+def follow(pilot, control, y):
+    loops.follow(pilot, control["layout"]["main"], control["surfaces"], control["allocation"]["saturated"], y)
+
+
+def limit(pilot, control):
+    loops.limit(pilot, control["layout"], control["allocation"]["G"], control["axes"]["hold"])
+
+
+def full_power(pilot, control, y):
+    left, at_stop = control["surfaces"]["effectiveness"], control["allocation"]["saturated"]
+    return loops.full_power(pilot, control["power"], left[RUDDER], at_stop[RUDDER], y)
 
 
 def new_y(alpha=0.1, beta=0.03, airspeed=46.0, dpt=0.4):
@@ -66,7 +76,7 @@ def seen(attitude=(0.0, 0.0, 0.0), altitude=1000.0, **air):
 
 def test_it_takes_over_in_trim():
     pilot = new_autopilot(flying=0)
-    loops.take_over(pilot, new_control(), new_y(), np.array([0.0, 0.13, 0.0]))
+    loops.take_over(pilot, new_y(), np.array([0.0, 0.13, 0.0]))
     assert pilot["flying"] == 1
     assert pilot["alpha"] == 0.1
     assert pilot["airspeed"] == pilot["usual"] == 46.0
@@ -77,8 +87,8 @@ def test_it_takes_over_in_trim():
 @pytest.mark.parametrize("left", [0.0, 0.0999, 0.1, 1.0])
 def test_signals_are_smoothed_and_a_lost_surface_is_noticed(surface, share, left):
     pilot, control = new_autopilot(jammed=0.5, loose=0.5), new_control()
-    control["effectiveness"][surface] = left
-    loops.follow(pilot, control, new_y())
+    control["surfaces"]["effectiveness"][surface] = left
+    follow(pilot, control, new_y())
     assert pilot["alpha"] == pytest.approx(ALPHA_NOW + DT / 2.0 * (0.1 - ALPHA_NOW))
     assert pilot["airspeed"] == pytest.approx(V + DT / 3.0 * (46.0 - V))
     for name in ("jammed", "loose"):
@@ -88,9 +98,9 @@ def test_signals_are_smoothed_and_a_lost_surface_is_noticed(surface, share, left
 
 def limited(jammed=0.0, loose=0.0, hold=(0.0, 0.0, 0.0)):
     pilot, control = new_autopilot(jammed=jammed, loose=loose), new_control(hold=hold)
-    control["G"] = np.diag([0.1, 0.2, 0.05, 0.0])[:3]
-    control["low"], control["high"] = -0.5, (1.0, 0.5, 2.0, 0.0)
-    loops.limit(pilot, control)
+    control["allocation"]["G"] = np.diag([0.1, 0.2, 0.05, 0.0])[:3]
+    control["layout"]["low"], control["layout"]["high"] = -0.5, (1.0, 0.5, 2.0, 0.0)
+    limit(pilot, control)
     return pilot
 
 
@@ -103,8 +113,9 @@ def test_rates_are_what_the_smaller_spare_acceleration_gives():
 
 def test_a_healthy_aircraft_is_asked_for_no_more_than_declared():
     pilot, control = new_autopilot(), new_control()
-    control["G"], control["low"], control["high"] = np.eye(3, 4), -1.0, 1.0
-    loops.limit(pilot, control)
+    control["layout"]["low"], control["layout"]["high"] = -1.0, 1.0
+    put(control, G=np.eye(3, 4))
+    limit(pilot, control)
     assert pilot["limit"] == pytest.approx([0.2, 0.1, 0.15])
     assert pilot["bank_limit"] == 0.5
 
@@ -127,9 +138,9 @@ def test_thrust_per_inhg_is_the_slope_of_the_thrust():
         return y[QDYN] * (0.2 * dpt + 0.1 * ALPHA_NOW * dpt**2)
 
     numeric = (thrust(1e-4) - thrust(-1e-4)) / 2e-4
-    assert loops.thrust_per_inhg(pilot, control, y) == pytest.approx(numeric, rel=1e-6)
+    assert loops.thrust_per_inhg(pilot, control["power"], y) == pytest.approx(numeric, rel=1e-6)
     pilot["thrust"] = -1.0, 0.0
-    assert loops.thrust_per_inhg(pilot, control, y) == 1e-3
+    assert loops.thrust_per_inhg(pilot, control["power"], y) == 1e-3
 
 
 PUSH = 0.2  # m/s2 per inHg
@@ -269,12 +280,12 @@ def test_upside_down_the_turn_stays_finite():
 def throttled(path=0.03, y=None, power=(), rudder=1.0, **fields):
     pilot, control = new_autopilot(SPEED, **{"usual": 43.0, "throttle": 0.05, **fields}), new_control()
     pilot["held"], pilot["held_moving"], pilot["weathercock"] = 45.0, 0.04, 0.2
-    control["effectiveness"][RUDDER] = rudder
+    control["surfaces"]["effectiveness"][RUDDER] = rudder
     control["power"]["command"][0] = 21.0
     for name, value in dict(power).items():
         control["power"][name] = value
-    pilot["full_inhg"] = loops.full_power(pilot, control, new_y(dpt=0.2) if y is None else y)
-    loops.throttle(pilot, control, new_y(dpt=0.2) if y is None else y, path, PUSH)
+    pilot["full_inhg"] = full_power(pilot, control, new_y(dpt=0.2) if y is None else y)
+    loops.throttle(pilot, control["power"], new_y(dpt=0.2) if y is None else y, path, PUSH)
     return pilot, control["power"]
 
 
@@ -353,12 +364,15 @@ def test_a_direction_is_given_within_half_a_turn(angle):
 def test_a_frame_is_its_loops_one_after_the_other():
     """From a heading and an altitude hold in trim: nothing to do but to keep the bank and the path."""
     pilot, control = new_autopilot(flying=0), new_control()
-    control["G"], control["low"], control["high"] = np.eye(3, 4), -1.0, 1.0
+    put(control, G=np.eye(3, 4))
+    control["layout"]["low"], control["layout"]["high"] = -1.0, 1.0
     control["power"]["command"][0] = 20.0
     pilot["legs"], pilot["value"][:, 0] = (1, 1, 1, 0), np.nan
     pilot["speed"] = np.inf
     measured = seen(attitude=(0.0, 0.11, 0.5), alpha=0.1, beta=0.02)
-    loops.steer(pilot, control, record(belief_dtype(4)), measured, 0.0)
+    power, u = control["power"], np.zeros(4)
+    parts = control["layout"], control["surfaces"], control["allocation"], control["axes"]["hold"]
+    loops.steer(pilot, *parts, power, u, measured, 0.0, 0.0)
     assert pilot["held"] == 46.0
     assert pilot["commanded"][:3].all()
     assert pilot["command"][:3] == pytest.approx([1000.0, 46.0, 0.5])
@@ -366,7 +380,7 @@ def test_a_frame_is_its_loops_one_after_the_other():
     # pitch: path 0 + alpha - theta; yaw: the sideslip washed out
     assert pilot["rates"] == pytest.approx([0.0, max(3.0 * -0.01, -0.1), 0.5 * 0.02])
     assert control["power"]["trim"] == pytest.approx(
-        20.0 - G * 0.01 / loops.thrust_per_inhg(pilot, control, measured["y"])
+        20.0 - G * 0.01 / loops.thrust_per_inhg(pilot, control["power"], measured["y"])
     )
 
 
@@ -380,36 +394,36 @@ def test_a_climb_asks_for_no_more_power_than_a_lost_rudder_leaves():
 
 def test_a_whole_rudder_leaves_the_whole_engine():
     pilot, control = new_autopilot(weathercock=0.2), new_control()
-    assert loops.full_power(pilot, control, new_y(dpt=2.0)) == 28.0
+    assert full_power(pilot, control, new_y(dpt=2.0)) == 28.0
 
 
 def test_power_goes_back_while_the_rudder_stands_at_its_stop():
     """From what is commanded, to what sideslip alone holds, and slowly up again."""
     pilot, control = new_autopilot(weathercock=0.027), new_control()
-    control["power"]["command"][0], control["saturated"][RUDDER] = 24.0, 1
+    control["power"]["command"][0], control["allocation"]["saturated"][RUDDER] = 24.0, 1
     y = new_y(dpt=0.4)
     inhg_per_dpt = 2.0 * y[QDYN] * y[AIRSPEED] / 40.0
     lowest = 24.0 + (0.3 - 0.4) * inhg_per_dpt
     assert lowest < 12.0  # a low ceiling: what follows is not bounded by it
-    assert loops.full_power(pilot, control, y) == pytest.approx(24.0 - 8.0 * DT)
-    assert loops.full_power(pilot, control, y) == pytest.approx(24.0 - 16.0 * DT)
+    assert full_power(pilot, control, y) == pytest.approx(24.0 - 8.0 * DT)
+    assert full_power(pilot, control, y) == pytest.approx(24.0 - 16.0 * DT)
     control["power"]["command"][0] = 20.0
-    assert loops.full_power(pilot, control, y) == pytest.approx(20.0 - 8.0 * DT)
+    assert full_power(pilot, control, y) == pytest.approx(20.0 - 8.0 * DT)
     pilot["weathercock"] = 0.4**3  # sideslip holds what there is: no less than that
-    assert loops.full_power(pilot, control, y) == pytest.approx(20.0)
-    control["saturated"][RUDDER] = 0
-    assert loops.full_power(pilot, control, y) == pytest.approx(20.0 + DT)
+    assert full_power(pilot, control, y) == pytest.approx(20.0)
+    control["allocation"]["saturated"][RUDDER] = 0
+    assert full_power(pilot, control, y) == pytest.approx(20.0 + DT)
     pilot["allowed_inhg"] = 27.9999
-    assert loops.full_power(pilot, control, y) == 28.0
+    assert full_power(pilot, control, y) == 28.0
 
 
 def test_ailerons_at_their_stop_are_gone_whatever_is_believed_of_them():
     pilot, control = new_autopilot(), new_control()
-    control["saturated"][AILERON] = 1
-    loops.follow(pilot, control, new_y())
+    control["allocation"]["saturated"][AILERON] = 1
+    follow(pilot, control, new_y())
     assert pilot["jammed"] == pytest.approx(DT / pilot["gain"]["jammed_s"])
-    control["saturated"][:] = (0, 1, 1, 1)
-    loops.follow(pilot, control, new_y())
+    control["allocation"]["saturated"][:] = (0, 1, 1, 1)
+    follow(pilot, control, new_y())
     assert pilot["jammed"] < DT / pilot["gain"]["jammed_s"]
 
 
@@ -417,9 +431,9 @@ def test_ailerons_at_their_stop_are_gone_whatever_is_believed_of_them():
 def test_a_weak_rudder_and_sideslip_hold_the_propellers_yaw_together(left):
     """dpt^3 at the ceiling: what is left of the rudder's share, and the sideslip's for what is not."""
     pilot, control, y = new_autopilot(weathercock=0.2, high_inhg=1e9), new_control(), new_y(dpt=0.4)
-    pilot["allowed_inhg"], control["effectiveness"][RUDDER] = 1e9, left
+    pilot["allowed_inhg"], control["surfaces"]["effectiveness"][RUDDER] = 1e9, left
     control["power"]["command"][0] = 21.0
-    dpt = y[DPT] + (loops.full_power(pilot, control, y) - 21.0) * 40.0 / (2.0 * y[QDYN] * y[AIRSPEED])
+    dpt = y[DPT] + (full_power(pilot, control, y) - 21.0) * 40.0 / (2.0 * y[QDYN] * y[AIRSPEED])
     assert dpt**3 == pytest.approx(max(left, 0.0) * 0.9**3 + (1.0 - left) * 0.2)
 
 

@@ -9,12 +9,12 @@ from beaver_ftc.control import allocation
 from beaver_ftc.control.outer import holding
 from beaver_ftc.control.outer.level import elevator_needed
 from beaver_ftc.control.outer.state import AUTOPILOT, FASTEST, SPEED
-from beaver_ftc.control.state import control_dtype
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.metrics import metrics
 from beaver_ftc.results.verdict import facts
 from beaver_ftc.scenario.schema import Scenario
 from flying import Memory
+from law_records import new_control
 
 MASS_KG, DENSITY = 2288.231, 1.0238  # the latter at 1828.8 m
 STRAIGHT = {"altitude_m": [{"hold": True}], "airspeed_mps": [{"hold": True}], "heading_deg": [{"hold": True}]}
@@ -89,19 +89,16 @@ def test_a_limit_moves_the_command_at_its_pace_and_lets_it_go_again():
 
 
 def test_the_flap_takes_what_an_elevator_at_its_stop_leaves():
-    control = np.zeros(1, control_dtype(4)).view(np.recarray)[0]
-    control.main, control.stand_in = [0, 1, 2], 3
-    control.low, control.high = [-0.5, -0.4, -0.4, -0.1], [0.5, 0.4, 0.4, 1.0]
-    control.demand[1] = 5.0
-    G = np.zeros((3, 4))
+    control = new_control(main=(0, 1, 2), stand_in=3, command=(0.0, -0.4, 0.0, 0.0), saturated=(0, 1, 0, 0))
+    layout, out = control["layout"], control["allocation"]
+    layout["low"], layout["high"] = [-0.5, -0.4, -0.4, -0.1], [0.5, 0.4, 0.4, 1.0]
+    G, u = out["G"], out["command"]
     G[1, 1], G[1, 3] = -10.0, 2.5
-    u = np.array([0.0, -0.4, 0.0, 0.0])
-    control.saturated[:] = [0, 1, 0, 0]
-    allocation.relieve(control, G, u)
+    allocation.relieve(out, layout, 5.0)
     assert u[3] == pytest.approx(0.4)
     assert (G @ u)[1] == pytest.approx(5.0)
-    control.saturated[1], u[3] = 0, 0.2
-    allocation.relieve(control, G, u)
+    out["saturated"][1], u[3] = 0, 0.2
+    allocation.relieve(out, layout, 5.0)
     assert u[3] == 0.2
 
 

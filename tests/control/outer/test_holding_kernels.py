@@ -3,12 +3,10 @@
 import numpy as np
 import pytest
 
-from beaver_ftc.control.laws.state import REJECTING
 from beaver_ftc.control.outer import holding
 from beaver_ftc.control.outer.state import AUTOPILOT, BANK_LIMIT, FASTEST, SLOWEST, SPEED
-from beaver_ftc.control.state import control_dtype
 from beaver_ftc.design.model import AIRSPEED, QDYN
-from beaver_ftc.diagnosis.belief import belief_dtype
+from law_records import new_control, put
 
 DT, AILERON, ELEVATOR, RUDDER, FLAP = 0.05, 0, 1, 2, 3
 DENSITY = 0.9
@@ -23,9 +21,9 @@ def record(dtype):
     return np.zeros(1, dtype).view(np.recarray)[0]
 
 
-def new(inner=0, command=45.0, **fields):
-    """(autopilot, control, belief, y) with an elevator of which 0.6 is left."""
-    pilot, control, belief = record(AUTOPILOT), record(control_dtype(4)), record(belief_dtype(4))
+def new(command=45.0, **fields):
+    """(autopilot, layout, surfaces, y) with an elevator of which 0.6 is left."""
+    pilot = record(AUTOPILOT)
     hold = pilot["holding"]
     speeds = np.linspace(30.0, 55.0, hold["qdyn"].size)
     hold["qdyn"], hold["flap"] = 0.5 * speeds**2, np.linspace(-0.1, 1.0, hold["flap"].size)
@@ -33,38 +31,32 @@ def new(inner=0, command=45.0, **fields):
     hold["known"], hold["pace"], hold["reserve"], hold["from_s"] = 1, 1.0, 0.05, -1.0
     pilot["dt"], pilot["command"][SPEED], pilot["commanded"][SPEED] = DT, command, 1
     pilot["most_bank"] = pilot["bank_limit"] = hold["bank"] = 0.5
-    control["main"], control["stand_in"], control["inner"] = (0, 1, 2), FLAP, inner
-    control["effectiveness"], control["least_effectiveness"] = (1.0, 0.6, 1.0, 1.0), 0.1
-    control["low"], control["high"] = (-0.5, -0.4, -0.3, -0.1), (0.5, 0.3, 0.3, 1.0)
-    control["offset"][ELEVATOR] = 0.02
-    control["rejection"]["disturbance"], belief["G"][1, ELEVATOR] = (1.0, 0.5, -1.0), -8.0
-    for name, value in fields.items():
-        control[name] = value
+    control = new_control(main=(0, 1, 2), stand_in=FLAP, least_effectiveness=0.1)
+    layout, surfaces = control["layout"], control["surfaces"]
+    layout["low"], layout["high"] = (-0.5, -0.4, -0.3, -0.1), (0.5, 0.3, 0.3, 1.0)
+    surfaces["effectiveness"], surfaces["offset"][ELEVATOR] = (1.0, 0.6, 1.0, 1.0), 0.02
+    put(control, **fields)
     y = np.zeros(8)
     y[AIRSPEED], y[QDYN] = 44.0, 0.5 * DENSITY * 44.0**2
-    return pilot, control, belief, y
+    return pilot, layout, surfaces, y
 
 
-@pytest.mark.parametrize("inner", [0, REJECTING])
-def test_what_acts_is_averaged_from_the_first_frame_on(inner):
-    pilot, control, belief, _ = new(inner)
+@pytest.mark.parametrize("unexplained", [0.0, -0.5 / 8.0])
+def test_what_acts_is_averaged_from_the_first_frame_on(unexplained):
+    hold = new()[0]["holding"]
     commands = np.random.default_rng(1).uniform(-0.2, 0.2, 40)
     for command in commands:
-        belief["u"][ELEVATOR] = command
-        holding.watch(pilot, control, belief, ELEVATOR)
-    unexplained = -0.5 / 8.0 if inner == REJECTING else 0.0
-    hold = pilot["holding"]
+        holding.watch(hold, DT, 0.02, 0.6 * command, unexplained)
     assert hold["frames"] == 40
     assert hold["acting"] == pytest.approx(0.02 + 0.6 * commands.mean() + unexplained)
     assert hold["centre"] == pytest.approx(0.6 * commands.mean())
 
 
 def test_later_it_follows_within_four_seconds():
-    pilot, control, belief, _ = new()
-    hold = pilot["holding"]
-    hold["frames"], hold["acting"], hold["centre"], belief["u"][ELEVATOR] = 10_000, 0.3, 0.4, 0.1
+    hold = new()[0]["holding"]
+    hold["frames"], hold["acting"], hold["centre"] = 10_000, 0.3, 0.4
     for _ in range(80):
-        holding.watch(pilot, control, belief, ELEVATOR)
+        holding.watch(hold, DT, 0.02, 0.6 * 0.1, 0.0)
     left = (1.0 - DT / 4.0) ** 80
     assert hold["acting"] == pytest.approx(0.08 + left * (0.3 - 0.08))
     assert hold["centre"] == pytest.approx(0.06 + left * (0.4 - 0.06))
@@ -80,11 +72,11 @@ def at(elevator, flap):
 )
 def test_the_airspeeds_are_those_of_flap_and_elevator_at_their_ends(flap_left, up, down):
     """What is left of the elevator's travel, about where it acts; of the flap all but a reserve."""
-    pilot, control, belief, y = new(effectiveness=(1.0, 0.05, 1.0, flap_left))
-    control["offset"][FLAP] = 0.12
+    pilot, layout, surfaces, y = new(effectiveness=(1.0, 0.05, 1.0, flap_left))
+    surfaces["offset"][FLAP] = 0.12
     hold = pilot["holding"]
     hold["acting"], hold["centre"] = -0.03, 0.005
-    holding.find(pilot, control, belief, y, ELEVATOR, FLAP)
+    holding.find(pilot["holding"], layout, surfaces, y)
     assert hold["fastest"] == pytest.approx(at(-0.035 + 0.05 * 0.3, up), abs=0.05)
     slowest = at(-0.035 - 0.05 * 0.4, down)
     in_table = slowest * np.sqrt(DENSITY) > 30.0
@@ -93,10 +85,10 @@ def test_the_airspeeds_are_those_of_flap_and_elevator_at_their_ends(flap_left, u
 
 @pytest.mark.parametrize(("offset", "stands"), [(-0.3, -0.1), (1.2, 1.0)])
 def test_a_lost_flap_stands_within_its_travel(offset, stands):
-    pilot, control, belief, y = new(effectiveness=(1.0, 0.0, 1.0, 0.0))
-    control["offset"][FLAP] = offset
+    pilot, layout, surfaces, y = new(effectiveness=(1.0, 0.0, 1.0, 0.0))
+    surfaces["offset"][FLAP] = offset
     pilot["holding"]["acting"] = needed(40.0, stands)
-    holding.find(pilot, control, belief, y, ELEVATOR, FLAP)
+    holding.find(pilot["holding"], layout, surfaces, y)
     assert pilot["holding"]["fastest"] == pytest.approx(40.0 / np.sqrt(DENSITY), abs=0.05)
     assert pilot["holding"]["slowest"] == pytest.approx(40.0 / np.sqrt(DENSITY), abs=0.05)
 
@@ -120,19 +112,19 @@ def test_the_table_is_straight_between_its_columns_and_goes_on_beyond_them(flap)
     ],
 )  # fmt: skip
 def test_only_a_pitch_that_is_not_whole_is_watched(effectiveness, stand_in, known, watched):
-    pilot, control, belief, y = new(effectiveness=effectiveness, stand_in=stand_in)
+    pilot, layout, surfaces, y = new(effectiveness=effectiveness, stand_in=stand_in)
     pilot["holding"]["known"], pilot["holding"]["frames"] = known, 3
-    holding.protect(pilot, control, belief, y, 1.0)
+    holding.protect(pilot, layout, surfaces, np.zeros(4), 0.0, y, 1.0)
     assert pilot["holding"]["frames"] == (4 if watched else 0)
     assert pilot["held"] == 45.0
 
 
 def test_nothing_is_concluded_within_the_first_half_second():
-    pilot, control, belief, y = new(effectiveness=(1.0, 0.0, 1.0, 0.0))
-    control["offset"][[ELEVATOR, FLAP]] = needed(40.0, 0.2), 0.2
+    pilot, layout, surfaces, y = new(effectiveness=(1.0, 0.0, 1.0, 0.0))
+    surfaces["offset"][[ELEVATOR, FLAP]] = needed(40.0, 0.2), 0.2
     fastest = []
     for k in range(12):
-        holding.protect(pilot, control, belief, y, k * DT)
+        holding.protect(pilot, layout, surfaces, np.zeros(4), 0.0, y, k * DT)
         fastest.append(float(pilot["holding"]["fastest"]))
     assert fastest[:10] == [np.inf] * 10
     assert fastest[10:] == pytest.approx([40.0 / np.sqrt(DENSITY)] * 2, abs=0.05)
@@ -141,11 +133,11 @@ def test_nothing_is_concluded_within_the_first_half_second():
 
 
 def noted(command=45.0, fastest=np.inf, slowest=0.0, commanded=1, effectiveness=(1, 1, 1, 1), limit=0.5):
-    pilot, control, _, _ = new(command=command, effectiveness=effectiveness)
+    pilot, layout, surfaces, _ = new(command=command, effectiveness=effectiveness)
     hold = pilot["holding"]
     hold["fastest"], hold["slowest"], pilot["commanded"][SPEED] = fastest, slowest, commanded
     pilot["bank_limit"] = limit
-    holding.announce(pilot, control, 7.0)
+    holding.announce(pilot, layout["main"], surfaces["effectiveness"], 7.0)
     return hold
 
 
@@ -171,10 +163,10 @@ def test_a_bank_limit_is_announced_as_it_has_been_on_average(surface):
     hold = noted(effectiveness=effectiveness, limit=0.1)
     assert hold["bank"] == pytest.approx(0.5 - DT / 4.0 * 0.4)
     assert not hold["in_force"].any()  # 0.005 rad as yet
-    pilot, control, _, _ = new(effectiveness=effectiveness)
+    pilot, layout, surfaces, _ = new(effectiveness=effectiveness)
     pilot["bank_limit"] = 0.1
     for k in range(6):
-        holding.announce(pilot, control, float(k))
+        holding.announce(pilot, layout["main"], surfaces["effectiveness"], float(k))
     assert pilot["holding"]["in_force"][BANK_LIMIT] == 1
     assert pilot["holding"]["from_s"][BANK_LIMIT] == 4.0
     left = 0.1 + 0.4 * (1.0 - DT / 4.0) ** 6

@@ -26,8 +26,8 @@ def set_up(stand_in=3, autopilot=LEGS, **keys):
     """(autopilot, control) as filled for a scenario."""
     given = {"name": "profile", "duration_s": 60, "autopilot": autopilot, "design_model": DESIGN, **keys}
     pilot, control = np.zeros(1, AUTOPILOT)[0], np.zeros(1, control_dtype(4))[0]
-    control["main"], control["stand_in"] = (0, 1, 2), stand_in
-    control["low"], control["high"] = (-0.5, -0.4, -0.3, -0.1), (0.5, 0.4, 0.3, 1.0)
+    control["layout"]["main"], control["layout"]["stand_in"] = (0, 1, 2), stand_in
+    control["layout"]["low"], control["layout"]["high"] = (-0.5, -0.4, -0.3, -0.1), (0.5, 0.4, 0.3, 1.0)
     control["power"]["trim"], control["power"]["low"] = 20.0, 12.0
     control["power"]["high"], control["power"]["step"] = 28.0, 0.5
     setup.set_up_autopilot(pilot, control, Scenario.model_validate(given))
@@ -48,12 +48,12 @@ def coefficient(name, **of):
 def test_without_a_profile_it_is_off():
     pilot, control = set_up(autopilot=None)
     assert pilot.tobytes() == np.zeros(1, AUTOPILOT)[0].tobytes()
-    assert control["steered"] == 0
+    assert control["reference"]["steered"] == 0
 
 
 def test_the_legs_are_in_si_and_what_is_held_has_no_value(filled):
     pilot, control = filled
-    assert (pilot["enabled"], control["steered"]) == (1, 1)
+    assert (pilot["enabled"], control["reference"]["steered"]) == (1, 1)
     assert pilot["dt"] == pytest.approx(0.01)
     assert pilot["legs"].tolist() == [2, 1, 1, 0]
     assert pilot["at_s"][:3, :2].tolist() == [[0.0, 20.0], [5.0, 0.0], [0.0, 0.0]]

@@ -15,17 +15,24 @@ A loop's response is found a frequency at a time from the equations of rejecting
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from math import inf, pi, sqrt
+from math import exp, hypot, inf, pi, radians, sqrt
 
 import numpy as np
 
-from beaver_ftc.control.laws.left import fading
+from beaver_ftc.control.laws.rejecting import N_POINTS, fading
+from beaver_ftc.design.model import AIRSPEED, QDYN
+from beaver_ftc.design.variants import effectiveness, own_damping
+from beaver_ftc.diagnosis.state import PITCH
+from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.scenario.sensors import RateGyro
 
 RATIO = 6.5  # observer over feedback: of those with the same margins, near the least error in turbulence
 LEAST_LEAD_RATIO, MOST_LEAD = 1.0, 4.0  # an actuator hurried to at most this many times its bandwidth
 RESERVE_DB, RESERVE_DEG = 0.5, 2.0  # kept for what an integrator is not: the rest of the aircraft
 N_FREQUENCIES, N_CANDIDATES = 160, 40
 LEAST_PER_S = 0.5
+DEFAULT_RATE_RAD_S = pi / 3.0  # of an actuator with no declared rate limit: the aircraft's default
+GYROS = ("p", "q", "r")
 
 
 @dataclass(frozen=True)
@@ -179,7 +186,7 @@ def set_up(
     carriers: axis and surface of each loop.
     """
     whole = 1.0 - (1.0 - approach) ** substeps
-    rejection["share"], rejection["qdyn"] = 1.0 / substeps, qdyn
+    rejection["dt"], rejection["share"], rejection["qdyn"] = dt_s, 1.0 / substeps, qdyn
     rejection["found"]["fading"] = fading(dt_s)
     rejection["lead"] = [lead_of(float(a)) for a in whole]
     for row, (axis, surface) in enumerate(carriers):
@@ -191,3 +198,51 @@ def set_up(
             s = fastest(loop, margin, gyro.noise_rad_s, float(G[j, axis, surface]), speed)
             rejection["Kp_at"][row, j] = s
             rejection["pull_at"][row, j], rejection["learn_at"][row, j] = corrections(RATIO * s, dt_s)
+
+
+def configure(
+    rejection: np.void, layout: np.void, belief: np.void, scenario: Scenario, y: np.ndarray
+) -> None:
+    """Derive the gains of a scenario; y: the measured signals in trim."""
+    config, dt = scenario.control, 1.0 / scenario.rate_hz
+    speeds_mps = np.linspace(*scenario.airframe.envelope.airspeed_mps, N_POINTS)
+    signals = np.tile(y, (N_POINTS, 1))
+    signals[:, AIRSPEED], signals[:, QDYN] = speeds_mps, y[QDYN] * (speeds_mps / y[AIRSPEED]) ** 2
+    carriers = [(axis, int(s)) for axis, s in enumerate(layout["main"])]
+    if layout["stand_in"] >= 0:
+        carriers.append((PITCH, int(layout["stand_in"])))
+    set_up(
+        rejection,
+        dt_s=dt,
+        substeps=scenario.substeps,
+        approach=belief["actuators"]["approach"],
+        speed_rad_s=config.noise_share * _shares(belief["design"], y, carriers) * _rate_limits(scenario),
+        gyros=[_gyro(getattr(scenario.sensors, axis), dt) for axis in GYROS],
+        margin=(config.gain_margin_db, config.phase_margin_deg),
+        qdyn=signals[:, QDYN],
+        G=np.stack([effectiveness(belief["design"], each) for each in signals]),
+        carriers=carriers,
+    )
+
+
+def _shares(design: np.void, y: np.ndarray, carriers: list[tuple[int, int]]) -> np.ndarray:
+    """What part of the noise that is allowed each surface (n,) may have: the root of how much of its own
+    damping the axis has, beside the most damped one."""
+    a = np.abs(own_damping(design, y))
+    shares = np.ones(design["G0"].shape[1])
+    for axis, s in carriers:
+        shares[s] = sqrt(a[axis] / a.max())
+    return shares
+
+
+def _rate_limits(scenario: Scenario) -> np.ndarray:
+    """Declared rate limits (n,) rad/s, the aircraft's default where none is."""
+    surfaces = scenario.airframe.surfaces
+    limits_deg_s = [getattr(scenario.actuators, surface).rate_limit_deg_s for surface in surfaces]
+    return np.array([radians(limit) or DEFAULT_RATE_RAD_S for limit in limits_deg_s])
+
+
+def _gyro(sensor: RateGyro, dt: float) -> Gyro:
+    noise, _, quantum = sensor.noise_bias_quantum
+    lag = sensor.bandwidth_rad_s
+    return Gyro(hypot(noise, quantum / sqrt(12.0)), sensor.delay_s, exp(-lag * dt) if lag else 0.0)

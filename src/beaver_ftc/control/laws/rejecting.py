@@ -10,15 +10,78 @@ acts, one JSBSim frame from now, and xm is taken there too.
 
 Discrete: z and d are corrected by `pull` = 1 - e^{-2 w dt} and `learn` = (1 - e^{-w dt})^2 / dt of what the
 observer missed. gains.py derives w, Kp and the lead.
+
+How much of a surface is left, the observer sees as well. An acceleration a that the law does not reckon with
+shows in what it misses, through its own error dynamics
+
+    e' = a - dd,   missed = e before correction,   e <- (1 - pull) missed,   dd <- dd + learn missed
+
+which take out what changes slowly: gusts, wrong coefficients. A surface with effectiveness 1 + theta gives
+theta G u more than a healthy one: theta is the least-squares fit of that, so filtered, to what was missed
+[Ljung1999, ch. 13: a prediction error in a closed loop]. The last MEMORY_S count.
+
+An equation error in a closed loop takes a surface for weaker than it is, since the command answers the gust
+it is hidden in. This one errs the other way, with what the gyro's noise commands. The larger of both is
+believed: a loop is then no faster than its margins allow.
 """
 
-from beaver_ftc.compiled import kernel
-from beaver_ftc.control.laws import left
-from beaver_ftc.control.laws.state import PITCH, STAND_IN
-from beaver_ftc.control.reference_model import advance
-from beaver_ftc.design.model import QDYN
+from functools import lru_cache
+from math import exp
 
+import numpy as np
+
+from beaver_ftc.compiled import kernel
+from beaver_ftc.control.reference import advance
+from beaver_ftc.design.model import QDYN
+from beaver_ftc.diagnosis.state import PITCH
+
+N_POINTS = 5  # of the schedule over dynamic pressure
+N_LOOPS, STAND_IN = 4, 3  # roll, pitch, yaw, and pitch by the surface that stands in
 PATIENCE_S, LONG_PATIENCE_S, RETRY_S = 0.5, 1.0, 20.0
+MEMORY_S = 5.0  # a slow reference's swing
+UNSURE = 0.2  # standard deviation of the diagnosis' estimate reckoned with: it settles the start
+NOTHING_LEFT = 0.05  # half of what the law divides by
+
+# The observer's answer to an acceleration, and the sums of the least squares.
+ANSWER = np.dtype([("rate", "f8", (3,)), ("disturbance", "f8", (3,))], align=True)
+FOUND = np.dtype(
+    [
+        ("fading", "f8"), ("product", "f8", (3,)), ("square", "f8", (3,)), ("missed", "f8", (3,)),
+        ("frames", "f8", (3,)), ("named", "i8", (3,)),
+    ],
+    align=True,
+)  # fmt: skip
+
+
+@lru_cache
+def rejection_dtype(surfaces: int) -> np.dtype:
+    """The law's record for an aircraft with so many surfaces.
+
+    qdyn (N_POINTS,) Pa: the schedule's points, ascending. Kp 1/s, pull 1, learn 1/s (N_LOOPS, N_POINTS):
+    feedback, and the observer's corrections of rate and disturbance for what it missed.
+    rate (3,) rad/s, disturbance (3,) rad/s2: its estimates. ahead (3,) rad/s: the rate when the command
+    acts. lost: share of pitch that the stand-in carries. lead (n,): command beyond the actuator's position
+    over what is wanted beyond it. at_stop_s, withdrawn (n,): see `withdraw`.
+    """
+    return np.dtype(
+        [
+            ("begun", "i8"), ("dt", "f8"), ("share", "f8"), ("lost", "f8"),
+            ("qdyn", "f8", (N_POINTS,)),
+            ("Kp_at", "f8", (N_LOOPS, N_POINTS)), ("pull_at", "f8", (N_LOOPS, N_POINTS)),
+            ("learn_at", "f8", (N_LOOPS, N_POINTS)),
+            ("Kp", "f8", (3,)), ("pull", "f8", (3,)), ("learn", "f8", (3,)),
+            ("rate", "f8", (3,)), ("disturbance", "f8", (3,)), ("ahead", "f8", (3,)),
+            ("lead", "f8", (surfaces,)),
+            ("at_stop_s", "f8", (surfaces,)), ("withdrawn", "i8", (surfaces,)),
+            ("healthy", ANSWER), ("believed", ANSWER), ("found", FOUND),
+        ],
+        align=True,
+    )  # fmt: skip
+
+
+def fading(dt_s: float) -> float:
+    """Share of the past that goes in a frame of dt_s seconds."""
+    return 1.0 - exp(-dt_s / MEMORY_S)
 
 
 @kernel
@@ -51,124 +114,169 @@ def between(table, i, j, part):
 
 
 @kernel
-def hand_over(control, remains):
-    """The share of pitch its stand-in carries, once handed over: what the main surface has lost."""
-    given = control.hand_over if remains > 0.0 else 1.0
-    lost = 1.0 - remains if remains >= control.least_effectiveness else 1.0
-    control.rejection.lost = given * given * (3.0 - 2.0 * given) * lost
+def hand_over(rejection, given, remains, least):
+    """The share of pitch its stand-in carries, once `given` is handed over: what the main surface has lost.
+
+    remains: its effectiveness; less than `least` is none.
+    """
+    given = given if remains > 0.0 else 1.0
+    lost = 1.0 - remains if remains >= least else 1.0
+    rejection.lost = given * given * (3.0 - 2.0 * given) * lost
 
 
 @kernel
-def is_replaced(control, s):
+def is_replaced(layout, s):
     """Whether another surface can take the place of surface s."""
-    return s == control.main[PITCH] or s == control.stand_in
+    return s == layout.main[PITCH] or s == layout.stand_in
 
 
 @kernel
-def hesitate(control, s):
+def believe_larger(rejection, surfaces, layout, s):
     """Take a loss of a surface that nothing replaces for no larger than the observer sees it."""
     for i in range(3):
-        if s == control.main[i] and control.target[s] < 1.0 and not is_replaced(control, s):
-            left.hesitate(control, s, i)
+        if s == layout.main[i] and surfaces.target[s] < 1.0 and not is_replaced(layout, s):
+            believe_larger_of(rejection.found, surfaces, s, i)
 
 
 @kernel
-def acts(control, s):
-    """Whether the law's observer sees surface s act."""
+def believe_larger_of(found, surfaces, s, i):
+    """Believe the larger of both estimates of surface s, main one of axis i; nothing of it is nothing."""
+    named = surfaces.target[s]
+    if not found.named[i]:  # it is not what it was: what was seen before counts no longer
+        found.named[i], found.product[i], found.square[i] = 1, 0.0, 0.0
+    larger = max(named, min(effectiveness_seen(found, i, named), 1.0))
+    least = surfaces.least_effectiveness
+    surfaces.target[s] = larger if larger < NOTHING_LEFT else max(larger, least)
+
+
+@kernel
+def effectiveness_seen(found, i, named):
+    """Effectiveness of the main surface of axis i; named: what the diagnosis takes it for."""
+    if found.frames[i] == 0.0:
+        return named
+    prior = found.missed[i] / found.frames[i] / (UNSURE * UNSURE)
+    weight = found.square[i] + prior
+    return 1.0 + (found.product[i] + prior * (named - 1.0)) / weight if weight > 0.0 else named
+
+
+@kernel
+def acts(found, main, s, least):
+    """Whether the law's observer sees surface s act, enough to be divided by; main (3,), least: of the
+    effectiveness."""
     for i in range(3):
-        if s == control.main[i] and left.acts(control, i):
+        if s == main[i] and found.product[i] > (least - 1.0) * found.square[i]:
             return True
     return False
 
 
 @kernel
-def abandon(control, s, suspected):
+def withdraw(rejection, surfaces, layout, s, saturated, suspected):
     """Give up surface s if it is suspected of a fault and has stood at its stop for a while.
 
     It does not give what it is told, and at its stop it is told nothing that would show why: jams, offsets
     and losses look alike. In trim it shows; where another takes its place, it is tried again after RETRY_S.
     """
-    rejection = control.rejection
-    rejection.at_stop_s[s] += control.dt
+    rejection.at_stop_s[s] += rejection.dt
     if not suspected:
-        rejection.abandoned[s], rejection.at_stop_s[s] = 0, 0.0
-    elif rejection.abandoned[s]:
-        if rejection.at_stop_s[s] > RETRY_S and is_replaced(control, s):
-            rejection.abandoned[s], rejection.at_stop_s[s] = 0, 0.0
-    elif not control.saturated[s]:
-        rejection.at_stop_s[s] = max(rejection.at_stop_s[s] - 1.5 * control.dt, 0.0)  # a dead one swings
-    elif rejection.at_stop_s[s] > (PATIENCE_S if is_replaced(control, s) else LONG_PATIENCE_S):
-        rejection.abandoned[s], rejection.at_stop_s[s] = 1, 0.0
-    if rejection.abandoned[s]:
-        control.target[s] = control.effectiveness[s] = 0.0
+        rejection.withdrawn[s], rejection.at_stop_s[s] = 0, 0.0
+    elif rejection.withdrawn[s]:
+        if rejection.at_stop_s[s] > RETRY_S and is_replaced(layout, s):
+            rejection.withdrawn[s], rejection.at_stop_s[s] = 0, 0.0
+    elif not saturated:
+        rejection.at_stop_s[s] = max(rejection.at_stop_s[s] - 1.5 * rejection.dt, 0.0)  # a dead one swings
+    elif rejection.at_stop_s[s] > (PATIENCE_S if is_replaced(layout, s) else LONG_PATIENCE_S):
+        rejection.withdrawn[s], rejection.at_stop_s[s] = 1, 0.0
+    if rejection.withdrawn[s]:
+        surfaces.target[s] = surfaces.effectiveness[s] = 0.0
 
 
 @kernel
-def explained(control, i, design, given, G):
+def explained(surfaces, i, design, given, G):
     """Acceleration of axis i that the law believes in, rad/s2: the design model's with the faults in it."""
     total = design[i]
     for s in range(G.shape[1]):
-        total += (control.effectiveness[s] - 1.0) * given[i, s] + G[i, s] * control.offset[s]
+        total += (surfaces.effectiveness[s] - 1.0) * given[i, s] + G[i, s] * surfaces.offset[s]
     return total
 
 
 @kernel
-def observe(control, x, design, given, G):
+def observe(rejection, surfaces, main, x, design, given, G):
     """Bring rate and disturbance to this frame: x (3,) rad/s; design (3,) rad/s2, given, G (3, n): f + G u
     of healthy surfaces, their moments and effectiveness, means over the frame that has elapsed."""
-    rejection = control.rejection
     if not rejection.begun:
         rejection.begun = 1
         rejection.rate[:] = x
         return
     for i in range(3):
-        expected = explained(control, i, design, given, G) + rejection.disturbance[i]
-        rejection.rate[i] += control.dt * expected
+        expected = explained(surfaces, i, design, given, G) + rejection.disturbance[i]
+        rejection.rate[i] += rejection.dt * expected
         missed = x[i] - rejection.rate[i]
-        left.learn(control, i, given, missed)
+        learn(rejection, i, surfaces.effectiveness[main[i]], given[i, main[i]], missed)
         rejection.rate[i] += rejection.pull[i] * missed
         rejection.disturbance[i] += rejection.learn[i] * missed
 
 
 @kernel
-def demand(control, belief, measured):
-    """Fill control.demand and control.hold (3,) rad/s2."""
-    rejection, means = control.rejection, belief.means
-    schedule(rejection, measured.y[QDYN])
-    observe(control, measured.x, means.acceleration, means.Gu, means.G)
-    for i in range(3):
-        look_ahead(control, i, belief.f, belief.G, belief.u)
-        target, after = targets(control, i, rejection.share)
-        feedback = rejection.Kp[i] * (target - rejection.ahead[i])
-        control.hold[i] = -belief.f[i] - rejection.disturbance[i]
-        control.demand[i] = (after - target) / control.dt + feedback + control.hold[i]
+def answer(memory, i, acceleration, pull, learn, dt):
+    """What the observer misses in a frame for an acceleration (rad/s2) of axis i; memory: dtype ANSWER."""
+    missed = memory.rate[i] + dt * (acceleration - memory.disturbance[i])
+    memory.rate[i] = (1.0 - pull) * missed
+    memory.disturbance[i] += learn * missed
+    return missed
 
 
 @kernel
-def look_ahead(control, i, f, G, u):
+def learn(rejection, i, effectiveness, given, missed):
+    """Take in what was missed of axis i, rad/s; effectiveness: believed of its main surface, given: moment
+    of a healthy one, rad/s2."""
+    found = rejection.found
+    pull, into, dt = rejection.pull[i], rejection.learn[i], rejection.dt
+    believed = (effectiveness - 1.0) * given
+    psi = answer(rejection.healthy, i, given, pull, into, dt)
+    missed += answer(rejection.believed, i, believed, pull, into, dt)
+    found.product[i] += psi * missed - found.fading * found.product[i]
+    found.square[i] += psi * psi - found.fading * found.square[i]
+    found.missed[i] += missed * missed - found.fading * found.missed[i]
+    found.frames[i] += 1.0 - found.fading * found.frames[i]
+
+
+@kernel
+def demand(rejection, axes, reference, surfaces, main, belief, measured):
+    """Fill axes.demand and axes.hold (3,) rad/s2; main (3,): the surface that leads each axis."""
+    means = belief.means
+    schedule(rejection, measured.y[QDYN])
+    observe(rejection, surfaces, main, measured.x, means.acceleration, means.Gu, means.G)
+    for i in range(3):
+        look_ahead(rejection, surfaces, i, belief.f, belief.G, belief.u)
+        target, after = targets(reference, i, rejection.share)
+        feedback = rejection.Kp[i] * (target - rejection.ahead[i])
+        axes.hold[i] = -belief.f[i] - rejection.disturbance[i]
+        axes.demand[i] = (after - target) / rejection.dt + feedback + axes.hold[i]
+
+
+@kernel
+def look_ahead(rejection, surfaces, i, f, G, u):
     """Rate of axis i when the command acts; f (3,), G (3, n), u (n,) rad: of this instant."""
-    rejection = control.rejection
     now = f[i] + rejection.disturbance[i]
     for s in range(u.size):
-        now += G[i, s] * (control.effectiveness[s] * u[s] + control.offset[s])
-    rejection.ahead[i] = rejection.rate[i] + rejection.share * control.dt * now
+        now += G[i, s] * (surfaces.effectiveness[s] * u[s] + surfaces.offset[s])
+    rejection.ahead[i] = rejection.rate[i] + rejection.share * rejection.dt * now
 
 
 @kernel
-def targets(control, i, share):
+def targets(reference, i, share):
     """The reference of axis i when the command acts, and a frame later, rad/s."""
-    rate = control.governed_rate[i]
-    wanted = control.reference_scale[i] * control.commanded_rate[i]
-    following, acceleration = advance(control, rate, control.governed_acceleration[i], wanted)
-    last, _ = advance(control, following, acceleration, wanted)
+    rate = reference.governed_rate[i]
+    wanted = reference.scale[i] * reference.commanded_rate[i]
+    following, acceleration = advance(reference, rate, reference.governed_acceleration[i], wanted)
+    last, _ = advance(reference, following, acceleration, wanted)
     return rate + share * (following - rate), following + share * (last - following)
 
 
 @kernel
-def hurry(control, u):
-    """Command beyond what is wanted, so that a lagging actuator at u (n,) rad is there sooner."""
-    lead = control.rejection.lead
+def lead_actuators(rejection, layout, command, u):
+    """Command (n,) rad beyond what is wanted, so that a lagging actuator at u (n,) rad is there sooner."""
+    lead = rejection.lead
     for s in range(u.size):
         if lead[s] > 1.0:
-            command = u[s] + lead[s] * (control.command[s] - u[s])
-            control.command[s] = min(max(command, control.low[s]), control.high[s])
+            command[s] = min(max(u[s] + lead[s] * (command[s] - u[s]), layout.low[s]), layout.high[s])

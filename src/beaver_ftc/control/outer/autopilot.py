@@ -15,7 +15,7 @@ the airspeed is kept. Where the ailerons no longer act, the roll is flown by sid
 import numpy as np
 
 from beaver_ftc.compiled import kernel
-from beaver_ftc.control.authority import attainable
+from beaver_ftc.control.allocation import attainable
 from beaver_ftc.control.outer.holding import protect
 from beaver_ftc.control.outer.profile import advance, turn
 from beaver_ftc.control.outer.state import ALTITUDE, BANK, HEADING, N_CHANNELS, SPEED
@@ -41,25 +41,30 @@ def clamp(value, most):
 
 
 @kernel
-def steer(autopilot, control, belief, measured, t):
-    """One frame, at t s: fill autopilot.rates (3,) rad/s; move the engine where an airspeed is commanded."""
+def steer(autopilot, layout, surfaces, allocation, hold, power, u, measured, unexplained, t):
+    """One frame, at t s: fill autopilot.rates (3,) rad/s; move the engine where an airspeed is commanded.
+
+    hold (3,) rad/s2: what only holds the rates. u, unexplained: see `holding.protect`.
+    """
     y, attitude = measured.y, measured.attitude
     if not autopilot.flying:
-        take_over(autopilot, control, y, attitude)
+        take_over(autopilot, y, attitude)
     advance(autopilot, (measured.altitude, y[AIRSPEED], attitude[YAW], attitude[ROLL]), t)
-    follow(autopilot, control, y)
-    limit(autopilot, control)
-    protect(autopilot, control, belief, y, t)
-    push = thrust_per_inhg(autopilot, control, y)
-    autopilot.full_inhg = full_power(autopilot, control, y)
+    follow(autopilot, layout.main, surfaces, allocation.saturated, y)
+    limit(autopilot, layout, allocation.G, hold)
+    protect(autopilot, layout, surfaces, u, unexplained, y, t)
+    push = thrust_per_inhg(autopilot, power, y)
+    rudder = layout.main[YAW]
+    left, at_stop = surfaces.effectiveness[rudder], allocation.saturated[rudder]
+    autopilot.full_inhg = full_power(autopilot, power, left, at_stop, y)
     path = path_of(autopilot, measured, push)
     to_body(autopilot, y, attitude, rolling(autopilot, attitude), pitching(autopilot, y, attitude, path))
     if autopilot.commanded[SPEED]:
-        throttle(autopilot, control, y, path, push)
+        throttle(autopilot, power, y, path, push)
 
 
 @kernel
-def take_over(autopilot, control, y, attitude):
+def take_over(autopilot, y, attitude):
     """In trim: smoothed signals and the engine as they are."""
     autopilot.flying = 1
     autopilot.alpha, autopilot.airspeed = y[ALPHA], y[AIRSPEED]
@@ -68,25 +73,26 @@ def take_over(autopilot, control, y, attitude):
 
 
 @kernel
-def follow(autopilot, control, y):
+def follow(autopilot, main, surfaces, saturated, y):
     """Smooth what is noisy, and note whether the ailerons or the rudder are gone; ailerons at their stop give
-    no more roll, whatever is believed of them."""
-    dt = autopilot.dt
+    no more roll, whatever is believed of them. main (3,): who leads each axis."""
+    dt, least = autopilot.dt, surfaces.least_effectiveness
     autopilot.alpha += dt / autopilot.gain.alpha_s * (y[ALPHA] - autopilot.alpha)
     autopilot.airspeed += dt / autopilot.gain.airspeed_s * (y[AIRSPEED] - autopilot.airspeed)
-    a = control.main[ROLL]
-    gone = control.effectiveness[a] < control.least_effectiveness or control.saturated[a] == 1
+    a = main[ROLL]
+    gone = surfaces.effectiveness[a] < least or saturated[a] == 1
     autopilot.jammed += dt / autopilot.gain.jammed_s * (gone - autopilot.jammed)
-    free = control.effectiveness[control.main[YAW]] < control.least_effectiveness
+    free = surfaces.effectiveness[main[YAW]] < least
     autopilot.loose += dt / autopilot.gain.jammed_s * (free - autopilot.loose)
 
 
 @kernel
-def limit(autopilot, control):
-    """Rates and bank that the surfaces left can give: their spare acceleration for a while."""
+def limit(autopilot, layout, G, hold):
+    """Rates and bank that the surfaces left can give: their spare acceleration for a while. G (3, n): with
+    what is believed of each; hold (3,) rad/s2."""
     for i in range(3):
-        least, greatest = attainable(control.G, control.low, control.high, i)
-        spare = max(min(greatest - control.hold[i], control.hold[i] - least), 0.0)
+        least, greatest = attainable(G, layout, i)
+        spare = max(min(greatest - hold[i], hold[i] - least), 0.0)
         autopilot.limit[i] = min(autopilot.most[i], spare * autopilot.gain.authority_s)
     by_sideslip = autopilot.jammed * autopilot.dihedral * autopilot.airspeed * MOST_SIDESLIP_RAD
     autopilot.limit[ROLL] = max(autopilot.limit[ROLL], by_sideslip)
@@ -95,23 +101,23 @@ def limit(autopilot, control):
 
 
 @kernel
-def thrust_per_inhg(autopilot, control, y):
+def thrust_per_inhg(autopilot, power, y):
     """Acceleration along the path per inHg of manifold pressure, m/s2."""
-    dpt_per_inhg = control.power.dpt_factor / (2.0 * y[QDYN] * autopilot.airspeed)
+    dpt_per_inhg = power.dpt_factor / (2.0 * y[QDYN] * autopilot.airspeed)
     slope = autopilot.thrust[0] + 2.0 * autopilot.thrust[1] * autopilot.alpha * y[DPT]
     return max(y[QDYN] * slope * dpt_per_inhg, LEAST_PUSH)
 
 
 @kernel
-def full_power(autopilot, control, y):
+def full_power(autopilot, power, left, at_stop, y):
     """The highest manifold pressure (inHg) with what is left of the rudder: the propeller yaws with dpt^3.
 
     What the rudder lacks, sideslip makes up for. The slower, the less: a climb beyond it ends in slow flight.
     A rudder at its stop holds no more, whatever is believed of it: power then goes back until it comes off.
+    left: effectiveness of the rudder.
     """
-    r, power = control.main[YAW], control.power
-    left, high = control.effectiveness[r], autopilot.high_inhg
-    if control.saturated[r]:
+    high = autopilot.high_inhg
+    if at_stop:
         lowest = ceiling(power, y, autopilot.weathercock ** (1.0 / 3.0))
         cut = min(autopilot.allowed_inhg, power.command[0]) - CUT_INHG_S * autopilot.dt
         autopilot.allowed_inhg = min(max(cut, lowest), high)
@@ -209,10 +215,9 @@ def to_body(autopilot, y, attitude, rolling, pitching):
 
 
 @kernel
-def throttle(autopilot, control, y, path, push):
+def throttle(autopilot, power, y, path, push):
     """Move the manifold pressure; while power stands in for a lost pitch, give its law our airspeed and what
     the path takes: it has an airspeed loop of its own."""
-    power = control.power
     power.in_use = 1
     error = autopilot.held - autopilot.airspeed
     autopilot.usual += autopilot.dt / USUAL_S * (autopilot.airspeed - autopilot.usual)

@@ -12,7 +12,6 @@ with, makes up for the rest are those that can be held; the commanded airspeed i
 import numpy as np
 
 from beaver_ftc.compiled import kernel
-from beaver_ftc.control.laws.state import REJECTING
 from beaver_ftc.control.outer.state import BANK_LIMIT, FASTEST, N_FLAP, N_QDYN, SLOWEST, SPEED
 from beaver_ftc.design.model import AIRSPEED, QDYN
 from beaver_ftc.diagnosis.state import PITCH, ROLL, YAW
@@ -23,43 +22,48 @@ NOTED_MPS, NOTED_RAD = 0.5, 0.02  # a limit that bites by so much is announced
 
 
 @kernel
-def protect(autopilot, control, belief, y, t):
-    """Bring autopilot.held, the airspeed to fly, to this frame: the commanded one where it can be held."""
-    hold, e, f = autopilot.holding, control.main[PITCH], control.stand_in
+def protect(autopilot, layout, surfaces, u, unexplained, y, t):
+    """Bring autopilot.held, the airspeed to fly, to this frame: the commanded one where it can be held.
+
+    u (n,) rad: where the surfaces are. unexplained rad: the elevator that would give what the law's observer
+    finds in pitch.
+    """
+    hold, e, f = autopilot.holding, layout.main[PITCH], layout.stand_in
     hold.fastest, hold.slowest = np.inf, 0.0
-    whole = control.effectiveness[e] >= 1.0 and (f < 0 or control.effectiveness[f] >= 1.0)
+    left = surfaces.effectiveness[e]
+    whole = left >= 1.0 and (f < 0 or surfaces.effectiveness[f] >= 1.0)
     if whole or not hold.known:
         hold.frames = 0
     else:
-        watch(autopilot, control, belief, e)
+        watch(hold, autopilot.dt, surfaces.offset[e], left * u[e], unexplained)
         if hold.frames * autopilot.dt > SETTLED_S:
-            find(autopilot, control, belief, y, e, f)
+            find(hold, layout, surfaces, y)
     approach(autopilot)
-    announce(autopilot, control, t)
+    announce(autopilot, layout.main, surfaces.effectiveness, t)
 
 
 @kernel
-def watch(autopilot, control, belief, e):
-    """Average the elevator that would account for the pitch moments there are, rad."""
-    hold, left = autopilot.holding, control.effectiveness[e]
-    acting = control.offset[e] + left * belief.u[e]
-    if control.inner == REJECTING:
-        acting += control.rejection.disturbance[PITCH] / belief.G[PITCH, e]
+def watch(hold, dt, offset, commanded, unexplained):
+    """Average the elevator that would account for the pitch moments there are, rad: it is off by `offset`,
+    what is left of it gives `commanded`."""
+    acting = offset + commanded
+    acting += unexplained
     hold.frames += 1
-    weight = max(autopilot.dt / ACTING_S, 1.0 / hold.frames)
+    weight = max(dt / ACTING_S, 1.0 / hold.frames)
     hold.acting += weight * (acting - hold.acting)
-    hold.centre += weight * (left * belief.u[e] - hold.centre)
+    hold.centre += weight * (commanded - hold.centre)
 
 
 @kernel
-def find(autopilot, control, belief, y, e, f):
+def find(hold, layout, surfaces, y):
     """The fastest and the slowest airspeed that can be held, m/s."""
-    hold, left = autopilot.holding, control.effectiveness[e]
-    least = hold.acting - hold.centre + left * control.low[e]
-    greatest = hold.acting - hold.centre + left * control.high[e]
-    up, down = control.low[f] + hold.reserve, control.high[f] - hold.reserve
-    if control.effectiveness[f] < control.least_effectiveness:
-        up = down = min(max(control.offset[f], control.low[f]), control.high[f])
+    e, f = layout.main[PITCH], layout.stand_in
+    left = surfaces.effectiveness[e]
+    least = hold.acting - hold.centre + left * layout.low[e]
+    greatest = hold.acting - hold.centre + left * layout.high[e]
+    up, down = layout.low[f] + hold.reserve, layout.high[f] - hold.reserve
+    if surfaces.effectiveness[f] < surfaces.least_effectiveness:
+        up = down = min(max(surfaces.offset[f], layout.low[f]), layout.high[f])
     per_pa = 2.0 * y[QDYN] / y[AIRSPEED] ** 2
     hold.fastest = np.sqrt(2.0 * limit_of(hold, up, greatest, True) / per_pa)
     hold.slowest = np.sqrt(2.0 * limit_of(hold, down, least, False) / per_pa)
@@ -107,14 +111,13 @@ def approach(autopilot):
 
 
 @kernel
-def announce(autopilot, control, t):
-    """Note since when a limit has bitten, and what it is at last."""
+def announce(autopilot, main, effectiveness, t):
+    """Note since when a limit has bitten, and what it is at last; main (3,): who leads each axis."""
     hold, command = autopilot.holding, autopilot.command[SPEED]
     if autopilot.commanded[SPEED]:
         note(hold, FASTEST, hold.fastest, hold.fastest < command - NOTED_MPS, t)
         note(hold, SLOWEST, hold.slowest, hold.slowest > command + NOTED_MPS, t)
-    roll, yaw = control.main[ROLL], control.main[YAW]
-    if control.effectiveness[roll] < 1.0 or control.effectiveness[yaw] < 1.0:
+    if effectiveness[main[ROLL]] < 1.0 or effectiveness[main[YAW]] < 1.0:
         hold.bank += autopilot.dt / ACTING_S * (autopilot.bank_limit - hold.bank)
         note(hold, BANK_LIMIT, hold.bank, hold.bank < autopilot.most_bank - NOTED_RAD, t)
 

@@ -53,8 +53,8 @@ def set_up_autopilot(autopilot: np.void, control: np.void, scenario: Scenario) -
     for ours, theirs in (("trim_inhg", "trim"), ("low_inhg", "low"), ("high_inhg", "high")):
         autopilot[ours] = control["power"][theirs]
     autopilot["step_inhg"], autopilot["allowed_inhg"] = control["power"]["step"], control["power"]["high"]
-    control["steered"] = 1
-    _know_what_holds(autopilot["holding"], control, scenario)
+    control["reference"]["steered"] = 1
+    _know_what_holds(autopilot["holding"], control["layout"], scenario)
 
 
 def set_up_profile(autopilot: np.void, scenario: Scenario) -> None:
@@ -79,19 +79,19 @@ def _know(autopilot: np.void, scenario: Scenario) -> None:
     autopilot["slowest_mps"] = aircraft.envelope.airspeed_mps[0] + SPARE_MPS
 
 
-def _know_what_holds(holding: np.void, control: np.void, scenario: Scenario) -> None:
+def _know_what_holds(holding: np.void, layout: np.void, scenario: Scenario) -> None:
     """The table of level flight, where the aircraft's file has forces and a flap for the elevator."""
-    aircraft, flap = scenario.airframe, int(control["stand_in"])
+    aircraft, flap = scenario.airframe, int(layout["stand_in"])
     holding["from_s"], holding["bank"] = -1.0, radians(MOST_BANK_DEG)
     holding["fastest"] = inf
     if flap < 0 or not aircraft.forces or THRUST not in aircraft.signals:
         return
     speeds_mps = np.linspace(*aircraft.envelope.airspeed_mps, N_QDYN)
     holding["qdyn"] = 0.5 * SEA_LEVEL_DENSITY_KG_M3 * speeds_mps**2
-    holding["flap"] = np.linspace(control["low"][flap], control["high"][flap], N_FLAP)
+    holding["flap"] = np.linspace(layout["low"][flap], layout["high"][flap], N_FLAP)
     needed = elevator_needed(
         aircraft,
-        (aircraft.surfaces[control["main"][PITCH]], aircraft.surfaces[flap]),
+        (aircraft.surfaces[layout["main"][PITCH]], aircraft.surfaces[flap]),
         aircraft.mass.mass_kg * scenario.design_model.mass,
         tuple(scenario.design_model.coefficients.items()),
         tuple(holding["qdyn"]),

@@ -4,67 +4,65 @@ The surfaces that lead roll, pitch and yaw move; the others stay in trim.
 """
 
 from beaver_ftc.compiled import kernel
-from beaver_ftc.control.laws.state import LQR
-from beaver_ftc.control.rivals.state import DELAY_FRAMES
+from beaver_ftc.control.allocation import clip
+from beaver_ftc.control.laws import LQR
+from beaver_ftc.control.rivals.tracking import DELAY_FRAMES
 
 
 @kernel
-def command(control, G, x):
-    """Fill control.command (n,) rad by the rival in control.inner; G (3, n) rad/s2 per rad, x (3,) rad/s."""
-    rival = control.rival
-    control.command[:] = control.trim
-    if control.inner == LQR:
-        regulate(control, x)
+def command(inner, rival, reference, axes, allocation, layout, G, x):
+    """Fill the command (n,) rad by the rival `inner`; G (3, n) rad/s2 per rad, x (3,) rad/s."""
+    main, out = layout.main, allocation.command
+    out[:] = layout.trim
+    if inner == LQR:
+        regulate(rival, reference, main, x, out)
     else:
-        increment(control, G, x)
+        increment(rival, reference, axes.demand, main, G, x, out)
     rival.saturated = 0
-    for s in range(control.command.size):
-        limited = min(max(control.command[s], control.low[s]), control.high[s])
-        control.saturated[s] = limited != control.command[s]
-        rival.saturated += control.saturated[s]
-        control.command[s] = limited
-    if control.inner != LQR:
-        remember(rival, control.command, control.main, x)
+    for s in range(out.size):
+        out[s] = clip(allocation, layout, s, out[s])
+        rival.saturated += allocation.saturated[s]
+    if inner != LQR:
+        remember(rival, out, main, x)
 
 
 @kernel
-def missed(control, i, x):
+def missed(rival, reference, i, x):
     """Error of axis i, rad/s; its integral stands still while a surface is at its stop."""
-    error = control.model_rate[i] - x[i]
-    if not control.rival.saturated:
-        control.rival.integral[i] += control.dt * error
+    error = reference.model_rate[i] - x[i]
+    if not rival.saturated:
+        rival.integral[i] += reference.dt * error
     return error
 
 
 @kernel
-def regulate(control, x):
-    """Trim, what the linear model asks for to follow the reference, and K times what is missing."""
-    rival = control.rival
+def regulate(rival, reference, main, x, out):
+    """Add to out, in trim, what the linear model asks for to follow the reference, and K times what is
+    missing."""
     for i in range(3):
-        error = missed(control, i, x)
-        needed = control.model_acceleration[i]
+        error = missed(rival, reference, i, x)
+        needed = reference.model_acceleration[i]
         for j in range(3):
-            needed -= rival.A[i, j] * (control.model_rate[j] - rival.trim_x[j])
+            needed -= rival.A[i, j] * (reference.model_rate[j] - rival.trim_x[j])
         for s in range(3):
             back = rival.K[s, i] * error + rival.K[s, 3 + i] * rival.integral[i]
-            control.command[control.main[s]] += rival.B_inverse[s, i] * needed + back
+            out[main[s]] += rival.B_inverse[s, i] * needed + back
 
 
 @kernel
-def increment(control, G, x):
-    """u0 + G^-1 (nu - xdot0)."""
-    rival = control.rival
+def increment(rival, reference, demand, main, G, x, out):
+    """u0 + G^-1 (nu - xdot0), into out; nu - xdot0 into demand (3,) rad/s2."""
     if not rival.begun:
         rival.begun, rival.x_before[:] = 1, x
     for i in range(3):
-        error = missed(control, i, x)
-        xdot0 = smooth(rival.rate_filter, i, (x[i] - rival.x_before[i]) / control.dt, rival.keep)
-        nu = control.model_acceleration[i] + rival.Kp * error + rival.Ki * rival.integral[i]
-        control.demand[i] = nu - xdot0
-    solve(G, control.main, control.demand, control.command)
+        error = missed(rival, reference, i, x)
+        xdot0 = smooth(rival.rate_filter, i, (x[i] - rival.x_before[i]) / reference.dt, rival.keep)
+        nu = reference.model_acceleration[i] + rival.Kp * error + rival.Ki * rival.integral[i]
+        demand[i] = nu - xdot0
+    solve(G, main, demand, out)
     for i in range(3):
         u0 = smooth(rival.command_filter, i, rival.given[0, i], rival.keep)
-        control.command[control.main[i]] += u0
+        out[main[i]] += u0
 
 
 @kernel

@@ -14,9 +14,8 @@ from typing import ClassVar
 import numpy as np
 
 from beaver_ftc.control.base import Reference
-from beaver_ftc.control.laws.state import INDI
-from beaver_ftc.control.rivals.state import DELAY_FRAMES
-from beaver_ftc.control.rivals.tracking import GAINS, Demand, limited, with_others
+from beaver_ftc.control.laws import INDI
+from beaver_ftc.control.rivals.tracking import DELAY_FRAMES, GAINS, Demand, limited, with_others
 from beaver_ftc.design.context import Context
 from beaver_ftc.diagnosis.base import Measured, Verdict
 from beaver_ftc.diagnosis.rivals.options import options_of

@@ -12,7 +12,7 @@ from typing import ClassVar
 import numpy as np
 
 from beaver_ftc.control.base import Reference
-from beaver_ftc.control.laws.state import LQR
+from beaver_ftc.control.laws import LQR
 from beaver_ftc.control.rivals.tracking import limited, with_others
 from beaver_ftc.design.context import Context
 from beaver_ftc.diagnosis.base import Measured, Verdict

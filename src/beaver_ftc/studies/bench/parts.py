@@ -69,9 +69,9 @@ PARTS = (
     Part("supervisor", "who is in charge", {"loop.frame.decide": nothing}),
     Part("writing", "the command, into the aircraft's properties", {"plant.native.write_nodes": nothing}),
     Part("law", "reference model, feedback linearisation, accommodation, allocation, anti-windup",
-         {"loop.frame.command": nothing, "control.reference_model.follow": nothing}),
+         {"loop.frame.command": nothing, "control.reference.follow": nothing}),
     Part("logging", "every column of the log, and the sums of the metrics",
-         {"loop.record.record": nothing, "loop.accounts.account": nothing}),
+         {"loop.frame.record": nothing, "loop.frame.account": nothing}),
 )  # fmt: skip
 
 

@@ -7,7 +7,7 @@ the modules of the loop have the sources.
 
 import numpy as np
 
-from beaver_ftc.control.reference_model import discretise
+from beaver_ftc.control.reference import discretise
 from beaver_ftc.design.coefficients import GEOMETRY, MASS, SURFACES, inertia_coefficients, value
 from beaver_ftc.diagnosis.state import ALPHA_CENTRES, BETA_CENTRES, N_BASIS
 from beaver_ftc.loop.assembly import EARTH_RATE_RAD_S

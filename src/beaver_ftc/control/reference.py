@@ -1,0 +1,96 @@
+"""The reference that a law follows: a model of the wanted response, bent to what the surfaces can give.
+
+    xm'' = wn^2 (ref - xm) - 2 zeta wn xm'
+
+Second order, so that xm' needs no differentiation; discretised exactly for a reference held over the frame.
+
+Once authority is lost, two things happen to it. It is hedged [Johnson2000]: what was demanded and could not
+be given is taken off the model's acceleration, so that model and integrator wait for the aircraft instead of
+winding up. And it is scaled: following only the half of a swing that is within reach would ratchet the
+attitude, so what is missed on one side is asked for on neither.
+"""
+
+import numpy as np
+
+from beaver_ftc.compiled import kernel
+from beaver_ftc.scenario.control import ControlConfig
+
+MISSED_RAD_S = 0.1  # a rate missed in all by this much: the reference is given up
+RECOVERY_S = 30.0  # and asked for again within this time: several periods of a slow reference
+
+# The model A, B over dt s; its answer to what is commanded, and the one that is governed: rad/s, rad/s2.
+# hedging: from when on it is; steered: by outer loops.
+REFERENCE = np.dtype(
+    [
+        ("dt", "f8"), ("A", "f8", (2, 2)), ("B", "f8", (2,)), ("steered", "i8"),
+        ("commanded_rate", "f8", (3,)), ("model_rate", "f8", (3,)), ("model_acceleration", "f8", (3,)),
+        ("governed_rate", "f8", (3,)), ("governed_acceleration", "f8", (3,)),
+        ("hedging", "i8"), ("scale", "f8", (3,)),
+    ],
+    align=True,
+)  # fmt: skip
+
+
+def configure(reference: np.void, config: ControlConfig, dt_s: float) -> None:
+    """Fill the record (dtype REFERENCE) for frames of dt_s seconds."""
+    reference["dt"], reference["scale"] = dt_s, 1.0
+    reference["A"], reference["B"] = discretise(
+        config.reference_natural_frequency_rad_s, config.reference_damping, dt_s
+    )
+
+
+def discretise(wn: float, zeta: float, dt: float) -> tuple[np.ndarray, np.ndarray]:
+    """State transition A (2, 2) and input B (2,) of (xm, xm') over dt (s) under a held reference; wn in
+    rad/s.
+
+    Cayley-Hamilton for a 2 x 2 matrix: exp(F dt) = e^{-s dt} (c I + d (F + s I)) with s = zeta wn, and c, d
+    the (hyperbolic) cosine and sine of m dt, m^2 = s^2 - wn^2. The input follows from the equilibrium (ref,
+    0).
+    """
+    s = zeta * wn
+    m = np.sqrt(complex(s * s - wn * wn))
+    c = np.cosh(m * dt).real
+    d = (np.sinh(m * dt) / m).real if abs(m) * dt > 1e-8 else dt
+    A = np.exp(-s * dt) * np.array([[c + s * d, d], [-wn * wn * d, c - s * d]])
+    return A, np.array([1.0 - A[0, 0], -A[1, 0]])
+
+
+@kernel
+def advance(reference, rate, acceleration, wanted):
+    """Rate (rad/s) and acceleration (rad/s2) of the model a frame on, `wanted` (rad/s) held."""
+    A, B = reference.A, reference.B
+    return (
+        A[0, 0] * rate + A[0, 1] * acceleration + B[0] * wanted,
+        A[1, 0] * rate + A[1, 1] * acceleration + B[1] * wanted,
+    )
+
+
+@kernel
+def follow(reference, commanded):
+    """Advance the model by one frame towards `commanded` (3,) rad/s."""
+    reference.commanded_rate[:] = commanded
+    for i in range(3):
+        rate, acceleration = reference.model_rate[i], reference.model_acceleration[i]
+        rate, acceleration = advance(reference, rate, acceleration, commanded[i])
+        reference.model_rate[i], reference.model_acceleration[i] = rate, acceleration
+
+
+@kernel
+def govern(reference, commanded, shortfall):
+    """Bring what the law follows to the next frame.
+
+    commanded (3,) rad/s; shortfall (3,) rad/s2: what was demanded and not given.
+    """
+    if not reference.hedging:
+        reference.governed_rate[:] = reference.model_rate
+        reference.governed_acceleration[:] = reference.model_acceleration
+        return
+    dt = reference.dt
+    for i in range(3):
+        scale = reference.scale[i] - dt * abs(shortfall[i]) / MISSED_RAD_S
+        if not reference.steered:  # outer loops ask again for what was missed
+            reference.scale[i] = max(scale + dt / RECOVERY_S * (1.0 - scale), 0.0)
+        rate, acceleration = reference.governed_rate[i], reference.governed_acceleration[i]
+        rate, acceleration = advance(reference, rate, acceleration, reference.scale[i] * commanded[i])
+        reference.governed_rate[i] = rate - dt * shortfall[i]
+        reference.governed_acceleration[i] = acceleration

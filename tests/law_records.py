@@ -1,0 +1,25 @@
+"""The records of a law, filled by the names of their fields, for tests of single kernels."""
+
+import numpy as np
+
+from beaver_ftc.control.state import control_dtype
+
+
+def new_control(**fields):
+    """All records of a law for four surfaces, in one, zero but for these fields."""
+    return put(np.zeros(1, control_dtype(4)).view(np.recarray)[0], **fields)
+
+
+def put(control, **fields):
+    """Put each value where a field of that name is, but for what observer, rivals and engine keep."""
+    for name, value in fields.items():
+        if name in control.dtype.names:
+            control[name] = value
+            continue
+        own = (part for part in control.dtype.names if part not in ("rival", "rejection", "power"))
+        parts = [part for part in own if name in (control[part].dtype.names or ())]
+        assert len(parts) == 1, (name, parts)
+        control[parts[0]][name] = value
+        if name == "dt":
+            control["rejection"]["dt"] = value
+    return control

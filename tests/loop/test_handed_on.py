@@ -13,10 +13,12 @@ GRADE = {"sensors": {"q": {"bias_deg_s": 0.2, "delay_s": 0.1, "bandwidth_rad_s":
 # Beside the change itself: the engine's instruments, chance, and a fault that somebody has found by then.
 GIVEN = {"duration_s": 4.0, "faults": [loss(at_s=0.5, magnitude=0.6)], "seed": 5, "fdi": {"statistical": {}}}
 REFERENCE_AND_COMMAND = {
-    "commanded_rate", "model_rate", "model_acceleration", "governed_rate", "governed_acceleration", "command",
-    "saturated", "effectiveness", "offset", "lag", "hand_over", "probe", "probed", "probe_from_s",
-    "probe_to_s",
-}  # fmt: skip
+    *(f"reference.{name}" for name in ("commanded_rate", "model_rate", "model_acceleration")),
+    *(f"reference.{name}" for name in ("governed_rate", "governed_acceleration")),
+    *(f"surfaces.{name}" for name in ("effectiveness", "offset", "lag")),
+    *(f"allocation.{name}" for name in ("command", "saturated", "hand_over")),
+    *(f"probe.{name}" for name in ("deflection", "probed", "from_s", "to_s")),
+}
 ENGINE = {
     "lost", "engaged", "in_use", "moved", "speed", "usual_speed", "attitude", "command", "from_s", "frames",
     "least", "greatest",
@@ -41,12 +43,12 @@ BEGINS = {
     "sensors": ("instruments",),
 }
 # What the change itself works out, tested below or elsewhere.
-OF_A_LAW = {"control.hands_back", "control.integral", "control.rejection.disturbance"}
+OF_A_LAW = {"control.allocation.hands_back", "control.feedback.integral", "control.rejection.disturbance"}
 OWN = {
     "law": OF_A_LAW,
     "observer": OF_A_LAW,
-    "scheme": {"control.hands_back", "since"},
-    "sensors": {"control.hands_back", "instruments.taken"},
+    "scheme": {"control.allocation.hands_back", "since"},
+    "sensors": {"control.allocation.hands_back", "instruments.taken"},
 }
 
 
@@ -111,7 +113,7 @@ def test_every_field_begins_anew_or_goes_on(kind, change):
         begins = name.partition(".")[0] in parts and name not in goes_on
         expected = always[name] if begins else before[name]
         assert value.tobytes() == expected.tobytes(), f"{name} should {'begin anew' if begins else 'go on'}"
-    assert after["control.hands_back"] == 1
+    assert after["control.allocation.hands_back"] == 1
 
 
 def test_the_frame_of_a_diagnosis_begun_anew_and_the_first_sample_of_instruments_are_noted():

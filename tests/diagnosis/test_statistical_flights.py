@@ -247,3 +247,31 @@ def test_a_slow_slipping_aircraft_with_the_declared_sensors_raises_no_alarm(grad
     )  # fmt: skip
     assert log["airspeed_mps"].min() < 24.0
     assert flight.detection_time_s is None
+
+
+_HIDING = {
+    "sensors": {},
+    "constant_rad_s2": {"p": 0.0, "q": 0.0073, "r": 0.0},
+}  # and gusts
+
+
+@pytest.mark.parametrize("authority", ["either", "statistical"])
+@pytest.mark.parametrize("severity", ["light", "moderate"])
+@pytest.mark.parametrize("sensor", ["alpha", "beta"])
+def test_an_error_of_a_vane_that_a_gust_may_hide_is_no_surfaces(sensor, severity, authority):
+    watched = _fdi(authority, {**_HIDING, "turbulence": severity}, sensor_monitor="always")
+    for size_deg in (0.5, 0.8, 1.2, 1.7, 2.5, -0.5, -0.8, -1.2, -1.7, -2.5):
+        broken = {"sensor": sensor, "type": "bias", "magnitude": size_deg, "at_s": 1, "end_s": 2.2}
+        flight, _ = flown(duration_s=4, uncertainty={}, faults=[broken], fdi=watched)
+        assert flight.isolated in (None, "unanticipated", f"sensor {sensor}"), size_deg
+
+
+@pytest.mark.parametrize("surface", ["elevator", "aileron", "rudder"])
+def test_a_surface_that_shows_by_itself_is_named_where_a_vane_may_be_broken(surface):
+    flight, _ = flown(
+        duration_s=5, uncertainty={}, faults=[loss(surface, 0.9, 2)], reference=AT_WORK,
+        environment={"turbulence": "dryden", "severity": "light"},
+        fdi=_fdi("either", {**_HIDING, "turbulence": "light"}, sensor_monitor="always"),
+    )  # fmt: skip
+    assert flight.isolated == surface
+    assert flight.isolation_time_s < 2.5

@@ -116,23 +116,39 @@ def rules_out(fdi, fie, within):
         )
     if fdi.config.authority != STATISTICS and not within:
         return True
+    return (
+        fdi.statistical.tests.enabled and fdi.statistical.alarm.detected_at_s >= 0.0 and is_unlikely(fdi, fie)
+    )
+
+
+@kernel
+def is_unlikely(fdi, fie):
+    """Whether chance excludes a loss of the class. A loss that shows by itself it never does.
+
+    A fault that only the end of a loss that nobody saw would explain is `doubted`. So are all, where a gust
+    may hide a vane's error from the watch: what that excludes leaves a surface by accident.
+    """
     tests, blocks, others, loss_of, s = (
         fdi.statistical.tests, fdi.statistical.block, fdi.isolation.estimator, fdi.layout.loss_of, fie.surface
     )  # fmt: skip
-    if not tests.enabled or fie.shown or fdi.statistical.alarm.detected_at_s < 0.0:
-        return False
-    fie.shown = not fdi.config.abrupt and shows(tests, blocks, others, loss_of, s)  # later may be its end
+    if not fie.shown and (fie.doubted or not fdi.config.abrupt):
+        fie.shown = shows(tests, blocks, others, loss_of, s)  # later may be its end
     if fie.shown or not excludes(tests, blocks, others, loss_of, s, False, fdi.config.abrupt):
         return False
-    fie.doubted = 1  # only the end of a loss that nobody saw would explain it
-    return excludes(tests, blocks, others, loss_of, s, True, fdi.config.abrupt)
+    fie.doubted = 1
+    if not excludes(tests, blocks, others, loss_of, s, True, fdi.config.abrupt):
+        return False
+    if fdi.watch.enabled and fdi.statistical.air.moving:
+        for i in range(fdi.isolation.n):
+            others[i].doubted = 1
+    return True
 
 
 @kernel
 def decide(fdi, t):
     """The generalised observer scheme: the one left is the fault; none left means it is outside the class.
 
-    One that is left for an end alone, of a loss that was never seen, is not named.
+    One that is doubted and does not show by itself is not named.
     """
     left, last = 0, NOT_ISOLATED
     for s in range(fdi.isolation.n):

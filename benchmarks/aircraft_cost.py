@@ -20,7 +20,7 @@ from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.model_file import with_systems
 from beaver_ftc.plant.state import FlightState
 from beaver_ftc.plant.trim import trim
-from beaver_ftc.studies.bench.stopwatch import Timing, interleave
+from beaver_ftc.studies.bench.contenders import Timing, interleave
 
 SURFACES = ("aileron", "elevator", "rudder", "flap")
 FRAMES = 500

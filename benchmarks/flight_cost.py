@@ -29,7 +29,7 @@ import numpy as np
 
 from aircraft_cost import Variant, jsbsim_alone, write_variant
 from beaver_ftc.plant.conditions import trim
-from beaver_ftc.studies.bench.flights import by_kind
+from beaver_ftc.studies.bench.measure import by_kind
 
 HERE = Path(__file__).resolve()
 ROOT = HERE.parents[1]

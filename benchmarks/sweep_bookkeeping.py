@@ -19,8 +19,8 @@ from pathlib import Path
 
 from beaver_ftc.scenario.sweep_loader import Sweep, load_sweep_text
 from beaver_ftc.studies.engine.workers import ThisProcess, Work
-from beaver_ftc.studies.sweep import run
-from beaver_ftc.studies.sweep.flying import Job, fly_one
+from beaver_ftc.studies.sweep import campaign
+from beaver_ftc.studies.sweep.one_flight import Job, fly_one
 from beaver_ftc.studies.sweep.sampling import Assignment, Plan
 
 SWEEP = """\
@@ -51,16 +51,18 @@ def sweep_of(runs: int) -> Sweep:
 def go_on(sweep: Sweep, out: Path, until: float) -> None:
     """Land rows until a share of them is there, then end this process as a kill would; or conclude."""
     template = fly_one(Job(sweep), Plan(sweep).assignments([0])[0])
-    run._workers = lambda *_: ThisProcess(Work(partial(made_up, template)))
+    campaign._workers = lambda *_: ThisProcess(Work(partial(made_up, template)))
     began = time.perf_counter()
 
-    def progress(tally: run.Tally) -> None:
+    def progress(tally: campaign.Tally) -> None:
         if tally.done >= until * sweep.flights:
             say(began)
             sys.stdout.flush()
             os._exit(9)
 
-    run.run_sweep(sweep, run.Options(out=out, resume=True), progress if until < 1 else lambda tally: None)
+    campaign.run_sweep(
+        sweep, campaign.Options(out=out, resume=True), progress if until < 1 else lambda tally: None
+    )
     say(began)
 
 

@@ -23,11 +23,10 @@ from pathlib import Path
 from beaver_ftc.scenario.sweep_loader import Sweep, load_sweep
 from beaver_ftc.studies.engine.store import Parts
 from beaver_ftc.studies.engine.workers import Row, Task, Work, Workers, one_thread_each
-from beaver_ftc.studies.sweep.flying import Job, fly_one, scenario_of
-from beaver_ftc.studies.sweep.run import Options, Tally, run_sweep
+from beaver_ftc.studies.sweep.campaign import Options, Tally, run_sweep
+from beaver_ftc.studies.sweep.one_flight import Job, fly_one, scenario_of
 from beaver_ftc.studies.sweep.sampling import Assignment, Plan
-from beaver_ftc.studies.sweep.source import batch_size
-from beaver_ftc.studies.sweep.store import RowsAsParquet
+from beaver_ftc.studies.sweep.store import RowsAsParquet, batch_size
 
 FLIGHTS_ALONE = 200
 LONG = 1_000_000  # flights of the sweep whose batches are weighed

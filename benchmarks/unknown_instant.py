@@ -6,7 +6,7 @@ delay at the same mean time between false alarms. It is told surface and magnitu
 `studies/engine/told.py`; instants are 0.05 s apart and at most 10 s back. Its level gives at most 20 false
 alarms per hour on healthy flights, as in `beaver-ftc power`.
 
-    python benchmarks/unknown_instant.py [BOUTS] [HEALTHY_FLIGHTS]
+    python benchmarks/unknown_instant.py [BLOCKS] [HEALTHY_FLIGHTS]
 """
 
 import sys
@@ -17,19 +17,20 @@ import numpy as np
 
 from beaver_ftc.studies.compare.replay import Recording, Trace, aware_of_the_air, record, trace
 from beaver_ftc.studies.engine.told import Whitening, chance
-from beaver_ftc.studies.power.contenders import STATISTICAL, contenders
-from beaver_ftc.studies.power.flying import with_fdi
-from beaver_ftc.studies.power.grid import (
+from beaver_ftc.studies.power.chances import level_for
+from beaver_ftc.studies.power.survey import (
+    STATISTICAL,
     WATCHED_S,
     WITHIN_S,
-    Bout,
+    Block,
     Condition,
+    contenders,
+    deflections,
     loss,
     scenario_of,
     strikes_at_s,
+    with_fdi,
 )
-from beaver_ftc.studies.power.levels import level_for
-from beaver_ftc.studies.power.limit import deflections
 
 LIGHT = Condition("tactical-grade", "light")
 SURFACES, MAGNITUDES, EXCITATIONS_DEG_S = {"aileron": 0, "rudder": 2}, (0.4, 1.0), (3.0, 6.0)
@@ -37,10 +38,10 @@ PER_H, EVERY, FURTHEST = 20.0, 5, 1000  # false alarms; frames between instants,
 SEED = 500_000  # others than those of `power`
 
 
-def flown(bout: Bout, duration_s: float, faults: list[dict]) -> Recording:
+def flown(block: Block, duration_s: float, faults: list[dict]) -> Recording:
     """A flight as shown to plug-ins, the vanes' view of the air included."""
     ours = next(one for one in contenders([]) if one.name == STATISTICAL)
-    return aware_of_the_air(record(with_fdi(scenario_of(bout, duration_s, faults), ours)))
+    return aware_of_the_air(record(with_fdi(scenario_of(block, duration_s, faults), ours)))
 
 
 def ratios(recording: Recording, surface: str) -> dict[float, np.ndarray]:
@@ -67,32 +68,32 @@ def healthy(flights: int) -> dict[tuple[str, float], list[Trace]]:
     """Traces without a fault, by surface and magnitude."""
     found: dict[tuple[str, float], list[Trace]] = {(s, m): [] for s in SURFACES for m in MAGNITUDES}
     for i in range(flights):
-        bout = Bout(LIGHT, EXCITATIONS_DEG_S[i % len(EXCITATIONS_DEG_S)], SEED + 100_000 + i)
-        recording = flown(bout, 18.0, [])
+        block = Block(LIGHT, EXCITATIONS_DEG_S[i % len(EXCITATIONS_DEG_S)], SEED + 100_000 + i)
+        recording = flown(block, 18.0, [])
         for surface in SURFACES:
             for magnitude, statistic in ratios(recording, surface).items():
                 found[surface, magnitude].append(trace(recording, statistic))
     return found
 
 
-def faulted(bouts: int) -> Iterator[tuple[str, float, Trace, list[float]]]:
+def faulted(blocks: int) -> Iterator[tuple[str, float, Trace, list[float]]]:
     """Surface, magnitude, the trace and the deflections of the test that is told the instant as well."""
     for excitation in EXCITATIONS_DEG_S:
-        for seed in range(bouts):
-            bout = Bout(LIGHT, excitation, SEED + 1000 * int(excitation) + seed)
-            at_s = strikes_at_s(bout)
+        for seed in range(blocks):
+            block = Block(LIGHT, excitation, SEED + 1000 * int(excitation) + seed)
+            at_s = strikes_at_s(block)
             for surface in SURFACES:
                 for magnitude in MAGNITUDES:
-                    recording = flown(bout, at_s + WATCHED_S, [loss(surface, magnitude, at_s)])
+                    recording = flown(block, at_s + WATCHED_S, [loss(surface, magnitude, at_s)])
                     statistic = ratios(recording, surface)[magnitude]
                     d = deflections(recording, surface, magnitude, WITHIN_S)
                     yield surface, magnitude, trace(recording, statistic), d
 
 
-def main(bouts: int = 20, flights: int = 72) -> None:
+def main(blocks: int = 20, flights: int = 72) -> None:
     """Print, for each surface and delay, what either test finds."""
     levels = {key: level_for(traces, PER_H).level for key, traces in healthy(flights).items()}
-    rows = list(faulted(bouts))
+    rows = list(faulted(blocks))
     for surface in SURFACES:
         here = [(magnitude, seen, d) for s, magnitude, seen, d in rows if s == surface]
         for w, within_s in enumerate(WITHIN_S):

@@ -84,4 +84,4 @@ def test_the_time_without_a_fault_ends_with_the_first_alarm_of_any_diagnosis():
 
     result = result_of(fly(flight.scenario), Entry("adaptive-estimators", "fault-tolerant"), 1.0)
     assert result.false_alarm
-    assert result.healthy_s == replaced["detection_time_s"]
+    assert result.fault_free_s == replaced["detection_time_s"]

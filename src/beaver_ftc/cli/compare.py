@@ -141,7 +141,7 @@ def _compare_runs(folders: list[Path], out: Path, format: Format) -> None:
 
 
 def _cases(sweep: Path | None, only: str | None, most: int | None) -> list[Any]:
-    from beaver_ftc.studies.compare.flights import of_set, of_sweep, set_names
+    from beaver_ftc.studies.compare.trial import of_set, of_sweep, set_names
 
     if sweep is not None:
         return of_sweep(sweep, most=most)
@@ -167,7 +167,7 @@ def _fly(
 ) -> dict[str, Any]:
     from beaver_ftc.cli.progress import progress_bar
     from beaver_ftc.plugins import DETECTORS, LAWS
-    from beaver_ftc.studies.compare.run import run_comparison
+    from beaver_ftc.studies.compare.leaderboard import run_comparison
     from beaver_ftc.studies.compare.trial import entries_of
 
     entries = entries_of(_chosen(DETECTORS, schemes, _OURS[0]), _chosen(LAWS, laws, _OURS[1]))
@@ -176,8 +176,7 @@ def _fly(
 
 
 def _say(document: dict[str, Any], folder: Path, format: Format, leaderboard: Path | None) -> None:
-    from beaver_ftc.studies.compare.page import write_leaderboard
-    from beaver_ftc.studies.compare.table import as_text
+    from beaver_ftc.studies.compare.leaderboard import as_text, write_leaderboard
 
     if format is Format.json:
         emit_json(document | {"folder": str(folder)})

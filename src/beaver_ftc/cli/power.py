@@ -57,10 +57,8 @@ def command(
     """
     from beaver_ftc.cli.progress import progress_bar
     from beaver_ftc.studies.engine.workers import cores
-    from beaver_ftc.studies.power.contenders import contenders
-    from beaver_ftc.studies.power.grid import GRIDS
-    from beaver_ftc.studies.power.run import NAME, run_power
-    from beaver_ftc.studies.power.text import as_text
+    from beaver_ftc.studies.power.shown import NAME, as_text, run_power
+    from beaver_ftc.studies.power.survey import GRIDS, contenders
 
     names = None if schemes is None else [name.strip() for name in schemes.split(",") if name.strip()]
     chosen = contenders(names)

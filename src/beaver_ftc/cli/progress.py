@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from beaver_ftc.studies.sweep.run import Tally
+    from beaver_ftc.studies.sweep.campaign import Tally
 
 PATIENCE_S = 1.0
 TERMINAL_S, LOG_S = 0.2, 30.0  # time between two lines of a sweep

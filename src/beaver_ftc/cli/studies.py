@@ -23,8 +23,7 @@ def bench(
     Side by side, and part by part. The first time, the frame is compiled once more for each part that
     is taken out: about two minutes.
     """
-    from beaver_ftc.studies.bench.measure import bench
-    from beaver_ftc.studies.bench.text import text_of
+    from beaver_ftc.studies.bench.measure import bench, text_of
 
     document = bench(rounds, not no_parts, say=lambda what: complain(f"timing {what}"))
     answer(format, document, lambda: text_of(document))

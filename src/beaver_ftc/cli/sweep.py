@@ -17,8 +17,8 @@ from beaver_ftc.documents.errors import BadInput, BeaverFtcError
 
 if TYPE_CHECKING:
     from beaver_ftc.scenario.sweep_loader import Sweep
-    from beaver_ftc.studies.sweep.flying import Keep
-    from beaver_ftc.studies.sweep.run import Options
+    from beaver_ftc.studies.sweep.campaign import Options
+    from beaver_ftc.studies.sweep.one_flight import Keep
 
 
 class Backend(StrEnum):
@@ -79,7 +79,7 @@ def command(
         from beaver_ftc.studies.engine.workers import start_early
 
         start_early()
-    from beaver_ftc.studies.sweep.run import Options
+    from beaver_ftc.studies.sweep.campaign import Options
 
     options = Options(
         out=out,
@@ -121,7 +121,7 @@ def _write_junit(verdict: dict[str, Any], junit: Path | None, began: float) -> N
 
 
 def _keep(asked: str) -> "Keep":
-    from beaver_ftc.studies.sweep.flying import KEEP_POLICIES, Keep
+    from beaver_ftc.studies.sweep.one_flight import KEEP_POLICIES, Keep
 
     if asked in KEEP_POLICIES:
         return Keep(asked)
@@ -136,8 +136,8 @@ def _keep(asked: str) -> "Keep":
 
 def _fly(sweep: "Sweep", options: "Options", format: Format) -> dict[str, Any]:
     from beaver_ftc.cli.progress import live_progress
-    from beaver_ftc.studies.sweep.run import named_for, run_sweep
-    from beaver_ftc.studies.sweep.words import summary_text, verdict
+    from beaver_ftc.studies.sweep.campaign import named_for, run_sweep
+    from beaver_ftc.studies.sweep.summary_page import summary_text, verdict
 
     with _stoppable() as stopped, live_progress(sweep.name) as progress:
         document = run_sweep(sweep, options, progress, stopped)
@@ -151,7 +151,7 @@ def _fly(sweep: "Sweep", options: "Options", format: Format) -> dict[str, Any]:
 
 def _replay(sweep: "Sweep", options: "Options", index: int, format: Format) -> dict[str, Any]:
     from beaver_ftc.results.verdict import verdict_text
-    from beaver_ftc.studies.sweep.run import replay
+    from beaver_ftc.studies.sweep.campaign import replay
 
     document: dict[str, Any] = replay(sweep, options, index)
     if format is Format.json:
@@ -176,7 +176,7 @@ def _stoppable() -> Iterator[Callable[[], bool]]:
     try:
         yield lambda: bool(asked)
     except KeyboardInterrupt:
-        from beaver_ftc.studies.sweep.run import SweepStopped
+        from beaver_ftc.studies.sweep.campaign import SweepStopped
 
         raise SweepStopped("stopped at once; what had landed is kept, go on with --resume") from None
     finally:

@@ -22,7 +22,7 @@ from beaver_ftc.loop.flight import Flight
 from beaver_ftc.results.metrics import fault_free_s
 from beaver_ftc.scenario.faults import LossOfEffectiveness
 from beaver_ftc.scenario.schema import Scenario
-from beaver_ftc.studies.engine.statistics import CONFIDENCE, binomial_upper, poisson_bound, quantile
+from beaver_ftc.studies.engine.statistics import CONFIDENCE, binomial_upper, poisson_bound, share_within
 from beaver_ftc.studies.engine.store import Parts, RowsAsJson, fingerprint, write_whole
 from beaver_ftc.studies.engine.study import GO_ON, Batch, Batches
 from beaver_ftc.studies.engine.study import conduct as fly_missing
@@ -391,8 +391,8 @@ def _scheme(rows: Sequence[Row]) -> dict[str, Any]:
 
 def _quantiles(values: Iterable[float | None]) -> dict[str, float | None]:
     """Median and 90th percentile, what never came counting as infinitely late; None stands for infinite."""
-    numbers = np.sort([np.inf if value is None else value for value in values])
-    return {name: finite(quantile(numbers, share)) for name, share in (("median", 0.5), ("p90", 0.9))}
+    found = list(values)
+    return {name: finite(share_within(found, share)) for name, share in (("median", 0.5), ("p90", 0.9))}
 
 
 def _shorter(schemes: dict[str, Any]) -> float | None:

@@ -9,10 +9,16 @@ import pytest
 
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.scenario.loader import load_scenario
-from beaver_ftc.studies.bench import flights, measure
-from beaver_ftc.studies.bench.contenders import Bare, ClosedLoop, state_of, take_over
-from beaver_ftc.studies.bench.plugged import InnovationDetector, ProportionalInversion
-from beaver_ftc.studies.bench.text import text_of
+from beaver_ftc.studies.bench import measure
+from beaver_ftc.studies.bench.contenders import (
+    Bare,
+    ClosedLoop,
+    InnovationDetector,
+    ProportionalInversion,
+    state_of,
+    take_over,
+)
+from beaver_ftc.studies.bench.measure import text_of
 from flying import Memory, scenario
 
 ELEVATOR_LOSS = {"actuator": "elevator", "type": "loss_of_effectiveness", "magnitude": 0.4, "at_s": 12}
@@ -53,7 +59,7 @@ def test_medians_are_over_rounds_and_ratios_within_one():
     """Three rounds, the second on a machine half as fast: ratios are those of every round."""
     parts = np.array([1.0, 2.0, 12.0, 1.0]) * 1e-3
     rows = [(parts, 1000, 0.01), (2 * parts, 1000, 0.02), (parts, 1000, 0.01)]
-    found = flights._medians(rows)
+    found = measure._medians(rows)
     assert found["parts_ms"]["frames"] == 12.0
     assert (found["bare_ms"], found["frames_ratio"], found["flight_ratio"]) == (10.0, 1.2, 1.6)
     assert found["own_part_us"] == 2.0

@@ -1,6 +1,6 @@
 """What `bench` prints, of figures that all differ."""
 
-from beaver_ftc.studies.bench import text
+from beaver_ftc.studies.bench import measure as text
 
 
 def timing(name, middle, ratio=None):

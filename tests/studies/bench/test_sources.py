@@ -113,7 +113,7 @@ def test_an_edit_of_what_a_kernel_follows_from_makes_another_name(copy, name_of)
         names.append(name_of())
     assert len(edited) > 70
     assert len(set(names)) == len(names)
-    for file in ("cli/run.py", "results/report.py", "studies/sweep/run.py"):
+    for file in ("cli/run.py", "results/report.py", "studies/sweep/campaign.py"):
         path = copy / file
         path.write_bytes(path.read_bytes() + b"\n")
         assert name_of() == names[-1], file

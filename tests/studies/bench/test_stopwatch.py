@@ -6,7 +6,7 @@ import statistics
 import numpy as np
 import pytest
 
-from beaver_ftc.studies.bench.stopwatch import Timing, interleave
+from beaver_ftc.studies.bench.contenders import Timing, interleave
 
 
 class Clock:

@@ -15,21 +15,32 @@ from beaver_ftc.diagnosis.rivals.options import TUNED, TUNED_FOR_ERRORS, tuned
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.plugins import plugin_class
 from beaver_ftc.scenario.schema import Scenario
-from beaver_ftc.studies.compare.document import better_than_ours, document_of
-from beaver_ftc.studies.compare.flights import (
+from beaver_ftc.studies.compare.leaderboard import (
+    CONTROL,
+    DIAGNOSIS,
+    MARK,
+    as_text,
+    files_of,
+    write_leaderboard,
+)
+from beaver_ftc.studies.compare.replay import Trace
+from beaver_ftc.studies.compare.runs import figure_of, read_runs
+from beaver_ftc.studies.compare.scores import better_than_ours, document_of
+from beaver_ftc.studies.compare.trial import (
     CALIBRATION,
     CALIBRATION_ERRORS,
+    LAW,
+    ORACLE,
+    SCHEME,
     Case,
+    Entry,
+    entries_of,
+    fly_case,
     of_set,
     of_sweep,
     set_names,
+    with_entry,
 )
-from beaver_ftc.studies.compare.page import MARK, write_leaderboard
-from beaver_ftc.studies.compare.replay import Trace
-from beaver_ftc.studies.compare.run import files_of
-from beaver_ftc.studies.compare.runs import figure_of, read_runs
-from beaver_ftc.studies.compare.table import CONTROL, DIAGNOSIS, as_text
-from beaver_ftc.studies.compare.trial import LAW, ORACLE, SCHEME, Entry, entries_of, fly_case, with_entry
 from beaver_ftc.studies.compare.tune import (
     DETECTORS,
     DETECTORS_FOR_ERRORS,

@@ -8,21 +8,21 @@ import pytest
 
 from beaver_ftc.studies.compare import trial
 from beaver_ftc.studies.compare.replay import Trace
-from beaver_ftc.studies.compare.tally import (
+from beaver_ftc.studies.compare.scores import (
     line_of,
     lines_of,
     matched,
     point_at,
-    share_within,
     trade_off,
 )
 from beaver_ftc.studies.compare.trial import Entry, Result
+from beaver_ftc.studies.engine.statistics import share_within
 
 ENTRY = Entry("a", "b")
 
 
 def _result(**changes):
-    values = {"entry": ENTRY, "false_alarm": False, "healthy_s": 360.0, "faulted": True, "delay_s": 0.1,
+    values = {"entry": ENTRY, "false_alarm": False, "fault_free_s": 360.0, "faulted": True, "delay_s": 0.1,
               "isolated": "rudder", "correct": True, "isolation_delay_s": 0.2, "rms_deg_s": 1.0}  # fmt: skip
     return Result(**{**values, **changes})
 
@@ -31,26 +31,26 @@ def test_a_line_counts():
     mine = [
         _result(),
         _result(delay_s=inf, correct=False, isolation_delay_s=inf, rms_deg_s=4.0),
-        _result(false_alarm=True, healthy_s=180.0, delay_s=inf, correct=False, isolation_delay_s=inf),
+        _result(false_alarm=True, fault_free_s=180.0, delay_s=inf, correct=False, isolation_delay_s=inf),
         _result(faulted=False, delay_s=inf, correct=False, rms_deg_s=inf, departed=True),
         _result(error="could not"),
     ]
     oracle = [_result(rms_deg_s=0.5)] * 5
     line = line_of(ENTRY, mine, oracle)
-    assert (line.flights, line.failed, line.faults, line.departures) == (4, 1, 3, 1)
-    assert line.healthy_h == pytest.approx((3 * 360 + 180) / 3600)
-    assert line.false_alarms_per_h == pytest.approx(1 / 0.35)
-    assert line.detection_rate == pytest.approx(1 / 3)
-    assert line.isolation_rate == pytest.approx(1 / 3)
-    assert line.delay_median_s == inf
-    assert line.ratio_median == 2.0  # of 2, 8, 2 and infinity, the least that half do not exceed
-    assert line.ratio_90 == inf
+    assert (line["flights"], line["failed"], line["faults"], line["departures"]) == (4, 1, 3, 1)
+    assert line["healthy_h"] == pytest.approx((3 * 360 + 180) / 3600)
+    assert line["false_alarms_per_h"] == pytest.approx(1 / 0.35)
+    assert line["detection_rate"] == pytest.approx(1 / 3)
+    assert line["isolation_rate"] == pytest.approx(1 / 3)
+    assert line["delay_median_s"] == inf
+    assert line["ratio_median"] == 2.0  # of 2, 8, 2 and infinity, the least that half do not exceed
+    assert line["ratio_90"] == inf
 
 
 def test_nothing_to_count_is_not_zero():
-    line = line_of(ENTRY, [_result(faulted=False, healthy_s=0.0)], [_result()])
-    assert line.detection_rate is None
-    assert line.false_alarms_per_h is None
+    line = line_of(ENTRY, [_result(faulted=False, fault_free_s=0.0)], [_result()])
+    assert line["detection_rate"] is None
+    assert line["false_alarms_per_h"] is None
 
 
 def test_quantiles_count_what_never_came_as_last():
@@ -118,15 +118,15 @@ def test_what_other_threads_do_meanwhile_is_no_cost_of_a_law(monkeypatch):
 
 
 def test_shares_of_the_faulted_flights_and_of_all():
-    mine = [_result(healthy_s=1800.0, before_deg_s=b, after_deg_s=2 * b, us=b) for b in (1.0, 3.0)]
-    mine.append(_result(correct=False, healthy_s=1800.0, before_deg_s=5.0, after_deg_s=10.0, us=5.0))
+    mine = [_result(fault_free_s=1800.0, before_deg_s=b, after_deg_s=2 * b, us=b) for b in (1.0, 3.0)]
+    mine.append(_result(correct=False, fault_free_s=1800.0, before_deg_s=5.0, after_deg_s=10.0, us=5.0))
     line = line_of(ENTRY, mine, mine)
-    assert line.isolation_rate == pytest.approx(2 / 3)
-    assert (line.detection_rate, line.healthy_h, line.us) == (1.0, 1.5, 3.0)
-    assert (line.before_median, line.before_90) == (3.0, 5.0)
-    assert (line.after_median, line.after_90) == (6.0, 10.0)
-    assert 0.0 < line.detection_rate_lower < 1.0
-    assert line.false_alarms_per_h_upper > 0.0
+    assert line["isolation_rate"] == pytest.approx(2 / 3)
+    assert (line["detection_rate"], line["healthy_h"], line["us"]) == (1.0, 1.5, 3.0)
+    assert (line["before_median"], line["before_90"]) == (3.0, 5.0)
+    assert (line["after_median"], line["after_90"]) == (6.0, 10.0)
+    assert 0.0 < line["detection_rate_lower"] < 1.0
+    assert line["false_alarms_per_h_upper"] > 0.0
 
 
 def test_each_entry_is_tallied_from_its_own_flights_against_the_yardsticks():
@@ -134,9 +134,11 @@ def test_each_entry_is_tallied_from_its_own_flights_against_the_yardsticks():
     flown = ((ENTRY, 3.0), (yardstick, 1.0), (other, 5.0)), ((ENTRY, 4.0), (yardstick, 2.0), (other, 8.0))
     trials = [trial.Trial("set", [_result(entry=of, rms_deg_s=rms) for of, rms in one]) for one in flown]
     mine, theirs = lines_of(trials, [ENTRY, other])
-    assert (mine.entry, mine.flights, theirs.entry, theirs.flights) == (ENTRY, 2, other, 2)
-    assert (mine.ratio_median, mine.ratio_90) == (2.0, 3.0)
-    assert (theirs.ratio_median, theirs.ratio_90) == (4.0, 5.0)
+    assert [(line["scheme"], line["law"], line["flights"]) for line in (mine, theirs)] == [
+        (ENTRY.scheme, ENTRY.law, 2), (other.scheme, other.law, 2),
+    ]  # fmt: skip
+    assert (mine["ratio_median"], mine["ratio_90"]) == (2.0, 3.0)
+    assert (theirs["ratio_median"], theirs["ratio_90"]) == (4.0, 5.0)
 
 
 def test_without_flights_a_level_costs_nothing():

@@ -30,7 +30,7 @@ def result(**changes):
 
 
 SOUND = {
-    "false_alarm": False, "healthy_s": 12.0, "faulted": True, "delay_s": 0.5, "isolated": "elevator",
+    "false_alarm": False, "fault_free_s": 12.0, "faulted": True, "delay_s": 0.5, "isolated": "elevator",
     "correct": True, "isolation_delay_s": 0.75, "rms_deg_s": 7.0, "before_deg_s": 5.0, "after_deg_s": 7.0,
     "travel_deg_s": 4.0, "energy_deg2_s2": 20.0, "departed": False, "us": 7.0,
 }  # fmt: skip

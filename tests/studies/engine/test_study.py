@@ -153,9 +153,9 @@ ALL_IMPORTED = """
 import sys
 from pathlib import Path
 from beaver_ftc.scenario.sweep_loader import load_sweep
-from beaver_ftc.studies.sweep.flying import Job, fly_one, scenario_of
+from beaver_ftc.studies.sweep.one_flight import Job, fly_one, scenario_of
 from beaver_ftc.studies.sweep.sampling import Plan
-from beaver_ftc.studies.sweep.table import schema_of, table_of
+from beaver_ftc.studies.sweep.one_flight import schema_of, table_of
 sweep = load_sweep("{sweep}")
 plan = Plan(sweep).assignments([0])
 rows = [fly_one(Job(sweep), plan[0])]

@@ -9,8 +9,7 @@ import pytest
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.studies.compare.replay import Recorder, record
 from beaver_ftc.studies.engine.told import UNEXPLAINED_S, Whitening, chance
-from beaver_ftc.studies.power.grid import Bout, Condition, loss, scenario_of, strikes_at_s
-from beaver_ftc.studies.power.limit import deflections
+from beaver_ftc.studies.power.survey import Block, Condition, deflections, loss, scenario_of, strikes_at_s
 
 DT = 0.01
 LIGHT = Condition("tactical-grade", "light")
@@ -18,7 +17,7 @@ LIGHT = Condition("tactical-grade", "light")
 
 @pytest.fixture(scope="module")
 def context():
-    return Loop(scenario_of(Bout(LIGHT, 3.0, 1), 1.0), Recorder()).plugin_frame.detector.context
+    return Loop(scenario_of(Block(LIGHT, 3.0, 1), 1.0), Recorder()).plugin_frame.detector.context
 
 
 def covariance(context, n):
@@ -97,9 +96,9 @@ def test_rougher_air_hides_more(context):
 
 
 def test_of_a_flight_it_takes_what_the_surface_gave(context):
-    bout = Bout(LIGHT, 6.0, 2)
-    at_s = strikes_at_s(bout)
-    recording = record(scenario_of(bout, at_s + 1.0, [loss("elevator", 0.7, at_s)]))
+    block = Block(LIGHT, 6.0, 2)
+    at_s = strikes_at_s(block)
+    recording = record(scenario_of(block, at_s + 1.0, [loss("elevator", 0.7, at_s)]))
     seen = [measured for measured, _ in recording.seen]
     frames = round(at_s * 100)
     effect = np.array([-0.7 * measured.contribution[:, 1] for measured in seen[frames + 1 :]])

@@ -2,8 +2,8 @@
 
 import pytest
 
-from beaver_ftc.studies.power.grid import WITHIN_S
-from beaver_ftc.studies.power.text import as_text, comparison, shares, title_of
+from beaver_ftc.studies.power.shown import as_text, comparison, shares, title_of
+from beaver_ftc.studies.power.survey import WITHIN_S
 
 AT = {"sensors": "perfect", "turbulence": "none"}
 

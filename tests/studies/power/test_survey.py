@@ -15,14 +15,24 @@ from beaver_ftc.cli.main import app
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.studies.compare.replay import Trace, record
 from beaver_ftc.studies.engine.told import chance
-from beaver_ftc.studies.power.contenders import BUILT_IN, ESTIMATORS, Contender, contenders
-from beaver_ftc.studies.power.document import document_of
-from beaver_ftc.studies.power.flying import Watched, fly_faulted, with_fdi
-from beaver_ftc.studies.power.grid import GRIDS, WITHIN_S, Bout, Condition, loss, scenario_of, strikes_at_s
-from beaver_ftc.studies.power.levels import level_at, level_for
-from beaver_ftc.studies.power.run import run_power
-from beaver_ftc.studies.power.tally import limit, rows_of, summary
-from beaver_ftc.studies.power.text import as_text, comparison
+from beaver_ftc.studies.power.chances import document_of, level_at, level_for, limit, rows_of, summary
+from beaver_ftc.studies.power.shown import as_text, comparison, run_power
+from beaver_ftc.studies.power.survey import (
+    BUILT_IN,
+    ESTIMATORS,
+    GRIDS,
+    WITHIN_S,
+    Block,
+    Condition,
+    Contender,
+    Watched,
+    contenders,
+    fly_faulted,
+    loss,
+    scenario_of,
+    strikes_at_s,
+    with_fdi,
+)
 
 STILL, LIGHT = Condition("ideal", "none"), Condition("tactical-grade", "light")
 SMALL = replace(
@@ -31,7 +41,7 @@ SMALL = replace(
     surfaces=("aileron", "elevator"),
     magnitudes=(0.5, 1.0),
     excitations_deg_s=(3.0,),
-    bouts=2,
+    blocks=2,
     healthy_h=4 * 12.0 / 3600.0,
     healthy_flight_s=12.0,
     per_h=60.0,
@@ -48,17 +58,17 @@ class TestFlights:
     def test_part_of_a_grid_flies_the_same_flights(self):
         full = GRIDS["full"]
         part = full.only("tactical-grade", "light")
-        assert part.faulted() == [bout for bout in full.faulted() if bout.condition == LIGHT]
-        assert part.healthy() == [bout for bout in full.healthy() if bout.condition == LIGHT]
+        assert part.faulted() == [block for block in full.faulted() if block.condition == LIGHT]
+        assert part.healthy() == [block for block in full.healthy() if block.condition == LIGHT]
         assert full.only(None, None) == full
         with pytest.raises(BadInput, match="allowed: tactical-grade, none; tactical-grade, light"):
             GRIDS["quick"].only("ideal", None)
 
     def test_everything_but_the_fault_follows_from_the_bout(self):
-        bout = Bout(LIGHT, 3.0, 7)
-        healthy, faulty = scenario_of(bout, 12.0), scenario_of(bout, 12.0, [loss("rudder", 0.4, 9.0)])
+        block = Block(LIGHT, 3.0, 7)
+        healthy, faulty = scenario_of(block, 12.0), scenario_of(block, 12.0, [loss("rudder", 0.4, 9.0)])
         assert faulty.model_copy(update={"faults": ()}) == healthy
-        assert scenario_of(bout._replace(seed=8), 12.0).reference != healthy.reference
+        assert scenario_of(block._replace(seed=8), 12.0).reference != healthy.reference
 
     def test_seeds_are_the_same_in_every_condition_and_no_healthy_one_has_a_fault(self):
         for grid in GRIDS.values():
@@ -66,17 +76,17 @@ class TestFlights:
                 condition: {(b.excitation_deg_s, b.seed) for b in grid.faulted() if b.condition == condition}
                 for condition in grid.conditions
             }
-            assert len({frozenset(bouts) for bouts in by_condition.values()}) == 1
-            seeds = {bout.seed for bout in grid.faulted() if bout.condition == grid.conditions[0]}
-            assert len(seeds) == grid.bouts * len(grid.excitations_deg_s)
-            assert not seeds & {bout.seed for bout in grid.healthy()}
-            assert {bout.excitation_deg_s for bout in grid.healthy()} == set(grid.excitations_deg_s)
+            assert len({frozenset(blocks) for blocks in by_condition.values()}) == 1
+            seeds = {block.seed for block in grid.faulted() if block.condition == grid.conditions[0]}
+            assert len(seeds) == grid.blocks * len(grid.excitations_deg_s)
+            assert not seeds & {block.seed for block in grid.healthy()}
+            assert {block.excitation_deg_s for block in grid.healthy()} == set(grid.excitations_deg_s)
 
     @given(st.integers(0, 2_000_000), st.sampled_from([1.0, 3.0, 6.0]))
     def test_the_truth_stays_within_what_is_declared(self, seed, excitation):
-        scenario = scenario_of(Bout(LIGHT, excitation, seed), 12.0)
+        scenario = scenario_of(Block(LIGHT, excitation, seed), 12.0)
         assert scenario.warnings() == ()
-        frame = 100.0 * strikes_at_s(Bout(LIGHT, excitation, seed))
+        frame = 100.0 * strikes_at_s(Block(LIGHT, excitation, seed))
         assert frame == pytest.approx(round(frame), abs=1e-9)
         for axis in "pqr":
             assert abs(getattr(scenario.uncertainty.inertia_coupling, axis)) <= 0.25
@@ -84,10 +94,10 @@ class TestFlights:
             assert signal.sine.amplitude_deg_s == excitation
 
     def test_a_flight_is_the_same_until_its_fault_strikes(self):
-        bout = Bout(LIGHT, 3.0, 3)
-        at_s = strikes_at_s(bout)
+        block = Block(LIGHT, 3.0, 3)
+        at_s = strikes_at_s(block)
         flights = [
-            record(scenario_of(bout, at_s + 1.0, [loss(surface, 1.0, at_s)])).seen
+            record(scenario_of(block, at_s + 1.0, [loss(surface, 1.0, at_s)])).seen
             for surface in ("aileron", "rudder")
         ]
         rates = [np.array([measured.x for measured, _ in seen]) for seen in flights]
@@ -118,7 +128,7 @@ class TestLevels:
         """Two flights of an hour, one alarmed at the level 2 after 900 s: 1.25 h, not 2."""
         rising = Trace(3.0, (), False, 3600.0, rises=((0.0, 1.0), (900.0, 2.5), (1800.0, 3.0)))
         quiet = Trace(1.5, (), False, 3600.0, rises=((0.0, 1.5),))
-        assert [rising.watched_s(level) for level in (0.5, 2.0, 2.7, 4.0)] == [0.0, 900.0, 1800.0, 3600.0]
+        assert [rising.fault_free_s(level) for level in (0.5, 2.0, 2.7, 4.0)] == [0.0, 900.0, 1800.0, 3600.0]
         found = level_at([rising, quiet], 2.0)
         assert (found.alarms, found.hours) == (1, 1.25)
 
@@ -130,12 +140,12 @@ class TestLevels:
 
 
 def watched(seed, **delays):
-    """A bout with one fault, a scheme a keyword: its delay at the level 2, or None."""
+    """A block with one fault, a scheme a keyword: its delay at the level 2, or None."""
     traces = {
         scheme: [Trace(0.5, ((0.2, 1.5), *(((delay, 3.0),) if delay is not None else ())), True, 10.0)]
         for scheme, delay in delays.items()
     }
-    return Watched(Bout(STILL, 3.0, seed), (("rudder", 0.4),), traces, [[1.0, 2.0, 3.0]])
+    return Watched(Block(STILL, 3.0, seed), (("rudder", 0.4),), traces, [[1.0, 2.0, 3.0]])
 
 
 class TestCounts:
@@ -189,8 +199,8 @@ class TestCounts:
 
 
 def replace_traces(one):
-    """The bout as a healthy one, whose statistic comes to 2."""
-    return Watched(one.bout, (), {scheme: healthy(2.0) for scheme in one.traces})
+    """The block as a healthy one, whose statistic comes to 2."""
+    return Watched(one.block, (), {scheme: healthy(2.0) for scheme in one.traces})
 
 
 class TestSurvey:
@@ -241,9 +251,9 @@ class TestSurvey:
         assert {path.name: path.read_bytes() for path in (folder / "figures").iterdir()} == pictures
 
     def test_without_the_vanes_plug_ins_are_shown_the_rates_alone_and_ours_as_before(self):
-        bout = SMALL.faulted()[-1]
+        block = SMALL.faulted()[-1]
         with_vanes, without = (
-            fly_faulted(bout, replace(SMALL, vanes=vanes), contenders(["augmented-ekf"]))
+            fly_faulted(block, replace(SMALL, vanes=vanes), contenders(["augmented-ekf"]))
             for vanes in (True, False)
         )
         for scheme in BUILT_IN:
@@ -255,8 +265,8 @@ class TestSurvey:
 
     def test_a_bout_flown_alone_gives_the_same(self, survey):
         document, folder = survey
-        bout = SMALL.faulted()[-1]
-        one = fly_faulted(bout, SMALL, contenders(["observer-constant"]))
+        block = SMALL.faulted()[-1]
+        one = fly_faulted(block, SMALL, contenders(["observer-constant"]))
         level = next(
             level["level"]
             for level in document["levels"]
@@ -265,7 +275,7 @@ class TestSurvey:
         rows = [
             row
             for row in pq.read_table(folder / "power.parquet").to_pylist()
-            if (row["seed"], row["turbulence"], row["scheme"]) == (bout.seed, "light", "observer-constant")
+            if (row["seed"], row["turbulence"], row["scheme"]) == (block.seed, "light", "observer-constant")
         ]
         delays = [trace.delay_s(level) for trace in one.traces["observer-constant"]]
         assert [row["delay_s"] for row in rows] == [None if np.isinf(d) else d for d in delays]
@@ -295,7 +305,7 @@ class TestContenders:
                 contenders([name])
 
     def test_what_a_built_in_one_wants_is_in_its_flight(self):
-        flight = scenario_of(Bout(LIGHT, 3.0, 1), 5.0)
+        flight = scenario_of(Block(LIGHT, 3.0, 1), 5.0)
         for contender in contenders([]):
             fdi = with_fdi(flight, contender).fdi
             assert fdi.bounds == flight.fdi.bounds
@@ -321,13 +331,13 @@ def test_the_command_refuses_what_it_does_not_know(tmp_path):
 
 
 def test_held_out_alarms_are_counted_at_the_common_level_before_the_faults():
-    """By hand: of four bouts with faults two pass the level 0.8 before the fault, one the own level 1."""
+    """By hand: of four blocks with faults two pass the level 0.8 before the fault, one the own level 1."""
 
     def watched(before, faults):
         rises = ((3.0, before),)
         traces = [Trace(before, (), bool(faults), 9.0, rises=rises) for _ in faults or (None,)]
         fault_deflections = [[1.0] * len(WITHIN_S) for _ in faults]
-        return Watched(Bout(STILL, 3.0, 1), faults, {ESTIMATORS: traces}, fault_deflections)
+        return Watched(Block(STILL, 3.0, 1), faults, {ESTIMATORS: traces}, fault_deflections)
 
     healthy = [watched(before, ()) for before in (0.8, 0.3, 0.2)]
     faulted = [watched(before, (("aileron", 0.5), ("elevator", 0.5))) for before in (0.5, 0.9, 1.2, 0.1)]
@@ -337,6 +347,6 @@ def test_held_out_alarms_are_counted_at_the_common_level_before_the_faults():
     assert line["calibration"]["alarms"] == 0
     assert (
         line["before_faults"]["alarms"] == 2
-    )  # a bout's flights are the same until the fault: each counts once
+    )  # a block's flights are the same until the fault: each counts once
     assert line["before_faults"]["hours"] == pytest.approx((9.0 + 3.0 + 3.0 + 9.0) / 3600.0)
     assert line["own_level"]["alarms"] == 0

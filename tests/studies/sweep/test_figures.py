@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from beaver_ftc.scenario.sweep_loader import load_sweep_text
-from beaver_ftc.studies.sweep.figures import (
+from beaver_ftc.studies.sweep.outcomes import worst_flights
+from beaver_ftc.studies.sweep.pictures import (
     FIGURES,
     confusion_matrix,
     delay_distribution,
@@ -15,9 +16,8 @@ from beaver_ftc.studies.sweep.figures import (
     parallel_coordinates,
     write_figures,
 )
-from beaver_ftc.studies.sweep.report import render
 from beaver_ftc.studies.sweep.summary import summarise
-from beaver_ftc.studies.sweep.worst import worst_flights
+from beaver_ftc.studies.sweep.summary_page import render
 
 from .counted import NOTHING, ROWS, SWEEP, flights_of, row
 

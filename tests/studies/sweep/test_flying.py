@@ -3,9 +3,8 @@ import pytest
 from beaver_ftc.aircraft import load
 from beaver_ftc.documents.errors import SimulationFailed
 from beaver_ftc.results.metrics import metrics
-from beaver_ftc.studies.sweep.flying import Job, Keep, fly_one, scenario_of
+from beaver_ftc.studies.sweep.one_flight import Job, Keep, columns_of, fly_one, scenario_of
 from beaver_ftc.studies.sweep.sampling import Assignment, Plan, flight_seed
-from beaver_ftc.studies.sweep.table import columns_of
 
 from .conftest import SHORT, sweep_of
 

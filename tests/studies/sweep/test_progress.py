@@ -2,7 +2,7 @@ import pytest
 
 from beaver_ftc.cli import progress as shown
 from beaver_ftc.cli.progress import live_progress
-from beaver_ftc.studies.sweep.run import Tally
+from beaver_ftc.studies.sweep.campaign import Tally
 
 
 class Clock:

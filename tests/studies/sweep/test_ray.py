@@ -4,7 +4,7 @@ import time
 
 import pytest
 
-from beaver_ftc.studies.sweep.run import Options, run_sweep
+from beaver_ftc.studies.sweep.campaign import Options, run_sweep
 
 from .conftest import sweep_of
 

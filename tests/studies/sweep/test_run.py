@@ -11,8 +11,8 @@ import pytest
 
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.studies.engine import workers
-from beaver_ftc.studies.sweep.flying import Keep
-from beaver_ftc.studies.sweep.run import Options, SweepStopped, replay, run_sweep
+from beaver_ftc.studies.sweep.campaign import Options, SweepStopped, replay, run_sweep
+from beaver_ftc.studies.sweep.one_flight import Keep
 
 from .conftest import SHORT, parts_in, sweep_of
 
@@ -22,7 +22,7 @@ def reference(tmp_path_factory):
     """The uninterrupted sweep, one worker, everything drawn: its folder and its summary."""
     out = tmp_path_factory.mktemp("reference")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("beaver_ftc.studies.sweep.source.FRAMES_A_BATCH", 400)
+        patch.setattr("beaver_ftc.studies.sweep.store.FRAMES_A_BATCH", 400)
         summary = run_sweep(sweep_of(), Options(out=out, workers=1, source="short.yaml"))
     return out / "short", summary
 
@@ -130,7 +130,9 @@ def test_a_worker_that_is_killed_is_replaced(reference, tmp_path, small_batches,
 def test_a_finished_sweep_is_not_flown_again_when_resumed(reference, tmp_path, small_batches, monkeypatch):
     options = Options(out=tmp_path, workers=2, report=False)
     run_sweep(sweep_of(), options)
-    monkeypatch.setattr("beaver_ftc.studies.sweep.run._workers", lambda *_: pytest.fail("nothing is missing"))
+    monkeypatch.setattr(
+        "beaver_ftc.studies.sweep.campaign._workers", lambda *_: pytest.fail("nothing is missing")
+    )
     asked = sweep_of(**{"seed: 3": "seed: 3\nexpect: {detection_rate: {at_least: 0.999, confidence: 0.99}}"})
     again = run_sweep(asked, Options(out=tmp_path, resume=True, report=False))
     assert [entry["passed"] for entry in again["expectations"]] == [False]  # 48 flights cannot show that

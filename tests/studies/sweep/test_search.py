@@ -3,7 +3,7 @@ import pytest
 from pyarrow.parquet import read_table
 
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.studies.sweep.run import Options, assignment_of, named_for, run_sweep
+from beaver_ftc.studies.sweep.campaign import Options, assignment_of, named_for, run_sweep
 from beaver_ftc.studies.sweep.search import Evolution, score
 
 from .conftest import SHORT, sweep_of

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from beaver_ftc.studies.sweep.sensitivity import rank, ranks_of
+from beaver_ftc.studies.sweep.outcomes import rank, ranks_of
 
 
 @pytest.fixture

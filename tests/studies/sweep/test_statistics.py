@@ -7,10 +7,9 @@ import pytest
 
 from beaver_ftc.scenario.sweep_loader import load_sweep_text
 from beaver_ftc.scenario.sweep_schema import SweepExpect
-from beaver_ftc.studies.sweep import words
-from beaver_ftc.studies.sweep.expectations import evaluate
-from beaver_ftc.studies.sweep.summary import summarise
-from beaver_ftc.studies.sweep.worst import replay_command, worst_flights
+from beaver_ftc.studies.sweep import summary_page as words
+from beaver_ftc.studies.sweep.outcomes import replay_command, worst_flights
+from beaver_ftc.studies.sweep.summary import evaluate, summarise
 
 from .counted import ROWS, SWEEP, detected, flights_of
 

@@ -5,8 +5,8 @@ import pyarrow.parquet as pq
 import pytest
 
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
+from beaver_ftc.studies.sweep.one_flight import row_of_failure, schema_of, table_of
 from beaver_ftc.studies.sweep.store import Store, identity_of
-from beaver_ftc.studies.sweep.table import row_of_failure, schema_of, table_of
 
 from .conftest import parts_in, sweep_of
 

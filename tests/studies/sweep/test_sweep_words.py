@@ -2,7 +2,7 @@
 
 import pytest
 
-from beaver_ftc.studies.sweep import words
+from beaver_ftc.studies.sweep import summary_page as words
 from beaver_ftc.studies.sweep.summary import summarise
 
 from .counted import ROWS, detected, flights_of, load_sweep_text, row

@@ -1,18 +1,80 @@
 """Who is timed: each flies the same seconds of the same flight, from the same state."""
 
-from collections.abc import Callable
+import gc
+import time
+from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
-from beaver_ftc.control.base import Law
+import numpy as np
+
+from beaver_ftc.control.base import Law, Reference
 from beaver_ftc.design.coefficients import SURFACES
-from beaver_ftc.diagnosis.base import Detector
+from beaver_ftc.design.context import Context
+from beaver_ftc.diagnosis.base import Detector, Measured, Verdict
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.plant import channels as ch
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.state import FlightState
 from beaver_ftc.scenario.schema import Scenario
+
+
+class Contender(Protocol):
+    """Something that flies a number of frames."""
+
+    def prepare(self) -> None:
+        """Go back to where every round starts; not timed."""
+
+    def fly(self, frames: int) -> None:
+        """Fly that many frames; timed."""
+
+
+@dataclass(frozen=True)
+class Timing:
+    """A quantity over the rounds: its median, and the quartiles between which half the rounds lie."""
+
+    median: float
+    low: float
+    high: float
+
+    @classmethod
+    def of(cls, values: np.ndarray) -> "Timing":
+        """values (rounds,), one a round."""
+        low, median, high = (float(np.quantile(values, share)) for share in (0.25, 0.5, 0.75))
+        return cls(median, low, high)
+
+
+Clock = Callable[[], int]  # ns
+
+
+def interleave(
+    contenders: Sequence[Contender], rounds: int, frames: int, clock: Clock = time.process_time_ns
+) -> np.ndarray:
+    """Time all contenders in turn, A B C then C B A; microseconds a frame, (rounds, contenders).
+
+    What is to be compared is formed within a round, which lasts some milliseconds, and condensed afterwards.
+    """
+    us = np.empty((rounds, len(contenders)))
+    order = list(range(len(contenders)))
+    collecting = gc.isenabled()
+    gc.disable()
+    try:
+        for round_ in us:
+            for i in order:
+                round_[i] = _time(contenders[i], frames, clock)
+            order.reverse()
+    finally:
+        if collecting:
+            gc.enable()
+    return us
+
+
+def _time(contender: Contender, frames: int, clock: Clock) -> float:
+    contender.prepare()
+    start_ns = clock()
+    contender.fly(frames)
+    return (clock() - start_ns) / (1e3 * frames)
 
 
 def state_of(plant: Plant) -> FlightState:
@@ -104,3 +166,38 @@ def take_over(scenario: Scenario, at_s: float) -> Moment:
     loop = Loop(scenario)
     loop.fly_chunk(0, round(at_s * scenario.rate_hz))
     return Moment.of(loop.plant)
+
+
+class InnovationDetector:
+    """Alarms when the rates do what neither the design model nor its declared error explains."""
+
+    def reset(self, context: Context) -> None:
+        """Nothing seen yet."""
+        self._dt_s = context.dt_s
+        self._before: np.ndarray | None = None
+        self._detected = False
+
+    def step(self, measured: Measured, command: np.ndarray) -> Verdict:
+        """Compare the frame that has elapsed with the model's."""
+        if self._before is not None:
+            innovation = (measured.x - self._before) / self._dt_s - measured.acceleration
+            self._detected = self._detected or bool((np.abs(innovation) > measured.eta_bar).any())
+        self._before = measured.x
+        return Verdict(detected=self._detected)
+
+
+class ProportionalInversion:
+    """Inverts the design model on a proportional feedback, with the flap left in trim."""
+
+    _FEEDBACK_PER_S = 3.0
+
+    def reset(self, context: Context) -> None:
+        """Keep the model and the trim."""
+        self._model, self._flap_rad = context.model, context.trim_rad[3]
+
+    def step(self, measured: Measured, reference: Reference, verdict: Verdict) -> np.ndarray:
+        """Ask the three main surfaces for what the reference model does, and for what is missing."""
+        G = self._model.G(measured.y)
+        feedback = self._FEEDBACK_PER_S * (reference.rate - measured.x)
+        wanted = reference.acceleration + feedback - self._model.f(measured.x, measured.y)
+        return np.append(np.linalg.solve(G[:, :3], wanted - G[:, 3] * self._flap_rad), self._flap_rad)

@@ -3,6 +3,7 @@
 import os
 import platform
 import tempfile
+import time
 from collections.abc import Callable
 from importlib.metadata import version
 from pathlib import Path
@@ -10,17 +11,28 @@ from typing import Any
 
 import numpy as np
 
-from beaver_ftc.plant import addresses
+from beaver_ftc.loop.loop import Loop, fly
+from beaver_ftc.plant import addresses, conditions
+from beaver_ftc.results.log import ParquetLog
+from beaver_ftc.results.metrics import metrics
 from beaver_ftc.scenario.loader import load_scenario
 from beaver_ftc.scenario.schema import Scenario
-from beaver_ftc.studies.bench.contenders import Bare, ClosedLoop, take_over
-from beaver_ftc.studies.bench.flights import by_kind
+from beaver_ftc.scenario.sweep_loader import Sweep, load_sweep
+from beaver_ftc.studies.bench.contenders import (
+    Bare,
+    ClosedLoop,
+    Contender,
+    InnovationDetector,
+    ProportionalInversion,
+    Timing,
+    interleave,
+    take_over,
+)
 from beaver_ftc.studies.bench.parts import PARTS, frame_with
-from beaver_ftc.studies.bench.plugged import InnovationDetector, ProportionalInversion
-from beaver_ftc.studies.bench.stopwatch import Contender, Timing, interleave
 from beaver_ftc.studies.bench.straightforward import Straightforward
-from beaver_ftc.studies.bench.whole_flight import WholeFlight
 from beaver_ftc.studies.engine.workers import cores
+from beaver_ftc.studies.sweep.one_flight import row_of, scenario_of
+from beaver_ftc.studies.sweep.sampling import Plan
 
 SCENARIO = "elevator-partial-loss"
 BEFORE_ALARM_S, AFTER_ALARM_S = 1.0, 14.0  # the fault strikes at 12 s
@@ -156,3 +168,172 @@ def _whole_flights(scenario: Scenario, rounds: int) -> Document:
         **_figures("with_log_file_us", us[:, 2]),
         **_figures("with_log_file_ratio", us[:, 2] / us[:, 0]),
     }
+
+
+STAGES = ("scenario", "aircraft, trim, record", "frames", "metrics and row")
+# kind -> a built-in sweep, and what its flights have besides
+KINDS: dict[str, tuple[str, dict[str, Any]]] = {
+    "published": ("elevator-effectiveness", {}),
+    "class all": ("elevator-effectiveness", {"fdi.fault_class": "all"}),
+    "real air, sensors, statistical": ("robust-elevator-all", {}),
+    "autopilot": (
+        "elevator-effectiveness",
+        {"autopilot": {"altitude_m": [{"hold": True}], "heading_deg": [{"hold": True}]}},
+    ),
+}
+Taken = tuple[np.ndarray, int, float]
+
+
+def by_kind(rounds: int, between: Callable[[], object] = lambda: None) -> dict[str, dict[str, Any]]:
+    """What a flight of each kind costs, all kinds in each round; `between` is called before every round.
+
+    Processor time: `parts_ms` by part, `bare_ms` for JSBSim's frames alone, `frames_ratio` and `flight_ratio`
+    to those, and `own_part_us`, what the loop adds to a JSBSim frame. Ratios are formed within a round; all
+    are medians over the rounds.
+    """
+    sweeps = {kind: load_sweep(name) for kind, (name, _) in KINDS.items()}
+    seen: dict[str, list[Taken]] = {kind: [] for kind in KINDS}
+    for run in range(-1, rounds):
+        between()
+        for kind, (_, changes) in KINDS.items():
+            taken = _flown(sweeps[kind], changes, max(run, 0))
+            if run >= 0:  # the first is the warm-up
+                seen[kind].append(taken)
+    return {kind: _medians(rows) for kind, rows in seen.items()}
+
+
+def _flown(sweep: Sweep, changes: dict[str, Any], run: int) -> Taken:
+    """Seconds of each part of one flight, JSBSim frames flown, and seconds of as many by JSBSim alone.
+
+    All that `sweep` does for a flight; its trim is a new one each time.
+    """
+    (assignment,) = Plan(sweep).assignments([run])
+    conditions._trims.clear()
+    marks = [time.process_time()]
+    scenario = scenario_of(sweep, assignment)
+    marks.append(time.process_time())
+    if changes:  # not a part of a flight that a sweep makes
+        scenario = scenario.with_(changes)
+        marks = [marks[0] + time.process_time() - marks[1], time.process_time()]
+    loop = Loop(scenario)
+    marks.append(time.process_time())
+    for _ in loop.chunks():
+        pass
+    marks.append(time.process_time())
+    flight = loop.land()
+    row_of(assignment.run, assignment.values, scenario.seed, metrics(flight), flight)
+    marks.append(time.process_time())
+    runs = flight.frames * scenario.substeps
+    alone = _alone(loop.plant.run, runs)
+    loop.release()
+    return np.diff(marks), runs, alone
+
+
+def _alone(run: Callable[[], object], runs: int) -> float:
+    began = time.process_time()
+    for _ in range(runs):
+        run()
+    return time.process_time() - began
+
+
+def _medians(rows: list[Taken]) -> dict[str, Any]:
+    parts, runs, alone = (np.array(column) for column in zip(*rows, strict=True))
+    frames_s = parts[:, STAGES.index("frames")]
+    return {
+        "parts_ms": dict(zip(STAGES, (1e3 * np.median(parts, axis=0)).round(3).tolist(), strict=True)),
+        "bare_ms": round(1e3 * float(np.median(alone)), 3),
+        "frames_ratio": round(float(np.median(frames_s / alone)), 3),
+        "flight_ratio": round(float(np.median(parts.sum(axis=1) / alone)), 3),
+        "own_part_us": round(1e6 * float(np.median((frames_s - alone) / runs)), 3),
+    }
+
+
+class WholeFlight:
+    """`fly`, with the log in memory or, given a file, on disk."""
+
+    def __init__(self, scenario: Scenario, log: Path | None = None) -> None:
+        self._scenario, self._log = scenario, log
+
+    def prepare(self) -> None:
+        """Every flight is new."""
+
+    def fly(self, frames: int) -> None:
+        """Fly the scenario, which must last that many frames."""
+        if self._log is None:
+            fly(self._scenario)
+        else:
+            with ParquetLog(self._log) as log:
+                fly(self._scenario, log)
+
+
+_ALTERNATIVES = {
+    "straightforward": "properties by name, estimators in NumPy",
+    "python_detector": "a detector in Python plugged in",
+    "python_law": "a law in Python plugged in",
+    "python_detector_and_law": "both",
+    "properties_through_python": "properties through JSBSim's Python binding",
+}
+
+
+def text_of(document: dict[str, Any]) -> str:
+    """The document of `bench` as text."""
+    return "\n".join([
+        "{processor}, {cores} cores, Python {python}, JSBSim {jsbsim}".format(**document["machine"]),
+        "us a frame: medians [quartiles] over {rounds} rounds of {frames_a_round} frames".format(**document),
+        "",
+        "after the alarm: every estimator, the network and the fault-tolerant law at work",
+        *_phase_lines(document),
+        "",
+        "before the alarm",
+        *_phase_lines(document["before_alarm"]),
+        "",
+        "other ways, after the alarm",
+        *(_line(_ALTERNATIVES[name], figures) for name, figures in document["alternatives"].items()),
+        "",
+        *_flights(document["whole_flight"]),
+        "",
+        *_kinds(document["sweep_flights"]),
+    ])  # fmt: skip
+
+
+def _phase_lines(phase: dict[str, Any]) -> list[str]:
+    parts = phase["parts"].items()
+    return [
+        _line("bare aircraft", {**phase, "ratio": 1.0}, "bare_us"),
+        *(_line(f"  + {name}", part) + f"{part['adds_us']:+10.3f}" for name, part in parts),
+        _line("closed loop", phase, "closed_loop_us"),
+    ]
+
+
+def _flights(flights: dict[str, Any]) -> list[str]:
+    with_file = {**flights, "ratio": flights["with_log_file_ratio"]}
+    return [
+        f"whole flights of {flights['frames']} frames, loading and trim included",
+        _line("bare aircraft", {**flights, "ratio": 1.0}, "bare_us"),
+        _line("closed loop", flights, "closed_loop_us"),
+        _line("with a log file", with_file, "with_log_file_us"),
+    ]
+
+
+def _kinds(kinds: dict[str, Any]) -> list[str]:
+    """A line a kind of flight; the parts are the same for all."""
+    parts = list(next(iter(kinds.values()))["parts_ms"])
+    head = [*parts, "frames alone", "frames, x", "flight, x", "us added a frame"]
+    widths = [max(len(word), 8) + 2 for word in head]
+    return [
+        "flights of 15 s in a sweep, ms of processor time; x: of what JSBSim alone takes for its frames",
+        " " * 32 + "".join(f"{word:>{width}}" for word, width in zip(head, widths, strict=True)),
+        *(_kind(kind, of, widths) for kind, of in kinds.items()),
+    ]
+
+
+def _kind(kind: str, of: dict[str, Any], widths: list[int]) -> str:
+    figures = (
+        *of["parts_ms"].values(), of["bare_ms"], of["frames_ratio"], of["flight_ratio"], of["own_part_us"]
+    )  # fmt: skip
+    return f"{kind:32}" + "".join(f"{f:{width}.3f}" for f, width in zip(figures, widths, strict=True))
+
+
+def _line(what: str, figures: dict[str, Any], us: str = "us") -> str:
+    low, high = figures[f"{us}_quartiles"]
+    return f"{what:42}{figures[us]:9.3f}  [{low:.3f}, {high:.3f}]{figures['ratio']:9.3f} x"

@@ -55,7 +55,7 @@ class Trace:
     us: float = 0.0
     rises: tuple[tuple[float, float], ...] = ()
 
-    def watched_s(self, level: float = 1.0) -> float:
+    def fault_free_s(self, level: float = 1.0) -> float:
         """Time in which an alarm would have been false: until the fault, the end or the alarm itself."""
         return next((at_s for at_s, value in self.rises if value > level), self.healthy_s)
 

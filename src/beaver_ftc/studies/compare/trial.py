@@ -3,16 +3,61 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from math import hypot, inf
+from pathlib import Path
 from time import thread_time
 from typing import Any
 
-from beaver_ftc.documents.errors import BeaverFtcError
+from beaver_ftc.documents.errors import BadInput, BeaverFtcError
+from beaver_ftc.documents.paths import data_root
 from beaver_ftc.loop.flight import Flight
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.results.metrics import metrics
 from beaver_ftc.scenario.schema import Scenario
-from beaver_ftc.studies.compare.flights import Case
 from beaver_ftc.studies.compare.replay import Recording, Trace, record, replay
+
+CALIBRATION = "calibration"
+CALIBRATION_ERRORS = "calibration-errors"
+
+
+@dataclass(frozen=True)
+class Case:
+    """One flight of a set."""
+
+    set: str
+    scenario: Scenario
+
+
+def of_sweep(path: str | Path, set_name: str | None = None, most: int | None = None) -> list[Case]:
+    """The flights of a sweep file, the first `most` of them. Raises BadInput for what is wrong with it."""
+    from beaver_ftc.scenario.sweep_loader import load_sweep
+    from beaver_ftc.studies.sweep.one_flight import scenario_of
+    from beaver_ftc.studies.sweep.sampling import Plan
+
+    sweep = load_sweep(path)
+    count = sweep.flights if most is None else min(most, sweep.flights)
+    assignments = Plan(sweep).assignments(range(count))
+    return [Case(set_name or sweep.name, scenario_of(sweep, flight)) for flight in assignments]
+
+
+def benchmark_folder() -> Path:
+    """Where the standard sets are: a folder a set, sweep files in it."""
+    return data_root() / "scenarios" / "benchmark"
+
+
+def set_names() -> list[str]:
+    """The standard sets but those that are for tuning."""
+    folders = sorted(path.name for path in benchmark_folder().iterdir() if path.is_dir())
+    return [name for name in folders if not name.startswith(CALIBRATION)]
+
+
+def of_set(name: str, most: int | None = None) -> list[Case]:
+    """The flights of a standard set; of each of its sweeps, the first `most`."""
+    folder = benchmark_folder() / name
+    if not folder.is_dir():
+        allowed = ", ".join([*set_names(), CALIBRATION, CALIBRATION_ERRORS])
+        raise BadInput(f"no benchmark set {name!r}, allowed: {allowed}")
+    return [case for path in sorted(folder.glob("*.yaml")) for case in of_sweep(path, name, most)]
+
 
 SCHEME, LAW, ORACLE = "adaptive-estimators", "fault-tolerant", "oracle"
 
@@ -29,7 +74,7 @@ class Entry:
 class Result:
     """What an entry made of a case. Times in s, errors in deg/s; infinite where there is none.
 
-    healthy_s: time under observation without a fault, until the first alarm. rms_deg_s: over all axes,
+    fault_free_s: time under observation without a fault, until the first alarm. rms_deg_s: over all axes,
     after the fault (all the flight without one), and infinite after a departure. before_deg_s, after_deg_s:
     the same before and after it. travel_deg_s: path of all surfaces over the time flown.
     energy_deg2_s2: mean square of their speeds, summed: what moves a mass against friction spends.
@@ -37,7 +82,7 @@ class Result:
 
     entry: Entry
     false_alarm: bool
-    healthy_s: float
+    fault_free_s: float
     faulted: bool
     delay_s: float = inf
     isolated: str | None = None
@@ -134,7 +179,7 @@ def result_of(flight: Flight, entry: Entry, us: float) -> Result:
     return Result(
         entry=entry,
         false_alarm=document["false_alarm"],
-        healthy_s=document["fault_free_s"],
+        fault_free_s=document["fault_free_s"],
         faulted=fault is not None and end_s > fault["at_s"],
         delay_s=_or_never(detection["delay_s"]),
         isolated=isolation["fault"],

@@ -30,9 +30,17 @@ from typing import Any
 
 from beaver_ftc.diagnosis.rivals.options import TUNED, TUNED_FOR_ERRORS
 from beaver_ftc.loop.loop import fly
-from beaver_ftc.studies.compare.flights import CALIBRATION, CALIBRATION_ERRORS, Case, of_set
 from beaver_ftc.studies.compare.replay import Trace, record, replay
-from beaver_ftc.studies.compare.trial import SCHEME, Entry, result_of, with_entry
+from beaver_ftc.studies.compare.trial import (
+    CALIBRATION,
+    CALIBRATION_ERRORS,
+    SCHEME,
+    Case,
+    Entry,
+    of_set,
+    result_of,
+    with_entry,
+)
 from beaver_ftc.studies.engine.study import fly_all
 
 Options = dict[str, float]

@@ -4,6 +4,7 @@ All are functions of counts alone. A bound that the flights do not give is infin
 """
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -81,6 +82,12 @@ def quantile(ordered: np.ndarray, q: float) -> float:
     if not ordered.size:
         return math.nan
     return float(ordered[max(0, math.ceil(q * ordered.size - 1e-9) - 1)])
+
+
+def share_within(values: Iterable[float | None], share: float) -> float:
+    """The smallest value that at least this share do not exceed; None is infinite, as it is of none."""
+    ordered = np.sort([math.inf if value is None else value for value in values])
+    return quantile(ordered, share) if ordered.size else math.inf
 
 
 def quantile_bound(ordered: np.ndarray, q: float, confidence: float, upper: bool) -> float:

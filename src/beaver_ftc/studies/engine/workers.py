@@ -220,7 +220,7 @@ def silence() -> Iterator[None]:
 
 _PRELOAD = [
     "beaver_ftc.studies.engine.workers",
-    "beaver_ftc.studies.sweep.flying",
+    "beaver_ftc.studies.sweep.one_flight",
     "beaver_ftc.loop.loop",
     "beaver_ftc.results.metrics",
 ]

@@ -16,10 +16,9 @@ from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.scenario.sweep_loader import Sweep
 from beaver_ftc.studies.engine.study import Batch
 from beaver_ftc.studies.present.tables import finite
+from beaver_ftc.studies.sweep.one_flight import AXES, DEPARTED, Row, counts_of_rows
 from beaver_ftc.studies.sweep.sampling import Assignment, value_at
-from beaver_ftc.studies.sweep.source import Landed
-from beaver_ftc.studies.sweep.store import Store
-from beaver_ftc.studies.sweep.table import AXES, DEPARTED, Row, counts_of_rows
+from beaver_ftc.studies.sweep.store import Landed, Store
 
 if TYPE_CHECKING:
     import pyarrow as pa

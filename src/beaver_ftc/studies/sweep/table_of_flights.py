@@ -62,9 +62,8 @@ def _made(scenario: ScenarioLike, asked: dict[str, Any]) -> Sweep:
 
 def _here(made: Sweep) -> "pa.Table":
     """Flown one after the other in this process."""
-    from beaver_ftc.studies.sweep.flying import Job, fly_one
+    from beaver_ftc.studies.sweep.one_flight import Job, fly_one, schema_of, table_of
     from beaver_ftc.studies.sweep.sampling import Plan
-    from beaver_ftc.studies.sweep.table import schema_of, table_of
 
     rows = [fly_one(Job(made), flight) for flight in Plan(made).assignments(range(made.flights))]
     return table_of(made, schema_of(made), rows)
@@ -74,7 +73,7 @@ def _kept(made: Sweep, workers: int, out: str | PathLike[str] | None) -> "pa.Tab
     """Flown by worker processes into a result folder, for good or to be read once."""
     import pyarrow.parquet as pq
 
-    from beaver_ftc.studies.sweep.run import Options, run_sweep
+    from beaver_ftc.studies.sweep.campaign import Options, run_sweep
 
     with TemporaryDirectory(prefix="beaver-ftc-") as scratch, _main_hidden():
         folder = Path(scratch if out is None else out)

@@ -12,12 +12,13 @@ import numpy as np
 
 from beaver_ftc.results.looks import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILION
 from beaver_ftc.studies.engine.statistics import wilson
-from beaver_ftc.studies.sweep.flights import Flights
+from beaver_ftc.studies.sweep.outcomes import Flights
 from beaver_ftc.studies.sweep.summary import NO_ALARM
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
 
 Document = dict[str, Any]
 Drawer = Callable[[Flights, Document], "Figure | None"]

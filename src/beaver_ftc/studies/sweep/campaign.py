@@ -15,14 +15,14 @@ from beaver_ftc.scenario.sweep_loader import Sweep
 from beaver_ftc.studies.engine.store import clear_disk_errors, write_whole
 from beaver_ftc.studies.engine.study import Campaign, Source
 from beaver_ftc.studies.engine.workers import LocalWorkers, Work, Workers, cores
-from beaver_ftc.studies.sweep.flying import Job, Keep, fly_one, keep_flight, lost, scenario_of, warm_up
+from beaver_ftc.studies.sweep.one_flight import Job, Keep, fly_one, keep_flight, lost, scenario_of, warm_up
 from beaver_ftc.studies.sweep.sampling import Assignment, Plan
 from beaver_ftc.studies.sweep.search import SearchSource, found
-from beaver_ftc.studies.sweep.source import SweepSource
-from beaver_ftc.studies.sweep.store import Store, identity_of
+from beaver_ftc.studies.sweep.store import Store, SweepSource, identity_of
 
 if TYPE_CHECKING:
-    from beaver_ftc.studies.sweep.flights import Flights
+    from beaver_ftc.studies.sweep.outcomes import Flights
+
 
 Document = dict[str, Any]
 
@@ -140,10 +140,8 @@ def _workers(sweep: Sweep, options: Options) -> Workers:
 
 def conclude(sweep: Sweep, options: Options, store: Store) -> Document:
     """Write what the flights of a complete `results.parquet` show; `summary.json`, last, says all is done."""
-    from beaver_ftc.studies.sweep.expectations import evaluate
-    from beaver_ftc.studies.sweep.flights import Flights
-    from beaver_ftc.studies.sweep.summary import summarise
-    from beaver_ftc.studies.sweep.worst import replay_command, worst_flights
+    from beaver_ftc.studies.sweep.outcomes import Flights, replay_command, worst_flights
+    from beaver_ftc.studies.sweep.summary import evaluate, summarise
 
     flights = Flights.read(store.results, sweep)
     document = summarise(flights, sweep)
@@ -171,8 +169,8 @@ def _keep_worst(sweep: Sweep, options: Options, document: Document) -> None:
 
 
 def _draw(sweep: Sweep, flights: "Flights", document: Document, store: Store) -> None:
-    from beaver_ftc.studies.sweep.figures import write_figures
-    from beaver_ftc.studies.sweep.report import render
+    from beaver_ftc.studies.sweep.pictures import write_figures
+    from beaver_ftc.studies.sweep.summary_page import render
 
     with clear_disk_errors(store.folder):
         write_figures(flights, document, store.folder / "figures")
@@ -203,7 +201,7 @@ def replay(sweep: Sweep, options: Options, index: int) -> Document:
 
 def _link(folder: Path) -> None:
     """Let the sweep's report, if there is one, lead to the flight that has just been flown."""
-    from beaver_ftc.studies.sweep.report import render
+    from beaver_ftc.studies.sweep.summary_page import render
 
     if (folder / "report.html").exists():
         document = json.loads((folder / "summary.json").read_text(encoding="utf-8"))

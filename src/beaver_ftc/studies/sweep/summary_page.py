@@ -3,13 +3,19 @@
 Everything is said from the summary document, so that the words and `summary.json` cannot disagree.
 """
 
+from functools import cache
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from beaver_ftc.studies.present.page import picture_data
 from beaver_ftc.studies.present.tables import number, printed
-from beaver_ftc.studies.sweep.table import AXES
+from beaver_ftc.studies.sweep.one_flight import AXES
+from beaver_ftc.studies.sweep.pictures import FIGURES
 
 if TYPE_CHECKING:
+    from jinja2 import Environment
     from rich.table import Table
+
 
 Document = dict[str, Any]
 
@@ -195,3 +201,51 @@ def _guarantee(found: Document) -> str:
 def _drivers(ranking: list[Document]) -> str:
     told = [entry for entry in ranking if entry["p_value"] <= 0.05 and entry["explained"] >= 0.01][:3]
     return ", ".join(f"{entry['key']} ({percent(entry['explained'])} of the ranks)" for entry in told)
+
+
+_TEMPLATES = Path(__file__).parent / "templates"
+_OUTCOMES = {
+    "detection_delay": "detection delay",
+    "missed_detection": "missed detection",
+    "tracking_error": "tracking error",
+    "residual_before_fault": "residual before the fault",
+}
+
+
+def render(summary: Document, folder: Path) -> str:
+    """The report as HTML text, from the summary and the figures and flights in the sweep's folder."""
+    return _environment().get_template("sweep.html.j2").render(
+        summary=summary,
+        title=title(summary),
+        facts=facts(summary),
+        tracking=tracking(summary),
+        expectations=expectations(summary),
+        sensitivity=[(_OUTCOMES[name], ranking) for name, ranking in summary["sensitivity"].items()
+                     if ranking],
+        worst=[flight | {"link": _link(folder, flight["name"])} for flight in summary["worst"]],
+        figures=_figures(folder),
+        value=value,
+        percent=percent,
+    )  # fmt: skip
+
+
+def _link(folder: Path, name: str) -> str | None:
+    """Where a kept flight is to be seen, relative to the report."""
+    for seen in ("report.html", "metrics.json", "scenario.yaml"):
+        if (folder / "flights" / name / seen).is_file():
+            return f"flights/{name}/{seen}"
+    return None
+
+
+def _figures(folder: Path) -> list[tuple[str, str]]:
+    """(title, PNG as base64) of each figure there is."""
+    paths = [(title, folder / "figures" / f"{name}.png") for name, (title, _) in FIGURES.items()]
+    return [(title, picture_data(path)) for title, path in paths if path.exists()]
+
+
+@cache
+def _environment() -> "Environment":
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+    options: dict[str, Any] = {"autoescape": True, "trim_blocks": True, "lstrip_blocks": True}
+    return Environment(loader=FileSystemLoader(_TEMPLATES), undefined=StrictUndefined, **options)

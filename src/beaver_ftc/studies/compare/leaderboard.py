@@ -1,0 +1,224 @@
+"""The comparison as tables."""
+
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from beaver_ftc.results.looks import BLUE, GREY
+from beaver_ftc.results.metrics import as_json
+from beaver_ftc.studies.compare.scores import document_of
+from beaver_ftc.studies.compare.trial import LAW, ORACLE, SCHEME, Case, Entry, Trial, fly_case
+from beaver_ftc.studies.engine.study import Progress, Study, run_study
+from beaver_ftc.studies.present import page
+from beaver_ftc.studies.present.figures import curve_look, marker, panels
+from beaver_ftc.studies.present.files import Files
+from beaver_ftc.studies.present.tables import aligned
+
+Document = dict[str, Any]
+Cell = Callable[[Document, Document], str]
+
+
+def _share(value: float | None) -> str:
+    return "-" if value is None else f"{100 * value:.0f}"
+
+
+def _seconds(value: float | None) -> str:
+    return "never" if value is None else f"{value:.2f}"
+
+
+def _alarms(row: Document, _: Document) -> str:
+    rate, upper = row["false_alarms_per_h"], row["false_alarms_per_h_upper"]
+    return "-" if rate is None else f"{rate:.3g} (<{upper:.2g})"
+
+
+def _of_faults(show: Callable[[Document], str]) -> Cell:
+    return lambda row, _: show(row) if row["faults"] else "-"
+
+
+def _free(row: Document, part: Document) -> str:
+    point = part["without_false_alarm"].get(row["scheme"])
+    if point is None or not row["faults"]:
+        return "-"
+    return f"{_share(point['detection_rate'])} / {_seconds(point['delay_median_s'])}"
+
+
+def _ratio(row: Document, _: Document) -> str:
+    def shown(value: float | None) -> str:
+        return "lost" if value is None else f"{value:.2f}"
+
+    return f"{shown(row['ratio_median'])} / {shown(row['ratio_90'])}"
+
+
+def _rate(value: float | None) -> str:
+    return "-" if value is None else f"{value:.3g}"
+
+
+def _pair(part: str) -> Cell:
+    """Median and 90 % of the tracking error of a part of the flight."""
+    return lambda row, _: f"{_rate(row.get(part + '_median'))} / {_rate(row.get(part + '_90'))}"
+
+
+DIAGNOSIS: tuple[tuple[str, Cell], ...] = (
+    ("scheme", lambda row, _: row["scheme"]),
+    ("false alarms/h (95 %)", _alarms),
+    ("detected %", _of_faults(lambda row: _share(row["detection_rate"]))),
+    (
+        "delay s 50/90 %",
+        _of_faults(lambda row: f"{_seconds(row['delay_median_s'])} / {_seconds(row['delay_90_s'])}"),
+    ),
+    ("isolated %", _of_faults(lambda row: _share(row["isolation_rate"]))),
+    ("with no false alarm: detected % / delay s", _free),
+    ("tracking/oracle 50/90 %", _ratio),
+    ("lost", lambda row, _: str(row["departures"])),
+    ("us/frame", lambda row, _: f"{row['us']:.0f}"),
+)
+CONTROL: tuple[tuple[str, Cell], ...] = (
+    ("law", lambda row, _: row["law"]),
+    *DIAGNOSIS[6:],
+    ("error before, deg/s 50/90 %", _pair("before")),
+    ("after", _pair("after")),
+    ("travel deg/s", lambda row, _: _rate(row.get("travel_median"))),
+    ("energy deg2/s2", lambda row, _: _rate(row.get("energy_median"))),
+)
+
+
+def sections(part: Document) -> list[tuple[list[str], list[list[str]]]]:
+    """(header, rows) of the schemes with our law, and of the laws with our scheme."""
+    schemes = [row for row in part["lines"] if row["law"] == LAW]
+    laws = [row for row in part["lines"] if row["scheme"] == SCHEME]
+    return [_section(DIAGNOSIS, schemes, part), _section(CONTROL, laws, part)]
+
+
+def _section(
+    columns: Sequence[tuple[str, Cell]], rows: Sequence[Document], part: Document
+) -> tuple[list[str], list[list[str]]]:
+    return [name for name, _ in columns], [[cell(row, part) for _, cell in columns] for row in rows]
+
+
+def as_text(document: Document) -> str:
+    """For a terminal."""
+    blocks = []
+    for name, part in document["sets"].items():
+        blocks.append(f"{name}: {part['flights']} flights")
+        blocks += [aligned([header, *rows]) + "\n" for header, rows in sections(part)]
+        blocks += part["better_than_ours"] + [f"could not fly: {error}" for error in part["errors"]]
+        blocks.append("")
+    return "\n".join(blocks)
+
+
+MARK = "<!-- everything below is written by `beaver-ftc compare --benchmark` -->"
+_SAYS = (
+    "The same flights for every scheme, with the fault-tolerant law, and for every law, with our scheme. "
+    "Lines in the figure run over all alarm levels of a scheme's statistic, on flights under the nominal "
+    "law; the mark is the level it ships with."
+)
+_STEM = "comparison"
+_FIGURE = "Detection rate and delay against false alarms, and tracking against the oracle"
+
+
+def page_of(document: Document, title: str, folder: Path) -> str:
+    """The page; the figure in the folder goes into it."""
+    versions = page.versions_line(document["versions"])
+    parts = [_SAYS, page.Pictures([(_FIGURE, _STEM)]), *_sets(document), versions]
+    return page.as_html(title, parts, {_STEM: folder / f"{_STEM}.png"})
+
+
+def write_leaderboard(document: Document, path: Path) -> None:
+    """Replace what stands below the mark; what stands above it was written by hand and stays."""
+    above = path.read_text(encoding="utf-8").partition(MARK)[0] if path.exists() else "# Benchmark\n\n"
+    made = f"Made with {page.versions_line(document['versions'])}."
+    path.write_text(above + page.as_markdown([MARK, made, *_sets(document)]), encoding="utf-8")
+
+
+def _sets(document: Document) -> Iterator[page.Part]:
+    for name, part in document["sets"].items():
+        yield page.Heading(f"{name}: {part['flights']} flights")
+        yield from (page.Table(header, rows) for header, rows in sections(part))
+        losses = [f"{sentence}." for sentence in part["better_than_ours"]]
+        nothing = "nothing here: in these tables no rival has a better number than ours, us/frame aside."
+        yield page.Bullets("What loses:", losses or [nothing])
+
+
+def figure_of(document: Document) -> Any:
+    """A row a set."""
+    sets = document["sets"]
+    figure, axes = panels(len(sets), 3, 13.0, 3.4 * len(sets), dpi=120)
+    for row, (name, part) in zip(axes, sets.items(), strict=True):
+        _draw_curves(row[0], row[1], part)
+        _draw_ratios(row[2], part)
+        row[0].set_title(f"{name}: {part['flights']} flights", loc="left", fontsize=10)
+    axes[0][0].legend(fontsize=7)
+    return figure
+
+
+def _draw_curves(rate: Any, delay: Any, part: Document) -> None:
+    for index, (scheme, points) in enumerate(part["trade_off"].items()):
+        look = curve_look(index)
+        alarms = [point["false_alarms_per_h"] for point in points]
+        own = next(point for point in points if point["level"] == 1.0)
+        for axis, key in ((rate, "detection_rate"), (delay, "delay_median_s")):
+            values = [float("nan") if point[key] is None else point[key] for point in points]
+            axis.plot(alarms, values, label=scheme, drawstyle="steps-post", **look)
+            if own[key] is not None:
+                axis.plot(own["false_alarms_per_h"], own[key], marker(index), color=look["color"])
+    for axis, label in ((rate, "detection rate"), (delay, "median detection delay, s")):
+        axis.set_xlabel("false alarms per hour")
+        axis.set_ylabel(label)
+        axis.set_xscale("symlog", linthresh=10.0)
+        axis.set_xlim(left=-1.0)
+        axis.grid(alpha=0.3)
+    rate.set_ylim(-0.05, 1.05)
+    delay.set_yscale("symlog", linthresh=0.01)
+    delay.set_ylim(bottom=0.0)
+
+
+def _draw_ratios(axis: Any, part: Document) -> None:
+    rows = [row for row in part["lines"] if row["scheme"] == SCHEME and row["law"] != ORACLE]
+    for place, row in enumerate(rows):
+        median, most = row["ratio_median"], row["ratio_90"]
+        colour = BLUE if row["law"] == LAW else GREY
+        if median is not None:
+            axis.plot([median, median if most is None else most], [place, place], color=colour, linewidth=3)
+            axis.plot(median, place, "o", color=colour)
+        if most is None:
+            axis.annotate(
+                "aircraft lost", (1.0, place), fontsize=7, xytext=(4, 5), textcoords="offset points"
+            )
+    axis.plot([1.0, 1.0], [-0.5, len(rows) - 0.5], color="#000000", linewidth=0.8)
+    axis.set_yticks(range(len(rows)), [row["law"] for row in rows], fontsize=7)
+    axis.set_xscale("log")
+    axis.xaxis.set_major_formatter("{x:g}")
+    axis.xaxis.set_minor_formatter("")
+    axis.set_xlabel("tracking error over the oracle's: median to 90 %")
+    axis.grid(alpha=0.3)
+
+
+def run_comparison(
+    out: Path,
+    name: str,
+    cases: Sequence[Case],
+    entries: Sequence[Entry],
+    workers: int = 1,
+    progress: Progress | None = None,
+) -> Document:
+    """Write `out/<name>/` (document, figure, page) of every case with every entry; return the document."""
+    study = Study(
+        name, cases, partial(fly_case, entries=tuple(entries)), partial(document_of, entries=entries),
+        partial(files_of, name=name), row=Trial, follows_from=entries, lost=lost,
+    )  # fmt: skip
+    return run_study(study, out, workers, progress)
+
+
+def files_of(document: Document, name: str) -> Files:
+    """Document, figure and page."""
+    return {
+        "comparison.json": as_json(document),
+        "comparison.png": figure_of(document),
+        "comparison.html": partial(page_of, document, f"Comparison: {name}"),
+    }
+
+
+def lost(case: Any, why: str) -> Trial:
+    """What becomes of a case that ends its process: no results, and why."""
+    return Trial(case.what.set, failures=[f"{case.what.scenario.name}: {why}"])

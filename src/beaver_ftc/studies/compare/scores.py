@@ -1,0 +1,198 @@
+"""From the results of many flights to one line an entry, with the uncertainty of counting, and one document:
+what tables, figure, page and `--format json` are made from.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict, dataclass
+from math import inf
+from statistics import median
+from typing import Any
+
+from beaver_ftc.results.metrics import versions
+from beaver_ftc.studies.compare.replay import Trace
+from beaver_ftc.studies.compare.trial import LAW, ORACLE, SCHEME, Entry, Result, Trial
+from beaver_ftc.studies.engine.statistics import CONFIDENCE, poisson_bound, share_within, wilson_bound
+from beaver_ftc.studies.present.tables import finite
+
+Document = dict[str, Any]
+
+
+def line_of(entry: Entry, results: Sequence[Result], oracle: Sequence[Result]) -> Document:
+    """Tally one entry over one set; oracle: the yardstick's results of the same flights, in the same order.
+
+    What never comes is infinite; None where there was nothing to count.
+    """
+    flown = [(mine, best) for mine, best in zip(results, oracle, strict=True) if mine.error is None]
+    mine = [result for result, _ in flown]
+    faulted = [result for result in mine if result.faulted]
+    alarms, hours = sum(r.false_alarm for r in mine), sum(r.fault_free_s for r in mine) / 3600.0
+    detected, n = sum(r.delay_s < inf for r in faulted), len(faulted)
+    ratios = [m.rms_deg_s / o.rms_deg_s for m, o in flown if o.error is None and 0 < o.rms_deg_s < inf]
+    return {
+        "scheme": entry.scheme,
+        "law": entry.law,
+        "flights": len(mine),
+        "failed": len(results) - len(mine),
+        "false_alarms": alarms,
+        "healthy_h": hours,
+        "false_alarms_per_h": alarms / hours if hours else None,
+        "false_alarms_per_h_upper": poisson_bound(alarms, hours, CONFIDENCE, upper=True) if hours else None,
+        "faults": n,
+        "detection_rate": detected / n if n else None,
+        "detection_rate_lower": wilson_bound(detected, n, CONFIDENCE, upper=False) if n else None,
+        "delay_median_s": share_within([r.delay_s for r in faulted], 0.5),
+        "delay_90_s": share_within([r.delay_s for r in faulted], 0.9),
+        "isolation_rate": sum(r.correct for r in faulted) / n if n else None,
+        "isolation_delay_median_s": share_within([r.isolation_delay_s for r in faulted], 0.5),
+        **_spread("ratio", ratios),
+        "departures": sum(r.departed for r in mine),
+        "us": median(r.us for r in mine) if mine else 0.0,
+        **_spread("before", [r.before_deg_s for r in mine]),
+        **_spread("after", [r.after_deg_s for r in faulted]),
+        **_spread("travel", [r.travel_deg_s for r in mine], ("median",)),
+        **_spread("energy", [r.energy_deg2_s2 for r in mine], ("median",)),
+    }
+
+
+def _spread(name: str, values: Sequence[float], which: Sequence[str] = ("median", "90")) -> Document:
+    shares = {"median": 0.5, "90": 0.9}
+    return {f"{name}_{part}": share_within(values, shares[part]) if values else None for part in which}
+
+
+def lines_of(trials: Sequence[Trial], entries: Sequence[Entry]) -> list[Document]:
+    """One line an entry, in their order."""
+    yardstick = _results(trials, Entry(SCHEME, ORACLE))
+    return [line_of(entry, _results(trials, entry), yardstick) for entry in entries]
+
+
+def _results(trials: Iterable[Trial], entry: Entry) -> list[Result]:
+    return [result for trial in trials for result in trial.results if result.entry == entry]
+
+
+@dataclass(frozen=True)
+class Point:
+    """One level of a scheme's statistic: what it costs in false alarms, and what it buys."""
+
+    level: float
+    false_alarms_per_h: float
+    detection_rate: float
+    delay_median_s: float
+
+
+def trade_off(traces: Sequence[Trace]) -> list[Point]:
+    """Every level at which the number of false alarms changes, from the strictest; and the scheme's own,
+    1."""
+    levels = sorted({1.0, *(trace.before for trace in traces if trace.before > 0.0)}, reverse=True)
+    return [point_at(traces, level) for level in levels]
+
+
+def point_at(traces: Sequence[Trace], level: float) -> Point:
+    """False alarms, detections and delay at a level of the statistic.
+
+    Detections and delays are of the flights in which the fault was still to be detected: no false alarm
+    before it.
+    """
+    hours = sum(trace.fault_free_s(level) for trace in traces) / 3600.0
+    alarms = sum(trace.false_alarm(level) for trace in traces)
+    delays = [trace.delay_s(level) for trace in traces if trace.faulted and not trace.false_alarm(level)]
+    rate = sum(delay < inf for delay in delays) / len(delays) if delays else 0.0
+    return Point(level, alarms / hours if hours else 0.0, rate, share_within(delays, 0.5))
+
+
+def matched(traces: Sequence[Trace], per_hour: float = 0.0) -> Point:
+    """The most sensitive level with no more false alarms than this."""
+    points = [point for point in trade_off(traces) if point.false_alarms_per_h <= per_hour]
+    return min(points, key=lambda point: point.level)
+
+
+# (key of a line, what it is called, whether more is better); what is held against ours in `verdicts`
+COMPARED = (
+    ("false_alarms_per_h", "false alarms per hour", False),
+    ("detection_rate", "detection rate", True),
+    ("delay_median_s", "median detection delay, s", False),
+    ("delay_90_s", "90 % detection delay, s", False),
+    ("isolation_rate", "isolation accuracy", True),
+)
+MATCHED = (("detection_rate", "detection rate", True), ("delay_median_s", "median detection delay, s", False))
+TRACKING = (
+    ("ratio_median", "median tracking ratio to the oracle", False),
+    ("ratio_90", "90 % tracking ratio to the oracle", False),
+    ("departures", "departures", False),
+)
+EFFORT = (
+    ("before_median", "median error before the fault, deg/s", False),
+    ("before_90", "90 % error before the fault, deg/s", False),
+    ("after_median", "median error after the fault, deg/s", False),
+    ("after_90", "90 % error after the fault, deg/s", False),
+    ("travel_median", "median travel of the surfaces, deg/s", False),
+    ("energy_median", "median energy of the surfaces, deg2/s2", False),
+)
+
+
+def document_of(trials: Sequence[Trial], entries: Sequence[Entry]) -> Document:
+    """Tally every set; numbers that do not exist are null."""
+    names = list(dict.fromkeys(trial.set for trial in trials))
+    sets = {name: _set([t for t in trials if t.set == name], entries) for name in names}
+    return {"sets": sets, "versions": dict(versions())}
+
+
+def _set(trials: Sequence[Trial], entries: Sequence[Entry]) -> Document:
+    schemes = list(dict.fromkeys(scheme for trial in trials for scheme in trial.traces))
+    traces = {s: [t.traces[s] for t in trials if s in t.traces] for s in schemes}
+    lines = [{k: finite(v) for k, v in line.items()} for line in lines_of(trials, entries)]
+    free = {s: _point(matched(of)) for s, of in traces.items()}
+    return {
+        "flights": len(trials),
+        "lines": lines,
+        "trade_off": {s: [_point(p) for p in trade_off(of)] for s, of in traces.items()},
+        "without_false_alarm": free,
+        "better_than_ours": better_than_ours(lines, free if any(line["faults"] for line in lines) else {}),
+        "errors": sorted({error for trial in trials for error in _errors(trial)}),
+    }
+
+
+def _errors(trial: Trial) -> list[str]:
+    return [*trial.failures, *(result.error for result in trial.results if result.error)]
+
+
+def _point(point: Point) -> Document:
+    return {key: finite(value) for key, value in asdict(point).items()}
+
+
+def better_than_ours(lines: Sequence[Document], free: Document) -> list[str]:
+    """Where a rival does better than our scheme or our law: one sentence each.
+
+    free: of each scheme, the most sensitive level without a false alarm.
+    """
+    ours = next(row for row in lines if (row["scheme"], row["law"]) == (SCHEME, LAW))
+    schemes = [row for row in lines if row["law"] == LAW and row["scheme"] not in (SCHEME, "none")]
+    laws = [row for row in lines if row["scheme"] == SCHEME and row["law"] not in (LAW, ORACLE)]
+    said = [s for row in schemes for s in _better(row, ours, COMPARED + TRACKING, row["scheme"])]
+    said += [
+        f"with no false alarm, {sentence}"
+        for scheme, point in free.items()
+        if scheme != SCHEME and SCHEME in free
+        for sentence in _better(point, free[SCHEME], MATCHED, scheme)
+    ]
+    return said + [s for row in laws for s in _better(row, ours, TRACKING + EFFORT, row["law"])]
+
+
+def _better(row: Document, ours: Document, compared: Sequence[tuple[str, str, bool]], name: str) -> list[str]:
+    return [
+        f"{name} has the better {what}: {_shown(row.get(key))} against {_shown(ours.get(key))}"
+        for key, what, more in compared
+        if _is_better(row.get(key), ours.get(key), more)
+    ]
+
+
+def _is_better(value: float | None, than: float | None, more: bool) -> bool:
+    """None is the worst there is: a delay that never ends, a rate of nothing."""
+    if value is None:
+        return False
+    if than is None:
+        return True
+    return value > than + 1e-9 if more else value < than - 1e-9
+
+
+def _shown(value: float | None) -> str:
+    return "never" if value is None else f"{value:.3g}"

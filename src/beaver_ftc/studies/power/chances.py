@@ -1,0 +1,249 @@
+"""From traces to alarm levels at an equal false-alarm rate, rows, chances of detection, and one document."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict, dataclass
+from math import inf, isfinite
+from statistics import fmean
+from typing import Any
+
+from beaver_ftc.results.metrics import versions
+from beaver_ftc.studies.compare.replay import Trace
+from beaver_ftc.studies.engine.statistics import Estimate, binomial, poisson, share_within, sign_test
+from beaver_ftc.studies.engine.told import chance
+from beaver_ftc.studies.power.survey import BUILT_IN, WATCHED_S, WITHIN_S, Grid, Watched
+
+
+@dataclass(frozen=True)
+class Level:
+    """An alarm level, and the false alarms it costs: counted, in so many hours, per hour with limits."""
+
+    level: float
+    alarms: int
+    hours: float
+
+    @property
+    def per_h(self) -> Estimate:
+        """False alarms per hour with their exact two-sided limits."""
+        return poisson(self.alarms, self.hours)
+
+
+def level_for(healthy: Sequence[Trace], per_h: float) -> Level:
+    """The most sensitive level with no more false alarms than this; a flight raises one at most."""
+    strictest, *others = sorted({trace.before for trace in healthy}, reverse=True)
+    best = level_at(healthy, strictest)
+    for found in (level_at(healthy, level) for level in others):
+        if found.alarms > per_h * found.hours + 1e-9:
+            break
+        best = found
+    return best
+
+
+def level_at(healthy: Sequence[Trace], level: float) -> Level:
+    """What a level costs in false alarms, over the time until they were raised."""
+    hours = sum(trace.fault_free_s(level) for trace in healthy) / 3600.0
+    return Level(level, sum(trace.false_alarm(level) for trace in healthy), hours)
+
+
+Row = dict[str, Any]
+Document = dict[str, Any]
+Key = tuple[str, str, str]  # sensors, turbulence, scheme
+
+
+def levels_of(healthy: Iterable[Watched], per_h: float) -> dict[Key, Level]:
+    """The level of each scheme under each condition at the false-alarm rate all are held to."""
+    return {key: level_for(traces, per_h) for key, traces in _by_condition(healthy).items()}
+
+
+def own_levels_of(healthy: Iterable[Watched]) -> dict[Key, Level]:
+    """What each scheme costs at the level it ships with."""
+    return {key: level_at(traces, 1.0) for key, traces in _by_condition(healthy).items()}
+
+
+def held_out(faulted: Iterable[Watched], levels: dict[Key, Level]) -> dict[Key, Level]:
+    """False alarms at those levels before the faults: flights that had no part in setting them."""
+    return {key: level_at(of, levels[key].level) for key, of in _by_condition(faulted).items()}
+
+
+def _by_condition(watched: Iterable[Watched]) -> dict[Key, list[Trace]]:
+    """The first trace of each block: its flights are the same as long as there is no fault."""
+    traces: dict[Key, list[Trace]] = {}
+    for one in watched:
+        for scheme, of in one.traces.items():
+            traces.setdefault((*one.block.condition, scheme), []).append(of[0])
+    return traces
+
+
+def rows_of(faulted: Iterable[Watched], levels: dict[Key, Level]) -> list[Row]:
+    """One row a flight and scheme.
+
+    delay_s at the common level, own_delay_s at the scheme's own; None where there is no alarm. An alarm
+    before the fault is a false_alarm and no detection.
+    """
+    return [
+        {
+            "sensors": one.block.condition.sensors,
+            "turbulence": one.block.condition.turbulence,
+            "excitation_deg_s": one.block.excitation_deg_s,
+            "seed": one.block.seed,
+            "surface": surface,
+            "magnitude": magnitude,
+            "scheme": scheme,
+            **_alarms(trace, levels[(*one.block.condition, scheme)].level),
+            **{f"deflection_{s:g}": d for s, d in zip(WITHIN_S, deflections, strict=True)},
+        }
+        for one in faulted
+        for scheme, traces in one.traces.items()
+        for (surface, magnitude), trace, deflections in zip(one.faults, traces, one.deflections, strict=True)
+        if trace.faulted
+    ]
+
+
+def _alarms(trace: Trace, level: float) -> Row:
+    delay_s, own_delay_s = trace.delay_s(level), trace.delay_s(1.0)
+    return {
+        "false_alarm": trace.false_alarm(level),
+        "delay_s": delay_s if isfinite(delay_s) else None,
+        "own_false_alarm": trace.false_alarm(1.0),
+        "own_delay_s": own_delay_s if isfinite(own_delay_s) else None,
+    }
+
+
+def summary(rows: Sequence[Row], own: bool = False) -> Document:
+    """Detection probability within each of WITHIN_S, with exact limits, and the median delay.
+
+    own: at the level each scheme ships with. Flights with an alarm before the fault do not count.
+    """
+    prefix = "own_" if own else ""
+    delays = [
+        inf if row[f"{prefix}delay_s"] is None else row[f"{prefix}delay_s"]
+        for row in rows
+        if not row[f"{prefix}false_alarm"]
+    ]
+    shares = {f"{within_s:g}": _share(delays, within_s) for within_s in WITHIN_S}
+    median_s = share_within(delays, 0.5)
+    return {
+        "flights": len(delays),
+        "within": {name: vars(share) for name, share in shares.items()} if delays else {},
+        "median_delay_s": median_s if isfinite(median_s) else None,
+    }
+
+
+def _share(delays: Sequence[float], within_s: float) -> Estimate:
+    return binomial(sum(delay <= within_s + 1e-9 for delay in delays), len(delays))
+
+
+def limit(rows: Sequence[Row], per_h: float) -> Document:
+    """What a test that is told the fault would find of the same flights, within each of WITHIN_S."""
+    one_each = {(row["excitation_deg_s"], row["seed"], row["surface"], row["magnitude"]): row for row in rows}
+    flights = list(one_each.values())
+    return {
+        f"{within_s:g}": fmean(chance(row[f"deflection_{within_s:g}"], within_s, per_h) for row in flights)
+        for within_s in WITHIN_S
+    }
+
+
+def grouped(rows: Iterable[Row], *names: str) -> dict[tuple[Any, ...], list[Row]]:
+    """Rows by the values of some columns, in order of appearance."""
+    groups: dict[tuple[Any, ...], list[Row]] = {}
+    for row in rows:
+        groups.setdefault(tuple(row[name] for name in names), []).append(row)
+    return groups
+
+
+PLACE = ("sensors", "turbulence", "surface")
+CELL = (*PLACE, "excitation_deg_s", "magnitude", "scheme")
+SIGNIFICANT = 0.05
+JUDGED_S = 1.0
+
+
+def document_of(
+    grid: Grid, healthy: Sequence[Watched], faulted: Sequence[Watched]
+) -> tuple[Document, list[Row]]:
+    """The document, and the rows behind it."""
+    levels = levels_of(healthy, grid.per_h)
+    rows = rows_of(faulted, levels)
+    totals = grouped(rows, *PLACE, "scheme")
+    cells = grouped(rows, *CELL)
+    document = {
+        "grid": {"bouts" if key == "blocks" else key: value for key, value in asdict(grid).items()},
+        "watched_s": WATCHED_S,
+        "false_alarms_per_h": grid.per_h,
+        "levels": _levels(levels, held_out(faulted, levels), own_levels_of(healthy)),
+        "totals": [_line((*PLACE, "scheme"), key, of, own=True) for key, of in totals.items()],
+        "cells": [_line(CELL, key, of) for key, of in cells.items()],
+        "limits": [
+            {**dict(zip(PLACE, key, strict=True)), "within": limit(of, grid.per_h)}
+            for key, of in grouped(rows, *PLACE).items()
+        ],
+        "comparison": _comparison(rows),
+        "failures": sorted({failure for one in (*healthy, *faulted) for failure in one.failures}),
+        "versions": dict(versions()),
+    }
+    return document, rows
+
+
+def _levels(common: dict[Key, Level], apart: dict[Key, Level], own: dict[Key, Level]) -> list[Document]:
+    return [
+        {
+            **dict(zip(("sensors", "turbulence", "scheme"), key, strict=True)),
+            "level": level.level,
+            "calibration": _counted(level),
+            "before_faults": _counted(apart[key]) if key in apart else None,
+            "own_level": _counted(own[key]),
+        }
+        for key, level in common.items()
+    ]
+
+
+def _counted(level: Level) -> Document:
+    rate = {f"per_h{end}": value for end, value in zip(("", "_low", "_high"), _ends(level), strict=True)}
+    return {"alarms": level.alarms, "hours": level.hours, **rate}
+
+
+def _ends(level: Level) -> list[float | None]:
+    rate = level.per_h
+    return [value if isfinite(value) else None for value in (rate.value, rate.low, rate.high)]
+
+
+def _line(names: Sequence[str], key: tuple[Any, ...], rows: Sequence[Row], own: bool = False) -> Document:
+    line = {**dict(zip(names, key, strict=True)), **summary(rows)}
+    return line | {"own_level": summary(rows, own=True)} if own else line
+
+
+def _comparison(rows: Sequence[Row]) -> list[Document]:
+    """Our schemes against every other on the same flights, by how many faults each finds within JUDGED_S.
+
+    Flights of a seed share their noise, so a seed counts once: for who finds more of its faults.
+    """
+    compared = []
+    for place, here in grouped(rows, *PLACE).items():
+        found = {scheme: _found_by_seed(of) for (scheme,), of in grouped(here, "scheme").items()}
+        compared += [
+            {
+                **dict(zip(PLACE, place, strict=True)),
+                "ours": ours,
+                "against": scheme,
+                **_duel(found[ours], theirs),
+            }
+            for ours in BUILT_IN
+            for scheme, theirs in found.items()
+            if ours in found and scheme not in BUILT_IN
+        ]
+    return compared
+
+
+def _found_by_seed(rows: Sequence[Row]) -> dict[int, int]:
+    return {
+        seed: sum(row["delay_s"] is not None and row["delay_s"] <= JUDGED_S + 1e-9 for row in of)
+        for (seed,), of in grouped(rows, "seed").items()
+    }
+
+
+def _duel(ours: dict[int, int], theirs: dict[int, int]) -> Document:
+    pairs = [(found, theirs[seed]) for seed, found in ours.items() if seed in theirs]
+    wins, losses = sum(a > b for a, b in pairs), sum(a < b for a, b in pairs)
+    p = sign_test(wins, losses)
+    verdict = "even" if p >= SIGNIFICANT else "better" if wins > losses else "worse"
+    return {
+        "within_s": JUDGED_S, "seeds_ours": wins, "seeds_theirs": losses, "p": p, "verdict": verdict,
+    }  # fmt: skip

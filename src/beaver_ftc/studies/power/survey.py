@@ -1,0 +1,333 @@
+"""Which flights of the survey are flown, and what every scheme makes of them.
+
+A block is flown once for each fault; every scheme watches the same flights.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from beaver_ftc.design.coefficients import SURFACES
+from beaver_ftc.documents.errors import BadInput, BeaverFtcError
+from beaver_ftc.plugins import DETECTORS, is_compiled, refusal, registered
+from beaver_ftc.scenario.environment import air_of
+from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.studies.compare.replay import (
+    Recording,
+    Trace,
+    aware_of_the_air,
+    record,
+    replay_together,
+    trace,
+)
+from beaver_ftc.studies.engine.told import Whitening
+
+STRIKES_S = (8.0, 10.0)  # a fault strikes at random in between
+WATCHED_S = 5.0  # after it
+WITHIN_S = (0.5, 1.0, WATCHED_S)  # how soon is soon
+FREQUENCY_HZ = {"p": 0.25, "q": 0.2, "r": 0.15}
+_RATE_HZ = 100.0
+UNEXPLAINED_UP_TO_RAD_S = 15.0  # the faster of the published sinusoids, and what is declared of them
+
+
+class Condition(NamedTuple):
+    """What a designer is told, and may set his alarm level for."""
+
+    sensors: str
+    turbulence: str
+
+
+class Block(NamedTuple):
+    """One condition, one excitation, one seed: flights that are the same until the fault strikes."""
+
+    condition: Condition
+    excitation_deg_s: float
+    seed: int
+
+
+@dataclass(frozen=True)
+class Grid:
+    """The survey. blocks: flights with a fault a cell; healthy_h: without one, a condition; per_h: false
+    alarms per hour at which the schemes are compared."""
+
+    conditions: tuple[Condition, ...]
+    surfaces: tuple[str, ...]
+    magnitudes: tuple[float, ...]
+    excitations_deg_s: tuple[float, ...]
+    blocks: int
+    healthy_h: float
+    healthy_flight_s: float
+    per_h: float
+    vanes: bool = True  # whether plug-ins are shown the air as our statistical detector sees it
+
+    @property
+    def faults(self) -> tuple[tuple[str, float], ...]:
+        """Every surface with every magnitude."""
+        return tuple((surface, magnitude) for surface in self.surfaces for magnitude in self.magnitudes)
+
+    def only(self, sensors: str | None, turbulence: str | None) -> "Grid":
+        """The same flights under some of the conditions. Raises BadInput if there are none."""
+        kept = tuple(
+            condition
+            for condition in self.conditions
+            if sensors in (None, condition.sensors) and turbulence in (None, condition.turbulence)
+        )
+        if not kept:
+            there = "; ".join(f"{one.sensors}, {one.turbulence}" for one in self.conditions)
+            raise BadInput(f"power: this grid has no such condition, allowed: {there}")
+        return replace(self, conditions=kept)
+
+    def faulted(self) -> list[Block]:
+        """The blocks with faults; each flies all of them. The same seeds in every condition."""
+        return [
+            Block(condition, excitation, 1000 * i + seed)
+            for condition in self.conditions
+            for i, excitation in enumerate(self.excitations_deg_s)
+            for seed in range(self.blocks)
+        ]
+
+    def healthy(self) -> list[Block]:
+        """The blocks without a fault, which set the levels; seeds of their own."""
+        count = round(self.healthy_h * 3600.0 / self.healthy_flight_s)
+        excitations = self.excitations_deg_s
+        return [
+            Block(condition, excitations[i % len(excitations)], 1_000_000 + i)
+            for condition in self.conditions
+            for i in range(count)
+        ]
+
+
+_SURFACES = ("aileron", "rudder", "elevator")
+GRIDS = {
+    "quick": Grid(
+        conditions=(Condition("tactical-grade", "none"), Condition("tactical-grade", "light")),
+        surfaces=_SURFACES,
+        magnitudes=(0.4, 1.0),
+        excitations_deg_s=(3.0, 6.0),
+        blocks=5,
+        healthy_h=0.06,
+        healthy_flight_s=18.0,
+        per_h=20.0,
+    ),
+    "full": Grid(
+        conditions=tuple(
+            Condition(sensors, turbulence)
+            for sensors in ("ideal", "tactical-grade")
+            for turbulence in ("none", "light", "moderate")
+        ),
+        surfaces=_SURFACES,
+        magnitudes=(0.2, 0.4, 0.7, 1.0),
+        excitations_deg_s=(1.0, 3.0, 6.0),
+        blocks=8,
+        healthy_h=0.2,
+        healthy_flight_s=20.0,
+        per_h=20.0,
+    ),
+}
+
+
+def scenario_of(block: Block, duration_s: float, faults: list[dict[str, Any]] | None = None) -> Scenario:
+    """A flight of a block: everything in it but the fault follows from the block alone."""
+    sensors, turbulence = block.condition
+    return Scenario.model_validate(
+        {
+            "name": "power",
+            "duration_s": duration_s,
+            "rate_hz": _RATE_HZ,
+            "seed": block.seed,
+            "reference": _reference(block),
+            "uncertainty": _uncertainty(block),
+            "sensors": sensors,
+            "environment": air_of(turbulence),
+            "faults": faults or [],
+            "fdi": {"bounds": {"sensors": sensors, "turbulence": turbulence}},
+            "control": {"law": "nominal"},
+        }
+    )
+
+
+def strikes_at_s(block: Block) -> float:
+    """When the faults of a block strike, on a frame."""
+    return round(_draws(block, 2).uniform(*STRIKES_S) * _RATE_HZ) / _RATE_HZ
+
+
+def loss(surface: str, magnitude: float, at_s: float) -> dict[str, Any]:
+    """The fault of a cell."""
+    return {
+        "type": "loss_of_effectiveness", "actuator": surface, "magnitude": magnitude, "at_s": at_s
+    }  # fmt: skip
+
+
+def _draws(block: Block, purpose: int) -> np.random.Generator:
+    """Random numbers of a seed, the same in every condition."""
+    return np.random.default_rng([block.seed, purpose])
+
+
+def _reference(block: Block) -> dict[str, Any]:
+    phase_deg = _draws(block, 0).uniform(-180.0, 180.0, 3)
+    return {
+        axis: [{"sine": {"amplitude_deg_s": block.excitation_deg_s, "frequency_hz": hz, "phase_deg": phase}}]
+        for (axis, hz), phase in zip(FREQUENCY_HZ.items(), phase_deg.tolist(), strict=True)
+    }
+
+
+def _uncertainty(block: Block) -> dict[str, Any]:
+    """Inside the published bound [Zhang2005, sec. VII]: half of it at the bound, whatever the frequency."""
+    draws = _draws(block, 1)
+    coupling = draws.uniform(-0.25, 0.25, 3).tolist()
+    frequency = np.exp(draws.uniform(np.log(1.0), np.log(UNEXPLAINED_UP_TO_RAD_S), 3)).tolist()
+    return {
+        "inertia_coupling": dict(zip("pqr", coupling, strict=True)),
+        "sinusoid": {
+            axis: {"amplitude_rad_s2": 0.02, "frequency_rad_s": omega}
+            for axis, omega in zip("pqr", frequency, strict=True)
+        },
+    }
+
+
+ESTIMATORS = "adaptive-estimators"
+
+
+class Contender(NamedTuple):
+    """A scheme in the comparison. fdi: what a scenario's `fdi` says beside the bounds to have it."""
+
+    name: str
+    scheme: str
+    fdi: dict[str, Any]
+
+    @property
+    def built_in(self) -> bool:
+        """Whether its statistic comes with the flight itself rather than from a replay."""
+        return is_compiled(DETECTORS, self.scheme)
+
+
+STATISTICAL, BOTH = "statistical", "both"
+BUILT_IN: dict[str, dict[str, Any]] = {
+    ESTIMATORS: {},
+    STATISTICAL: {"statistical": {}, "authority": "statistical"},
+    BOTH: {"statistical": {}},
+}
+
+
+def contenders(names: list[str] | None = None) -> list[Contender]:
+    """Those of the names given, ours first; without names all there are. Raises BadInput, a line a name."""
+    if names is None:
+        names = [name for name in registered(DETECTORS) if not is_compiled(DETECTORS, name)]
+    names = list(dict.fromkeys([*BUILT_IN, *names]))
+    wrong = [
+        f"--schemes: {says}"
+        for name in names
+        if name not in BUILT_IN and (says := _refusal(name)) is not None
+    ]
+    if wrong:
+        raise BadInput("\n".join(wrong))
+    return [_contender(name) for name in names]
+
+
+def _refusal(name: str) -> str | None:
+    if is_compiled(DETECTORS, name):
+        return f"scheme {name!r} detects nothing, allowed: {', '.join(BUILT_IN)}, a registered detector"
+    return refusal(DETECTORS, name)
+
+
+def _contender(name: str) -> Contender:
+    return Contender(name, ESTIMATORS, BUILT_IN[name]) if name in BUILT_IN else Contender(name, name, {})
+
+
+def deflections(
+    recording: Recording, surface: str, magnitude: float, within_s: tuple[float, ...]
+) -> list[float]:
+    """d of a loss of effectiveness in a recorded flight, as long after it struck."""
+    since = [measured for measured, _ in recording.seen if measured.t_s > recording.fault_at_s + 1e-9]
+    if not since:
+        return [0.0] * len(within_s)
+    moment = np.array([measured.contribution[:, SURFACES.index(surface)] for measured in since])
+    d = Whitening(recording.context).deflection(-magnitude * moment)
+    frames = [round(s / recording.context.dt_s) for s in within_s]
+    return [float(d[min(n, len(d)) - 1]) for n in frames]
+
+
+@dataclass
+class Watched:
+    """What came of a block: of every scheme, a trace for each of its flights, in order; why one is missing.
+
+    deflections: how far each fault stands out of the noise, after each of WITHIN_S (limit.py).
+    """
+
+    block: Block
+    faults: tuple[tuple[str, float], ...] = ()
+    traces: dict[str, list[Trace]] = field(default_factory=dict)
+    deflections: list[list[float]] = field(default_factory=list)
+    failures: list[str] = field(default_factory=list)
+
+
+def fly_faulted(block: Block, grid: Grid, schemes: Sequence[Contender]) -> Watched:
+    """Every fault of the grid in this block."""
+    at_s = strikes_at_s(block)
+    flights = [scenario_of(block, at_s + WATCHED_S, [loss(*fault, at_s)]) for fault in grid.faults]
+    return _watch(Watched(block, grid.faults), flights, schemes, grid.vanes)
+
+
+def fly_healthy(block: Block, grid: Grid, schemes: Sequence[Contender]) -> Watched:
+    """The one flight of a block without a fault."""
+    return _watch(Watched(block), [scenario_of(block, grid.healthy_flight_s)], schemes, grid.vanes)
+
+
+def _watch(
+    watched: Watched, flights: Sequence[Scenario], schemes: Sequence[Contender], vanes: bool
+) -> Watched:
+    seen: list[Recording] = []
+    for contender in schemes:
+        try:
+            if contender.built_in:
+                recordings = [record(with_fdi(flight, contender)) for flight in flights]
+                seen = _as_shown(recordings, vanes)
+            watched.traces[contender.name] = (
+                [trace(recording, recording.built_in) for recording in recordings]
+                if contender.built_in
+                else replay_together(seen, contender.scheme)
+            )
+        except BeaverFtcError as error:
+            watched.failures.append(f"{contender.name}: {error}")
+        except Exception as error:  # a plug-in may raise anything: not the end of the comparison
+            watched.failures.append(f"{contender.name}: {type(error).__name__}: {error}")
+    watched.deflections = _deflections(seen, watched.faults)
+    return watched
+
+
+def _as_shown(recordings: Sequence[Recording], vanes: bool) -> list[Recording]:
+    """What plug-ins are shown of the flights."""
+    return [
+        aware_of_the_air(recording) if vanes and recording.air is not None else recording
+        for recording in recordings
+    ]
+
+
+def _deflections(recordings: Sequence[Recording], faults: Sequence[tuple[str, float]]) -> list[list[float]]:
+    """Of every fault; a healthy flight has none."""
+    return [
+        deflections(recording, *fault, WITHIN_S) for recording, fault in zip(recordings, faults, strict=False)
+    ]
+
+
+def with_fdi(flight: Scenario, contender: Contender) -> Scenario:
+    """The flight with what the contender wants of the built-in diagnosis."""
+    document = flight.model_dump(mode="json", exclude_none=True)
+    document["fdi"] |= contender.fdi
+    return Scenario.model_validate(document)
+
+
+Document = dict[str, Any]
+
+
+def fly_block(case: tuple[Block, bool], grid: Grid, schemes: Sequence[Contender]) -> Watched:
+    block, faulted = case
+    return (fly_faulted if faulted else fly_healthy)(block, grid, schemes)
+
+
+def lost(case: Any, why: str) -> Watched:
+    """A block that ends its process: nothing was watched, and why."""
+    block = case.what[0]
+    return Watched(block, failures=[f"{' '.join(block.condition)}, seed {block.seed}: {why}"])

@@ -1,0 +1,281 @@
+"""The flights of a sweep as columns, and the groups of them that statistics are about."""
+
+import shlex
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from functools import cache, cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from beaver_ftc.scenario.sweep_schema import Variation
+from beaver_ftc.studies.sweep.one_flight import AXES, DEPARTED, FLOWN, flight_name, kind_of
+
+if TYPE_CHECKING:
+    from beaver_ftc.scenario.sweep_loader import Sweep
+
+
+NO_FAULT = "no fault"
+_METRICS = (
+    "run", "status", "reason", "frames", "flown_s", "fault_free_s", "false_alarm", "worst_residual_ratio",
+    "passed", "fault.actuator", "fault.type", "fault.at_s",
+    "detection.detected", "detection.delay_s", "detection.guaranteed_delay_s",
+    "isolation.fault", "isolation.correct", "isolation.delay_s",
+    *(f"tracking.{when}_fault_rms_deg_s.{axis}" for when in ("pre", "post") for axis in AXES),
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Flights:
+    """Columns of the results as arrays (flights,): numbers with NaN for null, flags False, texts ''."""
+
+    columns: dict[str, np.ndarray]
+    vary: dict[str, Variation]
+
+    @classmethod
+    def read(cls, path: Path, sweep: "Sweep") -> "Flights":
+        """The columns of a `results.parquet` that statistics need."""
+        from pyarrow.parquet import read_table
+
+        columns = {
+            name: _array(read_table(path, columns=[name]).column(0)) for name in (*_METRICS, *sweep.keys)
+        }
+        return cls(columns, dict(sweep.file.vary))
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        return self.columns[name]
+
+    def __len__(self) -> int:
+        return len(self["run"])
+
+    @cached_property
+    def measured(self) -> np.ndarray:
+        """Flights that have metrics."""
+        return np.isin(self["status"], (FLOWN, DEPARTED))
+
+    @cached_property
+    def departed(self) -> np.ndarray:
+        """Flights that lost the aircraft."""
+        return self["status"] == DEPARTED
+
+    @cached_property
+    def false_alarms(self) -> tuple[int, float]:
+        """How many there were, and in how many hours in which an alarm would have been a false one."""
+        count = int((self["false_alarm"] & self.measured).sum())
+        return count, float(np.nansum(self["fault_free_s"][self.measured])) / 3600
+
+    @cached_property
+    def faulted(self) -> np.ndarray:
+        """Flights that can tell about detection: a fault came, and no alarm before it."""
+        there = self["fault.at_s"] < self["flown_s"]  # False where there is no fault
+        return self.measured & there & ~self["false_alarm"]
+
+    @cached_property
+    def detected(self) -> np.ndarray:
+        """Faulted flights whose fault raised the alarm."""
+        return self.faulted & np.isfinite(self["detection.delay_s"])
+
+    @cached_property
+    def isolated(self) -> np.ndarray:
+        """Faulted flights whose fault was named rightly."""
+        return self.detected & self["isolation.correct"]
+
+    @cached_property
+    def detection_delay_s(self) -> np.ndarray:
+        """From fault to alarm, infinite where there was none; meaningful where faulted."""
+        return np.where(self.detected, self["detection.delay_s"], np.inf)
+
+    @cached_property
+    def isolation_delay_s(self) -> np.ndarray:
+        """From fault to its right name, infinite where it never came; meaningful where faulted."""
+        return np.where(self.isolated, self["isolation.delay_s"], np.inf)
+
+    def post_fault_rms_deg_s(self, axis: str) -> np.ndarray:
+        """Tracking error after the fault, infinite where the aircraft was lost; NaN without a fault."""
+        rms = self[f"tracking.post_fault_rms_deg_s.{axis}"]
+        return np.where(self.departed & self.faulted, np.inf, rms)
+
+    def tracking_ratio(self, axis: str) -> np.ndarray:
+        """Tracking error after the fault over before it."""
+        before = self[f"tracking.pre_fault_rms_deg_s.{axis}"]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ratio = self.post_fault_rms_deg_s(axis) / before
+        return np.where(before > 0, ratio, np.nan)
+
+    @cached_property
+    def worst_rms_deg_s(self) -> np.ndarray:
+        """The largest tracking error after the fault over the three axes."""
+        return np.max([self.post_fault_rms_deg_s(axis) for axis in AXES], axis=0)
+
+    @cached_property
+    def fault_labels(self) -> np.ndarray:
+        """What broke in each flight, in words: the surface, with the type where there are several types."""
+        kinds, actuators = self["fault.type"], self["fault.actuator"]
+        several = len(set(kinds[kinds != ""])) > 1
+        pairs = zip(kinds, actuators, strict=True)
+        return np.array([_label(kind, actuator, several) for kind, actuator in pairs], dtype=object)
+
+    def values(self, key: str) -> np.ndarray:
+        """The values of a varied key."""
+        return self[key]
+
+    def is_number(self, key: str) -> bool:
+        """Whether a varied key is a number (and not a choice among names)."""
+        return kind_of(self.vary[key]) == "float"
+
+    def numbers(self) -> Iterable[str]:
+        """The varied keys that are numbers."""
+        return (key for key in self.vary if self.is_number(key))
+
+
+def _array(column) -> np.ndarray:
+    import pyarrow as pa
+
+    if pa.types.is_boolean(column.type):
+        return column.fill_null(False).to_numpy(zero_copy_only=False)
+    if pa.types.is_string(column.type):
+        coded = (
+            column.fill_null("").combine_chunks().dictionary_encode()
+        )  # each text once, however many flights
+        return np.array(coded.dictionary.to_pylist(), dtype=object)[coded.indices.to_numpy()]
+    return column.to_numpy()
+
+
+@cache
+def _label(kind: str, actuator: str, several_types: bool) -> str:
+    if not kind:
+        return NO_FAULT
+    if not actuator:
+        return kind
+    return f"{actuator} {kind.replace('_', ' ')}" if several_types else actuator
+
+
+BINS = 8
+MOST_FLIGHTS = 4000  # of more, evenly spaced ones are taken: the ranking does not need them all
+PERMUTATIONS = 199
+
+Ranking = list[dict[str, Any]]
+
+
+def rank(keys: dict[str, np.ndarray], outcome: np.ndarray) -> Ranking:
+    """The keys by how much of the outcome they explain, most first.
+
+    keys: name -> values (n,), numbers or texts; outcome (n,), infinite allowed. Each entry: `key`,
+    `explained` (share of rank variance), `rank_correlation` (Spearman's, null for names), `p_value`.
+    """
+    chosen = np.arange(0, outcome.size, max(1, -(-outcome.size // MOST_FLIGHTS)))
+    ranks = ranks_of(outcome[chosen])
+    if ranks.size < 2 * BINS or ranks.min() == ranks.max():
+        return []
+    found = [_entry(key, values[chosen], ranks) for key, values in keys.items()]
+    return sorted(found, key=lambda entry: (-entry["explained"], entry["key"]))
+
+
+def ranks_of(values: np.ndarray) -> np.ndarray:
+    """Ranks from 0, equal values sharing the mean of theirs."""
+    from scipy.stats import rankdata
+
+    return rankdata(values) - 1.0
+
+
+def _entry(key: str, values: np.ndarray, ranks: np.ndarray) -> dict[str, Any]:
+    groups = _groups(values)
+    share = _explained(groups, ranks)
+    generator = np.random.Generator(np.random.PCG64(0))
+    by_chance = sum(_explained(groups, generator.permutation(ranks)) >= share for _ in range(PERMUTATIONS))
+    return {
+        "key": key,
+        "explained": round(max(share, 0.0), 6),
+        "rank_correlation": _spearman(values, ranks),
+        "p_value": (1 + by_chance) / (1 + PERMUTATIONS),
+    }
+
+
+def _groups(values: np.ndarray) -> np.ndarray:
+    """Group number of each value: its level, or its bin where there are many levels."""
+    levels, group = np.unique(values, return_inverse=True)
+    if values.dtype == object or levels.size <= BINS:
+        return group
+    return np.minimum(ranks_of(values) * BINS // values.size, BINS - 1).astype(int)
+
+
+def _explained(groups: np.ndarray, ranks: np.ndarray) -> float:
+    """1 - (SSW / (n - k)) / (SST / (n - 1))."""
+    counts = np.bincount(groups)
+    used = counts > 0
+    means = np.bincount(groups, ranks)[used] / counts[used]
+    total = ((ranks - ranks.mean()) ** 2).sum()
+    between = (counts[used] * (means - ranks.mean()) ** 2).sum()
+    n, k = ranks.size, int(used.sum())
+    if k < 2 or n <= k:
+        return 0.0
+    return float(1.0 - (total - between) / (n - k) / (total / (n - 1)))
+
+
+def _spearman(values: np.ndarray, ranks: np.ndarray) -> float | None:
+    if values.dtype == object:
+        return None
+    own = ranks_of(values)
+    if own.min() == own.max():
+        return None
+    return round(float(np.corrcoef(own, ranks)[0, 1]), 6)
+
+
+OF_EACH_KIND = 3
+
+
+def worst_flights(flights: Flights, sweep: "Sweep", command: str) -> list[dict[str, Any]]:
+    """A few flights of each bad kind, each once: `run`, `name`, `why` (all that is bad), `replay`."""
+    whys: dict[int, list[str]] = {}
+    for position, why in _candidates(flights):
+        whys.setdefault(position, []).append(why)
+    return [
+        {
+            "run": (run := int(flights["run"][position])),
+            "name": flight_name(sweep, run),
+            "why": why,
+            "values": {key: _plain(flights.values(key)[position]) for key in flights.vary},
+            "replay": f"{command} --replay {run}",
+        }
+        for position, why in whys.items()
+    ]
+
+
+def replay_command(source: str, out: Path, search: str | None = None) -> str:
+    """The command line that replays a flight, but for its index."""
+    words = ["beaver-ftc", "sweep", source]
+    words += ["--search", search] if search else []
+    words += ["--out", str(out)] if str(out) != "runs" else []
+    return shlex.join(words)
+
+
+def _plain(value: Any) -> Any:
+    return value.item() if isinstance(value, np.generic) else value
+
+
+def _candidates(flights: Flights) -> Iterator[tuple[int, str]]:
+    """(position, what is bad about it), the worst kind first."""
+    yield from _those(flights, ~flights.measured, lambda i: f"{flights['status'][i]}: {flights['reason'][i]}")
+    yield from _those(flights, flights["false_alarm"] & flights.measured, lambda i: "false alarm")
+    yield from _those(flights, flights.departed, lambda i: f"departed: {flights['reason'][i]}")
+    wrong = flights.faulted & (flights["isolation.fault"] != "") & ~flights["isolation.correct"]
+    yield from _those(flights, wrong, lambda i: f"named {flights['isolation.fault'][i]}")
+    yield from _those(flights, flights.faulted & ~flights.detected, lambda i: "fault not detected")
+    delays = np.where(flights.detected, flights.detection_delay_s, -np.inf)
+    yield from _largest(delays, lambda i: f"detected after {delays[i]:.3g} s")
+    rms = np.where(flights.faulted & np.isfinite(flights.worst_rms_deg_s), flights.worst_rms_deg_s, -np.inf)
+    yield from _largest(rms, lambda i: f"tracking error {rms[i]:.3g} deg/s RMS")
+    ratio = np.nan_to_num(flights["worst_residual_ratio"], nan=-np.inf)
+    yield from _largest(ratio, lambda i: f"residual {ratio[i]:.4g} of its threshold without a fault")
+
+
+def _those(flights: Flights, which: np.ndarray, why: Any) -> Iterator[tuple[int, str]]:
+    for position in np.flatnonzero(which)[:OF_EACH_KIND].tolist():
+        yield position, why(position)
+
+
+def _largest(values: np.ndarray, why: Any) -> Iterator[tuple[int, str]]:
+    for position in np.argsort(-values, kind="stable")[:OF_EACH_KIND].tolist():
+        if np.isfinite(values[position]):
+            yield position, why(position)

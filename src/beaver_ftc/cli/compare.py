@@ -1,51 +1,57 @@
 """`beaver-ftc compare`: finished runs side by side, or schemes and laws on the same flights."""
 
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
-from beaver_ftc.cli.output import Format, FormatOption, emit, emit_json
+from beaver_ftc.cli.inputs import taking
+from beaver_ftc.cli.output import Format, FormatOption, answer, emit, emit_json
 from beaver_ftc.documents.errors import BadInput
 
-_OURS = "adaptive-estimators", "fault-tolerant"
 
+@dataclass(frozen=True)
+class Options:
+    """What is wanted of it."""
 
-def command(
-    runs: Annotated[list[Path] | None, typer.Argument(metavar="RUN", help="Result folders of `run`.")] = None,
-    sweep: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Compare on the flights of a sweep.")
-    ] = None,
+    runs: Annotated[list[Path] | None, typer.Argument(metavar="RUN", help="Result folders of `run`.")] = None
+    sweep: Annotated[Path | None, typer.Option(metavar="FILE", help="Compare on the flights of a sweep.")] = (
+        None
+    )
     benchmark: Annotated[
         bool, typer.Option("--benchmark", help="Compare on the standard sets; update the leaderboard.")
-    ] = False,
-    tune: Annotated[bool, typer.Option("--tune", help="Tune the rivals on the calibration set.")] = False,
+    ] = False
+    tune: Annotated[bool, typer.Option("--tune", help="Tune the rivals on the calibration set.")] = False
     errors: Annotated[
         bool, typer.Option("--errors", help="With --tune: for declared sensor errors and turbulence.")
-    ] = False,
+    ] = False
     schemes: Annotated[
         str | None, typer.Option(help="Comma-separated schemes; all registered ones if left out.")
-    ] = None,
+    ] = None
     laws: Annotated[
         str | None, typer.Option(help="Comma-separated laws; all registered ones if left out.")
-    ] = None,
-    only: Annotated[str | None, typer.Option("--set", help="With --benchmark: one set.")] = None,
+    ] = None
+    only: Annotated[str | None, typer.Option("--set", help="With --benchmark: one set.")] = None
     flights: Annotated[
         str | None,
         typer.Option(metavar="N|FOLDER", help="At most N flights of each sweep; or recorded flights."),
-    ] = None,
+    ] = None
     other_days: Annotated[
         bool,
         typer.Option("--other-days", help="With --flights FOLDER: on days made of the labelled flights."),
-    ] = False,
-    workers: Annotated[int, typer.Option(min=1, help="Processes.")] = 2,
-    target: Annotated[float, typer.Option(min=0, help="With --tune: false alarms per hour allowed.")] = 1.0,
-    out: Annotated[Path, typer.Option(help="Folder for the comparison.")] = Path("comparisons"),
+    ] = False
+    workers: Annotated[int, typer.Option(min=1, help="Processes.")] = 2
+    target: Annotated[float, typer.Option(min=0, help="With --tune: false alarms per hour allowed.")] = 1.0
+    out: Annotated[Path, typer.Option(help="Folder for the comparison.")] = Path("comparisons")
     leaderboard: Annotated[
         Path | None, typer.Option(help="With --benchmark or recorded flights: the page to update.")
-    ] = None,
-    format: FormatOption = Format.text,
-) -> None:
+    ] = None
+    format: FormatOption = Format.text
+
+
+@taking(Options)
+def command(options: Options) -> None:
     """Compare runs; or schemes and laws on the same flights.
 
     Finished runs; or schemes and laws (--sweep, --benchmark); or ways to diagnose recorded flights
@@ -57,30 +63,33 @@ def command(
 
     Stopped or killed, a comparison on flights goes on where it was with the same command.
     """
-    most, folder = _most_or_folder(flights)
-    asked = [bool(runs), sweep is not None, benchmark, tune, folder is not None]
-    if sum(asked) != 1:
+    most, folder = _most_or_folder(options.flights)
+    _refuse_contradictions(options, folder)
+    if options.runs:
+        _compare_runs(options.runs, options.out, options.format)
+    elif folder is not None and options.other_days:
+        _compare_other_days(folder, options.format, options.leaderboard)
+    elif folder is not None:
+        _compare_recorded(folder, options.out, options.format, options.leaderboard)
+    elif options.tune:
+        _tune(options, most)
+    else:
+        _compare_on_flights(options, most)
+
+
+def _refuse_contradictions(options: Options, folder: Path | None) -> None:
+    ways = (options.runs, options.sweep is not None, options.benchmark, options.tune, folder is not None)
+    if sum(map(bool, ways)) != 1:
         raise BadInput(
             "compare: allowed: exactly one of RUN..., --sweep FILE, --benchmark, --tune, --flights FOLDER"
         )
-    if only is not None and not benchmark:
-        raise BadInput("compare: --set: allowed: only with --benchmark")
-    if errors and not tune:
-        raise BadInput("compare: --errors: allowed: only with --tune")
-    if other_days and folder is None:
-        raise BadInput("compare: --other-days: allowed: only with --flights FOLDER")
-    if runs:
-        _compare_runs(runs, out, format)
-    elif folder is not None and other_days:
-        _compare_other_days(folder, format, leaderboard)
-    elif folder is not None:
-        _compare_recorded(folder, out, format, leaderboard)
-    elif tune:
-        _tune(target, workers, most, errors, format)
-    else:
-        cases = _cases(sweep, only, most)
-        name = f"benchmark-{only}" if only else "benchmark" if benchmark else cases[0].set
-        _say(_fly(cases, schemes, laws, workers, out, name), out / name, format, leaderboard)
+    for option, with_it, allowed in (
+        (options.only is not None, options.benchmark, "--set: allowed: only with --benchmark"),
+        (options.errors, options.tune, "--errors: allowed: only with --tune"),
+        (options.other_days, folder is not None, "--other-days: allowed: only with --flights FOLDER"),
+    ):
+        if option and not with_it:
+            raise BadInput(f"compare: {allowed}")
 
 
 def _most_or_folder(flights: str | None) -> tuple[int | None, Path | None]:
@@ -140,60 +149,57 @@ def _compare_runs(folders: list[Path], out: Path, format: Format) -> None:
         emit(f"{as_text(runs)}\n\nreport: {out / 'runs' / 'runs.html'}")
 
 
-def _cases(sweep: Path | None, only: str | None, most: int | None) -> list[Any]:
-    from beaver_ftc.studies.compare.trial import of_set, of_sweep, set_names
-
-    if sweep is not None:
-        return of_sweep(sweep, most=most)
-    return [case for name in ([only] if only else set_names()) for case in of_set(name, most)]
-
-
-def _chosen(group: str, given: str | None, ours: str) -> list[str]:
-    """The names asked for, ours among them. Raises BadInput with a line a name that is not registered."""
-    from beaver_ftc.plugins import refusal, registered
-
-    if given is None:
-        return list(registered(group))
-    names = [name.strip() for name in given.split(",") if name.strip()]
-    what = "schemes" if ours == _OURS[0] else "laws"
-    wrong = [f"--{what}: {says}" for name in names if (says := refusal(group, name))]
-    if wrong:
-        raise BadInput("\n".join(wrong))
-    return list(dict.fromkeys([ours, *names]))
-
-
-def _fly(
-    cases: list[Any], schemes: str | None, laws: str | None, workers: int, out: Path, name: str
-) -> dict[str, Any]:
+def _compare_on_flights(options: Options, most: int | None) -> None:
+    """Schemes and laws on the flights of a sweep, or of the standard sets."""
     from beaver_ftc.cli.progress import progress_bar
     from beaver_ftc.plugins import DETECTORS, LAWS
-    from beaver_ftc.studies.compare.leaderboard import run_comparison
-    from beaver_ftc.studies.compare.trial import entries_of
+    from beaver_ftc.studies.compare.leaderboard import as_text, run_comparison, write_leaderboard
+    from beaver_ftc.studies.compare.trial import LAW, SCHEME, entries_of, of_set, of_sweep, set_names
 
-    entries = entries_of(_chosen(DETECTORS, schemes, _OURS[0]), _chosen(LAWS, laws, _OURS[1]))
-    with progress_bar(f"{len(cases)} flights, {len(entries)} times each") as progress:
-        return run_comparison(out, name, cases, entries, workers, progress)
-
-
-def _say(document: dict[str, Any], folder: Path, format: Format, leaderboard: Path | None) -> None:
-    from beaver_ftc.studies.compare.leaderboard import as_text, write_leaderboard
-
-    if format is Format.json:
-        emit_json(document | {"folder": str(folder)})
+    if options.sweep is not None:
+        cases = of_sweep(options.sweep, most=most)
+        name = cases[0].set
     else:
-        emit(f"{as_text(document)}page: {folder / 'comparison.html'}")
-    if leaderboard is not None:
-        write_leaderboard(document, leaderboard)
+        sets = [options.only] if options.only else set_names()
+        cases = [case for each in sets for case in of_set(each, most)]
+        name = f"benchmark-{options.only}" if options.only else "benchmark"
+    entries = entries_of(
+        _chosen("--schemes", DETECTORS, options.schemes, SCHEME), _chosen("--laws", LAWS, options.laws, LAW)
+    )
+    with progress_bar(f"{len(cases)} flights, {len(entries)} times each") as progress:
+        document = run_comparison(options.out, name, cases, entries, options.workers, progress)
+    folder = options.out / name
+    answer(
+        options.format,
+        document | {"folder": str(folder)},
+        lambda: f"{as_text(document)}page: {folder / 'comparison.html'}",
+    )
+    if options.leaderboard is not None:
+        write_leaderboard(document, options.leaderboard)
 
 
-def _tune(target: float, workers: int, most: int | None, errors: bool, format: Format) -> None:
+def _chosen(option: str, group: str, names: str | None, ours: str) -> list[str]:
+    """The names listed, ours among them. Raises BadInput with a line a name that is not registered."""
+    from beaver_ftc.plugins import refusal, registered
+
+    if names is None:
+        return list(registered(group))
+    listed = [name.strip() for name in names.split(",") if name.strip()]
+    wrong = [f"{option}: {says}" for name in listed if (says := refusal(group, name))]
+    if wrong:
+        raise BadInput("\n".join(wrong))
+    return list(dict.fromkeys([ours, *listed]))
+
+
+def _tune(options: Options, most: int | None) -> None:
     from beaver_ftc.cli.progress import progress_bar
     from beaver_ftc.studies.compare.tune import tune, write_tuned
 
     with progress_bar("calibration flights") as progress:
-        document = tune(target, workers, most, progress, errors)
-    write_tuned(document, errors=errors)
-    if format is Format.json:
-        emit_json(document)
-    else:
-        emit("\n".join(f"{name}: {options}" for name, options in document["options"].items()))
+        document = tune(options.target, options.workers, most, progress, options.errors)
+    write_tuned(document, errors=options.errors)
+    answer(
+        options.format,
+        document,
+        lambda: "\n".join(f"{name}: {tuned}" for name, tuned in document["options"].items()),
+    )

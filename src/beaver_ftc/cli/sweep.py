@@ -5,14 +5,15 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from beaver_ftc.cli.inputs import JunitOption, NoReportOption
-from beaver_ftc.cli.output import Format, FormatOption, complain, emit, emit_json, unexpected
+from beaver_ftc.cli.inputs import JunitOption, NoReportOption, taking
+from beaver_ftc.cli.output import Format, FormatOption, answer, complain, emit_json, unexpected
 from beaver_ftc.documents.errors import BadInput, BeaverFtcError
 
 if TYPE_CHECKING:
@@ -36,73 +37,83 @@ class Objective(StrEnum):
     tracking = "tracking"
 
 
-def command(
+@dataclass(frozen=True)
+class Arguments:
+    """What is wanted of it."""
+
     file: Annotated[
         str, typer.Argument(metavar="FILE", help="A sweep file, or the name of a built-in sweep.")
-    ],
+    ]
     out: Annotated[Path, typer.Option(help="Folder for the results, one folder a sweep in it.")] = Path(
         "runs"
-    ),
+    )
     workers: Annotated[
         int | None,
         typer.Option(min=1, max=4096, help="Processes, or Ray tasks, at a time. Default: one a core."),
-    ] = None,
-    backend: Annotated[Backend, typer.Option(help="Local processes, or a Ray cluster.")] = Backend.local,
+    ] = None
+    backend: Annotated[Backend, typer.Option(help="Local processes, or a Ray cluster.")] = Backend.local
     ray_address: Annotated[
         str | None, typer.Option(help="Ray cluster to join, e.g. auto. Default: one on this machine.")
-    ] = None,
-    resume: Annotated[
-        bool, typer.Option("--resume", help="Fly what is missing from an earlier start.")
-    ] = False,
+    ] = None
+    resume: Annotated[bool, typer.Option("--resume", help="Fly what is missing from an earlier start.")] = (
+        False
+    )
     keep_logs: Annotated[
         str,
         typer.Option(
             help="Flights to keep a result folder of: none, failed, missed, worst, all, or indices 3,17."
         ),
-    ] = "none",
+    ] = "none"
     replay: Annotated[
         int | None, typer.Option(min=0, metavar="INDEX", help="Fly this one flight again, as `run` would.")
-    ] = None,
+    ] = None
     search: Annotated[
         Objective | None, typer.Option(help="Look for the worst flight instead of sampling.")
-    ] = None,
-    format: FormatOption = Format.text,
-    no_report: NoReportOption = False,
-    junit: JunitOption = None,
-) -> None:
+    ] = None
+    format: FormatOption = Format.text
+    no_report: NoReportOption = False
+    junit: JunitOption = None
+
+
+@taking(Arguments)
+def command(arguments: Arguments) -> None:
     """Fly a sweep: many flights of one scenario, varied.
 
     On all cores, or on a cluster. What has been flown is kept, whatever happens: go on with --resume.
     With --format json: the summary.
     """
-    if backend is Backend.local and replay is None:
+    if arguments.backend is Backend.local and arguments.replay is None:
         from beaver_ftc.studies.engine.workers import start_early
 
         start_early()
-    from beaver_ftc.studies.sweep.campaign import Options
-
-    options = Options(
-        out=out,
-        workers=workers,
-        backend=backend.value,
-        address=ray_address,
-        resume=resume,
-        keep=_keep(keep_logs),
-        report=not no_report,
-        search=search.value if search else None,
-        source=file,
-    )
+    options = _options(arguments)
     began = time.perf_counter()
     try:
-        verdict = _command(options, replay, format)
+        verdict = _command(options, arguments.replay, arguments.format)
     except Exception as error:
         failure = error if isinstance(error, BeaverFtcError) else unexpected(error)
-        if format is Format.json:
+        if arguments.format is Format.json:
             emit_json({"passed": False, "errors": str(failure).splitlines()})
-        _write_junit({"scenario": file, "error": str(failure)}, junit, began)
+        _write_junit({"scenario": arguments.file, "error": str(failure)}, arguments.junit, began)
         raise failure from failure.__cause__
-    _write_junit(verdict, junit, began)
+    _write_junit(verdict, arguments.junit, began)
     raise typer.Exit(0 if verdict["passed"] else 1)
+
+
+def _options(arguments: Arguments) -> "Options":
+    from beaver_ftc.studies.sweep.campaign import Options
+
+    return Options(
+        out=arguments.out,
+        workers=arguments.workers,
+        backend=arguments.backend.value,
+        address=arguments.ray_address,
+        resume=arguments.resume,
+        keep=_keep(arguments.keep_logs),
+        report=not arguments.no_report,
+        search=arguments.search.value if arguments.search else None,
+        source=arguments.file,
+    )
 
 
 def _command(options: "Options", replay: int | None, format: Format) -> dict[str, Any]:
@@ -120,17 +131,17 @@ def _write_junit(verdict: dict[str, Any], junit: Path | None, began: float) -> N
         write_junit([verdict | {"took_s": time.perf_counter() - began}], junit)
 
 
-def _keep(asked: str) -> "Keep":
+def _keep(flights: str) -> "Keep":
     from beaver_ftc.studies.sweep.one_flight import KEEP_POLICIES, Keep
 
-    if asked in KEEP_POLICIES:
-        return Keep(asked)
+    if flights in KEEP_POLICIES:
+        return Keep(flights)
     try:
-        return Keep("selected", frozenset(int(index) for index in asked.split(",")))
+        return Keep("selected", frozenset(int(index) for index in flights.split(",")))
     except ValueError:
         allowed = ", ".join(KEEP_POLICIES)
         raise BadInput(
-            f"--keep-logs: {asked!r} is not known, allowed: {allowed}, or indices like 3,17"
+            f"--keep-logs: {flights!r} is not known, allowed: {allowed}, or indices like 3,17"
         ) from None
 
 
@@ -142,10 +153,7 @@ def _fly(sweep: "Sweep", options: "Options", format: Format) -> dict[str, Any]:
     with _stoppable() as stopped, live_progress(sweep.name) as progress:
         document = run_sweep(sweep, options, progress, stopped)
     document |= {"folder": str(options.out / named_for(sweep, options.search).name)}
-    if format is Format.json:
-        emit_json(document)
-    else:
-        emit(summary_text(document, colour=sys.stdout.isatty()))
+    answer(format, document, lambda: summary_text(document, colour=sys.stdout.isatty()))
     return verdict(document)
 
 
@@ -154,27 +162,24 @@ def _replay(sweep: "Sweep", options: "Options", index: int, format: Format) -> d
     from beaver_ftc.studies.sweep.campaign import replay
 
     document: dict[str, Any] = replay(sweep, options, index)
-    if format is Format.json:
-        emit_json(document)
-    else:
-        emit(verdict_text(document, document["folder"], colour=sys.stdout.isatty()))
+    answer(format, document, lambda: verdict_text(document, document["folder"], sys.stdout.isatty()))
     return document
 
 
 @contextmanager
 def _stoppable() -> Iterator[Callable[[], bool]]:
     """Let Ctrl-C (or SIGTERM) end the sweep after what is in the air; a second one ends it at once."""
-    asked: list[int] = []
+    signals: list[int] = []
 
     def stop(number: int, frame: Any) -> None:
-        if asked:
+        if signals:
             raise KeyboardInterrupt
-        asked.append(number)
+        signals.append(number)
         complain("\nstopping once the flights in the air have landed; once more to stop at once")
 
     before = {number: signal.signal(number, stop) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
-        yield lambda: bool(asked)
+        yield lambda: bool(signals)
     except KeyboardInterrupt:
         from beaver_ftc.studies.sweep.campaign import SweepStopped
 

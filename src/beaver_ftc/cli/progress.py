@@ -7,11 +7,8 @@ line on a terminal, one now and then in a log.
 import contextlib
 import sys
 import time
+from collections import Counter
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from beaver_ftc.studies.sweep.campaign import Tally
 
 PATIENCE_S = 1.0
 TERMINAL_S, LOG_S = 0.2, 30.0  # time between two lines of a sweep
@@ -51,8 +48,8 @@ class _Bar:
 
 
 @contextlib.contextmanager
-def live_progress(name: str) -> Iterator[Callable[["Tally"], None]]:
-    """Yield what a sweep tells its tally to."""
+def live_progress(name: str) -> Iterator[Callable[[Counter[str]], None]]:
+    """Yield what a sweep calls with its counts (campaign.run_sweep)."""
     progress = _Progress(name, sys.stderr.isatty())
     try:
         yield progress
@@ -67,25 +64,26 @@ class _Progress:
         self._first: int | None = None
         self._shown = ""
 
-    def __call__(self, tally: "Tally") -> None:
+    def __call__(self, counts: Counter[str]) -> None:
         now = time.monotonic()
         if self._first is None:
-            self._first, self._begun = tally.done, now
+            self._first, self._begun = counts["done"], now
         if now - self._last < (TERMINAL_S if self._terminal else LOG_S):
             return
         self._last = now
-        self._show(self.line(tally, now))
+        self._show(self.line(counts, now))
 
-    def line(self, tally: "Tally", now: float) -> str:
+    def line(self, counts: Counter[str], now: float) -> str:
         """Done, rate, time left, running detection rate."""
         assert self._first is not None
-        rate = (tally.done - self._first) / max(now - self._begun, 1e-9)
-        left = f", {_span((tally.total - tally.done) / rate)} left" if rate > 0 else ""
-        parts = [f"{self._name}: {tally.done} of {tally.total} flights, {rate:.0f}/s{left}"]
-        if tally.faulted:
-            parts.append(f"detected {tally.detected / tally.faulted:.1%}")
-        if tally.failed:
-            parts.append(f"{tally.failed} not flown")
+        done, total = counts["done"], counts["total"]
+        rate = (done - self._first) / max(now - self._begun, 1e-9)
+        to_come = f", {_span((total - done) / rate)} left" if rate > 0 else ""
+        parts = [f"{self._name}: {done} of {total} flights, {rate:.0f}/s{to_come}"]
+        if counts["faulted"]:
+            parts.append(f"detected {counts['detected'] / counts['faulted']:.1%}")
+        if counts["failed"]:
+            parts.append(f"{counts['failed']} not flown")
         return ", ".join(parts)
 
     def _show(self, line: str) -> None:

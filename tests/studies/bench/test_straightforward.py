@@ -6,7 +6,7 @@ import pytest
 from beaver_ftc.design.model import control_effectiveness, design_record, free_response
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.plant.faults import FaultSchedule
-from beaver_ftc.studies.bench.straightforward import DesignModel, Straightforward
+from beaver_ftc.studies.bench.straightforward import PublishedModel, Straightforward
 from flying import Memory, scenario
 
 FAULT_FRAME, FRAMES = 200, 500
@@ -38,7 +38,7 @@ def test_its_design_model_is_the_published_one():
         design, y = design_record()[0], np.array([alpha, beta, V, qdyn, dpt])
         free_response(design, x, y, f)
         control_effectiveness(design, y, G)
-        mine = DesignModel().f_and_G(x, truth)
+        mine = PublishedModel().f_and_G(x, truth)
         np.testing.assert_allclose(mine[0], f, rtol=1e-9, atol=1e-9)
         np.testing.assert_allclose(mine[1], G, rtol=1e-9, atol=1e-9)
 

@@ -1,8 +1,9 @@
+from collections import Counter
+
 import pytest
 
 from beaver_ftc.cli import progress as shown
 from beaver_ftc.cli.progress import live_progress
-from beaver_ftc.studies.sweep.campaign import Tally
 
 
 class Clock:
@@ -21,9 +22,9 @@ def clock(monkeypatch):
 
 def test_it_says_done_rate_time_left_and_detections(clock, capsys):
     with live_progress("many") as progress:
-        progress(Tally(total=10_000, done=500))  # resumed: these cost no time now
+        progress(Counter(total=10_000, done=500))  # resumed: these cost no time now
         clock.now += 50
-        progress(Tally(total=10_000, done=1500, failed=3, faulted=1400, detected=1190))
+        progress(Counter(total=10_000, done=1500, failed=3, faulted=1400, detected=1190))
     line = capsys.readouterr().err.strip()
     assert line == "many: 1500 of 10000 flights, 20/s, 7 min left, detected 85.0%, 3 not flown"
 
@@ -32,7 +33,7 @@ def test_a_log_is_not_flooded(clock, capsys):
     with live_progress("many") as progress:
         for done in range(600):
             clock.now += 0.1
-            progress(Tally(total=600, done=done))
+            progress(Counter(total=600, done=done))
     assert len(capsys.readouterr().err.splitlines()) <= 2
 
 

@@ -20,7 +20,7 @@ AXES = "pqr"
 LEAST_EFFECTIVENESS = 0.1
 
 
-class DesignModel:
+class PublishedModel:
     """xdot = I^-1 (M - x cross I x), with the moments of the coefficient table."""
 
     def __init__(self) -> None:
@@ -175,7 +175,7 @@ class Straightforward:
         self.scenario, self.at_s = scenario, at_s
         self.start = take_over(scenario, at_s)
         self.plant = self.start.plant
-        self.model = DesignModel()
+        self.model = PublishedModel()
         self.references = sample(scenario.reference, at_s + np.arange(frames) / scenario.rate_hz)
         self.prepare()
 

@@ -20,7 +20,7 @@ from beaver_ftc.loop.loop import Loop
 from beaver_ftc.loop.steps import built_in_statistic
 from beaver_ftc.plugins import DETECTORS, made
 from beaver_ftc.scenario.schema import Scenario
-from beaver_ftc.studies.engine import told
+from beaver_ftc.studies.engine import clairvoyant
 
 
 class Recorder:
@@ -134,7 +134,7 @@ def aware_of_the_air(recording: Recording) -> Recording:
         for (measured, command), air in zip(recording.seen, recording.air, strict=True)
     ]
     return replace(
-        recording, context=told.aware_of_the_air(recording.context, recording.air_noise), seen=seen
+        recording, context=clairvoyant.aware_of_the_air(recording.context, recording.air_noise), seen=seen
     )
 
 

@@ -8,8 +8,8 @@ from typing import Any
 
 from beaver_ftc.results.metrics import versions
 from beaver_ftc.studies.compare.replay import Trace
+from beaver_ftc.studies.engine.clairvoyant import chance
 from beaver_ftc.studies.engine.statistics import Estimate, binomial, poisson, share_within, sign_test
-from beaver_ftc.studies.engine.told import chance
 from beaver_ftc.studies.power.survey import BUILT_IN, WATCHED_S, WITHIN_S, Grid, Watched
 
 

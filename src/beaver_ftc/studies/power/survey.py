@@ -22,7 +22,7 @@ from beaver_ftc.studies.compare.replay import (
     replay_together,
     trace,
 )
-from beaver_ftc.studies.engine.told import Whitening
+from beaver_ftc.studies.engine.clairvoyant import Whitening
 
 STRIKES_S = (8.0, 10.0)  # a fault strikes at random in between
 WATCHED_S = 5.0  # after it

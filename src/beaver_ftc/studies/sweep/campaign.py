@@ -48,24 +48,6 @@ class Options:
     source: str = "FILE"
 
 
-@dataclass
-class Tally:
-    """How far the sweep has come."""
-
-    total: int
-    done: int = 0
-    failed: int = 0
-    faulted: int = 0
-    detected: int = 0
-
-    def count(self, counts: Counter[str]) -> None:
-        """Take in the counts of a batch."""
-        self.done += counts["done"]
-        self.failed += counts["failed"]
-        self.faulted += counts["faulted"]
-        self.detected += counts["detected"]
-
-
 class _Flown(Source, Protocol):
     def tables(self) -> Any:
         """Every batch's table, in order."""
@@ -81,16 +63,19 @@ def named_for(sweep: Sweep, search: str | None) -> Sweep:
 def run_sweep(
     sweep: Sweep,
     options: Options,
-    progress: Callable[[Tally], None] = lambda tally: None,
+    progress: Callable[[Counter[str]], None] = lambda counts: None,
     stopped: Callable[[], bool] = lambda: False,
 ) -> Document:
     """Fly a sweep into `out/<name>/` and return its summary.
+
+    progress: told of the number of flights in all, `total`, and so far: `done`, `failed` (no metrics),
+    `faulted`, and `detected` of these.
 
     Raises BadInput for a folder that holds another or an unfinished sweep, SimulationFailed where the folder
     cannot be written or no flight could be flown, SweepStopped once `stopped` says so.
     """
     sweep = named_for(sweep, options.search)
-    tally = Tally(sweep.flights)
+    so_far = Counter(total=sweep.flights)
     folder = options.out / sweep.name
     options = replace(options, keep=replace(options.keep, folder=(folder / "flights").resolve()))
     with Store(folder, sweep) as store:
@@ -98,12 +83,12 @@ def run_sweep(
         if not store.is_compacted(sweep.flights):
 
             def landed(counts: Counter[str]) -> None:
-                tally.count(counts)
-                progress(tally)
+                so_far.update(counts)
+                progress(so_far)
 
             store.reopen()
             source = _source(sweep, options, store, landed)
-            _fly_missing(source, sweep, options, tally, stopped)
+            _fly_missing(source, sweep, options, so_far, stopped)
             store.compact(source.tables())
         store.parts.remove()
         return conclude(sweep, options, store)
@@ -116,14 +101,14 @@ def _source(sweep: Sweep, options: Options, store: Store, landed: Callable[[Coun
 
 
 def _fly_missing(
-    source: _Flown, sweep: Sweep, options: Options, tally: Tally, stopped: Callable[[], bool]
+    source: _Flown, sweep: Sweep, options: Options, so_far: Counter[str], stopped: Callable[[], bool]
 ) -> None:
-    if tally.done < tally.total:
+    if so_far["done"] < so_far["total"]:
         with closing(_workers(sweep, options)) as workers:
             Campaign(source, workers, partial(lost, sweep)).fly(stopped)
-    if tally.done < tally.total:
+    if so_far["done"] < so_far["total"]:
         raise SweepStopped(
-            f"{sweep.name}: stopped, {tally.done} of {tally.total} flights are kept; "
+            f"{sweep.name}: stopped, {so_far['done']} of {so_far['total']} flights are kept; "
             "go on with the same command and --resume"
         )
 

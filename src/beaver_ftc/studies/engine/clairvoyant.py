@@ -1,4 +1,4 @@
-"""What can be seen at all: the test that is told the fault and the instant it strikes.
+"""What can be seen at all: the clairvoyant test, which is told the fault and the instant it strikes.
 
 With all that is declared taken as Gaussian, a Kalman filter makes of the measurements, as they are shown to
 plug-ins, independent innovations of covariance S. A fault phi, rad/s2, adds to them a known signature s, and

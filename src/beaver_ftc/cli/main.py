@@ -32,27 +32,29 @@ COMMANDS = {
         "beaver-ftc run elevator-partial-loss --format json --no-report",
     )),
     "mismatch": Command("mismatch"),
-    "validate": Command("validate", examples=("beaver-ftc validate elevator-partial-loss fault-free",)),
+    "validate": Command("scenarios", "validate", examples=(
+        "beaver-ftc validate elevator-partial-loss fault-free",
+    )),
     "schema": Command("catalogue", "schema", False, ("beaver-ftc schema",)),
-    "trim": Command("trim", examples=("beaver-ftc trim --airspeed-mps 40 --altitude-m 1000",)),
+    "trim": Command("studies", "trim", examples=("beaver-ftc trim --airspeed-mps 40 --altitude-m 1000",)),
     "linearise": Command("studies", "linearise"),
     "list": Command("catalogue", "list_choices", examples=("beaver-ftc list",)),
     "show": Command("catalogue", "show", False, ("beaver-ftc show elevator-partial-loss",)),
-    "new": Command("new", flies=False, examples=(
+    "new": Command("scenarios", "new", flies=False, examples=(
         "beaver-ftc new my-case", "beaver-ftc new my-other-case --like elevator-partial-loss",
     )),
     "sweep": Command("sweep"),
     "compare": Command("compare"),
     "reproduce": Command("studies", "reproduce", False),
-    "matrix": Command("matrix"),
-    "power": Command("power"),
+    "matrix": Command("surveys", "matrix"),
+    "power": Command("surveys", "power"),
     "bench": Command("studies", "bench", False),
     "derive": Command("studies", "derive", False),
     "verify": Command("studies", "verify", False),
     "detectability": Command("studies", "detectability", False),
     "identify": Command("recorded", "identify"),
     "diagnose": Command("recorded", "diagnose"),
-    "live": Command("live"),
+    "live": Command("run", "live"),
 }  # fmt: skip
 
 app = typer.Typer(

@@ -1,4 +1,4 @@
-"""`beaver-ftc run`: fly scenarios, keep the results, say the verdict."""
+"""`beaver-ftc run`: fly scenarios, keep the results, say the verdict; and `live`: fly one in the browser."""
 
 import sys
 import time
@@ -15,6 +15,7 @@ from beaver_ftc.cli.inputs import (
     JunitOption,
     NoReportOption,
     ResultsOption,
+    ScenarioArgument,
     ScenariosArgument,
     load_all,
     taking,
@@ -147,3 +148,38 @@ def _say(document: dict[str, Any]) -> None:
     from beaver_ftc.results.verdict import verdict_text
 
     emit(verdict_text(document, document["folder"], colour=sys.stdout.isatty()))
+
+
+def live(
+    scenario: ScenarioArgument = "fault-free",
+    aircraft: Annotated[
+        str | None, typer.Option(metavar="AIRCRAFT", help="Fly this one, without the scenario's uncertainty.")
+    ] = None,
+    port: Annotated[int, typer.Option(min=0, max=65535, help="Port on the loopback; 0: any.")] = 0,
+    out: Annotated[Path, typer.Option(help="Folder in which the page's Save writes.")] = Path("runs"),
+    open_browser: Annotated[bool, typer.Option("--open", help="Also open the page in a browser.")] = False,
+) -> None:
+    """Fly in the browser: break it and watch the diagnosis.
+
+    Prints an address of this machine that works once; Ctrl-C ends it.
+    """
+    from beaver_ftc.integrations.live.serve import serve
+
+    serve(lambda: _with(aircraft, scenario), out, port, lambda address: _point_to(address, open_browser))
+
+
+def _with(aircraft: str | None, name: str) -> "Scenario":
+    from beaver_ftc.scenario.loader import load_scenario
+
+    loaded = load_scenario(name)
+    if aircraft is None or aircraft == loaded.aircraft:
+        return loaded
+    return loaded.with_({"aircraft": aircraft, "uncertainty": {}})  # it is of the aircraft that was meant
+
+
+def _point_to(address: str, open_browser: bool) -> None:
+    emit(f"live: {address}\nOpen it in a browser; Ctrl-C ends the flight.")
+    if open_browser:
+        import webbrowser
+
+        webbrowser.open(address)

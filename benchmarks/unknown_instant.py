@@ -3,8 +3,8 @@
 The latter is Page's [Page1954]: the largest log likelihood ratio of "this fault, since some instant" that any
 instant has. Where observations have one distribution before and one after, no test has a shorter worst mean
 delay at the same mean time between false alarms. It is told surface and magnitude, and has the filter of
-`studies/engine/told.py`; instants are 0.05 s apart and at most 10 s back. Its level gives at most 20 false
-alarms per hour on healthy flights, as in `beaver-ftc power`.
+`studies/engine/clairvoyant.py`; instants are 0.05 s apart and at most 10 s back. Its level gives at most 20
+false alarms per hour on healthy flights, as in `beaver-ftc power`.
 
     python benchmarks/unknown_instant.py [BLOCKS] [HEALTHY_FLIGHTS]
 """

@@ -73,6 +73,12 @@ class Trace:
         return self.records[index][0] if index < len(self.records) else inf
 
 
+def alarms_at(traces: Sequence[Trace], level: float) -> tuple[int, float]:
+    """False alarms at a level of the statistic, and the hours until they were raised."""
+    hours = sum(trace.fault_free_s(level) for trace in traces) / 3600.0
+    return sum(trace.false_alarm(level) for trace in traces), hours
+
+
 @dataclass
 class Recording:
     """A flight under the nominal law as a detector sees it, with the built-in statistic beside it.

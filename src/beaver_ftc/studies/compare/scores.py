@@ -9,7 +9,7 @@ from statistics import median
 from typing import Any
 
 from beaver_ftc.results.metrics import versions
-from beaver_ftc.studies.compare.replay import Trace
+from beaver_ftc.studies.compare.replay import Trace, alarms_at
 from beaver_ftc.studies.compare.trial import LAW, ORACLE, SCHEME, Entry, Result, Trial
 from beaver_ftc.studies.engine.statistics import CONFIDENCE, poisson_bound, share_within, wilson_bound
 from beaver_ftc.studies.present.tables import finite
@@ -92,8 +92,7 @@ def point_at(traces: Sequence[Trace], level: float) -> Point:
     Detections and delays are of the flights in which the fault was still to be detected: no false alarm
     before it.
     """
-    hours = sum(trace.fault_free_s(level) for trace in traces) / 3600.0
-    alarms = sum(trace.false_alarm(level) for trace in traces)
+    alarms, hours = alarms_at(traces, level)
     delays = [trace.delay_s(level) for trace in traces if trace.faulted and not trace.false_alarm(level)]
     rate = sum(delay < inf for delay in delays) / len(delays) if delays else 0.0
     return Point(level, alarms / hours if hours else 0.0, rate, share_within(delays, 0.5))

@@ -7,7 +7,7 @@ from statistics import fmean
 from typing import Any
 
 from beaver_ftc.results.metrics import versions
-from beaver_ftc.studies.compare.replay import Trace
+from beaver_ftc.studies.compare.replay import Trace, alarms_at
 from beaver_ftc.studies.engine.clairvoyant import chance
 from beaver_ftc.studies.engine.statistics import Estimate, binomial, poisson, share_within, sign_test
 from beaver_ftc.studies.power.survey import BUILT_IN, WATCHED_S, WITHIN_S, Grid, Watched
@@ -40,8 +40,7 @@ def level_for(healthy: Sequence[Trace], per_h: float) -> Level:
 
 def level_at(healthy: Sequence[Trace], level: float) -> Level:
     """What a level costs in false alarms, over the time until they were raised."""
-    hours = sum(trace.fault_free_s(level) for trace in healthy) / 3600.0
-    return Level(level, sum(trace.false_alarm(level) for trace in healthy), hours)
+    return Level(level, *alarms_at(healthy, level))
 
 
 Row = dict[str, Any]

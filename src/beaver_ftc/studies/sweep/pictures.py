@@ -5,6 +5,7 @@ Each function takes the flights and returns a figure, or None where the flights 
 
 import re
 from collections.abc import Callable
+from itertools import cycle
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,8 +13,9 @@ import numpy as np
 
 from beaver_ftc.results.looks import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILION
 from beaver_ftc.studies.engine.statistics import wilson
+from beaver_ftc.studies.present.figures import GRID, heat_map, new_figure, save
 from beaver_ftc.studies.sweep.outcomes import Flights
-from beaver_ftc.studies.sweep.summary import NO_ALARM
+from beaver_ftc.studies.sweep.summary import NO_ALARM, OUTCOMES
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -23,7 +25,6 @@ if TYPE_CHECKING:
 Document = dict[str, Any]
 Drawer = Callable[[Flights, Document], "Figure | None"]
 
-DPI = 110
 BINS = 16
 LEAST_A_BIN = 10
 _SEARCHED = {
@@ -47,22 +48,15 @@ def write_figures(flights: Flights, summary: Document, folder: Path) -> list[Pat
     for name in FIGURES:
         (folder / f"{name}.png").unlink(missing_ok=True)
     drawn = [(name, draw(flights, summary)) for name, (_, draw) in FIGURES.items()]
-    return [_save(figure, folder / f"{name}.png") for name, figure in drawn if figure is not None]
-
-
-def _save(figure: "Figure", path: Path) -> Path:
-    figure.savefig(path, metadata={"Software": "beaver-ftc"})
-    return path
+    return [save(figure, folder / f"{name}.png") for name, figure in drawn if figure is not None]
 
 
 def _axes(title: str, size: tuple[float, float] = (8.0, 4.6)) -> tuple["Figure", "Axes"]:
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=size, dpi=DPI, layout="constrained")
+    figure = new_figure(*size)
     axes = figure.subplots()
     axes.set_title(title, fontsize=10)
     axes.tick_params(labelsize=8)
-    axes.grid(visible=True, color="#dddddd", linewidth=0.6)
+    axes.grid(visible=True, color=GRID, linewidth=0.6)
     axes.set_axisbelow(True)
     return figure, axes
 
@@ -82,7 +76,7 @@ def detection_probability(flights: Flights, summary: Document) -> "Figure | None
         return None
     figure, axes = _axes("Detection probability (bars: 95 % intervals)")
     labels = flights.fault_labels
-    for look, label in zip(_cycle(_FAULT_LOOKS), sorted(set(labels[flights.faulted])), strict=False):
+    for look, label in zip(cycle(_FAULT_LOOKS), sorted(set(labels[flights.faulted])), strict=False):
         group = flights.faulted & (labels == label)
         values = flights.values(key)[group]
         bins = _levels(values) if flights.vary[key].count else _bins(values)
@@ -123,17 +117,13 @@ def _bins(values: np.ndarray) -> list[np.ndarray]:
     return np.array_split(np.argsort(values, kind="stable"), count)
 
 
-def _cycle(looks: tuple) -> list:
-    return [looks[i % len(looks)] for i in range(100)]
-
-
 def delay_distribution(flights: Flights, summary: Document) -> "Figure | None":
     """Share of faults detected within a time, a curve a fault; what is missing at the top was missed."""
     if not flights.detected.any():
         return None
     figure, axes = _axes("Detection delay: share of faults detected within a time")
     labels = flights.fault_labels
-    for look, label in zip(_cycle(_FAULT_LOOKS), sorted(set(labels[flights.faulted])), strict=False):
+    for look, label in zip(cycle(_FAULT_LOOKS), sorted(set(labels[flights.faulted])), strict=False):
         group = flights.faulted & (labels == label)
         delays = np.sort(flights.detection_delay_s[group & flights.detected])
         if delays.size:
@@ -166,13 +156,13 @@ def confusion_matrix(flights: Flights, summary: Document) -> "Figure | None":
     figure, axes = _axes("What broke (rows) against what the diagnosis said (columns)", size)
     axes.grid(visible=False)
     shares = counts / np.maximum(counts.sum(axis=1, keepdims=True), 1)
-    axes.imshow(shares, cmap="Blues", vmin=0, vmax=1.15, aspect="auto")
-    for (row, column), count in np.ndenumerate(counts):
-        ink = "white" if shares[row, column] > 0.6 else BLACK
-        text = f"{count}\n{shares[row, column]:.0%}" if count else "0"
-        axes.text(column, row, text, ha="center", va="center", fontsize=8, color=ink if count else GREY)
-    axes.set_xticks(range(len(columns)), columns)
-    axes.set_yticks(range(len(rows)), rows)
+    labels = {
+        place: (f"{count}\n{shares[place]:.0%}", "white" if shares[place] > 0.6 else BLACK)
+        if count
+        else ("0", GREY)
+        for place, count in np.ndenumerate(counts)
+    }
+    heat_map(axes, shares, labels, columns, rows, cmap="Blues", vmin=0, vmax=1.15)
     for border in range(1, len(rows)):
         axes.axhline(border - 0.5, color="white", linewidth=2)
     for border in range(1, len(columns)):
@@ -196,11 +186,7 @@ def _diagnoses(fault: str, diagnoses: list[str], counts: np.ndarray) -> "Figure"
 
 def sensitivity_bars(flights: Flights, summary: Document) -> "Figure | None":
     """How much of each outcome each varied key explains."""
-    titles = {
-        "detection_delay": "detection delay", "missed_detection": "missed detection",
-        "tracking_error": "tracking error", "residual_before_fault": "residual before the fault",
-    }  # fmt: skip
-    rankings = {titles[name]: ranking for name, ranking in summary["sensitivity"].items() if ranking}
+    rankings = {OUTCOMES[name]: ranking for name, ranking in summary["sensitivity"].items() if ranking}
     if not rankings:
         return None
     keys = [entry["key"] for entry in next(iter(rankings.values()))][:12]

@@ -35,6 +35,12 @@ Document = dict[str, Any]
 QUANTILES = {"median": 0.5, "p90": 0.9, "p95": 0.95, "p99": 0.99, "max": 1.0}
 FALSE_ALARM, NO_ALARM, NOT_ISOLATED = "false alarm", "no alarm", "not isolated"
 UNANTICIPATED = "unanticipated"
+OUTCOMES = {
+    "detection_delay": "detection delay",
+    "missed_detection": "missed detection",
+    "tracking_error": "tracking error",
+    "residual_before_fault": "residual before the fault",
+}  # what keys are ranked by, and its title
 MOST_REASONS = 20
 _NUMBERS = re.compile(r"-?\d+(\.\d+)?(e[-+]?\d+)?")
 

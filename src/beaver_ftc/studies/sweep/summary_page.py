@@ -11,6 +11,7 @@ from beaver_ftc.studies.present.page import picture_data
 from beaver_ftc.studies.present.tables import number, printed
 from beaver_ftc.studies.sweep.one_flight import AXES
 from beaver_ftc.studies.sweep.pictures import FIGURES
+from beaver_ftc.studies.sweep.summary import OUTCOMES
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -204,12 +205,6 @@ def _drivers(ranking: list[Document]) -> str:
 
 
 _TEMPLATES = Path(__file__).parent / "templates"
-_OUTCOMES = {
-    "detection_delay": "detection delay",
-    "missed_detection": "missed detection",
-    "tracking_error": "tracking error",
-    "residual_before_fault": "residual before the fault",
-}
 
 
 def render(summary: Document, folder: Path) -> str:
@@ -220,7 +215,7 @@ def render(summary: Document, folder: Path) -> str:
         facts=facts(summary),
         tracking=tracking(summary),
         expectations=expectations(summary),
-        sensitivity=[(_OUTCOMES[name], ranking) for name, ranking in summary["sensitivity"].items()
+        sensitivity=[(OUTCOMES[name], ranking) for name, ranking in summary["sensitivity"].items()
                      if ranking],
         worst=[flight | {"link": _link(folder, flight["name"])} for flight in summary["worst"]],
         figures=_figures(folder),

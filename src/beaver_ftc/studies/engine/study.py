@@ -237,16 +237,7 @@ def _remove(kept: Path, parent: bool) -> None:
 
 def fly_all(fly: Fly, cases: Sequence[Any], workers: int = 1, progress: Progress | None = None) -> list[Any]:
     """fly(case) of every case, in order, kept nowhere."""
-    rows: dict[int, Any] = {}
-
-    def note(batch: Batch, landed: list[Any]) -> None:
-        rows[batch.cases[0].run] = landed[0]
-        if progress:
-            progress(len(rows) / len(cases))
-
-    batches = [Batch(i, (Case(i, case),)) for i, case in enumerate(cases)]
-    conduct(Batches(batches, len(cases), note), Work(partial(_fly_case, fly)), workers, _fail)
-    return [rows[i] for i in range(len(cases))]
+    return _all_rows(None, cases, Work(partial(_fly_case, fly)), workers, progress, _fail)
 
 
 def conduct(source: Batches, work: Work, workers: int, lost: Callable[[Any, str], Any]) -> None:
@@ -277,23 +268,24 @@ def _begin(kept: Path, identity: Identity, codec: RowsAsJson) -> Parts:
 
 
 def _all_rows(
-    parts: Parts, cases: Sequence[Any], work: Work, workers: int, progress: Progress | None, lost: Any
+    parts: Parts | None, cases: Sequence[Any], work: Work, workers: int, progress: Progress | None, lost: Any
 ) -> list[Any]:
+    """What has landed in the parts is read from there: the same rows, whenever they were flown."""
     rows: dict[int, Any] = {}
 
-    def has_landed(number: int) -> bool:
-        found = parts.landed(number, [number])
-        if found is None:
-            return False
-        rows[number] = found[0]
-        if progress:
-            progress(len(rows) / len(cases))
-        return True
+    def take(number: int, flown: list[Any] | None) -> None:
+        found = flown if parts is None else parts.landed(number, [number])
+        if found is not None:
+            rows[number] = found[0]
+            if progress:
+                progress(len(rows) / len(cases))
 
-    missing = [Batch(n, (Case(n, case),)) for n, case in enumerate(cases) if not has_landed(n)]
-    source = Batches(missing, len(missing), lambda batch, _: has_landed(batch.cases[0].run), parts)
+    for number in range(len(cases)):
+        take(number, None)
+    missing = [Batch(n, (Case(n, case),)) for n, case in enumerate(cases) if n not in rows]
+    source = Batches(missing, len(missing), lambda batch, flown: take(batch.cases[0].run, flown), parts)
     conduct(source, work, workers, lost)
-    return [rows[i] for i in range(len(cases))]
+    return [rows[number] for number in range(len(cases))]
 
 
 def _fly_case(fly: Fly, case: Case) -> Any:

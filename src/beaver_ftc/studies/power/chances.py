@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
-from math import inf, isfinite
+from math import inf
 from statistics import fmean
 from typing import Any
 
@@ -11,6 +11,7 @@ from beaver_ftc.studies.compare.replay import Trace, alarms_at
 from beaver_ftc.studies.engine.clairvoyant import chance
 from beaver_ftc.studies.engine.statistics import Estimate, binomial, poisson, share_within, sign_test
 from beaver_ftc.studies.power.survey import BUILT_IN, WATCHED_S, WITHIN_S, Grid, Watched
+from beaver_ftc.studies.present.tables import finite
 
 
 @dataclass(frozen=True)
@@ -98,12 +99,11 @@ def rows_of(faulted: Iterable[Watched], levels: dict[Key, Level]) -> list[Row]:
 
 
 def _alarms(trace: Trace, level: float) -> Row:
-    delay_s, own_delay_s = trace.delay_s(level), trace.delay_s(1.0)
     return {
         "false_alarm": trace.false_alarm(level),
-        "delay_s": delay_s if isfinite(delay_s) else None,
+        "delay_s": finite(trace.delay_s(level)),
         "own_false_alarm": trace.false_alarm(1.0),
-        "own_delay_s": own_delay_s if isfinite(own_delay_s) else None,
+        "own_delay_s": finite(trace.delay_s(1.0)),
     }
 
 
@@ -119,11 +119,10 @@ def summary(rows: Sequence[Row], own: bool = False) -> Document:
         if not row[f"{prefix}false_alarm"]
     ]
     shares = {f"{within_s:g}": _share(delays, within_s) for within_s in WITHIN_S}
-    median_s = share_within(delays, 0.5)
     return {
         "flights": len(delays),
         "within": {name: vars(share) for name, share in shares.items()} if delays else {},
-        "median_delay_s": median_s if isfinite(median_s) else None,
+        "median_delay_s": finite(share_within(delays, 0.5)),
     }
 
 
@@ -195,13 +194,14 @@ def _levels(common: dict[Key, Level], apart: dict[Key, Level], own: dict[Key, Le
 
 
 def _counted(level: Level) -> Document:
-    rate = {f"per_h{end}": value for end, value in zip(("", "_low", "_high"), _ends(level), strict=True)}
-    return {"alarms": level.alarms, "hours": level.hours, **rate}
-
-
-def _ends(level: Level) -> list[float | None]:
     rate = level.per_h
-    return [value if isfinite(value) else None for value in (rate.value, rate.low, rate.high)]
+    return {
+        "alarms": level.alarms,
+        "hours": level.hours,
+        "per_h": finite(rate.value),
+        "per_h_low": finite(rate.low),
+        "per_h_high": finite(rate.high),
+    }
 
 
 def _line(names: Sequence[str], key: tuple[Any, ...], rows: Sequence[Row], own: bool = False) -> Document:

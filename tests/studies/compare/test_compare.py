@@ -32,8 +32,8 @@ from beaver_ftc.studies.compare.trial import (
     LAW,
     ORACLE,
     SCHEME,
-    Case,
     Entry,
+    SetFlight,
     entries_of,
     fly_case,
     of_set,
@@ -160,7 +160,7 @@ def test_options_are_the_named_schemes_alone():
 def test_a_case_that_cannot_be_flown_is_said():
     scenario = Scenario(name="low", initial={"airspeed_mps": 20.0, "manifold_pressure_inhg": 10.0})
     entries = entries_of([SCHEME], [LAW])
-    document = document_of([fly_case(Case("s", scenario), entries)], entries)
+    document = document_of([fly_case(SetFlight("s", scenario), entries)], entries)
     assert document["sets"]["s"]["lines"][0]["failed"] == 1
     assert document["sets"]["s"]["errors"]
 
@@ -174,7 +174,7 @@ def _line(scheme, law, **changes):
 def test_a_set_without_faults_can_be_drawn(tmp_path):
     scenario = Scenario(name="still", duration_s=2)
     entries = entries_of([SCHEME, "none"], ["lqr"])
-    document = document_of([fly_case(Case("healthy", scenario), entries)], entries)
+    document = document_of([fly_case(SetFlight("healthy", scenario), entries)], entries)
     row = document["sets"]["healthy"]["lines"][0]
     assert (row["detection_rate"], row["false_alarms_per_h"]) == (None, 0.0)
     write_files(tmp_path, files_of(document, "still"))

@@ -8,7 +8,7 @@ from typing import Any
 from beaver_ftc.results.looks import BLUE, GREY
 from beaver_ftc.results.metrics import as_json
 from beaver_ftc.studies.compare.scores import document_of
-from beaver_ftc.studies.compare.trial import LAW, ORACLE, SCHEME, Case, Entry, Trial, fly_case
+from beaver_ftc.studies.compare.trial import LAW, ORACLE, SCHEME, Entry, SetFlight, Trial, fly_case
 from beaver_ftc.studies.engine.study import Progress, Study, run_study
 from beaver_ftc.studies.present import page
 from beaver_ftc.studies.present.figures import curve_look, marker, panels
@@ -197,7 +197,7 @@ def _draw_ratios(axis: Any, part: Document) -> None:
 def run_comparison(
     out: Path,
     name: str,
-    cases: Sequence[Case],
+    cases: Sequence[SetFlight],
     entries: Sequence[Entry],
     workers: int = 1,
     progress: Progress | None = None,

@@ -20,14 +20,14 @@ CALIBRATION_ERRORS = "calibration-errors"
 
 
 @dataclass(frozen=True)
-class Case:
+class SetFlight:
     """One flight of a set."""
 
     set: str
     scenario: Scenario
 
 
-def of_sweep(path: str | Path, set_name: str | None = None, most: int | None = None) -> list[Case]:
+def of_sweep(path: str | Path, set_name: str | None = None, most: int | None = None) -> list[SetFlight]:
     """The flights of a sweep file, the first `most` of them. Raises BadInput for what is wrong with it."""
     from beaver_ftc.scenario.sweep_loader import load_sweep
     from beaver_ftc.studies.sweep.one_flight import scenario_of
@@ -36,7 +36,7 @@ def of_sweep(path: str | Path, set_name: str | None = None, most: int | None = N
     sweep = load_sweep(path)
     count = sweep.flights if most is None else min(most, sweep.flights)
     assignments = Plan(sweep).assignments(range(count))
-    return [Case(set_name or sweep.name, scenario_of(sweep, flight)) for flight in assignments]
+    return [SetFlight(set_name or sweep.name, scenario_of(sweep, flight)) for flight in assignments]
 
 
 def benchmark_folder() -> Path:
@@ -50,7 +50,7 @@ def set_names() -> list[str]:
     return [name for name in folders if not name.startswith(CALIBRATION)]
 
 
-def of_set(name: str, most: int | None = None) -> list[Case]:
+def of_set(name: str, most: int | None = None) -> list[SetFlight]:
     """The flights of a standard set; of each of its sweeps, the first `most`."""
     folder = benchmark_folder() / name
     if not folder.is_dir():
@@ -134,7 +134,7 @@ def options_for(scenario: Scenario, scheme: str) -> dict[str, float]:
     return dict(scenario.fdi.options) if scheme == scenario.fdi.scheme else {}
 
 
-def fly_case(case: Case, entries: Sequence[Entry]) -> Trial:
+def fly_case(case: SetFlight, entries: Sequence[Entry]) -> Trial:
     """Fly a case with every entry; record it once under the nominal law for the trade-off of each scheme."""
     trial = Trial(case.set, [_fly(case.scenario, entry) for entry in entries])
     schemes = [scheme for scheme in dict.fromkeys(entry.scheme for entry in entries) if scheme != "none"]

@@ -35,8 +35,8 @@ from beaver_ftc.studies.compare.trial import (
     CALIBRATION,
     CALIBRATION_ERRORS,
     SCHEME,
-    Case,
     Entry,
+    SetFlight,
     of_set,
     result_of,
     with_entry,
@@ -110,7 +110,7 @@ def write_tuned(document: dict[str, Any], path: Path | None = None, errors: bool
     path.write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
 
 
-def _play(case: Case, grids: dict[str, dict[str, tuple[float, ...]]]) -> dict[str, list[Trace]]:
+def _play(case: SetFlight, grids: dict[str, dict[str, tuple[float, ...]]]) -> dict[str, list[Trace]]:
     """A flight played to every candidate of every detector."""
     recording = record(case.scenario)
     return {
@@ -155,7 +155,7 @@ def _cost(trace: Trace, level: float) -> float:
     return delay if isfinite(delay) else 10.0
 
 
-def _best_law(name: str, faulted: Sequence[Case], workers: int) -> Options:
+def _best_law(name: str, faulted: Sequence[SetFlight], workers: int) -> Options:
     costs = [
         fmean(fly_all(partial(_law_cost, name=name, option=option), faulted, workers))
         for option in candidates(LAWS[name])
@@ -163,7 +163,7 @@ def _best_law(name: str, faulted: Sequence[Case], workers: int) -> Options:
     return candidates(LAWS[name])[costs.index(min(costs))]
 
 
-def _law_cost(case: Case, name: str, option: Options) -> float:
+def _law_cost(case: SetFlight, name: str, option: Options) -> float:
     entry = Entry(SCHEME, name)
     scenario = with_entry(case.scenario, entry)
     control = scenario.control.model_copy(update={"options": option})

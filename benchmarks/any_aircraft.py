@@ -28,7 +28,7 @@ from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.metrics import fault_free_s
 from beaver_ftc.scenario.schema import Scenario
-from beaver_ftc.studies.derive.first_use import derived_if_needed
+from beaver_ftc.studies.derive.first_use import derive_if_needed
 from beaver_ftc.studies.detectability import DETECT_WITHIN_S, SETTLED_S, detection_magnitude, excitation
 
 TWELVE = ("737", "A4", "B747", "MD11", "c172p", "c310", "J3Cub", "L410", "OV10", "T37", "pa28", "p51d")
@@ -179,7 +179,7 @@ def main() -> None:
     args = parser.parse_args()
     table, broken = Table(*COLUMNS), []
     for name in args.names:
-        derived_if_needed(f"jsbsim:{name}")
+        derive_if_needed(f"jsbsim:{name}")
         row, said = row_of(name, args)
         table.add_row(*row)
         broken += said

@@ -16,6 +16,7 @@ import pickle
 import resource
 import tempfile
 import time
+from collections import Counter
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -23,7 +24,7 @@ from pathlib import Path
 from beaver_ftc.scenario.sweep_loader import Sweep, load_sweep
 from beaver_ftc.studies.engine.store import Parts
 from beaver_ftc.studies.engine.workers import Row, Task, Work, Workers, one_thread_each
-from beaver_ftc.studies.sweep.campaign import Options, Tally, run_sweep
+from beaver_ftc.studies.sweep.campaign import Options, run_sweep
 from beaver_ftc.studies.sweep.one_flight import Job, fly_one, scenario_of
 from beaver_ftc.studies.sweep.sampling import Assignment, Plan
 from beaver_ftc.studies.sweep.store import RowsAsParquet, batch_size
@@ -48,10 +49,10 @@ def seconds(work: Callable[[], object]) -> float:
 
 def sweep_seconds(flights: int, **options: object) -> float:
     """Wall time of a sweep, summary and all, but without figures."""
-    return seconds(lambda: _sweep(flights, lambda tally: None, **options))
+    return seconds(lambda: _sweep(flights, lambda counts: None, **options))
 
 
-def _sweep(flights: int, progress: Callable[[Tally], None], **options: object) -> None:
+def _sweep(flights: int, progress: Callable[[Counter[str]], None], **options: object) -> None:
     with tempfile.TemporaryDirectory() as out:
         run_sweep(sweep_of(flights), Options(out=Path(out), report=False, **options), progress)  # type: ignore[arg-type]
 
@@ -60,7 +61,7 @@ def processor_seconds(flights: int) -> tuple[float, float]:
     """Processor time a sweep takes in (its worker, its own process); other work hardly shows."""
     spent: dict[int, float] = {}
 
-    def note(tally: Tally) -> None:
+    def note(counts: Counter[str]) -> None:
         spent.update(
             {worker.pid: _processor_time(worker.pid) for worker in multiprocessing.active_children()}
         )

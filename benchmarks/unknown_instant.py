@@ -14,9 +14,9 @@ from collections.abc import Iterator
 from statistics import fmean
 
 import numpy as np
-from beaver_ftc.studies.engine.told import Whitening, chance
 
 from beaver_ftc.studies.compare.replay import Recording, Trace, aware_of_the_air, record, trace
+from beaver_ftc.studies.engine.clairvoyant import Whitening, chance
 from beaver_ftc.studies.power.chances import level_for
 from beaver_ftc.studies.power.survey import (
     STATISTICAL,

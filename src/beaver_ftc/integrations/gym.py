@@ -19,8 +19,8 @@ asks flies a part itself instead of waiting.
 import contextlib
 import pickle
 import signal
-from collections.abc import Mapping, Sequence
-from ctypes import c_double
+from collections.abc import Sequence
+from ctypes import Array, c_double
 from itertools import pairwise
 from multiprocessing.connection import Connection
 from typing import Any, NamedTuple
@@ -49,7 +49,8 @@ _PATIENCE_S = 5.0  # for a worker to end by itself
 
 Vector = NDArray[np.float64]
 Flags = NDArray[np.bool_]
-Infos = dict[int, dict[str, Any]]  # of the episodes that have any
+Info = dict[str, Any]
+Infos = dict[int, Info]  # of the episodes that have any
 
 
 class Episode(Simulation):
@@ -121,9 +122,7 @@ class BeaverEnv(gymnasium.Env[Vector, Vector]):
         self._episode: Episode | None = None
         self._seeded = False
 
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[Vector, dict[str, Any]]:
+    def reset(self, *, seed: int | None = None, options: Info | None = None) -> tuple[Vector, Info]:
         """Put the aircraft in trim. A seed replaces the scenario's, and those of the episodes to come follow
         from it; without any they all have the scenario's."""
         super().reset(seed=seed)
@@ -136,7 +135,7 @@ class BeaverEnv(gymnasium.Env[Vector, Vector]):
             self._episode.reset(seed=seed)  # the aircraft is not loaded again
         return self._episode.observation(), {}
 
-    def step(self, action: Vector) -> tuple[Vector, float, bool, bool, dict[str, Any]]:
+    def step(self, action: Vector) -> tuple[Vector, float, bool, bool, Info]:
         """Command the surfaces, fly, look."""
         episode = self._episode
         if episode is None:
@@ -153,23 +152,23 @@ class _Part(NamedTuple):
     """Some of the episodes: the memory that all share, how many numbers an action and an observation have,
     which of its rows they are, and the options of their environments."""
 
-    block: Any
+    block: "Array[c_double]"
     sizes: tuple[int, int]
     rows: slice
-    options: dict[str, Any]
+    options: Info
 
 
 class _Shared:
     """A row an episode: its action, its observation, reward, whether it is terminated, whether truncated."""
 
-    def __init__(self, block: Any, sizes: tuple[int, int], rows: slice) -> None:
+    def __init__(self, block: "Array[c_double]", sizes: tuple[int, int], rows: slice) -> None:
         actions, seen = sizes
-        values = np.frombuffer(block).reshape(-1, actions + seen + 3)[rows]
+        values = np.frombuffer(memoryview(block)).reshape(-1, actions + seen + 3)[rows]
         self.actions, self.seen = values[:, :actions], values[:, actions : actions + seen]
         self.rewards, self.terminated, self.truncated = values[:, -3], values[:, -2], values[:, -1]
 
 
-class BeaverVectorEnv(gymnasium.vector.VectorEnv[NDArray[np.float64], NDArray[np.float64], Any]):
+class BeaverVectorEnv(gymnasium.vector.VectorEnv[Vector, Vector, Any]):
     """`num_envs` environments as one, flown by `workers` processes, this one among them; as many as there are
     cores if left out.
 
@@ -202,8 +201,8 @@ class BeaverVectorEnv(gymnasium.vector.VectorEnv[NDArray[np.float64], NDArray[np
         ]
 
     def reset(
-        self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[NDArray[np.float64], dict[str, Any]]:
+        self, *, seed: int | Sequence[int | None] | None = None, options: Info | None = None
+    ) -> tuple[Vector, Info]:
         """Put every aircraft in trim. A seed is the first one's, the others have those after it."""
         seeds = [seed] * self.num_envs if seed is None else seed
         if isinstance(seeds, int):
@@ -216,9 +215,7 @@ class BeaverVectorEnv(gymnasium.vector.VectorEnv[NDArray[np.float64], NDArray[np
         infos = self._answers()
         return self._shared.seen.copy(), infos
 
-    def step(
-        self, actions: ArrayLike
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64], Flags, Flags, dict[str, Any]]:
+    def step(self, actions: ArrayLike) -> tuple[Vector, Vector, Flags, Flags, Info]:
         """Command the surfaces, fly, look: all at the same time."""
         shared, given = self._shared, np.asarray(actions, np.float64)
         if given.shape != shared.actions.shape:
@@ -235,9 +232,9 @@ class BeaverVectorEnv(gymnasium.vector.VectorEnv[NDArray[np.float64], NDArray[np
         for worker in getattr(self, "_workers", ()):
             worker.end()
 
-    def _answers(self) -> dict[str, Any]:
+    def _answers(self) -> Info:
         """Wait for all; what they have to say, by Gymnasium's rule, but a document stays one."""
-        infos: dict[str, Any] = {}
+        infos: Info = {}
         failed: Exception | None = None
         for worker in self._workers:
             answer = worker.answer()
@@ -251,7 +248,7 @@ class BeaverVectorEnv(gymnasium.vector.VectorEnv[NDArray[np.float64], NDArray[np
             raise failed
         return infos
 
-    def _put(self, infos: dict[str, Any], i: int, info: Mapping[str, Any]) -> None:
+    def _put(self, infos: Info, i: int, info: Info) -> None:
         for key, value in info.items():
             infos.setdefault(key, np.full(self.num_envs, None, object))[i] = value
             infos.setdefault(f"_{key}", np.zeros(self.num_envs, np.bool_))[i] = True

@@ -12,7 +12,6 @@ from importlib import import_module
 from math import sqrt
 from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import Any
 
 from beaver_ftc.documents.errors import BadInput, BeaverFtcError
 from beaver_ftc.integrations.live import BAD_INPUT, EVERYONE, messages
@@ -148,7 +147,7 @@ class Flying:
         else:
             self._answer(page, request, True, says)
 
-    def _answer(self, page: int, request: Any, ok: bool, says: str) -> None:
+    def _answer(self, page: int, request: messages.Request | None, ok: bool, says: str) -> None:
         if isinstance(request, messages.Stick) and ok:
             return
         self._send(page, messages.acknowledged(request.n if request else 0, ok, says))
@@ -205,5 +204,5 @@ class Flying:
             self._send(EVERYONE, self._session.frame())
         self._ticks += 1
 
-    def _send(self, page: int, told: dict[str, Any]) -> None:
-        self._pipe.send((page, messages.encode(told)))
+    def _send(self, page: int, message: messages.Message) -> None:
+        self._pipe.send((page, messages.encode(message)))

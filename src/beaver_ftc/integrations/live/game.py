@@ -6,10 +6,13 @@ from typing import Any
 import numpy as np
 
 from beaver_ftc.documents.errors import BadInput, suggestion
+from beaver_ftc.integrations.live.messages import Message
 
 EARLIEST_S, LATEST_S = 4.0, 20.0  # of the hidden fault, after the start of the round
 IDLE, WAITING, BROKEN, OVER = "idle", "waiting", "broken", "over"
 NOTHING = "nothing"
+
+Fault = dict[str, Any]  # as in a scenario, without its times
 
 
 @dataclass
@@ -18,7 +21,7 @@ class Game:
 
     phase: str = IDLE
     mode: str = "random"
-    fault: dict[str, Any] = field(default_factory=dict)
+    fault: Fault = field(default_factory=dict)
     due_s: float = float("inf")
     broken_s: float | None = None
     yours: tuple[str, float] | None = None
@@ -30,9 +33,7 @@ class Game:
         """Whether the page must not show what is broken, nor what the diagnosis says."""
         return self.phase in (WAITING, BROKEN)
 
-    def next_round(
-        self, mode: str, now_s: float, kinds: list[dict[str, Any]], rng: np.random.Generator
-    ) -> "Game":
+    def next_round(self, mode: str, now_s: float, kinds: list[Fault], rng: np.random.Generator) -> "Game":
         """A new round; in `random` one of these faults will come at a time nobody is told."""
         game = Game(phase=WAITING, mode=mode, score=self.score)
         if mode == "random":
@@ -44,7 +45,7 @@ class Game:
         """Whether the hidden fault has to come now."""
         return self.phase == WAITING and now_s >= self.due_s
 
-    def broke(self, fault: dict[str, Any], now_s: float) -> None:
+    def broke(self, fault: Fault, now_s: float) -> None:
         """Something has been broken, by chance or by the second person."""
         self.phase, self.fault, self.broken_s = BROKEN, fault, now_s
 
@@ -91,28 +92,30 @@ class Game:
         """Give the round up."""
         self.phase = OVER if self.hidden else IDLE
 
-    def shown(self) -> dict[str, Any]:
+    def shown(self) -> Message:
         """What a page may know."""
-        told: dict[str, Any] = {"phase": WAITING if self.hidden else self.phase, "mode": self.mode}
-        told["answered"] = self.yours is not None
-        told["score"] = self.score
-        if self.phase == OVER:
-            told |= {"fault": self.fault, "broken_s": self.broken_s, "winner": self.winner}
-            told |= {"yours": self.yours, "detector": self.detector}
-            told |= {"your_delay_s": self._delay_s(self.yours), "its_delay_s": self._delay_s(self.detector)}
-        return told
+        phase = WAITING if self.hidden else self.phase
+        always = {"phase": phase, "mode": self.mode, "answered": self.yours is not None, "score": self.score}
+        if self.phase != OVER:
+            return always
+        return always | {
+            "fault": self.fault, "broken_s": self.broken_s, "winner": self.winner,
+            "yours": self.yours, "detector": self.detector,
+            "your_delay_s": self._delay_s(self.yours), "its_delay_s": self._delay_s(self.detector),
+        }  # fmt: skip
 
 
-def hidden_faults(surfaces: tuple[str, ...], primary: tuple[str, ...]) -> list[dict[str, Any]]:
+def hidden_faults(surfaces: tuple[str, ...], primary: tuple[str, ...]) -> list[Fault]:
     """What may break unseen: what can be felt. A surface that only stands in for others is still while all is
     well: of it only a runaway shows."""
-    kinds: list[dict[str, Any]] = []
-    for surface in surfaces:
-        kinds.append({"type": "hardover", "actuator": surface, "direction": 1})
-        if surface in primary:
-            kinds.append({"type": "stuck", "actuator": surface})
-            kinds += [
-                {"type": "loss_of_effectiveness", "actuator": surface, "magnitude": share}
-                for share in (0.4, 0.7)
-            ]
-    return kinds
+    felt: tuple[tuple[str, Fault], ...] = (
+        ("hardover", {"direction": 1}),
+        ("stuck", {}),
+        ("loss_of_effectiveness", {"magnitude": 0.4}),
+        ("loss_of_effectiveness", {"magnitude": 0.7}),
+    )
+    return [
+        {"type": kind, "actuator": surface, **size}
+        for surface in surfaces
+        for kind, size in (felt if surface in primary else felt[:1])
+    ]

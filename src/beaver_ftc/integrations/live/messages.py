@@ -18,6 +18,8 @@ FASTEST = 20.0  # times real time
 STICK_DEG_S = 20.0  # full stick
 WHEN = {"at_s", "end_s"}  # of a fault: not what it is
 
+Message = dict[str, Any]  # to a page
+
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]{1,100}$")]
 Finite = Annotated[float, Field(ge=-1000, le=1000)]
 Finite4 = Annotated[float, Field(ge=-10_000, le=10_000)]
@@ -134,10 +136,10 @@ AnyRequest = Annotated[
     Break | Repair | Blow | Aim | Stick | Speed | Pause | Change | Fresh | Game | Save | Invite,
     Field(discriminator="do"),
 ]
-_ADAPTER: TypeAdapter[Any] = TypeAdapter(AnyRequest)
+_ADAPTER: TypeAdapter[Request] = TypeAdapter(AnyRequest)
 
 
-def parse(text: str | bytes) -> Any:
+def parse(text: str | bytes) -> Request:
     """The request in a message. Raises BadInput with the first thing that is wrong, in one line."""
     if len(text) > MAX_BYTES:
         raise BadInput(f"a message of {len(text)} characters, allowed: {MAX_BYTES}")
@@ -149,7 +151,7 @@ def parse(text: str | bytes) -> Any:
         raise BadInput(f"{place:.100}: {first['msg']:.200}") from None
 
 
-def acknowledged(n: int, ok: bool, says: str) -> dict[str, Any]:
+def acknowledged(n: int, ok: bool, says: str) -> Message:
     """The answer to the request of this number."""
     return {"k": "ack", "n": n, "ok": ok, "says": says}
 
@@ -162,7 +164,7 @@ def in_words(fault: Mapping[str, Any]) -> str:
     return f"{where}: {str(fault['type']).replace('_', ' ')}" + (f" ({sizes})" if sizes else "")
 
 
-def encode(message: dict[str, Any]) -> bytes:
+def encode(message: Message) -> bytes:
     """One message to a page."""
     return json.dumps(message, separators=(",", ":"), allow_nan=False).encode()
 

@@ -9,16 +9,22 @@ import threading
 from collections.abc import Callable, Iterator
 from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.integrations.live import BAD_INPUT, EVERYONE, MAX_BYTES
 
 if TYPE_CHECKING:
+    from multiprocessing.process import BaseProcess
+
+    import uvicorn
+
     from beaver_ftc.scenario.schema import Scenario
 
 LOOPBACK = "127.0.0.1"
 LAST_WORDS_S = 3.0  # the flight process is given so long to end
+
+Heard = Callable[[int | str, bytes | str], None]  # a page and its message, or why the flight has ended
 
 
 def serve(load: "Callable[[], Scenario]", out: Path, port: int, say: Callable[[str], None]) -> None:
@@ -55,7 +61,7 @@ def _listening(port: int) -> Iterator[socket.socket]:
 
 
 @contextlib.contextmanager
-def _flight(out: Path) -> Iterator[tuple[Any, Connection]]:
+def _flight(out: Path) -> Iterator[tuple["BaseProcess", Connection]]:
     """The flight process, and the pipe to it; the first thing it is sent is the scenario."""
     context = multiprocessing.get_context("spawn")
     ours, theirs = context.Pipe()
@@ -91,20 +97,27 @@ async def _serve(
     from beaver_ftc.integrations.live.server import Gate, Pages, application
 
     gate, pages = Gate(listener.getsockname()[1]), Pages()
-    app = application(gate, pages, _asker(pipe))
+
+    def ask(page: int, text: str) -> None:
+        with contextlib.suppress(OSError):  # it has died: `_listen` says so
+            pipe.send((page, text))
+
     config = uvicorn.Config(
-        app, log_level="error", access_log=False, lifespan="off", server_header=False,
+        application(gate, pages, ask),
+        log_level="error", access_log=False, lifespan="off", server_header=False,
         ws_max_size=MAX_BYTES, ws_ping_interval=20.0, timeout_graceful_shutdown=2,
     )  # fmt: skip
-    server = _server(config)
+    server = uvicorn.Server(config)
+    # its own raises the signals again at its end
+    server.capture_signals = contextlib.nullcontext  # type: ignore[assignment, method-assign]
     _on_signals(server)
     ended: list[tuple[str, str]] = []
 
-    def heard(page: Any, told: Any) -> None:
-        if isinstance(page, int):
-            pages.tell(page, told)
+    def heard(page: int | str, message: bytes | str) -> None:
+        if isinstance(page, int) and isinstance(message, bytes):
+            pages.tell(page, message)
         else:
-            ended.append((page, told))
+            ended.append((str(page), str(message)))
             server.should_exit = True
 
     arguments = pipe, asyncio.get_running_loop(), heard
@@ -117,15 +130,7 @@ async def _serve(
     return ended[0] if ended else None
 
 
-def _asker(pipe: Connection) -> Callable[[int, str], None]:
-    def ask(page: int, text: str) -> None:
-        with contextlib.suppress(OSError):  # it has died: `_listen` says so
-            pipe.send((page, text))
-
-    return ask
-
-
-def _listen(pipe: Connection, loop: asyncio.AbstractEventLoop, heard: Callable[[Any, Any], None]) -> None:
+def _listen(pipe: Connection, loop: asyncio.AbstractEventLoop, heard: Heard) -> None:
     """Hand on what the flight process says, from a thread of its own, until there is nothing more."""
     with contextlib.suppress(RuntimeError):  # the loop is closed: the server has ended
         try:
@@ -135,7 +140,7 @@ def _listen(pipe: Connection, loop: asyncio.AbstractEventLoop, heard: Callable[[
             loop.call_soon_threadsafe(heard, "died", "the flight process has ended unexpectedly")
 
 
-def _on_signals(server: Any) -> None:
+def _on_signals(server: "uvicorn.Server") -> None:
     """SIGINT and SIGTERM end the server in good order."""
     loop = asyncio.get_running_loop()
 
@@ -147,15 +152,3 @@ def _on_signals(server: Any) -> None:
             loop.add_signal_handler(number, end)
         except NotImplementedError:  # Windows
             signal.signal(number, end)
-
-
-def _server(config: Any) -> Any:
-    """A uvicorn server that leaves the signals to `_on_signals`: its own raises them again at its end."""
-    import uvicorn
-
-    class Server(uvicorn.Server):
-        @contextlib.contextmanager
-        def capture_signals(self) -> Iterator[None]:
-            yield
-
-    return Server(config)

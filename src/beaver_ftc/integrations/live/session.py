@@ -12,8 +12,8 @@ import numpy as np
 import beaver_ftc as bf
 from beaver_ftc.documents.errors import BadInput, suggestion
 from beaver_ftc.integrations.live import messages
-from beaver_ftc.integrations.live.game import NOTHING, Game, hidden_faults
-from beaver_ftc.integrations.live.messages import WHEN, in_words, short
+from beaver_ftc.integrations.live.game import NOTHING, Fault, Game, hidden_faults
+from beaver_ftc.integrations.live.messages import WHEN, Message, in_words, short
 from beaver_ftc.loop.cockpit import IMMOVABLE
 from beaver_ftc.plugins import DETECTORS, LAWS, is_compiled, registered
 from beaver_ftc.results.log import SpooledLog
@@ -58,9 +58,9 @@ class Session:
         self.columns = sim.columns
         self.surfaces = tuple(c.removesuffix("_cmd_rad") for c in self.columns if c.endswith("_cmd_rad"))
         self._hidden = [i for i, name in enumerate(self.columns) if name.endswith(HIDDEN)]
-        self.events: deque[dict[str, Any]] = deque(maxlen=EVENTS_KEPT)
-        self.fresh_events: list[dict[str, Any]] = []
-        self.told: deque[dict[str, Any]] = deque(maxlen=EVENTS_KEPT)
+        self.events: deque[Message] = deque(maxlen=EVENTS_KEPT)
+        self.fresh_events: list[Message] = []
+        self.told: deque[Message] = deque(maxlen=EVENTS_KEPT)
         self.flying = {"law": flown.control.law, "scheme": flown.fdi.scheme}
         self._gust_until_s = 0.0
         self._said: tuple[Any, ...] = (None, None, None, (), False)
@@ -109,12 +109,8 @@ class Session:
             return
         before, self._said = self._said, said
         if alarm and before[0] != alarm:
-            why = (
-                f"residual of {alarm} beyond its threshold"
-                if verdict.axis
-                else f"{alarm} contradict one another"
-            )
-            self._tell("alarm", why, secret=True)
+            beyond, against = f"residual of {alarm} beyond its threshold", f"{alarm} contradict one another"
+            self._tell("alarm", beyond if verdict.axis else against, secret=True)
         if verdict.isolated and before[1:3] != said[1:3]:
             self.game.named(verdict.isolated, t_s)
             kind = verdict.type if verdict.type != verdict.isolated else None
@@ -133,7 +129,7 @@ class Session:
         self.events.append(event)
         self.fresh_events.append(event)
 
-    def take_events(self) -> list[dict[str, Any]]:
+    def take_events(self) -> list[Message]:
         """The events since the last call that a page may see; the others wait for the end of the round."""
         if self.game.hidden:
             told = [event for event in self.fresh_events if not event["secret"]]
@@ -207,7 +203,7 @@ class Session:
         self._tell("changed", says)
         return says
 
-    def _break(self, fault: dict[str, Any]) -> str:
+    def _break(self, fault: Fault) -> str:
         self._check_going_on()
         self.sim.inject(fault)
         self._known = self.sim.in_force
@@ -263,22 +259,20 @@ class Session:
         self._tell("saved", str(folder))
         return f"saved: {folder}; fly it again: beaver-ftc run {folder / 'scenario.yaml'}"
 
-    def frame(self) -> dict[str, Any]:
+    def frame(self) -> Message:
         """What the page draws, of the frame just flown."""
         sim, hidden = self.sim, self.game.hidden
         values = [short(value) for value in sim.values]
         for i in self._hidden if hidden else ():
             values[i] = None
-        told: dict[str, Any] = {"k": "f", "v": values, "stick": self._flown_stick}
+        seen = {"k": "f", "v": values, "stick": self._flown_stick}
         if hidden:
-            return told
+            return seen
         verdict = sim.verdict
-        told["detected"] = verdict.detected
-        told["axis"], told["isolated"], told["type"] = verdict.axis, verdict.isolated, verdict.type
-        told["candidates"], told["estimate"] = verdict.candidates, verdict.estimate
-        told["mode"] = sim.mode
-        told["effectiveness"] = [short(self._effectiveness(surface)) for surface in self.surfaces]
-        return told
+        said = ("detected", "axis", "isolated", "type", "candidates", "estimate")
+        seen |= {name: getattr(verdict, name) for name in said}
+        effectiveness = [short(self._effectiveness(surface)) for surface in self.surfaces]
+        return seen | {"mode": sim.mode, "effectiveness": effectiveness}
 
     def _effectiveness(self, surface: str) -> float:
         """How much of its moment a surface gives for its command: none while it does not follow that."""
@@ -287,14 +281,15 @@ class Session:
             return 0.0
         return self.sim.read(f"{failures}/effectiveness")
 
-    def state(self) -> dict[str, Any]:
+    def state(self) -> Message:
         """What changes seldom."""
         there = () if self.game.hidden else self.sim.in_force
-        gust = self.sim.t_s < self._gust_until_s
-        told = {"k": "s", "over": self.over, "game": self.game.shown(), "gust": gust, "flying": self.flying}
-        told["knows"] = self._knows
-        told["broken"] = sorted({place_of(fault) for fault in there})
-        return told | {"faults": [fault.model_dump(exclude=WHEN, exclude_none=True) for fault in there]}
+        return {
+            "k": "s", "over": self.over, "game": self.game.shown(),
+            "gust": self.sim.t_s < self._gust_until_s, "flying": self.flying, "knows": self._knows,
+            "broken": sorted({place_of(fault) for fault in there}),
+            "faults": [fault.model_dump(exclude=WHEN, exclude_none=True) for fault in there],
+        }  # fmt: skip
 
     @property
     def _knows(self) -> str:
@@ -309,7 +304,7 @@ class Session:
         with checked_against(self.scenario.airframe):
             return sensors_there()
 
-    def hello(self) -> dict[str, Any]:
+    def hello(self) -> Message:
         """What a page needs to know of this flight before its first frame."""
         low, high = self.sim.travel_rad
         scenario = self.scenario
@@ -328,7 +323,7 @@ class Session:
         }  # fmt: skip
 
 
-def level_turn(phi_rad: float, theta_rad: float, airspeed_mps: float) -> Any:
+def level_turn(phi_rad: float, theta_rad: float, airspeed_mps: float) -> np.ndarray:
     """Body rates (3,) rad/s of a coordinated level turn: psi' = g tan(phi) / V, seen in body axes."""
     turn = G_MPS2 * tan(phi_rad) / airspeed_mps
     return turn * np.array([-sin(theta_rad), sin(phi_rad) * cos(theta_rad), cos(phi_rad) * cos(theta_rad)])

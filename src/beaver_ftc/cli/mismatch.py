@@ -85,7 +85,7 @@ def _fly_all(
 
 def _fly(scenario: "Scenario", out: Path, report: bool) -> tuple[dict[str, Any], Any]:
     from beaver_ftc.cli.progress import progress_bar
-    from beaver_ftc.studies.mismatch.run import run_mismatch
+    from beaver_ftc.studies.mismatch.study import run_mismatch
 
     for warning in scenario.warnings():
         complain(f"{scenario.name}: warning: {warning}")
@@ -102,9 +102,8 @@ def _compare(
     format: Format,
     report: bool,
 ) -> dict[str, Any]:
-    from beaver_ftc.studies.mismatch.compare import entry, write_comparison
-    from beaver_ftc.studies.mismatch.run import recommended_for
-    from beaver_ftc.studies.mismatch.text import comparison_text
+    from beaver_ftc.studies.mismatch.study import entry, recommended_for, write_comparison
+    from beaver_ftc.studies.mismatch.tables import comparison_text
 
     entries = [entry(found) for found in documents]
     recommended = recommended_for(scenarios, tallies)
@@ -116,7 +115,7 @@ def _compare(
 
 def _map(scenario: "Scenario", out: Path, format: Format, report: bool) -> list[dict[str, Any]]:
     from beaver_ftc.cli.progress import progress_bar
-    from beaver_ftc.studies.mismatch.envelope import map_name, run_map
+    from beaver_ftc.studies.mismatch.study import map_name, run_map
 
     with progress_bar(f"{scenario.name}: envelope") as progress:
         entries = run_map(out, scenario, report, progress)
@@ -126,7 +125,7 @@ def _map(scenario: "Scenario", out: Path, format: Format, report: bool) -> list[
 
 
 def _say(found: dict[str, Any], folder: Path) -> None:
-    from beaver_ftc.studies.mismatch.text import mismatch_text
+    from beaver_ftc.studies.mismatch.tables import mismatch_text
 
     emit(mismatch_text(found, str(folder), _colour()))
 

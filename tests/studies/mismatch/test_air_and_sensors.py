@@ -6,7 +6,7 @@ import pytest
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.channels import TRUTH
 from beaver_ftc.plant.trim import trim
-from beaver_ftc.studies.mismatch.sources import SOURCES, Case, instantaneous
+from beaver_ftc.studies.mismatch.sources import SOURCES, Models, instantaneous
 from beaver_ftc.studies.mismatch.split import split
 from beaver_ftc.studies.mismatch.states import States, air_name, measured_name, states_of
 from flying import flown, scenario
@@ -47,10 +47,10 @@ def row(plant, t_s):
 def test_turbulence_is_its_own_source_and_leaves_nothing():
     states = flight_in_turbulence()
     assert np.abs(states.x_air - states.x).max() > 1e-3
-    case = Case.of(CALM, states[:1])
+    case = Models.of(CALM, states[:1])
     contributions, _ = instantaneous(case, states)
-    believed = case.belief.acceleration(states.x_measured, states.y_measured, states.u)
-    rest = states.xdot - believed - sum(contributions.values())
+    designed = case.belief.acceleration(states.x_measured, states.y_measured, states.u)
+    rest = states.xdot - designed - sum(contributions.values())
     assert np.abs(contributions["wind_turbulence"]).max() > 1e-3
     assert np.abs(rest).max() <= ROUNDING
 
@@ -73,8 +73,8 @@ def test_an_erring_sensor_shows_as_the_model_at_the_true_state_less_that_at_the_
     plain, _ = split(CALM, [columns])
     off = columns | {measured_name(column): columns[column] + error}
     states = states_of(off)
-    believed = Case.of(CALM, states[:1]).belief
-    made_of_it = believed.acceleration(states.x_measured, states.y_measured, states.u)
+    designed = Models.of(CALM, states[:1]).belief
+    made_of_it = designed.acceleration(states.x_measured, states.y_measured, states.u)
     for i, axis in enumerate("pqr"):  # what the diagnosis would have logged, one row later
         off[f"{axis}_design_rad_s2"] = np.concatenate([[0.0], made_of_it[:-1, i]])
     erring, _ = split(CALM, [off])

@@ -5,11 +5,18 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from beaver_ftc.studies.mismatch.bound import guarantee_with, recommend, rounded_up, widened, with_bound
-from beaver_ftc.studies.mismatch.run import recommended_for, settle, tally_of_flight
+from beaver_ftc.studies.mismatch.bound import (
+    guarantee_with,
+    recommend,
+    recommended_for,
+    rounded_up,
+    settle,
+    tally_of_flight,
+    widened,
+    with_bound,
+)
 from beaver_ftc.studies.mismatch.sources import SOURCES
-from beaver_ftc.studies.mismatch.split import Stretch
-from beaver_ftc.studies.mismatch.tally import AxisBound, Tally
+from beaver_ftc.studies.mismatch.split import AxisBound, Stretch, Tally
 from flying import loss, scenario
 
 CONSTANT = np.array([0.02, 0.02, 0.02])
@@ -182,7 +189,7 @@ def test_an_alarm_without_an_excess_widens_the_bound_until_there_is_none(monkeyp
         flown.append(case.fdi.bounds.constant_rad_s2.q)
         return Tally(CONSTANT, 0.1), {"false_alarm": len(flown) <= alarms}
 
-    monkeypatch.setattr("beaver_ftc.studies.mismatch.run.tally_of_flight", fly)
+    monkeypatch.setattr("beaver_ftc.studies.mismatch.bound.tally_of_flight", fly)
     needs = Tally(CONSTANT, 0.1, bounds=tuple(AxisBound(smallest_constant_rad_s2=0.1) for _ in range(3)))
     found = settle([scenario()], [needs])
     assert found.settled

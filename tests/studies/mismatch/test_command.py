@@ -11,10 +11,9 @@ import pytest
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.results.log import read
-from beaver_ftc.studies.mismatch import envelope
-from beaver_ftc.studies.mismatch.section import _heading
+from beaver_ftc.studies.mismatch import charts, study
 from beaver_ftc.studies.mismatch.sources import SOURCES
-from beaver_ftc.studies.mismatch.text import findings
+from beaver_ftc.studies.mismatch.tables import _heading, findings
 from beaver_ftc.studies.mismatch.variants import VARIANTS, variant_of
 from flying import loss, scenario
 
@@ -111,7 +110,7 @@ def test_a_false_alarm_of_the_published_case_is_said_on_the_page_too():
 
 
 def test_a_run_without_mismatch_has_no_such_section(tmp_path):
-    from beaver_ftc.studies.mismatch.section import mismatch_section
+    from beaver_ftc.studies.mismatch.tables import mismatch_section
 
     assert mismatch_section(tmp_path) == ""
 
@@ -196,10 +195,10 @@ def test_a_long_name_stays_a_valid_name():
 
 
 def test_the_map_covers_the_envelope_and_names_the_reason(monkeypatch, tmp_path):
-    monkeypatch.setattr(envelope, "AIRSPEEDS_MPS", (40.0, 50.0))
-    monkeypatch.setattr(envelope, "ALTITUDES_M", (500.0, 2500.0))
+    monkeypatch.setattr(study, "AIRSPEEDS_MPS", (40.0, 50.0))
+    monkeypatch.setattr(study, "ALTITUDES_M", (500.0, 2500.0))
     case = scenario(duration_s=2, faults=[loss(at_s=1)], design_model={"engine_terms": False})
-    entries = envelope.run_map(tmp_path, case)
+    entries = study.run_map(tmp_path, case)
     assert len(entries) == 2 * 2 * 3
     slow, fast = (
         next(e for e in entries if e["axis"] == "q" and e["airspeed_mps"] == V and e["altitude_m"] == 500.0)
@@ -207,7 +206,7 @@ def test_the_map_covers_the_envelope_and_names_the_reason(monkeypatch, tmp_path)
     )
     assert slow["dominant"] == fast["dominant"] == "engine"
     assert slow["worst_ratio"] > fast["worst_ratio"] > 1.0  # the slipstream matters more at low speed
-    folder = tmp_path / envelope.map_name(case)
+    folder = tmp_path / study.map_name(case)
     assert (folder / "figures" / "mismatch-map.png").exists()
     with (folder / "mismatch.csv").open() as file:
         assert len(list(csv.DictReader(file))) == 12
@@ -217,9 +216,9 @@ def test_where_there_is_no_trim_the_map_says_so(monkeypatch, tmp_path):
     def refuses(case):
         raise BadInput("no trim")
 
-    monkeypatch.setattr("beaver_ftc.studies.mismatch.run.tally_of_flight", refuses)
-    monkeypatch.setattr(envelope, "AIRSPEEDS_MPS", (40.0,))
-    monkeypatch.setattr(envelope, "ALTITUDES_M", (500.0,))
-    entries = envelope.run_map(tmp_path, scenario(), report=False)
+    monkeypatch.setattr("beaver_ftc.studies.mismatch.study.tally_of_flight", refuses)
+    monkeypatch.setattr(study, "AIRSPEEDS_MPS", (40.0,))
+    monkeypatch.setattr(study, "ALTITUDES_M", (500.0,))
+    entries = study.run_map(tmp_path, scenario(), report=False)
     assert [entry["worst_ratio"] for entry in entries] == [None] * 3
-    assert envelope.map_figure(entries, "x") is not None
+    assert charts.map_figure(entries, "x") is not None

@@ -3,8 +3,7 @@
 import pytest
 
 from beaver_ftc.studies.mismatch.states import AXES
-from beaver_ftc.studies.mismatch.text import comparison_text, findings, tables
-from beaver_ftc.studies.mismatch.words import percent
+from beaver_ftc.studies.mismatch.tables import comparison_text, findings, percent, tables
 
 
 def of(largest, share, **more):

@@ -10,10 +10,14 @@ from scipy.spatial.transform import Rotation
 
 from beaver_ftc.design.coefficients import MASS, inertia_coefficients
 from beaver_ftc.design.variants import anchor, design_of, response
-from beaver_ftc.studies.mismatch import moments
-from beaver_ftc.studies.mismatch.actuator import HealthyActuators
-from beaver_ftc.studies.mismatch.believed import Belief, designed_parts
-from beaver_ftc.studies.mismatch.rotation import EARTH_RATE_RAD_S, earth_in_body, earth_rotation
+from beaver_ftc.studies.mismatch import models
+from beaver_ftc.studies.mismatch.models import Belief, designed_moments
+from beaver_ftc.studies.mismatch.sources import (
+    EARTH_RATE_RAD_S,
+    HealthyActuators,
+    earth_in_body,
+    earth_rotation,
+)
 from flying import scenario
 
 DATA = Path(__file__).parents[2] / "data"
@@ -43,7 +47,7 @@ def test_belief_is_what_the_compiled_loop_evaluates(keys):
     x, y, u = random_states()
     design = design_of(case.design_model)[0]
     anchor(design, x[0], y[0], u[0])
-    found = Belief(designed_parts(case), design)
+    found = Belief(designed_moments(case), design)
     record = np.array([design]).view(np.recarray)[0]
     for k in range(len(x)):
         f, G = np.zeros(3), np.zeros((3, 4))
@@ -58,20 +62,20 @@ def test_belief_is_what_the_compiled_loop_evaluates(keys):
 def test_inertial_part_is_eulers_equation():
     x, _, _ = random_states()
     euler = [np.linalg.solve(INERTIA, -np.cross(w, INERTIA @ w)) for w in x]
-    assert moments.inertial(inertia_coefficients(), x) == pytest.approx(np.array(euler), rel=1e-9, abs=1e-12)
+    assert models.inertial(inertia_coefficients(), x) == pytest.approx(np.array(euler), rel=1e-9, abs=1e-12)
 
 
 def test_weights_are_the_inverse_inertia():
     """A unit of Cl, Cm, Cn is a moment qdyn S (b, c, b) about x, y, z."""
     for i, (name, length) in enumerate((("Cl", 14.63), ("Cm", 1.5875), ("Cn", 14.63))):
         moment = 900.0 * 23.23 * length * np.eye(3)[i]
-        found = moments.weights(inertia_coefficients(), name, np.array([900.0]))[0]
+        found = models.weights(inertia_coefficients(), name, np.array([900.0]))[0]
         assert found == pytest.approx(np.linalg.solve(INERTIA, moment), rel=1e-12, abs=1e-12)
 
 
 def test_the_terms_of_all_moments_are_those_of_the_table():
-    assert len(moments.MOMENT_TERMS) == 26
-    assert moments.ENGINE_TERMS == ("Cl_a2dpt", "Cm_dpt", "Cn_dpt3")
+    assert len(models.MOMENT_TERMS) == 26
+    assert models.ENGINE_TERMS == ("Cl_a2dpt", "Cm_dpt", "Cn_dpt3")
 
 
 @given(st.tuples(*[st.floats(-3, 3)] * 3), st.floats(-1.5, 1.5))
@@ -87,8 +91,8 @@ def test_a_body_at_rest_among_the_stars_keeps_its_rates_against_the_earth():
     attitude, latitude = np.array([[0.4, -0.3, 2.0]]), np.array([0.7])
     at_rest = -earth_in_body(attitude, latitude)
     inertia = inertia_coefficients()
-    total = moments.inertial(inertia, at_rest) + earth_rotation(
-        lambda w: moments.inertial(inertia, w), at_rest, attitude, latitude
+    total = models.inertial(inertia, at_rest) + earth_rotation(
+        lambda w: models.inertial(inertia, w), at_rest, attitude, latitude
     )
     assert total == pytest.approx(np.zeros((1, 3)), abs=1e-20)
 
@@ -108,21 +112,21 @@ def test_earth_rotation_is_the_derivative_of_the_rates_of_a_free_body():
         body, n = np.array(rate) + turn.inv().apply(earth), 20
         orientation, h = turn, time / n
         for _ in range(n):  # midpoint rule
-            middle = body + 0.5 * h * moments.inertial(inertia, body[None])[0]
+            middle = body + 0.5 * h * models.inertial(inertia, body[None])[0]
             orientation = orientation * Rotation.from_rotvec(middle * h)
-            body = body + h * moments.inertial(inertia, middle[None])[0]
+            body = body + h * models.inertial(inertia, middle[None])[0]
         return body - orientation.inv().apply(earth)
 
     slope = (against_earth(step) - against_earth(-step)) / (2 * step)
     exaggerated = scaled_rotation(scale, inertia, rate[None], attitude[None], latitude)
-    assert slope - moments.inertial(inertia, rate[None])[0] == pytest.approx(
+    assert slope - models.inertial(inertia, rate[None])[0] == pytest.approx(
         exaggerated[0], rel=1e-4, abs=1e-6
     )
 
 
 def scaled_rotation(scale, inertia, x, attitude, latitude):
     """earth_rotation with an Earth `scale` times as fast: the same with another unit of time."""
-    found = earth_rotation(lambda w: moments.inertial(inertia, w), x / scale, attitude, latitude)
+    found = earth_rotation(lambda w: models.inertial(inertia, w), x / scale, attitude, latitude)
     return scale**2 * found
 
 

@@ -11,9 +11,9 @@ from beaver_ftc.plant.configure import configure
 from beaver_ftc.plant.state import FlightState
 from beaver_ftc.scenario.builtin import builtin_names
 from beaver_ftc.scenario.loader import load_scenario
-from beaver_ftc.studies.mismatch.run import tally_of_flight
 from beaver_ftc.studies.mismatch.sources import SOURCES
 from beaver_ftc.studies.mismatch.split import split
+from beaver_ftc.studies.mismatch.study import tally_of_flight
 from beaver_ftc.studies.mismatch.variants import variant_of
 from flying import PUBLISHED_UNCERTAINTY, flown, loss, scenario
 
@@ -155,7 +155,7 @@ def test_what_nobody_declared_is_unexplained(monkeypatch):
 @pytest.mark.parametrize("name", ["Cm_alpha2", "Cl_beta", "Cn_q", "Cl_daa", "Cm_df", "Cl_a2dpt"])
 def test_a_term_is_what_jsbsim_makes_of_it(name):
     """JSBSim's acceleration with the term up by a half, less that without, at one state."""
-    from beaver_ftc.studies.mismatch.sources import Case, coefficient_errors
+    from beaver_ftc.studies.mismatch.sources import Models, coefficient_errors
     from beaver_ftc.studies.mismatch.states import States
 
     case = scenario(uncertainty={"coefficients": {name: 1.5}})
@@ -173,7 +173,7 @@ def test_a_term_is_what_jsbsim_makes_of_it(name):
     y = np.array([[0.17, 0.09, 41.0, qdyn, dpt]])
     x, u, none = np.array([[0.3, -0.2, 0.25]]), np.array([[0.2, -0.1, 0.1, 0.3]]), np.zeros((1, 3))
     states = States(np.zeros(1), x, x, x, y, y, u, u, u, none, none, np.zeros(1), np.zeros(1), none, none)
-    found = coefficient_errors(Case.of(case, states), states)
+    found = coefficient_errors(Models.of(case, states), states)
     assert list(found) == [name]
     assert found[name][0] == pytest.approx(np.subtract(*accelerations), rel=1e-6, abs=1e-9)
 

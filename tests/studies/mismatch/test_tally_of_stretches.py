@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from beaver_ftc.studies.mismatch import tally
+from beaver_ftc.studies.mismatch import split
 from beaver_ftc.studies.mismatch.sources import SOURCES
 from beaver_ftc.studies.mismatch.split import UNEXPLAINED, Stretch
 
@@ -14,7 +14,7 @@ def test_figures_are_those_of_all_frames_whatever_the_stretches():
     rng = np.random.default_rng(4)
     values, bound = rng.normal(size=(40, 3)), rng.uniform(0.5, 2.0, (40, 3))
     values[3], bound[3] = 0.0, 0.0  # nothing of nothing is no share
-    figures = tally.Figures()
+    figures = split.Figures()
     for part in (slice(0, 7), slice(7, 8), slice(8, 40)):
         figures.add(values[part], bound[part])
     share = np.abs(values) / np.where(bound > 0.0, bound, 1.0)
@@ -24,14 +24,14 @@ def test_figures_are_those_of_all_frames_whatever_the_stretches():
 
 
 def test_something_beside_a_bound_of_nothing_is_beyond_it():
-    figures = tally.Figures()
+    figures = split.Figures()
     figures.add(np.array([[0.1, 0.0, 0.0]]), np.zeros((1, 3)))
     assert figures.bound_share.tolist() == [np.inf, 0.0, 0.0]
 
 
 def ratios(*shares, noted=None):
     """An axis' bound that has seen stretches of ratios."""
-    bound, t_s = tally.AxisBound() if noted is None else noted, 0.0
+    bound, t_s = split.AxisBound() if noted is None else noted, 0.0
     for ratio in shares:
         n = len(ratio)
         times = t_s + FRAME_S * np.arange(n)
@@ -39,7 +39,7 @@ def ratios(*shares, noted=None):
         none = {name: np.zeros((n, 3)) for name in SOURCES}
         none["sinusoids" if "sinusoids" in none else SOURCES[0]][:, 1] = 1.0
         stretch = _stretch(times, place, none)
-        tally._note(bound, np.array(ratio), stretch, 1, FRAME_S)
+        split._note(bound, np.array(ratio), stretch, 1, FRAME_S)
         t_s += FRAME_S * n
     return bound
 
@@ -77,16 +77,16 @@ def test_a_stay_that_goes_on_lower_or_as_high_keeps_its_first_peak():
 
 
 def test_of_very_many_stays_the_first_are_kept_and_all_are_counted():
-    bound = ratios([1.5, 0.5] * tally.MAX_EXCEEDANCES)
-    assert (len(bound.exceedances), bound.stays) == (tally.MAX_EXCEEDANCES, tally.MAX_EXCEEDANCES)
+    bound = ratios([1.5, 0.5] * split.MAX_EXCEEDANCES)
+    assert (len(bound.exceedances), bound.stays) == (split.MAX_EXCEEDANCES, split.MAX_EXCEEDANCES)
     last = bound.exceedances[-1].end_s
     ratios([1.5], [9.0, 0.5], noted=bound)
-    assert (len(bound.exceedances), bound.stays) == (tally.MAX_EXCEEDANCES, tally.MAX_EXCEEDANCES + 1)
+    assert (len(bound.exceedances), bound.stays) == (split.MAX_EXCEEDANCES, split.MAX_EXCEEDANCES + 1)
     assert bound.exceedances[-1].end_s == last, "what goes on is another stay than the last one kept"
 
 
 def test_a_flight_is_beyond_its_bound_if_any_axis_is():
-    bounds = tuple(tally.AxisBound(exceeded_frames=n) for n in (0, 3, 0))
-    assert tally.Tally(np.zeros(3), FRAME_S, bounds=bounds).exceeded
-    assert not tally.Tally(np.zeros(3), FRAME_S).exceeded
-    assert UNEXPLAINED != tally.TOTAL
+    bounds = tuple(split.AxisBound(exceeded_frames=n) for n in (0, 3, 0))
+    assert split.Tally(np.zeros(3), FRAME_S, bounds=bounds).exceeded
+    assert not split.Tally(np.zeros(3), FRAME_S).exceeded
+    assert UNEXPLAINED != split.TOTAL

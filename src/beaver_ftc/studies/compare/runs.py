@@ -146,7 +146,7 @@ def write_runs(out: Path, folders: Sequence[Path]) -> list[Document]:
     from beaver_ftc.results.metrics import as_json
     from beaver_ftc.results.report import write_report
     from beaver_ftc.results.writer import result_folder
-    from beaver_ftc.studies.mismatch.section import show_in_reports
+    from beaver_ftc.studies.mismatch.tables import show_in_reports
 
     runs = read_runs(folders)
     show_in_reports()

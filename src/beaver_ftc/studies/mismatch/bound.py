@@ -1,18 +1,18 @@
 """The bound recommended for a set of runs, and what it costs the guarantee of detection."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from math import ceil, floor, log10
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+from beaver_ftc.studies.mismatch.split import Tally, tally_of_flight
 from beaver_ftc.studies.mismatch.states import AXES
 
 if TYPE_CHECKING:
-    from beaver_ftc.loop.flight import Flight
     from beaver_ftc.scenario.schema import Scenario
-    from beaver_ftc.studies.mismatch.tally import Tally
 
 PUBLISHED_CASE = "elevator-partial-loss"
+MAX_ROUNDS = 10  # of flights with a larger bound
 LEAST_RAD_S2 = 1e-4  # of a bound that is widened
 PerAxis = dict[str, float]
 
@@ -40,7 +40,7 @@ class Recommendation:
         return replace(self, constant_rad_s2=largest)
 
 
-def recommend(tallies: Iterable["Tally"]) -> Recommendation:
+def recommend(tallies: Iterable[Tally]) -> Recommendation:
     """The smallest constants that would have covered every run, rounded up to two digits."""
     needed = [[bound.smallest_constant_rad_s2 for bound in tally.bounds] for tally in tallies]
     worst = [max(column) for column in zip(*needed, strict=True)]
@@ -77,10 +77,10 @@ def guarantee_with(constant_rad_s2: PerAxis, like: "Scenario") -> Guarantee:
     from beaver_ftc.loop.loop import fly
 
     flight = fly(published_case(constant_rad_s2, like))
-    fault_s = flight.scenario.faults[0].at_s
-    return Guarantee(
-        constant_rad_s2, flight.guaranteed_delay_s, _delay(flight, fault_s), _false_alarm(flight, fault_s)
-    )
+    fault_s, at_s = flight.scenario.faults[0].at_s, flight.detection_time_s
+    delay_s = None if at_s is None or at_s < fault_s else round(at_s - fault_s, 9)
+    early = at_s is not None and at_s < fault_s
+    return Guarantee(constant_rad_s2, flight.guaranteed_delay_s, delay_s, early)
 
 
 def published_case(constant_rad_s2: PerAxis, like: "Scenario") -> "Scenario":
@@ -98,10 +98,45 @@ def with_bound(scenario: "Scenario", constant_rad_s2: PerAxis) -> "Scenario":
     return scenario.model_copy(update={"fdi": scenario.fdi.model_copy(update={"bounds": bounds})})
 
 
-def _delay(flight: "Flight", fault_s: float) -> float | None:
-    at_s = flight.detection_time_s
-    return None if at_s is None or at_s < fault_s else round(at_s - fault_s, 9)
+def recommended_for(scenarios: Sequence["Scenario"], kept: Sequence[Tally]) -> dict[str, Any]:
+    """The bound that covers these flights, and the published elevator case flown with it and the design.
+
+    The case is one of the flights to be covered: a bound that suits calmer air alone would raise a false
+    alarm in it, and guarantee nothing.
+    """
+    first = scenarios[0]
+    declared = first.fdi.bounds.constant_rad_s2.model_dump()
+    case = published_case(declared, first)
+    covered = settle([*scenarios, case], [*kept, tally_of_flight(case)[0]])
+    recommended = replace(covered, runs=len(scenarios))
+    return {
+        "recommended": {
+            "constant_rad_s2": recommended.constant_rad_s2,
+            "runs": recommended.runs,
+            "coverage": recommended.coverage,
+            "settled": recommended.settled,
+        },
+        "guarantee": {
+            "declared": vars(guarantee_with(declared, first)),
+            "recommended": vars(guarantee_with(recommended.constant_rad_s2, first)),
+        },
+    }
 
 
-def _false_alarm(flight: "Flight", fault_s: float) -> bool:
-    return flight.detection_time_s is not None and flight.detection_time_s < fault_s
+def settle(scenarios: Sequence["Scenario"], kept: Sequence[Tally]) -> Recommendation:
+    """The recommended bound, flown with until no flight exceeds it or raises a false alarm.
+
+    A bound too small raises an alarm, after which another law flies; without that alarm the flight, and its
+    mismatch, is another. So every flight is flown again with what is recommended.
+    """
+    tallies, recommended = list(kept), recommend(kept)
+    for _ in range(MAX_ROUNDS):
+        constant = recommended.constant_rad_s2
+        again = [tally_of_flight(with_bound(scenario, constant)) for scenario in scenarios]
+        short = [tally for tally, flown in again if tally.exceeded or flown["false_alarm"]]
+        if not short:
+            return replace(recommended, runs=len(scenarios))
+        tallies += short
+        larger = recommend(tallies).at_least(constant)
+        recommended = larger if larger.constant_rad_s2 != constant else widened(larger)
+    return replace(recommended, runs=len(scenarios), settled=False)

@@ -1,19 +1,19 @@
 """The truth's linear model beside the design model's, at the trim a scenario starts from.
 
 truth: JSBSim's accelerations differenced about the trim. fdc: the FDC equations, by complex steps, an
-independent road. design: the FDC equations with the moments the designer believes. own: JSBSim's own
+independent road. design: the FDC equations with the moments the designer holds. own: JSBSim's own
 linearisation, at the same condition without its sideslip, against the FDC equations there.
 """
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from beaver_ftc.design import fdc
 from beaver_ftc.design.coefficients import engine_power_kw, slipstream
 from beaver_ftc.design.variants import anchor, design_of, jacobian
-from beaver_ftc.studies.linear_systems import CLASSICAL, MODES, Mode, deviation, modes
+from beaver_ftc.studies.linear_systems import CHANNELS, CLASSICAL, MODES, Mode, deviation, modes, zeros
 
 if TYPE_CHECKING:
     from beaver_ftc.plant.linear import LinearModel
@@ -42,7 +42,7 @@ class LinearAnalysis:
 
 
 def analyse(scenario: "Scenario") -> LinearAnalysis:
-    """Linearise the scenario's truth and what the designer believes, at its trim."""
+    """Linearise the scenario's truth and what the designer holds, at its trim."""
     from beaver_ftc.plant.adapter import Plant
     from beaver_ftc.plant.configure import configure, trim_of
     from beaver_ftc.plant.linear import LinearModel, differences
@@ -103,8 +103,8 @@ def engine_of(point: "FlightState") -> fdc.Engine:
 def designed(
     scenario: "Scenario", point: "FlightState", A: np.ndarray, B: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """A and B with the rows of p, q and r as the designer believes them."""
-    f_x, f_y, G = believed_derivatives(scenario, point)
+    """A and B with the rows of p, q and r as the designer holds them."""
+    f_x, f_y, G = designed_derivatives(scenario, point)
     A, B = A.copy(), B.copy()
     rows = slice(3, 6)
     A[rows] = 0.0
@@ -116,7 +116,7 @@ def designed(
     return A, B
 
 
-def believed_derivatives(
+def designed_derivatives(
     scenario: "Scenario", point: "FlightState"
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """f_x (3, 3), f_y (3, 5) and G (3, 4) of the design model at a trim."""
@@ -147,3 +147,41 @@ def air_data_slope(point: "FlightState", along: str) -> np.ndarray:
     V = point.airspeed_mps + 1j * _STEP * (along == "airspeed")
     h = point.altitude_m + 1j * _STEP * (along == "altitude")
     return np.array([complex(each).imag / _STEP for each in air_data(point, V, h)])
+
+
+def linear_document(analysis: LinearAnalysis) -> dict[str, Any]:
+    """Modes side by side, how far the models are apart, zeros of the surface-to-rate channels."""
+    apart = {name: analysis.deviation(name) for name in analysis.models if name != "truth"}
+    return {
+        "airspeed_mps": analysis.point.airspeed_mps,
+        "altitude_m": analysis.point.altitude_m,
+        "modes": {
+            mode: {
+                **{name: _mode(found[mode]) for name, found in analysis.modes.items()},
+                "deviation": {name: each[mode] for name, each in apart.items()},
+                "jsbsim_own_deviation": analysis.own_deviation[mode],
+            }
+            for mode in MODES
+        },
+        "zeros": {
+            f"{surface} to {rate}": {
+                name: [
+                    [float(zero.real), float(zero.imag)]
+                    for zero in zeros(
+                        model.A, model.B[:, model.inputs.index(surface)], model.states.index(rate)
+                    )
+                ]
+                for name, model in analysis.models.items()
+            }
+            for surface, rate in CHANNELS
+        },
+    }
+
+
+def _mode(mode: Mode) -> dict[str, Any]:
+    return {
+        "real_per_s": mode.pole.real,
+        "imaginary_rad_s": mode.pole.imag,
+        "frequency_rad_s": mode.frequency_rad_s,
+        "damping": mode.damping,
+    }

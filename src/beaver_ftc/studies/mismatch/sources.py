@@ -17,18 +17,49 @@ difference.
       wind_turbulence    with the rates of the turning air in the damping terms
       earth_rotation     on a turning Earth
       integration        as JSBSim's integration moves the rates
+
+Healthy actuators are driven by the logged command: what the surfaces would have done with no fault,
+
+    a' = a + min(max(w (demand - a), -rate dt), rate dt),  w = 1 - exp(-bandwidth dt)
+
+every JSBSim frame of dt, within the stops; with neither lag nor rate limit a is the demand. The command
+of a row was in force in all JSBSim frames that led to it; at the start the actuator rests at its command.
+
+A declared fault is weighed with the design's G, as in theory. A loss of effectiveness is what it takes from
+the surface where the surface is: the product of all losses, taken one after the other. A fault of the
+mechanism (jam, runaway, bias, ...) is the way from where the healthy actuator would be to where the surface
+is; of several on one surface at once the latest to strike has it. The unanticipated one is its own moment.
+
+Moments turn the body against inertial space; its rates are reported against the Earth. With w the
+reported rates, W the Earth's rotation in body axes and w_i = w + W,
+
+    wdot = J^-1 (M - w_i x J w_i) + w_i x W            [SL03, sec. 1.5]
+
+The design model has J^-1 (M - w x J w): the difference is all that the Earth adds, and J enters by itself.
 """
 
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from math import exp, inf, radians
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from beaver_ftc.studies.mismatch import moments
-from beaver_ftc.studies.mismatch.actuator import HealthyActuators
-from beaver_ftc.studies.mismatch.believed import Belief, Parts, belief_of, true_parts
-from beaver_ftc.studies.mismatch.faults import fault_effects
-from beaver_ftc.studies.mismatch.rotation import earth_rotation, latitude_rad
+from beaver_ftc.compiled import kernel
+from beaver_ftc.design.coefficients import GEOMETRY, SURFACES, TRAVEL
+from beaver_ftc.plant.state import START_LATITUDE_DEG
+from beaver_ftc.studies.mismatch.models import (
+    ENGINE_TERMS,
+    MOMENT_TERMS,
+    RATES,
+    Belief,
+    MomentModel,
+    belief_of,
+    inertial,
+    quantities,
+    term,
+    true_moments,
+)
 from beaver_ftc.studies.mismatch.states import AXES, States
 
 if TYPE_CHECKING:
@@ -38,154 +69,307 @@ SOURCES = (
     "sensors", "actuators", "fault", "simplification", "engine", "coefficients", "inertia",
     "inertia_coupling", "sinusoids", "wind_turbulence", "earth_rotation", "integration",
 )  # fmt: skip
+TIME_TOLERANCE_S = 1e-9
+EARTH_RATE_RAD_S = 7.292115e-5  # [WGS84]
+MEAN_RADIUS_M = 6371000.0  # what the log's north is measured with
 Contributions = dict[str, np.ndarray]
+Inertial = Callable[[np.ndarray], np.ndarray]
 
 
 @dataclass
-class Case:
-    """What is known of one flight: its scenario, what the designer believes and what the truth is made of."""
+class HealthyActuators:
+    """Four actuators and where they are: `follow` moves them on, a stretch of commands at a time."""
+
+    gain: np.ndarray  # (4,) share of the way to the demand in one JSBSim frame
+    reach: np.ndarray  # (4,) rad, the longest way in one JSBSim frame
+    low: np.ndarray  # (4,) rad
+    high: np.ndarray
+    runs: int  # JSBSim frames per row
+    at_rad: np.ndarray | None = None
+
+    @classmethod
+    def of(cls, scenario: "Scenario") -> "HealthyActuators":
+        """The scenario's actuators, before the first command."""
+        dt = 1.0 / (scenario.rate_hz * scenario.substeps)
+        dynamics = [getattr(scenario.actuators, surface) for surface in SURFACES]
+        stops = np.array([_stops(surface, of) for surface, of in zip(SURFACES, dynamics, strict=True)])
+        return cls(
+            gain=np.array(
+                [1.0 - exp(-d.bandwidth_rad_s * dt) if d.bandwidth_rad_s else 1.0 for d in dynamics]
+            ),
+            reach=np.array(
+                [radians(d.rate_limit_deg_s) * dt if d.rate_limit_deg_s else inf for d in dynamics]
+            ),
+            low=stops[:, 0],
+            high=stops[:, 1],
+            runs=scenario.substeps,
+        )
+
+    @property
+    def _ideal(self) -> np.ndarray:
+        """Which follow their command at once, (4,) bool."""
+        return (self.gain == 1.0) & np.isinf(self.reach)
+
+    def follow(self, commands: np.ndarray) -> np.ndarray:
+        """Positions (n, 4) rad at rows with these commands (n, 4) rad, following those given before."""
+        if self._ideal.all():
+            return np.clip(commands, self.low, self.high)
+        if self.at_rad is None:
+            self.at_rad = np.clip(commands[0], self.low, self.high)
+        positions = np.empty_like(commands)
+        _follow(commands, self.gain, self.reach, self.low, self.high, self.runs, self.at_rad, positions)
+        return positions
+
+
+def _stops(surface: str, dynamics) -> tuple[float, float]:
+    if dynamics.travel_deg is not None:
+        low, high = dynamics.travel_deg
+        return radians(low), radians(high)
+    return TRAVEL[surface].min_rad, TRAVEL[surface].max_rad
+
+
+@kernel
+def _follow(commands, gain, reach, low, high, runs, at, positions):
+    """Fill positions (n, 4) rad, `runs` JSBSim frames a row, and leave `at` (4,) rad at the last."""
+    for k in range(commands.shape[0]):
+        for s in range(4):
+            demand = min(max(commands[k, s], low[s]), high[s])
+            ideal = gain[s] == 1.0 and reach[s] == np.inf
+            for _ in range(runs):
+                way = min(max(gain[s] * (demand - at[s]), -reach[s]), reach[s])
+                at[s] = demand if ideal else min(max(at[s] + way, low[s]), high[s])
+            positions[k, s] = at[s]
+
+
+def earth_in_body(attitude: np.ndarray, latitude: np.ndarray) -> np.ndarray:
+    """The Earth's rotation in body axes (n, 3) rad/s; attitude (n, 3) phi, theta, psi, latitude (n,), rad."""
+    phi, theta, psi = attitude.T
+    north, down = EARTH_RATE_RAD_S * np.cos(latitude), -EARTH_RATE_RAD_S * np.sin(latitude)
+    ahead, right = north * np.cos(psi), -north * np.sin(psi)  # turned into the heading
+    forward = ahead * np.cos(theta) - down * np.sin(theta)
+    below = ahead * np.sin(theta) + down * np.cos(theta)
+    return np.column_stack([
+        forward, right * np.cos(phi) + below * np.sin(phi), below * np.cos(phi) - right * np.sin(phi)
+    ])  # fmt: skip
+
+
+def latitude_rad(north_m: np.ndarray, start_altitude_m: float) -> np.ndarray:
+    """Geodetic latitude (n,) of the flight's path, which starts at 45 deg."""
+    return radians(START_LATITUDE_DEG) + north_m / (MEAN_RADIUS_M + start_altitude_m)
+
+
+def earth_rotation(
+    inertial: Inertial, x: np.ndarray, attitude: np.ndarray, latitude: np.ndarray
+) -> np.ndarray:
+    """What the Earth's rotation adds to the angular acceleration, (n, 3) rad/s2.
+
+    inertial: the angular acceleration with no moment, -J^-1 (w x J w), as a function of w (n, 3).
+    """
+    W = earth_in_body(attitude, latitude)
+    inertial_rate = x + W
+    return inertial(inertial_rate) - inertial(x) + np.cross(inertial_rate, W)
+
+
+def fault_effects(scenario: "Scenario", belief: Belief, states: States, healthy: np.ndarray) -> Contributions:
+    """The angular acceleration (n, 3) rad/s2 of each fault; healthy (n, 4) rad is where they found it."""
+    G = belief.effectiveness(states.y)
+    effects: Contributions = {}
+    for fault, moved in _deflections(scenario, states, healthy):
+        s, name = SURFACES.index(fault.actuator), name_of(fault)
+        effects[name] = effects.get(name, 0.0) + G[:, :, s] * moved[:, None]
+    for fault in scenario.faults:
+        if fault.type == "unanticipated":
+            effects[name_of(fault)] = unanticipated(fault, belief, states)
+    return effects
+
+
+def name_of(fault: Any) -> str:
+    """A name of a fault's own: surface, type and time."""
+    place = " ".join(str(getattr(fault, key)) for key in ("sensor", "actuator") if hasattr(fault, key))
+    return f"{place} {fault.type.replace('_', ' ')} at {fault.at_s:g} s".strip()
+
+
+def in_force(fault: Any, t_s: np.ndarray) -> np.ndarray:
+    """Whether a fault is there, (n,) bool."""
+    end_s = np.inf if fault.end_s is None else fault.end_s
+    return (t_s >= fault.at_s - TIME_TOLERANCE_S) & (t_s < end_s - TIME_TOLERANCE_S)
+
+
+def share(fault: Any, t_s: np.ndarray) -> np.ndarray:
+    """B(t - T0) (n,): how far a fault has grown, 0 where it is not there [Zhang2005]."""
+    age = np.maximum(t_s - fault.at_s, 0.0)
+    grown = 1.0 - np.exp(-fault.kappa_per_s * age) if fault.profile == "incipient" else 1.0
+    return np.where(in_force(fault, t_s), grown, 0.0)
+
+
+def unanticipated(fault: Any, belief: Belief, states: States) -> np.ndarray:
+    """The extra pitching moment on alpha^3 as an acceleration (n, 3) rad/s2 [Zhang2005]."""
+    moment = states.y[:, 3] * GEOMETRY.wing_area_m2 * GEOMETRY.chord_m * states.y[:, 0] ** 3
+    pitch = fault.Cm_alpha3 * share(fault, states.t_s) * belief.moments.inertia.Qm * moment
+    return np.column_stack([0.0 * pitch, pitch, 0.0 * pitch])
+
+
+def _deflections(
+    scenario: "Scenario", states: States, healthy: np.ndarray
+) -> Iterator[tuple[Any, np.ndarray]]:
+    """What every fault of a surface moves the effective deflection by, (n,) rad."""
+    for s, surface in enumerate(SURFACES):
+        here = [fault for fault in scenario.faults if getattr(fault, "actuator", "") == surface]
+        losses = [fault for fault in here if fault.type == "loss_of_effectiveness"]
+        mechanical = [fault for fault in here if fault.type != "loss_of_effectiveness"]
+        yield from _lost(losses, states, states.position[:, s])
+        yield from _displaced(mechanical, states.t_s, states.position[:, s] - healthy[:, s])
+
+
+def _lost(losses: list, states: States, position: np.ndarray) -> Iterator[tuple[Any, np.ndarray]]:
+    remaining = np.ones_like(position)
+    for fault in losses:
+        taken = remaining * fault.magnitude * share(fault, states.t_s)
+        remaining = remaining - taken
+        yield fault, -taken * position
+
+
+def _displaced(faults: list, t_s: np.ndarray, way: np.ndarray) -> Iterator[tuple[Any, np.ndarray]]:
+    """Who struck last has the displacement, also what lingers after a repair."""
+    order = sorted(faults, key=lambda fault: fault.at_s)
+    struck = [t_s >= fault.at_s - TIME_TOLERANCE_S for fault in order]
+    there = [in_force(fault, t_s) for fault in order]
+    owner = np.full(t_s.size, -1)
+    for of in (struck, there):  # who is there now goes before who has been
+        for i, mask in enumerate(of):
+            owner[mask] = i
+    for i, fault in enumerate(order):
+        yield fault, np.where(owner == i, way, 0.0)
+
+
+@dataclass
+class Models:
+    """Of one flight: its scenario, the design model in use, the truth, and the actuators that drive it."""
 
     scenario: "Scenario"
     belief: Belief
-    truth: Parts
+    truth: MomentModel
     actuators: HealthyActuators
 
     @classmethod
-    def of(cls, scenario: "Scenario", trim: States) -> "Case":
-        """The case of a flight that starts with these states."""
-        return cls(scenario, belief_of(scenario, trim), true_parts(scenario), HealthyActuators.of(scenario))
+    def of(cls, scenario: "Scenario", trim: States) -> "Models":
+        """The models of a flight that starts with these states."""
+        return cls(scenario, belief_of(scenario, trim), true_moments(scenario), HealthyActuators.of(scenario))
 
 
-def sensors(case: Case, s: States) -> np.ndarray:
+def sensors(m: Models, s: States) -> np.ndarray:
     """The design model at the true state less the same at the measured one."""
-    belief = case.belief
-    return belief.acceleration(s.x, s.y, s.u) - belief.acceleration(s.x_measured, s.y_measured, s.u)
+    return m.belief.acceleration(s.x, s.y, s.u) - m.belief.acceleration(s.x_measured, s.y_measured, s.u)
 
 
-def actuators(case: Case, s: States, healthy: np.ndarray) -> np.ndarray:
+def actuators(m: Models, s: States, healthy: np.ndarray) -> np.ndarray:
     """Lag and limits: G times what healthy actuators fall short of the command by."""
-    return np.einsum("kas,ks->ka", case.belief.effectiveness(s.y), healthy - s.u)
+    return np.einsum("kas,ks->ka", m.belief.effectiveness(s.y), healthy - s.u)
 
 
-def simplification(case: Case, s: States) -> np.ndarray:
+def simplification(m: Models, s: States) -> np.ndarray:
     """What freezing or linearising leaves out."""
-    exact = case.belief.parts.acceleration(s.x, s.y, s.effective)
-    return exact - case.belief.acceleration(s.x, s.y, s.effective)
+    exact = m.belief.moments.acceleration(s.x, s.y, s.effective)
+    return exact - m.belief.acceleration(s.x, s.y, s.effective)
 
 
-def engine(case: Case, s: States) -> np.ndarray:
+def engine(m: Models, s: States) -> np.ndarray:
     """The slipstream's moments where the design model neglects them, with the table's coefficients."""
-    if case.scenario.design_model.engine_terms:
+    if m.scenario.design_model.engine_terms:
         return np.zeros_like(s.x)
-    of = moments.quantities(s.x, s.y, s.effective)
-    table = {name: moments.MOMENT_TERMS[name].value for name in moments.ENGINE_TERMS}
-    return moments.aerodynamic(table, case.belief.parts.inertia, of, s.y[:, 3], moments.ENGINE_TERMS)
+    table = {name: MOMENT_TERMS[name].value for name in ENGINE_TERMS}
+    neglected = MomentModel(table, m.belief.moments.inertia)
+    return neglected.aerodynamic(s.x, s.y, s.effective, ENGINE_TERMS)
 
 
-def coefficient_errors(case: Case, s: States) -> Contributions:
+def coefficient_errors(m: Models, s: States) -> Contributions:
     """Each term whose coefficient differs between truth and design, neglected engine terms aside."""
-    of = moments.quantities(s.x, s.y, s.effective)
+    of = quantities(s.x, s.y, s.effective)
+    neglected = () if m.scenario.design_model.engine_terms else ENGINE_TERMS
+    designed = m.belief.moments.coefficients | {name: MOMENT_TERMS[name].value for name in neglected}
     return {
-        name: moments.term(name, error, case.belief.parts.inertia, of, s.y[:, 3])
-        for name in moments.MOMENT_TERMS
-        if (error := case.truth.coefficients[name] - _believed_coefficient(case, name)) != 0.0
+        name: term(name, error, m.belief.moments.inertia, of, s.y[:, 3])
+        for name in MOMENT_TERMS
+        if (error := m.truth.coefficients[name] - designed[name]) != 0.0
     }
 
 
-def _believed_coefficient(case: Case, name: str) -> float:
-    neglected = not case.scenario.design_model.engine_terms and name in moments.ENGINE_TERMS
-    return moments.MOMENT_TERMS[name].value if neglected else case.belief.parts.coefficients[name]
-
-
-def inertia(case: Case, s: States, extra_moment: np.ndarray) -> np.ndarray:
+def inertia(m: Models, s: States, extra_moment: np.ndarray) -> np.ndarray:
     """The truth's moments and rate products by the truth's inertia less by the designer's.
 
     extra_moment (n, 3) rad/s2: the pitching moment of unanticipated faults, as the designer's inertia
     weighs it.
     """
-    true, believed = case.truth.inertia, case.belief.parts.inertia
-    if true == believed:
+    true, designed = m.truth.inertia, m.belief.moments.inertia
+    if true == designed:
         return np.zeros_like(s.x)
-    of = moments.quantities(s.x, s.y, s.effective)
-    by = [
-        moments.inertial(inertia, s.x) + moments.aerodynamic(case.truth.coefficients, inertia, of, s.y[:, 3])
-        for inertia in (true, believed)
-    ]
-    return by[0] - by[1] + extra_moment * (true.Qm / believed.Qm - 1.0)
+    by_true, by_designed = (
+        MomentModel(m.truth.coefficients, inertia).acceleration(s.x, s.y, s.effective)
+        for inertia in (true, designed)
+    )
+    return by_true - by_designed + extra_moment * (true.Qm / designed.Qm - 1.0)
 
 
-def inertia_coupling(case: Case, s: States) -> np.ndarray:
+def inertia_coupling(m: Models, s: States) -> np.ndarray:
     """The declared relative errors of the rate products [Zhang2005, sec. VII]."""
     p, q, r = s.x.T
-    theta, of = case.scenario.uncertainty.inertia_coupling, case.truth.inertia
+    theta, of = m.scenario.uncertainty.inertia_coupling, m.truth.inertia
     return np.column_stack([theta.p * of.Pqr * q * r, theta.q * of.Qpr * p * r, theta.r * of.Rpq * p * q])
 
 
-def sinusoids(case: Case, s: States) -> np.ndarray:
+def sinusoids(m: Models, s: States) -> np.ndarray:
     """The declared sinusoids [Zhang2005, sec. VII]."""
-    declared = [getattr(case.scenario.uncertainty.sinusoid, axis) for axis in AXES]
+    declared = [getattr(m.scenario.uncertainty.sinusoid, axis) for axis in AXES]
     return np.column_stack([d.amplitude_rad_s2 * np.sin(d.frequency_rad_s * s.t_s) for d in declared])
 
 
-def wind_turbulence(case: Case, s: States) -> np.ndarray:
+def wind_turbulence(m: Models, s: States) -> np.ndarray:
     """The damping terms at the rates relative to the turning air, less the same at the body rates.
 
     Wind that does not turn reaches the moments only through alpha, beta and V, which are measured.
     """
     if s.x_air is s.x or np.array_equal(s.x_air, s.x):
         return np.zeros_like(s.x)
-    names = [name for name, t in moments.MOMENT_TERMS.items() if set(t.factors) & set(moments.RATES)]
-    at = [
-        moments.aerodynamic(
-            case.truth.coefficients,
-            case.truth.inertia,
-            moments.quantities(rates, s.y, s.effective),
-            s.y[:, 3],
-            names,
-        )
-        for rates in (s.x_air, s.x)
-    ]
-    return at[0] - at[1]
+    names = [name for name, t in MOMENT_TERMS.items() if set(t.factors) & set(RATES)]
+    in_air, over_earth = (m.truth.aerodynamic(rates, s.y, s.effective, names) for rates in (s.x_air, s.x))
+    return in_air - over_earth
 
 
-def earth(case: Case, s: States) -> np.ndarray:
+def earth(m: Models, s: States) -> np.ndarray:
     """The Earth's rotation; real gravity makes no moment about the centre of gravity."""
-    latitude = latitude_rad(s.north_m, case.scenario.initial.altitude_m)
-    return earth_rotation(lambda w: moments.inertial(case.truth.inertia, w), s.x, s.attitude, latitude)
+    latitude = latitude_rad(s.north_m, m.scenario.initial.altitude_m)
+    return earth_rotation(lambda w: inertial(m.truth.inertia, w), s.x, s.attitude, latitude)
 
 
-def instantaneous(case: Case, s: States) -> tuple[Contributions, dict[str, Contributions]]:
-    """All sources but the integration at every frame, and the parts of those that have parts."""
-    healthy = case.actuators.follow(s.u)
-    faults = fault_effects(case.scenario, case.belief, s, healthy)
-    errors = coefficient_errors(case, s)
+def instantaneous(m: Models, s: States) -> tuple[Contributions, dict[str, Contributions]]:
+    """All sources but the integration at every frame, and the single faults and single coefficients."""
+    healthy = m.actuators.follow(s.u)
+    faults = fault_effects(m.scenario, m.belief, s, healthy)
+    errors = coefficient_errors(m, s)
     nothing = np.zeros_like(s.x)
+    extra = sum((effect for name, effect in faults.items() if name.startswith("unanticipated")), nothing)
     contributions = {
-        "sensors": sensors(case, s),
-        "actuators": actuators(case, s, healthy),
+        "sensors": sensors(m, s),
+        "actuators": actuators(m, s, healthy),
         "fault": sum(faults.values(), nothing),
-        "simplification": simplification(case, s),
-        "engine": engine(case, s),
+        "simplification": simplification(m, s),
+        "engine": engine(m, s),
         "coefficients": sum(errors.values(), nothing),
-        "inertia": inertia(case, s, _unanticipated(case, faults, nothing)),
-        "inertia_coupling": inertia_coupling(case, s),
-        "sinusoids": sinusoids(case, s),
-        "wind_turbulence": wind_turbulence(case, s),
-        "earth_rotation": earth(case, s),
+        "inertia": inertia(m, s, extra),
+        "inertia_coupling": inertia_coupling(m, s),
+        "sinusoids": sinusoids(m, s),
+        "wind_turbulence": wind_turbulence(m, s),
+        "earth_rotation": earth(m, s),
     }
     return contributions, {"fault": faults, "coefficients": errors}
 
 
-def _unanticipated(case: Case, faults: Contributions, nothing: np.ndarray) -> np.ndarray:
-    return sum((effect for name, effect in faults.items() if name.startswith("unanticipated")), nothing)
-
-
-def integration(case: Case, s: States, following: States) -> np.ndarray:
+def integration(m: Models, s: States, following: States) -> np.ndarray:
     """How the rates moved over a frame less JSBSim's acceleration at its start; the design's likewise.
 
     The design model's mean over a frame is the diagnosis': over all its JSBSim frames. With one JSBSim frame
     a frame it is the sample at the start. following: the same frames, each one later.
     """
-    moved = (following.x - s.x) * case.scenario.rate_hz - s.xdot
-    sampled = case.belief.acceleration(s.x_measured, s.y_measured, s.u)
+    moved = (following.x - s.x) * m.scenario.rate_hz - s.xdot
+    sampled = m.belief.acceleration(s.x_measured, s.y_measured, s.u)
     return moved - (following.design_mean - sampled)

@@ -1,13 +1,40 @@
-"""The mismatch as tables for the terminal."""
+"""The mismatch as tables and sentences, for the terminal and as a section of `report.html`."""
 
-from beaver_ftc.studies.mismatch.document import Document
+import base64
+import json
+from html import escape
+from pathlib import Path
+from typing import Any
+
+from beaver_ftc.studies.engine.words import html_table, number, plain, printed, seconds
 from beaver_ftc.studies.mismatch.states import AXES
-from beaver_ftc.studies.mismatch.words import label, percent
-from beaver_ftc.studies.present.tables import number, plain, printed, seconds
 
+Document = dict[str, Any]
 WIDTH = 150
 
+PICTURES = {
+    "mismatch-sources": "What the mismatch is made of, in time",
+    "mismatch-bound": "How much of the bound each source uses",
+    "mismatch-linear": "Poles and frequency responses: truth, FDC equations, design model",
+    "mismatch-zeros": "Zeros from each surface to its rate",
+    "mismatch-response": "Pulse responses of the linear models",
+}
 Table = tuple[str, list[str], list[list[str]]]
+
+
+def label(source: str) -> str:
+    """A source's name in words."""
+    return source.replace("_", " ")
+
+
+def percent(share: float | None) -> str:
+    """A share as a percentage; None is a share of nothing."""
+    if share is None:
+        return "no bound"
+    value = 100.0 * share
+    if 0.0 < value < 0.001:
+        return "<0.001 %"
+    return f"{value:.0f} %" if value >= 9.95 else f"{value:.2g} %"
 
 
 def mismatch_text(found: Document, folder: str, colour: bool = False) -> str:
@@ -141,3 +168,35 @@ def comparison_text(entries: list[Document], recommended: Document, folder: str,
     lines = [_recommendation(recommended["recommended"]), *_guarantee(recommended["guarantee"])]
     table = printed([plain(*_comparison(entries))], WIDTH, colour)
     return "\n".join([table, "", *lines, f"results      {folder}", ""])
+
+
+def show_in_reports() -> None:
+    """Add the section to the reports of folders that hold a mismatch."""
+    from beaver_ftc.results.report import register_section
+
+    register_section(mismatch_section)
+
+
+def mismatch_section(folder: Path) -> str:
+    """The section of a result folder as HTML; empty where the folder holds no mismatch."""
+    path = folder / "mismatch.json"
+    if not path.exists():
+        return ""
+    found = json.loads(path.read_text(encoding="utf-8"))
+    pictures = [_picture(folder / "figures" / f"{name}.png", says) for name, says in PICTURES.items()]
+    shown = [html_table(head, rows, caption) for caption, head, rows in tables(found)]
+    parts = [_heading(found), *shown, *pictures]
+    return f"<section>{''.join(parts)}</section>"
+
+
+def _heading(found: Document) -> str:
+    said = "".join(f"<p>{escape(line)}</p>" for line in findings(found))
+    return f"<h2>Truth against design: {escape(found['scenario'])}</h2>{said}"
+
+
+def _picture(path: Path, says: str) -> str:
+    if not path.exists():
+        return ""
+    data = base64.b64encode(path.read_bytes()).decode("ascii")
+    image = f'<img style="max-width: 100%" alt="{escape(says)}" src="data:image/png;base64,{data}">'
+    return f"<figure>{image}<figcaption>{escape(says)}</figcaption></figure>"

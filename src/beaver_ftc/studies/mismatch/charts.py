@@ -12,12 +12,10 @@ import numpy as np
 from beaver_ftc.results.looks import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILION, Mark, marks
 from beaver_ftc.results.series import read_series
 from beaver_ftc.studies.linear_systems import CHANNELS, pulse_response, response, zeros
-from beaver_ftc.studies.mismatch.document import Document
-from beaver_ftc.studies.mismatch.frames import column
 from beaver_ftc.studies.mismatch.sources import SOURCES
-from beaver_ftc.studies.mismatch.split import UNEXPLAINED
+from beaver_ftc.studies.mismatch.split import CAUSES, ETA_BAR, FAULT, TOTAL, UNEXPLAINED, column
 from beaver_ftc.studies.mismatch.states import AXES
-from beaver_ftc.studies.mismatch.words import label, percent
+from beaver_ftc.studies.mismatch.tables import Document, label, percent
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -52,8 +50,6 @@ MODEL_LOOKS: dict[str, dict[str, Any]] = {
 
 def write_figures(folder: Path, found: Document, flown: Document, analysis: "LinearAnalysis") -> list[Path]:
     """Draw the mismatch of a result folder that holds `mismatch.parquet`; return the files."""
-    figures = folder / "figures"
-    figures.mkdir(exist_ok=True)
     drawn = {
         "mismatch-sources": sources_figure(folder / "mismatch.parquet", found, marks(flown)),
         "mismatch-bound": bound_figure(found),
@@ -61,11 +57,12 @@ def write_figures(folder: Path, found: Document, flown: Document, analysis: "Lin
         "mismatch-zeros": zeros_figure(analysis, found["scenario"]),
         "mismatch-response": response_figure(analysis, found["scenario"]),
     }
-    return [save(figure, figures / f"{name}.png") for name, figure in drawn.items()]
+    return [save(figure, folder / "figures" / f"{name}.png") for name, figure in drawn.items()]
 
 
 def save(figure: "Figure", path: Path) -> Path:
     """Write a figure; the same figure gives the same file."""
+    path.parent.mkdir(exist_ok=True)
     figure.savefig(path, metadata={"Software": "beaver-ftc"})
     return path
 
@@ -82,7 +79,7 @@ def new_figure(width: float, height: float, title: str) -> "Figure":
 def sources_figure(frames: Path, found: Document, instants: Sequence[Mark]) -> "Figure":
     """The largest sources and what they add up to without the fault, over the bound, per axis."""
     chosen = {axis: largest_sources(found, axis) for axis in AXES}
-    names = {axis: ["total", "fault", "eta_bar", *chosen[axis]] for axis in AXES}
+    names = {axis: [TOTAL, FAULT, ETA_BAR, *chosen[axis]] for axis in AXES}
     series = read_series(frames, [column(axis, name) for axis in AXES for name in names[axis]])
     figure = new_figure(
         11.0, 8.0, f"Truth less design: what it is made of, faults aside\n{found['scenario']}"
@@ -96,17 +93,15 @@ def sources_figure(frames: Path, found: Document, instants: Sequence[Mark]) -> "
 
 def largest_sources(found: Document, axis: str) -> list[str]:
     """The sources of an axis with the largest peaks, faults aside, largest first."""
-    by_peak = sorted(
-        (name for name in SOURCES if name != "fault"), key=lambda name: -found["axes"][axis][name]["max"]
-    )
+    by_peak = sorted(CAUSES, key=lambda name: -found["axes"][axis][name]["max"])
     least = LEAST_CURVE * found["axes"][axis][by_peak[0]]["max"]
     return [name for name in by_peak[:SHOWN_SOURCES] if found["axes"][axis][name]["max"] >= least]
 
 
 def _draw_sources(axes: "Axes", series: dict, axis: str, chosen: list[str], instants: Sequence[Mark]) -> None:
-    t, bound = series["t_s"], series[column(axis, "eta_bar")]
+    t, bound = series["t_s"], series[column(axis, ETA_BAR)]
     axes.fill_between(t, -bound, bound, color=SKY, alpha=0.25, linewidth=0, label="± bound eta_bar")
-    uncertainty = series[column(axis, "total")] - series[column(axis, "fault")]
+    uncertainty = series[column(axis, TOTAL)] - series[column(axis, FAULT)]
     axes.plot(t, uncertainty, color=BLACK, linewidth=2.4, alpha=0.35, label="all together")
     for name in chosen:
         colour, dashes = SOURCE_LOOKS[name]
@@ -158,7 +153,7 @@ def _shares(found: Document, name: str) -> np.ndarray:
 
 def _draw_bound(axes: "Axes", title: str, names: list[str], shares: list[float], top: float) -> None:
     drawn = [max(share, LEAST_SHARE) for share in shares]
-    colours = [GREY if name == "fault" else VERMILION if share > 1.0 else BLUE for name, share in
+    colours = [GREY if name == FAULT else VERMILION if share > 1.0 else BLUE for name, share in
                zip(names, shares, strict=True)]  # fmt: skip
     axes.barh(range(len(names)), drawn, color=colours, height=0.7)
     for row, share in enumerate(shares):
@@ -265,3 +260,74 @@ def response_figure(analysis: "LinearAnalysis", name: str) -> "Figure":
     handles, labels = grid[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=3, fontsize=9, frameon=False)
     return figure
+
+
+def comparison_figure(entries: Sequence[Document]) -> "Figure":
+    """How much of the bound each flight has needed, per axis, on a logarithmic scale."""
+    figure = new_figure(
+        12.0, 1.6 + 0.38 * max(len(entries), 2), "Mismatch at its worst, faults aside, over the bound"
+    )
+    grid = figure.subplots(1, 3, sharey=True, sharex=True)
+    ratios = np.array([[_ratio(each, axis) for each in entries] for axis in AXES])
+    for axis, axes, row in zip(AXES, grid, ratios, strict=True):
+        _draw_ratios(axes, AXIS_NAMES[axis], row, [each[f"{axis}_dominant"] for each in entries])
+        axes.set_xlim(min(0.1, 0.5 * ratios.min()), 60.0 * max(ratios.max(), 1.0))
+    grid[0].set_yticks(range(len(entries)), [each["scenario"] for each in entries], fontsize=9)
+    grid[0].invert_yaxis()
+    return figure
+
+
+def _ratio(of: Document, axis: str) -> float:
+    ratio = of[f"{axis}_worst_ratio"]
+    return 1e6 if ratio is None else max(ratio, 1e-6)
+
+
+def _draw_ratios(axes: "Axes", title: str, ratios: np.ndarray, reasons: list[str]) -> None:
+    colours = [VERMILION if ratio > 1.0 else BLUE for ratio in ratios]
+    axes.barh(range(len(ratios)), ratios, color=colours, height=0.7)
+    for row, (ratio, reason) in enumerate(zip(ratios, reasons, strict=True)):
+        axes.annotate(f" {percent(float(ratio))} ({label(reason)})", (ratio, row), va="center", fontsize=7)
+    axes.axvline(1.0, color=BLACK, linewidth=1.0, dashes=(4, 2))
+    axes.set_xscale("log")
+    axes.set_title(title, fontsize=10)
+    axes.set_xlabel("largest mismatch / eta_bar", fontsize=9)
+    axes.tick_params(labelsize=8)
+    axes.grid(axis="x", color=GREY, alpha=0.3, linewidth=0.5)
+
+
+def map_figure(entries: Sequence[Document], name: str) -> "Figure":
+    """The worst share of the bound against speed and altitude, per axis; grey where there is no trim."""
+    from matplotlib.colors import LogNorm
+
+    speeds, altitudes = (list(dict.fromkeys(e[of] for e in entries)) for of in ("airspeed_mps", "altitude_m"))
+    shape = len(altitudes), len(speeds), len(AXES)  # the order of the entries
+    worst = [np.nan if each["worst_ratio"] is None else each["worst_ratio"] for each in entries]
+    grids = dict(zip(AXES, np.moveaxis(np.reshape(worst, shape), -1, 0), strict=True))
+    known = np.concatenate([grid[np.isfinite(grid)] for grid in grids.values()] or [np.ones(1)])
+    known = known[known > 0.0] if (known > 0.0).any() else np.ones(1)
+    norm = LogNorm(vmin=min(known.min(), 0.99), vmax=max(known.max(), 1.01))
+    figure = new_figure(14.0, 4.6, f"Largest mismatch over the bound eta_bar, no fault\n{name}")
+    row = figure.subplots(1, 3, sharey=True)
+    for axis, axes in zip(AXES, row, strict=True):
+        image = _draw_map(axes, grids[axis], norm)
+        axes.set_title(AXIS_NAMES[axis], fontsize=10)
+        axes.set_xticks(range(len(speeds)), [f"{V:g}" for V in speeds], fontsize=8)
+        axes.set_yticks(range(len(altitudes)), [f"{h:g}" for h in altitudes], fontsize=8)
+        axes.set_xlabel("airspeed (m/s)", fontsize=9)
+    row[0].set_ylabel("altitude (m)", fontsize=9)
+    figure.colorbar(image, ax=row, label="mismatch / eta_bar (1: all of the bound)", pad=0.01)
+    return figure
+
+
+def _draw_map(axes: "Axes", grid: np.ndarray, norm):
+    from matplotlib import colormaps
+
+    shades = colormaps["cividis"].with_extremes(bad="0.8")
+    image = axes.imshow(grid, origin="lower", aspect="auto", cmap=shades, norm=norm)
+    for (i, j), ratio in np.ndenumerate(grid):
+        bright = np.isfinite(ratio) and norm(ratio) > 0.5
+        text = f"{ratio:.2g}" if np.isfinite(ratio) else "no trim"
+        colour = "black" if bright or text == "no trim" else "white"
+        weight = "bold" if ratio > 1.0 else "normal"
+        axes.annotate(text, (j, i), ha="center", va="center", fontsize=8, color=colour, weight=weight)
+    return image

@@ -1,0 +1,253 @@
+"""Fly a scenario, split its mismatch, keep the results beside the run's own; several of them, and a map.
+
+`mismatch.json` and its CSV: accelerations in rad/s2. `share` is a source's RMS over the RMS of the total:
+sources may cancel, so shares need not add up to 1. `bound_share` is the largest part of the bound eta_bar
+that a source has used at any frame. A map is the scenario, without faults, flown at each speed and altitude.
+"""
+
+import csv
+from collections.abc import Iterator
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from beaver_ftc.aircraft import load
+from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.loop.loop import fly
+from beaver_ftc.results.log import ParquetLog
+from beaver_ftc.results.metrics import as_json, metrics
+from beaver_ftc.results.run import write_report_files
+from beaver_ftc.results.writer import result_folder
+from beaver_ftc.scenario.dump import to_yaml
+from beaver_ftc.studies.engine.flown import Progress, flown
+from beaver_ftc.studies.engine.words import finite
+from beaver_ftc.studies.mismatch import charts
+from beaver_ftc.studies.mismatch.bound import recommended_for
+from beaver_ftc.studies.mismatch.linear import analyse, linear_document
+from beaver_ftc.studies.mismatch.sources import SOURCES
+from beaver_ftc.studies.mismatch.split import (
+    CAUSES,
+    TOTAL,
+    UNEXPLAINED,
+    AxisBound,
+    Figures,
+    Tally,
+    tally_of_flight,
+    tally_of_log,
+)
+from beaver_ftc.studies.mismatch.states import AXES
+from beaver_ftc.studies.mismatch.tables import show_in_reports
+
+if TYPE_CHECKING:
+    from beaver_ftc.scenario.schema import Scenario
+
+Document = dict[str, Any]
+COMPARISON, MAP = "mismatch-comparison", "mismatch-map"
+AIRSPEEDS_MPS = (30.0, 35.0, 40.0, 45.0, 50.0, 55.0)  # the validated envelope
+ALTITUDES_M = (0.0, 1000.0, 2000.0, 3000.0, 4000.0)
+_OF_MAP = ("worst_ratio", "smallest_constant_rad_s2", "dominant", "false_alarm")
+
+
+def run_mismatch(
+    scenario: "Scenario", out: Path, report: bool = True, progress: Progress | None = None
+) -> tuple[Document, Tally]:
+    """Fly `scenario` and write `out/<name>/`: a run's result folder with the mismatch in it.
+
+    Raises BadInput for a flight that cannot be trimmed, SimulationFailed for one not completed or kept.
+    """
+    refuse_other_aircraft(scenario)
+    with result_folder(out, scenario.name) as folder:
+        with ParquetLog(folder / "log.parquet") as log:
+            flight = fly(scenario, log, progress)
+        flown = metrics(flight)
+        (folder / "scenario.yaml").write_text(to_yaml(scenario), encoding="utf-8")
+        (folder / "metrics.json").write_text(as_json(flown), encoding="utf-8")
+        found, kept = analyse_folder(scenario, folder, flown, report)
+    return found, kept
+
+
+def refuse_other_aircraft(scenario: "Scenario") -> None:
+    """The study compares with a second set of equations, which there is of the built-in aircraft only."""
+    if scenario.airframe is not load():
+        raise BadInput(
+            f"{scenario.name}: aircraft: mismatch knows the equations of {load().name} alone, allowed: "
+            f"{load().name}; of others `beaver-ftc derive` measures the error"
+        )
+
+
+def analyse_folder(
+    scenario: "Scenario", folder: Path, flown: Document, report: bool
+) -> tuple[Document, Tally]:
+    """Split the flight whose log is in a result folder; add the mismatch's files, figures and report."""
+    kept = tally_of_log(scenario, folder / "log.parquet", folder / "mismatch.parquet")
+    analysis = analyse(scenario)
+    found = {
+        **document(scenario, kept, flown),
+        **recommended_for([scenario], [kept]),
+        "linear": linear_document(analysis),
+    }
+    _write(folder, found, list(rows(found)))
+    if report:
+        show_in_reports()
+        charts.write_figures(folder, found, flown, analysis)
+        write_report_files(folder, flown)
+    return found, kept
+
+
+def document(scenario: "Scenario", tally: Tally, metrics: Document) -> Document:
+    """What the split of a flight amounts to."""
+    return {
+        "scenario": scenario.name,
+        "frames": tally.frames,
+        "unit": "rad/s2",
+        "design_model": scenario.design_model.model_dump(mode="json"),
+        "axes": {axis: _axis(tally, i) for i, axis in enumerate(AXES)},
+        "dominant": dominant(tally),
+        "bound": {axis: _bound(tally.bounds[i], tally, i) for i, axis in enumerate(AXES)},
+        "closure": float(tally.figures[UNEXPLAINED].largest.max()),
+        "false_alarm": metrics["false_alarm"],
+        "detection": metrics["detection"],
+        "isolation": {key: metrics["isolation"][key] for key in ("fault", "delay_s", "correct")},
+    }
+
+
+def _axis(tally: Tally, i: int) -> Document:
+    found = {name: _figures(tally.figures[name], tally, i) for name in (*SOURCES, UNEXPLAINED, TOTAL)}
+    for source, details in tally.details.items():
+        if details:
+            found[source]["parts"] = {name: _figures(figures, tally, i) for name, figures in details.items()}
+    return found
+
+
+def _figures(figures: Figures, tally: Tally, i: int) -> Document:
+    rms = float(np.sqrt(figures.square_sum[i] / max(tally.frames, 1)))
+    whole = float(tally.rms(TOTAL)[i])
+    return {
+        "rms": rms,
+        "max": float(figures.largest[i]),
+        "share": rms / whole if whole > 0.0 else 0.0,
+        "bound_share": finite(figures.bound_share[i]),
+    }
+
+
+def dominant(tally: Tally) -> Document | None:
+    """The source, faults aside, that has used most of a bound: the reason for most of the threshold."""
+    used = np.array([np.nan_to_num(tally.figures[name].bound_share, posinf=1e300) for name in CAUSES])
+    if not used.any():
+        return None
+    which, i = np.unravel_index(int(used.argmax()), used.shape)
+    source = CAUSES[which]
+    return {"source": source, "axis": AXES[i], "bound_share": finite(tally.figures[source].bound_share[i])}
+
+
+def _bound(bound: AxisBound, tally: Tally, i: int) -> Document:
+    return {
+        "constant_rad_s2": float(tally.constant[i]),
+        "smallest_constant_rad_s2": bound.smallest_constant_rad_s2,
+        "worst_ratio": finite(bound.worst_ratio),
+        "worst_at_s": bound.worst_at_s,
+        "exceeded_s": bound.exceeded_frames * tally.frame_s,
+        "exceeded_times": bound.stays,
+        "exceedances": [{**vars(stay), "peak_ratio": finite(stay.peak_ratio)} for stay in bound.exceedances],
+    }
+
+
+def rows(found: Document) -> Iterator[Document]:
+    """One row per axis, source and part of a document."""
+    for axis, sources in found["axes"].items():
+        for source, figures in sources.items():
+            for part, of in [("", figures), *figures.get("parts", {}).items()]:
+                yield {
+                    "scenario": found["scenario"],
+                    "axis": axis,
+                    "source": source,
+                    "part": part,
+                    "rms_rad_s2": of["rms"],
+                    "max_rad_s2": of["max"],
+                    "share": of["share"],
+                    "bound_share": of["bound_share"],
+                }
+
+
+def _write(folder: Path, found: Document, table: list[Document]) -> None:
+    """`mismatch.json`, and as a CSV file rows of equal keys; null is an empty cell."""
+    (folder / "mismatch.json").write_text(as_json(found), encoding="utf-8")
+    with (folder / "mismatch.csv").open("w", encoding="utf-8", newline="") as file:
+        writer = csv.DictWriter(file, fieldnames=list(table[0]), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(table)
+
+
+def entry(found: Document) -> Document:
+    """One flight's line of the comparison."""
+    bounds = found["bound"]
+    return {
+        "scenario": found["scenario"],
+        **{f"{axis}_worst_ratio": bounds[axis]["worst_ratio"] for axis in AXES},
+        **{f"{axis}_smallest_constant_rad_s2": bounds[axis]["smallest_constant_rad_s2"] for axis in AXES},
+        **{f"{axis}_exceeded_s": bounds[axis]["exceeded_s"] for axis in AXES},
+        **{f"{axis}_dominant": charts.largest_sources(found, axis)[0] for axis in AXES},
+        "dominant": found["dominant"]["source"] if found["dominant"] else None,
+        "false_alarm": found["false_alarm"],
+        "guarantee_void": found["guarantee"]["recommended"]["false_alarm"],
+        "guaranteed_delay_s": found["guarantee"]["recommended"]["guaranteed_delay_s"],
+    }
+
+
+def write_comparison(out: Path, entries: list[Document], recommended: Document, report: bool) -> Path:
+    """Write `out/mismatch-comparison/`: the table as JSON and CSV, and a figure. Whole or not at all."""
+    with result_folder(out, COMPARISON) as folder:
+        _write(folder, {"runs": entries} | recommended, entries)
+        if report:
+            charts.save(charts.comparison_figure(entries), folder / "figures" / f"{COMPARISON}.png")
+    return out / COMPARISON
+
+
+def run_map(
+    out: Path, scenario: "Scenario", report: bool = True, progress: Progress | None = None
+) -> list[Document]:
+    """Write `out/<scenario>-mismatch-map/`: the map as JSON and CSV, and a figure. Return its entries.
+
+    One entry per axis, speed and altitude: worst share of the bound, smallest constant, and why.
+    """
+    refuse_other_aircraft(scenario)
+    name, fly_cell = map_name(scenario), partial(_cell, scenario)
+    conditions = [(V, h) for h in ALTITUDES_M for V in AIRSPEEDS_MPS]
+    cells = flown(out / name, conditions, fly_cell, list[Document], asked=scenario, progress=progress)
+    with cells as found, result_folder(out, name) as folder:
+        entries = [entry for of_cell in found for entry in of_cell]
+        _write(folder, {"scenario": scenario.name, "map": entries}, entries)
+        if report:
+            charts.save(charts.map_figure(entries, scenario.name), folder / "figures" / f"{MAP}.png")
+    return entries
+
+
+def map_name(scenario: "Scenario") -> str:
+    """The name of the map's result folder."""
+    return f"{scenario.name}-{MAP}"
+
+
+def at(scenario: "Scenario", airspeed_mps: float, altitude_m: float) -> "Scenario":
+    """The scenario without its faults, starting from this speed and altitude."""
+    initial = scenario.initial.model_copy(update={"airspeed_mps": airspeed_mps, "altitude_m": altitude_m})
+    return scenario.model_copy(update={"initial": initial, "faults": ()})
+
+
+def _cell(scenario: "Scenario", condition: tuple[float, float]) -> list[Document]:
+    """A row per axis; without figures where there is no trim."""
+    V, h = condition
+    place = {"airspeed_mps": V, "altitude_m": h}
+    try:
+        kept, flight = tally_of_flight(at(scenario, V, h))
+    except BadInput:
+        return [{**place, "axis": axis, **dict.fromkeys(_OF_MAP)} for axis in AXES]
+    found = document(scenario, kept, flight)
+    return [{**place, "axis": axis, **_worst(found, axis)} for axis in AXES]
+
+
+def _worst(found: Document, axis: str) -> Document:
+    bound, dominant = found["bound"][axis], charts.largest_sources(found, axis)[0]
+    values = bound["worst_ratio"], bound["smallest_constant_rad_s2"], dominant, found["false_alarm"]
+    return dict(zip(_OF_MAP, values, strict=True))

@@ -11,7 +11,7 @@ from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.model_file import with_systems
 from beaver_ftc.results.looks import LOOKS
 from beaver_ftc.studies.reproduce.claims import CLAIMS
-from beaver_ftc.studies.reproduce.figures import FIGURES
+from beaver_ftc.studies.reproduce.published_figures import FIGURES
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"

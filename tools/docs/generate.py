@@ -42,11 +42,9 @@ def _write_first_figure(docs: Path) -> Path:
 
 def _write_reproduction(docs: Path) -> Iterator[Path]:
     from beaver_ftc.studies.engine.study import fly_all
-    from beaver_ftc.studies.reproduce.document import document_of, fly_published
-    from beaver_ftc.studies.reproduce.figures import write_figures
-    from beaver_ftc.studies.reproduce.margins import write_margins
-    from beaver_ftc.studies.reproduce.page import as_markdown
-    from beaver_ftc.studies.reproduce.sensitivity import VARIANTS, numbers_of
+    from beaver_ftc.studies.reproduce.cases import VARIANTS
+    from beaver_ftc.studies.reproduce.published_figures import write_figures, write_margins
+    from beaver_ftc.studies.reproduce.reproduction import as_markdown, document_of, fly_published, numbers_of
 
     flights = fly_published()
     document = document_of(flights, fly_all(numbers_of, VARIANTS, workers=2))

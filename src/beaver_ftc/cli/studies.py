@@ -158,8 +158,7 @@ def reproduce(
 
     Stopped or killed, it goes on where it was with the same command.
     """
-    from beaver_ftc.studies.reproduce.run import NAME, reproduce
-    from beaver_ftc.studies.reproduce.text import as_text
+    from beaver_ftc.studies.reproduce.reproduction import NAME, as_text, reproduce
 
     with progress_bar("changes to what the paper leaves open") as progress:
         document = reproduce(out, workers, progress)

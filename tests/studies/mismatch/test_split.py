@@ -119,7 +119,7 @@ FAULTS = {
 @pytest.mark.parametrize("faults", FAULTS.values(), ids=FAULTS)
 def test_every_fault_is_accounted_for_part_by_part(faults, actuators):
     found = split_flight(uncertainty=NOTHING, faults=faults, actuators=actuators, duration_s=7)
-    parts = found.parts["fault"]
+    parts = found.details["fault"]
     assert len(parts) == len(faults)
     assert all(largest(part) > 1e-4 for part in parts.values())
     assert sum(parts.values()) == pytest.approx(found.contributions["fault"], abs=1e-15)

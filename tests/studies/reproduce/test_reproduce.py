@@ -9,14 +9,12 @@ from typer.testing import CliRunner
 from beaver_ftc.cli.main import app
 from beaver_ftc.results.looks import LOOKS
 from beaver_ftc.scenario.loader import load_scenario
-from beaver_ftc.studies.reproduce import words
-from beaver_ftc.studies.reproduce.cases import BESIDE, PUBLISHED, fly_case
+from beaver_ftc.studies.reproduce import reproduction
+from beaver_ftc.studies.reproduce.cases import BESIDE, PUBLISHED, VARIANTS, fly_case
 from beaver_ftc.studies.reproduce.choices import CHOICES, GIVEN, scenario
 from beaver_ftc.studies.reproduce.claims import CLAIMS
-from beaver_ftc.studies.reproduce.document import fly_published
-from beaver_ftc.studies.reproduce.figures import FIGURES
-from beaver_ftc.studies.reproduce.margins import shares
-from beaver_ftc.studies.reproduce.sensitivity import VARIANTS
+from beaver_ftc.studies.reproduce.published_figures import FIGURES, shares
+from beaver_ftc.studies.reproduce.reproduction import fly_published
 
 SHOWN = {"Fig. 2a", "Fig. 2b", "Fig. 3", "Fig. 4a", "Fig. 4b", "Fig. 4c", "Fig. 5", "Fig. 6", "Fig. 7"}
 
@@ -116,7 +114,7 @@ def test_unanticipated_fault_is_never_named_under_the_interval_test():
     ],
 )
 def test_numbers_in_words(value, unit, said):
-    assert words.number(value, unit) == said
+    assert reproduction.number(value, unit) == said
 
 
 @pytest.mark.parametrize(

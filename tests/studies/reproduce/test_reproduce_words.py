@@ -2,7 +2,7 @@
 
 import pytest
 
-from beaver_ftc.studies.reproduce import text, words
+from beaver_ftc.studies.reproduce import reproduction as words
 
 CLAIMS = [
     {
@@ -65,7 +65,7 @@ def test_the_outcome_in_a_sentence():
 
 
 def test_the_terminal_shows_the_statements_and_what_excepts_them():
-    lines = text.as_text(DOCUMENT, "out").splitlines()
+    lines = words.as_text(DOCUMENT, "out").splitlines()
     assert lines[0] == "[Zhang2005] flown again"
     head = next(line for line in lines if "Published" in line)
     assert [head.index(word) for word in words.VERDICT_HEAD[:4]] == sorted(
@@ -80,8 +80,8 @@ def test_the_terminal_shows_the_statements_and_what_excepts_them():
 
 
 def test_what_is_not_borne_out_is_red_and_where_it_stands_is_not_broken():
-    coloured = text.as_text(DOCUMENT, "out", colour=True)
+    coloured = words.as_text(DOCUMENT, "out", colour=True)
     assert "\x1b[1;31mNOT BORNE OUT" in coloured
     assert "\x1b[32mborne out" in coloured
     long = {**CLAIMS[0], "where": "Figure 2 and section VII", "statement": "word " * 80}
-    assert "Figure 2 and section VII" in text.as_text({**DOCUMENT, "claims": [long]}, "out")
+    assert "Figure 2 and section VII" in words.as_text({**DOCUMENT, "claims": [long]}, "out")

@@ -21,8 +21,7 @@ from beaver_ftc.results.metrics import as_json, metrics
 from beaver_ftc.results.run import write_report_files
 from beaver_ftc.results.writer import result_folder
 from beaver_ftc.scenario.dump import to_yaml
-from beaver_ftc.studies.engine.flown import Progress, flown
-from beaver_ftc.studies.engine.words import finite
+from beaver_ftc.studies.engine.study import Progress, flown
 from beaver_ftc.studies.mismatch import charts
 from beaver_ftc.studies.mismatch.bound import recommended_for
 from beaver_ftc.studies.mismatch.linear import analyse, linear_document
@@ -39,6 +38,7 @@ from beaver_ftc.studies.mismatch.split import (
 )
 from beaver_ftc.studies.mismatch.states import AXES
 from beaver_ftc.studies.mismatch.tables import show_in_reports
+from beaver_ftc.studies.present.tables import finite
 
 if TYPE_CHECKING:
     from beaver_ftc.scenario.schema import Scenario
@@ -215,7 +215,7 @@ def run_map(
     refuse_other_aircraft(scenario)
     name, fly_cell = map_name(scenario), partial(_cell, scenario)
     conditions = [(V, h) for h in ALTITUDES_M for V in AIRSPEEDS_MPS]
-    cells = flown(out / name, conditions, fly_cell, list[Document], asked=scenario, progress=progress)
+    cells = flown(out / name, conditions, fly_cell, list[Document], follows_from=scenario, progress=progress)
     with cells as found, result_folder(out, name) as folder:
         entries = [entry for of_cell in found for entry in of_cell]
         _write(folder, {"scenario": scenario.name, "map": entries}, entries)

@@ -6,8 +6,8 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-from beaver_ftc.studies.engine.words import html_table, number, plain, printed, seconds
 from beaver_ftc.studies.mismatch.states import AXES
+from beaver_ftc.studies.present.tables import html_table, number, plain, printed, seconds
 
 Document = dict[str, Any]
 WIDTH = 150

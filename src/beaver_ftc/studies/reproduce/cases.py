@@ -1,4 +1,8 @@
-"""The flights of the published study, and a few beside them for comparison."""
+"""The flights of the published study, a few beside them for comparison, and what is changed in all of them.
+
+Do the conclusions hang on what the paper leaves open? Every choice is changed, one at a time, and every
+statement held against the flights again.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -10,7 +14,13 @@ from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.metrics import Document, metrics
 from beaver_ftc.scenario.diagnosis import DEADBEAT_PER_S
 from beaver_ftc.studies.engine.columns import Columns
-from beaver_ftc.studies.reproduce.choices import ELEVATOR_LOSS, FAULT_AT_S, UNANTICIPATED, scenario
+from beaver_ftc.studies.reproduce.choices import (
+    AMPLITUDE_DEG_S,
+    ELEVATOR_LOSS,
+    FAULT_AT_S,
+    UNANTICIPATED,
+    scenario,
+)
 
 AXES = ("p", "q", "r")
 ESTIMATORS = ("aileron", "elevator", "rudder")
@@ -20,7 +30,7 @@ SETTLED_S = 2.0  # from rest, or from a fault, to steady tracking: four error ti
 
 
 @dataclass(frozen=True)
-class Case:
+class PublishedCase:
     """One flight: where the paper shows it, and what sets it apart from the choices."""
 
     name: str
@@ -33,20 +43,20 @@ def _loss(actuator: str) -> list[dict[str, Any]]:
 
 
 PUBLISHED = (
-    Case("fault-free-nominal", "Fig. 2a", NOMINAL),
-    Case("elevator-nominal", "Fig. 2b", {"faults": _loss("elevator"), **NOMINAL}),
-    Case("elevator", "Fig. 3, 4, 5", {"faults": _loss("elevator")}),
-    Case("unanticipated-nominal", "Fig. 6", {"faults": [UNANTICIPATED], **NOMINAL}),
-    Case("unanticipated", "Fig. 7", {"faults": [UNANTICIPATED]}),
-    Case("aileron", "mentioned", {"faults": _loss("aileron")}),
-    Case("rudder", "mentioned", {"faults": _loss("rudder")}),
+    PublishedCase("fault-free-nominal", "Fig. 2a", NOMINAL),
+    PublishedCase("elevator-nominal", "Fig. 2b", {"faults": _loss("elevator"), **NOMINAL}),
+    PublishedCase("elevator", "Fig. 3, 4, 5", {"faults": _loss("elevator")}),
+    PublishedCase("unanticipated-nominal", "Fig. 6", {"faults": [UNANTICIPATED], **NOMINAL}),
+    PublishedCase("unanticipated", "Fig. 7", {"faults": [UNANTICIPATED]}),
+    PublishedCase("aileron", "mentioned", {"faults": _loss("aileron")}),
+    PublishedCase("rudder", "mentioned", {"faults": _loss("rudder")}),
 )
 BESIDE = (
-    Case("elevator-sharpened", "", {"faults": _loss("elevator"), **SHARPENED}),
-    Case("unanticipated-sharpened", "", {"faults": [UNANTICIPATED], **SHARPENED}),
-    Case("aileron-sharpened", "", {"faults": _loss("aileron"), **SHARPENED}),
-    Case("rudder-sharpened", "", {"faults": _loss("rudder"), **SHARPENED}),
-    Case("unanticipated-interval", "", {"faults": [UNANTICIPATED], "fdi.thresholds": "interval"}),
+    PublishedCase("elevator-sharpened", "", {"faults": _loss("elevator"), **SHARPENED}),
+    PublishedCase("unanticipated-sharpened", "", {"faults": [UNANTICIPATED], **SHARPENED}),
+    PublishedCase("aileron-sharpened", "", {"faults": _loss("aileron"), **SHARPENED}),
+    PublishedCase("rudder-sharpened", "", {"faults": _loss("rudder"), **SHARPENED}),
+    PublishedCase("unanticipated-interval", "", {"faults": [UNANTICIPATED], "fdi.thresholds": "interval"}),
 )
 
 
@@ -104,13 +114,74 @@ class Flown:
 
     def named_s(self, estimator: str) -> float:
         """For how long this was the only estimator left, s."""
-        left = np.column_stack([self.log[f"fie_{name}_excluded"] != 1 for name in ESTIMATORS])
-        alone = (left.sum(axis=1) == 1) & left[:, ESTIMATORS.index(estimator)] & (self.log["detected"] == 1)
+        possible = np.column_stack([self.log[f"fie_{name}_excluded"] != 1 for name in ESTIMATORS])
+        alone = (
+            (possible.sum(axis=1) == 1)
+            & possible[:, ESTIMATORS.index(estimator)]
+            & (self.log["detected"] == 1)
+        )
         return float(alone.sum() * (self.log["t_s"][1] - self.log["t_s"][0]))
 
 
-def fly_case(case: Case, changes: Mapping[str, Any] | None = None) -> Flown:
+def fly_case(case: PublishedCase, changes: Mapping[str, Any] | None = None) -> Flown:
     """Fly a case, with further changes to the choices."""
     log = Columns()
     flight = fly(scenario(case.name, {**case.changes, **(changes or {})}), log)
     return Flown(metrics(flight), log)
+
+
+INTERVAL = {"fdi.thresholds": "interval"}
+
+
+@dataclass(frozen=True)
+class Variant:
+    """What is changed, in words and as dotted scenario keys."""
+
+    name: str
+    changes: Mapping[str, Any]
+
+
+def _references(kind: str, **options: Any) -> dict[str, Any]:
+    frequencies = {"p": 0.25, "q": 0.2, "r": 0.15}
+    return {
+        f"reference.{axis}": [
+            {kind: {"amplitude_deg_s": AMPLITUDE_DEG_S, "frequency_hz": hz * options.get("times", 1.0)}}
+        ]
+        for axis, hz in frequencies.items()
+    }
+
+
+def _couplings(p: float, q: float, r: float) -> dict[str, Any]:
+    return {"uncertainty.inertia_coupling": {"p": p, "q": q, "r": r}}
+
+
+VARIANTS = (
+    Variant("airspeed 42 m/s", {"initial.airspeed_mps": 42.0}),
+    Variant("airspeed 48 m/s", {"initial.airspeed_mps": 48.0}),
+    Variant("altitude 300 m", {"initial.altitude_m": 300.0}),
+    Variant("altitude 3000 m", {"initial.altitude_m": 3000.0}),
+    Variant("references half as fast", _references("sine", times=0.5)),
+    Variant("references twice as fast", _references("sine", times=2.0)),
+    Variant("square references, which jump themselves", _references("square")),
+    Variant("uncertainty -, +, -", _couplings(-0.25, 0.25, -0.25)),
+    Variant("uncertainty +, +, +", _couplings(0.25, 0.25, 0.25)),
+    Variant("no inertia uncertainty", _couplings(0.0, 0.0, 0.0)),
+    Variant("Kp halved, Ki to match", {"control.proportional_per_s": 1.0, "control.integral_per_s2": 0.25}),
+    Variant("Kp doubled, Ki to match", {"control.proportional_per_s": 4.0, "control.integral_per_s2": 4.0}),
+    Variant("no integral action", {"control.integral_per_s2": 0.0}),
+    Variant("reference model 5 rad/s", {"control.reference_natural_frequency_rad_s": 5.0}),
+    Variant("network gain 30 1/s2", {"control.network_gain_per_s2": 30.0}),
+    Variant("network gain 120 1/s2", {"control.network_gain_per_s2": 120.0}),
+    Variant("hand-over in 2 s", {"control.hand_over_s": 2.0}),
+    Variant("detection pole 5 1/s", {"fdi.detection_pole_per_s": 5.0}),
+    Variant("detection pole 20 1/s", {"fdi.detection_pole_per_s": 20.0}),
+    Variant("isolation pole 5 1/s", {"fdi.isolation_pole_per_s": 5.0}),
+    Variant("isolation pole 20 1/s", {"fdi.isolation_pole_per_s": 20.0}),
+    Variant("forgetting time 20 s", {"fdi.forgetting_time_s": 20.0}),
+    Variant("frame rate 50 Hz", {"rate_hz": 50.0}),
+    Variant("frame rate 200 Hz", {"rate_hz": 200.0}),
+    Variant("interval thresholds", INTERVAL),
+    Variant("interval thresholds, 48 m/s", {**INTERVAL, "initial.airspeed_mps": 48.0}),
+    Variant("interval thresholds, references twice as fast", {**INTERVAL, **_references("sine", times=2.0)}),
+    Variant("sharpened estimators", SHARPENED),
+)

@@ -136,7 +136,8 @@ def test_a_fault_is_its_surfaces_wherever_the_file_has_it(tmp_path):
 
 
 def test_what_cannot_be_trimmed_is_said_not_dropped(flight, tmp_path):
-    rows = run_survey(tmp_path, flight, speeds_mps=[45.0, 21.0], altitudes_m=[1000.0], excitations=[1.0])
+    document = run_survey(tmp_path, flight, speeds_mps=[45.0, 21.0], altitudes_m=[1000.0], excitations=[1.0])
+    rows = document["points"]
     assert len(rows) == 2 * len(FAULTS)
     assert all(row["detected"] is None and row["why"] for row in rows[len(FAULTS) :])
 
@@ -147,7 +148,10 @@ def test_another_scheme_is_refused(tmp_path):
 
 
 def test_csv_and_map_hold_every_point(flight, tmp_path):
-    rows = run_survey(tmp_path, flight, speeds_mps=[45.0], altitudes_m=[0.0, 2000.0], excitations=[0.5, 1.0])
+    document = run_survey(
+        tmp_path, flight, speeds_mps=[45.0], altitudes_m=[0.0, 2000.0], excitations=[0.5, 1.0]
+    )
+    rows = document["points"]
     assert len(list(csv.DictReader(as_csv(rows).splitlines()))) == len(rows) == 2 * 2 * len(FAULTS)
     assert len([axes for axes in draw("x", rows).axes if axes.get_title()]) == 2 * len(FAULTS)
 

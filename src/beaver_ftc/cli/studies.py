@@ -211,11 +211,11 @@ def detectability(
     Stopped or killed, it goes on where it was with the same command.
     """
     from beaver_ftc.scenario.loader import load_scenario
-    from beaver_ftc.studies.detectability import document, run_survey, survey_name, text
+    from beaver_ftc.studies.detectability import run_survey, survey_name, text
 
     loaded = load_scenario(scenario)
     name = survey_name(loaded)
     with progress_bar(name) as progress:
-        rows = run_survey(out, loaded, progress=progress)
-    found = document(loaded.name, rows) | {"folder": str(out / name)}
-    answer(format, found, lambda: f"{text(rows)}\n{out / name}")
+        found = run_survey(out, loaded, progress=progress)
+    folder = str(out / name)
+    answer(format, found | {"folder": folder}, lambda: f"{text(found['points'])}\n{folder}")

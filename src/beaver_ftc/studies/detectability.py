@@ -14,8 +14,6 @@ frame-by-frame test of the innovation, whatever the fault's course; z is taken a
 the loop's answer to the fault within the window is neglected.
 """
 
-import csv
-import io
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -34,7 +32,10 @@ from beaver_ftc.loop.loop import fly
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.engine.columns import Columns
 from beaver_ftc.studies.engine.statistics import quantile
-from beaver_ftc.studies.engine.study import Progress, flown
+from beaver_ftc.studies.engine.study import Progress, Study, run_study
+from beaver_ftc.studies.present.figures import heat_map, label_edges, panels
+from beaver_ftc.studies.present.files import Files
+from beaver_ftc.studies.present.tables import as_csv
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -45,7 +46,7 @@ SHARES = (0.9, 1.0, 1.1)  # of the speed another aircraft starts with
 EXCITATIONS = (0.25, 0.5, 1.0, 2.0)  # of the scenario's references
 SETTLED_S = 2.0  # the start of a reference is a step of its own
 BISECTIONS = 16  # magnitudes to 2^-16
-Row = dict[str, Any]
+Document = dict[str, Any]
 
 
 def speeds_of(aircraft: Aircraft) -> tuple[float, ...]:
@@ -147,25 +148,24 @@ def run_survey(
     altitudes_m: Sequence[float] = (),
     excitations: Sequence[float] = EXCITATIONS,
     progress: Progress | None = None,
-) -> list[Row]:
-    """Write `out/<scenario>-detectability/`; return one row a fault and grid point.
+) -> Document:
+    """Write `out/<scenario>-detectability/`; return the document: one row a fault and grid point.
 
     Raises BadInput if another scheme than the sharpened one diagnoses.
     """
-    from beaver_ftc.results.writer import result_folder
-
     _refuse_other_schemes(scenario)
-    name = survey_name(scenario)
     speeds_mps = speeds_mps or speeds_of(scenario.airframe)
     altitudes_m = altitudes_m or altitudes_of(scenario.airframe)
-    grid = list(product(speeds_mps, altitudes_m, excitations))
-    points = flown(
-        out / name, grid, partial(_point, scenario), list[Row], follows_from=scenario, progress=progress
+    survey = Study(
+        survey_name(scenario),
+        list(product(speeds_mps, altitudes_m, excitations)),
+        partial(_point, scenario),
+        partial(document_of, scenario.name),
+        files_of,
+        row=list[Document],
+        follows_from=scenario,
     )
-    with points as found, result_folder(out, name) as folder:
-        rows = [row for point in found for row in point]
-        write(folder, scenario.name, rows)
-    return rows
+    return run_study(survey, out, progress=progress)
 
 
 def survey_name(scenario: Scenario) -> str:
@@ -183,7 +183,7 @@ def _refuse_other_schemes(scenario: Scenario) -> None:
         )
 
 
-def _point(scenario: Scenario, point: tuple[float, float, float]) -> list[Row]:
+def _point(scenario: Scenario, point: tuple[float, float, float]) -> list[Document]:
     speed, altitude, scale = point
     place = {"airspeed_mps": speed, "altitude_m": altitude, "excitation": scale}
     try:
@@ -204,7 +204,7 @@ def at(scenario: Scenario, speed_mps: float, altitude_m: float, excitation: floa
     return Scenario.model_validate({**document, "faults": [], "expect": {}})
 
 
-def _scaled(signal: Row, factor: float) -> Row:
+def _scaled(signal: Document, factor: float) -> Document:
     (kind, parameters), *_ = signal.items()
     scaled = dict(parameters)
     for name in ("amplitude_deg_s", "values_deg_s"):
@@ -213,12 +213,12 @@ def _scaled(signal: Row, factor: float) -> Row:
     return {kind: scaled}
 
 
-def _nothing(why: str) -> Row:
+def _nothing(why: str) -> Document:
     magnitudes = dict.fromkeys(("detected", "detected_median", "isolated", "isolated_median"))
     return {**magnitudes, "confused_with": None, "why": why}
 
 
-def judge(seen: Excitation, fault: str) -> Row:
+def judge(seen: Excitation, fault: str) -> Document:
     """Magnitudes from which a fault is certain to be found along a flight.
 
     detected, isolated: whenever it strikes; `_median`: in half of the instants at which it may strike;
@@ -273,88 +273,73 @@ def _why(
     return f"{rival} explains smaller ones"
 
 
-def document(name: str, rows: Sequence[Row]) -> dict[str, Any]:
+def document_of(name: str, points: Sequence[Sequence[Document]]) -> Document:
     """What the command answers and `detectability.json` holds."""
     return {
         "scenario": name,
         "detect_within_s": DETECT_WITHIN_S,
         "isolate_within_s": ISOLATE_WITHIN_S,
-        "points": list(rows),
+        "points": [row for point in points for row in point],
     }
 
 
-def write(folder: Path, name: str, rows: Sequence[Row]) -> None:
-    """Fill `folder` with detectability.json, .csv and .png."""
-    (folder / "detectability.json").write_text(
-        json.dumps(document(name, rows), indent=1) + "\n", encoding="utf-8"
-    )
-    (folder / "detectability.csv").write_text(as_csv(rows), encoding="utf-8")
-    draw(name, rows).savefig(folder / "detectability.png", dpi=110)
+def files_of(document: Document) -> Files:
+    """The document, its rows and their map; a cell is empty where nothing is certain."""
+    rows = document["points"]
+    return {
+        "detectability.json": json.dumps(document, indent=1) + "\n",
+        "detectability.csv": as_csv(rows),
+        "detectability.png": draw(document["scenario"], rows),
+    }
 
 
-def as_csv(rows: Sequence[Row]) -> str:
-    """One line a fault and grid point; empty where nothing is certain."""
-    text = io.StringIO()
-    writer = csv.DictWriter(text, fieldnames=list(rows[0]), lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(rows)
-    return text.getvalue()
-
-
-def draw(name: str, rows: Sequence[Row]) -> Any:
+def draw(name: str, rows: Sequence[Document]) -> Any:
     """A map a fault and excitation: over speed and altitude, the magnitude certain to be found."""
-    from matplotlib.figure import Figure
-
     faults, scales = _faults(rows), sorted({row["excitation"] for row in rows})
-    figure = Figure(figsize=(3.4 * len(scales) + 1.2, 9.0), layout="constrained")
-    grid = figure.subplots(len(faults), len(scales), squeeze=False, sharex=True, sharey=True)
-    for line, fault in zip(grid, faults, strict=True):
-        for axes, scale in zip(line, scales, strict=True):
-            image = _map(axes, [row for row in rows if (row["fault"], row["excitation"]) == (fault, scale)])
-            axes.set_title(f"{fault}, {scale:g} x reference", fontsize=9)
-    for axes in grid[-1]:
-        axes.set_xlabel("airspeed (m/s)", fontsize=9)
-    for line in grid:
-        line[0].set_ylabel("altitude (m)", fontsize=9)
-    figure.colorbar(image, ax=grid, label="magnitude certain to be detected, whenever it strikes", shrink=0.6)
-    figure.suptitle(
+    title = (
         f"{name}: loss of effectiveness certain to be detected within {DETECT_WITHIN_S:g} s / "
-        f"isolated within {ISOLATE_WITHIN_S:g} s (-: not even a total loss)",
-        fontsize=11,
+        f"isolated within {ISOLATE_WITHIN_S:g} s (-: not even a total loss)"
     )
+    size = 3.4 * len(scales) + 1.2, 9.0
+    figure, grid = panels(len(faults), len(scales), *size, title, sharex=True, sharey=True)
+    for (fault, scale), axes in zip(product(faults, scales), grid.flat, strict=True):
+        image = _map(axes, [row for row in rows if (row["fault"], row["excitation"]) == (fault, scale)])
+        axes.set_title(f"{fault}, {scale:g} x reference", fontsize=9)
+    label_edges(grid, "airspeed (m/s)", ["altitude (m)"] * len(faults))
+    figure.colorbar(image, ax=grid, label="magnitude certain to be detected, whenever it strikes", shrink=0.6)
     return figure
 
 
-def _faults(rows: Sequence[Row]) -> list[str]:
+def _faults(rows: Sequence[Document]) -> list[str]:
     """The faults in the order of the rows."""
     return list(dict.fromkeys(row["fault"] for row in rows))
 
 
-def _map(axes: "Axes", rows: Sequence[Row]) -> Any:
+def _map(axes: "Axes", rows: Sequence[Document]) -> Any:
     speeds, altitudes = (sorted({row[key] for row in rows}) for key in ("airspeed_mps", "altitude_m"))
-    values = np.full((len(altitudes), len(speeds)), np.nan)
+    values, labels = np.full((len(altitudes), len(speeds)), np.nan), {}
     for row in rows:
         at = altitudes.index(row["altitude_m"]), speeds.index(row["airspeed_mps"])
         values[at] = np.nan if row["detected"] is None else row["detected"]
-        label = f"{_short(row['detected'])}\n{_short(row['isolated'])}"
-        axes.text(at[1], at[0], label, ha="center", va="center", fontsize=7)
-    axes.set_xticks(range(len(speeds)), [f"{speed:g}" for speed in speeds], fontsize=8)
-    axes.set_yticks(range(len(altitudes)), [f"{altitude:g}" for altitude in altitudes], fontsize=8)
-    return axes.imshow(values, origin="lower", aspect="auto", cmap="viridis_r", vmin=0.0, vmax=1.0, alpha=0.6)
+        labels[at] = f"{_short(row['detected'])}\n{_short(row['isolated'])}", "black"
+    names = [f"{speed:g}" for speed in speeds], [f"{altitude:g}" for altitude in altitudes]
+    return heat_map(
+        axes, values, labels, *names, 7, origin="lower", cmap="viridis_r", vmin=0.0, vmax=1.0, alpha=0.6
+    )
 
 
 def _short(magnitude: float | None) -> str:
     return "-" if magnitude is None else f"{magnitude:.2f}"
 
 
-def text(rows: Sequence[Row]) -> str:
+def text(rows: Sequence[Document]) -> str:
     """A line a fault and grid point, then one a fault and excitation."""
     place = f"{'fault':<10}{'m/s':>6}{'m':>7}{'excit.':>8}"
     head = f"{place}{'detected':>10}{'median':>8}{'isolated':>10}{'median':>8}   why"
     return "\n".join([head, *map(_line, rows), "", *_summary(rows)])
 
 
-def _summary(rows: Sequence[Row]) -> list[str]:
+def _summary(rows: Sequence[Document]) -> list[str]:
     """How many grid points each fault is certain at, and from which magnitudes on."""
     lines = [f"{'fault':<10}{'excit.':>8}{'certain at':>12}{'from':>13}{'half the time at':>18}{'from':>13}"]
     for fault, scale in product(_faults(rows), sorted({row["excitation"] for row in rows})):
@@ -370,7 +355,7 @@ def _range(magnitudes: Sequence[float | None]) -> tuple[str, str]:
     return f"{len(certain)} of {len(magnitudes)}", span
 
 
-def _line(row: Row) -> str:
+def _line(row: Document) -> str:
     place = f"{row['fault']:<10}{row['airspeed_mps']:>6g}{row['altitude_m']:>7g}{row['excitation']:>8g}"
     found = f"{_short(row['detected']):>10}{_short(row['detected_median']):>8}"
     return place + found + f"{_short(row['isolated']):>10}{_short(row['isolated_median']):>8}   {row['why']}"

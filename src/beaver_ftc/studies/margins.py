@@ -24,6 +24,10 @@ from beaver_ftc.design.model import QDYN
 from beaver_ftc.design.variants import jacobian
 from beaver_ftc.diagnosis.state import PITCH, ROLL, YAW
 from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.loop.assembly import y_places
+from beaver_ftc.loop.loop import Loop
+from beaver_ftc.plant.conditions import trimmed
+from beaver_ftc.plant.linear import differences
 from beaver_ftc.studies.linear_systems import held_over_frame
 from beaver_ftc.studies.present.tables import aligned
 
@@ -195,11 +199,6 @@ def study(scenario: "Scenario") -> list[Margin]:
 
 def at(scenario: "Scenario") -> Iterator[Margin]:
     """The margins at a scenario's flight condition."""
-    from beaver_ftc.loop.assembly import y_places
-    from beaver_ftc.loop.loop import Loop
-    from beaver_ftc.plant.conditions import trimmed
-    from beaver_ftc.plant.linear import differences
-
     plant, point = trimmed(scenario)
     linear = differences(plant, point)
     frame = Loop(scenario).frames[0]

@@ -12,12 +12,22 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from beaver_ftc.aircraft import AXES, DEFAULT, Aircraft, load
+from beaver_ftc.loop.loop import fly
+from beaver_ftc.plant.adapter import Plant
+from beaver_ftc.plant.trim import trim
+from beaver_ftc.results.metrics import as_json, metrics
 from beaver_ftc.scenario.airframe import find_aircraft
 from beaver_ftc.scenario.environment import air_of
-from beaver_ftc.studies.engine.study import Progress, flown
+from beaver_ftc.scenario.given import load as load_scenario
+from beaver_ftc.scenario.initial import initial_of
+from beaver_ftc.studies.engine.study import Progress, Study, run_study
 from beaver_ftc.studies.matrix.told import columns_of, told
+from beaver_ftc.studies.present.figures import heat_map, panels
+from beaver_ftc.studies.present.files import Files
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from beaver_ftc.loop.flight import Flight
     from beaver_ftc.scenario.schema import Scenario
 
@@ -128,8 +138,6 @@ def declared(turbulence: str = "none") -> dict[str, Any]:
 
 def scenario_of(case: Case, law: str, trimmed_deg: float) -> "Scenario":
     """The flight of a case under a law; trimmed_deg: the surface's deflection in trim."""
-    from beaver_ftc.scenario.given import load as load_scenario
-
     fault = dict(dict(FAULTS)[case.fault])
     if "off_deg" in fault:
         fault["position_deg"] = trimmed_deg + fault.pop("off_deg")
@@ -152,10 +160,6 @@ def scenario_of(case: Case, law: str, trimmed_deg: float) -> "Scenario":
 @lru_cache
 def trimmed_deg(airspeed_mps: float, surface: str, aircraft: str = DEFAULT) -> float:
     """Deflection of a surface in the trim the cases start from."""
-    from beaver_ftc.plant.adapter import Plant
-    from beaver_ftc.plant.trim import trim
-    from beaver_ftc.scenario.initial import initial_of
-
     flown = aircraft_of(aircraft)
     altitude_m = initial_of(flown)().altitude_m
     point = trim(airspeed_mps, altitude_m, plant=Plant(100, aircraft=flown))
@@ -164,8 +168,6 @@ def trimmed_deg(airspeed_mps: float, surface: str, aircraft: str = DEFAULT) -> f
 
 def fly_case(case: Case) -> Document:
     """The row of a case: fault, verdict, tracking beside the oracle's, and why it was lost, if so."""
-    from beaver_ftc.loop.loop import fly
-
     off_deg = trimmed_deg(case.airspeed_mps, case.surface, case.aircraft)
     ours, best = (scenario_of(case, law, off_deg) for law in ("fault-tolerant-published", "oracle-published"))
     kept = columns_of(ours.airframe) if case.declared else None
@@ -175,8 +177,6 @@ def fly_case(case: Case) -> Document:
 
 
 def _diagnosis(flight: "Flight", case: Case) -> Document:
-    from beaver_ftc.results.metrics import metrics
-
     document = metrics(flight)
     isolation, true_type = document["isolation"], flight.scenario.faults[0].type
     return {
@@ -336,20 +336,18 @@ def run_matrix(
     turbulence: str = "none",
 ) -> Document:
     """Write table, JSON and heat map into the folder that `name_of` says, in `out`; return the document."""
-    from beaver_ftc.results.metrics import as_json
-    from beaver_ftc.results.writer import result_folder
-    from beaver_ftc.studies.matrix.fault_matrix import write_heat_map
+    all_cases = cases(airspeeds_mps or airspeeds_of(aircraft), declared, aircraft, turbulence)
+    matrix = Study(name_of(declared, turbulence), all_cases, fly_case, document_of, files_of)
+    return run_study(matrix, out, workers, progress)
 
-    airspeeds_mps = airspeeds_mps or airspeeds_of(aircraft)
-    name = name_of(declared, turbulence)
-    all_cases = cases(airspeeds_mps, declared, aircraft, turbulence)
-    fly = flown(out / name, all_cases, fly_case, workers=workers, progress=progress)
-    with fly as rows, result_folder(out, name) as folder:
-        document = document_of(rows)
-        (folder / f"{NAME}.json").write_text(as_json(document), encoding="utf-8")
-        (folder / f"{NAME}.txt").write_text(as_text(document) + "\n", encoding="utf-8")
-        write_heat_map(document, folder / f"{NAME}.png")
-    return document
+
+def files_of(document: Document) -> Files:
+    """The document, its table, and the heat map."""
+    return {
+        f"{NAME}.json": as_json(document),
+        f"{NAME}.txt": as_text(document) + "\n",
+        f"{NAME}.png": heat_map_of(document),
+    }
 
 
 LEGEND = (
@@ -412,34 +410,27 @@ def _told(told: Document) -> str:
     )
 
 
-def write_heat_map(document: Document, path: Path) -> None:
-    """Draw the matrix into a PNG."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    names = [fault for fault, _ in FAULTS]
-    surfaces = surfaces_of(document)
+def heat_map_of(document: Document) -> "Figure":
+    """Colour says how the flight compares with the oracle's, letters the verdict."""
+    names, surfaces = [fault for fault, _ in FAULTS], surfaces_of(document)
     by_place = {(cell["fault"], cell["surface"]): cell for cell in document["cells"]}
     grid = np.array([[_doublings(by_place[fault, surface]) for surface in surfaces] for fault in names])
-    figure = Figure(figsize=(11, 0.5 * len(names) + 1.8), layout="constrained")
-    FigureCanvasAgg(figure)
-    axes = figure.subplots()
-    image = axes.imshow(grid, cmap="YlOrBr", vmin=0, vmax=MOST_DOUBLINGS, aspect="auto")
+    labels = {
+        (i, j): (_label(by_place[names[i], surfaces[j]]), "white" if dark else "black")
+        for (i, j), dark in np.ndenumerate(grid > 0.7 * MOST_DOUBLINGS)
+    }
+    figure, panel = panels(1, 1, 11.0, 0.5 * len(names) + 1.8)
+    axes, most = panel[0, 0], int(MOST_DOUBLINGS)
+    image = heat_map(axes, grid, labels, surfaces, names, 9, cmap="YlOrBr", vmin=0, vmax=MOST_DOUBLINGS)
     axes.set_title("Each fault on each surface: verdict, and how well the flight goes on")
-    axes.set_xticks(range(len(surfaces)), surfaces)
     axes.set_xticks(np.arange(0.5, len(surfaces) - 1), minor=True)
     axes.set_yticks(np.arange(0.5, len(names) - 1), minor=True)
     axes.grid(which="minor", color="white", linewidth=1.5)
     axes.tick_params(which="minor", length=0)
-    axes.set_yticks(range(len(names)), names)
-    for i, fault in enumerate(names):
-        for j, surface in enumerate(surfaces):
-            axes.text(j, i, _label(by_place[fault, surface]), ha="center", va="center", **_ink(grid[i, j]))
-    bar = figure.colorbar(image, ticks=range(int(MOST_DOUBLINGS) + 1))
-    most = int(MOST_DOUBLINGS)
+    bar = figure.colorbar(image, ticks=range(most + 1))
     bar.ax.set_yticklabels([f"{2**n}" for n in range(most)] + [f"{2**most} or more"])
     bar.set_label("tracking RMS over the oracle's, worst airspeed")
-    figure.savefig(path, dpi=120, metadata={"Software": None})
+    return figure
 
 
 def _doublings(cell: Document) -> float:
@@ -449,7 +440,3 @@ def _doublings(cell: Document) -> float:
 def _label(cell: Document) -> str:
     delay = "" if cell["delay_s"] is None else f", {cell['delay_s']:.2f} s"
     return f"{cell['verdict']}{delay}{', lost' if cell['lost'] else ''}"
-
-
-def _ink(doublings: float) -> dict[str, Any]:
-    return {"color": "white" if doublings > 0.7 * MOST_DOUBLINGS else "black", "fontsize": 9}

@@ -5,22 +5,29 @@ law.
 """
 
 from collections.abc import Sequence
+from functools import partial
 from math import degrees
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from beaver_ftc.loop.loop import fly
+from beaver_ftc.plant.adapter import Plant
+from beaver_ftc.plant.linear import differences, engine_slope
+from beaver_ftc.plant.trim import trim
+from beaver_ftc.results.metrics import as_json, metrics
 from beaver_ftc.scenario.control import EnginePower
+from beaver_ftc.scenario.schema import Initial, Scenario
 from beaver_ftc.studies.engine.columns import Columns
-from beaver_ftc.studies.engine.study import Progress, flown
+from beaver_ftc.studies.engine.study import Progress, Study, run_study
 from beaver_ftc.studies.linear_systems import zeros
 from beaver_ftc.studies.matrix.fault_matrix import AIRSPEEDS_MPS, AT_S, REFERENCE, UNCERTAINTY, trimmed_deg
+from beaver_ftc.studies.present.files import Files
 
 if TYPE_CHECKING:
     from beaver_ftc.loop.flight import Flight
     from beaver_ftc.plant.linear import LinearModel
-    from beaver_ftc.scenario.schema import Scenario
 
 Document = dict[str, Any]
 NAME = "pitch-lost"
@@ -58,8 +65,6 @@ class PitchCase(NamedTuple):
 
 def scenario_of(case: PitchCase, enabled: bool) -> "Scenario":
     """The flight of a case, with engine power on pitch or without."""
-    from beaver_ftc.scenario.schema import Scenario
-
     off_deg, flap_deg = next((off, flap) for name, off, flap in LOST if name == case.lost)
     elevator: Document = {"type": "float"}
     if off_deg is not None:
@@ -89,9 +94,6 @@ def fly_case(case: PitchCase) -> Document:
 
 
 def _outcome(scenario: "Scenario") -> Document:
-    from beaver_ftc.loop.loop import fly
-    from beaver_ftc.results.metrics import metrics
-
     kept = Columns(*COLUMNS)
     flight = fly(scenario, kept)
     document = metrics(flight)
@@ -132,23 +134,19 @@ def run_pitch_lost(
     progress: Progress | None = None,
 ) -> Document:
     """Write `out/pitch-lost/` (table, JSON); return the document."""
-    from beaver_ftc.results.metrics import as_json
-    from beaver_ftc.results.writer import result_folder
-
     airspeeds_mps = airspeeds_mps or AIRSPEEDS_MPS
     cases = [PitchCase(name, V, law) for law in LAWS for name, _, _ in LOST for V in airspeeds_mps]
-    fly = flown(out / NAME, cases, fly_case, workers=workers, progress=progress)
-    with fly as rows, result_folder(out, NAME) as folder:
-        document = document_of(rows, airspeeds_mps)
-        (folder / f"{NAME}.json").write_text(as_json(document), encoding="utf-8")
-        (folder / f"{NAME}.txt").write_text(as_text(document) + "\n", encoding="utf-8")
-    return document
+    document = partial(document_of, airspeeds_mps=airspeeds_mps)
+    return run_study(Study(NAME, cases, fly_case, document, files_of), out, workers, progress)
+
+
+def files_of(document: Document) -> Files:
+    """The document and its table."""
+    return {f"{NAME}.json": as_json(document), f"{NAME}.txt": as_text(document) + "\n"}
 
 
 def document_of(rows: list[Document], airspeeds_mps: Sequence[float]) -> Document:
     """All flights, the linear margins, and whether power lost an aircraft that was kept without it."""
-    from beaver_ftc.scenario.control import EnginePower
-
     harmed = [row for row in rows if row["with"]["departure"] and not row["without"]["departure"]]
     return {
         "margins": [margins(V, EnginePower()) for V in airspeeds_mps or AIRSPEEDS_MPS],
@@ -184,11 +182,6 @@ def margins(airspeed_mps: float, config: EnginePower) -> Document:
 
 def about_trim(airspeed_mps: float) -> tuple["LinearModel", np.ndarray, float]:
     """The four longitudinal states, the column (4,) of manifold pressure in inHg, and its trim."""
-    from beaver_ftc.plant.adapter import Plant
-    from beaver_ftc.plant.linear import differences, engine_slope
-    from beaver_ftc.plant.trim import trim
-    from beaver_ftc.scenario.schema import Initial
-
     plant, point = Plant(100), trim(airspeed_mps, Initial().altitude_m)
     model = differences(plant, point)
     rows = [model.states.index(name) for name in STATES]

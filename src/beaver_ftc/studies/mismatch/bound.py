@@ -5,6 +5,8 @@ from dataclasses import dataclass, replace
 from math import ceil, floor, log10
 from typing import TYPE_CHECKING, Any
 
+from beaver_ftc.loop.loop import fly
+from beaver_ftc.scenario.loader import load_scenario
 from beaver_ftc.studies.mismatch.split import Tally, tally_of_flight
 from beaver_ftc.studies.mismatch.states import AXES
 
@@ -74,8 +76,6 @@ class Guarantee:
 
 def guarantee_with(constant_rad_s2: PerAxis, like: "Scenario") -> Guarantee:
     """Fly the published elevator case with this bound and the design model of `like`."""
-    from beaver_ftc.loop.loop import fly
-
     flight = fly(published_case(constant_rad_s2, like))
     fault_s, at_s = flight.scenario.faults[0].at_s, flight.detection_time_s
     delay_s = None if at_s is None or at_s < fault_s else round(at_s - fault_s, 9)
@@ -85,8 +85,6 @@ def guarantee_with(constant_rad_s2: PerAxis, like: "Scenario") -> Guarantee:
 
 def published_case(constant_rad_s2: PerAxis, like: "Scenario") -> "Scenario":
     """The built-in published elevator case with the design model of `like` and this constant bound."""
-    from beaver_ftc.scenario.loader import load_scenario
-
     case = load_scenario(PUBLISHED_CASE).model_copy(update={"design_model": like.design_model})
     return with_bound(case, constant_rad_s2)
 

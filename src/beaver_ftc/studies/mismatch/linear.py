@@ -13,10 +13,12 @@ import numpy as np
 from beaver_ftc.design import fdc
 from beaver_ftc.design.coefficients import engine_power_kw, slipstream
 from beaver_ftc.design.variants import anchor, design_of, jacobian
+from beaver_ftc.plant.adapter import Plant
+from beaver_ftc.plant.configure import configure, trim_of
+from beaver_ftc.plant.linear import LinearModel, differences, own
 from beaver_ftc.studies.linear_systems import CHANNELS, CLASSICAL, MODES, Mode, deviation, modes, zeros
 
 if TYPE_CHECKING:
-    from beaver_ftc.plant.linear import LinearModel
     from beaver_ftc.plant.state import FlightState
     from beaver_ftc.scenario.schema import Scenario
 
@@ -35,6 +37,11 @@ class LinearAnalysis:
     modes: dict[str, dict[str, Mode]]
     own_deviation: dict[str, float]
 
+    def channel(self, name: str, surface: str, rate: str) -> tuple[np.ndarray, np.ndarray, int]:
+        """Of a model: A, the column of a surface, and which state a rate is."""
+        model = self.models[name]
+        return model.A, model.B[:, model.inputs.index(surface)], model.states.index(rate)
+
     def deviation(self, name: str) -> dict[str, float]:
         """How far each mode of a model is from the truth's, as a share of its magnitude."""
         truth = self.modes["truth"]
@@ -43,10 +50,6 @@ class LinearAnalysis:
 
 def analyse(scenario: "Scenario") -> LinearAnalysis:
     """Linearise the scenario's truth and what the designer holds, at its trim."""
-    from beaver_ftc.plant.adapter import Plant
-    from beaver_ftc.plant.configure import configure, trim_of
-    from beaver_ftc.plant.linear import LinearModel, differences
-
     plant = Plant(scenario.rate_hz, scenario.substeps)
     configure(plant, scenario)
     point = trim_of(scenario, plant)
@@ -66,8 +69,6 @@ def analyse(scenario: "Scenario") -> LinearAnalysis:
 
 def own_deviation(scenario: "Scenario", point: "FlightState") -> dict[str, float]:
     """JSBSim's own linearisation against the FDC equations, per mode, at `point` without its sideslip."""
-    from beaver_ftc.plant.linear import LinearModel, own
-
     straight = replace(point, beta_rad=0.0)
     reference = modes(
         LinearModel(*fdc_matrices(scenario, straight), fdc.STATES, fdc.SURFACES).of(CLASSICAL).A
@@ -167,11 +168,9 @@ def linear_document(analysis: LinearAnalysis) -> dict[str, Any]:
             f"{surface} to {rate}": {
                 name: [
                     [float(zero.real), float(zero.imag)]
-                    for zero in zeros(
-                        model.A, model.B[:, model.inputs.index(surface)], model.states.index(rate)
-                    )
+                    for zero in zeros(*analysis.channel(name, surface, rate))
                 ]
-                for name, model in analysis.models.items()
+                for name in analysis.models
             }
             for surface, rate in CHANNELS
         },

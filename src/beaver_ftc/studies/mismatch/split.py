@@ -11,7 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from beaver_ftc.results.log import ParquetLog
+from beaver_ftc.loop.loop import fly
+from beaver_ftc.results.log import ParquetLog, column_names, read_chunks
+from beaver_ftc.results.metrics import metrics
 from beaver_ftc.studies.mismatch.sources import SOURCES, Contributions, Models, instantaneous, integration
 from beaver_ftc.studies.mismatch.states import (
     AXES,
@@ -297,8 +299,6 @@ def table(stretch: Stretch) -> np.ndarray:
 
 def tally_of_log(scenario: "Scenario", log: Path, frames: Path) -> Tally:
     """Split a log, a row group at a time; every frame goes to `frames`."""
-    from beaver_ftc.studies.mismatch.split import split, tally_for, written
-
     kept = tally_for(scenario)
     for stretch in written(split(scenario, _chunks(log)), frames):
         kept.add(stretch)
@@ -307,9 +307,6 @@ def tally_of_log(scenario: "Scenario", log: Path, frames: Path) -> Tally:
 
 def tally_of_flight(scenario: "Scenario") -> tuple[Tally, dict[str, Any]]:
     """Fly and split as it is flown, keeping no log: the tally and the flight's metrics."""
-    from beaver_ftc.loop.loop import fly
-    from beaver_ftc.results.metrics import metrics
-
     sink = _SplittingSink(scenario)
     flight = fly(scenario, sink)
     return sink.tally, metrics(flight)
@@ -319,8 +316,6 @@ class _SplittingSink:
     """A log sink that splits and forgets."""
 
     def __init__(self, scenario: "Scenario") -> None:
-        from beaver_ftc.studies.mismatch.split import Splitter, tally_for
-
         self._splitter, self.tally = Splitter(scenario), tally_for(scenario)
 
     def open(self, columns: Sequence[str]) -> None:
@@ -338,7 +333,5 @@ class _SplittingSink:
 
 
 def _chunks(log: Path) -> Iterator[Columns]:
-    from beaver_ftc.results.log import column_names, read_chunks
-
     there = column_names(log)
     return read_chunks(log, [name for name in (*REQUIRED, *OPTIONAL) if name in there])

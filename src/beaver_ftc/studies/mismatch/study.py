@@ -5,11 +5,10 @@ sources may cancel, so shares need not add up to 1. `bound_share` is the largest
 that a source has used at any frame. A map is the scenario, without faults, flown at each speed and altitude.
 """
 
-import csv
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -21,7 +20,8 @@ from beaver_ftc.results.metrics import as_json, metrics
 from beaver_ftc.results.run import write_report_files
 from beaver_ftc.results.writer import result_folder
 from beaver_ftc.scenario.dump import to_yaml
-from beaver_ftc.studies.engine.study import Progress, flown
+from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.studies.engine.study import Progress, Study, run_study
 from beaver_ftc.studies.mismatch import charts
 from beaver_ftc.studies.mismatch.bound import recommended_for
 from beaver_ftc.studies.mismatch.linear import analyse, linear_document
@@ -38,10 +38,8 @@ from beaver_ftc.studies.mismatch.split import (
 )
 from beaver_ftc.studies.mismatch.states import AXES
 from beaver_ftc.studies.mismatch.tables import show_in_reports
-from beaver_ftc.studies.present.tables import finite
-
-if TYPE_CHECKING:
-    from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.studies.present.files import Files, write_files
+from beaver_ftc.studies.present.tables import as_csv, finite
 
 Document = dict[str, Any]
 COMPARISON, MAP = "mismatch-comparison", "mismatch-map"
@@ -51,7 +49,7 @@ _OF_MAP = ("worst_ratio", "smallest_constant_rad_s2", "dominant", "false_alarm")
 
 
 def run_mismatch(
-    scenario: "Scenario", out: Path, report: bool = True, progress: Progress | None = None
+    scenario: Scenario, out: Path, report: bool = True, progress: Progress | None = None
 ) -> tuple[Document, Tally]:
     """Fly `scenario` and write `out/<name>/`: a run's result folder with the mismatch in it.
 
@@ -62,13 +60,23 @@ def run_mismatch(
         with ParquetLog(folder / "log.parquet") as log:
             flight = fly(scenario, log, progress)
         flown = metrics(flight)
-        (folder / "scenario.yaml").write_text(to_yaml(scenario), encoding="utf-8")
-        (folder / "metrics.json").write_text(as_json(flown), encoding="utf-8")
-        found, kept = analyse_folder(scenario, folder, flown, report)
+        kept = tally_of_log(scenario, folder / "log.parquet", folder / "mismatch.parquet")
+        analysis = analyse(scenario)
+        found = {
+            **document(scenario, kept, flown),
+            **recommended_for([scenario], [kept]),
+            "linear": linear_document(analysis),
+        }
+        of_the_run = {"scenario.yaml": to_yaml(scenario), "metrics.json": as_json(flown)}
+        write_files(folder, {**of_the_run, **_as_files(found, rows(found))})
+        if report:
+            show_in_reports()
+            write_files(folder / "figures", charts.figures(folder, found, flown, analysis))
+            write_report_files(folder, flown)
     return found, kept
 
 
-def refuse_other_aircraft(scenario: "Scenario") -> None:
+def refuse_other_aircraft(scenario: Scenario) -> None:
     """The study compares with a second set of equations, which there is of the built-in aircraft only."""
     if scenario.airframe is not load():
         raise BadInput(
@@ -77,26 +85,7 @@ def refuse_other_aircraft(scenario: "Scenario") -> None:
         )
 
 
-def analyse_folder(
-    scenario: "Scenario", folder: Path, flown: Document, report: bool
-) -> tuple[Document, Tally]:
-    """Split the flight whose log is in a result folder; add the mismatch's files, figures and report."""
-    kept = tally_of_log(scenario, folder / "log.parquet", folder / "mismatch.parquet")
-    analysis = analyse(scenario)
-    found = {
-        **document(scenario, kept, flown),
-        **recommended_for([scenario], [kept]),
-        "linear": linear_document(analysis),
-    }
-    _write(folder, found, list(rows(found)))
-    if report:
-        show_in_reports()
-        charts.write_figures(folder, found, flown, analysis)
-        write_report_files(folder, flown)
-    return found, kept
-
-
-def document(scenario: "Scenario", tally: Tally, metrics: Document) -> Document:
+def document(scenario: Scenario, tally: Tally, metrics: Document) -> Document:
     """What the split of a flight amounts to."""
     return {
         "scenario": scenario.name,
@@ -171,13 +160,8 @@ def rows(found: Document) -> Iterator[Document]:
                 }
 
 
-def _write(folder: Path, found: Document, table: list[Document]) -> None:
-    """`mismatch.json`, and as a CSV file rows of equal keys; null is an empty cell."""
-    (folder / "mismatch.json").write_text(as_json(found), encoding="utf-8")
-    with (folder / "mismatch.csv").open("w", encoding="utf-8", newline="") as file:
-        writer = csv.DictWriter(file, fieldnames=list(table[0]), lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(table)
+def _as_files(found: Document, table: Iterable[Document]) -> Files:
+    return {"mismatch.json": as_json(found), "mismatch.csv": as_csv(list(table))}
 
 
 def entry(found: Document) -> Document:
@@ -198,44 +182,49 @@ def entry(found: Document) -> Document:
 
 def write_comparison(out: Path, entries: list[Document], recommended: Document, report: bool) -> Path:
     """Write `out/mismatch-comparison/`: the table as JSON and CSV, and a figure. Whole or not at all."""
+    drawn = {f"{COMPARISON}.png": charts.comparison_figure(entries)} if report else None
     with result_folder(out, COMPARISON) as folder:
-        _write(folder, {"runs": entries} | recommended, entries)
-        if report:
-            charts.save(charts.comparison_figure(entries), folder / "figures" / f"{COMPARISON}.png")
+        write_files(folder, {**_as_files({"runs": entries} | recommended, entries), "figures": drawn})
     return out / COMPARISON
 
 
 def run_map(
-    out: Path, scenario: "Scenario", report: bool = True, progress: Progress | None = None
+    out: Path, scenario: Scenario, report: bool = True, progress: Progress | None = None
 ) -> list[Document]:
     """Write `out/<scenario>-mismatch-map/`: the map as JSON and CSV, and a figure. Return its entries.
 
     One entry per axis, speed and altitude: worst share of the bound, smallest constant, and why.
     """
     refuse_other_aircraft(scenario)
-    name, fly_cell = map_name(scenario), partial(_cell, scenario)
-    conditions = [(V, h) for h in ALTITUDES_M for V in AIRSPEEDS_MPS]
-    cells = flown(out / name, conditions, fly_cell, list[Document], follows_from=scenario, progress=progress)
-    with cells as found, result_folder(out, name) as folder:
-        entries = [entry for of_cell in found for entry in of_cell]
-        _write(folder, {"scenario": scenario.name, "map": entries}, entries)
-        if report:
-            charts.save(charts.map_figure(entries, scenario.name), folder / "figures" / f"{MAP}.png")
-    return entries
+
+    def files_of(found: Document) -> Files:
+        drawn = {f"{MAP}.png": charts.map_figure(found["map"], scenario.name)} if report else None
+        return {**_as_files(found, found["map"]), "figures": drawn}
+
+    flights = Study(
+        map_name(scenario),
+        [(V, h) for h in ALTITUDES_M for V in AIRSPEEDS_MPS],
+        partial(_cell, scenario),
+        lambda cells: {"scenario": scenario.name, "map": [entry for cell in cells for entry in cell]},
+        files_of,
+        row=list[Document],
+        follows_from=scenario,
+    )
+    return run_study(flights, out, progress=progress)["map"]
 
 
-def map_name(scenario: "Scenario") -> str:
+def map_name(scenario: Scenario) -> str:
     """The name of the map's result folder."""
     return f"{scenario.name}-{MAP}"
 
 
-def at(scenario: "Scenario", airspeed_mps: float, altitude_m: float) -> "Scenario":
+def at(scenario: Scenario, airspeed_mps: float, altitude_m: float) -> Scenario:
     """The scenario without its faults, starting from this speed and altitude."""
     initial = scenario.initial.model_copy(update={"airspeed_mps": airspeed_mps, "altitude_m": altitude_m})
     return scenario.model_copy(update={"initial": initial, "faults": ()})
 
 
-def _cell(scenario: "Scenario", condition: tuple[float, float]) -> list[Document]:
+def _cell(scenario: Scenario, condition: tuple[float, float]) -> list[Document]:
     """A row per axis; without figures where there is no trim."""
     V, h = condition
     place = {"airspeed_mps": V, "altitude_m": h}

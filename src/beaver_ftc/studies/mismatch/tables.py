@@ -6,6 +6,7 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
+from beaver_ftc.results.report import register_section
 from beaver_ftc.studies.mismatch.states import AXES
 from beaver_ftc.studies.present.tables import html_table, number, plain, printed, seconds
 
@@ -172,8 +173,6 @@ def comparison_text(entries: list[Document], recommended: Document, folder: str,
 
 def show_in_reports() -> None:
     """Add the section to the reports of folders that hold a mismatch."""
-    from beaver_ftc.results.report import register_section
-
     register_section(mismatch_section)
 
 

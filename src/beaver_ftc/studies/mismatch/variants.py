@@ -7,6 +7,8 @@ A variant is a name of VARIANTS, or key=value pairs of `design_model`, joined by
 from typing import TYPE_CHECKING, Any
 
 from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.documents.problems import ScenarioError, key_path
+from beaver_ftc.scenario.loader import load_text
 
 if TYPE_CHECKING:
     from beaver_ftc.scenario.schema import Scenario
@@ -34,9 +36,6 @@ def variant_of(scenario: "Scenario", text: str) -> "Scenario":
 
 def _validated(data: dict[str, Any], text: str) -> "Scenario":
     import yaml
-
-    from beaver_ftc.documents.problems import ScenarioError, key_path
-    from beaver_ftc.scenario.loader import load_text
 
     try:
         return load_text(yaml.safe_dump(data))

@@ -15,8 +15,8 @@ from beaver_ftc.aircraft.loading import DEFAULT
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.scenario.builtin import builtin_names, resolve
 from beaver_ftc.scenario.loader import load_text
-from beaver_ftc.studies.derive.run import derive
-from beaver_ftc.studies.derive.text import differences
+from beaver_ftc.studies.derive.derivation import derive
+from beaver_ftc.studies.derive.derived import differences
 
 
 def verdict(aircraft: str, scenario: str, folder: Path) -> tuple[Any, ...]:

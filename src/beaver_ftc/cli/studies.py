@@ -137,8 +137,8 @@ def derive(
     and checks them on states the fit did not see: the largest error becomes the declared bound.
     Afterwards `aircraft: jsbsim:NAME` flies.
     """
-    from beaver_ftc.studies.derive.run import derive
-    from beaver_ftc.studies.derive.text import document_of, text_of
+    from beaver_ftc.studies.derive.derivation import derive
+    from beaver_ftc.studies.derive.derived import document_of, text_of
 
     made = derive(aircraft, out, envelope, tell=lambda what: complain(f"deriving: {what}"))
     document = document_of(made)

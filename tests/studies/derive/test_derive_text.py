@@ -1,8 +1,8 @@
 """What a derivation prints, of a document with everything in it."""
 
 from beaver_ftc.aircraft import load
-from beaver_ftc.studies.derive import text
-from beaver_ftc.studies.derive.page import WHY_NOT_USED
+from beaver_ftc.studies.derive import derived
+from beaver_ftc.studies.derive.derived import WHY_NOT_USED
 
 DOCUMENT = {
     "aircraft": "glider", "folder": "out/glider",
@@ -21,7 +21,7 @@ DOCUMENT = {
 
 
 def test_a_derivation_as_text():
-    assert text.text_of(DOCUMENT).splitlines() == [
+    assert derived.text_of(DOCUMENT).splitlines() == [
         "glider: Cl 4, Cm 3, Cn 5 terms",
         " envelope   20 to 45.5 m/s, angle of attack -2 to 12 deg",
         " surfaces   aileron, elevator",
@@ -37,13 +37,13 @@ def test_a_derivation_as_text():
         f" not used: spoiler, slat: {WHY_NOT_USED}",
         " written in 12.3 s to out/glider, with a page on it, derived.md",
     ]
-    short = text.text_of({**DOCUMENT, "own_file": None, "notes": [], "further_surfaces": {}}).splitlines()
+    short = derived.text_of({**DOCUMENT, "own_file": None, "notes": [], "further_surfaces": {}}).splitlines()
     assert len(short) == 9
     assert short[-1].startswith(" written in")
 
 
 def test_a_file_beside_itself_has_found_each_of_its_terms():
     beaver = load()
-    told = text.differences(beaver, beaver)
+    told = derived.differences(beaver, beaver)
     assert [of["term"] for of in told] == [term.name for term in beaver.moments if term.value]
     assert all(of["own"] == of["found"] != 0.0 for of in told)

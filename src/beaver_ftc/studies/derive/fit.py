@@ -1,8 +1,10 @@
-"""A sparse table of terms for the moments: orthogonal matching pursuit on what may be multiplied.
+"""A sparse table of terms for the moments, and the error that it leaves, box by box.
 
-The coefficients follow from the sampled accelerations and the inertia by Euler's equations; each is then
-fitted alone. A term is taken for what it explains of the residual, all taken so far are fitted again, and it
-ends when another would explain next to nothing; what turned out to be no use is then left out again.
+Orthogonal matching pursuit on what may be multiplied: the coefficients follow from the sampled accelerations
+and the inertia by Euler's equations; each is then fitted alone. A term is taken for what it explains of the
+residual, all taken so far are fitted again, and it ends when another would explain next to nothing; what
+turned out to be no use is then left out again. What the terms leave of the angular accelerations is measured
+box by box and written as the aircraft's map.
 """
 
 from collections.abc import Sequence
@@ -12,8 +14,10 @@ from typing import Any
 import numpy as np
 from scipy.linalg import lstsq
 
-from beaver_ftc.aircraft import Aircraft, MassProperties
-from beaver_ftc.studies.derive.sample import Samples, flow_signals
+from beaver_ftc.aircraft import AXES, Aircraft, MassProperties
+from beaver_ftc.aircraft.aircraft import MOMENTS
+from beaver_ftc.design.inertia import InertiaCoefficients, inertia_coefficients
+from beaver_ftc.studies.derive.sample import AGES_S, REACHES, SHARES, Samples, flow_signals, places, sorted_in
 
 MOST_TERMS = 26
 LEAST_GAIN = 3e-3  # of what is left, for another term to be taken
@@ -21,6 +25,8 @@ EXACT = 1e-10  # share of the variance at which nothing is left: the turning Ear
 RIDGE = 1e-13  # keeps what is nearly the same twice from being nearly infinite
 NO_USE = 1e-3  # of what is left in the end, for a term to stay
 LEAST_RAD_S2 = 1e-3  # below it, how small an error is does not matter
+MARGIN = 1.3  # of the declared error over the largest one found
+ROUNDING_RAD_S2 = 1e-7  # of errors in the file
 LEAST_SPAN = 1e-9  # of a signal over the samples, dimensionless
 NOT_MISSED = 0.02  # rise of the sum of the logarithms of the errors without a signal
 _FREE: tuple[dict[str, int], ...] = (
@@ -68,12 +74,12 @@ def candidates(signals: Sequence[str], surfaces: Sequence[str]) -> list[Candidat
     return [(of, None) for of in free] + [(of, s) for s in surfaces for of in with_surface]
 
 
-def regressors(samples: Samples, aircraft: Aircraft, known: Sequence[Candidate]) -> np.ndarray:
+def regressors(samples: Samples, aircraft: Aircraft, products: Sequence[Candidate]) -> np.ndarray:
     """What each candidate multiplies, (n, candidates)."""
     of = flow_signals(samples, aircraft)
     deflection = dict(zip(aircraft.surfaces, samples.u.T, strict=True))
     columns = []
-    for powers, surface in known:
+    for powers, surface in products:
         column = np.ones(len(samples)) if surface is None else deflection[surface]
         for signal, power in powers.items():
             column = column * of[signal] ** power
@@ -210,3 +216,79 @@ def _term(coefficient: str, of: dict[str, int], surface: str | None, value: floa
     parts = [*([surface] if surface else []), *(f"{s}{p if p > 1 else ''}" for s, p in of.items())]
     term: Term = {"name": f"{coefficient}_{'_'.join(parts) or '0'}", "value": float(f"{value:.8g}"), "of": of}
     return term | ({"surface": surface} if surface else {})
+
+
+def errors_of(aircraft: Aircraft, samples: Samples) -> np.ndarray:
+    """|f + G u - truth| of each sample, (n, 3) rad/s2."""
+    of = flow_signals(samples, aircraft) | dict(zip(aircraft.surfaces, samples.u.T, strict=True))
+    geometry = aircraft.geometry
+    size = samples.y[:, 3] * geometry.wing_area_m2
+    moments = [
+        size * arm * aircraft.coefficient(name, of)
+        for name, arm in zip(MOMENTS, (geometry.span_m, geometry.chord_m, geometry.span_m), strict=True)
+    ]
+    believed = accelerations(inertia_coefficients(aircraft.mass), samples.x, np.column_stack(moments))
+    error: np.ndarray = np.abs(believed - samples.rate)
+    return error
+
+
+def accelerations(i: InertiaCoefficients, x: np.ndarray, moments: np.ndarray) -> np.ndarray:
+    """Euler's equations: rates x (n, 3) rad/s and moments (n, 3) N m give rad/s2, (n, 3)."""
+    (p, q, r), (L, M, N) = x.T, moments.T
+    return np.column_stack(
+        [
+            i.Ppq * p * q + i.Pqr * q * r + i.Pl * L + i.Pn * N,
+            i.Qpp * p * p + i.Qpr * p * r + i.Qrr * r * r + i.Qm * M,
+            i.Rpq * p * q + i.Rqr * q * r + i.Rl * L + i.Rn * N,
+        ]
+    )
+
+
+def largest(errors: np.ndarray, samples: Samples) -> np.ndarray:
+    """The largest error within each age, box and share of the travel, (ages, boxes, shares, 3) rad/s2."""
+    table = np.zeros((len(AGES_S), len(REACHES), len(SHARES), 3))
+    for at in np.ndindex(table.shape[:3]):
+        age, box, level = at
+        inside = (samples.age <= age) & (samples.box <= box) & (samples.level <= level)
+        table[at] = errors[inside].max(axis=0, initial=0.0)
+    return table
+
+
+def map_of(aircraft: Aircraft, sets: Sequence[Samples], flown: Samples) -> tuple[dict[str, Any], np.ndarray]:
+    """The section `model_error_map` of the aircraft's file, and the largest error of each set, (sets, 3).
+
+    sets: of random states, that make the boxes; flown: states of flights, of which those in a box count.
+    """
+    ends = [_ends(aircraft, sets, box) for box in range(len(REACHES))]
+    sets = [*sets, sorted_in(flown, ends, aircraft, SHARES)]
+    tables = np.array([largest(errors_of(aircraft, samples), samples) for samples in sets])
+    table = MARGIN * tables.max(axis=0) + ROUNDING_RAD_S2
+    boxes = [_box(aircraft, ends[box], table[:, box]) for box in range(len(REACHES))]
+    return {"travel_share": list(SHARES), "until_s": list(AGES_S), "boxes": boxes}, tables[:, 0, -1, -1]
+
+
+def _ends(aircraft: Aircraft, sets: Sequence[Samples], box: int) -> np.ndarray:
+    """The least and the greatest of every quantity in a box, (2, 7 + declared), rounded outwards."""
+    within = np.concatenate([places(samples, aircraft)[samples.box <= box] for samples in sets])
+    low = [_rounded(float(v), -1) for v in within.min(axis=0)]
+    return np.array([low, [_rounded(float(v), 1) for v in within.max(axis=0)]])
+
+
+def _box(aircraft: Aircraft, ends: np.ndarray, errors: np.ndarray) -> dict[str, Any]:
+    names = [*(f"{axis}_rad_s" for axis in AXES), "alpha_rad", "beta_rad", "airspeed_mps", "density_kg_m3"]
+    ranges = [[float(low), float(high)] for low, high in ends.T]
+    flow = dict(zip(names, ranges, strict=False))
+    signals = dict(zip(aircraft.signals, ranges[len(names) :], strict=True))
+    known = {
+        f"error_{axis}_rad_s2": [[_rounded(float(e), 1) for e in of_age] for of_age in errors[:, :, i]]
+        for i, axis in enumerate(AXES)
+    }
+    return flow | {"signals": signals} | known
+
+
+def _rounded(value: float, way: int) -> float:
+    """To a few digits, outwards."""
+    if value == 0.0:
+        return 0.0
+    digit = 10.0 ** (np.floor(np.log10(abs(value))) - 4)
+    return float(f"{(np.ceil(value / digit) if way > 0 else np.floor(value / digit)) * digit:.8g}")

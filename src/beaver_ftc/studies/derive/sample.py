@@ -1,10 +1,12 @@
 """States of an aircraft over its envelope, and the angular accelerations JSBSim has there.
 
 The states fill boxes about the trim, one inside the other. The aircraft is started at some settings of its
-engines, tanks and altitudes; at each of these time stands still, and the state goes from place to place.
+engines, tanks and altitudes; at each of these time stands still, and the state goes from place to place. They
+hold nothing of what changes by itself: beside them are states as the aircraft comes through them in flight,
+from trim, its surfaces moved a little by sines: engines turn, the air lags, fuel burns.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -26,6 +28,10 @@ STARTS = 48
 AT_AN_END = 0.3  # share of the draws that are at an end of their range: corners are where errors are large
 _BANK_RAD, _CLIMB_RAD, _ALTITUDE_M, _THROTTLE = 1.0, 0.3, 600.0, 0.35  # half widths beside the envelope's
 _MOST_BURNT = 0.9  # of the fuel
+FLIGHTS, FRAMES, EVERY = 6, 800, 4
+_SHARE_OF_TRAVEL = 0.06
+_FREQUENCIES_HZ = (0.2, 0.5, 1.1)
+_SPEEDS = (1.0, 1.0, 0.95, 1.05, 1.0, 1.0)  # as shares of the trim's
 
 
 @dataclass(frozen=True)
@@ -205,3 +211,56 @@ def flow_signals(samples: Samples, aircraft: Aircraft) -> dict[str, np.ndarray]:
     rates = samples.x[:, 0] * half_span_time, samples.x[:, 1] * geometry.chord_m / V
     values = samples.y[:, 0], samples.y[:, 1], *rates, samples.x[:, 2] * half_span_time
     return {**dict(zip(FLOW_SIGNALS, values, strict=True)), **samples.signals}
+
+
+def fly_about(plant: Plant, trim: FlightState, seed: int, properties: Mapping[str, str]) -> Samples:
+    """Some short flights from trim; `box` and `level` are not sorted yet."""
+    rng, rows = np.random.default_rng(seed), []
+    for share in _SPEEDS[:FLIGHTS]:
+        started = replace(trim, airspeed_mps=share * trim.airspeed_mps)
+        plant.start(started)
+        phases = rng.uniform(0.0, 2.0 * np.pi, (plant.aircraft.n, len(_FREQUENCIES_HZ)))
+        for k in range(FRAMES):
+            if k % EVERY == 0:
+                rows.append((*seen_at(plant, properties), 0, 0, 0))
+            _move(plant, trim, phases, k * plant.dt_s)
+            plant.run()
+    plant.start(trim)
+    return as_arrays(rows, tuple(properties))
+
+
+def _move(plant: Plant, trim: FlightState, phases: np.ndarray, t_s: float) -> None:
+    """Command the surfaces for one frame."""
+    waves = np.sin(2.0 * np.pi * np.array(_FREQUENCIES_HZ) * t_s + phases).sum(axis=1)
+    for (name, surface), wave in zip(plant.aircraft.surface.items(), waves, strict=True):
+        travel = plant.aircraft.travel[name]
+        reach = _SHARE_OF_TRAVEL * min(-travel.min_rad, travel.max_rad)
+        there = trim.surfaces_rad[name] + reach * float(wave)
+        plant.write(surface.command, float(np.clip(there, travel.min_rad, travel.max_rad)))
+
+
+def sorted_in(
+    samples: Samples, ends: Sequence[np.ndarray], aircraft: Aircraft, shares: Sequence[float]
+) -> Samples:
+    """Samples with the innermost box each is in, and its share of the travel; those in no box are left out.
+
+    ends: of each box (2, 7 + declared), in the order of `places`.
+    """
+    where = places(samples, aircraft)
+    inside = np.array([((where >= low) & (where <= high)).all(axis=1) for low, high in ends])
+    travel = np.array([(t.min_rad, t.max_rad) for t in aircraft.travel.values()])
+    used = np.maximum(samples.u / travel[:, 1], samples.u / travel[:, 0]).max(axis=1)
+    level = np.searchsorted(np.array(shares[:-1]), used)
+    kept = inside.any(axis=0)
+    named = {name: values[kept] for name, values in samples.signals.items()}
+    return Samples(
+        samples.x[kept], samples.y[kept], named, samples.u[kept], samples.rate[kept],
+        inside.argmax(axis=0)[kept], level[kept], samples.age[kept],
+    )  # fmt: skip
+
+
+def places(samples: Samples, aircraft: Aircraft) -> np.ndarray:
+    """Rates, alpha, beta, airspeed, density, declared signals: (n, 7 + declared)."""
+    y = samples.y
+    declared = [samples.signals[name] for name in aircraft.signals]
+    return np.column_stack([samples.x, y[:, :3], 2.0 * y[:, 3] / y[:, 2] ** 2, *declared])

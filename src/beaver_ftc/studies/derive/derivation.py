@@ -19,17 +19,21 @@ from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.plant import instrumented
 from beaver_ftc.plant.adapter import translated
 from beaver_ftc.plant.state import FlightState
-from beaver_ftc.studies.derive.check import further_surfaces, moved_by_itself, not_affine, own_control
-from beaver_ftc.studies.derive.derived import Derived
-from beaver_ftc.studies.derive.error import map_of
-from beaver_ftc.studies.derive.fit import MOST_TERMS, engine_signals, fitted, signals_of_use
-from beaver_ftc.studies.derive.flown import fly_about
-from beaver_ftc.studies.derive.known import about_known, named_as
-from beaver_ftc.studies.derive.level import LIFT_COEFFICIENTS, Level, level_flight
-from beaver_ftc.studies.derive.outline import EnvelopeFile, outline, read_envelope, travel_of
-from beaver_ftc.studies.derive.page import NAME as PAGE
-from beaver_ftc.studies.derive.page import page_of
-from beaver_ftc.studies.derive.sample import FRESH, SIDESLIP_RAD, Envelope, Samples, sample
+from beaver_ftc.studies.derive.derived import NAME as PAGE
+from beaver_ftc.studies.derive.derived import Derived, page_of
+from beaver_ftc.studies.derive.fit import MOST_TERMS, engine_signals, fitted, map_of, signals_of_use
+from beaver_ftc.studies.derive.level import LIFT_COEFFICIENTS, Level, level_as_filed, level_flight, named_as
+from beaver_ftc.studies.derive.outline import (
+    EnvelopeFile,
+    further_surfaces,
+    moved_by_itself,
+    not_affine,
+    outline,
+    own_control,
+    read_envelope,
+    travel_of,
+)
+from beaver_ftc.studies.derive.sample import FRESH, SIDESLIP_RAD, Envelope, Samples, fly_about, sample
 from beaver_ftc.studies.derive.source import Source, source_of, try_out
 
 SAMPLES, CHECKED = 6000, 16000
@@ -50,13 +54,13 @@ def derive(
     Raises BadInput, naming what is in the way, if its failures cannot be put in or it cannot be trimmed, and
     SimulationFailed if JSBSim cannot fly it.
     """
-    started_s, asked, source = perf_counter(), read_envelope(envelope), source_of(reference)
+    started_s, wanted, source = perf_counter(), read_envelope(envelope), source_of(reference)
     target = _target(source, out)
     notes: list[str] = []
     with tempfile.TemporaryDirectory(prefix="beaver-ftc-") as scratch:
         folder = Path(scratch) / "new" / source.name
         with translated(source.model):
-            level = _prepared(source, folder, asked, notes, tell)
+            level = _prepared(source, folder, wanted, notes, tell)
             notes += not_affine(level.plant, level.trim)
             further = {} if source.folder else further_surfaces(source.model, level.plant)
             if moving := moved_by_itself(level.aircraft, level.trim, tuple(further)):
@@ -65,23 +69,23 @@ def derive(
                     "aerodynamics see it, allowed: surfaces that move by command"
                 )
             if source.folder is None:
-                _set_envelope(level.data, level.trim, asked)
+                _set_envelope(level.data, level.trim, wanted)
             made = _derived(level, folder, tell)
         aircraft = Aircraft(AircraftFile.model_validate(level.data), target)
-        given = read(source.folder) if source.folder else None
+        as_filed = read(source.folder) if source.folder else None
         took_s = perf_counter() - started_s
-        found = Derived(aircraft, level.trim, *made, tuple(notes), given, further, took_s)
+        found = Derived(aircraft, level.trim, *made, tuple(notes), as_filed, further, took_s)
         write(folder, level.data)
         (folder / PAGE).write_text(page_of(found), encoding="utf-8")
         move(folder, target)
     return found
 
 
-def _prepared(source: Source, folder: Path, asked: EnvelopeFile, notes: list[str], tell: Tell) -> Level:
+def _prepared(source: Source, folder: Path, wanted: EnvelopeFile, notes: list[str], tell: Tell) -> Level:
     """An aircraft in level flight, instrumented if need be."""
     if source.folder is not None:
         tell("trim")
-        return about_known(source.folder, folder, asked)
+        return level_as_filed(source.folder, folder, wanted)
     tell("instrument")
     seen = instrumented.surfaces_of(source.model)
     if len(seen) < 3:
@@ -96,13 +100,13 @@ def _prepared(source: Source, folder: Path, asked: EnvelopeFile, notes: list[str
     model = instrumented.instrument(source.model, folder, travel, absent)
     outlines = [outline(source.name, model, travel, lift) for lift in LIFT_COEFFICIENTS]
     for data in outlines:
-        if asked.altitude_m is not None:
-            data["start"]["altitude_m"] = asked.altitude_m
-        if asked.airspeed_mps is not None:
-            data["envelope"]["airspeed_mps"] = list(asked.airspeed_mps)
+        if wanted.altitude_m is not None:
+            data["start"]["altitude_m"] = wanted.altitude_m
+        if wanted.airspeed_mps is not None:
+            data["envelope"]["airspeed_mps"] = list(wanted.airspeed_mps)
     tell("trim")
-    tried = outlines[: 1 if asked.airspeed_mps else None]
-    return level_flight(tried, folder, notes, asked.sideslip_rad or SIDESLIP_RAD)
+    tried = outlines[: 1 if wanted.airspeed_mps else None]
+    return level_flight(tried, folder, notes, wanted.sideslip_rad or SIDESLIP_RAD)
 
 
 def _derived(level: Level, folder: Path, tell: Tell) -> tuple[np.ndarray, np.ndarray]:
@@ -149,10 +153,10 @@ def _placeholders(data: Mapping[str, Any]) -> dict[str, Any]:
     return {"Cl": [{"name": "Cl_placeholder", "value": -0.1, "surface": names[0]}]}
 
 
-def _set_envelope(data: dict[str, Any], point: FlightState, asked: EnvelopeFile) -> None:
-    """Let the file's envelope be about trim, or what is asked for, and flights start there."""
+def _set_envelope(data: dict[str, Any], point: FlightState, wanted: EnvelopeFile) -> None:
+    """Let the file's envelope be about trim, or what is wanted, and flights start there."""
     low, high = point.alpha_rad - SPAN_OF_ALPHA_RAD, point.alpha_rad + SPAN_OF_ALPHA_RAD
-    alpha_deg = asked.alpha_deg or tuple(float(np.degrees(end)) for end in (low, high))
+    alpha_deg = wanted.alpha_deg or tuple(float(np.degrees(end)) for end in (low, high))
     data["envelope"]["alpha_deg"] = [float(f"{end:.4g}") for end in alpha_deg]
     data["envelope"]["airspeed_mps"] = [float(f"{end:.4g}") for end in data["envelope"]["airspeed_mps"]]
     data["start"] = data.get("start", {}) | {"airspeed_mps": float(f"{point.airspeed_mps:.4g}")}

@@ -34,8 +34,8 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch)
         made = derive(DEFAULT, folder)
-        assert made.given is not None
-        terms = differences(made.given, made.aircraft)
+        assert made.as_filed is not None
+        terms = differences(made.as_filed, made.aircraft)
         worst = max(terms, key=lambda of: abs(of["found"] / of["own"] - 1.0))
         share = abs(worst["found"] / worst["own"] - 1.0)
         print(f"{len(terms)} coefficients, the furthest off {worst['term']}: {share:.1e} of its value")

@@ -104,17 +104,13 @@ def _most_or_folder(flights: str | None) -> tuple[int | None, Path | None]:
 
 
 def _compare_recorded(folder: Path, out: Path, format: Format, page: Path | None) -> None:
-    from beaver_ftc.results.metrics import as_json
     from beaver_ftc.results.writer import result_folder
-    from beaver_ftc.studies.recorded.figure import write_figure
-    from beaver_ftc.studies.recorded.run import run_benchmark
-    from beaver_ftc.studies.recorded.words import as_markdown, as_text, update_page
+    from beaver_ftc.studies.present.files import write_files
+    from beaver_ftc.studies.recorded.benchmark import as_text, files_of, run_benchmark, update_page
 
     document = run_benchmark(folder)
     with result_folder(out, "recorded-flights") as written:
-        write_figure(document, written / "flights.png")
-        (written / "flights.json").write_text(as_json(document), encoding="utf-8")
-        (written / "flights.md").write_text(as_markdown(document), encoding="utf-8")
+        write_files(written, files_of(document))
     if page is not None:
         update_page(document, page)
         picture = page.parent / "images" / "recorded-flights.png"
@@ -127,8 +123,8 @@ def _compare_recorded(folder: Path, out: Path, format: Format, page: Path | None
 
 
 def _compare_other_days(folder: Path, format: Format, page: Path | None) -> None:
-    from beaver_ftc.studies.recorded.robustness import run_other_days
-    from beaver_ftc.studies.recorded.words import as_text, update_page
+    from beaver_ftc.studies.recorded.benchmark import as_text, update_page
+    from beaver_ftc.studies.recorded.other_days import run_other_days
 
     document = {"other_days": run_other_days(folder)}
     if page is not None:

@@ -9,9 +9,8 @@ from typer.testing import CliRunner
 from beaver_ftc.cli.main import app
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.flights.detectors import detector_names
-from beaver_ftc.studies.recorded import robustness, tally, words
-from beaver_ftc.studies.recorded.data import data_sets
-from beaver_ftc.studies.recorded.run import OURS, run_benchmark
+from beaver_ftc.studies.recorded import benchmark, other_days
+from beaver_ftc.studies.recorded.benchmark import OURS, data_sets, run_benchmark
 from flights import synthetic
 
 
@@ -44,7 +43,7 @@ def test_every_method_has_a_row_and_ours_is_right(document):
 
 
 def test_tables_have_a_line_a_method(document):
-    text, page = words.as_text(document), words.as_markdown(document)
+    text, page = benchmark.as_text(document), benchmark.as_markdown(document)
     for row in document["sets"][0]["rows"]:
         assert row["method"] in text
         assert f"| {row['method']} |" in page
@@ -52,22 +51,22 @@ def test_tables_have_a_line_a_method(document):
 
 def test_the_page_keeps_what_stands_around_the_tables(document, tmp_path):
     page = tmp_path / "page.md"
-    begin, end = words.marks(document)
+    begin, end = benchmark.marks(document)
     page.write_text(f"before\n{begin}\nold\n{end}\nafter\n")
-    words.update_page(document, page)
+    benchmark.update_page(document, page)
     text = page.read_text()
     assert text.startswith("before\n")
     assert text.endswith("after\n")
     assert "old" not in text
     page.write_text("no marks")
     with pytest.raises(BadInput, match="has no place for the tables"):
-        words.update_page(document, page)
+        benchmark.update_page(document, page)
 
 
 def test_other_days_have_a_row_each_and_a_worst(folder, monkeypatch, tmp_path):
-    days = robustness.drawn(2, range(2))
-    monkeypatch.setattr(robustness, "grid", lambda mixer, commands: days[:1])
-    monkeypatch.setattr(robustness, "drawn", lambda surfaces, seeds: days[1:])
+    days = other_days.drawn(2, range(2))
+    monkeypatch.setattr(other_days, "grid", lambda mixer, commands: days[:1])
+    monkeypatch.setattr(other_days, "drawn", lambda surfaces, seeds: days[1:])
     page = tmp_path / "page.md"
     page.write_text("<!-- other days: begin -->\n<!-- other days: end -->\n")
     arguments = ["compare", "--flights", str(folder), "--other-days", "--format", "json"]
@@ -121,7 +120,7 @@ def test_the_tally_counts_by_hand():
         _flight(None, false_alarms=1),
         _flight("engine", delay=3.0),
     ]
-    found = tally.by_events(flights)
+    found = benchmark.by_events(flights)
     assert (found["surface_failures"], found["found"]) == (4, 3)
     assert found["precision"] == pytest.approx(3 / 5)
     assert found["recall"] == pytest.approx(3 / 4)
@@ -135,7 +134,7 @@ def test_the_tally_counts_by_hand():
 def test_labels_are_weighted_by_rows():
     keys = ("classes", "healthy_or_faulty", "side", "mean_error", "held_by_bounds")
     one, other = dict.fromkeys(keys, 1.0), dict.fromkeys(keys, 0.0)
-    found = tally.by_labels([one | {"rows": 30}, other | {"rows": 10}])
+    found = benchmark.by_labels([one | {"rows": 30}, other | {"rows": 10}])
     assert found["rows"] == 40
     assert np.allclose([found[key] for key in keys], 0.75)
 
@@ -143,7 +142,7 @@ def test_labels_are_weighted_by_rows():
 def test_of_the_healthy_flights_those_with_an_alarm_are_counted():
     quiet = {"failure": None, "false_alarms": 0, "healthy_s": 1800.0, "detected": False}
     flights = [quiet, quiet, {**quiet, "false_alarms": 2}]
-    found = tally.by_events(flights)
+    found = benchmark.by_events(flights)
     assert (found["healthy_flights"], found["healthy_flights_with_an_alarm"]) == (3, 1)
     assert found["false_alarms_per_hour"]["value"] == pytest.approx(2 / 1.5)
     assert found["accuracy"] == pytest.approx(2 / 3)

@@ -1,17 +1,40 @@
 """Other days, made of a flight we have: what changes between two flights of one vehicle, put into its log.
 
 The rates are kept and the commands made those that would have given them, or the other way round: the log
-stays one that the vehicle's equation of motion allows. Labels stay as they are.
+stays one that the vehicle's equation of motion allows. Labels stay as they are. How a model holds on such a
+day: halves of a labelled flight, the other half altered. The settings were chosen on the first drawn days;
+what counts is the others.
 """
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.flights import scoring
+from beaver_ftc.flights.detectors import BANK, diagnose_with
+from beaver_ftc.flights.identify import Stretch, fit_model, stretches_of
+from beaver_ftc.flights.model import Model
 from beaver_ftc.flights.recording import Floats
-from beaver_ftc.flights.samples import Samples
+from beaver_ftc.flights.samples import Samples, mixer
+from beaver_ftc.flights.testing import folds
+from beaver_ftc.studies.recorded.benchmark import (
+    FIGURES,
+    DataSet,
+    by_labels,
+    data_sets,
+    kept_rows,
+    settings_of,
+)
 
-_SLOW_S = 30.0
+Document = dict[str, Any]
+CHOSEN_ON, JUDGED_ON = range(8), range(8, 16)
+_BESIDE = "sliding-least-squares"
+_WORST = {"mean_error": max}
+_SLOW_S = 30.0  # of the mean that is called slow
 
 
 @dataclass(frozen=True)
@@ -85,12 +108,12 @@ def _draw(surfaces: int, seed: int) -> Day:
 def on(day: Day, samples: Samples, past: Floats, noise: Floats) -> Samples:
     """The flight as it might have been on that day. past (3 h, 3) and noise (3, 3) of its model."""
     rng = np.random.default_rng(20)
-    left = np.where(np.isfinite(samples.labels), samples.labels, 1.0)
+    effectiveness = np.where(np.isfinite(samples.labels), samples.labels, 1.0)
     commands = _later(samples.commands, day.late_s / samples.dt_s)
     slow = _slow(commands, round(_SLOW_S / samples.dt_s))
     commands = slow + day.excitation * (commands - slow) / (day.gain * day.own)
     wander = day.drift * _wander(rng, commands.shape, 300.0 / samples.dt_s)
-    commands = commands + day.neutral + (day.trim + wander) / left
+    commands = commands + day.neutral + (day.trim + wander) / effectiveness
     mean = _slow(samples.rates, round(_SLOW_S / samples.dt_s))
     rates = mean + day.excitation * (samples.rates - mean)
     extra = np.sqrt(max(day.noise**2 - min(day.excitation, 1.0) ** 2, 0.0))
@@ -98,9 +121,9 @@ def on(day: Day, samples: Samples, past: Floats, noise: Floats) -> Samples:
     return replace(samples, commands=commands, rates=rates)
 
 
-def _later(values: Floats, steps: float) -> Floats:
-    """Values that act `steps` samples later than these: logged earlier by as much, (n, S)."""
-    at = np.arange(len(values)) + steps
+def _later(values: Floats, length: float) -> Floats:
+    """Values that act `length` samples later than these: logged earlier by as much, (n, S)."""
+    at = np.arange(len(values)) + length
     return np.column_stack([np.interp(at, np.arange(len(values)), column) for column in values.T])
 
 
@@ -111,11 +134,11 @@ def _slow(values: Floats, length: int) -> Floats:
     return np.asarray(uniform_filter1d(values, length, axis=0, mode="nearest"))
 
 
-def _wander(rng: np.random.Generator, shape: tuple[int, ...], steps: float) -> Floats:
-    """Coloured noise of standard deviation 1 and correlation time `steps`."""
+def _wander(rng: np.random.Generator, shape: tuple[int, ...], length: float) -> Floats:
+    """Coloured noise of standard deviation 1 and correlation time `length`."""
     from scipy.signal import lfilter
 
-    keep = np.exp(-1.0 / steps)
+    keep = np.exp(-1.0 / length)
     white = rng.standard_normal(shape) * np.sqrt(1.0 - keep**2)
     return np.asarray(lfilter([1.0], [1.0, -keep], white, axis=0))
 
@@ -128,3 +151,53 @@ def _air(rng: np.random.Generator, past: Floats, noise: Floats, n: int) -> Float
     for k in range(n):
         rates[k + history] = rates[k : k + history][::-1].ravel() @ past[: 3 * history] + moments[k]
     return rates[history:]
+
+
+def run_other_days(folder: Path) -> Document:
+    """The document: of each labelled data set a part, a row a day. Raises BadInput where none has labels."""
+    labelled = [data for data in data_sets(folder) if np.isfinite(data.flights[0].labels).any()]
+    if not labelled:
+        raise BadInput(f"compare: --other-days: {folder} holds no labelled flight, allowed: one with labels")
+    return {"sets": [_part(data) for data in labelled]}
+
+
+def _part(data: DataSet) -> Document:
+    stretches = stretches_of(data.flights)
+    settings = settings_of(stretches, data)
+    models = [(fit_model(fitted, data.vehicle, settings), kept) for fitted, kept, _ in folds(stretches)]
+    whole = fit_model(stretches, data.vehicle, settings)
+    surfaces = len(data.vehicle.surfaces)
+    kinds = {
+        "one change": grid(mixer(data.vehicle), list(data.vehicle.commands)),
+        "drawn, settings chosen on these": drawn(surfaces, CHOSEN_ON),
+        "drawn, not looked at": drawn(surfaces, JUDGED_ON),
+    }
+    rows = [row for kind, days in kinds.items() for row in _rows(kind, days, models, whole)]
+    summaries = [_summary(kind, [row for row in rows if row["kind"] == kind]) for kind in kinds]
+    return {"set": data.name, "rows": rows, "summary": summaries}
+
+
+def _rows(
+    kind: str, days: Sequence[Day], models: Sequence[tuple[Model, Stretch]], whole: Model
+) -> Iterator[Document]:
+    past, noise = whole.arrays()[1], whole.arrays()[3]
+    for day in days:
+        scores: dict[str, list[Document]] = {BANK: [], _BESIDE: []}
+        for model, kept in models:
+            altered = on(day, kept.samples, past, noise)
+            labels = np.where(kept_rows(kept)[:, None], kept.samples.labels, np.nan)
+            for name, found in scores.items():
+                found.append(scoring.by_labels(diagnose_with(name, altered, model), labels))
+        beside = by_labels(scores[_BESIDE])["classes"]
+        yield {"kind": kind, "day": day.name, **by_labels(scores[BANK]), "beside": beside}
+
+
+def _summary(kind: str, rows: Sequence[Document]) -> Document:
+    """Mean and worst of each figure."""
+    keys = (*FIGURES, "beside")
+    worst = {key: _WORST.get(key, min)(row[key] for row in rows) for key in keys}
+    return {
+        "kind": kind,
+        "mean": {key: float(np.mean([row[key] for row in rows])) for key in keys},
+        "worst": worst,
+    }

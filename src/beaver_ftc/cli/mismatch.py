@@ -1,5 +1,7 @@
 """`beaver-ftc mismatch`: where truth and design model differ, and what that costs the diagnosis."""
 
+import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -7,10 +9,14 @@ import typer
 
 from beaver_ftc.cli.inputs import NoReportOption, ResultsOption, ScenariosArgument, load_all
 from beaver_ftc.cli.output import Format, FormatOption, complain, emit, emit_json
+from beaver_ftc.cli.progress import progress_bar
 from beaver_ftc.documents.errors import BadInput
 
 if TYPE_CHECKING:
     from beaver_ftc.scenario.schema import Scenario
+
+Document = dict[str, Any]
+Say = Callable[[str], None]
 
 
 def command(
@@ -38,12 +44,19 @@ def command(
             emit_json({"runs": [], "errors": str(error).splitlines()})
         raise
     _refuse_other_aircraft(flown)
-    documents, recommended = _fly_all(flown, out, format, report=not no_report)
-    maps = [_map(scenario, out, format, report=not no_report) for scenario in flown if map]
-    for document, entries in zip(documents, maps, strict=False):
-        document["map"] = entries
+    report, say = not no_report, emit if format is Format.text else _nothing
+    found = [_split(scenario, out, report, say) for scenario in flown]
+    documents = [document for document, _ in found]
+    several = len(flown) > 1
+    recommended = _compare(flown, found, out, report, say) if several else {}
+    for scenario, document in zip(flown, documents if map else (), strict=False):
+        document["map"] = _map(scenario, out, report, say)
     if format is Format.json:
-        emit_json(documents[0] if len(documents) == 1 else {"runs": documents} | recommended)
+        emit_json({"runs": documents} | recommended if several else documents[0])
+
+
+def _nothing(text: str) -> None:
+    """The document says it."""
 
 
 def _refuse_other_aircraft(scenarios: list["Scenario"]) -> None:
@@ -67,70 +80,38 @@ def _variants(scenario: "Scenario", text: str) -> list["Scenario"]:
     return wanted
 
 
-def _fly_all(
-    scenarios: list["Scenario"], out: Path, format: Format, report: bool
-) -> tuple[list[dict[str, Any]], dict[str, Any]]:
-    """Fly and split each; then compare, if there is something to compare."""
-    documents, tallies = [], []
-    for scenario in scenarios:
-        found, kept = _fly(scenario, out, report)
-        documents.append(found)
-        tallies.append(kept)
-        if format is Format.text:
-            _say(found, out / scenario.name)
-    if len(scenarios) == 1:
-        return documents, {}
-    return documents, _compare(scenarios, documents, tallies, out, format, report)
-
-
-def _fly(scenario: "Scenario", out: Path, report: bool) -> tuple[dict[str, Any], Any]:
-    from beaver_ftc.cli.progress import progress_bar
+def _split(scenario: "Scenario", out: Path, report: bool, say: Say) -> tuple[Document, Any]:
+    """Fly and split one: its document, and its tally."""
     from beaver_ftc.studies.mismatch.study import run_mismatch
+    from beaver_ftc.studies.mismatch.tables import mismatch_text
 
     for warning in scenario.warnings():
         complain(f"{scenario.name}: warning: {warning}")
     with progress_bar(scenario.name) as progress:
-        found, kept = run_mismatch(scenario, out, report, progress)
-    return found | {"folder": str(out / scenario.name)}, kept
+        document, tally = run_mismatch(scenario, out, report, progress)
+    folder = str(out / scenario.name)
+    say(mismatch_text(document, folder, sys.stdout.isatty()))
+    return document | {"folder": folder}, tally
 
 
 def _compare(
-    scenarios: list["Scenario"],
-    documents: list[dict[str, Any]],
-    tallies: list[Any],
-    out: Path,
-    format: Format,
-    report: bool,
-) -> dict[str, Any]:
-    from beaver_ftc.studies.mismatch.study import entry, recommended_for, write_comparison
+    scenarios: list["Scenario"], found: list[tuple[Document, Any]], out: Path, report: bool, say: Say
+) -> Document:
+    from beaver_ftc.studies.mismatch.bound import recommended_for
+    from beaver_ftc.studies.mismatch.study import entry, write_comparison
     from beaver_ftc.studies.mismatch.tables import comparison_text
 
-    entries = [entry(found) for found in documents]
-    recommended = recommended_for(scenarios, tallies)
+    entries = [entry(document) for document, _ in found]
+    recommended = recommended_for(scenarios, [tally for _, tally in found])
     folder = write_comparison(out, entries, recommended, report)
-    if format is Format.text:
-        emit(comparison_text(entries, recommended, str(folder), _colour()))
+    say(comparison_text(entries, recommended, str(folder), sys.stdout.isatty()))
     return recommended
 
 
-def _map(scenario: "Scenario", out: Path, format: Format, report: bool) -> list[dict[str, Any]]:
-    from beaver_ftc.cli.progress import progress_bar
+def _map(scenario: "Scenario", out: Path, report: bool, say: Say) -> list[Document]:
     from beaver_ftc.studies.mismatch.study import map_name, run_map
 
     with progress_bar(f"{scenario.name}: envelope") as progress:
         entries = run_map(out, scenario, report, progress)
-    if format is Format.text:
-        emit(f"map          {out / map_name(scenario)}")
+    say(f"map          {out / map_name(scenario)}")
     return entries
-
-
-def _say(found: dict[str, Any], folder: Path) -> None:
-    from beaver_ftc.studies.mismatch.tables import mismatch_text
-
-    emit(mismatch_text(found, str(folder), _colour()))
-
-
-def _colour() -> bool:
-    import sys
-
-    return sys.stdout.isatty()

@@ -26,7 +26,7 @@ from beaver_ftc.diagnosis.types.pairs import IN_PITCH, IN_ROLL_AND_YAW
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop import memory
 from beaver_ftc.loop.frame import frame_dtype, idle
-from beaver_ftc.loop.instruments import (
+from beaver_ftc.loop.instrument_records import (
     admit_engine,
     assemble_instruments,
     assemble_watch,

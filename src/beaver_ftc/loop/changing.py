@@ -13,7 +13,7 @@ import numpy as np
 
 from beaver_ftc.control.laws import NOMINAL, ORACLE, REJECTING
 from beaver_ftc.loop.assembly import assemble
-from beaver_ftc.loop.instruments import enable_watch, read_more
+from beaver_ftc.loop.instrument_records import enable_watch, read_more
 from beaver_ftc.loop.plugin_frame import PluginFrame, named_detector, named_law, plugged
 from beaver_ftc.plant.faults import NEVER, TIME_TOLERANCE_S
 from beaver_ftc.scenario.change import Change

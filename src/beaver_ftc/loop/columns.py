@@ -4,7 +4,7 @@ import numpy as np
 
 from beaver_ftc.control.outer.state import COLUMNS
 from beaver_ftc.loop.assembly import estimator_names
-from beaver_ftc.loop.instruments import comes_to_be_watched
+from beaver_ftc.loop.instrument_records import comes_to_be_watched
 from beaver_ftc.plant.channels import log_columns
 from beaver_ftc.scenario.schema import Scenario
 

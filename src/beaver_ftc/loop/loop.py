@@ -18,7 +18,7 @@ from beaver_ftc.loop.columns import lay_out
 from beaver_ftc.loop.direct import direct
 from beaver_ftc.loop.flight import Flight, LogSink
 from beaver_ftc.loop.frame import FLYING, NOT_FINITE, fly_frame, fly_on, hold, look_inside
-from beaver_ftc.loop.instruments import anchor_watch, watch_from_now
+from beaver_ftc.loop.instrument_records import anchor_watch, watch_from_now
 from beaver_ftc.loop.summary import flight_of
 from beaver_ftc.plant import channels as ch
 from beaver_ftc.plant.adapter import Plant

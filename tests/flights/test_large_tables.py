@@ -82,10 +82,10 @@ def test_a_log_with_more_rows_at_once_than_a_run_writes_is_one_line(tmp_path):
 
 
 def test_used_up_memory_is_said_in_plain_words():
-    from beaver_ftc.cli.output import unexpected
+    from beaver_ftc.cli.output import failure_of
 
-    assert str(unexpected(MemoryError("4 GiB wanted"))) == "there is not enough memory for this: 4 GiB wanted"
-    assert str(unexpected(MemoryError())) == "there is not enough memory for this"
+    assert str(failure_of(MemoryError("4 GiB wanted"))) == "there is not enough memory for this: 4 GiB wanted"
+    assert str(failure_of(MemoryError())) == "there is not enough memory for this"
 
 
 @pytest.mark.parametrize("text", ["uint64_t timestamp;wide[60000] a;", "uint64_t timestamp;bomb a;"])

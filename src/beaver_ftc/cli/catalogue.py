@@ -2,12 +2,12 @@
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
 from beaver_ftc.cli.inputs import complete_names
-from beaver_ftc.cli.output import Format, FormatOption, answer, emit, emit_json
+from beaver_ftc.cli.output import Document, Format, FormatOption, answer, emit, emit_json
 from beaver_ftc.documents.errors import BadInput, suggestion
 
 Entries = list[dict[str, str]]
@@ -80,7 +80,7 @@ def _registered(group: str) -> Entries:
     ]
 
 
-def _faults(schema: dict[str, Any], key: str) -> Iterator[dict[str, str]]:
+def _faults(schema: Document, key: str) -> Iterator[dict[str, str]]:
     """The parts of the schema that are fault types, with a fixed `type`; key: actuator or sensor."""
     of = "of a sensor: " if key == "sensor" else ""
     for part in schema.values():
@@ -90,13 +90,13 @@ def _faults(schema: dict[str, Any], key: str) -> Iterator[dict[str, str]]:
             yield {"name": kind, "description": of + _first_line(part)}
 
 
-def _kind(schema: dict[str, Any], name: str, node: dict[str, Any]) -> dict[str, str]:
+def _kind(schema: Document, name: str, node: Document) -> dict[str, str]:
     references = [branch["$ref"] for branch in node.get("anyOf", [node]) if "$ref" in branch]
     part = schema[references[0].rpartition("/")[2]] if references else {}
     return {"name": name, "description": _first_line(part)}
 
 
-def _first_line(part: dict[str, Any]) -> str:
+def _first_line(part: Document) -> str:
     return part.get("description", "").partition("\n")[0]
 
 

@@ -13,8 +13,7 @@ import typer
 
 from beaver_ftc import __version__
 from beaver_ftc.cli.inputs import with_plugins
-from beaver_ftc.cli.output import report_last, unexpected
-from beaver_ftc.documents.errors import BeaverFtcError
+from beaver_ftc.cli.output import failure_of, report_last
 
 
 class Command(NamedTuple):
@@ -106,8 +105,6 @@ def main() -> NoReturn:
             stream.reconfigure(errors="replace")  # a terminal that lacks a letter is no reason to fail
     try:
         app()
-    except BeaverFtcError as error:
-        sys.exit(report_last(error))
     except Exception as error:
-        sys.exit(report_last(unexpected(error)))
+        sys.exit(report_last(failure_of(error)))
     sys.exit(0)

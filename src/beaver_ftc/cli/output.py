@@ -6,11 +6,14 @@ import traceback
 from collections.abc import Callable
 from contextlib import suppress
 from enum import StrEnum
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
 from beaver_ftc.documents.errors import BeaverFtcError, SimulationFailed
+
+Document = dict[str, Any]
 
 
 class Format(StrEnum):
@@ -86,15 +89,24 @@ def report_last(error: BeaverFtcError) -> int:
     return status
 
 
-def unexpected(error: Exception) -> SimulationFailed:
-    """What nobody foresaw, as a line for the user; the error itself is the cause of the new one."""
+def write_junit(runs: list[Document], path: Path | None) -> None:
+    """The verdicts as JUnit XML, where they are asked for."""
+    from beaver_ftc.results import junit
+
+    if path is not None:
+        junit.write_junit(runs, path)
+
+
+def failure_of(error: Exception) -> BeaverFtcError:
+    """An error of ours as it is; another as a line for the user, with the error itself as its cause."""
+    if isinstance(error, BeaverFtcError):
+        return error
     said = " ".join(str(error).split())
     if isinstance(error, MemoryError):
-        said = f": {said}" if said else ""
-        failed = SimulationFailed(f"there is not enough memory for this{said}")
-        failed.__cause__ = error
-        return failed
-    failed = SimulationFailed(f"unexpected {type(error).__name__}: {said} (BEAVER_FTC_DEBUG=1 shows where)")
+        text = "there is not enough memory for this" + (f": {said}" if said else "")
+    else:
+        text = f"unexpected {type(error).__name__}: {said} (BEAVER_FTC_DEBUG=1 shows where)"
+    failed = SimulationFailed(text)
     failed.__cause__ = error
     return failed
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -20,9 +20,19 @@ from beaver_ftc.cli.inputs import (
     load_all,
     taking,
 )
-from beaver_ftc.cli.output import Format, FormatOption, complain, emit, emit_json, report, unexpected
+from beaver_ftc.cli.output import (
+    Document,
+    Format,
+    FormatOption,
+    complain,
+    emit,
+    emit_json,
+    failure_of,
+    report,
+    write_junit,
+)
 from beaver_ftc.cli.progress import progress_bar
-from beaver_ftc.documents.errors import BadInput, BeaverFtcError
+from beaver_ftc.documents.errors import BadInput
 
 if TYPE_CHECKING:
     from beaver_ftc.plant.adapter import Plant
@@ -71,7 +81,7 @@ def command(options: Options) -> None:
     except BadInput as error:
         if options.format is Format.json:
             emit_json({"passed": False, "runs": [], "errors": str(error).splitlines()})
-        _write_junit([{"scenario": "scenarios", "error": str(error)}], options.junit)
+        write_junit([{"scenario": "scenarios", "error": str(error)}], options.junit)
         raise
     raise typer.Exit(_run_all(loaded, options))
 
@@ -108,7 +118,7 @@ def _run_all(scenarios: list["Scenario"], options: Options) -> int:
         try:
             document = _run_one(scenario, options, prepare)
         except Exception as error:
-            failure = error if isinstance(error, BeaverFtcError) else unexpected(error)
+            failure = failure_of(error)
             status = max(status, report(failure))
             runs.append({"scenario": scenario.name, "error": str(failure)})
             continue
@@ -118,21 +128,14 @@ def _run_all(scenarios: list["Scenario"], options: Options) -> int:
         status = max(status, 0 if document["passed"] else 1)
         if options.format is Format.text:
             _say(document)
-    _write_junit([run | {"took_s": each} for run, each in zip(runs, took_s, strict=True)], options.junit)
+    write_junit([run | {"took_s": each} for run, each in zip(runs, took_s, strict=True)], options.junit)
     if options.format is Format.json:
         first = runs[0] if len(runs) == 1 else {}
         emit_json(first | {"passed": status == 0, "runs": runs})
     return status
 
 
-def _write_junit(runs: list[dict[str, Any]], junit: Path | None) -> None:
-    from beaver_ftc.results.junit import write_junit
-
-    if junit is not None:
-        write_junit(runs, junit)
-
-
-def _run_one(scenario: "Scenario", options: Options, prepare: "Prepare | None") -> dict[str, Any]:
+def _run_one(scenario: "Scenario", options: Options, prepare: "Prepare | None") -> Document:
     from beaver_ftc.results.run import run
 
     for warning in scenario.warnings():
@@ -144,7 +147,7 @@ def _run_one(scenario: "Scenario", options: Options, prepare: "Prepare | None") 
     return document | {"folder": str(options.out / scenario.name)}
 
 
-def _say(document: dict[str, Any]) -> None:
+def _say(document: Document) -> None:
     from beaver_ftc.results.verdict import verdict_text
 
     emit(verdict_text(document, document["folder"], colour=sys.stdout.isatty()))

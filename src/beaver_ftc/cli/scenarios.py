@@ -2,12 +2,12 @@
 
 import re
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
 from beaver_ftc.cli.inputs import check_flyable, complete_names
-from beaver_ftc.cli.output import Format, FormatOption, complain, emit, emit_json
+from beaver_ftc.cli.output import Document, Format, FormatOption, complain, emit, emit_json
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
 
 _NAME = re.compile(r"[A-Za-z0-9_-]{1,100}")  # as of a scenario
@@ -51,7 +51,7 @@ def validate(
     raise typer.Exit(0 if valid else BadInput.exit_code)
 
 
-def _check(file: str) -> dict[str, Any]:
+def _check(file: str) -> Document:
     from beaver_ftc.scenario.loader import load_scenario
     from beaver_ftc.scenario.sweep_loader import is_sweep, load_sweep
 
@@ -66,7 +66,7 @@ def _check(file: str) -> dict[str, Any]:
     return {"file": file, "valid": True, "errors": [], "warnings": list(scenario.warnings())}
 
 
-def _say(report: dict[str, Any], format: Format) -> None:
+def _say(report: Document, format: Format) -> None:
     for error in report["errors"]:
         complain(error)
     for warning in report["warnings"]:

@@ -2,12 +2,13 @@
 
 import math
 import sys
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from beaver_ftc.cli.inputs import ScenarioArgument, WorkersOption
+from beaver_ftc.cli.inputs import ScenarioArgument, WorkersOption, taking
 from beaver_ftc.cli.output import Format, FormatOption, answer, complain
 from beaver_ftc.cli.progress import progress_bar
 
@@ -24,36 +25,36 @@ _ATTITUDE = (  # what, attribute, unit; angles in degrees
 )
 
 
-def trim(
+@dataclass(frozen=True)
+class Condition:
+    """The flight condition to trim: but for the first and the last, keys of a scenario's `initial`."""
+
     scenario: Annotated[
         str | None, typer.Argument(metavar="SCENARIO", help="Take the flight condition from it.")
-    ] = None,
-    airspeed_mps: Annotated[float | None, typer.Option(min=1, max=1000, help="True airspeed, m/s.")] = None,
-    altitude_m: Annotated[float | None, typer.Option(min=-300, max=30000, help="Altitude, m.")] = None,
-    engine_rpm: Annotated[float | None, typer.Option(min=0, max=3000, help="Engine speed, rpm.")] = None,
+    ] = None
+    airspeed_mps: Annotated[float | None, typer.Option(min=1, max=1000, help="True airspeed, m/s.")] = None
+    altitude_m: Annotated[float | None, typer.Option(min=-300, max=30000, help="Altitude, m.")] = None
+    engine_rpm: Annotated[float | None, typer.Option(min=0, max=3000, help="Engine speed, rpm.")] = None
     manifold_pressure_inhg: Annotated[
         float | None, typer.Option(min=0, max=50, help="Manifold pressure, inHg.")
-    ] = None,
-    flap_deg: Annotated[float | None, typer.Option(min=-6, max=60, help="Flap deflection, deg.")] = None,
-    format: FormatOption = Format.text,
-) -> None:
+    ] = None
+    flap_deg: Annotated[float | None, typer.Option(min=-6, max=60, help="Flap deflection, deg.")] = None
+    format: FormatOption = Format.text
+
+
+@taking(Condition)
+def trim(condition: Condition) -> None:
     """Print a trimmed flight condition.
 
     Steady straight flight, wings level; what cannot be trimmed is bad input (2). What is not given
     is the scenario's, or else its default: 45 m/s at 1828.8 m, 1800 rpm, 20 inHg, no flap.
     Engine and flap are those of an aircraft that has them.
     """
-    condition = {
-        "airspeed_mps": airspeed_mps,
-        "altitude_m": altitude_m,
-        "engine_rpm": engine_rpm,
-        "manifold_pressure_inhg": manifold_pressure_inhg,
-        "flap_deg": flap_deg,
-    }
     from beaver_ftc.plant import conditions
 
-    changed = {key: value for key, value in condition.items() if value is not None}
-    point = conditions.trim(scenario, **changed)
+    given = asdict(condition)
+    name, format = given.pop("scenario"), given.pop("format")
+    point = conditions.trim(name, **{key: value for key, value in given.items() if value is not None})
     residual = dict(zip(_RESIDUALS, point.residual, strict=True))
     answer(format, point.as_dict() | {"residual": residual}, lambda: _table(point))
 

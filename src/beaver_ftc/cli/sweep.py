@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from beaver_ftc.cli.inputs import JunitOption, NoReportOption, taking
-from beaver_ftc.cli.output import Format, FormatOption, answer, complain, emit_json, unexpected
-from beaver_ftc.documents.errors import BadInput, BeaverFtcError
+from beaver_ftc.cli.output import Format, FormatOption, answer, complain, emit_json, failure_of, write_junit
+from beaver_ftc.documents.errors import BadInput
 
 if TYPE_CHECKING:
     from beaver_ftc.scenario.sweep_loader import Sweep
@@ -91,12 +91,13 @@ def command(arguments: Arguments) -> None:
     try:
         verdict = _command(options, arguments.replay, arguments.format)
     except Exception as error:
-        failure = error if isinstance(error, BeaverFtcError) else unexpected(error)
+        failure = failure_of(error)
         if arguments.format is Format.json:
             emit_json({"passed": False, "errors": str(failure).splitlines()})
-        _write_junit({"scenario": arguments.file, "error": str(failure)}, arguments.junit, began)
+        failed = {"scenario": arguments.file, "error": str(failure)}
+        write_junit([failed | {"took_s": time.perf_counter() - began}], arguments.junit)
         raise failure from failure.__cause__
-    _write_junit(verdict, arguments.junit, began)
+    write_junit([verdict | {"took_s": time.perf_counter() - began}], arguments.junit)
     raise typer.Exit(0 if verdict["passed"] else 1)
 
 
@@ -122,13 +123,6 @@ def _command(options: "Options", replay: int | None, format: Format) -> dict[str
 
     sweep = load_sweep(options.source)
     return _fly(sweep, options, format) if replay is None else _replay(sweep, options, replay, format)
-
-
-def _write_junit(verdict: dict[str, Any], junit: Path | None, began: float) -> None:
-    from beaver_ftc.results.junit import write_junit
-
-    if junit is not None:
-        write_junit([verdict | {"took_s": time.perf_counter() - began}], junit)
 
 
 def _keep(flights: str) -> "Keep":

@@ -20,7 +20,7 @@ from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.model_file import with_systems
 from beaver_ftc.plant.state import FlightState
 from beaver_ftc.plant.trim import trim
-from beaver_ftc.studies.bench.contenders import Timing, interleave
+from beaver_ftc.studies.bench.contenders import interleave, quartiles
 
 SURFACES = ("aileron", "elevator", "rudder", "flap")
 FRAMES = 500
@@ -214,13 +214,13 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--rounds", type=int, default=100)
     us = measure(parser.parse_args().rounds)
-    whole = Timing.of(us[:, 0])
+    low, median, high = quartiles(us[:, 0])
     print(f"us a frame; medians [quartiles] over {len(us)} rounds of {FRAMES} frames")
-    print(f"{'the whole aircraft':48}{whole.median:8.3f}  [{whole.low:.3f}, {whole.high:.3f}]")
+    print(f"{'the whole aircraft':48}{median:8.3f}  [{low:.3f}, {high:.3f}]")
     print("\nwhat is saved without")
     for name, variant in zip(VARIANTS, us[:, 1:].T, strict=True):
-        saved = Timing.of(us[:, 0] - variant)
-        print(f"  {name:46}{saved.median:8.3f}  [{saved.low:.3f}, {saved.high:.3f}]")
+        low, median, high = quartiles(us[:, 0] - variant)
+        print(f"  {name:46}{median:8.3f}  [{low:.3f}, {high:.3f}]")
     return 0
 
 

@@ -30,19 +30,9 @@ class Contender(Protocol):
         """Fly that many frames; timed."""
 
 
-@dataclass(frozen=True)
-class Timing:
-    """A quantity over the rounds: its median, and the quartiles between which half the rounds lie."""
-
-    median: float
-    low: float
-    high: float
-
-    @classmethod
-    def of(cls, values: np.ndarray) -> "Timing":
-        """values (rounds,), one a round."""
-        low, median, high = (float(np.quantile(values, share)) for share in (0.25, 0.5, 0.75))
-        return cls(median, low, high)
+def quartiles(values: np.ndarray) -> list[float]:
+    """Lower quartile, median and upper quartile of values (rounds,)."""
+    return [float(np.quantile(values, share)) for share in (0.25, 0.5, 0.75)]
 
 
 Clock = Callable[[], int]  # ns

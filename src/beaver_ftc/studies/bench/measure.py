@@ -1,6 +1,5 @@
 """The measurement behind `beaver-ftc bench`."""
 
-import os
 import platform
 import tempfile
 import time
@@ -24,13 +23,13 @@ from beaver_ftc.studies.bench.contenders import (
     Contender,
     InnovationDetector,
     ProportionalInversion,
-    Timing,
     interleave,
+    quartiles,
     take_over,
 )
 from beaver_ftc.studies.bench.parts import PARTS, frame_with
 from beaver_ftc.studies.bench.straightforward import Straightforward
-from beaver_ftc.studies.engine.workers import cores
+from beaver_ftc.studies.engine.workers import cores, environment
 from beaver_ftc.studies.sweep.one_flight import row_of, scenario_of
 from beaver_ftc.studies.sweep.sampling import Plan
 
@@ -117,8 +116,8 @@ def _against(bare: np.ndarray, loop: np.ndarray) -> Document:
 
 def _figures(name: str, values: np.ndarray) -> dict[str, Any]:
     """The median over the rounds, and the quartiles as `<name>_quartiles`."""
-    timing = Timing.of(values)
-    return {name: round(timing.median, 4), f"{name}_quartiles": [round(timing.low, 4), round(timing.high, 4)]}
+    low, median, high = (round(value, 4) for value in quartiles(values))
+    return {name: median, f"{name}_quartiles": [low, high]}
 
 
 def _alternatives(scenario: Scenario, rounds: int) -> Document:
@@ -143,15 +142,8 @@ def _alternatives(scenario: Scenario, rounds: int) -> Document:
 
 def _without_native(make: Callable[[], Contender]) -> Contender:
     """A contender whose loop reads and writes every property through JSBSim's Python binding."""
-    before = os.environ.get("BEAVER_FTC_NATIVE")
-    os.environ["BEAVER_FTC_NATIVE"] = "0"
-    try:
+    with environment({"BEAVER_FTC_NATIVE": "0"}):
         return make()
-    finally:
-        if before is None:
-            del os.environ["BEAVER_FTC_NATIVE"]
-        else:
-            os.environ["BEAVER_FTC_NATIVE"] = before
 
 
 def _whole_flights(scenario: Scenario, rounds: int) -> Document:

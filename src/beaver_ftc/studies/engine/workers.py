@@ -12,7 +12,7 @@ import os
 import signal
 import threading
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from multiprocessing import forkserver, resource_tracker
@@ -258,14 +258,23 @@ def single_threaded() -> Iterator[None]:
     """Processes started meanwhile have one thread each, and never hear the terminal's Ctrl-C, not even while
     they import: it is for the process that gives the orders.
     """
-    before = {name: os.environ.get(name) for name in _ONE_THREAD}
-    os.environ.update(one_thread_each())
-    heard = _block_interrupt()
+    with environment(one_thread_each()):
+        heard = _block_interrupt()
+        try:
+            yield
+        finally:
+            if heard is not None:
+                signal.pthread_sigmask(signal.SIG_SETMASK, heard)
+
+
+@contextlib.contextmanager
+def environment(values: Mapping[str, str]) -> Iterator[None]:
+    """These variables of the environment meanwhile have these values."""
+    before = {name: os.environ.get(name) for name in values}
+    os.environ.update(values)
     try:
         yield
     finally:
-        if heard is not None:
-            signal.pthread_sigmask(signal.SIG_SETMASK, heard)
         for name, value in before.items():
             if value is None:
                 del os.environ[name]

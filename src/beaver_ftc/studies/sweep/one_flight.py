@@ -72,10 +72,6 @@ def _of_pair(name: str, end: int) -> Getter:
     return get
 
 
-def _outside_s(document: Document, flight: "Flight") -> float:
-    return document["envelope"]["outside_s"]
-
-
 def _flown_s(document: Document, flight: "Flight") -> float:
     return flight.frames / flight.scenario.rate_hz
 
@@ -123,8 +119,8 @@ _PROFILE = ("altitude_m", "airspeed_mps", "airspeed_limited_mps", "heading_deg",
 _ENDED: tuple[Column, ...] = (
     ("supervisor.mode", "text", lambda document, flight: document["supervisor"][-1]["mode"]),
     *((f"supervisor.{mode}_at_s", "float", _first_entry(mode)) for mode in MODES),
-    ("envelope_exits.count", "int", lambda document, flight: document["envelope"]["exits"]),
-    ("envelope_exits.total_s", "float", _outside_s),
+    ("envelope_exits.count", "int", _at("envelope", "exits")),
+    ("envelope_exits.total_s", "float", _at("envelope", "outside_s")),
     *_under("float", "departure", "time_s"),
     *_under("text", "departure", "signal"),
     *(column for a in AXES for column in _under("float", f"authority.{a}", "given_share", "beyond_s")),

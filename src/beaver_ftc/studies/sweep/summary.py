@@ -14,6 +14,7 @@ import numpy as np
 from beaver_ftc.scenario.sweep_schema import AxisLevels, Level, QuantileLevel, SweepExpect
 from beaver_ftc.studies.engine.statistics import (
     CONFIDENCE,
+    Estimate,
     poisson,
     poisson_bound,
     quantile,
@@ -77,11 +78,12 @@ def number(value: float) -> float | None:
 def rate(hits: np.ndarray, of: np.ndarray) -> Document:
     """How many of a group are hits, with Wilson's interval."""
     count, trials = int((hits & of).sum()), int(of.sum())
-    found = wilson(count, trials)
+    return {"count": count, "of": trials, **_estimate("rate", wilson(count, trials))}
+
+
+def _estimate(name: str, found: Estimate) -> Document:
     return {
-        "count": count,
-        "of": trials,
-        "rate": number(found.value),
+        name: number(found.value),
         "low": number(found.low),
         "high": number(found.high),
         "confidence": CONFIDENCE,
@@ -134,14 +136,10 @@ def _isolation(flights: Flights, group: np.ndarray) -> Document:
 def _false_alarms(flights: Flights) -> Document:
     """Alarms without a fault, per hour of flight in which one would have been false."""
     count, hours = flights.false_alarms
-    found = poisson(count, hours)
     return {
         "count": count,
         "hours": number(hours),
-        "per_hour": number(found.value),
-        "low": number(found.low),
-        "high": number(found.high),
-        "confidence": CONFIDENCE,
+        **_estimate("per_hour", poisson(count, hours)),
         "closest_residual_ratio": number(float(np.nanmax(flights["worst_residual_ratio"], initial=0.0))),
     }
 
@@ -250,21 +248,14 @@ def _verdict(name: str, level: Level, side: str, of: int, value: float, bound: B
     limit = getattr(level, side)
     actual = value if level.confidence is None else bound(level.confidence, side == "at_most")
     kept = actual >= limit if side == "at_least" else actual <= limit
+    other = "at_most" if side == "at_least" else "at_least"
     return {
         "name": name,
         "passed": bool(of > 0 and kept),
-        "expected": {key: value for key, value in _asked(level).items() if key not in _other(side)},
+        "expected": level.model_dump(exclude_none=True, exclude={other}),
         "actual": number(actual),
         "of": of,
     }
-
-
-def _asked(level: Level) -> Document:
-    return level.model_dump(exclude_none=True)
-
-
-def _other(side: str) -> tuple[str, ...]:
-    return ("at_most",) if side == "at_least" else ("at_least",)
 
 
 def estimate_of(flights: Flights, name: str, level: Level) -> tuple[int, float, Bound]:

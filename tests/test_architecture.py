@@ -21,7 +21,7 @@ PACKAGE = "beaver_ftc"
 # Folders from the ground up; a folder imports what is below its own floor, and itself.
 FLOORS = (
     {"documents"},
-    {"compiled", "elsewhere", "plugins", "translation"},
+    {"compiled", "plugins", "second_process", "translation"},
     {"aircraft"},
     {"design"},
     {"scenario"},

@@ -7,7 +7,7 @@ Compiled code is kept in the user's cache, in a folder named after the sources: 
 also works where the package is read-only. Nobody else may write there: what is kept is run.
 
 A kernel that another one calls is only translated: to optimise is done once, for the outermost one and all
-it calls (translation.py). Of the largest, another process translates a half meanwhile (elsewhere.py).
+it calls (translation.py). Of the largest, another process translates a half meanwhile (second_process.py).
 """
 
 # mypy: disable-error-code="attr-defined"
@@ -34,7 +34,7 @@ from numba.core.types import unliteral
 
 from beaver_ftc.documents.paths import cache_of_version
 from beaver_ftc.documents.sources import digest_of, fingerprint
-from beaver_ftc.elsewhere import Helper, Part
+from beaver_ftc.second_process import Helper, Part
 from beaver_ftc.translation import Inner, lighten, nesting, stub
 
 COMPILING = "compiling the flight code, once for this version on this machine: some 10 s on an idle one"

@@ -24,7 +24,7 @@ from numba.core.compiler import CompileResult
 from beaver_ftc.translation import Inner, all_called, lighten, linkable, nesting
 
 Part = tuple[Any, tuple[Any, ...]]  # a kernel, and the types of its arguments
-PROGRAM = "from beaver_ftc.elsewhere import serve; serve()"
+PROGRAM = "from beaver_ftc.second_process import serve; serve()"
 FIRST_NUMBER = 1_000_000  # functions are told apart by a number; those of the two processes must differ
 PATIENCE_S = 600.0
 _ONE_CORE = 1

@@ -5,7 +5,7 @@ import importlib
 import numpy as np
 import pytest
 
-from beaver_ftc import elsewhere
+from beaver_ftc import second_process
 from beaver_ftc.compiled import compile_into
 
 MODULE = """
@@ -48,8 +48,10 @@ def made(tmp_path, monkeypatch):
     return module, whole
 
 
-def translated_elsewhere(kernel):
-    return [f"v{elsewhere.FIRST_NUMBER}"[:-2] in of.fndesc.mangled_name for of in kernel.overloads.values()]
+def translated_apart(kernel):
+    return [
+        f"v{second_process.FIRST_NUMBER}"[:-2] in of.fndesc.mangled_name for of in kernel.overloads.values()
+    ]
 
 
 def expected():
@@ -60,8 +62,8 @@ def expected():
 def test_a_half_comes_from_the_other_process_and_the_whole_is_right_and_kept(made, tmp_path):
     module, whole = made
     assert whole(VALUES.copy()) == expected()
-    assert translated_elsewhere(module.apart) == [True]
-    assert translated_elsewhere(module.here) == [False]
+    assert translated_apart(module.apart) == [True]
+    assert translated_apart(module.here) == [False]
     again = compile_into(tmp_path / "cache", module.whole)
     assert again(VALUES.copy()) == expected()
     assert sum(again.stats.cache_hits.values()) == 1
@@ -78,9 +80,9 @@ def test_a_half_comes_from_the_other_process_and_the_whole_is_right_and_kept(mad
 )
 def test_without_the_other_process_this_one_does_it_all(made, monkeypatch, what, value):
     module, whole = made
-    monkeypatch.setattr(elsewhere, what, value)
+    monkeypatch.setattr(second_process, what, value)
     assert whole(VALUES.copy()) == expected()
-    assert translated_elsewhere(module.apart) == [False]
+    assert translated_apart(module.apart) == [False]
 
 
 def test_a_kernel_that_is_not_the_one_of_its_name_is_translated_here(made, monkeypatch):

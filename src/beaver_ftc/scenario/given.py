@@ -14,10 +14,10 @@ from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.documents.problems import ScenarioError
 from beaver_ftc.documents.validation import validate
 from beaver_ftc.scenario.change import Change
-from beaver_ftc.scenario.changes import plain
 from beaver_ftc.scenario.environment import Gust
 from beaver_ftc.scenario.faults import Fault
 from beaver_ftc.scenario.loader import load_scenario, validate_scenario
+from beaver_ftc.scenario.overrides import plain
 from beaver_ftc.scenario.schema import Scenario
 
 ScenarioLike = Scenario | str | PathLike[str] | Mapping[str, Any]

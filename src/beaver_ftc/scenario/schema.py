@@ -310,7 +310,7 @@ class Scenario(Section):
 
         Raises BadInput that names the key, what is wrong and what is allowed.
         """
-        from beaver_ftc.scenario.changes import changed
+        from beaver_ftc.scenario.overrides import changed
 
         return changed(self, changes)
 

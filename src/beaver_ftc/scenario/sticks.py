@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 from beaver_ftc.documents.document import Document
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.scenario.airframe import checked_against
-from beaver_ftc.scenario.changes import aircraft_of
 from beaver_ftc.scenario.consistency import OF_A_FAULT
 from beaver_ftc.scenario.loader import validate_scenario
+from beaver_ftc.scenario.overrides import aircraft_of
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.table import MAX_ROWS
 

@@ -13,8 +13,8 @@ from beaver_ftc.documents.document import Document
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.results.frame import units
 from beaver_ftc.scenario.airframe import checked_against
-from beaver_ftc.scenario.changes import plain
 from beaver_ftc.scenario.given import ScenarioLike, load
+from beaver_ftc.scenario.overrides import plain
 from beaver_ftc.scenario.sweep_loader import Sweep, validate_sweep
 
 if TYPE_CHECKING:

@@ -144,6 +144,41 @@ class MemoryLog:
             yield {name: chunk[:, place] for name, place in zip(wanted, places, strict=True)}
 
 
+class Columns(dict[str, np.ndarray]):
+    """A `LogSink` that is, once the flight is over, name -> values (frames,).
+
+    names: the columns to keep; without any, all.
+    """
+
+    def __init__(self, *names: str) -> None:
+        super().__init__()
+        self._wanted = names
+
+    def open(self, columns: Sequence[str]) -> None:
+        """A flight begins, with these columns in its rows."""
+        names = list(columns)
+        self._names = self._wanted or tuple(names)
+        self._places = [names.index(name) for name in self._names]
+        self._chunks: list[np.ndarray] = []
+
+    def write(self, rows: np.ndarray) -> None:
+        """Take in rows (n, columns)."""
+        self._chunks.append(rows[:, self._places])  # a copy: the rows' memory is used again
+
+    def close(self) -> None:
+        """The flight is over."""
+        self.update(zip(self._names, np.ascontiguousarray(np.concatenate(self._chunks).T), strict=True))
+
+    def read(self, *names: str) -> np.ndarray:
+        """Some columns side by side, (frames, names)."""
+        return np.column_stack([self[name] for name in names])
+
+    def since(self, from_s: float) -> dict[str, np.ndarray]:
+        """Every column from an instant on."""
+        late = self["t_s"] >= from_s
+        return {name: column[late] for name, column in self.items()}
+
+
 class SpooledLog(MemoryLog):
     """A `MemoryLog` that is kept in a temporary file: an hour of flight is 0.3 GB."""
 

@@ -29,8 +29,8 @@ from beaver_ftc.design.model import AXES, N_Y, control_effectiveness
 from beaver_ftc.design.variants import design_of
 from beaver_ftc.documents.errors import BadInput, BeaverFtcError
 from beaver_ftc.loop.loop import fly
+from beaver_ftc.results.log import Columns
 from beaver_ftc.scenario.schema import Scenario
-from beaver_ftc.studies.engine.columns import Columns
 from beaver_ftc.studies.engine.statistics import quantile
 from beaver_ftc.studies.engine.study import Progress, Study, run_study
 from beaver_ftc.studies.present.figures import heat_map, label_edges, panels

@@ -10,8 +10,8 @@ from beaver_ftc.aircraft import load
 from beaver_ftc.design.context import DesignModel
 from beaver_ftc.design.variants import design_of
 from beaver_ftc.loop.loop import fly
+from beaver_ftc.results.log import Columns
 from beaver_ftc.scenario.schema import Scenario
-from beaver_ftc.studies.engine.columns import Columns
 from beaver_ftc.studies.matrix.fault_matrix import AT_S, Case, beside_told, scenario_of, trimmed_deg
 from beaver_ftc.studies.matrix.told import accelerations, columns_of, healthy, told
 

@@ -16,10 +16,10 @@ from beaver_ftc.loop.loop import fly
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.linear import differences, engine_slope
 from beaver_ftc.plant.trim import trim
+from beaver_ftc.results.log import Columns
 from beaver_ftc.results.metrics import as_json, metrics
 from beaver_ftc.scenario.control import EnginePower
 from beaver_ftc.scenario.schema import Initial, Scenario
-from beaver_ftc.studies.engine.columns import Columns
 from beaver_ftc.studies.engine.study import Progress, Study, run_study
 from beaver_ftc.studies.linear_systems import zeros
 from beaver_ftc.studies.matrix.fault_matrix import AIRSPEEDS_MPS, AT_S, REFERENCE, UNCERTAINTY, trimmed_deg

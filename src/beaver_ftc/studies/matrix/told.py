@@ -12,8 +12,8 @@ import numpy as np
 from beaver_ftc.aircraft import Aircraft, Term
 from beaver_ftc.design.context import Context
 from beaver_ftc.design.inertia import inertia_coefficients
+from beaver_ftc.results.log import Columns
 from beaver_ftc.studies.engine.clairvoyant import Whitening, aware_of_the_air, chance
-from beaver_ftc.studies.engine.columns import Columns
 
 if TYPE_CHECKING:
     from beaver_ftc.scenario.schema import Scenario

@@ -1,7 +1,6 @@
-"""How figures of a study are begun, what they have in common, and how they are saved."""
+"""How figures of a study are begun, and what they have in common."""
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -71,14 +70,3 @@ def heat_map(
     axes.set_xticks(range(len(columns)), columns, fontsize=fontsize)
     axes.set_yticks(range(len(rows)), rows, fontsize=fontsize)
     return axes.imshow(values, aspect="auto", **image)
-
-
-def save(figure: "Figure", path: Path) -> Path:
-    """Write a figure as PNG or SVG; the same figure gives the same bytes."""
-    from matplotlib import rc_context
-
-    svg = path.suffix == ".svg"
-    metadata = {"Date": None, "Creator": "beaver-ftc"} if svg else {"Software": "beaver-ftc"}
-    with rc_context({"svg.hashsalt": path.stem}):
-        figure.savefig(path, metadata=metadata)
-    return path

@@ -2,9 +2,10 @@
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from beaver_ftc.studies.present.figures import save
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 Content = Any  # text, bytes, a figure, a folder of these, or a function that makes one, given the folder
 Files = Mapping[str, Content]
@@ -28,3 +29,14 @@ def _write(path: Path, content: Content) -> None:
         _write(path, content(path.parent))
     elif content is not None:
         save(content, path)
+
+
+def save(figure: "Figure", path: Path) -> Path:
+    """Write a figure as PNG or SVG; the same figure gives the same bytes."""
+    from matplotlib import rc_context
+
+    svg = path.suffix == ".svg"
+    metadata = {"Date": None, "Creator": "beaver-ftc"} if svg else {"Software": "beaver-ftc"}
+    with rc_context({"svg.hashsalt": path.stem}):
+        figure.savefig(path, metadata=metadata)
+    return path

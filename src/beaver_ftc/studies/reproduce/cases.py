@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from beaver_ftc.loop.loop import fly
+from beaver_ftc.results.log import Columns
 from beaver_ftc.results.metrics import Document, metrics
 from beaver_ftc.scenario.diagnosis import DEADBEAT_PER_S
-from beaver_ftc.studies.engine.columns import Columns
 from beaver_ftc.studies.reproduce.choices import (
     AMPLITUDE_DEG_S,
     ELEVATOR_LOSS,

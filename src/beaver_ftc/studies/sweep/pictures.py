@@ -13,7 +13,8 @@ import numpy as np
 
 from beaver_ftc.results.looks import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILION
 from beaver_ftc.studies.engine.statistics import wilson
-from beaver_ftc.studies.present.figures import GRID, heat_map, new_figure, save
+from beaver_ftc.studies.present.figures import GRID, heat_map, new_figure
+from beaver_ftc.studies.present.files import save
 from beaver_ftc.studies.sweep.outcomes import Flights
 from beaver_ftc.studies.sweep.summary import NO_ALARM, OUTCOMES
 

@@ -6,7 +6,7 @@ from .installation import ROOT
 
 IMPORTED = """
 import json, sys
-import beaver_ftc.cli.main, beaver_ftc.results.run, beaver_ftc.loop.loop
+import beaver_ftc.cli.main, beaver_ftc.results.writer, beaver_ftc.loop.loop
 files = [module.__file__ for name, module in sys.modules.items() if name.partition(".")[0] == "beaver_ftc"]
 print(json.dumps({"files": [file for file in files if file], "path": sys.path}))
 """

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from beaver_ftc.results.about import faults_of, hints
+from beaver_ftc.results.metrics import faults_of, hints
 from beaver_ftc.results.verdict import facts, mood, title
 from beaver_ftc.scenario.schema import Scenario
 

@@ -13,11 +13,10 @@ from pyarrow import parquet
 
 from beaver_ftc.aircraft import load
 from beaver_ftc.flights.readers import read_flight
-from beaver_ftc.results.exports import write_acmi, write_csv
+from beaver_ftc.results.exports import RECORDINGS, write_acmi, write_csv, write_recording
 from beaver_ftc.results.junit import write_junit
 from beaver_ftc.results.log import ParquetLog
 from beaver_ftc.results.metrics import metrics
-from beaver_ftc.results.recordings import RECORDINGS, write_recording
 
 RATE_HZ, FRAMES = 25.0, 60
 TRAVEL_RAD = {"aileron": 0.5, "elevator": 0.4, "rudder": 0.3, "flap": 1.0}

@@ -5,10 +5,9 @@ from synthetic import Flight, Scenario, rows
 
 from beaver_ftc.results.figures import draw, write_figures
 from beaver_ftc.results.log import ParquetLog
-from beaver_ftc.results.looks import LOOKS, closeup_window, marks
 from beaver_ftc.results.metrics import metrics
-from beaver_ftc.results.series import read_series
-from beaver_ftc.results.views import views
+from beaver_ftc.results.style import LOOKS, closeup_window, marks
+from beaver_ftc.results.views import read_series, views
 
 EVERY = {"tracking", "surfaces", "detection", "isolation", "ratio", "effectiveness", "supervisor", "states"}
 

@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 
 import beaver_ftc as bf
-from beaver_ftc.results.run import run
+from beaver_ftc.results.writer import run
 from flying import loss, scenario
 
 SHORT = {"duration_s": 3.0, "faults": [loss(at_s=1.5)], "expect": {"isolated_as": "rudder"}}

@@ -9,7 +9,7 @@ import beaver_ftc as bf
 from beaver_ftc.cli.main import app
 from beaver_ftc.flights.inputs import load_flights
 from beaver_ftc.flights.vehicle import load_vehicle
-from beaver_ftc.results.recordings import RECORDINGS, write_recording
+from beaver_ftc.results.exports import RECORDINGS, write_recording
 
 TRAVEL_RAD = {"aileron": 0.5, "elevator": 0.4, "rudder": 0.3, "flap": 1.0}
 

@@ -9,7 +9,7 @@ from tools.docs.properties import as_markdown, meaning_of
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.model_file import with_systems
-from beaver_ftc.results.looks import LOOKS
+from beaver_ftc.results.style import LOOKS
 from beaver_ftc.studies.reproduce.claims import CLAIMS
 from beaver_ftc.studies.reproduce.published_figures import FIGURES
 

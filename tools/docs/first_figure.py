@@ -37,9 +37,9 @@ def write_figure(path: Path) -> Path:
     from tempfile import TemporaryDirectory
 
     from beaver_ftc.results.figures import draw
-    from beaver_ftc.results.looks import marks
-    from beaver_ftc.results.run import run
-    from beaver_ftc.results.series import read_series
+    from beaver_ftc.results.style import marks
+    from beaver_ftc.results.views import read_series
+    from beaver_ftc.results.writer import run
     from beaver_ftc.scenario.loader import load_scenario
 
     with TemporaryDirectory() as folder:

@@ -28,7 +28,7 @@ MODES = {KERNELS: (PLAIN,), GLUE: (PLAIN, COMPILED)}
 QUICK = ("design", "diagnosis", "control")
 APART = {
     "compiled.py": "compile", "translation.py": "compile", "second_process.py": "compile",
-    "results/looks.py": "looks",
+    "results/style.py": "looks",
 }  # fmt: skip
 LEFT_OUT = {
     "looks": "how lines look: only the eye can judge it",

@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 
 
 class Recording(StrEnum):
-    """The formats of `results.recordings`."""
+    """The formats of `results.exports`."""
 
     table = "table"
     ulog = "ulog"
@@ -136,7 +136,7 @@ def _run_all(scenarios: list["Scenario"], options: Options) -> int:
 
 
 def _run_one(scenario: "Scenario", options: Options, prepare: "Prepare | None") -> Document:
-    from beaver_ftc.results.run import run
+    from beaver_ftc.results.writer import run
 
     for warning in scenario.warnings():
         complain(f"{scenario.name}: warning: {warning}")

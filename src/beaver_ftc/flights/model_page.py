@@ -18,7 +18,7 @@ from beaver_ftc.flights.recording import Floats
 from beaver_ftc.flights.regression import Fit, spectrum
 from beaver_ftc.flights.samples import Samples
 from beaver_ftc.flights.testing import folds, residual_rows, residuals
-from beaver_ftc.results.looks import SERIES
+from beaver_ftc.results.style import SERIES
 
 MARK = '<meta name="generator" content="beaver-ftc identify">'
 _SHOWN_S = 40.0

@@ -11,7 +11,7 @@ from beaver_ftc.flights.model import Model
 from beaver_ftc.flights.page import template
 from beaver_ftc.flights.samples import Samples
 from beaver_ftc.flights.verdict import BRIEF_S, lasting, looked_at
-from beaver_ftc.results.looks import SERIES
+from beaver_ftc.results.style import SERIES
 
 _MOST_POINTS = 6000
 

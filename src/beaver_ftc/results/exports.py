@@ -1,17 +1,25 @@
-"""The log for other tools: as CSV, and as a flight recording for Tacview."""
+"""The log for other tools: as CSV, as a flight recording for Tacview, and as a recorder on board would have
+written it, which is a table, a PX4 ULog or a dataflash log.
 
-from collections.abc import Iterator
+Of the last, only what an autopilot knows: measured rates, attitude, airspeed and the commands to the surfaces
+as shares of travel. `vehicle.yaml` beside it names the columns for `identify` and `diagnose`.
+
+ULog: https://docs.px4.io/main/en/dev_log/ulog_file_format; dataflash: FMT messages, then packed ones.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
 from math import ceil, cos, degrees, radians
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from beaver_ftc.aircraft import Aircraft, load
 from beaver_ftc.loop.cockpit import EARTH_RADIUS_M
 from beaver_ftc.plant.state import START_LATITUDE_DEG
 from beaver_ftc.results import log
-from beaver_ftc.results.looks import marks
 from beaver_ftc.results.metrics import Document
+from beaver_ftc.results.style import marks
 
 ACMI_RATE_HZ = 25.0  # smooth to look at; a viewer interpolates
 FLAP = "flap"  # a surface of this name is shown as a share of its travel
@@ -21,6 +29,15 @@ _ACMI_COLUMNS = (
     "t_s", "north_m", "east_m", "altitude_m", "phi_rad", "theta_rad", "psi_rad",
     "airspeed_mps", "alpha_rad", "beta_rad",
 )  # fmt: skip
+
+Columns = dict[str, NDArray[np.float64]]
+Topics = dict[str, Columns]
+"""Fields of each message; every message has the stamps `t_s`."""
+
+RECORDINGS = {"table": "flight.csv", "ulog": "flight.ulg", "ardupilot": "flight.bin"}
+_RATES = ("p", "q", "r")
+_BOOT_US = 1_000_000
+"""A clock on board does not start with the log."""
 
 
 def write_csv(log_path: Path, path: Path) -> None:
@@ -106,3 +123,160 @@ def _properties(row: dict[str, float]) -> str:
 
 def _flaps(row: dict[str, float], full_rad: float | None) -> str:
     return "" if full_rad is None else f",Flaps={row[f'{FLAP}_pos_rad'] / full_rad:.4f}"
+
+
+def write_recording(log_path: Path, travel_rad: dict[str, float], kind: str, folder: Path) -> None:
+    """Write a flight's log as `kind` (of RECORDINGS) with its vehicle.yaml into a folder.
+
+    travel_rad: the farther stop of each surface.
+    """
+    names = [*(f"{axis}_measured_rad_s" for axis in _RATES), "phi_rad", "theta_rad", "psi_rad"]
+    commands = [f"{surface}_cmd_rad" for surface in travel_rad]
+    chunks = list(log.read_chunks(log_path, ["t_s", *names, "airspeed_mps", *commands]))
+    known = {name: np.concatenate([chunk[name] for chunk in chunks]) for name in chunks[0]}
+    shares = {s: known[f"{s}_cmd_rad"] / travel for s, travel in travel_rad.items()}
+    write, named = _FORMATS[kind]
+    topics = named(known, shares)
+    t_us = np.round(known["t_s"] * 1e6).astype(np.int64) + _BOOT_US
+    write(folder / RECORDINGS[kind], t_us, topics)
+    (folder / "vehicle.yaml").write_text(_vehicle(topics, list(shares), kind), encoding="utf-8")
+
+
+def _as_table(known: Columns, shares: Columns) -> Topics:
+    rates = {f"{axis}_rad_s": known[f"{axis}_measured_rad_s"] for axis in _RATES}
+    commands = {f"{surface}_command": share for surface, share in shares.items()}
+    return {"": rates | commands | _attitude(known) | {"airspeed_mps": known["airspeed_mps"]}}
+
+
+def _as_px4(known: Columns, shares: Columns) -> Topics:
+    rates = {f"xyz[{i}]": known[f"{axis}_measured_rad_s"] for i, axis in enumerate(_RATES)}
+    controls = {f"control[{i}]": share for i, share in enumerate(shares.values())}
+    return {
+        "vehicle_angular_velocity": rates,
+        "actuator_servos": controls,
+        "airspeed": {"true_airspeed_m_s": known["airspeed_mps"]},
+        "attitude": _attitude(known),
+    }
+
+
+def _as_ardupilot(known: Columns, shares: Columns) -> Topics:
+    gyros = {f"Gyr{x}": known[f"{axis}_measured_rad_s"] for x, axis in zip("XYZ", _RATES, strict=True)}
+    attitude = {name: np.rad2deg(known[f"{of}_rad"]) for name, of in _ATT.items()}
+    controls = {f"C{i + 1}": share for i, share in enumerate(shares.values())}
+    return {"IMU": gyros, "SRFC": controls, "ARSP": {"Airspeed": known["airspeed_mps"]}, "ATT": attitude}
+
+
+_ATT = {"Roll": "phi", "Pitch": "theta", "Yaw": "psi"}
+
+
+def _attitude(known: Columns) -> Columns:
+    return {
+        f"{name}_rad": known[f"{of}_rad"]
+        for name, of in (("roll", "phi"), ("pitch", "theta"), ("yaw", "psi"))
+    }
+
+
+def _write_table(path: Path, t_us: NDArray[np.int64], topics: Topics) -> None:
+    import pyarrow as pa
+    from pyarrow import csv
+
+    csv.write_csv(pa.table({"t_s": (t_us - _BOOT_US) * 1e-6, **topics[""]}), path)
+
+
+def _write_ulog(path: Path, t_us: NDArray[np.int64], topics: Topics) -> None:
+    """Definitions and subscriptions, then every message in the order of time."""
+    head = [b"ULog\x01\x12\x35\x01" + np.uint64(t_us[0]).tobytes()]
+    for topic, fields in topics.items():
+        head.append(_ulog_message("F", f"{topic}:uint64_t timestamp;{_layout(list(fields))}".encode()))
+    for number, topic in enumerate(topics):
+        head.append(_ulog_message("A", b"\x00" + np.uint16(number).tobytes() + topic.encode()))
+    packed = [
+        _packed_ulog(number, t_us, list(fields.values())) for number, fields in enumerate(topics.values())
+    ]
+    path.write_bytes(b"".join(head) + _in_turn(packed))
+
+
+def _layout(fields: Sequence[str]) -> str:
+    """Fields of one format; `xyz[0]`, `xyz[1]`, ... are one array."""
+    arrays: dict[str, int] = {}
+    for field in fields:
+        arrays[field.partition("[")[0]] = arrays.get(field.partition("[")[0], 0) + 1
+    return "".join(
+        f"double[{count}] {name};" if f"{name}[0]" in fields else f"double {name};"
+        for name, count in arrays.items()
+    )
+
+
+def _ulog_message(kind: str, body: bytes) -> bytes:
+    return np.uint16(len(body)).tobytes() + kind.encode() + body
+
+
+def _packed_ulog(number: int, t_us: NDArray[np.int64], values: Sequence[NDArray[np.float64]]) -> np.ndarray:
+    layout = [("size", "<u2"), ("kind", "S1"), ("id", "<u2"), ("t", "<u8"), ("v", "<f8", (len(values),))]
+    rows = np.zeros(len(t_us), dtype=layout)
+    rows["size"], rows["kind"], rows["id"] = rows.dtype.itemsize - 3, b"D", number
+    rows["t"], rows["v"] = t_us, np.column_stack(values)
+    return rows
+
+
+def _write_dataflash(path: Path, t_us: NDArray[np.int64], topics: Topics) -> None:
+    """FMT messages (the first describes FMT itself), then every message in the order of time."""
+    numbers = {name: 140 + i for i, name in enumerate(topics)}
+    head = [_fmt(128, 89, "FMT", "BBnNZ", "Type,Length,Name,Format,Columns")]
+    packed = []
+    for name, fields in topics.items():
+        rows = _packed_dataflash(numbers[name], t_us, list(fields.values()))
+        labels = ",".join(["TimeUS", *fields])
+        head.append(_fmt(numbers[name], rows.dtype.itemsize, name, "Q" + "d" * len(fields), labels))
+        packed.append(rows)
+    path.write_bytes(b"".join(head) + _in_turn(packed))
+
+
+def _fmt(number: int, length: int, name: str, layout: str, labels: str) -> bytes:
+    """One FMT message, 89 bytes."""
+    texts = (
+        name.encode().ljust(4, b"\0") + layout.encode().ljust(16, b"\0") + labels.encode().ljust(64, b"\0")
+    )
+    return bytes([0xA3, 0x95, 128, number, length]) + texts
+
+
+def _packed_dataflash(
+    number: int, t_us: NDArray[np.int64], values: Sequence[NDArray[np.float64]]
+) -> np.ndarray:
+    layout = [("head", "u1", (3,)), ("t", "<u8"), ("v", "<f8", (len(values),))]
+    rows = np.zeros(len(t_us), dtype=layout)
+    rows["head"], rows["t"], rows["v"] = (0xA3, 0x95, number), t_us, np.column_stack(values)
+    return rows
+
+
+def _in_turn(topics: Sequence[np.ndarray]) -> bytes:
+    """Records of several topics, one of each a stamp."""
+    rows = [topic.view(np.uint8).reshape(len(topic), -1) for topic in topics]
+    return np.hstack(rows).tobytes()
+
+
+def _vehicle(topics: Topics, surfaces: list[str], kind: str) -> str:
+    """The vehicle file: which column is what."""
+    columns = [f"{topic}.{field}" if topic else field for topic, fields in topics.items() for field in fields]
+    commands = [
+        name for name in columns if "command" in name or ".control[" in name or name.startswith("SRFC")
+    ]
+    rates = ", ".join(f"{axis}: {name!r}" for axis, name in zip(_RATES, columns, strict=False))
+    lines = [
+        "# Written with the log beside it: which column is what. Commands are shares of travel.",
+        f"name: {kind}-of-a-simulated-flight",
+        f"reader: {kind}",
+        f"rates: {{{rates}}}",
+        f"commands: [{', '.join(map(repr, commands))}]",
+        "surfaces:",
+        *(f"  {s}: {{{command!r}: 1.0}}" for s, command in zip(surfaces, commands, strict=True)),
+    ]
+    return "\n".join(lines) + "\n"
+
+
+Write = Callable[[Path, NDArray[np.int64], Topics], None]
+_FORMATS: dict[str, tuple[Write, Callable[[Columns, Columns], Topics]]] = {
+    "table": (_write_table, _as_table),
+    "ulog": (_write_ulog, _as_px4),
+    "ardupilot": (_write_dataflash, _as_ardupilot),
+}

@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from beaver_ftc.results import log
-from beaver_ftc.results.looks import GREY, LOOKS, YELLOW, Mark, closeup_window, marks
 from beaver_ftc.results.metrics import Document
-from beaver_ftc.results.series import WHOLE, Series, read_series
-from beaver_ftc.results.views import Panel, Trace, View, unit_of, views
+from beaver_ftc.results.style import GREY, LOOKS, YELLOW, Mark, closeup_window, marks
+from beaver_ftc.results.views import WHOLE, Panel, Series, Trace, View, read_series, unit_of, views
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

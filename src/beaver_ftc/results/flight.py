@@ -48,7 +48,7 @@ class Flight:
 
         Raises BadInput for a flight that kept none.
         """
-        from beaver_ftc.results.frame import log_frame
+        from beaver_ftc.results.log import log_frame
 
         return log_frame(self._kept(), self.metrics)
 
@@ -114,8 +114,8 @@ class Flight:
         Raises BadInput for a view that there is not.
         """
         from beaver_ftc.results.figures import draw
-        from beaver_ftc.results.looks import closeup_window, marks
-        from beaver_ftc.results.series import WHOLE, series_of
+        from beaver_ftc.results.style import closeup_window, marks
+        from beaver_ftc.results.views import WHOLE, series_of
 
         known = self._views()
         if view not in known:
@@ -131,8 +131,7 @@ class Flight:
         report: with report.html and the figures. Raises BadInput for a flight without a log,
         SimulationFailed where the folder cannot be written.
         """
-        from beaver_ftc.results.run import write_documents, write_report_files
-        from beaver_ftc.results.writer import result_folder
+        from beaver_ftc.results.writer import result_folder, write_documents, write_report_files
 
         kept = self._kept()
         with result_folder(Path(out), self.name) as folder:

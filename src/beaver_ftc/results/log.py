@@ -7,18 +7,26 @@ other reader opens as it is, and what costs the loop least.
 import contextlib
 import shutil
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
 from beaver_ftc.documents.errors import BadInput
 
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
 ROWS_PER_GROUP = 16384  # 12 MB of 90 columns: large enough to compress well, small enough to hold
 _BLOCK = 256  # rows turned into columns at a time: they fit the processor's cache, four times faster
 _MOST_ROWS_AT_ONCE = 1_000_000
+_UNITS = (  # ending of a column's name, unit; the longest endings first
+    ("_rad_s2", "rad/s2"), ("_deg_s", "deg/s"), ("_rad_s", "rad/s"), ("_per_s", "1/s"), ("_rad", "rad"),
+    ("_deg", "deg"), ("_mps", "m/s"), ("_inhg", "inHg"), ("_pa", "Pa"), ("_hz", "Hz"), ("_m", "m"),
+    ("_s", "s"),
+)  # fmt: skip
 
 
 class ParquetLog:
@@ -286,3 +294,39 @@ def read(path: Path, columns: Sequence[str] | None = None) -> dict[str, np.ndarr
     chunks = list(read_chunks(path, columns))
     names = column_names(path) if columns is None else columns
     return {name: np.concatenate([chunk[name] for chunk in chunks] or [np.empty(0)]) for name in names}
+
+
+def units(columns: Iterable[str]) -> dict[str, str]:
+    """The unit of each column, read off its name or the section's it is in; "1" for a pure number."""
+    return {column: _unit(column.split(".")) for column in columns}
+
+
+def _unit(parts: Sequence[str]) -> str:
+    named = (unit for part in reversed(parts) for ending, unit in _UNITS if part.endswith(ending))
+    return next(named, "1")
+
+
+def log_frame(log: "Log", metrics: dict[str, Any]) -> "DataFrame":
+    """The log as a DataFrame, float64, with scenario, seed, verdict and units in `attrs`."""
+    from pandas import DataFrame
+
+    if isinstance(log, MemoryLog):
+        table = DataFrame(np.asfortranarray(log.rows), columns=list(log.columns), copy=False)
+    else:
+        chunks = list(log.read_chunks())
+        table = DataFrame({name: np.concatenate([chunk[name] for chunk in chunks]) for name in log.columns})
+    table.attrs = {
+        "scenario": metrics["scenario"], "seed": metrics["seed"], "verdict": _said(metrics),
+        "units": units(log.columns),
+    }  # fmt: skip
+    return table
+
+
+def _said(metrics: dict[str, Any]) -> dict[str, Any]:
+    detection, isolation = metrics["detection"], metrics["isolation"]
+    return {
+        "passed": metrics["passed"], "false_alarm": metrics["false_alarm"],
+        "detected": detection["detected"], "detection_delay_s": detection["delay_s"],
+        "isolated": isolation["fault"], "type": isolation["type"], "isolation_delay_s": isolation["delay_s"],
+        "departed": metrics["departure"] is not None,
+    }  # fmt: skip

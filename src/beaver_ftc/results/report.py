@@ -16,10 +16,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from beaver_ftc.results import log, verdict
-from beaver_ftc.results.looks import LOOKS, MODE_COLOURS, Mark, closeup_window, marks
 from beaver_ftc.results.metrics import Document
-from beaver_ftc.results.series import MAX_POINTS, Series, read_series
-from beaver_ftc.results.views import Panel, Trace, View, unit_of, views
+from beaver_ftc.results.style import LOOKS, MODE_COLOURS, Mark, closeup_window, marks
+from beaver_ftc.results.views import MAX_POINTS, Panel, Series, Trace, View, read_series, unit_of, views
 
 if TYPE_CHECKING:
     from jinja2 import Environment

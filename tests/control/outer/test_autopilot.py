@@ -6,8 +6,7 @@ from pydantic import ValidationError
 
 from beaver_ftc.control.laws.gains import margins
 from beaver_ftc.control.outer import setup
-from beaver_ftc.control.outer.autopilot import to_body
-from beaver_ftc.control.outer.profile import advance
+from beaver_ftc.control.outer.autopilot import advance, to_body
 from beaver_ftc.control.outer.state import ALTITUDE, AUTOPILOT, BANK, HEADING, SPEED
 from beaver_ftc.loop.loop import Loop, fly
 from beaver_ftc.results.metrics import metrics

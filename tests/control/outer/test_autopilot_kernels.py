@@ -5,7 +5,6 @@ import pytest
 
 import law_records
 from beaver_ftc.control.outer import autopilot as loops
-from beaver_ftc.control.outer import profile
 from beaver_ftc.control.outer.state import ALTITUDE, AUTOPILOT, BANK, HEADING, N_CHANNELS, SPEED
 from beaver_ftc.design.model import AIRSPEED, ALPHA, BETA, DPT, QDYN
 from beaver_ftc.diagnosis.state import PITCH, ROLL, YAW
@@ -358,7 +357,7 @@ def test_deviations_are_judged_once_settled_and_of_the_airspeed_the_mean():
 
 @pytest.mark.parametrize("angle", [-9.0, -3.2, -3.1, 0.0, 2.0, 3.2, 9.0])
 def test_a_direction_is_given_within_half_a_turn(angle):
-    assert profile.turn(angle) == pytest.approx(np.arctan2(np.sin(angle), np.cos(angle)))
+    assert loops.turn(angle) == pytest.approx(np.arctan2(np.sin(angle), np.cos(angle)))
 
 
 def test_a_frame_is_its_loops_one_after_the_other():

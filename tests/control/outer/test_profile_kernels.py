@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from beaver_ftc.control.outer import profile
+from beaver_ftc.control.outer import autopilot as loops
 from beaver_ftc.control.outer.state import ALTITUDE, AUTOPILOT, BANK, HEADING, SPEED
 
 DT = 0.1
@@ -24,9 +24,9 @@ def new(**legs):
 
 def test_a_channel_is_commanded_from_its_first_leg_on_and_begins_where_it_is():
     pilot = new(altitude=[(0.5, 1003.0, 2.0)])
-    profile.advance(pilot, WHERE, 0.5 - 1e-6)
+    loops.advance(pilot, WHERE, 0.5 - 1e-6)
     assert not pilot["commanded"].any()
-    profile.advance(pilot, WHERE, 0.5 - 1e-10)  # a frame's time is k / rate in floating point
+    loops.advance(pilot, WHERE, 0.5 - 1e-10)  # a frame's time is k / rate in floating point
     assert pilot["commanded"].tolist() == [1, 0, 0, 0]
     assert pilot["goal"][ALTITUDE] == 1003.0
     assert pilot["command"][ALTITUDE] == pytest.approx(1000.2)
@@ -40,7 +40,7 @@ def test_it_moves_at_its_pace_and_stops_where_it_should(value):
     pilot = new(altitude=[(0.0, value, 2.0)])
     way = []
     for k in range(4):
-        profile.advance(pilot, WHERE, k * DT)
+        loops.advance(pilot, WHERE, k * DT)
         way.append((float(pilot["command"][ALTITUDE]), float(pilot["moving"][ALTITUDE])))
     sign = np.sign(value - 1000.0)
     assert np.array(way) == pytest.approx(
@@ -50,26 +50,26 @@ def test_it_moves_at_its_pace_and_stops_where_it_should(value):
 
 def test_what_is_held_stays_where_it_was_and_a_leg_without_a_pace_is_there_at_once():
     pilot = new(bank=[(0.0, np.nan, np.inf), (1.0, 0.4, np.inf)])
-    profile.advance(pilot, WHERE, 0.0)
+    loops.advance(pilot, WHERE, 0.0)
     assert (pilot["command"][BANK], pilot["moving"][BANK]) == (0.1, 0.0)
     assert pilot["changed_at_s"][BANK] == -np.inf
-    profile.advance(pilot, WHERE + 1.0, 1.0)
+    loops.advance(pilot, WHERE + 1.0, 1.0)
     assert (pilot["command"][BANK], pilot["moving"][BANK]) == (pytest.approx(0.4), 0.0)
     assert pilot["changed_at_s"][BANK] == 1.0
 
 
 def test_a_heading_is_turned_to_the_short_way_from_what_is_commanded():
     pilot = new(heading=[(0.0, -3.0, 0.5), (0.2, 3.0, np.inf)])
-    profile.advance(pilot, WHERE, 0.0)
+    loops.advance(pilot, WHERE, 0.0)
     assert pilot["goal"][HEADING] == pytest.approx(2.0 * np.pi - 3.0)
     assert pilot["command"][HEADING] == pytest.approx(3.05)
-    profile.advance(pilot, -WHERE, 0.1)  # wherever the aircraft is
-    profile.advance(pilot, -WHERE, 0.2)
+    loops.advance(pilot, -WHERE, 0.1)  # wherever the aircraft is
+    loops.advance(pilot, -WHERE, 0.2)
     assert pilot["command"][HEADING] == pytest.approx(3.0)
 
 
 def test_of_legs_of_the_same_instant_the_last_counts():
     pilot = new(speed=[(0.0, 50.0, 1.0), (0.0, 40.0, 0.5), (9.0, 60.0, 1.0)])
-    profile.advance(pilot, WHERE, 0.0)
+    loops.advance(pilot, WHERE, 0.0)
     assert (pilot["leg"][SPEED], pilot["goal"][SPEED]) == (2, 40.0)
     assert pilot["command"][SPEED] == pytest.approx(45.0 - 0.05)

@@ -7,7 +7,7 @@ import pytest
 from typer.testing import CliRunner
 
 from beaver_ftc.cli.main import app
-from beaver_ftc.results.looks import LOOKS
+from beaver_ftc.results.style import LOOKS
 from beaver_ftc.scenario.loader import load_scenario
 from beaver_ftc.studies.reproduce import reproduction
 from beaver_ftc.studies.reproduce.cases import BESIDE, PUBLISHED, VARIANTS, fly_case

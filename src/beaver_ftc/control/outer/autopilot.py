@@ -1,4 +1,5 @@
-"""The autopilot: body-rate references and an engine setting from a commanded profile.
+"""The autopilot: where each channel of the commanded profile should be now, from the legs of the scenario;
+and body-rate references and an engine setting for that.
 
     climb    gamma_c = (h' + k (hc - h)) / V + what was found missing,   theta_c = gamma_c + alpha (smoothed)
              theta' = k (theta_c - theta)
@@ -17,7 +18,6 @@ import numpy as np
 from beaver_ftc.compiled import kernel
 from beaver_ftc.control.allocation import attainable
 from beaver_ftc.control.outer.holding import protect
-from beaver_ftc.control.outer.profile import advance, turn
 from beaver_ftc.control.outer.state import ALTITUDE, BANK, HEADING, N_CHANNELS, SPEED
 from beaver_ftc.control.power import ceiling
 from beaver_ftc.design.model import AIRSPEED, ALPHA, BETA, DPT, QDYN
@@ -29,6 +29,7 @@ MOST_MISSING = 0.1  # rad of path angle, and times gravity of acceleration
 MOST_DRIFT_RAD_S = 0.1  # of turning that a bank without a turn stands for
 USUAL_S, USUAL_MPS = 20.0, 3.0  # airspeed that power alone can hold: within so much of what it has been
 CUT_INHG_S, RAISE_INHG_S = 8.0, 1.0  # about as fast as the engine follows; and slower than a gust lasts
+INSTANT_S = 1e-9  # frame times are k / rate in floating point
 LEAST_PUSH = 1e-3  # m/s2 per inHg
 SETTLED_S = 30.0  # after a change of heading
 MEAN_S = 10.0  # over which airspeed and arrival are judged: what comes and goes faster is a gust
@@ -38,6 +39,42 @@ MEAN_S = 10.0  # over which airspeed and arrival are judged: what comes and goes
 def clamp(value, most):
     """value within -most and most."""
     return min(max(value, -most), most)
+
+
+@kernel
+def turn(angle):
+    """The same direction within half a turn, rad."""
+    return angle - 2.0 * np.pi * np.floor((angle + np.pi) / (2.0 * np.pi))
+
+
+@kernel
+def begin_leg(autopilot, c, now, t):
+    """Take up the next leg of channel c, which is at `now` as measured."""
+    j = autopilot.leg[c]
+    autopilot.leg[c] = j + 1
+    if not autopilot.commanded[c]:
+        autopilot.commanded[c] = 1
+        autopilot.command[c] = now
+    value = autopilot.value[c, j]
+    autopilot.goal[c] = autopilot.command[c]
+    if not np.isnan(value):
+        away = value - autopilot.command[c]
+        autopilot.goal[c] += turn(away) if c == HEADING else away
+        autopilot.changed_at_s[c] = t
+    autopilot.pace[c] = autopilot.speed[c, j]
+
+
+@kernel
+def advance(autopilot, measured, t):
+    """Bring every channel's command to t s; measured (N_CHANNELS,): where they are."""
+    for c in range(N_CHANNELS):
+        while autopilot.leg[c] < autopilot.legs[c] and t >= autopilot.at_s[c, autopilot.leg[c]] - INSTANT_S:
+            begin_leg(autopilot, c, measured[c], t)
+        if autopilot.commanded[c]:
+            away, most = autopilot.goal[c] - autopilot.command[c], autopilot.pace[c] * autopilot.dt
+            step = min(max(away, -most), most)
+            autopilot.command[c] += step
+            autopilot.moving[c] = step / autopilot.dt if most < np.inf else 0.0
 
 
 @kernel

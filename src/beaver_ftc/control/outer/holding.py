@@ -1,6 +1,6 @@
 """Envelope protection: what can still be held with what is left of the surfaces.
 
-Level flight takes an elevator that depends on dynamic pressure and flap (level.py). What acts like the
+Level flight takes an elevator that depends on dynamic pressure and flap (setup.py). What acts like the
 elevator now is estimated from the balance of the pitch moments,
 
     acting = offset + left u + d / G,    d: what the law's observer finds unexplained

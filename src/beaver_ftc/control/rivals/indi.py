@@ -56,7 +56,7 @@ class IncrementalInversion:
         self.saturated = False
 
     def compile_into(self, rival: np.void) -> int:
-        """Fill the record of compiled.py (dtype RIVAL), in trim; which inner law that is."""
+        """Fill the record of tracking.py (dtype RIVAL), in trim; which inner law that is."""
         trim = self.context.trim_rad[self.leading]
         rival["Kp"], rival["Ki"] = self.option["proportional_per_s"], self.option["integral_per_s2"]
         rival["keep"] = exp(-self.option["filter_per_s"] * self.context.dt_s)

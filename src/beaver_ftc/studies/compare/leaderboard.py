@@ -5,8 +5,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from beaver_ftc.results.looks import BLUE, GREY
 from beaver_ftc.results.metrics import as_json
+from beaver_ftc.results.style import BLUE, GREY
 from beaver_ftc.studies.compare.scores import document_of
 from beaver_ftc.studies.compare.trial import LAW, ORACLE, SCHEME, Entry, SetFlight, Trial, fly_case
 from beaver_ftc.studies.engine.study import Progress, Study, run_study

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.documents.problems import one_line
-from beaver_ftc.results.looks import BLACK
+from beaver_ftc.results.style import BLACK
 from beaver_ftc.studies.present.tables import aligned, number
 
 if TYPE_CHECKING:

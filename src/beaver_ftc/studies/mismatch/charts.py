@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from beaver_ftc.results.looks import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILION, Mark, marks
-from beaver_ftc.results.series import read_series
+from beaver_ftc.results.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILION, Mark, marks
+from beaver_ftc.results.views import read_series
 from beaver_ftc.studies.linear_systems import CHANNELS, pulse_response, response, zeros
 from beaver_ftc.studies.mismatch.linear import LinearAnalysis
 from beaver_ftc.studies.mismatch.sources import SOURCES

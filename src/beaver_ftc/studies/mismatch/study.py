@@ -17,8 +17,7 @@ from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.log import ParquetLog
 from beaver_ftc.results.metrics import as_json, metrics
-from beaver_ftc.results.run import write_report_files
-from beaver_ftc.results.writer import result_folder
+from beaver_ftc.results.writer import result_folder, write_report_files
 from beaver_ftc.scenario.dump import to_yaml
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.engine.study import Progress, Study, run_study

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from beaver_ftc.results.looks import SERIES
+from beaver_ftc.results.style import SERIES
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -24,8 +24,8 @@ from beaver_ftc.flights.samples import Samples, sample
 from beaver_ftc.flights.scoring import ENGINE
 from beaver_ftc.flights.testing import folds, run_tests
 from beaver_ftc.flights.vehicle import Vehicle, load_vehicle
-from beaver_ftc.results.looks import SERIES
 from beaver_ftc.results.metrics import as_json
+from beaver_ftc.results.style import SERIES
 from beaver_ftc.studies.engine.statistics import poisson
 from beaver_ftc.studies.present.figures import panels
 from beaver_ftc.studies.present.files import Files

@@ -10,10 +10,9 @@ from pathlib import Path
 import numpy as np
 
 from beaver_ftc.results.figures import draw
-from beaver_ftc.results.looks import BLUE, GREY, VERMILION, marks
 from beaver_ftc.results.metrics import Document
-from beaver_ftc.results.series import Series
-from beaver_ftc.results.views import AXES, AXIS_NAMES, Panel, Trace, View
+from beaver_ftc.results.style import BLUE, GREY, VERMILION, marks
+from beaver_ftc.results.views import AXES, AXIS_NAMES, Panel, Series, Trace, View
 from beaver_ftc.studies.reproduce.cases import Flown
 from beaver_ftc.studies.reproduce.choices import FAULT_AT_S
 

@@ -174,7 +174,7 @@ def assignment_of(sweep: Sweep, options: Options, index: int) -> Assignment:
 
 def replay(sweep: Sweep, options: Options, index: int) -> Document:
     """Fly one flight of a sweep again, as `run` would, into `out/<sweep>/flights/`; return its metrics."""
-    from beaver_ftc.results.run import run
+    from beaver_ftc.results.writer import run
 
     sweep = named_for(sweep, options.search)
     folder = options.out / sweep.name

@@ -316,8 +316,7 @@ def keep_flight(
     sweep: Sweep, assignment: Assignment, folder: Path, report: bool = False
 ) -> dict[str, Any] | None:
     """Fly one flight as `run` would, into a result folder of its own; of a failure, keep the scenario."""
-    from beaver_ftc.results.run import run
-    from beaver_ftc.results.writer import result_folder
+    from beaver_ftc.results.writer import result_folder, run
     from beaver_ftc.scenario.dump import to_yaml
 
     try:

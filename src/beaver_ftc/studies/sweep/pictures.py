@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from beaver_ftc.results.looks import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILION
+from beaver_ftc.results.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILION
 from beaver_ftc.studies.engine.statistics import wilson
 from beaver_ftc.studies.present.figures import GRID, heat_map, new_figure
 from beaver_ftc.studies.present.files import save

@@ -14,8 +14,8 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from beaver_ftc.loop.flight import Flight
 from beaver_ftc.loop.loop import fly
+from beaver_ftc.loop.outcome import Landing
 from beaver_ftc.scenario.sweep_loader import Sweep, load_sweep
 from beaver_ftc.studies.sweep.sampling import Plan, flight_seed
 
@@ -24,7 +24,7 @@ LAWS = ("fault-tolerant", "oracle", "nominal")
 FLIGHTS = 100
 
 
-def flights(sweep: Sweep, count: int) -> Iterator[dict[str, Flight]]:
+def flights(sweep: Sweep, count: int) -> Iterator[dict[str, Landing]]:
     """The same flight with each law, flight by flight."""
     for run, values in Plan(sweep).assignments(range(count)):
         scenario = sweep.scenario(values, seed=flight_seed(sweep.file.seed, run))

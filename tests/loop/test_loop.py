@@ -8,7 +8,7 @@ import pytest
 from beaver_ftc.control.laws import ORACLE
 from beaver_ftc.control.supervisor import MAX_EVENTS
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
-from beaver_ftc.loop import accounts, frame, loop, summary
+from beaver_ftc.loop import accounts, frame, loop, outcome
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.plant.channels import TRUTH
 from beaver_ftc.results.metrics import metrics
@@ -199,7 +199,7 @@ def test_more_events_than_there_is_room_for_are_counted_and_the_last_is_kept():
     for k in range(10 * stays):
         accounts.note_envelope(envelope, k % 10 >= 7, float(k))
     frames["t"] = 10 * stays - 1
-    exits = summary._envelope_exits(frames[0])
+    exits = outcome._envelope_exits(frames[0])
     assert len(exits) == room
     assert exits[:2] == ((7, 10), (17, 20))
     assert exits[-2:] == ((10 * (room - 2) + 7, 10 * (room - 1)), (10 * stays - 3, 10 * stays - 1))

@@ -6,6 +6,7 @@ import numpy as np
 
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.control.allocation import leaders_of
+from beaver_ftc.control.outer.state import COLUMNS
 from beaver_ftc.control.state import configure
 from beaver_ftc.design.variants import design_of, mass_of
 from beaver_ftc.diagnosis.admitted import admit, gyros_vary, poles_for_noise
@@ -31,6 +32,7 @@ from beaver_ftc.loop.instrument_records import (
     assemble_instruments,
     assemble_watch,
     breaks_instruments,
+    comes_to_be_watched,
     seed_instruments,
     truth_read,
 )
@@ -73,7 +75,7 @@ def _assemble_diagnosis(
     fdi: np.void, config: FdiConfig, dt: float, reach: np.ndarray, aircraft: Aircraft
 ) -> None:
     shared, isolation = fdi["config"], fdi["isolation"]
-    shared["enabled"], shared["dt"] = config.scheme == "adaptive-estimators", dt
+    shared["enabled"], shared["dt"] = config.is_ours, dt
     shared["authority"], shared["every_type"] = _AUTHORITIES[config.authority], config.fault_class == "all"
     shared["abrupt"] = config.fault_profile == "abrupt"
     isolation["thresholds"] = _THRESHOLDS[config.thresholds]
@@ -254,3 +256,21 @@ def y_places(frame: np.void) -> list[int]:
     """Where in the truth the measured signals beside the rates are: y without noise, (4 + declared,)."""
     first = ch.POS + 3 * frame["belief"]["u"].size
     return [ch.ALPHA, ch.BETA, ch.AIRSPEED, ch.QDYN, *range(first, first + int(frame["truth"]["declared"]))]
+
+
+def lay_out(frame: np.void, scenario: Scenario, diagnoses_itself: bool) -> tuple[str, ...]:
+    """Note in a flight's record what there are columns for; returns their names."""
+    fdi, logged, profile = frame["fdi"], frame["logged"], bool(frame["autopilot"]["enabled"])
+    tested = bool(fdi["statistical"]["tests"]["enabled"])
+    logged["estimators"] = fdi["isolation"]["n"] if diagnoses_itself else 0
+    logged["watch"] = comes_to_be_watched(scenario)
+    logged["power"] = frame["control"]["power"]["enabled"] or profile
+    logged["tests"] = fdi["statistical"]["tests"]["n_columns"] if tested else 0
+    return ch.log_columns(
+        estimator_names(scenario.fdi.fault_class, scenario.airframe) if diagnoses_itself else (),
+        bool(logged["power"]),
+        tested,
+        scenario.airframe,
+        profile=COLUMNS if profile else (),
+        watch=bool(logged["watch"]),
+    )

@@ -71,7 +71,7 @@ class Changing:
         layout = loop.frames["control"]["layout"][0]
         frames = assemble(then, layout["trim"], np.array([layout["low"], layout["high"]]))
         loop.anchor(frames[0], then)
-        renews = begins_anew(change, then)
+        renews = renews_diagnosis(change, then)
         detector = before.detector if before and not renews else None
         law = before.law if before and change.law is None else None
         if renews:
@@ -126,11 +126,13 @@ class Changing:
         self.replaced.append(noted)
 
 
-def begins_anew(change: Change, then: Scenario) -> bool:
-    """Whether the diagnosis does, in a flight that goes on as `then`: with other sensors of declared errors
-    as well, since a constant error is then another, and our thresholds hold for one that stays."""
+def renews_diagnosis(change: Change, then: Scenario) -> bool:
+    """Whether the diagnosis begins anew, in a flight that goes on as `then`: as another scheme, told other
+    errors, or with other sensors of declared errors, since a constant error is then another, and our
+    thresholds hold for one that stays."""
+    told = change.scheme is not None or change.declared_sensors is not None
     declared = change.sensors is not None and not then.fdi.bounds.sensors.is_ideal
-    return change.renews_diagnosis or (declared and then.fdi.scheme == "adaptive-estimators")
+    return told or (declared and then.fdi.is_ours)
 
 
 def take_law(frame: np.void, new: np.void) -> None:

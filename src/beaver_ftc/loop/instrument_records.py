@@ -48,7 +48,7 @@ def is_watched(scenario: Scenario) -> bool:
     sound instruments never make the watch speak."""
     wanted = scenario.fdi.sensor_monitor
     needed = wanted == "always" or (wanted == "auto" and breaks_instruments(scenario))
-    return needed and scenario.fdi.scheme == "adaptive-estimators"
+    return needed and scenario.fdi.is_ours
 
 
 def comes_to_be_watched(scenario: Scenario) -> bool:

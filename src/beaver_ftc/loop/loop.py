@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable, Sequence
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -12,14 +12,12 @@ from beaver_ftc.design.variants import anchor, mass_of
 from beaver_ftc.diagnosis import noise_model
 from beaver_ftc.documents.errors import SimulationFailed
 from beaver_ftc.loop import memory
-from beaver_ftc.loop.assembly import assemble, y_places
+from beaver_ftc.loop.assembly import assemble, lay_out, y_places
 from beaver_ftc.loop.cockpit import Cockpit, note_failures, set_origin, travel_rad
-from beaver_ftc.loop.columns import lay_out
 from beaver_ftc.loop.direct import direct
-from beaver_ftc.loop.flight import Flight, LogSink
 from beaver_ftc.loop.frame import FLYING, NOT_FINITE, fly_frame, fly_on, hold, look_inside
 from beaver_ftc.loop.instrument_records import anchor_watch, watch_from_now
-from beaver_ftc.loop.summary import flight_of
+from beaver_ftc.loop.outcome import Landing, landing_of
 from beaver_ftc.plant import channels as ch
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.conditions import ready
@@ -40,6 +38,19 @@ if TYPE_CHECKING:
 
 CHUNK_ROWS = 8192
 AT_ONCE = 256  # frames, a millisecond or two: so long a signal and other threads wait
+
+
+class LogSink(Protocol):
+    """Takes the log as it is flown, in chunks: a ten-hour flight has 3.6 million rows."""
+
+    def open(self, columns: Sequence[str]) -> None:
+        """Called once, with the columns in order."""
+
+    def write(self, rows: np.ndarray) -> None:
+        """rows (n, columns), float64; the array is reused afterwards."""
+
+    def close(self) -> None:
+        """Called once, after the last row."""
 
 
 class Loop:
@@ -147,11 +158,11 @@ class Loop:
         """Compiled frames as this flight calls them: `frame.fly_on`, or another in its place."""
         return direct(kernel, self.frames, self.references, self.log, self._order)
 
-    def land(self) -> Flight:
+    def land(self) -> Landing:
         """What the flight has yielded so far."""
         verdict = self.plugin_frame.verdict if self.plugin_frame and self.plugin_frame.detector else None
         replaced = self.changing.replaced if self.changing else ()
-        return flight_of(self.scenario, self.frames[0], self.columns, verdict, tuple(replaced))
+        return landing_of(self.scenario, self.frames[0], self.columns, verdict, tuple(replaced))
 
     def release(self) -> None:
         """Give aircraft and memory back for another flight: this one is over and not asked again."""
@@ -310,7 +321,7 @@ def fly(
     detector: "Detector | None" = None,
     law: "Law | None" = None,
     prepare: Callable[[Plant], None] | None = None,
-) -> Flight:
+) -> Landing:
     """Fly a scenario. The log goes to `sink`; `progress` is called with the share flown, chunk by chunk.
 
     detector, law: plug-ins to fly with, in place of those the scenario names. prepare: called with the

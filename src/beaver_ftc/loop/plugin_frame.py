@@ -16,7 +16,7 @@ from beaver_ftc.documents.errors import BeaverFtcError, SimulationFailed
 from beaver_ftc.loop import steps
 from beaver_ftc.loop.assembly import y_places
 from beaver_ftc.loop.frame import NOT_FINITE
-from beaver_ftc.loop.summary import verdict_of
+from beaver_ftc.loop.outcome import verdict_of
 from beaver_ftc.plugins import DETECTORS, LAWS, is_compiled, made
 from beaver_ftc.scenario.schema import Scenario
 

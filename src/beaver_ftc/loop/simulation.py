@@ -4,6 +4,7 @@ What is done to a flight is kept, frame by frame: `scenario_flown` says it all a
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from difflib import get_close_matches
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,13 +13,10 @@ from numpy.typing import ArrayLike, NDArray
 from beaver_ftc.control.outer.setup import set_up_profile
 from beaver_ftc.control.supervisor import MODES
 from beaver_ftc.documents.errors import BadInput, suggestion
-from beaver_ftc.loop.asked import near, vector
-from beaver_ftc.loop.flight import Flight, LogSink
-from beaver_ftc.loop.loop import CHUNK_ROWS, FLYING, Loop
+from beaver_ftc.loop.loop import CHUNK_ROWS, FLYING, LogSink, Loop
+from beaver_ftc.loop.outcome import Landing, verdict_of
 from beaver_ftc.loop.plugin_frame import measured_of
-from beaver_ftc.loop.steering import Steering
-from beaver_ftc.loop.summary import verdict_of
-from beaver_ftc.plant.adapter import UnknownProperty
+from beaver_ftc.plant.adapter import Plant, UnknownProperty
 from beaver_ftc.plant.faults import is_there
 from beaver_ftc.plant.gust import GustSchedule
 from beaver_ftc.scenario.airframe import checked_against
@@ -28,15 +26,42 @@ from beaver_ftc.scenario.in_flight import aimed, blown, changed
 from beaver_ftc.scenario.names import UNANTICIPATED
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.sensor_faults import fault_name, sensors_there
-from beaver_ftc.scenario.signals import RAD_PER_DEG
-from beaver_ftc.scenario.sticks import flown, in_force
+from beaver_ftc.scenario.signals import RAD_PER_DEG, sample_deg_s
+from beaver_ftc.scenario.sticks import StickTrack, flown, in_force
 
 if TYPE_CHECKING:
     from beaver_ftc.control.base import Law
     from beaver_ftc.diagnosis.base import Detector, Measured, Verdict
-    from beaver_ftc.plant.adapter import Plant
 
 Vector = NDArray[np.float64]
+
+
+class Steering:
+    """The stick of one flight; `track` keeps its movements."""
+
+    def __init__(self, loop: Loop) -> None:
+        self._loop, self._scenario = loop, loop.scenario
+        self._base: tuple[int, Vector] | None = None
+        self.track = StickTrack()
+
+    def put(self, k: int, stop: int, stick_deg_s: Vector | None) -> None:
+        """Add the stick, (3,) deg/s, to the references of frames k to stop, all in one chunk of the log.
+
+        The sum is formed in deg/s, as a scenario that says the same forms it: to the bit.
+        """
+        self.track.move(k, stick_deg_s)
+        if stick_deg_s is not None:
+            row = slice(k % CHUNK_ROWS, k % CHUNK_ROWS + stop - k)
+            self._loop.references[row] = (self._base_deg_s(k)[row] + stick_deg_s) * RAD_PER_DEG
+
+    def _base_deg_s(self, k: int) -> Vector:
+        """The scenario's own references of the chunk that frame k is in, (rows, 3) deg/s."""
+        start = k - k % CHUNK_ROWS
+        if self._base is None or self._base[0] != start:
+            end = min(start + CHUNK_ROWS, self._loop.n_frames)
+            t = np.arange(start, end) / self._scenario.rate_hz
+            self._base = start, sample_deg_s(self._scenario.reference, t)
+        return self._base[1]
 
 
 class Stepping:
@@ -51,7 +76,7 @@ class Stepping:
         detector: "Detector | None" = None,
         law: "Law | None" = None,
         sink: LogSink | None = None,
-        prepare: "Callable[[Plant], None] | None" = None,
+        prepare: Callable[[Plant], None] | None = None,
     ) -> None:
         self._given, self._plug_ins, self._prepare = scenario, (detector, law), prepare
         self._sink = sink
@@ -168,7 +193,7 @@ class Stepping:
         if not isinstance(frames, int) or frames < 1:
             raise BadInput(f"frames: {frames!r} is out of range, allowed: a whole number of at least 1")
         deflections = None if command is None else self._deflections(command)
-        rate_deg_s = None if stick is None else vector(stick, 3, "stick", "rad/s") / RAD_PER_DEG
+        rate_deg_s = None if stick is None else _vector(stick, 3, "stick", "rad/s") / RAD_PER_DEG
         if self._next > 0:
             self._last.clear()
         self._begin()
@@ -238,7 +263,7 @@ class Stepping:
         try:
             return self._loop.plant.read(name)
         except UnknownProperty:
-            meant = near(name, self._loop.plant)
+            meant = _near(name, self._loop.plant)
             raise BadInput(
                 f"the aircraft has no property {name!r:.80}{meant}, allowed: one that JSBSim lists"
             ) from None
@@ -271,7 +296,7 @@ class Stepping:
             faults = in_force(self._faults, self._now_s)
             return self._scenario.model_copy(update={"faults": faults})
 
-    def _outcome(self) -> Flight:
+    def _outcome(self) -> Landing:
         """What the flight has yielded so far."""
         self._begin()
         loop, flying = self._loop, self._loop.scenario
@@ -343,4 +368,24 @@ class Stepping:
 
     def _deflections(self, command: ArrayLike) -> Vector:
         low, high = self.travel_rad
-        return np.clip(vector(command, low.size, "command", "rad"), low, high)
+        return np.clip(_vector(command, low.size, "command", "rad"), low, high)
+
+
+def _near(name: str, plant: Plant) -> str:
+    """The property of JSBSim's that was meant, as a question; nothing if none is near."""
+    catalogue: Any = plant.fdm.query_property_catalog("")
+    known = [line.split(" ")[0] for line in catalogue.splitlines()]
+    match = get_close_matches(str(name), known, n=1)
+    return f", did you mean {match[0]}?" if match else ""
+
+
+def _vector(given: ArrayLike, size: int, what: str, unit: str) -> Vector:
+    """So many finite numbers, or BadInput."""
+    try:
+        array = np.asarray(given, dtype=float)
+    except (TypeError, ValueError):
+        array = np.empty(0)
+    if array.shape != (size,) or not np.isfinite(array).all():
+        shown = " ".join(repr(given).split())
+        raise BadInput(f"{what}: {shown:.80} is not usable, allowed: {size} finite numbers, {unit}")
+    return array

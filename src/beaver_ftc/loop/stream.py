@@ -15,7 +15,7 @@ from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop import steps, watching
 from beaver_ftc.loop.assembly import assemble
 from beaver_ftc.loop.direct import direct
-from beaver_ftc.loop.summary import estimate_now, verdict_of
+from beaver_ftc.loop.outcome import estimate_now, verdict_of
 from beaver_ftc.plugins import DETECTORS, is_compiled
 from beaver_ftc.scenario.airframe import checked_against
 from beaver_ftc.scenario.given import load

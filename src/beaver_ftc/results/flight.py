@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from beaver_ftc.control.base import Law
     from beaver_ftc.diagnosis.base import Detector
-    from beaver_ftc.loop.flight import Flight as Outcome
+    from beaver_ftc.loop.outcome import Landing
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -38,9 +38,9 @@ class Flight:
     _source: Log | None = field(default=None)
 
     @classmethod
-    def landed(cls, outcome: "Outcome", log: Log | None) -> "Flight":
+    def landed(cls, landing: "Landing", log: Log | None) -> "Flight":
         """Of what the loop yields."""
-        return cls(outcome.scenario, metrics(outcome), log)
+        return cls(landing.scenario, metrics(landing), log)
 
     @cached_property
     def log(self) -> "DataFrame":

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 from beaver_ftc.results.expectations import evaluate
 
 if TYPE_CHECKING:
-    from beaver_ftc.loop.flight import Flight
+    from beaver_ftc.loop.outcome import Landing
     from beaver_ftc.scenario.schema import Scenario
 
 Document = dict[str, Any]
@@ -33,7 +33,7 @@ DRIFT_MPS, DRIFT_M = 5.0, 300.0  # a flight that ends further from where it bega
 _NOT_SIZE = {"actuator", "sensor", "type", "at_s", "end_s", "profile"}
 
 
-def metrics(flight: "Flight") -> Document:
+def metrics(flight: "Landing") -> Document:
     """The metrics of `flight`, key by key in the order documented."""
     scenario = flight.scenario
     fault = first_fault(scenario)
@@ -114,7 +114,7 @@ def versions() -> Document:
     return packages | {"python": platform.python_version()}
 
 
-def _detection(flight: "Flight", fault: Document | None) -> Document:
+def _detection(flight: "Landing", fault: Document | None) -> Document:
     return {
         "detected": flight.detection_time_s is not None,
         "time_s": _number(flight.detection_time_s),
@@ -126,7 +126,7 @@ def _detection(flight: "Flight", fault: Document | None) -> Document:
     }
 
 
-def _isolation(flight: "Flight", fault: Document | None) -> Document:
+def _isolation(flight: "Landing", fault: Document | None) -> Document:
     return {
         "isolated": flight.isolated is not None,
         "fault": flight.isolated,
@@ -170,7 +170,7 @@ def _one_of_several(found: Document, scenario: "Scenario") -> Document:
     }
 
 
-def _meant(flight: "Flight", fault: Document | None) -> Document | None:
+def _meant(flight: "Landing", fault: Document | None) -> Document | None:
     """The declared fault that the verdict is held against: the first, or of several that surface's."""
     if not flight.faults:
         return fault
@@ -197,14 +197,14 @@ def _type_correct(kind: str | None, fault: Document | None) -> bool | None:
     return None if kind is None else fault is not None and kind == fault["type"]
 
 
-def _estimate_deg(flight: "Flight") -> float | None:
+def _estimate_deg(flight: "Landing") -> float | None:
     """The estimate in deg, where it is a deflection."""
     if flight.estimate is None or flight.isolation_type == LOSS_OF_EFFECTIVENESS:
         return None
     return _number(math.degrees(flight.estimate))
 
 
-def _authority(flight: "Flight") -> Document | None:
+def _authority(flight: "Landing") -> Document | None:
     """Per axis, since the fault: share of the demanded acceleration that was given, and for how long what
     holds the rates was beyond what the surfaces can give."""
     if flight.authority is None:
@@ -215,7 +215,7 @@ def _authority(flight: "Flight") -> Document | None:
     }
 
 
-def _engine_power(flight: "Flight") -> Document | None:
+def _engine_power(flight: "Landing") -> Document | None:
     """Since when and for how long engine power stood in for elevator and flap, and how far it went; null if
     it never did."""
     if flight.engine_power is None:
@@ -234,7 +234,7 @@ def _in_deg(off: dict[str, float | None] | None) -> Document | None:
     }
 
 
-def _arrival(flight: "Flight") -> Document | None:
+def _arrival(flight: "Landing") -> Document | None:
     """Where a flight along a profile has come to; null without an autopilot, or if the aircraft is lost."""
     off = _in_deg(flight.arrival)
     if off is None or flight.departure is not None:
@@ -263,12 +263,12 @@ def _false_alarm(detection_time_s: float | None, fault: Document | None) -> bool
     return fault is None or _before_the_fault(detection_time_s, fault)
 
 
-def _alarms_s(flight: "Flight") -> list[float | None]:
+def _alarms_s(flight: "Landing") -> list[float | None]:
     """When there was an alarm: of the diagnosis at the end, and of those that changes in flight replaced."""
     return [flight.detection_time_s, *(change.get("detection_time_s") for change in flight.changes)]
 
 
-def fault_free_s(flight: "Flight") -> float:
+def fault_free_s(flight: "Landing") -> float:
     """Time under observation in which an alarm is a false one: until the first fault, the first alarm of any
     diagnosis, or the end. Rates of false alarms are per this time."""
     scenario, fault = flight.scenario, first_fault(flight.scenario)
@@ -299,7 +299,7 @@ def _before(fault: Document | None, rms_rad_s: Rates) -> Rates | None:
     return None if fault and fault["at_s"] <= 0 else rms_rad_s
 
 
-def _departure(flight: "Flight") -> Document | None:
+def _departure(flight: "Landing") -> Document | None:
     if flight.departure is None:
         return None
     time_s, signal = flight.departure
@@ -319,7 +319,7 @@ def _number(value: float | None) -> float | None:
     return round(float(value), 9)
 
 
-def flown(flight: "Flight") -> Document:
+def flown(flight: "Landing") -> Document:
     """The flight condition, and who diagnosed and controlled."""
     scenario = flight.scenario
     return {
@@ -354,7 +354,7 @@ def sensor_of(fault: Any) -> Document:
     return {"sensor": fault.sensor} if hasattr(fault, "sensor") else {}
 
 
-def hints(flight: "Flight", document: Document) -> list[str]:
+def hints(flight: "Landing", document: Document) -> list[str]:
     """What would mislead a reader who is not told of it: one sentence each."""
     scenario = flight.scenario
     of_diagnosis = (_outside_the_class, _several, _too_small) if scenario.fdi.scheme == OURS else ()
@@ -428,7 +428,7 @@ def _waited(document: Document) -> str:
     )
 
 
-def _drift(flight: "Flight") -> str:
+def _drift(flight: "Landing") -> str:
     """Attitude, height and speed are left alone unless a scenario has an autopilot."""
     if flight.end is None:
         return ""

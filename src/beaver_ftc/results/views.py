@@ -358,10 +358,12 @@ def _unwrap_heading(chunks: Iterable[Series]) -> Iterator[Series]:
 
 
 def _derive(chunk: Series, wanted: Sequence[str]) -> Series:
-    return {name: chunk[name] if name in chunk else _ratio(chunk, sources([name])) for name in wanted}
+    return {
+        name: chunk[name] if name in chunk else _share_of_bound(chunk, sources([name])) for name in wanted
+    }
 
 
-def _ratio(chunk: Series, names: Sequence[str]) -> np.ndarray:
+def _share_of_bound(chunk: Series, names: Sequence[str]) -> np.ndarray:
     """|residual| / threshold, the threshold on the residual's side; NaN where there is no threshold."""
     residual, *bounds = (chunk[name] for name in names)
     bound = bounds[0] if len(bounds) == 1 else np.where(residual < 0, bounds[0], bounds[1])

@@ -31,8 +31,3 @@ class Change(Section):
         if all(value is None for value in said):
             refuse([((), "says no change, allowed: law, scheme, sensors or declared_sensors")])
         return self
-
-    @property
-    def renews_diagnosis(self) -> bool:
-        """Whether the diagnosis begins anew."""
-        return self.scheme is not None or self.declared_sensors is not None

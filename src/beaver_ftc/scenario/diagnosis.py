@@ -221,9 +221,14 @@ class FdiConfig(BaseModel):
     )
 
     @property
+    def is_ours(self) -> bool:
+        """Whether our scheme diagnoses, which is compiled in."""
+        return self.scheme == "adaptive-estimators"
+
+    @property
     def weighs_chance(self) -> bool:
         """Whether our scheme has its statistical detector."""
-        return self.statistical is not None and self.scheme == "adaptive-estimators"
+        return self.statistical is not None and self.is_ours
 
     @property
     def looks_across(self) -> bool:

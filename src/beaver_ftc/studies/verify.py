@@ -18,7 +18,7 @@ import numpy as np
 from beaver_ftc import __version__
 from beaver_ftc.aircraft import load
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
-from beaver_ftc.loop.flight import Flight
+from beaver_ftc.loop.outcome import Landing
 from beaver_ftc.results.metrics import fault_free_s
 from beaver_ftc.scenario.faults import LossOfEffectiveness
 from beaver_ftc.scenario.schema import Scenario
@@ -186,7 +186,7 @@ def _faulty(draw: Draw, schemes: dict[str, dict[str, Any]]) -> Row:
     }
 
 
-def judge(flight: Flight) -> Row:
+def judge(flight: Landing) -> Row:
     """What became of the promises in a flight with one fault; delays in s from the first frame that bears
     it.
     """
@@ -210,7 +210,7 @@ def judge(flight: Flight) -> Row:
     }
 
 
-def _estimate_error(flight: Flight) -> float | None:
+def _estimate_error(flight: Landing) -> float | None:
     """How far the estimated parameter is from the true one as the flight ends."""
     fault = flight.scenario.faults[0]
     if flight.estimate is None or not isinstance(fault, LossOfEffectiveness):

@@ -9,8 +9,8 @@ from typing import Any
 
 from beaver_ftc.documents.errors import BadInput, BeaverFtcError
 from beaver_ftc.documents.paths import data_root
-from beaver_ftc.loop.flight import Flight
 from beaver_ftc.loop.loop import Loop
+from beaver_ftc.loop.outcome import Landing
 from beaver_ftc.results.metrics import metrics
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.compare.replay import Recording, Trace, record, replay
@@ -170,7 +170,7 @@ def _fly(scenario: Scenario, entry: Entry) -> Result:
         return Result(entry, False, 0.0, bool(scenario.faults), error=str(error))
 
 
-def result_of(flight: Flight, entry: Entry, us: float) -> Result:
+def result_of(flight: Landing, entry: Entry, us: float) -> Result:
     """Boil a flight down."""
     document = metrics(flight)
     fault, detection, isolation = document["fault"], document["detection"], document["isolation"]

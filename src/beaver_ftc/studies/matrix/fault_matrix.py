@@ -28,7 +28,7 @@ from beaver_ftc.studies.present.files import Files
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from beaver_ftc.loop.flight import Flight
+    from beaver_ftc.loop.outcome import Landing
     from beaver_ftc.scenario.schema import Scenario
 
 Document = dict[str, Any]
@@ -176,7 +176,7 @@ def fly_case(case: Case) -> Document:
     return {**case._asdict(), **_diagnosis(flight, case), **_tracking(flight, oracle, case), **seen}
 
 
-def _diagnosis(flight: "Flight", case: Case) -> Document:
+def _diagnosis(flight: "Landing", case: Case) -> Document:
     document = metrics(flight)
     isolation, true_type = document["isolation"], flight.scenario.faults[0].type
     return {
@@ -209,7 +209,7 @@ def verdict(document: Document, surface: str, true_type: str) -> str:
     return "named"
 
 
-def _tracking(flight: "Flight", oracle: "Flight", case: Case) -> Document:
+def _tracking(flight: "Landing", oracle: "Landing", case: Case) -> Document:
     axis = own_axis(case)
     ours, best = (_rms_deg_s(one, axis) for one in (flight, oracle))
     return {
@@ -225,7 +225,7 @@ def _tracking(flight: "Flight", oracle: "Flight", case: Case) -> Document:
     }
 
 
-def _rms_deg_s(flight: "Flight", axis: str) -> float:
+def _rms_deg_s(flight: "Landing", axis: str) -> float:
     return degrees((flight.post_fault_rms_rad_s or (0.0,) * 3)["pqr".index(axis)])
 
 

@@ -26,7 +26,7 @@ from beaver_ftc.studies.matrix.fault_matrix import AIRSPEEDS_MPS, AT_S, REFERENC
 from beaver_ftc.studies.present.files import Files
 
 if TYPE_CHECKING:
-    from beaver_ftc.loop.flight import Flight
+    from beaver_ftc.loop.outcome import Landing
     from beaver_ftc.plant.linear import LinearModel
 
 Document = dict[str, Any]
@@ -105,7 +105,7 @@ def _outcome(scenario: "Scenario") -> Document:
     }
 
 
-def _swing(flight: "Flight", kept: Columns) -> Document:
+def _swing(flight: "Landing", kept: Columns) -> Document:
     """RMS pitch rate and swing of the attitude once settled; null if the aircraft was lost."""
     if flight.departure is not None:
         return {"q_rms_deg_s": None, "theta_swing_deg": None}

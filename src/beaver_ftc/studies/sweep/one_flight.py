@@ -26,12 +26,12 @@ from beaver_ftc.studies.sweep.sampling import Assignment, flight_seed
 if TYPE_CHECKING:
     import pyarrow as pa
 
-    from beaver_ftc.loop.flight import Flight
+    from beaver_ftc.loop.outcome import Landing
 
 
 Row = dict[str, Any]
 Document = dict[str, Any]
-Getter = Callable[[Document, "Flight"], Any]
+Getter = Callable[[Document, "Landing"], Any]
 
 FLOWN, DEPARTED, BAD_INPUT, FAILED, CRASHED = "flown", "departed", "bad_input", "failed", "crashed"
 RESULTS = (FLOWN, DEPARTED)  # the statuses of a flight that has metrics
@@ -43,7 +43,7 @@ MODES = ("adaptive", "reallocated", "unanticipated")
 def _at(*path: str) -> Getter:
     """The value at a path of the metrics document; None where a section on the way is null."""
 
-    def get(document: Document, flight: "Flight") -> Any:
+    def get(document: Document, flight: "Landing") -> Any:
         here: Any = document
         for part in path:
             here = None if here is None else here.get(part)
@@ -58,29 +58,29 @@ def _under(kind: str, section: str, *names: str) -> list[tuple[str, str, Getter]
 
 
 def _first_entry(mode: str) -> Getter:
-    def get(document: Document, flight: "Flight") -> Any:
+    def get(document: Document, flight: "Landing") -> Any:
         return next((change["time_s"] for change in document["supervisor"] if change["mode"] == mode), None)
 
     return get
 
 
 def _of_pair(name: str, end: int) -> Getter:
-    def get(document: Document, flight: "Flight") -> Any:
+    def get(document: Document, flight: "Landing") -> Any:
         pair = document["isolation"][name]
         return pair[end] if pair else None
 
     return get
 
 
-def _flown_s(document: Document, flight: "Flight") -> float:
+def _flown_s(document: Document, flight: "Landing") -> float:
     return flight.frames / flight.scenario.rate_hz
 
 
-def _missed_expectations(document: Document, flight: "Flight") -> str:
+def _missed_expectations(document: Document, flight: "Landing") -> str:
     return " ".join(found["name"] for found in document["expectations"] if not found["passed"])
 
 
-def _faults(document: Document, flight: "Flight") -> str:
+def _faults(document: Document, flight: "Landing") -> str:
     """surface:type of each fault that was named, of several at once."""
     named = (found for found in document["isolation"]["faults"] if found["fault"])
     return " ".join(f"{found['fault']}:{found['type'] or 'open'}" for found in named)
@@ -165,7 +165,7 @@ def as_cell(value: Any, kind: str) -> Any:
     return value if kind == "flag" or isinstance(value, str) else json.dumps(value)
 
 
-def row_of(run: int, values: dict[str, Any], seed: int, document: Document, flight: "Flight") -> Row:
+def row_of(run: int, values: dict[str, Any], seed: int, document: Document, flight: "Landing") -> Row:
     """The row of a flight that has metrics."""
     departure = document["departure"]
     status = DEPARTED if departure else FLOWN
@@ -302,7 +302,7 @@ def _row(sweep: Sweep, assignment: Assignment) -> Row:
     index, values = assignment
     seed = flight_seed(sweep.file.seed, index)
     try:
-        flight: Flight = fly(scenario_of(sweep, assignment))
+        flight: Landing = fly(scenario_of(sweep, assignment))
         return row_of(index, values, seed, metrics(flight), flight)
     except BadInput as error:
         return row_of_failure(index, values, seed, BAD_INPUT, str(error))

@@ -1,6 +1,14 @@
-"""From the frame record at the end of a flight to what the flight yields."""
+"""What a flight has yielded, read off its frame record: the verdict, the accounts, the promise of detection.
+
+The instant from which detection was certain is found by accounts.py for the worst-case filters of the
+diagnosis in charge. It binds nobody where those filters raise no alarm (a plug-in, or the statistical test in
+sole authority), where they were not asked any more (an alarm before the fault, or of the watch over the
+instruments), and where what they are told is off by more than is declared (a broken instrument, undeclared
+errors). Then nothing is said.
+"""
 
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 from math import degrees, isfinite
 from typing import Any
 
@@ -12,13 +20,79 @@ from beaver_ftc.design.model import AXES
 from beaver_ftc.diagnosis.base import Verdict
 from beaver_ftc.diagnosis.instrument_words import instrument_found
 from beaver_ftc.diagnosis.scheme import isolated_theta
-from beaver_ftc.diagnosis.state import NOT_ISOLATED, PITCH, ROLL, UNANTICIPATED, YAW
+from beaver_ftc.diagnosis.state import NOT_ISOLATED, PITCH, ROLL, STATISTICS, UNANTICIPATED, YAW
 from beaver_ftc.diagnosis.types.findings import estimate_of, found
-from beaver_ftc.loop.flight import Flight
-from beaver_ftc.loop.guarantee import guaranteed_delay_s
 from beaver_ftc.plant.channels import AIRSPEED, ALTITUDE
+from beaver_ftc.plant.faults import TIME_TOLERANCE_S
 from beaver_ftc.plant.sensing import DEPARTURE_SIGNALS
+from beaver_ftc.scenario.faults import of_a_sensor
+from beaver_ftc.scenario.in_flight import stages
 from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.scenario.warnings import undeclared
+
+
+@dataclass(frozen=True)
+class Landing:
+    """What a flight has yielded: metrics, texts and rows of tables are views of it. Times in s since the
+    start, rates in rad/s, per axis (p, q, r).
+
+    isolated: aileron, elevator, rudder, flap, unanticipated, or None while more than one fault fits
+    (`candidates`). estimate: the isolated fault's parameter, theta in [-1, 0] for a loss of effectiveness.
+    guaranteed_delay_s: from the fault to the instant from which detection was certain, None if that never
+    came. worst_residual_ratio: largest |residual| / threshold in healthy flight; closest_approach: the same
+    of each filter of the bank, the published one first. surface_travel_rad: path of each surface, up and
+    down added. engine_power: if pitch was left to the engine, since when and for how long, s, and the lowest
+    and highest manifold pressure, inHg. faults: of several at once (`fdi.pairs`), as in types/findings.py,
+    the first named first. statistical: when the statistical detector would have raised the alarm, its level
+    in standard deviations, and the largest share of it reached in healthy flight. mode_changes, exits: how
+    many there were of `supervisor` and `envelope_exits`, which hold the first and the last; outside_s: time
+    outside the validated envelope, all exits together. end: airspeed, m/s, and altitude, m, at the end.
+    profile: largest deviation from the commanded one by
+    channel of the autopilot, m, m/s, rad; None where it was not flown. arrival: the deviation's mean over the
+    last 10 s, with its sign. limits: of each limit that protection
+    has put on the command since when, s, on what (airspeed_mps, bank_deg), "at most" or "at least", its value
+    at last, SI, why, and whether it is in force at the end. changes: what was changed in flight:
+    time_s; law and scheme, None for what was not; sensors, True or False; and of a diagnosis that was
+    replaced detection_time_s and isolated. The verdict above is the last diagnosis'.
+    """
+
+    scenario: Scenario
+    frames: int
+    columns: tuple[str, ...]
+    detection_time_s: float | None
+    detection_axis: str | None
+    guaranteed_delay_s: float | None
+    isolation_time_s: float | None
+    isolated: str | None
+    isolation_type: str | None
+    candidates: tuple[str, ...]
+    estimate: float | None
+    pre_fault_rms_rad_s: tuple[float, float, float]
+    post_fault_rms_rad_s: tuple[float, float, float] | None
+    supervisor: tuple[tuple[float, str], ...]
+    envelope_exits: tuple[tuple[float, float], ...]
+    departure: tuple[float, str] | None
+    saturation_s: dict[str, float]
+    worst_residual_ratio: float
+    closest_approach: tuple[float, ...] = ()
+    surface_travel_rad: dict[str, float] = field(default_factory=dict)
+    surface_energy_rad2_s: dict[str, float] = field(default_factory=dict)
+    type_time_s: float | None = None
+    estimate_interval: tuple[float, float] | None = None
+    frequency_rad_s: float | None = None
+    authority: dict[str, tuple[float, float]] | None = None
+    probing_s: tuple[float, float] | None = None
+    engine_power: tuple[float, float, float, float] | None = None
+    faults: tuple[dict[str, Any], ...] = ()
+    statistical: dict[str, float | None] | None = None
+    mode_changes: int = 0
+    exits: int = 0
+    outside_s: float = 0.0
+    end: tuple[float, float] | None = None
+    profile: dict[str, float | None] | None = None
+    arrival: dict[str, float | None] | None = None
+    limits: tuple[tuple[float, str, str, float, str, bool], ...] = ()
+    changes: tuple[dict[str, Any], ...] = ()
 
 
 def _instant(seconds: float) -> float | None:
@@ -41,34 +115,23 @@ def _estimate(fdi: np.void, surface: int) -> float:
     return float(fdi["isolation"]["estimator"][estimator]["theta"][axis])
 
 
-def _isolation(fdi: np.void, surfaces: Sequence[str]) -> dict:
-    """isolated, isolation_type, candidates, estimate, isolation_time_s of a Flight."""
+def _isolation(fdi: np.void, surfaces: Sequence[str]) -> dict[str, Any]:
+    """isolated, isolation_type, candidates, estimate, isolation_time_s of a Landing."""
     if fdi["config"]["every_type"]:
         return found(fdi, surfaces)
-    verdict = int(fdi["verdict"]["isolated"])
+    verdict, detected = int(fdi["verdict"]["isolated"]), bool(fdi["verdict"]["detected"])
     estimators = fdi["isolation"]["estimator"][: int(fdi["isolation"]["n"])]
-    left = [surfaces[int(fie["surface"])] for fie in estimators if not fie["excluded"]]
-    nothing = {"isolated": None, "isolation_type": None, "estimate": None, "isolation_time_s": None}
-    if not fdi["verdict"]["detected"] or verdict == NOT_ISOLATED:
-        return {**nothing, "candidates": tuple(left) if fdi["verdict"]["detected"] else ()}
-    at_s = float(fdi["verdict"]["isolated_at_s"])
+    possible = tuple(surfaces[int(fie["surface"])] for fie in estimators if not fie["excluded"])
+    said: dict[str, Any] = {"isolated": None, "isolation_type": None, "estimate": None}
+    said |= {"isolation_time_s": None, "candidates": possible if detected else ()}
+    if not detected or verdict == NOT_ISOLATED:
+        return said
+    said["isolation_time_s"] = float(fdi["verdict"]["isolated_at_s"])
     if verdict == UNANTICIPATED:
-        return {
-            **nothing,
-            "isolated": "unanticipated",
-            "isolation_type": "unanticipated",
-            "candidates": (),
-            "isolation_time_s": at_s,
-        }
-    fie = fdi["isolation"]["estimator"][verdict]
-    surface = int(fie["surface"])
-    return {
-        "isolated": surfaces[surface],
-        "isolation_type": "loss_of_effectiveness",
-        "candidates": tuple(left),
-        "estimate": _estimate(fdi, surface),
-        "isolation_time_s": at_s,
-    }
+        return said | {"isolated": "unanticipated", "isolation_type": "unanticipated", "candidates": ()}
+    surface = int(fdi["isolation"]["estimator"][verdict]["surface"])
+    named = {"isolated": surfaces[surface], "isolation_type": "loss_of_effectiveness"}
+    return said | named | {"estimate": _estimate(fdi, surface)}
 
 
 def _envelope_exits(frame: np.void) -> tuple[tuple[float, float], ...]:
@@ -139,17 +202,11 @@ def _limits(frame: np.void, surfaces: Sequence[str]) -> tuple[tuple[float, str, 
         (SLOWEST, "airspeed_mps", "at least", pitch),
         (BANK_LIMIT, "bank_deg", "at most", left),
     )
+    since_s, value, in_force = holding["from_s"], holding["value"], holding["in_force"]
     began = [
-        (
-            float(holding["from_s"][k]),
-            what,
-            side,
-            float(holding["value"][k]),
-            why,
-            bool(holding["in_force"][k]),
-        )
+        (float(since_s[k]), what, side, float(value[k]), why, bool(in_force[k]))
         for k, what, side, why in kinds
-        if holding["from_s"][k] >= 0.0
+        if since_s[k] >= 0.0
     ]
     return tuple(sorted(began))
 
@@ -166,33 +223,33 @@ def _statistical(fdi: np.void) -> dict[str, float | None] | None:
     }
 
 
-def _findings(frame: np.void, surfaces: Sequence[str]) -> dict:
-    """detection_time_s, detection_axis and what `_isolation` has, of surfaces or of an instrument."""
+def _alarm(fdi: np.void) -> dict[str, Any]:
+    """detection_time_s and detection_axis of a Landing."""
+    verdict = fdi["verdict"]
+    return {
+        "detection_time_s": _instant(verdict["detected_at_s"]),
+        "detection_axis": AXES[int(verdict["detected_axis"])] if verdict["detected"] else None,
+    }
+
+
+def _findings(frame: np.void, surfaces: Sequence[str]) -> dict[str, Any]:
+    """What `_alarm` and `_isolation` have, of surfaces or of an instrument."""
     fdi = frame["fdi"]
     broken = instrument_found(fdi["watch"], float(frame["t"]))
     if broken is not None:
         return {"detection_axis": None, **broken}
-    detected = fdi["verdict"]["detected"]
-    return {
-        "detection_time_s": _instant(fdi["verdict"]["detected_at_s"]),
-        "detection_axis": AXES[int(fdi["verdict"]["detected_axis"])] if detected else None,
-        **_isolation(fdi, surfaces),
-    }
+    return _alarm(fdi) | _isolation(fdi, surfaces)
 
 
 def verdict_of(frame: np.void, surfaces: Sequence[str]) -> Verdict:
     """What the built-in diagnosis makes of the flight so far, as a plug-in law is given it."""
     fdi = frame["fdi"]
-    broken = instrument_found(fdi["watch"], float(frame["t"]))
-    if broken is not None:
-        kind, left = broken["isolation_type"], broken["candidates"]
-        return Verdict(detected=True, isolated=broken["isolated"], type=kind, candidates=left)
-    if not fdi["verdict"]["detected"]:
+    if not (fdi["verdict"]["detected"] or fdi["watch"]["alarmed"]):
         return Verdict()
-    said = _isolation(fdi, surfaces)
+    said = _findings(frame, surfaces)
     return Verdict(
         detected=True,
-        axis=AXES[int(fdi["verdict"]["detected_axis"])],
+        axis=said["detection_axis"],
         isolated=said["isolated"],
         type=said["isolation_type"],
         estimate=said["estimate"],
@@ -211,13 +268,10 @@ def estimate_now(fdi: np.void, said: Verdict, surfaces: Sequence[str]) -> float 
     return estimate_of(fdi, surface, int(kind))
 
 
-def _of_verdict(fdi: np.void, verdict: Verdict) -> dict:
-    """The same of a Flight, from a plug-in's verdict."""
+def _of_verdict(fdi: np.void, verdict: Verdict) -> dict[str, Any]:
+    """The same of a Landing, from a plug-in's verdict."""
     isolated = verdict.isolated if fdi["verdict"]["detected"] else None
-    detected = fdi["verdict"]["detected"]
-    return {
-        "detection_time_s": _instant(fdi["verdict"]["detected_at_s"]),
-        "detection_axis": AXES[int(fdi["verdict"]["detected_axis"])] if detected else None,
+    return _alarm(fdi) | {
         "isolated": isolated,
         "isolation_type": verdict.type if isolated else None,
         "candidates": tuple(verdict.candidates) if fdi["verdict"]["detected"] else (),
@@ -226,13 +280,35 @@ def _of_verdict(fdi: np.void, verdict: Verdict) -> dict:
     }
 
 
-def flight_of(
+def guaranteed_delay_s(frame: np.void, scenario: Scenario, plugged: bool) -> float | None:
+    """From the fault's first frame to the instant from which its alarm was certain, s; plugged: the detector
+    is a plug-in."""
+    certain_s = float(frame["accounts"]["guarantee"]["certain_after_s"])
+    truth, fdi = frame["truth"], frame["fdi"]
+    if certain_s < 0.0 or not truth["faulted"] or plugged:
+        return None
+    fault_s, verdict = float(truth["fault_at_s"]), fdi["verdict"]
+    early = verdict["detected"] and verdict["detected_at_s"] < fault_s - TIME_TOLERANCE_S
+    if early or fdi["config"]["authority"] == STATISTICS or fdi["watch"]["alarmed"]:
+        return None
+    return None if _is_off(scenario, certain_s) else certain_s - fault_s
+
+
+def _is_off(scenario: Scenario, certain_s: float) -> bool:
+    """Whether by then the diagnosis was told something that is off by more than it reckons with."""
+    if any(of_a_sensor(fault) and fault.at_s <= certain_s for fault in scenario.faults):
+        return True
+    flown = [scenario, *(then for change, then in stages(scenario) if change.at_s <= certain_s)]
+    return any(any(undeclared(each)) for each in flown)
+
+
+def landing_of(
     scenario: Scenario,
     frame: np.void,
     columns: tuple[str, ...],
     verdict: Verdict | None = None,
     replaced: tuple[dict[str, Any], ...] = (),
-) -> Flight:
+) -> Landing:
     """Read the flight's outcome off its frame record; `verdict` is a plug-in detector's last one, `replaced`
     what changes in flight have ended."""
     fdi, accounts, dt = frame["fdi"], frame["accounts"], float(frame["dt"])
@@ -241,7 +317,7 @@ def flight_of(
     departed = int(frame["departed"])
     modes = range(min(int(supervisor["n_modes"]), MAX_EVENTS))
     closest = tuple(float(share) for share in fdi["bank"]["closest"][: max(int(fdi["bank"]["n"]), 1)])
-    return Flight(
+    return Landing(
         scenario=scenario,
         frames=int(frame["k"]),
         columns=columns,

@@ -318,14 +318,14 @@ def test_in_turbulence_it_steadies_too(severity):
 def test_an_ambiguous_verdict_is_no_obstacle():
     flight, _ = lost(45.0, law="fault-tolerant-published", flap_at_s=20.0)
     assert flight.isolated in (None, "unanticipated")
-    assert 20.0 < flight.engine_power[0] < 30.0
+    assert 20.0 < flight.engine_power["from_s"] < 30.0
 
 
 @pytest.mark.parametrize("V", SPEEDS)
 def test_two_jams_named_one_after_the_other_are_acted_upon_at_once(V):
     fdi = {"fault_class": "all", "pairs": True}
     flight, _ = lost(V, 1.0, law="fault-tolerant-published", flap_at_s=20.0, fdi=fdi)
-    assert 21.0 <= flight.engine_power[0] < 21.2
+    assert 21.0 <= flight.engine_power["from_s"] < 21.2
 
 
 def test_the_design_model_knows_what_the_engine_does():

@@ -109,12 +109,12 @@ class Flight:
     type_time_s: float | None = None
     estimate_interval: tuple[float, float] | None = None
     frequency_rad_s: float | None = None
-    authority: dict[str, tuple[float, float]] | None = None
+    authority: dict[str, dict[str, float]] | None = None
     profile: dict[str, float | None] | None = None
     arrival: dict[str, float | None] | None = None
-    limits: tuple[tuple[float, str, str, float, str, bool], ...] = ()
+    limits: tuple[dict[str, Any], ...] = ()
     probing_s: tuple[float, float] | None = None
-    engine_power: tuple[float, float, float, float] | None = None
+    engine_power: dict[str, float] | None = None
     faults: tuple[dict, ...] = ()
     statistical: dict[str, float | None] | None = None
     mode_changes: int = 3

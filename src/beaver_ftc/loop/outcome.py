@@ -47,11 +47,10 @@ class Landing:
     in standard deviations, and the largest share of it reached in healthy flight. mode_changes, exits: how
     many there were of `supervisor` and `envelope_exits`, which hold the first and the last; outside_s: time
     outside the validated envelope, all exits together. end: airspeed, m/s, and altitude, m, at the end.
-    profile: largest deviation from the commanded one by
-    channel of the autopilot, m, m/s, rad; None where it was not flown. arrival: the deviation's mean over the
-    last 10 s, with its sign. limits: of each limit that protection
-    has put on the command since when, s, on what (airspeed_mps, bank_deg), "at most" or "at least", its value
-    at last, SI, why, and whether it is in force at the end. changes: what was changed in flight:
+    profile: largest deviation from the commanded one by channel of the autopilot, m, m/s, rad; None where it
+    was not flown. arrival: the deviation's mean over the last 10 s, with its sign. limits: of each limit that
+    protection has put on the command since when, on what (airspeed_mps, bank_deg), "at most" or "at least",
+    its value at last, why, and whether it is in force at the end. changes: what was changed in flight:
     time_s; law and scheme, None for what was not; sensors, True or False; and of a diagnosis that was
     replaced detection_time_s and isolated. The verdict above is the last diagnosis'.
     """
@@ -80,9 +79,9 @@ class Landing:
     type_time_s: float | None = None
     estimate_interval: tuple[float, float] | None = None
     frequency_rad_s: float | None = None
-    authority: dict[str, tuple[float, float]] | None = None
+    authority: dict[str, dict[str, float]] | None = None
     probing_s: tuple[float, float] | None = None
-    engine_power: tuple[float, float, float, float] | None = None
+    engine_power: dict[str, float] | None = None
     faults: tuple[dict[str, Any], ...] = ()
     statistical: dict[str, float | None] | None = None
     mode_changes: int = 0
@@ -91,7 +90,7 @@ class Landing:
     end: tuple[float, float] | None = None
     profile: dict[str, float | None] | None = None
     arrival: dict[str, float | None] | None = None
-    limits: tuple[tuple[float, str, str, float, str, bool], ...] = ()
+    limits: tuple[dict[str, Any], ...] = ()
     changes: tuple[dict[str, Any], ...] = ()
 
 
@@ -152,24 +151,30 @@ def _probing_s(frame: np.void) -> tuple[float, float] | None:
     return began, (ended if ended >= 0.0 else float(frame["t"]))
 
 
-def _authority(frame: np.void) -> dict[str, tuple[float, float]] | None:
-    """Per axis, after the fault: share of the demanded acceleration given, and seconds beyond holding."""
+def _authority(frame: np.void) -> dict[str, dict[str, float]] | None:
+    """Per axis, after the fault: share of the demanded acceleration given, and for how long what holds the
+    rates was beyond what the surfaces can give."""
     if not frame["accounts"]["tracking"]["frames_since"]:
         return None
     authority = frame["accounts"]["authority"]
     both = zip(authority["demanded"], authority["lacking"], strict=True)
     shares = [1.0 - float(lack / asked) if asked > 0.0 else 1.0 for asked, lack in both]
     beyond_s = [int(n) * float(frame["dt"]) for n in authority["beyond_frames"]]
-    return dict(zip(AXES, zip(shares, beyond_s, strict=True), strict=True))
+    each = zip(AXES, shares, beyond_s, strict=True)
+    return {axis: {"given_share": share, "beyond_s": time_s} for axis, share, time_s in each}
 
 
-def _engine_power(frame: np.void) -> tuple[float, float, float, float] | None:
-    """Since when and for how long pitch was left to the engine, s, and the range it went through, inHg."""
+def _engine_power(frame: np.void) -> dict[str, float] | None:
+    """Since when and for how long pitch was left to the engine, and how far it went; None if it never was."""
     power = frame["control"]["power"]
     if not power["enabled"] or power["from_s"] < 0.0:
         return None
-    in_charge_s = int(power["frames"]) * float(frame["dt"])
-    return float(power["from_s"]), in_charge_s, float(power["least"]), float(power["greatest"])
+    return {
+        "from_s": float(power["from_s"]),
+        "in_charge_s": int(power["frames"]) * float(frame["dt"]),
+        "lowest_inhg": float(power["least"]),
+        "highest_inhg": float(power["greatest"]),
+    }
 
 
 def _by_channel(frame: np.void, off: str) -> dict[str, float | None] | None:
@@ -188,8 +193,9 @@ def _profile(frame: np.void) -> dict[str, float | None] | None:
     return None if off is None else off | {LIMITED: limited}
 
 
-def _limits(frame: np.void, surfaces: Sequence[str]) -> tuple[tuple[float, str, str, float, str, bool], ...]:
-    """What envelope protection has limited, in the order in which the limits began."""
+def _limits(frame: np.void, surfaces: Sequence[str]) -> tuple[dict[str, Any], ...]:
+    """What envelope protection has limited, in the order in which the limits began; value: at last, airspeed
+    in m/s, bank in deg."""
     if not frame["autopilot"]["enabled"]:
         return ()
     holding, main = frame["autopilot"]["holding"], frame["control"]["layout"]["main"]
@@ -202,13 +208,19 @@ def _limits(frame: np.void, surfaces: Sequence[str]) -> tuple[tuple[float, str, 
         (SLOWEST, "airspeed_mps", "at least", pitch),
         (BANK_LIMIT, "bank_deg", "at most", left),
     )
-    since_s, value, in_force = holding["from_s"], holding["value"], holding["in_force"]
     began = [
-        (float(since_s[k]), what, side, float(value[k]), why, bool(in_force[k]))
+        {
+            "time_s": float(holding["from_s"][k]),
+            "limits": what,
+            "side": side,
+            "value": degrees(holding["value"][k]) if k == BANK_LIMIT else float(holding["value"][k]),
+            "because": why,
+            "in_force": bool(holding["in_force"][k]),
+        }
         for k, what, side, why in kinds
-        if since_s[k] >= 0.0
+        if holding["from_s"][k] >= 0.0
     ]
-    return tuple(sorted(began))
+    return tuple(sorted(began, key=lambda limit: tuple(limit.values())))
 
 
 def _statistical(fdi: np.void) -> dict[str, float | None] | None:

@@ -51,32 +51,25 @@ def metrics(flight: "Landing") -> Document:
         "tracking": {
             "pre_fault_rms_deg_s": _per_axis_deg_s(_before(fault, flight.pre_fault_rms_rad_s)),
             "post_fault_rms_deg_s": _per_axis_deg_s(flight.post_fault_rms_rad_s),
-            "surface_travel_deg": {
-                surface: _number(math.degrees(path)) for surface, path in flight.surface_travel_rad.items()
-            },
-            "surface_energy_deg2_s": {
-                surface: _number(math.degrees(math.degrees(spent)))
-                for surface, spent in flight.surface_energy_rad2_s.items()
-            },
+            "surface_travel_deg": _rounded(_each_in_deg(flight.surface_travel_rad)),
+            "surface_energy_deg2_s": _rounded(_each_in_deg(_each_in_deg(flight.surface_energy_rad2_s))),
         },
-        "supervisor": [{"time_s": _number(time), "mode": mode} for time, mode in flight.supervisor],
-        "changes": [_change(change) for change in flight.changes],
+        "supervisor": [_rounded({"time_s": time, "mode": mode}) for time, mode in flight.supervisor],
+        "changes": _rounded(flight.changes),
         "mode_changes_left_out": flight.mode_changes - len(flight.supervisor),
-        "envelope_exits": [
-            {"start_s": _number(start), "end_s": _number(end)} for start, end in flight.envelope_exits
-        ],
+        "envelope_exits": [_rounded({"start_s": out, "end_s": back}) for out, back in flight.envelope_exits],
         "envelope": {
             "exits": flight.exits,
             "outside_s": _number(flight.outside_s),
             "exits_left_out": flight.exits - len(flight.envelope_exits),
         },
         "departure": _departure(flight),
-        "authority": _authority(flight),
-        "engine_power": _engine_power(flight),
+        "authority": _rounded(flight.authority),
+        "engine_power": _rounded(flight.engine_power),
         "profile": _in_deg(flight.profile),
         "arrival": _arrival(flight),
-        "limits": [_limit(limit) for limit in flight.limits],
-        "saturation_s": {surface: _number(time) for surface, time in flight.saturation_s.items()},
+        "limits": [_rounded(limit) for limit in flight.limits],
+        "saturation_s": _rounded(flight.saturation_s),
     }
     document["hints"] = hints(flight, document)
     expectations = evaluate(scenario.expect, document)
@@ -121,8 +114,7 @@ def _detection(flight: "Landing", fault: Document | None) -> Document:
         "delay_s": _delay(flight.detection_time_s, fault, flight.scenario),
         "axis": flight.detection_axis,
         "guaranteed_delay_s": _number(flight.guaranteed_delay_s),
-        "statistical": flight.statistical
-        and {key: _number(value) for key, value in flight.statistical.items()},
+        "statistical": _rounded(flight.statistical),
     }
 
 
@@ -139,9 +131,9 @@ def _isolation(flight: "Landing", fault: Document | None) -> Document:
         "type_correct": _type_correct(flight.isolation_type, _meant(flight, fault)),
         "type_delay_s": _delay(flight.type_time_s, fault, flight.scenario),
         "estimate_deg": _estimate_deg(flight),
-        "estimate_interval": [_number(end) for end in flight.estimate_interval or ()] or None,
+        "estimate_interval": _rounded(flight.estimate_interval or ()) or None,
         "frequency_rad_s": _number(flight.frequency_rad_s),
-        "probing_s": [_number(instant) for instant in flight.probing_s or ()] or None,
+        "probing_s": _rounded(flight.probing_s or ()) or None,
         "faults": [_one_of_several(found, flight.scenario) for found in flight.faults],
     }
 
@@ -165,7 +157,7 @@ def _one_of_several(found: Document, scenario: "Scenario") -> Document:
         "type_delay_s": _delay(found.get("type_time_s"), fault, scenario),
         "estimate": _number(estimate),
         "estimate_deg": _number(in_deg),
-        "estimate_interval": [_number(end) for end in found.get("estimate_interval") or ()] or None,
+        "estimate_interval": _rounded(found.get("estimate_interval") or ()) or None,
         "frequency_rad_s": _number(found.get("frequency_rad_s")),
     }
 
@@ -204,26 +196,6 @@ def _estimate_deg(flight: "Landing") -> float | None:
     return _number(math.degrees(flight.estimate))
 
 
-def _authority(flight: "Landing") -> Document | None:
-    """Per axis, since the fault: share of the demanded acceleration that was given, and for how long what
-    holds the rates was beyond what the surfaces can give."""
-    if flight.authority is None:
-        return None
-    return {
-        axis: {"given_share": _number(share), "beyond_s": _number(beyond_s)}
-        for axis, (share, beyond_s) in flight.authority.items()
-    }
-
-
-def _engine_power(flight: "Landing") -> Document | None:
-    """Since when and for how long engine power stood in for elevator and flap, and how far it went; null if
-    it never did."""
-    if flight.engine_power is None:
-        return None
-    names = ("from_s", "in_charge_s", "lowest_inhg", "highest_inhg")
-    return {name: _number(value) for name, value in zip(names, flight.engine_power, strict=True)}
-
-
 def _in_deg(off: dict[str, float | None] | None) -> Document | None:
     """Deviations from the commanded profile; null without an autopilot, or where a channel is not flown."""
     if off is None:
@@ -241,19 +213,6 @@ def _arrival(flight: "Landing") -> Document | None:
         return None
     outside = bool(flight.envelope_exits) and math.isinf(flight.envelope_exits[-1][1])
     return {**off, "in_envelope": not outside}
-
-
-def _limit(limit: tuple[float, str, str, float, str, bool]) -> Document:
-    """One limit of envelope protection: airspeed in m/s, bank in deg; value: at last."""
-    since_s, what, side, value, why, in_force = limit
-    return {
-        "time_s": _number(since_s),
-        "limits": what,
-        "side": side,
-        "value": _number(math.degrees(value) if what == "bank_deg" else value),
-        "because": why,
-        "in_force": in_force,
-    }
 
 
 def _false_alarm(detection_time_s: float | None, fault: Document | None) -> bool:
@@ -274,12 +233,6 @@ def fault_free_s(flight: "Landing") -> float:
     scenario, fault = flight.scenario, first_fault(flight.scenario)
     ends = [flight.frames / scenario.rate_hz, *(time_s for time_s in _alarms_s(flight) if time_s is not None)]
     return min(ends if fault is None else [*ends, fault["at_s"]])
-
-
-def _change(change: Document) -> Document:
-    """What was changed in flight; detection_time_s and isolated are of a diagnosis that ended with it."""
-    times: Document = {key: _number(change[key]) for key in ("time_s", "detection_time_s") if key in change}
-    return {**change, **times}
 
 
 def _before_the_fault(time_s: float, fault: Document) -> bool:
@@ -309,7 +262,21 @@ def _departure(flight: "Landing") -> Document | None:
 def _per_axis_deg_s(rates_rad_s: Rates | None) -> Document | None:
     if rates_rad_s is None:
         return None
-    return {axis: _number(math.degrees(rate)) for axis, rate in zip(AXES, rates_rad_s, strict=True)}
+    in_deg: Document = _rounded(_each_in_deg(dict(zip(AXES, rates_rad_s, strict=True))))
+    return in_deg
+
+
+def _each_in_deg(angles: dict[str, float]) -> dict[str, float]:
+    return {name: math.degrees(angle) for name, angle in angles.items()}
+
+
+def _rounded(value: Any) -> Any:
+    """A part of a landing as the document has it: each number as `_number` gives it, a sequence as a list."""
+    if isinstance(value, dict):
+        return {key: _rounded(entry) for key, entry in value.items()}
+    if isinstance(value, list | tuple):
+        return [_rounded(entry) for entry in value]
+    return _number(value) if isinstance(value, float) else value
 
 
 def _number(value: float | None) -> float | None:

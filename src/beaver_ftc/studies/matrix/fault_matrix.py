@@ -220,7 +220,7 @@ def _tracking(flight: "Landing", oracle: "Landing", case: Case) -> Document:
         "departure_s": flight.departure[0] if flight.departure else None,
         "oracle_departure_s": oracle.departure[0] if oracle.departure else None,
         "departure_signal": flight.departure[1] if flight.departure else None,
-        "oracle_beyond_s": oracle.authority[axis][1] if oracle.authority else 0.0,
+        "oracle_beyond_s": oracle.authority[axis]["beyond_s"] if oracle.authority else 0.0,
         "oracle_left_envelope_s": oracle.envelope_exits[0][0] if oracle.envelope_exits else None,
     }
 

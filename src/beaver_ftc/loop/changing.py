@@ -13,7 +13,6 @@ import numpy as np
 
 from beaver_ftc.control.laws import NOMINAL, ORACLE, REJECTING
 from beaver_ftc.loop.assembly import assemble
-from beaver_ftc.loop.instrument_records import enable_watch, read_more
 from beaver_ftc.loop.plugin_frame import PluginFrame, named_detector, named_law, plugged
 from beaver_ftc.plant.faults import NEVER, TIME_TOLERANCE_S
 from beaver_ftc.scenario.change import Change
@@ -103,7 +102,7 @@ class Changing:
             take_instruments(frame["instruments"], new["instruments"])
         forces = frame["fdi"]["statistical"]["forces"]["known"]
         if frame["fdi"]["watch"]["enabled"] or frame["instruments"]["engine"] or forces:
-            read_more(loop)
+            loop.read_more()
         frame["control"]["power"]["enabled"] = new["control"]["power"]["enabled"]
         frame["control"]["allocation"]["hands_back"] = 1
         take_plugins(loop, stage.plugins)
@@ -113,7 +112,7 @@ class Changing:
         flight."""
         wanted = self._loop.scenario.fdi.sensor_monitor != "never" and fdi["config"]["enabled"]
         if self._loop.sensor_schedule.any and wanted and not fdi["watch"]["enabled"]:
-            enable_watch(self._loop, fdi)
+            self._loop.enable_watch(fdi)
 
     def _note(self, stage: Stage) -> None:
         """Say what is changed, and what becomes of a verdict that ends with it."""

@@ -14,12 +14,8 @@ from beaver_ftc.diagnosis.forces import tell_apart
 from beaver_ftc.diagnosis.views import across_a_column
 from beaver_ftc.diagnosis.watch import NOBODY, POLES_PER_S
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.loop import steps
-from beaver_ftc.loop.direct import direct
 from beaver_ftc.plant import channels as ch
 from beaver_ftc.plant.instruments import (
-    AX,
-    ENGINE_SPEED,
     LONGEST_DELAY,
     NOISE_LIMIT_SIGMA,
     PHI,
@@ -182,44 +178,3 @@ def anchor_watch(watch: np.void, design: np.ndarray, y: np.ndarray) -> None:
     """Show the watch the trim: y, and how the rates are damped there; design: the designer's record, (1,)."""
     watch["trim"][3:7] = y[:4]
     watch["damping"] = gust_effect(DesignModel(design.copy()), y)
-
-
-def watch_from_now(loop: Any) -> None:
-    """Begin, between two frames of a Loop, to read further instruments and watch all; again is harmless."""
-    frame = loop.frames[0]
-    watch = frame["fdi"]["watch"]
-    read_more(loop)
-    wanted = loop.scenario.fdi.sensor_monitor != "never" and frame["fdi"]["config"]["enabled"]
-    if wanted and not watch["enabled"]:
-        enable_watch(loop, frame["fdi"])
-        if frame["k"] > 0:
-            if not frame["measured"]["inertial"]:
-                _read_further(loop, frame["measured"])
-            direct(steps.begin_watch, loop.frames)(loop.frames)
-
-
-def enable_watch(loop: Any, fdi: np.void) -> None:
-    """Have a watch that was not wanted before the flight; the trim is shown to it now. Accelerometers are no
-    longer taken at their word."""
-    frame = loop.frames[0]
-    fdi["watch"]["enabled"], fdi["statistical"]["air"]["read"] = 1, 0
-    fdi["statistical"]["inertial_air"]["moving"] = 0
-    anchor_watch(fdi["watch"], np.array([frame["belief"]["design"]]), loop.start_y)
-
-
-def read_more(loop: Any) -> None:
-    """Have the further instruments read from the next frame on."""
-    truth, aircraft = loop.frames[0]["truth"], loop.aircraft
-    channels = (*ch.truth_channels(aircraft), *ch.further_channels(aircraft))
-    if truth["n"] < len(channels):
-        truth["n"] = len(channels)
-        truth["factor"][: len(channels)] = [factor for _, _, factor in channels]
-        loop.cockpit = type(loop.cockpit)(loop.plant, loop.frames)
-
-
-def _read_further(loop: Any, measured: np.void) -> None:
-    """Put what further instruments would say of the frame just flown among the readings, without errors."""
-    values = [loop.plant.read(name) * factor for _, name, factor in ch.further_channels(loop.aircraft)]
-    measured["signal"][AX:] = np.array(values[:3]) / values[3]
-    if len(values) > 4:
-        measured["engine"], measured["signal"][ENGINE_SPEED:AX] = 1, values[4:]

@@ -11,12 +11,12 @@ from beaver_ftc.control.outer.setup import set_up_autopilot
 from beaver_ftc.design.variants import anchor, mass_of
 from beaver_ftc.diagnosis import noise_model
 from beaver_ftc.documents.errors import SimulationFailed
-from beaver_ftc.loop import memory
+from beaver_ftc.loop import memory, steps
 from beaver_ftc.loop.assembly import assemble, lay_out, y_places
 from beaver_ftc.loop.cockpit import Cockpit, note_failures, set_origin, travel_rad
 from beaver_ftc.loop.direct import direct
 from beaver_ftc.loop.frame import FLYING, NOT_FINITE, fly_frame, fly_on, hold, look_inside
-from beaver_ftc.loop.instrument_records import anchor_watch, watch_from_now
+from beaver_ftc.loop.instrument_records import anchor_watch
 from beaver_ftc.loop.outcome import Landing, landing_of
 from beaver_ftc.plant import channels as ch
 from beaver_ftc.plant.adapter import Plant
@@ -24,6 +24,7 @@ from beaver_ftc.plant.conditions import ready
 from beaver_ftc.plant.configure import take_off
 from beaver_ftc.plant.faults import FaultSchedule
 from beaver_ftc.plant.gust import GustSchedule, MovingAir
+from beaver_ftc.plant.instruments import AX, ENGINE_SPEED
 from beaver_ftc.plant.reuse import give_back
 from beaver_ftc.plant.sensor_faults import SensorFaultSchedule
 from beaver_ftc.plugins import DETECTORS, LAWS, is_compiled
@@ -225,7 +226,44 @@ class Loop:
         self.schedule.declare(faults)
         self.sensor_schedule.declare(faults)
         if self.sensor_schedule.any:
-            watch_from_now(self)
+            self._watch_from_now()
+
+    def _watch_from_now(self) -> None:
+        """Begin, between two frames, to read further instruments and watch all; again is harmless."""
+        frame = self.frames[0]
+        fdi = frame["fdi"]
+        self.read_more()
+        wanted = self.scenario.fdi.sensor_monitor != "never" and fdi["config"]["enabled"]
+        if wanted and not fdi["watch"]["enabled"]:
+            self.enable_watch(fdi)
+            if frame["k"] > 0:
+                if not frame["measured"]["inertial"]:
+                    self._read_further(frame["measured"])
+                direct(steps.begin_watch, self.frames)(self.frames)
+
+    def enable_watch(self, fdi: np.void) -> None:
+        """Have a watch that was not wanted before the flight; the trim is shown to it now. Accelerometers are
+        no longer taken at their word."""
+        fdi["watch"]["enabled"], fdi["statistical"]["air"]["read"] = 1, 0
+        fdi["statistical"]["inertial_air"]["moving"] = 0
+        anchor_watch(fdi["watch"], np.array([self.frames[0]["belief"]["design"]]), self.start_y)
+
+    def read_more(self) -> None:
+        """Have the further instruments read from the next frame on."""
+        truth = self.frames[0]["truth"]
+        channels = (*ch.truth_channels(self.aircraft), *ch.further_channels(self.aircraft))
+        if truth["n"] < len(channels):
+            truth["n"] = len(channels)
+            truth["factor"][: len(channels)] = [factor for _, _, factor in channels]
+            self.cockpit = Cockpit(self.plant, self.frames)
+
+    def _read_further(self, measured: np.void) -> None:
+        """Put among the readings what further instruments would say of this frame, without errors."""
+        further = ch.further_channels(self.aircraft)
+        values = [self.plant.read(name) * factor for _, name, factor in further]
+        measured["signal"][AX:] = np.array(values[:3]) / values[3]
+        if len(values) > 4:
+            measured["engine"], measured["signal"][ENGINE_SPEED:AX] = 1, values[4:]
 
     def fly_segment(self, k: int, stop: int) -> int:
         """Frames k to stop, in which no fault changes."""

@@ -426,3 +426,20 @@ def test_a_wrong_airspeed_turns_the_flow_at_most_by_what_it_makes_of_the_pull():
     turned = pull * (1.0 / (V - 2.0) - 1.0 / V)
     assert (turned < rates[1] - rates[0]).all()
     assert rates[1] - rates[0] == pytest.approx(turned, rel=0.3)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_momentary_errors_of_the_attitude_stay_within_bounds_that_remember_long(seed):
+    """A heading that leaps back and forth turns each time about the axis that a blurred bank has by then."""
+    rng, step, signal = np.random.default_rng(seed), new_step(), reading(rates=np.zeros(3))
+    step["decay"], step["drift"] = (0.0, 0.99, 0.9999), 0.0
+    step["offset"][PHI : PHI + 3] = sizes = np.array([1e-3, 1e-3, 0.06])
+    true = signal[PHI : PHI + 3] * (0.0, 1.0, 1.0)
+    for k in range(400):
+        signal[PHI : PHI + 3] = true + sizes * rng.choice([-1.0, 0.0, 1.0], 3)
+        if k == 0:
+            redundancy.begin(step, signal, signal[AX:])
+        else:
+            redundancy.check(step, signal, False)
+            redundancy.look(step, signal, signal[AX:])
+        assert (step["test"]["share"][TURN : TURN + 3] <= 1.0).all(), k

@@ -61,6 +61,16 @@ def test_sound_declared_instruments_are_never_suspected(words):
     assert found.log["detected"].max() == 0.0
 
 
+def test_a_heading_that_leaps_past_north_is_sound_while_a_blurred_bank_swings():
+    """A scale error of the heading comes and goes there, and turns each time about another axis."""
+    errors = has(psi={"scale_error": 0.01}, phi={"noise_std_deg": 0.01})
+    errors["fdi"]["bounds"]["turbulence"] = "moderate"
+    air = {"turbulence": "dryden", "severity": "moderate"}
+    for seed in range(40):
+        flight = flown(duration_s=0.3, rate_hz=92, seed=seed, environment=air, **errors)
+        assert not flight.metrics["detection"]["detected"], seed
+
+
 @pytest.mark.parametrize("substeps", [1, 2, 5])
 @pytest.mark.parametrize(
     ("sensor", "kind", "tests"),

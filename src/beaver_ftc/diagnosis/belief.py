@@ -32,11 +32,14 @@ def sums_dtype(n: int) -> np.dtype:
 
 @lru_cache
 def means_dtype(n: int) -> np.dtype:
-    """Means over the elapsed frame. acceleration: f + G u; Gu_spread: see `spread`. Within it, where faults
+    """Means over the elapsed frame. acceleration: f + G u; Gu_spread: see `spread`. G_foreseen, Gu_foreseen:
+    with G of the frame before, of which the readings of this one know nothing: a law answers what they are
+    off by, and chance would take its answer for the work of a broken surface. Within it, where faults
     of every type are in question: G_least, G_most on each surface's dominant axis, and u_least, u_most, where
     a healthy one was."""
     fields = [
         ("G", "f8", (3, n)), ("Gu", "f8", (3, n)), ("Gu_spread", "f8", (3, n)), ("acceleration", "f8", (3,)),
+        ("G_foreseen", "f8", (3, n)), ("Gu_foreseen", "f8", (3, n)),
         ("G_least", "f8", (n,)), ("G_most", "f8", (n,)), ("u_least", "f8", (n,)), ("u_most", "f8", (n,)),
     ]  # fmt: skip
     return np.dtype(fields, align=True)
@@ -107,8 +110,11 @@ def elapse(belief, bound):
     for i in range(3):
         rate = share * total.f[i]
         for s in range(belief.u.size):
+            mean.G_foreseen[i, s] = mean.G[i, s]
             mean.G[i, s] = share * total.G[i, s]
             mean.Gu[i, s] = share * total.Gu[i, s]
+            moved = mean.G_foreseen[i, s] / mean.G[i, s] if mean.G[i, s] != 0.0 else 0.0
+            mean.Gu_foreseen[i, s] = moved * mean.Gu[i, s]
             rate += mean.Gu[i, s]
         mean.acceleration[i] = rate
         bound.eta_bar[i] = share * total.eta_bar[i]

@@ -213,12 +213,15 @@ def misjudged(step, turning, rates):
 @kernel
 def allow_turning(step, signal, turning, rates):
     """The same as `allow`, of attitude. That a constant error of it turns with the aircraft: of the rates
-    J(phi, theta) (phi', theta', psi') it changes J."""
+    J(phi, theta) (phi', theta', psi') it changes J. An error of a moment turns an axis when it comes and back
+    when it goes, and J has changed between."""
     test, E, n = step.test, step.error_then, step.changing
     level = 1.0 / np.cos(min(steepest(step, signal), STEEPEST_RAD))
     tilt, around = E[PHI] + E[THETA] + E[PSI], step.h * turning
+    tipped = abs(signal[PHI] - step.then[PHI]) + abs(signal[THETA] - step.then[THETA])
+    momentary = E[THETA] - step.steady[THETA] + E[PSI] - step.steady[PSI] + n[THETA] + n[PSI]
     for i in range(3):
-        by_attitude = turning * (tilt + level * E[THETA])
+        by_attitude = turning * (tilt + level * E[THETA]) + tipped * momentary / step.h
         test[TURN + i].rate = TURNING_RAD_S + 2.0 * step.drift + E[P + i] + around * rates + by_attitude
         by_attitude = 2.0 * level * turning * (E[PHI] + E[THETA])
         off = TURNING_RAD_S + (1.0 + level * around) * rates + by_attitude

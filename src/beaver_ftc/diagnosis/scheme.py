@@ -116,12 +116,12 @@ def compare_likelihoods(fdi, belief, measured, k, t):
     air.elapse(seen, belief.share)
     if inertial.moving:
         air.elapse(inertial, belief.share)
-    statistical.signatures(blocks, mean.Gu, unanticipated_pitch(belief.design, y, 1.0))
+    statistical.signatures(blocks, mean.Gu_foreseen, unanticipated_pitch(belief.design, y, 1.0))
     latched, ends = chances.alarm.detected_at_s >= 0.0, not fdi.config.abrupt
     statistical.observe(
         tests, noise.bounded, blocks, seen, fdi.bank.innovation, fdi.config.dt, k, latched, ends
     )
-    across.face(views, forces_felt, seen, fdi.bound, mean.G, mean.Gu)
+    across.face(views, forces_felt, seen, fdi.bound, mean.G_foreseen, mean.Gu_foreseen)
     across.compose(
         views, tests.tolerated, noise, blocks, forces_felt, seen, inertial, fdi.bank.innovation, y[AIRSPEED]
     )

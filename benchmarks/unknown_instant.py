@@ -3,7 +3,7 @@
 The latter is Page's [Page1954]: the largest log likelihood ratio of "this fault, since some instant" that any
 instant has. Where observations have one distribution before and one after, no test has a shorter worst mean
 delay at the same mean time between false alarms. It is told surface and magnitude, and has the filter of
-`studies/engine/clairvoyant.py`; instants are 0.05 s apart and at most 10 s back. Its level gives at most 20
+`diagnosis/bounds/clairvoyant.py`; instants are 0.05 s apart and at most 10 s back. Its level gives at most 20
 false alarms per hour on healthy flights, as in `beaver-ftc power`.
 
     python benchmarks/unknown_instant.py [BLOCKS] [HEALTHY_FLIGHTS]
@@ -15,8 +15,8 @@ from statistics import fmean
 
 import numpy as np
 
+from beaver_ftc.diagnosis.bounds.clairvoyant import Whitening, chance
 from beaver_ftc.studies.compare.replay import Recording, Trace, aware_of_the_air, record, trace
-from beaver_ftc.studies.engine.clairvoyant import Whitening, chance
 from beaver_ftc.studies.power.chances import level_for
 from beaver_ftc.studies.power.survey import (
     STATISTICAL,

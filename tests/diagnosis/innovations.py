@@ -13,7 +13,9 @@ from statistics_of import Statistical
 from beaver_ftc.compiled import kernel
 from beaver_ftc.design.coefficients import MASS
 from beaver_ftc.design.engine import DPT_0, KW_TO_DPT, SEA_LEVEL_DENSITY_KG_M3
-from beaver_ftc.diagnosis import gusts, likelihood, noise_model, statistical, whitening
+from beaver_ftc.diagnosis import likelihood, noise_model, statistical, whitening
+from beaver_ftc.diagnosis.bounds import variances
+from beaver_ftc.diagnosis.bounds.declared import Errors
 from beaver_ftc.diagnosis.likelihood import BLOCK, MAX_HYPOTHESES, N_SLOTS, SENSE
 from beaver_ftc.loop.assembly import assemble
 from beaver_ftc.scenario.schema import Scenario
@@ -219,5 +221,5 @@ def surfaces_at_work(frames, rate_hz, rng, size=0.3):
 
 def gust_jitter(sensors, design, span_m):
     """What the noise of vanes and airspeed adds to the gust they see, in level flight."""
-    flow = gusts.flow_noise(sensors, LEVEL_FLIGHT[1][2])
-    return gusts.jitter(flow, design, *LEVEL_FLIGHT[1:], span_m)
+    flow = variances.flow_noise(Errors(sensors), LEVEL_FLIGHT[1][2])
+    return variances.jitter(flow, design, *LEVEL_FLIGHT[1:], span_m)

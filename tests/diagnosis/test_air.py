@@ -12,8 +12,9 @@ from beaver_ftc.aircraft.schema import MAX_MONOMIALS
 from beaver_ftc.design.coefficients import MASS
 from beaver_ftc.design.model import design_record, rate_damping
 from beaver_ftc.design.variants import jacobian
-from beaver_ftc.diagnosis import air, gusts
+from beaver_ftc.diagnosis import air
 from beaver_ftc.diagnosis.air import AIR
+from beaver_ftc.diagnosis.bounds import variances
 from beaver_ftc.loop.loop import Loop
 from flying import scenario
 
@@ -24,7 +25,7 @@ FT = 0.3048
 def air_of(turbulence="light"):
     """The record as before a flight."""
     record = np.zeros(1, AIR).view(np.recarray)[0]
-    gusts.set_up_air(record, turbulence, MASS, load())
+    air.set_up_air(record, turbulence, MASS, load())
     return record
 
 
@@ -62,7 +63,7 @@ class Flown:
         """Of the random walk that differs as much over so long (3,), as a share of what is declared."""
         frames = round(over_s * self.rate_hz)
         differences = signal[frames:] - signal[:-frames]
-        declared = gusts.drift(self.turbulence, 14.63) * self.airspeed
+        declared = variances.drift(self.turbulence, 14.63) * self.airspeed
         return np.mean(differences**2, axis=0) / over_s / declared
 
 
@@ -85,8 +86,8 @@ def test_pitching_and_yawing_gusts_are_seen_but_for_less_than_the_share_declared
 ):
     flown = _flown(turbulence, airspeed_mps, seed)
     left = flown.intensity(flown.true - flown.seen)
-    assert left[1] < gusts.UNSEEN[1]
-    assert left[2] < gusts.UNSEEN[2]
+    assert left[1] < air.UNSEEN[1]
+    assert left[2] < air.UNSEEN[2]
     assert np.corrcoef(flown.true[:, 1], flown.seen[:, 1])[0, 1] > 0.98
     assert np.corrcoef(flown.true[:, 2], flown.seen[:, 2])[0, 1] > 0.95
 
@@ -95,8 +96,8 @@ def test_pitching_and_yawing_gusts_are_seen_but_for_less_than_the_share_declared
 def test_and_at_other_rates_and_between_jsbsims_frames(keys):
     flown = Flown("light", duration_s=20, seed=3, **keys)
     left = flown.intensity(flown.true - flown.seen)
-    assert left[1] < gusts.UNSEEN[1]
-    assert left[2] < gusts.UNSEEN[2]
+    assert left[1] < air.UNSEEN[1]
+    assert left[2] < air.UNSEEN[2]
 
 
 def test_a_steady_wind_is_not_taken_for_a_gust():
@@ -246,7 +247,7 @@ def test_what_is_not_seen_drifts_in_body_axes_as_a_covariance_turns():
     y = np.array([0.1, 0.02, 45.0, 1036.0, 0.3])
     record["axes"] = turn = _turn(0.6, 0.1)
     air.effect(record, design, np.zeros(3), y, np.zeros(4))
-    spread = turn @ np.diag(45.0 * gusts.drift("light", 14.63) * gusts.UNSEEN) @ turn.T
+    spread = turn @ np.diag(45.0 * variances.drift("light", 14.63) * air.UNSEEN) @ turn.T
     expected = record["damping"] @ spread @ record["damping"].T
     found = [[air.unseen_drift(record, 45.0, i, j) for j in range(3)] for i in range(3)]
     assert np.array(found) == pytest.approx(expected, rel=1e-12)
@@ -263,7 +264,7 @@ def test_a_gust_unseen_drifts_besides_as_its_axis_turns_in_the_body():
     air.elapse(record, 1.0)
     turned = (_turn(*after[:2]) - _turn(*before[:2]))[:, 0] / dt
     lag_s = np.sqrt(0.3048 * 1750 * 14.63) / 2.6 / 45
-    variance = 45 * gusts.drift("light", 14.63)[0] * lag_s / 2  # of a first-order process
+    variance = 45 * variances.drift("light", 14.63)[0] * lag_s / 2  # of a first-order process
     expected = np.outer(D @ turned, D @ turned) * variance * lag_s
     assert record["leap"] / dt == pytest.approx(expected, rel=1e-9)
 
@@ -286,5 +287,5 @@ def test_the_rolling_gust_rolls_whatever_the_heading(wind_mps):
     across = np.abs(np.cos(flown.heading)) < 0.5
     assert across.sum() > 400
     left = flown.intensity((flown.true - flown.seen)[across])
-    assert left[1] < gusts.UNSEEN[1]
-    assert left[2] < gusts.UNSEEN[2]
+    assert left[1] < air.UNSEEN[1]
+    assert left[2] < air.UNSEEN[2]

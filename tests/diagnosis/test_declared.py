@@ -5,7 +5,8 @@ import pytest
 
 from beaver_ftc.aircraft import load
 from beaver_ftc.design.context import Declared
-from beaver_ftc.diagnosis.declared import GUST_FT_S, SCALE_FT, gust_effect, gusts
+from beaver_ftc.diagnosis.bounds.declared import GUST_FT_S, SCALE_FT
+from beaver_ftc.diagnosis.bounds.variances import gust_effect, gusts
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.studies.compare.replay import Recorder, record
 from flying import scenario

@@ -5,7 +5,8 @@ import pytest
 
 from beaver_ftc.aircraft import load
 from beaver_ftc.design.model import design_record
-from beaver_ftc.diagnosis.declared import SCALE_FT, declared_of, gust_effect, gusts, model_error
+from beaver_ftc.diagnosis.bounds.declared import SCALE_FT
+from beaver_ftc.diagnosis.bounds.variances import declared_of, gust_effect, gusts, model_error
 from beaver_ftc.scenario.actuators import Actuators
 from beaver_ftc.scenario.diagnosis import Bounds
 

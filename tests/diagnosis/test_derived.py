@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from beaver_ftc.design.model import control_effectiveness, design_record, free_response
-from beaver_ftc.diagnosis.admitted import inertia_slack, poles_for_noise
+from beaver_ftc.diagnosis.bounds.declared import inertia_slack, poles_for_noise
 from beaver_ftc.diagnosis.bounds.worst_case import derived_bound, slack_per_rad
 from beaver_ftc.diagnosis.thresholds import noise_step
 from beaver_ftc.loop.assembly import assemble

@@ -13,6 +13,7 @@ from beaver_ftc.design.model import AXES, design_record
 from beaver_ftc.design.terms import evaluate, regressors
 from beaver_ftc.design.variants import response
 from beaver_ftc.diagnosis import noise_model, statistical
+from beaver_ftc.diagnosis.bounds import variances
 from beaver_ftc.diagnosis.likelihood import N_SLOTS
 from beaver_ftc.diagnosis.state import LOSS
 from beaver_ftc.plant.instruments import SIGNALS
@@ -146,7 +147,7 @@ def test_a_scale_error_of_a_sensor_is_within_the_tolerances_it_is_turned_into(si
     _, y, _ = LEVEL_FLIGHT
     rng = np.random.default_rng(2)
     aircraft, table = load(), design["moments"]
-    tolerance = noise_model.steady_tolerance(bounds, aircraft, design, MASS, y, np.zeros(4))
+    tolerance = variances.steady_tolerance(bounds, aircraft, design, MASS, y, np.zeros(4))
     axis = np.array([["Cl", "Cm", "Cn"].index(term.coefficient) for term in aircraft.moments])
     for _ in range(50):
         x, u = rng.uniform(-0.02, 0.02, 3), np.append(rng.uniform(-0.005, 0.005, 3), 0.0)
@@ -168,8 +169,8 @@ def test_a_scale_error_of_a_sensor_is_within_the_tolerances_it_is_turned_into(si
 def test_tolerances_of_coefficients_and_inertia_add_up():
     bounds = Bounds.model_validate({"coefficients": {"Cm_de": 0.1}, "inertia": 0.05})
     aircraft, design = load(), design_record()[0]
-    tolerance = noise_model.steady_tolerance(bounds, aircraft, design, MASS, *LEVEL_FLIGHT[1:])
-    inertia = noise_model.steady_tolerance(
+    tolerance = variances.steady_tolerance(bounds, aircraft, design, MASS, *LEVEL_FLIGHT[1:])
+    inertia = variances.steady_tolerance(
         Bounds.model_validate({"inertia": 0.05}), aircraft, design, MASS, *LEVEL_FLIGHT[1:]
     )
     i, size = aircraft.index("Cm_de"), abs(aircraft.terms["Cm_de"].value)

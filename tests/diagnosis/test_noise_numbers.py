@@ -1,5 +1,6 @@
 """The statistical detector's numbers one by one: from what is declared, by the formulas' own conditions."""
 
+from dataclasses import astuple
 from math import exp, pi, radians, sqrt
 from types import SimpleNamespace
 
@@ -9,10 +10,12 @@ from innovations import LEVEL_FLIGHT, TRAVEL_RAD, Detector, gust_jitter
 
 from beaver_ftc.aircraft import load
 from beaver_ftc.design.coefficients import MASS
+from beaver_ftc.design.inertia import inertia_coefficients
 from beaver_ftc.design.model import design_record
-from beaver_ftc.design.variants import coefficient_slopes
-from beaver_ftc.diagnosis import gusts, noise_model
-from beaver_ftc.diagnosis.admitted import gust_sigma_rad_s, inertia_slack
+from beaver_ftc.design.variants import coefficient_slopes, jacobian
+from beaver_ftc.diagnosis import air, noise_model
+from beaver_ftc.diagnosis.bounds import variances
+from beaver_ftc.diagnosis.bounds.declared import Errors, gust_sigma_rad_s, inertia_slack
 from beaver_ftc.diagnosis.likelihood import ALPHA3, ENDING, GROWING, N_SLOTS, STEP
 from beaver_ftc.diagnosis.state import LOSS
 from beaver_ftc.diagnosis.statistical import STATISTICAL
@@ -36,7 +39,7 @@ AILERON, ELEVATOR, RUDDER = 0, 1, 2
 def test_gusts_drift_as_the_specification_has_them(turbulence):
     """Intensity over V: of a first-order process twice its variance over its lag; of a lagged slope that of
     the velocity over (V lag)^2 [MIL-F-8785C]."""
-    found = gusts.drift(turbulence, SPAN_M)
+    found = variances.drift(turbulence, SPAN_M)
     sigma_w = 0.3048 * {"light": 7.4, "severe": 23.6}[turbulence]
     L = 0.3048 * 1750.0
     rolling_lag_s = sqrt(L * SPAN_M) / (2.6 * V)
@@ -189,7 +192,7 @@ def test_where_nothing_diagnoses_nothing_is_enabled():
 def _tolerance(**bounds):
     design = design_record()[0]
     given = Bounds.model_validate(bounds)
-    return noise_model.steady_tolerance(given, AIRCRAFT, design, MASS, Y, np.zeros(4))
+    return variances.steady_tolerance(given, AIRCRAFT, design, MASS, Y, np.zeros(4))
 
 
 SIZE = np.array([abs(term.value) for term in AIRCRAFT.moments])
@@ -234,7 +237,7 @@ def test_a_gyro_scales_its_own_axis_once_and_its_terms_elsewhere(axis):
 
 
 def test_inertia_scales_every_term_by_the_worst_of_its_own_axes():
-    nominal = np.abs([noise_model.astuple(noise_model.inertia_coefficients(MASS))])[0]
+    nominal = np.abs([astuple(inertia_coefficients(MASS))])[0]
     share = (inertia_slack(0.05, MASS) / nominal)[[2, 7, 11]].max()
     assert _tolerance(inertia=0.05) == pytest.approx(share * SIZE)
 
@@ -255,7 +258,7 @@ def test_the_noise_of_vanes_and_airspeed_turns_the_gust_they_see():
     sensors = Bounds.model_validate({"sensors": {"V": {"noise_std_mps": 0.5}}}).sensors
     speed = 0.3 * 0.5 / V
     turning = np.array([0.0, speed * pi * V / (4 * SPAN_M), speed * pi * V / (3 * SPAN_M)])
-    damping = noise_model.jacobian(design, np.zeros(3), Y, np.zeros(4))[2]
+    damping = jacobian(design, np.zeros(3), Y, np.zeros(4))[2]
     found = gust_jitter(sensors, design, SPAN_M)
     assert found == pytest.approx(np.sqrt(damping**2 @ turning**2))
 
@@ -280,7 +283,7 @@ def as_set_up(bounds):
 def test_the_noise_of_what_the_model_is_made_of_is_white():
     """Each instrument's, through the slopes of f + G u, by squares; beside it that of the gusts they see."""
     given = Bounds.model_validate(UNEVEN)
-    _, G, f_x, f_y = noise_model.jacobian(design_record()[0], *LEVEL_FLIGHT)
+    _, G, f_x, f_y = jacobian(design_record()[0], *LEVEL_FLIGHT)
     names = ("p", "q", "r", "alpha", "beta", "V", "qdyn")
     slopes = [*f_x.T, *f_y.T[:4]]  # y: alpha, beta, airspeed, dynamic pressure first
     jitter = np.zeros(3)
@@ -305,7 +308,7 @@ def test_vanes_and_airspeed_err_together_in_the_gust_they_see():
     speed = 0.3 * 0.3 / V
     pitching = (radians(0.1) + speed) * pi * V / (4 * SPAN_M)
     yawing = (radians(0.2) / sqrt(12.0) + speed) * pi * V / (3 * SPAN_M)
-    damping = noise_model.jacobian(design, np.zeros(3), Y, np.zeros(4))[2]
+    damping = jacobian(design, np.zeros(3), Y, np.zeros(4))[2]
     found = gust_jitter(sensors, design, SPAN_M)
     assert found == pytest.approx(np.hypot(damping[:, 1] * pitching, damping[:, 2] * yawing))
 
@@ -327,7 +330,7 @@ def test_an_elevator_off_trim_is_in_what_constants_multiply():
     scenario = Scenario.model_validate({**GIVEN, "fdi": {"statistical": {}, "bounds": config.model_dump()}})
     start = np.zeros(3), Y, u
     noise_model.set_up(alone.fdi, scenario.fdi, design, MASS, start, 50.0)
-    total = noise_model.steady_tolerance(config, AIRCRAFT, design, MASS, Y, u)
+    total = variances.steady_tolerance(config, AIRCRAFT, design, MASS, Y, u)
     for block, axes in zip(alone.blocks, ((1,), (0, 2), (0, 2)), strict=True):
         of_it = total[np.isin(AXIS, axes)]
         assert block["tolerance"][: of_it.size] == pytest.approx(of_it)
@@ -360,13 +363,13 @@ def test_where_forces_are_weighed_their_noise_is_in_the_gust_that_follows_from_t
     forces = statistical["forces"]
     forces["known"], forces["component"]["felt"] = known, (0.3**2, 0.2**2)
     forces["component"]["vane"][:, 1] = -6.0, 50.0
-    gusts.set_up_jitter(statistical, sensors.sensors, design, *LEVEL_FLIGHT[1:], SPAN_M, dt)
+    air.set_up_jitter(statistical, Errors(sensors.sensors), design, *LEVEL_FLIGHT[1:], SPAN_M, dt)
     airspeed = LEVEL_FLIGHT[1][2]
     walked = known * np.sqrt(1.5**2 + 0.5**2) * np.array([0.2, 0.3]) * dt / airspeed
-    added = gusts.jitter(walked, design, *LEVEL_FLIGHT[1:], SPAN_M)
+    added = variances.jitter(walked, design, *LEVEL_FLIGHT[1:], SPAN_M)
     assert np.sqrt(statistical["noise"]["jitter"]) == pytest.approx(added, rel=0.02)
     by_force = known * np.array([0.2 / 50.0, 0.3 / 6.0])
-    blurred = gusts.jitter(by_force, design, *LEVEL_FLIGHT[1:], SPAN_M)
+    blurred = variances.jitter(by_force, design, *LEVEL_FLIGHT[1:], SPAN_M)
     assert forces["blurred"] == pytest.approx(blurred)
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from beaver_ftc.diagnosis.admitted import gust_sigma_rad_s
+from beaver_ftc.diagnosis.bounds.declared import gust_sigma_rad_s
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.configure import configure, take_off, trim_of
 from beaver_ftc.plant.gust import NEVER, GustSchedule

@@ -12,15 +12,25 @@ changes across the span, is seen by no instrument.
 Velocity is followed as JSBSim moves it, by Adams and Bashforth's two steps: v' = v + dt (3 a - a_before) / 2.
 """
 
-from math import pi
+from math import pi, sqrt
 
 import numpy as np
 
+from beaver_ftc.aircraft import Aircraft, MassProperties
+from beaver_ftc.aircraft.aircraft import FORCES
 from beaver_ftc.aircraft.schema import MAX_MONOMIALS
 from beaver_ftc.compiled import kernel
 from beaver_ftc.design.model import rate_damping
-from beaver_ftc.design.terms import AIRSPEED, ALPHA, BETA, QDYN, TABLE, evaluate, whole_sum
+from beaver_ftc.design.terms import AIRSPEED, ALPHA, BETA, QDYN, TABLE, evaluate, fill_table, whole_sum
+from beaver_ftc.diagnosis.bounds.declared import SCALE_M, Errors
+from beaver_ftc.diagnosis.bounds.variances import drift as gust_drift
+from beaver_ftc.diagnosis.bounds.variances import flow_noise, jitter
 
+# Share of the intensity of the rolling, pitching and yawing gust that the vanes leave; on exact vanes and
+# over a filter's memory it is less (`tests/diagnosis/test_air.py`).
+UNSEEN = (1.0, 0.003, 0.03)
+BY_FORCE = 0.01  # share of the intensity that errors of a tenth leave of the gusts that forces show
+TWO_STEPS = 1.6  # times its noise does an acceleration scatter by Adams and Bashforth: sqrt(1.5^2 + 0.5^2)
 LEAST_SWING = 0.01  # of a gust's own intensity: less is not reckoned with
 
 AIR = np.dtype(
@@ -299,3 +309,37 @@ def together(air, axes, i, j, g):
         on_i += air.damping[i, k] * axes[k, g]
         on_j += air.damping[j, k] * axes[k, g]
     return on_i * on_j
+
+
+def set_up_air(air: np.void, turbulence: str, mass: MassProperties, aircraft: Aircraft) -> None:
+    span_m = aircraft.geometry.span_m
+    air["moving"] = turbulence != "none"
+    fill_table(air["forces"], aircraft, aircraft.measurable_forces, FORCES)
+    air["area_per_mass"] = aircraft.geometry.wing_area_m2 / mass.mass_kg
+    air["gravity"] = 9.80665  # m/s2, standard; what is constant has no part in a change of the gust
+    air["span"] = span_m
+    air["per_metre"], air["unseen"] = gust_drift(turbulence, span_m), UNSEEN
+    air["scale"] = SCALE_M
+    air["rolling"] = sqrt(air["scale"] * span_m) / 2.6  # [Yeager1998, eq. 10]
+
+
+def set_up_jitter(
+    statistical: np.void,
+    errors: Errors,
+    design: np.void,
+    y: np.ndarray,
+    u: np.ndarray,
+    span_m: float,
+    dt_s: float,
+) -> None:
+    """What noise adds to the gust that is followed: that of the vanes, and of the force that moves the air's
+    velocity on from frame to frame; where the flow follows from the forces, that of the forces too."""
+    flow = flow_noise(errors, y[AIRSPEED])
+    if statistical["forces"]["known"]:
+        forces = statistical["forces"]["component"][::-1]  # normal to the body, and across
+        felt = errors.each("random", ("az", "ay"))
+        flow += TWO_STEPS * felt * dt_s / y[AIRSPEED]
+        by_force = np.sqrt(forces["felt"]) / np.abs(forces["vane"][:, 1])
+        statistical["forces"]["blurred"] = jitter(by_force, design, y, u, span_m)
+    for name in ("own_jitter", "jitter"):
+        statistical["noise"][name] += jitter(flow, design, y, u, span_m) ** 2

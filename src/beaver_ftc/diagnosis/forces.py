@@ -16,16 +16,15 @@ of the run before.
 
 import numpy as np
 
-from beaver_ftc.aircraft import Aircraft, Term
+from beaver_ftc.aircraft import AXES, Aircraft, Term
 from beaver_ftc.aircraft.aircraft import FORCES
 from beaver_ftc.aircraft.schema import MAX_SURFACES, MAX_TERMS_OF_ONE, SIDESLIP_RATE
 from beaver_ftc.compiled import kernel
 from beaver_ftc.design.terms import AIRSPEED, ALPHA, BETA, N_Y, QDYN, evaluate
-from beaver_ftc.diagnosis.admitted import GUST_FT_S
+from beaver_ftc.diagnosis.bounds.declared import Errors, gust_mps
 from beaver_ftc.diagnosis.redundancy import FALLING_M_S2
-from beaver_ftc.plant.instruments import SIGNALS
 from beaver_ftc.scenario.diagnosis import Bounds
-from beaver_ftc.scenario.sensors import ACCELEROMETERS, Sensors
+from beaver_ftc.scenario.sensors import ACCELEROMETERS
 from beaver_ftc.scenario.warnings import MASS_TOLERANCE
 
 ASIDE, UP = range(2)  # across the body, and normal to it
@@ -203,11 +202,12 @@ def set_up_forces(
     y = trim[1]
     forces, air, size = statistical["forces"], statistical["air"], aircraft.geometry
     forces["per_m"], forces["gravity"] = 1.0 / size.chord_m, air["gravity"]
-    forces["pressure"], forces["pressure_noise"] = y[QDYN], bounds.sensors.qdyn.random_error
+    declared = Errors(bounds.sensors)
+    forces["pressure"], forces["pressure_noise"] = y[QDYN], declared["qdyn"].random
     rates = [t.value for t in aircraft.forces if t.coefficient == "CY" and t.of == ((SIDESLIP_RATE, 1),)]
     forces["span"], forces["of_rate"] = size.span_m, sum(rates)
     scale = y[QDYN] * air["area_per_mass"] * forces["per_m"]
-    errors = [getattr(bounds.sensors, name).random_error for name in ("alpha", "beta", "V", *SIGNALS[:3])]
+    errors = declared.each("random", ("alpha", "beta", "V", *AXES))
     for f, (vane, axis) in enumerate(((BETA, 2), (ALPHA, 1))):
         force, terms = forces["component"][f], terms_of(aircraft, f)
         slopes = scale * _slopes(aircraft, COMPONENTS[f], trim)
@@ -215,34 +215,32 @@ def set_up_forces(
         force["damping"] = slopes[3:]
         parts = (slopes * errors) ** 2
         force["quiet"] = parts.sum(), parts.sum() - parts[vane]
-        noise = getattr(bounds.sensors, ACCELEROMETERS[1 + f]).random_error
+        noise = declared[ACCELEROMETERS[1 + f]].random
         force["felt"] = (forces["per_m"] * noise) ** 2
         _set_up_tolerances(force, bounds, terms, y, slopes[vane] / scale, f, forces["per_m"])
         turned = scale * sum(abs(term.value) for term in terms if term.surface)
         force["deflection"] = turned * np.radians(bounds.deflection_deg)
-        force["drift"] = _drift(bounds, air["gravity"], y[AIRSPEED], f)
-        gusts = 3.0 * (0.3048 * GUST_FT_S[bounds.turbulence]) ** 2 / (air["scale"] * y[AIRSPEED])
+        force["drift"] = _drift(declared, air["gravity"], y[AIRSPEED], f)
+        gusts = 3.0 * gust_mps(bounds.turbulence) ** 2 / (air["scale"] * y[AIRSPEED])
         wander = (CHANGES * force["drift"]) ** 2 + dt_s * (noise / y[AIRSPEED]) ** 2
         force["wander"] = slopes[vane] ** 2 * (wander + gusts)
 
 
-def _drift(bounds: Bounds, gravity: float, airspeed_mps: float, f: int) -> float:
+def _drift(errors: Errors, gravity: float, airspeed_mps: float, f: int) -> float:
     """How fast the angle that is followed can drift, rad/s. Gravity acts along the path's slope only on the
     incidence, and in full on sideslip."""
-    sensors = bounds.sensors
-    tilt = abs(sensors.phi.noise_bias_quantum[1]) + abs(sensors.theta.noise_bias_quantum[1])
-    gyros = [getattr(sensors, name) for name in SIGNALS[:3]]
-    turning = sum(abs(gyro.noise_bias_quantum[1]) + LIVELY_RAD_S * abs(gyro.scale_error) for gyro in gyros)
-    falls = gravity * tilt * (STEEP_RAD if f == UP else 1.0) + FALLING_M_S2 + _misfelt(sensors, gravity, f)
+    tilt = errors["phi"].steady + errors["theta"].steady
+    turning = sum(errors[gyro].steady + LIVELY_RAD_S * errors[gyro].slope for gyro in AXES)
+    falls = gravity * tilt * (STEEP_RAD if f == UP else 1.0) + FALLING_M_S2 + _misfelt(errors, gravity, f)
     return float(EARTH_RATE_RAD_S + turning + falls / airspeed_mps)
 
 
-def _misfelt(sensors: Sensors, gravity: float, f: int) -> float:
+def _misfelt(errors: Errors, gravity: float, f: int) -> float:
     """How far accelerometers can be off across the flow in level flight, m/s2: that of the axis, and of the
     one ahead as much as the flow's angle lets it."""
-    ahead, own = sensors.ax, (sensors.ay, sensors.az)[f]
-    bias = abs(own.noise_bias_quantum[1]) + STEEP_RAD * abs(ahead.noise_bias_quantum[1])
-    return bias + gravity * (abs(own.scale_error) if f == UP else 0.0)
+    own = errors[ACCELEROMETERS[1 + f]]
+    bias = own.steady + STEEP_RAD * errors["ax"].steady
+    return bias + gravity * (own.slope if f == UP else 0.0)
 
 
 def _set_up_tolerances(
@@ -250,21 +248,20 @@ def _set_up_tolerances(
 ) -> None:
     """Of each term: that of the coefficients, and what constant errors of vane and pressure do; of the
     accelerometer's bias, m/s2; of the whole."""
-    given, sensors = bounds.coefficients, bounds.sensors
-    vane = sensors.alpha if f == UP else sensors.beta
+    given, errors = bounds.coefficients, Errors(bounds.sensors)
+    vane, felt = errors["alpha" if f == UP else "beta"], errors[ACCELEROMETERS[1 + f]]
     share = max(given.values(), default=0.0) if isinstance(given, dict) else given
-    pressure = abs(sensors.qdyn.noise_bias_quantum[1]) / y[QDYN] + abs(sensors.qdyn.scale_error)
+    pressure = errors["qdyn"].steady / y[QDYN] + errors["qdyn"].slope
     for k, term in enumerate(terms):
-        force["tolerance"][k] = (share + pressure + abs(vane.scale_error)) * abs(term.value)
+        force["tolerance"][k] = (share + pressure + vane.slope) * abs(term.value)
         if term.is_constant:
-            force["tolerance"][k] += abs(vane.noise_bias_quantum[1] * of_vane)
+            force["tolerance"][k] += vane.steady * abs(of_vane)
     n = len(terms)
     if f == ASIDE:
         force["tolerance"][n], n = share + RATE_TOLERANCE[bounds.turbulence != "none"], n + 1
-    felt = sensors.az if f == UP else sensors.ay
-    if felt.noise_bias_quantum[1]:
-        force["tolerance"][n], force["regressor"][n], n = abs(felt.noise_bias_quantum[1]), per_m, n + 1
-    force["tolerance"][n], force["n"] = MASS_TOLERANCE + abs(felt.scale_error), n + 1
+    if felt.steady:
+        force["tolerance"][n], force["regressor"][n], n = felt.steady, per_m, n + 1
+    force["tolerance"][n], force["n"] = MASS_TOLERANCE + felt.slope, n + 1
 
 
 def _value(aircraft: Aircraft, name: str, at: tuple[np.ndarray, np.ndarray, np.ndarray]) -> float:

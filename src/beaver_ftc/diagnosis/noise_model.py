@@ -1,21 +1,18 @@
 """From what a scenario declares to the statistical detector's numbers: levels, noise, tolerances."""
 
 from collections.abc import Iterator
-from dataclasses import astuple
 from math import exp, hypot, sqrt
 from statistics import NormalDist
 
 import numpy as np
 
-from beaver_ftc.aircraft import AXES, Aircraft, MassProperties, Term, load
-from beaver_ftc.aircraft.aircraft import MOMENTS
-from beaver_ftc.aircraft.schema import RATE_SIGNALS
-from beaver_ftc.design.inertia import inertia_coefficients
-from beaver_ftc.design.terms import AIRSPEED, ALPHA, BETA, PH, QDYN, QH, RH
-from beaver_ftc.design.variants import coefficient_slopes, jacobian
-from beaver_ftc.diagnosis import gusts
+from beaver_ftc.aircraft import AXES, Aircraft, MassProperties, load
+from beaver_ftc.design.terms import AIRSPEED, ALPHA, BETA, QDYN
+from beaver_ftc.design.variants import jacobian
 from beaver_ftc.diagnosis.across import AN_AXIS
-from beaver_ftc.diagnosis.admitted import inertia_slack, tolerances
+from beaver_ftc.diagnosis.air import BY_FORCE, UNSEEN, set_up_air, set_up_jitter
+from beaver_ftc.diagnosis.bounds.declared import Errors
+from beaver_ftc.diagnosis.bounds.variances import axis_of, steady_tolerance
 from beaver_ftc.diagnosis.forces import set_up_forces
 from beaver_ftc.diagnosis.likelihood import (
     ALPHA3,
@@ -36,9 +33,7 @@ from beaver_ftc.diagnosis.views import (
     set_up_views,
     views_of,
 )
-from beaver_ftc.plant.instruments import SIGNALS
 from beaver_ftc.scenario.diagnosis import Bounds, FdiConfig, Statistical
-from beaver_ftc.scenario.sensors import Sensors
 
 PITCH_AXES, LATERAL_AXES = (1,), (0, 2)
 SIDES = {LOSS: 1, GROWING: 1, ENDING: 1, STEP: 2, ALPHA3: 2}  # a loss has a sign, a step may go either way
@@ -50,7 +45,6 @@ GROWTH_PER_S = 1.5
 CHANCE = 0.5
 LEAST_NOISE_RAD_S = 1e-9  # of a gyro: exact ones are still doubles, and a variance no difference of zeros
 Start = tuple[np.ndarray, np.ndarray, np.ndarray]  # x (3,) rad/s, y (5,) and u (4,) rad in trim
-_GYRO_OF = dict(zip(RATE_SIGNALS, AXES, strict=True))
 # (kind, surface, axis, raises alarms)
 Hypothesis = tuple[int, int, int, int]
 
@@ -123,18 +117,19 @@ def set_up(
         1,
         1.0 / max(int(fdi["config"]["instants"]), 1),
     )
-    gusts.set_up_air(statistical["air"], config.bounds.turbulence, mass, aircraft)
+    errors = Errors(config.bounds.sensors)
+    set_up_air(statistical["air"], config.bounds.turbulence, mass, aircraft)
     forces = bool(statistical["forces"]["known"])
     across = across_a_column(config, int(fdi["config"]["instants"]))
     tests = tests_a_frame(aircraft, *(views_of(aircraft, forces) if across else ()))
     statistical["tests"]["alarm_level"] = alarm_level(given.false_alarms_per_h, rate_hz, tests)
     statistical["tests"]["naming_level"] = naming_level(given.misnaming, rate_hz, aircraft)
     statistical["tests"]["keep"] = exp(-1.0 / (rate_hz * config.forgetting_time_s))
-    _set_up_blocks(statistical, config.bounds.sensors, aircraft)
+    _set_up_blocks(statistical, errors, aircraft)
     _set_up_bounded(statistical, config, pace_of(given, aircraft, 1.0 / rate_hz), 1.0 / rate_hz)
     _set_up_noise(statistical, given, config.bounds, design, start, 1.0 / rate_hz)
     _set_up_tolerances(statistical, config.bounds, design, mass, start, aircraft)
-    set_up_readings(statistical, config.bounds.sensors, fdi["bound"]["admitted"])
+    set_up_readings(statistical, errors, fdi["bound"]["admitted"])
     if across:
         chance = given.false_alarms_per_h / (3600.0 * rate_hz * tests)
         airspeed_mps, pace_rad_s = (
@@ -148,27 +143,27 @@ def set_up(
             statistical["air"]["read"] = not fdi["watch"]["enabled"]  # which may find them broken
             statistical["inertial_air"] = statistical["air"]
             statistical["inertial_air"]["moving"] *= statistical["air"]["read"]
-            statistical["inertial_air"]["unseen"] = np.minimum(np.add(gusts.UNSEEN, gusts.BY_FORCE), 1.0)
+            statistical["inertial_air"]["unseen"] = np.minimum(np.add(UNSEEN, BY_FORCE), 1.0)
         set_up_views(statistical, aircraft)
     block = statistical["block"][-1]
     block["lag"] = returning_length(statistical, float(start[1][AIRSPEED]), rate_hz)
     if statistical["air"]["moving"]:
         block["stronger"] = (statistical["air"]["rolling"] / block["lag"]) ** 2
         span_m = aircraft.geometry.span_m
-        gusts.set_up_jitter(statistical, config.bounds.sensors, design, *start[1:], span_m, 1.0 / rate_hz)
+        set_up_jitter(statistical, errors, design, *start[1:], span_m, 1.0 / rate_hz)
 
 
-def _set_up_blocks(statistical: np.void, sensors: Sensors, aircraft: Aircraft) -> None:
+def _set_up_blocks(statistical: np.void, errors: Errors, aircraft: Aircraft) -> None:
     blocks = blocks_of(aircraft)
     losses = [aircraft.surfaces.index(surface) for surface in aircraft.primary]
     statistical["tests"]["n_columns"] = len(losses) + len(AXES)
     for block, (axes, members) in zip(statistical["block"], blocks, strict=True):
         block["n"], block["n_hypotheses"] = len(axes), len(members)
-        block["n_regressors"] = sum(_axis_of(term) in axes for term in aircraft.moments)
+        block["n_regressors"] = sum(axis_of(term) in axes for term in aircraft.moments)
         block["keep"], block["stronger"] = 1.0, 1.0
         for i, axis in enumerate(axes):
             block["axis"][i] = axis
-            variance = max(getattr(sensors, AXES[axis]).random_error, LEAST_NOISE_RAD_S) ** 2
+            variance = max(errors[AXES[axis]].random, LEAST_NOISE_RAD_S) ** 2
             block["noise"][i] = block["P_xx"][i, i] = variance
             block["P_dd"][i, i] = PRIOR_DRIFT_RAD_S2**2
         sense = block["lane"]["sense"].reshape(N_SLOTS, -1)
@@ -200,10 +195,6 @@ def _set_up_bounded(statistical: np.void, config: FdiConfig, pace: float, dt_s: 
         block["hypothesis"]["growth_keep"] = exp(-GROWTH_PER_S * dt_s)
 
 
-def _axis_of(term: Term) -> int:
-    return MOMENTS.index(term.coefficient)
-
-
 def _set_up_noise(
     statistical: np.void,
     given: Statistical,
@@ -213,12 +204,12 @@ def _set_up_noise(
     dt_s: float,
 ) -> None:
     """What drifts, and what is white: noise of the measurements that f + G u is made of."""
-    noise = max(getattr(bounds.sensors, axis).random_error for axis in AXES)
+    errors = Errors(bounds.sensors).each("random")
+    noise = float(errors[:3].max())
     largest = max(bounds.constant_rad_s2.as_tuple())
     level = float(statistical["tests"]["alarm_level"])
     statistical["noise"]["rapidity"] = rapidity(largest, given.uncertainty_rad_s, noise, level, dt_s)
     _, G, f_x, f_y = jacobian(design, *start)
-    errors = np.array([getattr(bounds.sensors, name).random_error for name in SIGNALS])
     statistical["noise"]["own_jitter"] = f_x**2 @ errors[:3] ** 2
     in_trim = f_y[:, [ALPHA, BETA, AIRSPEED, QDYN]] ** 2 @ errors[3:] ** 2  # later as readings.py says
     statistical["noise"]["jitter"] = statistical["noise"]["own_jitter"] + in_trim
@@ -270,46 +261,8 @@ def _set_up_tolerances(
 ) -> None:
     """What is constant but unknown, as tolerances of coefficients: theirs, inertia, steady sensor errors."""
     tolerance = steady_tolerance(bounds, aircraft, design, mass, start[1], start[2])
-    axis = np.array([_axis_of(term) for term in aircraft.moments])
+    axis = np.array([axis_of(term) for term in aircraft.moments])
     for block, axes in zip(statistical["block"], (PITCH_AXES, LATERAL_AXES, LATERAL_AXES), strict=True):
         of_it = tolerance[np.isin(axis, axes)]
         block["tolerance"][: of_it.size] = of_it
     statistical["tests"]["tolerated"] = bool(np.any(tolerance))
-
-
-def steady_tolerance(
-    bounds: Bounds, aircraft: Aircraft, design: np.void, mass: MassProperties, y: np.ndarray, u: np.ndarray
-) -> np.ndarray:
-    """Tolerance of each moment's term that covers every declared constant error but those of the air data
-    (readings.py); y, u in trim."""
-    size = np.abs(design["moments"]["value"][: len(aircraft.moments)])
-    share = np.full(size.shape, _inertia_share(bounds.inertia, mass))
-    share += [_measured_share(bounds, term) for term in aircraft.moments]
-    total = tolerances(bounds.coefficients, aircraft, size) + share * size
-    slopes = np.abs(coefficient_slopes(design, np.zeros(3), y, u))
-    span, chord = aircraft.geometry.span_m, aircraft.geometry.chord_m
-    for name, place, length in zip(AXES, (PH, QH, RH), (span / 2, chord, span / 2), strict=True):
-        error = abs(getattr(bounds.sensors, name).noise_bias_quantum[1]) * length / y[AIRSPEED]
-        for k, term in enumerate(aircraft.moments):
-            if term.is_constant:
-                total[k] += error * slopes[_axis_of(term), place]
-    return total
-
-
-def _measured_share(bounds: Bounds, term: Term) -> float:
-    """Relative error of what a term multiplies, by the slopes of gyros, vanes, airspeed and pressure."""
-    own = AXES[_axis_of(term)]  # a gyro's slope is counted once for all terms of its own axis
-    share = abs(getattr(bounds.sensors, own).scale_error) + abs(bounds.sensors.qdyn.scale_error)
-    for signal, power in term.of:
-        if signal in _GYRO_OF:
-            share += power * abs(bounds.sensors.V.scale_error)
-        sensor = getattr(bounds.sensors, _GYRO_OF.get(signal, signal), None)
-        if sensor is not None and _GYRO_OF.get(signal) != own:
-            share += power * abs(sensor.scale_error)
-    return share
-
-
-def _inertia_share(tolerance: float, mass: MassProperties) -> float:
-    """Largest relative error of what multiplies a moment on its own axis."""
-    slack, nominal = inertia_slack(tolerance, mass), np.abs(astuple(inertia_coefficients(mass)))
-    return float(max(slack[i] / nominal[i] for i in (2, 7, 11)))

@@ -11,21 +11,20 @@ import numpy as np
 from beaver_ftc.compiled import kernel
 from beaver_ftc.design.engine import DPT_0, KW_TO_DPT, density_ratio
 from beaver_ftc.design.terms import AIRSPEED, ALPHA, BETA, DPT, PH, QDYN, RH, directional, whole_sum
+from beaver_ftc.diagnosis.bounds.declared import Errors
 from beaver_ftc.diagnosis.likelihood import LATERAL, N_READINGS, PITCH_BLOCK
 from beaver_ftc.plant.instruments import NOISE_LIMIT_SIGMA
-from beaver_ftc.scenario.sensors import Sensors
 
 _SENSORS = {"alpha": ALPHA, "beta": BETA, "V": AIRSPEED, "qdyn": QDYN}
 _POWER = N_READINGS - 1  # of the engine, kW
 _SLIPSTREAM = RH + 1  # the first of the declared signals
 
 
-def set_up_readings(statistical: np.void, sensors: Sensors, admitted: np.void) -> None:
+def set_up_readings(statistical: np.void, errors: Errors, admitted: np.void) -> None:
     """Add the readings to the regressors of the blocks, which have those of their coefficients."""
     steady, noise = np.zeros(N_READINGS), statistical["noise"]["reading"]
     for name, place in _SENSORS.items():
-        steady[place] = abs(getattr(sensors, name).noise_bias_quantum[1])
-        noise[place] = getattr(sensors, name).random_error
+        steady[place], noise[place] = errors[name].steady, errors[name].random
     steady[_POWER] = admitted["engine_kw"]  # all of it: so many standard deviations are part of that
     noise[_POWER] = admitted["engine_kw"] / NOISE_LIMIT_SIGMA
     if not (steady.any() or noise.any()):

@@ -9,7 +9,7 @@ from beaver_ftc.control.allocation import leaders_of
 from beaver_ftc.control.outer.state import COLUMNS
 from beaver_ftc.control.state import configure
 from beaver_ftc.design.variants import design_of, mass_of
-from beaver_ftc.diagnosis.admitted import admit, gyros_vary, poles_for_noise
+from beaver_ftc.diagnosis.bounds.declared import admit, admit_engine, gyros_vary, poles_for_noise
 from beaver_ftc.diagnosis.bounds.worst_case import fill_error_map
 from beaver_ftc.diagnosis.fault_class import PARAMETER_SET
 from beaver_ftc.diagnosis.state import (
@@ -28,7 +28,6 @@ from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop import memory
 from beaver_ftc.loop.frame import frame_dtype, idle
 from beaver_ftc.loop.instrument_records import (
-    admit_engine,
     assemble_instruments,
     assemble_watch,
     breaks_instruments,

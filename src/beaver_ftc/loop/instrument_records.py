@@ -6,10 +6,9 @@ from typing import Any
 import numpy as np
 
 from beaver_ftc.design.context import DesignModel
-from beaver_ftc.design.engine import power_error_kw
 from beaver_ftc.diagnosis.accelerometers import NEVER_STILL
-from beaver_ftc.diagnosis.admitted import GUST_FT_S, GUST_LIMIT_SIGMA, SCALE_FT
-from beaver_ftc.diagnosis.declared import gust_effect
+from beaver_ftc.diagnosis.bounds.declared import GUST_LIMIT_SIGMA, SCALE_M, Errors, gust_mps
+from beaver_ftc.diagnosis.bounds.variances import gust_effect
 from beaver_ftc.diagnosis.forces import tell_apart
 from beaver_ftc.diagnosis.views import across_a_column
 from beaver_ftc.diagnosis.watch import NOBODY, POLES_PER_S
@@ -17,7 +16,6 @@ from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.plant import channels as ch
 from beaver_ftc.plant.instruments import (
     LONGEST_DELAY,
-    NOISE_LIMIT_SIGMA,
     PHI,
     SENSORS,
 )
@@ -25,7 +23,6 @@ from beaver_ftc.plant.sensor_faults import OF_THE_SLIPSTREAM
 from beaver_ftc.scenario.faults import of_a_sensor
 from beaver_ftc.scenario.in_flight import stages
 from beaver_ftc.scenario.schema import Scenario
-from beaver_ftc.scenario.sensors import ENGINE
 
 GRAVITY_M_S2, EARTH_RADIUS_M = 9.80665, 6_371_000.0
 FASTER = 1.4  # than at the start a flight may become
@@ -108,6 +105,7 @@ def assemble_watch(watch: np.void, scenario: Scenario, h: float) -> None:
     watch["named"], watch["alarmed_at_s"], watch["named_at_s"] = NOBODY, -1.0, -1.0
     watch["engine"] = scenario.airframe.has_engine_instruments
     step, sensors = watch["step"], scenario.fdi.bounds.sensors
+    errors = Errors(sensors)
     step["h"], step["decay"] = h, [exp(-pole * h) for pole in POLES_PER_S]
     step["gravity"] = GRAVITY_M_S2 * (1.0 + scenario.initial.altitude_m / EARTH_RADIUS_M) ** -2
     step["gust"], step["gusts"] = gusts_seen(scenario.fdi.bounds.turbulence, scenario.initial.airspeed_mps, h)
@@ -116,12 +114,10 @@ def assemble_watch(watch: np.void, scenario: Scenario, h: float) -> None:
         initial: Any = scenario.initial  # its engine's keys are the aircraft's
         step["command"] = initial.engine_rpm, initial.manifold_pressure_inhg
     for i, name in enumerate(SENSORS):
-        sensor = getattr(sensors, name)
-        noise, bias, quantum = sensor.noise_bias_quantum
-        step["offset"][i] = NOISE_LIMIT_SIGMA * noise + abs(bias) + quantum / 2
-        step["slope"][i], step["steady"][i] = abs(sensor.scale_error), abs(bias)
-        watch["longest_still"][i] = longest_still(noise, quantum)
-        step["drift"] = max(step["drift"], abs(getattr(sensor, "drift_rad_s", 0.0)))
+        error = errors[name]
+        step["offset"][i], step["slope"][i], step["steady"][i] = error.worst, error.slope, error.steady
+        watch["longest_still"][i] = longest_still(error.noise, error.resolution)
+        step["drift"] = max(step["drift"], abs(getattr(getattr(sensors, name), "drift_rad_s", 0.0)))
     blurred = np.any(step["offset"][PHI : PHI + 3] > step["steady"][PHI : PHI + 3])
     watch["blurred"] = blurred
     watch["follows"] = min(1.0, h * TAKEN_OVER_PER_S) if blurred else 1.0
@@ -134,33 +130,6 @@ def longest_still(noise: float, quantum: float) -> int:
     return 50 if noise > quantum / 4.0 else NEVER_STILL
 
 
-def admit_engine(admitted: np.void, scenario: Scenario) -> None:
-    """Admit errors of dpt where those are declared of which it is worked out.
-
-    The engine may be set anywhere between here and its highest manifold pressure.
-    """
-    sensors = scenario.fdi.bounds.sensors
-    declared = any(not getattr(sensors, name).is_ideal for name in OF_THE_SLIPSTREAM)
-    if not (declared and scenario.airframe.has_engine_instruments):
-        return
-    initial: Any = scenario.initial
-    highest = scenario.airframe.engine.settings["manifold_pressure_inhg"].range[1]
-    errors = [
-        _whole_error(getattr(sensors, name), most)
-        for name, most in zip(ENGINE, (initial.engine_rpm, highest), strict=True)
-    ]
-    admitted["engine"] = 1
-    admitted["engine_kw"], admitted["thin_air_kw"] = power_error_kw(initial.engine_rpm, highest, *errors)
-
-
-def _whole_error(sensor: Any, largest: float) -> float:
-    """How far a reading of at most `largest` can be off."""
-    noise, bias, quantum = sensor.noise_bias_quantum
-    slope = abs(sensor.scale_error)
-    error: float = (NOISE_LIMIT_SIGMA * noise + abs(bias) + quantum / 2 + slope * largest) / (1.0 - slope)
-    return error
-
-
 def gusts_seen(turbulence: str, airspeed_mps: float, h: float) -> tuple[float, np.ndarray]:
     """Speed of gusts, m/s, and of their changes in h s what passes each filter of the watch: bounds.
 
@@ -168,8 +137,8 @@ def gusts_seen(turbulence: str, airspeed_mps: float, h: float) -> tuple[float, n
     the vertical and lateral ones of half as much again [MIL-F-8785C, 3.7.1]; a filter with a pole of lam 1/s
     keeps 1 / 2 lam of it.
     """
-    sigma_mps = GUST_FT_S[turbulence] * ch.FT
-    intensity = 3.0 * sigma_mps**2 * FASTER * airspeed_mps / (SCALE_FT * ch.FT)
+    sigma_mps = gust_mps(turbulence)
+    intensity = 3.0 * sigma_mps**2 * FASTER * airspeed_mps / SCALE_M
     kept_s = [h / (1.0 - exp(-2.0 * pole * h)) for pole in POLES_PER_S]
     return GUST_LIMIT_SIGMA * sigma_mps, GUST_LIMIT_SIGMA * np.sqrt(intensity * np.array(kept_s))
 

@@ -10,7 +10,7 @@ from beaver_ftc.control.base import Law, Reference
 from beaver_ftc.control.laws import ADAPTIVE, NOMINAL, ORACLE
 from beaver_ftc.design.context import Context, DesignModel
 from beaver_ftc.diagnosis.base import Detector, Measured, Verdict
-from beaver_ftc.diagnosis.declared import declared_of
+from beaver_ftc.diagnosis.bounds.variances import declared_of
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, UNANTICIPATED
 from beaver_ftc.documents.errors import BeaverFtcError, SimulationFailed
 from beaver_ftc.loop import steps

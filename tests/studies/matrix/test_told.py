@@ -9,11 +9,12 @@ from beaver_ftc import load as load_scenario
 from beaver_ftc.aircraft import load
 from beaver_ftc.design.context import DesignModel
 from beaver_ftc.design.variants import design_of
+from beaver_ftc.diagnosis.bounds.clairvoyant import accelerations, healthy
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.log import Columns
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.matrix.fault_matrix import AT_S, Case, beside_told, scenario_of, trimmed_deg
-from beaver_ftc.studies.matrix.told import accelerations, columns_of, healthy, told
+from beaver_ftc.studies.matrix.told import columns_of, told
 
 AIRCRAFT = load()
 FOLDER = Path(__file__).parents[2] / "data" / "aircraft"

@@ -6,9 +6,9 @@ from statistics import NormalDist
 import numpy as np
 import pytest
 
+from beaver_ftc.diagnosis.bounds.clairvoyant import UNEXPLAINED_S, Whitening, chance
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.studies.compare.replay import Recorder, record
-from beaver_ftc.studies.engine.clairvoyant import UNEXPLAINED_S, Whitening, chance
 from beaver_ftc.studies.power.survey import Block, Condition, deflections, loss, scenario_of, strikes_at_s
 
 DT = 0.01

@@ -4,16 +4,21 @@ What the fault adds to the accelerations is known from the truth: where the surf
 one would have been under the same commands. Coefficients are unknown constants, even over their tolerance.
 """
 
-from math import prod, sqrt
+from math import sqrt
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from beaver_ftc.aircraft import Aircraft, Term
+from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.design.context import Context
-from beaver_ftc.design.inertia import inertia_coefficients
+from beaver_ftc.diagnosis.bounds.clairvoyant import (
+    Whitening,
+    accelerations,
+    aware_of_the_air,
+    chance,
+    healthy,
+)
 from beaver_ftc.results.log import Columns
-from beaver_ftc.studies.engine.clairvoyant import Whitening, aware_of_the_air, chance
 
 if TYPE_CHECKING:
     from beaver_ftc.scenario.schema import Scenario
@@ -60,37 +65,3 @@ def _declared(scenario: "Scenario") -> tuple[Context, np.ndarray]:
     context = aware_of_the_air(context_of(loop.frames, exact, loop.start, {}), noise_rad_s2)
     loop.release()
     return context, coefficients
-
-
-def healthy(context: Context, kept: Columns, surface: str) -> np.ndarray:
-    """Where a healthy surface would have been under the commands of a flight, (frames,) rad."""
-    s, command = context.surfaces.index(surface), kept[f"{surface}_cmd_rad"]
-    bandwidth, rate = context.declared.bandwidth_rad_s[s], context.declared.rate_limit_rad_s[s]
-    approach = 1.0 - np.exp(-bandwidth * context.dt_s) if bandwidth else 1.0
-    step = rate * context.dt_s if rate else np.inf
-    low, high = context.travel_rad[:, s]
-    there, places = kept[f"{surface}_effective_rad"][0], np.empty_like(command)
-    for k, wanted in enumerate(np.clip(command, low, high)):
-        there += min(max((wanted - there) * approach, -step), step)
-        places[k] = there
-    return places
-
-
-def accelerations(
-    aircraft: Aircraft, term: Term, kept: Columns, deflection_rad: np.ndarray | None
-) -> np.ndarray:
-    """What a coefficient's term of value one does, (frames, 3) rad/s2; deflection_rad: of its surface."""
-    V, size, i = kept["airspeed_mps"], aircraft.geometry, inertia_coefficients(aircraft.mass)
-    of: dict[str | None, Any] = {
-        **{name: kept[name] for name in aircraft.signals},
-        "alpha": kept["alpha_rad"], "beta": kept["beta_rad"],
-        "ph": kept["p_rad_s"] * size.span_m / (2.0 * V), "qh": kept["q_rad_s"] * size.chord_m / V,
-        "rh": kept["r_rad_s"] * size.span_m / (2.0 * V), term.surface: deflection_rad,
-    }  # fmt: skip
-    value = kept["qdyn_pa"] * size.wing_area_m2 * prod(of[factor] for factor in term.factors)
-    along = {
-        "Cl": (i.Pl * size.span_m, 0.0, i.Rl * size.span_m),
-        "Cm": (0.0, i.Qm * size.chord_m, 0.0),
-        "Cn": (i.Pn * size.span_m, 0.0, i.Rn * size.span_m),
-    }[term.coefficient]
-    return np.multiply.outer(value, along)

@@ -6,9 +6,9 @@ from math import inf
 from statistics import fmean
 from typing import Any
 
+from beaver_ftc.diagnosis.bounds.clairvoyant import chance
 from beaver_ftc.results.metrics import versions
 from beaver_ftc.studies.compare.replay import Trace, alarms_at
-from beaver_ftc.studies.engine.clairvoyant import chance
 from beaver_ftc.studies.engine.statistics import Estimate, binomial, poisson, share_within, sign_test
 from beaver_ftc.studies.power.survey import BUILT_IN, WATCHED_S, WITHIN_S, Grid, Watched
 from beaver_ftc.studies.present.tables import finite

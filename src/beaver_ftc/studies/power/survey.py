@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from beaver_ftc.design.coefficients import SURFACES
+from beaver_ftc.diagnosis.bounds.clairvoyant import Whitening
 from beaver_ftc.documents.errors import BadInput, BeaverFtcError
 from beaver_ftc.plugins import DETECTORS, is_compiled, refusal, registered
 from beaver_ftc.scenario.environment import air_of
@@ -22,7 +23,6 @@ from beaver_ftc.studies.compare.replay import (
     replay_together,
     trace,
 )
-from beaver_ftc.studies.engine.clairvoyant import Whitening
 
 STRIKES_S = (8.0, 10.0)  # a fault strikes at random in between
 WATCHED_S = 5.0  # after it

@@ -21,18 +21,26 @@ The unexplained acceleration of the published bound is a sinusoid of unknown fre
 first-order process of the same power and UNEXPLAINED_S of memory.
 """
 
+from collections.abc import Mapping
 from dataclasses import replace
+from math import prod
 from statistics import NormalDist
+from typing import Any
 
 import numpy as np
 
+from beaver_ftc.aircraft import Aircraft, Term
 from beaver_ftc.design.context import Context
-from beaver_ftc.diagnosis.gusts import UNSEEN
+from beaver_ftc.design.inertia import inertia_coefficients
+from beaver_ftc.diagnosis.air import UNSEEN
 from beaver_ftc.diagnosis.rivals.air import rate_variance
 
 UNEXPLAINED_S = 0.1
 LEAST_RATE_RAD_S = 1e-5  # what perfect instruments are taken for
 _SETTLING_FRAMES = 400
+
+
+Flown = Mapping[str, np.ndarray]  # columns of a log, (frames,) each
 
 
 class Whitening:
@@ -104,3 +112,37 @@ def chance(d: float, within_s: float, per_h: float) -> float:
     if per_h <= 0.0:
         return 0.0  # noise that has no bound leaves nothing certain
     return normal.cdf(d - normal.inv_cdf(1.0 - min(per_h * within_s / 3600.0, 0.5)))
+
+
+def healthy(context: Context, kept: Flown, surface: str) -> np.ndarray:
+    """Where a healthy surface would have been under the commands of a flight, (frames,) rad."""
+    s, command = context.surfaces.index(surface), kept[f"{surface}_cmd_rad"]
+    bandwidth, rate = context.declared.bandwidth_rad_s[s], context.declared.rate_limit_rad_s[s]
+    approach = 1.0 - np.exp(-bandwidth * context.dt_s) if bandwidth else 1.0
+    step = rate * context.dt_s if rate else np.inf
+    low, high = context.travel_rad[:, s]
+    there, places = kept[f"{surface}_effective_rad"][0], np.empty_like(command)
+    for k, wanted in enumerate(np.clip(command, low, high)):
+        there += min(max((wanted - there) * approach, -step), step)
+        places[k] = there
+    return places
+
+
+def accelerations(
+    aircraft: Aircraft, term: Term, kept: Flown, deflection_rad: np.ndarray | None
+) -> np.ndarray:
+    """What a coefficient's term of value one does, (frames, 3) rad/s2; deflection_rad: of its surface."""
+    V, size, i = kept["airspeed_mps"], aircraft.geometry, inertia_coefficients(aircraft.mass)
+    of: dict[str | None, Any] = {
+        **{name: kept[name] for name in aircraft.signals},
+        "alpha": kept["alpha_rad"], "beta": kept["beta_rad"],
+        "ph": kept["p_rad_s"] * size.span_m / (2.0 * V), "qh": kept["q_rad_s"] * size.chord_m / V,
+        "rh": kept["r_rad_s"] * size.span_m / (2.0 * V), term.surface: deflection_rad,
+    }  # fmt: skip
+    value = kept["qdyn_pa"] * size.wing_area_m2 * prod(of[factor] for factor in term.factors)
+    along = {
+        "Cl": (i.Pl * size.span_m, 0.0, i.Rl * size.span_m),
+        "Cm": (0.0, i.Qm * size.chord_m, 0.0),
+        "Cn": (i.Pn * size.span_m, 0.0, i.Rn * size.span_m),
+    }[term.coefficient]
+    return np.multiply.outer(value, along)

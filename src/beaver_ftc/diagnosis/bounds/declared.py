@@ -1,25 +1,75 @@
-"""From what a scenario declares in `fdi.bounds` to the numbers of derived.py."""
+"""What a scenario declares in `fdi.bounds`, read once, for any aircraft and instrument; its worst case."""
 
+from collections.abc import Iterable
 from dataclasses import astuple, replace
 from functools import lru_cache
 from itertools import product
 from math import exp, log, radians, sqrt
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from beaver_ftc.aircraft import Aircraft, MassProperties
+from beaver_ftc.aircraft import AXES, Aircraft, MassProperties
+from beaver_ftc.design.engine import power_error_kw
 from beaver_ftc.design.inertia import inertia_coefficients
-from beaver_ftc.plant.instruments import NOISE_LIMIT_SIGMA, SIGNALS
+from beaver_ftc.plant.instruments import NOISE_LIMIT_SIGMA, SENSORS, SIGNALS
+from beaver_ftc.plant.sensor_faults import OF_THE_SLIPSTREAM
 from beaver_ftc.scenario.diagnosis import Bounds
-from beaver_ftc.scenario.sensors import Sensors
+from beaver_ftc.scenario.sensors import ENGINE, Sensors
+
+if TYPE_CHECKING:
+    from beaver_ftc.scenario.schema import Scenario
 
 # Largest vertical gust (standard deviation) above 2000 ft and its scale [MIL-F-8785C, fig. 7, 3.7.2].
 GUST_FT_S = {"none": 0.0, "light": 7.4, "moderate": 10.6, "severe": 23.6}
 SCALE_FT = 1750.0
+M_PER_FT = 0.3048
+SCALE_M = M_PER_FT * SCALE_FT
 ROLLING = 1.9  # of the rotating gusts the strongest [Yeager1998, eq. 8]; pitching and yawing are weaker
 GUST_LIMIT_SIGMA = 6.0  # once in 5e8 samples beyond, were they independent
 _INERTIA = ("Ix_kg_m2", "Iy_kg_m2", "Iz_kg_m2", "Jxz_kg_m2")
 DELAYS_S = (0.1, 0.5, 2.0)  # within which a pole of the bank finds the smallest fault
+
+
+class Error(NamedTuple):
+    """What is declared of one instrument, SI.
+
+    noise: standard deviation of a sample's; steady: size of a constant error; slope: as a share. random:
+    noise and rounding together, a standard deviation. worst: how far a reading of zero can be off.
+    """
+
+    noise: float
+    steady: float
+    resolution: float
+    slope: float
+    random: float
+    worst: float
+
+    def of_reading(self, largest: float) -> float:
+        """How far a reading of at most `largest` can be off."""
+        return (self.worst + self.slope * largest) / (1.0 - self.slope)
+
+
+class Errors(dict[str, Error]):
+    """Those of all instruments, by their names in SENSORS."""
+
+    def __init__(self, sensors: Sensors) -> None:
+        super().__init__((name, _error(getattr(sensors, name))) for name in SENSORS)
+
+    def each(self, of_it: str, names: Iterable[str] = SIGNALS) -> np.ndarray:
+        """One number of several instruments, (n,)."""
+        return np.array([getattr(self[name], of_it) for name in names])
+
+
+def _error(sensor: Any) -> Error:
+    noise, bias, resolution = sensor.noise_bias_quantum
+    worst = NOISE_LIMIT_SIGMA * noise + abs(bias) + resolution / 2
+    return Error(noise, abs(bias), resolution, abs(sensor.scale_error), sensor.random_error, worst)
+
+
+def gust_mps(turbulence: str) -> float:
+    """Standard deviation of the vertical gusts, m/s; their scale is SCALE_M."""
+    return M_PER_FT * GUST_FT_S[turbulence]
 
 
 def gust_sigma_rad_s(turbulence: str, span_m: float) -> float:
@@ -61,15 +111,28 @@ def admit(
     admitted["inertia"] = inertia_slack(bounds.inertia, mass)
     admitted["deflection"] = radians(bounds.deflection_deg)
     admitted["gust"] = GUST_LIMIT_SIGMA * gust_sigma_rad_s(bounds.turbulence, aircraft.geometry.span_m)
-    for i, name in enumerate(SIGNALS):
-        sensor = getattr(bounds.sensors, name)
-        noise, bias, quantum = sensor.noise_bias_quantum
-        admitted["offset"][i] = NOISE_LIMIT_SIGMA * noise + abs(bias) + quantum / 2
-        admitted["slope"][i] = abs(sensor.scale_error)
-        if i < 3:
-            admitted["steady"][i] = abs(bias)
+    errors = Errors(bounds.sensors)
+    admitted["offset"], admitted["slope"] = errors.each("worst"), errors.each("slope")
+    admitted["steady"] = errors.each("steady", AXES)
     declared = (admitted["tolerance"], admitted["inertia"], admitted["deflection"], admitted["gust"])
     admitted["any"] = any(np.any(part) for part in declared) or not bounds.sensors.is_ideal
+
+
+def admit_engine(admitted: np.void, scenario: "Scenario") -> None:
+    """Admit errors of dpt where those are declared of which it is worked out.
+
+    The engine may be set anywhere between here and its highest manifold pressure.
+    """
+    sensors = scenario.fdi.bounds.sensors
+    declared = any(not getattr(sensors, name).is_ideal for name in OF_THE_SLIPSTREAM)
+    if not (declared and scenario.airframe.has_engine_instruments):
+        return
+    initial: Any = scenario.initial
+    highest = scenario.airframe.engine.settings["manifold_pressure_inhg"].range[1]
+    largest = dict(zip(ENGINE, (initial.engine_rpm, highest), strict=True))
+    errors = [Errors(sensors)[name].of_reading(most) for name, most in largest.items()]
+    admitted["engine"] = 1
+    admitted["engine_kw"], admitted["thin_air_kw"] = power_error_kw(initial.engine_rpm, highest, *errors)
 
 
 def poles_for_noise(sensors: Sensors, constant_rad_s2: float) -> tuple[float, ...]:
@@ -78,14 +141,14 @@ def poles_for_noise(sensors: Sensors, constant_rad_s2: float) -> tuple[float, ..
     After T the residual is phi (1 - exp(-lam T)) / lam, its bound at most eta_bar / lam + 2 nbar. The excess
     of one over the other is greatest at lam = ln(phi T / (2 nbar)) / T; the smallest phi with any follows.
     """
-    nbar = max(2 * NOISE_LIMIT_SIGMA * getattr(sensors, axis).noise_bias_quantum[0] for axis in "pqr")
+    nbar = 2 * NOISE_LIMIT_SIGMA * float(Errors(sensors).each("noise", AXES).max())
     return tuple(_pole(delay_s, nbar, constant_rad_s2) for delay_s in DELAYS_S) if nbar > 0 else ()
 
 
 def gyros_vary(sensors: Sensors) -> bool:
     """Whether the error of some gyro is more than a constant."""
-    gyros = [getattr(sensors, axis) for axis in "pqr"]
-    return any(gyro.noise_bias_quantum[0] or gyro.noise_bias_quantum[2] or gyro.scale_error for gyro in gyros)
+    errors = Errors(sensors)
+    return any(errors.each(of_it, AXES).any() for of_it in ("noise", "resolution", "slope"))
 
 
 def _pole(delay_s: float, noise: float, eta_bar: float) -> float:

@@ -60,7 +60,7 @@ def with_hypotheses(block, *kinds, tolerance=()):
 def by_onset(block, name):
     """What the lanes keep under a name, (..., slots, hypotheses)."""
     kept = block["lane"][name]
-    return kept.reshape(*kept.shape[:-1], N_SLOTS, MAX_HYPOTHESES)
+    return kept.reshape(*kept.shape[:-1], MAX_HYPOTHESES, N_SLOTS).swapaxes(-1, -2)
 
 
 def covariance(block, frames, dt):

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from innovations import by_onset
 from kernels import DT, new_fdi
 from statistics_of import Across
 
@@ -251,7 +252,7 @@ def test_a_view_has_levels_and_tolerances_of_the_axes_it_looks_at(fdi):
         assert block["P_dd"][0, 0] == 1.0
         tried = block["hypothesis"][: block["n_hypotheses"]]
         assert tried["kind"].tolist() == [STEP] + [LOSS] * (len(tried) - 1)
-        sense = block["lane"]["sense"].reshape(-1, MAX_HYPOTHESES)
+        sense = by_onset(block, "sense")
         assert (sense == -losses(tried)).all()
 
 

@@ -8,7 +8,7 @@ from innovations import block_of, bounded_all, by_onset, covariance, drawn, weig
 from scipy.stats import kstest
 
 from beaver_ftc.diagnosis import likelihood
-from beaver_ftc.diagnosis.likelihood import ALPHA3, LANES, MAX_HYPOTHESES, N_SLOTS, STEP
+from beaver_ftc.diagnosis.likelihood import ALPHA3, N_SLOTS, STEP
 from beaver_ftc.diagnosis.state import LOSS
 
 DT = 0.01
@@ -170,8 +170,7 @@ def test_a_bounded_uncertainty_adds_no_more_than_is_allowed_for(case, seed, cour
 
 def _allowed(block):
     """What a bounded uncertainty may add to the correlation of the first hypothesis, (slots,)."""
-    lanes = range(0, LANES, MAX_HYPOTHESES)
-    return np.array([likelihood.allowance(block["lane"], k, *block["swing"]) for k in lanes])
+    return np.array([likelihood.allowance(block["lane"], k, *block["swing"]) for k in range(N_SLOTS)])
 
 
 def test_the_allowance_is_not_absurdly_wide():

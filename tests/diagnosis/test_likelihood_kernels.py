@@ -39,7 +39,8 @@ def test_the_slot_that_starts_anew_counts_the_twos_of_the_frame():
 
 
 def test_an_onset_that_starts_knows_nothing_and_the_others_stay():
-    block = with_hypotheses(block_of(TOGETHER, [1e-3, 1e-3]), LOSS, STEP, tolerance=(0.1, 0.2))
+    kinds = MAX_HYPOTHESES // 2 * (LOSS, STEP)
+    block = with_hypotheses(block_of(TOGETHER, [1e-3, 1e-3]), *kinds, tolerance=(0.1, 0.2))
     names = (
         "correlation",
         "information",
@@ -88,7 +89,7 @@ def test_the_room_of_a_bounded_uncertainty_is_summed_up_by_parts():
     block["stay"], block["swing"], block["pace"] = (0.1, 0.2), (0.3, 0.4), 0.05
     w = rng.normal(size=(frames, 2))
     block["K_x"] = block["S_inverse"] = np.eye(2)  # a filter that forgets at once: g_s is the signature
-    lane = 2 * MAX_HYPOTHESES
+    lane = 2
     for each in w:
         block["lane"]["shaped"][:, lane] = each
         likelihood.respond(block, 1.0, keep)
@@ -110,7 +111,8 @@ def test_the_room_of_a_bounded_uncertainty_is_summed_up_by_parts():
 def test_a_frame_is_whitened_weighed_and_summed_as_matrices_say():
     """Every lane by itself: r = x + dt (s - d), w = S^-1 r; N, D and R by w, what was there by its share."""
     rng, dt, keep, kept = np.random.default_rng(8), 0.05, 0.9, 0.8
-    block = with_hypotheses(block_of(TOGETHER, [1e-3, 1e-3]), LOSS, STEP, tolerance=(0.1, 0.2))
+    kinds = MAX_HYPOTHESES // 2 * (LOSS, STEP)
+    block = with_hypotheses(block_of(TOGETHER, [1e-3, 1e-3]), *kinds, tolerance=(0.1, 0.2))
     K_x, K_d, S = rng.normal(size=(3, 2, 2))
     block["K_x"], block["K_d"], block["S_inverse"], block["keep"] = K_x, K_d, S, kept
     seen, regressors = rng.normal(size=2), rng.normal(size=(2, 2))
@@ -136,8 +138,23 @@ def test_a_frame_is_whitened_weighed_and_summed_as_matrices_say():
     assert lane["slack"] == pytest.approx(np.array([0.1, 0.2]) @ np.abs(overlaps))
 
 
+def test_of_hypotheses_that_a_block_does_not_have_nothing_is_reckoned():
+    rng = np.random.default_rng(9)
+    block = with_hypotheses(block_of(TOGETHER, [1e-3, 1e-3]), LOSS, STEP, tolerance=(0.1, 0.2))
+    block["level"], block["regressor"][:2] = 4.0, rng.normal(size=(2, 2))
+    lane = block["lane"]
+    for name in lane.dtype.names:
+        lane[name] = rng.uniform(1.0, 2.0, lane[name].shape)
+    before = lane.copy()
+    block["hypothesis"]["signature"], block["scratch"] = rng.normal(size=2), rng.normal(size=2)
+    likelihood.start(block, 3)
+    likelihood.take_in(block, np.full(3, 0.1), True, DT, 0.9)
+    for name in lane.dtype.names:
+        assert (lane[name][..., 2 * N_SLOTS :] == before[name][..., 2 * N_SLOTS :]).all(), name
+
+
 def test_a_lane_without_information_comes_to_nothing():
-    block = with_hypotheses(block_of(TOGETHER, [1e-3, 1e-3]), LOSS)
+    block = with_hypotheses(block_of(TOGETHER, [1e-3, 1e-3]), *MAX_HYPOTHESES * (LOSS,))
     block["lane"]["sense"], block["lane"]["correlation"], block["level"] = -1.0, -5.0, 4.0
     block["lane"]["information"][::2] = 2.0
     with np.errstate(divide="ignore", invalid="ignore"):

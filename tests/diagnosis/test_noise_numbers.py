@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from innovations import LEVEL_FLIGHT, TRAVEL_RAD, Detector, gust_jitter
+from innovations import LEVEL_FLIGHT, TRAVEL_RAD, Detector, by_onset, gust_jitter
 
 from beaver_ftc.aircraft import load
 from beaver_ftc.design.coefficients import MASS
@@ -342,7 +342,7 @@ def test_a_sense_is_kept_for_every_onset(alone):
         n = int(block["n_hypotheses"])
         kinds = block["hypothesis"]["kind"][:n]
         signs = [{LOSS: -1.0, GROWING: -1.0, ENDING: 1.0}.get(int(kind), 0.0) for kind in kinds]
-        sense = block["lane"]["sense"].reshape(N_SLOTS, -1)
+        sense = by_onset(block, "sense")
         assert (sense[:, :n] == signs).all()
         assert not sense[:, n:].any()
 

@@ -260,10 +260,10 @@ def compose(views, tolerated, noise, blocks, forces, air, inertial_air, innovati
 
 
 @kernel
-def observe(views, tests, listening, y, dt, frame, latched):
-    """Take in one frame of what the views see, as `statistical.observe`; y as measured."""
+def observe(views, tests, listening, y, dt, k, latched):
+    """Take in frame k of what the views see, as `statistical.observe`; y as measured."""
     heard = tones.usual(listening, y)
-    keep, slot = tests.keep if latched else 1.0, likelihood.slot_to_start(frame)
+    keep, slot = tests.keep if latched else 1.0, likelihood.slot_to_start(k)
     for a in range(views.size):
         view = views[a]
         if not view.weighed:

@@ -41,8 +41,8 @@ from beaver_ftc.diagnosis.state import LOSS
 
 # A block is the axes whose noise goes together: pitch, and roll with yaw, the latter twice. States of a
 # filter: what is left of the rate, then the drift. Every hypothesis is tried from every onset: that is a lane
-# of a block, and what lanes keep lies side by side for vector instructions, lane slot * MAX_HYPOTHESES +
-# hypothesis.
+# of a block, and what lanes keep lies side by side for vector instructions, lane hypothesis * N_SLOTS + slot:
+# those of the hypotheses that a block has come first, and no other is reckoned.
 PITCH_BLOCK, LATERAL, RETURNING = 0, 1, 2  # the last is the second view of roll and yaw
 N_BLOCKS = 3
 N_SLOTS = 10
@@ -104,29 +104,34 @@ BLOCK = np.dtype(
 
 
 @kernel
-def slot_to_start(frame):
-    """The slot that starts anew at a frame: slot j at odd multiples of 2^j, the last at all that are left."""
+def slot_to_start(k):
+    """The slot that starts anew at frame k: slot j at odd multiples of 2^j, the last at all that are left."""
     slot = 0
-    while frame % 2 == 0 and slot < N_SLOTS - 1:
-        frame //= 2
+    while k % 2 == 0 and slot < N_SLOTS - 1:
+        k //= 2
         slot += 1
     return slot
+
+
+@kernel
+def lanes(block):
+    """How many lanes there are: the first of each of its arrays."""
+    return block.n_hypotheses * N_SLOTS
 
 
 @kernel
 def start(block, slot):
     """Forget everything about an onset."""
     lane = block.lane
-    first = slot * MAX_HYPOTHESES
-    for k in range(first, first + MAX_HYPOTHESES):
+    for k in range(slot, lanes(block), N_SLOTS):
         lane.correlation[k] = lane.information[k] = 0.0
         lane.weight[0, k] = lane.weight[1, k] = 0.0
         lane.stays[k] = lane.swings[k] = lane.drifts[k] = 0.0
         lane.missing[k] = 1.0
-    for i in range(4):
-        lane.response[i, first : first + MAX_HYPOTHESES] = 0.0
-    for j in range(block.n_regressors):
-        lane.overlap[j, first : first + MAX_HYPOTHESES] = 0.0
+        for i in range(4):
+            lane.response[i, k] = 0.0
+        for j in range(block.n_regressors):
+            lane.overlap[j, k] = 0.0
 
 
 @kernel
@@ -150,8 +155,7 @@ def shape(block, h):
     was then."""
     lane, hypothesis = block.lane, block.hypothesis[h]
     s0, s1 = hypothesis.signature[0], hypothesis.signature[1]
-    for slot in range(N_SLOTS):
-        k = slot * MAX_HYPOTHESES + h
+    for k in range(h * N_SLOTS, (h + 1) * N_SLOTS):
         if hypothesis.kind == ENDING:
             if lane.missing[k] > 0.0:
                 lane.held[0, k], lane.held[1, k], lane.missing[k] = s0, s1, 0.0
@@ -177,7 +181,7 @@ def respond(block, dt, keep):
     kept, g0, g1 = block.keep, block.innovation[0], block.innovation[1]
     swing0, swing1, stay0, stay1 = block.swing[0], block.swing[1], block.stay[0], block.stay[1]
     state, shaped, weight, pace = lane.response, lane.shaped, lane.weight, block.pace
-    for k in range(LANES):
+    for k in range(lanes(block)):
         r0 = state[0, k] + dt * (shaped[0, k] - state[2, k])
         r1 = state[1, k] + dt * (shaped[1, k] - state[3, k])
         state[0, k], state[1, k] = r0 - x00 * r0 - x01 * r1, r1 - x10 * r0 - x11 * r1
@@ -196,12 +200,12 @@ def respond(block, dt, keep):
 @kernel
 def overlap(block, keep):
     """Bring R_j to this frame, and `slack`: how much of N the declared errors of the coefficients explain."""
-    weight, slack = block.lane.weight, block.lane.slack
-    slack[:] = 0.0
+    weight, slack, n = block.lane.weight, block.lane.slack, lanes(block)
+    slack[:n] = 0.0
     for j in range(block.n_regressors):
         r0, r1 = block.regressor_response[j, 0], block.regressor_response[j, 1]
         total, tolerance = block.lane.overlap[j], block.tolerance[j]
-        for k in range(LANES):
+        for k in range(n):
             total[k] = keep * total[k] + (weight[0, k] * r0 + weight[1, k] * r1)
             slack[k] += tolerance * abs(total[k])
 
@@ -257,7 +261,7 @@ def judge_lanes(block, certain):
     """
     lane, sense, swing0, swing1 = block.lane, block.lane.sense, block.swing[0], block.swing[1]
     level, chance, doubted = block.level, block.chance, 0.0 if certain else 1.0
-    for k in range(LANES):
+    for k in range(lanes(block)):
         N, D, slack = lane.correlation[k], lane.information[k], lane.slack[k]
         is_loss, known = sense[k] != 0.0, D > 0.0
         evidence = sense[k] * N if is_loss else abs(N)
@@ -284,7 +288,7 @@ def judge(block, memory=0.0):
     for h in range(block.n_hypotheses):
         hypothesis = block.hypothesis[h]
         score, at_least, at_most, best, likeliest = 0.0, 0.0, memory * hypothesis.at_most, -1.0, -1
-        for k in range(h, LANES, MAX_HYPOTHESES):
+        for k in range(h * N_SLOTS, (h + 1) * N_SLOTS):
             score = max(score, lane.score[k])
             at_least, at_most = max(at_least, lane.at_least[k]), max(at_most, lane.at_most[k])
             if lane.likelihood[k] > best:

@@ -94,11 +94,11 @@ def signatures(blocks, Gu, cubic):
 
 
 @kernel
-def observe(tests, bounded, blocks, air, innovation, dt, frame, latched, ends=False):
-    """Take in one frame: innovation and `bounded` (3,) rad/s2, frame number, whether the alarm is out; ends:
+def observe(tests, bounded, blocks, air, innovation, dt, k, latched, ends=False):
+    """Take in frame k: innovation and `bounded` (3,) rad/s2, whether the alarm is out; ends:
     a loss may."""
     keep = tests.keep if latched else 1.0
-    slot = likelihood.slot_to_start(frame)
+    slot = likelihood.slot_to_start(k)
     for b in range(blocks.size):
         block = blocks[b]
         if not latched:

@@ -100,6 +100,6 @@ def set_up_views(statistical: np.void, aircraft: Aircraft) -> None:
         hypotheses["kind"], hypotheses["surface"] = kinds, [-1, *tried]
         view["past_gust"] = surface == THE_VANE and plane == IN_YAW and statistical["air"]["moving"]
         view["inertial"], view["clears"] = inertial, inertial or surface == THE_VANE
-        sense = block["lane"]["sense"].reshape(N_SLOTS, -1)
+        sense = block["lane"]["sense"].reshape(-1, N_SLOTS)
         sense[:] = 0.0
-        sense[:, : len(kinds)] = [SENSE[kind] for kind in kinds]
+        sense[: len(kinds)] = [[SENSE[kind]] for kind in kinds]

@@ -42,11 +42,11 @@ _OURS = {
             "Recursive least-squares monitor of each surface and its rate, without a model [Keipour2019].",
         ),
         "augmented-ekf": (
-            "beaver_ftc.diagnosis.rivals.ekf:AugmentedEkf",
+            "beaver_ftc.diagnosis.rivals.effectiveness:AugmentedEkf",
             "Extended Kalman filter of effectiveness, chi-square test on the estimates [Jazwinski1970].",
         ),
         "augmented-ukf": (
-            "beaver_ftc.diagnosis.rivals.ukf:AugmentedUkf",
+            "beaver_ftc.diagnosis.rivals.effectiveness:AugmentedUkf",
             "Unscented Kalman filter of effectiveness, CUSUM on the innovation squared [Julier2004].",
         ),
         "multiple-models": (

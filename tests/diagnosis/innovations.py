@@ -13,7 +13,7 @@ from statistics_of import Statistical
 from beaver_ftc.compiled import kernel
 from beaver_ftc.design.coefficients import MASS
 from beaver_ftc.design.engine import DPT_0, KW_TO_DPT, SEA_LEVEL_DENSITY_KG_M3
-from beaver_ftc.diagnosis import likelihood, noise_model, statistical, whitening
+from beaver_ftc.diagnosis import likelihood, noise_model, statistical
 from beaver_ftc.diagnosis.bounds import variances
 from beaver_ftc.diagnosis.bounds.declared import Errors
 from beaver_ftc.diagnosis.likelihood import BLOCK, MAX_HYPOTHESES, N_SLOTS, SENSE
@@ -117,9 +117,9 @@ class PlainKalman:
 def filter_all(block, innovations, dt, out):
     """Innovations (k, n) rad/s2 whitened into out (k, 2)."""
     for k in range(len(innovations)):
-        whitening.advance(block, dt)
+        likelihood.advance(block, dt)
         block.scratch[: block.n] = innovations[k]
-        whitening.whiten(block, block.state, block.scratch, dt, out[k])
+        likelihood.whiten(block, block.state, block.scratch, dt, out[k])
 
 
 @kernel
@@ -128,11 +128,11 @@ def weigh_all(block, innovations, signatures, regressors, first, keep, tolerated
     for k in range(len(innovations)):
         if keep == 1.0:
             likelihood.start(block, likelihood.slot_to_start(first + k))
-        whitening.advance(block, dt)
+        likelihood.advance(block, dt)
         block.scratch[: block.n] = innovations[k]
-        whitening.whiten(block, block.state, block.scratch, dt, block.innovation)
+        likelihood.whiten(block, block.state, block.scratch, dt, block.innovation)
         for j in range(block.n_regressors):
-            whitening.whiten(
+            likelihood.whiten(
                 block, block.regressor_state[j], regressors[k, j], dt, block.regressor_response[j]
             )
         for h in range(block.n_hypotheses):
@@ -146,9 +146,9 @@ def bounded_all(block, d, signatures, onset, dt):
     """Show a block an uncertainty d (k, n) up to 0.02 rad/s2, and from `onset` on signatures (k, h, n)."""
     bounded = np.full(3, 0.02)
     for k in range(len(d)):
-        whitening.advance(block, dt)
+        likelihood.advance(block, dt)
         block.scratch[: block.n] = d[k]
-        whitening.whiten(block, block.state, block.scratch, dt, block.innovation)
+        likelihood.whiten(block, block.state, block.scratch, dt, block.innovation)
         for h in range(block.n_hypotheses):
             block.hypothesis[h].signature[: block.n] = signatures[k, h]
         likelihood.reach(block, bounded, dt)

@@ -7,10 +7,10 @@ from statistics_of import Across
 
 from beaver_ftc.aircraft import load
 from beaver_ftc.diagnosis import air, isolation
+from beaver_ftc.diagnosis.across import across_a_column, set_up_views
 from beaver_ftc.diagnosis.likelihood import STEP
 from beaver_ftc.diagnosis.state import LOSS, POSITION
 from beaver_ftc.diagnosis.tones import set_up_listening
-from beaver_ftc.diagnosis.views import across_a_column, set_up_views
 from beaver_ftc.loop.loop import Loop, fly
 from beaver_ftc.scenario.diagnosis import FdiConfig
 from beaver_ftc.studies.matrix.fault_matrix import declared

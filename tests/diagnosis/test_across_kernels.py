@@ -8,10 +8,9 @@ from statistics_of import Across
 
 from beaver_ftc.aircraft import load
 from beaver_ftc.diagnosis import across, likelihood, tones
-from beaver_ftc.diagnosis.across import AN_AXIS, MAX_VIEWS
+from beaver_ftc.diagnosis.across import AN_AXIS, MAX_VIEWS, set_up_views
 from beaver_ftc.diagnosis.likelihood import LEAST_UNCERTAINTY_RAD_S2, MAX_HYPOTHESES, STEP
 from beaver_ftc.diagnosis.state import LOSS, POSITION
-from beaver_ftc.diagnosis.views import set_up_views
 
 AILERON, ELEVATOR, RUDDER, FLAP = range(4)
 PITCH_AXIS, ROLL_AXIS, YAW_AXIS, PAST_AILERON, PAST_RUDDER = range(5)

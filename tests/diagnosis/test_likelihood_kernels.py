@@ -6,7 +6,7 @@ from innovations import block_of, by_onset, with_hypotheses
 from kernels import new_fdi
 from statistics_of import Statistical, put
 
-from beaver_ftc.diagnosis import likelihood, statistical, whitening
+from beaver_ftc.diagnosis import likelihood, statistical
 from beaver_ftc.diagnosis.likelihood import ALPHA3, ENDING, GROWING, MAX_HYPOTHESES, N_SLOTS, STEP
 from beaver_ftc.diagnosis.state import LOSS
 
@@ -19,7 +19,7 @@ def steady_block(axes=2, keep=0.97):
     drift, noise = (TOGETHER, [3e-4, 8e-4]) if axes == 2 else (TOGETHER[:1, :1], [3e-4])
     block = block_of(drift, noise, jitter=0.05, keep=keep)
     for _ in range(60):
-        whitening.advance(block, DT)
+        likelihood.advance(block, DT)
     return block
 
 
@@ -27,7 +27,7 @@ def through(block, accelerations):
     """What the filter, from rest, leaves of accelerations (k, n)."""
     out, state, shown = np.zeros(2), np.zeros(4), []
     for acceleration in accelerations:
-        whitening.whiten(block, state, np.append(acceleration, 0.0)[:2], DT, out)
+        likelihood.whiten(block, state, np.append(acceleration, 0.0)[:2], DT, out)
         shown.append(out[: block["n"]].copy())
     return np.array(shown)
 

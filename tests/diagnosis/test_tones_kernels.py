@@ -10,7 +10,7 @@ from kernels import DT, new_fdi
 from statistics_of import Across
 
 from beaver_ftc.design.terms import AIRSPEED, ALPHA, BETA
-from beaver_ftc.diagnosis import across, tones, whitening
+from beaver_ftc.diagnosis import across, likelihood, tones
 from beaver_ftc.diagnosis.across import AN_AXIS, THE_VANE
 from beaver_ftc.diagnosis.state import PITCH, SIDE, YAW
 from beaver_ftc.diagnosis.tones import FREQUENCIES_RAD_S, MEMORY_S, N_TONES
@@ -96,7 +96,7 @@ def test_the_filter_lets_pass_of_a_tone_what_it_does_when_run(view, K_x, K_d, ke
     block["K_x"][0, 0], block["K_d"][0, 0], block["keep"] = K_x, K_d, keep
     out, response = np.zeros(2), []
     for k in range(6000):
-        whitening.whiten(block, block["state"], np.array([np.cos(frequency_rad_s * k * DT), 0.0]), DT, out)
+        likelihood.whiten(block, block["state"], np.array([np.cos(frequency_rad_s * k * DT), 0.0]), DT, out)
         response.append(out[0])
     angles = frequency_rad_s * DT * np.arange(3000, 6000)
     shares, *_ = np.linalg.lstsq(

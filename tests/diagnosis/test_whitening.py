@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from innovations import PlainKalman, block_of, drawn, filter_all
 from scipy.linalg import solve_discrete_are
 
-from beaver_ftc.diagnosis import whitening
+from beaver_ftc.diagnosis import likelihood
 
 TOGETHER = np.array([[0.04, 0.006], [0.006, 0.003]])
 CASES = {  # drift, noise, what a drift keeps of itself in a frame
@@ -96,7 +96,7 @@ def test_from_the_first_frame_on_the_covariance_is_as_said(case):
         squares += g[:, :, None] * g[:, None, :]
     block = block_of(drift, noise, keep=keep)
     for k in range(frames):
-        whitening.advance(block, dt)
+        likelihood.advance(block, dt)
         whole = np.linalg.cholesky(block["S_inverse"][:n, :n])
         assert whole.T @ (squares[k] / flights) @ whole == pytest.approx(
             np.eye(n), abs=6 * np.sqrt(2 / flights)

@@ -11,7 +11,7 @@ import numpy as np
 from beaver_ftc.aircraft.schema import MAX_MONOMIALS, MAX_TERMS
 from beaver_ftc.compiled import kernel
 from beaver_ftc.design.terms import AIRSPEED, N_SIGNALS, QDYN, evaluate, regressors
-from beaver_ftc.diagnosis import across, likelihood, readings, whitening
+from beaver_ftc.diagnosis import across, likelihood, noise_model
 from beaver_ftc.diagnosis import air as gusts
 from beaver_ftc.diagnosis.across import MAX_VIEWS, VIEW
 from beaver_ftc.diagnosis.air import AIR
@@ -48,8 +48,8 @@ TESTS = np.dtype(
 
 # What moves the rates besides a fault. rapidity, 1/s: intensity of the drift of an uncertainty over its bound
 # squared; bounded, rad/s2: that bound now; deflection: its part by that of the surfaces; jitter, (rad/s2)2:
-# noise of the model's own inputs, `own_jitter` what of it is none of readings.py. read: whether errors of the
-# air data count. The last are scratch.
+# noise of the model's own inputs, `own_jitter` what of it is none of the air data's. read: whether errors of
+# the air data count. The last are scratch.
 NOISE = np.dtype(
     [
         ("rapidity", "f8"), ("bounded", "f8", (3,)), ("deflection", "f8", (3,)),
@@ -128,7 +128,7 @@ def follow_rest(blocks, air, surprise, dt):
         for i in range(block.n):
             axis = block.axis[i]
             block.scratch[i] = surprise[axis] - air.mean[axis]
-        whitening.whiten(block, block.rest, block.scratch, dt, block.scratch)
+        likelihood.whiten(block, block.rest, block.scratch, dt, block.scratch)
 
 
 @kernel
@@ -320,7 +320,7 @@ def constants(share, noise, blocks, admitted, design, measured, u):
     evaluate(design.moments, measured.x, y)
     coefficients(share, noise.terms, blocks, design, y, u)
     if noise.read:
-        readings.add(share, noise, blocks, admitted, design, y, u)
+        noise_model.add_readings(share, noise, blocks, admitted, design, y, u)
 
 
 @kernel

@@ -7,10 +7,10 @@ import numpy as np
 
 from beaver_ftc.design.context import DesignModel
 from beaver_ftc.diagnosis.accelerometers import NEVER_STILL
+from beaver_ftc.diagnosis.across import across_a_column
 from beaver_ftc.diagnosis.bounds.declared import GUST_LIMIT_SIGMA, SCALE_M, Errors, gust_mps
 from beaver_ftc.diagnosis.bounds.variances import gust_effect
 from beaver_ftc.diagnosis.forces import tell_apart
-from beaver_ftc.diagnosis.views import across_a_column
 from beaver_ftc.diagnosis.watch import NOBODY, POLES_PER_S
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.plant import channels as ch

@@ -5,7 +5,7 @@ import pytest
 
 from beaver_ftc.design.context import Context, Declared
 from beaver_ftc.diagnosis.base import Measured
-from beaver_ftc.diagnosis.rivals.air import Air
+from beaver_ftc.diagnosis.rivals.kalman import Air
 from beaver_ftc.diagnosis.rivals.observer import Fit, residual_deviation
 from beaver_ftc.diagnosis.rivals.rls import Pair
 from beaver_ftc.plugins import DETECTORS, plugin_class

@@ -6,7 +6,7 @@ from scipy.stats import chi2, multivariate_normal
 
 from beaver_ftc.diagnosis.rivals.imm import mix, posterior, transition
 from beaver_ftc.diagnosis.rivals.kalman import log_likelihood, normalised_square, sigma_points, update
-from beaver_ftc.diagnosis.rivals.least_squares import RecursiveLeastSquares
+from beaver_ftc.diagnosis.rivals.rls import RecursiveLeastSquares
 
 RNG = np.random.default_rng(7)
 

@@ -8,13 +8,10 @@ import pytest
 
 from beaver_ftc.design.context import Context, Declared
 from beaver_ftc.diagnosis.base import Measured
-from beaver_ftc.diagnosis.rivals.air import Air, rate_variance, unexplained
-from beaver_ftc.diagnosis.rivals.effectiveness import EffectivenessFilter, N
-from beaver_ftc.diagnosis.rivals.ekf import AugmentedEkf
-from beaver_ftc.diagnosis.rivals.kalman import update
-from beaver_ftc.diagnosis.rivals.least_squares import RecursiveLeastSquares
-from beaver_ftc.diagnosis.rivals.rls import Pair, RlsMonitor
-from beaver_ftc.diagnosis.rivals.ukf import AugmentedUkf
+from beaver_ftc.diagnosis.bounds.variances import rate_variance
+from beaver_ftc.diagnosis.rivals.effectiveness import AugmentedEkf, AugmentedUkf, EffectivenessFilter, N
+from beaver_ftc.diagnosis.rivals.kalman import Air, unexplained, update
+from beaver_ftc.diagnosis.rivals.rls import Pair, RecursiveLeastSquares, RlsMonitor
 
 DT, BOUND = 0.02, np.array([0.02, 0.03, 0.05])
 GUSTY = Declared(

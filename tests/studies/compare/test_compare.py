@@ -11,7 +11,7 @@ import pytest
 from typer.testing import CliRunner
 
 from beaver_ftc.cli.main import app
-from beaver_ftc.diagnosis.rivals.options import TUNED, TUNED_FOR_ERRORS, tuned
+from beaver_ftc.diagnosis.rivals import TUNED, TUNED_FOR_ERRORS, tuned
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.plugins import plugin_class
 from beaver_ftc.scenario.schema import Scenario

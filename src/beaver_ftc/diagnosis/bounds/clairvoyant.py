@@ -33,7 +33,7 @@ from beaver_ftc.aircraft import Aircraft, Term
 from beaver_ftc.design.context import Context
 from beaver_ftc.design.inertia import inertia_coefficients
 from beaver_ftc.diagnosis.air import UNSEEN
-from beaver_ftc.diagnosis.rivals.air import rate_variance
+from beaver_ftc.diagnosis.bounds.variances import rate_variance
 
 UNEXPLAINED_S = 0.1
 LEAST_RATE_RAD_S = 1e-5  # what perfect instruments are taken for

@@ -12,9 +12,9 @@ import numpy as np
 
 from beaver_ftc.design.context import Context
 from beaver_ftc.diagnosis.base import Measured, Verdict
-from beaver_ftc.diagnosis.rivals.air import Air, rate_variance, unexplained
-from beaver_ftc.diagnosis.rivals.kalman import log_likelihood, update
-from beaver_ftc.diagnosis.rivals.options import options_of
+from beaver_ftc.diagnosis.bounds.variances import rate_variance
+from beaver_ftc.diagnosis.rivals import options_of
+from beaver_ftc.diagnosis.rivals.kalman import Air, log_likelihood, unexplained, update
 
 LEVELS = (-0.25, -0.5, -0.9)
 MODES = (

@@ -21,7 +21,7 @@ import numpy as np
 
 from beaver_ftc.design.context import Context
 from beaver_ftc.diagnosis.base import Measured, Verdict
-from beaver_ftc.diagnosis.rivals.options import options_of
+from beaver_ftc.diagnosis.rivals import options_of
 
 
 class Fit:

@@ -4,6 +4,10 @@ For each pair (surface, rate) a linear input-output model is learnt in flight; t
 prediction is compared with the errors before, and the alarm is a score z = (error - mean) / deviation
 beyond a limit [Keipour2019]. The pair that raises the alarm is what is isolated. Departures: two past
 samples of input and output instead of a longer window; mean and deviation fade exponentially.
+
+Learnt by recursive least squares with exponential forgetting [Ljung1999, sec. 11.2]:
+
+    K = P phi / (lam + phi' P phi),   w += K (y - w' phi),   P = (P - K phi' P) / lam
 """
 
 from collections.abc import Mapping
@@ -14,8 +18,30 @@ import numpy as np
 
 from beaver_ftc.design.context import Context
 from beaver_ftc.diagnosis.base import Measured, Verdict
-from beaver_ftc.diagnosis.rivals.least_squares import RecursiveLeastSquares
-from beaver_ftc.diagnosis.rivals.options import options_of
+from beaver_ftc.diagnosis.rivals import options_of
+
+
+class RecursiveLeastSquares:
+    """y = w' phi, learnt sample by sample.
+
+    n: parameters. forgetting: lam in (0, 1]. prior: variance of the parameters at the start; it also bounds
+    P, which would otherwise grow without excitation.
+    """
+
+    def __init__(self, n: int, forgetting: float, prior: float) -> None:
+        self.w, self.P = np.zeros(n), np.eye(n) * prior
+        self._forgetting, self._prior = forgetting, prior
+
+    def step(self, phi: np.ndarray, y: float) -> float:
+        """Learn from one sample; returns the error of the prediction made before it."""
+        Pphi = self.P @ phi
+        gain = Pphi / (self._forgetting + phi @ Pphi)
+        error = y - float(self.w @ phi)
+        self.w = self.w + gain * error
+        P = (self.P - np.outer(gain, Pphi)) / self._forgetting
+        largest = float(P.diagonal().max())
+        self.P = P if largest <= self._prior else P * (self._prior / largest)
+        return error
 
 
 class Pair:

@@ -28,7 +28,7 @@ from pathlib import Path
 from statistics import fmean
 from typing import Any
 
-from beaver_ftc.diagnosis.rivals.options import TUNED, TUNED_FOR_ERRORS
+from beaver_ftc.diagnosis.rivals import TUNED, TUNED_FOR_ERRORS
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.studies.compare.replay import Trace, record, replay
 from beaver_ftc.studies.compare.trial import (

@@ -1,9 +1,10 @@
 """What the instruments do to the truth: one section a signal; what is left out is measured perfectly."""
 
+from collections.abc import Callable
 from math import hypot, radians, sqrt
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, Self, TypeVar
 
-from pydantic import Field, GetJsonSchemaHandler, model_validator
+from pydantic import Field, GetJsonSchemaHandler, create_model, model_validator
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
@@ -52,44 +53,45 @@ class _Sensor(Section):
         return hypot(noise, quantum / sqrt(12.0))
 
 
+_S = TypeVar("_S", bound=_Sensor)
+
+
+def _reads(suffix: str, unit: str, most: float, si: float = 1.0) -> Callable[[type[_S]], type[_S]]:
+    """An instrument's row: the ending of its keys, their unit, the largest error, and the unit in SI."""
+    keys = f"noise_std_{suffix}", f"bias_{suffix}", f"quantum_{suffix}"
+    meaning = "standard deviation of a sample", "constant error", "resolution"
+    fields: dict[str, Any] = {
+        key: (Number, number(0.0, unit=unit, says=says, ge=least, le=most))
+        for key, says, least in zip(keys, meaning, (0, -most, 0), strict=True)
+    }
+
+    def made(cls: type[_S]) -> type[_S]:
+        cls.si = (*keys, si)
+        return create_model(
+            cls.__name__, __base__=cls, __module__=cls.__module__, __doc__=cls.__doc__, **fields
+        )
+
+    return made
+
+
+@_reads("deg_s", "deg/s", 100, radians(1.0))
 class RateGyro(_Sensor):
     """A body rate."""
 
-    si = ("noise_std_deg_s", "bias_deg_s", "quantum_deg_s", radians(1.0))
 
-    noise_std_deg_s: Number = number(0.0, unit="deg/s", says="standard deviation of a sample", ge=0, le=100)
-    bias_deg_s: Number = number(0.0, unit="deg/s", says="constant error", ge=-100, le=100)
-    quantum_deg_s: Number = number(0.0, unit="deg/s", says="resolution", ge=0, le=100)
-
-
+@_reads("deg", "deg", 45, radians(1.0))
 class FlowVane(_Sensor):
     """An incidence angle."""
 
-    si = ("noise_std_deg", "bias_deg", "quantum_deg", radians(1.0))
 
-    noise_std_deg: Number = number(0.0, unit="deg", says="standard deviation of a sample", ge=0, le=45)
-    bias_deg: Number = number(0.0, unit="deg", says="constant error", ge=-45, le=45)
-    quantum_deg: Number = number(0.0, unit="deg", says="resolution", ge=0, le=45)
-
-
+@_reads("mps", "m/s", 50)
 class Airspeed(_Sensor):
     """True airspeed."""
 
-    si = ("noise_std_mps", "bias_mps", "quantum_mps", 1.0)
 
-    noise_std_mps: Number = number(0.0, unit="m/s", says="standard deviation of a sample", ge=0, le=50)
-    bias_mps: Number = number(0.0, unit="m/s", says="constant error", ge=-50, le=50)
-    quantum_mps: Number = number(0.0, unit="m/s", says="resolution", ge=0, le=50)
-
-
+@_reads("pa", "Pa", 5000)
 class DynamicPressure(_Sensor):
     """Dynamic pressure."""
-
-    si = ("noise_std_pa", "bias_pa", "quantum_pa", 1.0)
-
-    noise_std_pa: Number = number(0.0, unit="Pa", says="standard deviation of a sample", ge=0, le=5000)
-    bias_pa: Number = number(0.0, unit="Pa", says="constant error", ge=-5000, le=5000)
-    quantum_pa: Number = number(0.0, unit="Pa", says="resolution", ge=0, le=5000)
 
 
 class AttitudeAngle(FlowVane):
@@ -105,44 +107,24 @@ class AttitudeAngle(FlowVane):
         return radians(self.drift_deg_h) / 3600.0
 
 
+@_reads("m", "m", 500)
 class Altimeter(_Sensor):
     """Altitude above sea level."""
 
-    si = ("noise_std_m", "bias_m", "quantum_m", 1.0)
 
-    noise_std_m: Number = number(0.0, unit="m", says="standard deviation of a sample", ge=0, le=500)
-    bias_m: Number = number(0.0, unit="m", says="constant error", ge=-500, le=500)
-    quantum_m: Number = number(0.0, unit="m", says="resolution", ge=0, le=500)
-
-
+@_reads("rpm", "rpm", 500)
 class Tachometer(_Sensor):
     """Engine speed."""
 
-    si = ("noise_std_rpm", "bias_rpm", "quantum_rpm", 1.0)
 
-    noise_std_rpm: Number = number(0.0, unit="rpm", says="standard deviation of a sample", ge=0, le=500)
-    bias_rpm: Number = number(0.0, unit="rpm", says="constant error", ge=-500, le=500)
-    quantum_rpm: Number = number(0.0, unit="rpm", says="resolution", ge=0, le=500)
-
-
+@_reads("inhg", "inHg", 10)
 class ManifoldGauge(_Sensor):
     """Manifold pressure."""
 
-    si = ("noise_std_inhg", "bias_inhg", "quantum_inhg", 1.0)
 
-    noise_std_inhg: Number = number(0.0, unit="inHg", says="standard deviation of a sample", ge=0, le=10)
-    bias_inhg: Number = number(0.0, unit="inHg", says="constant error", ge=-10, le=10)
-    quantum_inhg: Number = number(0.0, unit="inHg", says="resolution", ge=0, le=10)
-
-
+@_reads("mps2", "m/s2", 100)
 class Accelerometer(_Sensor):
     """Specific force along a body axis at the centre of mass: all forces but gravity, over the mass."""
-
-    si = ("noise_std_mps2", "bias_mps2", "quantum_mps2", 1.0)
-
-    noise_std_mps2: Number = number(0.0, unit="m/s2", says="standard deviation of a sample", ge=0, le=100)
-    bias_mps2: Number = number(0.0, unit="m/s2", says="constant error", ge=-100, le=100)
-    quantum_mps2: Number = number(0.0, unit="m/s2", says="resolution", ge=0, le=100)
 
 
 ENGINE = ("engine_rpm", "manifold_pressure")  # instruments of an engine like the Beaver's

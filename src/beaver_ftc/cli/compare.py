@@ -7,7 +7,8 @@ from typing import Annotated
 import typer
 
 from beaver_ftc.cli.inputs import taking
-from beaver_ftc.cli.output import Format, FormatOption, answer, emit, emit_json
+from beaver_ftc.cli.output import Format, FormatOption, answer
+from beaver_ftc.cli.progress import progress_bar
 from beaver_ftc.documents.errors import BadInput
 
 
@@ -116,10 +117,7 @@ def _compare_recorded(folder: Path, out: Path, format: Format, page: Path | None
         picture = page.parent / "images" / "recorded-flights.png"
         if picture.parent.is_dir():
             picture.write_bytes((out / "recorded-flights" / "flights.png").read_bytes())
-    if format is Format.json:
-        emit_json(document | {"folder": str(out / "recorded-flights")})
-    else:
-        emit(as_text(document))
+    answer(format, document | {"folder": str(out / "recorded-flights")}, lambda: as_text(document))
 
 
 def _compare_other_days(folder: Path, format: Format, page: Path | None) -> None:
@@ -129,25 +127,19 @@ def _compare_other_days(folder: Path, format: Format, page: Path | None) -> None
     document = {"other_days": run_other_days(folder)}
     if page is not None:
         update_page(document, page)
-    if format is Format.json:
-        emit_json(document)
-    else:
-        emit(as_text(document))
+    answer(format, document, lambda: as_text(document))
 
 
 def _compare_runs(folders: list[Path], out: Path, format: Format) -> None:
     from beaver_ftc.studies.compare.runs import as_text, labels, write_runs
 
     runs = write_runs(out, folders)
-    if format is Format.json:
-        emit_json({"runs": dict(zip(labels(runs), runs, strict=True))})
-    else:
-        emit(f"{as_text(runs)}\n\nreport: {out / 'runs' / 'runs.html'}")
+    document = {"runs": dict(zip(labels(runs), runs, strict=True))}
+    answer(format, document, lambda: f"{as_text(runs)}\n\nreport: {out / 'runs' / 'runs.html'}")
 
 
 def _compare_on_flights(options: Options, most: int | None) -> None:
     """Schemes and laws on the flights of a sweep, or of the standard sets."""
-    from beaver_ftc.cli.progress import progress_bar
     from beaver_ftc.plugins import DETECTORS, LAWS
     from beaver_ftc.studies.compare.leaderboard import as_text, run_comparison, write_leaderboard
     from beaver_ftc.studies.compare.trial import LAW, SCHEME, entries_of, of_set, of_sweep, set_names
@@ -188,7 +180,6 @@ def _chosen(option: str, group: str, names: str | None, ours: str) -> list[str]:
 
 
 def _tune(options: Options, most: int | None) -> None:
-    from beaver_ftc.cli.progress import progress_bar
     from beaver_ftc.studies.compare.tune import tune, write_tuned
 
     with progress_bar("calibration flights") as progress:

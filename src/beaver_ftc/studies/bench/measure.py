@@ -72,7 +72,7 @@ def bench(rounds: int = 60, with_parts: bool = True, say: Say = lambda text: Non
     }
 
 
-def machine() -> dict[str, Any]:
+def machine() -> Document:
     """The kind of machine, without its name."""
     return {
         "processor": _processor(),
@@ -114,7 +114,7 @@ def _against(bare: np.ndarray, loop: np.ndarray) -> Document:
     return {**_figures("bare_us", bare), **_figures("closed_loop_us", loop), **_figures("ratio", loop / bare)}
 
 
-def _figures(name: str, values: np.ndarray) -> dict[str, Any]:
+def _figures(name: str, values: np.ndarray) -> Document:
     """The median over the rounds, and the quartiles as `<name>_quartiles`."""
     low, median, high = (round(value, 4) for value in quartiles(values))
     return {name: median, f"{name}_quartiles": [low, high]}
@@ -176,7 +176,7 @@ KINDS: dict[str, tuple[str, dict[str, Any]]] = {
 Taken = tuple[np.ndarray, int, float]
 
 
-def by_kind(rounds: int, between: Callable[[], object] = lambda: None) -> dict[str, dict[str, Any]]:
+def by_kind(rounds: int, between: Callable[[], object] = lambda: None) -> dict[str, Document]:
     """What a flight of each kind costs, all kinds in each round; `between` is called before every round.
 
     Processor time: `parts_ms` by part, `bare_ms` for JSBSim's frames alone, `frames_ratio` and `flight_ratio`
@@ -228,7 +228,7 @@ def _alone(run: Callable[[], object], runs: int) -> float:
     return time.process_time() - began
 
 
-def _medians(rows: list[Taken]) -> dict[str, Any]:
+def _medians(rows: list[Taken]) -> Document:
     parts, runs, alone = (np.array(column) for column in zip(*rows, strict=True))
     frames_s = parts[:, STAGES.index("frames")]
     return {
@@ -267,7 +267,7 @@ _ALTERNATIVES = {
 }
 
 
-def text_of(document: dict[str, Any]) -> str:
+def text_of(document: Document) -> str:
     """The document of `bench` as text."""
     return "\n".join([
         "{processor}, {cores} cores, Python {python}, JSBSim {jsbsim}".format(**document["machine"]),
@@ -288,7 +288,7 @@ def text_of(document: dict[str, Any]) -> str:
     ])  # fmt: skip
 
 
-def _phase_lines(phase: dict[str, Any]) -> list[str]:
+def _phase_lines(phase: Document) -> list[str]:
     parts = phase["parts"].items()
     return [
         _line("bare aircraft", {**phase, "ratio": 1.0}, "bare_us"),
@@ -297,7 +297,7 @@ def _phase_lines(phase: dict[str, Any]) -> list[str]:
     ]
 
 
-def _flights(flights: dict[str, Any]) -> list[str]:
+def _flights(flights: Document) -> list[str]:
     with_file = {**flights, "ratio": flights["with_log_file_ratio"]}
     return [
         f"whole flights of {flights['frames']} frames, loading and trim included",
@@ -307,7 +307,7 @@ def _flights(flights: dict[str, Any]) -> list[str]:
     ]
 
 
-def _kinds(kinds: dict[str, Any]) -> list[str]:
+def _kinds(kinds: Document) -> list[str]:
     """A line a kind of flight; the parts are the same for all."""
     parts = list(next(iter(kinds.values()))["parts_ms"])
     head = [*parts, "frames alone", "frames, x", "flight, x", "us added a frame"]
@@ -319,13 +319,13 @@ def _kinds(kinds: dict[str, Any]) -> list[str]:
     ]
 
 
-def _kind(kind: str, of: dict[str, Any], widths: list[int]) -> str:
+def _kind(kind: str, of: Document, widths: list[int]) -> str:
     figures = (
         *of["parts_ms"].values(), of["bare_ms"], of["frames_ratio"], of["flight_ratio"], of["own_part_us"]
     )  # fmt: skip
     return f"{kind:32}" + "".join(f"{f:{width}.3f}" for f, width in zip(figures, widths, strict=True))
 
 
-def _line(what: str, figures: dict[str, Any], us: str = "us") -> str:
+def _line(what: str, figures: Document, us: str = "us") -> str:
     low, high = figures[f"{us}_quartiles"]
     return f"{what:42}{figures[us]:9.3f}  [{low:.3f}, {high:.3f}]{figures['ratio']:9.3f} x"

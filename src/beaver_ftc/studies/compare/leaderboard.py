@@ -3,17 +3,22 @@
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from beaver_ftc.results.metrics import as_json
 from beaver_ftc.results.style import BLUE, GREY
 from beaver_ftc.studies.compare.scores import document_of
 from beaver_ftc.studies.compare.trial import LAW, ORACLE, SCHEME, Entry, SetFlight, Trial, fly_case
 from beaver_ftc.studies.engine.study import Progress, Study, run_study
+from beaver_ftc.studies.engine.workers import Case
 from beaver_ftc.studies.present import page
 from beaver_ftc.studies.present.figures import curve_look, marker, panels
 from beaver_ftc.studies.present.files import Files
 from beaver_ftc.studies.present.tables import aligned
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 Document = dict[str, Any]
 Cell = Callable[[Document, Document], str]
@@ -140,7 +145,7 @@ def _sets(document: Document) -> Iterator[page.Part]:
         yield page.Bullets("What loses:", losses or [nothing])
 
 
-def figure_of(document: Document) -> Any:
+def figure_of(document: Document) -> "Figure":
     """A row a set."""
     sets = document["sets"]
     figure, axes = panels(len(sets), 3, 13.0, 3.4 * len(sets), dpi=120)
@@ -152,7 +157,7 @@ def figure_of(document: Document) -> Any:
     return figure
 
 
-def _draw_curves(rate: Any, delay: Any, part: Document) -> None:
+def _draw_curves(rate: "Axes", delay: "Axes", part: Document) -> None:
     for index, (scheme, points) in enumerate(part["trade_off"].items()):
         look = curve_look(index)
         alarms = [point["false_alarms_per_h"] for point in points]
@@ -173,7 +178,7 @@ def _draw_curves(rate: Any, delay: Any, part: Document) -> None:
     delay.set_ylim(bottom=0.0)
 
 
-def _draw_ratios(axis: Any, part: Document) -> None:
+def _draw_ratios(axis: "Axes", part: Document) -> None:
     rows = [row for row in part["lines"] if row["scheme"] == SCHEME and row["law"] != ORACLE]
     for place, row in enumerate(rows):
         median, most = row["ratio_median"], row["ratio_90"]
@@ -219,6 +224,6 @@ def files_of(document: Document, name: str) -> Files:
     }
 
 
-def lost(case: Any, why: str) -> Trial:
+def lost(case: Case, why: str) -> Trial:
     """What becomes of a case that ends its process: no results, and why."""
     return Trial(case.what.set, failures=[f"{case.what.scenario.name}: {why}"])

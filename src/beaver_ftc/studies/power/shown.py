@@ -4,7 +4,7 @@ import io
 from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -24,6 +24,12 @@ from beaver_ftc.studies.present.figures import curve_look, heat_map, label_edges
 from beaver_ftc.studies.present.files import Files
 from beaver_ftc.studies.present.tables import plain, printed
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from matplotlib.image import AxesImage
+    from rich.table import Table
+
 Document = dict[str, Any]
 NAME = "power"
 WIDTH = 140
@@ -38,7 +44,7 @@ def as_text(document: Document, colour: bool = False) -> str:
     return "\n".join([printed(tables, WIDTH, colour), *said])
 
 
-def _table(document: Document, sensors: str, turbulence: str) -> Any:
+def _table(document: Document, sensors: str, turbulence: str) -> "Table":
     surfaces = document["grid"]["surfaces"]
     rows = []
     for level in document["levels"]:
@@ -200,14 +206,14 @@ def _rows_as_parquet(rows: Sequence[Row]) -> bytes:
     return content.getvalue()
 
 
-def _figures(document: Document, rows: Sequence[Row]) -> Iterator[tuple[str, Any]]:
+def _figures(document: Document, rows: Sequence[Row]) -> Iterator[tuple[str, "Figure"]]:
     for (scheme,), of in grouped(rows, "scheme").items():
         yield f"map-{scheme.replace(':', '-')}", _maps(document, scheme, of)
     for (sensors,), of in grouped(rows, "sensors").items():
         yield f"schemes-{sensors}", _curves(document, sensors, of)
 
 
-def _maps(document: Document, scheme: str, rows: Sequence[Row]) -> Any:
+def _maps(document: Document, scheme: str, rows: Sequence[Row]) -> "Figure":
     """Rows surfaces, columns conditions; in each, magnitude over excitation."""
     grid = document["grid"]
     surfaces, conditions = grid["surfaces"], grid["conditions"]
@@ -230,7 +236,7 @@ def _maps(document: Document, scheme: str, rows: Sequence[Row]) -> Any:
     return figure
 
 
-def _map(panel: Any, grid: Document, rows: Sequence[Row]) -> Any:
+def _map(panel: "Axes", grid: Document, rows: Sequence[Row]) -> "AxesImage":
     magnitudes, excitations = grid["magnitudes"], grid["excitations_deg_s"]
     cells = {key: summary(of) for key, of in grouped(rows, "magnitude", "excitation_deg_s").items()}
     percent, labels = np.full((len(magnitudes), len(excitations)), np.nan), {}
@@ -248,7 +254,7 @@ def _map(panel: Any, grid: Document, rows: Sequence[Row]) -> Any:
     )  # fmt: skip
 
 
-def _curves(document: Document, sensors: str, rows: Sequence[Row]) -> Any:
+def _curves(document: Document, sensors: str, rows: Sequence[Row]) -> "Figure":
     """Rows surfaces, columns air; in each, the share detected over magnitude, a line a scheme."""
     surfaces = document["grid"]["surfaces"]
     air = [turbulence for given, turbulence in document["grid"]["conditions"] if given == sensors]
@@ -276,7 +282,7 @@ def _curves(document: Document, sensors: str, rows: Sequence[Row]) -> Any:
     return figure
 
 
-def _draw_limit(panel: Any, rows: Sequence[Row], per_h: float) -> None:
+def _draw_limit(panel: "Axes", rows: Sequence[Row], per_h: float) -> None:
     found = {m: limit(here, per_h) for (m,), here in sorted(grouped(rows, "magnitude").items())}
     share = [100 * within[f"{JUDGED_S:g}"] for within in found.values()]
     panel.plot(
@@ -284,7 +290,7 @@ def _draw_limit(panel: Any, rows: Sequence[Row], per_h: float) -> None:
     )
 
 
-def _draw(panel: Any, rows: Sequence[Row], schemes: Sequence[str]) -> None:
+def _draw(panel: "Axes", rows: Sequence[Row], schemes: Sequence[str]) -> None:
     for (scheme,), of in grouped(rows, "scheme").items():
         place = schemes.index(scheme)
         found = {m: summary(here) for (m,), here in sorted(grouped(of, "magnitude").items())}

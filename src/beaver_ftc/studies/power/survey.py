@@ -23,6 +23,7 @@ from beaver_ftc.studies.compare.replay import (
     replay_together,
     trace,
 )
+from beaver_ftc.studies.engine.workers import Case
 
 STRIKES_S = (8.0, 10.0)  # a fault strikes at random in between
 WATCHED_S = 5.0  # after it
@@ -327,7 +328,7 @@ def fly_block(case: tuple[Block, bool], grid: Grid, schemes: Sequence[Contender]
     return (fly_faulted if faulted else fly_healthy)(block, grid, schemes)
 
 
-def lost(case: Any, why: str) -> Watched:
+def lost(case: Case, why: str) -> Watched:
     """A block that ends its process: nothing was watched, and why."""
     block = case.what[0]
     return Watched(block, failures=[f"{' '.join(block.condition)}, seed {block.seed}: {why}"])

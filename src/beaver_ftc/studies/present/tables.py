@@ -5,7 +5,10 @@ import io
 from collections.abc import Mapping, Sequence
 from html import escape
 from math import isfinite
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rich.table import Table
 
 Rows = Sequence[Sequence[str]]
 LEAST = 1e-3  # what is smaller is said to be so: nobody reads 2.29e-07 deg/s
@@ -72,7 +75,7 @@ def _cell(text: str) -> str:
     return f"<td{kind}>{escape(text)}</td>"
 
 
-def plain(title: str, head: Sequence[str], rows: Rows) -> Any:
+def plain(title: str, head: Sequence[str], rows: Rows) -> "Table":
     """A table of rich: the first column to the left, the others to the right."""
     from rich.table import Table
 
@@ -84,7 +87,7 @@ def plain(title: str, head: Sequence[str], rows: Rows) -> Any:
     return table
 
 
-def printed(tables: Sequence[Any], width: int | None = None, colour: bool = False) -> str:
+def printed(tables: Sequence["Table"], width: int | None = None, colour: bool = False) -> str:
     """Tables of rich as text."""
     from rich.console import Console
 

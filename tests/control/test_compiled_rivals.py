@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from beaver_ftc.control.base import Reference
-from beaver_ftc.control.rivals import tracking
+from beaver_ftc.control.rivals import compiled
 from beaver_ftc.control.rivals.indi import IncrementalInversion
 from beaver_ftc.control.rivals.lqr import FixedGainLqr
 from beaver_ftc.design.context import Context
@@ -50,7 +50,7 @@ def test_both_command_the_same_within_the_travel_and_at_the_stops(rival, most):
         wanted = law.step(seen, Reference(rate, rate, acceleration), Verdict())
         control["reference"]["model_rate"], control["reference"]["model_acceleration"] = rate, acceleration
         parts = (control[part] for part in ("rival", "reference", "axes", "allocation", "layout"))
-        tracking.command(int(control["inner"]), *parts, G, x)
+        compiled.command(int(control["inner"]), *parts, G, x)
         assert control["allocation"]["command"] == pytest.approx(wanted, abs=1e-9)
         at_stop = np.isclose(wanted, -most) | np.isclose(wanted, 0.8 * most)
         assert control["allocation"]["saturated"].tolist() == at_stop.tolist()

@@ -14,7 +14,7 @@ from beaver_ftc.control.laws import (
     REJECTING,
     published,
 )
-from beaver_ftc.control.rivals import tracking
+from beaver_ftc.control.rivals import compiled
 from beaver_ftc.control.supervisor import MODE_ADAPTIVE
 from beaver_ftc.diagnosis import scheme
 from beaver_ftc.diagnosis.state import LOSS, NOT_ISOLATED, WORST_CASE
@@ -230,7 +230,7 @@ def test_a_compiled_rival_commands_by_itself(inner):
         rival["Kp"], rival["Ki"], rival["keep"], rival["given"] = 2.0, 1.0, 0.5, 0.01
     given, told = commanded(frame), alone["control"]
     parts = (told[part] for part in ("rival", "reference", "axes", "allocation", "layout"))
-    tracking.command(inner, *parts, G, X)
+    compiled.command(inner, *parts, G, X)
     assert given["allocation"]["command"].tolist() == told["allocation"]["command"].tolist()
     assert (given["allocation"]["command"] != 0.01).any()
     assert given["axes"]["hold"].tolist() == told["axes"]["hold"].tolist()

@@ -22,7 +22,7 @@ from beaver_ftc.control.accommodation import assessment_dtype, true_faults_dtype
 from beaver_ftc.control.laws import INDI, LQR, NOMINAL, ORACLE, REJECTING, published, rejecting
 from beaver_ftc.control.outer.autopilot import judge, steer
 from beaver_ftc.control.outer.state import AUTOPILOT
-from beaver_ftc.control.rivals import tracking
+from beaver_ftc.control.rivals import compiled
 from beaver_ftc.control.state import control_dtype
 from beaver_ftc.control.supervisor import MODE_REALLOCATED, SUPERVISOR
 from beaver_ftc.design.actuators import move
@@ -344,7 +344,7 @@ def note_what_is_missing(frame):
 def command_as_rival(frame):
     """The command of a compiled rival."""
     control = frame.control
-    tracking.command(
+    compiled.command(
         control.inner,
         control.rival,
         control.reference,

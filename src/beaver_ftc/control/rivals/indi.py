@@ -18,7 +18,7 @@ from beaver_ftc.control.laws import INDI
 from beaver_ftc.control.rivals.tracking import DELAY_FRAMES, GAINS, Demand, limited, with_others
 from beaver_ftc.design.context import Context
 from beaver_ftc.diagnosis.base import Measured, Verdict
-from beaver_ftc.diagnosis.rivals import options_of
+from beaver_ftc.diagnosis.rivals.options import options_of
 
 
 class LowPass:
@@ -56,7 +56,7 @@ class IncrementalInversion:
         self.saturated = False
 
     def compile_into(self, rival: np.void) -> int:
-        """Fill the record of tracking.py (dtype RIVAL), in trim; which inner law that is."""
+        """Fill the record of compiled.py (dtype RIVAL), in trim; which inner law that is."""
         trim = self.context.trim_rad[self.leading]
         rival["Kp"], rival["Ki"] = self.option["proportional_per_s"], self.option["integral_per_s2"]
         rival["keep"] = exp(-self.option["filter_per_s"] * self.context.dt_s)

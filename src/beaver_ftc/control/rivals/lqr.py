@@ -16,7 +16,7 @@ from beaver_ftc.control.laws import LQR
 from beaver_ftc.control.rivals.tracking import limited, with_others
 from beaver_ftc.design.context import Context
 from beaver_ftc.diagnosis.base import Measured, Verdict
-from beaver_ftc.diagnosis.rivals import options_of
+from beaver_ftc.diagnosis.rivals.options import options_of
 
 _STEP = 1e-6
 
@@ -51,7 +51,7 @@ class FixedGainLqr:
         self.saturated = False
 
     def compile_into(self, rival: np.void) -> int:
-        """Fill the record of tracking.py (dtype RIVAL), in trim; which inner law that is."""
+        """Fill the record of compiled.py (dtype RIVAL), in trim; which inner law that is."""
         rival["K"], rival["A"], rival["B_inverse"] = self.K, self.A, np.linalg.inv(self.B)
         rival["trim_x"] = self.context.trim_x
         return LQR

@@ -18,7 +18,7 @@ from beaver_ftc.control.laws import INDI
 from beaver_ftc.control.rivals.tracking import DELAY_FRAMES, GAINS, Demand, limited, with_others
 from beaver_ftc.design.context import Context
 from beaver_ftc.diagnosis.base import Measured, Verdict
-from beaver_ftc.diagnosis.rivals.options import options_of
+from beaver_ftc.diagnosis.rivals import options_of
 
 
 class LowPass:

@@ -16,7 +16,7 @@ from beaver_ftc.control.laws import LQR
 from beaver_ftc.control.rivals.tracking import limited, with_others
 from beaver_ftc.design.context import Context
 from beaver_ftc.diagnosis.base import Measured, Verdict
-from beaver_ftc.diagnosis.rivals.options import options_of
+from beaver_ftc.diagnosis.rivals import options_of
 
 _STEP = 1e-6
 

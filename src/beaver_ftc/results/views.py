@@ -188,6 +188,21 @@ def _surfaces(names: Sequence[str]) -> View:
     return View("surfaces", "Control surfaces: commanded, reached, and as the aerodynamics see them", panels)
 
 
+def detection_panel(axis: str, label: str, role: str = "residual") -> Panel:
+    """The residual of the detection estimator on an axis, within its threshold."""
+    threshold, residual = f"{axis}_threshold_rad_s", f"{axis}_residual_rad_s"
+    bounds = Trace(threshold, "± threshold", "bound"), Trace(threshold, "", "bound", -1.0)
+    return Panel(label, (*bounds, Trace(residual, "residual", role)))
+
+
+def isolation_panel(name: str, axis: str, label: str, threshold: str = "± threshold") -> Panel:
+    """The residual of an isolation estimator on an axis, within its thresholds."""
+    stem = f"fie_{name}_{axis}"
+    bounds = Trace(f"{stem}_lower_rad_s", threshold, "bound"), Trace(f"{stem}_upper_rad_s", "", "bound")
+    residual = Trace(f"{stem}_residual_rad_s", "residual", "actual")
+    return Panel(label, (*bounds, residual), shade=f"fie_{name}_excluded", shade_label="excluded")
+
+
 def _detection() -> View:
     alarm = Panel(
         "alarm test: |residual| / threshold",
@@ -196,15 +211,7 @@ def _detection() -> View:
         level=1.0,
     )
     panels = tuple(
-        Panel(
-            f"{AXIS_NAMES[axis]}: residual of the detection estimator",
-            (
-                Trace(f"{axis}_threshold_rad_s", "± threshold", "bound"),
-                Trace(f"{axis}_threshold_rad_s", "", "bound", -1.0),
-                Trace(f"{axis}_residual_rad_s", "residual", "residual"),
-            ),
-        )
-        for axis in AXES
+        detection_panel(axis, f"{AXIS_NAMES[axis]}: residual of the detection estimator") for axis in AXES
     )
     title = "Detection: the test that raises the alarm (above 1), and the detection estimator"
     return View("detection", title, (alarm, *panels), closeup=True)
@@ -244,16 +251,7 @@ def _likelihood(columns: Sequence[str]) -> View:
 
 def _isolation(names: Sequence[str]) -> View:
     panels = tuple(
-        Panel(
-            f"{_spoken(name)} estimator: {axis}",
-            (
-                Trace(f"fie_{name}_{axis}_lower_rad_s", "threshold", "bound"),
-                Trace(f"fie_{name}_{axis}_upper_rad_s", "", "bound"),
-                Trace(f"fie_{name}_{axis}_residual_rad_s", "residual", "actual"),
-            ),
-            shade=f"fie_{name}_excluded",
-            shade_label="excluded",
-        )
+        isolation_panel(name, axis, f"{_spoken(name)} estimator: {axis}", "threshold")
         for name in names
         for axis in AXES
     )

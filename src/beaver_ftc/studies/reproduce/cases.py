@@ -5,7 +5,7 @@ statement held against the flights again.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -30,12 +30,12 @@ SETTLED_S = 2.0  # from rest, or from a fault, to steady tracking: four error ti
 
 
 @dataclass(frozen=True)
-class PublishedCase:
-    """One flight: where the paper shows it, and what sets it apart from the choices."""
+class Changed:
+    """What is changed in the published setting, as dotted scenario keys, and where the paper shows it."""
 
     name: str
-    shown_in: str
-    changes: Mapping[str, Any] = field(default_factory=dict)
+    changes: Mapping[str, Any]
+    shown_in: str = ""
 
 
 def _loss(actuator: str) -> list[dict[str, Any]]:
@@ -43,20 +43,20 @@ def _loss(actuator: str) -> list[dict[str, Any]]:
 
 
 PUBLISHED = (
-    PublishedCase("fault-free-nominal", "Fig. 2a", NOMINAL),
-    PublishedCase("elevator-nominal", "Fig. 2b", {"faults": _loss("elevator"), **NOMINAL}),
-    PublishedCase("elevator", "Fig. 3, 4, 5", {"faults": _loss("elevator")}),
-    PublishedCase("unanticipated-nominal", "Fig. 6", {"faults": [UNANTICIPATED], **NOMINAL}),
-    PublishedCase("unanticipated", "Fig. 7", {"faults": [UNANTICIPATED]}),
-    PublishedCase("aileron", "mentioned", {"faults": _loss("aileron")}),
-    PublishedCase("rudder", "mentioned", {"faults": _loss("rudder")}),
+    Changed("fault-free-nominal", NOMINAL, "Fig. 2a"),
+    Changed("elevator-nominal", {"faults": _loss("elevator"), **NOMINAL}, "Fig. 2b"),
+    Changed("elevator", {"faults": _loss("elevator")}, "Fig. 3, 4, 5"),
+    Changed("unanticipated-nominal", {"faults": [UNANTICIPATED], **NOMINAL}, "Fig. 6"),
+    Changed("unanticipated", {"faults": [UNANTICIPATED]}, "Fig. 7"),
+    Changed("aileron", {"faults": _loss("aileron")}, "mentioned"),
+    Changed("rudder", {"faults": _loss("rudder")}, "mentioned"),
 )
 BESIDE = (
-    PublishedCase("elevator-sharpened", "", {"faults": _loss("elevator"), **SHARPENED}),
-    PublishedCase("unanticipated-sharpened", "", {"faults": [UNANTICIPATED], **SHARPENED}),
-    PublishedCase("aileron-sharpened", "", {"faults": _loss("aileron"), **SHARPENED}),
-    PublishedCase("rudder-sharpened", "", {"faults": _loss("rudder"), **SHARPENED}),
-    PublishedCase("unanticipated-interval", "", {"faults": [UNANTICIPATED], "fdi.thresholds": "interval"}),
+    Changed("elevator-sharpened", {"faults": _loss("elevator"), **SHARPENED}),
+    Changed("unanticipated-sharpened", {"faults": [UNANTICIPATED], **SHARPENED}),
+    Changed("aileron-sharpened", {"faults": _loss("aileron"), **SHARPENED}),
+    Changed("rudder-sharpened", {"faults": _loss("rudder"), **SHARPENED}),
+    Changed("unanticipated-interval", {"faults": [UNANTICIPATED], "fdi.thresholds": "interval"}),
 )
 
 
@@ -123,7 +123,7 @@ class Flown:
         return float(alone.sum() * (self.log["t_s"][1] - self.log["t_s"][0]))
 
 
-def fly_case(case: PublishedCase, changes: Mapping[str, Any] | None = None) -> Flown:
+def fly_case(case: Changed, changes: Mapping[str, Any] | None = None) -> Flown:
     """Fly a case, with further changes to the choices."""
     log = Columns()
     flight = fly(scenario(case.name, {**case.changes, **(changes or {})}), log)
@@ -131,14 +131,6 @@ def fly_case(case: PublishedCase, changes: Mapping[str, Any] | None = None) -> F
 
 
 INTERVAL = {"fdi.thresholds": "interval"}
-
-
-@dataclass(frozen=True)
-class Variant:
-    """What is changed, in words and as dotted scenario keys."""
-
-    name: str
-    changes: Mapping[str, Any]
 
 
 def _references(kind: str, **options: Any) -> dict[str, Any]:
@@ -156,32 +148,32 @@ def _couplings(p: float, q: float, r: float) -> dict[str, Any]:
 
 
 VARIANTS = (
-    Variant("airspeed 42 m/s", {"initial.airspeed_mps": 42.0}),
-    Variant("airspeed 48 m/s", {"initial.airspeed_mps": 48.0}),
-    Variant("altitude 300 m", {"initial.altitude_m": 300.0}),
-    Variant("altitude 3000 m", {"initial.altitude_m": 3000.0}),
-    Variant("references half as fast", _references("sine", times=0.5)),
-    Variant("references twice as fast", _references("sine", times=2.0)),
-    Variant("square references, which jump themselves", _references("square")),
-    Variant("uncertainty -, +, -", _couplings(-0.25, 0.25, -0.25)),
-    Variant("uncertainty +, +, +", _couplings(0.25, 0.25, 0.25)),
-    Variant("no inertia uncertainty", _couplings(0.0, 0.0, 0.0)),
-    Variant("Kp halved, Ki to match", {"control.proportional_per_s": 1.0, "control.integral_per_s2": 0.25}),
-    Variant("Kp doubled, Ki to match", {"control.proportional_per_s": 4.0, "control.integral_per_s2": 4.0}),
-    Variant("no integral action", {"control.integral_per_s2": 0.0}),
-    Variant("reference model 5 rad/s", {"control.reference_natural_frequency_rad_s": 5.0}),
-    Variant("network gain 30 1/s2", {"control.network_gain_per_s2": 30.0}),
-    Variant("network gain 120 1/s2", {"control.network_gain_per_s2": 120.0}),
-    Variant("hand-over in 2 s", {"control.hand_over_s": 2.0}),
-    Variant("detection pole 5 1/s", {"fdi.detection_pole_per_s": 5.0}),
-    Variant("detection pole 20 1/s", {"fdi.detection_pole_per_s": 20.0}),
-    Variant("isolation pole 5 1/s", {"fdi.isolation_pole_per_s": 5.0}),
-    Variant("isolation pole 20 1/s", {"fdi.isolation_pole_per_s": 20.0}),
-    Variant("forgetting time 20 s", {"fdi.forgetting_time_s": 20.0}),
-    Variant("frame rate 50 Hz", {"rate_hz": 50.0}),
-    Variant("frame rate 200 Hz", {"rate_hz": 200.0}),
-    Variant("interval thresholds", INTERVAL),
-    Variant("interval thresholds, 48 m/s", {**INTERVAL, "initial.airspeed_mps": 48.0}),
-    Variant("interval thresholds, references twice as fast", {**INTERVAL, **_references("sine", times=2.0)}),
-    Variant("sharpened estimators", SHARPENED),
+    Changed("airspeed 42 m/s", {"initial.airspeed_mps": 42.0}),
+    Changed("airspeed 48 m/s", {"initial.airspeed_mps": 48.0}),
+    Changed("altitude 300 m", {"initial.altitude_m": 300.0}),
+    Changed("altitude 3000 m", {"initial.altitude_m": 3000.0}),
+    Changed("references half as fast", _references("sine", times=0.5)),
+    Changed("references twice as fast", _references("sine", times=2.0)),
+    Changed("square references, which jump themselves", _references("square")),
+    Changed("uncertainty -, +, -", _couplings(-0.25, 0.25, -0.25)),
+    Changed("uncertainty +, +, +", _couplings(0.25, 0.25, 0.25)),
+    Changed("no inertia uncertainty", _couplings(0.0, 0.0, 0.0)),
+    Changed("Kp halved, Ki to match", {"control.proportional_per_s": 1.0, "control.integral_per_s2": 0.25}),
+    Changed("Kp doubled, Ki to match", {"control.proportional_per_s": 4.0, "control.integral_per_s2": 4.0}),
+    Changed("no integral action", {"control.integral_per_s2": 0.0}),
+    Changed("reference model 5 rad/s", {"control.reference_natural_frequency_rad_s": 5.0}),
+    Changed("network gain 30 1/s2", {"control.network_gain_per_s2": 30.0}),
+    Changed("network gain 120 1/s2", {"control.network_gain_per_s2": 120.0}),
+    Changed("hand-over in 2 s", {"control.hand_over_s": 2.0}),
+    Changed("detection pole 5 1/s", {"fdi.detection_pole_per_s": 5.0}),
+    Changed("detection pole 20 1/s", {"fdi.detection_pole_per_s": 20.0}),
+    Changed("isolation pole 5 1/s", {"fdi.isolation_pole_per_s": 5.0}),
+    Changed("isolation pole 20 1/s", {"fdi.isolation_pole_per_s": 20.0}),
+    Changed("forgetting time 20 s", {"fdi.forgetting_time_s": 20.0}),
+    Changed("frame rate 50 Hz", {"rate_hz": 50.0}),
+    Changed("frame rate 200 Hz", {"rate_hz": 200.0}),
+    Changed("interval thresholds", INTERVAL),
+    Changed("interval thresholds, 48 m/s", {**INTERVAL, "initial.airspeed_mps": 48.0}),
+    Changed("interval thresholds, references twice as fast", {**INTERVAL, **_references("sine", times=2.0)}),
+    Changed("sharpened estimators", SHARPENED),
 )

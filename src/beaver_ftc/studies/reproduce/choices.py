@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from beaver_ftc.documents.keys import parse_key, with_values
 from beaver_ftc.scenario.schema import Scenario
 
 FAULT_AT_S = 12.0
@@ -74,13 +75,6 @@ CHOICES = (
 
 def scenario(name: str, changes: Mapping[str, Any]) -> Scenario:
     """The published setting with our choices and `changes`, all dotted keys, as a scenario."""
-    document: dict[str, Any] = {"name": name}
-    for key, value in {**GIVEN, **{c.key: c.value for c in CHOICES}, **changes}.items():
-        _put(document, key.split("."), value)
-    return Scenario.model_validate(document)
-
-
-def _put(document: dict[str, Any], path: list[str], value: Any) -> None:
-    for key in path[:-1]:
-        document = document.setdefault(key, {})
-    document[path[-1]] = value
+    values = {**GIVEN, **{choice.key: choice.value for choice in CHOICES}, **changes}
+    places = {parse_key(key): value for key, value in values.items()}
+    return Scenario.model_validate(with_values({"name": name}, places))

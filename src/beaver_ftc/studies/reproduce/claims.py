@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -42,35 +43,27 @@ def _delay(flown: Flown, what: str) -> float:
     return np.inf if delay is None else delay
 
 
-def _detection(name: str) -> Callable[[Flights], float]:
-    return lambda flights: _delay(flights[name], "detection")
+def _detection(name: str, flights: Flights) -> float:
+    return _delay(flights[name], "detection")
 
 
-def _isolation(name: str, fault: str) -> Callable[[Flights], float]:
+def _isolation(name: str, fault: str, flights: Flights) -> float:
     """Isolation after detection, s; infinite if anything else is named."""
-
-    def measure(flights: Flights) -> float:
-        found = flights[name].metrics
-        if found["isolation"]["fault"] != fault:
-            return np.inf
-        return round(found["isolation"]["time_s"] - found["detection"]["time_s"], 9)
-
-    return measure
+    found = flights[name].metrics
+    if found["isolation"]["fault"] != fault:
+        return np.inf
+    return round(found["isolation"]["time_s"] - found["detection"]["time_s"], 9)
 
 
-def _tracking(name: str, axis: str) -> Callable[[Flights], float]:
+def _tracking(name: str, axis: str, flights: Flights) -> float:
     """RMS error after the fault over the amplitude of the reference, infinite if the aircraft is lost."""
-
-    def measure(flights: Flights) -> float:
-        flown = flights[name]
-        return np.inf if flown.metrics["departure"] else flown.after_deg_s(axis) / AMPLITUDE_DEG_S
-
-    return measure
+    flown = flights[name]
+    return np.inf if flown.metrics["departure"] else flown.after_deg_s(axis) / AMPLITUDE_DEG_S
 
 
-def _deterioration(name: str) -> Callable[[Flights], float]:
+def _deterioration(name: str, flights: Flights) -> float:
     """RMS pitch rate error after the fault over that before, over all the flight there is."""
-    return lambda flights: flights[name].rms_deg_s("q", FAULT_AT_S) / flights[name].before_deg_s("q")
+    return flights[name].rms_deg_s("q", FAULT_AT_S) / flights[name].before_deg_s("q")
 
 
 def _last_to_go(flights: Flights) -> float:
@@ -104,29 +97,20 @@ def _share_of_elevator(flights: Flights) -> float:
     return elevator / flap if flap else np.inf
 
 
-def _said_theta(name: str) -> Callable[[Flights], str]:
-    def remark(flights: Flights) -> str:
-        theta = flights[name].metrics["isolation"]["estimate"]
-        return "" if theta is None else f"estimated theta {theta:.3f}, true -0.4"
-
-    return remark
+def _said_theta(name: str, flights: Flights) -> str:
+    theta = flights[name].metrics["isolation"]["estimate"]
+    return "" if theta is None else f"estimated theta {theta:.3f}, true -0.4"
 
 
-def _named(name: str) -> Callable[[Flights], str]:
-    def remark(flights: Flights) -> str:
-        delay = _delay(flights[name], "detection")
-        beside = [said for said in (_sharpened(name)(flights), _said_theta(name)(flights)) if said]
-        return "; ".join([f"detected after {delay:.2f} s", *beside])
-
-    return remark
+def _named(name: str, flights: Flights) -> str:
+    delay = _delay(flights[name], "detection")
+    beside = [said for said in (_sharpened(name, flights), _said_theta(name, flights)) if said]
+    return "; ".join([f"detected after {delay:.2f} s", *beside])
 
 
-def _sharpened(name: str) -> Callable[[Flights], str]:
-    def remark(flights: Flights) -> str:
-        beside = flights.get(f"{name}-sharpened")
-        return f"{_delay(beside, 'detection'):.2f} s sharpened" if beside else ""
-
-    return remark
+def _sharpened(name: str, flights: Flights) -> str:
+    beside = flights.get(f"{name}-sharpened")
+    return f"{_delay(beside, 'detection'):.2f} s sharpened" if beside else ""
 
 
 def _degraded(flights: Flights) -> str:
@@ -160,10 +144,9 @@ def _last_standing(flights: Flights) -> str:
     return f"{said}; the interval test never names it"
 
 
-def _recovered(axis: str, name: str) -> Callable[[Flights], str]:
-    return lambda flights: (
-        f"{flights[name].after_deg_s(axis):.3f} deg/s RMS, {flights[name].before_deg_s(axis):.3f} before"
-    )
+def _recovered(axis: str, name: str, flights: Flights) -> str:
+    flown = flights[name]
+    return f"{flown.after_deg_s(axis):.3f} deg/s RMS, {flown.before_deg_s(axis):.3f} before"
 
 
 _OF_AMPLITUDE = "of the reference's amplitude"
@@ -175,7 +158,7 @@ CLAIMS = (
     ),
     Claim(
         "Fig. 2b", "After the elevator fault the nominal law tracks much worse.",
-        "RMS error of q", "times that before", _deterioration("elevator-nominal"), DETERIORATED,
+        "RMS error of q", "times that before", partial(_deterioration, "elevator-nominal"), DETERIORATED,
         at_least=True, remark=_degraded,
     ),
     Claim(
@@ -184,8 +167,8 @@ CLAIMS = (
     ),
     Claim(
         "Fig. 3", "The elevator fault is detected within 0.5 s.",
-        "detection", "s after the fault", _detection("elevator"), DETECTED_WITHIN_S,
-        remark=_sharpened("elevator"),
+        "detection", "s after the fault", partial(_detection, "elevator"), DETECTED_WITHIN_S,
+        remark=partial(_sharpened, "elevator"),
     ),
     Claim(
         "Fig. 4a, 4c", "The aileron's and the rudder's estimators exceed their thresholds almost at once.",
@@ -197,8 +180,8 @@ CLAIMS = (
     ),
     Claim(
         "Fig. 4", "The fault is thereby isolated as the elevator's.",
-        "isolation", "s after detection", _isolation("elevator", "elevator"), IMMEDIATELY_S,
-        remark=_said_theta("elevator"),
+        "isolation", "s after detection", partial(_isolation, "elevator", "elevator"), IMMEDIATELY_S,
+        remark=partial(_said_theta, "elevator"),
     ),
     Claim(
         "Fig. 5", "Right after detection the adaptive law takes over.",
@@ -215,44 +198,46 @@ CLAIMS = (
     ),
     Claim(
         "Fig. 5", "With reallocation the pitch rate is tracked acceptably in spite of the fault.",
-        "RMS error of q", _OF_AMPLITUDE, _tracking("elevator", "q"), GOOD, remark=_restored,
+        "RMS error of q", _OF_AMPLITUDE, partial(_tracking, "elevator", "q"), GOOD, remark=_restored,
     ),
     Claim(
         "mentioned", "An aileron fault is detected and isolated just as well.",
-        "isolation", "s after detection", _isolation("aileron", "aileron"), IMMEDIATELY_S,
-        remark=_named("aileron"),
+        "isolation", "s after detection", partial(_isolation, "aileron", "aileron"), IMMEDIATELY_S,
+        remark=partial(_named, "aileron"),
     ),
     Claim(
         "mentioned", "An aileron fault leaves tracking satisfactory.",
-        "RMS error of p", _OF_AMPLITUDE, _tracking("aileron", "p"), GOOD, remark=_recovered("p", "aileron"),
+        "RMS error of p", _OF_AMPLITUDE, partial(_tracking, "aileron", "p"), GOOD,
+        remark=partial(_recovered, "p", "aileron"),
     ),
     Claim(
         "mentioned", "A rudder fault is detected and isolated just as well.",
-        "isolation", "s after detection", _isolation("rudder", "rudder"), IMMEDIATELY_S,
-        remark=_named("rudder"),
+        "isolation", "s after detection", partial(_isolation, "rudder", "rudder"), IMMEDIATELY_S,
+        remark=partial(_named, "rudder"),
     ),
     Claim(
         "mentioned", "A rudder fault leaves tracking satisfactory.",
-        "RMS error of r", _OF_AMPLITUDE, _tracking("rudder", "r"), GOOD, remark=_recovered("r", "rudder"),
+        "RMS error of r", _OF_AMPLITUDE, partial(_tracking, "rudder", "r"), GOOD,
+        remark=partial(_recovered, "r", "rudder"),
     ),
     Claim(
         "Fig. 6", "After the unanticipated fault the nominal law tracks much worse.",
-        "RMS error of q", "times that before", _deterioration("unanticipated-nominal"), DETERIORATED,
+        "RMS error of q", "times that before", partial(_deterioration, "unanticipated-nominal"), DETERIORATED,
         at_least=True, remark=_lost,
     ),
     Claim(
         "mentioned", "The unanticipated fault is detected within 0.5 s.",
-        "detection", "s after the fault", _detection("unanticipated"), DETECTED_WITHIN_S,
-        remark=_sharpened("unanticipated"),
+        "detection", "s after the fault", partial(_detection, "unanticipated"), DETECTED_WITHIN_S,
+        remark=partial(_sharpened, "unanticipated"),
     ),
     Claim(
         "mentioned", "The unanticipated fault is not taken for one of the known ones.",
-        "last estimator excluded", "s after detection", _isolation("unanticipated", "unanticipated"),
+        "last estimator excluded", "s after detection", partial(_isolation, "unanticipated", "unanticipated"),
         DETECTED_WITHIN_S, remark=_last_standing,
     ),
     Claim(
         "Fig. 7", "The adaptive law keeps tracking acceptable in spite of the unanticipated fault.",
-        "RMS error of q", _OF_AMPLITUDE, _tracking("unanticipated", "q"), GOOD,
-        remark=_recovered("q", "unanticipated"),
+        "RMS error of q", _OF_AMPLITUDE, partial(_tracking, "unanticipated", "q"), GOOD,
+        remark=partial(_recovered, "q", "unanticipated"),
     ),
 )  # fmt: skip

@@ -12,7 +12,17 @@ import numpy as np
 from beaver_ftc.results.figures import draw
 from beaver_ftc.results.metrics import Document
 from beaver_ftc.results.style import BLUE, GREY, VERMILION, marks
-from beaver_ftc.results.views import AXES, AXIS_NAMES, Panel, Series, Trace, View
+from beaver_ftc.results.views import (
+    AXES,
+    AXIS_NAMES,
+    Panel,
+    Series,
+    Trace,
+    View,
+    detection_panel,
+    isolation_panel,
+)
+from beaver_ftc.studies.present.files import save
 from beaver_ftc.studies.reproduce.cases import Flown
 from beaver_ftc.studies.reproduce.choices import FAULT_AT_S
 
@@ -22,96 +32,49 @@ WHOLE = (0.0, np.inf)
 CLOSE = (FAULT_AT_S - 0.5, FAULT_AT_S + 5.0)
 
 
-def _surface(name: str) -> Panel:
-    return Panel(
-        f"{name} deflection",
-        (Trace(f"{name}_cmd_rad", "command", "command"), Trace(f"{name}_effective_rad", "actual", "actual")),
+def _pair(label: str, target: tuple[str, str, str], actual: str) -> Panel:
+    return Panel(label, (Trace(*target), Trace(actual, "actual", "actual")))
+
+
+def _tracking(surfaces: tuple[str, str], axis: str) -> tuple[Panel, ...]:
+    """Two surfaces above, below them the errors of all rates, and one rate."""
+    above = (
+        _pair(f"{name} deflection", (f"{name}_cmd_rad", "command", "command"), f"{name}_effective_rad")
+        for name in surfaces
     )
+    errors = tuple(Trace(f"{axis}_error_rad_s", f"error of {axis}", f"error of {axis}") for axis in AXES)
+    rate = _pair(AXIS_NAMES[axis], (f"{axis}_model_rad_s", "reference", "target"), f"{axis}_rad_s")
+    return (*above, Panel("tracking errors", errors), rate)
 
 
-def _rate(axis: str) -> Panel:
-    return Panel(
-        AXIS_NAMES[axis],
-        (Trace(f"{axis}_model_rad_s", "reference", "target"), Trace(f"{axis}_rad_s", "actual", "actual")),
-    )
+def _isolation(estimator: str) -> tuple[Panel, ...]:
+    return tuple(isolation_panel(estimator, axis, f"{AXIS_NAMES[axis]}: residual") for axis in AXES)
 
 
-def _errors() -> Panel:
-    traces = tuple(Trace(f"{axis}_error_rad_s", f"error of {axis}", f"error of {axis}") for axis in AXES)
-    return Panel("tracking errors", traces)
-
-
-def _tracking_view(name: str, title: str, above: tuple[Panel, ...], axis: str = "q") -> View:
-    return View(name, title, (*above, _errors(), _rate(axis)), across=2)
-
-
-def _detection_view(name: str, title: str) -> View:
-    panels = tuple(
-        Panel(
-            f"{AXIS_NAMES[axis]}: residual",
-            (
-                Trace(f"{axis}_threshold_rad_s", "± threshold", "bound"),
-                Trace(f"{axis}_threshold_rad_s", "", "bound", -1.0),
-                Trace(f"{axis}_residual_rad_s", "residual", "actual"),
-            ),
-        )
-        for axis in AXES
-    )
-    return View(name, title, panels)
-
-
-def _isolation_view(name: str, estimator: str, title: str) -> View:
-    panels = tuple(
-        Panel(
-            f"{AXIS_NAMES[axis]}: residual",
-            (
-                Trace(f"fie_{estimator}_{axis}_lower_rad_s", "± threshold", "bound"),
-                Trace(f"fie_{estimator}_{axis}_upper_rad_s", "", "bound"),
-                Trace(f"fie_{estimator}_{axis}_residual_rad_s", "residual", "actual"),
-            ),
-            shade=f"fie_{estimator}_excluded",
-            shade_label="excluded",
-        )
-        for axis in AXES
-    )
-    return View(name, title, panels)
-
-
-_PITCH = (_surface("elevator"), _surface("flap"))
-FIGURES: tuple[tuple[View, str, tuple[float, float]], ...] = (  # view, case, span of time
-    (_tracking_view("fig-2a", "Fig. 2a: nominal law, no fault", _PITCH), "fault-free-nominal", WHOLE),
+_PITCH = _tracking(("elevator", "flap"), "q")
+_ROLL, _YAW = (_tracking(("aileron", "rudder"), axis) for axis in "pr")
+_DETECTION = tuple(detection_panel(axis, f"{AXIS_NAMES[axis]}: residual", "actual") for axis in AXES)
+_SHOWN = (  # name, title, panels, case, span of time
+    ("fig-2a", "Fig. 2a: nominal law, no fault", _PITCH, "fault-free-nominal", WHOLE),
+    ("fig-2b", "Fig. 2b: nominal law, 40 % loss of the elevator", _PITCH, "elevator-nominal", WHOLE),
+    ("fig-3", "Fig. 3: detection of the elevator fault", _DETECTION, "elevator", WHOLE),
+    ("fig-4a", "Fig. 4a: isolation estimator 1, aileron", _isolation("aileron"), "elevator", CLOSE),
+    ("fig-4b", "Fig. 4b: isolation estimator 2, elevator", _isolation("elevator"), "elevator", CLOSE),
+    ("fig-4c", "Fig. 4c: isolation estimator 3, rudder", _isolation("rudder"), "elevator", CLOSE),
+    ("fig-5", "Fig. 5: fault-tolerant law, elevator to flap", _PITCH, "elevator", WHOLE),
+    ("fig-6", "Fig. 6: nominal law, unanticipated fault", _PITCH, "unanticipated-nominal", WHOLE),
+    ("fig-7", "Fig. 7: fault-tolerant law, unanticipated fault", _PITCH, "unanticipated", WHOLE),
+    ("aileron", "Mentioned: aileron fault", _ROLL, "aileron", WHOLE),
+    ("rudder", "Mentioned: rudder fault", _YAW, "rudder", WHOLE),
     (
-        _tracking_view("fig-2b", "Fig. 2b: nominal law, 40 % loss of the elevator", _PITCH),
-        "elevator-nominal", WHOLE,
-    ),
-    (_detection_view("fig-3", "Fig. 3: detection of the elevator fault"), "elevator", WHOLE),
-    (_isolation_view("fig-4a", "aileron", "Fig. 4a: isolation estimator 1, aileron"), "elevator", CLOSE),
-    (_isolation_view("fig-4b", "elevator", "Fig. 4b: isolation estimator 2, elevator"), "elevator", CLOSE),
-    (_isolation_view("fig-4c", "rudder", "Fig. 4c: isolation estimator 3, rudder"), "elevator", CLOSE),
-    (_tracking_view("fig-5", "Fig. 5: fault-tolerant law, elevator to flap", _PITCH), "elevator", WHOLE),
-    (
-        _tracking_view("fig-6", "Fig. 6: nominal law, unanticipated fault", _PITCH),
-        "unanticipated-nominal", WHOLE,
-    ),
-    (
-        _tracking_view("fig-7", "Fig. 7: fault-tolerant law, unanticipated fault", _PITCH),
-        "unanticipated", WHOLE,
-    ),
-    (
-        _tracking_view(
-            "aileron", "Mentioned: aileron fault", (_surface("aileron"), _surface("rudder")), "p"
-        ),
-        "aileron", WHOLE,
-    ),
-    (
-        _tracking_view("rudder", "Mentioned: rudder fault", (_surface("aileron"), _surface("rudder")), "r"),
-        "rudder", WHOLE,
-    ),
-    (
-        _detection_view("unanticipated-detection", "Mentioned: detection of the unanticipated fault"),
+        "unanticipated-detection", "Mentioned: detection of the unanticipated fault", _DETECTION,
         "unanticipated", CLOSE,
     ),
 )  # fmt: skip
+FIGURES: tuple[tuple[View, str, tuple[float, float]], ...] = tuple(  # view, case, span of time
+    (View(name, title, panels, across=2 if len(panels) > len(AXES) else 1), case, span)
+    for name, title, panels, case, span in _SHOWN
+)
 
 
 def write_figures(flights: Mapping[str, Flown], folder: Path) -> list[Path]:
@@ -121,11 +84,9 @@ def write_figures(flights: Mapping[str, Flown], folder: Path) -> list[Path]:
 
 
 def _write(view: View, flown: Flown, span: tuple[float, float], folder: Path) -> Path:
-    path = folder / f"{view.name}.png"
     said = f"case {flown.metrics['scenario']}"
     figure = draw(view, _series(flown, span), marks(flown.metrics), said)
-    figure.savefig(path, metadata={"Software": "beaver-ftc"})
-    return path
+    return save(figure, folder / f"{view.name}.png")
 
 
 def _series(flown: Flown, span: tuple[float, float]) -> Series:
@@ -171,6 +132,4 @@ def write_margins(document: Document, folder: Path) -> Path:
     axes.grid(visible=True, axis="x", color="#dddddd", linewidth=0.6)
     axes.set_xlabel("share of what is allowed: dot as flown, bar over all changes", fontsize=9)
     axes.set_title("Left of 1 the statement holds", fontsize=9)
-    path = folder / f"{SENSITIVITY}.png"
-    figure.savefig(path, metadata={"Software": "beaver-ftc"})
-    return path
+    return save(figure, folder / f"{SENSITIVITY}.png")

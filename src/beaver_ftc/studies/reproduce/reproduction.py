@@ -9,8 +9,9 @@ from beaver_ftc.results.metrics import Document, as_json, versions
 from beaver_ftc.results.writer import result_folder
 from beaver_ftc.studies.engine.study import Progress, flown
 from beaver_ftc.studies.present import page, tables
+from beaver_ftc.studies.present.files import write_files
 from beaver_ftc.studies.present.tables import finite, printed
-from beaver_ftc.studies.reproduce.cases import BESIDE, PUBLISHED, VARIANTS, Flown, Variant, fly_case
+from beaver_ftc.studies.reproduce.cases import BESIDE, PUBLISHED, VARIANTS, Changed, Flown, fly_case
 from beaver_ftc.studies.reproduce.choices import CHOICES
 from beaver_ftc.studies.reproduce.claims import CLAIMS, Claim
 from beaver_ftc.studies.reproduce.published_figures import FIGURES, SENSITIVITY, write_figures, write_margins
@@ -41,7 +42,7 @@ _ABOUT_CHOICES = "What the paper leaves open, in one place (`src/beaver_ftc/stud
 _VERDICT = {True: "borne out", False: "NOT BORNE OUT"}
 
 
-def numbers_of(variant: Variant) -> list[float]:
+def numbers_of(variant: Changed) -> list[float]:
     """The number of every claim, in the claims' order, with the variant's changes."""
     flights = {case.name: fly_case(case, variant.changes) for case in PUBLISHED}
     return [claim.measure(flights) for claim in CLAIMS]
@@ -195,10 +196,10 @@ def as_markdown(document: Document, figures: str) -> str:
     return page.as_markdown([f"# {_TITLE}", *_page(document)], figures)
 
 
-def write_page(document: Document, figures: Mapping[str, Path], path: Path) -> None:
-    """Write the HTML page; `figures` are the pictures by name, which go into it."""
+def as_html(document: Document, figures: Mapping[str, Path]) -> str:
+    """The HTML page; `figures` are the pictures by name, which go into it."""
     whole = [*_page(document), page.versions_line(document["versions"])]
-    path.write_text(page.as_html(_TITLE, whole, figures), encoding="utf-8")
+    return page.as_html(_TITLE, whole, figures)
 
 
 def _page(document: Document) -> list[page.Part]:
@@ -227,7 +228,6 @@ def reproduce(out: Path, workers: int = 2, progress: Progress | None = None) -> 
         document = document_of(flights, numbers)
         drawn = [*write_figures(flights, folder / "figures"), write_margins(document, folder / "figures")]
         figures = {path.stem: path for path in drawn}
-        (folder / f"{NAME}.json").write_text(as_json(document), encoding="utf-8")
-        (folder / f"{NAME}.md").write_text(as_markdown(document, "figures"), encoding="utf-8")
-        write_page(document, figures, folder / f"{NAME}.html")
+        markdown, html = as_markdown(document, "figures"), as_html(document, figures)
+        write_files(folder, {f"{NAME}.json": as_json(document), f"{NAME}.md": markdown, f"{NAME}.html": html})
     return document

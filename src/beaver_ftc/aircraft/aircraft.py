@@ -242,6 +242,11 @@ class Aircraft:
         """Where the terms hold."""
         return self.file.envelope
 
+    @property
+    def usual_airspeed_mps(self) -> float:
+        """Where its flights start, m/s; the middle of its envelope where its file says nothing."""
+        return self.file.start.airspeed_mps or 0.5 * sum(self.envelope.airspeed_mps)
+
     @cached_property
     def alpha_rad(self) -> tuple[float, float]:
         """Angles of attack of the envelope."""

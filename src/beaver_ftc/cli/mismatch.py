@@ -37,13 +37,15 @@ def command(
 
     Stopped or killed, a map goes on where it was with the same command.
     """
+    from beaver_ftc.studies.mismatch.study import refuse_other_aircraft
+
     try:
         flown = [each for scenario in load_all(scenarios) for each in _variants(scenario, variant)]
     except BadInput as error:
         if format is Format.json:
             emit_json({"runs": [], "errors": str(error).splitlines()})
         raise
-    _refuse_other_aircraft(flown)
+    refuse_other_aircraft(flown)
     report, say = not no_report, emit if format is Format.text else _nothing
     found = [_split(scenario, out, report, say) for scenario in flown]
     documents = [document for document, _ in found]
@@ -57,16 +59,6 @@ def command(
 
 def _nothing(text: str) -> None:
     """The document says it."""
-
-
-def _refuse_other_aircraft(scenarios: list["Scenario"]) -> None:
-    """The sources are told apart by the terms and the engine of the built-in aircraft."""
-    for scenario in scenarios:
-        if not scenario.airframe.forces or "dpt" not in scenario.airframe.signals:
-            raise BadInput(
-                f"{scenario.name}: mismatch splits by the terms and the engine of a built-in aircraft; what "
-                f"is left of {scenario.aircraft} is in the page derive writes, allowed: a built-in aircraft"
-            )
 
 
 def _variants(scenario: "Scenario", text: str) -> list["Scenario"]:

@@ -75,7 +75,8 @@ def matrix(
         raise typer.BadParameter("--pitch-lost and --declared exclude each other, allowed: one of them")
     if aircraft and (pitch_lost or declared):
         raise typer.BadParameter(
-            "--pitch-lost and --declared are for the built-in aircraft, allowed: without --aircraft"
+            "--pitch-lost needs a flap and engine power that stand in for the elevator, --declared terms "
+            "that the model lets be wrong: the built-in aircraft has these, allowed: without --aircraft"
         )
     if turbulence is not TurbulenceName.none and not declared:
         raise typer.BadParameter("--turbulence is declared or not flown, allowed: with --declared")

@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from beaver_ftc.aircraft import Aircraft
+from beaver_ftc.aircraft import Aircraft, load
 from beaver_ftc.design.model import AXES, N_Y, control_effectiveness
 from beaver_ftc.design.variants import design_of
 from beaver_ftc.documents.errors import BadInput, BeaverFtcError
@@ -51,8 +51,9 @@ Document = dict[str, Any]
 
 def speeds_of(aircraft: Aircraft) -> tuple[float, ...]:
     """Speeds to survey, m/s: those of the built-in aircraft, or about where another one starts."""
-    start_mps = aircraft.file.start.airspeed_mps
-    return SPEEDS_MPS if start_mps is None else tuple(round(share * start_mps, 1) for share in SHARES)
+    if aircraft is load():
+        return SPEEDS_MPS
+    return tuple(round(share * aircraft.usual_airspeed_mps, 1) for share in SHARES)
 
 
 def altitudes_of(aircraft: Aircraft) -> tuple[float, ...]:

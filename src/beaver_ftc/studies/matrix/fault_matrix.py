@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from beaver_ftc.aircraft import AXES, DEFAULT, Aircraft, load
+from beaver_ftc.aircraft import AXES, DEFAULT, Aircraft
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.trim import trim
@@ -88,9 +88,8 @@ def airspeeds_of(reference: str) -> tuple[float, ...]:
     """Airspeeds to fly an aircraft at, m/s."""
     if reference == DEFAULT:
         return AIRSPEEDS_MPS
-    aircraft = aircraft_of(reference)
-    start = aircraft.file.start.airspeed_mps or 0.5 * sum(aircraft.envelope.airspeed_mps)
-    return tuple(round(share * start, 1) for share in SPEEDS)
+    start_mps = aircraft_of(reference).usual_airspeed_mps
+    return tuple(round(share * start_mps, 1) for share in SPEEDS)
 
 
 def aircraft_of(reference: str) -> Aircraft:
@@ -119,9 +118,9 @@ def cases(
     ]
 
 
-def declared(turbulence: str = "none") -> dict[str, Any]:
+def declared(turbulence: str = "none", aircraft: str = DEFAULT) -> dict[str, Any]:
     """Real sensors, servos, coefficients at the ends of their tolerance by turns, air: all of it declared."""
-    names = [term.name for term in load().moments]
+    names = [term.name for term in aircraft_of(aircraft).moments]
     wrong = {name: 1.0 + (TOLERANCE if i % 2 else -TOLERANCE) for i, name in enumerate(names)}
     return {
         "uncertainty": UNCERTAINTY | {"coefficients": wrong},
@@ -153,7 +152,7 @@ def scenario_of(case: Case, law: str, trimmed_deg: float) -> "Scenario":
             "fdi": {"fault_class": "all"},
             "control": {"law": law},
         }
-        | (declared(case.turbulence) if case.declared else {})
+        | (declared(case.turbulence, case.aircraft) if case.declared else {})
     )
 
 

@@ -44,6 +44,7 @@ Document = dict[str, Any]
 COMPARISON, MAP = "mismatch-comparison", "mismatch-map"
 AIRSPEEDS_MPS = (30.0, 35.0, 40.0, 45.0, 50.0, 55.0)  # the validated envelope
 ALTITUDES_M = (0.0, 1000.0, 2000.0, 3000.0, 4000.0)
+_OF_BOUND = ("worst_ratio", "smallest_constant_rad_s2", "exceeded_s")
 _OF_MAP = ("worst_ratio", "smallest_constant_rad_s2", "dominant", "false_alarm")
 
 
@@ -54,7 +55,7 @@ def run_mismatch(
 
     Raises BadInput for a flight that cannot be trimmed, SimulationFailed for one not completed or kept.
     """
-    refuse_other_aircraft(scenario)
+    refuse_other_aircraft([scenario])
     with result_folder(out, scenario.name) as folder:
         with ParquetLog(folder / "log.parquet") as log:
             flight = fly(scenario, log, progress)
@@ -75,13 +76,14 @@ def run_mismatch(
     return found, kept
 
 
-def refuse_other_aircraft(scenario: Scenario) -> None:
+def refuse_other_aircraft(scenarios: Iterable[Scenario]) -> None:
     """The study compares with a second set of equations, which there is of the built-in aircraft only."""
-    if scenario.airframe is not load():
-        raise BadInput(
-            f"{scenario.name}: aircraft: mismatch knows the equations of {load().name} alone, allowed: "
-            f"{load().name}; of others `beaver-ftc derive` measures the error"
-        )
+    for scenario in scenarios:
+        if scenario.airframe is not load():
+            raise BadInput(
+                f"{scenario.name}: aircraft: mismatch knows the equations of {load().name} alone, allowed: "
+                f"{load().name}; of others `beaver-ftc derive` measures the error"
+            )
 
 
 def document(scenario: Scenario, tally: Tally, metrics: Document) -> Document:
@@ -144,19 +146,12 @@ def _bound(bound: AxisBound, tally: Tally, i: int) -> Document:
 
 def rows(found: Document) -> Iterator[Document]:
     """One row per axis, source and part of a document."""
+    columns = {"rms_rad_s2": "rms", "max_rad_s2": "max", "share": "share", "bound_share": "bound_share"}
     for axis, sources in found["axes"].items():
         for source, figures in sources.items():
             for part, of in [("", figures), *figures.get("parts", {}).items()]:
-                yield {
-                    "scenario": found["scenario"],
-                    "axis": axis,
-                    "source": source,
-                    "part": part,
-                    "rms_rad_s2": of["rms"],
-                    "max_rad_s2": of["max"],
-                    "share": of["share"],
-                    "bound_share": of["bound_share"],
-                }
+                place = {"scenario": found["scenario"], "axis": axis, "source": source, "part": part}
+                yield place | {column: of[key] for column, key in columns.items()}
 
 
 def _as_files(found: Document, table: Iterable[Document]) -> Files:
@@ -168,9 +163,7 @@ def entry(found: Document) -> Document:
     bounds = found["bound"]
     return {
         "scenario": found["scenario"],
-        **{f"{axis}_worst_ratio": bounds[axis]["worst_ratio"] for axis in AXES},
-        **{f"{axis}_smallest_constant_rad_s2": bounds[axis]["smallest_constant_rad_s2"] for axis in AXES},
-        **{f"{axis}_exceeded_s": bounds[axis]["exceeded_s"] for axis in AXES},
+        **{f"{axis}_{key}": bounds[axis][key] for key in _OF_BOUND for axis in AXES},
         **{f"{axis}_dominant": charts.largest_sources(found, axis)[0] for axis in AXES},
         "dominant": found["dominant"]["source"] if found["dominant"] else None,
         "false_alarm": found["false_alarm"],
@@ -194,7 +187,7 @@ def run_map(
 
     One entry per axis, speed and altitude: worst share of the bound, smallest constant, and why.
     """
-    refuse_other_aircraft(scenario)
+    refuse_other_aircraft([scenario])
 
     def files_of(found: Document) -> Files:
         drawn = {f"{MAP}.png": charts.map_figure(found["map"], scenario.name)} if report else None

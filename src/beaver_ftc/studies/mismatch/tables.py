@@ -1,6 +1,5 @@
 """The mismatch as tables and sentences, for the terminal and as a section of `report.html`."""
 
-import base64
 import json
 from html import escape
 from pathlib import Path
@@ -8,6 +7,7 @@ from typing import Any
 
 from beaver_ftc.results.report import register_section
 from beaver_ftc.studies.mismatch.states import AXES
+from beaver_ftc.studies.present.page import picture_data
 from beaver_ftc.studies.present.tables import html_table, number, plain, printed, seconds
 
 Document = dict[str, Any]
@@ -196,6 +196,7 @@ def _heading(found: Document) -> str:
 def _picture(path: Path, says: str) -> str:
     if not path.exists():
         return ""
-    data = base64.b64encode(path.read_bytes()).decode("ascii")
-    image = f'<img style="max-width: 100%" alt="{escape(says)}" src="data:image/png;base64,{data}">'
+    image = (
+        f'<img style="max-width: 100%" alt="{escape(says)}" src="data:image/png;base64,{picture_data(path)}">'
+    )
     return f"<figure>{image}<figcaption>{escape(says)}</figcaption></figure>"

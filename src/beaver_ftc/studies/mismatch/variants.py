@@ -7,8 +7,6 @@ A variant is a name of VARIANTS, or key=value pairs of `design_model`, joined by
 from typing import TYPE_CHECKING, Any
 
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.documents.problems import ScenarioError, key_path
-from beaver_ftc.scenario.loader import load_text
 
 if TYPE_CHECKING:
     from beaver_ftc.scenario.schema import Scenario
@@ -25,26 +23,19 @@ VARIANTS: dict[str, dict[str, Any]] = {
 
 def variant_of(scenario: "Scenario", text: str) -> "Scenario":
     """The scenario with one variant's design model, named after both. Raises BadInput for an unknown one."""
-    data = scenario.model_dump(mode="json", by_alias=True, exclude_none=True)
-    for piece in text.split("+"):
-        _merge(data["design_model"], _changes(piece.strip()))
+    pieces = [_changes(piece.strip()) for piece in text.split("+")]
+    changes = {f"design_model.{key}": value for piece in pieces for key, value in piece.items()}
     if text != DECLARED:
-        data["name"] = f"{scenario.name}-{_as_name(text)}"[:100]
-    data.pop("expect", None)  # what was expected of the scenario's own design need not hold for another
-    return _validated(data, text)
-
-
-def _validated(data: dict[str, Any], text: str) -> "Scenario":
-    import yaml
-
+        changes["name"] = f"{scenario.name}-{_as_name(text)}"[:100]
+    changes["expect"] = {}  # what was expected of the scenario's own design need not hold for another
     try:
-        return load_text(yaml.safe_dump(data))
-    except ScenarioError as error:
-        says = (f"--variant {text}: {key_path(each.location)}: {each.says}" for each in error.problems)
-        raise BadInput("\n".join(says)) from None
+        return scenario.with_(changes)
+    except BadInput as error:
+        raise BadInput("\n".join(f"--variant {text}: {line}" for line in str(error).splitlines())) from None
 
 
 def _changes(piece: str) -> dict[str, Any]:
+    """Dotted keys of `design_model` and their values."""
     if piece in VARIANTS:
         return VARIANTS[piece]
     key, equals, value = piece.partition("=")
@@ -53,7 +44,7 @@ def _changes(piece: str) -> dict[str, Any]:
             f"--variant {piece}: no such variant, "
             f"allowed: {', '.join(VARIANTS)}, or key=value of design_model"
         )
-    return _nested(key.split("."), _value(piece, value))
+    return {key: _value(piece, value)}
 
 
 def _value(piece: str, text: str) -> Any:
@@ -66,18 +57,6 @@ def _value(piece: str, text: str) -> Any:
     if not isinstance(value, bool | int | float):
         raise BadInput(f"--variant {piece}: {text!r} is no value, allowed: a number, true or false")
     return float(value) if isinstance(value, int) and not isinstance(value, bool) else value
-
-
-def _nested(keys: list[str], value: Any) -> dict[str, Any]:
-    return {keys[0]: _nested(keys[1:], value) if len(keys) > 1 else value}
-
-
-def _merge(into: dict[str, Any], changes: dict[str, Any]) -> None:
-    for key, value in changes.items():
-        if isinstance(value, dict) and isinstance(into.get(key), dict):
-            _merge(into[key], value)
-        else:
-            into[key] = value
 
 
 def _as_name(text: str) -> str:

@@ -7,6 +7,8 @@ rdot = Rpq p q + Rqr q r + Rn N + Rl L
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from beaver_ftc.aircraft import MassProperties
 
 
@@ -45,4 +47,16 @@ def inertia_coefficients(mass: MassProperties) -> InertiaCoefficients:
         Rqr=(Iy - Iz - Ix) * Jxz / Ir,
         Rl=Jxz / Ir,
         Rn=Ix / Ir,
+    )
+
+
+def inertial(inertia: InertiaCoefficients, x: np.ndarray) -> np.ndarray:
+    """The angular acceleration (n, 3) rad/s2 of turning with no moment, from the rate products [FDC]."""
+    p, q, r = x.T
+    return np.column_stack(
+        [
+            inertia.Ppq * p * q + inertia.Pqr * q * r,
+            inertia.Qpp * p * p + inertia.Qpr * p * r + inertia.Qrr * r * r,
+            inertia.Rpq * p * q + inertia.Rqr * q * r,
+        ]
     )

@@ -22,11 +22,10 @@ from beaver_ftc.plant.adapter import Plant, bare, probe, translated
 from beaver_ftc.plant.model_file import copy_of
 from beaver_ftc.scenario.airframe import find_aircraft
 from beaver_ftc.scenario.loader import load_text
-from beaver_ftc.studies.derive.derivation import derive
+from beaver_ftc.studies.derive.derivation import derive, source_of, try_out
 from beaver_ftc.studies.derive.fit import errors_of, pursue, signals_of_use
 from beaver_ftc.studies.derive.outline import not_affine
 from beaver_ftc.studies.derive.sample import SIDESLIP_RAD, Envelope, places, sample
-from beaver_ftc.studies.derive.source import source_of, try_out
 
 TRAINER = Path(__file__).parents[2] / "data" / "aircraft" / "trainer"
 FLIGHT = """

@@ -6,9 +6,9 @@ import pytest
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.channels import TRUTH
 from beaver_ftc.plant.trim import trim
+from beaver_ftc.studies.mismatch.models import States, air_name, measured_name, states_of
 from beaver_ftc.studies.mismatch.sources import SOURCES, Models, instantaneous
 from beaver_ftc.studies.mismatch.split import split
-from beaver_ftc.studies.mismatch.states import States, air_name, measured_name, states_of
 from flying import flown, scenario
 
 PROPERTY = {name: (path, factor) for name, path, factor in TRUTH}

@@ -155,8 +155,8 @@ def test_what_nobody_declared_is_unexplained(monkeypatch):
 @pytest.mark.parametrize("name", ["Cm_alpha2", "Cl_beta", "Cn_q", "Cl_daa", "Cm_df", "Cl_a2dpt"])
 def test_a_term_is_what_jsbsim_makes_of_it(name):
     """JSBSim's acceleration with the term up by a half, less that without, at one state."""
+    from beaver_ftc.studies.mismatch.models import States
     from beaver_ftc.studies.mismatch.sources import Models, coefficient_errors
-    from beaver_ftc.studies.mismatch.states import States
 
     case = scenario(uncertainty={"coefficients": {name: 1.5}})
     state = FlightState(

@@ -1,8 +1,13 @@
 """From an aircraft's name to a folder that flies: a JSBSim model that takes faults, and `aircraft.yaml`."""
 
+import os
+import re
 import shutil
+import subprocess
+import sys
 import tempfile
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from math import radians
 from pathlib import Path
 from time import perf_counter
@@ -12,34 +17,129 @@ import numpy as np
 import yaml
 
 from beaver_ftc.aircraft import Aircraft
-from beaver_ftc.aircraft.loading import DERIVED, first_line, read
+from beaver_ftc.aircraft.loading import (
+    DERIVED,
+    FILE,
+    FROM_JSBSIM,
+    builtin_names,
+    derived_folder,
+    first_line,
+    load,
+    read,
+)
 from beaver_ftc.aircraft.schema import MAX_MONOMIALS, MAX_SIGNALS, AircraftFile
 from beaver_ftc.design.model import design_record
-from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.plant import instrumented
 from beaver_ftc.plant.adapter import translated
+from beaver_ftc.plant.model_file import copy_of, refuse_deeds
 from beaver_ftc.plant.state import FlightState
 from beaver_ftc.studies.derive.derived import NAME as PAGE
 from beaver_ftc.studies.derive.derived import Derived, page_of
 from beaver_ftc.studies.derive.fit import MOST_TERMS, engine_signals, fitted, map_of, signals_of_use
-from beaver_ftc.studies.derive.level import LIFT_COEFFICIENTS, Level, level_as_filed, level_flight, named_as
 from beaver_ftc.studies.derive.outline import (
+    LIFT_COEFFICIENTS,
     EnvelopeFile,
+    Level,
     further_surfaces,
+    level_as_filed,
+    level_flight,
     moved_by_itself,
+    named_as,
     not_affine,
     outline,
     own_control,
+    placeholder,
     read_envelope,
     travel_of,
 )
 from beaver_ftc.studies.derive.sample import FRESH, SIDESLIP_RAD, Envelope, Samples, fly_about, sample
-from beaver_ftc.studies.derive.source import Source, source_of, try_out
 
 SAMPLES, CHECKED = 6000, 16000
 SPAN_OF_ALPHA_RAD = 0.10
 FEWEST_TERMS = 6
 Tell = Callable[[str], None]
+_PROBE = """import sys
+from pathlib import Path
+from beaver_ftc.plant.adapter import probe
+probe(Path(sys.argv[1]), sys.argv[2:])"""
+_LONGEST_S = 60.0
+_MOST_ABSENT = 20
+_ABSENT = re.compile(r"The property ([^ ]+) does not exist")
+_ALLOWED = "jsbsim:NAME, a built-in name, a JSBSim model FILE.xml, or a folder with an aircraft.yaml"
+
+
+@dataclass(frozen=True)
+class Source:
+    """An aircraft to derive. name: of the folder to be written. model: JSBSim's. folder: of an aircraft file
+    whose moments are to be found anew, else None: the model is instrumented. target: where the result goes
+    unless somebody says otherwise, None if somebody must."""
+
+    name: str
+    model: Path
+    folder: Path | None = None
+    target: Path | None = None
+
+    @property
+    def says(self) -> str:
+        """What to call it."""
+        return f"{FROM_JSBSIM}{self.name}" if self.target else self.name
+
+
+def source_of(reference: str) -> Source:
+    """What a reference means. Raises BadInput for what is no aircraft, or would act on the machine."""
+    if reference.startswith(FROM_JSBSIM):
+        name = reference.removeprefix(FROM_JSBSIM)
+        target = derived_folder(name)
+        return Source(name, instrumented.source_of(name), target=target)
+    if reference in builtin_names():
+        aircraft = load(reference)
+        return Source(reference, aircraft.jsbsim, aircraft.folder)
+    path = Path(reference)
+    if (path / FILE).is_file():
+        aircraft = read(path.resolve())
+        return Source(aircraft.name, aircraft.jsbsim, aircraft.folder)
+    if path.is_dir() and (path / f"{path.resolve().name}.xml").is_file():
+        path = path / f"{path.resolve().name}.xml"
+    if path.suffix == ".xml" and path.is_file():
+        refuse_deeds(path)
+        return Source(path.stem, path.resolve())
+    raise BadInput(f"{reference[:80]!r} cannot be derived, allowed: {_ALLOWED}")
+
+
+def try_out(source: Source) -> tuple[str, ...]:
+    """Load and start the model in a process of its own: some models end the process that loads them.
+
+    Returns the properties that its files read and nothing gives; most are FlightGear's. Raises
+    SimulationFailed, with what JSBSim says, for a model that cannot be flown with these at 0 either.
+    """
+    absent: list[str] = []
+    while (why := _failure(source, absent)) is not None:
+        found = _ABSENT.search(why)
+        if found is None or found[1] in absent or len(absent) == _MOST_ABSENT:
+            raise SimulationFailed(f"{source.says}: {why}")
+        absent.append(found[1])
+    return tuple(absent)
+
+
+def _failure(source: Source, absent: list[str]) -> str | None:
+    """Why the model does not fly with these properties at 0; None if it does."""
+    try:
+        with tempfile.TemporaryDirectory(prefix="beaver-ftc-") as here:  # also of a process that is ended
+            around = os.environ | {"TMPDIR": here}
+            model = copy_of(source.model, Path(here) / source.name)
+            command = [sys.executable, "-c", _PROBE, str(model), *absent]
+            run = subprocess.run(
+                command, capture_output=True, text=True, timeout=_LONGEST_S, check=False, env=around
+            )
+    except subprocess.TimeoutExpired:
+        return f"JSBSim does not start it within {_LONGEST_S:g} s"
+    if not run.returncode:
+        return None
+    said = [line.strip() for line in run.stderr.splitlines() if line.strip()]
+    ours = [line for line in said if "SimulationFailed: " in line]  # JSBSim may end the process after it
+    why = (ours or said or [f"ended by signal {-run.returncode}"])[-1]
+    return why.rpartition("SimulationFailed: ")[2].removeprefix("what():").strip()
 
 
 def derive(
@@ -136,8 +236,10 @@ def _derived(level: Level, folder: Path, tell: Tell) -> tuple[np.ndarray, np.nda
 
 def _moments(samples: Samples, data: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     """The terms: as many as the evaluator has room for."""
+    surface = next(iter(data["surfaces"]))
     bare = {name: value for name, value in data.items() if name != "model_error_map"}
-    aircraft = Aircraft(AircraftFile.model_validate({**bare, "moments": _placeholders(data)}), folder)
+    moments = {"Cl": [placeholder("Cl", surface)]}
+    aircraft = Aircraft(AircraftFile.model_validate({**bare, "moments": moments}), folder)
     for most in range(MOST_TERMS, FEWEST_TERMS - 1, -4):
         terms = fitted(samples, aircraft, most)
         try:
@@ -146,11 +248,6 @@ def _moments(samples: Samples, data: Mapping[str, Any], folder: Path) -> dict[st
             continue
         return terms
     raise BadInput(f"{aircraft.name}: its terms need more than {MAX_MONOMIALS} products of signals")
-
-
-def _placeholders(data: Mapping[str, Any]) -> dict[str, Any]:
-    names = list(data["surfaces"])
-    return {"Cl": [{"name": "Cl_placeholder", "value": -0.1, "surface": names[0]}]}
 
 
 def _set_envelope(data: dict[str, Any], point: FlightState, wanted: EnvelopeFile) -> None:

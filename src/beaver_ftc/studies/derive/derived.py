@@ -45,15 +45,13 @@ class Derived:
 def smallest_losses(aircraft: Aircraft) -> dict[str, dict[str, Any]]:
     """Of each surface: the axis it shows on, rad/s2 per rad there, and the loss of effectiveness, as a share,
     that theory is certain to detect at DEFLECTION_DEG; above 1 none is."""
-    error_map = aircraft.file.model_error_map
-    if error_map is None:
+    if aircraft.file.model_error_map is None:
         return {}
-    box = error_map.boxes[min(_NEAR, len(error_map.boxes) - 1)]
+    error = near_trim(aircraft)
     G = DesignModel(design_record(aircraft)).G(_usual_y(aircraft))
     found = {}
     for s, (surface, axis) in enumerate(zip(aircraft.surfaces, aircraft.dominant_axis, strict=True)):
-        errors = getattr(box, f"error_{AXES[axis]}_rad_s2")[0]
-        eta = errors[min(_NEAR, len(errors) - 1)] + getattr(Bounds().constant_rad_s2, AXES[axis])
+        eta = error[AXES[axis]] + getattr(Bounds().constant_rad_s2, AXES[axis])
         per_rad = abs(float(G[axis, s]))
         found[surface] = {
             "axis": AXES[axis],

@@ -29,11 +29,10 @@ from beaver_ftc.documents.validation import parse_document
 from beaver_ftc.plant.adapter import Plant, translated
 from beaver_ftc.plant.model_file import refuse_deeds
 from beaver_ftc.scenario.diagnosis import Bounds
-from beaver_ftc.studies.derive.derivation import derive
+from beaver_ftc.studies.derive.derivation import derive, source_of
 from beaver_ftc.studies.derive.fit import errors_of
-from beaver_ftc.studies.derive.level import trim_at, usual_start
+from beaver_ftc.studies.derive.outline import trim_at, usual_start
 from beaver_ftc.studies.derive.sample import FRESH, SIDESLIP_RAD, Envelope, Samples, sample, sorted_in
-from beaver_ftc.studies.derive.source import source_of
 from beaver_ftc.studies.engine.store import write_whole
 
 STATES, STARTS, SEED = 800, 8, 11

@@ -16,7 +16,7 @@ from scipy.linalg import lstsq
 
 from beaver_ftc.aircraft import AXES, Aircraft, MassProperties
 from beaver_ftc.aircraft.aircraft import MOMENTS
-from beaver_ftc.design.inertia import InertiaCoefficients, inertia_coefficients
+from beaver_ftc.design.inertia import InertiaCoefficients, inertia_coefficients, inertial
 from beaver_ftc.studies.derive.sample import AGES_S, REACHES, SHARES, Samples, flow_signals, places, sorted_in
 
 MOST_TERMS = 26
@@ -53,9 +53,12 @@ def moment_coefficients(samples: Samples, mass: MassProperties, aircraft: Aircra
     Ix, Iy, Iz, Jxz = mass.Ix_kg_m2, mass.Iy_kg_m2, mass.Iz_kg_m2, mass.Jxz_kg_m2
     inertia = np.array([[Ix, 0.0, -Jxz], [0.0, Iy, 0.0], [-Jxz, 0.0, Iz]])
     moments = samples.rate @ inertia + np.cross(samples.x, samples.x @ inertia)
-    geometry = aircraft.geometry
-    arms = np.array([geometry.span_m, geometry.chord_m, geometry.span_m])
-    return moments / (samples.y[:, 3:4] * geometry.wing_area_m2 * arms)
+    return moments / (samples.y[:, 3:4] * aircraft.geometry.wing_area_m2 * _arms(aircraft))
+
+
+def _arms(aircraft: Aircraft) -> np.ndarray:
+    """What Cl, Cm and Cn are made dimensionless with beside the wing area, (3,) m."""
+    return np.array([aircraft.geometry.span_m, aircraft.geometry.chord_m, aircraft.geometry.span_m])
 
 
 def candidates(signals: Sequence[str], surfaces: Sequence[str]) -> list[Candidate]:
@@ -205,10 +208,9 @@ def signals_of_use(samples: Samples, aircraft: Aircraft, most: int, wanted: Sequ
 
 def _accelerations(samples: Samples, aircraft: Aircraft) -> np.ndarray:
     """What one unit of Cl, Cm and Cn does, rad/s2."""
-    geometry, mass = aircraft.geometry, aircraft.mass
-    arms = np.array([geometry.span_m, geometry.chord_m, geometry.span_m])
+    mass = aircraft.mass
     inertia = np.array([mass.Ix_kg_m2, mass.Iy_kg_m2, mass.Iz_kg_m2])
-    size: np.ndarray = samples.y[:, 3].mean() * geometry.wing_area_m2 * arms / inertia
+    size: np.ndarray = samples.y[:, 3].mean() * aircraft.geometry.wing_area_m2 * _arms(aircraft) / inertia
     return size
 
 
@@ -221,12 +223,9 @@ def _term(coefficient: str, of: dict[str, int], surface: str | None, value: floa
 def errors_of(aircraft: Aircraft, samples: Samples) -> np.ndarray:
     """|f + G u - truth| of each sample, (n, 3) rad/s2."""
     of = flow_signals(samples, aircraft) | dict(zip(aircraft.surfaces, samples.u.T, strict=True))
-    geometry = aircraft.geometry
-    size = samples.y[:, 3] * geometry.wing_area_m2
-    moments = [
-        size * arm * aircraft.coefficient(name, of)
-        for name, arm in zip(MOMENTS, (geometry.span_m, geometry.chord_m, geometry.span_m), strict=True)
-    ]
+    size = samples.y[:, 3] * aircraft.geometry.wing_area_m2
+    arms = zip(MOMENTS, _arms(aircraft), strict=True)
+    moments = [size * arm * aircraft.coefficient(name, of) for name, arm in arms]
     believed = accelerations(inertia_coefficients(aircraft.mass), samples.x, np.column_stack(moments))
     error: np.ndarray = np.abs(believed - samples.rate)
     return error
@@ -234,14 +233,8 @@ def errors_of(aircraft: Aircraft, samples: Samples) -> np.ndarray:
 
 def accelerations(i: InertiaCoefficients, x: np.ndarray, moments: np.ndarray) -> np.ndarray:
     """Euler's equations: rates x (n, 3) rad/s and moments (n, 3) N m give rad/s2, (n, 3)."""
-    (p, q, r), (L, M, N) = x.T, moments.T
-    return np.column_stack(
-        [
-            i.Ppq * p * q + i.Pqr * q * r + i.Pl * L + i.Pn * N,
-            i.Qpp * p * p + i.Qpr * p * r + i.Qrr * r * r + i.Qm * M,
-            i.Rpq * p * q + i.Rqr * q * r + i.Rl * L + i.Rn * N,
-        ]
-    )
+    (p, q, r), (L, M, N) = inertial(i, x).T, moments.T
+    return np.column_stack([p + i.Pl * L + i.Pn * N, q + i.Qm * M, r + i.Rl * L + i.Rn * N])
 
 
 def largest(errors: np.ndarray, samples: Samples) -> np.ndarray:

@@ -1,6 +1,6 @@
 """Truth against design: where the design model is wrong, by how much, and what that costs the diagnosis.
 
-`states` reads the log, `models` works truth and design out, `sources` names the causes, `split` adds them
+`models` reads the log and works truth and design out, `sources` names the causes, `split` adds them
 up frame by frame and keeps the figures, `bound` holds them against eta_bar, `linear` is about the trim.
 `study` flies, `variants` are its wrong designs; `tables` and `charts` show what was found.
 """

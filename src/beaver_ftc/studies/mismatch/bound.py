@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.scenario.loader import load_scenario
+from beaver_ftc.studies.mismatch.models import AXES
 from beaver_ftc.studies.mismatch.split import Tally, tally_of_flight
-from beaver_ftc.studies.mismatch.states import AXES
 
 if TYPE_CHECKING:
     from beaver_ftc.scenario.schema import Scenario

@@ -13,9 +13,9 @@ from beaver_ftc.results.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, S
 from beaver_ftc.results.views import read_series
 from beaver_ftc.studies.linear_systems import CHANNELS, pulse_response, response, zeros
 from beaver_ftc.studies.mismatch.linear import LinearAnalysis
+from beaver_ftc.studies.mismatch.models import AXES
 from beaver_ftc.studies.mismatch.sources import SOURCES
 from beaver_ftc.studies.mismatch.split import CAUSES, ETA_BAR, FAULT, TOTAL, UNEXPLAINED, column
-from beaver_ftc.studies.mismatch.states import AXES
 from beaver_ftc.studies.mismatch.tables import Document, label, percent
 from beaver_ftc.studies.present.figures import heat_map, label_edges, panels
 from beaver_ftc.studies.present.files import Files

@@ -47,20 +47,21 @@ import numpy as np
 
 from beaver_ftc.compiled import kernel
 from beaver_ftc.design.coefficients import GEOMETRY, SURFACES, TRAVEL
+from beaver_ftc.design.inertia import inertial
 from beaver_ftc.plant.state import START_LATITUDE_DEG
 from beaver_ftc.studies.mismatch.models import (
+    AXES,
     ENGINE_TERMS,
     MOMENT_TERMS,
     RATES,
     Belief,
     MomentModel,
+    States,
     belief_of,
-    inertial,
     quantities,
     term,
     true_moments,
 )
-from beaver_ftc.studies.mismatch.states import AXES, States
 
 if TYPE_CHECKING:
     from beaver_ftc.scenario.schema import Scenario

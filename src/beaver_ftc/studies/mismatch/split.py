@@ -14,8 +14,7 @@ import numpy as np
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.log import ParquetLog, column_names, read_chunks
 from beaver_ftc.results.metrics import metrics
-from beaver_ftc.studies.mismatch.sources import SOURCES, Contributions, Models, instantaneous, integration
-from beaver_ftc.studies.mismatch.states import (
+from beaver_ftc.studies.mismatch.models import (
     AXES,
     OPTIONAL,
     REQUIRED,
@@ -25,6 +24,7 @@ from beaver_ftc.studies.mismatch.states import (
     last_row,
     states_of,
 )
+from beaver_ftc.studies.mismatch.sources import SOURCES, Contributions, Models, instantaneous, integration
 
 if TYPE_CHECKING:
     from beaver_ftc.scenario.schema import Scenario

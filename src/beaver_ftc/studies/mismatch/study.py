@@ -24,6 +24,7 @@ from beaver_ftc.studies.engine.study import Progress, Study, run_study
 from beaver_ftc.studies.mismatch import charts
 from beaver_ftc.studies.mismatch.bound import recommended_for
 from beaver_ftc.studies.mismatch.linear import analyse, linear_document
+from beaver_ftc.studies.mismatch.models import AXES
 from beaver_ftc.studies.mismatch.sources import SOURCES
 from beaver_ftc.studies.mismatch.split import (
     CAUSES,
@@ -35,7 +36,6 @@ from beaver_ftc.studies.mismatch.split import (
     tally_of_flight,
     tally_of_log,
 )
-from beaver_ftc.studies.mismatch.states import AXES
 from beaver_ftc.studies.mismatch.tables import show_in_reports
 from beaver_ftc.studies.present.files import Files, write_files
 from beaver_ftc.studies.present.tables import as_csv, finite

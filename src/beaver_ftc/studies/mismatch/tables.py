@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from beaver_ftc.results.report import register_section
-from beaver_ftc.studies.mismatch.states import AXES
+from beaver_ftc.studies.mismatch.models import AXES
 from beaver_ftc.studies.present.page import picture_data
 from beaver_ftc.studies.present.tables import html_table, number, plain, printed, seconds
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from beaver_ftc.flights.identification import identify
-from beaver_ftc.flights.inputs import load_flights
+from beaver_ftc.flights.samples import load_flights
 from beaver_ftc.flights.vehicle import load_vehicle
 from flights import synthetic
 

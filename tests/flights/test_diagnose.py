@@ -5,9 +5,9 @@ import pytest
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.flights.diagnose import diagnose
-from beaver_ftc.flights.inputs import load_flights
+from beaver_ftc.flights.findings import verdict_of
+from beaver_ftc.flights.samples import load_flights
 from beaver_ftc.flights.scoring import by_labels
-from beaver_ftc.flights.verdict import verdict_of
 from flights import synthetic
 
 PARTS = ((60, 120, 1.0, 0.5), (160, 220, 0.4, 1.0))
@@ -87,7 +87,7 @@ def test_a_verdict_says_what_a_still_flight_cannot_show(wing, wing_folder, wing_
 
 
 def test_events_are_as_few_as_the_faults(rows, wing):
-    from beaver_ftc.flights.verdict import events_of, lasting
+    from beaver_ftc.flights.findings import events_of, lasting
 
     events = lasting(events_of(rows, list(wing.surfaces)))
     named = [event["named"] for event in events if event["to_s"] - event["from_s"] > 20]

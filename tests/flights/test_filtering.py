@@ -7,7 +7,7 @@ import pytest
 
 from beaver_ftc.flights.bank import adaptation_of, bank_of
 from beaver_ftc.flights.filtering import _later, _weights, posterior_of
-from beaver_ftc.flights.inputs import load_flights
+from beaver_ftc.flights.samples import load_flights
 from flights import synthetic
 
 

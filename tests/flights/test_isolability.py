@@ -7,9 +7,9 @@ import pytest
 
 from beaver_ftc.flights.bank import bank_of
 from beaver_ftc.flights.diagnose import diagnose
+from beaver_ftc.flights.findings import sentences, statement
 from beaver_ftc.flights.identification import identify
-from beaver_ftc.flights.inputs import load_flights
-from beaver_ftc.flights.isolability import sentences, statement
+from beaver_ftc.flights.samples import load_flights
 from beaver_ftc.flights.vehicle import load_vehicle
 from flights import synthetic
 

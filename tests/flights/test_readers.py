@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.flights.inputs import load_flights
 from beaver_ftc.flights.readers import read_flight
-from beaver_ftc.flights.samples import _held
+from beaver_ftc.flights.samples import _held, load_flights
 from beaver_ftc.flights.vehicle import load_vehicle
 from flights import synthetic
 

@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 
 from beaver_ftc.flights.diagnose import diagnose
-from beaver_ftc.flights.identify import fit_model, stretches_of
-from beaver_ftc.flights.inputs import load_flights
+from beaver_ftc.flights.fitting import fit_model, folds, stretches_of
+from beaver_ftc.flights.samples import load_flights
 from beaver_ftc.flights.scoring import by_event, by_labels
-from beaver_ftc.flights.testing import folds
 from beaver_ftc.flights.vehicle import load_vehicle
 
 ALFA = "carbonZ_2018-09-11-15-06-34_1_rudder_right_failure"

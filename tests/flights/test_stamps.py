@@ -7,10 +7,10 @@ import pytest
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.flights.diagnose import diagnose
-from beaver_ftc.flights.inputs import load_flights
+from beaver_ftc.flights.findings import as_text, verdict_of
 from beaver_ftc.flights.readers import read_flight
-from beaver_ftc.flights.readers.stamps import in_order
-from beaver_ftc.flights.verdict import as_text, verdict_of
+from beaver_ftc.flights.recording import in_order
+from beaver_ftc.flights.samples import load_flights
 from flights import limited, synthetic
 
 JUMP_S = 1e6

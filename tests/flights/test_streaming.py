@@ -5,9 +5,8 @@ import pytest
 
 from beaver_ftc.diagnosis.base import Verdict
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.flights.detectors import detector_names, diagnose_with
-from beaver_ftc.flights.inputs import load_flights
-from beaver_ftc.flights.stream import context_of, rows_of, stream_of
+from beaver_ftc.flights.detectors import context_of, detector_names, diagnose_with, rows_of, stream_of
+from beaver_ftc.flights.samples import load_flights
 from flights import synthetic
 
 

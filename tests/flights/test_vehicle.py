@@ -3,7 +3,7 @@
 import pytest
 
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.flights.regressors import groups_of
+from beaver_ftc.flights.regression import groups_of
 from beaver_ftc.flights.samples import mixer
 from beaver_ftc.flights.vehicle import load_vehicle
 from flights import synthetic

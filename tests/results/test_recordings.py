@@ -7,7 +7,7 @@ from typer.testing import CliRunner
 
 import beaver_ftc as bf
 from beaver_ftc.cli.main import app
-from beaver_ftc.flights.inputs import load_flights
+from beaver_ftc.flights.samples import load_flights
 from beaver_ftc.flights.vehicle import load_vehicle
 from beaver_ftc.results.exports import RECORDINGS, write_recording
 

@@ -28,9 +28,9 @@ def identify(
     as a page beside it (MODEL with .html).
     """
     from beaver_ftc.flights.identification import identify, summary
-    from beaver_ftc.flights.inputs import load_flights
     from beaver_ftc.flights.model import as_text, write_text
-    from beaver_ftc.flights.model_page import check_page, render_model
+    from beaver_ftc.flights.pages import check_page, render_model
+    from beaver_ftc.flights.samples import load_flights
     from beaver_ftc.flights.vehicle import load_vehicle
 
     page = out.with_suffix(".html")
@@ -75,9 +75,9 @@ def diagnose(
         _replay(flights, out, format)
         return
     from beaver_ftc.flights.detectors import check_detector
-    from beaver_ftc.flights.inputs import load_flights
+    from beaver_ftc.flights.findings import as_text
     from beaver_ftc.flights.model import load_model
-    from beaver_ftc.flights.verdict import as_text
+    from beaver_ftc.flights.samples import load_flights
 
     check_detector(detector)
     known = load_model(model)
@@ -93,23 +93,24 @@ def diagnose(
 
 
 def _replay(flights: list[Path], out: Path, format: Format) -> None:
-    from beaver_ftc.flights.replay import as_text, is_own_log, replay, write_replay
+    from beaver_ftc.flights.pages import write_results
+    from beaver_ftc.flights.replay import as_text, is_own_log, replay
 
     others = [path for path in flights if not is_own_log(path)]
     if others:
         says = "--model is missing, allowed without one: log.parquet beside its scenario.yaml"
         raise BadInput(f"diagnose: {others[0]}: {says}")
     done = [replay(path) for path in flights]
-    folders = [write_replay(out, one) for one in done]
+    folders = [write_results(out, one.name, one.columns, one.verdict) for one in done]
     verdicts = [one.verdict | {"folder": str(at)} for one, at in zip(done, folders, strict=True)]
     answer(format, {"flights": verdicts}, lambda: "\n".join(map(as_text, verdicts)))
 
 
 def _diagnose(samples: Any, model: Any, out: Path, scored: bool, detector: str) -> dict[str, Any]:
     from beaver_ftc.flights.detectors import diagnose_with
+    from beaver_ftc.flights.findings import verdict_of
+    from beaver_ftc.flights.pages import write_diagnosis
     from beaver_ftc.flights.scoring import score
-    from beaver_ftc.flights.verdict import verdict_of
-    from beaver_ftc.flights.writing import write_diagnosis
 
     rows = diagnose_with(detector, samples, model)
     verdict = verdict_of(samples, model, rows) | {"detector": detector}

@@ -1,15 +1,279 @@
-"""Who may diagnose a recorded flight: our bank of filters, plain least squares, and the loop's detectors."""
+"""Who may diagnose a recorded flight: our bank of filters, plain estimators, and the loop's detectors.
 
-from beaver_ftc.diagnosis.base import Detector
+Plain estimators get the same model; the freeze rule needs none.
+
+sliding-least-squares   the last 20 s, every sample alike
+forgetting-least-squares  all the past, forgotten exponentially with 20 s [Ljung1999]
+freeze                  a servo output that has not moved for 6 s: sees the logged output itself stand still
+
+A detector of the loop is told the rates, what the design model makes of the frame before, and how much of
+that each surface did (diagnosis/base.py). All three follow from the identified model:
+
+    acceleration = (c + A past + sum_g F_g - rates before) / dt,      contribution_g = F_g / dt
+
+so the innovation a detector forms is the model's one-step residual. Its declared error is the residual's
+standard deviation. Detectors of the loop know the surfaces aileron, elevator and rudder: the vehicle's groups
+take these places in their order.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from beaver_ftc.design.context import Context, Declared
+from beaver_ftc.design.model import N_Y
+from beaver_ftc.diagnosis.base import Detector, Measured, Verdict
 from beaver_ftc.documents.errors import BadInput, suggestion
-from beaver_ftc.flights.diagnose import Rows, check_rate, diagnose
+from beaver_ftc.flights.bank import bank_of
+from beaver_ftc.flights.diagnose import UNKNOWN, Rows, check_rate, diagnose
 from beaver_ftc.flights.model import Model
-from beaver_ftc.flights.plain import forgetting, sliding
+from beaver_ftc.flights.recording import Floats, Recording
+from beaver_ftc.flights.regression import group_indices, predicted
 from beaver_ftc.flights.samples import Samples
-from beaver_ftc.flights.stream import run_detector
 from beaver_ftc.plugins import DETECTORS, is_compiled, made, registered
 
+MEMORY_S = 20.0
+STILL_S = 6.0
+_SURE_SD = 5.0
+_NINETY = 1.645
+PLACES = ("aileron", "elevator", "rudder")
+_SURFACES = 4
+_GYRO_RAD_S = 1e-4
 BANK = "bank-of-filters"
+
+
+def sliding(samples: Samples, model: Model) -> Rows:
+    """Least squares over the last 20 s."""
+    return _least_squares(samples, model, forget=False)
+
+
+def forgetting(samples: Samples, model: Model) -> Rows:
+    """Least squares that forgets with a time constant of 20 s."""
+    return _least_squares(samples, model, forget=True)
+
+
+def _least_squares(samples: Samples, model: Model, forget: bool) -> Rows:
+    """Effectiveness of the groups and the trim, from y = c + sum e_g F_g, whitened."""
+    x, y = _whitened(samples, model)
+    information = _remembered(np.einsum("nai,naj->nij", x, x), samples.dt_s, forget)
+    score = _remembered(np.einsum("nai,na->ni", x, y), samples.dt_s, forget)
+    prior = np.diag([*np.full(3, 1.0 / model.settings.trim_sd**2), *np.full(x.shape[2] - 3, 4.0)])
+    covariance = np.linalg.inv(information + prior)
+    found = np.einsum("nij,nj->ni", covariance, score)
+    effectiveness = 1.0 + found[:, 3:]
+    sd = np.sqrt(np.maximum(np.diagonal(covariance, axis1=1, axis2=2)[:, 3:], 0.0))
+    return _rows(samples, model, effectiveness, sd)
+
+
+def _whitened(samples: Samples, model: Model) -> tuple[Floats, Floats]:
+    """Regressors (n, 3, 3 + G) of trim and lost effectiveness, and what a healthy vehicle leaves, (n, 3)."""
+    ok, unexplained, answers = predicted(samples, model)
+    intercept, _, _, noise = model.arrays()
+    whiten = np.linalg.inv(np.linalg.cholesky(noise))
+    rest = np.where(ok[:, None], unexplained - intercept - answers.sum(axis=1), 0.0) @ whiten.T
+    sizes = np.broadcast_to(np.diag(np.sqrt(np.diag(noise))), (len(rest), 3, 3))
+    x = np.concatenate([sizes, answers.transpose(0, 2, 1)], axis=2)
+    x = np.where(ok[:, None, None], x, 0.0)
+    return np.einsum("ab,nbi->nai", whiten, x), rest
+
+
+def _remembered(values: Floats, dt_s: float, forget: bool) -> Floats:
+    """Sums over the memory that ends at each sample."""
+    if forget:
+        from scipy.signal import lfilter
+
+        return np.asarray(lfilter([1.0], [1.0, -np.exp(-dt_s / MEMORY_S)], values, axis=0))
+    total = np.cumsum(values, axis=0)
+    length = round(MEMORY_S / dt_s)
+    total[length:] = total[length:] - total[:-length].copy()
+    return total
+
+
+def _rows(samples: Samples, model: Model, effectiveness: Floats, sd: Floats) -> Rows:
+    """The nearest level the model knows; faulty where that is not healthy, and surely so without labels."""
+    bank, groups = bank_of(model), group_indices(model)
+    surfaces = len(model.vehicle.surfaces)
+    estimate, low, high = (np.ones((len(effectiveness), surfaces)) for _ in range(3))
+    lost = np.zeros(effectiveness.shape, dtype=bool)
+    for g, members in enumerate(groups):
+        levels = _known_levels(model, bank.effectiveness[:, g], g)
+        value = np.clip(effectiveness[:, g], 0.0, 1.0)
+        if model.settings.levels:
+            value = levels[np.abs(value[:, None] - levels).argmin(axis=1)]
+            lost[:, g] = value < 1.0
+        else:
+            lost[:, g] = effectiveness[:, g] + _SURE_SD * sd[:, g] < 1.0
+        estimate[:, members] = value[:, None]
+        low[:, members] = np.clip(effectiveness[:, g] - _NINETY * sd[:, g], 0.0, 1.0)[:, None]
+        high[:, members] = np.clip(effectiveness[:, g] + _NINETY * sd[:, g], 0.0, 1.0)[:, None]
+    bounds = {"low": np.minimum(low, estimate), "high": np.maximum(high, estimate)}
+    return _stateless(samples.t_s, _named(model, lost), estimate, **bounds, healthy=1.0 - lost)
+
+
+def _known_levels(model: Model, all_levels: Floats, group: int) -> Floats:
+    seen = model.settings.levels.get("+".join(model.groups[group]))
+    return np.array([*seen, 1.0]) if seen else np.unique(all_levels)
+
+
+def _named(model: Model, lost: np.ndarray) -> np.ndarray:
+    """The surfaces of the groups that have lost effectiveness, (n,) text; lost (n, G)."""
+    named = np.full(len(lost), "", dtype=object)
+    for k in np.flatnonzero(lost.any(axis=1)):
+        named[k] = "+".join(name for g in np.flatnonzero(lost[k]) for name in model.groups[g])
+    return named
+
+
+def _stateless(t_s: Floats, named: np.ndarray, estimate: Floats, **known: Any) -> Rows:
+    """Rows of who says nothing of gain and noise: faulty where something is named, sure of the estimate where
+    no bounds are known."""
+    faulty, ones = np.array([bool(name) for name in named], dtype=np.int64), np.ones(len(t_s))
+    found = {"low": estimate, "high": estimate, "probability": faulty.astype(float), **known}
+    return Rows(t_s=t_s, faulty=faulty, named=named, estimate=estimate, gain=ones, scale=ones, **found)
+
+
+def freeze(recording: Recording, samples: Samples, model: Model) -> Rows | None:
+    """The freeze rule on the logged servo outputs; None where the vehicle file names none."""
+    names = list(model.vehicle.surfaces)
+    columns = {
+        name: recording.columns[column]
+        for name, column in model.vehicle.outputs.items()
+        if column in recording.columns
+    }
+    if not columns:
+        return None
+    still = np.zeros((len(samples.t_s), len(names)), dtype=bool)
+    for name, column in columns.items():
+        last = np.searchsorted(column.t_s, samples.t_s, side="right") - 1
+        moved = np.concatenate([[True], np.diff(column.values) != 0.0])
+        since = column.t_s[np.maximum.accumulate(np.where(moved, np.arange(len(moved)), 0))]
+        still[:, names.index(name)] = (samples.t_s - since[np.maximum(last, 0)] > STILL_S) & (last >= 0)
+    estimate = 1.0 - still
+    named = np.array(
+        ["+".join(name for name, frozen in zip(names, row, strict=True) if frozen) for row in still],
+        dtype=object,
+    )
+    return _stateless(samples.t_s, named, estimate, healthy=np.ones((len(still), len(model.groups))))
+
+
+class Linear:
+    """The identified model as a detector's design model: only how the rates answer themselves, x (..., 3)."""
+
+    def __init__(self, past: Floats, dt_s: float) -> None:
+        self._jacobian = (past[:3] - np.eye(3)) / dt_s
+
+    def f(self, x: Floats, y: Floats) -> Floats:
+        """Angular acceleration rad/s2 by the rates alone."""
+        return np.asarray(x @ self._jacobian)
+
+    def G(self, y: Floats) -> Floats:
+        """Nothing: what surfaces do is in `contribution`, with its lags."""
+        return np.zeros((3, _SURFACES))
+
+
+@dataclass(frozen=True)
+class Stream:
+    """A flight as the detectors' contract has it. x (n, 3) rad/s; acceleration (n, 3) and contribution
+    (n, 3, 4) rad/s2; command (n, 4) as shares of travel; error (3,) rad/s2."""
+
+    t_s: Floats
+    x: Floats
+    acceleration: Floats
+    contribution: Floats
+    command: Floats
+    error: Floats
+
+    def __len__(self) -> int:
+        return len(self.t_s)
+
+    def sample(self, k: int) -> tuple[Measured, Floats]:
+        """What a detector is given at row k."""
+        measured = Measured(
+            float(self.t_s[k]), self.x[k].copy(), np.zeros(N_Y), self.acceleration[k].copy(),
+            self.contribution[k].copy(), self.error.copy(),
+        )  # fmt: skip
+        return measured, self.command[k].copy()
+
+
+def stream_of(samples: Samples, model: Model) -> Stream:
+    """The stream of a flight. Where the model can say nothing (a gap, a lost sample) the innovation is 0."""
+    groups = group_indices(model)
+    if len(groups) > len(PLACES):
+        raise BadInput(
+            f"{model.vehicle.name}: {len(groups)} groups of surfaces, allowed for a detector of the loop: "
+            f"at most {len(PLACES)}"
+        )
+    ok, unexplained, answers = predicted(samples, model)
+    (intercept, _, _, noise), dt_s = model.arrays(), 1.0 / model.rate_hz
+    x = np.nan_to_num(samples.rates)
+    before = np.vstack([x[:1], x[:-1]])
+    expected = x - np.where(ok[:, None], unexplained - intercept - answers.sum(axis=1), 0.0)
+    contribution, command = np.zeros((len(x), 3, _SURFACES)), np.zeros((len(x), _SURFACES))
+    known = np.where(ok[:, None, None], answers, 0.0)
+    for place, members in enumerate(groups):
+        contribution[:, :, place] = known[:, place] / dt_s
+        command[:, place] = np.nan_to_num(samples.commands[:, members].sum(axis=1))
+    error = np.sqrt(np.diag(noise)) / dt_s
+    return Stream(samples.t_s, x, (expected - before) / dt_s, contribution, command, error)
+
+
+def context_of(model: Model, error: Floats) -> Context:
+    """What a detector is told before the flight."""
+    dt_s = 1.0 / model.rate_hz
+    noise = np.zeros(7)
+    noise[:3] = _GYRO_RAD_S
+    design: Any = Linear(model.arrays()[1], dt_s)
+    return Context(
+        dt_s=dt_s, substeps=1, model=design, trim_x=np.zeros(3), trim_y=np.zeros(N_Y),
+        trim_rad=np.zeros(_SURFACES), travel_rad=np.outer((-1.0, 1.0), np.ones(_SURFACES)),
+        constant_rad_s2=np.zeros(3), inertia_coupling=np.zeros(3), surfaces=(*PLACES, "flap"),
+        declared=Declared(noise=noise, model_rad_s2=error),
+    )  # fmt: skip
+
+
+def run_detector(detector: Detector, samples: Samples, model: Model) -> Rows:
+    """Step a detector of the loop through a flight. An alarm stands while its statistic says so."""
+    stream = stream_of(samples, model)
+    detector.reset(context_of(model, stream.error))
+    return rows_of([detector.step(*stream.sample(k)) for k in range(len(stream))], samples, model)
+
+
+def rows_of(verdicts: list[Verdict], samples: Samples, model: Model) -> Rows:
+    """Verdicts as rows. A detector that gives no bounds says 0 to 1 of what it suspects."""
+    n, groups = len(verdicts), group_indices(model)
+    faulty = np.array([_alarm(verdict) for verdict in verdicts], dtype=np.int64)
+    estimate, low = np.ones((n, len(model.vehicle.surfaces))), np.ones((n, len(model.vehicle.surfaces)))
+    named = np.full(n, "", dtype=object)
+    for k in np.flatnonzero(faulty):
+        place = _place(verdicts[k], len(groups))
+        named[k] = UNKNOWN if place is None else "+".join(model.groups[place])
+        suspected = range(len(model.vehicle.surfaces)) if place is None else groups[place]
+        low[k, list(suspected)] = 0.0
+        if place is not None:
+            estimate[k, groups[place]] = _left(verdicts[k], place)
+    probability = np.array([min(max(verdict.statistic, 0.0), 1.0) for verdict in verdicts])
+    probability = np.where(np.isfinite(probability), probability, faulty)
+    bounds = {"low": low, "high": np.ones_like(low)}
+    healthy = np.ones((n, len(groups)))
+    return _stateless(samples.t_s, named, estimate, **bounds, probability=probability, healthy=healthy)
+
+
+def _alarm(verdict: Verdict) -> bool:
+    """By the statistic of this sample where there is one; the loop's own latch serves one fault a flight."""
+    return verdict.statistic > 1.0 if np.isfinite(verdict.statistic) else verdict.detected
+
+
+def _place(verdict: Verdict, groups: int) -> int | None:
+    place = PLACES.index(verdict.isolated) if verdict.isolated in PLACES else None
+    return place if place is not None and place < groups else None
+
+
+def _left(verdict: Verdict, place: int) -> float:
+    if verdict.effectiveness is not None:
+        return float(np.clip(verdict.effectiveness[place], 0.0, 1.0))
+    return float(np.clip(1.0 + verdict.estimate, 0.0, 1.0)) if verdict.estimate is not None else 1.0
+
+
 _OF_FLIGHTS = {BANK: diagnose, "sliding-least-squares": sliding, "forgetting-least-squares": forgetting}
 
 

@@ -14,7 +14,7 @@ from beaver_ftc.flights.bank import Bank, bank_of
 from beaver_ftc.flights.filtering import posterior_of
 from beaver_ftc.flights.model import Model
 from beaver_ftc.flights.recording import Floats
-from beaver_ftc.flights.regressors import group_indices
+from beaver_ftc.flights.regression import group_indices
 from beaver_ftc.flights.samples import Samples
 
 _RATE_TOLERANCE = 0.25

@@ -23,7 +23,7 @@ from beaver_ftc.compiled import kernel
 from beaver_ftc.flights.bank import Bank, adaptation_of, noise_of
 from beaver_ftc.flights.model import Model
 from beaver_ftc.flights.recording import Floats
-from beaver_ftc.flights.regressors import build, group_indices, predict
+from beaver_ftc.flights.regression import predicted
 from beaver_ftc.flights.samples import Samples
 
 _DELAY_MEMORY_S = 600.0
@@ -71,14 +71,10 @@ def _weights(evidence: list[Floats], rate_hz: float) -> Floats:
 
 def _filtered(samples: Samples, model: Model, bank: Bank) -> tuple[Floats, Floats, Floats, Floats]:
     """As the kernel gives it."""
-    regressors = build(samples, group_indices(model), model.history, model.lags, scaled=False)
-    _, past, response, _ = model.arrays()
-    unexplained, answers = (
-        np.ascontiguousarray(np.nan_to_num(part))
-        for part in predict(samples.rates, regressors, past, response)
-    )
+    ok, *parts = predicted(samples, model)
+    unexplained, answers = (np.ascontiguousarray(np.nan_to_num(part)) for part in parts)
     found: tuple[Floats, Floats, Floats, Floats] = run_bank(
-        unexplained, answers, regressors.ok, bank, adaptation_of(model), noise_of(model)
+        unexplained, answers, ok, bank, adaptation_of(model), noise_of(model)
     )
     return found
 

@@ -161,17 +161,3 @@ def as_text(found: Document) -> str:
     same = {True: "as flown", False: "not as flown", None: "nothing beside it to compare with"}
     lines = [f"{found['flight']}: {what}; {same[found['as_flown']]}"]
     return "\n".join([*lines, *(f"  left out: {one}" for one in found["left_out"])])
-
-
-def write_replay(out: Path, done: Replay) -> Path:
-    """Write `out/<flight>` with diagnosis.parquet and verdict.json, whole or not at all."""
-    import pyarrow as pa
-    from pyarrow import parquet
-
-    from beaver_ftc.results.metrics import as_json
-    from beaver_ftc.results.writer import result_folder
-
-    with result_folder(out, done.name) as folder:
-        parquet.write_table(pa.table(done.columns), folder / "diagnosis.parquet")
-        (folder / "verdict.json").write_text(as_json(done.verdict), encoding="utf-8")
-    return out / done.name

@@ -6,12 +6,15 @@ one received up to t, never a later one; the age that this adds is stated. A log
 that a log has as many as its rows ask for, whatever its clock does.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.flights.readers import read_flight
 from beaver_ftc.flights.recording import Column, Event, Floats, Recording
 from beaver_ftc.flights.vehicle import Vehicle
 
@@ -203,3 +206,23 @@ def _at_stamps(column: Column, t_s: Floats) -> Floats:
     """A label is held without skipping its gaps: where the log says nothing it is unknown."""
     last = np.searchsorted(column.t_s, t_s, side="right") - 1
     return np.where(last >= 0, column.values[np.maximum(last, 0)], np.nan)
+
+
+def load_flights(paths: Sequence[Path], vehicle: Vehicle, reader: str | None = None) -> list[Samples]:
+    """The flights, each on one time base. Raises BadInput with a line for each that cannot be used."""
+    loaded: list[Samples] = []
+    mistakes: list[str] = []
+    for path in paths:
+        try:
+            loaded.append(sample(read_flight(path, reader or vehicle.reader), vehicle))
+        except BadInput as error:
+            mistakes.append(str(error))
+    mistakes += _repeated([samples.name for samples in loaded])
+    if mistakes:
+        raise BadInput("\n".join(mistakes))
+    return loaded
+
+
+def _repeated(names: list[str]) -> list[str]:
+    twice = dict.fromkeys(name for name in names if names.count(name) > 1)
+    return [f"two flights are named {name}: one result would replace the other" for name in twice]

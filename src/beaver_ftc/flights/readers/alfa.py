@@ -15,9 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.flights.readers.stamps import in_order
 from beaver_ftc.flights.readers.table import read_numbers
-from beaver_ftc.flights.recording import Column, Event, Floats, Recording
+from beaver_ftc.flights.recording import Column, Event, Floats, Recording, in_order
 
 _NS = 1e-9
 _TIME = "%time"

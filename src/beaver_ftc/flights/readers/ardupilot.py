@@ -16,8 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.flights.readers.stamps import columns_of
-from beaver_ftc.flights.recording import Recording
+from beaver_ftc.flights.recording import Recording, columns_of
 
 _TIME, _INSTANCES = "TimeUS", ("I", "C", "Instance")
 _OVERHEAD = {"FMT", "FMTU", "UNIT", "MULT", "PARM", "MSG"}

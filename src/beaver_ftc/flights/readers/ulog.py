@@ -9,8 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.flights.readers.stamps import columns_of
-from beaver_ftc.flights.recording import Recording
+from beaver_ftc.flights.recording import Recording, columns_of
 
 _STAMP = "timestamp"
 _LONGEST = 65535

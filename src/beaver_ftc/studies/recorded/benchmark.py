@@ -13,16 +13,14 @@ import numpy as np
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.flights import scoring
-from beaver_ftc.flights.detectors import detector_names, diagnose_with
+from beaver_ftc.flights.detectors import detector_names, diagnose_with, freeze
 from beaver_ftc.flights.diagnose import Rows
-from beaver_ftc.flights.identify import Stretch, fit_model, stretches_of
+from beaver_ftc.flights.fitting import Stretch, fit_model, folds, run_tests, stretches_of
 from beaver_ftc.flights.model import Model, Settings
-from beaver_ftc.flights.plain import freeze
 from beaver_ftc.flights.readers import read_flight
 from beaver_ftc.flights.recording import Recording
 from beaver_ftc.flights.samples import Samples, sample
 from beaver_ftc.flights.scoring import ENGINE
-from beaver_ftc.flights.testing import folds, run_tests
 from beaver_ftc.flights.vehicle import Vehicle, load_vehicle
 from beaver_ftc.results.metrics import as_json
 from beaver_ftc.results.style import SERIES

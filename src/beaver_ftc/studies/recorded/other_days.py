@@ -16,11 +16,10 @@ import numpy as np
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.flights import scoring
 from beaver_ftc.flights.detectors import BANK, diagnose_with
-from beaver_ftc.flights.identify import Stretch, fit_model, stretches_of
+from beaver_ftc.flights.fitting import Stretch, fit_model, folds, stretches_of
 from beaver_ftc.flights.model import Model
 from beaver_ftc.flights.recording import Floats
 from beaver_ftc.flights.samples import Samples, mixer
-from beaver_ftc.flights.testing import folds
 from beaver_ftc.studies.recorded.benchmark import (
     FIGURES,
     DataSet,

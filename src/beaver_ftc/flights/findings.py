@@ -1,0 +1,267 @@
+"""From rows to a verdict: what happened when, in this flight, and what it can and cannot separate.
+
+What can be separated follows from the model, the mixer and how much the commands moved. Under a small loss of
+effectiveness d of group g the rates of a sample shift by -d s F_g. Its information is F_g' R^-1 F_g a sample;
+what trim, gain and the other groups could explain as well is taken off (the Schur complement). A loss shows
+once d^2 / 2 times the information gathered passes the odds against it before.
+"""
+
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from beaver_ftc.flights.bank import Bank, bank_of
+from beaver_ftc.flights.diagnose import UNKNOWN, Rows
+from beaver_ftc.flights.model import Model
+from beaver_ftc.flights.recording import Floats
+from beaver_ftc.flights.regression import predicted
+from beaver_ftc.flights.samples import Samples
+
+Document = dict[str, Any]
+
+BRIEF_S = 3.0
+HORIZONS_S = (5.0, 20.0, 60.0)
+_ALIKE = 0.9
+
+
+def verdict_of(samples: Samples, model: Model, rows: Rows) -> Document:
+    """The document of verdict.json."""
+    found = statement(samples, model)
+    return {
+        "flight": samples.name,
+        "vehicle": model.vehicle.name,
+        "duration_s": float(samples.t_s[-1] - samples.t_s[0]),
+        "recorded_s": len(samples.t_s) * samples.dt_s,
+        "gaps": int(samples.run[-1]),
+        "rate_hz": 1.0 / samples.dt_s,
+        "faulty": bool(rows.faulty.any()),
+        "events": events_of(rows, list(model.vehicle.surfaces)),
+        "can_separate": sentences(found),
+        "isolability": found,
+        "settings": model.settings.model_dump(),
+        "notes": list(samples.notes),
+    }
+
+
+def events_of(rows: Rows, surfaces: list[str]) -> list[Document]:
+    """Each time with one name and one effectiveness: when, what, how much is left.
+
+    What lasts less than BRIEF_S between alarms is taken into the event before it; what stands alone is brief.
+    This is hindsight, for the reader; the rows have none.
+    """
+    return [
+        _event(rows, begin, end, surfaces) for begin, end in _joined(rows, _runs(rows)) if rows.faulty[begin]
+    ]
+
+
+def _runs(rows: Rows) -> list[tuple[int, int]]:
+    """Begin and end of what has one name and one estimate."""
+    changed = (rows.named[1:] != rows.named[:-1]) | (np.diff(rows.faulty) != 0)
+    changed |= (np.diff(rows.estimate, axis=0) != 0.0).any(axis=1) & (rows.faulty[1:] == 1)
+    edges = [0, *(np.flatnonzero(changed) + 1).tolist(), len(rows.named)]
+    return list(pairwise(edges))
+
+
+def _joined(rows: Rows, runs: list[tuple[int, int]]) -> list[tuple[int, int]]:
+    """Runs with the brief ones taken into the alarm before them, and alike neighbours made one."""
+    joined: list[tuple[int, int]] = []
+    for begin, end in runs:
+        last = joined[-1] if joined else None
+        brief = rows.t_s[end - 1] - rows.t_s[begin] < BRIEF_S
+        if last and rows.faulty[last[0]] and (brief or _alike(rows, last[0], begin)) and rows.faulty[begin]:
+            joined[-1] = (last[0], end)
+        else:
+            joined.append((begin, end))
+    return joined
+
+
+def _alike(rows: Rows, one: int, other: int) -> bool:
+    return bool(
+        rows.named[one] == rows.named[other] and np.array_equal(rows.estimate[one], rows.estimate[other])
+    )
+
+
+def _event(rows: Rows, begin: int, end: int, surfaces: list[str]) -> Document:
+    """One event; name and effectiveness as they stood for most of it."""
+    names, count = np.unique(rows.named[begin:end].astype(str), return_counts=True)
+    named = str(names[count.argmax()])
+    mentioned = surfaces if named == UNKNOWN else named.split("+")
+    return {
+        "from_s": float(rows.t_s[begin]),
+        "to_s": float(rows.t_s[end - 1]),
+        "brief": bool(rows.t_s[end - 1] - rows.t_s[begin] < BRIEF_S),
+        "named": named,
+        "probability": float(rows.probability[begin:end].max()),
+        "effectiveness": {
+            name: {
+                "estimate": float(np.median(rows.estimate[begin:end, i])),
+                "low": float(np.median(rows.low[begin:end, i])),
+                "high": float(np.median(rows.high[begin:end, i])),
+            }
+            for i, name in enumerate(surfaces)
+            if name in mentioned
+        },
+    }
+
+
+def lasting(events: list[Document]) -> list[Document]:
+    """The events that are not brief; all of them where every one is."""
+    return [event for event in events if not event["brief"]] or events
+
+
+def as_text(verdict: Document) -> str:
+    """The verdict in lines for people."""
+    lines = [f"{verdict['flight']}: {_summary(verdict)}"]
+    shown = lasting(verdict["events"])
+    lines += [f"  {_event_line(event)}" for event in shown]
+    if len(shown) < len(verdict["events"]):
+        lines.append(f"  and {len(verdict['events']) - len(shown)} brief alarms of under {BRIEF_S:g} s")
+    lines += [f"  {sentence}" for sentence in (*verdict["can_separate"], *verdict["notes"])]
+    for key, value in verdict.get("score", {}).items():
+        lines.append(f"  {key}: {_shown(value)}")
+    return "\n".join(lines)
+
+
+def _summary(verdict: Document) -> str:
+    count = len(lasting(verdict["events"]))
+    what = f"{count} event{'s' if count > 1 else ''}" if count else "no fault shows"
+    return f"{what} in {looked_at(verdict)}"
+
+
+def looked_at(verdict: Document) -> str:
+    """How much flight was diagnosed, in words: a gap in the log is no flight."""
+    if not (gaps := verdict["gaps"]):
+        return f"{verdict['duration_s']:.0f} s"
+    return f"{verdict['recorded_s']:.0f} s, {gaps} gap{'s' if gaps > 1 else ''} in the log left out"
+
+
+def _event_line(event: Document) -> str:
+    left = ", ".join(
+        f"{name} {known['estimate']:.2f} ({known['low']:.2f} to {known['high']:.2f})"
+        for name, known in event["effectiveness"].items()
+    )
+    return f"{event['from_s']:.1f} to {event['to_s']:.1f} s  {event['named']}  effectiveness {left}"
+
+
+def _shown(value: Any) -> str:
+    return f"{value:.3f}" if isinstance(value, float) else str(value)
+
+
+def statement(samples: Samples, model: Model) -> dict[str, Any]:
+    """Which faults this flight can separate and which not, and the smallest loss that would show by when."""
+    bank = bank_of(model)
+    answers = _whitened(samples, model)
+    return {
+        "together": [_together(group) for group in model.groups if len(group) > 1],
+        "groups": [
+            {"surfaces": group, **_reach(answers, index, model, bank, samples.dt_s)}
+            for index, group in enumerate(model.groups)
+        ],
+        "alike": _proportional(answers, model),
+        "columns_held_s": {name: round(age, 4) for name, age in samples.age_s.items()},
+    }
+
+
+def _whitened(samples: Samples, model: Model) -> Floats:
+    """Each group's share of the rates in standard deviations of the noise, (n, G, 3)."""
+    ok, _, answers = predicted(samples, model)
+    answers, noise = answers[ok], np.array(model.noise)
+    whitened = np.linalg.solve(np.linalg.cholesky(noise), answers.reshape(-1, 3).T).T
+    return np.asarray(whitened.reshape(answers.shape) * np.sqrt(model.settings.power))
+
+
+def _together(group: list[str]) -> dict[str, Any]:
+    return {
+        "surfaces": group,
+        "says": f"{', '.join(group)} get proportional commands while they are healthy: no fit of healthy "
+        "flight tells their effects apart. A loss in any of them is named as all of them, and the "
+        "effectiveness given is that of all together.",
+    }
+
+
+def _reach(answers: Floats, group: int, model: Model, bank: Bank, dt_s: float) -> dict[str, Any]:
+    """Information a second about one group's effectiveness, and the smallest loss seen within some times."""
+    if not len(answers):
+        return {"information_per_s": 0.0, "smallest_loss": {f"{h:g}": None for h in HORIZONS_S}}
+    own = float((answers[:, group] ** 2).sum(axis=1).mean()) / dt_s
+    left = _conditional(answers, group) / dt_s
+    odds = _odds_against(model, bank, group, dt_s)
+    return {
+        "information_per_s": own,
+        "information_per_s_of_its_motion": left,
+        "smallest_loss": {f"{horizon:g}": _smallest(own, odds, horizon) for horizon in HORIZONS_S},
+        "smallest_loss_by_motion_alone": {
+            f"{horizon:g}": _smallest(left, odds, horizon) for horizon in HORIZONS_S
+        },
+    }
+
+
+def _conditional(answers: Floats, group: int) -> float:
+    """Information a sample about one group that trim (a constant an axis) and other groups cannot explain."""
+    n, groups, axes = answers.shape
+    constant = np.tile(np.eye(axes), (n, 1))
+    others = [answers[:, other].reshape(-1, 1) for other in range(groups) if other != group]
+    nuisance = np.column_stack([constant, *others])
+    target = answers[:, group].reshape(-1)
+    rest = target - nuisance @ np.linalg.lstsq(nuisance, target, rcond=None)[0]
+    return float(rest @ rest) / n
+
+
+def _odds_against(model: Model, bank: Bank, group: int, dt_s: float) -> float:
+    """Log odds that a change to one level of this group overcomes to raise the alarm."""
+    settings = model.settings
+    share = float(np.median(bank.weight[bank.faulty(group)]))
+    change = settings.changes_per_hour * dt_s / 3600.0 * share
+    return float(np.log(settings.alarm / (1.0 - settings.alarm)) - np.log(change))
+
+
+def _smallest(information: float, odds: float, horizon_s: float) -> float | None:
+    """The loss whose mean log likelihood passes the odds within the horizon; None where none does."""
+    if information <= 0.0:
+        return None
+    loss = float(np.sqrt(2.0 * odds / (information * horizon_s)))
+    return loss if loss <= 1.0 else None
+
+
+def _proportional(answers: Floats, model: Model) -> list[dict[str, Any]]:
+    """Pairs of groups whose effects in this flight were nearly proportional."""
+    pairs = []
+    for a in range(len(model.groups)):
+        for b in range(a + 1, len(model.groups)):
+            one, other = answers[:, a].ravel(), answers[:, b].ravel()
+            norms = float(np.sqrt((one @ one) * (other @ other)))
+            cosine = float(one @ other) / max(norms, 1e-300)
+            pairs.append(
+                {
+                    "surfaces": [model.groups[a], model.groups[b]],
+                    "cosine": cosine,
+                    "separable": abs(cosine) < _ALIKE,
+                }
+            )
+    return pairs
+
+
+def sentences(found: dict[str, Any]) -> list[str]:
+    """The statement in words."""
+    said = [entry["says"] for entry in found["together"]]
+    for entry in found["groups"]:
+        said.append(f"{', '.join(entry['surfaces'])}: {_loss_in_words(entry['smallest_loss'])}")
+    for pair in found["alike"]:
+        if not pair["separable"]:
+            one, other = (" and ".join(names) for names in pair["surfaces"])
+            said.append(
+                f"In this flight the effects of {one} and of {other} were nearly proportional (cosine "
+                f"{pair['cosine']:.2f}): one may be named for the other."
+            )
+    return said
+
+
+def _loss_in_words(smallest: dict[str, float | None]) -> str:
+    seen = [f"{loss:.0%} within {horizon} s" for horizon, loss in smallest.items() if loss is not None]
+    if not seen:
+        longest = list(smallest)[-1]
+        return (
+            f"not even a complete loss would show within {longest} s by the mean of this flight's commands."
+        )
+    return f"the smallest loss that shows on average is {', '.join(seen)}."

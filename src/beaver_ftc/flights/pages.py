@@ -1,0 +1,283 @@
+"""The pages of recorded flights: of an identification and of a diagnosed flight, with its files."""
+
+from base64 import b64encode
+from collections.abc import Sequence
+from functools import cache
+from io import BytesIO
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.flights.diagnose import Rows
+from beaver_ftc.flights.findings import BRIEF_S, lasting, looked_at
+from beaver_ftc.flights.fitting import (
+    Stretch,
+    fit_like,
+    fit_order,
+    folds,
+    residual_rows,
+    residuals,
+    stretches_of,
+)
+from beaver_ftc.flights.identification import regressor_names
+from beaver_ftc.flights.model import Model
+from beaver_ftc.flights.recording import Floats
+from beaver_ftc.flights.regression import Fit, spectrum
+from beaver_ftc.flights.samples import Samples
+from beaver_ftc.results.style import SERIES
+from beaver_ftc.results.metrics import as_json
+from beaver_ftc.results.writer import result_folder
+
+if TYPE_CHECKING:
+    from jinja2 import Template
+
+_TEMPLATES = Path(__file__).parent / "templates"
+_MOST_POINTS = 6000
+MARK = '<meta name="generator" content="beaver-ftc identify">'
+_SHOWN_S = 40.0
+_MOST_PARTS = 3
+
+
+@cache
+def template(name: str) -> "Template":
+    """A page's template by its file name."""
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+    loader = Environment(loader=FileSystemLoader(_TEMPLATES), autoescape=True, undefined=StrictUndefined)
+    return loader.get_template(name)
+
+
+def render(samples: Samples, model: Model, rows: Rows, verdict: dict[str, Any]) -> str:
+    """The report as HTML text."""
+    return template("flight.html.j2").render(
+        verdict=verdict,
+        looked_at=looked_at(verdict),
+        events=lasting(verdict["events"]),
+        brief_s=BRIEF_S,
+        model=model,
+        picture=_encoded(picture(samples, model, rows)),
+        ages=samples.age_s,
+        notes=_notes(samples, model),
+    )
+
+
+def _notes(samples: Samples, model: Model) -> list[str]:
+    gaps = int(samples.run[-1])
+    said = [f"{len(samples.t_s)} samples at {1.0 / samples.dt_s:.3g} Hz, {gaps} gaps in the log."]
+    said += [
+        f"{name} has its own stamps: its last value is held, {age:.2f} s old on average."
+        for name, age in samples.age_s.items()
+    ]
+    said += samples.notes
+    said.append(
+        f"The model was identified at {model.rate_hz:.3g} Hz; it predicts a sample from past ones, "
+        f"{model.history} of the rates and {model.lags} of the commands."
+    )
+    return said
+
+
+def picture(samples: Samples, model: Model, rows: Rows) -> Any:
+    """The flight on one page: commands, rates, effectiveness with bounds, probability of a fault."""
+    surfaces = list(model.vehicle.surfaces)
+    figure = _figure(11, 3.4 + 1.25 * len(surfaces))
+    axes = figure.subplots(
+        3 + len(surfaces),
+        1,
+        sharex=True,
+        squeeze=False,
+        height_ratios=[1.2, 1.2, *[1.0] * (len(surfaces) + 1)],
+    )[:, 0]
+    _lines(axes[0], samples.t_s, np.rad2deg(samples.rates), ["p", "q", "r"], "rates, deg/s")
+    limit = float(np.rad2deg(np.nanpercentile(np.abs(samples.rates), 99.9))) * 1.3
+    axes[0].set_ylim(-max(limit, 1.0), max(limit, 1.0))  # a landing's spike does not flatten the flight
+    _lines(axes[1], samples.t_s, samples.commands, surfaces, "healthy surfaces'\nshare of travel")
+    _lines(axes[2], rows.t_s, rows.probability[:, None], ["a fault"], "probability")
+    axes[2].set_ylim(-0.05, 1.05)
+    for i, surface in enumerate(surfaces):
+        _effectiveness(axes[3 + i], rows, i, surface)
+    for axis in axes:
+        _shade(axis, rows)
+        axis.grid(color="#dddddd", linewidth=0.5)
+    axes[-1].set_xlabel("time, s")
+    axes[-1].set_xlim(samples.t_s[0], samples.t_s[-1])
+    return figure
+
+
+def _thin(n: int) -> slice:
+    return slice(None, None, max(n // _MOST_POINTS, 1))
+
+
+def _lines(axis: Any, t_s: np.ndarray, values: np.ndarray, names: list[str], label: str) -> None:
+    kept = _thin(len(t_s))
+    for i, name in enumerate(names):
+        axis.plot(t_s[kept], values[kept, i], color=SERIES[i % len(SERIES)], linewidth=0.7, label=name)
+    axis.set_ylabel(label, fontsize=8)
+    axis.legend(loc="upper left", fontsize=7, ncols=4, framealpha=0.8)
+    axis.tick_params(labelsize=8)
+
+
+def _effectiveness(axis: Any, rows: Rows, surface: int, name: str) -> None:
+    kept = _thin(len(rows.t_s))
+    axis.fill_between(
+        rows.t_s[kept], rows.low[kept, surface], rows.high[kept, surface], color="#9cc4e4", step="post",
+        linewidth=0, label="90 % bounds",
+    )  # fmt: skip
+    axis.step(rows.t_s[kept], rows.estimate[kept, surface], where="post", color="#0b3d66", linewidth=1.1)
+    axis.set_ylim(-0.05, 1.08)
+    axis.set_ylabel(f"{name}\neffectiveness", fontsize=8)
+    axis.tick_params(labelsize=8)
+
+
+def _shade(axis: Any, rows: Rows) -> None:
+    """Where the alarm stands."""
+    edges = np.flatnonzero(np.diff(rows.faulty, prepend=0, append=0))
+    for begin, end in zip(edges[::2], edges[1::2], strict=True):
+        axis.axvspan(
+            rows.t_s[begin], rows.t_s[min(end, len(rows.t_s) - 1)], color="#f4d6cc", alpha=0.45, lw=0
+        )
+
+
+def write_diagnosis(out: Path, samples: Samples, model: Model, rows: Rows, verdict: dict[str, Any]) -> Path:
+    """Write the folder `out/<flight>` whole or not at all; returns it."""
+    columns = columns_of(rows, list(model.vehicle.surfaces))
+    return write_results(out, samples.name, columns, verdict, render(samples, model, rows, verdict))
+
+
+def columns_of(rows: Rows, surfaces: list[str]) -> dict[str, Any]:
+    """A row a sample: t_s, faulty, named, and for each surface its effectiveness with bounds."""
+    columns: dict[str, Any] = {"t_s": rows.t_s, "faulty": rows.faulty, "named": rows.named.tolist()}
+    for i, surface in enumerate(surfaces):
+        columns[f"{surface}_effectiveness"] = rows.estimate[:, i]
+        columns[f"{surface}_low"] = rows.low[:, i]
+        columns[f"{surface}_high"] = rows.high[:, i]
+    return columns | {"fault_probability": rows.probability}
+
+
+def write_results(
+    out: Path, name: str, columns: dict[str, Any], verdict: dict[str, Any], page: str | None = None
+) -> Path:
+    """Write `out/<name>` with diagnosis.parquet, verdict.json and report.html, whole or not at all."""
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    with result_folder(out, name) as folder:
+        parquet.write_table(pa.table(columns), folder / "diagnosis.parquet")
+        (folder / "verdict.json").write_text(as_json(verdict), encoding="utf-8")
+        if page is not None:
+            (folder / "report.html").write_text(page, encoding="utf-8")
+    return out / name
+
+
+def check_page(path: Path) -> None:
+    """Raise BadInput where the page would take the place of a file that is not a page of ours."""
+    if path.exists() and (not path.is_file() or MARK not in path.read_text("utf-8", errors="replace")[:2000]):
+        raise BadInput(f"will not replace {path}: it is no page of `identify`, allowed: another --out")
+
+
+def render_model(flights: Sequence[Samples], model: Model) -> str:
+    """The page as HTML text."""
+    stretches = stretches_of(flights)
+    fit = fit_order(stretches, model.vehicle, model.history, model.lags)
+    return template("model.html.j2").render(
+        mark=MARK,
+        model=model,
+        found=model.identified,
+        used=sum(int(stretch.use.sum()) for stretch in stretches),
+        coefficients=_coefficients(fit, model),
+        fits=_encoded(_fits(stretches, model)),
+        spectrum=_encoded(_spectrum(stretches, model)),
+        correlation=_encoded(_correlation(fit, model)),
+    )
+
+
+def _coefficients(fit: Fit, model: Model) -> list[dict[str, Any]]:
+    """Each regressor's coefficient and standard error, an axis."""
+    return [
+        {"name": name, "value": fit.coefficients[i].tolist(), "sd": fit.standard_errors[i].tolist()}
+        for i, name in enumerate(["constant", *regressor_names(model)])
+    ]
+
+
+def _figure(width: float, height: float) -> Any:
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=(width, height), layout="constrained", dpi=110)
+
+
+def _encoded(figure: Any) -> str:
+    buffer = BytesIO()
+    figure.savefig(buffer, format="png")
+    return b64encode(buffer.getvalue()).decode()
+
+
+def _fits(stretches: Sequence[Stretch], model: Model) -> Any:
+    """Measured and predicted rates over the liveliest part of each flight (or half) that was left out."""
+    parts = [(fit_like(fitted, model), kept, name) for fitted, kept, name in folds(stretches)]
+    parts = [part for part in parts if part[1].use.any()][:_MOST_PARTS]
+    figure = _figure(11, 4.6 * max(len(parts), 1))
+    for block, (fitted, kept, name) in zip(
+        figure.subfigures(max(len(parts), 1), 1, squeeze=False)[:, 0], parts, strict=False
+    ):
+        axes = block.subplots(3, 1, sharex=True)
+        rows, residual = residual_rows(fitted, kept)
+        begin = _liveliest(kept.samples.rates, rows, round(_SHOWN_S * model.rate_hz))
+        inside = (rows >= begin) & (rows < begin + round(_SHOWN_S * model.rate_hz))
+        t_s, measured = kept.samples.t_s[rows[inside]], kept.samples.rates[rows[inside]]
+        for i, axis in enumerate(axes):
+            left = np.rad2deg(residual[inside, i])
+            axis.plot(t_s, np.rad2deg(measured[:, i]), color="#888888", linewidth=2.2, label="measured")
+            axis.plot(
+                t_s, np.rad2deg(measured[:, i]) - left, color=SERIES[0], linewidth=0.9, label="predicted"
+            )
+            axis.plot(t_s, left, color=SERIES[1], linewidth=0.7, label="residual")
+            axis.set_ylabel(f"{'pqr'[i]}, deg/s", fontsize=8)
+            axis.tick_params(labelsize=8)
+            axis.grid(color="#dddddd", linewidth=0.5)
+        axes[0].set_title(f"{name}, not fitted: one sample ahead", fontsize=9, loc="left")
+        axes[0].legend(loc="upper right", fontsize=7, ncols=3, framealpha=0.8)
+        axes[-1].set_xlabel("time, s", fontsize=8)
+    return figure
+
+
+def _liveliest(rates: Floats, rows: NDArray[np.int64], length: int) -> int:
+    """First sample of the window in which the rates known moved most."""
+    square = np.zeros(len(rates))
+    square[rows] = (rates[rows] ** 2).sum(axis=1)
+    total = np.concatenate([[0.0], np.cumsum(square)])
+    return int(np.argmax(total[length:] - total[:-length])) if len(rates) > length else 0
+
+
+def _spectrum(stretches: Sequence[Stretch], model: Model) -> Any:
+    """Density of the residual, and what white noise of the same variance would have."""
+    residual = np.vstack([residuals(model, stretch)[0] for stretch in stretches])
+    frequency, density = spectrum(residual, 1.0 / model.rate_hz)
+    figure = _figure(7.5, 3.2)
+    axis = figure.subplots()
+    for i, name in enumerate("pqr"):
+        axis.loglog(frequency[1:], density[1:, i], color=SERIES[i], linewidth=1.1, label=name)
+        axis.axhline(
+            residual[:, i].var() / (0.5 * model.rate_hz), color=SERIES[i], linewidth=0.7, linestyle=":"
+        )
+    axis.set_xlabel("frequency, Hz", fontsize=8)
+    axis.set_ylabel("density, (rad/s)² / Hz", fontsize=8)
+    axis.set_title("residual (dotted: white noise of the same variance)", fontsize=9, loc="left")
+    axis.tick_params(labelsize=8)
+    axis.grid(color="#dddddd", linewidth=0.5, which="both")
+    axis.legend(fontsize=8)
+    return figure
+
+
+def _correlation(fit: Fit, model: Model) -> Any:
+    """Correlation of the errors of the coefficients."""
+    names = ["constant", *regressor_names(model)]
+    size = 2.5 + 0.19 * len(names)
+    figure = _figure(size + 0.8, size)
+    axis = figure.subplots()
+    image = axis.imshow(fit.correlation, cmap="RdBu_r", vmin=-1.0, vmax=1.0)
+    axis.set_xticks(range(len(names)), names, rotation=90, fontsize=6)
+    axis.set_yticks(range(len(names)), names, fontsize=6)
+    figure.colorbar(image, shrink=0.7).ax.tick_params(labelsize=7)
+    return figure

@@ -10,6 +10,7 @@ from pydantic import BaseModel, ValidationError
 
 from beaver_ftc.documents.base import Conflict
 from beaver_ftc.documents.document import MAX_PROBLEMS, Document, MalformedDocumentError, Problem, parse
+from beaver_ftc.documents.files import UnreadableError, read_text
 from beaver_ftc.documents.problems import ScenarioError, problems_of
 from beaver_ftc.documents.repair import repaired
 
@@ -32,6 +33,17 @@ def parse_document(text: str, source: str, keys: str = "the keys of `beaver-ftc 
         problem = Problem(document.line(()), (), f"{says}, allowed: a mapping with {keys}")
         raise ScenarioError(source, [*document.problems, problem])
     return document
+
+
+def read_file(
+    model: type[_Model], path: Path, most_bytes: int, keys: str = "the keys of `beaver-ftc schema`"
+) -> _Model:
+    """A file as a model. Raises ScenarioError with one line a mistake."""
+    try:
+        text = read_text(path, most_bytes)
+    except UnreadableError as error:
+        raise ScenarioError(str(path), [Problem(error.line, (), str(error))]) from None
+    return validate(model, parse_document(text, str(path), keys), str(path))
 
 
 def _all_of(

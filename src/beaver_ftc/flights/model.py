@@ -9,13 +9,10 @@ import numpy as np
 from pydantic import Field
 
 from beaver_ftc.documents.base import Number, Section, Whole
-from beaver_ftc.documents.document import Problem
 from beaver_ftc.documents.errors import SimulationFailed
-from beaver_ftc.documents.files import UnreadableError, read_text
-from beaver_ftc.documents.problems import ScenarioError
+from beaver_ftc.documents.validation import read_file
 from beaver_ftc.flights.recording import Floats
 from beaver_ftc.flights.vehicle import Vehicle
-from beaver_ftc.scenario.loader import parse_document, validate
 
 _MAX_BYTES = 20_000_000
 
@@ -82,11 +79,7 @@ class Model(Section):
 
 def load_model(path: Path) -> Model:
     """The model in a file. Raises ScenarioError with one line a mistake."""
-    try:
-        text = read_text(path, _MAX_BYTES)
-    except UnreadableError as error:
-        raise ScenarioError(str(path), [Problem(error.line, (), str(error))]) from None
-    return validate(Model, parse_document(text, str(path)), str(path))
+    return read_file(Model, path, _MAX_BYTES)
 
 
 def as_text(model: Model) -> str:

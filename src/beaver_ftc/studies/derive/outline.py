@@ -18,11 +18,8 @@ from beaver_ftc.aircraft import AXES, Aircraft
 from beaver_ftc.aircraft.loading import read
 from beaver_ftc.aircraft.schema import AircraftFile, Interval
 from beaver_ftc.documents.base import Number, Section, number
-from beaver_ftc.documents.document import Problem
 from beaver_ftc.documents.errors import BadInput, BeaverFtcError, SimulationFailed
-from beaver_ftc.documents.files import UnreadableError, read_text
-from beaver_ftc.documents.problems import ScenarioError
-from beaver_ftc.documents.validation import parse_document, validate
+from beaver_ftc.documents.validation import read_file
 from beaver_ftc.plant import instrumented
 from beaver_ftc.plant.adapter import Plant, bare, translated
 from beaver_ftc.plant.model_file import copy_of
@@ -83,12 +80,8 @@ def read_envelope(path: Path | None) -> EnvelopeFile:
     """The envelope file, or an empty one. Raises ScenarioError with one line a mistake."""
     if path is None:
         return EnvelopeFile()
-    try:
-        text = read_text(path, 100_000)
-    except UnreadableError as error:
-        raise ScenarioError(str(path), [Problem(error.line, (), str(error))]) from None
     keys = "the keys airspeed_mps, alpha_deg, altitude_m, sideslip_deg"
-    return validate(EnvelopeFile, parse_document(text, str(path), keys), str(path))
+    return read_file(EnvelopeFile, path, 100_000, keys)
 
 
 def travel_of(source: Path, model: Path, notes: list[str]) -> Travel:

@@ -62,7 +62,7 @@ def _nothing(text: str) -> None:
 
 
 def _variants(scenario: "Scenario", text: str) -> list["Scenario"]:
-    from beaver_ftc.studies.mismatch.variants import variant_of
+    from beaver_ftc.studies.mismatch.study import variant_of
 
     wanted = [scenario] if not text else [variant_of(scenario, each.strip()) for each in text.split(",")]
     names = [each.name for each in wanted]

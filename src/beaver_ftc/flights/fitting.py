@@ -16,19 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.flights import regression
 from beaver_ftc.flights.bank import bank_of
 from beaver_ftc.flights.diagnose import Rows, rows_of
 from beaver_ftc.flights.filtering import posterior_of
 from beaver_ftc.flights.model import Model, Settings
 from beaver_ftc.flights.recording import Floats
-from beaver_ftc.flights.regression import (
-    Fit,
-    Regressors,
-    build,
-    groups_of,
-    least_squares,
-    predicted,
-)
 from beaver_ftc.flights.samples import Samples
 from beaver_ftc.flights.scoring import by_labels
 from beaver_ftc.flights.vehicle import Vehicle
@@ -142,12 +135,12 @@ def _columns(vehicle: Vehicle, history: int, lags: int) -> list[int]:
     """Columns of the largest design that an order has."""
     first = 1 + 3 * max(HISTORIES)
     commands = first + len(vehicle.signals)
-    starts = [commands + group * max(LAGS) for group in range(len(groups_of(vehicle)))]
+    starts = [commands + group * max(LAGS) for group in range(len(regression.groups_of(vehicle)))]
     delayed = [start + lag for start in starts for lag in range(lags)]
     return [*range(1 + 3 * history), *range(first, commands), *delayed]
 
 
-def fit_order(stretches: Sequence[Stretch], vehicle: Vehicle, history: int, lags: int) -> Fit:
+def fit_order(stretches: Sequence[Stretch], vehicle: Vehicle, history: int, lags: int) -> regression.Fit:
     """Least squares of given order over all stretches."""
     x, y, run = stacked(stretches, vehicle, history, lags)
     if len(y) < 10 * x.shape[1]:
@@ -159,17 +152,17 @@ def fit_order(stretches: Sequence[Stretch], vehicle: Vehicle, history: int, lags
     if still:
         raise BadInput(f"identify: rate {still[0]} does not move, allowed: flights in which every rate does")
     dt_s = float(np.median([stretch.samples.dt_s for stretch in stretches]))
-    return least_squares(x, y, run, round(_COLOUR_S / dt_s))
+    return regression.least_squares(x, y, run, round(_COLOUR_S / dt_s))
 
 
 def stacked(
     stretches: Sequence[Stretch], vehicle: Vehicle, history: int, lags: int
 ) -> tuple[Floats, Floats, NDArray[np.int64]]:
     """Regressors, rates and run number over all stretches: the same samples for any order."""
-    groups, reach = groups_of(vehicle), max(HISTORIES + LAGS)
+    groups, reach = regression.groups_of(vehicle), max(HISTORIES + LAGS)
     xs, ys, runs = [], [], []
     for number, stretch in enumerate(stretches):
-        regressors = build(stretch.samples, groups, history, lags, scaled=True)
+        regressors = regression.build(stretch.samples, groups, history, lags, scaled=True)
         use = stretch.use & regressors.ok
         use[:reach] = False
         xs.append(design(regressors)[use])
@@ -178,14 +171,16 @@ def stacked(
     return np.vstack(xs), np.vstack(ys), np.concatenate(runs)
 
 
-def design(regressors: Regressors) -> Floats:
+def design(regressors: regression.Regressors) -> Floats:
     """Columns of the fit: one, the past, the commands of each group by lag."""
     n = len(regressors.past)
     return np.column_stack([np.ones(n), regressors.past, regressors.commands.reshape(n, -1)])
 
 
-def _model(fit: Fit, stretches: Sequence[Stretch], vehicle: Vehicle, history: int, lags: int) -> Model:
-    names, groups = list(vehicle.surfaces), groups_of(vehicle)
+def _model(
+    fit: regression.Fit, stretches: Sequence[Stretch], vehicle: Vehicle, history: int, lags: int
+) -> Model:
+    names, groups = list(vehicle.surfaces), regression.groups_of(vehicle)
     first = len(fit.coefficients) - len(groups) * lags
     shape = (len(groups), lags, 3)
     return Model(
@@ -305,6 +300,6 @@ def residuals(model: Model, kept: Stretch) -> tuple[Floats, Floats]:
 
 def residual_rows(model: Model, kept: Stretch) -> tuple[NDArray[np.int64], Floats]:
     """Places (n,) of the samples in use, and their one-step residuals (n, 3)."""
-    ok, unexplained, answers = predicted(kept.samples, model, scaled=True)
+    ok, unexplained, answers = regression.predicted(kept.samples, model, scaled=True)
     rows = np.flatnonzero(kept.use & ok)
     return rows, (unexplained - answers.sum(axis=1) - np.array(model.intercept))[rows]

@@ -5,15 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from beaver_ftc.flights.fitting import (
-    Stretch,
-    fit_model,
-    fit_order,
-    residuals,
-    run_tests,
-    stacked,
-    stretches_of,
-)
+from beaver_ftc.flights import fitting
 from beaver_ftc.flights.model import Model
 from beaver_ftc.flights.recording import Floats
 from beaver_ftc.flights.regression import group_indices, spectrum, variance_inflation
@@ -31,9 +23,9 @@ _MOST_DELAY_S, _LEAST_LAG_S, _MOST_LAG_S = 0.6, 0.005, 1.0
 
 def identify(flights: Sequence[Samples], vehicle: Vehicle) -> Model:
     """The model of a vehicle from its flights, with its own account of how good it is in `identified`."""
-    stretches = stretches_of(flights)
-    model = fit_model(stretches, vehicle)
-    tests, bounds = run_tests(stretches, model)
+    stretches = fitting.stretches_of(flights)
+    model = fitting.fit_model(stretches, vehicle)
+    tests, bounds = fitting.run_tests(stretches, model)
     found = {
         "flights": [
             {
@@ -54,9 +46,9 @@ def identify(flights: Sequence[Samples], vehicle: Vehicle) -> Model:
     return model.model_copy(update={"settings": settings, "identified": found})
 
 
-def collinear(stretches: Sequence[Stretch], model: Model) -> list[Document]:
+def collinear(stretches: Sequence[fitting.Stretch], model: Model) -> list[Document]:
     """Regressors whose coefficient's variance the others inflate more than tenfold, worst first."""
-    x, _, _ = stacked(stretches, model.vehicle, model.history, model.lags)
+    x, _, _ = fitting.stacked(stretches, model.vehicle, model.history, model.lags)
     factors = variance_inflation(x[:, 1:])
     worst = sorted(zip(regressor_names(model), factors.tolist(), strict=True), key=lambda pair: -pair[1])
     return [{"regressor": name, "inflation": factor} for name, factor in worst if factor > _COLLINEAR]
@@ -72,16 +64,16 @@ def regressor_names(model: Model) -> list[str]:
     return rates + signals + commands
 
 
-def colour(stretches: Sequence[Stretch], model: Model) -> dict[str, float]:
+def colour(stretches: Sequence[fitting.Stretch], model: Model) -> dict[str, float]:
     """By how much the residual's colour widens the standard errors of the responses: the median, an axis."""
-    fit = fit_order(stretches, model.vehicle, model.history, model.lags)
+    fit = fitting.fit_order(stretches, model.vehicle, model.history, model.lags)
     first = len(fit.colour) - len(model.groups) * model.lags
     return dict(zip("pqr", np.median(fit.colour[first:], axis=0).tolist(), strict=True))
 
 
-def residual_spectrum(stretches: Sequence[Stretch], model: Model) -> list[Document]:
+def residual_spectrum(stretches: Sequence[fitting.Stretch], model: Model) -> list[Document]:
     """Mean density of the residual by band, over that of white noise of the same variance, an axis."""
-    e = np.vstack([residuals(model, stretch)[0] for stretch in stretches])
+    e = np.vstack([fitting.residuals(model, stretch)[0] for stretch in stretches])
     frequency, density = spectrum(e, 1.0 / model.rate_hz)
     white = e.var(axis=0) / (0.5 * model.rate_hz)
     bands = []
@@ -144,7 +136,7 @@ def _axes(values: dict[str, float]) -> str:
     return ", ".join(f"{axis} {value:.3f}" for axis, value in values.items())
 
 
-def output_error(stretches: Sequence[Stretch], groups: list[list[int]]) -> dict[str, Any]:
+def output_error(stretches: Sequence[fitting.Stretch], groups: list[list[int]]) -> dict[str, Any]:
     """Fit on every other window, test on the rest. Returns servo lag and delay in s, their standard errors,
     and the share of the rates' variance explained over free-running windows not fitted, an axis."""
     from scipy.optimize import least_squares
@@ -177,7 +169,7 @@ def output_error(stretches: Sequence[Stretch], groups: list[list[int]]) -> dict[
 
 
 def _windows(
-    stretches: Sequence[Stretch], groups: list[list[int]], length: int, before: int
+    stretches: Sequence[fitting.Stretch], groups: list[list[int]], length: int, before: int
 ) -> tuple[Floats, Floats]:
     """Commands (W, before + length, G) with their past, scaled by labels, and rates (W, length, 3)."""
     commands, rates = [], []

@@ -11,17 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.flights import fitting
 from beaver_ftc.flights.diagnose import Rows
 from beaver_ftc.flights.findings import BRIEF_S, lasting, looked_at
-from beaver_ftc.flights.fitting import (
-    Stretch,
-    fit_like,
-    fit_order,
-    folds,
-    residual_rows,
-    residuals,
-    stretches_of,
-)
 from beaver_ftc.flights.identification import regressor_names
 from beaver_ftc.flights.model import Model
 from beaver_ftc.flights.recording import Floats
@@ -179,8 +171,8 @@ def check_page(path: Path) -> None:
 
 def render_model(flights: Sequence[Samples], model: Model) -> str:
     """The page as HTML text."""
-    stretches = stretches_of(flights)
-    fit = fit_order(stretches, model.vehicle, model.history, model.lags)
+    stretches = fitting.stretches_of(flights)
+    fit = fitting.fit_order(stretches, model.vehicle, model.history, model.lags)
     return template("model.html.j2").render(
         mark=MARK,
         model=model,
@@ -213,16 +205,16 @@ def _encoded(figure: Any) -> str:
     return b64encode(buffer.getvalue()).decode()
 
 
-def _fits(stretches: Sequence[Stretch], model: Model) -> Any:
+def _fits(stretches: Sequence[fitting.Stretch], model: Model) -> Any:
     """Measured and predicted rates over the liveliest part of each flight (or half) that was left out."""
-    parts = [(fit_like(fitted, model), kept, name) for fitted, kept, name in folds(stretches)]
+    parts = [(fitting.fit_like(fitted, model), kept, name) for fitted, kept, name in fitting.folds(stretches)]
     parts = [part for part in parts if part[1].use.any()][:_MOST_PARTS]
     figure = _figure(11, 4.6 * max(len(parts), 1))
     for block, (fitted, kept, name) in zip(
         figure.subfigures(max(len(parts), 1), 1, squeeze=False)[:, 0], parts, strict=False
     ):
         axes = block.subplots(3, 1, sharex=True)
-        rows, residual = residual_rows(fitted, kept)
+        rows, residual = fitting.residual_rows(fitted, kept)
         begin = _liveliest(kept.samples.rates, rows, round(_SHOWN_S * model.rate_hz))
         inside = (rows >= begin) & (rows < begin + round(_SHOWN_S * model.rate_hz))
         t_s, measured = kept.samples.t_s[rows[inside]], kept.samples.rates[rows[inside]]
@@ -250,9 +242,9 @@ def _liveliest(rates: Floats, rows: NDArray[np.int64], length: int) -> int:
     return int(np.argmax(total[length:] - total[:-length])) if len(rates) > length else 0
 
 
-def _spectrum(stretches: Sequence[Stretch], model: Model) -> Any:
+def _spectrum(stretches: Sequence[fitting.Stretch], model: Model) -> Any:
     """Density of the residual, and what white noise of the same variance would have."""
-    residual = np.vstack([residuals(model, stretch)[0] for stretch in stretches])
+    residual = np.vstack([fitting.residuals(model, stretch)[0] for stretch in stretches])
     frequency, density = spectrum(residual, 1.0 / model.rate_hz)
     figure = _figure(7.5, 3.2)
     axis = figure.subplots()

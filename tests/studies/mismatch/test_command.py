@@ -13,8 +13,8 @@ from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.results.log import read
 from beaver_ftc.studies.mismatch import charts, study
 from beaver_ftc.studies.mismatch.sources import SOURCES
+from beaver_ftc.studies.mismatch.study import VARIANTS, variant_of
 from beaver_ftc.studies.mismatch.tables import _heading, findings
-from beaver_ftc.studies.mismatch.variants import VARIANTS, variant_of
 from flying import loss, scenario
 
 SHORT = """

@@ -13,8 +13,7 @@ from beaver_ftc.scenario.builtin import builtin_names
 from beaver_ftc.scenario.loader import load_scenario
 from beaver_ftc.studies.mismatch.sources import SOURCES
 from beaver_ftc.studies.mismatch.split import split
-from beaver_ftc.studies.mismatch.study import tally_of_flight
-from beaver_ftc.studies.mismatch.variants import variant_of
+from beaver_ftc.studies.mismatch.study import tally_of_flight, variant_of
 from flying import PUBLISHED_UNCERTAINTY, flown, loss, scenario
 
 PUBLISHED_BOUND = 0.02  # rad/s2

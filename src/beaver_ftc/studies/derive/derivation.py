@@ -16,17 +16,7 @@ from typing import Any
 import numpy as np
 import yaml
 
-from beaver_ftc.aircraft import Aircraft
-from beaver_ftc.aircraft.loading import (
-    DERIVED,
-    FILE,
-    FROM_JSBSIM,
-    builtin_names,
-    derived_folder,
-    first_line,
-    load,
-    read,
-)
+from beaver_ftc.aircraft import Aircraft, loading
 from beaver_ftc.aircraft.schema import MAX_MONOMIALS, MAX_SIGNALS, AircraftFile
 from beaver_ftc.design.model import design_record
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
@@ -34,25 +24,10 @@ from beaver_ftc.plant import instrumented
 from beaver_ftc.plant.adapter import translated
 from beaver_ftc.plant.model_file import copy_of, refuse_deeds
 from beaver_ftc.plant.state import FlightState
+from beaver_ftc.studies.derive import outline
 from beaver_ftc.studies.derive.derived import NAME as PAGE
 from beaver_ftc.studies.derive.derived import Derived, page_of
 from beaver_ftc.studies.derive.fit import MOST_TERMS, engine_signals, fitted, map_of, signals_of_use
-from beaver_ftc.studies.derive.outline import (
-    LIFT_COEFFICIENTS,
-    EnvelopeFile,
-    Level,
-    further_surfaces,
-    level_as_filed,
-    level_flight,
-    moved_by_itself,
-    named_as,
-    not_affine,
-    outline,
-    own_control,
-    placeholder,
-    read_envelope,
-    travel_of,
-)
 from beaver_ftc.studies.derive.sample import FRESH, SIDESLIP_RAD, Envelope, Samples, fly_about, sample
 
 SAMPLES, CHECKED = 6000, 16000
@@ -83,21 +58,21 @@ class Source:
     @property
     def says(self) -> str:
         """What to call it."""
-        return f"{FROM_JSBSIM}{self.name}" if self.target else self.name
+        return f"{loading.FROM_JSBSIM}{self.name}" if self.target else self.name
 
 
 def source_of(reference: str) -> Source:
     """What a reference means. Raises BadInput for what is no aircraft, or would act on the machine."""
-    if reference.startswith(FROM_JSBSIM):
-        name = reference.removeprefix(FROM_JSBSIM)
-        target = derived_folder(name)
+    if reference.startswith(loading.FROM_JSBSIM):
+        name = reference.removeprefix(loading.FROM_JSBSIM)
+        target = loading.derived_folder(name)
         return Source(name, instrumented.source_of(name), target=target)
-    if reference in builtin_names():
-        aircraft = load(reference)
+    if reference in loading.builtin_names():
+        aircraft = loading.load(reference)
         return Source(reference, aircraft.jsbsim, aircraft.folder)
     path = Path(reference)
-    if (path / FILE).is_file():
-        aircraft = read(path.resolve())
+    if (path / loading.FILE).is_file():
+        aircraft = loading.read(path.resolve())
         return Source(aircraft.name, aircraft.jsbsim, aircraft.folder)
     if path.is_dir() and (path / f"{path.resolve().name}.xml").is_file():
         path = path / f"{path.resolve().name}.xml"
@@ -154,16 +129,16 @@ def derive(
     Raises BadInput, naming what is in the way, if its failures cannot be put in or it cannot be trimmed, and
     SimulationFailed if JSBSim cannot fly it.
     """
-    started_s, wanted, source = perf_counter(), read_envelope(envelope), source_of(reference)
+    started_s, wanted, source = perf_counter(), outline.read_envelope(envelope), source_of(reference)
     target = _target(source, out)
     notes: list[str] = []
     with tempfile.TemporaryDirectory(prefix="beaver-ftc-") as scratch:
         folder = Path(scratch) / "new" / source.name
         with translated(source.model):
             level = _prepared(source, folder, wanted, notes, tell)
-            notes += not_affine(level.plant, level.trim)
-            further = {} if source.folder else further_surfaces(source.model, level.plant)
-            if moving := moved_by_itself(level.aircraft, level.trim, tuple(further)):
+            notes += outline.not_affine(level.plant, level.trim)
+            further = {} if source.folder else outline.further_surfaces(source.model, level.plant)
+            if moving := outline.moved_by_itself(level.aircraft, level.trim, tuple(further)):
                 raise BadInput(
                     f"{source.says}: {', '.join(moving)} moves by itself in steady flight, and its "
                     "aerodynamics see it, allowed: surfaces that move by command"
@@ -172,7 +147,7 @@ def derive(
                 _set_envelope(level.data, level.trim, wanted)
             made = _derived(level, folder, tell)
         aircraft = Aircraft(AircraftFile.model_validate(level.data), target)
-        as_filed = read(source.folder) if source.folder else None
+        as_filed = loading.read(source.folder) if source.folder else None
         took_s = perf_counter() - started_s
         found = Derived(aircraft, level.trim, *made, tuple(notes), as_filed, further, took_s)
         write(folder, level.data)
@@ -181,11 +156,13 @@ def derive(
     return found
 
 
-def _prepared(source: Source, folder: Path, wanted: EnvelopeFile, notes: list[str], tell: Tell) -> Level:
+def _prepared(
+    source: Source, folder: Path, wanted: outline.EnvelopeFile, notes: list[str], tell: Tell
+) -> outline.Level:
     """An aircraft in level flight, instrumented if need be."""
     if source.folder is not None:
         tell("trim")
-        return level_as_filed(source.folder, folder, wanted)
+        return outline.level_as_filed(source.folder, folder, wanted)
     tell("instrument")
     seen = instrumented.surfaces_of(source.model)
     if len(seen) < 3:
@@ -195,10 +172,10 @@ def _prepared(source: Source, folder: Path, wanted: EnvelopeFile, notes: list[st
     if absent:
         notes.append(f"JSBSim alone gives it no {', '.join(absent)}: 0 in the copy")
     own = instrumented.instrument(source.model, folder.parent.parent / "own", {}, absent)
-    travel = travel_of(source.model, own, notes)
-    notes += own_control(source.model, own)
+    travel = outline.travel_of(source.model, own, notes)
+    notes += outline.own_control(source.model, own)
     model = instrumented.instrument(source.model, folder, travel, absent)
-    outlines = [outline(source.name, model, travel, lift) for lift in LIFT_COEFFICIENTS]
+    outlines = [outline.outline(source.name, model, travel, lift) for lift in outline.LIFT_COEFFICIENTS]
     for data in outlines:
         if wanted.altitude_m is not None:
             data["start"]["altitude_m"] = wanted.altitude_m
@@ -206,10 +183,10 @@ def _prepared(source: Source, folder: Path, wanted: EnvelopeFile, notes: list[st
             data["envelope"]["airspeed_mps"] = list(wanted.airspeed_mps)
     tell("trim")
     tried = outlines[: 1 if wanted.airspeed_mps else None]
-    return level_flight(tried, folder, notes, wanted.sideslip_rad or SIDESLIP_RAD)
+    return outline.level_flight(tried, folder, notes, wanted.sideslip_rad or SIDESLIP_RAD)
 
 
-def _derived(level: Level, folder: Path, tell: Tell) -> tuple[np.ndarray, np.ndarray]:
+def _derived(level: outline.Level, folder: Path, tell: Tell) -> tuple[np.ndarray, np.ndarray]:
     """Sample, fit and check; the data get their terms and errors. Returns the largest errors, (3,) rad/s2."""
     data, plant, point = level.data, level.plant, level.trim
     low, high = map(radians, data["envelope"]["alpha_deg"])
@@ -224,7 +201,7 @@ def _derived(level: Level, folder: Path, tell: Tell) -> tuple[np.ndarray, np.nda
         useful = signals_of_use(first, level.aircraft, MAX_SIGNALS, engine_signals(flown, level.aircraft))
         data["signals"] = {name: {"property": properties[name]} for name in useful}
     tell("fit")
-    data["moments"] = named_as(level.aircraft, _moments(first, data, folder))
+    data["moments"] = outline.named_as(level.aircraft, _moments(first, data, folder))
     tell("check")
     other = sample(plant, where, point, CHECKED, 2, properties)
     aircraft = Aircraft(AircraftFile.model_validate(data), folder)
@@ -238,7 +215,7 @@ def _moments(samples: Samples, data: Mapping[str, Any], folder: Path) -> dict[st
     """The terms: as many as the evaluator has room for."""
     surface = next(iter(data["surfaces"]))
     bare = {name: value for name, value in data.items() if name != "model_error_map"}
-    moments = {"Cl": [placeholder("Cl", surface)]}
+    moments = {"Cl": [outline.placeholder("Cl", surface)]}
     aircraft = Aircraft(AircraftFile.model_validate({**bare, "moments": moments}), folder)
     for most in range(MOST_TERMS, FEWEST_TERMS - 1, -4):
         terms = fitted(samples, aircraft, most)
@@ -250,7 +227,7 @@ def _moments(samples: Samples, data: Mapping[str, Any], folder: Path) -> dict[st
     raise BadInput(f"{aircraft.name}: its terms need more than {MAX_MONOMIALS} products of signals")
 
 
-def _set_envelope(data: dict[str, Any], point: FlightState, wanted: EnvelopeFile) -> None:
+def _set_envelope(data: dict[str, Any], point: FlightState, wanted: outline.EnvelopeFile) -> None:
     """Let the file's envelope be about trim, or what is wanted, and flights start there."""
     low, high = point.alpha_rad - SPAN_OF_ALPHA_RAD, point.alpha_rad + SPAN_OF_ALPHA_RAD
     alpha_deg = wanted.alpha_deg or tuple(float(np.degrees(end)) for end in (low, high))
@@ -269,7 +246,7 @@ class _Plain(yaml.SafeDumper):
 def write(folder: Path, data: Mapping[str, Any]) -> None:
     """Write the aircraft's file into its folder."""
     text = yaml.dump(dict(data), Dumper=_Plain, sort_keys=False, default_flow_style=None, width=120)
-    (folder / "aircraft.yaml").write_text(first_line() + text, encoding="utf-8")
+    (folder / "aircraft.yaml").write_text(loading.first_line() + text, encoding="utf-8")
 
 
 def _target(source: Source, out: Path | None) -> Path:
@@ -278,7 +255,8 @@ def _target(source: Source, out: Path | None) -> Path:
     if target is None:
         raise BadInput(f"{source.name}: give --out DIR, the folder to write {source.name}/ into")
     file = target / "aircraft.yaml"
-    if target.exists() and not (file.is_file() and file.read_text(encoding="utf-8").startswith(DERIVED)):
+    derived = file.is_file() and file.read_text(encoding="utf-8").startswith(loading.DERIVED)
+    if target.exists() and not derived:
         raise BadInput(f"{target} is there already and was not derived, allowed: another folder")
     return target
 

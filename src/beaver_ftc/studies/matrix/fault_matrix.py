@@ -21,7 +21,7 @@ from beaver_ftc.scenario.environment import air_of
 from beaver_ftc.scenario.given import load as load_scenario
 from beaver_ftc.scenario.initial import initial_of
 from beaver_ftc.studies.engine.study import Progress, Study, run_study
-from beaver_ftc.studies.matrix.told import columns_of, told
+from beaver_ftc.studies.matrix.clairvoyant import columns_of, seen_when_told
 from beaver_ftc.studies.present.figures import heat_map, panels
 from beaver_ftc.studies.present.files import Files
 
@@ -171,7 +171,7 @@ def fly_case(case: Case) -> Document:
     ours, best = (scenario_of(case, law, off_deg) for law in ("fault-tolerant-published", "oracle-published"))
     kept = columns_of(ours.airframe) if case.declared else None
     flight, oracle = fly(ours, kept), fly(best)
-    seen = {} if kept is None else told(ours, kept, case.surface)
+    seen = {} if kept is None else seen_when_told(ours, kept, case.surface)
     return {**case._asdict(), **_diagnosis(flight, case), **_tracking(flight, oracle, case), **seen}
 
 

@@ -2,5 +2,5 @@
 
 `models` reads the log and works truth and design out, `sources` names the causes, `split` adds them
 up frame by frame and keeps the figures, `bound` holds them against eta_bar, `linear` is about the trim.
-`study` flies, `variants` are its wrong designs; `tables` and `charts` show what was found.
+`study` flies, wrong designs too; `tables` and `charts` show what was found.
 """

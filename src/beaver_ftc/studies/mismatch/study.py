@@ -3,6 +3,9 @@
 `mismatch.json` and its CSV: accelerations in rad/s2. `share` is a source's RMS over the RMS of the total:
 sources may cancel, so shares need not add up to 1. `bound_share` is the largest part of the bound eta_bar
 that a source has used at any frame. A map is the scenario, without faults, flown at each speed and altitude.
+
+A variant differs in `design_model` alone: a name of VARIANTS, or key=value pairs of `design_model`, joined
+by +: `engine-neglected`, `mass=1.1`, `linearised+coefficients.Cm_alpha=0.9`. `declared` is as it is.
 """
 
 from collections.abc import Iterable, Iterator
@@ -46,6 +49,14 @@ AIRSPEEDS_MPS = (30.0, 35.0, 40.0, 45.0, 50.0, 55.0)  # the validated envelope
 ALTITUDES_M = (0.0, 1000.0, 2000.0, 3000.0, 4000.0)
 _OF_BOUND = ("worst_ratio", "smallest_constant_rad_s2", "exceeded_s")
 _OF_MAP = ("worst_ratio", "smallest_constant_rad_s2", "dominant", "false_alarm")
+DECLARED = "declared"
+VARIANTS: dict[str, dict[str, Any]] = {
+    DECLARED: {},
+    "engine-neglected": {"engine_terms": False},
+    "linearised": {"linearised": True},
+    "frozen-alpha": {"frozen_alpha": True},
+    "heavy": {"mass": 1.1},
+}
 
 
 def run_mismatch(
@@ -232,3 +243,45 @@ def _worst(found: Document, axis: str) -> Document:
     bound, dominant = found["bound"][axis], charts.largest_sources(found, axis)[0]
     values = bound["worst_ratio"], bound["smallest_constant_rad_s2"], dominant, found["false_alarm"]
     return dict(zip(_OF_MAP, values, strict=True))
+
+
+def variant_of(scenario: Scenario, text: str) -> Scenario:
+    """The scenario with one variant's design model, named after both. Raises BadInput for an unknown one."""
+    pieces = [_changes(piece.strip()) for piece in text.split("+")]
+    changes = {f"design_model.{key}": value for piece in pieces for key, value in piece.items()}
+    if text != DECLARED:
+        changes["name"] = f"{scenario.name}-{_as_name(text)}"[:100]
+    changes["expect"] = {}  # what was expected of the scenario's own design need not hold for another
+    try:
+        return scenario.with_(changes)
+    except BadInput as error:
+        raise BadInput("\n".join(f"--variant {text}: {line}" for line in str(error).splitlines())) from None
+
+
+def _changes(piece: str) -> dict[str, Any]:
+    """Dotted keys of `design_model` and their values."""
+    if piece in VARIANTS:
+        return VARIANTS[piece]
+    key, equals, value = piece.partition("=")
+    if not equals:
+        raise BadInput(
+            f"--variant {piece}: no such variant, "
+            f"allowed: {', '.join(VARIANTS)}, or key=value of design_model"
+        )
+    return {key: _value(piece, value)}
+
+
+def _value(piece: str, text: str) -> Any:
+    import yaml
+
+    try:
+        value = yaml.safe_load(text)
+    except yaml.YAMLError:
+        value = None
+    if not isinstance(value, bool | int | float):
+        raise BadInput(f"--variant {piece}: {text!r} is no value, allowed: a number, true or false")
+    return float(value) if isinstance(value, int) and not isinstance(value, bool) else value
+
+
+def _as_name(text: str) -> str:
+    return "".join(letter if letter.isalnum() or letter in "-_" else "-" for letter in text)

@@ -20,14 +20,7 @@ from beaver_ftc.flights.fitting import Stretch, fit_model, folds, stretches_of
 from beaver_ftc.flights.model import Model
 from beaver_ftc.flights.recording import Floats
 from beaver_ftc.flights.samples import Samples, mixer
-from beaver_ftc.studies.recorded.benchmark import (
-    FIGURES,
-    DataSet,
-    by_labels,
-    data_sets,
-    kept_rows,
-    settings_of,
-)
+from beaver_ftc.studies.recorded import benchmark
 
 Document = dict[str, Any]
 CHOSEN_ON, JUDGED_ON = range(8), range(8, 16)
@@ -154,15 +147,15 @@ def _air(rng: np.random.Generator, past: Floats, noise: Floats, n: int) -> Float
 
 def run_other_days(folder: Path) -> Document:
     """The document: of each labelled data set a part, a row a day. Raises BadInput where none has labels."""
-    labelled = [data for data in data_sets(folder) if np.isfinite(data.flights[0].labels).any()]
+    labelled = [data for data in benchmark.data_sets(folder) if np.isfinite(data.flights[0].labels).any()]
     if not labelled:
         raise BadInput(f"compare: --other-days: {folder} holds no labelled flight, allowed: one with labels")
     return {"sets": [_part(data) for data in labelled]}
 
 
-def _part(data: DataSet) -> Document:
+def _part(data: benchmark.DataSet) -> Document:
     stretches = stretches_of(data.flights)
-    settings = settings_of(stretches, data)
+    settings = benchmark.settings_of(stretches, data)
     models = [(fit_model(fitted, data.vehicle, settings), kept) for fitted, kept, _ in folds(stretches)]
     whole = fit_model(stretches, data.vehicle, settings)
     surfaces = len(data.vehicle.surfaces)
@@ -184,16 +177,16 @@ def _rows(
         scores: dict[str, list[Document]] = {BANK: [], _BESIDE: []}
         for model, kept in models:
             altered = on(day, kept.samples, past, noise)
-            labels = np.where(kept_rows(kept)[:, None], kept.samples.labels, np.nan)
+            labels = np.where(benchmark.kept_rows(kept)[:, None], kept.samples.labels, np.nan)
             for name, found in scores.items():
                 found.append(scoring.by_labels(diagnose_with(name, altered, model), labels))
-        beside = by_labels(scores[_BESIDE])["classes"]
-        yield {"kind": kind, "day": day.name, **by_labels(scores[BANK]), "beside": beside}
+        beside = benchmark.by_labels(scores[_BESIDE])["classes"]
+        yield {"kind": kind, "day": day.name, **benchmark.by_labels(scores[BANK]), "beside": beside}
 
 
 def _summary(kind: str, rows: Sequence[Document]) -> Document:
     """Mean and worst of each figure."""
-    keys = (*FIGURES, "beside")
+    keys = (*benchmark.FIGURES, "beside")
     worst = {key: _WORST.get(key, min)(row[key] for row in rows) for key in keys}
     return {
         "kind": kind,

@@ -35,7 +35,7 @@ def columns_of(aircraft: Aircraft) -> Columns:
     return Columns(*COLUMNS, *aircraft.signals, *surfaces)
 
 
-def told(scenario: "Scenario", kept: Columns, surface: str) -> Document:
+def seen_when_told(scenario: "Scenario", kept: Columns, surface: str) -> Document:
     """told_deflection: of the fault of a surface since it struck; told_chance: of finding it in that time."""
     assert scenario.fdi.statistical is not None
     aircraft, (context, coefficients) = scenario.airframe, _declared(scenario)

@@ -13,8 +13,8 @@ from beaver_ftc.diagnosis.bounds.clairvoyant import accelerations, healthy
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.log import Columns
 from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.studies.matrix.clairvoyant import columns_of, seen_when_told
 from beaver_ftc.studies.matrix.fault_matrix import AT_S, Case, beside_told, scenario_of, trimmed_deg
-from beaver_ftc.studies.matrix.told import columns_of, told
 
 AIRCRAFT = load()
 FOLDER = Path(__file__).parents[2] / "data" / "aircraft"
@@ -54,7 +54,7 @@ def test_terms_add_up_to_what_the_design_model_makes_of_a_surface():
 
 def test_a_healthy_surface_is_where_the_truth_has_it(lost):
     """Until the fault strikes, and one that is not broken for all of the flight."""
-    from beaver_ftc.studies.matrix.told import _declared
+    from beaver_ftc.studies.matrix.clairvoyant import _declared
 
     scenario, kept = lost
     context, coefficients = _declared(scenario)
@@ -69,16 +69,16 @@ def test_a_healthy_surface_is_where_the_truth_has_it(lost):
 
 def test_a_loss_of_what_stands_at_neutral_is_seen_by_nobody(lost):
     scenario, kept = lost
-    nothing = told(*flown("total loss", "flap"), "flap")
+    nothing = seen_when_told(*flown("total loss", "flap"), "flap")
     assert nothing["told_deflection"] < 1e-6
     assert nothing["told_chance"] < 1e-5
-    assert told(scenario, kept, "elevator")["told_chance"] > 0.99
+    assert seen_when_told(scenario, kept, "elevator")["told_chance"] > 0.99
 
 
 def test_rougher_air_shows_less(lost):
     scenario, kept = lost
     rough = scenario.with_({"fdi.bounds.turbulence": "moderate"})
-    still, moved = (told(one, kept, "elevator")["told_deflection"] for one in (scenario, rough))
+    still, moved = (seen_when_told(one, kept, "elevator")["told_deflection"] for one in (scenario, rough))
     assert moved < still
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.flights.fitting import constant_parts, known
+from beaver_ftc.flights.fitting import constant_parts, usable
 from beaver_ftc.flights.identification import identify
 from beaver_ftc.flights.regression import least_squares, variance_inflation
 from beaver_ftc.flights.samples import load_flights
@@ -41,7 +41,7 @@ def test_edges_of_labels_are_not_fitted(wing, wing_folder):
     flown = synthetic.fly(60.0, parts=((30, 40, 1.0, 0.5),))
     flown["left_effectiveness"][:50] = np.nan
     samples = load_flights([synthetic.write_csv(wing_folder / "edges.csv", flown)], wing)[0]
-    use, t_s = known(samples), samples.t_s
+    use, t_s = usable(samples), samples.t_s
     assert not use[t_s < 5.0].any()
     assert not use[np.abs(t_s - 30.0) < 1.4].any()
     assert use[(t_s > 32) & (t_s < 38)].all()

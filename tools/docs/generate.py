@@ -42,8 +42,9 @@ def _write_first_figure(docs: Path) -> Path:
 
 def _write_reproduction(docs: Path) -> Iterator[Path]:
     from beaver_ftc.studies.engine.study import fly_all
+    from beaver_ftc.studies.present.files import write_files
     from beaver_ftc.studies.reproduce.cases import VARIANTS
-    from beaver_ftc.studies.reproduce.published_figures import write_figures, write_margins
+    from beaver_ftc.studies.reproduce.published_figures import figures_of
     from beaver_ftc.studies.reproduce.reproduction import as_markdown, document_of, fly_published, numbers_of
 
     flights = fly_published()
@@ -52,7 +53,9 @@ def _write_reproduction(docs: Path) -> Iterator[Path]:
     path.write_text(as_markdown(document, "images/reproduction"), encoding="utf-8")
     yield path
     folder = docs / "images" / "reproduction"
-    yield from map(lighten, [*write_figures(flights, folder), write_margins(document, folder)])
+    figures = figures_of(document, flights)
+    write_files(folder, figures)
+    yield from (lighten(folder / name) for name in figures)
 
 
 def lighten(picture: Path) -> Path:

@@ -250,7 +250,7 @@ def rows_of(verdicts: list[Verdict], samples: Samples, model: Model) -> Rows:
         suspected = range(len(model.vehicle.surfaces)) if place is None else groups[place]
         low[k, list(suspected)] = 0.0
         if place is not None:
-            estimate[k, groups[place]] = _left(verdicts[k], place)
+            estimate[k, groups[place]] = _remaining(verdicts[k], place)
     probability = np.array([min(max(verdict.statistic, 0.0), 1.0) for verdict in verdicts])
     probability = np.where(np.isfinite(probability), probability, faulty)
     bounds = {"low": low, "high": np.ones_like(low)}
@@ -268,7 +268,7 @@ def _place(verdict: Verdict, groups: int) -> int | None:
     return place if place is not None and place < groups else None
 
 
-def _left(verdict: Verdict, place: int) -> float:
+def _remaining(verdict: Verdict, place: int) -> float:
     if verdict.effectiveness is not None:
         return float(np.clip(verdict.effectiveness[place], 0.0, 1.0))
     return float(np.clip(1.0 + verdict.estimate, 0.0, 1.0)) if verdict.estimate is not None else 1.0

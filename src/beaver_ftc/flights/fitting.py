@@ -69,10 +69,10 @@ class Stretch:
 
 def stretches_of(flights: Sequence[Samples]) -> list[Stretch]:
     """What of each flight is known well enough to be fitted."""
-    return [Stretch(samples, known(samples)) for samples in flights]
+    return [Stretch(samples, usable(samples)) for samples in flights]
 
 
-def known(samples: Samples) -> NDArray[np.bool_]:
+def usable(samples: Samples) -> NDArray[np.bool_]:
     """Which samples are known to be healthy, or faulty by a known amount, (n,)."""
     use = np.ones(len(samples.t_s), dtype=bool)
     if samples.events:

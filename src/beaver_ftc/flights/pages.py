@@ -92,7 +92,6 @@ def picture(samples: Samples, model: Model, rows: Rows) -> Any:
         _effectiveness(axes[3 + i], rows, i, surface)
     for axis in axes:
         _shade(axis, rows)
-        axis.grid(color="#dddddd", linewidth=0.5)
     axes[-1].set_xlabel("time, s")
     axes[-1].set_xlim(samples.t_s[0], samples.t_s[-1])
     return figure
@@ -102,13 +101,19 @@ def _thin(n: int) -> slice:
     return slice(None, None, max(n // _MOST_POINTS, 1))
 
 
+def _dress(axis: Any, label: str, **grid: Any) -> None:
+    """Axis label, ticks and grid."""
+    axis.set_ylabel(label, fontsize=8)
+    axis.tick_params(labelsize=8)
+    axis.grid(color="#dddddd", linewidth=0.5, **grid)
+
+
 def _lines(axis: Any, t_s: np.ndarray, values: np.ndarray, names: list[str], label: str) -> None:
     kept = _thin(len(t_s))
     for i, name in enumerate(names):
         axis.plot(t_s[kept], values[kept, i], color=SERIES[i % len(SERIES)], linewidth=0.7, label=name)
-    axis.set_ylabel(label, fontsize=8)
     axis.legend(loc="upper left", fontsize=7, ncols=4, framealpha=0.8)
-    axis.tick_params(labelsize=8)
+    _dress(axis, label)
 
 
 def _effectiveness(axis: Any, rows: Rows, surface: int, name: str) -> None:
@@ -119,8 +124,7 @@ def _effectiveness(axis: Any, rows: Rows, surface: int, name: str) -> None:
     )  # fmt: skip
     axis.step(rows.t_s[kept], rows.estimate[kept, surface], where="post", color="#0b3d66", linewidth=1.1)
     axis.set_ylim(-0.05, 1.08)
-    axis.set_ylabel(f"{name}\neffectiveness", fontsize=8)
-    axis.tick_params(labelsize=8)
+    _dress(axis, f"{name}\neffectiveness")
 
 
 def _shade(axis: Any, rows: Rows) -> None:
@@ -225,9 +229,7 @@ def _fits(stretches: Sequence[fitting.Stretch], model: Model) -> Any:
                 t_s, np.rad2deg(measured[:, i]) - left, color=SERIES[0], linewidth=0.9, label="predicted"
             )
             axis.plot(t_s, left, color=SERIES[1], linewidth=0.7, label="residual")
-            axis.set_ylabel(f"{'pqr'[i]}, deg/s", fontsize=8)
-            axis.tick_params(labelsize=8)
-            axis.grid(color="#dddddd", linewidth=0.5)
+            _dress(axis, f"{'pqr'[i]}, deg/s")
         axes[0].set_title(f"{name}, not fitted: one sample ahead", fontsize=9, loc="left")
         axes[0].legend(loc="upper right", fontsize=7, ncols=3, framealpha=0.8)
         axes[-1].set_xlabel("time, s", fontsize=8)
@@ -254,10 +256,8 @@ def _spectrum(stretches: Sequence[fitting.Stretch], model: Model) -> Any:
             residual[:, i].var() / (0.5 * model.rate_hz), color=SERIES[i], linewidth=0.7, linestyle=":"
         )
     axis.set_xlabel("frequency, Hz", fontsize=8)
-    axis.set_ylabel("density, (rad/s)² / Hz", fontsize=8)
     axis.set_title("residual (dotted: white noise of the same variance)", fontsize=9, loc="left")
-    axis.tick_params(labelsize=8)
-    axis.grid(color="#dddddd", linewidth=0.5, which="both")
+    _dress(axis, "density, (rad/s)² / Hz", which="both")
     axis.legend(fontsize=8)
     return figure
 

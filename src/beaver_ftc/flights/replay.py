@@ -43,19 +43,19 @@ def replay(path: Path) -> Replay:
 
     scenario = load_scenario(path.with_name("scenario.yaml"))
     aircraft = scenario.airframe
-    given = _given(aircraft)
-    log = _columns_of(path, ["t_s", *(name for names in given for name in names)])
+    inputs = _inputs(aircraft)
+    log = _columns_of(path, ["t_s", *(name for names in inputs for name in names)])
     keys = scenario.model_dump(mode="json", exclude_unset=True)
     others = {key: keys[key] for key in ("actuators", "design_model") if key in keys}
     diagnosis = Diagnosis(aircraft, scenario.rate_hz, keys.get("fdi"), **others)
-    samples = _samples(log, given)
+    samples = _samples(log, inputs)
     verdicts = [diagnosis.step(*sample) for sample in samples]
     surfaces = list(aircraft.surfaces)
     columns = _columns(log["t_s"], verdicts, surfaces)
     return Replay(scenario.name, columns, _verdict(path, scenario, log, verdicts))
 
 
-def _given(aircraft: Any) -> tuple[list[str], ...]:
+def _inputs(aircraft: Any) -> tuple[list[str], ...]:
     """Columns of what the diagnosis is given at each frame: rates, signals, commands, attitude."""
     return (
         [f"{axis}_measured_rad_s" for axis in "pqr"],
@@ -75,9 +75,9 @@ def _columns_of(path: Path, names: list[str]) -> dict[str, Floats]:
     return log
 
 
-def _samples(log: dict[str, Floats], given: tuple[list[str], ...]) -> list[tuple[Floats, ...]]:
+def _samples(log: dict[str, Floats], inputs: tuple[list[str], ...]) -> list[tuple[Floats, ...]]:
     """What the diagnosis was given at each frame."""
-    parts = [np.ascontiguousarray(np.column_stack([log[name] for name in names])) for names in given]
+    parts = [np.ascontiguousarray(np.column_stack([log[name] for name in names])) for names in inputs]
     return list(zip(*parts, strict=True))
 
 

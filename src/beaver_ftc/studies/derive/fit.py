@@ -99,7 +99,7 @@ class Products:
         self.gram, self.onto = (A / self.scale).T @ (A / self.scale), (A / self.scale).T @ b
         self.total, self.square = float(np.sum((b - b.mean()) ** 2)) or 1.0, float(b @ b)
 
-    def left(self, taken: list[int]) -> float:
+    def unexplained(self, taken: list[int]) -> float:
         """Sum of squares that these columns leave."""
         return max(self.square - float(self.solved(taken) @ self.onto[taken]), 0.0)
 
@@ -117,7 +117,7 @@ class Products:
         while len(taken) < most and left > EXACT * self.total:
             open_ = free[~np.isin(free, taken)]
             wider = [*taken, int(open_[np.argmax(np.abs(residual[open_]))])]
-            then = self.left(wider)
+            then = self.unexplained(wider)
             if left - then < LEAST_GAIN * left:
                 break
             taken, left = wider, then
@@ -126,10 +126,10 @@ class Products:
 
     def exchanged(self, taken: list[int], within: Sequence[int]) -> list[int]:
         """Columns in place of these with which less is left: a pursuit may take neighbours."""
-        best, left = list(taken), self.left(taken)
+        best, left = list(taken), self.unexplained(taken)
         for place in range(len(taken)):
             others = [[*best[:place], k, *best[place + 1 :]] for k in within if k not in best]
-            tried = [self.left(columns) for columns in others]
+            tried = [self.unexplained(columns) for columns in others]
             if tried and min(tried) < (1.0 - LEAST_GAIN) * left:
                 best, left = others[int(np.argmin(tried))], min(tried)
         return best
@@ -139,7 +139,7 @@ class Products:
         kept = list(taken)
         for column in taken:
             fewer = [k for k in kept if k != column]
-            if fewer and self.left(fewer) < (1.0 + NO_USE) * left:
+            if fewer and self.unexplained(fewer) < (1.0 + NO_USE) * left:
                 kept = fewer
         return kept
 
@@ -149,7 +149,7 @@ def pursue(A: np.ndarray, b: np.ndarray, most: int = MOST_TERMS) -> tuple[list[i
     products, every = Products(A, b), [k for k in range(A.shape[1]) if A[:, k].any()]
     taken = products.pursued(every, most)
     taken = products.exchanged(taken, every)
-    taken = products.of_use(taken, products.left(taken) + EXACT * products.total)
+    taken = products.of_use(taken, products.unexplained(taken) + EXACT * products.total)
     scale = np.linalg.norm(A[:, taken], axis=0)
     return taken, lstsq(A[:, taken] / scale, b)[0] / scale if taken else np.empty(0)
 
@@ -192,7 +192,7 @@ def signals_of_use(samples: Samples, aircraft: Aircraft, most: int, wanted: Sequ
 
     def misses(signals: set[str]) -> float:
         within = [k for k, (of, _) in enumerate(known) if not (set(of) & set(samples.signals)) - signals]
-        left = [(of.left(of.pursued(within)) / len(A)) ** 0.5 for of in products]
+        left = [(of.unexplained(of.pursued(within)) / len(A)) ** 0.5 for of in products]
         return float(np.sum(np.log(np.array(left) + LEAST_RAD_S2)))
 
     kept = {name for name, values in samples.signals.items() if np.ptp(values) > LEAST_SPAN} | set(wanted)

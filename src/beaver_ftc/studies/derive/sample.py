@@ -79,7 +79,7 @@ class Draw:
             return low if at < 0.5 * AT_AN_END else high
         return float(low + (high - low) * self.rng.random())
 
-    def about(self, middle: float, half: float) -> float:
+    def around(self, middle: float, half: float) -> float:
         """One number about a middle."""
         return self.between(middle - half, middle + half)
 
@@ -156,7 +156,7 @@ def _started(draw: Draw, plant: Plant, trim: FlightState, envelope: Envelope, re
     return replace(
         trim,
         airspeed_mps=draw.share(trim.airspeed_mps, envelope.airspeed_mps, reach),
-        altitude_m=max(draw.about(trim.altitude_m, reach * _ALTITUDE_M), 0.0),
+        altitude_m=max(draw.around(trim.altitude_m, reach * _ALTITUDE_M), 0.0),
         settings=settings,
     )
 
@@ -172,7 +172,7 @@ def _state(
 ) -> FlightState:
     alpha = draw.share(trim.alpha_rad, envelope.alpha_rad, reach)
     rates: dict[str, Any] = {
-        f"{axis}_rad_s": draw.about(0.0, reach * half)
+        f"{axis}_rad_s": draw.around(0.0, reach * half)
         for axis, half in zip(AXES, envelope.rates_rad_s, strict=True)
     }
     surfaces = {
@@ -180,9 +180,9 @@ def _state(
     }
     return FlightState(
         draw.share(trim.airspeed_mps, envelope.airspeed_mps, reach), started.altitude_m,
-        alpha_rad=alpha, beta_rad=draw.about(trim.beta_rad, reach * envelope.beta_rad),
-        phi_rad=draw.about(trim.phi_rad, _BANK_RAD),
-        theta_rad=trim.theta_rad - trim.alpha_rad + alpha + draw.about(0.0, _CLIMB_RAD),
+        alpha_rad=alpha, beta_rad=draw.around(trim.beta_rad, reach * envelope.beta_rad),
+        phi_rad=draw.around(trim.phi_rad, _BANK_RAD),
+        theta_rad=trim.theta_rad - trim.alpha_rad + alpha + draw.around(0.0, _CLIMB_RAD),
         surfaces_rad=surfaces, settings=started.settings, **rates,
     )  # fmt: skip
 

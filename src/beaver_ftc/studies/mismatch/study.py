@@ -79,7 +79,7 @@ def run_mismatch(
             "linear": linear_document(analysis),
         }
         of_the_run = {"scenario.yaml": to_yaml(scenario), "metrics.json": as_json(flown)}
-        write_files(folder, {**of_the_run, **_as_files(found, rows(found))})
+        write_files(folder, {**of_the_run, **_as_files(found, csv_rows(found))})
         if report:
             show_in_reports()
             write_files(folder / "figures", charts.figures(folder, found, flown, analysis))
@@ -155,7 +155,7 @@ def _bound(bound: AxisBound, tally: Tally, i: int) -> Document:
     }
 
 
-def rows(found: Document) -> Iterator[Document]:
+def csv_rows(found: Document) -> Iterator[Document]:
     """One row per axis, source and part of a document."""
     columns = {"rms_rad_s2": "rms", "max_rad_s2": "max", "share": "share", "bound_share": "bound_share"}
     for axis, sources in found["axes"].items():

@@ -5,7 +5,7 @@ Beside them the sensitivity study in one: how far each number stays from its lim
 
 from collections.abc import Mapping
 from math import inf
-from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -22,9 +22,12 @@ from beaver_ftc.results.views import (
     detection_panel,
     isolation_panel,
 )
-from beaver_ftc.studies.present.files import save
+from beaver_ftc.studies.present.files import Files
 from beaver_ftc.studies.reproduce.cases import Flown
 from beaver_ftc.studies.reproduce.choices import FAULT_AT_S
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 SENSITIVITY = "sensitivity"
 _LEAST, _MOST = 1e-3, 10.0  # of its axis: what is smaller is nothing, what is larger never happens
@@ -77,16 +80,15 @@ FIGURES: tuple[tuple[View, str, tuple[float, float]], ...] = tuple(  # view, cas
 )
 
 
-def write_figures(flights: Mapping[str, Flown], folder: Path) -> list[Path]:
-    """Draw every figure as `<name>.png` into `folder`; return the files."""
-    folder.mkdir(exist_ok=True)
-    return [_write(view, flights[case], span, folder) for view, case, span in FIGURES]
+def figures_of(document: Document, flights: Mapping[str, Flown]) -> Files:
+    """Every figure by the name of its file: a figure for each published one, and the sensitivity study's."""
+    drawn = {f"{view.name}.png": _drawn(view, flights[case], span) for view, case, span in FIGURES}
+    return {**drawn, f"{SENSITIVITY}.png": margins_figure(document)}
 
 
-def _write(view: View, flown: Flown, span: tuple[float, float], folder: Path) -> Path:
+def _drawn(view: View, flown: Flown, span: tuple[float, float]) -> "Figure":
     said = f"case {flown.metrics['scenario']}"
-    figure = draw(view, _series(flown, span), marks(flown.metrics), said)
-    return save(figure, folder / f"{view.name}.png")
+    return draw(view, _series(flown, span), marks(flown.metrics), said)
 
 
 def _series(flown: Flown, span: tuple[float, float]) -> Series:
@@ -112,8 +114,8 @@ def _share(number: float | None, limit: float, at_least: bool) -> float:
     return limit / number if number else inf
 
 
-def write_margins(document: Document, folder: Path) -> Path:
-    """Draw a row a statement into `folder/sensitivity.png`: its range over the changes, and ours."""
+def margins_figure(document: Document) -> "Figure":
+    """A row a statement: its number's range over the changes, and ours."""
     from matplotlib.figure import Figure
 
     claims = document["claims"]
@@ -132,4 +134,4 @@ def write_margins(document: Document, folder: Path) -> Path:
     axes.grid(visible=True, axis="x", color="#dddddd", linewidth=0.6)
     axes.set_xlabel("share of what is allowed: dot as flown, bar over all changes", fontsize=9)
     axes.set_title("Left of 1 the statement holds", fontsize=9)
-    return save(figure, folder / f"{SENSITIVITY}.png")
+    return figure

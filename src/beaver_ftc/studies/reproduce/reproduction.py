@@ -1,20 +1,20 @@
 """Fly the published study and say what became of its statements: a document, a text, a page."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from beaver_ftc.results.metrics import Document, as_json, versions
-from beaver_ftc.results.writer import result_folder
-from beaver_ftc.studies.engine.study import Progress, flown
+from beaver_ftc.studies.engine.study import Progress, Study, run_study
 from beaver_ftc.studies.present import page, tables
-from beaver_ftc.studies.present.files import write_files
+from beaver_ftc.studies.present.files import Files
 from beaver_ftc.studies.present.tables import finite, printed
 from beaver_ftc.studies.reproduce.cases import BESIDE, PUBLISHED, VARIANTS, Changed, Flown, fly_case
 from beaver_ftc.studies.reproduce.choices import CHOICES
 from beaver_ftc.studies.reproduce.claims import CLAIMS, Claim
-from beaver_ftc.studies.reproduce.published_figures import FIGURES, SENSITIVITY, write_figures, write_margins
+from beaver_ftc.studies.reproduce.published_figures import FIGURES, SENSITIVITY, figures_of
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -196,10 +196,10 @@ def as_markdown(document: Document, figures: str) -> str:
     return page.as_markdown([f"# {_TITLE}", *_page(document)], figures)
 
 
-def as_html(document: Document, figures: Mapping[str, Path]) -> str:
-    """The HTML page; `figures` are the pictures by name, which go into it."""
+def as_html(document: Document, folder: Path) -> str:
+    """The HTML page, with the pictures that are in the folder's `figures`."""
     whole = [*_page(document), page.versions_line(document["versions"])]
-    return page.as_html(_TITLE, whole, figures)
+    return page.as_html(_TITLE, whole, {path.stem: path for path in (folder / "figures").iterdir()})
 
 
 def _page(document: Document) -> list[page.Part]:
@@ -220,14 +220,24 @@ def _page(document: Document) -> list[page.Part]:
     ]  # fmt: skip
 
 
+def files_of(found: tuple[Document, dict[str, Flown]]) -> Files:
+    """The figures, the document, and its page as Markdown and as HTML."""
+    document, flights = found
+    return {
+        "figures": figures_of(document, flights),
+        f"{NAME}.json": as_json(document),
+        f"{NAME}.md": as_markdown(document, "figures"),
+        f"{NAME}.html": partial(as_html, document),
+    }
+
+
 def reproduce(out: Path, workers: int = 2, progress: Progress | None = None) -> Document:
     """Write `out/reproduction/` (table as JSON, Markdown and HTML, and the figures); return the document."""
-    study = flown(out / NAME, VARIANTS, numbers_of, list[float], workers=workers, progress=progress)
-    with study as numbers, result_folder(out, NAME) as folder:
+
+    def judged(numbers: Sequence[list[float]]) -> tuple[Document, dict[str, Flown]]:
         flights = fly_published()
-        document = document_of(flights, numbers)
-        drawn = [*write_figures(flights, folder / "figures"), write_margins(document, folder / "figures")]
-        figures = {path.stem: path for path in drawn}
-        markdown, html = as_markdown(document, "figures"), as_html(document, figures)
-        write_files(folder, {f"{NAME}.json": as_json(document), f"{NAME}.md": markdown, f"{NAME}.html": html})
+        return document_of(flights, numbers), flights
+
+    study = Study(NAME, VARIANTS, numbers_of, judged, files_of, row=list[float])
+    document: Document = run_study(study, out, workers, progress)[0]
     return document

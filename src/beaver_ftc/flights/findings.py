@@ -95,9 +95,7 @@ def _event(rows: Rows, begin: int, end: int, surfaces: list[str]) -> Document:
         "probability": float(rows.probability[begin:end].max()),
         "effectiveness": {
             name: {
-                "estimate": float(np.median(rows.estimate[begin:end, i])),
-                "low": float(np.median(rows.low[begin:end, i])),
-                "high": float(np.median(rows.high[begin:end, i])),
+                key: float(np.median(getattr(rows, key)[begin:end, i])) for key in ("estimate", "low", "high")
             }
             for i, name in enumerate(surfaces)
             if name in mentioned

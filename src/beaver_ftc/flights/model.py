@@ -69,12 +69,7 @@ class Model(Section):
 
     def arrays(self) -> tuple[Floats, Floats, Floats, Floats]:
         """intercept (3,), past (m, 3), response (G, L, 3) and noise (3, 3) as arrays."""
-        return (
-            np.array(self.intercept),
-            np.array(self.past),
-            np.array(self.response),
-            np.array(self.noise),
-        )
+        return np.array(self.intercept), np.array(self.past), np.array(self.response), np.array(self.noise)
 
 
 def load_model(path: Path) -> Model:

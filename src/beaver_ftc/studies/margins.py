@@ -12,7 +12,7 @@ scales the surface and what the law takes it for alike; of a surface that is giv
 
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
-from math import exp, inf
+from math import exp
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -29,7 +29,7 @@ from beaver_ftc.loop.loop import Loop
 from beaver_ftc.plant.conditions import trimmed
 from beaver_ftc.plant.linear import differences
 from beaver_ftc.studies.linear_systems import held_over_frame
-from beaver_ftc.studies.present.tables import aligned
+from beaver_ftc.studies.present.tables import aligned, finite
 
 if TYPE_CHECKING:
     from beaver_ftc.plant.linear import LinearModel
@@ -275,12 +275,11 @@ def sensors(scenario: "Scenario", m: int, dt: float) -> tuple[np.ndarray, np.nda
 
 def as_document(found: list[Margin], required: tuple[float, float]) -> dict[str, Any]:
     """For `--format json`; a margin without end is null."""
-    rows = [{**_finite(asdict(margin)), "keeps": margin.keeps(*required)} for margin in found]
+    rows = [
+        {key: finite(value) for key, value in asdict(margin).items()} | {"keeps": margin.keeps(*required)}
+        for margin in found
+    ]
     return {"gain_margin_db": required[0], "phase_margin_deg": required[1], "margins": rows}
-
-
-def _finite(row: dict[str, Any]) -> dict[str, Any]:
-    return {key: None if value == inf else value for key, value in row.items()}
 
 
 def as_text(found: list[Margin], required: tuple[float, float]) -> str:

@@ -62,6 +62,11 @@ class Samples:
         """y with the signals an aircraft declares, (n, 4 + declared)."""
         return np.column_stack([self.y, *(self.signals[name] for name in aircraft.signals)])
 
+    def at(self, places: np.ndarray) -> "Samples":
+        """Those in these places."""
+        arrays = {name: values[places] for name, values in vars(self).items() if name != "signals"}
+        return Samples(signals={name: values[places] for name, values in self.signals.items()}, **arrays)
+
     def __len__(self) -> int:
         return len(self.x)
 
@@ -120,9 +125,9 @@ def sample(
 def as_arrays(rows: list[tuple], names: tuple[str, ...]) -> Samples:
     """Rows of x, y, signals, u, rate, box, level, age as samples; without those that are not finite."""
     x, y, signals, u, rate, *indices = (np.array(column) for column in zip(*rows, strict=True))
-    kept = np.isfinite(rate).all(axis=1)
-    named = dict(zip(names, signals[kept].T, strict=True))
-    return Samples(x[kept], y[kept], named, u[kept], rate[kept], *(index[kept] for index in indices))
+    named = dict(zip(names, signals.T, strict=True))
+    finite = np.flatnonzero(np.isfinite(rate).all(axis=1))
+    return Samples(x, y, named, u, rate, *indices).at(finite)
 
 
 class Tanks:
@@ -251,12 +256,8 @@ def sorted_in(
     travel = np.array([(t.min_rad, t.max_rad) for t in aircraft.travel.values()])
     used = np.maximum(samples.u / travel[:, 1], samples.u / travel[:, 0]).max(axis=1)
     level = np.searchsorted(np.array(shares[:-1]), used)
-    kept = inside.any(axis=0)
-    named = {name: values[kept] for name, values in samples.signals.items()}
-    return Samples(
-        samples.x[kept], samples.y[kept], named, samples.u[kept], samples.rate[kept],
-        inside.argmax(axis=0)[kept], level[kept], samples.age[kept],
-    )  # fmt: skip
+    sorted_ = replace(samples, box=inside.argmax(axis=0), level=level)
+    return sorted_.at(np.flatnonzero(inside.any(axis=0)))
 
 
 def places(samples: Samples, aircraft: Aircraft) -> np.ndarray:

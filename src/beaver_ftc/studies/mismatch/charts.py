@@ -85,12 +85,10 @@ def _draw_sources(axes: "Axes", series: dict, axis: str, chosen: list[str], inst
     axes.plot(t, uncertainty, color=BLACK, linewidth=2.4, alpha=0.35, label="all together")
     for name in chosen:
         colour, dashes = SOURCE_LOOKS[name]
-        look: dict[str, Any] = {
-            "color": colour,
-            "linestyle": (0, dashes) if dashes else "-",
-            "linewidth": 1.3,
-        }
-        axes.plot(t, series[column(axis, name)], label=label(name), **look)
+        style: Any = (0, dashes) if dashes else "-"
+        axes.plot(
+            t, series[column(axis, name)], label=label(name), color=colour, linestyle=style, linewidth=1.3
+        )
     for i, mark in enumerate(instants):
         axes.axvline(mark.time_s, color=mark.colour, linewidth=0.9, linestyle=(0, mark.dash or (1, 0)))
         axes.annotate(
@@ -198,13 +196,8 @@ def _name_models(figure: "Figure", axes: "Axes") -> None:
 def _draw_poles(axes: "Axes", analysis: LinearAnalysis) -> None:
     for model, look in MODEL_LOOKS.items():
         poles = np.linalg.eigvals(analysis.models[model].A)
-        drawn: dict[str, Any] = {
-            "color": look["color"],
-            "s": 70,
-            "label": look["label"],
-            "alpha": look.get("alpha", 1.0),
-        }
-        axes.scatter(poles.real, poles.imag, marker=look["marker"], **drawn)
+        seen = {key: look[key] for key in ("color", "marker", "label")}
+        axes.scatter(poles.real, poles.imag, s=70, alpha=look.get("alpha", 1.0), **seen)
     axes.axvline(0.0, color=GREY, linewidth=0.8)
     _dress(axes)
 

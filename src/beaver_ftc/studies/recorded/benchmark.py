@@ -376,12 +376,9 @@ def _draw_labels(axis: Any, part: Document) -> None:
     for i, row in enumerate(rows):
         places = [k + _offset(i, len(rows)) for k, key in enumerate(keys) if key in row]
         shares = [row[key] for key in keys if key in row]
-        look = {
-            "color": _colour(i),
-            "hatch": _HATCHES[i // len(SERIES) % len(_HATCHES)],
-            "edgecolor": "white",
-        }
-        axis.bar(places, shares, width=0.9 * _GROUP / len(rows), label=row["method"], **look)
+        hatch, width = _HATCHES[i // len(SERIES) % len(_HATCHES)], 0.9 * _GROUP / len(rows)
+        look = {"color": _colour(i), "hatch": hatch, "edgecolor": "white"}
+        axis.bar(places, shares, width=width, label=row["method"], **look)
     axis.set_xticks(range(len(keys)), list(keys.values()))
     axis.set_ylabel("share of rows right", fontsize=8)
     axis.set_ylim(0, 1)

@@ -19,8 +19,8 @@ from beaver_ftc.flights.model import Model
 from beaver_ftc.flights.recording import Floats
 from beaver_ftc.flights.regression import Fit, spectrum
 from beaver_ftc.flights.samples import Samples
-from beaver_ftc.results.style import SERIES
 from beaver_ftc.results.metrics import as_json
+from beaver_ftc.results.style import SERIES
 from beaver_ftc.results.writer import result_folder
 
 if TYPE_CHECKING:

@@ -13,8 +13,7 @@ import numpy as np
 from beaver_ftc.design import fdc
 from beaver_ftc.design.coefficients import engine_power_kw, slipstream
 from beaver_ftc.design.variants import anchor, design_of, jacobian
-from beaver_ftc.plant.adapter import Plant
-from beaver_ftc.plant.configure import configure, trim_of
+from beaver_ftc.plant.conditions import trimmed
 from beaver_ftc.plant.linear import LinearModel, differences, own
 from beaver_ftc.studies.linear_systems import CHANNELS, CLASSICAL, MODES, Mode, deviation, modes, zeros
 
@@ -50,9 +49,7 @@ class LinearAnalysis:
 
 def analyse(scenario: "Scenario") -> LinearAnalysis:
     """Linearise the scenario's truth and what the designer holds, at its trim."""
-    plant = Plant(scenario.rate_hz, scenario.substeps)
-    configure(plant, scenario)
-    point = trim_of(scenario, plant)
+    plant, point = trimmed(scenario)
     A, B = fdc_matrices(scenario, point)
     models = {
         "truth": differences(plant, point).of(CLASSICAL),

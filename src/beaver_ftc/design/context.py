@@ -80,6 +80,10 @@ class Declared:
         """Standard deviation of a gyro's sample, noise and rounding, (3,)."""
         return np.hypot(self.noise[:3], self.resolution[:3] / np.sqrt(12.0))
 
+    def rate_variance(self, least_rad_s: float) -> np.ndarray:
+        """Variance (3,) of a measured rate; least_rad_s: what a filter takes for perfect."""
+        return least_rad_s**2 + self.gyro_rad_s**2
+
     @property
     def turbulence_rad_s2(self) -> np.ndarray:
         """Standard deviation of the angular acceleration that turbulence causes, per axis, (3,)."""

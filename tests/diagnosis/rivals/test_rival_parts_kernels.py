@@ -8,7 +8,6 @@ import pytest
 
 from beaver_ftc.design.context import Context, Declared
 from beaver_ftc.diagnosis.base import Measured
-from beaver_ftc.diagnosis.bounds.variances import rate_variance
 from beaver_ftc.diagnosis.rivals.effectiveness import AugmentedEkf, AugmentedUkf, EffectivenessFilter, N
 from beaver_ftc.diagnosis.rivals.kalman import Air, unexplained, update
 from beaver_ftc.diagnosis.rivals.rls import Pair, RecursiveLeastSquares, RlsMonitor
@@ -63,14 +62,14 @@ def test_the_air_is_a_first_order_process_of_each_axis():
 
 def test_what_is_declared_adds_by_squares():
     gyro = np.hypot(GUSTY.noise[:3], 0.01 / sqrt(12.0))
-    assert np.sqrt(rate_variance(GUSTY, 0.004)) == pytest.approx(np.hypot(0.004, gyro))
+    assert np.sqrt(GUSTY.rate_variance(0.004)) == pytest.approx(np.hypot(0.004, gyro))
     assert unexplained(context(GUSTY), 9.0 * BOUND) == pytest.approx(np.hypot(BOUND, [0.04, 0.0, 0.1]))
     assert unexplained(context(), 9.0 * BOUND).tolist() == (9.0 * BOUND).tolist()
 
 
 def test_a_filter_starts_healthy_with_theta_known_to_a_tenth():
     detector = started(GUSTY, misfit_s=0.25, measurement_rad_s=0.004, drift_per_s=0.3)
-    rates = rate_variance(GUSTY, 0.004)
+    rates = GUSTY.rate_variance(0.004)
     assert (detector.n, detector.z.tolist()) == (N + 3, [0.0] * 9)
     assert np.diag(detector.P) == pytest.approx([*rates, 0.01, 0.01, 0.01, *GUSTY.gust_rad_s**2])
     assert np.count_nonzero(detector.P) == 9

@@ -33,7 +33,6 @@ from beaver_ftc.aircraft import Aircraft, Term
 from beaver_ftc.design.context import Context
 from beaver_ftc.design.inertia import inertia_coefficients
 from beaver_ftc.diagnosis.air import UNSEEN
-from beaver_ftc.diagnosis.bounds.variances import rate_variance
 
 UNEXPLAINED_S = 0.1
 LEAST_RATE_RAD_S = 1e-5  # what perfect instruments are taken for
@@ -55,7 +54,7 @@ class Whitening:
         self.F[:3, 3:6], self.F[:3, 6:] = dt * declared.gust_effect, dt * np.eye(3)
         self.F[range(3, 9), range(3, 9)] = keep
         self.dt = dt
-        self.R = np.diag(rate_variance(declared, LEAST_RATE_RAD_S))
+        self.R = np.diag(declared.rate_variance(LEAST_RATE_RAD_S))
         steady = (dt * declared.model_rad_s2) ** 2
         Q = np.diag(np.concatenate((steady, (1.0 - keep**2) * size**2)))
         P = np.diag(np.concatenate((np.diagonal(self.R), size**2)))

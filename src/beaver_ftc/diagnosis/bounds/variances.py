@@ -127,11 +127,6 @@ def flow_noise(errors: Errors, airspeed_mps: float) -> np.ndarray:
     return np.array(vanes) + through * (errors["V"].random / airspeed_mps + errors["phi"].random)
 
 
-def rate_variance(declared: Declared, least_rad_s: float) -> np.ndarray:
-    """Variance (3,) of a measured rate; least_rad_s: what a filter takes for perfect."""
-    return least_rad_s**2 + declared.gyro_rad_s**2
-
-
 def jitter(flow: np.ndarray, design: np.void, y: np.ndarray, u: np.ndarray, span_m: float) -> np.ndarray:
     """Standard deviation, rad/s2 on each axis, of what noise of the flow's angles (2,) rad adds to a gust."""
     V, b = y[AIRSPEED], span_m

@@ -16,7 +16,6 @@ import numpy as np
 
 from beaver_ftc.design.context import Context
 from beaver_ftc.diagnosis.base import Measured, Verdict
-from beaver_ftc.diagnosis.bounds.variances import rate_variance
 from beaver_ftc.diagnosis.rivals import options_of
 from beaver_ftc.diagnosis.rivals.kalman import Air, sigma_points, unexplained, update
 
@@ -43,7 +42,7 @@ class EffectivenessFilter:
         self.leading = list(context.leading)
         self.air = Air(context)
         self.n = N + self.air.n
-        rates = rate_variance(context.declared, self.option["measurement_rad_s"])
+        rates = context.declared.rate_variance(self.option["measurement_rad_s"])
         self.z = np.zeros(self.n)
         self.P = np.diag(np.concatenate((rates, [0.01] * 3, self.air.variance)))
         self.R = np.diag(rates)

@@ -12,7 +12,6 @@ import numpy as np
 
 from beaver_ftc.design.context import Context
 from beaver_ftc.diagnosis.base import Measured, Verdict
-from beaver_ftc.diagnosis.bounds.variances import rate_variance
 from beaver_ftc.diagnosis.rivals import options_of
 from beaver_ftc.diagnosis.rivals.kalman import Air, log_likelihood, unexplained, update
 
@@ -74,7 +73,7 @@ class InteractingMultipleModels:
         self.probability = np.full(N_MODES, _LEAST)
         self.probability[0] = 1.0 - (N_MODES - 1) * _LEAST
         self.air = Air(context)
-        rates = rate_variance(context.declared, self.option["measurement_rad_s"])
+        rates = context.declared.rate_variance(self.option["measurement_rad_s"])
         self.R = np.diag(rates)
         self.x = np.zeros((N_MODES, 3 + self.air.n))
         self.P = np.tile(np.diag(np.concatenate((rates, self.air.variance))), (N_MODES, 1, 1))

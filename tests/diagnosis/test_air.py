@@ -213,12 +213,6 @@ def test_level_axes_are_turned_not_bent(phi, theta):
     assert (turn.T @ [1.0, 0.0, 0.0])[1] == 0.0  # the nose points ahead, up or down, not aside
 
 
-@given(st.floats(0.0, 6.28), st.floats(-3.0, 3.0))
-def test_a_heading_changes_by_what_it_turned_even_past_north(then, turned):
-    now = (then + turned) % (2 * np.pi)
-    assert air.heading_change(now, then) == pytest.approx(turned, abs=1e-9)
-
-
 @given(st.floats(30, 55), st.floats(0, 0.25), st.floats(-0.1, 0.1))
 def test_the_damping_is_the_slope_of_the_aerodynamic_moments(V, alpha, beta):
     """f without its inertia coupling, which is of second order in the rates: at none, its slope vanishes."""

@@ -148,13 +148,6 @@ def test_a_yawing_gust_that_turning_hides_fades_and_its_loss_fades_with_it():
     assert record["gust"][2] == pytest.approx(0.05 * lag**5 - aside / (45.0 * tau_r))
 
 
-@pytest.mark.parametrize(
-    ("now", "then"), [(0.1, -0.2), (3.1, -3.1), (-3.1, 3.1), (6.0, 0.1), (-6.2, 6.2), (1.0, -2.2)]
-)
-def test_a_heading_turns_the_short_way(now, then):
-    assert air.heading_change(now, then) == pytest.approx(np.angle(np.exp(1j * (now - then))))
-
-
 @pytest.mark.parametrize("seed", range(3))
 def test_level_axes_are_a_rotation(seed):
     phi, theta = np.random.default_rng(seed).uniform(-1.4, 1.4, 2)

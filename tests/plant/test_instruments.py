@@ -5,7 +5,16 @@ import pytest
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.assembly import assemble
-from beaver_ftc.plant.instruments import AX, NOISE_LIMIT_SIGMA, SIGNALS, read_all, read_forces
+from beaver_ftc.plant.instruments import (
+    AX,
+    N_SENSORS,
+    NOISE_LIMIT_SIGMA,
+    PSI,
+    SIGNALS,
+    read_all,
+    read_forces,
+    wrapped,
+)
 from beaver_ftc.scenario.schema import Scenario
 
 TRAVEL_RAD = np.array([[-0.52, -0.49, -0.44, -0.1], [0.52, 0.49, 0.44, 1.03]])
@@ -149,3 +158,37 @@ def test_a_first_sample_is_the_first_whenever_it_is_taken():
     last = in_flight(1)[0]
     read_forces(instruments, last)
     assert last[AX + 2] == -9.8
+
+
+def headings(truth_deg, **psi):
+    """What a heading reads, deg, along these."""
+    row = np.concatenate([still(1)[0], np.zeros(N_SENSORS - len(SIGNALS))])
+    truth = np.tile(row, (len(truth_deg), 1))
+    truth[:, PSI] = np.radians(np.mod(truth_deg, 360.0))
+    return np.degrees(samples(truth, psi=psi)[:, PSI])
+
+
+def apart_deg(one, other):
+    """The short way round."""
+    return (np.asarray(one) - other + 180.0) % 360.0 - 180.0
+
+
+def test_the_slope_of_a_heading_does_not_leap_at_north():
+    true = np.array([-2.0, -0.1, 0.1, 2.0, 90.0, 179.0, 270.0])
+    read = headings(true, scale_error=0.01)
+    assert apart_deg(read, true) == pytest.approx([-0.02, -0.001, 0.001, 0.02, 0.9, 1.79, -0.9])
+
+
+@pytest.mark.parametrize("psi", [{"bandwidth_rad_s": 20.0}, {"delay_s": 0.037}])
+def test_a_heading_lags_the_short_way_past_north(psi):
+    """Turning on either side of north it is late by the same angle as anywhere."""
+    turn_deg = 0.3 * np.arange(400.0)
+    anywhere = turn_deg - headings(turn_deg + 30.0, **psi) + 30.0
+    past_north = -apart_deg(headings(turn_deg - 60.0, **psi), turn_deg - 60.0)
+    assert past_north == pytest.approx(anywhere, abs=1e-9)
+    assert anywhere[-1] > 1.0
+
+
+@pytest.mark.parametrize("angle", [-7.0, -3.2, -3.1, 0.0, 0.4, 3.1, 3.2, 6.5])
+def test_an_angle_is_brought_within_half_a_turn(angle):
+    assert wrapped(angle) == pytest.approx(np.arctan2(np.sin(angle), np.cos(angle)))

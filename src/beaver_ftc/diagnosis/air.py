@@ -25,6 +25,7 @@ from beaver_ftc.design.terms import AIRSPEED, ALPHA, BETA, QDYN, TABLE, evaluate
 from beaver_ftc.diagnosis.bounds.declared import SCALE_M, Errors
 from beaver_ftc.diagnosis.bounds.variances import drift as gust_drift
 from beaver_ftc.diagnosis.bounds.variances import flow_noise, jitter
+from beaver_ftc.plant.instruments import wrapped
 
 # Share of the intensity of the rolling, pitching and yawing gust that the vanes leave; on exact vanes and
 # over a filter's memory it is less (`tests/diagnosis/test_air.py`).
@@ -84,13 +85,6 @@ def level_axes(phi, theta, turn):
 def to_level(turn, body, i):
     """Component i of a body vector (3,) in level axes."""
     return turn[0, i] * body[0] + turn[1, i] * body[1] + turn[2, i] * body[2]
-
-
-@kernel
-def heading_change(now, then):
-    """By how much the heading turned, rad, wherever north lies."""
-    change = now - then
-    return change - 2.0 * pi * np.floor(change / (2.0 * pi) + 0.5)
 
 
 @kernel
@@ -173,7 +167,7 @@ def observe(air, y, attitude, dt):
         air.started = 1
     for i in range(3):
         air.velocity[i] += dt * (1.5 * pulled[i] - 0.5 * air.pull[i])
-    turned = heading_change(attitude[2], air.heading)
+    turned = wrapped(attitude[2] - air.heading)
     sin, cos = np.sin(turned), np.cos(turned)
     right, down = air.velocity[1] * cos - air.velocity[0] * sin, air.velocity[2]
     air.pull[0], air.pull[1] = pulled[0] * cos + pulled[1] * sin, pulled[1] * cos - pulled[0] * sin

@@ -13,8 +13,6 @@ bound on what the declared errors of all instruments together can make of it, as
 turbulence widens the bounds of flow and climb by what its gusts do within a filter's memory.
 """
 
-from math import pi
-
 import numpy as np
 
 from beaver_ftc.compiled import kernel
@@ -39,7 +37,7 @@ from beaver_ftc.diagnosis.watch import (
     Q,
     R,
 )
-from beaver_ftc.plant.instruments import ALTITUDE, AX, ENGINE_SPEED, MANIFOLD, N_SENSORS, PHI
+from beaver_ftc.plant.instruments import ALTITUDE, AX, ENGINE_SPEED, MANIFOLD, N_SENSORS, PHI, wrapped
 
 TURNING_RAD_S = 4e-5  # Earth rate is in the rates; the level turns with the flight over the round Earth
 FALLING_M_S2 = 0.03  # Coriolis, centrifugal, and gravity's change with place
@@ -91,12 +89,6 @@ def turned_by(step, axis, i):
 
 
 @kernel
-def wrapped(angle):
-    """The angle within -pi and pi."""
-    return angle - 2.0 * pi * np.floor(angle / (2.0 * pi) + 0.5)
-
-
-@kernel
 def turn_back(x, h, vector, out):
     """Fill out (3,): a vector (3,) that stays put, in body axes that turned at x (3,) rad/s for h s."""
     size = np.sqrt(x[0] ** 2 + x[1] ** 2 + x[2] ** 2)
@@ -114,7 +106,8 @@ def turn_back(x, h, vector, out):
 def note_declared(step, signal):
     """Fill error and changing (N_SENSORS,): how far each reading can be off, and by how much that changes."""
     for i in range(N_SENSORS):
-        whole = (step.offset[i] + step.slope[i] * abs(signal[i])) / (1.0 - step.slope[i])
+        size = abs(wrapped(signal[i])) if i == PSI else abs(signal[i])
+        whole = (step.offset[i] + step.slope[i] * size) / (1.0 - step.slope[i])
         step.error[i] = whole
         step.changing[i] = whole - step.steady[i] + 1e-10 * abs(signal[i])
     for i in range(PHI, PHI + 3):

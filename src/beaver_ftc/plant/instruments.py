@@ -7,6 +7,8 @@ declared and holds. A flight draws its random numbers from a counter of its own 
 to the bit whatever else is flown beside it.
 """
 
+from math import pi
+
 import numpy as np
 
 from beaver_ftc.compiled import kernel
@@ -17,8 +19,8 @@ SENSORS = (
     *SIGNALS, "phi", "theta", "psi", "altitude", "engine_rpm", "manifold_pressure", "ax", "ay", "az"
 )  # fmt: skip
 N_SENSORS = len(SENSORS)
-PHI, ALTITUDE, ENGINE_SPEED, MANIFOLD, AX = (
-    SENSORS.index(name) for name in ("phi", "altitude", "engine_rpm", "manifold_pressure", "ax")
+PHI, PSI, ALTITUDE, ENGINE_SPEED, MANIFOLD, AX = (
+    SENSORS.index(name) for name in ("phi", "psi", "altitude", "engine_rpm", "manifold_pressure", "ax")
 )
 NOISE_LIMIT_SIGMA = 4.0
 LONGEST_DELAY = 1000  # JSBSim frames
@@ -92,14 +94,26 @@ def delayed(instruments, i, value):
 
 
 @kernel
+def wrapped(angle):
+    """The angle within -pi and pi."""
+    return angle - 2.0 * pi * np.floor(angle / (2.0 * pi) + 0.5)
+
+
+@kernel
 def read_one(instruments, i, true):
-    """The reading of signal i, SI."""
+    """The reading of signal i, SI. A heading lags the short way round, and its slope is that of the angle
+    from north, the short way too: it does not leap where the circle is full."""
     keep = instruments.keep[i] if instruments.taken[i] > 0 else 0.0
+    if i == PSI and instruments.taken[i] > 0 and (keep > 0.0 or instruments.delay[i] > 0.0):
+        true = instruments.lagged[i] + wrapped(true - instruments.lagged[i])
     instruments.lagged[i] = true + keep * (instruments.lagged[i] - true)
     value = instruments.lagged[i]
     if instruments.delay[i] > 0.0:
         value = delayed(instruments, i, value)
-    value = instruments.gain[i] * value + instruments.bias[i]
+    if i == PSI:
+        value += (instruments.gain[i] - 1.0) * wrapped(value) + instruments.bias[i]
+    else:
+        value = instruments.gain[i] * value + instruments.bias[i]
     if instruments.drift[i] != 0.0:
         value += instruments.drift[i] * instruments.taken[i]
     if instruments.noise[i] > 0.0:

@@ -128,44 +128,38 @@ def set_up(
     statistical["alarm"]["detected_at_s"] = -1.0
     if given is None or not fdi["config"]["enabled"]:  # a plug-in diagnoses, or nothing does
         return
-    statistical["tests"]["enabled"], statistical["tests"]["share"] = (
-        1,
-        1.0 / max(int(fdi["config"]["instants"]), 1),
-    )
-    errors = Errors(config.bounds.sensors)
-    set_up_air(statistical["air"], config.bounds.turbulence, mass, aircraft)
+    tests, air = statistical["tests"], statistical["air"]
+    errors, dt_s, instants = Errors(config.bounds.sensors), 1.0 / rate_hz, int(fdi["config"]["instants"])
+    airspeed_mps, pace = float(start[1][AIRSPEED]), pace_of(given, aircraft, dt_s)
+    tests["enabled"], tests["share"] = 1, 1.0 / max(instants, 1)
+    set_up_air(air, config.bounds.turbulence, mass, aircraft)
     forces = bool(statistical["forces"]["known"])
-    across = across_a_column(config, int(fdi["config"]["instants"]))
-    tests = tests_a_frame(aircraft, *(views_of(aircraft, forces) if across else ()))
-    statistical["tests"]["alarm_level"] = alarm_level(given.false_alarms_per_h, rate_hz, tests)
-    statistical["tests"]["naming_level"] = naming_level(given.misnaming, rate_hz, aircraft)
-    statistical["tests"]["keep"] = exp(-1.0 / (rate_hz * config.forgetting_time_s))
+    across = across_a_column(config, instants)
+    n_tests = tests_a_frame(aircraft, *(views_of(aircraft, forces) if across else ()))
+    tests["alarm_level"] = alarm_level(given.false_alarms_per_h, rate_hz, n_tests)
+    tests["naming_level"] = naming_level(given.misnaming, rate_hz, aircraft)
+    tests["keep"] = exp(-1.0 / (rate_hz * config.forgetting_time_s))
     _set_up_blocks(statistical, errors, aircraft)
-    _set_up_bounded(statistical, config, pace_of(given, aircraft, 1.0 / rate_hz), 1.0 / rate_hz)
-    _set_up_noise(statistical, given, config.bounds, design, start, 1.0 / rate_hz)
+    _set_up_bounded(statistical, config, pace, dt_s)
+    _set_up_noise(statistical, given, config.bounds, design, start, dt_s)
     _set_up_tolerances(statistical, config.bounds, design, mass, start, aircraft)
     set_up_readings(statistical, errors, fdi["bound"]["admitted"])
     if across:
-        chance = given.false_alarms_per_h / (3600.0 * rate_hz * tests)
-        airspeed_mps, pace_rad_s = (
-            float(start[1][AIRSPEED]),
-            pace_of(given, aircraft, 1.0 / rate_hz) * rate_hz,
-        )
-        set_up_listening(statistical["listening"], chance, airspeed_mps, pace_rad_s, 1.0 / rate_hz)
+        chance = given.false_alarms_per_h / (3600.0 * rate_hz * n_tests)
+        set_up_listening(statistical["listening"], chance, airspeed_mps, pace * rate_hz, dt_s)
         if forces:
             along_y = jacobian(design, *start)[3]
-            set_up_forces(statistical, config.bounds, aircraft, start, along_y, 1.0 / rate_hz)
-            statistical["air"]["read"] = not fdi["watch"]["enabled"]  # which may find them broken
-            statistical["inertial_air"] = statistical["air"]
-            statistical["inertial_air"]["moving"] *= statistical["air"]["read"]
+            set_up_forces(statistical, config.bounds, aircraft, start, along_y, dt_s)
+            air["read"] = not fdi["watch"]["enabled"]  # which may find them broken
+            statistical["inertial_air"] = air
+            statistical["inertial_air"]["moving"] *= air["read"]
             statistical["inertial_air"]["unseen"] = np.minimum(np.add(UNSEEN, BY_FORCE), 1.0)
         set_up_views(statistical, aircraft)
     block = statistical["block"][-1]
-    block["lag"] = returning_length(statistical, float(start[1][AIRSPEED]), rate_hz)
-    if statistical["air"]["moving"]:
-        block["stronger"] = (statistical["air"]["rolling"] / block["lag"]) ** 2
-        span_m = aircraft.geometry.span_m
-        set_up_jitter(statistical, errors, design, *start[1:], span_m, 1.0 / rate_hz)
+    block["lag"] = returning_length(statistical, airspeed_mps, rate_hz)
+    if air["moving"]:
+        block["stronger"] = (air["rolling"] / block["lag"]) ** 2
+        set_up_jitter(statistical, errors, design, *start[1:], aircraft.geometry.span_m, dt_s)
 
 
 def _set_up_blocks(statistical: np.void, errors: Errors, aircraft: Aircraft) -> None:

@@ -91,8 +91,8 @@ class Across:
         return across.turn(view, record["forces"], record["air"], fdi["bound"], G)
 
     @staticmethod
-    def told(record, view):
-        return across.told(view, record["air"])
+    def knows_gust(record, view):
+        return across.knows_gust(view, record["air"])
 
     @staticmethod
     def blur(view, record, V):

@@ -243,7 +243,7 @@ def test_accelerometers_that_may_break_raise_no_alarm_and_tell_no_gust(viewed):
         views["held"][UP_VIEW] = 50.0
         assert Across.alarm(statistical, views[ELEVATOR_VIEW]) == 9.0 * read
         views["held"][UP_VIEW] = 0.0
-        assert Across.told(statistical, views[0]) == bool(read)
+        assert Across.knows_gust(statistical, views[0]) == bool(read)
         assert Across.part(viewed, views[0], np.ones(3), PITCH) == pytest.approx(1.0 - 0.2 * read)
         assert Across.shown(statistical, views[0]) == (0.0 if read else 7.0), "nothing is to be cleared"
         assert Across.shown(statistical, views[ELEVATOR_VIEW]) == 0.0

@@ -38,7 +38,7 @@ from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.compiled import kernel
 from beaver_ftc.diagnosis import likelihood, tones
 from beaver_ftc.diagnosis.air import along, drift_beside, whole_drift
-from beaver_ftc.diagnosis.forces import ASIDE, SETTLED, UP, told_by_force
+from beaver_ftc.diagnosis.forces import ASIDE, SETTLED, UP, separated_by_force
 from beaver_ftc.diagnosis.likelihood import (
     BLOCK,
     LATERAL,
@@ -85,7 +85,7 @@ VIEW = np.dtype(
 def part(view, forces, air, inertial_air, innovation, i):
     """Component i of what is looked at, rad/s2: of the rates' innovation (3,), or of a force's."""
     if i < SIDE:
-        return innovation[i] - (gust_of(view, air, inertial_air).mean[i] if told(view, air) else 0.0)
+        return innovation[i] - (gust_of(view, air, inertial_air).mean[i] if knows_gust(view, air) else 0.0)
     force = forces.component[i - SIDE]
     return force.inertial if view.inertial else force.innovation
 
@@ -142,7 +142,7 @@ def turn_past_gust(view, forces, air):
 
 
 @kernel
-def told(view, air):
+def knows_gust(view, air):
     """Whether a view is told the gust: only one that the measured force clears of broken surfaces."""
     return view.cleared_by > 0 and air.read == 1
 
@@ -192,7 +192,7 @@ def blur(view, noise, blocks, forces, air, inertial_air, V):
         bound += abs(m[SIDE + f]) * (force.deflection * forces.strength + force.unsettled)
     if air.moving:
         feel_gust(view, forces, air.damping)
-        if told(view, air):
+        if knows_gust(view, air):
             drift += drift_beside(gust_of(view, air, inertial_air), V, view.by_rates, view.by_forces)
         else:
             drift += whole_drift(air, V, view.by_rates, view.by_forces)
@@ -322,7 +322,7 @@ def shown(view, views, tests, forces, air):
     shows, and what clears the vane, may come a moment apart. The latter asks for the naming level."""
     if weighs(view) and not forces.known:
         return 0.0
-    if view.clears or not (weighs(view) or told(view, air)):
+    if view.clears or not (weighs(view) or knows_gust(view, air)):
         return best(view)
     cleared = 0.0
     for a in range(views.size):
@@ -381,7 +381,7 @@ def views_of(aircraft: Aircraft, with_force: bool = False) -> Iterator[Direction
     if not with_force:
         return
     for f, plane, movers in ((UP, IN_PITCH, in_pitch), (ASIDE, IN_YAW, lateral)):
-        found = told_by_force(aircraft, f)
+        found = separated_by_force(aircraft, f)
         for s in found:
             own = aircraft.dominant_axis[s], plane[1]
             yield Direction(s, _along(own), own, [other for other in movers if other != s])
@@ -406,8 +406,8 @@ def across_a_column(config: FdiConfig, instants: int) -> bool:
 def set_up_views(statistical: np.void, aircraft: Aircraft) -> None:
     """Fill the views of a statistical record whose blocks, and normal force, are set up."""
     forces = statistical["forces"]
-    told = [told_by_force(aircraft, f) for f in (ASIDE, UP)]
-    with_air = forces["known"] and statistical["air"]["moving"] and all(told)
+    separated = [separated_by_force(aircraft, f) for f in (ASIDE, UP)]
+    with_air = forces["known"] and statistical["air"]["moving"] and all(separated)
     views = list(views_of(aircraft, bool(forces["known"])))[:MAX_VIEWS]
     statistical["n_views"] = len(views)
     for view, (surface, mix, plane, movers, inertial, asks) in zip(statistical["views"], views, strict=False):

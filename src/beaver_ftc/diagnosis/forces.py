@@ -174,7 +174,7 @@ def terms_of(aircraft: Aircraft, f: int) -> list[Term]:
     return [term for term in aircraft.measurable_forces if term.coefficient == COMPONENTS[f]]
 
 
-def told_by_force(aircraft: Aircraft, f: int) -> list[int]:
+def separated_by_force(aircraft: Aircraft, f: int) -> list[int]:
     """The surfaces that a force tells apart: of those that pitch by their lift, of the others by the side."""
     with_force = {term.surface for term in terms_of(aircraft, f)}
     lead = enumerate(zip(aircraft.surfaces, aircraft.dominant_axis, strict=True))
@@ -184,7 +184,7 @@ def told_by_force(aircraft: Aircraft, f: int) -> list[int]:
 
 def tell_apart(aircraft: Aircraft) -> bool:
     """Whether accelerometers tell any surfaces of this aircraft apart."""
-    return any(told_by_force(aircraft, f) for f in (ASIDE, UP))
+    return any(separated_by_force(aircraft, f) for f in (ASIDE, UP))
 
 
 def set_up_forces(

@@ -9,7 +9,7 @@ import pytest
 
 import beaver_ftc as bf
 from beaver_ftc.aircraft import load
-from beaver_ftc.design.context import DesignModel
+from beaver_ftc.design.context import DesignFunctions
 from beaver_ftc.design.model import design_record
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.loop import fly
@@ -59,7 +59,7 @@ def test_it_has_its_own_surfaces_groups_and_leaders(trainer):
 
 def test_the_design_model_gives_what_jsbsim_does(trainer):
     """At random states: f + G u is the truth's angular acceleration but for the turning Earth."""
-    model = DesignModel(design_record(trainer))
+    model = DesignFunctions(design_record(trainer))
     plant, rng = Plant(100, aircraft=trainer), np.random.default_rng(1)
     worst = 0.0
     for _ in range(30):

@@ -9,7 +9,7 @@ import numpy as np
 from beaver_ftc.aircraft import load
 
 
-class DesignModel:
+class DesignFunctions:
     """The design model as two functions, xdot = f(x, y) + G(y) u (see design/model.py for the order of y)."""
 
     def __init__(self, record: np.ndarray) -> None:
@@ -110,7 +110,7 @@ class Context:
 
     dt_s: float
     substeps: int
-    model: DesignModel
+    model: DesignFunctions
     trim_x: np.ndarray
     trim_y: np.ndarray
     trim_rad: np.ndarray

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from beaver_ftc.design.context import DesignModel
+from beaver_ftc.design.context import DesignFunctions
 from beaver_ftc.diagnosis.accelerometers import NEVER_STILL
 from beaver_ftc.diagnosis.across import across_a_column
 from beaver_ftc.diagnosis.bounds.declared import GUST_LIMIT_SIGMA, SCALE_M, Errors, gust_mps
@@ -146,4 +146,4 @@ def gusts_seen(turbulence: str, airspeed_mps: float, h: float) -> tuple[float, n
 def anchor_watch(watch: np.void, design: np.ndarray, y: np.ndarray) -> None:
     """Show the watch the trim: y, and how the rates are damped there; design: the designer's record, (1,)."""
     watch["trim"][3:7] = y[:4]
-    watch["damping"] = gust_effect(DesignModel(design.copy()), y)
+    watch["damping"] = gust_effect(DesignFunctions(design.copy()), y)

@@ -8,7 +8,7 @@ import numpy as np
 
 from beaver_ftc.control.base import Law, Reference
 from beaver_ftc.control.laws import ADAPTIVE, NOMINAL, ORACLE
-from beaver_ftc.design.context import Context, DesignModel
+from beaver_ftc.design.context import Context, DesignFunctions
 from beaver_ftc.diagnosis.base import Detector, Measured, Verdict
 from beaver_ftc.diagnosis.bounds.variances import declared_of
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, UNANTICIPATED
@@ -161,7 +161,7 @@ def context_of(
     return Context(
         dt_s=float(frame["dt"]),
         substeps=scenario.substeps,
-        model=DesignModel(frames["belief"]["design"].copy()),
+        model=DesignFunctions(frames["belief"]["design"].copy()),
         trim_x=start[:3].copy(),
         trim_y=trim_y,
         trim_rad=layout["trim"].copy(),

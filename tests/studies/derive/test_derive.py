@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 from beaver_ftc.aircraft import load
 from beaver_ftc.aircraft.loading import first_line, read
 from beaver_ftc.cli.main import app
-from beaver_ftc.design.context import DesignModel
+from beaver_ftc.design.context import DesignFunctions
 from beaver_ftc.design.model import design_record
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.documents.paths import data_root
@@ -87,7 +87,7 @@ def test_the_declared_error_holds_on_states_neither_fit_nor_check_has_seen(unsee
 def test_the_error_is_that_of_the_evaluator_that_flies(unseen):
     """The error is measured with one evaluator and flown with another: they agree to rounding."""
     seen, aircraft = unseen
-    model, y = DesignModel(design_record(aircraft)), seen.measured(aircraft)
+    model, y = DesignFunctions(design_record(aircraft)), seen.measured(aircraft)
     for k in range(0, len(seen), 97):
         believed = model.f(seen.x[k], y[k]) + model.G(y[k]) @ seen.u[k]
         assert np.abs(believed - seen.rate[k]) == pytest.approx(errors_of(aircraft, seen)[k], abs=1e-9)

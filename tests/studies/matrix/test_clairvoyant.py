@@ -7,14 +7,14 @@ import pytest
 
 from beaver_ftc import load as load_scenario
 from beaver_ftc.aircraft import load
-from beaver_ftc.design.context import DesignModel
+from beaver_ftc.design.context import DesignFunctions
 from beaver_ftc.design.variants import design_of
 from beaver_ftc.diagnosis.bounds.clairvoyant import accelerations, healthy
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.log import Columns
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.matrix.clairvoyant import columns_of, seen_when_told
-from beaver_ftc.studies.matrix.fault_matrix import AT_S, Case, beside_told, scenario_of, trimmed_deg
+from beaver_ftc.studies.matrix.fault_matrix import AT_S, FaultCase, beside_told, scenario_of, trimmed_deg
 
 AIRCRAFT = load()
 FOLDER = Path(__file__).parents[2] / "data" / "aircraft"
@@ -22,7 +22,7 @@ FOLDER = Path(__file__).parents[2] / "data" / "aircraft"
 
 def flown(fault, surface, turbulence="none"):
     scenario = scenario_of(
-        Case(fault, surface, 45.0, True, turbulence=turbulence), "nominal", trimmed_deg(45.0, surface)
+        FaultCase(fault, surface, 45.0, True, turbulence=turbulence), "nominal", trimmed_deg(45.0, surface)
     )
     kept = columns_of(scenario.airframe)
     fly(scenario, kept)
@@ -41,7 +41,7 @@ def test_terms_add_up_to_what_the_design_model_makes_of_a_surface():
     kept |= {name: rng.uniform(-0.2, 0.2, n) for name in ("p_rad_s", "q_rad_s", "r_rad_s", "dpt")}
     kept |= {"alpha_rad": rng.uniform(0, 0.2, n), "beta_rad": rng.uniform(-0.2, 0.2, n)}
     kept |= {"airspeed_mps": rng.uniform(35, 55, n), "qdyn_pa": rng.uniform(700, 1500, n)}
-    model = DesignModel(design_of(Scenario(name="any").design_model, AIRCRAFT))
+    model = DesignFunctions(design_of(Scenario(name="any").design_model, AIRCRAFT))
     deflection = rng.uniform(-0.2, 0.2, n)
     for s, surface in enumerate(AIRCRAFT.surfaces):
         of_it = [term for term in AIRCRAFT.moments if term.surface == surface]

@@ -8,7 +8,7 @@ import numpy as np
 from beaver_ftc.aircraft import AXES, Aircraft, MassProperties, Term, load
 from beaver_ftc.aircraft.aircraft import MOMENTS
 from beaver_ftc.aircraft.schema import RATE_SIGNALS
-from beaver_ftc.design.context import Declared, DesignModel
+from beaver_ftc.design.context import Declared, DesignFunctions
 from beaver_ftc.design.inertia import inertia_coefficients
 from beaver_ftc.design.terms import AIRSPEED, PH, QH, RH
 from beaver_ftc.design.variants import coefficient_slopes, jacobian
@@ -58,7 +58,7 @@ def declared_of(
         slope=errors.each("slope"),
         gust_rad_s=rotation,
         gust_time_s=time_s,
-        gust_effect=gust_effect(DesignModel(design.copy()), y),
+        gust_effect=gust_effect(DesignFunctions(design.copy()), y),
         coefficients=coefficients,
         inertia=bounds.inertia,
         deflection_rad=deflection_rad,
@@ -68,7 +68,7 @@ def declared_of(
     )
 
 
-def gust_effect(model: DesignModel, y: np.ndarray) -> np.ndarray:
+def gust_effect(model: DesignFunctions, y: np.ndarray) -> np.ndarray:
     """Angular acceleration of an aircraft at rest in air that rotates, (3, 3) 1/s: -df/dx without rates."""
     step = 1e-4
     columns = [(model.f(step * e, y) - model.f(-step * e, y)) / (2.0 * step) for e in np.eye(3)]
@@ -99,7 +99,7 @@ def model_error(
 
 
 def _acceleration(design: np.ndarray, y: np.ndarray, u: np.ndarray) -> np.ndarray:
-    model = DesignModel(design)
+    model = DesignFunctions(design)
     return model.f(np.zeros(3), y) + model.G(y) @ u
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from beaver_ftc.aircraft import AXES, Aircraft
 from beaver_ftc.aircraft.aircraft import MOMENTS
-from beaver_ftc.design.context import DesignModel
+from beaver_ftc.design.context import DesignFunctions
 from beaver_ftc.design.model import design_record
 from beaver_ftc.design.terms import N_Y
 from beaver_ftc.plant.trim import TrimPoint
@@ -48,7 +48,7 @@ def smallest_losses(aircraft: Aircraft) -> dict[str, dict[str, Any]]:
     if aircraft.file.model_error_map is None:
         return {}
     error = near_trim(aircraft)
-    G = DesignModel(design_record(aircraft)).G(_usual_y(aircraft))
+    G = DesignFunctions(design_record(aircraft)).G(_usual_y(aircraft))
     found = {}
     for s, (surface, axis) in enumerate(zip(aircraft.surfaces, aircraft.dominant_axis, strict=True)):
         eta = error[AXES[axis]] + getattr(Bounds().constant_rad_s2, AXES[axis])

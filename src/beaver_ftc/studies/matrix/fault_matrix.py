@@ -73,7 +73,7 @@ FAULTS: tuple[tuple[str, dict[str, Any]], ...] = (
 )
 
 
-class Case(NamedTuple):
+class FaultCase(NamedTuple):
     """One cell of the matrix at one airspeed."""
 
     fault: str
@@ -97,7 +97,7 @@ def aircraft_of(reference: str) -> Aircraft:
     return find_aircraft(reference, Path())
 
 
-def own_axis(case: Case) -> str:
+def own_axis(case: FaultCase) -> str:
     """The axis the surface of a case turns most about: p, q or r."""
     aircraft = aircraft_of(case.aircraft)
     return AXES[aircraft.dominant_axis[aircraft.surfaces.index(case.surface)]]
@@ -108,10 +108,10 @@ def cases(
     declared: bool = False,
     aircraft: str = DEFAULT,
     turbulence: str = "none",
-) -> list[Case]:
+) -> list[FaultCase]:
     """Every fault on every surface at every airspeed, fault by fault."""
     return [
-        Case(fault, surface, V, declared, aircraft, turbulence)
+        FaultCase(fault, surface, V, declared, aircraft, turbulence)
         for fault, _ in FAULTS
         for surface in aircraft_of(aircraft).surfaces
         for V in airspeeds_mps
@@ -135,7 +135,7 @@ def declared(turbulence: str = "none", aircraft: str = DEFAULT) -> dict[str, Any
     }
 
 
-def scenario_of(case: Case, law: str, trimmed_deg: float) -> "Scenario":
+def scenario_of(case: FaultCase, law: str, trimmed_deg: float) -> "Scenario":
     """The flight of a case under a law; trimmed_deg: the surface's deflection in trim."""
     fault = dict(dict(FAULTS)[case.fault])
     if "off_deg" in fault:
@@ -165,7 +165,7 @@ def trimmed_deg(airspeed_mps: float, surface: str, aircraft: str = DEFAULT) -> f
     return degrees(point.surfaces_rad[surface])
 
 
-def fly_case(case: Case) -> Document:
+def fly_case(case: FaultCase) -> Document:
     """The row of a case: fault, verdict, tracking beside the oracle's, and why it was lost, if so."""
     off_deg = trimmed_deg(case.airspeed_mps, case.surface, case.aircraft)
     ours, best = (scenario_of(case, law, off_deg) for law in ("fault-tolerant-published", "oracle-published"))
@@ -175,7 +175,7 @@ def fly_case(case: Case) -> Document:
     return {**case._asdict(), **_diagnosis(flight, case), **_tracking(flight, oracle, case), **seen}
 
 
-def _diagnosis(flight: "Landing", case: Case) -> Document:
+def _diagnosis(flight: "Landing", case: FaultCase) -> Document:
     document = metrics(flight)
     isolation, true_type = document["isolation"], flight.scenario.faults[0].type
     return {
@@ -208,7 +208,7 @@ def verdict(document: Document, surface: str, true_type: str) -> str:
     return "named"
 
 
-def _tracking(flight: "Landing", oracle: "Landing", case: Case) -> Document:
+def _tracking(flight: "Landing", oracle: "Landing", case: FaultCase) -> Document:
     axis = own_axis(case)
     ours, best = (_rms_deg_s(one, axis) for one in (flight, oracle))
     return {

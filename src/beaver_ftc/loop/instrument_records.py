@@ -21,7 +21,7 @@ from beaver_ftc.plant.instruments import (
 )
 from beaver_ftc.plant.sensor_faults import OF_THE_SLIPSTREAM
 from beaver_ftc.scenario.faults import of_a_sensor
-from beaver_ftc.scenario.in_flight import stages
+from beaver_ftc.scenario.interventions import stages
 from beaver_ftc.scenario.schema import Scenario
 
 GRAVITY_M_S2, EARTH_RADIUS_M = 9.80665, 6_371_000.0

@@ -26,7 +26,7 @@ from beaver_ftc.plant.channels import AIRSPEED, ALTITUDE
 from beaver_ftc.plant.faults import TIME_TOLERANCE_S
 from beaver_ftc.plant.sensing import DEPARTURE_SIGNALS
 from beaver_ftc.scenario.faults import of_a_sensor
-from beaver_ftc.scenario.in_flight import stages
+from beaver_ftc.scenario.interventions import stages
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.warnings import undeclared
 

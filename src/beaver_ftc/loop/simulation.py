@@ -22,7 +22,7 @@ from beaver_ftc.plant.gust import GustSchedule
 from beaver_ftc.scenario.airframe import checked_against
 from beaver_ftc.scenario.faults import MOST_FAULTS, place_of
 from beaver_ftc.scenario.given import fault_of, is_same_again
-from beaver_ftc.scenario.in_flight import aimed, blown, changed
+from beaver_ftc.scenario.interventions import aimed, blown, changed
 from beaver_ftc.scenario.names import UNANTICIPATED
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.sensor_faults import fault_name, sensors_there

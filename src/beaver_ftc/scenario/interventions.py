@@ -1,4 +1,4 @@
-"""A scenario that is changed while it is flown: as if it had said so from the start."""
+"""What a caller changes while a scenario is flown (gusts, targets, law): as if it had said so from the start."""
 
 from collections.abc import Iterator, Mapping
 from typing import Any

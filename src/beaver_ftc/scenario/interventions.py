@@ -1,4 +1,4 @@
-"""What a caller changes while a scenario is flown (gusts, targets, law): as if it had said so from the start."""
+"""Interventions while a scenario is flown: gust, targets, law; as if it had said so from the start."""
 
 from collections.abc import Iterator, Mapping
 from typing import Any

@@ -277,16 +277,19 @@ def test_a_surface_that_shows_by_itself_is_named_where_a_vane_may_be_broken(surf
     assert flight.isolation_time_s < 2.5
 
 
+@pytest.mark.parametrize("fault_class", ["published", "all"])
 @pytest.mark.parametrize("law", ["nominal", "fault-tolerant", "indi"])
 @pytest.mark.parametrize(
     "noisy", [{"qdyn": {"noise_std_pa": 3}}, {"alpha": {"noise_std_deg": 0.3}}, {"V": {"noise_std_mps": 0.3}}]
 )
-def test_what_a_law_makes_of_noisy_air_data_is_no_fault(noisy, law):
-    """With gyros without noise: all that the law does, it does for what the readings are off by."""
+def test_what_a_law_makes_of_noisy_air_data_is_no_fault(noisy, law, fault_class):
+    """With gyros without noise: all that the law does, it does for what the readings are off by. Of every
+    type the forces are asked as well: what noise does to them, by the slipstream too, is no fault either.
+    """
     declared = {"sensors": noisy, "constant_rad_s2": {"p": 0.0, "q": 0.0, "r": 0.0}}
     flight, log = flown(
         duration_s=4, uncertainty={}, reference={}, sensors=noisy, control={"law": law},
-        initial={"airspeed_mps": 41}, fdi=_fdi("either", declared),
+        initial={"airspeed_mps": 41}, fdi=_fdi("either", declared, fault_class=fault_class),
     )  # fmt: skip
     assert flight.detection_time_s is None
     shares = [log[column].max() for column in log.columns if column.endswith("likelihood_share")]

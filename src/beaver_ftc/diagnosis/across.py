@@ -99,7 +99,7 @@ def column_of(view, forces, bound, G, j):
         return size, VANE_TOLERANCE * abs(size)
     if i >= SIDE:
         force = forces.component[i - SIDE]
-        return force.column[s], force.own[s]
+        return force.foreseen[s], force.own[s]
     return G[i, s], bound.own_per_rad[i, s] if bound.own_errors else 0.0
 
 

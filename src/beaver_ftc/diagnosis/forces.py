@@ -20,9 +20,11 @@ from beaver_ftc.aircraft import AXES, Aircraft, Term
 from beaver_ftc.aircraft.aircraft import FORCES
 from beaver_ftc.aircraft.schema import MAX_SURFACES, MAX_TERMS_OF_ONE, SIDESLIP_RATE
 from beaver_ftc.compiled import kernel
-from beaver_ftc.design.terms import AIRSPEED, ALPHA, BETA, N_Y, QDYN, evaluate
+from beaver_ftc.design.engine import DPT_0, KW_TO_DPT, density_ratio
+from beaver_ftc.design.terms import AIRSPEED, ALPHA, BETA, DPT, N_Y, QDYN, evaluate
 from beaver_ftc.diagnosis.bounds.declared import Errors, gust_mps
 from beaver_ftc.diagnosis.redundancy import FALLING_M_S2
+from beaver_ftc.plant.instruments import NOISE_LIMIT_SIGMA
 from beaver_ftc.scenario.diagnosis import Bounds
 from beaver_ftc.scenario.sensors import ACCELEROMETERS
 from beaver_ftc.scenario.warnings import MASS_TOLERANCE
@@ -45,8 +47,10 @@ FORCE = np.dtype(
         # the same by the angle that follows from inertial motion; that angle, rad; how fast it may drift,
         # rad/s, and what that comes to per rad/s; how far errors and gusts let e wander, (rad/s2)2/s
         ("inertial", "f8"), ("angle", "f8"), ("drift", "f8"), ("drifted", "f8"), ("wander", "f8"),
-        # of each surface per rad, and at its command; of its errors per rad
-        ("column", "f8", (MAX_SURFACES,)), ("moment", "f8", (MAX_SURFACES,)), ("own", "f8", (MAX_SURFACES,)),
+        # of each surface per rad, by this instant's readings and by those before, and at its command; of its
+        # errors per rad
+        ("column", "f8", (MAX_SURFACES,)), ("foreseen", "f8", (MAX_SURFACES,)),
+        ("moment", "f8", (MAX_SURFACES,)), ("own", "f8", (MAX_SURFACES,)),
         # of an error of its vane: angular acceleration, and e, per rad; that in roll
         ("vane", "f8", (2,)), ("vane_roll", "f8"),
         ("quiet", "f8", (2,)), ("jitter", "f8", (2,)), ("damping", "f8", (3,)), ("deflection", "f8"),
@@ -128,6 +132,7 @@ def look_along(forces, air, f, measured, u):
     table, force = air.forces, forces.component[f]
     first, last = table.free_from[CY + f], table.surface_to[CY + f]
     scale, whole = measured.y[QDYN] * air.area_per_mass * forces.per_m, 0.0
+    force.foreseen[:] = force.column
     force.column[:], force.own[:] = 0.0, 0.0
     for k in range(first, last):
         s, of_one = table.surface[k], scale * table.power[table.monomial[k]]
@@ -142,8 +147,10 @@ def look_along(forces, air, f, measured, u):
         force.regressor[last - first] = turning
         whole += turning
     force.regressor[force.n - 1], force.whole = whole, whole
+    if forces.begun == 0:
+        force.foreseen[:] = force.column
     for s in range(u.size):
-        force.moment[s] = force.column[s] * u[s]
+        force.moment[s] = force.foreseen[s] * u[s]
     force.innovation = measured.force[1 + f] * forces.per_m - whole
     by_pressure = whole * forces.pressure_noise / measured.y[QDYN]
     for k in range(2):
@@ -194,10 +201,12 @@ def set_up_forces(
     trim: tuple[np.ndarray, np.ndarray, np.ndarray],
     along_y: np.ndarray,
     dt_s: float,
+    admitted: np.void,
 ) -> None:
     """Fill the record of forces that are `known` from what is declared; trim: x (3,) rad/s, y, u rad.
 
-    along_y (3, y.size): the slopes of the angular accelerations with y. dt_s: of a frame.
+    along_y (3, y.size): the slopes of the angular accelerations with y. dt_s: of a frame. admitted: of the
+    bound, for the engine's power.
     """
     y = trim[1]
     forces, air, size = statistical["forces"], statistical["air"], aircraft.geometry
@@ -208,13 +217,16 @@ def set_up_forces(
     forces["span"], forces["of_rate"] = size.span_m, sum(rates)
     scale = y[QDYN] * air["area_per_mass"] * forces["per_m"]
     errors = declared.each("random", ("alpha", "beta", "V", *AXES))
+    by_airspeed, by_others = _slipstream_noise(y, admitted, declared)
     for f, (vane, axis) in enumerate(((BETA, 2), (ALPHA, 1))):
         force, terms = forces["component"][f], terms_of(aircraft, f)
         slopes = scale * _slopes(aircraft, COMPONENTS[f], trim)
         force["vane"], force["vane_roll"] = (-along_y[axis, vane], -slopes[vane]), -along_y[0, vane]
         force["damping"] = slopes[3:]
-        parts = (slopes * errors) ** 2
-        force["quiet"] = parts.sum(), parts.sum() - parts[vane]
+        slipstream = scale * _slope_of(aircraft, COMPONENTS[f], trim, DPT)
+        parts = ((slopes + slipstream * by_airspeed * (np.arange(6) == 2)) * errors) ** 2
+        quiet = parts.sum() + slipstream**2 * by_others
+        force["quiet"] = quiet, quiet - parts[vane]
         noise = declared[ACCELEROMETERS[1 + f]].random
         force["felt"] = (forces["per_m"] * noise) ** 2
         _set_up_tolerances(force, bounds, terms, y, slopes[vane] / scale, f, forces["per_m"])
@@ -224,6 +236,17 @@ def set_up_forces(
         gusts = 3.0 * gust_mps(bounds.turbulence) ** 2 / (air["scale"] * y[AIRSPEED])
         wander = (CHANGES * force["drift"]) ** 2 + dt_s * (noise / y[AIRSPEED]) ** 2
         force["wander"] = slopes[vane] ** 2 * (wander + gusts)
+
+
+def _slipstream_noise(y: np.ndarray, admitted: np.void, declared: Errors) -> tuple[float, float]:
+    """How dpt moves with the reading of the airspeed, s/m; its variance by those of pressure and power."""
+    if not admitted["engine"]:
+        return 0.0, 0.0
+    per_kw, power = KW_TO_DPT / (y[QDYN] * y[AIRSPEED]), y[DPT] - DPT_0
+    thin = per_kw * admitted["thin_air_kw"] * density_ratio(y)
+    by_pressure = (thin + power) / y[QDYN] * declared["qdyn"].random
+    by_power = per_kw * admitted["engine_kw"] / NOISE_LIMIT_SIGMA
+    return float((2.0 * thin - power) / y[AIRSPEED]), float(by_pressure**2 + by_power**2)
 
 
 def _drift(errors: Errors, gravity: float, airspeed_mps: float, f: int) -> float:
@@ -283,3 +306,14 @@ def _slopes(
     states += [(x + step * e, y, u) for e in np.eye(3)]
     here = _value(aircraft, name, trim)
     return np.array([(_value(aircraft, name, state) - here) / step for state in states])
+
+
+def _slope_of(
+    aircraft: Aircraft, name: str, trim: tuple[np.ndarray, np.ndarray, np.ndarray], place: int
+) -> float:
+    """Its derivative with y[place], by differences; 0 where there is no such signal."""
+    x, y, u = trim
+    if place >= y.size:
+        return 0.0
+    step = 1e-5 * (np.arange(y.size) == place)
+    return (_value(aircraft, name, (x, y + step, u)) - _value(aircraft, name, trim)) / 1e-5

@@ -3,19 +3,19 @@
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from beaver_ftc.cli.inputs import NoReportOption, ResultsOption, ScenariosArgument, load_all
-from beaver_ftc.cli.output import Format, FormatOption, complain, emit, emit_json
+from beaver_ftc.cli.output import Document, Format, FormatOption, complain, emit, emit_json
 from beaver_ftc.cli.progress import progress_bar
 from beaver_ftc.documents.errors import BadInput
 
 if TYPE_CHECKING:
     from beaver_ftc.scenario.schema import Scenario
+    from beaver_ftc.studies.mismatch.split import Tally
 
-Document = dict[str, Any]
 Say = Callable[[str], None]
 
 
@@ -72,7 +72,7 @@ def _variants(scenario: "Scenario", text: str) -> list["Scenario"]:
     return wanted
 
 
-def _split(scenario: "Scenario", out: Path, report: bool, say: Say) -> tuple[Document, Any]:
+def _split(scenario: "Scenario", out: Path, report: bool, say: Say) -> tuple[Document, "Tally"]:
     """Fly and split one: its document, and its tally."""
     from beaver_ftc.studies.mismatch.study import run_mismatch
     from beaver_ftc.studies.mismatch.tables import mismatch_text
@@ -87,7 +87,7 @@ def _split(scenario: "Scenario", out: Path, report: bool, say: Say) -> tuple[Doc
 
 
 def _compare(
-    scenarios: list["Scenario"], found: list[tuple[Document, Any]], out: Path, report: bool, say: Say
+    scenarios: list["Scenario"], found: list[tuple[Document, "Tally"]], out: Path, report: bool, say: Say
 ) -> Document:
     from beaver_ftc.studies.mismatch.bound import recommended_for
     from beaver_ftc.studies.mismatch.study import entry, write_comparison

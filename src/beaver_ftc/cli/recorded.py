@@ -1,12 +1,16 @@
 """`beaver-ftc identify` and `diagnose`: from recorded flights to a model, and to what broke in a flight."""
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from beaver_ftc.cli.output import Format, FormatOption, answer
+from beaver_ftc.cli.output import Document, Format, FormatOption, answer
 from beaver_ftc.documents.errors import BadInput
+
+if TYPE_CHECKING:
+    from beaver_ftc.flights.model import Model
+    from beaver_ftc.flights.samples import Samples
 
 FlightsArgument = Annotated[list[Path], typer.Argument(metavar="FLIGHT", help="Recorded flights.")]
 ReaderOption = Annotated[
@@ -106,7 +110,7 @@ def _replay(flights: list[Path], out: Path, format: Format) -> None:
     answer(format, {"flights": verdicts}, lambda: "\n".join(map(as_text, verdicts)))
 
 
-def _diagnose(samples: Any, model: Any, out: Path, scored: bool, detector: str) -> dict[str, Any]:
+def _diagnose(samples: "Samples", model: "Model", out: Path, scored: bool, detector: str) -> Document:
     from beaver_ftc.flights.detectors import diagnose_with
     from beaver_ftc.flights.findings import verdict_of
     from beaver_ftc.flights.pages import write_diagnosis

@@ -5,15 +5,13 @@ from dataclasses import replace
 from enum import StrEnum
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
 from beaver_ftc.cli.inputs import TurbulenceName, WorkersOption
-from beaver_ftc.cli.output import Format, FormatOption, answer
+from beaver_ftc.cli.output import Document, Format, FormatOption, answer
 from beaver_ftc.cli.progress import progress_bar
-
-Document = dict[str, Any]
 
 
 class GridName(StrEnum):

@@ -13,7 +13,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from beaver_ftc.cli.inputs import JunitOption, NoReportOption, taking
-from beaver_ftc.cli.output import Format, FormatOption, answer, complain, emit_json, failure_of, write_junit
+from beaver_ftc.cli.output import (
+    Document,
+    Format,
+    FormatOption,
+    answer,
+    complain,
+    emit_json,
+    failure_of,
+    write_junit,
+)
 from beaver_ftc.documents.errors import BadInput
 
 if TYPE_CHECKING:
@@ -117,7 +126,7 @@ def _options(arguments: Arguments) -> "Options":
     )
 
 
-def _command(options: "Options", replay: int | None, format: Format) -> dict[str, Any]:
+def _command(options: "Options", replay: int | None, format: Format) -> Document:
     """Fly, say what came out, and return {scenario, passed, expectations} of it."""
     from beaver_ftc.scenario.sweep_loader import load_sweep
 
@@ -139,7 +148,7 @@ def _keep(flights: str) -> "Keep":
         ) from None
 
 
-def _fly(sweep: "Sweep", options: "Options", format: Format) -> dict[str, Any]:
+def _fly(sweep: "Sweep", options: "Options", format: Format) -> Document:
     from beaver_ftc.cli.progress import live_progress
     from beaver_ftc.studies.sweep.campaign import named_for, run_sweep
     from beaver_ftc.studies.sweep.summary_page import summary_text, verdict
@@ -151,11 +160,11 @@ def _fly(sweep: "Sweep", options: "Options", format: Format) -> dict[str, Any]:
     return verdict(document)
 
 
-def _replay(sweep: "Sweep", options: "Options", index: int, format: Format) -> dict[str, Any]:
+def _replay(sweep: "Sweep", options: "Options", index: int, format: Format) -> Document:
     from beaver_ftc.results.verdict import verdict_text
     from beaver_ftc.studies.sweep.campaign import replay
 
-    document: dict[str, Any] = replay(sweep, options, index)
+    document: Document = replay(sweep, options, index)
     answer(format, document, lambda: verdict_text(document, document["folder"], sys.stdout.isatty()))
     return document
 

@@ -42,7 +42,7 @@ def _write_first_figure(docs: Path) -> Path:
 
 def _write_reproduction(docs: Path) -> Iterator[Path]:
     from beaver_ftc.studies.engine.study import fly_all
-    from beaver_ftc.studies.present.files import write_files
+    from beaver_ftc.studies.present.page import write_files
     from beaver_ftc.studies.reproduce.cases import VARIANTS
     from beaver_ftc.studies.reproduce.published_figures import figures_of
     from beaver_ftc.studies.reproduce.reproduction import as_markdown, document_of, fly_published, numbers_of

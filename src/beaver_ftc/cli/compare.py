@@ -106,7 +106,7 @@ def _most_or_folder(flights: str | None) -> tuple[int | None, Path | None]:
 
 def _compare_recorded(folder: Path, out: Path, format: Format, page: Path | None) -> None:
     from beaver_ftc.results.writer import result_folder
-    from beaver_ftc.studies.present.files import write_files
+    from beaver_ftc.studies.present.page import write_files
     from beaver_ftc.studies.recorded.benchmark import as_text, files_of, run_benchmark, update_page
 
     document = run_benchmark(folder)

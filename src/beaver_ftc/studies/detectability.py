@@ -34,7 +34,7 @@ from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.engine.statistics import quantile
 from beaver_ftc.studies.engine.study import Progress, Study, run_study
 from beaver_ftc.studies.present.figures import heat_map, label_edges, panels
-from beaver_ftc.studies.present.files import Files
+from beaver_ftc.studies.present.page import Files
 from beaver_ftc.studies.present.tables import as_csv
 
 if TYPE_CHECKING:

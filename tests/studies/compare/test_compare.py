@@ -50,7 +50,7 @@ from beaver_ftc.studies.compare.tune import (
     candidates,
 )
 from beaver_ftc.studies.engine.study import fly_all
-from beaver_ftc.studies.present.files import write_files
+from beaver_ftc.studies.present.page import write_files
 from flying import scenario
 
 BEAVER = Path(sys.executable).with_name("beaver-ftc")

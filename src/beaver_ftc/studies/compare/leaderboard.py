@@ -13,7 +13,7 @@ from beaver_ftc.studies.engine.study import Progress, Study, run_study
 from beaver_ftc.studies.engine.workers import Case
 from beaver_ftc.studies.present import page
 from beaver_ftc.studies.present.figures import curve_look, marker, panels
-from beaver_ftc.studies.present.files import Files
+from beaver_ftc.studies.present.page import Files
 from beaver_ftc.studies.present.tables import aligned
 
 if TYPE_CHECKING:

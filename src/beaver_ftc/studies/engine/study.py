@@ -36,7 +36,7 @@ from beaver_ftc.studies.engine.workers import (
     Work,
     Workers,
 )
-from beaver_ftc.studies.present.files import Files, write_files
+from beaver_ftc.studies.present.page import Files, write_files
 
 Progress = Callable[[float], None]
 Fly = Callable[[Any], Any]

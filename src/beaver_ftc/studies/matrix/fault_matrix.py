@@ -23,7 +23,7 @@ from beaver_ftc.scenario.initial import initial_of
 from beaver_ftc.studies.engine.study import Progress, Study, run_study
 from beaver_ftc.studies.matrix.clairvoyant import columns_of, seen_when_told
 from beaver_ftc.studies.present.figures import heat_map, panels
-from beaver_ftc.studies.present.files import Files
+from beaver_ftc.studies.present.page import Files
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -23,7 +23,7 @@ from beaver_ftc.scenario.schema import Initial, Scenario
 from beaver_ftc.studies.engine.study import Progress, Study, run_study
 from beaver_ftc.studies.linear_systems import zeros
 from beaver_ftc.studies.matrix.fault_matrix import AIRSPEEDS_MPS, AT_S, REFERENCE, UNCERTAINTY, trimmed_deg
-from beaver_ftc.studies.present.files import Files
+from beaver_ftc.studies.present.page import Files
 
 if TYPE_CHECKING:
     from beaver_ftc.loop.outcome import Landing

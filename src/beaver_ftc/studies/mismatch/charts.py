@@ -18,7 +18,7 @@ from beaver_ftc.studies.mismatch.sources import SOURCES
 from beaver_ftc.studies.mismatch.split import CAUSES, ETA_BAR, FAULT, TOTAL, UNEXPLAINED, column
 from beaver_ftc.studies.mismatch.tables import Document, label, percent
 from beaver_ftc.studies.present.figures import heat_map, label_edges, panels
-from beaver_ftc.studies.present.files import Files
+from beaver_ftc.studies.present.page import Files
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

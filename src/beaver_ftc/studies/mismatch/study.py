@@ -40,7 +40,7 @@ from beaver_ftc.studies.mismatch.split import (
     tally_of_log,
 )
 from beaver_ftc.studies.mismatch.tables import show_in_reports
-from beaver_ftc.studies.present.files import Files, write_files
+from beaver_ftc.studies.present.page import Files, write_files
 from beaver_ftc.studies.present.tables import as_csv, finite
 
 Document = dict[str, Any]

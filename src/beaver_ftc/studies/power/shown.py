@@ -21,7 +21,7 @@ from beaver_ftc.studies.power.survey import (
     lost,
 )
 from beaver_ftc.studies.present.figures import curve_look, heat_map, label_edges, marker, panels
-from beaver_ftc.studies.present.files import Files
+from beaver_ftc.studies.present.page import Files
 from beaver_ftc.studies.present.tables import plain, printed
 
 if TYPE_CHECKING:

@@ -26,8 +26,7 @@ from beaver_ftc.results.metrics import as_json
 from beaver_ftc.results.style import SERIES
 from beaver_ftc.studies.engine.statistics import poisson
 from beaver_ftc.studies.present.figures import panels
-from beaver_ftc.studies.present.files import Files
-from beaver_ftc.studies.present.page import replace_between
+from beaver_ftc.studies.present.page import Files, replace_between
 from beaver_ftc.studies.present.tables import aligned, markdown_table
 
 Document = dict[str, Any]

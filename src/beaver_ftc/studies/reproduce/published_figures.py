@@ -22,7 +22,7 @@ from beaver_ftc.results.views import (
     detection_panel,
     isolation_panel,
 )
-from beaver_ftc.studies.present.files import Files
+from beaver_ftc.studies.present.page import Files
 from beaver_ftc.studies.reproduce.cases import Flown
 from beaver_ftc.studies.reproduce.choices import FAULT_AT_S
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from beaver_ftc.results.metrics import Document, as_json, versions
 from beaver_ftc.studies.engine.study import Progress, Study, run_study
 from beaver_ftc.studies.present import page, tables
-from beaver_ftc.studies.present.files import Files
+from beaver_ftc.studies.present.page import Files
 from beaver_ftc.studies.present.tables import finite, printed
 from beaver_ftc.studies.reproduce.cases import BESIDE, PUBLISHED, VARIANTS, Changed, Flown, fly_case
 from beaver_ftc.studies.reproduce.choices import CHOICES

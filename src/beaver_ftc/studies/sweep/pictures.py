@@ -14,7 +14,7 @@ import numpy as np
 from beaver_ftc.results.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILION
 from beaver_ftc.studies.engine.statistics import wilson
 from beaver_ftc.studies.present.figures import GRID, heat_map, new_figure
-from beaver_ftc.studies.present.files import save
+from beaver_ftc.studies.present.page import save
 from beaver_ftc.studies.sweep.outcomes import Flights
 from beaver_ftc.studies.sweep.summary import NO_ALARM, OUTCOMES
 

@@ -4,8 +4,7 @@ import pytest
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.studies.present.figures import heat_map, label_edges, panels
-from beaver_ftc.studies.present.files import write_files
-from beaver_ftc.studies.present.page import replace_between
+from beaver_ftc.studies.present.page import replace_between, write_files
 from beaver_ftc.studies.present.tables import as_csv
 
 

@@ -118,21 +118,24 @@ def _detection(flight: "Landing", fault: Document | None) -> Document:
     }
 
 
+# What a landing says of the fault it names, and in which order the document says it.
+_FOUND = (
+    "isolated", "isolation_type", "isolation_time_s", "candidates", "type_time_s",
+    "estimate", "estimate_interval", "frequency_rad_s",
+)  # fmt: skip
+_NAMED = (
+    "fault", "type", "time_s", "delay_s", "correct", "estimate", "candidates", "type_correct", "type_delay_s",
+    "estimate_deg", "estimate_interval", "frequency_rad_s",
+)  # fmt: skip
+
+
 def _isolation(flight: "Landing", fault: Document | None) -> Document:
+    found, meant = {name: getattr(flight, name) for name in _FOUND}, _meant(flight, fault)
+    right = _correct(flight.isolated, meant), _type_correct(flight.isolation_type, meant)
+    named = _named(found, fault, right, flight.scenario)
     return {
         "isolated": flight.isolated is not None,
-        "fault": flight.isolated,
-        "type": flight.isolation_type,
-        "time_s": _number(flight.isolation_time_s),
-        "delay_s": _delay(flight.isolation_time_s, fault, flight.scenario),
-        "correct": _correct(flight.isolated, _meant(flight, fault)),
-        "estimate": _number(flight.estimate),
-        "candidates": list(flight.candidates),
-        "type_correct": _type_correct(flight.isolation_type, _meant(flight, fault)),
-        "type_delay_s": _delay(flight.type_time_s, fault, flight.scenario),
-        "estimate_deg": _estimate_deg(flight),
-        "estimate_interval": _rounded(flight.estimate_interval or ()) or None,
-        "frequency_rad_s": _number(flight.frequency_rad_s),
+        **{key: named[key] for key in _NAMED},
         "probing_s": _rounded(flight.probing_s or ()) or None,
         "faults": [_one_of_several(found, flight.scenario) for found in flight.faults],
     }
@@ -143,20 +146,29 @@ def _one_of_several(found: Document, scenario: "Scenario") -> Document:
     surface, kind = found["isolated"], found["isolation_type"]
     declared = [fault for fault in scenario.faults if getattr(fault, "actuator", None) == surface]
     first = min(declared, key=lambda fault: fault.at_s, default=None)
+    correct = None if surface is None else bool(declared)
+    type_correct = None if kind is None else any(kind == fault.type for fault in declared)
     fault = None if first is None else {"at_s": first.at_s}
-    estimate = found.get("estimate")
-    in_deg = None if estimate is None or kind == LOSS_OF_EFFECTIVENESS else math.degrees(estimate)
+    return _named(found, fault, (correct, type_correct), scenario)
+
+
+def _named(
+    found: Document, fault: Document | None, right: tuple[bool | None, bool | None], scenario: "Scenario"
+) -> Document:
+    """A fault that is named; fault: since when it is there. right: whether it, and its type, are."""
+    estimate, kind = found.get("estimate"), found["isolation_type"]
+    is_angle = estimate is not None and kind != LOSS_OF_EFFECTIVENESS
     return {
-        "fault": surface,
+        "fault": found["isolated"],
         "type": kind,
         "time_s": _number(found["isolation_time_s"]),
         "delay_s": _delay(found["isolation_time_s"], fault, scenario),
-        "correct": None if surface is None else bool(declared),
+        "correct": right[0],
         "candidates": list(found["candidates"]),
-        "type_correct": None if kind is None else any(kind == fault.type for fault in declared),
+        "type_correct": right[1],
         "type_delay_s": _delay(found.get("type_time_s"), fault, scenario),
         "estimate": _number(estimate),
-        "estimate_deg": _number(in_deg),
+        "estimate_deg": _number(math.degrees(estimate)) if is_angle else None,
         "estimate_interval": _rounded(found.get("estimate_interval") or ()) or None,
         "frequency_rad_s": _number(found.get("frequency_rad_s")),
     }
@@ -187,13 +199,6 @@ def _type_correct(kind: str | None, fault: Document | None) -> bool | None:
     if fault is not None and "sensor" in fault:
         return None
     return None if kind is None else fault is not None and kind == fault["type"]
-
-
-def _estimate_deg(flight: "Landing") -> float | None:
-    """The estimate in deg, where it is a deflection."""
-    if flight.estimate is None or flight.isolation_type == LOSS_OF_EFFECTIVENESS:
-        return None
-    return _number(math.degrees(flight.estimate))
 
 
 def _in_deg(off: dict[str, float | None] | None) -> Document | None:

@@ -1,5 +1,7 @@
 """Records that kernels of the diagnosis are tried on, one at a time."""
 
+from inspect import signature
+
 import numpy as np
 
 from beaver_ftc.diagnosis.scheme import diagnosis_dtype
@@ -11,6 +13,7 @@ DT, POLES = 0.02, np.array([1e6, 4.0, 0.5])
 def new_fdi():
     fdi = np.zeros(1, diagnosis_dtype(4)).view(np.recarray)[0]
     fdi["config"]["dt"], fdi["bank"]["n"], fdi["bank"]["decay"][:3] = DT, 3, np.exp(-POLES * DT)
+    fdi["types"]["config"]["dt"] = DT
     fdi["isolation"]["forgetting"], fdi["isolation"]["decay"] = 0.98, np.exp(-np.array([3.0, 4.0, 5.0]) * DT)
     return fdi
 
@@ -18,7 +21,7 @@ def new_fdi():
 WHERE = {
     **dict.fromkeys(("enabled", "authority", "every_type", "abrupt", "dt"), "config"),
     **dict.fromkeys(("thresholds", "forgetting", "memory", "shared", "membership"), "isolation"),
-    **dict.fromkeys(("own_errors", "eta_bar", "noise"), "bound"),
+    **dict.fromkeys(("eta_bar", "noise"), "bound"),
 }
 
 
@@ -27,8 +30,37 @@ def put(fdi, **values):
     for name, value in values.items():
         if name in fdi["types"]["config"].dtype.names:
             fdi["types"]["config"][name] = value
-        else:
+        if name in WHERE:
             fdi[WHERE[name]][name] = value
+
+
+def of_stages(fdi, kernel):
+    """What the arguments of kernels are called, of the stages of one diagnosis."""
+    types, whole = fdi["types"], kernel.__module__.startswith("beaver_ftc.diagnosis.types")
+    later = kernel.__name__ in ("whereabouts",) or kernel.__name__.startswith("deflection")
+    return {
+        "config": types["config"] if whole else fdi["config"], "types": types, "surfaces": types["surface"],
+        "pair": types["pair"], "conclusion": fdi["verdict"], "layout": fdi["layout"], "watch": fdi["watch"],
+        "isolation": fdi["isolation"], "estimators": fdi["isolation"]["estimator"], "bound": fdi["bound"],
+        "bank": fdi["bank"], "fdae": fdi["fdae"], "innovation": fdi["bank"]["innovation"],
+        "frame_bound": fdi["bound"]["frame"], "noise": fdi["bound"]["noise"], "dt": fdi["config"]["dt"],
+        "frame": types["frame"] if later else types["frame"] - 1,
+    }  # fmt: skip
+
+
+def on(kernel, fdi, *given):
+    """Call a kernel on the records of its stages and on what is given, in the order of its arguments."""
+    parameters = signature(getattr(kernel, "py_func", kernel)).parameters.values()
+    needed = sum(each.default is each.empty for each in parameters)
+    stages, left, missing = of_stages(fdi, kernel), list(given), max(needed - len(given), 1)
+    arguments = []
+    for each in parameters:
+        if missing > 0 and each.name in stages:
+            arguments.append(stages[each.name])
+            missing -= 1
+        elif left:
+            arguments.append(left.pop(0))
+    return kernel(*arguments)
 
 
 def estimator(fdi, kind=LOSS, surface=0, low=-1.0, high=0.0):

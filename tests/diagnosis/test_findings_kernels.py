@@ -7,7 +7,6 @@ from kernels import put
 from beaver_ftc.diagnosis.scheme import diagnosis_dtype
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, UNANTICIPATED
 from beaver_ftc.diagnosis.types import findings
-from beaver_ftc.diagnosis.types.candidates import BY_DEDUCTION, RULED_OUT
 from beaver_ftc.diagnosis.types.pairs import IN_PITCH
 from beaver_ftc.diagnosis.types.registry import (
     BIAS,
@@ -19,6 +18,7 @@ from beaver_ftc.diagnosis.types.registry import (
     UP,
     VARYING_LOSS,
 )
+from beaver_ftc.diagnosis.types.verdict import BY_DEDUCTION, RULED_OUT
 
 SURFACES = ("aileron", "elevator", "rudder", "flap")
 AILERON, ELEVATOR, RUDDER, FLAP = range(4)
@@ -33,10 +33,10 @@ def new(left=None, detected=1, pairs=0, verdict=NOT_ISOLATED, **fields):
     fdi["layout"]["position_of"], fdi["isolation"]["estimator"]["surface"][4:8] = POSITION_OF, range(4)
     fdi["layout"]["group"] = 1 - IN_PITCH
     fdi["layout"]["group"][[ELEVATOR, FLAP]] = IN_PITCH
-    fdi["isolation"]["estimator"]["excluded"][4:8], fdi["types"]["surface"]["type_excluded"] = 1, 1
+    fdi["types"]["surface"]["refuted"], fdi["types"]["surface"]["type_excluded"] = 1, 1
     fdi["types"]["surface"]["type"], fdi["types"]["surface"]["type_at_s"] = -1, -1.0
     for s, kinds in (left or {}).items():
-        fdi["isolation"]["estimator"]["excluded"][POSITION_OF[s]] = 0
+        fdi["types"]["surface"]["refuted"][s] = 0
         fdi["types"]["surface"]["type_excluded"][s][list(kinds)] = 0
     put(fdi, **fields)
     return fdi
@@ -75,7 +75,7 @@ def test_a_surface_of_which_no_type_fits_is_named_bare_and_the_fault_may_be_unan
 def test_a_surface_is_possible_until_it_is_excluded_or_ruled_out(named, standing, excluded, possible):
     fdi = new({RUDDER: [STUCK]})
     fdi["types"]["surface"]["named"][RUDDER], fdi["types"]["surface"]["standing"][RUDDER] = named, standing
-    fdi["isolation"]["estimator"]["excluded"][POSITION_OF[RUDDER]] = excluded
+    fdi["types"]["surface"]["refuted"][RUDDER] = excluded
     assert (f"rudder:{NAMES[STUCK]}" in findings.found(fdi, SURFACES)["candidates"]) == possible
 
 
@@ -95,7 +95,7 @@ def test_what_any_course_explains_counts_only_until_a_constant_has_been_seen_for
     constants = set() if constant is None else {constant}
     fdi = new({RUDDER: {VARYING_LOSS, SLOW} | constants}, patience=40)
     fdi["types"]["surface"]["evidence"][RUDDER], fdi["types"]["surface"]["quiet"][RUDDER] = evidence, 10
-    fdi["bound"]["own_errors"] = own_errors
+    fdi["types"]["config"]["own_errors"] = own_errors
     types = findings._types_left(fdi, RUDDER)
     assert set(types) == set(said(*constants, *kept))
     assert len(types) == len(set(types))

@@ -1,4 +1,4 @@
-"""A new fault type is one file and one registry line: a copy of the package with both, and nothing else."""
+"""A new fault type is one file: a copy of the package with it, and nothing else."""
 
 import os
 import shutil
@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 import beaver_ftc
-from beaver_ftc.diagnosis.types import registry
+from beaver_ftc.diagnosis.types import contract, registry
 from beaver_ftc.documents.paths import data_root
 
 HERE = Path(__file__).parent
@@ -17,20 +17,18 @@ REVERSED = '''
 """A surface rigged the wrong way round: p = -u."""
 
 from beaver_ftc.compiled import kernel
-
-NAME = "reversed"
-CONSTANT = True
+from beaver_ftc.diagnosis.types.contract import FaultType
 
 
 @kernel
-def judge(fdi, surface, kind, frame):
+def judge(config, surface, kind, frame):
     """Whether the mirrored command explains this frame."""
     if not surface.low_then <= -surface.command_then <= surface.high_then:
         surface.type_excluded[kind] = 1
 
 
 @kernel
-def deflection(fdi, surface, kind):
+def deflection(config, surface, kind, frame):
     """The mirrored command."""
     return -surface.command, -surface.command
 
@@ -38,6 +36,9 @@ def deflection(fdi, surface, kind):
 def estimate(fdi, s, kind):
     """It has none but itself."""
     return -1.0
+
+
+TYPES = (FaultType(name="reversed", constant=True, judge=judge, deflection=deflection, estimate=estimate),)
 '''
 FLIGHT = """
 import sys
@@ -57,12 +58,7 @@ def test_a_new_type_is_found_and_named(tmp_path):
     shutil.copytree(beaver_ftc.__path__[0], package, ignore=shutil.ignore_patterns("__pycache__"))
     shutil.copytree(data_root() / "aircraft", package / "data" / "aircraft")
     shutil.copytree(data_root() / "scenarios", package / "data" / "scenarios")
-    types = package / "diagnosis" / "types"
-    (types / "backwards.py").write_text(REVERSED)
-    text = (types / "registry.py").read_text()
-    listing = "REGISTERED: tuple[ModuleType, ...] = ("
-    line = f"from beaver_ftc.diagnosis.types import backwards\n\n{listing}\n    backwards,"
-    (types / "registry.py").write_text(text.replace(listing, line))
+    (package / "diagnosis" / "types" / "table" / "backwards.py").write_text(REVERSED)
     done = subprocess.run(
         [sys.executable, "-c", FLIGHT.format(folder=str(HERE))],
         env={**os.environ, "PYTHONPATH": str(tmp_path), "NUMBA_DISABLE_JIT": "1"},
@@ -74,14 +70,13 @@ def test_a_new_type_is_found_and_named(tmp_path):
 
 
 def test_every_type_keeps_the_contract():
-    for module in registry.TYPES:
-        assert isinstance(module.NAME, str)
-        assert isinstance(module.CONSTANT, bool)
-        assert callable(module.judge)
-        assert hasattr(module, "deflection") or not module.CONSTANT
+    for row in registry.TYPES:
+        assert callable(row.judge)
+        assert row.deflection is not contract.anywhere or not row.constant
+        assert bool(row.memory) == bool(row.record)
 
 
 def test_types_of_a_constant_parameter_come_first():
-    constant = [module.CONSTANT for module in registry.TYPES]
+    constant = [row.constant for row in registry.TYPES]
     assert constant == sorted(constant, reverse=True)
     assert sum(constant) == registry.N_CONSTANT

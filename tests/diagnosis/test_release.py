@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from test_fault_types import TYPES, cases, shares, surfaces
 
 from beaver_ftc.diagnosis.types import registry as types
-from beaver_ftc.diagnosis.types import stuck
+from beaver_ftc.diagnosis.types.table import stuck
 
 HELD = ("stuck", "float", "hardover up", "hardover down")
 uncertainties = st.sampled_from(list(UNCERTAINTIES.values()))

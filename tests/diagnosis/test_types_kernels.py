@@ -4,24 +4,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from kernels import new_fdi, put
+from kernels import new_fdi, on, put
 
-from beaver_ftc.diagnosis.types import (
-    bias,
-    examine,
-    floating,
-    growing_bias,
-    hardover_down,
-    hardover_up,
-    loss,
-    oscillatory,
-    rate_limit,
-    release,
-    runaway,
-    sets,
-    stuck,
-    varying_loss,
-)
+from beaver_ftc.diagnosis.types import contract, examine, release
 from beaver_ftc.diagnosis.types.registry import (
     BIAS,
     CONSTANT_LOSS,
@@ -32,9 +17,11 @@ from beaver_ftc.diagnosis.types.registry import (
     OSCILLATORY,
     SLOW,
     STUCK,
+    TYPES,
     UP,
     VARYING_LOSS,
 )
+from beaver_ftc.diagnosis.types.table import bias, hardover, loss, oscillatory, rate_limit, stuck
 
 LOW, HIGH, DT = -0.4, 0.5, 0.02
 ALL = set(range(N_TYPES))
@@ -81,8 +68,8 @@ def test_what_is_known_of_a_surface_as_it_begins():
 )  # fmt: skip
 def test_a_constant_loss_keeps_the_shares_that_explain_the_frame(low, high, command, expected):
     fdi, surface = new_surface(low=low, high=high, command=command)
-    loss.judge(fdi, surface, CONSTANT_LOSS, 5)
-    varying_loss.judge(fdi, surface, VARYING_LOSS, 5)
+    on(loss.judge, fdi, surface, CONSTANT_LOSS, 5)
+    on(loss.judge_varying, fdi, surface, VARYING_LOSS, 5)
     assert (
         surface["type_excluded"][CONSTANT_LOSS]
         == surface["type_excluded"][VARYING_LOSS]
@@ -99,38 +86,38 @@ def test_over_a_block_in_which_the_command_swings_any_mean_may_be_a_varying_loss
         fdi, surface = new_surface(low=0.11, high=0.2, command=0.1)
         fdi["types"]["config"]["length"], surface["orders"]["least"][1] = 5, least
         surface["orders"]["greatest"][1] = greatest
-        varying_loss.judge(fdi, surface, VARYING_LOSS, 5)
+        on(loss.judge_varying, fdi, surface, VARYING_LOSS, 5)
         assert surface["type_excluded"][VARYING_LOSS] == excluded
 
 
 def test_sets_shrink_to_what_is_left_and_end_when_nothing_is():
     _, surface = new_surface()
-    sets.intersect(surface, STUCK, -0.1, 0.2)
-    sets.intersect(surface, STUCK, 0.0, 0.9)
+    contract.intersect(surface, STUCK, -0.1, 0.2)
+    contract.intersect(surface, STUCK, 0.0, 0.9)
     assert (surface["set_low"][STUCK], surface["set_high"][STUCK]) == (0.0, 0.2)
-    assert sets.middle(surface, STUCK) == 0.1
+    assert contract.middle(surface, STUCK) == 0.1
     assert not surface["type_excluded"][STUCK]
-    sets.intersect(surface, STUCK, 0.2, 0.9)  # one point is not nothing
+    contract.intersect(surface, STUCK, 0.2, 0.9)  # one point is not nothing
     assert not surface["type_excluded"][STUCK]
-    sets.intersect(surface, STUCK, 0.21, 0.9)
+    contract.intersect(surface, STUCK, 0.21, 0.9)
     assert surface["type_excluded"][STUCK]
 
 
 def test_an_offset_is_unlimited_at_a_stop():
-    fdi, surface = new_surface(low=0.1, high=0.15, command=0.3)
-    assert sets.offset(fdi, surface) == pytest.approx((-0.2, -0.15))
+    _, surface = new_surface(low=0.1, high=0.15, command=0.3)
+    assert bias.offset(surface) == pytest.approx((-0.2, -0.15))
     surface["high_then"] = HIGH
-    assert sets.offset(fdi, surface) == (pytest.approx(-0.2), np.inf)
+    assert bias.offset(surface) == (pytest.approx(-0.2), np.inf)
     surface["low_then"] = LOW
-    assert sets.offset(fdi, surface)[0] == -np.inf
+    assert bias.offset(surface)[0] == -np.inf
 
 
 @pytest.mark.parametrize(("low", "high"), [(0.0, 0.09), (0.51, 0.6)])
 def test_no_offset_takes_a_surface_beyond_its_stops(low, high):
     """A loss does, where neutral is out of reach."""
     fdi, surface = new_surface(low=low, high=high, command=0.2, travel_low=0.1)
-    for kind, module in ((BIAS, bias), (GROWING_BIAS, growing_bias)):
-        module.judge(fdi, surface, kind, 5)
+    for kind, judge in ((BIAS, bias.judge), (GROWING_BIAS, bias.judge_growing)):
+        on(judge, fdi, surface, kind, 5)
         assert surface["type_excluded"][kind]
 
 
@@ -140,27 +127,27 @@ def test_within_what_is_seen_at_once_a_stop_may_have_been_met_at_its_furthest_or
     fdi["types"]["config"]["length"] = length
     surface["orders"]["least"][1], surface["orders"]["greatest"][1] = -0.4, 0.34
     # the lowest it was: 0.2 - (0.1 + 0.4) = -0.3; the highest: 0.25 + 0.24 = 0.49, below 0.5
-    assert sets.offset(fdi, surface) == pytest.approx((0.1, 0.15))
+    assert bias.offset(surface) == pytest.approx((0.1, 0.15))
     surface["orders"]["greatest"][1] = 0.36
-    assert sets.offset(fdi, surface)[1] == np.inf
+    assert bias.offset(surface)[1] == np.inf
     surface["orders"]["least"][1] = -0.51
-    assert sets.offset(fdi, surface)[0] == -np.inf
+    assert bias.offset(surface)[0] == -np.inf
 
 
 def test_a_bias_keeps_the_offsets_that_explain_every_frame():
     fdi, surface = new_surface(low=0.1, high=0.15, command=0.3)
-    bias.judge(fdi, surface, BIAS, 5)
+    on(bias.judge, fdi, surface, BIAS, 5)
     surface["low_then"], surface["high_then"], surface["command_then"] = 0.23, 0.4, 0.4
-    bias.judge(fdi, surface, BIAS, 6)
+    on(bias.judge, fdi, surface, BIAS, 6)
     assert (surface["set_low"][BIAS], surface["set_high"][BIAS]) == pytest.approx((-0.17, -0.15))
     surface["command"] = 0.05
-    assert bias.deflection(fdi, surface, BIAS) == pytest.approx((-0.12, -0.1))
+    assert on(bias.deflection, fdi, surface, BIAS) == pytest.approx((-0.12, -0.1))
     orders, surface["command"] = surface["orders"], -0.2
     orders["least"][0], orders["greatest"][0] = -0.24, -0.1  # where it was meanwhile: to -0.41 and to -0.25
-    assert bias.deflection(fdi, surface, BIAS) == pytest.approx((LOW, -0.35))
+    assert on(bias.deflection, fdi, surface, BIAS) == pytest.approx((LOW, -0.35))
     orders["least"][0] = orders["greatest"][0] = 0.0
     assert bias.interval(fdi, 0, BIAS) == pytest.approx((-0.17, -0.15))
-    assert bias.estimate(fdi, 0, BIAS) == pytest.approx(-0.16)
+    assert contract.middle_of(fdi, 0, BIAS) == pytest.approx(-0.16)
     surface["set_high"][BIAS] = np.inf
     assert bias.interval(fdi, 0, BIAS) is None
 
@@ -177,14 +164,14 @@ def test_a_growing_bias_keeps_its_sign_and_never_shrinks(offsets, excluded):
     fdi, surface = new_surface()
     for offset in offsets:
         surface["low_then"], surface["high_then"] = offset - 0.01, offset + 0.01
-        growing_bias.judge(fdi, surface, GROWING_BIAS, 5)
+        on(bias.judge_growing, fdi, surface, GROWING_BIAS, 5)
     assert surface["type_excluded"][GROWING_BIAS] == excluded
 
 
 def test_at_a_stop_a_growing_bias_says_nothing():
     for low, high in ((0.45, 0.5), (-0.4, -0.35)):
         fdi, surface = new_surface(low=low, high=high)
-        growing_bias.judge(fdi, surface, GROWING_BIAS, 5)
+        on(bias.judge_growing, fdi, surface, GROWING_BIAS, 5)
         assert surface["growing_bias"]["up"] == surface["growing_bias"]["down"] == 0.0
 
 
@@ -200,12 +187,12 @@ def test_at_a_stop_a_growing_bias_says_nothing():
 def test_a_growing_bias_is_as_fast_as_a_runaway_only_where_that_is_certain(places, ran):
     fdi, surface = new_surface(least_runaway_rate=0.05 / DT)
     for place in places:
-        growing_bias.watch(fdi, surface, GROWING_BIAS)
+        on(bias.watch_growing, fdi, surface, GROWING_BIAS)
         if place == "well":
-            growing_bias.pass_over(fdi, surface, GROWING_BIAS)
+            on(bias.pass_over_growing, fdi, surface, GROWING_BIAS)
         elif place is not None:
             surface["low_then"], surface["high_then"] = place - 0.01, min(place + 0.01, HIGH)
-            growing_bias.judge(fdi, surface, GROWING_BIAS, 5)
+            on(bias.judge_growing, fdi, surface, GROWING_BIAS, 5)
     assert surface["growing_bias"]["ran"].tolist() == ran
 
 
@@ -213,9 +200,9 @@ def test_of_several_instants_a_mean_may_be_that_of_the_last():
     fdi, surface = new_surface(least_runaway_rate=0.05 / DT)
     fdi["types"]["config"]["whole"] = 0
     for place, ran in ((0.0, 0), (0.19, 0), (0.31, 1)):  # beyond 0.01 + 3 * 0.09 after two frames
-        growing_bias.watch(fdi, surface, GROWING_BIAS)
+        on(bias.watch_growing, fdi, surface, GROWING_BIAS)
         surface["low_then"], surface["high_then"] = place - 0.01, place + 0.01
-        growing_bias.judge(fdi, surface, GROWING_BIAS, 5)
+        on(bias.judge_growing, fdi, surface, GROWING_BIAS, 5)
         assert surface["growing_bias"]["ran"][1] == ran
 
 
@@ -225,7 +212,7 @@ def slow_run(places, orders=(0.0, 0.0), whole=1, frames=None, slowest_step=0.0):
     surface["orders"]["low"], surface["orders"]["high"] = orders[0], orders[1]
     for k, place in enumerate(places):
         surface["low_then"], surface["high_then"] = place - 0.01, place + 0.01
-        rate_limit.judge(fdi, surface, SLOW, (frames or range(99))[k])
+        on(rate_limit.judge, fdi, surface, SLOW, (frames or range(99))[k])
     return surface["type_excluded"][SLOW]
 
 
@@ -265,7 +252,7 @@ def test_which_side_of_its_orders_a_surface_stands_on():
             orders["low"][newest], orders["high"][newest] = low, high
             orders["low"][2] = min(orders["low"][2], low)
             orders["high"][2] = max(orders["high"][2], high)
-            assert rate_limit.side(fdi, surface) == side
+            assert on(rate_limit.side, fdi, surface) == side
 
 
 def swung(signs, patience=20):
@@ -274,8 +261,8 @@ def swung(signs, patience=20):
     for frame, sign in enumerate(signs):
         fdi["types"]["frame"] = frame + 1
         surface["low_then"], surface["high_then"] = 0.1 * sign - 0.02, 0.1 * sign + 0.02
-        oscillatory.watch(fdi, surface, OSCILLATORY)
-        oscillatory.judge(fdi, surface, OSCILLATORY, frame)
+        on(oscillatory.watch, fdi, surface, OSCILLATORY)
+        on(oscillatory.judge, fdi, surface, OSCILLATORY, frame)
     return fdi, surface
 
 
@@ -286,7 +273,7 @@ def test_an_oscillation_is_counted_by_half_cycles():
     assert (swing["first_end"], swing["last_end"]) == (5, 15)
     assert oscillatory.shown(surface)
     assert not oscillatory.shown(swung([1] * 5 + [-1] * 5 + [1])[1])
-    assert oscillatory.frequency_rad_s(fdi, 0) == pytest.approx(2 * np.pi / (10 * DT))
+    assert oscillatory.frequency_rad_s(fdi, 0, OSCILLATORY) == pytest.approx(2 * np.pi / (10 * DT))
     # the first half-cycle is cut off and does not count: ten frames, each 0.1 rad off; its first frame is
     # summed before the half-cycle before it is seen to have ended
     assert swing["squares"] == pytest.approx(10 * 0.01)
@@ -303,7 +290,7 @@ def test_a_sign_that_stays_for_longer_than_the_slowest_half_cycle_is_none():
     assert swung([-1] * 22)[1]["type_excluded"][OSCILLATORY]
     assert not swung([1] * 15 + [0] + [1] * 15)[1]["type_excluded"][OSCILLATORY]
     fdi, surface = swung([1] * 20)
-    oscillatory.pass_over(fdi, surface, OSCILLATORY)
+    on(oscillatory.pass_over, fdi, surface, OSCILLATORY)
     assert surface["oscillatory"]["steady_since"] == 20
 
 
@@ -312,31 +299,31 @@ def test_a_runaway_has_gone_at_least_its_way(length, ways):
     fdi, surface = new_surface(started_at=3, start_low=0.1, start_high=0.2, least_runaway_rate=1.0)
     fdi["types"]["config"]["length"] = length
     for frame, way in zip((3, 4, 8), ways, strict=True):
-        assert runaway.way(fdi, surface, frame) == pytest.approx(way)
-        assert runaway.upwards(fdi, surface, frame) == pytest.approx(0.1 + way)
-        assert runaway.downwards(fdi, surface, frame) == pytest.approx(0.2 - way)
-    assert runaway.upwards(fdi, surface, 99) == HIGH
-    assert runaway.downwards(fdi, surface, 99) == LOW
+        assert on(hardover.way, fdi, surface, frame) == pytest.approx(way)
+        assert on(hardover.upwards, fdi, surface, frame) == pytest.approx(0.1 + way)
+        assert on(hardover.downwards, fdi, surface, frame) == pytest.approx(0.2 - way)
+    assert on(hardover.upwards, fdi, surface, 99) == HIGH
+    assert on(hardover.downwards, fdi, surface, 99) == LOW
     surface["started_at"] = -1
-    assert (runaway.upwards(fdi, surface, 9), runaway.downwards(fdi, surface, 9)) == (LOW, HIGH)
+    assert (on(hardover.upwards, fdi, surface, 9), on(hardover.downwards, fdi, surface, 9)) == (LOW, HIGH)
 
 
 @pytest.mark.parametrize(
-    ("module", "kind", "inside", "outside"),
+    ("kind", "inside", "outside"),
     [
-        (stuck, STUCK, (0.1, 0.2), (0.31, 0.4)), (floating, FLOAT, (-0.1, 0.1), (0.01, 0.1)),
-        (hardover_up, UP, (0.1, 0.2), (0.0, 0.13)), (hardover_down, DOWN, (0.1, 0.2), (0.17, 0.3)),
+        (STUCK, (0.1, 0.2), (0.31, 0.4)), (FLOAT, (-0.1, 0.1), (0.01, 0.1)),
+        (UP, (0.1, 0.2), (0.0, 0.13)), (DOWN, (0.1, 0.2), (0.17, 0.3)),
     ],
 )  # fmt: skip
-def test_what_holds_a_surface_is_excluded_where_it_is_not(module, kind, inside, outside):
+def test_what_holds_a_surface_is_excluded_where_it_is_not(kind, inside, outside):
     for (low, high), excluded in ((inside, 0), (outside, 1)):
         fdi, surface = new_surface(low=low, high=high, started_at=3, start_low=0.1, start_high=0.2)
         surface["least_runaway_rate"] = 1.0
         surface["set_low"][STUCK], surface["set_high"][STUCK] = 0.05, 0.3
-        module.judge(fdi, surface, kind, 5)
+        on(TYPES[kind].judge, fdi, surface, kind, 5)
         assert surface["type_excluded"][kind] == excluded
     if kind == STUCK:
-        assert module.estimate(fdi, 0, kind) == pytest.approx(0.175)
+        assert TYPES[kind].estimate(fdi, 0, kind) == pytest.approx(0.175)
 
 
 @pytest.mark.parametrize(
@@ -347,7 +334,7 @@ def test_at_a_stop_the_mean_of_a_quick_swing_keeps_its_sign(whole, hides, exclud
     fdi, surface = new_surface(low=-0.2, high=-0.1, command=0.1)  # below its command all the time
     fdi["types"]["config"]["whole"], surface["hides_then"] = whole, hides
     for frame in range(30):
-        oscillatory.judge(fdi, surface, OSCILLATORY, frame)
+        on(oscillatory.judge, fdi, surface, OSCILLATORY, frame)
     assert surface["type_excluded"][OSCILLATORY] == excluded
 
 
@@ -363,9 +350,9 @@ def test_a_stop_hides_what_is_no_wider_than_the_interval_of_a_deflection(least, 
 
 def test_a_jam_narrows_to_where_it_is_seen():
     fdi, surface = new_surface(low=0.1, high=0.2)
-    stuck.judge(fdi, surface, STUCK, 5)
-    assert stuck.deflection(fdi, surface, STUCK) == (0.1, 0.2)
-    assert stuck.interval(fdi, 0, STUCK) == (0.1, 0.2)
+    on(stuck.judge, fdi, surface, STUCK, 5)
+    assert on(stuck.deflection, fdi, surface, STUCK) == (0.1, 0.2)
+    assert contract.set_of(fdi, 0, STUCK) == (0.1, 0.2)
 
 
 def test_where_types_have_a_surface():
@@ -374,15 +361,15 @@ def test_where_types_have_a_surface():
     )
     surface["command"], surface["set_low"][CONSTANT_LOSS] = -0.2, 0.25
     fdi["types"]["frame"] = 5
-    assert loss.deflection(fdi, surface, CONSTANT_LOSS) == pytest.approx((-0.2, -0.05))
-    assert floating.deflection(fdi, surface, FLOAT) == (0.0, 0.0)
+    assert on(loss.deflection, fdi, surface, CONSTANT_LOSS) == pytest.approx((-0.2, -0.05))
+    assert on(stuck.deflection_float, fdi, surface, FLOAT) == (0.0, 0.0)
     surface["travel_low"] = 0.1  # the lower stop is as near to neutral as it comes
-    assert floating.deflection(fdi, surface, FLOAT) == (0.1, 0.1)
-    assert floating.estimate(fdi, 0, FLOAT) == 0.1
+    assert on(stuck.deflection_float, fdi, surface, FLOAT) == (0.1, 0.1)
+    assert stuck.neutral_of(fdi, 0, FLOAT) == 0.1
     surface["travel_low"] = LOW
-    assert hardover_up.deflection(fdi, surface, UP) == pytest.approx((0.14, HIGH))
-    assert hardover_down.deflection(fdi, surface, DOWN) == pytest.approx((LOW, 0.16))
-    assert [module.estimate(fdi, 0, 0) for module in (floating, hardover_up, hardover_down)] == [
+    assert on(hardover.deflection_up, fdi, surface, UP) == pytest.approx((0.14, HIGH))
+    assert on(hardover.deflection_down, fdi, surface, DOWN) == pytest.approx((LOW, 0.16))
+    assert [TYPES[kind].estimate(fdi, 0, kind) for kind in (FLOAT, UP, DOWN)] == [
         0.0,
         HIGH,
         LOW,
@@ -409,7 +396,7 @@ def test_a_return_goes_by_the_actuator(instants):
     for _ in range(instants):
         path.append(place)
         place -= min(0.5 * place, 0.1)
-    assert release.carried(fdi, surface, 0.3) == pytest.approx((np.mean(path), place, 0.0))
+    assert on(release.carried, fdi, surface, 0.3) == pytest.approx((np.mean(path), place, 0.0))
 
 
 @given(st.lists(st.floats(0.5, 2.0), min_size=1, max_size=9), st.floats(-0.4, 0.5), st.floats(-0.4, 0.5))
@@ -422,23 +409,25 @@ def test_what_a_frame_shows_of_a_return_is_weighted_by_the_effectiveness_then(G,
         path.append(path[-1] + np.clip(0.5 * (order - path[-1]), -0.1, 0.1))
     shown = np.sum(G * path) / np.sum(G)
     surface["uneven_then"] = 0.25 * (G.max() - G.min()) / G.mean()
-    mean, _, room = release.carried(fdi, surface, held)
+    mean, _, room = on(release.carried, fdi, surface, held)
     assert abs(shown - mean) <= room + 1e-15
     surface["command_then"], surface["low_then"], surface["high_then"] = 9.0, shown - 1e-12, shown + 1e-12
-    assert release.possible(fdi, surface, STUCK)
+    assert on(release.possible, fdi, surface, STUCK)
 
 
 def test_a_return_keeps_where_it_agrees_and_ends_where_it_does_not():
     fdi, surface = released(judged=(0.22, 0.28))
-    assert release.possible(fdi, surface, STUCK)
+    assert on(release.possible, fdi, surface, STUCK)
     held = surface["release"]
     assert (held["low"][1, STUCK], held["high"][1, STUCK]) == pytest.approx((0.22, 0.28))
     for judged in ((0.31, 0.4), (0.1, 0.19)):
         fdi, surface = released(judged=judged)
-        assert not release.possible(fdi, surface, STUCK)
+        assert not on(release.possible, fdi, surface, STUCK)
         assert not release.any_release(surface, release.LATER, STUCK)
     fdi, surface = released(low=0.1, high=0.1, judged=(0.0, 0.2), command=0.1)
-    assert not release.possible(fdi, surface, STUCK)  # it is back: no release explains that anything is wrong
+    assert not on(
+        release.possible, fdi, surface, STUCK
+    )  # it is back: no release explains that anything is wrong
 
 
 @pytest.mark.parametrize(("length", "instants"), [(1, 3), (3, 1)])
@@ -449,7 +438,7 @@ def test_a_return_has_the_room_that_an_uneven_effectiveness_gives_it(length, ins
         fdi, surface = released(low=0.2, high=0.2, order=0.9, judged=(shown, shown), instants=instants)
         fdi["types"]["config"]["length"], surface["approach"], surface["step"] = length, 1.0, 0.05
         surface["uneven_then"] = 0.2
-        assert release.possible(fdi, surface, STUCK) == there
+        assert on(release.possible, fdi, surface, STUCK) == there
 
 
 def test_what_is_let_go_joins_the_later_releases_and_is_carried_on():
@@ -463,11 +452,11 @@ def test_what_is_let_go_joins_the_later_releases_and_is_carried_on():
     release.let_go(surface, STUCK, -0.4, 0.5)
     assert (held["low"][1, STUCK], held["high"][1, STUCK]) == (0.1, 0.3)
     surface["wrong_then"] = 1
-    release.bring_back(fdi, surface, STUCK)
+    on(release.bring_back, fdi, surface, STUCK)
     assert (held["low"][1, STUCK], held["high"][1, STUCK]) == pytest.approx((0.05, 0.2))
     assert held["released"][STUCK] == 1
     surface["wrong_then"] = 0
-    release.bring_back(fdi, surface, STUCK)
+    on(release.bring_back, fdi, surface, STUCK)
     assert held["released"][STUCK] == 0
 
 
@@ -475,28 +464,26 @@ def test_what_is_let_go_joins_the_later_releases_and_is_carried_on():
 def test_a_type_that_no_longer_holds_is_excluded_unless_a_return_explains_it(returns):
     fdi, surface = released(judged=(0.2, 0.3))
     fdi["types"]["config"]["returns"] = returns
-    assert not release.holds(fdi, surface, STUCK, -0.1, 0.1)
+    assert not on(release.holds, fdi, surface, STUCK, -0.1, 0.1)
     assert surface["type_excluded"][STUCK] == (not returns)
     assert surface["release"]["released"][STUCK] == returns
     fdi, surface = released(judged=(0.2, 0.3))
     fdi["types"]["config"]["returns"] = returns
-    assert release.holds(fdi, surface, STUCK, 0.3, 0.4)
-    assert release.holds(fdi, surface, STUCK, 0.1, 0.2)
+    assert on(release.holds, fdi, surface, STUCK, 0.3, 0.4)
+    assert on(release.holds, fdi, surface, STUCK, 0.1, 0.2)
     surface["release"]["released"][STUCK] = 1
-    assert not release.holds(fdi, surface, STUCK, 0.1, 0.2)
+    assert not on(release.holds, fdi, surface, STUCK, 0.1, 0.2)
 
 
 def test_where_a_surface_was_as_the_judged_frame_began():
     fdi, surface = new_surface(low=0.1, high=0.2, low_before=0.3, high_before=0.4)
-    assert release.beginning(fdi, surface) == (0.1, 0.2, 9)
+    assert on(release.beginning, fdi, surface) == (0.1, 0.2, 9)
     fdi["types"]["config"]["whole"] = 0
-    assert release.beginning(fdi, surface) == (0.3, 0.4, 8)
+    assert on(release.beginning, fdi, surface) == (0.3, 0.4, 8)
 
 
-@pytest.mark.parametrize(
-    ("module", "kind"), [(stuck, STUCK), (floating, FLOAT), (hardover_up, UP), (hardover_down, DOWN)]
-)
-def test_from_where_each_type_lets_go(module, kind):
+@pytest.mark.parametrize("kind", [STUCK, FLOAT, UP, DOWN])
+def test_from_where_each_type_lets_go(kind):
     fdi, surface = released(low=np.inf, high=-np.inf, judged=(-0.1, 0.2), started_at=7, start_low=0.0)
     surface["least_runaway_rate"], surface["start_high"] = 1.0, 0.1
     surface["set_low"][STUCK], surface["set_high"][STUCK] = 0.05, 0.3
@@ -507,21 +494,19 @@ def test_from_where_each_type_lets_go(module, kind):
             surface["release"]["low"][release.EARLIER, STUCK],
             surface["release"]["high"][release.EARLIER, STUCK],
         ) = 0.0, 0.1
-    module.let_go(fdi, surface, kind)
+    on(TYPES[kind].let_go, fdi, surface, kind)
     held = surface["release"]
     expected = {STUCK: (0.05, 0.2), FLOAT: (0.0, 0.0), UP: (0.04, 0.2), DOWN: (-0.1, 0.06)}[kind]
     assert (held["low"][1, kind], held["high"][1, kind]) == pytest.approx(expected)
 
 
-@pytest.mark.parametrize(
-    ("module", "kind", "expected"), [(hardover_up, UP, (0.02, HIGH)), (hardover_down, DOWN, (LOW, 0.08))]
-)
-def test_within_a_frame_of_several_instants_a_runaway_may_be_let_go_further_on(module, kind, expected):
+@pytest.mark.parametrize(("kind", "expected"), [(UP, (0.02, HIGH)), (DOWN, (LOW, 0.08))])
+def test_within_a_frame_of_several_instants_a_runaway_may_be_let_go_further_on(kind, expected):
     fdi, surface = released(started_at=7, start_low=0.0, start_high=0.1, least_runaway_rate=1.0)
     surface["low_before"], surface["high_before"], fdi["types"]["config"]["whole"] = -0.1, 0.2, 0
     for which in (0, 1):
         release.forget(surface, which, kind)
-    module.let_go(fdi, surface, kind)
+    on(TYPES[kind].let_go, fdi, surface, kind)
     held = surface["release"]
     assert (held["low"][1, kind], held["high"][1, kind]) == pytest.approx(expected)
 
@@ -543,7 +528,7 @@ def test_a_jam_that_may_have_let_go_returns_to_what_was_known_before():
     stuck.settle(surface, STUCK)
     assert (surface["set_low"][STUCK], surface["set_high"][STUCK]) == (0.1, 0.4)
     surface["wrong_then"], surface["set_low"][STUCK] = 1, 0.3
-    stuck.bring_back(fdi, surface, STUCK)
+    on(stuck.bring_back, fdi, surface, STUCK)
     assert surface["set_low"][STUCK] == 0.3
 
 
@@ -577,7 +562,7 @@ def test_let_go_at_any_instant_a_surface_lies_between_the_ways_that_stay_on_one_
             path.append(place)
             place = extreme(way(place, [order])[1], start)
         room = UNEVEN * np.ptp(path)
-        assert release.carried(fdi, surface, start, side) == pytest.approx((np.mean(path), place, room))
+        assert on(release.carried, fdi, surface, start, side) == pytest.approx((np.mean(path), place, room))
         for wait in range(len(ORDERS)):  # held so long, then let go
             mean = np.mean([*[start] * wait, *way(start, ORDERS[wait:-1])])
             assert -side * (mean - np.mean(path)) >= -1e-12
@@ -588,22 +573,22 @@ def test_let_go_at_any_instant_a_surface_lies_between_the_ways_that_stay_on_one_
 def test_a_release_within_the_block_explains_what_lies_between_with_some_room(end, inside):
     fdi, surface = within_block(ORDERS)
     start, side = (0.2, -1) if end == "low" else (0.3, 1)
-    mean, _, room = release.carried(fdi, surface, start, side)
+    mean, _, room = on(release.carried, fdi, surface, start, side)
     assert room > 1e-3
     edge = mean + side * room
     beyond = edge - side * 1e-6 if inside else edge + side * 1e-6
     surface["low_then"], surface["high_then"] = (-1.0, beyond) if end == "low" else (beyond, 1.0)
-    assert release.let_go_within(fdi, surface, STUCK) == inside
-    assert release.possible(fdi, surface, STUCK) == inside
+    assert on(release.let_go_within, fdi, surface, STUCK) == inside
+    assert on(release.possible, fdi, surface, STUCK) == inside
     held = surface["release"]["held_low"][STUCK] <= surface["release"]["held_high"][STUCK]
     assert held == inside, "what explains nothing is forgotten"
     fdi["types"]["config"]["length"] = 1
-    assert not release.let_go_within(fdi, surface, STUCK)
+    assert not on(release.let_go_within, fdi, surface, STUCK)
 
 
 def test_what_is_held_nowhere_is_not_let_go_within():
     fdi, surface = within_block(ORDERS, held=(0.3, 0.2))
-    assert not release.let_go_within(fdi, surface, STUCK)
+    assert not on(release.let_go_within, fdi, surface, STUCK)
 
 
 @pytest.mark.parametrize("joined", [False, True])
@@ -612,13 +597,13 @@ def test_after_a_block_releases_within_it_join_the_later_ones(joined):
     held = surface["release"]
     if joined:
         held["low"][1, STUCK], held["high"][1, STUCK] = 0.25, 0.251
-    release.bring_back(fdi, surface, STUCK)
-    low, high = (release.carried(fdi, surface, *of)[1] for of in ((0.2, -1), (0.3, 1)))
+    on(release.bring_back, fdi, surface, STUCK)
+    low, high = (on(release.carried, fdi, surface, *of)[1] for of in ((0.2, -1), (0.3, 1)))
     assert (held["low"][1, STUCK], held["high"][1, STUCK]) == pytest.approx((low, high))
     assert not release.any_release(surface, release.EARLIER, STUCK)
     fdi["types"]["config"]["length"], before = 1, held["high"][1, STUCK].copy()
     release.forget(surface, release.LATER, STUCK)
-    release.bring_back(fdi, surface, STUCK)
+    on(release.bring_back, fdi, surface, STUCK)
     assert not release.any_release(surface, release.LATER, STUCK), "in one frame nothing is let go within"
     assert before == pytest.approx(high)
 
@@ -631,12 +616,14 @@ def test_where_the_effectiveness_changes_a_return_has_a_share_of_its_way_as_room
     held, start = surface["release"], 0.2 if side == "low" else 0.3
     surface["uneven_then"], path = UNEVEN, way(start, ORDERS)
     mean = path[:-1].mean()
-    assert release.carried(fdi, surface, start) == pytest.approx((mean, path[-1], UNEVEN * np.ptp(path[:-1])))
+    assert on(release.carried, fdi, surface, start) == pytest.approx(
+        (mean, path[-1], UNEVEN * np.ptp(path[:-1]))
+    )
     room = max(UNEVEN * np.ptp(way(other, ORDERS)[:-1]) for other in (0.2, 0.3))
     sign = -1.0 if side == "low" else 1.0
     beyond = mean + sign * (room + (-1e-6 if inside else 1e-6))
     surface["low_then"], surface["high_then"] = (-1.0, beyond) if side == "low" else (beyond, 1.0)
-    assert release.agrees(fdi, surface, release.LATER, STUCK) == inside
+    assert on(release.agrees, fdi, surface, release.LATER, STUCK) == inside
     if inside:  # nearly all that could have been let go is left out; but the ends may not pass
         assert held["low"][1, STUCK] <= held["high"][1, STUCK]
         kept = held["low" if side == "low" else "high"][1, STUCK]
@@ -646,7 +633,7 @@ def test_where_the_effectiveness_changes_a_return_has_a_share_of_its_way_as_room
 def test_a_jam_let_go_without_an_earlier_release_is_the_earlier_one_then():
     fdi, surface = released(low=0.1, high=0.3, judged=(0.0, 0.25))
     surface["set_low"][STUCK], surface["set_high"][STUCK] = 0.15, 0.22
-    stuck.let_go(fdi, surface, STUCK)
+    on(stuck.let_go, fdi, surface, STUCK)
     held = surface["release"]
     assert (held["low"][0, STUCK], held["high"][0, STUCK]) == (0.1, 0.3)
     assert (held["low"][1, STUCK], held["high"][1, STUCK]) == (0.15, 0.22)
@@ -657,19 +644,19 @@ def test_a_jam_that_looks_healthy_is_what_it_was_before():
     fdi, surface = released(low=0.2, high=0.3, wrong_then=0)
     surface["stuck"]["kept_low"], surface["stuck"]["kept_high"] = (0.0, 0.1), (0.2, 0.4)
     surface["set_low"][STUCK], surface["set_high"][STUCK] = 0.25, 0.26
-    stuck.bring_back(fdi, surface, STUCK)
+    on(stuck.bring_back, fdi, surface, STUCK)
     assert (surface["set_low"][STUCK], surface["set_high"][STUCK]) == (0.1, 0.4)
     surface["release"]["low"][0, STUCK], surface["release"]["high"][0, STUCK] = 0.1, 0.2
-    stuck.bring_back(fdi, surface, STUCK)
+    on(stuck.bring_back, fdi, surface, STUCK)
     assert (surface["set_low"][STUCK], surface["set_high"][STUCK]) == (0.0, 0.2)
 
 
 def test_a_frame_that_may_be_on_either_side_ends_no_half_cycle_and_begins_the_count_anew():
     fdi, surface = new_surface(low=-0.1, high=0.2)
-    oscillatory.judge(fdi, surface, OSCILLATORY, 10)
+    on(oscillatory.judge, fdi, surface, OSCILLATORY, 10)
     swing = surface["oscillatory"]
     assert (swing["sign"], swing["half_cycles"], swing["steady_since"]) == (0, 0, 11)
     for low, high in ((0.0, 0.3), (-0.3, 0.0)):
         surface["low_then"], surface["high_then"] = low, high
-        oscillatory.judge(fdi, surface, OSCILLATORY, 10)
+        on(oscillatory.judge, fdi, surface, OSCILLATORY, 10)
         assert swing["sign"] == 0, "on its command it is on no side of it"

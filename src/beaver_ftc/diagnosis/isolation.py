@@ -25,7 +25,7 @@ from beaver_ftc.diagnosis.state import (
 )
 from beaver_ftc.diagnosis.statistical import excludes, shows
 from beaver_ftc.diagnosis.thresholds import bound_step, interval, noise_step, published
-from beaver_ftc.diagnosis.types import blocks, examine, pairs, verdict
+from beaver_ftc.diagnosis.types import examine, pairs, verdict
 
 
 @kernel
@@ -64,7 +64,7 @@ def start(fdi, x):
             fie.covariance[i] = (fie.high - fie.low) ** 2 / 12.0  # of a uniform distribution
             fie.theta_low[i], fie.theta_high[i] = fie.low, fie.high
     if fdi.config.every_type:
-        examine.start(fdi)
+        examine.start(fdi.types)
 
 
 @kernel
@@ -179,16 +179,15 @@ def isolate(fdi, x, t, started):
 @apart
 def isolate_type(fdi, t, started):
     """Of faults of every type, alone or two at a time, decide which it is."""
-    if fdi.types.pair.enabled:
-        pairs.examine(fdi)
-        pairs.decide(fdi, t)
+    types, layout, estimators = fdi.types, fdi.layout, fdi.isolation.estimator
+    verdict.note_refuted(types.surface, layout, estimators)
+    if types.pair.enabled:
+        pairs.examine(types, layout, estimators, fdi.bank, fdi.bound.frame)
+        pairs.decide(types, fdi.verdict, layout, t)
         return
     if started or fdi.isolation.memory:
-        if fdi.types.config.length > 1:
-            blocks.examine(fdi)
-        else:
-            examine.examine(fdi)
-    verdict.decide(fdi, t)
+        examine.examine(types, layout, estimators, fdi.bank.innovation, fdi.bound)
+    verdict.decide(types, fdi.verdict, layout, estimators, t)
 
 
 @kernel

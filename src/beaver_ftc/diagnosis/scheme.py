@@ -36,7 +36,7 @@ from beaver_ftc.diagnosis.state import (
 )
 from beaver_ftc.diagnosis.statistical import STATISTICAL
 from beaver_ftc.diagnosis.types import examine
-from beaver_ftc.diagnosis.types.memory import types_dtype
+from beaver_ftc.diagnosis.types.registry import types_dtype
 from beaver_ftc.diagnosis.watch import WATCH
 
 
@@ -82,7 +82,7 @@ def predict(fdi, belief, measured, effectiveness, offset, k, t):
         compare_likelihoods(fdi, belief, measured, k, t)
     isolation.suppose_all(fdi, mean.G, mean.Gu, mean.Gu_spread)
     if fdi.config.every_type:
-        examine.note_orders(fdi, belief.commanded, mean)
+        examine.note_orders(fdi.types, belief.commanded, mean)
     if fdi.verdict.detected:
         isolation.predict_all(fdi, x_then, expected)
         expect_known_faults(expected, mean, effectiveness, offset, fdi.config.every_type)

@@ -115,7 +115,8 @@ def _assemble_types(frame: np.void, scenario: Scenario, dt: float, travel: np.nd
     if config.pairs:
         _assemble_pairs(fdi, scenario.airframe)
     fdi["config"]["instants"] = going_by["instants"] = scenario.substeps
-    going_by["returns"] = actuators["real"]
+    going_by["returns"], going_by["dt"] = actuators["real"], dt
+    going_by["abrupt"] = config.fault_profile == "abrupt"
     surfaces, instant_s = scenario.airframe.surfaces, dt / scenario.substeps
     for s, (name, place, low, high) in enumerate(zip(surfaces, types["surface"], *travel, strict=True)):
         place["travel_low"], place["travel_high"] = low, high
@@ -191,7 +192,8 @@ def _assemble_admitted(frame: np.void, scenario: Scenario) -> None:
     mass = mass_of(scenario.design_model, scenario.airframe)
     admit(admitted, scenario.fdi.bounds, scenario.airframe, frame["belief"]["design"], mass)
     admit_engine(admitted, scenario)
-    frame["fdi"]["bound"]["own_errors"] = admitted["any"] and scenario.fdi.fault_class == "all"
+    own_errors = admitted["any"] and scenario.fdi.fault_class == "all"
+    frame["fdi"]["bound"]["own_errors"] = frame["fdi"]["types"]["config"]["own_errors"] = own_errors
     if scenario.fdi.pairs and frame["fdi"]["types"]["config"]["length"] > 1:
         raise BadInput(
             f"{scenario.name}: fdi.pairs is not available with errors of the gyros that vary declared in "

@@ -38,9 +38,8 @@ from beaver_ftc.diagnosis.scheme import (
     unknown_acceleration,
 )
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, PITCH, verdict_dtype
-from beaver_ftc.diagnosis.types import candidates
 from beaver_ftc.diagnosis.types.examine import FIXED, LAGS, LOSES, SHIFTED
-from beaver_ftc.diagnosis.types.verdict import deflection_error, effectiveness_left
+from beaver_ftc.diagnosis.types.verdict import deflection_error, effectiveness_left, possible
 from beaver_ftc.loop.accounts import (
     account_authority,
     account_surfaces,
@@ -195,9 +194,10 @@ def assess_loss(fdi, assessment, s):
 @kernel
 def assess_type(fdi, assessment, s):
     """What the diagnosis of every type makes of surface s."""
-    surface, at_fault = fdi.types.surface[s], candidates.possible(fdi, s)
+    surface = fdi.types.surface[s]
+    at_fault = possible(surface)
     if surface.measure == LOSES:
-        assessment.effectiveness[s] = effectiveness_left(fdi, s)
+        assessment.effectiveness[s] = effectiveness_left(fdi.types, fdi.layout, fdi.isolation.estimator, s)
     elif surface.measure == FIXED:
         assessment.effectiveness[s], assessment.at_once[s] = 0.0, 1
         assessment.offset[s] = surface.command + deflection_error(surface, at_fault)

@@ -20,6 +20,6 @@ A frame that eta alone explains gives no information: so a fault may be intermit
 constant while it is there, is never excluded, and so never misnamed. What cannot be told apart stays a
 candidate.
 
-One file a type (contract.py says what is in it); registry.py lists them; examine.py shows them each frame;
-candidates.py and verdict.py conclude; findings.py says it in words.
+One file a type under table/ (contract.py says what is in it); registry.py reads them; examine.py shows them
+each frame; verdict.py and pairs.py conclude; findings.py says it in words.
 """

@@ -2,14 +2,26 @@
 
 A frame is judged when the next one is there: with several JSBSim frames in one of ours a fault may begin or
 end within a frame, which then shows a part of it; such a frame, next to a healthy one, is passed over.
+
+Where a gyro's noise makes a single frame say little, frames are examined in blocks. Summed over a block the
+innovation holds the noise of its two ends alone, n[k+N] - n[k]. So the mean over N frames has the bound
+
+    mean eta_bar + (nbar[k] + nbar[k+N]) / (N dt)
+
+and with it says where the surface was in the mean, weighted by its effectiveness G, whose sign stays. Of a
+constant position, offset or effectiveness the weighted mean is exact; of what varies it lies between the
+extremes. A block is then to the types what a frame is that consists of several JSBSim frames: one next to a
+healthy one is passed over.
+
+types: of `types_dtype`. estimators: those of the isolation; layout: whose is which. bound: of `bound_dtype`.
 """
 
 import numpy as np
 
 from beaver_ftc.compiled import kernel
 from beaver_ftc.diagnosis import membership
-from beaver_ftc.diagnosis.types.memory import HISTORY
 from beaver_ftc.diagnosis.types.registry import (
+    HISTORY,
     OSCILLATORY,
     STUCK,
     begin_each,
@@ -25,10 +37,10 @@ LOSES, FIXED, SHIFTED, LAGS = range(4)
 
 
 @kernel
-def start(fdi):
+def start(types):
     """Nothing is known of any surface yet."""
-    for s in range(fdi.types.surface.size):
-        begin(fdi.types.surface[s])
+    for s in range(types.surface.size):
+        begin(types.surface[s])
 
 
 @kernel
@@ -43,25 +55,24 @@ def begin(surface):
 
 
 @kernel
-def note_orders(fdi, commanded, means):
+def note_orders(types, commanded, means):
     """What the surfaces have been ordered to do, commanded (n,) rad, since the elapsed frame began; where
     healthy ones were, and their least and greatest effectiveness, within it: means of a `belief.means_dtype`.
     """
-    for s in range(fdi.types.surface.size):
-        surface = fdi.types.surface[s]
+    length = types.config.length
+    for s in range(types.surface.size):
+        surface = types.surface[s]
         orders = surface.orders
-        if fdi.types.block.filled == 0:
+        if types.block.filled == 0:
             for age in range(HISTORY - 1, 0, -1):
-                orders.given[age, : fdi.types.config.length] = orders.given[
-                    age - 1, : fdi.types.config.length
-                ]
+                orders.given[age, :length] = orders.given[age - 1, :length]
                 orders.low[age], orders.high[age] = orders.low[age - 1], orders.high[age - 1]
             orders.low[0], orders.high[0] = np.inf, -np.inf
             orders.least[1], orders.greatest[1] = orders.least[0], orders.greatest[0]
             orders.least[0], orders.greatest[0] = np.inf, -np.inf
             surface.G_least, surface.G_most = np.inf, -np.inf
         order = min(max(commanded[s], surface.travel_low), surface.travel_high)
-        orders.given[0, fdi.types.block.filled] = order
+        orders.given[0, types.block.filled] = order
         orders.low[0], orders.high[0] = min(orders.low[0], order), max(orders.high[0], order)
         orders.least[0] = min(orders.least[0], means.u_least[s])
         orders.greatest[0] = max(orders.greatest[0], means.u_most[s])
@@ -70,16 +81,12 @@ def note_orders(fdi, commanded, means):
 
 
 @kernel
-def locate(fdi, s, innovation, bound, effect):
-    """Find where surface s can have been (rad): what agrees with the innovation (3,) within its bound (3,).
+def locate(config, surface, fie, axis, innovation, bound, effect):
+    """Find where a surface can have been (rad): what agrees with the innovation (3,) within its bound (3,).
 
-    effect: what the surface's estimator supposes of the same frame or block, dtype EFFECT.
+    fie: its estimator of a position; axis: on which it has most effect; effect: what that supposes of the
+    same frame or block, dtype EFFECT.
     """
-    surface, fie, axis = (
-        fdi.types.surface[s],
-        fdi.isolation.estimator[fdi.layout.position_of[s]],
-        fdi.layout.dominant_axis[s],
-    )
     surface.low_before, surface.high_before = surface.low_then, surface.high_then
     surface.low_then, surface.high_then, surface.command_then = surface.low, surface.high, surface.command
     surface.command = -effect.offset[axis] / effect.Z[axis]
@@ -87,7 +94,7 @@ def locate(fdi, s, innovation, bound, effect):
     surface.uneven = 0.25 * (surface.G_most - surface.G_least) / abs(effect.Z[axis])
     surface.low, surface.high = fie.low, fie.high
     for i in range(3):
-        if fdi.types.config.length > 1 and i != axis and effect.Z[i] != 0.0:
+        if config.length > 1 and i != axis and effect.Z[i] != 0.0:
             continue  # over a block the axes weigh what varies differently
         low, high = membership.agreeing(innovation, bound, fie, effect, i)
         surface.low, surface.high = max(surface.low, low), min(surface.high, high)
@@ -104,21 +111,24 @@ def note_stops(surface, width):
 
 
 @kernel
-def note_wrong(fdi, innovation, bound):
+def note_wrong(surfaces, innovation, bound):
     """Keep for every surface whether more than the admitted uncertainty was at work."""
     wrong = not membership.healthy(innovation, bound)
-    for s in range(fdi.types.surface.size):
-        surface = fdi.types.surface[s]
+    for s in range(surfaces.size):
+        surface = surfaces[s]
         surface.wrong_before, surface.wrong_then, surface.wrong = surface.wrong_then, surface.wrong, wrong
 
 
 @kernel
-def take_in_frame(fdi):
-    """Find where each surface was in the elapsed frame, if it alone is at fault."""
-    note_wrong(fdi, fdi.bank.innovation, fdi.bound.frame)
-    for s in range(fdi.types.surface.size):
-        effect = fdi.isolation.estimator[fdi.layout.position_of[s]].effect
-        locate(fdi, s, fdi.bank.innovation, fdi.bound.frame, effect)
+def take_in_frame(types, layout, estimators, innovation, frame_bound):
+    """Find where each surface was in the elapsed frame, if it alone is at fault.
+
+    frame_bound (3,): on its innovation (3,) without a fault, rad/s2.
+    """
+    note_wrong(types.surface, innovation, frame_bound)
+    for s in range(types.surface.size):
+        fie, axis = estimators[layout.position_of[s]], layout.dominant_axis[s]
+        locate(types.config, types.surface[s], fie, axis, innovation, frame_bound, fie.effect)
 
 
 @kernel
@@ -129,57 +139,108 @@ def note_evidence(surface):
 
 
 @kernel
-def judge(fdi, surface, frame):
+def judge(config, surface, frame):
     """Hold every type of one surface against the frame before the elapsed one: something was wrong in it."""
     if surface.low_then > surface.high_then:
         return
     if surface.started_at < 0:
         surface.started_at, surface.start_low, surface.start_high = frame, surface.low_then, surface.high_then
-    judge_each(fdi, surface, frame)
+    judge_each(config, surface, frame)
 
 
 @kernel
-def judge_all(fdi):
+def judge_all(types):
     """Judge the frame before the elapsed one."""
-    for s in range(fdi.types.surface.size):
-        surface = fdi.types.surface[s]
-        watch_each(fdi, surface)
-        if fdi.types.config.returns and fdi.types.frame > 0:
-            let_go_each(fdi, surface)
-        if fdi.config.abrupt and surface.measure == FIXED and not surface.wrong_then:
-            note_quiet(fdi, s)
-        elif surface.wrong_then and (fdi.types.config.whole or (surface.wrong_before and surface.wrong)):
+    config, frame = types.config, types.frame - 1
+    for s in range(types.surface.size):
+        surface = types.surface[s]
+        watch_each(config, surface)
+        if config.returns and types.frame > 0:
+            let_go_each(config, surface, frame)
+        if config.abrupt and surface.measure == FIXED and not surface.wrong_then:
+            note_quiet(types, s)
+        elif surface.wrong_then and (config.whole or (surface.wrong_before and surface.wrong)):
             note_evidence(surface)
-            judge(fdi, surface, fdi.types.frame - 1)
+            judge(config, surface, frame)
         else:
-            pass_over_each(fdi, surface)
-        if fdi.types.config.returns and fdi.types.frame > 0:
-            bring_back_each(fdi, surface)
+            pass_over_each(config, surface, frame)
+        if config.returns and types.frame > 0:
+            bring_back_each(config, surface)
         if surface.hides_then[0] or surface.hides_then[1]:
             surface.unhidden = 0
-    fdi.types.frame += 1
+    types.frame += 1
 
 
 @kernel
-def examine(fdi):
-    """Take in the elapsed frame, and judge the one before."""
-    take_in_frame(fdi)
-    judge_all(fdi)
+def examine(types, layout, estimators, innovation, bound):
+    """Take in the elapsed frame, and judge the one before: it, or the block that it completes."""
+    if types.config.length > 1:
+        examine_block(types, layout, estimators, innovation, bound)
+        return
+    take_in_frame(types, layout, estimators, innovation, bound.frame)
+    judge_all(types)
 
 
 @kernel
-def note_quiet(fdi, s):
+def begin_block(types, layout, estimators, noise_then):
+    """Begin a block with the elapsed frame; noise_then (3,): as it began."""
+    block = types.block
+    block.innovation[:], block.bound[:] = 0.0, 0.0
+    block.noise[:] = noise_then
+    for s in range(types.surface.size):
+        effect = estimators[layout.position_of[s]].block_effect
+        effect.offset[:], effect.Z[:], effect.spread[:] = 0.0, 0.0, 0.0
+
+
+@kernel
+def add_to_block(types, layout, estimators, innovation, eta_bar):
+    """Add the elapsed frame to the means over the block."""
+    block, share = types.block, 1.0 / types.config.length
+    for i in range(3):
+        block.innovation[i] += share * innovation[i]
+        block.bound[i] += share * eta_bar[i]
+    for s in range(types.surface.size):
+        fie = estimators[layout.position_of[s]]
+        frame, mean = fie.effect, fie.block_effect
+        for i in range(3):
+            mean.offset[i] += share * frame.offset[i]
+            mean.Z[i] += share * frame.Z[i]
+            mean.spread[i] += share * frame.spread[i]
+
+
+@kernel
+def examine_block(types, layout, estimators, innovation, bound):
+    """Take in the elapsed frame; with the last one of a block, take in the block and judge the one before."""
+    config, block = types.config, types.block
+    if block.filled == 0:
+        begin_block(types, layout, estimators, bound.noise_then)
+    add_to_block(types, layout, estimators, innovation, bound.eta_bar)
+    block.filled += 1
+    if block.filled < config.length:
+        return
+    block.filled = 0
+    for i in range(3):
+        block.bound[i] += (block.noise[i] + bound.noise[i]) / config.span_s
+    note_wrong(types.surface, block.innovation, block.bound)
+    for s in range(types.surface.size):
+        fie, axis = estimators[layout.position_of[s]], layout.dominant_axis[s]
+        locate(config, types.surface[s], fie, axis, block.innovation, block.bound, fie.block_effect)
+    judge_all(types)
+
+
+@kernel
+def note_quiet(types, s):
     """A surface given up, and commanded to where it happens to be, shows by its quiet that it does not swing.
 
     That is evidence against the others too, as far as one of them all is in question. It takes a fault that
     is declared to stay: of one that may go, the quiet may be that of health.
     """
-    surface = fdi.types.surface[s]
+    surface = types.surface[s]
     if surface.low_then > surface.set_high[STUCK] or surface.high_then < surface.set_low[STUCK]:
         return
-    for other in range(fdi.types.surface.size):
-        if other == s or (surface.in_question and fdi.types.surface[other].in_question):
-            note_evidence(fdi.types.surface[other])
+    for other in range(types.surface.size):
+        if other == s or (surface.in_question and types.surface[other].in_question):
+            note_evidence(types.surface[other])
     surface.quiet += 1
-    if surface.quiet > fdi.types.config.patience and not fdi.bound.own_errors:
+    if surface.quiet > types.config.patience and not types.config.own_errors:
         surface.type_excluded[OSCILLATORY] = 1

@@ -11,7 +11,6 @@ import numpy as np
 
 from beaver_ftc.aircraft import load
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, UNANTICIPATED
-from beaver_ftc.diagnosis.types.candidates import BY_DEDUCTION, RULED_OUT
 from beaver_ftc.diagnosis.types.pairs import IN_PITCH
 from beaver_ftc.diagnosis.types.registry import (
     BIAS,
@@ -26,8 +25,8 @@ from beaver_ftc.diagnosis.types.registry import (
     TYPES,
     UP,
     VARYING_LOSS,
-    part,
 )
+from beaver_ftc.diagnosis.types.verdict import BY_DEDUCTION, RULED_OUT
 
 Found = dict[str, Any]
 _NOTHING: Found = {
@@ -113,7 +112,7 @@ def _found_on(fdi: np.void, s: int, kind: int, names: Sequence[str]) -> Found:
         "candidates": (NAMES[kind],) if kind >= 0 else tuple(_types_left(fdi, s)),
         "estimate": estimate_of(fdi, s, kind),
         "estimate_interval": _of_type(kind, "interval", fdi, s, kind),
-        "frequency_rad_s": _of_type(kind, "frequency_rad_s", fdi, s),
+        "frequency_rad_s": _of_type(kind, "frequency_rad_s", fdi, s, kind),
     }
 
 
@@ -124,18 +123,15 @@ def estimate_of(fdi: np.void, s: int, kind: int) -> float | None:
 
 
 def _of_type(kind: int, what: str, *arguments: Any) -> Any:
-    """What a type's own module says; None while the type is open."""
-    return part(TYPES[kind], what)(*arguments) if kind >= 0 else None
+    """What a type's row says; None while the type is open."""
+    return getattr(TYPES[kind], what)(*arguments) if kind >= 0 else None
 
 
 def _possible(fdi: np.void, s: int) -> bool:
     surface = fdi["types"]["surface"][s]
     if surface["named"] or surface["standing"] == BY_DEDUCTION:
         return True
-    return not (
-        surface["standing"] == RULED_OUT
-        or fdi["isolation"]["estimator"][int(fdi["layout"]["position_of"][s])]["excluded"]
-    )
+    return not (surface["standing"] == RULED_OUT or surface["refuted"])
 
 
 def _types_left(fdi: np.void, s: int) -> list[str]:
@@ -146,7 +142,7 @@ def _types_left(fdi: np.void, s: int) -> list[str]:
     """
     surface = fdi["types"]["surface"][s]
     left = [kind for kind in range(N_TYPES) if _possible(fdi, s) and not surface["type_excluded"][kind]]
-    if any(kind < N_CONSTANT for kind in left) and not fdi["bound"]["own_errors"]:
+    if any(kind < N_CONSTANT for kind in left) and not fdi["types"]["config"]["own_errors"]:
         early = surface["evidence"] - surface["quiet"] < fdi["types"]["config"]["patience"]
         still = bool({STUCK, FLOAT, UP, DOWN} & set(left))  # so may a slow one
         beside = {VARYING_LOSS: early, SLOW: early or still}

@@ -10,29 +10,14 @@ named when the other alone cannot explain the flight; both are when neither can 
 fault. Once that was named, with its constant, a second fault that refutes it is found on the other surface,
 whose deflection follows from what is known of the first, taken to last. Anything else stays open.
 
-A surface's group and the other surface in it are looked up: `fdi.group`, `fdi.partner`.
+A surface's group and the other surface in it are looked up in the layout. types: of `types_dtype`;
+conclusion: of `conclusion_dtype`; estimators: those of the isolation.
 """
 
 import numpy as np
 
 from beaver_ftc.compiled import kernel
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, PITCH, ROLL, UNANTICIPATED, YAW
-from beaver_ftc.diagnosis.types.candidates import (
-    BY_DEDUCTION,
-    NO_SURFACE,
-    RULED_OUT,
-    any_constant,
-    anything_left,
-    explained,
-    left,
-    may_be_growing,
-    may_be_slow,
-    one_type,
-    only_a_swing,
-    possible,
-    sole,
-    would_have_swung,
-)
 from beaver_ftc.diagnosis.types.examine import (
     FIXED,
     LOSES,
@@ -44,30 +29,38 @@ from beaver_ftc.diagnosis.types.examine import (
 )
 from beaver_ftc.diagnosis.types.registry import DOWN, N_CONSTANT, STUCK, UP, deflection
 from beaver_ftc.diagnosis.types.verdict import (
+    BY_DEDUCTION,
+    NO_SURFACE,
+    RULED_OUT,
+    any_constant,
+    anything_left,
     estimator_for,
+    explained,
+    left,
+    may_be_growing,
+    may_be_slow,
     measure_for,
+    one_type,
+    only_a_swing,
+    possible,
+    sole,
     still_there,
     surface_at_fault,
     type_at_fault,
+    would_have_swung,
 )
 
 IN_PITCH, IN_ROLL_AND_YAW = 0, 1
 
 
 @kernel
-def note_alarms(fdi):
+def note_alarms(pair, bank):
     """In which plane a filter of the bank has left its bound."""
     for i in range(3):
         plane = IN_PITCH if i == PITCH else IN_ROLL_AND_YAW
-        for m in range(fdi.bank.n):
-            if abs(fdi.bank.residual[m, i]) > fdi.bank.threshold[m, i]:
-                fdi.types.pair.alarmed[plane] = 1
-
-
-@kernel
-def effect_of(fdi, s):
-    """What the position estimator of surface s supposes of the elapsed frame."""
-    return fdi.isolation.estimator[fdi.layout.position_of[s]].effect
+        for m in range(bank.n):
+            if abs(bank.residual[m, i]) > bank.threshold[m, i]:
+                pair.alarmed[plane] = 1
 
 
 @kernel
@@ -81,75 +74,80 @@ def place(surface, middle, slack):
 
 
 @kernel
-def solve_roll_and_yaw(fdi):
-    """Where ailerons and rudder were in the elapsed frame: nu = G (p - u) + eta solved for p."""
-    one, other = effect_of(fdi, fdi.layout.main[ROLL]), effect_of(fdi, fdi.layout.main[YAW])
+def solve_roll_and_yaw(types, layout, estimators, innovation, frame_bound):
+    """Where ailerons and rudder were in the elapsed frame: nu = G (p - u) + eta solved for p; nu: innovation
+    (3,), |eta| <= frame_bound (3,) rad/s2."""
+    a, b = layout.main[ROLL], layout.main[YAW]
+    one, other = estimators[layout.position_of[a]].effect, estimators[layout.position_of[b]].effect
     a_p, a_r, r_p, r_r = one.Z[ROLL], one.Z[YAW], other.Z[ROLL], other.Z[YAW]
-    p, r = fdi.bank.innovation[ROLL], fdi.bank.innovation[YAW]
-    slack_p = fdi.bound.frame[ROLL] + one.spread[ROLL] + other.spread[ROLL]
-    slack_r = fdi.bound.frame[YAW] + one.spread[YAW] + other.spread[YAW]
+    p, r = innovation[ROLL], innovation[YAW]
+    slack_p = frame_bound[ROLL] + one.spread[ROLL] + other.spread[ROLL]
+    slack_r = frame_bound[YAW] + one.spread[YAW] + other.spread[YAW]
     determinant = a_p * r_r - a_r * r_p
     size = abs(determinant)
     off, slack = (p * r_r - r * r_p) / determinant, (slack_p * abs(r_r) + slack_r * abs(r_p)) / size
-    fits = place(fdi.types.surface[fdi.layout.main[ROLL]], off, slack)
+    fits = place(types.surface[a], off, slack)
     off, slack = (r * a_p - p * a_r) / determinant, (slack_r * abs(a_p) + slack_p * abs(a_r)) / size
-    if not (place(fdi.types.surface[fdi.layout.main[YAW]], off, slack) and fits):
-        fdi.types.pair.no_lateral_pair = 1
+    if not (place(types.surface[b], off, slack) and fits):
+        types.pair.no_lateral_pair = 1
 
 
 @kernel
-def whereabouts(fdi, surface):
-    """Least and greatest deflection (rad) of a surface over all types of a constant that are left."""
+def whereabouts(config, surface, frame):
+    """Least and greatest deflection (rad) of a surface by the elapsed frame, of this number, over all types
+    of a constant that are left."""
     least, greatest = np.inf, -np.inf
     for kind in range(N_CONSTANT):
         if left(surface, kind):
-            low, high = deflection(fdi, surface, kind)
+            low, high = deflection(config, surface, kind, frame)
             least, greatest = min(least, low), max(greatest, high)
     low, high = surface.reach_low, surface.reach_high
     return min(max(least, low), high), min(max(greatest, low), high)
 
 
 @kernel
-def first_is_settled(fdi):
+def first_is_settled(types):
     """Whether one pitch fault was named and a second has begun beside it."""
-    return fdi.types.pair.first != NO_SURFACE and not fdi.types.surface[fdi.types.pair.first].in_question
+    return types.pair.first != NO_SURFACE and not types.surface[types.pair.first].in_question
 
 
 @kernel
-def solve_pitch(fdi):
+def solve_pitch(types, layout, estimators, innovation, frame_bound):
     """Where the surface beside the first fault was in the elapsed frame, and whether pitch shows a fault."""
-    if first_is_settled(fdi):
-        solve_beside_the_first(fdi)
+    if first_is_settled(types):
+        solve_beside_the_first(types, layout, estimators, innovation, frame_bound)
         return
-    for s in range(fdi.types.surface.size):
-        if fdi.layout.group[s] == IN_PITCH:
-            fdi.types.surface[s].wrong = abs(fdi.bank.innovation[PITCH]) > fdi.bound.frame[PITCH]
+    for s in range(types.surface.size):
+        if layout.group[s] == IN_PITCH:
+            types.surface[s].wrong = abs(innovation[PITCH]) > frame_bound[PITCH]
 
 
 @kernel
-def solve_beside_the_first(fdi):
+def solve_beside_the_first(types, layout, estimators, innovation, frame_bound):
     """Where the second surface was, given what is known of the first."""
-    first, second = fdi.types.pair.first, fdi.layout.partner[fdi.types.pair.first]
-    known, other = effect_of(fdi, first), effect_of(fdi, second)
-    surface = fdi.types.surface[first]
-    surface.low, surface.high = whereabouts(fdi, surface)
+    first = types.pair.first
+    second = layout.partner[first]
+    known = estimators[layout.position_of[first]].effect
+    other = estimators[layout.position_of[second]].effect
+    surface = types.surface[first]
+    surface.low, surface.high = whereabouts(types.config, surface, types.frame)
     surface.wrong = 0
     Z, Z_known = other.Z[PITCH], known.Z[PITCH]
     share = Z_known * (0.5 * (surface.low + surface.high) - surface.command)
     slack = abs(Z_known) * 0.5 * (surface.high - surface.low)
-    slack += fdi.bound.frame[PITCH] + known.spread[PITCH] + other.spread[PITCH]
-    if not place(fdi.types.surface[second], (fdi.bank.innovation[PITCH] - share) / Z, slack / abs(Z)):
-        fdi.types.surface[second].standing = RULED_OUT
+    slack += frame_bound[PITCH] + known.spread[PITCH] + other.spread[PITCH]
+    if not place(types.surface[second], (innovation[PITCH] - share) / Z, slack / abs(Z)):
+        types.surface[second].standing = RULED_OUT
 
 
 @kernel
-def examine(fdi):
-    """Take in the elapsed frame, plane by plane, and judge the one before."""
-    note_alarms(fdi)
-    take_in_frame(fdi)
-    solve_roll_and_yaw(fdi)
-    solve_pitch(fdi)
-    judge_all(fdi)
+def examine(types, layout, estimators, bank, frame_bound):
+    """Take in the elapsed frame, plane by plane, and judge the one before; frame_bound (3,): of its own."""
+    note_alarms(types.pair, bank)
+    take_in_frame(types, layout, estimators, bank.innovation, frame_bound)
+    solve_roll_and_yaw(types, layout, estimators, bank.innovation, frame_bound)
+    solve_pitch(types, layout, estimators, bank.innovation, frame_bound)
+    judge_all(types)
 
 
 @kernel
@@ -164,44 +162,45 @@ def name(surface, named, kind, t):
 
 
 @kernel
-def decide_roll_and_yaw(fdi, t):
+def decide_roll_and_yaw(types, layout, t):
     """Which of the two is at fault, if any. Returns whether the plane's fault is outside the class."""
-    a, r = fdi.layout.main[ROLL], fdi.layout.main[YAW]
-    one, other = fdi.types.surface[a], fdi.types.surface[r]
-    one_left, other_left = possible(fdi, a), possible(fdi, r)
+    config, pair = types.config, types.pair
+    one, other = types.surface[layout.main[ROLL]], types.surface[layout.main[YAW]]
+    one_left, other_left = possible(one), possible(other)
     both = not one_left and not other_left
-    no_pair = fdi.types.pair.no_lateral_pair == 1 or not anything_left(one) or not anything_left(other)
+    no_pair = pair.no_lateral_pair == 1 or not anything_left(one) or not anything_left(other)
     outside = both and no_pair
     open_yet = both and (only_a_swing(one) or only_a_swing(other))
-    certain = fdi.types.pair.alarmed[IN_ROLL_AND_YAW] == 1 and not (outside or open_yet)
-    name(one, certain and not other_left, type_at_fault(fdi, one), t)
-    name(other, certain and not one_left, type_at_fault(fdi, other), t)
+    certain = pair.alarmed[IN_ROLL_AND_YAW] == 1 and not (outside or open_yet)
+    name(one, certain and not other_left, type_at_fault(config, one), t)
+    name(other, certain and not one_left, type_at_fault(config, other), t)
     return outside
 
 
 @kernel
-def note_first(fdi, s):
+def note_first(types, s):
     """Keep what is known of the one pitch fault, and again when fewer types have been left for a while.
 
     What refutes a type may be a second fault that begins to show, and is about to refute all of them.
     """
-    surface, known, changed = fdi.types.surface[s], fdi.types.surface[s].known, False
+    pair, surface, changed = types.pair, types.surface[s], False
+    known = surface.known
     for kind in range(N_CONSTANT):
         changed = changed or surface.type_excluded[kind] != known.excluded[kind]
-    fdi.types.pair.unsettled = fdi.types.pair.unsettled + 1 if changed else 0
-    if fdi.types.pair.first != s or fdi.types.pair.unsettled >= fdi.types.config.patience:
-        fdi.types.pair.first, fdi.types.pair.unsettled = s, 0
+    pair.unsettled = pair.unsettled + 1 if changed else 0
+    if pair.first != s or pair.unsettled >= types.config.patience:
+        pair.first, pair.unsettled = s, 0
         known.low[:], known.high[:] = surface.set_low, surface.set_high
         known.excluded[:] = 1
         known.excluded[:N_CONSTANT] = surface.type_excluded[:N_CONSTANT]
 
 
 @kernel
-def begin_second(fdi):
+def begin_second(types, layout):
     """The one known pitch fault no longer explains the flight: there is another beside it."""
     first, second = (
-        fdi.types.surface[fdi.types.pair.first],
-        fdi.types.surface[fdi.layout.partner[fdi.types.pair.first]],
+        types.surface[types.pair.first],
+        types.surface[layout.partner[types.pair.first]],
     )
     first.set_low[:], first.set_high[:] = first.known.low, first.known.high
     first.type_excluded[:] = first.known.excluded
@@ -212,122 +211,122 @@ def begin_second(fdi):
 
 
 @kernel
-def patient(fdi, surface):
+def patient(config, surface):
     """Whether a slow oscillation, a slow surface or a growing bias would have shown by now."""
-    growing = may_be_growing(surface, one_type(surface)) or may_be_slow(fdi, surface)
-    return surface.evidence >= fdi.types.config.patience and would_have_swung(fdi, surface) and not growing
+    growing = may_be_growing(surface, one_type(surface)) or may_be_slow(config, surface)
+    return surface.evidence >= config.patience and would_have_swung(config, surface) and not growing
 
 
 @kernel
-def two_in_pitch(fdi):
+def two_in_pitch(types, layout):
     """Whether a second pitch fault has shown beside one that was known."""
-    if fdi.types.pair.first == NO_SURFACE or fdi.layout.partner[fdi.types.pair.first] < 0:
+    if types.pair.first == NO_SURFACE or layout.partner[types.pair.first] < 0:
         return False
-    surface = fdi.types.surface[fdi.types.pair.first]
-    if surface.in_question and not (possible(fdi, fdi.types.pair.first) and any_constant(surface)):
-        begin_second(fdi)
+    surface = types.surface[types.pair.first]
+    if surface.in_question and not (possible(surface) and any_constant(surface)):
+        begin_second(types, layout)
     return not surface.in_question
 
 
 @kernel
-def type_in_pitch(fdi, surface):
+def type_in_pitch(config, surface):
     """The type of the one fault of pitch, or -1 while it is open.
 
     A jam may as well be a trailing surface or one at its stop, if the other surface is off by a constant.
     """
-    kind = type_at_fault(fdi, surface)
+    kind = type_at_fault(config, surface)
     return -1 if kind in (STUCK, UP, DOWN) else kind
 
 
 @kernel
-def decide_pitch(fdi, t):
+def decide_pitch(types, layout, t):
     """Which surface of pitch is at fault, if any."""
-    if two_in_pitch(fdi):
-        first, s = fdi.types.surface[fdi.types.pair.first], fdi.layout.partner[fdi.types.pair.first]
-        second = fdi.types.surface[s]
+    if two_in_pitch(types, layout):
+        first, s = types.surface[types.pair.first], layout.partner[types.pair.first]
+        second = types.surface[s]
         name(first, 1, first.type, t)
-        shows = second.evidence > 0 and possible(fdi, s) and explained(second)
-        name(second, shows, type_at_fault(fdi, second), t)
+        shows = second.evidence > 0 and possible(second) and explained(second)
+        name(second, shows, type_at_fault(types.config, second), t)
         return
-    s = one_in_pitch(fdi)
-    for member in range(fdi.types.surface.size):
-        if fdi.layout.group[member] == IN_PITCH:
-            surface = fdi.types.surface[member]
-            name(surface, member == s, type_in_pitch(fdi, surface) if member == s else -1, t)
+    s = one_in_pitch(types, layout)
+    for member in range(types.surface.size):
+        if layout.group[member] == IN_PITCH:
+            surface = types.surface[member]
+            name(surface, member == s, type_in_pitch(types.config, surface) if member == s else -1, t)
 
 
 @kernel
-def one_in_pitch(fdi):
+def one_in_pitch(types, layout):
     """The surface of pitch at fault if a constant explains everything on it, or NO_SURFACE."""
-    s = surface_at_fault(fdi) if fdi.types.pair.alarmed[IN_PITCH] else NO_SURFACE
-    if s < 0 or not any_constant(fdi.types.surface[s]):
+    s = surface_at_fault(types, layout) if types.pair.alarmed[IN_PITCH] else NO_SURFACE
+    if s < 0 or not any_constant(types.surface[s]):
         return NO_SURFACE
-    if patient(fdi, fdi.types.surface[s]):
-        note_first(fdi, s)
+    if patient(types.config, types.surface[s]):
+        note_first(types, s)
     return s
 
 
 @kernel
-def decide(fdi, t):
+def decide(types, conclusion, layout, t):
     """Name surfaces and types plane by plane; t s. `isolated` is the one named first, the law acts on all."""
-    outside = decide_roll_and_yaw(fdi, t)
-    decide_pitch(fdi, t)
+    outside = decide_roll_and_yaw(types, layout, t)
+    decide_pitch(types, layout, t)
     earliest = NO_SURFACE
-    for s in range(fdi.types.surface.size):
-        surface = fdi.types.surface[s]
-        if surface.named and (earliest < 0 or surface.named_at_s < fdi.types.surface[earliest].named_at_s):
+    for s in range(types.surface.size):
+        surface = types.surface[s]
+        if surface.named and (earliest < 0 or surface.named_at_s < types.surface[earliest].named_at_s):
             earliest = s
-    summarise(fdi, earliest, outside, t)
-    act(fdi)
+    summarise(types, conclusion, layout, earliest, outside, t)
+    act(types, conclusion, layout)
 
 
 @kernel
-def summarise(fdi, s, outside, t):
+def summarise(types, conclusion, layout, s, outside, t):
     """The verdict on surface s, the first named, as that of a single fault."""
-    before = fdi.verdict.isolated
+    before = conclusion.isolated
     if s < 0:
-        fdi.verdict.isolated, fdi.verdict.type = UNANTICIPATED if outside else NOT_ISOLATED, -1
+        conclusion.isolated, conclusion.type = UNANTICIPATED if outside else NOT_ISOLATED, -1
     else:
-        surface = fdi.types.surface[s]
-        fdi.verdict.isolated = estimator_for(fdi, s, surface.type)
-        fdi.verdict.type, fdi.verdict.type_at_s = surface.type, surface.type_at_s
-        fdi.verdict.isolated_at_s = surface.named_at_s
-    if s < 0 and fdi.verdict.isolated != before:
-        fdi.verdict.isolated_at_s = t
+        surface = types.surface[s]
+        conclusion.isolated = estimator_for(layout, s, surface.type)
+        conclusion.type, conclusion.type_at_s = surface.type, surface.type_at_s
+        conclusion.isolated_at_s = surface.named_at_s
+    if s < 0 and conclusion.isolated != before:
+        conclusion.isolated_at_s = t
 
 
 @kernel
-def named_in_pitch(fdi):
+def named_in_pitch(types, layout):
     """Whether a surface of pitch is named."""
-    for s in range(fdi.types.surface.size):
-        if fdi.layout.group[s] == IN_PITCH and fdi.types.surface[s].named:
+    for s in range(types.surface.size):
+        if layout.group[s] == IN_PITCH and types.surface[s].named:
             return True
     return False
 
 
 @kernel
-def acted_upon(fdi, s):
+def acted_upon(types, layout, s):
     """Whether the law acts on surface s: it is named, or the likeliest in pitch."""
-    if fdi.types.surface[s].named:
+    if types.surface[s].named:
         return True
-    if fdi.layout.group[s] != IN_PITCH or named_in_pitch(fdi) or not fdi.types.pair.alarmed[IN_PITCH]:
+    if layout.group[s] != IN_PITCH or named_in_pitch(types, layout) or not types.pair.alarmed[IN_PITCH]:
         return False
-    likeliest = sole(fdi, True)
-    return s == (likeliest if likeliest >= 0 else fdi.layout.main[PITCH])
+    likeliest = sole(types.surface, True)
+    return s == (likeliest if likeliest >= 0 else layout.main[PITCH])
 
 
 @kernel
-def act(fdi):
+def act(types, conclusion, layout):
     """What the law does about each surface. The supervisor follows the lead: a replaced elevator first."""
-    fdi.verdict.lead, fdi.verdict.lead_kind = NO_SURFACE, -1
-    for s in range(fdi.types.surface.size):
-        surface = fdi.types.surface[s]
+    conclusion.lead, conclusion.lead_kind = NO_SURFACE, -1
+    for s in range(types.surface.size):
+        surface = types.surface[s]
         surface.measure = -1
-        if acted_upon(fdi, s):
-            at_fault = surface.named == 1 or possible(fdi, s)
+        if acted_upon(types, layout, s):
+            at_fault = surface.named == 1 or possible(surface)
             measure = measure_for(surface) if at_fault else SHIFTED
-            if still_there(fdi, surface, measure, at_fault):
+            if still_there(types.config, surface, measure, at_fault):
                 surface.measure = measure
-                replaced = s == fdi.layout.main[PITCH] and measure in (LOSES, FIXED)
-                if fdi.verdict.lead == NO_SURFACE or replaced:
-                    fdi.verdict.lead, fdi.verdict.lead_kind = s, measure
+                replaced = s == layout.main[PITCH] and measure in (LOSES, FIXED)
+                if conclusion.lead == NO_SURFACE or replaced:
+                    conclusion.lead, conclusion.lead_kind = s, measure

@@ -1,53 +1,41 @@
-"""The fault types, a line each. A new one is a module beside this one and a line here."""
+"""The fault types there are, the kernels that ask all of them, and the records of the stage.
 
+Every file under `table/` is read: a new type is one more.
+"""
+
+import pkgutil
 from collections.abc import Callable
-from types import ModuleType
+from functools import lru_cache
+from importlib import import_module
 from typing import Any
 
+import numpy as np
+
 from beaver_ftc.compiled import kernel
-from beaver_ftc.diagnosis.types import (
-    bias,
-    contract,
-    floating,
-    growing_bias,
-    hardover_down,
-    hardover_up,
-    loss,
-    oscillatory,
-    rate_limit,
-    stuck,
-    varying_loss,
-)
+from beaver_ftc.diagnosis.types import table
+from beaver_ftc.diagnosis.types.contract import FaultType
+from beaver_ftc.diagnosis.types.table import bias, hardover, loss, oscillatory, rate_limit, stuck
 
-REGISTERED: tuple[ModuleType, ...] = (
-    loss,
-    stuck,
-    floating,
-    hardover_up,
-    hardover_down,
-    bias,
-    varying_loss,
-    oscillatory,
-    rate_limit,
-    growing_bias,
-)
 
-# Types of a constant parameter come first; a type's number is its place.
-TYPES = tuple(sorted(REGISTERED, key=lambda module: not module.CONSTANT))
+def _rows() -> tuple[FaultType, ...]:
+    """Those of a constant parameter first: a type's number is its place."""
+    modules = [
+        import_module(f"{table.__name__}.{info.name}") for info in pkgutil.iter_modules(table.__path__)
+    ]
+    rows = [row for module in modules for row in module.TYPES]
+    return tuple(sorted(rows, key=lambda row: (not row.constant, row.rank, row.name)))
+
+
+TYPES = _rows()
 N_TYPES = len(TYPES)
-N_CONSTANT = sum(module.CONSTANT for module in TYPES)
-NAMES: tuple[str, ...] = tuple(module.NAME for module in TYPES)
+N_CONSTANT = sum(row.constant for row in TYPES)
+NAMES: tuple[str, ...] = tuple(row.name for row in TYPES)
 FAMILY = tuple(NAMES.index(name) for name in NAMES)  # the first type of the same name
-CONSTANT_LOSS, VARYING_LOSS = TYPES.index(loss), TYPES.index(varying_loss)
-STUCK, FLOAT = TYPES.index(stuck), TYPES.index(floating)
-UP, DOWN = TYPES.index(hardover_up), TYPES.index(hardover_down)
-BIAS, GROWING_BIAS = TYPES.index(bias), TYPES.index(growing_bias)
-OSCILLATORY, SLOW = TYPES.index(oscillatory), TYPES.index(rate_limit)
-
-
-def part(module: ModuleType, name: str) -> Any:
-    """A part of a type, or what the contract has in its place."""
-    return getattr(module, name, getattr(contract, name, None))
+CONSTANT_LOSS, VARYING_LOSS = TYPES.index(loss.CONSTANT), TYPES.index(loss.VARYING)
+STUCK, FLOAT = TYPES.index(stuck.STUCK), TYPES.index(stuck.FLOAT)
+UP, DOWN = TYPES.index(hardover.UP), TYPES.index(hardover.DOWN)
+BIAS, GROWING_BIAS = TYPES.index(bias.CONSTANT), TYPES.index(bias.GROWING)
+OSCILLATORY, SLOW = TYPES.index(oscillatory.OSCILLATORY), TYPES.index(rate_limit.RATE_LIMIT)
 
 
 def _written_out(name: str, arguments: str, lines: list[str]) -> Callable[..., Any]:
@@ -55,7 +43,7 @@ def _written_out(name: str, arguments: str, lines: list[str]) -> Callable[..., A
 
     Compiled code calls only what it can name, so the calls are written out, one a type.
     """
-    space = {f"part_{kind}": part(module, name) for kind, module in enumerate(TYPES)}
+    space = {f"part_{kind}": getattr(row, name) for kind, row in enumerate(TYPES)}
     space["__name__"] = __name__
     source = "\n    ".join([f"def {name}_each({arguments}):", *lines])
     exec(compile(source, __file__, "exec"), space)
@@ -67,23 +55,122 @@ def _all_of(name: str, arguments: str) -> Callable[..., Any]:
     taken = ", ".join(argument for argument in arguments.split(", ") if argument != "kind")
     calls = [
         f"part_{kind}({arguments})".replace("kind", str(kind))
-        for kind, module in enumerate(TYPES)
-        if hasattr(module, name)
+        for kind, row in enumerate(TYPES)
+        if getattr(row, name) is not None
     ]
     return _written_out(name, taken, calls)
 
 
-def _one_of(name: str, arguments: str, passed: str) -> Callable[..., Any]:
+def _one_of(name: str, arguments: str, passed: str, otherwise: str) -> Callable[..., Any]:
     """A kernel that calls this part of the type `kind` and returns what that returns."""
-    calls = [f"if kind == {kind}: return part_{kind}({passed})" for kind in range(N_TYPES)]
-    return _written_out(name, arguments, [*calls, f"return part_0({passed})"])
+    calls = [
+        f"if kind == {kind}: return part_{kind}({passed})"
+        for kind, row in enumerate(TYPES)
+        if getattr(row, name) is not None
+    ]
+    return _written_out(name, arguments, [*calls, f"return {otherwise}"])
 
 
 begin_each = _all_of("begin", "surface, kind")
-watch_each = _all_of("watch", "fdi, surface, kind")
-pass_over_each = _all_of("pass_over", "fdi, surface, kind")
-judge_each = _all_of("judge", "fdi, surface, kind, frame")
-let_go_each = _all_of("let_go", "fdi, surface, kind")
-bring_back_each = _all_of("bring_back", "fdi, surface, kind")
-shown = _one_of("shown", "surface, kind", "surface")
-deflection = _one_of("deflection", "fdi, surface, kind", "fdi, surface, kind")
+watch_each = _all_of("watch", "config, surface, kind")
+pass_over_each = _all_of("pass_over", "config, surface, kind, frame")
+judge_each = _all_of("judge", "config, surface, kind, frame")
+let_go_each = _all_of("let_go", "config, surface, kind, frame")
+bring_back_each = _all_of("bring_back", "config, surface, kind")
+shown = _one_of("shown", "surface, kind", "surface", "True")
+_OF_ONE = "config, surface, kind, frame"
+deflection = _one_of("deflection", _OF_ONE, _OF_ONE, f"part_0({_OF_ONE})")
+
+MAX_BLOCK = 256  # frames of a block: examine.py
+HISTORY = 3  # frames, or blocks, of which the orders are kept: the elapsed one and two before it
+
+# What the surface was ordered to do, rad; [0] belongs to the elapsed frame or block, [1] to the one before.
+ORDERS = np.dtype(
+    [
+        ("given", "f8", (HISTORY, MAX_BLOCK)), ("low", "f8", (HISTORY,)), ("high", "f8", (HISTORY,)),
+        ("least", "f8", (2,)), ("greatest", "f8", (2,)),  # where a healthy surface was within it
+    ],
+    align=True,
+)  # fmt: skip
+
+# Where a surface that a type has held and let go can be, rad: release.py.
+RELEASE = np.dtype(
+    [
+        ("low", "f8", (2, N_TYPES)), ("high", "f8", (2, N_TYPES)), ("released", "i8", (N_TYPES,)),
+        ("held_low", "f8", (N_TYPES,)), ("held_high", "f8", (N_TYPES,)),  # where it is held by then
+    ],
+    align=True,
+)  # fmt: skip
+
+# What was known of the first of two faults when it was named: pairs.py.
+KNOWN = np.dtype(
+    [("low", "f8", (N_TYPES,)), ("high", "f8", (N_TYPES,)), ("excluded", "i8", (N_TYPES,))], align=True
+)
+
+# What the types go by: whether a frame shows one instant, instants in it, whether a surface returns by its
+# actuator, frames of half of the slowest oscillation, whether a fault is declared to stay as it is and errors
+# of the surfaces' own terms are; frames of a block and its duration; dt s.
+TYPES_CONFIG = np.dtype(
+    [
+        ("whole", "i8"), ("instants", "i8"), ("returns", "i8"), ("patience", "i8"),
+        ("abrupt", "i8"), ("own_errors", "i8"), ("length", "i8"), ("span_s", "f8"), ("dt", "f8"),
+    ],
+    align=True,
+)  # fmt: skip
+
+# Two faults at once: pairs.py; alarms of the groups, and what is known of the first fault in pitch.
+PAIR = np.dtype(
+    [
+        ("enabled", "i8"), ("alarmed", "i8", (2,)), ("no_lateral_pair", "i8"), ("first", "i8"),
+        ("unsettled", "i8"),
+    ],
+    align=True,
+)  # fmt: skip
+
+# Blocks of frames: examine.py.
+FRAME_BLOCK = np.dtype(
+    [
+        ("filled", "i8"),
+        ("innovation", "f8", (3,)), ("bound", "f8", (3,)), ("noise", "f8", (3,)),
+    ],
+    align=True,
+)  # fmt: skip
+
+
+@lru_cache
+def surface_dtype() -> np.dtype:
+    """One surface's record; positions in rad. `then`: a frame before the elapsed one, `before`: two."""
+    own = [(row.record, np.dtype(list(row.memory), align=True)) for row in TYPES if row.memory]
+    fields = [
+        # its actuator
+        ("travel_low", "f8"), ("travel_high", "f8"), ("least_runaway_rate", "f8"),
+        ("reach_low", "f8"), ("reach_high", "f8"),  # where it can act: a part of its travel is nearer to zero
+        ("approach", "f8"), ("step", "f8"), ("slowest_step", "f8"), ("orders", ORDERS),
+        # where it was if it alone is at fault, and whether something was wrong
+        ("command", "f8"), ("low", "f8"), ("high", "f8"), ("wrong", "i8"),
+        ("command_then", "f8"), ("low_then", "f8"), ("high_then", "f8"), ("wrong_then", "i8"),
+        ("low_before", "f8"), ("high_before", "f8"), ("wrong_before", "i8"),
+        # its effectiveness within the frame or block, and a quarter of what that varies by, in means
+        ("G_least", "f8"), ("G_most", "f8"), ("uneven", "f8"), ("uneven_then", "f8"),
+        # what the types make of it
+        ("set_low", "f8", (N_TYPES,)), ("set_high", "f8", (N_TYPES,)), ("type_excluded", "i8", (N_TYPES,)),
+        ("start_low", "f8"), ("start_high", "f8"), ("started_at", "i8"),
+        ("hides", "i8", (2,)), ("hides_then", "i8", (2,)),  # lower and upper stop: examine.note_stops
+        ("evidence", "i8"), ("quiet", "i8"), ("absent", "i8"),  # frames
+        ("unhidden", "i8"),  # of the evidence, what has come since a stop could last hide something
+        ("release", RELEASE), *own,
+        # what is concluded; refuted: its estimator is excluded
+        ("in_question", "i8"), ("refuted", "i8"), ("standing", "i8"), ("measure", "i8"),
+        ("named", "i8"), ("named_at_s", "f8"), ("type", "i8"), ("type_at_s", "f8"), ("known", KNOWN),
+    ]  # fmt: skip
+    return np.dtype(fields, align=True)
+
+
+@lru_cache
+def types_dtype(n: int) -> np.dtype:
+    """Faults of every type on n surfaces: types/."""
+    fields = [
+        ("config", TYPES_CONFIG), ("frame", "i8"), ("pair", PAIR), ("block", FRAME_BLOCK),
+        ("surface", surface_dtype(), (n,)),
+    ]  # fmt: skip
+    return np.dtype(fields, align=True)

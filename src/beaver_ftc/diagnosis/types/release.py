@@ -59,7 +59,7 @@ def not_held(surface, kind):
 
 
 @kernel
-def carried(fdi, surface, held, side=0):
+def carried(config, surface, held, side=0):
     """Mean position over the judged frame of a surface that is at `held` (rad) as it begins; and as it ends;
     and by how much the mean may be off, where the effectiveness changes meanwhile.
 
@@ -67,9 +67,9 @@ def carried(fdi, surface, held, side=0):
     greatest.
     """
     total, count, a, least, greatest = 0.0, 0, held, held, held
-    for k in range(fdi.types.config.length):
+    for k in range(config.length):
         order = surface.orders.given[1, k]
-        for _ in range(fdi.types.config.instants):
+        for _ in range(config.instants):
             total += a
             count += 1
             least, greatest = min(least, a), max(greatest, a)
@@ -80,25 +80,25 @@ def carried(fdi, surface, held, side=0):
 
 
 @kernel
-def let_go_within(fdi, surface, kind):
+def let_go_within(config, surface, kind):
     """Whether a release inside the judged block explains it."""
     held_low, held_high = surface.release.held_low[kind], surface.release.held_high[kind]
-    if fdi.types.config.length == 1 or held_low > held_high:
+    if config.length == 1 or held_low > held_high:
         return False
-    low, _, low_room = carried(fdi, surface, held_low, -1)
-    high, _, high_room = carried(fdi, surface, held_high, 1)
+    low, _, low_room = carried(config, surface, held_low, -1)
+    high, _, high_room = carried(config, surface, held_high, 1)
     return low - low_room <= surface.high_then and high + high_room >= surface.low_then
 
 
 @kernel
-def possible(fdi, surface, kind):
+def possible(config, surface, kind):
     """Whether a return from this type explains the judged frame; forget those releases that do not."""
-    left = let_go_within(fdi, surface, kind)
+    left = let_go_within(config, surface, kind)
     if not left:
         not_held(surface, kind)
     for which in (EARLIER, LATER):
         if any_release(surface, which, kind):
-            if agrees(fdi, surface, which, kind):
+            if agrees(config, surface, which, kind):
                 left = True
             else:
                 forget(surface, which, kind)
@@ -106,14 +106,14 @@ def possible(fdi, surface, kind):
 
 
 @kernel
-def agrees(fdi, surface, which, kind):
+def agrees(config, surface, which, kind):
     """Whether the judged frame agrees with a return; drop the part of its interval that does not.
 
     The mean over the frame rises with where the return began, and by no more than that.
     """
     held = surface.release
-    low, _, low_room = carried(fdi, surface, held.low[which, kind])
-    high, _, high_room = carried(fdi, surface, held.high[which, kind])
+    low, _, low_room = carried(config, surface, held.low[which, kind])
+    high, _, high_room = carried(config, surface, held.high[which, kind])
     room, command = max(low_room, high_room), surface.command_then
     if max(abs(low - room - command), abs(high + room - command)) <= NOT_BACK_RAD:
         return False
@@ -136,12 +136,12 @@ def keep(held, which, kind, low, high):
 
 
 @kernel
-def holds(fdi, surface, kind, least, greatest):
+def holds(config, surface, kind, least, greatest):
     """Whether a type can be holding the surface between least and greatest (rad) in the judged frame.
 
     If not, it may have let go, and the actuator be bringing the surface back; else the type is excluded.
     """
-    returning = fdi.types.config.returns and possible(fdi, surface, kind)
+    returning = config.returns and possible(config, surface, kind)
     released = surface.release.released
     if least <= surface.high_then and greatest >= surface.low_then and not released[kind]:
         return True
@@ -153,14 +153,14 @@ def holds(fdi, surface, kind, least, greatest):
 
 
 @kernel
-def beginning(fdi, surface):
+def beginning(config, surface, frame):
     """Where the surface can have been as the judged frame began, (low, high) rad, and which frame shows it.
 
     With several JSBSim frames in one of ours it may have been let go within it: the frame before is used.
     """
-    if fdi.types.config.whole:
-        return surface.low_then, surface.high_then, fdi.types.frame - 1
-    return surface.low_before, surface.high_before, fdi.types.frame - 2
+    if config.whole:
+        return surface.low_then, surface.high_then, frame
+    return surface.low_before, surface.high_before, frame - 1
 
 
 @kernel
@@ -175,18 +175,18 @@ def let_go(surface, kind, low, high):
 
 
 @kernel
-def bring_back(fdi, surface, kind):
+def bring_back(config, surface, kind):
     """Carry what has been let go to the next frame; a surface that looks healthy may be held again."""
     held = surface.release
     if not surface.wrong_then:
         held.released[kind] = 0
     for which in (EARLIER, LATER):
         if any_release(surface, which, kind):
-            _, low, _ = carried(fdi, surface, held.low[which, kind])
-            _, high, _ = carried(fdi, surface, held.high[which, kind])
+            _, low, _ = carried(config, surface, held.low[which, kind])
+            _, high, _ = carried(config, surface, held.high[which, kind])
             keep(held, which, kind, low, high)
-    if fdi.types.config.length > 1 and held.held_low[kind] <= held.held_high[kind]:
-        _, low, _ = carried(fdi, surface, held.held_low[kind], -1)
-        _, high, _ = carried(fdi, surface, held.held_high[kind], 1)
+    if config.length > 1 and held.held_low[kind] <= held.held_high[kind]:
+        _, low, _ = carried(config, surface, held.held_low[kind], -1)
+        _, high, _ = carried(config, surface, held.held_high[kind], 1)
         held.low[LATER, kind] = min(held.low[LATER, kind], low)
         held.high[LATER, kind] = max(held.high[LATER, kind], high)

@@ -4,13 +4,7 @@ Slower than that it is a jam: the two are one another's limit, and only a least 
 """
 
 from beaver_ftc.compiled import kernel
-
-NAME = "rate_limit"
-CONSTANT = False
-MEMORY = (
-    ("low", "f8"), ("high", "f8"),  # where it can be while it stands on one side of its command, rad
-    ("sign", "i8"), ("at", "i8"),  # which side, and the last frame of which that is known
-)  # fmt: skip
+from beaver_ftc.diagnosis.types.contract import FaultType
 
 
 @kernel
@@ -20,30 +14,30 @@ def begin(surface, kind):
 
 
 @kernel
-def judge(fdi, surface, kind, frame):
+def judge(config, surface, kind, frame):
     """It never moves away from its command, so while it stands on one side it comes nearer.
 
     Of several JSBSim frames in one of ours the first is the old command's.
     """
     low, high, run = surface.low_then, surface.high_then, surface.rate_limit
-    sign = side(fdi, surface)
+    sign = side(config, surface)
     if sign == 0 or sign != run.sign or frame != run.at + 1:
         run.low, run.high = low, high
     else:
         if (sign > 0 and low > run.high) or (sign < 0 and high < run.low):
             surface.type_excluded[kind] = 1
-        come_nearer(fdi, surface, run, sign)
+        come_nearer(config, surface, run, sign)
     run.low, run.high = max(run.low, low), min(run.high, high)
     run.sign, run.at = sign, frame
 
 
 @kernel
-def come_nearer(fdi, surface, run, sign):
+def come_nearer(config, surface, run, sign):
     """Take off what the slowest one comes nearer by within the judged frame: a least step an instant, until
     its lag makes the steps smaller. Where it was at an instant bounds where it is a frame later."""
-    least = fdi.types.config.instants * fdi.types.config.length * surface.slowest_step
+    least = config.instants * config.length * surface.slowest_step
     close = surface.slowest_step / surface.approach
-    lowest, highest = ordered(fdi, surface)
+    lowest, highest = ordered(config, surface)
     if sign > 0:
         run.high = min(run.high, max(run.high - least, highest + close))
     elif sign < 0:
@@ -51,15 +45,25 @@ def come_nearer(fdi, surface, run, sign):
 
 
 @kernel
-def ordered(fdi, surface):
+def ordered(config, surface):
     """The least and greatest order that moved it towards and within the judged frame, rad."""
     orders = surface.orders
-    newest = 2 if fdi.types.config.whole else 1
+    newest = 2 if config.whole else 1
     return min(orders.low[2], orders.low[newest]), max(orders.high[2], orders.high[newest])
 
 
 @kernel
-def side(fdi, surface):
+def side(config, surface):
     """1 for a surface certainly above all it was ordered to, -1 below, 0 otherwise."""
-    lowest, highest = ordered(fdi, surface)
+    lowest, highest = ordered(config, surface)
     return 1 if surface.low_then > highest else (-1 if surface.high_then < lowest else 0)
+
+
+RATE_LIMIT = FaultType(
+    name="rate_limit", constant=False, rank=3, begin=begin, judge=judge, record="rate_limit",
+    memory=(
+        ("low", "f8"), ("high", "f8"),  # where it can be while it stands on one side of its command, rad
+        ("sign", "i8"), ("at", "i8"),  # which side, and the last frame of which that is known
+    ),
+)  # fmt: skip
+TYPES = (RATE_LIMIT,)

@@ -9,14 +9,8 @@ from math import pi, sqrt
 import numpy as np
 
 from beaver_ftc.compiled import kernel
+from beaver_ftc.diagnosis.types.contract import FaultType
 
-NAME = "oscillatory"
-CONSTANT = False
-MEMORY = (
-    ("sign", "i8"), ("steady_since", "i8"),
-    ("half_cycles", "i8"), ("first_end", "i8"), ("last_end", "i8"),  # ends of half-cycles, frames
-    ("square", "f8"), ("squares", "f8"),  # of the deflection error, rad2: this half-cycle, those before
-)  # fmt: skip
 HALF_CYCLES_THAT_SHOW = 3
 
 
@@ -27,14 +21,14 @@ def begin(surface, kind):
 
 
 @kernel
-def watch(fdi, surface, kind):
+def watch(config, surface, kind):
     """Sum the squares of the deflection error."""
     error = 0.5 * (surface.low_then + surface.high_then) - surface.command_then
     surface.oscillatory.square += error**2
 
 
 @kernel
-def judge(fdi, surface, kind, frame):
+def judge(config, surface, kind, frame):
     """Count half-cycles; a sign that stays for longer than the slowest half-cycle is no oscillation.
 
     At a stop half of a swing is hidden: where several instants are seen at once, the mean of a quick one
@@ -43,13 +37,13 @@ def judge(fdi, surface, kind, frame):
     swing = surface.oscillatory
     low, high = surface.low_then - surface.command_then, surface.high_then - surface.command_then
     sign = 1 if low > 0.0 else (-1 if high < 0.0 else 0)
-    if sign == 0 or (not fdi.types.config.whole and surface.hides_then[0 if sign > 0 else 1]):
+    if sign == 0 or (not config.whole and surface.hides_then[0 if sign > 0 else 1]):
         swing.steady_since = frame + 1
         return
     if sign != swing.sign:
         end_half_cycle(swing, frame)
         swing.sign, swing.steady_since = sign, frame
-    if frame - swing.steady_since > fdi.types.config.patience:
+    if frame - swing.steady_since > config.patience:
         surface.type_excluded[kind] = 1
 
 
@@ -67,9 +61,9 @@ def end_half_cycle(swing, frame):
 
 
 @kernel
-def pass_over(fdi, surface, kind):
+def pass_over(config, surface, kind, frame):
     """In a frame that is not judged it may have swung to the other side, unseen."""
-    surface.oscillatory.steady_since = fdi.types.frame
+    surface.oscillatory.steady_since = frame + 1
 
 
 @kernel
@@ -84,8 +78,20 @@ def estimate(fdi: np.void, s: int, kind: int) -> float | None:
     return float(sqrt(2.0 * swing["squares"] / (swing["last_end"] - swing["first_end"])))
 
 
-def frequency_rad_s(fdi: np.void, s: int) -> float | None:
+def frequency_rad_s(fdi: np.void, s: int, kind: int) -> float | None:
     """From the half-cycles counted."""
     swing = fdi["types"]["surface"][s]["oscillatory"]
     half_cycles, frames = int(swing["half_cycles"]) - 1, int(swing["last_end"] - swing["first_end"])
     return half_cycles * pi / (float(fdi["types"]["config"]["span_s"]) * frames)
+
+
+OSCILLATORY = FaultType(
+    name="oscillatory", constant=False, rank=2, begin=begin, watch=watch, judge=judge, pass_over=pass_over,
+    shown=shown, estimate=estimate, frequency_rad_s=frequency_rad_s, record="oscillatory",
+    memory=(
+        ("sign", "i8"), ("steady_since", "i8"),
+        ("half_cycles", "i8"), ("first_end", "i8"), ("last_end", "i8"),  # ends of half-cycles, frames
+        ("square", "f8"), ("squares", "f8"),  # of the deflection error, rad2: this half-cycle, those before
+    ),
+)  # fmt: skip
+TYPES = (OSCILLATORY,)

@@ -1,0 +1,148 @@
+"""An offset, p = u + b, cut off by the stops: constant, or of one sign and never smaller than it was.
+
+At a stop one that grows shows nothing that a runaway does not. How fast they came there tells them apart:
+what runs almost as fast as a runaway counts as one.
+"""
+
+import numpy as np
+
+from beaver_ftc.compiled import kernel
+from beaver_ftc.diagnosis import membership
+from beaver_ftc.diagnosis.types.contract import FaultType, intersect, middle_of, set_of, within_travel
+
+AS_FAST = 1.8  # times the least pace of a runaway, half of the rate limit at which it runs
+
+
+@kernel
+def offset(surface):
+    """How far off its command the surface was in the judged frame, (low, high) rad: unlimited at a stop.
+
+    A surface at its stop may be off by more than it shows; so may one that was there at an instant of it.
+    Nothing but a loss takes it beyond.
+    """
+    low, high, u, orders = surface.low_then, surface.high_then, surface.command_then, surface.orders
+    if high < surface.travel_low or low > surface.travel_high:
+        return membership.NOTHING
+    least, greatest = low - max(u - orders.least[1], 0.0), high + max(orders.greatest[1] - u, 0.0)
+    return (
+        low - u if least > surface.travel_low else -np.inf,
+        high - u if greatest < surface.travel_high else np.inf,
+    )
+
+
+@kernel
+def judge(config, surface, kind, frame):
+    """Keep the offsets that also explain this frame."""
+    least, greatest = offset(surface)
+    intersect(surface, kind, least, greatest)
+
+
+@kernel
+def deflection(config, surface, kind, frame):
+    """The command and the offset, cut off by the stops."""
+    low = cut_off(surface, surface.set_low[kind], surface.orders.least[0])
+    return low, cut_off(surface, surface.set_high[kind], surface.orders.greatest[0])
+
+
+@kernel
+def cut_off(surface, off, extreme):
+    """Where an offset (rad) takes a surface in the mean; if a stop is met at an instant, at the `extreme`."""
+    orders, mean = surface.orders, surface.command + off
+    met = orders.least[0] + off < surface.travel_low or orders.greatest[0] + off > surface.travel_high
+    return within_travel(surface, extreme + off) if met else mean
+
+
+def interval(fdi: np.void, s: int, kind: int) -> tuple[float, float] | None:
+    """Of the offset, rad; None while one end is open."""
+    low, high = set_of(fdi, s, kind)
+    return (low, high) if np.isfinite(low) and np.isfinite(high) else None
+
+
+@kernel
+def begin_growing(surface, kind):
+    """It has not grown yet."""
+    grown = surface.growing_bias
+    grown.up = grown.down = 0.0
+    grown.ran[:] = 0
+    forget_pace(grown)
+
+
+@kernel
+def forget_pace(grown):
+    """Where it is is not known."""
+    grown.least, grown.greatest = -np.inf, np.inf
+
+
+@kernel
+def pace(config, surface):
+    """How far one that is slower than a runaway moves from one judged frame to the next, rad at most."""
+    return AS_FAST * surface.least_runaway_rate * config.span_s
+
+
+@kernel
+def watch_growing(config, surface, kind):
+    """A slower one has moved on."""
+    way = pace(config, surface)
+    surface.growing_bias.least -= way
+    surface.growing_bias.greatest += way
+
+
+@kernel
+def pass_over_growing(config, surface, kind, frame):
+    """It may have gone, and begin anew."""
+    forget_pace(surface.growing_bias)
+
+
+@kernel
+def note_pace(config, surface, least, greatest):
+    """Hold an offset between least and greatest (rad) against what a slower one can be. A mean over several
+    instants may be that of the last of them."""
+    grown = surface.growing_bias
+    if greatest < grown.least:
+        grown.ran[0] = 1
+    if least > grown.greatest:
+        grown.ran[1] = 1
+    spare = 0.0 if config.whole else pace(config, surface)
+    grown.least, grown.greatest = max(grown.least, least - spare), min(grown.greatest, greatest + spare)
+
+
+@kernel
+def judge_growing(config, surface, kind, frame):
+    """It keeps its sign and does not shrink; at a stop it may be larger than it shows."""
+    least, greatest = offset(surface)
+    if least <= greatest:
+        note_pace(config, surface, least, greatest)
+    if np.isinf(least) or np.isinf(greatest):
+        return
+    grown = surface.growing_bias
+    grown.up, grown.down = max(grown.up, least), min(grown.down, greatest)
+    above, below = grown.up > 0.0, grown.down < 0.0
+    if (
+        least > greatest
+        or (above and below)
+        or (above and greatest < grown.up)
+        or (below and least > grown.down)
+    ):
+        surface.type_excluded[kind] = 1
+
+
+def last_offset(fdi: np.void, s: int, kind: int) -> float | None:
+    """Offset in the last frame, rad."""
+    surface = fdi["types"]["surface"][s]
+    return float(0.5 * (surface["low"] + surface["high"]) - surface["command"])
+
+
+CONSTANT = FaultType(
+    name="bias", constant=True, rank=6, judge=judge, deflection=deflection, estimate=middle_of,
+    interval=interval,
+)  # fmt: skip
+GROWING = FaultType(
+    name="bias", constant=False, rank=4, begin=begin_growing, watch=watch_growing, judge=judge_growing,
+    pass_over=pass_over_growing, estimate=last_offset, record="growing_bias",
+    memory=(
+        ("up", "f8"), ("down", "f8"),  # how far it has certainly grown, rad
+        # between what a slower one lies, rad; whether it has certainly run as fast as a runaway, down and up
+        ("least", "f8"), ("greatest", "f8"), ("ran", "i8", (2,)),
+    ),
+)  # fmt: skip
+TYPES = CONSTANT, GROWING

@@ -1,0 +1,97 @@
+"""A runaway to a stop: by each frame it has come at least as far as its least rate takes it, and it stays."""
+
+import numpy as np
+
+from beaver_ftc.compiled import kernel
+from beaver_ftc.diagnosis.types import release
+from beaver_ftc.diagnosis.types.contract import FaultType
+
+
+@kernel
+def way(config, surface, frame):
+    """The least way (rad) a runaway has gone by a frame; over a block the mean was reached within it."""
+    elapsed = frame - surface.started_at
+    if config.length > 1:
+        elapsed = max(elapsed - 1, 0)
+    return surface.least_runaway_rate * config.span_s * elapsed
+
+
+@kernel
+def upwards(config, surface, frame):
+    """How far up a runaway has come by a frame, at least: rad, the stop at most."""
+    if surface.started_at < 0:
+        return surface.travel_low
+    return min(surface.travel_high, surface.start_low + way(config, surface, frame))
+
+
+@kernel
+def downwards(config, surface, frame):
+    """How far down one has come: rad, the stop at most."""
+    if surface.started_at < 0:
+        return surface.travel_high
+    return max(surface.travel_low, surface.start_high - way(config, surface, frame))
+
+
+@kernel
+def judge_up(config, surface, kind, frame):
+    """It is beyond where its least rate takes it, or at the stop."""
+    release.holds(config, surface, kind, upwards(config, surface, frame), surface.travel_high)
+
+
+@kernel
+def judge_down(config, surface, kind, frame):
+    """The same downwards."""
+    release.holds(config, surface, kind, surface.travel_low, downwards(config, surface, frame))
+
+
+@kernel
+def let_go_up(config, surface, kind, frame):
+    """It may be let go on its way; within a frame of several instants, further on."""
+    low, high, shown = release.beginning(config, surface, frame)
+    low = max(low, upwards(config, surface, shown))
+    if not config.whole and low <= high:
+        high = surface.travel_high
+    release.let_go(surface, kind, low, high)
+
+
+@kernel
+def let_go_down(config, surface, kind, frame):
+    """The same downwards."""
+    low, high, shown = release.beginning(config, surface, frame)
+    high = min(high, downwards(config, surface, shown))
+    if not config.whole and low <= high:
+        low = surface.travel_low
+    release.let_go(surface, kind, low, high)
+
+
+@kernel
+def deflection_up(config, surface, kind, frame):
+    """Between its least way and the stop."""
+    return upwards(config, surface, frame), surface.travel_high
+
+
+@kernel
+def deflection_down(config, surface, kind, frame):
+    """The same downwards."""
+    return surface.travel_low, downwards(config, surface, frame)
+
+
+def upper_stop(fdi: np.void, s: int, kind: int) -> float | None:
+    """Deflection, rad."""
+    return float(fdi["types"]["surface"][s]["travel_high"])
+
+
+def lower_stop(fdi: np.void, s: int, kind: int) -> float | None:
+    """Deflection, rad."""
+    return float(fdi["types"]["surface"][s]["travel_low"])
+
+
+UP = FaultType(
+    name="hardover", constant=True, rank=4, begin=release.start, judge=judge_up, let_go=let_go_up,
+    bring_back=release.bring_back, deflection=deflection_up, estimate=upper_stop,
+)  # fmt: skip
+DOWN = FaultType(
+    name="hardover", constant=True, rank=5, begin=release.start, judge=judge_down, let_go=let_go_down,
+    bring_back=release.bring_back, deflection=deflection_down, estimate=lower_stop,
+)  # fmt: skip
+TYPES = UP, DOWN

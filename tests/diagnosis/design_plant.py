@@ -35,7 +35,7 @@ def conclude(frames):
     frame = frames[0]
     look_back(frame.belief, frame.fdi.bound, frame.measured, frame.k, frame.dt)
     diagnose(frame)
-    note_closest_approach(frame.fdi)
+    note_closest_approach(frame.fdi.bank, frame.fdi.statistical.alarm)
 
 
 class DesignPlant:

@@ -40,10 +40,13 @@ def of_stages(fdi, kernel):
     later = kernel.__name__ in ("whereabouts",) or kernel.__name__.startswith("deflection")
     return {
         "config": types["config"] if whole else fdi["config"], "types": types, "surfaces": types["surface"],
-        "pair": types["pair"], "conclusion": fdi["verdict"], "layout": fdi["layout"], "watch": fdi["watch"],
+        "pair": types["pair"], "conclusion": fdi["verdict"], "layout": fdi["layout"],
         "isolation": fdi["isolation"], "estimators": fdi["isolation"]["estimator"], "bound": fdi["bound"],
-        "bank": fdi["bank"], "fdae": fdi["fdae"], "innovation": fdi["bank"]["innovation"],
+        "shared": fdi["isolation"]["shared"], "abrupt": fdi["config"]["abrupt"],
+        "instants": fdi["config"]["instants"], "bank": fdi["bank"], "fdae": fdi["fdae"],
+        "innovation": fdi["bank"]["innovation"], "detected": fdi["verdict"]["detected"],
         "frame_bound": fdi["bound"]["frame"], "noise": fdi["bound"]["noise"], "dt": fdi["config"]["dt"],
+        "chances": fdi["statistical"]["alarm"],
         "frame": types["frame"] if later else types["frame"] - 1,
     }  # fmt: skip
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from kernels import DT, POLES, estimator, new_fdi, weights
+from kernels import DT, POLES, estimator, new_fdi, on, weights
 
 from beaver_ftc.diagnosis import bank
 
@@ -15,7 +15,7 @@ def test_a_filter_and_its_bound_are_convolutions_of_what_went_in():
     for k in range(frames):
         fdi["bound"]["eta_bar"], fdi["bound"]["noise_then"] = eta[k], noise[k]
         fdi["bound"]["noise"] = noise[k + 1]
-        bank.innovate(fdi, x[k + 1], x[k], believed[k])
+        on(bank.innovate, fdi, x[k + 1], x[k], believed[k])
     innovation = np.diff(x, axis=0) / DT - believed
     assert fdi["bank"]["innovation"] == pytest.approx(innovation[-1])
     assert fdi["bound"]["frame"] == pytest.approx(eta[-1] + (noise[-1] + noise[-2]) / DT)
@@ -41,23 +41,23 @@ CALM, LEAVES = [[0.1, -0.2, 0.3]] * 3, [[0.1, 0.5, 0.2], [0.3, -1.5, 0.1], [0.4,
 
 
 def test_the_alarm_is_of_the_first_axis_on_which_a_filter_leaves_its_bound():
-    assert bank.alarm(with_shares(*CALM)) == -1
-    assert bank.alarm(with_shares([1.0, -1.0, 1.0], *CALM[:2])) == -1  # at its bound is within
-    assert bank.alarm(with_shares(*LEAVES)) == 1
+    assert on(bank.alarm, with_shares(*CALM)) == -1
+    assert on(bank.alarm, with_shares([1.0, -1.0, 1.0], *CALM[:2])) == -1  # at its bound is within
+    assert on(bank.alarm, with_shares(*LEAVES)) == 1
     assert [bank.nearest(with_shares(*LEAVES)["bank"], i) for i in range(3)] == [2, 1, 2]
-    assert bank.largest_share(with_shares(*LEAVES)) == pytest.approx(1.5)
+    assert on(bank.largest_share, with_shares(*LEAVES)) == pytest.approx(1.5)
 
 
 def test_the_closest_approach_of_every_filter_is_kept():
     fdi = with_shares(*LEAVES)
     fdi["bank"]["closest"][:3], fdi["statistical"]["alarm"]["score"] = (0.6, 0.0, 0.0), 0.4
-    bank.note_closest_approach(fdi)
+    bank.note_closest_approach(fdi["bank"], fdi["statistical"]["alarm"])
     assert fdi["bank"]["closest"][:3] == pytest.approx([0.6, 1.5, 1.2])
     assert fdi["statistical"]["alarm"]["closest"] == 0.4
     silent = new_fdi()
-    bank.note_closest_approach(silent)
+    bank.note_closest_approach(silent["bank"], silent["statistical"]["alarm"])
     assert not silent["bank"]["closest"].any()
-    assert bank.largest_share(silent) == 0.0
+    assert on(bank.largest_share, silent) == 0.0
 
 
 def test_the_direction_across_a_fault_is_of_unit_length_and_sees_nothing_of_it():
@@ -65,7 +65,7 @@ def test_the_direction_across_a_fault_is_of_unit_length_and_sees_nothing_of_it()
     fdi["isolation"]["n"] = 2
     fdi["isolation"]["estimator"]["surface"][:2] = 2, 1
     G = np.array([[0, 0, 3.0, 0], [0, 5.0, 0, 0], [0, 0, -4.0, 0]])
-    bank.align(fdi, G)
+    on(bank.align, fdi, G)
     assert fdi["isolation"]["estimator"]["across"][0] == pytest.approx([-0.8, 0.0, -0.6])
     assert fdi["isolation"]["estimator"]["across"][0] @ G[:, 2] == pytest.approx(0.0)
     assert not fdi["isolation"]["estimator"]["across"][1].any()
@@ -85,7 +85,7 @@ def test_what_a_fault_can_have_done_is_the_filtered_extreme_of_what_it_does(seed
     rng = np.random.default_rng(seed)
     fdi, fie = reach_of(0.2 * rng.normal(size=3), rng.normal(size=3), rng.uniform(0, 0.3, 3))
     for _ in range(3):
-        bank.remember(fdi, fie)
+        on(bank.remember, fdi, fie)
     effect, across = fie["effect"], np.vstack([np.eye(3), fie["across"]])
     at_ends = [effect["offset"] + theta * effect["Z"] for theta in (-1.0, 0.5)]
     does = np.array([*at_ends, np.zeros(3)]) @ across.T
@@ -106,7 +106,7 @@ def test_a_fault_explains_what_is_within_its_reach_and_the_bound(m, axis, side):
         fie["unasked"][axis] = unasked
         limit = -0.4 if side < 0 else 0.6
         fdi["bank"]["residual"][m, axis] = limit + side * beyond
-        return bool(bank.explains(fdi, fie, True))
+        return bool(on(bank.explains, fdi, fie, True))
 
     assert explained(-1e-9)
     assert not explained(1e-9)
@@ -122,8 +122,8 @@ def test_across_its_direction_a_shared_parameter_confines_it_too(side):
     limit = (0.3 if side > 0 else -0.2) + side * (0.6 + 0.8) * 0.1
     for beyond, within in ((-1e-9, True), (1e-9, False)):
         fdi["bank"]["residual"][1] = (limit + side * beyond) * fie["across"]  # a unit vector
-        assert bool(bank.explains(fdi, fie, True)) == within
-        assert bank.explains(fdi, fie, False)
+        assert bool(on(bank.explains, fdi, fie, True)) == within
+        assert on(bank.explains, fdi, fie, False)
 
 
 def test_a_filter_without_a_bound_has_no_share_of_it():
@@ -131,11 +131,11 @@ def test_a_filter_without_a_bound_has_no_share_of_it():
     fdi = with_shares(*LEAVES)
     fdi["bank"]["threshold"][0] = 0.0
     with np.errstate(divide="ignore"):
-        assert bank.largest_share(fdi) == pytest.approx(1.5)
+        assert on(bank.largest_share, fdi) == pytest.approx(1.5)
         assert [bank.nearest(fdi["bank"], i) for i in range(3)] == [2, 1, 2]
-        bank.note_closest_approach(fdi)
+        bank.note_closest_approach(fdi["bank"], fdi["statistical"]["alarm"])
     assert fdi["bank"]["closest"][:3] == pytest.approx([0.0, 1.5, 1.2])
-    assert bank.alarm(fdi) == 0
+    assert on(bank.alarm, fdi) == 0
 
 
 def test_of_filters_that_are_equally_near_the_published_one_is_named():
@@ -149,7 +149,7 @@ def test_across_a_fault_is_square_to_its_column_in_roll_and_yaw(size):
     fdi, G = new_fdi(), np.zeros((3, 4))
     fie = estimator(fdi)
     G[:, 0] = size * np.array([0.8, 5.0, -0.6])
-    bank.align(fdi, G)
+    on(bank.align, fdi, G)
     assert fie["across"] == pytest.approx([-0.6, 0.0, -0.8])
-    bank.align(fdi, np.zeros((3, 4)))
+    on(bank.align, fdi, np.zeros((3, 4)))
     assert fie["across"] == pytest.approx([-0.6, 0.0, -0.8]), "what moves neither has no direction"

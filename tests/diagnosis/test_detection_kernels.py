@@ -2,16 +2,13 @@
 
 import numpy as np
 import pytest
-from kernels import DT, new_fdi
+from kernels import DT, new_fdi, on
 
 from beaver_ftc.diagnosis import belief as beliefs
-from beaver_ftc.diagnosis import detection, network
+from beaver_ftc.diagnosis import detection
+from beaver_ftc.diagnosis.detection import ALPHA_CENTRES, BETA_CENTRES, N_BASIS, NETWORK
 from beaver_ftc.diagnosis.state import (
-    ALPHA_CENTRES,
-    BETA_CENTRES,
     EITHER,
-    N_BASIS,
-    NETWORK,
     STATISTICS,
     WORST_CASE,
 )
@@ -28,7 +25,7 @@ def new_network(**fields):
 @pytest.mark.parametrize("beta", [-0.5, 0.07, 0.3, 0.4])
 def test_the_basis_is_that_of_gaussians_as_wide_as_their_spacing(alpha, beta):
     out = np.zeros(N_BASIS)
-    network.basis(alpha, beta, out)
+    detection.basis(alpha, beta, out)
     parts = []
     for place, centres in ((alpha, ALPHA_CENTRES), (beta, BETA_CENTRES)):
         inside = np.clip(place, centres[0], centres[-1])
@@ -41,13 +38,13 @@ def test_the_basis_is_that_of_gaussians_as_wide_as_their_spacing(alpha, beta):
     ("residual", "left"), [(0.5, 0.2), (0.3, 0.0), (-0.3, 0.0), (-0.5, -0.2), (0.1, 0.0)]
 )
 def test_the_dead_zone_leaves_the_excess(residual, left):
-    assert network.dead_zone(residual, 0.3) == pytest.approx(left)
+    assert detection.dead_zone(residual, 0.3) == pytest.approx(left)
 
 
 def test_the_output_is_the_weights_on_the_basis():
     rng = np.random.default_rng(1)
     record = new_network(weights=rng.normal(size=(3, N_BASIS)))
-    network.evaluate(record, 0.1, -0.05)
+    detection.evaluate(record, 0.1, -0.05)
     assert record["output"] == pytest.approx(record["weights"] @ record["basis"])
 
 
@@ -58,12 +55,12 @@ def test_weights_learn_what_exceeds_the_threshold_and_leak(leaking):
     record = new_network(
         gain=30.0, leak_per_s=2.0, weight_limit=9.0, weights=before, basis=rng.uniform(0, 1, N_BASIS)
     )
-    network.learn(record, np.array([0.5, -0.4, 0.1]), np.full(3, 0.2), leaking, DT)
+    detection.learn(record, np.array([0.5, -0.4, 0.1]), np.full(3, 0.2), leaking, DT)
     kept = np.exp(-2.0 * DT) if leaking else 1.0
     learnt = DT * 30.0 * np.outer([0.3, -0.2, 0.0], record["basis"])
     assert record["weights"] == pytest.approx(kept * before + learnt)
     record["weight_limit"] = 0.05
-    network.learn(record, np.array([0.5, -0.4, 0.1]), np.full(3, 0.2), leaking, DT)
+    detection.learn(record, np.array([0.5, -0.4, 0.1]), np.full(3, 0.2), leaking, DT)
     assert np.abs(record["weights"]).max() == 0.05
     assert record["weights"].min() == -0.05
 
@@ -71,7 +68,7 @@ def test_weights_learn_what_exceeds_the_threshold_and_leak(leaking):
 def test_a_diagnosis_begins_with_no_residual_and_the_gyros_error_to_come():
     fdi = new_fdi()
     fdi["bound"]["noise"] = 0.1, 0.2, 0.3
-    detection.begin(fdi, np.array([1.0, 2.0, 3.0]))
+    on(detection.begin, fdi, np.array([1.0, 2.0, 3.0]))
     assert fdi["fdae"]["xhat"] == pytest.approx([1.0, 2.0, 3.0])
     assert fdi["fdae"]["threshold_noise"] == pytest.approx([0.1, 0.2, 0.3])
     assert fdi["bank"]["noise"][:3] == pytest.approx(np.tile([0.1, 0.2, 0.3], (3, 1)))
@@ -94,12 +91,13 @@ def test_who_is_in_authority_raises_the_alarm(authority, filters, score, axis):
         0,
         (1.0, 1.0, 1.0),
     )
-    detection.detect(fdi, np.array([1.5, 0.5, 1.0]), 7.0)
+    detection.form_residual(fdi["fdae"], np.array([1.5, 0.5, 1.0]))
+    on(detection.detect, fdi, authority, fdi["statistical"]["alarm"], 7.0)
     assert fdi["fdae"]["residual"] == pytest.approx([0.5, -0.5, 0.0])
     assert bool(fdi["verdict"]["detected"]) == (axis is not None)
     assert fdi["verdict"]["detected_axis"] == (-1 if axis is None else axis)
     assert fdi["verdict"]["detected_at_s"] == (0.0 if axis is None else 7.0)
-    detection.detect(fdi, np.array([1.5, 0.5, 1.0]), 8.0)
+    on(detection.detect, fdi, authority, fdi["statistical"]["alarm"], 8.0)
     assert fdi["verdict"]["detected_at_s"] == (0.0 if axis is None else 7.0)  # the first alarm stays
 
 
@@ -116,7 +114,7 @@ def test_the_detection_estimator_and_its_threshold_are_convolutions(detected):
     for k in range(frames):
         fdi["bound"]["eta_bar"], fdi["bound"]["noise_then"] = eta[k], noise[k]
         fdi["bound"]["noise"], fdae["residual"] = noise[k + 1], 99.0
-        detection.predict(fdi, x[k], believed[k], False)
+        on(detection.predict, fdi, x[k], believed[k], False)
     w = decay ** np.arange(frames)[::-1, None]
     shares = w * ((1.0 - decay) * x + DT * (believed + output))
     assert fdae["xhat"] == pytest.approx(shares.sum(axis=0))
@@ -132,7 +130,7 @@ def test_beyond_the_model_is_what_was_learnt_and_the_residual_beyond_noise():
     fdae = fdi["fdae"]
     fdae["network"]["output"], fdae["pole"], fdae["residual"] = 0.1, (2.0, 3.0, 4.0), (0.5, -0.5, 0.05)
     fdae["threshold_noise"], fdi["bound"]["noise"] = 0.1, 0.2
-    detection.unknown_acceleration(fdi, out)
+    on(detection.unknown_acceleration, fdi, out)
     assert out == pytest.approx([0.1 + 2.0 * 0.2, 0.1 - 3.0 * 0.2, 0.1])
 
 

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from kernels import DT, estimator, new_fdi, put
+from kernels import DT, estimator, new_fdi, on, put
 
-from beaver_ftc.diagnosis import isolation
-from beaver_ftc.diagnosis.fault_class import hypothesis
+from beaver_ftc.diagnosis import isolation, scheme
+from beaver_ftc.diagnosis.isolation import hypothesis
 from beaver_ftc.diagnosis.likelihood import STEP
 from beaver_ftc.diagnosis.state import (
     INTERVAL,
@@ -27,7 +27,7 @@ def run_estimator(shared, theta, kind=LOSS, frames=25, eta_share=1.0, seed=0):
     fie = estimator(fdi, kind, low=-1.0, high=0.6)
     fdi["isolation"]["shared"], x = shared, rng.normal(size=3)
     fdi["bound"]["noise"] = 0.004, 0.005, 0.006
-    isolation.start(fdi, x)
+    on(isolation.start, fdi, x)
     fed = {name: [] for name in ("Z", "eta", "eta_bar", "noise_then", "spread")}
     for _ in range(frames):
         Z, eta_bar, noise_then = rng.normal(size=3), rng.uniform(0.1, 0.3, 3), rng.uniform(0.01, 0.02, 3)
@@ -36,12 +36,12 @@ def run_estimator(shared, theta, kind=LOSS, frames=25, eta_share=1.0, seed=0):
         offset = rng.normal(size=3)
         fie["effect"]["Z"], fie["effect"]["offset"], fie["effect"]["spread"] = Z, offset, spread
         fdi["bound"]["eta_bar"], fdi["bound"]["noise_then"] = eta_bar, noise_then
-        isolation.within_limits(fdi, fie, x)
-        isolation.predict_all(fdi, x, believed)
+        isolation.within_limits(fie, fdi["isolation"]["thresholds"], x)
+        on(isolation.predict_all, fdi, x, believed)
         x = x + DT * (believed + offset + theta * Z + eta)
         for name, value in zip(fed, (Z, eta, eta_bar, noise_then, spread), strict=True):
             fed[name].append(value)
-    within = isolation.within_limits(fdi, fie, x)
+    within = isolation.within_limits(fie, fdi["isolation"]["thresholds"], x)
     return fdi, fie, {name: np.array(value) for name, value in fed.items()}, within
 
 
@@ -81,7 +81,7 @@ def test_a_start_knows_nothing_but_the_set_of_theta():
     fie = estimator(fdi, low=-0.4, high=0.8)
     fie["theta_low"] = fie["theta_high"] = 0.3
     fdi["bound"]["noise"] = 0.1, 0.2, 0.3
-    isolation.start(fdi, np.array([1.0, 2.0, 3.0]))
+    on(isolation.start, fdi, np.array([1.0, 2.0, 3.0]))
     assert fie["xhat"] == pytest.approx([1.0, 2.0, 3.0])
     assert fie["bound_noise"] == pytest.approx([0.1, 0.2, 0.3])
     assert fie["covariance"] == pytest.approx([1.2**2 / 12.0] * 3)  # of a uniform distribution
@@ -137,7 +137,7 @@ def test_a_residual_at_its_limit_is_within_and_beyond_it_is_not(thresholds, axis
             limits = (-0.6 * 0.3 - 0.03, 0.6 * 0.3 + 0.03)
         x = np.zeros(3)
         x[axis] = limits[side > 0] + side * beyond
-        return bool(isolation.within_limits(fdi, fie, x))
+        return bool(isolation.within_limits(fie, fdi["isolation"]["thresholds"], x))
 
     assert within(-1e-12)
     assert not within(1e-9)
@@ -155,7 +155,7 @@ def test_a_residual_at_its_limit_is_within_and_beyond_it_is_not(thresholds, axis
 def test_who_rules_a_fault_out(every_type, authority, within, ruled_out):
     fdi = new_fdi()
     fdi["config"]["every_type"], fdi["config"]["authority"] = every_type, authority
-    assert bool(isolation.rules_out(fdi, estimator(fdi), within)) == ruled_out
+    assert bool(scheme.rules_out(fdi, estimator(fdi), within)) == ruled_out
 
 
 @pytest.mark.parametrize(
@@ -169,10 +169,10 @@ def test_the_one_left_is_the_fault(excluded, isolated):
     fdi = new_fdi()
     fdi["isolation"]["n"], fdi["isolation"]["estimator"]["excluded"][:3] = 3, excluded
     fdi["verdict"]["isolated"], fdi["verdict"]["isolated_at_s"] = NOT_ISOLATED, -1.0
-    isolation.decide(fdi, 4.0)
+    on(isolation.decide, fdi, 4.0)
     assert fdi["verdict"]["isolated"] == isolated
     assert fdi["verdict"]["isolated_at_s"] == (-1.0 if isolated == NOT_ISOLATED else 4.0)
-    isolation.decide(fdi, 5.0)
+    on(isolation.decide, fdi, 5.0)
     assert fdi["verdict"]["isolated_at_s"] != 5.0
 
 
@@ -181,10 +181,10 @@ def test_one_that_is_left_for_an_end_that_nobody_saw_begin_is_not_named(doubted,
     fdi = new_fdi()
     fdi["isolation"]["n"], fdi["isolation"]["estimator"]["excluded"][:3] = 3, (1, 0, 1)
     fdi["isolation"]["estimator"]["doubted"][1], fdi["isolation"]["estimator"]["shown"][1] = doubted, shown
-    isolation.decide(fdi, 4.0)
+    on(isolation.decide, fdi, 4.0)
     assert fdi["verdict"]["isolated"] == (1 if named else NOT_ISOLATED)
     fdi["isolation"]["estimator"]["excluded"][1] = 1
-    isolation.decide(fdi, 5.0)
+    on(isolation.decide, fdi, 5.0)
     assert fdi["verdict"]["isolated"] == UNANTICIPATED
 
 
@@ -204,12 +204,12 @@ def test_what_is_supposed_of_a_frame(memory):
     estimator(fdi, surface=2)
     G, Gu, spread = rng.normal(size=(3, 3, 4))
     fdi["isolation"]["memory"], fdi["verdict"]["detected"] = memory, 0
-    isolation.suppose_all(fdi, G, Gu, np.abs(spread))
+    on(isolation.suppose_all, fdi, G, Gu, np.abs(spread))
     fie = fdi["isolation"]["estimator"][0]
     assert fie["reach_low"][:3, :3].any() == memory
     assert fie["effect"]["Z"].any() == memory
     fdi["verdict"]["detected"] = 1
-    isolation.suppose_all(fdi, G, Gu, np.abs(spread))
+    on(isolation.suppose_all, fdi, G, Gu, np.abs(spread))
     assert fie["effect"]["Z"] == pytest.approx(Gu[:, 2])
     assert fie["effect"]["spread"] == pytest.approx(np.abs(spread[:, 2]))
 
@@ -235,11 +235,11 @@ def told(fdi, loss, step):
 def test_statistics_rule_out_what_something_else_explains_better(authority, step, ruled_out):
     fdi = new_fdi()
     fie, fdi["config"]["authority"] = told(fdi, 0.0, step), authority
-    assert isolation.rules_out(fdi, fie, True) == ruled_out
+    assert scheme.rules_out(fdi, fie, True) == ruled_out
     fdi["statistical"]["tests"]["enabled"] = 0
-    assert not isolation.rules_out(fdi, fie, True)
+    assert not scheme.rules_out(fdi, fie, True)
     fdi["statistical"]["tests"]["enabled"], fdi["config"]["authority"] = 1, WORST_CASE
-    assert not isolation.rules_out(fdi, fie, True)
+    assert not scheme.rules_out(fdi, fie, True)
 
 
 @pytest.mark.parametrize(("detected_at_s", "ruled_out"), [(-1.0, False), (0.0, True), (2.5, True)])
@@ -247,7 +247,7 @@ def test_statistics_that_have_raised_no_alarm_rule_out_nothing(detected_at_s, ru
     fdi = new_fdi()
     fie, fdi["config"]["authority"] = told(fdi, 0.0, NAMING + 0.1), EITHER
     fdi["statistical"]["alarm"]["detected_at_s"] = detected_at_s
-    assert isolation.rules_out(fdi, fie, True) == ruled_out
+    assert scheme.rules_out(fdi, fie, True) == ruled_out
 
 
 @pytest.mark.parametrize("abrupt", [0, 1])
@@ -255,10 +255,10 @@ def test_a_loss_that_has_shown_is_not_ruled_out_by_what_comes_later(abrupt):
     """That may be its end; one that is declared to stay has none."""
     fdi = new_fdi()
     fie, fdi["config"]["abrupt"] = told(fdi, 20.0, 0.0), abrupt
-    assert not isolation.rules_out(fdi, fie, True)
+    assert not scheme.rules_out(fdi, fie, True)
     assert fie["shown"] == (not abrupt)
     told(fdi, 0.0, 90.0)
-    assert isolation.rules_out(fdi, fie, True) == bool(abrupt)
+    assert scheme.rules_out(fdi, fie, True) == bool(abrupt)
 
 
 def doubtful(kind=LOSS, **switches):
@@ -283,22 +283,22 @@ def doubtful(kind=LOSS, **switches):
 )  # fmt: skip
 def test_each_test_that_is_switched_on_can_exclude(kind, switches, started, possible):
     fdi, fie = doubtful(kind, **switches)
-    assert isolation.possible(fdi, fie, np.zeros(3), started) == possible
-    assert not isolation.possible(fdi, fie, np.full(3, 9.0), started), "beyond its limits it is excluded"
+    assert on(isolation.possible, fdi, fie, np.zeros(3), started) == possible
+    assert not on(isolation.possible, fdi, fie, np.full(3, 9.0), started), "beyond its limits it is excluded"
 
 
 def test_a_position_is_asked_in_the_first_frame_where_the_past_is_kept():
     fdi, fie = doubtful(POSITION, memory=1)
     fdi["bank"]["residual"] = 0.0
-    assert not isolation.possible(fdi, fie, np.zeros(3), False)
+    assert not on(isolation.possible, fdi, fie, np.zeros(3), False)
     fdi["bank"]["innovation"] = 0.0
-    assert isolation.possible(fdi, fie, np.zeros(3), False)
+    assert on(isolation.possible, fdi, fie, np.zeros(3), False)
 
 
 def test_what_is_learned_of_a_constant_loss_is_kept_of_no_position():
     fdi, fie = doubtful(POSITION, membership=1, abrupt=1)
     fdi["bank"]["innovation"] = 0.0
-    isolation.possible(fdi, fie, np.zeros(3), True)
+    on(isolation.possible, fdi, fie, np.zeros(3), True)
     assert fie["theta_low"].tolist() == [-1.0] * 3
 
 
@@ -311,7 +311,7 @@ def test_errors_of_a_surfaces_own_terms_widen_the_room_of_its_position(kind, err
     G, Gu = rng.normal(size=(2, 3, 4))
     fdi["bound"]["own_errors"], fdi["bound"]["own_per_rad"], fdi["bound"]["frame"] = errors, 0.3, 1.0
     fdi["config"]["instants"] = 1
-    isolation.suppose(fdi, fie, G, Gu, np.full((3, 4), 0.1))
+    on(isolation.suppose, fdi, fie, G, Gu, np.full((3, 4), 0.1))
     assert (fie["effect"]["spread"] > 0.1).tolist() == [wider] * 3
 
 
@@ -319,7 +319,7 @@ def test_every_type_starts_with_no_knowledge_of_any_surface():
     for every_type in (0, 1):
         fdi = new_fdi()
         fdi["config"]["every_type"], fdi["types"]["surface"]["evidence"] = every_type, 7
-        isolation.start(fdi, np.zeros(3))
+        scheme.begin_isolation(fdi, np.zeros(3))
         assert fdi["types"]["surface"]["evidence"].tolist() == [0 if every_type else 7] * 4
 
 
@@ -346,7 +346,7 @@ def test_a_frame_is_shown_to_every_type_alone_or_in_its_block(length, started, m
     for s, fie in enumerate(fdi["isolation"]["estimator"][:4]):
         fie["kind"], fie["surface"], fie["low"], fie["high"] = POSITION, s, -1.0, 1.0
         fie["effect"]["Z"] = np.eye(3)[(0, 1, 2, 1)[s]]
-    isolation.isolate(fdi, np.zeros(3), 1.0, started)
+    scheme.isolate(fdi, np.zeros(3), 1.0, started)
     assert (fdi["types"]["frame"], fdi["types"]["block"]["filled"]) == (frame, filled)
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from kernels import estimator, new_fdi
+from kernels import estimator, new_fdi, on
 
 from beaver_ftc.diagnosis import membership
 from beaver_ftc.diagnosis.state import POSITION
@@ -37,13 +37,13 @@ def agreeing(innovation, **fields):
 def test_one_theta_has_to_explain_all_axes():
     theta = -0.5
     exact = 0.3 + theta * np.array([1.0, 2.0, -1.0])
-    assert membership.agree(*agreeing(exact))
-    assert membership.agree(*agreeing(exact + np.array([0.149, 0.149, -0.149])))
+    assert on(membership.agree, *agreeing(exact))
+    assert on(membership.agree, *agreeing(exact + np.array([0.149, 0.149, -0.149])))
     # axis 0 allows theta up to -0.35 - ..., axis 2 asks for one below: no theta is left
-    assert not membership.agree(*agreeing(exact + np.array([0.16, 0.0, 0.16])))
-    assert membership.agree(*agreeing(exact + np.array([0.16, 0.0, 0.16]), unasked=(0, 0, 1)))
-    assert membership.agree(*agreeing(np.full(3, 0.1)))  # what is healthy agrees
-    assert not membership.agree(*agreeing(0.3 + 0.2 * np.array([1.0, 2.0, -1.0])))  # a gain is no loss
+    assert not on(membership.agree, *agreeing(exact + np.array([0.16, 0.0, 0.16])))
+    assert on(membership.agree, *agreeing(exact + np.array([0.16, 0.0, 0.16]), unasked=(0, 0, 1)))
+    assert on(membership.agree, *agreeing(np.full(3, 0.1)))  # what is healthy agrees
+    assert not on(membership.agree, *agreeing(0.3 + 0.2 * np.array([1.0, 2.0, -1.0])))  # a gain is no loss
 
 
 @pytest.mark.parametrize("shared", [False, True])
@@ -53,14 +53,14 @@ def test_of_a_constant_theta_every_frame_leaves_what_it_agrees_with(shared):
     fdi["isolation"]["shared"] = shared
     fie["omega"], fie["theta"], fie["bound"] = (0.5, 0.0, 1.0), -0.2, 0.05
     fie["residual"] = fie["omega"] * (-0.5 + 0.2)
-    assert membership.narrow(fdi, fie)
+    assert on(membership.narrow, fdi, fie)
     # frame: (0.1 + 0.05) / |Z|; filtered: 0.05 / |omega|
     half = np.minimum(0.15 / np.array([1.0, 2.0, 1.0]), [0.1, np.inf, 0.05])
     half = np.full(3, half.min()) if shared else half
     assert fie["theta_low"] == pytest.approx(-0.5 - half)
     assert fie["theta_high"] == pytest.approx(-0.5 + half)
     fie["theta_low"][2], fie["theta_high"][2] = -0.2, -0.1
-    assert not membership.narrow(fdi, fie)
+    assert not on(membership.narrow, fdi, fie)
 
 
 def test_the_dominant_axis_is_that_of_the_largest_effect():
@@ -86,7 +86,7 @@ def test_how_far_a_surface_can_have_been_is_narrowed_round_by_round(instants):
     for _ in range(membership.ROUNDS):
         room = 0.05 + 0.01 + max(0.4 * (reach + earlier) - 0.02, 0.0)
         reach = min(reach, (1.0 + room) / 5.0)
-    membership.allow_for_own_errors(fdi, fie)
+    on(membership.allow_for_own_errors, fdi, fie)
     assert fie["furthest"] == pytest.approx(reach)
     own = np.maximum(np.array([0.1, 0.4, 0.2]) * (reach + earlier) - [0.01, 0.02, 0.2], 0.0)
     assert fie["effect"]["spread"] == pytest.approx(0.01 + own)
@@ -98,6 +98,6 @@ def test_where_no_position_agrees_the_whole_travel_stays_possible():
     fdi["config"]["instants"], fdi["bank"]["innovation"], fdi["bound"]["frame"] = 1, (0.0, 9.0, 0.0), 0.05
     fdi["bound"]["own_per_rad"][:, 1] = 0.1
     fie["effect"]["Z"] = 0.1, 5.0, 1.0
-    membership.allow_for_own_errors(fdi, fie)
+    on(membership.allow_for_own_errors, fdi, fie)
     assert fie["furthest"] == 0.6
     assert fie["effect"]["spread"] == pytest.approx([0.06] * 3)

@@ -14,18 +14,30 @@ import numpy as np
 
 from beaver_ftc.compiled import kernel
 from beaver_ftc.diagnosis.thresholds import bound_step, noise_step
+from beaver_ftc.scenario.diagnosis import MAX_POLES
+
+# The bank of detection filters; filter 0 is the published one.
+BANK = np.dtype(
+    [
+        ("n", "i8"), ("decay", "f8", (MAX_POLES,)), ("innovation", "f8", (3,)),
+        ("residual", "f8", (MAX_POLES, 3)), ("threshold", "f8", (MAX_POLES, 3)),
+        ("eta", "f8", (MAX_POLES, 3)), ("noise", "f8", (MAX_POLES, 3)),
+        ("closest", "f8", (MAX_POLES,)),  # largest share of its bound each filter reached in healthy flight
+    ],
+    align=True,
+)  # fmt: skip
 
 
 @kernel
-def align(fdi, G):
+def align(isolation, G):
     """Fix, once, the direction across which each fault has least effect; G (3, 4) as the flight begins.
 
     Unit length, in the roll-yaw plane, whose two axes are the only ones that one surface moves together.
     The bound is exact for any fixed direction; this one has power while G keeps its direction, which
     depends on alpha alone, and weakly.
     """
-    for s in range(fdi.isolation.n):
-        fie = fdi.isolation.estimator[s]
+    for s in range(isolation.n):
+        fie = isolation.estimator[s]
         p, r = G[0, fie.surface], G[2, fie.surface]
         length = np.hypot(p, r)
         if length > 0.0:
@@ -33,31 +45,29 @@ def align(fdi, G):
 
 
 @kernel
-def innovate(fdi, x, x_then, believed):
+def innovate(bank, bound, x, x_then, believed, dt):
     """Form the innovation of the elapsed frame and pass it through the bank.
 
     x, x_then (3,) rad/s: measured now and a frame ago; believed (3,) rad/s2: f + G u of the healthy
-    aircraft, mean over the frame.
+    aircraft, mean over the frame. bound: of `bound_dtype`; dt s.
     """
     for i in range(3):
-        fdi.bank.innovation[i] = (x[i] - x_then[i]) / fdi.config.dt - believed[i]
-        fdi.bound.frame[i] = (
-            fdi.bound.eta_bar[i] + (fdi.bound.noise[i] + fdi.bound.noise_then[i]) / fdi.config.dt
-        )
-        for m in range(fdi.bank.n):
-            a = fdi.bank.decay[m]
-            fdi.bank.residual[m, i] = a * fdi.bank.residual[m, i] + fdi.config.dt * fdi.bank.innovation[i]
-            fdi.bank.eta[m, i] = bound_step(fdi.bank.eta[m, i], fdi.bound.eta_bar[i], a, fdi.config.dt)
-            fdi.bank.noise[m, i] = noise_step(fdi.bank.noise[m, i], fdi.bound.noise_then[i], a)
-            fdi.bank.threshold[m, i] = fdi.bank.eta[m, i] + fdi.bank.noise[m, i] + fdi.bound.noise[i]
+        bank.innovation[i] = (x[i] - x_then[i]) / dt - believed[i]
+        bound.frame[i] = bound.eta_bar[i] + (bound.noise[i] + bound.noise_then[i]) / dt
+        for m in range(bank.n):
+            a = bank.decay[m]
+            bank.residual[m, i] = a * bank.residual[m, i] + dt * bank.innovation[i]
+            bank.eta[m, i] = bound_step(bank.eta[m, i], bound.eta_bar[i], a, dt)
+            bank.noise[m, i] = noise_step(bank.noise[m, i], bound.noise_then[i], a)
+            bank.threshold[m, i] = bank.eta[m, i] + bank.noise[m, i] + bound.noise[i]
 
 
 @kernel
-def alarm(fdi):
+def alarm(bank):
     """The first axis on which a filter of the bank leaves its bound, or -1."""
     for i in range(3):
-        for m in range(fdi.bank.n):
-            if abs(fdi.bank.residual[m, i]) > fdi.bank.threshold[m, i]:
+        for m in range(bank.n):
+            if abs(bank.residual[m, i]) > bank.threshold[m, i]:
                 return i
     return -1
 
@@ -75,26 +85,26 @@ def nearest(bank, i):
 
 
 @kernel
-def largest_share(fdi):
+def largest_share(bank):
     """The largest share of its bound that a filter of the bank reaches."""
     largest = 0.0
-    for m in range(fdi.bank.n):
+    for m in range(bank.n):
         for i in range(3):
-            if fdi.bank.threshold[m, i] > 0.0:
-                largest = max(largest, abs(fdi.bank.residual[m, i]) / fdi.bank.threshold[m, i])
+            if bank.threshold[m, i] > 0.0:
+                largest = max(largest, abs(bank.residual[m, i]) / bank.threshold[m, i])
     return largest
 
 
 @kernel
-def note_closest_approach(fdi):
-    """Keep the largest share of its bound that each filter has reached."""
-    for m in range(fdi.bank.n):
+def note_closest_approach(bank, chances):
+    """Keep the largest share of its bound that each filter has reached, and of its level the statistical
+    detector, `chances` of its ALARM."""
+    chances.closest = max(chances.closest, chances.score)
+    for m in range(bank.n):
         for i in range(3):
-            if fdi.bank.threshold[m, i] > 0.0:
-                share = abs(fdi.bank.residual[m, i]) / fdi.bank.threshold[m, i]
-                fdi.bank.closest[m] = max(fdi.bank.closest[m], share)
-    alarm = fdi.statistical.alarm
-    alarm.closest = max(alarm.closest, alarm.score)
+            if bank.threshold[m, i] > 0.0:
+                share = abs(bank.residual[m, i]) / bank.threshold[m, i]
+                bank.closest[m] = max(bank.closest[m], share)
 
 
 @kernel
@@ -118,26 +128,26 @@ def aligned_extremes(fie):
 
 
 @kernel
-def remember(fdi, fie):
+def remember(bank, fie, dt):
     """Advance what the fault can have done to each filter since the flight began; channel 3 is `across`."""
     for channel in range(4):
         low, high = extremes(fie, channel) if channel < 3 else aligned_extremes(fie)
-        for m in range(fdi.bank.n):
-            a = fdi.bank.decay[m]
-            fie.reach_low[m, channel] = a * fie.reach_low[m, channel] + fdi.config.dt * low
-            fie.reach_high[m, channel] = a * fie.reach_high[m, channel] + fdi.config.dt * high
+        for m in range(bank.n):
+            a = bank.decay[m]
+            fie.reach_low[m, channel] = a * fie.reach_low[m, channel] + dt * low
+            fie.reach_high[m, channel] = a * fie.reach_high[m, channel] + dt * high
 
 
 @kernel
-def explains(fdi, fie, shared):
+def explains(bank, fie, shared):
     """Whether the fault, whatever its course since the flight began, can have brought the filters here.
 
     `shared`: also across its direction, which only a parameter shared by the axes confines.
     """
-    for m in range(fdi.bank.n):
+    for m in range(bank.n):
         residual, bound = 0.0, 0.0
         for i in range(3):
-            r, b = fdi.bank.residual[m, i], fdi.bank.threshold[m, i]
+            r, b = bank.residual[m, i], bank.threshold[m, i]
             if not fie.reach_low[m, i] - b <= r <= fie.reach_high[m, i] + b and not fie.unasked[i]:
                 return False
             residual += fie.across[i] * r

@@ -1,70 +1,176 @@
-"""The fault detection and approximation estimator (FDAE), always on.
+"""The fault detection and approximation estimator (FDAE), always on, and the network that learns a fault.
 
     xhat0' = -Lambda0 (xhat0 - x) + f + G u + fhat,  eps0 = x - xhat0,  alarm when |eps0_i| > ebar_i, some i
 
 [Zhang2005, sec. IV]. Until the alarm eps0 is filter 0 of the bank (bank.py), which raises it. Written for
 the discrete truth: xhat0[k+1] = x[k] + dt F[k] + exp(-Lambda0 dt) (xhat0[k] - x[k]).
+
+The network: Gaussian radial basis functions of alpha and of beta, linear in its weights.
+
+    fhat_i = W_i^T Phi(alpha, beta)       W_i' = P{gain Phi D[eps_i] - leak W_i},   |Phi| = 1
+
+[Zhang2005, sec. IV and V]. Phi is normalised, so that `gain` alone sets the bandwidth of learning wherever
+the state is. D is a continuous dead zone at the detection threshold: the network cannot learn what the
+admitted uncertainty explains.
 """
 
+import numpy as np
+
 from beaver_ftc.compiled import kernel
-from beaver_ftc.diagnosis import bank
-from beaver_ftc.diagnosis.network import dead_zone, learn
+from beaver_ftc.diagnosis.bank import alarm
 from beaver_ftc.diagnosis.state import STATISTICS, WORST_CASE
 from beaver_ftc.diagnosis.thresholds import bound_step, noise_step
 
+# Centres of the network's basis functions, rad; and its memory.
+ALPHA_CENTRES = np.linspace(-0.1, 0.5, 9)
+BETA_CENTRES = np.linspace(-0.3, 0.3, 5)
+N_BASIS = len(ALPHA_CENTRES) + len(BETA_CENTRES)
+NETWORK = np.dtype(
+    [
+        ("gain", "f8"), ("leak_per_s", "f8"), ("weight_limit", "f8"),
+        ("weights", "f8", (3, N_BASIS)), ("basis", "f8", (N_BASIS,)), ("output", "f8", (3,)),
+    ],
+    align=True,
+)  # fmt: skip
+
+FDAE = np.dtype(
+    [
+        ("pole", "f8", (3,)), ("decay", "f8", (3,)), ("xhat", "f8", (3,)), ("residual", "f8", (3,)),
+        ("threshold", "f8", (3,)), ("threshold_eta", "f8", (3,)), ("threshold_noise", "f8", (3,)),
+        ("network", NETWORK),
+    ],
+    align=True,
+)  # fmt: skip
+
+_PER_STEP = np.exp(-1.0)
+_N_ALPHA = len(ALPHA_CENTRES)
+_N_BETA = len(BETA_CENTRES)
+_ALPHA_FIRST, _ALPHA_STEP = ALPHA_CENTRES[0], ALPHA_CENTRES[1] - ALPHA_CENTRES[0]
+_BETA_FIRST, _BETA_STEP = BETA_CENTRES[0], BETA_CENTRES[1] - BETA_CENTRES[0]
+
 
 @kernel
-def begin(fdi, x):
-    """Start at the first measurement x (3,) rad/s: no residual, and all of the gyro's error still to come."""
+def gaussians(place, count, first, out):
+    """Fill out[first : first + count] with exp(-(place - j)^2 / 2), j = 0, 1, ...; return the squares' sum.
+
+    From one to the next they change by exp(place - j - 1/2), and that by 1/e: two exponentials do for all.
+    """
+    value, change = np.exp(-0.5 * place * place), np.exp(place - 0.5)
+    square = 0.0
+    for j in range(count):
+        out[first + j] = value
+        square += value * value
+        value *= change
+        change *= _PER_STEP
+    return square
+
+
+@kernel
+def basis(alpha, beta, out):
+    """Fill out (N_BASIS,) with the normalised radial basis functions at (alpha, beta), rad.
+
+    Each width equals the spacing of its centres; outside the grid the nearest edge answers.
+    """
+    a = min(max((alpha - _ALPHA_FIRST) / _ALPHA_STEP, 0.0), _N_ALPHA - 1.0)
+    b = min(max((beta - _BETA_FIRST) / _BETA_STEP, 0.0), _N_BETA - 1.0)
+    norm = np.sqrt(gaussians(a, _N_ALPHA, 0, out) + gaussians(b, _N_BETA, _N_ALPHA, out))
+    for j in range(N_BASIS):
+        out[j] /= norm
+
+
+@kernel
+def dead_zone(residual, threshold):
+    """D[eps]: zero inside the threshold, the excess over it outside."""
+    if residual > threshold:
+        return residual - threshold
+    if residual < -threshold:
+        return residual + threshold
+    return 0.0
+
+
+@kernel
+def evaluate(network, alpha, beta):
+    """Fill network.output (3,) rad/s2 for the present alpha and beta."""
+    basis(alpha, beta, network.basis)
     for i in range(3):
-        fdi.fdae.xhat[i] = x[i]
-        fdi.fdae.threshold_noise[i] = fdi.bound.noise[i]
-        for m in range(fdi.bank.n):
-            fdi.bank.noise[m, i] = fdi.bound.noise[i]
+        total = 0.0
+        for j in range(N_BASIS):
+            total += network.weights[i, j] * network.basis[j]
+        network.output[i] = total
 
 
 @kernel
-def detect(fdi, x, t):
-    """Form the residual and raise the alarm if a detector in authority does; x (3,) rad/s measured, t s."""
+def learn(network, residual, threshold, leaking, dt):
+    """Advance the weights by one frame; residual and threshold (3,) rad/s, dt s.
+
+    `leaking` lets go of what was learnt once another estimate explains the fault.
+    """
+    keep = np.exp(-network.leak_per_s * dt) if leaking else 1.0
+    limit = network.weight_limit
     for i in range(3):
-        fdi.fdae.residual[i] = x[i] - fdi.fdae.xhat[i]
-    axis = bank.alarm(fdi) if fdi.config.authority != STATISTICS else -1
-    if axis < 0 and fdi.config.authority != WORST_CASE and fdi.statistical.alarm.score > 1.0:
-        axis = fdi.statistical.alarm.axis
-    if axis >= 0 and not fdi.verdict.detected:
-        fdi.verdict.detected = 1
-        fdi.verdict.detected_at_s = t
-        fdi.verdict.detected_axis = axis
+        drive = dt * network.gain * dead_zone(residual[i], threshold[i])
+        for j in range(N_BASIS):
+            weight = keep * network.weights[i, j] + drive * network.basis[j]
+            network.weights[i, j] = min(max(weight, -limit), limit)
 
 
 @kernel
-def predict(fdi, x, believed, leaking):
-    """Advance the FDAE and its threshold by one frame, and let the network learn what exceeds the threshold.
+def begin(fdae, bank, noise, x):
+    """Start at the first measurement x (3,) rad/s: no residual, and all of the gyro's error still to come.
+
+    noise (3,) rad/s: by how much the gyros' errors may change.
+    """
+    for i in range(3):
+        fdae.xhat[i] = x[i]
+        fdae.threshold_noise[i] = noise[i]
+        for m in range(bank.n):
+            bank.noise[m, i] = noise[i]
+
+
+@kernel
+def form_residual(fdae, x):
+    """Fill the residual for the measured x (3,) rad/s."""
+    for i in range(3):
+        fdae.residual[i] = x[i] - fdae.xhat[i]
+
+
+@kernel
+def detect(bank, conclusion, authority, chances, t):
+    """Raise the alarm if a detector in authority does, at t s; chances: the statistical one's, of `ALARM`."""
+    axis = alarm(bank) if authority != STATISTICS else -1
+    if axis < 0 and authority != WORST_CASE and chances.score > 1.0:
+        axis = chances.axis
+    if axis >= 0 and not conclusion.detected:
+        conclusion.detected = 1
+        conclusion.detected_at_s = t
+        conclusion.detected_axis = axis
+
+
+@kernel
+def predict(fdae, bound, x, believed, detected, leaking, dt):
+    """Advance the FDAE and its threshold by one frame; once `detected`, the network learns what exceeds the
+    threshold.
 
     x (3,) rad/s; `believed` (3,) rad/s2 is f + G u, with the isolated fault once there is one.
     """
-    if fdi.verdict.detected:
-        learn(fdi.fdae.network, fdi.fdae.residual, fdi.fdae.threshold, leaking, fdi.config.dt)
+    if detected:
+        learn(fdae.network, fdae.residual, fdae.threshold, leaking, dt)
     for i in range(3):
-        rate = believed[i] + fdi.fdae.network.output[i]
-        fdi.fdae.xhat[i] = x[i] + fdi.config.dt * rate + fdi.fdae.decay[i] * (fdi.fdae.xhat[i] - x[i])
-        fdi.fdae.threshold_eta[i] = bound_step(
-            fdi.fdae.threshold_eta[i], fdi.bound.eta_bar[i], fdi.fdae.decay[i], fdi.config.dt
-        )
-        fdi.fdae.threshold_noise[i] = noise_step(
-            fdi.fdae.threshold_noise[i], fdi.bound.noise_then[i], fdi.fdae.decay[i]
-        )
-        fdi.fdae.threshold[i] = fdi.fdae.threshold_eta[i] + fdi.fdae.threshold_noise[i] + fdi.bound.noise[i]
+        rate, decay = believed[i] + fdae.network.output[i], fdae.decay[i]
+        fdae.xhat[i] = x[i] + dt * rate + decay * (fdae.xhat[i] - x[i])
+        fdae.threshold_eta[i] = bound_step(fdae.threshold_eta[i], bound.eta_bar[i], decay, dt)
+        fdae.threshold_noise[i] = noise_step(fdae.threshold_noise[i], bound.noise_then[i], decay)
+        fdae.threshold[i] = fdae.threshold_eta[i] + fdae.threshold_noise[i] + bound.noise[i]
 
 
 @kernel
-def unknown_acceleration(fdi, out):
+def unknown_acceleration(fdae, noise, out):
     """Fill out (3,) rad/s2 with what the FDAE believes beyond the model: learnt, and about to be learnt.
 
     The residual settles at (phi - fhat) / Lambda0, so Lambda0 eps0 is the part of the fault not yet in the
-    weights, at the bandwidth of the estimator. What the gyro's noise alone explains stays out of it, and off
-    the surfaces.
+    weights, at the bandwidth of the estimator. What the gyro's noise (3,) rad/s alone explains stays out of
+    it, and off the surfaces.
     """
     for i in range(3):
-        noise = fdi.fdae.threshold_noise[i] + fdi.bound.noise[i]
-        out[i] = fdi.fdae.network.output[i] + fdi.fdae.pole[i] * dead_zone(fdi.fdae.residual[i], noise)
+        explained = fdae.threshold_noise[i] + noise[i]
+        out[i] = fdae.network.output[i] + fdae.pole[i] * dead_zone(fdae.residual[i], explained)

@@ -11,7 +11,8 @@ of it, for the diagnosis and for the laws; it is not trusted again in the flight
 """
 
 from beaver_ftc.compiled import kernel
-from beaver_ftc.diagnosis import accelerometers, bank, redundancy
+from beaver_ftc.diagnosis import accelerometers, redundancy
+from beaver_ftc.diagnosis.bank import alarm
 from beaver_ftc.diagnosis.stand_in import replace
 from beaver_ftc.diagnosis.state import NOT_ISOLATED
 from beaver_ftc.diagnosis.thresholds import bound_step
@@ -45,14 +46,17 @@ CROSS_DAMPING_PER_S = 10.0  # by which a gyro's own error moves the innovation
 
 
 @kernel
-def attend(watch, fdi, belief, measured, t):
-    """Look at the instruments at one instant, t s; replace in `measured` what is known to be broken."""
+def attend(watch, belief, measured, conclusion, bank, bound, dt, t):
+    """Look at the instruments at one instant, t s; replace in `measured` what is known to be broken.
+
+    bank, bound: of the innovation of the elapsed frame, of dt s. conclusion: void from an alarm on.
+    """
     step, signal = watch.step, measured.signal
     if not watch.begun:
         begin(watch, measured, t)
         return
     if watch.past == 0:
-        follow_rates(watch, fdi)
+        follow_rates(watch, bank.innovation, bound.eta_bar, dt)
     redundancy.check(step, signal, watch.engine)
     accelerometers.note_stillness(watch, signal)
     if watch.past == 0:
@@ -66,7 +70,7 @@ def attend(watch, fdi, belief, measured, t):
             watch.spike[i] = max(watch.spike[i], abs(error))
     if watch.blurred:
         clear_gyros(watch)
-    decide(watch, fdi, measured, t)
+    decide(watch, measured, conclusion, bank, bound, dt, t)
     replace(watch, belief, measured)
     accelerometers.spoil(watch, measured)
     watch.earlier[:] = step.then
@@ -85,7 +89,7 @@ def begin(watch, measured, t):
 
 
 @kernel
-def follow_rates(watch, fdi):
+def follow_rates(watch, innovation, eta_bar, dt):
     """Bring W (3,) rad/s and its bound to the frame whose innovation is there."""
     W, bound, D = watch.W, watch.W_bound, watch.damping
     watch.W_then[:] = bound
@@ -96,8 +100,8 @@ def follow_rates(watch, fdi):
         for j in range(3):
             lost += D[i, j] * before[j]
             spread += (-D[i, j] if i == j else abs(D[i, j])) * watch.W_then[j]
-        W[i] += fdi.config.dt * (fdi.bank.innovation[i] - lost)
-        bound[i] = max(watch.W_then[i] + fdi.config.dt * (fdi.bound.eta_bar[i] + spread), 0.0)
+        W[i] += dt * (innovation[i] - lost)
+        bound[i] = max(watch.W_then[i] + dt * (eta_bar[i] + spread), 0.0)
 
 
 @kernel
@@ -118,23 +122,23 @@ def clear_gyros(watch):
 
 
 @kernel
-def decide(watch, fdi, measured, t):
+def decide(watch, measured, conclusion, bank, bound, dt, t):
     """Raise the alarm, and name the instrument once there is but one it can be."""
     note_furthest(watch)
     if watch.named != NOBODY:
         return
     for i in range(N_SENSORS):
         if measured.missing[i] and watch.named == NOBODY:
-            raise_alarm(watch, fdi, t)
+            raise_alarm(watch, conclusion, t)
             name(watch, i, t)
     if watch.named != NOBODY:
         return
     if watch.share > 1.0 and not watch.alarmed:
-        raise_alarm(watch, fdi, t)
+        raise_alarm(watch, conclusion, t)
         watch.lead = watch.furthest
     if watch.alarmed:
         if watch.past == 0:
-            ask_rates(watch, fdi)
+            ask_rates(watch, bank, bound, dt)
         note_fired(watch)
         accelerometers.weigh(watch, measured.signal)
         suspect(watch)
@@ -157,25 +161,20 @@ def note_furthest(watch):
 
 
 @kernel
-def raise_alarm(watch, fdi, t):
-    """An instrument is broken; what the diagnosis of the surfaces made of it a moment ago is void."""
+def raise_alarm(watch, conclusion, t):
+    """An instrument is broken; what the diagnosis of the surfaces concluded a moment ago is void."""
     if watch.alarmed:
         return
     watch.alarmed, watch.alarmed_at_s = 1, t
-    verdict = fdi.verdict
-    if verdict.detected and verdict.detected_at_s < t - BESIDE_S:
+    if conclusion.detected and conclusion.detected_at_s < t - BESIDE_S:
         watch.beside = 1
         return
-    if verdict.detected:
-        watch.alarmed_at_s = verdict.detected_at_s  # the same fault, seen first in the rates
-    watch.misnamed = verdict.isolated >= 0
-    verdict.detected, verdict.isolated, verdict.type = 0, NOT_ISOLATED, -1
-    verdict.detected_at_s = verdict.isolated_at_s = -1.0
-    verdict.lead = verdict.lead_kind = -1
-    for s in range(fdi.types.surface.size):
-        fdi.types.surface[s].measure = -1
-    fdi.fdae.network.weights[:] = 0.0
-    fdi.fdae.network.output[:] = 0.0
+    if conclusion.detected:
+        watch.alarmed_at_s = conclusion.detected_at_s  # the same fault, seen first in the rates
+    watch.misnamed = conclusion.isolated >= 0
+    conclusion.detected, conclusion.isolated, conclusion.type = 0, NOT_ISOLATED, -1
+    conclusion.detected_at_s = conclusion.isolated_at_s = -1.0
+    conclusion.lead = conclusion.lead_kind = -1
 
 
 @kernel
@@ -186,23 +185,23 @@ def name(watch, i, t):
 
 
 @kernel
-def ask_rates(watch, fdi):
+def ask_rates(watch, bank, bound, dt):
     """By axis, whether the rates' dynamics have seen what the attitude shows: YES or NO once it is certain.
 
     What has shown inside the frame before and is gone is no gyro's: its error would have come to stay.
     """
-    alarm = bank.alarm(fdi)
+    alarmed, innovation = alarm(bank), bank.innovation
     for i in range(3):
         if watch.rates_say[i] != UNKNOWN:
             continue
-        error, jump = watch.error[i], (watch.error[i] - watch.error_then[i]) / fdi.config.dt
+        error, jump = watch.error[i], (watch.error[i] - watch.error_then[i]) / dt
         own = CROSS_DAMPING_PER_S * max(abs(error), abs(watch.error_then[i])) + 0.1 * abs(jump)
         blur = 4.0 * watch.step.test[TURN + i].noise / watch.step.h  # of `error`, by the attitude's noise
-        bound = fdi.bound.frame[i] + 1e-6
-        seen = abs(fdi.bank.innovation[i]) > bound or alarm >= 0 or abs(watch.W[i]) > watch.W_bound[i] + 1e-6
+        most = bound.frame[i] + 1e-6
+        seen = abs(innovation[i]) > most or alarmed >= 0 or abs(watch.W[i]) > watch.W_bound[i] + 1e-6
         spike = watch.spike_then[i]
         sudden = abs(error) < GONE * spike and spike > 2.0 * blur
-        explained = abs(fdi.bank.innovation[i] - jump) <= bound + own + blur / fdi.config.dt
+        explained = abs(innovation[i] - jump) <= most + own + blur / dt
         slow = 0.7 * abs(error) <= watch.W_bound[i] + abs(watch.W[i]) + blur
         if not explained or (not seen and (sudden or not slow)):
             watch.rates_say[i] = NO

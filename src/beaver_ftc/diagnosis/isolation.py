@@ -7,29 +7,85 @@
 multiplied by Omega[k+1], the residual of the true estimator is exactly Omega (theta - thetahat) plus the
 filtered uncertainty, whatever the estimate does.
 
+Every hypothesis is linear in one unknown parameter per axis, phi_i = base_i + theta_i Z_i:
+
+    loss of effectiveness   base 0          Z_i = G_is u_s      theta in [-1, 0]       [Zhang2005, eq. (4)]
+    position                base -G_is u_s  Z_i = G_is          theta in the travel
+
+LOSS on aileron, elevator and rudder is the published class. POSITION says only that the surface is not
+where its command puts it: its parameter, the deflection in rad, may change in any way, so it covers every
+fault of the surface. The two together are `fdi.fault_class: all`; types/ finds out which type of fault it is.
+
 The sharpened tests (bank.py, membership.py) exclude beside it, each by its own switch; a fault is excluded
 by the first test that fails.
 """
 
-from beaver_ftc.compiled import apart, kernel
-from beaver_ftc.diagnosis import across, bank, membership
-from beaver_ftc.diagnosis.fault_class import hypothesis
+import numpy as np
+
+from beaver_ftc.compiled import kernel
+from beaver_ftc.diagnosis import membership
+from beaver_ftc.diagnosis.bank import explains, remember
 from beaver_ftc.diagnosis.state import (
     INTERVAL,
     LOSS,
     NOT_ISOLATED,
     POSITION,
-    STATISTICS,
     UNANTICIPATED,
-    WORST_CASE,
 )
-from beaver_ftc.diagnosis.statistical import excludes, shows
 from beaver_ftc.diagnosis.thresholds import bound_step, interval, noise_step, published
-from beaver_ftc.diagnosis.types import examine, pairs, verdict
+from beaver_ftc.scenario.diagnosis import MAX_POLES
+
+MAX_ESTIMATORS = 16
+# What a fault adds to the angular acceleration, as its estimator supposes: offset + theta Z, give or take.
+EFFECT = np.dtype([("offset", "f8", (3,)), ("Z", "f8", (3,)), ("spread", "f8", (3,))], align=True)
+
+ESTIMATOR = np.dtype(
+    [
+        ("kind", "i8"), ("surface", "i8"),
+        ("low", "f8"), ("high", "f8"),  # the known set of theta
+        ("excluded", "i8"), ("excluded_at_s", "f8"), ("unasked", "i8", (3,)),
+        ("shown", "i8"), ("doubted", "i8"),
+        ("xhat", "f8", (3,)), ("residual", "f8", (3,)), ("lower", "f8", (3,)), ("upper", "f8", (3,)),
+        ("omega", "f8", (3,)), ("rise", "f8", (3,)), ("fall", "f8", (3,)), ("bound", "f8", (3,)),
+        ("bound_eta", "f8", (3,)), ("bound_noise", "f8", (3,)),
+        ("theta", "f8", (3,)), ("covariance", "f8", (3,)),
+        ("effect", EFFECT), ("block_effect", EFFECT),  # of the frame; mean over a block
+        ("furthest", "f8"),  # rad, from neutral, that the surface can have been in the frame
+        # what bank.py and membership.py keep
+        ("across", "f8", (3,)), ("reach_low", "f8", (MAX_POLES, 4)), ("reach_high", "f8", (MAX_POLES, 4)),
+        ("theta_low", "f8", (3,)), ("theta_high", "f8", (3,)),
+    ],
+    align=True,
+)  # fmt: skip
+
+# The isolation estimators, and how the decision among them is sharpened.
+ISOLATION = np.dtype(
+    [
+        ("n", "i8"), ("thresholds", "i8"), ("forgetting", "f8"), ("decay", "f8", (3,)),
+        ("memory", "i8"), ("shared", "i8"), ("membership", "i8"),
+        ("estimator", ESTIMATOR, (MAX_ESTIMATORS,)),
+    ],
+    align=True,
+)  # fmt: skip
+
+PARAMETER_SET = {LOSS: (-1.0, 0.0)}
 
 
 @kernel
-def suppose(fdi, fie, G, Gu, spread):
+def hypothesis(kind, surface, G, Gu, base, Z):
+    """Fill base (3,) rad/s2 and the regressor Z (3,) rad/s2 per unit of theta, for one fault of `surface`.
+
+    G (3, 4) rad/s2 per rad; Gu (3, 4) rad/s2, the acceleration each commanded surface would give if healthy.
+    """
+    for i in range(3):
+        if kind == POSITION:
+            base[i], Z[i] = -Gu[i, surface], G[i, surface]
+        else:
+            base[i], Z[i] = 0.0, Gu[i, surface]
+
+
+@kernel
+def suppose(isolation, fie, bank, bound, config, G, Gu, spread):
     """What the fault would have done in the elapsed frame, and to the bank since the flight began.
 
     G (3, 4) rad/s2 per rad; Gu (3, 4) rad/s2, the contribution of each surface; means over the frame. spread
@@ -39,41 +95,42 @@ def suppose(fdi, fie, G, Gu, spread):
     hypothesis(fie.kind, fie.surface, G, Gu, effect.offset, effect.Z)
     for i in range(3):
         effect.spread[i] = spread[i, fie.surface]
-    if fdi.bound.own_errors and fie.kind == POSITION:
-        membership.allow_for_own_errors(fdi, fie)
-    if fdi.isolation.memory:
-        bank.remember(fdi, fie)
+    if bound.own_errors and fie.kind == POSITION:
+        membership.allow_for_own_errors(fie, bound, bank.innovation, config.instants)
+    if isolation.memory:
+        remember(bank, fie, config.dt)
 
 
 @kernel
-def suppose_all(fdi, G, Gu, spread):
+def suppose_all(isolation, bank, bound, config, detected, G, Gu, spread):
     """`suppose` for every estimator, where something will ask for it."""
-    if fdi.isolation.memory or fdi.config.every_type or fdi.verdict.detected:
-        for s in range(fdi.isolation.n):
-            suppose(fdi, fdi.isolation.estimator[s], G, Gu, spread)
+    if isolation.memory or config.every_type or detected:
+        for s in range(isolation.n):
+            suppose(isolation, isolation.estimator[s], bank, bound, config, G, Gu, spread)
 
 
 @kernel
-def start(fdi, x):
-    """Start every estimator at the measured x (3,) rad/s, with no residual and no knowledge of theta."""
-    for s in range(fdi.isolation.n):
-        fie = fdi.isolation.estimator[s]
+def start(isolation, noise, x):
+    """Start every estimator at the measured x (3,) rad/s, with no residual and no knowledge of theta.
+
+    noise (3,) rad/s: by how much the gyros' errors may change.
+    """
+    for s in range(isolation.n):
+        fie = isolation.estimator[s]
         for i in range(3):
             fie.xhat[i] = x[i]
-            fie.bound_noise[i] = fdi.bound.noise[i]
+            fie.bound_noise[i] = noise[i]
             fie.covariance[i] = (fie.high - fie.low) ** 2 / 12.0  # of a uniform distribution
             fie.theta_low[i], fie.theta_high[i] = fie.low, fie.high
-    if fdi.config.every_type:
-        examine.start(fdi.types)
 
 
 @kernel
-def within_limits(fdi, fie, x):
+def within_limits(fie, thresholds, x):
     """Form the residual and its limits; whether it is within them on every axis."""
     within = True
     for i in range(3):
         fie.residual[i] = x[i] - fie.xhat[i]
-        if fdi.isolation.thresholds == INTERVAL:
+        if thresholds == INTERVAL:
             fie.lower[i], fie.upper[i] = interval(
                 fie.low, fie.high, fie.rise[i], fie.fall[i], fie.omega[i], fie.theta[i], fie.bound[i]
             )
@@ -86,108 +143,37 @@ def within_limits(fdi, fie, x):
 
 
 @kernel
-def possible(fdi, fie, x, started):
-    """Whether the fault can be the one, by every test switched on. `started`: a frame or more ago."""
-    can_be = within_limits(fdi, fie, x)
-    if fdi.isolation.memory:
-        can_be = can_be and bank.explains(fdi, fie, fdi.isolation.shared)
-    if (fdi.isolation.shared or fie.kind == POSITION) and (started or fdi.isolation.memory):
-        can_be = can_be and membership.agree(fdi, fie)
-    if fdi.isolation.membership and fdi.config.abrupt and started and fie.kind == LOSS:
-        can_be = can_be and membership.narrow(fdi, fie)
+def possible(isolation, fie, bank, frame_bound, abrupt, x, started):
+    """Whether the fault can be the one, by every test switched on. `started`: a frame or more ago.
+
+    frame_bound (3,): on the innovation of a healthy frame; abrupt: whether a fault stays as it is.
+    """
+    can_be = within_limits(fie, isolation.thresholds, x)
+    if isolation.memory:
+        can_be = can_be and explains(bank, fie, isolation.shared)
+    if (isolation.shared or fie.kind == POSITION) and (started or isolation.memory):
+        can_be = can_be and membership.agree(fie, bank.innovation, frame_bound)
+    if isolation.membership and abrupt and started and fie.kind == LOSS:
+        can_be = can_be and membership.narrow(fie, bank.innovation, frame_bound, isolation.shared)
     return can_be
 
 
 @kernel
-def rules_out(fdi, fie, within):
-    """Whether a fault is excluded by those in authority; `within`: it is possible in the worst case.
-
-    Of faults of every type the sets know the course; chance, which axes are moved. Within the class, chance
-    that has raised no alarm has nothing to say about the alarm of the sets.
-    """
-    if fdi.config.authority == WORST_CASE or (fdi.config.every_type and not within):
-        return not within
-    if fdi.config.every_type:
-        chances, places = fdi.statistical, fdi.layout.position_of
-        column = fdi.isolation.estimator[places[fie.surface]].effect.Z
-        views = chances.views[: chances.n_views]
-        return chances.tests.enabled and across.excludes(
-            views, chances.tests, chances.forces, chances.air, fie.surface, column
-        )
-    if fdi.config.authority != STATISTICS and not within:
-        return True
-    return (
-        fdi.statistical.tests.enabled and fdi.statistical.alarm.detected_at_s >= 0.0 and is_unlikely(fdi, fie)
-    )
-
-
-@kernel
-def is_unlikely(fdi, fie):
-    """Whether chance excludes a loss of the class. A loss that shows by itself it never does.
-
-    A fault that only the end of a loss that nobody saw would explain is `doubted`. So are all, where a gust
-    may hide a vane's error from the watch: what that excludes leaves a surface by accident.
-    """
-    tests, blocks, others, loss_of, s = (
-        fdi.statistical.tests, fdi.statistical.block, fdi.isolation.estimator, fdi.layout.loss_of, fie.surface
-    )  # fmt: skip
-    if not fie.shown and (fie.doubted or not fdi.config.abrupt):
-        fie.shown = shows(tests, blocks, others, loss_of, s)  # later may be its end
-    if fie.shown or not excludes(tests, blocks, others, loss_of, s, False, fdi.config.abrupt):
-        return False
-    fie.doubted = 1
-    if not excludes(tests, blocks, others, loss_of, s, True, fdi.config.abrupt):
-        return False
-    if fdi.watch.enabled and fdi.statistical.air.moving:
-        for i in range(fdi.isolation.n):
-            others[i].doubted = 1
-    return True
-
-
-@kernel
-def decide(fdi, t):
+def decide(isolation, conclusion, t):
     """The generalised observer scheme: the one left is the fault; none left means it is outside the class.
 
     One that is doubted and does not show by itself is not named.
     """
     left, last = 0, NOT_ISOLATED
-    for s in range(fdi.isolation.n):
-        fie = fdi.isolation.estimator[s]
+    for s in range(isolation.n):
+        fie = isolation.estimator[s]
         if not fie.excluded:
             left += 1
             last = NOT_ISOLATED if fie.doubted and not fie.shown else s
     named = NOT_ISOLATED if left > 1 else (last if left == 1 else UNANTICIPATED)
-    if named != fdi.verdict.isolated:
-        fdi.verdict.isolated = named
-        fdi.verdict.isolated_at_s = t
-
-
-@kernel
-def isolate(fdi, x, t, started):
-    """Test every estimator against the measured x (3,) rad/s at time t (s), and decide; as `possible`."""
-    for s in range(fdi.isolation.n):
-        fie = fdi.isolation.estimator[s]
-        if rules_out(fdi, fie, possible(fdi, fie, x, started)) and not fie.excluded:
-            fie.excluded = 1
-            fie.excluded_at_s = t
-    if fdi.config.every_type:
-        isolate_type(fdi, t, started)
-    else:
-        decide(fdi, t)
-
-
-@apart
-def isolate_type(fdi, t, started):
-    """Of faults of every type, alone or two at a time, decide which it is."""
-    types, layout, estimators = fdi.types, fdi.layout, fdi.isolation.estimator
-    verdict.note_refuted(types.surface, layout, estimators)
-    if types.pair.enabled:
-        pairs.examine(types, layout, estimators, fdi.bank, fdi.bound.frame)
-        pairs.decide(types, fdi.verdict, layout, t)
-        return
-    if started or fdi.isolation.memory:
-        examine.examine(types, layout, estimators, fdi.bank.innovation, fdi.bound)
-    verdict.decide(types, fdi.verdict, layout, estimators, t)
+    if named != conclusion.isolated:
+        conclusion.isolated = named
+        conclusion.isolated_at_s = t
 
 
 @kernel
@@ -226,43 +212,40 @@ def adapt_jointly(fie, forgetting):
 
 
 @kernel
-def predict(fdi, fie, x, believed):
+def predict(isolation, fie, bound, x, believed, dt):
     """Advance one estimator by a frame.
 
     x (3,) rad/s as the frame began; believed (3,) rad/s2 is f + G u, mean over the frame; fie.effect is
     already this frame's.
     """
-    dt = fdi.config.dt
     for i in range(3):
-        base, Z, theta, a = fie.effect.offset[i], fie.effect.Z[i], fie.theta[i], fdi.isolation.decay[i]
+        base, Z, theta, a = fie.effect.offset[i], fie.effect.Z[i], fie.theta[i], isolation.decay[i]
         fie.xhat[i] = x[i] + dt * (believed[i] + base + Z * theta) + a * (fie.xhat[i] - x[i])
-    adapt(fdi, fie)
+    adapt(isolation, fie, dt)
     for i in range(3):
-        Z, a = fie.effect.Z[i], fdi.isolation.decay[i]
+        Z, a = fie.effect.Z[i], isolation.decay[i]
         fie.rise[i] = a * fie.rise[i] + dt * max(Z, 0.0)
         fie.fall[i] = a * fie.fall[i] + dt * min(Z, 0.0)
-        fie.bound_eta[i] = bound_step(fie.bound_eta[i], fdi.bound.eta_bar[i] + fie.effect.spread[i], a, dt)
-        fie.bound_noise[i] = noise_step(fie.bound_noise[i], fdi.bound.noise_then[i], a)
-        fie.bound[i] = fie.bound_eta[i] + fie.bound_noise[i] + fdi.bound.noise[i]
+        fie.bound_eta[i] = bound_step(fie.bound_eta[i], bound.eta_bar[i] + fie.effect.spread[i], a, dt)
+        fie.bound_noise[i] = noise_step(fie.bound_noise[i], bound.noise_then[i], a)
+        fie.bound[i] = fie.bound_eta[i] + fie.bound_noise[i] + bound.noise[i]
 
 
 @kernel
-def adapt(fdi, fie):
+def adapt(isolation, fie, dt):
     """Move the estimate by the residual the frame began with, and the prediction along Omega[k+1]."""
-    joint = adapt_jointly(fie, fdi.isolation.forgetting) if fdi.isolation.shared else 0.0
+    joint = adapt_jointly(fie, isolation.forgetting) if isolation.shared else 0.0
     for i in range(3):
-        if fdi.isolation.shared:
+        if isolation.shared:
             step = joint
         else:
-            step = correct(
-                fie, i, fie.residual[i], fdi.isolation.forgetting, fie.theta_low[i], fie.theta_high[i]
-            )
-        fie.omega[i] = fdi.isolation.decay[i] * fie.omega[i] + fdi.config.dt * fie.effect.Z[i]
+            step = correct(fie, i, fie.residual[i], isolation.forgetting, fie.theta_low[i], fie.theta_high[i])
+        fie.omega[i] = isolation.decay[i] * fie.omega[i] + dt * fie.effect.Z[i]
         fie.xhat[i] += fie.omega[i] * step
 
 
 @kernel
-def predict_all(fdi, x, believed):
+def predict_all(isolation, bound, x, believed, dt):
     """Advance the estimators by a frame; arguments as in `predict`."""
-    for s in range(fdi.isolation.n):
-        predict(fdi, fdi.isolation.estimator[s], x, believed)
+    for s in range(isolation.n):
+        predict(isolation, isolation.estimator[s], bound, x, believed, dt)

@@ -54,38 +54,38 @@ def dominant(Z):
 
 
 @kernel
-def allow_for_own_errors(fdi, fie):
+def allow_for_own_errors(fie, bound, innovation, instants):
     """Widen the room of a position by what the errors of the surface's own terms do where it can have been.
 
     eta_bar holds them at the command. The further the surface is from neutral, the more they do; how far it
     can have been follows from the frame itself, in a few rounds from its travel inwards, each of them valid.
-    Of several JSBSim frames in one of ours the first may have seen it where it was a frame before.
+    Of several JSBSim frames in one of ours (instants) the first may have seen it where it was a frame before.
     """
     s, effect = fie.surface, fie.effect
     axis = dominant(effect.Z)
     before, reach = fie.furthest, max(abs(fie.low), abs(fie.high))
     room = effect.spread[axis]
-    value = fdi.bank.innovation[axis] - effect.offset[axis]
-    earlier = 2.0 * before / fdi.config.instants if fdi.config.instants > 1 else 0.0
+    value = innovation[axis] - effect.offset[axis]
+    earlier = 2.0 * before / instants if instants > 1 else 0.0
     for _ in range(ROUNDS):
-        own = max(fdi.bound.own_per_rad[axis, s] * (reach + earlier) - fdi.bound.own[axis, s], 0.0)
-        low, high = solve(value, fdi.bound.frame[axis] + room + own, effect.Z[axis], fie.low, fie.high)
+        own = max(bound.own_per_rad[axis, s] * (reach + earlier) - bound.own[axis, s], 0.0)
+        low, high = solve(value, bound.frame[axis] + room + own, effect.Z[axis], fie.low, fie.high)
         if low > high:
             break
         reach = min(reach, max(abs(low), abs(high)))
     fie.furthest = reach
     for i in range(3):
-        effect.spread[i] += max(fdi.bound.own_per_rad[i, s] * (reach + earlier) - fdi.bound.own[i, s], 0.0)
+        effect.spread[i] += max(bound.own_per_rad[i, s] * (reach + earlier) - bound.own[i, s], 0.0)
 
 
 @kernel
-def agree(fdi, fie):
+def agree(fie, innovation, frame_bound):
     """Whether one theta, or no fault at all, explains the elapsed frame on every axis."""
-    if healthy(fdi.bank.innovation, fdi.bound.frame):
+    if healthy(innovation, frame_bound):
         return True
     low, high = fie.low, fie.high
     for i in range(3):
-        axis_low, axis_high = agreeing(fdi.bank.innovation, fdi.bound.frame, fie, fie.effect, i)
+        axis_low, axis_high = agreeing(innovation, frame_bound, fie, fie.effect, i)
         low, high = max(low, axis_low), min(high, axis_high)
     return low <= high
 
@@ -101,18 +101,16 @@ def intersect(fie, i, interval, shared):
 
 
 @kernel
-def narrow(fdi, fie):
+def narrow(fie, innovation, frame_bound, shared):
     """Intersect with what frame and filtered residual say of a constant theta; False when nothing is left.
 
     Filtered: eps + Omega thetahat = Omega theta + filtered uncertainty, whatever the estimate thetahat did.
     """
     for i in range(3):
-        frame = agreeing(fdi.bank.innovation, fdi.bound.frame, fie, fie.effect, i)
-        intersect(fie, i, frame, fdi.isolation.shared)
+        frame = agreeing(innovation, frame_bound, fie, fie.effect, i)
+        intersect(fie, i, frame, shared)
         filtered = fie.residual[i] + fie.omega[i] * fie.theta[i]
-        intersect(
-            fie, i, solve(filtered, fie.bound[i], fie.omega[i], fie.low, fie.high), fdi.isolation.shared
-        )
+        intersect(fie, i, solve(filtered, fie.bound[i], fie.omega[i], fie.low, fie.high), shared)
     left = True
     for i in range(3):
         left = left and fie.theta_low[i] <= fie.theta_high[i]

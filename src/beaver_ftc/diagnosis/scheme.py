@@ -18,16 +18,15 @@ from beaver_ftc.diagnosis import (
     forces,
     instruments,
     isolation,
-    network,
     statistical,
 )
+from beaver_ftc.diagnosis.bank import BANK
 from beaver_ftc.diagnosis.belief import begin_frame, look
 from beaver_ftc.diagnosis.bounds.worst_case import bound_dtype
+from beaver_ftc.diagnosis.detection import FDAE
+from beaver_ftc.diagnosis.isolation import ISOLATION
 from beaver_ftc.diagnosis.state import (
-    BANK,
     CONFIG,
-    FDAE,
-    ISOLATION,
     NOT_ISOLATED,
     STATISTICS,
     WORST_CASE,
@@ -35,7 +34,7 @@ from beaver_ftc.diagnosis.state import (
     layout_dtype,
 )
 from beaver_ftc.diagnosis.statistical import STATISTICAL
-from beaver_ftc.diagnosis.types import examine
+from beaver_ftc.diagnosis.types import examine, pairs, verdict
 from beaver_ftc.diagnosis.types.registry import types_dtype
 from beaver_ftc.diagnosis.watch import WATCH
 
@@ -62,36 +61,39 @@ def diagnose(fdi, belief, measured, effectiveness, offset, k, t):
 def conclude(fdi, belief, measured, effectiveness, offset, k, t):
     """From prediction to verdict; with scheme `none`, nothing."""
     if k == 0:
-        detection.begin(fdi, measured.x)
+        detection.begin(fdi.fdae, fdi.bank, fdi.bound.noise, measured.x)
     if fdi.config.enabled:
         if k > 0:
             predict(fdi, belief, measured, effectiveness, offset, k, t)
         else:
-            bank.align(fdi, belief.G)
+            bank.align(fdi.isolation, belief.G)
         decide(fdi, measured, t)
 
 
 @kernel
 def predict(fdi, belief, measured, effectiveness, offset, k, t):
     """Bring the estimators from the frame before to this one."""
-    x, x_then, mean = measured.x, belief.x_then, belief.means
+    x, x_then, mean, dt = measured.x, belief.x_then, belief.means, fdi.config.dt
     expected = belief.expected
     expected[:] = mean.acceleration
-    bank.innovate(fdi, x, x_then, expected)
+    bank.innovate(fdi.bank, fdi.bound, x, x_then, expected, dt)
     if fdi.statistical.tests.enabled:
         compare_likelihoods(fdi, belief, measured, k, t)
-    isolation.suppose_all(fdi, mean.G, mean.Gu, mean.Gu_spread)
+    isolation.suppose_all(
+        fdi.isolation, fdi.bank, fdi.bound, fdi.config, fdi.verdict.detected, mean.G, mean.Gu, mean.Gu_spread
+    )
     if fdi.config.every_type:
         examine.note_orders(fdi.types, belief.commanded, mean)
     if fdi.verdict.detected:
-        isolation.predict_all(fdi, x_then, expected)
+        isolation.predict_all(fdi.isolation, fdi.bound, x_then, expected, dt)
         expect_known_faults(expected, mean, effectiveness, offset, fdi.config.every_type)
     if fdi.statistical.tests.enabled:
         for i in range(3):
-            belief.surprise[i] = (x[i] - x_then[i]) / fdi.config.dt - expected[i]
+            belief.surprise[i] = (x[i] - x_then[i]) / dt - expected[i]
         chances = fdi.statistical
-        statistical.follow_rest(chances.block, chances.air, belief.surprise, fdi.config.dt)
-    detection.predict(fdi, x_then, expected, fdi.verdict.isolated >= 0 or fdi.verdict.lead >= 0)
+        statistical.follow_rest(chances.block, chances.air, belief.surprise, dt)
+    leaking = fdi.verdict.isolated >= 0 or fdi.verdict.lead >= 0
+    detection.predict(fdi.fdae, fdi.bound, x_then, expected, fdi.verdict.detected, leaking, dt)
 
 
 @kernel
@@ -140,14 +142,92 @@ def decide(fdi, measured, t):
     if instruments.speaks(fdi.watch):
         return
     known = fdi.verdict.detected
-    detection.detect(fdi, measured.x, t)
+    detection.form_residual(fdi.fdae, measured.x)
+    detection.detect(fdi.bank, fdi.verdict, fdi.config.authority, fdi.statistical.alarm, t)
     if not fdi.verdict.detected:
         return
     if not known:
-        isolation.start(fdi, measured.x)
+        begin_isolation(fdi, measured.x)
     if instruments.clears_surfaces(fdi.watch, known):
-        isolation.isolate(fdi, measured.x, t, known)
-    network.evaluate(fdi.fdae.network, measured.y[ALPHA], measured.y[BETA])
+        isolate(fdi, measured.x, t, known)
+    detection.evaluate(fdi.fdae.network, measured.y[ALPHA], measured.y[BETA])
+
+
+@kernel
+def begin_isolation(fdi, x):
+    """Begin, at the measured x (3,) rad/s, with no knowledge of any fault."""
+    isolation.start(fdi.isolation, fdi.bound.noise, x)
+    if fdi.config.every_type:
+        examine.start(fdi.types)
+
+
+@kernel
+def rules_out(fdi, fie, within):
+    """Whether a fault is excluded by those in authority; `within`: it is possible in the worst case.
+
+    Of faults of every type the sets know the course; chance, which axes are moved. Within the class, chance
+    that has raised no alarm has nothing to say about the alarm of the sets.
+    """
+    if fdi.config.authority == WORST_CASE or (fdi.config.every_type and not within):
+        return not within
+    if fdi.config.every_type:
+        chances, places = fdi.statistical, fdi.layout.position_of
+        column = fdi.isolation.estimator[places[fie.surface]].effect.Z
+        views = chances.views[: chances.n_views]
+        return chances.tests.enabled and across.excludes(
+            views, chances.tests, chances.forces, chances.air, fie.surface, column
+        )
+    if fdi.config.authority != STATISTICS and not within:
+        return True
+    tests, blocks, others, loss_of, s = (
+        fdi.statistical.tests, fdi.statistical.block, fdi.isolation.estimator, fdi.layout.loss_of, fie.surface
+    )  # fmt: skip
+    if not tests.enabled or fie.shown or fdi.statistical.alarm.detected_at_s < 0.0:
+        return False
+    fie.shown = not fdi.config.abrupt and statistical.shows(
+        tests, blocks, others, loss_of, s
+    )  # later may be its end
+    if fie.shown or not statistical.excludes(tests, blocks, others, loss_of, s, False, fdi.config.abrupt):
+        return False
+    fie.doubted = 1  # only the end of a loss that nobody saw would explain it
+    return statistical.excludes(tests, blocks, others, loss_of, s, True, fdi.config.abrupt)
+
+
+@kernel
+def isolate(fdi, x, t, started):
+    """Test every estimator against the measured x (3,) rad/s at time t (s), and decide; as `possible`."""
+    for s in range(fdi.isolation.n):
+        fie = fdi.isolation.estimator[s]
+        if (
+            rules_out(
+                fdi,
+                fie,
+                isolation.possible(
+                    fdi.isolation, fie, fdi.bank, fdi.bound.frame, fdi.config.abrupt, x, started
+                ),
+            )
+            and not fie.excluded
+        ):
+            fie.excluded = 1
+            fie.excluded_at_s = t
+    if fdi.config.every_type:
+        isolate_type(fdi, t, started)
+    else:
+        isolation.decide(fdi.isolation, fdi.verdict, t)
+
+
+@apart
+def isolate_type(fdi, t, started):
+    """Of faults of every type, alone or two at a time, decide which it is."""
+    types, layout, estimators = fdi.types, fdi.layout, fdi.isolation.estimator
+    verdict.note_refuted(types.surface, layout, estimators)
+    if types.pair.enabled:
+        pairs.examine(types, layout, estimators, fdi.bank, fdi.bound.frame)
+        pairs.decide(types, fdi.verdict, layout, t)
+        return
+    if started or fdi.isolation.memory:
+        examine.examine(types, layout, estimators, fdi.bank.innovation, fdi.bound)
+    verdict.decide(types, fdi.verdict, layout, estimators, t)
 
 
 @kernel
@@ -216,14 +296,13 @@ def look_inside(fdi, belief, measured):
 def take_verdict(fdi, belief, measured, verdict, effectiveness, offset, k, t):
     """Take a plug-in's verdict (`verdict_dtype`), and bring the estimator that serves the laws up to date."""
     if k == 0:
-        detection.begin(fdi, measured.x)
+        detection.begin(fdi.fdae, fdi.bank, fdi.bound.noise, measured.x)
     else:
         predict(fdi, belief, measured, effectiveness, offset, k, t)
-    for i in range(3):
-        fdi.fdae.residual[i] = measured.x[i] - fdi.fdae.xhat[i]
+    detection.form_residual(fdi.fdae, measured.x)
     note_verdict(fdi, verdict, t)
     if fdi.verdict.detected:
-        network.evaluate(fdi.fdae.network, measured.y[ALPHA], measured.y[BETA])
+        detection.evaluate(fdi.fdae.network, measured.y[ALPHA], measured.y[BETA])
     ready(fdi, belief, measured, k)
 
 
@@ -267,7 +346,7 @@ def unknown_acceleration(fdi, out):
     if likelihood_counts(fdi):
         statistical.unknown_acceleration(fdi.statistical.block, fdi.statistical.air, out)
     else:
-        detection.unknown_acceleration(fdi, out)
+        detection.unknown_acceleration(fdi.fdae, fdi.bound.noise, out)
 
 
 @kernel
@@ -281,5 +360,5 @@ def built_in_statistic(fdi):
     likely = fdi.statistical.alarm.score if chances else 0.0
     if fdi.config.authority == STATISTICS:
         return likely
-    certain = bank.largest_share(fdi)
+    certain = bank.largest_share(fdi.bank)
     return max(likely, certain) if certain > 1.0 or not chances else likely

@@ -11,7 +11,7 @@ from beaver_ftc.control.state import configure
 from beaver_ftc.design.variants import design_of, mass_of
 from beaver_ftc.diagnosis.bounds.declared import admit, admit_engine, gyros_vary, poles_for_noise
 from beaver_ftc.diagnosis.bounds.worst_case import fill_error_map
-from beaver_ftc.diagnosis.fault_class import PARAMETER_SET
+from beaver_ftc.diagnosis.isolation import PARAMETER_SET
 from beaver_ftc.diagnosis.state import (
     EITHER,
     INTERVAL,

@@ -114,10 +114,22 @@ def idle(fdi: FdiConfig) -> list[tuple[str, ...]]:
 def watch_instruments(frame):
     """Hold the instruments against one another; what is known to be broken is replaced. What an instant
     inside a frame shows is known with that frame."""
-    watch, engine = frame.fdi.watch, frame.control.power
+    fdi, watch, engine = frame.fdi, frame.fdi.watch, frame.control.power
+    before, t = watch.alarmed, frame.k * frame.dt
     if engine.in_use:
         watch.step.command[1] = engine.command[0]
-    attend(watch, frame.fdi, frame.belief, frame.measured, frame.k * frame.dt)
+    attend(watch, frame.belief, frame.measured, fdi.verdict, fdi.bank, fdi.bound, frame.dt, t)
+    if watch.alarmed and not (before or watch.beside):
+        take_back(fdi)
+
+
+@kernel
+def take_back(fdi):
+    """What the diagnosis of the surfaces made of a broken instrument is void."""
+    for s in range(fdi.types.surface.size):
+        fdi.types.surface[s].measure = -1
+    fdi.fdae.network.weights[:] = 0.0
+    fdi.fdae.network.output[:] = 0.0
 
 
 @kernel
@@ -430,7 +442,7 @@ def account(frame):
     if truth.faulted:
         account_authority(accounts.authority, control.axes)
     else:
-        bank.note_closest_approach(frame.fdi)
+        bank.note_closest_approach(frame.fdi.bank, frame.fdi.statistical.alarm)
     account_surfaces(accounts, truth, control.allocation.saturated, frame.k, control.reference.dt)
     note_envelope(accounts.envelope, truth.value[ch.ENVELOPE] < 0.5, frame.t)
 
@@ -561,7 +573,7 @@ def _halves_of_a_frame(frames, references, log):
 
 def _halves_of_frames(frames, references, log, order):
     there, here = _halves_of_a_frame(frames, references, log)
-    inside = there[-1][1][:-1]
+    inside = tuple(frames.dtype.fields[name].type for name in ("fdi", "belief", "measured"))
     return [*there, (scheme.look_inside, inside)], here
 
 

@@ -20,7 +20,7 @@ from beaver_ftc.design.model import design_record, unanticipated_pitch
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, UNANTICIPATED
 from beaver_ftc.diagnosis.types.examine import FIXED, LAGS, LOSES, SHIFTED
 from beaver_ftc.loop import frame as whole
-from beaver_ftc.loop.frame import frame_dtype
+from beaver_ftc.loop.assembly import frame_dtype
 from law_records import put
 
 AILERON, ELEVATOR, RUDDER, FLAP = range(4)

@@ -16,7 +16,6 @@ from beaver_ftc.control.laws import (
 )
 from beaver_ftc.control.rivals import compiled
 from beaver_ftc.control.supervisor import MODE_ADAPTIVE
-from beaver_ftc.diagnosis import scheme
 from beaver_ftc.diagnosis.state import LOSS, NOT_ISOLATED, WORST_CASE
 from beaver_ftc.diagnosis.types.examine import FIXED, LAGS, LOSES, SHIFTED
 from beaver_ftc.diagnosis.types.registry import BIAS, CONSTANT_LOSS, N_TYPES, STUCK
@@ -168,7 +167,7 @@ def alarmed(known=0, speaks=0, score=2.0):
     fdi["bank"]["residual"][0, 1] = 0.1 * score
     fdi["fdae"]["network"]["weights"], fdi["fdae"]["network"]["output"] = 1.0, 0.0
     fdi["isolation"]["estimator"]["xhat"] = 9.0
-    scheme.decide(fdi, frame["measured"], 5.0)
+    whole.conclude(fdi, frame["measured"], 5.0)
     return fdi
 
 

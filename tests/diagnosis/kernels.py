@@ -43,6 +43,7 @@ def of_stages(fdi, kernel):
         "pair": types["pair"], "conclusion": fdi["verdict"], "layout": fdi["layout"],
         "isolation": fdi["isolation"], "estimators": fdi["isolation"]["estimator"], "bound": fdi["bound"],
         "shared": fdi["isolation"]["shared"], "abrupt": fdi["config"]["abrupt"],
+        "every_type": fdi["config"]["every_type"],
         "instants": fdi["config"]["instants"], "bank": fdi["bank"], "fdae": fdi["fdae"],
         "innovation": fdi["bank"]["innovation"], "detected": fdi["verdict"]["detected"],
         "frame_bound": fdi["bound"]["frame"], "noise": fdi["bound"]["noise"], "dt": fdi["config"]["dt"],

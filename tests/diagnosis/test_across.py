@@ -6,11 +6,12 @@ from kernels import DT, new_fdi
 from statistics_of import Across
 
 from beaver_ftc.aircraft import load
-from beaver_ftc.diagnosis import air, scheme
+from beaver_ftc.diagnosis import air
 from beaver_ftc.diagnosis.across import across_a_column, set_up_views
 from beaver_ftc.diagnosis.likelihood import STEP
 from beaver_ftc.diagnosis.state import LOSS, POSITION
 from beaver_ftc.diagnosis.tones import set_up_listening
+from beaver_ftc.loop import frame
 from beaver_ftc.loop.loop import Loop, fly
 from beaver_ftc.scenario.diagnosis import FdiConfig
 from beaver_ftc.studies.matrix.fault_matrix import declared
@@ -124,10 +125,10 @@ def test_what_a_surface_does_not_move_rules_its_faults_out():
     fdi = watching()
     fdi["statistical"]["tests"]["enabled"] = fdi["config"]["every_type"] = 1
     fdi["statistical"]["views"][PITCH_AXIS]["block"]["hypothesis"]["score"][0] = 5.1
-    assert scheme.rules_out(fdi, fdi["isolation"]["estimator"][AILERON], True)
-    assert not scheme.rules_out(fdi, fdi["isolation"]["estimator"][ELEVATOR], True)
+    assert frame.rules_out(fdi, fdi["isolation"]["estimator"][AILERON], True)
+    assert not frame.rules_out(fdi, fdi["isolation"]["estimator"][ELEVATOR], True)
     fdi["statistical"]["n_views"] = 0
-    assert not scheme.rules_out(fdi, fdi["isolation"]["estimator"][AILERON], True)
+    assert not frame.rules_out(fdi, fdi["isolation"]["estimator"][AILERON], True)
 
 
 def test_views_try_a_step_and_the_losses_of_those_that_move_the_axis():

@@ -17,6 +17,7 @@ from beaver_ftc.diagnosis.state import (
     UNANTICIPATED,
     WORST_CASE,
 )
+from beaver_ftc.loop import frame as whole
 
 EITHER = 0
 
@@ -155,7 +156,7 @@ def test_a_residual_at_its_limit_is_within_and_beyond_it_is_not(thresholds, axis
 def test_who_rules_a_fault_out(every_type, authority, within, ruled_out):
     fdi = new_fdi()
     fdi["config"]["every_type"], fdi["config"]["authority"] = every_type, authority
-    assert bool(scheme.rules_out(fdi, estimator(fdi), within)) == ruled_out
+    assert bool(whole.rules_out(fdi, estimator(fdi), within)) == ruled_out
 
 
 @pytest.mark.parametrize(
@@ -235,11 +236,11 @@ def told(fdi, loss, step):
 def test_statistics_rule_out_what_something_else_explains_better(authority, step, ruled_out):
     fdi = new_fdi()
     fie, fdi["config"]["authority"] = told(fdi, 0.0, step), authority
-    assert scheme.rules_out(fdi, fie, True) == ruled_out
+    assert whole.rules_out(fdi, fie, True) == ruled_out
     fdi["statistical"]["tests"]["enabled"] = 0
-    assert not scheme.rules_out(fdi, fie, True)
+    assert not whole.rules_out(fdi, fie, True)
     fdi["statistical"]["tests"]["enabled"], fdi["config"]["authority"] = 1, WORST_CASE
-    assert not scheme.rules_out(fdi, fie, True)
+    assert not whole.rules_out(fdi, fie, True)
 
 
 @pytest.mark.parametrize(("detected_at_s", "ruled_out"), [(-1.0, False), (0.0, True), (2.5, True)])
@@ -247,7 +248,7 @@ def test_statistics_that_have_raised_no_alarm_rule_out_nothing(detected_at_s, ru
     fdi = new_fdi()
     fie, fdi["config"]["authority"] = told(fdi, 0.0, NAMING + 0.1), EITHER
     fdi["statistical"]["alarm"]["detected_at_s"] = detected_at_s
-    assert scheme.rules_out(fdi, fie, True) == ruled_out
+    assert whole.rules_out(fdi, fie, True) == ruled_out
 
 
 @pytest.mark.parametrize("abrupt", [0, 1])
@@ -255,10 +256,10 @@ def test_a_loss_that_has_shown_is_not_ruled_out_by_what_comes_later(abrupt):
     """That may be its end; one that is declared to stay has none."""
     fdi = new_fdi()
     fie, fdi["config"]["abrupt"] = told(fdi, 20.0, 0.0), abrupt
-    assert not scheme.rules_out(fdi, fie, True)
+    assert not whole.rules_out(fdi, fie, True)
     assert fie["shown"] == (not abrupt)
     told(fdi, 0.0, 90.0)
-    assert scheme.rules_out(fdi, fie, True) == bool(abrupt)
+    assert whole.rules_out(fdi, fie, True) == bool(abrupt)
 
 
 def doubtful(kind=LOSS, **switches):
@@ -319,7 +320,7 @@ def test_every_type_starts_with_no_knowledge_of_any_surface():
     for every_type in (0, 1):
         fdi = new_fdi()
         fdi["config"]["every_type"], fdi["types"]["surface"]["evidence"] = every_type, 7
-        scheme.begin_isolation(fdi, np.zeros(3))
+        on(scheme.begin_isolation, fdi, np.zeros(3))
         assert fdi["types"]["surface"]["evidence"].tolist() == [0 if every_type else 7] * 4
 
 
@@ -346,7 +347,7 @@ def test_a_frame_is_shown_to_every_type_alone_or_in_its_block(length, started, m
     for s, fie in enumerate(fdi["isolation"]["estimator"][:4]):
         fie["kind"], fie["surface"], fie["low"], fie["high"] = POSITION, s, -1.0, 1.0
         fie["effect"]["Z"] = np.eye(3)[(0, 1, 2, 1)[s]]
-    scheme.isolate(fdi, np.zeros(3), 1.0, started)
+    whole.isolate(fdi, np.zeros(3), 1.0, started)
     assert (fdi["types"]["frame"], fdi["types"]["block"]["filled"]) == (frame, filled)
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from kernels import DT, new_fdi
+from kernels import DT, new_fdi, on
 from scipy.spatial.transform import Rotation
 from statistics_of import Statistical, put
 
@@ -17,6 +17,7 @@ from beaver_ftc.diagnosis.bounds import worst_case
 from beaver_ftc.diagnosis.bounds.worst_case import error_map_dtype
 from beaver_ftc.diagnosis.likelihood import BLOCK
 from beaver_ftc.diagnosis.state import LOSS, NOT_ISOLATED, STATISTICS, WORST_CASE, verdict_dtype
+from beaver_ftc.loop import frame
 
 AIRCRAFT = load()
 SPAN, V = 14.63, 45.0
@@ -305,22 +306,22 @@ def test_a_plug_ins_verdict_takes_the_place_of_the_built_in_one():
     fdi["verdict"]["isolated"] = NOT_ISOLATED
     given["isolated"], given["axis"], given["theta"], given["estimates"] = 2, 1, -0.3, 1
     given["effectiveness"] = 0.5
-    scheme.note_verdict(fdi, given, 3.0)
+    on(scheme.note_verdict, fdi, given, 3.0)
     assert (fdi["verdict"]["detected"], fdi["verdict"]["isolated"]) == (0, NOT_ISOLATED)
     given["detected"] = 1
-    scheme.note_verdict(fdi, given, 4.0)
+    on(scheme.note_verdict, fdi, given, 4.0)
     found = fdi["verdict"]
     assert (found["detected"], found["detected_at_s"], found["detected_axis"]) == (1, 4.0, 1)
     assert (found["isolated"], found["isolated_at_s"], found["estimates"]) == (2, 4.0, 1)
     assert fdi["isolation"]["estimator"]["theta"][2] == pytest.approx([-0.3] * 3)
     assert found["effectiveness"] == pytest.approx([0.5] * 4)
-    scheme.note_verdict(fdi, given, 5.0)
+    on(scheme.note_verdict, fdi, given, 5.0)
     assert (found["detected_at_s"], found["isolated_at_s"]) == (4.0, 4.0)
     given["isolated"] = NOT_ISOLATED
-    scheme.note_verdict(fdi, given, 6.0)
+    on(scheme.note_verdict, fdi, given, 6.0)
     assert (found["isolated"], found["isolated_at_s"]) == (NOT_ISOLATED, 6.0)
     given["isolated"], given["theta"] = 0, -0.7  # the first is as good as any
-    scheme.note_verdict(fdi, given, 7.0)
+    on(scheme.note_verdict, fdi, given, 7.0)
     assert fdi["isolation"]["estimator"]["theta"][0] == pytest.approx([-0.7] * 3)
 
 
@@ -344,8 +345,11 @@ def test_the_built_in_statistic(enabled, authority, score, share, statistic):
         score,
     )
     fdi["bank"]["threshold"][0], fdi["bank"]["residual"][0, 1] = 0.5, 0.5 * share
-    assert scheme.built_in_statistic(fdi) == pytest.approx(statistic)
-    assert bool(scheme.likelihood_counts(fdi)) == (enabled == 1 and authority != WORST_CASE)
+    likely = scheme.likelihood_counts(fdi["statistical"]["tests"], authority)
+    alarm = fdi["statistical"]["alarm"]
+    found = scheme.built_in_statistic(fdi["bank"], alarm, authority, likely)
+    assert found == pytest.approx(statistic)
+    assert bool(likely) == (enabled == 1 and authority != WORST_CASE)
 
 
 def test_the_estimate_is_that_of_whoever_counts():
@@ -365,18 +369,18 @@ def test_the_estimate_is_that_of_whoever_counts():
         -0.6,
         1.0,
     )
-    assert scheme.isolated_surface(fdi) == 2
-    assert scheme.isolated_theta(fdi, 2) == -0.2
+    assert on(scheme.isolated_surface, fdi) == 2
+    assert frame.isolated_theta(fdi, 2) == -0.2
     out = np.zeros(3)
     fdi["fdae"]["network"]["output"], block["rest"] = 0.3, (0, 0, 0.7, 0)
-    scheme.unknown_acceleration(fdi, out)
+    frame.unknown_acceleration(fdi, out)
     assert out == pytest.approx([0.3] * 3)
     fdi["statistical"]["tests"]["enabled"] = 1
-    assert scheme.isolated_theta(fdi, 2) == -0.6
-    scheme.unknown_acceleration(fdi, out)
+    assert frame.isolated_theta(fdi, 2) == -0.6
+    frame.unknown_acceleration(fdi, out)
     assert out[1] == 0.7
     fdi["verdict"]["isolated"] = NOT_ISOLATED
-    assert scheme.isolated_surface(fdi) == -1
+    assert on(scheme.isolated_surface, fdi) == -1
 
 
 @pytest.mark.parametrize("share", [1.0, 0.25])

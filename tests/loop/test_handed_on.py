@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import beaver_ftc as bf
-from beaver_ftc.loop.frame import idle
+from beaver_ftc.loop.assembly import idle
 from beaver_ftc.loop.loop import Loop
 from flying import loss, scenario
 

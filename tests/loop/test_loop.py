@@ -8,7 +8,7 @@ import pytest
 from beaver_ftc.control.laws import ORACLE
 from beaver_ftc.control.supervisor import MAX_EVENTS
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
-from beaver_ftc.loop import accounts, frame, loop, outcome
+from beaver_ftc.loop import accounts, assembly, frame, loop, outcome
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.plant.channels import TRUTH
 from beaver_ftc.results.metrics import metrics
@@ -194,7 +194,7 @@ class TestDepartures:
 
 
 def test_more_events_than_there_is_room_for_are_counted_and_the_last_is_kept():
-    frames, room, stays = np.zeros(1, frame.frame_dtype(4)), MAX_EVENTS, 150
+    frames, room, stays = np.zeros(1, assembly.frame_dtype(4)), MAX_EVENTS, 150
     envelope = frames[0]["accounts"]["envelope"]
     for k in range(10 * stays):
         accounts.note_envelope(envelope, k % 10 >= 7, float(k))
@@ -207,7 +207,7 @@ def test_more_events_than_there_is_room_for_are_counted_and_the_last_is_kept():
 
 
 def test_the_final_mode_is_right_after_any_number_of_changes():
-    frames = np.zeros(1, frame.frame_dtype(4))
+    frames = np.zeros(1, assembly.frame_dtype(4))
     frames["control"]["law"] = ORACLE
     supervisor = frames[0]["supervisor"]
     for k in range(201):

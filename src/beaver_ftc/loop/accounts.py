@@ -14,7 +14,7 @@ from beaver_ftc.compiled import kernel
 from beaver_ftc.control.supervisor import MAX_EVENTS
 from beaver_ftc.design.model import unanticipated_pitch
 from beaver_ftc.diagnosis.state import PITCH
-from beaver_ftc.plant.sensing import effective, position
+from beaver_ftc.plant.sensing import effective, effectiveness, position
 from beaver_ftc.scenario.diagnosis import MAX_POLES
 
 GUARANTEE = np.dtype(
@@ -54,6 +54,19 @@ def accounts_dtype(n: int) -> np.dtype:
         ("position_then", "f8", (n,)),
     ]  # fmt: skip
     return np.dtype(fields, align=True)
+
+
+@kernel
+def share_faults(truth, faults, oracle):
+    """Put into `faults` what the law may know of the truth: to the oracle all, to others whether to account
+    for authority."""
+    faults.present = truth.faulted
+    if oracle:
+        faults.Cm_alpha3 = truth.Cm_alpha3
+        for s in range(faults.effectiveness.size):
+            faults.effectiveness[s] = effectiveness(truth, s)
+            faults.effective[s] = effective(truth, s)
+            faults.immovable[s] = truth.immovable[s]
 
 
 @kernel

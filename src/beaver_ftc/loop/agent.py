@@ -1,13 +1,13 @@
 """What an agent that learns does in a flight and sees of it: actions in, observations and costs out.
 
-Between both, `frame.fly_on` flies: a step of an agent is three compiled calls, however many frames it has.
+Between both, `stepping.fly_on` flies: a step of an agent is three compiled calls, however many frames it has.
 """
 
 import numpy as np
 
 from beaver_ftc.compiled import kernel
 from beaver_ftc.design.model import AIRSPEED, ALPHA, BETA
-from beaver_ftc.loop.frame import hold
+from beaver_ftc.loop.stepping import hold
 
 RATE_RAD_S = 0.1  # one unit of an observed rate; a tracking error that costs one unit of reward a second
 AIRSPEED_MPS = 10.0

@@ -1,17 +1,22 @@
 """Turns a scenario into the frame record that the compiled loop works on."""
 
+from functools import lru_cache
 from math import ceil, exp, pi, radians
 
 import numpy as np
 
 from beaver_ftc.aircraft import Aircraft
+from beaver_ftc.control.accommodation import assessment_dtype, true_faults_dtype
 from beaver_ftc.control.allocation import leaders_of
-from beaver_ftc.control.outer.state import COLUMNS
-from beaver_ftc.control.state import configure
+from beaver_ftc.control.outer.state import AUTOPILOT, COLUMNS
+from beaver_ftc.control.state import configure, control_dtype
+from beaver_ftc.control.supervisor import SUPERVISOR
 from beaver_ftc.design.variants import design_of, mass_of
+from beaver_ftc.diagnosis.belief import belief_dtype
 from beaver_ftc.diagnosis.bounds.declared import admit, admit_engine, gyros_vary, poles_for_noise
 from beaver_ftc.diagnosis.bounds.worst_case import fill_error_map
 from beaver_ftc.diagnosis.isolation import PARAMETER_SET
+from beaver_ftc.diagnosis.scheme import diagnosis_dtype
 from beaver_ftc.diagnosis.state import (
     EITHER,
     INTERVAL,
@@ -22,11 +27,12 @@ from beaver_ftc.diagnosis.state import (
     PUBLISHED,
     STATISTICS,
     WORST_CASE,
+    verdict_dtype,
 )
 from beaver_ftc.diagnosis.types.pairs import IN_PITCH, IN_ROLL_AND_YAW
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop import memory
-from beaver_ftc.loop.frame import frame_dtype, idle
+from beaver_ftc.loop.accounts import accounts_dtype
 from beaver_ftc.loop.instrument_records import (
     assemble_instruments,
     assemble_watch,
@@ -36,6 +42,9 @@ from beaver_ftc.loop.instrument_records import (
     truth_read,
 )
 from beaver_ftc.plant import channels as ch
+from beaver_ftc.plant.instruments import INSTRUMENTS
+from beaver_ftc.plant.native import RUNNING
+from beaver_ftc.plant.sensing import MEASURED, truth_dtype
 from beaver_ftc.scenario.actuators import Actuators
 from beaver_ftc.scenario.control import ControlConfig
 from beaver_ftc.scenario.diagnosis import MAX_POLES, FdiConfig
@@ -47,6 +56,34 @@ RUNAWAY_RATE_RAD_S = pi / 3.0  # of an actuator with no declared rate limit: the
 EARTH_RATE_RAD_S = 2.0 * pi / 86164.0905  # one turn per sidereal day [WGS84]
 _AUTHORITIES = {"either": EITHER, "worst-case": WORST_CASE, "statistical": STATISTICS}
 _THRESHOLDS = {"interval": INTERVAL, "published": PUBLISHED}
+
+# What the log has columns for: estimators, the watch, the engine, statistical tests.
+LOGGED = np.dtype([("estimators", "i8"), ("watch", "i8"), ("power", "i8"), ("tests", "i8")], align=True)
+
+
+@lru_cache
+def frame_dtype(n: int) -> np.dtype:
+    """All that a flight of an aircraft with n surfaces remembers between frames."""
+    fields = [
+        ("k", "i8"), ("row", "i8"), ("dt", "f8"), ("t", "f8"),  # frame, row of the log, s, s
+        ("running", RUNNING),
+        ("since", "i8"), ("logged", LOGGED),  # the frame with which this diagnosis has begun
+        ("truth", truth_dtype(n)), ("instruments", INSTRUMENTS), ("measured", MEASURED),
+        ("belief", belief_dtype(n)), ("fdi", diagnosis_dtype(n)), ("verdict", verdict_dtype(n)),
+        ("assessment", assessment_dtype(n)), ("faults", true_faults_dtype(n)),
+        ("supervisor", SUPERVISOR), ("control", control_dtype(n)),
+        ("autopilot", AUTOPILOT),
+        ("held", "i8"), ("held_rad", "f8", (n,)),  # whether another than the law commands, and what
+        ("accounts", accounts_dtype(n)), ("departed", "i8"),
+    ]  # fmt: skip
+    return np.dtype(fields, align=True)
+
+
+def idle(fdi: FdiConfig) -> list[tuple[str, ...]]:
+    """Large fields that are not read before they are written: delay lines are filled by the first sample."""
+    parts = {"block": bool(fdi.statistical), "views": bool(fdi.statistical) and fdi.fault_class == "all"}
+    unused = [("fdi", "statistical", part) for part, used in parts.items() if not used]
+    return [("instruments", "line"), *unused]
 
 
 Member = tuple[str, int, int]  # of a fault class: name, kind and surface of its estimator

@@ -1,53 +1,38 @@
 """One frame of the closed loop, compiled: measure, diagnose, decide, command, record.
 
     measure     plant/sensing.py          the truth, and what the instruments make of it
-    diagnose    diagnosis/scheme.py       what is believed of the aircraft, and whether it still holds
+    diagnose    diagnosis/                what is believed of the aircraft, and whether it still holds
     decide      control/supervisor.py     the mode
     command     control/                  the surfaces, and the engine
     outer loops control/outer/            the reference of the next frame, if a profile is to be flown
     record      accounts.py, record.py    the metrics' sums, a row of the log
 
-Each has records of its own; what a flight remembers is all of them in one, so that a frame is one call from
-Python. The command computed in a frame is in effect from the next on.
+Each stage has records of its own; what a flight remembers is all of them in one (assembly.py), which only the
+kernels of this file see whole. Python calls them through stepping.py. The command computed in a frame is in
+effect from the next on.
 """
 
-from functools import lru_cache
-
-import numba
 import numpy as np
 
-from beaver_ftc.compiled import apart, in_two, kernel
+from beaver_ftc.compiled import apart, kernel
 from beaver_ftc.control import accommodation, allocation, power, reference, supervisor
-from beaver_ftc.control.accommodation import assessment_dtype, true_faults_dtype
 from beaver_ftc.control.laws import INDI, LQR, NOMINAL, ORACLE, REJECTING, published, rejecting
 from beaver_ftc.control.outer.autopilot import judge, steer
-from beaver_ftc.control.outer.state import AUTOPILOT
 from beaver_ftc.control.rivals import compiled
-from beaver_ftc.control.state import control_dtype
-from beaver_ftc.control.supervisor import MODE_REALLOCATED, SUPERVISOR
-from beaver_ftc.design.actuators import move
-from beaver_ftc.design.model import unanticipated_pitch
-from beaver_ftc.diagnosis import bank, scheme, statistical
-from beaver_ftc.diagnosis.belief import belief_dtype, follow_command, look_back, respond
-from beaver_ftc.diagnosis.instruments import attend
-from beaver_ftc.diagnosis.scheme import (
-    diagnosis_dtype,
-    isolated_surface,
-    isolated_theta,
-    likelihood_counts,
-    unknown_acceleration,
-)
-from beaver_ftc.diagnosis.state import NOT_ISOLATED, PITCH, verdict_dtype
-from beaver_ftc.diagnosis.types.examine import FIXED, LAGS, LOSES, SHIFTED
-from beaver_ftc.diagnosis.types.verdict import deflection_error, effectiveness_left, possible
+from beaver_ftc.control.supervisor import MODE_REALLOCATED
+from beaver_ftc.design.model import AIRSPEED, ALPHA, BETA, unanticipated_pitch
+from beaver_ftc.diagnosis import across, air, bank, detection, instruments, isolation, scheme, statistical
+from beaver_ftc.diagnosis.belief import begin_frame, follow_command, look, look_back, respond
+from beaver_ftc.diagnosis.state import NOT_ISOLATED, PITCH, STATISTICS, WORST_CASE
+from beaver_ftc.diagnosis.types import examine
+from beaver_ftc.diagnosis.types.examine import LAGS
 from beaver_ftc.loop.accounts import (
     account_authority,
     account_surfaces,
-    accounts_dtype,
-    add_effect,
     effect_of_faults,
     follow_guarantee,
     note_envelope,
+    share_faults,
     track,
 )
 from beaver_ftc.loop.record import (
@@ -59,55 +44,15 @@ from beaver_ftc.loop.record import (
     record_truth,
     record_watch,
 )
-from beaver_ftc.loop.rows import row_of
 from beaver_ftc.plant import channels as ch
-from beaver_ftc.plant.instruments import INSTRUMENTS
-from beaver_ftc.plant.native import RUNNING, advance
 from beaver_ftc.plant.sensing import (
-    FLYING,
-    MEASURED,
     NOT_FINITE,
-    effective,
-    effectiveness,
     flight_status,
     hand_over,
     measure,
-    truth_dtype,
 )
-from beaver_ftc.scenario.diagnosis import FdiConfig
-
-__all__ = ["FLYING", "NOT_FINITE", "fly_frame", "fly_on", "frame_dtype", "hold", "idle", "look_inside"]
-
 
 SURE = 400.0  # one over the variance of an effectiveness known to 0.05
-
-# What the log has columns for: estimators, the watch, the engine, statistical tests.
-LOGGED = np.dtype([("estimators", "i8"), ("watch", "i8"), ("power", "i8"), ("tests", "i8")], align=True)
-
-
-@lru_cache
-def frame_dtype(n: int) -> np.dtype:
-    """All that a flight of an aircraft with n surfaces remembers between frames."""
-    fields = [
-        ("k", "i8"), ("row", "i8"), ("dt", "f8"), ("t", "f8"),  # frame, row of the log, s, s
-        ("running", RUNNING),
-        ("since", "i8"), ("logged", LOGGED),  # the frame with which this diagnosis has begun
-        ("truth", truth_dtype(n)), ("instruments", INSTRUMENTS), ("measured", MEASURED),
-        ("belief", belief_dtype(n)), ("fdi", diagnosis_dtype(n)), ("verdict", verdict_dtype(n)),
-        ("assessment", assessment_dtype(n)), ("faults", true_faults_dtype(n)),
-        ("supervisor", SUPERVISOR), ("control", control_dtype(n)),
-        ("autopilot", AUTOPILOT),
-        ("held", "i8"), ("held_rad", "f8", (n,)),  # whether another than the law commands, and what
-        ("accounts", accounts_dtype(n)), ("departed", "i8"),
-    ]  # fmt: skip
-    return np.dtype(fields, align=True)
-
-
-def idle(fdi: FdiConfig) -> list[tuple[str, ...]]:
-    """Large fields that are not read before they are written: delay lines are filled by the first sample."""
-    parts = {"block": bool(fdi.statistical), "views": bool(fdi.statistical) and fdi.fault_class == "all"}
-    unused = [("fdi", "statistical", part) for part, used in parts.items() if not used]
-    return [("instruments", "line"), *unused]
 
 
 @apart
@@ -118,7 +63,7 @@ def watch_instruments(frame):
     before, t = watch.alarmed, frame.k * frame.dt
     if engine.in_use:
         watch.step.command[1] = engine.command[0]
-    attend(watch, frame.belief, frame.measured, fdi.verdict, fdi.bank, fdi.bound, frame.dt, t)
+    instruments.attend(watch, frame.belief, frame.measured, fdi.verdict, fdi.bank, fdi.bound, frame.dt, t)
     if watch.alarmed and not (before or watch.beside):
         take_back(fdi)
 
@@ -158,79 +103,228 @@ def begin(frame):
 
 @kernel
 def diagnose(frame):
-    """The built-in diagnosis; and when detection would have been certain."""
-    surfaces, fdi, belief = frame.control.surfaces, frame.fdi, frame.belief
-    k = frame.k - frame.since
-    scheme.diagnose(fdi, belief, frame.measured, surfaces.effectiveness, surfaces.offset, k, frame.t)
-    follow_guarantee(frame.accounts.guarantee, fdi.bank, fdi.config.dt, belief.share, k, frame.t)
-    assess(fdi, frame.assessment)
+    """The built-in diagnosis, from prediction to verdict; with scheme `none`, nothing is concluded."""
+    fdi, k = frame.fdi, frame.k - frame.since
+    if k == 0:
+        detection.begin(fdi.fdae, fdi.bank, fdi.bound.noise, frame.measured.x)
+    if fdi.config.enabled:
+        if k > 0:
+            predict(frame, k)
+        else:
+            bank.align(fdi.isolation, frame.belief.G)
+        conclude(fdi, frame.measured, frame.t)
+    make_ready(frame, k)
 
 
 @kernel
 def take_verdict(frame):
-    """Take a plug-in's verdict, which is in frame.verdict, in place of the built-in diagnosis."""
-    surfaces, fdi, belief, k = frame.control.surfaces, frame.fdi, frame.belief, frame.k - frame.since
-    scheme.take_verdict(
-        fdi, belief, frame.measured, frame.verdict, surfaces.effectiveness, surfaces.offset, k, frame.t
+    """Take a plug-in's verdict, which is in frame.verdict, in place of the built-in diagnosis; the estimator
+    that serves the laws is brought up to date."""
+    fdi, measured, k = frame.fdi, frame.measured, frame.k - frame.since
+    if k == 0:
+        detection.begin(fdi.fdae, fdi.bank, fdi.bound.noise, measured.x)
+    else:
+        predict(frame, k)
+    detection.form_residual(fdi.fdae, measured.x)
+    scheme.note_verdict(fdi.verdict, fdi.isolation.estimator, frame.verdict, frame.t)
+    if fdi.verdict.detected:
+        detection.evaluate(fdi.fdae.network, measured.y[ALPHA], measured.y[BETA])
+    make_ready(frame, k)
+
+
+@kernel
+def predict(frame, k):
+    """Bring the estimators from the frame before to this one; k: number of the diagnosis' frame.
+
+    What the law takes each surface for is expected: what is known of a fault is no surprise.
+    """
+    fdi, belief, chances, surfaces = frame.fdi, frame.belief, frame.fdi.statistical, frame.control.surfaces
+    config, bound, conclusion, dt = fdi.config, fdi.bound, fdi.verdict, fdi.config.dt
+    x, x_then, mean, expected = frame.measured.x, belief.x_then, belief.means, belief.expected
+    expected[:] = mean.acceleration
+    bank.innovate(fdi.bank, bound, x, x_then, expected, dt)
+    if chances.tests.enabled:
+        compare_likelihoods(frame, k)
+    isolation.suppose_all(
+        fdi.isolation, fdi.bank, bound, config, conclusion.detected, mean.G, mean.Gu, mean.Gu_spread
     )
+    if config.every_type:
+        examine.note_orders(fdi.types, belief.commanded, mean)
+    if conclusion.detected:
+        isolation.predict_all(fdi.isolation, bound, x_then, expected, dt)
+        scheme.expect_known_faults(expected, mean, surfaces.effectiveness, surfaces.offset, config.every_type)
+    if chances.tests.enabled:
+        for i in range(3):
+            belief.surprise[i] = (x[i] - x_then[i]) / dt - expected[i]
+        statistical.follow_rest(chances.block, chances.air, belief.surprise, dt)
+    leaking = conclusion.isolated >= 0 or conclusion.lead >= 0
+    detection.predict(fdi.fdae, bound, x_then, expected, conclusion.detected, leaking, dt)
+
+
+@apart
+def compare_likelihoods(frame, k):
+    """Show the statistical detector the elapsed frame."""
+    fdi, belief, chances, y = frame.fdi, frame.belief, frame.fdi.statistical, frame.measured.y
+    tests, noise, blocks, felt = chances.tests, chances.noise, chances.block, chances.forces
+    seen, inertial, views = chances.air, chances.inertial_air, chances.views[: chances.n_views]
+    mean, innovation, dt = belief.means, fdi.bank.innovation, fdi.config.dt
+    air.elapse(seen, belief.share)
+    if inertial.moving:
+        air.elapse(inertial, belief.share)
+    statistical.signatures(blocks, mean.Gu_foreseen, unanticipated_pitch(belief.design, y, 1.0))
+    latched, ends = chances.alarm.detected_at_s >= 0.0, not fdi.config.abrupt
+    statistical.observe(tests, noise.bounded, blocks, seen, innovation, dt, k, latched, ends)
+    across.face(views, felt, seen, fdi.bound, mean.G_foreseen, mean.Gu_foreseen)
+    across.compose(views, tests.tolerated, noise, blocks, felt, seen, inertial, innovation, y[AIRSPEED])
+    across.observe(views, tests, chances.listening, y, dt, k, latched)
+    known = fdi.bound.error_map.outside == 0
+    statistical.score(chances.alarm, tests, blocks, views, felt, seen, frame.t, known)
+
+
+@kernel
+def conclude(fdi, measured, t):
+    """From residuals to alarm, and from then on to a verdict.
+
+    Where instruments are watched, a surface waits a frame after the alarm: that much later the attitude shows
+    what a gyro did; a blurred one, later. Once an instrument is found broken, no surface is named.
+    """
+    if instruments.speaks(fdi.watch):
+        return
+    known, every_type = fdi.verdict.detected, fdi.config.every_type
+    detection.form_residual(fdi.fdae, measured.x)
+    detection.detect(fdi.bank, fdi.verdict, fdi.config.authority, fdi.statistical.alarm, t)
+    if not fdi.verdict.detected:
+        return
+    if not known:
+        scheme.begin_isolation(fdi.isolation, fdi.types, every_type, fdi.bound.noise, measured.x)
+    if instruments.clears_surfaces(fdi.watch, known):
+        isolate(fdi, measured.x, t, known)
+    detection.evaluate(fdi.fdae.network, measured.y[ALPHA], measured.y[BETA])
+
+
+@kernel
+def isolate(fdi, x, t, started):
+    """Test every estimator against the measured x (3,) rad/s, and decide; started: a frame or more ago."""
+    config, records, bound = fdi.config, fdi.isolation, fdi.bound
+    for s in range(records.n):
+        fie = records.estimator[s]
+        can_be = isolation.possible(records, fie, fdi.bank, bound.frame, config.abrupt, x, started)
+        if rules_out(fdi, fie, can_be) and not fie.excluded:
+            fie.excluded = 1
+            fie.excluded_at_s = t
+    if config.every_type:
+        scheme.isolate_type(fdi.types, fdi.verdict, fdi.layout, records, fdi.bank, bound, t, started)
+    else:
+        isolation.decide(records, fdi.verdict, t)
+
+
+@kernel
+def rules_out(fdi, fie, within):
+    """Whether a fault is excluded by those in authority; `within`: it is possible in the worst case.
+
+    Of faults of every type the sets know the course; chance, which axes are moved. Within the class, chance
+    that has raised no alarm has nothing to say about the alarm of the sets.
+    """
+    config, chances, layout, estimators = fdi.config, fdi.statistical, fdi.layout, fdi.isolation.estimator
+    tests = chances.tests
+    if config.authority == WORST_CASE or (config.every_type and not within):
+        return not within
+    if config.every_type:
+        column, views = estimators[layout.position_of[fie.surface]].effect.Z, chances.views[: chances.n_views]
+        return tests.enabled and across.excludes(
+            views, tests, chances.forces, chances.air, fie.surface, column
+        )
+    if config.authority != STATISTICS and not within:
+        return True
+    if not tests.enabled or chances.alarm.detected_at_s < 0.0:
+        return False
+    hidden = fdi.watch.enabled and chances.air.moving
+    return scheme.is_unlikely(fie, tests, chances.block, fdi.isolation, layout.loss_of, config.abrupt, hidden)
+
+
+@kernel
+def make_ready(frame, k):
+    """Make ready for the frame to come: begin its sums, and put where the law reads it what is concluded."""
+    fdi, belief = frame.fdi, frame.belief
+    if fdi.statistical.tests.enabled:
+        look_ahead(frame, k)
+    begin_frame(belief, fdi.bound, fdi.layout, fdi.config.every_type, frame.measured)
     follow_guarantee(frame.accounts.guarantee, fdi.bank, fdi.config.dt, belief.share, k, frame.t)
     assess(fdi, frame.assessment)
+
+
+@apart
+def look_ahead(frame, k):
+    """Ready the statistical detector for the next frame: the air as it is seen, noise, coefficients."""
+    fdi, belief, measured, chances = frame.fdi, frame.belief, frame.measured, frame.fdi.statistical
+    seen, dt = chances.air, fdi.config.dt
+    scheme.see_air(seen, chances.inertial_air, chances.forces, belief, measured, k, dt)
+    statistical.prepare(
+        chances.tests, chances.noise, chances.block, seen, fdi.bound, belief.design, measured, belief.u, dt
+    )
+
+
+@apart
+def look_at_air(frame):
+    """Take in the gust that the vanes see by now, and what it does."""
+    fdi, belief, measured, chances = frame.fdi, frame.belief, frame.measured, frame.fdi.statistical
+    seen, dt = chances.air, belief.share * fdi.config.dt
+    statistical.look(
+        chances.tests, chances.noise, chances.block, seen, fdi.bound, belief.design, measured, belief.u, dt
+    )
+
+
+@kernel
+def look_on(frame):
+    """Take in an instant inside a frame: what is believed of it, and the gust that the vanes see by then."""
+    fdi = frame.fdi
+    if fdi.statistical.tests.enabled:
+        look_at_air(frame)
+    look(frame.belief, fdi.bound, fdi.layout, fdi.config.every_type, frame.measured)
 
 
 @kernel
 def assess(fdi, assessment):
     """Put what the diagnosis says of each surface where the law reads it (`assessment_dtype`)."""
-    verdict, named = fdi.verdict, isolated_surface(fdi)
-    assessment.detected, assessment.every_type = verdict.detected, fdi.config.every_type
+    conclusion, types, estimators = fdi.verdict, fdi.types, fdi.isolation.estimator
+    every_type, named = fdi.config.every_type, scheme.isolated_surface(conclusion, estimators)
+    assessment.detected, assessment.every_type = conclusion.detected, every_type
     assessment.named, assessment.hedge = named, 0
     for s in range(assessment.measure.size):
-        assessment.measure[s] = fdi.types.surface[s].measure if fdi.config.every_type else -1
+        assessment.measure[s] = types.surface[s].measure if every_type else -1
         assessment.effectiveness[s], assessment.at_once[s] = 1.0, 0
         assessment.offset[s], assessment.lag[s] = 0.0, 0.0
-        if verdict.estimates and verdict.detected:
-            assessment.effectiveness[s] = verdict.effectiveness[s]
+        if conclusion.estimates and conclusion.detected:
+            assessment.effectiveness[s] = conclusion.effectiveness[s]
         elif assessment.measure[s] >= 0:
-            assess_type(fdi, assessment, s)
-        elif s == named and not fdi.config.every_type:
-            assess_loss(fdi, assessment, s)
+            scheme.assess_type(assessment, types, fdi.layout, estimators, s)
+        elif s == named and not every_type:
+            assessment.effectiveness[s] = 1.0 + isolated_theta(fdi, s)
+            assessment.at_once[s] = is_sure(fdi, s)
 
 
 @kernel
-def assess_loss(fdi, assessment, s):
-    """Surface s has lost effectiveness; what is known well need not be eased in."""
-    assessment.effectiveness[s] = 1.0 + isolated_theta(fdi, s)
-    if likelihood_counts(fdi) and statistical.estimated_loss(fdi.statistical.block, s)[1] > SURE:
-        assessment.at_once[s] = 1
+def isolated_theta(fdi, s):
+    """Estimated theta of the isolated loss of surface s: under noise, the most likely one."""
+    if scheme.likelihood_counts(fdi.statistical.tests, fdi.config.authority):
+        return statistical.estimated_loss(fdi.statistical.block, s)[0]
+    return fdi.isolation.estimator[fdi.verdict.isolated].theta[fdi.layout.dominant_axis[s]]
 
 
 @kernel
-def assess_type(fdi, assessment, s):
-    """What the diagnosis of every type makes of surface s."""
-    surface = fdi.types.surface[s]
-    at_fault = possible(surface)
-    if surface.measure == LOSES:
-        assessment.effectiveness[s] = effectiveness_left(fdi.types, fdi.layout, fdi.isolation.estimator, s)
-    elif surface.measure == FIXED:
-        assessment.effectiveness[s], assessment.at_once[s] = 0.0, 1
-        assessment.offset[s] = surface.command + deflection_error(surface, at_fault)
-    elif surface.measure == SHIFTED:
-        assessment.offset[s] = deflection_error(surface, at_fault)
-    elif surface.measure == LAGS:
-        assessment.lag[s] = 0.5 * (surface.low + surface.high) - surface.command
-        assessment.hedge = 1
+def is_sure(fdi, s):
+    """Whether that estimate is known well, so that it need not be eased in."""
+    likely = scheme.likelihood_counts(fdi.statistical.tests, fdi.config.authority)
+    return likely and statistical.estimated_loss(fdi.statistical.block, s)[1] > SURE
 
 
 @kernel
-def share_faults(truth, faults, oracle):
-    """Put into `faults` what the law may know of the truth: to the oracle all, to others whether to account
-    for authority."""
-    faults.present = truth.faulted
-    if oracle:
-        faults.Cm_alpha3 = truth.Cm_alpha3
-        for s in range(faults.effectiveness.size):
-            faults.effectiveness[s] = effectiveness(truth, s)
-            faults.effective[s] = effective(truth, s)
-            faults.immovable[s] = truth.immovable[s]
+def unknown_acceleration(fdi, out):
+    """Fill out (3,) rad/s2 with what goes on beyond the model and the known faults, as it is estimated."""
+    if scheme.likelihood_counts(fdi.statistical.tests, fdi.config.authority):
+        statistical.unknown_acceleration(fdi.statistical.block, fdi.statistical.air, out)
+    else:
+        detection.unknown_acceleration(fdi.fdae, fdi.bound.noise, out)
 
 
 @kernel
@@ -251,16 +345,9 @@ def accommodate(frame):
     """What the law takes each surface for, and the unknown."""
     control, surfaces = frame.control, frame.control.surfaces
     accommodation.accommodate(
-        control.law,
-        control.inner,
-        frame.assessment,
-        surfaces,
-        control.rejection,
-        control.layout,
-        control.allocation.saturated,
-        frame.faults,
-        frame.belief.u,
-    )
+        control.law, control.inner, frame.assessment, surfaces, control.rejection, control.layout,
+        control.allocation.saturated, frame.faults, frame.belief.u,
+    )  # fmt: skip
     if frame.assessment.hedge and control.law != ORACLE:
         control.reference.hedging = 1
     compensate(frame)
@@ -326,15 +413,9 @@ def allocate(frame):
     if rejects and control.law != NOMINAL and frame.assessment.detected:
         allocation.relieve(out, layout, wanted[PITCH])
     accommodation.give_up(
-        control.law,
-        frame.assessment,
-        surfaces,
-        control.rejection.withdrawn,
-        frame.faults,
-        layout,
-        out,
+        control.law, frame.assessment, surfaces, control.rejection.withdrawn, frame.faults, layout, out,
         control.reference,
-    )
+    )  # fmt: skip
 
 
 @kernel
@@ -357,15 +438,9 @@ def command_as_rival(frame):
     """The command of a compiled rival."""
     control = frame.control
     compiled.command(
-        control.inner,
-        control.rival,
-        control.reference,
-        control.axes,
-        control.allocation,
-        control.layout,
-        frame.belief.G,
-        frame.measured.x,
-    )
+        control.inner, control.rival, control.reference, control.axes, control.allocation,
+        control.layout, frame.belief.G, frame.measured.x,
+    )  # fmt: skip
 
 
 @kernel
@@ -417,17 +492,9 @@ def fly_profile(frame, commanded):
         elevator = control.layout.main[PITCH]
         unexplained = control.rejection.disturbance[PITCH] / belief.G[PITCH, elevator]
     steer(
-        autopilot,
-        control.layout,
-        control.surfaces,
-        control.allocation,
-        control.axes.hold,
-        control.power,
-        belief.u,
-        frame.measured,
-        unexplained,
-        frame.t,
-    )
+        autopilot, control.layout, control.surfaces, control.allocation, control.axes.hold,
+        control.power, belief.u, frame.measured, unexplained, frame.t,
+    )  # fmt: skip
     judge(autopilot, value[ch.ALTITUDE], value[ch.AIRSPEED], value[ch.PHI + 2], value[ch.PHI], frame.t)
     for i in range(3):
         commanded[i] += autopilot.rates[i]
@@ -498,84 +565,3 @@ def finish(frame, commanded, row):
     hand_over(frame.truth, belief.commanded, control.power)
     frame.k += 1
     frame.row += 1
-
-
-@kernel
-def hold(frames):
-    """Command frame.held_rad in the law's place, from the frame just flown on: nothing has moved since."""
-    frame = frames[0]
-    belief = frame.belief
-    frame.held = 1
-    belief.commanded[:] = frame.held_rad
-    belief.u[:] = belief.u_then
-    move(belief.actuators, belief.commanded, belief.u)
-    hand_over(frame.truth, belief.commanded, frame.control.power)
-
-
-@kernel
-def look_inside(frames):
-    """See an instant inside a frame of the loop, for the means over that frame; nothing is commanded.
-
-    frames (1,) of dtype `frame_dtype`. A departure, or what is not finite, is left for `fly_frame` to find.
-    """
-    frame = frames[0]
-    if sense(frame) != NOT_FINITE:
-        scheme.look_inside(frame.fdi, frame.belief, frame.measured)
-        add_effect(frame.accounts.guarantee)
-
-
-@kernel
-def fly_frame(frames, references, log):
-    """One frame of the closed loop with the built-in diagnosis and law.
-
-    frames (1,) of dtype `frame_dtype`; references (m, 3) rad/s and log (m, columns) of the present chunk,
-    indexed by frame.row. Returns FLYING, or why the flight ends: the row of a departure is still recorded,
-    that of a non-finite truth is not.
-    """
-    frame = frames[0]
-    status = begin(frame)
-    if status == NOT_FINITE:
-        return status
-    diagnose(frame)
-    decide(frame)
-    command(frame)
-    finish(frame, row_of(references, frame.row), row_of(log, frame.row))
-    return status
-
-
-@kernel
-def fly_on(frames, references, log, order):
-    """Frames of the loop one after the other, each after JSBSim's own; nothing else changes meanwhile.
-
-    order: (2,) how many, and how many of JSBSim's to each. The rest, and what is returned: see `fly_frame`.
-    """
-    running = frames[0].running
-    for _ in range(order[0]):
-        for left in range(order[1] - 1, -1, -1):
-            advance(running)
-            if left > 0:
-                look_inside(frames)
-        status = fly_frame(frames, references, log)
-        if status != FLYING:
-            return status
-    return FLYING
-
-
-def _halves_of_a_frame(frames, references, log):
-    """What `fly_frame` mostly consists of, by types: halves that take about as long to compile."""
-    frame, row = frames.dtype, references.copy(ndim=1)
-    parts = tuple(frame.fields[name].type for name in ("fdi", "belief", "measured"))
-    fdi, belief, measured = parts
-    bound = fdi.fields["bound"].type
-    there = [(diagnose, (frame,)), (look_back, (belief, bound, measured, numba.int64, numba.float64))]
-    return there, [(sense, (frame,)), (command, (frame,)), (finish, (frame, row, row))]
-
-
-def _halves_of_frames(frames, references, log, order):
-    there, here = _halves_of_a_frame(frames, references, log)
-    inside = tuple(frames.dtype.fields[name].type for name in ("fdi", "belief", "measured"))
-    return [*there, (scheme.look_inside, inside)], here
-
-
-in_two(fly_frame, _halves_of_a_frame)
-in_two(fly_on, _halves_of_frames)

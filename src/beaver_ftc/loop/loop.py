@@ -11,13 +11,13 @@ from beaver_ftc.control.outer.setup import set_up_autopilot
 from beaver_ftc.design.variants import anchor, mass_of
 from beaver_ftc.diagnosis import noise_model
 from beaver_ftc.documents.errors import SimulationFailed
-from beaver_ftc.loop import memory, steps
+from beaver_ftc.loop import memory, stepping
 from beaver_ftc.loop.assembly import assemble, lay_out, y_places
 from beaver_ftc.loop.cockpit import Cockpit, note_failures, set_origin, travel_rad
 from beaver_ftc.loop.direct import direct
-from beaver_ftc.loop.frame import FLYING, NOT_FINITE, fly_frame, fly_on, hold, look_inside
 from beaver_ftc.loop.instrument_records import anchor_watch
 from beaver_ftc.loop.outcome import Landing, landing_of
+from beaver_ftc.loop.stepping import fly_frame, fly_on, hold, look_inside
 from beaver_ftc.plant import channels as ch
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.conditions import ready
@@ -26,6 +26,7 @@ from beaver_ftc.plant.faults import FaultSchedule
 from beaver_ftc.plant.gust import GustSchedule, MovingAir
 from beaver_ftc.plant.instruments import AX, ENGINE_SPEED
 from beaver_ftc.plant.reuse import give_back
+from beaver_ftc.plant.sensing import FLYING, NOT_FINITE
 from beaver_ftc.plant.sensor_faults import SensorFaultSchedule
 from beaver_ftc.plugins import DETECTORS, LAWS, is_compiled
 from beaver_ftc.scenario.schema import Scenario
@@ -156,7 +157,7 @@ class Loop:
         return self.plugin_frame is None or self.plugin_frame.detector is None
 
     def direct(self, kernel: Callable[..., int]) -> Callable[..., int]:
-        """Compiled frames as this flight calls them: `frame.fly_on`, or another in its place."""
+        """Compiled frames as this flight calls them: `stepping.fly_on`, or another in its place."""
         return direct(kernel, self.frames, self.references, self.log, self._order)
 
     def land(self) -> Landing:
@@ -239,7 +240,7 @@ class Loop:
             if frame["k"] > 0:
                 if not frame["measured"]["inertial"]:
                     self._read_further(frame["measured"])
-                direct(steps.begin_watch, self.frames)(self.frames)
+                direct(stepping.begin_watch, self.frames)(self.frames)
 
     def enable_watch(self, fdi: np.void) -> None:
         """Have a watch that was not wanted before the flight; the trim is shown to it now. Accelerometers are
@@ -301,7 +302,7 @@ class Loop:
 
     @cached_property
     def fly_on(self) -> Callable[..., int]:
-        """Frames of the loop with JSBSim's between them, as `frame.fly_on`."""
+        """Frames of the loop with JSBSim's between them, as `stepping.fly_on`."""
         return self.direct(fly_on)
 
     def _advance(self, runs: int) -> Callable[[], object]:

@@ -13,10 +13,10 @@ from beaver_ftc.diagnosis.base import Detector, Measured, Verdict
 from beaver_ftc.diagnosis.bounds.variances import declared_of
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, UNANTICIPATED
 from beaver_ftc.documents.errors import BeaverFtcError, SimulationFailed
-from beaver_ftc.loop import steps
+from beaver_ftc.loop import stepping
 from beaver_ftc.loop.assembly import y_places
-from beaver_ftc.loop.frame import NOT_FINITE
 from beaver_ftc.loop.outcome import verdict_of
+from beaver_ftc.plant.sensing import NOT_FINITE
 from beaver_ftc.plugins import DETECTORS, LAWS, is_compiled, made
 from beaver_ftc.scenario.schema import Scenario
 
@@ -24,7 +24,7 @@ _AXES = {"p": 0, "q": 1, "r": 2, None: 0}
 
 
 class PluginFrame:
-    """One frame of the loop with a detector or a law that is not compiled in; called as `frame.fly_frame` is.
+    """One frame of the loop with a detector or a law that is not compiled in, called as `stepping.fly_frame`.
 
     detector, law: the plug-ins, None where the built-in one is in place. names: what to call them when one is
     at fault. begun: the frame that this one follows in flight, whose plug-ins are not begun anew.
@@ -51,31 +51,31 @@ class PluginFrame:
             self._ask(names[1], law.reset, context[1])
 
     def __call__(self, frames: np.ndarray, references: np.ndarray, log: np.ndarray) -> int:
-        """Fly one frame; see `frame.fly_frame`."""
-        status = steps.measure(frames)
+        """Fly one frame; see `stepping.fly_frame`."""
+        status = stepping.measure(frames)
         if status == NOT_FINITE:
             return status
         frame = frames[0]
         self._t_s = float(frame["t"])
         measured = measured_of(frame)
         self._diagnose(frames, measured)
-        steps.decide(frames)
+        stepping.decide(frames)
         self._command(frames, references, measured)
-        steps.finish(frames, references, log)
+        stepping.finish(frames, references, log)
         return status
 
     def _diagnose(self, frames: np.ndarray, measured: Measured) -> None:
         if self.detector is None:
-            steps.diagnose(frames)
+            stepping.diagnose(frames)
             return
         verdict = self._ask(self._names[0], self.detector.step, measured, frames["belief"]["u"][0].copy())
         self._check(verdict, frames["verdict"][0])
         self.verdict = verdict
-        steps.take_verdict(frames)
+        stepping.take_verdict(frames)
 
     def _command(self, frames: np.ndarray, references: np.ndarray, measured: Measured) -> None:
         if self.law is None or frames["held"][0]:
-            steps.command(frames)
+            stepping.command(frames)
             return
         frame = frames[0]
         control = frame["control"]
@@ -86,7 +86,7 @@ class PluginFrame:
         )
         verdict = self.verdict if self.detector is not None else verdict_of(frame, self._surfaces)
         answer = self._ask(self._names[1], self.law.step, measured, reference, verdict)
-        steps.take_command(frames, self._deflections(answer))
+        stepping.take_command(frames, self._deflections(answer))
 
     def _ask(self, name: str, question: Any, *arguments: Any) -> Any:
         try:

@@ -12,7 +12,7 @@ from beaver_ftc.design.variants import anchor, mass_of
 from beaver_ftc.diagnosis import noise_model
 from beaver_ftc.diagnosis.base import Verdict
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.loop import steps, watching
+from beaver_ftc.loop import stepping, watching
 from beaver_ftc.loop.assembly import assemble
 from beaver_ftc.loop.direct import direct
 from beaver_ftc.loop.outcome import estimate_now, verdict_of
@@ -71,7 +71,7 @@ class Diagnosis:
         )  # beyond the aircraft's own signals it stays zero
         self._signals = self._y[: len(FLOW) + len(self._aircraft.signals)]
         self._take = direct(watching.take, self._frames, self._x, self._y, self._command, self._attitude)
-        self._diagnose = direct(steps.diagnose, self._frames)
+        self._diagnose = direct(stepping.diagnose, self._frames)
         self._believe = direct(watching.believe, self._frames)
         self._known = np.zeros(watching.MEMORY, dtype=np.int64)
         self._news = direct(watching.news, self._frames, self._known)

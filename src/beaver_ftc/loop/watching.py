@@ -1,14 +1,14 @@
 """The compiled diagnosis fed from outside: what is measured comes as arguments, nothing is read or written.
 
-take -> steps.diagnose -> believe
+take -> stepping.diagnose -> believe
 """
 
 import numpy as np
 
 from beaver_ftc.compiled import kernel
 from beaver_ftc.diagnosis.belief import follow_command, look_back, respond
-from beaver_ftc.diagnosis.scheme import isolated_surface, isolated_theta
-from beaver_ftc.loop.frame import accommodate
+from beaver_ftc.diagnosis.scheme import isolated_surface
+from beaver_ftc.loop.frame import accommodate, isolated_theta
 
 MEMORY = 8 + 5 * 8  # of the verdict's words: `news`
 
@@ -56,7 +56,7 @@ def believe(frames):
 def theta(frames):
     """The estimate of the isolated loss of effectiveness, of the published class."""
     fdi = frames[0].fdi
-    return isolated_theta(fdi, isolated_surface(fdi))
+    return isolated_theta(fdi, isolated_surface(fdi.verdict, fdi.isolation.estimator))
 
 
 @kernel
@@ -78,21 +78,20 @@ def news(frames, known):
         for plane in range(fdi.types.pair.alarmed.size):
             changed |= replace(known, 5 + plane, fdi.types.pair.alarmed[plane])
         for s in range(fdi.types.surface.size):
-            changed |= news_of(fdi, s, known)
+            changed |= news_of(fdi.types.surface[s], fdi.types.config.patience, known[8 + 5 * s :])
     return changed
 
 
 @kernel
-def news_of(fdi, s, known):
-    """The same of surface s, where every type is asked for."""
-    surface, first = fdi.types.surface[s], 8 + 5 * s
+def news_of(surface, patience, known):
+    """The same of one surface, where every type is asked for; known (5 and more,): its own."""
     bits = 0
     for kind in range(surface.type_excluded.size):
         bits = 2 * bits + surface.type_excluded[kind]
-    early = surface.evidence - surface.quiet < fdi.types.config.patience
-    changed = replace(known, first, surface.named) | replace(known, first + 1, surface.standing)
-    changed |= replace(known, first + 2, surface.type) | replace(known, first + 3, bits)
-    return changed | replace(known, first + 4, 1 if early else 0)
+    early = surface.evidence - surface.quiet < patience
+    changed = replace(known, 0, surface.named) | replace(known, 1, surface.standing)
+    changed |= replace(known, 2, surface.type) | replace(known, 3, bits)
+    return changed | replace(known, 4, 1 if early else 0)
 
 
 @kernel

@@ -141,7 +141,7 @@ def test_what_old_versions_left_goes_but_for_the_latest(nowhere, tmp_path):
 
 PROGRAM = """
 import sys
-from beaver_ftc.loop.frame import fly_on
+from beaver_ftc.loop.stepping import fly_on
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.scenario.loader import load_scenario
 import beaver_ftc

@@ -9,7 +9,7 @@ import pytest
 PROGRAM = """
 import json, re, sys, tempfile
 from pathlib import Path
-from beaver_ftc.loop.frame import fly_on
+from beaver_ftc.loop.stepping import fly_on
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.log import ParquetLog
 from beaver_ftc.scenario.schema import Scenario

@@ -5,19 +5,19 @@ import pytest
 
 from beaver_ftc import compiled
 from beaver_ftc.design.coefficients import SURFACES
-from beaver_ftc.loop import frame
+from beaver_ftc.loop import stepping
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.studies.bench.parts import PARTS, frame_with, frame_without, nothing
 from flying import scenario
 
 
 def test_all_parts_together_are_the_frame_itself():
-    assert frame_with(len(PARTS)) is frame.fly_on
+    assert frame_with(len(PARTS)) is stepping.fly_on
 
 
 def test_every_part_names_kernels_there_are():
     for i in range(len(PARTS)):
-        assert frame_with(i) is not frame.fly_on
+        assert frame_with(i) is not stepping.fly_on
 
 
 def test_an_unknown_kernel_is_refused():
@@ -28,12 +28,12 @@ def test_an_unknown_kernel_is_refused():
 def test_the_loops_own_kernels_are_left_as_they_were():
     from beaver_ftc.diagnosis import isolation
 
-    before = frame.fly_on, isolation.predict_all, compiled.kernel
+    before = stepping.fly_on, isolation.predict_all, compiled.kernel
     frame_with(1)
     from beaver_ftc.diagnosis import isolation as isolation_now
-    from beaver_ftc.loop import frame as frame_now
+    from beaver_ftc.loop import stepping as stepping_now
 
-    assert (frame_now.fly_on, isolation_now.predict_all, compiled.kernel) == before
+    assert (stepping_now.fly_on, isolation_now.predict_all, compiled.kernel) == before
 
 
 def test_with_reading_alone_the_truth_is_read_and_nothing_else_happens():

@@ -24,7 +24,7 @@ WORDS = {
 PROGRAM = """
 import sys
 import numba, numpy as np
-from beaver_ftc.loop.frame import fly_frame
+from beaver_ftc.loop.stepping import fly_frame
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.scenario.schema import Scenario
 folder, law = sys.argv[1:]

@@ -13,7 +13,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-import beaver_ftc.loop.frame  # noqa: F401  (its kernels must be there to be copied)
+import beaver_ftc.loop.stepping  # noqa: F401  (its kernels must be there to be copied)
 from beaver_ftc import compiled
 
 Kernel = Callable[..., Any]
@@ -59,7 +59,7 @@ PARTS = (
           "diagnosis.belief.look_back": nothing, "loop.frame.diagnose": nothing}),
     Part("fies", "the isolation estimators, and the decision among them",
          {"diagnosis.isolation.suppose_all": nothing, "diagnosis.isolation.predict_all": nothing,
-          "diagnosis.isolation.start": nothing, "diagnosis.scheme.isolate": nothing}),
+          "diagnosis.isolation.start": nothing, "loop.frame.isolate": nothing}),
     Part("thresholds", "the bound on the uncertainty, and every threshold that follows from it",
          {"diagnosis.bounds.worst_case.uncertainty_bound": nothing,
           "diagnosis.thresholds.bound_step": unlimited,
@@ -76,9 +76,9 @@ PARTS = (
 
 
 def frame_with(switched_on: int) -> Kernel:
-    """`frame.fly_on` with the first so many of PARTS; compiled once, into a cache of its own."""
+    """`stepping.fly_on` with the first so many of PARTS; compiled once, into a cache of its own."""
     if switched_on == len(PARTS):
-        return import_module("beaver_ftc.loop.frame").fly_on
+        return import_module("beaver_ftc.loop.stepping").fly_on
     out: dict[str, Kernel] = {}
     for part in PARTS[switched_on:]:
         out |= part.kernels
@@ -86,7 +86,7 @@ def frame_with(switched_on: int) -> Kernel:
 
 
 def frame_without(stand_ins: Mapping[str, Kernel], name: str) -> Kernel:
-    """A private `frame.fly_on` with stand-ins for the kernels named; `name` names its cache."""
+    """A private `stepping.fly_on` with stand-ins for the kernels named; `name` names its cache."""
     used: set[str] = set()
     folder = compiled.cache_folder()
 
@@ -96,7 +96,7 @@ def frame_without(stand_ins: Mapping[str, Kernel], name: str) -> Kernel:
         return compiled.compile_into(folder and folder / name, stand_ins.get(full_name, function))
 
     with _fresh_kernel_modules(kernel):
-        fly_on = import_module("beaver_ftc.loop.frame").fly_on
+        fly_on = import_module("beaver_ftc.loop.stepping").fly_on
     if unknown := set(stand_ins) - used:
         raise ValueError(f"no such kernel: {', '.join(sorted(unknown))}")
     return fly_on

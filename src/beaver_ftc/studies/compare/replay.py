@@ -18,7 +18,7 @@ from beaver_ftc.design.context import Context
 from beaver_ftc.diagnosis.base import Detector, Measured, Verdict
 from beaver_ftc.diagnosis.bounds import clairvoyant
 from beaver_ftc.loop.loop import Loop
-from beaver_ftc.loop.steps import built_in_statistic
+from beaver_ftc.loop.stepping import built_in_statistic
 from beaver_ftc.plugins import DETECTORS, made
 from beaver_ftc.scenario.schema import Scenario
 

@@ -1,0 +1,161 @@
+"""The compiled frame as Python calls it: whole, many in a row, or step by step where a plug-in is between.
+
+    measure -> diagnose | take_verdict -> decide -> command | take_command -> finish
+
+left of a bar: built in, right of it: a plug-in's answer. `fly_frame` is the built-in ones in one call.
+
+frames (1,): of `frame_dtype` (assembly.py).
+"""
+
+import numba
+
+from beaver_ftc.compiled import in_two, kernel
+from beaver_ftc.design.actuators import move
+from beaver_ftc.diagnosis import instruments
+from beaver_ftc.diagnosis.belief import look_back
+from beaver_ftc.diagnosis.scheme import built_in_statistic as largest_statistic
+from beaver_ftc.diagnosis.scheme import likelihood_counts
+from beaver_ftc.loop import frame as whole
+from beaver_ftc.loop.accounts import add_effect
+from beaver_ftc.loop.rows import row_of
+from beaver_ftc.plant.native import advance
+from beaver_ftc.plant.sensing import FLYING, NOT_FINITE, hand_over, sample_forces
+
+
+@kernel
+def measure(frames):
+    """Measure, and see what the design model makes of the elapsed frame. Returns the flight's status."""
+    return whole.begin(frames[0])
+
+
+@kernel
+def begin_watch(frames):
+    """Begin to watch the instruments, with the readings there are. Where accelerometers were not read, their
+    truth stands there."""
+    frame = frames[0]
+    if not frame.measured.inertial:
+        sample_forces(frame.instruments, frame.measured)
+    instruments.begin(frame.fdi.watch, frame.measured, frame.t)
+
+
+@kernel
+def diagnose(frames):
+    """The built-in diagnosis."""
+    whole.diagnose(frames[0])
+
+
+@kernel
+def take_verdict(frames):
+    """A plug-in's verdict, written to the frame's `verdict`."""
+    whole.take_verdict(frames[0])
+
+
+@kernel
+def built_in_statistic(frames):
+    """The built-in detection's statistic at this frame: see scheme.py."""
+    fdi = frames[0].fdi
+    alarm, authority = fdi.statistical.alarm, fdi.config.authority
+    return largest_statistic(fdi.bank, alarm, authority, likelihood_counts(fdi.statistical.tests, authority))
+
+
+@kernel
+def decide(frames):
+    """The mode."""
+    whole.decide(frames[0])
+
+
+@kernel
+def command(frames):
+    """The built-in law, or a command that is held in its place."""
+    whole.command(frames[0])
+
+
+@kernel
+def take_command(frames, deflections):
+    """A plug-in's command (n,) rad, within the travel of each surface."""
+    whole.take_command(frames[0], deflections)
+
+
+@kernel
+def finish(frames, references, log):
+    """Account, record, hand the command over."""
+    frame = frames[0]
+    whole.finish(frame, row_of(references, frame.row), row_of(log, frame.row))
+
+
+@kernel
+def hold(frames):
+    """Command frame.held_rad in the law's place, from the frame just flown on: nothing has moved since."""
+    frame = frames[0]
+    belief = frame.belief
+    frame.held = 1
+    belief.commanded[:] = frame.held_rad
+    belief.u[:] = belief.u_then
+    move(belief.actuators, belief.commanded, belief.u)
+    hand_over(frame.truth, belief.commanded, frame.control.power)
+
+
+@kernel
+def look_inside(frames):
+    """See an instant inside a frame of the loop, for the means over that frame; nothing is commanded.
+
+    A departure, or what is not finite, is left for `fly_frame` to find.
+    """
+    frame = frames[0]
+    if whole.sense(frame) != NOT_FINITE:
+        whole.look_on(frame)
+        add_effect(frame.accounts.guarantee)
+
+
+@kernel
+def fly_frame(frames, references, log):
+    """One frame of the closed loop with the built-in diagnosis and law.
+
+    references (m, 3) rad/s and log (m, columns): of the present chunk, indexed by frame.row. Returns FLYING,
+    or why the flight ends: the row of a departure is still recorded, that of a non-finite truth is not.
+    """
+    frame = frames[0]
+    status = whole.begin(frame)
+    if status == NOT_FINITE:
+        return status
+    whole.diagnose(frame)
+    whole.decide(frame)
+    whole.command(frame)
+    whole.finish(frame, row_of(references, frame.row), row_of(log, frame.row))
+    return status
+
+
+@kernel
+def fly_on(frames, references, log, order):
+    """Frames of the loop one after the other, each after JSBSim's own; nothing else changes meanwhile.
+
+    order: (2,) how many, and how many of JSBSim's to each. The rest, and what is returned: see `fly_frame`.
+    """
+    running = frames[0].running
+    for _ in range(order[0]):
+        for left in range(order[1] - 1, -1, -1):
+            advance(running)
+            if left > 0:
+                look_inside(frames)
+        status = fly_frame(frames, references, log)
+        if status != FLYING:
+            return status
+    return FLYING
+
+
+def _halves_of_a_frame(frames, references, log):
+    """What `fly_frame` mostly consists of, by types: halves that take about as long to compile."""
+    frame, row = frames.dtype, references.copy(ndim=1)
+    fdi, belief, measured = (frame.fields[name].type for name in ("fdi", "belief", "measured"))
+    back = belief, fdi.fields["bound"].type, measured, numba.int64, numba.float64
+    there = [(whole.diagnose, (frame,)), (look_back, back)]
+    return there, [(whole.sense, (frame,)), (whole.command, (frame,)), (whole.finish, (frame, row, row))]
+
+
+def _halves_of_frames(frames, references, log, order):
+    there, here = _halves_of_a_frame(frames, references, log)
+    return [*there, (whole.look_on, (frames.dtype,))], here
+
+
+in_two(fly_frame, _halves_of_a_frame)
+in_two(fly_on, _halves_of_frames)

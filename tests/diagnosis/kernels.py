@@ -48,7 +48,7 @@ def of_stages(fdi, kernel):
         "innovation": fdi["bank"]["innovation"], "detected": fdi["verdict"]["detected"],
         "frame_bound": fdi["bound"]["frame"], "noise": fdi["bound"]["noise"], "dt": fdi["config"]["dt"],
         "chances": fdi["statistical"]["alarm"],
-        "frame": types["frame"] if later else types["frame"] - 1,
+        **({"k": types["frame"] if later else types["frame"] - 1} if whole else {}),
     }  # fmt: skip
 
 

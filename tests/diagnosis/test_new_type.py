@@ -21,14 +21,14 @@ from beaver_ftc.diagnosis.types.contract import FaultType
 
 
 @kernel
-def judge(config, surface, kind, frame):
+def judge(config, surface, kind, k):
     """Whether the mirrored command explains this frame."""
     if not surface.low_then <= -surface.command_then <= surface.high_then:
         surface.type_excluded[kind] = 1
 
 
 @kernel
-def deflection(config, surface, kind, frame):
+def deflection(config, surface, kind, k):
     """The mirrored command."""
     return -surface.command, -surface.command
 

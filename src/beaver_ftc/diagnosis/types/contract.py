@@ -2,7 +2,7 @@
 
 A file under `table/` describes one type of fault, or the two of one name; its `TYPES` are all that is said of
 them. `kind` is a type's number, the same in every array over types. config: TYPES_CONFIG of registry.py;
-surface: a record of its `surface_dtype`. frame: the number of the judged frame, the one before the elapsed.
+surface: a record of its `surface_dtype`. k: the number of the judged frame, the one before the elapsed.
 """
 
 from collections.abc import Callable
@@ -17,7 +17,7 @@ Kernel = Callable[..., Any]
 
 
 @kernel
-def anywhere(config, surface, kind, frame):
+def anywhere(config, surface, kind, k):
     """Anywhere within reach."""
     return surface.reach_low, surface.reach_high
 
@@ -32,18 +32,18 @@ class FaultType:
 
     name                    in scenarios, reports and metrics
     constant                whether its parameter is: what it says of one frame, the next can refute
-    judge(config, surface, kind, frame)
+    judge(config, surface, kind, k)
                             hold the type against the judged frame, in which something was wrong: narrow
                             surface.set_low[kind] to .set_high[kind], or set surface.type_excluded[kind]
     rank                    place among the types of its sort, in numbers and in lists
     memory, record          fields of a record of its own, found at `surface.<record>`
     begin(surface, kind)                        nothing is known yet; its set is unlimited
     watch(config, surface, kind)                called for every frame, before it is judged
-    pass_over(config, surface, kind, frame)     called for a frame that is not judged
-    let_go(config, surface, kind, frame)        a repair may have released the surface as the frame began
+    pass_over(config, surface, kind, k)         called for a frame that is not judged
+    let_go(config, surface, kind, k)            a repair may have released the surface as the frame began
     bring_back(config, surface, kind)           carry such a release on to the next frame (release.py)
     shown(surface)                              whether it has shown itself, so that it can explain a flight
-    deflection(config, surface, kind, frame)    least and greatest deflection under it by the elapsed frame,
+    deflection(config, surface, kind, k)        least and greatest deflection under it by the elapsed frame,
                                                 rad; of a constant type
     estimate(fdi, s, kind)                      its parameter: see findings.py; None without one
     interval(fdi, s, kind)                      the set that parameter is certain to lie in, or None

@@ -139,31 +139,31 @@ def note_evidence(surface):
 
 
 @kernel
-def judge(config, surface, frame):
+def judge(config, surface, k):
     """Hold every type of one surface against the frame before the elapsed one: something was wrong in it."""
     if surface.low_then > surface.high_then:
         return
     if surface.started_at < 0:
-        surface.started_at, surface.start_low, surface.start_high = frame, surface.low_then, surface.high_then
-    judge_each(config, surface, frame)
+        surface.started_at, surface.start_low, surface.start_high = k, surface.low_then, surface.high_then
+    judge_each(config, surface, k)
 
 
 @kernel
 def judge_all(types):
     """Judge the frame before the elapsed one."""
-    config, frame = types.config, types.frame - 1
+    config, k = types.config, types.frame - 1
     for s in range(types.surface.size):
         surface = types.surface[s]
         watch_each(config, surface)
         if config.returns and types.frame > 0:
-            let_go_each(config, surface, frame)
+            let_go_each(config, surface, k)
         if config.abrupt and surface.measure == FIXED and not surface.wrong_then:
             note_quiet(types, s)
         elif surface.wrong_then and (config.whole or (surface.wrong_before and surface.wrong)):
             note_evidence(surface)
-            judge(config, surface, frame)
+            judge(config, surface, k)
         else:
-            pass_over_each(config, surface, frame)
+            pass_over_each(config, surface, k)
         if config.returns and types.frame > 0:
             bring_back_each(config, surface)
         if surface.hides_then[0] or surface.hides_then[1]:

@@ -93,13 +93,13 @@ def solve_roll_and_yaw(types, layout, estimators, innovation, frame_bound):
 
 
 @kernel
-def whereabouts(config, surface, frame):
+def whereabouts(config, surface, k):
     """Least and greatest deflection (rad) of a surface by the elapsed frame, of this number, over all types
     of a constant that are left."""
     least, greatest = np.inf, -np.inf
     for kind in range(N_CONSTANT):
         if left(surface, kind):
-            low, high = deflection(config, surface, kind, frame)
+            low, high = deflection(config, surface, kind, k)
             least, greatest = min(least, low), max(greatest, high)
     low, high = surface.reach_low, surface.reach_high
     return min(max(least, low), high), min(max(greatest, low), high)

@@ -73,12 +73,12 @@ def _one_of(name: str, arguments: str, passed: str, otherwise: str) -> Callable[
 
 begin_each = _all_of("begin", "surface, kind")
 watch_each = _all_of("watch", "config, surface, kind")
-pass_over_each = _all_of("pass_over", "config, surface, kind, frame")
-judge_each = _all_of("judge", "config, surface, kind, frame")
-let_go_each = _all_of("let_go", "config, surface, kind, frame")
+pass_over_each = _all_of("pass_over", "config, surface, kind, k")
+judge_each = _all_of("judge", "config, surface, kind, k")
+let_go_each = _all_of("let_go", "config, surface, kind, k")
 bring_back_each = _all_of("bring_back", "config, surface, kind")
 shown = _one_of("shown", "surface, kind", "surface", "True")
-_OF_ONE = "config, surface, kind, frame"
+_OF_ONE = "config, surface, kind, k"
 deflection = _one_of("deflection", _OF_ONE, _OF_ONE, f"part_0({_OF_ONE})")
 
 MAX_BLOCK = 256  # frames of a block: examine.py

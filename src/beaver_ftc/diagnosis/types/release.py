@@ -153,14 +153,14 @@ def holds(config, surface, kind, least, greatest):
 
 
 @kernel
-def beginning(config, surface, frame):
+def beginning(config, surface, k):
     """Where the surface can have been as the judged frame began, (low, high) rad, and which frame shows it.
 
     With several JSBSim frames in one of ours it may have been let go within it: the frame before is used.
     """
     if config.whole:
-        return surface.low_then, surface.high_then, frame
-    return surface.low_before, surface.high_before, frame - 1
+        return surface.low_then, surface.high_then, k
+    return surface.low_before, surface.high_before, k - 1
 
 
 @kernel

@@ -31,14 +31,14 @@ def offset(surface):
 
 
 @kernel
-def judge(config, surface, kind, frame):
+def judge(config, surface, kind, k):
     """Keep the offsets that also explain this frame."""
     least, greatest = offset(surface)
     intersect(surface, kind, least, greatest)
 
 
 @kernel
-def deflection(config, surface, kind, frame):
+def deflection(config, surface, kind, k):
     """The command and the offset, cut off by the stops."""
     low = cut_off(surface, surface.set_low[kind], surface.orders.least[0])
     return low, cut_off(surface, surface.set_high[kind], surface.orders.greatest[0])
@@ -88,7 +88,7 @@ def watch_growing(config, surface, kind):
 
 
 @kernel
-def pass_over_growing(config, surface, kind, frame):
+def pass_over_growing(config, surface, kind, k):
     """It may have gone, and begin anew."""
     forget_pace(surface.growing_bias)
 
@@ -107,7 +107,7 @@ def note_pace(config, surface, least, greatest):
 
 
 @kernel
-def judge_growing(config, surface, kind, frame):
+def judge_growing(config, surface, kind, k):
     """It keeps its sign and does not shrink; at a stop it may be larger than it shows."""
     least, greatest = offset(surface)
     if least <= greatest:

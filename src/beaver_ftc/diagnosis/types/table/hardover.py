@@ -8,46 +8,46 @@ from beaver_ftc.diagnosis.types.contract import FaultType
 
 
 @kernel
-def way(config, surface, frame):
+def way(config, surface, k):
     """The least way (rad) a runaway has gone by a frame; over a block the mean was reached within it."""
-    elapsed = frame - surface.started_at
+    elapsed = k - surface.started_at
     if config.length > 1:
         elapsed = max(elapsed - 1, 0)
     return surface.least_runaway_rate * config.span_s * elapsed
 
 
 @kernel
-def upwards(config, surface, frame):
+def upwards(config, surface, k):
     """How far up a runaway has come by a frame, at least: rad, the stop at most."""
     if surface.started_at < 0:
         return surface.travel_low
-    return min(surface.travel_high, surface.start_low + way(config, surface, frame))
+    return min(surface.travel_high, surface.start_low + way(config, surface, k))
 
 
 @kernel
-def downwards(config, surface, frame):
+def downwards(config, surface, k):
     """How far down one has come: rad, the stop at most."""
     if surface.started_at < 0:
         return surface.travel_high
-    return max(surface.travel_low, surface.start_high - way(config, surface, frame))
+    return max(surface.travel_low, surface.start_high - way(config, surface, k))
 
 
 @kernel
-def judge_up(config, surface, kind, frame):
+def judge_up(config, surface, kind, k):
     """It is beyond where its least rate takes it, or at the stop."""
-    release.holds(config, surface, kind, upwards(config, surface, frame), surface.travel_high)
+    release.holds(config, surface, kind, upwards(config, surface, k), surface.travel_high)
 
 
 @kernel
-def judge_down(config, surface, kind, frame):
+def judge_down(config, surface, kind, k):
     """The same downwards."""
-    release.holds(config, surface, kind, surface.travel_low, downwards(config, surface, frame))
+    release.holds(config, surface, kind, surface.travel_low, downwards(config, surface, k))
 
 
 @kernel
-def let_go_up(config, surface, kind, frame):
+def let_go_up(config, surface, kind, k):
     """It may be let go on its way; within a frame of several instants, further on."""
-    low, high, shown = release.beginning(config, surface, frame)
+    low, high, shown = release.beginning(config, surface, k)
     low = max(low, upwards(config, surface, shown))
     if not config.whole and low <= high:
         high = surface.travel_high
@@ -55,9 +55,9 @@ def let_go_up(config, surface, kind, frame):
 
 
 @kernel
-def let_go_down(config, surface, kind, frame):
+def let_go_down(config, surface, kind, k):
     """The same downwards."""
-    low, high, shown = release.beginning(config, surface, frame)
+    low, high, shown = release.beginning(config, surface, k)
     high = min(high, downwards(config, surface, shown))
     if not config.whole and low <= high:
         low = surface.travel_low
@@ -65,15 +65,15 @@ def let_go_down(config, surface, kind, frame):
 
 
 @kernel
-def deflection_up(config, surface, kind, frame):
+def deflection_up(config, surface, kind, k):
     """Between its least way and the stop."""
-    return upwards(config, surface, frame), surface.travel_high
+    return upwards(config, surface, k), surface.travel_high
 
 
 @kernel
-def deflection_down(config, surface, kind, frame):
+def deflection_down(config, surface, kind, k):
     """The same downwards."""
-    return surface.travel_low, downwards(config, surface, frame)
+    return surface.travel_low, downwards(config, surface, k)
 
 
 def upper_stop(fdi: np.void, s: int, kind: int) -> float | None:

@@ -21,21 +21,21 @@ def begin(surface, kind):
 
 
 @kernel
-def judge(config, surface, kind, frame):
+def judge(config, surface, kind, k):
     """Keep what also explains this frame."""
     low, high = effectiveness(surface)
     intersect(surface, kind, low, high)
 
 
 @kernel
-def deflection(config, surface, kind, frame):
+def deflection(config, surface, kind, k):
     """The command times what can be left."""
     low, high, u = surface.set_low[kind], surface.set_high[kind], surface.command
     return min(low * u, high * u), max(low * u, high * u)
 
 
 @kernel
-def judge_varying(config, surface, kind, frame):
+def judge_varying(config, surface, kind, k):
     """Some effectiveness explains this frame; over a block in which the command changes sign, any mean."""
     low, high = effectiveness(surface)
     swung = config.length > 1 and surface.orders.least[1] < 0.0 < surface.orders.greatest[1]

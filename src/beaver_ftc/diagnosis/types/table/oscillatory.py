@@ -28,7 +28,7 @@ def watch(config, surface, kind):
 
 
 @kernel
-def judge(config, surface, kind, frame):
+def judge(config, surface, kind, k):
     """Count half-cycles; a sign that stays for longer than the slowest half-cycle is no oscillation.
 
     At a stop half of a swing is hidden: where several instants are seen at once, the mean of a quick one
@@ -38,32 +38,32 @@ def judge(config, surface, kind, frame):
     low, high = surface.low_then - surface.command_then, surface.high_then - surface.command_then
     sign = 1 if low > 0.0 else (-1 if high < 0.0 else 0)
     if sign == 0 or (not config.whole and surface.hides_then[0 if sign > 0 else 1]):
-        swing.steady_since = frame + 1
+        swing.steady_since = k + 1
         return
     if sign != swing.sign:
-        end_half_cycle(swing, frame)
-        swing.sign, swing.steady_since = sign, frame
-    if frame - swing.steady_since > config.patience:
+        end_half_cycle(swing, k)
+        swing.sign, swing.steady_since = sign, k
+    if k - swing.steady_since > config.patience:
         surface.type_excluded[kind] = 1
 
 
 @kernel
-def end_half_cycle(swing, frame):
+def end_half_cycle(swing, k):
     """A half-cycle ends here; the first one is cut off at its beginning and does not count."""
     if swing.sign != 0:
         if swing.half_cycles == 0:
-            swing.first_end = frame
+            swing.first_end = k
         else:
             swing.squares += swing.square
-        swing.last_end = frame
+        swing.last_end = k
         swing.half_cycles += 1
         swing.square = 0.0
 
 
 @kernel
-def pass_over(config, surface, kind, frame):
+def pass_over(config, surface, kind, k):
     """In a frame that is not judged it may have swung to the other side, unseen."""
-    surface.oscillatory.steady_since = frame + 1
+    surface.oscillatory.steady_since = k + 1
 
 
 @kernel

@@ -14,21 +14,21 @@ def begin(surface, kind):
 
 
 @kernel
-def judge(config, surface, kind, frame):
+def judge(config, surface, kind, k):
     """It never moves away from its command, so while it stands on one side it comes nearer.
 
     Of several JSBSim frames in one of ours the first is the old command's.
     """
     low, high, run = surface.low_then, surface.high_then, surface.rate_limit
     sign = side(config, surface)
-    if sign == 0 or sign != run.sign or frame != run.at + 1:
+    if sign == 0 or sign != run.sign or k != run.at + 1:
         run.low, run.high = low, high
     else:
         if (sign > 0 and low > run.high) or (sign < 0 and high < run.low):
             surface.type_excluded[kind] = 1
         come_nearer(config, surface, run, sign)
     run.low, run.high = max(run.low, low), min(run.high, high)
-    run.sign, run.at = sign, frame
+    run.sign, run.at = sign, k
 
 
 @kernel

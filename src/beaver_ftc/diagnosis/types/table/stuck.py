@@ -21,17 +21,17 @@ def begin(surface, kind):
 
 
 @kernel
-def judge(config, surface, kind, frame):
+def judge(config, surface, kind, k):
     """It stays where it is."""
     if release.holds(config, surface, kind, surface.set_low[kind], surface.set_high[kind]):
         intersect(surface, kind, surface.low_then, surface.high_then)
 
 
 @kernel
-def let_go(config, surface, kind, frame):
+def let_go(config, surface, kind, k):
     """It may be let go where it is jammed."""
     renew(surface, kind)
-    low, high, _ = release.beginning(config, surface, frame)
+    low, high, _ = release.beginning(config, surface, k)
     release.let_go(surface, kind, max(low, surface.set_low[kind]), min(high, surface.set_high[kind]))
 
 
@@ -65,28 +65,28 @@ def settle(surface, kind):
 
 
 @kernel
-def deflection(config, surface, kind, frame):
+def deflection(config, surface, kind, k):
     """Where it is jammed."""
     return surface.set_low[kind], surface.set_high[kind]
 
 
 @kernel
-def judge_float(config, surface, kind, frame):
+def judge_float(config, surface, kind, k):
     """It is at neutral, or at the stop that is nearest to it."""
     neutral = within_travel(surface, 0.0)
     release.holds(config, surface, kind, neutral, neutral)
 
 
 @kernel
-def let_go_float(config, surface, kind, frame):
+def let_go_float(config, surface, kind, k):
     """It may be let go at neutral."""
-    low, high, _ = release.beginning(config, surface, frame)
+    low, high, _ = release.beginning(config, surface, k)
     neutral = within_travel(surface, 0.0)
     release.let_go(surface, kind, max(low, neutral), min(high, neutral))
 
 
 @kernel
-def deflection_float(config, surface, kind, frame):
+def deflection_float(config, surface, kind, k):
     """At neutral."""
     neutral = within_travel(surface, 0.0)
     return neutral, neutral

@@ -22,7 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from beaver_ftc.diagnosis.instrument_words import instrument_found
+from beaver_ftc.diagnosis.watch import instrument_found
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.scenario.given import load
 from beaver_ftc.scenario.sensors import PRESETS, Sensors

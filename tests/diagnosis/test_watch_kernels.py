@@ -7,7 +7,6 @@ from kernels import DT, new_fdi, on
 from beaver_ftc.design.engine import measured_slipstream
 from beaver_ftc.design.model import DPT
 from beaver_ftc.diagnosis import instruments as watching
-from beaver_ftc.diagnosis import stand_in
 from beaver_ftc.diagnosis.belief import belief_dtype
 from beaver_ftc.diagnosis.state import NOT_ISOLATED
 from beaver_ftc.diagnosis.watch import (
@@ -389,7 +388,7 @@ def stood_in(i, signal=(), **fields):
         values[sensor] = value
     belief["f"], belief["G"], belief["u"], belief["u_then"] = (1, 2, 3), 0.5, (0.1, 0.2, 0, 0), (0.7, 0, 0, 0)
     step["test"]["residual"][:3], step["test"]["filtered"][:3, 1] = (0.01, 0.02, 0.03), (0.4, 0.5, 0.6)
-    return float(stand_in.stand_in(watch, belief, values, i)), watch
+    return float(watching.stand_in(watch, belief, values, i)), watch
 
 
 def test_vanes_are_predicted_and_drift_back_to_trim():
@@ -508,7 +507,7 @@ def test_what_is_replaced_is_shared_out_and_the_slipstream_is_that_of_what_it_is
         else:
             watch["replaced"][i] = 1
     before = measured["signal"].copy()
-    stand_in.replace(watch, belief, measured)
+    watching.replace(watch, belief, measured)
     assert np.flatnonzero(watch["replaced"]).tolist() == sorted(broken)
     assert set(np.flatnonzero(measured["signal"] != before)) == set(broken)
     assert (measured["attitude"][1] != 9.0) == shared

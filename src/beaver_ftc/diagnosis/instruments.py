@@ -7,13 +7,14 @@ attitude is none. With D the damping of the axis, the filter W' = -D W + innovat
 exactly, and stays within its bound for an attitude's.
 
 From the alarm on no surface is named. A broken instrument that is named is replaced by what the others say
-of it, for the diagnosis and for the laws; it is not trusted again in the flight.
+of it, for the diagnosis and for the laws (`stand_in`); it is not trusted again in the flight.
 """
+
+import numpy as np
 
 from beaver_ftc.compiled import kernel
 from beaver_ftc.diagnosis import accelerometers, redundancy
 from beaver_ftc.diagnosis.bank import alarm
-from beaver_ftc.diagnosis.stand_in import replace
 from beaver_ftc.diagnosis.state import NOT_ISOLATED
 from beaver_ftc.diagnosis.thresholds import bound_step
 from beaver_ftc.diagnosis.watch import (
@@ -36,12 +37,15 @@ from beaver_ftc.diagnosis.watch import (
     UNKNOWN,
     YES,
 )
-from beaver_ftc.plant.instruments import ALTITUDE, ENGINE_SPEED, MANIFOLD, N_SENSORS, PHI
+from beaver_ftc.plant.instruments import ALTITUDE, AX, ENGINE_SPEED, MANIFOLD, N_SENSORS, PHI
+from beaver_ftc.plant.readings import note_slipstream, share_out
 
 INVOLVED = 0.03  # of the largest residual of its kind: less is what a large error does to its neighbours
 BESIDE_S = 0.5  # a surface found earlier than this before the alarm was found without the broken instrument
 SLACK = 0.2  # of the damping, away from trim
 GONE = 0.003  # of what an attitude's jump has shown: what is left of it afterwards
+QUICK_PER_S = 10.0  # the second of watch.POLES_PER_S
+FORGETTING_S = 20.0  # of a vane that is replaced, back to trim: kinematics alone drift
 CROSS_DAMPING_PER_S = 10.0  # by which a gyro's own error moves the innovation
 
 
@@ -339,3 +343,57 @@ def flow_stands_still(watch):
 def speaks(watch):
     """Whether the watch has the word: no surface is to be named."""
     return watch.enabled and watch.alarmed
+
+
+@kernel
+def replace(watch, belief, measured):
+    """Put what the other instruments say in the place of those that are named or missing. Accelerometers are
+    not replaced: then none of them is used."""
+    signal, changed = measured.signal, 0
+    for i in range(N_SENSORS):
+        if measured.missing[i]:
+            watch.replaced[i] = 1
+        if watch.replaced[i] and i < AX:
+            signal[i] = stand_in(watch, belief, signal, i)
+            changed = 2 if i in (AIRSPEED, QDYN, ENGINE_SPEED, MANIFOLD) else max(changed, 1)
+    if changed > 0:
+        share_out(measured)
+    if changed > 1 and watch.engine:
+        note_slipstream(measured)
+
+
+@kernel
+def stand_in(watch, belief, signal, i):
+    """What the other instruments say of instrument i."""
+    step = watch.step
+    if i < 3:
+        return rate_from_attitude(watch, belief, i)
+    if i in (ALPHA, BETA):
+        return step.predicted[i] + step.h / FORGETTING_S * (watch.trim[i] - step.predicted[i])
+    density = 2.0 * step.then[QDYN] / step.then[AIRSPEED] ** 2
+    if i == AIRSPEED:
+        return np.sqrt(max(2.0 * signal[QDYN] / density, 1.0))
+    if i == QDYN:
+        return 0.5 * density * signal[AIRSPEED] ** 2
+    if i >= ENGINE_SPEED:
+        return step.command[i - ENGINE_SPEED]
+    return step.predicted[i]
+
+
+@kernel
+def rate_from_attitude(watch, belief, i):
+    """Rate i, rad/s: what the attitude has shown of it by the look before, and the model's change since.
+
+    The rate itself is used for the next look: its own error shows there.
+    """
+    step = watch.step
+    u = belief.u_then if watch.past == 0 else belief.u
+    acceleration = belief.f[i]
+    for s in range(u.size):
+        acceleration += belief.G[i, s] * u[s]
+    shown = watch.follows * step.test[TURN + i].residual
+    if not watch.taken_over[i] and watch.follows < 1.0:
+        shown = step.h * QUICK_PER_S * step.test[TURN + i].filtered[1]
+    watch.taken_over[i] = 1
+    known = step.then[i] + shown / step.h
+    return known + step.h * acceleration

@@ -1,8 +1,11 @@
-"""What the watch over the instruments keeps: redundancy.py, instruments.py."""
+"""What the watch over the instruments keeps (redundancy.py, instruments.py), and its verdict in words."""
+
+from typing import Any
 
 import numpy as np
 
-from beaver_ftc.plant.instruments import N_SENSORS, PHI, SIGNALS
+from beaver_ftc.plant.instruments import N_SENSORS, PHI, SENSORS, SIGNALS
+from beaver_ftc.scenario.sensor_faults import sensor_words
 
 TURN, ANGLE, SPEED, ALPHA_FLOW, BETA_FLOW, DENSITY, CLIMB, RPM, PRESSURE = 0, 3, 6, 7, 8, 9, 10, 11, 12
 N_TESTS = 13
@@ -10,6 +13,7 @@ POLES_PER_S = (1e6, 10.0, 1.0)
 NOBODY = -1
 LEAP_M_S2 = 8.0  # by which no specific force changes from one look to the next
 UNKNOWN, YES, NO = 0, 1, 2
+WAIT_S = 1.0  # for the instrument to be found; then the fault is outside what can be named
 P, Q, R, ALPHA, BETA, AIRSPEED, QDYN = range(len(SIGNALS))
 THETA, PSI = PHI + 1, PHI + 2
 
@@ -47,7 +51,6 @@ STEP = np.dtype(
     align=True,
 )  # fmt: skip
 
-
 WATCH = np.dtype(
     [
         ("enabled", "i8"), ("begun", "i8"), ("instants", "i8"), ("past", "i8"), ("engine", "i8"),
@@ -80,3 +83,21 @@ WATCH = np.dtype(
     ],
     align=True,
 )  # fmt: skip
+
+
+def instrument_found(watch: np.void, t_s: float) -> dict[str, Any] | None:
+    """The verdict's parts as of t_s, where an instrument is found broken; None where none is."""
+    if not watch["alarmed"] or watch["beside"]:
+        return None
+    said: dict[str, Any] = {"isolated": None, "isolation_type": None, "estimate": None, "candidates": ()}
+    said["detection_time_s"], said["isolation_time_s"] = float(watch["alarmed_at_s"]), None
+    if watch["named"] >= 0:
+        said["isolated"] = sensor_words(SENSORS[int(watch["named"])])
+        said["isolation_time_s"] = float(watch["named_at_s"])
+    elif t_s > said["detection_time_s"] + WAIT_S:
+        said["isolated"] = said["isolation_type"] = "unanticipated"
+        said["isolation_time_s"] = said["detection_time_s"] + WAIT_S
+    else:
+        left = zip(SENSORS, watch["suspect"], strict=True)
+        said["candidates"] = tuple(sensor_words(name) for name, possible in left if possible)
+    return said

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from beaver_ftc.diagnosis.instrument_words import WAIT_S, instrument_found
-from beaver_ftc.diagnosis.watch import WATCH
+from beaver_ftc.diagnosis.watch import WAIT_S, WATCH, instrument_found
 from beaver_ftc.plant.instruments import SENSORS
 from beaver_ftc.scenario.sensor_faults import sensor_words
 

@@ -1,10 +1,13 @@
-"""A new fault type is one file: a copy of the package with it, and nothing else."""
+"""A new fault type is a row of two tables, what happens and what tells it: the package with both."""
 
+import json
 import os
 import shutil
 import subprocess
 import sys
 from pathlib import Path
+
+import pytest
 
 import beaver_ftc
 from beaver_ftc.diagnosis.types import contract, registry
@@ -40,6 +43,51 @@ def estimate(fdi, s, kind):
 
 TYPES = (FaultType(name="reversed", constant=True, judge=judge, deflection=deflection, estimate=estimate),)
 '''
+# What happens to the surface: all of its moment, the other way round.
+HAPPENS = '''
+"""A surface rigged the wrong way round."""
+
+from typing import Literal
+
+from pydantic import Field
+
+from beaver_ftc.scenario.faults.base import Button, Properties, Switched
+from beaver_ftc.scenario.names import Actuator
+
+
+class Reversed(Switched):
+    """The surface goes the wrong way."""
+
+    size = ("by", "deg")
+    examples = (("rigged wrongly", {}),)
+    button = Button(8, "reverse", {})
+
+    type: Literal["reversed"]
+    actuator: Actuator = Field(description="the surface that fails")
+
+    def strike(self, of: Properties, share: float, was_rad: float) -> None:
+        of["effectiveness"] *= 1.0 - 2.0 * share
+'''
+# Who has to know of it beside the diagnosis: scenario and schema, documents, `matrix`, `list`, the live page.
+KNOWN = """
+import json
+from beaver_ftc.cli.catalogue import _available
+from beaver_ftc.integrations.live.session import fault_types
+from beaver_ftc.results.about import faults_of
+from beaver_ftc.scenario.given import load
+from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.studies.matrix.fault_matrix import Case, scenario_of
+schema = Scenario.model_json_schema()["$defs"]
+fault = scenario_of(Case("rigged wrongly", "rudder", 45.0), "nominal", 0.0).faults[0]
+expected = load({"name": "r", "faults": [fault.model_dump()], "expect": {"isolated_type": "reversed"}})
+of = {"effectiveness": 1.0}
+fault.strike(of, 1.0, 0.0)
+said = [schema["Reversed"]["description"], expected.expect.isolated_type, fault.type, of["effectiveness"]]
+said.append(faults_of(expected)[0]["type"])
+said.append("reversed" in [entry["name"] for entry in _available()["faults"]])
+live = fault_types()
+print(json.dumps([*said, live["breaks"][-1], live["sizes"]["reversed"]]))
+"""
 FLIGHT = """
 import sys
 sys.path.insert(0, {folder!r})
@@ -53,20 +101,39 @@ print(said["isolated"], said["isolation_type"], said["estimate"])
 """
 
 
-def test_a_new_type_is_found_and_named(tmp_path):
-    package = tmp_path / "beaver_ftc"
+@pytest.fixture(scope="module")
+def in_a_copy(tmp_path_factory):
+    """A copy of the package with the new type: what a text prints there."""
+    root = tmp_path_factory.mktemp("copy")
+    package = root / "beaver_ftc"
     shutil.copytree(beaver_ftc.__path__[0], package, ignore=shutil.ignore_patterns("__pycache__"))
     shutil.copytree(data_root() / "aircraft", package / "data" / "aircraft")
     shutil.copytree(data_root() / "scenarios", package / "data" / "scenarios")
+    (package / "scenario" / "faults" / "backwards.py").write_text(HAPPENS)
     (package / "diagnosis" / "types" / "table" / "backwards.py").write_text(REVERSED)
-    done = subprocess.run(
-        [sys.executable, "-c", FLIGHT.format(folder=str(HERE))],
-        env={**os.environ, "PYTHONPATH": str(tmp_path), "NUMBA_DISABLE_JIT": "1"},
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    assert done.stdout.split() == ["rudder", "reversed", "-1.0"]
+
+    def printed(text):
+        done = subprocess.run(
+            [sys.executable, "-c", text],
+            env={**os.environ, "PYTHONPATH": str(root), "NUMBA_DISABLE_JIT": "1"},
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        return done.stdout
+
+    return printed
+
+
+def test_a_new_type_is_found_and_named(in_a_copy):
+    assert in_a_copy(FLIGHT.format(folder=str(HERE))).split() == ["rudder", "reversed", "-1.0"]
+
+
+def test_scenario_documents_matrix_list_and_live_page_know_it(in_a_copy):
+    assert json.loads(in_a_copy(KNOWN)) == [
+        "The surface goes the wrong way.", "reversed", "reversed", -1.0, "reversed", True,
+        ["reverse", {"type": "reversed"}], ["by", "deg"],
+    ]  # fmt: skip
 
 
 def test_every_type_keeps_the_contract():

@@ -6,9 +6,9 @@ from typing import get_args
 import pytest
 from pydantic import TypeAdapter
 
-from beaver_ftc.plant.faults import EFFECTS, HEALTHY, NEVER, FaultSchedule, frame_of
-from beaver_ftc.scenario.faults import Fault
-from beaver_ftc.scenario.schema import FaultType
+from beaver_ftc.plant.faults import HEALTHY, NEVER, FaultSchedule, frame_of
+from beaver_ftc.scenario.faults import TYPES, Fault, FaultType
+from beaver_ftc.scenario.faults.base import SurfaceFault
 
 RATE_HZ = 100
 
@@ -74,7 +74,8 @@ def test_each_type_sets_its_properties_alone_and_repairs_them(beaver, surface, g
 
 
 def test_every_type_of_the_scenario_has_an_effect():
-    assert set(EFFECTS) == set(get_args(FaultType))
+    assert set(TYPES) == set(get_args(FaultType))
+    assert all(row.strike is not SurfaceFault.strike for row in TYPES.values())
 
 
 def test_the_unanticipated_fault(beaver):

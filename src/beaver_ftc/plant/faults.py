@@ -8,10 +8,10 @@ hides a runaway (that is the aircraft's own order).
 """
 
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import zip_longest
-from math import ceil, exp, inf, radians
+from math import ceil, exp, inf
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -34,59 +34,6 @@ HEALTHY = {
     "oscillation-amplitude-rad": 0.0,
     "oscillation-frequency-rad_sec": 0.0,
     "Cm-alpha3": 0.0,
-}
-
-
-# An effect changes the failure properties of one surface, given how far the fault has grown (0 to 1) and
-# where the surface was when it struck.
-Properties = dict[str, float]
-Effect = Callable[[Properties, Any, float, float], None]
-
-
-def _loss_of_effectiveness(of: Properties, fault: Any, share: float, was_rad: float) -> None:
-    of["effectiveness"] *= 1.0 - share * fault.magnitude
-
-
-def _stuck(of: Properties, fault: Any, share: float, was_rad: float) -> None:
-    if of["stuck"] == 0.0:
-        of["stuck"] = 1.0
-        of["stuck-at-rad"] = was_rad if fault.position_deg is None else radians(fault.position_deg)
-
-
-def _hardover(of: Properties, fault: Any, share: float, was_rad: float) -> None:
-    of["hardover"] = float(fault.direction)
-
-
-def _float(of: Properties, fault: Any, share: float, was_rad: float) -> None:
-    of["float"] = 1.0
-
-
-def _bias(of: Properties, fault: Any, share: float, was_rad: float) -> None:
-    of["bias-rad"] += share * radians(fault.bias_deg)
-
-
-def _rate_limit(of: Properties, fault: Any, share: float, was_rad: float) -> None:
-    of["rate-scale"] *= 1.0 - share * (1.0 - fault.scale)
-
-
-def _oscillatory(of: Properties, fault: Any, share: float, was_rad: float) -> None:
-    of["oscillation-amplitude-rad"] = share * radians(fault.amplitude_deg)
-    of["oscillation-frequency-rad_sec"] = fault.frequency_rad_s
-
-
-def _unanticipated(of: Properties, fault: Any, share: float, was_rad: float) -> None:
-    of["Cm-alpha3"] += share * fault.Cm_alpha3
-
-
-EFFECTS: dict[str, Effect] = {
-    "loss_of_effectiveness": _loss_of_effectiveness,
-    "stuck": _stuck,
-    "hardover": _hardover,
-    "float": _float,
-    "bias": _bias,
-    "rate_limit": _rate_limit,
-    "oscillatory": _oscillatory,
-    "unanticipated": _unanticipated,
 }
 
 
@@ -191,7 +138,7 @@ class FaultSchedule:
         for event in self._events:
             if event.in_force(k) and not event.struck:
                 event.struck = True
-                if event.fault.type == "stuck":
+                if event.fault.stays_where_it_is:
                     surface = self._plant.aircraft.surface[event.fault.actuator]
                     event.was_rad = self._plant.read(surface.position)
 
@@ -200,7 +147,7 @@ class FaultSchedule:
         places = {event.place: dict(HEALTHY) for event in self._events}
         for event in self._events:
             if event.in_force(k):
-                EFFECTS[event.fault.type](places[event.place], event.fault, event.share(k), event.was_rad)
+                event.fault.strike(places[event.place], event.share(k), event.was_rad)
         return {
             f"{place}/{name}": value
             for place, properties in places.items()

@@ -196,17 +196,14 @@ def _sensor_sizes(fault: Document) -> list[str]:
     return [] if size is None else [words[fault["type"]].format(size, unit)]
 
 
-_TRUTH = {
-    "loss_of_effectiveness": ("magnitude", -1.0), "stuck": ("position_deg", 1.0), "bias": ("bias_deg", 1.0),
-    "oscillatory": ("amplitude_deg", 1.0),
-}  # fmt: skip
-
-
 def _true(isolation: Document, metrics: Document) -> str:
     """What the estimate ought to be, where the fault named is one that was declared."""
+    from beaver_ftc.scenario.faults import TYPES
+
     if isolation["estimate"] is None:
         return ""
-    key, sign = _TRUTH.get(isolation["type"], ("", 1.0))
+    row = TYPES.get(isolation["type"])
+    key, sign = (row and row.truth) or ("", 1.0)
     sizes = [
         fault["size"][key]
         for fault in metrics.get("faults", ())

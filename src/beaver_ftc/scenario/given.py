@@ -23,7 +23,6 @@ from beaver_ftc.scenario.schema import Scenario
 ScenarioLike = Scenario | str | PathLike[str] | Mapping[str, Any]
 
 UNNAMED = "unnamed"
-SINGULAR = ("stuck", "hardover", "float")  # a second one of these changes nothing
 
 
 class _OneFault(Section):
@@ -88,4 +87,6 @@ def _begun(model: type[OneThing], what: str, given: Mapping[str, Any], at_s: flo
 def is_same_again(new: Any, known: Any) -> bool:
     """Whether a fault that does not add to its like is there already, to stay."""
     begun = known.type == new.type and known.at_s <= new.at_s
-    return bool(begun and new.type in SINGULAR and known == new.model_copy(update={"at_s": known.at_s}))
+    return bool(
+        begun and not getattr(new, "adds", True) and known == new.model_copy(update={"at_s": known.at_s})
+    )

@@ -1,7 +1,7 @@
 """The scenario file as frozen, typed, strict sections; ranges are the contract's."""
 
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Self
 
 from pydantic import (
     AfterValidator,
@@ -25,7 +25,7 @@ from beaver_ftc.scenario.consistency import DURATION_S, RATE_HZ, Outline, confli
 from beaver_ftc.scenario.control import ControlConfig
 from beaver_ftc.scenario.diagnosis import FdiConfig
 from beaver_ftc.scenario.environment import Environment
-from beaver_ftc.scenario.faults import MOST_FAULTS, Fault
+from beaver_ftc.scenario.faults import MOST_FAULTS, Fault, FaultType
 from beaver_ftc.scenario.initial import Initial, default_initial, given_initial, initial_schema
 from beaver_ftc.scenario.names import Ratio, Ratios, folder_of, known_aircraft, nameable
 from beaver_ftc.scenario.sensors import Sensors
@@ -149,18 +149,6 @@ class Arrival(Section):
     in_envelope: Flag | None = Field(
         default=None, description="true: inside the validated envelope at the end; false: outside"
     )
-
-
-FaultType = Literal[
-    "loss_of_effectiveness",
-    "stuck",
-    "hardover",
-    "float",
-    "bias",
-    "rate_limit",
-    "oscillatory",
-    "unanticipated",
-]
 
 
 class Expect(Section):

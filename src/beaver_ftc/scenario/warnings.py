@@ -147,5 +147,5 @@ def _frequencies_hz(scenario: Any) -> Iterator[tuple[str, float]]:
         if sinusoid.amplitude_rad_s2 > 0:
             yield f"uncertainty.sinusoid.{axis}", sinusoid.frequency_rad_s / (2 * pi)
     for i, fault in enumerate(scenario.faults):
-        if fault.type == "oscillatory":
+        if hasattr(fault, "frequency_rad_s"):
             yield f"faults[{i}].frequency_rad_s", fault.frequency_rad_s / (2 * pi)

@@ -18,7 +18,7 @@ from beaver_ftc.loop.cockpit import IMMOVABLE
 from beaver_ftc.plugins import DETECTORS, LAWS, is_compiled, registered
 from beaver_ftc.results.log import SpooledLog
 from beaver_ftc.scenario.airframe import checked_against
-from beaver_ftc.scenario.faults import place_of
+from beaver_ftc.scenario.faults import TYPES, place_of
 from beaver_ftc.scenario.sensor_faults import sensors_there
 
 LONGEST_S = 3600.0  # of one live flight: its log is 0.4 GB then
@@ -319,8 +319,17 @@ class Session:
             "scenarios": sorted({*bf.scenarios(), self._given.name}),
             "laws": list(registered(LAWS)), "schemes": list(registered(DETECTORS)),
             "stick_deg_s": messages.STICK_DEG_S, "fastest": messages.FASTEST,
-            "events": list(self.told),
+            "events": list(self.told), **fault_types(),
         }  # fmt: skip
+
+
+def fault_types() -> Message:
+    """What there is to break a surface with, and how the estimate of each type is put in words."""
+    buttons = sorted((row.button, kind) for kind, row in TYPES.items() if row.button)
+    return {
+        "breaks": [[button.says, {"type": kind, **button.keys}] for button, kind in buttons],
+        "sizes": {kind: row.size for kind, row in TYPES.items() if row.size},
+    }
 
 
 def level_turn(phi_rad: float, theta_rad: float, airspeed_mps: float) -> np.ndarray:

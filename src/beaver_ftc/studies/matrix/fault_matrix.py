@@ -18,6 +18,7 @@ from beaver_ftc.plant.trim import trim
 from beaver_ftc.results.metrics import as_json, metrics
 from beaver_ftc.scenario.airframe import find_aircraft
 from beaver_ftc.scenario.environment import air_of
+from beaver_ftc.scenario.faults import TYPES
 from beaver_ftc.scenario.given import load as load_scenario
 from beaver_ftc.scenario.initial import initial_of
 from beaver_ftc.studies.engine.study import Progress, Study, run_study
@@ -56,20 +57,8 @@ UNCERTAINTY = {
 }
 
 # Name in the table, and the fault; off_deg: a jam this far off the trimmed command.
-FAULTS: tuple[tuple[str, dict[str, Any]], ...] = (
-    ("40 % loss", {"type": "loss_of_effectiveness", "magnitude": 0.4}),
-    ("total loss", {"type": "loss_of_effectiveness", "magnitude": 1.0}),
-    ("stuck +3 deg", {"type": "stuck", "off_deg": 3.0}),
-    ("stuck -3 deg", {"type": "stuck", "off_deg": -3.0}),
-    ("hardover +", {"type": "hardover", "direction": 1}),
-    ("hardover -", {"type": "hardover", "direction": -1}),
-    ("float", {"type": "float"}),
-    ("bias +2 deg", {"type": "bias", "bias_deg": 2.0}),
-    ("bias -2 deg", {"type": "bias", "bias_deg": -2.0}),
-    ("rate limit 1.2 deg/s", {"type": "rate_limit", "scale": 0.02}),
-    ("oscillation 0.5 deg, 1 rad/s", {"type": "oscillatory", "amplitude_deg": 0.5, "frequency_rad_s": 1.0}),
-    ("oscillation 0.5 deg, 10 rad/s", {"type": "oscillatory", "amplitude_deg": 0.5, "frequency_rad_s": 10.0}),
-    ("oscillation 2 deg, 5 rad/s", {"type": "oscillatory", "amplitude_deg": 2.0, "frequency_rad_s": 5.0}),
+FAULTS: tuple[tuple[str, dict[str, Any]], ...] = tuple(
+    (name, {"type": kind, **keys}) for kind, row in TYPES.items() for name, keys in row.examples
 )
 
 

@@ -4,15 +4,7 @@ import { ask } from "./link.js";
 import { notice } from "./panels.js";
 import { flight } from "./state.js";
 
-const KINDS = [
-  ["lose 40 %", { type: "loss_of_effectiveness", magnitude: 0.4 }],
-  ["jam", { type: "stuck" }],
-  ["float", { type: "float" }],
-  ["run away", { type: "hardover", direction: 1 }],
-  ["oscillate", { type: "oscillatory", amplitude_deg: 3, frequency_rad_s: 6 }],
-  ["bias", { type: "bias", bias_deg: 3 }],
-  ["slow", { type: "rate_limit", scale: 0.05 }],
-];
+const kinds = () => flight.hello?.breaks ?? []; // [label, fault]: the rows of the fault types
 const byId = (id) => document.getElementById(id);
 
 export function perform(request) {
@@ -31,7 +23,7 @@ const toggle = (surface, kind) => (isThere(surface, kind) ? repair(surface) : pe
 export const repair = (surface = null) => perform({ do: "repair", actuator: surface });
 
 function buttons(surface) {
-  const made = KINDS.map(([label, fault]) => {
+  const made = kinds().map(([label, fault]) => {
     const button = Object.assign(document.createElement("button"), { textContent: label, type: "button" });
     button.dataset.label = label;
     button.setAttribute("aria-label", `${surface}: ${label}`);
@@ -91,7 +83,7 @@ export function drawBroken() {
     const says = broken.has(surface) ? ` ✕ broken: ${[...new Set(faultsOf(surface).map(({ type }) => type.replaceAll("_", " ")))].join(", ")}` : "";
     group.classList.toggle("broken", broken.has(surface));
     if (group.querySelector("em").textContent !== says) group.querySelector("em").textContent = says;
-    for (const [label, kind] of KINDS) group.querySelector(`[data-label="${label}"]`).setAttribute("aria-pressed", isThere(surface, kind));
+    for (const [label, kind] of kinds()) group.querySelector(`[data-label="${label}"]`).setAttribute("aria-pressed", isThere(surface, kind));
   }
 }
 

@@ -27,18 +27,18 @@ function verdictText(frame) {
   if (!frame.isolated) return `${frame.candidates.length} could explain it`;
   if (frame.isolated === frame.type) return `Named: ${frame.isolated}, none of the known faults`;
   const kinds = (frame.type ? [frame.type] : frame.candidates).map((kind) => kind.replaceAll("_", " "));
-  const size = frame.estimate === null || frame.estimate === undefined ? "" : SIZES[frame.type]?.(frame.estimate) ?? "";
+  const size = frame.estimate === null || frame.estimate === undefined ? "" : sizeText(flight.hello.sizes[frame.type], frame.estimate);
   return `Named: ${frame.isolated}${kinds.length ? `, ${kinds.join(" or ")}` : ""}${size}`;
 }
 
 const inDegrees = (rad) => `${(rad * DEG).toFixed(1)} deg`;
-const SIZES = { // what the diagnosis makes of it
-  loss_of_effectiveness: (theta) => ` of ${Math.round(-100 * theta)} %`,
-  stuck: (rad) => ` at ${inDegrees(rad)}`,
-  hardover: (rad) => ` at ${inDegrees(rad)}`,
-  bias: (rad) => ` of ${inDegrees(rad)}`,
-  oscillatory: (rad) => ` by ${inDegrees(rad)}`,
-};
+
+// What the diagnosis makes of it: theta of what is lost in %, else rad.
+function sizeText(size, estimate) {
+  if (!size) return "";
+  const [word, unit] = size;
+  return ` ${word} ${unit === "%" ? `${Math.round(-100 * estimate)} %` : inDegrees(estimate)}`;
+}
 
 function drawCandidates(frame, hidden) {
   const list = byId("candidates");

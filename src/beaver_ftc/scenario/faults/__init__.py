@@ -1,0 +1,66 @@
+"""What can break, and when: a class a fault type, a union on `type`.
+
+Every file of this folder is read: a fault type that can be injected is one class more (base.py).
+"""
+
+import pkgutil
+from functools import reduce
+from importlib import import_module
+from operator import or_
+from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
+
+from pydantic import Discriminator, Field, Tag
+
+from beaver_ftc.scenario.faults.base import SurfaceFault
+from beaver_ftc.scenario.faults.surfaces import Bias, LossOfEffectiveness, Unanticipated
+from beaver_ftc.scenario.names import UNANTICIPATED
+from beaver_ftc.scenario.sensor_faults import AnySensorFault, SensorFault
+
+__all__ = [
+    "MOST_FAULTS", "TYPES", "Bias", "Fault", "FaultType", "LossOfEffectiveness", "Unanticipated",
+    "of_a_sensor", "place_of",
+]  # fmt: skip
+
+MOST_FAULTS = 1000  # of one flight: an hour of breaking and repairing by hand has room
+
+
+def _rows() -> dict[str, type[SurfaceFault]]:
+    """Every class of this folder that has a `type`, by that; `unanticipated` last."""
+    modules = [import_module(f"{__name__}.{info.name}") for info in pkgutil.iter_modules(__path__)]
+    found = [row for module in modules for row in vars(module).values() if isinstance(row, type)]
+    rows = {
+        get_args(row.model_fields["type"].annotation)[0]: row
+        for row in found
+        if issubclass(row, SurfaceFault) and "type" in row.model_fields
+    }
+    rows[UNANTICIPATED] = rows.pop(UNANTICIPATED)
+    return rows
+
+
+TYPES = _rows()
+
+
+def place_of(fault: Any) -> str:
+    """What a fault is of: a surface, a sensor, or the aerodynamics (`unanticipated`)."""
+    return str(getattr(fault, "sensor", getattr(fault, "actuator", UNANTICIPATED)))
+
+
+def of_a_sensor(fault: Any) -> bool:
+    """Whether a fault, or what a file says of one, is an instrument's."""
+    return "sensor" in fault if isinstance(fault, dict) else isinstance(fault, SensorFault)
+
+
+def _tag(given: Any) -> str:
+    return "(sensor)" if of_a_sensor(given) else "(surface)"  # no keys of the file
+
+
+if TYPE_CHECKING:
+    Fault = SurfaceFault | AnySensorFault
+    FaultType = str
+else:
+    FaultType = Literal[tuple(TYPES)]
+    Fault = Annotated[
+        Annotated[Annotated[reduce(or_, TYPES.values()), Field(discriminator="type")], Tag("(surface)")]
+        | Annotated[AnySensorFault, Tag("(sensor)")],
+        Discriminator(_tag),
+    ]

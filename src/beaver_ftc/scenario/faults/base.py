@@ -1,0 +1,80 @@
+"""What a fault of the aircraft is: a class a type, which is its row in every table.
+
+It says its parameters with unit and range, what it does to the aircraft's failure properties, and how it is
+shown to people. What the diagnosis makes of a type stands in diagnosis/types/table/.
+"""
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple, Self
+
+from pydantic import Field, model_validator
+
+from beaver_ftc.documents.base import Conflict, Number, Section, number, order_conflicts, refuse
+
+Keys = Mapping[str, Any]  # of a fault in a scenario, beside type, actuator and times
+Properties = dict[str, float]  # failure properties of one surface: plant/faults.py
+
+
+class Button(NamedTuple):
+    """Of the live page: its place among the others, what it says, and the fault it makes."""
+
+    place: int
+    says: str
+    keys: Keys
+
+
+class SurfaceFault(Section):
+    """When a fault is there; `end_s` makes it intermittent or repaired."""
+
+    # The row of its type; what is left out does not apply.
+    adds: ClassVar[bool] = True  # whether a second one of the like changes anything
+    stays_where_it_is: ClassVar[bool] = False  # whether it must be known where the surface was
+    truth: ClassVar[tuple[str, float] | None] = None  # the key that an estimate is of, and the sign of that
+    size: ClassVar[tuple[str, str] | None] = None  # an estimate in words: "of" so many "%", or "deg"
+    examples: ClassVar[tuple[tuple[str, Keys], ...]] = ()  # of `matrix`: name, fault; off_deg: off the trim
+    button: ClassVar[Button | None] = None
+
+    if TYPE_CHECKING:
+        type: str
+        profile: str
+
+    at_s: Number = number(unit="s", says="when the fault starts", ge=0, le=360_000)
+    end_s: Number | None = number(None, unit="s", says="when it is gone; left out: it stays", gt=0)
+
+    @model_validator(mode="after")
+    def _fits_together(self) -> Self:
+        refuse(self._conflicts())
+        return self
+
+    def _conflicts(self) -> list[Conflict]:
+        return order_conflicts(self.at_s, self.end_s, "at_s")
+
+    def strike(self, of: Properties, share: float, was_rad: float) -> None:
+        """Change the failure properties of its place, given how far it has grown (0 to 1) and where the
+        surface was when it struck."""
+        raise NotImplementedError
+
+
+class Switched(SurfaceFault):
+    """A fault that is either there or not: a jam does not grow."""
+
+    profile: Literal["abrupt"] = Field(default="abrupt", description="this type of fault is always abrupt")
+
+
+class Gradual(SurfaceFault):
+    """A fault with a time profile B(t - at_s): a step, or 1 - exp(-kappa (t - at_s)) [Zhang2005]."""
+
+    profile: Literal["abrupt", "incipient"] = Field(
+        default="abrupt", description="a step, or growing as 1 - exp(-kappa t)"
+    )
+    kappa_per_s: Number | None = number(
+        None, unit="1/s", says="growth rate of an incipient fault", gt=0, le=1000
+    )
+
+    def _conflicts(self) -> list[Conflict]:
+        incipient, given = self.profile == "incipient", self.kappa_per_s is not None
+        if incipient and not given:
+            says = "required key is missing, allowed: the growth rate of the incipient fault, 1/s"
+        else:
+            says = "has no meaning here, allowed: only with profile: incipient"
+        return super()._conflicts() + ([] if incipient == given else [(("kappa_per_s",), says)])

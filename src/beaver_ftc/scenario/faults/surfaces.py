@@ -1,0 +1,139 @@
+"""The faults that there are, of surfaces and of the aerodynamics: a row each (base.py)."""
+
+from math import radians
+from typing import Literal
+
+from pydantic import Field
+
+from beaver_ftc.documents.base import Number, number
+from beaver_ftc.scenario.faults.base import Button, Gradual, Properties, Switched
+from beaver_ftc.scenario.names import Actuator
+
+
+class LossOfEffectiveness(Gradual):
+    """The surface gives only a part of its moment: 1 + theta, theta = -magnitude."""
+
+    truth, size = ("magnitude", -1.0), ("of", "%")
+    examples = (("40 % loss", {"magnitude": 0.4}), ("total loss", {"magnitude": 1.0}))
+    button = Button(1, "lose 40 %", {"magnitude": 0.4})
+
+    type: Literal["loss_of_effectiveness"]
+    actuator: Actuator = Field(description="the surface that fails")
+    magnitude: Number = number(
+        unit="share of 1", says="effectiveness lost: 0 healthy, 1 no moment at all", ge=0, le=1
+    )
+
+    def strike(self, of: Properties, share: float, was_rad: float) -> None:
+        of["effectiveness"] *= 1.0 - share * self.magnitude
+
+
+class Stuck(Switched):
+    """The surface jams."""
+
+    adds, stays_where_it_is, truth, size = False, True, ("position_deg", 1.0), ("at", "deg")
+    examples = (("stuck +3 deg", {"off_deg": 3.0}), ("stuck -3 deg", {"off_deg": -3.0}))
+    button = Button(2, "jam", {})
+
+    type: Literal["stuck"]
+    actuator: Actuator = Field(description="the surface that fails")
+    position_deg: Number | None = number(
+        None, unit="deg", says="where it jams; left out: where it happens to be", ge=-90, le=90
+    )
+
+    def strike(self, of: Properties, share: float, was_rad: float) -> None:
+        if of["stuck"] == 0.0:
+            of["stuck"] = 1.0
+            of["stuck-at-rad"] = was_rad if self.position_deg is None else radians(self.position_deg)
+
+
+class Hardover(Switched):
+    """The surface runs at its rate limit to a stop."""
+
+    adds, size = False, ("at", "deg")
+    examples = (("hardover +", {"direction": 1}), ("hardover -", {"direction": -1}))
+    button = Button(4, "run away", {"direction": 1})
+
+    type: Literal["hardover"]
+    actuator: Actuator = Field(description="the surface that fails")
+    direction: Literal[1, -1] = Field(
+        default=1, description="the stop it runs to: 1 positive, -1 negative deflection"
+    )
+
+    def strike(self, of: Properties, share: float, was_rad: float) -> None:
+        of["hardover"] = float(self.direction)
+
+
+class Float(Switched):
+    """The surface trails in the wind and gives no moment."""
+
+    adds = False
+    examples = (("float", {}),)
+    button = Button(3, "float", {})
+
+    type: Literal["float"]
+    actuator: Actuator = Field(description="the surface that fails")
+
+    def strike(self, of: Properties, share: float, was_rad: float) -> None:
+        of["float"] = 1.0
+
+
+class Bias(Gradual):
+    """The surface stands off its command by a constant."""
+
+    truth, size = ("bias_deg", 1.0), ("of", "deg")
+    examples = (("bias +2 deg", {"bias_deg": 2.0}), ("bias -2 deg", {"bias_deg": -2.0}))
+    button = Button(6, "bias", {"bias_deg": 3})
+
+    type: Literal["bias"]
+    actuator: Actuator = Field(description="the surface that fails")
+    bias_deg: Number = number(unit="deg", says="added to the actuator's output", ge=-90, le=90)
+
+    def strike(self, of: Properties, share: float, was_rad: float) -> None:
+        of["bias-rad"] += share * radians(self.bias_deg)
+
+
+class RateLimit(Gradual):
+    """The surface moves slowly."""
+
+    examples = (("rate limit 1.2 deg/s", {"scale": 0.02}),)
+    button = Button(7, "slow", {"scale": 0.05})
+
+    type: Literal["rate_limit"]
+    actuator: Actuator = Field(description="the surface that fails")
+    scale: Number = number(unit="share of 1", says="what is left of the rate limit", ge=0, le=1)
+
+    def strike(self, of: Properties, share: float, was_rad: float) -> None:
+        of["rate-scale"] *= 1.0 - share * (1.0 - self.scale)
+
+
+class Oscillatory(Gradual):
+    """The surface swings about its command by itself."""
+
+    truth, size = ("amplitude_deg", 1.0), ("by", "deg")
+    examples = (
+        ("oscillation 0.5 deg, 1 rad/s", {"amplitude_deg": 0.5, "frequency_rad_s": 1.0}),
+        ("oscillation 0.5 deg, 10 rad/s", {"amplitude_deg": 0.5, "frequency_rad_s": 10.0}),
+        ("oscillation 2 deg, 5 rad/s", {"amplitude_deg": 2.0, "frequency_rad_s": 5.0}),
+    )
+    button = Button(5, "oscillate", {"amplitude_deg": 3, "frequency_rad_s": 6})
+
+    type: Literal["oscillatory"]
+    actuator: Actuator = Field(description="the surface that fails")
+    amplitude_deg: Number = number(unit="deg", says="half of the swing", gt=0, le=90)
+    frequency_rad_s: Number = number(unit="rad/s", says="angular frequency of the swing", gt=0, le=1000)
+
+    def strike(self, of: Properties, share: float, was_rad: float) -> None:
+        of["oscillation-amplitude-rad"] = share * radians(self.amplitude_deg)
+        of["oscillation-frequency-rad_sec"] = self.frequency_rad_s
+
+
+class Unanticipated(Gradual):
+    """A fault outside the declared class: an extra pitching moment coefficient on alpha^3 [Zhang2005]."""
+
+    type: Literal["unanticipated"]
+    Cm_alpha3: Number = number(
+        10.0, unit="1/rad^3", says="extra Cm on alpha^3, published case 10", ge=-1000, le=1000
+    )
+
+    def strike(self, of: Properties, share: float, was_rad: float) -> None:
+        of["Cm-alpha3"] += share * self.Cm_alpha3

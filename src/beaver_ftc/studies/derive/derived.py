@@ -205,10 +205,11 @@ def text_of(document: dict[str, Any]) -> str:
     for kind, errors in document["largest_error_rad_s2"].items():
         lines.append(f"   {kinds[kind]:22}" + "".join(f"{errors[axis]:10.4f}" for axis in AXES))
     losses = document["smallest_certain_loss"].items()
-    says = {name: f"{loss:.0%}" if loss <= 1.0 else "none" for name, loss in losses}
-    lines.append(f" certain to be detected at {DEFLECTION_DEG:g} deg: losses from " + _listed(says))
+    says = ", ".join(f"{name} {f'{loss:.0%}' if loss <= 1.0 else 'none'}" for name, loss in losses)
+    lines.append(f" certain to be detected at {DEFLECTION_DEG:g} deg: losses from {says}")
     if document["own_file"]:
-        lines += _compared(document["own_file"])
+        lines.append(f" {'coefficient':24}{'own file':>12}{'found':>12}")
+        lines += [f"   {of['term']:22}{of['own']:12.5g}{of['found']:12.5g}" for of in document["own_file"]]
     lines += [f" note: {note}" for note in document["notes"]]
     if document["further_surfaces"]:
         lines.append(f" not used: {', '.join(document['further_surfaces'])}: {WHY_NOT_USED}")
@@ -226,13 +227,3 @@ def differences(as_filed: Aircraft, found: Aircraft) -> list[dict[str, Any]]:
         for t in as_filed.moments
         if t.value
     ]
-
-
-def _compared(terms: list[dict[str, Any]]) -> list[str]:
-    """The coefficients beside those of the aircraft's own file."""
-    head = f" {'coefficient':24}{'own file':>12}{'found':>12}"
-    return [head, *(f"   {of['term']:22}{of['own']:12.5g}{of['found']:12.5g}" for of in terms)]
-
-
-def _listed(values: dict[str, str]) -> str:
-    return ", ".join(f"{name} {value}" for name, value in values.items())

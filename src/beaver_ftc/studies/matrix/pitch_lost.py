@@ -39,6 +39,10 @@ SLOW_RAD_S = 1.0  # the phugoid is slower than this, the short period faster
 WIDTH = 25  # of a column
 SETTLED_S = 30.0  # from here on the swing is judged: what the fault itself throws off is over
 LAWS = ("fault-tolerant-published", "oracle-published")
+MARGIN_HEAD = (
+    "airspeed", "phugoid damping", "gain margin", "phase margin", "power to attitude",
+    "its range as elevator",
+)  # fmt: skip
 
 # Name, elevator's jam off its trim in deg (None: it floats), flap's position in deg.
 LOST: tuple[tuple[str, float | None, float], ...] = (
@@ -265,15 +269,7 @@ def _half(outcome: Document) -> str:
 
 
 def _margins(found: list[Document]) -> list[str]:
-    heads = (
-        "airspeed",
-        "phugoid damping",
-        "gain margin",
-        "phase margin",
-        "power to attitude",
-        "its range as elevator",
-    )
-    return [_row(heads), *(_margin(one) for one in found)]
+    return [_row(MARGIN_HEAD), *(_margin(one) for one in found)]
 
 
 def _margin(one: Document) -> str:
@@ -281,15 +277,8 @@ def _margin(one: Document) -> str:
     gain = "unlimited" if one["gain_margin_db"] is None else f"{one['gain_margin_db']:.1f} dB"
     phase = "unlimited" if one["phase_margin_deg"] is None else f"{one['phase_margin_deg']:.0f} deg"
     closed, opened = one["worth_deg"]
-    cells = (
-        f"{one['airspeed_mps']:g} m/s",
-        f"{alone:.2f} > {damped:.2f}",
-        gain,
-        phase,
-        f"zero at +{one['attitude_zero_rad_s']:.2f} rad/s",
-        f"{closed:+.1f} to {opened:+.1f} deg",
-    )
-    return _row(cells)
+    zero, worth = f"zero at +{one['attitude_zero_rad_s']:.2f} rad/s", f"{closed:+.1f} to {opened:+.1f} deg"
+    return _row((f"{one['airspeed_mps']:g} m/s", f"{alone:.2f} > {damped:.2f}", gain, phase, zero, worth))
 
 
 def _row(cells: tuple[str, ...]) -> str:

@@ -434,7 +434,7 @@ def looked(watch, fdi, **signal):
     for name, value in signal.items():
         measured["signal"][{"phi": PHI, "altitude": ALTITUDE, "p": 0}[name]] += value
     belief = np.zeros(1, belief_dtype(4)).view(np.recarray)[0]
-    on(watching.attend, fdi, watch, belief, measured, 3.0)
+    on(watching.monitor, fdi, watch, belief, measured, 3.0)
     return measured
 
 

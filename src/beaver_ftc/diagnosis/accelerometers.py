@@ -183,7 +183,7 @@ def suspect_accelerometers(watch, shown):
 
 
 @kernel
-def spoil(watch, measured):
+def discard(watch, measured):
     """Have no accelerometer used once one may be broken."""
     for i in range(AX, N_SENSORS):
         if watch.replaced[i] or (watch.alarmed and watch.suspect[i]):

@@ -50,7 +50,7 @@ CROSS_DAMPING_PER_S = 10.0  # by which a gyro's own error moves the innovation
 
 
 @kernel
-def attend(watch, belief, measured, conclusion, bank, bound, dt, t):
+def monitor(watch, belief, measured, conclusion, bank, bound, dt, t):
     """Look at the instruments at one instant, t s; replace in `measured` what is known to be broken.
 
     bank, bound: of the innovation of the elapsed frame, of dt s. conclusion: void from an alarm on.
@@ -76,7 +76,7 @@ def attend(watch, belief, measured, conclusion, bank, bound, dt, t):
         clear_gyros(watch)
     decide(watch, measured, conclusion, bank, bound, dt, t)
     replace(watch, belief, measured)
-    accelerometers.spoil(watch, measured)
+    accelerometers.discard(watch, measured)
     watch.earlier[:] = step.then
     redundancy.look(step, signal, measured.force)
     watch.past = (watch.past + 1) % watch.instants

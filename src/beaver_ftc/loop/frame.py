@@ -63,7 +63,7 @@ def watch_instruments(frame):
     before, t = watch.alarmed, frame.k * frame.dt
     if engine.in_use:
         watch.step.command[1] = engine.command[0]
-    instruments.attend(watch, frame.belief, frame.measured, fdi.verdict, fdi.bank, fdi.bound, frame.dt, t)
+    instruments.monitor(watch, frame.belief, frame.measured, fdi.verdict, fdi.bank, fdi.bound, frame.dt, t)
     if watch.alarmed and not (before or watch.beside):
         take_back(fdi)
 

@@ -5,9 +5,10 @@ from math import exp, pi, radians
 import numpy as np
 import pytest
 
+from beaver_ftc.diagnosis.isolation import estimator_names
 from beaver_ftc.diagnosis.rivals.rls import RlsMonitor
 from beaver_ftc.loop import plugin_frame
-from beaver_ftc.loop.assembly import assemble, estimator_names
+from beaver_ftc.loop.assembly import assemble
 from beaver_ftc.scenario.schema import Scenario
 
 TRAVEL = np.array([[-0.5, -0.4, -0.3, -0.1], [0.5, 0.45, 0.35, 1.0]])

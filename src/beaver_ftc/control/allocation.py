@@ -16,8 +16,7 @@ import numpy as np
 
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.compiled import kernel
-from beaver_ftc.diagnosis.state import PITCH, ROLL, YAW
-from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.diagnosis.state import PITCH, ROLL, YAW, leaders_of
 from beaver_ftc.scenario.control import ControlConfig
 from beaver_ftc.scenario.diagnosis import Probing
 
@@ -75,17 +74,6 @@ def configure_probe(probe: np.void, probing: Probing | None, dt: float) -> None:
         probe["step"] = 2.0 * pi * probing.frequency_hz * dt
         probe["frames"] = round(probing.duration_s / dt)
         probe["from_s"] = probe["to_s"] = -1.0
-
-
-def leaders_of(aircraft: Aircraft) -> list[int]:
-    """The surface that leads each of roll, pitch and yaw. Raises BadInput where none does."""
-    leads = {
-        aircraft.dominant_axis[s]: s for s, name in enumerate(aircraft.surfaces) if name in aircraft.primary
-    }
-    for axis, name in enumerate(("roll", "pitch", "yaw")):
-        if axis not in leads:
-            raise BadInput(f"{aircraft.name}: no surface turns it most in {name}, allowed: one for each axis")
-    return [leads[axis] for axis in range(3)]
 
 
 def _stand_in(aircraft: Aircraft) -> int:

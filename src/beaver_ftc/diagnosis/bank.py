@@ -10,11 +10,14 @@ a bound that holds instant by instant no filter, window or sum of innovations ca
 measurement errors are.
 """
 
+from math import exp
+
 import numpy as np
 
 from beaver_ftc.compiled import kernel
+from beaver_ftc.diagnosis.bounds.declared import poles_for_noise
 from beaver_ftc.diagnosis.thresholds import bound_step, noise_step
-from beaver_ftc.scenario.diagnosis import MAX_POLES
+from beaver_ftc.scenario.diagnosis import MAX_POLES, FdiConfig
 
 # The bank of detection filters; filter 0 is the published one.
 BANK = np.dtype(
@@ -26,6 +29,16 @@ BANK = np.dtype(
     ],
     align=True,
 )  # fmt: skip
+
+
+def configure(bank: np.void, config: FdiConfig, dt: float) -> None:
+    """Fill in the filters' poles: those of the scenario, and those that noise asks for."""
+    bounds = config.bounds
+    for_noise = poles_for_noise(bounds.sensors, max(bounds.constant_rad_s2.as_tuple()))
+    further = (*config.pole_bank_per_s, *for_noise) if config.sharpen.pole_bank else ()
+    poles = (config.detection_pole_per_s, *further)[:MAX_POLES]
+    bank["n"] = len(poles)
+    bank["decay"][: len(poles)] = [exp(-pole * dt) for pole in poles]
 
 
 @kernel

@@ -7,14 +7,16 @@ u[k+1]: the truth is a left sum over n instants, the first under the old command
 """
 
 from functools import lru_cache
+from math import exp, radians
 
 import numpy as np
 
 from beaver_ftc.compiled import kernel
 from beaver_ftc.design.actuators import actuators_dtype, move
 from beaver_ftc.design.model import design_dtype
-from beaver_ftc.design.variants import response
+from beaver_ftc.design.variants import design_of, response
 from beaver_ftc.diagnosis.bounds.worst_case import bound_now, changing_error
+from beaver_ftc.scenario.schema import Scenario
 
 
 @lru_cache
@@ -60,6 +62,20 @@ def belief_dtype(n: int) -> np.dtype:
         ("surprise", "f8", (3,)),  # what the rates did beyond it
     ]  # fmt: skip
     return np.dtype(fields, align=True)
+
+
+def configure(belief: np.void, scenario: Scenario, travel: np.ndarray) -> None:
+    """Fill in the design model and the declared actuators; travel (2, n) rad."""
+    belief["share"] = 1.0 / scenario.substeps
+    belief["design"] = design_of(scenario.design_model, scenario.airframe)[0]
+    actuators, dt = belief["actuators"], 1.0 / scenario.rate_hz / scenario.substeps
+    actuators["real"] = not scenario.actuators.is_ideal
+    actuators["low"], actuators["high"] = travel
+    for s, surface in enumerate(scenario.airframe.surfaces):
+        dynamics = getattr(scenario.actuators, surface)
+        bandwidth, rate = dynamics.bandwidth_rad_s, radians(dynamics.rate_limit_deg_s)
+        actuators["approach"][s] = 1.0 - exp(-bandwidth * dt) if bandwidth else 1.0
+        actuators["step"][s] = rate * dt if rate else np.inf
 
 
 @kernel

@@ -14,12 +14,15 @@ the state is. D is a continuous dead zone at the detection threshold: the networ
 admitted uncertainty explains.
 """
 
+from math import exp
+
 import numpy as np
 
 from beaver_ftc.compiled import kernel
 from beaver_ftc.diagnosis.bank import alarm
 from beaver_ftc.diagnosis.state import STATISTICS, WORST_CASE
 from beaver_ftc.diagnosis.thresholds import bound_step, noise_step
+from beaver_ftc.scenario.schema import Scenario
 
 # Centres of the network's basis functions, rad; and its memory.
 ALPHA_CENTRES = np.linspace(-0.1, 0.5, 9)
@@ -47,6 +50,15 @@ _N_ALPHA = len(ALPHA_CENTRES)
 _N_BETA = len(BETA_CENTRES)
 _ALPHA_FIRST, _ALPHA_STEP = ALPHA_CENTRES[0], ALPHA_CENTRES[1] - ALPHA_CENTRES[0]
 _BETA_FIRST, _BETA_STEP = BETA_CENTRES[0], BETA_CENTRES[1] - BETA_CENTRES[0]
+
+
+def configure(fdae: np.void, scenario: Scenario) -> None:
+    """Fill in the estimator's pole, and how its network learns."""
+    config, network = scenario.control, fdae["network"]
+    fdae["pole"] = scenario.fdi.detection_pole_per_s
+    fdae["decay"] = exp(-scenario.fdi.detection_pole_per_s * (1.0 / scenario.rate_hz))
+    network["gain"], network["leak_per_s"] = config.network_gain_per_s2, config.network_leak_per_s
+    network["weight_limit"] = config.network_weight_limit_rad_s2
 
 
 @kernel

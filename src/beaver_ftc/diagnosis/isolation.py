@@ -20,8 +20,11 @@ The sharpened tests (bank.py, membership.py) exclude beside it, each by its own 
 by the first test that fails.
 """
 
+from math import exp
+
 import numpy as np
 
+from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.compiled import kernel
 from beaver_ftc.diagnosis import membership
 from beaver_ftc.diagnosis.bank import explains, remember
@@ -30,10 +33,11 @@ from beaver_ftc.diagnosis.state import (
     LOSS,
     NOT_ISOLATED,
     POSITION,
+    PUBLISHED,
     UNANTICIPATED,
 )
 from beaver_ftc.diagnosis.thresholds import bound_step, interval, noise_step, published
-from beaver_ftc.scenario.diagnosis import MAX_POLES
+from beaver_ftc.scenario.diagnosis import MAX_POLES, FdiConfig
 
 MAX_ESTIMATORS = 16
 # What a fault adds to the angular acceleration, as its estimator supposes: offset + theta Z, give or take.
@@ -69,6 +73,43 @@ ISOLATION = np.dtype(
 )  # fmt: skip
 
 PARAMETER_SET = {LOSS: (-1.0, 0.0)}
+_THRESHOLDS = {"interval": INTERVAL, "published": PUBLISHED}
+
+Member = tuple[str, int, int]  # of a fault class: name, kind and surface of its estimator
+
+
+def members_of(fault_class: str, aircraft: Aircraft) -> tuple[Member, ...]:
+    """The isolation estimators of a fault class, in the bank's order.
+
+    published: a loss of the surface that leads each axis. all: a loss and a position of every surface.
+    """
+    index = {name: s for s, name in enumerate(aircraft.surfaces)}
+    losses = tuple((name, LOSS, index[name]) for name in aircraft.primary)
+    if fault_class == "published":
+        return losses
+    others = tuple((name, LOSS, s) for name, s in index.items() if name not in aircraft.primary)
+    return (*losses, *others, *((f"{name}_position", POSITION, s) for name, s in index.items()))
+
+
+def estimator_names(fault_class: str, aircraft: Aircraft) -> tuple[str, ...]:
+    """Names of the isolation estimators of a fault class, in the bank's order."""
+    return tuple(name for name, _, _ in members_of(fault_class, aircraft))
+
+
+def configure(
+    isolation: np.void, config: FdiConfig, dt: float, members: tuple[Member, ...], travel: np.ndarray
+) -> None:
+    """Fill in the estimators and how the decision among them is sharpened; travel (2, n) rad."""
+    sharpen = config.sharpen
+    isolation["thresholds"] = _THRESHOLDS[config.thresholds]
+    isolation["forgetting"] = exp(-dt / config.forgetting_time_s)
+    isolation["decay"] = exp(-config.isolation_pole_per_s * dt)
+    isolation["memory"], isolation["shared"] = sharpen.memory, sharpen.shared_effectiveness
+    isolation["membership"], isolation["n"] = sharpen.set_membership, len(members)
+    reach = np.array([np.minimum(travel[0], 0.0), np.maximum(travel[1], 0.0)])  # a share of it can be left
+    for fie, (_, kind, surface) in zip(isolation["estimator"], members, strict=False):
+        fie["kind"], fie["surface"] = kind, surface
+        fie["low"], fie["high"] = PARAMETER_SET[kind] if kind == LOSS else reach[:, surface]
 
 
 @kernel

@@ -8,15 +8,19 @@ from functools import lru_cache
 
 import numpy as np
 
+from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.compiled import apart, kernel
 from beaver_ftc.design.model import AIRSPEED
-from beaver_ftc.diagnosis import air, forces, statistical
+from beaver_ftc.diagnosis import air, bank, detection, forces, isolation, state, statistical
 from beaver_ftc.diagnosis.bank import BANK, largest_share
+from beaver_ftc.diagnosis.bounds import declared
 from beaver_ftc.diagnosis.bounds.worst_case import bound_dtype
 from beaver_ftc.diagnosis.detection import FDAE
 from beaver_ftc.diagnosis.isolation import ISOLATION, start
 from beaver_ftc.diagnosis.state import (
     CONFIG,
+    IN_PITCH,
+    IN_ROLL_AND_YAW,
     NOT_ISOLATED,
     STATISTICS,
     WORST_CASE,
@@ -24,10 +28,12 @@ from beaver_ftc.diagnosis.state import (
     layout_dtype,
 )
 from beaver_ftc.diagnosis.statistical import STATISTICAL
-from beaver_ftc.diagnosis.types import examine, pairs, verdict
+from beaver_ftc.diagnosis.types import examine, pairs, registry, verdict
 from beaver_ftc.diagnosis.types.examine import FIXED, LAGS, LOSES, SHIFTED
 from beaver_ftc.diagnosis.types.registry import types_dtype
 from beaver_ftc.diagnosis.watch import WATCH
+from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.scenario.schema import Scenario
 
 
 @lru_cache
@@ -39,6 +45,35 @@ def diagnosis_dtype(n: int) -> np.dtype:
         ("types", types_dtype(n)), ("statistical", STATISTICAL), ("watch", WATCH),
     ]  # fmt: skip
     return np.dtype(fields, align=True)
+
+
+def configure(fdi: np.void, belief: np.void, scenario: Scenario, travel: np.ndarray) -> None:
+    """Fill in the stages of the diagnosis; belief: already filled in. travel (2, n) rad: the stops."""
+    config, aircraft, dt = scenario.fdi, scenario.airframe, 1.0 / scenario.rate_hz
+    members, conclusion = isolation.members_of(config.fault_class, aircraft), fdi["verdict"]
+    state.configure(fdi["config"], scenario)
+    state.configure_layout(fdi["layout"], members, aircraft)
+    isolation.configure(fdi["isolation"], config, dt, members, travel)
+    if config.pairs:
+        _ask_each_plane(fdi, aircraft)
+    declared.configure(fdi["bound"], scenario, belief["design"])
+    bank.configure(fdi["bank"], config, dt)
+    detection.configure(fdi["fdae"], scenario)
+    registry.configure(fdi["types"], fdi["layout"], belief["actuators"], scenario, travel)
+    fdi["types"]["config"]["own_errors"] = fdi["bound"]["own_errors"]
+    conclusion["detected_at_s"] = conclusion["isolated_at_s"] = -1.0
+    conclusion["isolated"] = NOT_ISOLATED
+    conclusion["type"] = conclusion["lead"] = conclusion["lead_kind"] = conclusion["type_at_s"] = -1
+
+
+def _ask_each_plane(fdi: np.void, aircraft: Aircraft) -> None:
+    """Each plane is asked for itself: pitch by its two surfaces, roll and yaw by theirs."""
+    if sorted(fdi["layout"]["group"]) != [IN_PITCH, IN_PITCH, IN_ROLL_AND_YAW, IN_ROLL_AND_YAW]:
+        raise BadInput(
+            f"fdi.pairs: {aircraft.name} has not two surfaces in pitch, two in roll and yaw, allowed: false"
+        )
+    for fie in fdi["isolation"]["estimator"][: fdi["isolation"]["n"]]:
+        fie["unasked"] = (1, 0, 1) if fdi["layout"]["group"][fie["surface"]] == IN_PITCH else (0, 1, 0)
 
 
 @kernel

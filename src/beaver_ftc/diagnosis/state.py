@@ -1,13 +1,20 @@
 """Records of the diagnosis, and the numbers that stand for its words."""
 
+from collections.abc import Sequence
 from functools import lru_cache
 
 import numpy as np
 
+from beaver_ftc.aircraft import Aircraft
+from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.scenario.schema import Scenario
+
 NOT_ISOLATED, UNANTICIPATED = -1, -2
 INTERVAL, PUBLISHED = 0, 1
 EITHER, WORST_CASE, STATISTICS = 0, 1, 2  # whose alarms count
+_AUTHORITIES = {"either": EITHER, "worst-case": WORST_CASE, "statistical": STATISTICS}
 LOSS, POSITION = 0, 1  # kinds of hypothesis: isolation.py
+IN_PITCH, IN_ROLL_AND_YAW = 0, 1  # groups of surfaces
 ROLL, PITCH, YAW, SIDE, NORMAL = range(5)  # axes, and the accelerometers beside them: forces.py
 
 
@@ -54,3 +61,36 @@ CONFIG = np.dtype(
     ],
     align=True,
 )  # fmt: skip
+
+
+def configure(shared: np.void, scenario: Scenario) -> None:
+    """Fill what several stages go by (dtype CONFIG)."""
+    config = scenario.fdi
+    shared["enabled"], shared["dt"] = config.is_ours, 1.0 / scenario.rate_hz
+    shared["authority"], shared["every_type"] = _AUTHORITIES[config.authority], config.fault_class == "all"
+    shared["abrupt"], shared["instants"] = config.fault_profile == "abrupt", scenario.substeps
+
+
+def configure_layout(layout: np.void, members: Sequence[tuple[str, int, int]], aircraft: Aircraft) -> None:
+    """Fill in axes, groups and estimators of the surfaces; members: of the isolation (isolation.py)."""
+    index = {name: s for s, name in enumerate(aircraft.surfaces)}
+    layout["main"] = leaders_of(aircraft)
+    layout["dominant_axis"] = aircraft.dominant_axis
+    layout["group"] = [IN_PITCH if axis == PITCH else IN_ROLL_AND_YAW for axis in aircraft.dominant_axis]
+    layout["partner"] = layout["loss_of"] = layout["position_of"] = -1
+    for names in aircraft.groups.values():
+        for name, other in zip(names, names[::-1], strict=True):
+            layout["partner"][index[name]] = index[other] if other != name else -1
+    for e, (_, kind, surface) in enumerate(members):
+        layout["loss_of" if kind == LOSS else "position_of"][surface] = e
+
+
+def leaders_of(aircraft: Aircraft) -> list[int]:
+    """The surface that leads each of roll, pitch and yaw. Raises BadInput where none does."""
+    leads = {
+        aircraft.dominant_axis[s]: s for s, name in enumerate(aircraft.surfaces) if name in aircraft.primary
+    }
+    for axis, name in enumerate(("roll", "pitch", "yaw")):
+        if axis not in leads:
+            raise BadInput(f"{aircraft.name}: no surface turns it most in {name}, allowed: one for each axis")
+    return [leads[axis] for axis in range(3)]

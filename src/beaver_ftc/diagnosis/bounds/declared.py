@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from dataclasses import astuple, replace
 from functools import lru_cache
 from itertools import product
-from math import exp, log, radians, sqrt
+from math import exp, log, pi, radians, sqrt
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -12,6 +12,8 @@ import numpy as np
 from beaver_ftc.aircraft import AXES, Aircraft, MassProperties
 from beaver_ftc.design.engine import power_error_kw
 from beaver_ftc.design.inertia import inertia_coefficients
+from beaver_ftc.design.variants import mass_of
+from beaver_ftc.diagnosis.bounds.worst_case import fill_error_map
 from beaver_ftc.plant.instruments import NOISE_LIMIT_SIGMA, SENSORS, SIGNALS
 from beaver_ftc.plant.sensor_faults import OF_THE_SLIPSTREAM
 from beaver_ftc.scenario.diagnosis import Bounds
@@ -27,6 +29,7 @@ M_PER_FT = 0.3048
 SCALE_M = M_PER_FT * SCALE_FT
 ROLLING = 1.9  # of the rotating gusts the strongest [Yeager1998, eq. 8]; pitching and yawing are weaker
 GUST_LIMIT_SIGMA = 6.0  # once in 5e8 samples beyond, were they independent
+EARTH_RATE_RAD_S = 2.0 * pi / 86164.0905  # one turn per sidereal day [WGS84]
 _INERTIA = ("Ix_kg_m2", "Iy_kg_m2", "Iz_kg_m2", "Jxz_kg_m2")
 DELAYS_S = (0.1, 0.5, 2.0)  # within which a pole of the bank finds the smallest fault
 
@@ -100,6 +103,21 @@ def tolerances(given: float | dict[str, float], aircraft: Aircraft, values: np.n
     """Tolerance of each moment coefficient, absolute; values: the designer's, as `Aircraft.moments`."""
     share = [given.get(term.name, 0.0) if isinstance(given, dict) else given for term in aircraft.moments]
     return np.array(share) * np.abs(values[: len(share)])
+
+
+def configure(bound: np.void, scenario: "Scenario", design: np.void) -> None:
+    """Fill in the declared bound, and what the aircraft's terms leave: where it is mapped, or everywhere the
+    same; design: the designer's record."""
+    config, aircraft = scenario.fdi, scenario.airframe
+    bound["inertia"], bound["earth_rate"] = config.bounds.inertia_coupling.as_tuple(), EARTH_RATE_RAD_S
+    bound["constant"] = config.bounds.constant_rad_s2.as_tuple()
+    fill_error_map(bound["error_map"], aircraft, whole=config.fault_class == "all")
+    if aircraft.file.model_error_map is None:
+        bound["constant"] += aircraft.model_error_rad_s2
+    admitted = bound["admitted"]
+    admit(admitted, config.bounds, aircraft, design, mass_of(scenario.design_model, aircraft))
+    admit_engine(admitted, scenario)
+    bound["own_errors"] = admitted["any"] and config.fault_class == "all"
 
 
 def admit(

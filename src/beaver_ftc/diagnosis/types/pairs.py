@@ -17,7 +17,15 @@ conclusion: of `conclusion_dtype`; estimators: those of the isolation.
 import numpy as np
 
 from beaver_ftc.compiled import kernel
-from beaver_ftc.diagnosis.state import NOT_ISOLATED, PITCH, ROLL, UNANTICIPATED, YAW
+from beaver_ftc.diagnosis.state import (
+    IN_PITCH,
+    IN_ROLL_AND_YAW,
+    NOT_ISOLATED,
+    PITCH,
+    ROLL,
+    UNANTICIPATED,
+    YAW,
+)
 from beaver_ftc.diagnosis.types.examine import (
     FIXED,
     LOSES,
@@ -49,8 +57,6 @@ from beaver_ftc.diagnosis.types.verdict import (
     type_at_fault,
     would_have_swung,
 )
-
-IN_PITCH, IN_ROLL_AND_YAW = 0, 1
 
 
 @kernel

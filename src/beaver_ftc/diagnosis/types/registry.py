@@ -7,14 +7,22 @@ import pkgutil
 from collections.abc import Callable
 from functools import lru_cache
 from importlib import import_module
+from math import ceil, pi, radians
 from typing import Any
 
 import numpy as np
 
 from beaver_ftc.compiled import kernel
+from beaver_ftc.diagnosis.bounds.declared import gyros_vary
+from beaver_ftc.diagnosis.state import IN_PITCH
 from beaver_ftc.diagnosis.types import table
 from beaver_ftc.diagnosis.types.contract import FaultType
 from beaver_ftc.diagnosis.types.table import bias, hardover, loss, oscillatory, rate_limit, stuck
+from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.scenario.schema import Scenario
+
+BLOCK_S = 0.2  # to be examined at once where gyros are noisy: short beside the slowest half-cycle, 3.1 s
+RUNAWAY_RATE_RAD_S = pi / 3.0  # of an actuator with no declared rate limit: the aircraft's default
 
 
 def _rows() -> tuple[FaultType, ...]:
@@ -174,3 +182,31 @@ def types_dtype(n: int) -> np.dtype:
         ("surface", surface_dtype(), (n,)),
     ]  # fmt: skip
     return np.dtype(fields, align=True)
+
+
+def configure(
+    types: np.void, layout: np.void, actuators: np.void, scenario: Scenario, travel: np.ndarray
+) -> None:
+    """Fill in what the types go by, and what they know of each surface's actuator; travel (2, n) rad."""
+    config, shared, dt = scenario.fdi, types["config"], 1.0 / scenario.rate_hz
+    shared["length"] = block = ceil(BLOCK_S / dt) if gyros_vary(config.bounds.sensors) else 1
+    shared["whole"], shared["span_s"] = scenario.substeps == 1 and block == 1, block * dt
+    shared["patience"] = ceil(pi / config.slowest_oscillation_rad_s / (block * dt))
+    shared["instants"], shared["returns"], shared["dt"] = scenario.substeps, actuators["real"], dt
+    shared["abrupt"] = config.fault_profile == "abrupt"
+    types["pair"]["first"], types["pair"]["enabled"] = -1, config.pairs
+    surfaces, instant_s = scenario.airframe.surfaces, dt / scenario.substeps
+    for s, (name, place, low, high) in enumerate(zip(surfaces, types["surface"], *travel, strict=True)):
+        place["travel_low"], place["travel_high"] = low, high
+        place["reach_low"], place["reach_high"] = min(low, 0.0), max(high, 0.0)
+        place["in_question"] = not config.pairs or layout["group"][s] == IN_PITCH
+        place["measure"], place["type"] = -1, -1
+        place["approach"], place["step"] = actuators["approach"][s], actuators["step"][s]
+        rate_deg_s = getattr(scenario.actuators, name).rate_limit_deg_s
+        place["least_runaway_rate"] = 0.5 * (radians(rate_deg_s) or RUNAWAY_RATE_RAD_S)
+        place["slowest_step"] = min(radians(config.slowest_rate_deg_s) * instant_s, place["step"])
+    if config.pairs and block > 1:
+        raise BadInput(
+            f"{scenario.name}: fdi.pairs is not available with errors of the gyros that vary declared in "
+            "fdi.bounds.sensors, allowed: a bias"
+        )

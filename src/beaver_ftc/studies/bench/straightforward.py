@@ -9,8 +9,8 @@ import numpy as np
 
 from beaver_ftc.control.reference import discretise
 from beaver_ftc.design.coefficients import GEOMETRY, MASS, SURFACES, inertia_coefficients, value
+from beaver_ftc.diagnosis.bounds.declared import EARTH_RATE_RAD_S
 from beaver_ftc.diagnosis.detection import ALPHA_CENTRES, BETA_CENTRES, N_BASIS
-from beaver_ftc.loop.assembly import EARTH_RATE_RAD_S
 from beaver_ftc.plant import channels as ch
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.signals import sample

@@ -66,12 +66,13 @@ def _call_run(typingctx, function, executive):
 
 
 @kernel
-def advance(running):
-    """One JSBSim frame; turbulence is first turned along the heading, see gust.MovingAir."""
-    if running.turbulent:
-        heading: float = _call_getter(running.getter, running.heading_pointer)  # type: ignore
-        _call_setter(running.setter, running.axes_pointer, -heading)
-    _call_run(running.run, running.executive)  # type: ignore
+def advance(simulator):
+    """One JSBSim frame; simulator: of dtype RUNNING. Turbulence is first turned along the heading, see
+    gust.MovingAir."""
+    if simulator.turbulent:
+        heading: float = _call_getter(simulator.getter, simulator.heading_pointer)  # type: ignore
+        _call_setter(simulator.setter, simulator.axes_pointer, -heading)
+    _call_run(simulator.run, simulator.executive)  # type: ignore
 
 
 @kernel

@@ -157,7 +157,7 @@ def _named(
 ) -> Document:
     """A fault that is named; fault: since when it is there. right: whether it, and its type, are."""
     estimate, kind = found.get("estimate"), found["isolation_type"]
-    is_angle = estimate is not None and kind != LOSS_OF_EFFECTIVENESS
+    angle_rad = None if kind == LOSS_OF_EFFECTIVENESS else estimate
     return {
         "fault": found["isolated"],
         "type": kind,
@@ -168,7 +168,7 @@ def _named(
         "type_correct": right[1],
         "type_delay_s": _delay(found.get("type_time_s"), fault, scenario),
         "estimate": _number(estimate),
-        "estimate_deg": _number(math.degrees(estimate)) if is_angle else None,
+        "estimate_deg": None if angle_rad is None else _number(math.degrees(angle_rad)),
         "estimate_interval": _rounded(found.get("estimate_interval") or ()) or None,
         "frequency_rad_s": _number(found.get("frequency_rad_s")),
     }

@@ -6,46 +6,32 @@ instead of every operation doing so. No fast-math: the same flight gives the sam
 Compiled code is kept in the user's cache, in a folder named after the sources: a change makes a new one. It
 also works where the package is read-only. Nobody else may write there: what is kept is run.
 
-A kernel that another one calls is only translated: to optimise is done once, for the outermost one and all
-it calls (translation.py). Of the largest, another process translates a half meanwhile (second_process.py).
+Of the versions of Numba in `KNOWN` much is borrowed that Numba does not promise (numba_inside.py). With any
+other, Numba compiles by its own means: flights are the same, the first of them takes minutes.
 """
 
-# mypy: disable-error-code="attr-defined"
-import atexit
-import contextlib
+# mypy: disable-error-code="attr-defined,method-assign,assignment"
 import functools
-import gc
 import hashlib
 import os
-import pickle
-import sys
-import threading
-from collections.abc import Callable, Iterator
 from functools import lru_cache
 from pathlib import Path
+from types import ModuleType
+from typing import Any
 
 import numba
 import numpy as np
-from numba.core import serialize, sigutils
-from numba.core.compiler import CompileResult
-from numba.core.compiler_lock import global_compiler_lock
-from numba.core.registry import CPUDispatcher
-from numba.core.types import unliteral
+from numba.extending import overload
 
+from beaver_ftc.documents.errors import say_once
 from beaver_ftc.documents.paths import cache_of_version
-from beaver_ftc.documents.sources import digest_of, fingerprint
-from beaver_ftc.second_process import Helper, Part
-from beaver_ftc.translation import Inner, lighten, nesting, stub
+from beaver_ftc.documents.sources import fingerprint
 
-COMPILING = "compiling the flight code, once for this version on this machine: some 10 s on an idle one"
-MORE = "making ready what this flight is the first to use, once for this version on this machine: some 10 s"
-PATIENCE_S = 1.0  # what takes less needs no word
-
-_DIGEST_BYTES = 32
-_LOCK = "lock"
+KNOWN = ("0.68",)  # versions whose inside numba_inside.py fits
+VARIABLE = "BEAVER_FTC_COMPILER"  # `numba`: borrow nothing
+PLAINLY = "numba {} is not known from inside: the first flight compiles for some minutes, allowed: numba {}"
 
 _PACKAGE = Path(__file__).parent
-Halves = Callable[..., tuple[list[Part], list[Part]]]
 
 
 @lru_cache(maxsize=1)
@@ -64,13 +50,14 @@ def apart(function):
 
     Give it records and numbers: shapes and strides of arrays are no longer constants beyond such a call.
     """
-    called = kernel(function)
-    if not isinstance(called, _Kernel):
+    called, inside = kernel(function), _inside()
+    if inside is None or numba.config.DISABLE_JIT:
         return called
     tag = called.folder.name if called.folder else ""
-    caller = compile_into(called.folder, stub((function.__module__, function.__qualname__, tag), called))
-    caller.py_func = function
-    return functools.update_wrapper(caller, function)
+    caller = inside.stub((function.__module__, function.__qualname__, tag), called)
+    compiled = compile_into(called.folder, caller)
+    compiled.py_func = function
+    return functools.update_wrapper(compiled, function)
 
 
 def plain(function):
@@ -88,132 +75,91 @@ def compile_into(folder: Path | None, function):
     """
     if numba.config.DISABLE_JIT:
         return _interpreted(function)
-    return _Kernel(folder, function)
+    numba.types.Record.mangling_args = property(_by_contents)
+    inside = _inside()
+    return inside.Kernel(folder, function) if inside else _by_numba_alone(folder, function)
 
 
-def in_two(whole, halves: Halves) -> None:
-    """Say of what a kernel mostly consists, so that two processes share the work of its first compilation.
+@lru_cache(maxsize=1)
+def _inside() -> ModuleType | None:
+    """What is borrowed from inside this version of Numba, if it is known."""
+    if os.environ.get(VARIABLE) == "numba" or not numba.__version__.startswith(tuple(f"{v}." for v in KNOWN)):
+        return None
+    from beaver_ftc import numba_inside
 
-    halves: from the types of its arguments to kernels with theirs; the first for the other process, the
-    second for this one.
-    """
-    if isinstance(whole, _Kernel):
-        whole.halves = halves
-
-
-class _Kernel(CPUDispatcher):
-    """A compiled function: kept by itself if Python calls it, and a part of the kernels that call it."""
-
-    def __init__(self, folder: Path | None, function) -> None:
-        super().__init__(function, targetoptions={"nopython": True, "error_model": "numpy"})
-        self.folder, self._store = folder, folder and _Store(folder, function)
-        self.halves: Halves | None = None
-
-    def compile(self, sig):
-        """Machine code for arguments of these types; inside another kernel only what stands for it."""
-        types, _ = sigutils.normalize_signature(sig)
-        types = tuple(map(unliteral, types))  # a number in the text makes no other function of it
-        with global_compiler_lock, self._compiling_counter:
-            there = self.overloads.get(tuple(types))
-            if there is not None and (nesting or not isinstance(there.entry_point, Inner)):
-                return there.entry_point
-            if nesting:
-                return self._translated(types, inner=True)
-            return self._loaded(types) or self._compiled(types)
-
-    def stored(self, types):
-        """The code an earlier process has kept, or None."""
-        return self._store and self._store.load(tuple(types), self.targetctx)
-
-    def result(self, types):
-        """The code with what is known of it; where it has been kept, without making ready to compile."""
-        found = self.stored(types)
-        if found is None:
-            self.compile(types)
-            found = self.overloads[types]
-        return found
-
-    def _loaded(self, types):
-        self.targetctx.refresh()
-        found = self.stored(types)
-        if found is None:
-            return None
-        self._cache_hits[types] += 1
-        self.targetctx.insert_user_function(found.entry_point, found.fndesc, [found.library])
-        self.add_overload(found)
-        return found.entry_point
-
-    def _compiled(self, types):
-        """Compile, one process at a time, and keep the code."""
-        lighten()
-        with _alone(self.folder), _announced(self.folder):
-            if entry_point := self._loaded(types):
-                return entry_point  # another process came first
-            self.overloads.pop(tuple(types), None)
-            entry_point = self._translated(types, inner=False)
-            if self._store:
-                self._store.save(tuple(types), self.overloads[tuple(types)])
-        return entry_point
-
-    def _translated(self, types, inner: bool):
-        wrappers = {"no_cpython_wrapper": inner, "no_cfunc_wrapper": True}
-        nesting.append(self)
-        try:
-            if not inner and self.halves is not None:
-                self._translate_halves(*self.halves(*types))
-            self._compiler.targetoptions = self.targetoptions | wrappers
-            result = self._compiler.compile(types, None)
-        finally:
-            nesting.pop()
-        self.add_overload(result)
-        return result.entry_point
-
-    def _translate_halves(self, there: list[Part], here: list[Part]) -> None:
-        """What another process cannot translate is left: it is then translated where it is called."""
-        with Helper(there) as helper:
-            for kernel, types in here:
-                kernel.compile(types)
-            for (kernel, types), result in zip(there, helper.results(self.targetctx), strict=False):
-                if tuple(types) not in kernel.overloads:
-                    self.targetctx.insert_user_function(result.entry_point, result.fndesc, [result.library])
-                    kernel.add_overload(result)
+    return numba_inside
 
 
-@contextlib.contextmanager
-def _alone(folder: Path | None) -> Iterator[None]:
-    """Wait until no other process compiles into this folder: it may be the very same."""
-    with contextlib.ExitStack() as held:
-        if folder is not None:
-            with contextlib.suppress(OSError, ImportError):  # no lock: then several may compile
-                import fcntl
-
-                folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-                fcntl.flock(held.enter_context((folder / _LOCK).open("w")), fcntl.LOCK_EX)
-        yield
+def _by_numba_alone(folder: Path | None, function):
+    """A kernel of Numba's own; what has no file it cannot keep."""
+    if folder is None or not any(folder.glob("*")):
+        say_once(PLAINLY.format(numba.__version__, " or ".join(f"{version}.*" for version in KNOWN)))
+    usual, numba.config.CACHE_DIR = numba.config.CACHE_DIR, str(folder or "")
+    try:
+        return numba.njit(error_model="numpy", cache=folder is not None)(function)
+    except RuntimeError:
+        return numba.njit(error_model="numpy")(function)
+    finally:
+        numba.config.CACHE_DIR = usual
 
 
 @functools.cache
-def _say_compiling(folder: Path | None) -> None:
-    """A word a process: of all the flight code, or of the part that earlier flights have had no use for."""
-    kept = folder is not None and any(path.name != _LOCK for path in folder.glob("*"))
-    _say_once(MORE if kept else COMPILING)
+def _digest_of(record) -> str:
+    return hashlib.sha256(repr(record).encode()).hexdigest()[:16]
 
 
-@contextlib.contextmanager
-def _announced(folder: Path | None) -> Iterator[None]:
-    """Say what takes so long, if it does. Garbage is not looked for meanwhile, nor soon in what the compiler
-    leaves: there is little, and looking costs a quarter of its time."""
-    saying = threading.Timer(PATIENCE_S, _say_compiling, [folder])
-    saying.start()
-    gc.disable()
-    try:
-        yield
-    finally:
-        gc.freeze()
-        gc.unfreeze()  # into the oldest generation
-        gc.enable()
-        saying.cancel()
-        atexit.register(gc.freeze)  # nor when the process ends
+def _by_contents(record):
+    """In place of numba's: what a record's type is called in the names of compiled functions.
+
+    Numba counts a process's types. Code that two processes have kept would then have the same names for
+    records of two aircraft, and a third process that loads both would run the one for the other.
+    """
+    return type(record).__name__, (_digest_of(record),)
+
+
+def direct(function: Any, *arguments: np.ndarray) -> Any:
+    """The machine code of a kernel for arguments of these types, to be called with no others.
+
+    The arguments are C-ordered arrays. It skips the look-up of their types, 0.1 to 0.2 us a call: worth it
+    once a frame, nowhere else.
+    """
+    if not hasattr(function, "overloads"):
+        return function  # NUMBA_DISABLE_JIT
+    return _entry_point(function, tuple((argument.dtype, argument.ndim) for argument in arguments))
+
+
+@lru_cache(maxsize=64)
+def _entry_point(function, kinds):
+    """The machine code for C-ordered arrays of these types and dimensions: 9 ms to find, so kept."""
+    types = tuple(numba.types.Array(numba.from_dtype(dtype), dimensions, "C") for dtype, dimensions in kinds)
+    found = function.stored(types) if _inside() else None
+    if found is None:
+        function.compile(types)
+        found = function.overloads[types]
+    return found.entry_point
+
+
+def row_of(array, i):
+    """Row i of an array (m, n) that stays where it is for as long as the row is used.
+
+    Compiled code counts who refers to a row, function by function, with instructions that wait until all
+    that was written before has arrived: a tenth of a frame. Where Numba's inside is known, this row is not
+    counted.
+    """
+    return array[i]
+
+
+@overload(row_of)
+def _row_of(array, i):
+    inside = _inside()
+    if inside is None:
+        return lambda array, i: array[i]
+    borrowed_row = inside.borrowed_row
+
+    def row(array, i):
+        return borrowed_row(array, i)
+
+    return row
 
 
 def _interpreted(function):
@@ -243,56 +189,3 @@ def _with_attributes(argument):
     if isinstance(argument, np.ndarray) and argument.dtype.type is np.void and argument.dtype.names:
         return argument.view(np.dtype((_Record, argument.dtype)))
     return argument
-
-
-class _Store:
-    """The machine code of one kernel on the disk: a file a set of argument types, behind its digest."""
-
-    def __init__(self, folder: Path, function) -> None:
-        self._folder, self._function = folder, function
-        self._name = f"{function.__module__}.{function.__qualname__}"
-
-    @functools.cached_property
-    def _of(self):
-        """Found when code is first asked for: what is named in a kernel may be defined after it."""
-        line = self._function.__code__.co_firstlineno
-        return self._name, line, digest_of(self._function), sys.version_info, numba.__version__
-
-    def _path(self, types, codegen) -> Path:
-        key = repr((*self._of, types, codegen.magic_tuple()))
-        return self._folder / f"{self._name.rpartition('.')[2]}-{hashlib.sha256(key.encode()).hexdigest()}"
-
-    def load(self, types, context):
-        """What was kept, ready to run; None if there is nothing, or it is not as it was written."""
-        try:
-            content = self._path(types, context.codegen()).read_bytes()
-        except OSError:
-            return None
-        digest, content = content[:_DIGEST_BYTES], content[_DIGEST_BYTES:]
-        if hashlib.sha256(content).digest() != digest:  # damaged machine code must not run
-            _say_once(f"compiled code in {self._folder} is damaged; it is compiled anew")
-            return None
-        return CompileResult._rebuild(context, *pickle.loads(content))
-
-    def save(self, types, result) -> None:
-        """Keep it; where that is impossible (a full disk), say so and fly without."""
-        content = serialize.dumps(result._reduce())
-        try:
-            self._write(self._path(types, result.codegen), hashlib.sha256(content).digest() + content)
-        except OSError as error:
-            reason = (error.strerror or str(error)).lower()
-            _say_once(f"compiled code cannot be kept in {self._folder}: {reason}; each start compiles anew")
-
-    def _write(self, path: Path, content: bytes) -> None:
-        self._folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-        partial = path.with_name(f"{path.name}.{os.getpid()}")
-        try:
-            partial.write_bytes(content)
-            partial.replace(path)
-        finally:
-            partial.unlink(missing_ok=True)
-
-
-@functools.cache
-def _say_once(text: str) -> None:
-    print(f"beaver-ftc: {text}", file=sys.stderr, flush=True)

@@ -33,7 +33,7 @@ SLOW_S = {
 WAITS_S = 20.0  # nor is what waits so long, for other processes
 HANGS_S = 900.0  # of processor for the tests of one file, far more than the limits allow
 EXAMPLES = 4
-APART = ("beaver_ftc.compiled", "beaver_ftc.translation", "beaver_ftc.second_process")
+APART = ("beaver_ftc.compiled", "beaver_ftc.numba_inside")
 KEPT = ROOT / ".mutants"
 
 

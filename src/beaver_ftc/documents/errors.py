@@ -1,7 +1,9 @@
 """What can go wrong, the exit status each kind ends with, and what was perhaps meant."""
 
+import sys
 from collections.abc import Iterable
 from difflib import SequenceMatcher, get_close_matches
+from functools import cache
 
 SHORTEST_BEGINNING = 3  # of a name, to be taken for it
 
@@ -44,3 +46,9 @@ def nearest(given: str, names: Iterable[str], cutoff: float = 0.6) -> str | None
     if best is None and len(meant) >= SHORTEST_BEGINNING:
         best = next((name for name in lower if name.startswith(meant)), None)
     return None if best is None else lower[best]
+
+
+@cache
+def say_once(line: str) -> None:
+    """Say something on standard error, once a process."""
+    print(f"beaver-ftc: {line}", file=sys.stderr, flush=True)

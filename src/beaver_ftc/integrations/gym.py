@@ -32,9 +32,9 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import ArrayLike, NDArray
 
 from beaver_ftc.aircraft import load as aircraft
+from beaver_ftc.compiled import direct
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.loop.agent import BESIDE_SURFACES, LARGEST, LOOK, act, cost, observe
-from beaver_ftc.loop.direct import direct
 from beaver_ftc.results.simulation import Simulation
 from beaver_ftc.scenario.given import ScenarioLike, load
 from beaver_ftc.scenario.schema import Scenario

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
+from beaver_ftc.compiled import direct
 from beaver_ftc.control import state
 from beaver_ftc.control.outer.setup import set_up_autopilot
 from beaver_ftc.design.variants import anchor, mass_of
@@ -14,7 +15,6 @@ from beaver_ftc.documents.errors import SimulationFailed
 from beaver_ftc.loop import memory, stepping
 from beaver_ftc.loop.assembly import assemble, lay_out, y_places
 from beaver_ftc.loop.cockpit import Cockpit, note_failures, set_origin, travel_rad
-from beaver_ftc.loop.direct import direct
 from beaver_ftc.loop.instrument_records import anchor_watch
 from beaver_ftc.loop.outcome import Landing, landing_of
 from beaver_ftc.loop.stepping import fly_frame, fly_on, hold, look_inside

@@ -7,17 +7,13 @@ left of a bar: built in, right of it: a plug-in's answer. `fly_frame` is the bui
 frames (1,): of `frame_dtype` (assembly.py).
 """
 
-import numba
-
-from beaver_ftc.compiled import in_two, kernel
+from beaver_ftc.compiled import kernel, row_of
 from beaver_ftc.design.actuators import move
 from beaver_ftc.diagnosis import instruments
-from beaver_ftc.diagnosis.belief import look_back
 from beaver_ftc.diagnosis.scheme import built_in_statistic as largest_statistic
 from beaver_ftc.diagnosis.scheme import likelihood_counts
 from beaver_ftc.loop import frame as whole
 from beaver_ftc.loop.accounts import add_effect
-from beaver_ftc.loop.rows import row_of
 from beaver_ftc.plant.native import advance
 from beaver_ftc.plant.sensing import FLYING, NOT_FINITE, hand_over, sample_forces
 
@@ -141,21 +137,3 @@ def fly_on(frames, references, log, order):
         if status != FLYING:
             return status
     return FLYING
-
-
-def _halves_of_a_frame(frames, references, log):
-    """What `fly_frame` mostly consists of, by types: halves that take about as long to compile."""
-    frame, row = frames.dtype, references.copy(ndim=1)
-    fdi, belief, measured = (frame.fields[name].type for name in ("fdi", "belief", "measured"))
-    back = belief, fdi.fields["bound"].type, measured, numba.int64, numba.float64
-    there = [(whole.diagnose, (frame,)), (look_back, back)]
-    return there, [(whole.sense, (frame,)), (whole.command, (frame,)), (whole.finish, (frame, row, row))]
-
-
-def _halves_of_frames(frames, references, log, order):
-    there, here = _halves_of_a_frame(frames, references, log)
-    return [*there, (whole.look_on, (frames.dtype,))], here
-
-
-in_two(fly_frame, _halves_of_a_frame)
-in_two(fly_on, _halves_of_frames)

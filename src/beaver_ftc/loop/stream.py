@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from beaver_ftc.aircraft import Aircraft
+from beaver_ftc.compiled import direct
 from beaver_ftc.design.model import N_Y
 from beaver_ftc.design.variants import anchor, mass_of
 from beaver_ftc.diagnosis import noise_model
@@ -14,7 +15,6 @@ from beaver_ftc.diagnosis.base import Verdict
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop import stepping, watching
 from beaver_ftc.loop.assembly import assemble
-from beaver_ftc.loop.direct import direct
 from beaver_ftc.loop.outcome import estimate_now, verdict_of
 from beaver_ftc.plugins import DETECTORS, is_compiled
 from beaver_ftc.scenario.airframe import checked_against

@@ -12,8 +12,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from beaver_ftc import compiled
+from beaver_ftc import compiled, numba_inside
 from beaver_ftc.documents import paths
+from beaver_ftc.documents.errors import say_once
 from beaver_ftc.documents.paths import data_root
 
 REPOSITORY = data_root()
@@ -312,7 +313,7 @@ def test_an_inner_kernel_can_be_called_by_itself_before_and_after(tmp_path):
 
 
 def test_what_takes_long_is_said(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(compiled, "PATIENCE_S", 0.0)
+    monkeypatch.setattr(numba_inside, "PATIENCE_S", 0.0)
     kernels = [
         lambda x: x + 1,
         lambda x: x - 2,
@@ -320,12 +321,12 @@ def test_what_takes_long_is_said(tmp_path, monkeypatch, capsys):
         lambda x: x * x,
     ]
     for said, folder, new in (
-        (compiled.COMPILING, None, kernels[:2]),  # two kernels, one word
-        (compiled.COMPILING, tmp_path, kernels[:2]),
-        (compiled.MORE, tmp_path, kernels[2:]),
+        (numba_inside.COMPILING, None, kernels[:2]),  # two kernels, one word
+        (numba_inside.COMPILING, tmp_path, kernels[:2]),
+        (numba_inside.MORE, tmp_path, kernels[2:]),
     ):
-        compiled._say_once.cache_clear()
-        compiled._say_compiling.cache_clear()
+        say_once.cache_clear()
+        numba_inside._say_compiling.cache_clear()
         for kernel in new:
             assert compiled.compile_into(folder, kernel)(0.0) == kernel(0.0)
         assert capsys.readouterr().err == f"beaver-ftc: {said}\n"
@@ -335,7 +336,7 @@ def test_a_full_disk_for_the_cache_is_said_and_does_not_matter(tmp_path, monkeyp
     def full(*_):
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr(compiled._Store, "_write", full)
+    monkeypatch.setattr(numba_inside._Store, "_write", full)
     twice = compiled.compile_into(tmp_path, lambda x: 2 * x)
     assert twice(3) == 6
     assert "compiled code cannot be kept in" in capsys.readouterr().err

@@ -1,0 +1,167 @@
+"""What is borrowed from inside Numba is there, is called as it was, and is not needed.
+
+A version that fails here is not `compiled.KNOWN`: with it Numba compiles by its own means.
+"""
+
+import json
+import os
+import subprocess
+import sys
+from functools import cache
+
+import numba
+import pytest
+
+from beaver_ftc import compiled
+
+# Where it is, and its arguments; none where only its name is used.
+BORROWED = {
+    "numba.core.cgutils:add_global_variable": "(module, ty, name, addrspace=0)",
+    "numba.core.cgutils:if_unlikely": "(builder, pred)",
+    "numba.core.cgutils:is_null": "(builder, val)",
+    "numba.core.cgutils:unpack_tuple": "(builder, tup, count=None)",
+    "numba.core.codegen:CPUCodeLibrary.finalize": "(self)",
+    "numba.core.codegen:CPUCodeLibrary._raise_if_finalized": "(self)",
+    "numba.core.codegen:CPUCodeLibrary._optimize_final_module": "(self)",
+    "numba.core.codegen:CPUCodeLibrary._finalize_final_module": "(self)",
+    "numba.core.codegen:CPUCodeLibrary._get_module_for_linking": "(self)",
+    "numba.core.codegen:JITCodeLibrary.get_pointer_to_function": "(self, name)",
+    "numba.core.codegen:CPUCodegen._check_llvm_bugs": "(self)",
+    "numba.core.codegen:CPUCodegen.magic_tuple": "(self)",
+    "numba.core.compiler:CompileResult._rebuild": None,
+    "numba.core.compiler:CompileResult._reduce": "(self)",
+    "numba.core.compiler_lock:global_compiler_lock": None,
+    "numba.core.cpu:CPUContext.get_executable": "(self, library, fndesc, env)",
+    "numba.core.cpu:CPUContext.insert_user_function": "(self, func, fndesc, libs=())",
+    "numba.core.cpu:CPUContext.refresh": "(self)",
+    "numba.core.cpu:CPUContext.get_python_api": "(self, builder)",
+    "numba.core.dispatcher:Dispatcher.add_overload": "(self, cres)",
+    "numba.core.dispatcher:_FunctionCompiler.compile": "(self, args, return_type)",
+    "numba.core.pythonapi:PythonAPI.serialize_object": "(self, obj)",
+    "numba.core.pythonapi:PythonAPI.unserialize": "(self, structptr)",
+    "numba.core.registry:CPUDispatcher": None,
+    "numba.core.runtime:rtsys.initialize": "(ctx)",
+    "numba.core.serialize:dumps": "(obj)",
+    "numba.core.sigutils:normalize_signature": "(sig)",
+    "numba.core.types:unliteral": None,
+    "numba.core.types:Record.mangling_args": None,
+    "numba.core.typing.npydecl:ufunc_find_matching_loop": "(ufunc, arg_types)",
+    "numba.np.arrayobj:make_array": "(array_type)",
+    "numba.np.arrayobj:populate_array": None,
+    "numba.np.arrayobj:raise_with_shape_context": "(src_shapes, index_shape)",
+    "numba.np.numpy_support:ufunc_find_matching_loop": "(ufunc, arg_types)",
+}
+OF_A_LIBRARY = ("_codegen", "_final_module", "_finalized", "_linking_libraries", "_reload_init")
+OF_A_DISPATCHER = (
+    "_cache_hits",
+    "_compiler",
+    "_compiling_counter",
+    "overloads",
+    "targetctx",
+    "targetoptions",
+)
+
+LOOK = """
+import inspect, json, sys
+from importlib import import_module
+import numba
+found = {}
+for where in json.load(sys.stdin):
+    module, _, path = where.partition(":")
+    it = import_module(module)
+    for name in path.split("."):
+        it = getattr(it, name, None)
+    found[where] = None if it is None else str(inspect.signature(it)) if inspect.isroutine(it) else ""
+add = numba.njit(lambda x: x + 1.0)
+add(1.0)
+(result,) = add.overloads.values()
+json.dump([found, sorted(vars(result.library)), sorted(dir(add))], sys.stdout)
+"""
+
+
+@cache
+def numbas_own():
+    """(arguments by name, what a library has, what a dispatcher has) where nothing is replaced."""
+    given = json.dumps(list(BORROWED))
+    done = subprocess.run(
+        [sys.executable, "-c", LOOK], input=given, capture_output=True, text=True, check=True
+    )
+    return json.loads(done.stdout)
+
+
+of_known = pytest.mark.skipif(compiled._inside() is None, reason="nothing is borrowed of this version")
+
+
+@of_known
+@pytest.mark.parametrize(("where", "arguments"), BORROWED.items(), ids=list(BORROWED))
+def test_what_is_borrowed_is_there_with_its_arguments(where, arguments):
+    found = numbas_own()[0][where]
+    assert found is not None
+    assert arguments in (None, found)
+
+
+@of_known
+def test_a_library_and_a_dispatcher_have_what_is_read_of_them():
+    assert set(OF_A_LIBRARY) <= set(numbas_own()[1])
+    assert set(OF_A_DISPATCHER) <= set(numbas_own()[2])
+
+
+@pytest.mark.parametrize("version", ["0.67.2", "0.680.0", "1.0.0"])
+def test_of_another_version_nothing_is_borrowed(monkeypatch, version):
+    monkeypatch.setattr(numba, "__version__", version)
+    compiled._inside.cache_clear()
+    try:
+        assert compiled._inside() is None
+    finally:
+        monkeypatch.undo()
+        compiled._inside.cache_clear()
+
+
+KERNELS = """
+import sys
+from pathlib import Path
+import numpy as np
+from beaver_ftc import compiled
+
+compiled.cache_folder = lambda: Path(__file__).parent / "cache"
+
+@compiled.apart
+def halve(record):
+    record.value[:] = 0.5 * record.value
+
+@compiled.kernel
+def step(records, log):
+    halve(records[0])
+    row = compiled.row_of(log, 1)
+    row[:] = records[0].value / 0.0
+    return records[0].value.sum() / records.size
+
+if __name__ == "__main__":
+    records = np.zeros(1, [("before", "f8", (int(sys.argv[1]),)), ("value", "f8", (2,))])
+    records["value"] = 3.0, -5.0
+    log = np.zeros((2, 2))
+    call = compiled.direct(step, records, log)
+    print(call(records, log), *log[1], type(step).__name__, sum(step.stats.cache_hits.values()))
+"""
+
+
+@pytest.mark.parametrize("compiler", ["", "numba"])
+def test_kernels_come_to_the_same_either_way_and_are_kept(tmp_path, compiler):
+    """Records of two shapes: the process that loads both must not take the code of one for the other's."""
+    (tmp_path / "few_kernels.py").write_text(KERNELS)
+    environment = {**os.environ, compiled.VARIABLE: compiler}
+
+    def run(size):
+        command = [sys.executable, tmp_path / "few_kernels.py", str(size)]
+        done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+        return done.stdout.split(), done.stderr
+
+    kind = "CPUDispatcher" if compiler or compiled._inside() is None else "Kernel"
+    first, said = run(1)
+    assert first == ["-1.0", "inf", "-inf", kind, "0"]
+    assert ("the first flight compiles for some minutes" in said) == (kind == "CPUDispatcher")
+    assert run(4)[0][:4] == first[:4]
+    again, said = run(1)
+    assert again[:4] == first[:4]
+    assert said == ""
+    assert [path.name for path in (tmp_path / "cache").rglob("*step*")]

@@ -138,21 +138,6 @@ def test_a_frame_is_whitened_weighed_and_summed_as_matrices_say():
     assert lane["slack"] == pytest.approx(np.array([0.1, 0.2]) @ np.abs(overlaps))
 
 
-def test_one_axis_is_weighed_as_two_of_which_the_second_is_nothing():
-    rng, one = np.random.default_rng(11), steady_block(1)
-    with_hypotheses(one, LOSS, STEP, GROWING)
-    one["stay"][0], one["swing"][0], one["pace"], one["keep"] = 0.1, 0.3, 0.05, 0.9
-    two = one.copy().view(np.recarray)
-    for _ in range(20):
-        for block in (one, two):
-            block["innovation"][0] = block["lane"]["shaped"][0] = 0.0
-        one["innovation"][0] = two["innovation"][0] = rng.choice([0.0, 1.0]) * rng.normal()
-        one["lane"]["shaped"][0, ::2] = two["lane"]["shaped"][0, ::2] = rng.normal(size=40)
-        likelihood.respond_one_axis(one, DT, 0.9)
-        likelihood.respond(two, DT, 0.9)
-        assert one.tobytes() == two.tobytes(), "to the sign of what is zero"
-
-
 def test_of_hypotheses_that_a_block_does_not_have_nothing_is_reckoned():
     rng = np.random.default_rng(9)
     block = with_hypotheses(block_of(TOGETHER, [1e-3, 1e-3]), LOSS, STEP, tolerance=(0.1, 0.2))

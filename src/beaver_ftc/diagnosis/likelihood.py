@@ -268,7 +268,10 @@ def shape(block, h):
 
 @kernel
 def respond(block, dt, keep):
-    """Whiten the shaped signatures, as `whiten` does, and bring N and D to this frame."""
+    """Whiten the shaped signatures, as `whiten` does, and bring N and D to this frame.
+
+    Of a block of one axis, what belongs to a second one is zero.
+    """
     K_x, K_d, S, lane = block.K_x, block.K_d, block.S_inverse, block.lane
     x00, x01, x10, x11 = K_x[0, 0], K_x[0, 1], K_x[1, 0], K_x[1, 1]
     d00, d01, d10, d11 = K_d[0, 0], K_d[0, 1], K_d[1, 0], K_d[1, 1]
@@ -293,28 +296,6 @@ def respond(block, dt, keep):
 
 
 @kernel
-def respond_one_axis(block, dt, keep):
-    """The same of a block of one axis: what belongs to a second one is zero, and is not reckoned.
-
-    A zero is added where it was, so that the sign of what comes to nothing is the same.
-    """
-    K_x, K_d, S, lane = block.K_x[0, 0], block.K_d[0, 0], block.S_inverse[0, 0], block.lane
-    kept, g, swing, stay = block.keep, block.innovation[0], block.swing[0], block.stay[0]
-    state, shaped, weight, pace = lane.response, lane.shaped, lane.weight, block.pace
-    for k in range(lanes(block)):
-        r = state[0, k] + dt * (shaped[0, k] - state[2, k])
-        state[0, k] = r - K_x * r
-        state[2, k] = kept * state[2, k] + (K_d * r + 0.0)
-        w = S * r + 0.0
-        lane.correlation[k] = keep * lane.correlation[k] + (w * g + 0.0)
-        lane.information[k] = keep * lane.information[k] + w * r + 0.0
-        lane.stays[k] = keep * lane.stays[k] + stay * abs(w)
-        lane.swings[k] = keep * lane.swings[k] + swing * abs(w - weight[0, k])
-        lane.drifts[k] = keep * lane.drifts[k] + pace * (swing * abs(w))
-        weight[0, k] = w
-
-
-@kernel
 def overlap(block, keep):
     """Bring R_j to this frame, and `slack`: how much of N the declared errors of the coefficients explain."""
     weight, slack, n = block.lane.weight, block.lane.slack, lanes(block)
@@ -322,14 +303,9 @@ def overlap(block, keep):
     for j in range(block.n_regressors):
         r0, r1 = block.regressor_response[j, 0], block.regressor_response[j, 1]
         total, tolerance = block.lane.overlap[j], block.tolerance[j]
-        if block.n == 1:
-            for k in range(n):
-                total[k] = keep * total[k] + (weight[0, k] * r0 + 0.0)
-                slack[k] += tolerance * abs(total[k])
-        else:
-            for k in range(n):
-                total[k] = keep * total[k] + (weight[0, k] * r0 + weight[1, k] * r1)
-                slack[k] += tolerance * abs(total[k])
+        for k in range(n):
+            total[k] = keep * total[k] + (weight[0, k] * r0 + weight[1, k] * r1)
+            slack[k] += tolerance * abs(total[k])
 
 
 @kernel
@@ -337,10 +313,7 @@ def weigh(block, tolerated, dt, keep):
     """Add the frame just whitened to every hypothesis and onset; `keep` is the share of what was there."""
     for h in range(block.n_hypotheses):
         shape(block, h)
-    if block.n == 1:
-        respond_one_axis(block, dt, keep)
-    else:
-        respond(block, dt, keep)
+    respond(block, dt, keep)
     if tolerated:
         overlap(block, keep)
 

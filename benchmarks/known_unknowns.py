@@ -20,7 +20,7 @@ from rich.table import Table
 
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.scenario.schema import Scenario
-from beaver_ftc.scenario.sweep_loader import load_sweep
+from beaver_ftc.scenario.sweeps import load_sweep
 from beaver_ftc.studies.sweep.sampling import Plan, flight_seed
 
 CONDITIONS = ("all", "sensors")

@@ -16,7 +16,7 @@ from rich.table import Table
 
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.loop.outcome import Landing
-from beaver_ftc.scenario.sweep_loader import Sweep, load_sweep
+from beaver_ftc.scenario.sweeps import Sweep, load_sweep
 from beaver_ftc.studies.sweep.sampling import Plan, flight_seed
 
 CONDITIONS = ("sensors", "servo", "coefficients", "air", "all", "all-published")

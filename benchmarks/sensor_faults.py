@@ -24,7 +24,7 @@ import numpy as np
 
 from beaver_ftc.diagnosis.watch import instrument_found
 from beaver_ftc.loop.loop import Loop
-from beaver_ftc.scenario.given import load
+from beaver_ftc.scenario.loader import load
 from beaver_ftc.scenario.sensors import PRESETS, Sensors
 
 TYPES = ("bias", "freeze", "noise", "scale", "lost")

@@ -17,7 +17,7 @@ import time
 from functools import partial
 from pathlib import Path
 
-from beaver_ftc.scenario.sweep_loader import Sweep, load_sweep_text
+from beaver_ftc.scenario.sweeps import Sweep, load_sweep_text
 from beaver_ftc.studies.engine.workers import ThisProcess, Work
 from beaver_ftc.studies.sweep import campaign
 from beaver_ftc.studies.sweep.one_flight import Job, fly_one

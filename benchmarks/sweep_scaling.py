@@ -21,7 +21,7 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
-from beaver_ftc.scenario.sweep_loader import Sweep, load_sweep
+from beaver_ftc.scenario.sweeps import Sweep, load_sweep
 from beaver_ftc.studies.engine.store import Parts
 from beaver_ftc.studies.engine.workers import Row, Task, Work, Workers, one_thread_each
 from beaver_ftc.studies.sweep.campaign import Options, run_sweep

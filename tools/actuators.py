@@ -6,7 +6,7 @@ python -m tools.actuators
 from pathlib import Path
 
 from beaver_ftc.aircraft import builtin_names, load
-from beaver_ftc.plant.actuator import actuator_system
+from beaver_ftc.plant.instrumented import actuator_system
 
 
 def files() -> dict[Path, str]:

@@ -28,8 +28,8 @@ if TYPE_CHECKING:
     from beaver_ftc.results.flight import Flight, fly, open_run
     from beaver_ftc.results.simulation import Simulation
     from beaver_ftc.scenario.airframe import find_aircraft as aircraft
-    from beaver_ftc.scenario.builtin import builtin_names as scenarios
-    from beaver_ftc.scenario.given import load
+    from beaver_ftc.scenario.loader import builtin_names as scenarios
+    from beaver_ftc.scenario.loader import load
     from beaver_ftc.scenario.schema import Scenario
     from beaver_ftc.studies.sweep.table_of_flights import sweep
 
@@ -49,9 +49,9 @@ _WHERE = {
     "Verdict": "beaver_ftc.diagnosis.base:Verdict",
     "fly": "beaver_ftc.results.flight:fly",
     "linearise": "beaver_ftc.plant.conditions:linearise",
-    "load": "beaver_ftc.scenario.given:load",
+    "load": "beaver_ftc.scenario.loader:load",
     "open_run": "beaver_ftc.results.flight:open_run",
-    "scenarios": "beaver_ftc.scenario.builtin:builtin_names",
+    "scenarios": "beaver_ftc.scenario.loader:builtin_names",
     "sweep": "beaver_ftc.studies.sweep.table_of_flights:sweep",
     "trim": "beaver_ftc.plant.conditions:trim",
 }

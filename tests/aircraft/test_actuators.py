@@ -5,7 +5,7 @@ from math import exp, sin
 import numpy as np
 import pytest
 
-from beaver_ftc.design.coefficients import SURFACES, TRAVEL
+from beaver_ftc.design.fdc import SURFACES, TRAVEL
 from beaver_ftc.plant.adapter import Plant
 
 DT = 0.01

@@ -6,7 +6,8 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from beaver_ftc.design.coefficients import MASS, TERMS, inertia_coefficients
+from beaver_ftc.design.fdc import MASS, TERMS
+from beaver_ftc.design.model import inertia_coefficients
 
 
 class Accelerations(NamedTuple):
@@ -108,7 +109,7 @@ def test_without_moments_the_rates_couple_as_a_rigid_body(beaver, trim_point):
     for name, term in TERMS.items():
         if term.coefficient in ("Cl", "Cm", "Cn"):
             beaver.write(f"uncertainty/{name}-scale", 0.0)
-    j = inertia_coefficients()
+    j = inertia_coefficients(MASS)
     rng = np.random.default_rng(3)
     for rates in rng.uniform(-1, 1, (20, 3)):
         restarted(beaver, trim_point, **dict(zip(("p_rad_s", "q_rad_s", "r_rad_s"), rates, strict=True)))

@@ -5,15 +5,9 @@ from math import prod, sin
 
 import pytest
 
-from beaver_ftc.design.coefficients import (
-    COEFFICIENTS,
-    GEOMETRY,
-    MASS,
-    TERMS,
-    engine_power_kw,
-    inertia_coefficients,
-    slipstream,
-)
+from beaver_ftc.design.engine import engine_power_kw, slipstream
+from beaver_ftc.design.fdc import COEFFICIENTS, GEOMETRY, MASS, TERMS
+from beaver_ftc.design.model import inertia_coefficients
 
 AXES = "pqr"
 
@@ -65,7 +59,9 @@ def test_inertia_coupling_error_acts_on_its_axis_alone(banked, axis, name, other
     banked.write(f"uncertainty/inertia-coupling/{axis}", 0.25)
     banked.settle()
     first, second = (banked.read(f"velocities/{other}-rad_sec") for other in others)
-    wanted = dict.fromkeys(AXES, 0.0) | {axis: 0.25 * getattr(inertia_coefficients(), name) * first * second}
+    wanted = dict.fromkeys(AXES, 0.0) | {
+        axis: 0.25 * getattr(inertia_coefficients(MASS), name) * first * second
+    }
     after = angular(banked)
     assert abs(wanted[axis]) > 1e-3
     assert {each: after[each] - before[each] for each in AXES} == pytest.approx(wanted, abs=1e-12)

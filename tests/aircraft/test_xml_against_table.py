@@ -4,7 +4,7 @@ import pytest
 from tools.actuators import files
 
 from beaver_ftc.aircraft import load
-from beaver_ftc.design.coefficients import (
+from beaver_ftc.design.fdc import (
     COEFFICIENTS,
     ENVELOPE_AIRSPEED_MPS,
     ENVELOPE_ALPHA_RAD,
@@ -14,8 +14,8 @@ from beaver_ftc.design.coefficients import (
     TERMS,
     TRAVEL,
     coefficient_terms,
-    inertia_coefficients,
 )
+from beaver_ftc.design.model import inertia_coefficients
 from beaver_ftc.plant.model_file import with_systems
 
 PROPERTY_OF = {
@@ -122,7 +122,7 @@ def test_reference_lengths_in_the_rates_are_the_table_s(functions):
 @pytest.mark.parametrize(("axis", "name"), [("p", "Pqr"), ("q", "Qpr"), ("r", "Rpq")])
 def test_inertia_coupling_error_has_the_table_s_coefficient(functions, axis, name):
     written = numbers(functions[f"uncertainty/{axis}dot-rad_sec2"].find("ifthen/sum"))
-    assert written == pytest.approx([getattr(inertia_coefficients(), name)], abs=1e-12)
+    assert written == pytest.approx([getattr(inertia_coefficients(MASS), name)], abs=1e-12)
 
 
 def test_envelope_is_the_table_s(functions):

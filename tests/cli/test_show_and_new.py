@@ -9,9 +9,8 @@ import pytest
 from typer.testing import CliRunner
 
 from beaver_ftc.cli.main import COMMANDS, app
-from beaver_ftc.scenario.builtin import builtin_names, builtin_path
-from beaver_ftc.scenario.loader import load_scenario
-from beaver_ftc.scenario.sweep_loader import builtin_sweeps, load_sweep_text
+from beaver_ftc.scenario.loader import builtin_names, builtin_path, builtin_sweeps, load_scenario
+from beaver_ftc.scenario.sweeps import load_sweep_text
 
 BEAVER = Path(sys.executable).with_name("beaver-ftc")
 

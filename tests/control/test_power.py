@@ -10,7 +10,7 @@ from beaver_ftc.aircraft import load
 from beaver_ftc.control import power
 from beaver_ftc.control.laws import ORACLE
 from beaver_ftc.design import fdc
-from beaver_ftc.design.coefficients import value
+from beaver_ftc.design.fdc import value
 from beaver_ftc.design.model import ELEVATOR, FLAP, RUDDER
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.assembly import assemble

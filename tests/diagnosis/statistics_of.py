@@ -3,7 +3,7 @@
 import numpy as np
 
 from beaver_ftc.diagnosis import across, statistical
-from beaver_ftc.plant.sensing import MEASURED
+from beaver_ftc.plant.instruments import MEASURED
 
 
 def views_of(record):

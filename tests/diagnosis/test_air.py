@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from beaver_ftc.aircraft import load
 from beaver_ftc.aircraft.schema import MAX_MONOMIALS
-from beaver_ftc.design.coefficients import MASS
+from beaver_ftc.design.fdc import MASS
 from beaver_ftc.design.model import design_record, rate_damping
 from beaver_ftc.design.variants import jacobian
 from beaver_ftc.diagnosis import air

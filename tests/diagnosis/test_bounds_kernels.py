@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 
 from beaver_ftc.aircraft import load
-from beaver_ftc.design.inertia import inertia_coefficients
-from beaver_ftc.design.model import design_record
+from beaver_ftc.design.model import design_record, inertia_coefficients
 from beaver_ftc.diagnosis.bounds import declared
 from beaver_ftc.diagnosis.bounds.worst_case import admitted_dtype
-from beaver_ftc.scenario.given import load as scenario
+from beaver_ftc.scenario.loader import load as scenario
 
 AIRCRAFT = load()
 

@@ -100,7 +100,8 @@ def test_nothing_declared_adds_nothing():
 def test_inertia_coefficients_are_extreme_at_the_corners(seed):
     from dataclasses import astuple, replace
 
-    from beaver_ftc.design.coefficients import MASS, inertia_coefficients
+    from beaver_ftc.design.fdc import MASS
+    from beaver_ftc.design.model import inertia_coefficients
 
     rng, tolerance = np.random.default_rng(seed), 0.08
     names = ("Ix_kg_m2", "Iy_kg_m2", "Iz_kg_m2", "Jxz_kg_m2")

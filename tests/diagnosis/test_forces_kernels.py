@@ -14,7 +14,7 @@ from beaver_ftc.diagnosis.across import AN_AXIS, THE_VANE, set_up_views
 from beaver_ftc.diagnosis.forces import ASIDE, UP, look, set_up_forces, tell_apart
 from beaver_ftc.diagnosis.state import NORMAL, PITCH, ROLL, SIDE, YAW
 from beaver_ftc.diagnosis.tones import set_up_listening
-from beaver_ftc.plant.readings import MEASURED
+from beaver_ftc.plant.instruments import MEASURED
 from beaver_ftc.scenario.diagnosis import Bounds
 
 AIRCRAFT = load()

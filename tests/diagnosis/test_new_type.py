@@ -52,7 +52,7 @@ from typing import Literal
 from pydantic import Field
 
 from beaver_ftc.scenario.faults.base import Button, Properties, Switched
-from beaver_ftc.scenario.names import Actuator
+from beaver_ftc.scenario.airframe import Actuator
 
 
 class Reversed(Switched):
@@ -74,7 +74,7 @@ import json
 from beaver_ftc.cli.catalogue import _available
 from beaver_ftc.integrations.live.session import fault_types
 from beaver_ftc.results.about import faults_of
-from beaver_ftc.scenario.given import load
+from beaver_ftc.scenario.loader import load
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.matrix.fault_matrix import Case, scenario_of
 schema = Scenario.model_json_schema()["$defs"]

@@ -7,8 +7,8 @@ from scipy.stats import norm
 
 from beaver_ftc.aircraft import load
 from beaver_ftc.aircraft.schema import MAX_TERMS
-from beaver_ftc.design.coefficients import MASS
 from beaver_ftc.design.engine import KW_TO_DPT
+from beaver_ftc.design.fdc import MASS
 from beaver_ftc.design.model import AXES, design_record
 from beaver_ftc.design.terms import evaluate, regressors
 from beaver_ftc.design.variants import response

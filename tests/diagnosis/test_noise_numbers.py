@@ -9,9 +9,8 @@ import pytest
 from innovations import LEVEL_FLIGHT, TRAVEL_RAD, Detector, by_onset, gust_jitter
 
 from beaver_ftc.aircraft import load
-from beaver_ftc.design.coefficients import MASS
-from beaver_ftc.design.inertia import inertia_coefficients
-from beaver_ftc.design.model import design_record
+from beaver_ftc.design.fdc import MASS
+from beaver_ftc.design.model import design_record, inertia_coefficients
 from beaver_ftc.design.variants import coefficient_slopes, jacobian
 from beaver_ftc.diagnosis import air, noise_model
 from beaver_ftc.diagnosis.bounds import variances

@@ -5,7 +5,7 @@ import pytest
 
 from beaver_ftc.diagnosis.watch import WAIT_S, WATCH, instrument_found
 from beaver_ftc.plant.instruments import SENSORS
-from beaver_ftc.scenario.sensor_faults import sensor_words
+from beaver_ftc.scenario.sensors import sensor_words
 
 
 @pytest.fixture

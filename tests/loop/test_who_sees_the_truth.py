@@ -19,8 +19,9 @@ from beaver_ftc.control.state import control_dtype
 from beaver_ftc.diagnosis.belief import belief_dtype
 from beaver_ftc.diagnosis.scheme import diagnosis_dtype
 from beaver_ftc.loop.loop import Loop
-from beaver_ftc.plant.sensing import MEASURED, truth_dtype
-from beaver_ftc.scenario.given import load
+from beaver_ftc.plant.instruments import MEASURED
+from beaver_ftc.plant.sensing import truth_dtype
+from beaver_ftc.scenario.loader import load
 
 PROGRAM = """
 import json, sys

@@ -5,8 +5,7 @@ import pytest
 
 from beaver_ftc.diagnosis.bounds.declared import gust_sigma_rad_s
 from beaver_ftc.plant.adapter import Plant
-from beaver_ftc.plant.configure import configure, take_off, trim_of
-from beaver_ftc.plant.gust import NEVER, GustSchedule
+from beaver_ftc.plant.configure import NEVER, GustSchedule, configure, take_off, trim_of
 from beaver_ftc.scenario.environment import Gust
 from beaver_ftc.scenario.schema import Scenario
 

@@ -8,7 +8,7 @@ from beaver_ftc.loop.loop import Loop
 from beaver_ftc.plant import addresses, native
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.native import NodeBank
-from beaver_ftc.scenario.given import load
+from beaver_ftc.scenario.loader import load
 
 READ = [
     "velocities/vt-fps",

@@ -10,7 +10,7 @@ from beaver_ftc.loop.loop import Loop
 from beaver_ftc.plant import conditions, reuse
 from beaver_ftc.plant.conditions import ready
 from beaver_ftc.plant.configure import take_off
-from beaver_ftc.scenario.given import load
+from beaver_ftc.scenario.loader import load
 
 SURFACES = ("aileron", "elevator", "rudder", "flap")
 KINDS = (

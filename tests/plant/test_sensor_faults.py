@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
+from beaver_ftc.plant.faults import NEVER, SensorFaultSchedule
 from beaver_ftc.plant.instruments import INSTRUMENTS, N_SENSORS, SENSORS, break_all
-from beaver_ftc.plant.sensor_faults import NEVER, SensorFaultSchedule, si
-from beaver_ftc.scenario.given import load
+from beaver_ftc.scenario.loader import load
+from beaver_ftc.scenario.sensors import QUANTITIES, Sensors
 
 
 def schedule_of(*faults, rate_hz=100.0):
@@ -69,11 +70,18 @@ def test_it_says_when_to_come_again():
 
 
 def test_magnitudes_are_in_the_units_of_the_page():
-    assert (si("p"), si("alpha"), si("V"), si("engine_rpm")) == (np.pi / 180, np.pi / 180, 1.0, 1.0)
+    degrees = [QUANTITIES[name].si for name in ("p", "alpha")]
+    assert degrees == [np.pi / 180, np.pi / 180]
+    assert QUANTITIES["V"].si == QUANTITIES["engine_rpm"].si == 1.0
 
 
 def test_an_accelerometer_s_fault_is_in_metres_a_second_squared():
     broken, schedule = schedule_of({"sensor": "az", "type": "bias", "magnitude": 2, "at_s": 0})
     schedule.apply(0)
-    assert si("az") == 1.0
+    assert QUANTITIES["az"].si == 1.0
     assert read(broken, -9.8, "az") == (pytest.approx(-7.8), False)
+
+
+def test_instruments_are_those_of_the_contract_in_its_order():
+    assert tuple(Sensors.model_fields) == SENSORS
+    assert set(QUANTITIES) == set(SENSORS)

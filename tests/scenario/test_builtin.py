@@ -2,8 +2,7 @@
 
 import pytest
 
-from beaver_ftc.scenario.builtin import builtin_names, builtin_path, resolve
-from beaver_ftc.scenario.loader import builtin_scenarios, load_scenario
+from beaver_ftc.scenario.loader import builtin_names, builtin_path, builtin_scenarios, load_scenario, resolve
 from beaver_ftc.scenario.schema import Expect
 
 REQUIRED = {

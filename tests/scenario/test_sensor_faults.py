@@ -3,8 +3,8 @@
 import pytest
 
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.scenario.given import load
-from beaver_ftc.scenario.sensor_faults import fault_name
+from beaver_ftc.scenario.faults import fault_name
+from beaver_ftc.scenario.loader import load
 
 
 def faulty(**fault):

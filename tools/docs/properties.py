@@ -4,7 +4,7 @@ import re
 from collections.abc import Iterable, Sequence
 from xml.etree.ElementTree import Element
 
-from beaver_ftc.design.coefficients import SURFACES
+from beaver_ftc.design.fdc import SURFACES
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.documents.paths import data_root
 from beaver_ftc.plant.model_file import with_systems

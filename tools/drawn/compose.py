@@ -11,7 +11,7 @@ import numpy as np
 import beaver_ftc as bf
 from beaver_ftc.aircraft import load
 from beaver_ftc.scenario.schema import json_schema
-from beaver_ftc.scenario.sensor_faults import UNITS
+from beaver_ftc.scenario.sensors import QUANTITIES
 from tools.drawn.array import CoveringArray, Row
 from tools.drawn.declare import Words, declare, fit
 from tools.drawn.factors import (
@@ -252,7 +252,7 @@ class Composer:
         node = sensor_fault_types(self._schema)[kind]["properties"]
         there = [
             name
-            for name in UNITS
+            for name in QUANTITIES
             if self._aircraft.has_engine_instruments or name not in ("engine_rpm", "manifold_pressure")
         ]
         sensor = str(self._rng.choice(there))

@@ -48,7 +48,8 @@ def _available() -> dict[str, Entries]:
 
 
 def _sweeps() -> Entries:
-    from beaver_ftc.scenario.sweep_loader import builtin_sweeps, load_sweep
+    from beaver_ftc.scenario.loader import builtin_sweeps
+    from beaver_ftc.scenario.sweeps import load_sweep
 
     return [
         {"name": name, "description": load_sweep(name).file.description.strip()} for name in builtin_sweeps()
@@ -120,13 +121,12 @@ def show(
 
 
 def _file(name: str) -> Path:
-    from beaver_ftc.scenario.builtin import builtin_names, builtin_path
-    from beaver_ftc.scenario.sweep_loader import builtin_sweeps, resolve_sweep
+    from beaver_ftc.scenario.loader import builtin_names, builtin_path, builtin_sweeps, resolve
 
     if name in builtin_names():
         return builtin_path(name)
     if name in builtin_sweeps():
-        return resolve_sweep(name)
+        return resolve(name)
     known = [*builtin_names(), *builtin_sweeps()]
     raise BadInput(f"show: no built-in scenario or sweep {name[:100]!r}{suggestion(name, known)}")
 
@@ -139,7 +139,7 @@ def schema(
     Editors that know it complete and check a scenario as it is written.
     """
     if sweep:
-        from beaver_ftc.scenario.sweep_schema import sweep_json_schema
+        from beaver_ftc.scenario.sweeps import sweep_json_schema
 
         emit_json(sweep_json_schema())
         return

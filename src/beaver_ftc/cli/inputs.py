@@ -25,7 +25,7 @@ class TurbulenceName(StrEnum):
 
 def complete_names(incomplete: str) -> list[str]:
     """Built-in scenarios whose names begin so, for the shell."""
-    from beaver_ftc.scenario.builtin import builtin_names
+    from beaver_ftc.scenario.loader import builtin_names
 
     return [name for name in builtin_names() if name.startswith(incomplete)]
 
@@ -132,8 +132,8 @@ def _repeated(names: list[str]) -> list[str]:
 
 def _place_of_initial(name: str) -> str:
     """FILE:LINE of the flight condition, the file's first line where it is left to the defaults."""
-    from beaver_ftc.scenario.builtin import resolve
-    from beaver_ftc.scenario.loader import parse_document, read_file
+    from beaver_ftc.documents.validation import parse_document
+    from beaver_ftc.scenario.loader import read_file, resolve
 
     path = resolve(name)
     return f"{path}:{parse_document(read_file(path, name), str(path)).line(('initial',))}"

@@ -53,7 +53,7 @@ def validate(
 
 def _check(file: str) -> Document:
     from beaver_ftc.scenario.loader import load_scenario
-    from beaver_ftc.scenario.sweep_loader import is_sweep, load_sweep
+    from beaver_ftc.scenario.sweeps import is_sweep, load_sweep
 
     try:
         if is_sweep(file):
@@ -101,7 +101,7 @@ def new(
 
 
 def _renamed(like: str, name: str) -> str:
-    from beaver_ftc.scenario.builtin import builtin_names, builtin_path, no_such
+    from beaver_ftc.scenario.loader import builtin_names, builtin_path, no_such
 
     if like not in builtin_names():
         raise BadInput(f"new: --like: {no_such(like, 'scenario')}")

@@ -106,7 +106,7 @@ def linearise(
     default law, broken at each surface in turn; healthy, and with losses of each surface that the law
     knows.
     """
-    from beaver_ftc.scenario.given import load
+    from beaver_ftc.scenario.loader import load
     from beaver_ftc.studies.margins import as_document, as_text, study
 
     given = load({} if scenario is None else scenario)

@@ -26,7 +26,7 @@ from beaver_ftc.cli.output import (
 from beaver_ftc.documents.errors import BadInput
 
 if TYPE_CHECKING:
-    from beaver_ftc.scenario.sweep_loader import Sweep
+    from beaver_ftc.scenario.sweeps import Sweep
     from beaver_ftc.studies.sweep.campaign import Options
     from beaver_ftc.studies.sweep.one_flight import Keep
 
@@ -128,7 +128,7 @@ def _options(arguments: Arguments) -> "Options":
 
 def _command(options: "Options", replay: int | None, format: Format) -> Document:
     """Fly, say what came out, and return {scenario, passed, expectations} of it."""
-    from beaver_ftc.scenario.sweep_loader import load_sweep
+    from beaver_ftc.scenario.sweeps import load_sweep
 
     sweep = load_sweep(options.source)
     return _fly(sweep, options, format) if replay is None else _replay(sweep, options, replay, format)

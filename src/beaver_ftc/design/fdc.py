@@ -12,13 +12,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from beaver_ftc.aircraft import load
+from beaver_ftc.aircraft import Term, load
 from beaver_ftc.aircraft.aircraft import FORCES, MOMENTS
 from beaver_ftc.design.engine import engine_power_kw, slipstream
-from beaver_ftc.design.inertia import inertia_coefficients
+from beaver_ftc.design.model import inertia_coefficients
 
 _AIRCRAFT = load()  # the equations are those of any aircraft, the engine is that of the built-in one
 GEOMETRY, MASS = _AIRCRAFT.geometry, _AIRCRAFT.mass
+TERMS, TRAVEL = _AIRCRAFT.terms, _AIRCRAFT.travel
+COEFFICIENTS = (*FORCES, *MOMENTS)
+ENVELOPE_AIRSPEED_MPS = _AIRCRAFT.envelope.airspeed_mps
+ENVELOPE_ALPHA_RAD = _AIRCRAFT.alpha_rad
 STATES = ("airspeed", "alpha", "beta", "p", "q", "r", "phi", "theta", "psi", "north", "east", "altitude")
 SURFACES = _AIRCRAFT.surfaces
 
@@ -33,6 +37,16 @@ _GAS_J_PER_KG_K = 287.053
 _GRAVITY_MPS2 = 9.80665
 _EARTH_RADIUS_M = 6371020.0
 _STEP = 1e-30  # complex
+
+
+def value(name: str) -> float:
+    """The coefficient of one term, e.g. value("Cm_de"); KeyError for a name the file lacks."""
+    return TERMS[name].value
+
+
+def coefficient_terms(coefficient: str) -> tuple[Term, ...]:
+    """The terms whose sum is `coefficient` (one of COEFFICIENTS)."""
+    return tuple(term for term in TERMS.values() if term.coefficient == coefficient)
 
 
 @dataclass(frozen=True)

@@ -37,8 +37,16 @@ from beaver_ftc.diagnosis.watch import (
     UNKNOWN,
     YES,
 )
-from beaver_ftc.plant.instruments import ALTITUDE, AX, ENGINE_SPEED, MANIFOLD, N_SENSORS, PHI
-from beaver_ftc.plant.readings import note_slipstream, share_out
+from beaver_ftc.plant.instruments import (
+    ALTITUDE,
+    AX,
+    ENGINE_SPEED,
+    MANIFOLD,
+    N_SENSORS,
+    PHI,
+    note_slipstream,
+    share_out,
+)
 
 INVOLVED = 0.03  # of the largest residual of its kind: less is what a large error does to its neighbours
 BESIDE_S = 0.5  # a surface found earlier than this before the alarm was found without the broken instrument

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from beaver_ftc.plant.instruments import N_SENSORS, PHI, SENSORS, SIGNALS
-from beaver_ftc.scenario.sensor_faults import sensor_words
+from beaver_ftc.scenario.sensors import sensor_words
 
 TURN, ANGLE, SPEED, ALPHA_FLOW, BETA_FLOW, DENSITY, CLIMB, RPM, PRESSURE = 0, 3, 6, 7, 8, 9, 10, 11, 12
 N_TESTS = 13

@@ -1,8 +1,13 @@
 """Dotted keys: `faults[0].magnitude` as a place in a scenario's data."""
 
 import re
+from collections.abc import Mapping
 from functools import lru_cache
+from os import PathLike
 from typing import Any
+
+import numpy as np
+from pydantic import BaseModel
 
 from beaver_ftc.documents.base import Location
 from beaver_ftc.documents.problems import key_path
@@ -18,7 +23,7 @@ class UnusableKeyError(ValueError):
 @lru_cache(maxsize=1024)  # a sweep asks for the same few again for each flight
 def parse_key(key: str) -> Location:
     """'faults[0].magnitude' -> ('faults', 0, 'magnitude'). Raises UnusableKeyError."""
-    parts = [(name or int(index)) for name, index in _PART.findall(key)]
+    parts = [(name or int(index)) for name, index in _PART.findall(key)] if isinstance(key, str) else []
     if not parts or key_path(tuple(parts)) != key:
         raise UnusableKeyError("is no dotted key, allowed: keys like faults[0].magnitude")
     return tuple(parts)
@@ -30,6 +35,19 @@ def with_values(data: dict[str, Any], values: dict[Location, Any]) -> dict[str, 
     for location, value in values.items():
         _put(changed, location, _copied(value))
     return changed
+
+
+def plain(value: Any) -> Any:
+    """Mappings, lists and numbers as a YAML file would give them: no NumPy, no tuples, no models."""
+    if isinstance(value, BaseModel):
+        return value.model_dump(mode="json", by_alias=True, exclude_unset=True)
+    if isinstance(value, Mapping):
+        return {key: plain(entry) for key, entry in value.items()}
+    if isinstance(value, np.ndarray | np.generic):
+        return plain(value.tolist())
+    if isinstance(value, list | tuple):
+        return [plain(entry) for entry in value]
+    return str(value) if isinstance(value, PathLike) else value
 
 
 def _copied(data: Any) -> Any:

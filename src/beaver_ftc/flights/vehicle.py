@@ -15,8 +15,8 @@ from beaver_ftc.documents.document import Problem
 from beaver_ftc.documents.errors import suggestion
 from beaver_ftc.documents.files import UnreadableError, read_text
 from beaver_ftc.documents.problems import ScenarioError
-from beaver_ftc.scenario.builtin import looks_like_a_path
-from beaver_ftc.scenario.loader import parse_document, validate
+from beaver_ftc.documents.validation import parse_document, validate
+from beaver_ftc.scenario.loader import looks_like_a_path
 
 _MAX_BYTES = 1_000_000
 _FOLDER = Path(__file__).parent / "vehicles"

@@ -36,7 +36,7 @@ from beaver_ftc.compiled import direct
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.loop.agent import BESIDE_SURFACES, LARGEST, LOOK, act, cost, observe
 from beaver_ftc.results.simulation import Simulation
-from beaver_ftc.scenario.given import ScenarioLike, load
+from beaver_ftc.scenario.loader import ScenarioLike, load
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.engine.workers import context, cores, single_threaded
 

@@ -92,7 +92,8 @@ def _kind_by_its_keys(path: Path, named: bool, all_of_them: bool) -> "type[Flown
     """A file is read as `run` reads it. What is there to be collected and cannot be read is, so that it fails
     and is not missed; a file that is named alone may be another tool's."""
     from beaver_ftc.documents.problems import ScenarioError
-    from beaver_ftc.scenario.loader import parse_document, read_file
+    from beaver_ftc.documents.validation import parse_document
+    from beaver_ftc.scenario.loader import read_file
 
     try:
         keys = list(parse_document(read_file(path, str(path)), str(path)).data)
@@ -161,7 +162,7 @@ class ScenarioFile(FlownFile):
 
     def _read(self) -> tuple[str, list[str]]:
         from beaver_ftc.results.expectations import names
-        from beaver_ftc.scenario.given import load
+        from beaver_ftc.scenario.loader import load
 
         self.scenario = load(self.path)
         return self.scenario.name, names(self.scenario.expect)
@@ -177,7 +178,7 @@ class SweepFile(FlownFile):
     """One sweep, flown on all cores."""
 
     def _read(self) -> tuple[str, list[str]]:
-        from beaver_ftc.scenario.sweep_loader import load_sweep
+        from beaver_ftc.scenario.sweeps import load_sweep
         from beaver_ftc.studies.sweep.summary import names
 
         self.sweep = load_sweep(self.path)

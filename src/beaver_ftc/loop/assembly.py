@@ -22,11 +22,11 @@ from beaver_ftc.loop.instrument_records import (
     truth_read,
 )
 from beaver_ftc.plant import channels as ch
-from beaver_ftc.plant.instruments import INSTRUMENTS
+from beaver_ftc.plant.instruments import INSTRUMENTS, MEASURED
 from beaver_ftc.plant.native import RUNNING
-from beaver_ftc.plant.sensing import MEASURED, truth_dtype
+from beaver_ftc.plant.sensing import truth_dtype
 from beaver_ftc.scenario.diagnosis import FdiConfig
-from beaver_ftc.scenario.keys import texts_of
+from beaver_ftc.scenario.dump import texts_of
 from beaver_ftc.scenario.schema import Scenario
 
 # What the log has columns for: estimators, the watch, the engine, statistical tests.

@@ -15,9 +15,8 @@ from beaver_ftc.control.laws import NOMINAL, ORACLE, REJECTING
 from beaver_ftc.loop.assembly import assemble
 from beaver_ftc.loop.plugin_frame import PluginFrame, named_detector, named_law, plugged
 from beaver_ftc.plant.faults import NEVER, TIME_TOLERANCE_S
-from beaver_ftc.scenario.change import Change
 from beaver_ftc.scenario.interventions import stages
-from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.scenario.schema import Change, Scenario
 
 # What a law takes over from the one before it: where reference, command and engine are, and what is believed.
 KEPT = {

@@ -45,12 +45,7 @@ from beaver_ftc.loop.record import (
     record_watch,
 )
 from beaver_ftc.plant import channels as ch
-from beaver_ftc.plant.sensing import (
-    NOT_FINITE,
-    flight_status,
-    hand_over,
-    measure,
-)
+from beaver_ftc.plant.sensing import NOT_FINITE, flight_status, hand_over, measure
 
 SURE = 400.0  # one over the variance of an effectiveness known to 0.05
 

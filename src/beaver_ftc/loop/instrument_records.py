@@ -14,12 +14,12 @@ from beaver_ftc.diagnosis.forces import tell_apart
 from beaver_ftc.diagnosis.watch import NOBODY, POLES_PER_S
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.plant import channels as ch
+from beaver_ftc.plant.faults import OF_THE_SLIPSTREAM
 from beaver_ftc.plant.instruments import (
     LONGEST_DELAY,
     PHI,
     SENSORS,
 )
-from beaver_ftc.plant.sensor_faults import OF_THE_SLIPSTREAM
 from beaver_ftc.scenario.faults import of_a_sensor
 from beaver_ftc.scenario.interventions import stages
 from beaver_ftc.scenario.schema import Scenario

@@ -21,13 +21,11 @@ from beaver_ftc.loop.stepping import fly_frame, fly_on, hold, look_inside
 from beaver_ftc.plant import channels as ch
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.conditions import ready
-from beaver_ftc.plant.configure import take_off
-from beaver_ftc.plant.faults import FaultSchedule
-from beaver_ftc.plant.gust import GustSchedule, MovingAir
+from beaver_ftc.plant.configure import GustSchedule, MovingAir, take_off
+from beaver_ftc.plant.faults import FaultSchedule, SensorFaultSchedule
 from beaver_ftc.plant.instruments import AX, ENGINE_SPEED
 from beaver_ftc.plant.reuse import give_back
 from beaver_ftc.plant.sensing import FLYING, NOT_FINITE
-from beaver_ftc.plant.sensor_faults import SensorFaultSchedule
 from beaver_ftc.plugins import DETECTORS, LAWS, is_compiled
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.signals import sample_frames

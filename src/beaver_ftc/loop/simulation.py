@@ -17,17 +17,23 @@ from beaver_ftc.loop.loop import CHUNK_ROWS, FLYING, LogSink, Loop
 from beaver_ftc.loop.outcome import Landing, verdict_of
 from beaver_ftc.loop.plugin_frame import measured_of
 from beaver_ftc.plant.adapter import Plant, UnknownProperty
+from beaver_ftc.plant.configure import GustSchedule
 from beaver_ftc.plant.faults import is_there
-from beaver_ftc.plant.gust import GustSchedule
 from beaver_ftc.scenario.airframe import checked_against
-from beaver_ftc.scenario.faults import MOST_FAULTS, place_of
-from beaver_ftc.scenario.given import fault_of, is_same_again
-from beaver_ftc.scenario.interventions import aimed, blown, changed
-from beaver_ftc.scenario.names import UNANTICIPATED
+from beaver_ftc.scenario.faults import MOST_FAULTS, UNANTICIPATED, fault_name, place_of
+from beaver_ftc.scenario.interventions import (
+    StickTrack,
+    fault_of,
+    in_force,
+    is_same_again,
+    scenario_flown,
+    with_change,
+    with_gust,
+    with_targets,
+)
 from beaver_ftc.scenario.schema import Scenario
-from beaver_ftc.scenario.sensor_faults import fault_name, sensors_there
+from beaver_ftc.scenario.sensors import sensors_there
 from beaver_ftc.scenario.signals import RAD_PER_DEG, sample_deg_s
-from beaver_ftc.scenario.sticks import StickTrack, flown, in_force
 
 if TYPE_CHECKING:
     from beaver_ftc.control.base import Law
@@ -237,7 +243,7 @@ class Stepping:
         Raises BadInput that names the key, and while another one blows.
         """
         self._begin()
-        self._scenario = blown(self._scenario, gust, self._now_s)
+        self._scenario = with_gust(self._scenario, gust, self._now_s)
         loop, gusts = self._loop, self._scenario.environment.gusts
         loop.gust, self._turn_at = GustSchedule(gusts, loop.plant, self._scenario.rate_hz), self._next
 
@@ -248,14 +254,14 @@ class Stepping:
         key, the flight going on as it was.
         """
         self._begin()
-        scenario = changed(self._scenario, change, self._now_s)
+        scenario = with_change(self._scenario, change, self._now_s)
         self._loop.change(scenario, self._next)
         self._scenario, self._turn_at = scenario, self._next
 
     def aim(self, targets: Mapping[str, float]) -> None:
         """Give the autopilot new values from now on, `{"altitude_m": 1900}`. Raises BadInput with the key."""
         self._begin()
-        self._scenario = aimed(self._scenario, targets, self._now_s)
+        self._scenario = with_targets(self._scenario, targets, self._now_s)
         set_up_profile(self._loop.frames["autopilot"][0], self._scenario)
 
     def read(self, name: str) -> float:
@@ -284,7 +290,7 @@ class Stepping:
                 "the reference, sticks and faults"
             )
         self._begin()
-        return flown(self._scenario, self._faults, self._steering.track, self._next)
+        return scenario_flown(self._scenario, self._faults, self._steering.track, self._next)
 
     def _as_it_happened(self) -> Scenario:
         """The scenario of the verdict: as given if it was flown to its end and nobody interfered."""

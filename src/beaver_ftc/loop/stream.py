@@ -18,7 +18,7 @@ from beaver_ftc.loop.assembly import assemble
 from beaver_ftc.loop.outcome import estimate_now, verdict_of
 from beaver_ftc.plugins import DETECTORS, is_compiled
 from beaver_ftc.scenario.airframe import checked_against
-from beaver_ftc.scenario.given import load
+from beaver_ftc.scenario.loader import load
 from beaver_ftc.scenario.schema import Scenario
 
 Vector = NDArray[np.float64]

@@ -21,6 +21,8 @@ FT_PER_M = 1.0 / 0.3048
 _LONGEST_REASON = 300
 PA_PER_PSF = 4.4482216152605 / 0.3048**2
 
+_AT_REST = str(data_root() / "aircraft" / "at_rest.xml")
+
 # betadot enters the side force with the value of the previous run; each further run at the same state
 # divides the error by more than 100 (CY_betadot qdyn S b / 2 m V^2 is at most 0.01), so five leave nothing
 # above rounding.
@@ -203,6 +205,10 @@ class Plant:
         self._initialise()  # again, so that the integrator's past derivatives are the settled ones too
         if any(wind_mps):
             self._drift(state, wind_mps)
+
+    def forget_conditions(self) -> None:
+        """Let the initial conditions be those of an aircraft nobody has placed yet."""
+        self.fdm.load_ic(_AT_REST, False)
 
     def _drift(self, state: FlightState, wind_mps: Sequence[float]) -> None:
         """Let the air, and the aircraft with it, move over the ground.

@@ -5,18 +5,29 @@ that frame; one with `end_s` is repaired in the first frame whose time t >= end_
 overlap: effectiveness and rate scale multiply, biases and alpha^3 moments add; of two jams the earlier
 holds, of two runaways or two oscillations the later. On one surface a jam hides a trailing surface, which
 hides a runaway (that is the aircraft's own order).
+
+A fault of an instrument changes what it says and leaves the aircraft alone. Several of one instrument add up:
+offsets add, relative errors multiply, noise adds by its squares; one that is frozen or lost says nothing
+else.
 """
 
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import zip_longest
-from math import ceil, exp, inf
+from math import ceil, exp, hypot, inf
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from beaver_ftc.scenario.faults import SensorFault, place_of
+from beaver_ftc.scenario.sensors import ENGINE, QUANTITIES, Sensors
 
 if TYPE_CHECKING:
     from beaver_ftc.plant.adapter import Plant
 
+_SENSORS = tuple(Sensors.model_fields)
+OF_THE_SLIPSTREAM = ("V", "qdyn", *ENGINE)  # what dpt is worked out from
 TIME_TOLERANCE_S = 1e-9
 NEVER = sys.maxsize
 
@@ -72,7 +83,7 @@ class _Event:
     @property
     def place(self) -> str:
         """The folder of the failure properties it changes."""
-        return f"failures/{getattr(self.fault, 'actuator', 'unanticipated')}"
+        return f"failures/{place_of(self.fault)}"
 
     def in_force(self, k: int) -> bool:
         return self.first <= k < self.last
@@ -94,8 +105,6 @@ class _Event:
 class FaultSchedule:
     """Sets the aircraft's failure properties, frame by frame; between changes there is nothing to do.
 
-    Faults of instruments are passed over: sensor_faults.py has them.
-
     faults: the scenario's. plant: the aircraft they happen to. rate_hz: frame rate of the loop.
     """
 
@@ -109,7 +118,7 @@ class FaultSchedule:
     def declare(self, faults: Sequence[Any]) -> None:
         """Take these faults for those declared so far: some more at the end, some that end otherwise."""
         before, self._declared = self._declared, []
-        faults = [fault for fault in faults if not hasattr(fault, "sensor")]
+        faults = [fault for fault in faults if not isinstance(fault, SensorFault)]
         for known, fault in zip_longest(before, faults):
             self._declared.append(known if known and known.fault is fault else self._event(fault, known))
         self._events = sorted(self._declared, key=lambda event: event.first)
@@ -162,3 +171,68 @@ class FaultSchedule:
             self._plant.write(name, value)
         self._written.update(changed)
         return bool(changed)
+
+
+class SensorFaultSchedule:
+    """Breaks and mends the instruments (dtype `instruments.INSTRUMENTS`), frame by frame.
+
+    faults: the scenario's; those of surfaces are passed over. rate_hz: frame rate of the loop. has_engine:
+    the aircraft has instruments from which dpt follows.
+    """
+
+    def __init__(
+        self, faults: Sequence[Any], instruments: np.void, rate_hz: float, has_engine: bool = False
+    ) -> None:
+        self._instruments, self._rate_hz, self._has_engine = instruments, rate_hz, has_engine
+        self.declare(faults)
+
+    def declare(self, faults: Sequence[Any]) -> None:
+        """Take these faults for those declared so far."""
+        self._faults = [fault for fault in faults if isinstance(fault, SensorFault)]
+        self._spans = [(frame_of(f.at_s, self._rate_hz), self._last(f)) for f in self._faults]
+
+    def _last(self, fault: SensorFault) -> int:
+        return NEVER if fault.end_s is None else frame_of(fault.end_s, self._rate_hz)
+
+    @property
+    def any(self) -> bool:
+        """Whether an instrument breaks in this flight."""
+        return bool(self._faults)
+
+    def begun(self, k: int) -> bool:
+        """Whether some instrument has broken by frame k, mended or not."""
+        return any(first <= k for first, _ in self._spans)
+
+    def next_change(self, k: int) -> int:
+        """The first frame after k in which an instrument breaks or is mended; NEVER if none."""
+        return min((at for span in self._spans for at in span if at > k), default=NEVER)
+
+    def apply(self, k: int) -> None:
+        """Bring the instruments to frame k; again is harmless. From the first fault of theirs on, dpt is what
+        engine and air data say."""
+        if not self._faults:
+            return
+        record = self._instruments["fault"]
+        record["bias"] = record["scale"] = record["noise"] = 0.0
+        record["frozen"] = record["lost"] = 0
+        for fault, (first, last) in zip(self._faults, self._spans, strict=True):
+            if first <= k and self._has_engine and fault.sensor in OF_THE_SLIPSTREAM:
+                self._instruments["engine"] = 1
+            if first <= k < last:
+                _take(record[_SENSORS.index(fault.sensor)], fault)
+        self._instruments["broken"] = 1  # from now on: a mended one must let go of what it holds
+
+
+def _take(record: np.void, fault: Any) -> None:
+    """Add one fault to what an instrument's record says."""
+    unit = QUANTITIES[fault.sensor].si
+    if fault.type == "bias":
+        record["bias"] += unit * fault.magnitude
+    elif fault.type == "noise":
+        record["noise"] = hypot(record["noise"], unit * fault.magnitude)
+    elif fault.type == "scale":
+        record["scale"] = (1.0 + record["scale"]) * (1.0 + fault.magnitude) - 1.0
+    elif fault.type == "freeze":
+        record["frozen"] = 1
+    else:
+        record["lost"] = 1

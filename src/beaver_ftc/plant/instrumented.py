@@ -7,13 +7,14 @@ those of the aircraft's flight control; all else is the aircraft's own. The file
 
 import re
 from collections.abc import Iterable
+from functools import lru_cache
 from itertools import product
 from pathlib import Path
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
 from beaver_ftc.documents.errors import BadInput, suggestion
-from beaver_ftc.plant.actuator import actuator_system
+from beaver_ftc.documents.paths import data_root
 from beaver_ftc.plant.model_file import SYSTEMS, copy_of, package
 
 PREFIX = "actuated-"
@@ -118,6 +119,29 @@ _COMMON = """<?xml version="1.0"?>
 
 # What stands before all functions in aerodynamics, by JSBSim's own schema.
 _BEFORE_FUNCTIONS = ("description", "alphalimits", "hysteresis_limits", "aero_ref_pt_shift_x")
+
+
+@lru_cache
+def _template() -> str:
+    return (data_root() / "aircraft" / "actuator.xml").read_text(encoding="utf-8")
+
+
+def actuator_system(surface: str, low_rad: float, high_rad: float, prefix: str = "") -> str:
+    """A system file for a surface that travels from low_rad to high_rad, by `aircraft/actuator.xml`.
+
+    prefix: begins the names of its signals, `fcs/<prefix><surface>-cmd-rad`, in an aircraft whose own flight
+    control uses the plain ones.
+    """
+    start = _template().index("<system")
+    text = _template()[start:].replace("fcs/SURFACE-", f"fcs/{prefix}SURFACE-")
+    if prefix:  # JSBSim knows the plain ones without being told
+        command = f'<property value="0"> fcs/{prefix}SURFACE-cmd-norm </property>'
+        text = text.replace("<property", f"{command}\n  <property", 1)
+    text = text.replace("SURFACE", surface)
+    for end, stop_rad in (("min", low_rad), ("max", high_rad)):
+        stop = f'"> actuators/{surface}/position-{end}-rad </property>'
+        text = re.sub(rf'[^"]*(?={stop})', f"{stop_rad!r}", text, count=1)
+    return f'<?xml version="1.0"?>\n<!-- From aircraft/actuator.xml: change that. -->\n{text}'
 
 
 def engines_of(source: Path) -> int:

@@ -4,7 +4,8 @@
 
 Noise is white and normal, cut off at NOISE_LIMIT_SIGMA standard deviations: a bound on it can then be
 declared and holds. A flight draws its random numbers from a counter of its own [Steele2014], so it repeats
-to the bit whatever else is flown beside it.
+to the bit whatever else is flown beside it. What is known of an instant (`MEASURED`) is made of readings
+alone: nothing in it knows the truth.
 """
 
 from math import pi
@@ -12,6 +13,8 @@ from math import pi
 import numpy as np
 
 from beaver_ftc.compiled import kernel
+from beaver_ftc.design.engine import measured_slipstream
+from beaver_ftc.design.model import AIRSPEED, ALPHA, BETA, DPT, N_Y, QDYN
 
 SIGNALS = ("p", "q", "r", "alpha", "beta", "V", "qdyn")  # what the diagnosis compares with its model
 N_SIGNALS = len(SIGNALS)
@@ -19,6 +22,7 @@ SENSORS = (
     *SIGNALS, "phi", "theta", "psi", "altitude", "engine_rpm", "manifold_pressure", "ax", "ay", "az"
 )  # fmt: skip
 N_SENSORS = len(SENSORS)
+_ALPHA, _BETA, _AIRSPEED, _QDYN = (SENSORS.index(name) for name in ("alpha", "beta", "V", "qdyn"))
 PHI, PSI, ALTITUDE, ENGINE_SPEED, MANIFOLD, AX = (
     SENSORS.index(name) for name in ("phi", "psi", "altitude", "engine_rpm", "manifold_pressure", "ax")
 )
@@ -47,6 +51,18 @@ INSTRUMENTS = np.dtype(
         ("reading", "f8", (N_SENSORS,)),
         ("engine", "i8"),  # dpt is worked out from readings
         ("broken", "i8"), ("fault", SENSOR_FAULT, (N_SENSORS,)), ("random_fault", "u8"),
+    ],
+    align=True,
+)  # fmt: skip
+
+# What is known of an instant: every sensor's reading, and sorted by use. attitude: phi, theta, psi, rad;
+# altitude m. force (3,) m/s2 without gravity, from accelerometers, where `inertial`: they are read, and none
+# may be broken. missing: no reading.
+MEASURED = np.dtype(
+    [
+        ("signal", "f8", (N_SENSORS,)), ("x", "f8", (3,)), ("y", "f8", (N_Y,)),
+        ("attitude", "f8", (3,)), ("altitude", "f8"),
+        ("inertial", "i8"), ("engine", "i8"), ("force", "f8", (3,)), ("missing", "i8", (N_SENSORS,)),
     ],
     align=True,
 )  # fmt: skip
@@ -188,3 +204,25 @@ def break_all(instruments, signals, missing):
         missing[i] = instruments.fault[i].lost
     instruments.random_fault = instruments.random
     instruments.random = own
+
+
+@kernel
+def share_out(measured):
+    """From the readings to x, y, attitude, force and altitude."""
+    signal, y = measured.signal, measured.y
+    for i in range(3):
+        measured.x[i] = signal[i]
+        measured.attitude[i] = signal[PHI + i]
+        measured.force[i] = signal[AX + i]
+    y[ALPHA], y[BETA], y[AIRSPEED] = signal[_ALPHA], signal[_BETA], signal[_AIRSPEED]
+    y[QDYN] = signal[_QDYN]
+    measured.altitude = signal[ALTITUDE]
+
+
+@kernel
+def note_slipstream(measured):
+    """Work dpt out from the readings of the engine and of the air."""
+    signal = measured.signal
+    measured.y[DPT] = measured_slipstream(
+        signal[ENGINE_SPEED], signal[MANIFOLD], signal[_AIRSPEED], signal[_QDYN]
+    )

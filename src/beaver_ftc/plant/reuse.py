@@ -19,7 +19,6 @@ from pathlib import Path
 from time import monotonic
 
 from beaver_ftc.aircraft import Aircraft
-from beaver_ftc.documents.paths import data_root
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.addresses import executive_address
 
@@ -28,7 +27,6 @@ _GUST = "atmosphere/cosine-gust"
 _SHORTEST_S = 1e-9
 _MOST = 8  # kept of one aircraft: more than this are hardly ever in the air at the same time
 
-_AT_REST = str(data_root() / "aircraft" / "at_rest.xml")
 _free: dict[object, list[Plant]] = {}
 
 
@@ -70,11 +68,6 @@ def renew(plant: Plant, rate_hz: float, substeps: int) -> None:
         if not name.startswith(("ic/", _GUST)):
             plant.write(name, value)
     plant.set_rate(rate_hz, substeps)
-
-
-def forget_conditions(plant: Plant) -> None:
-    """Let the initial conditions be those of an aircraft nobody has placed yet."""
-    plant.fdm.load_ic(_AT_REST, False)
 
 
 def _blow_over(plant: Plant) -> None:

@@ -18,13 +18,12 @@ from beaver_ftc.plant.instruments import (
     MANIFOLD,
     PHI,
     break_all,
+    note_slipstream,
     read_all,
     read_forces,
+    share_out,
 )
 from beaver_ftc.plant.native import read_nodes, write_nodes
-from beaver_ftc.plant.readings import MEASURED, note_slipstream, share_out
-
-__all__ = ["MEASURED"]
 
 FLYING, DEPARTED, NOT_FINITE = 0, 1, 2
 DEPARTURE_ANGLE_RAD = 0.6

@@ -4,9 +4,15 @@ Wings level, the propeller's side force and moments are balanced by a little sid
 [FDC]. Unknowns: alpha, beta, theta and the surfaces that lead the axes. Equations: JSBSim's six body
 accelerations are zero, which absorbs everything the textbook leaves out (round rotating Earth, real gravity,
 standard atmosphere).
+
+A start of the truth costs nine JSBSim frames, Newton's method two dozen starts. So an aircraft without
+engines is brought near by Broyden's method: the Jacobian is found once, by differences, and then corrected
+by each step [Broyden1965, the first method]; and of a start only what changes is done again. The side force
+of betadot lags one look behind: the steps end at zero, and so does what it lags by. The full start has the
+last word.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from math import asin, cos, degrees, isfinite, sin
@@ -16,12 +22,23 @@ import numpy as np
 
 from beaver_ftc.aircraft import Aircraft, Travel
 from beaver_ftc.aircraft.schema import SIDESLIP_RATE
-from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.plant.adapter import FT_PER_M, PA_PER_PSF, Plant
-from beaver_ftc.plant.broyden import ACCELERATIONS, STEP_RAD, approach, newton_step, shortened
-from beaver_ftc.plant.reuse import forget_conditions
 from beaver_ftc.plant.state import FlightState
 
+ACCELERATIONS = (
+    ("accelerations/udot-ft_sec2", 1.0 / FT_PER_M),
+    ("accelerations/vdot-ft_sec2", 1.0 / FT_PER_M),
+    ("accelerations/wdot-ft_sec2", 1.0 / FT_PER_M),
+    ("accelerations/pdot-rad_sec2", 1.0),
+    ("accelerations/qdot-rad_sec2", 1.0),
+    ("accelerations/rdot-rad_sec2", 1.0),
+)
+STEP_RAD = 1e-5  # for differences
+MAX_CHANGE_RAD = 0.2  # a longer step leaves the region its Jacobian describes
+_GOAL = 1e-11  # m/s2 and rad/s2: rounding leaves a tenth of it
+_MAX_STEPS = 15  # of Broyden's method
+_RATES_AND_FLOW = ("ic/u-fps", "ic/v-fps", "ic/w-fps")
 TOLERANCE = 1e-9  # m/s2 and rad/s2, in each of the six accelerations
 
 _ALPHA_LIMIT_RAD = 0.6  # beyond it an aircraft has departed, so it cannot be trimmed there
@@ -30,6 +47,9 @@ _ALPHA_GUESS_RAD = 0.05  # where the file has no forces
 _LIFTED_TRAVEL_RAD = 10.0
 _NO_DEFLECTION_RAD = 1.6  # square to the air
 _FLOW_UNKNOWNS = ("alpha_rad", "beta_rad", "theta_rad")
+
+Vector = np.ndarray
+Look = Callable[[Vector], Vector]
 
 
 @dataclass(frozen=True, init=False)
@@ -58,7 +78,7 @@ def trim(airspeed_mps: float, altitude_m: float, plant: Plant | None = None, **g
     named: dict[str, Any] = dict(given)  # by the aircraft's own names, which FlightState checks
     wanted = FlightState(airspeed_mps, altitude_m, aircraft=aircraft, **named)
     _check_request(wanted, aircraft)
-    forget_conditions(truth)  # of what was flown before, which would show in the last bits
+    truth.forget_conditions()  # of what was flown before, which would show in the last bits
     with _travel_lifted(truth) as travel:
         for surface in set(aircraft.surfaces) - set(aircraft.primary):
             allowed = travel[surface].min_rad, travel[surface].max_rad
@@ -161,7 +181,7 @@ def _solve(truth: Plant, state: FlightState) -> tuple[FlightState, np.ndarray]:
     """
     names = (*_FLOW_UNKNOWNS, *(f"{surface}_rad" for surface in truth.aircraft.primary))
     if not truth.n_engines:
-        near = approach(truth, state, names)
+        near = _approach(truth, state, names)
         if np.isfinite(near).all():
             state = _moved(state, names, near - np.array([getattr(state, name) for name in names]))
     here = _accelerations(truth, state)
@@ -170,9 +190,67 @@ def _solve(truth: Plant, state: FlightState) -> tuple[FlightState, np.ndarray]:
             return state, here
         if not np.isfinite(here).all():
             break
-        state = _moved(state, names, shortened(newton_step(_jacobian(truth, state, names, here), here)))
+        state = _moved(state, names, _shortened(_newton_step(_jacobian(truth, state, names, here), here)))
         here = _accelerations(truth, state)
     raise _not_flown(state, _left_over(here), truth.aircraft)
+
+
+def _approach(truth: Plant, state: FlightState, names: tuple[str, ...]) -> Vector:
+    """Values of the unknowns `names` of a state at which its accelerations nearly vanish, (unknowns,) rad.
+
+    names: alpha, beta, theta, then `<surface>_rad`. The truth has been started at the state. What comes out
+    is not finite, or not near, where there is no such flight.
+    """
+    look = _looking(truth, state, names)
+    x = np.array([getattr(state, name) for name in names])
+    here = look(x)
+    J = np.column_stack([(look(x + step) - here) / STEP_RAD for step in STEP_RAD * np.eye(x.size)])
+    for _ in range(_MAX_STEPS):
+        if not np.abs(here).max() > _GOAL:
+            break
+        step = _shortened(_newton_step(J, here))
+        x = x + step
+        there = look(x)
+        J += np.outer(there - here - J @ step, step) / (step @ step)
+        here = there
+    return x
+
+
+def _newton_step(J: Vector, here: Vector) -> Vector:
+    """The step that takes `here` (6,) to zero in the least-squares sense; zero where that is not finite."""
+    if not isfinite(J.sum() + here.sum()):
+        return np.full(J.shape[1], np.nan)
+    try:
+        return np.linalg.solve(J, -here)
+    except np.linalg.LinAlgError:  # singular, or other than six unknowns
+        return np.linalg.lstsq(J, -here, rcond=None)[0]
+
+
+def _shortened(step: Vector) -> Vector:
+    """At most MAX_CHANGE_RAD in each unknown."""
+    return step * min(1.0, MAX_CHANGE_RAD / max(np.abs(step).max(), STEP_RAD))
+
+
+def _looking(truth: Plant, state: FlightState, names: tuple[str, ...]) -> Look:
+    """The six accelerations, m/s2 and rad/s2, as a function of the unknowns."""
+    fdm, speed_fps = truth.fdm, state.airspeed_mps * FT_PER_M
+    theta_place, *flow = (truth.input(name) for name in ("ic/theta-rad", *_RATES_AND_FLOW))
+    surfaces = [truth.input(truth.aircraft.surface[name.removesuffix("_rad")].command) for name in names[3:]]
+    puts = [node.set_double_value for node in (theta_place, *flow, *surfaces)]
+    gets = [truth.node(name).get_double_value for name, _ in ACCELERATIONS]
+    factors = np.array([factor for _, factor in ACCELERATIONS])
+
+    def look(x: Vector) -> Vector:
+        alpha, beta, theta, *deflections = x.tolist()
+        along = speed_fps * cos(beta)
+        flow_fps = along * cos(alpha), speed_fps * sin(beta), along * sin(alpha)
+        for put, value in zip(puts, (theta, *flow_fps, *deflections), strict=True):
+            put(value)
+        if not fdm.run_ic():
+            raise SimulationFailed("JSBSim cannot initialise the flight")
+        return np.array([get() for get in gets]) * factors
+
+    return look
 
 
 def _not_flown(state: FlightState, why: str, aircraft: Aircraft) -> BadInput:

@@ -13,7 +13,7 @@ from beaver_ftc.documents.errors import BadInput, SimulationFailed, suggestion
 from beaver_ftc.results import typed, verdict
 from beaver_ftc.results.log import Log, MemoryLog, StoredLog
 from beaver_ftc.results.metrics import Document, metrics
-from beaver_ftc.scenario.given import ScenarioLike, load
+from beaver_ftc.scenario.loader import ScenarioLike, load
 from beaver_ftc.scenario.schema import Scenario
 
 if TYPE_CHECKING:

@@ -15,6 +15,7 @@ from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 from beaver_ftc.results.expectations import evaluate
+from beaver_ftc.scenario.faults import of_a_sensor
 
 if TYPE_CHECKING:
     from beaver_ftc.loop.outcome import Landing
@@ -323,7 +324,7 @@ def faults_of(scenario: "Scenario") -> list[Document]:
 
 def sensor_of(fault: Any) -> Document:
     """The instrument that a fault is on, as the documents have it; nothing for other faults."""
-    return {"sensor": fault.sensor} if hasattr(fault, "sensor") else {}
+    return {"sensor": fault.sensor} if of_a_sensor(fault) else {}
 
 
 def hints(flight: "Landing", document: Document) -> list[str]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from beaver_ftc.loop.simulation import Stepping
 from beaver_ftc.results.flight import Flight, check_plug_in
 from beaver_ftc.results.log import MemoryLog
-from beaver_ftc.scenario.given import ScenarioLike, load
+from beaver_ftc.scenario.loader import ScenarioLike, load
 
 if TYPE_CHECKING:
     from pandas import DataFrame

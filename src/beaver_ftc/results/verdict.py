@@ -188,10 +188,10 @@ def _sizes(fault: Document) -> list[str]:
 
 def _sensor_sizes(fault: Document) -> list[str]:
     """The same of an instrument's fault, in the unit of the instrument."""
-    from beaver_ftc.scenario.sensor_faults import UNITS
+    from beaver_ftc.scenario.sensors import QUANTITIES
 
     size = fault["size"].get("magnitude")
-    unit = UNITS[fault["sensor"]][0]
+    unit = QUANTITIES[fault["sensor"]].unit
     words = {"bias": "{:+g} {}", "noise": "{:g} {}", "scale": "{:+.0%}"}
     return [] if size is None else [words[fault["type"]].format(size, unit)]
 

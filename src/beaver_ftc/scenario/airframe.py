@@ -1,13 +1,17 @@
-"""The aircraft of a scenario: found by what the scenario calls it, and what its names are checked against."""
+"""The aircraft of a scenario, found by what the scenario calls it, and the names that are its own."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo
 
 from beaver_ftc.aircraft import DEFAULT, Aircraft, load
 from beaver_ftc.aircraft.loading import BESIDE, NotDerived, UnknownAircraft
-from beaver_ftc.documents.errors import BeaverFtcError
+from beaver_ftc.documents.base import Number, refuse
+from beaver_ftc.documents.errors import BeaverFtcError, suggestion
 from beaver_ftc.plugins import first_use
 
 _CHECKED: ContextVar[tuple[Aircraft, str | None] | None] = ContextVar("aircraft", default=None)
@@ -54,3 +58,49 @@ def checked_against(aircraft: Aircraft, reference: str | None = None) -> Iterato
         yield
     finally:
         _CHECKED.reset(token)
+
+
+def folder_of(info: ValidationInfo) -> Path | None:
+    """Where the scenario's file is, if it is one."""
+    return (info.context or {}).get("folder")
+
+
+def known_aircraft(reference: str, info: ValidationInfo) -> str:
+    """Refuse what is no aircraft."""
+    try:
+        aircraft_called(reference, folder_of(info))
+    except UnknownAircraft as error:
+        refuse([((), str(error))])
+    return reference
+
+
+def _known_surface(name: str) -> str:
+    surfaces = checked_aircraft().surfaces
+    if name not in surfaces:
+        refuse([((), f"{name[:100]!r} is not known{suggestion(name, surfaces)}")])
+    return name
+
+
+def _examples(schema: dict[str, Any]) -> None:
+    schema["examples"] = list(load().surfaces)
+
+
+def _known_term(name: str) -> str:
+    known = checked_aircraft().terms
+    if name not in known:
+        refuse([((), f"unknown aerodynamic term{suggestion(name, known)}")])
+    return name
+
+
+def _no_more_than_there_are(given: Any) -> Any:
+    """Refuse a mapping that cannot be right before a suggestion is made for each of its names."""
+    most = len(checked_aircraft().terms)
+    if isinstance(given, dict) and len(given) > most:
+        refuse([((), f"{len(given)} terms, allowed: at most the {most} there are")])
+    return given
+
+
+Actuator = Annotated[str, AfterValidator(_known_surface), Field(json_schema_extra=_examples)]
+TermName = Annotated[str, AfterValidator(_known_term)]
+Ratio = Annotated[Number, Field(ge=-10, le=10)]
+Ratios = Annotated[dict[TermName, Ratio], BeforeValidator(_no_more_than_there_are)]

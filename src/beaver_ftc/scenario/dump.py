@@ -1,9 +1,13 @@
-"""A scenario back to YAML, every default written out: what was flown, complete and flyable again."""
+"""A scenario back to text: complete and flyable again, or by section, a key to what was computed."""
 
+from collections.abc import Iterable
 from typing import Any
 
 import yaml
 from pydantic import BaseModel
+
+_MOST = 256
+_texts: dict[int, tuple[BaseModel, str]] = {}  # a section is kept, so its id stays its own
 
 
 class _Dumper(yaml.SafeDumper):
@@ -31,6 +35,20 @@ _Dumper.add_representer(list, _list)
 
 
 def to_yaml(scenario: BaseModel) -> str:
-    """The fully resolved scenario; loading it again gives an equal one."""
+    """The fully resolved scenario, every default written out; loading it again gives an equal one."""
     data = scenario.model_dump(mode="json", exclude_none=True, by_alias=True)
     return yaml.dump(data, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=110)
+
+
+def texts_of(scenario: BaseModel, sections: Iterable[str]) -> tuple[str, ...]:
+    """What sections hold. Flights of a sweep share those that do not vary, whose text is written once."""
+    return tuple(_text_of(getattr(scenario, name)) for name in sections)
+
+
+def _text_of(section: BaseModel) -> str:
+    known = _texts.get(id(section))
+    if known is None:
+        if len(_texts) >= _MOST:
+            _texts.clear()
+        known = _texts[id(section)] = section, section.model_dump_json()
+    return known[1]

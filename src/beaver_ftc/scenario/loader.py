@@ -1,33 +1,46 @@
-"""A scenario from a file, a built-in name or a text: every mistake at once, one line each."""
+"""A scenario from a file, a built-in name, a text or a mapping: every mistake at once, one line each."""
 
+from collections.abc import Mapping
+from os import PathLike
 from pathlib import Path
 from typing import Any
 
 from beaver_ftc.documents.document import Document, Problem
+from beaver_ftc.documents.errors import BadInput, nearest, suggestion
 from beaver_ftc.documents.files import UnreadableError, read_text
+from beaver_ftc.documents.keys import plain
+from beaver_ftc.documents.paths import data_root
 from beaver_ftc.documents.problems import ScenarioError
 from beaver_ftc.documents.validation import parse_document, validate
-from beaver_ftc.scenario.builtin import builtin_names, builtin_path, looks_like_a_path, no_such, resolve
 from beaver_ftc.scenario.consistency import conflicts_in_data
 from beaver_ftc.scenario.schema import Scenario
 
 MAX_BYTES = 4_000_000
 """A hand-written scenario is a few kB; a fully resolved one with reference tables in it stays below this."""
+UNNAMED = "unnamed"
+
+ScenarioLike = Scenario | str | PathLike[str] | Mapping[str, Any]
+
+
+def load(scenario: ScenarioLike) -> Scenario:
+    """The scenario of a built-in name, a file's path or a mapping; a Scenario is returned as it is.
+
+    A mapping has the keys of a scenario file, `name` may be left out; its CSV files are in the working
+    directory. Raises BadInput with one line a mistake.
+    """
+    if isinstance(scenario, Scenario):
+        return scenario
+    if isinstance(scenario, Mapping):
+        return validate_scenario(Document({"name": UNNAMED, **plain(scenario)}), folder=Path())
+    if isinstance(scenario, str | PathLike):
+        return load_scenario(Path(scenario) if isinstance(scenario, PathLike) else scenario)
+    raise BadInput(f"{scenario!r:.60} is no scenario, allowed: a built-in name, a path or a mapping")
 
 
 def load_scenario(path_or_name: str | Path) -> Scenario:
     """The scenario in a file or of a built-in name. Raises ScenarioError with one line a mistake."""
     path = resolve(path_or_name)
     return load_text(read_file(path, str(path_or_name)), source=str(path), folder=path.parent)
-
-
-def builtin_scenarios() -> list[tuple[str, str, Path]]:
-    """(name, description, file) of each built-in scenario."""
-    return [
-        (s.name, s.description, builtin_path(name))
-        for name in builtin_names()
-        for s in (load_scenario(name),)
-    ]
 
 
 def load_text(text: str, source: str = "<text>", folder: Path | None = None) -> Scenario:
@@ -58,3 +71,60 @@ def read_file(path: Path, given: str, kind: str = "scenario") -> str:
         if says.startswith("no such file") and not looks_like_a_path(given):
             says = no_such(given, kind)
         raise ScenarioError(str(path), [Problem(error.line, (), says)]) from None
+
+
+def _folder() -> Path:
+    return data_root() / "scenarios"
+
+
+def builtin_names() -> list[str]:
+    """Names of the built-in scenarios, in alphabetical order; a scenario's name is its file's."""
+    return sorted(path.stem for path in _folder().glob("*.yaml"))
+
+
+def builtin_sweeps() -> list[str]:
+    """Names of the sweeps that come with the project."""
+    return sorted(path.stem for path in (_folder() / "sweeps").glob("*.yaml"))
+
+
+def builtin_path(name: str) -> Path:
+    """The file of a built-in scenario."""
+    return _folder() / f"{name}.yaml"
+
+
+def builtin_scenarios() -> list[tuple[str, str, Path]]:
+    """(name, description, file) of each built-in scenario."""
+    return [
+        (s.name, s.description, builtin_path(name))
+        for name in builtin_names()
+        for s in (load_scenario(name),)
+    ]
+
+
+def no_such(given: str, kind: str) -> str:
+    """What to say of a name that is no built-in `kind`, "scenario" or "sweep": perhaps it is of the other."""
+    names = {"scenario": builtin_names(), "sweep": builtin_sweeps()}
+    other, flies = ("sweep", "sweep") if kind == "scenario" else ("scenario", "run")
+    if given in names[other]:
+        return f"{given} is a {other}, allowed: a {kind}; `beaver-ftc {flies} {given}` flies it"
+    says = f"no such file or built-in {kind}: {given[:100]!r}"
+    near = nearest(given, names[kind] + names[other])
+    if near in names[other]:
+        return f"{says}, did you mean the {other} {near}? allowed: {', '.join(names[kind])}"
+    return f"{says}{suggestion(given, names[kind])}"
+
+
+def resolve(name_or_path: str | Path, kind: str = "scenario") -> Path:
+    """The file a built-in name of a "scenario" or "sweep" stands for; anything else is a path already."""
+    given = str(name_or_path)
+    names, folder = (
+        (builtin_names(), _folder()) if kind == "scenario" else (builtin_sweeps(), _folder() / "sweeps")
+    )
+    if not looks_like_a_path(given) and given in names:
+        return folder / f"{given}.yaml"
+    return Path(name_or_path)
+
+
+def looks_like_a_path(given: str) -> bool:
+    """A built-in name has no folder and no dot."""
+    return any(mark in given for mark in "/\\.")

@@ -1,6 +1,7 @@
 """The scenario file as frozen, typed, strict sections; ranges are the contract's."""
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Annotated, Any, Self
 
 from pydantic import (
@@ -17,17 +18,34 @@ from pydantic import (
 
 from beaver_ftc.aircraft import DEFAULT, Aircraft, UnknownAircraft, load
 from beaver_ftc.documents.base import Flag, Number, Section, Whole, number, refuse
+from beaver_ftc.documents.document import Document
+from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.documents.keys import UnusableKeyError, parse_key, plain, with_values
+from beaver_ftc.documents.validation import validate
 from beaver_ftc.scenario.actuators import Actuators
-from beaver_ftc.scenario.airframe import aircraft_called, checked_against, find_aircraft
+from beaver_ftc.scenario.airframe import (
+    Ratio,
+    Ratios,
+    aircraft_called,
+    checked_against,
+    find_aircraft,
+    folder_of,
+    known_aircraft,
+)
 from beaver_ftc.scenario.autopilot import Autopilot
-from beaver_ftc.scenario.change import Change
-from beaver_ftc.scenario.consistency import DURATION_S, RATE_HZ, Outline, conflicts, keys_expected
-from beaver_ftc.scenario.control import ControlConfig
-from beaver_ftc.scenario.diagnosis import FdiConfig
+from beaver_ftc.scenario.consistency import (
+    DURATION_S,
+    RATE_HZ,
+    Outline,
+    conflicts,
+    conflicts_in_data,
+    keys_expected,
+)
+from beaver_ftc.scenario.control import ControlConfig, known_law
+from beaver_ftc.scenario.diagnosis import FdiConfig, can_be_bounded, known_scheme
 from beaver_ftc.scenario.environment import Environment
-from beaver_ftc.scenario.faults import MOST_FAULTS, Fault, FaultType
+from beaver_ftc.scenario.faults import MOST_FAULTS, Fault, FaultType, nameable
 from beaver_ftc.scenario.initial import Initial, default_initial, given_initial, initial_schema
-from beaver_ftc.scenario.names import Ratio, Ratios, folder_of, known_aircraft, nameable
 from beaver_ftc.scenario.sensors import Sensors
 from beaver_ftc.scenario.signals import Reference
 
@@ -130,6 +148,29 @@ class DesignModel(Section):
         description="design / table ratio of single aerodynamic terms, 1 is no error, e.g. Cm_alpha: 0.9",
         examples=[{"Cm_alpha": 0.9}],
     )
+
+
+class Change(Section):
+    """From a time on another law, another diagnosis, other sensors; what is left out stays as it is."""
+
+    at_s: Number = number(unit="s", says="from when on", gt=0, le=360_000)
+    law: Annotated[str, AfterValidator(known_law)] | None = Field(
+        default=None, description="as control.law; surfaces and reference go on from where they are"
+    )
+    scheme: Annotated[str, AfterValidator(known_scheme)] | None = Field(
+        default=None, description="as fdi.scheme; the diagnosis begins anew"
+    )
+    sensors: Sensors | None = Field(default=None, description="as sensors: a preset, or errors by signal")
+    declared_sensors: Annotated[Sensors, AfterValidator(can_be_bounded)] | None = Field(
+        default=None, description="as fdi.bounds.sensors; the diagnosis begins anew"
+    )
+
+    @model_validator(mode="after")
+    def _changes_something(self) -> Self:
+        said = (value for key, value in self if key != "at_s")
+        if all(value is None for value in said):
+            refuse([((), "says no change, allowed: law, scheme, sensors or declared_sensors")])
+        return self
 
 
 class RmsLimits(Section):
@@ -293,14 +334,21 @@ class Scenario(Section):
         changes_s = tuple(change.at_s for change in self.changes)
         return Outline(self.duration_s, self.rate_hz, starts_s, expected, flown, changes_s)
 
-    def with_(self, changes: Mapping[str, Any]) -> "Scenario":
+    def with_(self, changes: Mapping[str, Any]) -> Self:
         """This scenario with new values at dotted keys, e.g. `{"faults[0].magnitude": 0.2}`.
 
         Raises BadInput that names the key, what is wrong and what is allowed.
         """
-        from beaver_ftc.scenario.overrides import changed
-
-        return changed(self, changes)
+        if not isinstance(changes, Mapping):
+            raise BadInput(f"{changes!r:.60} is no change, allowed: a mapping of dotted keys to values")
+        data = self.model_dump(mode="json", by_alias=True, exclude_unset=True)
+        for key, value in changes.items():
+            try:
+                data = with_values(data, {parse_key(key): plain(value)})
+            except UnusableKeyError as error:
+                raise BadInput(f"{key}: {str(error).replace('the base', 'the scenario')}") from None
+        with checked_against(self.airframe, self.aircraft):
+            return validate(type(self), Document(data), "", Path(), conflicts_in_data)
 
     def warnings(self) -> tuple[str, ...]:
         """What is allowed and yet deserves a word: one line each, `key.path: what`."""

@@ -1,14 +1,18 @@
-"""What the instruments do to the truth: one section a signal; what is left out is measured perfectly."""
+"""The instruments: a row each, what they do to the truth, and their names.
+
+What is left out of `sensors` is measured perfectly.
+"""
 
 from collections.abc import Callable
 from math import hypot, radians, sqrt
-from typing import Any, ClassVar, Self, TypeVar
+from typing import Any, ClassVar, NamedTuple, Self, TypeVar
 
 from pydantic import Field, GetJsonSchemaHandler, create_model, model_validator
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
 from beaver_ftc.documents.base import Number, Section, number
+from beaver_ftc.scenario.airframe import checked_aircraft
 
 
 class _Sensor(Section):
@@ -127,6 +131,27 @@ class Accelerometer(_Sensor):
     """Specific force along a body axis at the centre of mass: all forces but gravity, over the mass."""
 
 
+class Quantity(NamedTuple):
+    """What an instrument measures: unit, in SI, the largest offset or noise of a fault, in words."""
+
+    unit: str
+    si: float
+    most: float
+    words: str = ""
+
+
+_DEG = radians(1.0)
+QUANTITIES = {
+    **dict.fromkeys("pqr", Quantity("deg/s", _DEG, 200.0)),
+    **dict.fromkeys(("alpha", "beta", "phi", "theta", "psi"), Quantity("deg", _DEG, 90.0)),
+    "V": Quantity("m/s", 1.0, 100.0, "airspeed"),
+    "qdyn": Quantity("Pa", 1.0, 5000.0, "dynamic_pressure"),
+    "altitude": Quantity("m", 1.0, 5000.0),
+    "engine_rpm": Quantity("rpm", 1.0, 3000.0),
+    "manifold_pressure": Quantity("inHg", 1.0, 50.0),
+    **dict.fromkeys(("ax", "ay", "az"), Quantity("m/s2", 1.0, 100.0)),
+}
+ALIASES = {of.words: name for name, of in QUANTITIES.items() if of.words}
 ENGINE = ("engine_rpm", "manifold_pressure")  # instruments of an engine like the Beaver's
 ACCELEROMETERS = ("ax", "ay", "az")
 
@@ -199,3 +224,14 @@ class Sensors(Section):
         signals = handler.resolve_ref_schema(handler(core))
         preset = {"enum": list(PRESETS), "type": "string", "description": "a preset"}
         return {"anyOf": [preset, signals]}
+
+
+def sensors_there() -> tuple[str, ...]:
+    """The instruments of the aircraft in question."""
+    engine = checked_aircraft().has_engine_instruments
+    return tuple(name for name in Sensors.model_fields if engine or name not in ENGINE)
+
+
+def sensor_words(name: str) -> str:
+    """What a verdict calls a sensor: surfaces may have the same name."""
+    return f"sensor {name}"

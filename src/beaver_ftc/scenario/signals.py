@@ -2,10 +2,16 @@
 
 One class a kind: its parameters and `rate_deg_s(t_s)`. tau = t - start_s; every signal but the table is zero
 before `start_s` and, but for the ramp, from `end_s` on. A new kind is a class here and a line in `Signal`.
+
+A table comes from a CSV file: of bounded size, in the scenario's own folder, time increasing.
 """
 
+import csv as csv_files
+from collections.abc import Sequence
 from functools import lru_cache
-from math import pi
+from itertools import pairwise
+from math import isfinite, pi
+from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
@@ -13,7 +19,9 @@ from numpy.typing import NDArray
 from pydantic import ConfigDict, Field, ValidationInfo, model_validator
 
 from beaver_ftc.documents.base import Number, Section, number, order_conflicts, refuse
-from beaver_ftc.scenario.table import MAX_ROWS, check_table, read_column
+from beaver_ftc.documents.files import UnreadableError, read_text
+from beaver_ftc.documents.paths import inside
+from beaver_ftc.scenario.airframe import folder_of
 
 Samples = NDArray[np.float64]
 
@@ -22,6 +30,11 @@ _INSTANT_S = 1e-9
 """Frame times are k / rate in floating point: a signal starts on the frame its start names."""
 
 _LATEST_S = 360_000.0
+
+MAX_ROWS = 20_000
+_MAX_BYTES = 2_000_000
+_LARGEST_DEG_S = 1000.0
+_FORMAT = "comma-separated text with a header line, times in column t_s, rates in deg/s"
 
 
 def _amplitude() -> Any:
@@ -176,8 +189,8 @@ class Csv(Section):
     def _read(cls, given: Any, info: ValidationInfo) -> Any:
         if not isinstance(given, dict) or "time_s" in given or "values_deg_s" in given:
             return given
-        folder = (info.context or {}).get("folder")
-        return {**given, **read_column(given.get("file"), given.get("column", "rate_deg_s"), folder)}
+        column = given.get("column", "rate_deg_s")
+        return {**given, **_read_column(given.get("file"), column, folder_of(info))}
 
     @model_validator(mode="after")
     def _table_is_a_time_history(self) -> Self:
@@ -186,6 +199,68 @@ class Csv(Section):
 
     def rate_deg_s(self, t_s: Samples) -> Samples:
         return np.interp(t_s, self.time_s, self.values_deg_s)
+
+
+def _read_column(file: Any, column: Any, folder: Path | None) -> dict[str, list[float]]:
+    """The named column of a CSV file (deg/s) against its `t_s` (s); refuses what is not a table."""
+    if not isinstance(file, str) or not isinstance(column, str) or not file:
+        # the schema reports `file` or `column`, and only them
+        return {"time_s": [0.0], "values_deg_s": [0.0]}
+    path = _inside(folder, file)
+    try:
+        lines = read_text(path, _MAX_BYTES).splitlines()
+        return _parse(lines, column)
+    except UnreadableError as error:
+        refuse([(("file",), f"{file!r} line {error.line}: {error}")])
+    raise AssertionError("refuse always raises here")
+
+
+def _inside(folder: Path | None, file: str) -> Path:
+    """The file's path, resolved, if it is in the folder or below it: a scenario reads nothing else."""
+    path = None
+    if folder is None:
+        says = "there is no folder to read it from, allowed: csv in a scenario that is a file itself"
+    else:
+        path = inside(folder, file)
+        says = f"{file!r} is outside, allowed: a file in the scenario's own folder or below it"
+    refuse([(("file",), says)] if path is None else [])
+    assert path is not None
+    return path
+
+
+def _parse(lines: Sequence[str], column: str) -> dict[str, list[float]]:
+    header = [name.strip() for name in next(csv_files.reader(lines[:1]), [])]
+    for name in ("t_s", column):
+        if header.count(name) != 1:
+            raise UnreadableError(f"the header has no column {name!r}, allowed: {_FORMAT}")
+    if len(lines) - 1 > MAX_ROWS:
+        raise UnreadableError(f"too many rows ({len(lines) - 1}), allowed: at most {MAX_ROWS}")
+    at, of = header.index("t_s"), header.index(column)
+    rows = [_row(line, number, (at, of)) for number, line in enumerate(lines[1:], start=2) if line.strip()]
+    if not rows:
+        raise UnreadableError(f"there are no rows, allowed: {_FORMAT}", 2)
+    return {"time_s": [row[0] for row in rows], "values_deg_s": [row[1] for row in rows]}
+
+
+def _row(line: str, number: int, columns: tuple[int, int]) -> tuple[float, float]:
+    cells = line.split(",")
+    try:
+        at, of = float(cells[columns[0]]), float(cells[columns[1]])
+    except (ValueError, IndexError):
+        raise UnreadableError(f"{line[:40]!r} is not a row of numbers, allowed: {_FORMAT}", number) from None
+    if not (isfinite(at) and isfinite(of)):
+        raise UnreadableError(f"{line[:40]!r} is not finite, allowed: finite numbers", number)
+    return at, of
+
+
+def check_table(time_s: Sequence[float], values_deg_s: Sequence[float]) -> None:
+    """Refuse columns of different length, times that do not increase, values that no aircraft flies."""
+    if len(time_s) != len(values_deg_s):
+        refuse([((), f"{len(time_s)} times but {len(values_deg_s)} values, allowed: as many of each")])
+    if not all(a < b for a, b in pairwise(time_s)) or time_s[0] < 0 or time_s[-1] > _LATEST_S:
+        refuse([((), f"times do not increase from 0, allowed: strictly increasing, 0 to {_LATEST_S:g} s")])
+    if max(map(abs, values_deg_s)) > _LARGEST_DEG_S:
+        refuse([((), f"rates out of range, allowed: -{_LARGEST_DEG_S:g} to {_LARGEST_DEG_S:g} deg/s")])
 
 
 class Signal(Section):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from beaver_ftc import compiled
-from beaver_ftc.design.coefficients import SURFACES
+from beaver_ftc.design.fdc import SURFACES
 from beaver_ftc.loop import stepping
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.studies.bench.parts import PARTS, frame_with, frame_without, nothing

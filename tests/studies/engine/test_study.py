@@ -152,7 +152,7 @@ def test_a_key_that_has_gone_is_a_difference():
 ALL_IMPORTED = """
 import sys
 from pathlib import Path
-from beaver_ftc.scenario.sweep_loader import load_sweep
+from beaver_ftc.scenario.sweeps import load_sweep
 from beaver_ftc.studies.sweep.one_flight import Job, fly_one, scenario_of
 from beaver_ftc.studies.sweep.sampling import Plan
 from beaver_ftc.studies.sweep.one_flight import schema_of, table_of

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from beaver_ftc.design.coefficients import SURFACES
+from beaver_ftc.design.fdc import SURFACES
 from beaver_ftc.studies.matrix.fault_matrix import (
     AIRSPEEDS_MPS,
     FAULTS,

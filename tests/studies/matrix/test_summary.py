@@ -2,7 +2,7 @@
 
 import pytest
 
-from beaver_ftc.design.coefficients import SURFACES
+from beaver_ftc.design.fdc import SURFACES
 from beaver_ftc.studies.matrix.fault_matrix import FAULTS, as_text, beside_told, document_of
 
 FAULT, SURFACE = FAULTS[0][0], "elevator"

@@ -8,7 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from beaver_ftc.design.coefficients import MASS, inertia_coefficients
+from beaver_ftc.design.fdc import MASS
+from beaver_ftc.design.model import inertia_coefficients
 from beaver_ftc.design.variants import anchor, design_of, response
 from beaver_ftc.studies.mismatch import models
 from beaver_ftc.studies.mismatch.models import Belief, designed_moments
@@ -62,14 +63,16 @@ def test_belief_is_what_the_compiled_loop_evaluates(keys):
 def test_inertial_part_is_eulers_equation():
     x, _, _ = random_states()
     euler = [np.linalg.solve(INERTIA, -np.cross(w, INERTIA @ w)) for w in x]
-    assert models.inertial(inertia_coefficients(), x) == pytest.approx(np.array(euler), rel=1e-9, abs=1e-12)
+    assert models.inertial(inertia_coefficients(MASS), x) == pytest.approx(
+        np.array(euler), rel=1e-9, abs=1e-12
+    )
 
 
 def test_weights_are_the_inverse_inertia():
     """A unit of Cl, Cm, Cn is a moment qdyn S (b, c, b) about x, y, z."""
     for i, (name, length) in enumerate((("Cl", 14.63), ("Cm", 1.5875), ("Cn", 14.63))):
         moment = 900.0 * 23.23 * length * np.eye(3)[i]
-        found = models.weights(inertia_coefficients(), name, np.array([900.0]))[0]
+        found = models.weights(inertia_coefficients(MASS), name, np.array([900.0]))[0]
         assert found == pytest.approx(np.linalg.solve(INERTIA, moment), rel=1e-12, abs=1e-12)
 
 
@@ -90,7 +93,7 @@ def test_earth_in_body_is_a_rotation_of_the_earths(attitude, latitude):
 def test_a_body_at_rest_among_the_stars_keeps_its_rates_against_the_earth():
     attitude, latitude = np.array([[0.4, -0.3, 2.0]]), np.array([0.7])
     at_rest = -earth_in_body(attitude, latitude)
-    inertia = inertia_coefficients()
+    inertia = inertia_coefficients(MASS)
     total = models.inertial(inertia, at_rest) + earth_rotation(
         lambda w: models.inertial(inertia, w), at_rest, attitude, latitude
     )
@@ -100,7 +103,7 @@ def test_a_body_at_rest_among_the_stars_keeps_its_rates_against_the_earth():
 def test_earth_rotation_is_the_derivative_of_the_rates_of_a_free_body():
     """Integrate a body free of moments among the stars, over an Earth so fast that differences show it."""
     scale, step = 1e4, 1e-4
-    inertia, latitude = inertia_coefficients(), np.array([0.7])
+    inertia, latitude = inertia_coefficients(MASS), np.array([0.7])
     attitude = np.array([0.4, -0.3, 2.0])
     earth = (
         scale * EARTH_RATE_RAD_S * np.array([np.cos(0.7), 0.0, -np.sin(0.7)])

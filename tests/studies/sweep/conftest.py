@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from beaver_ftc.scenario.sweep_loader import Sweep, load_sweep_text
+from beaver_ftc.scenario.sweeps import Sweep, load_sweep_text
 
 SHORT = """\
 name: short

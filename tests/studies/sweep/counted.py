@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from beaver_ftc.aircraft import load
-from beaver_ftc.scenario.sweep_loader import load_sweep_text
+from beaver_ftc.scenario.sweeps import load_sweep_text
 from beaver_ftc.studies.sweep.one_flight import columns_of, schema_of, table_of
 from beaver_ftc.studies.sweep.outcomes import Flights
 from beaver_ftc.studies.sweep.store import write_tables

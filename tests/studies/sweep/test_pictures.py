@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 
-from beaver_ftc.scenario.sweep_loader import load_sweep_text
+from beaver_ftc.scenario.sweeps import load_sweep_text
 from beaver_ftc.studies.sweep.outcomes import worst_flights
 from beaver_ftc.studies.sweep.pictures import (
     FIGURES,

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from beaver_ftc.scenario.sweep_schema import Variation
+from beaver_ftc.scenario.sweeps import Variation
 from beaver_ftc.studies.sweep.sampling import Plan, flight_seed, value_at
 
 from .conftest import sweep_of

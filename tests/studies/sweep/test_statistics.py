@@ -5,8 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from beaver_ftc.scenario.sweep_loader import load_sweep_text
-from beaver_ftc.scenario.sweep_schema import SweepExpect
+from beaver_ftc.scenario.sweeps import SweepExpect, load_sweep_text
 from beaver_ftc.studies.sweep import summary_page as words
 from beaver_ftc.studies.sweep.outcomes import replay_command, worst_flights
 from beaver_ftc.studies.sweep.summary import evaluate, summarise

@@ -6,9 +6,9 @@ from pydantic import ValidationError
 from beaver_ftc.documents.keys import UnusableKeyError, parse_key, with_values
 from beaver_ftc.documents.problems import ScenarioError
 from beaver_ftc.scenario.airframe import checked_against
+from beaver_ftc.scenario.loader import builtin_sweeps
 from beaver_ftc.scenario.schema import Scenario
-from beaver_ftc.scenario.sweep_loader import builtin_sweeps, is_sweep, load_sweep, load_sweep_text
-from beaver_ftc.scenario.sweep_schema import SweepFile
+from beaver_ftc.scenario.sweeps import SweepFile, is_sweep, load_sweep, load_sweep_text
 from beaver_ftc.studies.sweep.sampling import Plan
 
 HEAD = "base: elevator-partial-loss\nruns: 3\nvary:\n  "

@@ -31,7 +31,7 @@ import numpy as np
 
 from beaver_ftc.aircraft import Aircraft, Term
 from beaver_ftc.design.context import Context
-from beaver_ftc.design.inertia import inertia_coefficients
+from beaver_ftc.design.model import inertia_coefficients
 from beaver_ftc.diagnosis.air import UNSEEN
 
 UNEXPLAINED_S = 0.1

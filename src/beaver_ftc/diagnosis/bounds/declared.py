@@ -11,11 +11,11 @@ import numpy as np
 
 from beaver_ftc.aircraft import AXES, Aircraft, MassProperties
 from beaver_ftc.design.engine import power_error_kw
-from beaver_ftc.design.inertia import inertia_coefficients
+from beaver_ftc.design.model import inertia_coefficients
 from beaver_ftc.design.variants import mass_of
 from beaver_ftc.diagnosis.bounds.worst_case import fill_error_map
+from beaver_ftc.plant.faults import OF_THE_SLIPSTREAM
 from beaver_ftc.plant.instruments import NOISE_LIMIT_SIGMA, SENSORS, SIGNALS
-from beaver_ftc.plant.sensor_faults import OF_THE_SLIPSTREAM
 from beaver_ftc.scenario.diagnosis import Bounds
 from beaver_ftc.scenario.sensors import ENGINE, Sensors
 

@@ -9,7 +9,7 @@ from beaver_ftc.aircraft import AXES, Aircraft, MassProperties, Term, load
 from beaver_ftc.aircraft.aircraft import MOMENTS
 from beaver_ftc.aircraft.schema import RATE_SIGNALS
 from beaver_ftc.design.context import Declared, DesignFunctions
-from beaver_ftc.design.inertia import inertia_coefficients
+from beaver_ftc.design.model import inertia_coefficients
 from beaver_ftc.design.terms import AIRSPEED, PH, QH, RH
 from beaver_ftc.design.variants import coefficient_slopes, jacobian
 from beaver_ftc.diagnosis.bounds.declared import ROLLING, SCALE_M, Errors, gust_mps, inertia_slack, tolerances

@@ -50,7 +50,7 @@ def admitted_dtype(n: int) -> np.dtype:
         [
             ("any", "i8"),
             ("tolerance", "f8", (MAX_TERMS,)),  # of each moment coefficient, as the design model has them
-            ("inertia", "f8", (12,)),  # of each inertia coefficient, in the order of design.inertia
+            ("inertia", "f8", (12,)),  # of each inertia coefficient, in the order of design.model
             ("offset", "f8", (7,)), ("slope", "f8", (7,)),  # error of a signal: offset + slope |signal|
             ("steady", "f8", (3,)),  # of the offset of a gyro, what does not change
             ("gust", "f8", (3,)), ("deflection", "f8"),

@@ -19,7 +19,7 @@ from beaver_ftc.plugins import DETECTORS, LAWS, is_compiled, registered
 from beaver_ftc.results.log import SpooledLog
 from beaver_ftc.scenario.airframe import checked_against
 from beaver_ftc.scenario.faults import TYPES, place_of
-from beaver_ftc.scenario.sensor_faults import sensors_there
+from beaver_ftc.scenario.sensors import sensors_there
 
 LONGEST_S = 3600.0  # of one live flight: its log is 0.4 GB then
 HELD = ("altitude_m", "airspeed_mps", "heading_deg")  # by the autopilot that the page asks for

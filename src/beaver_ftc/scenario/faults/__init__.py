@@ -11,16 +11,31 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
 
 from pydantic import Discriminator, Field, Tag
 
+from beaver_ftc.documents.base import refuse
+from beaver_ftc.documents.errors import suggestion
+from beaver_ftc.scenario.airframe import checked_aircraft
 from beaver_ftc.scenario.faults.base import SurfaceFault
+from beaver_ftc.scenario.faults.sensors import AnySensorFault, SensorFault, fault_name
 from beaver_ftc.scenario.faults.surfaces import Bias, LossOfEffectiveness, Unanticipated
-from beaver_ftc.scenario.names import UNANTICIPATED
-from beaver_ftc.scenario.sensor_faults import AnySensorFault, SensorFault
+from beaver_ftc.scenario.sensors import sensor_words, sensors_there
 
 __all__ = [
-    "MOST_FAULTS", "TYPES", "Bias", "Fault", "FaultType", "LossOfEffectiveness", "Unanticipated",
-    "of_a_sensor", "place_of",
+    "MOST_FAULTS",
+    "TYPES",
+    "UNANTICIPATED",
+    "Bias",
+    "Fault",
+    "FaultType",
+    "LossOfEffectiveness",
+    "SensorFault",
+    "Unanticipated",
+    "fault_name",
+    "nameable",
+    "of_a_sensor",
+    "place_of",
 ]  # fmt: skip
 
+UNANTICIPATED = "unanticipated"
 MOST_FAULTS = 1000  # of one flight: an hour of breaking and repairing by hand has room
 
 
@@ -48,6 +63,14 @@ def place_of(fault: Any) -> str:
 def of_a_sensor(fault: Any) -> bool:
     """Whether a fault, or what a file says of one, is an instrument's."""
     return "sensor" in fault if isinstance(fault, dict) else isinstance(fault, SensorFault)
+
+
+def nameable(name: str) -> str:
+    """Refuse what a diagnosis cannot name."""
+    known = (*checked_aircraft().surfaces, UNANTICIPATED, *map(sensor_words, sensors_there()))
+    if name not in known:
+        refuse([((), f"{name[:100]!r} is not known{suggestion(name, known)}")])
+    return name
 
 
 def _tag(given: Any) -> str:

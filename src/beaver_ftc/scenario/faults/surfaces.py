@@ -6,8 +6,8 @@ from typing import Literal
 from pydantic import Field
 
 from beaver_ftc.documents.base import Number, number
+from beaver_ftc.scenario.airframe import Actuator
 from beaver_ftc.scenario.faults.base import Button, Gradual, Properties, Switched
-from beaver_ftc.scenario.names import Actuator
 
 
 class LossOfEffectiveness(Gradual):

@@ -16,7 +16,7 @@ from beaver_ftc.results.log import ParquetLog
 from beaver_ftc.results.metrics import metrics
 from beaver_ftc.scenario.loader import load_scenario
 from beaver_ftc.scenario.schema import Scenario
-from beaver_ftc.scenario.sweep_loader import Sweep, load_sweep
+from beaver_ftc.scenario.sweeps import Sweep, load_sweep
 from beaver_ftc.studies.bench.contenders import (
     Bare,
     ClosedLoop,

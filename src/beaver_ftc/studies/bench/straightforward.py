@@ -8,7 +8,8 @@ the modules of the loop have the sources.
 import numpy as np
 
 from beaver_ftc.control.reference import discretise
-from beaver_ftc.design.coefficients import GEOMETRY, MASS, SURFACES, inertia_coefficients, value
+from beaver_ftc.design.fdc import GEOMETRY, MASS, SURFACES, value
+from beaver_ftc.design.model import inertia_coefficients
 from beaver_ftc.diagnosis.bounds.declared import EARTH_RATE_RAD_S
 from beaver_ftc.diagnosis.detection import ALPHA_CENTRES, BETA_CENTRES, N_BASIS
 from beaver_ftc.plant import channels as ch

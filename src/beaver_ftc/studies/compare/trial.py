@@ -29,7 +29,7 @@ class SetFlight:
 
 def of_sweep(path: str | Path, set_name: str | None = None, most: int | None = None) -> list[SetFlight]:
     """The flights of a sweep file, the first `most` of them. Raises BadInput for what is wrong with it."""
-    from beaver_ftc.scenario.sweep_loader import load_sweep
+    from beaver_ftc.scenario.sweeps import load_sweep
     from beaver_ftc.studies.sweep.one_flight import scenario_of
     from beaver_ftc.studies.sweep.sampling import Plan
 

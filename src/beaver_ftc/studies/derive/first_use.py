@@ -19,7 +19,7 @@ import numpy as np
 from beaver_ftc.aircraft import AXES, Aircraft
 from beaver_ftc.aircraft.loading import FILE, FROM_JSBSIM, is_derived
 from beaver_ftc.aircraft.schema import AircraftFile
-from beaver_ftc.design.inertia import inertia_coefficients
+from beaver_ftc.design.model import inertia_coefficients
 from beaver_ftc.documents.base import Location
 from beaver_ftc.documents.document import Problem
 from beaver_ftc.documents.errors import BeaverFtcError, SimulationFailed

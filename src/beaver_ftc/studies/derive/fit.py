@@ -16,7 +16,7 @@ from scipy.linalg import lstsq
 
 from beaver_ftc.aircraft import AXES, Aircraft, MassProperties
 from beaver_ftc.aircraft.aircraft import MOMENTS
-from beaver_ftc.design.inertia import InertiaCoefficients, inertia_coefficients, inertial
+from beaver_ftc.design.model import InertiaCoefficients, inertia_coefficients, inertial
 from beaver_ftc.studies.derive.sample import AGES_S, REACHES, SHARES, Samples, flow_signals, places, sorted_in
 
 MOST_TERMS = 26

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from beaver_ftc.design import fdc
-from beaver_ftc.design.coefficients import engine_power_kw, slipstream
+from beaver_ftc.design.engine import engine_power_kw, slipstream
 from beaver_ftc.design.variants import anchor, design_of, jacobian
 from beaver_ftc.plant.conditions import trimmed
 from beaver_ftc.plant.linear import LinearModel, differences, own

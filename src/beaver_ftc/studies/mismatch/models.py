@@ -11,16 +11,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from beaver_ftc.aircraft import Term
-from beaver_ftc.design.coefficients import (
-    GEOMETRY,
-    MASS,
-    SURFACES,
-    TERMS,
-    InertiaCoefficients,
-    inertia_coefficients,
-    value,
-)
-from beaver_ftc.design.inertia import inertial
+from beaver_ftc.design.fdc import GEOMETRY, MASS, SURFACES, TERMS, value
+from beaver_ftc.design.model import InertiaCoefficients, inertia_coefficients, inertial
 from beaver_ftc.design.variants import anchor, design_of, mass_of
 
 if TYPE_CHECKING:

@@ -46,9 +46,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from beaver_ftc.compiled import kernel
-from beaver_ftc.design.coefficients import GEOMETRY, SURFACES, TRAVEL
-from beaver_ftc.design.inertia import inertial
+from beaver_ftc.design.fdc import GEOMETRY, SURFACES, TRAVEL
+from beaver_ftc.design.model import inertial
 from beaver_ftc.plant.state import START_LATITUDE_DEG
+from beaver_ftc.scenario.faults import UNANTICIPATED, place_of
 from beaver_ftc.studies.mismatch.models import (
     AXES,
     ENGINE_TERMS,
@@ -186,8 +187,8 @@ def fault_effects(scenario: "Scenario", belief: Belief, states: States, healthy:
 
 def name_of(fault: Any) -> str:
     """A name of a fault's own: surface, type and time."""
-    place = " ".join(str(getattr(fault, key)) for key in ("sensor", "actuator") if hasattr(fault, key))
-    return f"{place} {fault.type.replace('_', ' ')} at {fault.at_s:g} s".strip()
+    place = "" if fault.type == UNANTICIPATED else f"{place_of(fault)} "
+    return f"{place}{fault.type.replace('_', ' ')} at {fault.at_s:g} s"
 
 
 def in_force(fault: Any, t_s: np.ndarray) -> np.ndarray:

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from beaver_ftc.design.coefficients import SURFACES
+from beaver_ftc.design.fdc import SURFACES
 from beaver_ftc.diagnosis.bounds.clairvoyant import Whitening
 from beaver_ftc.documents.errors import BadInput, BeaverFtcError
 from beaver_ftc.plugins import DETECTORS, is_compiled, refusal, registered

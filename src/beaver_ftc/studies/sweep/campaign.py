@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from beaver_ftc.documents.errors import BadInput, BeaverFtcError, SimulationFailed
 from beaver_ftc.results.metrics import as_json, versions
-from beaver_ftc.scenario.sweep_loader import Sweep
+from beaver_ftc.scenario.sweeps import Sweep
 from beaver_ftc.studies.engine.store import clear_disk_errors, write_whole
 from beaver_ftc.studies.engine.study import Campaign, Source
 from beaver_ftc.studies.engine.workers import LocalWorkers, Work, Workers, cores

@@ -19,8 +19,7 @@ from beaver_ftc.documents import document as source
 from beaver_ftc.documents.errors import BadInput, BeaverFtcError
 from beaver_ftc.documents.problems import key_path, problems_of
 from beaver_ftc.scenario.schema import Scenario
-from beaver_ftc.scenario.sweep_loader import Sweep
-from beaver_ftc.scenario.sweep_schema import Variation
+from beaver_ftc.scenario.sweeps import Sweep, Variation
 from beaver_ftc.studies.sweep.sampling import Assignment, flight_seed
 
 if TYPE_CHECKING:

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from beaver_ftc.scenario.sweep_schema import Variation
+from beaver_ftc.scenario.sweeps import Variation
 from beaver_ftc.studies.sweep.one_flight import AXES, DEPARTED, FLOWN, flight_name, kind_of
 
 if TYPE_CHECKING:
-    from beaver_ftc.scenario.sweep_loader import Sweep
+    from beaver_ftc.scenario.sweeps import Sweep
 
 
 NO_FAULT = "no fault"

@@ -13,8 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from beaver_ftc.scenario.sweep_loader import Sweep
-from beaver_ftc.scenario.sweep_schema import SweepFile, Variation
+from beaver_ftc.scenario.sweeps import Sweep, SweepFile, Variation
 
 _ALMOST = 2.0**-53  # keeps a unit number off 0 and 1, where a normal distribution is infinite
 

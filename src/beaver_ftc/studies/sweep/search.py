@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.scenario.sweep_loader import Sweep
+from beaver_ftc.scenario.sweeps import Sweep
 from beaver_ftc.studies.engine.study import Batch
 from beaver_ftc.studies.present.tables import finite
 from beaver_ftc.studies.sweep.one_flight import AXES, DEPARTED, Row, counts_of_rows

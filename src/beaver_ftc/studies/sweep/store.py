@@ -10,7 +10,7 @@ from typing import IO, TYPE_CHECKING, Any, Self
 
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
-from beaver_ftc.scenario.sweep_loader import Sweep
+from beaver_ftc.scenario.sweeps import Sweep
 from beaver_ftc.studies.engine import store as files
 from beaver_ftc.studies.engine.store import KEPT, Identity, Parts, batches_of
 from beaver_ftc.studies.engine.study import Batch, Batches

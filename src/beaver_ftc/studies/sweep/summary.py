@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from beaver_ftc.scenario.sweep_schema import AxisLevels, Level, QuantileLevel, SweepExpect
+from beaver_ftc.scenario.sweeps import AxisLevels, Level, QuantileLevel, SweepExpect
 from beaver_ftc.studies.engine.statistics import (
     CONFIDENCE,
     Estimate,
@@ -28,7 +28,7 @@ from beaver_ftc.studies.sweep.outcomes import NO_FAULT, Flights, Ranking, rank
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from beaver_ftc.scenario.sweep_loader import Sweep
+    from beaver_ftc.scenario.sweeps import Sweep
 
 
 Document = dict[str, Any]

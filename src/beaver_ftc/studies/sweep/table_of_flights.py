@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Any
 
 from beaver_ftc.documents.document import Document
 from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.documents.keys import plain
 from beaver_ftc.results.log import units
 from beaver_ftc.scenario.airframe import checked_against
-from beaver_ftc.scenario.given import ScenarioLike, load
-from beaver_ftc.scenario.overrides import plain
-from beaver_ftc.scenario.sweep_loader import Sweep, validate_sweep
+from beaver_ftc.scenario.loader import ScenarioLike, load
+from beaver_ftc.scenario.sweeps import Sweep, validate_sweep
 
 if TYPE_CHECKING:
     import pyarrow as pa

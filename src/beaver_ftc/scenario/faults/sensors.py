@@ -1,6 +1,6 @@
 """How an instrument can break: the reading goes wrong, the aircraft does not.
 
-Magnitudes are in the unit in which `sensors` has the instrument: UNITS.
+Magnitudes are in the unit in which `sensors` has the instrument.
 """
 
 from typing import Annotated, Any, Literal, Self
@@ -9,34 +9,9 @@ from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from beaver_ftc.documents.base import Conflict, Number, Section, number, order_conflicts, refuse
 from beaver_ftc.documents.errors import suggestion
-from beaver_ftc.scenario.airframe import checked_aircraft
-from beaver_ftc.scenario.sensors import ACCELEROMETERS, ENGINE, Sensors
+from beaver_ftc.scenario.sensors import ALIASES, QUANTITIES, sensor_words, sensors_there
 
-# Sensor -> its unit, and the largest offset or noise that a fault may have.
-UNITS: dict[str, tuple[str, float]] = {
-    **dict.fromkeys("pqr", ("deg/s", 200.0)),
-    **dict.fromkeys(("alpha", "beta", "phi", "theta", "psi"), ("deg", 90.0)),
-    "V": ("m/s", 100.0),
-    "qdyn": ("Pa", 5000.0),
-    "altitude": ("m", 5000.0),
-    "engine_rpm": ("rpm", 3000.0),
-    "manifold_pressure": ("inHg", 50.0),
-    **dict.fromkeys(ACCELEROMETERS, ("m/s2", 100.0)),
-}
 MOST_SCALE = 2.0
-# What an instrument is called in words, and in `sensors`.
-ALIASES = {"airspeed": "V", "dynamic_pressure": "qdyn"}
-
-
-def sensors_there() -> tuple[str, ...]:
-    """The instruments of the aircraft in question."""
-    engine = checked_aircraft().has_engine_instruments
-    return tuple(name for name in Sensors.model_fields if engine or name not in ENGINE)
-
-
-def sensor_words(name: str) -> str:
-    """What a verdict calls a sensor: surfaces may have the same name."""
-    return f"sensor {name}"
 
 
 def fault_name(said: Any, names: tuple[str, ...]) -> Any:
@@ -50,7 +25,7 @@ def _in_short(name: Any) -> Any:
     return ALIASES.get(name, name) if isinstance(name, str) else name
 
 
-def _known(name: str) -> str:
+def _known_sensor(name: str) -> str:
     known = sensors_there()
     if name not in known:
         refuse([((), f"{name[:100]!r} is no sensor{suggestion(name, known)}")])
@@ -58,13 +33,13 @@ def _known(name: str) -> str:
 
 
 def _examples(schema: dict[str, Any]) -> None:
-    schema["examples"] = [*UNITS, *ALIASES]
+    schema["examples"] = [*QUANTITIES, *ALIASES]
 
 
 SensorName = Annotated[
     str,
     BeforeValidator(_in_short),
-    AfterValidator(_known),
+    AfterValidator(_known_sensor),
     Field(description="the instrument that fails, as in `sensors`", json_schema_extra=_examples),
 ]
 
@@ -89,33 +64,18 @@ class SensorFault(Section):
 
     @model_validator(mode="after")
     def _fits_together(self) -> Self:
-        refuse([*order_conflicts(self.at_s, self.end_s, "at_s"), *self._out_of_range()])
+        refuse([*order_conflicts(self.at_s, self.end_s, "at_s"), *_out_of_range(self)])
         return self
 
-    def _out_of_range(self) -> list[Conflict]:
-        return []
 
-
-class _Sized(SensorFault):
-    """A fault whose size is in the sensor's unit."""
-
-    def _out_of_range(self) -> list[Conflict]:
-        unit, most = UNITS[self.sensor]
-        magnitude: float = getattr(self, "magnitude", 0.0)
-        if abs(magnitude) <= most:
-            return []
-        says = f"{magnitude:g} is out of range, allowed: at most {most:g} {unit} for {self.sensor}"
-        return [(("magnitude",), says)]
-
-
-class SensorBias(_Sized):
+class SensorBias(SensorFault):
     """The reading is off by a constant."""
 
     type: Literal["bias"]
     magnitude: Number = number(unit="the sensor's unit", says="added to the reading", ge=-5000, le=5000)
 
 
-class SensorNoise(_Sized):
+class SensorNoise(SensorFault):
     """The reading scatters."""
 
     type: Literal["noise"]
@@ -143,6 +103,15 @@ class SensorLost(SensorFault):
     """There is no reading any more, and whoever reads can tell."""
 
     type: Literal["lost"]
+
+
+def _out_of_range(fault: SensorFault) -> list[Conflict]:
+    """The conflict of an offset or a noise larger than its instrument can have."""
+    of = QUANTITIES[fault.sensor]
+    if not isinstance(fault, SensorBias | SensorNoise) or abs(fault.magnitude) <= of.most:
+        return []
+    says = f"out of range, allowed: at most {of.most:g} {of.unit} for {fault.sensor}"
+    return [(("magnitude",), f"{fault.magnitude:g} is {says}")]
 
 
 AnySensorFault = Annotated[

@@ -73,12 +73,12 @@ KNOWN = """
 import json
 from beaver_ftc.cli.catalogue import _available
 from beaver_ftc.integrations.live.session import fault_types
-from beaver_ftc.results.about import faults_of
+from beaver_ftc.results.metrics import faults_of
 from beaver_ftc.scenario.loader import load
 from beaver_ftc.scenario.schema import Scenario
-from beaver_ftc.studies.matrix.fault_matrix import Case, scenario_of
+from beaver_ftc.studies.matrix.fault_matrix import FaultCase, scenario_of
 schema = Scenario.model_json_schema()["$defs"]
-fault = scenario_of(Case("rigged wrongly", "rudder", 45.0), "nominal", 0.0).faults[0]
+fault = scenario_of(FaultCase("rigged wrongly", "rudder", 45.0), "nominal", 0.0).faults[0]
 expected = load({"name": "r", "faults": [fault.model_dump()], "expect": {"isolated_type": "reversed"}})
 of = {"effectiveness": 1.0}
 fault.strike(of, 1.0, 0.0)

@@ -14,6 +14,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections import Counter
 from functools import partial
 from pathlib import Path
 
@@ -54,14 +55,14 @@ def go_on(sweep: Sweep, out: Path, until: float) -> None:
     campaign._workers = lambda *_: ThisProcess(Work(partial(made_up, template)))
     began = time.perf_counter()
 
-    def progress(tally: campaign.Tally) -> None:
-        if tally.done >= until * sweep.flights:
+    def progress(counts: Counter[str]) -> None:
+        if counts["done"] >= until * sweep.flights:
             say(began)
             sys.stdout.flush()
             os._exit(9)
 
     campaign.run_sweep(
-        sweep, campaign.Options(out=out, resume=True), progress if until < 1 else lambda tally: None
+        sweep, campaign.Options(out=out, resume=True), progress if until < 1 else lambda counts: None
     )
     say(began)
 

@@ -106,7 +106,13 @@ def test_ailerons_and_rudder_were_where_two_equations_put_them(off_a, off_r, siz
         fdi["types"]["surface"][s]["command"] = 0.02
     fdi["bound"]["frame"][[0, 2]] = frame
     fdi["bank"]["innovation"][[0, 2]] = Z @ [off_a, off_r]
-    solve_roll_and_yaw(fdi)
+    solve_roll_and_yaw(
+        fdi["types"],
+        fdi["layout"],
+        fdi["isolation"]["estimator"],
+        fdi["bank"]["innovation"],
+        fdi["bound"]["frame"],
+    )
     e = frame + spread.sum(axis=1)
     signs = product((-1, 1), repeat=2)
     corners = np.array([np.linalg.solve(Z, Z @ [off_a, off_r] + e * sign) for sign in signs])

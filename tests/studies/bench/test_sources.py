@@ -20,7 +20,7 @@ PACKAGE = Path(beaver_ftc.__file__).parent
 MAKERS = {"kernel", "apart", "compile_into"}
 BESIDE = (
     "control/rivals/indi.py", "control/rivals/lqr.py", "loop/plugin_frame.py", "plant/channels.py",
-    "aircraft/schema.py", "compiled.py", "control/laws/state.py", "numba_inside.py",
+    "aircraft/schema.py", "compiled.py", "control/state.py", "numba_inside.py",
 )  # fmt: skip
 
 
@@ -66,7 +66,7 @@ def imported(path: Path):
 def test_every_file_that_a_kernel_follows_from_is_hashed():
     """Kernels' files, and whatever these import, on and on."""
     made = {path for path in PACKAGE.rglob("*.py") if makes_kernels(path)}
-    assert len(made) > 70
+    assert len(made) > 50
     wanted, ahead = set(), list(made)
     while ahead:
         path = ahead.pop()
@@ -111,7 +111,7 @@ def test_an_edit_of_what_a_kernel_follows_from_makes_another_name(copy, name_of)
         path = copy / file
         path.write_bytes(path.read_bytes() + b"\n")
         names.append(name_of())
-    assert len(edited) > 70
+    assert len(edited) > 50
     assert len(set(names)) == len(names)
     for file in ("cli/run.py", "results/report.py", "studies/sweep/campaign.py"):
         path = copy / file

@@ -177,7 +177,7 @@ def test_every_module_that_makes_rows_is_in_the_fingerprint(tmp_path):
         [sys.executable, "-c", ALL_IMPORTED.format(sweep=sweep)], capture_output=True, text=True, check=True
     )
     imported = {Path(line).resolve() for line in done.stdout.splitlines()}
-    assert {"sampling.py", "table.py", "metrics.py", "ekf.py"} <= {path.name for path in imported}
+    assert {"sampling.py", "metrics.py", "kalman.py", "one_flight.py"} <= {path.name for path in imported}
     hashed = set(hashed_files())
     assert imported - hashed == set()
     assert {path.name for path in hashed} >= {"beaver.xml", "tuned.json"}

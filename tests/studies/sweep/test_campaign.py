@@ -54,7 +54,7 @@ def test_only_what_is_missing_is_flown(reference, tmp_path, small_batches):
     seen = []
     with pytest.raises(SweepStopped, match=r"of 48 flights are kept; .*--resume") as caught:
         run_sweep(
-            sweep_of(), Options(out=tmp_path, workers=1), lambda t: seen.append(t.done), lambda: bool(seen)
+            sweep_of(), Options(out=tmp_path, workers=1), lambda t: seen.append(t["done"]), lambda: bool(seen)
         )
     assert caught.value.exit_code == 130
     kept = {path.name: path.stat().st_mtime_ns for path in (tmp_path / "short" / "parts").iterdir()}
@@ -63,7 +63,7 @@ def test_only_what_is_missing_is_flown(reference, tmp_path, small_batches):
     run_sweep(
         sweep_of(),
         Options(out=tmp_path, workers=2, resume=True, report=False),
-        lambda t: tallies.append(t.done),
+        lambda t: tallies.append(t["done"]),
     )
     assert tallies[len(kept) - 1] == 4 * len(kept)  # counted without flying
     assert table_of(tmp_path / "short") == table_of(reference[0])
@@ -120,7 +120,7 @@ def test_a_worker_that_is_killed_is_replaced(reference, tmp_path, small_batches,
     def kill_the_first(tally):
         if not seen:
             os.kill(hired[0].pid.result(), signal.SIGKILL)
-        seen.append(tally.done)
+        seen.append(tally["done"])
 
     run_sweep(sweep_of(), Options(out=tmp_path, workers=2, report=False), kill_the_first)
     assert len(hired) == 3

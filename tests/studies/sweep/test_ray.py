@@ -46,7 +46,7 @@ def test_flights_of_a_node_that_is_lost_are_flown_again(cluster, local, tmp_path
     lost = []
 
     def lose_a_node(tally):
-        if not lost and tally.done >= 8:
+        if not lost and tally["done"] >= 8:
             lost.append(cluster.remove_node(extra, allow_graceful=False))
 
     run_sweep(sweep_of(), Options(out=tmp_path, backend="ray", report=False), lose_a_node)

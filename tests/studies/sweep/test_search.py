@@ -70,7 +70,7 @@ def test_a_search_that_is_stopped_goes_on_to_the_same_end(tmp_path, small_batche
     seen = []
     stopping = Options(out=tmp_path / "halves", workers=1, search="delay", report=False)
     with pytest.raises(Exception, match="stopped, 16 of 56"):
-        run_sweep(sweep, stopping, lambda tally: seen.append(tally.done), stopped=lambda: bool(seen))
+        run_sweep(sweep, stopping, lambda tally: seen.append(tally["done"]), stopped=lambda: bool(seen))
     resumed = run_sweep(
         sweep, Options(out=tmp_path / "halves", workers=2, search="delay", resume=True, report=False)
     )

@@ -20,7 +20,7 @@ PACKAGE = Path(beaver_ftc.__file__).parent
 MAKERS = {"kernel", "apart", "compile_into"}
 BESIDE = (
     "control/rivals/indi.py", "control/rivals/lqr.py", "loop/plugin_frame.py", "plant/channels.py",
-    "aircraft/schema.py", "compiled.py", "control/state.py", "numba_inside.py",
+    "aircraft/schema.py", "compiled.py", "control/laws/__init__.py", "numba_inside.py",
 )  # fmt: skip
 
 

@@ -126,7 +126,7 @@ def _file(name: str) -> Path:
     if name in builtin_names():
         return builtin_path(name)
     if name in builtin_sweeps():
-        return resolve(name)
+        return resolve(name, "sweep")
     known = [*builtin_names(), *builtin_sweeps()]
     raise BadInput(f"show: no built-in scenario or sweep {name[:100]!r}{suggestion(name, known)}")
 

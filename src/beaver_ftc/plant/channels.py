@@ -91,7 +91,6 @@ def command_properties(aircraft: Aircraft) -> tuple[str, ...]:
 TRUTH = truth_channels(load())
 SURFACES = load().surfaces
 COMMANDS = command_properties(load())
-MANIFOLD_PRESSURE = "engine/manifold-pressure-inhg"
 
 _STATES = (
     "airspeed_mps", "alpha_rad", "beta_rad", "p_rad_s", "q_rad_s", "r_rad_s",

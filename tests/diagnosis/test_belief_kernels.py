@@ -18,6 +18,7 @@ def test_what_is_foreseen_has_the_effectiveness_of_the_frame_before(instants):
     for k in range(5):
         belief["sums"]["G"], belief["sums"]["Gu"] = instants * G[k], instants * G[k] * u[k]
         beliefs.elapse(belief, bound)
+        beliefs.foresee(belief["means"])
         assert belief["means"]["Gu"] == pytest.approx(G[k] * u[k])
         if k > 0:
             assert belief["means"]["G_foreseen"] == pytest.approx(G[k - 1])
@@ -29,4 +30,5 @@ def test_of_the_first_frame_nothing_is_foreseen():
     belief["share"] = 1.0
     belief["sums"]["G"][:, 0] = belief["sums"]["Gu"][:, 0] = 1.0
     beliefs.elapse(belief, np.zeros(1, bound_dtype(2))[0])
+    beliefs.foresee(belief["means"])
     assert not belief["means"]["Gu_foreseen"].any()

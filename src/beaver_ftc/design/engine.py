@@ -1,7 +1,7 @@
 """The R-985 Wasp Junior and its slipstream, as FDC has them [FDC, Power]."""
 
 from beaver_ftc.compiled import kernel
-from beaver_ftc.design.terms import AIRSPEED, QDYN
+from beaver_ftc.design.terms import AIRSPEED, DPT, QDYN
 
 SEA_LEVEL_DENSITY_KG_M3 = 1.225
 DPT_0, KW_TO_DPT = 0.08696, 191.18  # dpt = DPT_0 + KW_TO_DPT P / (qdyn V)
@@ -32,6 +32,16 @@ def measured_slipstream(engine_rpm, manifold_pressure_inhg, airspeed_mps, qdyn_p
 def density_ratio(y):
     """Density over that at sea level, from the air data in y."""
     return 2.0 * y[QDYN] / y[AIRSPEED] ** 2 / SEA_LEVEL_DENSITY_KG_M3
+
+
+@kernel
+def slipstream_slopes(y, thin_air_kw):
+    """What dpt changes by per unit of airspeed, s/m, of dynamic pressure, 1/Pa, and of the power, 1/kW, from
+    which it is worked out; thin_air_kw: of that for the whole of the density."""
+    V, qdyn = y[AIRSPEED], y[QDYN]
+    per_kw = KW_TO_DPT / (qdyn * V)
+    thin = per_kw * thin_air_kw * density_ratio(y)
+    return (2.0 * thin - (y[DPT] - DPT_0)) / V, -(thin + y[DPT] - DPT_0) / qdyn, per_kw
 
 
 def power_error_kw(

@@ -129,8 +129,6 @@ def elapse(belief, bound):
             mean.G_foreseen[i, s] = mean.G[i, s]
             mean.G[i, s] = share * total.G[i, s]
             mean.Gu[i, s] = share * total.Gu[i, s]
-            moved = mean.G_foreseen[i, s] / mean.G[i, s] if mean.G[i, s] != 0.0 else 0.0
-            mean.Gu_foreseen[i, s] = moved * mean.Gu[i, s]
             rate += mean.Gu[i, s]
         mean.acceleration[i] = rate
         bound.eta_bar[i] = share * total.eta_bar[i]
@@ -141,6 +139,15 @@ def elapse(belief, bound):
         bound.own[:] = share * total.own
     if share < 1.0:
         spread(belief)
+
+
+@kernel
+def foresee(mean):
+    """Fill Gu_foreseen (3, n) rad/s2, for those who ask."""
+    for i in range(3):
+        for s in range(mean.G_least.size):
+            moved = mean.G_foreseen[i, s] / mean.G[i, s] if mean.G[i, s] != 0.0 else 0.0
+            mean.Gu_foreseen[i, s] = moved * mean.Gu[i, s]
 
 
 @kernel

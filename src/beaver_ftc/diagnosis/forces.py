@@ -20,7 +20,7 @@ from beaver_ftc.aircraft import AXES, Aircraft, Term
 from beaver_ftc.aircraft.aircraft import FORCES
 from beaver_ftc.aircraft.schema import MAX_SURFACES, MAX_TERMS_OF_ONE, SIDESLIP_RATE
 from beaver_ftc.compiled import kernel
-from beaver_ftc.design.engine import DPT_0, KW_TO_DPT, density_ratio
+from beaver_ftc.design.engine import slipstream_slopes
 from beaver_ftc.design.terms import AIRSPEED, ALPHA, BETA, DPT, N_Y, QDYN, evaluate
 from beaver_ftc.diagnosis.bounds.declared import Errors, gust_mps
 from beaver_ftc.diagnosis.redundancy import FALLING_M_S2
@@ -220,11 +220,13 @@ def set_up_forces(
     by_airspeed, by_others = _slipstream_noise(y, admitted, declared)
     for f, (vane, axis) in enumerate(((BETA, 2), (ALPHA, 1))):
         force, terms = forces["component"][f], terms_of(aircraft, f)
-        slopes = scale * _slopes(aircraft, COMPONENTS[f], trim)
+        every = scale * _slopes(aircraft, COMPONENTS[f], trim)
+        slopes, slipstream = every[:-1], every[-1]
         force["vane"], force["vane_roll"] = (-along_y[axis, vane], -slopes[vane]), -along_y[0, vane]
         force["damping"] = slopes[3:]
-        slipstream = scale * _slope_of(aircraft, COMPONENTS[f], trim, DPT)
-        parts = ((slopes + slipstream * by_airspeed * (np.arange(6) == 2)) * errors) ** 2
+        felt = slopes.copy()
+        felt[AIRSPEED] += slipstream * by_airspeed
+        parts = (felt * errors) ** 2
         quiet = parts.sum() + slipstream**2 * by_others
         force["quiet"] = quiet, quiet - parts[vane]
         noise = declared[ACCELEROMETERS[1 + f]].random
@@ -242,11 +244,9 @@ def _slipstream_noise(y: np.ndarray, admitted: np.void, declared: Errors) -> tup
     """How dpt moves with the reading of the airspeed, s/m; its variance by those of pressure and power."""
     if not admitted["engine"]:
         return 0.0, 0.0
-    per_kw, power = KW_TO_DPT / (y[QDYN] * y[AIRSPEED]), y[DPT] - DPT_0
-    thin = per_kw * admitted["thin_air_kw"] * density_ratio(y)
-    by_pressure = (thin + power) / y[QDYN] * declared["qdyn"].random
-    by_power = per_kw * admitted["engine_kw"] / NOISE_LIMIT_SIGMA
-    return float((2.0 * thin - power) / y[AIRSPEED]), float(by_pressure**2 + by_power**2)
+    by_airspeed, by_pressure, per_kw = slipstream_slopes(y, admitted["thin_air_kw"])
+    power_kw = admitted["engine_kw"] / NOISE_LIMIT_SIGMA
+    return by_airspeed, float((by_pressure * declared["qdyn"].random) ** 2 + (per_kw * power_kw) ** 2)
 
 
 def _drift(errors: Errors, gravity: float, airspeed_mps: float, f: int) -> float:
@@ -300,20 +300,10 @@ def _value(aircraft: Aircraft, name: str, at: tuple[np.ndarray, np.ndarray, np.n
 def _slopes(
     aircraft: Aircraft, name: str, trim: tuple[np.ndarray, np.ndarray, np.ndarray], step: float = 1e-5
 ) -> np.ndarray:
-    """(6,): its derivatives with alpha, beta (1/rad), airspeed (s/m), rates (s/rad), by differences."""
+    """(7,): its derivatives with alpha, beta (1/rad), airspeed (s/m), rates (s/rad), dpt, by differences."""
     x, y, u = trim
     states = [(x, y + step * e, u) for e in np.eye(3, y.size)]
     states += [(x + step * e, y, u) for e in np.eye(3)]
+    states += [(x, y + step * (np.arange(y.size) == DPT), u)]
     here = _value(aircraft, name, trim)
     return np.array([(_value(aircraft, name, state) - here) / step for state in states])
-
-
-def _slope_of(
-    aircraft: Aircraft, name: str, trim: tuple[np.ndarray, np.ndarray, np.ndarray], place: int
-) -> float:
-    """Its derivative with y[place], by differences; 0 where there is no such signal."""
-    x, y, u = trim
-    if place >= y.size:
-        return 0.0
-    step = 1e-5 * (np.arange(y.size) == place)
-    return (_value(aircraft, name, (x, y + step, u)) - _value(aircraft, name, trim)) / 1e-5

@@ -15,8 +15,8 @@ import numpy as np
 
 from beaver_ftc.aircraft import AXES, Aircraft, MassProperties, load
 from beaver_ftc.compiled import kernel
-from beaver_ftc.design.engine import DPT_0, KW_TO_DPT, density_ratio
-from beaver_ftc.design.terms import AIRSPEED, ALPHA, BETA, DPT, PH, QDYN, RH, directional, whole_sum
+from beaver_ftc.design.engine import slipstream_slopes
+from beaver_ftc.design.terms import AIRSPEED, ALPHA, BETA, PH, QDYN, RH, directional, whole_sum
 from beaver_ftc.design.variants import jacobian
 from beaver_ftc.diagnosis.across import (
     AN_AXIS,
@@ -297,19 +297,17 @@ def set_up_readings(statistical: np.void, errors: Errors, admitted: np.void) -> 
 def sensitivity(table, admitted, y, which, direction):
     """Fill direction (N_SIGNALS,) with what the signals of a table change by per unit of a reading."""
     direction[:] = 0.0
-    V, qdyn = y[AIRSPEED], y[QDYN]
     if which < AIRSPEED:  # a vane
         direction[which] = 1.0
     if which == AIRSPEED:
         for k in range(PH, RH + 1):
-            direction[k] = -table.signal[k] / V
+            direction[k] = -table.signal[k] / y[AIRSPEED]
     if admitted.engine and which >= AIRSPEED:
-        per_kw = KW_TO_DPT / (qdyn * V)
-        thin = per_kw * admitted.thin_air_kw * density_ratio(y)
+        by_airspeed, by_pressure, per_kw = slipstream_slopes(y, admitted.thin_air_kw)
         if which == AIRSPEED:
-            direction[_SLIPSTREAM] = (2.0 * thin - (y[DPT] - DPT_0)) / V
+            direction[_SLIPSTREAM] = by_airspeed
         elif which == QDYN:
-            direction[_SLIPSTREAM] = -(thin + y[DPT] - DPT_0) / qdyn
+            direction[_SLIPSTREAM] = by_pressure
         else:
             direction[_SLIPSTREAM] = per_kw
 

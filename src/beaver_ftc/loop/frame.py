@@ -22,7 +22,7 @@ from beaver_ftc.control.rivals import compiled
 from beaver_ftc.control.supervisor import MODE_REALLOCATED
 from beaver_ftc.design.model import AIRSPEED, ALPHA, BETA, unanticipated_pitch
 from beaver_ftc.diagnosis import across, air, bank, detection, instruments, isolation, scheme, statistical
-from beaver_ftc.diagnosis.belief import begin_frame, follow_command, look, look_back, respond
+from beaver_ftc.diagnosis.belief import begin_frame, follow_command, foresee, look, look_back, respond
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, PITCH, STATISTICS, WORST_CASE
 from beaver_ftc.diagnosis.types import examine
 from beaver_ftc.diagnosis.types.examine import LAGS
@@ -166,6 +166,7 @@ def compare_likelihoods(frame, k):
     air.elapse(seen, belief.share)
     if inertial.moving:
         air.elapse(inertial, belief.share)
+    foresee(mean)
     statistical.signatures(blocks, mean.Gu_foreseen, unanticipated_pitch(belief.design, y, 1.0))
     latched, ends = chances.alarm.detected_at_s >= 0.0, not fdi.config.abrupt
     statistical.observe(tests, noise.bounded, blocks, seen, innovation, dt, k, latched, ends)

@@ -257,3 +257,53 @@ def test_each_frame_counts_keep_times_what_the_next_one_counts():
 
     each = np.diff([np.zeros(4), *(after(k, 1.0) for k in range(1, frames + 1))], axis=0)
     assert after(frames, keep) == pytest.approx(keep ** np.arange(frames)[::-1] @ each, rel=1e-9)
+
+
+GUSTS, QUIET_RAD_S, FRAME_S = np.array([[18.0]]), 1.7e-3, 1 / 229
+
+
+def _beside(block):
+    """The block with the filter that reckons with no gust, as it begins."""
+    for name in ("n", "keep", "noise", "jitter", "P_xx", "P_dd"):
+        block["calm"][name] = block[name]
+    block["calm"]["drift"][0, 0] = 0.01
+    return block
+
+
+def _largest_share(block, innovations, moments):
+    """Largest evidence for a loss, in standard deviations, innovations and moments (k,) rad/s2."""
+    block["level"], most = 0.0, 0.0
+    for k, (nu, moment) in enumerate(zip(innovations, moments, strict=True)):
+        likelihood.start(block, likelihood.slot_to_start(k))
+        block["scratch"][0], block["hypothesis"][0]["signature"][0] = nu, moment
+        likelihood.take_in(block, np.zeros(3), False, FRAME_S, 1.0)
+        most = max(most, block["hypothesis"][0]["score"])
+    return most
+
+
+def _shares(flights, calm, drift, moments_of, theta=0.0):
+    rng, shares = np.random.default_rng(5), []
+    for _ in range(flights):
+        block = with_hypotheses(block_of(GUSTS, [QUIET_RAD_S]), LOSS)
+        block = _beside(block) if calm else block
+        gyro = QUIET_RAD_S * rng.standard_normal(301)
+        gust = np.cumsum(np.sqrt(FRAME_S * drift) * rng.standard_normal(300))
+        moments = moments_of(gyro)
+        innovations = gust + np.diff(gyro) / FRAME_S + theta * moments
+        shares.append(_largest_share(block, innovations, moments))
+    return np.array(shares)
+
+
+def test_a_law_that_answers_noise_shows_no_loss_in_air_calmer_than_declared():
+    """The surfaces give 2.5 rad/s2 for each rad/s that the gyro reads: a law that takes damping off does."""
+    answered = _shares(20, True, 0.0, lambda gyro: 2.5 * gyro[:-1])
+    assert _shares(20, False, 0.0, lambda gyro: 2.5 * gyro[:-1]).min() > 5.0  # the evidence, were it not so
+    assert answered.max() < 3.5
+
+
+def test_in_air_as_declared_a_loss_shows_as_if_the_air_might_not_be_calm():
+    """Nor does it in calm air for a surface that moves by itself."""
+    swings = 6.0 * np.sign(np.sin(2 * np.pi * 2.0 * FRAME_S * np.arange(300)))
+    for drift in (18.0, 0.0):
+        shares = [_shares(20, calm, drift, lambda gyro: swings, theta=-1.0) for calm in (True, False)]
+        assert shares[0].mean() > 0.95 * shares[1].mean() > 5.0

@@ -47,6 +47,7 @@ def test_an_onset_that_starts_knows_nothing_and_the_others_stay():
         "stays",
         "swings",
         "drifts",
+        "foreseen",
         "missing",
         "response",
         "weight",
@@ -136,6 +137,54 @@ def test_a_frame_is_whitened_weighed_and_summed_as_matrices_say():
     assert lane["overlap"][:2] == pytest.approx(overlaps)
     assert lane["overlap"][2:] == pytest.approx(before["overlap"][2:])
     assert lane["slack"] == pytest.approx(np.array([0.1, 0.2]) @ np.abs(overlaps))
+
+
+@pytest.mark.parametrize(
+    ("agreement", "size", "share"),
+    [
+        (0.0, 500.0, lambda agreement, size: (agreement + 4.0 + 2.0 * np.sqrt(size + 4.0)) / (size + 4.0)),
+        (-900.0, 500.0, lambda agreement, size: 0.0),
+        (900.0, 500.0, lambda agreement, size: 1.0),
+    ],
+)
+def test_what_calm_air_foretells_is_what_the_calm_filter_sees_by_as_much_as_it_lately_has(
+    agreement, size, share
+):
+    block = steady_block()
+    for name in ("n", "keep", "noise", "jitter", "P_xx", "P_dd"):
+        block["calm"][name] = block[name]
+    block["calm"]["drift"][:] = 0.1 * TOGETHER
+    alone = block["calm"].copy()
+    block["innovation"], block["scratch"] = (0.003, -0.001), (0.4, -0.2)
+    block["agreement"], block["size"] = agreement, size
+    inverse, g = block["S_inverse"].copy(), block["innovation"].copy()
+    likelihood.foresee(block, DT)
+    likelihood.advance(alone, DT)
+    likelihood.whiten(alone, alone["state"], np.array([0.4, -0.2]), DT, alone["innovation"])
+    foretold = g - alone["innovation"]
+    kept = np.exp(-DT / 2.0)
+    agreement, size = kept * agreement + foretold @ inverse @ g, kept * size + foretold @ inverse @ foretold
+    assert (block["agreement"], block["size"]) == pytest.approx((agreement, size), rel=1e-12)
+    assert block["foreseen"] == pytest.approx(share(agreement, size) * foretold, rel=1e-12)
+    assert block["calm"]["state"] == pytest.approx(alone["state"], rel=1e-12)
+
+
+@pytest.mark.parametrize(("kind", "sided"), [(LOSS, -1.0), (ENDING, 1.0), (STEP, 0.0)])
+def test_what_calm_air_foretells_is_taken_off_where_it_speaks_for_the_fault(kind, sided):
+    for foreseen in (3.0, -3.0):
+        scores = []
+        for it in (0.0, foreseen):
+            block = with_hypotheses(steady_block(), kind)
+            for name, value in {
+                "correlation": sided * 8.0 or 8.0,
+                "information": 4.0,
+                "foreseen": it,
+            }.items():
+                by_onset(block, name)[:, 0] = value
+            likelihood.judge(block)
+            scores.append(block["hypothesis"][0]["score"])
+        assert scores[0] == pytest.approx(4.0)
+        assert scores[0] - scores[1] == pytest.approx(1.5 if sided * foreseen > 0.0 else 0.0)
 
 
 def test_of_hypotheses_that_a_block_does_not_have_nothing_is_reckoned():

@@ -72,6 +72,18 @@ def test_a_dive_past_the_vertical_is_no_fault(
     assert flight.detection_time_s is None
 
 
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_law_that_answers_noise_in_air_calmer_than_declared_is_no_fault(seed):
+    """The published law takes the damping off, by what the gyros read: the ailerons follow their noise."""
+    flight, log = flown(
+        rate_hz=229, substeps=6, seed=seed, duration_s=2, initial={"airspeed_mps": 36.5},
+        sensors="consumer-grade", reference={}, uncertainty={}, control={"law": "adaptive"},
+        fdi=_fdi(bounds={"turbulence": "moderate", "sensors": "consumer-grade"}),
+    )  # fmt: skip
+    assert flight.detection_time_s is None
+    assert log["aileron_loss_likelihood_share"].max() < 0.65
+
+
 @pytest.mark.parametrize("noise", [{}, NOISY])
 @pytest.mark.parametrize("authority", ["either", "statistical"])
 def test_the_published_unanticipated_fault_is_named_so(authority, noise):

@@ -39,6 +39,12 @@ alarm wants evidence beyond all of this.
 A loss that grows is a loss times 1 - exp(-kappa t); one that ends gives back what the surface did not do at
 that instant, and stays away. Such shapes raise no alarm: they say what a surface may explain.
 
+The declared drift is a most. In calmer air the filter follows the gyro's noise as if it were gust, and what
+it leaves, g, can be foreseen: by p = g - g_calm, of a filter beside it that reckons with no gust. A law
+answers the same noise through the surfaces, so a loss then shows where there is none. How much of p is in g
+is fitted, lambda = sum p' S^-1 g / sum p' S^-1 p: 0 in air as declared, 1 in calm air. What lambda p gives
+the evidence is taken off it.
+
 Onsets: slot j starts anew every 2^(j+1) frames, so that there is always one of about every age. From the
 alarm on they stay, and old evidence is forgotten slowly.
 """
@@ -70,6 +76,10 @@ PRIOR_INFORMATION = 12.0  # of a loss uniform on [0, 1]: one over its variance
 # Magnitudes of a second-order transient of damping 0.7 add up to 1.09 times its sum; on two axes to more.
 RINGING = 1.2
 
+FOLLOWED_S = 2.0  # of the past say how calm the air is: long beside a filter's memory, short beside weather's
+CALM_PRIOR = 4.0  # before anything is known it is calm, and held so within two standard deviations
+CALM_MARGIN = 2.0
+
 HYPOTHESIS = np.dtype(
     [
         ("kind", "i8"), ("surface", "i8"), ("axis", "i8"), ("alarms", "i8"), ("column", "i8"),
@@ -89,6 +99,7 @@ LANE = np.dtype(
         ("held", "f8", (2, LANES)),  # of a loss that ends, its signature as it did
         # what a bounded uncertainty can add to the correlation: as it stays, as it swings, at its pace
         ("stays", "f8", (LANES,)), ("swings", "f8", (LANES,)), ("drifts", "f8", (LANES,)),
+        ("foreseen", "f8", (LANES,)),  # of the correlation, what calm air gives a law that answers noise
         # what it comes to, the last three as log likelihood ratios
         ("score", "f8", (LANES,)),
         ("at_least", "f8", (LANES,)), ("at_most", "f8", (LANES,)), ("likelihood", "f8", (LANES,)),
@@ -96,13 +107,21 @@ LANE = np.dtype(
     align=True,
 )  # fmt: skip
 
+_FILTER = [
+    ("n", "i8"), ("keep", "f8"), ("state", "f8", (4,)), ("innovation", "f8", (2,)),
+    ("P_xx", "f8", (2, 2)), ("P_xd", "f8", (2, 2)), ("P_dd", "f8", (2, 2)),
+    ("drift", "f8", (2, 2)), ("jitter", "f8", (2,)), ("noise", "f8", (2,)),
+    ("S_inverse", "f8", (2, 2)), ("K_x", "f8", (2, 2)), ("K_d", "f8", (2, 2)),
+]  # fmt: skip
+FILTER = np.dtype(_FILTER, align=True)
+
 BLOCK = np.dtype(
     [
-        ("n", "i8"), ("axis", "i8", (2,)), ("lag", "f8"), ("keep", "f8"), ("stronger", "f8"),
-        ("state", "f8", (4,)), ("rest", "f8", (4,)), ("innovation", "f8", (2,)), ("scratch", "f8", (2,)),
-        ("P_xx", "f8", (2, 2)), ("P_xd", "f8", (2, 2)), ("P_dd", "f8", (2, 2)),
-        ("drift", "f8", (2, 2)), ("jitter", "f8", (2,)), ("noise", "f8", (2,)),
-        ("S_inverse", "f8", (2, 2)), ("K_x", "f8", (2, 2)), ("K_d", "f8", (2, 2)),
+        ("axis", "i8", (2,)),  # first: a record that begins as another does is taken for one
+        *_FILTER,
+        ("lag", "f8"), ("stronger", "f8"), ("rest", "f8", (4,)), ("scratch", "f8", (2,)),
+        # the filter that reckons with no gust, where one is declared; lambda p, and the two sums of lambda
+        ("calm", FILTER), ("foreseen", "f8", (2,)), ("agreement", "f8"), ("size", "f8"),
         # alarm level; share of it that chance is given beside what is bounded; omega dt of the latter
         ("level", "f8"), ("chance", "f8"), ("pace", "f8"), ("stay", "f8", (2,)), ("swing", "f8", (2,)),
         ("n_regressors", "i8"), ("tolerance", "f8", (MAX_REGRESSORS,)),
@@ -202,6 +221,28 @@ def whiten(block, state, acceleration, dt, out):
 
 
 @kernel
+def foresee(block, dt):
+    """Fill `foreseen` (2,) rad/s: what of this frame's whitened innovation the past foretells if the air is
+    calmer than declared, as far as it has lately been."""
+    calm, foreseen, g = block.calm, block.foreseen, block.innovation
+    advance(calm, dt)
+    whiten(calm, calm.state, block.scratch, dt, calm.innovation)
+    kept = np.exp(-dt / FOLLOWED_S)
+    block.agreement *= kept
+    block.size *= kept
+    for i in range(block.n):
+        foreseen[i] = g[i] - calm.innovation[i]
+    for i in range(block.n):
+        for j in range(block.n):
+            block.agreement += foreseen[i] * block.S_inverse[i, j] * g[j]
+            block.size += foreseen[i] * block.S_inverse[i, j] * foreseen[j]
+    size = block.size + CALM_PRIOR
+    share = min(max((block.agreement + CALM_PRIOR + CALM_MARGIN * sqrt(size)) / size, 0.0), 1.0)
+    for i in range(block.n):
+        foreseen[i] *= share
+
+
+@kernel
 def slot_to_start(k):
     """The slot that starts anew at frame k: slot j at odd multiples of 2^j, the last at all that are left."""
     slot = 0
@@ -224,7 +265,7 @@ def start(block, slot):
     for k in range(slot, lanes(block), N_SLOTS):
         lane.correlation[k] = lane.information[k] = 0.0
         lane.weight[0, k] = lane.weight[1, k] = 0.0
-        lane.stays[k] = lane.swings[k] = lane.drifts[k] = 0.0
+        lane.stays[k] = lane.swings[k] = lane.drifts[k] = lane.foreseen[k] = 0.0
         lane.missing[k] = 1.0
         for i in range(4):
             lane.response[i, k] = 0.0
@@ -277,6 +318,7 @@ def respond(block, dt, keep):
     d00, d01, d10, d11 = K_d[0, 0], K_d[0, 1], K_d[1, 0], K_d[1, 1]
     s00, s01, s10, s11 = S[0, 0], S[0, 1], S[1, 0], S[1, 1]
     kept, g0, g1 = block.keep, block.innovation[0], block.innovation[1]
+    p0, p1 = block.foreseen[0], block.foreseen[1]
     swing0, swing1, stay0, stay1 = block.swing[0], block.swing[1], block.stay[0], block.stay[1]
     state, shaped, weight, pace = lane.response, lane.shaped, lane.weight, block.pace
     for k in range(lanes(block)):
@@ -288,6 +330,7 @@ def respond(block, dt, keep):
         w0, w1 = s00 * r0 + s01 * r1, s10 * r0 + s11 * r1
         lane.correlation[k] = keep * lane.correlation[k] + (w0 * g0 + w1 * g1)
         lane.information[k] = keep * lane.information[k] + w0 * r0 + w1 * r1
+        lane.foreseen[k] = keep * lane.foreseen[k] + (w0 * p0 + w1 * p1)
         change = swing0 * abs(w0 - weight[0, k]) + swing1 * abs(w1 - weight[1, k])
         lane.stays[k] = keep * lane.stays[k] + (stay0 * abs(w0) + stay1 * abs(w1))
         lane.swings[k] = keep * lane.swings[k] + change
@@ -360,7 +403,8 @@ def judge_lanes(block, certain):
     lane, sense, swing0, swing1 = block.lane, block.lane.sense, block.swing[0], block.swing[1]
     level, chance, doubted = block.level, block.chance, 0.0 if certain else 1.0
     for k in range(lanes(block)):
-        N, D, slack = lane.correlation[k], lane.information[k], lane.slack[k]
+        N, D = lane.correlation[k], lane.information[k]
+        slack = lane.slack[k] + max(sense[k] * lane.foreseen[k], 0.0)
         is_loss, known = sense[k] != 0.0, D > 0.0
         evidence = sense[k] * N if is_loss else abs(N)
         room = allowance(lane, k, swing0, swing1)
@@ -408,6 +452,8 @@ def take_in(block, bounded, tolerated, dt, keep, memory=0.0):
     if block.level > 0.0:
         reach(block, bounded, dt)
     whiten(block, block.state, block.scratch, dt, block.innovation)
+    if block.calm.n > 0:
+        foresee(block, dt)
     if tolerated:
         for j in range(block.n_regressors):
             state, response = block.regressor_state[j], block.regressor_response[j]

@@ -156,6 +156,8 @@ def set_up(
             statistical["inertial_air"]["moving"] *= air["read"]
             statistical["inertial_air"]["unseen"] = np.minimum(np.add(UNSEEN, BY_FORCE), 1.0)
         set_up_views(statistical, aircraft)
+    if air["moving"]:
+        _set_up_calm(statistical["block"])
     block = statistical["block"][-1]
     block["lag"] = returning_length(statistical, airspeed_mps, rate_hz)
     if air["moving"]:
@@ -182,6 +184,12 @@ def _set_up_blocks(statistical: np.void, errors: Errors, aircraft: Aircraft) -> 
             hypothesis["kind"], hypothesis["surface"] = kind, surface
             hypothesis["axis"], hypothesis["alarms"] = axis, alarms
             hypothesis["column"] = losses.index(surface) if kind == LOSS else len(losses) + axis
+
+
+def _set_up_calm(blocks: np.ndarray) -> None:
+    """The filters that reckon with no gust: as the others begin, and with a drift that goes anywhere."""
+    for name in ("n", "keep", "noise", "P_xx", "P_dd"):
+        blocks["calm"][name] = blocks[name]
 
 
 def pace_of(given: Statistical, aircraft: Aircraft, dt_s: float) -> float:

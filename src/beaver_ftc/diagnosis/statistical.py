@@ -343,8 +343,10 @@ def drifts(noise, blocks, air, bound, design, measured, dt):
                 if air.moving:
                     block.drift[i, j] = block.stronger * gusts.unseen_drift(air, V, axis, block.axis[j])
             size = max(bounded[axis], LEAST_UNCERTAINTY_RAD_S2)
-            block.drift[i, i] += noise.rapidity * size * size
-            block.jitter[i] = noise.jitter[axis]
+            walk = noise.rapidity * size * size
+            block.drift[i, i] += walk
+            block.calm.drift[i, i] = walk
+            block.jitter[i] = block.calm.jitter[i] = noise.jitter[axis]
         block.keep = np.exp(-dt * V / block.lag) if block.lag > 0.0 else 1.0
 
 

@@ -1,5 +1,6 @@
 """Small defects on purpose: which are made, that a seed draws the same ones, and that each goes on trial."""
 
+import ast
 import json
 import subprocess
 import tempfile
@@ -74,8 +75,21 @@ def test_half_of_what_is_drawn_is_glue_and_a_kernel_is_what_compiled_code_is_mad
     pairs, numbers = scope.drawn(1, ("loop/changing.py", "diagnosis/isolation.py", "loop/frame.py"))
     assert [kind for kind, _ in pairs[:60]] == [scope.KERNELS, scope.GLUE] * 30
     files = {kind: {m.file.name for of, m in pairs if of == kind} for kind in numbers}
-    assert files == {scope.KERNELS: {"isolation.py"}, scope.GLUE: {"changing.py"}}
+    assert files == {scope.KERNELS: {"isolation.py"}, scope.GLUE: {"changing.py", "isolation.py"}}
     assert sum(numbers.values()) == len(pairs)
+
+
+def test_what_fills_the_records_of_kernels_is_glue_and_what_lays_them_out_is_not():
+    file = scope.PACKAGE / "diagnosis" / "likelihood.py"
+    of = {}
+    for mutant in mutants(scope.PACKAGE / "diagnosis" / "isolation.py") + mutants(file):
+        around = [f.name for f in ast.parse(mutant.file.read_text()).body if isinstance(f, ast.FunctionDef)
+                  and f.lineno <= mutant.lines[0] <= f.end_lineno]  # fmt: skip
+        of.setdefault((*around, "a constant")[0], set()).add(scope.kind_of(mutant))
+    assert of["configure"] == {scope.GLUE}
+    assert of["a constant"] == of["whiten"] == {scope.KERNELS}
+    frame = {scope.kind_of(mutant) for mutant in mutants(scope.PACKAGE / "loop" / "frame.py")}
+    assert frame == {"fly"}
 
 
 def test_what_is_left_out_has_a_reason_and_what_is_listed_exists():
@@ -188,6 +202,7 @@ def shared_file(monkeypatch):
         file, kept = Path(folder) / "test_of_a_fixture.py", Path(folder) / "kept.json"
         file.write_text(SHARED)
         monkeypatch.setattr(reach, "_kept", lambda mode, file: kept)
+        monkeypatch.setitem(reach.SLOW_S, scope.PLAIN, 1.0)
         yield file, kept
 
 

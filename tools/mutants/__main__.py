@@ -17,7 +17,7 @@ import scipy.stats
 
 from tools.mutants.making import Mutant
 from tools.mutants.reach import Reach, few_examples, reach
-from tools.mutants.scope import MODES, PACKAGE, drawn, left_out, stale
+from tools.mutants.scope import GLUE, MODES, PACKAGE, drawn, left_out, stale
 from tools.mutants.trial import HANGS, KILLED, outcome
 
 LIBRARIES = (hypothesis, numba, pandas, pydantic, scipy)  # loaded once here, not once in each child
@@ -34,7 +34,7 @@ def main() -> int:
     _say(f"mutants that can be made: {made}; none of")
     for line in left_out():
         _say(f"  {line}")
-    ends = _trials(taken, _tests({kind for kind, _ in taken}, options.jobs), options)
+    ends = _trials(taken, _tests(options.jobs), options)
     for kind in numbers:
         of = {end: number for (its, end), number in sorted(ends.items()) if its == kind}
         _say(f"{kind}: {', '.join(f'{number} {end.lower()}' for end, number in of.items()) or 'none drawn'}")
@@ -58,9 +58,9 @@ def _say(text: str) -> None:
     print(text, flush=True)
 
 
-def _tests(kinds: set[str], jobs: int) -> dict[str, Reach]:
-    """What the tests of each mode execute that the kinds of mutants ask for."""
-    found = {mode: reach(mode, jobs, _say) for mode in {mode for kind in kinds for mode in MODES[kind]}}
+def _tests(jobs: int) -> dict[str, Reach]:
+    """What the tests of each mode execute."""
+    found = {mode: reach(mode, jobs, _say) for mode in MODES[GLUE]}
     for mode, tests in found.items():
         reasons = ", ".join(f"{number} {why}" for why, number in tests.left_out.items())
         _say(f"{mode}: {len(tests.seconds)} tests take part; left out: {reasons or 'none'}")

@@ -20,7 +20,7 @@ EQUIVALENT = Path(__file__).with_name("equivalent.yaml")
 
 KERNELS, GLUE = "kernels", "glue"
 # How tests run: kernels in plain Python, since to compile each mutant would take all day; or compiled, once
-# for all, where no source of a kernel changes.
+# for all, where no kernel changes.
 PLAIN, COMPILED = "plain", "compiled"
 MODES = {KERNELS: (PLAIN,), GLUE: (PLAIN, COMPILED)}
 
@@ -33,7 +33,7 @@ APART = {
 LEFT_OUT = {
     "looks": "how lines look: only the eye can judge it",
     "compile": "what compiles and keeps code: a mistake in it would be kept",
-    "fly": "compiled into the whole flight: plain Python takes minutes to reach it, a compiler half of one",
+    "fly": "their kernels, compiled into the whole flight: minutes in plain Python, half of one to compile",
 }
 
 
@@ -48,6 +48,24 @@ def kind(file: Path) -> str:
 
 def _is_quick(file: Path) -> bool:
     return any(file.is_relative_to(PACKAGE / folder) for folder in QUICK)
+
+
+def kind_of(mutant: Mutant) -> str:
+    """The same of a mutant: what fills a kernel's records stands beside it, and is glue."""
+    of = kind(mutant.file)
+    return of if of in APART.values() or _in_compiled_code(mutant.file, mutant.lines[0]) else GLUE
+
+
+def _in_compiled_code(file: Path, line: int) -> bool:
+    """Whether a kernel follows from a line: its own, a constant's, or one that lays out a record."""
+    if file not in _compiled(PACKAGE):
+        return False
+    around = (node for node in _tree(file).body if node.lineno <= line <= (node.end_lineno or 0))
+    for node in around:
+        if isinstance(node, ast.FunctionDef):
+            kernel = any(ast.unparse(each).startswith(("kernel", "apart")) for each in node.decorator_list)
+            return kernel or node.name.endswith("_dtype")
+    return True
 
 
 @cache
@@ -103,8 +121,9 @@ def drawn(seed: int, patterns: Sequence[str]) -> tuple[list[tuple[str, Mutant]],
     known = equivalent()
     files = sorted({file for pattern in patterns for file in PACKAGE.glob(pattern)})
     every: dict[str, list[Mutant]] = {KERNELS: [], GLUE: []}
-    for file in files:
-        every.get(kind(file), []).extend(m for m in mutants(file) if m.name(PACKAGE) not in known)
+    for mutant in chain(*map(mutants, files)):
+        if mutant.name(PACKAGE) not in known:
+            every.get(kind_of(mutant), []).append(mutant)
     for found in every.values():
         found.sort(key=lambda mutant: hashlib.sha256(f"{seed} {mutant.name(PACKAGE)}".encode()).digest())
     turns = zip_longest(*([(of, mutant) for mutant in found] for of, found in every.items()))

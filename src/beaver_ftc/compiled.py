@@ -34,6 +34,20 @@ PLAINLY = "numba {} is not known from inside: the first flight compiles for some
 _PACKAGE = Path(__file__).parent
 
 
+def record(**fields: Any) -> np.dtype:
+    """The type of a record: what each field is, `int`, `float` or the type of another record, or, of an array
+    of floats, its shape. Of other arrays what they are made of comes first.
+
+    record(n=int, share=float, decay=8, damping=(3, 3), fired=(int, 13), test=(TEST, 13))
+    """
+    return np.dtype([(name, *_kind_and_shape(given)) for name, given in fields.items()], align=True)
+
+
+def _kind_and_shape(given: Any) -> tuple[Any, tuple[int, ...]]:
+    parts = given if isinstance(given, tuple) else (given,)
+    return (float, parts) if isinstance(parts[0], int) else (parts[0], parts[1:])
+
+
 @lru_cache(maxsize=1)
 def cache_folder() -> Path | None:
     """Where compiled kernels are kept; None where nothing can be written: each process compiles its own."""

@@ -19,7 +19,7 @@ import numpy as np
 from beaver_ftc.aircraft import Aircraft, MassProperties
 from beaver_ftc.aircraft.aircraft import FORCES
 from beaver_ftc.aircraft.schema import MAX_MONOMIALS
-from beaver_ftc.compiled import kernel
+from beaver_ftc.compiled import kernel, record
 from beaver_ftc.design.model import rate_damping
 from beaver_ftc.design.terms import AIRSPEED, ALPHA, BETA, QDYN, TABLE, evaluate, fill_table, whole_sum
 from beaver_ftc.diagnosis.bounds.declared import SCALE_M, Errors
@@ -34,30 +34,26 @@ BY_FORCE = 0.01  # share of the intensity that errors of a tenth leave of the gu
 TWO_STEPS = 1.6  # times its noise does an acceleration scatter by Adams and Bashforth: sqrt(1.5^2 + 0.5^2)
 LEAST_SWING = 0.01  # of a gust's own intensity: less is not reckoned with
 
-AIR = np.dtype(
-    [
-        ("moving", "i8"), ("started", "i8"),  # whether there is turbulence; whether `pull` is known
-        ("read", "i8"), ("felt", "f8", (3,)),  # whether accelerometers are read; what they say, m/s2
-        ("forces", TABLE), ("scratch", "f8", (MAX_MONOMIALS,)),  # force coefficients
-        ("area_per_mass", "f8"), ("gravity", "f8"), ("span", "f8"),
-        ("velocity", "f8", (3,)), ("force", "f8", (3,)), ("turn", "f8", (3, 3)), ("heading", "f8"),
-        ("axes", "f8", (3, 3)),  # from the gusts' axes to body axes
-        ("pull", "f8", (3,)),  # forces and gravity an instant before, m/s2 in the level axes of this one
-        ("gust", "f8", (3,)), ("rotation", "f8", (3,)), ("damping", "f8", (3, 3)),
-        ("acceleration", "f8", (3,)),  # at this instant
-        ("total", "f8", (3,)), ("mean", "f8", (3,)),  # over the instants of a frame; over the elapsed one
-        ("per_metre", "f8", (3,)),  # intensity of the rotation's drift over airspeed, rad2/s3 per m/s
-        ("unseen", "f8", (3,)),  # share of it that the vanes do not show
-        ("rolling", "f8"),  # lag of the rolling gust times airspeed, m
-        # Scale of the gusts, m; share of a yawing one that turning loses at this instant, and that is lost.
-        ("scale", "f8"), ("lost", "f8"), ("turning", "f8"),
-        # How fast the axes of the gusts turn in the body, 1/s, and whether that matters.
-        ("swing", "f8", (3, 3)), ("swings", "i8"),
-        # Variance of what that moves the accelerations by, (rad/s2)2: in the frame that goes on, in the one
-        # before it, and in both; for how many frames there is any.
-        ("leaping", "f8", (3, 3)), ("leapt", "f8", (3, 3)), ("leap", "f8", (3, 3)), ("leaps", "i8"),
-    ],
-    align=True,
+AIR = record(
+    moving=int, started=int,  # whether there is turbulence; whether `pull` is known
+    read=int, felt=3,  # whether accelerometers are read; what they say, m/s2
+    forces=TABLE, scratch=MAX_MONOMIALS,  # force coefficients
+    area_per_mass=float, gravity=float, span=float, velocity=3, force=3, turn=(3, 3), heading=float,
+    axes=(3, 3),  # from the gusts' axes to body axes
+    pull=3,  # forces and gravity an instant before, m/s2 in the level axes of this one
+    gust=3, rotation=3, damping=(3, 3),
+    acceleration=3,  # at this instant
+    total=3, mean=3,  # over the instants of a frame; over the elapsed one
+    per_metre=3,  # intensity of the rotation's drift over airspeed, rad2/s3 per m/s
+    unseen=3,  # share of it that the vanes do not show
+    rolling=float,  # lag of the rolling gust times airspeed, m
+    # Scale of the gusts, m; share of a yawing one that turning loses at this instant, and that is lost.
+    scale=float, lost=float, turning=float,
+    # How fast the axes of the gusts turn in the body, 1/s, and whether that matters.
+    swing=(3, 3), swings=int,
+    # Variance of what that moves the accelerations by, (rad/s2)2: in the frame that goes on, in the one
+    # before it, and in both; for how many frames there is any.
+    leaping=(3, 3), leapt=(3, 3), leap=(3, 3), leaps=int,
 )  # fmt: skip
 
 

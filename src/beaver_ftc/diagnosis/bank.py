@@ -14,20 +14,16 @@ from math import exp
 
 import numpy as np
 
-from beaver_ftc.compiled import kernel
+from beaver_ftc.compiled import kernel, record
 from beaver_ftc.diagnosis.bounds.declared import poles_for_noise
 from beaver_ftc.diagnosis.thresholds import bound_step, noise_step
 from beaver_ftc.scenario.diagnosis import MAX_POLES, FdiConfig
 
 # The bank of detection filters; filter 0 is the published one.
-BANK = np.dtype(
-    [
-        ("n", "i8"), ("decay", "f8", (MAX_POLES,)), ("innovation", "f8", (3,)),
-        ("residual", "f8", (MAX_POLES, 3)), ("threshold", "f8", (MAX_POLES, 3)),
-        ("eta", "f8", (MAX_POLES, 3)), ("noise", "f8", (MAX_POLES, 3)),
-        ("closest", "f8", (MAX_POLES,)),  # largest share of its bound each filter reached in healthy flight
-    ],
-    align=True,
+BANK = record(
+    n=int, decay=MAX_POLES, innovation=3, residual=(MAX_POLES, 3), threshold=(MAX_POLES, 3),
+    eta=(MAX_POLES, 3), noise=(MAX_POLES, 3),
+    closest=MAX_POLES,  # largest share of its bound each filter reached in healthy flight
 )  # fmt: skip
 
 

@@ -11,7 +11,7 @@ from math import exp, radians
 
 import numpy as np
 
-from beaver_ftc.compiled import kernel
+from beaver_ftc.compiled import kernel, record
 from beaver_ftc.design.actuators import actuators_dtype, move
 from beaver_ftc.design.model import design_dtype
 from beaver_ftc.design.variants import design_of, response
@@ -22,14 +22,12 @@ from beaver_ftc.scenario.schema import Scenario
 @lru_cache
 def sums_dtype(n: int) -> np.dtype:
     """Sums over the instants of a frame, n surfaces: f, G, G u and the bound; own errors as in state.py."""
-    fields = [
-        ("f", "f8", (3,)), ("G", "f8", (3, n)), ("Gu", "f8", (3, n)), ("eta_bar", "f8", (3,)),
-        ("own_per_rad", "f8", (3, n)), ("own", "f8", (3, n)),
-        ("Gu_first", "f8", (3, n)),  # of the first instant alone
-        ("G_least", "f8", (n,)), ("G_most", "f8", (n,)),  # on each surface's dominant axis
-        ("u_least", "f8", (n,)), ("u_most", "f8", (n,)),  # rad
-    ]  # fmt: skip
-    return np.dtype(fields, align=True)
+    return record(
+        f=3, G=(3, n), Gu=(3, n), eta_bar=3, own_per_rad=(3, n), own=(3, n),
+        Gu_first=(3, n),  # of the first instant alone
+        G_least=n, G_most=n,  # on each surface's dominant axis
+        u_least=n, u_most=n,  # rad
+    )  # fmt: skip
 
 
 @lru_cache
@@ -39,29 +37,26 @@ def means_dtype(n: int) -> np.dtype:
     off by, and chance would take its answer for the work of a broken surface. Within it, where faults
     of every type are in question: G_least, G_most on each surface's dominant axis, and u_least, u_most, where
     a healthy one was."""
-    fields = [
-        ("G", "f8", (3, n)), ("Gu", "f8", (3, n)), ("Gu_spread", "f8", (3, n)), ("acceleration", "f8", (3,)),
-        ("G_foreseen", "f8", (3, n)), ("Gu_foreseen", "f8", (3, n)),
-        ("G_least", "f8", (n,)), ("G_most", "f8", (n,)), ("u_least", "f8", (n,)), ("u_most", "f8", (n,)),
-    ]  # fmt: skip
-    return np.dtype(fields, align=True)
+    return record(
+        G=(3, n), Gu=(3, n), Gu_spread=(3, n), acceleration=3, G_foreseen=(3, n), Gu_foreseen=(3, n),
+        G_least=n, G_most=n, u_least=n, u_most=n,
+    )  # fmt: skip
 
 
 @lru_cache
 def belief_dtype(n: int) -> np.dtype:
     """The belief about an aircraft with n surfaces; rad, rad/s, rad/s2."""
-    fields = [
-        ("design", design_dtype(n)), ("actuators", actuators_dtype(n)),
-        ("share", "f8"),  # one over the instants in a frame
-        ("commanded", "f8", (n,)),
-        ("u", "f8", (n,)), ("u_then", "f8", (n,)),  # where healthy surfaces are under it, and where they were
-        ("f", "f8", (3,)), ("G", "f8", (3, n)),  # at this instant
-        ("x_then", "f8", (3,)),  # measured as the elapsed frame began
-        ("sums", sums_dtype(n)), ("means", means_dtype(n)),
-        ("expected", "f8", (3,)),  # mean acceleration with the known faults in it
-        ("surprise", "f8", (3,)),  # what the rates did beyond it
-    ]  # fmt: skip
-    return np.dtype(fields, align=True)
+    return record(
+        design=design_dtype(n), actuators=actuators_dtype(n),
+        share=float,  # one over the instants in a frame
+        commanded=n,
+        u=n, u_then=n,  # where healthy surfaces are under it, and where they were
+        f=3, G=(3, n),  # at this instant
+        x_then=3,  # measured as the elapsed frame began
+        sums=sums_dtype(n), means=means_dtype(n),
+        expected=3,  # mean acceleration with the known faults in it
+        surprise=3,  # what the rates did beyond it
+    )  # fmt: skip
 
 
 def configure(belief: np.void, scenario: Scenario, travel: np.ndarray) -> None:

@@ -18,7 +18,7 @@ from math import exp
 
 import numpy as np
 
-from beaver_ftc.compiled import kernel
+from beaver_ftc.compiled import kernel, record
 from beaver_ftc.diagnosis.bank import alarm
 from beaver_ftc.diagnosis.state import STATISTICS, WORST_CASE
 from beaver_ftc.diagnosis.thresholds import bound_step, noise_step
@@ -28,21 +28,12 @@ from beaver_ftc.scenario.schema import Scenario
 ALPHA_CENTRES = np.linspace(-0.1, 0.5, 9)
 BETA_CENTRES = np.linspace(-0.3, 0.3, 5)
 N_BASIS = len(ALPHA_CENTRES) + len(BETA_CENTRES)
-NETWORK = np.dtype(
-    [
-        ("gain", "f8"), ("leak_per_s", "f8"), ("weight_limit", "f8"),
-        ("weights", "f8", (3, N_BASIS)), ("basis", "f8", (N_BASIS,)), ("output", "f8", (3,)),
-    ],
-    align=True,
+NETWORK = record(
+    gain=float, leak_per_s=float, weight_limit=float, weights=(3, N_BASIS), basis=N_BASIS, output=3,
 )  # fmt: skip
 
-FDAE = np.dtype(
-    [
-        ("pole", "f8", (3,)), ("decay", "f8", (3,)), ("xhat", "f8", (3,)), ("residual", "f8", (3,)),
-        ("threshold", "f8", (3,)), ("threshold_eta", "f8", (3,)), ("threshold_noise", "f8", (3,)),
-        ("network", NETWORK),
-    ],
-    align=True,
+FDAE = record(
+    pole=3, decay=3, xhat=3, residual=3, threshold=3, threshold_eta=3, threshold_noise=3, network=NETWORK,
 )  # fmt: skip
 
 _PER_STEP = np.exp(-1.0)

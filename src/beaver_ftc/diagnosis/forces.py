@@ -19,7 +19,7 @@ import numpy as np
 from beaver_ftc.aircraft import AXES, Aircraft, Term
 from beaver_ftc.aircraft.aircraft import FORCES
 from beaver_ftc.aircraft.schema import MAX_SURFACES, MAX_TERMS_OF_ONE, SIDESLIP_RATE
-from beaver_ftc.compiled import kernel
+from beaver_ftc.compiled import kernel, record
 from beaver_ftc.design.engine import slipstream_slopes
 from beaver_ftc.design.terms import AIRSPEED, ALPHA, BETA, DPT, N_Y, QDYN, evaluate
 from beaver_ftc.diagnosis.bounds.declared import Errors, gust_mps
@@ -41,36 +41,28 @@ RATE_TOLERANCE = {False: 0.05, True: 0.2}  # of the term in the rate of sideslip
 # The rate of sideslip, the bias of the accelerometer and the force as a whole come last.
 MAX_ERRORS = MAX_TERMS_OF_ONE + 3
 
-FORCE = np.dtype(
-    [
-        ("innovation", "f8"),  # e as the elapsed frame began
-        # the same by the angle that follows from inertial motion; that angle, rad; how fast it may drift,
-        # rad/s, and what that comes to per rad/s; how far errors and gusts let e wander, (rad/s2)2/s
-        ("inertial", "f8"), ("angle", "f8"), ("drift", "f8"), ("drifted", "f8"), ("wander", "f8"),
-        # of each surface per rad, by this instant's readings and by those before, and at its command; of its
-        # errors per rad
-        ("column", "f8", (MAX_SURFACES,)), ("foreseen", "f8", (MAX_SURFACES,)),
-        ("moment", "f8", (MAX_SURFACES,)), ("own", "f8", (MAX_SURFACES,)),
-        # of an error of its vane: angular acceleration, and e, per rad; that in roll
-        ("vane", "f8", (2,)), ("vane_roll", "f8"),
-        ("quiet", "f8", (2,)), ("jitter", "f8", (2,)), ("damping", "f8", (3,)), ("deflection", "f8"),
-        ("whole", "f8"), ("unsettled", "f8"),  # e as the model has it; how far a lag lets it be off, rad/s2
-        ("felt", "f8"),  # variance of e by noise of the accelerometer, which the pressure does not scale
-        ("n", "i8"), ("tolerance", "f8", (MAX_ERRORS,)), ("regressor", "f8", (MAX_ERRORS,)),
-    ],
-    align=True,
+FORCE = record(
+    innovation=float,  # e as the elapsed frame began
+    # the same by the angle that follows from inertial motion; that angle, rad; how fast it may drift,
+    # rad/s, and what that comes to per rad/s; how far errors and gusts let e wander, (rad/s2)2/s
+    inertial=float, angle=float, drift=float, drifted=float, wander=float,
+    # of each surface per rad, by this instant's readings and by those before, and at its command; of its
+    # errors per rad
+    column=MAX_SURFACES, foreseen=MAX_SURFACES, moment=MAX_SURFACES, own=MAX_SURFACES,
+    # of an error of its vane: angular acceleration, and e, per rad; that in roll
+    vane=2, vane_roll=float, quiet=2, jitter=2, damping=3, deflection=float,
+    whole=float, unsettled=float,  # e as the model has it; how far a lag lets it be off, rad/s2
+    felt=float,  # variance of e by noise of the accelerometer, which the pressure does not scale
+    n=int, tolerance=MAX_ERRORS, regressor=MAX_ERRORS,
 )  # fmt: skip
-FORCES_FELT = np.dtype(
-    [
-        ("known", "i8"), ("per_m", "f8"), ("gravity", "f8"), ("span", "f8"),  # one over the chord; m/s2; m
-        ("pressure", "f8"), ("pressure_noise", "f8"),  # Pa: in trim, and of its reading
-        ("strength", "f8"),  # of the pressure, as a share of trim: so much more do forces than stands here
-        # coefficient of the rate of sideslip; rates of sideslip and incidence, rad/s, of the instant before
-        ("of_rate", "f8"), ("rate", "f8", (2,)), ("begun", "i8"),  # looks, up to SETTLED
-        ("blurred", "f8", (3,)),  # rad/s2: what their noise adds to the gust that follows from them
-        ("y", "f8", (N_Y,)), ("component", FORCE, (2,)),
-    ],
-    align=True,
+FORCES_FELT = record(
+    known=int, per_m=float, gravity=float, span=float,  # one over the chord; m/s2; m
+    pressure=float, pressure_noise=float,  # Pa: in trim, and of its reading
+    strength=float,  # of the pressure, as a share of trim: so much more do forces than stands here
+    # coefficient of the rate of sideslip; rates of sideslip and incidence, rad/s, of the instant before
+    of_rate=float, rate=2, begun=int,  # looks, up to SETTLED
+    blurred=3,  # rad/s2: what their noise adds to the gust that follows from them
+    y=N_Y, component=(FORCE, 2),
 )  # fmt: skip
 
 

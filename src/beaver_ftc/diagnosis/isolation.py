@@ -25,7 +25,7 @@ from math import exp
 import numpy as np
 
 from beaver_ftc.aircraft import Aircraft
-from beaver_ftc.compiled import kernel
+from beaver_ftc.compiled import kernel, record
 from beaver_ftc.diagnosis import membership
 from beaver_ftc.diagnosis.bank import explains, remember
 from beaver_ftc.diagnosis.state import (
@@ -41,35 +41,23 @@ from beaver_ftc.scenario.diagnosis import MAX_POLES, FdiConfig
 
 MAX_ESTIMATORS = 16
 # What a fault adds to the angular acceleration, as its estimator supposes: offset + theta Z, give or take.
-EFFECT = np.dtype([("offset", "f8", (3,)), ("Z", "f8", (3,)), ("spread", "f8", (3,))], align=True)
+EFFECT = record(offset=3, Z=3, spread=3)
 
-ESTIMATOR = np.dtype(
-    [
-        ("kind", "i8"), ("surface", "i8"),
-        ("low", "f8"), ("high", "f8"),  # the known set of theta
-        ("excluded", "i8"), ("excluded_at_s", "f8"), ("unasked", "i8", (3,)),
-        ("shown", "i8"), ("doubted", "i8"),
-        ("xhat", "f8", (3,)), ("residual", "f8", (3,)), ("lower", "f8", (3,)), ("upper", "f8", (3,)),
-        ("omega", "f8", (3,)), ("rise", "f8", (3,)), ("fall", "f8", (3,)), ("bound", "f8", (3,)),
-        ("bound_eta", "f8", (3,)), ("bound_noise", "f8", (3,)),
-        ("theta", "f8", (3,)), ("covariance", "f8", (3,)),
-        ("effect", EFFECT), ("block_effect", EFFECT),  # of the frame; mean over a block
-        ("furthest", "f8"),  # rad, from neutral, that the surface can have been in the frame
-        # what bank.py and membership.py keep
-        ("across", "f8", (3,)), ("reach_low", "f8", (MAX_POLES, 4)), ("reach_high", "f8", (MAX_POLES, 4)),
-        ("theta_low", "f8", (3,)), ("theta_high", "f8", (3,)),
-    ],
-    align=True,
+ESTIMATOR = record(
+    kind=int, surface=int,
+    low=float, high=float,  # the known set of theta
+    excluded=int, excluded_at_s=float, unasked=(int, 3), shown=int, doubted=int, xhat=3, residual=3, lower=3,
+    upper=3, omega=3, rise=3, fall=3, bound=3, bound_eta=3, bound_noise=3, theta=3, covariance=3,
+    effect=EFFECT, block_effect=EFFECT,  # of the frame; mean over a block
+    furthest=float,  # rad, from neutral, that the surface can have been in the frame
+    # what bank.py and membership.py keep
+    across=3, reach_low=(MAX_POLES, 4), reach_high=(MAX_POLES, 4), theta_low=3, theta_high=3,
 )  # fmt: skip
 
 # The isolation estimators, and how the decision among them is sharpened.
-ISOLATION = np.dtype(
-    [
-        ("n", "i8"), ("thresholds", "i8"), ("forgetting", "f8"), ("decay", "f8", (3,)),
-        ("memory", "i8"), ("shared", "i8"), ("membership", "i8"),
-        ("estimator", ESTIMATOR, (MAX_ESTIMATORS,)),
-    ],
-    align=True,
+ISOLATION = record(
+    n=int, thresholds=int, forgetting=float, decay=3, memory=int, shared=int, membership=int,
+    estimator=(ESTIMATOR, MAX_ESTIMATORS),
 )  # fmt: skip
 
 PARAMETER_SET = {LOSS: (-1.0, 0.0)}

@@ -9,7 +9,7 @@ from functools import lru_cache
 import numpy as np
 
 from beaver_ftc.aircraft import Aircraft
-from beaver_ftc.compiled import apart, kernel
+from beaver_ftc.compiled import apart, kernel, record
 from beaver_ftc.design.model import AIRSPEED
 from beaver_ftc.diagnosis import air, bank, detection, forces, isolation, state, statistical
 from beaver_ftc.diagnosis.bank import BANK, largest_share
@@ -39,12 +39,11 @@ from beaver_ftc.scenario.schema import Scenario
 @lru_cache
 def diagnosis_dtype(n: int) -> np.dtype:
     """The stages of the diagnosis of an aircraft with n surfaces."""
-    fields = [
-        ("config", CONFIG), ("bound", bound_dtype(n)), ("bank", BANK), ("fdae", FDAE),
-        ("verdict", conclusion_dtype(n)), ("layout", layout_dtype(n)), ("isolation", ISOLATION),
-        ("types", types_dtype(n)), ("statistical", STATISTICAL), ("watch", WATCH),
-    ]  # fmt: skip
-    return np.dtype(fields, align=True)
+    return record(
+        config=CONFIG, bound=bound_dtype(n), bank=BANK, fdae=FDAE, verdict=conclusion_dtype(n),
+        layout=layout_dtype(n), isolation=ISOLATION, types=types_dtype(n), statistical=STATISTICAL,
+        watch=WATCH,
+    )  # fmt: skip
 
 
 def configure(fdi: np.void, belief: np.void, scenario: Scenario, travel: np.ndarray) -> None:

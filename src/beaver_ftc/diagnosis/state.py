@@ -6,6 +6,7 @@ from functools import lru_cache
 import numpy as np
 
 from beaver_ftc.aircraft import Aircraft
+from beaver_ftc.compiled import record
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.scenario.schema import Scenario
 
@@ -21,11 +22,7 @@ ROLL, PITCH, YAW, SIDE, NORMAL = range(5)  # axes, and the accelerometers beside
 @lru_cache
 def verdict_dtype(n: int) -> np.dtype:
     """A plug-in's verdict. isolated: a surface, NOT_ISOLATED or UNANTICIPATED."""
-    fields = [
-        ("detected", "i8"), ("axis", "i8"), ("isolated", "i8"), ("theta", "f8"),
-        ("estimates", "i8"), ("effectiveness", "f8", (n,)),
-    ]  # fmt: skip
-    return np.dtype(fields, align=True)
+    return record(detected=int, axis=int, isolated=int, theta=float, estimates=int, effectiveness=n)
 
 
 @lru_cache
@@ -33,34 +30,25 @@ def conclusion_dtype(n: int) -> np.dtype:
     """What is concluded about n surfaces. isolated: an estimator, NOT_ISOLATED or UNANTICIPATED. type: of the
     isolated fault, -1 if open. lead: the surface the law acts upon, and what it does about it. effectiveness:
     of every surface, where a plug-in `estimates` it."""
-    fields = [
-        ("detected", "i8"), ("detected_at_s", "f8"), ("detected_axis", "i8"),
-        ("isolated", "i8"), ("isolated_at_s", "f8"), ("type", "i8"), ("type_at_s", "f8"),
-        ("lead", "i8"), ("lead_kind", "i8"), ("estimates", "i8"), ("effectiveness", "f8", (n,)),
-    ]  # fmt: skip
-    return np.dtype(fields, align=True)
+    return record(
+        detected=int, detected_at_s=float, detected_axis=int, isolated=int, isolated_at_s=float, type=int,
+        type_at_s=float, lead=int, lead_kind=int, estimates=int, effectiveness=n,
+    )  # fmt: skip
 
 
 @lru_cache
 def layout_dtype(n: int) -> np.dtype:
     """Axis and group of each of n surfaces, the other one of a group of two, or -1; the main surface of each
     axis; the estimators of a surface's loss and position, or -1."""
-    fields = [
-        ("dominant_axis", "i8", (n,)), ("group", "i8", (n,)), ("partner", "i8", (n,)), ("main", "i8", (3,)),
-        ("loss_of", "i8", (n,)), ("position_of", "i8", (n,)),
-    ]  # fmt: skip
-    return np.dtype(fields, align=True)
+    return record(
+        dominant_axis=(int, n), group=(int, n), partner=(int, n), main=(int, 3), loss_of=(int, n),
+        position_of=(int, n),
+    )  # fmt: skip
 
 
 # What several stages go by. authority: whose alarms count; every_type: faults of every type; abrupt: a fault
 # is declared to stay as it is; instants: of JSBSim, in a frame; dt s.
-CONFIG = np.dtype(
-    [
-        ("enabled", "i8"), ("authority", "i8"), ("every_type", "i8"), ("abrupt", "i8"),
-        ("instants", "i8"), ("dt", "f8"),
-    ],
-    align=True,
-)  # fmt: skip
+CONFIG = record(enabled=int, authority=int, every_type=int, abrupt=int, instants=int, dt=float)
 
 
 def configure(shared: np.void, scenario: Scenario) -> None:

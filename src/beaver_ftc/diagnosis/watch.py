@@ -4,12 +4,14 @@ from typing import Any
 
 import numpy as np
 
+from beaver_ftc.compiled import record
 from beaver_ftc.plant.instruments import N_SENSORS, PHI, SENSORS, SIGNALS
 from beaver_ftc.scenario.sensors import sensor_words
 
 TURN, ANGLE, SPEED, ALPHA_FLOW, BETA_FLOW, DENSITY, CLIMB, RPM, PRESSURE = 0, 3, 6, 7, 8, 9, 10, 11, 12
 N_TESTS = 13
 POLES_PER_S = (1e6, 10.0, 1.0)
+N_POLES = len(POLES_PER_S)
 NOBODY = -1
 LEAP_M_S2 = 8.0  # by which no specific force changes from one look to the next
 UNKNOWN, YES, NO = 0, 1, 2
@@ -17,71 +19,52 @@ WAIT_S = 1.0  # for the instrument to be found; then the fault is outside what c
 P, Q, R, ALPHA, BETA, AIRSPEED, QDYN = range(len(SIGNALS))
 THETA, PSI = PHI + 1, PHI + 2
 
-TEST = np.dtype(
-    [
-        ("residual", "f8"), ("rate", "f8"), ("noise", "f8"), ("noise_then", "f8"),  # of the elapsed step
-        ("air", "f8"), ("bound", "f8", (len(POLES_PER_S),)),  # share of `gusts` in it; the whole bound
-        ("filtered", "f8", (len(POLES_PER_S),)), ("bound_rate", "f8", (len(POLES_PER_S),)),
-        ("bound_noise", "f8", (len(POLES_PER_S),)), ("share", "f8"),
-    ],
-    align=True,
+TEST = record(
+    residual=float, rate=float, noise=float, noise_then=float,  # of the elapsed step
+    air=float, bound=N_POLES,  # share of `gusts` in it; the whole bound
+    filtered=N_POLES, bound_rate=N_POLES, bound_noise=N_POLES, share=float,
 )  # fmt: skip
 
-STEP = np.dtype(
-    [
-        ("h", "f8"), ("decay", "f8", (len(POLES_PER_S),)), ("gravity", "f8"),
-        # of the declared turbulence: its speed at most, m/s, and what passes each filter of a gust's changes
-        # up to an airspeed m/s
-        ("gust", "f8"), ("gusts", "f8", (len(POLES_PER_S),)), ("swift", "f8"),
-        # declared: the whole error of a reading, and what of it changes; drift of the attitude
-        ("offset", "f8", (N_SENSORS,)), ("slope", "f8", (N_SENSORS,)), ("steady", "f8", (N_SENSORS,)),
-        ("drift", "f8"), ("error", "f8", (N_SENSORS,)), ("changing", "f8", (N_SENSORS,)),
-        # drift so far, rad; the errors of the look before, and of the one before that
-        ("drifted", "f8"), ("error_then", "f8", (N_SENSORS,)), ("error_before", "f8", (N_SENSORS,)),
-        # the look before: readings, attitude as a quaternion, velocity, acceleration there and before that
-        ("then", "f8", (N_SENSORS,)), ("turned", "f8", (4,)), ("velocity", "f8", (3,)),
-        ("acceleration", "f8", (3,)), ("acceleration_then", "f8", (3,)),
-        # m/s2: size of the acceleration of the elapsed step, and of those before it; of acceleration_then
-        ("pull", "f8"), ("pulled", "f8", (2,)), ("felt_then", "f8"),
-        ("unknown", "f8"),  # of the acceleration of the first step, for want of the instant before
-        ("predicted", "f8", (N_SENSORS,)), ("scratch", "f8", (4,)), ("now", "f8", (4,)),
-        ("command", "f8", (2,)),  # engine speed rpm, manifold pressure inHg
-        ("test", TEST, (N_TESTS,)),
-    ],
-    align=True,
+STEP = record(
+    h=float, decay=N_POLES, gravity=float,
+    # of the declared turbulence: its speed at most, m/s, and what passes each filter of a gust's changes
+    # up to an airspeed m/s
+    gust=float, gusts=N_POLES, swift=float,
+    # declared: the whole error of a reading, and what of it changes; drift of the attitude
+    offset=N_SENSORS, slope=N_SENSORS, steady=N_SENSORS, drift=float, error=N_SENSORS, changing=N_SENSORS,
+    # drift so far, rad; the errors of the look before, and of the one before that
+    drifted=float, error_then=N_SENSORS, error_before=N_SENSORS,
+    # the look before: readings, attitude as a quaternion, velocity, acceleration there and before that
+    then=N_SENSORS, turned=4, velocity=3, acceleration=3, acceleration_then=3,
+    # m/s2: size of the acceleration of the elapsed step, and of those before it; of acceleration_then
+    pull=float, pulled=2, felt_then=float,
+    unknown=float,  # of the acceleration of the first step, for want of the instant before
+    predicted=N_SENSORS, scratch=4, now=4,
+    command=2,  # engine speed rpm, manifold pressure inHg
+    test=(TEST, N_TESTS),
 )  # fmt: skip
 
-WATCH = np.dtype(
-    [
-        ("enabled", "i8"), ("begun", "i8"), ("instants", "i8"), ("past", "i8"), ("engine", "i8"),
-        ("alarmed", "i8"), ("alarmed_at_s", "f8"), ("beside", "i8"), ("lead", "i8"),
-        ("misnamed", "i8"),  # a surface had been named in the moment before the alarm
-        ("furthest", "i8"), ("share", "f8"),  # of this frame: the test nearest its bound, and how near
-        ("fired", "i8", (N_TESTS,)), ("suspect", "i8", (N_SENSORS,)),
-        ("named", "i8"), ("named_at_s", "f8"), ("replaced", "i8", (N_SENSORS,)),
-        ("trim", "f8", (N_SENSORS,)), ("follows", "f8"),  # share of its error a replaced rate makes up a look
-        # what tells a gyro from the attitude, by axis
-        ("error", "f8", (3,)), ("error_then", "f8", (3,)),  # of the gyro, as each frame began, rad/s
-        ("spike", "f8", (3,)), ("spike_then", "f8", (3,)),
-        ("damping", "f8", (3, 3)), ("W", "f8", (3,)), ("W_bound", "f8", (3,)),
-        ("W_then", "f8", (3,)), ("before", "f8", (3,)),
-        # no gyro can be what the rates show: what attitude and W make of that, and how far one gyro goes
-        ("blurred", "i8"), ("no_gyro", "i8"),
-        ("apart", "f8", (3, len(POLES_PER_S))), ("apart_bound", "f8", (3, len(POLES_PER_S))),
-        ("rates_say", "i8", (3,)), ("taken_over", "i8", (3,)),
-        # accelerometers.py: looks with the very same reading, and how many say that it is frozen; readings of
-        # two looks ago; who is cleared
-        ("still", "i8", (N_SENSORS,)), ("longest_still", "i8", (N_SENSORS,)),
-        ("earlier", "f8", (N_SENSORS,)), ("cleared", "i8", (N_SENSORS,)),
-        # how far accelerometers have leapt of late. Since the alarm: looks, residuals of speed, incidence and
-        # sideslip, how much of them is sound, least and most of the readings; the climb that such an
-        # incidence makes up; the velocity made up, body axes
-        ("restless", "f8"), ("gathering", "i8"), ("gathered", "f8", (3,)), ("sound", "f8", (3,)),
-        ("least", "f8", (3,)), ("most", "f8", (3,)), ("fallen", "f8", (len(POLES_PER_S),)),
-        ("made_up", "f8", (3,)),
-        ("step", STEP),
-    ],
-    align=True,
+WATCH = record(
+    enabled=int, begun=int, instants=int, past=int, engine=int, alarmed=int, alarmed_at_s=float, beside=int,
+    lead=int,
+    misnamed=int,  # a surface had been named in the moment before the alarm
+    furthest=int, share=float,  # of this frame: the test nearest its bound, and how near
+    fired=(int, N_TESTS), suspect=(int, N_SENSORS), named=int, named_at_s=float, replaced=(int, N_SENSORS),
+    trim=N_SENSORS, follows=float,  # share of its error a replaced rate makes up a look
+    # what tells a gyro from the attitude, by axis
+    error=3, error_then=3,  # of the gyro, as each frame began, rad/s
+    spike=3, spike_then=3, damping=(3, 3), W=3, W_bound=3, W_then=3, before=3,
+    # no gyro can be what the rates show: what attitude and W make of that, and how far one gyro goes
+    blurred=int, no_gyro=int, apart=(3, N_POLES), apart_bound=(3, N_POLES),
+    rates_say=(int, 3), taken_over=(int, 3),
+    # accelerometers.py: looks with the very same reading, and how many say that it is frozen; readings of
+    # two looks ago; who is cleared
+    still=(int, N_SENSORS), longest_still=(int, N_SENSORS), earlier=N_SENSORS, cleared=(int, N_SENSORS),
+    # how far accelerometers have leapt of late. Since the alarm: looks, residuals of speed, incidence and
+    # sideslip, how much of them is sound, least and most of the readings; the climb that such an
+    # incidence makes up; the velocity made up, body axes
+    restless=float, gathering=int, gathered=3, sound=3, least=3, most=3, fallen=N_POLES, made_up=3,
+    step=STEP,
 )  # fmt: skip
 
 

@@ -27,7 +27,7 @@ import numpy as np
 
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.aircraft.schema import MAX_AGES, MAX_BOXES, MAX_LEVELS, MAX_MONOMIALS, MAX_TERMS
-from beaver_ftc.compiled import kernel
+from beaver_ftc.compiled import kernel, record
 from beaver_ftc.design.engine import DPT_0, KW_TO_DPT, density_ratio
 from beaver_ftc.design.terms import AIRSPEED, DPT, N_SIGNALS, N_Y, QDYN, monomials, signals
 
@@ -46,24 +46,17 @@ _N = 3 + N_Y  # rates, then y with the density of the air in place of dynamic pr
 @lru_cache
 def admitted_dtype(n: int) -> np.dtype:
     """What else than the published bound is admitted, for an aircraft with n surfaces."""
-    return np.dtype(
-        [
-            ("any", "i8"),
-            ("tolerance", "f8", (MAX_TERMS,)),  # of each moment coefficient, as the design model has them
-            ("inertia", "f8", (12,)),  # of each inertia coefficient, in the order of design.model
-            ("offset", "f8", (7,)), ("slope", "f8", (7,)),  # error of a signal: offset + slope |signal|
-            ("steady", "f8", (3,)),  # of the offset of a gyro, what does not change
-            ("gust", "f8", (3,)), ("deflection", "f8"),
-            ("engine", "i8"), ("engine_kw", "f8"), ("thin_air_kw", "f8"),  # of dpt: see `slipstream_error`
-            # scratch: magnitudes as measured, and the furthest they can be from there
-            ("near_x", "f8", (3,)), ("near_y", "f8", (N_Y,)), ("near_u", "f8", (n,)),
-            ("far_x", "f8", (3,)), ("far_y", "f8", (N_Y,)), ("far_u", "f8", (n,)), ("far_aero", "f8", (3,)),
-            ("signal", "f8", (N_SIGNALS,)),
-            ("near", "f8", (MAX_MONOMIALS,)), ("far", "f8", (MAX_MONOMIALS,)),
-            ("per_rad", "f8", (3, n)),
-            ("moment", "f8", (3,)), ("slack", "f8", (3,)),
-        ],
-        align=True,
+    return record(
+        any=int,
+        tolerance=MAX_TERMS,  # of each moment coefficient, as the design model has them
+        inertia=12,  # of each inertia coefficient, in the order of design.model
+        offset=7, slope=7,  # error of a signal: offset + slope |signal|
+        steady=3,  # of the offset of a gyro, what does not change
+        gust=3, deflection=float,
+        engine=int, engine_kw=float, thin_air_kw=float,  # of dpt: see `slipstream_error`
+        # scratch: magnitudes as measured, and the furthest they can be from there
+        near_x=3, near_y=N_Y, near_u=n, far_x=3, far_y=N_Y, far_u=n, far_aero=3, signal=N_SIGNALS,
+        near=MAX_MONOMIALS, far=MAX_MONOMIALS, per_rad=(3, n), moment=3, slack=3,
     )  # fmt: skip
 
 
@@ -71,15 +64,11 @@ def admitted_dtype(n: int) -> np.dtype:
 def error_map_dtype(n: int) -> np.dtype:
     """The map for an aircraft with n surfaces. whole: surfaces may be anywhere. outside: of all boxes. now:
     the error here, rad/s2."""
-    fields = [
-        ("n_boxes", "i8"), ("n_levels", "i8"), ("n_ages", "i8"), ("whole", "i8"), ("outside", "i8"),
-        ("time_s", "f8"), ("until_s", "f8", (MAX_AGES,)),
-        ("low", "f8", (MAX_BOXES, _N)), ("high", "f8", (MAX_BOXES, _N)),
-        ("share", "f8", (MAX_LEVELS,)), ("error", "f8", (MAX_AGES, MAX_BOXES, MAX_LEVELS, 3)),
-        ("travel_low", "f8", (n,)), ("travel_high", "f8", (n,)), ("place", "f8", (_N,)),
-        ("now", "f8", (3,)),
-    ]  # fmt: skip
-    return np.dtype(fields, align=True)
+    return record(
+        n_boxes=int, n_levels=int, n_ages=int, whole=int, outside=int, time_s=float, until_s=MAX_AGES,
+        low=(MAX_BOXES, _N), high=(MAX_BOXES, _N), share=MAX_LEVELS,
+        error=(MAX_AGES, MAX_BOXES, MAX_LEVELS, 3), travel_low=n, travel_high=n, place=_N, now=3,
+    )  # fmt: skip
 
 
 @lru_cache
@@ -87,34 +76,29 @@ def bound_dtype(n: int) -> np.dtype:
     """Bounds on the uncertainty. eta_bar, eta_bar_now: over the elapsed frame and at this instant, rad/s2.
     noise: on what a gyro's error changes by, rad/s. frame: on one frame's innovation, rad/s2. own: of the
     errors of n surfaces' own terms, per rad of deflection and at the command, means over the frame."""
-    fields = [
-        ("inertia", "f8", (3,)), ("constant", "f8", (3,)), ("earth_rate", "f8"),
-        ("admitted", admitted_dtype(n)), ("error_map", error_map_dtype(n)),
-        ("eta_bar", "f8", (3,)), ("eta_bar_now", "f8", (3,)),
-        ("noise", "f8", (3,)), ("noise_then", "f8", (3,)), ("frame", "f8", (3,)),
-        ("own_errors", "i8"), ("own_per_rad", "f8", (3, n)), ("own", "f8", (3, n)),
-    ]  # fmt: skip
-    return np.dtype(fields, align=True)
+    return record(
+        inertia=3, constant=3, earth_rate=float, admitted=admitted_dtype(n), error_map=error_map_dtype(n),
+        eta_bar=3, eta_bar_now=3, noise=3, noise_then=3, frame=3, own_errors=int, own_per_rad=(3, n),
+        own=(3, n),
+    )  # fmt: skip
 
 
-def fill_error_map(record: np.void, aircraft: Aircraft, whole: bool) -> None:
+def fill_error_map(error_map: np.void, aircraft: Aircraft, whole: bool) -> None:
     """Write an aircraft's map, if it has one; whole: surfaces may be anywhere in their travel."""
     given = aircraft.file.model_error_map
     if given is None:
         return
-    record["whole"], record["n_boxes"], record["n_levels"] = whole, len(given.boxes), len(given.travel_share)
-    record["n_ages"] = len(given.until_s)
-    record["until_s"][: len(given.until_s)] = given.until_s
-    record["share"][: len(given.travel_share)] = given.travel_share
-    record["travel_low"] = [travel.min_rad for travel in aircraft.travel.values()]
-    record["travel_high"] = [travel.max_rad for travel in aircraft.travel.values()]
+    n_levels, n_ages = len(given.travel_share), len(given.until_s)
+    error_map["whole"], error_map["n_boxes"] = whole, len(given.boxes)
+    error_map["n_levels"], error_map["n_ages"] = n_levels, n_ages
+    error_map["until_s"][:n_ages], error_map["share"][:n_levels] = given.until_s, given.travel_share
+    error_map["travel_low"] = [travel.min_rad for travel in aircraft.travel.values()]
+    error_map["travel_high"] = [travel.max_rad for travel in aircraft.travel.values()]
     for k, box in enumerate(given.boxes):
         ends = np.array(box.ends(aircraft.signals))
-        record["low"][k, : len(ends)], record["high"][k, : len(ends)] = ends.T
+        error_map["low"][k, : len(ends)], error_map["high"][k, : len(ends)] = ends.T
         errors = box.error_p_rad_s2, box.error_q_rad_s2, box.error_r_rad_s2
-        record["error"][: len(given.until_s), k, : len(given.travel_share)] = np.moveaxis(
-            np.array(errors), 0, -1
-        )
+        error_map["error"][:n_ages, k, :n_levels] = np.stack(errors, axis=-1)
 
 
 @kernel

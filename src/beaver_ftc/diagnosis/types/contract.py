@@ -36,7 +36,7 @@ class FaultType:
                             hold the type against the judged frame, in which something was wrong: narrow
                             surface.set_low[kind] to .set_high[kind], or set surface.type_excluded[kind]
     rank                    place among the types of its sort, in numbers and in lists
-    memory, record          fields of a record of its own, found at `surface.<record>`
+    memory, record          a record of its own, found at `surface.<record>`
     begin(surface, kind)                        nothing is known yet; its set is unlimited
     watch(config, surface, kind)                called for every frame, before it is judged
     pass_over(config, surface, kind, k)         called for a frame that is not judged
@@ -54,7 +54,7 @@ class FaultType:
     constant: bool
     judge: Kernel
     rank: int = 100
-    memory: tuple[tuple, ...] = ()
+    memory: np.dtype | None = None
     record: str = ""
     begin: Kernel | None = None
     watch: Kernel | None = None

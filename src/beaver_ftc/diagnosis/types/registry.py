@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from beaver_ftc.compiled import kernel
+from beaver_ftc.compiled import kernel, record
 from beaver_ftc.diagnosis.bounds.declared import gyros_vary
 from beaver_ftc.diagnosis.state import IN_PITCH
 from beaver_ftc.diagnosis.types import table
@@ -93,95 +93,66 @@ MAX_BLOCK = 256  # frames of a block: examine.py
 HISTORY = 3  # frames, or blocks, of which the orders are kept: the elapsed one and two before it
 
 # What the surface was ordered to do, rad; [0] belongs to the elapsed frame or block, [1] to the one before.
-ORDERS = np.dtype(
-    [
-        ("given", "f8", (HISTORY, MAX_BLOCK)), ("low", "f8", (HISTORY,)), ("high", "f8", (HISTORY,)),
-        ("least", "f8", (2,)), ("greatest", "f8", (2,)),  # where a healthy surface was within it
-    ],
-    align=True,
+ORDERS = record(
+    given=(HISTORY, MAX_BLOCK), low=HISTORY, high=HISTORY,
+    least=2, greatest=2,  # where a healthy surface was within it
 )  # fmt: skip
 
 # Where a surface that a type has held and let go can be, rad: release.py.
-RELEASE = np.dtype(
-    [
-        ("low", "f8", (2, N_TYPES)), ("high", "f8", (2, N_TYPES)), ("released", "i8", (N_TYPES,)),
-        ("held_low", "f8", (N_TYPES,)), ("held_high", "f8", (N_TYPES,)),  # where it is held by then
-    ],
-    align=True,
+RELEASE = record(
+    low=(2, N_TYPES), high=(2, N_TYPES), released=(int, N_TYPES),
+    held_low=N_TYPES, held_high=N_TYPES,  # where it is held by then
 )  # fmt: skip
 
 # What was known of the first of two faults when it was named: pairs.py.
-KNOWN = np.dtype(
-    [("low", "f8", (N_TYPES,)), ("high", "f8", (N_TYPES,)), ("excluded", "i8", (N_TYPES,))], align=True
-)
+KNOWN = record(low=N_TYPES, high=N_TYPES, excluded=(int, N_TYPES))
 
 # What the types go by: whether a frame shows one instant, instants in it, whether a surface returns by its
 # actuator, frames of half of the slowest oscillation, whether a fault is declared to stay as it is and errors
 # of the surfaces' own terms are; frames of a block and its duration; dt s.
-TYPES_CONFIG = np.dtype(
-    [
-        ("whole", "i8"), ("instants", "i8"), ("returns", "i8"), ("patience", "i8"),
-        ("abrupt", "i8"), ("own_errors", "i8"), ("length", "i8"), ("span_s", "f8"), ("dt", "f8"),
-    ],
-    align=True,
+TYPES_CONFIG = record(
+    whole=int, instants=int, returns=int, patience=int, abrupt=int, own_errors=int, length=int, span_s=float,
+    dt=float,
 )  # fmt: skip
 
 # Two faults at once: pairs.py; alarms of the groups, and what is known of the first fault in pitch.
-PAIR = np.dtype(
-    [
-        ("enabled", "i8"), ("alarmed", "i8", (2,)), ("no_lateral_pair", "i8"), ("first", "i8"),
-        ("unsettled", "i8"),
-    ],
-    align=True,
-)  # fmt: skip
+PAIR = record(enabled=int, alarmed=(int, 2), no_lateral_pair=int, first=int, unsettled=int)
 
 # Blocks of frames: examine.py.
-FRAME_BLOCK = np.dtype(
-    [
-        ("filled", "i8"),
-        ("innovation", "f8", (3,)), ("bound", "f8", (3,)), ("noise", "f8", (3,)),
-    ],
-    align=True,
-)  # fmt: skip
+FRAME_BLOCK = record(filled=int, innovation=3, bound=3, noise=3)
 
 
 @lru_cache
 def surface_dtype() -> np.dtype:
     """One surface's record; positions in rad. `then`: a frame before the elapsed one, `before`: two."""
-    own = [(row.record, np.dtype(list(row.memory), align=True)) for row in TYPES if row.memory]
-    fields = [
+    own = {row.record: row.memory for row in TYPES if row.memory}
+    return record(
         # its actuator
-        ("travel_low", "f8"), ("travel_high", "f8"), ("least_runaway_rate", "f8"),
-        ("reach_low", "f8"), ("reach_high", "f8"),  # where it can act: a part of its travel is nearer to zero
-        ("approach", "f8"), ("step", "f8"), ("slowest_step", "f8"), ("orders", ORDERS),
+        travel_low=float, travel_high=float, least_runaway_rate=float,
+        reach_low=float, reach_high=float,  # where it can act: a part of its travel is nearer to zero
+        approach=float, step=float, slowest_step=float, orders=ORDERS,
         # where it was if it alone is at fault, and whether something was wrong
-        ("command", "f8"), ("low", "f8"), ("high", "f8"), ("wrong", "i8"),
-        ("command_then", "f8"), ("low_then", "f8"), ("high_then", "f8"), ("wrong_then", "i8"),
-        ("low_before", "f8"), ("high_before", "f8"), ("wrong_before", "i8"),
+        command=float, low=float, high=float, wrong=int, command_then=float, low_then=float, high_then=float,
+        wrong_then=int, low_before=float, high_before=float, wrong_before=int,
         # its effectiveness within the frame or block, and a quarter of what that varies by, in means
-        ("G_least", "f8"), ("G_most", "f8"), ("uneven", "f8"), ("uneven_then", "f8"),
+        G_least=float, G_most=float, uneven=float, uneven_then=float,
         # what the types make of it
-        ("set_low", "f8", (N_TYPES,)), ("set_high", "f8", (N_TYPES,)), ("type_excluded", "i8", (N_TYPES,)),
-        ("start_low", "f8"), ("start_high", "f8"), ("started_at", "i8"),
-        ("hides", "i8", (2,)), ("hides_then", "i8", (2,)),  # lower and upper stop: examine.note_stops
-        ("evidence", "i8"), ("quiet", "i8"), ("absent", "i8"),  # frames
-        ("unhidden", "i8"),  # of the evidence, what has come since a stop could last hide something
-        ("release", RELEASE), *own,
+        set_low=N_TYPES, set_high=N_TYPES, type_excluded=(int, N_TYPES), start_low=float, start_high=float,
+        started_at=int,
+        hides=(int, 2), hides_then=(int, 2),  # lower and upper stop: examine.note_stops
+        evidence=int, quiet=int, absent=int,  # frames
+        unhidden=int,  # of the evidence, what has come since a stop could last hide something
+        release=RELEASE, **own,
         # what is concluded; refuted: its estimator is excluded
-        ("in_question", "i8"), ("refuted", "i8"), ("standing", "i8"), ("measure", "i8"),
-        ("named", "i8"), ("named_at_s", "f8"), ("type", "i8"), ("type_at_s", "f8"), ("known", KNOWN),
-    ]  # fmt: skip
-    return np.dtype(fields, align=True)
+        in_question=int, refuted=int, standing=int, measure=int, named=int, named_at_s=float, type=int,
+        type_at_s=float, known=KNOWN,
+    )  # fmt: skip
 
 
 @lru_cache
 def types_dtype(n: int) -> np.dtype:
     """Faults of every type on n surfaces: types/."""
-    fields = [
-        ("config", TYPES_CONFIG), ("frame", "i8"), ("pair", PAIR), ("block", FRAME_BLOCK),
-        ("surface", surface_dtype(), (n,)),
-    ]  # fmt: skip
-    return np.dtype(fields, align=True)
+    return record(config=TYPES_CONFIG, frame=int, pair=PAIR, block=FRAME_BLOCK, surface=(surface_dtype(), n))
 
 
 def configure(

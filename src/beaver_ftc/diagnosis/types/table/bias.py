@@ -6,7 +6,7 @@ what runs almost as fast as a runaway counts as one.
 
 import numpy as np
 
-from beaver_ftc.compiled import kernel
+from beaver_ftc.compiled import kernel, record
 from beaver_ftc.diagnosis import membership
 from beaver_ftc.diagnosis.types.contract import FaultType, intersect, middle_of, set_of, within_travel
 
@@ -139,10 +139,10 @@ CONSTANT = FaultType(
 GROWING = FaultType(
     name="bias", constant=False, rank=4, begin=begin_growing, watch=watch_growing, judge=judge_growing,
     pass_over=pass_over_growing, estimate=last_offset, record="growing_bias",
-    memory=(
-        ("up", "f8"), ("down", "f8"),  # how far it has certainly grown, rad
+    memory=record(
+        up=float, down=float,  # how far it has certainly grown, rad
         # between what a slower one lies, rad; whether it has certainly run as fast as a runaway, down and up
-        ("least", "f8"), ("greatest", "f8"), ("ran", "i8", (2,)),
+        least=float, greatest=float, ran=(int, 2),
     ),
 )  # fmt: skip
 TYPES = CONSTANT, GROWING

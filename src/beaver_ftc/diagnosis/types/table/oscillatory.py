@@ -8,7 +8,7 @@ from math import pi, sqrt
 
 import numpy as np
 
-from beaver_ftc.compiled import kernel
+from beaver_ftc.compiled import kernel, record
 from beaver_ftc.diagnosis.types.contract import FaultType
 
 HALF_CYCLES_THAT_SHOW = 3
@@ -88,10 +88,10 @@ def frequency_rad_s(fdi: np.void, s: int, kind: int) -> float | None:
 OSCILLATORY = FaultType(
     name="oscillatory", constant=False, rank=2, begin=begin, watch=watch, judge=judge, pass_over=pass_over,
     shown=shown, estimate=estimate, frequency_rad_s=frequency_rad_s, record="oscillatory",
-    memory=(
-        ("sign", "i8"), ("steady_since", "i8"),
-        ("half_cycles", "i8"), ("first_end", "i8"), ("last_end", "i8"),  # ends of half-cycles, frames
-        ("square", "f8"), ("squares", "f8"),  # of the deflection error, rad2: this half-cycle, those before
+    memory=record(
+        sign=int, steady_since=int,
+        half_cycles=int, first_end=int, last_end=int,  # ends of half-cycles, frames
+        square=float, squares=float,  # of the deflection error, rad2: this half-cycle, those before
     ),
 )  # fmt: skip
 TYPES = (OSCILLATORY,)

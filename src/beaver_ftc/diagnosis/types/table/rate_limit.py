@@ -3,7 +3,7 @@
 Slower than that it is a jam: the two are one another's limit, and only a least rate tells them apart.
 """
 
-from beaver_ftc.compiled import kernel
+from beaver_ftc.compiled import kernel, record
 from beaver_ftc.diagnosis.types.contract import FaultType
 
 
@@ -61,9 +61,9 @@ def side(config, surface):
 
 RATE_LIMIT = FaultType(
     name="rate_limit", constant=False, rank=3, begin=begin, judge=judge, record="rate_limit",
-    memory=(
-        ("low", "f8"), ("high", "f8"),  # where it can be while it stands on one side of its command, rad
-        ("sign", "i8"), ("at", "i8"),  # which side, and the last frame of which that is known
+    memory=record(
+        low=float, high=float,  # where it can be while it stands on one side of its command, rad
+        sign=int, at=int,  # which side, and the last frame of which that is known
     ),
 )  # fmt: skip
 TYPES = (RATE_LIMIT,)

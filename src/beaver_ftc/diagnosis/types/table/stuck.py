@@ -6,7 +6,7 @@ it was before the earliest return still possible is kept, and comes back when he
 
 import numpy as np
 
-from beaver_ftc.compiled import kernel
+from beaver_ftc.compiled import kernel, record
 from beaver_ftc.diagnosis.types import release
 from beaver_ftc.diagnosis.types.contract import FaultType, intersect, middle_of, set_of, within_travel
 from beaver_ftc.diagnosis.types.release import EARLIER, LATER
@@ -100,7 +100,7 @@ def neutral_of(fdi: np.void, s: int, kind: int) -> float | None:
 
 STUCK = FaultType(
     name="stuck", constant=True, rank=2, begin=begin, judge=judge, let_go=let_go, bring_back=bring_back,
-    record="stuck", memory=(("kept_low", "f8", (2,)), ("kept_high", "f8", (2,))),  # rad; EARLIER and LATER
+    record="stuck", memory=record(kept_low=2, kept_high=2),  # rad; EARLIER and LATER
     deflection=deflection, estimate=middle_of, interval=set_of,
 )  # fmt: skip
 FLOAT = FaultType(

@@ -16,7 +16,7 @@ from beaver_ftc.design.fdc import MASS
 from beaver_ftc.diagnosis import likelihood, noise_model, statistical
 from beaver_ftc.diagnosis.bounds import variances
 from beaver_ftc.diagnosis.bounds.declared import Errors
-from beaver_ftc.diagnosis.likelihood import BLOCK, MAX_HYPOTHESES, N_SLOTS, SENSE
+from beaver_ftc.diagnosis.likelihood import MAX_HYPOTHESES, N_SLOTS, SENSE, Rooms, block_dtype
 from beaver_ftc.loop.assembly import assemble
 from beaver_ftc.scenario.schema import Scenario
 
@@ -38,7 +38,7 @@ def misread(y, place, error, thin_air_kw=0.0):
 def block_of(drift, noise, jitter=0.0, prior=1.0, keep=1.0):
     """A block as a record, with as many axes as `drift` (n, n) has. Standard deviations noise and jitter."""
     n = len(drift)
-    block = np.zeros(1, BLOCK).view(np.recarray)[0]
+    block = np.zeros(1, block_dtype(Rooms(105, MAX_HYPOTHESES))).view(np.recarray)[0]
     block["n"], block["axis"][:n], block["keep"] = n, range(n), keep
     block["drift"][:n, :n] = drift
     block["noise"][:n], block["jitter"][:n] = np.square(noise), np.square(jitter)
@@ -60,7 +60,7 @@ def with_hypotheses(block, *kinds, tolerance=()):
 def by_onset(block, name):
     """What the lanes keep under a name, (..., slots, hypotheses)."""
     kept = block["lane"][name]
-    return kept.reshape(*kept.shape[:-1], MAX_HYPOTHESES, N_SLOTS).swapaxes(-1, -2)
+    return kept.reshape(*kept.shape[:-1], -1, N_SLOTS).swapaxes(-1, -2)
 
 
 def covariance(block, frames, dt):

@@ -8,8 +8,8 @@ from statistics_of import Across
 
 from beaver_ftc.aircraft import load
 from beaver_ftc.diagnosis import across, likelihood, tones
-from beaver_ftc.diagnosis.across import AN_AXIS, MAX_VIEWS, set_up_views
-from beaver_ftc.diagnosis.likelihood import LEAST_UNCERTAINTY_RAD_S2, MAX_HYPOTHESES, STEP
+from beaver_ftc.diagnosis.across import AN_AXIS, USUAL, set_up_views
+from beaver_ftc.diagnosis.likelihood import LEAST_UNCERTAINTY_RAD_S2, STEP
 from beaver_ftc.diagnosis.state import LOSS, POSITION
 
 AILERON, ELEVATOR, RUDDER, FLAP = range(4)
@@ -213,7 +213,7 @@ def test_views_that_are_not_there_are_not_asked(fdi, rng):
     Across.observe(fdi, rng.normal(size=3), np.ones((3, 4)), np.ones((3, 4)), FLOW, 3, False)
     after = fdi["statistical"]["views"]
     changed = [now.tobytes() != then.tobytes() for now, then in zip(after, before, strict=True)]
-    assert changed == [True] + [False] * (MAX_VIEWS - 1)
+    assert changed == [True] + [False] * (USUAL.views - 1)
 
 
 def test_any_hypothesis_beyond_the_level_excludes_whom_it_is_not_felt_of(fdi):
@@ -223,8 +223,9 @@ def test_any_hypothesis_beyond_the_level_excludes_whom_it_is_not_felt_of(fdi):
         fie["kind"], fie["surface"], fie["effect"]["Z"] = POSITION, s, np.eye(3, 4)[:, s]
     view = statistical["views"][ROLL_AXIS]
     tried = int(view["block"]["n_hypotheses"])
-    for h in range(MAX_HYPOTHESES):
-        view["block"]["hypothesis"]["score"] = np.where(np.arange(MAX_HYPOTHESES) == h, 5.1, 4.9)
+    room = len(view["block"]["hypothesis"])
+    for h in range(room):
+        view["block"]["hypothesis"]["score"] = np.where(np.arange(room) == h, 5.1, 4.9)
         assert Across.excludes(fdi, ELEVATOR) == (h < tried)
         assert not Across.excludes(fdi, AILERON)
     view["block"]["hypothesis"]["score"] = 5.0
@@ -257,4 +258,4 @@ def test_a_view_has_levels_and_tolerances_of_the_axes_it_looks_at(fdi):
 
 def losses(tried):
     """1 for each loss that is tried, of which a correlation of the other sign speaks for nothing."""
-    return np.pad(tried["kind"] == LOSS, (0, MAX_HYPOTHESES - len(tried))).astype(float)
+    return np.pad(tried["kind"] == LOSS, (0, USUAL.view.hypotheses - len(tried))).astype(float)

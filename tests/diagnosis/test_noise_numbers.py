@@ -17,7 +17,7 @@ from beaver_ftc.diagnosis.bounds import variances
 from beaver_ftc.diagnosis.bounds.declared import Errors, gust_sigma_rad_s, inertia_slack
 from beaver_ftc.diagnosis.likelihood import ALPHA3, ENDING, GROWING, N_SLOTS, STEP
 from beaver_ftc.diagnosis.state import LOSS
-from beaver_ftc.diagnosis.statistical import STATISTICAL
+from beaver_ftc.diagnosis.statistical import statistical_dtype
 from beaver_ftc.loop.assembly import assemble
 from beaver_ftc.scenario.diagnosis import Bounds, Statistical
 from beaver_ftc.scenario.schema import Scenario
@@ -77,7 +77,7 @@ def test_a_bound_of_zero_is_reckoned_with_as_a_small_one():
 
 
 def returning(rapidity, moving=1, rolling=200.0, rate_hz=50.0):
-    record = np.zeros(1, STATISTICAL)[0]
+    record = np.zeros(1, statistical_dtype())[0]
     record["noise"]["rapidity"], record["tests"]["alarm_level"] = rapidity, 6.0
     record["air"]["moving"], record["air"]["rolling"] = moving, rolling
     return noise_model.returning_length(record, V, rate_hz)
@@ -358,7 +358,7 @@ def test_where_forces_are_weighed_their_noise_is_in_the_gust_that_follows_from_t
     sensors = Bounds.model_validate(
         {"sensors": {"ay": {"noise_std_mps2": 0.3}, "az": {"noise_std_mps2": 0.2}}}
     )
-    statistical, design, dt = np.zeros(1, STATISTICAL)[0], design_record()[0], 0.02
+    statistical, design, dt = np.zeros(1, statistical_dtype())[0], design_record()[0], 0.02
     forces = statistical["forces"]
     forces["known"], forces["component"]["felt"] = known, (0.3**2, 0.2**2)
     forces["component"]["vane"][:, 1] = -6.0, 50.0

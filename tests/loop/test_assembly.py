@@ -1,12 +1,16 @@
 """From a scenario to the record a flight is flown by: numbers in their units, per frame or JSBSim frame."""
 
+import dataclasses
 from math import exp, pi, radians
 
 import numpy as np
 import pytest
 
+from beaver_ftc.aircraft import load
+from beaver_ftc.diagnosis.across import size_for
 from beaver_ftc.diagnosis.isolation import estimator_names
 from beaver_ftc.diagnosis.rivals.rls import RlsMonitor
+from beaver_ftc.diagnosis.statistical import statistical_dtype
 from beaver_ftc.loop import plugin_frame
 from beaver_ftc.loop.assembly import assemble
 from beaver_ftc.scenario.schema import Scenario
@@ -42,6 +46,24 @@ GIVEN = {
 
 def assembled(**keys):
     return assemble(Scenario.model_validate(GIVEN | keys), TRIM, TRAVEL)[0]
+
+
+def test_a_flight_remembers_little_and_one_of_more_terms_or_delays_as_much_as_it_needs():
+    """The usual record is that of most flights, so that one compiled code is."""
+    usual = assembled()
+    assert usual.nbytes <= 600_000
+    assert usual["fdi"]["statistical"].dtype == statistical_dtype(size_for(load()))
+    file = load().file
+    twice = {axis: 2 * terms for axis, terms in file.moments}
+    many = file.model_copy(update={"moments": file.moments.model_copy(update=twice)})
+    size = size_for(dataclasses.replace(load(), file=many))
+    in_roll_and_yaw = 2 * sum(term.coefficient != "Cm" for term in load().moments)
+    assert usual["fdi"]["statistical"]["block"]["tolerance"].shape[1] < in_roll_and_yaw + 5
+    assert in_roll_and_yaw + 5 <= size.rates.regressors < size.view.regressors
+    slow = {name: {"delay_s": 1.0} for name in ("p", "q", "r", "alpha", "beta", "V")}
+    says = {}, {"sensors": slow}, {"changes": [{"at_s": 3.0, "sensors": slow}]}
+    lines = [assembled(**keys)["instruments"]["line"].size for keys in says]
+    assert lines[0] < 6 * (50 * SUBSTEPS + 2) <= lines[1] == lines[2]
 
 
 @pytest.fixture(scope="module")

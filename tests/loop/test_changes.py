@@ -183,6 +183,10 @@ def test_by_hand_across_a_change():
         ({"declared_sensors": {"p": {"delay_s": 0.1}}}, "declared_sensors.p: a lag, a delay"),
         ({"at_s": 3, "law": "lqr"}, "at_s: has no meaning here"),
         ({"speed": 3}, "speed: unknown key"),
+        (
+            {"sensors": {name: {"delay_s": 1.0} for name in ("p", "q", "r", "alpha", "beta", "V")}},
+            r"sensors: delays of 612 samples in all, allowed: 512 in this flight",
+        ),
     ],
 )
 def test_a_mistake_is_said_in_one_line_and_the_flight_goes_on(change, says):

@@ -80,6 +80,17 @@ def test_a_ramp_comes_out_late_by_delay_and_lag():
     assert ramp[399, 0] - lagged[399, 0] == pytest.approx(slope * dt * keep / (1 - keep), rel=1e-6)
 
 
+@pytest.mark.parametrize("rate_hz", [100, 900])
+def test_each_signal_has_a_delay_of_its_own(rate_hz):
+    """At 900 Hz they keep more samples than most flights have room for."""
+    delays_s = np.array([0.05, 0.0, 1.0, 0.017, 0.0, 0.6, 0.2])
+    names = [name for name, delay_s in zip(SIGNALS, delays_s, strict=True) if delay_s]
+    ramps = still(1200) + np.arange(1200)[:, None] / rate_hz
+    late = samples(ramps, rate_hz=rate_hz, **{n: {"delay_s": delays_s[SIGNALS.index(n)]} for n in names})
+    assert ramps[1100:] - late[1100:] == pytest.approx(np.tile(delays_s, (100, 1)), abs=1e-9)
+    assert late[0] == pytest.approx(ramps[0])
+
+
 def test_lost_samples_are_as_many_as_declared_and_hold_the_last():
     n = 20_000
     ramp = still(n)

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from beaver_ftc.plant.faults import NEVER, SensorFaultSchedule
-from beaver_ftc.plant.instruments import INSTRUMENTS, N_SENSORS, SENSORS, break_all
+from beaver_ftc.plant.instruments import N_SENSORS, SENSORS, break_all, instruments_dtype
 from beaver_ftc.scenario.loader import load
 from beaver_ftc.scenario.sensors import QUANTITIES, Sensors
 
 
 def schedule_of(*faults, rate_hz=100.0):
-    instruments = np.zeros(1, INSTRUMENTS)[0]
+    instruments = np.zeros(1, instruments_dtype())[0]
     given = load({"name": "x", "faults": list(faults)}).faults
     return instruments, SensorFaultSchedule(given, instruments, rate_hz)
 

@@ -30,34 +30,46 @@ known by them. Known to be broken, or suspected of it, they count no more.
 """
 
 from collections.abc import Iterator
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
 from beaver_ftc.aircraft import Aircraft
+from beaver_ftc.aircraft.schema import MAX_TERMS_OF_ONE
 from beaver_ftc.compiled import kernel
 from beaver_ftc.diagnosis import likelihood, tones
 from beaver_ftc.diagnosis.air import along, drift_beside, whole_drift
-from beaver_ftc.diagnosis.forces import ASIDE, SETTLED, UP, separated_by_force
+from beaver_ftc.diagnosis.bounds.variances import axis_of
+from beaver_ftc.diagnosis.forces import (
+    ASIDE,
+    MAX_ERRORS,
+    SETTLED,
+    UP,
+    separated_by_force,
+    tell_apart,
+    terms_of,
+)
 from beaver_ftc.diagnosis.likelihood import (
-    BLOCK,
     LATERAL,
     LEAST_UNCERTAINTY_RAD_S2,
     MAX_HYPOTHESES,
+    N_READINGS,
     N_SLOTS,
     PITCH_BLOCK,
     SENSE,
     STEP,
+    Rooms,
+    block_dtype,
 )
 from beaver_ftc.diagnosis.state import LOSS, NORMAL, PITCH, ROLL, SIDE, YAW
-from beaver_ftc.diagnosis.tones import TONES
+from beaver_ftc.diagnosis.tones import tones_dtype
 from beaver_ftc.scenario.diagnosis import FdiConfig
 
 VANE_TOLERANCE = 0.1  # of what a vane's error does: its column is that of the trim
 HOLDS = 5.0  # times as long as old evidence elsewhere a force is remembered
 MOSTLY = 0.9  # of a direction of length one
 LEAST_LENGTH = 0.1  # of a column: errors larger than that are not reckoned with
-MAX_VIEWS = 16
 PRIOR_DRIFT_RAD_S2 = 1.0  # what a drift may be at the start of a flight: soon forgotten
 IN_PITCH, LATERALLY, IN_YAW = (PITCH, NORMAL), (ROLL, YAW), (YAW, SIDE)  # planes that several surfaces move
 
@@ -68,17 +80,37 @@ IN_PITCH, LATERALLY, IN_YAW = (PITCH, NORMAL), (ROLL, YAW), (YAW, SIDE)  # plane
 # axis: that an alarm of it is said to be about. past_gust: across the rolling gust too. column: of length 1.
 # Of the frame: whether it is weighed; which share of what goes along its column may show across.
 AN_AXIS, THE_VANE = -1, -2
-VIEW = np.dtype(
-    [
+
+
+class Size(NamedTuple):
+    """What a statistical record has room for: of a block of the rates, of a view, and views."""
+
+    rates: Rooms
+    view: Rooms
+    views: int
+
+
+# The usual one serves most aircraft, so that the same compiled code does; all fit into the other.
+USUAL = Size(Rooms(24, MAX_HYPOTHESES), Rooms(36, 3), 13)
+MOST = Size(
+    Rooms(2 * MAX_TERMS_OF_ONE + N_READINGS, MAX_HYPOTHESES),
+    Rooms(2 * MAX_TERMS_OF_ONE + N_READINGS + MAX_ERRORS + 2, MAX_HYPOTHESES),
+    16,
+)
+
+
+@lru_cache
+def view_dtype(rooms: Rooms) -> np.dtype:
+    """A view whose block has these rooms."""
+    fields = [
         ("surface", "i8"), ("axis", "i8"), ("mix", "f8", (5,)), ("plane", "i8", (2,)),
         ("past_gust", "i8"), ("column", "f8", (5,)), ("tolerated", "i8"),
         ("inertial", "i8"), ("clears", "i8"), ("cleared_by", "i8"),
         ("weighed", "i8"), ("shows_across", "f8"),
         ("bounded", "f8", (1,)), ("by_rates", "f8", (3,)), ("by_forces", "f8", (3,)), ("held", "f8"),
-        ("block", BLOCK), ("tones", TONES),
-    ],
-    align=True,
-)  # fmt: skip
+        ("block", block_dtype(rooms)), ("tones", tones_dtype(rooms.regressors)),
+    ]  # fmt: skip
+    return np.dtype(fields, align=True)
 
 
 @kernel
@@ -403,12 +435,26 @@ def across_a_column(config: FdiConfig, instants: int) -> bool:
     return config.looks_across and instants <= 1
 
 
+def size_for(aircraft: Aircraft) -> Size:
+    """The usual size, or the largest where that is too small."""
+    axes, views = [axis_of(term) for term in aircraft.moments], list(views_of(aircraft, tell_apart(aircraft)))
+    rates = N_READINGS + max(axes.count(PITCH), axes.count(ROLL) + axes.count(YAW))
+    errors = max(len(terms_of(aircraft, f)) for f in (ASIDE, UP)) + MAX_ERRORS - MAX_TERMS_OF_ONE
+    fits = (
+        rates <= USUAL.rates.regressors
+        and rates + errors + 2 <= USUAL.view.regressors
+        and all(len(view.tries) < USUAL.view.hypotheses for view in views)
+        and len(views) <= USUAL.views
+    )
+    return USUAL if fits else MOST
+
+
 def set_up_views(statistical: np.void, aircraft: Aircraft) -> None:
     """Fill the views of a statistical record whose blocks, and normal force, are set up."""
     forces = statistical["forces"]
     separated = [separated_by_force(aircraft, f) for f in (ASIDE, UP)]
     with_air = forces["known"] and statistical["air"]["moving"] and all(separated)
-    views = list(views_of(aircraft, bool(forces["known"])))[:MAX_VIEWS]
+    views = list(views_of(aircraft, bool(forces["known"])))[: len(statistical["views"])]
     statistical["n_views"] = len(views)
     for view, (surface, mix, plane, movers, inertial, asks) in zip(statistical["views"], views, strict=False):
         view["surface"], view["mix"], view["plane"], block = surface, mix, plane, view["block"]
@@ -417,7 +463,7 @@ def set_up_views(statistical: np.void, aircraft: Aircraft) -> None:
         # A law answers a gust by the vanes before the gyros feel it pitch, and the vanes are not asked here:
         # what an elevator does in moving air goes along with the noise, and no test of its loss is fair.
         answered = statistical["air"]["moving"] and mix[PITCH]
-        tried = [] if answered else movers[: MAX_HYPOTHESES - 1]
+        tried = [] if answered else movers[: len(block["hypothesis"]) - 1]
         kinds, n = [STEP, *(LOSS for _ in tried)], int(axes["n_regressors"])
         block["n"], block["n_hypotheses"], block["keep"] = 1, len(kinds), 1.0
         block["P_xx"][0, 0], block["P_dd"][0, 0] = axes["noise"].max(), PRIOR_DRIFT_RAD_S2**2

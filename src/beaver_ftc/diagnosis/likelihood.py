@@ -49,11 +49,12 @@ Onsets: slot j starts anew every 2^(j+1) frames, so that there is always one of 
 alarm on they stay, and old evidence is forgotten slowly.
 """
 
+from functools import lru_cache
 from math import sqrt
+from typing import NamedTuple
 
 import numpy as np
 
-from beaver_ftc.aircraft.schema import MAX_TERMS_OF_ONE
 from beaver_ftc.compiled import kernel
 from beaver_ftc.diagnosis.state import LOSS
 
@@ -65,8 +66,7 @@ PITCH_BLOCK, LATERAL, RETURNING = 0, 1, 2  # the last is the second view of roll
 N_BLOCKS = 3
 N_SLOTS = 10
 N_READINGS = 5  # alpha, beta, airspeed, dynamic pressure, engine power: noise_model.py
-MAX_HYPOTHESES, MAX_REGRESSORS = 8, 3 * MAX_TERMS_OF_ONE + 4 + N_READINGS
-LANES = N_SLOTS * MAX_HYPOTHESES
+MAX_HYPOTHESES = 8  # of a block of the rates: three losses at most, and what they are held against
 LEAST_UNCERTAINTY_RAD_S2 = 1e-3  # reckoned with: a bound that passes zero does not stay there
 STEP, ALPHA3, GROWING, ENDING = 2, 3, 4, 5  # further kinds of hypothesis
 # Which sign of a correlation speaks for one: a loss takes away, one that ends gives back; 0: either does.
@@ -89,23 +89,34 @@ HYPOTHESIS = np.dtype(
     align=True,
 )  # fmt: skip
 
-LANE = np.dtype(
-    [
-        ("sense", "f8", (LANES,)), ("shaped", "f8", (2, LANES)), ("response", "f8", (4, LANES)),
-        ("weight", "f8", (2, LANES)),  # S^-1 g_s of the frame
-        ("correlation", "f8", (LANES,)), ("information", "f8", (LANES,)),
-        ("overlap", "f8", (MAX_REGRESSORS, LANES)), ("slack", "f8", (LANES,)),
-        ("missing", "f8", (LANES,)),  # of a loss that grows, what is yet to come
-        ("held", "f8", (2, LANES)),  # of a loss that ends, its signature as it did
+
+class Rooms(NamedTuple):
+    """How many regressors and hypotheses a block has room for."""
+
+    regressors: int
+    hypotheses: int
+
+
+@lru_cache
+def lane_dtype(rooms: Rooms) -> np.dtype:
+    """What the lanes of a block keep, side by side."""
+    lanes = N_SLOTS * rooms.hypotheses
+    fields = [
+        ("sense", "f8", (lanes,)), ("shaped", "f8", (2, lanes)), ("response", "f8", (4, lanes)),
+        ("weight", "f8", (2, lanes)),  # S^-1 g_s of the frame
+        ("correlation", "f8", (lanes,)), ("information", "f8", (lanes,)),
+        ("overlap", "f8", (rooms.regressors, lanes)), ("slack", "f8", (lanes,)),
+        ("missing", "f8", (lanes,)),  # of a loss that grows, what is yet to come
+        ("held", "f8", (2, lanes)),  # of a loss that ends, its signature as it did
         # what a bounded uncertainty can add to the correlation: as it stays, as it swings, at its pace
-        ("stays", "f8", (LANES,)), ("swings", "f8", (LANES,)), ("drifts", "f8", (LANES,)),
-        ("foreseen", "f8", (LANES,)),  # of the correlation, what calm air gives a law that answers noise
+        ("stays", "f8", (lanes,)), ("swings", "f8", (lanes,)), ("drifts", "f8", (lanes,)),
+        ("foreseen", "f8", (lanes,)),  # of the correlation, what calm air gives a law that answers noise
         # what it comes to, the last three as log likelihood ratios
-        ("score", "f8", (LANES,)),
-        ("at_least", "f8", (LANES,)), ("at_most", "f8", (LANES,)), ("likelihood", "f8", (LANES,)),
-    ],
-    align=True,
-)  # fmt: skip
+        ("score", "f8", (lanes,)),
+        ("at_least", "f8", (lanes,)), ("at_most", "f8", (lanes,)), ("likelihood", "f8", (lanes,)),
+    ]  # fmt: skip
+    return np.dtype(fields, align=True)
+
 
 _FILTER = [
     ("n", "i8"), ("keep", "f8"), ("state", "f8", (4,)), ("innovation", "f8", (2,)),
@@ -115,8 +126,11 @@ _FILTER = [
 ]  # fmt: skip
 FILTER = np.dtype(_FILTER, align=True)
 
-BLOCK = np.dtype(
-    [
+
+@lru_cache
+def block_dtype(rooms: Rooms) -> np.dtype:
+    """A block: its filter, and what its hypotheses come to."""
+    fields = [
         ("axis", "i8", (2,)),  # first: a record that begins as another does is taken for one
         *_FILTER,
         ("lag", "f8"), ("stronger", "f8"), ("rest", "f8", (4,)), ("scratch", "f8", (2,)),
@@ -124,14 +138,13 @@ BLOCK = np.dtype(
         ("calm", FILTER), ("foreseen", "f8", (2,)), ("agreement", "f8"), ("size", "f8"),
         # alarm level; share of it that chance is given beside what is bounded; omega dt of the latter
         ("level", "f8"), ("chance", "f8"), ("pace", "f8"), ("stay", "f8", (2,)), ("swing", "f8", (2,)),
-        ("n_regressors", "i8"), ("tolerance", "f8", (MAX_REGRESSORS,)),
-        ("regressor", "f8", (MAX_REGRESSORS, 2)), ("regressor_state", "f8", (MAX_REGRESSORS, 4)),
-        ("regressor_response", "f8", (MAX_REGRESSORS, 2)),
-        ("n_hypotheses", "i8"), ("hypothesis", HYPOTHESIS, (MAX_HYPOTHESES,)),
-        ("lane", LANE),
-    ],
-    align=True,
-)  # fmt: skip
+        ("n_regressors", "i8"), ("tolerance", "f8", (rooms.regressors,)),
+        ("regressor", "f8", (rooms.regressors, 2)), ("regressor_state", "f8", (rooms.regressors, 4)),
+        ("regressor_response", "f8", (rooms.regressors, 2)),
+        ("n_hypotheses", "i8"), ("hypothesis", HYPOTHESIS, (rooms.hypotheses,)),
+        ("lane", lane_dtype(rooms)),
+    ]  # fmt: skip
+    return np.dtype(fields, align=True)
 
 
 @kernel

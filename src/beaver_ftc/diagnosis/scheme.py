@@ -12,6 +12,7 @@ from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.compiled import apart, kernel, record
 from beaver_ftc.design.model import AIRSPEED
 from beaver_ftc.diagnosis import air, bank, detection, forces, isolation, state, statistical
+from beaver_ftc.diagnosis.across import USUAL, Size
 from beaver_ftc.diagnosis.bank import BANK, largest_share
 from beaver_ftc.diagnosis.bounds import declared
 from beaver_ftc.diagnosis.bounds.worst_case import bound_dtype
@@ -27,7 +28,7 @@ from beaver_ftc.diagnosis.state import (
     conclusion_dtype,
     layout_dtype,
 )
-from beaver_ftc.diagnosis.statistical import STATISTICAL
+from beaver_ftc.diagnosis.statistical import statistical_dtype
 from beaver_ftc.diagnosis.types import examine, pairs, registry, verdict
 from beaver_ftc.diagnosis.types.examine import FIXED, LAGS, LOSES, SHIFTED
 from beaver_ftc.diagnosis.types.registry import types_dtype
@@ -37,12 +38,12 @@ from beaver_ftc.scenario.schema import Scenario
 
 
 @lru_cache
-def diagnosis_dtype(n: int) -> np.dtype:
-    """The stages of the diagnosis of an aircraft with n surfaces."""
+def diagnosis_dtype(n: int, size: Size = USUAL) -> np.dtype:
+    """The stages of the diagnosis of an aircraft with n surfaces; size: of its statistical record."""
     return record(
         config=CONFIG, bound=bound_dtype(n), bank=BANK, fdae=FDAE, verdict=conclusion_dtype(n),
-        layout=layout_dtype(n), isolation=ISOLATION, types=types_dtype(n), statistical=STATISTICAL,
-        watch=WATCH,
+        layout=layout_dtype(n), isolation=ISOLATION, types=types_dtype(n),
+        statistical=statistical_dtype(size), watch=WATCH,
     )  # fmt: skip
 
 

@@ -6,6 +6,8 @@ gathers evidence for longer. The declared rate of false alarms holds for the dec
 scheme beside it needs no probability at all. `fdi.config.authority` says whose alarms and exclusions count.
 """
 
+from functools import lru_cache
+
 import numpy as np
 
 from beaver_ftc.aircraft.schema import MAX_MONOMIALS, MAX_TERMS
@@ -13,12 +15,11 @@ from beaver_ftc.compiled import kernel
 from beaver_ftc.design.terms import AIRSPEED, N_SIGNALS, QDYN, evaluate, regressors
 from beaver_ftc.diagnosis import across, likelihood, noise_model
 from beaver_ftc.diagnosis import air as gusts
-from beaver_ftc.diagnosis.across import MAX_VIEWS, VIEW
+from beaver_ftc.diagnosis.across import USUAL, Size, view_dtype
 from beaver_ftc.diagnosis.air import AIR
 from beaver_ftc.diagnosis.bounds.worst_case import UNKNOWN_TO_FILTERS_RAD_S2, uncertainty_bound
 from beaver_ftc.diagnosis.forces import FORCES_FELT
 from beaver_ftc.diagnosis.likelihood import (
-    BLOCK,
     ENDING,
     GROWING,
     LATERAL,
@@ -27,6 +28,7 @@ from beaver_ftc.diagnosis.likelihood import (
     N_READINGS,
     RETURNING,
     STEP,
+    block_dtype,
 )
 from beaver_ftc.diagnosis.likelihood import PITCH_BLOCK as PITCH
 from beaver_ftc.diagnosis.state import LOSS
@@ -66,14 +68,16 @@ ALARM = np.dtype(
     [("score", "f8"), ("axis", "i8"), ("closest", "f8"), ("detected_at_s", "f8")], align=True
 )  # fmt: skip
 
-STATISTICAL = np.dtype(
-    [
-        ("tests", TESTS), ("noise", NOISE), ("alarm", ALARM), ("block", BLOCK, (N_BLOCKS,)),
-        ("n_views", "i8"), ("views", VIEW, (MAX_VIEWS,)), ("listening", LISTENING),
+
+@lru_cache
+def statistical_dtype(size: Size = USUAL) -> np.dtype:
+    """What the detector keeps of an aircraft of this size."""
+    fields = [
+        ("tests", TESTS), ("noise", NOISE), ("alarm", ALARM), ("block", block_dtype(size.rates), (N_BLOCKS,)),
+        ("n_views", "i8"), ("views", view_dtype(size.view), (size.views,)), ("listening", LISTENING),
         ("forces", FORCES_FELT), ("air", AIR), ("inertial_air", AIR),
-    ],
-    align=True,
-)  # fmt: skip
+    ]  # fmt: skip
+    return np.dtype(fields, align=True)
 
 
 @kernel

@@ -14,13 +14,14 @@ little less, since d changes no faster than declared.
 Frames are summed a few at a time: no frequency listened to turns far within 0.04 s.
 """
 
+from functools import lru_cache
 from math import exp, pi, sqrt
 
 import numpy as np
 
 from beaver_ftc.compiled import kernel
 from beaver_ftc.design.terms import AIRSPEED, ALPHA, BETA
-from beaver_ftc.diagnosis.likelihood import MAX_REGRESSORS, share
+from beaver_ftc.diagnosis.likelihood import share
 
 N_TONES = 16
 # A memory of T s tells frequencies 1 / T apart; halfway between two of the grid 0.7 of a tone is heard.
@@ -44,17 +45,20 @@ LISTENING = np.dtype(
     ],
     align=True,
 )  # fmt: skip
-TONES = np.dtype(
-    [
-        ("count", "i8"), ("sum", "f8"), ("sums", "f8", (MAX_REGRESSORS,)),  # of frames, and of regressors
-        ("tone", "f8", (2, N_TONES)), ("overlap", "f8", (MAX_REGRESSORS, 2, N_TONES)),
+
+
+@lru_cache
+def tones_dtype(regressors: int) -> np.dtype:
+    """What a view of so many regressors keeps."""
+    fields = [
+        ("count", "i8"), ("sum", "f8"), ("sums", "f8", (regressors,)),  # of frames, and of regressors
+        ("tone", "f8", (2, N_TONES)), ("overlap", "f8", (regressors, 2, N_TONES)),
         # of |N|: what coefficients and a bounded uncertainty explain; of the latter, its size and its beat
         ("slack", "f8", (N_TONES,)), ("room", "f8", (N_TONES,)),
         ("steady", "f8", (N_TONES,)), ("beat", "f8", (2, N_TONES)), ("information", "f8"),
         ("score", "f8"),  # of the loudest, as a score of likelihood.py of the same chance
-    ],
-    align=True,
-)  # fmt: skip
+    ]  # fmt: skip
+    return np.dtype(fields, align=True)
 
 
 @kernel

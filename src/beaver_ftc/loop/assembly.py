@@ -9,6 +9,7 @@ from beaver_ftc.control.accommodation import assessment_dtype, true_faults_dtype
 from beaver_ftc.control.outer.state import AUTOPILOT, COLUMNS
 from beaver_ftc.control.supervisor import SUPERVISOR
 from beaver_ftc.diagnosis import belief, scheme
+from beaver_ftc.diagnosis.across import USUAL, Size, size_for
 from beaver_ftc.diagnosis.isolation import estimator_names
 from beaver_ftc.diagnosis.state import verdict_dtype
 from beaver_ftc.loop import memory
@@ -18,14 +19,14 @@ from beaver_ftc.loop.instrument_records import (
     assemble_watch,
     breaks_instruments,
     comes_to_be_watched,
+    line_for,
     seed_instruments,
     truth_read,
 )
 from beaver_ftc.plant import channels as ch
-from beaver_ftc.plant.instruments import INSTRUMENTS, MEASURED
+from beaver_ftc.plant.instruments import MEASURED, USUAL_LINE, instruments_dtype
 from beaver_ftc.plant.native import RUNNING
 from beaver_ftc.plant.sensing import truth_dtype
-from beaver_ftc.scenario.diagnosis import FdiConfig
 from beaver_ftc.scenario.dump import texts_of
 from beaver_ftc.scenario.schema import Scenario
 
@@ -34,15 +35,16 @@ LOGGED = np.dtype([("estimators", "i8"), ("watch", "i8"), ("power", "i8"), ("tes
 
 
 @lru_cache
-def frame_dtype(n: int) -> np.dtype:
-    """All that a flight of an aircraft with n surfaces remembers between frames."""
+def frame_dtype(n: int, size: Size = USUAL, line: int = USUAL_LINE) -> np.dtype:
+    """All that a flight of an aircraft with n surfaces remembers between frames; size: of its statistics;
+    line: of its delay lines."""
     fields = [
         ("k", "i8"), ("row", "i8"), ("dt", "f8"), ("t", "f8"),  # frame, row of the log, s, s
         ("running", RUNNING),
         ("since", "i8"), ("logged", LOGGED),  # the frame with which this diagnosis has begun
-        ("truth", truth_dtype(n)), ("instruments", INSTRUMENTS), ("measured", MEASURED),
-        ("belief", belief.belief_dtype(n)), ("fdi", scheme.diagnosis_dtype(n)), ("verdict", verdict_dtype(n)),
-        ("assessment", assessment_dtype(n)), ("faults", true_faults_dtype(n)),
+        ("truth", truth_dtype(n)), ("instruments", instruments_dtype(line)), ("measured", MEASURED),
+        ("belief", belief.belief_dtype(n)), ("fdi", scheme.diagnosis_dtype(n, size)),
+        ("verdict", verdict_dtype(n)), ("assessment", assessment_dtype(n)), ("faults", true_faults_dtype(n)),
         ("supervisor", SUPERVISOR), ("control", control.control_dtype(n)),
         ("autopilot", AUTOPILOT),
         ("held", "i8"), ("held_rad", "f8", (n,)),  # whether another than the law commands, and what
@@ -51,16 +53,9 @@ def frame_dtype(n: int) -> np.dtype:
     return np.dtype(fields, align=True)
 
 
-def idle(fdi: FdiConfig) -> list[tuple[str, ...]]:
-    """Large fields that are not read before they are written: delay lines are filled by the first sample."""
-    parts = {"block": bool(fdi.statistical), "views": bool(fdi.statistical) and fdi.fault_class == "all"}
-    unused = [("fdi", "statistical", part) for part, used in parts.items() if not used]
-    return [("instruments", "line"), *unused]
-
-
 _DESIGN = ("fdi", "control", "design_model", "actuators", "sensors")
 _MOST_DESIGNS = 32
-_designs: dict[tuple[object, ...], memory.Packed] = {}
+_designs: dict[tuple[object, ...], np.ndarray] = {}
 
 
 def assemble(scenario: Scenario, trim: np.ndarray, travel: np.ndarray) -> np.ndarray:
@@ -71,12 +66,13 @@ def assemble(scenario: Scenario, trim: np.ndarray, travel: np.ndarray) -> np.nda
     """
     initial = tuple(scenario.initial.model_dump(exclude={"airspeed_mps"}).values())
     rates, failing = (scenario.rate_hz, scenario.substeps), breaks_instruments(scenario)
-    key = scenario.airframe, texts_of(scenario, _DESIGN), rates, failing, initial, travel.tobytes()
+    line = line_for(scenario)
+    key = scenario.airframe, texts_of(scenario, _DESIGN), rates, failing, line, initial, travel.tobytes()
     if key not in _designs:
         if len(_designs) >= _MOST_DESIGNS:
             _designs.clear()
-        _designs[key] = memory.packed(_assemble_design(scenario, travel), idle(scenario.fdi))
-    frames = memory.unpacked(_designs[key])
+        _designs[key] = _assemble_design(scenario, travel, line)
+    frames = memory.copied(_designs[key])
     frame = frames[0]
     frame["belief"]["u"] = frame["belief"]["commanded"] = trim
     frame["control"]["layout"]["trim"] = frame["control"]["allocation"]["command"] = trim
@@ -84,10 +80,10 @@ def assemble(scenario: Scenario, trim: np.ndarray, travel: np.ndarray) -> np.nda
     return frames
 
 
-def _assemble_design(scenario: Scenario, travel: np.ndarray) -> np.ndarray:
+def _assemble_design(scenario: Scenario, travel: np.ndarray, line: int) -> np.ndarray:
     """What does not depend on the trim, the seed and the truth: each stage fills in its own record."""
     aircraft, dt = scenario.airframe, 1.0 / scenario.rate_hz
-    frames = memory.taken_empty((1,), frame_dtype(aircraft.n))
+    frames = memory.taken_empty((1,), frame_dtype(aircraft.n, size_for(aircraft), line))
     frame, instant_s = frames[0], dt / scenario.substeps
     frame["dt"], frame["accounts"]["guarantee"]["certain_after_s"] = dt, -1.0
     _assemble_truth(frame["truth"], scenario)

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from beaver_ftc.control.laws import NOMINAL, ORACLE, REJECTING
+from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.assembly import assemble
 from beaver_ftc.loop.plugin_frame import PluginFrame, named_detector, named_law, plugged
 from beaver_ftc.plant.faults import NEVER, TIME_TOLERANCE_S
@@ -31,7 +32,10 @@ KEPT = {
         "from_s", "frames", "least", "greatest",
     ),
 }  # fmt: skip
-OF_INSTRUMENTS = ("real", "gain", "bias", "noise", "quantum", "dropout", "drift", "keep", "delay", "engine")
+OF_INSTRUMENTS = (
+    "real", "gain", "bias", "noise", "quantum", "dropout", "drift", "keep", "delay", "first", "length",
+    "engine",
+)  # fmt: skip
 
 
 class Stage(NamedTuple):
@@ -68,6 +72,7 @@ class Changing:
         loop = self._loop
         layout = loop.frames["control"]["layout"][0]
         frames = assemble(then, layout["trim"], np.array([layout["low"], layout["high"]]))
+        _check_delays(frames, loop.frames)
         loop.anchor(frames[0], then)
         renews = renews_diagnosis(change, then)
         detector = before.detector if before and not renews else None
@@ -122,6 +127,16 @@ class Changing:
             found = self._loop.land()
             noted |= {"detection_time_s": found.detection_time_s, "isolated": found.isolated}
         self.replaced.append(noted)
+
+
+def _check_delays(then: np.ndarray, now: np.ndarray) -> None:
+    """A flight keeps as many samples as it was to need when it began."""
+    needed, room = int(then["instruments"]["length"].sum()), now["instruments"]["line"].size
+    if needed > room:
+        raise BadInput(
+            f"changes.sensors: delays of {needed} samples in all, allowed: {room} in this flight, "
+            "or any that the scenario says before it begins"
+        )
 
 
 def renews_diagnosis(change: Change, then: Scenario) -> bool:

@@ -17,8 +17,10 @@ from beaver_ftc.plant import channels as ch
 from beaver_ftc.plant.faults import OF_THE_SLIPSTREAM
 from beaver_ftc.plant.instruments import (
     LONGEST_DELAY,
+    MOST_LINE,
     PHI,
     SENSORS,
+    USUAL_LINE,
 )
 from beaver_ftc.scenario.faults import of_a_sensor
 from beaver_ftc.scenario.interventions import stages
@@ -83,11 +85,28 @@ def assemble_instruments(frame: np.void, scenario: Scenario, dt: float) -> None:
         instruments["drift"][i] = getattr(sensor, "drift_rad_s", 0.0) * dt
         instruments["keep"][i] = exp(-sensor.bandwidth_rad_s * dt) if sensor.bandwidth_rad_s else 0.0
         instruments["delay"][i] = sensor.delay_s / dt
+        instruments["length"][i] = _samples(sensor.delay_s / dt)
         if sensor.delay_s / dt > LONGEST_DELAY:
             raise BadInput(
                 f"{scenario.name}: sensors.{name}.delay_s is {sensor.delay_s:g} s, "
                 f"allowed: {LONGEST_DELAY} JSBSim frames, {LONGEST_DELAY * dt:g} s here"
             )
+
+    instruments["first"] = np.cumsum(instruments["length"]) - instruments["length"]
+
+
+def line_for(scenario: Scenario) -> int:
+    """How many samples the delay lines of a flight keep: as many as most flights', or as any's."""
+    instant_s, flown = 1.0 / scenario.rate_hz / scenario.substeps, [scenario]
+    flown += [then for _, then in stages(scenario)]
+    delays = [[getattr(then.sensors, name).delay_s / instant_s for name in SENSORS] for then in flown]
+    needed = [sum(_samples(delay) for delay in of_it) for of_it in delays]
+    return USUAL_LINE if max(needed) <= USUAL_LINE else MOST_LINE
+
+
+def _samples(delay: float) -> int:
+    """What a line of this delay, in JSBSim frames, keeps."""
+    return int(delay) + 2 if delay else 0
 
 
 def seed_instruments(instruments: np.void, seed: int) -> None:

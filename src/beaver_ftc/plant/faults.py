@@ -174,7 +174,7 @@ class FaultSchedule:
 
 
 class SensorFaultSchedule:
-    """Breaks and mends the instruments (dtype `instruments.INSTRUMENTS`), frame by frame.
+    """Breaks and mends the instruments (`instruments.instruments_dtype`), frame by frame.
 
     faults: the scenario's; those of surfaces are passed over. rate_hz: frame rate of the loop. has_engine:
     the aircraft has instruments from which dpt follows.

@@ -8,6 +8,7 @@ to the bit whatever else is flown beside it. What is known of an instant (`MEASU
 alone: nothing in it knows the truth.
 """
 
+from functools import lru_cache
 from math import pi
 
 import numpy as np
@@ -28,6 +29,8 @@ PHI, PSI, ALTITUDE, ENGINE_SPEED, MANIFOLD, AX = (
 )
 NOISE_LIMIT_SIGMA = 4.0
 LONGEST_DELAY = 1000  # JSBSim frames
+# Samples that all delay lines together keep: most flights', for which the same compiled code serves; any's.
+USUAL_LINE, MOST_LINE = 512, N_SENSORS * (LONGEST_DELAY + 2)
 
 # What is broken of an instrument: offset, relative error, added noise; held and frozen at; no reading at all.
 SENSOR_FAULT = np.dtype(
@@ -38,22 +41,26 @@ SENSOR_FAULT = np.dtype(
     align=True,
 )  # fmt: skip
 
-INSTRUMENTS = np.dtype(
-    [
+
+@lru_cache
+def instruments_dtype(line: int = USUAL_LINE) -> np.dtype:
+    """The instruments of a flight whose delay lines keep so many samples."""
+    fields = [
         ("real", "i8"), ("random", "u8"), ("random_further", "u8"), ("random_force", "u8"),
         ("gain", "f8", (N_SENSORS,)), ("bias", "f8", (N_SENSORS,)), ("noise", "f8", (N_SENSORS,)),
         ("quantum", "f8", (N_SENSORS,)), ("dropout", "f8", (N_SENSORS,)),
         ("drift", "f8", (N_SENSORS,)),  # per sample
         ("keep", "f8", (N_SENSORS,)),  # exp(-bandwidth dt), 0 without lag
-        ("delay", "f8", (N_SENSORS,)),  # JSBSim frames
-        ("lagged", "f8", (N_SENSORS,)), ("line", "f8", (LONGEST_DELAY + 2, N_SENSORS)),
+        # JSBSim frames; samples of the line that are the signal's, and the first of them
+        ("delay", "f8", (N_SENSORS,)), ("length", "i8", (N_SENSORS,)), ("first", "i8", (N_SENSORS,)),
+        ("lagged", "f8", (N_SENSORS,)), ("line", "f8", (line,)),
         ("taken", "i8", (N_SENSORS,)),  # samples
         ("reading", "f8", (N_SENSORS,)),
         ("engine", "i8"),  # dpt is worked out from readings
         ("broken", "i8"), ("fault", SENSOR_FAULT, (N_SENSORS,)), ("random_fault", "u8"),
-    ],
-    align=True,
-)  # fmt: skip
+    ]  # fmt: skip
+    return np.dtype(fields, align=True)
+
 
 # What is known of an instant: every sensor's reading, and sorted by use. attitude: phi, theta, psi, rad;
 # altitude m. force (3,) m/s2 without gravity, from accelerometers, where `inertial`: they are read, and none
@@ -99,13 +106,14 @@ def normal(instruments):
 @kernel
 def delayed(instruments, i, value):
     """Put the value of signal i into its delay line; returns what comes out, between frames if need be."""
-    line, now = instruments.line, instruments.taken[i]
+    now, first, length = instruments.taken[i], instruments.first[i], instruments.length[i]
+    line = instruments.line[first : first + length]
     if now == 0:
-        line[:, i] = value
-    line[now % line.shape[0], i] = value
+        line[:] = value
+    line[now % length] = value
     whole = int(instruments.delay[i])
     part = instruments.delay[i] - whole
-    late, later = line[(now - whole) % line.shape[0], i], line[(now - whole - 1) % line.shape[0], i]
+    late, later = line[(now - whole) % length], line[(now - whole - 1) % length]
     return late + part * (later - late)
 
 

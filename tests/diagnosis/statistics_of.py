@@ -33,7 +33,7 @@ class Statistical:
     @staticmethod
     def record(record, row):
         tests, blocks, views = record["tests"], record["block"], views_of(record)
-        statistical.record(tests, blocks, views, record["forces"], record["air"], row)
+        statistical.write_shares(tests, blocks, views, record["forces"], record["air"], row)
 
     @staticmethod
     def follow_rest(record, surprise, dt):

@@ -37,7 +37,7 @@ import numpy as np
 
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.aircraft.schema import MAX_TERMS_OF_ONE
-from beaver_ftc.compiled import kernel
+from beaver_ftc.compiled import kernel, record
 from beaver_ftc.diagnosis import likelihood, tones
 from beaver_ftc.diagnosis.air import along, drift_beside, whole_drift
 from beaver_ftc.diagnosis.bounds.variances import axis_of
@@ -102,15 +102,12 @@ MOST = Size(
 @lru_cache
 def view_dtype(rooms: Rooms) -> np.dtype:
     """A view whose block has these rooms."""
-    fields = [
-        ("surface", "i8"), ("axis", "i8"), ("mix", "f8", (5,)), ("plane", "i8", (2,)),
-        ("past_gust", "i8"), ("column", "f8", (5,)), ("tolerated", "i8"),
-        ("inertial", "i8"), ("clears", "i8"), ("cleared_by", "i8"),
-        ("weighed", "i8"), ("shows_across", "f8"),
-        ("bounded", "f8", (1,)), ("by_rates", "f8", (3,)), ("by_forces", "f8", (3,)), ("held", "f8"),
-        ("block", block_dtype(rooms)), ("tones", tones_dtype(rooms.regressors)),
-    ]  # fmt: skip
-    return np.dtype(fields, align=True)
+    return record(
+        surface=int, axis=int, mix=5, plane=(int, 2), past_gust=int, column=5, tolerated=int,
+        inertial=int, clears=int, cleared_by=int, weighed=int, shows_across=float,
+        bounded=1, by_rates=3, by_forces=3, held=float,
+        block=block_dtype(rooms), tones=tones_dtype(rooms.regressors),
+    )  # fmt: skip
 
 
 @kernel

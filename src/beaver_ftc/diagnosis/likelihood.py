@@ -55,7 +55,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from beaver_ftc.compiled import kernel
+from beaver_ftc.compiled import kernel, record
 from beaver_ftc.diagnosis.state import LOSS
 
 # A block is the axes whose noise goes together: pitch, and roll with yaw, the latter twice. States of a
@@ -80,13 +80,9 @@ FOLLOWED_S = 2.0  # of the past say how calm the air is: long beside a filter's 
 CALM_PRIOR = 4.0  # before anything is known it is calm, and held so within two standard deviations
 CALM_MARGIN = 2.0
 
-HYPOTHESIS = np.dtype(
-    [
-        ("kind", "i8"), ("surface", "i8"), ("axis", "i8"), ("alarms", "i8"), ("column", "i8"),
-        ("signature", "f8", (2,)), ("growth_keep", "f8"),
-        ("score", "f8"), ("theta", "f8"), ("certainty", "f8"), ("at_least", "f8"), ("at_most", "f8"),
-    ],
-    align=True,
+HYPOTHESIS = record(
+    kind=int, surface=int, axis=int, alarms=int, column=int, signature=2, growth_keep=float,
+    score=float, theta=float, certainty=float, at_least=float, at_most=float,
 )  # fmt: skip
 
 
@@ -101,50 +97,42 @@ class Rooms(NamedTuple):
 def lane_dtype(rooms: Rooms) -> np.dtype:
     """What the lanes of a block keep, side by side."""
     lanes = N_SLOTS * rooms.hypotheses
-    fields = [
-        ("sense", "f8", (lanes,)), ("shaped", "f8", (2, lanes)), ("response", "f8", (4, lanes)),
-        ("weight", "f8", (2, lanes)),  # S^-1 g_s of the frame
-        ("correlation", "f8", (lanes,)), ("information", "f8", (lanes,)),
-        ("overlap", "f8", (rooms.regressors, lanes)), ("slack", "f8", (lanes,)),
-        ("missing", "f8", (lanes,)),  # of a loss that grows, what is yet to come
-        ("held", "f8", (2, lanes)),  # of a loss that ends, its signature as it did
+    return record(
+        sense=lanes, shaped=(2, lanes), response=(4, lanes),
+        weight=(2, lanes),  # S^-1 g_s of the frame
+        correlation=lanes, information=lanes, overlap=(rooms.regressors, lanes), slack=lanes,
+        missing=lanes,  # of a loss that grows, what is yet to come
+        held=(2, lanes),  # of a loss that ends, its signature as it did
         # what a bounded uncertainty can add to the correlation: as it stays, as it swings, at its pace
-        ("stays", "f8", (lanes,)), ("swings", "f8", (lanes,)), ("drifts", "f8", (lanes,)),
-        ("foreseen", "f8", (lanes,)),  # of the correlation, what calm air gives a law that answers noise
+        stays=lanes, swings=lanes, drifts=lanes,
+        foreseen=lanes,  # of the correlation, what calm air gives a law that answers noise
         # what it comes to, the last three as log likelihood ratios
-        ("score", "f8", (lanes,)),
-        ("at_least", "f8", (lanes,)), ("at_most", "f8", (lanes,)), ("likelihood", "f8", (lanes,)),
-    ]  # fmt: skip
-    return np.dtype(fields, align=True)
+        score=lanes, at_least=lanes, at_most=lanes, likelihood=lanes,
+    )  # fmt: skip
 
 
-_FILTER = [
-    ("n", "i8"), ("keep", "f8"), ("state", "f8", (4,)), ("innovation", "f8", (2,)),
-    ("P_xx", "f8", (2, 2)), ("P_xd", "f8", (2, 2)), ("P_dd", "f8", (2, 2)),
-    ("drift", "f8", (2, 2)), ("jitter", "f8", (2,)), ("noise", "f8", (2,)),
-    ("S_inverse", "f8", (2, 2)), ("K_x", "f8", (2, 2)), ("K_d", "f8", (2, 2)),
-]  # fmt: skip
-FILTER = np.dtype(_FILTER, align=True)
+_FILTER = {
+    "n": int, "keep": float, "state": 4, "innovation": 2, "P_xx": (2, 2), "P_xd": (2, 2), "P_dd": (2, 2),
+    "drift": (2, 2), "jitter": 2, "noise": 2, "S_inverse": (2, 2), "K_x": (2, 2), "K_d": (2, 2),
+}  # fmt: skip
+FILTER = record(**_FILTER)
 
 
 @lru_cache
 def block_dtype(rooms: Rooms) -> np.dtype:
     """A block: its filter, and what its hypotheses come to."""
-    fields = [
-        ("axis", "i8", (2,)),  # first: a record that begins as another does is taken for one
-        *_FILTER,
-        ("lag", "f8"), ("stronger", "f8"), ("rest", "f8", (4,)), ("scratch", "f8", (2,)),
+    return record(
+        axis=(int, 2),  # first: a record that begins as another does is taken for one
+        **_FILTER,
+        lag=float, stronger=float, rest=4, scratch=2,
         # the filter that reckons with no gust, where one is declared; lambda p, and the two sums of lambda
-        ("calm", FILTER), ("foreseen", "f8", (2,)), ("agreement", "f8"), ("size", "f8"),
+        calm=FILTER, foreseen=2, agreement=float, size=float,
         # alarm level; share of it that chance is given beside what is bounded; omega dt of the latter
-        ("level", "f8"), ("chance", "f8"), ("pace", "f8"), ("stay", "f8", (2,)), ("swing", "f8", (2,)),
-        ("n_regressors", "i8"), ("tolerance", "f8", (rooms.regressors,)),
-        ("regressor", "f8", (rooms.regressors, 2)), ("regressor_state", "f8", (rooms.regressors, 4)),
-        ("regressor_response", "f8", (rooms.regressors, 2)),
-        ("n_hypotheses", "i8"), ("hypothesis", HYPOTHESIS, (rooms.hypotheses,)),
-        ("lane", lane_dtype(rooms)),
-    ]  # fmt: skip
-    return np.dtype(fields, align=True)
+        level=float, chance=float, pace=float, stay=2, swing=2,
+        n_regressors=int, tolerance=rooms.regressors, regressor=(rooms.regressors, 2),
+        regressor_state=(rooms.regressors, 4), regressor_response=(rooms.regressors, 2),
+        n_hypotheses=int, hypothesis=(HYPOTHESIS, rooms.hypotheses), lane=lane_dtype(rooms),
+    )  # fmt: skip
 
 
 @kernel

@@ -11,7 +11,7 @@ from functools import lru_cache
 import numpy as np
 
 from beaver_ftc.aircraft.schema import MAX_MONOMIALS, MAX_TERMS
-from beaver_ftc.compiled import kernel
+from beaver_ftc.compiled import kernel, record
 from beaver_ftc.design.terms import AIRSPEED, N_SIGNALS, QDYN, evaluate, regressors
 from beaver_ftc.diagnosis import across, likelihood, noise_model
 from beaver_ftc.diagnosis import air as gusts
@@ -40,44 +40,32 @@ LEAST_PART = 0.25
 
 # What the scenario asks of the tests: whether there are any, levels, what of the evidence a frame after the
 # alarm leaves, columns of the log, whether constants are tolerated; one over the instants in a frame.
-TESTS = np.dtype(
-    [
-        ("enabled", "i8"), ("alarm_level", "f8"), ("naming_level", "f8"), ("keep", "f8"),
-        ("n_columns", "i8"), ("tolerated", "i8"), ("share", "f8"),
-    ],
-    align=True,
+TESTS = record(
+    enabled=int, alarm_level=float, naming_level=float, keep=float, n_columns=int, tolerated=int, share=float,
 )  # fmt: skip
 
 # What moves the rates besides a fault. rapidity, 1/s: intensity of the drift of an uncertainty over its bound
 # squared; bounded, rad/s2: that bound now; deflection: its part by that of the surfaces; jitter, (rad/s2)2:
 # noise of the model's own inputs, `own_jitter` what of it is none of the air data's. read: whether errors of
 # the air data count. The last are scratch.
-NOISE = np.dtype(
-    [
-        ("rapidity", "f8"), ("bounded", "f8", (3,)), ("deflection", "f8", (3,)),
-        ("jitter", "f8", (3,)), ("own_jitter", "f8", (3,)), ("read", "i8"), ("reading", "f8", (N_READINGS,)),
-        ("terms", "f8", (MAX_TERMS,)), ("direction", "f8", (N_SIGNALS,)),
-        ("slope", "f8", (MAX_MONOMIALS,)), ("moved", "f8", (3,)),
-    ],
-    align=True,
+NOISE = record(
+    rapidity=float, bounded=3, deflection=3, jitter=3, own_jitter=3, read=int, reading=N_READINGS,
+    terms=MAX_TERMS, direction=N_SIGNALS, slope=MAX_MONOMIALS, moved=3,
 )  # fmt: skip
 
 # What the tests say: the largest share of the alarm level and its axis, how close healthy flight came to it,
 # and when it was first passed.
-ALARM = np.dtype(
-    [("score", "f8"), ("axis", "i8"), ("closest", "f8"), ("detected_at_s", "f8")], align=True
-)  # fmt: skip
+ALARM = record(score=float, axis=int, closest=float, detected_at_s=float)
 
 
 @lru_cache
 def statistical_dtype(size: Size = USUAL) -> np.dtype:
     """What the detector keeps of an aircraft of this size."""
-    fields = [
-        ("tests", TESTS), ("noise", NOISE), ("alarm", ALARM), ("block", block_dtype(size.rates), (N_BLOCKS,)),
-        ("n_views", "i8"), ("views", view_dtype(size.view), (size.views,)), ("listening", LISTENING),
-        ("forces", FORCES_FELT), ("air", AIR), ("inertial_air", AIR),
-    ]  # fmt: skip
-    return np.dtype(fields, align=True)
+    return record(
+        tests=TESTS, noise=NOISE, alarm=ALARM, block=(block_dtype(size.rates), N_BLOCKS),
+        n_views=int, views=(view_dtype(size.view), size.views), listening=LISTENING,
+        forces=FORCES_FELT, air=AIR, inertial_air=AIR,
+    )  # fmt: skip
 
 
 @kernel
@@ -175,7 +163,7 @@ def note(alarm, level, score, axis):
 
 
 @kernel
-def record(tests, blocks, views, forces, air, row):
+def write_shares(tests, blocks, views, forces, air, row):
     """Write the last columns of the log: each test as a share of the alarm level, losses, then steps. What
     forces and tones show besides is in the step of the axis."""
     first = row.size - tests.n_columns

@@ -19,7 +19,7 @@ from math import exp, pi, sqrt
 
 import numpy as np
 
-from beaver_ftc.compiled import kernel
+from beaver_ftc.compiled import kernel, record
 from beaver_ftc.design.terms import AIRSPEED, ALPHA, BETA
 from beaver_ftc.diagnosis.likelihood import share
 
@@ -34,31 +34,26 @@ CHANCE = 0.5
 FASTER, WILD_RAD = 2.0, 0.5  # than in trim; incidences
 
 # What all views share, and what each keeps.
-LISTENING = np.dtype(
-    [
-        ("slowest", "f8"), ("fastest", "f8"),  # m/s: beyond, nothing is heard
-        ("every", "i8"), ("level", "f8"), ("keep", "f8"),  # frames; standard deviations; of a sum
-        # by the angle of a frame; by that of a sum, and twice that, times `keep`
-        ("turn", "f8", (2, N_TONES)), ("turn_kept", "f8", (2, N_TONES)), ("turn_twice", "f8", (2, N_TONES)),
-        ("heard", "f8", (N_TONES,)),  # at most, of an uncertainty within one
-        ("width", "f8", (N_TONES,)),  # larger variance of the two parts of N, of both together one
-    ],
-    align=True,
+LISTENING = record(
+    slowest=float, fastest=float,  # m/s: beyond, nothing is heard
+    every=int, level=float, keep=float,  # frames; standard deviations; of a sum
+    # by the angle of a frame; by that of a sum, and twice that, times `keep`
+    turn=(2, N_TONES), turn_kept=(2, N_TONES), turn_twice=(2, N_TONES),
+    heard=N_TONES,  # at most, of an uncertainty within one
+    width=N_TONES,  # larger variance of the two parts of N, of both together one
 )  # fmt: skip
 
 
 @lru_cache
 def tones_dtype(regressors: int) -> np.dtype:
     """What a view of so many regressors keeps."""
-    fields = [
-        ("count", "i8"), ("sum", "f8"), ("sums", "f8", (regressors,)),  # of frames, and of regressors
-        ("tone", "f8", (2, N_TONES)), ("overlap", "f8", (regressors, 2, N_TONES)),
+    return record(
+        count=int, sum=float, sums=regressors,  # of frames, and of regressors
+        tone=(2, N_TONES), overlap=(regressors, 2, N_TONES),
         # of |N|: what coefficients and a bounded uncertainty explain; of the latter, its size and its beat
-        ("slack", "f8", (N_TONES,)), ("room", "f8", (N_TONES,)),
-        ("steady", "f8", (N_TONES,)), ("beat", "f8", (2, N_TONES)), ("information", "f8"),
-        ("score", "f8"),  # of the loudest, as a score of likelihood.py of the same chance
-    ]  # fmt: skip
-    return np.dtype(fields, align=True)
+        slack=N_TONES, room=N_TONES, steady=N_TONES, beat=(2, N_TONES), information=float,
+        score=float,  # of the loudest, as a score of likelihood.py of the same chance
+    )  # fmt: skip
 
 
 @kernel

@@ -542,7 +542,7 @@ def record(frame, commanded, row):
     chances = fdi.statistical
     if logged.tests and chances.tests.enabled:
         views = chances.views[: chances.n_views]
-        statistical.record(chances.tests, chances.block, views, chances.forces, chances.air, row)
+        statistical.write_shares(chances.tests, chances.block, views, chances.forces, chances.air, row)
     elif logged.tests:
         row[row.size - logged.tests :] = np.nan
 

@@ -13,7 +13,7 @@ from math import pi
 
 import numpy as np
 
-from beaver_ftc.compiled import kernel
+from beaver_ftc.compiled import kernel, record
 from beaver_ftc.design.engine import measured_slipstream
 from beaver_ftc.design.model import AIRSPEED, ALPHA, BETA, DPT, N_Y, QDYN
 
@@ -33,45 +33,35 @@ LONGEST_DELAY = 1000  # JSBSim frames
 USUAL_LINE, MOST_LINE = 512, N_SENSORS * (LONGEST_DELAY + 2)
 
 # What is broken of an instrument: offset, relative error, added noise; held and frozen at; no reading at all.
-SENSOR_FAULT = np.dtype(
-    [
-        ("bias", "f8"), ("scale", "f8"), ("noise", "f8"),
-        ("frozen", "i8"), ("holding", "i8"), ("held", "f8"), ("lost", "i8"),
-    ],
-    align=True,
+SENSOR_FAULT = record(
+    bias=float, scale=float, noise=float, frozen=int, holding=int, held=float, lost=int
 )  # fmt: skip
 
 
 @lru_cache
 def instruments_dtype(line: int = USUAL_LINE) -> np.dtype:
     """The instruments of a flight whose delay lines keep so many samples."""
-    fields = [
-        ("real", "i8"), ("random", "u8"), ("random_further", "u8"), ("random_force", "u8"),
-        ("gain", "f8", (N_SENSORS,)), ("bias", "f8", (N_SENSORS,)), ("noise", "f8", (N_SENSORS,)),
-        ("quantum", "f8", (N_SENSORS,)), ("dropout", "f8", (N_SENSORS,)),
-        ("drift", "f8", (N_SENSORS,)),  # per sample
-        ("keep", "f8", (N_SENSORS,)),  # exp(-bandwidth dt), 0 without lag
+    return record(
+        real=int, random="u8", random_further="u8", random_force="u8",
+        gain=N_SENSORS, bias=N_SENSORS, noise=N_SENSORS, quantum=N_SENSORS, dropout=N_SENSORS,
+        drift=N_SENSORS,  # per sample
+        keep=N_SENSORS,  # exp(-bandwidth dt), 0 without lag
         # JSBSim frames; samples of the line that are the signal's, and the first of them
-        ("delay", "f8", (N_SENSORS,)), ("length", "i8", (N_SENSORS,)), ("first", "i8", (N_SENSORS,)),
-        ("lagged", "f8", (N_SENSORS,)), ("line", "f8", (line,)),
-        ("taken", "i8", (N_SENSORS,)),  # samples
-        ("reading", "f8", (N_SENSORS,)),
-        ("engine", "i8"),  # dpt is worked out from readings
-        ("broken", "i8"), ("fault", SENSOR_FAULT, (N_SENSORS,)), ("random_fault", "u8"),
-    ]  # fmt: skip
-    return np.dtype(fields, align=True)
+        delay=N_SENSORS, length=(int, N_SENSORS), first=(int, N_SENSORS),
+        lagged=N_SENSORS, line=line,
+        taken=(int, N_SENSORS),  # samples
+        reading=N_SENSORS,
+        engine=int,  # dpt is worked out from readings
+        broken=int, fault=(SENSOR_FAULT, N_SENSORS), random_fault="u8",
+    )  # fmt: skip
 
 
 # What is known of an instant: every sensor's reading, and sorted by use. attitude: phi, theta, psi, rad;
 # altitude m. force (3,) m/s2 without gravity, from accelerometers, where `inertial`: they are read, and none
 # may be broken. missing: no reading.
-MEASURED = np.dtype(
-    [
-        ("signal", "f8", (N_SENSORS,)), ("x", "f8", (3,)), ("y", "f8", (N_Y,)),
-        ("attitude", "f8", (3,)), ("altitude", "f8"),
-        ("inertial", "i8"), ("engine", "i8"), ("force", "f8", (3,)), ("missing", "i8", (N_SENSORS,)),
-    ],
-    align=True,
+MEASURED = record(
+    signal=N_SENSORS, x=3, y=N_Y, attitude=3, altitude=float,
+    inertial=int, engine=int, force=3, missing=(int, N_SENSORS),
 )  # fmt: skip
 
 _GOLDEN, _FIRST, _SECOND = (

@@ -1,7 +1,6 @@
 """`beaver-ftc list`, `show` and `schema`: what there is to choose from, and what a file may say."""
 
-from collections.abc import Iterator
-from pathlib import Path
+from collections.abc import Iterable, Iterator
 from typing import Annotated
 
 import typer
@@ -14,13 +13,15 @@ Entries = list[dict[str, str]]
 
 
 def list_choices(
-    kind: Annotated[str | None, typer.Argument(metavar="KIND", help="One kind only, e.g. aircraft.")] = None,
+    kind: Annotated[str | None, typer.Argument(metavar="KIND")] = None,
     format: FormatOption = Format.text,
 ) -> None:
     """List what there is to choose from.
 
     Built-in scenarios and sweeps, aircraft, diagnosis schemes, control laws, fault types and reference
     signals.
+
+    kind: One kind only, e.g. aircraft.
     """
     available = _available()
     if kind is not None and kind not in available:
@@ -32,69 +33,61 @@ def list_choices(
 def _available() -> dict[str, Entries]:
     """Kind -> entries, each a name and a description."""
     from beaver_ftc.plugins import DETECTORS, LAWS
-    from beaver_ftc.scenario.loader import builtin_scenarios
+    from beaver_ftc.scenario.loader import builtin_scenarios, builtin_sweeps
     from beaver_ftc.scenario.schema import Scenario
+    from beaver_ftc.scenario.sweeps import load_sweep
 
     parts = Scenario.model_json_schema()["$defs"]
-    return {
-        "scenarios": [{"name": name, "description": says.strip()} for name, says, _ in builtin_scenarios()],
-        "sweeps": _sweeps(),
+    available: dict[str, Iterable[tuple[str, str]]] = {
+        "scenarios": ((name, says.strip()) for name, says, _ in builtin_scenarios()),
+        "sweeps": ((name, load_sweep(name).file.description.strip()) for name in builtin_sweeps()),
         "aircraft": _aircraft(),
         "schemes": _registered(DETECTORS),
         "laws": _registered(LAWS),
-        "faults": [entry for key in ("actuator", "sensor") for entry in _faults(parts, key)],
-        "signals": [_kind(parts, name, part) for name, part in parts["Signal"]["properties"].items()],
+        "faults": _faults(parts),
+        "signals": _signals(parts),
+    }
+    return {
+        kind: [{"name": name, "description": says} for name, says in entries]
+        for kind, entries in available.items()
     }
 
 
-def _sweeps() -> Entries:
-    from beaver_ftc.scenario.loader import builtin_sweeps
-    from beaver_ftc.scenario.sweeps import load_sweep
-
-    return [
-        {"name": name, "description": load_sweep(name).file.description.strip()} for name in builtin_sweeps()
-    ]
-
-
-def _aircraft() -> Entries:
+def _aircraft() -> Iterator[tuple[str, str]]:
     """The built-in aircraft, and those of the jsbsim package that have been derived or can be."""
     from beaver_ftc.aircraft import builtin_names, load
     from beaver_ftc.aircraft.loading import is_derived
     from beaver_ftc.plant.instrumented import names
 
-    ours = [{"name": name, "description": load(name).file.description} for name in builtin_names()]
-    says = {True: "of the jsbsim package, derived", False: "of the jsbsim package: derived at first use"}
-    known = [(name, is_derived(name)) for name in names()]
-    return ours + [{"name": f"jsbsim:{name}", "description": says[made]} for name, made in known]
+    for name in builtin_names():
+        yield name, load(name).file.description
+    for name in names():
+        made = ", derived" if is_derived(name) else ": derived at first use"
+        yield f"jsbsim:{name}", f"of the jsbsim package{made}"
 
 
-def _registered(group: str) -> Entries:
+def _registered(group: str) -> Iterator[tuple[str, str]]:
     """The detectors or laws that a scenario may name, those of other installed packages included."""
     from beaver_ftc.plugins import OURS, registered
 
-    return [
-        {
-            "name": entry.name,
-            "description": entry.description() + ("" if entry.package == OURS else f" [{entry.package}]"),
-        }
-        for entry in registered(group).values()
-    ]
+    for entry in registered(group).values():
+        yield entry.name, entry.description() + ("" if entry.package == OURS else f" [{entry.package}]")
 
 
-def _faults(schema: Document, key: str) -> Iterator[dict[str, str]]:
-    """The parts of the schema that are fault types, with a fixed `type`; key: actuator or sensor."""
-    of = "of a sensor: " if key == "sensor" else ""
-    for part in schema.values():
-        has = part.get("properties", {})
-        kind = has.get("type", {}).get("const")
-        if kind and ("sensor" in has) == (key == "sensor"):
-            yield {"name": kind, "description": of + _first_line(part)}
+def _faults(schema: Document) -> Iterator[tuple[str, str]]:
+    """The parts of the schema that are fault types, with a fixed `type`: of actuators, then of sensors."""
+    for of_a_sensor, of in ((False, ""), (True, "of a sensor: ")):
+        for part in schema.values():
+            has = part.get("properties", {})
+            kind = has.get("type", {}).get("const")
+            if kind and ("sensor" in has) == of_a_sensor:
+                yield kind, of + _first_line(part)
 
 
-def _kind(schema: Document, name: str, node: Document) -> dict[str, str]:
-    references = [branch["$ref"] for branch in node.get("anyOf", [node]) if "$ref" in branch]
-    part = schema[references[0].rpartition("/")[2]] if references else {}
-    return {"name": name, "description": _first_line(part)}
+def _signals(schema: Document) -> Iterator[tuple[str, str]]:
+    for name, node in schema["Signal"]["properties"].items():
+        references = [branch["$ref"] for branch in node.get("anyOf", [node]) if "$ref" in branch]
+        yield name, _first_line(schema[references[0].rpartition("/")[2]] if references else {})
 
 
 def _first_line(part: Document) -> str:
@@ -108,35 +101,29 @@ def _section(kind: str, entries: Entries) -> str:
 
 
 def show(
-    name: Annotated[
-        str,
-        typer.Argument(metavar="NAME", help="A built-in scenario or sweep.", autocompletion=complete_names),
-    ],
+    name: Annotated[str, typer.Argument(metavar="NAME", autocompletion=complete_names)],
 ) -> None:
     """Print a built-in scenario or sweep.
 
     What is printed is a file that `run` or `sweep` takes.
+
+    name: A built-in scenario or sweep.
     """
-    emit(_file(name).read_text(encoding="utf-8"))
-
-
-def _file(name: str) -> Path:
     from beaver_ftc.scenario.loader import builtin_names, builtin_path, builtin_sweeps, resolve
 
-    if name in builtin_names():
-        return builtin_path(name)
-    if name in builtin_sweeps():
-        return resolve(name, "sweep")
     known = [*builtin_names(), *builtin_sweeps()]
-    raise BadInput(f"show: no built-in scenario or sweep {name[:100]!r}{suggestion(name, known)}")
+    if name not in known:
+        raise BadInput(f"show: no built-in scenario or sweep {name[:100]!r}{suggestion(name, known)}")
+    path = builtin_path(name) if name in builtin_names() else resolve(name, "sweep")
+    emit(path.read_text(encoding="utf-8"))
 
 
-def schema(
-    sweep: Annotated[bool, typer.Option("--sweep", help="Of a sweep file instead of a scenario.")] = False,
-) -> None:
+def schema(sweep: bool = False) -> None:
     """Print the JSON Schema of a scenario.
 
     Editors that know it complete and check a scenario as it is written.
+
+    sweep: Of a sweep file instead of a scenario.
     """
     if sweep:
         from beaver_ftc.scenario.sweeps import sweep_json_schema

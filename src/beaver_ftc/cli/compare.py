@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from beaver_ftc.cli.inputs import taking
+from beaver_ftc.cli.inputs import listed, taking
 from beaver_ftc.cli.output import Format, FormatOption, answer
 from beaver_ftc.cli.progress import progress_bar
 from beaver_ftc.documents.errors import BadInput
@@ -14,40 +14,22 @@ from beaver_ftc.documents.errors import BadInput
 
 @dataclass(frozen=True)
 class Options:
-    """What is wanted of it."""
+    """What is wanted of it, as `command` says."""
 
-    runs: Annotated[list[Path] | None, typer.Argument(metavar="RUN", help="Result folders of `run`.")] = None
-    sweep: Annotated[Path | None, typer.Option(metavar="FILE", help="Compare on the flights of a sweep.")] = (
-        None
-    )
-    benchmark: Annotated[
-        bool, typer.Option("--benchmark", help="Compare on the standard sets; update the leaderboard.")
-    ] = False
-    tune: Annotated[bool, typer.Option("--tune", help="Tune the rivals on the calibration set.")] = False
-    errors: Annotated[
-        bool, typer.Option("--errors", help="With --tune: for declared sensor errors and turbulence.")
-    ] = False
-    schemes: Annotated[
-        str | None, typer.Option(help="Comma-separated schemes; all registered ones if left out.")
-    ] = None
-    laws: Annotated[
-        str | None, typer.Option(help="Comma-separated laws; all registered ones if left out.")
-    ] = None
-    only: Annotated[str | None, typer.Option("--set", help="With --benchmark: one set.")] = None
-    flights: Annotated[
-        str | None,
-        typer.Option(metavar="N|FOLDER", help="At most N flights of each sweep; or recorded flights."),
-    ] = None
-    other_days: Annotated[
-        bool,
-        typer.Option("--other-days", help="With --flights FOLDER: on days made of the labelled flights."),
-    ] = False
-    workers: Annotated[int, typer.Option(min=1, help="Processes.")] = 2
-    target: Annotated[float, typer.Option(min=0, help="With --tune: false alarms per hour allowed.")] = 1.0
-    out: Annotated[Path, typer.Option(help="Folder for the comparison.")] = Path("comparisons")
-    leaderboard: Annotated[
-        Path | None, typer.Option(help="With --benchmark or recorded flights: the page to update.")
-    ] = None
+    runs: Annotated[list[Path] | None, typer.Argument(metavar="RUN")] = None
+    sweep: Annotated[Path | None, typer.Option(metavar="FILE")] = None
+    benchmark: bool = False
+    tune: bool = False
+    errors: bool = False
+    schemes: str | None = None
+    laws: str | None = None
+    only: Annotated[str | None, typer.Option("--set")] = None
+    flights: Annotated[str | None, typer.Option(metavar="N|FOLDER")] = None
+    other_days: bool = False
+    workers: Annotated[int, typer.Option(min=1)] = 2
+    target: Annotated[float, typer.Option(min=0)] = 1.0
+    out: Path = Path("comparisons")
+    leaderboard: Path | None = None
     format: FormatOption = Format.text
 
 
@@ -63,6 +45,21 @@ def command(options: Options) -> None:
     flights.png.
 
     Stopped or killed, a comparison on flights goes on where it was with the same command.
+
+    runs: Result folders of `run`.
+    sweep: Compare on the flights of a sweep.
+    benchmark: Compare on the standard sets; update the leaderboard.
+    tune: Tune the rivals on the calibration set.
+    errors: With --tune: for declared sensor errors and turbulence.
+    schemes: Comma-separated schemes; all registered ones if left out.
+    laws: Comma-separated laws; all registered ones if left out.
+    only: With --benchmark: one set.
+    flights: At most N flights of each sweep; or recorded flights.
+    other_days: With --flights FOLDER: on days made of the labelled flights.
+    workers: Processes.
+    target: With --tune: false alarms per hour allowed.
+    out: Folder for the comparison.
+    leaderboard: With --benchmark or recorded flights: the page to update.
     """
     most, folder = _most_or_folder(options.flights)
     _refuse_contradictions(options, folder)
@@ -172,11 +169,10 @@ def _chosen(option: str, group: str, names: str | None, ours: str) -> list[str]:
 
     if names is None:
         return list(registered(group))
-    listed = [name.strip() for name in names.split(",") if name.strip()]
-    wrong = [f"{option}: {says}" for name in listed if (says := refusal(group, name))]
+    wrong = [f"{option}: {says}" for name in listed(names) if (says := refusal(group, name))]
     if wrong:
         raise BadInput("\n".join(wrong))
-    return list(dict.fromkeys([ours, *listed]))
+    return list(dict.fromkeys([ours, *listed(names)]))
 
 
 def _tune(options: Options, most: int | None) -> None:

@@ -1,11 +1,13 @@
 """What commands are given: options that several share, and scenarios, checked before the first one flies."""
 
+import re
 from collections.abc import Callable
+from copy import copy
 from enum import StrEnum
 from functools import wraps
-from inspect import Parameter, Signature, signature
+from inspect import Parameter, Signature, getdoc, signature
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, get_args
 
 import typer
 
@@ -15,12 +17,7 @@ if TYPE_CHECKING:
     from beaver_ftc.scenario.schema import Scenario
 
 
-class TurbulenceName(StrEnum):
-    """The air there is to fly in."""
-
-    none = "none"
-    light = "light"
-    moderate = "moderate"
+TurbulenceName = StrEnum("TurbulenceName", ["none", "light", "moderate"])  # the air there is to fly in
 
 
 def complete_names(incomplete: str) -> list[str]:
@@ -73,7 +70,7 @@ def taking(record: type[Any]) -> Callable[[Callable[[Any], None]], Callable[...,
 
     @dataclass(frozen=True)
     class Options:
-        files: Annotated[list[str], typer.Argument(help="...")]
+        files: Annotated[list[str], typer.Argument()]
         out: ResultsOption = Path("runs")
 
     @taking(Options)
@@ -90,11 +87,41 @@ def taking(record: type[Any]) -> Callable[[Callable[[Any], None]], Callable[...,
     return made
 
 
+def documented(command: Callable[..., None]) -> Callable[..., None]:
+    """The command with what its docstring says of a parameter (`name: ...`, at its end) as that one's help.
+
+    A parameter that is not annotated is an option; one that is true or false a switch, off if left out.
+    """
+    own = signature(command)
+    about, *said = re.split(rf"^({'|'.join(own.parameters)}): ", getdoc(command) or "", flags=re.MULTILINE)
+    helps = dict(zip(said[::2], said[1::2], strict=True))
+    command.__doc__ = about.rstrip()
+    told = [_told(each, helps.get(name)) for name, each in own.parameters.items()]
+    return _signed(command, own.replace(parameters=told))
+
+
+def _told(parameter: Parameter, help: str | None) -> Parameter:
+    """A parameter as typer is to read it, with this help if any."""
+    kind, given = parameter.annotation, None
+    if hasattr(kind, "__metadata__"):
+        kind, given = get_args(kind)
+    switch = [f"--{parameter.name.replace('_', '-')}"] if kind is bool else []
+    option = copy(given) or typer.Option(*switch)
+    if help:
+        option.help = " ".join(help.split())
+    return parameter.replace(annotation=Annotated[kind, option])
+
+
 def _signed(command: Callable[..., None], own: Signature) -> Callable[..., None]:
     """The command as typer is to read it: its parameters, with what is annotated of them."""
     command.__signature__ = own  # type: ignore[attr-defined]
     command.__annotations__ = {name: each.annotation for name, each in own.parameters.items()}
     return command
+
+
+def listed(names: str) -> list[str]:
+    """What a list with commas in it names."""
+    return [name.strip() for name in names.split(",") if name.strip()]
 
 
 def load_all(names: list[str]) -> list["Scenario"]:
@@ -109,7 +136,9 @@ def load_all(names: list[str]) -> list["Scenario"]:
             check_flyable(loaded[-1], name)
         except BadInput as error:
             mistakes.append(str(error))
-    mistakes += _repeated([scenario.name for scenario in loaded])
+    given = [scenario.name for scenario in loaded]
+    twice = dict.fromkeys(name for name in given if given.count(name) > 1)
+    mistakes += [f"two scenarios are named {name}: one result would replace the other" for name in twice]
     if mistakes:
         raise BadInput("\n".join(mistakes))
     return loaded
@@ -117,23 +146,13 @@ def load_all(names: list[str]) -> list["Scenario"]:
 
 def check_flyable(scenario: "Scenario", name: str) -> None:
     """Raise BadInput, in the form of any other mistake in a file, if the flight cannot be trimmed."""
+    from beaver_ftc.documents.validation import parse_document
     from beaver_ftc.plant.conditions import trimmed
+    from beaver_ftc.scenario.loader import read_file, resolve
 
     try:
         trimmed(scenario)
     except BadInput as error:
-        raise BadInput(f"{_place_of_initial(name)}: initial: {error}") from None
-
-
-def _repeated(names: list[str]) -> list[str]:
-    twice = dict.fromkeys(name for name in names if names.count(name) > 1)
-    return [f"two scenarios are named {name}: one result would replace the other" for name in twice]
-
-
-def _place_of_initial(name: str) -> str:
-    """FILE:LINE of the flight condition, the file's first line where it is left to the defaults."""
-    from beaver_ftc.documents.validation import parse_document
-    from beaver_ftc.scenario.loader import read_file, resolve
-
-    path = resolve(name)
-    return f"{path}:{parse_document(read_file(path, name), str(path)).line(('initial',))}"
+        path = resolve(name)
+        line = parse_document(read_file(path, name), str(path)).line(("initial",))
+        raise BadInput(f"{path}:{line}: initial: {error}") from None

@@ -3,9 +3,7 @@
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
-
-import typer
+from typing import TYPE_CHECKING
 
 from beaver_ftc.cli.inputs import NoReportOption, ResultsOption, ScenariosArgument, load_all
 from beaver_ftc.cli.output import Document, Format, FormatOption, complain, emit, emit_json
@@ -23,11 +21,8 @@ def command(
     scenarios: ScenariosArgument,
     out: ResultsOption = Path("runs"),
     format: FormatOption = Format.text,
-    variant: Annotated[
-        str,
-        typer.Option(help="Design models to compare, e.g. declared,engine-neglected,linearised,mass=1.1."),
-    ] = "",
-    map: Annotated[bool, typer.Option("--map", help="Worst mismatch over speed and altitude, too.")] = False,
+    variant: str = "",
+    map: bool = False,
     no_report: NoReportOption = False,
 ) -> None:
     """Split truth less design model into its sources.
@@ -36,6 +31,9 @@ def command(
     of several flights {"runs": [...], "recommended": ..., "guarantee": ...}.
 
     Stopped or killed, a map goes on where it was with the same command.
+
+    variant: Design models to compare, e.g. declared,engine-neglected,linearised,mass=1.1.
+    map: Worst mismatch over speed and altitude, too.
     """
     from beaver_ftc.studies.mismatch.study import refuse_other_aircraft
 

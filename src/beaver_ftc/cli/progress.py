@@ -20,31 +20,27 @@ def progress_bar(label: str) -> Iterator[Callable[[float], None] | None]:
     if not sys.stderr.isatty():
         yield None
         return
+    started, advance = time.monotonic(), None
     with contextlib.ExitStack() as stack:
-        yield _Bar(label, stack)
+
+        def show(done: float) -> None:
+            """Shows itself only once the run has taken longer than anyone waits without asking."""
+            nonlocal advance
+            if advance is None and time.monotonic() - started > PATIENCE_S:
+                advance = _bar(label, stack)
+            if advance:
+                advance(done)
+
+        yield show
 
 
-class _Bar:
-    """Shows itself only once the run has taken longer than anyone waits without asking."""
+def _bar(label: str, stack: contextlib.ExitStack) -> Callable[[float], None]:
+    from rich.console import Console
+    from rich.progress import Progress
 
-    def __init__(self, label: str, stack: contextlib.ExitStack) -> None:
-        self._label, self._stack = label, stack
-        self._started = time.monotonic()
-        self._advance: Callable[[float], None] | None = None
-
-    def __call__(self, done: float) -> None:
-        if self._advance is None and time.monotonic() - self._started > PATIENCE_S:
-            self._advance = self._show()
-        if self._advance:
-            self._advance(done)
-
-    def _show(self) -> Callable[[float], None]:
-        from rich.console import Console
-        from rich.progress import Progress
-
-        progress = self._stack.enter_context(Progress(console=Console(stderr=True), transient=True))
-        task = progress.add_task(self._label, total=1.0)
-        return lambda done: progress.update(task, completed=done)
+    progress = stack.enter_context(Progress(console=Console(stderr=True), transient=True))
+    task = progress.add_task(label, total=1.0)
+    return lambda done: progress.update(task, completed=done)
 
 
 @contextlib.contextmanager

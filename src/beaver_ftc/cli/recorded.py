@@ -20,8 +20,8 @@ ReaderOption = Annotated[
 
 def identify(
     flights: FlightsArgument,
-    vehicle: Annotated[str, typer.Option(metavar="FILE", help="Vehicle file, or the built-in `alfa`.")],
-    out: Annotated[Path, typer.Option(metavar="MODEL", help="The model file to write.")],
+    vehicle: Annotated[str, typer.Option(metavar="FILE")],
+    out: Annotated[Path, typer.Option(metavar="MODEL")],
     reader: ReaderOption = None,
     format: FormatOption = Format.text,
 ) -> None:
@@ -30,6 +30,9 @@ def identify(
     Writes a model file for `diagnose`. Fitted are the flights' healthy parts, and faulty ones whose
     effectiveness the labels tell. What the fit did not see tells how good it is: in the model file, and
     as a page beside it (MODEL with .html).
+
+    vehicle: Vehicle file, or the built-in `alfa`.
+    out: The model file to write.
     """
     from beaver_ftc.flights.identification import identify, summary
     from beaver_ftc.flights.model import as_text, write_text
@@ -56,17 +59,10 @@ def identify(
 
 def diagnose(
     flights: FlightsArgument,
-    model: Annotated[
-        Path | None,
-        typer.Option(metavar="MODEL", help="The model file `identify` has written; none for our own logs."),
-    ] = None,
-    out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("diagnoses"),
-    score: Annotated[
-        bool, typer.Option("--score", help="Compare with the log's labels, after the fact.")
-    ] = False,
-    detector: Annotated[
-        str, typer.Option(metavar="NAME", help="Who diagnoses: bank-of-filters, or a rival by its name.")
-    ] = "bank-of-filters",
+    model: Annotated[Path | None, typer.Option(metavar="MODEL")] = None,
+    out: Path = Path("diagnoses"),
+    score: bool = False,
+    detector: Annotated[str, typer.Option(metavar="NAME")] = "bank-of-filters",
     reader: ReaderOption = None,
     format: FormatOption = Format.text,
 ) -> None:
@@ -74,6 +70,11 @@ def diagnose(
 
     Writes DIR/<flight>/diagnosis.parquet (a row a sample), verdict.json and report.html. A row uses nothing
     later than its time. The log.parquet of a run of ours needs no model: it is diagnosed as it was in flight.
+
+    model: The model file `identify` has written; none for our own logs.
+    out: Folder for the results.
+    score: Compare with the log's labels, after the fact.
+    detector: Who diagnoses: bank-of-filters, or a rival by its name.
     """
     if model is None:
         _replay(flights, out, format)

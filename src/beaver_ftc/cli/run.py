@@ -41,32 +41,22 @@ if TYPE_CHECKING:
     Prepare = Callable[[Plant], None]
 
 
-class Recording(StrEnum):
-    """The formats of `results.exports`."""
-
-    table = "table"
-    ulog = "ulog"
-    ardupilot = "ardupilot"
+Recording = StrEnum("Recording", ["table", "ulog", "ardupilot"])  # the formats of `results.exports`
 
 
 @dataclass(frozen=True)
 class Options:
-    """What is asked of it."""
+    """What is asked of it, as `command` says."""
 
     scenarios: ScenariosArgument
     out: ResultsOption = Path("runs")
     format: FormatOption = Format.text
     no_report: NoReportOption = False
     junit: JunitOption = None
-    csv: Annotated[bool, typer.Option("--csv", help="Also write the log as log.csv.")] = False
-    acmi: Annotated[bool, typer.Option("--acmi", help="Also write flight.acmi, for Tacview.")] = False
-    recording: Annotated[
-        Recording | None,
-        typer.Option("--as", help="Also write the log as a recorder on board would have, with vehicle.yaml."),
-    ] = None
-    flightgear: Annotated[
-        str | None, typer.Option(metavar="HOST:PORT", help="Show it in FlightGear, at the pace of the clock.")
-    ] = None
+    csv: bool = False
+    acmi: bool = False
+    recording: Annotated[Recording | None, typer.Option("--as")] = None
+    flightgear: Annotated[str | None, typer.Option(metavar="HOST:PORT")] = None
 
 
 @taking(Options)
@@ -75,6 +65,11 @@ def command(options: Options) -> None:
 
     With --format json: the metrics and `folder` of the run (or its `error`), with `runs`, a list of it; of
     several scenarios {"passed": ..., "runs": [...]}.
+
+    csv: Also write the log as log.csv.
+    acmi: Also write flight.acmi, for Tacview.
+    recording: Also write the log as a recorder on board would have, with vehicle.yaml.
+    flightgear: Show it in FlightGear, at the pace of the clock.
     """
     try:
         loaded = load_all(options.scenarios)
@@ -86,19 +81,14 @@ def command(options: Options) -> None:
     raise typer.Exit(_run_all(loaded, options))
 
 
-def _shown(flightgear: str | None) -> "Prepare | None":
+def _shown(given: str | None) -> "Prepare | None":
     """What connects a plant to the FlightGear at HOST:PORT."""
-    if flightgear is None:
-        return None
-    host, port = _address(flightgear)
-    from beaver_ftc.plant.flightgear import show_in_flightgear
-
-    return partial(show_in_flightgear, host=host, port=port)
-
-
-def _address(given: str) -> tuple[str, int]:
     import socket
 
+    from beaver_ftc.plant.flightgear import show_in_flightgear
+
+    if given is None:
+        return None
     host, _, port = given.rpartition(":")
     if not host or not port.isdecimal() or not 0 < int(port) < 65536:
         raise BadInput(f"--flightgear: {given!r} is no address, allowed: HOST:PORT with a port of 1 to 65535")
@@ -106,11 +96,13 @@ def _address(given: str) -> tuple[str, int]:
         socket.getaddrinfo(host, int(port), socket.AF_INET, socket.SOCK_DGRAM)
     except (OSError, UnicodeError):
         raise BadInput(f"--flightgear: there is no host {host!r}") from None
-    return host, int(port)
+    return partial(show_in_flightgear, host=host, port=int(port))
 
 
 def _run_all(scenarios: list["Scenario"], options: Options) -> int:
     """Fly one after the other; one that fails does not stop the rest. Returns the worst exit status."""
+    from beaver_ftc.results.verdict import verdict_text
+
     prepare = _shown(options.flightgear)
     runs, took_s, status = [], [], 0
     for scenario in scenarios:
@@ -127,7 +119,7 @@ def _run_all(scenarios: list["Scenario"], options: Options) -> int:
         runs.append(document)
         status = max(status, 0 if document["passed"] else 1)
         if options.format is Format.text:
-            _say(document)
+            emit(verdict_text(document, document["folder"], colour=sys.stdout.isatty()))
     write_junit([run | {"took_s": each} for run, each in zip(runs, took_s, strict=True)], options.junit)
     if options.format is Format.json:
         first = runs[0] if len(runs) == 1 else {}
@@ -147,24 +139,21 @@ def _run_one(scenario: "Scenario", options: Options, prepare: "Prepare | None") 
     return document | {"folder": str(options.out / scenario.name)}
 
 
-def _say(document: Document) -> None:
-    from beaver_ftc.results.verdict import verdict_text
-
-    emit(verdict_text(document, document["folder"], colour=sys.stdout.isatty()))
-
-
 def live(
     scenario: ScenarioArgument = "fault-free",
-    aircraft: Annotated[
-        str | None, typer.Option(metavar="AIRCRAFT", help="Fly this one, without the scenario's uncertainty.")
-    ] = None,
-    port: Annotated[int, typer.Option(min=0, max=65535, help="Port on the loopback; 0: any.")] = 0,
-    out: Annotated[Path, typer.Option(help="Folder in which the page's Save writes.")] = Path("runs"),
-    open_browser: Annotated[bool, typer.Option("--open", help="Also open the page in a browser.")] = False,
+    aircraft: Annotated[str | None, typer.Option(metavar="AIRCRAFT")] = None,
+    port: Annotated[int, typer.Option(min=0, max=65535)] = 0,
+    out: Path = Path("runs"),
+    open_browser: Annotated[bool, typer.Option("--open")] = False,
 ) -> None:
     """Fly in the browser: break it and watch the diagnosis.
 
     Prints an address of this machine that works once; Ctrl-C ends it.
+
+    aircraft: Fly this one, without the scenario's uncertainty.
+    port: Port on the loopback; 0: any.
+    out: Folder in which the page's Save writes.
+    open_browser: Also open the page in a browser.
     """
     from beaver_ftc.integrations.live.serve import serve
 

@@ -31,20 +31,22 @@ expect:                               # what a CI job asserts; each key is optio
 
 
 def validate(
-    files: Annotated[
-        list[str], typer.Argument(metavar="FILE", help="Scenario and sweep files, or names of built-in ones.")
-    ],
-    format: FormatOption = Format.text,
+    files: Annotated[list[str], typer.Argument(metavar="FILE")], format: FormatOption = Format.text
 ) -> None:
     """Check scenario and sweep files.
 
     Every mistake is one line on standard error, FILE:LINE: key.path: what is wrong, what is allowed.
 
     With --format json: {"valid": ..., "files": [{"file", "valid", "errors", "warnings"}]}.
+
+    files: Scenario and sweep files, or names of built-in ones.
     """
     reports = [_check(file) for file in files]
     for report in reports:
-        _say(report, format)
+        for line in (*report["errors"], *(f"{report['file']}: warning: {w}" for w in report["warnings"])):
+            complain(line)
+        if report["valid"] and format is Format.text:
+            emit(f"{report['file']}: OK")
     valid = all(report["valid"] for report in reports)
     if format is Format.json:
         emit_json({"valid": valid, "files": reports})
@@ -55,39 +57,32 @@ def _check(file: str) -> Document:
     from beaver_ftc.scenario.loader import load_scenario
     from beaver_ftc.scenario.sweeps import is_sweep, load_sweep
 
+    errors: list[str] = []
+    warnings: list[str] = []
     try:
         if is_sweep(file):
             load_sweep(file)
-            return {"file": file, "valid": True, "errors": [], "warnings": []}
-        scenario = load_scenario(file)
-        check_flyable(scenario, file)
+        else:
+            scenario = load_scenario(file)
+            check_flyable(scenario, file)
+            warnings = list(scenario.warnings())
     except BadInput as error:
-        return {"file": file, "valid": False, "errors": str(error).splitlines(), "warnings": []}
-    return {"file": file, "valid": True, "errors": [], "warnings": list(scenario.warnings())}
-
-
-def _say(report: Document, format: Format) -> None:
-    for error in report["errors"]:
-        complain(error)
-    for warning in report["warnings"]:
-        complain(f"{report['file']}: warning: {warning}")
-    if report["valid"] and format is Format.text:
-        emit(f"{report['file']}: OK")
+        errors = str(error).splitlines()
+    return {"file": file, "valid": not errors, "errors": errors, "warnings": warnings}
 
 
 def new(
-    name: Annotated[str, typer.Argument(metavar="NAME", help="Name of the scenario, and of its file.")],
-    like: Annotated[
-        str | None,
-        typer.Option(
-            "--like", metavar="SCENARIO", help="Begin with a built-in one.", autocompletion=complete_names
-        ),
-    ] = None,
-    out: Annotated[Path, typer.Option(help="Folder of the new file; made if need be.")] = Path(),
+    name: Annotated[str, typer.Argument(metavar="NAME")],
+    like: Annotated[str | None, typer.Option(metavar="SCENARIO", autocompletion=complete_names)] = None,
+    out: Path = Path(),
 ) -> None:
     """Write NAME.yaml, a scenario to begin with.
 
     It flies as it is; an existing file is never replaced.
+
+    name: Name of the scenario, and of its file.
+    like: Begin with a built-in one.
+    out: Folder of the new file; made if need be.
     """
     if not _NAME.fullmatch(name):
         raise BadInput(f"new: {name[:100]!r} is no name, allowed: letters, digits, - and _, at most 100")

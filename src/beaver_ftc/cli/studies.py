@@ -24,21 +24,19 @@ _ATTITUDE = (  # what, attribute, unit; angles in degrees
     ("flight path", "gamma_rad", "deg"),
 )
 
+ConditionOf = Annotated[str | None, typer.Argument(metavar="SCENARIO")]
+
 
 @dataclass(frozen=True)
 class Condition:
     """The flight condition to trim: but for the first and the last, keys of a scenario's `initial`."""
 
-    scenario: Annotated[
-        str | None, typer.Argument(metavar="SCENARIO", help="Take the flight condition from it.")
-    ] = None
-    airspeed_mps: Annotated[float | None, typer.Option(min=1, max=1000, help="True airspeed, m/s.")] = None
-    altitude_m: Annotated[float | None, typer.Option(min=-300, max=30000, help="Altitude, m.")] = None
-    engine_rpm: Annotated[float | None, typer.Option(min=0, max=3000, help="Engine speed, rpm.")] = None
-    manifold_pressure_inhg: Annotated[
-        float | None, typer.Option(min=0, max=50, help="Manifold pressure, inHg.")
-    ] = None
-    flap_deg: Annotated[float | None, typer.Option(min=-6, max=60, help="Flap deflection, deg.")] = None
+    scenario: ConditionOf = None
+    airspeed_mps: Annotated[float | None, typer.Option(min=1, max=1000)] = None
+    altitude_m: Annotated[float | None, typer.Option(min=-300, max=30000)] = None
+    engine_rpm: Annotated[float | None, typer.Option(min=0, max=3000)] = None
+    manifold_pressure_inhg: Annotated[float | None, typer.Option(min=0, max=50)] = None
+    flap_deg: Annotated[float | None, typer.Option(min=-6, max=60)] = None
     format: FormatOption = Format.text
 
 
@@ -49,6 +47,13 @@ def trim(condition: Condition) -> None:
     Steady straight flight, wings level; what cannot be trimmed is bad input (2). What is not given
     is the scenario's, or else its default: 45 m/s at 1828.8 m, 1800 rpm, 20 inHg, no flap.
     Engine and flap are those of an aircraft that has them.
+
+    scenario: Take the flight condition from it.
+    airspeed_mps: True airspeed, m/s.
+    altitude_m: Altitude, m.
+    engine_rpm: Engine speed, rpm.
+    manifold_pressure_inhg: Manifold pressure, inHg.
+    flap_deg: Flap deflection, deg.
     """
     from beaver_ftc.plant import conditions
 
@@ -77,16 +82,17 @@ def _shown(value: float, unit: str) -> str:
 
 
 def bench(
-    rounds: Annotated[int, typer.Option(min=3, max=10000, help="How often everything is timed.")] = 60,
-    no_parts: Annotated[
-        bool, typer.Option("--no-parts", help="Time the whole loop only, not part by part.")
-    ] = False,
+    rounds: Annotated[int, typer.Option(min=3, max=10000)] = 60,
+    no_parts: bool = False,
     format: FormatOption = Format.text,
 ) -> None:
     """Time the closed loop against the bare aircraft.
 
     Side by side, and part by part. The first time, the frame is compiled once more for each part that
     is taken out: about two minutes.
+
+    rounds: How often everything is timed.
+    no_parts: Time the whole loop only, not part by part.
     """
     from beaver_ftc.studies.bench.measure import bench, text_of
 
@@ -94,17 +100,14 @@ def bench(
     answer(format, document, lambda: text_of(document))
 
 
-def linearise(
-    scenario: Annotated[
-        str | None, typer.Argument(metavar="SCENARIO", help="Take sensors, actuators and law from it.")
-    ] = None,
-    format: FormatOption = Format.text,
-) -> None:
+def linearise(scenario: ConditionOf = None, format: FormatOption = Format.text) -> None:
     """Linearise the closed loop and print its margins.
 
     Over the airspeeds of the envelope. Aircraft, actuators, sensors' lag and delay, frame rate and the
     default law, broken at each surface in turn; healthy, and with losses of each surface that the law
     knows.
+
+    scenario: Take sensors, actuators and law from it.
     """
     from beaver_ftc.scenario.loader import load
     from beaver_ftc.studies.margins import as_document, as_text, study
@@ -116,20 +119,9 @@ def linearise(
 
 
 def derive(
-    aircraft: Annotated[
-        str,
-        typer.Argument(
-            metavar="AIRCRAFT",
-            help="jsbsim:NAME of the installed jsbsim package, a JSBSim model, or an aircraft's folder.",
-        ),
-    ],
-    envelope: Annotated[
-        Path | None,
-        typer.Option(help="YAML with airspeed_mps, alpha_deg, altitude_m, sideslip_deg: where to sample."),
-    ] = None,
-    out: Annotated[
-        Path | None, typer.Option(help="Folder to write the aircraft's folder into, if not the cache.")
-    ] = None,
+    aircraft: Annotated[str, typer.Argument(metavar="AIRCRAFT")],
+    envelope: Path | None = None,
+    out: Path | None = None,
     format: FormatOption = Format.text,
 ) -> None:
     """Derive an aircraft's design model from JSBSim.
@@ -137,6 +129,10 @@ def derive(
     And measure the error that is left. It samples the aircraft over its envelope, fits sparse terms,
     and checks them on states the fit did not see: the largest error becomes the declared bound.
     Afterwards `aircraft: jsbsim:NAME` flies.
+
+    aircraft: jsbsim:NAME of the installed jsbsim package, a JSBSim model, or an aircraft's folder.
+    envelope: YAML with airspeed_mps, alpha_deg, altitude_m, sideslip_deg: where to sample.
+    out: Folder to write the aircraft's folder into, if not the cache.
     """
     from beaver_ftc.studies.derive.derivation import derive
     from beaver_ftc.studies.derive.derived import document_of, text_of
@@ -147,8 +143,8 @@ def derive(
 
 
 def reproduce(
-    out: Annotated[Path, typer.Option(help="Folder for the results: `reproduction` in it.")] = Path("runs"),
-    workers: Annotated[int, typer.Option(min=1, help="Processes for the sensitivity study.")] = 2,
+    out: Path = Path("runs"),
+    workers: Annotated[int, typer.Option(min=1)] = 2,
     format: FormatOption = Format.text,
 ) -> None:
     """Fly the published study and judge its statements.
@@ -158,6 +154,9 @@ def reproduce(
     Exit status 1 if a statement is not borne out.
 
     Stopped or killed, it goes on where it was with the same command.
+
+    out: Folder for the results: `reproduction` in it.
+    workers: Processes for the sensitivity study.
     """
     from beaver_ftc.studies.reproduce.reproduction import NAME, as_text, reproduce
 
@@ -169,16 +168,12 @@ def reproduce(
 
 
 def verify(
-    hours: Annotated[float, typer.Option(min=0.0, max=1e6, help="Flight hours without a fault.")] = 2.0,
-    faults: Annotated[int, typer.Option(min=0, max=10_000_000, help="Flights with one random fault.")] = 200,
-    seed: Annotated[int, typer.Option(min=0, help="Of everything drawn.")] = 1,
+    hours: Annotated[float, typer.Option(min=0.0, max=1e6)] = 2.0,
+    faults: Annotated[int, typer.Option(min=0, max=10_000_000)] = 200,
+    seed: Annotated[int, typer.Option(min=0)] = 1,
     workers: WorkersOption = None,
-    out: Annotated[
-        Path, typer.Option(help="Folder of the flights flown; a campaign goes on from it.")
-    ] = Path("runs/verification"),
-    steps: Annotated[
-        bool, typer.Option("--steps", help="Also fly every step from the published scheme on.")
-    ] = False,
+    out: Path = Path("runs/verification"),
+    steps: bool = False,
     format: FormatOption = Format.text,
 ) -> None:
     """Fly at random inside all that is declared: what breaks?
@@ -186,6 +181,12 @@ def verify(
     Counts, with exact confidence limits, broken promises: false alarms, true faults excluded, wrong
     isolations and detections later than guaranteed plus a frame, for the published and the sharpened
     scheme on the same flights. Stopped, it goes on where it was. Exit status 1 if a promise is broken.
+
+    hours: Flight hours without a fault.
+    faults: Flights with one random fault.
+    seed: Of everything drawn.
+    out: Folder of the flights flown; a campaign goes on from it.
+    steps: Also fly every step from the published scheme on.
     """
     from beaver_ftc.studies.engine.workers import cores
     from beaver_ftc.studies.verify import Campaign, conduct, summarise, summary_text
@@ -198,9 +199,7 @@ def verify(
 
 
 def detectability(
-    scenario: ScenarioArgument,
-    out: Annotated[Path, typer.Option(help="Folder for the map, the CSV and the JSON.")] = Path("runs"),
-    format: FormatOption = Format.text,
+    scenario: ScenarioArgument, out: Path = Path("runs"), format: FormatOption = Format.text
 ) -> None:
     """Survey the smallest fault that is certain to be found.
 
@@ -210,6 +209,8 @@ def detectability(
     scaled by 0.25 to 2; `median` where the fault strikes at half of all instants.
 
     Stopped or killed, it goes on where it was with the same command.
+
+    out: Folder for the map, the CSV and the JSON.
     """
     from beaver_ftc.scenario.loader import load_scenario
     from beaver_ftc.studies.detectability import run_survey, survey_name, text

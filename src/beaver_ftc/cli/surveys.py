@@ -1,61 +1,28 @@
 """Surveys of faults: `beaver-ftc matrix`, each type on each surface; `power`, how likely each is found."""
 
-from collections.abc import Callable
 from dataclasses import replace
 from enum import StrEnum
-from functools import partial
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from beaver_ftc.cli.inputs import TurbulenceName, WorkersOption
-from beaver_ftc.cli.output import Document, Format, FormatOption, answer
+from beaver_ftc.cli.inputs import TurbulenceName, WorkersOption, listed
+from beaver_ftc.cli.output import Format, FormatOption, answer
 from beaver_ftc.cli.progress import progress_bar
 
-
-class GridName(StrEnum):
-    """The grids there are."""
-
-    quick = "quick"
-    full = "full"
-
-
-class SensorsName(StrEnum):
-    """The sensors there are in a grid."""
-
-    ideal = "ideal"
-    tactical_grade = "tactical-grade"
+GridName = StrEnum("GridName", ["quick", "full"])
+SensorsName = StrEnum("SensorsName", {"ideal": "ideal", "tactical_grade": "tactical-grade"})
 
 
 def matrix(
-    out: Annotated[
-        Path,
-        typer.Option(help="Folder for the results: `fault-matrix`, with what is declared, or `pitch-lost`."),
-    ] = Path("runs"),
-    airspeed: Annotated[
-        list[float] | None, typer.Option(min=1, max=1000, help="Airspeed, m/s; once for each.")
-    ] = None,
-    workers: Annotated[int, typer.Option(min=1, help="Processes.")] = 1,
-    pitch_lost: Annotated[
-        bool,
-        typer.Option(
-            "--pitch-lost", help="Elevator and flap lost at once instead, with engine power and without."
-        ),
-    ] = False,
-    declared: Annotated[
-        bool,
-        typer.Option(
-            "--declared",
-            help="With tactical-grade sensors, servos and 5 % wrong moment coefficients, and told so.",
-        ),
-    ] = False,
-    turbulence: Annotated[
-        TurbulenceName, typer.Option(help="Of --declared: flown, and told so.")
-    ] = TurbulenceName.none,
-    aircraft: Annotated[
-        str | None, typer.Option(help="Built-in name, jsbsim:NAME, or ./FOLDER in the working directory.")
-    ] = None,
+    out: Path = Path("runs"),
+    airspeed: Annotated[list[float] | None, typer.Option(min=1, max=1000)] = None,
+    workers: Annotated[int, typer.Option(min=1)] = 1,
+    pitch_lost: bool = False,
+    declared: bool = False,
+    turbulence: TurbulenceName = TurbulenceName.none,
+    aircraft: str | None = None,
     format: FormatOption = Format.text,
 ) -> None:
     """Fly every fault type on every surface.
@@ -68,6 +35,14 @@ def matrix(
     an aircraft that is kept without it.
 
     Stopped or killed, it goes on where it was with the same command.
+
+    out: Folder for the results: `fault-matrix`, with what is declared, or `pitch-lost`.
+    airspeed: Airspeed, m/s; once for each.
+    workers: Processes.
+    pitch_lost: Elevator and flap lost at once instead, with engine power and without.
+    declared: With tactical-grade sensors, servos and 5 % wrong moment coefficients, and told so.
+    turbulence: Of --declared: flown, and told so.
+    aircraft: Built-in name, jsbsim:NAME, or ./FOLDER in the working directory.
     """
     if pitch_lost and declared:
         raise typer.BadParameter("--pitch-lost and --declared exclude each other, allowed: one of them")
@@ -78,49 +53,33 @@ def matrix(
         )
     if turbulence is not TurbulenceName.none and not declared:
         raise typer.BadParameter("--turbulence is declared or not flown, allowed: with --declared")
-    name, run, as_text = _pitch_lost() if pitch_lost else _every_fault(declared, aircraft, turbulence)
+    from beaver_ftc.aircraft import DEFAULT
+    from beaver_ftc.studies.matrix import fault_matrix
+    from beaver_ftc.studies.matrix import pitch_lost as lost
+
+    speeds_mps = tuple(airspeed) if airspeed else None
     with progress_bar("faults") as progress:
-        document = run(out, tuple(airspeed) if airspeed else None, workers, progress)
+        if pitch_lost:
+            name, as_text = lost.NAME, lost.as_text
+            document = lost.run_pitch_lost(out, speeds_mps, workers, progress)
+        else:
+            name, as_text = fault_matrix.name_of(declared, turbulence), fault_matrix.as_text
+            document = fault_matrix.run_matrix(
+                out, speeds_mps, workers, progress, declared, aircraft or DEFAULT, turbulence.value
+            )
     folder = str(out / name)
     answer(format, document | {"folder": folder}, lambda: as_text(document) + f"\n\nresults: {folder}")
     raise typer.Exit(0 if document["passed"] else 1)
 
 
-def _every_fault(
-    declared: bool, aircraft: str | None, turbulence: TurbulenceName
-) -> tuple[str, Callable[..., Document], Callable[[Document], str]]:
-    from beaver_ftc.aircraft import DEFAULT
-    from beaver_ftc.studies.matrix.fault_matrix import as_text, name_of, run_matrix
-
-    run = partial(run_matrix, declared=declared, aircraft=aircraft or DEFAULT, turbulence=turbulence.value)
-    return name_of(declared, turbulence), run, as_text
-
-
-def _pitch_lost() -> tuple[str, Callable[..., Document], Callable[[Document], str]]:
-    from beaver_ftc.studies.matrix.pitch_lost import NAME, as_text, run_pitch_lost
-
-    return NAME, run_pitch_lost, as_text
-
-
 def power(
-    grid: Annotated[GridName, typer.Option(help="quick: a minute of CPU; full: ten or so.")] = GridName.quick,
-    schemes: Annotated[
-        str | None, typer.Option(help="Comma-separated schemes beside ours; all registered ones if left out.")
-    ] = None,
-    sensors: Annotated[
-        SensorsName | None, typer.Option(help="Only with these sensors; left out: all of the grid.")
-    ] = None,
-    turbulence: Annotated[
-        TurbulenceName | None, typer.Option(help="Only in this air; left out: all of the grid.")
-    ] = None,
-    rates_alone: Annotated[
-        bool,
-        typer.Option(
-            "--rates-alone", help="Do not show plug-ins the air as our detector sees it by the vanes."
-        ),
-    ] = False,
+    grid: GridName = GridName.quick,
+    schemes: str | None = None,
+    sensors: SensorsName | None = None,
+    turbulence: TurbulenceName | None = None,
+    rates_alone: bool = False,
     workers: WorkersOption = None,
-    out: Annotated[Path, typer.Option(help="Folder for the results: `power` in it.")] = Path("runs"),
+    out: Path = Path("runs"),
     format: FormatOption = Format.text,
 ) -> None:
     """Map how likely and how soon faults are detected.
@@ -131,13 +90,19 @@ def power(
     same healthy flights. Writes power.json, power.parquet, power.txt, and maps as PNG and SVG.
 
     Stopped or killed, it goes on where it was with the same command.
+
+    grid: quick: a minute of CPU; full: ten or so.
+    schemes: Comma-separated schemes beside ours; all registered ones if left out.
+    sensors: Only with these sensors; left out: all of the grid.
+    turbulence: Only in this air; left out: all of the grid.
+    rates_alone: Do not show plug-ins the air as our detector sees it by the vanes.
+    out: Folder for the results: `power` in it.
     """
     from beaver_ftc.studies.engine.workers import cores
     from beaver_ftc.studies.power.shown import NAME, as_text, run_power
     from beaver_ftc.studies.power.survey import GRIDS, contenders
 
-    names = None if schemes is None else [name.strip() for name in schemes.split(",") if name.strip()]
-    chosen = contenders(names)
+    chosen = contenders(None if schemes is None else listed(schemes))
     with progress_bar(f"power, {grid.value} grid") as progress:
         survey = replace(GRIDS[grid].only(sensors, turbulence), vanes=not rates_alone)
         document = run_power(out, survey, chosen, workers or cores(), progress)

@@ -31,54 +31,23 @@ if TYPE_CHECKING:
     from beaver_ftc.studies.sweep.one_flight import Keep
 
 
-class Backend(StrEnum):
-    """Who flies."""
-
-    local = "local"
-    ray = "ray"
-
-
-class Objective(StrEnum):
-    """What a worst-case search looks for."""
-
-    delay = "delay"
-    false_alarm = "false_alarm"
-    tracking = "tracking"
+Backend = StrEnum("Backend", ["local", "ray"])  # who flies
+Objective = StrEnum("Objective", ["delay", "false_alarm", "tracking"])  # what a search looks for
 
 
 @dataclass(frozen=True)
 class Arguments:
-    """What is wanted of it."""
+    """What is wanted of it, as `command` says."""
 
-    file: Annotated[
-        str, typer.Argument(metavar="FILE", help="A sweep file, or the name of a built-in sweep.")
-    ]
-    out: Annotated[Path, typer.Option(help="Folder for the results, one folder a sweep in it.")] = Path(
-        "runs"
-    )
-    workers: Annotated[
-        int | None,
-        typer.Option(min=1, max=4096, help="Processes, or Ray tasks, at a time. Default: one a core."),
-    ] = None
-    backend: Annotated[Backend, typer.Option(help="Local processes, or a Ray cluster.")] = Backend.local
-    ray_address: Annotated[
-        str | None, typer.Option(help="Ray cluster to join, e.g. auto. Default: one on this machine.")
-    ] = None
-    resume: Annotated[bool, typer.Option("--resume", help="Fly what is missing from an earlier start.")] = (
-        False
-    )
-    keep_logs: Annotated[
-        str,
-        typer.Option(
-            help="Flights to keep a result folder of: none, failed, missed, worst, all, or indices 3,17."
-        ),
-    ] = "none"
-    replay: Annotated[
-        int | None, typer.Option(min=0, metavar="INDEX", help="Fly this one flight again, as `run` would.")
-    ] = None
-    search: Annotated[
-        Objective | None, typer.Option(help="Look for the worst flight instead of sampling.")
-    ] = None
+    file: Annotated[str, typer.Argument(metavar="FILE")]
+    out: Path = Path("runs")
+    workers: Annotated[int | None, typer.Option(min=1, max=4096)] = None
+    backend: Backend = Backend.local
+    ray_address: str | None = None
+    resume: bool = False
+    keep_logs: str = "none"
+    replay: Annotated[int | None, typer.Option(min=0, metavar="INDEX")] = None
+    search: Objective | None = None
     format: FormatOption = Format.text
     no_report: NoReportOption = False
     junit: JunitOption = None
@@ -90,6 +59,16 @@ def command(arguments: Arguments) -> None:
 
     On all cores, or on a cluster. What has been flown is kept, whatever happens: go on with --resume.
     With --format json: the summary.
+
+    file: A sweep file, or the name of a built-in sweep.
+    out: Folder for the results, one folder a sweep in it.
+    workers: Processes, or Ray tasks, at a time. Default: one a core.
+    backend: Local processes, or a Ray cluster.
+    ray_address: Ray cluster to join, e.g. auto. Default: one on this machine.
+    resume: Fly what is missing from an earlier start.
+    keep_logs: Flights to keep a result folder of: none, failed, missed, worst, all, or indices 3,17.
+    replay: Fly this one flight again, as `run` would.
+    search: Look for the worst flight instead of sampling.
     """
     if arguments.backend is Backend.local and arguments.replay is None:
         from beaver_ftc.studies.engine.workers import start_early

@@ -1,23 +1,24 @@
 """What a scenario expects of its flight (`expect:`), held against the metrics: what a CI job asserts.
 
-One rule a key. A rule takes what was expected and the metrics document, and returns what was found and
-whether that will do. Where the quantity does not exist (nothing was detected, say) the expectation fails.
+One row a key: how the metrics document says what was found, and whether that will do for what was expected.
+Where the quantity does not exist (nothing was detected, say) the expectation fails.
 """
 
 from collections.abc import Callable, Iterator
-from functools import partial
+from operator import eq
 from typing import Any
 
 Document = dict[str, Any]
-Rule = Callable[[Any, Document], tuple[Any, bool]]
+Rule = tuple[Callable[[Document], Any], Callable[[Any, Any], bool]]
+"""From the metrics what was found; from that and what was expected whether it will do."""
 
 
 def evaluate(expect: Any, metrics: Document) -> list[Document]:
     """One {name, passed, expected, actual} for each expectation set in `expect`, in its fields' order."""
     return [
-        {"name": name, "passed": passed, "expected": expected, "actual": actual}
-        for name, rule, expected in _each(expect)
-        for actual, passed in [rule(expected, metrics)]
+        {"name": name, "passed": met(actual, expected), "expected": expected, "actual": actual}
+        for name, (found, met), expected in _each(expect)
+        for actual in [found(metrics)]
     ]
 
 
@@ -31,90 +32,45 @@ def _each(expect: Any) -> Iterator[tuple[str, Rule, Any]]:
         return
     for name, expected in expect.model_dump(exclude_none=True).items():
         if isinstance(expected, dict):
-            rule = _arrived if name == "arrives" else partial(_rms_at_most, name)
-            yield from ((f"{name}.{part}", rule(part), limit) for part, limit in expected.items())
+            yield from ((f"{name}.{part}", _rule_of(name, part), limit) for part, limit in expected.items())
         else:
             yield name, _RULES[name], expected
 
 
-def _at_most(actual: float | None, limit: float) -> tuple[float | None, bool]:
-    return actual, actual is not None and actual <= limit
+def _rule_of(name: str, part: str) -> Rule:
+    """The rule of one part of an expectation that has several: of an arrival, or of a tracking error."""
+    if name == "arrives":
+        return _entry("arrival", part), eq if part == "in_envelope" else _off_by_at_most
+    return lambda metrics: (metrics["tracking"][name] or {}).get(part), _at_most
 
 
-def _detected_within(limit_s: float, metrics: Document) -> tuple[Any, bool]:
-    return _at_most(metrics["detection"]["delay_s"], limit_s)
+def _entry(section: str, key: str) -> Callable[[Document], Any]:
+    return lambda metrics: (metrics[section] or {}).get(key)
 
 
-def _isolated_within(limit_s: float, metrics: Document) -> tuple[Any, bool]:
-    return _at_most(metrics["isolation"]["delay_s"], limit_s)
+def _at_most(found: float | None, limit: float) -> bool:
+    return found is not None and found <= limit
 
 
-def _isolated_as(fault: str, metrics: Document) -> tuple[Any, bool]:
-    actual = metrics["isolation"]["fault"]
-    return actual, actual == fault
+def _off_by_at_most(found: float | None, limit: float) -> bool:
+    return found is not None and abs(found) <= limit
 
 
-def _isolated_type(kind: str, metrics: Document) -> tuple[Any, bool]:
-    actual = metrics["isolation"]["type"]
-    return actual, actual == kind
-
-
-def _candidate_type(kind: str, metrics: Document) -> tuple[Any, bool]:
-    actual = metrics["isolation"]["candidates"]
-    return actual, any(kind == candidate.rpartition(":")[2] for candidate in actual)
-
-
-def _no_false_alarm(expected: bool, metrics: Document) -> tuple[Any, bool]:
-    actual = not metrics["false_alarm"]
-    return actual, actual == expected
-
-
-def _no_departure(expected: bool, metrics: Document) -> tuple[Any, bool]:
-    actual = metrics["departure"] is None
-    return actual, actual == expected
-
-
-def _rms_at_most(name: str, axis: str) -> Rule:
-    def rule(limit_deg_s: float, metrics: Document) -> tuple[Any, bool]:
-        rms = metrics["tracking"][name]
-        return _at_most(rms[axis] if rms else None, limit_deg_s)
-
-    return rule
-
-
-def _profile_within(channel: str) -> Rule:
-    def rule(limit: float, metrics: Document) -> tuple[Any, bool]:
-        return _at_most((metrics["profile"] or {}).get(channel), limit)
-
-    return rule
-
-
-def _arrived(part: str) -> Rule:
-    def rule(expected: Any, metrics: Document) -> tuple[Any, bool]:
-        actual = (metrics["arrival"] or {}).get(part)
-        if part == "in_envelope":
-            return actual, actual == expected
-        return actual, actual is not None and abs(actual) <= expected
-
-    return rule
-
-
-def _stays_in_envelope(expected: bool, metrics: Document) -> tuple[Any, bool]:
-    actual = metrics["envelope"]["exits"] == 0
-    return actual, actual == expected
+def _among(candidates: list[str], kind: str) -> bool:
+    return any(kind == candidate.rpartition(":")[2] for candidate in candidates)
 
 
 _RULES: dict[str, Rule] = {
-    "detected_within_s": _detected_within,
-    "isolated_as": _isolated_as,
-    "isolated_within_s": _isolated_within,
-    "isolated_type": _isolated_type,
-    "candidate_type": _candidate_type,
-    "no_false_alarm": _no_false_alarm,
-    "no_departure": _no_departure,
-    "altitude_within_m": _profile_within("altitude_m"),
-    "airspeed_within_mps": _profile_within("airspeed_mps"),
-    "airspeed_within_limits_mps": _profile_within("airspeed_limited_mps"),
-    "heading_within_deg": _profile_within("heading_deg"),
-    "stays_in_envelope": _stays_in_envelope,
+    "detected_within_s": (_entry("detection", "delay_s"), _at_most),
+    "isolated_as": (_entry("isolation", "fault"), eq),
+    "isolated_within_s": (_entry("isolation", "delay_s"), _at_most),
+    "isolated_type": (_entry("isolation", "type"), eq),
+    "candidate_type": (_entry("isolation", "candidates"), _among),
+    "no_false_alarm": (lambda metrics: not metrics["false_alarm"], eq),
+    "no_departure": (lambda metrics: metrics["departure"] is None, eq),
+    "altitude_within_m": (_entry("profile", "altitude_m"), _at_most),
+    "airspeed_within_mps": (_entry("profile", "airspeed_mps"), _at_most),
+    "airspeed_within_limits_mps": (_entry("profile", "airspeed_limited_mps"), _at_most),
+    "heading_within_deg": (_entry("profile", "heading_deg"), _at_most),
+    "stays_in_envelope": (lambda metrics: metrics["envelope"]["exits"] == 0, eq),
 }

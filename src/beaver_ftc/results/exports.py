@@ -7,6 +7,7 @@ as shares of travel. `vehicle.yaml` beside it names the columns for `identify` a
 ULog: https://docs.px4.io/main/en/dev_log/ulog_file_format; dataflash: FMT messages, then packed ones.
 """
 
+import re
 from collections.abc import Callable, Iterator, Sequence
 from math import ceil, cos, degrees, radians
 from pathlib import Path
@@ -35,7 +36,7 @@ Topics = dict[str, Columns]
 """Fields of each message; every message has the stamps `t_s`."""
 
 RECORDINGS = {"table": "flight.csv", "ulog": "flight.ulg", "ardupilot": "flight.bin"}
-_RATES = ("p", "q", "r")
+_RATES, _ATTITUDE = ("p", "q", "r"), {"Roll": "phi", "Pitch": "theta", "Yaw": "psi"}
 _BOOT_US = 1_000_000
 """A clock on board does not start with the log."""
 
@@ -74,13 +75,14 @@ def _escaped(text: str) -> str:
 def _frames(log_path: Path, metrics: Document, aircraft: Aircraft) -> Iterator[str]:
     """A frame of the recording at ACMI_RATE_HZ at most, each event in the first frame not before it."""
     events = sorted(marks(metrics), key=lambda mark: mark.time_s)
-    place = _Place(log_path)
+    start_m = float(next(log.read_chunks(log_path, ["altitude_m"]))["altitude_m"][0])
     columns: tuple[str, ...] = _ACMI_COLUMNS
-    full = aircraft.travel[FLAP].max_rad if FLAP in aircraft.surfaces else None
-    if full is not None:
+    full_rad = aircraft.travel[FLAP].max_rad if FLAP in aircraft.surfaces else None
+    if full_rad is not None:
         columns += (f"{FLAP}_pos_rad",)
     for row in _thinned(log_path, columns):
-        yield f"#{row['t_s']:.3f}\n{_AIRCRAFT},T={place.of(row)},{_properties(row)}{_flaps(row, full)}\n"
+        place = _place(row, EARTH_RADIUS_M + start_m)
+        yield f"#{row['t_s']:.3f}\n{_AIRCRAFT},T={place},{_properties(row, full_rad)}\n"
         while events and events[0].time_s <= row["t_s"] + 1e-9:
             yield f"0,Event=Bookmark|{_AIRCRAFT}|{_escaped(events.pop(0).label)}\n"
 
@@ -99,30 +101,18 @@ def _every(log_path: Path) -> int:
     return max(1, ceil(1.0 / (ACMI_RATE_HZ * float(np.diff(first)[0])) - 1e-9)) if len(first) == 2 else 1
 
 
-class _Place:
-    """From the log's local plane back to longitude and latitude, with the attitude, as ACMI wants them."""
-
-    def __init__(self, log_path: Path) -> None:
-        start_m = float(next(log.read_chunks(log_path, ["altitude_m"]))["altitude_m"][0])
-        self._radius_m = EARTH_RADIUS_M + start_m
-
-    def of(self, row: dict[str, float]) -> str:
-        """Longitude, latitude (deg), altitude (m), roll, pitch, yaw (deg)."""
-        latitude = START_LATITUDE_DEG + degrees(row["north_m"] / self._radius_m)
-        longitude = degrees(row["east_m"] / (self._radius_m * cos(radians(START_LATITUDE_DEG))))
-        attitude = "|".join(f"{degrees(row[name]):.3f}" for name in ("phi_rad", "theta_rad", "psi_rad"))
-        return f"{longitude:.8f}|{latitude:.8f}|{row['altitude_m']:.3f}|{attitude}"
+def _place(row: dict[str, float], radius_m: float) -> str:
+    """From the log's local plane back to longitude, latitude (deg), altitude (m), roll, pitch, yaw (deg)."""
+    latitude = START_LATITUDE_DEG + degrees(row["north_m"] / radius_m)
+    longitude = degrees(row["east_m"] / (radius_m * cos(radians(START_LATITUDE_DEG))))
+    attitude = "|".join(f"{degrees(row[name]):.3f}" for name in ("phi_rad", "theta_rad", "psi_rad"))
+    return f"{longitude:.8f}|{latitude:.8f}|{row['altitude_m']:.3f}|{attitude}"
 
 
-def _properties(row: dict[str, float]) -> str:
-    return (
-        f"TAS={row['airspeed_mps']:.3f},AOA={degrees(row['alpha_rad']):.3f},"
-        f"AOS={degrees(row['beta_rad']):.3f}"
-    )
-
-
-def _flaps(row: dict[str, float], full_rad: float | None) -> str:
-    return "" if full_rad is None else f",Flaps={row[f'{FLAP}_pos_rad'] / full_rad:.4f}"
+def _properties(row: dict[str, float], full_flap_rad: float | None) -> str:
+    alpha, beta = degrees(row["alpha_rad"]), degrees(row["beta_rad"])
+    air = f"TAS={row['airspeed_mps']:.3f},AOA={alpha:.3f},AOS={beta:.3f}"
+    return air if full_flap_rad is None else f"{air},Flaps={row[f'{FLAP}_pos_rad'] / full_flap_rad:.4f}"
 
 
 def write_recording(log_path: Path, travel_rad: dict[str, float], kind: str, folder: Path) -> None:
@@ -161,19 +151,13 @@ def _as_px4(known: Columns, shares: Columns) -> Topics:
 
 def _as_ardupilot(known: Columns, shares: Columns) -> Topics:
     gyros = {f"Gyr{x}": known[f"{axis}_measured_rad_s"] for x, axis in zip("XYZ", _RATES, strict=True)}
-    attitude = {name: np.rad2deg(known[f"{of}_rad"]) for name, of in _ATT.items()}
+    attitude = {name: np.rad2deg(known[f"{of}_rad"]) for name, of in _ATTITUDE.items()}
     controls = {f"C{i + 1}": share for i, share in enumerate(shares.values())}
     return {"IMU": gyros, "SRFC": controls, "ARSP": {"Airspeed": known["airspeed_mps"]}, "ATT": attitude}
 
 
-_ATT = {"Roll": "phi", "Pitch": "theta", "Yaw": "psi"}
-
-
 def _attitude(known: Columns) -> Columns:
-    return {
-        f"{name}_rad": known[f"{of}_rad"]
-        for name, of in (("roll", "phi"), ("pitch", "theta"), ("yaw", "psi"))
-    }
+    return {f"{name.lower()}_rad": known[f"{of}_rad"] for name, of in _ATTITUDE.items()}
 
 
 def _write_table(path: Path, t_us: NDArray[np.int64], topics: Topics) -> None:
@@ -190,9 +174,10 @@ def _write_ulog(path: Path, t_us: NDArray[np.int64], topics: Topics) -> None:
         head.append(_ulog_message("F", f"{topic}:uint64_t timestamp;{_layout(list(fields))}".encode()))
     for number, topic in enumerate(topics):
         head.append(_ulog_message("A", b"\x00" + np.uint16(number).tobytes() + topic.encode()))
-    packed = [
-        _packed_ulog(number, t_us, list(fields.values())) for number, fields in enumerate(topics.values())
-    ]
+    packed = []
+    for number, fields in enumerate(topics.values()):
+        length, header = 10 + 8 * len(fields), b"D" + np.uint16(number).tobytes()
+        packed.append(_packed(np.uint16(length).tobytes() + header, t_us, fields))
     path.write_bytes(b"".join(head) + _in_turn(packed))
 
 
@@ -211,41 +196,29 @@ def _ulog_message(kind: str, body: bytes) -> bytes:
     return np.uint16(len(body)).tobytes() + kind.encode() + body
 
 
-def _packed_ulog(number: int, t_us: NDArray[np.int64], values: Sequence[NDArray[np.float64]]) -> np.ndarray:
-    layout = [("size", "<u2"), ("kind", "S1"), ("id", "<u2"), ("t", "<u8"), ("v", "<f8", (len(values),))]
-    rows = np.zeros(len(t_us), dtype=layout)
-    rows["size"], rows["kind"], rows["id"] = rows.dtype.itemsize - 3, b"D", number
-    rows["t"], rows["v"] = t_us, np.column_stack(values)
-    return rows
-
-
 def _write_dataflash(path: Path, t_us: NDArray[np.int64], topics: Topics) -> None:
     """FMT messages (the first describes FMT itself), then every message in the order of time."""
-    numbers = {name: 140 + i for i, name in enumerate(topics)}
     head = [_fmt(128, 89, "FMT", "BBnNZ", "Type,Length,Name,Format,Columns")]
     packed = []
-    for name, fields in topics.items():
-        rows = _packed_dataflash(numbers[name], t_us, list(fields.values()))
+    for number, (name, fields) in enumerate(topics.items(), start=140):
+        rows = _packed(bytes([0xA3, 0x95, number]), t_us, fields)
         labels = ",".join(["TimeUS", *fields])
-        head.append(_fmt(numbers[name], rows.dtype.itemsize, name, "Q" + "d" * len(fields), labels))
+        head.append(_fmt(number, rows.dtype.itemsize, name, "Q" + "d" * len(fields), labels))
         packed.append(rows)
     path.write_bytes(b"".join(head) + _in_turn(packed))
 
 
 def _fmt(number: int, length: int, name: str, layout: str, labels: str) -> bytes:
     """One FMT message, 89 bytes."""
-    texts = (
-        name.encode().ljust(4, b"\0") + layout.encode().ljust(16, b"\0") + labels.encode().ljust(64, b"\0")
-    )
-    return bytes([0xA3, 0x95, 128, number, length]) + texts
+    padded = (text.encode().ljust(size, b"\0") for text, size in ((name, 4), (layout, 16), (labels, 64)))
+    return bytes([0xA3, 0x95, 128, number, length]) + b"".join(padded)
 
 
-def _packed_dataflash(
-    number: int, t_us: NDArray[np.int64], values: Sequence[NDArray[np.float64]]
-) -> np.ndarray:
-    layout = [("head", "u1", (3,)), ("t", "<u8"), ("v", "<f8", (len(values),))]
+def _packed(head: bytes, t_us: NDArray[np.int64], fields: Columns) -> np.ndarray:
+    """The messages of one topic: each its head, the stamp, and the fields as doubles."""
+    layout = [("head", "u1", (len(head),)), ("t", "<u8"), ("v", "<f8", (len(fields),))]
     rows = np.zeros(len(t_us), dtype=layout)
-    rows["head"], rows["t"], rows["v"] = (0xA3, 0x95, number), t_us, np.column_stack(values)
+    rows["head"], rows["t"], rows["v"] = list(head), t_us, np.column_stack(list(fields.values()))
     return rows
 
 
@@ -258,9 +231,7 @@ def _in_turn(topics: Sequence[np.ndarray]) -> bytes:
 def _vehicle(topics: Topics, surfaces: list[str], kind: str) -> str:
     """The vehicle file: which column is what."""
     columns = [f"{topic}.{field}" if topic else field for topic, fields in topics.items() for field in fields]
-    commands = [
-        name for name in columns if "command" in name or ".control[" in name or name.startswith("SRFC")
-    ]
+    commands = [name for name in columns if re.search(r"command|\.control\[|^SRFC", name)]
     rates = ", ".join(f"{axis}: {name!r}" for axis, name in zip(_RATES, columns, strict=False))
     lines = [
         "# Written with the log beside it: which column is what. Commands are shares of travel.",

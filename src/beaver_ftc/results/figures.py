@@ -11,7 +11,7 @@ import numpy as np
 from beaver_ftc.results import log
 from beaver_ftc.results.metrics import Document
 from beaver_ftc.results.style import GREY, LOOKS, YELLOW, Mark, closeup_window, marks
-from beaver_ftc.results.views import WHOLE, Panel, Series, Trace, View, read_series, unit_of, views
+from beaver_ftc.results.views import WHOLE, Panel, Series, Trace, View, read_series, views
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -24,20 +24,18 @@ LOWEST_RATIO = 1e-2  # of a logarithmic axis: what is smaller is nothing
 
 def write_figures(log_path: Path, metrics: Document, folder: Path) -> list[Path]:
     """Draw every view of the log as `<view>.png`, some also as `<view>-closeup.png`; return the files."""
-    shown, instants, window = (
-        views(log.column_names(log_path), bool(metrics.get("engine_power"))),
-        marks(metrics),
-        closeup_window(marks(metrics)),
-    )
+    shown, instants = views(log.column_names(log_path), bool(metrics.get("engine_power"))), marks(metrics)
+    window = closeup_window(instants)
     closeups = [view for view in shown if view.closeup] if window else []
     folder.mkdir(exist_ok=True)
-    jobs = [(shown, WHOLE, ""), (closeups, window or WHOLE, "-closeup")]
-    return [
-        _save(draw(view, series, instants, metrics["scenario"]), folder / f"{view.name}{ending}.png")
-        for drawn, span, ending in jobs
-        for series in [read_series(log_path, _columns(drawn), span)]
-        for view in drawn
-    ]
+    written = []
+    for drawn, span, ending in ((shown, WHOLE, ""), (closeups, window or WHOLE, "-closeup")):
+        series = read_series(log_path, [name for view in drawn for name in view.columns], span)
+        for view in drawn:
+            written.append(folder / f"{view.name}{ending}.png")
+            figure = draw(view, series, instants, metrics["scenario"])
+            figure.savefig(written[-1], metadata={"Software": "beaver-ftc"})
+    return written
 
 
 def draw(view: View, series: Series, instants: Sequence[Mark], subtitle: str) -> "Figure":
@@ -70,10 +68,6 @@ def figure_class() -> "type[Figure]":
     return Shown
 
 
-def _columns(drawn: Sequence[View]) -> list[str]:
-    return [column for view in drawn for column in view.columns]
-
-
 def _laid_out(view: View, new_figure: Any) -> tuple["Figure", Any]:
     """An empty figure with its grid of axes, laid out in inches: a solver would double the time."""
     down = -(-len(view.panels) // view.across)
@@ -99,20 +93,13 @@ def _height(panel: Panel, across: int) -> float:
     return 1.75 if across == 1 else 1.5
 
 
-def _save(figure: "Figure", path: Path) -> Path:
-    figure.savefig(path, metadata={"Software": "beaver-ftc"})
-    return path
-
-
 def _draw_panel(axes: "Axes", panel: Panel, series: Series, instants: Sequence[Mark]) -> None:
     for trace in panel.traces:
         _draw_trace(axes, trace, series, bool(panel.steps))
     _draw_shade(axes, panel, series)
     _draw_marks(axes, instants, series["t_s"])
     title = panel.label if panel.steps or not panel.unit else f"{panel.label} ({panel.unit})"
-    axes.set_title(
-        title, fontsize=9, y=1.0
-    )  # at a given height: looking for one would take a third of the time
+    axes.set_title(title, fontsize=9, y=1.0)  # at this height: looking for one takes a third of the time
     axes.tick_params(labelsize=8)
     axes.grid(visible=True, color="#dddddd", linewidth=0.6)
     axes.ticklabel_format(axis="x", useOffset=False)
@@ -133,10 +120,9 @@ def _draw_panel(axes: "Axes", panel: Panel, series: Series, instants: Sequence[M
 
 def _draw_trace(axes: "Axes", trace: Trace, series: Series, stepped: bool) -> None:
     look = LOOKS[trace.role]
-    _, factor = unit_of(trace.column)
     axes.plot(
         series["t_s"],
-        trace.sign * factor * series[trace.column],
+        trace.factor * series[trace.column],
         color=look.colour,
         linestyle=_linestyle(look.dash),
         linewidth=look.width,
@@ -165,18 +151,11 @@ def _draw_marks(axes: "Axes", instants: Sequence[Mark], t_s: np.ndarray) -> None
     for rank, mark in enumerate(instants):
         if not t_s.size or not t_s[0] <= mark.time_s <= t_s[-1]:
             continue
-        axes.axvline(
-            mark.time_s,
-            color=mark.colour,
-            linestyle=_linestyle(mark.dash),
-            linewidth=0.9,
-            alpha=0.8,
-            zorder=2.5,
-        )
+        line: Any = {"color": mark.colour, "linestyle": _linestyle(mark.dash), "linewidth": 0.9}
+        axes.axvline(mark.time_s, alpha=0.8, zorder=2.5, **line)
         axes.plot(
-            [mark.time_s], [1.0 - 0.09 * rank], transform=axes.get_xaxis_transform(), color=mark.colour,
-            marker=mark.symbol, markersize=4.5, linestyle=_linestyle(mark.dash), linewidth=0.9,
-            label=mark.label, zorder=6, clip_on=False,
+            [mark.time_s], [1.0 - 0.09 * rank], transform=axes.get_xaxis_transform(), marker=mark.symbol,
+            markersize=4.5, label=mark.label, zorder=6, clip_on=False, **line,
         )  # fmt: skip
 
 
@@ -192,9 +171,7 @@ def _draw_legend(figure: "Figure", grid: Iterable["Axes"]) -> None:
     entries: dict[str, Any] = {}
     for axes in grid:
         handles, labels = axes.get_legend_handles_labels()
-        entries |= {
-            label: handle for label, handle in zip(labels, handles, strict=True) if label not in entries
-        }
+        entries = entries | dict(zip(labels, handles, strict=True)) | entries
     shown = {label: handle for label, handle in entries.items() if label not in _titles(grid)}
     figure.legend(
         shown.values(),

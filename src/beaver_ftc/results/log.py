@@ -9,7 +9,6 @@ import shutil
 import tempfile
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
-from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
@@ -63,7 +62,7 @@ class ParquetLog:
             self._used += count
             start += count
             if self._used == self._rows_per_group:
-                self._flush()
+                self._flush(self._writer)
 
     def close(self) -> None:
         """Write what is left and complete the file."""
@@ -72,7 +71,7 @@ class ParquetLog:
         writer, self._writer = self._writer, None
         try:
             if self._used:
-                self._flush_to(writer)
+                self._flush(writer)
         finally:
             writer.close()
             self._file.close()
@@ -80,25 +79,18 @@ class ParquetLog:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *about: object) -> None:
         if kind is not None:
             self._used = 0  # the file is to be thrown away: do not spend time on it
         self.close()
 
-    def _flush(self) -> None:
-        self._flush_to(self._writer)
-
-    def _flush_to(self, writer: Any) -> None:
+    def _flush(self, writer: Any) -> None:
         import pyarrow as pa
 
         # Not pa.array: it imports pandas, if that is installed, only to see whether it was given a series.
         used, float64 = self._used, pa.float64()
-        arrays = [
-            pa.Array.from_buffers(float64, used, [None, pa.py_buffer(column[:used])])
-            for column in self._buffer
-        ]
+        values = (pa.py_buffer(column[:used]) for column in self._buffer)
+        arrays = [pa.Array.from_buffers(float64, used, [None, column]) for column in values]
         writer.write_table(pa.Table.from_arrays(arrays, schema=self._schema))
         self._used = 0
 
@@ -297,13 +289,14 @@ def read(path: Path, columns: Sequence[str] | None = None) -> dict[str, np.ndarr
 
 
 def units(columns: Iterable[str]) -> dict[str, str]:
-    """The unit of each column, read off its name or the section's it is in; "1" for a pure number."""
-    return {column: _unit(column.split(".")) for column in columns}
+    """The unit of each column."""
+    return {column: unit_of(column) for column in columns}
 
 
-def _unit(parts: Sequence[str]) -> str:
-    named = (unit for part in reversed(parts) for ending, unit in _UNITS if part.endswith(ending))
-    return next(named, "1")
+def unit_of(column: str) -> str:
+    """The unit of a column, read off its name or the section's it is in; "1" for a pure number."""
+    parts = reversed(column.split("."))
+    return next((unit for part in parts for ending, unit in _UNITS if part.endswith(ending)), "1")
 
 
 def log_frame(log: "Log", metrics: dict[str, Any]) -> "DataFrame":

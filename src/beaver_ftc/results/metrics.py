@@ -9,7 +9,7 @@ machine's name, so that the same scenario and seed give the same file.
 import json
 import math
 import platform
-from collections.abc import Iterator
+from collections.abc import Sequence
 from functools import cache
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
@@ -38,6 +38,7 @@ def metrics(flight: "Landing") -> Document:
     """The metrics of `flight`, key by key in the order documented."""
     scenario = flight.scenario
     fault = first_fault(scenario)
+    at_once = fault is not None and fault["at_s"] <= 0  # then nothing was measured before it
     document = {
         "scenario": scenario.name,
         "seed": scenario.seed,
@@ -47,24 +48,25 @@ def metrics(flight: "Landing") -> Document:
         "faults": faults_of(scenario),
         "detection": _detection(flight, fault),
         "isolation": _isolation(flight, fault),
-        "false_alarm": any(_false_alarm(time_s, fault) for time_s in _alarms_s(flight)),
+        # the alarm is latched: there is one a diagnosis
+        "false_alarm": any(fault is None or _before_the_fault(time_s, fault) for time_s in _alarms_s(flight)),
         "fault_free_s": _number(fault_free_s(flight)),
         "tracking": {
-            "pre_fault_rms_deg_s": _per_axis_deg_s(_before(fault, flight.pre_fault_rms_rad_s)),
+            "pre_fault_rms_deg_s": None if at_once else _per_axis_deg_s(flight.pre_fault_rms_rad_s),
             "post_fault_rms_deg_s": _per_axis_deg_s(flight.post_fault_rms_rad_s),
             "surface_travel_deg": _rounded(_each_in_deg(flight.surface_travel_rad)),
             "surface_energy_deg2_s": _rounded(_each_in_deg(_each_in_deg(flight.surface_energy_rad2_s))),
         },
-        "supervisor": [_rounded({"time_s": time, "mode": mode}) for time, mode in flight.supervisor],
+        "supervisor": [_named_values(change, "time_s", "mode") for change in flight.supervisor],
         "changes": _rounded(flight.changes),
         "mode_changes_left_out": flight.mode_changes - len(flight.supervisor),
-        "envelope_exits": [_rounded({"start_s": out, "end_s": back}) for out, back in flight.envelope_exits],
+        "envelope_exits": [_named_values(exit, "start_s", "end_s") for exit in flight.envelope_exits],
         "envelope": {
             "exits": flight.exits,
             "outside_s": _number(flight.outside_s),
             "exits_left_out": flight.exits - len(flight.envelope_exits),
         },
-        "departure": _departure(flight),
+        "departure": _named_values(flight.departure, "time_s", "signal"),
         "authority": _rounded(flight.authority),
         "engine_power": _rounded(flight.engine_power),
         "profile": _in_deg(flight.profile),
@@ -92,13 +94,8 @@ def first_fault(scenario: "Scenario") -> Document | None:
     if not scenario.faults:
         return None
     fault = min(scenario.faults, key=lambda fault: fault.at_s)
-    where = {"actuator": getattr(fault, "actuator", None), **sensor_of(fault)}
+    where = {"actuator": surface_of(fault), **sensor_of(fault)}
     return {**where, "type": fault.type, "at_s": fault.at_s}
-
-
-def _in_force_s(at_s: float, scenario: "Scenario") -> float:
-    """The time of the first frame in which a fault of `at_s` is there."""
-    return math.ceil((at_s - TIME_TOLERANCE_S) * scenario.rate_hz) / scenario.rate_hz
 
 
 @cache
@@ -145,7 +142,7 @@ def _isolation(flight: "Landing", fault: Document | None) -> Document:
 def _one_of_several(found: Document, scenario: "Scenario") -> Document:
     """One of several faults at once; `fault` is null where a plane's is open between its candidates."""
     surface, kind = found["isolated"], found["isolation_type"]
-    declared = [fault for fault in scenario.faults if getattr(fault, "actuator", None) == surface]
+    declared = [fault for fault in scenario.faults if surface_of(fault) == surface]
     first = min(declared, key=lambda fault: fault.at_s, default=None)
     correct = None if surface is None else bool(declared)
     type_correct = None if kind is None else any(kind == fault.type for fault in declared)
@@ -179,7 +176,7 @@ def _meant(flight: "Landing", fault: Document | None) -> Document | None:
     """The declared fault that the verdict is held against: the first, or of several that surface's."""
     if not flight.faults:
         return fault
-    of_surface = (one for one in flight.scenario.faults if getattr(one, "actuator", None) == flight.isolated)
+    of_surface = (one for one in flight.scenario.faults if surface_of(one) == flight.isolated)
     first = min(of_surface, key=lambda one: one.at_s, default=None)
     return fault if first is None else {"actuator": flight.isolated, "type": first.type, "at_s": first.at_s}
 
@@ -221,23 +218,17 @@ def _arrival(flight: "Landing") -> Document | None:
     return {**off, "in_envelope": not outside}
 
 
-def _false_alarm(detection_time_s: float | None, fault: Document | None) -> bool:
-    """An alarm without a fault, or before it. (The alarm is latched: there is one a diagnosis.)"""
-    if detection_time_s is None:
-        return False
-    return fault is None or _before_the_fault(detection_time_s, fault)
-
-
-def _alarms_s(flight: "Landing") -> list[float | None]:
+def _alarms_s(flight: "Landing") -> list[float]:
     """When there was an alarm: of the diagnosis at the end, and of those that changes in flight replaced."""
-    return [flight.detection_time_s, *(change.get("detection_time_s") for change in flight.changes)]
+    alarms = [flight.detection_time_s, *(change.get("detection_time_s") for change in flight.changes)]
+    return [time_s for time_s in alarms if time_s is not None]
 
 
 def fault_free_s(flight: "Landing") -> float:
     """Time under observation in which an alarm is a false one: until the first fault, the first alarm of any
     diagnosis, or the end. Rates of false alarms are per this time."""
     scenario, fault = flight.scenario, first_fault(flight.scenario)
-    ends = [flight.frames / scenario.rate_hz, *(time_s for time_s in _alarms_s(flight) if time_s is not None)]
+    ends = [flight.frames / scenario.rate_hz, *_alarms_s(flight)]
     return min(ends if fault is None else [*ends, fault["at_s"]])
 
 
@@ -250,26 +241,16 @@ def _delay(time_s: float | None, fault: Document | None, scenario: "Scenario") -
     """Time since the fault's first frame; null without one, or where the event came before it."""
     if time_s is None or fault is None or _before_the_fault(time_s, fault):
         return None
-    return _number(max(time_s - _in_force_s(fault["at_s"], scenario), 0.0))
-
-
-def _before(fault: Document | None, rms_rad_s: Rates) -> Rates | None:
-    """What was measured before the fault; nothing was where the flight begins with it."""
-    return None if fault and fault["at_s"] <= 0 else rms_rad_s
-
-
-def _departure(flight: "Landing") -> Document | None:
-    if flight.departure is None:
-        return None
-    time_s, signal = flight.departure
-    return {"time_s": _number(time_s), "signal": signal}
+    first_frame_s = math.ceil((fault["at_s"] - TIME_TOLERANCE_S) * scenario.rate_hz) / scenario.rate_hz
+    return _number(max(time_s - first_frame_s, 0.0))
 
 
 def _per_axis_deg_s(rates_rad_s: Rates | None) -> Document | None:
-    if rates_rad_s is None:
-        return None
-    in_deg: Document = _rounded(_each_in_deg(dict(zip(AXES, rates_rad_s, strict=True))))
-    return in_deg
+    return _named_values(rates_rad_s and [math.degrees(rate) for rate in rates_rad_s], *AXES)
+
+
+def _named_values(values: Sequence[Any] | None, *names: str) -> Document | None:
+    return None if values is None else _rounded(dict(zip(names, values, strict=True)))
 
 
 def _each_in_deg(angles: dict[str, float]) -> dict[str, float]:
@@ -310,7 +291,7 @@ def faults_of(scenario: "Scenario") -> list[Document]:
     """Every declared fault, in the order in which they strike: what, when, and how large."""
     return [
         {
-            "actuator": getattr(fault, "actuator", None),
+            "actuator": surface_of(fault),
             **sensor_of(fault),
             "type": fault.type,
             "at_s": fault.at_s,
@@ -320,6 +301,11 @@ def faults_of(scenario: "Scenario") -> list[Document]:
         }
         for fault in sorted(scenario.faults, key=lambda fault: fault.at_s)
     ]
+
+
+def surface_of(fault: Any) -> str | None:
+    """The surface that a fault is on, if it is on one."""
+    return getattr(fault, "actuator", None)
 
 
 def sensor_of(fault: Any) -> Document:
@@ -336,7 +322,12 @@ def hints(flight: "Landing", document: Document) -> list[str]:
 
 
 def _outside_the_class(scenario: "Scenario", document: Document) -> str:
-    strange = list(_strangers(scenario))
+    strange = [
+        f"{surface_of(fault)} {fault.type.replace('_', ' ')}"
+        for fault in scenario.faults
+        if surface_of(fault)  # what is on no surface is meant to be outside
+        and (fault.type != LOSS_OF_EFFECTIVENESS or surface_of(fault) not in scenario.airframe.primary)
+    ]
     if scenario.fdi.fault_class == "all" or not strange:
         return ""
     *first, last = scenario.airframe.primary
@@ -346,35 +337,18 @@ def _outside_the_class(scenario: "Scenario", document: Document) -> str:
     )
 
 
-def _strangers(scenario: "Scenario") -> Iterator[str]:
-    """Faults that are not of the published class, but for the one that is meant to be none."""
-    for fault in scenario.faults:
-        actuator = getattr(fault, "actuator", None)
-        lost = fault.type == "loss_of_effectiveness" and actuator in scenario.airframe.primary
-        if actuator and not lost:
-            yield f"{actuator} {fault.type.replace('_', ' ')}"
-
-
 def _several(scenario: "Scenario", document: Document) -> str:
-    surfaces = {getattr(fault, "actuator", None) for fault in scenario.faults if not sensor_of(fault)}
-    if len(surfaces) < 2 or scenario.fdi.pairs or not _together(scenario):
-        return ""
-    wanted = (
-        "fdi.pairs: true" if scenario.fdi.fault_class == "all" else "fdi: {fault_class: all, pairs: true}"
-    )
-    return f"faults on several surfaces at once: the diagnosis looks for one; set {wanted}"
-
-
-def _together(scenario: "Scenario") -> bool:
-    """Whether two faults of different surfaces are in force at one time."""
     spans = [
-        (fault.at_s, fault.end_s or scenario.duration_s, getattr(fault, "actuator", None))
+        (fault.at_s, fault.end_s or scenario.duration_s, surface_of(fault))
         for fault in scenario.faults
-        if not sensor_of(fault)
+        if not of_a_sensor(fault)
     ]
-    return any(
-        one[2] != other[2] and one[0] < other[1] and other[0] < one[1] for one in spans for other in spans
-    )
+    together = any(a[2] != b[2] and a[0] < b[1] and b[0] < a[1] for a in spans for b in spans)
+    if scenario.fdi.pairs or not together:
+        return ""
+    both = "fdi: {fault_class: all, pairs: true}"
+    wanted = "fdi.pairs: true" if scenario.fdi.fault_class == "all" else both
+    return f"faults on several surfaces at once: the diagnosis looks for one; set {wanted}"
 
 
 def _too_small(scenario: "Scenario", document: Document) -> str:

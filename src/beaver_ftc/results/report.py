@@ -17,8 +17,8 @@ import numpy as np
 
 from beaver_ftc.results import log, verdict
 from beaver_ftc.results.metrics import Document
-from beaver_ftc.results.style import LOOKS, MODE_COLOURS, Mark, closeup_window, marks
-from beaver_ftc.results.views import MAX_POINTS, Panel, Series, Trace, View, read_series, unit_of, views
+from beaver_ftc.results.style import LOOKS, MODE_COLOURS, closeup_window, marks
+from beaver_ftc.results.views import MAX_POINTS, Panel, View, read_series, views
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -41,18 +41,22 @@ def write_report(path: Path, folders: Sequence[Path], names: Sequence[str] = ())
 
 def render(folders: Sequence[Path], names: Sequence[str] = ()) -> str:
     """The report as HTML text."""
+    from markupsafe import Markup
+
     documents = [json.loads((folder / "metrics.json").read_text(encoding="utf-8")) for folder in folders]
     texts = [(folder / "scenario.yaml").read_text(encoding="utf-8") for folder in folders]
+    data = json.dumps(_data(folders, documents, names), allow_nan=False, separators=(",", ":"))
     template = _environment().get_template("report.html.j2")
     return template.render(
         runs=[_words(document, text) for document, text in zip(documents, texts, strict=True)],
         names=names,
         modes=MODE_COLOURS,
-        marks=_kinds_of_marks(documents),
-        data=_harmless(json.dumps(_data(folders, documents, names), allow_nan=False, separators=(",", ":"))),
+        marks={mark.name: mark for document in documents for mark in marks(document)}.values(),
+        data=Markup(data.replace("<", "\\u003c")),  # it cannot end the script element it stands in
         css=_asset("report.css"),
         script=_asset("report.js"),
-        sections=[_sections(folder) for folder in folders],
+        # what studies have found in a folder, if they have been there
+        sections=[Markup("".join(section(folder) for section in _SECTIONS)) for folder in folders],
     )
 
 
@@ -60,13 +64,6 @@ def register_section(section: Section) -> None:
     """Have every report from now on show what `section` makes of its result folder: HTML, or nothing."""
     if section not in _SECTIONS:
         _SECTIONS.append(section)
-
-
-def _sections(folder: Path) -> Any:
-    """What studies have found in a folder, if they have been there."""
-    from markupsafe import Markup
-
-    return Markup("".join(section(folder) for section in _SECTIONS))
 
 
 def _words(metrics: Document, scenario: str) -> Document:
@@ -84,23 +81,16 @@ def _words(metrics: Document, scenario: str) -> Document:
     }
 
 
-def _kinds_of_marks(documents: Sequence[Document]) -> list[Mark]:
-    """One mark of each kind that at least one of the runs has."""
-    return list({mark.name: mark for document in documents for mark in marks(document)}.values())
-
-
 def _data(folders: Sequence[Path], documents: Sequence[Document], names: Sequence[str]) -> Document:
     """What the page draws from."""
     logs = [folder / "log.parquet" for folder in folders]
     shown = _common_views(logs, documents)
     columns = tuple(dict.fromkeys([*_PATH, "mode", *(name for view in shown for name in view.columns)]))
+    # fewer points of each curve the more runs there are: the page stays within a few megabytes
+    points = MAX_POINTS if len(logs) <= 2 else max(600, 2 * MAX_POINTS // len(logs))
+    named = zip(logs, documents, names or [document["scenario"] for document in documents], strict=True)
     return {
-        "runs": [
-            _run(path, document, columns, name, _points(len(logs)))
-            for path, document, name in zip(
-                logs, documents, names or [document["scenario"] for document in documents], strict=True
-            )
-        ],
+        "runs": [_run(path, document, columns, name, points) for path, document, name in named],
         "views": [_view(view) for view in shown],
         "looks": {role: asdict(look) for role, look in LOOKS.items()},
         "modes": list(MODE_COLOURS.items()),
@@ -116,27 +106,19 @@ def _common_views(logs: Sequence[Path], documents: Sequence[Document]) -> tuple[
     return tuple(view for view in first if all(view in other for other in rest))
 
 
-def _points(runs: int) -> int:
-    """Points of each curve, fewer the more runs there are: the page stays within a few megabytes."""
-    return MAX_POINTS if runs <= 2 else max(600, 2 * MAX_POINTS // runs)
-
-
 def _run(path: Path, metrics: Document, columns: Sequence[str], name: str, points: int) -> Document:
     instants = marks(metrics)
     window = closeup_window(instants)
     levels = [read_series(path, columns, max_points=points)]
-    if window and levels[0]["t_s"].size < log.row_count(path):
+    t_s = levels[0]["t_s"]
+    if window and t_s.size < log.row_count(path):
         levels.append(read_series(path, columns, window, points))
     return {
         "name": name,
         "marks": [asdict(mark) for mark in instants],
-        "window": window or _ends(levels[0]),
+        "window": window or ((float(t_s[0]), float(t_s[-1])) if t_s.size else (0.0, 0.0)),
         "levels": [{name: _packed(name, values) for name, values in level.items()} for level in levels],
     }
-
-
-def _ends(series: Series) -> tuple[float, float]:
-    return (float(series["t_s"][0]), float(series["t_s"][-1])) if series["t_s"].size else (0.0, 0.0)
 
 
 def _packed(name: str, values: np.ndarray) -> str:
@@ -164,20 +146,11 @@ def _panel(panel: Panel) -> Document:
         "shade": panel.shade,
         "shadeLabel": panel.shade_label,
         "level": panel.level,
-        "traces": [_trace(trace) for trace in panel.traces],
+        "traces": [
+            {"column": trace.column, "label": trace.label, "role": trace.role, "factor": trace.factor}
+            for trace in panel.traces
+        ],
     }
-
-
-def _trace(trace: Trace) -> Document:
-    factor = trace.sign * unit_of(trace.column)[1]
-    return {"column": trace.column, "label": trace.label, "role": trace.role, "factor": factor}
-
-
-def _harmless(text: str) -> Any:
-    """JSON that cannot end the script element it stands in."""
-    from markupsafe import Markup
-
-    return Markup(text.replace("<", "\\u003c"))
 
 
 @cache

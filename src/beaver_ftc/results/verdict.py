@@ -29,9 +29,10 @@ def mood(metrics: Document) -> str:
 
 def facts(metrics: Document) -> list[tuple[str, str]]:
     """(what, how it went) for each thing worth knowing, in the order in which they happen."""
+    declared = metrics.get("faults") or [metrics["fault"]]
     said = (
         ("flight", _flight(metrics)),
-        *(("" if i else "fault", _fault(fault)) for i, fault in enumerate(_declared(metrics))),
+        *(("" if i else "fault", _fault(fault)) for i, fault in enumerate(declared)),
         ("detection", _detection(metrics)),
         ("statistical", _statistical(metrics)),
         ("isolation", _isolation(metrics)),
@@ -127,10 +128,6 @@ def _flight(metrics: Document) -> str:
     condition = f"{flown['airspeed_mps']:g} m/s at {flown['altitude_m']:g} m, {_time(flown['flown_s'])}"
     kind = ", every fault type" if flown["fault_class"] == "all" else ""
     return f"{condition}; diagnosis {flown['scheme']}{kind}; law {flown['law']}"
-
-
-def _declared(metrics: Document) -> list[Document | None]:
-    return metrics.get("faults") or [metrics["fault"]]
 
 
 def _fault(fault: Document | None) -> str:

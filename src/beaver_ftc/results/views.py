@@ -28,17 +28,7 @@ WHOLE = (-math.inf, math.inf)
 Series = dict[str, np.ndarray]
 RATIO = "_ratio"  # ends the name of a derived column: |residual| / threshold
 
-_DEG_PER_RAD = 57.29577951308232
-_UNITS = (  # (ending of the column's name, unit shown, factor), the longest endings first
-    ("_rad_s2", "deg/s²", _DEG_PER_RAD),
-    ("_rad_s", "deg/s", _DEG_PER_RAD),
-    ("_rad", "deg", _DEG_PER_RAD),
-    ("_mps", "m/s", 1.0),
-    ("_inhg", "inHg", 1.0),
-    ("_pa", "Pa", 1.0),
-    ("_m", "m", 1.0),
-    ("_s", "s", 1.0),
-)
+_SHOWN = {"rad/s2": "deg/s²", "rad/s": "deg/s", "rad": "deg", "1": ""}  # for people; others as they are
 
 
 @dataclass(frozen=True)
@@ -49,6 +39,11 @@ class Trace:
     label: str
     role: str
     sign: float = 1.0
+
+    @property
+    def factor(self) -> float:
+        """From the column's own unit, and sign, to what is shown."""
+        return self.sign * unit_of(self.column)[1]
 
 
 @dataclass(frozen=True)
@@ -91,7 +86,8 @@ class View:
 
 def unit_of(column: str) -> tuple[str, float]:
     """Unit to show a log column in, and the factor from the column's own unit to it."""
-    return next(((unit, factor) for ending, unit, factor in _UNITS if column.endswith(ending)), ("", 1.0))
+    unit = log.unit_of(column)
+    return _SHOWN.get(unit, unit), math.degrees(1.0) if unit.startswith("rad") else 1.0
 
 
 def estimators(columns: Sequence[str]) -> tuple[str, ...]:
@@ -130,15 +126,23 @@ def _sources(column: str) -> tuple[str, ...]:
     return tuple(f"{stem}_{what}_rad_s" for what in ("residual", *bounds))
 
 
+def _panel(label: str, *traces: tuple[str, str, str], shade: str = "", shade_label: str = "") -> Panel:
+    """A panel of curves, each (column, label, role)."""
+    return Panel(label, tuple(Trace(*trace) for trace in traces), shade=shade, shade_label=shade_label)
+
+
+def _share(label: str, *traces: tuple[str, str, str]) -> Panel:
+    """A panel of what stays below 1 as long as all is well."""
+    return Panel(label, tuple(Trace(*trace) for trace in traces), log_scale=True, level=1.0)
+
+
 def _tracking() -> View:
     panels = tuple(
-        Panel(
+        _panel(
             AXIS_NAMES[axis],
-            (
-                Trace(f"{axis}_reference_rad_s", "reference", "command"),
-                Trace(f"{axis}_model_rad_s", "reference model", "target"),
-                Trace(f"{axis}_rad_s", "aircraft", "actual"),
-            ),
+            (f"{axis}_reference_rad_s", "reference", "command"),
+            (f"{axis}_model_rad_s", "reference model", "target"),
+            (f"{axis}_rad_s", "aircraft", "actual"),
         )
         for axis in AXES
     )
@@ -146,40 +150,28 @@ def _tracking() -> View:
 
 
 def _profile(limited: bool) -> View:
+    held = {"airspeed": [(LIMITED, "what can be held", "command")]} if limited else {}
     flown = (
         ("altitude", "altitude_command_m", "altitude_m"),
         ("airspeed", "airspeed_command_mps", "airspeed_mps"),
         ("heading ψ", "heading_command_rad", "psi_rad"),
         ("bank φ", "bank_command_rad", "phi_rad"),
-        ("engine: manifold pressure", "", "manifold_pressure_inhg"),
     )
-    panels = tuple(
-        Panel(
-            label,
-            (
-                *((Trace(command, "commanded", "target"),) if command else ()),
-                *(
-                    (Trace(LIMITED, "what can be held", "command"),)
-                    if limited and label == "airspeed"
-                    else ()
-                ),
-                Trace(actual, "flown", "actual"),
-            ),
-        )
+    panels = (
+        _panel(label, (command, "commanded", "target"), *held.get(label, ()), (actual, "flown", "actual"))
         for label, command, actual in flown
     )
-    return View("profile", "Profile: what was commanded, and what was flown", panels)
+    engine = _panel("engine: manifold pressure", ("manifold_pressure_inhg", "flown", "actual"))
+    return View("profile", "Profile: what was commanded, and what was flown", (*panels, engine))
 
 
 def _surfaces(names: Sequence[str]) -> View:
     panels = tuple(
-        Panel(
+        _panel(
             surface,
-            (
-                Trace(f"{surface}_cmd_rad", "command", "command"),
-                Trace(f"{surface}_pos_rad", "position", "target"),
-                Trace(f"{surface}_effective_rad", "effective", "actual"),
-            ),
+            (f"{surface}_cmd_rad", "command", "command"),
+            (f"{surface}_pos_rad", "position", "target"),
+            (f"{surface}_effective_rad", "effective", "actual"),
             shade=f"{surface}_saturated",
             shade_label="saturated",
         )
@@ -204,13 +196,9 @@ def isolation_panel(name: str, axis: str, label: str, threshold: str = "± thres
 
 
 def _detection() -> View:
-    alarm = Panel(
-        "alarm test: |residual| / threshold",
-        tuple(Trace(f"{axis}_alarm{RATIO}", axis, axis) for axis in AXES),
-        log_scale=True,
-        level=1.0,
-    )
-    panels = tuple(
+    ratios = [(f"{axis}_alarm{RATIO}", axis, axis) for axis in AXES]
+    alarm = _share("alarm test: |residual| / threshold", *ratios)
+    panels = (
         detection_panel(axis, f"{AXIS_NAMES[axis]}: residual of the detection estimator") for axis in AXES
     )
     title = "Detection: the test that raises the alarm (above 1), and the detection estimator"
@@ -219,31 +207,19 @@ def _detection() -> View:
 
 def _watch() -> View:
     label = "largest residual between two instruments / bound"
-    panel = Panel(label, (Trace("watch_share", "largest", "actual"),), log_scale=True, level=1.0)
     title = "Instruments: held against one another; above 1 one of them is broken"
-    return View("watch", title, (panel,), closeup=True)
+    return View("watch", title, (_share(label, ("watch_share", "largest", "actual")),), closeup=True)
 
 
 def _likelihood(columns: Sequence[str]) -> View:
     ending = "_loss_likelihood_share"
     names = [column.removesuffix(ending) for column in columns if column.endswith(ending)]
-    losses = tuple(
-        Trace(f"{surface}{ending}", f"{surface} loss", role)
-        for surface, role in zip(names, SURFACE_ROLES, strict=False)
-    )
-    steps = tuple(Trace(f"{axis}_step_likelihood_share", f"{axis}'", axis) for axis in AXES)
+    roles = zip(names, SURFACE_ROLES, strict=False)
+    losses = [(f"{surface}{ending}", f"{surface} loss", role) for surface, role in roles]
+    steps = [(f"{axis}_step_likelihood_share", f"{axis}'", axis) for axis in AXES]
     panels = (
-        *(
-            [Panel("loss of a surface: test / alarm level", losses, log_scale=True, level=1.0)]
-            if losses
-            else ()
-        ),
-        Panel(
-            "step or tone of an acceleration, or its force: test / alarm level",
-            steps,
-            log_scale=True,
-            level=1.0,
-        ),
+        *([_share("loss of a surface: test / alarm level", *losses)] if losses else ()),
+        _share("step or tone of an acceleration, or its force: test / alarm level", *steps),
     )
     title = "Detection: likelihood ratio tests against their alarm level"
     return View("likelihood", title, panels, closeup=True)
@@ -262,12 +238,7 @@ def _isolation(names: Sequence[str]) -> View:
 def _ratio(names: Sequence[str]) -> View:
     stems = [("detection estimator", ""), *((f"{_spoken(name)} estimator", f"fie_{name}_") for name in names)]
     panels = tuple(
-        Panel(
-            f"{label}: |residual| / threshold",
-            tuple(Trace(f"{stem}{axis}{RATIO}", axis, axis) for axis in AXES),
-            log_scale=True,
-            level=1.0,
-        )
+        _share(f"{label}: |residual| / threshold", *((f"{stem}{axis}{RATIO}", axis, axis) for axis in AXES))
         for label, stem in stems
     )
     title = "How close to the threshold: above 1 is an alarm, or an estimator excluded"
@@ -279,10 +250,8 @@ def _spoken(name: str) -> str:
 
 
 def _effectiveness(names: Sequence[str]) -> View:
-    traces = tuple(
-        Trace(f"{surface}_effectiveness_estimate", surface, role)
-        for surface, role in zip(names, SURFACE_ROLES, strict=False)
-    )
+    roles = zip(names, SURFACE_ROLES, strict=False)
+    traces = tuple(Trace(f"{surface}_effectiveness_estimate", surface, role) for surface, role in roles)
     panels = (Panel("effectiveness (1 healthy)", traces, limits=(-0.05, 1.1)),) if traces else ()
     return View("effectiveness", "Estimated effectiveness of each surface", panels)
 
@@ -297,24 +266,26 @@ def _supervisor() -> View:
 
 
 def _engine() -> View:
-    panels = (
-        Panel("manifold pressure", (Trace("manifold_pressure_inhg", "manifold pressure", "actual"),)),
-        Panel("slipstream dpt", (Trace("dpt", "slipstream dpt", "actual"),)),
-        Panel("airspeed", (Trace("airspeed_mps", "airspeed", "actual"),)),
-        Panel("pitch θ", (Trace("theta_rad", "pitch θ", "actual"),)),
-    )
+    panels = _curves(
+        ("manifold_pressure_inhg", "manifold pressure"), ("dpt", "slipstream dpt"),
+        ("airspeed_mps", "airspeed"), ("theta_rad", "pitch θ"),
+    )  # fmt: skip
     return View("engine", "Engine power on pitch, when elevator and flap are lost", panels)
 
 
 def _states() -> View:
-    names = (
+    panels = _curves(
         ("airspeed_mps", "airspeed"), ("alpha_rad", "angle of attack"), ("beta_rad", "sideslip"),
         ("p_rad_s", "roll rate p"), ("q_rad_s", "pitch rate q"), ("r_rad_s", "yaw rate r"),
         ("phi_rad", "bank φ"), ("theta_rad", "pitch θ"), ("psi_rad", "heading ψ"),
         ("north_m", "north"), ("east_m", "east"), ("altitude_m", "altitude"),
     )  # fmt: skip
-    panels = tuple(Panel(label, (Trace(column, label, "actual"),)) for column, label in names)
     return View("states", "The twelve states", panels, across=3)
+
+
+def _curves(*named: tuple[str, str]) -> tuple[Panel, ...]:
+    """A panel for each column, under its name."""
+    return tuple(_panel(label, (column, label, "actual")) for column, label in named)
 
 
 def read_series(
@@ -325,10 +296,7 @@ def read_series(
 
 
 def series_of(
-    source: log.Log,
-    columns: Sequence[str],
-    window_s: tuple[float, float] = WHOLE,
-    max_points: int = MAX_POINTS,
+    source: log.Log, columns: Sequence[str], window_s: tuple[float, float], max_points: int = MAX_POINTS
 ) -> Series:
     """`t_s` and the named columns within a window of time, each of shape (points,), about max_points at most.
 

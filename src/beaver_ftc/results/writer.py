@@ -10,17 +10,16 @@ import ctypes
 import errno
 import os
 import shutil
-import tempfile
 from collections.abc import Callable, Collection, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
+from uuid import uuid4
 
 from beaver_ftc.documents.errors import SimulationFailed
 from beaver_ftc.results.log import ParquetLog
 from beaver_ftc.results.metrics import Document, as_json, metrics
 
 if TYPE_CHECKING:
-    from beaver_ftc.aircraft import Aircraft
     from beaver_ftc.plant.adapter import Plant
     from beaver_ftc.scenario.schema import Scenario
 
@@ -65,19 +64,23 @@ def run(
     that cannot be trimmed, SimulationFailed for one not completed or kept.
     """
     from beaver_ftc.loop.loop import fly
-    from beaver_ftc.results.exports import write_recording
+    from beaver_ftc.results import exports as exporting
 
     with result_folder(out, scenario.name) as folder:
-        with ParquetLog(folder / "log.parquet") as log:
+        log_path, aircraft = folder / "log.parquet", scenario.airframe
+        with ParquetLog(log_path) as log:
             flight = fly(scenario, log, progress, prepare=prepare)
         document = metrics(flight)
         write_documents(folder, scenario, document)
         if report:
             write_report_files(folder, document)
-        if exports:
-            write_exports(folder, document, exports, scenario.airframe)
+        if "csv" in exports:
+            exporting.write_csv(log_path, folder / "log.csv")
+        if "acmi" in exports:
+            exporting.write_acmi(log_path, document, folder / "flight.acmi", aircraft)
         if recording is not None:
-            write_recording(folder / "log.parquet", _travel_rad(scenario.airframe), recording, folder)
+            stops_rad = {s: max(abs(to.min_rad), abs(to.max_rad)) for s, to in aircraft.travel.items()}
+            exporting.write_recording(log_path, stops_rad, recording, folder)
     return document
 
 
@@ -111,23 +114,6 @@ def write_report_files(folder: Path, document: Document) -> None:
     write_report(folder / "report.html", [folder])
 
 
-def write_exports(
-    folder: Path, document: Document, exports: Collection[str], aircraft: "Aircraft | None" = None
-) -> None:
-    """Write the log of a result folder for other tools: "csv" as log.csv, "acmi" as flight.acmi."""
-    from beaver_ftc.results.exports import write_acmi, write_csv
-
-    if "csv" in exports:
-        write_csv(folder / "log.parquet", folder / "log.csv")
-    if "acmi" in exports:
-        write_acmi(folder / "log.parquet", document, folder / "flight.acmi", aircraft)
-
-
-def _travel_rad(aircraft: "Aircraft") -> dict[str, float]:
-    """The farther stop of each surface."""
-    return {name: max(abs(stop.min_rad), abs(stop.max_rad)) for name, stop in aircraft.travel.items()}
-
-
 @contextlib.contextmanager
 def result_folder(out: Path, name: str) -> Iterator[Path]:
     """Yield an empty folder to fill; on success it becomes `out/name`, on any failure it vanishes.
@@ -139,18 +125,20 @@ def result_folder(out: Path, name: str) -> Iterator[Path]:
         refuse_foreign(final)
         created = _make_parents(out)
         _remove_stale(out, name)
-        unnamed = Path(tempfile.mkdtemp(prefix=".beaver-ftc-", dir=out))
-        partial = unnamed.with_name(_prefix(name) + unnamed.name.rpartition("-")[2])
+        own = uuid4().hex
+        unnamed, partial = out / f".beaver-ftc-{own}", out / f"{_prefix(name)}{own}"
+        unnamed.mkdir()
         try:
             with _locked(unnamed):  # before it bears the name by which another run would look for stale ones
                 unnamed.rename(partial)
-                partial.chmod(0o777 & ~_umask())
                 yield partial
                 _sync(partial)
                 _move_into_place(partial, final)
         except BaseException:
             shutil.rmtree(partial, ignore_errors=True)
-            _remove_empty(created)
+            with contextlib.suppress(OSError):
+                for folder in created:
+                    folder.rmdir()
             raise
 
 
@@ -199,12 +187,6 @@ def _prefix(name: str) -> str:
     return f".{name}.partial-"
 
 
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
-
-
 def _make_parents(folder: Path) -> list[Path]:
     """Create `folder` with its parents; return those that were missing, deepest first."""
     missing = []
@@ -216,46 +198,30 @@ def _make_parents(folder: Path) -> list[Path]:
     return missing
 
 
-def _remove_empty(folders: list[Path]) -> None:
-    with contextlib.suppress(OSError):
-        for folder in folders:
-            folder.rmdir()
-
-
 @contextlib.contextmanager
-def _locked(folder: Path) -> Iterator[None]:
-    descriptor = os.open(folder, os.O_RDONLY) if fcntl else -1
+def _locked(folder: Path) -> Iterator[bool]:
+    """Lock a folder meanwhile. False where another process has it, or nothing can be locked there."""
+    if not fcntl:
+        yield False
+        return
+    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
     try:
-        if fcntl:
-            with contextlib.suppress(OSError):  # a file system without locks: nobody can call it stale either
-                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        yield
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            locked = True
+        except OSError:
+            locked = False
+        yield locked
     finally:
-        if fcntl:
-            os.close(descriptor)
+        os.close(descriptor)
 
 
 def _remove_stale(out: Path, name: str) -> None:
     """Remove what killed runs of this scenario left behind."""
     for leftover in out.glob(f"{_prefix(name)}*"):
-        if _is_stale(leftover):
-            shutil.rmtree(leftover, ignore_errors=True)
-
-
-def _is_stale(folder: Path) -> bool:
-    if not fcntl:
-        return False
-    try:
-        descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
-    except OSError:
-        return False
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:
-        return False
-    finally:
-        os.close(descriptor)
-    return True
+        with contextlib.suppress(OSError), _locked(leftover) as stale:
+            if stale:
+                shutil.rmtree(leftover, ignore_errors=True)
 
 
 def _sync(folder: Path) -> None:

@@ -118,10 +118,6 @@ class Aircraft:
         """Who can stand in for whom, in the order of hand-over."""
         return MappingProxyType(dict(self.file.groups))
 
-    def group_of(self, surface: str) -> int:
-        """Index of the group a surface belongs to."""
-        return next(i for i, members in enumerate(self.groups.values()) if surface in members)
-
     @cached_property
     def dominant_axis(self) -> tuple[int, ...]:
         """Of each surface, the axis (p, q, r) it turns most about, by its terms at `usual_signals`.
@@ -218,16 +214,16 @@ class Aircraft:
         A plain sum for those who want one number now and then; `scale` multiplies single terms.
         """
         scale = scale or {}
-        terms = self._terms_of.get(name, ())
+        terms = self._terms_of[name]
         return sum(t.value * scale.get(t.name, 1.0) * prod(of[f] for f in factors) for t, factors in terms)
 
     @cached_property
     def _terms_of(self) -> Mapping[str, tuple[tuple[Term, tuple[str, ...]], ...]]:
         """The terms of each coefficient, and what they multiply."""
-        sums: dict[str, list[tuple[Term, tuple[str, ...]]]] = {}
-        for term in self.terms.values():
-            sums.setdefault(term.coefficient, []).append((term, tuple(term.factors)))
-        return {name: tuple(terms) for name, terms in sums.items()}
+        return {
+            name: tuple((term, term.factors) for term in self.terms.values() if term.coefficient == name)
+            for name in (*FORCES, *MOMENTS)
+        }
 
     def index(self, term: str) -> int:
         """Place of a moment's term in `moments`. Raises KeyError for a name the file lacks."""
@@ -282,13 +278,9 @@ def _sorted(section: object, coefficients: tuple[str, ...], constants: bool = Fa
     terms: list[Term] = []
     for coefficient in coefficients:
         given: tuple[TermSection, ...] = getattr(section, coefficient)
-        of_it = [_term(coefficient, term) for term in given]
+        as_given = (dict(term) | {"of": tuple(term.of.items())} for term in given)
+        of_it = [Term(coefficient=coefficient, **term) for term in as_given]
         if constants and not any(term.is_constant for term in of_it):
             of_it.append(Term(f"{coefficient}_constant", coefficient, 0.0))
         terms += sorted(of_it, key=lambda term: (term.surface is not None, not term.is_constant))
     return tuple(terms)
-
-
-def _term(coefficient: str, given: TermSection) -> Term:
-    of = tuple(given.of.items())
-    return Term(given.name, coefficient, given.value, of, given.surface, given.source, given.description)

@@ -99,9 +99,17 @@ def _derived(name: str) -> Path:
 
 
 def _inside(beside: Path | None, reference: str) -> Path:
-    """The folder's path if it is below the scenario's own: a scenario reads nothing else."""
+    """The folder's path if it is below the scenario's own: a scenario reads nothing else.
+
+    Without a scenario's folder: what the reference has stood for in this process, if that is one folder.
+    """
     if beside is None:
-        return _remembered(reference)
+        seen = _SEEN.get(reference, set())
+        if len(seen) != 1:
+            raise UnknownAircraft(
+                f"there is no folder to find {reference!r} in, allowed: ./FOLDER in a scenario that is a file"
+            )
+        return next(iter(seen))
     root = beside.resolve()
     try:
         folder = (root / reference).resolve()
@@ -117,16 +125,6 @@ def _inside(beside: Path | None, reference: str) -> Path:
             raise UnknownAircraft(f"{link!r} leads outside, allowed: files below the scenario's own folder")
     _SEEN.setdefault(reference, set()).add(folder)
     return folder
-
-
-def _remembered(reference: str) -> Path:
-    """The folder a reference has stood for in this process, if only one has."""
-    folders = _SEEN.get(reference, set())
-    if len(folders) != 1:
-        raise UnknownAircraft(
-            f"there is no folder to find {reference!r} in, allowed: ./FOLDER in a scenario that is a file"
-        )
-    return next(iter(folders))
 
 
 def read(folder: Path) -> Aircraft:

@@ -24,7 +24,6 @@ from beaver_ftc.studies.power.survey import (
     WITHIN_S,
     Block,
     Condition,
-    contenders,
     deflections,
     loss,
     scenario_of,
@@ -40,8 +39,7 @@ SEED = 500_000  # others than those of `power`
 
 def flown(block: Block, duration_s: float, faults: list[dict]) -> Recording:
     """A flight as shown to plug-ins, the vanes' view of the air included."""
-    ours = next(one for one in contenders([]) if one.name == STATISTICAL)
-    return aware_of_the_air(record(with_fdi(scenario_of(block, duration_s, faults), ours)))
+    return aware_of_the_air(record(with_fdi(scenario_of(block, duration_s, faults), STATISTICAL)))
 
 
 def ratios(recording: Recording, surface: str) -> dict[float, np.ndarray]:

@@ -24,7 +24,6 @@ from beaver_ftc.studies.power.survey import (
     WITHIN_S,
     Block,
     Condition,
-    Contender,
     Watched,
     contenders,
     fly_faulted,
@@ -293,9 +292,9 @@ class Raises:
 
 class TestContenders:
     def test_ours_come_first_and_only_once(self):
-        names = [contender.name for contender in contenders(["observer-constant", ESTIMATORS])]
-        assert names == [*BUILT_IN, "observer-constant"]
-        everybody = [contender.name for contender in contenders()]
+        names = contenders(["observer-constant", ESTIMATORS])
+        assert names == (*BUILT_IN, "observer-constant")
+        everybody = contenders()
         assert {"augmented-ekf", "rls-monitor"} <= set(everybody)
         assert "none" not in everybody
 
@@ -306,19 +305,19 @@ class TestContenders:
 
     def test_what_a_built_in_one_wants_is_in_its_flight(self):
         flight = scenario_of(Block(LIGHT, 3.0, 1), 5.0)
-        for contender in contenders([]):
-            fdi = with_fdi(flight, contender).fdi
+        for scheme in contenders([]):
+            fdi = with_fdi(flight, scheme).fdi
             assert fdi.bounds == flight.fdi.bounds
-            assert (fdi.statistical is not None) == (contender.name != ESTIMATORS)
-            assert fdi.authority == contender.fdi.get("authority", "either")
+            assert (fdi.statistical is not None) == (scheme != ESTIMATORS)
+            assert fdi.authority == BUILT_IN[scheme].get("authority", "either")
 
     def test_a_plug_in_that_fails_is_named_and_the_others_go_on(self):
-        broken = Contender("broken", f"{__name__}:Raises", {})
+        broken = f"{__name__}:Raises"
         grid = replace(SMALL, magnitudes=(1.0,), surfaces=("elevator",))
         one = fly_faulted(grid.faulted()[0], grid, [*contenders([]), broken])
         assert set(one.traces) == set(BUILT_IN)
         assert len(one.failures) == 1
-        assert one.failures[0].startswith(f"broken: plug-in {__name__}:Raises: not registered")
+        assert one.failures[0].startswith(f"{broken}: plug-in {broken}: not registered")
 
 
 def test_the_command_refuses_what_it_does_not_know(tmp_path):

@@ -1,7 +1,8 @@
 """From traces to alarm levels at an equal false-alarm rate, rows, chances of detection, and one document."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass
+from itertools import product
 from math import inf
 from statistics import fmean
 from typing import Any
@@ -49,21 +50,6 @@ Document = dict[str, Any]
 Key = tuple[str, str, str]  # sensors, turbulence, scheme
 
 
-def levels_of(healthy: Iterable[Watched], per_h: float) -> dict[Key, Level]:
-    """The level of each scheme under each condition at the false-alarm rate all are held to."""
-    return {key: level_for(traces, per_h) for key, traces in _by_condition(healthy).items()}
-
-
-def own_levels_of(healthy: Iterable[Watched]) -> dict[Key, Level]:
-    """What each scheme costs at the level it ships with."""
-    return {key: level_at(traces, 1.0) for key, traces in _by_condition(healthy).items()}
-
-
-def held_out(faulted: Iterable[Watched], levels: dict[Key, Level]) -> dict[Key, Level]:
-    """False alarms at those levels before the faults: flights that had no part in setting them."""
-    return {key: level_at(of, levels[key].level) for key, of in _by_condition(faulted).items()}
-
-
 def _by_condition(watched: Iterable[Watched]) -> dict[Key, list[Trace]]:
     """The first trace of each block: its flights are the same as long as there is no fault."""
     traces: dict[Key, list[Trace]] = {}
@@ -88,23 +74,18 @@ def rows_of(faulted: Iterable[Watched], levels: dict[Key, Level]) -> list[Row]:
             "surface": surface,
             "magnitude": magnitude,
             "scheme": scheme,
-            **_alarms(trace, levels[(*one.block.condition, scheme)].level),
+            "false_alarm": trace.false_alarm(level),
+            "delay_s": finite(trace.delay_s(level)),
+            "own_false_alarm": trace.false_alarm(1.0),
+            "own_delay_s": finite(trace.delay_s(1.0)),
             **{f"deflection_{s:g}": d for s, d in zip(WITHIN_S, deflections, strict=True)},
         }
         for one in faulted
         for scheme, traces in one.traces.items()
+        for level in [levels[(*one.block.condition, scheme)].level]
         for (surface, magnitude), trace, deflections in zip(one.faults, traces, one.deflections, strict=True)
         if trace.faulted
     ]
-
-
-def _alarms(trace: Trace, level: float) -> Row:
-    return {
-        "false_alarm": trace.false_alarm(level),
-        "delay_s": finite(trace.delay_s(level)),
-        "own_false_alarm": trace.false_alarm(1.0),
-        "own_delay_s": finite(trace.delay_s(1.0)),
-    }
 
 
 def summary(rows: Sequence[Row], own: bool = False) -> Document:
@@ -113,21 +94,14 @@ def summary(rows: Sequence[Row], own: bool = False) -> Document:
     own: at the level each scheme ships with. Flights with an alarm before the fault do not count.
     """
     prefix = "own_" if own else ""
-    delays = [
-        inf if row[f"{prefix}delay_s"] is None else row[f"{prefix}delay_s"]
-        for row in rows
-        if not row[f"{prefix}false_alarm"]
-    ]
-    shares = {f"{within_s:g}": _share(delays, within_s) for within_s in WITHIN_S}
+    flights = [row[f"{prefix}delay_s"] for row in rows if not row[f"{prefix}false_alarm"]]
+    delays = [inf if delay_s is None else delay_s for delay_s in flights]
+    found = {s: sum(delay <= s + 1e-9 for delay in delays) for s in WITHIN_S} if delays else {}
     return {
         "flights": len(delays),
-        "within": {name: vars(share) for name, share in shares.items()} if delays else {},
+        "within": {f"{s:g}": vars(binomial(count, len(delays))) for s, count in found.items()},
         "median_delay_s": finite(share_within(delays, 0.5)),
     }
-
-
-def _share(delays: Sequence[float], within_s: float) -> Estimate:
-    return binomial(sum(delay <= within_s + 1e-9 for delay in delays), len(delays))
 
 
 def limit(rows: Sequence[Row], per_h: float) -> Document:
@@ -158,39 +132,34 @@ def document_of(
     grid: Grid, healthy: Sequence[Watched], faulted: Sequence[Watched]
 ) -> tuple[Document, list[Row]]:
     """The document, and the rows behind it."""
-    levels = levels_of(healthy, grid.per_h)
+    watched, struck = _by_condition(healthy), _by_condition(faulted)
+    levels = {key: level_for(traces, grid.per_h) for key, traces in watched.items()}
     rows = rows_of(faulted, levels)
-    totals = grouped(rows, *PLACE, "scheme")
-    cells = grouped(rows, *CELL)
     document = {
         "grid": {"bouts" if key == "blocks" else key: value for key, value in asdict(grid).items()},
         "watched_s": WATCHED_S,
         "false_alarms_per_h": grid.per_h,
-        "levels": _levels(levels, held_out(faulted, levels), own_levels_of(healthy)),
-        "totals": [_line((*PLACE, "scheme"), key, of, own=True) for key, of in totals.items()],
-        "cells": [_line(CELL, key, of) for key, of in cells.items()],
-        "limits": [
-            {**dict(zip(PLACE, key, strict=True)), "within": limit(of, grid.per_h)}
-            for key, of in grouped(rows, *PLACE).items()
+        "levels": [
+            {
+                **dict(zip(("sensors", "turbulence", "scheme"), key, strict=True)),
+                "level": level.level,
+                "calibration": _counted(level),
+                # on flights that had no part in setting it
+                "before_faults": _counted(level_at(struck[key], level.level)) if key in struck else None,
+                "own_level": _counted(level_at(watched[key], 1.0)),
+            }
+            for key, level in levels.items()
         ],
+        "totals": _lines(
+            rows, (*PLACE, "scheme"), lambda of: summary(of) | {"own_level": summary(of, own=True)}
+        ),
+        "cells": _lines(rows, CELL, summary),
+        "limits": _lines(rows, PLACE, lambda of: {"within": limit(of, grid.per_h)}),
         "comparison": _comparison(rows),
         "failures": sorted({failure for one in (*healthy, *faulted) for failure in one.failures}),
         "versions": dict(versions()),
     }
     return document, rows
-
-
-def _levels(common: dict[Key, Level], apart: dict[Key, Level], own: dict[Key, Level]) -> list[Document]:
-    return [
-        {
-            **dict(zip(("sensors", "turbulence", "scheme"), key, strict=True)),
-            "level": level.level,
-            "calibration": _counted(level),
-            "before_faults": _counted(apart[key]) if key in apart else None,
-            "own_level": _counted(own[key]),
-        }
-        for key, level in common.items()
-    ]
 
 
 def _counted(level: Level) -> Document:
@@ -204,9 +173,11 @@ def _counted(level: Level) -> Document:
     }
 
 
-def _line(names: Sequence[str], key: tuple[Any, ...], rows: Sequence[Row], own: bool = False) -> Document:
-    line = {**dict(zip(names, key, strict=True)), **summary(rows)}
-    return line | {"own_level": summary(rows, own=True)} if own else line
+def _lines(
+    rows: Sequence[Row], names: Sequence[str], what: Callable[[Sequence[Row]], Document]
+) -> list[Document]:
+    """What there is to say of each group of rows that are alike in these columns."""
+    return [{**dict(zip(names, key, strict=True)), **what(of)} for key, of in grouped(rows, *names).items()]
 
 
 def _comparison(rows: Sequence[Row]) -> list[Document]:
@@ -217,17 +188,10 @@ def _comparison(rows: Sequence[Row]) -> list[Document]:
     compared = []
     for place, here in grouped(rows, *PLACE).items():
         found = {scheme: _found_by_seed(of) for (scheme,), of in grouped(here, "scheme").items()}
-        compared += [
-            {
-                **dict(zip(PLACE, place, strict=True)),
-                "ours": ours,
-                "against": scheme,
-                **_duel(found[ours], theirs),
-            }
-            for ours in BUILT_IN
-            for scheme, theirs in found.items()
-            if ours in found and scheme not in BUILT_IN
-        ]
+        others = [scheme for scheme in found if scheme not in BUILT_IN]
+        for ours, scheme in product([scheme for scheme in BUILT_IN if scheme in found], others):
+            duel = {**dict(zip(PLACE, place, strict=True)), "ours": ours, "against": scheme}
+            compared.append(duel | _duel(found[ours], found[scheme]))
     return compared
 
 

@@ -3,6 +3,7 @@
 import io
 from collections.abc import Iterator, Sequence
 from functools import partial
+from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,18 +12,10 @@ import numpy as np
 from beaver_ftc.results.metrics import as_json
 from beaver_ftc.studies.engine.study import Progress, Study, run_study
 from beaver_ftc.studies.power.chances import JUDGED_S, SIGNIFICANT, Row, document_of, grouped, limit, summary
-from beaver_ftc.studies.power.survey import (
-    BUILT_IN,
-    WITHIN_S,
-    Contender,
-    Grid,
-    Watched,
-    fly_block,
-    lost,
-)
+from beaver_ftc.studies.power.survey import BUILT_IN, WITHIN_S, Grid, Watched, fly_block, lost
 from beaver_ftc.studies.present.figures import curve_look, heat_map, label_edges, marker, panels
 from beaver_ftc.studies.present.page import Files
-from beaver_ftc.studies.present.tables import plain, printed
+from beaver_ftc.studies.present.tables import plain, printed, seconds
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -40,23 +33,33 @@ TOLD = "(told the fault)"
 def as_text(document: Document, colour: bool = False) -> str:
     """Tables, legend, comparison and failures."""
     tables = [_table(document, *condition) for condition in document["grid"]["conditions"]]
-    said = [*_legend(document), "", *comparison(document), *_failures(document)]
+    said = [*_legend(document), "", *comparison(document)]
+    said += [f"could not be judged: {failure}" for failure in document["failures"]]
     return "\n".join([printed(tables, WIDTH, colour), *said])
 
 
 def _table(document: Document, sensors: str, turbulence: str) -> "Table":
-    surfaces = document["grid"]["surfaces"]
+    here, surfaces = {"sensors": sensors, "turbulence": turbulence}, document["grid"]["surfaces"]
+
+    def of_each(what: str, **where: Any) -> list[Document | None]:
+        return [next(_those(document[what], **here, **where, surface=surface), None) for surface in surfaces]
+
     rows = []
-    for level in document["levels"]:
-        if (level["sensors"], level["turbulence"]) == (sensors, turbulence):
-            cells = [_total(document, level, surface) for surface in surfaces]
-            rows.append([level["scheme"], _rate(level["calibration"]), _rate(level["before_faults"]), *cells])
-            if level["scheme"] in BUILT_IN:
-                own = [_total(document, level, surface, own=True) for surface in surfaces]
-                rows.append([OWN, _rate(level["own_level"]), "", *own])
-    rows.append([TOLD, "", "", *(_limit(document, sensors, turbulence, surface) for surface in surfaces)])
+    for level in _those(document["levels"], **here):
+        totals = of_each("totals", scheme=level["scheme"])
+        alarms = _rate(level["calibration"]), _rate(level["before_faults"])
+        rows.append([level["scheme"], *alarms, *map(shares, totals)])
+        if level["scheme"] in BUILT_IN:
+            own = [total and total["own_level"] for total in totals]
+            rows.append([OWN, _rate(level["own_level"]), "", *map(shares, own)])
+    limits = [limit["within"].values() if limit else [] for limit in of_each("limits")]
+    told = ["/".join(f"{100 * share:.0f}" for share in within) or "-" for within in limits]
     head = ["scheme", "false alarms/h", "before faults/h", *surfaces]
-    return plain(title_of(sensors, turbulence), head, rows)
+    return plain(title_of(sensors, turbulence), head, [*rows, [TOLD, "", "", *told]])
+
+
+def _those(lines: Sequence[Document], **where: Any) -> Iterator[Document]:
+    return (line for line in lines if where.items() <= line.items())
 
 
 def title_of(sensors: str, turbulence: str) -> str:
@@ -72,31 +75,12 @@ def _rate(alarms: Document | None) -> str:
     return f"{alarms['per_h']:.0f} ({alarms['per_h_low']:.0f}{high})"
 
 
-def _limit(document: Document, sensors: str, turbulence: str, surface: str) -> str:
-    for found in document["limits"]:
-        if (found["sensors"], found["turbulence"], found["surface"]) == (sensors, turbulence, surface):
-            return "/".join(f"{100 * share:.0f}" for share in found["within"].values())
-    return "-"
-
-
-def _total(document: Document, level: Document, surface: str, own: bool = False) -> str:
-    for total in document["totals"]:
-        if total["surface"] == surface and _same(total, level):
-            return shares(total["own_level"] if own else total)
-    return "-"
-
-
-def _same(total: Document, level: Document) -> bool:
-    return all(total[name] == level[name] for name in ("sensors", "turbulence", "scheme"))
-
-
-def shares(total: Document) -> str:
+def shares(total: Document | None) -> str:
     """Per cent found within each delay, and the median delay."""
-    if not total["flights"]:
+    if not total or not total["flights"]:
         return "-"
     percent = "/".join(f"{100 * total['within'][f'{within_s:g}']['value']:.0f}" for within_s in WITHIN_S)
-    median_s = total["median_delay_s"]
-    return f"{percent} {'never' if median_s is None else f'{median_s:.2f} s'}"
+    return f"{percent} {seconds(total['median_delay_s'])}"
 
 
 def _legend(document: Document) -> list[str]:
@@ -116,54 +100,36 @@ def _legend(document: Document) -> list[str]:
         f"{WITHIN_S[-1]:g} s.",
         f"{OWN.strip()}: at the level that follows from what it declares.",
         f"{TOLD}: a test that knows surface, magnitude and instant, made once in that time at the same rate.",
-        _shown(grid["vanes"]),
+        "plug-ins and that test are shown the air as the statistical scheme sees it by the vanes."
+        if grid["vanes"]
+        else "plug-ins and that test have the rates alone; the statistical scheme sees the air by its vanes.",
     ]
-
-
-def _shown(vanes: bool) -> str:
-    if vanes:
-        return "plug-ins and that test are shown the air as the statistical scheme sees it by the vanes."
-    return "plug-ins and that test have the rates alone; the statistical scheme sees the air by its vanes."
 
 
 def comparison(document: Document) -> list[str]:
     """Where ours finds more or fewer faults than another scheme, and is unlikely to by chance."""
-    duels = document["comparison"]
-    lines = [
-        f"{ours} is {verdict} than {against}: {'; '.join(_places(duels, ours, against, verdict))}"
-        for ours in dict.fromkeys(duel["ours"] for duel in duels)
-        for verdict in ("worse", "better")
-        for against in dict.fromkeys(duel["against"] for duel in duels)
-        if _places(duels, ours, against, verdict)
-    ]
-    return [*lines, *_counts(duels)]
-
-
-def _places(duels: list[Document], ours: str, against: str, verdict: str) -> list[str]:
-    """`surface, surface in condition` for each condition in which that is so."""
-    found: dict[str, list[str]] = {}
-    for duel in duels:
-        if (duel["ours"], duel["against"], duel["verdict"]) == (ours, against, verdict):
-            found.setdefault(title_of(duel["sensors"], duel["turbulence"]), []).append(duel["surface"])
-    return [f"{', '.join(surfaces)} with {condition}" for condition, surfaces in found.items()]
-
-
-def _counts(duels: list[Document]) -> list[str]:
-    return [
-        f"{ours}, faults found within {JUDGED_S:g} s, {len(verdicts)} comparisons: better in "
-        f"{verdicts.count('better')}, worse in {verdicts.count('worse')}, no difference at "
-        f"p < {SIGNIFICANT:g} in the rest"
-        for ours in dict.fromkeys(duel["ours"] for duel in duels)
-        for verdicts in [[duel["verdict"] for duel in duels if duel["ours"] == ours]]
-    ]
-
-
-def _failures(document: Document) -> list[str]:
-    return [f"could not be judged: {failure}" for failure in document["failures"]]
+    lines, counts = [], []
+    for (ours,), duels in grouped(document["comparison"], "ours").items():
+        verdicts = [duel["verdict"] for duel in duels]
+        counts.append(
+            f"{ours}, faults found within {JUDGED_S:g} s, {len(verdicts)} comparisons: better in "
+            f"{verdicts.count('better')}, worse in {verdicts.count('worse')}, no difference at "
+            f"p < {SIGNIFICANT:g} in the rest"
+        )
+        for verdict in ("worse", "better"):
+            for (against,), those in grouped(duels, "against").items():
+                so = grouped(_those(those, verdict=verdict), "sensors", "turbulence")
+                places = [
+                    f"{', '.join(duel['surface'] for duel in here)} with {title_of(*condition)}"
+                    for condition, here in so.items()
+                ]
+                if places:
+                    lines.append(f"{ours} is {verdict} than {against}: {'; '.join(places)}")
+    return [*lines, *counts]
 
 
 def run_power(
-    out: Path, grid: Grid, schemes: Sequence[Contender], workers: int = 1, progress: Progress | None = None
+    out: Path, grid: Grid, schemes: Sequence[str], workers: int = 1, progress: Progress | None = None
 ) -> Document:
     """Write `out/power/` (document, one row a flight and scheme, text, figures); return the document."""
     schemes = tuple(schemes)
@@ -222,10 +188,8 @@ def _maps(document: Document, scheme: str, rows: Sequence[Row]) -> "Figure":
         len(surfaces), len(conditions), 2.35 * len(conditions) + 1.9, 2.3 * len(surfaces) + 1.0, title,
         dpi=120, sharex=True, sharey=True,
     )  # fmt: skip
-    by_place = grouped(rows, "surface", "sensors", "turbulence")
-    for line, surface in zip(axes, surfaces, strict=True):
-        for panel, (sensors, turbulence) in zip(line, conditions, strict=True):
-            image = _map(panel, grid, by_place.get((surface, sensors, turbulence), []))
+    for panel, here in _by_place(axes, surfaces, conditions, rows):
+        image = _map(panel, grid, here)
     label_edges(
         axes, "reference amplitude, deg/s", [f"{surface}\neffectiveness lost, %" for surface in surfaces],
         [title_of(*condition).replace(", ", ",\n") for condition in conditions],
@@ -236,18 +200,24 @@ def _maps(document: Document, scheme: str, rows: Sequence[Row]) -> "Figure":
     return figure
 
 
+def _by_place(
+    axes: np.ndarray, surfaces: list[str], conditions: list[tuple[str, str]], rows: Sequence[Row]
+) -> Iterator[tuple["Axes", list[Row]]]:
+    """Each panel (surfaces, conditions) with its rows."""
+    groups = grouped(rows, "surface", "sensors", "turbulence")
+    for panel, (surface, condition) in zip(axes.flat, product(surfaces, conditions), strict=True):
+        yield panel, groups.get((surface, *condition), [])
+
+
 def _map(panel: "Axes", grid: Document, rows: Sequence[Row]) -> "AxesImage":
     magnitudes, excitations = grid["magnitudes"], grid["excitations_deg_s"]
-    cells = {key: summary(of) for key, of in grouped(rows, "magnitude", "excitation_deg_s").items()}
     percent, labels = np.full((len(magnitudes), len(excitations)), np.nan), {}
-    for i, magnitude in enumerate(magnitudes):
-        for j, excitation in enumerate(excitations):
-            cell = cells.get((magnitude, excitation))
-            if cell is not None and cell["flights"]:
-                percent[i, j] = 100.0 * cell["within"][f"{JUDGED_S:g}"]["value"]
-                delay = "-" if cell["median_delay_s"] is None else f"{cell['median_delay_s']:.2f}"
-                ink = "black" if percent[i, j] > 55.0 else "white"
-                labels[i, j] = f"{percent[i, j]:.0f}\n{delay}", ink
+    for (magnitude, excitation), of in sorted(grouped(rows, "magnitude", "excitation_deg_s").items()):
+        cell, place = summary(of), (magnitudes.index(magnitude), excitations.index(excitation))
+        if cell["flights"]:
+            percent[place] = 100.0 * cell["within"][f"{JUDGED_S:g}"]["value"]
+            delay = "-" if cell["median_delay_s"] is None else f"{cell['median_delay_s']:.2f}"
+            labels[place] = f"{percent[place]:.0f}\n{delay}", "black" if percent[place] > 55.0 else "white"
     return heat_map(
         panel, percent, labels, [f"{e:g}" for e in excitations], [f"{100 * m:g}" for m in magnitudes],
         origin="lower", cmap="cividis", vmin=0.0, vmax=100.0,
@@ -257,56 +227,40 @@ def _map(panel: "Axes", grid: Document, rows: Sequence[Row]) -> "AxesImage":
 def _curves(document: Document, sensors: str, rows: Sequence[Row]) -> "Figure":
     """Rows surfaces, columns air; in each, the share detected over magnitude, a line a scheme."""
     surfaces = document["grid"]["surfaces"]
-    air = [turbulence for given, turbulence in document["grid"]["conditions"] if given == sensors]
+    conditions = [condition for condition in document["grid"]["conditions"] if condition[0] == sensors]
     schemes = list(dict.fromkeys(row["scheme"] for row in rows))
-    title = (
-        f"Loss of effectiveness, at most {document['false_alarms_per_h']:g} false alarms per hour, "
-        "all references"
-    )
+    most = f"at most {document['false_alarms_per_h']:g} false alarms per hour"
+    title = f"Loss of effectiveness, {most}, all references"
     figure, axes = panels(
-        len(surfaces), len(air), 3.4 * len(air) + 2.6, 2.5 * len(surfaces) + 0.6, title,
+        len(surfaces), len(conditions), 3.4 * len(conditions) + 2.6, 2.5 * len(surfaces) + 0.6, title,
         dpi=120, sharex=True, sharey=True,
     )  # fmt: skip
-    by_place = grouped(rows, "surface", "turbulence")
-    for line, surface in zip(axes, surfaces, strict=True):
-        for panel, turbulence in zip(line, air, strict=True):
-            here = by_place.get((surface, turbulence), [])
-            _draw(panel, here, schemes)
-            _draw_limit(panel, here, document["false_alarms_per_h"])
+    for panel, here in _by_place(axes, surfaces, conditions, rows):
+        _draw(panel, here, schemes, document["false_alarms_per_h"])
     label_edges(
         axes, "effectiveness lost, %", [f"{s}\ndetected within {JUDGED_S:g} s, %" for s in surfaces],
-        [title_of(sensors, turbulence) for turbulence in air],
+        [title_of(*condition) for condition in conditions],
     )  # fmt: skip
     handles, labels = axes[0][0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside right center", fontsize=8)
     return figure
 
 
-def _draw_limit(panel: "Axes", rows: Sequence[Row], per_h: float) -> None:
-    found = {m: limit(here, per_h) for (m,), here in sorted(grouped(rows, "magnitude").items())}
-    share = [100 * within[f"{JUDGED_S:g}"] for within in found.values()]
-    panel.plot(
-        [100 * m for m in found], share, color="#000000", linewidth=3.5, alpha=0.25, label=TOLD, zorder=0
-    )
-
-
-def _draw(panel: "Axes", rows: Sequence[Row], schemes: Sequence[str]) -> None:
+def _draw(panel: "Axes", rows: Sequence[Row], schemes: Sequence[str], per_h: float) -> None:
+    """Of each scheme, and of the test told the fault, the share detected over the effectiveness lost."""
     for (scheme,), of in grouped(rows, "scheme").items():
         place = schemes.index(scheme)
         found = {m: summary(here) for (m,), here in sorted(grouped(of, "magnitude").items())}
-        points = [
-            (100 * m, 100 * cell["within"][f"{JUDGED_S:g}"]["value"])
-            for m, cell in found.items()
-            if cell["flights"]
-        ]
+        flown = {m: cell["within"][f"{JUDGED_S:g}"]["value"] for m, cell in found.items() if cell["flights"]}
         panel.plot(
-            *zip(*points, strict=True) if points else ([], []),
-            label=scheme,
-            marker=marker(place),
-            **curve_look(place),
-            markersize=5,
-            linewidth=1.6,
-        )
+            [100 * m for m in flown], [100 * share for share in flown.values()], label=scheme,
+            marker=marker(place), **curve_look(place), markersize=5, linewidth=1.6,
+        )  # fmt: skip
+    told = {m: limit(here, per_h) for (m,), here in sorted(grouped(rows, "magnitude").items())}
+    panel.plot(
+        [100 * m for m in told], [100 * within[f"{JUDGED_S:g}"] for within in told.values()], label=TOLD,
+        color="#000000", linewidth=3.5, alpha=0.25, zorder=0,
+    )  # fmt: skip
     panel.set_ylim(-4, 104)
     panel.set_xlim(left=0)
     panel.grid(alpha=0.3)

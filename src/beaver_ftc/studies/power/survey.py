@@ -5,9 +5,12 @@ A block is flown once for each fault; every scheme watches the same flights.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from itertools import product
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from pydantic import TypeAdapter
 
 from beaver_ftc.design.fdc import SURFACES
 from beaver_ftc.diagnosis.bounds.clairvoyant import Whitening
@@ -15,14 +18,8 @@ from beaver_ftc.documents.errors import BadInput, BeaverFtcError
 from beaver_ftc.plugins import DETECTORS, is_compiled, refusal, registered
 from beaver_ftc.scenario.environment import air_of
 from beaver_ftc.scenario.schema import Scenario
-from beaver_ftc.studies.compare.replay import (
-    Recording,
-    Trace,
-    aware_of_the_air,
-    record,
-    replay_together,
-    trace,
-)
+from beaver_ftc.studies.compare import replay
+from beaver_ftc.studies.compare.replay import Recording, Trace
 from beaver_ftc.studies.engine.workers import Case
 
 STRIKES_S = (8.0, 10.0)  # a fault strikes at random in between
@@ -66,17 +63,17 @@ class Grid:
     @property
     def faults(self) -> tuple[tuple[str, float], ...]:
         """Every surface with every magnitude."""
-        return tuple((surface, magnitude) for surface in self.surfaces for magnitude in self.magnitudes)
+        return tuple(product(self.surfaces, self.magnitudes))
 
     def only(self, sensors: str | None, turbulence: str | None) -> "Grid":
         """The same flights under some of the conditions. Raises BadInput if there are none."""
         kept = tuple(
-            condition
-            for condition in self.conditions
-            if sensors in (None, condition.sensors) and turbulence in (None, condition.turbulence)
+            one
+            for one in self.conditions
+            if sensors in (None, one.sensors) and turbulence in (None, one.turbulence)
         )
         if not kept:
-            there = "; ".join(f"{one.sensors}, {one.turbulence}" for one in self.conditions)
+            there = "; ".join(map(", ".join, self.conditions))
             raise BadInput(f"power: this grid has no such condition, allowed: {there}")
         return replace(self, conditions=kept)
 
@@ -100,33 +97,7 @@ class Grid:
         ]
 
 
-_SURFACES = ("aileron", "rudder", "elevator")
-GRIDS = {
-    "quick": Grid(
-        conditions=(Condition("tactical-grade", "none"), Condition("tactical-grade", "light")),
-        surfaces=_SURFACES,
-        magnitudes=(0.4, 1.0),
-        excitations_deg_s=(3.0, 6.0),
-        blocks=5,
-        healthy_h=0.06,
-        healthy_flight_s=18.0,
-        per_h=20.0,
-    ),
-    "full": Grid(
-        conditions=tuple(
-            Condition(sensors, turbulence)
-            for sensors in ("ideal", "tactical-grade")
-            for turbulence in ("none", "light", "moderate")
-        ),
-        surfaces=_SURFACES,
-        magnitudes=(0.2, 0.4, 0.7, 1.0),
-        excitations_deg_s=(1.0, 3.0, 6.0),
-        blocks=8,
-        healthy_h=0.2,
-        healthy_flight_s=20.0,
-        per_h=20.0,
-    ),
-}
+GRIDS = TypeAdapter(dict[str, Grid]).validate_json((Path(__file__).parent / "grids.json").read_bytes())
 
 
 def scenario_of(block: Block, duration_s: float, faults: list[dict[str, Any]] | None = None) -> Scenario:
@@ -156,9 +127,8 @@ def strikes_at_s(block: Block) -> float:
 
 def loss(surface: str, magnitude: float, at_s: float) -> dict[str, Any]:
     """The fault of a cell."""
-    return {
-        "type": "loss_of_effectiveness", "actuator": surface, "magnitude": magnitude, "at_s": at_s
-    }  # fmt: skip
+    kind = {"type": "loss_of_effectiveness", "actuator": surface}
+    return kind | {"magnitude": magnitude, "at_s": at_s}
 
 
 def _draws(block: Block, purpose: int) -> np.random.Generator:
@@ -191,20 +161,8 @@ def _uncertainty(block: Block) -> dict[str, Any]:
 ESTIMATORS = "adaptive-estimators"
 
 
-class Contender(NamedTuple):
-    """A scheme in the comparison. fdi: what a scenario's `fdi` says beside the bounds to have it."""
-
-    name: str
-    scheme: str
-    fdi: dict[str, Any]
-
-    @property
-    def built_in(self) -> bool:
-        """Whether its statistic comes with the flight itself rather than from a replay."""
-        return is_compiled(DETECTORS, self.scheme)
-
-
 STATISTICAL, BOTH = "statistical", "both"
+# Schemes of which the statistic comes with the flight itself, and what its `fdi` says beside the bounds.
 BUILT_IN: dict[str, dict[str, Any]] = {
     ESTIMATORS: {},
     STATISTICAL: {"statistical": {}, "authority": "statistical"},
@@ -212,29 +170,23 @@ BUILT_IN: dict[str, dict[str, Any]] = {
 }
 
 
-def contenders(names: list[str] | None = None) -> list[Contender]:
-    """Those of the names given, ours first; without names all there are. Raises BadInput, a line a name."""
+def contenders(names: list[str] | None = None) -> tuple[str, ...]:
+    """The schemes to compare: those named, ours first; without names all. Raises BadInput, a line a name."""
     if names is None:
         names = [name for name in registered(DETECTORS) if not is_compiled(DETECTORS, name)]
     names = list(dict.fromkeys([*BUILT_IN, *names]))
-    wrong = [
-        f"--schemes: {says}"
-        for name in names
-        if name not in BUILT_IN and (says := _refusal(name)) is not None
-    ]
+    wrong = [f"--schemes: {says}" for name in names if (says := _refusal(name)) is not None]
     if wrong:
         raise BadInput("\n".join(wrong))
-    return [_contender(name) for name in names]
+    return tuple(names)
 
 
 def _refusal(name: str) -> str | None:
+    if name in BUILT_IN:
+        return None
     if is_compiled(DETECTORS, name):
         return f"scheme {name!r} detects nothing, allowed: {', '.join(BUILT_IN)}, a registered detector"
     return refusal(DETECTORS, name)
-
-
-def _contender(name: str) -> Contender:
-    return Contender(name, ESTIMATORS, BUILT_IN[name]) if name in BUILT_IN else Contender(name, name, {})
 
 
 def deflections(
@@ -264,68 +216,49 @@ class Watched:
     failures: list[str] = field(default_factory=list)
 
 
-def fly_faulted(block: Block, grid: Grid, schemes: Sequence[Contender]) -> Watched:
+def fly_faulted(block: Block, grid: Grid, schemes: Sequence[str]) -> Watched:
     """Every fault of the grid in this block."""
     at_s = strikes_at_s(block)
     flights = [scenario_of(block, at_s + WATCHED_S, [loss(*fault, at_s)]) for fault in grid.faults]
     return _watch(Watched(block, grid.faults), flights, schemes, grid.vanes)
 
 
-def fly_healthy(block: Block, grid: Grid, schemes: Sequence[Contender]) -> Watched:
-    """The one flight of a block without a fault."""
+def fly_block(case: tuple[Block, bool], grid: Grid, schemes: Sequence[str]) -> Watched:
+    """Every fault of the grid in a block, or the one flight of a block without a fault."""
+    block, faulted = case
+    if faulted:
+        return fly_faulted(block, grid, schemes)
     return _watch(Watched(block), [scenario_of(block, grid.healthy_flight_s)], schemes, grid.vanes)
 
 
-def _watch(
-    watched: Watched, flights: Sequence[Scenario], schemes: Sequence[Contender], vanes: bool
-) -> Watched:
-    seen: list[Recording] = []
-    for contender in schemes:
+def _watch(watched: Watched, flights: Sequence[Scenario], schemes: Sequence[str], vanes: bool) -> Watched:
+    seen: list[Recording] = []  # what plug-ins are shown of the flights
+    for scheme in schemes:
         try:
-            if contender.built_in:
-                recordings = [record(with_fdi(flight, contender)) for flight in flights]
-                seen = _as_shown(recordings, vanes)
-            watched.traces[contender.name] = (
-                [trace(recording, recording.built_in) for recording in recordings]
-                if contender.built_in
-                else replay_together(seen, contender.scheme)
-            )
+            if scheme in BUILT_IN:
+                recordings = [replay.record(with_fdi(flight, scheme)) for flight in flights]
+                seen = [
+                    replay.aware_of_the_air(one) if vanes and one.air is not None else one
+                    for one in recordings
+                ]
+                traces = [replay.trace(recording, recording.built_in) for recording in recordings]
+            else:
+                traces = replay.replay_together(seen, scheme)
+            watched.traces[scheme] = traces
         except BeaverFtcError as error:
-            watched.failures.append(f"{contender.name}: {error}")
+            watched.failures.append(f"{scheme}: {error}")
         except Exception as error:  # a plug-in may raise anything: not the end of the comparison
-            watched.failures.append(f"{contender.name}: {type(error).__name__}: {error}")
-    watched.deflections = _deflections(seen, watched.faults)
+            watched.failures.append(f"{scheme}: {type(error).__name__}: {error}")
+    struck = zip(seen, watched.faults, strict=False)  # a healthy flight has none
+    watched.deflections = [deflections(recording, *fault, WITHIN_S) for recording, fault in struck]
     return watched
 
 
-def _as_shown(recordings: Sequence[Recording], vanes: bool) -> list[Recording]:
-    """What plug-ins are shown of the flights."""
-    return [
-        aware_of_the_air(recording) if vanes and recording.air is not None else recording
-        for recording in recordings
-    ]
-
-
-def _deflections(recordings: Sequence[Recording], faults: Sequence[tuple[str, float]]) -> list[list[float]]:
-    """Of every fault; a healthy flight has none."""
-    return [
-        deflections(recording, *fault, WITHIN_S) for recording, fault in zip(recordings, faults, strict=False)
-    ]
-
-
-def with_fdi(flight: Scenario, contender: Contender) -> Scenario:
-    """The flight with what the contender wants of the built-in diagnosis."""
+def with_fdi(flight: Scenario, scheme: str) -> Scenario:
+    """The flight with what a scheme of ours wants of the built-in diagnosis."""
     document = flight.model_dump(mode="json", exclude_none=True)
-    document["fdi"] |= contender.fdi
+    document["fdi"] |= BUILT_IN[scheme]
     return Scenario.model_validate(document)
-
-
-Document = dict[str, Any]
-
-
-def fly_block(case: tuple[Block, bool], grid: Grid, schemes: Sequence[Contender]) -> Watched:
-    block, faulted = case
-    return (fly_faulted if faulted else fly_healthy)(block, grid, schemes)
 
 
 def lost(case: Case, why: str) -> Watched:

@@ -66,7 +66,8 @@ def _markdown(part: Part, figures: str) -> Iterator[str]:
 def as_html(title: str, parts: Sequence[Part], figures: Mapping[str, Path]) -> str:
     """The page as HTML; figures: stem to file of the pictures, which go into it."""
     body = "\n".join(_html(part, figures) for part in parts if part)
-    return f"{_HEAD.format(title=escape(title))}\n{body}\n</main></body></html>\n"
+    page = (Path(__file__).parent / "page.html").read_text(encoding="utf-8")
+    return page.format(title=escape(title), body=body)
 
 
 def _html(part: Part, figures: Mapping[str, Path]) -> str:
@@ -143,25 +144,3 @@ def save(figure: "Figure", path: Path) -> Path:
     with rc_context({"svg.hashsalt": path.stem}):
         figure.savefig(path, metadata=metadata)
     return path
-
-
-_HEAD = """<!DOCTYPE html>
-<html lang="en"><head><meta charset="utf-8"><title>{title}</title>
-<meta name="viewport" content="width=device-width, initial-scale=1"><link rel="icon" href="data:,">
-<style>
-body {{ font: 15px/1.5 system-ui, sans-serif; margin: 0; color: #111; background: #fff }}
-main {{ max-width: 84rem; margin: 0 auto; padding: 0 1rem 2rem }}
-h1 {{ font-size: 1.4rem }} h2 {{ font-size: 1.15rem; margin-top: 2.2rem; break-after: avoid }}
-p, ul {{ max-width: 60rem }}
-.wide {{ overflow-x: auto }}
-table {{ border-collapse: collapse; font-size: .9rem; margin: .6rem 0 }}
-th, td {{ text-align: left; vertical-align: top; padding: .2rem .9rem .2rem 0 }}
-th, td {{ border-bottom: 1px solid #d8d8d8 }}
-tr {{ break-inside: avoid }}
-.met, .missed {{ white-space: nowrap }}
-.met {{ color: #00614a }} .missed {{ color: #a33b00; font-weight: 700 }}
-.figures {{ display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 36rem), 1fr)) }}
-img {{ width: 100%; break-inside: avoid }}
-@media print {{ body {{ font-size: 10px }} .wide {{ overflow: visible }} }}
-</style></head><body><main>
-<h1>{title}</h1>"""

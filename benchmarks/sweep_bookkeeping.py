@@ -21,7 +21,7 @@ from pathlib import Path
 from beaver_ftc.scenario.sweeps import Sweep, load_sweep_text
 from beaver_ftc.studies.engine.workers import ThisProcess, Work
 from beaver_ftc.studies.sweep import campaign
-from beaver_ftc.studies.sweep.one_flight import Job, fly_one
+from beaver_ftc.studies.sweep.one_flight import fly_one
 from beaver_ftc.studies.sweep.sampling import Assignment, Plan
 
 SWEEP = """\
@@ -51,7 +51,7 @@ def sweep_of(runs: int) -> Sweep:
 
 def go_on(sweep: Sweep, out: Path, until: float) -> None:
     """Land rows until a share of them is there, then end this process as a kill would; or conclude."""
-    template = fly_one(Job(sweep), Plan(sweep).assignments([0])[0])
+    template = fly_one(sweep, Plan(sweep).assignments([0])[0])
     campaign._workers = lambda *_: ThisProcess(Work(partial(made_up, template)))
     began = time.perf_counter()
 

@@ -23,9 +23,9 @@ from pathlib import Path
 
 from beaver_ftc.scenario.sweeps import Sweep, load_sweep
 from beaver_ftc.studies.engine.store import Parts
-from beaver_ftc.studies.engine.workers import Row, Task, Work, Workers, one_thread_each
+from beaver_ftc.studies.engine.workers import ONE_THREAD_EACH, Row, Task, Work, Workers
 from beaver_ftc.studies.sweep.campaign import Options, run_sweep
-from beaver_ftc.studies.sweep.one_flight import Job, fly_one, scenario_of
+from beaver_ftc.studies.sweep.one_flight import fly_one, scenario_of
 from beaver_ftc.studies.sweep.sampling import Assignment, Plan
 from beaver_ftc.studies.sweep.store import RowsAsParquet, batch_size
 
@@ -84,7 +84,7 @@ def flight_seconds() -> tuple[float, float]:
     flights = Plan(sweep).assignments(range(FLIGHTS_ALONE))
     scenarios = [scenario_of(sweep, flight) for flight in flights]
     for flight in flights[:2]:  # what the first of a process costs
-        fly_one(Job(sweep), flight)
+        fly_one(sweep, flight)
     before = time.process_time()
     wall = seconds(lambda: [fly(scenario) for scenario in scenarios])
     return wall / FLIGHTS_ALONE, (time.process_time() - before) / FLIGHTS_ALONE
@@ -125,7 +125,7 @@ def compare_ray(n: int, workers: int) -> None:
 
     os.environ.setdefault("RAY_worker_niceness", "0")  # as local ones; Ray's default is 15
     for cpus in range(1, workers + 1):
-        options = {"runtime_env": {"env_vars": one_thread_each()}, "include_dashboard": False}
+        options = {"runtime_env": {"env_vars": ONE_THREAD_EACH}, "include_dashboard": False}
         started = seconds(lambda: ray.init(num_cpus=cpus, log_to_driver=False, **options))  # noqa: B023
         ready = seconds(lambda: sweep_seconds(4 * cpus, backend="ray"))  # noqa: B023 : each worker loads the code
         flying = sweep_seconds(n, backend="ray")
@@ -148,7 +148,7 @@ def weigh_batches() -> None:
     sweep = sweep_of(LONG)
     size = batch_size(sweep)
     cases = tuple(Plan(sweep).assignments(range(size)))
-    rows = [fly_one(Job(sweep), case) for case in cases]
+    rows = [fly_one(sweep, case) for case in cases]
     workers = RayWorkers(Work(partial(_flown_before, rows)), None, None)
     _through(workers, cases, 4)  # a worker's first task loads the code
     print(f"batch of {size} there and back {_each(lambda: _through(workers, cases, BATCHES))}")

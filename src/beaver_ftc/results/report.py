@@ -21,7 +21,7 @@ from beaver_ftc.results.style import LOOKS, MODE_COLOURS, closeup_window, marks
 from beaver_ftc.results.views import MAX_POINTS, Panel, View, read_series, views
 
 if TYPE_CHECKING:
-    from jinja2 import Environment
+    from jinja2 import Template
 
 Section = Callable[[Path], str]
 
@@ -46,8 +46,7 @@ def render(folders: Sequence[Path], names: Sequence[str] = ()) -> str:
     documents = [json.loads((folder / "metrics.json").read_text(encoding="utf-8")) for folder in folders]
     texts = [(folder / "scenario.yaml").read_text(encoding="utf-8") for folder in folders]
     data = json.dumps(_data(folders, documents, names), allow_nan=False, separators=(",", ":"))
-    template = _environment().get_template("report.html.j2")
-    return template.render(
+    return template(_TEMPLATES / "report.html.j2").render(
         runs=[_words(document, text) for document, text in zip(documents, texts, strict=True)],
         names=names,
         modes=MODE_COLOURS,
@@ -161,8 +160,10 @@ def _asset(name: str) -> Any:
 
 
 @cache
-def _environment() -> "Environment":
+def template(path: Path) -> "Template":
+    """The template of a page, by its file."""
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
     options: Mapping[str, Any] = {"autoescape": True, "trim_blocks": True, "lstrip_blocks": True}
-    return Environment(loader=FileSystemLoader(_TEMPLATES), undefined=StrictUndefined, **options)
+    pages = Environment(loader=FileSystemLoader(path.parent), undefined=StrictUndefined, **options)
+    return pages.get_template(path.name)

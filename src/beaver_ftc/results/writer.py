@@ -121,7 +121,7 @@ def result_folder(out: Path, name: str) -> Iterator[Path]:
     Raises SimulationFailed where the folder cannot be written, or `out/name` is not a result of ours.
     """
     final = out / name
-    with _clear_disk_errors(final):
+    with clear_disk_errors(final):
         refuse_foreign(final)
         created = _make_parents(out)
         _remove_stale(out, name)
@@ -175,12 +175,13 @@ def _is_our_picture(path: Path) -> bool:
 
 
 @contextlib.contextmanager
-def _clear_disk_errors(final: Path) -> Iterator[None]:
+def clear_disk_errors(folder: Path, but: str = "") -> Iterator[None]:
+    """Turn an operating system's error into one line, which may end with a word of comfort."""
     try:
         yield
     except OSError as error:
         reason = os.strerror(error.errno) if error.errno else str(error)
-        raise SimulationFailed(f"cannot write {final}: {reason[:1].lower()}{reason[1:]}") from error
+        raise SimulationFailed(f"cannot write {folder}: {reason[:1].lower()}{reason[1:]}{but}") from error
 
 
 def _prefix(name: str) -> str:
@@ -227,11 +228,16 @@ def _remove_stale(out: Path, name: str) -> None:
 def _sync(folder: Path) -> None:
     """Bring the folder's files to the disk before its name says that they are there."""
     for path in (*folder.rglob("*"), folder):
-        descriptor = os.open(path, os.O_RDONLY)
-        try:
-            os.fsync(descriptor)
-        finally:
-            os.close(descriptor)
+        sync(path)
+
+
+def sync(path: Path) -> None:
+    """Bring a file, or the names in a folder, to the disk."""
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
 
 
 def _move_into_place(partial: Path, final: Path) -> None:

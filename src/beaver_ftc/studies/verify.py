@@ -260,13 +260,14 @@ def conduct(
     def note(batch: Batch, flown: list[Row]) -> None:
         nonlocal done
         kind = batch.cases[0].kind
+        parts.land(batch.number, flown)
         rows[kind].update((row["index"], row) for row in flown)
         done += len(flown)
         if progress is not None:
             progress(done / total)
 
-    source = Batches(chunks, total - done, note, Parts(folder, RowsAsJson(dict), GO_ON))
-    fly_missing(source, Work(partial(_fly_draw, campaign.schemes)), workers, _crashed)
+    batches, parts = Batches(iter(chunks), total - done, note), Parts(folder, RowsAsJson(dict), GO_ON)
+    fly_missing(batches, Work(partial(_fly_draw, campaign.schemes)), workers, _crashed)
     return {kind: [rows[kind][i] for i in range(campaign.wanted(kind))] for kind in KINDS}
 
 

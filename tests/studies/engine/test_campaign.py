@@ -4,24 +4,19 @@ import random
 
 import pytest
 
-from beaver_ftc.studies.engine.study import Batch, Campaign
+from beaver_ftc.studies.engine.study import Batch, Batches, Campaign
 from beaver_ftc.studies.engine.workers import Case, Outcome, Task
 
 
 class Numbers:
-    """A source of batches of flights, remembering what lands."""
+    """Batches of flights, remembering what lands."""
 
     def __init__(self, flights: int, size: int) -> None:
         runs = [range(first, min(first + size, flights)) for first in range(0, flights, size)]
-        self._coming = [Batch(n, tuple(Case(run, None) for run in batch)) for n, batch in enumerate(runs)]
+        coming = [Batch(n, tuple(Case(run, None) for run in batch)) for n, batch in enumerate(runs)]
+        self.batches = Batches(iter(coming), flights, self.landed)
         self.landings: list[tuple[int, list[int]]] = []
         self.rows: list[dict] = []
-
-    def next_batch(self):
-        return self._coming.pop(0) if self._coming else None
-
-    def cases_left(self):
-        return sum(len(batch.cases) for batch in self._coming)
 
     def landed(self, batch, rows):
         self.landings.append((batch.number, [row["run"] for row in rows]))
@@ -58,7 +53,7 @@ def lost(case, why):
 
 
 def fly(source, workers):
-    Campaign(source, workers, lost).fly()
+    Campaign(source.batches, workers, lost).fly()
     return source
 
 
@@ -96,7 +91,7 @@ def test_the_last_tasks_are_small_so_that_no_worker_waits_long():
 
 def test_stopping_lands_what_is_in_the_air_and_hands_out_no_more():
     source, workers = Numbers(100, 5), Unreliable(2)
-    Campaign(source, workers, lost).fly(stopped=lambda: len(workers.submitted) >= 4)
+    Campaign(source.batches, workers, lost).fly(stopped=lambda: len(workers.submitted) >= 4)
     assert len(workers.submitted) == 4
     assert not workers._tasks
     assert all(len(runs) == 5 for _, runs in source.landings)

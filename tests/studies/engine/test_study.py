@@ -40,9 +40,13 @@ def kills_itself(case: int, marks: Path, always: int = -1) -> Row:
     return square(case)
 
 
-def rows_of(folder, cases, fly, **options):
-    with flown(folder, cases, fly, Row, **options) as rows:
+def rows_of(folder, cases, fly, workers=1, progress=None, **options):
+    with flown(study_of(folder, cases, fly, **options), folder.parent, workers, progress) as rows:
         return list(rows)
+
+
+def study_of(folder, cases, fly, **options):
+    return Study(folder.name, cases, fly, list, dict, Row, **options)
 
 
 def hidden(folder):
@@ -137,7 +141,7 @@ def test_a_failure_before_the_first_row_leaves_nothing(tmp_path):
 
 def test_two_processes_do_not_fly_the_same_study(tmp_path):
     with (
-        flown(tmp_path / "study", range(2), square, Row),
+        flown(study_of(tmp_path / "study", range(2), square), tmp_path),
         pytest.raises(SimulationFailed, match="another beaver-ftc"),
     ):
         rows_of(tmp_path / "study", range(2), square)
@@ -153,12 +157,12 @@ ALL_IMPORTED = """
 import sys
 from pathlib import Path
 from beaver_ftc.scenario.sweeps import load_sweep
-from beaver_ftc.studies.sweep.one_flight import Job, fly_one, scenario_of
+from beaver_ftc.studies.sweep.one_flight import fly_one, scenario_of
 from beaver_ftc.studies.sweep.sampling import Plan
 from beaver_ftc.studies.sweep.one_flight import schema_of, table_of
 sweep = load_sweep("{sweep}")
 plan = Plan(sweep).assignments([0])
-rows = [fly_one(Job(sweep), plan[0])]
+rows = [fly_one(sweep, plan[0])]
 table_of(sweep, schema_of(sweep), rows)
 for name, module in list(sys.modules.items()):
     if name.startswith("beaver_ftc") and getattr(module, "__file__", None):

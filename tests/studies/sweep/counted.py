@@ -15,7 +15,7 @@ runs: 12
 vary:
   faults[0].magnitude: {uniform: [0.1, 1]}
 """
-NOTHING = dict.fromkeys(name for name, _, _ in columns_of(load().surfaces))
+NOTHING = dict.fromkeys(columns_of(load().surfaces))
 
 
 def row(run, status="flown", **metrics):
@@ -56,4 +56,4 @@ def flights_of(rows, folder: Path) -> Flights:
     schema = schema_of(sweep)
     with (folder / "results.parquet").open("wb") as file:
         write_tables(file, [table_of(sweep, schema, rows)], schema)
-    return Flights.read(folder / "results.parquet", sweep)
+    return Flights(folder / "results.parquet", sweep)

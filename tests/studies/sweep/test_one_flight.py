@@ -3,7 +3,7 @@ import pytest
 from beaver_ftc.aircraft import load
 from beaver_ftc.documents.errors import SimulationFailed
 from beaver_ftc.results.metrics import metrics
-from beaver_ftc.studies.sweep.one_flight import Job, Keep, columns_of, fly_one, scenario_of
+from beaver_ftc.studies.sweep.one_flight import Keep, columns_of, fly_one, scenario_of
 from beaver_ftc.studies.sweep.sampling import Assignment, Plan, flight_seed
 
 from .conftest import SHORT, sweep_of
@@ -13,7 +13,7 @@ def test_a_row_says_what_the_flights_metrics_say(short):
     from beaver_ftc.loop.loop import fly
 
     (flight,) = Plan(short).assignments([7])
-    row = fly_one(Job(short), flight)
+    row = fly_one(short, flight)
     document = metrics(fly(scenario_of(short, flight)))
     assert row["run"] == 7
     assert row["seed"] == document["seed"] == flight_seed(3, 7)
@@ -36,7 +36,7 @@ def test_every_metric_has_a_column(short):
         for section, below in document.items()
         for key in (below if isinstance(below, dict) else [""])
     } - {"scenario", "seed", "versions"}
-    names = {name for name, _, _ in columns_of(load().surfaces)}
+    names = set(columns_of(load().surfaces))
     lists = {
         "supervisor",
         "envelope_exits",
@@ -59,14 +59,14 @@ def test_every_metric_has_a_column(short):
 
 def test_a_flight_that_cannot_be_trimmed_is_a_row_with_its_reason():
     sweep = sweep_of(SHORT.replace("{normal: [45, 3], within: [36, 54]}", "{choice: [20, 45]}"))
-    row = fly_one(Job(sweep), Assignment(0, {"initial.airspeed_mps": 20.0}))
+    row = fly_one(sweep, Assignment(0, {"initial.airspeed_mps": 20.0}))
     assert row["status"] == "bad_input"
     assert "20 m/s" in row["reason"]
     assert row["detection.detected"] is None
 
 
 def test_values_that_contradict_each_other_are_a_row_too(short):
-    row = fly_one(Job(short), Assignment(0, {"faults[0].at_s": 2.0}))
+    row = fly_one(short, Assignment(0, {"faults[0].at_s": 2.0}))
     assert row["status"] == "bad_input"
     assert row["reason"].startswith("faults[0].at_s: 2 is after the end")
 
@@ -83,7 +83,7 @@ def test_a_flight_that_fails_is_a_row_with_its_reason(short, monkeypatch, error,
         raise error
 
     monkeypatch.setattr("beaver_ftc.loop.loop.fly", fail)
-    row = fly_one(Job(short), Plan(short).assignments([1])[0])
+    row = fly_one(short, Plan(short).assignments([1])[0])
     assert (row["status"], row["reason"]) == ("failed", reason)
 
 

@@ -6,6 +6,7 @@ import pytest
 
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.studies.sweep.one_flight import row_of_failure, schema_of, table_of
+from beaver_ftc.studies.sweep.sampling import Assignment
 from beaver_ftc.studies.sweep.store import Store, identity_of
 
 from .conftest import parts_in, sweep_of
@@ -18,7 +19,7 @@ def store(short, tmp_path):
 
 def batch_of(sweep, runs):
     return [
-        row_of_failure(run, dict.fromkeys(sweep.keys, 1), 0, "failed", "for the test")
+        row_of_failure(sweep, Assignment(run, dict.fromkeys(sweep.keys, 1)), "failed", "for the test")
         for run in reversed(runs)
     ]
 
@@ -143,7 +144,7 @@ def test_words_and_expectations_may_change(store, short):
 
 def test_other_versions_are_not_mixed(store, short):
     then = identity_of(short)
-    then.document["versions"]["jsbsim"] = "0.9"
+    then["versions"]["jsbsim"] = "0.9"
     with store:
         store.begin(then, resume=False)
         with pytest.raises(BadInput, match=r"jsbsim 0\.9 then, .* now"):

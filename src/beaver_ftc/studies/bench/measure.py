@@ -213,7 +213,7 @@ def _flown(sweep: Sweep, changes: dict[str, Any], run: int) -> Taken:
         pass
     marks.append(time.process_time())
     flight = loop.land()
-    row_of(assignment.run, assignment.values, scenario.seed, metrics(flight), flight)
+    row_of(assignment, metrics(flight), flight)
     marks.append(time.process_time())
     runs = flight.frames * scenario.substeps
     alone = _alone(loop.plant.run, runs)

@@ -10,7 +10,7 @@ from typing import Any
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.plugins import VARIABLE
 from beaver_ftc.results.metrics import versions
-from beaver_ftc.studies.engine.workers import Outcome, Row, Task, Work, one_thread_each, silence
+from beaver_ftc.studies.engine.workers import ONE_THREAD_EACH, Outcome, Row, Task, Work, silence
 
 QUEUED_A_CPU = 2
 
@@ -19,8 +19,12 @@ class RayWorkers:
     """The CPUs of a Ray cluster: one that runs already, one at an address, or one started on this machine."""
 
     def __init__(self, work: Work, address: str | None, workers: int | None) -> None:
-        self._ray = _ray()
-        self._ours = _join(self._ray, address)
+        try:
+            import ray
+        except ImportError:
+            allowed = "pip install 'beaver-ftc[ray]'"
+            raise BadInput(f"--backend ray: Ray is not installed, allowed: {allowed}") from None
+        self._ray, self._ours = ray, _join(ray, address)
         self._most = workers
         self._work = self._ray.put(work)
         self._versions = dict(versions())
@@ -58,26 +62,18 @@ class RayWorkers:
 
 def fly_task(work: Work, driver_versions: dict[str, str], cases: tuple[Any, ...]) -> list[Row]:
     """Fly a task on whatever node it is, if that has what the others have."""
-    own = dict(versions())
-    if own != driver_versions:
-        changed = ", ".join(
-            f"{name} {own.get(name)} instead of {version}"
-            for name, version in driver_versions.items()
-            if own.get(name) != version
+    own = versions()
+    changed = [
+        f"{name} {own.get(name)} instead of {theirs}"
+        for name, theirs in driver_versions.items()
+        if own.get(name) != theirs
+    ]
+    if changed:
+        raise SimulationFailed(
+            f"a node of the cluster has {', '.join(changed)}: the table would mix versions"
         )
-        raise SimulationFailed(f"a node of the cluster has {changed}: the table would mix versions")
     with silence():
         return work.all(cases)
-
-
-def _ray() -> Any:
-    try:
-        import ray
-    except ImportError:
-        raise BadInput(
-            "--backend ray: Ray is not installed, allowed: pip install 'beaver-ftc[ray]'"
-        ) from None
-    return ray
 
 
 def _join(ray: Any, address: str | None) -> bool:
@@ -85,7 +81,7 @@ def _join(ray: Any, address: str | None) -> bool:
     if ray.is_initialized():
         return False
     options: dict[str, Any] = {} if address else {"include_dashboard": False}
-    environment = one_thread_each() | {VARIABLE: os.environ.get(VARIABLE, "")}
+    environment = ONE_THREAD_EACH | {VARIABLE: os.environ.get(VARIABLE, "")}
     try:
         with silence():
             ray.init(address, log_to_driver=False, runtime_env={"env_vars": environment}, **options)

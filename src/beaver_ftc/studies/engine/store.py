@@ -6,8 +6,7 @@ import contextlib
 import hashlib
 import json
 import os
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import cache
 from pathlib import Path
 from typing import IO, Any, Protocol
@@ -15,8 +14,12 @@ from typing import IO, Any, Protocol
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.documents.paths import data_root
 from beaver_ftc.results.metrics import versions
+from beaver_ftc.results.writer import clear_disk_errors, sync
+
+Document = dict[str, Any]
 
 LOCK = ".lock"
+KEPT = "; what has been flown is kept, go on with --resume"
 
 
 def write_whole(path: Path, content: bytes) -> None:
@@ -36,16 +39,7 @@ def replace_whole(path: Path, fill: Callable[[IO[bytes]], object]) -> None:
     except BaseException:
         partial.unlink(missing_ok=True)
         raise
-    sync_folder(path.parent)
-
-
-def sync_folder(folder: Path) -> None:
-    """Bring the names in a folder to the disk."""
-    descriptor = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
+    sync(path.parent)
 
 
 def remove_leftovers(folder: Path) -> None:
@@ -77,19 +71,6 @@ def locked(folder: Path) -> Iterator[None]:
         lock.release()
 
 
-@contextlib.contextmanager
-def clear_disk_errors(folder: Path, but: str = "") -> Iterator[None]:
-    """Turn an operating system's error into one line, which may end with a word of comfort."""
-    try:
-        yield
-    except OSError as error:
-        reason = os.strerror(error.errno) if error.errno else str(error)
-        raise SimulationFailed(f"cannot write {folder}: {reason[:1].lower()}{reason[1:]}{but}") from error
-
-
-KEPT = "; what has been flown is kept, go on with --resume"
-
-
 class Codec(Protocol):
     """How the rows of a batch are written and read."""
 
@@ -119,15 +100,13 @@ class Parts:
 
     def landed(self, batch: int | str, runs: Sequence[int]) -> Any:
         """The rows of a batch if it has landed whole; what cannot be read is removed, to be flown again."""
-        path = self._path(batch)
-        if not path.exists():
-            return None
-        with contextlib.suppress(Exception):
-            rows = self._codec.read(path, runs)
-            if rows is not None:
-                return rows
-        path.unlink()
-        return None
+        path, rows = self._path(batch), None
+        if path.exists():
+            with contextlib.suppress(Exception):
+                rows = self._codec.read(path, runs)
+            if rows is None:
+                path.unlink()
+        return rows
 
     def remove(self) -> None:
         """Remove all parts."""
@@ -151,16 +130,12 @@ class RowsAsJson:
         self._adapter = TypeAdapter(list[row])
 
     def write(self, rows: Any, file: IO[bytes]) -> None:
-        file.write(json.dumps(self._adapter.dump_python(rows), default=_plain).encode())
+        plain = json.dumps(self._adapter.dump_python(rows), default=lambda number: number.item())  # of NumPy
+        file.write(plain.encode())
 
     def read(self, path: Path, runs: Sequence[int]) -> Any:
         rows = self._adapter.validate_python(json.loads(path.read_text(encoding="utf-8")))
         return rows if len(rows) == len(runs) else None
-
-
-def _plain(value: Any) -> Any:
-    """A number of NumPy's as Python's."""
-    return value.item()
 
 
 def batches_of(count: int, size: int) -> Iterator[tuple[int, range]]:
@@ -173,38 +148,31 @@ PACKAGE = Path(__file__).resolve().parents[2]
 NO_ROWS = ("cli", "live", "integrations")  # rooms that ask for rows, or show them, and make none
 
 
-@dataclass(frozen=True)
-class Identity:
-    """What was asked, resolved, and what flew it."""
-
-    document: dict[str, Any]
-
-    @classmethod
-    def of(cls, what: str, asked: dict[str, Any]) -> "Identity":
-        """The identity of what was asked, under its name, on this machine."""
-        document = {what: asked, "versions": {**versions(), **plug_ins(), "flight code": fingerprint()}}
-        return cls(json.loads(json.dumps(document)))
-
-    def refuse_other(self, there: dict[str, Any], folder: Path) -> None:
-        """Raise BadInput if the flights in a folder follow from anything else."""
-        what = next(iter(self.document))
-        changed = differences(there.get(what, {}), self.document[what])
-        if changed:
-            raise BadInput(
-                f"{folder}: the {what} file has changed since these flights ({', '.join(changed)}): "
-                f"resuming would mix two {what}s, allowed: the unchanged file, or another --out"
-            )
-        then, now = there.get("versions", {}), self.document["versions"]
-        changed = differences(then, now)
-        if changed:
-            said = ", ".join(f"{name} {then.get(name)} then, {now.get(name)} now" for name in changed)
-            raise BadInput(
-                f"{folder}: flown by other versions ({said}): resuming would mix them, "
-                "allowed: the same versions, or another --out"
-            )
+def identity(what: str, asked: Document) -> Document:
+    """What was asked, resolved, under its name, and what flew it: this machine's versions and code."""
+    document = {what: asked, "versions": {**versions(), **plug_ins(), "flight code": fingerprint()}}
+    return json.loads(json.dumps(document))
 
 
-def differences(then: dict[str, Any], now: dict[str, Any]) -> list[str]:
+def refuse_other(mine: Document, there: Document, folder: Path) -> None:
+    """Raise BadInput if the flights in a folder follow from another identity than mine."""
+    what = next(iter(mine))
+    changed = differences(there.get(what, {}), mine[what])
+    if changed:
+        raise BadInput(
+            f"{folder}: the {what} file has changed since these flights ({', '.join(changed)}): "
+            f"resuming would mix two {what}s, allowed: the unchanged file, or another --out"
+        )
+    then, now = there.get("versions", {}), mine["versions"]
+    changed = [f"{name} {then.get(name)} then, {now.get(name)} now" for name in differences(then, now)]
+    if changed:
+        raise BadInput(
+            f"{folder}: flown by other versions ({', '.join(changed)}): resuming would mix them, "
+            "allowed: the same versions, or another --out"
+        )
+
+
+def differences(then: Document, now: Document) -> list[str]:
     """The keys whose values differ, those that have gone included."""
     return [name for name in dict.fromkeys([*now, *then]) if then.get(name) != now.get(name)]
 
@@ -227,11 +195,8 @@ def plug_ins() -> dict[str, str]:
 
 def hashed_files() -> list[Path]:
     """The sources and data that rows may follow from: all but the rooms that make none."""
-    sources = [
-        path
-        for path in (*PACKAGE.rglob("*.py"), *PACKAGE.rglob("*.json"))
-        if path.relative_to(PACKAGE).parts[0] not in NO_ROWS
-    ]
+    ours = (path for path in PACKAGE.rglob("*") if path.suffix in (".py", ".json"))
+    sources = [path for path in ours if path.relative_to(PACKAGE).parts[0] not in NO_ROWS]
     aircraft = [path for path in (data_root() / "aircraft").rglob("*") if path.is_file()]
     return sorted({*sources, *aircraft})
 
@@ -239,7 +204,12 @@ def hashed_files() -> list[Path]:
 @cache
 def fingerprint() -> str:
     """A digest of those files: a version number sees no edit."""
-    digest = hashlib.sha256()
-    for path in hashed_files():
-        digest.update(path.name.encode() + path.read_bytes())
-    return digest.hexdigest()[:16]
+    return digest(hashed_files())[:16]
+
+
+def digest(paths: Iterable[Path]) -> str:
+    """A digest of files, names and contents."""
+    found = hashlib.sha256()
+    for path in paths:
+        found.update(path.name.encode() + path.read_bytes())
+    return found.hexdigest()

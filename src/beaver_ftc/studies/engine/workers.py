@@ -107,9 +107,6 @@ class _Worker:
     def fly(self, task: Task) -> "Future[list[Row]]":
         return self._pool.submit(_fly, task.cases)
 
-    def started(self) -> bool:
-        return self.pid.done() and self.pid.exception() is None
-
     def end(self) -> None:
         """Terminate it, started or not. Its futures are left to fail: a pool that breaks cannot fail
         cancelled ones, and says so in a traceback. Its thread is waited for: an interpreter that exits while
@@ -153,21 +150,20 @@ class LocalWorkers:
 
     def _outcome(self, flown: "Future[list[Row]]") -> Outcome:
         worker, task = self._busy.pop(flown)
+        rows = None
         try:
             rows = flown.result()
         except BrokenProcessPool:
-            self._idle.append(self._replacement(worker))
-            return Outcome(task, None)
+            if not worker.pid.done() or worker.pid.exception() is not None:
+                raise SimulationFailed(
+                    "a worker process cannot start: it ended before its first flight"
+                ) from None
+            worker = _Worker(self._work)
         except Exception as error:  # not a flight's: those are in their rows
-            self._idle.append(worker)
             raise SimulationFailed(f"a worker cannot go on: {error}") from error
-        self._idle.append(worker)
+        finally:
+            self._idle.append(worker)
         return Outcome(task, rows)
-
-    def _replacement(self, lost: _Worker) -> _Worker:
-        if not lost.started():
-            raise SimulationFailed("a worker process cannot start: it ended before its first flight")
-        return _Worker(self._work)
 
 
 _OF_THIS_PROCESS: list[Work] = []  # a worker's only one
@@ -224,7 +220,10 @@ _PRELOAD = [
     "beaver_ftc.loop.loop",
     "beaver_ftc.results.metrics",
 ]
-_ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+# Environment of a worker: one thread for linear algebra, since the cores are taken by the flights.
+ONE_THREAD_EACH = dict.fromkeys(
+    ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1"
+)
 
 
 def cores() -> int:
@@ -248,43 +247,31 @@ def start_early() -> None:
             forkserver.ensure_running()
 
 
-def one_thread_each() -> dict[str, str]:
-    """Environment of a worker: one thread for linear algebra, since the cores are taken by the flights."""
-    return dict.fromkeys(_ONE_THREAD, "1")
-
-
 @contextlib.contextmanager
 def single_threaded() -> Iterator[None]:
     """Processes started meanwhile have one thread each, and never hear the terminal's Ctrl-C, not even while
     they import: it is for the process that gives the orders.
     """
-    with environment(one_thread_each()):
-        heard = _block_interrupt()
+    blocks = hasattr(signal, "pthread_sigmask")
+    with environment(ONE_THREAD_EACH):
+        if blocks:  # Ctrl-C waits meanwhile, which what is started inherits
+            resource_tracker.ensure_running()  # it would unblock what is blocked here
+            before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         try:
             yield
         finally:
-            if heard is not None:
-                signal.pthread_sigmask(signal.SIG_SETMASK, heard)
+            if blocks:
+                signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 @contextlib.contextmanager
 def environment(values: Mapping[str, str]) -> Iterator[None]:
     """These variables of the environment meanwhile have these values."""
-    before = {name: os.environ.get(name) for name in values}
+    before = {name: os.environ[name] for name in values if name in os.environ}
     os.environ.update(values)
     try:
         yield
     finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value
-
-
-def _block_interrupt() -> set[int | signal.Signals] | None:
-    """Leave Ctrl-C waiting, which what is started inherits; what was blocked before, where that exists."""
-    if not hasattr(signal, "pthread_sigmask"):
-        return None
-    resource_tracker.ensure_running()  # it would unblock what is blocked here
-    return signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        for name in values:
+            del os.environ[name]
+        os.environ.update(before)

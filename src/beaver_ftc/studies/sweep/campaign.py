@@ -2,29 +2,32 @@
 
 import json
 from collections import Counter
-from collections.abc import Callable
-from contextlib import closing
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, closing
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 from beaver_ftc.documents.errors import BadInput, BeaverFtcError, SimulationFailed
 from beaver_ftc.results.metrics import as_json, versions
+from beaver_ftc.results.writer import clear_disk_errors
 from beaver_ftc.scenario.sweeps import Sweep
-from beaver_ftc.studies.engine.store import clear_disk_errors, write_whole
-from beaver_ftc.studies.engine.study import Campaign, Source
-from beaver_ftc.studies.engine.workers import LocalWorkers, Work, Workers, cores
-from beaver_ftc.studies.sweep.one_flight import Job, Keep, fly_one, keep_flight, lost, scenario_of, warm_up
+from beaver_ftc.studies.engine.store import batches_of, write_whole
+from beaver_ftc.studies.engine.study import Batch, Batches, Campaign
+from beaver_ftc.studies.engine.workers import LocalWorkers, Number, Row, Work, Workers, cores
+from beaver_ftc.studies.sweep import one_flight
+from beaver_ftc.studies.sweep.one_flight import Keep, counts_of_rows, counts_of_table
 from beaver_ftc.studies.sweep.sampling import Assignment, Plan
-from beaver_ftc.studies.sweep.search import SearchSource, found
-from beaver_ftc.studies.sweep.store import Store, SweepSource, identity_of
+from beaver_ftc.studies.sweep.search import found, generations, members
+from beaver_ftc.studies.sweep.store import Store, batch_size, identity_of
 
 if TYPE_CHECKING:
     from beaver_ftc.studies.sweep.outcomes import Flights
 
 
 Document = dict[str, Any]
+Landed = Callable[[Counter[str]], None]  # takes the counts of a batch
 
 
 class SweepStopped(BeaverFtcError):
@@ -46,11 +49,6 @@ class Options:
     report: bool = True
     search: str | None = None
     source: str = "FILE"
-
-
-class _Flown(Source, Protocol):
-    def tables(self) -> Any:
-        """Every batch's table, in order."""
 
 
 def named_for(sweep: Sweep, search: str | None) -> Sweep:
@@ -81,41 +79,61 @@ def run_sweep(
     with Store(folder, sweep) as store:
         store.begin(identity_of(sweep, options.search), options.resume)
         if not store.is_compacted(sweep.flights):
+            (folder / "summary.json").unlink(missing_ok=True)  # let nobody take the sweep for finished
 
             def landed(counts: Counter[str]) -> None:
                 so_far.update(counts)
                 progress(so_far)
 
-            store.reopen()
-            source = _source(sweep, options, store, landed)
-            _fly_missing(source, sweep, options, so_far, stopped)
-            store.compact(source.tables())
+            _fly_missing(sweep, options, store, landed, stopped)
+            if so_far["done"] < so_far["total"]:
+                raise SweepStopped(
+                    f"{sweep.name}: stopped, {so_far['done']} of {so_far['total']} flights are kept; "
+                    "go on with the same command and --resume"
+                )
+            size = members(len(sweep.keys)) if options.search else batch_size(sweep)
+            store.compact(store.landed(*batch) for batch in batches_of(sweep.flights, size))
         store.parts.remove()
         return conclude(sweep, options, store)
 
 
-def _source(sweep: Sweep, options: Options, store: Store, landed: Callable[[Counter[str]], None]) -> _Flown:
-    if options.search:
-        return SearchSource(sweep, options.search, store, landed)
-    return SweepSource(sweep, store, landed)
-
-
 def _fly_missing(
-    source: _Flown, sweep: Sweep, options: Options, so_far: Counter[str], stopped: Callable[[], bool]
+    sweep: Sweep, options: Options, store: Store, landed: Landed, stopped: Callable[[], bool]
 ) -> None:
-    if so_far["done"] < so_far["total"]:
-        with closing(_workers(sweep, options)) as workers:
-            Campaign(source, workers, partial(lost, sweep)).fly(stopped)
-    if so_far["done"] < so_far["total"]:
-        raise SweepStopped(
-            f"{sweep.name}: stopped, {so_far['done']} of {so_far['total']} flights are kept; "
-            "go on with the same command and --resume"
-        )
+    workers: Workers | None = None
+    with ExitStack() as at_work:
+        for batches in _missing(sweep, options, store, landed):
+            workers = workers or at_work.enter_context(closing(_workers(sweep, options)))
+            Campaign(batches, workers, partial(one_flight.lost, sweep)).fly(stopped)
+
+
+def _missing(sweep: Sweep, options: Options, store: Store, landed: Landed) -> Iterator[Batches]:
+    """What is still to be flown: of a search the next generation, once the one before has landed."""
+
+    def there(number: Number, runs: Sequence[int]) -> bool:
+        table = store.landed(number, runs)
+        if table is not None:
+            landed(counts_of_table(table))
+        return table is not None
+
+    def land(batch: Batch, rows: list[Row]) -> None:
+        store.parts.land(batch.number, rows)
+        landed(counts_of_rows(rows))
+
+    if options.search:
+        for batch in generations(sweep, options.search, store):
+            if not there(batch.number, [case.run for case in batch.cases]):
+                yield Batches(iter([batch]), len(batch.cases), land)
+        return
+    plan, batches = Plan(sweep), batches_of(sweep.flights, batch_size(sweep))
+    missing = {number: runs for number, runs in batches if not there(number, runs)}
+    if missing:
+        coming = (Batch(number, tuple(plan.assignments(runs))) for number, runs in missing.items())
+        yield Batches(coming, sum(map(len, missing.values())), land)
 
 
 def _workers(sweep: Sweep, options: Options) -> Workers:
-    job = Job(sweep, options.keep)
-    work = Work(partial(fly_one, job), partial(warm_up, job))
+    work = Work(partial(one_flight.fly_one, sweep, keep=options.keep), partial(one_flight.warm_up, sweep))
     if options.backend == "ray":
         from beaver_ftc.studies.engine.ray_workers import RayWorkers
 
@@ -128,7 +146,7 @@ def conclude(sweep: Sweep, options: Options, store: Store) -> Document:
     from beaver_ftc.studies.sweep.outcomes import Flights, replay_command, worst_flights
     from beaver_ftc.studies.sweep.summary import evaluate, summarise
 
-    flights = Flights.read(store.results, sweep)
+    flights = Flights(store.results, sweep)
     document = summarise(flights, sweep)
     if options.search:
         document["search"] = found(options.search, store.results, sweep)
@@ -138,19 +156,15 @@ def conclude(sweep: Sweep, options: Options, store: Store) -> Document:
     document["expectations"] = [] if steered else evaluate(sweep.file.expect, flights)
     document["passed"] = all(expectation["passed"] for expectation in document["expectations"])
     document["versions"] = dict(versions())
-    _keep_worst(sweep, options, document)
+    for flight in document["worst"] if options.keep.policy == "worst" else ():
+        kept = assignment_of(sweep, options, flight["run"])
+        one_flight.keep_flight(sweep, kept, options.keep.folder, report=True)
     if options.report:
         _draw(sweep, flights, document, store)
     store.write("summary.json", as_json(document))
     if not flights.measured.any():
         raise SimulationFailed(f"{sweep.name}: no flight could be flown: {document['reasons'][0]['reason']}")
     return document
-
-
-def _keep_worst(sweep: Sweep, options: Options, document: Document) -> None:
-    if options.keep.policy == "worst":
-        for flight in document["worst"]:
-            keep_flight(sweep, assignment_of(sweep, options, flight["run"]), options.keep.folder, report=True)
 
 
 def _draw(sweep: Sweep, flights: "Flights", document: Document, store: Store) -> None:
@@ -168,26 +182,23 @@ def assignment_of(sweep: Sweep, options: Options, index: int) -> Assignment:
         raise BadInput(f"{sweep.name}: there is no flight {index}, allowed: 0 to {sweep.flights - 1}")
     if options.search is None:
         return Plan(sweep).assignments([index])[0]
-    store = Store(options.out / sweep.name, sweep)
-    return SearchSource(sweep, options.search, store, lambda rows: None).assignment(index)
+    for generation in generations(sweep, options.search, Store(options.out / sweep.name, sweep)):
+        for flight in generation.cases:
+            if flight.run == index:
+                return flight
+    raise BadInput(f"flight {index} of {sweep.name} is not known yet: the search has not come so far")
 
 
 def replay(sweep: Sweep, options: Options, index: int) -> Document:
     """Fly one flight of a sweep again, as `run` would, into `out/<sweep>/flights/`; return its metrics."""
     from beaver_ftc.results.writer import run
+    from beaver_ftc.studies.sweep.summary_page import render
 
     sweep = named_for(sweep, options.search)
     folder = options.out / sweep.name
-    scenario = scenario_of(sweep, assignment_of(sweep, options, index))
+    scenario = one_flight.scenario_of(sweep, assignment_of(sweep, options, index))
     document = run(scenario, folder / "flights", options.report)
-    _link(folder)
+    if (folder / "report.html").exists():  # let it lead to the flight
+        summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+        write_whole(folder / "report.html", render(summary, folder).encode("utf-8"))
     return document | {"folder": str(folder / "flights" / scenario.name)}
-
-
-def _link(folder: Path) -> None:
-    """Let the sweep's report, if there is one, lead to the flight that has just been flown."""
-    from beaver_ftc.studies.sweep.summary_page import render
-
-    if (folder / "report.html").exists():
-        document = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
-        write_whole(folder / "report.html", render(document, folder).encode("utf-8"))

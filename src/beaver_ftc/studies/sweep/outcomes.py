@@ -1,50 +1,35 @@
 """The flights of a sweep as columns, and the groups of them that statistics are about."""
 
 import shlex
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
 from functools import cache, cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from beaver_ftc.scenario.sweeps import Variation
+from beaver_ftc.scenario.sweeps import Sweep
 from beaver_ftc.studies.sweep.one_flight import AXES, DEPARTED, FLOWN, flight_name, kind_of
 
-if TYPE_CHECKING:
-    from beaver_ftc.scenario.sweeps import Sweep
-
-
 NO_FAULT = "no fault"
-_METRICS = (
-    "run", "status", "reason", "frames", "flown_s", "fault_free_s", "false_alarm", "worst_residual_ratio",
-    "passed", "fault.actuator", "fault.type", "fault.at_s",
-    "detection.detected", "detection.delay_s", "detection.guaranteed_delay_s",
-    "isolation.fault", "isolation.correct", "isolation.delay_s",
-    *(f"tracking.{when}_fault_rms_deg_s.{axis}" for when in ("pre", "post") for axis in AXES),
-)  # fmt: skip
 
 
-@dataclass(frozen=True)
 class Flights:
-    """Columns of the results as arrays (flights,): numbers with NaN for null, flags False, texts ''."""
+    """Columns of a `results.parquet` as arrays (flights,), each read when it is asked for.
 
-    columns: dict[str, np.ndarray]
-    vary: dict[str, Variation]
+    Numbers have NaN for null, flags False, texts ''.
+    """
 
-    @classmethod
-    def read(cls, path: Path, sweep: "Sweep") -> "Flights":
-        """The columns of a `results.parquet` that statistics need."""
-        from pyarrow.parquet import read_table
-
-        columns = {
-            name: _array(read_table(path, columns=[name]).column(0)) for name in (*_METRICS, *sweep.keys)
-        }
-        return cls(columns, dict(sweep.file.vary))
+    def __init__(self, path: Path, sweep: Sweep) -> None:
+        self._path, self.vary = path, sweep.file.vary
+        self._columns: dict[str, np.ndarray] = {}
 
     def __getitem__(self, name: str) -> np.ndarray:
-        return self.columns[name]
+        from pyarrow.parquet import read_table
+
+        if name not in self._columns:
+            self._columns[name] = _array(read_table(self._path, columns=[name]).column(0))
+        return self._columns[name]
 
     def __len__(self) -> int:
         return len(self["run"])
@@ -116,17 +101,9 @@ class Flights:
         pairs = zip(kinds, actuators, strict=True)
         return np.array([_label(kind, actuator, several) for kind, actuator in pairs], dtype=object)
 
-    def values(self, key: str) -> np.ndarray:
-        """The values of a varied key."""
-        return self[key]
-
     def is_number(self, key: str) -> bool:
         """Whether a varied key is a number (and not a choice among names)."""
         return kind_of(self.vary[key]) == "float"
-
-    def numbers(self) -> Iterable[str]:
-        """The varied keys that are numbers."""
-        return (key for key in self.vary if self.is_number(key))
 
 
 def _array(column) -> np.ndarray:
@@ -135,9 +112,8 @@ def _array(column) -> np.ndarray:
     if pa.types.is_boolean(column.type):
         return column.fill_null(False).to_numpy(zero_copy_only=False)
     if pa.types.is_string(column.type):
-        coded = (
-            column.fill_null("").combine_chunks().dictionary_encode()
-        )  # each text once, however many flights
+        # each text once, however many flights
+        coded = column.fill_null("").combine_chunks().dictionary_encode()
         return np.array(coded.dictionary.to_pylist(), dtype=object)[coded.indices.to_numpy()]
     return column.to_numpy()
 
@@ -225,17 +201,17 @@ def _spearman(values: np.ndarray, ranks: np.ndarray) -> float | None:
 OF_EACH_KIND = 3
 
 
-def worst_flights(flights: Flights, sweep: "Sweep", command: str) -> list[dict[str, Any]]:
+def worst_flights(flights: Flights, sweep: Sweep, command: str) -> list[dict[str, Any]]:
     """A few flights of each bad kind, each once: `run`, `name`, `why` (all that is bad), `replay`."""
     whys: dict[int, list[str]] = {}
     for position, why in _candidates(flights):
         whys.setdefault(position, []).append(why)
     return [
         {
-            "run": (run := int(flights["run"][position])),
+            "run": (run := flights["run"].item(position)),
             "name": flight_name(sweep, run),
             "why": why,
-            "values": {key: _plain(flights.values(key)[position]) for key in flights.vary},
+            "values": {key: flights[key].item(position) for key in flights.vary},
             "replay": f"{command} --replay {run}",
         }
         for position, why in whys.items()
@@ -250,32 +226,28 @@ def replay_command(source: str, out: Path, search: str | None = None) -> str:
     return shlex.join(words)
 
 
-def _plain(value: Any) -> Any:
-    return value.item() if isinstance(value, np.generic) else value
-
-
 def _candidates(flights: Flights) -> Iterator[tuple[int, str]]:
     """(position, what is bad about it), the worst kind first."""
-    yield from _those(flights, ~flights.measured, lambda i: f"{flights['status'][i]}: {flights['reason'][i]}")
-    yield from _those(flights, flights["false_alarm"] & flights.measured, lambda i: "false alarm")
-    yield from _those(flights, flights.departed, lambda i: f"departed: {flights['reason'][i]}")
-    wrong = flights.faulted & (flights["isolation.fault"] != "") & ~flights["isolation.correct"]
-    yield from _those(flights, wrong, lambda i: f"named {flights['isolation.fault'][i]}")
-    yield from _those(flights, flights.faulted & ~flights.detected, lambda i: "fault not detected")
-    delays = np.where(flights.detected, flights.detection_delay_s, -np.inf)
-    yield from _largest(delays, lambda i: f"detected after {delays[i]:.3g} s")
-    rms = np.where(flights.faulted & np.isfinite(flights.worst_rms_deg_s), flights.worst_rms_deg_s, -np.inf)
+    faulted, named, reason = flights.faulted, flights["isolation.fault"], flights["reason"]
+    wrong = faulted & (named != "") & ~flights["isolation.correct"]
+    yield from _first(~flights.measured, lambda i: f"{flights['status'][i]}: {reason[i]}")
+    yield from _first(flights["false_alarm"] & flights.measured, lambda i: "false alarm")
+    yield from _first(flights.departed, lambda i: f"departed: {reason[i]}")
+    yield from _first(wrong, lambda i: f"named {named[i]}")
+    yield from _first(faulted & ~flights.detected, lambda i: "fault not detected")
+    delay = np.where(flights.detected, flights.detection_delay_s, -np.inf)
+    yield from _largest(delay, lambda i: f"detected after {delay[i]:.3g} s")
+    rms = flights.worst_rms_deg_s
+    rms = np.where(faulted & np.isfinite(rms), rms, -np.inf)
     yield from _largest(rms, lambda i: f"tracking error {rms[i]:.3g} deg/s RMS")
     ratio = np.nan_to_num(flights["worst_residual_ratio"], nan=-np.inf)
     yield from _largest(ratio, lambda i: f"residual {ratio[i]:.4g} of its threshold without a fault")
 
 
-def _those(flights: Flights, which: np.ndarray, why: Any) -> Iterator[tuple[int, str]]:
-    for position in np.flatnonzero(which)[:OF_EACH_KIND].tolist():
-        yield position, why(position)
+def _first(which: np.ndarray, why: Callable[[int], str]) -> Iterator[tuple[int, str]]:
+    return ((i, why(i)) for i in np.flatnonzero(which)[:OF_EACH_KIND].tolist())
 
 
-def _largest(values: np.ndarray, why: Any) -> Iterator[tuple[int, str]]:
-    for position in np.argsort(-values, kind="stable")[:OF_EACH_KIND].tolist():
-        if np.isfinite(values[position]):
-            yield position, why(position)
+def _largest(values: np.ndarray, why: Callable[[int], str]) -> Iterator[tuple[int, str]]:
+    largest = np.argsort(-values, kind="stable")[:OF_EACH_KIND]
+    return ((i, why(i)) for i in largest.tolist() if np.isfinite(values[i]))

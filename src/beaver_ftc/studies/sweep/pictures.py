@@ -4,7 +4,7 @@ Each function takes the flights and returns a figure, or None where the flights 
 """
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from itertools import cycle
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -52,10 +52,14 @@ def write_figures(flights: Flights, summary: Document, folder: Path) -> list[Pat
     return [save(figure, folder / f"{name}.png") for name, figure in drawn if figure is not None]
 
 
-def _axes(title: str, size: tuple[float, float] = (8.0, 4.6)) -> tuple["Figure", "Axes"]:
+def _axes(
+    title: str, x: str = "", y: str = "", size: tuple[float, float] = (8.0, 4.6)
+) -> tuple["Figure", "Axes"]:
     figure = new_figure(*size)
     axes = figure.subplots()
     axes.set_title(title, fontsize=10)
+    axes.set_xlabel(x, fontsize=9)
+    axes.set_ylabel(y, fontsize=9)
     axes.tick_params(labelsize=8)
     axes.grid(visible=True, color=GRID, linewidth=0.6)
     axes.set_axisbelow(True)
@@ -75,33 +79,29 @@ def detection_probability(flights: Flights, summary: Document) -> "Figure | None
     key = magnitude_key(flights, summary)
     if key is None or not flights.faulted.any():
         return None
-    figure, axes = _axes("Detection probability (bars: 95 % intervals)")
-    labels = flights.fault_labels
-    for look, label in zip(cycle(_FAULT_LOOKS), sorted(set(labels[flights.faulted])), strict=False):
-        group = flights.faulted & (labels == label)
-        values = flights.values(key)[group]
+    figure, axes = _axes("Detection probability (bars: 95 % intervals)", key, "share detected")
+    for (colour, marker, dash), label, group in _faults(flights):
+        values, hits = flights[key][group], flights.detected[group]
         bins = _levels(values) if flights.vary[key].count else _bins(values)
-        _probability_curve(axes, values, bins, flights.detected[group], label, look)
+        found = [wilson(int(hits[bin].sum()), bin.size) for bin in bins]
+        shares = np.array([estimate.value for estimate in found])
+        reach = np.array([[e.value - e.low, e.high - e.value] for e in found]).T
+        axes.errorbar(
+            [values[bin].mean() for bin in bins], shares, np.maximum(reach, 0), label=label, color=colour,
+            marker=marker, linestyle=dash, markersize=4.5, linewidth=1.3, elinewidth=0.8, capsize=2,
+        )  # fmt: skip
     if flights.vary[key].loguniform:
         axes.set_xscale("log")
     axes.set_ylim(-0.03, 1.03)
-    axes.set_xlabel(key, fontsize=9)
-    axes.set_ylabel("share detected", fontsize=9)
     axes.legend(fontsize=8)
     return figure
 
 
-def _probability_curve(
-    axes: "Axes", values: np.ndarray, groups: list[np.ndarray], hits: np.ndarray, label: str, look: tuple
-) -> None:
-    found = [wilson(int(hits[group].sum()), group.size) for group in groups]
-    shares = np.array([estimate.value for estimate in found])
-    reach = np.array([[e.value - e.low, e.high - e.value] for e in found]).T
-    colour, marker, dash = look
-    axes.errorbar(
-        [values[group].mean() for group in groups], shares, np.maximum(reach, 0), label=label, color=colour,
-        marker=marker, linestyle=dash, markersize=4.5, linewidth=1.3, elinewidth=0.8, capsize=2,
-    )  # fmt: skip
+def _faults(flights: Flights) -> Iterator[tuple[tuple[str, str, str], str, np.ndarray]]:
+    """(look, label, which flights) of each fault."""
+    labels = flights.fault_labels
+    for look, label in zip(cycle(_FAULT_LOOKS), sorted(set(labels[flights.faulted])), strict=False):
+        yield look, label, flights.faulted & (labels == label)
 
 
 def _levels(values: np.ndarray) -> list[np.ndarray]:
@@ -122,24 +122,19 @@ def delay_distribution(flights: Flights, summary: Document) -> "Figure | None":
     """Share of faults detected within a time, a curve a fault; what is missing at the top was missed."""
     if not flights.detected.any():
         return None
-    figure, axes = _axes("Detection delay: share of faults detected within a time")
-    labels = flights.fault_labels
-    for look, label in zip(cycle(_FAULT_LOOKS), sorted(set(labels[flights.faulted])), strict=False):
-        group = flights.faulted & (labels == label)
+    title = "Detection delay: share of faults detected within a time"
+    figure, axes = _axes(title, "detection delay (s)", "share of faults")
+    for (colour, _, dash), label, group in _faults(flights):
         delays = np.sort(flights.detection_delay_s[group & flights.detected])
         if delays.size:
             shares = np.arange(1, delays.size + 1) / group.sum()
-            axes.step(
-                delays, shares, where="post", label=label, color=look[0], linestyle=look[2], linewidth=1.4
-            )
+            axes.step(delays, shares, where="post", label=label, color=colour, linestyle=dash, linewidth=1.4)
     for q in (0.5, 0.95):
         axes.axhline(q, color=GREY, linewidth=0.8, linestyle=":")
     positive = flights.detection_delay_s[flights.detected & (flights.detection_delay_s > 0)]
     if positive.size and positive.max() > 20 * np.median(positive):
         axes.set_xscale("log")
     axes.set_ylim(0, 1.02)
-    axes.set_xlabel("detection delay (s)", fontsize=9)
-    axes.set_ylabel("share of faults", fontsize=9)
     axes.legend(fontsize=8, loc="lower right")
     return figure
 
@@ -147,22 +142,20 @@ def delay_distribution(flights: Flights, summary: Document) -> "Figure | None":
 def confusion_matrix(flights: Flights, summary: Document) -> "Figure | None":
     """Declared fault against diagnosis."""
     confusion = summary["confusion"]
-    counts = np.array(confusion["counts"])
+    counts, rows, columns = np.array(confusion["counts"]), confusion["faults"], confusion["diagnoses"]
     if not counts.size:
         return None
-    if len(confusion["faults"]) == 1:
-        return _diagnoses(confusion["faults"][0], confusion["diagnoses"], counts[0])
-    rows, columns = confusion["faults"], confusion["diagnoses"]
+    if len(rows) == 1:  # a matrix of one row is no picture
+        return _diagnoses(rows[0], columns, counts[0])
     size = (2.6 + 1.15 * len(columns), 1.7 + 0.55 * len(rows))
-    figure, axes = _axes("What broke (rows) against what the diagnosis said (columns)", size)
+    figure, axes = _axes("What broke (rows) against what the diagnosis said (columns)", size=size)
     axes.grid(visible=False)
     shares = counts / np.maximum(counts.sum(axis=1, keepdims=True), 1)
-    labels = {
-        place: (f"{count}\n{shares[place]:.0%}", "white" if shares[place] > 0.6 else BLACK)
-        if count
-        else ("0", GREY)
-        for place, count in np.ndenumerate(counts)
-    }
+    labels = dict.fromkeys(np.ndindex(*counts.shape), ("0", GREY))
+    for row, column in np.argwhere(counts).tolist():
+        share = shares[row, column]
+        ink = "white" if share > 0.6 else BLACK
+        labels[row, column] = (f"{counts[row, column]}\n{share:.0%}", ink)
     heat_map(axes, shares, labels, columns, rows, cmap="Blues", vmin=0, vmax=1.15)
     for border in range(1, len(rows)):
         axes.axhline(border - 0.5, color="white", linewidth=2)
@@ -172,8 +165,9 @@ def confusion_matrix(flights: Flights, summary: Document) -> "Figure | None":
 
 
 def _diagnoses(fault: str, diagnoses: list[str], counts: np.ndarray) -> "Figure":
-    """What the diagnosis said of one fault, as bars: a matrix of one row is no picture."""
-    figure, axes = _axes(f"{fault}: what the diagnosis said", (8.0, 1.5 + 0.45 * len(diagnoses)))
+    """What the diagnosis said of one fault, as bars."""
+    size = (8.0, 1.5 + 0.45 * len(diagnoses))
+    figure, axes = _axes(f"{fault}: what the diagnosis said", "share of the flights", size=size)
     shares = counts / counts.sum()
     axes.barh(range(len(diagnoses)), shares, 0.6, color=BLUE)
     for row, (count, share) in enumerate(zip(counts, shares, strict=True)):
@@ -181,7 +175,6 @@ def _diagnoses(fault: str, diagnoses: list[str], counts: np.ndarray) -> "Figure"
     axes.set_yticks(range(len(diagnoses)), diagnoses)
     axes.invert_yaxis()
     axes.set_xlim(0, 1.18)
-    axes.set_xlabel("share of the flights", fontsize=9)
     return figure
 
 
@@ -191,9 +184,8 @@ def sensitivity_bars(flights: Flights, summary: Document) -> "Figure | None":
     if not rankings:
         return None
     keys = [entry["key"] for entry in next(iter(rankings.values()))][:12]
-    figure, axes = _axes(
-        "What drives what: share of the outcome's ranks that a key explains", (8.0, 1.8 + 0.5 * len(keys))
-    )
+    title = "What drives what: share of the outcome's ranks that a key explains"
+    figure, axes = _axes(title, size=(8.0, 1.8 + 0.5 * len(keys)))
     height = 0.8 / len(rankings)
     colours = (BLUE, ORANGE, GREEN, PURPLE)
     for position, (name, ranking) in enumerate(rankings.items()):
@@ -209,13 +201,13 @@ def sensitivity_bars(flights: Flights, summary: Document) -> "Figure | None":
 
 def parallel_coordinates(flights: Flights, summary: Document) -> "Figure | None":
     """Each flight a line through its varied values and its delay, the bad ones on top."""
-    keys = _shown_keys(flights, summary)
+    ranked = [entry["key"] for entry in summary["sensitivity"]["detection_delay"]]
+    keys = (ranked or list(flights.vary))[:8]
     if not keys:
         return None
     chosen = _spread(flights)
-    figure, axes = _axes(
-        f"{chosen.size} of {len(flights)} flights, a line each", (max(7.0, 1.7 * len(keys) + 3), 5.0)
-    )
+    size = (max(7.0, 1.7 * len(keys) + 3), 5.0)
+    figure, axes = _axes(f"{chosen.size} of {len(flights)} flights, a line each", size=size)
     axes.grid(visible=False)
     scaled = np.column_stack([*(_scaled(axes, i, flights, key)[chosen] for i, key in enumerate(keys)),
                               _scaled_delay(axes, len(keys), flights)[chosen]])  # fmt: skip
@@ -224,7 +216,8 @@ def parallel_coordinates(flights: Flights, summary: Document) -> "Figure | None"
         if lines.size:
             axes.plot(lines.T, color=colour, alpha=alpha, linewidth=0.8)
             axes.plot([], [], color=colour, label=label)
-    axes.set_xticks(range(len(keys) + 1), [*map(_broken, keys), "detection\ndelay"], fontsize=8)
+    names = [*(key.replace(".", "\n.") for key in keys), "detection\ndelay"]
+    axes.set_xticks(range(len(keys) + 1), names, fontsize=8)
     axes.set_yticks([])
     axes.set_ylim(-0.06, 1.06)
     axes.set_xlim(-0.3, len(keys) + 0.45)
@@ -232,16 +225,6 @@ def parallel_coordinates(flights: Flights, summary: Document) -> "Figure | None"
         axes.axvline(place, color=BLACK, linewidth=0.8)
     figure.legend(loc="outside lower center", ncols=4, fontsize=8, frameon=False)
     return figure
-
-
-def _shown_keys(flights: Flights, summary: Document) -> list[str]:
-    ranked = [entry["key"] for entry in summary["sensitivity"]["detection_delay"]]
-    return (ranked or list(flights.vary))[:8]
-
-
-def _broken(key: str) -> str:
-    """A key on lines short enough to stand side by side."""
-    return key.replace(".", "\n.")
 
 
 def _spread(flights: Flights) -> np.ndarray:
@@ -266,7 +249,7 @@ def _outcomes(flights: Flights) -> list[tuple[str, np.ndarray, str, float]]:
 
 def _scaled(axes: "Axes", place: int, flights: Flights, key: str) -> np.ndarray:
     """A key's values from 0 to 1, its ends or its names written beside its axis."""
-    values = flights.values(key)
+    values = flights[key]
     if not flights.is_number(key):
         names, group = np.unique(values.astype(str), return_inverse=True)
         for i, name in enumerate(names):
@@ -310,11 +293,10 @@ def search_history(flights: Flights, summary: Document) -> "Figure | None":
     if "search" not in summary:
         return None
     search = summary["search"]
-    figure, axes = _axes("Worst-case search: the worst flight so far")
+    worst = _SEARCHED[search["objective"]]
+    figure, axes = _axes("Worst-case search: the worst flight so far", "generation", worst)
     history = [np.nan if score is None else score for score in search["history"]]
     axes.plot(range(1, len(history) + 1), history, color=BLUE, marker="o", markersize=3.5)
-    axes.set_xlabel("generation", fontsize=9)
-    axes.set_ylabel(_SEARCHED[search["objective"]], fontsize=9)
     axes.ticklabel_format(useOffset=False)
     return figure
 

@@ -7,7 +7,7 @@ from.
 
 import math
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from statistics import NormalDist
 from typing import Any, NamedTuple
 
@@ -51,9 +51,8 @@ def value_at(how: Variation, u: float) -> Any:
 def _normal(distribution: NormalDist, within: tuple[float, float] | None, u: float) -> float:
     """The normal distribution's inverse, cut to an interval by drawing from the part inside."""
     low, high = within or (-math.inf, math.inf)
-    below = distribution.cdf(low) if within else 0.0
-    inside = (distribution.cdf(high) if within else 1.0) - below
-    share = min(max(below + u * inside, _ALMOST), 1.0 - _ALMOST)
+    below, above = distribution.cdf(low), distribution.cdf(high)
+    share = min(max(below + u * (above - below), _ALMOST), 1.0 - _ALMOST)
     return min(max(distribution.inv_cdf(share), low), high)
 
 
@@ -78,35 +77,30 @@ class Plan:
 
     def assignments(self, indices: Sequence[int]) -> list[Assignment]:
         """The values of these flights; the indices are in order."""
-        points = self._points(indices)
+        points = self._points(np.array(indices))
         return [
-            Assignment(index, self._in_order(self._counted(index) | self._drawn_values(point)))
+            Assignment(index, self._values(index, point))
             for index, point in zip(indices, points, strict=True)
         ]
 
-    def _points(self, indices: Sequence[int]) -> np.ndarray:
+    def _points(self, indices: np.ndarray) -> np.ndarray:
         """Points of the unit cube, (flights, drawn keys)."""
-        if not self._drawn or not indices:
-            return np.empty((len(indices), 0))
+        seed, dimensions = self._file.seed, len(self._drawn)
+        if not dimensions or not indices.size:
+            return np.empty((indices.size, dimensions))
         if self._latin is not None:
-            return self._latin[list(indices)]
+            return self._latin[indices]
         if self._file.sampling == "sobol":
-            return _sobol(self._file.seed, len(self._drawn), indices)
-        return np.array([_random(self._file.seed, index, len(self._drawn)) for index in indices])
+            return _sobol(seed, dimensions, indices)
+        return np.array(
+            [_generator(seed, index, _OF_VALUES).random(dimensions) for index in indices.tolist()]
+        )
 
-    def _counted(self, index: int) -> dict[str, Any]:
-        values = {}
-        rest = index
+    def _values(self, index: int, point: np.ndarray) -> dict[str, Any]:
+        values = {key: value_at(how, float(u)) for (key, how), u in zip(self._drawn, point, strict=True)}
         for key, how in reversed(self._in_turn):
-            assert how.count is not None
-            rest, position = divmod(rest, how.count)
+            index, position = divmod(index, how.count or 1)
             values[key] = counted_value(how, position)
-        return values
-
-    def _drawn_values(self, point: np.ndarray) -> dict[str, Any]:
-        return {key: value_at(how, float(u)) for (key, how), u in zip(self._drawn, point, strict=True)}
-
-    def _in_order(self, values: dict[str, Any]) -> dict[str, Any]:
         return {key: values[key] for key in self._file.vary}
 
 
@@ -114,18 +108,13 @@ def _is_in_turn(file: SweepFile, how: Variation) -> bool:
     return file.sampling == "grid" or how.linspace is not None
 
 
-def _random(seed: int, index: int, dimensions: int) -> np.ndarray:
-    sequence = np.random.SeedSequence(seed, spawn_key=(index, _OF_VALUES))
-    return np.random.Generator(np.random.PCG64(sequence)).random(dimensions)
-
-
-def _design_generator(seed: int) -> np.random.Generator:
-    return np.random.Generator(np.random.PCG64(np.random.SeedSequence(seed, spawn_key=(0, _OF_DESIGN))))
+def _generator(seed: int, index: int, purpose: int) -> np.random.Generator:
+    return np.random.Generator(np.random.PCG64(np.random.SeedSequence(seed, spawn_key=(index, purpose))))
 
 
 def _latin_hypercube(file: SweepFile, dimensions: int) -> np.ndarray:
     """One flight in each of `flights` equal slices of every key [McKay, Beckman, Conover 1979]."""
-    generator = _design_generator(file.seed)
+    generator = _generator(file.seed, 0, _OF_DESIGN)
     columns = [
         (generator.permutation(file.flights) + generator.random(file.flights)) / file.flights
         for _ in range(dimensions)
@@ -133,31 +122,17 @@ def _latin_hypercube(file: SweepFile, dimensions: int) -> np.ndarray:
     return np.column_stack(columns) if columns else np.empty((file.flights, 0))
 
 
-def _sobol(seed: int, dimensions: int, indices: Sequence[int]) -> np.ndarray:
-    """Scrambled Sobol points [Owen 1995] at these indices."""
+def _sobol(seed: int, dimensions: int, indices: np.ndarray) -> np.ndarray:
+    """Scrambled Sobol points [Owen 1995] at these increasing indices."""
     from scipy.stats import qmc
 
-    engine = qmc.Sobol(dimensions, scramble=True, seed=_design_generator(seed))
-    with warnings.catch_warnings():
-        warnings.simplefilter(
-            "ignore", UserWarning
-        )  # that a sample is no power of 2: the sweep as a whole may be
-        return np.concatenate([_stretch(engine, first, last) for first, last in _stretches(indices)])
-
-
-def _stretch(engine: Any, first: int, last: int) -> np.ndarray:
-    engine.reset()
-    if first:
-        engine.fast_forward(first)
-    return engine.random(last - first)
-
-
-def _stretches(indices: Sequence[int]) -> Iterator[tuple[int, int]]:
-    """Unbroken stretches [first, last) of increasing indices."""
-    first = previous = indices[0]
-    for index in indices[1:]:
-        if index != previous + 1:
-            yield first, previous + 1
-            first = index
-        previous = index
-    yield first, previous + 1
+    engine = qmc.Sobol(dimensions, scramble=True, seed=_generator(seed, 0, _OF_DESIGN))
+    points = []
+    with warnings.catch_warnings():  # that a sample is no power of 2: the sweep as a whole may be
+        warnings.simplefilter("ignore", UserWarning)
+        for stretch in np.split(indices, np.flatnonzero(np.diff(indices) > 1) + 1):
+            engine.reset()
+            if stretch[0]:
+                engine.fast_forward(int(stretch[0]))
+            points.append(engine.random(stretch.size))
+    return np.concatenate(points)

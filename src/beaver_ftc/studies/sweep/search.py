@@ -8,20 +8,18 @@ is interrupted goes on exactly as it would have, and any number of workers finds
 import math
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.scenario.sweeps import Sweep
+from beaver_ftc.studies.engine.store import batches_of
 from beaver_ftc.studies.engine.study import Batch
 from beaver_ftc.studies.present.tables import finite
-from beaver_ftc.studies.sweep.one_flight import AXES, DEPARTED, Row, counts_of_rows
+from beaver_ftc.studies.sweep.one_flight import AXES, DEPARTED
 from beaver_ftc.studies.sweep.sampling import Assignment, value_at
-from beaver_ftc.studies.sweep.store import Landed, Store
-
-if TYPE_CHECKING:
-    import pyarrow as pa
+from beaver_ftc.studies.sweep.store import Store
 
 WEIGHT, CROSSOVER = 0.7, 0.9  # [Storn and Price 1997] recommend 0.4 to 1 and, for few dependent keys, 0.9
 _OF_SEARCH = 2
@@ -59,11 +57,16 @@ def score(objective: str, row: Mapping[str, Any]) -> float:
     return -math.inf if row["frames"] is None else float(OBJECTIVES[objective](row))
 
 
+def members(keys: int) -> int:
+    """Flights a generation, of so many varied keys."""
+    return min(64, max(16, 4 * keys))
+
+
 class Evolution:
     """The population: points of the unit cube (members, keys) and their scores (members,)."""
 
     def __init__(self, seed: int, keys: int) -> None:
-        self.members = min(64, max(16, 4 * keys))
+        self.members = members(keys)
         self._seed, self._keys = seed, keys
         self.generation = 0
         self._points = np.empty((0, keys))
@@ -99,79 +102,24 @@ class Evolution:
         self.generation += 1
 
 
-class SearchSource:
-    """A `Source`: one generation after the other, `flights` in all."""
+def generations(sweep: Sweep, objective: str, store: Store) -> Iterator[Batch]:
+    """One generation after the other; the next one once this one has landed in the store."""
+    if not sweep.keys:
+        raise BadInput(f"{sweep.name}: vary: nothing varies, allowed in a search: at least one key")
+    evolution = Evolution(sweep.file.seed, len(sweep.keys))
+    for number, runs in batches_of(sweep.flights, evolution.members):
+        points = evolution.trials()[: len(runs)]
+        flights = zip(runs, points, strict=True)
+        yield Batch(number, tuple(Assignment(run, _values(sweep, point)) for run, point in flights))
+        table = store.landed(number, runs)
+        if table is None:
+            return
+        evolution.select(np.array([score(objective, row) for row in table.to_pylist()]))
 
-    def __init__(self, sweep: Sweep, objective: str, store: Store, on_landed: Landed) -> None:
-        if not sweep.keys:
-            raise BadInput(f"{sweep.name}: vary: nothing varies, allowed in a search: at least one key")
-        self._sweep, self._objective, self._store, self._on_landed = sweep, objective, store, on_landed
-        self._evolution = Evolution(sweep.file.seed, len(sweep.keys))
-        self._known: dict[int, Assignment] = {}
-        self._in_flight = False
-        self._catch_up()
 
-    def next_batch(self) -> Batch | None:
-        runs = self._runs(self._evolution.generation)
-        if self._in_flight or not runs:
-            return None
-        self._in_flight = True
-        return Batch(self._evolution.generation, self._assignments(runs))
-
-    def cases_left(self) -> int:
-        return 0  # the next generation waits for this one: it must be spread over all workers
-
-    def landed(self, batch: Batch, rows: list[Row]) -> None:
-        self._store.parts.land(batch.number, rows)
-        self._select(rows)
-        self._in_flight = False
-
-    def tables(self) -> "Iterator[pa.Table]":
-        """Every generation's table, in order."""
-        number = 0
-        while runs := self._runs(number):
-            table = self._store.landed(number, runs)
-            assert table is not None
-            yield table
-            number += 1
-
-    def assignment(self, index: int) -> Assignment:
-        """The values of a flight that has been flown, or is next. Raises BadInput for one still unknown."""
-        for flight in self._assignments(self._runs(self._evolution.generation)):
-            self._known[flight.run] = flight
-        if index not in self._known:
-            raise BadInput(
-                f"flight {index} of {self._sweep.name} is not known yet: the search has not come so far"
-            )
-        return self._known[index]
-
-    def _catch_up(self) -> None:
-        while runs := self._runs(self._evolution.generation):
-            table = self._store.landed(self._evolution.generation, runs)
-            if table is None:
-                return
-            self._known.update({flight.run: flight for flight in self._assignments(runs)})
-            self._select(table.to_pylist())
-
-    def _select(self, rows: list[Row]) -> None:
-        self._evolution.select(np.array([score(self._objective, row) for row in rows]))
-        self._on_landed(counts_of_rows(rows))
-
-    def _assignments(self, runs: range) -> tuple[Assignment, ...]:
-        if not runs:
-            return ()
-        points = self._evolution.trials()[: len(runs)]
-        return tuple(
-            Assignment(index, self._values(point)) for index, point in zip(runs, points, strict=True)
-        )
-
-    def _values(self, point: np.ndarray) -> dict[str, Any]:
-        keys = self._sweep.file.vary.items()
-        return {key: value_at(how, float(u)) for (key, how), u in zip(keys, point, strict=True)}
-
-    def _runs(self, generation: int) -> range:
-        members, flights = self._evolution.members, self._sweep.flights
-        return range(generation * members, min((generation + 1) * members, flights))
+def _values(sweep: Sweep, point: np.ndarray) -> dict[str, Any]:
+    keys = sweep.file.vary.items()
+    return {key: value_at(how, float(u)) for (key, how), u in zip(keys, point, strict=True)}
 
 
 def found(objective: str, results: Path, sweep: Sweep) -> dict[str, Any]:
@@ -181,8 +129,7 @@ def found(objective: str, results: Path, sweep: Sweep) -> dict[str, Any]:
     rows = read_table(results).to_pylist()
     scores = np.array([score(objective, row) for row in rows])
     best = int(scores.argmax())
-    members = Evolution(sweep.file.seed, len(sweep.keys)).members
-    ends = [*range(members - 1, scores.size - 1, members), scores.size - 1]  # the last may be cut short
+    ends = [runs[-1] for _, runs in batches_of(scores.size, members(len(sweep.keys)))]
     after = np.maximum.accumulate(scores)[ends]
     return {
         "objective": objective,

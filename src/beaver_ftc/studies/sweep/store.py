@@ -3,19 +3,17 @@
 import contextlib
 import json
 import shutil
-from collections.abc import Callable, Iterator, Sequence
-from hashlib import sha256
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any, Self
 
-from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
+from beaver_ftc.results.writer import clear_disk_errors, refuse_foreign, sync
 from beaver_ftc.scenario.sweeps import Sweep
 from beaver_ftc.studies.engine import store as files
-from beaver_ftc.studies.engine.store import KEPT, Identity, Parts, batches_of
-from beaver_ftc.studies.engine.study import Batch, Batches
-from beaver_ftc.studies.sweep.one_flight import counts_of_rows, counts_of_table, schema_of, table_of
-from beaver_ftc.studies.sweep.sampling import Plan
+from beaver_ftc.studies.engine.store import KEPT, Document, Parts
+from beaver_ftc.studies.engine.workers import Number
+from beaver_ftc.studies.sweep.one_flight import schema_of, table_of
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -31,21 +29,14 @@ _WRITE_OPTIONS: dict[str, Any] = {"compression": "snappy", "write_statistics": F
 _NOT_FLOWN = ("description", "expect", "base", "set")
 
 
-def identity_of(sweep: Sweep, search: str | None = None) -> Identity:
+def identity_of(sweep: Sweep, search: str | None = None) -> Document:
     """The identity of a sweep on this machine, as in `sweep.json`."""
     file = sweep.file.model_dump(mode="json", exclude_none=True)
     asked = {key: value for key, value in file.items() if key not in _NOT_FLOWN}
-    flown = {"runs": sweep.flights, "base": sweep.base, "aircraft": _digest(sweep.aircraft), "search": search}
-    return Identity.of("sweep", {**asked, **flown})
-
-
-def _digest(aircraft: Aircraft) -> str:
-    """The aircraft's files, so that a sweep is not resumed with another one of the same name."""
-    digest = sha256()
-    for path in sorted(aircraft.folder.rglob("*")):
-        if path.suffix in (".xml", ".yaml"):
-            digest.update(path.name.encode() + path.read_bytes())
-    return digest.hexdigest()
+    paths = sorted(sweep.aircraft.folder.rglob("*"))  # another one of the same name is not the same
+    aircraft = files.digest(path for path in paths if path.suffix in (".xml", ".yaml"))
+    flown = {"runs": sweep.flights, "base": sweep.base, "aircraft": aircraft, "search": search}
+    return files.identity("sweep", {**asked, **flown})
 
 
 class RowsAsParquet:
@@ -78,7 +69,7 @@ class Store:
         self._compacted: pa.Table | None = None
 
     def __enter__(self) -> Self:
-        with files.clear_disk_errors(self.folder):
+        with clear_disk_errors(self.folder):
             _refuse_foreign(self.folder)
             self.folder.mkdir(parents=True, exist_ok=True)
             self._open.enter_context(files.locked(self.folder))
@@ -87,39 +78,38 @@ class Store:
     def __exit__(self, *_: object) -> None:
         self._open.close()
 
-    def begin(self, identity: Identity, resume: bool) -> None:
+    def begin(self, identity: Document, resume: bool) -> None:
         """Make the folder this sweep's. Raises BadInput where flights in it would be lost or mixed.
 
         A finished sweep is replaced unless it is to be resumed; an unfinished one never is.
         """
-        there = self._identity()
+        there, flown = self._identity(), self.results.exists() or bool(self.parts)
         if there is not None and resume:
-            identity.refuse_other(there, self.folder)
-        elif there is not None and self._has_flights() and not (self.folder / "summary.json").exists():
+            files.refuse_other(identity, there, self.folder)
+        elif there is not None and flown and not (self.folder / "summary.json").exists():
             raise BadInput(
                 f"{self.folder}: holds an unfinished sweep, allowed: --resume to go on with it, "
                 "another --out, or to remove it first"
             )
-        with files.clear_disk_errors(self.folder):
+        with clear_disk_errors(self.folder):
             if there is None or not resume:
                 self._clear()
             self.parts.folder.mkdir(exist_ok=True)
-            manifest = json.dumps(identity.document, indent=2).encode() + b"\n"
+            manifest = json.dumps(identity, indent=2).encode() + b"\n"
             files.write_whole(self.folder / "sweep.json", manifest)
-            files.sync_folder(self.folder.parent)
+            sync(self.folder.parent)
             files.remove_leftovers(self.folder)
 
-    def landed(self, batch: int, runs: range) -> "pa.Table | None":
+    def landed(self, batch: Number, runs: Sequence[int]) -> "pa.Table | None":
         """The table of a batch if it has landed whole."""
-        table = self.parts.landed(batch, runs)
-        return self._compacted_batch(runs) if table is None else table
-
-    def _compacted_batch(self, runs: range) -> "pa.Table | None":
         from pyarrow.parquet import read_table
 
+        table = self.parts.landed(batch, runs)
+        if table is not None:
+            return table
         if self._compacted is None and self.results.exists():
             self._compacted = read_table(self.results, schema=self.schema)
-        return self._compacted and self._compacted.slice(runs.start, len(runs))
+        return self._compacted and self._compacted.slice(runs[0], len(runs))
 
     def is_compacted(self, flights: int) -> bool:
         """Whether `results.parquet` is there with all flights."""
@@ -132,23 +122,16 @@ class Store:
         except (FileNotFoundError, ArrowException):
             return False
 
-    def reopen(self) -> None:
-        """There is still something to fly: let nobody take the sweep for finished."""
-        (self.folder / "summary.json").unlink(missing_ok=True)
-
-    def compact(self, batches: Iterator["pa.Table"]) -> None:
+    def compact(self, batches: Iterable["pa.Table"]) -> None:
         """Make `results.parquet` of all batches, in order, and remove the parts."""
-        with files.clear_disk_errors(self.folder, KEPT):
+        with clear_disk_errors(self.folder, KEPT):
             files.replace_whole(self.results, lambda file: write_tables(file, batches, self.schema))
             self.parts.remove()
 
     def write(self, name: str, text: str) -> None:
         """Write a file of the folder, whole or not at all."""
-        with files.clear_disk_errors(self.folder):
+        with clear_disk_errors(self.folder):
             files.write_whole(self.folder / name, text.encode("utf-8"))
-
-    def _has_flights(self) -> bool:
-        return self.results.exists() or bool(self.parts)
 
     def _identity(self) -> dict[str, Any] | None:
         try:
@@ -163,53 +146,38 @@ class Store:
 
         What a user has put into its folders stays: SimulationFailed for a kept flight that is no longer ours.
         """
-        from beaver_ftc.results.writer import refuse_foreign
+        from beaver_ftc.studies.sweep.pictures import FIGURES
 
         for flight in (self.folder / "flights").glob("*"):
             refuse_foreign(flight)
-        _remove(self.folder / "flights")
-        _remove(self.folder / "parts")
-        for name in figures_of_a_sweep():
-            (self.folder / "figures" / name).unlink(missing_ok=True)
+        for folder in (self.folder / "flights", self.parts.folder):
+            if folder.is_dir():
+                shutil.rmtree(folder)
+        for name in FIGURES:
+            (self.folder / "figures" / f"{name}.png").unlink(missing_ok=True)
         with contextlib.suppress(OSError):  # not empty: somebody else's
             (self.folder / "figures").rmdir()
         for name in (*sorted(OWN_FILES - FOLDERS - {files.LOCK, "sweep.json"}), "sweep.json"):
             (self.folder / name).unlink(missing_ok=True)
 
 
-def _remove(folder: Path) -> None:
-    if folder.is_dir():
-        shutil.rmtree(folder)
+def write_tables(file: IO[bytes], tables: Iterable["pa.Table"], schema: "pa.Schema") -> None:
+    """Write tables one after the other into a parquet file, in row groups worth reading.
 
-
-def figures_of_a_sweep() -> list[str]:
-    """The files a sweep draws."""
-    from beaver_ftc.studies.sweep.pictures import FIGURES
-
-    return [f"{name}.png" for name in FIGURES]
-
-
-def write_tables(file: IO[bytes], tables: "Iterator[pa.Table] | list[pa.Table]", schema: "pa.Schema") -> None:
-    """Write tables one after the other into a parquet file, in row groups worth reading."""
+    They are joined into these as they come: the memory they take is bounded.
+    """
+    import pyarrow as pa
     from pyarrow.parquet import ParquetWriter
 
-    with ParquetWriter(file, schema, **_WRITE_OPTIONS) as writer:
-        for group in _grouped(iter(tables)):
-            writer.write_table(group)
-
-
-def _grouped(tables: "Iterator[pa.Table]") -> "Iterator[pa.Table]":
-    """Tables joined into row groups, the memory they take bounded."""
-    import pyarrow as pa
-
     waiting: list[pa.Table] = []
-    for table in tables:
-        waiting.append(table)
-        if sum(len(part) for part in waiting) >= ROWS_PER_GROUP:
-            yield pa.concat_tables(waiting)
-            waiting = []
-    if waiting:
-        yield pa.concat_tables(waiting)
+    with ParquetWriter(file, schema, **_WRITE_OPTIONS) as writer:
+        for table in tables:
+            waiting.append(table)
+            if sum(map(len, waiting)) >= ROWS_PER_GROUP:
+                writer.write_table(pa.concat_tables(waiting))
+                waiting = []
+        if waiting:
+            writer.write_table(pa.concat_tables(waiting))
 
 
 def _refuse_foreign(folder: Path) -> None:
@@ -231,8 +199,6 @@ FRAMES_A_BATCH = 50_000  # a third of a second of work: little to lose, and a fi
 MOST_A_BATCH = 256
 MOST_BATCHES = 4_000  # of a sweep of millions: so many files are read again in seconds
 
-Landed = Callable[[Any], None]  # takes the counts of a batch
-
 
 def batch_size(sweep: Sweep) -> int:
     """Flights a batch, from the sweep alone, so that a resumed sweep has the same batches."""
@@ -240,32 +206,3 @@ def batch_size(sweep: Sweep) -> int:
     frames = scenario.duration_s * scenario.rate_hz * scenario.substeps
     size = max(1, min(MOST_A_BATCH, round(FRAMES_A_BATCH / frames)))
     return max(size, -(-sweep.flights // MOST_BATCHES))
-
-
-class SweepSource(Batches):
-    """The batches that have not landed yet, in order."""
-
-    def __init__(self, sweep: Sweep, store: Store, on_landed: Landed) -> None:
-        self._store, self._on_landed = store, on_landed
-        self._batches = dict(batches_of(sweep.flights, batch_size(sweep)))
-        plan, missing = Plan(sweep), self._find_missing()
-        super().__init__(
-            (Batch(number, tuple(plan.assignments(self._batches[number]))) for number in missing),
-            sum(len(self._batches[number]) for number in missing),
-            lambda batch, rows: on_landed(counts_of_rows(rows)),
-            store.parts,
-        )
-
-    def tables(self) -> "Iterator[pa.Table]":
-        """Every batch's table, in order; all must have landed."""
-        return (self._store.landed(number, runs) for number, runs in self._batches.items())
-
-    def _find_missing(self) -> list[int]:
-        missing = []
-        for number, runs in self._batches.items():
-            table = self._store.landed(number, runs)
-            if table is None:
-                missing.append(number)
-            else:
-                self._on_landed(counts_of_table(table))
-        return missing

@@ -7,29 +7,16 @@ import math
 import re
 from collections import Counter
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING, Any
+from functools import partial
+from typing import Any
 
 import numpy as np
 
-from beaver_ftc.scenario.sweeps import AxisLevels, Level, QuantileLevel, SweepExpect
-from beaver_ftc.studies.engine.statistics import (
-    CONFIDENCE,
-    Estimate,
-    poisson,
-    poisson_bound,
-    quantile,
-    quantile_bound,
-    wilson,
-    wilson_bound,
-)
+from beaver_ftc.scenario.sweeps import AxisLevels, Level, QuantileLevel, Sweep, SweepExpect
+from beaver_ftc.studies.engine import statistics
+from beaver_ftc.studies.engine.statistics import CONFIDENCE, Estimate, quantile, wilson
 from beaver_ftc.studies.sweep.one_flight import AXES
 from beaver_ftc.studies.sweep.outcomes import NO_FAULT, Flights, Ranking, rank
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from beaver_ftc.scenario.sweeps import Sweep
-
 
 Document = dict[str, Any]
 
@@ -46,7 +33,7 @@ MOST_REASONS = 20
 _NUMBERS = re.compile(r"-?\d+(\.\d+)?(e[-+]?\d+)?")
 
 
-def summarise(flights: Flights, sweep: "Sweep") -> Document:
+def summarise(flights: Flights, sweep: Sweep) -> Document:
     """The statistics of a sweep's flights."""
     return {
         "sweep": sweep.name,
@@ -55,7 +42,7 @@ def summarise(flights: Flights, sweep: "Sweep") -> Document:
         "sampling": sweep.file.sampling,
         "flights": len(flights),
         "flown_h": number(float(np.nansum(flights["flown_s"])) / 3600),
-        "statuses": _statuses(flights),
+        "statuses": dict(sorted(Counter(flights["status"].tolist()).items())),
         "reasons": _reasons(flights),
         "detection": _detection(flights, flights.faulted),
         "isolation": _isolation(flights, flights.faulted),
@@ -92,12 +79,12 @@ def _estimate(name: str, found: Estimate) -> Document:
 
 def quantiles(values: np.ndarray) -> Document:
     """Quantiles of values (n,); infinity stands for what never came; an infinite quantile is null."""
-    ordered = np.sort(values[~np.isnan(values)])
+    ordered = _told(values)
     return {"of": int(ordered.size), **{name: number(quantile(ordered, q)) for name, q in QUANTILES.items()}}
 
 
-def _statuses(flights: Flights) -> dict[str, int]:
-    return dict(sorted(Counter(flights["status"].tolist()).items()))
+def _told(values: np.ndarray) -> np.ndarray:
+    return np.sort(values[~np.isnan(values)])
 
 
 def _reasons(flights: Flights) -> list[Document]:
@@ -139,7 +126,7 @@ def _false_alarms(flights: Flights) -> Document:
     return {
         "count": count,
         "hours": number(hours),
-        **_estimate("per_hour", poisson(count, hours)),
+        **_estimate("per_hour", statistics.poisson(count, hours)),
         "closest_residual_ratio": number(float(np.nanmax(flights["worst_residual_ratio"], initial=0.0))),
     }
 
@@ -161,29 +148,27 @@ def _by_fault(flights: Flights) -> list[Document]:
     return [
         {
             "fault": label,
-            "flights": int((labels == label).sum()),
-            "detection": _detection(flights, flights.faulted & (labels == label)),
-            "isolation": _isolation(flights, flights.faulted & (labels == label)),
+            "flights": int(alike.sum()),
+            "detection": _detection(flights, flights.faulted & alike),
+            "isolation": _isolation(flights, flights.faulted & alike),
         }
         for label in sorted(set(labels[flights.faulted]))
+        for alike in (labels == label,)
     ]
 
 
 def _confusion(flights: Flights) -> Document:
     """Declared fault against diagnosis, of all flights that have metrics."""
-    said = np.where(flights["isolation.fault"] != "", flights["isolation.fault"], NOT_ISOLATED)
+    faults, said = flights.fault_labels, flights["isolation.fault"]
+    said = np.where(said != "", said, NOT_ISOLATED)
     said = np.where(flights["detection.detected"], said, NO_ALARM)
-    said = np.where(flights["false_alarm"] & (flights.fault_labels != NO_FAULT), FALSE_ALARM, said)
-    rows = sorted(set(flights.fault_labels[flights.measured]))
-    found = set(said[flights.measured])
+    said = np.where(flights["false_alarm"] & (faults != NO_FAULT), FALSE_ALARM, said)
+    pairs = Counter(zip(faults[flights.measured], said[flights.measured], strict=True))
+    rows, found = ({pair[side] for pair in pairs} for side in (0, 1))
     last = [name for name in (UNANTICIPATED, NOT_ISOLATED, NO_ALARM, FALSE_ALARM) if name in found]
     columns = [*sorted(found.difference(last)), *last]
-    pairs = Counter(zip(flights.fault_labels[flights.measured], said[flights.measured], strict=True))
-    return {
-        "faults": rows,
-        "diagnoses": columns,
-        "counts": [[pairs[row, col] for col in columns] for row in rows],
-    }
+    counts = [[pairs[row, column] for column in columns] for row in sorted(rows)]
+    return {"faults": sorted(rows), "diagnoses": columns, "counts": counts}
 
 
 def _tracking(flights: Flights, axis: str) -> Document:
@@ -205,7 +190,7 @@ def _sensitivity(flights: Flights) -> dict[str, Ranking]:
         "residual_before_fault": (flights.measured, flights["worst_residual_ratio"]),
     }
     return {
-        name: rank({key: flights.values(key)[group] for key in flights.vary}, outcome[group])
+        name: rank({key: flights[key][group] for key in flights.vary}, outcome[group])
         for name, (group, outcome) in outcomes.items()
     }
 
@@ -218,10 +203,7 @@ def evaluate(expect: SweepExpect, flights: Flights) -> list[Document]:
 
     actual: what was held against the bound, null where the flights do not tell; `of` how many flights tell.
     """
-    return [
-        _verdict(name, level, side, *estimate_of(flights, name, level))
-        for name, level, side in _bounds(expect)
-    ]
+    return [_verdict(flights, *bound) for bound in _bounds(expect)]
 
 
 def names(expect: SweepExpect) -> list[str]:
@@ -230,21 +212,17 @@ def names(expect: SweepExpect) -> list[str]:
 
 
 def _bounds(expect: SweepExpect) -> Iterator[tuple[str, Level, str]]:
-    for name, level in _levels(expect):
-        for side in ("at_least", "at_most"):
-            if getattr(level, side) is not None:
-                yield name, level, side
-
-
-def _levels(expect: SweepExpect) -> Iterator[tuple[str, Level]]:
     for name, level in expect:
-        if isinstance(level, AxisLevels):
-            yield from ((f"{name}.{axis}", own) for axis, own in level if own is not None)
-        elif level is not None:
-            yield name, level
+        axes = level if isinstance(level, AxisLevels) else ()
+        levels = [(f"{name}.{axis}", own) for axis, own in axes] or [(name, level)]
+        for full_name, own in levels:
+            for side in ("at_least", "at_most"):
+                if own is not None and getattr(own, side) is not None:
+                    yield full_name, own, side
 
 
-def _verdict(name: str, level: Level, side: str, of: int, value: float, bound: Bound) -> Document:
+def _verdict(flights: Flights, name: str, level: Level, side: str) -> Document:
+    of, value, bound = estimate_of(flights, name, level)
     limit = getattr(level, side)
     actual = value if level.confidence is None else bound(level.confidence, side == "at_most")
     kept = actual >= limit if side == "at_least" else actual <= limit
@@ -260,40 +238,26 @@ def _verdict(name: str, level: Level, side: str, of: int, value: float, bound: B
 
 def estimate_of(flights: Flights, name: str, level: Level) -> tuple[int, float, Bound]:
     """(number of flights, estimate, its bounds) of a named quantity."""
+    if isinstance(level, QuantileLevel):
+        quantity, _, axis = name.partition(".")
+        ordered = _told(_DELAYS_AND_ERRORS[quantity](flights, axis)[flights.faulted])
+        found = quantile(ordered, level.quantile)
+        return ordered.size, found, partial(statistics.quantile_bound, ordered, level.quantile)
     if name in _RATES:
         hits, of = _RATES[name](flights)
-        return _rate(int((hits & of).sum()), int(of.sum()))
-    if name == "false_alarms_per_hour":
-        return _false_alarm_rate(flights)
-    assert isinstance(level, QuantileLevel)
-    return _quantile(_values(flights, name), level.quantile)
-
-
-def _rate(count: int, of: int) -> tuple[int, float, Bound]:
-    return of, wilson(count, of).value, lambda confidence, upper: wilson_bound(count, of, confidence, upper)
-
-
-def _false_alarm_rate(flights: Flights) -> tuple[int, float, Bound]:
+        count, trials = int((hits & of).sum()), int(of.sum())
+        return trials, wilson(count, trials).value, partial(statistics.wilson_bound, count, trials)
     count, hours = flights.false_alarms
-    of = int(flights.measured.sum()) if hours > 0 else 0
-    return of, poisson(count, hours).value, lambda c, upper: poisson_bound(count, hours, c, upper)
+    told = int(flights.measured.sum()) if hours > 0 else 0
+    return told, statistics.poisson(count, hours).value, partial(statistics.poisson_bound, count, hours)
 
 
-def _quantile(values: "NDArray[np.float64]", q: float) -> tuple[int, float, Bound]:
-    ordered = np.sort(values[~np.isnan(values)])
-    return ordered.size, quantile(ordered, q), lambda c, upper: quantile_bound(ordered, q, c, upper)
-
-
-def _values(flights: Flights, name: str) -> "NDArray[np.float64]":
-    quantity, _, axis = name.partition(".")
-    return {
-        "detection_delay_s": lambda: flights.detection_delay_s,
-        "isolation_delay_s": lambda: flights.isolation_delay_s,
-        "post_fault_rms_deg_s": lambda: flights.post_fault_rms_deg_s(axis),
-        "tracking_ratio": lambda: flights.tracking_ratio(axis),
-    }[quantity]()[flights.faulted]
-
-
+_DELAYS_AND_ERRORS: dict[str, Callable[[Flights, str], np.ndarray]] = {
+    "detection_delay_s": lambda flights, axis: flights.detection_delay_s,
+    "isolation_delay_s": lambda flights, axis: flights.isolation_delay_s,
+    "post_fault_rms_deg_s": lambda flights, axis: flights.post_fault_rms_deg_s(axis),
+    "tracking_ratio": lambda flights, axis: flights.tracking_ratio(axis),
+}
 _RATES: dict[str, Callable[[Flights], tuple[np.ndarray, np.ndarray]]] = {
     "detection_rate": lambda flights: (flights.detected, flights.faulted),
     "isolation_rate": lambda flights: (flights.isolated, flights.faulted),

@@ -3,7 +3,6 @@
 Everything is said from the summary document, so that the words and `summary.json` cannot disagree.
 """
 
-from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +13,6 @@ from beaver_ftc.studies.sweep.pictures import FIGURES
 from beaver_ftc.studies.sweep.summary import OUTCOMES
 
 if TYPE_CHECKING:
-    from jinja2 import Environment
     from rich.table import Table
 
 
@@ -32,19 +30,17 @@ def title(summary: Document) -> str:
 
 def facts(summary: Document) -> list[tuple[str, str]]:
     """(what, what the flights show) for each thing worth knowing."""
+    lost, wrong = summary["departures"], summary["isolation"]["wrong"]
     said = (
         ("flights", _flights(summary)),
         ("searched for", _search(summary)),
         ("detection", _rate(summary["detection"], "faults detected")),
-        ("detection delay", _quantiles(summary["detection"]["delay_s"], "s")),
+        ("detection delay", _quantiles(summary["detection"]["delay_s"])),
         ("isolation", _rate(summary["isolation"], "faults named rightly")),
-        ("wrongly named", _wrong(summary["isolation"]["wrong"])),
+        ("wrongly named", f"{wrong['count']} of {wrong['of']} named" if wrong["count"] else ""),
         ("false alarms", _false_alarms(summary["false_alarms"])),
         ("guarantee", _guarantee(summary["guarantee"])),
-        (
-            "departures",
-            _rate(summary["departures"], "flights lost") if summary["departures"]["count"] else "",
-        ),
+        ("departures", _rate(lost, "flights lost") if lost["count"] else ""),
         ("drives the delay", _drivers(summary["sensitivity"]["detection_delay"])),
         ("drives misses", _drivers(summary["sensitivity"]["missed_detection"])),
     )
@@ -53,13 +49,11 @@ def facts(summary: Document) -> list[tuple[str, str]]:
 
 def tracking(summary: Document) -> list[tuple[str, str, str, str]]:
     """(what, p, q, r): medians of the tracking errors, deg/s, and of their ratio."""
-    rows = (
-        ("before the fault", "pre_fault_rms_deg_s"),
-        ("after", "post_fault_rms_deg_s"),
-        ("ratio", "ratio"),
-    )
-    medians = [(what, [summary["tracking"][axis][key]["median"] for axis in AXES]) for what, key in rows]
-    return [(what, value(p), value(q), value(r)) for what, (p, q, r) in medians if {p, q, r} != {None}]
+    rows = {"before the fault": "pre_fault_rms_deg_s", "after": "post_fault_rms_deg_s", "ratio": "ratio"}
+    medians = {what: [summary["tracking"][a][key]["median"] for a in AXES] for what, key in rows.items()}
+    return [
+        (what, value(p), value(q), value(r)) for what, (p, q, r) in medians.items() if {p, q, r} != {None}
+    ]
 
 
 def expectations(summary: Document) -> list[tuple[str, str, str, bool]]:
@@ -108,13 +102,9 @@ def percent(share: float | None) -> str:
 
 def summary_text(summary: Document, colour: bool = False) -> str:
     """The summary as a table for the terminal."""
-    lines = [printed([_table(summary)], colour=colour), *_worth_a_look(summary)]
-    return "\n".join(lines) + "\n"
-
-
-def _worth_a_look(summary: Document) -> list[str]:
-    """The worst flights with their commands, each on a line of its own to be copied."""
-    return [f" {'; '.join(flight['why'])}:\n   {flight['replay']}" for flight in summary["worst"][:3]]
+    # commands each on a line of its own to be copied
+    worst = [f" {'; '.join(flight['why'])}:\n   {flight['replay']}" for flight in summary["worst"][:3]]
+    return "\n".join([printed([_table(summary)], colour=colour), *worst]) + "\n"
 
 
 def _table(summary: Document) -> "Table":
@@ -129,9 +119,8 @@ def _table(summary: Document) -> "Table":
         table.add_row(what, how)
     for what, p, q, r in tracking(summary):
         unit = "" if what == "ratio" else " deg/s"
-        table.add_row(
-            "tracking RMS, median" if what.startswith("before") else "", f"p {p}  q {q}  r {r}{unit} {what}"
-        )
+        label = "tracking RMS, median" if what.startswith("before") else ""
+        table.add_row(label, f"p {p}  q {q}  r {r}{unit} {what}")
     for name, bound, actual, passed in expectations(summary):
         mark = Text("met   " if passed else "MISSED", "green" if passed else "bold red")
         table.add_row("expected", Text.assemble(mark, f" {name} {bound}: {actual}"))
@@ -140,11 +129,8 @@ def _table(summary: Document) -> "Table":
 
 
 def _flights(summary: Document) -> str:
-    others = ", ".join(
-        f"{count} {status.replace('_', ' ')}"
-        for status, count in summary["statuses"].items()
-        if status != "flown"
-    )
+    statuses = [(count, name.replace("_", " ")) for name, count in summary["statuses"].items()]
+    others = ", ".join(f"{count} {name}" for count, name in statuses if name != "flown")
     return f"{summary['flights']}, {summary['flown_h']:.3g} h in the air{f' ({others})' if others else ''}"
 
 
@@ -165,22 +151,11 @@ def _rate(rate: Document, what: str) -> str:
     )
 
 
-def _wrong(rate: Document) -> str:
-    return f"{rate['count']} of {rate['of']} named" if rate["count"] else ""
-
-
-def _quantiles(quantiles: Document, unit: str) -> str:
-    if not quantiles["of"]:
+def _quantiles(delays: Document) -> str:
+    if not delays["of"]:
         return ""
-    named = ", ".join(
-        f"{name.replace('p', '') + ' %' if name[0] == 'p' else name} {_delay(quantiles[name], unit)}"
-        for name in ("median", "p95", "p99", "max")
-    )
-    return named
-
-
-def _delay(seconds: float | None, unit: str) -> str:
-    return "never" if seconds is None else f"{value(seconds)} {unit}"
+    quantiles = {"median": "median", "p95": "95 %", "p99": "99 %", "max": "max"}
+    return ", ".join(f"{says} {number(delays[name], 's', 'never')}" for name, says in quantiles.items())
 
 
 def _false_alarms(found: Document) -> str:
@@ -204,12 +179,12 @@ def _drivers(ranking: list[Document]) -> str:
     return ", ".join(f"{entry['key']} ({percent(entry['explained'])} of the ranks)" for entry in told)
 
 
-_TEMPLATES = Path(__file__).parent / "templates"
-
-
 def render(summary: Document, folder: Path) -> str:
     """The report as HTML text, from the summary and the figures and flights in the sweep's folder."""
-    return _environment().get_template("sweep.html.j2").render(
+    from beaver_ftc.results.report import template
+
+    figures = [(title, folder / "figures" / f"{name}.png") for name, (title, _) in FIGURES.items()]
+    return template(Path(__file__).parent / "templates" / "sweep.html.j2").render(
         summary=summary,
         title=title(summary),
         facts=facts(summary),
@@ -218,7 +193,7 @@ def render(summary: Document, folder: Path) -> str:
         sensitivity=[(OUTCOMES[name], ranking) for name, ranking in summary["sensitivity"].items()
                      if ranking],
         worst=[flight | {"link": _link(folder, flight["name"])} for flight in summary["worst"]],
-        figures=_figures(folder),
+        figures=[(title, picture_data(path)) for title, path in figures if path.exists()],
         value=value,
         percent=percent,
     )  # fmt: skip
@@ -226,21 +201,5 @@ def render(summary: Document, folder: Path) -> str:
 
 def _link(folder: Path, name: str) -> str | None:
     """Where a kept flight is to be seen, relative to the report."""
-    for seen in ("report.html", "metrics.json", "scenario.yaml"):
-        if (folder / "flights" / name / seen).is_file():
-            return f"flights/{name}/{seen}"
-    return None
-
-
-def _figures(folder: Path) -> list[tuple[str, str]]:
-    """(title, PNG as base64) of each figure there is."""
-    paths = [(title, folder / "figures" / f"{name}.png") for name, (title, _) in FIGURES.items()]
-    return [(title, picture_data(path)) for title, path in paths if path.exists()]
-
-
-@cache
-def _environment() -> "Environment":
-    from jinja2 import Environment, FileSystemLoader, StrictUndefined
-
-    options: dict[str, Any] = {"autoescape": True, "trim_blocks": True, "lstrip_blocks": True}
-    return Environment(loader=FileSystemLoader(_TEMPLATES), undefined=StrictUndefined, **options)
+    seen = [f"flights/{name}/{file}" for file in ("report.html", "metrics.json", "scenario.yaml")]
+    return next((path for path in seen if (folder / path).is_file()), None)

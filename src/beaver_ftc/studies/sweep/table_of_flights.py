@@ -62,10 +62,10 @@ def _made(scenario: ScenarioLike, asked: dict[str, Any]) -> Sweep:
 
 def _here(made: Sweep) -> "pa.Table":
     """Flown one after the other in this process."""
-    from beaver_ftc.studies.sweep.one_flight import Job, fly_one, schema_of, table_of
+    from beaver_ftc.studies.sweep.one_flight import fly_one, schema_of, table_of
     from beaver_ftc.studies.sweep.sampling import Plan
 
-    rows = [fly_one(Job(made), flight) for flight in Plan(made).assignments(range(made.flights))]
+    rows = [fly_one(made, flight) for flight in Plan(made).assignments(range(made.flights))]
     return table_of(made, schema_of(made), rows)
 
 
@@ -84,13 +84,11 @@ def _kept(made: Sweep, workers: int, out: str | PathLike[str] | None) -> "pa.Tab
 @contextlib.contextmanager
 def _main_hidden() -> Iterator[None]:
     """Workers started meanwhile do not import the caller's script, which would start the sweep again."""
-    main = sys.modules["__main__"]
-    own, spec = vars(main), main.__spec__
-    file = own.pop("__file__", None)
-    main.__spec__ = None
+    main = vars(sys.modules["__main__"])
+    shown = {name: value for name, value in main.items() if name in ("__file__", "__spec__")}
+    main.pop("__file__", None)
+    main["__spec__"] = None
     try:
         yield
     finally:
-        main.__spec__ = spec
-        if file is not None:
-            own["__file__"] = file
+        main.update(shown)

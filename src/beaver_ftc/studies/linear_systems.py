@@ -20,7 +20,6 @@ CHANNELS = (("aileron", "p"), ("elevator", "q"), ("rudder", "r"))
 class Mode:
     """One mode: its pole with the larger imaginary part, 1/s."""
 
-    name: str
     pole: complex
 
     @property
@@ -40,22 +39,11 @@ def modes(A: np.ndarray) -> dict[str, Mode]:
     share = np.abs(shapes * np.linalg.inv(shapes).T)  # participation of each state in each mode
     lateral = share[len(LONGITUDINAL) :].sum(axis=0) / share.sum(axis=0)
     order = np.argsort(lateral)
-    slow, fast = _by_size(poles[order[:4]])
-    rest = poles[order[4:]]
-    turning = rest[np.argsort(-np.abs(rest.imag))]
-    spiral, roll = sorted(turning[2:], key=abs)
-    found = {"short_period": fast, "phugoid": slow, "roll": roll, "dutch_roll": turning[0], "spiral": spiral}
-    return {name: Mode(name, _upper(found[name])) for name in MODES}
-
-
-def _by_size(poles: np.ndarray) -> tuple[complex, complex]:
-    """Of two pairs the slower's and the faster's pole."""
-    ordered = sorted(poles, key=abs)
-    return ordered[0], ordered[-1]
-
-
-def _upper(pole: complex) -> complex:
-    return complex(pole.real, abs(pole.imag))
+    slow, *_, fast = sorted(poles[order[:4]], key=abs)
+    dutch, _, *real = sorted(poles[order[4:]], key=lambda pole: -abs(pole.imag))
+    spiral, roll = sorted(real, key=abs)
+    found = {"short_period": fast, "phugoid": slow, "roll": roll, "dutch_roll": dutch, "spiral": spiral}
+    return {name: Mode(complex(found[name].real, abs(found[name].imag))) for name in MODES}
 
 
 def deviation(pole: complex, reference: complex) -> float:

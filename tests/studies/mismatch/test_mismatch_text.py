@@ -2,7 +2,7 @@
 
 import pytest
 
-from beaver_ftc.studies.mismatch.models import AXES
+from beaver_ftc.aircraft import AXES
 from beaver_ftc.studies.mismatch.tables import comparison_text, findings, percent, tables
 
 

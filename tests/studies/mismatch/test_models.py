@@ -94,9 +94,7 @@ def test_a_body_at_rest_among_the_stars_keeps_its_rates_against_the_earth():
     attitude, latitude = np.array([[0.4, -0.3, 2.0]]), np.array([0.7])
     at_rest = -earth_in_body(attitude, latitude)
     inertia = inertia_coefficients(MASS)
-    total = models.inertial(inertia, at_rest) + earth_rotation(
-        lambda w: models.inertial(inertia, w), at_rest, attitude, latitude
-    )
+    total = models.inertial(inertia, at_rest) + earth_rotation(inertia, at_rest, attitude, latitude)
     assert total == pytest.approx(np.zeros((1, 3)), abs=1e-20)
 
 
@@ -129,14 +127,14 @@ def test_earth_rotation_is_the_derivative_of_the_rates_of_a_free_body():
 
 def scaled_rotation(scale, inertia, x, attitude, latitude):
     """earth_rotation with an Earth `scale` times as fast: the same with another unit of time."""
-    found = earth_rotation(lambda w: models.inertial(inertia, w), x / scale, attitude, latitude)
+    found = earth_rotation(inertia, x / scale, attitude, latitude)
     return scale**2 * found
 
 
 class TestHealthyActuators:
     def test_ideal_ones_are_where_they_are_told_within_their_stops(self):
         commands = np.array([[0.1, -0.2, 0.3, 0.4], [0.9, -0.9, 0.9, -0.9]])
-        followed = HealthyActuators.of(scenario()).follow(commands)
+        followed = HealthyActuators(scenario()).follow(commands)
         assert np.array_equal(followed, [[0.1, -0.2, 0.3, 0.4], [0.52, -0.49, 0.44, -0.1]])
 
     def test_a_lag_approaches_a_step_exponentially_whatever_the_frames(self):
@@ -144,21 +142,21 @@ class TestHealthyActuators:
             case = scenario(actuators={"bandwidth_rad_s": 20.0}, substeps=substeps)
             commands = np.zeros((50, 4))
             commands[1:] = 0.1
-            followed = HealthyActuators.of(case).follow(commands)
+            followed = HealthyActuators(case).follow(commands)
             t = np.arange(50) / 100
             assert followed[:, 1] == pytest.approx(0.1 * (1 - np.exp(-20 * t)), abs=1e-12)
 
     def test_a_rate_limit_ramps(self):
         commands = np.zeros((50, 4))
         commands[1:] = -0.2
-        followed = HealthyActuators.of(scenario(actuators={"rate_limit_deg_s": 60})).follow(commands)
+        followed = HealthyActuators(scenario(actuators={"rate_limit_deg_s": 60})).follow(commands)
         ramp = np.maximum(-0.2, -np.radians(60) * np.arange(50) / 100)
         assert followed[:, 2] == pytest.approx(ramp, abs=1e-12)
 
     def test_a_flight_in_pieces_is_the_flight(self):
         rng = np.random.default_rng(1)
         commands = rng.uniform(-0.6, 0.6, (300, 4))
-        whole = HealthyActuators.of(scenario(actuators="servo")).follow(commands)
-        pieces = HealthyActuators.of(scenario(actuators="servo"))
+        whole = HealthyActuators(scenario(actuators="servo")).follow(commands)
+        pieces = HealthyActuators(scenario(actuators="servo"))
         joined = np.concatenate([pieces.follow(commands[a : a + 37]) for a in range(0, 300, 37)])
         assert np.array_equal(whole, joined)

@@ -8,6 +8,7 @@ from beaver_ftc.studies.mismatch.sources import SOURCES
 from beaver_ftc.studies.mismatch.split import UNEXPLAINED, Stretch
 
 FRAME_S = 0.1
+PLACE = ("airspeed_mps", "altitude_m", "alpha_rad")
 
 
 def test_figures_are_those_of_all_frames_whatever_the_stretches():
@@ -62,27 +63,33 @@ def test_a_stay_that_goes_on_in_the_next_stretch_is_one():
     bound = ratios([0.5, 1.5], [2.5, 2.0, 0.5, 1.25], [0.5, 1.1])
     assert (bound.exceeded_frames, bound.stays, bound.outside) == (5, 3, True)
     first, second, third = bound.exceedances
-    assert (first.start_s, first.end_s) == (pytest.approx(0.1), pytest.approx(0.4))
-    assert (first.peak_ratio, first.peak_s) == (2.5, pytest.approx(0.2))
-    assert (first.airspeed_mps, first.altitude_m, first.alpha_rad) == pytest.approx((40.2, 1000.2, 0.3))
-    assert (second.start_s, second.end_s, second.peak_ratio) == (pytest.approx(0.5), pytest.approx(0.6), 1.25)
-    assert (third.start_s, third.end_s) == (pytest.approx(0.7), pytest.approx(0.8))
+    assert (first["start_s"], first["end_s"]) == (pytest.approx(0.1), pytest.approx(0.4))
+    assert (first["peak_ratio"], first["peak_s"]) == (2.5, pytest.approx(0.2))
+    assert (first["airspeed_mps"], first["altitude_m"], first["alpha_rad"]) == pytest.approx(
+        (40.2, 1000.2, 0.3)
+    )
+    assert (second["start_s"], second["end_s"], second["peak_ratio"]) == (
+        pytest.approx(0.5),
+        pytest.approx(0.6),
+        1.25,
+    )
+    assert (third["start_s"], third["end_s"]) == (pytest.approx(0.7), pytest.approx(0.8))
 
 
 def test_a_stay_that_goes_on_lower_or_as_high_keeps_its_first_peak():
     for later in (1.25, 1.5):
         (stay,) = ratios([0.5, 1.5], [later, 0.5]).exceedances
-        assert (stay.peak_ratio, stay.peak_s) == (1.5, pytest.approx(0.1))
-        assert stay.end_s == pytest.approx(0.3)
+        assert (stay["peak_ratio"], stay["peak_s"]) == (1.5, pytest.approx(0.1))
+        assert stay["end_s"] == pytest.approx(0.3)
 
 
 def test_of_very_many_stays_the_first_are_kept_and_all_are_counted():
     bound = ratios([1.5, 0.5] * split.MAX_EXCEEDANCES)
     assert (len(bound.exceedances), bound.stays) == (split.MAX_EXCEEDANCES, split.MAX_EXCEEDANCES)
-    last = bound.exceedances[-1].end_s
+    last = bound.exceedances[-1]["end_s"]
     ratios([1.5], [9.0, 0.5], noted=bound)
     assert (len(bound.exceedances), bound.stays) == (split.MAX_EXCEEDANCES, split.MAX_EXCEEDANCES + 1)
-    assert bound.exceedances[-1].end_s == last, "what goes on is another stay than the last one kept"
+    assert bound.exceedances[-1]["end_s"] == last, "what goes on is another stay than the last one kept"
 
 
 def test_a_flight_is_beyond_its_bound_if_any_axis_is():

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from beaver_ftc.aircraft import AXES
 from beaver_ftc.results.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILION, Mark, marks
 from beaver_ftc.results.views import read_series
 from beaver_ftc.studies.linear_systems import CHANNELS, pulse_response, response, zeros
 from beaver_ftc.studies.mismatch.linear import LinearAnalysis
-from beaver_ftc.studies.mismatch.models import AXES
 from beaver_ftc.studies.mismatch.sources import SOURCES
 from beaver_ftc.studies.mismatch.split import CAUSES, ETA_BAR, FAULT, TOTAL, UNEXPLAINED, column
 from beaver_ftc.studies.mismatch.tables import Document, label, percent
@@ -116,47 +116,40 @@ def bound_figure(found: Document) -> "Figure":
     names = [name for name in (*SOURCES, UNEXPLAINED) if max(shares(name)) > LEAST_SHARE]
     values = np.reshape([shares(name) for name in names], (len(names), len(AXES))).T
     notes = [[percent(share) if share > LEAST_SHARE else "" for share in row] for row in values.tolist()]
-    title = f"Largest share of the bound eta_bar\n{found['scenario']}"
-    figure, grid = panels(1, 3, 11.0, 1.6 + 0.34 * max(len(names), 2), title, sharey=True, sharex=True)
-    grey = [name == FAULT for name in names]
+    title = f"Largest share of the bound eta_bar\n{found['scenario']}", "share of eta_bar (1: all of it)"
+    size = 11.0, 1.6 + 0.34 * max(len(names), 2)
     ends = LEAST_SHARE, 30.0 * max(values.max(initial=0.0), 1.0)
-    _bars(grid[0], [label(name) for name in names], np.maximum(values, LEAST_SHARE), notes, grey, ends)
-    label_edges(grid, "share of eta_bar (1: all of it)", titles=AXIS_NAMES)
-    return figure
+    shown = [label(name) for name in names], np.maximum(values, LEAST_SHARE), notes
+    return _bars(size, title, *shown, ends, grey=FAULT)
 
 
 def comparison_figure(entries: Sequence[Document]) -> "Figure":
     """How much of the bound each flight has needed, per axis, on a logarithmic scale."""
     needed = [[each[f"{axis}_worst_ratio"] for each in entries] for axis in AXES]
     ratios = np.array([[BEYOND if r is None else max(r, 1e-6) for r in row] for row in needed])
-    reasons = [[label(each[f"{axis}_dominant"]) for each in entries] for axis in AXES]
     notes = [
-        [f"{percent(ratio)} ({reason})" for ratio, reason in zip(*of_axis, strict=True)]
-        for of_axis in zip(ratios.tolist(), reasons, strict=True)
+        [f"{percent(r)} ({label(each[f'{axis}_dominant'])})" for r, each in zip(row, entries, strict=True)]
+        for row, axis in zip(ratios.tolist(), AXES, strict=True)
     ]
-    title = "Mismatch at its worst, faults aside, over the bound"
-    figure, grid = panels(1, 3, 12.0, 1.6 + 0.38 * max(len(entries), 2), title, sharey=True, sharex=True)
+    title = "Mismatch at its worst, faults aside, over the bound", "largest mismatch / eta_bar"
+    size = 12.0, 1.6 + 0.38 * max(len(entries), 2)
     ends = min(0.1, 0.5 * ratios.min()), 60.0 * max(ratios.max(), 1.0)
-    _bars(grid[0], [each["scenario"] for each in entries], ratios, notes, [False] * len(entries), ends)
-    label_edges(grid, "largest mismatch / eta_bar", titles=AXIS_NAMES)
-    return figure
+    return _bars(size, title, [each["scenario"] for each in entries], ratios, notes, ends)
 
 
 def _bars(
-    row: Any,
-    names: Sequence[str],
-    values: np.ndarray,
-    notes: Sequence[Sequence[str]],
-    grey: Sequence[bool],
-    ends: tuple[float, float],
-) -> None:
-    """Horizontal bars (axes, names), what is said beside each, red beyond 1; on a logarithmic scale."""
-    for axes, of_axis, said in zip(row, values, notes, strict=True):
+    size: tuple[float, float], titles: tuple[str, str], names: Sequence[str], values: np.ndarray,
+    notes: list[list[str]], ends: tuple[float, float], grey: str = "",
+) -> "Figure":  # fmt: skip
+    """Horizontal bars (axes, names), what is said beside each, red beyond 1; on a logarithmic scale.
+
+    titles: above and below. grey: the bar that has neither colour.
+    """
+    figure, grid = panels(1, 3, *size, titles[0], sharey=True, sharex=True)
+    for axes, of_axis, said in zip(grid[0], values, notes, strict=True):
         red = [VERMILION if value > 1.0 else BLUE for value in of_axis]
-        axes.barh(
-            range(len(names)), of_axis, height=0.7,
-            color=[GREY if fault else colour for fault, colour in zip(grey, red, strict=True)],
-        )  # fmt: skip
+        colours = [GREY if name == grey else colour for name, colour in zip(names, red, strict=True)]
+        axes.barh(range(len(names)), of_axis, height=0.7, color=colours)
         for place, (value, text) in enumerate(zip(of_axis, said, strict=True)):
             axes.annotate(f" {text}", (value, place), va="center", fontsize=7.5)
         axes.axvline(1.0, color=BLACK, linewidth=1.0, dashes=(4, 2))
@@ -164,8 +157,10 @@ def _bars(
         axes.set_xlim(*ends)
         axes.tick_params(labelsize=8)
         axes.grid(axis="x", color=GREY, alpha=0.3, linewidth=0.5)
-    row[0].set_yticks(range(len(names)), names, fontsize=9)
-    row[0].invert_yaxis()
+    grid[0, 0].set_yticks(range(len(names)), names, fontsize=9)
+    grid[0, 0].invert_yaxis()
+    label_edges(grid, titles[1], titles=AXIS_NAMES)
+    return figure
 
 
 def linear_figure(analysis: LinearAnalysis, name: str) -> "Figure":

@@ -6,20 +6,19 @@ linearisation, at the same condition without its sideslip, against the FDC equat
 """
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from beaver_ftc.design import fdc
 from beaver_ftc.design.engine import engine_power_kw, slipstream
-from beaver_ftc.design.variants import anchor, design_of, jacobian
+from beaver_ftc.design.model import ALPHA
+from beaver_ftc.design.variants import design_of, jacobian
 from beaver_ftc.plant.conditions import trimmed
 from beaver_ftc.plant.linear import LinearModel, differences, own
+from beaver_ftc.plant.state import FlightState
+from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.linear_systems import CHANNELS, CLASSICAL, MODES, Mode, deviation, modes, zeros
-
-if TYPE_CHECKING:
-    from beaver_ftc.plant.state import FlightState
-    from beaver_ftc.scenario.schema import Scenario
 
 _STEP = 1e-30  # complex
 
@@ -31,8 +30,8 @@ class LinearAnalysis:
     own_deviation: per mode, JSBSim's own linearisation against the FDC equations, both with no sideslip.
     """
 
-    point: "FlightState"
-    models: dict[str, "LinearModel"]
+    point: FlightState
+    models: dict[str, LinearModel]
     modes: dict[str, dict[str, Mode]]
     own_deviation: dict[str, float]
 
@@ -47,40 +46,34 @@ class LinearAnalysis:
         return {mode: deviation(self.modes[name][mode].pole, truth[mode].pole) for mode in MODES}
 
 
-def analyse(scenario: "Scenario") -> LinearAnalysis:
+def analyse(scenario: Scenario) -> LinearAnalysis:
     """Linearise the scenario's truth and what the designer holds, at its trim."""
     plant, point = trimmed(scenario)
-    A, B = fdc_matrices(scenario, point)
+    equations = fdc_model(scenario, point)
     models = {
         "truth": differences(plant, point).of(CLASSICAL),
-        "fdc": LinearModel(A, B, fdc.STATES, fdc.SURFACES).of(CLASSICAL),
-        "design": LinearModel(*designed(scenario, point, A, B), fdc.STATES, fdc.SURFACES).of(CLASSICAL),
+        "fdc": equations.of(CLASSICAL),
+        "design": designed(scenario, point, equations).of(CLASSICAL),
     }
-    return LinearAnalysis(
-        point,
-        models,
-        {name: modes(model.A) for name, model in models.items()},
-        own_deviation(scenario, point),
-    )
+    by_name = {name: modes(model.A) for name, model in models.items()}
+    return LinearAnalysis(point, models, by_name, own_deviation(scenario, point))
 
 
-def own_deviation(scenario: "Scenario", point: "FlightState") -> dict[str, float]:
+def own_deviation(scenario: Scenario, point: FlightState) -> dict[str, float]:
     """JSBSim's own linearisation against the FDC equations, per mode, at `point` without its sideslip."""
     straight = replace(point, beta_rad=0.0)
-    reference = modes(
-        LinearModel(*fdc_matrices(scenario, straight), fdc.STATES, fdc.SURFACES).of(CLASSICAL).A
-    )
-    found = modes(own(scenario, straight).of(CLASSICAL).A)
+    found, reference = (modes(model(scenario, straight).of(CLASSICAL).A) for model in (own, fdc_model))
     return {name: deviation(found[name].pole, reference[name].pole) for name in MODES}
 
 
-def fdc_matrices(scenario: "Scenario", point: "FlightState") -> tuple[np.ndarray, np.ndarray]:
-    """A (12, 12), B (12, 4) of the FDC equations with the truth's declared coefficients."""
-    ratio = dict(scenario.uncertainty.coefficients)
-    return fdc.linearise(state_vector(point), surfaces_of(point), engine_of(point), ratio)
+def fdc_model(scenario: Scenario, point: FlightState) -> LinearModel:
+    """The FDC equations with the truth's declared coefficients, twelve states."""
+    ratio = scenario.uncertainty.coefficients
+    matrices = fdc.linearise(state_vector(point), surfaces_of(point), engine_of(point), ratio)
+    return LinearModel(*matrices, fdc.STATES, fdc.SURFACES)
 
 
-def state_vector(point: "FlightState") -> np.ndarray:
+def state_vector(point: FlightState) -> np.ndarray:
     """A flight condition as the FDC state, (12,)."""
     return np.array([
         point.airspeed_mps, point.alpha_rad, point.beta_rad, point.p_rad_s, point.q_rad_s, point.r_rad_s,
@@ -88,63 +81,43 @@ def state_vector(point: "FlightState") -> np.ndarray:
     ])  # fmt: skip
 
 
-def surfaces_of(point: "FlightState") -> np.ndarray:
+def surfaces_of(point: FlightState) -> np.ndarray:
     """Deflections (4,) rad."""
     return np.array([getattr(point, f"{surface}_rad") for surface in fdc.SURFACES])
 
 
-def engine_of(point: "FlightState") -> fdc.Engine:
+def engine_of(point: FlightState) -> fdc.Engine:
     """Engine setting."""
     return fdc.Engine(point.engine_rpm, point.manifold_pressure_inhg)
 
 
-def designed(
-    scenario: "Scenario", point: "FlightState", A: np.ndarray, B: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """A and B with the rows of p, q and r as the designer holds them."""
+def designed(scenario: Scenario, point: FlightState, equations: LinearModel) -> LinearModel:
+    """The equations with the rows of p, q and r as the designer holds them."""
     f_x, f_y, G = designed_derivatives(scenario, point)
-    A, B = A.copy(), B.copy()
-    rows = slice(3, 6)
-    A[rows] = 0.0
-    A[rows, 3:6] = f_x
-    A[rows, 1:3] = f_y[:, :2]
-    for column, slope in ((0, air_data_slope(point, "airspeed")), (11, air_data_slope(point, "altitude"))):
-        A[rows, column] = f_y[:, 2:] @ slope
-    B[rows] = G
-    return A, B
+    A, B = equations.A.copy(), equations.B.copy()
+    turning = slice(3, 6)
+    A[turning] = 0.0
+    A[turning, 3:6], A[turning, 1:3], B[turning] = f_x, f_y[:, :2], G
+    for column, step in ((0, (1j * _STEP, 0j)), (11, (0j, 1j * _STEP))):  # airspeed, altitude
+        A[turning, column] = f_y[:, 2:] @ (air_data(point, *step).imag / _STEP)
+    return replace(equations, A=A, B=B)
 
 
-def designed_derivatives(
-    scenario: "Scenario", point: "FlightState"
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """f_x (3, 3), f_y (3, 5) and G (3, 4) of the design model at a trim."""
+def designed_derivatives(scenario: Scenario, point: FlightState) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """f_x (3, 3), f_y (3, 5) and G (3, 4) of the design model at a trim, where it is frozen or linearised."""
     design = design_of(scenario.design_model)[0]
-    x, y, u = np.zeros(3), measured(point), surfaces_of(point)
-    anchor(design, x, y, u)
-    if design["linearised"] or design["frozen_alpha"]:
-        return design["f_x"].copy(), design["f_y"][:, : y.size].copy(), design["G0"].copy()
-    _, G, f_x, f_y = jacobian(design, x, y, u)
+    y = np.array([point.alpha_rad, point.beta_rad, *air_data(point)])
+    _, G, f_x, f_y = jacobian(design, np.zeros(3), y, surfaces_of(point))
+    if design["frozen_alpha"]:
+        f_y[:, ALPHA] = 0.0
     return f_x, f_y, G
 
 
-def measured(point: "FlightState") -> np.ndarray:
-    """y = (alpha, beta, V, qdyn, dpt) at a flight condition."""
-    V, qdyn, dpt = air_data(point, point.airspeed_mps, point.altitude_m)
-    return np.array([point.alpha_rad, point.beta_rad, V, qdyn, dpt])
-
-
-def air_data(point: "FlightState", airspeed_mps, altitude_m) -> tuple:
-    """V, qdyn, dpt with the point's engine setting."""
-    density = fdc.atmosphere(altitude_m)
+def air_data(point: FlightState, faster_mps: Any = 0.0, higher_m: Any = 0.0) -> np.ndarray:
+    """V, qdyn, dpt (3,) with the point's engine setting, there or a step away, real or complex."""
+    V, density = point.airspeed_mps + faster_mps, fdc.atmosphere(point.altitude_m + higher_m)
     power = engine_power_kw(point.engine_rpm, point.manifold_pressure_inhg, density)
-    return airspeed_mps, 0.5 * density * airspeed_mps**2, slipstream(power, density, airspeed_mps)
-
-
-def air_data_slope(point: "FlightState", along: str) -> np.ndarray:
-    """Derivative (3,) of V, qdyn, dpt with airspeed or altitude, by a complex step."""
-    V = point.airspeed_mps + 1j * _STEP * (along == "airspeed")
-    h = point.altitude_m + 1j * _STEP * (along == "altitude")
-    return np.array([complex(each).imag / _STEP for each in air_data(point, V, h)])
+    return np.array([V, 0.5 * density * V**2, slipstream(power, density, V)])
 
 
 def linear_document(analysis: LinearAnalysis) -> dict[str, Any]:

@@ -38,20 +38,21 @@ reported rates, W the Earth's rotation in body axes and w_i = w + W,
 The design model has J^-1 (M - w x J w): the difference is all that the Earth adds, and J enters by itself.
 """
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator
 from math import exp, inf, radians
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from beaver_ftc.aircraft import AXES
 from beaver_ftc.compiled import kernel
 from beaver_ftc.design.fdc import GEOMETRY, SURFACES, TRAVEL
-from beaver_ftc.design.model import inertial
+from beaver_ftc.design.model import InertiaCoefficients, inertial
 from beaver_ftc.plant.state import START_LATITUDE_DEG
+from beaver_ftc.scenario.actuators import ActuatorDynamics
 from beaver_ftc.scenario.faults import UNANTICIPATED, place_of
+from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.mismatch.models import (
-    AXES,
     ENGINE_TERMS,
     MOMENT_TERMS,
     RATES,
@@ -64,81 +65,54 @@ from beaver_ftc.studies.mismatch.models import (
     true_moments,
 )
 
-if TYPE_CHECKING:
-    from beaver_ftc.scenario.schema import Scenario
-
 SOURCES = (
     "sensors", "actuators", "fault", "simplification", "engine", "coefficients", "inertia",
     "inertia_coupling", "sinusoids", "wind_turbulence", "earth_rotation", "integration",
 )  # fmt: skip
+LOSS = "loss_of_effectiveness"
 TIME_TOLERANCE_S = 1e-9
 EARTH_RATE_RAD_S = 7.292115e-5  # [WGS84]
 MEAN_RADIUS_M = 6371000.0  # what the log's north is measured with
 Contributions = dict[str, np.ndarray]
-Inertial = Callable[[np.ndarray], np.ndarray]
 
 
-@dataclass
 class HealthyActuators:
-    """Four actuators and where they are: `follow` moves them on, a stretch of commands at a time."""
+    """A scenario's actuators, before the first command: `follow` moves them on, some commands at a time."""
 
-    gain: np.ndarray  # (4,) share of the way to the demand in one JSBSim frame
-    reach: np.ndarray  # (4,) rad, the longest way in one JSBSim frame
-    low: np.ndarray  # (4,) rad
-    high: np.ndarray
-    runs: int  # JSBSim frames per row
-    at_rad: np.ndarray | None = None
-
-    @classmethod
-    def of(cls, scenario: "Scenario") -> "HealthyActuators":
-        """The scenario's actuators, before the first command."""
+    def __init__(self, scenario: Scenario) -> None:
         dt = 1.0 / (scenario.rate_hz * scenario.substeps)
-        dynamics = [getattr(scenario.actuators, surface) for surface in SURFACES]
-        stops = np.array([_stops(surface, of) for surface, of in zip(SURFACES, dynamics, strict=True)])
-        return cls(
-            gain=np.array(
-                [1.0 - exp(-d.bandwidth_rad_s * dt) if d.bandwidth_rad_s else 1.0 for d in dynamics]
-            ),
-            reach=np.array(
-                [radians(d.rate_limit_deg_s) * dt if d.rate_limit_deg_s else inf for d in dynamics]
-            ),
-            low=stops[:, 0],
-            high=stops[:, 1],
-            runs=scenario.substeps,
-        )
-
-    @property
-    def _ideal(self) -> np.ndarray:
-        """Which follow their command at once, (4,) bool."""
-        return (self.gain == 1.0) & np.isinf(self.reach)
+        each = [getattr(scenario.actuators, surface) for surface in SURFACES]
+        share = [1.0 - exp(-one.bandwidth_rad_s * dt) if one.bandwidth_rad_s else 1.0 for one in each]
+        reach = [radians(one.rate_limit_deg_s) * dt if one.rate_limit_deg_s else inf for one in each]
+        self._share, self._reach = np.array(share), np.array(reach)  # of the way, rad; in a JSBSim frame
+        self._low, self._high = np.array([_stops(*both) for both in zip(SURFACES, each, strict=True)]).T
+        self._runs = scenario.substeps
+        self._at_rad: np.ndarray | None = None
 
     def follow(self, commands: np.ndarray) -> np.ndarray:
         """Positions (n, 4) rad at rows with these commands (n, 4) rad, following those given before."""
-        if self._ideal.all():
-            return np.clip(commands, self.low, self.high)
-        if self.at_rad is None:
-            self.at_rad = np.clip(commands[0], self.low, self.high)
-        positions = np.empty_like(commands)
-        _follow(commands, self.gain, self.reach, self.low, self.high, self.runs, self.at_rad, positions)
+        if self._at_rad is None:
+            self._at_rad = np.clip(commands[0], self._low, self._high)
+        positions, stops = np.empty_like(commands), (self._low, self._high)
+        _follow(commands, self._share, self._reach, *stops, self._runs, self._at_rad, positions)
         return positions
 
 
-def _stops(surface: str, dynamics) -> tuple[float, float]:
+def _stops(surface: str, dynamics: ActuatorDynamics) -> tuple[float, float]:
     if dynamics.travel_deg is not None:
-        low, high = dynamics.travel_deg
-        return radians(low), radians(high)
+        return radians(dynamics.travel_deg[0]), radians(dynamics.travel_deg[1])
     return TRAVEL[surface].min_rad, TRAVEL[surface].max_rad
 
 
 @kernel
-def _follow(commands, gain, reach, low, high, runs, at, positions):
+def _follow(commands, share, reach, low, high, runs, at, positions):
     """Fill positions (n, 4) rad, `runs` JSBSim frames a row, and leave `at` (4,) rad at the last."""
     for k in range(commands.shape[0]):
         for s in range(4):
             demand = min(max(commands[k, s], low[s]), high[s])
-            ideal = gain[s] == 1.0 and reach[s] == np.inf
+            ideal = share[s] == 1.0 and reach[s] == np.inf
             for _ in range(runs):
-                way = min(max(gain[s] * (demand - at[s]), -reach[s]), reach[s])
+                way = min(max(share[s] * (demand - at[s]), -reach[s]), reach[s])
                 at[s] = demand if ideal else min(max(at[s] + way, low[s]), high[s])
             positions[k, s] = at[s]
 
@@ -155,32 +129,28 @@ def earth_in_body(attitude: np.ndarray, latitude: np.ndarray) -> np.ndarray:
     ])  # fmt: skip
 
 
-def latitude_rad(north_m: np.ndarray, start_altitude_m: float) -> np.ndarray:
-    """Geodetic latitude (n,) of the flight's path, which starts at 45 deg."""
-    return radians(START_LATITUDE_DEG) + north_m / (MEAN_RADIUS_M + start_altitude_m)
-
-
 def earth_rotation(
-    inertial: Inertial, x: np.ndarray, attitude: np.ndarray, latitude: np.ndarray
+    inertia: InertiaCoefficients, x: np.ndarray, attitude: np.ndarray, latitude: np.ndarray
 ) -> np.ndarray:
-    """What the Earth's rotation adds to the angular acceleration, (n, 3) rad/s2.
-
-    inertial: the angular acceleration with no moment, -J^-1 (w x J w), as a function of w (n, 3).
-    """
+    """What the Earth's rotation adds to the angular acceleration, (n, 3) rad/s2."""
     W = earth_in_body(attitude, latitude)
     inertial_rate = x + W
-    return inertial(inertial_rate) - inertial(x) + np.cross(inertial_rate, W)
+    return inertial(inertia, inertial_rate) - inertial(inertia, x) + np.cross(inertial_rate, W)
 
 
-def fault_effects(scenario: "Scenario", belief: Belief, states: States, healthy: np.ndarray) -> Contributions:
+def fault_effects(scenario: Scenario, belief: Belief, states: States, healthy: np.ndarray) -> Contributions:
     """The angular acceleration (n, 3) rad/s2 of each fault; healthy (n, 4) rad is where they found it."""
     G = belief.effectiveness(states.y)
     effects: Contributions = {}
-    for fault, moved in _deflections(scenario, states, healthy):
-        s, name = SURFACES.index(fault.actuator), name_of(fault)
-        effects[name] = effects.get(name, 0.0) + G[:, :, s] * moved[:, None]
+    for s, surface in enumerate(SURFACES):
+        here = [fault for fault in scenario.faults if getattr(fault, "actuator", "") == surface]
+        position = states.position[:, s]
+        moved = *_lost(here, states, position), *_displaced(here, states.t_s, position - healthy[:, s])
+        for fault, by_rad in moved:
+            name = name_of(fault)
+            effects[name] = effects.get(name, 0.0) + G[:, :, s] * by_rad[:, None]
     for fault in scenario.faults:
-        if fault.type == "unanticipated":
+        if fault.type == UNANTICIPATED:
             effects[name_of(fault)] = unanticipated(fault, belief, states)
     return effects
 
@@ -211,29 +181,20 @@ def unanticipated(fault: Any, belief: Belief, states: States) -> np.ndarray:
     return np.column_stack([0.0 * pitch, pitch, 0.0 * pitch])
 
 
-def _deflections(
-    scenario: "Scenario", states: States, healthy: np.ndarray
-) -> Iterator[tuple[Any, np.ndarray]]:
-    """What every fault of a surface moves the effective deflection by, (n,) rad."""
-    for s, surface in enumerate(SURFACES):
-        here = [fault for fault in scenario.faults if getattr(fault, "actuator", "") == surface]
-        losses = [fault for fault in here if fault.type == "loss_of_effectiveness"]
-        mechanical = [fault for fault in here if fault.type != "loss_of_effectiveness"]
-        yield from _lost(losses, states, states.position[:, s])
-        yield from _displaced(mechanical, states.t_s, states.position[:, s] - healthy[:, s])
-
-
-def _lost(losses: list, states: States, position: np.ndarray) -> Iterator[tuple[Any, np.ndarray]]:
+def _lost(faults: list, states: States, position: np.ndarray) -> Iterator[tuple[Any, np.ndarray]]:
+    """What each loss takes from the effective deflection, (n,) rad, of what those before it have left."""
     remaining = np.ones_like(position)
-    for fault in losses:
-        taken = remaining * fault.magnitude * share(fault, states.t_s)
-        remaining = remaining - taken
-        yield fault, -taken * position
+    for fault in faults:
+        if fault.type == LOSS:
+            taken = remaining * fault.magnitude * share(fault, states.t_s)
+            remaining = remaining - taken
+            yield fault, -taken * position
 
 
 def _displaced(faults: list, t_s: np.ndarray, way: np.ndarray) -> Iterator[tuple[Any, np.ndarray]]:
-    """Who struck last has the displacement, also what lingers after a repair."""
-    order = sorted(faults, key=lambda fault: fault.at_s)
+    """Which of the other faults moves the surface so far, (n,) rad: who struck last, also what lingers after
+    a repair."""
+    order = sorted((fault for fault in faults if fault.type != LOSS), key=lambda fault: fault.at_s)
     struck = [t_s >= fault.at_s - TIME_TOLERANCE_S for fault in order]
     there = [in_force(fault, t_s) for fault in order]
     owner = np.full(t_s.size, -1)
@@ -244,19 +205,12 @@ def _displaced(faults: list, t_s: np.ndarray, way: np.ndarray) -> Iterator[tuple
         yield fault, np.where(owner == i, way, 0.0)
 
 
-@dataclass
 class Models:
-    """Of one flight: its scenario, the design model in use, the truth, and the actuators that drive it."""
+    """Of a flight that starts with these states: the design model in use, the truth, and the actuators."""
 
-    scenario: "Scenario"
-    belief: Belief
-    truth: MomentModel
-    actuators: HealthyActuators
-
-    @classmethod
-    def of(cls, scenario: "Scenario", trim: States) -> "Models":
-        """The models of a flight that starts with these states."""
-        return cls(scenario, belief_of(scenario, trim), true_moments(scenario), HealthyActuators.of(scenario))
+    def __init__(self, scenario: Scenario, trim: States) -> None:
+        self.scenario, self.actuators = scenario, HealthyActuators(scenario)
+        self.belief, self.truth = belief_of(scenario, trim), true_moments(scenario)
 
 
 def sensors(m: Models, s: States) -> np.ndarray:
@@ -330,7 +284,7 @@ def wind_turbulence(m: Models, s: States) -> np.ndarray:
 
     Wind that does not turn reaches the moments only through alpha, beta and V, which are measured.
     """
-    if s.x_air is s.x or np.array_equal(s.x_air, s.x):
+    if np.array_equal(s.x_air, s.x):
         return np.zeros_like(s.x)
     names = [name for name, t in MOMENT_TERMS.items() if set(t.factors) & set(RATES)]
     in_air, over_earth = (m.truth.aerodynamic(rates, s.y, s.effective, names) for rates in (s.x_air, s.x))
@@ -338,9 +292,9 @@ def wind_turbulence(m: Models, s: States) -> np.ndarray:
 
 
 def earth(m: Models, s: States) -> np.ndarray:
-    """The Earth's rotation; real gravity makes no moment about the centre of gravity."""
-    latitude = latitude_rad(s.north_m, m.scenario.initial.altitude_m)
-    return earth_rotation(lambda w: inertial(m.truth.inertia, w), s.x, s.attitude, latitude)
+    """The Earth's rotation on the flight's path; real gravity makes no moment about the centre of gravity."""
+    latitude = radians(START_LATITUDE_DEG) + s.north_m / (MEAN_RADIUS_M + m.scenario.initial.altitude_m)
+    return earth_rotation(m.truth.inertia, s.x, s.attitude, latitude)
 
 
 def instantaneous(m: Models, s: States) -> tuple[Contributions, dict[str, Contributions]]:

@@ -4,30 +4,20 @@ Kept of it are figures (RMS, peaks, shares of the bound, exceedances), and every
 whoever wants to look closer.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from beaver_ftc.loop.loop import fly
+from beaver_ftc.aircraft import AXES
+from beaver_ftc.loop.loop import Loop
 from beaver_ftc.results.log import ParquetLog, column_names, read_chunks
 from beaver_ftc.results.metrics import metrics
-from beaver_ftc.studies.mismatch.models import (
-    AXES,
-    OPTIONAL,
-    REQUIRED,
-    Columns,
-    States,
-    joined,
-    last_row,
-    states_of,
-)
+from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.studies.mismatch.models import LOGGED, Columns, States, states_of
 from beaver_ftc.studies.mismatch.sources import SOURCES, Contributions, Models, instantaneous, integration
-
-if TYPE_CHECKING:
-    from beaver_ftc.scenario.schema import Scenario
 
 UNEXPLAINED, TOTAL, ETA_BAR, FAULT = "unexplained", "total", "eta_bar", "fault"
 MAX_EXCEEDANCES = 100  # kept with their times, per axis; all are counted
@@ -66,113 +56,85 @@ class Stretch:
         return self.total - sum(self.contributions[name] for name in SOURCES)
 
     @property
+    def named(self) -> Contributions:
+        """All that adds up: the whole, its sources, and what is left, by name."""
+        return {TOTAL: self.total, **self.contributions, UNEXPLAINED: self.unexplained}
+
+    @property
     def uncertainty(self) -> np.ndarray:
         """The mismatch without the faults, (n, 3) rad/s2: the eta that eta_bar shall bound."""
         return self.total - self.contributions["fault"]
 
 
-class Splitter:
-    """Splits the mismatch of a flight while its log comes in, chunk by chunk, in time's order.
+def split(scenario: Scenario, chunks: Iterable[Columns]) -> Iterator[Stretch]:
+    """Split the mismatch of the flight whose log comes in `chunks` of columns (n,), in time's order.
 
     The acceleration over a frame needs the frame's end, so the last row of a chunk waits for the next.
     """
-
-    def __init__(self, scenario: "Scenario") -> None:
-        self._scenario = scenario
-        self._models: Models | None = None
-        self._held: Columns | None = None
-
-    def feed(self, chunk: Columns) -> Iterator[Stretch]:
-        """Take in log columns (name -> (n,)); yields the frames that have ended."""
-        if chunk["t_s"].size == 0:
-            return
-        log = joined(self._held, chunk)
-        self._held = last_row(log)
-        states = states_of(log)
-        if self._models is None:
-            self._models = Models.of(self._scenario, states[:1])
-        if len(states) > 1:
-            yield _over_frames(self._models, states)
-
-    def end(self) -> Iterator[Stretch]:
-        """The flight has ended: yields its last row."""
-        if self._held is not None and self._models is not None:
-            yield _at_end(self._models, states_of(self._held))
-
-
-def split(scenario: "Scenario", chunks: Iterable[Columns]) -> Iterator[Stretch]:
-    """Split the mismatch of the flight whose log comes in `chunks` of columns, in time's order."""
-    splitter = Splitter(scenario)
+    models: Models | None = None
+    held: Columns = {}
     for chunk in chunks:
-        yield from splitter.feed(chunk)
-    yield from splitter.end()
+        log = {name: np.concatenate([held.get(name, ()), values]) for name, values in chunk.items()}
+        held = {name: values[-1:] for name, values in log.items()}
+        states = states_of(log)
+        models = models or Models(scenario, states[:1])
+        if states.t_s.size > 1:
+            yield _over_frames(models, states)
+    if models is not None:
+        yield _at_end(models, states_of(held))
 
 
 def _over_frames(m: Models, states: States) -> Stretch:
     """All frames but the last, which has no end here yet."""
     here, following = states[:-1], states[1:]
-    contributions, details = instantaneous(m, here)
-    contributions["integration"] = integration(m, here, following)
     flown = (following.x - here.x) * m.scenario.rate_hz
-    return Stretch(
-        here.t_s, flown - following.design_mean, contributions, details, following.eta_bar, _place(here)
+    return _stretch(
+        m, here, integration(m, here, following), flown - following.design_mean, following.eta_bar
     )
 
 
-def _place(states: States) -> np.ndarray:
-    return np.column_stack([states.y[:, 2], states.altitude_m, states.y[:, 0]])
-
-
-def _at_end(m: Models, states: States) -> Stretch:
+def _at_end(m: Models, last: States) -> Stretch:
     """The flight's last row: nothing follows, so JSBSim's acceleration then stands for the frame."""
-    contributions, details = instantaneous(m, states)
-    contributions["integration"] = np.zeros_like(states.x)
-    designed = m.belief.acceleration(states.x_measured, states.y_measured, states.u)
-    return Stretch(states.t_s, states.xdot - designed, contributions, details, states.eta_bar, _place(states))
+    designed = m.belief.acceleration(last.x_measured, last.y_measured, last.u)
+    return _stretch(m, last, np.zeros_like(last.x), last.xdot - designed, last.eta_bar)
 
 
-@dataclass
+def _stretch(m: Models, s: States, moved: np.ndarray, total: np.ndarray, eta_bar: np.ndarray) -> Stretch:
+    contributions, details = instantaneous(m, s)
+    place = np.column_stack([s.y[:, 2], s.altitude_m, s.y[:, 0]])
+    return Stretch(s.t_s, total, contributions | {"integration": moved}, details, eta_bar, place)
+
+
 class Figures:
     """Of one acceleration, per axis: sum of squares, largest magnitude, largest share of the bound."""
 
-    square_sum: np.ndarray = field(default_factory=lambda: np.zeros(3))
-    largest: np.ndarray = field(default_factory=lambda: np.zeros(3))
-    bound_share: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    def __init__(self) -> None:
+        self.square_sum, self.largest, self.bound_share = np.zeros((3, 3))
 
     def add(self, values: np.ndarray, eta_bar: np.ndarray) -> None:
         """Take in n frames: values, eta_bar (n, 3) rad/s2."""
-        size = np.abs(values)
         self.square_sum += (values**2).sum(axis=0)
-        self.largest = np.maximum(self.largest, size.max(axis=0))
-        with np.errstate(divide="ignore", invalid="ignore"):
-            share = np.where(size > 0.0, size / eta_bar, 0.0)
-        self.bound_share = np.maximum(self.bound_share, share.max(axis=0))
+        self.largest = np.maximum(self.largest, np.abs(values).max(axis=0))
+        self.bound_share = np.maximum(self.bound_share, _share(values, eta_bar).max(axis=0))
 
 
-@dataclass
-class Exceedance:
-    """A stay of the uncertainty above its bound: when, how far in shares of the bound, where, and why."""
-
-    start_s: float
-    end_s: float
-    peak_ratio: float
-    peak_s: float
-    airspeed_mps: float
-    altitude_m: float
-    alpha_rad: float
-    source: str
+def _share(values: np.ndarray, eta_bar: np.ndarray) -> np.ndarray:
+    """Of the bound, (n, 3); nothing is no share of a bound of nothing."""
+    size = np.abs(values)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(size > 0.0, size / eta_bar, 0.0)
 
 
 @dataclass
 class AxisBound:
-    """One axis against its bound."""
+    """One axis against its bound; exceedances: the first stays above it, as the document has them."""
 
     smallest_constant_rad_s2: float = 0.0
     worst_ratio: float = 0.0
     worst_at_s: float = 0.0
     exceeded_frames: int = 0
     stays: int = 0
-    exceedances: list[Exceedance] = field(default_factory=list)
+    exceedances: list[dict[str, Any]] = field(default_factory=list)
     outside: bool = False
 
 
@@ -188,21 +150,30 @@ class Tally:
     frames: int = 0
     figures: dict[str, Figures] = field(default_factory=dict)
     details: dict[str, dict[str, Figures]] = field(default_factory=dict)
-    bounds: tuple[AxisBound, AxisBound, AxisBound] = field(
-        default_factory=lambda: (AxisBound(), AxisBound(), AxisBound())
-    )
+    bounds: tuple[AxisBound, ...] = field(default_factory=lambda: tuple(AxisBound() for _ in AXES))
+
+    @classmethod
+    def of(cls, scenario: Scenario, stretches: Iterable[Stretch]) -> "Tally":
+        """The tally of a scenario's flight."""
+        kept = cls(np.array(scenario.fdi.bounds.constant_rad_s2.as_tuple()), 1.0 / scenario.rate_hz)
+        for stretch in stretches:
+            kept.add(stretch)
+        return kept
 
     def add(self, stretch: Stretch) -> None:
         """Take in a stretch."""
         self.frames += stretch.t_s.size
-        whole = {TOTAL: stretch.total, **stretch.contributions, UNEXPLAINED: stretch.unexplained}
-        for name, values in whole.items():
+        for name, values in stretch.named.items():
             self.figures.setdefault(name, Figures()).add(values, stretch.eta_bar)
         for source, details in stretch.details.items():
             kept = self.details.setdefault(source, {})
             for name, values in details.items():
                 kept.setdefault(name, Figures()).add(values, stretch.eta_bar)
-        self._hold_against_bound(stretch)
+        needed = (np.abs(stretch.uncertainty) - (stretch.eta_bar - self.constant)).max(axis=0)
+        ratio = _share(stretch.uncertainty, stretch.eta_bar)
+        for axis, bound in enumerate(self.bounds):
+            bound.smallest_constant_rad_s2 = max(bound.smallest_constant_rad_s2, float(needed[axis]))
+            _note(bound, ratio[:, axis], stretch, axis, self.frame_s)
 
     @property
     def exceeded(self) -> bool:
@@ -212,15 +183,6 @@ class Tally:
     def rms(self, name: str) -> np.ndarray:
         """RMS of a source over the flight, (3,) rad/s2."""
         return np.sqrt(self.figures[name].square_sum / max(self.frames, 1))
-
-    def _hold_against_bound(self, stretch: Stretch) -> None:
-        size = np.abs(stretch.uncertainty)
-        needed = (size - (stretch.eta_bar - self.constant)).max(axis=0)
-        for axis, bound in enumerate(self.bounds):
-            bound.smallest_constant_rad_s2 = max(bound.smallest_constant_rad_s2, float(needed[axis]))
-            with np.errstate(divide="ignore", invalid="ignore"):
-                ratio = np.where(size[:, axis] > 0.0, size[:, axis] / stretch.eta_bar[:, axis], 0.0)
-            _note(bound, ratio, stretch, axis, self.frame_s)
 
 
 def _note(bound: AxisBound, ratio: np.ndarray, stretch: Stretch, axis: int, frame_s: float) -> None:
@@ -232,31 +194,27 @@ def _note(bound: AxisBound, ratio: np.ndarray, stretch: Stretch, axis: int, fram
     bound.exceeded_frames += int(above.sum())
     for first, last in _runs(above):
         peak = first + int(ratio[first:last].argmax())
-        airspeed_mps, altitude_m, alpha_rad = map(float, stretch.place[peak])
-        stay = Exceedance(
-            start_s=float(stretch.t_s[first]),
-            end_s=float(stretch.t_s[last - 1]) + frame_s,
-            peak_ratio=float(ratio[peak]),
-            peak_s=float(stretch.t_s[peak]),
-            airspeed_mps=airspeed_mps,
-            altitude_m=altitude_m,
-            alpha_rad=alpha_rad,
-            source=dominant(stretch, peak, axis),
-        )
-        _keep(bound, stay, goes_on=first == 0 and bound.outside)
+        airspeed_mps, altitude_m, alpha_rad = stretch.place[peak].tolist()
+        stay = {
+            "start_s": float(stretch.t_s[first]),
+            "end_s": float(stretch.t_s[last - 1]) + frame_s,
+            "peak_ratio": float(ratio[peak]),
+            "peak_s": float(stretch.t_s[peak]),
+            "airspeed_mps": airspeed_mps,
+            "altitude_m": altitude_m,
+            "alpha_rad": alpha_rad,
+            "source": max(CAUSES, key=lambda name: abs(stretch.contributions[name][peak, axis])),
+        }
+        if not (first == 0 and bound.outside):
+            bound.stays += 1
+            if len(bound.exceedances) < MAX_EXCEEDANCES:
+                bound.exceedances.append(stay)
+        elif bound.stays == len(bound.exceedances):
+            before = bound.exceedances[-1]
+            before["end_s"] = stay["end_s"]
+            if stay["peak_ratio"] > before["peak_ratio"]:
+                bound.exceedances[-1] = stay | {"start_s": before["start_s"]}
     bound.outside = bool(above[-1])
-
-
-def _keep(bound: AxisBound, stay: Exceedance, goes_on: bool) -> None:
-    if not goes_on:
-        bound.stays += 1
-        if len(bound.exceedances) < MAX_EXCEEDANCES:
-            bound.exceedances.append(stay)
-    elif bound.stays == len(bound.exceedances):
-        last = bound.exceedances[-1]
-        last.end_s = stay.end_s
-        if stay.peak_ratio > last.peak_ratio:
-            bound.exceedances[-1] = replace(stay, start_s=last.start_s)
 
 
 def _runs(mask: np.ndarray) -> list[tuple[int, int]]:
@@ -265,73 +223,29 @@ def _runs(mask: np.ndarray) -> list[tuple[int, int]]:
     return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
 
 
-def dominant(stretch: Stretch, frame: int, axis: int) -> str:
-    """The source, faults aside, that adds most to the mismatch in one frame."""
-    return max(CAUSES, key=lambda name: abs(stretch.contributions[name][frame, axis]))
+def tally_of_log(scenario: Scenario, log: Path, frames: Path) -> Tally:
+    """Split a log, a row group at a time; every frame goes to `frames`."""
+    chunks = read_chunks(log, [name for name in column_names(log) if name in LOGGED])
+    return Tally.of(scenario, _written(split(scenario, chunks), frames))
 
 
-def tally_for(scenario: "Scenario") -> Tally:
-    """An empty tally of a scenario's flight."""
-    constant = np.array(scenario.fdi.bounds.constant_rad_s2.as_tuple())
-    return Tally(constant, 1.0 / scenario.rate_hz)
-
-
-def written(stretches: Iterable[Stretch], path: Path) -> Iterator[Stretch]:
+def _written(stretches: Iterable[Stretch], path: Path) -> Iterator[Stretch]:
     """Pass the stretches on, writing each to the file at `path` on the way."""
     with ParquetLog(path) as log:
         log.open(COLUMNS)
         for stretch in stretches:
-            log.write(table(stretch))
+            found = stretch.named | {ETA_BAR: stretch.eta_bar}
+            values = np.stack([found[name] for name in NAMES], axis=-1)  # (n, axis, name)
+            log.write(np.column_stack([stretch.t_s, values.reshape(len(values), -1)]))
             yield stretch
 
 
-def table(stretch: Stretch) -> np.ndarray:
-    """The stretch as rows (n, COLUMNS)."""
-    found = {
-        TOTAL: stretch.total,
-        **stretch.contributions,
-        UNEXPLAINED: stretch.unexplained,
-        ETA_BAR: stretch.eta_bar,
-    }
-    values = np.stack([found[name] for name in NAMES], axis=-1)  # (n, axis, name)
-    return np.column_stack([stretch.t_s, values.reshape(len(values), -1)])
-
-
-def tally_of_log(scenario: "Scenario", log: Path, frames: Path) -> Tally:
-    """Split a log, a row group at a time; every frame goes to `frames`."""
-    kept = tally_for(scenario)
-    for stretch in written(split(scenario, _chunks(log)), frames):
-        kept.add(stretch)
-    return kept
-
-
-def tally_of_flight(scenario: "Scenario") -> tuple[Tally, dict[str, Any]]:
+def tally_of_flight(scenario: Scenario) -> tuple[Tally, dict[str, Any]]:
     """Fly and split as it is flown, keeping no log: the tally and the flight's metrics."""
-    sink = _SplittingSink(scenario)
-    flight = fly(scenario, sink)
-    return sink.tally, metrics(flight)
-
-
-class _SplittingSink:
-    """A log sink that splits and forgets."""
-
-    def __init__(self, scenario: "Scenario") -> None:
-        self._splitter, self.tally = Splitter(scenario), tally_for(scenario)
-
-    def open(self, columns: Sequence[str]) -> None:
-        self._columns = {name: i for i, name in enumerate(columns) if name in REQUIRED or name in OPTIONAL}
-
-    def write(self, rows_: np.ndarray) -> None:
-        self._add(self._splitter.feed({name: rows_[:, i] for name, i in self._columns.items()}))
-
-    def close(self) -> None:
-        self._add(self._splitter.end())
-
-    def _add(self, stretches: Iterator[Stretch]) -> None:
-        for stretch in stretches:
-            self.tally.add(stretch)
-
-
-def _chunks(log: Path) -> Iterator[Columns]:
-    there = column_names(log)
-    return read_chunks(log, [name for name in (*REQUIRED, *OPTIONAL) if name in there])
+    loop = Loop(scenario)
+    places = [(name, place) for place, name in enumerate(loop.columns) if name in LOGGED]
+    try:
+        chunks = ({name: rows[:, place] for name, place in places} for rows in loop.chunks())
+        return Tally.of(scenario, split(scenario, chunks)), metrics(loop.land())
+    finally:
+        loop.release()

@@ -8,32 +8,31 @@ A variant differs in `design_model` alone: a name of VARIANTS, or key=value pair
 by +: `engine-neglected`, `mass=1.1`, `linearised+coefficients.Cm_alpha=0.9`. `declared` is as it is.
 """
 
+import re
 from collections.abc import Iterable, Iterator
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import yaml
 
-from beaver_ftc.aircraft import load
+from beaver_ftc.aircraft import AXES, load
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.log import ParquetLog
 from beaver_ftc.results.metrics import as_json, metrics
-from beaver_ftc.results.writer import result_folder, write_report_files
-from beaver_ftc.scenario.dump import to_yaml
+from beaver_ftc.results.writer import result_folder, write_documents, write_report_files
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.engine.study import Progress, Study, run_study
 from beaver_ftc.studies.mismatch import charts
 from beaver_ftc.studies.mismatch.bound import recommended_for
 from beaver_ftc.studies.mismatch.linear import analyse, linear_document
-from beaver_ftc.studies.mismatch.models import AXES
 from beaver_ftc.studies.mismatch.sources import SOURCES
 from beaver_ftc.studies.mismatch.split import (
     CAUSES,
     TOTAL,
     UNEXPLAINED,
-    AxisBound,
     Figures,
     Tally,
     tally_of_flight,
@@ -66,20 +65,16 @@ def run_mismatch(
 
     Raises BadInput for a flight that cannot be trimmed, SimulationFailed for one not completed or kept.
     """
-    refuse_other_aircraft([scenario])
     with result_folder(out, scenario.name) as folder:
         with ParquetLog(folder / "log.parquet") as log:
             flight = fly(scenario, log, progress)
         flown = metrics(flight)
         kept = tally_of_log(scenario, folder / "log.parquet", folder / "mismatch.parquet")
         analysis = analyse(scenario)
-        found = {
-            **document(scenario, kept, flown),
-            **recommended_for([scenario], [kept]),
-            "linear": linear_document(analysis),
-        }
-        of_the_run = {"scenario.yaml": to_yaml(scenario), "metrics.json": as_json(flown)}
-        write_files(folder, {**of_the_run, **_as_files(found, csv_rows(found))})
+        recommended = recommended_for([scenario], [kept])
+        found = document(scenario, kept, flown) | recommended | {"linear": linear_document(analysis)}
+        write_documents(folder, scenario, flown)
+        write_files(folder, _as_files(found, csv_rows(found)))
         if report:
             show_in_reports()
             write_files(folder / "figures", charts.figures(folder, found, flown, analysis))
@@ -106,7 +101,7 @@ def document(scenario: Scenario, tally: Tally, metrics: Document) -> Document:
         "design_model": scenario.design_model.model_dump(mode="json"),
         "axes": {axis: _axis(tally, i) for i, axis in enumerate(AXES)},
         "dominant": dominant(tally),
-        "bound": {axis: _bound(tally.bounds[i], tally, i) for i, axis in enumerate(AXES)},
+        "bound": {axis: _bound(tally, i) for i, axis in enumerate(AXES)},
         "closure": float(tally.figures[UNEXPLAINED].largest.max()),
         "false_alarm": metrics["false_alarm"],
         "detection": metrics["detection"],
@@ -143,7 +138,8 @@ def dominant(tally: Tally) -> Document | None:
     return {"source": source, "axis": AXES[i], "bound_share": finite(tally.figures[source].bound_share[i])}
 
 
-def _bound(bound: AxisBound, tally: Tally, i: int) -> Document:
+def _bound(tally: Tally, i: int) -> Document:
+    bound = tally.bounds[i]
     return {
         "constant_rad_s2": float(tally.constant[i]),
         "smallest_constant_rad_s2": bound.smallest_constant_rad_s2,
@@ -151,7 +147,7 @@ def _bound(bound: AxisBound, tally: Tally, i: int) -> Document:
         "worst_at_s": bound.worst_at_s,
         "exceeded_s": bound.exceeded_frames * tally.frame_s,
         "exceeded_times": bound.stays,
-        "exceedances": [{**vars(stay), "peak_ratio": finite(stay.peak_ratio)} for stay in bound.exceedances],
+        "exceedances": [stay | {"peak_ratio": finite(stay["peak_ratio"])} for stay in bound.exceedances],
     }
 
 
@@ -171,15 +167,15 @@ def _as_files(found: Document, table: Iterable[Document]) -> Files:
 
 def entry(found: Document) -> Document:
     """One flight's line of the comparison."""
-    bounds = found["bound"]
+    recommended = found["guarantee"]["recommended"]
     return {
         "scenario": found["scenario"],
-        **{f"{axis}_{key}": bounds[axis][key] for key in _OF_BOUND for axis in AXES},
+        **{f"{axis}_{key}": found["bound"][axis][key] for key in _OF_BOUND for axis in AXES},
         **{f"{axis}_dominant": charts.largest_sources(found, axis)[0] for axis in AXES},
         "dominant": found["dominant"]["source"] if found["dominant"] else None,
         "false_alarm": found["false_alarm"],
-        "guarantee_void": found["guarantee"]["recommended"]["false_alarm"],
-        "guaranteed_delay_s": found["guarantee"]["recommended"]["guaranteed_delay_s"],
+        "guarantee_void": recommended["false_alarm"],
+        "guaranteed_delay_s": recommended["guaranteed_delay_s"],
     }
 
 
@@ -198,21 +194,17 @@ def run_map(
 
     One entry per axis, speed and altitude: worst share of the bound, smallest constant, and why.
     """
-    refuse_other_aircraft([scenario])
 
     def files_of(found: Document) -> Files:
         drawn = {f"{MAP}.png": charts.map_figure(found["map"], scenario.name)} if report else None
         return {**_as_files(found, found["map"]), "figures": drawn}
 
+    conditions = [(V, h) for h in ALTITUDES_M for V in AIRSPEEDS_MPS]
     flights = Study(
-        map_name(scenario),
-        [(V, h) for h in ALTITUDES_M for V in AIRSPEEDS_MPS],
-        partial(_cell, scenario),
+        map_name(scenario), conditions, partial(_cell, scenario),
         lambda cells: {"scenario": scenario.name, "map": [entry for cell in cells for entry in cell]},
-        files_of,
-        row=list[Document],
-        follows_from=scenario,
-    )
+        files_of, row=list[Document], follows_from=scenario,
+    )  # fmt: skip
     return run_study(flights, out, progress=progress)["map"]
 
 
@@ -221,28 +213,25 @@ def map_name(scenario: Scenario) -> str:
     return f"{scenario.name}-{MAP}"
 
 
-def at(scenario: Scenario, airspeed_mps: float, altitude_m: float) -> Scenario:
-    """The scenario without its faults, starting from this speed and altitude."""
-    initial = scenario.initial.model_copy(update={"airspeed_mps": airspeed_mps, "altitude_m": altitude_m})
-    return scenario.model_copy(update={"initial": initial, "faults": ()})
-
-
 def _cell(scenario: Scenario, condition: tuple[float, float]) -> list[Document]:
-    """A row per axis; without figures where there is no trim."""
-    V, h = condition
-    place = {"airspeed_mps": V, "altitude_m": h}
+    """A row per axis of a flight that starts there, without faults; no figures where there is no trim."""
+    place = dict(zip(("airspeed_mps", "altitude_m"), condition, strict=True))
+    there = {"initial": scenario.initial.model_copy(update=place), "faults": ()}
     try:
-        kept, flight = tally_of_flight(at(scenario, V, h))
+        kept, flight = tally_of_flight(scenario.model_copy(update=there))
     except BadInput:
         return [{**place, "axis": axis, **dict.fromkeys(_OF_MAP)} for axis in AXES]
     found = document(scenario, kept, flight)
-    return [{**place, "axis": axis, **_worst(found, axis)} for axis in AXES]
-
-
-def _worst(found: Document, axis: str) -> Document:
-    bound, dominant = found["bound"][axis], charts.largest_sources(found, axis)[0]
-    values = bound["worst_ratio"], bound["smallest_constant_rad_s2"], dominant, found["false_alarm"]
-    return dict(zip(_OF_MAP, values, strict=True))
+    return [
+        {
+            **place,
+            "axis": axis,
+            **{key: found["bound"][axis][key] for key in _OF_MAP[:2]},
+            "dominant": charts.largest_sources(found, axis)[0],
+            "false_alarm": found["false_alarm"],
+        }
+        for axis in AXES
+    ]
 
 
 def variant_of(scenario: Scenario, text: str) -> Scenario:
@@ -250,7 +239,8 @@ def variant_of(scenario: Scenario, text: str) -> Scenario:
     pieces = [_changes(piece.strip()) for piece in text.split("+")]
     changes = {f"design_model.{key}": value for piece in pieces for key, value in piece.items()}
     if text != DECLARED:
-        changes["name"] = f"{scenario.name}-{_as_name(text)}"[:100]
+        ending = re.sub(r"[^\w-]", "-", text)
+        changes["name"] = f"{scenario.name}-{ending}"[:100]
     changes["expect"] = {}  # what was expected of the scenario's own design need not hold for another
     try:
         return scenario.with_(changes)
@@ -262,26 +252,16 @@ def _changes(piece: str) -> dict[str, Any]:
     """Dotted keys of `design_model` and their values."""
     if piece in VARIANTS:
         return VARIANTS[piece]
-    key, equals, value = piece.partition("=")
+    key, equals, text = piece.partition("=")
     if not equals:
         raise BadInput(
             f"--variant {piece}: no such variant, "
             f"allowed: {', '.join(VARIANTS)}, or key=value of design_model"
         )
-    return {key: _value(piece, value)}
-
-
-def _value(piece: str, text: str) -> Any:
-    import yaml
-
     try:
         value = yaml.safe_load(text)
     except yaml.YAMLError:
         value = None
     if not isinstance(value, bool | int | float):
         raise BadInput(f"--variant {piece}: {text!r} is no value, allowed: a number, true or false")
-    return float(value) if isinstance(value, int) and not isinstance(value, bool) else value
-
-
-def _as_name(text: str) -> str:
-    return "".join(letter if letter.isalnum() or letter in "-_" else "-" for letter in text)
+    return {key: value if isinstance(value, bool) else float(value)}

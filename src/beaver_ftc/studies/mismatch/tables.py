@@ -5,8 +5,8 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
+from beaver_ftc.aircraft import AXES
 from beaver_ftc.results.report import register_section
-from beaver_ftc.studies.mismatch.models import AXES
 from beaver_ftc.studies.present.page import picture_data
 from beaver_ftc.studies.present.tables import html_table, number, plain, printed, seconds
 
@@ -54,19 +54,18 @@ def findings(found: Document) -> list[str]:
     if found["false_alarm"]:
         detection = found["detection"]
         lines.append(f"FALSE ALARM  at {detection['time_s']:.2f} s on {detection['axis']}")
-    return [*lines, _recommendation(found["recommended"]), *_guarantee(found["guarantee"])]
+    return [*lines, *_advice(found)]
 
 
-def _recommendation(recommended: Document) -> str:
+def _advice(found: Document) -> list[str]:
+    """The bound to declare, and what becomes of the published elevator case with it."""
+    recommended, guarantee = found["recommended"], found["guarantee"]
     constant = "  ".join(f"{axis} {recommended['constant_rad_s2'][axis]:g}" for axis in AXES)
     doubt = "" if recommended["settled"] else ", still exceeded when flown"
-    return f"recommended  constant bound {constant} rad/s2, from {recommended['runs']} run(s){doubt}"
-
-
-def _guarantee(guarantee: Document) -> list[str]:
     return [
-        f"published elevator case with the {which} bound: {_case(guarantee[which])}"
-        for which in ("declared", "recommended")
+        f"recommended  constant bound {constant} rad/s2, from {recommended['runs']} run(s){doubt}",
+        f"published elevator case with the declared bound: {_case(guarantee['declared'])}",
+        f"published elevator case with the recommended bound: {_case(guarantee['recommended'])}",
     ]
 
 
@@ -89,28 +88,22 @@ def _sources(found: Document) -> Table:
     """RMS, largest value and share of the bound of every source that there is, and of its parts."""
     caption = f"{found['scenario']}: truth less design (1e-3 rad/s2; share of the bound)"
     head = ["source", *(f"{axis} {what}" for axis in AXES for what in ("rms", "max", "bound"))]
-    rows = [
-        [f"  {part}" if part else label(name), *(cell for of in per_axis for cell in _figures(of))]
-        for name, part, per_axis in _lines(found)
-    ]
-    return caption, head, rows
-
-
-def _lines(found: Document) -> list[tuple[str, str, list[Document | None]]]:
-    lines: list[tuple[str, str, list[Document | None]]] = []
+    rows = []
     for name in found["axes"]["p"]:
         per_axis = [found["axes"][axis][name] for axis in AXES]
         if any(of["max"] > 0.0 for of in per_axis):
-            lines.append((name, "", per_axis))
+            rows.append(_row(label(name), per_axis))
         for part in per_axis[0].get("parts", {}):
-            lines.append((name, part, [of["parts"][part] for of in per_axis]))
-    return lines
+            rows.append(_row(f"  {part}", [of["parts"][part] for of in per_axis]))
+    return caption, head, rows
 
 
-def _figures(of: Document | None) -> tuple[str, str, str]:
-    if of is None or of["max"] == 0.0:
-        return "-", "-", "-"
-    return number(1e3 * of["rms"]), number(1e3 * of["max"]), percent(of["bound_share"])
+def _row(name: str, per_axis: list[Document]) -> list[str]:
+    row = [name]
+    for of in per_axis:
+        shown = number(1e3 * of["rms"]), number(1e3 * of["max"]), percent(of["bound_share"])
+        row += ["-"] * len(shown) if of["max"] == 0.0 else shown
+    return row
 
 
 def _bounds(found: Document) -> Table:
@@ -166,9 +159,8 @@ def _needed(entry: Document, axis: str) -> str:
 
 def comparison_text(entries: list[Document], recommended: Document, folder: str, colour: bool = False) -> str:
     """Several flights side by side, and the bound that covers them all."""
-    lines = [_recommendation(recommended["recommended"]), *_guarantee(recommended["guarantee"])]
     table = printed([plain(*_comparison(entries))], WIDTH, colour)
-    return "\n".join([table, "", *lines, f"results      {folder}", ""])
+    return "\n".join([table, "", *_advice(recommended), f"results      {folder}", ""])
 
 
 def show_in_reports() -> None:

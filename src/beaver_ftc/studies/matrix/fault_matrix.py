@@ -4,6 +4,7 @@ Each flight is flown with the fault-tolerant law and with the oracle; a cell of 
 surface, the worst of its airspeeds.
 """
 
+from collections import Counter
 from functools import lru_cache
 from math import degrees, log2
 from pathlib import Path
@@ -13,6 +14,7 @@ import numpy as np
 
 from beaver_ftc.aircraft import AXES, DEFAULT, Aircraft
 from beaver_ftc.loop.loop import fly
+from beaver_ftc.loop.outcome import Landing
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.trim import trim
 from beaver_ftc.results.metrics import as_json, metrics
@@ -21,6 +23,7 @@ from beaver_ftc.scenario.environment import air_of
 from beaver_ftc.scenario.faults import TYPES
 from beaver_ftc.scenario.initial import initial_of
 from beaver_ftc.scenario.loader import load as load_scenario
+from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.engine.study import Progress, Study, run_study
 from beaver_ftc.studies.matrix.clairvoyant import columns_of, seen_when_told
 from beaver_ftc.studies.present.figures import heat_map, panels
@@ -28,9 +31,6 @@ from beaver_ftc.studies.present.page import Files
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-    from beaver_ftc.loop.outcome import Landing
-    from beaver_ftc.scenario.schema import Scenario
 
 Document = dict[str, Any]
 NAME, DECLARED = "fault-matrix", "fault-matrix-declared"
@@ -86,18 +86,10 @@ def aircraft_of(reference: str) -> Aircraft:
     return find_aircraft(reference, Path())
 
 
-def own_axis(case: FaultCase) -> str:
-    """The axis the surface of a case turns most about: p, q or r."""
-    aircraft = aircraft_of(case.aircraft)
-    return AXES[aircraft.dominant_axis[aircraft.surfaces.index(case.surface)]]
-
-
 def cases(
-    airspeeds_mps: tuple[float, ...] = AIRSPEEDS_MPS,
-    declared: bool = False,
-    aircraft: str = DEFAULT,
+    airspeeds_mps: tuple[float, ...], declared: bool = False, aircraft: str = DEFAULT,
     turbulence: str = "none",
-) -> list[FaultCase]:
+) -> list[FaultCase]:  # fmt: skip
     """Every fault on every surface at every airspeed, fault by fault."""
     return [
         FaultCase(fault, surface, V, declared, aircraft, turbulence)
@@ -124,7 +116,7 @@ def declared(turbulence: str = "none", aircraft: str = DEFAULT) -> dict[str, Any
     }
 
 
-def scenario_of(case: FaultCase, law: str, trimmed_deg: float) -> "Scenario":
+def scenario_of(case: FaultCase, law: str, trimmed_deg: float) -> Scenario:
     """The flight of a case under a law; trimmed_deg: the surface's deflection in trim."""
     fault = dict(dict(FAULTS)[case.fault])
     if "off_deg" in fault:
@@ -164,7 +156,7 @@ def fly_case(case: FaultCase) -> Document:
     return {**case._asdict(), **_diagnosis(flight, case), **_tracking(flight, oracle, case), **seen}
 
 
-def _diagnosis(flight: "Landing", case: FaultCase) -> Document:
+def _diagnosis(flight: Landing, case: FaultCase) -> Document:
     document = metrics(flight)
     isolation, true_type = document["isolation"], flight.scenario.faults[0].type
     return {
@@ -197,39 +189,41 @@ def verdict(document: Document, surface: str, true_type: str) -> str:
     return "named"
 
 
-def _tracking(flight: "Landing", oracle: "Landing", case: FaultCase) -> Document:
-    axis = own_axis(case)
-    ours, best = (_rms_deg_s(one, axis) for one in (flight, oracle))
+def _tracking(flight: Landing, oracle: Landing, case: FaultCase) -> Document:
+    aircraft = flight.scenario.airframe
+    axis = AXES[aircraft.dominant_axis[aircraft.surfaces.index(case.surface)]]
+    rms_rad_s = [(one.post_fault_rms_rad_s or (0.0,) * 3)[AXES.index(axis)] for one in (flight, oracle)]
+    ours, best = map(degrees, rms_rad_s)
+    departure_s, signal = flight.departure or (None, None)
     return {
         "axis": axis,
         "rms_deg_s": ours,
         "oracle_rms_deg_s": best,
         "ratio": ours / best if best else None,
-        "departure_s": flight.departure[0] if flight.departure else None,
+        "departure_s": departure_s,
         "oracle_departure_s": oracle.departure[0] if oracle.departure else None,
-        "departure_signal": flight.departure[1] if flight.departure else None,
+        "departure_signal": signal,
         "oracle_beyond_s": oracle.authority[axis]["beyond_s"] if oracle.authority else 0.0,
         "oracle_left_envelope_s": oracle.envelope_exits[0][0] if oracle.envelope_exits else None,
     }
 
 
-def _rms_deg_s(flight: "Landing", axis: str) -> float:
-    return degrees((flight.post_fault_rms_rad_s or (0.0,) * 3)["pqr".index(axis)])
-
-
 def document_of(rows: list[Document]) -> Document:
     """The whole matrix as a document: cells, single flights, and what went wrong anywhere."""
-    surfaces = list(dict.fromkeys(row["surface"] for row in rows))
-    cells = [_cell(fault, surface, rows) for fault, _ in FAULTS for surface in surfaces]
+    surfaces = dict.fromkeys(row["surface"] for row in rows)
     told = [row for row in rows if "told_chance" in row]
+    wrong = sum(row["verdict"] == "WRONG" for row in rows)
+    false_alarms = sum(row["false_alarm"] for row in rows)
     return {
-        "aircraft": next((row["aircraft"] for row in rows if "aircraft" in row), None),
-        "cells": cells,
+        "aircraft": rows[0].get("aircraft"),
+        "cells": [_cell(fault, surface, rows) for fault, _ in FAULTS for surface in surfaces],
         "flights": rows,
-        "wrong": sum(row["verdict"] == "WRONG" for row in rows),
-        "false_alarms": sum(row["false_alarm"] for row in rows),
-        "lost_though_the_oracle_was_not": [row for row in rows if _lost_alone(row)],
-        "passed": not any(row["verdict"] == "WRONG" or row["false_alarm"] for row in rows),
+        "wrong": wrong,
+        "false_alarms": false_alarms,
+        "lost_though_the_oracle_was_not": [
+            row for row in rows if row["departure_s"] is not None and row["oracle_departure_s"] is None
+        ],
+        "passed": not wrong and not false_alarms,
         **({"told": beside_told(told)} if told else {}),
     }
 
@@ -241,43 +235,31 @@ def beside_told(rows: list[Document]) -> Document:
     among the candidates.
     """
     seen = [row for row in rows if row["told_chance"] > LIKELY]
-    named = sum(row["verdict"] in NAMED for row in seen)
+    named = [row for row in seen if row["verdict"] in NAMED]
+    seen_on, named_on = (Counter(row["surface"] for row in of_it) for of_it in (seen, named))
+    surfaces = dict.fromkeys(row["surface"] for row in rows)
     return {
         "flights": len(rows),
         "seen": len(seen),
         "detected": sum(row["detected"] for row in seen),
-        "named": named,
-        "share": named / len(seen) if seen else None,
+        "named": len(named),
+        "share": len(named) / len(seen) if seen else None,
         "type_kept": sum(row["detected"] and row["verdict"] != "WRONG" for row in seen),
-        "by_surface": {
-            surface: {"seen": len(of_it), "named": sum(row["verdict"] in NAMED for row in of_it)}
-            for surface in dict.fromkeys(row["surface"] for row in rows)
-            for of_it in [[row for row in seen if row["surface"] == surface]]
-        },
+        "by_surface": {s: {"seen": seen_on[s], "named": named_on[s]} for s in surfaces},
         "detected_but_not_told": sum(row["detected"] and row["told_chance"] <= LIKELY for row in rows),
     }
-
-
-def surfaces_of(document: Document) -> list[str]:
-    """The surfaces in a matrix, in the aircraft's order."""
-    return list(dict.fromkeys(cell["surface"] for cell in document["cells"]))
-
-
-def _lost_alone(row: Document) -> bool:
-    return row["departure_s"] is not None and row["oracle_departure_s"] is None
 
 
 def _cell(fault: str, surface: str, rows: list[Document]) -> Document:
     here = [row for row in rows if (row["fault"], row["surface"]) == (fault, surface)]
     delays = [row["delay_s"] for row in here]
-    ratios = [row["ratio"] for row in here if row["ratio"] is not None]
     return {
         "fault": fault,
         "surface": surface,
         "verdict": min((row["verdict"] for row in here), key=WORST_FIRST.index),
         "delay_s": None if None in delays else max(delays),
         "candidates": sorted({candidate for row in here for candidate in row["candidates"]}),
-        "ratio": max(ratios, default=None),
+        "ratio": max((row["ratio"] for row in here if row["ratio"] is not None), default=None),
         "lost": sum(row["departure_s"] is not None for row in here),
         "oracle_lost": sum(row["oracle_departure_s"] is not None for row in here),
         "flights": len(here),
@@ -315,14 +297,10 @@ def name_of(declared: bool, turbulence: str) -> str:
 
 
 def run_matrix(
-    out: Path,
-    airspeeds_mps: tuple[float, ...] | None = None,
-    workers: int = 1,
-    progress: Progress | None = None,
-    declared: bool = False,
-    aircraft: str = DEFAULT,
+    out: Path, airspeeds_mps: tuple[float, ...] | None = None, workers: int = 1,
+    progress: Progress | None = None, declared: bool = False, aircraft: str = DEFAULT,
     turbulence: str = "none",
-) -> Document:
+) -> Document:  # fmt: skip
     """Write table, JSON and heat map into the folder that `name_of` says, in `out`; return the document."""
     all_cases = cases(airspeeds_mps or airspeeds_of(aircraft), declared, aircraft, turbulence)
     matrix = Study(name_of(declared, turbulence), all_cases, fly_case, document_of, files_of)
@@ -352,17 +330,27 @@ TOLD_LEGEND = (
 def as_text(document: Document) -> str:
     """Table, legend, remarks and totals."""
     width = max(len(fault) for fault, _ in FAULTS)
-    surfaces = surfaces_of(document)
-    by_place = {(cell["fault"], cell["surface"]): cell for cell in document["cells"]}
-    head = " " * width + "".join(f"  {surface:21}" for surface in surfaces)
-    lines = [
-        f"{fault:{width}}" + "".join(f"  {_cell_text(by_place[fault, surface]):21}" for surface in surfaces)
-        for fault, _ in FAULTS
-    ]
-    lines = [line.rstrip() for line in (head, *lines)]
+    surfaces, cells = _table(document)
+    lines = [" " * width + "".join(f"  {surface:21}" for surface in surfaces)]
+    for fault, _ in FAULTS:
+        lines.append(f"{fault:{width}}" + "".join(f"  {_cell_text(cells[fault, s]):21}" for s in surfaces))
+    lost = [cell for cell in document["cells"] if cell["lost"]]
+    remarks = [f"* {cell['surface']} {cell['fault']}: {cell['remark']}" for cell in lost]
+    totals = (
+        f"{len(document['flights'])} faults flown: {document['wrong']} named wrongly, "
+        f"{document['false_alarms']} false alarms, "
+        f"{len(document['lost_though_the_oracle_was_not'])} lost that the oracle kept"
+    )
     told = document.get("told")
     legend, share = (LEGEND + TOLD_LEGEND, [_told(told)]) if told else (LEGEND, [])
-    return "\n".join([*lines, "", legend, "", *_remarks(document), _totals(document), *share])
+    table = [line.rstrip() for line in lines]
+    return "\n".join([*table, "", legend, "", *remarks, *([""] if remarks else []), totals, *share])
+
+
+def _table(document: Document) -> tuple[list[str], dict[tuple[str, str], Document]]:
+    """The surfaces in the aircraft's order, and the cells by fault and surface."""
+    cells = {(cell["fault"], cell["surface"]): cell for cell in document["cells"]}
+    return list(dict.fromkeys(surface for _, surface in cells)), cells
 
 
 def _cell_text(cell: Document) -> str:
@@ -370,20 +358,6 @@ def _cell_text(cell: Document) -> str:
     ratio = "" if cell["ratio"] is None else f"{cell['ratio']:.1f}x"
     unseen = "o" if cell.get("told") == 0 else ""
     return f"{cell['verdict']:7} {delay} {ratio:>5}{'*' if cell['lost'] else ''}{unseen}"
-
-
-def _remarks(document: Document) -> list[str]:
-    said = [cell for cell in document["cells"] if cell["lost"]]
-    lines = [f"* {cell['surface']} {cell['fault']}: {cell['remark']}" for cell in said]
-    return [*lines, ""] if lines else []
-
-
-def _totals(document: Document) -> str:
-    return (
-        f"{len(document['flights'])} faults flown: {document['wrong']} named wrongly, "
-        f"{document['false_alarms']} false alarms, "
-        f"{len(document['lost_though_the_oracle_was_not'])} lost that the oracle kept"
-    )
 
 
 def _told(told: Document) -> str:
@@ -400,11 +374,10 @@ def _told(told: Document) -> str:
 
 def heat_map_of(document: Document) -> "Figure":
     """Colour says how the flight compares with the oracle's, letters the verdict."""
-    names, surfaces = [fault for fault, _ in FAULTS], surfaces_of(document)
-    by_place = {(cell["fault"], cell["surface"]): cell for cell in document["cells"]}
-    grid = np.array([[_doublings(by_place[fault, surface]) for surface in surfaces] for fault in names])
+    names, (surfaces, cells) = [fault for fault, _ in FAULTS], _table(document)
+    grid = np.array([[_doublings(cells[fault, surface]) for surface in surfaces] for fault in names])
     labels = {
-        (i, j): (_label(by_place[names[i], surfaces[j]]), "white" if dark else "black")
+        (i, j): (_label(cells[names[i], surfaces[j]]), "white" if dark else "black")
         for (i, j), dark in np.ndenumerate(grid > 0.7 * MOST_DOUBLINGS)
     }
     figure, panel = panels(1, 1, 11.0, 0.5 * len(names) + 1.8)

@@ -8,13 +8,13 @@ from collections.abc import Sequence
 from functools import partial
 from math import degrees
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.plant.adapter import Plant
-from beaver_ftc.plant.linear import differences, engine_slope
+from beaver_ftc.plant.linear import LinearModel, differences, engine_slope
 from beaver_ftc.plant.trim import trim
 from beaver_ftc.results.log import Columns
 from beaver_ftc.results.metrics import as_json, metrics
@@ -24,10 +24,6 @@ from beaver_ftc.studies.engine.study import Progress, Study, run_study
 from beaver_ftc.studies.linear_systems import zeros
 from beaver_ftc.studies.matrix.fault_matrix import AIRSPEEDS_MPS, AT_S, REFERENCE, UNCERTAINTY, trimmed_deg
 from beaver_ftc.studies.present.page import Files
-
-if TYPE_CHECKING:
-    from beaver_ftc.loop.outcome import Landing
-    from beaver_ftc.plant.linear import LinearModel
 
 Document = dict[str, Any]
 NAME = "pitch-lost"
@@ -44,19 +40,13 @@ MARGIN_HEAD = (
     "its range as elevator",
 )  # fmt: skip
 
-# Name, elevator's jam off its trim in deg (None: it floats), flap's position in deg.
-LOST: tuple[tuple[str, float | None, float], ...] = (
-    ("elevator at trim", 0.0, 0.0),
-    ("elevator +1 deg", 1.0, 0.0),
-    ("elevator -1 deg", -1.0, 0.0),
-    ("elevator +2 deg", 2.0, 0.0),
-    ("elevator -2 deg", -2.0, 0.0),
-    ("elevator floats", None, 0.0),
-    ("elevator -4 deg", -4.0, 0.0),
-    ("elevator -8 deg", -8.0, 0.0),
-    ("flap 10 deg down", 0.0, 10.0),
-    ("flap 20 deg down", 0.0, 20.0),
-)
+# Elevator's jam off its trim in deg (None: it floats), flap's position in deg.
+LOST: dict[str, tuple[float | None, float]] = {
+    "elevator at trim": (0.0, 0.0), "elevator +1 deg": (1.0, 0.0), "elevator -1 deg": (-1.0, 0.0),
+    "elevator +2 deg": (2.0, 0.0), "elevator -2 deg": (-2.0, 0.0), "elevator floats": (None, 0.0),
+    "elevator -4 deg": (-4.0, 0.0), "elevator -8 deg": (-8.0, 0.0),
+    "flap 10 deg down": (0.0, 10.0), "flap 20 deg down": (0.0, 20.0),
+}  # fmt: skip
 
 
 class PitchCase(NamedTuple):
@@ -67,13 +57,14 @@ class PitchCase(NamedTuple):
     law: str
 
 
-def scenario_of(case: PitchCase, enabled: bool) -> "Scenario":
+def scenario_of(case: PitchCase, enabled: bool) -> Scenario:
     """The flight of a case, with engine power on pitch or without."""
-    off_deg, flap_deg = next((off, flap) for name, off, flap in LOST if name == case.lost)
+    off_deg, flap_deg = LOST[case.lost]
     elevator: Document = {"type": "float"}
     if off_deg is not None:
         elevator = {"type": "stuck", "position_deg": trimmed_deg(case.airspeed_mps, "elevator") + off_deg}
     flap = {"type": "stuck", "position_deg": flap_deg}
+    faults = ({"actuator": "elevator", **elevator}, {"actuator": "flap", **flap})
     return Scenario.model_validate(
         {
             "name": NAME,
@@ -81,10 +72,7 @@ def scenario_of(case: PitchCase, enabled: bool) -> "Scenario":
             "initial": {"airspeed_mps": case.airspeed_mps},
             "reference": REFERENCE,
             "uncertainty": UNCERTAINTY,
-            "faults": [
-                {**fault, "actuator": surface, "at_s": AT_S}
-                for surface, fault in (("elevator", elevator), ("flap", flap))
-            ],
+            "faults": [{**fault, "at_s": AT_S} for fault in faults],
             "fdi": {"fault_class": "all"},
             "control": {"law": case.law, "power": {"enabled": enabled}},
         }
@@ -97,49 +85,31 @@ def fly_case(case: PitchCase) -> Document:
     return {**case._asdict(), "without": without, "with": powered}
 
 
-def _outcome(scenario: "Scenario") -> Document:
+def _outcome(scenario: Scenario) -> Document:
+    """RMS pitch rate and swing of the attitude once settled, null if the aircraft was lost; airspeed, bank
+    and stay outside the validated envelope since the fault."""
     kept = Columns(*COLUMNS)
-    flight = fly(scenario, kept)
-    document = metrics(flight)
+    document = metrics(fly(scenario, kept))
+    late, after = kept.since(SETTLED_S), kept.since(AT_S)
+    lost = document["departure"] is not None
     return {
-        **_swing(flight, kept),
-        **_range(kept),
+        "q_rms_deg_s": None if lost else degrees(float(np.sqrt(np.mean(late["q_rad_s"] ** 2)))),
+        "theta_swing_deg": None if lost else degrees(float(np.ptp(late["theta_rad"]))),
+        "airspeed_mps": [float(after["airspeed_mps"].min()), float(after["airspeed_mps"].max())],
+        "bank_deg": degrees(float(np.abs(after["phi_rad"]).max())),
+        "outside_share": float(np.mean(after["envelope_valid"] < 0.5)),
         "departure": document["departure"],
         "engine_power": document["engine_power"],
     }
 
 
-def _swing(flight: "Landing", kept: Columns) -> Document:
-    """RMS pitch rate and swing of the attitude once settled; null if the aircraft was lost."""
-    if flight.departure is not None:
-        return {"q_rms_deg_s": None, "theta_swing_deg": None}
-    late = kept.since(SETTLED_S)
-    q, theta = late["q_rad_s"], late["theta_rad"]
-    return {
-        "q_rms_deg_s": degrees(float(np.sqrt(np.mean(q**2)))),
-        "theta_swing_deg": degrees(float(np.ptp(theta))),
-    }
-
-
-def _range(kept: Columns) -> Document:
-    """Airspeed, bank and stay outside the validated envelope since the fault."""
-    after = kept.since(AT_S)
-    return {
-        "airspeed_mps": [float(after["airspeed_mps"].min()), float(after["airspeed_mps"].max())],
-        "bank_deg": degrees(float(np.abs(after["phi_rad"]).max())),
-        "outside_share": float(np.mean(after["envelope_valid"] < 0.5)),
-    }
-
-
 def run_pitch_lost(
-    out: Path,
-    airspeeds_mps: tuple[float, ...] | None = None,
-    workers: int = 1,
+    out: Path, airspeeds_mps: tuple[float, ...] | None = None, workers: int = 1,
     progress: Progress | None = None,
-) -> Document:
+) -> Document:  # fmt: skip
     """Write `out/pitch-lost/` (table, JSON); return the document."""
     airspeeds_mps = airspeeds_mps or AIRSPEEDS_MPS
-    cases = [PitchCase(name, V, law) for law in LAWS for name, _, _ in LOST for V in airspeeds_mps]
+    cases = [PitchCase(name, V, law) for law in LAWS for name in LOST for V in airspeeds_mps]
     document = partial(document_of, airspeeds_mps=airspeeds_mps)
     return run_study(Study(NAME, cases, fly_case, document, files_of), out, workers, progress)
 
@@ -169,22 +139,20 @@ def margins(airspeed_mps: float, config: EnginePower) -> Document:
     worth_deg: pitching moment of the throttle closed and opened, in deg of elevator.
     """
     model, power, trim_inhg = about_trim(airspeed_mps)
-    gain_db, phase_deg = _least_margins(loop_response(model.A, power, config))
-    elevator = model.B[STATES.index("q"), model.inputs.index("elevator")]
+    A, q = model.A, STATES.index("q")
+    gain_db, phase_deg = _least_margins(loop_response(A, power, config))
     ends = np.array([config.lowest_inhg, config.highest_inhg]) - trim_inhg
     return {
         "airspeed_mps": airspeed_mps,
-        "phugoid_damping": [
-            _phugoid_damping(system) for system in (model.A, closed_loop(model.A, power, config))
-        ],
+        "phugoid_damping": [_phugoid_damping(system) for system in (A, closed_loop(A, power, config))],
         "gain_margin_db": gain_db,
         "phase_margin_deg": phase_deg,
-        "attitude_zero_rad_s": float(zeros(model.A, power, STATES.index("theta")).real.max()),
-        "worth_deg": np.rad2deg(ends * power[STATES.index("q")] / elevator).tolist(),
+        "attitude_zero_rad_s": float(zeros(A, power, STATES.index("theta")).real.max()),
+        "worth_deg": np.rad2deg(ends * power[q] / model.B[q, model.inputs.index("elevator")]).tolist(),
     }
 
 
-def about_trim(airspeed_mps: float) -> tuple["LinearModel", np.ndarray, float]:
+def about_trim(airspeed_mps: float) -> tuple[LinearModel, np.ndarray, float]:
     """The four longitudinal states, the column (4,) of manifold pressure in inHg, and its trim."""
     plant, point = Plant(100), trim(airspeed_mps, Initial().altitude_m)
     model = differences(plant, point)
@@ -246,15 +214,19 @@ LEGEND = (
 def as_text(document: Document) -> str:
     """A table for each law, then what the linear model says, and the totals."""
     speeds = [found["airspeed_mps"] for found in document["margins"]]
-    tables = [line for law in LAWS for line in [*_table(document, law, speeds), ""]]
-    return "\n".join([*tables, LEGEND, "", *_margins(document["margins"]), "", _totals(document)])
-
-
-def _table(document: Document, law: str, speeds: list[float]) -> list[str]:
-    rows = {(row["lost"], row["airspeed_mps"]): row for row in document["flights"] if row["law"] == law}
-    head = f"{law:25}" + "".join(f"{f'{V:g} m/s':{WIDTH}}" for V in speeds)
-    lines = [f"{name:18}" + "".join(f"{_cell(rows[name, V]):{WIDTH}}" for V in speeds) for name, _, _ in LOST]
-    return [line.rstrip() for line in (head, *lines)]
+    flights = {(row["law"], row["lost"], row["airspeed_mps"]): row for row in document["flights"]}
+    lines = []
+    for law in LAWS:
+        lines.append(f"{law:25}" + "".join(f"{f'{V:g} m/s':{WIDTH}}" for V in speeds))
+        for name in LOST:
+            lines.append(f"{name:18}" + "".join(f"{_cell(flights[law, name, V]):{WIDTH}}" for V in speeds))
+        lines.append("")
+    totals = (
+        f"{len(document['flights'])} pairs of faults flown: {document['saved']} aircraft kept that are lost "
+        f"without engine power, {document['harmed']} lost that are kept without"
+    )
+    tables, linear = [line.rstrip() for line in lines], [_margin(one) for one in document["margins"]]
+    return "\n".join([*tables, LEGEND, "", _row(MARGIN_HEAD), *linear, "", totals])
 
 
 def _cell(row: Document) -> str:
@@ -268,10 +240,6 @@ def _half(outcome: Document) -> str:
     return f"{outcome['q_rms_deg_s']:.2f} {outcome['theta_swing_deg']:4.1f}"
 
 
-def _margins(found: list[Document]) -> list[str]:
-    return [_row(MARGIN_HEAD), *(_margin(one) for one in found)]
-
-
 def _margin(one: Document) -> str:
     alone, damped = one["phugoid_damping"]
     gain = "unlimited" if one["gain_margin_db"] is None else f"{one['gain_margin_db']:.1f} dB"
@@ -283,10 +251,3 @@ def _margin(one: Document) -> str:
 
 def _row(cells: tuple[str, ...]) -> str:
     return "".join(f"{cell:{width}}" for cell, width in zip(cells, (11, 18, 14, 15, 22, 0), strict=True))
-
-
-def _totals(document: Document) -> str:
-    return (
-        f"{len(document['flights'])} pairs of faults flown: {document['saved']} aircraft kept that are lost "
-        f"without engine power, {document['harmed']} lost that are kept without"
-    )

@@ -10,11 +10,6 @@ from beaver_ftc.scenario.schema import Scenario
 FAULT_AT_S = 12.0
 AMPLITUDE_DEG_S = 3.0
 
-ELEVATOR_LOSS = {
-    "type": "loss_of_effectiveness", "actuator": "elevator", "magnitude": 0.4, "at_s": FAULT_AT_S
-}  # fmt: skip
-UNANTICIPATED = {"type": "unanticipated", "Cm_alpha3": 10, "at_s": FAULT_AT_S}
-
 # Section VII: the sinusoids of eta, the uncertainty's bound, and thresholds by the norm bound.
 GIVEN: Mapping[str, Any] = {
     "uncertainty.sinusoid.p": {"amplitude_rad_s2": 0.02, "frequency_rad_s": 10},

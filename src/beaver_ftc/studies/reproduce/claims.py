@@ -38,18 +38,15 @@ class Claim:
         return bool(number >= self.limit if self.at_least else number <= self.limit)
 
 
-def _delay(flown: Flown, what: str) -> float:
-    delay = flown.metrics[what]["delay_s"]
+def _detection(name: str, flights: Flights) -> float:
+    """From the fault on, s; infinite if there is none."""
+    delay = flights[name].metrics["detection"]["delay_s"]
     return np.inf if delay is None else delay
 
 
-def _detection(name: str, flights: Flights) -> float:
-    return _delay(flights[name], "detection")
-
-
-def _isolation(name: str, fault: str, flights: Flights) -> float:
+def _isolation(fault: str, flights: Flights) -> float:
     """Isolation after detection, s; infinite if anything else is named."""
-    found = flights[name].metrics
+    found = flights[fault].metrics
     if found["isolation"]["fault"] != fault:
         return np.inf
     return round(found["isolation"]["time_s"] - found["detection"]["time_s"], 9)
@@ -102,15 +99,14 @@ def _said_theta(name: str, flights: Flights) -> str:
     return "" if theta is None else f"estimated theta {theta:.3f}, true -0.4"
 
 
-def _named(name: str, flights: Flights) -> str:
-    delay = _delay(flights[name], "detection")
-    beside = [said for said in (_sharpened(name, flights), _said_theta(name, flights)) if said]
-    return "; ".join([f"detected after {delay:.2f} s", *beside])
-
-
 def _sharpened(name: str, flights: Flights) -> str:
-    beside = flights.get(f"{name}-sharpened")
-    return f"{_delay(beside, 'detection'):.2f} s sharpened" if beside else ""
+    beside = f"{name}-sharpened"
+    return f"{_detection(beside, flights):.2f} s sharpened" if beside in flights else ""
+
+
+def _named(name: str, flights: Flights) -> str:
+    said = f"detected after {_detection(name, flights):.2f} s"
+    return "; ".join(filter(None, [said, _sharpened(name, flights), _said_theta(name, flights)]))
 
 
 def _degraded(flights: Flights) -> str:
@@ -180,7 +176,7 @@ CLAIMS = (
     ),
     Claim(
         "Fig. 4", "The fault is thereby isolated as the elevator's.",
-        "isolation", "s after detection", partial(_isolation, "elevator", "elevator"), IMMEDIATELY_S,
+        "isolation", "s after detection", partial(_isolation, "elevator"), IMMEDIATELY_S,
         remark=partial(_said_theta, "elevator"),
     ),
     Claim(
@@ -202,7 +198,7 @@ CLAIMS = (
     ),
     Claim(
         "mentioned", "An aileron fault is detected and isolated just as well.",
-        "isolation", "s after detection", partial(_isolation, "aileron", "aileron"), IMMEDIATELY_S,
+        "isolation", "s after detection", partial(_isolation, "aileron"), IMMEDIATELY_S,
         remark=partial(_named, "aileron"),
     ),
     Claim(
@@ -212,7 +208,7 @@ CLAIMS = (
     ),
     Claim(
         "mentioned", "A rudder fault is detected and isolated just as well.",
-        "isolation", "s after detection", partial(_isolation, "rudder", "rudder"), IMMEDIATELY_S,
+        "isolation", "s after detection", partial(_isolation, "rudder"), IMMEDIATELY_S,
         remark=partial(_named, "rudder"),
     ),
     Claim(
@@ -232,7 +228,7 @@ CLAIMS = (
     ),
     Claim(
         "mentioned", "The unanticipated fault is not taken for one of the known ones.",
-        "last estimator excluded", "s after detection", partial(_isolation, "unanticipated", "unanticipated"),
+        "last estimator excluded", "s after detection", partial(_isolation, "unanticipated"),
         DETECTED_WITHIN_S, remark=_last_standing,
     ),
     Claim(

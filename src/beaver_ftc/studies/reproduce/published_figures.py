@@ -16,7 +16,6 @@ from beaver_ftc.results.views import (
     AXES,
     AXIS_NAMES,
     Panel,
-    Series,
     Trace,
     View,
     detection_panel,
@@ -87,31 +86,25 @@ def figures_of(document: Document, flights: Mapping[str, Flown]) -> Files:
 
 
 def _drawn(view: View, flown: Flown, span: tuple[float, float]) -> "Figure":
-    said = f"case {flown.metrics['scenario']}"
-    return draw(view, _series(flown, span), marks(flown.metrics), said)
-
-
-def _series(flown: Flown, span: tuple[float, float]) -> Series:
-    """The log within a span of time, with the tracking errors."""
+    """A view of the log within a span of time, with the tracking errors."""
     shown = flown.between(*span)
     errors = {f"{axis}_error_rad_s": np.radians(flown.error_deg_s(axis)) for axis in AXES}
-    return {name: values[shown] for name, values in {**flown.log, **errors}.items()}
+    series = {name: values[shown] for name, values in {**flown.log, **errors}.items()}
+    return draw(view, series, marks(flown.metrics), f"case {flown.metrics['scenario']}")
 
 
 def shares(claim: Document) -> tuple[float, float, float]:
     """(lowest, ours, highest) number as shares of the limit, each at most 1 where the statement holds."""
-    found = sorted(
-        _share(claim[key], claim["limit"], claim["at_least"]) for key in ("lowest", "number", "highest")
-    )
-    return found[0], _share(claim["number"], claim["limit"], claim["at_least"]), found[-1]
+    low, ours, high = (_share(claim, claim[key]) for key in ("lowest", "number", "highest"))
+    return min(low, ours, high), ours, max(low, ours, high)
 
 
-def _share(number: float | None, limit: float, at_least: bool) -> float:
+def _share(claim: Document, number: float | None) -> float:
     if number is None:  # infinite: what never happens, or an error without end
-        return 0.0 if at_least else inf
-    if not at_least:
-        return number / limit
-    return limit / number if number else inf
+        return 0.0 if claim["at_least"] else inf
+    if not claim["at_least"]:
+        return number / claim["limit"]
+    return claim["limit"] / number if number else inf
 
 
 def margins_figure(document: Document) -> "Figure":

@@ -6,6 +6,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from beaver_ftc.documents.document import parse
 from beaver_ftc.results.metrics import Document, as_json, versions
 from beaver_ftc.studies.engine.study import Progress, Study, run_study
 from beaver_ftc.studies.present import page, tables
@@ -23,22 +24,7 @@ NAME, WIDTH = "reproduction", 118
 VERDICT_HEAD = ("Published", "Statement", "Our number", "Verdict", "Remark")
 SENSITIVITY_HEAD = ("Published", "Statement", "From", "To", "Held")
 CHOICES_HEAD = ("Key", "Value", "Reason")
-_TITLE = "The published study, flown again"
-_INTRODUCTION = (
-    "Every case of [Zhang2005], flown on the JSBSim truth with the published scheme (norm-bound thresholds, "
-    "none of the sharper tests), and each statement of its section VII held against our numbers. "
-    '"Sharpened" is what the default estimators make of the same flight.'
-)
-_ABOUT_FIGURES = (
-    "One figure for each published one. The paper names the upper panels (elevator and flap) and the lower "
-    "right one (pitch rate); the lower left one is ours."
-)
-_ABOUT_SENSITIVITY = (
-    "Each choice changed, one at a time, all cases flown again, every number measured again: its range, and "
-    "under how many of the changes the statement still holds."
-)
-_ABOUT_MARGINS = "How far each number stays from its limit"
-_ABOUT_CHOICES = "What the paper leaves open, in one place (`src/beaver_ftc/studies/reproduce/choices.py`)."
+_SAYS = parse(Path(__file__).with_name("page.yaml").read_text(encoding="utf-8")).data
 _VERDICT = {True: "borne out", False: "NOT BORNE OUT"}
 
 
@@ -193,29 +179,29 @@ def _table(document: Document) -> "Table":
 
 def as_markdown(document: Document, figures: str) -> str:
     """The page as Markdown; `figures` is the folder of the pictures, as the page sees it."""
-    return page.as_markdown([f"# {_TITLE}", *_page(document)], figures)
+    return page.as_markdown([f"# {_SAYS['title']}", *_page(document)], figures)
 
 
 def as_html(document: Document, folder: Path) -> str:
     """The HTML page, with the pictures that are in the folder's `figures`."""
     whole = [*_page(document), page.versions_line(document["versions"])]
-    return page.as_html(_TITLE, whole, {path.stem: path for path in (folder / "figures").iterdir()})
+    return page.as_html(_SAYS["title"], whole, {path.stem: path for path in (folder / "figures").iterdir()})
 
 
 def _page(document: Document) -> list[page.Part]:
     missed = exceptions(document)
     changes = "; ".join(row["variant"] for row in document["sensitivity"])
     return [
-        _INTRODUCTION, summary(document),
+        _SAYS["introduction"], summary(document),
         page.Table(VERDICT_HEAD, verdict_rows(document), {said: good for good, said in _VERDICT.items()}),
-        page.Heading("Figures"), _ABOUT_FIGURES,
+        page.Heading("Figures"), _SAYS["figures"],
         page.Pictures([(view.title, view.name) for view, _, _ in FIGURES]),
-        page.Heading("What the conclusions hang on"), _ABOUT_SENSITIVITY,
-        page.Pictures([(_ABOUT_MARGINS, SENSITIVITY)]),
+        page.Heading("What the conclusions hang on"), _SAYS["sensitivity"],
+        page.Pictures([(_SAYS["margins"], SENSITIVITY)]),
         page.Table(SENSITIVITY_HEAD, sensitivity_rows(document)),
         *([page.Bullets("Where one does not:", missed)] if missed else []),
         f"The changes: {changes}.",
-        page.Heading("What the paper leaves open"), _ABOUT_CHOICES,
+        page.Heading("What the paper leaves open"), _SAYS["choices"],
         page.Table(CHOICES_HEAD, choice_rows(document)),
     ]  # fmt: skip
 

@@ -20,11 +20,11 @@ from dataclasses import dataclass
 from functools import partial
 from itertools import combinations, product
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from beaver_ftc.aircraft import Aircraft, load
+from beaver_ftc.aircraft import load
 from beaver_ftc.design.model import AXES, N_Y, control_effectiveness
 from beaver_ftc.design.variants import design_of
 from beaver_ftc.documents.errors import BadInput, BeaverFtcError
@@ -37,29 +37,14 @@ from beaver_ftc.studies.present.figures import heat_map, label_edges, panels
 from beaver_ftc.studies.present.page import Files
 from beaver_ftc.studies.present.tables import as_csv
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
 DETECT_WITHIN_S, ISOLATE_WITHIN_S = 0.5, 1.0
 SPEEDS_MPS, ALTITUDES_M = (36.0, 40.0, 44.0, 48.0, 52.0), (0.0, 1000.0, 2000.0, 3000.0)
 SHARES = (0.9, 1.0, 1.1)  # of the speed another aircraft starts with
 EXCITATIONS = (0.25, 0.5, 1.0, 2.0)  # of the scenario's references
 SETTLED_S = 2.0  # the start of a reference is a step of its own
 BISECTIONS = 16  # magnitudes to 2^-16
+MAGNITUDES = ("detected", "detected_median", "isolated", "isolated_median")
 Document = dict[str, Any]
-
-
-def speeds_of(aircraft: Aircraft) -> tuple[float, ...]:
-    """Speeds to survey, m/s: those of the built-in aircraft, or about where another one starts."""
-    if aircraft is load():
-        return SPEEDS_MPS
-    return tuple(round(share * aircraft.usual_airspeed_mps, 1) for share in SHARES)
-
-
-def altitudes_of(aircraft: Aircraft) -> tuple[float, ...]:
-    """Altitudes to survey, m: another aircraft's error is known about the one it starts at."""
-    start_m = aircraft.file.start.altitude_m
-    return ALTITUDES_M if start_m is None else (start_m,)
 
 
 @dataclass(frozen=True)
@@ -154,18 +139,24 @@ def run_survey(
 
     Raises BadInput if another scheme than the sharpened one diagnoses.
     """
-    _refuse_other_schemes(scenario)
-    speeds_mps = speeds_mps or speeds_of(scenario.airframe)
-    altitudes_m = altitudes_m or altitudes_of(scenario.airframe)
+    fdi = scenario.fdi
+    sharp = fdi.sharpen.pole_bank and fdi.sharpen.memory and fdi.sharpen.shared_effectiveness
+    if fdi.scheme != "adaptive-estimators" or not sharp or max(fdi.pole_bank_per_s, default=0.0) < 1e6:
+        raise BadInput(
+            f"{scenario.name}: fdi: detectability is worked out for the sharpened scheme, allowed: "
+            "scheme adaptive-estimators, sharpen all, a filter of 1e6 in pole_bank_per_s"
+        )
+    aircraft, start_m = scenario.airframe, scenario.airframe.file.start.altitude_m
+    if not speeds_mps:  # those of the built-in aircraft, or about where another one starts
+        about = [round(share * aircraft.usual_airspeed_mps, 1) for share in SHARES]
+        speeds_mps = SPEEDS_MPS if aircraft is load() else about
+    if not altitudes_m:  # another aircraft's error is known about the one it starts at
+        altitudes_m = ALTITUDES_M if start_m is None else (start_m,)
+    points = list(product(speeds_mps, altitudes_m, excitations))
     survey = Study(
-        survey_name(scenario),
-        list(product(speeds_mps, altitudes_m, excitations)),
-        partial(_point, scenario),
-        partial(document_of, scenario.name),
-        files_of,
-        row=list[Document],
-        follows_from=scenario,
-    )
+        survey_name(scenario), points, partial(_point, scenario), partial(document_of, scenario.name),
+        files_of, row=list[Document], follows_from=scenario,
+    )  # fmt: skip
     return run_study(survey, out, progress=progress)
 
 
@@ -174,21 +165,10 @@ def survey_name(scenario: Scenario) -> str:
     return f"{scenario.name[:86]}-detectability"
 
 
-def _refuse_other_schemes(scenario: Scenario) -> None:
-    fdi = scenario.fdi
-    sharp = fdi.sharpen.pole_bank and fdi.sharpen.memory and fdi.sharpen.shared_effectiveness
-    if fdi.scheme != "adaptive-estimators" or not sharp or max(fdi.pole_bank_per_s, default=0.0) < 1e6:
-        raise BadInput(
-            f"{scenario.name}: fdi: detectability is worked out for the sharpened scheme, allowed: "
-            "scheme adaptive-estimators, sharpen all, a filter of 1e6 in pole_bank_per_s"
-        )
-
-
 def _point(scenario: Scenario, point: tuple[float, float, float]) -> list[Document]:
-    speed, altitude, scale = point
-    place = {"airspeed_mps": speed, "altitude_m": altitude, "excitation": scale}
+    place = dict(zip(("airspeed_mps", "altitude_m", "excitation"), point, strict=True))
     try:
-        seen = excitation(at(scenario, speed, altitude, scale))
+        seen = excitation(at(scenario, *point))
     except BeaverFtcError as error:
         return [{**place, "fault": fault, **_nothing(str(error))} for fault in scenario.airframe.primary]
     return [{**place, "fault": fault, **judge(seen, fault)} for fault in seen.moment]
@@ -198,25 +178,15 @@ def at(scenario: Scenario, speed_mps: float, altitude_m: float, excitation: floa
     """The scenario flown elsewhere, its references scaled."""
     document = scenario.model_dump(mode="json", exclude_none=True)
     document["initial"] |= {"airspeed_mps": speed_mps, "altitude_m": altitude_m}
-    document["reference"] = {
-        axis: [_scaled(signal, excitation) for signal in signals]
-        for axis, signals in document["reference"].items()
-    }
+    for signal in (signal for signals in document["reference"].values() for signal in signals):
+        parameters = next(iter(signal.values()))
+        for name in parameters.keys() & {"amplitude_deg_s", "values_deg_s"}:
+            parameters[name] = (np.asarray(parameters[name]) * excitation).tolist()
     return Scenario.model_validate({**document, "faults": [], "expect": {}})
 
 
-def _scaled(signal: Document, factor: float) -> Document:
-    (kind, parameters), *_ = signal.items()
-    scaled = dict(parameters)
-    for name in ("amplitude_deg_s", "values_deg_s"):
-        if name in scaled:
-            scaled[name] = (np.asarray(scaled[name]) * factor).tolist()
-    return {kind: scaled}
-
-
 def _nothing(why: str) -> Document:
-    magnitudes = dict.fromkeys(("detected", "detected_median", "isolated", "isolated_median"))
-    return {**magnitudes, "confused_with": None, "why": why}
+    return {**dict.fromkeys(MAGNITUDES), "confused_with": None, "why": why}
 
 
 def judge(seen: Excitation, fault: str) -> Document:
@@ -225,53 +195,39 @@ def judge(seen: Excitation, fault: str) -> Document:
     detected, isolated: whenever it strikes; `_median`: in half of the instants at which it may strike;
     None: not even a total loss. confused_with: the fault that survives longest; why: in words.
     """
-    z, frames = seen.moment[fault], [_frames(s, seen.dt) for s in (DETECT_WITHIN_S, ISOLATE_WITHIN_S)]
-    if len(z) < frames[1]:
+    z = seen.moment[fault]
+    detect, isolate = (max(round(s / seen.dt), 1) for s in (DETECT_WITHIN_S, ISOLATE_WITHIN_S))
+    if len(z) < isolate:
         return _nothing("the flight ends before a fault could be isolated")
-    found = best_in_window(detection_magnitude(z, seen.bound), frames[0])
+    found = best_in_window(detection_magnitude(z, seen.bound), detect)
     excluded = {
-        other: best_in_window(exclusion_magnitude(z, of_other, seen.bound), frames[1])
+        other: best_in_window(exclusion_magnitude(z, of_other, seen.bound), isolate)
         for other, of_other in seen.moment.items()
         if other != fault
     }
-    isolated = np.maximum(found[: len(z) - frames[1] + 1], np.max(list(excluded.values()), axis=0))
+    isolated = np.maximum(found[: len(z) - isolate + 1], np.max(list(excluded.values()), axis=0))
     rival = max(excluded, key=lambda other: (excluded[other].max(), np.median(excluded[other])))
+    least = [of(each) for each in (found, isolated) for of in (np.max, lambda m: quantile(np.sort(m), 0.5))]
     return {
-        "detected": _certain(found.max()),
-        "detected_median": _certain(quantile(np.sort(found), 0.5)),
-        "isolated": _certain(isolated.max()),
-        "isolated_median": _certain(quantile(np.sort(isolated), 0.5)),
+        **{name: float(m) if m <= 1.0 else None for name, m in zip(MAGNITUDES, least, strict=True)},
         "confused_with": rival,
-        "why": _why(seen, fault, rival, found, excluded[rival], frames[1]),
+        "why": _why(seen, fault, rival, found.max(), excluded[rival], isolate),
     }
 
 
-def _frames(seconds: float, dt: float) -> int:
-    return max(round(seconds / dt), 1)
-
-
-def _certain(magnitude: float) -> float | None:
-    return float(magnitude) if magnitude <= 1.0 else None
-
-
-def _why(
-    seen: Excitation, fault: str, rival: str, found: np.ndarray, excluded: np.ndarray, frames: int
-) -> str:
+def _why(seen: Excitation, fault: str, rival: str, detected: float, excluded: np.ndarray, frames: int) -> str:
     """What limits this fault at the worst instant for it to strike."""
-    z, other = seen.moment[fault], seen.moment[rival]
-    if found.max() > 1.0:
-        share = 1.0 / found.max()
+    if detected > 1.0:
+        share = 1.0 / detected
         return f"{fault} hardly used: in {DETECT_WITHIN_S:g} s a total loss is {share:.0%} of twice the bound"
     if excluded.max() > 1.0:
         start = int(excluded.argmax())
         window = slice(start, start + frames)
-        rest = mismatch(z[window], other[window], seen.bound[window]).max()
+        rest = mismatch(seen.moment[fault][window], seen.moment[rival][window], seen.bound[window]).max()
         return (
             f"for {ISOLATE_WITHIN_S:g} s {rival} explains a total loss but for {rest:.0%} of twice the bound"
         )
-    if excluded.max() <= found.max():
-        return "isolated once detected"
-    return f"{rival} explains smaller ones"
+    return "isolated once detected" if excluded.max() <= detected else f"{rival} explains smaller ones"
 
 
 def document_of(name: str, points: Sequence[Sequence[Document]]) -> Document:
@@ -296,15 +252,23 @@ def files_of(document: Document) -> Files:
 
 def draw(name: str, rows: Sequence[Document]) -> Any:
     """A map a fault and excitation: over speed and altitude, the magnitude certain to be found."""
-    faults, scales = _faults(rows), sorted({row["excitation"] for row in rows})
+    speeds, altitudes = _sorted(rows, "airspeed_mps"), _sorted(rows, "altitude_m")
+    faults, scales = _faults(rows), _sorted(rows, "excitation")
     title = (
         f"{name}: loss of effectiveness certain to be detected within {DETECT_WITHIN_S:g} s / "
         f"isolated within {ISOLATE_WITHIN_S:g} s (-: not even a total loss)"
     )
     size = 3.4 * len(scales) + 1.2, 9.0
     figure, grid = panels(len(faults), len(scales), *size, title, sharex=True, sharey=True)
+    names = [f"{speed:g}" for speed in speeds], [f"{altitude:g}" for altitude in altitudes]
+    look: dict[str, Any] = {"origin": "lower", "cmap": "viridis_r", "vmin": 0.0, "vmax": 1.0, "alpha": 0.6}
     for (fault, scale), axes in zip(product(faults, scales), grid.flat, strict=True):
-        image = _map(axes, [row for row in rows if (row["fault"], row["excitation"]) == (fault, scale)])
+        values, labels = np.full((len(altitudes), len(speeds)), np.nan), {}
+        for row in _chosen(rows, fault, scale):
+            at = altitudes.index(row["altitude_m"]), speeds.index(row["airspeed_mps"])
+            values[at] = np.nan if row["detected"] is None else row["detected"]
+            labels[at] = f"{_short(row['detected'])}\n{_short(row['isolated'])}", "black"
+        image = heat_map(axes, values, labels, *names, 7, **look)
         axes.set_title(f"{fault}, {scale:g} x reference", fontsize=9)
     label_edges(grid, "airspeed (m/s)", ["altitude (m)"] * len(faults))
     figure.colorbar(image, ax=grid, label="magnitude certain to be detected, whenever it strikes", shrink=0.6)
@@ -316,17 +280,12 @@ def _faults(rows: Sequence[Document]) -> list[str]:
     return list(dict.fromkeys(row["fault"] for row in rows))
 
 
-def _map(axes: "Axes", rows: Sequence[Document]) -> Any:
-    speeds, altitudes = (sorted({row[key] for row in rows}) for key in ("airspeed_mps", "altitude_m"))
-    values, labels = np.full((len(altitudes), len(speeds)), np.nan), {}
-    for row in rows:
-        at = altitudes.index(row["altitude_m"]), speeds.index(row["airspeed_mps"])
-        values[at] = np.nan if row["detected"] is None else row["detected"]
-        labels[at] = f"{_short(row['detected'])}\n{_short(row['isolated'])}", "black"
-    names = [f"{speed:g}" for speed in speeds], [f"{altitude:g}" for altitude in altitudes]
-    return heat_map(
-        axes, values, labels, *names, 7, origin="lower", cmap="viridis_r", vmin=0.0, vmax=1.0, alpha=0.6
-    )
+def _sorted(rows: Sequence[Document], key: str) -> list[float]:
+    return sorted({row[key] for row in rows})
+
+
+def _chosen(rows: Sequence[Document], fault: str, scale: float) -> list[Document]:
+    return [row for row in rows if (row["fault"], row["excitation"]) == (fault, scale)]
 
 
 def _short(magnitude: float | None) -> str:
@@ -343,20 +302,18 @@ def text(rows: Sequence[Document]) -> str:
 def _summary(rows: Sequence[Document]) -> list[str]:
     """How many grid points each fault is certain at, and from which magnitudes on."""
     lines = [f"{'fault':<10}{'excit.':>8}{'certain at':>12}{'from':>13}{'half the time at':>18}{'from':>13}"]
-    for fault, scale in product(_faults(rows), sorted({row["excitation"] for row in rows})):
-        chosen = [row for row in rows if (row["fault"], row["excitation"]) == (fault, scale)]
-        always, half = (_range([row[key] for row in chosen]) for key in ("isolated", "isolated_median"))
-        lines.append(f"{fault:<10}{scale:>8g}{always[0]:>12}{always[1]:>13}{half[0]:>18}{half[1]:>13}")
+    for fault, scale in product(_faults(rows), _sorted(rows, "excitation")):
+        line = f"{fault:<10}{scale:>8g}"
+        for key, width in (("isolated", 12), ("isolated_median", 18)):
+            magnitudes = [row[key] for row in _chosen(rows, fault, scale)]
+            certain = [magnitude for magnitude in magnitudes if magnitude is not None]
+            span = f"{min(certain):.2f} - {max(certain):.2f}" if certain else "-"
+            line += f"{f'{len(certain)} of {len(magnitudes)}':>{width}}{span:>13}"
+        lines.append(line)
     return [*lines, "certain: detected and isolated in time, from some magnitude on; of so many grid points"]
-
-
-def _range(magnitudes: Sequence[float | None]) -> tuple[str, str]:
-    certain = [magnitude for magnitude in magnitudes if magnitude is not None]
-    span = f"{min(certain):.2f} - {max(certain):.2f}" if certain else "-"
-    return f"{len(certain)} of {len(magnitudes)}", span
 
 
 def _line(row: Document) -> str:
     place = f"{row['fault']:<10}{row['airspeed_mps']:>6g}{row['altitude_m']:>7g}{row['excitation']:>8g}"
-    found = f"{_short(row['detected']):>10}{_short(row['detected_median']):>8}"
-    return place + found + f"{_short(row['isolated']):>10}{_short(row['isolated_median']):>8}   {row['why']}"
+    found = [f"{_short(row[name]):>{width}}" for name, width in zip(MAGNITUDES, (10, 8, 10, 8), strict=True)]
+    return f"{place}{''.join(found)}   {row['why']}"

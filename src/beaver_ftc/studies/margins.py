@@ -12,8 +12,9 @@ scales the surface and what the law takes it for alike; of a surface that is giv
 
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
+from itertools import product
 from math import exp
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -27,13 +28,10 @@ from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.assembly import y_places
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.plant.conditions import trimmed
-from beaver_ftc.plant.linear import differences
+from beaver_ftc.plant.linear import LinearModel, differences
+from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.linear_systems import held_over_frame
 from beaver_ftc.studies.present.tables import aligned, finite
-
-if TYPE_CHECKING:
-    from beaver_ftc.plant.linear import LinearModel
-    from beaver_ftc.scenario.schema import Scenario
 
 N_FREQUENCIES = 600
 LOWEST_RAD_S = 0.3  # below, the autopilot flies: a body rate says little of a phugoid
@@ -73,15 +71,13 @@ class OpenLoop:
     dt_s: float
 
 
-def interpolated(rejection: np.void, qdyn: float, lost: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Kp, pull and learn (3,) of the schedule at a dynamic pressure (Pa), a share `lost` of pitch handed
-    over."""
-    found = []
-    for name in ("Kp_at", "pull_at", "learn_at"):
-        rows = np.array([np.interp(qdyn, rejection["qdyn"], row) for row in rejection[name]])
-        rows[PITCH] += lost * (rows[STAND_IN] - rows[PITCH])
-        found.append(rows[:3])
-    return found[0], found[1], found[2]
+def interpolated(rejection: np.void, qdyn: float, lost: float) -> np.ndarray:
+    """Kp, pull and learn, (3, 3) over the axes, of the schedule at a dynamic pressure (Pa), a share `lost` of
+    pitch handed over."""
+    schedules = (rejection[name] for name in ("Kp_at", "pull_at", "learn_at"))
+    found = np.array([[np.interp(qdyn, rejection["qdyn"], row) for row in rows] for rows in schedules])
+    found[:, PITCH] += lost * (found[:, STAND_IN] - found[:, PITCH])
+    return found[:, :3]
 
 
 def allocation(G: np.ndarray, main: np.ndarray, stand_in: int, lost: float) -> np.ndarray:
@@ -92,14 +88,13 @@ def allocation(G: np.ndarray, main: np.ndarray, stand_in: int, lost: float) -> n
     if determinant != 0.0:
         commands[a, [ROLL, YAW]] = G[YAW, r] / determinant, -G[ROLL, r] / determinant
         commands[r, [ROLL, YAW]] = -G[YAW, a] / determinant, G[ROLL, a] / determinant
-    else:
-        for axis, s in ((ROLL, a), (YAW, r)):
-            commands[s, axis] = 1.0 / G[axis, s] if G[axis, s] else 0.0
     flap = lost if stand_in >= 0 else 0.0
-    if flap:
-        commands[stand_in, PITCH] = flap / G[PITCH, stand_in]
-    if G[PITCH, e]:
-        commands[e, PITCH] = (1.0 - flap) / G[PITCH, e]
+    shares = [(PITCH, stand_in, flap), (PITCH, e, 1.0 - flap)]
+    if determinant == 0.0:
+        shares += [(ROLL, a, 1.0), (YAW, r, 1.0)]
+    for axis, s, share in shares:
+        if share and G[axis, s]:
+            commands[s, axis] = share / G[axis, s]
     return commands
 
 
@@ -114,38 +109,32 @@ def law_response(loop: OpenLoop, law: LawGains, z: complex) -> np.ndarray:
     lead, none = np.diag(law.lead), np.zeros
     of_position = lead @ law.demand @ Kp @ loop.G * law.share * dt + lead - np.eye(n)
     # unknowns: rate, disturbance, position, command; driven by what is measured
-    M = np.block(
-        [
-            [one - keep * back, -keep * dt * back, -keep @ loop.G * dt * mean, none((3, n))],
-            [learn * back, one - one * back + learn * dt * back, learn @ loop.G * dt * mean, none((3, n))],
-            [none((n, 3)), none((n, 3)), np.eye(n), -actuator],
-            [lead @ law.demand @ Kp, lead @ law.demand @ ahead, of_position, np.eye(n)],
-        ]
-    )
+    M = np.block([
+        [one - keep * back, -keep * dt * back, -keep @ loop.G * dt * mean, none((3, n))],
+        [learn * back, one - one * back + learn * dt * back, learn @ loop.G * dt * mean, none((3, n))],
+        [none((n, 3)), none((n, 3)), np.eye(n), -actuator],
+        [lead @ law.demand @ Kp, lead @ law.demand @ ahead, of_position, np.eye(n)],
+    ])  # fmt: skip
     rates = np.eye(3, loop.C.shape[0])
-    driven = np.vstack(
-        [
-            np.diag(law.pull) @ rates + keep @ loop.f * dt * mean,
-            learn @ (rates - loop.f * dt * mean),
-            none((n, len(loop.C))),
-            -lead @ law.demand @ ahead @ loop.f,
-        ]
-    )
+    driven = np.vstack([
+        np.diag(law.pull) @ rates + keep @ loop.f * dt * mean,
+        learn @ (rates - loop.f * dt * mean),
+        none((n, len(loop.C))),
+        -lead @ law.demand @ ahead @ loop.f,
+    ])  # fmt: skip
     return np.linalg.solve(M, driven)[6 : 6 + n]
 
 
 def loops(loop: OpenLoop, law: LawGains, omega: np.ndarray) -> np.ndarray:
     """L_s (omega, n) of every surface, the others' loops closed."""
     Ad, Bd = held_over_frame(loop.A, loop.B * loop.effectiveness, loop.dt_s)
-    found = np.empty((len(omega), len(loop.effectiveness)), complex)
+    n, states = len(loop.effectiveness), np.eye(len(Ad))
+    found = np.empty((len(omega), n), complex)
     for k, z in enumerate(np.exp(1j * omega * loop.dt_s)):
         sensors = z ** (-loop.delay_s / loop.dt_s) * (1.0 - loop.keep) / (1.0 - loop.keep / z)
-        aircraft = (
-            loop.C @ np.linalg.solve(z * np.eye(len(Ad)) - Ad, Bd) * (law.share + (1.0 - law.share) * z)
-        )
+        aircraft = loop.C @ np.linalg.solve(z * states - Ad, Bd) * (law.share + (1.0 - law.share) * z)
         around = law_response(loop, law, z) @ (sensors[:, None] * aircraft)
-        for s in range(len(loop.effectiveness)):
-            found[k, s] = -_others_closed(around, s)
+        found[k] = [-_others_closed(around, s) for s in range(n)]
     return found
 
 
@@ -161,7 +150,7 @@ def frequencies(dt_s: float) -> np.ndarray:
 
 
 N_AIRSPEEDS = 5
-REMAINING = (0.5, 0.1)  # effectiveness after the losses that are judged; 0: given up
+REMAINING = (0.5, 0.1, 0.0)  # effectiveness after the losses that are judged; 0: given up
 LEAST_LOOP = 1e-3  # of a surface that hardly moves there is no loop to speak of
 
 
@@ -181,7 +170,7 @@ class Margin:
         return min(self.up_db, self.down_db) >= gain_db and self.phase_deg >= phase_deg
 
 
-def study(scenario: "Scenario") -> list[Margin]:
+def study(scenario: Scenario) -> list[Margin]:
     """The margins of a scenario's default law with its actuators, sensors and frame rate.
 
     Raises BadInput for another law: its loop is not this one.
@@ -190,14 +179,12 @@ def study(scenario: "Scenario") -> list[Margin]:
     if scenario.control.law not in allowed:
         says = f"margins are known of the default law's loop, allowed: {', '.join(allowed)}"
         raise BadInput(f"{scenario.name}: control.law: {scenario.control.law}: {says}")
-    low, high = scenario.airframe.envelope.airspeed_mps
-    found: list[Margin] = []
-    for V in np.linspace(low, high, N_AIRSPEEDS):
-        found += at(scenario.with_({"initial.airspeed_mps": float(V)}))
-    return found
+    airspeeds_mps = np.linspace(*scenario.airframe.envelope.airspeed_mps, N_AIRSPEEDS)
+    flights = (scenario.with_({"initial.airspeed_mps": float(V)}) for V in airspeeds_mps)
+    return [margin for flight in flights for margin in at(flight)]
 
 
-def at(scenario: "Scenario") -> Iterator[Margin]:
+def at(scenario: Scenario) -> Iterator[Margin]:
     """The margins at a scenario's flight condition."""
     plant, point = trimmed(scenario)
     linear = differences(plant, point)
@@ -210,28 +197,20 @@ def at(scenario: "Scenario") -> Iterator[Margin]:
         L = loops(loop, law, omega)
         for s, surface in enumerate(scenario.airframe.surfaces):
             if np.abs(L[:, s]).max() > LEAST_LOOP:
-                V = scenario.initial.airspeed_mps
-                yield Margin(V, fault, surface, *(float(value) for value in margins(L[:, s])))
+                yield Margin(scenario.initial.airspeed_mps, fault, surface, *map(float, margins(L[:, s])))
 
 
 def cases(main: np.ndarray, surfaces: tuple[str, ...]) -> Iterator[tuple[str, np.ndarray]]:
     """What a fault is called, and the effectiveness (n,) it leaves."""
     healthy = np.ones(len(surfaces))
     yield "none", healthy
-    for s in main:
-        for share in REMAINING:
-            yield f"{surfaces[s]} {100 * (1 - share):.0f} % lost", _with(healthy, s, share)
-        yield f"{surfaces[s]} given up", _with(healthy, s, 0.0)
-
-
-def _with(effectiveness: np.ndarray, s: int, value: float) -> np.ndarray:
-    changed = effectiveness.copy()
-    changed[s] = value
-    return changed
+    for s, left in product(main, REMAINING):
+        fault = f"{100 * (1 - left):.0f} % lost" if left else "given up"
+        yield f"{surfaces[s]} {fault}", np.where(np.arange(len(surfaces)) == s, left, healthy)
 
 
 def open_loop(
-    scenario: "Scenario", frame: np.void, linear: "LinearModel", y: np.ndarray, effectiveness: np.ndarray
+    scenario: Scenario, frame: np.void, linear: LinearModel, y: np.ndarray, effectiveness: np.ndarray
 ) -> tuple[OpenLoop, LawGains]:
     """The loop with this effectiveness (n,), the law knowing it; y: the measured signals in trim."""
     control, belief, dt = frame["control"], frame["belief"], 1.0 / scenario.rate_hz
@@ -240,13 +219,14 @@ def open_loop(
     lost = 1.0 - effectiveness[layout["main"][PITCH]] if layout["stand_in"] >= 0 else 0.0
     whole = 1.0 - (1.0 - belief["actuators"]["approach"]) ** scenario.substeps
     C = outputs(linear.states, y)
+    delay_s, keep = sensors(scenario, len(C), dt)
     loop = OpenLoop(
         linear.A, linear.B, C, np.hstack((f_x, f_y[:, : len(C) - 3])), G * effectiveness, effectiveness,
-        whole, *sensors(scenario, len(C), dt), dt,
+        whole, delay_s, keep, dt,
     )  # fmt: skip
     demand = allocation(G * effectiveness, layout["main"], layout["stand_in"], lost)
-    lead, share = np.array(rejection["lead"]), float(rejection["share"])
-    return loop, LawGains(*interpolated(rejection, y[QDYN], lost), demand, lead, share)
+    Kp, pull, learn = interpolated(rejection, y[QDYN], lost)
+    return loop, LawGains(Kp, pull, learn, demand, np.array(rejection["lead"]), float(rejection["share"]))
 
 
 def outputs(states: tuple[str, ...], y: np.ndarray) -> np.ndarray:
@@ -263,14 +243,13 @@ def outputs(states: tuple[str, ...], y: np.ndarray) -> np.ndarray:
     return C
 
 
-def sensors(scenario: "Scenario", m: int, dt: float) -> tuple[np.ndarray, np.ndarray]:
-    """delay_s and keep (m,) of what is measured."""
-    delay, keep = np.zeros(m), np.zeros(m)
+def sensors(scenario: Scenario, m: int, dt: float) -> np.ndarray:
+    """delay_s and keep, (2, m), of what is measured."""
+    found = np.zeros((2, m))
     for i, name in enumerate((*RATES, "alpha", "beta", "V", "qdyn")):
         sensor = getattr(scenario.sensors, name)
-        delay[i] = sensor.delay_s
-        keep[i] = exp(-sensor.bandwidth_rad_s * dt) if sensor.bandwidth_rad_s else 0.0
-    return delay, keep
+        found[:, i] = sensor.delay_s, exp(-sensor.bandwidth_rad_s * dt) if sensor.bandwidth_rad_s else 0.0
+    return found
 
 
 def as_document(found: list[Margin], required: tuple[float, float]) -> dict[str, Any]:

@@ -1,8 +1,8 @@
 """Each statement of [Zhang2005, sec. VII], how we read it as a number, and whether ours bears it out."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,23 +19,27 @@ TAKEN_OVER = 0.2  # of the flap's travel: what the elevator may still move
 CONTINUOUS_DEG_S = 60.0  # a rate that surface actuators follow [SL03]; a switch would be 100 times as fast
 
 
-@dataclass(frozen=True)
-class Claim:
-    """A published statement; `measure` gives our number (in `unit`), which must be at most or at least the
-    limit, and says more in words."""
+class Reading(NamedTuple):
+    """A number that a statement is read as, in `unit`, and what it must be at most, or at least."""
+
+    quantity: str
+    unit: str
+    limit: float
+    at_least: bool = False
+
+    def holds(self, number: float) -> bool:
+        """Whether the number bears the statement out."""
+        return bool(number >= self.limit if self.at_least else number <= self.limit)
+
+
+class Claim(NamedTuple):
+    """A published statement and how we read it; `measure` gives our number, `remark` says more in words."""
 
     where: str
     statement: str
-    quantity: str
-    unit: str
+    reading: Reading
     measure: Callable[[Flights], float]
-    limit: float
-    at_least: bool = False
     remark: Callable[[Flights], str] = lambda flights: ""
-
-    def holds(self, number: float) -> bool:
-        """Whether our number bears the statement out."""
-        return bool(number >= self.limit if self.at_least else number <= self.limit)
 
 
 def _detection(name: str, flights: Flights) -> float:
@@ -140,100 +144,57 @@ def _last_standing(flights: Flights) -> str:
     return f"{said}; the interval test never names it"
 
 
-def _recovered(axis: str, name: str, flights: Flights) -> str:
+def _recovered(name: str, axis: str, flights: Flights) -> str:
     flown = flights[name]
     return f"{flown.after_deg_s(axis):.3f} deg/s RMS, {flown.before_deg_s(axis):.3f} before"
 
 
-_OF_AMPLITUDE = "of the reference's amplitude"
+TRACKED_P, TRACKED_Q, TRACKED_R = (
+    Reading(f"RMS error of {axis}", "of the reference's amplitude", GOOD) for axis in "pqr"
+)
+WORSE = Reading("RMS error of q", "times that before", DETERIORATED, at_least=True)
+BELOW = Reading("largest |residual| / threshold", "", 1.0)
+DETECTED = Reading("detection", "s after the fault", DETECTED_WITHIN_S)
+ISOLATED = Reading("isolation", "s after detection", IMMEDIATELY_S)
 CLAIMS = (
-    Claim(
-        "Fig. 2a", "Without a fault the nominal law tracks the pitch rate well.",
-        "RMS error of q", _OF_AMPLITUDE,
-        lambda flights: flights["fault-free-nominal"].rms_deg_s("q", 2.0) / AMPLITUDE_DEG_S, GOOD,
-    ),
-    Claim(
-        "Fig. 2b", "After the elevator fault the nominal law tracks much worse.",
-        "RMS error of q", "times that before", partial(_deterioration, "elevator-nominal"), DETERIORATED,
-        at_least=True, remark=_degraded,
-    ),
-    Claim(
-        "Fig. 3", "Before the fault the residual stays below its threshold.",
-        "largest |residual| / threshold", "", lambda flights: flights["elevator"].closest_before_fault(), 1.0,
-    ),
-    Claim(
-        "Fig. 3", "The elevator fault is detected within 0.5 s.",
-        "detection", "s after the fault", partial(_detection, "elevator"), DETECTED_WITHIN_S,
-        remark=partial(_sharpened, "elevator"),
-    ),
-    Claim(
-        "Fig. 4a, 4c", "The aileron's and the rudder's estimators exceed their thresholds almost at once.",
-        "last exclusion", "s after detection", _last_to_go, IMMEDIATELY_S,
-    ),
-    Claim(
-        "Fig. 4b", "No residual of the elevator's estimator ever exceeds its threshold.",
-        "largest |residual| / threshold", "", lambda flights: flights["elevator"].closest("elevator"), 1.0,
-    ),
-    Claim(
-        "Fig. 4", "The fault is thereby isolated as the elevator's.",
-        "isolation", "s after detection", partial(_isolation, "elevator"), IMMEDIATELY_S,
-        remark=partial(_said_theta, "elevator"),
-    ),
-    Claim(
-        "Fig. 5", "Right after detection the adaptive law takes over.",
-        "in charge", "s after detection", _adaptive_after, IMMEDIATELY_S,
-        remark=lambda flights: "the paper's text says about 10 s here, its fault comes at 12 s",
-    ),
-    Claim(
-        "Fig. 5", "After isolation the flap moves in the elevator's place.",
-        "travel of the elevator", "of the flap's", _share_of_elevator, TAKEN_OVER,
-    ),
-    Claim(
-        "Fig. 5", "The hand-over from elevator to flap is continuous.",
-        "fastest motion of the flap", "deg/s", _flap_rate, CONTINUOUS_DEG_S,
-    ),
-    Claim(
-        "Fig. 5", "With reallocation the pitch rate is tracked acceptably in spite of the fault.",
-        "RMS error of q", _OF_AMPLITUDE, partial(_tracking, "elevator", "q"), GOOD, remark=_restored,
-    ),
-    Claim(
-        "mentioned", "An aileron fault is detected and isolated just as well.",
-        "isolation", "s after detection", partial(_isolation, "aileron"), IMMEDIATELY_S,
-        remark=partial(_named, "aileron"),
-    ),
-    Claim(
-        "mentioned", "An aileron fault leaves tracking satisfactory.",
-        "RMS error of p", _OF_AMPLITUDE, partial(_tracking, "aileron", "p"), GOOD,
-        remark=partial(_recovered, "p", "aileron"),
-    ),
-    Claim(
-        "mentioned", "A rudder fault is detected and isolated just as well.",
-        "isolation", "s after detection", partial(_isolation, "rudder"), IMMEDIATELY_S,
-        remark=partial(_named, "rudder"),
-    ),
-    Claim(
-        "mentioned", "A rudder fault leaves tracking satisfactory.",
-        "RMS error of r", _OF_AMPLITUDE, partial(_tracking, "rudder", "r"), GOOD,
-        remark=partial(_recovered, "r", "rudder"),
-    ),
-    Claim(
-        "Fig. 6", "After the unanticipated fault the nominal law tracks much worse.",
-        "RMS error of q", "times that before", partial(_deterioration, "unanticipated-nominal"), DETERIORATED,
-        at_least=True, remark=_lost,
-    ),
-    Claim(
-        "mentioned", "The unanticipated fault is detected within 0.5 s.",
-        "detection", "s after the fault", partial(_detection, "unanticipated"), DETECTED_WITHIN_S,
-        remark=partial(_sharpened, "unanticipated"),
-    ),
-    Claim(
-        "mentioned", "The unanticipated fault is not taken for one of the known ones.",
-        "last estimator excluded", "s after detection", partial(_isolation, "unanticipated"),
-        DETECTED_WITHIN_S, remark=_last_standing,
-    ),
-    Claim(
-        "Fig. 7", "The adaptive law keeps tracking acceptable in spite of the unanticipated fault.",
-        "RMS error of q", _OF_AMPLITUDE, partial(_tracking, "unanticipated", "q"), GOOD,
-        remark=partial(_recovered, "q", "unanticipated"),
-    ),
+    Claim("Fig. 2a", "Without a fault the nominal law tracks the pitch rate well.", TRACKED_Q,
+          lambda flights: flights["fault-free-nominal"].rms_deg_s("q", 2.0) / AMPLITUDE_DEG_S),
+    Claim("Fig. 2b", "After the elevator fault the nominal law tracks much worse.", WORSE,
+          partial(_deterioration, "elevator-nominal"), _degraded),
+    Claim("Fig. 3", "Before the fault the residual stays below its threshold.", BELOW,
+          lambda flights: flights["elevator"].closest_before_fault()),
+    Claim("Fig. 3", "The elevator fault is detected within 0.5 s.", DETECTED,
+          partial(_detection, "elevator"), partial(_sharpened, "elevator")),
+    Claim("Fig. 4a, 4c", "The aileron's and the rudder's estimators exceed their thresholds almost at once.",
+          Reading("last exclusion", "s after detection", IMMEDIATELY_S), _last_to_go),
+    Claim("Fig. 4b", "No residual of the elevator's estimator ever exceeds its threshold.", BELOW,
+          lambda flights: flights["elevator"].closest("elevator")),
+    Claim("Fig. 4", "The fault is thereby isolated as the elevator's.", ISOLATED,
+          partial(_isolation, "elevator"), partial(_said_theta, "elevator")),
+    Claim("Fig. 5", "Right after detection the adaptive law takes over.",
+          Reading("in charge", "s after detection", IMMEDIATELY_S), _adaptive_after,
+          lambda flights: "the paper's text says about 10 s here, its fault comes at 12 s"),
+    Claim("Fig. 5", "After isolation the flap moves in the elevator's place.",
+          Reading("travel of the elevator", "of the flap's", TAKEN_OVER), _share_of_elevator),
+    Claim("Fig. 5", "The hand-over from elevator to flap is continuous.",
+          Reading("fastest motion of the flap", "deg/s", CONTINUOUS_DEG_S), _flap_rate),
+    Claim("Fig. 5", "With reallocation the pitch rate is tracked acceptably in spite of the fault.",
+          TRACKED_Q, partial(_tracking, "elevator", "q"), _restored),
+    Claim("mentioned", "An aileron fault is detected and isolated just as well.", ISOLATED,
+          partial(_isolation, "aileron"), partial(_named, "aileron")),
+    Claim("mentioned", "An aileron fault leaves tracking satisfactory.", TRACKED_P,
+          partial(_tracking, "aileron", "p"), partial(_recovered, "aileron", "p")),
+    Claim("mentioned", "A rudder fault is detected and isolated just as well.", ISOLATED,
+          partial(_isolation, "rudder"), partial(_named, "rudder")),
+    Claim("mentioned", "A rudder fault leaves tracking satisfactory.", TRACKED_R,
+          partial(_tracking, "rudder", "r"), partial(_recovered, "rudder", "r")),
+    Claim("Fig. 6", "After the unanticipated fault the nominal law tracks much worse.", WORSE,
+          partial(_deterioration, "unanticipated-nominal"), _lost),
+    Claim("mentioned", "The unanticipated fault is detected within 0.5 s.", DETECTED,
+          partial(_detection, "unanticipated"), partial(_sharpened, "unanticipated")),
+    Claim("mentioned", "The unanticipated fault is not taken for one of the known ones.",
+          Reading("last estimator excluded", "s after detection", DETECTED_WITHIN_S),
+          partial(_isolation, "unanticipated"), _last_standing),
+    Claim("Fig. 7", "The adaptive law keeps tracking acceptable in spite of the unanticipated fault.",
+          TRACKED_Q, partial(_tracking, "unanticipated", "q"), partial(_recovered, "unanticipated", "q")),
 )  # fmt: skip

@@ -59,26 +59,29 @@ def document_of(flights: dict[str, Flown], numbers: Sequence[list[float]]) -> Do
 
 
 def _judged(claim: Claim, flights: dict[str, Flown], varied: list[float]) -> Document:
-    number = claim.measure(flights)
+    number, reading = claim.measure(flights), claim.reading
     return {
-        **{key: getattr(claim, key) for key in ("where", "statement", "quantity", "unit")},
+        "where": claim.where,
+        "statement": claim.statement,
+        "quantity": reading.quantity,
+        "unit": reading.unit,
         "number": finite(number),
-        "limit": claim.limit,
-        "at_least": claim.at_least,
-        "passed": claim.holds(number),
+        "limit": reading.limit,
+        "at_least": reading.at_least,
+        "passed": reading.holds(number),
         "remark": claim.remark(flights),
         "lowest": finite(min(varied)),
         "highest": finite(max(varied)),
-        "held_in": sum(claim.holds(other) for other in varied),
+        "held_in": sum(reading.holds(other) for other in varied),
     }
 
 
 def _missed(numbers: list[float]) -> list[Document]:
     """The claims that a variant does not bear out, with its number."""
     return [
-        {"where": claim.where, "statement": claim.statement, "number": finite(number), "unit": claim.unit}
-        for claim, number in zip(CLAIMS, numbers, strict=True)
-        if not claim.holds(number)
+        {"where": where, "statement": statement, "number": finite(number), "unit": reading.unit}
+        for (where, statement, reading, *_), number in zip(CLAIMS, numbers, strict=True)
+        if not reading.holds(number)
     ]
 
 

@@ -138,20 +138,28 @@ def earth_rotation(
     return inertial(inertia, inertial_rate) - inertial(inertia, x) + np.cross(inertial_rate, W)
 
 
-def fault_effects(scenario: Scenario, belief: Belief, states: States, healthy: np.ndarray) -> Contributions:
-    """The angular acceleration (n, 3) rad/s2 of each fault; healthy (n, 4) rad is where they found it."""
-    G = belief.effectiveness(states.y)
+class Models:
+    """Of a flight that starts with these states: the design model in use, the truth, and the actuators."""
+
+    def __init__(self, scenario: Scenario, trim: States) -> None:
+        self.scenario, self.actuators = scenario, HealthyActuators(scenario)
+        self.belief, self.truth = belief_of(scenario, trim), true_moments(scenario)
+
+
+def fault_effects(m: Models, states: States, G: np.ndarray, healthy: np.ndarray) -> Contributions:
+    """The angular acceleration (n, 3) rad/s2 of each fault, weighed with G (n, 3, 4); healthy (n, 4) rad is
+    where they found the surfaces."""
     effects: Contributions = {}
     for s, surface in enumerate(SURFACES):
-        here = [fault for fault in scenario.faults if getattr(fault, "actuator", "") == surface]
+        here = [fault for fault in m.scenario.faults if getattr(fault, "actuator", "") == surface]
         position = states.position[:, s]
         moved = *_lost(here, states, position), *_displaced(here, states.t_s, position - healthy[:, s])
         for fault, by_rad in moved:
             name = name_of(fault)
             effects[name] = effects.get(name, 0.0) + G[:, :, s] * by_rad[:, None]
-    for fault in scenario.faults:
+    for fault in m.scenario.faults:
         if fault.type == UNANTICIPATED:
-            effects[name_of(fault)] = unanticipated(fault, belief, states)
+            effects[name_of(fault)] = unanticipated(fault, m.belief, states)
     return effects
 
 
@@ -203,30 +211,6 @@ def _displaced(faults: list, t_s: np.ndarray, way: np.ndarray) -> Iterator[tuple
             owner[mask] = i
     for i, fault in enumerate(order):
         yield fault, np.where(owner == i, way, 0.0)
-
-
-class Models:
-    """Of a flight that starts with these states: the design model in use, the truth, and the actuators."""
-
-    def __init__(self, scenario: Scenario, trim: States) -> None:
-        self.scenario, self.actuators = scenario, HealthyActuators(scenario)
-        self.belief, self.truth = belief_of(scenario, trim), true_moments(scenario)
-
-
-def sensors(m: Models, s: States) -> np.ndarray:
-    """The design model at the true state less the same at the measured one."""
-    return m.belief.acceleration(s.x, s.y, s.u) - m.belief.acceleration(s.x_measured, s.y_measured, s.u)
-
-
-def actuators(m: Models, s: States, healthy: np.ndarray) -> np.ndarray:
-    """Lag and limits: G times what healthy actuators fall short of the command by."""
-    return np.einsum("kas,ks->ka", m.belief.effectiveness(s.y), healthy - s.u)
-
-
-def simplification(m: Models, s: States) -> np.ndarray:
-    """What freezing or linearising leaves out."""
-    exact = m.belief.moments.acceleration(s.x, s.y, s.effective)
-    return exact - m.belief.acceleration(s.x, s.y, s.effective)
 
 
 def engine(m: Models, s: States) -> np.ndarray:
@@ -299,16 +283,18 @@ def earth(m: Models, s: States) -> np.ndarray:
 
 def instantaneous(m: Models, s: States) -> tuple[Contributions, dict[str, Contributions]]:
     """All sources but the integration at every frame, and the single faults and single coefficients."""
-    healthy = m.actuators.follow(s.u)
-    faults = fault_effects(m.scenario, m.belief, s, healthy)
-    errors = coefficient_errors(m, s)
+    belief, healthy = m.belief, m.actuators.follow(s.u)
+    G = belief.effectiveness(s.y)
+    faults, errors = fault_effects(m, s, G, healthy), coefficient_errors(m, s)
     nothing = np.zeros_like(s.x)
     extra = sum((effect for name, effect in faults.items() if name.startswith("unanticipated")), nothing)
+    measured = belief.acceleration(s.x_measured, s.y_measured, s.u)
+    exact = belief.moments.acceleration(s.x, s.y, s.effective)
     contributions = {
-        "sensors": sensors(m, s),
-        "actuators": actuators(m, s, healthy),
+        "sensors": belief.acceleration(s.x, s.y, s.u) - measured,
+        "actuators": np.einsum("kas,ks->ka", G, healthy - s.u),
         "fault": sum(faults.values(), nothing),
-        "simplification": simplification(m, s),
+        "simplification": exact - belief.acceleration(s.x, s.y, s.effective),
         "engine": engine(m, s),
         "coefficients": sum(errors.values(), nothing),
         "inertia": inertia(m, s, extra),

@@ -87,10 +87,8 @@ def split(scenario: Scenario, chunks: Iterable[Columns]) -> Iterator[Stretch]:
 def _over_frames(m: Models, states: States) -> Stretch:
     """All frames but the last, which has no end here yet."""
     here, following = states[:-1], states[1:]
-    flown = (following.x - here.x) * m.scenario.rate_hz
-    return _stretch(
-        m, here, integration(m, here, following), flown - following.design_mean, following.eta_bar
-    )
+    total = (following.x - here.x) * m.scenario.rate_hz - following.design_mean
+    return _stretch(m, here, integration(m, here, following), total, following.eta_bar)
 
 
 def _at_end(m: Models, last: States) -> Stretch:

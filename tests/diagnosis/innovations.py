@@ -179,7 +179,7 @@ class Detector:
         out = np.empty((frames, 3))
         for block in self.blocks:  # of the two views of roll and yaw the latter, if it is there
             out[:, block["axis"][: block["n"]]] = drawn(
-                block, frames, self.dt, rng, noise_model.PRIOR_DRIFT_RAD_S2
+                block, frames, self.dt, rng, likelihood.PRIOR_DRIFT_RAD_S2
             )
         return out
 

@@ -12,9 +12,9 @@ from beaver_ftc.design.fdc import MASS
 from beaver_ftc.design.model import AXES, design_record
 from beaver_ftc.design.terms import evaluate, regressors
 from beaver_ftc.design.variants import response
-from beaver_ftc.diagnosis import noise_model, statistical
+from beaver_ftc.diagnosis import noise_model
 from beaver_ftc.diagnosis.bounds import variances
-from beaver_ftc.diagnosis.likelihood import N_SLOTS
+from beaver_ftc.diagnosis.likelihood import N_SLOTS, PITCH_BLOCK
 from beaver_ftc.diagnosis.state import LOSS
 from beaver_ftc.plant.instruments import SIGNALS
 from beaver_ftc.scenario.diagnosis import Bounds
@@ -217,4 +217,4 @@ def test_noise_of_other_sensors_and_of_deflections_is_part_of_the_noise():
     assert alone.detector["noise"]["deflection"][1] >= half_a_degree
     calm = Detector(100.0, bounds=TACTICAL)
     assert alone.blocks[0]["drift"][0, 0] > calm.blocks[0]["drift"][0, 0]
-    assert statistical.PITCH == 0
+    assert PITCH_BLOCK == 0

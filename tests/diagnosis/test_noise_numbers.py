@@ -360,9 +360,10 @@ def test_where_forces_are_weighed_their_noise_is_in_the_gust_that_follows_from_t
     )
     statistical, design, dt = np.zeros(1, statistical_dtype())[0], design_record()[0], 0.02
     forces = statistical["forces"]
+    statistical["air"]["span"] = SPAN_M
     forces["known"], forces["component"]["felt"] = known, (0.3**2, 0.2**2)
     forces["component"]["vane"][:, 1] = -6.0, 50.0
-    air.set_up_jitter(statistical, Errors(sensors.sensors), design, *LEVEL_FLIGHT[1:], SPAN_M, dt)
+    air.set_up_jitter(statistical, Errors(sensors.sensors), design, *LEVEL_FLIGHT[1:], dt)
     airspeed = LEVEL_FLIGHT[1][2]
     walked = known * np.sqrt(1.5**2 + 0.5**2) * np.array([0.2, 0.3]) * dt / airspeed
     added = variances.jitter(walked, design, *LEVEL_FLIGHT[1:], SPAN_M)

@@ -69,12 +69,6 @@ def stands_still(watch, i):
 
 
 @kernel
-def may_stand_still(watch, i):
-    """Whether it is too early to say: the reading has not moved, and may be frozen."""
-    return 0 < watch.still[i] < watch.longest_still[i] < NEVER_STILL
-
-
-@kernel
 def weigh(watch, signal):
     """Clear instruments of the flow, or accelerometers, by this look, that of the alarm or a later one."""
     if not of_the_flow(watch.lead):
@@ -95,24 +89,18 @@ def weigh(watch, signal):
 @kernel
 def clear_accelerometers(watch):
     """None of them is it."""
-    for i in range(AX, N_SENSORS):
-        watch.cleared[i] = 1
+    watch.cleared[AX:] = 1
 
 
 @kernel
 def leapt(watch, signal):
     """Whether the residual is more than accelerometers make in a look, and in the reading, not in theirs."""
     i, step = instrument_of(watch.lead), watch.step
-    test, per_m_s2 = step.test[watch.lead], step.h * per_speed(watch, watch.lead)
+    per_m_s = 1.0 if watch.lead == SPEED else 1.0 / max(step.then[AIRSPEED], 1.0)
+    test, per_m_s2 = step.test[watch.lead], step.h * per_m_s
     second = signal[i] - 2.0 * step.then[i] + watch.earlier[i]
     half, theirs = 0.5 * abs(test.residual), 1.5 * watch.restless * per_m_s2
     return 2.0 * half > test.bound[0] + LEAP_M_S2 * per_m_s2 and abs(second) >= half > theirs
-
-
-@kernel
-def per_speed(watch, test):
-    """A test's unit over m/s."""
-    return 1.0 if test == SPEED else 1.0 / max(watch.step.then[AIRSPEED], 1.0)
 
 
 @kernel

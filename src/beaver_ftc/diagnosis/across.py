@@ -38,29 +38,18 @@ import numpy as np
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.aircraft.schema import MAX_TERMS_OF_ONE
 from beaver_ftc.compiled import kernel, record
-from beaver_ftc.diagnosis import likelihood, tones
+from beaver_ftc.diagnosis import forces, likelihood, tones
 from beaver_ftc.diagnosis.air import along, drift_beside, whole_drift
 from beaver_ftc.diagnosis.bounds.variances import axis_of
-from beaver_ftc.diagnosis.forces import (
-    ASIDE,
-    MAX_ERRORS,
-    SETTLED,
-    UP,
-    separated_by_force,
-    tell_apart,
-    terms_of,
-)
+from beaver_ftc.diagnosis.forces import ASIDE, SETTLED, UP, separated_by_force, tell_apart, terms_of
 from beaver_ftc.diagnosis.likelihood import (
     LATERAL,
-    LEAST_UNCERTAINTY_RAD_S2,
     MAX_HYPOTHESES,
     N_READINGS,
-    N_SLOTS,
     PITCH_BLOCK,
     SENSE,
     STEP,
     Rooms,
-    block_dtype,
 )
 from beaver_ftc.diagnosis.state import LOSS, NORMAL, PITCH, ROLL, SIDE, YAW
 from beaver_ftc.diagnosis.tones import tones_dtype
@@ -70,7 +59,6 @@ VANE_TOLERANCE = 0.1  # of what a vane's error does: its column is that of the t
 HOLDS = 5.0  # times as long as old evidence elsewhere a force is remembered
 MOSTLY = 0.9  # of a direction of length one
 LEAST_LENGTH = 0.1  # of a column: errors larger than that are not reckoned with
-PRIOR_DRIFT_RAD_S2 = 1.0  # what a drift may be at the start of a flight: soon forgotten
 IN_PITCH, LATERALLY, IN_YAW = (PITCH, NORMAL), (ROLL, YAW), (YAW, SIDE)  # planes that several surfaces move
 
 # The rates along a direction, `mix`, in a block of one axis. surface: whose column it is across,
@@ -94,7 +82,7 @@ class Size(NamedTuple):
 USUAL = Size(Rooms(24, MAX_HYPOTHESES), Rooms(36, 3), 13)
 MOST = Size(
     Rooms(2 * MAX_TERMS_OF_ONE + N_READINGS, MAX_HYPOTHESES),
-    Rooms(2 * MAX_TERMS_OF_ONE + N_READINGS + MAX_ERRORS + 2, MAX_HYPOTHESES),
+    Rooms(2 * MAX_TERMS_OF_ONE + N_READINGS + forces.MAX_ERRORS + 2, MAX_HYPOTHESES),
     16,
 )
 
@@ -106,7 +94,7 @@ def view_dtype(rooms: Rooms) -> np.dtype:
         surface=int, axis=int, mix=5, plane=(int, 2), past_gust=int, column=5, tolerated=int,
         inertial=int, clears=int, cleared_by=int, weighed=int, shows_across=float,
         bounded=1, by_rates=3, by_forces=3, held=float,
-        block=block_dtype(rooms), tones=tones_dtype(rooms.regressors),
+        block=likelihood.block_dtype(rooms), tones=tones_dtype(rooms.regressors),
     )  # fmt: skip
 
 
@@ -157,8 +145,7 @@ def turn_past_gust(view, forces, air):
     gust does to the rates: the vector product of the two."""
     force = forces.component[0]
     roll, yaw, side = force.vane_roll, force.vane[0], force.vane[1]
-    roll_gust = along(air.damping[ROLL], air.axes, 0)
-    yaw_gust = along(air.damping[YAW], air.axes, 0)
+    roll_gust, yaw_gust = along(air.damping[ROLL], air.axes, 0), along(air.damping[YAW], air.axes, 0)
     by_roll, by_yaw, by_side = -side * yaw_gust, side * roll_gust, roll * yaw_gust - yaw * roll_gust
     length = np.sqrt(by_roll * by_roll + by_yaw * by_yaw + by_side * by_side)
     if length == 0.0:
@@ -194,9 +181,8 @@ def feel_gust(view, forces, damping):
     damping (3, 3) 1/s: to the rates."""
     m = view.mix
     for k in range(3):
-        view.by_rates[k] = (
-            m[ROLL] * damping[ROLL, k] + m[PITCH] * damping[PITCH, k] + m[YAW] * damping[YAW, k]
-        )
+        roll, pitch, yaw = m[ROLL] * damping[ROLL, k], m[PITCH] * damping[PITCH, k], m[YAW] * damping[YAW, k]
+        view.by_rates[k] = roll + pitch + yaw
         view.by_forces[k] = 0.0
         for f in range(2):
             view.by_forces[k] += m[SIDE + f] * forces.component[f].damping[k] * forces.strength
@@ -213,8 +199,7 @@ def blur(view, noise, blocks, forces, air, inertial_air, V):
         if view.clears:
             jitter += abs(m[i]) * forces.blurred[i]
         bound += abs(m[i]) * noise.bounded[i]
-    for f in range(2):
-        force = forces.component[f]
+    for f, force in enumerate(forces.component):
         jitter += abs(m[SIDE + f]) * np.sqrt(force.jitter[view.inertial])
         if view.inertial:
             drift += (m[SIDE + f] * forces.strength) ** 2 * force.wander
@@ -228,7 +213,7 @@ def blur(view, noise, blocks, forces, air, inertial_air, V):
         for i in range(3):
             for j in range(3):
                 block.P_dd[0, 0] += m[i] * m[j] * air.leap[i, j]
-    size = max(bound, LEAST_UNCERTAINTY_RAD_S2)
+    size = max(bound, likelihood.LEAST_UNCERTAINTY_RAD_S2)
     block.noise[0], block.jitter[0], view.bounded[0] = variance, jitter * jitter, bound
     block.drift[0, 0] = drift + noise.rapidity * size * size
 
@@ -264,8 +249,7 @@ def regress(view, blocks, forces, air, inertial_air, innovation):
 def sign(view, forces, Gu):
     """Fill the signatures: a step, and losses; Gu (3, n) rad/s2."""
     block, m = view.block, view.mix
-    for h in range(block.n_hypotheses):
-        hypothesis = block.hypothesis[h]
+    for hypothesis in block.hypothesis[: block.n_hypotheses]:
         s = hypothesis.surface
         hypothesis.signature[0] = 1.0
         if hypothesis.kind != STEP:
@@ -278,8 +262,7 @@ def sign(view, forces, Gu):
 @kernel
 def face(views, forces, air, bound, G, Gu):
     """Turn each view to where it looks in this frame, with its signatures; G, Gu (3, n): of it."""
-    for a in range(views.size):
-        view = views[a]
+    for view in views:
         view.weighed = not weighs(view) or (forces.known and forces.begun == SETTLED)
         if view.weighed:
             view.shows_across = turn(view, forces, air, bound, G) if view.surface != AN_AXIS else 0.0
@@ -290,8 +273,7 @@ def face(views, forces, air, bound, G, Gu):
 def compose(views, tolerated, noise, blocks, forces, air, inertial_air, innovation, V):
     """Put together what each view sees of the frame, and what it may owe to noise and to constants that are
     `tolerated`; V m/s."""
-    for a in range(views.size):
-        view = views[a]
+    for view in views:
         if not view.weighed:
             continue
         blur(view, noise, blocks, forces, air, inertial_air, V)
@@ -309,8 +291,7 @@ def observe(views, tests, listening, y, dt, k, latched):
     """Take in frame k of what the views see, as `statistical.observe`; y as measured."""
     heard = tones.usual(listening, y)
     keep, slot = tests.keep if latched else 1.0, likelihood.slot_to_start(k)
-    for a in range(views.size):
-        view = views[a]
+    for view in views:
         if not view.weighed:
             view.held = 0.0
             continue
@@ -354,8 +335,7 @@ def shown(view, views, tests, forces, air):
     if view.clears or not (weighs(view) or knows_gust(view, air)):
         return best(view)
     cleared = 0.0
-    for a in range(views.size):
-        other = views[a]
+    for other in views:
         if other.clears and other.plane[1] == view.cleared_by:
             cleared = max(cleared, other.held)
     return min(view.held, cleared * tests.alarm_level / np.sqrt(2.0 * tests.naming_level))
@@ -376,8 +356,7 @@ def alarm(view, views, tests, forces, air):
 @kernel
 def excludes(views, tests, forces, air, s, column):
     """Whether something is going on that no fault of surface s does, of this column of G (3,)."""
-    for a in range(views.size):
-        view = views[a]
+    for view in views:
         blind = not view.clears and not feels(view, forces, s, column)
         if blind and shown(view, views, tests, forces, air) > tests.alarm_level:
             return True
@@ -463,7 +442,7 @@ def set_up_views(statistical: np.void, aircraft: Aircraft) -> None:
         tried = [] if answered else movers[: len(block["hypothesis"]) - 1]
         kinds, n = [STEP, *(LOSS for _ in tried)], int(axes["n_regressors"])
         block["n"], block["n_hypotheses"], block["keep"] = 1, len(kinds), 1.0
-        block["P_xx"][0, 0], block["P_dd"][0, 0] = axes["noise"].max(), PRIOR_DRIFT_RAD_S2**2
+        block["P_xx"][0, 0], block["P_dd"][0, 0] = axes["noise"].max(), likelihood.PRIOR_DRIFT_RAD_S2**2
         for name in ("level", "chance", "pace"):
             block[name] = axes[name]
         block["tolerance"][:n] = axes["tolerance"][:n]
@@ -482,6 +461,6 @@ def set_up_views(statistical: np.void, aircraft: Aircraft) -> None:
         hypotheses["kind"], hypotheses["surface"] = kinds, [-1, *tried]
         view["past_gust"] = surface == THE_VANE and plane == IN_YAW and statistical["air"]["moving"]
         view["inertial"], view["clears"] = inertial, inertial or surface == THE_VANE
-        sense = block["lane"]["sense"].reshape(-1, N_SLOTS)
+        sense = block["lane"]["sense"].reshape(-1, likelihood.N_SLOTS)
         sense[:] = 0.0
         sense[: len(kinds)] = [[SENSE[kind]] for kind in kinds]

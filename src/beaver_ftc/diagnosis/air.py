@@ -183,6 +183,15 @@ def observe(air, y, attitude, dt):
 
 
 @kernel
+def follow(air, y, attitude, dt, k):
+    """Begin with the first frame, of number k = 0, and observe those that follow."""
+    if k > 0:
+        observe(air, y, attitude, dt)
+    else:
+        begin(air, y, attitude)
+
+
+@kernel
 def effect(air, design, x, y, u):
     """Fill `acceleration` (3,) rad/s2 with what the gust seen does from here on, and `force` for next time.
 
@@ -314,17 +323,11 @@ def set_up_air(air: np.void, turbulence: str, mass: MassProperties, aircraft: Ai
 
 
 def set_up_jitter(
-    statistical: np.void,
-    errors: Errors,
-    design: np.void,
-    y: np.ndarray,
-    u: np.ndarray,
-    span_m: float,
-    dt_s: float,
+    statistical: np.void, errors: Errors, design: np.void, y: np.ndarray, u: np.ndarray, dt_s: float
 ) -> None:
     """What noise adds to the gust that is followed: that of the vanes, and of the force that moves the air's
     velocity on from frame to frame; where the flow follows from the forces, that of the forces too."""
-    flow = flow_noise(errors, y[AIRSPEED])
+    flow, span_m = flow_noise(errors, y[AIRSPEED]), float(statistical["air"]["span"])
     if statistical["forces"]["known"]:
         forces = statistical["forces"]["component"][::-1]  # normal to the body, and across
         felt = errors.each("random", ("az", "ay"))

@@ -45,8 +45,7 @@ def align(isolation, G):
     The bound is exact for any fixed direction; this one has power while G keeps its direction, which
     depends on alpha alone, and weakly.
     """
-    for s in range(isolation.n):
-        fie = isolation.estimator[s]
+    for fie in isolation.estimator[: isolation.n]:
         p, r = G[0, fie.surface], G[2, fie.surface]
         length = np.hypot(p, r)
         if length > 0.0:
@@ -63,8 +62,7 @@ def innovate(bank, bound, x, x_then, believed, dt):
     for i in range(3):
         bank.innovation[i] = (x[i] - x_then[i]) / dt - believed[i]
         bound.frame[i] = bound.eta_bar[i] + (bound.noise[i] + bound.noise_then[i]) / dt
-        for m in range(bank.n):
-            a = bank.decay[m]
+        for m, a in enumerate(bank.decay[: bank.n]):
             bank.residual[m, i] = a * bank.residual[m, i] + dt * bank.innovation[i]
             bank.eta[m, i] = bound_step(bank.eta[m, i], bound.eta_bar[i], a, dt)
             bank.noise[m, i] = noise_step(bank.noise[m, i], bound.noise_then[i], a)
@@ -82,14 +80,20 @@ def alarm(bank):
 
 
 @kernel
+def share_of(bank, m, i):
+    """The share of its bound that filter m reaches on axis i."""
+    bound = bank.threshold[m, i]
+    return abs(bank.residual[m, i]) / bound if bound > 0.0 else 0.0
+
+
+@kernel
 def nearest(bank, i):
     """The filter that is nearest to its bound on axis i: the one the alarm comes from, if there is one."""
     m_nearest, largest = 0, 0.0
     for m in range(bank.n):
-        if bank.threshold[m, i] > 0.0:
-            share = abs(bank.residual[m, i]) / bank.threshold[m, i]
-            if share > largest:
-                m_nearest, largest = m, share
+        share = share_of(bank, m, i)
+        if share > largest:
+            m_nearest, largest = m, share
     return m_nearest
 
 
@@ -99,8 +103,7 @@ def largest_share(bank):
     largest = 0.0
     for m in range(bank.n):
         for i in range(3):
-            if bank.threshold[m, i] > 0.0:
-                largest = max(largest, abs(bank.residual[m, i]) / bank.threshold[m, i])
+            largest = max(largest, share_of(bank, m, i))
     return largest
 
 
@@ -111,9 +114,7 @@ def note_closest_approach(bank, chances):
     chances.closest = max(chances.closest, chances.score)
     for m in range(bank.n):
         for i in range(3):
-            if bank.threshold[m, i] > 0.0:
-                share = abs(bank.residual[m, i]) / bank.threshold[m, i]
-                bank.closest[m] = max(bank.closest[m], share)
+            bank.closest[m] = max(bank.closest[m], share_of(bank, m, i))
 
 
 @kernel
@@ -141,8 +142,7 @@ def remember(bank, fie, dt):
     """Advance what the fault can have done to each filter since the flight began; channel 3 is `across`."""
     for channel in range(4):
         low, high = extremes(fie, channel) if channel < 3 else aligned_extremes(fie)
-        for m in range(bank.n):
-            a = bank.decay[m]
+        for m, a in enumerate(bank.decay[: bank.n]):
             fie.reach_low[m, channel] = a * fie.reach_low[m, channel] + dt * low
             fie.reach_high[m, channel] = a * fie.reach_high[m, channel] + dt * high
 

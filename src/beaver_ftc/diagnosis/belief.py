@@ -90,28 +90,20 @@ def sum_up(belief, bound, layout, every_type):
         for s in range(u.size):
             total.G[i, s] += G[i, s]
             total.Gu[i, s] += G[i, s] * u[s]
+            if bound.own_errors:  # per rad and at the command
+                total.own_per_rad[i, s] += bound.admitted.per_rad[i, s]
+                total.own[i, s] += bound.admitted.per_rad[i, s] * abs(u[s])
     if every_type:
         note_extremes(layout.dominant_axis, G, u, total)
-    if bound.own_errors:
-        sum_up_own_errors(bound.admitted.per_rad, u, total)
 
 
 @kernel
 def note_extremes(dominant_axis, G, u, total):
     """Keep the least and greatest effectiveness and deflection within the frame."""
-    for s in range(dominant_axis.size):
-        now = G[dominant_axis[s], s]
+    for s, axis in enumerate(dominant_axis):
+        now = G[axis, s]
         total.G_least[s], total.G_most[s] = min(total.G_least[s], now), max(total.G_most[s], now)
         total.u_least[s], total.u_most[s] = min(total.u_least[s], u[s]), max(total.u_most[s], u[s])
-
-
-@kernel
-def sum_up_own_errors(per_rad, u, total):
-    """Add what the declared errors do to the surfaces' own terms now, per rad and at the command."""
-    for i in range(3):
-        for s in range(u.size):
-            total.own_per_rad[i, s] += per_rad[i, s]
-            total.own[i, s] += per_rad[i, s] * abs(u[s])
 
 
 @kernel

@@ -37,8 +37,7 @@ FDAE = record(
 )  # fmt: skip
 
 _PER_STEP = np.exp(-1.0)
-_N_ALPHA = len(ALPHA_CENTRES)
-_N_BETA = len(BETA_CENTRES)
+_N_ALPHA, _N_BETA = len(ALPHA_CENTRES), len(BETA_CENTRES)
 _ALPHA_FIRST, _ALPHA_STEP = ALPHA_CENTRES[0], ALPHA_CENTRES[1] - ALPHA_CENTRES[0]
 _BETA_FIRST, _BETA_STEP = BETA_CENTRES[0], BETA_CENTRES[1] - BETA_CENTRES[0]
 
@@ -123,11 +122,8 @@ def begin(fdae, bank, noise, x):
 
     noise (3,) rad/s: by how much the gyros' errors may change.
     """
-    for i in range(3):
-        fdae.xhat[i] = x[i]
-        fdae.threshold_noise[i] = noise[i]
-        for m in range(bank.n):
-            bank.noise[m, i] = noise[i]
+    fdae.xhat[:], fdae.threshold_noise[:] = x, noise
+    bank.noise[: bank.n] = noise
 
 
 @kernel
@@ -144,9 +140,7 @@ def detect(bank, conclusion, authority, chances, t):
     if axis < 0 and authority != WORST_CASE and chances.score > 1.0:
         axis = chances.axis
     if axis >= 0 and not conclusion.detected:
-        conclusion.detected = 1
-        conclusion.detected_at_s = t
-        conclusion.detected_axis = axis
+        conclusion.detected, conclusion.detected_at_s, conclusion.detected_axis = 1, t, axis
 
 
 @kernel

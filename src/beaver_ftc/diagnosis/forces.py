@@ -41,6 +41,8 @@ RATE_TOLERANCE = {False: 0.05, True: 0.2}  # of the term in the rate of sideslip
 # The rate of sideslip, the bias of the accelerometer and the force as a whole come last.
 MAX_ERRORS = MAX_TERMS_OF_ONE + 3
 
+Trim = tuple[np.ndarray, np.ndarray, np.ndarray]  # x (3,) rad/s, y and u rad
+
 FORCE = record(
     innovation=float,  # e as the elapsed frame began
     # the same by the angle that follows from inertial motion; that angle, rad; how fast it may drift,
@@ -190,12 +192,12 @@ def set_up_forces(
     statistical: np.void,
     bounds: Bounds,
     aircraft: Aircraft,
-    trim: tuple[np.ndarray, np.ndarray, np.ndarray],
+    trim: Trim,
     along_y: np.ndarray,
     dt_s: float,
     admitted: np.void,
 ) -> None:
-    """Fill the record of forces that are `known` from what is declared; trim: x (3,) rad/s, y, u rad.
+    """Fill the record of forces that are `known` from what is declared.
 
     along_y (3, y.size): the slopes of the angular accelerations with y. dt_s: of a frame. admitted: of the
     bound, for the engine's power.
@@ -279,7 +281,7 @@ def _set_up_tolerances(
     force["tolerance"][n], force["n"] = MASS_TOLERANCE + felt.slope, n + 1
 
 
-def _value(aircraft: Aircraft, name: str, at: tuple[np.ndarray, np.ndarray, np.ndarray]) -> float:
+def _value(aircraft: Aircraft, name: str, at: Trim) -> float:
     """A force coefficient at x (3,) rad/s, y, u rad."""
     x, y, u = at
     size, V = aircraft.geometry, y[AIRSPEED]
@@ -289,11 +291,9 @@ def _value(aircraft: Aircraft, name: str, at: tuple[np.ndarray, np.ndarray, np.n
     return float(aircraft.coefficient(name, of))
 
 
-def _slopes(
-    aircraft: Aircraft, name: str, trim: tuple[np.ndarray, np.ndarray, np.ndarray], step: float = 1e-5
-) -> np.ndarray:
+def _slopes(aircraft: Aircraft, name: str, trim: Trim) -> np.ndarray:
     """(7,): its derivatives with alpha, beta (1/rad), airspeed (s/m), rates (s/rad), dpt, by differences."""
-    x, y, u = trim
+    (x, y, u), step = trim, 1e-5
     states = [(x, y + step * e, u) for e in np.eye(3, y.size)]
     states += [(x + step * e, y, u) for e in np.eye(3)]
     states += [(x, y + step * (np.arange(y.size) == DPT), u)]

@@ -125,8 +125,7 @@ def clear_gyros(watch):
     step = watch.step
     for i in range(3):
         test, rate = step.test[TURN + i], watch.W_bound[i] + SLACK * abs(watch.W[i])
-        for m in range(step.decay.size):
-            a = step.decay[m]
+        for m, a in enumerate(step.decay):
             watch.apart[i, m] = a * watch.apart[i, m] + test.residual + step.h * watch.W[i]
             watch.apart_bound[i, m] = bound_step(watch.apart_bound[i, m], rate, a, step.h)
             if abs(watch.apart[i, m]) > watch.apart_bound[i, m] + test.bound[m]:
@@ -302,7 +301,9 @@ def suspect_attitude(watch):
         fits = explains(watch, i)
         mine = angles == 1 if fired[ANGLE + i] == 1 else angles == 0 and fits
         moved = mine and watch.rates_say[axis_of(watch, i)] != YES
-        who[PHI + i] = moved or (fits and accelerometers.may_stand_still(watch, PHI + i))
+        still, longest = watch.still[PHI + i], watch.longest_still[PHI + i]
+        may_be_frozen = 0 < still < longest < accelerometers.NEVER_STILL  # too early to say
+        who[PHI + i] = moved or (fits and may_be_frozen)
 
 
 @kernel

@@ -28,14 +28,7 @@ from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.compiled import kernel, record
 from beaver_ftc.diagnosis import membership
 from beaver_ftc.diagnosis.bank import explains, remember
-from beaver_ftc.diagnosis.state import (
-    INTERVAL,
-    LOSS,
-    NOT_ISOLATED,
-    POSITION,
-    PUBLISHED,
-    UNANTICIPATED,
-)
+from beaver_ftc.diagnosis.state import INTERVAL, LOSS, NOT_ISOLATED, POSITION, PUBLISHED, UNANTICIPATED
 from beaver_ftc.diagnosis.thresholds import bound_step, interval, noise_step, published
 from beaver_ftc.scenario.diagnosis import MAX_POLES, FdiConfig
 
@@ -134,8 +127,8 @@ def suppose(isolation, fie, bank, bound, config, G, Gu, spread):
 def suppose_all(isolation, bank, bound, config, detected, G, Gu, spread):
     """`suppose` for every estimator, where something will ask for it."""
     if isolation.memory or config.every_type or detected:
-        for s in range(isolation.n):
-            suppose(isolation, isolation.estimator[s], bank, bound, config, G, Gu, spread)
+        for fie in isolation.estimator[: isolation.n]:
+            suppose(isolation, fie, bank, bound, config, G, Gu, spread)
 
 
 @kernel
@@ -144,13 +137,10 @@ def start(isolation, noise, x):
 
     noise (3,) rad/s: by how much the gyros' errors may change.
     """
-    for s in range(isolation.n):
-        fie = isolation.estimator[s]
-        for i in range(3):
-            fie.xhat[i] = x[i]
-            fie.bound_noise[i] = noise[i]
-            fie.covariance[i] = (fie.high - fie.low) ** 2 / 12.0  # of a uniform distribution
-            fie.theta_low[i], fie.theta_high[i] = fie.low, fie.high
+    for fie in isolation.estimator[: isolation.n]:
+        fie.xhat[:], fie.bound_noise[:] = x, noise
+        fie.covariance[:] = (fie.high - fie.low) ** 2 / 12.0  # of a uniform distribution
+        fie.theta_low[:], fie.theta_high[:] = fie.low, fie.high
 
 
 @kernel
@@ -159,14 +149,12 @@ def within_limits(fie, thresholds, x):
     within = True
     for i in range(3):
         fie.residual[i] = x[i] - fie.xhat[i]
+        low, high, omega, theta, bound = fie.low, fie.high, fie.omega[i], fie.theta[i], fie.bound[i]
         if thresholds == INTERVAL:
-            fie.lower[i], fie.upper[i] = interval(
-                fie.low, fie.high, fie.rise[i], fie.fall[i], fie.omega[i], fie.theta[i], fie.bound[i]
-            )
+            limits = interval(low, high, fie.rise[i], fie.fall[i], omega, theta, bound)
         else:
-            fie.lower[i], fie.upper[i] = published(
-                fie.low, fie.high, fie.omega[i], fie.theta[i], fie.bound[i]
-            )
+            limits = published(low, high, omega, theta, bound)
+        fie.lower[i], fie.upper[i] = limits
         within = within and (fie.lower[i] <= fie.residual[i] <= fie.upper[i] or fie.unasked[i])
     return within
 
@@ -194,8 +182,7 @@ def decide(isolation, conclusion, t):
     One that is doubted and does not show by itself is not named.
     """
     left, last = 0, NOT_ISOLATED
-    for s in range(isolation.n):
-        fie = isolation.estimator[s]
+    for s, fie in enumerate(isolation.estimator[: isolation.n]):
         if not fie.excluded:
             left += 1
             last = NOT_ISOLATED if fie.doubted and not fie.shown else s
@@ -235,8 +222,7 @@ def adapt_jointly(fie, forgetting):
             left = fie.residual[i] - fie.omega[i] * total
             total += correct(fie, i, left, forgetting, fie.theta_low[i], fie.theta_high[i])
             forgetting = 1.0  # once a frame
-    for i in range(2):
-        fie.theta[i], fie.covariance[i] = fie.theta[2], fie.covariance[2]
+    fie.theta[:2], fie.covariance[:2] = fie.theta[2], fie.covariance[2]
     return total
 
 
@@ -276,5 +262,5 @@ def adapt(isolation, fie, dt):
 @kernel
 def predict_all(isolation, bound, x, believed, dt):
     """Advance the estimators by a frame; arguments as in `predict`."""
-    for s in range(isolation.n):
-        predict(isolation, isolation.estimator[s], bound, x, believed, dt)
+    for fie in isolation.estimator[: isolation.n]:
+        predict(isolation, fie, bound, x, believed, dt)

@@ -72,6 +72,7 @@ STEP, ALPHA3, GROWING, ENDING = 2, 3, 4, 5  # further kinds of hypothesis
 # Which sign of a correlation speaks for one: a loss takes away, one that ends gives back; 0: either does.
 SENSE = {LOSS: -1.0, STEP: 0.0, ALPHA3: 0.0, GROWING: -1.0, ENDING: 1.0}
 
+PRIOR_DRIFT_RAD_S2 = 1.0  # what a drift may be at the start of a flight: soon forgotten
 PRIOR_INFORMATION = 12.0  # of a loss uniform on [0, 1]: one over its variance
 # Magnitudes of a second-order transient of damping 0.7 add up to 1.09 times its sum; on two axes to more.
 RINGING = 1.2
@@ -428,8 +429,7 @@ def judge(block, memory=0.0):
     """
     lane = block.lane
     judge_lanes(block, memory > 0.0)
-    for h in range(block.n_hypotheses):
-        hypothesis = block.hypothesis[h]
+    for h, hypothesis in enumerate(block.hypothesis[: block.n_hypotheses]):
         score, at_least, at_most, best, likeliest = 0.0, 0.0, memory * hypothesis.at_most, -1.0, -1
         for k in range(h * N_SLOTS, (h + 1) * N_SLOTS):
             score = max(score, lane.score[k])

@@ -18,30 +18,13 @@ from beaver_ftc.compiled import kernel
 from beaver_ftc.design.engine import slipstream_slopes
 from beaver_ftc.design.terms import AIRSPEED, ALPHA, BETA, PH, QDYN, RH, directional, whole_sum
 from beaver_ftc.design.variants import jacobian
-from beaver_ftc.diagnosis.across import (
-    AN_AXIS,
-    PRIOR_DRIFT_RAD_S2,
-    Direction,
-    across_a_column,
-    set_up_views,
-    views_of,
-)
+from beaver_ftc.diagnosis import likelihood
+from beaver_ftc.diagnosis.across import AN_AXIS, Direction, across_a_column, set_up_views, views_of
 from beaver_ftc.diagnosis.air import BY_FORCE, UNSEEN, set_up_air, set_up_jitter
 from beaver_ftc.diagnosis.bounds.declared import Errors
 from beaver_ftc.diagnosis.bounds.variances import axis_of, steady_tolerance
 from beaver_ftc.diagnosis.forces import set_up_forces
-from beaver_ftc.diagnosis.likelihood import (
-    ALPHA3,
-    ENDING,
-    GROWING,
-    LATERAL,
-    LEAST_UNCERTAINTY_RAD_S2,
-    N_READINGS,
-    N_SLOTS,
-    PITCH_BLOCK,
-    SENSE,
-    STEP,
-)
+from beaver_ftc.diagnosis.likelihood import ALPHA3, ENDING, GROWING, LATERAL, N_READINGS, N_SLOTS, STEP
 from beaver_ftc.diagnosis.state import LOSS, SIDE
 from beaver_ftc.diagnosis.tones import N_TONES, set_up_listening
 from beaver_ftc.plant.instruments import NOISE_LIMIT_SIGMA
@@ -162,7 +145,7 @@ def set_up(
     block["lag"] = returning_length(statistical, airspeed_mps, rate_hz)
     if air["moving"]:
         block["stronger"] = (air["rolling"] / block["lag"]) ** 2
-        set_up_jitter(statistical, errors, design, *start[1:], aircraft.geometry.span_m, dt_s)
+        set_up_jitter(statistical, errors, design, *start[1:], dt_s)
 
 
 def _set_up_blocks(statistical: np.void, errors: Errors, aircraft: Aircraft) -> None:
@@ -177,9 +160,9 @@ def _set_up_blocks(statistical: np.void, errors: Errors, aircraft: Aircraft) -> 
             block["axis"][i] = axis
             variance = max(errors[AXES[axis]].random, LEAST_NOISE_RAD_S) ** 2
             block["noise"][i] = block["P_xx"][i, i] = variance
-            block["P_dd"][i, i] = PRIOR_DRIFT_RAD_S2**2
+            block["P_dd"][i, i] = likelihood.PRIOR_DRIFT_RAD_S2**2
         sense = block["lane"]["sense"].reshape(-1, N_SLOTS)
-        sense[: len(members)] = [[SENSE[kind]] for kind, *_ in members]
+        sense[: len(members)] = [[likelihood.SENSE[kind]] for kind, *_ in members]
         for hypothesis, (kind, surface, axis, alarms) in zip(block["hypothesis"], members, strict=False):
             hypothesis["kind"], hypothesis["surface"] = kind, surface
             hypothesis["axis"], hypothesis["alarms"] = axis, alarms
@@ -214,12 +197,7 @@ def _set_up_bounded(statistical: np.void, config: FdiConfig, pace: float, dt_s: 
 
 
 def _set_up_noise(
-    statistical: np.void,
-    given: Statistical,
-    bounds: Bounds,
-    design: np.void,
-    start: Start,
-    dt_s: float,
+    statistical: np.void, given: Statistical, bounds: Bounds, design: np.void, start: Start, dt_s: float
 ) -> None:
     """What drifts, and what is white: noise of the measurements that f + G u is made of."""
     errors = Errors(bounds.sensors).each("random")
@@ -244,7 +222,7 @@ def rapidity(eta_bar: float, omega: float, noise: float, level: float, dt_s: flo
     sin(z) / sqrt(z / 2), z half of omega t. Half the alarm level is left for it: noise alone then takes up no
     more than the other half. eta_bar rad/s2, omega rad/s, noise rad/s, level in standard deviations.
     """
-    eta_bar = max(eta_bar, LEAST_UNCERTAINTY_RAD_S2)
+    eta_bar = max(eta_bar, likelihood.LEAST_UNCERTAINTY_RAD_S2)
     swing = 8.0 * sqrt(2.0) * (eta_bar * omega / level) ** 2  # of i w0
     ramp = 4.0 * (1.204 * eta_bar / level) ** 2 * omega
     walk = (swing * (noise**2 * dt_s) ** 0.25) ** 0.8
@@ -263,9 +241,8 @@ def returning_length(statistical: np.void, airspeed_mps: float, rate_hz: float) 
     if statistical["noise"]["rapidity"] == 0.0:
         return rolling  # 0 in still air: nothing is declared that drifts, and the two views are one
     longest_s = 2 ** (N_SLOTS - 1) / rate_hz
-    lag_s = sqrt(2.0 * longest_s / statistical["noise"]["rapidity"]) / float(
-        statistical["tests"]["alarm_level"]
-    )
+    level = float(statistical["tests"]["alarm_level"])
+    lag_s = sqrt(2.0 * longest_s / statistical["noise"]["rapidity"]) / level
     return min(airspeed_mps * lag_s, rolling or np.inf)
 
 
@@ -312,12 +289,8 @@ def sensitivity(table, admitted, y, which, direction):
             direction[k] = -table.signal[k] / y[AIRSPEED]
     if admitted.engine and which >= AIRSPEED:
         by_airspeed, by_pressure, per_kw = slipstream_slopes(y, admitted.thin_air_kw)
-        if which == AIRSPEED:
-            direction[_SLIPSTREAM] = by_airspeed
-        elif which == QDYN:
-            direction[_SLIPSTREAM] = by_pressure
-        else:
-            direction[_SLIPSTREAM] = per_kw
+        of_power = by_pressure if which == QDYN else per_kw
+        direction[_SLIPSTREAM] = by_airspeed if which == AIRSPEED else of_power
 
 
 @kernel
@@ -345,10 +318,9 @@ def add_readings(share, noise, blocks, admitted, design, y, u):
         moved(design, y, u, which, noise.slope, out)
         for i in range(3):
             noise.jitter[i] += (out[i] * noise.reading[which]) ** 2
-        pitch = blocks[PITCH_BLOCK]
+        pitch = blocks[likelihood.PITCH_BLOCK]
         pitch.regressor[pitch.n_regressors - N_READINGS + which, 0] += share * out[1]
-        for b in range(LATERAL, blocks.size):
-            block = blocks[b]
+        for block in blocks[LATERAL:]:
             j = block.n_regressors - N_READINGS + which
             block.regressor[j, 0] += share * out[0]
             block.regressor[j, 1] += share * out[2]

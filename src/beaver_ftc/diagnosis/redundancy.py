@@ -284,8 +284,7 @@ def allow(step, signal):
 def follow(step, test):
     """Pass one residual through its filters; note the largest share of a bound."""
     test.share = 0.0
-    for m in range(step.decay.size):
-        a = step.decay[m]
+    for m, a in enumerate(step.decay):
         test.filtered[m] = a * test.filtered[m] + test.residual
         test.bound_rate[m] = bound_step(test.bound_rate[m], test.rate, a, step.h)
         test.bound_noise[m] = noise_step(test.bound_noise[m], test.noise_then, a)

@@ -13,25 +13,13 @@ from beaver_ftc.compiled import apart, kernel, record
 from beaver_ftc.design.model import AIRSPEED
 from beaver_ftc.diagnosis import air, bank, detection, forces, isolation, state, statistical
 from beaver_ftc.diagnosis.across import USUAL, Size
-from beaver_ftc.diagnosis.bank import BANK, largest_share
+from beaver_ftc.diagnosis.bank import largest_share
 from beaver_ftc.diagnosis.bounds import declared
 from beaver_ftc.diagnosis.bounds.worst_case import bound_dtype
-from beaver_ftc.diagnosis.detection import FDAE
-from beaver_ftc.diagnosis.isolation import ISOLATION, start
-from beaver_ftc.diagnosis.state import (
-    CONFIG,
-    IN_PITCH,
-    IN_ROLL_AND_YAW,
-    NOT_ISOLATED,
-    STATISTICS,
-    WORST_CASE,
-    conclusion_dtype,
-    layout_dtype,
-)
-from beaver_ftc.diagnosis.statistical import statistical_dtype
+from beaver_ftc.diagnosis.isolation import start
+from beaver_ftc.diagnosis.state import IN_PITCH, IN_ROLL_AND_YAW, NOT_ISOLATED, STATISTICS, WORST_CASE
 from beaver_ftc.diagnosis.types import examine, pairs, registry, verdict
 from beaver_ftc.diagnosis.types.examine import FIXED, LAGS, LOSES, SHIFTED
-from beaver_ftc.diagnosis.types.registry import types_dtype
 from beaver_ftc.diagnosis.watch import WATCH
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.scenario.schema import Scenario
@@ -41,9 +29,9 @@ from beaver_ftc.scenario.schema import Scenario
 def diagnosis_dtype(n: int, size: Size = USUAL) -> np.dtype:
     """The stages of the diagnosis of an aircraft with n surfaces; size: of its statistical record."""
     return record(
-        config=CONFIG, bound=bound_dtype(n), bank=BANK, fdae=FDAE, verdict=conclusion_dtype(n),
-        layout=layout_dtype(n), isolation=ISOLATION, types=types_dtype(n),
-        statistical=statistical_dtype(size), watch=WATCH,
+        config=state.CONFIG, bound=bound_dtype(n), bank=bank.BANK, fdae=detection.FDAE,
+        verdict=state.conclusion_dtype(n), layout=state.layout_dtype(n), isolation=isolation.ISOLATION,
+        types=registry.types_dtype(n), statistical=statistical.statistical_dtype(size), watch=WATCH,
     )  # fmt: skip
 
 
@@ -114,8 +102,8 @@ def is_unlikely(fie, tests, blocks, isolation, loss_of, abrupt, hidden):
     if not statistical.excludes(tests, blocks, others, loss_of, s, True, abrupt):
         return False
     if hidden:
-        for i in range(isolation.n):
-            others[i].doubted = 1
+        for other in others[: isolation.n]:
+            other.doubted = 1
     return True
 
 
@@ -137,10 +125,7 @@ def isolate_type(types, conclusion, layout, isolation, bank, bound, t, started):
 def see_air(seen, inertial, felt, belief, measured, k, dt):
     """Take in the air as the vanes see it, and what the accelerometers say of it (forces.py)."""
     if seen.moving:
-        if k > 0:
-            air.observe(seen, measured.y, measured.attitude, belief.share * dt)
-        else:
-            air.begin(seen, measured.y, measured.attitude)
+        air.follow(seen, measured.y, measured.attitude, belief.share * dt, k)
     if felt.known and not measured.inertial:
         forces.do_without(felt, seen, inertial)
     if felt.known:
@@ -155,10 +140,7 @@ def weigh_forces(seen, inertial, felt, belief, measured, k, dt):
     if inertial.moving:
         forces.without_vanes(felt, inertial.rotation, measured.y)
         inertial.felt[:] = measured.force
-        if k > 0:
-            air.observe(inertial, felt.y, measured.attitude, dt)
-        else:
-            air.begin(inertial, felt.y, measured.attitude)
+        air.follow(inertial, felt.y, measured.attitude, dt, k)
         air.effect(inertial, belief.design, measured.x, felt.y, belief.u)
         air.begin_frame(inertial, felt.y[AIRSPEED], dt)
 

@@ -19,18 +19,7 @@ from beaver_ftc.diagnosis.across import USUAL, Size, view_dtype
 from beaver_ftc.diagnosis.air import AIR
 from beaver_ftc.diagnosis.bounds.worst_case import UNKNOWN_TO_FILTERS_RAD_S2, uncertainty_bound
 from beaver_ftc.diagnosis.forces import FORCES_FELT
-from beaver_ftc.diagnosis.likelihood import (
-    ENDING,
-    GROWING,
-    LATERAL,
-    LEAST_UNCERTAINTY_RAD_S2,
-    N_BLOCKS,
-    N_READINGS,
-    RETURNING,
-    STEP,
-    block_dtype,
-)
-from beaver_ftc.diagnosis.likelihood import PITCH_BLOCK as PITCH
+from beaver_ftc.diagnosis.likelihood import ENDING, GROWING, LATERAL, N_BLOCKS, N_READINGS, STEP, block_dtype
 from beaver_ftc.diagnosis.state import LOSS
 from beaver_ftc.diagnosis.tones import LISTENING
 
@@ -72,10 +61,8 @@ def statistical_dtype(size: Size = USUAL) -> np.dtype:
 def signatures(blocks, Gu, cubic):
     """What each fault would have done in the elapsed frame, times theta. Gu (3, surfaces) rad/s2: what each
     surface gave, mean over it; cubic rad/s2: a pitching moment on alpha^3."""
-    for b in range(blocks.size):
-        block = blocks[b]
-        for h in range(block.n_hypotheses):
-            hypothesis = block.hypothesis[h]
+    for block in blocks:
+        for hypothesis in block.hypothesis[: block.n_hypotheses]:
             for i in range(block.n):
                 if hypothesis.surface >= 0:
                     hypothesis.signature[i] = Gu[block.axis[i], hypothesis.surface]
@@ -89,16 +76,13 @@ def signatures(blocks, Gu, cubic):
 def observe(tests, bounded, blocks, air, innovation, dt, k, latched, ends=False):
     """Take in frame k: innovation and `bounded` (3,) rad/s2, whether the alarm is out; ends:
     a loss may."""
-    keep = tests.keep if latched else 1.0
-    slot = likelihood.slot_to_start(k)
-    for b in range(blocks.size):
-        block = blocks[b]
+    keep, slot = tests.keep if latched else 1.0, likelihood.slot_to_start(k)
+    for block in blocks:
         if not latched:
             likelihood.start(block, slot)
         if air.moving:
             leap(air, block)
-        for i in range(block.n):
-            axis = block.axis[i]
+        for i, axis in enumerate(block.axis[: block.n]):
             block.scratch[i] = innovation[axis] - air.mean[axis]
         memory = tests.keep if ends else 0.0
         likelihood.take_in(block, bounded, tests.tolerated, dt, keep, memory)
@@ -115,10 +99,8 @@ def leap(air, block):
 @kernel
 def follow_rest(blocks, air, surprise, dt):
     """Filter what the law's beliefs leave unexplained: surprise (3,) rad/s2, known faults taken off."""
-    for b in range(RETURNING):
-        block = blocks[b]
-        for i in range(block.n):
-            axis = block.axis[i]
+    for block in blocks[: likelihood.RETURNING]:
+        for i, axis in enumerate(block.axis[: block.n]):
             block.scratch[i] = surprise[axis] - air.mean[axis]
         likelihood.whiten(block, block.rest, block.scratch, dt, block.scratch)
 
@@ -127,10 +109,8 @@ def follow_rest(blocks, air, surprise, dt):
 def unknown_acceleration(blocks, air, out):
     """Fill out (3,) rad/s2 with what goes on beyond the law's beliefs: the drift that explains the rates
     best, and the gust the vanes see."""
-    for b in range(RETURNING):
-        block = blocks[b]
-        for i in range(block.n):
-            axis = block.axis[i]
+    for block in blocks[: likelihood.RETURNING]:
+        for i, axis in enumerate(block.axis[: block.n]):
             out[axis] = block.rest[2 + i] + air.acceleration[axis]
 
 
@@ -141,14 +121,11 @@ def score(alarm, tests, blocks, views, forces, air, t, known=True):
     alarm.score = 0.0
     if not known:
         return
-    for b in range(blocks.size):
-        block = blocks[b]
-        for h in range(block.n_hypotheses):
-            hypothesis = block.hypothesis[h]
+    for block in blocks:
+        for hypothesis in block.hypothesis[: block.n_hypotheses]:
             if hypothesis.alarms:
                 note(alarm, tests.alarm_level, hypothesis.score, hypothesis.axis)
-    for a in range(views.size):
-        view = views[a]
+    for view in views:
         note(alarm, tests.alarm_level, across.alarm(view, views, tests, forces, air), view.axis)
     if alarm.score > 1.0 and alarm.detected_at_s < 0.0:
         alarm.detected_at_s = t
@@ -168,15 +145,12 @@ def write_shares(tests, blocks, views, forces, air, row):
     forces and tones show besides is in the step of the axis."""
     first = row.size - tests.n_columns
     row[first:] = 0.0
-    for b in range(blocks.size):
-        block = blocks[b]
-        for h in range(block.n_hypotheses):
-            hypothesis = block.hypothesis[h]
+    for block in blocks:
+        for hypothesis in block.hypothesis[: block.n_hypotheses]:
             if hypothesis.alarms:
                 place = first + hypothesis.column
                 row[place] = max(row[place], hypothesis.score / tests.alarm_level)
-    for a in range(views.size):
-        view = views[a]
+    for view in views:
         place = row.size - 3 + view.axis
         row[place] = max(row[place], across.alarm(view, views, tests, forces, air) / tests.alarm_level)
 
@@ -195,8 +169,7 @@ def best_alternative(block, estimators, loss_of, surface):
     the commands may gather some for it.
     """
     best = 0.0
-    for h in range(block.n_hypotheses):
-        hypothesis = block.hypothesis[h]
+    for hypothesis in block.hypothesis[: block.n_hypotheses]:
         if hypothesis.kind in (GROWING, ENDING):
             continue
         other = hypothesis.surface
@@ -210,8 +183,7 @@ def at_most(block, surface, ending):
     """The log likelihood ratio a loss of this surface, or the end of one, has at most; 0 where the block does
     not feel it."""
     most = 0.0
-    for h in range(block.n_hypotheses):
-        hypothesis = block.hypothesis[h]
+    for hypothesis in block.hypothesis[: block.n_hypotheses]:
         if hypothesis.surface == surface and (hypothesis.kind == ENDING) == ending:
             most = max(most, hypothesis.at_most)
     return most
@@ -223,11 +195,9 @@ def shows(tests, blocks, estimators, loss_of, surface):
 
     estimators: of isolation; loss_of (surfaces,): which of them is of a surface's loss, or -1.
     """
-    for b in range(blocks.size):
-        block = blocks[b]
+    for block in blocks:
         least = 0.0
-        for h in range(block.n_hypotheses):
-            hypothesis = block.hypothesis[h]
+        for hypothesis in block.hypothesis[: block.n_hypotheses]:
             if hypothesis.surface == surface and hypothesis.kind in (LOSS, GROWING):
                 least = max(least, hypothesis.at_least)
         if least - best_alternative(block, estimators, loss_of, surface) > tests.naming_level:
@@ -246,15 +216,12 @@ def excludes(tests, blocks, estimators, loss_of, surface, ends, abrupt):
     part: it shows in two; in pitch, where a fault outside the class may be such a step, only where asked for,
     by `ends`. Arguments as in `shows`.
     """
-    pitch, at_once = blocks[PITCH], tests.share == 1.0
+    pitch, at_once = blocks[likelihood.PITCH_BLOCK], tests.share == 1.0
     part = 1.0 if abrupt and at_once else LEAST_PART
     end_part = 1.0 if at_once else LEAST_PART
-    for b in range(LATERAL, blocks.size):
-        lateral = blocks[b]
-        better = max(
-            best_alternative(pitch, estimators, loss_of, surface),
-            best_alternative(lateral, estimators, loss_of, surface),
-        )
+    for lateral in blocks[LATERAL:]:
+        better = best_alternative(pitch, estimators, loss_of, surface)
+        better = max(better, best_alternative(lateral, estimators, loss_of, surface))
         worse = max(at_most(pitch, surface, False), at_most(lateral, surface, False))
         ended = at_most(lateral, surface, True)
         if ends:
@@ -269,10 +236,8 @@ def excludes(tests, blocks, estimators, loss_of, surface, ends, abrupt):
 def estimated_loss(blocks, surface):
     """Estimated theta of a loss of effectiveness of a surface, in [-1, 0], and one over its variance."""
     theta, certainty = 0.0, 0.0
-    for b in range(blocks.size):
-        block = blocks[b]
-        for h in range(block.n_hypotheses):
-            hypothesis = block.hypothesis[h]
+    for block in blocks:
+        for hypothesis in block.hypothesis[: block.n_hypotheses]:
             if hypothesis.kind == LOSS and hypothesis.surface == surface and hypothesis.certainty > certainty:
                 theta, certainty = hypothesis.theta, hypothesis.certainty
     return theta, certainty
@@ -288,8 +253,8 @@ def prepare(tests, noise, blocks, air, bound, design, measured, u, dt):
     if air.moving:
         gusts.effect(air, design, x, y, u)
     if tests.tolerated:
-        for b in range(blocks.size):
-            blocks[b].regressor[:] = 0.0
+        for block in blocks:
+            block.regressor[:] = 0.0
         constants(tests.share, noise, blocks, bound.admitted, design, measured, u)
     drifts(noise, blocks, air, bound, design, measured, dt)
     if air.moving:
@@ -326,15 +291,13 @@ def drifts(noise, blocks, air, bound, design, measured, dt):
         bounded[i] += noise.deflection[i]
         if mapped:
             bounded[i] += min(bound.error_map.now[i], UNKNOWN_TO_FILTERS_RAD_S2)
-    for b in range(blocks.size):
-        block = blocks[b]
-        for i in range(block.n):
-            axis = block.axis[i]
+    for block in blocks:
+        for i, axis in enumerate(block.axis[: block.n]):
             for j in range(block.n):
                 block.drift[i, j] = 0.0
                 if air.moving:
                     block.drift[i, j] = block.stronger * gusts.unseen_drift(air, V, axis, block.axis[j])
-            size = max(bounded[axis], LEAST_UNCERTAINTY_RAD_S2)
+            size = max(bounded[axis], likelihood.LEAST_UNCERTAINTY_RAD_S2)
             walk = noise.rapidity * size * size
             block.drift[i, i] += walk
             block.calm.drift[i, i] = walk
@@ -349,12 +312,11 @@ def coefficients(share, terms, blocks, design, y, u):
     regressors(table, table.power, u, terms)
     force = share * y[QDYN] * design.S
     lateral, longitudinal = force * design.b, force * design.c
-    pitch = blocks[PITCH]
+    pitch = blocks[likelihood.PITCH_BLOCK]
     first = table.free_from[1]
     for j in range(table.surface_to[1] - first):
         pitch.regressor[j, 0] += design.Qm * longitudinal * terms[first + j]
-    for b in range(LATERAL, blocks.size):
-        rolling = blocks[b]
+    for rolling in blocks[LATERAL:]:
         n_roll, first = table.surface_to[0], table.free_from[2]
         for j in range(n_roll):
             Cl = lateral * terms[j]

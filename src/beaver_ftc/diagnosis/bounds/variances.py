@@ -5,7 +5,7 @@ from math import hypot, pi, radians, sqrt
 
 import numpy as np
 
-from beaver_ftc.aircraft import AXES, Aircraft, MassProperties, Term, load
+from beaver_ftc.aircraft import AXES, Aircraft, MassProperties, Term
 from beaver_ftc.aircraft.aircraft import MOMENTS
 from beaver_ftc.aircraft.schema import RATE_SIGNALS
 from beaver_ftc.design.context import Declared, DesignFunctions
@@ -36,15 +36,9 @@ def gusts(turbulence: str, airspeed_mps: float, span_m: float) -> tuple[np.ndarr
 
 
 def declared_of(
-    bounds: Bounds,
-    actuators: Actuators,
-    design: np.ndarray,
-    y: np.ndarray,
-    u: np.ndarray,
-    aircraft: Aircraft | None = None,
+    bounds: Bounds, actuators: Actuators, design: np.ndarray, y: np.ndarray, u: np.ndarray, aircraft: Aircraft
 ) -> Declared:
     """What is declared, of a flight trimmed at y and u rad; design: the designer's record, (1,)."""
-    aircraft = aircraft or load()
     errors = Errors(bounds.sensors)
     noise, bias, resolution = (errors.each(of_it) for of_it in ("noise", "steady", "resolution"))
     coefficients = tolerances(bounds.coefficients, aircraft, design["moments"]["value"][0])
@@ -120,10 +114,8 @@ def flow_noise(errors: Errors, airspeed_mps: float) -> np.ndarray:
     """Of the flow's angles (2,) against the level axes, as vanes, airspeed and attitude have them, standard
     deviation in rad: what pitch attitude and heading are off turns the flow as much as what a vane is off."""
     through = 0.3  # attitudes and incidences of up to 17 deg
-    vanes = (
-        hypot(errors["alpha"].random, errors["theta"].random),
-        hypot(errors["beta"].random, errors["psi"].random),
-    )
+    pairs = (("alpha", "theta"), ("beta", "psi"))
+    vanes = [hypot(errors[vane].random, errors[angle].random) for vane, angle in pairs]
     return np.array(vanes) + through * (errors["V"].random / airspeed_mps + errors["phi"].random)
 
 

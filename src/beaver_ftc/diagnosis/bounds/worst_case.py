@@ -240,10 +240,7 @@ def derived_bound(admitted, design, x, y, u, eta_bar):
 def find_place(error_map, x, y):
     """Fill `place` from x (3,) rad/s and y (4 + declared,)."""
     place = error_map.place
-    for i in range(3):
-        place[i] = x[i]
-    for i in range(y.size):
-        place[3 + i] = y[i]
+    place[:3], place[3 : 3 + y.size] = x, y
     place[3 + QDYN] = 2.0 * y[QDYN] / (y[AIRSPEED] * y[AIRSPEED])
 
 

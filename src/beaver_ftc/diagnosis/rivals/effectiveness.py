@@ -102,9 +102,8 @@ class AugmentedEkf(EffectivenessFilter):
     """Extended Kalman filter of effectiveness, chi-square test on the estimates [Jazwinski1970]."""
 
     name: ClassVar[str] = "augmented-ekf"
-    defaults: ClassVar[Mapping[str, float]] = DEFAULTS | {
-        "alarm": 20.0
-    }  # chi-square value of the largest theta^2 / variance
+    # alarm: chi-square value of the largest theta^2 / variance
+    defaults: ClassVar[Mapping[str, float]] = DEFAULTS | {"alarm": 20.0}
 
     def propagate(self, measured: Measured) -> None:
         """z- = g(z), P- = F P F' + Q with the Jacobian F at the estimate."""

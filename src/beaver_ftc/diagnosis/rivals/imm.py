@@ -16,10 +16,8 @@ from beaver_ftc.diagnosis.rivals import options_of
 from beaver_ftc.diagnosis.rivals.kalman import Air, log_likelihood, unexplained, update
 
 LEVELS = (-0.25, -0.5, -0.9)
-MODES = (
-    (None, 0.0),
-    *((s, level) for s in range(3) for level in LEVELS),
-)  # (leader of roll, pitch or yaw, theta); the last one is noise
+# (leader of roll, pitch or yaw, theta); the last one is noise
+MODES = ((None, 0.0), *((s, level) for s in range(3) for level in LEVELS))
 N_MODES = len(MODES) + 1
 _LEAST = 1e-12  # no probability below it: a mode must be able to come back
 

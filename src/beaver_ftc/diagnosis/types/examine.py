@@ -39,8 +39,8 @@ LOSES, FIXED, SHIFTED, LAGS = range(4)
 @kernel
 def start(types):
     """Nothing is known of any surface yet."""
-    for s in range(types.surface.size):
-        begin(types.surface[s])
+    for surface in types.surface:
+        begin(surface)
 
 
 @kernel
@@ -60,8 +60,7 @@ def note_orders(types, commanded, means):
     healthy ones were, and their least and greatest effectiveness, within it: means of a `belief.means_dtype`.
     """
     length = types.config.length
-    for s in range(types.surface.size):
-        surface = types.surface[s]
+    for s, surface in enumerate(types.surface):
         orders = surface.orders
         if types.block.filled == 0:
             for age in range(HISTORY - 1, 0, -1):
@@ -114,21 +113,21 @@ def note_stops(surface, width):
 def note_wrong(surfaces, innovation, bound):
     """Keep for every surface whether more than the admitted uncertainty was at work."""
     wrong = not membership.healthy(innovation, bound)
-    for s in range(surfaces.size):
-        surface = surfaces[s]
+    for surface in surfaces:
         surface.wrong_before, surface.wrong_then, surface.wrong = surface.wrong_then, surface.wrong, wrong
 
 
 @kernel
-def take_in_frame(types, layout, estimators, innovation, frame_bound):
-    """Find where each surface was in the elapsed frame, if it alone is at fault.
+def take_in(types, layout, estimators, innovation, bound):
+    """Find where each surface was in the elapsed frame, or block, if it alone is at fault.
 
-    frame_bound (3,): on its innovation (3,) without a fault, rad/s2.
+    bound (3,): on its innovation (3,) without a fault, rad/s2.
     """
-    note_wrong(types.surface, innovation, frame_bound)
-    for s in range(types.surface.size):
+    note_wrong(types.surface, innovation, bound)
+    for s, surface in enumerate(types.surface):
         fie, axis = estimators[layout.position_of[s]], layout.dominant_axis[s]
-        locate(types.config, types.surface[s], fie, axis, innovation, frame_bound, fie.effect)
+        effect = fie.block_effect if types.config.length > 1 else fie.effect
+        locate(types.config, surface, fie, axis, innovation, bound, effect)
 
 
 @kernel
@@ -152,8 +151,7 @@ def judge(config, surface, k):
 def judge_all(types):
     """Judge the frame before the elapsed one."""
     config, k = types.config, types.frame - 1
-    for s in range(types.surface.size):
-        surface = types.surface[s]
+    for s, surface in enumerate(types.surface):
         watch_each(config, surface)
         if config.returns and types.frame > 0:
             let_go_each(config, surface, k)
@@ -177,7 +175,7 @@ def examine(types, layout, estimators, innovation, bound):
     if types.config.length > 1:
         examine_block(types, layout, estimators, innovation, bound)
         return
-    take_in_frame(types, layout, estimators, innovation, bound.frame)
+    take_in(types, layout, estimators, innovation, bound.frame)
     judge_all(types)
 
 
@@ -187,8 +185,8 @@ def begin_block(types, layout, estimators, noise_then):
     block = types.block
     block.innovation[:], block.bound[:] = 0.0, 0.0
     block.noise[:] = noise_then
-    for s in range(types.surface.size):
-        effect = estimators[layout.position_of[s]].block_effect
+    for e in layout.position_of:
+        effect = estimators[e].block_effect
         effect.offset[:], effect.Z[:], effect.spread[:] = 0.0, 0.0, 0.0
 
 
@@ -199,9 +197,8 @@ def add_to_block(types, layout, estimators, innovation, eta_bar):
     for i in range(3):
         block.innovation[i] += share * innovation[i]
         block.bound[i] += share * eta_bar[i]
-    for s in range(types.surface.size):
-        fie = estimators[layout.position_of[s]]
-        frame, mean = fie.effect, fie.block_effect
+    for e in layout.position_of:
+        frame, mean = estimators[e].effect, estimators[e].block_effect
         for i in range(3):
             mean.offset[i] += share * frame.offset[i]
             mean.Z[i] += share * frame.Z[i]
@@ -221,10 +218,7 @@ def examine_block(types, layout, estimators, innovation, bound):
     block.filled = 0
     for i in range(3):
         block.bound[i] += (block.noise[i] + bound.noise[i]) / config.span_s
-    note_wrong(types.surface, block.innovation, block.bound)
-    for s in range(types.surface.size):
-        fie, axis = estimators[layout.position_of[s]], layout.dominant_axis[s]
-        locate(config, types.surface[s], fie, axis, block.innovation, block.bound, fie.block_effect)
+    take_in(types, layout, estimators, block.innovation, block.bound)
     judge_all(types)
 
 
@@ -238,9 +232,9 @@ def note_quiet(types, s):
     surface = types.surface[s]
     if surface.low_then > surface.set_high[STUCK] or surface.high_then < surface.set_low[STUCK]:
         return
-    for other in range(types.surface.size):
-        if other == s or (surface.in_question and types.surface[other].in_question):
-            note_evidence(types.surface[other])
+    for i, other in enumerate(types.surface):
+        if i == s or (surface.in_question and other.in_question):
+            note_evidence(other)
     surface.quiet += 1
     if surface.quiet > types.config.patience and not types.config.own_errors:
         surface.type_excluded[OSCILLATORY] = 1

@@ -11,18 +11,15 @@ import numpy as np
 
 from beaver_ftc.aircraft import load
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, UNANTICIPATED
+from beaver_ftc.diagnosis.types import registry
 from beaver_ftc.diagnosis.types.pairs import IN_PITCH
 from beaver_ftc.diagnosis.types.registry import (
     BIAS,
     CONSTANT_LOSS,
     DOWN,
     FLOAT,
-    N_CONSTANT,
-    N_TYPES,
-    NAMES,
     SLOW,
     STUCK,
-    TYPES,
     UP,
     VARYING_LOSS,
 )
@@ -30,13 +27,9 @@ from beaver_ftc.diagnosis.types.verdict import BY_DEDUCTION, RULED_OUT
 
 Found = dict[str, Any]
 _NOTHING: Found = {
-    "isolated": None,
-    "isolation_type": None,
-    "estimate": None,
-    "isolation_time_s": None,
-    "candidates": (),
-    "faults": (),
-}
+    "isolated": None, "isolation_type": None, "estimate": None, "isolation_time_s": None,
+    "candidates": (), "faults": (),
+}  # fmt: skip
 
 
 def found(fdi: np.void, surfaces: Sequence[str] | None = None) -> Found:
@@ -60,11 +53,12 @@ def _found_of_several(fdi: np.void, names: Sequence[str]) -> Found:
     )
     faults = [_found_on(fdi, s, int(fdi["types"]["surface"][s]["type"]), names) for s in at_fault]
     planes = fdi["types"]["pair"]["alarmed"]
+    surfaces_of = [np.flatnonzero(fdi["layout"]["group"] == g).tolist() for g in range(len(planes))]
     if not planes.any() and not faults and int(fdi["verdict"]["isolated"]) == NOT_ISOLATED:
         planes = np.ones_like(planes)  # a statistical alarm by itself says of no plane that it is there
     open_planes = [
         {**_NOTHING, "candidates": tuple(_open_questions(fdi, plane, names))}
-        for alarmed, plane in zip(planes, _planes(fdi), strict=True)
+        for alarmed, plane in zip(planes, surfaces_of, strict=True)
         if alarmed and not set(plane) & set(at_fault)
     ]
     if faults:
@@ -75,41 +69,30 @@ def _found_of_several(fdi: np.void, names: Sequence[str]) -> Found:
     return {**_NOTHING, "candidates": left, "faults": tuple(open_planes)}
 
 
-def _planes(fdi: np.void) -> list[list[int]]:
-    """The surfaces of each group."""
-    return [
-        [s for s, group in enumerate(fdi["layout"]["group"]) if group == g]
-        for g in range(len(fdi["types"]["pair"]["alarmed"]))
-    ]
-
-
 def _found_of_one(fdi: np.void, names: Sequence[str]) -> Found:
     verdict, at_s = int(fdi["verdict"]["isolated"]), float(fdi["verdict"]["isolated_at_s"])
     if verdict == NOT_ISOLATED:
         return {**_NOTHING, "candidates": tuple(_open_questions(fdi, range(len(names)), names))}
     if verdict == UNANTICIPATED:
-        said = {"isolated": "unanticipated", "isolation_type": "unanticipated", "isolation_time_s": at_s}
-        return {**_NOTHING, **said}
+        said = "unanticipated"
+        return {**_NOTHING, "isolated": said, "isolation_type": said, "isolation_time_s": at_s}
     s, kind = int(fdi["isolation"]["estimator"][verdict]["surface"]), int(fdi["verdict"]["type"])
     return {
         **_found_on(fdi, s, kind, names),
         "isolation_time_s": at_s,
-        "type_time_s": _at_s(fdi["verdict"]["type_at_s"], kind),
+        "type_time_s": float(fdi["verdict"]["type_at_s"]) if kind >= 0 else None,
     }
-
-
-def _at_s(instant_s: float, kind: int) -> float | None:
-    return float(instant_s) if kind >= 0 else None
 
 
 def _found_on(fdi: np.void, s: int, kind: int, names: Sequence[str]) -> Found:
     """What is known of surface s, which is at fault; kind: of which type, -1 if open."""
+    surface = fdi["types"]["surface"][s]
     return {
         "isolated": names[s],
-        "isolation_time_s": float(fdi["types"]["surface"][s]["named_at_s"]),
-        "isolation_type": NAMES[kind] if kind >= 0 else None,
-        "type_time_s": _at_s(fdi["types"]["surface"][s]["type_at_s"], kind),
-        "candidates": (NAMES[kind],) if kind >= 0 else tuple(_types_left(fdi, s)),
+        "isolation_time_s": float(surface["named_at_s"]),
+        "isolation_type": registry.NAMES[kind] if kind >= 0 else None,
+        "type_time_s": float(surface["type_at_s"]) if kind >= 0 else None,
+        "candidates": (registry.NAMES[kind],) if kind >= 0 else tuple(_types_left(fdi, s)),
         "estimate": estimate_of(fdi, s, kind),
         "estimate_interval": _of_type(kind, "interval", fdi, s, kind),
         "frequency_rad_s": _of_type(kind, "frequency_rad_s", fdi, s, kind),
@@ -124,7 +107,7 @@ def estimate_of(fdi: np.void, s: int, kind: int) -> float | None:
 
 def _of_type(kind: int, what: str, *arguments: Any) -> Any:
     """What a type's row says; None while the type is open."""
-    return getattr(TYPES[kind], what)(*arguments) if kind >= 0 else None
+    return getattr(registry.TYPES[kind], what)(*arguments) if kind >= 0 else None
 
 
 def _possible(fdi: np.void, s: int) -> bool:
@@ -141,8 +124,8 @@ def _types_left(fdi: np.void, s: int) -> list[str]:
     the constant has been seen for long enough; beside a surface that stands still, until it is excluded.
     """
     surface = fdi["types"]["surface"][s]
-    left = [kind for kind in range(N_TYPES) if _possible(fdi, s) and not surface["type_excluded"][kind]]
-    if any(kind < N_CONSTANT for kind in left) and not fdi["types"]["config"]["own_errors"]:
+    left = [kind for kind, out in enumerate(surface["type_excluded"]) if _possible(fdi, s) and not out]
+    if any(kind < registry.N_CONSTANT for kind in left) and not fdi["types"]["config"]["own_errors"]:
         early = surface["evidence"] - surface["quiet"] < fdi["types"]["config"]["patience"]
         still = bool({STUCK, FLOAT, UP, DOWN} & set(left))  # so may a slow one
         beside = {VARYING_LOSS: early, SLOW: early or still}
@@ -153,7 +136,7 @@ def _types_left(fdi: np.void, s: int) -> list[str]:
         and {STUCK, UP, DOWN} & set(left)
     ):
         left += [STUCK, FLOAT, UP, BIAS, CONSTANT_LOSS]  # if the other one is off as well
-    return list(dict.fromkeys(NAMES[kind] for kind in left))
+    return list(dict.fromkeys(registry.NAMES[kind] for kind in left))
 
 
 def _open_questions(fdi: np.void, among: Iterable[int], names: Sequence[str]) -> Iterator[str]:

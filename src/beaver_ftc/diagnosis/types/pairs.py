@@ -17,46 +17,13 @@ conclusion: of `conclusion_dtype`; estimators: those of the isolation.
 import numpy as np
 
 from beaver_ftc.compiled import kernel
-from beaver_ftc.diagnosis.state import (
-    IN_PITCH,
-    IN_ROLL_AND_YAW,
-    NOT_ISOLATED,
-    PITCH,
-    ROLL,
-    UNANTICIPATED,
-    YAW,
-)
-from beaver_ftc.diagnosis.types.examine import (
-    FIXED,
-    LOSES,
-    SHIFTED,
-    begin,
-    judge_all,
-    note_stops,
-    take_in_frame,
-)
+from beaver_ftc.diagnosis import state
+from beaver_ftc.diagnosis.state import IN_PITCH, IN_ROLL_AND_YAW, PITCH, ROLL, YAW
+from beaver_ftc.diagnosis.types import examine as frames
+from beaver_ftc.diagnosis.types import verdict
+from beaver_ftc.diagnosis.types.examine import FIXED, LOSES, SHIFTED
 from beaver_ftc.diagnosis.types.registry import DOWN, N_CONSTANT, STUCK, UP, deflection
-from beaver_ftc.diagnosis.types.verdict import (
-    BY_DEDUCTION,
-    NO_SURFACE,
-    RULED_OUT,
-    any_constant,
-    anything_left,
-    estimator_for,
-    explained,
-    left,
-    may_be_growing,
-    may_be_slow,
-    measure_for,
-    one_type,
-    only_a_swing,
-    possible,
-    sole,
-    still_there,
-    surface_at_fault,
-    type_at_fault,
-    would_have_swung,
-)
+from beaver_ftc.diagnosis.types.verdict import NO_SURFACE, any_constant, left, possible
 
 
 @kernel
@@ -75,7 +42,7 @@ def place(surface, middle, slack):
     surface.low = max(surface.reach_low, surface.command + middle - slack)
     surface.high = min(surface.reach_high, surface.command + middle + slack)
     surface.wrong = abs(middle) > slack
-    note_stops(surface, 2.0 * slack)
+    frames.note_stops(surface, 2.0 * slack)
     return surface.low <= surface.high
 
 
@@ -112,20 +79,15 @@ def whereabouts(config, surface, k):
 
 
 @kernel
-def first_is_settled(types):
-    """Whether one pitch fault was named and a second has begun beside it."""
-    return types.pair.first != NO_SURFACE and not types.surface[types.pair.first].in_question
-
-
-@kernel
 def solve_pitch(types, layout, estimators, innovation, frame_bound):
-    """Where the surface beside the first fault was in the elapsed frame, and whether pitch shows a fault."""
-    if first_is_settled(types):
+    """Whether pitch shows a fault; once a second one has begun beside one that was named, where it was."""
+    first = types.pair.first
+    if first != NO_SURFACE and not types.surface[first].in_question:
         solve_beside_the_first(types, layout, estimators, innovation, frame_bound)
         return
-    for s in range(types.surface.size):
+    for s, surface in enumerate(types.surface):
         if layout.group[s] == IN_PITCH:
-            types.surface[s].wrong = abs(innovation[PITCH]) > frame_bound[PITCH]
+            surface.wrong = abs(innovation[PITCH]) > frame_bound[PITCH]
 
 
 @kernel
@@ -143,17 +105,17 @@ def solve_beside_the_first(types, layout, estimators, innovation, frame_bound):
     slack = abs(Z_known) * 0.5 * (surface.high - surface.low)
     slack += frame_bound[PITCH] + known.spread[PITCH] + other.spread[PITCH]
     if not place(types.surface[second], (innovation[PITCH] - share) / Z, slack / abs(Z)):
-        types.surface[second].standing = RULED_OUT
+        types.surface[second].standing = verdict.RULED_OUT
 
 
 @kernel
 def examine(types, layout, estimators, bank, frame_bound):
     """Take in the elapsed frame, plane by plane, and judge the one before; frame_bound (3,): of its own."""
     note_alarms(types.pair, bank)
-    take_in_frame(types, layout, estimators, bank.innovation, frame_bound)
+    frames.take_in(types, layout, estimators, bank.innovation, frame_bound)
     solve_roll_and_yaw(types, layout, estimators, bank.innovation, frame_bound)
     solve_pitch(types, layout, estimators, bank.innovation, frame_bound)
-    judge_all(types)
+    frames.judge_all(types)
 
 
 @kernel
@@ -174,12 +136,12 @@ def decide_roll_and_yaw(types, layout, t):
     one, other = types.surface[layout.main[ROLL]], types.surface[layout.main[YAW]]
     one_left, other_left = possible(one), possible(other)
     both = not one_left and not other_left
-    no_pair = pair.no_lateral_pair == 1 or not anything_left(one) or not anything_left(other)
+    no_pair = pair.no_lateral_pair == 1 or not verdict.anything_left(one) or not verdict.anything_left(other)
     outside = both and no_pair
-    open_yet = both and (only_a_swing(one) or only_a_swing(other))
+    open_yet = both and (verdict.only_a_swing(one) or verdict.only_a_swing(other))
     certain = pair.alarmed[IN_ROLL_AND_YAW] == 1 and not (outside or open_yet)
-    name(one, certain and not other_left, type_at_fault(config, one), t)
-    name(other, certain and not one_left, type_at_fault(config, other), t)
+    name(one, certain and not other_left, verdict.type_at_fault(config, one), t)
+    name(other, certain and not one_left, verdict.type_at_fault(config, other), t)
     return outside
 
 
@@ -204,23 +166,24 @@ def note_first(types, s):
 @kernel
 def begin_second(types, layout):
     """The one known pitch fault no longer explains the flight: there is another beside it."""
-    first, second = (
-        types.surface[types.pair.first],
-        types.surface[layout.partner[types.pair.first]],
-    )
+    first, second = types.surface[types.pair.first], types.surface[layout.partner[types.pair.first]]
     first.set_low[:], first.set_high[:] = first.known.low, first.known.high
     first.type_excluded[:] = first.known.excluded
-    begin(second)
+    frames.begin(second)
     for surface in (first, second):
-        surface.in_question, surface.standing = 0, BY_DEDUCTION
+        surface.in_question, surface.standing = 0, verdict.BY_DEDUCTION
         surface.wrong = surface.wrong_then = surface.wrong_before = 0
 
 
 @kernel
 def patient(config, surface):
     """Whether a slow oscillation, a slow surface or a growing bias would have shown by now."""
-    growing = may_be_growing(surface, one_type(surface)) or may_be_slow(config, surface)
-    return surface.evidence >= config.patience and would_have_swung(config, surface) and not growing
+    slow, growing = (
+        verdict.may_be_slow(config, surface),
+        verdict.may_be_growing(surface, verdict.one_type(surface)),
+    )
+    swung = verdict.would_have_swung(config, surface)
+    return surface.evidence >= config.patience and swung and not (slow or growing)
 
 
 @kernel
@@ -240,7 +203,7 @@ def type_in_pitch(config, surface):
 
     A jam may as well be a trailing surface or one at its stop, if the other surface is off by a constant.
     """
-    kind = type_at_fault(config, surface)
+    kind = verdict.type_at_fault(config, surface)
     return -1 if kind in (STUCK, UP, DOWN) else kind
 
 
@@ -251,20 +214,19 @@ def decide_pitch(types, layout, t):
         first, s = types.surface[types.pair.first], layout.partner[types.pair.first]
         second = types.surface[s]
         name(first, 1, first.type, t)
-        shows = second.evidence > 0 and possible(second) and explained(second)
-        name(second, shows, type_at_fault(types.config, second), t)
+        shows = second.evidence > 0 and possible(second) and verdict.explained(second)
+        name(second, shows, verdict.type_at_fault(types.config, second), t)
         return
     s = one_in_pitch(types, layout)
-    for member in range(types.surface.size):
+    for member, surface in enumerate(types.surface):
         if layout.group[member] == IN_PITCH:
-            surface = types.surface[member]
             name(surface, member == s, type_in_pitch(types.config, surface) if member == s else -1, t)
 
 
 @kernel
 def one_in_pitch(types, layout):
     """The surface of pitch at fault if a constant explains everything on it, or NO_SURFACE."""
-    s = surface_at_fault(types, layout) if types.pair.alarmed[IN_PITCH] else NO_SURFACE
+    s = verdict.surface_at_fault(types, layout) if types.pair.alarmed[IN_PITCH] else NO_SURFACE
     if s < 0 or not any_constant(types.surface[s]):
         return NO_SURFACE
     if patient(types.config, types.surface[s]):
@@ -278,8 +240,7 @@ def decide(types, conclusion, layout, t):
     outside = decide_roll_and_yaw(types, layout, t)
     decide_pitch(types, layout, t)
     earliest = NO_SURFACE
-    for s in range(types.surface.size):
-        surface = types.surface[s]
+    for s, surface in enumerate(types.surface):
         if surface.named and (earliest < 0 or surface.named_at_s < types.surface[earliest].named_at_s):
             earliest = s
     summarise(types, conclusion, layout, earliest, outside, t)
@@ -291,10 +252,10 @@ def summarise(types, conclusion, layout, s, outside, t):
     """The verdict on surface s, the first named, as that of a single fault."""
     before = conclusion.isolated
     if s < 0:
-        conclusion.isolated, conclusion.type = UNANTICIPATED if outside else NOT_ISOLATED, -1
+        conclusion.isolated, conclusion.type = state.UNANTICIPATED if outside else state.NOT_ISOLATED, -1
     else:
         surface = types.surface[s]
-        conclusion.isolated = estimator_for(layout, s, surface.type)
+        conclusion.isolated = verdict.estimator_for(layout, s, surface.type)
         conclusion.type, conclusion.type_at_s = surface.type, surface.type_at_s
         conclusion.isolated_at_s = surface.named_at_s
     if s < 0 and conclusion.isolated != before:
@@ -304,8 +265,8 @@ def summarise(types, conclusion, layout, s, outside, t):
 @kernel
 def named_in_pitch(types, layout):
     """Whether a surface of pitch is named."""
-    for s in range(types.surface.size):
-        if layout.group[s] == IN_PITCH and types.surface[s].named:
+    for s, surface in enumerate(types.surface):
+        if layout.group[s] == IN_PITCH and surface.named:
             return True
     return False
 
@@ -317,7 +278,7 @@ def acted_upon(types, layout, s):
         return True
     if layout.group[s] != IN_PITCH or named_in_pitch(types, layout) or not types.pair.alarmed[IN_PITCH]:
         return False
-    likeliest = sole(types.surface, True)
+    likeliest = verdict.sole(types.surface, True)
     return s == (likeliest if likeliest >= 0 else layout.main[PITCH])
 
 
@@ -325,13 +286,12 @@ def acted_upon(types, layout, s):
 def act(types, conclusion, layout):
     """What the law does about each surface. The supervisor follows the lead: a replaced elevator first."""
     conclusion.lead, conclusion.lead_kind = NO_SURFACE, -1
-    for s in range(types.surface.size):
-        surface = types.surface[s]
+    for s, surface in enumerate(types.surface):
         surface.measure = -1
         if acted_upon(types, layout, s):
             at_fault = surface.named == 1 or possible(surface)
-            measure = measure_for(surface) if at_fault else SHIFTED
-            if still_there(types.config, surface, measure, at_fault):
+            measure = verdict.measure_for(surface) if at_fault else SHIFTED
+            if verdict.still_there(types.config, surface, measure, at_fault):
                 surface.measure = measure
                 replaced = s == layout.main[PITCH] and measure in (LOSES, FIXED)
                 if conclusion.lead == NO_SURFACE or replaced:

@@ -37,8 +37,8 @@ _ROUNDING = 1e-9
 @kernel
 def note_refuted(surfaces, layout, estimators):
     """Keep for every surface whether its estimator is excluded."""
-    for s in range(surfaces.size):
-        surfaces[s].refuted = estimators[layout.position_of[s]].excluded
+    for s, surface in enumerate(surfaces):
+        surface.refuted = estimators[layout.position_of[s]].excluded
 
 
 @kernel
@@ -58,19 +58,13 @@ def left(surface, kind):
 @kernel
 def any_constant(surface):
     """Whether a type with a constant parameter is left."""
-    for kind in range(N_CONSTANT):
-        if left(surface, kind):
-            return True
-    return False
+    return not np.all(surface.type_excluded[:N_CONSTANT])
 
 
 @kernel
 def anything_left(surface):
     """Whether any type is left."""
-    for kind in range(N_TYPES):
-        if left(surface, kind):
-            return True
-    return False
+    return not np.all(surface.type_excluded)
 
 
 @kernel
@@ -124,10 +118,10 @@ def is_fixed(surface):
 
 
 @kernel
-def one_type(surface):
-    """The one type of constant parameter left, or -1; of one name, such as a runaway's two, the first."""
+def one_of(surface, n):
+    """The one of the first n types that is left, or -1; of one name, such as a runaway's two, the first."""
     found = -1
-    for kind in range(N_CONSTANT):
+    for kind in range(n):
         if left(surface, kind):
             if found >= 0 and FAMILY[kind] != FAMILY[found]:
                 return -1
@@ -136,14 +130,15 @@ def one_type(surface):
 
 
 @kernel
+def one_type(surface):
+    """The one type of constant parameter left, or -1."""
+    return one_of(surface, N_CONSTANT)
+
+
+@kernel
 def sole_type(surface):
     """The one type left whatever its course, or -1: in coarse sets a constant proves nothing."""
-    found = -1
-    for kind in range(N_TYPES):
-        if left(surface, kind):
-            if found >= 0 and FAMILY[kind] != FAMILY[found]:
-                return -1
-            found = kind if found < 0 else found
+    found = one_of(surface, N_TYPES)
     return found if found >= 0 and shown(surface, found) else -1
 
 
@@ -176,8 +171,7 @@ def may_be_growing(surface, found):
 def sole(surfaces, constant):
     """The one possible surface, with a type of constant parameter left if so asked; NO_SURFACE or SEVERAL."""
     found = NO_SURFACE
-    for s in range(surfaces.size):
-        surface = surfaces[s]
+    for s, surface in enumerate(surfaces):
         if surface.in_question and possible(surface) and (any_constant(surface) or not constant):
             found = s if found == NO_SURFACE else SEVERAL
     return found
@@ -209,8 +203,7 @@ def others_refuted(types, chosen):
     course can hide in, every type of the others must have been excluded.
     """
     config, waits = types.config, 1
-    for s in range(types.surface.size):
-        surface = types.surface[s]
+    for s, surface in enumerate(types.surface):
         if s != chosen and surface.in_question and possible(surface):
             if left(surface, GROWING_BIAS) or (config.own_errors and anything_left(surface)):
                 return False
@@ -298,8 +291,8 @@ def presumed(types, conclusion, layout, estimators):
     s = sole(types.surface, True)
     if s >= 0:
         return s
-    for s in range(types.surface.size):
-        if layout.dominant_axis[s] == PITCH and possible(types.surface[s]):
+    for s, surface in enumerate(types.surface):
+        if layout.dominant_axis[s] == PITCH and possible(surface):
             return s
     return NO_SURFACE
 
@@ -308,8 +301,8 @@ def presumed(types, conclusion, layout, estimators):
 def take_the_lead(types, conclusion, layout, estimators):
     """Settle on which surface the law acts and how."""
     s = presumed(types, conclusion, layout, estimators)
-    for other in range(types.surface.size):
-        types.surface[other].measure = -1
+    for other in types.surface:
+        other.measure = -1
     conclusion.lead, conclusion.lead_kind = NO_SURFACE, -1
     if s >= 0:
         surface = types.surface[s]

@@ -415,7 +415,7 @@ def size_for(aircraft: Aircraft) -> Size:
     """The usual size, or the largest where that is too small."""
     axes, views = [axis_of(term) for term in aircraft.moments], list(views_of(aircraft, tell_apart(aircraft)))
     rates = N_READINGS + max(axes.count(PITCH), axes.count(ROLL) + axes.count(YAW))
-    errors = max(len(terms_of(aircraft, f)) for f in (ASIDE, UP)) + MAX_ERRORS - MAX_TERMS_OF_ONE
+    errors = max(len(terms_of(aircraft, f)) for f in (ASIDE, UP)) + forces.MAX_ERRORS - MAX_TERMS_OF_ONE
     fits = (
         rates <= USUAL.rates.regressors
         and rates + errors + 2 <= USUAL.view.regressors

@@ -248,16 +248,12 @@ def _drift(errors: Errors, gravity: float, airspeed_mps: float, f: int) -> float
     incidence, and in full on sideslip."""
     tilt = errors["phi"].steady + errors["theta"].steady
     turning = sum(errors[gyro].steady + LIVELY_RAD_S * errors[gyro].slope for gyro in AXES)
-    falls = gravity * tilt * (STEEP_RAD if f == UP else 1.0) + FALLING_M_S2 + _misfelt(errors, gravity, f)
-    return float(EARTH_RATE_RAD_S + turning + falls / airspeed_mps)
-
-
-def _misfelt(errors: Errors, gravity: float, f: int) -> float:
-    """How far accelerometers can be off across the flow in level flight, m/s2: that of the axis, and of the
-    one ahead as much as the flow's angle lets it."""
+    # how far accelerometers can be off across the flow in level flight: that of the axis, and of the one
+    # ahead as much as the flow's angle lets it
     own = errors[ACCELEROMETERS[1 + f]]
-    bias = own.steady + STEEP_RAD * errors["ax"].steady
-    return bias + gravity * (own.slope if f == UP else 0.0)
+    misfelt = own.steady + STEEP_RAD * errors["ax"].steady + gravity * (own.slope if f == UP else 0.0)
+    falls = gravity * tilt * (STEEP_RAD if f == UP else 1.0) + FALLING_M_S2 + misfelt
+    return float(EARTH_RATE_RAD_S + turning + falls / airspeed_mps)
 
 
 def _set_up_tolerances(

@@ -222,7 +222,7 @@ def adapt_jointly(fie, forgetting):
             left = fie.residual[i] - fie.omega[i] * total
             total += correct(fie, i, left, forgetting, fie.theta_low[i], fie.theta_high[i])
             forgetting = 1.0  # once a frame
-    fie.theta[:2], fie.covariance[:2] = fie.theta[2], fie.covariance[2]
+    fie.theta[:], fie.covariance[:] = fie.theta[2], fie.covariance[2]
     return total
 
 

@@ -57,17 +57,16 @@ class Errors(dict[str, Error]):
     """Those of all instruments, by their names in SENSORS."""
 
     def __init__(self, sensors: Sensors) -> None:
-        super().__init__((name, _error(getattr(sensors, name))) for name in SENSORS)
+        super().__init__()
+        for name in SENSORS:
+            sensor = getattr(sensors, name)
+            noise, bias, resolution = sensor.noise_bias_quantum
+            worst, slope = NOISE_LIMIT_SIGMA * noise + abs(bias) + resolution / 2, abs(sensor.scale_error)
+            self[name] = Error(noise, abs(bias), resolution, slope, sensor.random_error, worst)
 
     def each(self, of_it: str, names: Iterable[str] = SIGNALS) -> np.ndarray:
         """One number of several instruments, (n,)."""
         return np.array([getattr(self[name], of_it) for name in names])
-
-
-def _error(sensor: Any) -> Error:
-    noise, bias, resolution = sensor.noise_bias_quantum
-    worst = NOISE_LIMIT_SIGMA * noise + abs(bias) + resolution / 2
-    return Error(noise, abs(bias), resolution, abs(sensor.scale_error), sensor.random_error, worst)
 
 
 def gust_mps(turbulence: str) -> float:

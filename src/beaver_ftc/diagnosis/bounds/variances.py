@@ -5,7 +5,7 @@ from math import hypot, pi, radians, sqrt
 
 import numpy as np
 
-from beaver_ftc.aircraft import AXES, Aircraft, MassProperties, Term
+from beaver_ftc.aircraft import AXES, Aircraft, MassProperties, Term, load
 from beaver_ftc.aircraft.aircraft import MOMENTS
 from beaver_ftc.aircraft.schema import RATE_SIGNALS
 from beaver_ftc.design.context import Declared, DesignFunctions
@@ -36,9 +36,15 @@ def gusts(turbulence: str, airspeed_mps: float, span_m: float) -> tuple[np.ndarr
 
 
 def declared_of(
-    bounds: Bounds, actuators: Actuators, design: np.ndarray, y: np.ndarray, u: np.ndarray, aircraft: Aircraft
+    bounds: Bounds,
+    actuators: Actuators,
+    design: np.ndarray,
+    y: np.ndarray,
+    u: np.ndarray,
+    aircraft: Aircraft | None = None,
 ) -> Declared:
     """What is declared, of a flight trimmed at y and u rad; design: the designer's record, (1,)."""
+    aircraft = aircraft or load()
     errors = Errors(bounds.sensors)
     noise, bias, resolution = (errors.each(of_it) for of_it in ("noise", "steady", "resolution"))
     coefficients = tolerances(bounds.coefficients, aircraft, design["moments"]["value"][0])
@@ -139,7 +145,9 @@ def steady_tolerance(
     (noise_model.py); y, u in trim."""
     errors = Errors(bounds.sensors)
     size = np.abs(design["moments"]["value"][: len(aircraft.moments)])
-    share = np.full(size.shape, _inertia_share(bounds.inertia, mass))
+    slack, nominal = inertia_slack(bounds.inertia, mass), np.abs(astuple(inertia_coefficients(mass)))
+    of_own_axis = (2, 7, 11)  # what multiplies a moment there
+    share = np.full(size.shape, max(slack[i] / nominal[i] for i in of_own_axis))
     share += [_measured_share(errors, term) for term in aircraft.moments]
     total = tolerances(bounds.coefficients, aircraft, size) + share * size
     slopes = np.abs(coefficient_slopes(design, np.zeros(3), y, u))
@@ -163,9 +171,3 @@ def _measured_share(errors: Errors, term: Term) -> float:
         if error is not None and _GYRO_OF.get(signal) != own:
             share += power * error.slope
     return share
-
-
-def _inertia_share(tolerance: float, mass: MassProperties) -> float:
-    """Largest relative error of what multiplies a moment on its own axis."""
-    slack, nominal = inertia_slack(tolerance, mass), np.abs(astuple(inertia_coefficients(mass)))
-    return float(max(slack[i] / nominal[i] for i in (2, 7, 11)))

@@ -47,11 +47,10 @@ def found(fdi: np.void, surfaces: Sequence[str] | None = None) -> Found:
 
 def _found_of_several(fdi: np.void, names: Sequence[str]) -> Found:
     """The fault named first as if it were alone, and all of them; what is open in a plane where none is."""
-    at_fault = sorted(
-        (s for s in range(len(names)) if fdi["types"]["surface"][s]["named"]),
-        key=lambda s: (fdi["types"]["surface"][s]["named_at_s"], s),
-    )
-    faults = [_found_on(fdi, s, int(fdi["types"]["surface"][s]["type"]), names) for s in at_fault]
+    surfaces = fdi["types"]["surface"]
+    named = np.flatnonzero(surfaces["named"]).tolist()
+    at_fault = sorted(named, key=lambda s: surfaces["named_at_s"][s])
+    faults = [_found_on(fdi, s, int(surfaces["type"][s]), names) for s in at_fault]
     planes = fdi["types"]["pair"]["alarmed"]
     surfaces_of = [np.flatnonzero(fdi["layout"]["group"] == g).tolist() for g in range(len(planes))]
     if not planes.any() and not faults and int(fdi["verdict"]["isolated"]) == NOT_ISOLATED:
@@ -130,11 +129,8 @@ def _types_left(fdi: np.void, s: int) -> list[str]:
         still = bool({STUCK, FLOAT, UP, DOWN} & set(left))  # so may a slow one
         beside = {VARYING_LOSS: early, SLOW: early or still}
         left = [kind for kind in left if beside.get(kind, True)]
-    if (
-        fdi["types"]["pair"]["enabled"]
-        and fdi["layout"]["group"][s] == IN_PITCH
-        and {STUCK, UP, DOWN} & set(left)
-    ):
+    beside_another = fdi["types"]["pair"]["enabled"] and fdi["layout"]["group"][s] == IN_PITCH
+    if beside_another and {STUCK, UP, DOWN} & set(left):
         left += [STUCK, FLOAT, UP, BIAS, CONSTANT_LOSS]  # if the other one is off as well
     return list(dict.fromkeys(registry.NAMES[kind] for kind in left))
 

@@ -178,12 +178,9 @@ def begin_second(types, layout):
 @kernel
 def patient(config, surface):
     """Whether a slow oscillation, a slow surface or a growing bias would have shown by now."""
-    slow, growing = (
-        verdict.may_be_slow(config, surface),
-        verdict.may_be_growing(surface, verdict.one_type(surface)),
-    )
-    swung = verdict.would_have_swung(config, surface)
-    return surface.evidence >= config.patience and swung and not (slow or growing)
+    growing = verdict.may_be_growing(surface, verdict.one_type(surface))
+    open_yet = growing or verdict.may_be_slow(config, surface)
+    return surface.evidence >= config.patience and verdict.would_have_swung(config, surface) and not open_yet
 
 
 @kernel

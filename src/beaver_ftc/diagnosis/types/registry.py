@@ -27,10 +27,8 @@ RUNAWAY_RATE_RAD_S = pi / 3.0  # of an actuator with no declared rate limit: the
 
 def _rows() -> tuple[FaultType, ...]:
     """Those of a constant parameter first: a type's number is its place."""
-    modules = [
-        import_module(f"{table.__name__}.{info.name}") for info in pkgutil.iter_modules(table.__path__)
-    ]
-    rows = [row for module in modules for row in module.TYPES]
+    names = (f"{table.__name__}.{info.name}" for info in pkgutil.iter_modules(table.__path__))
+    rows = [row for name in names for row in import_module(name).TYPES]
     return tuple(sorted(rows, key=lambda row: (not row.constant, row.rank, row.name)))
 
 
@@ -58,24 +56,21 @@ def _written_out(name: str, arguments: str, lines: list[str]) -> Callable[..., A
     return kernel(space[f"{name}_each"])
 
 
+def _having(name: str) -> list[int]:
+    """The types that have this part."""
+    return [kind for kind, row in enumerate(TYPES) if getattr(row, name) is not None]
+
+
 def _all_of(name: str, arguments: str) -> Callable[..., Any]:
     """A kernel that calls this part of every type; `kind` among the arguments is each type's own."""
     taken = ", ".join(argument for argument in arguments.split(", ") if argument != "kind")
-    calls = [
-        f"part_{kind}({arguments})".replace("kind", str(kind))
-        for kind, row in enumerate(TYPES)
-        if getattr(row, name) is not None
-    ]
+    calls = [f"part_{kind}({arguments})".replace("kind", str(kind)) for kind in _having(name)]
     return _written_out(name, taken, calls)
 
 
 def _one_of(name: str, arguments: str, passed: str, otherwise: str) -> Callable[..., Any]:
     """A kernel that calls this part of the type `kind` and returns what that returns."""
-    calls = [
-        f"if kind == {kind}: return part_{kind}({passed})"
-        for kind, row in enumerate(TYPES)
-        if getattr(row, name) is not None
-    ]
+    calls = [f"if kind == {kind}: return part_{kind}({passed})" for kind in _having(name)]
     return _written_out(name, arguments, [*calls, f"return {otherwise}"])
 
 

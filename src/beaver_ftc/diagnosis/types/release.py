@@ -119,13 +119,9 @@ def agrees(config, surface, which, kind):
         return False
     if low - room > surface.high_then or high + room < surface.low_then:
         return False
-    keep(
-        held,
-        which,
-        kind,
-        held.low[which, kind] + max(surface.low_then - low - room, 0.0),
-        held.high[which, kind] - max(high - room - surface.high_then, 0.0),
-    )
+    least = held.low[which, kind] + max(surface.low_then - low - room, 0.0)
+    greatest = held.high[which, kind] - max(high - room - surface.high_then, 0.0)
+    keep(held, which, kind, least, greatest)
     return True
 
 

@@ -24,10 +24,8 @@ def offset(surface):
     if high < surface.travel_low or low > surface.travel_high:
         return membership.NOTHING
     least, greatest = low - max(u - orders.least[1], 0.0), high + max(orders.greatest[1] - u, 0.0)
-    return (
-        low - u if least > surface.travel_low else -np.inf,
-        high - u if greatest < surface.travel_high else np.inf,
-    )
+    off_low = low - u if least > surface.travel_low else -np.inf
+    return off_low, high - u if greatest < surface.travel_high else np.inf
 
 
 @kernel
@@ -117,12 +115,8 @@ def judge_growing(config, surface, kind, k):
     grown = surface.growing_bias
     grown.up, grown.down = max(grown.up, least), min(grown.down, greatest)
     above, below = grown.up > 0.0, grown.down < 0.0
-    if (
-        least > greatest
-        or (above and below)
-        or (above and greatest < grown.up)
-        or (below and least > grown.down)
-    ):
+    shrinks = (above and greatest < grown.up) or (below and least > grown.down)
+    if least > greatest or (above and below) or shrinks:
         surface.type_excluded[kind] = 1
 
 

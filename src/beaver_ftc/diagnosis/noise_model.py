@@ -125,7 +125,8 @@ def set_up(
     _set_up_blocks(statistical, errors, aircraft)
     _set_up_bounded(statistical, config, pace, dt_s)
     _set_up_noise(statistical, given, config.bounds, design, start, dt_s)
-    _set_up_tolerances(statistical, config.bounds, design, mass, start, aircraft)
+    tolerance = steady_tolerance(config.bounds, aircraft, design, mass, *start[1:])
+    _set_up_tolerances(statistical, aircraft, tolerance)
     set_up_readings(statistical, errors, fdi["bound"]["admitted"])
     if across:
         chance = given.false_alarms_per_h / (3600.0 * rate_hz * n_tests)
@@ -139,11 +140,12 @@ def set_up(
             statistical["inertial_air"]["moving"] *= air["read"]
             statistical["inertial_air"]["unseen"] = np.minimum(np.add(UNSEEN, BY_FORCE), 1.0)
         set_up_views(statistical, aircraft)
-    if air["moving"]:
-        _set_up_calm(statistical["block"])
     block = statistical["block"][-1]
     block["lag"] = returning_length(statistical, airspeed_mps, rate_hz)
     if air["moving"]:
+        # the filters that reckon with no gust: as the others begin, and with a drift that goes anywhere
+        for name in ("n", "keep", "noise", "P_xx", "P_dd"):
+            statistical["block"]["calm"][name] = statistical["block"][name]
         block["stronger"] = (air["rolling"] / block["lag"]) ** 2
         set_up_jitter(statistical, errors, design, *start[1:], dt_s)
 
@@ -167,12 +169,6 @@ def _set_up_blocks(statistical: np.void, errors: Errors, aircraft: Aircraft) -> 
             hypothesis["kind"], hypothesis["surface"] = kind, surface
             hypothesis["axis"], hypothesis["alarms"] = axis, alarms
             hypothesis["column"] = losses.index(surface) if kind == LOSS else len(losses) + axis
-
-
-def _set_up_calm(blocks: np.ndarray) -> None:
-    """The filters that reckon with no gust: as the others begin, and with a drift that goes anywhere."""
-    for name in ("n", "keep", "noise", "P_xx", "P_dd"):
-        blocks["calm"][name] = blocks[name]
 
 
 def pace_of(given: Statistical, aircraft: Aircraft, dt_s: float) -> float:
@@ -246,16 +242,8 @@ def returning_length(statistical: np.void, airspeed_mps: float, rate_hz: float) 
     return min(airspeed_mps * lag_s, rolling or np.inf)
 
 
-def _set_up_tolerances(
-    statistical: np.void,
-    bounds: Bounds,
-    design: np.void,
-    mass: MassProperties,
-    start: Start,
-    aircraft: Aircraft,
-) -> None:
+def _set_up_tolerances(statistical: np.void, aircraft: Aircraft, tolerance: np.ndarray) -> None:
     """What is constant but unknown, as tolerances of coefficients: theirs, inertia, steady sensor errors."""
-    tolerance = steady_tolerance(bounds, aircraft, design, mass, start[1], start[2])
     axis = np.array([axis_of(term) for term in aircraft.moments])
     for block, axes in zip(statistical["block"], (PITCH_AXES, LATERAL_AXES, LATERAL_AXES), strict=True):
         of_it = tolerance[np.isin(axis, axes)]

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from beaver_ftc.cli.inputs import listed, taking
+from beaver_ftc.cli.inputs import listed
 from beaver_ftc.cli.output import Format, FormatOption, answer
 from beaver_ftc.cli.progress import progress_bar
 from beaver_ftc.documents.errors import BadInput
@@ -33,7 +33,6 @@ class Options:
     format: FormatOption = Format.text
 
 
-@taking(Options)
 def command(options: Options) -> None:
     """Compare runs; or schemes and laws on the same flights.
 

@@ -1,8 +1,9 @@
 """What commands are given: options that several share, and scenarios, checked before the first one flies."""
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from copy import copy
+from dataclasses import is_dataclass
 from enum import StrEnum
 from functools import wraps
 from inspect import Parameter, Signature, getdoc, signature
@@ -48,59 +49,38 @@ PluginOption = Annotated[
 ]
 
 
-def with_plugins(command: Callable[..., None]) -> Callable[..., None]:
-    """The command with an option --plugin, whose classes are registered before it runs."""
+def as_typer_reads(command: Callable[..., None], flies: bool) -> Callable[..., None]:
+    """A command as typer reads it: its parameters, or the fields of the dataclass that is its only one.
+
+    What the command's docstring says of one, `name: ...` at its end, is the help of that one. One that is not
+    annotated is an option; one that is true or false a switch, off if left out. A command that flies has
+    --plugin besides, whose classes are registered before it runs.
+    """
+    first = next(iter(signature(command).parameters.values())).annotation
+    record = first if isinstance(first, type) and is_dataclass(first) else None
+    own = signature(record or command).parameters
+    about, *said = re.split(rf"^({'|'.join(own)}): ", getdoc(command) or "", flags=re.MULTILINE)
+    helps = dict(zip(said[::2], said[1::2], strict=True))
+    parameters = [_annotated(each, helps.get(name)) for name, each in own.items()]
+    if flies:
+        parameters.append(Parameter("plugin", Parameter.KEYWORD_ONLY, default=None, annotation=PluginOption))
 
     @wraps(command)
-    def plugged(*arguments: Any, plugin: list[str] | None = None, **options: Any) -> None:
+    def called(plugin: Sequence[str] | None = None, **given: Any) -> None:
         if plugin:
             from beaver_ftc.plugins import register
 
-            for given in plugin:
-                register(given)
-        command(*arguments, **options)
+            for each in plugin:
+                register(each)
+        command(**given) if record is None else command(record(**given))
 
-    own = signature(command)
-    option = Parameter("plugin", Parameter.KEYWORD_ONLY, default=None, annotation=PluginOption)
-    return _signed(plugged, own.replace(parameters=[*own.parameters.values(), option]))
-
-
-def taking(record: type[Any]) -> Callable[[Callable[[Any], None]], Callable[..., None]]:
-    """A command that takes its arguments and options as one record: the fields of a dataclass, in its order.
-
-    @dataclass(frozen=True)
-    class Options:
-        files: Annotated[list[str], typer.Argument()]
-        out: ResultsOption = Path("runs")
-
-    @taking(Options)
-    def command(options: Options) -> None: ...
-    """
-
-    def made(command: Callable[[Any], None]) -> Callable[..., None]:
-        @wraps(command)
-        def called(**given: Any) -> None:
-            command(record(**given))
-
-        return _signed(called, signature(record))
-
-    return made
+    called.__doc__ = about.rstrip()
+    called.__signature__ = Signature(parameters)  # type: ignore[attr-defined]
+    called.__annotations__ = {each.name: each.annotation for each in parameters}
+    return called
 
 
-def documented(command: Callable[..., None]) -> Callable[..., None]:
-    """The command with what its docstring says of a parameter (`name: ...`, at its end) as that one's help.
-
-    A parameter that is not annotated is an option; one that is true or false a switch, off if left out.
-    """
-    own = signature(command)
-    about, *said = re.split(rf"^({'|'.join(own.parameters)}): ", getdoc(command) or "", flags=re.MULTILINE)
-    helps = dict(zip(said[::2], said[1::2], strict=True))
-    command.__doc__ = about.rstrip()
-    told = [_told(each, helps.get(name)) for name, each in own.parameters.items()]
-    return _signed(command, own.replace(parameters=told))
-
-
-def _told(parameter: Parameter, help: str | None) -> Parameter:
+def _annotated(parameter: Parameter, help: str | None) -> Parameter:
     """A parameter as typer is to read it, with this help if any."""
     kind, given = parameter.annotation, None
     if hasattr(kind, "__metadata__"):
@@ -110,13 +90,6 @@ def _told(parameter: Parameter, help: str | None) -> Parameter:
     if help:
         option.help = " ".join(help.split())
     return parameter.replace(annotation=Annotated[kind, option])
-
-
-def _signed(command: Callable[..., None], own: Signature) -> Callable[..., None]:
-    """The command as typer is to read it: its parameters, with what is annotated of them."""
-    command.__signature__ = own  # type: ignore[attr-defined]
-    command.__annotations__ = {name: each.annotation for name, each in own.parameters.items()}
-    return command
 
 
 def listed(names: str) -> list[str]:

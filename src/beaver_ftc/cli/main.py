@@ -12,7 +12,7 @@ from typing import Annotated, NamedTuple, NoReturn
 import typer
 
 from beaver_ftc import __version__
-from beaver_ftc.cli.inputs import documented, with_plugins
+from beaver_ftc.cli.inputs import as_typer_reads
 from beaver_ftc.cli.output import failure_of, report_last
 
 
@@ -86,12 +86,11 @@ def options(
 
 
 for _name, _command in COMMANDS.items():
-    _function = documented(getattr(import_module(f"beaver_ftc.cli.{_command.module}"), _command.function))
+    _function = getattr(import_module(f"beaver_ftc.cli.{_command.module}"), _command.function)
     # the examples at the end of its help, each on a line of its own
     _epilog = "\n".join(["\b", "Examples:", *(f"  {line}" for line in _command.examples)])
-    app.command(_name, epilog=_epilog if _command.examples else None)(
-        with_plugins(_function) if _command.flies else _function
-    )
+    _add = app.command(_name, epilog=_epilog if _command.examples else None)
+    _add(as_typer_reads(_function, _command.flies))
 
 
 def main() -> NoReturn:

@@ -44,7 +44,8 @@ def command(
             emit_json({"runs": [], "errors": str(error).splitlines()})
         raise
     refuse_other_aircraft(flown)
-    report, say = not no_report, emit if format is Format.text else _nothing
+    report = not no_report
+    say: Say = emit if format is Format.text else lambda text: None  # the document says it
     found = [_split(scenario, out, report, say) for scenario in flown]
     documents = [document for document, _ in found]
     several = len(flown) > 1
@@ -53,10 +54,6 @@ def command(
         document["map"] = _map(scenario, out, report, say)
     if format is Format.json:
         emit_json({"runs": documents} | recommended if several else documents[0])
-
-
-def _nothing(text: str) -> None:
-    """The document says it."""
 
 
 def _variants(scenario: "Scenario", text: str) -> list["Scenario"]:

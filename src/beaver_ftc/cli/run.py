@@ -18,7 +18,6 @@ from beaver_ftc.cli.inputs import (
     ScenarioArgument,
     ScenariosArgument,
     load_all,
-    taking,
 )
 from beaver_ftc.cli.output import (
     Document,
@@ -59,7 +58,6 @@ class Options:
     flightgear: Annotated[str | None, typer.Option(metavar="HOST:PORT")] = None
 
 
-@taking(Options)
 def command(options: Options) -> None:
     """Fly scenarios and say the verdict.
 

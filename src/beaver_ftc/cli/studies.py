@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from beaver_ftc.cli.inputs import ScenarioArgument, WorkersOption, taking
+from beaver_ftc.cli.inputs import ScenarioArgument, WorkersOption
 from beaver_ftc.cli.output import Format, FormatOption, answer, complain
 from beaver_ftc.cli.progress import progress_bar
 
@@ -40,7 +40,6 @@ class Condition:
     format: FormatOption = Format.text
 
 
-@taking(Condition)
 def trim(condition: Condition) -> None:
     """Print a trimmed flight condition.
 
@@ -68,17 +67,15 @@ def _table(point: "TrimPoint") -> str:
     settings = tuple((name.replace("_", " "), name, "") for name in point.settings)
     surfaces = tuple((name, f"{name}_rad", "deg") for name in point.surfaces_rad)
     shown = (*_CONDITION, *settings, *_ATTITUDE, *surfaces)
-    lines = [
-        f"{what:22}{_shown(getattr(point, name), unit):>12} {unit}".rstrip() for what, name, unit in shown
-    ]
+    lines = []
+    for what, name, unit in shown:
+        value = getattr(point, name)
+        text = f"{math.degrees(value):.4f}" if unit == "deg" else f"{value:g}"
+        lines.append(f"{what:22}{text:>12} {unit}".rstrip())
     lines.append(f"{'worst residual':22}{max(map(abs, point.residual)):>12.1e} m/s2 or rad/s2")
     if not point.envelope_valid:
         lines.append("outside the flight-validated envelope")
     return "\n".join(lines)
-
-
-def _shown(value: float, unit: str) -> str:
-    return f"{math.degrees(value):.4f}" if unit == "deg" else f"{value:g}"
 
 
 def bench(

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from beaver_ftc.cli.inputs import JunitOption, NoReportOption, taking
+from beaver_ftc.cli.inputs import JunitOption, NoReportOption
 from beaver_ftc.cli.output import (
     Document,
     Format,
@@ -53,7 +53,6 @@ class Arguments:
     junit: JunitOption = None
 
 
-@taking(Arguments)
 def command(arguments: Arguments) -> None:
     """Fly a sweep: many flights of one scenario, varied.
 
@@ -74,13 +73,16 @@ def command(arguments: Arguments) -> None:
         from beaver_ftc.studies.engine.workers import start_early
 
         start_early()
-    options = _options(arguments)
+    from beaver_ftc.scenario.sweeps import load_sweep
+
+    options, replay, format = _options(arguments), arguments.replay, arguments.format
     began = time.perf_counter()
     try:
-        verdict = _command(options, arguments.replay, arguments.format)
+        sweep = load_sweep(arguments.file)
+        verdict = _fly(sweep, options, format) if replay is None else _replay(sweep, options, replay, format)
     except Exception as error:
         failure = failure_of(error)
-        if arguments.format is Format.json:
+        if format is Format.json:
             emit_json({"passed": False, "errors": str(failure).splitlines()})
         failed = {"scenario": arguments.file, "error": str(failure)}
         write_junit([failed | {"took_s": time.perf_counter() - began}], arguments.junit)
@@ -103,14 +105,6 @@ def _options(arguments: Arguments) -> "Options":
         search=arguments.search.value if arguments.search else None,
         source=arguments.file,
     )
-
-
-def _command(options: "Options", replay: int | None, format: Format) -> Document:
-    """Fly, say what came out, and return {scenario, passed, expectations} of it."""
-    from beaver_ftc.scenario.sweeps import load_sweep
-
-    sweep = load_sweep(options.source)
-    return _fly(sweep, options, format) if replay is None else _replay(sweep, options, replay, format)
 
 
 def _keep(flights: str) -> "Keep":

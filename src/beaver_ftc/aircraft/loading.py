@@ -57,7 +57,11 @@ def load(reference: str = DEFAULT, beside: Path | None = None) -> Aircraft:
     if not isinstance(reference, str):
         raise UnknownAircraft(f"{reference!r:.60} is no aircraft, allowed: {_ALLOWED}")
     if reference.startswith(FROM_JSBSIM):
-        return read(_derived(reference.removeprefix(FROM_JSBSIM)))
+        name = reference.removeprefix(FROM_JSBSIM)
+        if not is_derived(name):
+            says = f"has no design model yet, allowed: what `beaver-ftc derive {reference}` makes"
+            raise NotDerived(f"{reference!r} {says}")
+        return read(derived_folder(name))
     if reference.startswith(BESIDE):
         return read(_inside(beside, reference))
     if reference not in builtin_names():
@@ -88,14 +92,6 @@ def is_derived(name: str) -> bool:
             return file.readline() == first_line()
     except OSError:
         return False
-
-
-def _derived(name: str) -> Path:
-    folder = derived_folder(name)
-    if not is_derived(name):
-        here = f"{FROM_JSBSIM}{name}"
-        raise NotDerived(f"{here!r} has no design model yet, allowed: what `beaver-ftc derive {here}` makes")
-    return folder
 
 
 def _inside(beside: Path | None, reference: str) -> Path:

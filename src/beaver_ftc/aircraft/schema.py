@@ -6,7 +6,6 @@ rh = r b/2V, and those the file declares.
 """
 
 from collections.abc import Iterable, Iterator
-from math import isfinite
 from typing import Annotated, Literal, Self
 
 from pydantic import AfterValidator, Field, model_validator
@@ -300,12 +299,8 @@ class AircraftFile(Section):
             if term.surface is not None and term.surface not in self.surfaces:
                 yield (*here, "surface"), f"unknown surface{suggestion(term.surface, self.surfaces)}"
             if section == "moments" and term.surface is not None and set(term.of) & set(RATE_SIGNALS):
-                yield (
-                    (*here, "of"),
-                    "multiplies a rate and a surface, allowed: one of them, for G is that of y",
-                )
-            if not isfinite(term.value):
-                yield (*here, "value"), "is not finite, allowed: a finite number"
+                says = "multiplies a rate and a surface, allowed: one of them, for G is that of y"
+                yield (*here, "of"), says
 
     def _names(self) -> Iterator[Conflict]:
         """Names are unique, and there is room for all of them."""
@@ -317,8 +312,7 @@ class AircraftFile(Section):
         for section in ("moments", "forces"):
             for coefficient, terms in getattr(self, section) or ():
                 if len(terms) > MAX_TERMS_OF_ONE:
-                    says = f"{len(terms)} terms, allowed: at most {MAX_TERMS_OF_ONE}"
-                    yield (section, coefficient), says
+                    yield (section, coefficient), f"{len(terms)} terms, allowed: at most {MAX_TERMS_OF_ONE}"
         for i, box in enumerate(self.model_error_map.boxes if self.model_error_map else ()):
             if set(box.signals) != set(self.signals):
                 says = "has other signals than the aircraft, allowed: a range for each of them"
@@ -326,11 +320,8 @@ class AircraftFile(Section):
         for name in set(self.signals) & {*FLOW_SIGNALS, SIDESLIP_RATE}:
             yield ("signals", name), f"{name} is measured in any case, allowed: another name"
 
-    def terms(self) -> Iterator[tuple[Literal["moments", "forces"], str, int, TermSection]]:
+    def terms(self) -> Iterator[tuple[str, str, int, TermSection]]:
         """(section, coefficient, index, term) of every term in the file."""
-        for axis, terms in self.moments:
-            for i, term in enumerate(terms):
-                yield "moments", axis, i, term
-        for axis, terms in self.forces or ():
-            for i, term in enumerate(terms):
-                yield "forces", axis, i, term
+        for section, coefficients in (("moments", self.moments), ("forces", self.forces or ())):
+            for coefficient, terms in coefficients:
+                yield from ((section, coefficient, i, term) for i, term in enumerate(terms))

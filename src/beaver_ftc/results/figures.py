@@ -172,7 +172,8 @@ def _draw_legend(figure: "Figure", grid: Iterable["Axes"]) -> None:
     for axes in grid:
         handles, labels = axes.get_legend_handles_labels()
         entries = entries | dict(zip(labels, handles, strict=True)) | entries
-    shown = {label: handle for label, handle in entries.items() if label not in _titles(grid)}
+    titles = {axes.get_title().rpartition(" (")[0] or axes.get_title() for axes in grid}
+    shown = {label: handle for label, handle in entries.items() if label not in titles}
     figure.legend(
         shown.values(),
         shown.keys(),
@@ -183,7 +184,3 @@ def _draw_legend(figure: "Figure", grid: Iterable["Axes"]) -> None:
         fontsize=8,
         frameon=False,
     )
-
-
-def _titles(grid: Iterable["Axes"]) -> set[str]:
-    return {axes.get_title().rpartition(" (")[0] or axes.get_title() for axes in grid}

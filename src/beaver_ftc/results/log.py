@@ -236,20 +236,17 @@ def opened(path: Path) -> Iterator[Any]:
     with path.open("rb") as content:
         try:
             with ParquetFile(content, pre_buffer=False) as file:
-                _check_groups(path, file.metadata)
+                groups = (file.metadata.row_group(i) for i in range(file.num_row_groups))
+                largest = max((group.num_rows for group in groups), default=0)
+                if largest > _MOST_ROWS_AT_ONCE:  # than a run writes: a few bytes may stand for billions
+                    has = f"has {largest:,} rows in a row group"
+                    raise BadInput(f"{path}: {has}, allowed: up to {_MOST_ROWS_AT_ONCE:,}")
                 yield file
         except (ArrowException, OSError) as error:
             if getattr(error, "errno", None) is not None:
                 raise  # of the disk, not of the file
             says = "is damaged or cut short, allowed: a log that a run has written"
             raise BadInput(f"{path}: {says}") from error
-
-
-def _check_groups(path: Path, metadata: Any) -> None:
-    """Raise BadInput for more rows at once than a run writes: a few bytes may stand for billions."""
-    largest = max((metadata.row_group(i).num_rows for i in range(metadata.num_row_groups)), default=0)
-    if largest > _MOST_ROWS_AT_ONCE:
-        raise BadInput(f"{path}: has {largest:,} rows in a row group, allowed: up to {_MOST_ROWS_AT_ONCE:,}")
 
 
 def column_names(path: Path) -> tuple[str, ...]:

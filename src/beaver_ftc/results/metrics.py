@@ -116,11 +116,7 @@ def _detection(flight: "Landing", fault: Document | None) -> Document:
     }
 
 
-# What a landing says of the fault it names, and in which order the document says it.
-_FOUND = (
-    "isolated", "isolation_type", "isolation_time_s", "candidates", "type_time_s",
-    "estimate", "estimate_interval", "frequency_rad_s",
-)  # fmt: skip
+# What the document says of the fault that is named, in its order.
 _NAMED = (
     "fault", "type", "time_s", "delay_s", "correct", "estimate", "candidates", "type_correct", "type_delay_s",
     "estimate_deg", "estimate_interval", "frequency_rad_s",
@@ -128,9 +124,9 @@ _NAMED = (
 
 
 def _isolation(flight: "Landing", fault: Document | None) -> Document:
-    found, meant = {name: getattr(flight, name) for name in _FOUND}, _meant(flight, fault)
+    meant = _meant(flight, fault)
     right = _correct(flight.isolated, meant), _type_correct(flight.isolation_type, meant)
-    named = _named(found, fault, right, flight.scenario)
+    named = _named(vars(flight), fault, right, flight.scenario)
     return {
         "isolated": flight.isolated is not None,
         **{key: named[key] for key in _NAMED},
@@ -142,12 +138,10 @@ def _isolation(flight: "Landing", fault: Document | None) -> Document:
 def _one_of_several(found: Document, scenario: "Scenario") -> Document:
     """One of several faults at once; `fault` is null where a plane's is open between its candidates."""
     surface, kind = found["isolated"], found["isolation_type"]
-    declared = [fault for fault in scenario.faults if surface_of(fault) == surface]
-    first = min(declared, key=lambda fault: fault.at_s, default=None)
+    declared = _declared_on(surface, scenario)
     correct = None if surface is None else bool(declared)
-    type_correct = None if kind is None else any(kind == fault.type for fault in declared)
-    fault = None if first is None else {"at_s": first.at_s}
-    return _named(found, fault, (correct, type_correct), scenario)
+    type_correct = None if kind is None else any(kind == fault["type"] for fault in declared)
+    return _named(found, declared[0] if declared else None, (correct, type_correct), scenario)
 
 
 def _named(
@@ -174,11 +168,13 @@ def _named(
 
 def _meant(flight: "Landing", fault: Document | None) -> Document | None:
     """The declared fault that the verdict is held against: the first, or of several that surface's."""
-    if not flight.faults:
-        return fault
-    of_surface = (one for one in flight.scenario.faults if surface_of(one) == flight.isolated)
-    first = min(of_surface, key=lambda one: one.at_s, default=None)
-    return fault if first is None else {"actuator": flight.isolated, "type": first.type, "at_s": first.at_s}
+    of_surface = _declared_on(flight.isolated, flight.scenario) if flight.faults else []
+    return of_surface[0] if of_surface else fault
+
+
+def _declared_on(surface: str | None, scenario: "Scenario") -> list[Document]:
+    """The faults declared on a surface, as they strike."""
+    return [fault for fault in faults_of(scenario) if fault["actuator"] == surface]
 
 
 def _correct(isolated: str | None, fault: Document | None) -> bool | None:

@@ -12,11 +12,13 @@ from typing import Any, Self
 class _Part:
     @classmethod
     def of(cls, document: Mapping[str, Any]) -> Self:
-        """From a section of the document; lists become tuples."""
+        """From a section of the document; lists become tuples, numbers by axis Rates."""
         return cls(**{field.name: _frozen(document.get(field.name)) for field in fields(cls)})
 
 
 def _frozen(value: Any) -> Any:
+    if isinstance(value, dict):
+        return Rates.of(value)
     return tuple(_frozen(entry) for entry in value) if isinstance(value, list) else value
 
 
@@ -68,17 +70,11 @@ class Rates(_Part):
 
 
 @dataclass(frozen=True)
-class Tracking:
+class Tracking(_Part):
     """RMS tracking errors, deg/s; None where there was no such time."""
 
     pre_fault_rms_deg_s: Rates | None
     post_fault_rms_deg_s: Rates | None
-
-    @classmethod
-    def of(cls, document: Mapping[str, Any]) -> Self:
-        """From `tracking` of the document."""
-        before, after = document["pre_fault_rms_deg_s"], document["post_fault_rms_deg_s"]
-        return cls(before and Rates.of(before), after and Rates.of(after))
 
 
 @dataclass(frozen=True)

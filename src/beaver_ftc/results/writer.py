@@ -88,16 +88,11 @@ def write_documents(folder: Path, scenario: "Scenario", document: Document) -> N
     """Write what was flown and what came out of it into a result folder."""
     from beaver_ftc.scenario.dump import to_yaml
 
-    (folder / "scenario.yaml").write_text(to_yaml(_with_its_aircraft(folder, scenario)), encoding="utf-8")
+    if str(scenario.aircraft).startswith("./"):  # the user's own, copied: it can be flown again from here
+        shutil.copytree(scenario.airframe.folder, folder / AIRCRAFT, ignore=_no_model, dirs_exist_ok=True)
+        scenario = scenario.model_copy(update={"aircraft": f"./{AIRCRAFT}"})
+    (folder / "scenario.yaml").write_text(to_yaml(scenario), encoding="utf-8")
     (folder / "metrics.json").write_text(as_json(document), encoding="utf-8")
-
-
-def _with_its_aircraft(folder: Path, scenario: "Scenario") -> "Scenario":
-    """The scenario as it can be flown again from this folder: an aircraft of the user's own is copied."""
-    if not str(scenario.aircraft).startswith("./"):
-        return scenario
-    shutil.copytree(scenario.airframe.folder, folder / AIRCRAFT, ignore=_no_model, dirs_exist_ok=True)
-    return scenario.model_copy(update={"aircraft": f"./{AIRCRAFT}"})
 
 
 def _no_model(folder: str, names: list[str]) -> set[str]:
@@ -148,7 +143,7 @@ def refuse_foreign(folder: Path) -> None:
         return
     if folder.is_symlink() or not folder.is_dir():
         raise SimulationFailed(f"cannot write {folder}: it exists and is not a folder")
-    strangers = strangers_in(folder, FILES_OF_A_RESULT)
+    strangers = _strangers_in(folder)
     if strangers:
         raise SimulationFailed(
             f"will not replace {folder}: it holds {strangers[0]}, which is no result of beaver-ftc; "
@@ -156,9 +151,9 @@ def refuse_foreign(folder: Path) -> None:
         )
 
 
-def strangers_in(folder: Path, known: Collection[str]) -> list[str]:
-    """What lies in a result folder and is none of ours: not of these names, or beside our pictures."""
-    strangers = [entry.name for entry in folder.iterdir() if entry.name not in known]
+def _strangers_in(folder: Path) -> list[str]:
+    """What lies in a result folder and is none of ours, by its name or beside our pictures."""
+    strangers = [entry.name for entry in folder.iterdir() if entry.name not in FILES_OF_A_RESULT]
     pictures = (folder / "figures").rglob("*")
     strangers += [str(path.relative_to(folder)) for path in pictures if not _is_our_picture(path)]
     copied = (path for path in (folder / AIRCRAFT).rglob("*") if not path.is_dir())

@@ -12,10 +12,9 @@ from beaver_ftc.aircraft.aircraft import Aircraft
 from beaver_ftc.aircraft.schema import AircraftFile
 from beaver_ftc.documents.document import Problem
 from beaver_ftc.documents.errors import BadInput, suggestion
-from beaver_ftc.documents.files import UnreadableError, read_text
 from beaver_ftc.documents.paths import data_root
 from beaver_ftc.documents.problems import ScenarioError
-from beaver_ftc.documents.validation import parse_document, validate
+from beaver_ftc.documents.validation import parse_document, text_of, validate
 
 DEFAULT = "beaver"
 FILE = "aircraft.yaml"
@@ -137,11 +136,7 @@ def read(folder: Path) -> Aircraft:
 def _read(folder: Path, changed_ns: int) -> Aircraft:
     """`changed_ns`: when the file was last written, so that a changed one is read again."""
     path = folder / FILE
-    try:
-        text = read_text(path, _MAX_BYTES)
-    except UnreadableError as error:
-        raise ScenarioError(str(path), [Problem(error.line, (), str(error))]) from None
-    document = parse_document(text, str(path), "the keys of an aircraft file")
+    document = parse_document(text_of(path, _MAX_BYTES), str(path), "the keys of an aircraft file")
     file = validate(AircraftFile, document, str(path))
     model = (folder / file.jsbsim).resolve()
     if not model.is_relative_to(folder.resolve()) or not model.is_file():

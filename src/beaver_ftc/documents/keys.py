@@ -10,6 +10,7 @@ import numpy as np
 from pydantic import BaseModel
 
 from beaver_ftc.documents.base import Location
+from beaver_ftc.documents.document import copied
 from beaver_ftc.documents.problems import key_path
 
 _PART = re.compile(r"(?:^|\.)([^.\[\]]+)|\[(\d{1,6})\]")
@@ -31,9 +32,9 @@ def parse_key(key: str) -> Location:
 
 def with_values(data: dict[str, Any], values: dict[Location, Any]) -> dict[str, Any]:
     """A copy of the data with these values in these places; sections that are missing are made."""
-    changed = _copied(data)
+    changed = copied(data)
     for location, value in values.items():
-        _put(changed, location, _copied(value))
+        _put(changed, location, copied(value))
     return changed
 
 
@@ -48,13 +49,6 @@ def plain(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return [plain(entry) for entry in value]
     return str(value) if isinstance(value, PathLike) else value
-
-
-def _copied(data: Any) -> Any:
-    """A copy of mappings and lists all the way down; for plain data several times faster than deepcopy."""
-    if isinstance(data, dict):
-        return {key: _copied(value) for key, value in data.items()}
-    return [_copied(value) for value in data] if isinstance(data, list) else data
 
 
 def _put(data: Any, location: Location, value: Any) -> None:

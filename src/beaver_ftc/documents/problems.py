@@ -11,11 +11,12 @@ from typing import Any
 from pydantic import ValidationError
 
 from beaver_ftc.documents.base import Location
-from beaver_ftc.documents.document import MAX_PROBLEMS, Document, Problem
+from beaver_ftc.documents.document import MAX_PROBLEMS, Document, Problem, has
 from beaver_ftc.documents.errors import BadInput, nearest, suggestion
 
 WHOLE_FILE = "(file)"
 _SHOWN = 48
+_NO_KEY = ("[key]", "(")  # steps of pydantic's: a mapping's key itself, which kind of fault is meant
 
 
 class ScenarioError(BadInput):
@@ -31,13 +32,12 @@ class ScenarioError(BadInput):
 
     @property
     def lines(self) -> tuple[str, ...]:
+        file = one_line(self.source, 4096)
         return tuple(
-            f"{self._place(problem)}{key_path(problem.location)}: {one_line(problem.says, 2000)}"
+            (f"{file}:{problem.line}: " if file else "")
+            + f"{key_path(problem.location)}: {one_line(problem.says, 2000)}"
             for problem in self.problems
         )
-
-    def _place(self, problem: Problem) -> str:
-        return f"{one_line(self.source, 4096)}:{problem.line}: " if self.source else ""
 
     def __reduce__(self) -> tuple[Any, ...]:
         return (type(self), (self.source, self.problems))
@@ -72,17 +72,18 @@ def one_line(text: str, longest: int) -> str:
 def problems_of(error: ValidationError, document: Document, schema: dict[str, Any]) -> Iterator[Problem]:
     """The mistakes in a document's data, each at its line."""
     for detail in error.errors(include_url=False):
-        location = _in_document(detail["loc"], document.data)
+        at = _in_document(detail["loc"], document.data)
         if detail["type"] == "conflict":
-            for below, says in detail["ctx"]["conflicts"]:
-                where = _in_document((*location, *below), document.data)
-                yield Problem(document.line(where), where, says)
+            found = [
+                (_in_document((*at, *below), document.data), says)
+                for below, says in detail["ctx"]["conflicts"]
+            ]
         elif detail["type"] == "union_tag_not_found" and (near := _near_miss_of_type(detail["input"])):
-            where = (*location, near)
-            yield Problem(document.line(where), where, f"unknown key{suggestion(near, ['type'], cutoff=0.5)}")
+            found = [((*at, near), f"unknown key{suggestion(near, ['type'], cutoff=0.5)}")]
         else:
-            says = _says(detail, location, document.data, schema)
-            where = (*location, "type") if detail["type"].startswith("union_tag") else location
+            where = (*at, "type") if detail["type"].startswith("union_tag") else at
+            found = [(where, _says(detail, at, document.data, schema))]
+        for where, says in found:
             yield Problem(document.line(where), where, says)
 
 
@@ -96,23 +97,12 @@ def _in_document(loc: Location, data: Any) -> Location:
     """Pydantic's location without the steps it adds for itself (a union's tag, an expanded preset)."""
     location: list[int | str] = []
     for i, part in enumerate(loc):
-        if _has(data, part):
+        if has(data, part):
             location.append(part)
             data = data[part]
-        elif i == len(loc) - 1 and isinstance(data, dict) and not _is_a_tag(part):
+        elif i == len(loc) - 1 and isinstance(data, dict) and not str(part).startswith(_NO_KEY):
             location.append(part)
     return tuple(location)
-
-
-def _is_a_tag(part: int | str) -> bool:
-    """Whether a step of pydantic's is no key: a mapping's key itself, or which kind of fault is meant."""
-    return part == "[key]" or str(part).startswith("(")
-
-
-def _has(data: Any, part: int | str) -> bool:
-    if isinstance(data, dict):
-        return part in data
-    return isinstance(data, list) and isinstance(part, int) and part < len(data)
 
 
 def _says(detail: Any, location: Location, data: Any, schema: dict[str, Any]) -> str:
@@ -122,26 +112,20 @@ def _says(detail: Any, location: Location, data: Any, schema: dict[str, Any]) ->
         return f"unknown key{suggestion(str(location[-1]), known, cutoff=0.5)}"
     here = _at(schema, location, data)
     if kind == "missing" and isinstance(detail["loc"][-1], int):
-        return f"too few items, allowed: {_allowed(here, detail)}"
+        return f"too few items, allowed: {_allowed(here)}"
     if kind in ("missing", "union_tag_not_found"):
-        return _missing(kind, here, location)
+        types = [tag for node in here for tag in _types(node)] if kind != "missing" else []
+        return f"required key is missing, allowed: {', '.join(types) or _allowed(here)}"
     if kind in ("literal_error", "enum", "union_tag_invalid"):
         return _not_one_of(detail, given, here)
     near = nearest(given, map(str, _choices(here))) if isinstance(given, str) else None
     if near:
-        return f"{_shown(given)} is not known, did you mean {near}? allowed: {_allowed(here, detail)}"
+        return f"{_shown(given)} is not known, did you mean {near}? allowed: {_allowed(here)}"
     items = ", each begun with `- `" if kind in _NO_LIST and isinstance(given, dict) else ""
-    return f"{_wrong(detail, given)}, allowed: {_allowed(here, detail)}{items}"
+    return f"{_wrong(detail, given)}, allowed: {_allowed(here)}{items}"
 
 
 _NO_LIST = ("list_type", "tuple_type")
-
-
-def _missing(kind: str, here: list[dict[str, Any]], location: Location) -> str:
-    if kind == "union_tag_not_found":
-        types = [tag for node in here for tag in node.get("discriminator", {}).get("mapping", {})]
-        return f"required key is missing, allowed: {', '.join(types)}"
-    return f"required key is missing, allowed: {_allowed(here, {})}"
 
 
 def _not_one_of(detail: Any, given: Any, here: list[dict[str, Any]]) -> str:
@@ -156,23 +140,23 @@ def _not_one_of(detail: Any, given: Any, here: list[dict[str, Any]]) -> str:
 
 
 _WRONG_TYPE = ("_type", "_parsing")
+_TYPES = {bool: "a truth value", dict: "a mapping", list: "a list", str: "text"}
 _SAYS = {
-    **dict.fromkeys(
-        ("greater_than", "greater_than_equal", "less_than", "less_than_equal"), "is out of range"
-    ),
-    **dict.fromkeys(("too_long", "string_too_long"), "is too long"),
-    **dict.fromkeys(("too_short", "string_too_short"), "is too short"),
-    "finite_number": "is not finite",
-    "string_pattern_mismatch": "has characters that are not allowed",
+    "is out of range": ("greater_than", "greater_than_equal", "less_than", "less_than_equal"),
+    "is too long": ("too_long", "string_too_long"),
+    "is too short": ("too_short", "string_too_short"),
+    "is not finite": ("finite_number",),
+    "has characters that are not allowed": ("string_pattern_mismatch",),
 }
 
 
 def _wrong(detail: Any, given: Any) -> str:
     kind, shown = detail["type"], _shown(given)
-    if kind in _SAYS:
-        return f"{shown} {_SAYS[kind]}"
+    for says, kinds in _SAYS.items():
+        if kind in kinds:
+            return f"{shown} {says}"
     if kind.endswith(_WRONG_TYPE):
-        return "has no value" if given is None else f"{shown} is {_type_name(given)}"
+        return "has no value" if given is None else f"{shown} is {_TYPES.get(type(given), 'a number')}"
     return one_line(f"{shown}: {detail['msg']}", 300)
 
 
@@ -186,16 +170,11 @@ def _shown(given: Any) -> str:
     return one_line(f"{given:g}" if isinstance(given, float) else repr(given), _SHOWN)
 
 
-def _type_name(given: Any) -> str:
-    names = {bool: "a truth value", dict: "a mapping", list: "a list", str: "text"}
-    return names.get(type(given), "a number")
-
-
 def _at(schema: dict[str, Any], location: Location, data: Any) -> list[dict[str, Any]]:
     """The schemas a location may have: one, or the branches of a union that fit what the data says it is."""
     nodes = _branches(schema, schema, data)
     for part in location:
-        data = data[part] if _has(data, part) else None
+        data = data[part] if has(data, part) else None
         below = [child for node in nodes for child in _children(node, part)]
         nodes = [branch for node in below for branch in _branches(node, schema, data)]
     return nodes
@@ -219,7 +198,7 @@ def _branches(node: dict[str, Any], root: dict[str, Any], data: Any) -> list[dic
         target = root["$defs"][node["$ref"].rsplit("/", 1)[-1]]
         around = {key: value for key, value in node.items() if key != "$ref"}
         return _branches({**target, **around}, root, data)
-    mapping = node.get("discriminator", {}).get("mapping", {})
+    mapping = _types(node)
     tag = data.get("type") if isinstance(data, dict) else None
     if mapping and isinstance(tag, str) and tag in mapping:
         return _branches({"$ref": mapping[tag]}, root, data)
@@ -233,7 +212,7 @@ def _branches(node: dict[str, Any], root: dict[str, Any], data: Any) -> list[dic
 
 def _fits(branch: dict[str, Any], root: dict[str, Any], data: Any) -> bool:
     """Whether a branch of the faults' union is meant: instruments by `sensor`, surfaces by the lack of it."""
-    targets = list(branch.get("discriminator", {}).get("mapping", {}).values())
+    targets = list(_types(branch).values())
     if not targets or not isinstance(data, dict):
         return True
     return ("sensor" in root["$defs"][targets[0].rsplit("/", 1)[-1]]["properties"]) == ("sensor" in data)
@@ -243,13 +222,19 @@ def _keys(nodes: list[dict[str, Any]]) -> list[str]:
     return list(dict.fromkeys(key for node in nodes for key in node.get("properties", {})))
 
 
+def _types(node: dict[str, Any]) -> dict[str, str]:
+    """Where the schema of each `type` is, of a node that has several."""
+    types: dict[str, str] = node.get("discriminator", {}).get("mapping", {})
+    return types
+
+
 def _choices(nodes: list[dict[str, Any]]) -> list[Any]:
     return [
         choice for node in nodes for choice in node.get("enum", [node["const"]] if "const" in node else [])
     ]
 
 
-def _allowed(nodes: list[dict[str, Any]], detail: Any) -> str:
+def _allowed(nodes: list[dict[str, Any]]) -> str:
     kinds = list(dict.fromkeys(_kind(node) for node in nodes if node.get("type") != "null"))
     says = next((node["description"] for node in nodes if "unit" in node), "")
     meaning = f" ({says})" if says and len(kinds) == 1 else ""
@@ -257,19 +242,18 @@ def _allowed(nodes: list[dict[str, Any]], detail: Any) -> str:
 
 
 def _kind(node: dict[str, Any]) -> str:
-    if choices := _choices([node]) or list(node.get("discriminator", {}).get("mapping", {})):
+    if choices := _choices([node]) or list(_types(node)):
         return f"{'a mapping of type ' if 'discriminator' in node else ''}{', '.join(map(str, choices))}"
-    return {
-        "number": lambda: f"a number{_range(node)}",
-        "integer": lambda: f"a whole number{_range(node)}",
-        "boolean": lambda: "true or false",
-        "array": lambda: f"a list{_length(node, 'Items', 'items')}",
-        "string": lambda: f"text{_pattern(node)}{_length(node, 'Length', 'characters')}",
-        "object": lambda: (
-            f"a mapping of {', '.join(_keys([node])) or 'names to values'}"
-            f"{_length(node, 'Properties', 'entries')}"
-        ),
-    }.get(node.get("type", ""), lambda: node.get("description", "another value"))()
+    keys = ", ".join(_keys([node])) or "names to values"
+    kinds = {
+        "number": f"a number{_range(node)}",
+        "integer": f"a whole number{_range(node)}",
+        "boolean": "true or false",
+        "array": f"a list{_length(node, 'Items', 'items')}",
+        "string": f"text{_pattern(node)}{_length(node, 'Length', 'characters')}",
+        "object": f"a mapping of {keys}{_length(node, 'Properties', 'entries')}",
+    }
+    return str(kinds.get(node.get("type", ""), node.get("description", "another value")))
 
 
 def _range(node: dict[str, Any]) -> str:

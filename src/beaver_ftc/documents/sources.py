@@ -29,37 +29,33 @@ def fingerprint(package: Path) -> str:
 
 def sources_of_kernels(package: Path) -> dict[str, bytes]:
     """Their texts, by dotted name below the package."""
-    texts = {_dotted(path.relative_to(package)): path.read_bytes() for path in package.rglob("*.py")}
+    texts = {}
+    for path in package.rglob("*.py"):
+        dotted = ".".join(path.relative_to(package).with_suffix("").parts)
+        texts[dotted.removesuffix("__init__").removesuffix(".")] = path.read_bytes()
     pattern = rf"^(?:from {package.name}\.?([\w.]*) import (\([^)]*\)|.*)|import {package.name}\.([\w.]+))"
     statement = re.compile(pattern.encode(), re.MULTILINE)
-    ahead = [name for name, text in texts.items() if _has_kernels(statement, text)]
+    imports = {name: statement.findall(text) for name, text in texts.items()}
+    ahead = [name for name, found in imports.items() if any(map(_makes_kernels, found))]
     found: dict[str, bytes] = {}
     while ahead:
         name = ahead.pop()
         if name not in found and name in texts:
             found[name] = texts[name]
-            ahead += _imported(statement, texts[name])
+            for each in imports[name]:
+                ahead += _modules(*each)
     return found | {name: text for name, text in texts.items() if _CALLS in text}
 
 
-def _dotted(path: Path) -> str:
-    return ".".join(path.with_suffix("").parts).removesuffix("__init__").removesuffix(".")
+def _makes_kernels(imported: tuple[bytes, bytes, bytes]) -> bool:
+    module, names, _ = imported
+    return module.decode() == _COMPILER and bool(_MAKES.search(names))
 
 
-def _has_kernels(statement: re.Pattern[bytes], text: bytes) -> bool:
-    return any(
-        module.decode() == _COMPILER and _MAKES.search(names) for module, names, _ in statement.findall(text)
-    )
-
-
-def _imported(statement: re.Pattern[bytes], text: bytes) -> list[str]:
-    """The modules a text imports; a name that is no module is found in none."""
-    found = []
-    for module, names, plain in statement.findall(text):
-        start = (module or plain).decode()
-        found.append(start)
-        found += [f"{start}.{name}".removeprefix(".") for name in re.findall(r"\w+", names.decode())]
-    return found
+def _modules(module: bytes, names: bytes, plain: bytes) -> list[str]:
+    """The modules that one statement imports; a name that is no module is found in none."""
+    start = (module or plain).decode()
+    return [start, *(f"{start}.{name}".removeprefix(".") for name in re.findall(r"\w+", names.decode()))]
 
 
 def digest_of(function: FunctionType) -> str:

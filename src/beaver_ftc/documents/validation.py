@@ -1,6 +1,8 @@
 """From a text to a model: every mistake at once, one line each, at its line in the file."""
 
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Iterable
+from dataclasses import replace
 from functools import lru_cache
 from itertools import islice
 from pathlib import Path
@@ -8,12 +10,20 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
-from beaver_ftc.documents.base import Conflict
-from beaver_ftc.documents.document import MAX_PROBLEMS, Document, MalformedDocumentError, Problem, parse
+from beaver_ftc.documents.base import Conflict, Location
+from beaver_ftc.documents.document import (
+    MAX_PROBLEMS,
+    Document,
+    MalformedDocumentError,
+    Problem,
+    copied,
+    has,
+    parse,
+)
 from beaver_ftc.documents.files import UnreadableError, read_text
 from beaver_ftc.documents.problems import ScenarioError, problems_of
-from beaver_ftc.documents.repair import repaired
 
+_MEANT = re.compile(r"did you mean ([^?\s]+)\?")
 _Model = TypeVar("_Model", bound=BaseModel)
 
 
@@ -35,34 +45,85 @@ def parse_document(text: str, source: str, keys: str = "the keys of `beaver-ftc 
     return document
 
 
+def text_of(path: Path | str, most_bytes: int, if_absent: Callable[[], str] | None = None) -> str:
+    """A file's text. if_absent: what to say where there is no such file. Raises ScenarioError."""
+    try:
+        return read_text(path, most_bytes)
+    except UnreadableError as error:
+        says = str(error)
+        if if_absent is not None and says.startswith("no such file"):
+            says = if_absent()
+        raise ScenarioError(str(path), [Problem(error.line, (), says)]) from None
+
+
 def read_file(
     model: type[_Model], path: Path, most_bytes: int, keys: str = "the keys of `beaver-ftc schema`"
 ) -> _Model:
     """A file as a model. Raises ScenarioError with one line a mistake."""
-    try:
-        text = read_text(path, most_bytes)
-    except UnreadableError as error:
-        raise ScenarioError(str(path), [Problem(error.line, (), str(error))]) from None
-    return validate(model, parse_document(text, str(path), keys), str(path))
+    return validate(model, parse_document(text_of(path, most_bytes), str(path), keys), str(path))
 
 
 def _all_of(
     error: ValidationError, model: type[BaseModel], document: Document, folder: Path | None
 ) -> list[Problem]:
     """The mistakes that an error names, and those that show once unknown keys and types are as meant."""
-    found = list(islice(problems_of(error, document, _schema(model)), MAX_PROBLEMS))
-    known = {problem.location for problem in found}
-    mended = repaired(document, found, known)
-    while mended is not None and len(found) < MAX_PROBLEMS:
+    found: list[Problem] = []
+    known: set[Location] = set()
+    while True:
+        seen = islice(problems_of(error, document, _schema(model)), MAX_PROBLEMS)
+        more = [problem for problem in seen if problem.location not in known]
+        found += more
+        known.update(problem.location for problem in more)
+        mended = _repaired(document, more, known)
+        if mended is None or len(found) >= MAX_PROBLEMS:
+            return found
         try:
             model.model_validate(mended.data, context={"folder": folder})
-            break
         except ValidationError as hidden:
-            seen = list(islice(problems_of(hidden, mended, _schema(model)), MAX_PROBLEMS))
-        more = [problem for problem in seen if problem.location not in known]
-        found, known = found + more, known | {problem.location for problem in more}
-        mended = repaired(mended, more, known)
-    return found
+            document, error = mended, hidden
+        else:
+            return found
+
+
+def _repaired(document: Document, problems: Iterable[Problem], known: set[Location]) -> Document | None:
+    """The document with unknown keys and types as they were meant, or without; None if none is unknown.
+
+    A mistyped key or type hides what else is wrong in its section: nothing there can be held against a
+    schema. known: gets the keys that were renamed: a value given to another key is not to be judged by this
+    one.
+    """
+    data, lines, changed = copied(document.data), dict(document.lines), False
+    for problem in problems:
+        section, key = _place(data, problem.location)
+        meant = _MEANT.search(problem.says)
+        if section is None:
+            continue
+        if problem.says.startswith("unknown key"):
+            value = section.pop(key)
+            if meant and meant[1] not in section:
+                section[meant[1]] = value
+                renamed = (*problem.location[:-1], meant[1])
+                known.add(renamed)
+                lines |= _moved(lines, problem.location, renamed)
+            changed = True
+        elif meant and key == "type":
+            section[key], changed = meant[1], True
+    return replace(document, data=data, lines=lines) if changed else None
+
+
+def _place(data: Any, location: Location) -> tuple[dict[str, Any] | None, Any]:
+    """The mapping that a location ends in and the key there; None where the data has no such place."""
+    section, key = None, None
+    for key in location:
+        if not has(data, key):
+            return None, key
+        section, data = data, data[key]
+    return section if isinstance(section, dict) else None, key
+
+
+def _moved(lines: dict[Location, int], old: Location, new: Location) -> dict[Location, int]:
+    depth = len(old)
+    return {(*new, *at[depth:]): line for at, line in lines.items() if at[:depth] == old}
 
 
 def validate(

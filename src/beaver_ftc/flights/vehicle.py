@@ -5,17 +5,15 @@ It names columns, not code. Unknown keys and every other mistake are refused wit
 """
 
 import re
+from collections.abc import Collection, Iterable
 from pathlib import Path
 from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from beaver_ftc.documents.base import Conflict, Number, Section, number, refuse
-from beaver_ftc.documents.document import Problem
+from beaver_ftc.documents.base import Conflict, Location, Number, Section, number, refuse
 from beaver_ftc.documents.errors import suggestion
-from beaver_ftc.documents.files import UnreadableError, read_text
-from beaver_ftc.documents.problems import ScenarioError
-from beaver_ftc.documents.validation import parse_document, validate
+from beaver_ftc.documents.validation import parse_document, text_of, validate
 from beaver_ftc.scenario.loader import looks_like_a_path
 
 _MAX_BYTES = 1_000_000
@@ -67,53 +65,31 @@ class Vehicle(Section):
 
     @model_validator(mode="after")
     def _agree(self) -> "Vehicle":
-        refuse([*self._bad_names(), *self._unknown_commands(), *self._unknown_surfaces()])
+        says = "a surface's name has letters, digits, - and _ only, allowed: one"  # it is part of a column's
+        bad = [name for name in self.surfaces if not _NAME.fullmatch(name)]
+        conflicts: list[Conflict] = [(("surfaces", name), f"{name!r}: {says}") for name in bad]
+        for surface, row in self.surfaces.items():
+            conflicts += _unknown(("surfaces", surface), row, "command", self.commands)
+        for key, table in (("labels", self.labels), ("outputs", self.outputs)):
+            conflicts += _unknown((key,), table, "surface", self.surfaces)
+        refuse(conflicts)
         return self
 
-    def _bad_names(self) -> list[Conflict]:
-        """A surface's name becomes part of a column's name, and + joins several."""
-        return [
-            (
-                ("surfaces", name),
-                f"{name!r}: a surface's name has letters, digits, - and _ only, allowed: one",
-            )
-            for name in self.surfaces
-            if not _NAME.fullmatch(name)
-        ]
 
-    def _unknown_commands(self) -> list[Conflict]:
-        return [
-            (("surfaces", surface, name), f"{name!r} is no command{suggestion(name, self.commands)}")
-            for surface, row in self.surfaces.items()
-            for name in row
-            if name not in self.commands
-        ]
-
-    def _unknown_surfaces(self) -> list[Conflict]:
-        return [
-            ((key, name), f"{name!r} is no surface{suggestion(name, self.surfaces)}")
-            for key, table in (("labels", self.labels), ("outputs", self.outputs))
-            for name in table
-            if name not in self.surfaces
-        ]
-
-
-def builtin_vehicles() -> list[str]:
-    """Names of the built-in vehicles."""
-    return sorted(path.stem for path in _FOLDER.glob("*.yaml"))
+def _unknown(at: Location, names: Iterable[str], what: str, known: Collection[str]) -> list[Conflict]:
+    """The conflicts of names below a location that are not known."""
+    unknown = [name for name in names if name not in known]
+    return [((*at, name), f"{name!r} is no {what}{suggestion(name, known)}") for name in unknown]
 
 
 def load_vehicle(path_or_name: str | Path) -> Vehicle:
     """The vehicle in a file or of a built-in name. Raises ScenarioError with one line a mistake."""
-    given = str(path_or_name)
-    path = Path(path_or_name)
-    if not looks_like_a_path(given) and given in builtin_vehicles():
-        path = _FOLDER / f"{given}.yaml"
-    try:
-        text = read_text(path, _MAX_BYTES)
-    except UnreadableError as error:
-        says = str(error)
-        if says.startswith("no such file") and not looks_like_a_path(given):
-            says = f"no such file or built-in vehicle{suggestion(given, builtin_vehicles())}"
-        raise ScenarioError(given, [Problem(error.line, (), says)]) from None
-    return validate(Vehicle, parse_document(text, str(path)), str(path))
+    given, known = str(path_or_name), sorted(path.stem for path in _FOLDER.glob("*.yaml"))
+    if looks_like_a_path(given):
+        text = text_of(given, _MAX_BYTES)
+    else:
+        given = str(_FOLDER / f"{given}.yaml") if given in known else given
+        unknown = f"no such file or built-in vehicle{suggestion(given, known)}"
+        text = text_of(given, _MAX_BYTES, lambda: unknown)
+    path = str(Path(given))
+    return validate(Vehicle, parse_document(text, path), path)

@@ -7,11 +7,10 @@ from typing import Any
 
 from beaver_ftc.documents.document import Document, Problem
 from beaver_ftc.documents.errors import BadInput, nearest, suggestion
-from beaver_ftc.documents.files import UnreadableError, read_text
 from beaver_ftc.documents.keys import plain
 from beaver_ftc.documents.paths import data_root
 from beaver_ftc.documents.problems import ScenarioError
-from beaver_ftc.documents.validation import parse_document, validate
+from beaver_ftc.documents.validation import parse_document, text_of, validate
 from beaver_ftc.scenario.consistency import conflicts_in_data
 from beaver_ftc.scenario.schema import Scenario
 
@@ -64,13 +63,7 @@ def validate_scenario(document: Document, source: str = "", folder: Path | None 
 
 def read_file(path: Path, given: str, kind: str = "scenario") -> str:
     """The text of a file, or a ScenarioError: why not and, for a bare name, which built-in it is near."""
-    try:
-        return read_text(path, MAX_BYTES)
-    except UnreadableError as error:
-        says = str(error)
-        if says.startswith("no such file") and not looks_like_a_path(given):
-            says = no_such(given, kind)
-        raise ScenarioError(str(path), [Problem(error.line, (), says)]) from None
+    return text_of(path, MAX_BYTES, None if looks_like_a_path(given) else lambda: no_such(given, kind))
 
 
 def _folder() -> Path:

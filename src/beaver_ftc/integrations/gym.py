@@ -27,6 +27,7 @@ from typing import Any, NamedTuple
 
 import gymnasium
 import numpy as np
+from gymnasium.spaces import flatdim
 from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 from numpy.typing import ArrayLike, NDArray
@@ -37,7 +38,6 @@ from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.loop.agent import BESIDE_SURFACES, LARGEST, LOOK, act, cost, observe
 from beaver_ftc.results.simulation import Simulation
 from beaver_ftc.scenario.loader import ScenarioLike, load
-from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.engine.workers import context, cores, single_threaded
 
 ID = "beaver_ftc/Beaver-v0"
@@ -55,9 +55,6 @@ Infos = dict[int, Info]  # of the episodes that have any
 
 class Episode(Simulation):
     """A flight of an agent, frame 0 flown: its actions, its observations, what its steps cost."""
-
-    def __init__(self, scenario: Scenario) -> None:
-        super().__init__(scenario, log=False)
 
     def _make_ready(self) -> None:
         super()._make_ready()
@@ -130,7 +127,8 @@ class BeaverEnv(gymnasium.Env[Vector, Vector]):
         if seed is None and self._seeded:
             seed = int(self.np_random.integers(2**31))
         if self._episode is None:
-            self._episode = Episode(self.scenario if seed is None else self.scenario.with_({"seed": seed}))
+            flown = self.scenario if seed is None else self.scenario.with_({"seed": seed})
+            self._episode = Episode(flown, log=False)
         else:
             self._episode.reset(seed=seed)  # the aircraft is not loaded again
         return self._episode.observation(), {}
@@ -184,21 +182,18 @@ class BeaverVectorEnv(gymnasium.vector.VectorEnv[Vector, Vector, Any]):
         _check_count("workers", 1 if workers is None else workers)
         self.num_envs = num_envs
         one = BeaverEnv(**options)
-        assert one.action_space.shape is not None
-        assert one.observation_space.shape is not None
         self.single_action_space, self.single_observation_space = one.action_space, one.observation_space
         self.action_space = batch_space(one.action_space, num_envs)
         self.observation_space = batch_space(one.observation_space, num_envs)
-        sizes = one.action_space.shape[0], one.observation_space.shape[0]
+        sizes = flatdim(one.action_space), flatdim(one.observation_space)
         block = context().RawArray(c_double, num_envs * (sum(sizes) + 3))
         self._shared = _Shared(block, sizes, slice(None))
         options |= {"scenario": one.scenario}
         workers = min(num_envs, workers or cores())
-        *others, own = (_Part(block, sizes, rows, options) for rows in _shares(num_envs, workers))
-        self._workers: list[_Worker | _Episodes] = [
-            *map(_Worker, others),
-            _Episodes(own),  # comes last, when all others fly
-        ]
+        ends = [num_envs * w // workers for w in range(workers + 1)]  # as even as can be
+        *others, own = (_Part(block, sizes, slice(*rows), options) for rows in pairwise(ends))
+        # its own come last, when all others fly
+        self._workers: list[_Worker | _Episodes] = [*map(_Worker, others), _Episodes(own)]
 
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: Info | None = None
@@ -234,30 +229,23 @@ class BeaverVectorEnv(gymnasium.vector.VectorEnv[Vector, Vector, Any]):
 
     def _answers(self) -> Info:
         """Wait for all; what they have to say, by Gymnasium's rule, but a document stays one."""
-        infos: Info = {}
+        said: Infos = {}
         failed: Exception | None = None
         for worker in self._workers:
             answer = worker.answer()
             if isinstance(answer, Exception):
                 failed = answer
             else:
-                for i, info in answer.items():
-                    self._put(infos, i, info)
+                said |= answer
         if failed is not None:
             self.close()
             raise failed
+        infos: Info = {}
+        for i, info in said.items():
+            for key, value in info.items():
+                infos.setdefault(key, np.full(self.num_envs, None, object))[i] = value
+                infos.setdefault(f"_{key}", np.zeros(self.num_envs, np.bool_))[i] = True
         return infos
-
-    def _put(self, infos: Info, i: int, info: Info) -> None:
-        for key, value in info.items():
-            infos.setdefault(key, np.full(self.num_envs, None, object))[i] = value
-            infos.setdefault(f"_{key}", np.zeros(self.num_envs, np.bool_))[i] = True
-
-
-def _shares(count: int, workers: int) -> list[slice]:
-    """Which episodes each worker flies, as even as can be."""
-    ends = [count * w // workers for w in range(workers + 1)]
-    return [slice(start, end) for start, end in pairwise(ends)]
 
 
 class _Episodes:
@@ -272,7 +260,10 @@ class _Episodes:
     def tell(self, what: bytes) -> None:
         """A step, or a reset by the seeds given."""
         try:
-            self._answer = self._step() if what == _STEP else self._reset(pickle.loads(what))
+            self._answer = self._step() if what == _STEP else {}
+            if what != _STEP:
+                for i, seed in enumerate(pickle.loads(what)):
+                    self._begin(i, seed)
         except Exception as error:
             self._answer = error
 
@@ -282,11 +273,6 @@ class _Episodes:
 
     def end(self) -> None:
         """This process goes on."""
-
-    def _reset(self, seeds: Sequence[int | None]) -> Infos:
-        for i, seed in enumerate(seeds):
-            self._begin(i, seed)
-        return {}
 
     def _begin(self, i: int, seed: int | None = None) -> None:
         shared = self._shared

@@ -113,12 +113,11 @@ class Flying:
         return self._paused or self._session.over
 
     def _fly(self, frames: int) -> None:
-        session = self._session
         try:
             for _ in range(frames):
-                if session.over:
+                if self._session.over:
                     return
-                session.step()
+                self._session.step()
         except BeaverFtcError as error:
             self._paused = True
             self._send(EVERYONE, messages.acknowledged(0, False, str(error)))
@@ -138,19 +137,16 @@ class Flying:
         if page == EVERYONE:
             self._obey(*text.split())
             return
-        request = None
+        n, ok = 0, True
         try:
             request = messages.parse(text)
+            n = request.n
             says = self._handle(page, request)
+            if isinstance(request, messages.Stick):
+                return
         except BeaverFtcError as error:
-            self._answer(page, request, False, str(error))
-        else:
-            self._answer(page, request, True, says)
-
-    def _answer(self, page: int, request: messages.Request | None, ok: bool, says: str) -> None:
-        if isinstance(request, messages.Stick) and ok:
-            return
-        self._send(page, messages.acknowledged(request.n if request else 0, ok, says))
+            ok, says = False, str(error)
+        self._send(page, messages.acknowledged(n, ok, says))
         self._ticks = 0  # the state with the next frame
 
     def _handle(self, page: int, request: messages.Request) -> str:

@@ -33,6 +33,7 @@ class Request(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     n: int = Field(0, ge=0, le=2**53)
+    do: str
 
 
 class Break(Request):

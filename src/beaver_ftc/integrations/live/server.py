@@ -101,16 +101,12 @@ class Page:
         if told.startswith(FRAME):
             self._frame = told
         else:
-            if not self._waiting:
-                self._flush_frame_first()
+            if not self._waiting and self._frame is not None:
+                # a frame flown before an event is drawn before it, one of another flight not after its hello
+                self._waiting.append(self._frame)
+                self._frame = None
             self._waiting.append(told)
         self._news.set()
-
-    def _flush_frame_first(self) -> None:
-        """A frame flown before an event is drawn before it, and one of another flight not after its hello."""
-        if self._frame is not None:
-            self._waiting.append(self._frame)
-            self._frame = None
 
     async def send(self) -> None:
         """Send until the page is gone."""

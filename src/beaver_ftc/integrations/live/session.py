@@ -1,7 +1,6 @@
 """The flight that the page shows: what is asked of it, what happens to it, and what is said of it."""
 
 from collections import deque
-from collections.abc import Callable
 from datetime import UTC, datetime
 from math import cos, sin, tan
 from pathlib import Path
@@ -32,11 +31,14 @@ NO_STICK = messages.Stick(do="stick", rates_deg_s=(0.0, 0.0, 0.0))
 GUST_S = {"rise_s": 0.5, "hold_s": 1.0, "fade_s": 0.5}
 PATIENCE_S = 10.0  # for the diagnosis, once you have spoken
 INSTRUMENTS = "instruments"
+OF_A_FLIGHT = ("break", "repair", "blow", "aim", "change")  # what is asked of a flight that goes on
 HIDDEN = ("_effective_rad", "_pos_rad", "_excluded", "_effectiveness_estimate", "mode", "detected")
 
 
 class Session:
     """One flight at a time, begun anew by `fresh`. out: where `save` writes."""
+
+    sim: "bf.Simulation"
 
     def __init__(self, scenario: "bf.Scenario", out: Path, seed: int | None = None) -> None:
         self._given, self._base, self._out = scenario, scenario, out
@@ -51,9 +53,8 @@ class Session:
         flown = as_live(scenario if faults else scenario.with_({"faults": []}))
         sim = bf.Simulation(flown, log=SpooledLog())
         sim.step()
-        before: bf.Simulation | None = getattr(self, "sim", None)
-        if before is not None:
-            before.release()
+        if hasattr(self, "sim"):
+            self.sim.release()
         self._base, self.scenario, self.sim = scenario, flown, sim
         self.columns = sim.columns
         self.surfaces = tuple(c.removesuffix("_cmd_rad") for c in self.columns if c.endswith("_cmd_rad"))
@@ -78,7 +79,7 @@ class Session:
     def step(self) -> None:
         """Fly one frame and notice what it brought."""
         if self.game.is_due(self.sim.t_s):
-            self._break(self.game.fault)
+            self._inject(self.game.fault)
         if self.sim.frames % STICK_FRAMES == 0 or not self.stick.coordinated:
             self._flown_stick = self._rates_rad_s()
         self.sim.step(stick=self._flown_stick)
@@ -140,25 +141,13 @@ class Session:
         return told
 
     def handle(self, request: messages.Request) -> str:
-        """Do what is asked; returns what to say of it. Raises BadInput."""
-        return self._doing[type(request)](request)
-
-    @property
-    def _doing(self) -> dict[type[messages.Request], Callable[[Any], str]]:
-        return {
-            messages.Break: lambda asked: self._break(dict(asked.fault)),
-            messages.Repair: lambda asked: self._repair(asked.actuator),
-            messages.Blow: lambda asked: self._blow(asked.velocity_mps),
-            messages.Aim: self._aim,
-            messages.Stick: self._steer,
-            messages.Change: self._change,
-            messages.Fresh: self._fresh,
-            messages.Game: self._play,
-            messages.Save: lambda _: self._save(),
-        }
+        """Do what is asked, by the method of its name; returns what to say of it. Raises BadInput."""
+        if self.over and request.do in OF_A_FLIGHT:
+            raise BadInput("the flight is over, allowed: a new flight")
+        says: str = getattr(self, f"_{request.do}")(request)
+        return says
 
     def _aim(self, asked: messages.Aim) -> str:
-        self._check_going_on()
         given = ((channel, getattr(asked, channel)) for channel in HELD)
         targets = {channel: value for channel, value in given if value is not None}
         self.sim.aim(targets)
@@ -166,7 +155,7 @@ class Session:
         self._tell("autopilot", says)
         return says
 
-    def _steer(self, asked: messages.Stick) -> str:
+    def _stick(self, asked: messages.Stick) -> str:
         self.stick = asked
         return ""
 
@@ -177,22 +166,18 @@ class Session:
         """
         rates = np.radians(self.stick.rates_deg_s)
         if self.stick.coordinated:
-            rates = rates + np.round(level_turn(*map(self._now, ATTITUDE)) / TURN_STEP) * TURN_STEP
+            now = [float(self.sim.values[self.columns.index(name)]) for name in ATTITUDE]
+            rates = rates + np.round(level_turn(*now) / TURN_STEP) * TURN_STEP
         return tuple(map(float, rates)) if rates.any() else None
 
-    def _now(self, column: str) -> float:
-        return float(self.sim.values[self.columns.index(column)])
-
-    def _blow(self, velocity_mps: tuple[float, ...]) -> str:
-        self._check_going_on()
-        self.sim.blow({"velocity_mps": list(velocity_mps), **GUST_S})
+    def _blow(self, asked: messages.Blow) -> str:
+        self.sim.blow({"velocity_mps": list(asked.velocity_mps), **GUST_S})
         self._gust_until_s = self.sim.t_s + sum(GUST_S.values()) + 1.0 / self.sim.rate_hz
-        self._tell("gust", ", ".join(f"{v:g}" for v in velocity_mps) + " m/s (north, east, down)")
+        self._tell("gust", ", ".join(f"{v:g}" for v in asked.velocity_mps) + " m/s (north, east, down)")
         return "gust"
 
     def _change(self, asked: messages.Change) -> str:
         """Exchange law, diagnosis, sensors; errors of sensors are declared to the diagnosis as well."""
-        self._check_going_on()
         if self.game.hidden:
             raise BadInput("a round is on, allowed: changes after it")
         change = asked.model_dump(include={"law", "scheme", "sensors"}, exclude_none=True)
@@ -203,8 +188,10 @@ class Session:
         self._tell("changed", says)
         return says
 
-    def _break(self, fault: Fault) -> str:
-        self._check_going_on()
+    def _break(self, asked: messages.Break) -> str:
+        return self._inject(dict(asked.fault))
+
+    def _inject(self, fault: Fault) -> str:
         self.sim.inject(fault)
         self._known = self.sim.in_force
         if self.game.hidden:
@@ -213,16 +200,12 @@ class Session:
         self._tell("broken", says, secret=True)
         return "" if self.game.hidden else f"{says.partition(':')[0]} broken"
 
-    def _repair(self, actuator: str | None) -> str:
-        self._check_going_on()
-        self.sim.repair(actuator)
+    def _repair(self, asked: messages.Repair) -> str:
+        self.sim.repair(asked.actuator)
         self._known = self.sim.in_force
-        self._tell("repaired", actuator or "everything", secret=True)
-        return f"{actuator or 'everything'} repaired"
-
-    def _check_going_on(self) -> None:
-        if self.over:
-            raise BadInput("the flight is over, allowed: a new flight")
+        what = asked.actuator or "everything"
+        self._tell("repaired", what, secret=True)
+        return f"{what} repaired"
 
     def _fresh(self, asked: messages.Fresh) -> str:
         base = self._scenario(asked.scenario)
@@ -241,7 +224,7 @@ class Session:
             raise BadInput(f"scenario: {name!r} is not known{suggestion(name, bf.scenarios())}")
         return bf.load(name)
 
-    def _play(self, asked: messages.Game) -> str:
+    def _game(self, asked: messages.Game) -> str:
         if asked.move == "stop":
             self.game.stop()
         elif asked.move == "answer":
@@ -254,7 +237,7 @@ class Session:
             self._tell("game", "a round begins: something will break")
         return ""
 
-    def _save(self) -> str:
+    def _save(self, asked: messages.Save) -> str:
         folder = self.sim.save(self._out, report=True)
         self._tell("saved", str(folder))
         return f"saved: {folder}; fly it again: beaver-ftc run {folder / 'scenario.yaml'}"
@@ -276,10 +259,8 @@ class Session:
 
     def _effectiveness(self, surface: str) -> float:
         """How much of its moment a surface gives for its command: none while it does not follow that."""
-        failures = f"failures/{surface}"
-        if any(self.sim.read(f"{failures}/{how}") for how in IMMOVABLE):
-            return 0.0
-        return self.sim.read(f"{failures}/effectiveness")
+        stands = any(self.sim.read(f"failures/{surface}/{how}") for how in IMMOVABLE)
+        return 0.0 if stands else self.sim.read(f"failures/{surface}/effectiveness")
 
     def state(self) -> Message:
         """What changes seldom."""
@@ -299,21 +280,17 @@ class Session:
         every = self.scenario.fdi.fault_class == "all"
         return "knows every fault type" if every else "knows partial loss alone"
 
-    @property
-    def _sensors(self) -> tuple[str, ...]:
-        with checked_against(self.scenario.airframe):
-            return sensors_there()
-
     def hello(self) -> Message:
         """What a page needs to know of this flight before its first frame."""
-        low, high = self.sim.travel_rad
         scenario = self.scenario
+        with checked_against(scenario.airframe):
+            sensors = sensors_there()
         return {
             "k": "hello", "columns": self.columns, "surfaces": self.surfaces,
             "scenario": self._base.name, "description": self._base.description, "rate_hz": scenario.rate_hz,
-            **{key: self.flying[key] for key in ("law", "scheme")},
+            "law": self.flying["law"], "scheme": self.flying["scheme"],
             "fault_class": scenario.fdi.fault_class, "aircraft": str(scenario.aircraft),
-            "sensors": self._sensors, "travel_rad": [list(map(float, low)), list(map(float, high))],
+            "sensors": sensors, "travel_rad": [list(map(float, limits)) for limits in self.sim.travel_rad],
             "autopilot": list(scenario.autopilot.channels if scenario.autopilot else ()),
             "trim_rad": list(map(float, self.sim.trim_rad)),
             "scenarios": sorted({*bf.scenarios(), self._given.name}),

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.flights.fitting import constant_parts, usable
+from beaver_ftc.flights.fitting import usable
 from beaver_ftc.flights.identification import identify
 from beaver_ftc.flights.regression import least_squares, variance_inflation
-from beaver_ftc.flights.samples import load_flights
+from beaver_ftc.flights.samples import constant_parts, load_flights
 from flights import synthetic
 
 

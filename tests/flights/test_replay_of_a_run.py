@@ -24,12 +24,12 @@ def run(request, tmp_path_factory):
 
 def test_detection_and_isolation_are_those_of_the_flight(run):
     folder, flight = run
-    done = replay(folder / "log.parquet")
-    assert done.verdict["as_flown"] is True
-    assert done.verdict["rows_that_differ"] == 0
-    assert done.verdict["left_out"] == []
-    assert done.verdict["detection_s"] == flight.detection.time_s
-    assert done.columns["faulty"].tolist() == [int(flag) for flag in flight.log["detected"]]
+    columns, verdict = replay(folder / "log.parquet")
+    assert verdict["as_flown"] is True
+    assert verdict["rows_that_differ"] == 0
+    assert verdict["left_out"] == []
+    assert verdict["detection_s"] == flight.detection.time_s
+    assert columns["faulty"].tolist() == [int(flag) for flag in flight.log["detected"]]
 
 
 def test_a_changed_log_is_not_as_flown(run, tmp_path):
@@ -41,9 +41,9 @@ def test_a_changed_log_is_not_as_flown(run, tmp_path):
     for name in ("scenario.yaml", "metrics.json"):
         (tmp_path / name).write_bytes((folder / name).read_bytes())
     table.to_parquet(tmp_path / "log.parquet")
-    done = replay(tmp_path / "log.parquet")
-    assert done.verdict["as_flown"] is False
-    assert done.verdict["detection_s"] == pytest.approx(5.0, abs=0.02)
+    _, verdict = replay(tmp_path / "log.parquet")
+    assert verdict["as_flown"] is False
+    assert verdict["detection_s"] == pytest.approx(5.0, abs=0.02)
     assert flight.detection.time_s > 5.1
 
 

@@ -36,20 +36,20 @@ def test_the_innovation_is_the_residual_of_the_model(flown, wing_model):
     dt_s = 1.0 / wing_model.rate_hz
     for k in (40, 333, 900):
         residual, answers = by_hand(flown, wing_model, k)
-        now, before = stream.sample(k)[0], stream.sample(k - 1)[0]
+        now, before = stream[k][0], stream[k - 1][0]
         np.testing.assert_allclose(now.x - before.x - dt_s * now.acceleration, residual, atol=1e-12)
         for place, answer in enumerate(answers):
             np.testing.assert_allclose(dt_s * now.contribution[:, place], answer, atol=1e-12)
 
 
 def test_where_the_model_is_silent_there_is_no_innovation(flown, wing_model):
-    now, before = stream_of(flown, wing_model).sample(2)[0], stream_of(flown, wing_model).sample(1)[0]
+    now, before = stream_of(flown, wing_model)[2][0], stream_of(flown, wing_model)[1][0]
     np.testing.assert_allclose(now.x - before.x, now.acceleration / wing_model.rate_hz, atol=1e-15)
 
 
 def test_the_design_model_answers_the_rates_as_the_fit_does(flown, wing_model):
     """A step of one rate changes the next sample by that column of the fit."""
-    context = context_of(wing_model, stream_of(flown, wing_model).error)
+    context = context_of(wing_model)
     step = np.array([0.0, 0.3, 0.0])
     changed = step + context.dt_s * (context.model.f(step, None) - context.model.f(np.zeros(3), None))
     np.testing.assert_allclose(changed, 0.3 * np.array(wing_model.past)[1], atol=1e-12)

@@ -106,8 +106,10 @@ def _replay(flights: list[Path], out: Path, format: Format) -> None:
         says = "--model is missing, allowed without one: log.parquet beside its scenario.yaml"
         raise BadInput(f"diagnose: {others[0]}: {says}")
     done = [replay(path) for path in flights]
-    folders = [write_results(out, one.name, one.columns, one.verdict) for one in done]
-    verdicts = [one.verdict | {"folder": str(at)} for one, at in zip(done, folders, strict=True)]
+    verdicts = [
+        verdict | {"folder": str(write_results(out, verdict["flight"], columns, verdict))}
+        for columns, verdict in done
+    ]
     answer(format, {"flights": verdicts}, lambda: "\n".join(map(as_text, verdicts)))
 
 
@@ -120,6 +122,6 @@ def _diagnose(samples: "Samples", model: "Model", out: Path, scored: bool, detec
     rows = diagnose_with(detector, samples, model)
     verdict = verdict_of(samples, model, rows) | {"detector": detector}
     if scored:
-        verdict["score"] = score(samples, rows, model.groups, list(model.vehicle.surfaces))
+        verdict["score"] = score(samples, rows, model.groups)
     folder = write_diagnosis(out, samples, model, rows, verdict)
     return verdict | {"folder": str(folder)}

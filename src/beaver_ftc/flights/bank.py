@@ -10,6 +10,7 @@ of each group's command) and a little freely; it wanders. Gains return to the mo
 about what it was when the model was identified.
 """
 
+from itertools import combinations, product
 from typing import NamedTuple
 
 import numpy as np
@@ -24,6 +25,9 @@ _IDLE_SHARE = 0.02
 _PAIR_LEVELS = (0.25, 0.5, 0.75)
 _HEALTHY_AT_FIRST, _IDLE_AT_FIRST = 0.7, 0.2
 _LEAST_SCALE, _LARGEST_SCALE = 0.3, 6.0
+
+
+Hypothesis = tuple[Floats, int, float, Floats]  # a row of Bank: effectiveness, kind, weight, offset
 
 
 class Bank(NamedTuple):
@@ -56,9 +60,7 @@ class Bank(NamedTuple):
 def bank_of(model: Model) -> Bank:
     """The hypotheses of a model."""
     count, settings = len(model.groups), model.settings
-    rows: list[tuple[Floats, int, float, Floats]] = [
-        (np.ones(count), HEALTHY, settings.repair_share, np.zeros(3))
-    ]
+    rows: list[Hypothesis] = [(np.ones(count), HEALTHY, settings.repair_share, np.zeros(3))]
     surfaces = sum(len(group) for group in model.groups)
     stuck = "stuck" in model.vehicle.faults
     pairs = count > 1
@@ -66,11 +68,9 @@ def bank_of(model: Model) -> Bank:
     for group in range(count):
         levels, weights = _levels(model, group)
         share = single * len(model.groups[group]) / surfaces / len(model.vehicle.faults)
-        for offset in offsets(model, group):
-            rows += [
-                (_with(count, {group: level}), GROUP, share * weight, offset)
-                for level, weight in zip(levels, weights, strict=True)
-            ]
+        for offset in _offsets(model, group):
+            for level, weight in zip(levels, weights, strict=True):
+                rows.append((_with(count, {group: level}), GROUP, share * weight, offset))
     rows += _pairs(count)
     if stuck:
         unknown = np.diag(np.array(model.noise)) * settings.jam_sd**2
@@ -102,32 +102,22 @@ def _levels(model: Model, group: int) -> tuple[Floats, Floats]:
     return levels, np.where(likelier, share / likelier.sum(), (1.0 - share) / (~likelier).sum())
 
 
-def offsets(model: Model, group: int) -> list[Floats]:
-    """Variances of the rates' offset that may come with a loss: none, or that of a surface that is stuck."""
-    kinds = {"loss": np.zeros(3), "stuck": _jam(model, group)}
-    return [kinds[kind] for kind in model.vehicle.faults]
-
-
-def _jam(model: Model, group: int) -> Floats:
-    """Variance of the rates' offset where the group is stuck anywhere within its travel, (3,): along the axes
-    the group moves most."""
+def _offsets(model: Model, group: int) -> list[Floats]:
+    """Variances of the rates' offset that may come with a loss, (3,) each: none, or that of the group stuck
+    anywhere within its travel, along the axes it moves most."""
     _, _, response, noise = model.arrays()
     total = np.abs(response[group]).sum(axis=0) / np.sqrt(np.diag(noise))
     share = np.clip(total / max(total.max(), 1e-300), 0.3, 1.0)
-    return np.asarray(np.diag(noise) * (model.settings.jam_sd * share) ** 2)
+    kinds = {"loss": np.zeros(3), "stuck": np.diag(noise) * (model.settings.jam_sd * share) ** 2}
+    return [kinds[kind] for kind in model.vehicle.faults]
 
 
-def _pairs(count: int) -> list[tuple[Floats, int, float, Floats]]:
+def _pairs(count: int) -> list[Hypothesis]:
     """Two groups at once, on a coarse grid."""
-    both = [(a, b) for a in range(count) for b in range(a + 1, count)]
-    if not both:
-        return []
-    weight = _PAIR_SHARE / (len(both) * len(_PAIR_LEVELS) ** 2)
+    both = list(product(combinations(range(count), 2), product(_PAIR_LEVELS, repeat=2)))
     return [
-        (_with(count, {a: one, b: other}), PAIR, weight, np.zeros(3))
-        for a, b in both
-        for one in _PAIR_LEVELS
-        for other in _PAIR_LEVELS
+        (_with(count, dict(zip(groups, levels, strict=True))), PAIR, _PAIR_SHARE / len(both), np.zeros(3))
+        for groups, levels in both
     ]
 
 

@@ -16,7 +16,8 @@ standard deviation. Detectors of the loop know the surfaces aileron, elevator an
 take these places in their order.
 """
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -26,10 +27,10 @@ from beaver_ftc.design.model import N_Y
 from beaver_ftc.diagnosis.base import Detector, Measured, Verdict
 from beaver_ftc.documents.errors import BadInput, suggestion
 from beaver_ftc.flights.bank import bank_of
-from beaver_ftc.flights.diagnose import UNKNOWN, Rows, check_rate, diagnose
+from beaver_ftc.flights.diagnose import UNKNOWN, Rows, check_rate, diagnose, joined
 from beaver_ftc.flights.model import Model
 from beaver_ftc.flights.recording import Floats, Recording
-from beaver_ftc.flights.regression import group_indices, predicted
+from beaver_ftc.flights.regression import by_surface, group_indices, predicted
 from beaver_ftc.flights.samples import Samples
 from beaver_ftc.plugins import DETECTORS, is_compiled, made, registered
 
@@ -43,16 +44,6 @@ _GYRO_RAD_S = 1e-4
 BANK = "bank-of-filters"
 
 
-def sliding(samples: Samples, model: Model) -> Rows:
-    """Least squares over the last 20 s."""
-    return _least_squares(samples, model, forget=False)
-
-
-def forgetting(samples: Samples, model: Model) -> Rows:
-    """Least squares that forgets with a time constant of 20 s."""
-    return _least_squares(samples, model, forget=True)
-
-
 def _least_squares(samples: Samples, model: Model, forget: bool) -> Rows:
     """Effectiveness of the groups and the trim, from y = c + sum e_g F_g, whitened."""
     x, y = _whitened(samples, model)
@@ -61,9 +52,8 @@ def _least_squares(samples: Samples, model: Model, forget: bool) -> Rows:
     prior = np.diag([*np.full(3, 1.0 / model.settings.trim_sd**2), *np.full(x.shape[2] - 3, 4.0)])
     covariance = np.linalg.inv(information + prior)
     found = np.einsum("nij,nj->ni", covariance, score)
-    effectiveness = 1.0 + found[:, 3:]
     sd = np.sqrt(np.maximum(np.diagonal(covariance, axis1=1, axis2=2)[:, 3:], 0.0))
-    return _rows(samples, model, effectiveness, sd)
+    return _rows(samples, model, 1.0 + found[:, 3:], sd)
 
 
 def _whitened(samples: Samples, model: Model) -> tuple[Floats, Floats]:
@@ -73,8 +63,7 @@ def _whitened(samples: Samples, model: Model) -> tuple[Floats, Floats]:
     whiten = np.linalg.inv(np.linalg.cholesky(noise))
     rest = np.where(ok[:, None], unexplained - intercept - answers.sum(axis=1), 0.0) @ whiten.T
     sizes = np.broadcast_to(np.diag(np.sqrt(np.diag(noise))), (len(rest), 3, 3))
-    x = np.concatenate([sizes, answers.transpose(0, 2, 1)], axis=2)
-    x = np.where(ok[:, None, None], x, 0.0)
+    x = np.where(ok[:, None, None], np.concatenate([sizes, answers.transpose(0, 2, 1)], axis=2), 0.0)
     return np.einsum("ab,nbi->nai", whiten, x), rest
 
 
@@ -92,68 +81,43 @@ def _remembered(values: Floats, dt_s: float, forget: bool) -> Floats:
 
 def _rows(samples: Samples, model: Model, effectiveness: Floats, sd: Floats) -> Rows:
     """The nearest level the model knows; faulty where that is not healthy, and surely so without labels."""
-    bank, groups = bank_of(model), group_indices(model)
-    surfaces = len(model.vehicle.surfaces)
-    estimate, low, high = (np.ones((len(effectiveness), surfaces)) for _ in range(3))
-    lost = np.zeros(effectiveness.shape, dtype=bool)
-    for g, members in enumerate(groups):
-        levels = _known_levels(model, bank.effectiveness[:, g], g)
-        value = np.clip(effectiveness[:, g], 0.0, 1.0)
-        if model.settings.levels:
-            value = levels[np.abs(value[:, None] - levels).argmin(axis=1)]
-            lost[:, g] = value < 1.0
-        else:
-            lost[:, g] = effectiveness[:, g] + _SURE_SD * sd[:, g] < 1.0
-        estimate[:, members] = value[:, None]
-        low[:, members] = np.clip(effectiveness[:, g] - _NINETY * sd[:, g], 0.0, 1.0)[:, None]
-        high[:, members] = np.clip(effectiveness[:, g] + _NINETY * sd[:, g], 0.0, 1.0)[:, None]
-    bounds = {"low": np.minimum(low, estimate), "high": np.maximum(high, estimate)}
-    return _stateless(samples.t_s, _named(model, lost), estimate, **bounds, healthy=1.0 - lost)
+    bank = bank_of(model)
+    low, high = (np.clip(effectiveness + side * _NINETY * sd, 0.0, 1.0) for side in (-1.0, 1.0))
+    value, lost = np.clip(effectiveness, 0.0, 1.0), effectiveness + _SURE_SD * sd < 1.0
+    if model.settings.levels:
+        for g, group in enumerate(model.groups):
+            seen = model.settings.levels.get("+".join(group))
+            levels = np.array([*seen, 1.0]) if seen else np.unique(bank.effectiveness[:, g])
+            value[:, g] = levels[np.abs(value[:, g, None] - levels).argmin(axis=1)]
+        lost = value < 1.0
+    edges = {"low": np.minimum(low, value), "high": np.maximum(high, value)}
+    bounds = {name: by_surface(edge, model) for name, edge in edges.items()}
+    named = joined(lost, ["+".join(group) for group in model.groups])
+    return _told(samples, named, by_surface(value, model), **bounds)
 
 
-def _known_levels(model: Model, all_levels: Floats, group: int) -> Floats:
-    seen = model.settings.levels.get("+".join(model.groups[group]))
-    return np.array([*seen, 1.0]) if seen else np.unique(all_levels)
-
-
-def _named(model: Model, lost: np.ndarray) -> np.ndarray:
-    """The surfaces of the groups that have lost effectiveness, (n,) text; lost (n, G)."""
-    named = np.full(len(lost), "", dtype=object)
-    for k in np.flatnonzero(lost.any(axis=1)):
-        named[k] = "+".join(name for g in np.flatnonzero(lost[k]) for name in model.groups[g])
-    return named
-
-
-def _stateless(t_s: Floats, named: np.ndarray, estimate: Floats, **known: Any) -> Rows:
-    """Rows of who says nothing of gain and noise: faulty where something is named, sure of the estimate where
-    no bounds are known."""
-    faulty, ones = np.array([bool(name) for name in named], dtype=np.int64), np.ones(len(t_s))
+def _told(samples: Samples, named: np.ndarray, estimate: Floats, **known: Floats) -> Rows:
+    """Rows of who says little: faulty where something is named, sure of the estimate where no bounds are
+    known."""
+    faulty = np.array([bool(name) for name in named], dtype=np.int64)
     found = {"low": estimate, "high": estimate, "probability": faulty.astype(float), **known}
-    return Rows(t_s=t_s, faulty=faulty, named=named, estimate=estimate, gain=ones, scale=ones, **found)
+    return Rows(samples.t_s, faulty, named, estimate, **found)
 
 
 def freeze(recording: Recording, samples: Samples, model: Model) -> Rows | None:
     """The freeze rule on the logged servo outputs; None where the vehicle file names none."""
     names = list(model.vehicle.surfaces)
-    columns = {
-        name: recording.columns[column]
-        for name, column in model.vehicle.outputs.items()
-        if column in recording.columns
-    }
-    if not columns:
+    logged = {name: column for name, column in model.vehicle.outputs.items() if column in recording.columns}
+    if not logged:
         return None
     still = np.zeros((len(samples.t_s), len(names)), dtype=bool)
-    for name, column in columns.items():
+    for name in logged:
+        column = recording.columns[logged[name]]
         last = np.searchsorted(column.t_s, samples.t_s, side="right") - 1
         moved = np.concatenate([[True], np.diff(column.values) != 0.0])
         since = column.t_s[np.maximum.accumulate(np.where(moved, np.arange(len(moved)), 0))]
         still[:, names.index(name)] = (samples.t_s - since[np.maximum(last, 0)] > STILL_S) & (last >= 0)
-    estimate = 1.0 - still
-    named = np.array(
-        ["+".join(name for name, frozen in zip(names, row, strict=True) if frozen) for row in still],
-        dtype=object,
-    )
-    return _stateless(samples.t_s, named, estimate, healthy=np.ones((len(still), len(model.groups))))
+    return _told(samples, joined(still, names), 1.0 - still)
 
 
 class Linear:
@@ -171,32 +135,11 @@ class Linear:
         return np.zeros((3, _SURFACES))
 
 
-@dataclass(frozen=True)
-class Stream:
-    """A flight as the detectors' contract has it. x (n, 3) rad/s; acceleration (n, 3) and contribution
-    (n, 3, 4) rad/s2; command (n, 4) as shares of travel; error (3,) rad/s2."""
+def stream_of(samples: Samples, model: Model) -> list[tuple[Measured, Floats]]:
+    """What a detector is given at each row: what is measured, and the command (4,) as shares of travel.
 
-    t_s: Floats
-    x: Floats
-    acceleration: Floats
-    contribution: Floats
-    command: Floats
-    error: Floats
-
-    def __len__(self) -> int:
-        return len(self.t_s)
-
-    def sample(self, k: int) -> tuple[Measured, Floats]:
-        """What a detector is given at row k."""
-        measured = Measured(
-            float(self.t_s[k]), self.x[k].copy(), np.zeros(N_Y), self.acceleration[k].copy(),
-            self.contribution[k].copy(), self.error.copy(),
-        )  # fmt: skip
-        return measured, self.command[k].copy()
-
-
-def stream_of(samples: Samples, model: Model) -> Stream:
-    """The stream of a flight. Where the model can say nothing (a gap, a lost sample) the innovation is 0."""
+    Where the model can say nothing (a gap, a lost sample) the innovation is 0.
+    """
     groups = group_indices(model)
     if len(groups) > len(PLACES):
         raise BadInput(
@@ -204,20 +147,30 @@ def stream_of(samples: Samples, model: Model) -> Stream:
             f"at most {len(PLACES)}"
         )
     ok, unexplained, answers = predicted(samples, model)
-    (intercept, _, _, noise), dt_s = model.arrays(), 1.0 / model.rate_hz
+    intercept, dt_s = model.arrays()[0], 1.0 / model.rate_hz
     x = np.nan_to_num(samples.rates)
     before = np.vstack([x[:1], x[:-1]])
     expected = x - np.where(ok[:, None], unexplained - intercept - answers.sum(axis=1), 0.0)
+    acceleration = (expected - before) / dt_s
     contribution, command = np.zeros((len(x), 3, _SURFACES)), np.zeros((len(x), _SURFACES))
     known = np.where(ok[:, None, None], answers, 0.0)
     for place, members in enumerate(groups):
         contribution[:, :, place] = known[:, place] / dt_s
         command[:, place] = np.nan_to_num(samples.commands[:, members].sum(axis=1))
-    error = np.sqrt(np.diag(noise)) / dt_s
-    return Stream(samples.t_s, x, (expected - before) / dt_s, contribution, command, error)
+    parts = zip(samples.t_s.tolist(), x, acceleration, contribution, command, strict=True)
+    error = _error(model)
+    return [
+        (Measured(t_s, rates, np.zeros(N_Y), expected_rad_s2, by_surfaces, error.copy()), commanded)
+        for t_s, rates, expected_rad_s2, by_surfaces, commanded in parts
+    ]
 
 
-def context_of(model: Model, error: Floats) -> Context:
+def _error(model: Model) -> Floats:
+    """The residual's standard deviation as an error of the model, (3,) rad/s2."""
+    return np.asarray(np.sqrt(np.diag(model.arrays()[3])) / (1.0 / model.rate_hz))
+
+
+def context_of(model: Model) -> Context:
     """What a detector is told before the flight."""
     dt_s = 1.0 / model.rate_hz
     noise = np.zeros(7)
@@ -227,45 +180,38 @@ def context_of(model: Model, error: Floats) -> Context:
         dt_s=dt_s, substeps=1, model=design, trim_x=np.zeros(3), trim_y=np.zeros(N_Y),
         trim_rad=np.zeros(_SURFACES), travel_rad=np.outer((-1.0, 1.0), np.ones(_SURFACES)),
         constant_rad_s2=np.zeros(3), inertia_coupling=np.zeros(3), surfaces=(*PLACES, "flap"),
-        declared=Declared(noise=noise, model_rad_s2=error),
+        declared=Declared(noise=noise, model_rad_s2=_error(model)),
     )  # fmt: skip
 
 
 def run_detector(detector: Detector, samples: Samples, model: Model) -> Rows:
     """Step a detector of the loop through a flight. An alarm stands while its statistic says so."""
     stream = stream_of(samples, model)
-    detector.reset(context_of(model, stream.error))
-    return rows_of([detector.step(*stream.sample(k)) for k in range(len(stream))], samples, model)
+    detector.reset(context_of(model))
+    return rows_of([detector.step(*given) for given in stream], samples, model)
 
 
 def rows_of(verdicts: list[Verdict], samples: Samples, model: Model) -> Rows:
     """Verdicts as rows. A detector that gives no bounds says 0 to 1 of what it suspects."""
     n, groups = len(verdicts), group_indices(model)
     faulty = np.array([_alarm(verdict) for verdict in verdicts], dtype=np.int64)
-    estimate, low = np.ones((n, len(model.vehicle.surfaces))), np.ones((n, len(model.vehicle.surfaces)))
+    estimate, low = np.ones((2, n, len(model.vehicle.surfaces)))
     named = np.full(n, "", dtype=object)
     for k in np.flatnonzero(faulty):
-        place = _place(verdicts[k], len(groups))
-        named[k] = UNKNOWN if place is None else "+".join(model.groups[place])
-        suspected = range(len(model.vehicle.surfaces)) if place is None else groups[place]
-        low[k, list(suspected)] = 0.0
-        if place is not None:
-            estimate[k, groups[place]] = _remaining(verdicts[k], place)
+        if verdicts[k].isolated not in PLACES[: len(groups)]:
+            named[k], low[k] = UNKNOWN, 0.0
+            continue
+        place = PLACES.index(str(verdicts[k].isolated))
+        named[k], low[k, groups[place]] = "+".join(model.groups[place]), 0.0
+        estimate[k, groups[place]] = _remaining(verdicts[k], place)
     probability = np.array([min(max(verdict.statistic, 0.0), 1.0) for verdict in verdicts])
     probability = np.where(np.isfinite(probability), probability, faulty)
-    bounds = {"low": low, "high": np.ones_like(low)}
-    healthy = np.ones((n, len(groups)))
-    return _stateless(samples.t_s, named, estimate, **bounds, probability=probability, healthy=healthy)
+    return _told(samples, named, estimate, low=low, high=np.ones_like(low), probability=probability)
 
 
 def _alarm(verdict: Verdict) -> bool:
     """By the statistic of this sample where there is one; the loop's own latch serves one fault a flight."""
     return verdict.statistic > 1.0 if np.isfinite(verdict.statistic) else verdict.detected
-
-
-def _place(verdict: Verdict, groups: int) -> int | None:
-    place = PLACES.index(verdict.isolated) if verdict.isolated in PLACES else None
-    return place if place is not None and place < groups else None
 
 
 def _remaining(verdict: Verdict, place: int) -> float:
@@ -274,7 +220,11 @@ def _remaining(verdict: Verdict, place: int) -> float:
     return float(np.clip(1.0 + verdict.estimate, 0.0, 1.0)) if verdict.estimate is not None else 1.0
 
 
-_OF_FLIGHTS = {BANK: diagnose, "sliding-least-squares": sliding, "forgetting-least-squares": forgetting}
+_OF_FLIGHTS: dict[str, Callable[[Samples, Model], Rows]] = {
+    BANK: diagnose,
+    "sliding-least-squares": partial(_least_squares, forget=False),
+    "forgetting-least-squares": partial(_least_squares, forget=True),
+}
 
 
 def detector_names() -> list[str]:

@@ -3,7 +3,9 @@
 Everything a row says comes from samples up to its own time.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import compress
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +16,7 @@ from beaver_ftc.flights.bank import Bank, bank_of
 from beaver_ftc.flights.filtering import posterior_of
 from beaver_ftc.flights.model import Model
 from beaver_ftc.flights.recording import Floats
-from beaver_ftc.flights.regression import group_indices
+from beaver_ftc.flights.regression import by_surface
 from beaver_ftc.flights.samples import Samples
 
 _RATE_TOLERANCE = 0.25
@@ -29,8 +31,7 @@ class Rows:
     """A row a sample.
 
     t_s (n,); faulty (n,) 0 or 1; named (n,) text; estimate, low, high (n, S) effectiveness of each surface;
-    probability (n,) of a fault of any surface; healthy (n, G) probability that a group is healthy; gain (n,)
-    over that of the model; scale (n,) variance of the noise over that of the model.
+    probability (n,) of a fault of any surface.
     """
 
     t_s: Floats
@@ -40,17 +41,13 @@ class Rows:
     low: Floats
     high: Floats
     probability: Floats
-    healthy: Floats
-    gain: Floats
-    scale: Floats
 
 
 def diagnose(samples: Samples, model: Model) -> Rows:
     """The diagnosis of each sample. Raises BadInput where the log's rate is not the model's."""
     check_rate(samples, model)
     bank = bank_of(model)
-    posterior, state, scale = posterior_of(samples, model, bank)
-    return _at_stamps(samples, rows_of(samples, model, bank, posterior, state, scale))
+    return _at_stamps(samples, rows_of(samples, model, bank, posterior_of(samples, model, bank)[0]))
 
 
 def check_rate(samples: Samples, model: Model) -> None:
@@ -63,38 +60,38 @@ def check_rate(samples: Samples, model: Model) -> None:
         )
 
 
-def rows_of(
-    samples: Samples, model: Model, bank: Bank, posterior: Floats, state: Floats, scale: Floats
-) -> Rows:
+def rows_of(samples: Samples, model: Model, bank: Bank, posterior: Floats) -> Rows:
+    """What the probabilities of the hypotheses (n, H) say of each sample."""
     idle = posterior[:, bank.idle]
     probability = posterior[:, bank.faults].sum(axis=1)
     answering = posterior[:, : bank.idle] / np.maximum(1.0 - idle, 1e-300)[:, None]
     well = posterior[:, 0] + idle > 0.5
     faulty = _latched(_standing(probability >= model.settings.alarm, model), well).astype(np.int64)
-    groups = group_indices(model)
-    estimate, low, high = (np.ones((len(posterior), len(model.vehicle.surfaces))) for _ in range(3))
-    healthy = np.empty((len(posterior), len(groups)))
-    for g, members in enumerate(groups):
-        levels, mass = _marginal(bank, answering, g)
-        healthy[:, g] = mass[:, -1]
-        estimate[:, members] = _median(levels, mass)[:, None]
-        bounds = _bounds(levels, mass, model.settings.bounds)
-        lower, upper = bounds if len(members) == 1 else _any_of_them(bounds)
-        low[:, members], high[:, members] = lower[:, None], upper[:, None]
+    by_group = [_of_group(bank, answering, g, model) for g in range(len(model.groups))]
+    estimate, low, high = (np.column_stack(part) for part in zip(*by_group, strict=True))
     still = idle > _IDLE
     estimate[still], low[still], high[still] = 1.0, 0.0, 1.0
     return Rows(
         t_s=samples.t_s,
         faulty=faulty,
         named=_names(model, bank, posterior, faulty),
-        estimate=estimate,
-        low=low,
-        high=high,
+        estimate=by_surface(estimate, model),
+        low=by_surface(low, model),
+        high=by_surface(high, model),
         probability=probability,
-        healthy=healthy,
-        gain=state[:, 3],
-        scale=scale,
     )
+
+
+def _of_group(bank: Bank, posterior: Floats, group: int, model: Model) -> tuple[Floats, ...]:
+    """A group's effectiveness and its bounds, (n,) each.
+
+    Of several surfaces that move together any may have lost all, or nothing.
+    """
+    levels, mass = _marginal(bank, posterior, group)
+    low, high = _bounds(levels, mass, model.settings.bounds)
+    if len(model.groups[group]) > 1:
+        low, high = np.where(low < low.max(initial=0.0), 0.0, low), np.ones_like(high)
+    return _median(levels, mass), low, high
 
 
 def _standing(raised: NDArray[np.bool_], model: Model) -> NDArray[np.bool_]:
@@ -137,27 +134,24 @@ def _bounds(levels: Floats, mass: Floats, share: float) -> tuple[Floats, Floats]
     return edges[np.searchsorted(levels, low)], edges[np.searchsorted(levels, high) + 1]
 
 
-def _any_of_them(bounds: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
-    """Bounds of one surface of several that move together: any of them may have lost all, or nothing."""
-    low, high = bounds
-    return np.where(low < low.max(initial=0.0), 0.0, low), np.ones_like(high)
-
-
 def _names(model: Model, bank: Bank, posterior: Floats, faulty: NDArray[np.int64]) -> NDArray[np.object_]:
     """The surfaces of the groups that most of the fault's probability is on; `unknown` where it is split."""
     total = np.maximum(posterior[:, bank.faults].sum(axis=1), 1e-300)
-    by_group = np.column_stack(
-        [posterior[:, bank.faulty(g)].sum(axis=1) / total for g in range(len(model.groups))]
-    )
+    shares = [posterior[:, bank.faulty(g)].sum(axis=1) / total for g in range(len(model.groups))]
+    likely = joined(np.column_stack(shares) > _NAMED, ["+".join(group) for group in model.groups])
     named = np.full(len(posterior), "", dtype=object)
     other = posterior[:, bank.kind == UNKNOWN_OFFSET].sum(axis=1) > total
     for k in np.flatnonzero(faulty):
         if other[k] and k and named[k - 1]:
             named[k] = named[k - 1]  # an offset of no known cause, with the alarm still standing
-            continue
-        surfaces = [name for g in np.flatnonzero(by_group[k] > _NAMED) for name in model.groups[g]]
-        named[k] = "+".join(surfaces) or UNKNOWN
+        else:
+            named[k] = likely[k] or UNKNOWN
     return named
+
+
+def joined(flags: NDArray[np.bool_], names: Sequence[str]) -> NDArray[np.object_]:
+    """The names that flags (n, K) stand for, joined by +, (n,) text."""
+    return np.array(["+".join(compress(names, row)) for row in flags], dtype=object)
 
 
 def _at_stamps(samples: Samples, rows: Rows) -> Rows:

@@ -93,9 +93,8 @@ def run_bank(y, f, ok, bank, own, noise):
     mu = bank.start.copy()
     m = np.zeros((hypotheses, states))
     p = np.zeros((hypotheses, states, states))
-    for h in range(hypotheses):
-        m[h] = own.mean
-        p[h] = own.covariance
+    m[:] = own.mean
+    p[:] = own.covariance
     posterior = np.zeros((n, hypotheses))
     trim = np.zeros((n, states))
     scales = np.zeros(n)
@@ -104,10 +103,10 @@ def run_bank(y, f, ok, bank, own, noise):
     for k in range(n):
         prior = _mix(mu, m, p, bank, own.walk)
         _relax(m, p, own)
-        _forget(m[idle], p[idle], own)
+        m[idle], p[idle] = own.mean, own.covariance  # while nothing answers, nothing is learnt
         if ok[k]:
             mu, square, evidence[k] = _correct(prior, m, p, y[k], f[k], bank, noise, scale)
-            _bound(m, own)
+            _bound(m, own.mean - own.bound, own.mean + own.bound)
             scale *= np.exp((1.0 - mu[idle]) * (square / 3.0 - _EXPECTED) / noise.memory)
             scale = min(max(scale, noise.least), noise.largest)
         else:
@@ -127,12 +126,11 @@ def _mix(mu, m, p, bank, walk):
     mean = np.zeros(states)
     spread = np.zeros((states, states))
     for h in range(hypotheses):
-        for i in range(states):
-            mean[i] += mu[h] * m[h, i]
+        mean += mu[h] * m[h]
     for h in range(hypotheses):
+        away = m[h] - mean
         for i in range(states):
-            for j in range(states):
-                spread[i, j] += mu[h] * (p[h, i, j] + (m[h, i] - mean[i]) * (m[h, j] - mean[j]))
+            spread[i] += mu[h] * (p[h, i] + away[i] * away)
     prior = np.empty(hypotheses)
     total = 0.0
     for h in range(hypotheses):
@@ -149,13 +147,11 @@ def _merge(own, m, p, mean, spread, offset, walk):
     m (N,) and p (N, N) are replaced; who comes from elsewhere brings the offset (3,) along.
     """
     rest = 1.0 - own
+    away = m - mean
     for i in range(len(m)):
-        for j in range(len(m)):
-            between = (m[i] - mean[i]) * (m[j] - mean[j])
-            p[i, j] = own * p[i, j] + rest * spread[i, j] + own * rest * between
-    for i in range(len(m)):
-        m[i] = own * m[i] + rest * mean[i]
+        p[i] = own * p[i] + rest * spread[i] + own * rest * (away[i] * away)
         p[i, i] += walk[i]
+    m[:] = own * m + rest * mean
     for i in range(len(offset)):
         p[i, i] += rest * offset[i]
 
@@ -163,12 +159,10 @@ def _merge(own, m, p, mean, spread, offset, walk):
 @kernel
 def _relax(m, p, own):
     """Let all trims and gains return towards the model's; m (H, N) and p (H, N, N) are replaced."""
-    m0, keep = own.mean, own.keep
     for h in range(len(m)):
-        for i in range(len(m0)):
-            m[h, i] = m0[i] + keep[i] * (m[h, i] - m0[i])
-            for j in range(len(m0)):
-                p[h, i, j] *= keep[i] * keep[j]
+        m[h] = own.mean + own.keep * (m[h] - own.mean)
+        for i in range(len(own.keep)):
+            p[h, i] *= own.keep[i] * own.keep
 
 
 @kernel
@@ -204,31 +198,19 @@ def _seen(e, f, base, states):
     """How the rates show the states, (N, 3): trim, the gain of the constant and of all groups' answers f
     (G, 3), each as effective as e (G,) says, and of each group's own."""
     seen = np.zeros((states, 3))
-    for i in range(3):
-        seen[i, i] = 1.0
-        seen[3, i] = base[i]
-        for g in range(len(e)):
-            seen[3, i] += e[g] * f[g, i]
-            seen[4 + g, i] = e[g] * f[g, i]
+    seen[:3] = np.eye(3)
+    seen[3] = base
+    for g in range(len(e)):
+        seen[4 + g] = e[g] * f[g]
+        seen[3] += seen[4 + g]
     return seen
 
 
 @kernel
-def _forget(m, p, own):
-    """Trim and gain as before any flight: while nothing answers, nothing is learnt."""
-    for i in range(len(m)):
-        m[i] = own.mean[i]
-        for j in range(len(m)):
-            p[i, j] = own.covariance[i, j]
-
-
-@kernel
-def _bound(m, own):
+def _bound(m, low, high):
     """Keep every hypothesis' trim and gain near those of the model: a fault is not to be learnt away."""
-    m0, bound = own.mean, own.bound
     for h in range(len(m)):
-        for i in range(len(m0)):
-            m[h, i] = min(max(m[h, i], m0[i] - bound[i]), m0[i] + bound[i])
+        m[h] = np.minimum(np.maximum(m[h], low), high)
 
 
 @kernel
@@ -243,28 +225,24 @@ def _update(m, p, y, seen, noise, dof):
     s = noise.copy()
     v = y.copy()
     for i in range(states):
-        for j in range(3):
-            v[j] -= m[i] * seen[i, j]
-            for k in range(states):
-                cross[i, j] += p[i, k] * seen[k, j]
+        v -= m[i] * seen[i]
+        for k in range(states):
+            cross[i] += p[i, k] * seen[k]
     for i in range(states):
         for j in range(3):
-            for k in range(3):
-                s[j, k] += seen[i, j] * cross[i, k]
+            s[j] += seen[i, j] * cross[i]
     inverse, determinant = _inverse(s)
     gain = np.zeros((states, 3))
     square = 0.0
     for j in range(3):
         for k in range(3):
             square += v[j] * inverse[j, k] * v[k]
-            for i in range(states):
-                gain[i, j] += cross[i, k] * inverse[k, j]
-    weight = min(1.0, (dof + 3.0) / (dof + square))
-    for i in range(states):
-        for j in range(3):
-            m[i] += weight * gain[i, j] * v[j]
-            for k in range(states):
-                p[i, k] -= weight * gain[i, j] * cross[k, j]
+            gain[:, j] += cross[:, k] * inverse[k, j]
+    gain *= min(1.0, (dof + 3.0) / (dof + square))
+    for j in range(3):
+        m += gain[:, j] * v[j]
+        for i in range(states):
+            p[i] -= gain[i, j] * cross[:, j]
     return square, np.log(determinant)
 
 

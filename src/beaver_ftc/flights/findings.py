@@ -6,7 +6,7 @@ what trim, gain and the other groups could explain as well is taken off (the Sch
 once d^2 / 2 times the information gathered passes the odds against it before.
 """
 
-from itertools import pairwise
+from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -16,13 +16,18 @@ from beaver_ftc.flights.diagnose import UNKNOWN, Rows
 from beaver_ftc.flights.model import Model
 from beaver_ftc.flights.recording import Floats
 from beaver_ftc.flights.regression import predicted
-from beaver_ftc.flights.samples import Samples
+from beaver_ftc.flights.samples import Samples, constant_parts
 
 Document = dict[str, Any]
 
 BRIEF_S = 3.0
 HORIZONS_S = (5.0, 20.0, 60.0)
 _ALIKE = 0.9
+_TOGETHER = (
+    "{} get proportional commands while they are healthy: no fit of healthy flight tells their effects "
+    "apart. A loss in any of them is named as all of them, and the effectiveness given is that of all "
+    "together."
+)
 
 
 def verdict_of(samples: Samples, model: Model, rows: Rows) -> Document:
@@ -50,17 +55,10 @@ def events_of(rows: Rows, surfaces: list[str]) -> list[Document]:
     What lasts less than BRIEF_S between alarms is taken into the event before it; what stands alone is brief.
     This is hindsight, for the reader; the rows have none.
     """
-    return [
-        _event(rows, begin, end, surfaces) for begin, end in _joined(rows, _runs(rows)) if rows.faulty[begin]
-    ]
-
-
-def _runs(rows: Rows) -> list[tuple[int, int]]:
-    """Begin and end of what has one name and one estimate."""
-    changed = (rows.named[1:] != rows.named[:-1]) | (np.diff(rows.faulty) != 0)
-    changed |= (np.diff(rows.estimate, axis=0) != 0.0).any(axis=1) & (rows.faulty[1:] == 1)
-    edges = [0, *(np.flatnonzero(changed) + 1).tolist(), len(rows.named)]
-    return list(pairwise(edges))
+    _, name = np.unique(rows.named.astype(str), return_inverse=True)
+    said = np.column_stack([name, rows.faulty, rows.faulty[:, None] * rows.estimate])
+    runs = _joined(rows, constant_parts(said))
+    return [_event(rows, begin, end, surfaces) for begin, end in runs if rows.faulty[begin]]
 
 
 def _joined(rows: Rows, runs: list[tuple[int, int]]) -> list[tuple[int, int]]:
@@ -77,9 +75,7 @@ def _joined(rows: Rows, runs: list[tuple[int, int]]) -> list[tuple[int, int]]:
 
 
 def _alike(rows: Rows, one: int, other: int) -> bool:
-    return bool(
-        rows.named[one] == rows.named[other] and np.array_equal(rows.estimate[one], rows.estimate[other])
-    )
+    return rows.named[one] == rows.named[other] and bool((rows.estimate[one] == rows.estimate[other]).all())
 
 
 def _event(rows: Rows, begin: int, end: int, surfaces: list[str]) -> Document:
@@ -87,6 +83,8 @@ def _event(rows: Rows, begin: int, end: int, surfaces: list[str]) -> Document:
     names, count = np.unique(rows.named[begin:end].astype(str), return_counts=True)
     named = str(names[count.argmax()])
     mentioned = surfaces if named == UNKNOWN else named.split("+")
+    known = {"estimate": rows.estimate, "low": rows.low, "high": rows.high}
+    middles = {key: np.median(values[begin:end], axis=0) for key, values in known.items()}
     return {
         "from_s": float(rows.t_s[begin]),
         "to_s": float(rows.t_s[end - 1]),
@@ -94,9 +92,7 @@ def _event(rows: Rows, begin: int, end: int, surfaces: list[str]) -> Document:
         "named": named,
         "probability": float(rows.probability[begin:end].max()),
         "effectiveness": {
-            name: {
-                key: float(np.median(getattr(rows, key)[begin:end, i])) for key in ("estimate", "low", "high")
-            }
+            name: {key: float(middle[i]) for key, middle in middles.items()}
             for i, name in enumerate(surfaces)
             if name in mentioned
         },
@@ -110,21 +106,15 @@ def lasting(events: list[Document]) -> list[Document]:
 
 def as_text(verdict: Document) -> str:
     """The verdict in lines for people."""
-    lines = [f"{verdict['flight']}: {_summary(verdict)}"]
-    shown = lasting(verdict["events"])
-    lines += [f"  {_event_line(event)}" for event in shown]
-    if len(shown) < len(verdict["events"]):
-        lines.append(f"  and {len(verdict['events']) - len(shown)} brief alarms of under {BRIEF_S:g} s")
+    shown, every = lasting(verdict["events"]), len(verdict["events"])
+    what = f"{len(shown)} event{'s' if len(shown) > 1 else ''}" if shown else "no fault shows"
+    lines = [f"{verdict['flight']}: {what} in {looked_at(verdict)}", *map(_event_line, shown)]
+    if len(shown) < every:
+        lines.append(f"  and {every - len(shown)} brief alarms of under {BRIEF_S:g} s")
     lines += [f"  {sentence}" for sentence in (*verdict["can_separate"], *verdict["notes"])]
     for key, value in verdict.get("score", {}).items():
-        lines.append(f"  {key}: {_shown(value)}")
+        lines.append(f"  {key}: {value:.3f}" if isinstance(value, float) else f"  {key}: {value}")
     return "\n".join(lines)
-
-
-def _summary(verdict: Document) -> str:
-    count = len(lasting(verdict["events"]))
-    what = f"{count} event{'s' if count > 1 else ''}" if count else "no fault shows"
-    return f"{what} in {looked_at(verdict)}"
 
 
 def looked_at(verdict: Document) -> str:
@@ -139,11 +129,7 @@ def _event_line(event: Document) -> str:
         f"{name} {known['estimate']:.2f} ({known['low']:.2f} to {known['high']:.2f})"
         for name, known in event["effectiveness"].items()
     )
-    return f"{event['from_s']:.1f} to {event['to_s']:.1f} s  {event['named']}  effectiveness {left}"
-
-
-def _shown(value: Any) -> str:
-    return f"{value:.3f}" if isinstance(value, float) else str(value)
+    return f"  {event['from_s']:.1f} to {event['to_s']:.1f} s  {event['named']}  effectiveness {left}"
 
 
 def statement(samples: Samples, model: Model) -> dict[str, Any]:
@@ -151,7 +137,11 @@ def statement(samples: Samples, model: Model) -> dict[str, Any]:
     bank = bank_of(model)
     answers = _whitened(samples, model)
     return {
-        "together": [_together(group) for group in model.groups if len(group) > 1],
+        "together": [
+            {"surfaces": group, "says": _TOGETHER.format(", ".join(group))}
+            for group in model.groups
+            if len(group) > 1
+        ],
         "groups": [
             {"surfaces": group, **_reach(answers, index, model, bank, samples.dt_s)}
             for index, group in enumerate(model.groups)
@@ -169,29 +159,18 @@ def _whitened(samples: Samples, model: Model) -> Floats:
     return np.asarray(whitened.reshape(answers.shape) * np.sqrt(model.settings.power))
 
 
-def _together(group: list[str]) -> dict[str, Any]:
-    return {
-        "surfaces": group,
-        "says": f"{', '.join(group)} get proportional commands while they are healthy: no fit of healthy "
-        "flight tells their effects apart. A loss in any of them is named as all of them, and the "
-        "effectiveness given is that of all together.",
-    }
-
-
 def _reach(answers: Floats, group: int, model: Model, bank: Bank, dt_s: float) -> dict[str, Any]:
     """Information a second about one group's effectiveness, and the smallest loss seen within some times."""
+    odds = _odds_against(model, bank, group, dt_s)
     if not len(answers):
-        return {"information_per_s": 0.0, "smallest_loss": {f"{h:g}": None for h in HORIZONS_S}}
+        return {"information_per_s": 0.0, "smallest_loss": _smallest(0.0, odds)}
     own = float((answers[:, group] ** 2).sum(axis=1).mean()) / dt_s
     left = _conditional(answers, group) / dt_s
-    odds = _odds_against(model, bank, group, dt_s)
     return {
         "information_per_s": own,
         "information_per_s_of_its_motion": left,
-        "smallest_loss": {f"{horizon:g}": _smallest(own, odds, horizon) for horizon in HORIZONS_S},
-        "smallest_loss_by_motion_alone": {
-            f"{horizon:g}": _smallest(left, odds, horizon) for horizon in HORIZONS_S
-        },
+        "smallest_loss": _smallest(own, odds),
+        "smallest_loss_by_motion_alone": _smallest(left, odds),
     }
 
 
@@ -214,29 +193,22 @@ def _odds_against(model: Model, bank: Bank, group: int, dt_s: float) -> float:
     return float(np.log(settings.alarm / (1.0 - settings.alarm)) - np.log(change))
 
 
-def _smallest(information: float, odds: float, horizon_s: float) -> float | None:
-    """The loss whose mean log likelihood passes the odds within the horizon; None where none does."""
-    if information <= 0.0:
-        return None
-    loss = float(np.sqrt(2.0 * odds / (information * horizon_s)))
-    return loss if loss <= 1.0 else None
+def _smallest(information: float, odds: float) -> dict[str, float | None]:
+    """By horizon in s the loss whose mean log likelihood passes the odds within it; None where none does."""
+    gathered = {f"{horizon_s:g}": information * horizon_s for horizon_s in HORIZONS_S}
+    losses = {key: np.sqrt(2.0 * odds / much) if much > 0.0 else np.inf for key, much in gathered.items()}
+    return {key: float(loss) if loss <= 1.0 else None for key, loss in losses.items()}
 
 
 def _proportional(answers: Floats, model: Model) -> list[dict[str, Any]]:
     """Pairs of groups whose effects in this flight were nearly proportional."""
     pairs = []
-    for a in range(len(model.groups)):
-        for b in range(a + 1, len(model.groups)):
-            one, other = answers[:, a].ravel(), answers[:, b].ravel()
-            norms = float(np.sqrt((one @ one) * (other @ other)))
-            cosine = float(one @ other) / max(norms, 1e-300)
-            pairs.append(
-                {
-                    "surfaces": [model.groups[a], model.groups[b]],
-                    "cosine": cosine,
-                    "separable": abs(cosine) < _ALIKE,
-                }
-            )
+    for a, b in combinations(range(len(model.groups)), 2):
+        one, other = answers[:, a].ravel(), answers[:, b].ravel()
+        norms = float(np.sqrt((one @ one) * (other @ other)))
+        cosine = float(one @ other) / max(norms, 1e-300)
+        surfaces = [model.groups[a], model.groups[b]]
+        pairs.append({"surfaces": surfaces, "cosine": cosine, "separable": abs(cosine) < _ALIKE})
     return pairs
 
 
@@ -258,8 +230,6 @@ def sentences(found: dict[str, Any]) -> list[str]:
 def _loss_in_words(smallest: dict[str, float | None]) -> str:
     seen = [f"{loss:.0%} within {horizon} s" for horizon, loss in smallest.items() if loss is not None]
     if not seen:
-        longest = list(smallest)[-1]
-        return (
-            f"not even a complete loss would show within {longest} s by the mean of this flight's commands."
-        )
+        longest = f"{HORIZONS_S[-1]:g} s"
+        return f"not even a complete loss would show within {longest} by the mean of this flight's commands."
     return f"the smallest loss that shows on average is {', '.join(seen)}."

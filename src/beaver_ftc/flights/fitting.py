@@ -9,7 +9,7 @@ out in turn.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
+from itertools import groupby
 from typing import Any
 
 import numpy as np
@@ -22,7 +22,7 @@ from beaver_ftc.flights.diagnose import Rows, rows_of
 from beaver_ftc.flights.filtering import posterior_of
 from beaver_ftc.flights.model import Model, Settings
 from beaver_ftc.flights.recording import Floats
-from beaver_ftc.flights.samples import Samples
+from beaver_ftc.flights.samples import Samples, constant_parts
 from beaver_ftc.flights.scoring import by_labels
 from beaver_ftc.flights.vehicle import Vehicle
 
@@ -90,26 +90,16 @@ def usable(samples: Samples) -> NDArray[np.bool_]:
     return use
 
 
-def constant_parts(labels: Floats) -> list[tuple[int, int]]:
-    """Begin and end of each stretch of equal rows."""
-    filled = np.nan_to_num(labels, nan=-1.0)
-    change = np.flatnonzero(np.any(np.diff(filled, axis=0) != 0.0, axis=1)) + 1
-    edges = [0, *change.tolist(), len(labels)]
-    return list(pairwise(edges))
-
-
 def fit_model(stretches: Sequence[Stretch], vehicle: Vehicle, settings: Settings | None = None) -> Model:
     """The model that fits these stretches. Raises BadInput where there is too little to fit."""
     history, lags = choose_order(stretches, vehicle)
-    fit = fit_order(stretches, vehicle, history, lags)
-    model = _model(fit, stretches, vehicle, history, lags)
+    model = _model(stretches, vehicle, history, lags)
     return model.model_copy(update={"settings": settings or prior(stretches, model)})
 
 
 def fit_like(stretches: Sequence[Stretch], model: Model) -> Model:
     """Another fit of the same order and settings to other stretches."""
-    fit = fit_order(stretches, model.vehicle, model.history, model.lags)
-    fitted = _model(fit, stretches, model.vehicle, model.history, model.lags)
+    fitted = _model(stretches, model.vehicle, model.history, model.lags)
     return fitted.model_copy(update={"settings": model.settings})
 
 
@@ -158,28 +148,25 @@ def fit_order(stretches: Sequence[Stretch], vehicle: Vehicle, history: int, lags
 def stacked(
     stretches: Sequence[Stretch], vehicle: Vehicle, history: int, lags: int
 ) -> tuple[Floats, Floats, NDArray[np.int64]]:
-    """Regressors, rates and run number over all stretches: the same samples for any order."""
+    """Regressors, rates and run number over all stretches: the same samples for any order.
+
+    Columns of the regressors: one, the past, the commands of each group by lag.
+    """
     groups, reach = regression.groups_of(vehicle), max(HISTORIES + LAGS)
     xs, ys, runs = [], [], []
     for number, stretch in enumerate(stretches):
-        regressors = regression.build(stretch.samples, groups, history, lags, scaled=True)
-        use = stretch.use & regressors.ok
+        past, commands, ok = regression.build(stretch.samples, groups, history, lags, scaled=True)
+        use = stretch.use & ok
         use[:reach] = False
-        xs.append(design(regressors)[use])
+        n = len(past)
+        xs.append(np.column_stack([np.ones(n), past, commands.reshape(n, -1)])[use])
         ys.append(stretch.samples.rates[use])
         runs.append(np.cumsum(np.diff(np.flatnonzero(use), prepend=0) > 1) + 1_000_000 * number)
     return np.vstack(xs), np.vstack(ys), np.concatenate(runs)
 
 
-def design(regressors: regression.Regressors) -> Floats:
-    """Columns of the fit: one, the past, the commands of each group by lag."""
-    n = len(regressors.past)
-    return np.column_stack([np.ones(n), regressors.past, regressors.commands.reshape(n, -1)])
-
-
-def _model(
-    fit: regression.Fit, stretches: Sequence[Stretch], vehicle: Vehicle, history: int, lags: int
-) -> Model:
+def _model(stretches: Sequence[Stretch], vehicle: Vehicle, history: int, lags: int) -> Model:
+    fit = fit_order(stretches, vehicle, history, lags)
     names, groups = list(vehicle.surfaces), regression.groups_of(vehicle)
     first = len(fit.coefficients) - len(groups) * lags
     shape = (len(groups), lags, 3)
@@ -227,16 +214,7 @@ def prior(stretches: Sequence[Stretch], model: Model) -> Settings:
 def _levels(stretch: Stretch, column: int) -> list[float]:
     """The levels of one surface's label in their order, edges left out."""
     values = stretch.samples.labels[:, column][stretch.use]
-    values = values[np.isfinite(values)]
-    keep = np.concatenate([[True], np.diff(values) != 0.0]) if len(values) else np.array([], dtype=bool)
-    return [round(float(value), 6) for value in values[keep]]
-
-
-def without(stretch: Stretch, begin: int, end: int) -> Stretch:
-    """The stretch less a part that is kept for testing."""
-    use = stretch.use.copy()
-    use[begin:end] = False
-    return replace(stretch, use=use)
+    return [round(level, 6) for level, _ in groupby(values[np.isfinite(values)].tolist())]
 
 
 def folds(stretches: Sequence[Stretch]) -> list[tuple[list[Stretch], Stretch, str]]:
@@ -247,7 +225,8 @@ def folds(stretches: Sequence[Stretch]) -> list[tuple[list[Stretch], Stretch, st
     (only,) = stretches
     known = np.flatnonzero(only.use)
     middle = int(known[len(known) // 2]) if len(known) else 0
-    first, second = without(only, middle, len(only.use)), without(only, 0, middle)
+    early = np.arange(len(only.use)) < middle
+    first, second = (replace(only, use=only.use & half) for half in (early, ~early))
     return [([first], second, "second half"), ([second], first, "first half")]
 
 
@@ -271,17 +250,18 @@ def run_tests(stretches: Sequence[Stretch], model: Model) -> tuple[list[Document
 
 def _rows_by_mass(model: Model, kept: Stretch) -> dict[float, Rows]:
     bank = bank_of(model)
-    found = posterior_of(kept.samples, model, bank)
+    posterior, _, _ = posterior_of(kept.samples, model, bank)
     settings = [model.settings.model_copy(update={"bounds": m}) for m in {*_MASSES, model.settings.bounds}]
     return {
-        one.bounds: rows_of(kept.samples, model.model_copy(update={"settings": one}), bank, *found)
+        one.bounds: rows_of(kept.samples, model.model_copy(update={"settings": one}), bank, posterior)
         for one in settings
     }
 
 
 def prediction(model: Model, kept: Stretch) -> Document:
     """Share of the rates' variance that one-step prediction explains, and the residual, an axis."""
-    residual, rates = residuals(model, kept)
+    rows, residual = residuals(model, kept)
+    rates = kept.samples.rates[rows]
     if not len(rates):
         return {"samples": 0}
     explained = 1.0 - residual.var(axis=0) / np.maximum(rates.var(axis=0), 1e-300)
@@ -292,13 +272,7 @@ def prediction(model: Model, kept: Stretch) -> Document:
     }
 
 
-def residuals(model: Model, kept: Stretch) -> tuple[Floats, Floats]:
-    """One-step residuals and rates of the samples in use, (n, 3)."""
-    rows, residual = residual_rows(model, kept)
-    return residual, kept.samples.rates[rows]
-
-
-def residual_rows(model: Model, kept: Stretch) -> tuple[NDArray[np.int64], Floats]:
+def residuals(model: Model, kept: Stretch) -> tuple[NDArray[np.int64], Floats]:
     """Places (n,) of the samples in use, and their one-step residuals (n, 3)."""
     ok, unexplained, answers = regression.predicted(kept.samples, model, scaled=True)
     rows = np.flatnonzero(kept.use & ok)

@@ -27,15 +27,7 @@ def identify(flights: Sequence[Samples], vehicle: Vehicle) -> Model:
     model = fitting.fit_model(stretches, vehicle)
     tests, bounds = fitting.run_tests(stretches, model)
     found = {
-        "flights": [
-            {
-                "name": one.samples.name,
-                "samples": int(one.use.sum()),
-                "of": len(one.use),
-                "notes": list(one.samples.notes),
-            }
-            for one in stretches
-        ],
+        "flights": [_used(stretch) for stretch in stretches],
         "tests": tests,
         "collinear": collinear(stretches, model),
         "colour": colour(stretches, model),
@@ -44,6 +36,11 @@ def identify(flights: Sequence[Samples], vehicle: Vehicle) -> Model:
     }
     settings = model.settings.model_copy(update={"bounds": bounds})
     return model.model_copy(update={"settings": settings, "identified": found})
+
+
+def _used(stretch: fitting.Stretch) -> Document:
+    samples, use = stretch.samples, stretch.use
+    return {"name": samples.name, "samples": int(use.sum()), "of": len(use), "notes": list(samples.notes)}
 
 
 def collinear(stretches: Sequence[fitting.Stretch], model: Model) -> list[Document]:
@@ -58,10 +55,8 @@ def regressor_names(model: Model) -> list[str]:
     """Names of the columns of the fit after the constant, in their order."""
     rates = [f"{rate}[-{k}]" for k in range(1, model.history + 1) for rate in "pqr"]
     signals = [f"{name}[-1]" for name in model.vehicle.signals]
-    commands = [
-        f"command of {'+'.join(group)}[-{k}]" for group in model.groups for k in range(1, model.lags + 1)
-    ]
-    return rates + signals + commands
+    delays, groups = range(1, model.lags + 1), map("+".join, model.groups)
+    return rates + signals + [f"command of {group}[-{k}]" for group in groups for k in delays]
 
 
 def colour(stretches: Sequence[fitting.Stretch], model: Model) -> dict[str, float]:
@@ -73,7 +68,7 @@ def colour(stretches: Sequence[fitting.Stretch], model: Model) -> dict[str, floa
 
 def residual_spectrum(stretches: Sequence[fitting.Stretch], model: Model) -> list[Document]:
     """Mean density of the residual by band, over that of white noise of the same variance, an axis."""
-    e = np.vstack([fitting.residuals(model, stretch)[0] for stretch in stretches])
+    e = np.vstack([fitting.residuals(model, stretch)[1] for stretch in stretches])
     frequency, density = spectrum(e, 1.0 / model.rate_hz)
     white = e.var(axis=0) / (0.5 * model.rate_hz)
     bands = []
@@ -117,13 +112,13 @@ def _test_line(test: Document) -> str:
     if not test["samples"]:
         return f"  without {test['left_out']}: nothing in it is known"
     line = f"  without {test['left_out']}: explains {_axes(test['explained'])} of it"
-    if "score" in test:
-        kept = test["score"]
-        line += (
-            f"; {len(kept['settings'])} classes {kept['classes']:.3f}, healthy or faulty "
-            f"{kept['healthy_or_faulty']:.3f}, side {kept['side']:.3f}, mean error {kept['mean_error']:.3f}"
-        )
-    return line
+    if "score" not in test:
+        return line
+    kept = test["score"]
+    return (
+        f"{line}; {len(kept['settings'])} classes {kept['classes']:.3f}, healthy or faulty "
+        f"{kept['healthy_or_faulty']:.3f}, side {kept['side']:.3f}, mean error {kept['mean_error']:.3f}"
+    )
 
 
 def _lag(run: Document) -> str:
@@ -154,7 +149,8 @@ def output_error(stretches: Sequence[fitting.Stretch], groups: list[list[int]]) 
         return ((run - rates[part]) / spread).ravel()
 
     found = least_squares(residual, start, bounds=(low, high), args=(fitted,), loss="soft_l1", max_nfev=40)
-    errors = _standard_errors(found.jac, found.fun)
+    covariance = np.linalg.pinv(found.jac.T @ found.jac, hermitian=True)
+    errors = np.sqrt(np.maximum(np.diag(covariance), 0.0) * float(found.fun @ found.fun) / len(found.fun))
     rest = residual(found.x, kept).reshape(-1, 3) * spread
     explained = 1.0 - rest.var(axis=0) / rates[kept].reshape(-1, 3).var(axis=0)
     return {
@@ -184,17 +180,16 @@ def _windows(
                 commands.append(grouped[part])
                 rates.append(samples.rates[end - length : end])
     step = max(len(rates) // _MOST_WINDOWS, 1)
-    empty = np.empty((0, before + length, len(groups))), np.empty((0, length, 3))
-    return (np.array(commands[::step]), np.array(rates[::step])) if rates else empty
+    shape = (-1, before + length, len(groups))
+    return np.reshape(commands[::step], shape), np.reshape(rates[::step], (-1, length, 3))
 
 
 def _start(groups: int, dt_s: float) -> tuple[Floats, Floats, Floats]:
     """First guess and bounds of lag, delay, A, B and c."""
     values = [0.1, dt_s, *(0.7 * np.eye(3)).ravel(), *np.full(3 * groups, 0.01), *np.zeros(3)]
-    low = np.full(len(values), -np.inf)
-    high = np.full(len(values), np.inf)
-    low[:2], high[:2] = (_LEAST_LAG_S, 0.0), (_MOST_LAG_S, _MOST_DELAY_S)
-    return np.array(values), low, high
+    free = np.full(len(values) - 2, np.inf)
+    low, high = [_LEAST_LAG_S, 0.0, *-free], [_MOST_LAG_S, _MOST_DELAY_S, *free]
+    return np.array(values), np.array(low), np.array(high)
 
 
 def _run(parameters: Floats, commands: Floats, rates: Floats, dt_s: float) -> Floats:
@@ -218,8 +213,3 @@ def _run(parameters: Floats, commands: Floats, rates: Floats, dt_s: float) -> Fl
         command = (1.0 - part) * commands[:, late[0]] + part * commands[:, late[1]]
         servo = keep * servo + (1.0 - keep) * command
     return run
-
-
-def _standard_errors(jacobian: Floats, residual: Floats) -> Floats:
-    covariance = np.linalg.pinv(jacobian.T @ jacobian, hermitian=True)
-    return np.sqrt(np.maximum(np.diag(covariance), 0.0) * float(residual @ residual) / len(residual))

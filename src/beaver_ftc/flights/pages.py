@@ -63,25 +63,19 @@ def _notes(samples: Samples, model: Model) -> list[str]:
         f"{name} has its own stamps: its last value is held, {age:.2f} s old on average."
         for name, age in samples.age_s.items()
     ]
-    said += samples.notes
-    said.append(
+    predicts = (
         f"The model was identified at {model.rate_hz:.3g} Hz; it predicts a sample from past ones, "
         f"{model.history} of the rates and {model.lags} of the commands."
     )
-    return said
+    return [*said, *samples.notes, predicts]
 
 
 def picture(samples: Samples, model: Model, rows: Rows) -> Any:
     """The flight on one page: commands, rates, effectiveness with bounds, probability of a fault."""
     surfaces = list(model.vehicle.surfaces)
     figure = _figure(11, 3.4 + 1.25 * len(surfaces))
-    axes = figure.subplots(
-        3 + len(surfaces),
-        1,
-        sharex=True,
-        squeeze=False,
-        height_ratios=[1.2, 1.2, *[1.0] * (len(surfaces) + 1)],
-    )[:, 0]
+    heights = [1.2, 1.2, *[1.0] * (len(surfaces) + 1)]
+    axes = figure.subplots(len(heights), sharex=True, height_ratios=heights)
     _lines(axes[0], samples.t_s, np.rad2deg(samples.rates), ["p", "q", "r"], "rates, deg/s")
     limit = float(np.rad2deg(np.nanpercentile(np.abs(samples.rates), 99.9))) * 1.3
     axes[0].set_ylim(-max(limit, 1.0), max(limit, 1.0))  # a landing's spike does not flatten the flight
@@ -89,16 +83,13 @@ def picture(samples: Samples, model: Model, rows: Rows) -> Any:
     _lines(axes[2], rows.t_s, rows.probability[:, None], ["a fault"], "probability")
     axes[2].set_ylim(-0.05, 1.05)
     for i, surface in enumerate(surfaces):
-        _effectiveness(axes[3 + i], rows, i, surface)
+        _effectiveness(axes[3 + i], rows, i)
+        _dress(axes[3 + i], f"{surface}\neffectiveness")
     for axis in axes:
         _shade(axis, rows)
     axes[-1].set_xlabel("time, s")
     axes[-1].set_xlim(samples.t_s[0], samples.t_s[-1])
     return figure
-
-
-def _thin(n: int) -> slice:
-    return slice(None, None, max(n // _MOST_POINTS, 1))
 
 
 def _dress(axis: Any, label: str, **grid: Any) -> None:
@@ -109,47 +100,40 @@ def _dress(axis: Any, label: str, **grid: Any) -> None:
 
 
 def _lines(axis: Any, t_s: np.ndarray, values: np.ndarray, names: list[str], label: str) -> None:
-    kept = _thin(len(t_s))
+    kept = slice(None, None, max(len(t_s) // _MOST_POINTS, 1))
     for i, name in enumerate(names):
         axis.plot(t_s[kept], values[kept, i], color=SERIES[i % len(SERIES)], linewidth=0.7, label=name)
     axis.legend(loc="upper left", fontsize=7, ncols=4, framealpha=0.8)
     _dress(axis, label)
 
 
-def _effectiveness(axis: Any, rows: Rows, surface: int, name: str) -> None:
-    kept = _thin(len(rows.t_s))
+def _effectiveness(axis: Any, rows: Rows, surface: int) -> None:
+    kept = slice(None, None, max(len(rows.t_s) // _MOST_POINTS, 1))
     axis.fill_between(
         rows.t_s[kept], rows.low[kept, surface], rows.high[kept, surface], color="#9cc4e4", step="post",
         linewidth=0, label="90 % bounds",
     )  # fmt: skip
     axis.step(rows.t_s[kept], rows.estimate[kept, surface], where="post", color="#0b3d66", linewidth=1.1)
     axis.set_ylim(-0.05, 1.08)
-    _dress(axis, f"{name}\neffectiveness")
 
 
 def _shade(axis: Any, rows: Rows) -> None:
     """Where the alarm stands."""
     edges = np.flatnonzero(np.diff(rows.faulty, prepend=0, append=0))
-    for begin, end in zip(edges[::2], edges[1::2], strict=True):
-        axis.axvspan(
-            rows.t_s[begin], rows.t_s[min(end, len(rows.t_s) - 1)], color="#f4d6cc", alpha=0.45, lw=0
-        )
+    times_s = rows.t_s[np.minimum(edges, len(rows.t_s) - 1)]
+    for begin_s, end_s in zip(times_s[::2], times_s[1::2], strict=True):
+        axis.axvspan(begin_s, end_s, color="#f4d6cc", alpha=0.45, lw=0)
 
 
 def write_diagnosis(out: Path, samples: Samples, model: Model, rows: Rows, verdict: dict[str, Any]) -> Path:
     """Write the folder `out/<flight>` whole or not at all; returns it."""
-    columns = columns_of(rows, list(model.vehicle.surfaces))
-    return write_results(out, samples.name, columns, verdict, render(samples, model, rows, verdict))
-
-
-def columns_of(rows: Rows, surfaces: list[str]) -> dict[str, Any]:
-    """A row a sample: t_s, faulty, named, and for each surface its effectiveness with bounds."""
     columns: dict[str, Any] = {"t_s": rows.t_s, "faulty": rows.faulty, "named": rows.named.tolist()}
-    for i, surface in enumerate(surfaces):
+    for i, surface in enumerate(model.vehicle.surfaces):
         columns[f"{surface}_effectiveness"] = rows.estimate[:, i]
         columns[f"{surface}_low"] = rows.low[:, i]
         columns[f"{surface}_high"] = rows.high[:, i]
-    return columns | {"fault_probability": rows.probability}
+    columns["fault_probability"] = rows.probability
+    return write_results(out, samples.name, columns, verdict, render(samples, model, rows, verdict))
 
 
 def write_results(
@@ -177,24 +161,17 @@ def render_model(flights: Sequence[Samples], model: Model) -> str:
     """The page as HTML text."""
     stretches = fitting.stretches_of(flights)
     fit = fitting.fit_order(stretches, model.vehicle, model.history, model.lags)
+    names = ["constant", *regressor_names(model)]
     return template("model.html.j2").render(
         mark=MARK,
         model=model,
         found=model.identified,
         used=sum(int(stretch.use.sum()) for stretch in stretches),
-        coefficients=_coefficients(fit, model),
+        coefficients=list(zip(names, fit.coefficients.tolist(), fit.standard_errors.tolist(), strict=True)),
         fits=_encoded(_fits(stretches, model)),
         spectrum=_encoded(_spectrum(stretches, model)),
-        correlation=_encoded(_correlation(fit, model)),
+        correlation=_encoded(_correlation(fit, names)),
     )
-
-
-def _coefficients(fit: Fit, model: Model) -> list[dict[str, Any]]:
-    """Each regressor's coefficient and standard error, an axis."""
-    return [
-        {"name": name, "value": fit.coefficients[i].tolist(), "sd": fit.standard_errors[i].tolist()}
-        for i, name in enumerate(["constant", *regressor_names(model)])
-    ]
 
 
 def _figure(width: float, height: float) -> Any:
@@ -213,21 +190,19 @@ def _fits(stretches: Sequence[fitting.Stretch], model: Model) -> Any:
     """Measured and predicted rates over the liveliest part of each flight (or half) that was left out."""
     parts = [(fitting.fit_like(fitted, model), kept, name) for fitted, kept, name in fitting.folds(stretches)]
     parts = [part for part in parts if part[1].use.any()][:_MOST_PARTS]
-    figure = _figure(11, 4.6 * max(len(parts), 1))
-    for block, (fitted, kept, name) in zip(
-        figure.subfigures(max(len(parts), 1), 1, squeeze=False)[:, 0], parts, strict=False
-    ):
+    height = max(len(parts), 1)
+    figure = _figure(11, 4.6 * height)
+    blocks = figure.subfigures(height, squeeze=False)[:, 0]
+    for block, (fitted, kept, name) in zip(blocks, parts, strict=False):
         axes = block.subplots(3, 1, sharex=True)
-        rows, residual = fitting.residual_rows(fitted, kept)
+        rows, residual = fitting.residuals(fitted, kept)
         begin = _liveliest(kept.samples.rates, rows, round(_SHOWN_S * model.rate_hz))
         inside = (rows >= begin) & (rows < begin + round(_SHOWN_S * model.rate_hz))
         t_s, measured = kept.samples.t_s[rows[inside]], kept.samples.rates[rows[inside]]
         for i, axis in enumerate(axes):
-            left = np.rad2deg(residual[inside, i])
-            axis.plot(t_s, np.rad2deg(measured[:, i]), color="#888888", linewidth=2.2, label="measured")
-            axis.plot(
-                t_s, np.rad2deg(measured[:, i]) - left, color=SERIES[0], linewidth=0.9, label="predicted"
-            )
+            left, rate = np.rad2deg(residual[inside, i]), np.rad2deg(measured[:, i])
+            axis.plot(t_s, rate, color="#888888", linewidth=2.2, label="measured")
+            axis.plot(t_s, rate - left, color=SERIES[0], linewidth=0.9, label="predicted")
             axis.plot(t_s, left, color=SERIES[1], linewidth=0.7, label="residual")
             _dress(axis, f"{'pqr'[i]}, deg/s")
         axes[0].set_title(f"{name}, not fitted: one sample ahead", fontsize=9, loc="left")
@@ -246,15 +221,14 @@ def _liveliest(rates: Floats, rows: NDArray[np.int64], length: int) -> int:
 
 def _spectrum(stretches: Sequence[fitting.Stretch], model: Model) -> Any:
     """Density of the residual, and what white noise of the same variance would have."""
-    residual = np.vstack([fitting.residuals(model, stretch)[0] for stretch in stretches])
+    residual = np.vstack([fitting.residuals(model, stretch)[1] for stretch in stretches])
     frequency, density = spectrum(residual, 1.0 / model.rate_hz)
     figure = _figure(7.5, 3.2)
     axis = figure.subplots()
     for i, name in enumerate("pqr"):
         axis.loglog(frequency[1:], density[1:, i], color=SERIES[i], linewidth=1.1, label=name)
-        axis.axhline(
-            residual[:, i].var() / (0.5 * model.rate_hz), color=SERIES[i], linewidth=0.7, linestyle=":"
-        )
+        white = residual[:, i].var() / (0.5 * model.rate_hz)
+        axis.axhline(white, color=SERIES[i], linewidth=0.7, linestyle=":")
     axis.set_xlabel("frequency, Hz", fontsize=8)
     axis.set_title("residual (dotted: white noise of the same variance)", fontsize=9, loc="left")
     _dress(axis, "density, (rad/s)² / Hz", which="both")
@@ -262,9 +236,8 @@ def _spectrum(stretches: Sequence[fitting.Stretch], model: Model) -> Any:
     return figure
 
 
-def _correlation(fit: Fit, model: Model) -> Any:
+def _correlation(fit: Fit, names: list[str]) -> Any:
     """Correlation of the errors of the coefficients."""
-    names = ["constant", *regressor_names(model)]
     size = 2.5 + 0.19 * len(names)
     figure = _figure(size + 0.8, size)
     axis = figure.subplots()

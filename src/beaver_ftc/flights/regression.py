@@ -21,23 +21,14 @@ _PARALLEL = 1e-9
 _RIDGE = 1e-10
 
 
-@dataclass(frozen=True)
-class Regressors:
-    """past (n, 3 h + X); commands (n, G, L) of the groups at lags 1 to L; ok (n,) all of it is known and no
-    gap lies within."""
-
-    past: Floats
-    commands: Floats
-    ok: NDArray[np.bool_]
-
-
 def groups_of(vehicle: Vehicle) -> list[list[int]]:
     """Surfaces by what excites them: those in one group get proportional commands."""
     rows = mixer(vehicle)
     groups: list[list[int]] = []
     for i, row in enumerate(rows):
         for group in groups:
-            if _parallel(row, rows[group[0]]):
+            other = rows[group[0]]
+            if (row @ other) ** 2 >= (1.0 - _PARALLEL) * (row @ row) * (other @ other):
                 group.append(i)
                 break
         else:
@@ -45,13 +36,11 @@ def groups_of(vehicle: Vehicle) -> list[list[int]]:
     return groups
 
 
-def _parallel(one: Floats, other: Floats) -> bool:
-    product = float(one @ other) ** 2
-    return product >= (1.0 - _PARALLEL) * float(one @ one) * float(other @ other)
-
-
-def build(samples: Samples, groups: list[list[int]], history: int, lags: int, scaled: bool) -> Regressors:
-    """The regressors of each sample.
+def build(
+    samples: Samples, groups: list[list[int]], history: int, lags: int, scaled: bool
+) -> tuple[Floats, Floats, NDArray[np.bool_]]:
+    """The regressors of each sample: the past (n, 3 h + X), the commands (n, G, L) of the groups at lags 1 to
+    L, and whether all of it is known and no gap lies within, (n,).
 
     scaled: multiply each surface's command by its labelled effectiveness (1 where there is no label).
     """
@@ -59,31 +48,33 @@ def build(samples: Samples, groups: list[list[int]], history: int, lags: int, sc
     if scaled:
         surfaces = surfaces * np.where(np.isfinite(samples.labels), samples.labels, 1.0)
     grouped = np.column_stack([surfaces[:, group].sum(axis=1) for group in groups])
-    past = np.column_stack([_lagged(samples.rates, range(1, history + 1)), _lagged(samples.signals, (1,))])
-    commands = _lagged(grouped, range(1, lags + 1)).reshape(len(grouped), lags, len(groups))
+    rates = [_delayed(samples.rates, k, np.nan) for k in range(1, history + 1)]
+    past = np.column_stack([*rates, _delayed(samples.signals, 1, np.nan)])
+    commands = np.stack([_delayed(grouped, k, np.nan) for k in range(1, lags + 1)], axis=1)
     known = np.isfinite(past).all(axis=1) & np.isfinite(commands).all(axis=(1, 2))
     known &= np.isfinite(samples.rates).all(axis=1)
-    return Regressors(past, commands.transpose(0, 2, 1), known & _within_run(samples.run, max(history, lags)))
+    known &= samples.run == _delayed(samples.run, max(history, lags), -1)
+    return past, commands.transpose(0, 2, 1), known
 
 
-def _lagged(values: Floats, lags: range | tuple[int, ...]) -> Floats:
-    """Columns delayed by each lag, nan where there is no past: (n, len(lags) * columns)."""
-    n = len(values)
-    delayed = [
-        np.vstack([np.full((min(k, n), values.shape[1]), np.nan), values[: max(n - k, 0)]]) for k in lags
-    ]
-    return np.column_stack(delayed)
-
-
-def _within_run(run: NDArray[np.int64], reach: int) -> NDArray[np.bool_]:
-    before = np.concatenate([np.full(min(reach, len(run)), -1), run[: max(len(run) - reach, 0)]])
-    return run == before
+def _delayed(values: np.ndarray, k: int, before: float) -> np.ndarray:
+    """The rows k samples later, `before` where there is no past."""
+    k = min(k, len(values))
+    return np.concatenate([np.full((k, *values.shape[1:]), before), values[: len(values) - k]])
 
 
 def group_indices(model: Model) -> list[list[int]]:
     """The model's groups as positions of their surfaces."""
     names = list(model.vehicle.surfaces)
     return [[names.index(name) for name in group] for group in model.groups]
+
+
+def by_surface(values: Floats, model: Model) -> Floats:
+    """Each surface's column (n, S) of those of the groups (n, G): its group's, 1 where it is in none."""
+    place = np.full(len(model.vehicle.surfaces), -1)
+    for group, members in enumerate(group_indices(model)):
+        place[members] = group
+    return np.asarray(np.take(np.column_stack([values, np.ones(len(values))]), place, axis=1))
 
 
 def predicted(
@@ -94,20 +85,19 @@ def predicted(
 
     Summed in the same order whatever the length of the flight, so that a row does not depend on later ones.
     """
-    regressors = build(samples, group_indices(model), model.history, model.lags, scaled)
-    _, past, response, _ = model.arrays()
-    unexplained = samples.rates - np.einsum("nm,mr->nr", regressors.past, past)
-    return regressors.ok, unexplained, np.einsum("ngl,glr->ngr", regressors.commands, response)
+    past, commands, ok = build(samples, group_indices(model), model.history, model.lags, scaled)
+    _, by_past, response, _ = model.arrays()
+    unexplained = samples.rates - np.einsum("nm,mr->nr", past, by_past)
+    return ok, unexplained, np.einsum("ngl,glr->ngr", commands, response)
 
 
 @dataclass(frozen=True)
 class Fit:
-    """coefficients (m, 3); residuals (n, 3); covariance (3, 3) of the residuals; standard errors (m, 3) and
+    """coefficients (m, 3); covariance (3, 3) of the residuals; standard errors (m, 3) and
     the factor by which the residuals' colour widens them over those of white ones, (m, 3); correlation (m, m)
     of the coefficients' errors, alike on every axis."""
 
     coefficients: Floats
-    residuals: Floats
     covariance: Floats
     standard_errors: Floats
     colour: Floats
@@ -134,7 +124,7 @@ def least_squares(x: Floats, y: Floats, run: NDArray[np.int64], reach: int) -> F
     colour = np.divide(robust, white, out=np.ones_like(robust), where=white > 0)
     size = np.sqrt(np.maximum(np.diag(inverse), 1e-300))
     return Fit(
-        coefficients / scale[:, None], residuals, covariance, robust / scale[:, None], colour,
+        coefficients / scale[:, None], covariance, robust / scale[:, None], colour,
         inverse / np.outer(size, size),
     )  # fmt: skip
 

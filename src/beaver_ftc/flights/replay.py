@@ -6,7 +6,7 @@ bit.
 """
 
 import json
-from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -22,37 +22,28 @@ _FLOW = ("alpha_rad", "beta_rad", "airspeed_mps", "qdyn_pa")
 _UNKNOWN = "unknown"
 
 
-@dataclass(frozen=True)
-class Replay:
-    """Columns of diagnosis.parquet by name, and the document of verdict.json."""
-
-    name: str
-    columns: dict[str, Any]
-    verdict: Document
-
-
 def is_own_log(path: Path) -> bool:
     """Whether a path is the log of one of our runs, with its scenario beside it."""
     return path.name == "log.parquet" and path.with_name("scenario.yaml").is_file()
 
 
-def replay(path: Path) -> Replay:
-    """Step the diagnosis through a log. Raises BadInput where the flight's diagnosis was none of ours."""
+def replay(path: Path) -> tuple[dict[str, Any], Document]:
+    """Step the diagnosis through a log: columns of diagnosis.parquet by name, and the document of
+    verdict.json. Raises BadInput where the flight's diagnosis was none of ours."""
     from beaver_ftc.loop.stream import Diagnosis
     from beaver_ftc.scenario.loader import load_scenario
 
     scenario = load_scenario(path.with_name("scenario.yaml"))
     aircraft = scenario.airframe
     inputs = _inputs(aircraft)
-    log = _columns_of(path, ["t_s", *(name for names in inputs for name in names)])
+    log = _columns_of(path, ["t_s", *chain.from_iterable(inputs)])
     keys = scenario.model_dump(mode="json", exclude_unset=True)
     others = {key: keys[key] for key in ("actuators", "design_model") if key in keys}
     diagnosis = Diagnosis(aircraft, scenario.rate_hz, keys.get("fdi"), **others)
-    samples = _samples(log, inputs)
-    verdicts = [diagnosis.step(*sample) for sample in samples]
-    surfaces = list(aircraft.surfaces)
-    columns = _columns(log["t_s"], verdicts, surfaces)
-    return Replay(scenario.name, columns, _verdict(path, scenario, log, verdicts))
+    given = [np.ascontiguousarray(np.column_stack([log[name] for name in names])) for names in inputs]
+    verdicts = [diagnosis.step(*frame) for frame in zip(*given, strict=True)]
+    columns = _columns(log["t_s"], verdicts, list(aircraft.surfaces))
+    return columns, _verdict(path, scenario, log, verdicts)
 
 
 def _inputs(aircraft: Any) -> tuple[list[str], ...]:
@@ -75,25 +66,15 @@ def _columns_of(path: Path, names: list[str]) -> dict[str, Floats]:
     return log
 
 
-def _samples(log: dict[str, Floats], inputs: tuple[list[str], ...]) -> list[tuple[Floats, ...]]:
-    """What the diagnosis was given at each frame."""
-    parts = [np.ascontiguousarray(np.column_stack([log[name] for name in names])) for names in inputs]
-    return list(zip(*parts, strict=True))
-
-
 def _columns(t_s: Floats, verdicts: list[Any], surfaces: list[str]) -> dict[str, Any]:
     """The columns of diagnosis.parquet. Where the diagnosis says nothing of a surface's effectiveness, its
     bounds are 0 and 1."""
+    suspected = np.array([verdict.detected for verdict in verdicts])
     named = [_name(verdict, surfaces) for verdict in verdicts]
-    columns: dict[str, Any] = {
-        "t_s": t_s,
-        "faulty": np.array([int(verdict.detected) for verdict in verdicts]),
-        "named": named,
-    }
+    columns: dict[str, Any] = {"t_s": t_s, "faulty": suspected.astype(np.int64), "named": named}
     for surface in surfaces:
         left = np.array([_effectiveness(verdict, surface) for verdict in verdicts])
         columns[f"{surface}_effectiveness"] = left
-        suspected = np.array([verdict.detected for verdict in verdicts])
         columns[f"{surface}_low"] = np.where(suspected, 0.0, left)
         columns[f"{surface}_high"] = np.ones(len(left))
     return columns
@@ -113,20 +94,19 @@ def _effectiveness(verdict: Any, surface: str) -> float:
 def _verdict(path: Path, scenario: Any, log: dict[str, Floats], verdicts: list[Any]) -> Document:
     """When what was found, and whether the flight's own record says the same."""
     t_s = log["t_s"]
-    detected = next((float(t) for t, one in zip(t_s, verdicts, strict=True) if one.detected), None)
-    isolated = next(((float(t), one) for t, one in zip(t_s, verdicts, strict=True) if one.isolated), None)
-    differ = sum(
-        bool(flag) != one.detected for flag, one in zip(log.get("detected", []), verdicts, strict=False)
-    )
+    detected = [float(t) for t, one in zip(t_s, verdicts, strict=True) if one.detected]
+    isolated = [(float(t), one.isolated) for t, one in zip(t_s, verdicts, strict=True) if one.isolated]
+    isolation_s, name = isolated[0] if isolated else (None, None)
+    logged = zip(log.get("detected", []), verdicts, strict=False)
     found: Document = {
         "flight": scenario.name,
         "replay": True,
         "duration_s": float(t_s[-1] - t_s[0]),
-        "faulty": detected is not None,
-        "detection_s": detected,
-        "isolation_s": isolated[0] if isolated else None,
-        "isolated": isolated[1].isolated if isolated else None,
-        "rows_that_differ": differ,
+        "faulty": bool(detected),
+        "detection_s": detected[0] if detected else None,
+        "isolation_s": isolation_s,
+        "isolated": name,
+        "rows_that_differ": sum(bool(flag) != one.detected for flag, one in logged),
         "left_out": _left_out(scenario),
     }
     return found | {"as_flown": _as_flown(path, found)}
@@ -135,11 +115,8 @@ def _verdict(path: Path, scenario: Any, log: dict[str, Floats], verdicts: list[A
 def _left_out(scenario: Any) -> list[str]:
     """What the diagnosis was given in flight and the log does not have."""
     ideal = type(scenario.sensors)()
-    flow = [
-        name
-        for name in type(scenario.sensors).model_fields
-        if name not in ("p", "q", "r") and getattr(scenario.sensors, name) != getattr(ideal, name)
-    ]
+    flawed = [name for name, value in scenario.sensors if value != getattr(ideal, name)]
+    flow = [name for name in flawed if name not in ("p", "q", "r")]
     return [f"the declared errors of {name}: the log has the true value" for name in flow]
 
 

@@ -6,8 +6,10 @@ one received up to t, never a later one; the age that this adds is stated. A log
 that a log has as many as its rows ask for, whatever its clock does.
 """
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -52,25 +54,28 @@ class Samples:
 def sample(recording: Recording, vehicle: Vehicle) -> Samples:
     """Put a recording on one time base. Raises BadInput with the reason where the log cannot be used."""
     names = [vehicle.rates.p, vehicle.rates.q, vehicle.rates.r]
-    used = [*names, *vehicle.commands, *vehicle.signals]
-    _require(recording, used)
-    _require_rad_s(recording, names)
+    used = list(dict.fromkeys([*names, *vehicle.commands, *vehicle.signals]))
+    _require(recording, used, rates=names)
     stamps = recording.columns[vehicle.rates.p].t_s
     t_s, run, step = _time_base(recording.name, stamps, vehicle.max_rate_hz)
-    grid = _Grid(recording, t_s, step)
+    found = {name: _at_samples(recording.columns[name], t_s, step) for name in used}
+
+    def columns(names: list[str]) -> Floats:
+        return np.column_stack([found[name][0] for name in names]) if names else np.empty((len(t_s), 0))
+
     return Samples(
         name=recording.name,
         t_s=t_s,
-        rates=grid.columns(names),
-        commands=np.einsum("nc,sc->ns", grid.columns(vehicle.commands), mixer(vehicle)),
-        signals=grid.columns(vehicle.signals),
+        rates=columns(names),
+        commands=np.einsum("nc,sc->ns", columns(vehicle.commands), mixer(vehicle)),
+        signals=columns(vehicle.signals),
         labels=_labels(recording, vehicle, t_s),
         run=run,
         dt_s=step,
-        age_s=grid.age_s,
+        age_s={name: age_s for name, (_, age_s) in found.items() if age_s is not None},
         events=recording.events,
         stamps=stamps,
-        notes=(*recording.notes, *_left_out(recording, used)),
+        notes=(*recording.notes, *dict.fromkeys(filter(None, (recording.columns[x].note for x in used)))),
     )
 
 
@@ -80,33 +85,28 @@ def mixer(vehicle: Vehicle) -> Floats:
     return np.array(rows, dtype=float)
 
 
-def _require(recording: Recording, names: list[str]) -> None:
-    missing = [name for name in dict.fromkeys(names) if name not in recording.columns]
+def _require(recording: Recording, names: list[str], rates: list[str]) -> None:
+    """Raise BadInput where a column is missing, or holds nothing; rates that no vehicle turns at are in
+    another unit."""
+    missing = [name for name in names if name not in recording.columns]
     if missing:
         known = ", ".join(name if name.isprintable() else repr(name) for name in sorted(recording.columns))
         raise BadInput(
             f"{recording.name}: no column {missing[0]}, allowed: a log that has it; it has {known or 'none'}"
         )
+    largest = {}
     for name in names:
         values = recording.columns[name].values
         if not np.isfinite(values).any():
             raise BadInput(f"{recording.name}: column {name} holds no number, allowed: a logged quantity")
-        if (largest := float(np.nanmax(np.abs(values)))) > _LARGEST:
-            raise BadInput(f"{recording.name}: column {name} holds {largest:g}, allowed: up to {_LARGEST:g}")
-
-
-def _left_out(recording: Recording, names: list[str]) -> list[str]:
-    """What readers say of rows they left out, once each."""
-    return list(dict.fromkeys(note for name in names if (note := recording.columns[name].note)))
-
-
-def _require_rad_s(recording: Recording, names: list[str]) -> None:
-    """Rates that no vehicle turns at are in another unit."""
-    for name in names:
-        largest = float(np.nanmax(np.abs(recording.columns[name].values)))
-        if largest > _FASTEST_RAD_S:
+        largest[name] = float(np.nanmax(np.abs(values)))
+        if largest[name] > _LARGEST:
+            holds = f"column {name} holds {largest[name]:g}, allowed: up to {_LARGEST:g}"
+            raise BadInput(f"{recording.name}: {holds}")
+    for name in rates:
+        if largest[name] > _FASTEST_RAD_S:
             raise BadInput(
-                f"{recording.name}: column {name} reaches {largest:g}, allowed: rates in rad/s, "
+                f"{recording.name}: column {name} reaches {largest[name]:g}, allowed: rates in rad/s, "
                 f"up to {_FASTEST_RAD_S:g}"
             )
 
@@ -147,36 +147,26 @@ def _step(stamps: Floats) -> float:
     return float(np.median(np.diff(stamps[:_FIRST]))) if len(stamps) > 1 else float("inf")
 
 
-class _Grid:
-    """Columns of a recording at given times; remembers how old what it holds is."""
-
-    def __init__(self, recording: Recording, t_s: Floats, step_s: float) -> None:
-        self._recording, self._t_s, self._step_s = recording, t_s, step_s
-        self.age_s: dict[str, float] = {}
-
-    def columns(self, names: list[str]) -> Floats:
-        return (
-            np.column_stack([self.column(name) for name in names]) if names else np.empty((len(self._t_s), 0))
-        )
-
-    def column(self, name: str) -> Floats:
-        column = self._recording.columns[name]
-        if len(column.t_s) == len(self._t_s) and np.array_equal(column.t_s, self._t_s):
-            return column.values
-        faster = _step(column.t_s) < 0.6 * self._step_s
-        values, age_s = _averaged(column, self._t_s, self._step_s) if faster else _held(column, self._t_s)
-        self.age_s[name] = age_s
-        return values
+def _at_samples(column: Column, t_s: Floats, step_s: float) -> tuple[Floats, float | None]:
+    """A column's values at given times, and how old they are on average, s; None: it has these very times."""
+    if len(column.t_s) == len(t_s) and np.array_equal(column.t_s, t_s):
+        return column.values, None
+    return _averaged(column, t_s, step_s) if _step(column.t_s) < 0.6 * step_s else _held(column, t_s)
 
 
 def _held(column: Column, t_s: Floats) -> tuple[Floats, float]:
     """The last value up to each time, nan before the first; and its mean age, s."""
     known = np.isfinite(column.values)
-    stamps, values = column.t_s[known], column.values[known]
+    stamps = column.t_s[known]
+    age_s = t_s - _latest(t_s, stamps, stamps)
+    age_s = age_s[np.isfinite(age_s)]
+    return _latest(t_s, stamps, column.values[known]), float(age_s.mean()) if age_s.size else float("nan")
+
+
+def _latest(t_s: Floats, stamps: Floats, values: Floats) -> Floats:
+    """The value of the last stamp up to each time, nan before the first."""
     last = np.searchsorted(stamps, t_s, side="right") - 1
-    held = np.where(last >= 0, values[np.maximum(last, 0)], np.nan)
-    age_s = (t_s - stamps[np.maximum(last, 0)])[last >= 0]
-    return held, float(age_s.mean()) if age_s.size else float("nan")
+    return np.where(last >= 0, values[np.maximum(last, 0)], np.nan)
 
 
 def _averaged(column: Column, t_s: Floats, step_s: float) -> tuple[Floats, float]:
@@ -198,14 +188,15 @@ def _labels(recording: Recording, vehicle: Vehicle, t_s: Floats) -> Floats:
     for i, surface in enumerate(vehicle.surfaces):
         column = recording.columns.get(vehicle.labels.get(surface, ""))
         if column is not None:
-            labels[:, i] = _at_stamps(column, t_s)
+            labels[:, i] = _latest(t_s, column.t_s, column.values)
     return labels
 
 
-def _at_stamps(column: Column, t_s: Floats) -> Floats:
-    """A label is held without skipping its gaps: where the log says nothing it is unknown."""
-    last = np.searchsorted(column.t_s, t_s, side="right") - 1
-    return np.where(last >= 0, column.values[np.maximum(last, 0)], np.nan)
+def constant_parts(values: Floats) -> list[tuple[int, int]]:
+    """Begin and end of each stretch of equal rows; nan is equal to nan."""
+    filled = np.nan_to_num(values, nan=-1.0)
+    change = np.flatnonzero(np.any(np.diff(filled, axis=0) != 0.0, axis=1)) + 1
+    return list(pairwise([0, *change.tolist(), len(values)]))
 
 
 def load_flights(paths: Sequence[Path], vehicle: Vehicle, reader: str | None = None) -> list[Samples]:
@@ -217,12 +208,9 @@ def load_flights(paths: Sequence[Path], vehicle: Vehicle, reader: str | None = N
             loaded.append(sample(read_flight(path, reader or vehicle.reader), vehicle))
         except BadInput as error:
             mistakes.append(str(error))
-    mistakes += _repeated([samples.name for samples in loaded])
+    for name, count in Counter(samples.name for samples in loaded).items():
+        if count > 1:
+            mistakes.append(f"two flights are named {name}: one result would replace the other")
     if mistakes:
         raise BadInput("\n".join(mistakes))
     return loaded
-
-
-def _repeated(names: list[str]) -> list[str]:
-    twice = dict.fromkeys(name for name in names if names.count(name) > 1)
-    return [f"two flights are named {name}: one result would replace the other" for name in twice]

@@ -17,7 +17,7 @@ ENGINE = "engine"
 _SETTLED_S = 2.0
 
 
-def score(samples: Samples, rows: Rows, groups: list[list[str]], surfaces: list[str]) -> Document:
+def score(samples: Samples, rows: Rows, groups: list[list[str]]) -> Document:
     """Every figure that the log's own word allows: by labels where it has them, by its failure otherwise."""
     if np.isfinite(samples.labels).any():
         return by_labels(rows, samples.labels)
@@ -27,12 +27,14 @@ def score(samples: Samples, rows: Rows, groups: list[list[str]], surfaces: list[
 def by_labels(rows: Rows, labels: Floats) -> Document:
     """Against labelled effectiveness (n, S), on the rows where it is known.
 
-    classes: share of rows whose estimate is nearest to the true one of the label's own settings, over all
-    surfaces; side: whether the same surfaces are faulty.
+    classes: share of rows whose estimate is nearest to the true one of the label's own settings, those that
+    it takes for at least a hundredth of the flight, over all surfaces; side: whether the same surfaces are
+    faulty.
     """
     ok = np.isfinite(labels).all(axis=1)
     truth, estimate = labels[ok], rows.estimate[ok]
-    settings = distinct(truth)
+    found, count = np.unique(truth, axis=0, return_counts=True)
+    settings = found[count >= 0.005 * len(truth)]
     faulty = (truth < 1.0).any(axis=1)
     return {
         "rows": int(ok.sum()),
@@ -43,12 +45,6 @@ def by_labels(rows: Rows, labels: Floats) -> Document:
         "mean_error": float(np.abs(estimate - truth).mean()),
         "held_by_bounds": float(np.mean((rows.low[ok] <= truth) & (truth <= rows.high[ok]))),
     }
-
-
-def distinct(truth: Floats) -> Floats:
-    """The settings a label takes for at least a hundredth of the flight, (C, S)."""
-    found, count = np.unique(truth, axis=0, return_counts=True)
-    return np.asarray(found[count >= 0.005 * len(truth)])
 
 
 def nearest(estimate: Floats, settings: Floats) -> np.ndarray:
@@ -62,18 +58,18 @@ def by_event(rows: Rows, events: tuple[Event, ...], groups: list[list[str]]) -> 
     begins = min((event.t_s for event in events), default=np.inf)
     surfaces = sorted({event.surface for event in events if event.t_s < begins + _SETTLED_S})
     before = rows.t_s < begins
-    alarms = int(np.sum(np.diff(rows.faulty[before], prepend=0) == 1))
     after = np.flatnonzero(~before & (rows.faulty == 1))
     detected = bool(after.size)
+    named = _named(rows, after)
     return {
         "failure": "+".join(surfaces) or None,
         "failure_s": None if np.isinf(begins) else float(begins),
         "healthy_s": float(rows.t_s[before][-1] - rows.t_s[0]) if before.any() else 0.0,
-        "false_alarms": alarms,
+        "false_alarms": int(np.sum(np.diff(rows.faulty[before], prepend=0) == 1)),
         "detected": detected,
         "delay_s": float(rows.t_s[after[0]] - begins) if detected else None,
-        "named": _named(rows, after),
-        "right_group": _right_group(rows, after, surfaces, groups),
+        "named": named,
+        "right_group": _right_group(named, surfaces, groups),
     }
 
 
@@ -83,15 +79,16 @@ def _named(rows: Rows, after: np.ndarray) -> dict[str, float]:
     return {str(name): float(share) for name, share in zip(names, count / max(len(after), 1), strict=True)}
 
 
-def _right_group(rows: Rows, after: np.ndarray, surfaces: list[str], groups: list[list[str]]) -> bool | None:
+def _right_group(named: dict[str, float], surfaces: list[str], groups: list[list[str]]) -> bool | None:
     """Whether the name held longest after the failure is of the group that failed; None: nothing to judge."""
+    endings = tuple(f"_{surface}" for surface in surfaces)
     actual = {
         index
         for index, group in enumerate(groups)
         for name in group
-        if any(name == surface or name.endswith(f"_{surface}") for surface in surfaces)
+        if name in surfaces or name.endswith(endings)
     }
-    names = {name: share for name, share in _named(rows, after).items() if name != "unknown"}
+    names = {name: share for name, share in named.items() if name != "unknown"}
     if not actual or not names:
         return None
     longest = set(max(names, key=lambda name: names[name]).split("+"))

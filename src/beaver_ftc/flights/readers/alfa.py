@@ -20,8 +20,7 @@ from beaver_ftc.flights.recording import Column, Event, Floats, Recording, in_or
 
 _NS = 1e-9
 _TIME = "%time"
-_RAW = "mavros-imu-data_raw"
-_CHANNELS = {1: "elevator", 2: "throttle", 3: "rudder", 4: "left_aileron", 5: "right_aileron"}
+_RAW, _OUTPUTS = "mavros-imu-data_raw", "mavros-rc-out"
 _STATUS = "failure_status-"
 _SIDES = {
     ("aileron", 1): "right_aileron",
@@ -43,10 +42,9 @@ def _microseconds(values: Floats) -> Floats:
 
 
 _COLUMNS: tuple[tuple[str, str, str, Callable[[Floats], Floats]], ...] = (
-    *(
-        (f"{rate}_rad_s", _RAW, f"field.angular_velocity.{axis}", _same)
-        for rate, axis in zip("pqr", "xyz", strict=True)
-    ),
+    ("p_rad_s", _RAW, "field.angular_velocity.x", _same),
+    ("q_rad_s", _RAW, "field.angular_velocity.y", _same),
+    ("r_rad_s", _RAW, "field.angular_velocity.z", _same),
     *((f"a{axis}_m_s2", _RAW, f"field.linear_acceleration.{axis}", _same) for axis in "xyz"),
     ("roll_command_rad", "mavros-nav_info-roll", "field.commanded", np.deg2rad),
     ("roll_rad", "mavros-nav_info-roll", "field.measured", np.deg2rad),
@@ -56,10 +54,11 @@ _COLUMNS: tuple[tuple[str, str, str, Callable[[Floats], Floats]], ...] = (
     ("ground_east_m_s", "mavros-nav_info-velocity", "field.meas_x", _same),
     ("wind_east_m_s", "mavros-wind_estimation", "field.twist.linear.x", _same),
     ("wind_north_m_s", "mavros-wind_estimation", "field.twist.linear.y", _same),
-    *(
-        (f"{name}_output", "mavros-rc-out", f"field.channels{channel}", _microseconds)
-        for channel, name in _CHANNELS.items()
-    ),
+    ("elevator_output", _OUTPUTS, "field.channels1", _microseconds),
+    ("throttle_output", _OUTPUTS, "field.channels2", _microseconds),
+    ("rudder_output", _OUTPUTS, "field.channels3", _microseconds),
+    ("left_aileron_output", _OUTPUTS, "field.channels4", _microseconds),
+    ("right_aileron_output", _OUTPUTS, "field.channels5", _microseconds),
 )
 
 

@@ -47,7 +47,9 @@ def _messages(path: Path) -> dict[str, Fields]:
                     for field, values in found.setdefault(name, {k: array("d") for k in numbers}).items():
                         values.append(numbers.get(field, nan))
     except Exception as error:  # pymavlink raises whatever a damaged file makes it stumble over
-        raise _unreadable(path, error) from None
+        says = " ".join(str(error).split()) or type(error).__name__
+        allowed = "allowed: ArduPilot's .bin or .log"
+        raise BadInput(f"{path}: is no dataflash log that can be read ({says}), {allowed}") from None
     return found
 
 
@@ -75,13 +77,6 @@ def _reader(path: Path) -> Any:
         ) from None
     text = path.suffix.lower() == ".log"
     return DFReader.DFReader_text if text else DFReader.DFReader_binary
-
-
-def _unreadable(path: Path, error: Exception) -> BadInput:
-    says = " ".join(str(error).split()) or type(error).__name__
-    return BadInput(
-        f"{path}: is no dataflash log that can be read ({says}), allowed: ArduPilot's .bin or .log"
-    )
 
 
 def _name(kind: str, fields: dict[str, Any]) -> str:

@@ -36,8 +36,7 @@ def read_numbers(path: Path, columns: Sequence[str] | None = None) -> dict[str, 
     except (pa.ArrowException, OSError, ValueError) as error:
         says = " ".join(str(error).split())[:200]
         raise BadInput(f"{path}: is no table that can be read ({says}), allowed: CSV or Parquet") from None
-    names = [name for name in table if columns is None or name in columns]
-    return {name: table[name] for name in names}
+    return {name: values for name, values in table.items() if columns is None or name in columns}
 
 
 def check_time(path: Path, t_s: Floats) -> None:

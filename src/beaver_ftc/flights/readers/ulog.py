@@ -40,18 +40,13 @@ def _topics(path: Path) -> list[Any]:
     try:
         with redirect_stdout(StringIO()):  # pyulog prints what is damaged where the answer belongs
             formats = ULog(str(path), parse_header_only=True).message_formats
-            _check_lengths(formats)
+            for name in formats:
+                if _length(formats, name, ()) > _LONGEST:  # pyulog writes every field of one out
+                    raise ValueError(f"a message {name} would have more than {_LONGEST} bytes")
             return list(ULog(str(path)).data_list)
     except Exception as error:  # pyulog raises whatever a damaged file makes it stumble over
         says = " ".join(str(error).split()) or type(error).__name__
         raise BadInput(f"{path}: is no ULog that can be read ({says}), allowed: a .ulg file of PX4") from None
-
-
-def _check_lengths(formats: dict[str, Any]) -> None:
-    """Raise ValueError for a format that no message can have: pyulog writes every field of one out."""
-    for name in formats:
-        if _length(formats, name, ()) > _LONGEST:
-            raise ValueError(f"a message {name} would have more than {_LONGEST} bytes")
 
 
 def _length(formats: dict[str, Any], name: str, within: tuple[str, ...]) -> int:

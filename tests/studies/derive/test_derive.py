@@ -87,7 +87,8 @@ def test_the_declared_error_holds_on_states_neither_fit_nor_check_has_seen(unsee
 def test_the_error_is_that_of_the_evaluator_that_flies(unseen):
     """The error is measured with one evaluator and flown with another: they agree to rounding."""
     seen, aircraft = unseen
-    model, y = DesignFunctions(design_record(aircraft)), seen.measured(aircraft)
+    model = DesignFunctions(design_record(aircraft))
+    y = np.column_stack([seen.y, *(seen.signals[name] for name in aircraft.signals)])
     for k in range(0, len(seen), 97):
         believed = model.f(seen.x[k], y[k]) + model.G(y[k]) @ seen.u[k]
         assert np.abs(believed - seen.rate[k]) == pytest.approx(errors_of(aircraft, seen)[k], abs=1e-9)

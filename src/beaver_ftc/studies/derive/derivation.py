@@ -1,5 +1,6 @@
 """From an aircraft's name to a folder that flies: a JSBSim model that takes faults, and `aircraft.yaml`."""
 
+import json
 import os
 import re
 import shutil
@@ -7,8 +8,9 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
-from math import radians
+from math import degrees, radians
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -16,8 +18,8 @@ from typing import Any
 import numpy as np
 import yaml
 
-from beaver_ftc.aircraft import Aircraft, loading
-from beaver_ftc.aircraft.schema import MAX_MONOMIALS, MAX_SIGNALS, AircraftFile
+from beaver_ftc.aircraft import loading
+from beaver_ftc.aircraft.schema import MAX_MONOMIALS, MAX_SIGNALS
 from beaver_ftc.design.model import design_record
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.plant import instrumented
@@ -118,10 +120,7 @@ def _failure(source: Source, absent: list[str]) -> str | None:
 
 
 def derive(
-    reference: str,
-    out: Path | None = None,
-    envelope: Path | None = None,
-    tell: Tell = lambda line: None,
+    reference: str, out: Path | None = None, envelope: Path | None = None, tell: Tell = lambda line: None
 ) -> Derived:
     """Derive the file of an aircraft; `out`: the folder to put its folder into, if not the cache;
     `envelope`: a YAML file that says where to sample.
@@ -138,7 +137,7 @@ def derive(
             level = _prepared(source, folder, wanted, notes, tell)
             notes += outline.not_affine(level.plant, level.trim)
             further = {} if source.folder else outline.further_surfaces(source.model, level.plant)
-            if moving := outline.moved_by_itself(level.aircraft, level.trim, tuple(further)):
+            if moving := outline.moved_by_itself(level.plant.aircraft, level.trim, tuple(further)):
                 raise BadInput(
                     f"{source.says}: {', '.join(moving)} moves by itself in steady flight, and its "
                     "aerodynamics see it, allowed: surfaces that move by command"
@@ -146,13 +145,18 @@ def derive(
             if source.folder is None:
                 _set_envelope(level.data, level.trim, wanted)
             made = _derived(level, folder, tell)
-        aircraft = Aircraft(AircraftFile.model_validate(level.data), target)
+        aircraft = outline.aircraft_of(level.data, target)
         as_filed = loading.read(source.folder) if source.folder else None
         took_s = perf_counter() - started_s
         found = Derived(aircraft, level.trim, *made, tuple(notes), as_filed, further, took_s)
-        write(folder, level.data)
+        twice = json.loads(json.dumps(level.data))  # what is there twice is written twice, not as an alias
+        text = yaml.safe_dump(twice, sort_keys=False, default_flow_style=None, width=120)
+        (folder / loading.FILE).write_text(loading.first_line() + text, encoding="utf-8")
         (folder / PAGE).write_text(page_of(found), encoding="utf-8")
-        move(folder, target)
+        target.parent.mkdir(parents=True, exist_ok=True)
+        if target.exists():
+            shutil.rmtree(target)
+        shutil.move(str(folder), target)
     return found
 
 
@@ -188,7 +192,7 @@ def _prepared(
 
 def _derived(level: outline.Level, folder: Path, tell: Tell) -> tuple[np.ndarray, np.ndarray]:
     """Sample, fit and check; the data get their terms and errors. Returns the largest errors, (3,) rad/s2."""
-    data, plant, point = level.data, level.plant, level.trim
+    data, plant, point, outlined = level.data, level.plant, level.trim, level.plant.aircraft
     low, high = map(radians, data["envelope"]["alpha_deg"])
     where = Envelope(tuple(data["envelope"]["airspeed_mps"]), (low, high), level.sideslip_rad)
     declared = {name: of["property"] for name, of in data["signals"].items()}
@@ -198,13 +202,13 @@ def _derived(level: outline.Level, folder: Path, tell: Tell) -> tuple[np.ndarray
     flown = fly_about(plant, point, 3, properties)
     first = sample(plant, where, point, SAMPLES, 1, properties, FRESH)
     if not declared:
-        useful = signals_of_use(first, level.aircraft, MAX_SIGNALS, engine_signals(flown, level.aircraft))
+        useful = signals_of_use(first, outlined, MAX_SIGNALS, engine_signals(flown, outlined))
         data["signals"] = {name: {"property": properties[name]} for name in useful}
     tell("fit")
-    data["moments"] = outline.named_as(level.aircraft, _moments(first, data, folder))
+    data["moments"] = outline.named_as(outlined, _moments(first, data, folder))
     tell("check")
     other = sample(plant, where, point, CHECKED, 2, properties)
-    aircraft = Aircraft(AircraftFile.model_validate(data), folder)
+    aircraft = outline.aircraft_of(data, folder)
     data["model_error_map"], (of_fit, of_check, _) = map_of(aircraft, (first, other), flown)
     outermost = data["model_error_map"]["boxes"][-1]
     data["model_error_rad_s2"] = {axis: outermost[f"error_{axis}_rad_s2"][0][-1] for axis in "pqr"}
@@ -213,40 +217,24 @@ def _derived(level: outline.Level, folder: Path, tell: Tell) -> tuple[np.ndarray
 
 def _moments(samples: Samples, data: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     """The terms: as many as the evaluator has room for."""
-    surface = next(iter(data["surfaces"]))
     bare = {name: value for name, value in data.items() if name != "model_error_map"}
-    moments = {"Cl": [outline.placeholder("Cl", surface)]}
-    aircraft = Aircraft(AircraftFile.model_validate({**bare, "moments": moments}), folder)
+    moments = {"Cl": [outline.placeholder("Cl", next(iter(data["surfaces"])))]}
+    aircraft = outline.aircraft_of(bare | {"moments": moments}, folder)
     for most in range(MOST_TERMS, FEWEST_TERMS - 1, -4):
         terms = fitted(samples, aircraft, most)
-        try:
-            design_record(Aircraft(AircraftFile.model_validate({**bare, "moments": terms}), folder))
-        except ValueError:
-            continue
-        return terms
+        with suppress(ValueError):  # too many products
+            design_record(outline.aircraft_of(bare | {"moments": terms}, folder))
+            return terms
     raise BadInput(f"{aircraft.name}: its terms need more than {MAX_MONOMIALS} products of signals")
 
 
 def _set_envelope(data: dict[str, Any], point: FlightState, wanted: outline.EnvelopeFile) -> None:
     """Let the file's envelope be about trim, or what is wanted, and flights start there."""
-    low, high = point.alpha_rad - SPAN_OF_ALPHA_RAD, point.alpha_rad + SPAN_OF_ALPHA_RAD
-    alpha_deg = wanted.alpha_deg or tuple(float(np.degrees(end)) for end in (low, high))
-    data["envelope"]["alpha_deg"] = [float(f"{end:.4g}") for end in alpha_deg]
-    data["envelope"]["airspeed_mps"] = [float(f"{end:.4g}") for end in data["envelope"]["airspeed_mps"]]
-    data["start"] = data.get("start", {}) | {"airspeed_mps": float(f"{point.airspeed_mps:.4g}")}
-
-
-class _Plain(yaml.SafeDumper):
-    """Writes what is there twice twice."""
-
-    def ignore_aliases(self, data: Any) -> bool:
-        return True
-
-
-def write(folder: Path, data: Mapping[str, Any]) -> None:
-    """Write the aircraft's file into its folder."""
-    text = yaml.dump(dict(data), Dumper=_Plain, sort_keys=False, default_flow_style=None, width=120)
-    (folder / "aircraft.yaml").write_text(loading.first_line() + text, encoding="utf-8")
+    about = [degrees(point.alpha_rad + way * SPAN_OF_ALPHA_RAD) for way in (-1, 1)]
+    data["envelope"]["alpha_deg"] = wanted.alpha_deg or about
+    for name, ends in data["envelope"].items():
+        data["envelope"][name] = [float(f"{end:.4g}") for end in ends]
+    data["start"]["airspeed_mps"] = float(f"{point.airspeed_mps:.4g}")
 
 
 def _target(source: Source, out: Path | None) -> Path:
@@ -254,16 +242,8 @@ def _target(source: Source, out: Path | None) -> Path:
     target = out / source.name if out else source.target
     if target is None:
         raise BadInput(f"{source.name}: give --out DIR, the folder to write {source.name}/ into")
-    file = target / "aircraft.yaml"
+    file = target / loading.FILE
     derived = file.is_file() and file.read_text(encoding="utf-8").startswith(loading.DERIVED)
     if target.exists() and not derived:
         raise BadInput(f"{target} is there already and was not derived, allowed: another folder")
     return target
-
-
-def move(folder: Path, target: Path) -> None:
-    """Put a finished folder where it belongs, in place of an older one."""
-    target.parent.mkdir(parents=True, exist_ok=True)
-    if target.exists():
-        shutil.rmtree(target)
-    shutil.move(str(folder), target)

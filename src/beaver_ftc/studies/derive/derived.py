@@ -3,8 +3,8 @@
 The page has its terms, its error over the envelope, and what can be diagnosed.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from math import radians
 from typing import Any
 
@@ -12,6 +12,7 @@ import numpy as np
 
 from beaver_ftc.aircraft import AXES, Aircraft
 from beaver_ftc.aircraft.aircraft import MOMENTS
+from beaver_ftc.aircraft.schema import ErrorMapSection
 from beaver_ftc.design.context import DesignFunctions
 from beaver_ftc.design.model import design_record
 from beaver_ftc.design.terms import N_Y
@@ -19,8 +20,10 @@ from beaver_ftc.plant.trim import TrimPoint
 from beaver_ftc.scenario.diagnosis import Bounds
 
 DEFLECTION_DEG = 3.0  # beside neutral: what flight with the built-in references asks of a surface
-_NEAR = 1  # box and share of the travel of such a flight
+_NEAR = 1  # box and share of the travel of such a flight, as `fit` makes them
 NAME = "derived.md"
+_OF_TRIM = ("airspeed_mps", "altitude_m", "alpha_rad", "gamma_rad")
+_KINDS = {"fitted": "states of the fit", "checked": "states not seen", "declared": "declared bound"}
 WHY_NOT_USED = (
     "they stay where its own flight control has them; most go in detents, at a pace no law controls with"
 )
@@ -29,26 +32,30 @@ WHY_NOT_USED = (
 @dataclass(frozen=True)
 class Derived:
     """What came of it: the folder, the aircraft, its trim, the largest errors (3,) rad/s2 over the samples
-    of the fit and over those it did not see, and what is to be known of it. further: surfaces that are not
-    used, by property, and where they stay. took_s: how long it took."""
+    of the fit and over those it did not see, and what is to be known of it. as_filed: as its own file has it.
+    further: surfaces that are not used, by property, and where they stay. took_s: how long it took."""
 
     aircraft: Aircraft
     trim: TrimPoint
     fitted_rad_s2: np.ndarray
     checked_rad_s2: np.ndarray
-    notes: tuple[str, ...] = field(default=())
-    as_filed: Aircraft | None = None  # as its own file has it
-    further: Mapping[str, float] = field(default_factory=dict)
-    took_s: float = 0.0
+    notes: tuple[str, ...]
+    as_filed: Aircraft | None
+    further: Mapping[str, float]
+    took_s: float
+
+    @property
+    def error_map(self) -> ErrorMapSection:
+        """The declared error over the envelope: a derivation always finds one."""
+        assert self.aircraft.file.model_error_map is not None
+        return self.aircraft.file.model_error_map
 
 
-def smallest_losses(aircraft: Aircraft) -> dict[str, dict[str, Any]]:
+def smallest_losses(made: Derived) -> dict[str, dict[str, Any]]:
     """Of each surface: the axis it shows on, rad/s2 per rad there, and the loss of effectiveness, as a share,
     that theory is certain to detect at DEFLECTION_DEG; above 1 none is."""
-    if aircraft.file.model_error_map is None:
-        return {}
-    error = near_trim(aircraft)
-    G = DesignFunctions(design_record(aircraft)).G(_usual_y(aircraft))
+    aircraft, error = made.aircraft, near_trim(made)
+    G = DesignFunctions(design_record(aircraft)).G(_usual_y(made))
     found = {}
     for s, (surface, axis) in enumerate(zip(aircraft.surfaces, aircraft.dominant_axis, strict=True)):
         eta = error[AXES[axis]] + getattr(Bounds().constant_rad_s2, AXES[axis])
@@ -62,25 +69,19 @@ def smallest_losses(aircraft: Aircraft) -> dict[str, dict[str, Any]]:
     return found
 
 
-def near_trim(aircraft: Aircraft) -> dict[str, float]:
+def near_trim(made: Derived) -> dict[str, float]:
     """The declared error in the second box, for surfaces within the second share of their travel, rad/s2."""
-    error_map = aircraft.file.model_error_map
-    if error_map is None:
-        return dict(zip(AXES, aircraft.model_error_rad_s2, strict=True))
-    box = error_map.boxes[min(_NEAR, len(error_map.boxes) - 1)]
-    level = min(_NEAR, len(error_map.travel_share) - 1)
-    return {axis: getattr(box, f"error_{axis}_rad_s2")[0][level] for axis in AXES}
+    box = made.error_map.boxes[_NEAR]
+    return {axis: getattr(box, f"error_{axis}_rad_s2")[0][_NEAR] for axis in AXES}
 
 
-def _usual_y(aircraft: Aircraft) -> np.ndarray:
+def _usual_y(made: Derived) -> np.ndarray:
     """The measured signals of level flight, as the innermost box has them."""
-    error_map = aircraft.file.model_error_map
-    assert error_map is not None
-    box, usual = error_map.boxes[0], aircraft.usual_signals
+    box, usual = made.error_map.boxes[0], made.aircraft.usual_signals
     V, density = 0.5 * sum(box.airspeed_mps), 0.5 * sum(box.density_kg_m3)
     y = np.zeros(N_Y)
     y[:4] = usual["alpha"], 0.5 * sum(box.beta_rad), V, 0.5 * density * V * V
-    y[4 : 4 + len(aircraft.signals)] = [usual[name] for name in aircraft.signals]
+    y[4 : 4 + len(made.aircraft.signals)] = [usual[name] for name in made.aircraft.signals]
     return y
 
 
@@ -89,100 +90,86 @@ def page_of(made: Derived) -> str:
     aircraft, trim = made.aircraft, made.trim
     low, high = aircraft.envelope.airspeed_mps
     least, most = aircraft.envelope.alpha_deg
-    lines = [
-        f"# {aircraft.name}", "", f"{aircraft.file.description}.", "",
+    parts = [
+        f"# {aircraft.name}",
+        f"{aircraft.file.description}.",
         f"Envelope {low:g} to {high:g} m/s, angle of attack {least:g} to {most:g} deg; trim at "
-        f"{trim.airspeed_mps:.1f} m/s and {trim.altitude_m:.0f} m. Derived in {made.took_s:.1f} s.", "",
-        "## What is to be known", "",
-        *([f"- {note}" for note in made.notes] or ["Nothing unusual was found."]), "",
-        *_diagnosed(aircraft), *_not_used(made), *_errors(aircraft), *_terms(aircraft),
+        f"{trim.airspeed_mps:.1f} m/s and {trim.altitude_m:.0f} m. Derived in {made.took_s:.1f} s.",
+        "## What is to be known",
+        "\n".join(f"- {note}" for note in made.notes) or "Nothing unusual was found.",
+        *_diagnosed(made), *_not_used(made), *_errors(made), "## Terms", _terms(aircraft),
     ]  # fmt: skip
-    return "\n".join(lines) + "\n"
+    return "\n\n".join(parts) + "\n"
 
 
-def _diagnosed(aircraft: Aircraft) -> list[str]:
-    lines = [
-        "## What can be diagnosed", "",
-        f"At {DEFLECTION_DEG:g} deg from neutral, in the second box below, with the published bound.", "",
-        "| surface | shows in | rad/s2 per rad | bound, rad/s2 | smallest loss certain to be detected |",
-        "|---|---|---|---|---|",
-    ]  # fmt: skip
-    for surface, of in smallest_losses(aircraft).items():
+def _table(*rows: Iterable[str]) -> str:
+    """The first row is the header."""
+    head, *others = (f"| {' | '.join(row)} |" for row in rows)
+    return "\n".join([head, "|---" * len([*rows[0]]) + "|", *others])
+
+
+def _diagnosed(made: Derived) -> Iterator[str]:
+    yield "## What can be diagnosed"
+    yield f"At {DEFLECTION_DEG:g} deg from neutral, in the second box below, with the published bound."
+    head = "surface", "shows in", "rad/s2 per rad", "bound, rad/s2", "smallest loss certain to be detected"
+    rows = []
+    for surface, of in smallest_losses(made).items():
         loss = of["certain_loss"]
         says = f"{loss:.0%}" if loss <= 1.0 else f"none: a total one needs {DEFLECTION_DEG * loss:.1f} deg"
-        lines.append(
-            f"| {surface} | {of['axis']} | {of['per_rad_rad_s2']:.3g} | {of['bound_rad_s2']:.3g} | {says} |"
-        )
-    return [*lines, ""]
+        rows.append((surface, of["axis"], f"{of['per_rad_rad_s2']:.3g}", f"{of['bound_rad_s2']:.3g}", says))
+    yield _table(head, *rows)
 
 
-def _not_used(made: Derived) -> list[str]:
+def _not_used(made: Derived) -> Iterator[str]:
     """Surfaces the aircraft has beside those of its file, if it was not known before."""
-    if made.as_filed:
-        return []
-    if not made.further:
-        return ["Its aerodynamics see no other surface.", ""]
-    lines = [
-        "## Surfaces that are not used", "",
-        f"Its aerodynamics see these too: {WHY_NOT_USED}. So none of them stands in for a surface that has "
-        "failed, and their own failures are not looked for.", "",
-        "| surface | in level flight |", "|---|---|",
-    ]  # fmt: skip
-    return [*lines, *(f"| `{name}` | {value:g} |" for name, value in made.further.items()), ""]
+    if made.further:
+        yield "## Surfaces that are not used"
+        yield (
+            f"Its aerodynamics see these too: {WHY_NOT_USED}. So none of them stands in for a surface that "
+            "has failed, and their own failures are not looked for."
+        )
+        places = [(f"`{name}`", f"{value:g}") for name, value in made.further.items()]
+        yield _table(("surface", "in level flight"), *places)
+    elif made.as_filed is None:
+        yield "Its aerodynamics see no other surface."
 
 
-def _errors(aircraft: Aircraft) -> list[str]:
-    error_map = aircraft.file.model_error_map
-    if error_map is None:
-        return []
-    shares = ", ".join(f"{share:g}" for share in error_map.travel_share)
-    lines = [
-        "## The error over the envelope", "",
+def _errors(made: Derived) -> Iterator[str]:
+    shares = ", ".join(f"{share:g}" for share in made.error_map.travel_share)
+    yield "## The error over the envelope"
+    yield (
         f"Largest error, rad/s2, in boxes about trim, for surfaces within {shares} of their travel, in the "
-        f"first {error_map.until_s[0]:g} s of a flight. Outside of the last box nothing is concluded.", "",
-        "| airspeed, m/s | angle of attack, rad | p | q | r |", "|---|---|---|---|---|",
-    ]  # fmt: skip
-    for box in error_map.boxes:
-        errors = [
-            " ".join(f"{error:.3g}" for error in getattr(box, f"error_{axis}_rad_s2")[0]) for axis in AXES
-        ]
-        speed, alpha = (f"{low:.4g} to {high:.4g}" for low, high in (box.airspeed_mps, box.alpha_rad))
-        lines.append(f"| {speed} | {alpha} | {' | '.join(errors)} |")
-    return [*lines, ""]
+        f"first {made.error_map.until_s[0]:g} s of a flight. Outside of the last box nothing is concluded."
+    )
+    rows = []
+    for box in made.error_map.boxes:
+        errors = (getattr(box, f"error_{axis}_rad_s2")[0] for axis in AXES)
+        ranges = (f"{low:.4g} to {high:.4g}" for low, high in (box.airspeed_mps, box.alpha_rad))
+        rows.append([*ranges, *(" ".join(f"{error:.3g}" for error in of_axis) for of_axis in errors)])
+    yield _table(("airspeed, m/s", "angle of attack, rad", *AXES), *rows)
 
 
-def _terms(aircraft: Aircraft) -> list[str]:
-    lines = ["## Terms", "", "| coefficient | term | value |", "|---|---|---|"]
-    for term in aircraft.moments:
-        if term.name in aircraft.terms and term.coefficient in MOMENTS:
-            factors = " ".join(term.factors) or "1"
-            lines.append(f"| {term.coefficient} | {factors} | {term.value:.6g} |")
-    return lines
+def _terms(aircraft: Aircraft) -> str:
+    terms = [t for t in aircraft.moments if t.name in aircraft.terms]
+    rows = [(t.coefficient, " ".join(t.factors) or "1", f"{t.value:.6g}") for t in terms]
+    return _table(("coefficient", "term", "value"), *rows)
 
 
 def document_of(made: Derived) -> dict[str, Any]:
     """Terms by coefficient, errors by axis, the envelope and the trim."""
     aircraft = made.aircraft
+    errors = made.fitted_rad_s2, made.checked_rad_s2, aircraft.model_error_rad_s2
+    by_axis = (dict(zip(AXES, map(float, of), strict=True)) for of in errors)
     return {
         "aircraft": aircraft.name,
         "folder": str(aircraft.folder),
         "surfaces": {name: [t.min_rad, t.max_rad] for name, t in aircraft.travel.items()},
-        "terms": {c: sum(t.coefficient == c for t in aircraft.moments) for c in ("Cl", "Cm", "Cn")},
+        "terms": {c: sum(t.coefficient == c for t in aircraft.moments) for c in MOMENTS},
         "envelope": aircraft.envelope.model_dump(),
-        "trim": {
-            "airspeed_mps": made.trim.airspeed_mps,
-            "altitude_m": made.trim.altitude_m,
-            "alpha_rad": made.trim.alpha_rad,
-            "gamma_rad": made.trim.gamma_rad,
-            "settings": dict(made.trim.settings),
-        },
-        "largest_error_rad_s2": {
-            "fitted": dict(zip(AXES, map(float, made.fitted_rad_s2), strict=True)),
-            "checked": dict(zip(AXES, map(float, made.checked_rad_s2), strict=True)),
-            "declared": dict(zip(AXES, aircraft.model_error_rad_s2, strict=True)),
-        },
-        "near_trim_rad_s2": near_trim(aircraft),
-        "smallest_certain_loss": {name: of["certain_loss"] for name, of in smallest_losses(aircraft).items()},
+        "trim": {n: getattr(made.trim, n) for n in _OF_TRIM} | {"settings": dict(made.trim.settings)},
+        "largest_error_rad_s2": dict(zip(_KINDS, by_axis, strict=True)),
+        "near_trim_rad_s2": near_trim(made),
+        "smallest_certain_loss": {name: of["certain_loss"] for name, of in smallest_losses(made).items()},
         "further_surfaces": dict(made.further),
         "notes": list(made.notes),
         "own_file": differences(made.as_filed, made.aircraft) if made.as_filed else None,
@@ -201,9 +188,8 @@ def text_of(document: dict[str, Any]) -> str:
         f" surfaces   {', '.join(document['surfaces'])}",
         f" {'largest error, rad/s2':24}{'p':>10}{'q':>10}{'r':>10}",
     ]
-    kinds = {"fitted": "states of the fit", "checked": "states not seen", "declared": "declared bound"}
     for kind, errors in document["largest_error_rad_s2"].items():
-        lines.append(f"   {kinds[kind]:22}" + "".join(f"{errors[axis]:10.4f}" for axis in AXES))
+        lines.append(f"   {_KINDS[kind]:22}" + "".join(f"{errors[axis]:10.4f}" for axis in AXES))
     losses = document["smallest_certain_loss"].items()
     says = ", ".join(f"{name} {f'{loss:.0%}' if loss <= 1.0 else 'none'}" for name, loss in losses)
     lines.append(f" certain to be detected at {DEFLECTION_DEG:g} deg: losses from {says}")
@@ -213,9 +199,7 @@ def text_of(document: dict[str, Any]) -> str:
     lines += [f" note: {note}" for note in document["notes"]]
     if document["further_surfaces"]:
         lines.append(f" not used: {', '.join(document['further_surfaces'])}: {WHY_NOT_USED}")
-    lines.append(
-        f" written in {document['took_s']:.1f} s to {document['folder']}, with a page on it, derived.md"
-    )
+    lines.append(f" written in {document['took_s']:.1f} s to {document['folder']}, with a page on it, {NAME}")
     return "\n".join(lines)
 
 

@@ -16,8 +16,8 @@ from scipy.linalg import lstsq
 
 from beaver_ftc.aircraft import AXES, Aircraft, MassProperties
 from beaver_ftc.aircraft.aircraft import MOMENTS
-from beaver_ftc.design.model import InertiaCoefficients, inertia_coefficients, inertial
-from beaver_ftc.studies.derive.sample import AGES_S, REACHES, SHARES, Samples, flow_signals, places, sorted_in
+from beaver_ftc.design.model import inertia_coefficients, inertial
+from beaver_ftc.studies.derive.sample import AGES_S, REACHES, SHARES, Samples, places, quantities, sorted_in
 
 MOST_TERMS = 26
 LEAST_GAIN = 3e-3  # of what is left, for another term to be taken
@@ -79,11 +79,9 @@ def candidates(signals: Sequence[str], surfaces: Sequence[str]) -> list[Candidat
 
 def regressors(samples: Samples, aircraft: Aircraft, products: Sequence[Candidate]) -> np.ndarray:
     """What each candidate multiplies, (n, candidates)."""
-    of = flow_signals(samples, aircraft)
-    deflection = dict(zip(aircraft.surfaces, samples.u.T, strict=True))
-    columns = []
+    of, columns = quantities(samples, aircraft), []
     for powers, surface in products:
-        column = np.ones(len(samples)) if surface is None else deflection[surface]
+        column = np.ones(len(samples)) if surface is None else of[surface]
         for signal, power in powers.items():
             column = column * of[signal] ** power
         columns.append(column)
@@ -147,8 +145,7 @@ class Products:
 def pursue(A: np.ndarray, b: np.ndarray, most: int = MOST_TERMS) -> tuple[list[int], np.ndarray]:
     """The columns of A taken, and their coefficients."""
     products, every = Products(A, b), [k for k in range(A.shape[1]) if A[:, k].any()]
-    taken = products.pursued(every, most)
-    taken = products.exchanged(taken, every)
+    taken = products.exchanged(products.pursued(every, most), every)
     taken = products.of_use(taken, products.unexplained(taken) + EXACT * products.total)
     scale = np.linalg.norm(A[:, taken], axis=0)
     return taken, lstsq(A[:, taken] / scale, b)[0] / scale if taken else np.empty(0)
@@ -174,12 +171,9 @@ def fitted(samples: Samples, aircraft: Aircraft, most: int = MOST_TERMS) -> dict
 def engine_signals(flown: Samples, aircraft: Aircraft) -> list[str]:
     """The moments of the engines that change in flight, so that no state at which time stands still shows
     them."""
-    per_coefficient = _accelerations(flown, aircraft)
-    return [
-        engines
-        for engines, moves in zip(EXACT_TERMS.values(), per_coefficient, strict=True)
-        if engines in flown.signals and moves * np.ptp(flown.signals[engines]) > MATTERS_RAD_S2
-    ]
+    effects = zip(EXACT_TERMS.values(), _accelerations(flown, aircraft), strict=True)
+    moves = {name: effect * np.ptp(flown.signals[name]) for name, effect in effects if name in flown.signals}
+    return [name for name, moved in moves.items() if moved > MATTERS_RAD_S2]
 
 
 def signals_of_use(samples: Samples, aircraft: Aircraft, most: int, wanted: Sequence[str] = ()) -> list[str]:
@@ -222,28 +216,22 @@ def _term(coefficient: str, of: dict[str, int], surface: str | None, value: floa
 
 def errors_of(aircraft: Aircraft, samples: Samples) -> np.ndarray:
     """|f + G u - truth| of each sample, (n, 3) rad/s2."""
-    of = flow_signals(samples, aircraft) | dict(zip(aircraft.surfaces, samples.u.T, strict=True))
+    of, i = quantities(samples, aircraft), inertia_coefficients(aircraft.mass)
     size = samples.y[:, 3] * aircraft.geometry.wing_area_m2
     arms = zip(MOMENTS, _arms(aircraft), strict=True)
-    moments = [size * arm * aircraft.coefficient(name, of) for name, arm in arms]
-    believed = accelerations(inertia_coefficients(aircraft.mass), samples.x, np.column_stack(moments))
+    L, M, N = (size * arm * aircraft.coefficient(name, of) for name, arm in arms)
+    p, q, r = inertial(i, samples.x).T
+    believed = np.column_stack([p + i.Pl * L + i.Pn * N, q + i.Qm * M, r + i.Rl * L + i.Rn * N])
     error: np.ndarray = np.abs(believed - samples.rate)
     return error
-
-
-def accelerations(i: InertiaCoefficients, x: np.ndarray, moments: np.ndarray) -> np.ndarray:
-    """Euler's equations: rates x (n, 3) rad/s and moments (n, 3) N m give rad/s2, (n, 3)."""
-    (p, q, r), (L, M, N) = inertial(i, x).T, moments.T
-    return np.column_stack([p + i.Pl * L + i.Pn * N, q + i.Qm * M, r + i.Rl * L + i.Rn * N])
 
 
 def largest(errors: np.ndarray, samples: Samples) -> np.ndarray:
     """The largest error within each age, box and share of the travel, (ages, boxes, shares, 3) rad/s2."""
     table = np.zeros((len(AGES_S), len(REACHES), len(SHARES), 3))
-    for at in np.ndindex(table.shape[:3]):
-        age, box, level = at
+    for age, box, level in np.ndindex(table.shape[:3]):
         inside = (samples.age <= age) & (samples.box <= box) & (samples.level <= level)
-        table[at] = errors[inside].max(axis=0, initial=0.0)
+        table[age, box, level] = errors[inside].max(axis=0, initial=0.0)
     return table
 
 
@@ -263,25 +251,25 @@ def map_of(aircraft: Aircraft, sets: Sequence[Samples], flown: Samples) -> tuple
 def _ends(aircraft: Aircraft, sets: Sequence[Samples], box: int) -> np.ndarray:
     """The least and the greatest of every quantity in a box, (2, 7 + declared), rounded outwards."""
     within = np.concatenate([places(samples, aircraft)[samples.box <= box] for samples in sets])
-    low = [_rounded(float(v), -1) for v in within.min(axis=0)]
-    return np.array([low, [_rounded(float(v), 1) for v in within.max(axis=0)]])
+    low, high = within.min(axis=0).tolist(), within.max(axis=0).tolist()
+    return np.array([[_rounded(v, np.floor) for v in low], [_rounded(v, np.ceil) for v in high]])
 
 
 def _box(aircraft: Aircraft, ends: np.ndarray, errors: np.ndarray) -> dict[str, Any]:
     names = [*(f"{axis}_rad_s" for axis in AXES), "alpha_rad", "beta_rad", "airspeed_mps", "density_kg_m3"]
-    ranges = [[float(low), float(high)] for low, high in ends.T]
+    ranges = ends.T.tolist()
     flow = dict(zip(names, ranges, strict=False))
     signals = dict(zip(aircraft.signals, ranges[len(names) :], strict=True))
     known = {
-        f"error_{axis}_rad_s2": [[_rounded(float(e), 1) for e in of_age] for of_age in errors[:, :, i]]
+        f"error_{axis}_rad_s2": [[_rounded(e, np.ceil) for e in row] for row in errors[:, :, i].tolist()]
         for i, axis in enumerate(AXES)
     }
     return flow | {"signals": signals} | known
 
 
-def _rounded(value: float, way: int) -> float:
-    """To a few digits, outwards."""
+def _rounded(value: float, whole: np.ufunc) -> float:
+    """To a few digits, up or down as `whole` goes."""
     if value == 0.0:
         return 0.0
     digit = 10.0 ** (np.floor(np.log10(abs(value))) - 4)
-    return float(f"{(np.ceil(value / digit) if way > 0 else np.floor(value / digit)) * digit:.8g}")
+    return float(f"{whole(value / digit) * digit:.8g}")

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from beaver_ftc.aircraft import AXES, Aircraft
+from beaver_ftc.aircraft.aircraft import MOMENTS
 from beaver_ftc.aircraft.loading import read
 from beaver_ftc.aircraft.schema import AircraftFile, Interval
 from beaver_ftc.documents.base import Number, Section, number
@@ -22,15 +23,15 @@ from beaver_ftc.documents.errors import BadInput, BeaverFtcError, SimulationFail
 from beaver_ftc.documents.validation import read_file
 from beaver_ftc.plant import instrumented
 from beaver_ftc.plant.adapter import Plant, bare, translated
+from beaver_ftc.plant.channels import FT
 from beaver_ftc.plant.model_file import copy_of
 from beaver_ftc.plant.state import FlightState
 from beaver_ftc.plant.trim import TrimPoint, trim
 from beaver_ftc.scenario.initial import initial_of
 
-KG_PER_SLUG = 0.45359237 * 9.80665 / 0.3048
-KG_M2 = KG_PER_SLUG * 0.3048**2
-ALTITUDE_M = 1500.0
-DENSITY_KG_M3 = 1.058  # there
+SLUG = 0.45359237 * 9.80665 / FT  # kg
+SLUG_FT2 = SLUG * FT**2
+ALTITUDE_M, DENSITY_KG_M3 = 1500.0, 1.058  # there
 SPAN_OF_SPEED = (0.8, 1.25)
 THROTTLE = "fcs/actuated-throttle-norm"
 LIKELY_TRAVEL_RAD = 0.35
@@ -40,6 +41,7 @@ POSITIONS = {
     "elevator": "fcs/elevator-pos-rad",
     "rudder": "fcs/rudder-pos-rad",
 }
+_ENDS = {"command": "cmd", "position": "pos", "effective": "effective"}  # of the names of its properties
 _LEAST_TRAVEL_RAD = 0.02
 _FRAMES = 400  # in which its own flight control has moved a surface
 NOT_AFFINE = 0.02  # deviation from a straight line, as a share of what the whole travel does
@@ -80,8 +82,7 @@ def read_envelope(path: Path | None) -> EnvelopeFile:
     """The envelope file, or an empty one. Raises ScenarioError with one line a mistake."""
     if path is None:
         return EnvelopeFile()
-    keys = "the keys airspeed_mps, alpha_deg, altitude_m, sideslip_deg"
-    return read_file(EnvelopeFile, path, 100_000, keys)
+    return read_file(EnvelopeFile, path, 100_000, f"the keys {', '.join(EnvelopeFile.model_fields)}")
 
 
 def travel_of(source: Path, model: Path, notes: list[str]) -> Travel:
@@ -91,71 +92,67 @@ def travel_of(source: Path, model: Path, notes: list[str]) -> Travel:
     """
     travel = {}
     for surface in instrumented.surfaces_of(source):
-        ends = [own_deflection(model, surface, command) for command in (-1.0, 1.0)]
-        low, high = min(ends), max(ends)
-        if not (np.isfinite([low, high]).all() and high > _LEAST_TRAVEL_RAD and low < -_LEAST_TRAVEL_RAD):
+        low, high = sorted(own_deflection(model, surface, command) for command in (-1.0, 1.0))
+        if not (isfinite(low) and isfinite(high) and low < -_LEAST_TRAVEL_RAD and high > _LEAST_TRAVEL_RAD):
             low, high = -LIKELY_TRAVEL_RAD, LIKELY_TRAVEL_RAD
             notes.append(
                 f"{surface}: its own flight control does not move it to both sides; {high:g} rad is supposed"
             )
-        travel[surface] = tuple(
-            round(float(np.clip(end, -MOST_TRAVEL_RAD, MOST_TRAVEL_RAD)), 5) for end in (low, high)
-        )
-    return travel  # type: ignore[return-value]
+        travel[surface] = round(max(low, -MOST_TRAVEL_RAD), 5), round(min(high, MOST_TRAVEL_RAD), 5)
+    return travel
 
 
 def own_deflection(model: Path, surface: str, command: float, rate_rad_s: float = 0.0) -> float:
     """Where its own flight control puts a surface, rad, at a command (-1 to 1) and a rate about all axes."""
+    given = {f"ic/{axis}-rad_sec": rate_rad_s for axis in AXES} | {f"fcs/{surface}-cmd-norm": command}
+    return _settled(model, given, (POSITIONS[surface],))[0]
+
+
+def _settled(model: Path, given: Mapping[str, float], names: Sequence[str]) -> list[float]:
+    """These properties once its own flight control has had time to answer to what is given."""
     fdm = bare(model)
     with translated(model):
-        for axis in "pqr":
-            fdm[f"ic/{axis}-rad_sec"] = rate_rad_s
-        fdm[f"fcs/{surface}-cmd-norm"] = command
-        fdm.run_ic()
+        for name, value in given.items():
+            fdm[name] = value
         for k in range(_FRAMES):
             if k % 10 == 0:
-                fdm.run_ic()
+                fdm.run_ic()  # it flies nowhere meanwhile
             fdm.run()
-    return float(fdm[POSITIONS[surface]])
+    return [float(fdm[name]) for name in names]
 
 
-def outline(name: str, model: Path, travel: Mapping[str, tuple[float, float]], lift: float) -> dict[str, Any]:
+def outline(name: str, model: Path, travel: Travel, lift: float) -> dict[str, Any]:
     """The file without its terms; lift: the lift coefficient at the speed the envelope is built about."""
     fdm = bare(model)
-    area, mass_kg = fdm["metrics/Sw-sqft"] * 0.3048**2, fdm["inertia/mass-slugs"] * KG_PER_SLUG
+    area, mass_kg = fdm["metrics/Sw-sqft"] * FT**2, fdm["inertia/mass-slugs"] * SLUG
     speed_mps = (2.0 * mass_kg * 9.81 / (DENSITY_KG_M3 * area * lift)) ** 0.5
     return {
         "name": name if name[0].isalpha() else f"a{name}",
         "description": f"{name}, derived from its JSBSim model",
         "jsbsim": model.name,
-        "surfaces": {surface: _surface(surface, ends) for surface, ends in travel.items()},
+        "surfaces": {
+            surface: {key: f"fcs/{instrumented.PREFIX}{surface}-{end}-rad" for key, end in _ENDS.items()}
+            | {"travel_rad": list(ends)}
+            for surface, ends in travel.items()
+        },
         "groups": {"pitch": ["elevator"], "lateral": ["aileron", "rudder"]},
         "signals": {},
         "mass": {
             "mass_kg": mass_kg,
-            **{f"I{a}_kgm2": fdm[f"inertia/i{a}{a}-slugs_ft2"] * KG_M2 for a in "xyz"},
-            "Jxz_kgm2": -fdm["inertia/ixz-slugs_ft2"] * KG_M2,
+            **{f"I{a}_kgm2": fdm[f"inertia/i{a}{a}-slugs_ft2"] * SLUG_FT2 for a in "xyz"},
+            "Jxz_kgm2": -fdm["inertia/ixz-slugs_ft2"] * SLUG_FT2,
         },
         "geometry": {
-            "wing_area_m2": area, "span_m": fdm["metrics/bw-ft"] * 0.3048,
-            "chord_m": fdm["metrics/cbarw-ft"] * 0.3048,
+            "wing_area_m2": area, "span_m": fdm["metrics/bw-ft"] * FT,
+            "chord_m": fdm["metrics/cbarw-ft"] * FT,
         },
-        "moments": {"Cl": [placeholder("Cl", "aileron")], "Cm": [placeholder("Cm", "elevator")],
-                    "Cn": [placeholder("Cn", "rudder")]},
+        "moments": {of: [placeholder(of, surface)] for of, surface in zip(MOMENTS, POSITIONS, strict=True)},
         "envelope": {"airspeed_mps": [speed_mps * share for share in SPAN_OF_SPEED], "alpha_deg": [-5, 15]},
         "trim": {"throttle": THROTTLE},
         "engine": {"start": "steady", "settings": {"throttle": {
             "property": THROTTLE, "says": "throttle", "unit": "share of 1",
             "default": 0.6, "range": [0.0, 1.0]}}},
         "start": {"altitude_m": ALTITUDE_M},
-    }  # fmt: skip
-
-
-def _surface(surface: str, ends: tuple[float, float]) -> dict[str, Any]:
-    prefix = f"fcs/{instrumented.PREFIX}{surface}"
-    return {
-        "command": f"{prefix}-cmd-rad", "position": f"{prefix}-pos-rad",
-        "effective": f"{prefix}-effective-rad", "travel_rad": list(ends),
     }  # fmt: skip
 
 
@@ -170,13 +167,17 @@ def not_affine(plant: Plant, trim: FlightState) -> list[str]:
     plant.start(trim)
     for name, travel in plant.aircraft.travel.items():
         at = np.linspace(travel.min_rad, travel.max_rad, _POINTS)
-        moved = [_accelerations(plant, trim, name, float(u)) for u in at]
+        moved = np.empty((_POINTS, len(AXES)))
+        for k, deflection_rad in enumerate(at.tolist()):
+            plant.hold(replace(trim, surfaces_rad={**trim.surfaces_rad, name: deflection_rad}))
+            moved[k] = [plant.read(f"accelerations/{axis}dot-rad_sec2") for axis in AXES]
         size = np.ptp(moved, axis=0)
         axis = int(size.argmax())
         if size[axis] == 0.0:
             notes.append(f"{name}: it turns nothing in trim: its faults cannot be seen")
             continue
-        share = float(np.ptp(_off_line(at, np.array(moved)[:, axis])) / size[axis])
+        off_line = moved[:, axis] - np.polyval(np.polyfit(at, moved[:, axis], 1), at)
+        share = float(np.ptp(off_line) / size[axis])
         if share > NOT_AFFINE:
             notes.append(
                 f"{name}: its moment is not proportional to its deflection, {share:.0%} off a straight line: "
@@ -184,16 +185,6 @@ def not_affine(plant: Plant, trim: FlightState) -> list[str]:
             )
     plant.start(trim)
     return notes
-
-
-def _accelerations(plant: Plant, trim: FlightState, surface: str, deflection_rad: float) -> list[float]:
-    plant.hold(replace(trim, surfaces_rad={**trim.surfaces_rad, surface: deflection_rad}))
-    return [plant.read(f"accelerations/{axis}dot-rad_sec2") for axis in AXES]
-
-
-def _off_line(at: np.ndarray, values: np.ndarray) -> np.ndarray:
-    off: np.ndarray = values - np.polyval(np.polyfit(at, values, 1), at)
-    return off
 
 
 def further_surfaces(source: Path, plant: Plant) -> dict[str, float]:
@@ -219,13 +210,11 @@ def moved_by_itself(aircraft: Aircraft, trim: FlightState, names: Sequence[str])
 
 
 def own_control(source: Path, model: Path) -> list[str]:
-    """What its own flight control does that the copy leaves out; model: a copy that writes no files."""
-    surfaces = instrumented.surfaces_of(source)
-    return [*_augmented(model, surfaces), *_moved_along(source, model, surfaces)]
+    """What its own flight control does that the copy leaves out; model: a copy that writes no files.
 
-
-def _augmented(model: Path, surfaces: tuple[str, ...]) -> list[str]:
-    notes = []
+    It moves surfaces with the rates, and with the command of a surface what else the aerodynamics see.
+    """
+    notes, surfaces = [], instrumented.surfaces_of(source)
     for surface in surfaces:
         moved = own_deflection(model, surface, 0.0, _RATE_RAD_S) - own_deflection(model, surface, 0.0)
         if abs(moved) > _MOVED_RAD:
@@ -233,31 +222,14 @@ def _augmented(model: Path, surfaces: tuple[str, ...]) -> list[str]:
                 f"{surface}: its own flight control moves it {degrees(moved):.1f} deg at "
                 f"{degrees(_RATE_RAD_S):.1f} deg/s, command or not: the copy flies without"
             )
-    return notes
-
-
-def _moved_along(source: Path, model: Path, surfaces: tuple[str, ...]) -> list[str]:
-    """What else of the flight control the aerodynamics see, and moves with the command of a surface."""
     others = instrumented.others_of(source)
-    still = _seen(model, others, None)
-    notes = []
+    still = np.round(_settled(model, {}, others), 6)
     for surface in surfaces:
-        moved = [name for name, value in _seen(model, others, surface).items() if value != still[name]]
-        if moved:
-            notes.append(f"{surface}: its command moves {', '.join(moved)} too: in the copy it does not")
+        moved = np.round(_settled(model, {f"fcs/{surface}-cmd-norm": 1.0}, others), 6) != still
+        if moved.any():
+            along = ", ".join(np.array(others)[moved])
+            notes.append(f"{surface}: its command moves {along} too: in the copy it does not")
     return notes
-
-
-def _seen(model: Path, names: tuple[str, ...], surface: str | None) -> dict[str, float]:
-    fdm = bare(model)
-    with translated(model):
-        if surface:
-            fdm[f"fcs/{surface}-cmd-norm"] = 1.0
-        for k in range(_OWN_FRAMES):
-            if k % 10 == 0:
-                fdm.run_ic()  # it flies nowhere meanwhile
-            fdm.run()
-    return {name: round(float(fdm[name]), 6) for name in names}
 
 
 @dataclass(frozen=True)
@@ -265,15 +237,19 @@ class Level:
     """An aircraft about to be sampled: its file's data, plant and trim, and how far its sideslip goes."""
 
     data: dict[str, Any]
-    aircraft: Aircraft
     plant: Plant
     trim: TrimPoint
     sideslip_rad: float
 
 
-def plant_of(data: dict[str, Any], folder: Path) -> Plant:
-    """A plant of the aircraft as its data are now."""
-    return Plant(100, aircraft=Aircraft(AircraftFile.model_validate(data), folder))
+def aircraft_of(data: Mapping[str, Any], folder: Path) -> Aircraft:
+    """The aircraft of a folder as its file's data are now."""
+    return Aircraft(AircraftFile.model_validate(data), folder)
+
+
+def plant_of(data: Mapping[str, Any], folder: Path) -> Plant:
+    """A plant of it."""
+    return Plant(100, aircraft=aircraft_of(data, folder))
 
 
 def choose_start(data: dict[str, Any], folder: Path, notes: list[str]) -> None:
@@ -333,16 +309,12 @@ def level_flight(
             failed = failed or error
             continue
         plant = plant_of(data, folder)
-        notes += [*choices, *(_slope(point) if plant.n_engines else [])]
-        return Level(data, plant.aircraft, plant, point, sideslip_rad)
+        notes += choices
+        if plant.n_engines and abs(point.gamma_rad) >= _LEVEL_RAD:
+            way, slope_deg = "climbs" if point.gamma_rad > 0.0 else "sinks", abs(degrees(point.gamma_rad))
+            notes.append(f"in trim it {way} at {slope_deg:.1f} deg: its power goes no further")
+        return Level(data, plant, point, sideslip_rad)
     raise BadInput(f"{outlines[0]['name']}: {failed}")
-
-
-def _slope(point: TrimPoint) -> list[str]:
-    if abs(point.gamma_rad) < _LEVEL_RAD:
-        return []
-    way = "climbs at" if point.gamma_rad > 0.0 else "sinks at"
-    return [f"in trim it {way} {abs(degrees(point.gamma_rad)):.1f} deg: its power goes no further"]
 
 
 def level_trim(plant: Plant, data: dict[str, Any]) -> TrimPoint:
@@ -368,16 +340,15 @@ def level_as_filed(source: Path, folder: Path, envelope: EnvelopeFile) -> Level:
     copy_of(aircraft.jsbsim, folder)
     data = aircraft.file.model_dump(mode="json", exclude_none=True, exclude={"moments"})
     data["envelope"] |= envelope.model_dump(
-        mode="json", exclude_none=True, exclude={"altitude_m", "sideslip_deg"}
+        mode="json", exclude_none=True, include={"airspeed_mps", "alpha_deg"}
     )
-    start = usual_start(aircraft)
+    data["start"] = start = usual_start(aircraft)
     if envelope.airspeed_mps is not None:
         start["airspeed_mps"] = 0.5 * sum(envelope.airspeed_mps)
     if envelope.altitude_m is not None:
         start["altitude_m"] = envelope.altitude_m
-    data["start"] = start
     plant = Plant(100, aircraft=aircraft)
-    return Level(data, aircraft, plant, trim_at(plant, **start), envelope.sideslip_rad or WIDE_SIDESLIP_RAD)
+    return Level(data, plant, trim_at(plant, **start), envelope.sideslip_rad or WIDE_SIDESLIP_RAD)
 
 
 def usual_start(aircraft: Aircraft) -> dict[str, float]:
@@ -395,12 +366,8 @@ def trim_at(plant: Plant, airspeed_mps: float, altitude_m: float) -> TrimPoint:
 def named_as(aircraft: Aircraft, moments: dict[str, list[dict[str, Any]]]) -> dict[str, list[dict[str, Any]]]:
     """Terms under the names an aircraft's own file has for the same products."""
     names = {(t.coefficient, t.surface, frozenset(t.of)): t.name for t in aircraft.terms.values()}
-
-    def name_of(coefficient: str, term: dict[str, Any]) -> str:
-        product = coefficient, term.get("surface"), frozenset(term["of"].items())
-        return names.get(product, term["name"])
-
-    return {
-        coefficient: [{**term, "name": name_of(coefficient, term)} for term in terms]
-        for coefficient, terms in moments.items()
-    }
+    for coefficient, terms in moments.items():
+        for term in terms:
+            product = coefficient, term.get("surface"), frozenset(term["of"].items())
+            term["name"] = names.get(product, term["name"])
+    return moments

@@ -15,20 +15,21 @@ import numpy as np
 from beaver_ftc.aircraft import AXES, Aircraft
 from beaver_ftc.aircraft.schema import FLOW_SIGNALS
 from beaver_ftc.plant.adapter import PA_PER_PSF, Plant
+from beaver_ftc.plant.channels import FT
 from beaver_ftc.plant.state import FlightState
 
-FT = 0.3048
 REACHES = (0.25, 0.5, 0.75, 1.0)  # of the boxes, as shares of the envelope's half widths
 SHARES = (0.15, 0.35, 0.65, 1.0)  # of the surfaces' travel
 AGES_S = (120.0, 900.0, 7200.0)  # of a flight: fuel burns, and inertia with it
 FRESH = (0,)
 SIDESLIP_RAD = 0.15  # the usual half width
+RATES_RAD_S = (0.60, 0.35, 0.35)  # half widths
 EVERY_AGE = (0, 0, 1, 0, 0, 2)
 STARTS = 48
 AT_AN_END = 0.3  # share of the draws that are at an end of their range: corners are where errors are large
 _BANK_RAD, _CLIMB_RAD, _ALTITUDE_M, _THROTTLE = 1.0, 0.3, 600.0, 0.35  # half widths beside the envelope's
 _MOST_BURNT = 0.9  # of the fuel
-FLIGHTS, FRAMES, EVERY = 6, 800, 4
+FRAMES, EVERY = 800, 4
 _SHARE_OF_TRAVEL = 0.06
 _FREQUENCIES_HZ = (0.2, 0.5, 1.1)
 _SPEEDS = (1.0, 1.0, 0.95, 1.05, 1.0, 1.0)  # as shares of the trim's
@@ -36,12 +37,11 @@ _SPEEDS = (1.0, 1.0, 0.95, 1.05, 1.0, 1.0)  # as shares of the trim's
 
 @dataclass(frozen=True)
 class Envelope:
-    """Half widths about the trim, but for airspeed and angle of attack, of which the ends are given."""
+    """Where states are drawn: between these ends, and so far to either side in sideslip."""
 
     airspeed_mps: tuple[float, float]
     alpha_rad: tuple[float, float]
     beta_rad: float
-    rates_rad_s: tuple[float, float, float] = (0.60, 0.35, 0.35)
 
 
 @dataclass(frozen=True)
@@ -58,10 +58,6 @@ class Samples:
     level: np.ndarray
     age: np.ndarray
 
-    def measured(self, aircraft: Aircraft) -> np.ndarray:
-        """y with the signals an aircraft declares, (n, 4 + declared)."""
-        return np.column_stack([self.y, *(self.signals[name] for name in aircraft.signals)])
-
     def at(self, places: np.ndarray) -> "Samples":
         """Those in these places."""
         arrays = {name: values[places] for name, values in vars(self).items() if name != "signals"}
@@ -72,10 +68,11 @@ class Samples:
 
 
 class Draw:
-    """Random numbers within a share of a range, often at its ends."""
+    """Random states of an aircraft about its trim, often at the ends of their ranges."""
 
-    def __init__(self, seed: int) -> None:
+    def __init__(self, seed: int, aircraft: Aircraft, envelope: Envelope, trim: FlightState) -> None:
         self.rng = np.random.default_rng(seed)
+        self.aircraft, self.envelope, self.trim = aircraft, envelope, trim
 
     def between(self, low: float, high: float) -> float:
         """One number between two ends."""
@@ -93,30 +90,52 @@ class Draw:
         low, high = (middle + reach * (end - middle) for end in ends)
         return self.between(low, high)
 
+    def start(self, reach: float) -> FlightState:
+        """Where the engines come to run, and the aircraft there."""
+        trim, settings = self.trim, {}
+        for name, setting in self.aircraft.engine.settings.items():
+            (low, high), middle = setting.range, trim.settings[name]
+            half = _THROTTLE * (high - low)
+            settings[name] = self.share(middle, (max(low, middle - half), min(high, middle + half)), reach)
+        airspeed_mps = self.share(trim.airspeed_mps, self.envelope.airspeed_mps, reach)
+        altitude_m = max(self.around(trim.altitude_m, reach * _ALTITUDE_M), 0.0)
+        return replace(trim, airspeed_mps=airspeed_mps, altitude_m=altitude_m, settings=settings)
+
+    def state(self, started: FlightState, reach: float, share: float) -> FlightState:
+        """A state with the engines as started; reach: of its box; share: of the surfaces' travel."""
+        trim, envelope = self.trim, self.envelope
+        alpha = self.share(trim.alpha_rad, envelope.alpha_rad, reach)
+        rates: dict[str, Any] = {
+            f"{axis}_rad_s": self.around(0.0, reach * half)
+            for axis, half in zip(AXES, RATES_RAD_S, strict=True)
+        }
+        surfaces = {n: share * self.between(t.min_rad, t.max_rad) for n, t in self.aircraft.travel.items()}
+        return FlightState(
+            self.share(trim.airspeed_mps, envelope.airspeed_mps, reach), started.altitude_m,
+            alpha_rad=alpha, beta_rad=self.around(trim.beta_rad, reach * envelope.beta_rad),
+            phi_rad=self.around(trim.phi_rad, _BANK_RAD),
+            theta_rad=trim.theta_rad - trim.alpha_rad + alpha + self.around(0.0, _CLIMB_RAD),
+            surfaces_rad=surfaces, settings=started.settings, **rates,
+        )  # fmt: skip
+
 
 def sample(
-    plant: Plant,
-    envelope: Envelope,
-    trim: FlightState,
-    n: int,
-    seed: int,
-    properties: Mapping[str, str],
-    ages: tuple[int, ...] = EVERY_AGE,
-    starts: int = STARTS,
-) -> Samples:
+    plant: Plant, envelope: Envelope, trim: FlightState, n: int, seed: int, properties: Mapping[str, str],
+    ages: tuple[int, ...] = EVERY_AGE, starts: int = STARTS,
+) -> Samples:  # fmt: skip
     """So many random states; properties: of each signal to be read there; ages: of the flights; starts: how
     often the engines are started anew."""
-    draw, rows = Draw(seed), []
+    draw, rows = Draw(seed, plant.aircraft, envelope, trim), []
     tanks = Tanks(plant, trim)
     for k in range(starts):
         box, age = k % len(REACHES), ages[(k // len(REACHES)) % len(ages)]
         tanks.fill(draw.between(0.0, AGES_S[age]))
-        started = _started(draw, plant, trim, envelope, REACHES[box])
+        started = draw.start(REACHES[box])
         plant.start(started)
         for i in range(max(1, n // starts)):
             level = i % len(SHARES)
-            state = _state(draw, plant.aircraft, envelope, trim, started, REACHES[box], SHARES[level])
-            rows.append((*_at(plant, state, properties), box, level, age))
+            plant.hold(draw.state(started, REACHES[box], SHARES[level]))
+            rows.append((*seen_at(plant, properties), box, level, age))
     tanks.fill(0.0)
     plant.start(trim)
     return as_arrays(rows, tuple(properties))
@@ -150,54 +169,6 @@ class Tanks:
             self._plant.write(name, left * full)
 
 
-def _started(draw: Draw, plant: Plant, trim: FlightState, envelope: Envelope, reach: float) -> FlightState:
-    """Where the engines come to run, and the aircraft there."""
-    settings = {}
-    for name, setting in plant.aircraft.engine.settings.items():
-        (low, high), middle = setting.range, trim.settings[name]
-        half = _THROTTLE * (high - low)
-        ends = max(low, middle - half), min(high, middle + half)
-        settings[name] = draw.share(middle, ends, reach)
-    return replace(
-        trim,
-        airspeed_mps=draw.share(trim.airspeed_mps, envelope.airspeed_mps, reach),
-        altitude_m=max(draw.around(trim.altitude_m, reach * _ALTITUDE_M), 0.0),
-        settings=settings,
-    )
-
-
-def _state(
-    draw: Draw,
-    aircraft: Aircraft,
-    envelope: Envelope,
-    trim: FlightState,
-    started: FlightState,
-    reach: float,
-    share: float,
-) -> FlightState:
-    alpha = draw.share(trim.alpha_rad, envelope.alpha_rad, reach)
-    rates: dict[str, Any] = {
-        f"{axis}_rad_s": draw.around(0.0, reach * half)
-        for axis, half in zip(AXES, envelope.rates_rad_s, strict=True)
-    }
-    surfaces = {
-        name: share * draw.between(travel.min_rad, travel.max_rad) for name, travel in aircraft.travel.items()
-    }
-    return FlightState(
-        draw.share(trim.airspeed_mps, envelope.airspeed_mps, reach), started.altitude_m,
-        alpha_rad=alpha, beta_rad=draw.around(trim.beta_rad, reach * envelope.beta_rad),
-        phi_rad=draw.around(trim.phi_rad, _BANK_RAD),
-        theta_rad=trim.theta_rad - trim.alpha_rad + alpha + draw.around(0.0, _CLIMB_RAD),
-        surfaces_rad=surfaces, settings=started.settings, **rates,
-    )  # fmt: skip
-
-
-def _at(plant: Plant, state: FlightState, properties: Mapping[str, str]) -> Iterator[list[float]]:
-    """x, y, signals, u, rate at a state."""
-    plant.hold(state)
-    return seen_at(plant, properties)
-
-
 def seen_at(plant: Plant, properties: Mapping[str, str]) -> Iterator[list[float]]:
     """x, y, signals, u, rate where the aircraft is."""
     read = plant.read
@@ -209,21 +180,21 @@ def seen_at(plant: Plant, properties: Mapping[str, str]) -> Iterator[list[float]
     yield [read(f"accelerations/{axis}dot-rad_sec2") for axis in AXES]
 
 
-def flow_signals(samples: Samples, aircraft: Aircraft) -> dict[str, np.ndarray]:
-    """alpha, beta, ph, qh, rh of samples, and the signals they were taken with."""
+def quantities(samples: Samples, aircraft: Aircraft) -> dict[str, np.ndarray]:
+    """What terms multiply, by name: alpha, beta, ph, qh, rh, the samples' signals, and the surfaces."""
     geometry, V = aircraft.geometry, samples.y[:, 2]
     half_span_time = geometry.span_m / (2.0 * V)
     rates = samples.x[:, 0] * half_span_time, samples.x[:, 1] * geometry.chord_m / V
     values = samples.y[:, 0], samples.y[:, 1], *rates, samples.x[:, 2] * half_span_time
-    return {**dict(zip(FLOW_SIGNALS, values, strict=True)), **samples.signals}
+    flow, surfaces = zip(FLOW_SIGNALS, values, strict=True), zip(aircraft.surfaces, samples.u.T, strict=True)
+    return {**dict(flow), **samples.signals, **dict(surfaces)}
 
 
 def fly_about(plant: Plant, trim: FlightState, seed: int, properties: Mapping[str, str]) -> Samples:
     """Some short flights from trim; `box` and `level` are not sorted yet."""
     rng, rows = np.random.default_rng(seed), []
-    for share in _SPEEDS[:FLIGHTS]:
-        started = replace(trim, airspeed_mps=share * trim.airspeed_mps)
-        plant.start(started)
+    for share in _SPEEDS:
+        plant.start(replace(trim, airspeed_mps=share * trim.airspeed_mps))
         phases = rng.uniform(0.0, 2.0 * np.pi, (plant.aircraft.n, len(_FREQUENCIES_HZ)))
         for k in range(FRAMES):
             if k % EVERY == 0:
@@ -256,8 +227,7 @@ def sorted_in(
     travel = np.array([(t.min_rad, t.max_rad) for t in aircraft.travel.values()])
     used = np.maximum(samples.u / travel[:, 1], samples.u / travel[:, 0]).max(axis=1)
     level = np.searchsorted(np.array(shares[:-1]), used)
-    sorted_ = replace(samples, box=inside.argmax(axis=0), level=level)
-    return sorted_.at(np.flatnonzero(inside.any(axis=0)))
+    return replace(samples, box=inside.argmax(axis=0), level=level).at(np.flatnonzero(inside.any(axis=0)))
 
 
 def places(samples: Samples, aircraft: Aircraft) -> np.ndarray:

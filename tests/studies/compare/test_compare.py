@@ -41,14 +41,7 @@ from beaver_ftc.studies.compare.trial import (
     set_names,
     with_entry,
 )
-from beaver_ftc.studies.compare.tune import (
-    DETECTORS,
-    DETECTORS_FOR_ERRORS,
-    LAWS,
-    _best_detector,
-    alarm_level,
-    candidates,
-)
+from beaver_ftc.studies.compare.tune import _best_detector, alarm_level, candidates, grids
 from beaver_ftc.studies.engine.study import fly_all
 from beaver_ftc.studies.present.page import write_files
 from flying import scenario
@@ -208,14 +201,13 @@ def test_every_number_of_the_tables_but_the_cost_counts(scheme, law, columns):
     whole = dict.fromkeys(efforts, 1.0) | {"false_alarms_per_h": 1.0, "false_alarms_per_h_upper": 2.0}
     whole |= {"faults": 3, "delay_90_s": 0.2, "departures": 2, "us": 5.0}
     ours, rival = _line(SCHEME, LAW, **whole), _line(scheme, law, **whole)
-    part = {"without_false_alarm": {}}
     shown = [cell for name, cell in columns if name not in ("scheme", "law", "us/frame")]
     found = []
     for key, value in rival.items():
         if not isinstance(value, int | float) or key in ("faults", "false_alarms_per_h_upper"):
             continue
         changed = rival | {key: value + 0.1 if key.endswith("_rate") else value / 2}
-        if [cell(changed, part) for cell in shown] != [cell(rival, part) for cell in shown]:
+        if [cell(changed) for cell in shown] != [cell(rival) for cell in shown]:
             assert better_than_ours([ours, changed], {}), key
             found.append(key)
     assert len(found) >= 7
@@ -261,15 +253,16 @@ def test_the_alarm_level_leaves_the_allowed_number_of_alarms():
 
 
 @pytest.mark.parametrize(
-    ("grids", "group", "path"),
+    ("rivals", "group", "path"),
     [
-        (DETECTORS, "beaver_ftc.detectors", TUNED),
-        (DETECTORS_FOR_ERRORS, "beaver_ftc.detectors", TUNED_FOR_ERRORS),
-        (LAWS, "beaver_ftc.laws", TUNED),
+        ("detectors", "beaver_ftc.detectors", TUNED),
+        ("detectors for errors", "beaver_ftc.detectors", TUNED_FOR_ERRORS),
+        ("laws", "beaver_ftc.laws", TUNED),
     ],
 )
-def test_what_is_tuned_are_options_the_rivals_have(grids, group, path):
-    for name, grid in grids.items():
+def test_what_is_tuned_are_options_the_rivals_have(rivals, group, path):
+    assert grids()[rivals]
+    for name, grid in grids()[rivals].items():
         known = plugin_class(group, name).defaults
         assert set(grid) <= set(known)
         assert set(grid) <= set(tuned(path)[name]) <= set(known)

@@ -21,84 +21,66 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Document = dict[str, Any]
-Cell = Callable[[Document, Document], str]
+Cell = Callable[[Document], str]
+Columns = Sequence[tuple[str, Cell]]
 
 
-def _share(value: float | None) -> str:
-    return "-" if value is None else f"{100 * value:.0f}"
+def _percent(share: float) -> str:
+    return f"{100 * share:.0f}"
 
 
-def _seconds(value: float | None) -> str:
-    return "never" if value is None else f"{value:.2f}"
+def _cell(form: Callable[[Any], str], *keys: str, none: str = "-") -> Cell:
+    """Numbers of a row, a slash between; `none` where there is none."""
+    return lambda row: " / ".join(none if row.get(key) is None else form(row[key]) for key in keys)
 
 
-def _alarms(row: Document, _: Document) -> str:
+def _of_faults(cell: Cell) -> Cell:
+    return lambda row: cell(row) if row["faults"] else "-"
+
+
+def _alarms(row: Document) -> str:
     rate, upper = row["false_alarms_per_h"], row["false_alarms_per_h_upper"]
     return "-" if rate is None else f"{rate:.3g} (<{upper:.2g})"
 
 
-def _of_faults(show: Callable[[Document], str]) -> Cell:
-    return lambda row, _: show(row) if row["faults"] else "-"
-
-
-def _free(row: Document, part: Document) -> str:
-    point = part["without_false_alarm"].get(row["scheme"])
-    if point is None or not row["faults"]:
+def _free(row: Document) -> str:
+    """What a scheme finds at the most sensitive level without a false alarm."""
+    if row.get("free") is None:
         return "-"
-    return f"{_share(point['detection_rate'])} / {_seconds(point['delay_median_s'])}"
+    rate, delay = _cell(_percent, "detection_rate"), _cell("{:.2f}".format, "delay_median_s", none="never")
+    return f"{rate(row['free'])} / {delay(row['free'])}"
 
 
-def _ratio(row: Document, _: Document) -> str:
-    def shown(value: float | None) -> str:
-        return "lost" if value is None else f"{value:.2f}"
-
-    return f"{shown(row['ratio_median'])} / {shown(row['ratio_90'])}"
-
-
-def _rate(value: float | None) -> str:
-    return "-" if value is None else f"{value:.3g}"
-
-
-def _pair(part: str) -> Cell:
-    """Median and 90 % of the tracking error of a part of the flight."""
-    return lambda row, _: f"{_rate(row.get(part + '_median'))} / {_rate(row.get(part + '_90'))}"
-
-
-DIAGNOSIS: tuple[tuple[str, Cell], ...] = (
-    ("scheme", lambda row, _: row["scheme"]),
+DIAGNOSIS: Columns = (
+    ("scheme", _cell(str, "scheme")),
     ("false alarms/h (95 %)", _alarms),
-    ("detected %", _of_faults(lambda row: _share(row["detection_rate"]))),
-    (
-        "delay s 50/90 %",
-        _of_faults(lambda row: f"{_seconds(row['delay_median_s'])} / {_seconds(row['delay_90_s'])}"),
-    ),
-    ("isolated %", _of_faults(lambda row: _share(row["isolation_rate"]))),
-    ("with no false alarm: detected % / delay s", _free),
-    ("tracking/oracle 50/90 %", _ratio),
-    ("lost", lambda row, _: str(row["departures"])),
-    ("us/frame", lambda row, _: f"{row['us']:.0f}"),
+    ("detected %", _cell(_percent, "detection_rate")),
+    ("delay s 50/90 %", _of_faults(_cell("{:.2f}".format, "delay_median_s", "delay_90_s", none="never"))),
+    ("isolated %", _cell(_percent, "isolation_rate")),
+    ("with no false alarm: detected % / delay s", _of_faults(_free)),
+    ("tracking/oracle 50/90 %", _cell("{:.2f}".format, "ratio_median", "ratio_90", none="lost")),
+    ("lost", _cell(str, "departures")),
+    ("us/frame", _cell("{:.0f}".format, "us")),
 )
-CONTROL: tuple[tuple[str, Cell], ...] = (
-    ("law", lambda row, _: row["law"]),
+CONTROL: Columns = (
+    ("law", _cell(str, "law")),
     *DIAGNOSIS[6:],
-    ("error before, deg/s 50/90 %", _pair("before")),
-    ("after", _pair("after")),
-    ("travel deg/s", lambda row, _: _rate(row.get("travel_median"))),
-    ("energy deg2/s2", lambda row, _: _rate(row.get("energy_median"))),
+    ("error before, deg/s 50/90 %", _cell("{:.3g}".format, "before_median", "before_90")),
+    ("after", _cell("{:.3g}".format, "after_median", "after_90")),
+    ("travel deg/s", _cell("{:.3g}".format, "travel_median")),
+    ("energy deg2/s2", _cell("{:.3g}".format, "energy_median")),
 )
 
 
 def sections(part: Document) -> list[tuple[list[str], list[list[str]]]]:
     """(header, rows) of the schemes with our law, and of the laws with our scheme."""
-    schemes = [row for row in part["lines"] if row["law"] == LAW]
-    laws = [row for row in part["lines"] if row["scheme"] == SCHEME]
-    return [_section(DIAGNOSIS, schemes, part), _section(CONTROL, laws, part)]
-
-
-def _section(
-    columns: Sequence[tuple[str, Cell]], rows: Sequence[Document], part: Document
-) -> tuple[list[str], list[list[str]]]:
-    return [name for name, _ in columns], [[cell(row, part) for _, cell in columns] for row in rows]
+    lines = [row | {"free": part["without_false_alarm"].get(row["scheme"])} for row in part["lines"]]
+    schemes = [row for row in lines if row["law"] == LAW]
+    laws = [row for row in lines if row["scheme"] == SCHEME]
+    return [
+        ([name for name, _ in columns], [[cell(row) for _, cell in columns] for row in rows])
+        for columns, rows in ((DIAGNOSIS, schemes), (CONTROL, laws))
+    ]
 
 
 def as_text(document: Document) -> str:
@@ -200,13 +182,9 @@ def _draw_ratios(axis: "Axes", part: Document) -> None:
 
 
 def run_comparison(
-    out: Path,
-    name: str,
-    cases: Sequence[SetFlight],
-    entries: Sequence[Entry],
-    workers: int = 1,
-    progress: Progress | None = None,
-) -> Document:
+    out: Path, name: str, cases: Sequence[SetFlight], entries: Sequence[Entry], workers: int,
+    progress: Progress | None,
+) -> Document:  # fmt: skip
     """Write `out/<name>/` (document, figure, page) of every case with every entry; return the document."""
     study = Study(
         name, cases, partial(fly_case, entries=tuple(entries)), partial(document_of, entries=entries),

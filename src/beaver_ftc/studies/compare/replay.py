@@ -5,7 +5,6 @@ and played back to each. What is kept of a detector's statistic is exact and sho
 the fault, and each value after it that was larger than all before.
 """
 
-from bisect import bisect_right
 from collections.abc import Sequence
 from copy import deepcopy
 from dataclasses import dataclass, replace
@@ -64,13 +63,9 @@ class Trace:
         return self.before > level
 
     def delay_s(self, level: float = 1.0) -> float:
-        """From the fault to the alarm at this level; infinite where there is none, or there was one
-        before."""
-        if self.before > level:
-            return inf
-        values = [value for _, value in self.records]
-        index = bisect_right(values, level)
-        return self.records[index][0] if index < len(self.records) else inf
+        """From the fault to the alarm at this level; infinite where there is none, or was one before."""
+        at_s = (at_s for at_s, value in self.records if value > level)
+        return inf if self.false_alarm(level) else next(at_s, inf)
 
 
 def alarms_at(traces: Sequence[Trace], level: float) -> tuple[int, float]:
@@ -139,9 +134,8 @@ def aware_of_the_air(recording: Recording) -> Recording:
         (measured._replace(acceleration=measured.acceleration + air), command)
         for (measured, command), air in zip(recording.seen, recording.air, strict=True)
     ]
-    return replace(
-        recording, context=clairvoyant.aware_of_the_air(recording.context, recording.air_noise), seen=seen
-    )
+    context = clairvoyant.aware_of_the_air(recording.context, recording.air_noise)
+    return replace(recording, context=context, seen=seen)
 
 
 def replay(recording: Recording, scheme: str, options: dict[str, float] | None = None) -> Trace:
@@ -149,26 +143,22 @@ def replay(recording: Recording, scheme: str, options: dict[str, float] | None =
     if scheme == "adaptive-estimators":
         return trace(recording, recording.built_in)
     detector: Detector = made(DETECTORS, scheme)
-    detector.reset(Context(**{**vars(recording.context), "options": options or {}}))
+    detector.reset(replace(recording.context, options=options or {}))
     began = process_time()
     verdicts = [detector.step(measured, command) for measured, command in recording.seen]
     us = 1e6 * (process_time() - began) / max(len(verdicts), 1)
     return trace(recording, np.array([_statistic(verdict) for verdict in verdicts]), us)
 
 
-def replay_together(
-    recordings: Sequence[Recording], scheme: str, options: dict[str, float] | None = None
-) -> list[Trace]:
+def replay_together(recordings: Sequence[Recording], scheme: str) -> list[Trace]:
     """The traces of a plugged-in scheme over flights that are the same until their faults strike.
 
     What they have in common is played once; from there on each has a copy of the detector.
     """
-    first = recordings[0]
-    common = _frames_in_common(recordings)
-    context = Context(**{**vars(first.context), "options": options or {}})
+    common, context = _frames_in_common(recordings), replace(recordings[0].context, options={})
     detector: Detector = made(DETECTORS, scheme)
     detector.reset(context)
-    before = [_statistic(detector.step(*shown)) for shown in first.seen[:common]]
+    before = [_statistic(detector.step(*shown)) for shown in recordings[0].seen[:common]]
     traces = []
     for recording in recordings:
         apart = deepcopy(detector, {id(context): context, id(context.model): context.model})

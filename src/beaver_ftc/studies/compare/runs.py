@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.documents.problems import one_line
 from beaver_ftc.results.style import BLACK
+from beaver_ftc.studies.present.figures import panels
+from beaver_ftc.studies.present.page import save
 from beaver_ftc.studies.present.tables import aligned, number
 
 if TYPE_CHECKING:
@@ -18,6 +20,7 @@ Document = dict[str, Any]
 _AXES = ("p", "q", "r")
 NOTHING = "-"
 STAR = "* differs between the runs"
+_ALLOWED = "allowed: a result folder of beaver-ftc run"
 
 
 def read_runs(folders: Sequence[Path]) -> list[Document]:
@@ -27,19 +30,13 @@ def read_runs(folders: Sequence[Path]) -> list[Document]:
     for folder in folders:
         try:
             runs.append(_read(folder))
-        except BadInput as error:
-            mistakes.append(str(error))
-        except (OSError, ValueError, KeyError, TypeError) as error:
-            mistakes.append(f"{folder}: {_why(error)}, allowed: a result folder of beaver-ftc run")
+        except OSError as error:
+            mistakes.append(f"{folder}: holds no {Path(error.filename).name}, {_ALLOWED}")
+        except (ValueError, KeyError, TypeError):
+            mistakes.append(f"{folder}: holds a metrics.json that cannot be read, {_ALLOWED}")
     if mistakes:
         raise BadInput("\n".join(mistakes))
     return runs
-
-
-def _why(error: Exception) -> str:
-    if isinstance(error, OSError):
-        return f"holds no {Path(error.filename).name}"
-    return "holds a metrics.json that cannot be read"
 
 
 def _read(folder: Path) -> Document:
@@ -90,13 +87,8 @@ def fault_words(fault: Document) -> str:
         for key, value in fault.items()
         if key not in ("at_s", "end_s") and isinstance(value, int | float) and not isinstance(value, bool)
     ]
-    what = [
-        fault.get("actuator") or fault.get("sensor"),
-        fault["type"].replace("_", " "),
-        *sizes,
-        f"at {fault['at_s']:g} s",
-    ]
-    return " ".join(filter(None, what))
+    where = fault.get("actuator") or fault.get("sensor")
+    return " ".join(filter(None, [where, fault["type"].replace("_", " "), *sizes, f"at {fault['at_s']:g} s"]))
 
 
 def as_text(runs: Sequence[Document]) -> str:
@@ -118,11 +110,9 @@ def labels(runs: Sequence[Document]) -> list[str]:
 
 def figure_of(runs: Sequence[Document]) -> "Figure":
     """Tracking errors of all runs over time, one axis above the other; dotted: a fault begins."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(11.0, 9.0), layout="constrained")
+    figure, grid = panels(3, 1, 11.0, 9.0, dpi=120, sharex=True)
     figure.suptitle(f"Tracking errors of {', '.join(labels(runs))}", fontsize=11, wrap=True)
-    axes = figure.subplots(3, 1, sharex=True)
+    axes = grid[:, 0]
     for run, label in zip(runs, labels(runs), strict=True):
         _draw(axes, Path(run["folder"]), label)
     struck = sorted({run["fault"]["at_s"] for run in runs if run["fault"]})
@@ -151,7 +141,7 @@ def write_runs(out: Path, folders: Sequence[Path]) -> list[Document]:
     runs = read_runs(folders)
     show_in_reports()
     with result_folder(out, "runs") as folder:
-        figure_of(runs).savefig(folder / "runs.png", dpi=120)
+        save(figure_of(runs), folder / "runs.png")
         (folder / "runs.json").write_text(as_json(runs), encoding="utf-8")
         write_report(folder / "runs.html", folders, labels(runs))
     return runs

@@ -2,7 +2,7 @@
 what tables, figure, page and `--format json` are made from.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from math import inf
 from statistics import median
@@ -104,28 +104,28 @@ def matched(traces: Sequence[Trace], per_hour: float = 0.0) -> Point:
     return min(points, key=lambda point: point.level)
 
 
-# (key of a line, what it is called, whether more is better); what is held against ours in `verdicts`
-COMPARED = (
-    ("false_alarms_per_h", "false alarms per hour", False),
-    ("detection_rate", "detection rate", True),
-    ("delay_median_s", "median detection delay, s", False),
-    ("delay_90_s", "90 % detection delay, s", False),
-    ("isolation_rate", "isolation accuracy", True),
-)
-MATCHED = (("detection_rate", "detection rate", True), ("delay_median_s", "median detection delay, s", False))
-TRACKING = (
-    ("ratio_median", "median tracking ratio to the oracle", False),
-    ("ratio_90", "90 % tracking ratio to the oracle", False),
-    ("departures", "departures", False),
-)
-EFFORT = (
-    ("before_median", "median error before the fault, deg/s", False),
-    ("before_90", "90 % error before the fault, deg/s", False),
-    ("after_median", "median error after the fault, deg/s", False),
-    ("after_90", "90 % error after the fault, deg/s", False),
-    ("travel_median", "median travel of the surfaces, deg/s", False),
-    ("energy_median", "median energy of the surfaces, deg2/s2", False),
-)
+# What is held against ours in `better_than_ours`: of each key of a line, what it is called.
+MATCHED = {"detection_rate": "detection rate", "delay_median_s": "median detection delay, s"}
+COMPARED = {
+    "false_alarms_per_h": "false alarms per hour",
+    **MATCHED,
+    "delay_90_s": "90 % detection delay, s",
+    "isolation_rate": "isolation accuracy",
+}
+TRACKING = {
+    "ratio_median": "median tracking ratio to the oracle",
+    "ratio_90": "90 % tracking ratio to the oracle",
+    "departures": "departures",
+}
+EFFORT = {
+    "before_median": "median error before the fault, deg/s",
+    "before_90": "90 % error before the fault, deg/s",
+    "after_median": "median error after the fault, deg/s",
+    "after_90": "90 % error after the fault, deg/s",
+    "travel_median": "median travel of the surfaces, deg/s",
+    "energy_median": "median energy of the surfaces, deg2/s2",
+}
+MORE_IS_BETTER = ("detection_rate", "isolation_rate")
 
 
 def document_of(trials: Sequence[Trial], entries: Sequence[Entry]) -> Document:
@@ -140,18 +140,15 @@ def _set(trials: Sequence[Trial], entries: Sequence[Entry]) -> Document:
     traces = {s: [t.traces[s] for t in trials if s in t.traces] for s in schemes}
     lines = [{k: finite(v) for k, v in line.items()} for line in lines_of(trials, entries)]
     free = {s: _point(matched(of)) for s, of in traces.items()}
+    failed = {result.error for trial in trials for result in trial.results if result.error}
     return {
         "flights": len(trials),
         "lines": lines,
         "trade_off": {s: [_point(p) for p in trade_off(of)] for s, of in traces.items()},
         "without_false_alarm": free,
         "better_than_ours": better_than_ours(lines, free if any(line["faults"] for line in lines) else {}),
-        "errors": sorted({error for trial in trials for error in _errors(trial)}),
+        "errors": sorted({error for trial in trials for error in trial.failures} | failed),
     }
-
-
-def _errors(trial: Trial) -> list[str]:
-    return [*trial.failures, *(result.error for result in trial.results if result.error)]
 
 
 def _point(point: Point) -> Document:
@@ -166,32 +163,23 @@ def better_than_ours(lines: Sequence[Document], free: Document) -> list[str]:
     ours = next(row for row in lines if (row["scheme"], row["law"]) == (SCHEME, LAW))
     schemes = [row for row in lines if row["law"] == LAW and row["scheme"] not in (SCHEME, "none")]
     laws = [row for row in lines if row["scheme"] == SCHEME and row["law"] not in (LAW, ORACLE)]
-    said = [s for row in schemes for s in _better(row, ours, COMPARED + TRACKING, row["scheme"])]
+    said = [s for row in schemes for s in _better(row, ours, COMPARED | TRACKING, row["scheme"])]
     said += [
         f"with no false alarm, {sentence}"
         for scheme, point in free.items()
         if scheme != SCHEME and SCHEME in free
         for sentence in _better(point, free[SCHEME], MATCHED, scheme)
     ]
-    return said + [s for row in laws for s in _better(row, ours, TRACKING + EFFORT, row["law"])]
+    return said + [s for row in laws for s in _better(row, ours, TRACKING | EFFORT, row["law"])]
 
 
-def _better(row: Document, ours: Document, compared: Sequence[tuple[str, str, bool]], name: str) -> list[str]:
-    return [
-        f"{name} has the better {what}: {_shown(row.get(key))} against {_shown(ours.get(key))}"
-        for key, what, more in compared
-        if _is_better(row.get(key), ours.get(key), more)
-    ]
-
-
-def _is_better(value: float | None, than: float | None, more: bool) -> bool:
+def _better(row: Document, ours: Document, compared: Mapping[str, str], name: str) -> Iterator[str]:
     """None is the worst there is: a delay that never ends, a rate of nothing."""
-    if value is None:
-        return False
-    if than is None:
-        return True
-    return value > than + 1e-9 if more else value < than - 1e-9
-
-
-def _shown(value: float | None) -> str:
-    return "never" if value is None else f"{value:.3g}"
+    for key, what in compared.items():
+        value, than = row.get(key), ours.get(key)
+        if value is None:
+            continue
+        sign = 1 if key in MORE_IS_BETTER else -1
+        if than is None or sign * value > sign * than + 1e-9:
+            against = "never" if than is None else f"{than:.3g}"
+            yield f"{name} has the better {what}: {value:.3g} against {against}"

@@ -13,7 +13,7 @@ from beaver_ftc.loop.loop import Loop
 from beaver_ftc.loop.outcome import Landing
 from beaver_ftc.results.metrics import metrics
 from beaver_ftc.scenario.schema import Scenario
-from beaver_ftc.studies.compare.replay import Recording, Trace, record, replay
+from beaver_ftc.studies.compare.replay import Trace, record, replay
 
 CALIBRATION = "calibration"
 CALIBRATION_ERRORS = "calibration-errors"
@@ -117,16 +117,15 @@ def entries_of(schemes: Sequence[str], laws: Sequence[str]) -> list[Entry]:
 def with_entry(scenario: Scenario, entry: Entry) -> Scenario:
     """The scenario with this scheme and this law; options are those of the one the scenario names, nobody
     else's."""
-    fdi: dict[str, Any] = {"scheme": entry.scheme, "options": options_for(scenario, entry.scheme)}
     control: dict[str, Any] = {"law": entry.law}
     if entry.law != scenario.control.law:
         control["options"] = {}
-    return scenario.model_copy(
-        update={
-            "fdi": scenario.fdi.model_copy(update=fdi),
-            "control": scenario.control.model_copy(update=control),
-        }
-    )
+    fdi = {"scheme": entry.scheme, "options": options_for(scenario, entry.scheme)}
+    changed = {
+        "fdi": scenario.fdi.model_copy(update=fdi),
+        "control": scenario.control.model_copy(update=control),
+    }
+    return scenario.model_copy(update=changed)
 
 
 def options_for(scenario: Scenario, scheme: str) -> dict[str, float]:
@@ -137,23 +136,17 @@ def options_for(scenario: Scenario, scheme: str) -> dict[str, float]:
 def fly_case(case: SetFlight, entries: Sequence[Entry]) -> Trial:
     """Fly a case with every entry; record it once under the nominal law for the trade-off of each scheme."""
     trial = Trial(case.set, [_fly(case.scenario, entry) for entry in entries])
-    schemes = [scheme for scheme in dict.fromkeys(entry.scheme for entry in entries) if scheme != "none"]
     try:
         recording = record(case.scenario)
     except BeaverFtcError as error:
         trial.failures.append(str(error))
         return trial
-    for scheme in schemes:
-        _trace(trial, recording, scheme, options_for(case.scenario, scheme))
+    for scheme in dict.fromkeys(entry.scheme for entry in entries if entry.scheme != "none"):
+        try:
+            trial.traces[scheme] = replay(recording, scheme, options_for(case.scenario, scheme))
+        except Exception as error:  # what a plug-in fails over is not the end of the comparison
+            trial.failures.append(f"{scheme}, on a recorded flight: {type(error).__name__}: {error}")
     return trial
-
-
-def _trace(trial: Trial, recording: Recording, scheme: str, options: dict[str, float]) -> None:
-    """Play the flight to a scheme; what a plug-in fails over is not the end of the comparison."""
-    try:
-        trial.traces[scheme] = replay(recording, scheme, options)
-    except Exception as error:
-        trial.failures.append(f"{scheme}, on a recorded flight: {type(error).__name__}: {error}")
 
 
 def _fly(scenario: Scenario, entry: Entry) -> Result:
@@ -173,24 +166,26 @@ def _fly(scenario: Scenario, entry: Entry) -> Result:
 def result_of(flight: Landing, entry: Entry, us: float) -> Result:
     """Boil a flight down."""
     document = metrics(flight)
-    fault, detection, isolation = document["fault"], document["detection"], document["isolation"]
-    end_s = flight.frames / flight.scenario.rate_hz
+    fault, isolation, tracking = document["fault"], document["isolation"], document["tracking"]
+    end_s, departed = flight.frames / flight.scenario.rate_hz, document["departure"] is not None
     correct = bool(isolation["correct"]) and not document["false_alarm"]
+    before, after = (_size(tracking[f"{part}_fault_rms_deg_s"]) for part in ("pre", "post"))
+    whole = before if tracking["post_fault_rms_deg_s"] is None else after
     return Result(
         entry=entry,
         false_alarm=document["false_alarm"],
         fault_free_s=document["fault_free_s"],
         faulted=fault is not None and end_s > fault["at_s"],
-        delay_s=_or_never(detection["delay_s"]),
+        delay_s=_or_never(document["detection"]["delay_s"]),
         isolated=isolation["fault"],
         correct=correct,
         isolation_delay_s=_or_never(isolation["delay_s"]) if correct else inf,
-        rms_deg_s=_rms(document),
-        before_deg_s=_part(document, "pre_fault_rms_deg_s"),
-        after_deg_s=_part(document, "post_fault_rms_deg_s"),
-        travel_deg_s=sum(document["tracking"]["surface_travel_deg"].values()) / end_s,
-        energy_deg2_s2=sum(document["tracking"]["surface_energy_deg2_s"].values()) / end_s,
-        departed=document["departure"] is not None,
+        rms_deg_s=inf if departed else whole,
+        before_deg_s=inf if departed and fault is None else before,
+        after_deg_s=inf if departed else after,
+        travel_deg_s=sum(tracking["surface_travel_deg"].values()) / end_s,
+        energy_deg2_s2=sum(tracking["surface_energy_deg2_s"].values()) / end_s,
+        departed=departed,
         us=us,
     )
 
@@ -199,16 +194,6 @@ def _or_never(value: float | None) -> float:
     return inf if value is None else value
 
 
-def _part(document: dict, part: str) -> float:
-    """RMS over all axes of a part of the flight; infinite after a departure in it, or where there is none."""
-    rms, after = document["tracking"][part], part.startswith("post")
-    fault = document["fault"]
-    lost = document["departure"] is not None and (after or fault is None)
-    return inf if rms is None or lost else hypot(*rms.values())
-
-
-def _rms(document: dict) -> float:
-    if document["departure"]:
-        return inf
-    tracking = document["tracking"]
-    return hypot(*(tracking["post_fault_rms_deg_s"] or tracking["pre_fault_rms_deg_s"]).values())
+def _size(rms: dict[str, float] | None) -> float:
+    """Over all axes; infinite of a part of the flight there is not."""
+    return inf if rms is None else hypot(*rms.values())

@@ -21,8 +21,8 @@ grid that suits it.
 
 import itertools
 import json
-from collections.abc import Callable, Sequence
-from functools import partial
+from collections.abc import Sequence
+from functools import cache, partial
 from math import isfinite
 from pathlib import Path
 from statistics import fmean
@@ -41,60 +41,48 @@ from beaver_ftc.studies.compare.trial import (
     result_of,
     with_entry,
 )
-from beaver_ftc.studies.engine.study import fly_all
+from beaver_ftc.studies.engine.study import Progress, fly_all
 
 Options = dict[str, float]
+Grid = dict[str, list[float]]  # values of each option that are tried
 
 MARGIN = 1.2
 DEPARTED_DEG_S = 10.0
 LEVEL = "alarm"
-DETECTORS: dict[str, dict[str, tuple[float, ...]]] = {
-    "rls-monitor": {"forgetting_s": (0.5, 2.0, 10.0), "score_s": (0.5, 1.0, 4.0)},
-    "augmented-ekf": {"noise": (1.0, 3.0, 10.0), "drift_per_s": (0.1, 0.5, 2.0)},
-    "augmented-ukf": {"noise": (1.0, 3.0), "drift_per_s": (0.03, 0.3), "allowance": (1.0, 3.0)},
-    "multiple-models": {"noise": (0.25, 0.5, 1.0), "stay": (0.99, 0.999)},
-    "observer-constant": {"pole_per_s": (10.0, 100.0, 1e4)},
-}
-DETECTORS_FOR_ERRORS: dict[str, dict[str, tuple[float, ...]]] = {
-    "rls-monitor": {"forgetting_s": (2.0, 10.0, 40.0), "score_s": (0.2, 0.5, 1.0)},
-    "augmented-ekf": {"noise": (0.3, 1.0, 3.0), "drift_per_s": (0.1, 0.3, 1.0)},
-    "augmented-ukf": {"noise": (0.3, 1.0), "drift_per_s": (0.03, 0.3), "allowance": (1.5, 2.5)},
-    "multiple-models": {"noise": (1.0, 3.0, 10.0), "stay": (0.999, 0.9999)},
-    "observer-constant": {"pole_per_s": (1.0, 3.0, 10.0, 30.0)},
-}
-LAWS: dict[str, dict[str, tuple[float, ...]]] = {
-    "indi": {"filter_per_s": (100.0, 200.0, 400.0)},
-    "l1-adaptive": {"bandwidth_per_s": (20.0, 40.0, 80.0)},
-    "lqr": {"deflection_deg": (3.0, 10.0, 30.0)},
-}
 # The level at which the statistic is 1 per unit of itself: traces at any level follow from it.
 _UNIT = {LEVEL: 1.0}
 
 
-def candidates(grid: dict[str, tuple[float, ...]]) -> list[Options]:
+@cache
+def grids() -> dict[str, dict[str, Grid]]:
+    """The grid of each rival: of "detectors", of "detectors for errors", of "laws"."""
+    found: dict[str, dict[str, Grid]] = json.loads(Path(__file__).with_name("grids.json").read_text("utf-8"))
+    return found
+
+
+def candidates(grid: Grid) -> list[Options]:
     """Every combination of a grid."""
     return [dict(zip(grid, values, strict=True)) for values in itertools.product(*grid.values())]
 
 
 def tune(
-    target_per_h: float,
-    workers: int = 1,
-    most: int | None = None,
-    progress: Callable[[float], None] | None = None,
-    errors: bool = False,
+    target_per_h: float, workers: int, most: int | None, progress: Progress | None, errors: bool
 ) -> dict[str, Any]:
     """The document of tuned.json. most: flights of each calibration sweep; None is all of them.
 
     errors: that of tuned_for_errors.json.
     """
     cases = of_set(CALIBRATION_ERRORS if errors else CALIBRATION, most)
-    grids = DETECTORS_FOR_ERRORS if errors else DETECTORS
-    played = fly_all(partial(_play, grids=grids), cases, workers, progress)
+    detectors = grids()["detectors for errors" if errors else "detectors"]
+    laws = {} if errors else grids()["laws"]
+    played = fly_all(partial(_play, grids=detectors), cases, workers, progress)
     air = [case.scenario.fdi.bounds.turbulence for case in cases]
-    options = {name: _best_detector(name, grid, played, air, target_per_h) for name, grid in grids.items()}
+    options = {
+        name: _best_detector(name, grid, played, air, target_per_h) for name, grid in detectors.items()
+    }
     faulted = [case for case in cases if case.scenario.faults]
-    options |= {name: _best_law(name, faulted, workers) for name in LAWS if not errors}
-    hours = sum(trace.healthy_s for flight in played for trace in [flight["observer-constant"][0]]) / 3600.0
+    options |= {name: _best_law(name, grid, faulted, workers) for name, grid in laws.items()}
+    hours = sum(flight["observer-constant"][0].healthy_s for flight in played) / 3600.0
     return {
         "procedure": f"beaver-ftc compare --tune{' --errors' if errors else ''}; docs/benchmark.md",
         "target_false_alarms_per_h": target_per_h,
@@ -104,13 +92,13 @@ def tune(
     }
 
 
-def write_tuned(document: dict[str, Any], path: Path | None = None, errors: bool = False) -> None:
+def write_tuned(document: dict[str, Any], errors: bool) -> None:
     """Keep what was found where the rivals read it."""
-    path = path or (TUNED_FOR_ERRORS if errors else TUNED)
+    path = TUNED_FOR_ERRORS if errors else TUNED
     path.write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
 
 
-def _play(case: SetFlight, grids: dict[str, dict[str, tuple[float, ...]]]) -> dict[str, list[Trace]]:
+def _play(case: SetFlight, grids: dict[str, Grid]) -> dict[str, list[Trace]]:
     """A flight played to every candidate of every detector."""
     recording = record(case.scenario)
     return {
@@ -120,11 +108,7 @@ def _play(case: SetFlight, grids: dict[str, dict[str, tuple[float, ...]]]) -> di
 
 
 def _best_detector(
-    name: str,
-    grid: dict[str, tuple[float, ...]],
-    played: Sequence[dict[str, list[Trace]]],
-    air: Sequence[str],
-    target_per_h: float,
+    name: str, grid: Grid, played: Sequence[dict[str, list[Trace]]], air: Sequence[str], target_per_h: float
 ) -> Options:
     """The candidate with the least delay at its own alarm level; air: what each flight declares of it."""
     found = []
@@ -144,9 +128,8 @@ def alarm_level(healthy: Sequence[Trace], target_per_h: float) -> float:
     hours = sum(trace.healthy_s for trace in healthy) / 3600.0
     allowed = int(target_per_h * hours)
     largest = sorted((trace.before for trace in healthy), reverse=True)
-    if allowed == 0:
-        return round(MARGIN * largest[0], 6)
-    return round(largest[min(allowed, len(largest) - 1)], 6)
+    level = largest[min(allowed, len(largest) - 1)] if allowed else MARGIN * largest[0]
+    return round(level, 6)
 
 
 def _cost(trace: Trace, level: float) -> float:
@@ -155,12 +138,11 @@ def _cost(trace: Trace, level: float) -> float:
     return delay if isfinite(delay) else 10.0
 
 
-def _best_law(name: str, faulted: Sequence[SetFlight], workers: int) -> Options:
-    costs = [
-        fmean(fly_all(partial(_law_cost, name=name, option=option), faulted, workers))
-        for option in candidates(LAWS[name])
-    ]
-    return candidates(LAWS[name])[costs.index(min(costs))]
+def _best_law(name: str, grid: Grid, faulted: Sequence[SetFlight], workers: int) -> Options:
+    def cost(option: Options) -> float:
+        return fmean(fly_all(partial(_law_cost, name=name, option=option), faulted, workers))
+
+    return min(candidates(grid), key=cost)
 
 
 def _law_cost(case: SetFlight, name: str, option: Options) -> float:

@@ -4,7 +4,8 @@ The data sets of a folder are ENAC's tables beside their vehicle file and ALFA's
 setting is frozen before the flight that is left out is looked at; rivals stand beside ours.
 """
 
-from collections.abc import Iterator, Sequence
+import json
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -25,36 +26,26 @@ from beaver_ftc.flights.vehicle import Vehicle, load_vehicle
 from beaver_ftc.results.metrics import as_json
 from beaver_ftc.results.style import SERIES
 from beaver_ftc.studies.engine.statistics import poisson
-from beaver_ftc.studies.present.figures import panels
+from beaver_ftc.studies.present.figures import GRID, panels
 from beaver_ftc.studies.present.page import Files, replace_between
 from beaver_ftc.studies.present.tables import aligned, markdown_table
 
 Document = dict[str, Any]
 Table = tuple[list[str], list[list[str]]]
-FIGURES = ("classes", "healthy_or_faulty", "side", "mean_error", "held_by_bounds")
+FIGURES = {
+    "classes": "classes", "healthy_or_faulty": "healthy or faulty", "side": "side",
+    "mean_error": "mean error", "held_by_bounds": "held by 90 % bounds",
+}  # fmt: skip
+PUBLISHED = Path(__file__).with_name("published.json")  # of each data set: what others found
 SOON_S = 5.0
-_KINDS = {"left_aileron": "aileron", "right_aileron": "aileron", "rudder": "rudder", "elevator": "elevator"}
+KINDS = ("aileron", "rudder", "elevator")
+_KIND_OF = {"left_aileron": "aileron", "right_aileron": "aileron"}
 OURS = "bank of filters (ours)"
 FREEZE = "freeze rule, 6 s, on the logged outputs"
 TITLES = {
     "bank-of-filters": OURS,
     "sliding-least-squares": "sliding least squares, 20 s",
     "forgetting-least-squares": "forgetting least squares, 20 s",
-}
-PUBLISHED: dict[str, list[Document]] = {
-    "alfa": [
-        {
-            "method": "recursive least-squares monitor [Keipour2019], 22 flights, as published",
-            "precision": 0.88,
-            "recall": 0.88,
-            "accuracy": 0.86,
-            "delay_s": {"rudder": {"mean": 0.21}, "elevator": {"mean": 0.36}, "aileron": {"mean": 3.3}},
-        }
-    ],
-    "enac": [
-        {"method": "support vector machine [Bronz2020], within one flight, as published", "classes": 0.94},
-        {"method": "support vector machine [Bronz2020], two days later, as published", "classes": 0.48},
-    ],
 }
 _MARKS = "os^DXPv<>*ph"
 _HATCHES = ("", "//", "..")  # where the colours begin again
@@ -117,11 +108,13 @@ def files_of(document: Document) -> Files:
 
 
 def _compare(data: DataSet) -> Document:
-    stretches = stretches_of(data.flights)
-    whole = settings_of(stretches, data)
+    stretches, alone = stretches_of(data.flights), len(data.flights) == 1
+    # Of one flight's halves neither shows all the levels that the test is about: there the settings, and only
+    # they, are those of the whole.
+    whole = settings_of(stretches, data) if alone else None
     flights: list[Document] = []
     for fitted, kept, name in folds(stretches):
-        model = _frozen(fitted, data, whole)
+        model = fit_model(fitted, data.vehicle, whole)
         recording = next(one for one in data.recordings if one.name == kept.samples.name)
         flights += [
             {"left_out": name, "method": method, **_score(kept, rows, model)}
@@ -135,9 +128,9 @@ def _compare(data: DataSet) -> Document:
         "set": data.name,
         "vehicle": data.vehicle.name,
         "scored_by": "labels" if labelled else "events",
-        "left_out": "halves of the one flight in turn" if len(data.flights) == 1 else "each flight in turn",
+        "left_out": "halves of the one flight in turn" if alone else "each flight in turn",
         "rows": [{"method": method, **summarise(scores)} for method, scores in rows_of.items()],
-        "published": PUBLISHED.get(data.name, []),
+        "published": json.loads(PUBLISHED.read_text(encoding="utf-8")).get(data.name, []),
         "flights": flights,
     }
 
@@ -159,34 +152,27 @@ def settings_of(stretches: list[Stretch], data: DataSet) -> Settings:
     return model.settings.model_copy(update={"bounds": run_tests(stretches, model)[1]})
 
 
-def _frozen(fitted: list[Stretch], data: DataSet, whole: Settings) -> Model:
-    """A model of the flights that are not left out, settings included.
-
-    Of one flight's halves neither shows all the levels that the test is about: there the settings, and only
-    they, are those of the whole.
-    """
-    return fit_model(fitted, data.vehicle, whole if len(data.flights) == 1 else None)
-
-
 def _score(kept: Stretch, rows: Rows, model: Model) -> Document:
     if np.isfinite(kept.samples.labels).any():
-        return scoring.by_labels(rows, np.where(kept_rows(kept)[:, None], kept.samples.labels, np.nan))
+        return scoring.by_labels(rows, kept_labels(kept))
     return scoring.by_event(rows, kept.samples.events, model.groups)
 
 
-def kept_rows(kept: Stretch) -> np.ndarray:
-    """The whole span of what is kept, edges of labels included: they count in the score."""
-    used = np.flatnonzero(kept.use)
-    span = np.zeros(len(kept.use), dtype=bool)
+def kept_labels(kept: Stretch) -> np.ndarray:
+    """Labels in the whole span of what is kept, their edges included: they count in the score; else NaN."""
+    used, labels = np.flatnonzero(kept.use), np.full_like(kept.samples.labels, np.nan)
     if used.size:
-        span[used[0] : used[-1] + 1] = True
-    return span
+        span = slice(used[0], used[-1] + 1)
+        labels[span] = kept.samples.labels[span]
+    return labels
 
 
 def by_events(scores: Sequence[Document]) -> Document:
     """From each flight's score against its failure. A flight whose surface failed is found if an alarm comes
     after; a flight with an alarm before its failure, or without any failure, counts as a false one."""
-    surface = [one for one in scores if one["failure"] and ENGINE not in one["failure"]]
+    failed = [one for one in scores if one["failure"]]
+    engine = [one for one in failed if ENGINE in one["failure"]]
+    surface = [one for one in failed if ENGINE not in one["failure"]]
     found = [one for one in surface if one["detected"]]
     falsely = [one for one in scores if one["false_alarms"]]
     healthy = [one for one in scores if one["failure"] is None]
@@ -205,15 +191,14 @@ def by_events(scores: Sequence[Document]) -> Document:
         "false_alarms_per_hour": {"value": alarms.value, "low": alarms.low, "high": alarms.high},
         "healthy_hours": hours,
         "wrong_group": sum(one["right_group"] is False for one in found),
-        "delay_s": {kind: _delays(surface, kind) for kind in ("aileron", "rudder", "elevator")},
-        "engine_failures_with_an_alarm": sum(
-            one["detected"] for one in scores if one["failure"] and ENGINE in one["failure"]
-        ),
+        "delay_s": {kind: _delays(surface, kind) for kind in KINDS},
+        "engine_failures_with_an_alarm": sum(one["detected"] for one in engine),
     }
 
 
 def _delays(surface: Sequence[Document], kind: str) -> Document:
-    ours = [one for one in surface if _kind(one["failure"]) == kind]
+    """Where several fail in one flight, the first in the alphabet counts: an aileron before a rudder."""
+    ours = [one for one in surface if min(_KIND_OF.get(s, s) for s in one["failure"].split("+")) == kind]
     delays = [one["delay_s"] for one in ours if one["detected"]]
     return {
         "failures": len(ours),
@@ -223,18 +208,11 @@ def _delays(surface: Sequence[Document], kind: str) -> Document:
     }
 
 
-def _kind(failure: str) -> str:
-    """What failed first in the name: an aileron before a rudder, as both do in one flight."""
-    kinds = [_KINDS.get(name, name) for name in failure.split("+")]
-    return min(kinds)
-
-
 def by_labels(scores: Sequence[Document]) -> Document:
     """Mean of the figures over the parts that were left out, weighted by their rows."""
     weights = np.array([one["rows"] for one in scores], dtype=float)
-    return {key: float(np.average([one[key] for one in scores], weights=weights)) for key in FIGURES} | {
-        "rows": int(weights.sum())
-    }
+    means = {key: float(np.average([one[key] for one in scores], weights=weights)) for key in FIGURES}
+    return means | {"rows": int(weights.sum())}
 
 
 def tables(document: Document) -> list[tuple[str, Table]]:
@@ -243,25 +221,15 @@ def tables(document: Document) -> list[tuple[str, Table]]:
         return _of_days(document["other_days"])
     found = []
     for part in document["sets"]:
-        by_labels = part["scored_by"] == "labels"
-        table = _labels(part) if by_labels else _events(part)
-        found.append((f"{part['set']}: left out, {part['left_out']}", table))
+        header, row_of = (LABELS, _label_row) if part["scored_by"] == "labels" else (EVENTS, _event_row)
+        rows = [row_of(row) for row in (*part["rows"], *part["published"])]
+        found.append((f"{part['set']}: left out, {part['left_out']}", (header, rows)))
     return found
 
 
-def _labels(part: Document) -> Table:
-    header = ["method", "classes", "healthy or faulty", "side", "mean error", "held by 90 % bounds"]
-    rows = [
-        [row["method"], *(_number(row.get(key)) for key in FIGURES)]
-        for row in [*part["rows"], *part["published"]]
-    ]
-    return header, rows
-
-
-def _of_days(document: Document) -> list[tuple[str, tuple[list[str], list[list[str]]]]]:
+def _of_days(document: Document) -> list[tuple[str, Table]]:
     """A title and a table for each data set: every day, then mean and worst of each kind."""
-    header = ["day", "classes", "healthy or faulty", "side", "mean error", "held by 90 % bounds",
-              "classes by sliding least squares"]  # fmt: skip
+    header = ["day", *FIGURES.values(), "classes by sliding least squares"]
     found = []
     for part in document["sets"]:
         cells = [[row["day"], *_cells(row)] for row in part["rows"] if row["kind"] == "one change"]
@@ -275,34 +243,37 @@ def _cells(row: Document) -> list[str]:
     return [f"{row[key]:.3f}" for key in (*FIGURES, "beside")]
 
 
-def _events(part: Document) -> Table:
-    header = [
-        "method", "precision", "recall", "accuracy", "mean delay, s: aileron", "rudder", "elevator",
-        "ailerons and rudders within 5 s", "false alarms an hour (95 %)", "healthy flights with an alarm",
-        "wrong group",
-    ]  # fmt: skip
-    return header, [_event_row(row) for row in [*part["rows"], *part["published"]]]
+LABELS = ["method", *FIGURES.values()]
+EVENTS = [
+    "method", "precision", "recall", "accuracy", "mean delay, s: aileron", "rudder", "elevator",
+    "ailerons and rudders within 5 s", "false alarms an hour (95 %)", "healthy flights with an alarm",
+    "wrong group",
+]  # fmt: skip
+
+
+def _label_row(row: Document) -> list[str]:
+    return [row["method"], *_shares(row, FIGURES)]
 
 
 def _event_row(row: Document) -> list[str]:
-    delays = row["delay_s"]
-    alarms = row.get("false_alarms_per_hour")
-    lateral = [delays[kind] for kind in ("aileron", "rudder") if "within_5_s" in delays.get(kind, {})]
+    """Of what others published only some is known."""
+    delays = [row["delay_s"].get(kind, {}) for kind in KINDS]
+    cells = [row["method"], *_shares(row, EVENTS[1:4]), *map(_delay, delays)]
+    if "false_alarms_per_hour" not in row:
+        return cells + [""] * (len(EVENTS) - len(cells))
+    soon, failures = (sum(of[key] for of in delays[:2]) for key in ("within_5_s", "failures"))
+    alarms = row["false_alarms_per_hour"]
     return [
-        row["method"],
-        *(_number(row.get(key)) for key in ("precision", "recall", "accuracy")),
-        *(_delay(delays.get(kind, {})) for kind in ("aileron", "rudder", "elevator")),
-        f"{sum(x['within_5_s'] for x in lateral)} of {sum(x['failures'] for x in lateral)}"
-        if lateral
-        else "",
-        f"{alarms['value']:.1f} ({alarms['low']:.1f} to {alarms['high']:.1f})" if alarms else "",
-        f"{row['healthy_flights_with_an_alarm']} of {row['healthy_flights']}" if alarms else "",
-        str(row.get("wrong_group", "")),
+        *cells,
+        f"{soon} of {failures}",
+        f"{alarms['value']:.1f} ({alarms['low']:.1f} to {alarms['high']:.1f})",
+        f"{row['healthy_flights_with_an_alarm']} of {row['healthy_flights']}",
+        str(row["wrong_group"]),
     ]
 
 
-def _number(value: float | None) -> str:
-    return "" if value is None else f"{value:.3f}"
+def _shares(row: Document, keys: Iterable[str]) -> list[str]:
+    return ["" if row.get(key) is None else f"{row[key]:.3f}" for key in keys]
 
 
 def _delay(of: Document) -> str:
@@ -319,9 +290,8 @@ def as_text(document: Document) -> str:
 
 def as_markdown(document: Document) -> str:
     """The tables for a Markdown page."""
-    return "\n".join(
-        f"### {title}\n\n{markdown_table(head, rows)}\n" for title, (head, rows) in tables(document)
-    )
+    found = tables(document)
+    return "\n".join(f"### {title}\n\n{markdown_table(head, rows)}\n" for title, (head, rows) in found)
 
 
 def marks(document: Document) -> tuple[str, str]:
@@ -351,21 +321,20 @@ def figure_of(document: Document) -> Any:
 def _draw_events(axis: Any, part: Document) -> None:
     """Delay of each method on each surface failure; what is not found stands at the top."""
     methods = [row["method"] for row in part["rows"]]
-    failures = [one for one in part["flights"] if one["method"] == methods[0] and one["failure"]]
-    failures = [one["left_out"] for one in failures if "engine" not in one["failure"]]
+    named = {one["left_out"]: one["failure"] for one in part["flights"]}
+    failures = [name for name, failure in named.items() if failure and ENGINE not in failure]
     for i, method in enumerate(methods):
         mine = {one["left_out"]: one for one in part["flights"] if one["method"] == method}
         delays = [mine[name]["delay_s"] for name in failures]
         heights = [_LATEST_S if delay is None else min(delay, _LATEST_S) for delay in delays]
         places = [k + _offset(i, len(methods)) for k in range(len(failures))]
-        axis.plot(places, heights, _mark(i), color=_colour(i), markersize=6, label=method)
-    named = {one["left_out"]: one["failure"] for one in part["flights"]}
+        axis.plot(places, heights, _MARKS[i % len(_MARKS)], color=_colour(i), markersize=6, label=method)
     axis.set_xticks(range(len(failures)), [named[name].replace("+", "\n+ ") for name in failures])
     axis.set_ylabel("delay, s", fontsize=8)
     axis.set_ylim(0, _LATEST_S + 1.5)
     axis.axhline(_LATEST_S, color="#999999", linewidth=0.8, linestyle=":", label="not found, or later")
     axis.axhline(5.0, color="#999999", linewidth=0.8, linestyle="--", label="5 s")
-    axis.grid(axis="y", color="#dddddd", linewidth=0.5)
+    axis.grid(axis="y", color=GRID, linewidth=0.5)
 
 
 def _draw_labels(axis: Any, part: Document) -> None:
@@ -382,7 +351,7 @@ def _draw_labels(axis: Any, part: Document) -> None:
     axis.set_ylabel("share of rows right", fontsize=8)
     axis.set_ylim(0, 1)
     axis.set_axisbelow(True)
-    axis.grid(axis="y", color="#dddddd", linewidth=0.5)
+    axis.grid(axis="y", color=GRID, linewidth=0.5)
 
 
 def _offset(i: int, methods: int) -> float:
@@ -392,7 +361,3 @@ def _offset(i: int, methods: int) -> float:
 
 def _colour(i: int) -> str:
     return SERIES[i % len(SERIES)]
-
-
-def _mark(i: int) -> str:
-    return _MARKS[i % len(_MARKS)]

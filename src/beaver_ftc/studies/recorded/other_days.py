@@ -60,19 +60,17 @@ def grid(mixer: Floats, commands: list[str]) -> list[Day]:
     """One thing changed at a time. mixer (S, C)."""
     same = nominal(len(mixer))
     days = [same]
-    for i, command in enumerate(commands):
+    for command, moves in zip(commands, mixer.T, strict=True):
         for shift in (-0.04, 0.04):
-            moved = shift * mixer[:, i]
-            days.append(replace(same, name=f"trim of {command} {shift:+.2f}", trim=moved))
-            days.append(replace(same, name=f"neutral of {command} {shift:+.2f}", neutral=moved))
+            days.append(replace(same, name=f"trim of {command} {shift:+.2f}", trim=shift * moves))
+            days.append(replace(same, name=f"neutral of {command} {shift:+.2f}", neutral=shift * moves))
     days += [replace(same, name=f"gain {gain:.2f}", gain=gain) for gain in (0.85, 1.15)]
     days += [replace(same, name=f"commands {late:+.2f} s", late_s=late) for late in (-0.04, 0.04)]
     days += [replace(same, name=f"excitation {size:.1f}", excitation=size) for size in (0.6, 1.5)]
-    days += [replace(same, name=f"noise {noise:.1f}", noise=noise) for noise in (1.5,)]
-    days += [replace(same, name="trim drifts", drift=0.01)]
-    for i in range(len(mixer)):
+    days += [replace(same, name="noise 1.5", noise=1.5), replace(same, name="trim drifts", drift=0.01)]
+    for i, surface in enumerate(np.eye(len(mixer))):
         for gain in (0.94, 1.06):
-            own = np.where(np.arange(len(mixer)) == i, gain, 1.0)
+            own = np.where(surface, gain, 1.0)
             days.append(replace(same, name=f"surface {i + 1} by {gain:.2f}", own=own))
     return days
 
@@ -176,8 +174,7 @@ def _rows(
     for day in days:
         scores: dict[str, list[Document]] = {BANK: [], _BESIDE: []}
         for model, kept in models:
-            altered = on(day, kept.samples, past, noise)
-            labels = np.where(benchmark.kept_rows(kept)[:, None], kept.samples.labels, np.nan)
+            altered, labels = on(day, kept.samples, past, noise), benchmark.kept_labels(kept)
             for name, found in scores.items():
                 found.append(scoring.by_labels(diagnose_with(name, altered, model), labels))
         beside = benchmark.by_labels(scores[_BESIDE])["classes"]
@@ -186,10 +183,6 @@ def _rows(
 
 def _summary(kind: str, rows: Sequence[Document]) -> Document:
     """Mean and worst of each figure."""
-    keys = (*benchmark.FIGURES, "beside")
-    worst = {key: _WORST.get(key, min)(row[key] for row in rows) for key in keys}
-    return {
-        "kind": kind,
-        "mean": {key: float(np.mean([row[key] for row in rows])) for key in keys},
-        "worst": worst,
-    }
+    values = {key: [row[key] for row in rows] for key in (*benchmark.FIGURES, "beside")}
+    mean = {key: float(np.mean(of)) for key, of in values.items()}
+    return {"kind": kind, "mean": mean, "worst": {k: _WORST.get(k, min)(of) for k, of in values.items()}}

@@ -6,9 +6,10 @@ stopped goes on where it was, and a longer one builds on a shorter one.
 """
 
 import json
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import product
 from math import ceil, exp
 from pathlib import Path
 from typing import Any
@@ -18,13 +19,14 @@ import numpy as np
 from beaver_ftc import __version__
 from beaver_ftc.aircraft import load
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
+from beaver_ftc.loop.loop import fly
 from beaver_ftc.loop.outcome import Landing
 from beaver_ftc.results.metrics import fault_free_s
 from beaver_ftc.scenario.faults import LossOfEffectiveness
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.engine.statistics import CONFIDENCE, binomial_upper, poisson_bound, share_within
 from beaver_ftc.studies.engine.store import Parts, RowsAsJson, fingerprint, write_whole
-from beaver_ftc.studies.engine.study import GO_ON, Batch, Batches
+from beaver_ftc.studies.engine.study import GO_ON, Batch, Batches, Progress
 from beaver_ftc.studies.engine.study import conduct as fly_missing
 from beaver_ftc.studies.engine.workers import Work
 from beaver_ftc.studies.present.tables import finite, number
@@ -39,8 +41,7 @@ _INERTIA, _AMPLITUDE_RAD_S2, _FREQUENCY_RAD_S = 0.25, 0.02, (0.1, 60.0)
 _AT_THE_BOUND = 0.3  # share of flights with an uncertainty at its very bound
 
 _COARSE = 0.05  # share of flights with several JSBSim frames in a frame of the loop
-
-_HEALTHY, _FAULTY = 0, 1
+KINDS = ("healthy", "faulty")
 
 
 @dataclass(frozen=True)
@@ -56,16 +57,11 @@ class Draw:
         """What it is known by in its campaign."""
         return self.kind, self.index
 
-    def generator(self) -> np.random.Generator:
-        """This flight's own random numbers."""
-        key = (_FAULTY if self.kind == "faulty" else _HEALTHY, self.index)
-        return np.random.default_rng(np.random.SeedSequence(self.seed, spawn_key=key))
-
     def scenario(self, fdi: dict[str, Any] | None = None) -> Scenario:
         """The flight, diagnosed as `fdi` says."""
-        rng = self.generator()
-        faulty = self.kind == "faulty"
-        fault = _fault(rng) if faulty else None
+        key = KINDS.index(self.kind), self.index
+        rng = np.random.default_rng(np.random.SeedSequence(self.seed, spawn_key=key))
+        fault = _fault(rng) if self.kind == "faulty" else None
         return Scenario.model_validate({
             "name": f"{self.kind}-{self.index}",
             "duration_s": fault["at_s"] + AFTER_FAULT_S if fault else HEALTHY_S,
@@ -116,16 +112,15 @@ def _within(rng: np.random.Generator, bound: float) -> float:
 def _uncertainty(rng: np.random.Generator) -> dict[str, Any]:
     """All that the published bounds admit [Zhang2005, sec. VII]."""
     sign = {axis: rng.choice([-1.0, 1.0]) for axis in AXES}
-    return {
-        "inertia_coupling": {axis: sign[axis] * _within(rng, _INERTIA) for axis in AXES},
-        "sinusoid": {
-            axis: {
-                "amplitude_rad_s2": _within(rng, _AMPLITUDE_RAD_S2),
-                "frequency_rad_s": _log_uniform(rng, *_FREQUENCY_RAD_S),
-            }
-            for axis in AXES
-        },
+    coupling = {axis: sign[axis] * _within(rng, _INERTIA) for axis in AXES}
+    sinusoid = {
+        axis: {
+            "amplitude_rad_s2": _within(rng, _AMPLITUDE_RAD_S2),
+            "frequency_rad_s": _log_uniform(rng, *_FREQUENCY_RAD_S),
+        }
+        for axis in AXES
     }
+    return {"inertia_coupling": coupling, "sinusoid": sinusoid}
 
 
 PUBLISHED, SHARPENED = "published", "sharpened"
@@ -144,9 +139,10 @@ _CONSTANT_ONLY = "constant"  # for faults that are: one that grows is outside wh
 _LATE_S = 1e-9  # rounding of frame times
 
 Row = dict[str, Any]
+Schemes = dict[str, dict[str, Any]]
 
 
-def fly_draw(draw: Draw, schemes: dict[str, dict[str, Any]] = SCHEMES) -> Row:
+def fly_draw(draw: Draw, schemes: Schemes) -> Row:
     """The row of a flight. A fault is flown once with each scheme, in all else the same flight."""
     try:
         return _faulty(draw, schemes) if draw.kind == "faulty" else _healthy(draw)
@@ -156,10 +152,7 @@ def fly_draw(draw: Draw, schemes: dict[str, dict[str, Any]] = SCHEMES) -> Row:
 
 def _healthy(draw: Draw) -> Row:
     """The published filter is the sharpened scheme's first, so one flight tells of both."""
-    from beaver_ftc.loop.loop import fly
-
-    scenario = draw.scenario()
-    flight = fly(scenario)
+    flight = fly(draw.scenario())
     return {
         "index": draw.index,
         "watched_s": fault_free_s(flight),
@@ -170,26 +163,18 @@ def _healthy(draw: Draw) -> Row:
     }
 
 
-def _faulty(draw: Draw, schemes: dict[str, dict[str, Any]]) -> Row:
-    from beaver_ftc.loop.loop import fly
-
+def _faulty(draw: Draw, schemes: Schemes) -> Row:
     row: Row = {"index": draw.index}
     for scheme, fdi in schemes.items():
         scenario = draw.scenario(fdi)
         abrupt = scenario.faults[0].profile == "abrupt"
         row[scheme] = judge(fly(scenario)) if abrupt or scheme != _CONSTANT_ONLY else row[SHARPENED]
-    fault = scenario.faults[0]
-    return row | {
-        "rate_hz": scenario.rate_hz,
-        "substeps": scenario.substeps,
-        **fault.model_dump(exclude_none=True),
-    }
+    frame = {"rate_hz": scenario.rate_hz, "substeps": scenario.substeps}
+    return row | frame | scenario.faults[0].model_dump(exclude_none=True)
 
 
 def judge(flight: Landing) -> Row:
-    """What became of the promises in a flight with one fault; delays in s from the first frame that bears
-    it.
-    """
+    """What became of the promises in a flight with one fault; delays in s from the first frame with it."""
     scenario = flight.scenario
     fault, frame_s = scenario.faults[0], 1.0 / scenario.rate_hz
     actuator = getattr(fault, "actuator", "unanticipated")
@@ -220,10 +205,7 @@ def _estimate_error(flight: Landing) -> float | None:
     return abs(flight.estimate + fault.magnitude * grown)
 
 
-KINDS = ("healthy", "faulty")
 CHUNK = 50
-Progress = Callable[[float], None]
-Schemes = dict[str, dict[str, Any]]
 
 
 @dataclass(frozen=True)
@@ -267,22 +249,19 @@ def conduct(
             progress(done / total)
 
     batches, parts = Batches(iter(chunks), total - done, note), Parts(folder, RowsAsJson(dict), GO_ON)
-    fly_missing(batches, Work(partial(_fly_draw, campaign.schemes)), workers, _crashed)
+    fly_missing(batches, Work(partial(fly_draw, schemes=campaign.schemes)), workers, _crashed)
     return {kind: [rows[kind][i] for i in range(campaign.wanted(kind))] for kind in KINDS}
 
 
-def _identity(campaign: Campaign) -> dict[str, Any]:
-    """What must be the same for rows to belong together: the seed, the version and the code that flies."""
-    return {
+def _open(folder: Path, campaign: Campaign) -> None:
+    """Raise BadInput unless the rows there belong with these: of one seed, version and code that flies."""
+    manifest = folder / "campaign.json"
+    mine = {
         "seed": campaign.seed,
         "schemes": list(campaign.schemes),
         "version": __version__,
         "code": fingerprint(),
     }
-
-
-def _open(folder: Path, campaign: Campaign) -> None:
-    manifest, mine = folder / "campaign.json", _identity(campaign)
     try:
         folder.mkdir(parents=True, exist_ok=True)
         if not manifest.exists():
@@ -311,15 +290,20 @@ def _missing(campaign: Campaign, kind: str, kept: dict[int, Row]) -> Iterator[Ba
         yield Batch(name, tuple(Draw(campaign.seed, kind, i) for i in chunk))
 
 
-def _fly_draw(schemes: Schemes, draw: Draw) -> Row:
-    return fly_draw(draw, schemes)
-
-
 def _crashed(draw: Draw, why: str) -> Row:
     raise SimulationFailed(f"{draw.kind} flight {draw.index} of seed {draw.seed}: {why}")
 
 
-PROMISES = ("false_alarms", "true_fault_exclusions", "wrong_isolations", "late_detections")
+# What breaks each promise, in the row of a scheme.
+_BROKEN = {
+    "false_alarms": "false_alarm", "true_fault_exclusions": "excluded", "wrong_isolations": "wrong",
+    "late_detections": "late",
+}  # fmt: skip
+PROMISES = tuple(_BROKEN)
+_SPREADS = {
+    "detection delay, s": "delay_s", "isolation delay, s": "isolation_delay_s",
+    "delay / guaranteed": "delay_over_guaranteed", "error of the estimate": "estimate_error",
+}  # fmt: skip
 
 
 def summarise(rows: dict[str, list[Row]]) -> dict[str, Any]:
@@ -327,17 +311,13 @@ def summarise(rows: dict[str, list[Row]]) -> dict[str, Any]:
 
     The published one is there for comparison: its isolation threshold presumes a constant parameter.
     """
-    healthy = [row for row in rows["healthy"] if "skipped" not in row]
-    faulty = [row for row in rows["faulty"] if "skipped" not in row]
+    healthy, faulty = ([row for row in rows[kind] if "skipped" not in row] for kind in KINDS)
+    schemes = [scheme for scheme in STEPS if faulty and scheme in faulty[0]]
     document: dict[str, Any] = {
         "healthy": _healthy_document(healthy),
         "faults": len(faulty),
-        "skipped": len(rows["healthy"]) + len(rows["faulty"]) - len(healthy) - len(faulty),
-        "schemes": {
-            scheme: _scheme([row[scheme] for row in faulty])
-            for scheme in STEPS
-            if faulty and scheme in faulty[0]
-        },
+        "skipped": sum("skipped" in row for kind in KINDS for row in rows[kind]),
+        "schemes": {scheme: _scheme([row[scheme] for row in faulty]) for scheme in schemes},
     }
     if faulty:
         document["delay_shorter_by"] = _shorter(document["schemes"])
@@ -351,30 +331,25 @@ def _healthy_document(rows: Sequence[Row]) -> dict[str, Any]:
     hours = sum(row["watched_s"] for row in rows) / 3600.0
     alarms = sum(row["alarm"] for row in rows)
     closest = np.max([row["closest"] for row in rows], axis=0).tolist() if rows else []
+    upper = poisson_bound(alarms, hours, CONFIDENCE, upper=True) if hours else None
     return {
         "flights": len(rows),
         "hours": hours,
         "false_alarms": alarms,
         "false_alarms_per_hour": alarms / hours if hours else None,
-        "false_alarms_per_hour_upper_95": poisson_bound(alarms, hours, CONFIDENCE, upper=True)
-        if hours
-        else None,
+        "false_alarms_per_hour_upper_95": upper,
         "departures": sum(row["departed"] for row in rows),
         "hours_outside_envelope": sum(row["outside_s"] for row in rows) / 3600.0,
-        "closest_approach": dict(zip(SCHEMES, closest, strict=False)) if len(rows) else {},
+        "closest_approach": dict(zip(SCHEMES, closest, strict=False)),
     }
 
 
 def _scheme(rows: Sequence[Row]) -> dict[str, Any]:
     n = len(rows)
-    counts = {
-        "false_alarms": sum(row["false_alarm"] for row in rows),
-        "true_fault_exclusions": sum(row["excluded"] for row in rows),
-        "wrong_isolations": sum(row["wrong"] for row in rows),
-        "late_detections": sum(row["late"] for row in rows),
-    }
+    counts = {promise: sum(row[broken] for row in rows) for promise, broken in _BROKEN.items()}
     certain = [row for row in rows if row["guaranteed_s"] is not None]
     ratios = [row["delay_s"] / row["guaranteed_s"] for row in certain if row["delay_s"]]
+    errors = [row["estimate_error"] for row in rows if row["estimate_error"] is not None]
     return {
         **counts,
         **{f"{name}_probability_upper_95": binomial_upper(count, n) for name, count in counts.items()},
@@ -384,9 +359,7 @@ def _scheme(rows: Sequence[Row]) -> dict[str, Any]:
         "delay_s": _quantiles(row["delay_s"] for row in rows),
         "isolation_delay_s": _quantiles(row["isolation_s"] for row in rows),
         "delay_over_guaranteed": _quantiles(ratios),
-        "estimate_error": _quantiles(
-            row["estimate_error"] for row in rows if row["estimate_error"] is not None
-        ),
+        "estimate_error": _quantiles(errors),
     }
 
 
@@ -434,22 +407,11 @@ def _fault_lines(document: dict[str, Any]) -> list[str]:
     for promise in PROMISES:
         cells = [f"{s[promise]} (p < {s[promise + '_probability_upper_95']:.1e})" for s in schemes.values()]
         lines.append(_line(promise.replace("_", " "), cells))
-    for label, key in (
-        ("detected", "detected"),
-        ("detection certain", "detection_certain"),
-        ("isolated", "isolated"),
-    ):
-        lines.append(_line(label, [str(s[key]) for s in schemes.values()]))
-    for label, key in (
-        ("detection delay, s", "delay_s"),
-        ("isolation delay, s", "isolation_delay_s"),
-        ("delay / guaranteed", "delay_over_guaranteed"),
-        ("error of the estimate", "estimate_error"),
-    ):
-        for which in ("median", "p90"):
-            lines.append(
-                _line(f"{label}, {which}", [number(s[key][which], none="never") for s in schemes.values()])
-            )
+    for key in ("detected", "detection_certain", "isolated"):
+        lines.append(_line(key.replace("_", " "), [str(s[key]) for s in schemes.values()]))
+    for (label, key), which in product(_SPREADS.items(), ("median", "p90")):
+        cells = [number(s[key][which], none="never") for s in schemes.values()]
+        lines.append(_line(f"{label}, {which}", cells))
     if document["delay_shorter_by"] is not None:
         lines += [f"  median detection delay shorter by {document['delay_shorter_by']:.0%}", ""]
     return lines

@@ -52,19 +52,15 @@ def interleave(
     try:
         for round_ in us:
             for i in order:
-                round_[i] = _time(contenders[i], frames, clock)
+                contenders[i].prepare()
+                start_ns = clock()
+                contenders[i].fly(frames)
+                round_[i] = (clock() - start_ns) / (1e3 * frames)
             order.reverse()
     finally:
         if collecting:
             gc.enable()
     return us
-
-
-def _time(contender: Contender, frames: int, clock: Clock) -> float:
-    contender.prepare()
-    start_ns = clock()
-    contender.fly(frames)
-    return (clock() - start_ns) / (1e3 * frames)
 
 
 def state_of(plant: Plant) -> FlightState:

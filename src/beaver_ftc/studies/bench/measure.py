@@ -4,6 +4,7 @@ import platform
 import tempfile
 import time
 from collections.abc import Callable
+from contextlib import nullcontext
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -50,26 +51,17 @@ def bench(rounds: int = 60, with_parts: bool = True, say: Say = lambda text: Non
     """
     scenario = load_scenario(SCENARIO)
     say("the closed loop after the alarm, part by part")
-    after = _phase(scenario, AFTER_ALARM_S, rounds, with_parts)
+    document = _phase(scenario, AFTER_ALARM_S, rounds, with_parts)
     say("the same before the alarm")
-    before = _phase(scenario, BEFORE_ALARM_S, rounds, with_parts)
+    document["before_alarm"] = _phase(scenario, BEFORE_ALARM_S, rounds, with_parts)
     say("other ways to write the loop")
-    alternatives = _alternatives(scenario, max(rounds // 6, 3))
+    document["alternatives"] = _alternatives(scenario, max(rounds // 6, 3))
     say("whole flights, with and without a log file")
-    flights = _whole_flights(scenario, max(rounds // 10, 3))
+    document["whole_flight"] = _whole_flights(scenario, max(rounds // 10, 3))
     say("flights of sweeps, taken apart, in four kinds")
-    kinds = by_kind(rounds)
-    return {
-        **after,
-        "before_alarm": before,
-        "alternatives": alternatives,
-        "whole_flight": flights,
-        "sweep_flights": kinds,
-        "scenario": SCENARIO,
-        "rounds": rounds,
-        "frames_a_round": FRAMES,
-        "machine": machine(),
-    }
+    document["sweep_flights"] = by_kind(rounds)
+    asked = {"scenario": SCENARIO, "rounds": rounds, "frames_a_round": FRAMES}
+    return document | asked | {"machine": machine()}
 
 
 def machine() -> Document:
@@ -94,7 +86,7 @@ def _processor() -> str:
 
 def _phase(scenario: Scenario, at_s: float, rounds: int, with_parts: bool) -> Document:
     """The bare aircraft, the loop, the loop with ever more of its parts; all in one aircraft, one memory."""
-    names = ["calling", *(part.name for part in PARTS)] if with_parts else []
+    names = ["calling", *PARTS] if with_parts else []
     whole = ClosedLoop(scenario, at_s)
     stages = [whole.with_frame(frame_with(i)) for i in range(len(names))]
     us = interleave([Bare(whole.moment, scenario.substeps), whole, *stages], rounds, FRAMES)
@@ -125,25 +117,18 @@ def _alternatives(scenario: Scenario, rounds: int) -> Document:
     at_s = AFTER_ALARM_S
     contenders: dict[str, Contender] = {
         "straightforward": Straightforward(scenario, at_s, FRAMES),
-        "python_detector": ClosedLoop(scenario, at_s, detector=InnovationDetector()),
+        "python_detector": ClosedLoop(scenario, at_s, InnovationDetector()),
         "python_law": ClosedLoop(scenario, at_s, law=ProportionalInversion()),
-        "python_detector_and_law": ClosedLoop(
-            scenario, at_s, detector=InnovationDetector(), law=ProportionalInversion()
-        ),
-        "properties_through_python": _without_native(lambda: ClosedLoop(scenario, at_s)),
+        "python_detector_and_law": ClosedLoop(scenario, at_s, InnovationDetector(), ProportionalInversion()),
     }
+    with environment({"BEAVER_FTC_NATIVE": "0"}):  # every property through JSBSim's Python binding
+        contenders["properties_through_python"] = ClosedLoop(scenario, at_s)
     bare = Bare(take_over(scenario, at_s), scenario.substeps)
     us = interleave([bare, *contenders.values()], rounds, FRAMES)
     return {
         name: {**_figures("us", column), **_figures("ratio", column / us[:, 0])}
         for name, column in zip(contenders, us[:, 1:].T, strict=True)
     }
-
-
-def _without_native(make: Callable[[], Contender]) -> Contender:
-    """A contender whose loop reads and writes every property through JSBSim's Python binding."""
-    with environment({"BEAVER_FTC_NATIVE": "0"}):
-        return make()
 
 
 def _whole_flights(scenario: Scenario, rounds: int) -> Document:
@@ -215,17 +200,13 @@ def _flown(sweep: Sweep, changes: dict[str, Any], run: int) -> Taken:
     flight = loop.land()
     row_of(assignment, metrics(flight), flight)
     marks.append(time.process_time())
-    runs = flight.frames * scenario.substeps
-    alone = _alone(loop.plant.run, runs)
-    loop.release()
-    return np.diff(marks), runs, alone
-
-
-def _alone(run: Callable[[], object], runs: int) -> float:
+    alone, runs = loop.plant.run, flight.frames * scenario.substeps
     began = time.process_time()
     for _ in range(runs):
-        run()
-    return time.process_time() - began
+        alone()
+    alone_s = time.process_time() - began
+    loop.release()
+    return np.diff(marks), runs, alone_s
 
 
 def _medians(rows: list[Taken]) -> Document:
@@ -251,11 +232,8 @@ class WholeFlight:
 
     def fly(self, frames: int) -> None:
         """Fly the scenario, which must last that many frames."""
-        if self._log is None:
-            fly(self._scenario)
-        else:
-            with ParquetLog(self._log) as log:
-                fly(self._scenario, log)
+        with ParquetLog(self._log) if self._log else nullcontext() as log:
+            fly(self._scenario, log)
 
 
 _ALTERNATIVES = {
@@ -312,18 +290,15 @@ def _kinds(kinds: Document) -> list[str]:
     parts = list(next(iter(kinds.values()))["parts_ms"])
     head = [*parts, "frames alone", "frames, x", "flight, x", "us added a frame"]
     widths = [max(len(word), 8) + 2 for word in head]
-    return [
+    lines = [
         "flights of 15 s in a sweep, ms of processor time; x: of what JSBSim alone takes for its frames",
         " " * 32 + "".join(f"{word:>{width}}" for word, width in zip(head, widths, strict=True)),
-        *(_kind(kind, of, widths) for kind, of in kinds.items()),
     ]
-
-
-def _kind(kind: str, of: Document, widths: list[int]) -> str:
-    figures = (
-        *of["parts_ms"].values(), of["bare_ms"], of["frames_ratio"], of["flight_ratio"], of["own_part_us"]
-    )  # fmt: skip
-    return f"{kind:32}" + "".join(f"{f:{width}.3f}" for f, width in zip(figures, widths, strict=True))
+    for kind, of in kinds.items():
+        others = (of[key] for key in ("bare_ms", "frames_ratio", "flight_ratio", "own_part_us"))
+        figures = zip((*of["parts_ms"].values(), *others), widths, strict=True)
+        lines.append(f"{kind:32}" + "".join(f"{figure:{width}.3f}" for figure, width in figures))
+    return lines
 
 
 def _line(what: str, figures: Document, us: str = "us") -> str:

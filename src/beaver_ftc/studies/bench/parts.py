@@ -8,7 +8,6 @@ import hashlib
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -27,7 +26,7 @@ def nothing(*arguments):
 
 
 def flying(truth, ground_m):
-    """Stands in for `frame.flight_status`."""
+    """Stands in for `sensing.flight_status`."""
     return FLYING
 
 
@@ -41,38 +40,38 @@ def all_residuals(*arguments):
     return -UNLIMITED_RAD_S, UNLIMITED_RAD_S
 
 
-@dataclass(frozen=True)
-class Part:
-    """A part of the frame: its name, what it does, and the kernels it consists of, with their stand-ins."""
-
-    name: str
-    does: str
-    kernels: Mapping[str, Kernel]
-
-
-# In the order in which they are switched on. Writing comes before the law, and hands over a held command.
-PARTS = (
-    Part("reading", "the truth's properties, and whether they are finite and within limits",
-         {"plant.sensing.measure": nothing, "plant.sensing.flight_status": flying}),
-    Part("fdae", "the design model, the detection estimator and its bank of filters",
-         {"design.variants.response": nothing, "loop.accounts.effect_of_faults": nothing,
-          "diagnosis.belief.look_back": nothing, "loop.frame.diagnose": nothing}),
-    Part("fies", "the isolation estimators, and the decision among them",
-         {"diagnosis.isolation.suppose_all": nothing, "diagnosis.isolation.predict_all": nothing,
-          "diagnosis.isolation.start": nothing, "loop.frame.isolate": nothing}),
-    Part("thresholds", "the bound on the uncertainty, and every threshold that follows from it",
-         {"diagnosis.bounds.worst_case.uncertainty_bound": nothing,
-          "diagnosis.thresholds.bound_step": unlimited,
-          "diagnosis.thresholds.interval": all_residuals, "diagnosis.thresholds.published": all_residuals}),
-    Part("network", "the network of the detection estimator, which learns after the alarm",
-         {"diagnosis.detection.learn": nothing, "diagnosis.detection.evaluate": nothing}),
-    Part("supervisor", "who is in charge", {"loop.frame.decide": nothing}),
-    Part("writing", "the command, into the aircraft's properties", {"plant.native.write_nodes": nothing}),
-    Part("law", "reference model, feedback linearisation, accommodation, allocation, anti-windup",
-         {"loop.frame.command": nothing, "control.reference.follow": nothing}),
-    Part("logging", "every column of the log, and the sums of the metrics",
-         {"loop.frame.record": nothing, "loop.frame.account": nothing}),
-)  # fmt: skip
+# Kernels and stand-ins by part, in the order in which parts are switched on. Writing comes before the law,
+# and hands over a held command.
+PARTS: dict[str, dict[str, Kernel]] = {
+    # the truth's properties, and whether they are finite and within limits
+    "reading": {"plant.sensing.measure": nothing, "plant.sensing.flight_status": flying},
+    # the design model, the detection estimator and its bank of filters
+    "fdae": {
+        "design.variants.response": nothing, "loop.accounts.effect_of_faults": nothing,
+        "diagnosis.belief.look_back": nothing, "loop.frame.diagnose": nothing,
+    },
+    # the isolation estimators, and the decision among them
+    "fies": {
+        "diagnosis.isolation.suppose_all": nothing, "diagnosis.isolation.predict_all": nothing,
+        "diagnosis.isolation.start": nothing, "loop.frame.isolate": nothing,
+    },
+    # the bound on the uncertainty, and every threshold that follows from it
+    "thresholds": {
+        "diagnosis.bounds.worst_case.uncertainty_bound": nothing,
+        "diagnosis.thresholds.bound_step": unlimited, "diagnosis.thresholds.interval": all_residuals,
+        "diagnosis.thresholds.published": all_residuals,
+    },
+    # the network of the detection estimator, which learns after the alarm
+    "network": {"diagnosis.detection.learn": nothing, "diagnosis.detection.evaluate": nothing},
+    # who is in charge
+    "supervisor": {"loop.frame.decide": nothing},
+    # the command, into the aircraft's properties
+    "writing": {"plant.native.write_nodes": nothing},
+    # reference model, feedback linearisation, accommodation, allocation, anti-windup
+    "law": {"loop.frame.command": nothing, "control.reference.follow": nothing},
+    # every column of the log, and the sums of the metrics
+    "logging": {"loop.frame.record": nothing, "loop.frame.account": nothing},
+}  # fmt: skip
 
 
 def frame_with(switched_on: int) -> Kernel:
@@ -80,9 +79,10 @@ def frame_with(switched_on: int) -> Kernel:
     if switched_on == len(PARTS):
         return import_module("beaver_ftc.loop.stepping").fly_on
     out: dict[str, Kernel] = {}
-    for part in PARTS[switched_on:]:
-        out |= part.kernels
-    return frame_without(out, f"parts-{switched_on}-{_digest(Path(__file__))}")
+    for kernels in [*PARTS.values()][switched_on:]:
+        out |= kernels
+    source = hashlib.sha256(Path(__file__).read_bytes()).hexdigest()[:8]
+    return frame_without(out, f"parts-{switched_on}-{source}")
 
 
 def frame_without(stand_ins: Mapping[str, Kernel], name: str) -> Kernel:
@@ -102,10 +102,6 @@ def frame_without(stand_ins: Mapping[str, Kernel], name: str) -> Kernel:
     return fly_on
 
 
-def _digest(path: Path) -> str:
-    return hashlib.sha256(path.read_bytes()).hexdigest()[:8]
-
-
 @contextmanager
 def _fresh_kernel_modules(kernel: Callable[[Kernel], Kernel]) -> Iterator[None]:
     """Within this, importing a module of kernels makes a new one, decorated by `kernel`.
@@ -119,7 +115,9 @@ def _fresh_kernel_modules(kernel: Callable[[Kernel], Kernel]) -> Iterator[None]:
         if name.startswith("beaver_ftc.") and module is not compiled and getattr(module, "kernel", 0) is usual
     }
     for name in modules:
-        _forget(name)
+        package, _, leaf = name.rpartition(".")
+        del sys.modules[name]
+        delattr(sys.modules[package], leaf)
     compiled.kernel = kernel
     try:
         yield
@@ -129,9 +127,3 @@ def _fresh_kernel_modules(kernel: Callable[[Kernel], Kernel]) -> Iterator[None]:
             sys.modules[name] = module
             package, _, leaf = name.rpartition(".")
             setattr(sys.modules[package], leaf, module)
-
-
-def _forget(name: str) -> None:
-    package, _, leaf = name.rpartition(".")
-    del sys.modules[name]
-    delattr(sys.modules[package], leaf)

@@ -8,7 +8,7 @@ the modules of the loop have the sources.
 import numpy as np
 
 from beaver_ftc.control.reference import discretise
-from beaver_ftc.design.fdc import GEOMETRY, MASS, SURFACES, value
+from beaver_ftc.design.fdc import GEOMETRY, MASS, SURFACES, TERMS
 from beaver_ftc.design.model import inertia_coefficients
 from beaver_ftc.diagnosis.bounds.declared import EARTH_RATE_RAD_S
 from beaver_ftc.diagnosis.detection import ALPHA_CENTRES, BETA_CENTRES, N_BASIS
@@ -32,11 +32,7 @@ class PublishedModel:
         inertia = inertia_coefficients(MASS)
         self.coupling = np.array([inertia.Pqr, inertia.Qpr, inertia.Rpq])
         self.lengths = np.array([GEOMETRY.span_m, GEOMETRY.chord_m, GEOMETRY.span_m])
-        self.k = {name: value(name) for name in (
-            "Cl_0", "Cl_beta", "Cl_p", "Cl_r", "Cl_da", "Cl_daa", "Cl_dr", "Cl_a2dpt",
-            "Cm_0", "Cm_alpha", "Cm_alpha2", "Cm_q", "Cm_beta2", "Cm_r", "Cm_dpt", "Cm_de", "Cm_df",
-            "Cn_0", "Cn_beta", "Cn_p", "Cn_r", "Cn_q", "Cn_beta3", "Cn_dpt3", "Cn_da", "Cn_dr",
-        )}  # fmt: skip
+        self.k = {name: term.value for name, term in TERMS.items()}
 
     def f_and_G(self, x: np.ndarray, truth: dict[str, float]) -> tuple[np.ndarray, np.ndarray]:
         """f (3,) rad/s2 and G (3, 4) rad/s2 per rad at the rates x (3,) rad/s."""

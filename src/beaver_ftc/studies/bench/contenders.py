@@ -66,8 +66,7 @@ def interleave(
 def state_of(plant: Plant) -> FlightState:
     """Where an aircraft with ideal actuators is now: its surfaces as they were in the run just flown."""
     truth = {name: plant.read(property_) * factor for name, property_, factor in ch.TRUTH}
-    names = set(FlightState.__dataclass_fields__) & set(truth)
-    values: dict[str, Any] = {name: truth[name] for name in names}
+    values: dict[str, Any] = {n: truth[n] for n in FlightState.__dataclass_fields__ if n in truth}
     values |= {f"{s}_rad": truth[f"{s}_pos_rad"] for s in SURFACES}
     return FlightState(
         **values,

@@ -126,6 +126,12 @@ class Estimators:
         return int(left[0]) if self.detected and left.size == 1 else None
 
     @property
+    def unknown(self) -> np.ndarray:
+        """The unknown acceleration, as far as it has been learnt since the alarm, (3,) rad/s2."""
+        learnt = self.weights @ self.basis + self.pole * self.residual
+        return learnt if self.detected else np.zeros(3)
+
+    @property
     def effectiveness(self) -> np.ndarray:
         """What is believed of the surfaces, (4,): 1 but for the isolated one."""
         believed, isolated = np.ones(4), self.isolated
@@ -205,7 +211,7 @@ class Straightforward:
             estimators.predict(*self.then)
         estimators.judge(x, truth["alpha_rad"], truth["beta_rad"])
         self.then = (x, f + G @ self.u, (G * self.u)[:, :3].T, self.bound(x))
-        self.u = self.command(x, f, G, reference)
+        self.u = self.law.command(x, f, G * estimators.effectiveness, estimators.unknown, reference)
         for surface, deflection in zip(SURFACES, self.u, strict=True):
             fdm[f"fcs/{surface}-cmd-rad"] = deflection
         self.log.append(self.row(truth, x, reference))
@@ -217,13 +223,6 @@ class Straightforward:
         earth = EARTH_RATE_RAD_S * (2.0 * np.abs(x).sum() + EARTH_RATE_RAD_S)
         published = np.array(bounds.inertia_coupling.as_tuple()) * np.abs(coupling * cross)
         return published + bounds.constant_rad_s2.as_tuple() + earth
-
-    def command(self, x: np.ndarray, f: np.ndarray, G: np.ndarray, reference: np.ndarray) -> np.ndarray:
-        """The law, told what the estimators have found."""
-        estimators, unknown = self.estimators, np.zeros(3)
-        if estimators.detected:
-            unknown = estimators.weights @ estimators.basis + estimators.pole * estimators.residual
-        return self.law.command(x, f, G * estimators.effectiveness, unknown, reference)
 
     def row(self, truth: dict[str, float], x: np.ndarray, reference: np.ndarray) -> dict[str, float]:
         """A row of the log."""

@@ -90,36 +90,28 @@ class Recording:
     air_noise: np.ndarray | None = None
 
 
-class _Watch:
-    """Stands in for the flight's frame: flies it, then notes the built-in statistic."""
-
-    def __init__(self, loop: Loop) -> None:
-        assert loop.plugin_frame is not None
-        self._frame, self.values, self.air = loop.plugin_frame, list[float](), list[np.ndarray]()
-        self._statistical = loop.frames["fdi"]["statistical"]
-        self._statistical["tests"]["enabled"] = loop.scenario.fdi.statistical is not None
-
-    def __call__(self, frames: np.ndarray, references: np.ndarray, log: np.ndarray) -> int:
-        self.air.append(self._statistical["air"]["acceleration"][0].copy())
-        status = self._frame(frames, references, log)
-        self.values.append(built_in_statistic(frames))
-        return status
-
-
 def record(scenario: Scenario) -> Recording:
     """Fly a scenario under the nominal law and keep what a detector would see."""
     nominal = scenario.control.model_copy(update={"law": "nominal"})
-    recorder = Recorder()
+    recorder, built_in, air = Recorder(), list[float](), list[np.ndarray]()
     loop = Loop(scenario.model_copy(update={"control": nominal}), recorder)
-    watch = _Watch(loop)
-    loop.fly_frame = watch
+    statistical, fly_frame = loop.frames["fdi"]["statistical"], loop.plugin_frame
+    statistical["tests"]["enabled"] = scenario.fdi.statistical is not None
+    assert fly_frame is not None
+
+    def fly_and_note(frames: np.ndarray, references: np.ndarray, log: np.ndarray) -> int:
+        air.append(statistical["air"]["acceleration"][0].copy())
+        status = fly_frame(frames, references, log)
+        built_in.append(built_in_statistic(frames))
+        return status
+
+    loop.fly_frame = fly_and_note
     for _ in loop.chunks():
         pass
     fault_at_s = min((fault.at_s for fault in scenario.faults), default=inf)
-    recording = Recording(recorder.context, recorder.seen, np.array(watch.values), fault_at_s)
+    recording = Recording(recorder.context, recorder.seen, np.array(built_in), fault_at_s)
     if scenario.fdi.statistical is not None:
-        recording.air = np.array(watch.air)
-        recording.air_noise = np.sqrt(loop.frames["fdi"]["statistical"]["noise"]["jitter"][0])
+        recording.air, recording.air_noise = np.array(air), np.sqrt(statistical["noise"]["jitter"][0])
     return recording
 
 

@@ -218,8 +218,8 @@ def _derived(level: outline.Level, folder: Path, tell: Tell) -> tuple[np.ndarray
 def _moments(samples: Samples, data: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     """The terms: as many as the evaluator has room for."""
     bare = {name: value for name, value in data.items() if name != "model_error_map"}
-    moments = {"Cl": [outline.placeholder("Cl", next(iter(data["surfaces"])))]}
-    aircraft = outline.aircraft_of(bare | {"moments": moments}, folder)
+    any_term = {"name": "Cl_any", "value": -0.1, "surface": next(iter(data["surfaces"]))}
+    aircraft = outline.aircraft_of(bare | {"moments": {"Cl": [any_term]}}, folder)
     for most in range(MOST_TERMS, FEWEST_TERMS - 1, -4):
         terms = fitted(samples, aircraft, most)
         with suppress(ValueError):  # too many products

@@ -13,9 +13,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import yaml
 
 from beaver_ftc.aircraft import AXES, Aircraft
-from beaver_ftc.aircraft.aircraft import MOMENTS
 from beaver_ftc.aircraft.loading import read
 from beaver_ftc.aircraft.schema import AircraftFile, Interval
 from beaver_ftc.documents.base import Number, Section, number
@@ -31,9 +31,9 @@ from beaver_ftc.scenario.initial import initial_of
 
 SLUG = 0.45359237 * 9.80665 / FT  # kg
 SLUG_FT2 = SLUG * FT**2
-ALTITUDE_M, DENSITY_KG_M3 = 1500.0, 1.058  # there
+OUTLINE = Path(__file__).with_name("outline.yaml")
+DENSITY_KG_M3 = 1.058  # at the altitude there
 SPAN_OF_SPEED = (0.8, 1.25)
-THROTTLE = "fcs/actuated-throttle-norm"
 LIKELY_TRAVEL_RAD = 0.35
 MOST_TRAVEL_RAD = 1.2
 POSITIONS = {
@@ -41,7 +41,6 @@ POSITIONS = {
     "elevator": "fcs/elevator-pos-rad",
     "rudder": "fcs/rudder-pos-rad",
 }
-_ENDS = {"command": "cmd", "position": "pos", "effective": "effective"}  # of the names of its properties
 _LEAST_TRAVEL_RAD = 0.02
 _FRAMES = 400  # in which its own flight control has moved a surface
 NOT_AFFINE = 0.02  # deviation from a straight line, as a share of what the whole travel does
@@ -51,7 +50,7 @@ _AT_REST = 0.05  # as a share of where it is
 _SURFACE = re.compile(r"fcs/(?!.*(cmd|throttle|thrust|gear))")
 Travel = dict[str, tuple[float, float]]
 LIFT_COEFFICIENTS = (0.45, 0.3, 0.2, 0.12, 0.7)  # of the speeds to be tried
-_LEAST_THROTTLE, _MOST_THROTTLE = 0.05, 1.0
+_THROTTLES = (0.05, 1.0)
 _HALVINGS = 9
 _LEVEL_RAD = 0.01
 _POWER = 0.7  # at which engines are tried
@@ -126,39 +125,17 @@ def outline(name: str, model: Path, travel: Travel, lift: float) -> dict[str, An
     fdm = bare(model)
     area, mass_kg = fdm["metrics/Sw-sqft"] * FT**2, fdm["inertia/mass-slugs"] * SLUG
     speed_mps = (2.0 * mass_kg * 9.81 / (DENSITY_KG_M3 * area * lift)) ** 0.5
-    return {
-        "name": name if name[0].isalpha() else f"a{name}",
-        "description": f"{name}, derived from its JSBSim model",
-        "jsbsim": model.name,
-        "surfaces": {
-            surface: {key: f"fcs/{instrumented.PREFIX}{surface}-{end}-rad" for key, end in _ENDS.items()}
-            | {"travel_rad": list(ends)}
-            for surface, ends in travel.items()
-        },
-        "groups": {"pitch": ["elevator"], "lateral": ["aileron", "rudder"]},
-        "signals": {},
-        "mass": {
-            "mass_kg": mass_kg,
-            **{f"I{a}_kgm2": fdm[f"inertia/i{a}{a}-slugs_ft2"] * SLUG_FT2 for a in "xyz"},
-            "Jxz_kgm2": -fdm["inertia/ixz-slugs_ft2"] * SLUG_FT2,
-        },
-        "geometry": {
-            "wing_area_m2": area, "span_m": fdm["metrics/bw-ft"] * FT,
-            "chord_m": fdm["metrics/cbarw-ft"] * FT,
-        },
-        "moments": {of: [placeholder(of, surface)] for of, surface in zip(MOMENTS, POSITIONS, strict=True)},
-        "envelope": {"airspeed_mps": [speed_mps * share for share in SPAN_OF_SPEED], "alpha_deg": [-5, 15]},
-        "trim": {"throttle": THROTTLE},
-        "engine": {"start": "steady", "settings": {"throttle": {
-            "property": THROTTLE, "says": "throttle", "unit": "share of 1",
-            "default": 0.6, "range": [0.0, 1.0]}}},
-        "start": {"altitude_m": ALTITUDE_M},
-    }  # fmt: skip
-
-
-def placeholder(coefficient: str, surface: str) -> dict[str, Any]:
-    """A term that is there until others are found."""
-    return {"name": f"{coefficient}_{surface}", "value": -0.1, "surface": surface}
+    data: dict[str, Any] = yaml.safe_load(OUTLINE.read_text(encoding="utf-8"))
+    data["name"] = name if name[0].isalpha() else f"a{name}"
+    data["description"], data["jsbsim"] = f"{name}, derived from its JSBSim model", model.name
+    for surface, ends in travel.items():
+        data["surfaces"][surface]["travel_rad"] = list(ends)
+    inertia = {f"I{a}_kgm2": fdm[f"inertia/i{a}{a}-slugs_ft2"] * SLUG_FT2 for a in "xyz"}
+    data["mass"] = {"mass_kg": mass_kg, **inertia, "Jxz_kgm2": -fdm["inertia/ixz-slugs_ft2"] * SLUG_FT2}
+    span_m, chord_m = fdm["metrics/bw-ft"] * FT, fdm["metrics/cbarw-ft"] * FT
+    data["geometry"] = {"wing_area_m2": area, "span_m": span_m, "chord_m": chord_m}
+    data["envelope"]["airspeed_mps"] = [speed_mps * share for share in SPAN_OF_SPEED]
+    return data
 
 
 def not_affine(plant: Plant, trim: FlightState) -> list[str]:
@@ -321,7 +298,7 @@ def level_trim(plant: Plant, data: dict[str, Any]) -> TrimPoint:
     """Level flight in the middle of the envelope, by the throttle; its setting becomes the default."""
     low, high = data["envelope"]["airspeed_mps"]
     speed_mps, altitude_m = 0.5 * (low + high), data["start"]["altitude_m"]
-    ends = [_LEAST_THROTTLE, _MOST_THROTTLE]
+    ends = [*_THROTTLES]
     throttle = 0.5 * sum(ends)
     if plant.n_engines and plant.aircraft.engine.start != "off":
         for _ in range(_HALVINGS):

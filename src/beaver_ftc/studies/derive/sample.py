@@ -58,10 +58,10 @@ class Samples:
     level: np.ndarray
     age: np.ndarray
 
-    def at(self, places: np.ndarray) -> "Samples":
-        """Those in these places."""
-        arrays = {name: values[places] for name, values in vars(self).items() if name != "signals"}
-        return Samples(signals={name: values[places] for name, values in self.signals.items()}, **arrays)
+    def at(self, wanted: np.ndarray) -> "Samples":
+        """Those that are wanted, (n,)."""
+        arrays = {name: values[wanted] for name, values in vars(self).items() if name != "signals"}
+        return Samples(signals={name: values[wanted] for name, values in self.signals.items()}, **arrays)
 
     def __len__(self) -> int:
         return len(self.x)
@@ -145,8 +145,7 @@ def as_arrays(rows: list[tuple], names: tuple[str, ...]) -> Samples:
     """Rows of x, y, signals, u, rate, box, level, age as samples; without those that are not finite."""
     x, y, signals, u, rate, *indices = (np.array(column) for column in zip(*rows, strict=True))
     named = dict(zip(names, signals.T, strict=True))
-    finite = np.flatnonzero(np.isfinite(rate).all(axis=1))
-    return Samples(x, y, named, u, rate, *indices).at(finite)
+    return Samples(x, y, named, u, rate, *indices).at(np.isfinite(rate).all(axis=1))
 
 
 class Tanks:
@@ -182,12 +181,11 @@ def seen_at(plant: Plant, properties: Mapping[str, str]) -> Iterator[list[float]
 
 def quantities(samples: Samples, aircraft: Aircraft) -> dict[str, np.ndarray]:
     """What terms multiply, by name: alpha, beta, ph, qh, rh, the samples' signals, and the surfaces."""
-    geometry, V = aircraft.geometry, samples.y[:, 2]
-    half_span_time = geometry.span_m / (2.0 * V)
-    rates = samples.x[:, 0] * half_span_time, samples.x[:, 1] * geometry.chord_m / V
-    values = samples.y[:, 0], samples.y[:, 1], *rates, samples.x[:, 2] * half_span_time
-    flow, surfaces = zip(FLOW_SIGNALS, values, strict=True), zip(aircraft.surfaces, samples.u.T, strict=True)
-    return {**dict(flow), **samples.signals, **dict(surfaces)}
+    (alpha, beta, V, _), (p, q, r) = samples.y.T, samples.x.T
+    half_span_time = aircraft.geometry.span_m / (2.0 * V)
+    flow = alpha, beta, p * half_span_time, q * aircraft.geometry.chord_m / V, r * half_span_time
+    by_surface = dict(zip(aircraft.surfaces, samples.u.T, strict=True))
+    return dict(zip(FLOW_SIGNALS, flow, strict=True)) | dict(samples.signals) | by_surface
 
 
 def fly_about(plant: Plant, trim: FlightState, seed: int, properties: Mapping[str, str]) -> Samples:
@@ -227,7 +225,7 @@ def sorted_in(
     travel = np.array([(t.min_rad, t.max_rad) for t in aircraft.travel.values()])
     used = np.maximum(samples.u / travel[:, 1], samples.u / travel[:, 0]).max(axis=1)
     level = np.searchsorted(np.array(shares[:-1]), used)
-    return replace(samples, box=inside.argmax(axis=0), level=level).at(np.flatnonzero(inside.any(axis=0)))
+    return replace(samples, box=inside.argmax(axis=0), level=level).at(inside.any(axis=0))
 
 
 def places(samples: Samples, aircraft: Aircraft) -> np.ndarray:

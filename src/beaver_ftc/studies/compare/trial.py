@@ -5,7 +5,6 @@ from dataclasses import dataclass, field
 from math import hypot, inf
 from pathlib import Path
 from time import thread_time
-from typing import Any
 
 from beaver_ftc.documents.errors import BadInput, BeaverFtcError
 from beaver_ftc.documents.paths import data_root
@@ -117,15 +116,11 @@ def entries_of(schemes: Sequence[str], laws: Sequence[str]) -> list[Entry]:
 def with_entry(scenario: Scenario, entry: Entry) -> Scenario:
     """The scenario with this scheme and this law; options are those of the one the scenario names, nobody
     else's."""
-    control: dict[str, Any] = {"law": entry.law}
-    if entry.law != scenario.control.law:
-        control["options"] = {}
-    fdi = {"scheme": entry.scheme, "options": options_for(scenario, entry.scheme)}
-    changed = {
-        "fdi": scenario.fdi.model_copy(update=fdi),
-        "control": scenario.control.model_copy(update=control),
-    }
-    return scenario.model_copy(update=changed)
+    options = options_for(scenario, entry.scheme)
+    fdi = scenario.fdi.model_copy(update={"scheme": entry.scheme, "options": options})
+    kept = scenario.control.options if entry.law == scenario.control.law else {}
+    control = scenario.control.model_copy(update={"law": entry.law, "options": kept})
+    return scenario.model_copy(update={"fdi": fdi, "control": control})
 
 
 def options_for(scenario: Scenario, scheme: str) -> dict[str, float]:

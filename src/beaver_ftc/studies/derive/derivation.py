@@ -7,13 +7,12 @@ import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 from math import degrees, radians
 from pathlib import Path
 from time import perf_counter
-from typing import Any
 
 import numpy as np
 import yaml
@@ -23,9 +22,9 @@ from beaver_ftc.aircraft.schema import MAX_MONOMIALS, MAX_SIGNALS
 from beaver_ftc.design.model import design_record
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.plant import instrumented
-from beaver_ftc.plant.adapter import translated
+from beaver_ftc.plant.adapter import Plant, translated
 from beaver_ftc.plant.model_file import copy_of, refuse_deeds
-from beaver_ftc.plant.state import FlightState
+from beaver_ftc.plant.trim import TrimPoint
 from beaver_ftc.studies.derive import outline
 from beaver_ftc.studies.derive.derived import NAME as PAGE
 from beaver_ftc.studies.derive.derived import Derived, page_of
@@ -134,22 +133,24 @@ def derive(
     with tempfile.TemporaryDirectory(prefix="beaver-ftc-") as scratch:
         folder = Path(scratch) / "new" / source.name
         with translated(source.model):
-            level = _prepared(source, folder, wanted, notes, tell)
-            notes += outline.not_affine(level.plant, level.trim)
-            further = {} if source.folder else outline.further_surfaces(source.model, level.plant)
-            if moving := outline.moved_by_itself(level.plant.aircraft, level.trim, tuple(further)):
+            data, plant, trim = _prepared(source, folder, wanted, notes, tell)
+            notes += outline.not_affine(plant, trim)
+            further = {} if source.folder else outline.further_surfaces(source.model, plant)
+            if moving := outline.moved_by_itself(plant.aircraft, trim, tuple(further)):
                 raise BadInput(
                     f"{source.says}: {', '.join(moving)} moves by itself in steady flight, and its "
                     "aerodynamics see it, allowed: surfaces that move by command"
                 )
             if source.folder is None:
-                _set_envelope(level.data, level.trim, wanted)
-            made = _derived(level, folder, tell)
-        aircraft = outline.aircraft_of(level.data, target)
+                _set_envelope(data, trim, wanted)
+            usual_rad = outline.WIDE_SIDESLIP_RAD if source.folder else SIDESLIP_RAD
+            sideslip_rad = radians(wanted.sideslip_deg) if wanted.sideslip_deg else usual_rad
+            made = _derived(data, plant, trim, sideslip_rad, folder, tell)
+        aircraft = outline.aircraft_of(data, target)
         as_filed = loading.read(source.folder) if source.folder else None
         took_s = perf_counter() - started_s
-        found = Derived(aircraft, level.trim, *made, tuple(notes), as_filed, further, took_s)
-        twice = json.loads(json.dumps(level.data))  # what is there twice is written twice, not as an alias
+        found = Derived(aircraft, trim, *made, tuple(notes), as_filed, further, took_s)
+        twice = json.loads(json.dumps(data))  # what is there twice is written twice, not as an alias
         text = yaml.safe_dump(twice, sort_keys=False, default_flow_style=None, width=120)
         (folder / loading.FILE).write_text(loading.first_line() + text, encoding="utf-8")
         (folder / PAGE).write_text(page_of(found), encoding="utf-8")
@@ -187,27 +188,29 @@ def _prepared(
             data["envelope"]["airspeed_mps"] = list(wanted.airspeed_mps)
     tell("trim")
     tried = outlines[: 1 if wanted.airspeed_mps else None]
-    return outline.level_flight(tried, folder, notes, wanted.sideslip_rad or SIDESLIP_RAD)
+    return outline.level_flight(tried, folder, notes)
 
 
-def _derived(level: outline.Level, folder: Path, tell: Tell) -> tuple[np.ndarray, np.ndarray]:
+def _derived(
+    data: outline.Data, plant: Plant, trim: TrimPoint, sideslip_rad: float, folder: Path, tell: Tell
+) -> tuple[np.ndarray, np.ndarray]:
     """Sample, fit and check; the data get their terms and errors. Returns the largest errors, (3,) rad/s2."""
-    data, plant, point, outlined = level.data, level.plant, level.trim, level.plant.aircraft
     low, high = map(radians, data["envelope"]["alpha_deg"])
-    where = Envelope(tuple(data["envelope"]["airspeed_mps"]), (low, high), level.sideslip_rad)
+    where = Envelope(tuple(data["envelope"]["airspeed_mps"]), (low, high), sideslip_rad)
     declared = {name: of["property"] for name, of in data["signals"].items()}
     known = {name: of[0] for name, of in instrumented.SIGNALS.items() if plant.has(of[0])}
     properties = declared or known
     tell("sample")
-    flown = fly_about(plant, point, 3, properties)
-    first = sample(plant, where, point, SAMPLES, 1, properties, FRESH)
+    flown = fly_about(plant, trim, 3, properties)
+    first = sample(plant, where, trim, SAMPLES, 1, properties, FRESH)
     if not declared:
-        useful = signals_of_use(first, outlined, MAX_SIGNALS, engine_signals(flown, outlined))
+        wanted = engine_signals(flown, plant.aircraft)
+        useful = signals_of_use(first, plant.aircraft, MAX_SIGNALS, wanted)
         data["signals"] = {name: {"property": properties[name]} for name in useful}
     tell("fit")
-    data["moments"] = outline.named_as(outlined, _moments(first, data, folder))
+    data["moments"] = outline.named_as(plant.aircraft, _moments(first, data, folder))
     tell("check")
-    other = sample(plant, where, point, CHECKED, 2, properties)
+    other = sample(plant, where, trim, CHECKED, 2, properties)
     aircraft = outline.aircraft_of(data, folder)
     data["model_error_map"], (of_fit, of_check, _) = map_of(aircraft, (first, other), flown)
     outermost = data["model_error_map"]["boxes"][-1]
@@ -215,7 +218,7 @@ def _derived(level: outline.Level, folder: Path, tell: Tell) -> tuple[np.ndarray
     return of_fit, of_check
 
 
-def _moments(samples: Samples, data: Mapping[str, Any], folder: Path) -> dict[str, Any]:
+def _moments(samples: Samples, data: outline.Data, folder: Path) -> outline.Data:
     """The terms: as many as the evaluator has room for."""
     bare = {name: value for name, value in data.items() if name != "model_error_map"}
     any_term = {"name": "Cl_any", "value": -0.1, "surface": next(iter(data["surfaces"]))}
@@ -228,13 +231,13 @@ def _moments(samples: Samples, data: Mapping[str, Any], folder: Path) -> dict[st
     raise BadInput(f"{aircraft.name}: its terms need more than {MAX_MONOMIALS} products of signals")
 
 
-def _set_envelope(data: dict[str, Any], point: FlightState, wanted: outline.EnvelopeFile) -> None:
+def _set_envelope(data: outline.Data, trim: TrimPoint, wanted: outline.EnvelopeFile) -> None:
     """Let the file's envelope be about trim, or what is wanted, and flights start there."""
-    about = [degrees(point.alpha_rad + way * SPAN_OF_ALPHA_RAD) for way in (-1, 1)]
+    about = [degrees(trim.alpha_rad + way * SPAN_OF_ALPHA_RAD) for way in (-1, 1)]
     data["envelope"]["alpha_deg"] = wanted.alpha_deg or about
     for name, ends in data["envelope"].items():
         data["envelope"][name] = [float(f"{end:.4g}") for end in ends]
-    data["start"]["airspeed_mps"] = float(f"{point.airspeed_mps:.4g}")
+    data["start"]["airspeed_mps"] = float(f"{trim.airspeed_mps:.4g}")
 
 
 def _target(source: Source, out: Path | None) -> Path:

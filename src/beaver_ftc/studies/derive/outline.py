@@ -7,8 +7,8 @@ file already keeps all that is in it but its moments: these are found anew.
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from math import degrees, isfinite, radians
+from dataclasses import replace
+from math import degrees, isfinite
 from pathlib import Path
 from typing import Any
 
@@ -49,6 +49,8 @@ _POINTS, _OWN_FRAMES = 9, 300
 _AT_REST = 0.05  # as a share of where it is
 _SURFACE = re.compile(r"fcs/(?!.*(cmd|throttle|thrust|gear))")
 Travel = dict[str, tuple[float, float]]
+Data = dict[str, Any]  # of an aircraft's file
+Level = tuple[Data, Plant, TrimPoint]  # of an aircraft about to be sampled
 LIFT_COEFFICIENTS = (0.45, 0.3, 0.2, 0.12, 0.7)  # of the speeds to be tried
 _THROTTLES = (0.05, 1.0)
 _HALVINGS = 9
@@ -70,11 +72,6 @@ class EnvelopeFile(Section):
     alpha_deg: Interval | None = None
     altitude_m: Number | None = number(None, unit="m", says="altitude", ge=0, le=15000)
     sideslip_deg: Number | None = number(None, unit="deg", says="sideslip to either side", gt=0, le=45)
-
-    @property
-    def sideslip_rad(self) -> float | None:
-        """How far to either side, if it is said."""
-        return None if self.sideslip_deg is None else radians(self.sideslip_deg)
 
 
 def read_envelope(path: Path | None) -> EnvelopeFile:
@@ -120,12 +117,12 @@ def _settled(model: Path, given: Mapping[str, float], names: Sequence[str]) -> l
     return [float(fdm[name]) for name in names]
 
 
-def outline(name: str, model: Path, travel: Travel, lift: float) -> dict[str, Any]:
+def outline(name: str, model: Path, travel: Travel, lift: float) -> Data:
     """The file without its terms; lift: the lift coefficient at the speed the envelope is built about."""
     fdm = bare(model)
     area, mass_kg = fdm["metrics/Sw-sqft"] * FT**2, fdm["inertia/mass-slugs"] * SLUG
     speed_mps = (2.0 * mass_kg * 9.81 / (DENSITY_KG_M3 * area * lift)) ** 0.5
-    data: dict[str, Any] = yaml.safe_load(OUTLINE.read_text(encoding="utf-8"))
+    data: Data = yaml.safe_load(OUTLINE.read_text(encoding="utf-8"))
     data["name"] = name if name[0].isalpha() else f"a{name}"
     data["description"], data["jsbsim"] = f"{name}, derived from its JSBSim model", model.name
     for surface, ends in travel.items():
@@ -209,16 +206,6 @@ def own_control(source: Path, model: Path) -> list[str]:
     return notes
 
 
-@dataclass(frozen=True)
-class Level:
-    """An aircraft about to be sampled: its file's data, plant and trim, and how far its sideslip goes."""
-
-    data: dict[str, Any]
-    plant: Plant
-    trim: TrimPoint
-    sideslip_rad: float
-
-
 def aircraft_of(data: Mapping[str, Any], folder: Path) -> Aircraft:
     """The aircraft of a folder as its file's data are now."""
     return Aircraft(AircraftFile.model_validate(data), folder)
@@ -229,20 +216,19 @@ def plant_of(data: Mapping[str, Any], folder: Path) -> Plant:
     return Plant(100, aircraft=aircraft_of(data, folder))
 
 
-def choose_start(data: dict[str, Any], folder: Path, notes: list[str]) -> None:
+def choose_start(data: Data, folder: Path) -> list[str]:
     """How the engines come to run: at once, as a pilot starts them, or not at all, which is noted."""
     if not plant_of(data, folder).n_engines:
-        notes.append("it has no engine: trim is a glide")
-        return
+        return ["it has no engine: trim is a glide"]
     settled: dict[str, float] = {}
     for how in ("steady", "run_up", "off"):
         data["engine"]["start"] = how
         share = _steady_thrust(plant_of(data, folder))
         if share is not None and share > _LEAST_THRUST:
-            return
+            return []
         settled |= {how: share} if share is not None else {}
     data["engine"]["start"] = next(iter(settled), "off")
-    notes.append("its engines give no thrust when JSBSim starts them: it is flown gliding")
+    return ["its engines give no thrust when JSBSim starts them: it is flown gliding"]
 
 
 def _steady_thrust(plant: Plant) -> float | None:
@@ -271,15 +257,12 @@ def _thrust_lbs(plant: Plant) -> float:
     return sum(plant.read(f"propulsion/engine[{i}]/thrust-lbs") for i in range(plant.n_engines))
 
 
-def level_flight(
-    outlines: list[dict[str, Any]], folder: Path, notes: list[str], sideslip_rad: float
-) -> Level:
+def level_flight(outlines: list[Data], folder: Path, notes: list[str]) -> Level:
     """The first of several outlines, each about another speed, that trims, in flight as level as power makes
     it. Raises BadInput, saying why the first does not, if none does."""
     failed: BeaverFtcError | None = None
     for data in outlines:
-        choices: list[str] = []
-        choose_start(data, folder, choices)
+        choices = choose_start(data, folder)
         try:
             point = level_trim(plant_of(data, folder), data)
         except (BadInput, SimulationFailed) as error:
@@ -290,11 +273,11 @@ def level_flight(
         if plant.n_engines and abs(point.gamma_rad) >= _LEVEL_RAD:
             way, slope_deg = "climbs" if point.gamma_rad > 0.0 else "sinks", abs(degrees(point.gamma_rad))
             notes.append(f"in trim it {way} at {slope_deg:.1f} deg: its power goes no further")
-        return Level(data, plant, point, sideslip_rad)
+        return data, plant, point
     raise BadInput(f"{outlines[0]['name']}: {failed}")
 
 
-def level_trim(plant: Plant, data: dict[str, Any]) -> TrimPoint:
+def level_trim(plant: Plant, data: Data) -> TrimPoint:
     """Level flight in the middle of the envelope, by the throttle; its setting becomes the default."""
     low, high = data["envelope"]["airspeed_mps"]
     speed_mps, altitude_m = 0.5 * (low + high), data["start"]["altitude_m"]
@@ -325,7 +308,7 @@ def level_as_filed(source: Path, folder: Path, envelope: EnvelopeFile) -> Level:
     if envelope.altitude_m is not None:
         start["altitude_m"] = envelope.altitude_m
     plant = Plant(100, aircraft=aircraft)
-    return Level(data, plant, trim_at(plant, **start), envelope.sideslip_rad or WIDE_SIDESLIP_RAD)
+    return data, plant, trim_at(plant, **start)
 
 
 def usual_start(aircraft: Aircraft) -> dict[str, float]:

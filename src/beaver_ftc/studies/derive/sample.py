@@ -225,7 +225,7 @@ def sorted_in(
     travel = np.array([(t.min_rad, t.max_rad) for t in aircraft.travel.values()])
     used = np.maximum(samples.u / travel[:, 1], samples.u / travel[:, 0]).max(axis=1)
     level = np.searchsorted(np.array(shares[:-1]), used)
-    return replace(samples, box=inside.argmax(axis=0), level=level).at(inside.any(axis=0))
+    return replace(samples, box=inside.argmax(axis=0), level=level).at(np.flatnonzero(inside.any(axis=0)))
 
 
 def places(samples: Samples, aircraft: Aircraft) -> np.ndarray:

@@ -70,18 +70,18 @@ def _traces():
 
 def test_a_lower_level_buys_delay_with_false_alarms():
     points = trade_off(_traces())
-    assert [point.level for point in points] == [1.0, 0.7, 0.6, 0.5, 0.2, 0.1]
-    assert [p.false_alarms_per_h for p in points] == pytest.approx([0, 0, 0.5, 1.0, 1.5, 2.0], abs=0.5)
-    rates = [point.false_alarms_per_h for point in points]
+    assert [point["level"] for point in points] == [1.0, 0.7, 0.6, 0.5, 0.2, 0.1]
+    assert [p["false_alarms_per_h"] for p in points] == pytest.approx([0, 0, 0.5, 1.0, 1.5, 2.0], abs=0.5)
+    rates = [point["false_alarms_per_h"] for point in points]
     assert rates == sorted(rates)
-    assert points[0].detection_rate == 0.5
-    assert points[1].detection_rate == 1.0
+    assert points[0]["detection_rate"] == 0.5
+    assert points[1]["detection_rate"] == 1.0
 
 
 def test_the_matched_level_is_the_most_sensitive_one_allowed():
-    assert matched(_traces()).level == 0.7
-    assert matched(_traces(), 0.51).level == 0.6
-    assert point_at(_traces(), 0.1).detection_rate == 1.0  # of the one flight without an earlier alarm
+    assert matched(trade_off(_traces()))["level"] == 0.7
+    assert matched(trade_off(_traces()), 0.51)["level"] == 0.6
+    assert point_at(_traces(), 0.1)["detection_rate"] == 1.0  # of the one flight without an earlier alarm
 
 
 def test_what_other_threads_do_meanwhile_is_no_cost_of_a_law(monkeypatch):
@@ -142,4 +142,4 @@ def test_each_entry_is_tallied_from_its_own_flights_against_the_yardsticks():
 
 
 def test_without_flights_a_level_costs_nothing():
-    assert point_at([], 1.0).false_alarms_per_h == 0.0
+    assert point_at([], 1.0)["false_alarms_per_h"] == 0.0

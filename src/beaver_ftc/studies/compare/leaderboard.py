@@ -150,8 +150,7 @@ def _draw_curves(rate: "Axes", delay: "Axes", part: Document) -> None:
             if own[key] is not None:
                 axis.plot(own["false_alarms_per_h"], own[key], marker(index), color=look["color"])
     for axis, label in ((rate, "detection rate"), (delay, "median detection delay, s")):
-        axis.set_xlabel("false alarms per hour")
-        axis.set_ylabel(label)
+        axis.set(xlabel="false alarms per hour", ylabel=label)
         axis.set_xscale("symlog", linthresh=10.0)
         axis.set_xlim(left=-1.0)
         axis.grid(alpha=0.3)
@@ -174,10 +173,9 @@ def _draw_ratios(axis: "Axes", part: Document) -> None:
             )
     axis.plot([1.0, 1.0], [-0.5, len(rows) - 0.5], color="#000000", linewidth=0.8)
     axis.set_yticks(range(len(rows)), [row["law"] for row in rows], fontsize=7)
-    axis.set_xscale("log")
+    axis.set(xscale="log", xlabel="tracking error over the oracle's: median to 90 %")
     axis.xaxis.set_major_formatter("{x:g}")
     axis.xaxis.set_minor_formatter("")
-    axis.set_xlabel("tracking error over the oracle's: median to 90 %")
     axis.grid(alpha=0.3)
 
 

@@ -3,8 +3,8 @@ what tables, figure, page and `--format json` are made from.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
 from math import inf
+from operator import itemgetter
 from statistics import median
 from typing import Any
 
@@ -69,25 +69,15 @@ def _results(trials: Iterable[Trial], entry: Entry) -> list[Result]:
     return [result for trial in trials for result in trial.results if result.entry == entry]
 
 
-@dataclass(frozen=True)
-class Point:
-    """One level of a scheme's statistic: what it costs in false alarms, and what it buys."""
-
-    level: float
-    false_alarms_per_h: float
-    detection_rate: float
-    delay_median_s: float
-
-
-def trade_off(traces: Sequence[Trace]) -> list[Point]:
+def trade_off(traces: Sequence[Trace]) -> list[Document]:
     """Every level at which the number of false alarms changes, from the strictest; and the scheme's own,
     1."""
     levels = sorted({1.0, *(trace.before for trace in traces if trace.before > 0.0)}, reverse=True)
     return [point_at(traces, level) for level in levels]
 
 
-def point_at(traces: Sequence[Trace], level: float) -> Point:
-    """False alarms, detections and delay at a level of the statistic.
+def point_at(traces: Sequence[Trace], level: float) -> Document:
+    """What a level of a scheme's statistic costs in false alarms, and what it buys.
 
     Detections and delays are of the flights in which the fault was still to be detected: no false alarm
     before it.
@@ -95,13 +85,13 @@ def point_at(traces: Sequence[Trace], level: float) -> Point:
     alarms, hours = alarms_at(traces, level)
     delays = [trace.delay_s(level) for trace in traces if trace.faulted and not trace.false_alarm(level)]
     rate = sum(delay < inf for delay in delays) / len(delays) if delays else 0.0
-    return Point(level, alarms / hours if hours else 0.0, rate, share_within(delays, 0.5))
+    per_h, median_s = alarms / hours if hours else 0.0, share_within(delays, 0.5)
+    return {"level": level, "false_alarms_per_h": per_h, "detection_rate": rate, "delay_median_s": median_s}
 
 
-def matched(traces: Sequence[Trace], per_hour: float = 0.0) -> Point:
+def matched(points: Sequence[Document], per_hour: float = 0.0) -> Document:
     """The most sensitive level with no more false alarms than this."""
-    points = [point for point in trade_off(traces) if point.false_alarms_per_h <= per_hour]
-    return min(points, key=lambda point: point.level)
+    return min((p for p in points if p["false_alarms_per_h"] <= per_hour), key=itemgetter("level"))
 
 
 # What is held against ours in `better_than_ours`: of each key of a line, what it is called.
@@ -138,21 +128,22 @@ def document_of(trials: Sequence[Trial], entries: Sequence[Entry]) -> Document:
 def _set(trials: Sequence[Trial], entries: Sequence[Entry]) -> Document:
     schemes = list(dict.fromkeys(scheme for trial in trials for scheme in trial.traces))
     traces = {s: [t.traces[s] for t in trials if s in t.traces] for s in schemes}
-    lines = [{k: finite(v) for k, v in line.items()} for line in lines_of(trials, entries)]
-    free = {s: _point(matched(of)) for s, of in traces.items()}
+    lines = [_finite(line) for line in lines_of(trials, entries)]
+    points = {s: trade_off(of) for s, of in traces.items()}
+    free = {s: _finite(matched(of)) for s, of in points.items()}
     failed = {result.error for trial in trials for result in trial.results if result.error}
     return {
         "flights": len(trials),
         "lines": lines,
-        "trade_off": {s: [_point(p) for p in trade_off(of)] for s, of in traces.items()},
+        "trade_off": {s: [_finite(point) for point in of] for s, of in points.items()},
         "without_false_alarm": free,
         "better_than_ours": better_than_ours(lines, free if any(line["faults"] for line in lines) else {}),
         "errors": sorted({error for trial in trials for error in trial.failures} | failed),
     }
 
 
-def _point(point: Point) -> Document:
-    return {key: finite(value) for key, value in asdict(point).items()}
+def _finite(document: Document) -> Document:
+    return {key: finite(value) for key, value in document.items()}
 
 
 def better_than_ours(lines: Sequence[Document], free: Document) -> list[str]:

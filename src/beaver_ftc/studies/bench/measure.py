@@ -89,16 +89,13 @@ def _phase(scenario: Scenario, at_s: float, rounds: int, with_parts: bool) -> Do
     names = ["calling", *PARTS] if with_parts else []
     whole = ClosedLoop(scenario, at_s)
     stages = [whole.with_frame(frame_with(i)) for i in range(len(names))]
-    us = interleave([Bare(whole.moment, scenario.substeps), whole, *stages], rounds, FRAMES)
-    bare, loop, steps = us[:, 0], us[:, 1], us[:, 2:]
-    before = np.column_stack([bare, steps[:, :-1]]) if with_parts else steps
-    return {
-        **_against(bare, loop),
-        "parts": {
-            name: _figures("us", us) | _figures("adds_us", us - less) | _figures("ratio", us / bare)
-            for name, us, less in zip(names, steps.T, before.T, strict=True)
-        },
+    contenders: list[Contender] = [Bare(whole.moment, scenario.substeps), whole, *stages]
+    bare, loop, *steps = interleave(contenders, rounds, FRAMES).T
+    parts = {
+        name: _figures("us", us) | _figures("adds_us", us - less) | _figures("ratio", us / bare)
+        for name, us, less in zip(names, steps, [bare, *steps], strict=False)  # less: the step before
     }
+    return _against(bare, loop) | {"parts": parts}
 
 
 def _against(bare: np.ndarray, loop: np.ndarray) -> Document:
@@ -124,10 +121,10 @@ def _alternatives(scenario: Scenario, rounds: int) -> Document:
     with environment({"BEAVER_FTC_NATIVE": "0"}):  # every property through JSBSim's Python binding
         contenders["properties_through_python"] = ClosedLoop(scenario, at_s)
     bare = Bare(take_over(scenario, at_s), scenario.substeps)
-    us = interleave([bare, *contenders.values()], rounds, FRAMES)
+    bare_us, *others = interleave([bare, *contenders.values()], rounds, FRAMES).T
     return {
-        name: {**_figures("us", column), **_figures("ratio", column / us[:, 0])}
-        for name, column in zip(contenders, us[:, 1:].T, strict=True)
+        name: _figures("us", us) | _figures("ratio", us / bare_us)
+        for name, us in zip(contenders, others, strict=True)
     }
 
 
@@ -137,14 +134,10 @@ def _whole_flights(scenario: Scenario, rounds: int) -> Document:
     frames = round(LONG_FLIGHT_S * scenario.rate_hz)
     with tempfile.TemporaryDirectory() as folder:
         with_file = WholeFlight(long, Path(folder) / "log.parquet")
-        bare = Bare(take_over(long, 0.0), long.substeps)
-        us = interleave([bare, WholeFlight(long), with_file], rounds, frames)
-    return {
-        "frames": frames,
-        **_against(us[:, 0], us[:, 1]),
-        **_figures("with_log_file_us", us[:, 2]),
-        **_figures("with_log_file_ratio", us[:, 2] / us[:, 0]),
-    }
+        alone = Bare(take_over(long, 0.0), long.substeps)
+        bare, loop, logged = interleave([alone, WholeFlight(long), with_file], rounds, frames).T
+    figures = _figures("with_log_file_us", logged) | _figures("with_log_file_ratio", logged / bare)
+    return {"frames": frames, **_against(bare, loop), **figures}
 
 
 STAGES = ("scenario", "aircraft, trim, record", "frames", "metrics and row")

@@ -100,15 +100,14 @@ _SAYS = (
     "Lines in the figure run over all alarm levels of a scheme's statistic, on flights under the nominal "
     "law; the mark is the level it ships with."
 )
-_STEM = "comparison"
 _FIGURE = "Detection rate and delay against false alarms, and tracking against the oracle"
 
 
 def page_of(document: Document, title: str, folder: Path) -> str:
     """The page; the figure in the folder goes into it."""
     versions = page.versions_line(document["versions"])
-    parts = [_SAYS, page.Pictures([(_FIGURE, _STEM)]), *_sets(document), versions]
-    return page.as_html(title, parts, {_STEM: folder / f"{_STEM}.png"})
+    parts = [_SAYS, page.Pictures([(_FIGURE, "comparison")]), *_sets(document), versions]
+    return page.as_html(title, parts, {"comparison": folder / "comparison.png"})
 
 
 def write_leaderboard(document: Document, path: Path) -> None:

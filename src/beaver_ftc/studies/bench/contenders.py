@@ -67,12 +67,9 @@ def state_of(plant: Plant) -> FlightState:
     """Where an aircraft with ideal actuators is now: its surfaces as they were in the run just flown."""
     truth = {name: plant.read(property_) * factor for name, property_, factor in ch.TRUTH}
     values: dict[str, Any] = {n: truth[n] for n in FlightState.__dataclass_fields__ if n in truth}
-    values |= {f"{s}_rad": truth[f"{s}_pos_rad"] for s in SURFACES}
-    return FlightState(
-        **values,
-        engine_rpm=plant.read("engine/speed-rpm"),
-        manifold_pressure_inhg=plant.read("engine/manifold-pressure-inhg"),
-    )
+    surfaces_rad = {s: truth[f"{s}_pos_rad"] for s in SURFACES}
+    settings = {name: plant.read(of.property) for name, of in plant.aircraft.engine.settings.items()}
+    return FlightState(**values, surfaces_rad=surfaces_rad, settings=settings)
 
 
 @dataclass(frozen=True)

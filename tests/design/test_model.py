@@ -12,7 +12,7 @@ from beaver_ftc.aircraft import load
 from beaver_ftc.aircraft.schema import MAX_MONOMIALS, MAX_TERMS
 from beaver_ftc.design import model
 from beaver_ftc.design.engine import engine_power_kw, slipstream
-from beaver_ftc.design.model import control_effectiveness, design_record, free_response
+from beaver_ftc.design.model import both_responses, design_record
 from beaver_ftc.design.terms import evaluate, regressors
 from beaver_ftc.design.variants import coefficient_slopes
 
@@ -43,8 +43,7 @@ def measured(row):
 
 def split(design, x, y):
     f, G = np.zeros(3), np.zeros((3, 4))
-    free_response(design, x, y, f)
-    control_effectiveness(design, y, G)
+    both_responses(design, x, y, f, G)
     return f, G
 
 

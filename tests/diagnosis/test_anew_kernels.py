@@ -21,9 +21,8 @@ def design():
 
 
 FILL = {
-    "free response": ((3,), lambda out: model.free_response(design(), X, Y, out)),
-    "control effectiveness": ((3, 4), lambda out: model.control_effectiveness(design(), Y, out)),
-    "both": ((3, 4), lambda out: model.both_responses(design(), X, Y, np.full(3, 9.0), out)),
+    "free response": ((3,), lambda out: model.both_responses(design(), X, Y, out, np.full((3, 4), 9.0))),
+    "control effectiveness": ((3, 4), lambda out: model.both_responses(design(), X, Y, np.full(3, 9.0), out)),
     "damping": ((3, 3), lambda out: model.rate_damping(design(), X, Y, U, np.full(MAX_MONOMIALS, 9.0), out)),
     "level axes": ((3, 3), lambda out: air.level_axes(0.3, 0.2, out)),
     "quaternion": ((4,), lambda out: redundancy.quaternion(0.3, 0.2, 0.1, out)),

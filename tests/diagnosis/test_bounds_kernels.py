@@ -1,6 +1,6 @@
 """What is declared of the design model: corners, random inertias, and the poles by brute force."""
 
-from dataclasses import astuple, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ AIRCRAFT = load()
 
 
 def coefficients(mass):
-    return np.array(astuple(inertia_coefficients(mass)))
+    return np.array(inertia_coefficients(mass))
 
 
 def test_no_inertia_within_its_tolerance_changes_a_coefficient_by_more():

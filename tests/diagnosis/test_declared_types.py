@@ -9,7 +9,7 @@ from test_fault_types import TYPES, shares, starts, surfaces
 from test_release import HELD, Repaired
 
 from beaver_ftc.aircraft import load
-from beaver_ftc.design.model import control_effectiveness, design_record, free_response
+from beaver_ftc.design.model import both_responses, design_record
 from beaver_ftc.diagnosis.types import registry as types
 from beaver_ftc.diagnosis.types.findings import found
 from beaver_ftc.documents.errors import BadInput
@@ -43,8 +43,7 @@ class RealPlant(DesignPlant):
         belief["u"], belief["commanded"] = self.u, self.commanded
         believe(self.frames)
         f, G, true_f, true_G = belief["f"].copy(), belief["G"].copy(), np.zeros(3), np.zeros((3, 4))
-        free_response(self.truth, self.x, y, true_f)
-        control_effectiveness(self.truth, y, true_G)
+        both_responses(self.truth, self.x, y, true_f, true_G)
         conclude(self.frames)
         eta = self.rng.uniform(-0.02, 0.02, 3)
         self.x = self.x + self.dt * (true_f + true_G @ self.u + self.effect(true_G) + eta)

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from beaver_ftc.design.model import control_effectiveness, design_record, free_response
+from beaver_ftc.design.model import both_responses, design_record
 from beaver_ftc.diagnosis.bounds.declared import inertia_slack, poles_for_noise
 from beaver_ftc.diagnosis.bounds.worst_case import derived_bound, slack_per_rad
 from beaver_ftc.diagnosis.thresholds import noise_step
@@ -32,8 +32,7 @@ TERMS_USED = (
 def acceleration(x, y, u, **changes):
     design = design_record(**changes)[0]
     f, G = np.zeros(3), np.zeros((3, 4))
-    free_response(design, x, y, f)
-    control_effectiveness(design, y, G)
+    both_responses(design, x, y, f, G)
     return f + G @ u
 
 
@@ -98,7 +97,7 @@ def test_nothing_declared_adds_nothing():
 @settings(max_examples=100, deadline=None)
 @given(st.integers(0, 2**32))
 def test_inertia_coefficients_are_extreme_at_the_corners(seed):
-    from dataclasses import astuple, replace
+    from dataclasses import replace
 
     from beaver_ftc.design.fdc import MASS
     from beaver_ftc.design.model import inertia_coefficients
@@ -106,7 +105,7 @@ def test_inertia_coefficients_are_extreme_at_the_corners(seed):
     rng, tolerance = np.random.default_rng(seed), 0.08
     names = ("Ix_kg_m2", "Iy_kg_m2", "Iz_kg_m2", "Jxz_kg_m2")
     change = {n: getattr(MASS, n) * (1 + rng.uniform(-tolerance, tolerance)) for n in names}
-    there, nominal = (np.array(astuple(inertia_coefficients(m))) for m in (replace(MASS, **change), MASS))
+    there, nominal = (np.array(inertia_coefficients(m)) for m in (replace(MASS, **change), MASS))
     assert (np.abs(there - nominal) <= inertia_slack(tolerance, MASS) * (1 + 1e-12)).all()
 
 

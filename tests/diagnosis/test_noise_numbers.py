@@ -1,6 +1,5 @@
 """The statistical detector's numbers one by one: from what is declared, by the formulas' own conditions."""
 
-from dataclasses import astuple
 from math import exp, pi, radians, sqrt
 from types import SimpleNamespace
 
@@ -236,7 +235,7 @@ def test_a_gyro_scales_its_own_axis_once_and_its_terms_elsewhere(axis):
 
 
 def test_inertia_scales_every_term_by_the_worst_of_its_own_axes():
-    nominal = np.abs([astuple(inertia_coefficients(MASS))])[0]
+    nominal = np.abs([inertia_coefficients(MASS)])[0]
     share = (inertia_slack(0.05, MASS) / nominal)[[2, 7, 11]].max()
     assert _tolerance(inertia=0.05) == pytest.approx(share * SIZE)
 

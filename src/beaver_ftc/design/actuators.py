@@ -10,19 +10,18 @@ from functools import lru_cache
 
 import numpy as np
 
-from beaver_ftc.compiled import kernel
+from beaver_ftc.compiled import kernel, record
 
 
 @lru_cache
 def actuators_dtype(n: int) -> np.dtype:
     """The actuators of n surfaces."""
-    fields = [
-        ("real", "i8"),
-        ("approach", "f8", (n,)),  # share of the way to the command in one JSBSim frame; 1 without lag
-        ("step", "f8", (n,)),  # rad, the furthest in one JSBSim frame
-        ("low", "f8", (n,)), ("high", "f8", (n,)),
-    ]  # fmt: skip
-    return np.dtype(fields, align=True)
+    return record(
+        real=int,
+        approach=n,  # share of the way to the command in one JSBSim frame; 1 without lag
+        step=n,  # rad, the furthest in one JSBSim frame
+        low=n, high=n,
+    )  # fmt: skip
 
 
 @kernel

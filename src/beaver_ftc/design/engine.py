@@ -18,13 +18,13 @@ def slipstream(power_kw: float, density_kg_m3: float, airspeed_mps: float) -> fl
     return DPT_0 + KW_TO_DPT * 2.0 * power_kw / (density_kg_m3 * airspeed_mps**3)
 
 
+_power_kw = kernel(engine_power_kw)
+
+
 @kernel
 def measured_slipstream(engine_rpm, manifold_pressure_inhg, airspeed_mps, qdyn_pa):
     """dpt from the engine's instruments and the air data, whose density is 2 qdyn / V^2."""
-    density = 2.0 * qdyn_pa / airspeed_mps**2
-    thin_air = (408.0 - 0.0965 * engine_rpm) * (1.0 - density / SEA_LEVEL_DENSITY_KG_M3)
-    chart = 0.00412 * (manifold_pressure_inhg + 7.4) * (engine_rpm + 2010.0)
-    power_kw = 0.7355 * (-326.5 + chart + thin_air)
+    power_kw = _power_kw(engine_rpm, manifold_pressure_inhg, 2.0 * qdyn_pa / airspeed_mps**2)
     return DPT_0 + KW_TO_DPT * power_kw / (qdyn_pa * airspeed_mps)
 
 

@@ -21,8 +21,6 @@ _AIRCRAFT = load()  # the equations are those of any aircraft, the engine is tha
 GEOMETRY, MASS = _AIRCRAFT.geometry, _AIRCRAFT.mass
 TERMS, TRAVEL = _AIRCRAFT.terms, _AIRCRAFT.travel
 COEFFICIENTS = (*FORCES, *MOMENTS)
-ENVELOPE_AIRSPEED_MPS = _AIRCRAFT.envelope.airspeed_mps
-ENVELOPE_ALPHA_RAD = _AIRCRAFT.alpha_rad
 STATES = ("airspeed", "alpha", "beta", "p", "q", "r", "phi", "theta", "psi", "north", "east", "altitude")
 SURFACES = _AIRCRAFT.surfaces
 
@@ -83,7 +81,7 @@ def aerodynamic_coefficients(
         "dpt": slipstream(power, density, V), "betadoth": 0.0,
         **dict(zip(SURFACES, surfaces, strict=True)),
     }  # fmt: skip
-    summed = {name: _AIRCRAFT.coefficient(name, of, ratio) for name in (*FORCES, *MOMENTS)}
+    summed = {name: _AIRCRAFT.coefficient(name, of, ratio) for name in COEFFICIENTS}
     return summed | {"qdyn": 0.5 * density * V * V}
 
 
@@ -93,14 +91,8 @@ def derivatives(
     """Time derivative of the state, (12,) per s [FDC, chapter 3]."""
     of = aerodynamic_coefficients(state, surfaces, engine, ratio)
     betadot_ratio = (ratio or {}).get("CY_betadot", 1.0)
-    return np.concatenate(
-        [
-            _flow_rates(state, of, betadot_ratio),
-            _body_accelerations(state, of),
-            _euler_rates(state),
-            _track(state),
-        ]
-    )
+    linear, angular = _flow_rates(state, of, betadot_ratio), _body_accelerations(state, of)
+    return np.concatenate([linear, angular, _euler_rates(state), _track(state)])
 
 
 def _flow_rates(state: np.ndarray, of: Mapping, betadot_ratio: float) -> np.ndarray:
@@ -125,20 +117,13 @@ _CY_BETADOT = _AIRCRAFT.terms["CY_betadot"].value
 def _body_accelerations(state: np.ndarray, of: Mapping) -> np.ndarray:
     """pdot, qdot, rdot."""
     p, q, r = state[3:6]
-    i = inertia_coefficients(MASS)
-    area = of["qdyn"] * GEOMETRY.wing_area_m2
-    L, M, N = (
-        area * GEOMETRY.span_m * of["Cl"],
-        area * GEOMETRY.chord_m * of["Cm"],
-        area * GEOMETRY.span_m * of["Cn"],
-    )
-    return np.array(
-        [
-            i.Ppq * p * q + i.Pqr * q * r + i.Pl * L + i.Pn * N,
-            i.Qpp * p * p + i.Qpr * p * r + i.Qrr * r * r + i.Qm * M,
-            i.Rpq * p * q + i.Rqr * q * r + i.Rl * L + i.Rn * N,
-        ]
-    )
+    i, area = inertia_coefficients(MASS), of["qdyn"] * GEOMETRY.wing_area_m2
+    L, N = area * GEOMETRY.span_m * of["Cl"], area * GEOMETRY.span_m * of["Cn"]
+    M = area * GEOMETRY.chord_m * of["Cm"]
+    pdot = i.Ppq * p * q + i.Pqr * q * r + i.Pl * L + i.Pn * N
+    qdot = i.Qpp * p * p + i.Qpr * p * r + i.Qrr * r * r + i.Qm * M
+    rdot = i.Rpq * p * q + i.Rqr * q * r + i.Rl * L + i.Rn * N
+    return np.array([pdot, qdot, rdot])
 
 
 def _euler_rates(state: np.ndarray) -> np.ndarray:
@@ -155,13 +140,8 @@ def _track(state: np.ndarray) -> np.ndarray:
     u, v, w = V * np.cos(alpha) * np.cos(beta), V * np.sin(beta), V * np.sin(alpha) * np.cos(beta)
     across, down = v * np.cos(phi) - w * np.sin(phi), v * np.sin(phi) + w * np.cos(phi)
     ahead = u * np.cos(theta) + down * np.sin(theta)
-    return np.array(
-        [
-            ahead * np.cos(psi) - across * np.sin(psi),
-            ahead * np.sin(psi) + across * np.cos(psi),
-            u * np.sin(theta) - down * np.cos(theta),
-        ]
-    )
+    north, east = ahead * np.cos(psi) - across * np.sin(psi), ahead * np.sin(psi) + across * np.cos(psi)
+    return np.array([north, east, u * np.sin(theta) - down * np.cos(theta)])
 
 
 def linearise(

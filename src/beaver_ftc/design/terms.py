@@ -15,7 +15,7 @@ import numpy as np
 
 from beaver_ftc.aircraft import Aircraft, Term
 from beaver_ftc.aircraft.schema import FLOW_SIGNALS, MAX_MONOMIALS, MAX_SIGNALS, MAX_TERMS
-from beaver_ftc.compiled import kernel
+from beaver_ftc.compiled import kernel, record
 
 ALPHA, BETA, AIRSPEED, QDYN, DPT = range(5)  # places in y; declared signals begin at the last
 N_Y = 4 + MAX_SIGNALS
@@ -23,18 +23,15 @@ N_SIGNALS = len(FLOW_SIGNALS) + MAX_SIGNALS
 PH, QH, RH = (FLOW_SIGNALS.index(name) for name in ("ph", "qh", "rh"))
 _DECLARED = len(FLOW_SIGNALS)  # where declared signals begin among the signals
 
-TABLE = np.dtype(
-    [
-        ("span", "f8"), ("chord", "f8"), ("n_declared", "i8"),
-        # monomial k is monomial parent[k] times signal factor[k]; the first is 1
-        ("n_monomials", "i8"), ("parent", "u8", (MAX_MONOMIALS,)), ("factor", "u8", (MAX_MONOMIALS,)),
-        # of each coefficient the terms without a surface, and those with one
-        ("n_terms", "i8"), ("free_from", "i8", (3,)), ("free_to", "i8", (3,)), ("surface_to", "i8", (3,)),
-        ("value", "f8", (MAX_TERMS,)), ("monomial", "u8", (MAX_TERMS,)), ("surface", "i8", (MAX_TERMS,)),
-        # scratch: signals and monomials of the state last evaluated
-        ("signal", "f8", (N_SIGNALS,)), ("power", "f8", (MAX_MONOMIALS,)),
-    ],
-    align=True,
+TABLE = record(
+    span=float, chord=float, n_declared=int,
+    # monomial k is monomial parent[k] times signal factor[k]; the first is 1
+    n_monomials=int, parent=("u8", MAX_MONOMIALS), factor=("u8", MAX_MONOMIALS),
+    # of each coefficient the terms without a surface, and those with one
+    n_terms=int, free_from=(int, 3), free_to=(int, 3), surface_to=(int, 3), value=MAX_TERMS,
+    monomial=("u8", MAX_TERMS), surface=(int, MAX_TERMS),
+    # scratch: signals and monomials of the state last evaluated
+    signal=N_SIGNALS, power=MAX_MONOMIALS,
 )  # fmt: skip
 
 

@@ -8,77 +8,43 @@ The linear model is that of f + G u at (x0, y0, u0): the surfaces' moments vary 
 d(G u0)/dy, and f0 + G0 u0 is the acceleration in trim.
 """
 
-from collections.abc import Mapping
 from dataclasses import replace
 from types import SimpleNamespace
-from typing import Protocol
+from typing import Any
 
 import numpy as np
 
 from beaver_ftc.aircraft import Aircraft, MassProperties, load
 from beaver_ftc.compiled import kernel, plain
-from beaver_ftc.design.model import (
-    ALPHA,
-    QDYN,
-    accelerations_of_moments,
-    accelerations_per_rad,
-    both_responses,
-    design_record,
-)
-from beaver_ftc.design.terms import MAX_MONOMIALS, N_SIGNALS, free_sum, monomials, signals, surface_sums
+from beaver_ftc.design import model as nonlinear
+from beaver_ftc.design import terms
+from beaver_ftc.design.model import ALPHA, QDYN, both_responses
+from beaver_ftc.design.terms import MAX_MONOMIALS, N_SIGNALS
 
 _STEP = 1e-30  # of a complex step: far below rounding, so the derivative is exact to rounding
 
 
-class WrongInertia(Protocol):
-    """The designer's inertia over the table's."""
+def design_of(model: Any, aircraft: Aircraft | None = None) -> np.ndarray:
+    """The design record (1,) of a scenario's `design_model`: what the designer leaves out or gets wrong.
 
-    @property
-    def Ix(self) -> float: ...
-    @property
-    def Iy(self) -> float: ...
-    @property
-    def Iz(self) -> float: ...
-    @property
-    def Jxz(self) -> float: ...
-
-
-class WrongModel(Protocol):
-    """What the designer leaves out or gets wrong, as a scenario's `design_model` says it."""
-
-    @property
-    def engine_terms(self) -> bool: ...
-    @property
-    def linearised(self) -> bool: ...
-    @property
-    def frozen_alpha(self) -> bool: ...
-    @property
-    def mass(self) -> float: ...
-    @property
-    def inertia(self) -> WrongInertia: ...
-    @property
-    def coefficients(self) -> Mapping[str, float]: ...
-
-
-def design_of(model: WrongModel, aircraft: Aircraft | None = None) -> np.ndarray:
-    """The design record (1,) of a scenario's `design_model`; one tied to the trim wants `anchor` as well."""
+    One that is tied to the trim wants `anchor` as well.
+    """
     mass = mass_of(model, aircraft)
-    design = design_record(aircraft, engine_terms=model.engine_terms, scale=model.coefficients, mass=mass)
+    design = nonlinear.design_record(
+        aircraft, engine_terms=model.engine_terms, scale=model.coefficients, mass=mass
+    )
     design["linearised"], design["frozen_alpha"] = model.linearised, model.frozen_alpha
     return design
 
 
-def mass_of(model: WrongModel, aircraft: Aircraft | None = None) -> MassProperties:
-    """A heavier aircraft of the same shape has its inertia in proportion."""
-    nominal = (aircraft or load()).mass
-    return replace(
-        nominal,
-        mass_kg=nominal.mass_kg * model.mass,
-        Ix_kg_m2=nominal.Ix_kg_m2 * model.mass * model.inertia.Ix,
-        Iy_kg_m2=nominal.Iy_kg_m2 * model.mass * model.inertia.Iy,
-        Iz_kg_m2=nominal.Iz_kg_m2 * model.mass * model.inertia.Iz,
-        Jxz_kg_m2=nominal.Jxz_kg_m2 * model.mass * model.inertia.Jxz,
-    )
+def mass_of(model: Any, aircraft: Aircraft | None = None) -> MassProperties:
+    """What a scenario's `design_model` takes for mass and inertia; a heavier aircraft of the same shape has
+    its inertia in proportion."""
+    nominal, inertia = (aircraft or load()).mass, {}
+    for name in ("Ix", "Iy", "Iz", "Jxz"):
+        own = getattr(nominal, f"{name}_kg_m2")
+        inertia[f"{name}_kg_m2"] = own * model.mass * getattr(model.inertia, name)
+    return replace(nominal, mass_kg=nominal.mass_kg * model.mass, **inertia)
 
 
 def anchor(design: np.void, x: np.ndarray, y: np.ndarray, u: np.ndarray) -> None:
@@ -109,13 +75,13 @@ def _split(design: np.void, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, n
     states = np.broadcast_shapes(x.shape[1:], y.shape[1:])
     f, G = np.zeros((3, *states), complex), np.zeros((*record.G0.shape, *states), complex)
     signal, power = np.zeros((N_SIGNALS, *states), complex), np.zeros((MAX_MONOMIALS, *states), complex)
-    plain(signals)(table, x, y, signal)
-    plain(monomials)(table, signal, power)
+    plain(terms.signals)(table, x, y, signal)
+    plain(terms.monomials)(table, signal, power)
     arms = [y[QDYN] * record.S * length for length in (record.b, record.c, record.b)]
-    moments = [arm * plain(free_sum)(table, i, power) for i, arm in enumerate(arms)]
-    plain(accelerations_of_moments)(record, x, *moments, f)
-    plain(surface_sums)(table, power, G)
-    plain(accelerations_per_rad)(record, y, G)
+    moments = [arm * plain(terms.free_sum)(table, i, power) for i, arm in enumerate(arms)]
+    plain(nonlinear.accelerations_of_moments)(record, x, *moments, f)
+    plain(terms.surface_sums)(table, power, G)
+    plain(nonlinear.accelerations_per_rad)(record, y, G)
     return f, G
 
 
@@ -128,11 +94,11 @@ def coefficient_slopes(design: np.void, x: np.ndarray, y: np.ndarray, u: np.ndar
     """d(Cl, Cm, Cn) / d signals, (3, N_SIGNALS), with the surfaces at u rad, by complex steps."""
     table = _fields(design["moments"])
     signal, power = np.zeros(N_SIGNALS, complex), np.zeros((MAX_MONOMIALS, N_SIGNALS), complex)
-    plain(signals)(table, x, y, signal)
-    plain(monomials)(table, signal[:, None] + 1j * _STEP * np.eye(N_SIGNALS), power)
+    plain(terms.signals)(table, x, y, signal)
+    plain(terms.monomials)(table, signal[:, None] + 1j * _STEP * np.eye(N_SIGNALS), power)
     per_rad = np.zeros((3, u.size, N_SIGNALS), complex)
-    plain(surface_sums)(table, power, per_rad)
-    free = np.array([plain(free_sum)(table, i, power) for i in range(3)])
+    plain(terms.surface_sums)(table, power, per_rad)
+    free = np.array([plain(terms.free_sum)(table, i, power) for i in range(3)])
     return (free + np.einsum("isk,s->ik", per_rad, u)).imag / _STEP
 
 

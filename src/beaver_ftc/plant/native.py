@@ -22,19 +22,15 @@ from llvmlite import ir
 from numba.core import types
 from numba.extending import intrinsic
 
-from beaver_ftc.compiled import kernel
+from beaver_ftc.compiled import kernel, record
 from beaver_ftc.plant.addresses import available, pointer
 
 if TYPE_CHECKING:  # whoever only diagnoses has compiled code of this module, and no JSBSim
     import jsbsim
 
 # What `advance` needs: code and executive; whether turbulence is to be turned, and the nodes for that.
-RUNNING = np.dtype(
-    [
-        ("run", "i8"), ("executive", "i8"), ("turbulent", "i8"),
-        ("getter", "i8"), ("setter", "i8"), ("heading_pointer", "i8"), ("axes_pointer", "i8"),
-    ],
-    align=True,
+RUNNING = record(
+    run=int, executive=int, turbulent=int, getter=int, setter=int, heading_pointer=int, axes_pointer=int,
 )  # fmt: skip
 
 

@@ -8,7 +8,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from beaver_ftc.compiled import kernel
+from beaver_ftc.compiled import kernel, record
 from beaver_ftc.design.model import DPT
 from beaver_ftc.plant import channels as ch
 from beaver_ftc.plant.instruments import (
@@ -35,17 +35,14 @@ DEPARTURE_SIGNALS = ("p", "q", "r", "alpha", "beta", "altitude")
 def truth_dtype(n: int) -> np.dtype:
     """The truth of an aircraft with n surfaces: its nodes, what they hold, and its faults."""
     room = ch.most_channels(n)
-    fields = [
-        ("native", "i8"), ("getter", "i8"), ("setter", "i8"),
-        ("n", "i8"), ("declared", "i8"), ("read_pointers", "i8", (room,)), ("write_pointers", "i8", (n,)),
-        ("engine_pointer", "i8", (1,)),
-        ("factor", "f8", (room,)), ("value", "f8", (room,)),  # the first n, in SI: see channels.py
-        ("latitude_0", "f8"), ("longitude_0", "f8"), ("radius_m", "f8"), ("parallel_radius_m", "f8"),
-        ("ground_m", "f8"),
+    return record(
+        native=int, getter=int, setter=int, n=int, declared=int, read_pointers=(int, room),
+        write_pointers=(int, n), engine_pointer=(int, 1),
+        factor=room, value=room,  # the first n, in SI: see channels.py
+        latitude_0=float, longitude_0=float, radius_m=float, parallel_radius_m=float, ground_m=float,
         # its faults, for the oracle and for the accounts
-        ("faulted", "i8"), ("fault_at_s", "f8"), ("immovable", "i8", (n,)), ("Cm_alpha3", "f8"),
-    ]  # fmt: skip
-    return np.dtype(fields, align=True)
+        faulted=int, fault_at_s=float, immovable=(int, n), Cm_alpha3=float,
+    )  # fmt: skip
 
 
 @kernel

@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 
 from beaver_ftc.aircraft import load
-from beaver_ftc.design.model import AXES, N_Y, control_effectiveness
+from beaver_ftc.design.model import AXES, N_Y, both_responses
 from beaver_ftc.design.variants import design_of
 from beaver_ftc.documents.errors import BadInput, BeaverFtcError
 from beaver_ftc.loop.loop import fly
@@ -73,7 +73,7 @@ def excitation(scenario: Scenario) -> Excitation:
     bound = log.read(*(f"{axis}_eta_bar_rad_s2" for axis in AXES))
     design, G = design_of(scenario.design_model, aircraft)[0], np.zeros((len(y), 3, aircraft.n))
     for row, at in zip(y, G, strict=True):
-        control_effectiveness(design, row, at)
+        both_responses(design, np.zeros(3), row, np.zeros(3), at)
     first = int(SETTLED_S * scenario.rate_hz)
     moment = (G * u[:, None, :])[first:]
     of = {name: moment[:, :, aircraft.surfaces.index(name)] for name in aircraft.primary}

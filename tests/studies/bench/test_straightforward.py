@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from beaver_ftc.design.model import control_effectiveness, design_record, free_response
+from beaver_ftc.design.model import both_responses, design_record
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.plant.faults import FaultSchedule
 from beaver_ftc.studies.bench.straightforward import PublishedModel, Straightforward
@@ -36,8 +36,7 @@ def test_its_design_model_is_the_published_one():
         truth = {"alpha_rad": alpha, "beta_rad": beta, "airspeed_mps": V, "qdyn_pa": qdyn, "dpt": dpt}
         f, G = np.zeros(3), np.zeros((3, 4))
         design, y = design_record()[0], np.array([alpha, beta, V, qdyn, dpt])
-        free_response(design, x, y, f)
-        control_effectiveness(design, y, G)
+        both_responses(design, x, y, f, G)
         mine = PublishedModel().f_and_G(x, truth)
         np.testing.assert_allclose(mine[0], f, rtol=1e-9, atol=1e-9)
         np.testing.assert_allclose(mine[1], G, rtol=1e-9, atol=1e-9)

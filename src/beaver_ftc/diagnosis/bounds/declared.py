@@ -1,7 +1,7 @@
 """What a scenario declares in `fdi.bounds`, read once, for any aircraft and instrument; its worst case."""
 
 from collections.abc import Iterable
-from dataclasses import astuple, replace
+from dataclasses import replace
 from functools import lru_cache
 from itertools import product
 from math import exp, log, pi, radians, sqrt
@@ -86,13 +86,13 @@ def inertia_slack(tolerance: float, mass: MassProperties) -> np.ndarray:
 
     Each is monotonic in each inertia as long as the others stay put, so the corners tell.
     """
-    nominal = np.array(astuple(inertia_coefficients(mass)))
+    nominal = np.array(inertia_coefficients(mass))
     worst = np.zeros(12)
     for signs in product((-1.0, 1.0), repeat=4):
         change = {
             name: getattr(mass, name) * (1 + tolerance * s) for name, s in zip(_INERTIA, signs, strict=True)
         }
-        there = np.array(astuple(inertia_coefficients(replace(mass, **change))))
+        there = np.array(inertia_coefficients(replace(mass, **change)))
         worst = np.maximum(worst, np.abs(there - nominal))
     worst.flags.writeable = False  # kept: the same for every flight of a design
     return worst

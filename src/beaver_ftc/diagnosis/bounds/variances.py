@@ -1,6 +1,5 @@
 """What a scenario declares, as variances: for plug-ins, for the statistical detector's filters and tests."""
 
-from dataclasses import astuple
 from math import hypot, pi, radians, sqrt
 
 import numpy as np
@@ -145,7 +144,7 @@ def steady_tolerance(
     (noise_model.py); y, u in trim."""
     errors = Errors(bounds.sensors)
     size = np.abs(design["moments"]["value"][: len(aircraft.moments)])
-    slack, nominal = inertia_slack(bounds.inertia, mass), np.abs(astuple(inertia_coefficients(mass)))
+    slack, nominal = inertia_slack(bounds.inertia, mass), np.abs(inertia_coefficients(mass))
     of_own_axis = (2, 7, 11)  # what multiplies a moment there
     share = np.full(size.shape, max(slack[i] / nominal[i] for i in of_own_axis))
     share += [_measured_share(errors, term) for term in aircraft.moments]

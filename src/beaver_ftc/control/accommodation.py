@@ -12,7 +12,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from beaver_ftc.compiled import kernel
+from beaver_ftc.compiled import kernel, record
 from beaver_ftc.control.laws import ORACLE, REJECTING, rejecting
 from beaver_ftc.diagnosis.types.examine import FIXED
 from beaver_ftc.scenario.control import ControlConfig
@@ -22,12 +22,9 @@ from beaver_ftc.scenario.control import ControlConfig
 def surfaces_dtype(n: int) -> np.dtype:
     """What n surfaces are taken for: effectiveness, on its way to target by at most a step a frame; offset
     and lag, rad."""
-    fields = [
-        ("target", "f8", (n,)), ("effectiveness", "f8", (n,)),
-        ("effectiveness_step", "f8"), ("least_effectiveness", "f8"),
-        ("offset", "f8", (n,)), ("lag", "f8", (n,)),
-    ]  # fmt: skip
-    return np.dtype(fields, align=True)
+    return record(
+        target=n, effectiveness=n, effectiveness_step=float, least_effectiveness=float, offset=n, lag=n,
+    )  # fmt: skip
 
 
 @lru_cache
@@ -36,23 +33,17 @@ def assessment_dtype(n: int) -> np.dtype:
     for none. measure: what is to be done about each, -1 where that is open, or for faults of every type not
     asked; effectiveness; offset, lag rad; at_once: whether its effectiveness need not be eased in. hedge: a
     surface is slow."""
-    fields = [
-        ("detected", "i8"), ("every_type", "i8"), ("named", "i8"), ("hedge", "i8"),
-        ("measure", "i8", (n,)), ("effectiveness", "f8", (n,)), ("at_once", "i8", (n,)),
-        ("offset", "f8", (n,)), ("lag", "f8", (n,)),
-    ]  # fmt: skip
-    return np.dtype(fields, align=True)
+    return record(
+        detected=int, every_type=int, named=int, hedge=int, measure=(int, n), effectiveness=n,
+        at_once=(int, n), offset=n, lag=n,
+    )  # fmt: skip
 
 
 @lru_cache
 def true_faults_dtype(n: int) -> np.dtype:
     """present: 1 from the first fault on. effectiveness (n,): 1 healthy. immovable (n,): does not follow its
     command. effective (n,) rad: the deflection that acts. Cm_alpha3: the unanticipated pitching moment."""
-    fields = [
-        ("present", "i8"), ("Cm_alpha3", "f8"),
-        ("effectiveness", "f8", (n,)), ("immovable", "i8", (n,)), ("effective", "f8", (n,)),
-    ]  # fmt: skip
-    return np.dtype(fields, align=True)
+    return record(present=int, Cm_alpha3=float, effectiveness=n, immovable=(int, n), effective=n)
 
 
 def configure(surfaces: np.void, config: ControlConfig, law: int, dt_s: float) -> None:
@@ -76,11 +67,8 @@ def accommodate(law, inner, assessment, surfaces, rejection, layout, saturated, 
         if inner == REJECTING and law != ORACLE:
             if assessment.measure[s] != FIXED:
                 rejecting.believe_larger(rejection, surfaces, layout, s)
-            suspected = (
-                assessment.detected
-                and s == assessment.named
-                and is_doubtful(assessment, surfaces, rejection, layout, s)
-            )
+            named = assessment.detected and s == assessment.named
+            suspected = named and is_doubtful(assessment, surfaces, rejection, layout, s)
             rejecting.withdraw(rejection, surfaces, layout, s, saturated[s], suspected)
     approach(surfaces)
 

@@ -15,48 +15,35 @@ from math import pi, radians
 import numpy as np
 
 from beaver_ftc.aircraft import Aircraft
-from beaver_ftc.compiled import kernel
+from beaver_ftc.compiled import kernel, record
 from beaver_ftc.diagnosis.state import PITCH, ROLL, YAW, leaders_of
 from beaver_ftc.scenario.control import ControlConfig
 from beaver_ftc.scenario.diagnosis import Probing
 
 # Of each axis, rad/s2: what is demanded, what of it only holds the rates, what of it was not given; and
 # whether not even the rates can be held.
-AXES = np.dtype(
-    [("demand", "f8", (3,)), ("hold", "f8", (3,)), ("shortfall", "f8", (3,)), ("beyond", "i8", (3,))],
-    align=True,
-)
+AXES = record(demand=3, hold=3, shortfall=3, beyond=(int, 3))
 
 # deflection rad of the flap, by step rad of phase a frame; frames: how many at most, 0 for no probe at all;
 # probed: those of the present movement.
-PROBE = np.dtype(
-    [
-        ("amplitude", "f8"), ("step", "f8"), ("frames", "i8"),
-        ("deflection", "f8"), ("probed", "i8"), ("from_s", "f8"), ("to_s", "f8"),
-    ],
-    align=True,
+PROBE = record(
+    amplitude=float, step=float, frames=int, deflection=float, probed=int, from_s=float, to_s=float,
 )  # fmt: skip
 
 
 @lru_cache
 def layout_dtype(n: int) -> np.dtype:
     """n surfaces: the one that leads each axis, who stands in for pitch's, or -1; trim and stops, rad."""
-    fields = [
-        ("main", "i8", (3,)), ("stand_in", "i8"),
-        ("trim", "f8", (n,)), ("low", "f8", (n,)), ("high", "f8", (n,)),
-    ]  # fmt: skip
-    return np.dtype(fields, align=True)
+    return record(main=(int, 3), stand_in=int, trim=n, low=n, high=n)
 
 
 @lru_cache
 def allocation_dtype(n: int) -> np.dtype:
     """n surfaces: effectiveness matrix with what is believed of each in it; the command, rad, and which stand
     at a stop; how far pitch is handed over, and whether it is handed back, after a change in flight."""
-    fields = [
-        ("G", "f8", (3, n)), ("command", "f8", (n,)), ("saturated", "i8", (n,)),
-        ("hand_over", "f8"), ("hand_over_step", "f8"), ("hands_back", "i8"),
-    ]  # fmt: skip
-    return np.dtype(fields, align=True)
+    return record(
+        G=(3, n), command=n, saturated=(int, n), hand_over=float, hand_over_step=float, hands_back=int,
+    )  # fmt: skip
 
 
 def configure(control: np.void, config: ControlConfig, travel: np.ndarray, aircraft: Aircraft) -> None:

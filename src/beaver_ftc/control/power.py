@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from beaver_ftc.aircraft import Aircraft
-from beaver_ftc.compiled import kernel
+from beaver_ftc.compiled import kernel, record
 from beaver_ftc.control.laws import FAULT_TOLERANT, ORACLE, law_of
 from beaver_ftc.design.engine import engine_power_kw, slipstream
 from beaver_ftc.design.model import AIRSPEED, DPT, QDYN
@@ -28,19 +28,15 @@ LEAST_LACK_RAD_S2 = 0.05  # of pitch acceleration: what 2 to 3 inHg give
 YAW_SHARE = 0.5  # of the rudder, that engine power may claim: the rest is there to fly with
 
 # Settings, state, and what is reported of it.
-POWER = np.dtype(
-    [
-        ("enabled", "i8"), ("impatience", "f8"), ("forgiveness", "f8"),  # shares per frame
-        ("speed_gain", "f8"), ("attitude_gain", "f8"),  # inHg per m/s, inHg per rad
-        ("smoothing", "f8"), ("washout", "f8"), ("leak", "f8"),  # shares per frame
-        ("trim", "f8"), ("low", "f8"), ("high", "f8"), ("step", "f8"),  # inHg
-        ("dpt_factor", "f8"), ("highest_dpt", "f8"),
-        ("lost", "f8"), ("engaged", "i8"), ("in_use", "i8"), ("moved", "i8"),
-        ("speed", "f8"), ("usual_speed", "f8"), ("attitude", "f8"),
-        ("command", "f8", (1,)),  # inHg
-        ("from_s", "f8"), ("frames", "i8"), ("least", "f8"), ("greatest", "f8"),
-    ],
-    align=True,
+POWER = record(
+    enabled=int, impatience=float, forgiveness=float,  # shares per frame
+    speed_gain=float, attitude_gain=float,  # inHg per m/s, inHg per rad
+    smoothing=float, washout=float, leak=float,  # shares per frame
+    trim=float, low=float, high=float, step=float,  # inHg
+    dpt_factor=float, highest_dpt=float, lost=float, engaged=int, in_use=int, moved=int, speed=float,
+    usual_speed=float, attitude=float,
+    command=1,  # inHg
+    from_s=float, frames=int, least=float, greatest=float,
 )  # fmt: skip
 
 
@@ -65,9 +61,8 @@ def configure(power: np.void, layout: np.void, scenario: Scenario) -> None:
     power["impatience"], power["forgiveness"] = dt / config.patience_s, dt / config.release_s
     power["speed_gain"] = config.speed_gain_inhg_per_mps
     power["attitude_gain"] = config.attitude_gain_inhg_per_deg / radians(1.0)
-    for name, lag_s in (
-        ("smoothing", config.smoothing_s), ("washout", config.washout_s), ("leak", config.attitude_memory_s),
-    ):  # fmt: skip
+    lags_s = {"smoothing": config.smoothing_s, "washout": config.washout_s, "leak": config.attitude_memory_s}
+    for name, lag_s in lags_s.items():
         power[name] = 1.0 - exp(-dt / lag_s)
     if not _has_piston_engine(scenario.airframe):
         return

@@ -12,7 +12,7 @@ attitude, so what is missed on one side is asked for on neither.
 
 import numpy as np
 
-from beaver_ftc.compiled import kernel
+from beaver_ftc.compiled import kernel, record
 from beaver_ftc.scenario.control import ControlConfig
 
 MISSED_RAD_S = 0.1  # a rate missed in all by this much: the reference is given up
@@ -20,14 +20,9 @@ RECOVERY_S = 30.0  # and asked for again within this time: several periods of a 
 
 # The model A, B over dt s; its answer to what is commanded, and the one that is governed: rad/s, rad/s2.
 # hedging: from when on it is; steered: by outer loops.
-REFERENCE = np.dtype(
-    [
-        ("dt", "f8"), ("A", "f8", (2, 2)), ("B", "f8", (2,)), ("steered", "i8"),
-        ("commanded_rate", "f8", (3,)), ("model_rate", "f8", (3,)), ("model_acceleration", "f8", (3,)),
-        ("governed_rate", "f8", (3,)), ("governed_acceleration", "f8", (3,)),
-        ("hedging", "i8"), ("scale", "f8", (3,)),
-    ],
-    align=True,
+REFERENCE = record(
+    dt=float, A=(2, 2), B=2, steered=int, commanded_rate=3, model_rate=3, model_acceleration=3,
+    governed_rate=3, governed_acceleration=3, hedging=int, scale=3,
 )  # fmt: skip
 
 
@@ -59,10 +54,8 @@ def discretise(wn: float, zeta: float, dt: float) -> tuple[np.ndarray, np.ndarra
 def advance(reference, rate, acceleration, wanted):
     """Rate (rad/s) and acceleration (rad/s2) of the model a frame on, `wanted` (rad/s) held."""
     A, B = reference.A, reference.B
-    return (
-        A[0, 0] * rate + A[0, 1] * acceleration + B[0] * wanted,
-        A[1, 0] * rate + A[1, 1] * acceleration + B[1] * wanted,
-    )
+    following = A[0, 0] * rate + A[0, 1] * acceleration + B[0] * wanted
+    return following, A[1, 0] * rate + A[1, 1] * acceleration + B[1] * wanted
 
 
 @kernel

@@ -4,6 +4,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from beaver_ftc.compiled import record
 from beaver_ftc.control import accommodation, allocation, power, reference
 from beaver_ftc.control.accommodation import surfaces_dtype
 from beaver_ftc.control.allocation import AXES, PROBE, allocation_dtype, layout_dtype
@@ -12,20 +13,19 @@ from beaver_ftc.control.laws.published import FEEDBACK
 from beaver_ftc.control.laws.rejecting import rejection_dtype
 from beaver_ftc.control.power import POWER
 from beaver_ftc.control.reference import REFERENCE
-from beaver_ftc.control.rivals.tracking import RIVAL
+from beaver_ftc.control.rivals.compiled import RIVAL
 from beaver_ftc.scenario.schema import Scenario
 
 
 @lru_cache
 def control_dtype(n: int) -> np.dtype:
     """What the law of an aircraft with n surfaces keeps: a record of each part, which alone writes it."""
-    fields = [
-        ("law", "i8"), ("inner", "i8"),  # laws/__init__.py
-        ("reference", REFERENCE), ("layout", layout_dtype(n)), ("surfaces", surfaces_dtype(n)),
-        ("feedback", FEEDBACK), ("rejection", rejection_dtype(n)), ("rival", RIVAL),
-        ("axes", AXES), ("allocation", allocation_dtype(n)), ("probe", PROBE), ("power", POWER),
-    ]  # fmt: skip
-    return np.dtype(fields, align=True)
+    return record(
+        law=int, inner=int,  # laws/__init__.py
+        reference=REFERENCE, layout=layout_dtype(n), surfaces=surfaces_dtype(n), feedback=FEEDBACK,
+        rejection=rejection_dtype(n), rival=RIVAL, axes=AXES, allocation=allocation_dtype(n), probe=PROBE,
+        power=POWER,
+    )  # fmt: skip
 
 
 def configure(control: np.void, scenario: Scenario, travel: np.ndarray) -> None:

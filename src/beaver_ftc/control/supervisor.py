@@ -5,9 +5,7 @@ nominal until detection; adaptive until isolation, compensating an unknown fault
 rudder: no second surface), or unanticipated (no known fault fits).
 """
 
-import numpy as np
-
-from beaver_ftc.compiled import kernel
+from beaver_ftc.compiled import kernel, record
 from beaver_ftc.control.laws import FAULT_TOLERANT, NOMINAL
 from beaver_ftc.diagnosis.state import PITCH, UNANTICIPATED
 from beaver_ftc.diagnosis.types.examine import FIXED, LOSES
@@ -16,10 +14,7 @@ MODES = ("nominal", "adaptive", "reallocated", "unanticipated")
 MODE_NOMINAL, MODE_ADAPTIVE, MODE_REALLOCATED, MODE_UNANTICIPATED = range(4)
 MAX_EVENTS = 64
 
-SUPERVISOR = np.dtype(
-    [("mode", "i8"), ("n_modes", "i8"), ("mode_at_s", "f8", (MAX_EVENTS,)), ("mode_is", "i8", (MAX_EVENTS,))],
-    align=True,
-)
+SUPERVISOR = record(mode=int, n_modes=int, mode_at_s=MAX_EVENTS, mode_is=(int, MAX_EVENTS))
 
 
 @kernel

@@ -82,19 +82,15 @@ def controller(loop: Loop, s: float, z: np.ndarray) -> np.ndarray:
     actuator = loop.approach / (z - 1.0 + loop.approach)
     one, none = np.ones_like(z), np.zeros_like(z)
     # unknowns: rate, disturbance, position (times G), command (times G); driven by the measured rate
-    M = np.stack(
-        [
-            np.stack([one - (1 - pull) * back, -(1 - pull) * dt * back, -(1 - pull) * dt * mean, none], 1),
-            np.stack([learn * back, one - back + learn * dt * back, learn * dt * mean, none], 1),
-            np.stack([none, none, one, -actuator], 1),
-            np.stack(
-                [loop.lead * s * one, loop.lead * (1 + s * share * dt) * one,
-                 (loop.lead - 1 + loop.lead * s * share * dt) * one, one], 1),
-        ],
-        1,
-    )  # fmt: skip
+    rows = [
+        [one - (1 - pull) * back, -(1 - pull) * dt * back, -(1 - pull) * dt * mean, none],
+        [learn * back, one - back + learn * dt * back, learn * dt * mean, none],
+        [none, none, one, -actuator],
+        [loop.lead * s * one, loop.lead * (1 + s * share * dt) * one,
+         (loop.lead - 1 + loop.lead * s * share * dt) * one, one],
+    ]  # fmt: skip
     driven = np.stack([pull * one, learn * one, none, none], 1)
-    return -np.linalg.solve(M, driven[..., None])[..., 3, 0]
+    return -np.linalg.solve(np.moveaxis(np.array(rows), 2, 0), driven[..., None])[..., 3, 0]
 
 
 def open_loop(loop: Loop, s: float, z: np.ndarray) -> np.ndarray:

@@ -6,12 +6,10 @@ The published laws share it; they differ in fhat, in the effectiveness they beli
 demand.
 """
 
-import numpy as np
-
-from beaver_ftc.compiled import kernel
+from beaver_ftc.compiled import kernel, record
 
 # Gains 1/s, 1/s2; the integral of the error, rad; fhat, what the unknown is taken for, rad/s2.
-FEEDBACK = np.dtype([("Kp", "f8"), ("Ki", "f8"), ("integral", "f8", (3,)), ("fhat", "f8", (3,))], align=True)
+FEEDBACK = record(Kp=float, Ki=float, integral=3, fhat=3)
 
 
 @kernel

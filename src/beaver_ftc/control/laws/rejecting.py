@@ -30,7 +30,7 @@ from math import exp
 
 import numpy as np
 
-from beaver_ftc.compiled import kernel
+from beaver_ftc.compiled import kernel, record
 from beaver_ftc.control.reference import advance
 from beaver_ftc.design.model import QDYN
 from beaver_ftc.diagnosis.state import PITCH
@@ -43,14 +43,8 @@ UNSURE = 0.2  # standard deviation of the diagnosis' estimate reckoned with: it 
 NOTHING_LEFT = 0.05  # half of what the law divides by
 
 # The observer's answer to an acceleration, and the sums of the least squares.
-ANSWER = np.dtype([("rate", "f8", (3,)), ("disturbance", "f8", (3,))], align=True)
-FOUND = np.dtype(
-    [
-        ("fading", "f8"), ("product", "f8", (3,)), ("square", "f8", (3,)), ("missed", "f8", (3,)),
-        ("frames", "f8", (3,)), ("named", "i8", (3,)),
-    ],
-    align=True,
-)  # fmt: skip
+ANSWER = record(rate=3, disturbance=3)
+FOUND = record(fading=float, product=3, square=3, missed=3, frames=3, named=(int, 3))
 
 
 @lru_cache
@@ -63,19 +57,11 @@ def rejection_dtype(surfaces: int) -> np.dtype:
     acts. lost: share of pitch that the stand-in carries. lead (n,): command beyond the actuator's position
     over what is wanted beyond it. at_stop_s, withdrawn (n,): see `withdraw`.
     """
-    return np.dtype(
-        [
-            ("begun", "i8"), ("dt", "f8"), ("share", "f8"), ("lost", "f8"),
-            ("qdyn", "f8", (N_POINTS,)),
-            ("Kp_at", "f8", (N_LOOPS, N_POINTS)), ("pull_at", "f8", (N_LOOPS, N_POINTS)),
-            ("learn_at", "f8", (N_LOOPS, N_POINTS)),
-            ("Kp", "f8", (3,)), ("pull", "f8", (3,)), ("learn", "f8", (3,)),
-            ("rate", "f8", (3,)), ("disturbance", "f8", (3,)), ("ahead", "f8", (3,)),
-            ("lead", "f8", (surfaces,)),
-            ("at_stop_s", "f8", (surfaces,)), ("withdrawn", "i8", (surfaces,)),
-            ("healthy", ANSWER), ("believed", ANSWER), ("found", FOUND),
-        ],
-        align=True,
+    return record(
+        begun=int, dt=float, share=float, lost=float, qdyn=N_POINTS, Kp_at=(N_LOOPS, N_POINTS),
+        pull_at=(N_LOOPS, N_POINTS), learn_at=(N_LOOPS, N_POINTS), Kp=3, pull=3, learn=3, rate=3,
+        disturbance=3, ahead=3, lead=surfaces, at_stop_s=surfaces, withdrawn=(int, surfaces),
+        healthy=ANSWER, believed=ANSWER, found=FOUND,
     )  # fmt: skip
 
 
@@ -93,18 +79,18 @@ def schedule(rejection, qdyn):
     while j < last - 1 and qdyn > points[j + 1]:
         j += 1
     part = min(max((qdyn - points[j]) / (points[j + 1] - points[j]), 0.0), 1.0)
+    look_up(rejection.Kp, rejection.Kp_at, j, part, rejection.lost)
+    look_up(rejection.pull, rejection.pull_at, j, part, rejection.lost)
+    look_up(rejection.learn, rejection.learn_at, j, part, rejection.lost)
+
+
+@kernel
+def look_up(gains, table, j, part, lost):
+    """Fill gains (3,) from a table; lost: the share of pitch that its stand-in carries."""
     for i in range(3):
-        rejection.Kp[i] = between(rejection.Kp_at, i, j, part)
-        rejection.pull[i] = between(rejection.pull_at, i, j, part)
-        rejection.learn[i] = between(rejection.learn_at, i, j, part)
-    lost = rejection.lost
+        gains[i] = between(table, i, j, part)
     if lost > 0.0:
-        rejection.Kp[PITCH] += lost * (between(rejection.Kp_at, STAND_IN, j, part) - rejection.Kp[PITCH])
-        rejection.pull[PITCH] += lost * (
-            between(rejection.pull_at, STAND_IN, j, part) - rejection.pull[PITCH]
-        )
-        learn = between(rejection.learn_at, STAND_IN, j, part)
-        rejection.learn[PITCH] += lost * (learn - rejection.learn[PITCH])
+        gains[PITCH] += lost * (between(table, STAND_IN, j, part) - gains[PITCH])
 
 
 @kernel

@@ -46,8 +46,7 @@ def protect(autopilot, layout, surfaces, u, unexplained, y, t):
 def watch(hold, dt, offset, commanded, unexplained):
     """Average the elevator that would account for the pitch moments there are, rad: it is off by `offset`,
     what is left of it gives `commanded`."""
-    acting = offset + commanded
-    acting += unexplained
+    acting = offset + commanded + unexplained
     hold.frames += 1
     weight = max(dt / ACTING_S, 1.0 / hold.frames)
     hold.acting += weight * (acting - hold.acting)

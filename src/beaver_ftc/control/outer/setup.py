@@ -13,7 +13,7 @@ from math import inf, nan, radians
 import numpy as np
 
 from beaver_ftc.aircraft import Aircraft
-from beaver_ftc.control.outer.state import CHANNELS, N_FLAP, N_QDYN
+from beaver_ftc.control.outer.state import CHANNELS, GAINS, N_FLAP, N_QDYN
 from beaver_ftc.design.engine import SEA_LEVEL_DENSITY_KG_M3
 from beaver_ftc.diagnosis.state import PITCH
 from beaver_ftc.scenario.autopilot import THRUST_TERM
@@ -29,25 +29,12 @@ MOST_DEG_S = (12.0, 6.0, 10.0)  # asked of a healthy aircraft: a transport's man
 MOST_BANK_DEG = 30.0
 STEEPEST_ALPHA_DEG = 15.0  # the model is valid to 16
 SPARE_MPS = 2.0  # above the validated airspeeds' end
-# Attitudes a fifth as fast as the inner loops, the path a quarter of that: gusts set the pace, not comfort.
-GAINS = {
-    "altitude": 0.8, "altitude_i": 0.04, "attitude": 3.0, "speed": 0.3, "speed_i": 0.015,
-    "bank": 1.0, "bank_i": 0.2, "heading": 0.25, "heading_i": 0.004,
-    "sideslip": 0.5,  # the yaw damper's part beside the rate loop
-    "alpha_s": 2.0, "airspeed_s": 3.0,  # against noise and gusts
-    "jammed_s": 1.0,  # rolling is handed to the rudder within about so long
-    "authority_s": 1.0,  # a rate is asked for only if it can be had, and ended, within this time
-    "bank_s": 6.0,  # and a bank only if it can be left within this time
-    "spare_mps": 2.0, "path_per_mps": 0.02,  # airspeed off before height goes for it, and how much path, rad
-    "loose": 0.4,  # share of the heading loop left when nothing acts in yaw: the turn is then slow to follow
-    "protection": 2.0,  # 1/s: how fast the angle of attack may close on its limit
-}  # fmt: skip
 POWER_SIDESLIP_RAD = 0.2  # that full power may lead to with a rudder that is lost; 0.6 is a departure
 # Of 0, 0.7, 1.5 and 3 deg kept of the flap at the end of the airspeeds that can be held, the one with which
 # most jams were kept; and how fast a limit moves the command: about as fast as drag slows the aircraft down.
 FLAP_RESERVE_DEG, PACE_MPS2 = 0.7, 1.0
 LEAST_DIHEDRAL = 0.01  # of an aircraft that hardly rolls by sideslip: it is then not flown by it
-_UNIT = {"altitude_m": 1.0, "airspeed_mps": 1.0, "heading_deg": radians(1.0), "bank_deg": radians(1.0)}
+_UNIT = dict(zip(CHANNELS, (1.0, 1.0, radians(1.0), radians(1.0)), strict=True))
 
 
 def set_up_autopilot(autopilot: np.void, control: np.void, scenario: Scenario) -> None:
@@ -58,8 +45,7 @@ def set_up_autopilot(autopilot: np.void, control: np.void, scenario: Scenario) -
     autopilot["enabled"], autopilot["dt"] = 1, 1.0 / scenario.rate_hz
     set_up_profile(autopilot, scenario)
     autopilot["changed_at_s"] = -inf
-    for name, gain in GAINS.items():
-        autopilot["gain"][name] = gain
+    autopilot["gain"] = tuple(GAINS.values())
     autopilot["gravity"] = GRAVITY_MPS2
     _know(autopilot, scenario)
     autopilot["steepest_alpha"] = radians(STEEPEST_ALPHA_DEG)
@@ -73,8 +59,13 @@ def set_up_autopilot(autopilot: np.void, control: np.void, scenario: Scenario) -
 
 def set_up_profile(autopilot: np.void, scenario: Scenario) -> None:
     """Fill in the legs; in flight too, where those that have been begun are the same as before."""
-    for c, name in enumerate(CHANNELS):
-        _fill(autopilot, c, getattr(scenario.autopilot, name), _UNIT[name])
+    for c, (name, unit) in enumerate(_UNIT.items()):
+        legs = getattr(scenario.autopilot, name)
+        autopilot["legs"][c] = len(legs)
+        for j, leg in enumerate(legs):
+            autopilot["at_s"][c, j] = leg.at_s
+            autopilot["value"][c, j] = nan if leg.value is None else leg.value * unit
+            autopilot["speed"][c, j] = getattr(leg, "climb_mps", getattr(leg, "change_mps2", inf))
 
 
 def _know(autopilot: np.void, scenario: Scenario) -> None:
@@ -96,33 +87,19 @@ def _know(autopilot: np.void, scenario: Scenario) -> None:
 def _know_what_holds(holding: np.void, layout: np.void, scenario: Scenario) -> None:
     """The table of level flight, where the aircraft's file has forces and a flap for the elevator."""
     aircraft, flap = scenario.airframe, int(layout["stand_in"])
-    holding["from_s"], holding["bank"] = -1.0, radians(MOST_BANK_DEG)
-    holding["fastest"] = inf
+    holding["from_s"], holding["bank"], holding["fastest"] = -1.0, radians(MOST_BANK_DEG), inf
     if flap < 0 or not aircraft.forces or THRUST not in aircraft.signals:
         return
     speeds_mps = np.linspace(*aircraft.envelope.airspeed_mps, N_QDYN)
     holding["qdyn"] = 0.5 * SEA_LEVEL_DENSITY_KG_M3 * speeds_mps**2
     holding["flap"] = np.linspace(layout["low"][flap], layout["high"][flap], N_FLAP)
-    needed = elevator_needed(
-        aircraft,
-        (aircraft.surfaces[layout["main"][PITCH]], aircraft.surfaces[flap]),
-        aircraft.mass.mass_kg * scenario.design_model.mass,
-        tuple(scenario.design_model.coefficients.items()),
-        tuple(holding["qdyn"]),
-        tuple(holding["flap"]),
-    )
+    surfaces = aircraft.surfaces[layout["main"][PITCH]], aircraft.surfaces[flap]
+    model = scenario.design_model
+    mass_kg, scale = aircraft.mass.mass_kg * model.mass, tuple(model.coefficients.items())
+    qdyn_pa, flap_rad = tuple(holding["qdyn"]), tuple(holding["flap"])
+    needed = elevator_needed(aircraft, surfaces, mass_kg, scale, qdyn_pa, flap_rad)
     holding["known"], holding["elevator"] = bool(np.isfinite(needed).all()), needed
-    holding["pace"] = PACE_MPS2
-    holding["reserve"] = radians(FLAP_RESERVE_DEG)
-
-
-def _fill(autopilot: np.void, c: int, legs: tuple, unit: float) -> None:
-    autopilot["legs"][c] = len(legs)
-    for j, leg in enumerate(legs):
-        autopilot["at_s"][c, j] = leg.at_s
-        autopilot["value"][c, j] = nan if leg.value is None else leg.value * unit
-        pace = getattr(leg, "climb_mps", getattr(leg, "change_mps2", inf))
-        autopilot["speed"][c, j] = pace
+    holding["pace"], holding["reserve"] = PACE_MPS2, radians(FLAP_RESERVE_DEG)
 
 
 @lru_cache(maxsize=32)
@@ -154,9 +131,6 @@ def elevator_needed(
     for _ in range(ITERATIONS):
         slopes = [imbalance(unknown + 1j * STEP * e).imag / STEP for e in np.eye(3)]
         unknown = unknown - np.linalg.solve(np.stack(slopes, -1), imbalance(unknown)[..., None])[..., 0]
-    found = (
-        (np.abs(imbalance(unknown)).max(axis=1) < CLOSE)
-        & (np.abs(unknown[:, 0]) < STEEPEST_RAD)
-        & (np.abs(unknown[:, 1]) < MOST_THRUST)
-    )
-    return np.where(found, unknown[:, 2], np.nan).reshape(len(qdyn_pa), len(flap_rad))
+    solved = np.abs(imbalance(unknown)).max(axis=1) < CLOSE
+    flyable = (np.abs(unknown[:, 0]) < STEEPEST_RAD) & (np.abs(unknown[:, 1]) < MOST_THRUST)
+    return np.where(solved & flyable, unknown[:, 2], np.nan).reshape(len(qdyn_pa), len(flap_rad))

@@ -3,10 +3,19 @@
 The surfaces that lead roll, pitch and yaw move; the others stay in trim.
 """
 
-from beaver_ftc.compiled import kernel
+from beaver_ftc.compiled import kernel, record
 from beaver_ftc.control.allocation import clip
 from beaver_ftc.control.laws import LQR
 from beaver_ftc.control.rivals.tracking import DELAY_FRAMES
+
+# What a rival keeps that flies compiled: its gains, and its memory of the flight.
+RIVAL = record(
+    Kp=float, Ki=float, integral=3, saturated=int, begun=int,
+    # the regulator: gains on error and integral, the linear model, its inverse, the trim
+    K=(3, 6), A=(3, 3), B_inverse=(3, 3), trim_x=3,
+    # incremental inversion: the filter's pole, rates and commands of before, and both filters
+    keep=float, x_before=3, given=(DELAY_FRAMES, 3), rate_filter=(2, 3), command_filter=(2, 3),
+)  # fmt: skip
 
 
 @kernel

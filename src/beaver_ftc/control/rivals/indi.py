@@ -15,10 +15,9 @@ import numpy as np
 
 from beaver_ftc.control.base import Reference
 from beaver_ftc.control.laws import INDI
-from beaver_ftc.control.rivals.tracking import DELAY_FRAMES, GAINS, Demand, limited, with_others
+from beaver_ftc.control.rivals.tracking import DELAY_FRAMES, GAINS, Rival
 from beaver_ftc.design.context import Context
 from beaver_ftc.diagnosis.base import Measured, Verdict
-from beaver_ftc.diagnosis.rivals import options_of
 
 
 class LowPass:
@@ -35,25 +34,22 @@ class LowPass:
         return self.value
 
 
-class IncrementalInversion:
+class IncrementalInversion(Rival):
     """Incremental nonlinear dynamic inversion on filtered angular acceleration [Sieberling2010]."""
 
     name: ClassVar[str] = "indi"
-    fault_tolerant = False
     defaults: ClassVar[Mapping[str, float]] = GAINS | {"filter_per_s": 50.0}
 
     def reset(self, context: Context) -> None:
         """In trim: no acceleration, trimmed surfaces."""
-        self.context, self.option = context, options_of(self.name, self.defaults, context)
-        self.demand = Demand(context, self.option)
+        self.begin(context)
         pole, dt = self.option["filter_per_s"], context.dt_s
         self.acceleration = LowPass(pole, dt, np.zeros(3))
         self.leading = list(context.leading)
         trim = context.trim_rad[self.leading]
-        self.command = LowPass(pole, dt, trim)
+        self.commanded = LowPass(pole, dt, trim)
         self.given = [trim] * (DELAY_FRAMES + 1)
         self.before: np.ndarray | None = None
-        self.saturated = False
 
     def compile_into(self, rival: np.void) -> int:
         """Fill the record of compiled.py (dtype RIVAL), in trim; which inner law that is."""
@@ -67,12 +63,10 @@ class IncrementalInversion:
         """u0 + G^-1 (nu - xdot0)."""
         before = measured.x if self.before is None else self.before
         xdot0 = self.acceleration.step((measured.x - before) / self.context.dt_s)
-        u0 = self.command.step(self.given[-DELAY_FRAMES])
-        nu = self.demand.of(measured, reference, self.saturated)
+        u0 = self.commanded.step(self.given[-DELAY_FRAMES])
+        nu = self.demand(measured, reference)
         G = self.context.model.G(measured.y)[:, self.leading]
-        wanted = with_others(u0 + np.linalg.solve(G, nu - xdot0), self.context)
-        command = limited(wanted, self.context)
-        self.saturated = bool((command != wanted).any())
+        command = self.command(u0 + np.linalg.solve(G, nu - xdot0))
         self.before = measured.x
         self.given = [*self.given[1:], command[self.leading]]
         return command

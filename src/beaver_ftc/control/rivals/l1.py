@@ -13,10 +13,9 @@ from typing import ClassVar
 import numpy as np
 
 from beaver_ftc.control.base import Reference
-from beaver_ftc.control.rivals.tracking import GAINS, Demand, limited, with_others
+from beaver_ftc.control.rivals.tracking import GAINS, Rival, with_others
 from beaver_ftc.design.context import Context
 from beaver_ftc.diagnosis.base import Measured, Verdict
-from beaver_ftc.diagnosis.rivals import options_of
 
 
 class Predictor:
@@ -35,22 +34,19 @@ class Predictor:
         return self.sigma
 
 
-class L1Adaptive:
+class L1Adaptive(Rival):
     """L1 adaptive control, piecewise-constant adaptation behind a low-pass filter [Hovakimyan2010]."""
 
     name: ClassVar[str] = "l1-adaptive"
-    fault_tolerant = False
     defaults: ClassVar[Mapping[str, float]] = GAINS | {"predictor_per_s": 1.0, "bandwidth_per_s": 20.0}
 
     def reset(self, context: Context) -> None:
         """Nothing unexplained yet."""
-        self.context, self.option = context, options_of(self.name, self.defaults, context)
-        self.demand = Demand(context, self.option)
+        self.begin(context)
         self.predictor = Predictor(self.option["predictor_per_s"], context.dt_s)
         self.filter = exp(-self.option["bandwidth_per_s"] * context.dt_s)
         self.compensated = np.zeros(3)
         self.before: np.ndarray | None = None
-        self.saturated = False
 
     def step(self, measured: Measured, reference: Reference, verdict: Verdict) -> np.ndarray:
         """Learn what the elapsed frame did not explain, and demand the rest."""
@@ -58,11 +54,8 @@ class L1Adaptive:
             sigma = self.predictor.step(measured.x - self.before, measured.acceleration)
             self.compensated = self.filter * self.compensated + (1.0 - self.filter) * sigma
         self.before = measured.x
-        nu = self.demand.of(measured, reference, self.saturated)
+        nu = self.demand(measured, reference)
         model, G = self.context.model, self.context.model.G(measured.y)
         others = G @ with_others(np.zeros(3), self.context)
         rest = nu - model.f(measured.x, measured.y) - self.compensated - others
-        wanted = with_others(np.linalg.solve(G[:, self.context.leading], rest), self.context)
-        command = limited(wanted, self.context)
-        self.saturated = bool((command != wanted).any())
-        return command
+        return self.command(np.linalg.solve(G[:, self.context.leading], rest))

@@ -13,10 +13,9 @@ import numpy as np
 
 from beaver_ftc.control.base import Reference
 from beaver_ftc.control.laws import LQR
-from beaver_ftc.control.rivals.tracking import limited, with_others
+from beaver_ftc.control.rivals.tracking import Rival
 from beaver_ftc.design.context import Context
 from beaver_ftc.diagnosis.base import Measured, Verdict
-from beaver_ftc.diagnosis.rivals import options_of
 
 _STEP = 1e-6
 
@@ -29,16 +28,16 @@ def gains(A: np.ndarray, B: np.ndarray, Q: np.ndarray, R: np.ndarray) -> np.ndar
     return np.linalg.solve(R + B.T @ P @ B, B.T @ P @ A)
 
 
-class FixedGainLqr:
+class FixedGainLqr(Rival):
     """Fixed-gain linear quadratic regulator about the trim, with integral action [Anderson1990]."""
 
     name: ClassVar[str] = "lqr"
-    fault_tolerant = False
     defaults: ClassVar[Mapping[str, float]] = {"error_deg_s": 0.5, "integral_deg": 0.5, "deflection_deg": 3.0}
 
     def reset(self, context: Context) -> None:
         """Linearise about the trim and solve for the gains, once."""
-        self.context, option = context, options_of(self.name, self.defaults, context)
+        self.begin(context)
+        option = self.option
         self.A, self.B = linearised(context)
         dt = context.dt_s
         A = np.block([[np.eye(3) + dt * self.A, np.zeros((3, 3))], [dt * np.eye(3), np.eye(3)]])
@@ -47,8 +46,6 @@ class FixedGainLqr:
         Q = np.diag(1.0 / np.radians(acceptable) ** 2)
         R = np.eye(3) / np.radians(option["deflection_deg"]) ** 2
         self.K = gains(A, B, Q, R)
-        self.integral = np.zeros(3)
-        self.saturated = False
 
     def compile_into(self, rival: np.void) -> int:
         """Fill the record of compiled.py (dtype RIVAL), in trim; which inner law that is."""
@@ -59,17 +56,12 @@ class FixedGainLqr:
     def step(self, measured: Measured, reference: Reference, verdict: Verdict) -> np.ndarray:
         """Trim, what the linear model asks for to follow the reference, and K times what is missing."""
         context = self.context
-        error = reference.rate - measured.x
-        if not self.saturated:
-            self.integral = self.integral + context.dt_s * error
+        error = self.missed(measured, reference)
         needed = reference.acceleration - self.A @ (reference.rate - context.trim_x)
         ahead = np.linalg.solve(self.B, needed)
         back = self.K @ np.concatenate((error, self.integral))
         trim = context.trim_rad[list(context.leading)]
-        wanted = with_others(trim + ahead + back, context)
-        command = limited(wanted, context)
-        self.saturated = bool((command != wanted).any())
-        return command
+        return self.command(trim + ahead + back)
 
 
 def linearised(context: Context) -> tuple[np.ndarray, np.ndarray]:

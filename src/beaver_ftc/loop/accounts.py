@@ -10,37 +10,25 @@ from functools import lru_cache
 
 import numpy as np
 
-from beaver_ftc.compiled import kernel
+from beaver_ftc.compiled import kernel, record
 from beaver_ftc.control.supervisor import MAX_EVENTS
 from beaver_ftc.design.model import unanticipated_pitch
 from beaver_ftc.diagnosis.state import PITCH
 from beaver_ftc.plant.sensing import effective, effectiveness, position
 from beaver_ftc.scenario.diagnosis import MAX_POLES
 
-GUARANTEE = np.dtype(
-    [
-        ("phi", "f8", (3,)), ("phi_sum", "f8", (3,)),  # effect of the faults, rad/s2: now, and over the frame
-        ("effect", "f8", (MAX_POLES, 3)),  # filtered as the bank filters the innovation, rad/s
-        ("certain_after_s", "f8"),
-    ],
-    align=True,
+GUARANTEE = record(
+    phi=3, phi_sum=3,  # effect of the faults, rad/s2: now, and over the frame
+    effect=(MAX_POLES, 3),  # filtered as the bank filters the innovation, rad/s
+    certain_after_s=float,
 )  # fmt: skip
-TRACKING = np.dtype(
-    [
-        ("before", "f8", (3,)), ("frames_before", "i8"),  # squared error before a fault, rad2/s2, and since
-        ("since", "f8", (3,)), ("frames_since", "i8"),
-    ],
-    align=True,
+TRACKING = record(
+    before=3, frames_before=int,  # squared error before a fault, rad2/s2, and since
+    since=3, frames_since=int,
 )  # fmt: skip
-AUTHORITY = np.dtype(
-    [("demanded", "f8", (3,)), ("lacking", "f8", (3,)), ("beyond_frames", "i8", (3,))], align=True
-)
-ENVELOPE = np.dtype(
-    [
-        ("outside", "i8"), ("n_exits", "i8"), ("outside_frames", "i8"),
-        ("exit_at_s", "f8", (MAX_EVENTS,)), ("return_at_s", "f8", (MAX_EVENTS,)),
-    ],
-    align=True,
+AUTHORITY = record(demanded=3, lacking=3, beyond_frames=(int, 3))
+ENVELOPE = record(
+    outside=int, n_exits=int, outside_frames=int, exit_at_s=MAX_EVENTS, return_at_s=MAX_EVENTS,
 )  # fmt: skip
 
 
@@ -48,12 +36,10 @@ ENVELOPE = np.dtype(
 def accounts_dtype(n: int) -> np.dtype:
     """Accounts of a flight with n surfaces; travelled (n,) rad, hurried
     (n,) rad2/s: the integral of the speed's square."""
-    fields = [
-        ("guarantee", GUARANTEE), ("tracking", TRACKING), ("authority", AUTHORITY), ("envelope", ENVELOPE),
-        ("saturated_frames", "i8", (n,)), ("travelled", "f8", (n,)), ("hurried", "f8", (n,)),
-        ("position_then", "f8", (n,)),
-    ]  # fmt: skip
-    return np.dtype(fields, align=True)
+    return record(
+        guarantee=GUARANTEE, tracking=TRACKING, authority=AUTHORITY, envelope=ENVELOPE,
+        saturated_frames=(int, n), travelled=n, hurried=n, position_then=n,
+    )  # fmt: skip
 
 
 @kernel
@@ -113,16 +99,14 @@ def follow_guarantee(guarantee, bank, dt, share, k, t):
 @kernel
 def track(tracking, truth, model_rate):
     """Add this frame's squared error of the rates, rad2/s2; model_rate (3,) rad/s."""
-    for i in range(3):
-        square = (model_rate[i] - truth.value[i]) ** 2
-        if truth.faulted:
-            tracking.since[i] += square
-        else:
-            tracking.before[i] += square
     if truth.faulted:
+        sums = tracking.since
         tracking.frames_since += 1
     else:
+        sums = tracking.before
         tracking.frames_before += 1
+    for i in range(3):
+        sums[i] += (model_rate[i] - truth.value[i]) ** 2
 
 
 @kernel
@@ -152,10 +136,10 @@ def account_authority(authority, axes):
 def note_envelope(envelope, outside, t):
     """Note when the flight leaves the validated envelope and when it comes back; t s."""
     envelope.outside_frames += envelope.outside
-    if outside and not envelope.outside:
-        envelope.n_exits += 1
+    exits = outside and not envelope.outside
+    envelope.n_exits += exits
     last = min(envelope.n_exits, MAX_EVENTS) - 1  # of more than there is room for, the latest stays
-    if outside and not envelope.outside:
+    if exits:
         envelope.exit_at_s[last], envelope.return_at_s[last] = t, np.inf
     elif envelope.outside and not outside:
         envelope.return_at_s[last] = t

@@ -5,7 +5,7 @@ Between both, `stepping.fly_on` flies: a step of an agent is three compiled call
 
 import numpy as np
 
-from beaver_ftc.compiled import kernel
+from beaver_ftc.compiled import kernel, record
 from beaver_ftc.design.model import AIRSPEED, ALPHA, BETA
 from beaver_ftc.loop.stepping import hold
 
@@ -16,9 +16,7 @@ LARGEST = 100.0  # of an observation: a departure is at 60
 BESIDE_SURFACES = 12
 
 # Where a row of the log has the measured p and the reference model's, which q and r follow; trim, in SI.
-LOOK = np.dtype(
-    [("measured", "i8"), ("model", "i8"), ("alpha", "f8"), ("beta", "f8"), ("airspeed", "f8")], align=True
-)
+LOOK = record(measured=int, model=int, alpha=float, beta=float, airspeed=float)
 
 
 @kernel

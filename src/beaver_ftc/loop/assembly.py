@@ -4,6 +4,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from beaver_ftc.compiled import record
 from beaver_ftc.control import state as control
 from beaver_ftc.control.accommodation import assessment_dtype, true_faults_dtype
 from beaver_ftc.control.outer.state import AUTOPILOT, COLUMNS
@@ -12,17 +13,8 @@ from beaver_ftc.diagnosis import belief, scheme
 from beaver_ftc.diagnosis.across import USUAL, Size, size_for
 from beaver_ftc.diagnosis.isolation import estimator_names
 from beaver_ftc.diagnosis.state import verdict_dtype
-from beaver_ftc.loop import memory
+from beaver_ftc.loop import instrument_records, memory
 from beaver_ftc.loop.accounts import accounts_dtype
-from beaver_ftc.loop.instrument_records import (
-    assemble_instruments,
-    assemble_watch,
-    breaks_instruments,
-    comes_to_be_watched,
-    line_for,
-    seed_instruments,
-    truth_read,
-)
 from beaver_ftc.plant import channels as ch
 from beaver_ftc.plant.instruments import MEASURED, USUAL_LINE, instruments_dtype
 from beaver_ftc.plant.native import RUNNING
@@ -31,26 +23,24 @@ from beaver_ftc.scenario.dump import texts_of
 from beaver_ftc.scenario.schema import Scenario
 
 # What the log has columns for: estimators, the watch, the engine, statistical tests.
-LOGGED = np.dtype([("estimators", "i8"), ("watch", "i8"), ("power", "i8"), ("tests", "i8")], align=True)
+LOGGED = record(estimators=int, watch=int, power=int, tests=int)
 
 
 @lru_cache
 def frame_dtype(n: int, size: Size = USUAL, line: int = USUAL_LINE) -> np.dtype:
     """All that a flight of an aircraft with n surfaces remembers between frames; size: of its statistics;
     line: of its delay lines."""
-    fields = [
-        ("k", "i8"), ("row", "i8"), ("dt", "f8"), ("t", "f8"),  # frame, row of the log, s, s
-        ("running", RUNNING),
-        ("since", "i8"), ("logged", LOGGED),  # the frame with which this diagnosis has begun
-        ("truth", truth_dtype(n)), ("instruments", instruments_dtype(line)), ("measured", MEASURED),
-        ("belief", belief.belief_dtype(n)), ("fdi", scheme.diagnosis_dtype(n, size)),
-        ("verdict", verdict_dtype(n)), ("assessment", assessment_dtype(n)), ("faults", true_faults_dtype(n)),
-        ("supervisor", SUPERVISOR), ("control", control.control_dtype(n)),
-        ("autopilot", AUTOPILOT),
-        ("held", "i8"), ("held_rad", "f8", (n,)),  # whether another than the law commands, and what
-        ("accounts", accounts_dtype(n)), ("departed", "i8"),
-    ]  # fmt: skip
-    return np.dtype(fields, align=True)
+    return record(
+        k=int, row=int, dt=float, t=float,  # frame, row of the log, s, s
+        running=RUNNING,
+        since=int, logged=LOGGED,  # the frame with which this diagnosis has begun
+        truth=truth_dtype(n), instruments=instruments_dtype(line), measured=MEASURED,
+        belief=belief.belief_dtype(n), fdi=scheme.diagnosis_dtype(n, size), verdict=verdict_dtype(n),
+        assessment=assessment_dtype(n), faults=true_faults_dtype(n), supervisor=SUPERVISOR,
+        control=control.control_dtype(n), autopilot=AUTOPILOT,
+        held=int, held_rad=n,  # whether another than the law commands, and what
+        accounts=accounts_dtype(n), departed=int,
+    )  # fmt: skip
 
 
 _DESIGN = ("fdi", "control", "design_model", "actuators", "sensors")
@@ -65,8 +55,8 @@ def assemble(scenario: Scenario, trim: np.ndarray, travel: np.ndarray) -> np.nda
     attached by the loop. A copy of the record of its design, which is assembled once.
     """
     initial = tuple(scenario.initial.model_dump(exclude={"airspeed_mps"}).values())
-    rates, failing = (scenario.rate_hz, scenario.substeps), breaks_instruments(scenario)
-    line = line_for(scenario)
+    rates, failing = (scenario.rate_hz, scenario.substeps), instrument_records.breaks_instruments(scenario)
+    line = instrument_records.line_for(scenario)
     key = scenario.airframe, texts_of(scenario, _DESIGN), rates, failing, line, initial, travel.tobytes()
     if key not in _designs:
         if len(_designs) >= _MOST_DESIGNS:
@@ -76,7 +66,7 @@ def assemble(scenario: Scenario, trim: np.ndarray, travel: np.ndarray) -> np.nda
     frame = frames[0]
     frame["belief"]["u"] = frame["belief"]["commanded"] = trim
     frame["control"]["layout"]["trim"] = frame["control"]["allocation"]["command"] = trim
-    seed_instruments(frame["instruments"], scenario.seed)
+    instrument_records.seed(frame["instruments"], scenario.seed)
     return frames
 
 
@@ -86,20 +76,15 @@ def _assemble_design(scenario: Scenario, travel: np.ndarray, line: int) -> np.nd
     frames = memory.taken_empty((1,), frame_dtype(aircraft.n, size_for(aircraft), line))
     frame, instant_s = frames[0], dt / scenario.substeps
     frame["dt"], frame["accounts"]["guarantee"]["certain_after_s"] = dt, -1.0
-    _assemble_truth(frame["truth"], scenario)
-    assemble_instruments(frame, scenario, instant_s)
-    assemble_watch(frame["fdi"]["watch"], scenario, instant_s)
+    truth, channels = frame["truth"], instrument_records.truth_read(scenario)
+    truth["n"], truth["declared"] = len(channels), len(aircraft.signals)
+    truth["factor"][: len(channels)] = [factor for _, _, factor in channels]
+    instrument_records.configure(frame, scenario, instant_s)
+    instrument_records.configure_watch(frame["fdi"]["watch"], scenario, instant_s)
     belief.configure(frame["belief"], scenario, travel)
     scheme.configure(frame["fdi"], frame["belief"], scenario, travel)
     control.configure(frame["control"], scenario, travel)
     return frames
-
-
-def _assemble_truth(truth: np.void, scenario: Scenario) -> None:
-    """What is read of it."""
-    channels = truth_read(scenario)
-    truth["n"], truth["declared"] = len(channels), len(scenario.airframe.signals)
-    truth["factor"][: len(channels)] = [factor for _, _, factor in channels]
 
 
 def y_places(frame: np.void) -> list[int]:
@@ -111,16 +96,11 @@ def y_places(frame: np.void) -> list[int]:
 def lay_out(frame: np.void, scenario: Scenario, diagnoses_itself: bool) -> tuple[str, ...]:
     """Note in a flight's record what there are columns for; returns their names."""
     fdi, logged, profile = frame["fdi"], frame["logged"], bool(frame["autopilot"]["enabled"])
-    tested = bool(fdi["statistical"]["tests"]["enabled"])
+    aircraft, tests = scenario.airframe, fdi["statistical"]["tests"]
+    estimators = estimator_names(scenario.fdi.fault_class, aircraft) if diagnoses_itself else ()
     logged["estimators"] = fdi["isolation"]["n"] if diagnoses_itself else 0
-    logged["watch"] = comes_to_be_watched(scenario)
+    watched = logged["watch"] = instrument_records.comes_to_be_watched(scenario)
     logged["power"] = frame["control"]["power"]["enabled"] or profile
-    logged["tests"] = fdi["statistical"]["tests"]["n_columns"] if tested else 0
-    return ch.log_columns(
-        estimator_names(scenario.fdi.fault_class, scenario.airframe) if diagnoses_itself else (),
-        bool(logged["power"]),
-        tested,
-        scenario.airframe,
-        profile=COLUMNS if profile else (),
-        watch=bool(logged["watch"]),
-    )
+    logged["tests"] = tests["n_columns"] if tests["enabled"] else 0
+    power, tested, columns = bool(logged["power"]), bool(tests["enabled"]), COLUMNS if profile else ()
+    return ch.log_columns(estimators, power, tested, aircraft, profile=columns, watch=watched)

@@ -53,19 +53,19 @@ class Changing:
     """The changes of a flight, of a `loop.Loop`. replaced: those made, and what the diagnosis that each ended
     had found."""
 
-    def __init__(self, loop: Any, scenario: Scenario) -> None:
+    def __init__(self, loop: Any) -> None:
         self._loop = loop
         self.replaced: list[dict[str, Any]] = []
-        self.plan(scenario, 0)
+        self._coming: list[Stage] = []
 
     def plan(self, scenario: Scenario, k: int) -> None:
         """Make ready what a scenario changes from frame k on. Raises BadInput for what cannot be flown."""
-        coming, plugins = [], self._loop.plugin_frame
+        coming: list[Stage] = []
         for change, then in stages(scenario):
             frame = ceil((change.at_s - TIME_TOLERANCE_S) * scenario.rate_hz)
             if frame >= k:
-                coming.append(self._stage(frame, change, then, plugins))
-                plugins = coming[-1].plugins
+                before = coming[-1].plugins if coming else self._loop.plugin_frame
+                coming.append(self._stage(frame, change, then, before))
         self._coming = coming
 
     def _stage(self, frame: int, change: Change, then: Scenario, before: PluginFrame | None) -> Stage:
@@ -75,8 +75,7 @@ class Changing:
         _check_delays(frames, loop.frames)
         loop.anchor(frames[0], then)
         renews = renews_diagnosis(change, then)
-        detector = before.detector if before and not renews else None
-        law = before.law if before and change.law is None else None
+        detector, law = (before.detector, before.law) if before else (None, None)
         if renews:
             detector = named_detector(then)
         if change.law is not None:
@@ -100,23 +99,22 @@ class Changing:
         if change.law is not None:
             take_law(frame, new["control"])
         if stage.renews:
-            self._watch(new["fdi"])
+            if loop.sensor_schedule.any:  # broken in flight, as the scenario had not said
+                loop.enable_watch(new["fdi"])
             take_diagnosis(frame, new, stage.frame)
         if change.sensors is not None:
-            take_instruments(frame["instruments"], new["instruments"])
+            for name in OF_INSTRUMENTS:  # the random numbers go on, lags and delays begin with what is there
+                frame["instruments"][name] = new["instruments"][name]
+            frame["instruments"]["taken"] = 0
         forces = frame["fdi"]["statistical"]["forces"]["known"]
         if frame["fdi"]["watch"]["enabled"] or frame["instruments"]["engine"] or forces:
             loop.read_more()
         frame["control"]["power"]["enabled"] = new["control"]["power"]["enabled"]
         frame["control"]["allocation"]["hands_back"] = 1
-        take_plugins(loop, stage.plugins)
-
-    def _watch(self, fdi: np.void) -> None:
-        """Watch the instruments as well if one has failed that the scenario had not said: it was broken in
-        flight."""
-        wanted = self._loop.scenario.fdi.sensor_monitor != "never" and fdi["config"]["enabled"]
-        if self._loop.sensor_schedule.any and wanted and not fdi["watch"]["enabled"]:
-            self._loop.enable_watch(fdi)
+        before = loop.plugin_frame
+        if stage.plugins is not None and before is not None and stage.plugins.detector is before.detector:
+            stage.plugins.verdict = before.verdict  # which still stands
+        loop.fly_with(stage.plugins)
 
     def _note(self, stage: Stage) -> None:
         """Say what is changed, and what becomes of a verdict that ends with it."""
@@ -168,12 +166,9 @@ def take_law(frame: np.void, new: np.void) -> None:
 
 def _unexplained(control: np.void) -> np.ndarray:
     """What the law in charge takes for acceleration that no model explains, (3,) rad/s2."""
-    if control["inner"] == REJECTING:
-        disturbance: np.ndarray = control["rejection"]["disturbance"].copy()
-        return disturbance
-    feedback = control["feedback"]
+    feedback, rejection = control["feedback"], control["rejection"]
     learnt: np.ndarray = feedback["fhat"] - feedback["Ki"] * feedback["integral"]
-    return learnt
+    return rejection["disturbance"].copy() if control["inner"] == REJECTING else learnt
 
 
 def take_diagnosis(frame: np.void, new: np.void, k: int) -> None:
@@ -184,18 +179,3 @@ def take_diagnosis(frame: np.void, new: np.void, k: int) -> None:
         other["bank"]["closest"] = fdi["bank"]["closest"]
     other["statistical"]["alarm"]["closest"] = fdi["statistical"]["alarm"]["closest"]
     frame["fdi"], frame["verdict"], frame["since"] = other, new["verdict"], k
-
-
-def take_instruments(instruments: np.void, new: np.void) -> None:
-    """Other errors; the random numbers go on, lags and delays begin with the present value."""
-    for name in OF_INSTRUMENTS:
-        instruments[name] = new[name]
-    instruments["taken"] = 0
-
-
-def take_plugins(loop: Any, plugins: PluginFrame | None) -> None:
-    """Fly on with these plug-ins; one that was there before has its last verdict still."""
-    before = loop.plugin_frame
-    if plugins is not None and before is not None and plugins.detector is before.detector:
-        plugins.verdict = before.verdict
-    loop.fly_with(plugins)

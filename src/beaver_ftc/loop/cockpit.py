@@ -67,12 +67,8 @@ def _banks(plant: Plant, n: int) -> tuple[NodeBank, ...]:
 
 def travel_rad(plant: Plant) -> np.ndarray:
     """Lower and upper stops of the surfaces, (2, 4) rad."""
-    return np.array(
-        [
-            [plant.read(f"actuators/{s}/position-{end}-rad") for s in plant.aircraft.surfaces]
-            for end in ("min", "max")
-        ]
-    )
+    surfaces, ends = plant.aircraft.surfaces, ("min", "max")
+    return np.array([[plant.read(f"actuators/{s}/position-{end}-rad") for s in surfaces] for end in ends])
 
 
 def set_origin(truth: np.void, plant: Plant, altitude_m: float) -> None:

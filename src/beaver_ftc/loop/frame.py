@@ -5,7 +5,7 @@
     decide      control/supervisor.py     the mode
     command     control/                  the surfaces, and the engine
     outer loops control/outer/            the reference of the next frame, if a profile is to be flown
-    record      accounts.py, record.py    the metrics' sums, a row of the log
+    record      accounts.py, log_row.py   the metrics' sums, a row of the log
 
 Each stage has records of its own; what a flight remembers is all of them in one (assembly.py), which only the
 kernels of this file see whole. Python calls them through stepping.py. The command computed in a frame is in
@@ -26,28 +26,12 @@ from beaver_ftc.diagnosis.belief import begin_frame, follow_command, foresee, lo
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, PITCH, STATISTICS, WORST_CASE
 from beaver_ftc.diagnosis.types import examine
 from beaver_ftc.diagnosis.types.examine import LAGS
-from beaver_ftc.loop.accounts import (
-    account_authority,
-    account_surfaces,
-    effect_of_faults,
-    follow_guarantee,
-    note_envelope,
-    share_faults,
-    track,
-)
-from beaver_ftc.loop.record import (
-    put,
-    record_alarm,
-    record_estimator,
-    record_profile,
-    record_surfaces,
-    record_truth,
-    record_watch,
-)
+from beaver_ftc.loop import accounts, log_row
+from beaver_ftc.loop.log_row import put
 from beaver_ftc.plant import channels as ch
 from beaver_ftc.plant.sensing import NOT_FINITE, flight_status, hand_over, measure
 
-SURE = 400.0  # one over the variance of an effectiveness known to 0.05
+SURE = 400.0  # one over the variance of an effectiveness known to 0.05, which need not be eased in
 
 
 @apart
@@ -82,7 +66,7 @@ def sense(frame):
     status = flight_status(truth.value, truth.ground_m)
     if status != NOT_FINITE:
         respond(belief, measured)
-        effect_of_faults(frame.accounts.guarantee, truth, belief, measured.y)
+        accounts.effect_of_faults(frame.accounts.guarantee, truth, belief, measured.y)
     return status
 
 
@@ -140,12 +124,11 @@ def predict(frame, k):
     bank.innovate(fdi.bank, bound, x, x_then, expected, dt)
     if chances.tests.enabled:
         compare_likelihoods(frame, k)
-    isolation.suppose_all(
-        fdi.isolation, fdi.bank, bound, config, conclusion.detected, mean.G, mean.Gu, mean.Gu_spread
-    )
+    known, spread = conclusion.detected, mean.Gu_spread
+    isolation.suppose_all(fdi.isolation, fdi.bank, bound, config, known, mean.G, mean.Gu, spread)
     if config.every_type:
         examine.note_orders(fdi.types, belief.commanded, mean)
-    if conclusion.detected:
+    if known:
         isolation.predict_all(fdi.isolation, bound, x_then, expected, dt)
         scheme.expect_known_faults(expected, mean, surfaces.effectiveness, surfaces.offset, config.every_type)
     if chances.tests.enabled:
@@ -153,7 +136,7 @@ def predict(frame, k):
             belief.surprise[i] = (x[i] - x_then[i]) / dt - expected[i]
         statistical.follow_rest(chances.block, chances.air, belief.surprise, dt)
     leaking = conclusion.isolated >= 0 or conclusion.lead >= 0
-    detection.predict(fdi.fdae, bound, x_then, expected, conclusion.detected, leaking, dt)
+    detection.predict(fdi.fdae, bound, x_then, expected, known, leaking, dt)
 
 
 @apart
@@ -227,9 +210,8 @@ def rules_out(fdi, fie, within):
         return not within
     if config.every_type:
         column, views = estimators[layout.position_of[fie.surface]].effect.Z, chances.views[: chances.n_views]
-        return tests.enabled and across.excludes(
-            views, tests, chances.forces, chances.air, fie.surface, column
-        )
+        felt, seen = chances.forces, chances.air
+        return tests.enabled and across.excludes(views, tests, felt, seen, fie.surface, column)
     if config.authority != STATISTICS and not within:
         return True
     if not tests.enabled or chances.alarm.detected_at_s < 0.0:
@@ -245,7 +227,7 @@ def make_ready(frame, k):
     if fdi.statistical.tests.enabled:
         look_ahead(frame, k)
     begin_frame(belief, fdi.bound, fdi.layout, fdi.config.every_type, frame.measured)
-    follow_guarantee(frame.accounts.guarantee, fdi.bank, fdi.config.dt, belief.share, k, frame.t)
+    accounts.follow_guarantee(frame.accounts.guarantee, fdi.bank, fdi.config.dt, belief.share, k, frame.t)
     assess(fdi, frame.assessment)
 
 
@@ -253,21 +235,17 @@ def make_ready(frame, k):
 def look_ahead(frame, k):
     """Ready the statistical detector for the next frame: the air as it is seen, noise, coefficients."""
     fdi, belief, measured, chances = frame.fdi, frame.belief, frame.measured, frame.fdi.statistical
-    seen, dt = chances.air, fdi.config.dt
+    tests, noise, seen, dt = chances.tests, chances.noise, chances.air, fdi.config.dt
     scheme.see_air(seen, chances.inertial_air, chances.forces, belief, measured, k, dt)
-    statistical.prepare(
-        chances.tests, chances.noise, chances.block, seen, fdi.bound, belief.design, measured, belief.u, dt
-    )
+    statistical.prepare(tests, noise, chances.block, seen, fdi.bound, belief.design, measured, belief.u, dt)
 
 
 @apart
 def look_at_air(frame):
     """Take in the gust that the vanes see by now, and what it does."""
     fdi, belief, measured, chances = frame.fdi, frame.belief, frame.measured, frame.fdi.statistical
-    seen, dt = chances.air, belief.share * fdi.config.dt
-    statistical.look(
-        chances.tests, chances.noise, chances.block, seen, fdi.bound, belief.design, measured, belief.u, dt
-    )
+    tests, noise, seen, dt = chances.tests, chances.noise, chances.air, belief.share * fdi.config.dt
+    statistical.look(tests, noise, chances.block, seen, fdi.bound, belief.design, measured, belief.u, dt)
 
 
 @kernel
@@ -295,8 +273,9 @@ def assess(fdi, assessment):
         elif assessment.measure[s] >= 0:
             scheme.assess_type(assessment, types, fdi.layout, estimators, s)
         elif s == named and not every_type:
-            assessment.effectiveness[s] = 1.0 + isolated_theta(fdi, s)
-            assessment.at_once[s] = is_sure(fdi, s)
+            likely = scheme.likelihood_counts(fdi.statistical.tests, fdi.config.authority)
+            sure = likely and statistical.estimated_loss(fdi.statistical.block, s)[1] > SURE
+            assessment.effectiveness[s], assessment.at_once[s] = 1.0 + isolated_theta(fdi, s), sure
 
 
 @kernel
@@ -305,13 +284,6 @@ def isolated_theta(fdi, s):
     if scheme.likelihood_counts(fdi.statistical.tests, fdi.config.authority):
         return statistical.estimated_loss(fdi.statistical.block, s)[0]
     return fdi.isolation.estimator[fdi.verdict.isolated].theta[fdi.layout.dominant_axis[s]]
-
-
-@kernel
-def is_sure(fdi, s):
-    """Whether that estimate is known well, so that it need not be eased in."""
-    likely = scheme.likelihood_counts(fdi.statistical.tests, fdi.config.authority)
-    return likely and statistical.estimated_loss(fdi.statistical.block, s)[1] > SURE
 
 
 @kernel
@@ -328,7 +300,7 @@ def decide(frame):
     """The mode for this frame."""
     control, layout = frame.control, frame.control.layout
     oracle = control.law == ORACLE
-    share_faults(frame.truth, frame.faults, oracle)
+    accounts.share_faults(frame.truth, frame.faults, oracle)
     if oracle:
         wanted = supervisor.true_mode(layout.main[PITCH], frame.faults)
     else:
@@ -422,10 +394,8 @@ def note_what_is_missing(frame):
     if frame.faults.present or control.reference.hedging or (engine.enabled and detected):
         allocation.note_shortfall(control.axes, control.allocation, control.layout, control.surfaces.lag)
     if engine.enabled:
-        watched = detected or control.law == ORACLE
-        lost = watched and power.pitch_is_lost(
-            control.layout, control.surfaces, saturated, control.axes.shortfall
-        )
+        watched, lacking = detected or control.law == ORACLE, control.axes.shortfall
+        lost = watched and power.pitch_is_lost(control.layout, control.surfaces, saturated, lacking)
         power.steer(engine, control.reference, measured.x, measured.y, watched, lost, frame.t)
 
 
@@ -500,51 +470,50 @@ def fly_profile(frame, commanded):
 def account(frame):
     """Advance the metrics' sums by this frame; before a fault, how near healthy flight has come to an
     alarm."""
-    control, truth, accounts = frame.control, frame.truth, frame.accounts
-    track(accounts.tracking, truth, control.reference.model_rate)
+    control, truth, sums = frame.control, frame.truth, frame.accounts
+    accounts.track(sums.tracking, truth, control.reference.model_rate)
     if truth.faulted:
-        account_authority(accounts.authority, control.axes)
+        accounts.account_authority(sums.authority, control.axes)
     else:
         bank.note_closest_approach(frame.fdi.bank, frame.fdi.statistical.alarm)
-    account_surfaces(accounts, truth, control.allocation.saturated, frame.k, control.reference.dt)
-    note_envelope(accounts.envelope, truth.value[ch.ENVELOPE] < 0.5, frame.t)
+    accounts.account_surfaces(sums, truth, control.allocation.saturated, frame.k, control.reference.dt)
+    accounts.note_envelope(sums.envelope, truth.value[ch.ENVELOPE] < 0.5, frame.t)
 
 
 @kernel
 def record(frame, commanded, row):
     """Write the row of a frame in the order of channels.log_columns; commanded (3,) rad/s."""
     control, fdi, belief, logged = frame.control, frame.fdi, frame.belief, frame.logged
-    column = record_truth(frame.truth, frame.t, row)
+    row[:] = np.nan
+    column = log_row.record_truth(frame.truth, frame.t, row)
     column = put(row, column, frame.measured.x)
     column = put(row, column, commanded)
     column = put(row, column, control.reference.model_rate)
-    column = record_surfaces(frame.truth, belief.commanded, control.allocation.saturated, row, column)
-    column = record_alarm(fdi.bank, row, column)
+    column = log_row.record_surfaces(frame.truth, belief.commanded, control.allocation.saturated, row, column)
+    column = log_row.record_alarm(fdi.bank, row, column)
     column = put(row, column, fdi.fdae.residual)
     column = put(row, column, fdi.fdae.threshold)
     column = put(row, column, fdi.bound.eta_bar)
     column = put(row, column, fdi.fdae.network.output)
     column = put(row, column, belief.means.acceleration)
     for e in range(logged.estimators):
-        there = e < fdi.isolation.n
-        column = record_estimator(fdi.isolation.estimator[e], there, fdi.verdict.detected, row, column)
+        if e < fdi.isolation.n:  # else another diagnosis has taken their place
+            log_row.record_estimator(fdi.isolation.estimator[e], fdi.verdict.detected, row, column)
+        column += log_row.PER_ESTIMATOR
     column = put(row, column, control.surfaces.effectiveness)
-    row[column] = frame.supervisor.mode
-    row[column + 1] = fdi.verdict.detected or fdi.watch.alarmed
+    row[column], row[column + 1] = frame.supervisor.mode, fdi.verdict.detected or fdi.watch.alarmed
     column += 2
     if logged.watch:
-        record_watch(fdi.watch, row, column)
+        log_row.record_watch(fdi.watch, row, column)
         column += 2
     if logged.power:
         row[column] = control.power.command[0]
     if frame.autopilot.enabled:
-        record_profile(frame.autopilot, row, column + 1)
+        log_row.record_profile(frame.autopilot, row, column + 1)
     chances = fdi.statistical
     if logged.tests and chances.tests.enabled:
         views = chances.views[: chances.n_views]
         statistical.write_shares(chances.tests, chances.block, views, chances.forces, chances.air, row)
-    elif logged.tests:
-        row[row.size - logged.tests :] = np.nan
 
 
 @kernel

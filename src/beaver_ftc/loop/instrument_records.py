@@ -1,7 +1,6 @@
 """The instruments of a flight, and the watch over them: from a scenario to their records."""
 
 from math import exp
-from typing import Any
 
 import numpy as np
 
@@ -15,13 +14,7 @@ from beaver_ftc.diagnosis.watch import NOBODY, POLES_PER_S
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.plant import channels as ch
 from beaver_ftc.plant.faults import OF_THE_SLIPSTREAM
-from beaver_ftc.plant.instruments import (
-    LONGEST_DELAY,
-    MOST_LINE,
-    PHI,
-    SENSORS,
-    USUAL_LINE,
-)
+from beaver_ftc.plant.instruments import LONGEST_DELAY, MOST_LINE, PHI, SENSORS, USUAL_LINE
 from beaver_ftc.scenario.faults import of_a_sensor
 from beaver_ftc.scenario.interventions import stages
 from beaver_ftc.scenario.schema import Scenario
@@ -41,9 +34,8 @@ def breaks_instruments(scenario: Scenario) -> bool:
 def is_watched(scenario: Scenario) -> bool:
     """Whether the instruments are held against one another. A flight in which none can fail is spared it:
     sound instruments never make the watch speak."""
-    wanted = scenario.fdi.sensor_monitor
-    needed = wanted == "always" or (wanted == "auto" and breaks_instruments(scenario))
-    return needed and scenario.fdi.is_ours
+    needed = {"always": True, "auto": breaks_instruments(scenario), "never": False}
+    return needed[scenario.fdi.sensor_monitor] and scenario.fdi.is_ours
 
 
 def comes_to_be_watched(scenario: Scenario) -> bool:
@@ -71,16 +63,15 @@ def truth_read(scenario: Scenario) -> tuple[ch.Channel, ...]:
     return (*usual, *ch.further_channels(scenario.airframe)) if further else usual
 
 
-def assemble_instruments(frame: np.void, scenario: Scenario, dt: float) -> None:
-    """dt: seconds between samples, which is a JSBSim frame."""
+def configure(frame: np.void, scenario: Scenario, dt: float) -> None:
+    """Fill the instruments' record; dt: seconds between samples, which is a JSBSim frame."""
     instruments = frame["instruments"]
     instruments["real"] = not scenario.sensors.is_ideal
     instruments["engine"] = has_real_engine(scenario)
     frame["fdi"]["statistical"]["forces"]["known"] = weighs_forces(scenario)
     for i, name in enumerate(SENSORS):
         sensor = getattr(scenario.sensors, name)
-        noise, bias, quantum = sensor.noise_bias_quantum
-        instruments["noise"][i], instruments["bias"][i], instruments["quantum"][i] = noise, bias, quantum
+        instruments["noise"][i], instruments["bias"][i], instruments["quantum"][i] = sensor.noise_bias_quantum
         instruments["gain"][i], instruments["dropout"][i] = 1.0 + sensor.scale_error, sensor.dropout_share
         instruments["drift"][i] = getattr(sensor, "drift_rad_s", 0.0) * dt
         instruments["keep"][i] = exp(-sensor.bandwidth_rad_s * dt) if sensor.bandwidth_rad_s else 0.0
@@ -109,36 +100,34 @@ def _samples(delay: float) -> int:
     return int(delay) + 2 if delay else 0
 
 
-def seed_instruments(instruments: np.void, seed: int) -> None:
+def seed(instruments: np.void, number: int) -> None:
     """Let the random numbers of all instruments, further ones and faults, begin with a seed."""
-    instruments["random"] = seed
+    instruments["random"] = number
     names = "random_further", "random_fault", "random_force"
     for name, counter in zip(names, OTHER_COUNTERS, strict=True):
-        instruments[name] = np.uint64(seed) ^ np.uint64(counter)
+        instruments[name] = np.uint64(number) ^ np.uint64(counter)
 
 
-def assemble_watch(watch: np.void, scenario: Scenario, h: float) -> None:
-    """h: seconds between two looks, which is a JSBSim frame."""
+def configure_watch(watch: np.void, scenario: Scenario, h: float) -> None:
+    """Fill the watch's record; h: seconds between two looks, which is a JSBSim frame."""
     watch["enabled"], watch["instants"] = is_watched(scenario), scenario.substeps
     watch["past"] = scenario.substeps - 1  # the first look ends a frame
     watch["named"], watch["alarmed_at_s"], watch["named_at_s"] = NOBODY, -1.0, -1.0
     watch["engine"] = scenario.airframe.has_engine_instruments
-    step, sensors = watch["step"], scenario.fdi.bounds.sensors
+    step, sensors, initial = watch["step"], scenario.fdi.bounds.sensors, scenario.initial
     errors = Errors(sensors)
     step["h"], step["decay"] = h, [exp(-pole * h) for pole in POLES_PER_S]
-    step["gravity"] = GRAVITY_M_S2 * (1.0 + scenario.initial.altitude_m / EARTH_RADIUS_M) ** -2
-    step["gust"], step["gusts"] = gusts_seen(scenario.fdi.bounds.turbulence, scenario.initial.airspeed_mps, h)
-    step["swift"] = FASTER * scenario.initial.airspeed_mps
-    if watch["engine"]:
-        initial: Any = scenario.initial  # its engine's keys are the aircraft's
-        step["command"] = initial.engine_rpm, initial.manifold_pressure_inhg
+    step["gravity"] = GRAVITY_M_S2 * (1.0 + initial.altitude_m / EARTH_RADIUS_M) ** -2
+    step["gust"], step["gusts"] = gusts_seen(scenario.fdi.bounds.turbulence, initial.airspeed_mps, h)
+    step["swift"] = FASTER * initial.airspeed_mps
+    if watch["engine"]:  # whose keys the aircraft names
+        step["command"] = [getattr(initial, name) for name in ("engine_rpm", "manifold_pressure_inhg")]
     for i, name in enumerate(SENSORS):
         error = errors[name]
         step["offset"][i], step["slope"][i], step["steady"][i] = error.worst, error.slope, error.steady
         watch["longest_still"][i] = longest_still(error.noise, error.resolution)
         step["drift"] = max(step["drift"], abs(getattr(getattr(sensors, name), "drift_rad_s", 0.0)))
-    blurred = np.any(step["offset"][PHI : PHI + 3] > step["steady"][PHI : PHI + 3])
-    watch["blurred"] = blurred
+    blurred = watch["blurred"] = np.any(step["offset"][PHI : PHI + 3] > step["steady"][PHI : PHI + 3])
     watch["follows"] = min(1.0, h * TAKEN_OVER_PER_S) if blurred else 1.0
 
 

@@ -74,70 +74,57 @@ class Loop:
         surfaces = np.array(list(self.trim.surfaces_rad.values()))
         self.frames = assemble(scenario, surfaces, travel_rad(self.plant))
         self.cockpit = Cockpit(self.plant, self.frames)
-        self.start = self._seen()
+        self.cockpit.read()
+        truth = self.frames["truth"]
+        self.start: np.ndarray = truth["value"][0] * truth["factor"][0]
+        self._trimmed = self.start[:3], self.start[y_places(self.frames[0])], surfaces
         self.anchor(self.frames[0], scenario)
         self.schedule = FaultSchedule(scenario.faults, self.plant, scenario.rate_hz)
-        instruments = self.frames["instruments"][0]
-        self.sensor_schedule = SensorFaultSchedule(
-            scenario.faults, instruments, scenario.rate_hz, self.aircraft.has_engine_instruments
-        )
+        instruments, has_engine = self.frames["instruments"][0], self.aircraft.has_engine_instruments
+        self.sensor_schedule = SensorFaultSchedule(scenario.faults, instruments, scenario.rate_hz, has_engine)
         self.air = MovingAir(scenario.environment, self.plant)
         self.frames["running"]["turbulent"] = self.air.turbulent
         self.gust = GustSchedule(scenario.environment.gusts, self.plant, scenario.rate_hz)
         self.n_frames = round(scenario.duration_s * scenario.rate_hz)
         self.plugin_frame = self._with_plugins(detector, law)
-        self.columns = lay_out(self.frames[0], scenario, self._diagnoses_itself)
+        diagnoses_itself = self.plugin_frame is None or self.plugin_frame.detector is None
+        self.columns = lay_out(self.frames[0], scenario, diagnoses_itself)
         self.log = memory.taken((min(CHUNK_ROWS, self.n_frames), len(self.columns)))
         self.references = np.empty((len(self.log), 3))
         self._order = np.zeros(2, np.int64)
         self.fly_with(self.plugin_frame)
-        self.changing = self._changing() if scenario.changes else None
+        self.changing: Changing | None = None
+        if scenario.changes:
+            self.change(scenario, 0)
         set_origin(self.frames["truth"][0], self.plant, scenario.initial.altitude_m)
-
-    def _seen(self) -> np.ndarray:
-        """The truth's channels now, in SI."""
-        self.cockpit.read()
-        truth = self.frames["truth"]
-        seen: np.ndarray = truth["value"][0] * truth["factor"][0]
-        return seen
-
-    @property
-    def start_y(self) -> np.ndarray:
-        """The measured signals beside the rates, in trim."""
-        y: np.ndarray = self.start[y_places(self.frames[0])]
-        return y
 
     def anchor(self, frame: np.void, scenario: Scenario) -> None:
         """Show a record the trim, which a linearised or frozen design model, the law and the statistics hold
         on to."""
-        start, y = self.start, self.start_y
-        surfaces = np.array(list(self.trim.surfaces_rad.values()))
-        design = frame["belief"]["design"]
-        anchor(design, start[:3], y, surfaces)
-        trim, mass = (start[:3], y, surfaces), mass_of(scenario.design_model, self.aircraft)
+        _, y, _ = trim = self._trimmed
+        fdi, design = frame["fdi"], frame["belief"]["design"]
+        anchor(design, *trim)
         state.anchor(frame["control"], frame["belief"], scenario, y)
         set_up_autopilot(frame["autopilot"], frame["control"], scenario)
-        fdi, rate_hz = frame["fdi"], scenario.rate_hz
         if fdi["watch"]["enabled"]:  # compiled code called from here: a quarter of a second, the first time
             anchor_watch(fdi["watch"], np.array([design]), y)
-        noise_model.set_up(fdi, scenario.fdi, design, mass, trim, rate_hz, self.aircraft)
-
-    def _changing(self) -> "Changing":
-        """What will change law, diagnosis and sensors in flight; nothing of it is imported without need."""
-        from beaver_ftc.loop.changing import Changing
-
-        return Changing(self, self.scenario)
+        mass = mass_of(scenario.design_model, self.aircraft)
+        noise_model.set_up(fdi, scenario.fdi, design, mass, trim, scenario.rate_hz, self.aircraft)
 
     def change(self, scenario: Scenario, k: int) -> None:
-        """Fly on by a scenario that says more `changes`, none of them before frame k, the next to fly."""
-        if self.changing is None:
-            self.changing = self._changing()
+        """Fly by a scenario that says what changes in flight, nothing of it before frame k, the next to fly.
+
+        Nothing of what changes it is imported without need.
+        """
+        from beaver_ftc.loop.changing import Changing
+
+        self.changing = self.changing or Changing(self)
         self.changing.plan(scenario, k)
 
     def _with_plugins(self, detector: "Detector | None", law: "Law | None") -> "PluginFrame | None":
         """The frame in which plug-ins take part; None, and nothing of it imported, if all is compiled in."""
-        names = self.scenario.fdi.scheme, self.scenario.control.law
-        if detector is law is None and is_compiled(DETECTORS, names[0]) and is_compiled(LAWS, names[1]):
+        scheme, named = self.scenario.fdi.scheme, self.scenario.control.law
+        if detector is law is None and is_compiled(DETECTORS, scheme) and is_compiled(LAWS, named):
             return None
         from beaver_ftc.loop.plugin_frame import plugin_frame
 
@@ -150,19 +137,15 @@ class Loop:
         if plugins is None and not (self.cockpit.native and self.plant.executive):
             self.fly_frame = direct(fly_frame, self.frames, self.references, self.log)
 
-    @property
-    def _diagnoses_itself(self) -> bool:
-        return self.plugin_frame is None or self.plugin_frame.detector is None
-
     def direct(self, kernel: Callable[..., int]) -> Callable[..., int]:
         """Compiled frames as this flight calls them: `stepping.fly_on`, or another in its place."""
         return direct(kernel, self.frames, self.references, self.log, self._order)
 
-    def land(self) -> Landing:
-        """What the flight has yielded so far."""
+    def land(self, scenario: Scenario | None = None) -> Landing:
+        """What the flight has yielded so far; scenario: another that says what was flown."""
         verdict = self.plugin_frame.verdict if self.plugin_frame and self.plugin_frame.detector else None
         replaced = self.changing.replaced if self.changing else ()
-        return landing_of(self.scenario, self.frames[0], self.columns, verdict, tuple(replaced))
+        return landing_of(scenario or self.scenario, self.frames[0], self.columns, verdict, tuple(replaced))
 
     def release(self) -> None:
         """Give aircraft and memory back for another flight: this one is over and not asked again."""
@@ -184,10 +167,8 @@ class Loop:
     def chunks(self) -> Iterable[np.ndarray]:
         """Fly; yield the log a chunk at a time, rows (n, columns). The array is reused."""
         for start in range(0, self.n_frames, CHUNK_ROWS):
-            rows = min(CHUNK_ROWS, self.n_frames - start)
-            status = self.fly_chunk(start, rows)
-            flown = int(self.frames["row"][0])
-            yield self.log[:flown]
+            status = self.fly_chunk(start, min(CHUNK_ROWS, self.n_frames - start))
+            yield self.log[: int(self.frames["row"][0])]
             if status != FLYING:
                 return
 
@@ -199,21 +180,21 @@ class Loop:
     def fly_chunk(self, start: int, rows: int) -> int:
         """Frames start to start + rows, into the first rows of the log; returns why it ended."""
         self.sample_references(start, rows)
-        k, end = start, start + rows
-        while k < end:
+        k, end, status = start, start + rows, FLYING
+        while k < end and status == FLYING:
             stop = min(self.turn_to(k), end)
-            status = self.fly_segment(k, stop)
-            if status != FLYING:
-                return status
-            k = stop
-        return FLYING
+            status, k = self.fly_segment(k, stop), stop
+        return status
 
     def turn_to(self, k: int) -> int:
         """Bring faults, gusts and changes to frame k, the next to fly; returns when to call again."""
         parts: tuple[Any, ...] = (self.schedule, self.sensor_schedule, self.gust)
         for part in parts:
             part.apply(k)
-        self._note_faults(k)
+        truth = self.frames["truth"][0]  # which keeps the faults for the oracle and the accounts
+        if (self.schedule.begun(k) or self.sensor_schedule.begun(k)) and not truth["faulted"]:
+            truth["faulted"], truth["fault_at_s"] = 1, k / self.scenario.rate_hz
+        note_failures(truth, self.plant)
         if self.changing is not None:
             self.changing.apply(k)
             parts = (*parts, self.changing)
@@ -224,28 +205,25 @@ class Loop:
         instruments are watched."""
         self.schedule.declare(faults)
         self.sensor_schedule.declare(faults)
-        if self.sensor_schedule.any:
-            self._watch_from_now()
-
-    def _watch_from_now(self) -> None:
-        """Begin, between two frames, to read further instruments and watch all; again is harmless."""
+        if not self.sensor_schedule.any:
+            return
         frame = self.frames[0]
-        fdi = frame["fdi"]
         self.read_more()
-        wanted = self.scenario.fdi.sensor_monitor != "never" and fdi["config"]["enabled"]
-        if wanted and not fdi["watch"]["enabled"]:
-            self.enable_watch(fdi)
-            if frame["k"] > 0:
-                if not frame["measured"]["inertial"]:
-                    self._read_further(frame["measured"])
-                direct(stepping.begin_watch, self.frames)(self.frames)
+        if self.enable_watch(frame["fdi"]) and frame["k"] > 0:
+            if not frame["measured"]["inertial"]:
+                self._read_further(frame["measured"])
+            direct(stepping.begin_watch, self.frames)(self.frames)
 
-    def enable_watch(self, fdi: np.void) -> None:
-        """Have a watch that was not wanted before the flight; the trim is shown to it now. Accelerometers are
-        no longer taken at their word."""
+    def enable_watch(self, fdi: np.void) -> bool:
+        """Have a watch, if one may be and was not wanted before the flight; the trim is shown to it now.
+        Accelerometers are no longer taken at their word. Returns whether it has just been enabled."""
+        wanted = self.scenario.fdi.sensor_monitor != "never" and fdi["config"]["enabled"]
+        if not wanted or fdi["watch"]["enabled"]:
+            return False
         fdi["watch"]["enabled"], fdi["statistical"]["air"]["read"] = 1, 0
         fdi["statistical"]["inertial_air"]["moving"] = 0
-        anchor_watch(fdi["watch"], np.array([self.frames[0]["belief"]["design"]]), self.start_y)
+        anchor_watch(fdi["watch"], np.array([self.frames[0]["belief"]["design"]]), self._trimmed[1])
+        return True
 
     def read_more(self) -> None:
         """Have the further instruments read from the next frame on."""
@@ -266,19 +244,18 @@ class Loop:
 
     def fly_segment(self, k: int, stop: int) -> int:
         """Frames k to stop, in which no fault changes."""
-        if k == 0:
-            status = self.fly_frames(1, 0)
-            if status != FLYING:
-                return status
-            k = 1
-        return self.fly_frames(stop - k, self.scenario.substeps)
+        status = self.fly_frames(1, 0) if k == 0 else FLYING
+        if status != FLYING:
+            return status
+        return self.fly_frames(stop - max(k, 1), self.scenario.substeps)
 
     def fly_frames(self, count: int, runs: int) -> int:
         """So many frames of the loop, each of so many JSBSim frames, in which no fault changes."""
         frames, references, log, fly_frame = self.frames, self.references, self.log, self.fly_frame
         if fly_frame is None:
             return self._fly_compiled(count, runs)
-        advance = self._advance(runs)
+        as_it_is = runs == 1 and self.cockpit.native and not self.air.turbulent
+        advance = self.plant.run if as_it_is else partial(self._advance, runs)
         for _ in range(count):
             advance()
             status = fly_frame(frames, references, log)
@@ -303,28 +280,20 @@ class Loop:
         """Frames of the loop with JSBSim's between them, as `stepping.fly_on`."""
         return self.direct(fly_on)
 
-    def _advance(self, runs: int) -> Callable[[], object]:
-        """What brings the truth from one frame of the loop to the next; mostly JSBSim's own `run`."""
-        if runs == 1 and self.cockpit.native and not self.air.turbulent:
-            return self.plant.run
-        return partial(self._advance_by, runs)
-
-    def _advance_by(self, runs: int) -> None:
+    def _advance(self, runs: int) -> None:
         """Hand the command over, run, and read; between two runs the truth is seen but not acted upon."""
-        if runs and not self.cockpit.native:
+        native = self.cockpit.native
+        if runs and not native:
             self.cockpit.write()
         for left in reversed(range(runs)):
             self.air.turn()
             self.plant.run()
+            if not native:
+                self.cockpit.read()
             if left:
-                self._look_between()
-        if not self.cockpit.native:
+                self._look(self.frames)
+        if not runs and not native:
             self.cockpit.read()
-
-    def _look_between(self) -> None:
-        if not self.cockpit.native:
-            self.cockpit.read()
-        self._look(self.frames)
 
     @cached_property
     def _look(self) -> Callable[[np.ndarray], int]:
@@ -333,22 +302,14 @@ class Loop:
     def _landed(self, status: int) -> int:
         if status == NOT_FINITE:
             names = [name for name, _, _ in ch.truth_channels(self.aircraft)]
-            values = self.frames["truth"]["value"][0][: len(names)]
-            bad = [name for name, value in zip(names, values, strict=True) if not np.isfinite(value)]
+            sound = np.isfinite(self.frames["truth"]["value"][0][: len(names)])
+            bad = [name for name, finite in zip(names, sound, strict=True) if not finite]
             raise SimulationFailed(
                 f"{self.scenario.name}: not finite at {self.frames['t'][0]:g} s: {', '.join(bad)}; "
                 "the flight cannot go on"
             )
         self.frames["departed"] = status
         return status
-
-    def _note_faults(self, k: int) -> None:
-        """Keep the faults in the truth's record, for the oracle and the accounts."""
-        truth = self.frames["truth"][0]
-        begun = self.schedule.begun(k) or self.sensor_schedule.begun(k)
-        if begun and not truth["faulted"]:
-            truth["faulted"], truth["fault_at_s"] = 1, k / self.scenario.rate_hz
-        note_failures(truth, self.plant)
 
 
 def fly(

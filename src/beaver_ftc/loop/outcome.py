@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from beaver_ftc.control.outer.state import BANK_LIMIT, CHANNELS, FASTEST, LIMITED, SLOWEST, SPEED
-from beaver_ftc.control.supervisor import MAX_EVENTS, MODES
+from beaver_ftc.control.supervisor import MODES
 from beaver_ftc.design.model import AXES
 from beaver_ftc.diagnosis.base import Verdict
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, PITCH, ROLL, STATISTICS, UNANTICIPATED, YAW
@@ -118,36 +118,38 @@ def _isolation(fdi: np.void, surfaces: Sequence[str]) -> dict[str, Any]:
     """isolated, isolation_type, candidates, estimate, isolation_time_s of a Landing."""
     if fdi["config"]["every_type"]:
         return found(fdi, surfaces)
-    verdict, detected = int(fdi["verdict"]["isolated"]), bool(fdi["verdict"]["detected"])
-    estimators = fdi["isolation"]["estimator"][: int(fdi["isolation"]["n"])]
-    possible = tuple(surfaces[int(fie["surface"])] for fie in estimators if not fie["excluded"])
-    said: dict[str, Any] = {"isolated": None, "isolation_type": None, "estimate": None}
-    said |= {"isolation_time_s": None, "candidates": possible if detected else ()}
-    if not detected or verdict == NOT_ISOLATED:
+    isolated = int(fdi["verdict"]["isolated"])
+    said: dict[str, Any] = {"isolated": None, "isolation_type": None, "estimate": None, "candidates": ()}
+    said["isolation_time_s"] = None
+    if not fdi["verdict"]["detected"]:
         return said
-    said["isolation_time_s"] = float(fdi["verdict"]["isolated_at_s"])
-    if verdict == UNANTICIPATED:
-        return said | {"isolated": "unanticipated", "isolation_type": "unanticipated", "candidates": ()}
-    surface = int(fdi["isolation"]["estimator"][verdict]["surface"])
-    named = {"isolated": surfaces[surface], "isolation_type": "loss_of_effectiveness"}
-    return said | named | {"estimate": _estimate(fdi, surface)}
+    if isolated == UNANTICIPATED:
+        said |= {"isolated": "unanticipated", "isolation_type": "unanticipated"}
+    else:
+        estimators = fdi["isolation"]["estimator"][: int(fdi["isolation"]["n"])]
+        said["candidates"] = tuple(surfaces[int(fie["surface"])] for fie in estimators if not fie["excluded"])
+    if isolated >= 0:
+        surface = int(fdi["isolation"]["estimator"][isolated]["surface"])
+        said |= {"isolated": surfaces[surface], "isolation_type": "loss_of_effectiveness"}
+        said["estimate"] = _estimate(fdi, surface)
+    if isolated != NOT_ISOLATED:
+        said["isolation_time_s"] = float(fdi["verdict"]["isolated_at_s"])
+    return said
 
 
 def _envelope_exits(frame: np.void) -> tuple[tuple[float, float], ...]:
     envelope, end_s = frame["accounts"]["envelope"], float(frame["t"])
-    count = min(int(envelope["n_exits"]), len(envelope["exit_at_s"]))
-    return tuple(
-        (float(out), float(back) if isfinite(back) else end_s)
-        for out, back in zip(envelope["exit_at_s"][:count], envelope["return_at_s"][:count], strict=True)
-    )
+    known = slice(int(envelope["n_exits"]))  # as many as there is room for
+    exits = zip(envelope["exit_at_s"][known], envelope["return_at_s"][known], strict=True)
+    return tuple((float(out), float(back) if isfinite(back) else end_s) for out, back in exits)
 
 
 def _probing_s(frame: np.void) -> tuple[float, float] | None:
     """When the active diagnosis began and ended."""
     probe = frame["control"]["probe"]
-    if not probe["frames"] or probe["from_s"] < 0.0:
-        return None
     began, ended = float(probe["from_s"]), float(probe["to_s"])
+    if not probe["frames"] or began < 0.0:
+        return None
     return began, (ended if ended >= 0.0 else float(frame["t"]))
 
 
@@ -156,12 +158,12 @@ def _authority(frame: np.void) -> dict[str, dict[str, float]] | None:
     rates was beyond what the surfaces can give."""
     if not frame["accounts"]["tracking"]["frames_since"]:
         return None
-    authority = frame["accounts"]["authority"]
-    both = zip(authority["demanded"], authority["lacking"], strict=True)
-    shares = [1.0 - float(lack / asked) if asked > 0.0 else 1.0 for asked, lack in both]
-    beyond_s = [int(n) * float(frame["dt"]) for n in authority["beyond_frames"]]
-    each = zip(AXES, shares, beyond_s, strict=True)
-    return {axis: {"given_share": share, "beyond_s": time_s} for axis, share, time_s in each}
+    authority, sums = {}, frame["accounts"]["authority"]
+    each = zip(AXES, sums["demanded"], sums["lacking"], sums["beyond_frames"], strict=True)
+    for axis, asked, lack, beyond in each:
+        share = 1.0 - float(lack / asked) if asked > 0.0 else 1.0
+        authority[axis] = {"given_share": share, "beyond_s": int(beyond) * float(frame["dt"])}
+    return authority
 
 
 def _engine_power(frame: np.void) -> dict[str, float] | None:
@@ -208,18 +210,12 @@ def _limits(frame: np.void, surfaces: Sequence[str]) -> tuple[dict[str, Any], ..
         (SLOWEST, "airspeed_mps", "at least", pitch),
         (BANK_LIMIT, "bank_deg", "at most", left),
     )
-    began = [
-        {
-            "time_s": float(holding["from_s"][k]),
-            "limits": what,
-            "side": side,
-            "value": degrees(holding["value"][k]) if k == BANK_LIMIT else float(holding["value"][k]),
-            "because": why,
-            "in_force": bool(holding["in_force"][k]),
-        }
-        for k, what, side, why in kinds
-        if holding["from_s"][k] >= 0.0
-    ]
+    began = []
+    for k, what, side, why in kinds:
+        if holding["from_s"][k] >= 0.0:
+            value = degrees(holding["value"][k]) if k == BANK_LIMIT else float(holding["value"][k])
+            said = {"time_s": float(holding["from_s"][k]), "limits": what, "side": side, "value": value}
+            began.append(said | {"because": why, "in_force": bool(holding["in_force"][k])})
     return tuple(sorted(began, key=lambda limit: tuple(limit.values())))
 
 
@@ -271,24 +267,20 @@ def verdict_of(frame: np.void, surfaces: Sequence[str]) -> Verdict:
 
 def estimate_now(fdi: np.void, said: Verdict, surfaces: Sequence[str]) -> float | None:
     """The estimate of a verdict that otherwise still stands, of a diagnosis for every type."""
-    surface = surfaces.index(str(said.isolated))
-    kind = (
-        fdi["types"]["surface"][surface]["type"]
-        if fdi["types"]["pair"]["enabled"]
-        else fdi["verdict"]["type"]
-    )
-    return estimate_of(fdi, surface, int(kind))
+    surface, types = surfaces.index(str(said.isolated)), fdi["types"]
+    named = types["surface"][surface] if types["pair"]["enabled"] else fdi["verdict"]
+    return estimate_of(fdi, surface, int(named["type"]))
 
 
 def _of_verdict(fdi: np.void, verdict: Verdict) -> dict[str, Any]:
     """The same of a Landing, from a plug-in's verdict."""
-    isolated = verdict.isolated if fdi["verdict"]["detected"] else None
+    said = verdict if fdi["verdict"]["detected"] else Verdict()
     return _alarm(fdi) | {
-        "isolated": isolated,
-        "isolation_type": verdict.type if isolated else None,
-        "candidates": tuple(verdict.candidates) if fdi["verdict"]["detected"] else (),
-        "estimate": verdict.estimate if isolated else None,
-        "isolation_time_s": float(fdi["verdict"]["isolated_at_s"]) if isolated else None,
+        "isolated": said.isolated,
+        "isolation_type": said.type if said.isolated else None,
+        "candidates": tuple(said.candidates),
+        "estimate": said.estimate if said.isolated else None,
+        "isolation_time_s": float(fdi["verdict"]["isolated_at_s"]) if said.isolated else None,
     }
 
 
@@ -324,10 +316,10 @@ def landing_of(
     """Read the flight's outcome off its frame record; `verdict` is a plug-in detector's last one, `replaced`
     what changes in flight have ended."""
     fdi, accounts, dt = frame["fdi"], frame["accounts"], float(frame["dt"])
-    supervisor, tracking = frame["supervisor"], accounts["tracking"]
-    surfaces = scenario.airframe.surfaces
-    departed = int(frame["departed"])
-    modes = range(min(int(supervisor["n_modes"]), MAX_EVENTS))
+    tracking, envelope, supervisor = accounts["tracking"], accounts["envelope"], frame["supervisor"]
+    surfaces, departed = scenario.airframe.surfaces, int(frame["departed"])
+    known = slice(int(supervisor["n_modes"]))  # as many as there is room for
+    modes = zip(supervisor["mode_at_s"][known], supervisor["mode_is"][known], strict=True)
     closest = tuple(float(share) for share in fdi["bank"]["closest"][: max(int(fdi["bank"]["n"]), 1)])
     return Landing(
         scenario=scenario,
@@ -336,13 +328,11 @@ def landing_of(
         guaranteed_delay_s=guaranteed_delay_s(frame, scenario, verdict is not None),
         pre_fault_rms_rad_s=_rms(tracking["before"], int(tracking["frames_before"])) or (0.0, 0.0, 0.0),
         post_fault_rms_rad_s=_rms(tracking["since"], int(tracking["frames_since"])),
-        supervisor=tuple(
-            (float(supervisor["mode_at_s"][i]), MODES[int(supervisor["mode_is"][i])]) for i in modes
-        ),
+        supervisor=tuple((float(at_s), MODES[mode]) for at_s, mode in modes),
         mode_changes=int(supervisor["n_modes"]),
         envelope_exits=_envelope_exits(frame),
-        exits=int(accounts["envelope"]["n_exits"]),
-        outside_s=int(accounts["envelope"]["outside_frames"]) * dt,
+        exits=int(envelope["n_exits"]),
+        outside_s=int(envelope["outside_frames"]) * dt,
         end=(float(frame["truth"]["value"][AIRSPEED]), float(frame["truth"]["value"][ALTITUDE])),
         departure=(float(frame["t"]), DEPARTURE_SIGNALS[departed // 10]) if departed else None,
         saturation_s={s: int(n) * dt for s, n in zip(surfaces, accounts["saturated_frames"], strict=True)},

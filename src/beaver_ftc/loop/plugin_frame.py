@@ -1,4 +1,9 @@
-"""A frame in which a plug-in diagnoses or commands: its answers are checked, and errors name it."""
+"""A frame in which a plug-in diagnoses or commands: its answers are checked, and errors name it.
+
+    begin -> diagnose | take_verdict -> decide -> command | take_command -> finish
+
+are the stages of frame.py; left of a bar: built in, right of it: a plug-in's answer.
+"""
 
 from collections.abc import Mapping
 from math import isfinite
@@ -13,7 +18,7 @@ from beaver_ftc.diagnosis.base import Detector, Measured, Verdict
 from beaver_ftc.diagnosis.bounds.variances import declared_of
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, UNANTICIPATED
 from beaver_ftc.documents.errors import BeaverFtcError, SimulationFailed
-from beaver_ftc.loop import stepping
+from beaver_ftc.loop import frame as stages
 from beaver_ftc.loop.assembly import y_places
 from beaver_ftc.loop.outcome import verdict_of
 from beaver_ftc.plant.sensing import NOT_FINITE
@@ -26,67 +31,68 @@ _AXES = {"p": 0, "q": 1, "r": 2, None: 0}
 class PluginFrame:
     """One frame of the loop with a detector or a law that is not compiled in, called as `stepping.fly_frame`.
 
-    detector, law: the plug-ins, None where the built-in one is in place. names: what to call them when one is
-    at fault. begun: the frame that this one follows in flight, whose plug-ins are not begun anew.
+    detector, law: the plug-ins, None where the built-in one is in place. start: as in `context_of`.
+    begun: the frame that this one follows in flight, whose plug-ins are not begun anew.
     """
 
     def __init__(
         self,
+        frames: np.ndarray,
+        scenario: Scenario,
+        start: np.ndarray,
         detector: Detector | None,
         law: Law | None,
-        names: tuple[str, str],
-        context: tuple[Context, Context],
-        begun: "PluginFrame | None" = None,
+        begun: "PluginFrame | None",
     ) -> None:
-        self.detector, self.law = detector, law
-        self.verdict = Verdict()
-        self._names = names
-        self._surfaces = surfaces = context[0].surfaces
+        self.detector, self.law, self.verdict, self._t_s = detector, law, Verdict(), 0.0
+        self._surfaces = surfaces = scenario.airframe.surfaces
         self._isolated = {None: NOT_ISOLATED, "unanticipated": UNANTICIPATED}
         self._isolated |= {surface: s for s, surface in enumerate(surfaces)}
-        self._t_s = 0.0
+        scheme, other = scenario.fdi.scheme, scenario.control.law
+        self._names = (  # to blame: the scenario's, or those of their classes if it does not name them
+            type(detector).__name__ if is_compiled(DETECTORS, scheme) else scheme,
+            type(law).__name__ if is_compiled(LAWS, other) else other,
+        )
         if detector is not None and not (begun and begun.detector is detector):
-            self._ask(names[0], detector.reset, context[0])
+            context = context_of(frames, scenario, start, scenario.fdi.options)
+            self._ask(self._names[0], detector.reset, context)
         if law is not None and not (begun and begun.law is law):
-            self._ask(names[1], law.reset, context[1])
+            context = context_of(frames, scenario, start, scenario.control.options)
+            self._ask(self._names[1], law.reset, context)
 
     def __call__(self, frames: np.ndarray, references: np.ndarray, log: np.ndarray) -> int:
         """Fly one frame; see `stepping.fly_frame`."""
-        status = stepping.measure(frames)
+        frame = frames[0]
+        status = stages.begin(frame)
         if status == NOT_FINITE:
             return status
-        frame = frames[0]
-        self._t_s = float(frame["t"])
-        measured = measured_of(frame)
-        self._diagnose(frames, measured)
-        stepping.decide(frames)
-        self._command(frames, references, measured)
-        stepping.finish(frames, references, log)
+        row, measured = int(frame["row"]), measured_of(frame)
+        self._t_s = measured.t_s
+        self._diagnose(frame, measured)
+        stages.decide(frame)
+        self._command(frame, references[row], measured)
+        stages.finish(frame, references[row], log[row])
         return status
 
-    def _diagnose(self, frames: np.ndarray, measured: Measured) -> None:
+    def _diagnose(self, frame: np.void, measured: Measured) -> None:
         if self.detector is None:
-            stepping.diagnose(frames)
+            stages.diagnose(frame)
             return
-        verdict = self._ask(self._names[0], self.detector.step, measured, frames["belief"]["u"][0].copy())
-        self._check(verdict, frames["verdict"][0])
-        self.verdict = verdict
-        stepping.take_verdict(frames)
+        answer = self._ask(self._names[0], self.detector.step, measured, frame["belief"]["u"].copy())
+        self.verdict = self._checked(answer, frame["verdict"])
+        stages.take_verdict(frame)
 
-    def _command(self, frames: np.ndarray, references: np.ndarray, measured: Measured) -> None:
-        if self.law is None or frames["held"][0]:
-            stepping.command(frames)
+    def _command(self, frame: np.void, commanded: np.ndarray, measured: Measured) -> None:
+        if self.law is None or frame["held"]:
+            stages.command(frame)
             return
-        frame = frames[0]
-        control = frame["control"]
+        name, model = self._names[1], frame["control"]["reference"]
         reference = Reference(
-            references[int(frame["row"])].copy(),
-            control["reference"]["model_rate"].copy(),
-            control["reference"]["model_acceleration"].copy(),
+            commanded.copy(), model["model_rate"].copy(), model["model_acceleration"].copy()
         )
         verdict = self.verdict if self.detector is not None else verdict_of(frame, self._surfaces)
-        answer = self._ask(self._names[1], self.law.step, measured, reference, verdict)
-        stepping.take_command(frames, self._deflections(answer))
+        answer = self._ask(name, self.law.step, measured, reference, verdict)
+        stages.take_command(frame, self._a_number_each(name, "the command", answer))
 
     def _ask(self, name: str, question: Any, *arguments: Any) -> Any:
         try:
@@ -100,8 +106,8 @@ class PluginFrame:
     def _blame(self, name: str, what: str) -> None:
         raise SimulationFailed(f"plug-in {name} at {self._t_s:g} s: {what[:500]}")
 
-    def _check(self, verdict: Any, taken: np.void) -> None:
-        """Check a verdict and put it into the record that compiled code reads."""
+    def _checked(self, verdict: Any, taken: np.void) -> Verdict:
+        """A verdict that is one, put into the record that compiled code reads."""
         name = self._names[0]
         if not isinstance(verdict, Verdict):
             self._blame(name, f"step returned {type(verdict).__name__}, allowed: a Verdict")
@@ -110,20 +116,15 @@ class PluginFrame:
         if verdict.isolated not in self._isolated:
             allowed = ", ".join(str(key) for key in self._isolated)
             self._blame(name, f"verdict.isolated is {verdict.isolated!r}, allowed: {allowed}")
+        estimate = 0.0 if verdict.estimate is None else verdict.estimate
+        if not isinstance(estimate, float | int | np.floating) or not isfinite(estimate):
+            self._blame(name, f"verdict.estimate is {estimate!r}, allowed: a finite number")
         taken["detected"], taken["axis"] = bool(verdict.detected), _AXES[verdict.axis]
-        taken["isolated"] = self._isolated[verdict.isolated]
-        taken["theta"] = 0.0 if verdict.estimate is None else self._finite(verdict.estimate)
+        taken["isolated"], taken["theta"] = self._isolated[verdict.isolated], estimate
         taken["estimates"] = verdict.effectiveness is not None
         if verdict.effectiveness is not None:
             taken["effectiveness"] = self._a_number_each(name, "verdict.effectiveness", verdict.effectiveness)
-
-    def _finite(self, value: Any) -> float:
-        if not isinstance(value, float | int | np.floating) or not isfinite(value):
-            self._blame(self._names[0], f"verdict.estimate is {value!r}, allowed: a finite number")
-        return float(value)
-
-    def _deflections(self, answer: Any) -> np.ndarray:
-        return self._a_number_each(self._names[1], "the command", answer)
+        return verdict
 
     def _a_number_each(self, name: str, what: str, values: Any) -> np.ndarray:
         """A finite number for each surface, or the plug-in is to blame."""
@@ -155,40 +156,27 @@ def context_of(
     frames: np.ndarray, scenario: Scenario, start: np.ndarray, options: Mapping[str, float]
 ) -> Context:
     """What a plug-in is given before the flight; start: the truth's channels at the start, in SI."""
-    frame = frames[0]
-    layout, fdi = frame["control"]["layout"], frame["fdi"]
-    trim_y = start[y_places(frame)]
+    frame, bounds, aircraft = frames[0], scenario.fdi.bounds, scenario.airframe
+    layout, bound, design = frame["control"]["layout"], frame["fdi"]["bound"], frames["belief"]["design"]
+    trim_y, trim_rad, constant = start[y_places(frame)], layout["trim"].copy(), bound["constant"].copy()
+    if bound["error_map"]["n_boxes"]:
+        constant += aircraft.model_error_rad_s2  # the most that the aircraft's terms leave in it
     return Context(
         dt_s=float(frame["dt"]),
         substeps=scenario.substeps,
-        model=DesignFunctions(frames["belief"]["design"].copy()),
+        model=DesignFunctions(design.copy()),
         trim_x=start[:3].copy(),
         trim_y=trim_y,
-        trim_rad=layout["trim"].copy(),
+        trim_rad=trim_rad,
         travel_rad=np.array([layout["low"], layout["high"]]),
-        constant_rad_s2=largest_constant(fdi["bound"], scenario),
-        inertia_coupling=fdi["bound"]["inertia"].copy(),
+        constant_rad_s2=constant,
+        inertia_coupling=bound["inertia"].copy(),
         seed=scenario.seed,
-        surfaces=scenario.airframe.surfaces,
+        surfaces=aircraft.surfaces,
         leading=(int(layout["main"][0]), int(layout["main"][1]), int(layout["main"][2])),
         options=dict(options),
-        declared=declared_of(
-            scenario.fdi.bounds,
-            scenario.actuators,
-            frames["belief"]["design"],
-            trim_y,
-            layout["trim"],
-            scenario.airframe,
-        ),
+        declared=declared_of(bounds, scenario.actuators, design, trim_y, trim_rad, aircraft),
     )
-
-
-def largest_constant(bound: np.void, scenario: Scenario) -> np.ndarray:
-    """The declared constant bound, (3,) rad/s2, with the most the aircraft's terms leave in it."""
-    largest: np.ndarray = bound["constant"].copy()
-    if bound["error_map"]["n_boxes"]:
-        largest += scenario.airframe.model_error_rad_s2
-    return largest
 
 
 def plugin_frame(
@@ -239,32 +227,14 @@ def plugged(
     `PluginFrame`."""
     if detector is None and law is None:
         return None
-    if detector is not None:
-        _clear_for_detector(frames["fdi"][0])
+    if detector is not None:  # no built-in isolation; instead, one estimator a surface for its verdict
+        fdi = frames["fdi"][0]
+        fdi["config"]["enabled"] = fdi["config"]["every_type"] = fdi["isolation"]["n"] = 0
+        fdi["statistical"]["tests"]["enabled"] = fdi["watch"]["enabled"] = 0
+        n = fdi["types"]["surface"].size
+        fdi["isolation"]["estimator"]["surface"][:n] = range(n)
     if law is not None or frames["control"]["law"][0] != ORACLE:
         frames["control"]["power"]["enabled"] = 0
     if law is not None:
         frames["control"]["law"] = ADAPTIVE if getattr(law, "fault_tolerant", False) else NOMINAL
-    contexts = (
-        context_of(frames, scenario, start, scenario.fdi.options),
-        context_of(frames, scenario, start, scenario.control.options),
-    )
-    return PluginFrame(detector, law, _names(scenario, detector, law), contexts, begun)
-
-
-def _names(scenario: Scenario, detector: Detector | None, law: Law | None) -> tuple[str, str]:
-    """What to call the plug-ins: by the scenario's names, or by their classes if the scenario did not name
-    them."""
-    scheme, other = scenario.fdi.scheme, scenario.control.law
-    return (
-        type(detector).__name__ if is_compiled(DETECTORS, scheme) else scheme,
-        type(law).__name__ if is_compiled(LAWS, other) else other,
-    )
-
-
-def _clear_for_detector(fdi: np.void) -> None:
-    """No built-in isolation; instead, one estimator a surface for the plug-in's verdict."""
-    config, isolation, n = fdi["config"], fdi["isolation"], fdi["types"]["surface"].size
-    config["enabled"] = config["every_type"] = isolation["n"] = 0
-    fdi["statistical"]["tests"]["enabled"] = fdi["watch"]["enabled"] = 0
-    isolation["estimator"]["surface"][:n] = range(n)
+    return PluginFrame(frames, scenario, start, detector, law, begun)

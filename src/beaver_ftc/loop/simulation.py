@@ -19,18 +19,10 @@ from beaver_ftc.loop.plugin_frame import measured_of
 from beaver_ftc.plant.adapter import Plant, UnknownProperty
 from beaver_ftc.plant.configure import GustSchedule
 from beaver_ftc.plant.faults import is_there
+from beaver_ftc.scenario import interventions
 from beaver_ftc.scenario.airframe import checked_against
 from beaver_ftc.scenario.faults import MOST_FAULTS, UNANTICIPATED, fault_name, place_of
-from beaver_ftc.scenario.interventions import (
-    StickTrack,
-    fault_of,
-    in_force,
-    is_same_again,
-    scenario_flown,
-    with_change,
-    with_gust,
-    with_targets,
-)
+from beaver_ftc.scenario.interventions import StickTrack, fault_of, is_same_again
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.sensors import sensors_there
 from beaver_ftc.scenario.signals import RAD_PER_DEG, sample_deg_s
@@ -84,8 +76,7 @@ class Stepping:
         sink: LogSink | None = None,
         prepare: Callable[[Plant], None] | None = None,
     ) -> None:
-        self._given, self._plug_ins, self._prepare = scenario, (detector, law), prepare
-        self._sink = sink
+        self._given, self._plug_ins, self._prepare, self._sink = scenario, (detector, law), prepare, sink
         self._make_ready()
 
     def reset(self, *, seed: int | None = None) -> None:
@@ -147,8 +138,7 @@ class Stepping:
     @property
     def values(self) -> Vector:
         """The log's row of the frame just flown, (columns,)."""
-        row: Vector = self.rows[-1]
-        return row
+        return np.asarray(self.rows[-1])
 
     @property
     def rows(self) -> Vector:
@@ -176,8 +166,7 @@ class Stepping:
     @property
     def trim_rad(self) -> Vector:
         """Surfaces in trim, (surfaces,) rad."""
-        trim: Vector = self._frame["control"]["layout"]["trim"].copy()
-        return trim
+        return np.array(self._frame["control"]["layout"]["trim"])
 
     @property
     def travel_rad(self) -> Vector:
@@ -198,14 +187,17 @@ class Stepping:
             raise BadInput(f"{self._scenario.name}: the flight is over at {self.t_s:g} s, allowed: reset()")
         if not isinstance(frames, int) or frames < 1:
             raise BadInput(f"frames: {frames!r} is out of range, allowed: a whole number of at least 1")
-        deflections = None if command is None else self._deflections(command)
+        low, high = self.travel_rad
+        deflections = None
+        if command is not None:
+            deflections = _vector(command, low.size, "command", "rad").clip(low, high)
         rate_deg_s = None if stick is None else _vector(stick, 3, "stick", "rad/s") / RAD_PER_DEG
         if self._next > 0:
             self._last.clear()
         self._begin()
-        self._take_command(deflections)
-        end = min(self._next + frames, self._loop.n_frames)
-        self._fly_to(end, rate_deg_s)
+        self._loop.hold(deflections)  # in the law's place, from the frame just flown on; None gives it back
+        self._by_hand |= deflections is not None
+        self._fly_to(min(self._next + frames, self._loop.n_frames), rate_deg_s)
 
     def inject(self, fault: Mapping[str, Any]) -> None:
         """Break something now, from the next frame on: a fault as in a scenario file, without `at_s`.
@@ -243,9 +235,9 @@ class Stepping:
         Raises BadInput that names the key, and while another one blows.
         """
         self._begin()
-        self._scenario = with_gust(self._scenario, gust, self._now_s)
-        loop, gusts = self._loop, self._scenario.environment.gusts
-        loop.gust, self._turn_at = GustSchedule(gusts, loop.plant, self._scenario.rate_hz), self._next
+        self._scenario = interventions.with_gust(self._scenario, gust, self._now_s)
+        gusts = self._scenario.environment.gusts
+        self._loop.gust, self._turn_at = GustSchedule(gusts, self._loop.plant, self.rate_hz), self._next
 
     def change(self, change: Mapping[str, Any]) -> None:
         """Change law, diagnosis or sensors now, from the next frame on: as one of `changes`, without `at_s`.
@@ -254,14 +246,14 @@ class Stepping:
         key, the flight going on as it was.
         """
         self._begin()
-        scenario = with_change(self._scenario, change, self._now_s)
+        scenario = interventions.with_change(self._scenario, change, self._now_s)
         self._loop.change(scenario, self._next)
         self._scenario, self._turn_at = scenario, self._next
 
     def aim(self, targets: Mapping[str, float]) -> None:
         """Give the autopilot new values from now on, `{"altitude_m": 1900}`. Raises BadInput with the key."""
         self._begin()
-        self._scenario = with_targets(self._scenario, targets, self._now_s)
+        self._scenario = interventions.with_targets(self._scenario, targets, self._now_s)
         set_up_profile(self._loop.frames["autopilot"][0], self._scenario)
 
     def read(self, name: str) -> float:
@@ -269,10 +261,10 @@ class Stepping:
         try:
             return self._loop.plant.read(name)
         except UnknownProperty:
-            meant = _near(name, self._loop.plant)
-            raise BadInput(
-                f"the aircraft has no property {name!r:.80}{meant}, allowed: one that JSBSim lists"
-            ) from None
+            listed: Any = self._loop.plant.fdm.query_property_catalog("")
+            near = get_close_matches(str(name), [line.split(" ")[0] for line in listed.splitlines()], n=1)
+            meant = f"{name!r:.80}, did you mean {near[0]}?" if near else f"{name!r:.80}"
+            raise BadInput(f"the aircraft has no property {meant}, allowed: one that JSBSim lists") from None
 
     __getitem__ = read
 
@@ -290,7 +282,7 @@ class Stepping:
                 "the reference, sticks and faults"
             )
         self._begin()
-        return scenario_flown(self._scenario, self._faults, self._steering.track, self._next)
+        return interventions.scenario_flown(self._scenario, self._faults, self._steering.track, self._next)
 
     def _as_it_happened(self) -> Scenario:
         """The scenario of the verdict: as given if it was flown to its end and nobody interfered."""
@@ -299,18 +291,13 @@ class Stepping:
         try:
             return self.scenario_flown()
         except BadInput:  # what no scenario can say is left out of it
-            faults = in_force(self._faults, self._now_s)
-            return self._scenario.model_copy(update={"faults": faults})
+            said = {"faults": interventions.in_force(self._faults, self._now_s)}
+            return self._scenario.model_copy(update=said)
 
     def _outcome(self) -> Landing:
         """What the flight has yielded so far."""
         self._begin()
-        loop, flying = self._loop, self._loop.scenario
-        try:
-            loop.scenario = self._as_it_happened()
-            return loop.land()
-        finally:
-            loop.scenario = flying  # whose references are still to come, without the stick
+        return self._loop.land(self._as_it_happened())
 
     def _flush(self) -> None:
         """Hand the sink what has been flown since."""
@@ -337,7 +324,9 @@ class Stepping:
         while self._next < end and self._status == FLYING:
             k = self._next
             if k % CHUNK_ROWS == 0:
-                self._begin_chunk(k)
+                self._flush()
+                self._written = 0
+                loop.sample_references(k, min(CHUNK_ROWS, loop.n_frames - k))
             if k >= self._turn_at:
                 self._turn_at = loop.turn_to(k)
             stop = min(end, self._turn_at, (k // CHUNK_ROWS + 1) * CHUNK_ROWS)
@@ -353,11 +342,6 @@ class Stepping:
         """Keep the rows just flown, (frames, columns), until the next step."""
         self._last.append(rows.copy())
 
-    def _begin_chunk(self, k: int) -> None:
-        self._flush()
-        self._written = 0
-        self._loop.sample_references(k, min(CHUNK_ROWS, self._loop.n_frames - k))
-
     def _declare(self, faults: Sequence[Any]) -> None:
         self._faults = tuple(faults)
         self._loop.declare(self._faults)
@@ -366,23 +350,6 @@ class Stepping:
     def _repaired(self, fault: Any, actuator: str | None) -> Any:
         ends = actuator in (None, place_of(fault)) and is_there(fault, self._next, self.rate_hz)
         return fault.model_copy(update={"end_s": self._now_s}) if ends else fault
-
-    def _take_command(self, deflections: Vector | None) -> None:
-        """Command the surfaces in the law's place, from the frame just flown on; None gives them back."""
-        self._loop.hold(deflections)
-        self._by_hand |= deflections is not None
-
-    def _deflections(self, command: ArrayLike) -> Vector:
-        low, high = self.travel_rad
-        return np.clip(_vector(command, low.size, "command", "rad"), low, high)
-
-
-def _near(name: str, plant: Plant) -> str:
-    """The property of JSBSim's that was meant, as a question; nothing if none is near."""
-    catalogue: Any = plant.fdm.query_property_catalog("")
-    known = [line.split(" ")[0] for line in catalogue.splitlines()]
-    match = get_close_matches(str(name), known, n=1)
-    return f", did you mean {match[0]}?" if match else ""
 
 
 def _vector(given: ArrayLike, size: int, what: str, unit: str) -> Vector:

@@ -1,8 +1,6 @@
-"""The compiled frame as Python calls it: whole, many in a row, or step by step where a plug-in is between.
+"""The compiled frame as Python calls it: whole, many in a row, and what is looked at between two.
 
-    measure -> diagnose | take_verdict -> decide -> command | take_command -> finish
-
-left of a bar: built in, right of it: a plug-in's answer. `fly_frame` is the built-in ones in one call.
+Where a plug-in is between (plugin_frame.py), Python calls the frame's own stages.
 
 frames (1,): of `frame_dtype` (assembly.py).
 """
@@ -19,12 +17,6 @@ from beaver_ftc.plant.sensing import FLYING, NOT_FINITE, hand_over, sample_force
 
 
 @kernel
-def measure(frames):
-    """Measure, and see what the design model makes of the elapsed frame. Returns the flight's status."""
-    return whole.begin(frames[0])
-
-
-@kernel
 def begin_watch(frames):
     """Begin to watch the instruments, with the readings there are. Where accelerometers were not read, their
     truth stands there."""
@@ -36,14 +28,8 @@ def begin_watch(frames):
 
 @kernel
 def diagnose(frames):
-    """The built-in diagnosis."""
+    """The built-in diagnosis alone."""
     whole.diagnose(frames[0])
-
-
-@kernel
-def take_verdict(frames):
-    """A plug-in's verdict, written to the frame's `verdict`."""
-    whole.take_verdict(frames[0])
 
 
 @kernel
@@ -52,31 +38,6 @@ def built_in_statistic(frames):
     fdi = frames[0].fdi
     alarm, authority = fdi.statistical.alarm, fdi.config.authority
     return largest_statistic(fdi.bank, alarm, authority, likelihood_counts(fdi.statistical.tests, authority))
-
-
-@kernel
-def decide(frames):
-    """The mode."""
-    whole.decide(frames[0])
-
-
-@kernel
-def command(frames):
-    """The built-in law, or a command that is held in its place."""
-    whole.command(frames[0])
-
-
-@kernel
-def take_command(frames, deflections):
-    """A plug-in's command (n,) rad, within the travel of each surface."""
-    whole.take_command(frames[0], deflections)
-
-
-@kernel
-def finish(frames, references, log):
-    """Account, record, hand the command over."""
-    frame = frames[0]
-    whole.finish(frame, row_of(references, frame.row), row_of(log, frame.row))
 
 
 @kernel

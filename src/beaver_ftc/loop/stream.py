@@ -19,11 +19,11 @@ from beaver_ftc.loop.outcome import estimate_now, verdict_of
 from beaver_ftc.plugins import DETECTORS, is_compiled
 from beaver_ftc.scenario.airframe import checked_against
 from beaver_ftc.scenario.loader import load
-from beaver_ftc.scenario.schema import Scenario
 
 Vector = NDArray[np.float64]
 FLOW = ("alpha_rad", "beta_rad", "airspeed_mps", "qdyn_pa")  # signals every aircraft measures
 Start = tuple[ArrayLike, ArrayLike, ArrayLike]
+_START = ("rates_rad_s", "signals", "command_rad")
 
 
 class Diagnosis:
@@ -55,20 +55,24 @@ class Diagnosis:
             "design_model": design_model or {},
         }  # fmt: skip
         with checked_against(aircraft):
-            self._scenario = _watchable(load(given))
+            self._scenario = load(given)
         self._aircraft, self._start = aircraft, start
+        if not is_compiled(DETECTORS, scheme := self._scenario.fdi.scheme):
+            allowed = "adaptive-estimators (step a plug-in itself)"
+            raise BadInput(f"fdi.scheme: {scheme} is plugged in, allowed: {allowed}")
+        if self._scenario.fdi.probing is not None:
+            raise BadInput("fdi.probing: moves surfaces, allowed here: a diagnosis that only looks on")
         self.reset()
 
     def reset(self) -> None:
         """Forget everything: the next sample is the first of a flight."""
-        travel = _travel_rad(self._aircraft)
+        stops = [self._aircraft.travel[name] for name in self._aircraft.surfaces]
+        travel = np.array([[stop.min_rad for stop in stops], [stop.max_rad for stop in stops]])
         self._frames = assemble(self._scenario, np.zeros(travel.shape[1]), travel)
         self._frame = self._frames[0]
         self._fdi = self._frame["fdi"]
         self._x, self._command, self._attitude = np.zeros(3), np.zeros(travel.shape[1]), np.zeros(3)
-        self._y = np.zeros(
-            self._frame["measured"]["y"].size
-        )  # beyond the aircraft's own signals it stays zero
+        self._y = np.zeros_like(self._frame["measured"]["y"])  # beyond the aircraft's own signals always zero
         self._signals = self._y[: len(FLOW) + len(self._aircraft.signals)]
         self._take = direct(watching.take, self._frames, self._x, self._y, self._command, self._attitude)
         self._diagnose = direct(stepping.diagnose, self._frames)
@@ -113,11 +117,7 @@ class Diagnosis:
             raise BadInput(f"the sample after {self.t_s:g} s is not finite, allowed: finite numbers")
         self._diagnose(self._frames)
         self._believe(self._frames)
-        return self._say()
-
-    def _say(self) -> Verdict:
-        """The verdict; its words are looked for only when there are others."""
-        if self._news(self._frames, self._known):
+        if self._news(self._frames, self._known):  # its words are looked for only when there are others
             self._said = verdict_of(self._frame, self._aircraft.surfaces)
         elif self._said.estimate is not None:
             self._said = self._said._replace(estimate=self._estimate())
@@ -132,31 +132,16 @@ class Diagnosis:
         """Show the design model and the statistics the flight condition they hold on to."""
         x, y, u = self._x.copy(), self._signals.copy(), self._command.copy()
         if self._start is not None:
-            places = {"rates_rad_s": x, "signals": y, "command_rad": u}
-            for (what, place), given in zip(places.items(), self._start, strict=True):
+            for what, place, given in zip(_START, (x, y, u), self._start, strict=True):
                 _put(what, np.asarray(given), place)
         if not all(np.isfinite(part).all() for part in (x, y, u)):
             return
-        frame, scenario = self._frame, self._scenario
-        belief = frame["belief"]
-        belief["u"] = belief["commanded"] = frame["control"]["layout"]["trim"] = u
-        anchor(belief["design"], x, y, u)
-        mass, start = mass_of(scenario.design_model, self._aircraft), (x, y, u)
-        rate_hz, design = scenario.rate_hz, belief["design"]
-        noise_model.set_up(self._fdi, scenario.fdi, design, mass, start, rate_hz, self._aircraft)
+        scenario, aircraft, belief = self._scenario, self._aircraft, self._frame["belief"]
+        belief["u"] = belief["commanded"] = self._frame["control"]["layout"]["trim"] = u
+        design, mass = belief["design"], mass_of(scenario.design_model, aircraft)
+        anchor(design, x, y, u)
+        noise_model.set_up(self._fdi, scenario.fdi, design, mass, (x, y, u), scenario.rate_hz, aircraft)
         self._fresh = False
-
-
-def _watchable(scenario: Scenario) -> Scenario:
-    """Refuse what a diagnosis that only looks on cannot do."""
-    fdi = scenario.fdi
-    if not is_compiled(DETECTORS, fdi.scheme):
-        raise BadInput(
-            f"fdi.scheme: {fdi.scheme} is plugged in, allowed: adaptive-estimators (step a plug-in itself)"
-        )
-    if fdi.probing is not None:
-        raise BadInput("fdi.probing: moves surfaces, allowed here: a diagnosis that only looks on")
-    return scenario
 
 
 def _put(what: str, given: Any, place: Vector) -> None:
@@ -172,9 +157,3 @@ def _put(what: str, given: Any, place: Vector) -> None:
     if not fits:
         shown = " ".join(repr(given).split())
         raise BadInput(f"{what}: {shown:.80} does not fit, allowed: {place.size} numbers")
-
-
-def _travel_rad(aircraft: Aircraft) -> Vector:
-    """Lower and upper stops, (2, surfaces) rad."""
-    stops = [aircraft.travel[name] for name in aircraft.surfaces]
-    return np.array([[stop.min_rad for stop in stops], [stop.max_rad for stop in stops]])

@@ -1,12 +1,15 @@
-"""What goes into a row of the log, a stage at a time; frame.py has the order."""
+"""What goes into a row of the log, a stage at a time; frame.py has the order.
 
-import numpy as np
+What is not there, or has not begun, is left as the row is given: not a number.
+"""
 
 from beaver_ftc.compiled import kernel
 from beaver_ftc.control.outer.state import SPEED
 from beaver_ftc.diagnosis.bank import nearest
 from beaver_ftc.plant import channels as ch
 from beaver_ftc.plant.sensing import effective, first_signal, position
+
+PER_ESTIMATOR = 10  # columns
 
 
 @kernel
@@ -48,17 +51,13 @@ def record_surfaces(truth, commanded, saturated, row, column):
 
 
 @kernel
-def record_estimator(fie, there, detected, row, column):
-    """Residuals between their limits; not a number before the estimators start, or where another diagnosis
-    has taken their place. Returns the next column."""
-    started = there and detected
-    for i in range(3):
-        row[column] = fie.residual[i] if started else np.nan
-        row[column + 1] = fie.lower[i] if started else np.nan
-        row[column + 2] = fie.upper[i] if started else np.nan
-        column += 3
-    row[column] = fie.excluded if there else np.nan
-    return column + 1
+def record_estimator(fie, started, row, column):
+    """Residuals between their limits, once the estimators have started; and whether the fault is excluded."""
+    if started:
+        for i in range(3):
+            row[column + 3 * i], row[column + 3 * i + 1] = fie.residual[i], fie.lower[i]
+            row[column + 3 * i + 2] = fie.upper[i]
+    row[column + PER_ESTIMATOR - 1] = fie.excluded
 
 
 @kernel
@@ -72,17 +71,16 @@ def record_alarm(bank, row, column):
 
 @kernel
 def record_watch(watch, row, column):
-    """How near a test between the instruments came to its bound in this frame, and which; not a number where
-    they are not watched."""
-    watched = watch.enabled and watch.begun
-    row[column] = watch.share if watched else np.nan
-    row[column + 1] = watch.furthest if watched else np.nan
+    """How near a test between the instruments came to its bound in this frame, and which."""
+    if watch.enabled and watch.begun:
+        row[column], row[column + 1] = watch.share, watch.furthest
 
 
 @kernel
 def record_profile(autopilot, row, column):
-    """The commanded profile, and the airspeed of it that can be held; not a number where a channel is not
-    flown."""
+    """The commanded profile, of the channels that are flown, and the airspeed of it that can be held."""
     for c in range(autopilot.command.size):
-        row[column + c] = autopilot.command[c] if autopilot.commanded[c] else np.nan
-    row[column + autopilot.command.size] = autopilot.held if autopilot.commanded[SPEED] else np.nan
+        if autopilot.commanded[c]:
+            row[column + c] = autopilot.command[c]
+    if autopilot.commanded[SPEED]:
+        row[column + autopilot.command.size] = autopilot.held

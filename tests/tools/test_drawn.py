@@ -97,7 +97,7 @@ def scheme_pairs(found):
 class Icing(Section):
     """A section that does not exist yet."""
 
-    thickness_mm: Number = number(unit="mm", says="ice", ge=0, le=20)
+    thickness_mm: Number = number(..., unit="mm", says="ice", ge=0, le=20)
     boots: Flag = Field(default=True)
 
 

@@ -83,9 +83,9 @@ class MassSection(Section):
     """Mass and inertia about the centre of gravity, body axes; Jxz enters the tensor with a minus sign."""
 
     mass_kg: Number | None = number(None, unit="kg", says="mass", gt=0, le=1e7)
-    Ix_kgm2: Number = number(unit="kg m2", says="roll inertia", gt=0, le=1e9)
-    Iy_kgm2: Number = number(unit="kg m2", says="pitch inertia", gt=0, le=1e9)
-    Iz_kgm2: Number = number(unit="kg m2", says="yaw inertia", gt=0, le=1e9)
+    Ix_kgm2: Number = number(..., unit="kg m2", says="roll inertia", gt=0, le=1e9)
+    Iy_kgm2: Number = number(..., unit="kg m2", says="pitch inertia", gt=0, le=1e9)
+    Iz_kgm2: Number = number(..., unit="kg m2", says="yaw inertia", gt=0, le=1e9)
     Jxz_kgm2: Number = number(0.0, unit="kg m2", says="product of inertia", ge=-1e9, le=1e9)
 
     @model_validator(mode="after")
@@ -98,9 +98,9 @@ class MassSection(Section):
 class GeometrySection(Section):
     """Reference dimensions."""
 
-    wing_area_m2: Number = number(unit="m2", says="wing area", gt=0, le=1e4)
-    span_m: Number = number(unit="m", says="wing span", gt=0, le=500)
-    chord_m: Number = number(unit="m", says="mean aerodynamic chord", gt=0, le=500)
+    wing_area_m2: Number = number(..., unit="m2", says="wing area", gt=0, le=1e4)
+    span_m: Number = number(..., unit="m", says="wing span", gt=0, le=500)
+    chord_m: Number = number(..., unit="m", says="mean aerodynamic chord", gt=0, le=500)
 
 
 class TermSection(Section):

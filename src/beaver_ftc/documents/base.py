@@ -26,9 +26,15 @@ Whole = Annotated[int, Strict(), BeforeValidator(_whole)]
 Flag = Annotated[bool, Strict()]
 
 
-def number(default: Any = ..., *, unit: str, says: str, **limits: Any) -> Any:
-    """A field holding one number: its unit and meaning go into the JSON Schema an editor shows."""
-    return Field(default, description=f"{says}, {unit}", json_schema_extra={"unit": unit}, **limits)
+def entry(default: Any, says: str, **limits: Any) -> Any:
+    """A field and what an editor says of it. default: a value, what makes one, or ... where there is none."""
+    how = "default_factory" if callable(default) else "default"
+    return Field(**{how: default}, description=says, **limits)
+
+
+def number(default: Any, unit: str, says: str, **limits: Any) -> Any:
+    """A field of one number, or several alike: the JSON Schema has their unit and meaning."""
+    return entry(default, f"{says}, {unit}", json_schema_extra={"unit": unit}, **limits)
 
 
 def refuse(conflicts: Sequence[Conflict]) -> None:

@@ -2,7 +2,7 @@
 
 from typing import Any, Self
 
-from pydantic import ConfigDict, Field, GetJsonSchemaHandler, model_validator
+from pydantic import ConfigDict, GetJsonSchemaHandler, model_validator
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
@@ -15,16 +15,12 @@ from beaver_ftc.scenario.airframe import checked_aircraft
 class ActuatorDynamics(Section):
     """First-order lag, rate limit and stops of one surface."""
 
-    bandwidth_rad_s: Number = number(
-        0.0, unit="rad/s", says="bandwidth of the lag, 0 means none", ge=0, le=10_000
-    )
+    bandwidth_rad_s: Number = number(0.0, "rad/s", "bandwidth of the lag, 0 means none", ge=0, le=10_000)
     rate_limit_deg_s: Number = number(
-        0.0, unit="deg/s", says="largest surface rate, 0 means no limit", ge=0, le=100_000
+        0.0, "deg/s", "largest surface rate, 0 means no limit", ge=0, le=100_000
     )
-    travel_deg: tuple[Number, Number] | None = Field(
-        default=None,
-        description="lower and upper stop; left out: the aircraft's own, deg",
-        json_schema_extra={"unit": "deg"},
+    travel_deg: tuple[Number, Number] | None = number(
+        None, "deg", "lower and upper stop; left out: the aircraft's own"
     )
 
     @model_validator(mode="after")

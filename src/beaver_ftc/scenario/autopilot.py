@@ -3,9 +3,9 @@
 from collections.abc import Iterator
 from typing import Any, Self
 
-from pydantic import Field, model_validator
+from pydantic import model_validator
 
-from beaver_ftc.documents.base import Conflict, Flag, Number, Section, number, refuse
+from beaver_ftc.documents.base import Conflict, Flag, Number, Section, entry, number, refuse
 from beaver_ftc.scenario.airframe import checked_aircraft
 
 MAX_LEGS = 100
@@ -16,8 +16,8 @@ _LATEST_S = 360_000.0
 class _Leg(Section):
     """From a time on: a value, or hold what is flown."""
 
-    at_s: Number = number(0.0, unit="s", says="from when on", ge=0, le=_LATEST_S)
-    hold: Flag = Field(default=False, description="true: hold what is flown or commanded at that time")
+    at_s: Number = number(0.0, "s", "from when on", ge=0, le=_LATEST_S)
+    hold: Flag = entry(False, "true: hold what is flown or commanded at that time")
     value: Number | None = None
 
     @model_validator(mode="after")
@@ -32,31 +32,31 @@ class _Leg(Section):
 class AltitudeLeg(_Leg):
     """An altitude, reached at a steady climb or descent."""
 
-    value: Number | None = number(None, unit="m", says="altitude above sea level", ge=-300, le=6000)
-    climb_mps: Number = number(2.5, unit="m/s", says="how fast the command goes there", gt=0, le=10)
+    value: Number | None = number(None, "m", "altitude above sea level", ge=-300, le=6000)
+    climb_mps: Number = number(2.5, "m/s", "how fast the command goes there", gt=0, le=10)
 
 
 class AirspeedLeg(_Leg):
     """An airspeed."""
 
-    value: Number | None = number(None, unit="m/s", says="true airspeed", ge=20, le=70)
-    change_mps2: Number = number(0.2, unit="m/s2", says="how fast the command goes there", gt=0, le=5)
+    value: Number | None = number(None, "m/s", "true airspeed", ge=20, le=70)
+    change_mps2: Number = number(0.2, "m/s2", "how fast the command goes there", gt=0, le=5)
 
 
 class HeadingLeg(_Leg):
     """A true heading, by the shorter turn."""
 
-    value: Number | None = number(None, unit="deg", says="true heading", ge=-360, le=360)
+    value: Number | None = number(None, "deg", "true heading", ge=-360, le=360)
 
 
 class BankLeg(_Leg):
     """A bank angle, right wing down positive."""
 
-    value: Number | None = number(None, unit="deg", says="bank angle", ge=-45, le=45)
+    value: Number | None = number(None, "deg", "bank angle", ge=-45, le=45)
 
 
 def _legs(says: str) -> Any:
-    return Field(default=(), max_length=MAX_LEGS, description=says)
+    return entry((), says, max_length=MAX_LEGS)
 
 
 class Autopilot(Section):

@@ -2,9 +2,9 @@
 
 from typing import Annotated, Self
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, model_validator
 
-from beaver_ftc.documents.base import refuse
+from beaver_ftc.documents.base import entry, refuse
 from beaver_ftc.plugins import LAWS, refusal
 
 
@@ -21,39 +21,28 @@ class EnginePower(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, strict=True)
 
-    enabled: bool = Field(True, description="false: the engine stays as trimmed, whatever is lost")
-    speed_gain_inhg_per_mps: float = Field(
-        3.0,
-        ge=0,
-        le=50,
-        description="less power for more airspeed than usual, inHg per m/s: damps the phugoid",
+    enabled: bool = entry(True, "false: the engine stays as trimmed, whatever is lost")
+    speed_gain_inhg_per_mps: float = entry(
+        3.0, "less power for more airspeed than usual, inHg per m/s: damps the phugoid", ge=0, le=50
     )
-    attitude_gain_inhg_per_deg: float = Field(
-        0.9, ge=0, le=50, description="more power for a nose too high, inHg per deg: power lowers it"
+    attitude_gain_inhg_per_deg: float = entry(
+        0.9, "more power for a nose too high, inHg per deg: power lowers it", ge=0, le=50
     )
-    washout_s: float = Field(
-        20.0, gt=0, le=600, description="usual airspeed: the mean over about so long, a phugoid's period, s"
+    washout_s: float = entry(
+        20.0, "usual airspeed: the mean over about so long, a phugoid's period, s", gt=0, le=600
     )
-    attitude_memory_s: float = Field(
-        10.0, gt=0, le=600, description="how long a missed pitch rate is remembered, s"
+    attitude_memory_s: float = entry(10.0, "how long a missed pitch rate is remembered, s", gt=0, le=600)
+    smoothing_s: float = entry(0.5, "lag on the airspeed, against noise and gusts, s", ge=0.05, le=10)
+    lowest_inhg: float = entry(10.0, "manifold pressure with the throttle closed, inHg", ge=0, le=50)
+    highest_inhg: float = entry(
+        36.5, "highest manifold pressure, inHg: the R-985's take-off rating", ge=0, le=50
     )
-    smoothing_s: float = Field(
-        0.5, ge=0.05, le=10, description="lag on the airspeed, against noise and gusts, s"
+    rate_inhg_s: float = entry(5.0, "fastest change, inHg/s: the whole range in five seconds", gt=0, le=100)
+    patience_s: float = entry(
+        1.0, "how long pitch must have been lost before power takes over, s", gt=0, le=60
     )
-    lowest_inhg: float = Field(
-        10.0, ge=0, le=50, description="manifold pressure with the throttle closed, inHg"
-    )
-    highest_inhg: float = Field(
-        36.5, ge=0, le=50, description="highest manifold pressure, inHg: the R-985's take-off rating"
-    )
-    rate_inhg_s: float = Field(
-        5.0, gt=0, le=100, description="fastest change, inHg/s: the whole range in five seconds"
-    )
-    patience_s: float = Field(
-        1.0, gt=0, le=60, description="how long pitch must have been lost before power takes over, s"
-    )
-    release_s: float = Field(
-        10.0, gt=0, le=600, description="and how long not, before the engine goes back to its trim, s"
+    release_s: float = entry(
+        10.0, "and how long not, before the engine goes back to its trim, s", gt=0, le=600
     )
 
     @model_validator(mode="after")
@@ -68,58 +57,42 @@ class ControlConfig(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, strict=True)
 
-    law: Annotated[str, AfterValidator(known_law)] = Field(
+    law: Annotated[str, AfterValidator(known_law)] = entry(
         "fault-tolerant",
-        description="a registered law, `beaver-ftc list laws` names them, e.g. nominal, adaptive, oracle",
+        "a registered law, `beaver-ftc list laws` names them, e.g. nominal, adaptive, oracle",
     )
-    options: dict[str, float] = Field({}, description="parameters of a registered law, by name")
-    gain_margin_db: float = Field(
-        6.0, gt=0, le=40, description="of every loop of the default law, up and down, dB"
-    )
-    phase_margin_deg: float = Field(45.0, gt=0, le=80, description="of every loop of the default law, deg")
-    noise_share: float = Field(
+    options: dict[str, float] = entry({}, "parameters of a registered law, by name")
+    gain_margin_db: float = entry(6.0, "of every loop of the default law, up and down, dB", gt=0, le=40)
+    phase_margin_deg: float = entry(45.0, "of every loop of the default law, deg", gt=0, le=80)
+    noise_share: float = entry(
         0.5,
+        "of a surface's rate limit, that gyro noise may cost with the default law, as a standard "
+        "deviation: it stays within the limit 95 % of the time",
         gt=0,
         le=1,
-        description="of a surface's rate limit, that gyro noise may cost with the default law, as a standard "
-        "deviation: it stays within the limit 95 % of the time",
     )
-    proportional_per_s: float = Field(
-        2.0, gt=0, le=50, description="Kp, 1/s: error bandwidth, well above the 0.2 Hz references"
+    proportional_per_s: float = entry(
+        2.0, "Kp, 1/s: error bandwidth, well above the 0.2 Hz references", gt=0, le=50
     )
-    integral_per_s2: float = Field(
-        1.0, ge=0, le=500, description="Ki, 1/s2: Kp^2/4, two equal real error poles at Kp/2"
+    integral_per_s2: float = entry(1.0, "Ki, 1/s2: Kp^2/4, two equal real error poles at Kp/2", ge=0, le=500)
+    reference_natural_frequency_rad_s: float = entry(
+        10.0, "reference model, rad/s: faster than the loop, slower than a 20 Hz frame", gt=0, le=100
     )
-    reference_natural_frequency_rad_s: float = Field(
-        10.0,
-        gt=0,
-        le=100,
-        description="reference model, rad/s: faster than the loop, slower than a 20 Hz frame",
+    reference_damping: float = entry(1.0, "reference model damping ratio: no overshoot", ge=0.2, le=5)
+    network_gain_per_s2: float = entry(
+        60.0, "learning gain, 1/s2: with the FDAE's pole a well damped observer", ge=0, le=1000
     )
-    reference_damping: float = Field(
-        1.0, ge=0.2, le=5, description="reference model damping ratio: no overshoot"
+    network_leak_per_s: float = entry(
+        1.0, "how fast the network lets go once the isolated fault explains the error, 1/s", ge=0, le=50
     )
-    network_gain_per_s2: float = Field(
-        60.0, ge=0, le=1000, description="learning gain, 1/s2: with the FDAE's pole a well damped observer"
+    network_weight_limit_rad_s2: float = entry(
+        20.0, "projection bound on every weight, rad/s2", gt=0, le=1000
     )
-    network_leak_per_s: float = Field(
-        1.0,
-        ge=0,
-        le=50,
-        description="how fast the network lets go once the isolated fault explains the error, 1/s",
+    effectiveness_rate_per_s: float = entry(
+        4.0, "fastest change of the effectiveness the law uses, 1/s: bumpless", gt=0, le=1000
     )
-    network_weight_limit_rad_s2: float = Field(
-        20.0, gt=0, le=1000, description="projection bound on every weight, rad/s2"
+    least_effectiveness: float = entry(
+        0.1, "projection: a surface weaker than this is not divided by, but given up", gt=0, lt=1
     )
-    effectiveness_rate_per_s: float = Field(
-        4.0, gt=0, le=1000, description="fastest change of the effectiveness the law uses, 1/s: bumpless"
-    )
-    least_effectiveness: float = Field(
-        0.1, gt=0, lt=1, description="projection: a surface weaker than this is not divided by, but given up"
-    )
-    hand_over_s: float = Field(
-        1.0, gt=0, le=60, description="duration of the continuous hand-over to the flap, s"
-    )
-    power: EnginePower = Field(
-        default_factory=EnginePower, description="engine power on pitch, when elevator and flap are lost"
-    )
+    hand_over_s: float = entry(1.0, "duration of the continuous hand-over to the flap, s", gt=0, le=60)
+    power: EnginePower = entry(EnginePower, "engine power on pitch, when elevator and flap are lost")

@@ -4,7 +4,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, Strict, field_validator, model_validator
 
-from beaver_ftc.documents.base import refuse
+from beaver_ftc.documents.base import entry, refuse
 from beaver_ftc.documents.errors import suggestion
 from beaver_ftc.plugins import DETECTORS, refusal
 from beaver_ftc.scenario.airframe import checked_aircraft
@@ -52,26 +52,23 @@ class Bounds(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, strict=True)
 
-    inertia_coupling: PerAxis = Field(
-        PerAxis(p=0.25, q=0.25, r=0.25), description="relative error of Pqr, Qpr, Rpq: as published"
+    inertia_coupling: PerAxis = entry(
+        PerAxis(p=0.25, q=0.25, r=0.25), "relative error of Pqr, Qpr, Rpq: as published"
     )
-    constant_rad_s2: PerAxis = Field(
-        PerAxis(p=0.02, q=0.02, r=0.02), description="unstructured angular acceleration, rad/s2: as published"
+    constant_rad_s2: PerAxis = entry(
+        PerAxis(p=0.02, q=0.02, r=0.02), "unstructured angular acceleration, rad/s2: as published"
     )
-    coefficients: Share | dict[str, Share] = Field(
-        0.0, description="tolerance of the moment coefficients as a share: of all, or by name"
+    coefficients: Share | dict[str, Share] = entry(
+        0.0, "tolerance of the moment coefficients as a share: of all, or by name"
     )
-    inertia: Share = Field(0.0, description="tolerance of Ix, Iy, Iz and Jxz as a share of each")
-    sensors: Sensors = Field(
-        default_factory=Sensors,
-        description="measurement errors, as those of the truth: a preset, or noise, bias, resolution, slope "
-        "by signal",
+    inertia: Share = entry(0.0, "tolerance of Ix, Iy, Iz and Jxz as a share of each")
+    sensors: Sensors = entry(
+        Sensors,
+        "measurement errors, as those of the truth: a preset, or noise, bias, resolution, slope by signal",
     )
-    deflection_deg: Deflection = Field(
-        0.0, description="how far a surface may be from its actuator's model, deg"
-    )
-    turbulence: Literal["none", "light", "moderate", "severe"] = Field(
-        "none", description="rotation of the air, which no instrument sees: Dryden, above 2000 ft"
+    deflection_deg: Deflection = entry(0.0, "how far a surface may be from its actuator's model, deg")
+    turbulence: Literal["none", "light", "moderate", "severe"] = entry(
+        "none", "rotation of the air, which no instrument sees: Dryden, above 2000 ft"
     )
 
     @field_validator("coefficients")
@@ -93,20 +90,14 @@ class Statistical(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
-    false_alarms_per_h: float = Field(
-        1e-3,
-        gt=0,
-        le=3600,
-        description="at most so many false alarms per flight hour under the noise declared",
+    false_alarms_per_h: float = entry(
+        1e-3, "at most so many false alarms per flight hour under the noise declared", gt=0, le=3600
     )
-    misnaming: float = Field(
-        1e-4, gt=0, lt=0.5, description="chance, within a second, that noise excludes the true fault"
+    misnaming: float = entry(
+        1e-4, "chance, within a second, that noise excludes the true fault", gt=0, lt=0.5
     )
-    uncertainty_rad_s: float = Field(
-        15.0,
-        gt=0,
-        le=1000,
-        description="how fast an uncertainty that is merely bounded swings, rad/s: as published",
+    uncertainty_rad_s: float = entry(
+        15.0, "how fast an uncertainty that is merely bounded swings, rad/s: as published", gt=0, le=1000
     )
 
 
@@ -119,9 +110,9 @@ class Probing(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
-    amplitude_deg: float = Field(3.0, gt=0, le=10, description="greatest flap deflection, downwards, deg")
-    frequency_hz: float = Field(0.5, gt=0, le=5, description="movements a second, Hz")
-    duration_s: float = Field(4.0, gt=0, le=60, description="at most so long, s")
+    amplitude_deg: float = entry(3.0, "greatest flap deflection, downwards, deg", gt=0, le=10)
+    frequency_hz: float = entry(0.5, "movements a second, Hz", gt=0, le=5)
+    duration_s: float = entry(4.0, "at most so long, s", gt=0, le=60)
 
 
 class Sharpen(BaseModel):
@@ -129,14 +120,10 @@ class Sharpen(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
 
-    pole_bank: bool = Field(True, description="alarm on the first of several filters: `fdi.pole_bank_per_s`")
-    memory: bool = Field(
-        True, description="hold each fault against the whole flight, not only what follows the alarm"
-    )
-    shared_effectiveness: bool = Field(
-        True, description="one parameter per surface, shared by the axes it moves"
-    )
-    set_membership: bool = Field(True, description="intersect the sets of a parameter declared constant")
+    pole_bank: bool = entry(True, "alarm on the first of several filters: `fdi.pole_bank_per_s`")
+    memory: bool = entry(True, "hold each fault against the whole flight, not only what follows the alarm")
+    shared_effectiveness: bool = entry(True, "one parameter per surface, shared by the axes it moves")
+    set_membership: bool = entry(True, "intersect the sets of a parameter declared constant")
 
     @model_validator(mode="before")
     @classmethod
@@ -157,67 +144,61 @@ class FdiConfig(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, strict=True)
 
-    scheme: Annotated[str, AfterValidator(known_scheme)] = Field(
+    scheme: Annotated[str, AfterValidator(known_scheme)] = entry(
         "adaptive-estimators",
-        description="a registered detector, `beaver-ftc list schemes` names them; none: nobody diagnoses",
+        "a registered detector, `beaver-ftc list schemes` names them; none: nobody diagnoses",
     )
-    options: dict[str, float] = Field({}, description="parameters of a registered detector, by name")
-    fault_class: Literal["published", "all"] = Field(
+    options: dict[str, float] = entry({}, "parameters of a registered detector, by name")
+    fault_class: Literal["published", "all"] = entry(
         "published",
-        description="what may befall a surface: loss of effectiveness of aileron, elevator or rudder, "
+        "what may befall a surface: loss of effectiveness of aileron, elevator or rudder, "
         "or every fault type on all four",
     )
-    pairs: bool = Field(
+    pairs: bool = entry(
         False,
-        description="also look for two faults at once on different surfaces (class `all`), pitch and "
+        "also look for two faults at once on different surfaces (class `all`), pitch and "
         "roll-yaw each for itself",
     )
-    sensor_monitor: Literal["auto", "always", "never"] = Field(
-        "auto",
-        description="hold the instruments against one another: auto, where the scenario breaks one",
+    sensor_monitor: Literal["auto", "always", "never"] = entry(
+        "auto", "hold the instruments against one another: auto, where the scenario breaks one"
     )
-    slowest_oscillation_rad_s: float = Field(
-        1.0, gt=0, le=100, description="oscillatory failures are this fast or faster (class `all`), rad/s"
+    slowest_oscillation_rad_s: float = entry(
+        1.0, "oscillatory failures are this fast or faster (class `all`), rad/s", gt=0, le=100
     )
-    slowest_rate_deg_s: float = Field(
+    slowest_rate_deg_s: float = entry(
         0.5,
+        "a slow surface moves this fast or faster, a slower one is a jam (class `all`), deg/s",
         gt=0,
         le=100,
-        description="a slow surface moves this fast or faster, a slower one is a jam (class `all`), deg/s",
     )
-    probing: Probing | None = Field(
-        None, description="active diagnosis (class `all`): off unless given; `{}` for its defaults"
+    probing: Probing | None = entry(
+        None, "active diagnosis (class `all`): off unless given; `{}` for its defaults"
     )
-    statistical: Statistical | None = Field(
-        None,
-        description="statistical detector beside the worst-case one: off unless given; `{}` for its defaults",
+    statistical: Statistical | None = entry(
+        None, "statistical detector beside the worst-case one: off unless given; `{}` for its defaults"
     )
-    authority: Literal["either", "worst-case", "statistical"] = Field(
-        "either", description="whose alarms and exclusions count where there are two detectors"
+    authority: Literal["either", "worst-case", "statistical"] = entry(
+        "either", "whose alarms and exclusions count where there are two detectors"
     )
-    thresholds: Literal["interval", "published"] = Field(
-        "interval", description="isolation test: signed interval or the paper's norm bound"
+    thresholds: Literal["interval", "published"] = entry(
+        "interval", "isolation test: signed interval or the paper's norm bound"
     )
-    detection_pole_per_s: float = Field(
-        10.0, gt=0, le=1000, description="Lambda0, 1/s: a few times the bound shows in 0.1 s"
+    detection_pole_per_s: float = entry(
+        10.0, "Lambda0, 1/s: a few times the bound shows in 0.1 s", gt=0, le=1000
     )
-    isolation_pole_per_s: float = Field(
-        10.0, gt=0, le=1000, description="Lambda of the isolation estimators, 1/s"
-    )
-    forgetting_time_s: float = Field(
-        5.0, gt=0, le=3600, description="memory of the estimates, s: longer than a reference period"
+    isolation_pole_per_s: float = entry(10.0, "Lambda of the isolation estimators, 1/s", gt=0, le=1000)
+    forgetting_time_s: float = entry(
+        5.0, "memory of the estimates, s: longer than a reference period", gt=0, le=3600
     )
     bounds: Bounds = Bounds()
-    sharpen: Sharpen = Field(
-        Sharpen(), description="steps beyond the published scheme: `all`, `none` or one by one"
-    )
-    pole_bank_per_s: Annotated[tuple[Pole, ...], Strict(False)] = Field(
+    sharpen: Sharpen = entry(Sharpen(), "steps beyond the published scheme: `all`, `none` or one by one")
+    pole_bank_per_s: Annotated[tuple[Pole, ...], Strict(False)] = entry(
         (DEADBEAT_PER_S,),
+        "filters beside the published one, 1/s; the default keeps a single frame",
         max_length=MAX_POLES - 1,
-        description="filters beside the published one, 1/s; the default keeps a single frame",
     )
-    fault_profile: Literal["any", "abrupt"] = Field(
-        "any", description="what is assumed of the fault's course: nothing, or constant once it is there"
+    fault_profile: Literal["any", "abrupt"] = entry(
+        "any", "what is assumed of the fault's course: nothing, or constant once it is there"
     )
 
     @property

@@ -5,7 +5,7 @@ from typing import Annotated, Any, Literal, Self, get_args
 
 from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
 
-from beaver_ftc.documents.base import Conflict, Number, Section, number, refuse
+from beaver_ftc.documents.base import Conflict, Number, Section, entry, number, refuse
 
 MAX_GUSTS = 100
 Wind = Annotated[Number, Field(ge=-100, le=100)]
@@ -14,13 +14,11 @@ Wind = Annotated[Number, Field(ge=-100, le=100)]
 class Gust(Section):
     """A one-minus-cosine gust: it rises, stays and fades as JSBSim's own does."""
 
-    at_s: Number = number(unit="s", says="when it starts", ge=0, le=360_000)
-    velocity_mps: tuple[Wind, Wind, Wind] = Field(
-        description="at its height, towards north, east, down, m/s", json_schema_extra={"unit": "m/s"}
-    )
-    rise_s: Number = number(1.0, unit="s", says="duration of the rise", gt=0, le=3600)
-    hold_s: Number = number(0.0, unit="s", says="time at its height", ge=0, le=3600)
-    fade_s: Number = number(1.0, unit="s", says="duration of the decay", gt=0, le=3600)
+    at_s: Number = number(..., "s", "when it starts", ge=0, le=360_000)
+    velocity_mps: tuple[Wind, Wind, Wind] = number(..., "m/s", "at its height, towards north, east, down")
+    rise_s: Number = number(1.0, "s", "duration of the rise", gt=0, le=3600)
+    hold_s: Number = number(0.0, "s", "time at its height", ge=0, le=3600)
+    fade_s: Number = number(1.0, "s", "duration of the decay", gt=0, le=3600)
 
     @property
     def end_s(self) -> float:
@@ -51,14 +49,12 @@ def _no_severity(given: Any) -> Any:
 class Environment(Section):
     """The air."""
 
-    turbulence: Annotated[Literal["none", "dryden"], BeforeValidator(_no_severity)] = Field(
-        default="none", description="still air or Dryden turbulence"
+    turbulence: Annotated[Literal["none", "dryden"], BeforeValidator(_no_severity)] = entry(
+        "none", "still air or Dryden turbulence"
     )
-    severity: Severity | None = Field(default=None, description="of the turbulence")
-    wind_mps: tuple[Wind, Wind, Wind] = Field(
-        default=(0.0, 0.0, 0.0),
-        description="steady wind towards north, east, down, m/s",
-        json_schema_extra={"unit": "m/s"},
+    severity: Severity | None = entry(None, "of the turbulence")
+    wind_mps: tuple[Wind, Wind, Wind] = number(
+        (0.0, 0.0, 0.0), "m/s", "steady wind towards north, east, down"
     )
     gust: (
         Annotated[
@@ -67,10 +63,7 @@ class Environment(Section):
             Discriminator(_one_or_several),
         ]
         | None
-    ) = Field(
-        default=None,
-        description="a one-minus-cosine gust, or a list of them, each begun after the one before has faded",
-    )
+    ) = entry(None, "a one-minus-cosine gust, or a list of them, each begun after the one before has faded")
 
     @property
     def gusts(self) -> tuple[Gust, ...]:

@@ -14,10 +14,8 @@ from beaver_ftc.scenario.airframe import checked_aircraft
 class Initial(Section):
     """The trimmed flight condition the run starts from."""
 
-    airspeed_mps: Number = number(
-        45.0, unit="m/s", says="true airspeed, validated from 30 to 55", ge=20, le=70
-    )
-    altitude_m: Number = number(1828.8, unit="m", says="altitude above sea level", ge=-300, le=6000)
+    airspeed_mps: Number = number(45.0, "m/s", "true airspeed, validated from 30 to 55", ge=20, le=70)
+    altitude_m: Number = number(1828.8, "m", "altitude above sea level", ge=-300, le=6000)
 
     _airframe: ClassVar[Aircraft | None] = None
 
@@ -33,12 +31,12 @@ def initial_of(aircraft: Aircraft) -> type[Initial]:
     for name, setting in aircraft.engine.settings.items():
         low, high = setting.range
         says = setting.says or name
-        keys[name] = Number, number(setting.default, unit=setting.unit, says=says, ge=low, le=high)
+        keys[name] = Number, number(setting.default, setting.unit, says, ge=low, le=high)
     for surface in aircraft.surfaces:
         if surface not in aircraft.primary:
             travel, says = aircraft.travel[surface], f"{surface} deflection"
             low, high = degrees(travel.min_rad), degrees(travel.max_rad)
-            keys[f"{surface}_deg"] = Number, number(0.0, unit="deg", says=says, ge=low, le=high)
+            keys[f"{surface}_deg"] = Number, number(0.0, "deg", says, ge=low, le=high)
     made = create_model("Initial", __base__=Initial, __doc__=Initial.__doc__, **keys)
     made._airframe = aircraft
     return made
@@ -50,11 +48,11 @@ def _flow_keys(aircraft: Aircraft) -> dict[str, Any]:
     default = start.airspeed_mps or (45.0 if low <= 45.0 <= high else 0.5 * (low + high))
     says = f"true airspeed, validated from {low:g} to {high:g}"
     slowest, fastest = min(20.0, 2.0 / 3.0 * low), max(70.0, 14.0 / 11.0 * high)
-    speed = number(default, unit="m/s", says=says, ge=slowest, le=fastest)
+    speed = number(default, "m/s", says, ge=slowest, le=fastest)
     keys: dict[str, Any] = {"airspeed_mps": (Number, speed)}
     if start.altitude_m is not None:
         highest = max(6000.0, start.altitude_m)
-        altitude = number(start.altitude_m, unit="m", says="altitude above sea level", ge=-300, le=highest)
+        altitude = number(start.altitude_m, "m", "altitude above sea level", ge=-300, le=highest)
         keys["altitude_m"] = Number, altitude
     return keys
 

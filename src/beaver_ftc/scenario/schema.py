@@ -17,7 +17,7 @@ from pydantic import (
 )
 
 from beaver_ftc.aircraft import DEFAULT, Aircraft, UnknownAircraft, load
-from beaver_ftc.documents.base import Flag, Number, Section, Whole, number, refuse
+from beaver_ftc.documents.base import Flag, Number, Section, Whole, entry, number, refuse
 from beaver_ftc.documents.document import Document
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.documents.keys import UnusableKeyError, parse_key, plain, with_values
@@ -55,16 +55,16 @@ NAME_PATTERN = r"^[A-Za-z0-9_-]+$"
 class InertiaCoupling(Section):
     """theta_p, theta_q, theta_r: relative errors of Pqr, Qpr, Rpq in the truth (published: within 0.25)."""
 
-    p: Number = number(0.0, unit="share of 1", says="theta_p", ge=-1, le=1)
-    q: Number = number(0.0, unit="share of 1", says="theta_q", ge=-1, le=1)
-    r: Number = number(0.0, unit="share of 1", says="theta_r", ge=-1, le=1)
+    p: Number = number(0.0, "share of 1", "theta_p", ge=-1, le=1)
+    q: Number = number(0.0, "share of 1", "theta_q", ge=-1, le=1)
+    r: Number = number(0.0, "share of 1", "theta_r", ge=-1, le=1)
 
 
 class Sinusoid(Section):
     """amplitude sin(frequency t) added to one angular acceleration."""
 
-    amplitude_rad_s2: Number = number(0.0, unit="rad/s2", says="amplitude", ge=0, le=10)
-    frequency_rad_s: Number = number(10.0, unit="rad/s", says="angular frequency", gt=0, le=1000)
+    amplitude_rad_s2: Number = number(0.0, "rad/s2", "amplitude", ge=0, le=10)
+    frequency_rad_s: Number = number(10.0, "rad/s", "angular frequency", gt=0, le=1000)
 
 
 class SinusoidAxes(Section):
@@ -78,9 +78,9 @@ class SinusoidAxes(Section):
 class TrueInertia(Section):
     """The truth's inertia, as a share of the table's value."""
 
-    Ix: Number = number(1.0, unit="share of 1", says="roll inertia", ge=0.5, le=2)
-    Iy: Number = number(1.0, unit="share of 1", says="pitch inertia", ge=0.5, le=2)
-    Iz: Number = number(1.0, unit="share of 1", says="yaw inertia", ge=0.5, le=2)
+    Ix: Number = number(1.0, "share of 1", "roll inertia", ge=0.5, le=2)
+    Iy: Number = number(1.0, "share of 1", "pitch inertia", ge=0.5, le=2)
+    Iz: Number = number(1.0, "share of 1", "yaw inertia", ge=0.5, le=2)
 
 
 Offset = Annotated[Number, Field(ge=-0.5, le=0.5)]
@@ -89,27 +89,19 @@ Offset = Annotated[Number, Field(ge=-0.5, le=0.5)]
 class Uncertainty(Section):
     """How the truth differs from what the designer believes."""
 
-    inertia_coupling: InertiaCoupling = Field(
-        default_factory=InertiaCoupling, description="relative errors of the inertia coupling"
-    )
-    sinusoid: SinusoidAxes = Field(
-        default_factory=SinusoidAxes, description="sinusoidal angular accelerations"
-    )
-    coefficients: Ratios = Field(
-        default_factory=dict,
-        description="truth / design ratio of single aerodynamic terms, 1 is no error, e.g. Cm_alpha: 1.05",
+    inertia_coupling: InertiaCoupling = entry(InertiaCoupling, "relative errors of the inertia coupling")
+    sinusoid: SinusoidAxes = entry(SinusoidAxes, "sinusoidal angular accelerations")
+    coefficients: Ratios = entry(
+        dict,
+        "truth / design ratio of single aerodynamic terms, 1 is no error, e.g. Cm_alpha: 1.05",
         examples=[{"Cm_alpha": 1.05}],
     )
     mass: Number = number(
-        1.0, unit="share of 1", says="truth / design ratio of the mass, at the same inertia", ge=0.5, le=2
+        1.0, "share of 1", "truth / design ratio of the mass, at the same inertia", ge=0.5, le=2
     )
-    inertia: TrueInertia = Field(
-        default_factory=TrueInertia, description="truth / design ratio of the inertia"
-    )
-    cg_m: tuple[Offset, Offset, Offset] = Field(
-        default=(0.0, 0.0, 0.0),
-        description="centre of gravity, forward, right and down of where the designer has it, m",
-        json_schema_extra={"unit": "m"},
+    inertia: TrueInertia = entry(TrueInertia, "truth / design ratio of the inertia")
+    cg_m: tuple[Offset, Offset, Offset] = number(
+        (0.0, 0.0, 0.0), "m", "centre of gravity, forward, right and down of where the designer has it"
     )
 
 
@@ -119,33 +111,25 @@ Scale = Annotated[Number, Field(ge=0.1, le=10)]
 class InertiaScale(Section):
     """What the designer takes the inertia for, as a share of the table's value."""
 
-    Ix: Scale = number(1.0, unit="share of 1", says="roll inertia")
-    Iy: Scale = number(1.0, unit="share of 1", says="pitch inertia")
-    Iz: Scale = number(1.0, unit="share of 1", says="yaw inertia")
-    Jxz: Ratio = number(1.0, unit="share of 1", says="product of inertia")
+    Ix: Scale = number(1.0, "share of 1", "roll inertia")
+    Iy: Scale = number(1.0, "share of 1", "pitch inertia")
+    Iz: Scale = number(1.0, "share of 1", "yaw inertia")
+    Jxz: Ratio = number(1.0, "share of 1", "product of inertia")
 
 
 class DesignModel(Section):
     """What the designer leaves out or gets wrong on purpose; the truth stays as it is."""
 
-    engine_terms: Flag = Field(
-        default=True, description="false neglects the dpt terms of Cl, Cm, Cn, as published"
+    engine_terms: Flag = entry(True, "false neglects the dpt terms of Cl, Cm, Cn, as published")
+    linearised: Flag = entry(
+        False, "true: the Jacobian at the trim the flight starts from, instead of f and G"
     )
-    linearised: Flag = Field(
-        default=False, description="true: the Jacobian at the trim the flight starts from, instead of f and G"
-    )
-    frozen_alpha: Flag = Field(
-        default=False, description="true: alpha stays at its trim value in the designer's model"
-    )
-    mass: Scale = number(
-        1.0, unit="share of 1", says="the designer's mass over the table's; inertia goes with it"
-    )
-    inertia: InertiaScale = Field(
-        default_factory=InertiaScale, description="the designer's inertia over the table's"
-    )
-    coefficients: Ratios = Field(
-        default_factory=dict,
-        description="design / table ratio of single aerodynamic terms, 1 is no error, e.g. Cm_alpha: 0.9",
+    frozen_alpha: Flag = entry(False, "true: alpha stays at its trim value in the designer's model")
+    mass: Scale = number(1.0, "share of 1", "the designer's mass over the table's; inertia goes with it")
+    inertia: InertiaScale = entry(InertiaScale, "the designer's inertia over the table's")
+    coefficients: Ratios = entry(
+        dict,
+        "design / table ratio of single aerodynamic terms, 1 is no error, e.g. Cm_alpha: 0.9",
         examples=[{"Cm_alpha": 0.9}],
     )
 
@@ -153,16 +137,16 @@ class DesignModel(Section):
 class Change(Section):
     """From a time on another law, another diagnosis, other sensors; what is left out stays as it is."""
 
-    at_s: Number = number(unit="s", says="from when on", gt=0, le=360_000)
-    law: Annotated[str, AfterValidator(known_law)] | None = Field(
-        default=None, description="as control.law; surfaces and reference go on from where they are"
+    at_s: Number = number(..., "s", "from when on", gt=0, le=360_000)
+    law: Annotated[str, AfterValidator(known_law)] | None = entry(
+        None, "as control.law; surfaces and reference go on from where they are"
     )
-    scheme: Annotated[str, AfterValidator(known_scheme)] | None = Field(
-        default=None, description="as fdi.scheme; the diagnosis begins anew"
+    scheme: Annotated[str, AfterValidator(known_scheme)] | None = entry(
+        None, "as fdi.scheme; the diagnosis begins anew"
     )
-    sensors: Sensors | None = Field(default=None, description="as sensors: a preset, or errors by signal")
-    declared_sensors: Annotated[Sensors, AfterValidator(can_be_bounded)] | None = Field(
-        default=None, description="as fdi.bounds.sensors; the diagnosis begins anew"
+    sensors: Sensors | None = entry(None, "as sensors: a preset, or errors by signal")
+    declared_sensors: Annotated[Sensors, AfterValidator(can_be_bounded)] | None = entry(
+        None, "as fdi.bounds.sensors; the diagnosis begins anew"
     )
 
     @model_validator(mode="after")
@@ -176,79 +160,61 @@ class Change(Section):
 class RmsLimits(Section):
     """Largest RMS tracking error allowed, per axis."""
 
-    p: Number | None = number(None, unit="deg/s", says="roll rate", ge=0, le=1000)
-    q: Number | None = number(None, unit="deg/s", says="pitch rate", ge=0, le=1000)
-    r: Number | None = number(None, unit="deg/s", says="yaw rate", ge=0, le=1000)
+    p: Number | None = number(None, "deg/s", "roll rate", ge=0, le=1000)
+    q: Number | None = number(None, "deg/s", "pitch rate", ge=0, le=1000)
+    r: Number | None = number(None, "deg/s", "yaw rate", ge=0, le=1000)
 
 
 class Arrival(Section):
     """What the flight has come to at its end: deviations from the commanded profile, means over 10 s."""
 
-    altitude_m: Number | None = number(None, unit="m", says="altitude", gt=0, le=10_000)
-    airspeed_mps: Number | None = number(None, unit="m/s", says="airspeed", gt=0, le=100)
-    heading_deg: Number | None = number(None, unit="deg", says="heading", gt=0, le=180)
-    in_envelope: Flag | None = Field(
-        default=None, description="true: inside the validated envelope at the end; false: outside"
-    )
+    altitude_m: Number | None = number(None, "m", "altitude", gt=0, le=10_000)
+    airspeed_mps: Number | None = number(None, "m/s", "airspeed", gt=0, le=100)
+    heading_deg: Number | None = number(None, "deg", "heading", gt=0, le=180)
+    in_envelope: Flag | None = entry(None, "true: inside the validated envelope at the end; false: outside")
 
 
 class Expect(Section):
     """What must come out for the run to pass; what is left out is not asserted."""
 
-    detected_within_s: Number | None = number(
-        None, unit="s", says="delay from fault to first alarm", ge=0, le=360_000
+    detected_within_s: Number | None = number(None, "s", "delay from fault to first alarm", ge=0, le=360_000)
+    isolated_as: Annotated[str, AfterValidator(nameable)] | None = entry(
+        None, "what the diagnosis must name: a surface, `sensor p` and the like, or unanticipated"
     )
-    isolated_as: Annotated[str, AfterValidator(nameable)] | None = Field(
-        default=None,
-        description="what the diagnosis must name: a surface, `sensor p` and the like, or unanticipated",
+    isolated_type: FaultType | None = entry(None, "the fault type the diagnosis must name")
+    candidate_type: FaultType | None = entry(None, "a fault type that must be named or still be possible")
+    isolated_within_s: Number | None = number(None, "s", "delay from fault to isolation", ge=0, le=360_000)
+    no_false_alarm: Flag | None = entry(None, "true: no alarm without a fault; false: there must be one")
+    no_departure: Flag | None = entry(None, "true: the aircraft is kept; false: it must be lost")
+    pre_fault_rms_deg_s: RmsLimits | None = entry(
+        None, "largest RMS tracking error before the fault, or of a flight without one"
     )
-    isolated_type: FaultType | None = Field(
-        default=None, description="the fault type the diagnosis must name"
-    )
-    candidate_type: FaultType | None = Field(
-        default=None, description="a fault type that must be named or still be possible"
-    )
-    isolated_within_s: Number | None = number(
-        None, unit="s", says="delay from fault to isolation", ge=0, le=360_000
-    )
-    no_false_alarm: Flag | None = Field(
-        default=None, description="true: no alarm without a fault; false: there must be one"
-    )
-    no_departure: Flag | None = Field(
-        default=None, description="true: the aircraft is kept; false: it must be lost"
-    )
-    pre_fault_rms_deg_s: RmsLimits | None = Field(
-        default=None, description="largest RMS tracking error before the fault, or of a flight without one"
-    )
-    post_fault_rms_deg_s: RmsLimits | None = Field(
-        default=None, description="largest RMS tracking error after the fault"
-    )
+    post_fault_rms_deg_s: RmsLimits | None = entry(None, "largest RMS tracking error after the fault")
     altitude_within_m: Number | None = number(
-        None, unit="m", says="largest deviation from the commanded altitude", gt=0, le=10_000
+        None, "m", "largest deviation from the commanded altitude", gt=0, le=10_000
     )
     airspeed_within_mps: Number | None = number(
-        None, unit="m/s", says="largest deviation from the commanded airspeed", gt=0, le=100
+        None, "m/s", "largest deviation from the commanded airspeed", gt=0, le=100
     )
     airspeed_within_limits_mps: Number | None = number(
         None,
-        unit="m/s",
-        says="largest deviation from the commanded airspeed, as limited to what can still be held",
+        "m/s",
+        "largest deviation from the commanded airspeed, as limited to what can still be held",
         gt=0,
         le=100,
     )
     heading_within_deg: Number | None = number(
         None,
-        unit="deg",
-        says="largest deviation from the commanded heading, 30 s after a change of it and later",
+        "deg",
+        "largest deviation from the commanded heading, 30 s after a change of it and later",
         gt=0,
         le=180,
     )
-    stays_in_envelope: Flag | None = Field(
-        default=None, description="true: never outside the validated envelope; false: it must leave it"
+    stays_in_envelope: Flag | None = entry(
+        None, "true: never outside the validated envelope; false: it must leave it"
     )
-    arrives: Arrival | None = Field(
-        default=None,
-        description="how far it is from the commanded profile at its end; a lost aircraft never arrives",
+    arrives: Arrival | None = entry(
+        None, "how far it is from the commanded profile at its end; a lost aircraft never arrives"
     )
 
 
@@ -257,45 +223,40 @@ class Scenario(Section):
 
     model_config = ConfigDict(title="beaver-ftc scenario")
 
-    name: str = Field(
+    name: str = entry(
+        ...,
+        "name of the result folder: letters, digits, - and _",
         pattern=NAME_PATTERN,
         max_length=100,
-        description="name of the result folder: letters, digits, - and _",
         examples=["elevator-partial-loss"],
     )
-    description: str = Field(default="", max_length=2000, description="what the case shows")
-    aircraft: Annotated[str, AfterValidator(known_aircraft)] = Field(
-        default=DEFAULT,
-        max_length=200,
-        description="what flies: a built-in name, or ./FOLDER beside this file",
+    description: str = entry("", "what the case shows", max_length=2000)
+    aircraft: Annotated[str, AfterValidator(known_aircraft)] = entry(
+        DEFAULT, "what flies: a built-in name, or ./FOLDER beside this file", max_length=200
     )
-    duration_s: Number = number(DURATION_S, unit="s", says="length of the flight", gt=0, le=360_000)
-    rate_hz: Number = number(RATE_HZ, unit="Hz", says="frame rate of diagnosis and control", ge=20, le=1000)
-    substeps: Whole = Field(default=1, ge=1, le=50, description="JSBSim frames per such frame")
-    seed: Whole = Field(default=1, ge=0, le=2**63 - 1, description="of everything random in the flight")
-    initial: Annotated[SerializeAsAny[Initial], PlainValidator(given_initial)] = Field(
-        default_factory=default_initial,
-        description="flight condition at the start, trimmed",
-        json_schema_extra=initial_schema,
+    duration_s: Number = number(DURATION_S, "s", "length of the flight", gt=0, le=360_000)
+    rate_hz: Number = number(RATE_HZ, "Hz", "frame rate of diagnosis and control", ge=20, le=1000)
+    substeps: Whole = entry(1, "JSBSim frames per such frame", ge=1, le=50)
+    seed: Whole = entry(1, "of everything random in the flight", ge=0, le=2**63 - 1)
+    initial: Annotated[SerializeAsAny[Initial], PlainValidator(given_initial)] = entry(
+        default_initial, "flight condition at the start, trimmed", json_schema_extra=initial_schema
     )
-    reference: Reference = Field(default_factory=Reference, description="body rates to follow")
-    autopilot: Autopilot | None = Field(
-        default=None, description="the flight path to fly, on top of the reference; left out: no outer loops"
+    reference: Reference = entry(Reference, "body rates to follow")
+    autopilot: Autopilot | None = entry(
+        None, "the flight path to fly, on top of the reference; left out: no outer loops"
     )
-    faults: tuple[Fault, ...] = Field(default=(), max_length=MOST_FAULTS, description="what breaks, and when")
-    uncertainty: Uncertainty = Field(
-        default_factory=Uncertainty, description="how the truth differs from the design model"
+    faults: tuple[Fault, ...] = entry((), "what breaks, and when", max_length=MOST_FAULTS)
+    uncertainty: Uncertainty = entry(Uncertainty, "how the truth differs from the design model")
+    actuators: Actuators = entry(Actuators, "actuator dynamics")
+    sensors: Sensors = entry(Sensors, "measurement errors")
+    environment: Environment = entry(Environment, "wind, turbulence and gusts")
+    fdi: FdiConfig = entry(FdiConfig, "fault detection and isolation")
+    control: ControlConfig = entry(ControlConfig, "the control law")
+    changes: tuple[Change, ...] = entry(
+        (), "law, diagnosis and sensors changed in flight, and when", max_length=1000
     )
-    actuators: Actuators = Field(default_factory=Actuators, description="actuator dynamics")
-    sensors: Sensors = Field(default_factory=Sensors, description="measurement errors")
-    environment: Environment = Field(default_factory=Environment, description="wind, turbulence and gusts")
-    fdi: FdiConfig = Field(default_factory=FdiConfig, description="fault detection and isolation")
-    control: ControlConfig = Field(default_factory=ControlConfig, description="the control law")
-    changes: tuple[Change, ...] = Field(
-        default=(), max_length=1000, description="law, diagnosis and sensors changed in flight, and when"
-    )
-    design_model: DesignModel = Field(default_factory=DesignModel, description="what the designer believes")
-    expect: Expect = Field(default_factory=Expect, description="what must come out")
+    design_model: DesignModel = entry(DesignModel, "what the designer believes")
+    expect: Expect = entry(Expect, "what must come out")
 
     _airframe: Aircraft | None = PrivateAttr(default=None)
 

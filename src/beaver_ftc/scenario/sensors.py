@@ -21,14 +21,12 @@ class _Sensor(Section):
     # Keys of noise, bias and resolution, and their unit in SI.
     si: ClassVar[tuple[str, str, str, float]]
 
-    scale_error: Number = number(0.0, unit="share of 1", says="relative error of the slope", ge=-0.9, le=1)
-    delay_s: Number = number(0.0, unit="s", says="age of the measurement", ge=0, le=1)
+    scale_error: Number = number(0.0, "share of 1", "relative error of the slope", ge=-0.9, le=1)
+    delay_s: Number = number(0.0, "s", "age of the measurement", ge=0, le=1)
     bandwidth_rad_s: Number = number(
-        0.0, unit="rad/s", says="bandwidth of the first-order lag, 0 means none", ge=0, le=100_000
+        0.0, "rad/s", "bandwidth of the first-order lag, 0 means none", ge=0, le=100_000
     )
-    dropout_share: Number = number(
-        0.0, unit="share of 1", says="samples lost, the last one standing in", ge=0, le=0.99
-    )
+    dropout_share: Number = number(0.0, "share of 1", "samples lost, the last one standing in", ge=0, le=0.99)
 
     @property
     def is_ideal(self) -> bool:
@@ -65,7 +63,7 @@ def _reads(suffix: str, unit: str, most: float, si: float = 1.0) -> Callable[[ty
     keys = f"noise_std_{suffix}", f"bias_{suffix}", f"quantum_{suffix}"
     meaning = "standard deviation of a sample", "constant error", "resolution"
     fields: dict[str, Any] = {
-        key: (Number, number(0.0, unit=unit, says=says, ge=least, le=most))
+        key: (Number, number(0.0, unit, says, ge=least, le=most))
         for key, says, least in zip(keys, meaning, (0, -most, 0), strict=True)
     }
 
@@ -101,9 +99,7 @@ class DynamicPressure(_Sensor):
 class AttitudeAngle(FlowVane):
     """Roll, pitch or yaw: a vertical or directional gyro, or integrated rates that drift away."""
 
-    drift_deg_h: Number = number(
-        0.0, unit="deg/h", says="growth of the error from the start on", ge=-3600, le=3600
-    )
+    drift_deg_h: Number = number(0.0, "deg/h", "growth of the error from the start on", ge=-3600, le=3600)
 
     @property
     def drift_rad_s(self) -> float:

@@ -16,9 +16,9 @@ from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import ConfigDict, Field, ValidationInfo, model_validator
+from pydantic import ConfigDict, ValidationInfo, model_validator
 
-from beaver_ftc.documents.base import Number, Section, number, order_conflicts, refuse
+from beaver_ftc.documents.base import Number, Section, entry, number, order_conflicts, refuse
 from beaver_ftc.documents.files import UnreadableError, read_text
 from beaver_ftc.documents.paths import inside
 from beaver_ftc.scenario.airframe import folder_of
@@ -38,15 +38,15 @@ _FORMAT = "comma-separated text with a header line, times in column t_s, rates i
 
 
 def _amplitude() -> Any:
-    return number(unit="deg/s", says="amplitude", ge=-1000, le=1000)
+    return number(..., "deg/s", "amplitude", ge=-1000, le=1000)
 
 
 def _frequency(says: str = "frequency") -> Any:
-    return number(unit="Hz", says=says, gt=0, le=500)
+    return number(..., "Hz", says, gt=0, le=500)
 
 
 def _start() -> Any:
-    return number(0.0, unit="s", says="when it starts", ge=0, le=_LATEST_S)
+    return number(0.0, "s", "when it starts", ge=0, le=_LATEST_S)
 
 
 def _during(tau_s: Samples, length_s: float | None) -> NDArray[np.bool_]:
@@ -59,7 +59,7 @@ class _Window(Section):
     """A signal that is zero outside [start_s, end_s)."""
 
     start_s: Number = _start()
-    end_s: Number | None = number(None, unit="s", says="when it ends; left out: with the flight", gt=0)
+    end_s: Number | None = number(None, "s", "when it ends; left out: with the flight", gt=0)
 
     @model_validator(mode="after")
     def _ends_after_it_starts(self) -> Self:
@@ -76,7 +76,7 @@ class Sine(_Window):
 
     amplitude_deg_s: Number = _amplitude()
     frequency_hz: Number = _frequency()
-    phase_deg: Number = number(0.0, unit="deg", says="phase at start_s", ge=-360, le=360)
+    phase_deg: Number = number(0.0, "deg", "phase at start_s", ge=-360, le=360)
 
     def rate_deg_s(self, t_s: Samples) -> Samples:
         tau_s = t_s - self.start_s
@@ -91,7 +91,7 @@ class Doublet(Section):
 
     amplitude_deg_s: Number = _amplitude()
     start_s: Number = _start()
-    width_s: Number = number(1.0, unit="s", says="length of each of the two pulses", gt=0, le=_LATEST_S)
+    width_s: Number = number(1.0, "s", "length of each of the two pulses", gt=0, le=_LATEST_S)
 
     def rate_deg_s(self, t_s: Samples) -> Samples:
         tau_s = t_s - self.start_s
@@ -114,7 +114,7 @@ class Square(_Window):
 
     amplitude_deg_s: Number = _amplitude()
     frequency_hz: Number = _frequency()
-    phase_deg: Number = number(0.0, unit="deg", says="phase at start_s", ge=-360, le=360)
+    phase_deg: Number = number(0.0, "deg", "phase at start_s", ge=-360, le=360)
 
     def rate_deg_s(self, t_s: Samples) -> Samples:
         tau_s = t_s - self.start_s
@@ -127,7 +127,7 @@ class _Closed(Section):
     """A signal that needs both its ends."""
 
     start_s: Number = _start()
-    end_s: Number = number(unit="s", says="when it ends", gt=0, le=_LATEST_S)
+    end_s: Number = number(..., "s", "when it ends", gt=0, le=_LATEST_S)
 
     @model_validator(mode="after")
     def _ends_after_it_starts(self) -> Self:
@@ -171,17 +171,11 @@ class Csv(Section):
 
     model_config = ConfigDict(json_schema_extra={"required": ["file"]})
 
-    file: str = Field(
-        min_length=1, max_length=200, description="CSV file in the scenario's own folder or below it"
-    )
-    column: str = Field(
-        default="rate_deg_s", min_length=1, max_length=100, description="column to fly, deg/s; time is `t_s`"
-    )
-    time_s: tuple[Number, ...] = Field(
-        min_length=1, max_length=MAX_ROWS, description="read from the file: times, s"
-    )
-    values_deg_s: tuple[Number, ...] = Field(
-        min_length=1, max_length=MAX_ROWS, description="read from the file: rates, deg/s"
+    file: str = entry(..., "CSV file in the scenario's own folder or below it", min_length=1, max_length=200)
+    column: str = entry("rate_deg_s", "column to fly, deg/s; time is `t_s`", min_length=1, max_length=100)
+    time_s: tuple[Number, ...] = entry(..., "read from the file: times, s", min_length=1, max_length=MAX_ROWS)
+    values_deg_s: tuple[Number, ...] = entry(
+        ..., "read from the file: rates, deg/s", min_length=1, max_length=MAX_ROWS
     )
 
     @model_validator(mode="before")
@@ -296,9 +290,9 @@ Signals = tuple[Signal, ...]
 class Reference(Section):
     """What the three body rates shall follow; the signals of an axis are summed, a missing axis is 0."""
 
-    p: Signals = Field(default=(), max_length=50, description="roll rate reference")
-    q: Signals = Field(default=(), max_length=50, description="pitch rate reference")
-    r: Signals = Field(default=(), max_length=50, description="yaw rate reference")
+    p: Signals = entry((), "roll rate reference", max_length=50)
+    q: Signals = entry((), "pitch rate reference", max_length=50)
+    r: Signals = entry((), "yaw rate reference", max_length=50)
 
 
 def sample(reference: Reference, t_s: Samples) -> Samples:

@@ -14,7 +14,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from beaver_ftc.aircraft import Aircraft, load
-from beaver_ftc.documents.base import Conflict, Location, Number, Section, Whole, refuse
+from beaver_ftc.documents.base import Conflict, Location, Number, Section, Whole, entry, refuse
 from beaver_ftc.documents.document import Document, Problem
 from beaver_ftc.documents.keys import UnusableKeyError, parse_key, with_values
 from beaver_ftc.documents.paths import inside
@@ -45,19 +45,15 @@ _DERIVED = {"name": "follows from the sweep's name", "seed": "follows from the s
 class Variation(Section):
     """How one key varies: a mapping of exactly one kind to its parameters."""
 
-    uniform: Span | None = Field(default=None, description="[lowest, highest], all values equally likely")
-    loguniform: Span | None = Field(
-        default=None, description="[lowest, highest], all ratios equally likely, lowest over 0"
+    uniform: Span | None = entry(None, "[lowest, highest], all values equally likely")
+    loguniform: Span | None = entry(None, "[lowest, highest], all ratios equally likely, lowest over 0")
+    normal: Span | None = entry(None, "[mean, standard deviation]")
+    within: Span | None = entry(None, "[lowest, highest] that `normal` is cut to; only with normal")
+    linspace: tuple[Number, Number, Annotated[Whole, Field(ge=1, le=1_000_000)]] | None = entry(
+        None, "[first, last, count], gone through in turn"
     )
-    normal: Span | None = Field(default=None, description="[mean, standard deviation]")
-    within: Span | None = Field(
-        default=None, description="[lowest, highest] that `normal` is cut to; only with normal"
-    )
-    linspace: tuple[Number, Number, Annotated[Whole, Field(ge=1, le=1_000_000)]] | None = Field(
-        default=None, description="[first, last, count], gone through in turn"
-    )
-    choice: tuple[Any, ...] | None = Field(
-        default=None, min_length=1, max_length=100_000, description="a list of values, all equally likely"
+    choice: tuple[Any, ...] | None = entry(
+        None, "a list of values, all equally likely", min_length=1, max_length=100_000
     )
 
     @model_validator(mode="after")
@@ -109,10 +105,10 @@ class Variation(Section):
 class Level(Section):
     """A bound on a number that the flights estimate; with a confidence, on its one-sided confidence bound."""
 
-    at_least: Number | None = Field(default=None, description="smallest value allowed")
-    at_most: Number | None = Field(default=None, description="largest value allowed")
-    confidence: Number | None = Field(
-        default=None, ge=0.5, lt=1, description="left out: the estimate itself is held against the bound"
+    at_least: Number | None = entry(None, "smallest value allowed")
+    at_most: Number | None = entry(None, "largest value allowed")
+    confidence: Number | None = entry(
+        None, "left out: the estimate itself is held against the bound", ge=0.5, lt=1
     )
 
     @model_validator(mode="after")
@@ -125,7 +121,7 @@ class Level(Section):
 class QuantileLevel(Level):
     """A bound on a quantile over the flights."""
 
-    quantile: Number = Field(default=0.95, gt=0, lt=1, description="which quantile, 0.5 is the median")
+    quantile: Number = entry(0.95, "which quantile, 0.5 is the median", gt=0, lt=1)
 
 
 class AxisLevels(Section):
@@ -139,26 +135,23 @@ class AxisLevels(Section):
 class SweepExpect(Section):
     """What the statistics of a sweep must show; what is left out is not asserted."""
 
-    detection_rate: Level | None = Field(default=None, description="share of faults that were detected")
-    isolation_rate: Level | None = Field(default=None, description="share of faults that were named rightly")
-    false_alarms_per_hour: Level | None = Field(default=None, description="per hour without a fault")
-    departure_rate: Level | None = Field(default=None, description="share of flights that lost the aircraft")
-    failure_rate: Level | None = Field(default=None, description="share of flights that could not be flown")
-    pass_rate: Level | None = Field(
-        default=None, description="share of flights that met every expectation of the base scenario"
+    detection_rate: Level | None = entry(None, "share of faults that were detected")
+    isolation_rate: Level | None = entry(None, "share of faults that were named rightly")
+    false_alarms_per_hour: Level | None = entry(None, "per hour without a fault")
+    departure_rate: Level | None = entry(None, "share of flights that lost the aircraft")
+    failure_rate: Level | None = entry(None, "share of flights that could not be flown")
+    pass_rate: Level | None = entry(None, "share of flights that met every expectation of the base scenario")
+    detection_delay_s: QuantileLevel | None = entry(
+        None, "from fault to alarm; a missed fault counts as infinite"
     )
-    detection_delay_s: QuantileLevel | None = Field(
-        default=None, description="from fault to alarm; a missed fault counts as infinite"
+    isolation_delay_s: QuantileLevel | None = entry(
+        None, "from fault to the right name; a fault not named rightly counts as infinite"
     )
-    isolation_delay_s: QuantileLevel | None = Field(
-        default=None, description="from fault to the right name; a fault not named rightly counts as infinite"
+    post_fault_rms_deg_s: AxisLevels | None = entry(
+        None, "RMS tracking error after the fault; a departure counts as infinite"
     )
-    post_fault_rms_deg_s: AxisLevels | None = Field(
-        default=None, description="RMS tracking error after the fault; a departure counts as infinite"
-    )
-    tracking_ratio: AxisLevels | None = Field(
-        default=None,
-        description="RMS error after / before the fault; a departure counts as infinite",
+    tracking_ratio: AxisLevels | None = entry(
+        None, "RMS error after / before the fault; a departure counts as infinite"
     )
 
 
@@ -167,25 +160,21 @@ class SweepFile(Section):
 
     model_config = ConfigDict(title="beaver-ftc sweep")
 
-    name: str = Field(
-        pattern=NAME_PATTERN, max_length=70, description="name of the result folder: letters, digits, - and _"
+    name: str = entry(
+        ..., "name of the result folder: letters, digits, - and _", pattern=NAME_PATTERN, max_length=70
     )
-    description: str = Field(default="", max_length=2000, description="what the sweep is to show")
-    base: str | dict[str, Any] = Field(
-        description="a built-in scenario's name, a scenario file beside this one, or a scenario itself"
+    description: str = entry("", "what the sweep is to show", max_length=2000)
+    base: str | dict[str, Any] = entry(
+        ..., "a built-in scenario's name, a scenario file beside this one, or a scenario itself"
     )
-    set: dict[str, Any] = Field(
-        default_factory=dict, description="dotted keys of the base to new values, the same in all flights"
+    set: dict[str, Any] = entry(dict, "dotted keys of the base to new values, the same in all flights")
+    runs: Whole | None = entry(
+        None, "number of flights; left out: one a point of the grid", ge=1, le=MAX_RUNS
     )
-    runs: Whole | None = Field(
-        default=None, ge=1, le=MAX_RUNS, description="number of flights; left out: one a point of the grid"
-    )
-    seed: Whole = Field(default=1, ge=0, le=2**63 - 1, description="of all values and of each flight's seed")
-    sampling: Sampling = Field(default="random", description="how values are drawn that are not linspace")
-    vary: dict[str, Variation] = Field(
-        default_factory=dict, max_length=200, description="dotted keys of the base to how they vary"
-    )
-    expect: SweepExpect = Field(default_factory=SweepExpect, description="what the statistics must show")
+    seed: Whole = entry(1, "of all values and of each flight's seed", ge=0, le=2**63 - 1)
+    sampling: Sampling = entry("random", "how values are drawn that are not linspace")
+    vary: dict[str, Variation] = entry(dict, "dotted keys of the base to how they vary", max_length=200)
+    expect: SweepExpect = entry(SweepExpect, "what the statistics must show")
 
     @model_validator(mode="after")
     def _parts_fit_together(self) -> Self:

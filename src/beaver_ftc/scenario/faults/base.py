@@ -7,9 +7,9 @@ shown to people. What the diagnosis makes of a type stands in diagnosis/types/ta
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple, Self
 
-from pydantic import Field, model_validator
+from pydantic import model_validator
 
-from beaver_ftc.documents.base import Conflict, Number, Section, number, order_conflicts, refuse
+from beaver_ftc.documents.base import Conflict, Number, Section, entry, number, order_conflicts, refuse
 
 Keys = Mapping[str, Any]  # of a fault in a scenario, beside type, actuator and times
 Properties = dict[str, float]  # failure properties of one surface: plant/faults.py
@@ -38,8 +38,8 @@ class SurfaceFault(Section):
         type: str
         profile: str
 
-    at_s: Number = number(unit="s", says="when the fault starts", ge=0, le=360_000)
-    end_s: Number | None = number(None, unit="s", says="when it is gone; left out: it stays", gt=0)
+    at_s: Number = number(..., "s", "when the fault starts", ge=0, le=360_000)
+    end_s: Number | None = number(None, "s", "when it is gone; left out: it stays", gt=0)
 
     @model_validator(mode="after")
     def _fits_together(self) -> Self:
@@ -58,18 +58,14 @@ class SurfaceFault(Section):
 class Switched(SurfaceFault):
     """A fault that is either there or not: a jam does not grow."""
 
-    profile: Literal["abrupt"] = Field(default="abrupt", description="this type of fault is always abrupt")
+    profile: Literal["abrupt"] = entry("abrupt", "this type of fault is always abrupt")
 
 
 class Gradual(SurfaceFault):
     """A fault with a time profile B(t - at_s): a step, or 1 - exp(-kappa (t - at_s)) [Zhang2005]."""
 
-    profile: Literal["abrupt", "incipient"] = Field(
-        default="abrupt", description="a step, or growing as 1 - exp(-kappa t)"
-    )
-    kappa_per_s: Number | None = number(
-        None, unit="1/s", says="growth rate of an incipient fault", gt=0, le=1000
-    )
+    profile: Literal["abrupt", "incipient"] = entry("abrupt", "a step, or growing as 1 - exp(-kappa t)")
+    kappa_per_s: Number | None = number(None, "1/s", "growth rate of an incipient fault", gt=0, le=1000)
 
     def _conflicts(self) -> list[Conflict]:
         incipient, given = self.profile == "incipient", self.kappa_per_s is not None

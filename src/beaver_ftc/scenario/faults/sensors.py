@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
-from beaver_ftc.documents.base import Conflict, Number, Section, number, order_conflicts, refuse
+from beaver_ftc.documents.base import Conflict, Number, Section, entry, number, order_conflicts, refuse
 from beaver_ftc.documents.errors import suggestion
 from beaver_ftc.scenario.sensors import ALIASES, QUANTITIES, sensor_words, sensors_there
 
@@ -40,7 +40,7 @@ SensorName = Annotated[
     str,
     BeforeValidator(_in_short),
     AfterValidator(_known_sensor),
-    Field(description="the instrument that fails, as in `sensors`", json_schema_extra=_examples),
+    entry(..., "the instrument that fails, as in `sensors`", json_schema_extra=_examples),
 ]
 
 
@@ -48,9 +48,9 @@ class SensorFault(Section):
     """When an instrument is broken."""
 
     sensor: SensorName
-    at_s: Number = number(unit="s", says="when the fault starts", ge=0, le=360_000)
-    end_s: Number | None = number(None, unit="s", says="when it is gone; left out: it stays", gt=0)
-    profile: Literal["abrupt"] = Field(default="abrupt", description="this type of fault is always abrupt")
+    at_s: Number = number(..., "s", "when the fault starts", ge=0, le=360_000)
+    end_s: Number | None = number(None, "s", "when it is gone; left out: it stays", gt=0)
+    profile: Literal["abrupt"] = entry("abrupt", "this type of fault is always abrupt")
 
     @model_validator(mode="before")
     @classmethod
@@ -72,7 +72,7 @@ class SensorBias(SensorFault):
     """The reading is off by a constant."""
 
     type: Literal["bias"]
-    magnitude: Number = number(unit="the sensor's unit", says="added to the reading", ge=-5000, le=5000)
+    magnitude: Number = number(..., "the sensor's unit", "added to the reading", ge=-5000, le=5000)
 
 
 class SensorNoise(SensorFault):
@@ -80,7 +80,7 @@ class SensorNoise(SensorFault):
 
     type: Literal["noise"]
     magnitude: Number = number(
-        unit="the sensor's unit", says="standard deviation added to the reading", gt=0, le=5000
+        ..., "the sensor's unit", "standard deviation added to the reading", gt=0, le=5000
     )
 
 
@@ -89,7 +89,7 @@ class SensorScale(SensorFault):
 
     type: Literal["scale"]
     magnitude: Number = number(
-        unit="share of 1", says="relative error of the reading", ge=-MOST_SCALE, le=MOST_SCALE
+        ..., "share of 1", "relative error of the reading", ge=-MOST_SCALE, le=MOST_SCALE
     )
 
 

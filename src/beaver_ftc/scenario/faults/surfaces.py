@@ -3,9 +3,7 @@
 from math import radians
 from typing import Literal
 
-from pydantic import Field
-
-from beaver_ftc.documents.base import Number, number
+from beaver_ftc.documents.base import Number, entry, number
 from beaver_ftc.scenario.airframe import Actuator
 from beaver_ftc.scenario.faults.base import Button, Gradual, Properties, Switched
 
@@ -18,9 +16,9 @@ class LossOfEffectiveness(Gradual):
     button = Button(1, "lose 40 %", {"magnitude": 0.4})
 
     type: Literal["loss_of_effectiveness"]
-    actuator: Actuator = Field(description="the surface that fails")
+    actuator: Actuator = entry(..., "the surface that fails")
     magnitude: Number = number(
-        unit="share of 1", says="effectiveness lost: 0 healthy, 1 no moment at all", ge=0, le=1
+        ..., "share of 1", "effectiveness lost: 0 healthy, 1 no moment at all", ge=0, le=1
     )
 
     def strike(self, of: Properties, share: float, was_rad: float) -> None:
@@ -35,9 +33,9 @@ class Stuck(Switched):
     button = Button(2, "jam", {})
 
     type: Literal["stuck"]
-    actuator: Actuator = Field(description="the surface that fails")
+    actuator: Actuator = entry(..., "the surface that fails")
     position_deg: Number | None = number(
-        None, unit="deg", says="where it jams; left out: where it happens to be", ge=-90, le=90
+        None, "deg", "where it jams; left out: where it happens to be", ge=-90, le=90
     )
 
     def strike(self, of: Properties, share: float, was_rad: float) -> None:
@@ -54,10 +52,8 @@ class Hardover(Switched):
     button = Button(4, "run away", {"direction": 1})
 
     type: Literal["hardover"]
-    actuator: Actuator = Field(description="the surface that fails")
-    direction: Literal[1, -1] = Field(
-        default=1, description="the stop it runs to: 1 positive, -1 negative deflection"
-    )
+    actuator: Actuator = entry(..., "the surface that fails")
+    direction: Literal[1, -1] = entry(1, "the stop it runs to: 1 positive, -1 negative deflection")
 
     def strike(self, of: Properties, share: float, was_rad: float) -> None:
         of["hardover"] = float(self.direction)
@@ -71,7 +67,7 @@ class Float(Switched):
     button = Button(3, "float", {})
 
     type: Literal["float"]
-    actuator: Actuator = Field(description="the surface that fails")
+    actuator: Actuator = entry(..., "the surface that fails")
 
     def strike(self, of: Properties, share: float, was_rad: float) -> None:
         of["float"] = 1.0
@@ -85,8 +81,8 @@ class Bias(Gradual):
     button = Button(6, "bias", {"bias_deg": 3})
 
     type: Literal["bias"]
-    actuator: Actuator = Field(description="the surface that fails")
-    bias_deg: Number = number(unit="deg", says="added to the actuator's output", ge=-90, le=90)
+    actuator: Actuator = entry(..., "the surface that fails")
+    bias_deg: Number = number(..., "deg", "added to the actuator's output", ge=-90, le=90)
 
     def strike(self, of: Properties, share: float, was_rad: float) -> None:
         of["bias-rad"] += share * radians(self.bias_deg)
@@ -99,8 +95,8 @@ class RateLimit(Gradual):
     button = Button(7, "slow", {"scale": 0.05})
 
     type: Literal["rate_limit"]
-    actuator: Actuator = Field(description="the surface that fails")
-    scale: Number = number(unit="share of 1", says="what is left of the rate limit", ge=0, le=1)
+    actuator: Actuator = entry(..., "the surface that fails")
+    scale: Number = number(..., "share of 1", "what is left of the rate limit", ge=0, le=1)
 
     def strike(self, of: Properties, share: float, was_rad: float) -> None:
         of["rate-scale"] *= 1.0 - share * (1.0 - self.scale)
@@ -118,9 +114,9 @@ class Oscillatory(Gradual):
     button = Button(5, "oscillate", {"amplitude_deg": 3, "frequency_rad_s": 6})
 
     type: Literal["oscillatory"]
-    actuator: Actuator = Field(description="the surface that fails")
-    amplitude_deg: Number = number(unit="deg", says="half of the swing", gt=0, le=90)
-    frequency_rad_s: Number = number(unit="rad/s", says="angular frequency of the swing", gt=0, le=1000)
+    actuator: Actuator = entry(..., "the surface that fails")
+    amplitude_deg: Number = number(..., "deg", "half of the swing", gt=0, le=90)
+    frequency_rad_s: Number = number(..., "rad/s", "angular frequency of the swing", gt=0, le=1000)
 
     def strike(self, of: Properties, share: float, was_rad: float) -> None:
         of["oscillation-amplitude-rad"] = share * radians(self.amplitude_deg)
@@ -131,9 +127,7 @@ class Unanticipated(Gradual):
     """A fault outside the declared class: an extra pitching moment coefficient on alpha^3 [Zhang2005]."""
 
     type: Literal["unanticipated"]
-    Cm_alpha3: Number = number(
-        10.0, unit="1/rad^3", says="extra Cm on alpha^3, published case 10", ge=-1000, le=1000
-    )
+    Cm_alpha3: Number = number(10.0, "1/rad^3", "extra Cm on alpha^3, published case 10", ge=-1000, le=1000)
 
     def strike(self, of: Properties, share: float, was_rad: float) -> None:
         of["Cm-alpha3"] += share * self.Cm_alpha3

@@ -1,7 +1,7 @@
 """What every section of a scenario shares: frozen, strict about its keys, no coercion of values."""
 
-from collections.abc import Sequence
-from typing import Annotated, Any
+from collections.abc import Iterable
+from typing import Annotated, Any, NoReturn
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, Strict
 from pydantic_core import PydanticCustomError
@@ -37,10 +37,15 @@ def number(default: Any, unit: str, says: str, **limits: Any) -> Any:
     return entry(default, f"{says}, {unit}", json_schema_extra={"unit": unit}, **limits)
 
 
-def refuse(conflicts: Sequence[Conflict]) -> None:
+def refuse(conflicts: Iterable[Conflict]) -> None:
     """Raise if values that are each fine contradict one another; every conflict keeps its own location."""
-    if conflicts:
-        raise PydanticCustomError("conflict", "contradictory values", {"conflicts": list(conflicts)})
+    if found := list(conflicts):
+        raise PydanticCustomError("conflict", "contradictory values", {"conflicts": found})
+
+
+def deny(says: str, *at: int | str) -> NoReturn:
+    """Raise what is wrong with a value, or with what is below it at these keys."""
+    raise PydanticCustomError("conflict", "contradictory values", {"conflicts": [(at, says)]})
 
 
 def order_conflicts(start_s: float, end_s: float | None, start_key: str) -> list[Conflict]:

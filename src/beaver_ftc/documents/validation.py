@@ -131,7 +131,7 @@ def validate(
     document: Document,
     source: str,
     folder: Path | None = None,
-    conflicts_in: Callable[[dict[str, Any]], list[Conflict]] = lambda data: [],
+    conflicts_in: Callable[[dict[str, Any]], Iterable[Conflict]] = lambda data: (),
 ) -> _Model:
     """The document's data as a model. Raises ScenarioError with all mistakes, duplicate keys included.
 

@@ -2,12 +2,12 @@
 
 from typing import Any, Self
 
-from pydantic import ConfigDict, GetJsonSchemaHandler, model_validator
+from pydantic import GetJsonSchemaHandler, model_validator
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
 from beaver_ftc.aircraft import load
-from beaver_ftc.documents.base import Number, Section, number, refuse
+from beaver_ftc.documents.base import Number, Section, deny, number, refuse
 from beaver_ftc.documents.errors import suggestion
 from beaver_ftc.scenario.airframe import checked_aircraft
 
@@ -26,9 +26,7 @@ class ActuatorDynamics(Section):
     @model_validator(mode="after")
     def _stops_are_in_order(self) -> Self:
         if self.travel_deg is not None and not -90 <= self.travel_deg[0] < self.travel_deg[1] <= 90:
-            refuse(
-                [(("travel_deg",), "stops out of order or range, allowed: [lower, upper] from -90 to 90 deg")]
-            )
+            deny("stops out of order or range, allowed: [lower, upper] from -90 to 90 deg", "travel_deg")
         return self
 
     @property
@@ -43,10 +41,9 @@ PRESETS: dict[str, dict[str, float]] = {
 }
 
 
-class Actuators(Section):
+class Actuators(Section, extra="allow"):
     """One set of dynamics a surface; a preset's name, or numbers beside the surfaces, stand for all."""
 
-    model_config = ConfigDict(extra="allow")
     __pydantic_extra__: dict[str, ActuatorDynamics]
 
     @model_validator(mode="before")

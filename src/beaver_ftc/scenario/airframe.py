@@ -1,6 +1,6 @@
 """The aircraft of a scenario, found by what the scenario calls it, and the names that are its own."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
@@ -10,7 +10,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo
 
 from beaver_ftc.aircraft import DEFAULT, Aircraft, load
 from beaver_ftc.aircraft.loading import BESIDE, NotDerived, UnknownAircraft
-from beaver_ftc.documents.base import Number, refuse
+from beaver_ftc.documents.base import Number, deny
 from beaver_ftc.documents.errors import BeaverFtcError, suggestion
 from beaver_ftc.plugins import first_use
 
@@ -70,37 +70,44 @@ def known_aircraft(reference: str, info: ValidationInfo) -> str:
     try:
         aircraft_called(reference, folder_of(info))
     except UnknownAircraft as error:
-        refuse([((), str(error))])
+        deny(str(error))
     return reference
 
 
-def _known_surface(name: str) -> str:
-    surfaces = checked_aircraft().surfaces
-    if name not in surfaces:
-        refuse([((), f"{name[:100]!r} is not known{suggestion(name, surfaces)}")])
-    return name
+def named(wrong: Callable[[str], str | None]) -> AfterValidator:
+    """Refuse names of which something is wrong."""
+
+    def check(name: str) -> str:
+        if says := wrong(name):
+            deny(says)
+        return name
+
+    return AfterValidator(check)
+
+
+def among(known: Callable[[], Iterable[str]], says: str = "{!r} is not known") -> AfterValidator:
+    """Refuse names that are not among those known. says: what such a name is."""
+
+    def wrong(name: str) -> str | None:
+        names = tuple(known())
+        return None if name in names else f"{says.format(name[:100])}{suggestion(name, names)}"
+
+    return named(wrong)
 
 
 def _examples(schema: dict[str, Any]) -> None:
     schema["examples"] = list(load().surfaces)
 
 
-def _known_term(name: str) -> str:
-    known = checked_aircraft().terms
-    if name not in known:
-        refuse([((), f"unknown aerodynamic term{suggestion(name, known)}")])
-    return name
-
-
 def _no_more_than_there_are(given: Any) -> Any:
     """Refuse a mapping that cannot be right before a suggestion is made for each of its names."""
     most = len(checked_aircraft().terms)
     if isinstance(given, dict) and len(given) > most:
-        refuse([((), f"{len(given)} terms, allowed: at most the {most} there are")])
+        deny(f"{len(given)} terms, allowed: at most the {most} there are")
     return given
 
 
-Actuator = Annotated[str, AfterValidator(_known_surface), Field(json_schema_extra=_examples)]
-TermName = Annotated[str, AfterValidator(_known_term)]
+Actuator = Annotated[str, among(lambda: checked_aircraft().surfaces), Field(json_schema_extra=_examples)]
+TermName = Annotated[str, among(lambda: checked_aircraft().terms, "unknown aerodynamic term")]
 Ratio = Annotated[Number, Field(ge=-10, le=10)]
 Ratios = Annotated[dict[TermName, Ratio], BeforeValidator(_no_more_than_there_are)]

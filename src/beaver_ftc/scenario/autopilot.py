@@ -5,7 +5,7 @@ from typing import Any, Self
 
 from pydantic import model_validator
 
-from beaver_ftc.documents.base import Conflict, Flag, Number, Section, entry, number, refuse
+from beaver_ftc.documents.base import Conflict, Flag, Number, Section, deny, entry, number, refuse
 from beaver_ftc.scenario.airframe import checked_aircraft
 
 MAX_LEGS = 100
@@ -23,9 +23,9 @@ class _Leg(Section):
     @model_validator(mode="after")
     def _either_hold_or_value(self) -> Self:
         if self.hold and self.value is not None:
-            refuse([(("hold",), "contradicts value, allowed: one of the two")])
+            deny("contradicts value, allowed: one of the two", "hold")
         if not self.hold and self.value is None:
-            refuse([(("value",), "required key is missing, allowed: value, or hold: true")])
+            deny("required key is missing, allowed: value, or hold: true", "value")
         return self
 
 

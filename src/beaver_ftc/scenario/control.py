@@ -1,25 +1,20 @@
 """What a scenario may say about the control law (`control:`), with defaults and their reasons."""
 
+from functools import partial
 from typing import Annotated, Self
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, model_validator
+from pydantic import model_validator
 
-from beaver_ftc.documents.base import entry, refuse
+from beaver_ftc.documents.base import Section, deny, entry
 from beaver_ftc.plugins import LAWS, refusal
+from beaver_ftc.scenario.airframe import named
+
+Law = Annotated[str, named(partial(refusal, LAWS))]
 
 
-def known_law(name: str) -> str:
-    """A law there is, or a refusal."""
-    wrong = refusal(LAWS, name)
-    refuse([((), wrong)] if wrong else [])
-    return name
-
-
-class EnginePower(BaseModel):
+class EnginePower(Section, strict=True):
     """Engine power on pitch, once neither elevator nor flap acts on it; with the fault-tolerant law and
     fault_class: all, and with the oracle. docs/fault-types.md has the design."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, strict=True)
 
     enabled: bool = entry(True, "false: the engine stays as trimmed, whatever is lost")
     speed_gain_inhg_per_mps: float = entry(
@@ -47,17 +42,15 @@ class EnginePower(BaseModel):
 
     @model_validator(mode="after")
     def _a_range(self) -> Self:
-        says = f"below lowest_inhg, allowed: {self.lowest_inhg:g} inHg or more"
-        refuse([(("highest_inhg",), says)] if self.highest_inhg < self.lowest_inhg else [])
+        if self.highest_inhg < self.lowest_inhg:
+            deny(f"below lowest_inhg, allowed: {self.lowest_inhg:g} inHg or more", "highest_inhg")
         return self
 
 
-class ControlConfig(BaseModel):
+class ControlConfig(Section, strict=True):
     """The law and its gains. All have defaults; the paper prints none of them."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, strict=True)
-
-    law: Annotated[str, AfterValidator(known_law)] = entry(
+    law: Law = entry(
         "fault-tolerant",
         "a registered law, `beaver-ftc list laws` names them, e.g. nominal, adaptive, oracle",
     )

@@ -1,28 +1,28 @@
 """What a scenario may say about the diagnosis (`fdi:`), with defaults and their reasons."""
 
+from functools import partial
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, Strict, field_validator, model_validator
+from pydantic import AfterValidator, Field, Strict, field_validator, model_validator
 
-from beaver_ftc.documents.base import entry, refuse
+from beaver_ftc.documents.base import Section, deny, entry, refuse
 from beaver_ftc.documents.errors import suggestion
 from beaver_ftc.plugins import DETECTORS, refusal
-from beaver_ftc.scenario.airframe import checked_aircraft
+from beaver_ftc.scenario.airframe import checked_aircraft, named
 from beaver_ftc.scenario.sensors import Sensors
 
 MAX_POLES = 6  # of the bank of detection filters, the published one included
 DEADBEAT_PER_S = 1e6  # a pole at which exp(-lam dt) is 0: the filter keeps nothing but the last frame
 
+Scheme = Annotated[str, named(partial(refusal, DETECTORS))]
 Bound = Annotated[float, Field(ge=0, le=100)]
 Share = Annotated[float, Field(ge=0, le=0.9)]
 Deflection = Annotated[float, Field(ge=0, le=30)]
 Pole = Annotated[float, Field(gt=0, le=DEADBEAT_PER_S)]
 
 
-class PerAxis(BaseModel):
+class PerAxis(Section, strict=True):
     """One non-negative number for each of p, q and r."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, strict=True)
 
     p: Bound = 0.0
     q: Bound = 0.0
@@ -33,24 +33,18 @@ class PerAxis(BaseModel):
         return self.p, self.q, self.r
 
 
-def known_scheme(name: str) -> str:
-    """A detector there is, or a refusal."""
-    wrong = refusal(DETECTORS, name)
-    refuse([((), wrong)] if wrong else [])
-    return name
-
-
-def can_be_bounded(given: Sensors) -> Sensors:
+def _can_be_bounded(given: Sensors) -> Sensors:
     """Errors that have a bound, or a refusal."""
     loose = [name for name, sensor in given if not sensor.is_bounded]
     refuse([((name,), "a lag, a delay or a lost sample has no bound, allowed: 0") for name in loose])
     return given
 
 
-class Bounds(BaseModel):
-    """What uncertainty the diagnosis admits; thresholds follow from it [Zhang2005, sec. VII]."""
+BoundedSensors = Annotated[Sensors, AfterValidator(_can_be_bounded)]
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, strict=True)
+
+class Bounds(Section, strict=True):
+    """What uncertainty the diagnosis admits; thresholds follow from it [Zhang2005, sec. VII]."""
 
     inertia_coupling: PerAxis = entry(
         PerAxis(p=0.25, q=0.25, r=0.25), "relative error of Pqr, Qpr, Rpq: as published"
@@ -62,7 +56,7 @@ class Bounds(BaseModel):
         0.0, "tolerance of the moment coefficients as a share: of all, or by name"
     )
     inertia: Share = entry(0.0, "tolerance of Ix, Iy, Iz and Jxz as a share of each")
-    sensors: Sensors = entry(
+    sensors: BoundedSensors = entry(
         Sensors,
         "measurement errors, as those of the truth: a preset, or noise, bias, resolution, slope by signal",
     )
@@ -79,16 +73,9 @@ class Bounds(BaseModel):
         refuse([((name,), f"unknown moment coefficient{suggestion(name, known)}") for name in unknown])
         return given
 
-    @field_validator("sensors")
-    @classmethod
-    def _can_be_bounded(cls, given: Sensors) -> Sensors:
-        return can_be_bounded(given)
 
-
-class Statistical(BaseModel):
+class Statistical(Section, strict=True):
     """Likelihood ratio tests beside the worst-case thresholds; levels follow from the rates declared here."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     false_alarms_per_h: float = entry(
         1e-3, "at most so many false alarms per flight hour under the noise declared", gt=0, le=3600
@@ -101,24 +88,20 @@ class Statistical(BaseModel):
     )
 
 
-class Probing(BaseModel):
+class Probing(Section):
     """A small movement of the flap, met by the elevator, to learn which of the two is at fault.
 
     If both follow, nothing is felt. It begins when the pitch axis is at fault and neither is named once a
     slow oscillation would have shown, and ends when one is.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
-
     amplitude_deg: float = entry(3.0, "greatest flap deflection, downwards, deg", gt=0, le=10)
     frequency_hz: float = entry(0.5, "movements a second, Hz", gt=0, le=5)
     duration_s: float = entry(4.0, "at most so long, s", gt=0, le=60)
 
 
-class Sharpen(BaseModel):
+class Sharpen(Section, strict=True):
     """Margin the published scheme gives away; each step loses no guarantee (docs/theory.md, section 3)."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
 
     pole_bank: bool = entry(True, "alarm on the first of several filters: `fdi.pole_bank_per_s`")
     memory: bool = entry(True, "hold each fault against the whole flight, not only what follows the alarm")
@@ -139,12 +122,10 @@ class Sharpen(BaseModel):
         return one_by_one | {"anyOf": [{"enum": ["all", "none"]}, {"type": one_by_one.pop("type")}]}
 
 
-class FdiConfig(BaseModel):
+class FdiConfig(Section, strict=True):
     """Gains, bounds and the choice of scheme. All have defaults."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, strict=True)
-
-    scheme: Annotated[str, AfterValidator(known_scheme)] = entry(
+    scheme: Scheme = entry(
         "adaptive-estimators",
         "a registered detector, `beaver-ftc list schemes` names them; none: nobody diagnoses",
     )
@@ -218,21 +199,11 @@ class FdiConfig(BaseModel):
         return self.authority != "worst-case" and self.fault_class == "all" and not self.pairs
 
     @model_validator(mode="after")
-    def _pairs_of_what(self) -> "FdiConfig":
-        wrong = self.pairs and self.fault_class != "all"
-        refuse(
-            [(("pairs",), "pairs of the published class are not known, allowed: true with fault_class: all")]
-            if wrong
-            else []
-        )
-        return self
-
-    @model_validator(mode="after")
-    def _nobody_in_charge(self) -> Self:
+    def _fits_together(self) -> Self:
+        if self.pairs and self.fault_class != "all":
+            deny("pairs of the published class are not known, allowed: true with fault_class: all", "pairs")
         if self.authority == "statistical" and self.statistical is None:
-            refuse(
-                [(("authority",), "statistical wants fdi.statistical, e.g. {}, allowed: either, worst-case")]
-            )
+            deny("statistical wants fdi.statistical, e.g. {}, allowed: either, worst-case", "authority")
         return self
 
     @model_validator(mode="before")

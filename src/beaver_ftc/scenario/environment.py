@@ -1,11 +1,12 @@
 """What a scenario may say of the air (`environment:`): steady wind, turbulence, gusts."""
 
+from collections.abc import Iterator
 from itertools import pairwise
 from typing import Annotated, Any, Literal, Self, get_args
 
 from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
 
-from beaver_ftc.documents.base import Conflict, Number, Section, entry, number, refuse
+from beaver_ftc.documents.base import Conflict, Number, Section, deny, entry, number, refuse
 
 MAX_GUSTS = 100
 Wind = Annotated[Number, Field(ge=-100, le=100)]
@@ -41,8 +42,7 @@ Severity = Literal["light", "moderate", "severe"]
 def _no_severity(given: Any) -> Any:
     """`turbulence: moderate` is what many write; say where that belongs."""
     if given in get_args(Severity):
-        says = f"{given!r} is a severity, allowed: none, or turbulence: dryden with severity: {given}"
-        refuse([((), says)])
+        deny(f"{given!r} is a severity, allowed: none, or turbulence: dryden with severity: {given}")
     return given
 
 
@@ -73,27 +73,18 @@ class Environment(Section):
         return (self.gust,) if isinstance(self.gust, Gust) else self.gust
 
     @model_validator(mode="after")
-    def _severity_belongs_to_turbulence(self) -> Self:
+    def _fits_together(self) -> Self:
         turbulent = self.turbulence != "none"
         if turbulent and self.severity is None:
-            refuse([(("severity",), "required key is missing, allowed: light, moderate, severe")])
+            deny("required key is missing, allowed: light, moderate, severe", "severity")
         if self.severity is not None and not turbulent:
-            refuse([(("severity",), "has no meaning here, allowed: only with turbulence: dryden")])
+            deny("has no meaning here, allowed: only with turbulence: dryden", "severity")
+        refuse(self._overlapping())
         return self
 
-    @model_validator(mode="after")
-    def _one_gust_at_a_time(self) -> Self:
-        refuse(_overlapping(self.gusts))
-        return self
-
-
-def _overlapping(gusts: tuple[Gust, ...]) -> list[Conflict]:
-    """JSBSim flies one gust at a time."""
-    return [
-        (
-            ("gust", i, "at_s"),
-            f"{late.at_s:g} is before the gust before it has faded, allowed: {early.end_s:g} s or later",
-        )
-        for i, (early, late) in enumerate(pairwise(gusts), start=1)
-        if late.at_s < early.end_s
-    ]
+    def _overlapping(self) -> Iterator[Conflict]:
+        """JSBSim flies one gust at a time."""
+        for i, (early, late) in enumerate(pairwise(self.gusts), start=1):
+            if late.at_s < early.end_s:
+                allowed = f"allowed: {early.end_s:g} s or later"
+                yield ("gust", i, "at_s"), f"{late.at_s:g} is before the gust before it has faded, {allowed}"

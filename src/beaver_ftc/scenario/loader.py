@@ -11,7 +11,7 @@ from beaver_ftc.documents.keys import plain
 from beaver_ftc.documents.paths import data_root
 from beaver_ftc.documents.problems import ScenarioError
 from beaver_ftc.documents.validation import parse_document, text_of, validate
-from beaver_ftc.scenario.consistency import conflicts_in_data
+from beaver_ftc.scenario.consistency import conflicts
 from beaver_ftc.scenario.schema import Scenario
 
 MAX_BYTES = 4_000_000
@@ -58,7 +58,7 @@ def is_of_a_sweep(data: dict[str, Any]) -> bool:
 
 def validate_scenario(document: Document, source: str = "", folder: Path | None = None) -> Scenario:
     """The scenario in a document; without a source its error lines begin with the key."""
-    return validate(Scenario, document, source, folder, conflicts_in_data)
+    return validate(Scenario, document, source, folder, conflicts)
 
 
 def read_file(path: Path, given: str, kind: str = "scenario") -> str:

@@ -6,7 +6,6 @@ from typing import Annotated, Any, Self
 
 from pydantic import (
     AfterValidator,
-    ConfigDict,
     Field,
     ModelWrapValidatorHandler,
     PlainValidator,
@@ -17,7 +16,7 @@ from pydantic import (
 )
 
 from beaver_ftc.aircraft import DEFAULT, Aircraft, UnknownAircraft, load
-from beaver_ftc.documents.base import Flag, Number, Section, Whole, entry, number, refuse
+from beaver_ftc.documents.base import Flag, Number, Section, Whole, deny, entry, number, refuse
 from beaver_ftc.documents.document import Document
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.documents.keys import UnusableKeyError, parse_key, plain, with_values
@@ -33,18 +32,11 @@ from beaver_ftc.scenario.airframe import (
     known_aircraft,
 )
 from beaver_ftc.scenario.autopilot import Autopilot
-from beaver_ftc.scenario.consistency import (
-    DURATION_S,
-    RATE_HZ,
-    Outline,
-    conflicts,
-    conflicts_in_data,
-    keys_expected,
-)
-from beaver_ftc.scenario.control import ControlConfig, known_law
-from beaver_ftc.scenario.diagnosis import FdiConfig, can_be_bounded, known_scheme
+from beaver_ftc.scenario.consistency import DURATION_S, RATE_HZ, conflicts
+from beaver_ftc.scenario.control import ControlConfig, Law
+from beaver_ftc.scenario.diagnosis import BoundedSensors, FdiConfig, Scheme
 from beaver_ftc.scenario.environment import Environment
-from beaver_ftc.scenario.faults import MOST_FAULTS, Fault, FaultType, nameable
+from beaver_ftc.scenario.faults import MOST_FAULTS, Fault, FaultType, Nameable
 from beaver_ftc.scenario.initial import Initial, default_initial, given_initial, initial_schema
 from beaver_ftc.scenario.sensors import Sensors
 from beaver_ftc.scenario.signals import Reference
@@ -138,22 +130,16 @@ class Change(Section):
     """From a time on another law, another diagnosis, other sensors; what is left out stays as it is."""
 
     at_s: Number = number(..., "s", "from when on", gt=0, le=360_000)
-    law: Annotated[str, AfterValidator(known_law)] | None = entry(
-        None, "as control.law; surfaces and reference go on from where they are"
-    )
-    scheme: Annotated[str, AfterValidator(known_scheme)] | None = entry(
-        None, "as fdi.scheme; the diagnosis begins anew"
-    )
+    law: Law | None = entry(None, "as control.law; surfaces and reference go on from where they are")
+    scheme: Scheme | None = entry(None, "as fdi.scheme; the diagnosis begins anew")
     sensors: Sensors | None = entry(None, "as sensors: a preset, or errors by signal")
-    declared_sensors: Annotated[Sensors, AfterValidator(can_be_bounded)] | None = entry(
-        None, "as fdi.bounds.sensors; the diagnosis begins anew"
-    )
+    declared_sensors: BoundedSensors | None = entry(None, "as fdi.bounds.sensors; the diagnosis begins anew")
 
     @model_validator(mode="after")
     def _changes_something(self) -> Self:
         said = (value for key, value in self if key != "at_s")
         if all(value is None for value in said):
-            refuse([((), "says no change, allowed: law, scheme, sensors or declared_sensors")])
+            deny("says no change, allowed: law, scheme, sensors or declared_sensors")
         return self
 
 
@@ -178,7 +164,7 @@ class Expect(Section):
     """What must come out for the run to pass; what is left out is not asserted."""
 
     detected_within_s: Number | None = number(None, "s", "delay from fault to first alarm", ge=0, le=360_000)
-    isolated_as: Annotated[str, AfterValidator(nameable)] | None = entry(
+    isolated_as: Nameable | None = entry(
         None, "what the diagnosis must name: a surface, `sensor p` and the like, or unanticipated"
     )
     isolated_type: FaultType | None = entry(None, "the fault type the diagnosis must name")
@@ -218,10 +204,8 @@ class Expect(Section):
     )
 
 
-class Scenario(Section):
+class Scenario(Section, title="beaver-ftc scenario"):
     """One flight: what flies, what it shall do, what breaks, who diagnoses and controls, what is expected."""
-
-    model_config = ConfigDict(title="beaver-ftc scenario")
 
     name: str = entry(
         ...,
@@ -285,15 +269,9 @@ class Scenario(Section):
 
     @model_validator(mode="after")
     def _parts_fit_together(self) -> Self:
-        refuse(conflicts(self._outline()))
+        flown = dict(self.autopilot or {})
+        refuse(conflicts({**dict(self), "autopilot": flown, "expect": self.expect.model_dump()}))
         return self
-
-    def _outline(self) -> Outline:
-        expected = keys_expected(self.expect.model_dump())
-        flown = self.autopilot.channels if self.autopilot else ()
-        starts_s = tuple(fault.at_s for fault in self.faults)
-        changes_s = tuple(change.at_s for change in self.changes)
-        return Outline(self.duration_s, self.rate_hz, starts_s, expected, flown, changes_s)
 
     def with_(self, changes: Mapping[str, Any]) -> Self:
         """This scenario with new values at dotted keys, e.g. `{"faults[0].magnitude": 0.2}`.
@@ -309,7 +287,7 @@ class Scenario(Section):
             except UnusableKeyError as error:
                 raise BadInput(f"{key}: {str(error).replace('the base', 'the scenario')}") from None
         with checked_against(self.airframe, self.aircraft):
-            return validate(type(self), Document(data), "", Path(), conflicts_in_data)
+            return validate(type(self), Document(data), "", Path(), conflicts)
 
     def warnings(self) -> tuple[str, ...]:
         """What is allowed and yet deserves a word: one line each, `key.path: what`."""

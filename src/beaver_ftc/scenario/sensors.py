@@ -5,6 +5,7 @@ What is left out of `sensors` is measured perfectly.
 
 from collections.abc import Callable
 from math import hypot, radians, sqrt
+from pathlib import Path
 from typing import Any, ClassVar, NamedTuple, Self, TypeVar
 
 from pydantic import Field, GetJsonSchemaHandler, create_model, model_validator
@@ -12,6 +13,7 @@ from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
 from beaver_ftc.documents.base import Number, Section, number
+from beaver_ftc.documents.document import parse
 from beaver_ftc.scenario.airframe import checked_aircraft
 
 
@@ -152,38 +154,8 @@ ENGINE = ("engine_rpm", "manifold_pressure")  # instruments of an engine like th
 ACCELEROMETERS = ("ax", "ay", "az")
 
 
-def _grade(gyro: dict, vane: dict, V: dict, attitude: dict, force: dict, **others: dict) -> dict[str, dict]:
-    """The same gyro and accelerometer on every axis, the same vane twice, three angles alike."""
-    alike = {"pqr": gyro, ("alpha", "beta"): vane, ("phi", "theta", "psi"): attitude, ACCELEROMETERS: force}
-    return {name: errors for names, errors in alike.items() for name in names} | {"V": V, **others}
-
-
-# Each number's source is in docs/robustness.md, section 1; noise is that of a sample at 100 Hz.
-PRESETS: dict[str, dict[str, dict[str, float]]] = {
-    "ideal": {},
-    "tactical-grade": _grade(
-        {"noise_std_deg_s": 0.0208, "bias_deg_s": 0.00028, "scale_error": 0.00015},
-        {"noise_std_deg": 0.025, "bias_deg": 0.1},
-        {"noise_std_mps": 0.05, "bias_mps": 0.2},
-        {"noise_std_deg": 0.005, "bias_deg": 0.2, "drift_deg_h": 1.0},
-        {"noise_std_mps2": 0.0033, "bias_mps2": 0.0098, "scale_error": 0.0003},
-        qdyn={"noise_std_pa": 2.0, "bias_pa": 5.0},
-        altitude={"noise_std_m": 0.2, "bias_m": 3.0},
-        engine_rpm={"noise_std_rpm": 1.0, "bias_rpm": 2.0},
-        manifold_pressure={"noise_std_inhg": 0.01, "bias_inhg": 0.03},
-    ),
-    "consumer-grade": _grade(
-        {"noise_std_deg_s": 0.1, "bias_deg_s": 0.5, "scale_error": 0.03, "quantum_deg_s": 0.0153},
-        {"noise_std_deg": 0.043, "bias_deg": 0.5, "quantum_deg": 0.088},
-        {"noise_std_mps": 0.1, "bias_mps": 0.4},
-        {"noise_std_deg": 0.05, "bias_deg": 1.0},
-        {"noise_std_mps2": 0.035, "bias_mps2": 0.59, "scale_error": 0.03, "quantum_mps2": 0.0012},
-        qdyn={"noise_std_pa": 3.0, "bias_pa": 17.0},
-        altitude={"noise_std_m": 0.5, "bias_m": 5.0},
-        engine_rpm={"noise_std_rpm": 5.0, "bias_rpm": 10.0},
-        manifold_pressure={"noise_std_inhg": 0.05, "bias_inhg": 0.1},
-    ),
-}
+_FILE = Path(__file__).with_name("presets.yaml")
+PRESETS: dict[str, dict[str, dict[str, float]]] = parse(_FILE.read_text(encoding="utf-8")).data
 
 
 class Sensors(Section):

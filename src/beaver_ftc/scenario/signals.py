@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ConfigDict, ValidationInfo, model_validator
 
-from beaver_ftc.documents.base import Number, Section, entry, number, order_conflicts, refuse
+from beaver_ftc.documents.base import Number, Section, deny, entry, number, order_conflicts, refuse
 from beaver_ftc.documents.files import UnreadableError, read_text
 from beaver_ftc.documents.paths import inside
 from beaver_ftc.scenario.airframe import folder_of
@@ -71,12 +71,16 @@ class _Window(Section):
         return None if self.end_s is None else self.end_s - self.start_s
 
 
-class Sine(_Window):
-    """amplitude sin(2 pi frequency tau + phase)."""
+class _Wave(_Window):
+    """A signal that comes again."""
 
     amplitude_deg_s: Number = _amplitude()
     frequency_hz: Number = _frequency()
     phase_deg: Number = number(0.0, "deg", "phase at start_s", ge=-360, le=360)
+
+
+class Sine(_Wave):
+    """amplitude sin(2 pi frequency tau + phase)."""
 
     def rate_deg_s(self, t_s: Samples) -> Samples:
         tau_s = t_s - self.start_s
@@ -109,12 +113,8 @@ class Step(_Window):
         return np.where(_during(t_s - self.start_s, self.length_s), self.amplitude_deg_s, 0.0)
 
 
-class Square(_Window):
+class Square(_Wave):
     """+amplitude in the first half of each period, -amplitude in the second; phase shifts it as in `sine`."""
-
-    amplitude_deg_s: Number = _amplitude()
-    frequency_hz: Number = _frequency()
-    phase_deg: Number = number(0.0, "deg", "phase at start_s", ge=-360, le=360)
 
     def rate_deg_s(self, t_s: Samples) -> Samples:
         tau_s = t_s - self.start_s
@@ -123,16 +123,10 @@ class Square(_Window):
         return np.where(_during(tau_s, self.length_s), wave, 0.0)
 
 
-class _Closed(Section):
+class _Closed(_Window):
     """A signal that needs both its ends."""
 
-    start_s: Number = _start()
     end_s: Number = number(..., "s", "when it ends", gt=0, le=_LATEST_S)
-
-    @model_validator(mode="after")
-    def _ends_after_it_starts(self) -> Self:
-        refuse(order_conflicts(self.start_s, self.end_s, "start_s"))
-        return self
 
     @property
     def length_s(self) -> float:
@@ -202,23 +196,18 @@ def _read_column(file: Any, column: Any, folder: Path | None) -> dict[str, list[
         return {"time_s": [0.0], "values_deg_s": [0.0]}
     path = _inside(folder, file)
     try:
-        lines = read_text(path, _MAX_BYTES).splitlines()
-        return _parse(lines, column)
+        return _parse(read_text(path, _MAX_BYTES).splitlines(), column)
     except UnreadableError as error:
-        refuse([(("file",), f"{file!r} line {error.line}: {error}")])
-    raise AssertionError("refuse always raises here")
+        deny(f"{file!r} line {error.line}: {error}", "file")
 
 
 def _inside(folder: Path | None, file: str) -> Path:
     """The file's path, resolved, if it is in the folder or below it: a scenario reads nothing else."""
-    path = None
     if folder is None:
-        says = "there is no folder to read it from, allowed: csv in a scenario that is a file itself"
-    else:
-        path = inside(folder, file)
-        says = f"{file!r} is outside, allowed: a file in the scenario's own folder or below it"
-    refuse([(("file",), says)] if path is None else [])
-    assert path is not None
+        deny("there is no folder to read it from, allowed: csv in a scenario that is a file itself", "file")
+    path = inside(folder, file)
+    if path is None:
+        deny(f"{file!r} is outside, allowed: a file in the scenario's own folder or below it", "file")
     return path
 
 
@@ -250,11 +239,11 @@ def _row(line: str, number: int, columns: tuple[int, int]) -> tuple[float, float
 def check_table(time_s: Sequence[float], values_deg_s: Sequence[float]) -> None:
     """Refuse columns of different length, times that do not increase, values that no aircraft flies."""
     if len(time_s) != len(values_deg_s):
-        refuse([((), f"{len(time_s)} times but {len(values_deg_s)} values, allowed: as many of each")])
+        deny(f"{len(time_s)} times but {len(values_deg_s)} values, allowed: as many of each")
     if not all(a < b for a, b in pairwise(time_s)) or time_s[0] < 0 or time_s[-1] > _LATEST_S:
-        refuse([((), f"times do not increase from 0, allowed: strictly increasing, 0 to {_LATEST_S:g} s")])
+        deny(f"times do not increase from 0, allowed: strictly increasing, 0 to {_LATEST_S:g} s")
     if max(map(abs, values_deg_s)) > _LARGEST_DEG_S:
-        refuse([((), f"rates out of range, allowed: -{_LARGEST_DEG_S:g} to {_LARGEST_DEG_S:g} deg/s")])
+        deny(f"rates out of range, allowed: -{_LARGEST_DEG_S:g} to {_LARGEST_DEG_S:g} deg/s")
 
 
 class Signal(Section):
@@ -272,16 +261,16 @@ class Signal(Section):
 
     @model_validator(mode="after")
     def _exactly_one_kind(self) -> Self:
-        given = [kind for kind in type(self).model_fields if getattr(self, kind) is not None]
-        if len(given) != 1:
+        given = sum(shape is not None for _, shape in self)
+        if given != 1:
             allowed = ", ".join(type(self).model_fields)
-            refuse([((), f"{len(given)} kinds in one list item, allowed: exactly one of {allowed}")])
+            deny(f"{given} kinds in one list item, allowed: exactly one of {allowed}")
         return self
 
     @property
     def shape(self) -> Sine | Doublet | Step | Square | Ramp | Chirp | Csv:
         """The parameters of the one kind given."""
-        return next(shape for kind in type(self).model_fields if (shape := getattr(self, kind)) is not None)
+        return next(shape for _, shape in self if shape is not None)
 
 
 Signals = tuple[Signal, ...]
@@ -314,11 +303,6 @@ def sample_frames(reference: Reference, first: int, frames: int, rate_hz: float)
 def sample_deg_s(reference: Reference, t_s: Samples) -> Samples:
     """The same in deg/s, as the file has them."""
     t_s = np.asarray(t_s, dtype=float)
-    axes = [
-        sum((item.shape.rate_deg_s(t_s) for item in axis), np.zeros_like(t_s)) for axis in _axes(reference)
-    ]
+    still = np.zeros_like(t_s)
+    axes = [sum((item.shape.rate_deg_s(t_s) for item in axis), still) for _, axis in reference]
     return np.column_stack(axes)
-
-
-def _axes(reference: Reference) -> tuple[Signals, Signals, Signals]:
-    return reference.p, reference.q, reference.r

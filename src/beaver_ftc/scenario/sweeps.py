@@ -11,10 +11,10 @@ from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, Field, ValidationError, model_validator
 
 from beaver_ftc.aircraft import Aircraft, load
-from beaver_ftc.documents.base import Conflict, Location, Number, Section, Whole, entry, refuse
+from beaver_ftc.documents.base import Conflict, Location, Number, Section, Whole, deny, entry, refuse
 from beaver_ftc.documents.document import Document, Problem
 from beaver_ftc.documents.keys import UnusableKeyError, parse_key, with_values
 from beaver_ftc.documents.paths import inside
@@ -58,26 +58,23 @@ class Variation(Section):
 
     @model_validator(mode="after")
     def _makes_sense(self) -> Self:
-        given = [kind for kind in KINDS if getattr(self, kind) is not None]
-        if len(given) != 1:
-            refuse([((), f"{len(given)} kinds of variation, allowed: exactly one of {', '.join(KINDS)}")])
-        refuse([*self._order_conflicts(), *self._normal_conflicts()])
+        given = sum(getattr(self, kind) is not None for kind in KINDS)
+        if given != 1:
+            deny(f"{given} kinds of variation, allowed: exactly one of {', '.join(KINDS)}")
+        refuse(self._conflicts())
         return self
 
-    def _order_conflicts(self) -> list[Conflict]:
-        says = "out of order, allowed: [lowest, highest]"
-        spans = [(key, span) for key in ("uniform", "loguniform", "within") if (span := getattr(self, key))]
-        conflicts: list[Conflict] = [((key,), says) for key, (lowest, highest) in spans if lowest >= highest]
+    def _conflicts(self) -> Iterator[Conflict]:
+        for key in ("uniform", "loguniform", "within"):
+            span = getattr(self, key)
+            if span and span[0] >= span[1]:
+                yield (key,), "out of order, allowed: [lowest, highest]"
         if self.loguniform and self.loguniform[0] <= 0:
-            conflicts.append((("loguniform",), "has no logarithm, allowed: a lowest value over 0"))
-        return conflicts
-
-    def _normal_conflicts(self) -> list[Conflict]:
+            yield ("loguniform",), "has no logarithm, allowed: a lowest value over 0"
         if self.within and not self.normal:
-            return [(("within",), "has no meaning here, allowed: only with normal")]
+            yield ("within",), "has no meaning here, allowed: only with normal"
         if self.normal and self.normal[1] <= 0:
-            return [(("normal",), "a spread of zero or less, allowed: [mean, standard deviation over 0]")]
-        return []
+            yield ("normal",), "a spread of zero or less, allowed: [mean, standard deviation over 0]"
 
     @property
     def kind(self) -> str:
@@ -114,7 +111,7 @@ class Level(Section):
     @model_validator(mode="after")
     def _bounds_something(self) -> Self:
         if self.at_least is None and self.at_most is None:
-            refuse([((), "bounds nothing, allowed: at_least, at_most or both")])
+            deny("bounds nothing, allowed: at_least, at_most or both")
         return self
 
 
@@ -155,10 +152,8 @@ class SweepExpect(Section):
     )
 
 
-class SweepFile(Section):
+class SweepFile(Section, title="beaver-ftc sweep"):
     """Many flights: a base scenario, what varies in it, and what the statistics must show."""
-
-    model_config = ConfigDict(title="beaver-ftc sweep")
 
     name: str = entry(
         ..., "name of the result folder: letters, digits, - and _", pattern=NAME_PATTERN, max_length=70
@@ -178,7 +173,7 @@ class SweepFile(Section):
 
     @model_validator(mode="after")
     def _parts_fit_together(self) -> Self:
-        refuse([*self._grid_conflicts(), *self._runs_conflicts()])
+        refuse(self._conflicts())
         return self
 
     @property
@@ -195,20 +190,15 @@ class SweepFile(Section):
         """Number of flights."""
         return self.grid_size if self.runs is None else self.runs
 
-    def _grid_conflicts(self) -> list[Conflict]:
-        if self.sampling != "grid":
-            return []
-        says = f"cannot be counted, allowed in a grid: {', '.join(COUNTED)}"
-        return [(("vary", key), says) for key, how in self.vary.items() if how.count is None]
-
-    def _runs_conflicts(self) -> list[Conflict]:
+    def _conflicts(self) -> Iterator[Conflict]:
+        for key, how in self.vary.items():
+            if self.sampling == "grid" and how.count is None:
+                yield ("vary", key), f"cannot be counted, allowed in a grid: {', '.join(COUNTED)}"
         size = self.grid_size
-        if self.runs is None:
-            if size > MAX_RUNS:
-                return [(("vary",), f"a grid of {size} points, allowed: at most {MAX_RUNS}")]
-            says = "required key is missing, allowed: the number of flights (only a grid gives it)"
-            return [(("runs",), says)] if size == 1 else []
-        return []
+        if self.runs is None and size > MAX_RUNS:
+            yield ("vary",), f"a grid of {size} points, allowed: at most {MAX_RUNS}"
+        if self.runs is None and size == 1:
+            yield ("runs",), "required key is missing, allowed: the number of flights (only a grid gives it)"
 
 
 def sweep_json_schema() -> dict[str, Any]:

@@ -33,18 +33,23 @@ def undeclared(scenario: Any) -> Iterator[str]:
     severity, declared = scenario.environment.severity, bounds.turbulence
     if _SEVERITIES.index(severity or "none") > _SEVERITIES.index(declared):
         yield f"environment.severity: {severity} is more than fdi.bounds.turbulence, {declared}"
+    share = bounds.coefficients
     for name, ratio in truth.coefficients.items():
-        share = bounds.coefficients
-        allowed = share.get(name, 0.0) if isinstance(share, dict) else share
-        if name[:2] in _MOMENTS and abs(ratio - 1.0) > allowed + _ROUNDING:
-            yield f"uncertainty.coefficients.{name}: {ratio:g} is beyond fdi.bounds.coefficients, {allowed:g}"
+        if name[:2] in _MOMENTS:
+            allowed = share.get(name, 0.0) if isinstance(share, dict) else share
+            yield from _beyond(f"coefficients.{name}", f"{ratio:g}", ratio - 1.0, "coefficients", allowed)
     for axis, ratio in truth.inertia:
-        if abs(ratio - 1.0) > bounds.inertia + _ROUNDING:
-            yield f"uncertainty.inertia.{axis}: {ratio:g} is beyond fdi.bounds.inertia, {bounds.inertia:g}"
+        yield from _beyond(f"inertia.{axis}", f"{ratio:g}", ratio - 1.0, "inertia", bounds.inertia)
     if any(truth.cg_m):
         yield "uncertainty.cg_m: a displaced centre of gravity is covered by fdi.bounds.constant_rad_s2 only"
     if _weighs_forces(scenario):
         yield from _forces(scenario)
+
+
+def _beyond(key: str, value: str, error: float, bound: str, allowed: float) -> Iterator[str]:
+    """An error of the truth larger than `fdi.bounds` allows; value: what the scenario says of it."""
+    if abs(error) > allowed + _ROUNDING:
+        yield f"uncertainty.{key}: {value} is beyond fdi.bounds.{bound}, {allowed:g}"
 
 
 def _instruments(scenario: Any) -> Iterator[str]:
@@ -74,14 +79,14 @@ def _forces(scenario: Any) -> Iterator[str]:
     """Errors of the forces that the accelerometers are held against."""
     share, truth = scenario.fdi.bounds.coefficients, scenario.uncertainty
     allowed = max(share.values(), default=0.0) if isinstance(share, dict) else share
+    why = "by which accelerometers are judged"
     for name, ratio in truth.coefficients.items():
-        if name[:2] in _FORCES and abs(ratio - 1.0) > allowed + _ROUNDING:
-            beyond = f"beyond fdi.bounds.coefficients, {allowed:g}, by which accelerometers are judged"
-            yield f"uncertainty.coefficients.{name}: {ratio:g} is {beyond}"
+        if name[:2] in _FORCES:
+            beyond = _beyond(f"coefficients.{name}", f"{ratio:g}", ratio - 1.0, "coefficients", allowed)
+            yield from (f"{says}, {why}" for says in beyond)
     heavier = truth.mass / scenario.design_model.mass
     if abs(heavier - 1.0) > MASS_TOLERANCE + _ROUNDING:
-        beyond = f"off the designer's by more than {MASS_TOLERANCE:g}, by which accelerometers are judged"
-        yield f"uncertainty.mass: {heavier:g} is {beyond}"
+        yield f"uncertainty.mass: {heavier:g} is off the designer's by more than {MASS_TOLERANCE:g}, {why}"
 
 
 def _unstructured(scenario: Any) -> Iterator[str]:
@@ -89,21 +94,14 @@ def _unstructured(scenario: Any) -> Iterator[str]:
     bounds, truth, statistical = scenario.fdi.bounds, scenario.uncertainty, scenario.fdi.statistical
     for axis in ("p", "q", "r"):
         theta, admitted = getattr(truth.inertia_coupling, axis), getattr(bounds.inertia_coupling, axis)
-        if abs(theta) > admitted + _ROUNDING:
-            beyond = f"beyond fdi.bounds.inertia_coupling.{axis}, {admitted:g}"
-            yield f"uncertainty.inertia_coupling.{axis}: {theta:g} is {beyond}"
+        key = f"inertia_coupling.{axis}"
+        yield from _beyond(key, f"{theta:g}", theta, key, admitted)
         sinusoid, constant = getattr(truth.sinusoid, axis), getattr(bounds.constant_rad_s2, axis)
-        if sinusoid.amplitude_rad_s2 > constant + _ROUNDING:
-            yield (
-                f"uncertainty.sinusoid.{axis}: {sinusoid.amplitude_rad_s2:g} rad/s2 is beyond "
-                f"fdi.bounds.constant_rad_s2.{axis}, {constant:g}"
-            )
-        swings = sinusoid.amplitude_rad_s2 > 0 and statistical is not None
-        if swings and statistical and sinusoid.frequency_rad_s > statistical.uncertainty_rad_s + _ROUNDING:
-            yield (
-                f"uncertainty.sinusoid.{axis}: {sinusoid.frequency_rad_s:g} rad/s is faster than "
-                f"fdi.statistical.uncertainty_rad_s, {statistical.uncertainty_rad_s:g}"
-            )
+        key, swing, rad_s = f"sinusoid.{axis}", sinusoid.amplitude_rad_s2, sinusoid.frequency_rad_s
+        yield from _beyond(key, f"{swing:g} rad/s2", swing, f"constant_rad_s2.{axis}", constant)
+        if swing > 0 and statistical and rad_s > statistical.uncertainty_rad_s + _ROUNDING:
+            slower = f"fdi.statistical.uncertainty_rad_s, {statistical.uncertainty_rad_s:g}"
+            yield f"uncertainty.{key}: {rad_s:g} rad/s is faster than {slower}"
 
 
 def _air(scenario: Any) -> Iterator[str]:

@@ -11,28 +11,15 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
 
 from pydantic import Discriminator, Field, Tag
 
-from beaver_ftc.documents.base import refuse
-from beaver_ftc.documents.errors import suggestion
-from beaver_ftc.scenario.airframe import checked_aircraft
+from beaver_ftc.scenario.airframe import among, checked_aircraft
 from beaver_ftc.scenario.faults.base import SurfaceFault
 from beaver_ftc.scenario.faults.sensors import AnySensorFault, SensorFault, fault_name
 from beaver_ftc.scenario.faults.surfaces import Bias, LossOfEffectiveness, Unanticipated
 from beaver_ftc.scenario.sensors import sensor_words, sensors_there
 
 __all__ = [
-    "MOST_FAULTS",
-    "TYPES",
-    "UNANTICIPATED",
-    "Bias",
-    "Fault",
-    "FaultType",
-    "LossOfEffectiveness",
-    "SensorFault",
-    "Unanticipated",
-    "fault_name",
-    "nameable",
-    "of_a_sensor",
-    "place_of",
+    "MOST_FAULTS", "TYPES", "UNANTICIPATED", "Bias", "Fault", "FaultType", "LossOfEffectiveness", "Nameable",
+    "SensorFault", "Unanticipated", "fault_name", "of_a_sensor", "place_of",
 ]  # fmt: skip
 
 UNANTICIPATED = "unanticipated"
@@ -65,12 +52,12 @@ def of_a_sensor(fault: Any) -> bool:
     return "sensor" in fault if isinstance(fault, dict) else isinstance(fault, SensorFault)
 
 
-def nameable(name: str) -> str:
-    """Refuse what a diagnosis cannot name."""
-    known = (*checked_aircraft().surfaces, UNANTICIPATED, *map(sensor_words, sensors_there()))
-    if name not in known:
-        refuse([((), f"{name[:100]!r} is not known{suggestion(name, known)}")])
-    return name
+def _nameable() -> tuple[str, ...]:
+    """What a diagnosis can name."""
+    return (*checked_aircraft().surfaces, UNANTICIPATED, *map(sensor_words, sensors_there()))
+
+
+Nameable = Annotated[str, among(_nameable)]
 
 
 def _tag(given: Any) -> str:

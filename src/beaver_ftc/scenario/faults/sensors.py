@@ -5,10 +5,10 @@ Magnitudes are in the unit in which `sensors` has the instrument.
 
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import AfterValidator, BeforeValidator, Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
-from beaver_ftc.documents.base import Conflict, Number, Section, entry, number, order_conflicts, refuse
-from beaver_ftc.documents.errors import suggestion
+from beaver_ftc.documents.base import Conflict, Number, Section, deny, entry, number, order_conflicts, refuse
+from beaver_ftc.scenario.airframe import among
 from beaver_ftc.scenario.sensors import ALIASES, QUANTITIES, sensor_words, sensors_there
 
 MOST_SCALE = 2.0
@@ -25,13 +25,6 @@ def _in_short(name: Any) -> Any:
     return ALIASES.get(name, name) if isinstance(name, str) else name
 
 
-def _known_sensor(name: str) -> str:
-    known = sensors_there()
-    if name not in known:
-        refuse([((), f"{name[:100]!r} is no sensor{suggestion(name, known)}")])
-    return name
-
-
 def _examples(schema: dict[str, Any]) -> None:
     schema["examples"] = [*QUANTITIES, *ALIASES]
 
@@ -39,7 +32,7 @@ def _examples(schema: dict[str, Any]) -> None:
 SensorName = Annotated[
     str,
     BeforeValidator(_in_short),
-    AfterValidator(_known_sensor),
+    among(sensors_there, "{!r} is no sensor"),
     entry(..., "the instrument that fails, as in `sensors`", json_schema_extra=_examples),
 ]
 
@@ -58,7 +51,7 @@ class SensorFault(Section):
         """`until_s` says the same as `end_s`."""
         if isinstance(given, dict) and "until_s" in given:
             if "end_s" in given:
-                refuse([(("until_s",), "says the same as end_s, allowed: one of the two")])
+                deny("says the same as end_s, allowed: one of the two", "until_s")
             return {"end_s" if key == "until_s" else key: value for key, value in given.items()}
         return given
 

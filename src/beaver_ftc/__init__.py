@@ -35,25 +35,19 @@ if TYPE_CHECKING:
 
 __version__ = "0.1.0"
 
-# Public name -> module:name it is found by at first use.
+# Public name -> module, or module:name there, by which it is found at first use.
 _WHERE = {
-    "Context": "beaver_ftc.design.context:Context",
-    "Diagnosis": "beaver_ftc.loop.stream:Diagnosis",
-    "Detector": "beaver_ftc.diagnosis.base:Detector",
-    "Flight": "beaver_ftc.results.flight:Flight",
-    "Law": "beaver_ftc.control.base:Law",
-    "Measured": "beaver_ftc.diagnosis.base:Measured",
-    "Reference": "beaver_ftc.control.base:Reference",
-    "Scenario": "beaver_ftc.scenario.schema:Scenario",
-    "Simulation": "beaver_ftc.results.simulation:Simulation",
-    "Verdict": "beaver_ftc.diagnosis.base:Verdict",
-    "fly": "beaver_ftc.results.flight:fly",
-    "linearise": "beaver_ftc.plant.conditions:linearise",
-    "load": "beaver_ftc.scenario.loader:load",
-    "open_run": "beaver_ftc.results.flight:open_run",
+    **dict.fromkeys(("Detector", "Measured", "Verdict"), "beaver_ftc.diagnosis.base"),
+    **dict.fromkeys(("Flight", "fly", "open_run"), "beaver_ftc.results.flight"),
+    **dict.fromkeys(("Law", "Reference"), "beaver_ftc.control.base"),
+    **dict.fromkeys(("linearise", "trim"), "beaver_ftc.plant.conditions"),
+    "Context": "beaver_ftc.design.context",
+    "Diagnosis": "beaver_ftc.loop.stream",
+    "Scenario": "beaver_ftc.scenario.schema",
+    "Simulation": "beaver_ftc.results.simulation",
+    "load": "beaver_ftc.scenario.loader",
     "scenarios": "beaver_ftc.scenario.loader:builtin_names",
-    "sweep": "beaver_ftc.studies.sweep.table_of_flights:sweep",
-    "trim": "beaver_ftc.plant.conditions:trim",
+    "sweep": "beaver_ftc.studies.sweep.table_of_flights",
 }
 __all__ = [
     "BadInput", "Context", "Detector", "Diagnosis", "Flight", "Law", "Measured", "Reference", "Scenario",
@@ -85,7 +79,7 @@ def __getattr__(name: str) -> Any:
     if name not in _WHERE:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     module, _, attribute = _WHERE[name].partition(":")
-    found = globals()[name] = getattr(import_module(module), attribute)
+    found = globals()[name] = getattr(import_module(module), attribute or name)
     return found
 
 

@@ -29,64 +29,55 @@ _GIVEN = re.compile(r"(?:([A-Za-z0-9_-]+)=)?([A-Za-z_]\w*(?:\.[A-Za-z_]\w*)*):([
 _WORDS = re.compile(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
 _ARGUMENTS = {3: DETECTORS, 4: LAWS}  # of `step`, with self
 
-# Name -> (module:Class, what `list` says of it). Without a class it is in the compiled frame itself.
+# Our own by name: what `list` says of them.
 _OURS = {
     DETECTORS: {
-        "adaptive-estimators": (
-            "",
-            "N + 1 nonlinear adaptive estimators with adaptive thresholds [Zhang2005].",
-        ),
-        "none": ("", "No diagnosis."),
+        "adaptive-estimators": "N + 1 nonlinear adaptive estimators with adaptive thresholds [Zhang2005].",
+        "none": "No diagnosis.",
         "rls-monitor": (
-            "beaver_ftc.diagnosis.rivals.rls:RlsMonitor",
-            "Recursive least-squares monitor of each surface and its rate, without a model [Keipour2019].",
+            "Recursive least-squares monitor of each surface and its rate, without a model [Keipour2019]."
         ),
         "augmented-ekf": (
-            "beaver_ftc.diagnosis.rivals.effectiveness:AugmentedEkf",
-            "Extended Kalman filter of effectiveness, chi-square test on the estimates [Jazwinski1970].",
+            "Extended Kalman filter of effectiveness, chi-square test on the estimates [Jazwinski1970]."
         ),
         "augmented-ukf": (
-            "beaver_ftc.diagnosis.rivals.effectiveness:AugmentedUkf",
-            "Unscented Kalman filter of effectiveness, CUSUM on the innovation squared [Julier2004].",
+            "Unscented Kalman filter of effectiveness, CUSUM on the innovation squared [Julier2004]."
         ),
         "multiple-models": (
-            "beaver_ftc.diagnosis.rivals.imm:InteractingMultipleModels",
-            "Interacting multiple models of lost effectiveness, alarm on the odds of a fault [Blom1988].",
+            "Interacting multiple models of lost effectiveness, alarm on the odds of a fault [Blom1988]."
         ),
         "observer-constant": (
-            "beaver_ftc.diagnosis.rivals.observer:ConstantThresholdObserver",
-            "Observer residual with a constant threshold, surface named by least squares [Chen1999].",
+            "Observer residual with a constant threshold, surface named by least squares [Chen1999]."
         ),
     },
     LAWS: {
-        "nominal": ("", "Feedback linearisation with proportional-integral feedback."),
-        "adaptive": (
-            "",
-            "Nominal, and compensates an unknown fault by what the estimators have learnt of it.",
-        ),
+        "nominal": "Feedback linearisation with proportional-integral feedback.",
+        "adaptive": "Nominal, and compensates an unknown fault by what the estimators have learnt of it.",
         "fault-tolerant": (
-            "",
-            "Inversion with a disturbance observer; hands pitch control from a weak elevator to the flap.",
+            "Inversion with a disturbance observer; hands pitch control from a weak elevator to the flap."
         ),
         "fault-tolerant-published": (
-            "",
-            "Adaptive, and hands pitch control from a weak elevator to the flap [Zhang2005].",
+            "Adaptive, and hands pitch control from a weak elevator to the flap [Zhang2005]."
         ),
-        "oracle": ("", "Fault-tolerant, and told the true fault the moment it occurs: the yardstick."),
-        "oracle-published": ("", "Fault-tolerant-published, and told the true fault the moment it occurs."),
-        "indi": (
-            "beaver_ftc.control.rivals.indi:IncrementalInversion",
-            "Incremental nonlinear dynamic inversion on filtered angular acceleration [Sieberling2010].",
-        ),
+        "oracle": "Fault-tolerant, and told the true fault the moment it occurs: the yardstick.",
+        "oracle-published": "Fault-tolerant-published, and told the true fault the moment it occurs.",
+        "indi": "Incremental nonlinear dynamic inversion on filtered angular acceleration [Sieberling2010].",
         "l1-adaptive": (
-            "beaver_ftc.control.rivals.l1:L1Adaptive",
-            "L1 adaptive control, piecewise-constant adaptation behind a low-pass filter [Hovakimyan2010].",
+            "L1 adaptive control, piecewise-constant adaptation behind a low-pass filter [Hovakimyan2010]."
         ),
-        "lqr": (
-            "beaver_ftc.control.rivals.lqr:FixedGainLqr",
-            "Fixed-gain linear quadratic regulator about the trim, with integral action [Anderson1990].",
-        ),
+        "lqr": "Fixed-gain linear quadratic regulator about the trim, with integral action [Anderson1990].",
     },
+}
+# Their classes; without one it is in the compiled frame itself.
+_CLASSES = {
+    "rls-monitor": "beaver_ftc.diagnosis.rivals.rls:RlsMonitor",
+    "augmented-ekf": "beaver_ftc.diagnosis.rivals.effectiveness:AugmentedEkf",
+    "augmented-ukf": "beaver_ftc.diagnosis.rivals.effectiveness:AugmentedUkf",
+    "multiple-models": "beaver_ftc.diagnosis.rivals.imm:InteractingMultipleModels",
+    "observer-constant": "beaver_ftc.diagnosis.rivals.observer:ConstantThresholdObserver",
+    "indi": "beaver_ftc.control.rivals.indi:IncrementalInversion",
+    "l1-adaptive": "beaver_ftc.control.rivals.l1:L1Adaptive",
+    "lqr": "beaver_ftc.control.rivals.lqr:FixedGainLqr",
 }
 _METHODS = ("reset", "step")
 
@@ -113,16 +104,15 @@ class Registered:
 
 def is_compiled(group: str, name: str) -> bool:
     """Whether the compiled frame does this scheme or law itself."""
-    return name in _OURS[group] and not _OURS[group][name][0]
+    return name in _OURS[group] and name not in _CLASSES
 
 
 def registered(group: str) -> dict[str, Registered]:
     """Everything registered under DETECTORS or LAWS, by name, ours first; imports none of it."""
-    ours = {
-        name: Registered(group, name, target, OURS, says) for name, (target, says) in _OURS[group].items()
-    }
+    known = _OURS[group].items()
+    ours = {name: Registered(group, name, _CLASSES.get(name, ""), OURS, says) for name, says in known}
     others = {entry.name: entry for entry in _from_packages(group) if entry.name not in ours}
-    return ours | others | {entry.name: entry for entry in _of_this_run() if entry.group == group}
+    return ours | others | {entry.name: entry for entry in _of_this_run(group)}
 
 
 def _from_packages(group: str) -> Iterable[Registered]:
@@ -149,8 +139,8 @@ def register(given: str) -> Registered:
     return entry
 
 
-def _of_this_run() -> tuple[Registered, ...]:
-    return _read_all(os.environ.get(VARIABLE, ""))
+def _of_this_run(group: str) -> list[Registered]:
+    return [entry for entry in _read_all(os.environ.get(VARIABLE, "")) if entry.group == group]
 
 
 @lru_cache
@@ -184,16 +174,13 @@ def _hyphenated(name: str) -> str:
 
 def _entry(group: str, name: str) -> Registered | None:
     """What is registered by a name; of this run's, the class's own name will do as well."""
-    of_this_run = (entry for entry in _of_this_run() if entry.group == group)
-    by_class = (entry for entry in of_this_run if entry.target.rpartition(":")[2] == name)
+    by_class = (entry for entry in _of_this_run(group) if entry.target.rpartition(":")[2] == name)
     return registered(group).get(name) or next(by_class, None)
 
 
 def refusal(group: str, name: str) -> str | None:
     """What is wrong with a scheme's or law's name in a scenario, and what is allowed; None if nothing is."""
-    if name in _OURS[group]:
-        return None
-    if _entry(group, name):
+    if name in _OURS[group] or _entry(group, name):
         return None
     known = registered(group)
     what = "scheme" if group == DETECTORS else "law"

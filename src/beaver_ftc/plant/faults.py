@@ -13,7 +13,7 @@ else.
 
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import zip_longest
 from math import ceil, exp, hypot, inf
 from typing import TYPE_CHECKING, Any
@@ -55,8 +55,7 @@ def frame_of(time_s: float, rate_hz: float) -> int:
 
 def is_there(fault: Any, k: int, rate_hz: float) -> bool:
     """Whether a fault is in force in frame k: begun, and neither repaired nor over."""
-    begun = frame_of(fault.at_s, rate_hz) <= k
-    return begun and (fault.end_s is None or frame_of(fault.end_s, rate_hz) > k)
+    return _Event(fault, rate_hz).in_force(k)
 
 
 @dataclass
@@ -65,20 +64,15 @@ class _Event:
 
     fault: Any
     rate_hz: float
-    kappa_per_s: float
-    first: int
-    last: int
-    grown: int
     was_rad: float = 0.0
     struck: bool = False
 
-    @classmethod
-    def of(cls, fault: Any, rate_hz: float) -> "_Event":
-        kappa_per_s = fault.kappa_per_s if fault.profile == "incipient" else inf
-        first = frame_of(fault.at_s, rate_hz)
-        last = NEVER if fault.end_s is None else frame_of(fault.end_s, rate_hz)
-        grown = frame_of(fault.at_s + _FULLY_GROWN / kappa_per_s, rate_hz)
-        return cls(fault, rate_hz, kappa_per_s, first, last, grown)
+    def __post_init__(self) -> None:
+        fault, rate_hz = self.fault, self.rate_hz
+        self.kappa_per_s = fault.kappa_per_s if fault.profile == "incipient" else inf
+        self.first = frame_of(fault.at_s, rate_hz)
+        self.last = NEVER if fault.end_s is None else frame_of(fault.end_s, rate_hz)
+        self.grown = frame_of(fault.at_s + _FULLY_GROWN / self.kappa_per_s, rate_hz)
 
     @property
     def place(self) -> str:
@@ -102,32 +96,31 @@ class _Event:
         return min(k + 1 if k < self.grown else NEVER, self.last)
 
 
-class FaultSchedule:
-    """Sets the aircraft's failure properties, frame by frame; between changes there is nothing to do.
+class _Schedule:
+    """The faults of a scenario that are of instruments, or those that are not, frame by frame.
 
-    faults: the scenario's. plant: the aircraft they happen to. rate_hz: frame rate of the loop.
+    faults: the scenario's. rate_hz: frame rate of the loop.
     """
 
-    def __init__(self, faults: Sequence[Any], plant: "Plant", rate_hz: float) -> None:
-        self._plant = plant
+    of_instruments: bool
+
+    def __init__(self, faults: Sequence[Any], rate_hz: float) -> None:
         self._rate_hz = rate_hz
-        self._declared: list[_Event] = []
-        self._written: dict[str, float] = {}
+        self._events: list[_Event] = []
         self.declare(faults)
 
     def declare(self, faults: Sequence[Any]) -> None:
         """Take these faults for those declared so far: some more at the end, some that end otherwise."""
-        before, self._declared = self._declared, []
-        faults = [fault for fault in faults if not isinstance(fault, SensorFault)]
+        before, self._events = self._events, []
+        faults = [fault for fault in faults if isinstance(fault, SensorFault) is self.of_instruments]
         for known, fault in zip_longest(before, faults):
-            self._declared.append(known if known and known.fault is fault else self._event(fault, known))
-        self._events = sorted(self._declared, key=lambda event: event.first)
+            event = known or _Event(fault, self._rate_hz)
+            self._events.append(event if event.fault is fault else replace(event, fault=fault))
 
-    def _event(self, fault: Any, known: _Event | None) -> _Event:
-        event = _Event.of(fault, self._rate_hz)
-        if known is not None:
-            event.was_rad, event.struck = known.was_rad, known.struck
-        return event
+    @property
+    def any(self) -> bool:
+        """Whether one of them happens in this flight."""
+        return bool(self._events)
 
     def begun(self, k: int) -> bool:
         """Whether some fault has struck by frame k, repaired or not."""
@@ -136,6 +129,20 @@ class FaultSchedule:
     def next_change(self, k: int) -> int:
         """The first frame after k in which something changes; NEVER if none."""
         return min((event.next_change(k) for event in self._events), default=NEVER)
+
+
+class FaultSchedule(_Schedule):
+    """Sets the aircraft's failure properties; between changes there is nothing to do.
+
+    plant: the aircraft they happen to.
+    """
+
+    of_instruments = False
+
+    def __init__(self, faults: Sequence[Any], plant: "Plant", rate_hz: float) -> None:
+        super().__init__(faults, rate_hz)
+        self._plant = plant
+        self._written: dict[str, float] = {}
 
     def apply(self, k: int) -> None:
         """Bring the aircraft's failures to frame k. Call it before that frame's runs; again is harmless."""
@@ -154,7 +161,7 @@ class FaultSchedule:
     def _wanted(self, k: int) -> dict[str, float]:
         """Failure properties at frame k, of every place a fault of this flight touches."""
         places = {event.place: dict(HEALTHY) for event in self._events}
-        for event in self._events:
+        for event in sorted(self._events, key=lambda event: event.first):
             if event.in_force(k):
                 event.fault.strike(places[event.place], event.share(k), event.was_rad)
         return {
@@ -173,53 +180,34 @@ class FaultSchedule:
         return bool(changed)
 
 
-class SensorFaultSchedule:
-    """Breaks and mends the instruments (`instruments.instruments_dtype`), frame by frame.
+class SensorFaultSchedule(_Schedule):
+    """Breaks and mends the instruments (`instruments.instruments_dtype`).
 
-    faults: the scenario's; those of surfaces are passed over. rate_hz: frame rate of the loop. has_engine:
-    the aircraft has instruments from which dpt follows.
+    has_engine: the aircraft has instruments from which dpt follows.
     """
+
+    of_instruments = True
 
     def __init__(
         self, faults: Sequence[Any], instruments: np.void, rate_hz: float, has_engine: bool = False
     ) -> None:
-        self._instruments, self._rate_hz, self._has_engine = instruments, rate_hz, has_engine
-        self.declare(faults)
-
-    def declare(self, faults: Sequence[Any]) -> None:
-        """Take these faults for those declared so far."""
-        self._faults = [fault for fault in faults if isinstance(fault, SensorFault)]
-        self._spans = [(frame_of(f.at_s, self._rate_hz), self._last(f)) for f in self._faults]
-
-    def _last(self, fault: SensorFault) -> int:
-        return NEVER if fault.end_s is None else frame_of(fault.end_s, self._rate_hz)
-
-    @property
-    def any(self) -> bool:
-        """Whether an instrument breaks in this flight."""
-        return bool(self._faults)
-
-    def begun(self, k: int) -> bool:
-        """Whether some instrument has broken by frame k, mended or not."""
-        return any(first <= k for first, _ in self._spans)
-
-    def next_change(self, k: int) -> int:
-        """The first frame after k in which an instrument breaks or is mended; NEVER if none."""
-        return min((at for span in self._spans for at in span if at > k), default=NEVER)
+        super().__init__(faults, rate_hz)
+        self._instruments, self._has_engine = instruments, has_engine
 
     def apply(self, k: int) -> None:
         """Bring the instruments to frame k; again is harmless. From the first fault of theirs on, dpt is what
         engine and air data say."""
-        if not self._faults:
+        if not self._events:
             return
         record = self._instruments["fault"]
         record["bias"] = record["scale"] = record["noise"] = 0.0
         record["frozen"] = record["lost"] = 0
-        for fault, (first, last) in zip(self._faults, self._spans, strict=True):
-            if first <= k and self._has_engine and fault.sensor in OF_THE_SLIPSTREAM:
+        for event in self._events:
+            sensor = event.fault.sensor
+            if event.first <= k and self._has_engine and sensor in OF_THE_SLIPSTREAM:
                 self._instruments["engine"] = 1
-            if first <= k < last:
-                _take(record[_SENSORS.index(fault.sensor)], fault)
+            if event.in_force(k):
+                _take(record[_SENSORS.index(sensor)], event.fault)
         self._instruments["broken"] = 1  # from now on: a mended one must let go of what it holds
 
 

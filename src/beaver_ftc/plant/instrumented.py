@@ -42,88 +42,32 @@ _SHAPES = {
     # of the travel as built: a scenario, and the search for trim, may move the stops
     "norm": "<quotient> {of} <value> {whole!r} </value> </quotient>",
 }
-_EXTRA_PITCH = """<function name="aero/moment/unanticipated-lbsft">
-  <description> The unanticipated fault: extra pitching moment on alpha cubed </description>
-  <product> <property> aero/qbar-psf </property> <property> metrics/Sw-sqft </property>
-  <property> metrics/cbarw-ft </property> <property> failures/unanticipated/Cm-alpha3 </property>
-  <pow> <property> aero/alpha-rad </property> <value> 3 </value> </pow> </product>
-</function>"""
-_LEVER = """
-    <fcs_function name="fcs/actuated-throttle-{i}-norm">
-      <function> <property> fcs/actuated-throttle-norm </property> </function>
-      <output> fcs/throttle-cmd-norm[{i}] </output>
-    </fcs_function>"""
-# What FlightGear tells an aircraft of its engines, from which some take lever and governor; {i}: of each.
-_FROM_FLIGHTGEAR = {
-    "/controls/engines/engine[{i}]/throttle": "fcs/actuated-throttle-norm",
-    "/engines/engine[{i}]/mp-inhg": "propulsion/engine[{i}]/map-inhg",
-    "/engines/engine[{i}]/rpm": "propulsion/engine[{i}]/engine-rpm",
-}
-_TOLD = """
-    <fcs_function name="fcs/{name}-{i}">
-      <function> <property> {of} </property> </function>
-      <output> {told} </output>
-    </fcs_function>"""
-# What else of the aircraft's motion and engines its moments may depend on, dimensionless: name, JSBSim
-# property, what it is. The aerodynamics reckon them themselves, so that they are those of the same instant.
-_RATE = """<quotient> <product> <property> {rate} </property> <property> metrics/{arm} </property> </product>
-    <max> <value> 1 </value>
-      <product> <value> 2 </value> <property> velocities/vt-fps </property> </product> </max>
-  </quotient>"""
-_MOMENT = """<quotient> <property> moments/{axis}-prop-lbsft </property>
-    <product> <property> metrics/Sw-sqft </property> <property> metrics/{arm} </property>
-      <max> <property> aero/qbar-psf </property> <value> 1 </value> </max> </product> </quotient>"""
+# What else of the aircraft's motion and engines its moments may depend on, dimensionless: name, and JSBSim
+# property. The aerodynamics reckon them themselves, so that they are those of the same instant.
 SIGNALS = {
-    "thrust": ("aero/thrust-coefficient", "thrust of all engines over dynamic pressure and wing area"),
-    "alpha_rate": ("aero/alphadot-hat", "rate of the angle of attack times c/2V"),
-    "beta_rate": ("aero/betadot-hat", "rate of sideslip times b/2V"),
-    "engines_l": ("aero/engines-roll-coefficient", "rolling moment of the engines over q S b"),
-    "engines_m": ("aero/engines-pitch-coefficient", "pitching moment of the engines over q S c"),
-    "engines_n": ("aero/engines-yaw-coefficient", "yawing moment of the engines over q S b"),
-    "mach": ("velocities/mach", "Mach number"),
+    "thrust": "aero/thrust-coefficient",
+    "alpha_rate": "aero/alphadot-hat",
+    "beta_rate": "aero/betadot-hat",
+    "engines_l": "aero/engines-roll-coefficient",
+    "engines_m": "aero/engines-pitch-coefficient",
+    "engines_n": "aero/engines-yaw-coefficient",
+    "mach": "velocities/mach",
 }
-_FUNCTIONS = {
-    "alpha_rate": _RATE.format(rate="aero/alphadot-rad_sec", arm="cbarw-ft"),
-    "beta_rate": _RATE.format(rate="aero/betadot-rad_sec", arm="bw-ft"),
-    "engines_l": _MOMENT.format(axis="l", arm="bw-ft"),
-    "engines_m": _MOMENT.format(axis="m", arm="cbarw-ft"),
-    "engines_n": _MOMENT.format(axis="n", arm="bw-ft"),
-}
-_THRUST = """<quotient> <sum> {thrusts} <value> 0 </value> </sum>
-    <product> <property> metrics/Sw-sqft </property>
-      <max> <property> aero/qbar-psf </property> <value> 1 </value> </max> </product>
-  </quotient>"""
-_COMMON = """<?xml version="1.0"?>
-<system name="envelope and faults">
-  ABSENT
-  <property value="0"> failures/unanticipated/Cm-alpha3 </property>
-  <property value="0"> envelope/airspeed-min-fps </property>
-  <property value="1e6"> envelope/airspeed-max-fps </property>
-  <property value="-3"> envelope/alpha-min-rad </property>
-  <property value="3"> envelope/alpha-max-rad </property>
-  <property value="0.7"> fcs/actuated-throttle-norm </property>
-  ENGINES
-  <channel name="envelope">
-    <fcs_function name="aero/envelope-valid">
-      <function> <and>
-        <ge> <property> velocities/vt-fps </property> <property> envelope/airspeed-min-fps </property> </ge>
-        <le> <property> velocities/vt-fps </property> <property> envelope/airspeed-max-fps </property> </le>
-        <ge> <property> aero/alpha-rad </property> <property> envelope/alpha-min-rad </property> </ge>
-        <le> <property> aero/alpha-rad </property> <property> envelope/alpha-max-rad </property> </le>
-      </and> </function>
-    </fcs_function>
-  </channel>
-</system>
-"""
 
+_OF_THE_FLOW = ("alpha_rate", "beta_rate")  # an aircraft without engines has not the properties of others
 
 # What stands before all functions in aerodynamics, by JSBSim's own schema.
 _BEFORE_FUNCTIONS = ("description", "alphalimits", "hysteresis_limits", "aero_ref_pt_shift_x")
 
 
 @lru_cache
-def _template() -> str:
-    return (data_root() / "aircraft" / "actuator.xml").read_text(encoding="utf-8")
+def _template(name: str) -> str:
+    return (data_root() / "aircraft" / name).read_text(encoding="utf-8")
+
+
+def _parts() -> Element:
+    """What is put into a copy, to be changed at will."""
+    return ElementTree.fromstring(_template("instrumented.xml"))
 
 
 def actuator_system(surface: str, low_rad: float, high_rad: float, prefix: str = "") -> str:
@@ -132,8 +76,8 @@ def actuator_system(surface: str, low_rad: float, high_rad: float, prefix: str =
     prefix: begins the names of its signals, `fcs/<prefix><surface>-cmd-rad`, in an aircraft whose own flight
     control uses the plain ones.
     """
-    start = _template().index("<system")
-    text = _template()[start:].replace("fcs/SURFACE-", f"fcs/{prefix}SURFACE-")
+    template = _template("actuator.xml")
+    text = template[template.index("<system") :].replace("fcs/SURFACE-", f"fcs/{prefix}SURFACE-")
     if prefix:  # JSBSim knows the plain ones without being told
         command = f'<property value="0"> fcs/{prefix}SURFACE-cmd-norm </property>'
         text = text.replace("<property", f"{command}\n  <property", 1)
@@ -169,30 +113,39 @@ def source_of(name: str) -> Path:
     return package() / "aircraft" / name / f"{name}.xml"
 
 
-def _common(engines: int, read: str, absent: Iterable[str]) -> str:
+def _common(engines: int, read: str, absent: Iterable[str]) -> Element:
     """Envelope, the unanticipated fault, and one power lever for all engines; read: the aircraft's files;
     absent: what they read and nothing gives."""
-    levers = "".join(_LEVER.format(i=i) for i in range(engines))
-    power = f'<channel name="power">{levers}{_told(engines, read)}</channel>'
-    zeros = "\n  ".join(f'<property value="0"> {name} </property>' for name in absent)
-    return _COMMON.replace("ENGINES", power if engines else "").replace("ABSENT", zeros)
+    parts = _parts()
+    system, levers = parts.find("system"), parts.findall("lever/*")
+    assert system is not None
+    for name in reversed(tuple(absent)):
+        zero = Element("property", value="0")
+        zero.text = name
+        system.insert(0, zero)
+    if engines:
+        power = Element("channel", name="power")
+        power.extend(_of_engine(lever, i) for i, lever in product(range(engines), levers))
+        told = (_of_engine(word, i) for i, word in product(range(engines), parts.findall("told/*")))
+        power.extend(word for word in told if _told(word) in read or _told(word).replace("[0]", "") in read)
+        system.insert(len(system) - 1, power)
+    return system
 
 
-def _told(engines: int, read: str) -> str:
-    """What FlightGear would tell the aircraft, of that which its files read."""
-    told = []
-    for i, (name, of) in product(range(engines), _FROM_FLIGHTGEAR.items()):
-        known_as = {name.format(i=i), name.format(i=i).replace("[0]", "")}
-        if any(each in read for each in known_as):
-            ending = f"told-{name.rpartition('/')[2]}"
-            told.append(_TOLD.format(name=ending, i=i, of=of.format(i=i), told=name.format(i=i)))
-    return "".join(told)
+def _of_engine(part: Element, i: int) -> Element:
+    """What is put in once an engine, for engine i."""
+    return ElementTree.fromstring(ElementTree.tostring(part, "unicode").replace("{i}", f"{i}"))
+
+
+def _told(word: Element) -> str:
+    """The property by which FlightGear would tell the aircraft a word."""
+    return (word.findtext("output") or "").strip()
 
 
 def is_told(name: str) -> bool:
     """Whether the copy has a property of FlightGear's, from its own lever and engines."""
     plain = re.sub(r"\[\d+\]", "", name)
-    return plain in {of.replace("[{i}]", "") for of in _FROM_FLIGHTGEAR}
+    return plain in {_told(word).replace("[{i}]", "") for word in _parts().findall("told/*")}
 
 
 def instrument(
@@ -215,7 +168,8 @@ def instrument(
     surfaces = _put_in(aerodynamics, folder, travel_rad)
     _add_signals(aerodynamics, _engines(whole))
     _add_pitch_fault(aerodynamics, source.stem)
-    (folder / SYSTEMS / "ftc-common.xml").write_text(_common(_engines(whole), read, absent), "utf-8")
+    common = ElementTree.ElementTree(_common(_engines(whole), read, absent))
+    common.write(folder / SYSTEMS / "ftc-common.xml", encoding="utf-8", xml_declaration=True)
     place = list(whole).index(next(iter(whole.iter("aerodynamics"))))
     for i, system in enumerate((*(f"ftc-{surface}" for surface in surfaces), "ftc-common")):
         whole.insert(place + i, Element("system", file=system))
@@ -291,19 +245,19 @@ def _component(surface: str, shape: str, whole: float) -> str:
 
 def _add_signals(aerodynamics: Element, engines: int) -> None:
     """Let the aerodynamics reckon the signals first of all."""
-    thrusts = " ".join(f"<property> propulsion/engine[{i}]/thrust-lbs </property>" for i in range(engines))
-    functions = {"thrust": _THRUST.format(thrusts=thrusts), **_FUNCTIONS}
-    if not engines:  # nor has the aircraft the properties
-        functions = {signal: functions[signal] for signal in ("alpha_rate", "beta_rate")}
+    functions = {function.get("name"): function for function in _parts().iter("function")}
+    thrusts = functions["aero/thrust-coefficient"].find("quotient/sum")
+    assert thrusts is not None
+    thrusts[:0] = [_of_engine(thrusts[0], i) for i in range(engines)]
+    thrusts.remove(thrusts[engines])
     first = sum(element.tag in _BEFORE_FUNCTIONS for element in aerodynamics)
-    for signal, formula in functions.items():
-        name, says = SIGNALS[signal]
-        text = f'<function name="{name}"> <description> {says} </description> {formula} </function>'
-        aerodynamics.insert(first, ElementTree.fromstring(text))
+    for signal, name in SIGNALS.items():
+        if name in functions and (engines or signal in _OF_THE_FLOW):
+            aerodynamics.insert(first, functions[name])
 
 
 def _add_pitch_fault(aerodynamics: Element, name: str) -> None:
     axis = next((axis for axis in aerodynamics.iter("axis") if axis.get("name") == "PITCH"), None)
     if axis is None:
         raise BadInput(f"{name}: its aerodynamics have no pitch axis, allowed: one that has")
-    axis.append(ElementTree.fromstring(_EXTRA_PITCH))
+    axis.extend(_parts().findall("pitch/function"))

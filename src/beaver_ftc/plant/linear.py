@@ -34,39 +34,27 @@ if TYPE_CHECKING:
 M_PER_FT = 1.0 / FT_PER_M
 _EARTH_RADIUS_M = 6371000.0
 
-# State, the field of FlightState that moves it, and how far for a difference: small against the curvature
-# of the polynomials, large against rounding.
-_MOVED = (
-    ("airspeed", "airspeed_mps", 1e-2),
-    ("alpha", "alpha_rad", 1e-4),
-    ("beta", "beta_rad", 1e-4),
-    ("p", "p_rad_s", 1e-4),
-    ("q", "q_rad_s", 1e-4),
-    ("r", "r_rad_s", 1e-4),
-    ("phi", "phi_rad", 1e-4),
-    ("theta", "theta_rad", 1e-4),
-    ("psi", "psi_rad", 1e-4),
-    ("altitude", "altitude_m", 10.0),
+# State by our name, with its unit (a field of FlightState, but for north and east), and by JSBSim's, with the
+# factor to ours; how far it is moved for a difference: small against the curvature of the polynomials, large
+# against rounding. Latitude and longitude become metres.
+_STATES = (
+    ("airspeed", "airspeed_mps", "Vt", M_PER_FT, 1e-2),
+    ("alpha", "alpha_rad", "Alpha", 1.0, 1e-4),
+    ("beta", "beta_rad", "Beta", 1.0, 1e-4),
+    ("p", "p_rad_s", "P", 1.0, 1e-4),
+    ("q", "q_rad_s", "Q", 1.0, 1e-4),
+    ("r", "r_rad_s", "R", 1.0, 1e-4),
+    ("phi", "phi_rad", "Phi", 1.0, 1e-4),
+    ("theta", "theta_rad", "Theta", 1.0, 1e-4),
+    ("psi", "psi_rad", "Psi", 1.0, 1e-4),
+    ("altitude", "altitude_m", "Alt", M_PER_FT, 10.0),
+    ("north", "north_m", "Latitude", _EARTH_RADIUS_M, 0.0),
+    ("east", "east_m", "Longitude", _EARTH_RADIUS_M, 0.0),
 )
-_UNITS = {name: field for name, field, _ in _MOVED} | {"north": "north_m", "east": "east_m"}
+_MOVED = [state for state in _STATES if state[-1]]
+_UNITS = {name: unit for name, unit, *_ in _STATES}
 _SURFACE_STEP_RAD = 1e-3
 _PRESSURE_STEP_INHG = 0.1
-
-# JSBSim's states by our names, with the factor from its unit to ours; latitude and longitude become metres.
-_STATES = {
-    "Vt": ("airspeed", M_PER_FT),
-    "Alpha": ("alpha", 1.0),
-    "Beta": ("beta", 1.0),
-    "P": ("p", 1.0),
-    "Q": ("q", 1.0),
-    "R": ("r", 1.0),
-    "Phi": ("phi", 1.0),
-    "Theta": ("theta", 1.0),
-    "Psi": ("psi", 1.0),
-    "Latitude": ("north", _EARTH_RADIUS_M),
-    "Longitude": ("east", _EARTH_RADIUS_M),
-    "Alt": ("altitude", M_PER_FT),
-}
 _INPUTS = {"DaCmd": "aileron", "DeCmd": "elevator", "DrCmd": "rudder"}
 
 _PLACE = '<location unit="M"> <x> 0 </x> <y> 0 </y> <z> 0 </z> </location>'
@@ -114,9 +102,9 @@ class LinearModel:
 def differences(plant: Plant, point: FlightState) -> LinearModel:
     """The plant about a flight condition: ten states (no position over ground), all surfaces."""
     surfaces = plant.aircraft.surfaces
-    A = [_slope(plant, point, field, step) for _, field, step in _MOVED]
+    A = [_slope(plant, point, field, step) for _, field, _, _, step in _MOVED]
     B = [_slope(plant, point, f"{surface}_rad", _SURFACE_STEP_RAD) for surface in surfaces]
-    names = tuple(name for name, _, _ in _MOVED)
+    names = tuple(name for name, *_ in _MOVED)
     return LinearModel(np.column_stack(A), np.column_stack(B), names, surfaces)
 
 
@@ -181,7 +169,8 @@ def _aircraft_with_an_engine(aircraft: Aircraft) -> Iterator[Path]:
 
 def _in_our_units(linear: jsbsim.FGLinearization, rad_per_norm: np.ndarray) -> LinearModel:
     """Rename and rescale; JSBSim's surface inputs are shares of the travel, and its throttle goes."""
-    named = [_STATES[name] for name in linear.x_names]
+    ours = {theirs: (name, factor) for name, _, theirs, factor, _ in _STATES}
+    named = [ours[name] for name in linear.x_names]
     columns = [linear.u_names.index(name) for name in _INPUTS]
     factor = np.array([factor for _, factor in named])
     A = np.array(linear.system_matrix) * factor[:, None] / factor

@@ -198,7 +198,7 @@ def _derived(
     low, high = map(radians, data["envelope"]["alpha_deg"])
     where = Envelope(tuple(data["envelope"]["airspeed_mps"]), (low, high), sideslip_rad)
     declared = {name: of["property"] for name, of in data["signals"].items()}
-    known = {name: of[0] for name, of in instrumented.SIGNALS.items() if plant.has(of[0])}
+    known = {name: of for name, of in instrumented.SIGNALS.items() if plant.has(of)}
     properties = declared or known
     tell("sample")
     flown = fly_about(plant, trim, 3, properties)

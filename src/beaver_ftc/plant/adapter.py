@@ -95,13 +95,16 @@ def _load(errors: _Errors, model: Path) -> jsbsim.FGFDMExec:
 
 
 @contextmanager
-def translated(model: Path) -> Iterator[None]:
-    """Turn what JSBSim raises while a model is initialised or run into SimulationFailed, one line."""
+def translated(flown: Path | str) -> Iterator[None]:
+    """Turn what JSBSim raises while an aircraft is initialised or run into SimulationFailed, one line.
+
+    flown: its model's file, or its name.
+    """
     try:
         yield
     except jsbsim.BaseError as error:
-        says = " ".join(str(error).split())
-        raise SimulationFailed(f"JSBSim cannot fly {model.parent.name}/{model.name}: {says}") from None
+        name = flown if isinstance(flown, str) else f"{flown.parent.name}/{flown.name}"
+        raise SimulationFailed(f"JSBSim cannot fly {name}: {' '.join(str(error).split())}") from None
 
 
 def bare(model: Path, absent: Iterable[str] = ()) -> jsbsim.FGFDMExec:
@@ -195,7 +198,9 @@ class Plant:
         Surfaces are commanded through their properties; failures and uncertainties stay as they are set.
         wind_mps: steady wind towards north, east, down; the state is that relative to the air.
         """
-        self._command(state)
+        self._command_surfaces(state)
+        self._settings = state.settings
+        self._command_engines()
         self._place(state)
         self.fdm.set_sim_time(0.0)
         self._initialise()
@@ -226,11 +231,8 @@ class Plant:
         self._initialise()
 
     def _initialise(self) -> None:
-        try:
+        with translated(self.aircraft.name):
             initialised = self.fdm.run_ic()
-        except jsbsim.BaseError as error:
-            says = " ".join(str(error).split())
-            raise SimulationFailed(f"JSBSim cannot fly {self.aircraft.name}: {says}") from None
         if not initialised:
             raise SimulationFailed("JSBSim cannot initialise the flight")
 
@@ -296,11 +298,6 @@ class Plant:
         self.fdm.resume_integration()
         if turbulence:
             self.write("atmosphere/turb-type", turbulence)
-
-    def _command(self, state: FlightState) -> None:
-        self._command_surfaces(state)
-        self._settings = state.settings
-        self._command_engines()
 
     def _command_surfaces(self, state: FlightState) -> None:
         for name, surface in self.aircraft.surface.items():

@@ -89,7 +89,6 @@ def command_properties(aircraft: Aircraft) -> tuple[str, ...]:
 
 # Of the built-in aircraft, for what does not yet ask the aircraft.
 TRUTH = truth_channels(load())
-SURFACES = load().surfaces
 COMMANDS = command_properties(load())
 
 _STATES = (

@@ -165,14 +165,14 @@ def instrument(
     (folder / SYSTEMS).mkdir(exist_ok=True)
     read = "".join(path.read_text("utf-8", "replace") for path in sorted(folder.rglob("*.xml")))
     aerodynamics = _aerodynamics(whole, source)
-    surfaces = _put_in(aerodynamics, folder, travel_rad)
+    _put_in(aerodynamics, folder, travel_rad)
     _add_signals(aerodynamics, _engines(whole))
     _add_pitch_fault(aerodynamics, source.stem)
     common = ElementTree.ElementTree(_common(_engines(whole), read, absent))
     common.write(folder / SYSTEMS / "ftc-common.xml", encoding="utf-8", xml_declaration=True)
     place = list(whole).index(next(iter(whole.iter("aerodynamics"))))
-    for i, system in enumerate((*(f"ftc-{surface}" for surface in surfaces), "ftc-common")):
-        whole.insert(place + i, Element("system", file=system))
+    for i, system in enumerate((*travel_rad, "common")):
+        whole.insert(place + i, Element("system", file=f"ftc-{system}"))
     ElementTree.ElementTree(whole).write(model, encoding="utf-8", xml_declaration=True)
     return model
 
@@ -213,8 +213,8 @@ def others_of(source: Path) -> tuple[str, ...]:
     return tuple(sorted(name for name in seen if name.startswith(("fcs/", "gear/"))))
 
 
-def _put_in(aerodynamics: Element, folder: Path, travel_rad: dict[str, tuple[float, float]]) -> Iterable[str]:
-    """Let the aerodynamics see our deflections, and write the actuators; returns the surfaces."""
+def _put_in(aerodynamics: Element, folder: Path, travel_rad: dict[str, tuple[float, float]]) -> None:
+    """Let the aerodynamics see our deflections, and write the actuators."""
     for surface, travel in travel_rad.items():
         shapes = set()
         for element in aerodynamics.iter():
@@ -227,7 +227,6 @@ def _put_in(aerodynamics: Element, folder: Path, travel_rad: dict[str, tuple[flo
         extra = "".join(_component(surface, shape, travel[1]) for shape in sorted(shapes - {"rad"}))
         system = re.sub(r"(\s*</channel>)", lambda end: f"{extra}{end.group(1)}", system)  # noqa: B023
         (folder / SYSTEMS / f"ftc-{surface}.xml").write_text(system, encoding="utf-8")
-    return tuple(travel_rad)
 
 
 def _property(surface: str, shape: str) -> str:

@@ -34,31 +34,32 @@ RUNNING = record(
 )  # fmt: skip
 
 
+_ADDRESS, _NUMBER, _TRUTH = ir.IntType(64), ir.DoubleType(), ir.IntType(1)
+
+
+def _calling(returned, *given):
+    """What makes the code that calls the function at the first argument with the others."""
+
+    def codegen(context, builder, signature, args):
+        function = builder.inttoptr(args[0], ir.FunctionType(returned, given).as_pointer())
+        return builder.call(function, args[1:])
+
+    return codegen
+
+
 @intrinsic
 def _call_getter(typingctx, function, node):
-    def codegen(context, builder, signature, args):
-        prototype = ir.FunctionType(ir.DoubleType(), [ir.IntType(64)])
-        return builder.call(builder.inttoptr(args[0], prototype.as_pointer()), [args[1]])
-
-    return types.float64(types.int64, types.int64), codegen
+    return types.float64(types.int64, types.int64), _calling(_NUMBER, _ADDRESS)
 
 
 @intrinsic
 def _call_setter(typingctx, function, node, value):
-    def codegen(context, builder, signature, args):
-        prototype = ir.FunctionType(ir.IntType(1), [ir.IntType(64), ir.DoubleType()])
-        return builder.call(builder.inttoptr(args[0], prototype.as_pointer()), [args[1], args[2]])
-
-    return types.boolean(types.int64, types.int64, types.float64), codegen
+    return types.boolean(types.int64, types.int64, types.float64), _calling(_TRUTH, _ADDRESS, _NUMBER)
 
 
 @intrinsic
 def _call_run(typingctx, function, executive):
-    def codegen(context, builder, signature, args):
-        prototype = ir.FunctionType(ir.IntType(1), [ir.IntType(64)])
-        return builder.call(builder.inttoptr(args[0], prototype.as_pointer()), [args[1]])
-
-    return types.boolean(types.int64, types.int64), codegen
+    return types.boolean(types.int64, types.int64), _calling(_TRUTH, _ADDRESS)
 
 
 @kernel

@@ -27,12 +27,8 @@ from beaver_ftc.plant.adapter import FT_PER_M, PA_PER_PSF, Plant
 from beaver_ftc.plant.state import FlightState
 
 ACCELERATIONS = (
-    ("accelerations/udot-ft_sec2", 1.0 / FT_PER_M),
-    ("accelerations/vdot-ft_sec2", 1.0 / FT_PER_M),
-    ("accelerations/wdot-ft_sec2", 1.0 / FT_PER_M),
-    ("accelerations/pdot-rad_sec2", 1.0),
-    ("accelerations/qdot-rad_sec2", 1.0),
-    ("accelerations/rdot-rad_sec2", 1.0),
+    *((f"accelerations/{axis}dot-ft_sec2", 1.0 / FT_PER_M) for axis in "uvw"),
+    *((f"accelerations/{axis}dot-rad_sec2", 1.0) for axis in "pqr"),
 )
 STEP_RAD = 1e-5  # for differences
 MAX_CHANGE_RAD = 0.2  # a longer step leaves the region its Jacobian describes

@@ -66,37 +66,31 @@ def read_file(path: Path, given: str, kind: str = "scenario") -> str:
     return text_of(path, MAX_BYTES, None if looks_like_a_path(given) else lambda: no_such(given, kind))
 
 
-def _folder() -> Path:
-    return data_root() / "scenarios"
+def _builtin(kind: str) -> dict[str, Path]:
+    """Files of the built-in scenarios, or sweeps, by name; its file's name is a scenario's."""
+    folder = data_root() / "scenarios" / ("sweeps" if kind == "sweep" else "")
+    return dict(sorted((path.stem, path) for path in folder.glob("*.yaml")))
 
 
 def builtin_names() -> list[str]:
-    """Names of the built-in scenarios, in alphabetical order; a scenario's name is its file's."""
-    return sorted(path.stem for path in _folder().glob("*.yaml"))
-
-
-def builtin_sweeps() -> list[str]:
-    """Names of the sweeps that come with the project."""
-    return sorted(path.stem for path in (_folder() / "sweeps").glob("*.yaml"))
+    """Names of the built-in scenarios, in alphabetical order."""
+    return list(_builtin("scenario"))
 
 
 def builtin_path(name: str) -> Path:
     """The file of a built-in scenario."""
-    return _folder() / f"{name}.yaml"
+    return data_root() / "scenarios" / f"{name}.yaml"
 
 
 def builtin_scenarios() -> list[tuple[str, str, Path]]:
     """(name, description, file) of each built-in scenario."""
-    return [
-        (s.name, s.description, builtin_path(name))
-        for name in builtin_names()
-        for s in (load_scenario(name),)
-    ]
+    known = [(load_scenario(path), path) for path in _builtin("scenario").values()]
+    return [(scenario.name, scenario.description, path) for scenario, path in known]
 
 
 def no_such(given: str, kind: str) -> str:
     """What to say of a name that is no built-in `kind`, "scenario" or "sweep": perhaps it is of the other."""
-    names = {"scenario": builtin_names(), "sweep": builtin_sweeps()}
+    names = {kind: list(_builtin(kind)) for kind in ("scenario", "sweep")}
     other, flies = ("sweep", "sweep") if kind == "scenario" else ("scenario", "run")
     if given in names[other]:
         return f"{given} is a {other}, allowed: a {kind}; `beaver-ftc {flies} {given}` flies it"
@@ -109,13 +103,7 @@ def no_such(given: str, kind: str) -> str:
 
 def resolve(name_or_path: str | Path, kind: str = "scenario") -> Path:
     """The file a built-in name of a "scenario" or "sweep" stands for; anything else is a path already."""
-    given = str(name_or_path)
-    names, folder = (
-        (builtin_names(), _folder()) if kind == "scenario" else (builtin_sweeps(), _folder() / "sweeps")
-    )
-    if not looks_like_a_path(given) and given in names:
-        return folder / f"{given}.yaml"
-    return Path(name_or_path)
+    return _builtin(kind).get(str(name_or_path)) or Path(name_or_path)
 
 
 def looks_like_a_path(given: str) -> bool:

@@ -310,18 +310,19 @@ def _base(
 
 
 def _base_path(base: str, document: Document, source: str, folder: Path | None) -> Path:
-    if not looks_like_a_path(base) and base in builtin_names():
+    if base in builtin_names():
         return builtin_path(base)
     path = inside(folder or Path(), base)
     if path is None:
         allowed = "a file in the sweep's own folder or below it, or a built-in scenario"
         says = f"{base[:100]!r} is outside, allowed: {allowed}"
-        raise ScenarioError(source, [Problem(document.line(("base",)), ("base",), says)])
+    elif looks_like_a_path(base):
+        says = f"no such file: {base[:100]!r}, allowed: a scenario file"
+    else:
+        says = no_such(base, "scenario")
     with contextlib.suppress(OSError):  # a name no file can have
-        if path.is_file():
+        if path and path.is_file():
             return path
-    says = f"no such file: {base[:100]!r}, allowed: a scenario file"
-    says = says if looks_like_a_path(base) else no_such(base, "scenario")
     raise ScenarioError(source, [Problem(document.line(("base",)), ("base",), says)])
 
 
@@ -331,11 +332,8 @@ def _inline(document: Document, source: str, folder: Path | None) -> Scenario:
     try:
         return validate(Scenario, Document(document.data["base"], lines), source, folder)
     except ScenarioError as error:
-        raise ScenarioError(source, [_moved(problem, ("base",)) for problem in error.problems]) from None
-
-
-def _moved(problem: Problem, below: Location) -> Problem:
-    return Problem(problem.line, (*below, *problem.location), problem.says)
+        below = [Problem(one.line, ("base", *one.location), one.says) for one in error.problems]
+        raise ScenarioError(source, below) from None
 
 
 def _self_contained(data: dict[str, Any], scenario: Scenario) -> tuple[dict[str, Any], Aircraft]:
@@ -378,15 +376,12 @@ def _key_problems(base: dict[str, Any], vary: dict[str, Variation], document: Do
 
 
 def _overlap(key: str, places: dict[Location, str]) -> Iterator[str]:
-    try:
+    with contextlib.suppress(UnusableKeyError):
         location = parse_key(key)
-    except UnusableKeyError:
-        return
-    for other, name in places.items():
-        shorter = min(len(other), len(location))
-        if other[:shorter] == location[:shorter]:
-            yield f"is varied twice, allowed: either it or {name}"
-    places[location] = key
+        for other, name in places.items():
+            if all(one == same for one, same in zip(location, other, strict=False)):
+                yield f"is varied twice, allowed: either it or {name}"
+        places[location] = key
 
 
 def _refusals(base: dict[str, Any], key: str, how: Variation) -> Iterator[str]:

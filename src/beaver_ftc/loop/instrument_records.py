@@ -22,8 +22,8 @@ from beaver_ftc.scenario.schema import Scenario
 GRAVITY_M_S2, EARTH_RADIUS_M = 9.80665, 6_371_000.0
 FASTER = 1.4  # than at the start a flight may become
 TAKEN_OVER_PER_S = 3.0  # by the attitude, of a rate it stands in for, where its own noise is declared
-# Apart from the seed: noise of further instruments, of faults, of accelerometers.
-OTHER_COUNTERS = (0xD1B54A32D192ED03, 0x8CB92BA72F3D8DD7, 0xA0761D6478BD642F)
+# What sets the counters of random numbers apart: OF_THE_FIRST, OF_THE_FURTHER, OF_FAULTS, OF_FORCES.
+COUNTERS = (0, 0xD1B54A32D192ED03, 0x8CB92BA72F3D8DD7, 0xA0761D6478BD642F)
 
 
 def breaks_instruments(scenario: Scenario) -> bool:
@@ -102,10 +102,7 @@ def _samples(delay: float) -> int:
 
 def seed(instruments: np.void, number: int) -> None:
     """Let the random numbers of all instruments, further ones and faults, begin with a seed."""
-    instruments["random"] = number
-    names = "random_further", "random_fault", "random_force"
-    for name, counter in zip(names, OTHER_COUNTERS, strict=True):
-        instruments[name] = np.uint64(number) ^ np.uint64(counter)
+    instruments["random"] = np.uint64(number) ^ np.array(COUNTERS, np.uint64)
 
 
 def configure_watch(watch: np.void, scenario: Scenario, h: float) -> None:

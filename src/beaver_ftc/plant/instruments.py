@@ -32,6 +32,10 @@ LONGEST_DELAY = 1000  # JSBSim frames
 # Samples that all delay lines together keep: most flights', for which the same compiled code serves; any's.
 USUAL_LINE, MOST_LINE = 512, N_SENSORS * (LONGEST_DELAY + 2)
 
+# Counters of random numbers: those of one draw change nothing in the noise of another.
+OF_THE_FIRST, OF_THE_FURTHER, OF_FAULTS, OF_FORCES = range(4)
+N_COUNTERS = 4
+
 # What is broken of an instrument: offset, relative error, added noise; held and frozen at; no reading at all.
 SENSOR_FAULT = record(
     bias=float, scale=float, noise=float, frozen=int, holding=int, held=float, lost=int
@@ -42,7 +46,7 @@ SENSOR_FAULT = record(
 def instruments_dtype(line: int = USUAL_LINE) -> np.dtype:
     """The instruments of a flight whose delay lines keep so many samples."""
     return record(
-        real=int, random="u8", random_further="u8", random_force="u8",
+        real=int, random=("u8", N_COUNTERS), counter=int,  # and which one counts now
         gain=N_SENSORS, bias=N_SENSORS, noise=N_SENSORS, quantum=N_SENSORS, dropout=N_SENSORS,
         drift=N_SENSORS,  # per sample
         keep=N_SENSORS,  # exp(-bandwidth dt), 0 without lag
@@ -52,7 +56,7 @@ def instruments_dtype(line: int = USUAL_LINE) -> np.dtype:
         taken=(int, N_SENSORS),  # samples
         reading=N_SENSORS,
         engine=int,  # dpt is worked out from readings
-        broken=int, fault=(SENSOR_FAULT, N_SENSORS), random_fault="u8",
+        broken=int, fault=(SENSOR_FAULT, N_SENSORS),
     )  # fmt: skip
 
 
@@ -75,8 +79,8 @@ _30, _27, _31, _11 = np.uint64(30), np.uint64(27), np.uint64(31), np.uint64(11)
 @kernel
 def uniform(instruments):
     """The next random number of this flight, in [0, 1)."""
-    instruments.random += _GOLDEN
-    z = instruments.random
+    instruments.random[instruments.counter] += _GOLDEN
+    z = instruments.random[instruments.counter]
     z = (z ^ (z >> _30)) * _FIRST
     z = (z ^ (z >> _27)) * _SECOND
     z = z ^ (z >> _31)
@@ -152,27 +156,19 @@ def read_each(instruments, signals, start, end):
 @kernel
 def read_all(instruments, signals):
     """Put a sample of every signal but the accelerometers' in the place of the truth; signals (N_SENSORS,),
-    SI, as SENSORS.
-
-    The further instruments draw from a counter of their own: they change nothing in the noise of the first.
-    """
+    SI, as SENSORS."""
+    instruments.counter = OF_THE_FIRST
     read_each(instruments, signals, 0, N_SIGNALS)
     if signals.size > N_SIGNALS:
-        first = instruments.random
-        instruments.random = instruments.random_further
+        instruments.counter = OF_THE_FURTHER
         read_each(instruments, signals, N_SIGNALS, AX)
-        instruments.random_further = instruments.random
-        instruments.random = first
 
 
 @kernel
 def read_forces(instruments, signals):
-    """The same of the accelerometers, which are not read in every flight, from a counter of their own."""
-    first = instruments.random
-    instruments.random = instruments.random_force
+    """The same of the accelerometers, which are not read in every flight."""
+    instruments.counter = OF_FORCES
     read_each(instruments, signals, AX, N_SENSORS)
-    instruments.random_force = instruments.random
-    instruments.random = first
 
 
 @kernel
@@ -195,13 +191,10 @@ def break_all(instruments, signals, missing):
 
     A frozen instrument stays at its first reading of the fault.
     """
-    own = instruments.random
-    instruments.random = instruments.random_fault
+    instruments.counter = OF_FAULTS
     for i in range(signals.size):
         signals[i] = break_one(instruments, i, signals[i])
         missing[i] = instruments.fault[i].lost
-    instruments.random_fault = instruments.random
-    instruments.random = own
 
 
 @kernel

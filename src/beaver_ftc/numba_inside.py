@@ -301,17 +301,8 @@ def _lighten() -> None:
         return written[id(record)][0]
 
     numba.types.Record.__repr__ = text  # type: ignore[method-assign]
-    npydecl.ufunc_find_matching_loop = _loop_found
-
-
-def _loop_found(ufunc, types):
-    """In place of numba's: as before for the same types."""
-    return _loop_of(ufunc, tuple(types))
-
-
-@functools.cache
-def _loop_of(ufunc, types):
-    return ufunc_find_matching_loop(ufunc, types)
+    loop_of = functools.cache(ufunc_find_matching_loop)
+    npydecl.ufunc_find_matching_loop = lambda ufunc, types: loop_of(ufunc, tuple(types))
 
 
 _ADDRESS = ir.IntType(64)

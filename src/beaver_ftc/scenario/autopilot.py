@@ -1,6 +1,7 @@
 """What a scenario may say of the flight path (`autopilot:`): altitude, airspeed, heading or bank in time."""
 
 from collections.abc import Iterator
+from itertools import pairwise
 from typing import Any, Self
 
 from pydantic import model_validator
@@ -68,22 +69,18 @@ class Autopilot(Section):
     bank_deg: tuple[BankLeg, ...] = _legs("bank angle in time")
 
     @model_validator(mode="after")
-    def _legs_in_order(self) -> Self:
-        refuse([*self._out_of_order(), *self._both_heading_and_bank(), *self._no_thrust()])
+    def _fits_together(self) -> Self:
+        refuse(self._conflicts())
         return self
 
-    def _out_of_order(self) -> Iterator[Conflict]:
+    def _conflicts(self) -> Iterator[Conflict]:
         for name, legs in self:
-            for i in range(1, len(legs)):
-                before, at_s = legs[i - 1].at_s, legs[i].at_s
-                if at_s <= before:
-                    yield (name, i, "at_s"), f"{at_s:g} is not after {before:g}, allowed: legs in order"
-
-    def _both_heading_and_bank(self) -> Iterator[Conflict]:
+            for i, (before, leg) in enumerate(pairwise(legs), start=1):
+                if leg.at_s <= before.at_s:
+                    says = f"{leg.at_s:g} is not after {before.at_s:g}, allowed: legs in order"
+                    yield (name, i, "at_s"), says
         if self.heading_deg and self.bank_deg:
             yield ("bank_deg",), "contradicts heading_deg, allowed: one of the two"
-
-    def _no_thrust(self) -> Iterator[Conflict]:
         aircraft = checked_aircraft()
         if self.airspeed_mps and THRUST_TERM not in aircraft.terms:
             yield (

@@ -302,7 +302,7 @@ def _lighten() -> None:
 
     numba.types.Record.__repr__ = text  # type: ignore[method-assign]
     loop_of = functools.cache(ufunc_find_matching_loop)
-    npydecl.ufunc_find_matching_loop = lambda ufunc, types: loop_of(ufunc, tuple(types))
+    npydecl.ufunc_find_matching_loop = lambda ufunc, arg_types: loop_of(ufunc, tuple(arg_types))
 
 
 _ADDRESS = ir.IntType(64)

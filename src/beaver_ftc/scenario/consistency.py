@@ -19,7 +19,7 @@ OF_A_FAULT = (
     "post_fault_rms_deg_s",
 )  # fmt: skip
 # What can be expected of a profile, below `expect`, and the channel of the autopilot it is of.
-_OF_A_PROFILE = {
+_OF_A_PROFILE: dict[tuple[str, ...], str] = {
     ("altitude_within_m",): "altitude_m",
     ("airspeed_within_mps",): "airspeed_mps",
     ("airspeed_within_limits_mps",): "airspeed_mps",

@@ -77,6 +77,11 @@ def builtin_names() -> list[str]:
     return list(_builtin("scenario"))
 
 
+def builtin_sweeps() -> list[str]:
+    """Names of the sweeps that come with the project."""
+    return list(_builtin("sweep"))
+
+
 def builtin_path(name: str) -> Path:
     """The file of a built-in scenario."""
     return data_root() / "scenarios" / f"{name}.yaml"

@@ -1,10 +1,11 @@
 """A dumped scenario is complete, and is the scenario."""
 
+import pytest
 import yaml
 from hypothesis import given, settings
 
 from beaver_ftc.scenario.dump import to_yaml
-from beaver_ftc.scenario.loader import load_scenario, load_text
+from beaver_ftc.scenario.loader import load, load_scenario, load_text
 from beaver_ftc.scenario.schema import Scenario
 
 from .strategies import SCENARIOS
@@ -17,6 +18,12 @@ def test_a_dump_loads_as_the_same_scenario(data):
     text = to_yaml(scenario)
     assert load_text(text) == scenario
     assert to_yaml(load_text(text)) == text
+
+
+@pytest.mark.parametrize("text", ["*\x85", "a\u2028b", "\u2029"])
+def test_line_separators_of_unicode_come_back(text):
+    scenario = load({"name": "a", "description": text})
+    assert load_text(to_yaml(scenario)).description == text
 
 
 def test_a_dump_says_every_default():

@@ -1,5 +1,6 @@
 """A scenario back to text: complete and flyable again, or by section, a key to what was computed."""
 
+import re
 from collections.abc import Iterable
 from typing import Any
 
@@ -7,6 +8,7 @@ import yaml
 from pydantic import BaseModel
 
 _MOST = 256
+_SEPARATORS = re.compile("[\x85\u2028\u2029]")
 _texts: dict[int, tuple[BaseModel, str]] = {}  # a section is kept, so its id stays its own
 
 
@@ -30,6 +32,13 @@ def _list(dumper: yaml.SafeDumper, items: list[Any]) -> yaml.Node:
     return dumper.represent_sequence("tag:yaml.org,2002:seq", items, flow_style=all(map(_is_leaf, items)))
 
 
+def _text(dumper: yaml.SafeDumper, text: str) -> yaml.Node:
+    """Line separators of Unicode are escaped: as they are, they read back as a space."""
+    style = '"' if _SEPARATORS.search(text) else None
+    return dumper.represent_scalar("tag:yaml.org,2002:str", text, style=style)
+
+
+_Dumper.add_representer(str, _text)
 _Dumper.add_representer(dict, _mapping)
 _Dumper.add_representer(list, _list)
 

@@ -1,13 +1,15 @@
 """Diagnosis of flights whose faults are known; causal, calibrated, honest about what is together."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.flights.diagnose import diagnose
+from beaver_ftc.flights.diagnose import Rows, diagnose
 from beaver_ftc.flights.findings import verdict_of
 from beaver_ftc.flights.samples import load_flights
-from beaver_ftc.flights.scoring import by_labels
+from beaver_ftc.flights.scoring import by_labels, score
 from flights import synthetic
 
 PARTS = ((60, 120, 1.0, 0.5), (160, 220, 0.4, 1.0))
@@ -57,14 +59,26 @@ def test_bounds_are_in_order_and_hold_the_estimate(rows):
 
 
 def test_score_of_a_perfect_diagnosis(flown, rows):
-    from dataclasses import replace
-
     faulty = (flown.labels < 1).any(axis=1).astype(int)
     perfect = replace(rows, estimate=flown.labels, low=flown.labels, high=flown.labels, faulty=faulty)
     found = by_labels(perfect, flown.labels)
     assert [found[key] for key in ("classes", "healthy_or_faulty", "side", "held_by_bounds")] == [1.0] * 4
     assert found["mean_error"] == 0.0
     assert by_labels(replace(perfect, estimate=np.ones_like(flown.labels)), flown.labels)["classes"] < 0.7
+
+
+def test_a_score_by_one_label_on_the_stamps_of_a_faster_log(flown, rows):
+    """Two stamps a sample, and a surface without a label: the figures of the other one."""
+    labels = flown.labels.copy()
+    labels[:, 0] = np.nan
+    twice = {name: np.repeat(getattr(rows, name), 2, axis=0) for name in rows.__dataclass_fields__}
+    twice["t_s"] = twice["t_s"] + np.tile([0.0, 0.4 * flown.dt_s], len(rows.t_s))
+    found = score(replace(flown, labels=labels), Rows(**twice), [["right"], ["left"]])
+    left = {name: getattr(rows, name)[:, 1:] for name in ("estimate", "low", "high")}
+    wanted = by_labels(replace(rows, **left), flown.labels[:, 1:])
+    assert found.pop("rows") == 2 * wanted.pop("rows")
+    assert found.pop("settings") == wanted.pop("settings")
+    assert found == {key: pytest.approx(value) for key, value in wanted.items()}
 
 
 def test_another_rate_is_refused(wing, wing_folder, wing_model):

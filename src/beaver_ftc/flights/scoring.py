@@ -3,6 +3,7 @@
 Used after the fact (`--score`, the benchmark, identification's own tests), never by the filter.
 """
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -18,10 +19,17 @@ _SETTLED_S = 2.0
 
 
 def score(samples: Samples, rows: Rows, groups: list[list[str]]) -> Document:
-    """Every figure that the log's own word allows: by labels where it has them, by its failure otherwise."""
-    if np.isfinite(samples.labels).any():
-        return by_labels(rows, samples.labels)
-    return by_event(rows, samples.events, groups)
+    """Every figure that the log's own word allows: by labels where it has them, by its failure otherwise.
+
+    Of a log faster than its samples each row has the label of its last sample; a surface of which the log
+    says nothing is not judged.
+    """
+    labelled = np.isfinite(samples.labels).any(axis=0)
+    if not labelled.any():
+        return by_event(rows, samples.events, groups)
+    last = np.maximum(np.searchsorted(samples.t_s, rows.t_s, side="right") - 1, 0)
+    judged = {name: getattr(rows, name).compress(labelled, axis=1) for name in ("estimate", "low", "high")}
+    return by_labels(replace(rows, **judged), samples.labels[last].compress(labelled, axis=1))
 
 
 def by_labels(rows: Rows, labels: Floats) -> Document:

@@ -36,7 +36,7 @@ AT_MOST_S = 65.0  # of a mission
 DRAWN_SEED, N_DRAWN = 424_242, 110
 VARYING = re.compile(
     r'"?\b(wall_s|elapsed_s|seconds|took_s|wall_time_s|created|date|version|cpu_s|commit|real_time_factor'
-    r'|times_real_time|flight code|code)"?\s*[:=]\s*[^,}\n]*'
+    r'|times_real_time|flight code|code|us)"?\s*[:=]\s*[^,}\n]*'
 )
 SMALL_SWEEP = {
     "name": "small", "base": "elevator-partial-loss", "set": {"duration_s": 15}, "runs": 12, "seed": 3,

@@ -70,6 +70,7 @@ def test_a_stopped_campaign_goes_on_and_a_longer_one_builds_on_it(flown, tmp_pat
 
 def test_a_chunk_half_written_is_flown_again(flown, tmp_path):
     (tmp_path / ".faulty-0000000-0000001.json.7").write_text('[{"index": 0, "del')
+    (tmp_path / "faulty-0000000-0000001.json").write_text('[{"index": 0, "del')
     assert conduct(SMALL, tmp_path, workers=1) == flown[0]
 
 

@@ -275,9 +275,13 @@ def _open(folder: Path, campaign: Campaign) -> None:
 
 
 def _kept(folder: Path, kind: str) -> dict[int, Row]:
+    """What has landed; what cannot be read is removed, to be flown again."""
     rows: dict[int, Row] = {}
     for file in sorted(folder.glob(f"{kind}-*.json")):
-        rows.update((row["index"], row) for row in json.loads(file.read_text(encoding="utf-8")))
+        try:
+            rows.update((row["index"], row) for row in json.loads(file.read_text(encoding="utf-8")))
+        except (ValueError, KeyError, TypeError):
+            file.unlink()
     return rows
 
 

@@ -12,6 +12,7 @@ from typer.testing import CliRunner
 
 from beaver_ftc.cli.main import app
 from beaver_ftc.diagnosis.rivals import TUNED, TUNED_FOR_ERRORS, tuned
+from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.plugins import plugin_class
 from beaver_ftc.scenario.schema import Scenario
@@ -351,3 +352,14 @@ def test_a_comparison_that_is_killed_goes_on_to_the_same_document(sweep, compare
         for row in each["sets"]["few"]["lines"]:
             row.pop("us")  # the one thing that is measured on the clock
     assert document["sets"] == compared[0]["sets"]
+
+
+def test_a_result_whose_scenario_is_no_yaml_is_said_in_one_line(tmp_path):
+    (tmp_path / "metrics.json").write_text("{}")
+    (tmp_path / "log.parquet").touch()
+    (tmp_path / "scenario.yaml").write_text("name: [")
+    with pytest.raises(
+        BadInput, match=r"holds a metrics\.json or a scenario\.yaml that cannot be read"
+    ) as said:
+        read_runs([tmp_path])
+    assert "\n" not in str(said.value)

@@ -33,7 +33,9 @@ def read_runs(folders: Sequence[Path]) -> list[Document]:
         except OSError as error:
             mistakes.append(f"{folder}: holds no {Path(error.filename).name}, {_ALLOWED}")
         except (ValueError, KeyError, TypeError):
-            mistakes.append(f"{folder}: holds a metrics.json that cannot be read, {_ALLOWED}")
+            mistakes.append(
+                f"{folder}: holds a file that cannot be read (metrics.json, scenario.yaml), {_ALLOWED}"
+            )
     if mistakes:
         raise BadInput("\n".join(mistakes))
     return runs
@@ -44,7 +46,10 @@ def _read(folder: Path) -> Document:
 
     document = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
     (folder / "log.parquet").stat()
-    flown = yaml.safe_load((folder / "scenario.yaml").read_text(encoding="utf-8"))
+    try:
+        flown = yaml.safe_load((folder / "scenario.yaml").read_text(encoding="utf-8"))
+    except yaml.YAMLError as error:
+        raise ValueError("no YAML") from error
     run = document | {"folder": str(folder), "flown": flown}
     rows_of(run)  # a document that lacks a key is refused here
     return run

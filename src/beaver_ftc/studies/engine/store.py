@@ -195,7 +195,7 @@ def plug_ins() -> dict[str, str]:
 
 def hashed_files() -> list[Path]:
     """The sources and data that rows may follow from: all but the rooms that make none."""
-    ours = (path for path in PACKAGE.rglob("*") if path.suffix in (".py", ".json"))
+    ours = (path for path in PACKAGE.rglob("*") if path.suffix in (".py", ".json", ".yaml"))
     sources = [path for path in ours if path.relative_to(PACKAGE).parts[0] not in NO_ROWS]
     aircraft = [path for path in (data_root() / "aircraft").rglob("*") if path.is_file()]
     return sorted({*sources, *aircraft})

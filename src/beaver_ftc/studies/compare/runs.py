@@ -33,9 +33,7 @@ def read_runs(folders: Sequence[Path]) -> list[Document]:
         except OSError as error:
             mistakes.append(f"{folder}: holds no {Path(error.filename).name}, {_ALLOWED}")
         except (ValueError, KeyError, TypeError):
-            mistakes.append(
-                f"{folder}: holds a file that cannot be read (metrics.json, scenario.yaml), {_ALLOWED}"
-            )
+            mistakes.append(f"{folder}: metrics.json or scenario.yaml cannot be read, {_ALLOWED}")
     if mistakes:
         raise BadInput("\n".join(mistakes))
     return runs

@@ -6,8 +6,6 @@ from tools.actuators import files
 from beaver_ftc.aircraft import load
 from beaver_ftc.design.fdc import (
     COEFFICIENTS,
-    ENVELOPE_AIRSPEED_MPS,
-    ENVELOPE_ALPHA_RAD,
     GEOMETRY,
     MASS,
     SURFACES,
@@ -127,7 +125,7 @@ def test_inertia_coupling_error_has_the_table_s_coefficient(functions, axis, nam
 
 def test_envelope_is_the_table_s(functions):
     limits = numbers(functions["aero/envelope-valid"])
-    assert limits == pytest.approx([*ENVELOPE_AIRSPEED_MPS, *ENVELOPE_ALPHA_RAD], abs=1e-9)
+    assert limits == pytest.approx([*load().envelope.airspeed_mps, *load().alpha_rad], abs=1e-9)
 
 
 @pytest.mark.parametrize("surface", SURFACES)

@@ -30,8 +30,7 @@ GOES_ON = {
     "scheme": {"fdi.bank.closest", "fdi.statistical.alarm.closest"},
     "sensors": {
         f"instruments.{name}"
-        for name in ("random", "random_further", "random_force", "random_fault", "lagged", "line", "reading",
-                     "broken", "fault")
+        for name in ("random", "counter", "lagged", "line", "reading", "broken", "fault")
     },
 }  # fmt: skip
 GOES_ON["observer"] = GOES_ON["law"] | {"control.rejection.begun", "control.rejection.rate"}

@@ -260,7 +260,7 @@ def test_a_mutant_of_glue_finds_the_compiled_code_that_it_leaves_as_it_is(mode, 
 def test_where_compiled_code_is_kept_changes_with_what_kernels_are_made_of(monkeypatch, tmp_path):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
-    file = scope.PACKAGE / "documents" / "repair.py"  # glue, which the schema that kernels read imports
+    file = scope.PACKAGE / "documents" / "validation.py"  # glue, which the schema that kernels read imports
     with trial._instead(file, file.read_text()) as same:
         assert trial._code_of(same) == trial._code_of(scope.PACKAGE)
     with trial._instead(file, f"{file.read_text()}# ") as other:

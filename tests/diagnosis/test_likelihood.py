@@ -276,6 +276,8 @@ def _largest_share(block, innovations, moments):
     for k, (nu, moment) in enumerate(zip(innovations, moments, strict=True)):
         likelihood.start(block, likelihood.slot_to_start(k))
         block["scratch"][0], block["hypothesis"][0]["signature"][0] = nu, moment
+        if block["calm"]["n"]:
+            likelihood.follow_calm(block, FRAME_S)
         likelihood.take_in(block, np.zeros(3), False, FRAME_S, 1.0)
         most = max(most, block["hypothesis"][0]["score"])
     return most

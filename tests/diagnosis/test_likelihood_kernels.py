@@ -158,6 +158,7 @@ def test_what_calm_air_foretells_is_what_the_calm_filter_sees_by_as_much_as_it_l
     block["innovation"], block["scratch"] = (0.003, -0.001), (0.4, -0.2)
     block["agreement"], block["size"] = agreement, size
     inverse, g = block["S_inverse"].copy(), block["innovation"].copy()
+    likelihood.follow_calm(block, DT)
     likelihood.foresee(block, DT)
     likelihood.advance(alone, DT)
     likelihood.whiten(alone, alone["state"], np.array([0.4, -0.2]), DT, alone["innovation"])

@@ -223,12 +223,17 @@ def whiten(block, state, acceleration, dt, out):
 
 
 @kernel
+def follow_calm(block, dt):
+    """Whiten the frame, `scratch`, by the filter that reckons with no gust."""
+    advance(block.calm, dt)
+    whiten(block.calm, block.calm.state, block.scratch, dt, block.calm.innovation)
+
+
+@kernel
 def foresee(block, dt):
     """Fill `foreseen` (2,) rad/s: what of this frame's whitened innovation the past foretells if the air is
-    calmer than declared, as far as it has lately been."""
+    calmer than declared, as far as it has lately been. `follow_calm` has taken the frame in."""
     calm, foreseen, g = block.calm, block.foreseen, block.innovation
-    advance(calm, dt)
-    whiten(calm, calm.state, block.scratch, dt, calm.innovation)
     kept = np.exp(-dt / FOLLOWED_S)
     block.agreement *= kept
     block.size *= kept

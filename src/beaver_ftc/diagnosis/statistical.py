@@ -77,13 +77,17 @@ def observe(tests, bounded, blocks, air, innovation, dt, k, latched, ends=False)
     """Take in frame k: innovation and `bounded` (3,) rad/s2, whether the alarm is out; ends:
     a loss may."""
     keep, slot = tests.keep if latched else 1.0, likelihood.slot_to_start(k)
-    for block in blocks:
+    for b, block in enumerate(blocks):
         if not latched:
             likelihood.start(block, slot)
-        if air.moving:
-            leap(air, block)
         for i, axis in enumerate(block.axis[: block.n]):
             block.scratch[i] = innovation[axis] - air.mean[axis]
+        if air.moving:
+            leap(air, block)
+            if b < likelihood.RETURNING:
+                likelihood.follow_calm(block, dt)
+            else:  # calm air is the same for both views of roll and yaw
+                block.calm.innovation[:] = blocks[LATERAL].calm.innovation
         memory = tests.keep if ends else 0.0
         likelihood.take_in(block, bounded, tests.tolerated, dt, keep, memory)
 

@@ -4,13 +4,32 @@ import os
 import sys
 from pathlib import Path
 
+import pytest
 from hypothesis import settings
 
 sys.path.insert(0, str(Path(__file__).parent))
 
+import kept as kept_documents
+
 # No deadline: a first call compiles. Derandomised: a red build can be repeated.
 settings.register_profile("repeatable", deadline=None, derandomize=True)
 settings.load_profile("repeatable")
+
+
+def pytest_addoption(parser):
+    parser.addoption("--keep", action="store_true", help="write anew what differs from tests/kept/")
+
+
+@pytest.fixture
+def kept(request):
+    """kept(document): it is as an earlier revision made it, see tests/kept.py. part: of several of a test."""
+    file = Path(request.node.path).relative_to(Path(__file__).parent).with_suffix("")
+
+    def hold(document, part=""):
+        name = request.node.name.replace("/", "-") + (f"-{part}" if part else "")
+        kept_documents.hold(f"{file}/{name}", document, request.config.getoption("--keep"))
+
+    return hold
 
 
 def pytest_sessionstart(session):

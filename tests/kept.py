@@ -1,0 +1,157 @@
+"""What an earlier revision made of a case, kept below tests/kept/: nothing of it changes unseen.
+
+Whether it is right the other tests say, and people who read it: figures, pages and tables were looked at
+before they were kept. `pytest --keep` writes anew what differs; read the difference before you commit it.
+"""
+
+import json
+import re
+from collections.abc import Iterator, Mapping
+from math import isclose, isfinite
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+FOLDER = Path(__file__).with_name("kept")
+RELATIVE, ABSOLUTE, DIGITS = 1e-6, 1e-9, 9
+_EMBEDDED = re.compile(r"data:[a-z/+-]+;base64,[A-Za-z0-9+/=]+")
+
+
+def hold(name: str, found: Any, anew: bool = False) -> None:
+    """Compare a document with the one kept under this name. anew: keep this one instead."""
+    file, found = FOLDER / f"{name}.json", _plain(found)
+    if anew:
+        if not file.exists() or any(_differences(json.loads(file.read_text()), found)):
+            file.parent.mkdir(parents=True, exist_ok=True)
+            file.write_text(json.dumps(found, indent=1, ensure_ascii=False) + "\n")
+        return
+    assert file.exists(), f"{name}: nothing is kept; pytest --keep"
+    differs = list(_differences(json.loads(file.read_text()), found))
+    assert not differs, f"{len(differs)} differences from tests/kept/{name}.json:\n" + "\n".join(differs[:20])
+
+
+def _plain(value: Any) -> Any:
+    """A document of JSON's own types; floats rounded, those that are none by name."""
+    match value:
+        case Mapping():
+            return {str(key): _plain(inner) for key, inner in value.items()}
+        case list() | tuple() | set() | frozenset():
+            return [_plain(one) for one in (sorted(value) if isinstance(value, set | frozenset) else value)]
+        case np.ndarray() | np.generic():
+            return _plain(value.tolist())
+        case float() if isfinite(value):
+            return float(f"{value:.{DIGITS}g}")
+    return value if isinstance(value, int | None) else str(value)
+
+
+def _differences(kept: Any, found: Any, path: str = "") -> Iterator[str]:
+    if isinstance(kept, dict) and isinstance(found, dict):
+        for key in kept | found:
+            yield from _differences(kept.get(key, "-"), found.get(key, "-"), f"{path}.{key}")
+    elif isinstance(kept, list) and isinstance(found, list) and len(kept) == len(found):
+        for i, (before, now) in enumerate(zip(kept, found, strict=True)):
+            yield from _differences(before, now, f"{path}[{i}]")
+    elif not _same(kept, found):
+        yield f"{path}: {str(kept)[:200]} -> {str(found)[:200]}"
+
+
+def _same(kept: Any, found: Any) -> bool:
+    if isinstance(kept, float) and isinstance(found, float):
+        return isclose(kept, found, rel_tol=RELATIVE, abs_tol=ABSOLUTE)
+    return type(kept) is type(found) and kept == found
+
+
+def in_short(array: Any) -> list[float]:
+    """An array of numbers in three: the sums, by weights that differ, of those above and of those below zero,
+    and how many are finite.
+    """
+    flat = np.asarray(array, float).ravel()
+    finite = np.isfinite(flat)
+    numbers = np.where(finite, flat, 0.0)
+    weighted = numbers * (1.0 + 0.618034 * np.arange(1, flat.size + 1) % 1.0)
+    return [float(weighted[numbers > 0].sum()), float(weighted[numbers < 0].sum()), int(finite.sum())]
+
+
+def of_record(record: np.ndarray, path: str = "") -> dict[str, Any]:
+    """Every field of a record that is not zero, by its path: a number as it is, an array in short."""
+    if record.dtype.names:
+        return {
+            key: value
+            for name in record.dtype.names
+            for key, value in of_record(record[name], f"{path}.{name}" if path else name).items()
+        }
+    array = np.asarray(record)
+    if not array.any():
+        return {}
+    return {path: array.item() if array.size == 1 else in_short(array)}
+
+
+def page(text: str) -> list[str]:
+    """The lines of a page without the pictures in it."""
+    return [line.rstrip() for line in _EMBEDDED.sub("data:", text).splitlines() if line.strip()]
+
+
+def picture(figure: Any) -> dict[str, Any]:
+    """What a figure of Matplotlib shows, in words and numbers: axes, lines, marks, areas, texts."""
+    figure.canvas.draw()
+    return {
+        "title": figure.get_suptitle(),
+        "legends": _legends(figure),
+        "axes": list(map(_axes, figure.axes)),
+    }
+
+
+def _axes(axes: Any) -> dict[str, Any]:
+    found = {
+        "title": [axes.get_title(loc=where) for where in ("left", "center", "right")],
+        "labels": [axes.get_xlabel(), axes.get_ylabel()],
+        "scales": [axes.get_xscale(), axes.get_yscale()],
+        "limits": [*axes.get_xlim(), *axes.get_ylim()],
+        "ticks": [[tick.get_text() for tick in one.get_ticklabels()] for one in (axes.xaxis, axes.yaxis)],
+        "legend": _legends(axes),
+        "lines": list(map(_line, axes.lines)),
+        "marks": list(map(_marks, axes.collections)),
+        "areas": list(map(_area, axes.patches)),
+        "images": [[in_short(np.ma.filled(one.get_array(), np.nan)), *one.get_clim()] for one in axes.images],
+        "texts": [[text.get_text(), *text.get_position(), _colour(text)] for text in axes.texts],
+    }
+    return {what: value for what, value in _plain(found).items() if any(one not in ("", []) for one in value)}
+
+
+def _legends(of: Any) -> list[str]:
+    legends = of.legends if hasattr(of, "legends") else [one for one in [of.get_legend()] if one]
+    return [text.get_text() for legend in legends for text in [legend.get_title(), *legend.get_texts()]]
+
+
+def _colour(of: Any) -> str:
+    from matplotlib.colors import to_hex
+
+    return to_hex(of.get_color(), keep_alpha=True)
+
+
+def _line(line: Any) -> list[Any]:
+    x, y = (in_short(_numbers(data)) for data in line.get_data(orig=False))
+    return [line.get_label(), _colour(line), line.get_linestyle(), str(line.get_marker()), *x, *y]
+
+
+def _numbers(data: Any) -> np.ndarray:
+    return np.ma.filled(np.ma.asarray(data, float), np.nan)
+
+
+def _marks(marks: Any) -> list[Any]:
+    paths = [path.vertices for path in marks.get_paths()]
+    colours = [in_short(marks.get_facecolor()), in_short(marks.get_edgecolor())]
+    corners = in_short(np.concatenate(paths)) if paths else []
+    return [
+        type(marks).__name__,
+        marks.get_label(),
+        in_short(_numbers(marks.get_offsets())),
+        corners,
+        *colours,
+    ]
+
+
+def _area(patch: Any) -> list[Any]:
+    corners = patch.get_patch_transform().transform(patch.get_path().vertices)
+    return [patch.get_label(), in_short(corners), in_short(patch.get_facecolor()), patch.get_hatch()]

@@ -3,11 +3,20 @@
 import numpy as np
 import pytest
 
-from beaver_ftc.design.model import both_responses, design_record
+from beaver_ftc.control.reference import discretise
+from beaver_ftc.design.fdc import MASS
+from beaver_ftc.design.model import both_responses, design_record, inertia_coefficients
+from beaver_ftc.diagnosis.bounds.declared import EARTH_RATE_RAD_S
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.plant.faults import FaultSchedule
-from beaver_ftc.studies.bench.straightforward import PublishedModel, Straightforward
+from beaver_ftc.studies.bench.straightforward import (
+    Estimators,
+    FeedbackLinearisation,
+    PublishedModel,
+    Straightforward,
+)
 from flying import Memory, scenario
+from kept import in_short
 
 FAULT_FRAME, FRAMES = 200, 500
 LOSS = {"actuator": "elevator", "type": "loss_of_effectiveness", "magnitude": 0.4, "at_s": 2}
@@ -58,3 +67,106 @@ def test_it_flies_as_well_as_the_loop(flown, wanted):
     fly(wanted, log)
     errors = [row["q_rad_s"] - row["q_model_rad_s"] for row in flown.log[FAULT_FRAME:]]
     assert np.rad2deg(np.sqrt(np.mean(np.square(errors)))) < 2 * log.rms_deg_s("q", 2.0) + 0.05
+
+
+def test_every_column_and_all_it_remembers_are_as_before(flown, kept):
+    estimators, law = in_full(flown.estimators), in_full(flown.law)
+    kept({"log": by_column(flown.log), "estimators": estimators, "law": law})
+
+
+def by_column(log):
+    return {name: in_short([row[name] for row in log]) for name in log[0]}
+
+
+def in_full(of):
+    """All that an object remembers; arrays of many numbers in short."""
+    arrays = {name: np.asarray(value) for name, value in vars(of).items()}
+    return {name: of.tolist() if of.size <= 9 else in_short(of) for name, of in arrays.items()}
+
+
+def test_it_takes_over_in_flight_and_starts_again_where_it_did(kept):
+    user = Straightforward(scenario(duration_s=3, rate_hz=50), at_s=1.0, frames=20)
+    for _ in range(2):
+        user.fly(20)
+        kept({"log": by_column(user.log), "law": in_full(user.law)})
+        user.prepare()
+        assert user.log == []
+
+
+RATES = np.array([0.3, -0.2, 0.25])
+SURFACE_GIVES = 0.05 * np.array([[-6.0, 0.0, -0.5], [0.0, -9.0, 0.0], [0.5, 0.0, -3.0]])  # (surface, axis)
+BOUND = np.array([0.02, 0.03, 0.04])
+
+
+def estimated(missing, frames=60):
+    """Estimators that have watched a body whose acceleration is known but for `missing` (3,) rad/s2, which
+    begins at frame 10; what all of them knew at some frames."""
+    wanted = scenario(fdi={"forgetting_time_s": 2.0}, control={"network_leak_per_s": 0.5})
+    found, known, x = Estimators(wanted, 0.02), [], RATES
+    found.x_hat = x
+    for k in range(frames):
+        shaking = np.array([1.0, -0.5, 0.8]) * np.sin(0.3 * k)
+        Z = SURFACE_GIVES * (1.0 + 0.5 * np.cos(0.2 * k))
+        found.predict(x, shaking, Z, BOUND)
+        x = x + 0.02 * (shaking + (k >= 10) * missing @ Z)
+        found.judge(x, 0.1 + 0.002 * k, 0.05 - 0.003 * k)
+        if k in (5, 15, frames - 1):
+            believed = {"isolated": found.isolated, "unknown": found.unknown.tolist()}
+            known.append(in_full(found) | believed | {"effectiveness": found.effectiveness.tolist()})
+    return known
+
+
+@pytest.mark.parametrize(
+    ("missing", "isolated"),
+    [((0, 0, 0), None), ((-0.6, 0, 0), 0), ((0, -0.4, 0), 1), ((0, 0, -0.97), 2), ((0.9, 1.5, 0.8), None)],
+    ids=["healthy", "aileron", "elevator", "rudder gone", "none of these"],
+)  # fmt: skip
+def test_what_the_estimators_remember_frame_by_frame(missing, isolated, kept):
+    known = estimated(np.array(missing, float))
+    last = known[-1]
+    assert last["detected"] == any(missing)
+    assert last["isolated"] == isolated
+    if isolated is not None:
+        left = 1.0 + missing[isolated]
+        assert last["effectiveness"][isolated] == pytest.approx(max(left, 0.1), abs=0.05)
+        assert [last["effectiveness"][s] for s in range(4) if s != isolated] == [1.0] * 3
+    kept(known)
+
+
+def test_its_bound_is_the_published_one_and_the_turning_earths(kept):
+    """Each axis the product of the two other rates; of the Earth 2 W |x| and its square [bounds.declared]."""
+    user = object.__new__(Straightforward)
+    constant = {"constant_rad_s2": {"p": 0.01, "q": 0.02, "r": 0.03}}
+    coupling = {"inertia_coupling": {"p": 0.1, "q": 0.2, "r": 0.3}}
+    user.model, user.scenario = PublishedModel(), scenario(fdi={"bounds": constant | coupling})
+    inertia, (p, q, r) = inertia_coefficients(MASS), (0.5, -0.3, 0.2)
+    earth = 2.0 * EARTH_RATE_RAD_S * (0.5 + 0.3 + 0.2) + EARTH_RATE_RAD_S**2
+    expected = np.array([0.01, 0.02, 0.03]) + earth
+    expected += np.abs([0.1 * inertia.Pqr * q * r, 0.2 * inertia.Qpr * p * r, 0.3 * inertia.Rpq * p * q])
+    assert user.bound(np.array([p, q, r])) == pytest.approx(expected, rel=1e-12)
+    nothing = dict.fromkeys("pqr", 0.0)
+    user.scenario = scenario(fdi={"bounds": {"constant_rad_s2": nothing, "inertia_coupling": nothing}})
+    assert user.bound(np.zeros(3)) == pytest.approx([EARTH_RATE_RAD_S**2] * 3, rel=1e-12)
+
+
+def test_its_law_cancels_the_model_and_follows_the_reference():
+    """u = G^-1 (reference's acceleration + Kp e + Ki int e - f - unknown), the flap left where it is."""
+    wanted, dt, flap = scenario(), 0.01, 0.1
+    law = FeedbackLinearisation(wanted, dt, flap)
+    rng = np.random.default_rng(7)
+    G = np.diag([-8.0, -10.0, -4.0]) @ np.eye(3, 4) + np.outer([0.0, -2.0, 0.0], [0, 0, 0, 1])
+    A, B = discretise(wanted.control.reference_natural_frequency_rad_s, wanted.control.reference_damping, dt)
+    model, summed = np.zeros((2, 3)), np.zeros(3)
+    for k in range(4):
+        x, f, unknown, reference = rng.uniform(-0.1, 0.1, (4, 3))
+        error = model[0] - x
+        summed += dt * error
+        demand = model[1] + law.Kp * error + law.Ki * summed - f - unknown - G[:, 3] * flap
+        asked = demand / np.diag(G)
+        u = law.command(x, f, G, unknown, reference)
+        assert u == pytest.approx([*asked, flap], rel=1e-12)
+        model = A @ model + np.outer(B, reference)
+        assert law.model == pytest.approx(model), k
+    far = law.command(x, np.array([50.0, -50.0, 1.0]), G, unknown, reference)
+    assert far[:2].tolist() == [0.44, -0.44]
+    assert (law.Kp, law.Ki) == (wanted.control.proportional_per_s, wanted.control.integral_per_s2)

@@ -155,3 +155,25 @@ def _marks(marks: Any) -> list[Any]:
 def _area(patch: Any) -> list[Any]:
     corners = patch.get_patch_transform().transform(patch.get_path().vertices)
     return [patch.get_label(), in_short(corners), in_short(patch.get_facecolor()), patch.get_hatch()]
+
+
+def looks(figure: Any) -> list[Any]:
+    """What the eye sees of a figure beside what `picture` says of it: sizes, widths, dashes, transparency."""
+    return [figure.get_size_inches().tolist(), [_looks(axes) for axes in figure.axes]]
+
+
+def _looks(axes: Any) -> list[Any]:
+    grid = [line for of in (axes.xaxis, axes.yaxis) for line in of.get_gridlines()[:1] if line.get_visible()]
+    marked = [marks for marks in axes.collections if hasattr(marks, "get_sizes")]
+    return [
+        *(
+            [_colour(line), line.get_alpha(), line.get_linewidth(), _dashes(line)]
+            for line in axes.lines + grid
+        ),
+        *([*map(float, marks.get_sizes()), marks.get_alpha()] for marks in marked),
+    ]
+
+
+def _dashes(line: Any) -> list[float]:
+    _, dashes = line._unscaled_dash_pattern  # Matplotlib has no public name for it
+    return list(dashes or [])

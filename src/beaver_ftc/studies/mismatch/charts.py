@@ -29,6 +29,7 @@ AXIS_NAMES = ("roll p", "pitch q", "yaw r")
 BEYOND = 1e6  # the share of a bound of nothing
 SHOWN_SOURCES = 4  # curves an eye can follow in one panel
 LEAST_CURVE = 1e-3  # of the largest source: a smaller one is a line at zero
+LEAST_RATIO = 1e-6  # what is smaller is drawn as this
 LEAST_SHARE = 1e-5  # of the bound: what is smaller is not drawn
 # Of two sources with one colour no flight is known to show both.
 SOURCE_LOOKS: dict[str, tuple[str, tuple[float, ...]]] = {
@@ -108,14 +109,14 @@ def _dress(axes: "Axes") -> None:
 def bound_figure(found: Document) -> "Figure":
     """How much of the bound each source has used at most, per axis, on a logarithmic scale."""
 
-    def shares(name: str) -> list[float]:
-        """Per axis; a source over no bound counts as far beyond it."""
-        of = [found["axes"][axis][name]["bound_share"] for axis in AXES]
-        return [BEYOND if share is None else share for share in of]
+    def shares(*names: str) -> list[list[float | None]]:
+        """Per axis, of each source; None over no bound."""
+        return [[found["axes"][axis][name]["bound_share"] for name in names] for axis in AXES]
 
-    names = [name for name in (*SOURCES, UNEXPLAINED) if max(shares(name)) > LEAST_SHARE]
-    values = np.reshape([shares(name) for name in names], (len(names), len(AXES))).T
-    notes = [[percent(share) if share > LEAST_SHARE else "" for share in row] for row in values.tolist()]
+    every = (*SOURCES, UNEXPLAINED)
+    names = [name for name in every if max(_length(share) for (share,) in shares(name)) > LEAST_SHARE]
+    values = np.array([[_length(share) for share in row] for row in shares(*names)])
+    notes = [[percent(s) if _length(s) > LEAST_SHARE else "" for s in row] for row in shares(*names)]
     title = f"Largest share of the bound eta_bar\n{found['scenario']}", "share of eta_bar (1: all of it)"
     size = 11.0, 1.6 + 0.34 * max(len(names), 2)
     ends = LEAST_SHARE, 30.0 * max(values.max(initial=0.0), 1.0)
@@ -123,13 +124,18 @@ def bound_figure(found: Document) -> "Figure":
     return _bars(size, title, *shown, ends, grey=FAULT)
 
 
+def _length(share: float | None) -> float:
+    """Of the bar of a share; one of no bound is far beyond it."""
+    return BEYOND if share is None else share
+
+
 def comparison_figure(entries: Sequence[Document]) -> "Figure":
     """How much of the bound each flight has needed, per axis, on a logarithmic scale."""
     needed = [[each[f"{axis}_worst_ratio"] for each in entries] for axis in AXES]
-    ratios = np.array([[BEYOND if r is None else max(r, 1e-6) for r in row] for row in needed])
+    ratios = np.array([[max(_length(ratio), LEAST_RATIO) for ratio in row] for row in needed])
     notes = [
         [f"{percent(r)} ({label(each[f'{axis}_dominant'])})" for r, each in zip(row, entries, strict=True)]
-        for row, axis in zip(ratios.tolist(), AXES, strict=True)
+        for row, axis in zip(needed, AXES, strict=True)
     ]
     title = "Mismatch at its worst, faults aside, over the bound", "largest mismatch / eta_bar"
     size = 12.0, 1.6 + 0.38 * max(len(entries), 2)
@@ -184,8 +190,8 @@ def linear_figure(analysis: LinearAnalysis, name: str) -> "Figure":
 
 def _name_models(figure: "Figure", axes: "Axes") -> None:
     """One legend for all panels."""
-    place: dict[str, Any] = {"loc": "outside lower center", "ncols": 3, "fontsize": 9, "frameon": False}
-    figure.legend(*axes.get_legend_handles_labels(), **place)
+    named = axes.get_legend_handles_labels()
+    figure.legend(*named, loc="outside lower center", ncols=len(MODEL_LOOKS), fontsize=9, frameon=False)
 
 
 def _draw_poles(axes: "Axes", analysis: LinearAnalysis) -> None:
@@ -272,5 +278,5 @@ def _ratios(grid: np.ndarray, norm: Any) -> dict[Any, tuple[str, str]]:
     labels = dict.fromkeys(np.ndindex(grid.shape), ("no trim", "black"))
     for at, ratio in np.ndenumerate(grid):
         if np.isfinite(ratio):
-            labels[at] = f"{ratio:.2g}", "black" if norm(ratio) > 0.5 else "white"
+            labels[at] = f"{ratio:.2g}", "white" if norm(ratio) < 0.5 else "black"
     return labels

@@ -87,6 +87,26 @@ def of_record(record: np.ndarray, path: str = "") -> dict[str, Any]:
     return {path: array.item() if array.size == 1 else in_short(array)}
 
 
+_WORDS = ("title", "description", "discriminator")
+
+
+def keys_of(schema: dict[str, Any]) -> dict[str, dict[str, str]]:
+    """Of each section of a JSON Schema what its keys may be, without the words: a line a key."""
+    sections = {**schema.get("$defs", {}), schema["title"]: schema}
+    return {
+        name: {key: json.dumps(_limits(value)) for key, value in of.get("properties", {}).items()}
+        | {"(required)": " ".join(of.get("required", []))}
+        for name, of in sections.items()
+    }
+
+
+def _limits(node: Any) -> Any:
+    if isinstance(node, dict):
+        said = {key: _limits(value) for key, value in node.items() if key not in _WORDS}
+        return said.get("anyOf", said) if set(said) == {"anyOf"} else said
+    return list(map(_limits, node)) if isinstance(node, list) else _plain(node)
+
+
 def page(text: str) -> list[str]:
     """The lines of a page without the pictures in it."""
     return [line.rstrip() for line in _EMBEDDED.sub("data:", text).splitlines() if line.strip()]

@@ -117,3 +117,52 @@ def test_no_reference_is_zero():
 def test_a_ramp_is_nothing_before_it_starts_and_stays_at_its_end():
     ramp = signals.Ramp(start_s=2.0, end_s=4.0, amplitude_deg_s=3.0)
     assert list(ramp.rate_deg_s(np.array([0.0, 2.0, 3.0, 4.0, 9.0]))) == [0.0, 0.0, 1.5, 3.0, 3.0]
+
+
+# What a signal is of at an instant off its edge by less than a rounding, or by more; phases of half a turn.
+EDGES = {
+    "step": (
+        signals.Step(start_s=1.0, end_s=2.0, amplitude_deg_s=4.0),
+        [1 - 1.5e-9, 1 - 0.5e-9, 2 - 1.5e-9, 2 - 0.5e-9], [0, 4, 4, 0],
+    ),
+    "doublet": (
+        signals.Doublet(start_s=1.0, amplitude_deg_s=4.0),
+        [1 - 1.5e-9, 1 - 0.5e-9, 2 - 0.5e-9, 3 - 1.5e-9, 3 - 0.5e-9], [0, 4, -4, -4, 0],
+    ),
+    "square": (
+        signals.Square(start_s=1.0, amplitude_deg_s=4.0, frequency_hz=0.5, phase_deg=180.0),
+        [1 - 1.5e-9, 1.0, 2 - 1.5e-9, 2 - 0.5e-9, 2.0], [0, -4, -4, 4, 4],
+    ),
+    "square that begins half way": (
+        signals.Square(amplitude_deg_s=4.0, frequency_hz=0.5, phase_deg=180.0), [-1e-9, 0.0], [-4, -4],
+    ),
+    "sine": (
+        signals.Sine(start_s=1.0, end_s=3.0, amplitude_deg_s=2.0, frequency_hz=0.25, phase_deg=30.0),
+        [0.9, 1.0, 5 / 3, 3.0], [0, 1, 2, 0],
+    ),
+    "chirp": (
+        signals.Chirp(
+            start_s=1.0, end_s=3.0, amplitude_deg_s=2.0, start_frequency_hz=0.25, end_frequency_hz=0.5
+        ),
+        [0.9, 2.0, 3.0], [0, 2 * np.sin(2 * pi * (0.25 + 0.0625)), 0],
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", EDGES)
+def test_edges_lie_within_a_rounding_of_their_instant(case):
+    signal, at_s, values = EDGES[case]
+    assert signal.rate_deg_s(np.array(at_s)) == pytest.approx(values, abs=1e-6)
+
+
+def test_the_very_edges_belong_to_what_begins_there():
+    assert list(signals._during(np.array([-1e-9, 1e-9]), 2e-9)) == [True, False]
+    assert list(signals._during(np.array([-2e-9, 1e9]), None)) == [False, True]
+
+
+def test_frames_are_sampled_from_any_one_on_and_nobody_changes_them():
+    reference = load_text("name: x\nreference: {q: [{ramp: {amplitude_deg_s: 6, end_s: 3}}]}").reference
+    sampled = signals.sample_frames(reference, 50, 4, 25.0)
+    assert np.degrees(sampled) == pytest.approx(np.column_stack([[0] * 4, [4, 4.08, 4.16, 4.24], [0] * 4]))
+    with pytest.raises(ValueError, match="read-only"):
+        sampled[0, 0] = 1.0

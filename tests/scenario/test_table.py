@@ -51,12 +51,16 @@ def test_a_file_in_a_folder_below(tmp_path):
         ("t_s,rate_deg_s\n1,0\n0,1\n", "times do not increase"),
         ("t_s,rate_deg_s\n-1,0\n0,1\n", "times do not increase from 0"),
         ("t_s,rate_deg_s\n0,0\n1,nan\n", "line 3: '1,nan' is not finite"),
+        ("t_s,rate_deg_s\n0,0\nnan,1\n", "line 3: 'nan,1' is not finite"),
         ("t_s,rate_deg_s\n0,0\n1,inf\n", "line 3: '1,inf' is not finite"),
         ("t_s,rate_deg_s\n0,0\n1\n", "line 3: '1' is not a row of numbers"),
         ("t_s,rate_deg_s\n0,0\n1,two\n", "line 3: '1,two' is not a row of numbers"),
         ("t_s,rate_deg_s\n0,0\n1,2000\n", "rates out of range"),
         ("t_s;rate_deg_s\n0;0\n", "the header has no column 't_s'"),
         ("t_s,rate_deg_s\n" + "".join(f"{i},0\n" for i in range(20_001)), "too many rows (20001)"),
+        ("t_s,rate_deg_s\n0," + "x" * 50, f"line 2: '0,{'x' * 38}' is not a row"),
+        ("t_s,rate_deg_s\n0," + "9" * 400, f"line 2: '0,{'9' * 38}' is not finite"),
+        ("t_s,rate_deg_s\n0,0\n".ljust(2_000_001), "is too large (2 MB), allowed: at most 2 MB"),
         ("t_s,rate_deg_s\n" + "0,0\n" * 600_000, "is too large"),
         ("t_s,rate_deg_s\n0,\0\n", "line 2: is a binary file"),
     ],
@@ -113,3 +117,43 @@ def test_times_before_the_flight_or_twice_the_same_are_refused(time_s):
 def test_the_first_row_may_be_later_than_zero():
     check_table((0.0, 0.5, 3.0), (1.0, 2.0, 3.0))
     check_table((0.5, 3.0), (1.0, 2.0))
+    check_table((0.0, 360_000.0), (-1000.0, 1000.0))
+
+
+@pytest.mark.parametrize(
+    ("time_s", "values"),
+    [
+        ((0.0, 1.0), (0.0, 1000.1)),
+        ((0.0, 1.0), (-1000.1, 0.0)),
+        ((0.0, 360_001.0), (0.0, 0.0)),
+        ((0.0,), (1, 2)),
+    ],
+)
+def test_what_no_aircraft_flies_is_refused(time_s, values):
+    with pytest.raises(PydanticCustomError, match="contradictory"):
+        check_table(time_s, values)
+
+
+def test_a_table_of_the_largest_size_is_read(tmp_path):
+    (tmp_path / "ref.csv").write_text("t_s,rate_deg_s\n0,0\n1,3\n".ljust(2_000_000))
+    text = "name: x\nreference: {q: [{csv: {file: ref.csv}}]}"
+    assert load_text(text, folder=tmp_path).reference.q[0].csv.values_deg_s == (0.0, 3.0)
+
+
+@pytest.mark.parametrize(
+    ("given", "says"),
+    [
+        ("{file: none.csv, time_s: [0]}", "reference.q[0].csv.values_deg_s: required key is missing"),
+        ("{file: none.csv, values_deg_s: [0]}", "reference.q[0].csv.time_s: required key is missing"),
+        ("3", "reference.q[0].csv: 3 is a number, allowed: a mapping of file"),
+        ("{}", "reference.q[0].csv.file: required key is missing"),
+        ("{file: ''}", "reference.q[0].csv.file: '' is too short"),
+        ("{file: 3}", "reference.q[0].csv.file: 3 is a number"),
+        ("{file: ref.csv, column: 3}", "reference.q[0].csv.column: 3 is a number"),
+    ],
+)
+def test_a_mistake_in_the_keys_is_one_line_and_nothing_is_read(tmp_path, given, says):
+    with pytest.raises(ScenarioError) as caught:
+        load_text(f"name: x\nreference: {{q: [{{csv: {given}}}]}}", folder=tmp_path)
+    (line,) = caught.value.lines
+    assert says in line

@@ -1,0 +1,102 @@
+"""What a type of fault does to the failure properties, twice over, and what its row says of it."""
+
+import pytest
+
+from beaver_ftc.scenario.faults import TYPES, fault_name, of_a_sensor, place_of
+from beaver_ftc.scenario.interventions import fault_of
+from beaver_ftc.scenario.sensors import QUANTITIES, Sensors
+
+GIVEN = {
+    "loss_of_effectiveness": {"magnitude": 0.4},
+    "stuck": {"position_deg": 90.0},
+    "hardover": {"direction": -1},
+    "float": {},
+    "bias": {"bias_deg": -18.0},
+    "rate_limit": {"scale": 0.2},
+    "oscillatory": {"amplitude_deg": 36.0, "frequency_rad_s": 5.0},
+    "unanticipated": {"Cm_alpha3": 8.0},
+}
+BEFORE = {
+    "effectiveness": 0.8, "stuck": 0.0, "stuck-at-rad": 0.1, "hardover": 0.0, "float": 0.0, "bias-rad": 0.1,
+    "rate-scale": 0.5, "oscillation-amplitude-rad": 0.0, "oscillation-frequency-rad_sec": 0.0,
+    "Cm-alpha3": 3.0,
+}  # fmt: skip
+PI = 3.14159265358979
+AFTER = {
+    "loss_of_effectiveness": {"effectiveness": 0.8 * 0.9 * 0.6},
+    "stuck": {"stuck": 1.0, "stuck-at-rad": PI / 2},
+    "hardover": {"hardover": -1.0},
+    "float": {"float": 1.0},
+    "bias": {"bias-rad": 0.1 - 1.25 * PI / 10},
+    "rate_limit": {"rate-scale": 0.5 * 0.8 * 0.2},
+    "oscillatory": {"oscillation-amplitude-rad": PI / 5, "oscillation-frequency-rad_sec": 5.0},
+    "unanticipated": {"Cm-alpha3": 3.0 + 2.0 + 8.0},
+}
+
+
+def fault(kind, **keys):
+    actuator = {} if kind == "unanticipated" else {"actuator": "flap"}
+    return fault_of({"type": kind, **actuator, **keys}, 1.0)
+
+
+@pytest.mark.parametrize("kind", TYPES)
+def test_a_quarter_of_a_fault_and_then_the_whole_of_it(kind):
+    found = dict(BEFORE)
+    for share in (0.25, 1.0):
+        fault(kind, **GIVEN[kind]).strike(found, share, was_rad=0.7)
+    assert found == pytest.approx(BEFORE | AFTER[kind])
+
+
+def test_a_jam_where_the_surface_was_is_not_moved_by_another():
+    found = dict(BEFORE)
+    fault("stuck").strike(found, 1.0, was_rad=0.7)
+    fault("stuck", position_deg=3.0).strike(found, 1.0, was_rad=0.9)
+    assert found == BEFORE | {"stuck": 1.0, "stuck-at-rad": 0.7}
+
+
+def test_rows_of_the_types(kept):
+    words = ("adds", "stays_where_it_is", "truth", "size", "examples", "button")
+    kept({kind: {word: getattr(row, word) for word in words} for kind, row in TYPES.items()})
+
+
+def test_places():
+    sensor = fault_of({"sensor": "p", "type": "freeze"}, 1.0)
+    assert [place_of(one) for one in (fault("float"), fault("unanticipated"), sensor)] == [
+        "flap", "unanticipated", "p",
+    ]  # fmt: skip
+    assert [of_a_sensor(one) for one in (fault("float"), sensor, {"sensor": 3}, {"type": 3})] == [
+        False, True, True, False,
+    ]  # fmt: skip
+    names = ("p", "flap", "sensor p")
+    assert [fault_name(said, names) for said in ("sensor p", "sensor q", "airspeed", "flap", 3)] == [
+        "sensor p", "q", "V", "flap", 3,
+    ]  # fmt: skip
+
+
+def test_what_instruments_measure(kept):
+    """Units, the largest offset or noise of a fault, and a reading's errors in SI."""
+    given = {"noise_std": 1.0, "bias": -2.0, "quantum": 6.0}
+    found = {}
+    for name, sensor in Sensors():
+        keys = {next(key for key in sensor.si[:3] if key.startswith(kind)): of for kind, of in given.items()}
+        errors = type(sensor).model_validate(keys)
+        found[name] = [*QUANTITIES[name], *errors.noise_bias_quantum, errors.random_error]
+    kept(found)
+    heading = type(Sensors().psi).model_validate({"drift_deg_h": 3600.0})
+    assert heading.drift_rad_s == pytest.approx(PI / 180)
+
+
+def test_what_is_ideal_and_what_covers_what():
+    gyro = type(Sensors().p).model_validate
+    bounded = gyro({"noise_std_deg_s": 1, "bias_deg_s": -2, "scale_error": -0.1})
+    assert not any(one.is_ideal for one in (bounded, gyro({"delay_s": 0.1})))
+    assert gyro({}).is_ideal
+    assert bounded.is_bounded
+    for key in ("delay_s", "bandwidth_rad_s", "dropout_share"):
+        assert not gyro({key: 0.5}).is_bounded
+    same = gyro({"noise_std_deg_s": 1, "bias_deg_s": 2, "scale_error": 0.1})
+    assert bounded.is_within(same)
+    assert same.is_within(bounded)
+    assert not gyro({"quantum_deg_s": 0.1}).is_within(bounded)
+    assert not gyro({"bias_deg_s": 2.1}).is_within(bounded)
+    assert not Sensors.model_validate({"az": {"delay_s": 0.1}}).is_ideal

@@ -1,0 +1,195 @@
+"""Sections against each other: what is said of contradictions and of what is unwise, right at each bound."""
+
+import pytest
+
+from beaver_ftc.documents.problems import ScenarioError
+from beaver_ftc.scenario.consistency import conflicts
+from beaver_ftc.scenario.dump import to_yaml
+from beaver_ftc.scenario.loader import load, load_text
+from beaver_ftc.scenario.schema import Scenario
+
+FLOAT = "{type: float, actuator: flap, at_s: "
+GUST = "{velocity_mps: [0, 0, 1], rise_s: 1, hold_s: 2, fade_s: 3, at_s: "
+CAN = {
+    "actuators: {travel_deg: [-90, 90]}",
+    "duration_s: 0.05\nrate_hz: 20",
+    f"faults: [{FLOAT}29.9}}]",
+    "changes: [{at_s: 1, law: nominal}, {at_s: 1.5, scheme: none}]",
+    f"environment: {{gust: [{GUST}1}}, {GUST}7}}, {GUST}13}}]}}",
+    "autopilot: {altitude_m: [{at_s: 0, hold: true}, {at_s: 0.1, value: 2000}]}",
+    "control: {power: {lowest_inhg: 20, highest_inhg: 20}}",
+    "fdi: {pairs: true, fault_class: all}",
+    "fdi: {authority: statistical, statistical: {}}",
+    "autopilot: {heading_deg: [{value: 9}]}\nexpect: {heading_within_deg: 9, arrives: {heading_deg: 3}}",
+}
+CANNOT = [
+    "actuators: {travel_deg: [-90.1, 90]}",
+    "actuators: {travel_deg: [-90, 90.1]}",
+    "actuators: {flap: {travel_deg: [5, 5]}}",
+    "actuators: {flap: 3, rudder: {rate: 4}}",
+    "actuators: {flop: {}, bandwith_rad_s: 3}",
+    "duration_s: 0.049\nrate_hz: 20",
+    "duration_s: 10\nfaults: [" + ", ".join(f"{FLOAT}{at}}}" for at in (0, 9.9, 10, 11)) + "]",
+    f"faults: [3, {FLOAT}31}}, {FLOAT}'x'}}]",
+    "changes: [{at_s: 5, law: nominal}, {at_s: 5, law: lqr}, {at_s: 31, law: lqr}, {at_s: 4, law: lqr}]",
+    "changes: [{at_s: 5}]",
+    "expect: {detected_within_s: 1, isolated_as: flap, isolated_type: float, no_departure: true}",
+    "expect: {candidate_type: float, isolated_within_s: 1, post_fault_rms_deg_s: {p: 1}}",
+    "expect: {altitude_within_m: 1, airspeed_within_mps: 1, airspeed_within_limits_mps: 1}",
+    "expect: {heading_within_deg: 1, arrives: {altitude_m: 1, airspeed_mps: 1, heading_deg: 1}}",
+    "autopilot: {altitude_m: []}\nexpect: {altitude_within_m: 1}\nsubsteps: 0",
+    "faults: []\nexpect: {detected_within_s: 1}\nsubsteps: 0",
+    "autopilot: {altitude_m: [{at_s: 1, value: 9}, {at_s: 1, value: 9}, {value: 9}]}",
+    "autopilot: {heading_deg: [{value: 9}], bank_deg: [{value: 9}]}",
+    "autopilot: {bank_deg: [{value: 9, hold: true}, {at_s: 1}]}",
+    f"environment: {{gust: [{GUST}1}}, {GUST}6.9}}]}}",
+    "environment: {turbulence: severe}",
+    "environment: {severity: light}",
+    "environment: {turbulence: dryden}",
+    "control: {power: {lowest_inhg: 20, highest_inhg: 19.9}}",
+    "fdi: {pairs: true}",
+    "fdi: {authority: statistical}",
+    "fdi: {bounds: {sensors: {p: {delay_s: 0.1}, q: {bias_deg_s: 1}, r: {dropout_share: 0.1}}}}",
+    "fdi: {bounds: {coefficients: {Cm_alfa: 0.1, CZ_alpha: 0.1, Cm_q: 0.1}}}",
+    "fdi: {scheme: rls}",
+    "uncertainty: {coefficients: {Cm_alfa: 1, " + ", ".join(f"C{i}: 1" for i in range(70)) + "}}",
+    "faults: [{sensor: p, type: bias, magnitude: -200.1, at_s: 1}]",
+    "faults: [{sensor: airspeed, type: noise, magnitude: 100.1, at_s: 1}]",
+    "faults: [{sensor: p, type: scale, magnitude: 2.1, at_s: 1, end_s: 1}]",
+    "faults: [{type: bias, bias_deg: 1, actuator: flap, at_s: 1, profile: incipient}]",
+    "faults: [{type: bias, bias_deg: 1, actuator: flap, at_s: 1, kappa_per_s: 1}]",
+    "aircraft: ./nowhere",
+    "aircraft: jsbsim:no one",
+]
+
+
+@pytest.mark.parametrize("text", sorted(CAN))
+def test_what_is_just_allowed(text):
+    assert load_text(f"name: x\n{text}").name == "x"
+
+
+def test_what_contradictions_are_called(kept):
+    found = {}
+    for text in CANNOT:
+        with pytest.raises(ScenarioError) as caught:
+            load_text(f"name: x\n{text}", "s.yaml")
+        found[text[:90]] = [line[:180] for line in caught.value.lines]
+    kept(found)
+
+
+@pytest.mark.parametrize(
+    ("said", "at"),
+    [
+        ({"duration_s": 1e9, "faults": [{"at_s": 1e9}]}, [("faults", 0, "at_s")]),
+        ({"duration_s": 1e9 + 1, "faults": [{"at_s": 2e9}]}, []),  # unknown
+        ({"duration_s": True, "faults": [{"at_s": 31}]}, []),
+        ({"duration_s": "3", "faults": [{"at_s": 31}]}, []),
+        ({"duration_s": float("nan"), "faults": [{"at_s": 31}]}, []),
+        ({"duration_s": 0, "faults": [{"at_s": 31}]}, []),
+        ({"faults": [{"at_s": 29}, {"at_s": 30}, {"at_s": -1}, {}]}, [("faults", 1, "at_s")]),
+        ({"faults": "none", "expect": {"isolated_as": "flap"}}, []),
+        ({"expect": {"isolated_as": "flap", "isolated_type": None}}, [("expect", "isolated_as")]),
+        ({"autopilot": 3, "expect": {"altitude_within_m": 3}}, []),
+        ({"expect": {"altitude_within_m": 3, "arrives": 5}}, [("expect", "altitude_within_m")]),
+        ({"duration_s": 0.01}, []),
+        ({"duration_s": 0.0099}, [("duration_s",)]),
+        ({"changes": [{"at_s": 3}, {"at_s": 0}, {"at_s": 2}]}, []),
+        ({"changes": [{"at_s": 3}, {"at_s": 2}]}, [("changes", 1, "at_s")]),
+    ],
+)
+def test_what_cannot_be_read_contradicts_nothing(said, at):
+    assert [where for where, _ in conflicts(said)] == at
+
+
+UNWISE = {
+    "nothing": {},
+    "no diagnosis": {"fdi": {"scheme": "none"}, "uncertainty": {"cg_m": [0.1, 0, 0]}},
+    "many sensors": {"sensors": "tactical-grade"},
+    "a sensor of no preset": {"sensors": {"p": {"bias_deg_s": 50}}},
+    "sensors that are declared": {
+        "sensors": "tactical-grade", "fdi": {"bounds": {"sensors": "tactical-grade"}},
+    },
+    "coefficients at the bound": {
+        "uncertainty": {"coefficients": {"Cm_q": 1.1, "Cm_alpha": 0.9, "Cn_r": 1.2, "Cl_p": 1.01, "CZ_q": 3}},
+        "fdi": {"bounds": {"coefficients": {"Cm_q": 0.1, "Cm_alpha": 0.099999, "Cn_r": 0.2}}},
+    },
+    "inertia at the bound": {
+        "uncertainty": {"inertia": {"Ix": 1.1, "Iy": 0.9, "Iz": 1.100001}},
+        "fdi": {"bounds": {"inertia": 0.1}},
+    },
+    "turbulence": {"environment": {"turbulence": "dryden", "severity": "severe"}},
+    "turbulence low": {
+        "environment": {"turbulence": "dryden", "severity": "light"}, "initial": {"altitude_m": 609.5},
+        "fdi": {"bounds": {"turbulence": "moderate"}},
+    },
+    "turbulence high": {
+        "environment": {"turbulence": "dryden", "severity": "light"}, "initial": {"altitude_m": 609.6},
+        "fdi": {"bounds": {"turbulence": "light"}},
+    },
+    "gusts": {"environment": {"gust": [
+        {"at_s": 1, "velocity_mps": [0, 0, 0]}, {"at_s": 9, "velocity_mps": [0, 1, 0]},
+    ]}},
+    "gusts of nothing": {"environment": {"gust": {"at_s": 1, "velocity_mps": [0, 0, 0]}}},
+    "coupling": {"uncertainty": {"inertia_coupling": {"p": 0.25, "q": -0.26, "r": -0.25}}},
+    "sinusoids": {
+        "uncertainty": {"sinusoid": {
+            "p": {"amplitude_rad_s2": 0.02, "frequency_rad_s": 15},
+            "q": {"amplitude_rad_s2": 0.0, "frequency_rad_s": 900},
+            "r": {"amplitude_rad_s2": 0.021, "frequency_rad_s": 15.1},
+        }},
+        "fdi": {"statistical": {}},
+    },
+    "forces": {
+        "fdi": {
+            "fault_class": "all", "statistical": {},
+            "bounds": {"coefficients": {"Cm_q": 0.1, "Cn_r": 0.2}},
+        },
+        "uncertainty": {"mass": 1.05, "coefficients": {"CZ_q": 1.2, "CY_r": 0.79, "CX_0": 3}},
+    },
+    "forces of nothing declared": {
+        "fdi": {"fault_class": "all", "statistical": {}, "bounds": {"coefficients": {}}},
+        "uncertainty": {"mass": 0.9499, "coefficients": {"CZ_q": 1.001}}, "design_model": {"mass": 1.0},
+    },
+    "mass of another": {
+        "fdi": {"fault_class": "all", "statistical": {}}, "uncertainty": {"mass": 0.5},
+        "design_model": {"mass": 0.5},
+    },
+    "Nyquist": {
+        "rate_hz": 20, "reference": {
+            "p": [
+                {"sine": {"amplitude_deg_s": 1, "frequency_hz": 10}},
+                {"square": {"amplitude_deg_s": 1, "frequency_hz": 10.1}},
+                {"chirp": {
+                    "amplitude_deg_s": 1, "start_frequency_hz": 11, "end_frequency_hz": 3, "end_s": 2,
+                }},
+            ],
+            "r": [{"step": {"amplitude_deg_s": 1}}],
+        },
+        "uncertainty": {"sinusoid": {"q": {"amplitude_rad_s2": 0.01, "frequency_rad_s": 62.9}}},
+        "faults": [
+            {"type": "float", "actuator": "flap", "at_s": 1},
+            *(
+                {"type": "oscillatory", "actuator": "flap", "at_s": 1, "amplitude_deg": 1,
+                 "frequency_rad_s": of} for of in (62.8, 62.9)
+            ),
+        ],
+    },
+    "airspeed": {"initial": {"airspeed_mps": 55.1}},
+}  # fmt: skip
+
+
+def test_what_is_unwise_is_said_at_the_bound_and_not_before(kept):
+    kept({case: load({"name": "x", **given}).warnings() for case, given in UNWISE.items()})
+
+
+def test_a_dump_reads_well(kept):
+    """Short mappings and lists on a line, descriptions by themselves, texts that want quotes quoted."""
+    given = {
+        "name": "x", "description": f"a line\u2028and another {'word ' * 30}",
+        "faults": [{"type": "float", "actuator": "flap", "at_s": 1}],
+        "reference": {"q": [{"sine": {"amplitude_deg_s": 1, "frequency_hz": 1}}]},
+        "environment": {"wind_mps": [1, 2, 3]},
+        "changes": [{"at_s": 3, "law": "nominal"}],
+    }  # fmt: skip
+    lines = to_yaml(Scenario.model_validate(given)).splitlines()
+    kept([line for line in lines if "std" not in line])

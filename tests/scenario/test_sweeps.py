@@ -1,0 +1,127 @@
+"""Sweep files: what varies and how, what each mistake is called, and what a sweep makes of its base."""
+
+import pytest
+
+from beaver_ftc.documents.problems import ScenarioError
+from beaver_ftc.scenario.sweeps import SweepFile, Variation, is_sweep, load_sweep, load_sweep_text
+
+HEAD = "base: elevator-partial-loss\nruns: 3\n"
+LONG = "n" * 120
+WRONG = {
+    "two kinds": HEAD + "vary: {rate_hz: {uniform: [50, 100], choice: [50]}}",
+    "equal ends": HEAD + "vary: {rate_hz: {uniform: [50, 50]}, duration_s: {loguniform: [40, 30]}}",
+    "cut to nothing": HEAD + "vary: {rate_hz: {normal: [60, 1], within: [70, 60]}}",
+    "cut without a normal": HEAD + "vary: {rate_hz: {choice: [60], within: [60, 70]}}",
+    "no logarithm": HEAD + "vary: {rate_hz: {loguniform: [-1, 30]}}",
+    "no spread": HEAD + "vary: {rate_hz: {normal: [60, -1]}}",
+    "outside at one end": HEAD + "vary:\n  rate_hz: {uniform: [10, 50]}\n  seed: {choice: [3]}",
+    "outside at both": HEAD + "vary:\n  faults[0].magnitude: {uniform: [-1, 2]}",
+    "outside in the middle": HEAD + "vary:\n  faults[0].magnitude: {choice: [0.5, 7, 0.2, 7]}",
+    "last of a table": HEAD + "vary: {rate_hz: {linspace: [50, 1001, 3]}}",
+    "normal at its cut": HEAD + "vary: {rate_hz: {normal: [60, 9], within: [19, 80]}}",
+    "twice": HEAD + "vary:\n  faults[0].at_s: {choice: [1]}\n  faults[0]: {choice: [{type: float}]}",
+    "twice below": HEAD + "vary:\n  sensors: {choice: [ideal]}\n  sensors.p: {choice: [{}]}",
+    "not twice": HEAD + "vary:\n  faults[0].at_s: {choice: [1]}\n  faults[1].at_s: {choice: [1]}",
+    "name": HEAD + "set: {name: a, duration_s: 20}\nvary: {name: {choice: [b]}}",
+    "set and set": HEAD + "set:\n  rate_hz: 10\n  substeps: 0\n  faults[0].magnitude: 3",
+    "set below": HEAD + "set:\n  substeps: 2\n  faults: [{type: float, actuator: flap, at_s: 77}]",
+    "set beside": HEAD + "set:\n  duration_s: 5\n  substeps: 2",
+    "set nowhere": HEAD + "set:\n  substeps: 2\n  'faults[4].at_s': 3\n  '..': 4",
+    "inline": "runs: 2\nbase:\n  duration_s: 20\n  faults:\n  - {type: float, actuator: flap, at_s: 21}\n",
+    "a grid of one": "base: fault-free\nvary: {rate_hz: {linspace: [50, 60, 1]}}",
+    "a grid too large": (
+        "base: fault-free\nvary: {rate_hz: {linspace: [50, 60, 1000000]}, seed: {linspace: [1, 2, 11]}}"
+    ),
+    "a scenario": "name: x\nduration_s: 3",
+    "nothing of both": "nam: x",
+    "no base": "vary: {rate_hz: {choice: [50]}}\nruns: 2",
+    "long name of nothing": f"base: {LONG}\nruns: 2",
+    "long path to nothing": f"base: {LONG}.yaml\nruns: 2",
+    "long path outside": f"base: ../{LONG}.yaml\nruns: 2",
+    "longer than any name of a file": f"base: {'n' * 300}.yaml\nruns: 2",
+    "a sweep": "base: elevator-effectiveness\nruns: 2",
+    "bounds nothing": HEAD + "expect: {detection_rate: {confidence: 0.9}}",
+}
+
+
+def test_what_mistakes_are_called(kept):
+    found = {}
+    for case, text in WRONG.items():
+        with pytest.raises(ScenarioError) as caught:
+            load_sweep_text(text, "s.yaml")
+        found[case] = [line[:200] for line in caught.value.lines]
+    kept(found)
+
+
+@pytest.mark.parametrize(
+    ("how", "kind", "count", "probes"),
+    [
+        ({"uniform": (3, 5)}, "uniform", None, (3, 5)),
+        ({"loguniform": (3, 5)}, "loguniform", None, (3, 5)),
+        ({"normal": (3, 5)}, "normal", None, (3,)),
+        ({"normal": (3, 5), "within": (1, 9)}, "normal", None, (3, 1, 9)),
+        ({"linspace": (3, 5, 7)}, "linspace", 7, (3, 5)),
+        ({"choice": (3, 5, "x")}, "choice", 3, (3, 5, "x")),
+    ],
+)
+def test_kinds_of_variation(how, kind, count, probes):
+    made = Variation.model_validate(how)
+    assert (made.kind, made.count, made.probes()) == (kind, count, probes)
+
+
+@pytest.mark.parametrize(
+    ("given", "grid", "flights"),
+    [
+        ({"runs": 2}, 1, 2),
+        ({"vary": {"a": {"linspace": (1, 2, 5)}, "b": {"linspace": (1, 2, 3)}}}, 15, 15),
+        ({"vary": {"a": {"linspace": (1, 2, 1_000_000)}, "b": {"linspace": (1, 2, 10)}}}, 10**7, 10**7),
+        ({"runs": 4, "vary": {"a": {"choice": (1, 2)}}}, 1, 4),
+        ({"sampling": "grid", "vary": {"a": {"choice": (1, 2)}, "b": {"choice": (1, 2, 3)}}}, 6, 6),
+        ({"vary": {"a": {"linspace": (1, 2, 2)}}}, 2, 2),
+    ],
+)
+def test_points_of_a_grid_and_flights(given, grid, flights):
+    file = SweepFile.model_validate({"name": "x", "base": "fault-free", **given})
+    assert (file.grid_size, file.flights) == (grid, flights)
+
+
+def test_a_sweep_is_named_by_its_file_and_holds_its_base():
+    text = "base: {duration_s: 20, rate_hz: 50}\nruns: 2\nset: {substeps: 2}\nvary: {rate_hz: {choice: [60]}}"
+    sweep = load_sweep_text(text, name=f"a b.c{LONG}.sweep")
+    assert sweep.name == f"a-b-c{LONG}"[:70]
+    assert (sweep.flights, sweep.keys) == (2, ("rate_hz",))
+    assert sweep.base == {"name": sweep.name, "duration_s": 20, "rate_hz": 50, "substeps": 2}
+    made = sweep.scenario({"rate_hz": 60.0}, seed=8)
+    assert (made.rate_hz, made.substeps, made.seed, made.duration_s) == (60.0, 2, 8, 20)
+    assert load_sweep_text("base: fault-free\nruns: 1\nname: own", name="other").name == "own"
+    assert load_sweep_text("base: {name: own}\nruns: 1").base["name"] == "own"
+
+
+def test_an_aircraft_may_vary():
+    sweep = load_sweep_text("base: {control: {law: lqr}}\nruns: 1\nvary: {aircraft: {choice: [beaver]}}")
+    assert sweep.scenario({"aircraft": "beaver"}).aircraft == "beaver"
+    assert sweep.scenario({}).control is sweep.scenario({}).control  # read once
+
+
+def test_what_is_a_sweep(tmp_path):
+    (tmp_path / "broken.yaml").write_text("base: [")
+    (tmp_path / "one.yaml").write_text("base: fault-free")
+    found = [is_sweep(name) for name in ("fault-free", "elevator-effectiveness", "nothing", tmp_path)]
+    assert found == [False, True, False, False]
+    assert [is_sweep(tmp_path / name) for name in ("broken.yaml", "one.yaml", "two.yaml")] == [
+        False,
+        True,
+        False,
+    ]
+
+
+def test_a_sweep_that_is_not_there_or_too_large(tmp_path):
+    with pytest.raises(
+        ScenarioError, match=r"no such file or built-in sweep: 'elevator-effectivenes', did you"
+    ):
+        load_sweep("elevator-effectivenes")
+    with pytest.raises(ScenarioError, match=r"`beaver-ftc run fault-free` flies it"):
+        load_sweep("fault-free")
+    (tmp_path / "large.yaml").write_text("#" * 4_000_001)
+    with pytest.raises(ScenarioError, match="is too large"):
+        load_sweep(tmp_path / "large.yaml")

@@ -48,7 +48,8 @@ DETECTION = {"detected": True, "time_s": 12.5, "delay_s": 0.5, "guaranteed_delay
     ("changes", "false_alarm", "said"),
     [
         ({"detected": False}, False, "no alarm"),
-        ({}, True, "FALSE ALARM at 12.50 s on q"),
+        ({"delay_s": None}, True, "FALSE ALARM at 12.50 s on q"),
+        ({}, True, "after 0.50 s on q"),  # the false one was of a diagnosis that a change has ended
         ({}, False, "after 0.50 s on q"),
         ({"guaranteed_delay_s": 0.75}, False, "after 0.50 s on q (certain within 0.75 s)"),
         ({"axis": None}, False, "after 0.50 s between the instruments"),

@@ -214,7 +214,7 @@ def _detection(metrics: Document) -> str:
     detection = metrics["detection"]
     if not detection["detected"]:
         return "no alarm"
-    if metrics["false_alarm"]:
+    if metrics["false_alarm"] and detection["delay_s"] is None:
         return f"FALSE ALARM at {_time(detection['time_s'])} {_seen(detection)}"
     guaranteed = detection["guaranteed_delay_s"]
     within = "" if guaranteed is None else f" (certain within {_time(guaranteed)})"

@@ -1,0 +1,304 @@
+"""All that is written of flights made by hand: metrics, recordings, the data of a report, JUnit, words."""
+
+import base64
+import json
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from pyarrow import parquet
+from synthetic import FDI, Expect, Fault, Flight, Scenario
+
+from beaver_ftc.documents.errors import SimulationFailed
+from beaver_ftc.results import report, verdict
+from beaver_ftc.results.exports import RECORDINGS, write_acmi, write_recording
+from beaver_ftc.results.flight import Flight as Opened
+from beaver_ftc.results.junit import write_junit
+from beaver_ftc.results.log import ParquetLog, unit_of, units
+from beaver_ftc.results.metrics import as_json, fault_free_s, hints, metrics
+from beaver_ftc.results.report import register_section, render
+from beaver_ftc.results.style import MODE_COLOURS
+from kept import in_short
+
+SENSOR = SimpleNamespace(
+    sensor="q", type="bias", at_s=5.0, end_s=None, profile="abrupt",
+    model_dump=lambda exclude, exclude_none: {"magnitude": 3.0},
+)  # fmt: skip
+EXPECT = Expect(
+    detected_within_s=0.1, isolated_as="elevator", no_departure=True,
+    arrives={"altitude_m": 5.0, "in_envelope": True}, post_fault_rms_deg_s={"q": 0.5},
+)  # fmt: skip
+FLIGHTS = {
+    "quiet": Flight(
+        scenario=Scenario(faults=()), detection_time_s=None, detection_axis=None, guaranteed_delay_s=None,
+        isolation_time_s=None, isolated=None, isolation_type=None, candidates=(), estimate=None,
+        post_fault_rms_rad_s=None, supervisor=[(0.0, "nominal")], mode_changes=1, end=(45.5, 1830.0),
+    ),
+    "eventful": Flight(
+        scenario=Scenario(
+            faults=(Fault(), Fault(at_s=20.0, actuator="flap", type="stuck", end_s=25.0)), expect=EXPECT
+        ),
+        mode_changes=9, exits=4, outside_s=2.25, envelope_exits=[(13.0, 14.5), (20.0, math.inf)],
+        end=(39.0, 1500.0), isolation_type="stuck", estimate=0.1, estimate_interval=(0.05, math.nan),
+        frequency_rad_s=5.0, type_time_s=12.5, probing_s=(14.0, 18.5),
+        engine_power={"from_s": 13.2, "in_charge_s": 0.9, "lowest_inhg": 20.04, "highest_inhg": 22.26},
+        profile={"altitude_m": 3.0, "airspeed_mps": 1.5, "heading_deg": 0.1, "bank_deg": 0.2},
+        arrival={"altitude_m": -2.0, "heading_deg": 0.05},
+        limits=({
+            "limits": "bank_deg", "side": "at most", "value": 30.0, "in_force": True, "time_s": 20.0,
+            "because": "stuck",
+        },),
+        authority={"p": {"beyond_s": 0.2}, "q": {"beyond_s": 0.05}},
+        saturation_s={"elevator": 1.25, "flap": 0.0},
+        statistical={"time_s": 12.2, "alarm_level": 6.5, "closest_approach": 0.81},
+        changes=({
+            "time_s": 3.0, "law": "adaptive", "scheme": None, "sensors": {}, "detection_time_s": 2.0,
+            "isolated": None,
+        },),
+        faults=({
+            "isolated": "elevator", "isolation_type": "loss_of_effectiveness", "isolation_time_s": 12.5,
+            "candidates": ["loss_of_effectiveness"], "estimate": -0.4,
+        }, {
+            "isolated": None, "isolation_type": None, "isolation_time_s": None,
+            "candidates": ["flap", "rudder"],
+        }),
+        supervisor=[(0.0, "nominal"), (12.07, "adaptive"), (14.0, "reallocated")],
+    ),
+    "lost": Flight(
+        scenario=Scenario(faults=(SENSOR,), expect=EXPECT), frames=1450, departure=(14.5, "alpha_rad"),
+        detection_axis=None, isolated="sensor q", isolation_type=None, estimate=None, candidates=(),
+        detection_time_s=5.5, isolation_time_s=5.75, arrival={"altitude_m": 1.0},
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", FLIGHTS)
+def test_the_metrics_of_a_flight(name, kept):
+    document = metrics(FLIGHTS[name])
+    assert document.pop("versions").keys() == {"beaver-ftc", "jsbsim", "numpy", "numba", "python"}
+    kept(document)
+
+
+@pytest.mark.parametrize("name", FLIGHTS)
+def test_the_words_of_a_flight(name, kept):
+    opened = Opened(FLIGHTS[name].scenario, metrics(FLIGHTS[name]))
+    kept({
+        "terminal": verdict.verdict_text(opened.metrics, "runs/x").splitlines(),
+        "mood": verdict.mood(opened.metrics), "repr": repr(opened).splitlines(), "html": opened._repr_html_(),
+    })  # fmt: skip
+
+
+def test_a_fault_free_time_ends_with_the_first_alarm_or_fault():
+    assert fault_free_s(FLIGHTS["quiet"]) == 30.0
+    assert fault_free_s(FLIGHTS["eventful"]) == 2.0
+    assert fault_free_s(FLIGHTS["lost"]) == 5.0
+
+
+@pytest.mark.parametrize(
+    ("end", "said"),
+    [
+        ((50.0, 2100.0), ""),
+        ((50.1, 1800.0), "airspeed from 45 to 50 m/s"),
+        ((39.9, 2101.0), "airspeed from 45 to 40 m/s and in altitude from 1800 to 2101 m"),
+    ],
+)
+def test_a_flight_has_drifted_beyond_5_mps_or_300_m(end, said):
+    initial = SimpleNamespace(airspeed_mps=45.0, altitude_m=1800.0)
+    found = hints(Flight(scenario=Scenario(initial=initial), end=end), {"detection": {"detected": True}})
+    assert "".join(found) == (said and f"the flight drifted in {said}: only the body rates are controlled")
+
+
+@pytest.mark.parametrize(("taken_s", "explained"), [(13.0, False), (13.25, True), (13.5, True)])
+def test_a_late_reallocation_is_explained(taken_s, explained):
+    late = Flight(supervisor=[(0.0, "nominal"), (taken_s, "reallocated")], isolation_time_s=12.25)
+    assert any("once it was certain" in said for said in metrics(late)["hints"]) is explained
+
+
+@pytest.mark.parametrize(
+    ("spans", "together"),
+    [
+        ([(2.0, 5.0), (5.0, 8.0)], False),
+        ([(2.0, 5.0), (4.9, 8.0)], True),
+        ([(2.0, None), (29.0, None)], True),
+        ([(2.0, None), (30.0, None)], False),
+    ],
+)
+def test_faults_that_touch_are_not_at_once(spans, together):
+    fdi = SimpleNamespace(**vars(FDI) | {"fault_class": "all"})
+    surfaces = ("elevator", "rudder")
+    faults = tuple(
+        Fault(at_s=at, end_s=end, actuator=s) for s, (at, end) in zip(surfaces, spans, strict=True)
+    )
+    said = metrics(Flight(scenario=Scenario(faults=faults, fdi=fdi)))["hints"]
+    assert bool(said) is together
+    for one in said:
+        assert one == ("faults on several surfaces at once: the diagnosis looks for one; set fdi.pairs: true")
+
+
+FRAMES, HZ = 6, 50.0
+ANGLES, ROOM = (
+    ("phi_rad", "theta_rad", "psi_rad", "alpha_rad", "beta_rad"),
+    ("north_m", "east_m", "altitude_m"),
+)
+TRAVEL_RAD = {"elevator": 0.4, "flap": 1.0}
+LOGGED = (
+    "t_s", *ROOM, *ANGLES, "airspeed_mps", "flap_pos_rad", *(f"{a}_measured_rad_s" for a in "pqr"),
+    *(f"{s}_cmd_rad" for s in TRAVEL_RAD),
+)  # fmt: skip
+
+
+def _written(path, frames=FRAMES, hz=HZ, group=4):
+    rows = np.outer(np.arange(frames), np.linspace(0.01, 0.2, len(LOGGED))) + np.arange(len(LOGGED)) / 100
+    rows[:, 0] = np.arange(frames) / hz
+    with ParquetLog(path, group) as log:
+        log.open(LOGGED)
+        log.write(rows)
+    return path
+
+
+@pytest.mark.parametrize("kind", RECORDINGS)
+def test_a_recording_and_its_vehicle_file(kind, tmp_path, kept):
+    write_recording(_written(tmp_path / "log.parquet"), TRAVEL_RAD, kind, tmp_path)
+    content = (tmp_path / RECORDINGS[kind]).read_bytes()
+    said = content.decode().splitlines() if kind == "table" else base64.b64encode(content).decode()
+    kept({"file": said, "vehicle": (tmp_path / "vehicle.yaml").read_text().splitlines()})
+
+
+def test_a_tacview_recording(tmp_path, kept):
+    flown = Flight(scenario=Scenario(name="a, b\\c\nd", faults=(Fault(at_s=0.04),)), frames=FRAMES,
+                   detection_time_s=0.06, isolation_time_s=0.2)  # fmt: skip
+    write_acmi(_written(tmp_path / "log.parquet"), metrics(flown), tmp_path / "flight.acmi")
+    kept((tmp_path / "flight.acmi").read_text(encoding="utf-8").splitlines())
+
+
+@pytest.mark.parametrize(
+    ("hz", "frames", "shown"), [(25.0, 6, 6), (26.0, 6, 3), (100.0, 9, 3), (10.0, 3, 3), (50.0, 1, 1)]
+)
+def test_a_tacview_recording_has_25_frames_a_second_at_most(tmp_path, hz, frames, shown):
+    path = _written(tmp_path / "log.parquet", frames, hz)
+    write_acmi(path, metrics(FLIGHTS["quiet"]), tmp_path / "flight.acmi")
+    lines = (tmp_path / "flight.acmi").read_text().splitlines()
+    assert sum(line.startswith("#") for line in lines) == shown
+
+
+def _folder(path, flight, group=1000):
+    path.mkdir()
+    columns = [
+        name for name in flight.columns if not name.startswith(("fie_rudder", "fie_aileron", "aileron"))
+    ]
+    t_s = np.arange(flight.frames) / flight.scenario.rate_hz
+    with ParquetLog(path / "log.parquet", group) as log:
+        log.open(columns)
+        log.write(np.column_stack([t_s, *(np.sin(t_s + i) for i in range(1, len(columns)))]))
+    (path / "metrics.json").write_text(as_json(metrics(flight)))
+    (path / "scenario.yaml").write_text("description: By hand.\n")
+    return path
+
+
+def _unpacked(data):
+    """The data of a page, its curves in short."""
+    for run in data["runs"]:
+        for level in run["levels"]:
+            for name, text in level.items():
+                kind = "<f8" if name == "t_s" else "<f4"
+                numbers = np.frombuffer(base64.b64decode(text), kind)
+                level[name] = [float(f"{n:.4g}") for n in in_short(numbers)]
+            level_names = ["t_s", "q_rad_s", "mode", "psi_rad", "q_ratio"]
+            level.update({"columns": sorted(level), **{name: level[name] for name in level_names}})
+            for name in set(level) - {*level_names, "columns"}:
+                del level[name]
+    return data
+
+
+def _data_of(html):
+    return json.loads(html.partition('id="data">')[2].partition("</script>")[0])
+
+
+@pytest.fixture(scope="module")
+def folders(tmp_path_factory):
+    runs = tmp_path_factory.mktemp("runs")
+    short = Flight(scenario=Scenario(rate_hz=10.0), frames=200)
+    none = Flight(scenario=Scenario(rate_hz=10.0, faults=()), frames=0, detection_time_s=None,
+                  isolation_time_s=None, isolated=None)  # fmt: skip
+    return [_folder(runs / "short", short), _folder(runs / "none", none)]
+
+
+def test_the_data_of_a_report(folders, kept):
+    data = _unpacked(_data_of(render(folders, ["one", "two"])))
+    assert data["modes"] == [list(pair) for pair in MODE_COLOURS.items()]
+    kept(data["runs"], part="runs")
+    views = [view | {"panels": view["panels"][:2]} for view in data["views"] if view["name"] != "states"]
+    kept({"views": views, "looks": sorted(data["looks"])}, part="views")
+
+
+def test_a_long_flight_is_shown_whole_and_around_the_fault(tmp_path):
+    """8 runs: 1000 points a curve; the window from 11.5 s to 14.12 s in full resolution."""
+    long = _folder(tmp_path / "long", Flight(), 3000)
+    data = _data_of(render([long] * 8))
+    for run in data["runs"]:
+        whole, near = (np.frombuffer(base64.b64decode(level["t_s"]), "<f8") for level in run["levels"])
+        assert whole.size == 1000
+        assert near[[0, -1]] == pytest.approx([11.5, 14.11], abs=0.011)
+        assert np.diff(near) == pytest.approx(0.01)
+    (alone,) = _data_of(render([long]))["runs"]
+    assert len(alone["levels"]) == 1
+    points = [len(_data_of(render([long] * n))["runs"][0]["levels"][0]["mode"]) for n in (3, 20)]
+    per = 16 / 3  # characters of base64 for four bytes
+    assert points == pytest.approx([per * 2 * 3000 / 3, per * 600], rel=0.01)
+
+
+def test_the_page_of_a_report(folders, kept):
+    html = render(folders)
+    words = html.partition("</style>")[2].partition('<script type="application/json"')[0]
+    kept([line.strip() for line in words.splitlines() if line.strip() and "jsbsim" not in line])
+
+
+def test_a_section_is_shown_once_of_each_run(folders, monkeypatch):
+    monkeypatch.setattr(report, "_SECTIONS", [])
+    for _ in range(2):
+        register_section(_say_where)
+    assert render(folders).count("<em>in ") == 2
+
+
+def _say_where(folder):
+    return f"<em>in {folder.name}</em>"
+
+
+MISSED = [
+    {"name": "a", "passed": False, "expected": 1, "actual": None},
+    {"name": "b", "passed": True, "expected": 1, "actual": 1},
+    {"name": "c", "passed": False, "expected": "x" * 20_000, "actual": []},
+]
+
+
+def test_what_xml_cannot_hold_and_what_is_too_long(tmp_path):
+    write_junit([{"scenario": "two", "took_s": 1.0, "expectations": MISSED}], tmp_path / "deep" / "junit.xml")
+    text = (tmp_path / "deep" / "junit.xml").read_text(encoding="utf-8")
+    assert text.startswith("<?xml version='1.0' encoding='utf-8'?>\n<testsuites")
+    assert 9_900 < text.count("x") < 10_100
+    assert 'tests="3" failures="2" errors="0"' in text
+    write_junit([{"scenario": "one", "error": "cannot\x07 be\ntrimmed \ud800"}], tmp_path / "junit.xml")
+    assert "cannot\\x07 be&#10;trimmed \\ud800" in (tmp_path / "junit.xml").read_text(encoding="utf-8")
+    (tmp_path / "file").write_text("")
+    with pytest.raises(SimulationFailed, match=r"cannot write .*junit.xml: "):
+        write_junit([], tmp_path / "file" / "junit.xml")
+
+
+def test_units_by_the_ends_of_names():
+    said = {
+        "p_rad_s2": "rad/s2", "x_deg_s": "deg/s", "p_rad_s": "rad/s", "gain_per_s": "1/s", "phi_rad": "rad",
+        "phi_deg": "deg", "airspeed_mps": "m/s", "manifold_pressure_inhg": "inHg", "qdyn_pa": "Pa",
+        "rate_hz": "Hz", "north_m": "m", "t_s": "s", "mode": "1", "size_deg.q": "deg",
+    }  # fmt: skip
+    assert units(said) == said
+    assert unit_of("rms_rad_s.time_s") == "s"
+
+
+def test_a_log_is_written_without_compressing_twice(tmp_path):
+    """Snappy, no dictionaries, no statistics, no nulls: what every reader opens, and costs least."""
+    file = parquet.ParquetFile(_written(tmp_path / "log.parquet"))
+    assert [file.metadata.row_group(i).num_rows for i in range(file.num_row_groups)] == [4, 2]
+    column = file.metadata.row_group(0).column(1)
+    assert (column.compression, column.statistics, column.has_dictionary_page) == ("SNAPPY", None, False)
+    assert not any(field.nullable for field in file.schema_arrow)

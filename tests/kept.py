@@ -16,6 +16,7 @@ import numpy as np
 FOLDER = Path(__file__).with_name("kept")
 RELATIVE, ABSOLUTE, DIGITS = 1e-6, 1e-9, 9
 _EMBEDDED = re.compile(r"data:[a-z/+-]+;base64,[A-Za-z0-9+/=]+")
+_INNERMOST = re.compile(r"\[\n[^\[\]{}]*\n *\]")  # lists of numbers or words, as JSON writes them
 
 
 def hold(name: str, found: Any, anew: bool = False) -> None:
@@ -24,11 +25,17 @@ def hold(name: str, found: Any, anew: bool = False) -> None:
     if anew:
         if not file.exists() or any(_differences(json.loads(file.read_text()), found)):
             file.parent.mkdir(parents=True, exist_ok=True)
-            file.write_text(json.dumps(found, indent=1, ensure_ascii=False) + "\n")
+            file.write_text(
+                _INNERMOST.sub(_on_a_line, json.dumps(found, indent=1, ensure_ascii=False)) + "\n"
+            )
         return
     assert file.exists(), f"{name}: nothing is kept; pytest --keep"
     differs = list(_differences(json.loads(file.read_text()), found))
     assert not differs, f"{len(differs)} differences from tests/kept/{name}.json:\n" + "\n".join(differs[:20])
+
+
+def _on_a_line(found: re.Match[str]) -> str:
+    return re.sub(r"\n *", " ", found[0]).replace("[ ", "[").replace(" ]", "]")
 
 
 def _plain(value: Any) -> Any:

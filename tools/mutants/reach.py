@@ -27,7 +27,7 @@ from tools.mutants.scope import COMPILED, PACKAGE, PLAIN, ROOT, assigned, runs_a
 from tools.mutants.trial import SURVIVED, in_a_child, processor_s, pytest_quietly, turn_to
 
 SLOW_S = {
-    PLAIN: 2.0,
+    PLAIN: 6.0,
     COMPILED: 10.0,
 }  # of processor, counting lines; a test that takes longer is none for this
 WAITS_S = 20.0  # nor is what waits so long, for other processes

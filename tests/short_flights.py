@@ -1,0 +1,30 @@
+"""Flights of two seconds, each of much at once, and all that is left of one: its log in short, its metrics,
+and what every stage remembers at the end.
+"""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+
+from beaver_ftc.loop.loop import Loop
+from beaver_ftc.results.metrics import metrics
+from beaver_ftc.scenario.loader import load
+from kept import in_short, of_record
+
+SCENARIOS = list(yaml.safe_load_all((Path(__file__).parent / "data" / "short_flights.yaml").read_text()))
+# Where JSBSim has its numbers: compiled code reads them there.
+OF_THE_MACHINE = (".native", ".executive", ".run", "getter", "setter", "pointer", "pointers")
+
+
+def flown(document: dict[str, Any]) -> dict[str, Any]:
+    """What is left of the flight of a scenario."""
+    loop = Loop(load(document))
+    log = np.concatenate([rows.copy() for rows in loop.chunks()])
+    record = of_record(loop.frames[0])
+    return {
+        "metrics": metrics(loop.land()),
+        "log": {name: in_short(column) for name, column in zip(loop.columns, log.T, strict=True)},
+        "record": {path: value for path, value in record.items() if not path.endswith(OF_THE_MACHINE)},
+    }

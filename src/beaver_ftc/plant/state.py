@@ -48,7 +48,9 @@ class FlightState:
         **given: Any,
     ) -> None:
         if surfaces_rad is None or settings is None:
-            surfaces_rad, settings = neutral(aircraft or load())
+            at_neutral, by_default = neutral(aircraft or load())
+            surfaces_rad = at_neutral if surfaces_rad is None else surfaces_rad
+            settings = by_default if settings is None else settings
         surfaces_rad, settings = dict(surfaces_rad), dict(settings)
         for name in [name for name in given if name not in type(self).__dataclass_fields__]:
             surface = name.removesuffix("_rad")

@@ -1,0 +1,54 @@
+"""All that a derivation writes and says, from few states: the file, the page, the document.
+
+That what it finds is right other tests say, from many states and known coefficients.
+"""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+import yaml
+
+from beaver_ftc.studies.derive import derivation, derived
+
+TRAINER = Path(__file__).parents[2] / "data" / "aircraft" / "trainer"
+ENVELOPE = "airspeed_mps: [42, 58]\nalpha_deg: [-2, 9]\naltitude_m: 1200\nsideslip_deg: 6\n"
+
+
+def derive(reference, folder, envelope=None):
+    """(what was found, the steps told), from few states."""
+    told = []
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(derivation, "SAMPLES", 300)
+        patched.setattr(derivation, "CHECKED", 400)
+        return derivation.derive(reference, folder, envelope, told.append), told
+
+
+@pytest.fixture(scope="module")
+def stranger(tmp_path_factory):
+    return derive("jsbsim:c172p", tmp_path_factory.mktemp("derived"))
+
+
+@pytest.fixture(scope="module")
+def filed(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("derived")
+    (folder / "envelope.yaml").write_text(ENVELOPE)
+    return derive(str(TRAINER), folder, folder / "envelope.yaml")
+
+
+@pytest.mark.parametrize("which", ["stranger", "filed"])
+def test_what_is_derived(which, request, kept):
+    found, told = request.getfixturevalue(which)
+    folder = found.aircraft.folder
+    kept(yaml.safe_load((folder / "aircraft.yaml").read_text()), part="file")
+    document = derived.document_of(replace(found, took_s=1.2345))
+    assert document.pop("folder") == str(folder)
+    kept(document | {"told": told}, part="document")
+    page = derived.page_of(replace(found, took_s=1.2345))
+    kept(page.splitlines(), part="page")
+    assert page.replace("1.2 s", f"{found.took_s:.1f} s") == (folder / "derived.md").read_text()
+
+
+def test_a_page_on_an_aircraft_of_which_little_is_to_be_said(stranger, kept):
+    found, _ = stranger
+    kept(derived.page_of(replace(found, notes=(), further={})).splitlines())

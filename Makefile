@@ -45,7 +45,7 @@ demo: $(VENV)/.demo
 	@echo "report: runs/elevator-partial-loss/report.html"
 
 test: $(VENV)/.dev
-	NUMBA_DISABLE_JIT=1 $(BIN)/python -m pytest $(PLAIN)
+	NUMBA_DISABLE_JIT=1 $(PYTEST) $(PLAIN)
 	$(PYTEST) -m "not acceptance" $(addprefix --ignore=,$(PLAIN))
 
 plain:

@@ -34,6 +34,7 @@ WAITS_S = 20.0  # nor is what waits so long, for other processes
 HANGS_S = 900.0  # of processor for the tests of one file, far more than the limits allow
 EXAMPLES = 4
 APART = ("beaver_ftc.compiled", "beaver_ftc.numba_inside")
+SHARED = ("conftest.py", "kept.py")
 KEPT = ROOT / ".mutants"
 
 
@@ -201,14 +202,14 @@ def _lines(data: coverage.CoverageData, timed: "_Timed") -> dict[str, dict[int, 
 
 
 def _tests_own() -> set[str]:
-    """The modules of tests/ and tools/ that are loaded."""
+    """The modules of tests/ and tools/ that are loaded, but for what all tests share and executes nothing."""
     files = (getattr(module, "__file__", None) for module in list(sys.modules.values()))
     roots = (ROOT / "tests", ROOT / "tools")
     inside = (Path(f) for f in files if f and any(Path(f).is_relative_to(root) for root in roots))
     return {
         file.relative_to(ROOT).as_posix()
         for file in inside
-        if not file.is_relative_to(ROOT / "tools" / "mutants")
+        if not file.is_relative_to(ROOT / "tools" / "mutants") and file.name not in SHARED
     }
 
 

@@ -51,4 +51,4 @@ def test_what_is_derived(which, request, kept):
 
 def test_a_page_on_an_aircraft_of_which_little_is_to_be_said(stranger, kept):
     found, _ = stranger
-    kept(derived.page_of(replace(found, notes=(), further={})).splitlines())
+    kept(derived.page_of(replace(found, notes=(), further={}, took_s=2.0)).splitlines())

@@ -112,7 +112,7 @@ class Products:
         taken: list[int] = []
         left, residual = self.square, self.onto
         free = np.array(within)
-        while len(taken) < most and left > EXACT * self.total:
+        while len(taken) < min(most, len(free)) and left > EXACT * self.total:
             open_ = free[~np.isin(free, taken)]
             wider = [*taken, int(open_[np.argmax(np.abs(residual[open_]))])]
             then = self.unexplained(wider)

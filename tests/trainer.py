@@ -13,7 +13,7 @@ FOLDER = Path(__file__).parent / "data" / "aircraft" / "trainer"
 def trainer_file(**sections):
     """Its file's data. sections: a mapping is added to what there is, None takes a key out of it.
 
-    A surface need not say its properties, and is in a group of its own unless one is said.
+    A surface need not say its properties, and is in a group of its own unless groups are said.
     """
     data = yaml.safe_load((FOLDER / "aircraft.yaml").read_text(encoding="utf-8"))
     for section, given in sections.items():
@@ -24,7 +24,7 @@ def trainer_file(**sections):
     for name, surface in data["surfaces"].items():
         for key in ("command", "position", "effective"):
             surface.setdefault(key, f"fcs/{name}-{key}")
-        if not any(name in members for members in data["groups"].values()):
+        if "groups" not in sections and not any(name in members for members in data["groups"].values()):
             data["groups"][f"{name}s"] = [name]
     return data
 

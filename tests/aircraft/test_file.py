@@ -1,0 +1,170 @@
+"""An aircraft's file: its contract, what it must not say, and what follows from it."""
+
+from math import isnan, radians
+
+import pytest
+from pydantic import ValidationError
+
+from beaver_ftc.aircraft import load
+from beaver_ftc.aircraft.schema import AircraftFile, writing_property
+from kept import keys_of
+from trainer import trainer, trainer_file
+
+
+def test_what_a_file_may_say(kept):
+    kept(keys_of(AircraftFile.model_json_schema()))
+
+
+def term(name="x", of=None, **keys):
+    return {"name": name, "value": 1.0, "of": of or {}, **keys}
+
+
+def box(**keys):
+    span = dict.fromkeys(
+        ("airspeed_mps", "alpha_rad", "beta_rad", "p_rad_s", "q_rad_s", "r_rad_s", "density_kg_m3"), (0, 1)
+    )
+    errors = {f"error_{axis}_rad_s2": [[0, 1], [1, 2]] for axis in "pqr"}
+    return {
+        "model_error_map": {
+            "travel_share": [0.5, 1],
+            "until_s": [9, 99],
+            "boxes": [{**span, **errors, **keys}],
+        }
+    }
+
+
+TAB = {"tab": {"travel_rad": [-0.1, 0.2]}}
+CANNOT = {
+    "ends": {"envelope": {"airspeed_mps": [65, 65], "alpha_deg": [14, -4]}},
+    "stops": {"surfaces": {"tab": {"travel_rad": [0.2, 0.2]}}},
+    "beyond a half turn": {"surfaces": {"tab": {"travel_rad": [-3.21, 3.21]}}},
+    "box": box(beta_rad=[1, 0.9]),
+    "inertia": {"mass": {"Ix_kgm2": 4.0, "Iz_kgm2": 9.0, "Jxz_kgm2": 6.0}},
+    "default below": {"engine": {"settings": {"n": {"property": "a/b", "default": 0.9, "range": [1, 2]}}}},
+    "default above": {"engine": {"settings": {"n": {"property": "a/b", "default": 2.1, "range": [1, 2]}}}},
+    "short rows": box(error_q_rad_s2=[[0, 1], [1]]),
+    "few rows": box(error_r_rad_s2=[[0, 1]]),
+    "groups": {"groups": {"lateral": ["aileron", "ruder"], "pitch": ["elevator", "elevator"]}},
+    "no group": {"groups": {"lateral": ["aileron", "rudder"], "pitch": None, "none": []}},
+    "signals of terms": {"moments": {"Cl": [term(of={"alfa": 1}), term("y", {"betadoth": 1})]}},
+    "surfaces of terms": {"forces": {"CY": [term(surface="tab"), term("y", {"betadoth": 1})]}},
+    "a rate and a surface": {"moments": {"Cn": [term(of={"qh": 1, "alpha": 1}, surface="rudder")]}},
+    "twice": {"forces": {"CX": [term("Cl_p"), term("CX_a"), term("CX_a")]}},
+    "too many": {"moments": {"Cm": [term(f"Cm_{i}") for i in range(33)]}},
+    "too many forces": {"forces": {"CZ": [term(f"CZ_{i}") for i in range(33)]}},
+    "signals of a box": box(signals={"dpt": [0, 1]}),
+    "signals not in a box": {**box(), "signals": {"dpt": {"property": "aero/dpt"}}},
+    "signals measured anyway": {"signals": {"alpha": {"property": "a/b"}, "betadoth": {"property": "a/b"}}},
+    "writing": {"trim": {"throttle": "simulation/do_linearization"}},
+}
+CAN = {
+    "a half turn": {"surfaces": {"tab": {"travel_rad": [-3.2, 3.2]}}},
+    "a box of one value": box(beta_rad=[1, 1]),
+    "inertia": {"mass": {"Ix_kgm2": 4.0, "Iz_kgm2": 9.0, "Jxz_kgm2": -5.99}},
+    "defaults at the ends": {
+        "engine": {"settings": {
+            "n": {"property": "a/b", "default": 1, "range": [1, 2]},
+            "m": {"property": "a/b", "default": 2, "range": [1, 2]},
+        }},
+    },
+    "as many as there may be": {"moments": {"Cm": [term(f"Cm_{i}") for i in range(32)]}},
+    "a rate and a surface in a force": {"forces": {"CZ": [term(of={"qh": 1}, surface="elevator")]}},
+    "signals of a box": {**box(signals={"dpt": [0, 1]}), "signals": {"dpt": {"property": "aero/dpt"}}},
+}  # fmt: skip
+
+
+def test_what_contradictions_are_called(kept):
+    found = {}
+    for case, given in CANNOT.items():
+        with pytest.raises(ValidationError) as caught:
+            AircraftFile.model_validate(trainer_file(**given))
+        found[case] = sorted(
+            [".".join(map(str, (*error["loc"], *at))), says]
+            for error in caught.value.errors()
+            for at, says in error.get("ctx", {}).get("conflicts", [((), error["type"])])
+        )
+    kept(found)
+
+
+@pytest.mark.parametrize("case", CAN)
+def test_what_is_just_allowed(case):
+    assert trainer(**CAN[case]).n in (3, 4)
+
+
+# A tab that does nothing; one that pitches more than the elevator; a rudder above the wing, that rolls more
+# than it yaws; ailerons that hardly roll.
+BUILDS = {
+    "trainer": {},
+    "tab of nothing": {"surfaces": TAB},
+    "strong tab": {"surfaces": TAB,
+                   "moments": {"Cm": [term("a", surface="elevator"), term("b", surface="tab")]},
+                   "groups": {"pitch": ["tab", "elevator"]}},
+    "high rudder": {"moments": {"Cn": [term("a", surface="rudder"), term("b", {"beta": 1})],
+                                "Cl": [term("c", surface="rudder"), term("d", surface="aileron")]}},
+    "rudder of alpha": {**box(alpha_rad=[0.1, 0.3]), "moments": {
+        "Cl": [term("a", {"alpha": 2}, surface="aileron"), term("b", {"alpha": 1}, surface="rudder")],
+        "Cn": [term("c", {"alpha": 1}, surface="aileron"), term("d", surface="rudder")],
+    }},
+    "signals": {**box(signals={"dpt": [0.2, 0.6]}), "signals": {"dpt": {"property": "aero/dpt"}},
+                "start": {"airspeed_mps": 44.0}, "model_error_rad_s2": {"p": 1, "q": 2, "r": 3}},
+    "no forces": {"forces": None, "mass": {"mass_kg": None}},
+    "sideslip's rate": {"forces": {"CY": [term("CY_betadot", {"betadoth": 1}), term("CY_p", {"ph": 1})]}},
+}  # fmt: skip
+
+
+def told(aircraft):
+    """What follows from a file."""
+    terms = {
+        kind: [[term.name, *term.factors] for term in getattr(aircraft, kind)]
+        for kind in ("moments", "forces", "measurable_forces")
+    }
+    return terms | {
+        "surfaces": aircraft.surfaces, "axes": aircraft.dominant_axis, "primary": aircraft.primary,
+        "groups": dict(aircraft.groups), "signals": aircraft.signal_names,
+        "usual": dict(aircraft.usual_signals),
+        "travel": {name: (of.min_rad, of.max_rad) for name, of in aircraft.travel.items()},
+        "mass": vars(aircraft.mass), "usual_airspeed_mps": aircraft.usual_airspeed_mps,
+        "model_error_rad_s2": aircraft.model_error_rad_s2,
+        "engine instruments": aircraft.has_engine_instruments,
+        "named": list(aircraft.terms),
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("build", [*BUILDS, "beaver"])
+def test_what_follows_from_a_file(build, kept):
+    kept(told(load() if build == "beaver" else trainer(**BUILDS[build])))
+
+
+def test_where_a_term_stands_and_what_a_coefficient_is():
+    aircraft = trainer()
+    assert [aircraft.index(name) for name in ("Cl_constant", "Cl_beta", "Cm_0", "Cn_rudder")] == [0, 1, 7, 19]
+    of = {"alpha": 0.2, "beta": 0.1, "qh": 0.01, "elevator": -0.3}
+    expected = 0.045 - 0.72 * 0.2 - 11.5 * 0.01 - 0.35 * 0.1**2 - 1.15 * -0.3 + 0.9 * 0.2 * -0.3
+    assert aircraft.coefficient("Cm", of) == pytest.approx(expected)
+    scaled = aircraft.coefficient("Cm", of, {"Cm_q": 3.0, "Cm_0": 0.0})
+    assert scaled == pytest.approx(expected - 0.045 - 2 * 11.5 * 0.01)
+    assert aircraft.alpha_rad == (radians(-4), radians(14))
+    assert isnan(trainer(mass={"mass_kg": None}).mass.mass_kg)
+
+
+def test_ends_of_a_box_in_their_order():
+    names = ("p_rad_s", "q_rad_s", "r_rad_s", "alpha_rad", "beta_rad", "airspeed_mps", "density_kg_m3")
+    spans = {name: (i, i + 0.5) for i, name in enumerate(names)}
+    signals = {"a": (7, 8), "b": (8, 9)}
+    given = trainer_file(
+        **box(**spans, signals=signals), signals={name: {"property": "a/b"} for name in signals}
+    )
+    made = AircraftFile.model_validate(given).model_error_map.boxes[0]
+    assert made.ends(["b", "a"]) == [*spans.values(), (8, 9), (7, 8)]
+
+
+@pytest.mark.parametrize(
+    ("text", "names"),
+    [
+        ("simulation/write-state-file", "simulation/write-state-file"),
+        ("a/do_linearization/b", "simulation/do_linearization"),
+        ("fcs/elevator-cmd-rad", ""),
+    ],
+)
+def test_properties_that_write(text, names):
+    assert writing_property(text) == names

@@ -1,0 +1,117 @@
+"""From what a scenario calls its aircraft to the aircraft, and what is said where there is none."""
+
+import os
+import shutil
+
+import pytest
+
+from beaver_ftc.aircraft import load, loading
+from beaver_ftc.aircraft.loading import UnknownAircraft, derived_folder, is_derived, read
+from beaver_ftc.documents.errors import BadInput
+from trainer import FOLDER
+
+
+@pytest.fixture
+def beside(tmp_path, monkeypatch):
+    """A scenario's folder with an aircraft below it; nothing was looked for yet."""
+    monkeypatch.setattr(loading, "_SEEN", {})
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    shutil.copytree(FOLDER, tmp_path / "here" / "trainer")
+    return tmp_path / "here"
+
+
+@pytest.mark.parametrize(
+    ("reference", "says"),
+    [
+        (3, "3 is no aircraft, allowed: a built-in name, jsbsim:NAME, or ./FOLDER beside the scenario"),
+        (["x" * 90], "['" + "x" * 58 + " is no aircraft"),
+        (
+            "bever",
+            "'bever' is not known, did you mean beaver? allowed: beaver, jsbsim:NAME as `beaver-ftc list",
+        ),
+        (
+            "jsbsim:none",
+            "'jsbsim:none' has no design model yet, allowed: what `beaver-ftc derive jsbsim:none`",
+        ),
+        ("jsbsim:a b", "'jsbsim:a b' is no name, allowed: letters, digits, - and _"),
+        (f"jsbsim:{'n' * 61}", f"'jsbsim:{'n' * 60}' is no name"),
+        ("./../here/trainer", "'./../here/trainer' is outside, allowed: a folder below the scenario's own"),
+        ("./up", "'./up' is outside"),
+        ("./nothing", "there is no folder './nothing', allowed: a built-in name"),
+        ("./\0", "'./\\x00' is outside"),
+    ],
+)
+def test_what_is_no_aircraft(beside, reference, says):
+    (beside / "up").symlink_to(beside.parent)
+    with pytest.raises(UnknownAircraft) as caught:
+        load(reference, beside)
+    assert str(caught.value).startswith(says)
+
+
+def test_a_folder_is_remembered_while_it_is_the_only_one(beside, tmp_path):
+    with pytest.raises(UnknownAircraft, match=r"there is no folder to find './trainer' in"):
+        load("./trainer")
+    assert load("./trainer", beside) is load("./trainer") is read(beside / "trainer")
+    shutil.copytree(FOLDER, tmp_path / "there" / "trainer")
+    load("./trainer", tmp_path / "there")
+    with pytest.raises(UnknownAircraft, match="no folder to find"):
+        load("./trainer")
+
+
+def test_links_stay_below_the_scenario_s_folder(beside):
+    (beside / "notes").write_text("n")
+    (beside / "trainer" / "notes").symlink_to(beside / "notes")
+    assert load("./trainer", beside).name == "trainer"
+    (beside.parent / "secret").write_text("s")
+    (beside / "trainer" / "Systems" / "link").symlink_to(beside.parent / "secret")
+    with pytest.raises(UnknownAircraft, match=r"'./trainer/Systems/link' leads outside"):
+        load("./trainer", beside)
+
+
+def test_a_file_is_read_again_once_it_changed(beside):
+    file = beside / "trainer" / "aircraft.yaml"
+    before = read(beside / "trainer")
+    assert read(beside / "trainer") is before
+    file.write_text(file.read_text().replace("span_m: 10.4", "span_m: 11.5"))
+    os.utime(file, ns=(1, 1))
+    assert (before.geometry.span_m, read(beside / "trainer").geometry.span_m) == (10.4, 11.5)
+
+
+@pytest.mark.parametrize(
+    ("model", "says"),
+    [
+        ("none.xml", r":5: jsbsim: 'none.xml' is not there"),
+        ("link.xml", r":5: jsbsim: 'link.xml' is outside"),
+    ],
+)
+def test_a_model_stands_beside_its_file(beside, model, says):
+    (beside / "trainer" / "link.xml").symlink_to(FOLDER / "trainer.xml")
+    file = beside / "trainer" / "aircraft.yaml"
+    file.write_text(file.read_text().replace("trainer.xml", model))
+    with pytest.raises(BadInput, match=says):
+        read(beside / "trainer")
+
+
+@pytest.mark.parametrize("text", ["", "#" * 1_000_001])
+def test_a_file_of_nothing_or_too_much(beside, text):
+    (beside / "trainer" / "aircraft.yaml").write_text(text)
+    with pytest.raises(
+        BadInput, match=r"is empty, allowed: a mapping with the keys of an aircraft|is too large"
+    ):
+        read(beside / "trainer")
+
+
+def test_what_was_derived_by_this_way_of_deriving_is_an_aircraft(beside):
+    name = "n" * 60
+    folder = derived_folder(name)
+    assert not is_derived(name)
+    shutil.copytree(FOLDER, folder)
+    text = (FOLDER / "aircraft.yaml").read_text()
+    for line, known in (
+        (loading.first_line(), True),
+        (loading.first_line().replace("format 5", "format 4"), False),
+    ):
+        (folder / "aircraft.yaml").write_text(line + text)
+        assert is_derived(name) is known
+    (folder / "aircraft.yaml").write_text(loading.first_line() + text)
+    assert load(f"jsbsim:{name}").name == "trainer"

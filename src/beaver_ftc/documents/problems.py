@@ -16,7 +16,6 @@ from beaver_ftc.documents.errors import BadInput, nearest, suggestion
 
 WHOLE_FILE = "(file)"
 _SHOWN = 48
-_NO_KEY = ("[key]", "(")  # steps of pydantic's: a mapping's key itself, which kind of fault is meant
 
 
 class ScenarioError(BadInput):
@@ -71,8 +70,9 @@ def one_line(text: str, longest: int) -> str:
 
 def problems_of(error: ValidationError, document: Document, schema: dict[str, Any]) -> Iterator[Problem]:
     """The mistakes in a document's data, each at its line."""
-    for detail in error.errors(include_url=False):
-        at = _in_document(detail["loc"], document.data)
+    details = error.errors(include_url=False)
+    places = [_in_document(of["loc"], document.data, of["type"] == "missing") for of in details]
+    for detail, at in _of_branches_meant(list(zip(details, places, strict=True))):
         if detail["type"] == "conflict":
             found = [
                 (_in_document((*at, *below), document.data), says)
@@ -87,20 +87,31 @@ def problems_of(error: ValidationError, document: Document, schema: dict[str, An
             yield Problem(document.line(where), where, says)
 
 
+def _of_branches_meant(located: list[tuple[Any, Location]]) -> Iterator[tuple[Any, Location]]:
+    """Mistakes without those that say a value is of another type than one branch of a union wants, where
+    another branch has found more in it."""
+    told = {at[:n] for _, at in located for n in range(len(at))}
+    told |= {at for detail, at in located if not detail["type"].endswith(_WRONG_TYPE)}
+    return (each for each in located if each[1] not in told or not each[0]["type"].endswith(_WRONG_TYPE))
+
+
 def _near_miss_of_type(given: Any) -> str:
     """The key that was meant to be `type`, if there is one."""
     keys = [key for key in given if isinstance(key, str)] if isinstance(given, dict) else []
     return next(iter(get_close_matches("type", keys, n=1)), "")
 
 
-def _in_document(loc: Location, data: Any) -> Location:
-    """Pydantic's location without the steps it adds for itself (a union's tag, an expanded preset)."""
+def _in_document(loc: Location, data: Any, is_missing: bool = True) -> Location:
+    """Pydantic's location without the steps it adds for itself (a union's branch, an expanded preset).
+
+    is_missing: its last step is a key even where the data does not have it.
+    """
     location: list[int | str] = []
     for i, part in enumerate(loc):
         if has(data, part):
             location.append(part)
             data = data[part]
-        elif i == len(loc) - 1 and isinstance(data, dict) and not str(part).startswith(_NO_KEY):
+        elif is_missing and i == len(loc) - 1 and isinstance(data, dict):
             location.append(part)
     return tuple(location)
 
@@ -260,7 +271,9 @@ def _range(node: dict[str, Any]) -> str:
     above, below = node.get("exclusiveMinimum"), node.get("exclusiveMaximum")
     low, high = node.get("minimum", above), node.get("maximum", below)
     if low is not None and high is not None:
-        return f" over {low:g} up to {high:g}" if above is not None else f" from {low:g} to {_bound(high)}"
+        ends = f"below {high:g}" if below is not None else _bound(high)
+        up = "and " if below is not None else "up to "
+        return f" over {low:g} {up}{ends}" if above is not None else f" from {low:g} to {ends}"
     if low is not None:
         return f" over {low:g}" if above is not None else f" of at least {low:g}"
     return "" if high is None else f" of at most {high:g}"

@@ -7,7 +7,7 @@ import pytest
 
 import beaver_ftc as bf
 from beaver_ftc.documents.errors import SimulationFailed
-from beaver_ftc.integrations.live import flying
+from beaver_ftc.integrations.live import BAD_INPUT, flying
 from beaver_ftc.integrations.live.flying import Flying
 from beaver_ftc.integrations.live.session import Session
 
@@ -154,3 +154,54 @@ def test_a_flight_that_cannot_go_on_is_held_and_says_why(flown):
     assert said == {"k": "ack", "n": 0, "ok": False, "says": "not finite at 0.5 s"}
     assert wire.of("s")[-1]["paused"]
     assert wire.times()[-1] == pytest.approx(0.5, abs=0.02)
+
+
+ADDED = {"scenarios", "laws", "schemes", "description", "columns", "sensors"}  # what others may add to
+
+
+def _in_short(told):
+    if told["k"] == "f":
+        return ["f", told["v"][0], told.get("stick"), told.get("mode")]
+    return {key: value for key, value in told.items() if key not in ADDED}
+
+
+def test_all_that_pages_are_told(flown, kept):
+    """Two pages; one asks, breaks, hurries, pauses and leaves, and a new flight follows."""
+    jam = {"do": "break", "fault": {"type": "stuck", "actuator": "rudder"}, "n": 7}
+    wire = flown(
+        (0.0, 0, "joined 1"), (0.1, 0, "joined 2"), (0.2, 1, STICK), (0.25, 1, jam),
+        (0.3, 2, {"do": "speed", "times": 2.5, "n": 2}), (0.5, 2, {"do": "pause", "on": True, "n": 3}),
+        (0.6, 1, {"do": "fresh", "scenario": "rudder-stuck", "n": 8}), (0.65, 0, "left 1"),
+        (0.7, 2, {"do": "pause", "on": False, "n": 4}), (0.9, 0, "end"),
+    )  # fmt: skip
+    kept([[round(at_s, 3), page, _in_short(told)] for at_s, page, told in wire.sent])
+
+
+class Died:
+    """A pipe whose other end is gone, or that says to end before there is a scenario."""
+
+    def __init__(self, *words):
+        self.words, self.sent = list(words), []
+
+    def recv(self):
+        if not self.words:
+            raise EOFError
+        return self.words.pop(0)
+
+    def send(self, told):
+        self.sent.append(told)
+
+
+def test_a_process_without_a_flight_ends(tmp_path):
+    for words in ((), ((0, "end"),)):
+        pipe = Died(*words)
+        flying.main(pipe, str(tmp_path))
+        assert pipe.sent == []
+
+
+def test_a_flight_that_cannot_begin_says_why(tmp_path):
+    pipe = Died(bf.load({"name": "high", "initial": {"airspeed_mps": 21, "altitude_m": 6000}}))
+    flying.main(pipe, str(tmp_path))
+    ((kind, says),) = pipe.sent
+    assert kind == BAD_INPUT
+    assert says.startswith("high: ")

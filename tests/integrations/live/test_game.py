@@ -83,3 +83,54 @@ def test_an_answer_needs_a_round_and_a_known_name():
     game = Game().next_round("second", 0.0, [], np.random.default_rng(1))
     with pytest.raises(BadInput, match="did you mean elevator"):
         game.answer("elevatr", NAMES, 1.0)
+
+
+def test_what_is_shown_of_each_phase(kept):
+    rng = np.random.default_rng(3)
+    kinds = hidden_faults(("aileron", "elevator", "flap"), ("aileron", "elevator"))
+    game = Game().next_round("random", 100.0, kinds, rng)
+    seen = {"kinds": kinds, "idle": Game().shown(), "waiting": game.shown(), "due_s": game.due_s}
+    assert (game.is_due(game.due_s), game.is_due(game.due_s - 1e-6)) == (True, False)
+    game.broke(game.fault, game.due_s)
+    assert not game.is_due(game.due_s + 1.0)
+    game.named(game.fault["actuator"], game.due_s + 2.0)
+    game.named("rudder", game.due_s + 3.0)  # the first name counts
+    assert not game.settle(5.0, game.due_s + 3.0)  # you have not spoken
+    game.answer(game.fault["actuator"], (game.fault["actuator"],), game.due_s + 2.5)
+    seen["broken"] = game.shown()
+    assert game.settle(5.0, game.due_s + 2.5)
+    assert not game.settle(5.0, game.due_s + 2.5)
+    seen["over"] = game.shown()
+    seen["next"] = game.next_round("second", 150.0, kinds, rng).shown()
+    kept(seen)
+
+
+def test_a_round_given_up_is_over_and_one_that_is_over_is_put_away():
+    game = Game().next_round("second", 0.0, [], np.random.default_rng(1))
+    assert (game.due_s, game.hidden) == (float("inf"), True)
+    for phase in (OVER, "idle", "idle"):
+        game.stop()
+        assert (game.phase, game.hidden) == (phase, False)
+    game.named("elevator", 1.0)
+    assert game.detector is None
+
+
+@pytest.mark.parametrize(
+    ("yours", "its", "winner"),
+    [
+        (("elevator", 10.0), ("elevator", 10.0), "you"),
+        (("elevator", 9.99), ("elevator", 10.0), "detector"),
+        (("elevator", 12.0), ("elevator", 12.0), "you"),
+    ],
+)
+def test_an_answer_in_the_very_frame_of_the_fault_is_right(yours, its, winner):
+    game = Game(phase="broken", fault=FAULT, broken_s=10.0, yours=yours, detector=its)
+    assert game.winner == winner
+    assert game._delay_s(its) == its[1] - 10.0
+
+
+def test_before_anything_broke_nobody_is_waited_for():
+    game = Game().next_round("second", 0.0, [], np.random.default_rng(1))
+    game.answer("nothing", NAMES, 1.0)
+    assert game.settle(5.0, 1.0)
+    assert (game.winner, game.score) == (None, [0, 0])

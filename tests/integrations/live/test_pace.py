@@ -35,3 +35,34 @@ def test_a_pause_adds_nothing():
     flown(pace, 60)
     pace.hold(10.0)
     assert flown(pace, 6, from_s=10.0) == pytest.approx(10, abs=1)
+
+
+def test_frames_are_due_by_the_clock_to_the_frame():
+    """At 100 Hz from 10 s on: 1.67 frames a tick; what a late tick lacks the next has."""
+    pace = Pace(100.0, 10.0)
+    assert (pace.achieved, pace.jitter_ms) == (0.0, 0.0)
+    due = [pace.frames_due(10.0 + tick * TICK_S + 1e-6) for tick in (1, 2, 3, 4.5, 5, 6)]
+    assert due == [1, 2, 2, 2, 1, 2]
+    assert pace.achieved == pytest.approx(10 / 100 / (6 * TICK_S), rel=1e-4)
+    assert pace.jitter_ms == pytest.approx(1e3 * 0.5 * TICK_S / 7**0.5, rel=1e-3)
+
+
+def test_of_a_quarter_of_a_second_all_is_flown_and_of_more_nothing():
+    for late_s, due in ((0.249, 26), (0.251, 0)):
+        pace = Pace(100.0, 0.0)
+        assert pace.frames_due(2 * TICK_S + late_s) == due
+        pace = Pace(100.0, 0.0)
+        pace.times = 2.0
+        assert pace.frames_due(2 * TICK_S + late_s) == (51 if due else 0)
+
+
+def test_of_a_second_sixty_ticks_are_remembered():
+    pace = Pace(100.0, 0.0)
+    late_s = 0.2
+    pace.frames_due(TICK_S + late_s)
+    for tick in range(2, 61):
+        pace.frames_due(tick * TICK_S)
+    assert pace.jitter_ms == pytest.approx(1e3 * late_s / 60**0.5)
+    pace.frames_due(61 * TICK_S)
+    assert pace.jitter_ms == pytest.approx(0.0, abs=1e-9)
+    assert pace.achieved == pytest.approx((101 - 3) / 100 / (59 * TICK_S), rel=0.02)

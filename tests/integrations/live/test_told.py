@@ -1,0 +1,150 @@
+"""What a session tells of a flight, held whole: events, states and frames of scripted flights."""
+
+import json
+from math import pi
+
+import numpy as np
+import pytest
+
+import beaver_ftc as bf
+from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.integrations.live import messages
+from beaver_ftc.integrations.live.session import Session, as_live, changes_of, fault_types
+
+LOSS = {"type": "loss_of_effectiveness", "actuator": "elevator", "magnitude": 0.4}
+ADDED = {"scenarios", "laws", "schemes", "description", "columns", "sensors"}  # what others may add to
+
+
+def asked(session, **request):
+    return session.handle(messages.parse(json.dumps(request)))
+
+
+def seen(session):
+    """The state, the frame in short, and what has happened since."""
+    frame = session.frame()
+    values = frame.pop("v")
+    assert len(values) == len(session.columns)
+    frame["t_s"], frame["hidden"] = values[0], sum(value is None for value in values)
+    events = [list(event.values()) for event in session.take_events()]
+    return json.loads(messages.encode({"state": session.state(), "frame": frame, "events": events}))
+
+
+@pytest.fixture
+def session(tmp_path):
+    return Session(bf.load("fault-free"), tmp_path, seed=1)
+
+
+def _flown(session, frames):
+    for _ in range(frames):
+        session.step()
+
+
+def test_a_flight_in_which_much_is_asked(session, kept):
+    told = [{key: value for key, value in session.hello().items() if key not in ADDED}, seen(session)]
+    script = [
+        (50, {"do": "break", "fault": LOSS}), (150, {"do": "stick", "rates_deg_s": [1.5, 0, -0.5]}),
+        (5, {"do": "blow", "velocity_mps": [0, 3, -1.5]}), (1, {"do": "repair", "actuator": "elevator"}),
+        (202, {"do": "change", "law": "adaptive", "scheme": "adaptive-estimators"}),
+        (2, {"do": "break", "fault": {"type": "bias", "sensor": "q", "magnitude": 4}}),
+        (60, {"do": "repair"}), (5, {"do": "stick", "rates_deg_s": [0, 0, 0]}), (2, None),
+    ]  # fmt: skip
+    for frames, request in script:
+        _flown(session, frames)
+        told += [seen(session), asked(session, **request) if request else ""]
+    kept(told)
+
+
+def test_a_round_by_chance_to_its_end(session, kept):
+    asked(session, do="stick", rates_deg_s=[0.5, 0, 0])
+    told = [asked(session, do="game", move="random"), seen(session)]
+    with pytest.raises(BadInput, match="answer: 'nose' is not known"):
+        asked(session, do="game", move="answer", answer="nose")
+    while session.game.phase == "waiting":
+        session.step()
+    told.append(seen(session))
+    _flown(session, 150)
+    asked(session, do="game", move="answer", answer=session.game.fault["actuator"])
+    while session.game.hidden:
+        session.step()
+    told += [seen(session), asked(session, do="game", move="stop"), seen(session)]
+    kept(told)
+
+
+def test_how_long_a_gust_is_shown(session):
+    """Half a second up, one held, half a second down, and the frame it ends with."""
+    asked(session, do="blow", velocity_mps=[0, 3, 0])
+    frames = 0
+    while session.state()["gust"]:
+        session.step()
+        frames += 1
+    assert frames == 201
+
+
+def test_the_rates_of_a_coordinated_turn_are_seen_to_every_tenth_frame(session):
+    asked(session, do="stick", rates_deg_s=[8, 0, 0], coordinated=True)
+    sticks = {}
+    for _ in range(200):
+        session.step()
+        sticks.setdefault(session.frame()["stick"], session.sim.frames - 1)
+    assert len(sticks) > 5
+    assert {frames % 10 for frames in list(sticks.values())[1:]} == {0}
+    steps = np.array([stick for stick in sticks if stick is not None])
+    rest = (steps - np.radians([8, 0, 0])) / np.radians(0.1)
+    assert rest == pytest.approx(np.round(rest), abs=1e-9)
+
+
+def test_the_latest_400_events_are_kept(session):
+    for i in range(401):
+        session._tell("test", str(i))
+    assert [session.events[0]["says"], session.events[-1]["says"], len(session.events)] == ["1", "400", 400]
+    assert len(session.take_events()) == 402
+    assert len(session.hello()["events"]) == 400
+    assert session.take_events() == []
+
+
+def test_what_there_is_to_break_and_how_it_is_said(kept):
+    kept(fault_types())
+
+
+def test_a_live_flight_is_an_hour_and_expects_nothing():
+    given = bf.load({"name": "n" * 64, "expect": {"no_departure": True}, "fdi": {"fault_class": "published"}})
+    flown = as_live(given)
+    name, date, time, milliseconds = flown.name.rsplit("-", 3)
+    assert name == "live-" + "n" * 60
+    assert (len(date), len(time), len(milliseconds)) == (8, 6, 3)
+    assert flown.duration_s == 3600.0
+    assert (flown.fdi.fault_class, flown.fdi.sensor_monitor) == ("published", "always")
+    assert not flown.expect.model_dump(exclude_none=True)
+    own = as_live(bf.load({"name": "x", "fdi": {"sensor_monitor": "auto"}}))
+    assert (own.fdi.fault_class, own.fdi.sensor_monitor) == ("all", "auto")
+
+
+@pytest.mark.parametrize(
+    "request_",
+    [
+        {}, {"law": "lqr", "scheme": "none", "fault_class": "all", "sensors": "ideal"},
+        {"turbulence": "none", "autopilot": False}, {"turbulence": "severe", "autopilot": True},
+    ],
+)  # fmt: skip
+def test_what_a_new_flight_changes(request_, kept):
+    kept(changes_of(messages.parse(json.dumps({"do": "fresh", **request_}))))
+
+
+def test_words_of_what_is_asked(session, tmp_path):
+    asked(session, do="fresh", autopilot=True)
+    assert asked(session, do="aim", altitude_m=1850.5, heading_deg=20) == "altitude_m 1850.5, heading_deg 20"
+    assert asked(session, do="blow", velocity_mps=[1, 0, -2.5]) == "gust"
+    assert asked(session, do="change", sensors="ideal") == "sensors ideal"
+    assert asked(session, do="stick", rates_deg_s=[0, 0, 0]) == ""
+    says = [(event["kind"], event["says"]) for event in session.events][1:]
+    assert says == [
+        ("autopilot", "altitude_m 1850.5, heading_deg 20"),
+        ("gust", "1, 0, -2.5 m/s (north, east, down)"),
+        ("changed", "sensors ideal"),
+    ]
+    assert session.stick.rates_deg_s == (0, 0, 0)
+    assert asked(session, do="fresh", scenario="fault-free") == "new flight"
+    assert session.scenario.autopilot is None
+    assert session._rates_rad_s() is None
+    asked(session, do="stick", rates_deg_s=[0, 18, 0])
+    assert session._rates_rad_s() == pytest.approx((0.0, pi / 10, 0.0))

@@ -109,8 +109,8 @@ def as_text(verdict: Document) -> str:
     shown, every = lasting(verdict["events"]), len(verdict["events"])
     what = f"{len(shown)} event{'s' if len(shown) > 1 else ''}" if shown else "no fault shows"
     lines = [f"{verdict['flight']}: {what} in {looked_at(verdict)}", *map(_event_line, shown)]
-    if len(shown) < every:
-        lines.append(f"  and {every - len(shown)} brief alarms of under {BRIEF_S:g} s")
+    if brief := every - len(shown):
+        lines.append(f"  and {brief} brief alarm{'s' if brief > 1 else ''} of under {BRIEF_S:g} s")
     lines += [f"  {sentence}" for sentence in (*verdict["can_separate"], *verdict["notes"])]
     for key, value in verdict.get("score", {}).items():
         lines.append(f"  {key}: {value:.3f}" if isinstance(value, float) else f"  {key}: {value}")

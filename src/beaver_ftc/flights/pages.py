@@ -58,7 +58,8 @@ def render(samples: Samples, model: Model, rows: Rows, verdict: dict[str, Any]) 
 
 def _notes(samples: Samples, model: Model) -> list[str]:
     gaps = int(samples.run[-1])
-    said = [f"{len(samples.t_s)} samples at {1.0 / samples.dt_s:.3g} Hz, {gaps} gaps in the log."]
+    many = "1 gap" if gaps == 1 else f"{gaps} gaps"
+    said = [f"{len(samples.t_s)} samples at {1.0 / samples.dt_s:.3g} Hz, {many} in the log."]
     said += [
         f"{name} has its own stamps: its last value is held, {age:.2f} s old on average."
         for name, age in samples.age_s.items()
@@ -122,7 +123,7 @@ def _shade(axis: Any, rows: Rows) -> None:
     edges = np.flatnonzero(np.diff(rows.faulty, prepend=0, append=0))
     times_s = rows.t_s[np.minimum(edges, len(rows.t_s) - 1)]
     for begin_s, end_s in zip(times_s[::2], times_s[1::2], strict=True):
-        axis.axvspan(begin_s, end_s, color="#f4d6cc", alpha=0.45, lw=0)
+        axis.axvspan(begin_s, end_s, color="#f4d6cc", alpha=0.45, linewidth=0)
 
 
 def write_diagnosis(out: Path, samples: Samples, model: Model, rows: Rows, verdict: dict[str, Any]) -> Path:
@@ -195,12 +196,9 @@ def _fits(stretches: Sequence[fitting.Stretch], model: Model) -> Any:
     blocks = figure.subfigures(height, squeeze=False)[:, 0]
     for block, (fitted, kept, name) in zip(blocks, parts, strict=False):
         axes = block.subplots(3, 1, sharex=True)
-        rows, residual = fitting.residuals(fitted, kept)
-        begin = _liveliest(kept.samples.rates, rows, round(_SHOWN_S * model.rate_hz))
-        inside = (rows >= begin) & (rows < begin + round(_SHOWN_S * model.rate_hz))
-        t_s, measured = kept.samples.t_s[rows[inside]], kept.samples.rates[rows[inside]]
+        t_s, rates, residual = _shown(fitted, kept, round(_SHOWN_S * model.rate_hz))
         for i, axis in enumerate(axes):
-            left, rate = np.rad2deg(residual[inside, i]), np.rad2deg(measured[:, i])
+            left, rate = np.rad2deg(residual[:, i]), np.rad2deg(rates[:, i])
             axis.plot(t_s, rate, color="#888888", linewidth=2.2, label="measured")
             axis.plot(t_s, rate - left, color=SERIES[0], linewidth=0.9, label="predicted")
             axis.plot(t_s, left, color=SERIES[1], linewidth=0.7, label="residual")
@@ -209,6 +207,16 @@ def _fits(stretches: Sequence[fitting.Stretch], model: Model) -> Any:
         axes[0].legend(loc="upper right", fontsize=7, ncols=3, framealpha=0.8)
         axes[-1].set_xlabel("time, s", fontsize=8)
     return figure
+
+
+def _shown(model: Model, kept: fitting.Stretch, length: int) -> tuple[Floats, Floats, Floats]:
+    """Times, rates and residual of the liveliest window; nan where nothing is known, for lines to end."""
+    rows, residual = fitting.residuals(model, kept)
+    rates, left = np.full_like(kept.samples.rates, np.nan), np.full_like(kept.samples.rates, np.nan)
+    rates[rows], left[rows] = kept.samples.rates[rows], residual
+    begin = _liveliest(rates, rows, length)
+    part = slice(begin, begin + length)
+    return kept.samples.t_s[part], rates[part], left[part]
 
 
 def _liveliest(rates: Floats, rows: NDArray[np.int64], length: int) -> int:

@@ -37,7 +37,8 @@ def model(of=WING, settings=None, history=2, lags=3, **changes):
     its = vehicle(of)
     groups = groups_of(its)
     names = list(its.surfaces)
-    past = np.vstack([np.diag([0.5, 0.6, 0.7]) + 0.02, *[0.05 * np.eye(3) - 0.01] * (history - 1)])
+    further = [(-1) ** j * 0.2 * np.eye(3) - 0.01 for j in range(1, history)]
+    past = np.vstack([np.diag([0.5, 0.6, 0.7]) + 0.02, *further])
     signals = [[0.001, 0.002, -0.001]] * len(its.signals)
     response = np.resize(RESPONSE, (len(groups), lags, 3))
     given = {

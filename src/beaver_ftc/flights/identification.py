@@ -100,10 +100,10 @@ def summary(model: Model) -> str:
             f"{_axes(run['explained_of_windows_not_fitted'])}"
         )
     if found["collinear"]:
-        worst = found["collinear"][0]
+        worst, many = found["collinear"][0], len(found["collinear"])
         lines.append(
-            f"  {len(found['collinear'])} regressors are collinear (variance inflated over {_COLLINEAR:g} "
-            f"times), most {worst['regressor']} ({worst['inflation']:.0f} times)"
+            f"  {many} {'regressors are' if many > 1 else 'regressor is'} collinear (variance inflated over "
+            f"{_COLLINEAR:g} times), most {worst['regressor']} ({worst['inflation']:.0f} times)"
         )
     return "\n".join(lines)
 

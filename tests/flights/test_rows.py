@@ -183,7 +183,7 @@ def test_a_short_flight_through_the_bank(kept, of, settings):
     samples = small.flight(model, 200, lost=((1, 70, 140, 0.4),), gap=100)
     rows = diagnose.diagnose(samples, model)
     kept({
-        "named": rows.named[::10], "faulty": rows.faulty[::10], "probability": rows.probability[::10],
+        "named": rows.named[::10], "faulty": rows.faulty[::10], "of_a_fault": rows.probability[::10],
         **{name: in_short(getattr(rows, name)) for name in ("estimate", "low", "high", "probability")},
     })  # fmt: skip
     late = slice(110, 140)

@@ -138,10 +138,10 @@ def output_error(stretches: Sequence[fitting.Stretch], groups: list[list[int]]) 
 
     dt_s = float(np.median([stretch.samples.dt_s for stretch in stretches]))
     commands, rates = _windows(stretches, groups, round(WINDOW_S / dt_s), round(_MOST_DELAY_S / dt_s) + 1)
-    if len(rates) < 20:
-        return {"windows": len(rates), "says": "too few gap-free windows for an output-error fit"}
+    if len(rates) < 20 or not np.ptp(rates, axis=(0, 1)).all():
+        return {"windows": len(rates), "says": "too few gap-free windows in which every rate moves"}
     fitted, kept = slice(0, None, 2), slice(1, None, 2)
-    spread = rates.std(axis=(0, 1)) + 1e-9
+    spread = rates.std(axis=(0, 1))
     start, low, high = _start(len(groups), dt_s)
 
     def residual(parameters: Floats, part: slice) -> Floats:

@@ -54,7 +54,7 @@ def test_what_is_written_is_what_was_found(found):
     assert json.loads((folder / "pitch-lost.json").read_text()) == json.loads(json.dumps(document))
     text = (folder / "pitch-lost.txt").read_text()
     assert text == as_text(document) + "\n"
-    assert "flap 20 deg down  lost 19.5 s >" in text
+    assert "flap 20 deg down          lost 19.5 s >" in text
     assert "0 lost that are kept without" in text
 
 

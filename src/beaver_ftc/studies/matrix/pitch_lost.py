@@ -32,7 +32,7 @@ COLUMNS = ("t_s", "q_rad_s", "theta_rad", "phi_rad", "airspeed_mps", "envelope_v
 STATES = ("airspeed", "alpha", "q", "theta")
 FREQUENCIES_RAD_S = np.geomspace(1e-3, 1e2, 20001)
 SLOW_RAD_S = 1.0  # the phugoid is slower than this, the short period faster
-WIDTH = 25  # of a column
+FIRST, WIDTH = 26, 27  # of the first column, which begins with a law, and of the others
 SETTLED_S = 30.0  # from here on the swing is judged: what the fault itself throws off is over
 LAWS = ("fault-tolerant-published", "oracle-published")
 MARGIN_HEAD = (
@@ -217,9 +217,11 @@ def as_text(document: Document) -> str:
     flights = {(row["law"], row["lost"], row["airspeed_mps"]): row for row in document["flights"]}
     lines = []
     for law in LAWS:
-        lines.append(f"{law:25}" + "".join(f"{f'{V:g} m/s':{WIDTH}}" for V in speeds))
+        lines.append(f"{law:{FIRST}}" + "".join(f"{f'{V:g} m/s':{WIDTH}}" for V in speeds))
         for name in LOST:
-            lines.append(f"{name:18}" + "".join(f"{_cell(flights[law, name, V]):{WIDTH}}" for V in speeds))
+            lines.append(
+                f"{name:{FIRST}}" + "".join(f"{_cell(flights[law, name, V]):{WIDTH}}" for V in speeds)
+            )
         lines.append("")
     totals = (
         f"{len(document['flights'])} pairs of faults flown: {document['saved']} aircraft kept that are lost "

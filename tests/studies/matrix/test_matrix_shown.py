@@ -1,0 +1,186 @@
+"""Table, heat map and document of the fault matrix, of rows made by hand; its scenarios; one short row."""
+
+from pathlib import Path
+
+import pytest
+
+from beaver_ftc.studies.matrix import fault_matrix
+from beaver_ftc.studies.matrix.fault_matrix import (
+    FAULTS,
+    FaultCase,
+    airspeeds_of,
+    as_text,
+    cases,
+    document_of,
+    files_of,
+    fly_case,
+    heat_map_of,
+    name_of,
+    run_matrix,
+    scenario_of,
+    verdict,
+)
+from kept import picture
+
+LOST = {"departure_s": 20.0, "departure_signal": "alpha_rad"}
+BOTH = {**LOST, "oracle_departure_s": 22.0}
+MADE = [  # of the faults in turn, at two airspeeds
+    ({}, {"delay_s": 0.5, "ratio": 1.9}),
+    ({"verdict": "unseen", "delay_s": None, "detected": False, "ratio": 1.0}, {"ratio": 0.5}),
+    ({"verdict": "surface", "candidates": ["stuck", "float"], "ratio": 4.0}, {"candidates": ["bias"]}),
+    ({"verdict": "open", "candidates": ["flap:stuck"], "ratio": 4.3}, {"ratio": None}),
+    ({**LOST, "ratio": 40.0}, {**BOTH, "oracle_beyond_s": 1.25}),
+    ({**BOTH, "oracle_left_envelope_s": 15.0}, {**BOTH, "oracle_left_envelope_s": 14.0}),
+    (LOST, {"verdict": "WRONG", "false_alarm": True, "delay_s": -1.0}),
+    ({"ratio": None}, {"ratio": None}),
+    *[({"verdict": "unseen", "delay_s": None, "detected": False, "ratio": 1.0},) * 2] * 2,
+]
+
+
+def rows_of(surfaces, **more):
+    plain = {
+        "aircraft": "beaver", "verdict": "named", "delay_s": 0.1, "false_alarm": False, "candidates": [],
+        "ratio": 1.25, "departure_s": None, "oracle_departure_s": None, "departure_signal": None,
+        "oracle_beyond_s": 0.0, "oracle_left_envelope_s": None, "axis": "q", "detected": True,
+    }  # fmt: skip
+    rows = []
+    for i, (fault, _) in enumerate(FAULTS):
+        for j, surface in enumerate(surfaces):
+            two = MADE[(i + 3 * j) % len(MADE)]
+            rows += [
+                {"fault": fault, "surface": surface, "airspeed_mps": V, **plain, **found, **more}
+                for V, found in zip((38.0, 45.0), two, strict=True)
+            ]
+    return rows
+
+
+def told(rows):
+    chances = [0.9 if row["detected"] else 0.2 for row in rows]
+    return [
+        row | {"told_chance": chance, "told_deflection": 1.0}
+        for row, chance in zip(rows, chances, strict=True)
+    ]
+
+
+@pytest.mark.parametrize("made", ["plain", "told"])
+def test_the_matrix_as_it_is_shown(made, kept):
+    rows = (
+        rows_of(("aileron", "elevator")) if made == "plain" else told(rows_of(("elevator", "rudder", "flap")))
+    )
+    document = document_of(rows)
+    kept(
+        {
+            key: value
+            for key, value in document.items()
+            if key not in ("flights", "lost_though_the_oracle_was_not")
+        }
+    )
+    assert document["flights"] == rows
+    lost = [row for row in rows if row["departure_s"] and not row["oracle_departure_s"]]
+    assert document["lost_though_the_oracle_was_not"] == lost != []
+    kept(as_text(document).splitlines(), "text")
+    kept(picture(heat_map_of(document)), "figure")
+    files = files_of(document)
+    assert list(files) == ["fault-matrix.json", "fault-matrix.txt", "fault-matrix.png"]
+    assert files["fault-matrix.txt"] == as_text(document) + "\n"
+    assert '"wrong"' in files["fault-matrix.json"]
+
+
+def test_the_flights_of_the_cases(kept):
+    flown = {fault: scenario_of(FaultCase(fault, "elevator", 45.0), "nominal", -1.5) for fault, _ in FAULTS}
+    kept({fault: found.model_dump(mode="json")["faults"] for fault, found in flown.items()})
+    kept(flown["float"].model_dump(mode="json", exclude_defaults=True), "whole")
+
+
+def test_the_flight_with_all_that_is_declared(kept):
+    calm, rough = (
+        scenario_of(FaultCase("total loss", "rudder", 38.0, True, turbulence=air), "oracle", 0.0)
+        for air in ("none", "light")
+    )
+    kept(rough.model_dump(mode="json", exclude_defaults=True))
+    assert (calm.environment.turbulence, calm.fdi.bounds.turbulence) == ("none", "none")
+
+
+TRAINER = "./trainer"
+
+
+def test_what_is_flown_of_which_aircraft(monkeypatch):
+    monkeypatch.chdir(Path(__file__).parents[2] / "data" / "aircraft")
+    assert airspeeds_of("beaver") == (38.0, 45.0, 52.0)
+    usual = fault_matrix.aircraft_of(TRAINER).usual_airspeed_mps
+    assert airspeeds_of(TRAINER) == tuple(round(share * usual, 1) for share in (0.9, 1.0, 1.1))
+    every = cases((40.0, 50.0), aircraft=TRAINER)
+    assert every[:3] == [
+        FaultCase(FAULTS[0][0], "aileron", 40.0, False, TRAINER, "none"),
+        FaultCase(FAULTS[0][0], "aileron", 50.0, False, TRAINER, "none"),
+        FaultCase(FAULTS[0][0], "elevator", 40.0, False, TRAINER, "none"),
+    ]
+    assert len(every) == 6 * len(FAULTS)
+    assert scenario_of(every[0], "nominal", 0.0).uncertainty.sinusoid.p.amplitude_rad_s2 == 0.0
+    assert [name_of(*which) for which in ((False, "none"), (True, "none"), (True, "light"))] == [
+        "fault-matrix", "fault-matrix-declared", "fault-matrix-declared-light"
+    ]  # fmt: skip
+
+
+@pytest.fixture
+def short(monkeypatch):
+    """Flights of three seconds, the fault after one."""
+    monkeypatch.setattr(fault_matrix, "DURATION_S", 3.0)
+    monkeypatch.setattr(fault_matrix, "AT_S", 1.0)
+
+
+@pytest.mark.parametrize(
+    "case",
+    [
+        FaultCase("total loss", "elevator", 45.0),
+        FaultCase("oscillation 0.5 deg, 10 rad/s", "aileron", 45.0, declared=True),
+    ],
+    ids=["elevator", "aileron"],
+)
+def test_a_row(case, short, kept):
+    kept(fly_case(case))
+
+
+def test_a_jam_is_off_the_trimmed_deflection():
+    (name,) = [name for name, fault in FAULTS if fault.get("off_deg")][:1]
+    off_deg = dict(FAULTS)[name]["off_deg"]
+    (fault,) = scenario_of(FaultCase(name, "elevator", 45.0), "nominal", -1.5).faults
+    assert fault.position_deg == -1.5 + off_deg
+    assert (
+        -5.0 < fault_matrix.trimmed_deg(52.0, "elevator") - fault_matrix.trimmed_deg(38.0, "elevator") != 0.0
+    )
+
+
+def test_a_run_of_the_whole_matrix(monkeypatch, tmp_path):
+    seen = []
+
+    def made(case):
+        seen.append(case)
+        return rows_of(("aileron",))[0] | {"fault": case.fault, "surface": case.surface}
+
+    monkeypatch.setattr(fault_matrix, "fly_case", made)
+    monkeypatch.setattr(fault_matrix, "heat_map_of", lambda document: None)
+    monkeypatch.setattr(fault_matrix, "FAULTS", FAULTS[:3])
+    document = run_matrix(tmp_path, (40.0,), declared=True, turbulence="light")
+    assert seen == cases((40.0,), True, "beaver", "light")
+    assert (tmp_path / "fault-matrix-declared-light" / "fault-matrix.txt").read_text() == as_text(
+        document
+    ) + "\n"
+    run_matrix(tmp_path)
+    assert [case.airspeed_mps for case in seen[-3:]] == [38.0, 45.0, 52.0]
+
+
+@pytest.mark.parametrize(
+    ("isolation", "said"),
+    [
+        ({"fault": "elevator", "type": None, "candidates": []}, "surface"),
+        ({"fault": "elevator", "type": "stuck", "type_correct": None}, "named"),
+        ({"candidates": ["elevator"]}, "open"),
+        ({"candidates": ["elevator:bias"]}, "WRONG"),
+        ({"fault": "flap", "candidates": ["stuck"]}, "WRONG"),
+    ],
+)
+def test_a_verdict(isolation, said):
+    nothing = {"fault": None, "type": None, "candidates": [], "type_correct": None}
+    document = {"detection": {"detected": True}, "false_alarm": False, "isolation": nothing | isolation}
+    assert verdict(document, "elevator", "stuck") == said

@@ -1,0 +1,143 @@
+"""Elevator and flap lost: the report of rows made by hand, the linear numbers, short rows, the scenarios."""
+
+import numpy as np
+import pytest
+
+from beaver_ftc.scenario.control import EnginePower
+from beaver_ftc.studies.matrix import pitch_lost
+from beaver_ftc.studies.matrix.pitch_lost import (
+    LAWS,
+    LOST,
+    PitchCase,
+    about_trim,
+    as_text,
+    closed_loop,
+    document_of,
+    files_of,
+    fly_case,
+    loop_response,
+    margins,
+    run_pitch_lost,
+    scenario_of,
+)
+from kept import in_short
+
+UNLIMITED = {
+    "airspeed_mps": 52.0, "phugoid_damping": [0.05, 1.0], "gain_margin_db": None, "phase_margin_deg": None,
+    "attitude_zero_rad_s": 0.123, "worth_deg": [-1.25, 2.5],
+}  # fmt: skip
+
+
+def outcome(number, departure=None):
+    lost = departure is not None
+    return {
+        "q_rms_deg_s": None if lost else 0.5 + number / 10, "theta_swing_deg": None if lost else 2.0 + number,
+        "outside_share": 0.25 if number % 4 == 1 else 0.0, "departure": departure,
+    }  # fmt: skip
+
+
+def rows_of(speeds):
+    gone = {"time_s": 19.46, "signal": "alpha_rad"}
+    return [
+        {
+            "law": law, "lost": name, "airspeed_mps": V,
+            "without": outcome(i + 10 * j, gone if i in (1, 2, 3) else None),
+            "with": outcome(i + j, gone if i in (3, 4) and law == LAWS[1] else None),
+        }
+        for law in LAWS for i, name in enumerate(LOST) for j, V in enumerate(speeds)
+    ]  # fmt: skip
+
+
+def test_the_report(kept):
+    document = document_of(rows_of((45.0, 52.0)), (45.0,))
+    document["margins"].append(UNLIMITED)
+    kept(as_text(document).splitlines(), "text")
+    kept({key: value for key, value in document.items() if key != "flights"})
+    assert files_of(document)["pitch-lost.txt"] == as_text(document) + "\n"
+    assert list(files_of(document)) == ["pitch-lost.json", "pitch-lost.txt"]
+    assert document_of(rows_of((45.0,))[:3], (45.0,))["passed"]
+
+
+def test_columns_stand_below_each_other():
+    """A cell with two losses and a star is the widest there is."""
+    rows = rows_of((45.0, 52.0))
+    for row in rows:
+        row["without"] = row["with"] = outcome(1, {"time_s": 19.5})
+    margins_of = [{**UNLIMITED, "airspeed_mps": V} for V in (45.0, 52.0)]
+    found = {"flights": rows, "margins": margins_of, "saved": 0, "harmed": 0}
+    head, first = as_text(found).splitlines()[:2]
+    assert [head.index(speed) for speed in ("45", "52")] == [
+        i for i in range(len(first)) if first[i:].startswith("lost")
+    ][::2]
+    assert first.count("lost 19.5 s > lost 19.5 s* lost") == 1
+
+
+def test_the_linear_loop(kept):
+    config = EnginePower()
+    model, power, trim_inhg = about_trim(38.0)
+    response = loop_response(model.A, power, config)
+    kept({
+        "A": model.A, "power": power, "trim_inhg": trim_inhg, "closed": closed_loop(model.A, power, config),
+        "response": [in_short(response.real), in_short(response.imag)],
+        "margins": margins(38.0, config),
+    })  # fmt: skip
+
+
+def test_the_slowest_damping_and_the_least_margins_are_those_of_known_systems():
+    def turning(rate, damping):
+        return np.array([[0.0, 1.0], [-(rate**2), -2.0 * damping * rate]])
+
+    two = np.block([[turning(0.9, 0.3), np.zeros((2, 2))], [np.zeros((2, 2)), turning(1.1, 0.1)]])
+    assert pitch_lost._phugoid_damping(two) == pytest.approx(0.3)
+    assert pitch_lost._phugoid_damping(turning(0.5, 1.5)) == 1.0
+    w = 1j * pitch_lost.FREQUENCIES_RAD_S
+    gain_db, phase_deg = pitch_lost._least_margins(4.0 / (w + 1.0) ** 3)  # of 8 at sqrt(3)
+    assert gain_db == pytest.approx(20 * np.log10(2.0), abs=0.02)
+    crossing = np.sqrt(4.0 ** (2 / 3) - 1.0)
+    assert phase_deg == pytest.approx(180.0 - 3 * np.degrees(np.arctan(crossing)), abs=0.1)
+    assert pitch_lost._least_margins(0.5 / (w + 1.0)) == (None, None)
+    gain_db, phase_deg = pitch_lost._least_margins(16.0 / (w + 1.0) ** 3)  # half of it would be stable
+    assert gain_db == pytest.approx(20 * np.log10(2.0), abs=0.02)
+    assert phase_deg == pytest.approx(3 * np.degrees(np.arctan(np.sqrt(16 ** (2 / 3) - 1))) - 180.0, abs=0.1)
+
+
+@pytest.fixture
+def short(monkeypatch):
+    for name, value in (("DURATION_S", 4.0), ("AT_S", 1.0), ("SETTLED_S", 2.5)):
+        monkeypatch.setattr(pitch_lost, name, value)
+
+
+@pytest.mark.parametrize("lost", ["elevator -1 deg", "flap 20 deg down"])
+def test_a_row(lost, short, kept):
+    kept(fly_case(PitchCase(lost, 38.0, LAWS[0])))
+
+
+def test_the_flights_of_the_cases(kept):
+    flown = {lost: scenario_of(PitchCase(lost, 45.0, LAWS[1]), True).model_dump(mode="json") for lost in LOST}
+    kept(
+        {
+            lost: [{k: v for k, v in f.items() if v is not None} for f in one["faults"]]
+            for lost, one in flown.items()
+        }
+    )
+    whole = scenario_of(PitchCase("elevator floats", 45.0, LAWS[1]), False)
+    kept(whole.model_dump(mode="json", exclude_defaults=True), "whole")
+    assert not whole.control.power.enabled
+    assert scenario_of(PitchCase("elevator floats", 45.0, LAWS[1]), True).control.power.enabled
+
+
+@pytest.mark.parametrize("given", [None, (38.0,)])
+def test_a_run_flies_every_pair_under_every_law(given, monkeypatch, tmp_path):
+    seen = []
+
+    def made(case):
+        seen.append(case)
+        return {**case._asdict(), "without": outcome(0), "with": outcome(0)}
+
+    monkeypatch.setattr(pitch_lost, "fly_case", made)
+    monkeypatch.setattr(pitch_lost, "LOST", dict(list(LOST.items())[:2]))
+    document = run_pitch_lost(tmp_path, given)
+    speeds = given or (38.0, 45.0, 52.0)
+    assert seen == [PitchCase(lost, V, law) for law in LAWS for lost in list(LOST)[:2] for V in speeds]
+    assert [found["airspeed_mps"] for found in document["margins"]] == list(speeds)
+    assert document["passed"]

@@ -1,0 +1,210 @@
+"""What a campaign draws and keeps to the number, and what becomes of a flight's promises at their bounds."""
+
+import json
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from beaver_ftc.documents.errors import BadInput, SimulationFailed
+from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.studies import verify
+from beaver_ftc.studies.verify import (
+    CHUNK,
+    STEPS,
+    Campaign,
+    Draw,
+    conduct,
+    fly_draw,
+    judge,
+    summarise,
+    summary_text,
+)
+
+
+@pytest.mark.parametrize("kind", ["healthy", "faulty"])
+def test_every_draw_of_a_seed_is_what_it_was(kind, kept):
+    """A campaign goes on with the flights of an earlier one: they must stay the same flights."""
+    drawn = [Draw(11, kind, index).scenario().model_dump(mode="json") for index in (0, 1, 2, 40)]
+    parts = ("name", "duration_s", "rate_hz", "substeps", "initial", "reference", "faults", "uncertainty")
+    kept([{part: found[part] for part in parts} for found in drawn])
+
+
+@pytest.mark.parametrize("kind", ["healthy", "faulty"])
+def test_draws_have_the_distributions_that_are_meant(kind):
+    drawn = [Draw(5, kind, i).scenario() for i in range(250)]
+    rates = np.array([found.rate_hz for found in drawn])
+    assert (rates.min(), rates.max()) == (20, {"healthy": 50, "faulty": 100}[kind])
+    assert np.median(rates) == pytest.approx(np.sqrt(rates.min() * rates.max()), rel=0.1)
+    substeps = [found.substeps for found in drawn]
+    assert set(substeps) == {1, 2, 3, 4}
+    assert np.mean(np.array(substeps) > 1) == pytest.approx(0.05, abs=0.03)
+    for axis, sign in (("p", 1), ("q", -1)):
+        coupling = np.array([getattr(found.uncertainty.inertia_coupling, axis) for found in drawn])
+        assert np.mean(coupling == sign * 0.25) == pytest.approx(0.15, abs=0.05)
+    names = [type(signal).__name__ for found in drawn for signal in found.reference.p]
+    assert 1.4 < len(names) / len(drawn) < 1.6
+
+
+def landing(at_s=4.995, rate_hz=50.0, **changes):
+    loss = {"actuator": "elevator", "type": "loss_of_effectiveness", "magnitude": 0.5, "at_s": at_s}
+    document = {"name": "x", "duration_s": 20, "rate_hz": rate_hz, "substeps": changes.pop("substeps", 1)}
+    scenario = Scenario.model_validate({**document, "faults": [loss | changes.pop("fault", {})]})
+    nothing = {
+        "detection_time_s": None, "isolation_time_s": None, "guaranteed_delay_s": None, "isolated": None,
+        "candidates": (), "estimate": None, "frames": 1000,
+    }  # fmt: skip
+    return SimpleNamespace(scenario=scenario, **nothing | changes)
+
+
+def test_delays_count_from_the_first_frame_with_the_fault():
+    found = judge(landing(detection_time_s=5.5, isolation_time_s=5.75, isolated="elevator", estimate=-0.45))
+    assert found == pytest.approx({
+        "delay_s": 0.5, "false_alarm": False, "guaranteed_s": None, "late": False, "isolation_s": 0.75,
+        "excluded": False, "wrong": False, "estimate_error": 0.05,
+    })  # fmt: skip
+    assert judge(landing(at_s=5.0, detection_time_s=5.5))["delay_s"] == pytest.approx(0.5)
+    assert judge(landing(at_s=5.0 + 5e-10, detection_time_s=5.5))["delay_s"] == pytest.approx(0.5)
+    assert judge(landing(at_s=5.0 + 5e-9, detection_time_s=5.5))["delay_s"] == pytest.approx(0.48)
+    nothing = judge(landing())
+    assert (nothing["delay_s"], nothing["isolation_s"], nothing["estimate_error"]) == (None, None, None)
+    assert not any(nothing[broken] for broken in ("false_alarm", "late", "excluded", "wrong"))
+
+
+@pytest.mark.parametrize(
+    ("substeps", "alarm_s", "false"),
+    [(1, 5.0, True), (1, 5.02, False), (1, 5.019, True), (2, 5.0, False), (2, 4.98, True), (1, None, False)],
+)
+def test_an_alarm_before_the_fault_can_show_is_false(substeps, alarm_s, false):
+    assert judge(landing(substeps=substeps, detection_time_s=alarm_s))["false_alarm"] is false
+
+
+@pytest.mark.parametrize(
+    ("guaranteed_s", "alarm_s", "late"),
+    [(0.5, 5.52, False), (0.5, 5.53, True), (0.5, None, True), (None, None, False), (0.5, 5.5, False)],
+)
+def test_a_promise_is_kept_up_to_a_frame_after(guaranteed_s, alarm_s, late):
+    assert judge(landing(guaranteed_delay_s=guaranteed_s, detection_time_s=alarm_s))["late"] is late
+
+
+@pytest.mark.parametrize(
+    ("candidates", "isolated", "excluded", "wrong"),
+    [
+        (("elevator", "rudder"), None, False, False), ((), "elevator", False, False),
+        (("rudder",), None, True, False), ((), "rudder", True, True),
+    ],
+)  # fmt: skip
+def test_the_true_fault_is_named_or_left(candidates, isolated, excluded, wrong):
+    found = judge(landing(detection_time_s=5.5, candidates=candidates, isolated=isolated))
+    assert (found["excluded"], found["wrong"]) == (excluded, wrong)
+
+
+def test_the_error_of_an_estimate_is_of_what_has_grown_by_the_end():
+    growing = {"profile": "incipient", "kappa_per_s": 0.1}
+    found = judge(landing(at_s=5.0, fault=growing, isolated="elevator", estimate=-0.3))
+    assert found["estimate_error"] == pytest.approx(0.5 * (1 - np.exp(-0.1 * 15.0)) - 0.3)
+    assert judge(landing(isolated="elevator"))["estimate_error"] is None
+    assert judge(landing(isolated="rudder", estimate=-0.3))["estimate_error"] is None
+
+
+def test_how_many_flights_an_hour_is():
+    assert [Campaign(hours, 7, 1).wanted("healthy") for hours in (0.0, 0.01, 1.0, 1.001)] == [0, 1, 36, 37]
+    assert Campaign(1.0, 7, 1).wanted("faulty") == 7
+    assert list(Campaign(1.0, 7, 1, steps=True).schemes) == list(STEPS)
+    assert list(Campaign(1.0, 7, 1).schemes) == ["published", "sharpened"]
+
+
+@pytest.fixture
+def unflown(monkeypatch):
+    """Rows without flights."""
+    monkeypatch.setattr(verify, "fly_draw", row_of)
+    return Campaign(hours=0.0, faults=CHUNK + 3, seed=2)
+
+
+def row_of(draw, schemes):
+    return {"index": draw.index, "flown": draw.seed, "schemes": list(schemes)}
+
+
+def test_what_is_missing_is_flown_in_chunks_and_told(unflown, tmp_path):
+    shares = []
+    rows = conduct(unflown, tmp_path, 1, shares.append)
+    assert [row["index"] for row in rows["faulty"]] == list(range(CHUNK + 3))
+    assert shares == [CHUNK / (CHUNK + 3), 1.0]
+    assert sorted(path.name for path in tmp_path.iterdir()) == [
+        "campaign.json", "faulty-0000000-0000049.json", "faulty-0000050-0000052.json"
+    ]  # fmt: skip
+    assert list(json.loads((tmp_path / "campaign.json").read_text())) == [
+        "seed",
+        "schemes",
+        "version",
+        "code",
+    ]
+    (tmp_path / "faulty-0000000-0000049.json").write_text("[3]")
+    shares.clear()
+    conduct(unflown, tmp_path, 1, shares.append)
+    assert shares == [1.0]
+    assert conduct(Campaign(0.0, 2, 2), tmp_path, 1)["faulty"] == rows["faulty"][:2]
+
+
+@pytest.mark.parametrize(
+    ("key", "other", "says"),
+    [
+        ("seed", 3, "another seed, allowed"),
+        ("version", "0", "another version, a"),
+        ("schemes", [], "another schemes"),
+    ],
+)
+def test_rows_that_follow_from_something_else_are_refused(unflown, tmp_path, key, other, says):
+    conduct(unflown, tmp_path, 1)
+    manifest = json.loads((tmp_path / "campaign.json").read_text())
+    (tmp_path / "campaign.json").write_text(json.dumps(manifest | {key: other}))
+    with pytest.raises(BadInput, match=says):
+        conduct(unflown, tmp_path, 1)
+
+
+def test_a_folder_that_cannot_be_used_is_said(unflown, tmp_path):
+    (tmp_path / "campaign.json").write_text("{")
+    with pytest.raises(SimulationFailed, match="cannot be used for a campaign"):
+        conduct(unflown, tmp_path, 1)
+    with pytest.raises(SimulationFailed, match="faulty flight 7 of seed 3: killed"):
+        verify._crashed(Draw(3, "faulty", 7), "killed")
+
+
+def test_a_flight_of_each_kind(kept, monkeypatch):
+    """Its row to the number; the same fault under each step."""
+    monkeypatch.setattr(verify, "HEALTHY_S", 20.0)
+    monkeypatch.setattr(verify, "AFTER_FAULT_S", 4.0)
+    steps = {name: STEPS[name] for name in ("published", "sharpened", "constant")}
+    kept({kind: fly_draw(Draw(4, kind, 1), steps) for kind in ("healthy", "faulty")})
+
+
+def test_a_growing_fault_is_not_flown_as_a_constant_one(monkeypatch):
+    flown = []
+    monkeypatch.setattr(verify, "fly", lambda scenario: flown.append(scenario) or landing())
+    growing, abrupt = (
+        next(
+            d for d in (Draw(1, "faulty", i) for i in range(50)) if d.scenario().faults[0].profile == profile
+        )
+        for profile in ("incipient", "abrupt")
+    )
+    row = fly_draw(growing, STEPS)
+    assert len(flown) == len(STEPS) - 1
+    assert row["constant"] is row["sharpened"]
+    assert (row["index"], row["profile"], row["rate_hz"]) == (growing.index, "incipient", flown[0].rate_hz)
+    fly_draw(abrupt, STEPS)
+    assert len(flown) == 2 * len(STEPS) - 1
+
+
+def test_a_draw_without_a_trim_is_said(monkeypatch):
+    def untrimmed(scenario):
+        raise BadInput("no trim")
+
+    monkeypatch.setattr(verify, "fly", untrimmed)
+    assert fly_draw(Draw(1, "healthy", 3), {}) == {"index": 3, "skipped": "no trim"}
+
+
+def test_of_nothing_flown_nothing_is_said():
+    found = summarise({"healthy": [], "faulty": []})
+    assert (found["faults"], found["skipped"], found["schemes"], found["kept"]) == (0, 0, {}, True)
+    assert "delay_shorter_by" not in found
+    assert summary_text(found) == "every promise of the sharpened scheme kept"

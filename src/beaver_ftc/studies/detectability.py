@@ -227,7 +227,8 @@ def _why(seen: Excitation, fault: str, rival: str, detected: float, excluded: np
         return (
             f"for {ISOLATE_WITHIN_S:g} s {rival} explains a total loss but for {rest:.0%} of twice the bound"
         )
-    return "isolated once detected" if excluded.max() <= detected else f"{rival} explains smaller ones"
+    as_soon = excluded.max() <= detected + 2.0**-BISECTIONS
+    return "isolated once detected" if as_soon else f"{rival} explains smaller ones"
 
 
 def document_of(name: str, points: Sequence[Sequence[Document]]) -> Document:

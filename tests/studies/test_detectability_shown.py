@@ -1,0 +1,207 @@
+"""What the detectability survey says and draws of rows made by hand; known moments; one flight."""
+
+import json
+
+import numpy as np
+import pytest
+
+from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.studies import detectability
+from beaver_ftc.studies.detectability import (
+    ALTITUDES_M,
+    EXCITATIONS,
+    MAGNITUDES,
+    SPEEDS_MPS,
+    Excitation,
+    at,
+    detection_magnitude,
+    document_of,
+    draw,
+    excitation,
+    exclusion_magnitude,
+    files_of,
+    judge,
+    mismatch,
+    run_survey,
+    survey_name,
+    text,
+)
+from flying import loss, scenario
+from kept import in_short, picture
+
+
+def rows_made():
+    rows = []
+    for i, fault in enumerate(("aileron", "elevator")):
+        for j, (V, h, scale) in enumerate(
+            (V, h, s) for V in (38.0, 45.5) for h in (0.0, 1000.0) for s in (0.5, 2.0)
+        ):
+            found = [0.1 + (i + 2 * j) / 30, 0.05 + j / 40, 0.3 + j / 20, 0.25 + i / 10]
+            least = [None if (i + j) % 5 == k else m for k, m in enumerate(found)]
+            place = {"airspeed_mps": V, "altitude_m": h, "excitation": scale, "fault": fault}
+            why = f"for the reason {i}{j}"
+            rows.append(
+                {**place, **dict(zip(MAGNITUDES, least, strict=True)), "confused_with": None, "why": why}
+            )
+    return rows
+
+
+def test_the_survey_as_it_is_shown(kept):
+    rows = rows_made()
+    kept(text(rows).splitlines(), "text")
+    kept(picture(draw("made", rows)), "figure")
+    document = document_of("made", [rows[:8], rows[8:]])
+    files = files_of(document)
+    kept(files["detectability.csv"].splitlines(), "csv")
+    assert json.loads(files["detectability.json"]) == {
+        "scenario": "made", "detect_within_s": 0.5, "isolate_within_s": 1.0, "points": rows
+    }  # fmt: skip
+    assert list(files) == ["detectability.json", "detectability.csv", "detectability.png"]
+    none = [row | dict.fromkeys(MAGNITUDES) for row in rows[:1]]
+    kept(text(none).splitlines(), "none")
+
+
+def test_what_is_weighed_along_a_flight(kept):
+    """Without its faults, from two seconds on, at the frame rate of the scenario."""
+    flown = scenario(duration_s=3, rate_hz=50, faults=[loss("elevator", 1.0, 0.5)])
+    seen = excitation(flown)
+    assert seen.dt == 0.02
+    assert {of.shape for of in (*seen.moment.values(), seen.bound)} == {(50, 3)}
+    kept({"moment": {s: [in_short(axis) for axis in of.T] for s, of in seen.moment.items()},
+          "bound": [in_short(axis) for axis in seen.bound.T]})  # fmt: skip
+    kept({fault: judge(seen, fault) for fault in seen.moment}, "judged")
+
+
+def still(n=60, **moments):
+    """Moments that do not change, at ten frames a second."""
+    of = {name: np.tile(np.array(z, float), (n, 1)) for name, z in moments.items()}
+    return Excitation(of, np.full((n, 3), 0.5), 0.1)
+
+
+def test_magnitudes_of_moments_that_do_not_change():
+    """Twice the bound is 1: roll alone tells the aileron, which the rudder's half explains in part."""
+    seen = still(aileron=[4.0, 0.0, 0.0], rudder=[2.0, 0.0, 1.6])
+    found = judge(seen, "aileron")
+    assert found["detected"] == found["detected_median"] == pytest.approx(0.25)
+    # the rudder by a share b leaves 4 m - 2 b of roll and 1.6 b of yaw: b = 0.625 hides all up to m = 0.5625
+    assert found["isolated"] == found["isolated_median"] == pytest.approx(0.5625, abs=1e-4)
+    assert (found["confused_with"], found["why"]) == ("rudder", "rudder explains smaller ones")
+    rudder = judge(seen, "rudder")
+    assert rudder["detected"] == pytest.approx(0.5)
+    # the aileron explains all roll: yaw alone tells, from 1 / 1.6
+    assert rudder["isolated"] == pytest.approx(0.625, abs=1e-4)
+    easy = judge(still(aileron=[4.0, 0.0, 0.0], rudder=[0.0, 0.0, 1.6]), "aileron")
+    assert (easy["isolated"], easy["why"]) == (pytest.approx(0.25, abs=1e-4), "isolated once detected")
+
+
+def test_a_surface_that_is_hardly_used_and_one_that_another_explains():
+    seen = still(aileron=[0.8, 0.0, 0.0], rudder=[2.0, 0.0, 0.5], elevator=[0.0, 3.0, 0.0])
+    weak, hidden = (
+        judge(seen, "aileron"),
+        judge(still(aileron=[2.0, 0.0, 0.0], rudder=[2.2, 0.0, 0.5]), "aileron"),
+    )
+    assert [weak[name] for name in MAGNITUDES] == [None] * 4
+    assert weak["why"] == "aileron hardly used: in 0.5 s a total loss is 80% of twice the bound"
+    assert (hidden["detected"], hidden["isolated"]) == (0.5, None)
+    # 2 - 2.2 b and 0.5 b are equal at b = 0.74: what is left is 0.37
+    assert hidden["why"] == "for 1 s rudder explains a total loss but for 37% of twice the bound"
+    assert judge(seen, "elevator")["isolated"] == pytest.approx(1 / 3, abs=1e-4)
+
+
+def test_half_of_the_instants_and_the_worst_of_them():
+    """Used from the sixth frame on, more and more: a fault is to be found in some frames from its start."""
+    z = np.zeros((25, 3))
+    z[5:, 0] = np.linspace(2.0, 3.9, 20)
+    rare = judge(Excitation({"aileron": np.vstack((np.zeros((35, 3)), z)), "rudder": np.zeros((60, 3))},
+                            np.full((60, 3), 0.5), 0.1), "aileron")  # fmt: skip
+    assert (rare["detected"], rare["detected_median"]) == (None, None)
+    found = judge(
+        Excitation({"aileron": z, "rudder": np.zeros((25, 3))}, np.full((25, 3), 0.5), 0.1), "aileron"
+    )
+    assert (found["detected"], found["isolated"]) == (
+        None,
+        None,
+    )  # from the first instant five frames of nothing
+    # of 21 instants the first finds nothing, the others 2.0, 2.1, ... 3.9: the eleventh from above is 2.9
+    assert found["detected_median"] == pytest.approx(1 / 2.9)
+    # of 16 the eighth, from 3.4 down: what excludes has ten frames, and more to see in the last
+    assert found["isolated_median"] == pytest.approx(1 / 2.7)
+
+
+def test_a_flight_too_short_to_isolate_in():
+    seen = still(n=9, aileron=[4.0, 0.0, 0.0], rudder=[0.0, 0.0, 2.0])
+    assert judge(seen, "aileron")["why"] == "the flight ends before a fault could be isolated"
+    assert (
+        judge(still(n=10, aileron=[4.0, 0.0, 0.0], rudder=[0.0, 0.0, 2.0]), "aileron")["isolated"] is not None
+    )
+
+
+def test_where_not_even_one_is_enough():
+    z, bound = np.array([[0.9, 0.0, 0.0], [1.0, 0.0, 0.0], [1.1, 0.0, 0.0]]), np.full((3, 3), 0.5)
+    nothing = np.zeros((3, 3))
+    np.testing.assert_allclose(detection_magnitude(z, bound), [1 / 0.9, 1.0, 1 / 1.1])
+    np.testing.assert_allclose(exclusion_magnitude(z, nothing, bound), [np.inf, np.inf, 1 / 1.1], atol=2**-16)
+    np.testing.assert_allclose(mismatch(z, nothing, bound), [0.9, 1.0, 1.1])
+    assert detection_magnitude(np.zeros((1, 3)), np.ones((1, 3))) == [np.inf]
+
+
+def test_elsewhere_only_the_place_and_the_references_change():
+    given = scenario(
+        reference={
+            "p": [{"sine": {"amplitude_deg_s": 3, "frequency_hz": 0.25}}],
+            "q": [{"csv": {"file": "q.csv", "time_s": [0, 1, 2], "values_deg_s": [0, 2, -1]}}],
+        },
+        faults=[loss("elevator", 0.5, 1.0)],
+        expect={"no_departure": True},
+    )
+    found = at(given, 40.0, 250.0, 0.5)
+    assert (found.initial.airspeed_mps, found.initial.altitude_m) == (40.0, 250.0)
+    before, after = (one.model_dump(mode="json") for one in (given, found))
+    assert after["reference"]["p"][0]["sine"]["amplitude_deg_s"] == 1.5
+    assert after["reference"]["p"][0]["sine"]["frequency_hz"] == 0.25
+    assert after["reference"]["q"][0]["csv"]["values_deg_s"] == [0, 1, -0.5]
+    assert (found.faults, found.expect.model_dump(exclude_none=True)) == ((), {})
+    same = before.keys() - {"initial", "reference", "faults", "expect"}
+    assert {key: after[key] for key in same} == {key: before[key] for key in same}
+
+
+@pytest.fixture
+def pointed(monkeypatch):
+    """The points a survey flies, none of them flown."""
+    seen = []
+    monkeypatch.setattr(detectability, "_point", lambda given, point: seen.append(point) or [])
+    monkeypatch.setattr(detectability, "files_of", lambda document: {})
+    return seen
+
+
+def test_the_points_of_the_built_in_aircraft_and_those_asked_for(pointed, tmp_path):
+    document = run_survey(tmp_path, scenario())
+    assert pointed == [(V, h, s) for V in SPEEDS_MPS for h in ALTITUDES_M for s in EXCITATIONS]
+    assert document["scenario"] == scenario().name
+    pointed.clear()
+    run_survey(tmp_path, scenario(), [40.0], [5.0], [1.5])
+    assert pointed == [(40.0, 5.0, 1.5)]
+
+
+@pytest.mark.parametrize(
+    ("fdi", "refused"),
+    [
+        ({}, False), ({"scheme": "none"}, True), ({"sharpen": {"memory": False}}, True),
+        ({"sharpen": {"pole_bank": False}}, True), ({"sharpen": {"shared_effectiveness": False}}, True),
+        ({"pole_bank_per_s": [1.0, 9e5]}, True), ({"pole_bank_per_s": [1.0, 1e6]}, False),
+    ],
+)  # fmt: skip
+def test_it_is_worked_out_for_one_scheme(fdi, refused, pointed, tmp_path):
+    given = scenario(fdi=fdi)
+    if not refused:
+        assert run_survey(tmp_path, given, [40.0], [0.0], [1.0])["points"] == []
+        return
+    with pytest.raises(BadInput, match="detectability is worked out for the sharpened scheme"):
+        run_survey(tmp_path, given, [40.0], [0.0], [1.0])
+
+
+def test_the_name_of_a_survey_is_no_longer_than_a_folders_may_be():
+    given = scenario()
+    assert survey_name(given) == f"{given.name}-detectability"
+    long = given.model_copy(update={"name": "x" * 90})
+    assert survey_name(long) == "x" * 86 + "-detectability"

@@ -1,0 +1,237 @@
+"""What is written into the aircraft, property by property: its start, a scenario's truth, the air, gusts."""
+
+from math import pi
+
+import numpy as np
+import pytest
+
+from beaver_ftc.documents.errors import BadInput, SimulationFailed
+from beaver_ftc.plant import channels
+from beaver_ftc.plant.adapter import Plant, _Errors, bare, body_axes, probe, translated
+from beaver_ftc.plant.configure import NEVER, GustSchedule, MovingAir, configure, take_off, trim_of
+from beaver_ftc.plant.model_file import copy_of, package
+from beaver_ftc.plant.state import FlightState
+from beaver_ftc.scenario.environment import Gust
+from beaver_ftc.scenario.loader import load
+from trainer import FOLDER, trainer
+
+BANKED = {
+    "alpha_rad": 0.1, "beta_rad": -0.05, "p_rad_s": 0.3, "q_rad_s": -0.2, "r_rad_s": 0.15, "phi_rad": 0.4,
+    "theta_rad": -0.1, "psi_rad": 1.1, "aileron_rad": 0.06, "elevator_rad": -0.08, "rudder_rad": 0.07,
+    "flap_rad": 0.2, "engine_rpm": 1900.0, "manifold_pressure_inhg": 22.0,
+}  # fmt: skip
+SEEN = ("velocities/u-fps", "velocities/v-fps", "velocities/w-fps", "velocities/v-north-fps",
+        "velocities/h-dot-fps",
+        "accelerations/udot-ft_sec2", "accelerations/vdot-ft_sec2", "accelerations/wdot-ft_sec2",
+        "accelerations/pdot-rad_sec2", "accelerations/qdot-rad_sec2", "accelerations/rdot-rad_sec2",
+        "simulation/sim-time-sec", "position/lat-geod-deg", "aero/dpt")  # fmt: skip
+
+
+class Noted(Plant):
+    """An aircraft that notes what is written: some properties of JSBSim read 0 whatever they are."""
+
+    def __init__(self, *of, **more):
+        self.written = {}
+        super().__init__(*of, **more)
+
+    def write(self, name, value):
+        self.written[name] = value
+        super().write(name, value)
+
+
+def written(plant):
+    return dict(sorted(plant.written.items()))
+
+
+def seen(plant):
+    return {name: round(plant.read(name), 6) for name in SEEN}
+
+
+def banked(**more):
+    return FlightState(50.0, 1500.0, **{**BANKED, **more})
+
+
+@pytest.mark.parametrize("wind_mps", [(0, 0, 0), (8, -3, 1)])
+def test_a_start_says_everything_of_its_state(wind_mps, kept):
+    plant = Noted(rate_hz=50)
+    plant.run()
+    plant.start(banked(), wind_mps)
+    kept({**written(plant), **seen(plant)})
+
+
+def test_a_hold_changes_what_it_is_given_and_stands_still():
+    plant, other = Plant(rate_hz=50), Plant(rate_hz=50)
+    plant.start(FlightState(45.0, 1000.0, engine_rpm=1900.0, manifold_pressure_inhg=22.0))
+    plant.hold(banked())
+    other.start(banked())
+    assert seen(plant) == pytest.approx(seen(other), rel=1e-6, abs=1e-6)
+
+
+def test_settling_leaves_the_turbulence_as_it_was():
+    plant = Plant(rate_hz=50)
+    plant.start(banked())
+    plant.write("atmosphere/turb-type", 4.0)
+    plant.settle()
+    assert plant.read("atmosphere/turb-type") == 4.0
+    assert plant.read("simulation/sim-time-sec") == 0.0
+
+
+def test_body_axes_turn_by_yaw_then_pitch_then_roll():
+    axes = body_axes(banked())
+    assert axes @ axes.T == pytest.approx(np.eye(3))
+    nose, right, down = axes
+    assert nose == pytest.approx([np.cos(0.1) * np.cos(1.1), np.cos(0.1) * np.sin(1.1), np.sin(0.1)])
+    assert down[2] == pytest.approx(np.cos(0.4) * np.cos(0.1))
+    assert right[2] == pytest.approx(np.sin(0.4) * np.cos(0.1))
+    yawed = FlightState(45.0, 0.0, psi_rad=pi / 2)
+    assert body_axes(yawed) @ [1.0, 2.0, 3.0] == pytest.approx([2.0, -1.0, 3.0])
+
+
+TRUTH = {
+    "uncertainty": {
+        "inertia_coupling": {"p": 0.1, "q": -0.2, "r": 0.3},
+        "sinusoid": {
+            axis: {"amplitude_rad_s2": 0.1 * i, "frequency_rad_s": 5 + i} for i, axis in enumerate("pqr", 1)
+        },
+        "coefficients": {"Cm_alpha": 1.1, "CX_0": 0.9}, "mass": 1.05,
+        "inertia": {"Ix": 1.1, "Iy": 0.9, "Iz": 1.2},
+        "cg_m": [0.1, -0.05, 0.02],
+    },
+    "actuators": {"bandwidth_rad_s": 20, "rate_limit_deg_s": 60, "flap": {"travel_deg": [-5, 40]}},
+    "environment": {"turbulence": "dryden", "severity": "severe", "wind_mps": [3, -2, 0.5]},
+    "seed": 2**31 + 5, "initial": {"flap_deg": 5},
+}  # fmt: skip
+
+
+def test_a_scenario_s_truth_is_written_and_trimmed_and_takes_off_in_its_air(kept):
+    plant, scenario = Noted(rate_hz=50), load(TRUTH)
+    configure(plant, scenario)
+    kept(written(plant), part="truth")
+    point = trim_of(scenario, plant)
+    kept({key: value for key, value in point.as_dict().items() if key != "residual"}, part="trim")
+    take_off(plant, scenario, point)
+    kept({**written(plant), **seen(plant)}, part="air")
+
+
+@pytest.mark.parametrize(
+    ("uncertainty", "says"),
+    [
+        ({"inertia_coupling": {"q": 0.1}}, "uncertainty.inertia_coupling.q: trainer has no property"),
+        ({"coefficients": {"Cm_q": 1.1}}, "uncertainty/Cm_q-scale, allowed: 1"),
+        ({"sinusoid": {"r": {"amplitude_rad_s2": 0.1}}}, "uncertainty.sinusoid.r: .*amplitude-rad_sec2, all"),
+    ],
+)  # fmt: skip
+def test_an_error_of_the_truth_that_an_aircraft_cannot_have_is_refused(uncertainty, says):
+    class Without(Plant):
+        def has(self, name):
+            return not name.startswith("uncertainty/")
+
+    plant = Without(rate_hz=50, aircraft=trainer(start={"altitude_m": 500}))
+    neutral = {"coefficients": dict.fromkeys(uncertainty.get("coefficients", ()), 1.0)}
+    for given, refused in ((neutral, False), (uncertainty, True)):
+        scenario = load({"aircraft": "beaver", "uncertainty": given})
+        if refused:
+            with pytest.raises(BadInput, match=says):
+                configure(plant, scenario)
+        else:
+            configure(plant, scenario)
+
+
+def test_gusts_are_set_off_in_their_frames(kept):
+    plant = Noted(rate_hz=50)
+    gusts = [
+        Gust(at_s=0.0, velocity_mps=(3, -4, 12), rise_s=0.5, hold_s=0.25, fade_s=0.75),
+        Gust(at_s=2.001, velocity_mps=(0, 0, -2)), Gust(at_s=9.0, velocity_mps=(0, 0, 0)),
+    ]  # fmt: skip
+    schedule = GustSchedule(gusts, plant, 50)
+    assert [schedule.next_change(k) for k in (-1, 0, 100, 101)] == [0, 101, 101, NEVER]
+    schedule.apply(1)
+    assert written(plant) == {}
+    schedule.apply(0)
+    kept(written(plant))
+    schedule.apply(101)
+    assert plant.written["atmosphere/cosine-gust/magnitude-ft_sec"] == pytest.approx(2 / 0.3048)
+
+
+def test_turbulence_turns_with_the_heading_and_still_air_does_not():
+    plant = Plant(rate_hz=50)
+    plant.start(banked())
+    for severity, turned in ((None, plant.read("atmosphere/psiw-rad")), ("light", -1.1)):
+        of = {"turbulence": "dryden", "severity": severity} if severity else {}
+        MovingAir(load({"environment": of}).environment, plant).turn()
+        assert plant.read("atmosphere/psiw-rad") == pytest.approx(turned, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("said", "reason"),
+    [
+        ([], "no reason given"),
+        (["a\n  b", "c "], "a bc"),
+        (["x Could not open file: /a/b/none.xml here"], "it needs the file none.xml, which is not there"),
+        (["In file /home/you/model.xml: line 3"], "In file model.xml: line 3"),
+        (["r" * 400], "r" * 300),
+    ],
+)
+def test_what_went_wrong_is_one_line_without_paths(said, reason):
+    errors = _Errors()
+    errors.said += said
+    assert errors.reason == reason
+
+
+def test_a_model_to_look_at_stands_at_a_place_and_what_nothing_gives_is_zero(tmp_path):
+    fdm = bare(FOLDER / "trainer.xml", ["fcs/nobody-gives-it"])
+    found = [fdm[name] for name in ("position/h-sl-ft", "velocities/vc-kts", "fcs/nobody-gives-it")]
+    assert found == pytest.approx([5000.0, 100.0, 0.0], rel=1e-3)
+    probe(FOLDER / "trainer.xml")
+    model = tmp_path / "none" / "none.xml"
+    model.parent.mkdir()
+    model.write_text("<fdm_config/>")
+    with pytest.raises(SimulationFailed, match=r"^JSBSim cannot load none/none.xml: \S"):
+        probe(model)
+
+
+@pytest.mark.parametrize(("flown", "name"), [("x", "x"), (FOLDER / "trainer.xml", "trainer/trainer.xml")])
+def test_what_jsbsim_raises_is_one_line(flown, name):
+    import jsbsim
+
+    with pytest.raises(SimulationFailed, match=f"^JSBSim cannot fly {name}: a b$"), translated(flown):
+        raise jsbsim.BaseError("a\n b")
+
+
+def test_engines_are_run_up_with_the_aircraft_where_it_is(tmp_path):
+    throttle = {"throttle": {"property": "fcs/throttle-cmd-norm", "default": 0.7, "range": [0, 1]}}
+    surfaces = {name: {"command": f"fcs/{name}-cmd-norm", "position": f"fcs/{name}-pos-norm",
+                       "effective": f"fcs/{name}-pos-norm", "travel_rad": [-0.3, 0.3]}
+                for name in ("aileron", "elevator", "rudder")}  # fmt: skip
+    aircraft = trainer(engine={"settings": throttle, "start": "run_up"}, surfaces=surfaces)
+    model = copy_of(package() / "aircraft" / "c172x" / "c172x.xml", tmp_path)
+    plant = Plant(100, aircraft=aircraft, model=model)
+    state = FlightState(50.0, 1000.0, alpha_rad=0.05, theta_rad=0.05, aircraft=aircraft)
+    plant.start(state)
+    first = plant.read("propulsion/engine/engine-rpm")
+    assert first > 1500
+    assert plant.read("simulation/sim-time-sec") == 0.0
+    assert plant.read("position/h-sl-ft") * 0.3048 == pytest.approx(1000.0, abs=0.01)
+    assert [plant.read(f"fcs/{lever}-cmd-norm[0]") for lever in ("advance", "throttle")] == [1, 0.7]
+    runs = []
+    plant.run = lambda run=plant.run: runs.append(run())
+    plant.start(state)
+    assert len(runs) == 5  # they run already: it settles
+    plant.start(FlightState(50.0, 1000.0, aircraft=aircraft, throttle=0.2))
+    assert len(runs) == 10 + 100 * 10
+    assert plant.read("propulsion/engine/engine-rpm") < 0.9 * first
+
+
+def test_names_and_units_of_what_is_read_and_logged(kept):
+    aircraft = trainer(signals={"dpt": {"property": "aero/dpt"}}, surfaces={"tab": {"travel_rad": [0, 1]}})
+    kept({
+        "truth": channels.truth_channels(aircraft), "further": channels.further_channels(aircraft),
+        "further of the beaver": channels.further_channels(load({}).airframe),
+        "room": [channels.most_channels(n) for n in (3, 8)],
+        "commands": channels.command_properties(aircraft),
+        "log": channels.log_columns(("rudder",), True, True, aircraft, ("h_m",), True),
+        "short log": channels.log_columns((), aircraft=aircraft),
+        "places": [channels.AIRSPEED, channels.ALPHA, channels.BETA, channels.QDYN, channels.PHI,
+                   channels.LATITUDE, channels.LONGITUDE, channels.ALTITUDE, channels.PDOT,
+                   channels.ENVELOPE, channels.POS],
+    })  # fmt: skip

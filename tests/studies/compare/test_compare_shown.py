@@ -1,0 +1,261 @@
+"""A comparison of made flights, all of it: document, tables, page, figure; and runs side by side."""
+
+from math import inf
+
+import numpy as np
+import pytest
+
+from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.studies.compare import runs, tune
+from beaver_ftc.studies.compare.leaderboard import (
+    MARK,
+    as_text,
+    figure_of,
+    files_of,
+    lost,
+    page_of,
+    write_leaderboard,
+)
+from beaver_ftc.studies.compare.replay import Recording, Trace, alarms_at, trace
+from beaver_ftc.studies.compare.scores import document_of
+from beaver_ftc.studies.compare.trial import LAW, SCHEME, Result, SetFlight, Trial, entries_of
+from beaver_ftc.studies.engine.workers import Case
+from flying import scenario
+from kept import page, picture
+
+SCHEMES, LAWS = ("observer", "none"), ("lqr", "nominal")
+
+
+def result(entry, k, healthy):
+    """Ours is good, the observer late, lqr better but for one departure; nothing is like anything else."""
+    late = {SCHEME: 0.1, "observer": 0.4, "none": inf}[entry.scheme] * (1 + k)
+    detected = not healthy and late < 2.0
+    rms = {LAW: 1.5, "lqr": 1.2, "nominal": 4.0, "oracle": 1.0}[entry.law] * (
+        1 + 0.1 * k * (entry.law != "oracle")
+    )
+    departed = entry.law == "lqr" and k == 3
+    return Result(
+        entry, false_alarm=(entry.scheme, k) == ("observer", 1), fault_free_s=1200.0 - 100 * k,
+        faulted=not healthy, delay_s=late if detected else inf, isolated="elevator" if detected else None,
+        correct=detected and k != 2, isolation_delay_s=late + 0.2 if detected and k != 2 else inf,
+        rms_deg_s=inf if departed else rms, departed=departed, us=5.0 + len(entry.scheme) + k,
+        before_deg_s=0.3 * rms, after_deg_s=rms, travel_deg_s=2.0 + k, energy_deg2_s2=12.0 + 3 * k,
+        error="could not be trimmed" if (entry.law, k) == ("nominal", 4) else None,
+    )  # fmt: skip
+
+
+def traces(k, healthy):
+    steps = () if healthy else ((0.0, 0.4), (0.1 * (k + 1), 1.5), (1.0, 3.0 + k))
+    rises = ((0.0, 0.1), (100.0 * (k + 1), 0.3 + 0.1 * k))
+    ours = Trace(0.3 + 0.1 * k, steps, not healthy, 1200.0, 2.0, rises)
+    noisy = Trace(1.5 if k == 1 else 0.2, steps, not healthy, 1200.0, 3.0, ((50.0, 1.5 if k == 1 else 0.2),))
+    return {SCHEME: ours, "observer": noisy}
+
+
+@pytest.fixture
+def compared():
+    entries = entries_of(SCHEMES, LAWS)
+    trials = [
+        Trial(name, [result(entry, k, healthy) for entry in entries], traces(k, healthy))
+        for name, healthy in (("faulty", False), ("healthy", True))
+        for k in range(5)
+    ]
+    trials[0].failures.append("observer, on a recorded flight: ValueError: no")
+    return document_of(trials, entries) | {"versions": {"ours": "1", "theirs": "2"}}
+
+
+def test_all_that_is_found(compared, kept):
+    kept({name: part["lines"] for name, part in compared["sets"].items()}, "lines")
+    kept({n: {k: v for k, v in part.items() if k != "lines"} for n, part in compared["sets"].items()})
+
+
+def test_all_that_is_shown(compared, kept, tmp_path):
+    kept(as_text(compared).splitlines(), "text")
+    kept(picture(figure_of(compared)), "figure")
+    (tmp_path / "comparison.png").write_bytes(b"a picture")
+    kept(page(page_of(compared, "Comparison: made", tmp_path)), "page")
+    write_leaderboard(compared, tmp_path / "board.md")
+    text = (tmp_path / "board.md").read_text()
+    assert text.startswith(
+        f"# Benchmark\n\n{MARK}\n\nMade with ours 1, theirs 2.\n\n## faulty: 5 flights\n\n| scheme "
+    )
+    kept([line for line in text.splitlines() if not line.startswith("|")], "board")
+    assert list(files_of(compared, "made")) == ["comparison.json", "comparison.png", "comparison.html"]
+
+
+def test_one_set_without_a_curve_that_came_to_anything(compared, kept):
+    part = compared["sets"]["healthy"]
+    part["better_than_ours"], part["errors"] = [], []
+    for row in part["lines"]:
+        row |= {"ratio_median": None, "ratio_90": None}
+    kept(picture(figure_of({"sets": {"healthy": part}})))
+    assert "could not fly" not in as_text({"sets": {"healthy": part}})
+
+
+def test_a_case_that_ends_its_process_has_no_results_and_says_why():
+    found = lost(Case(3, SetFlight("faulty", scenario())), "killed")
+    assert found == Trial("faulty", failures=["test: killed"])
+
+
+def test_a_trace_is_of_the_parts_of_the_flight():
+    from types import SimpleNamespace
+
+    def of(fault_at_s):
+        seen = [(SimpleNamespace(t_s=0.1 * i), None) for i in range(6)]
+        recording = Recording(SimpleNamespace(dt_s=0.1), seen, np.zeros(6), fault_at_s)
+        return trace(recording, np.array([0.2, 0.1, 0.5, 0.9, 0.3, 1.2]), us=4.0)
+
+    struck = of(0.3)
+    assert (struck.before, struck.faulted, struck.healthy_s, struck.us) == (
+        0.5,
+        True,
+        pytest.approx(0.3),
+        4.0,
+    )
+    np.testing.assert_allclose(struck.rises, [(0.0, 0.2), (0.2, 0.5)])
+    np.testing.assert_allclose(struck.records, [(0.0, 0.9), (0.2, 1.2)], atol=1e-9)
+    whole = of(inf)
+    assert (whole.before, whole.faulted, whole.records) == (1.2, False, ())
+    assert of(0.6).faulted is False
+    assert (of(0.0).before, of(0.0).rises) == (0.0, ())
+
+
+def test_an_alarm_ends_the_time_in_which_one_would_be_false():
+    one = Trace(2.0, (), False, 3600.0, rises=((10.0, 0.5), (900.0, 1.0), (1800.0, 2.0)))
+    assert [one.fault_free_s(level) for level in (0.4, 0.5, 1.0, 2.0)] == [10.0, 900.0, 1800.0, 3600.0]
+    assert [one.false_alarm(level) for level in (1.9, 2.0)] == [True, False]
+    assert alarms_at([one, Trace(0.1, (), False, 7200.0)], 1.0) == (1, 2.5)
+
+
+LIMITED = {"actuator": "elevator", "type": "rate_limit", "scale": 0.02, "at_s": 12.0, "end_s": 20.0}
+BEFORE = {"p": 0.1, "q": 0.2, "r": 0.3}
+BIASED = {"sensor": "p", "type": "bias", "bias_deg_s": 1, "abrupt": True, "at_s": 2}
+
+
+def run_of(folder, **changes):
+    run = {
+        "folder": str(folder), "scenario": "first", "seed": 7, "false_alarm": False, "passed": True,
+        "flown": {"initial": {"airspeed_mps": 45.0, "altitude_m": 1828.8}, "control": {"law": "nominal"},
+                  "fdi": {"scheme": "none"}, "faults": [LIMITED, BIASED]},
+        "detection": {"delay_s": 0.25, "guaranteed_delay_s": None},
+        "isolation": {"fault": "elevator", "delay_s": 0.5, "estimate": -0.412},
+        "tracking": {"pre_fault_rms_deg_s": BEFORE, "post_fault_rms_deg_s": {"p": 1.0}},
+        "envelope_exits": [{"start_s": 3.0, "end_s": 4.5}, {"start_s": 6.0, "end_s": 6.25}],
+        "departure": None, "fault": {"at_s": 12.0},
+    }  # fmt: skip
+    return run | changes
+
+
+def test_runs_side_by_side(kept, tmp_path):
+    lost = {"departure": {"signal": "alpha_rad", "time_s": 20.456}, "passed": False, "false_alarm": True}
+    healthy = run_of(tmp_path / "b", fault=None, **lost)
+    healthy["flown"] = {**healthy["flown"], "faults": []}
+    healthy["isolation"] = {"fault": None, "delay_s": None, "estimate": None}
+    healthy["tracking"] = {
+        "pre_fault_rms_deg_s": {"p": 0.1, "q": 0.2, "r": 0.3},
+        "post_fault_rms_deg_s": None,
+    }
+    kept(runs.as_text([run_of(tmp_path / "a"), healthy]).splitlines())
+    assert runs.labels([run_of("x/a"), run_of("y/a")]) == ["x/a", "y/a"]
+
+
+def test_tracking_errors_of_runs_in_one_figure(kept, monkeypatch, tmp_path):
+    t = np.linspace(0.0, 20.0, 41_000)
+    log = {"t_s": t}
+    for i, axis in enumerate("pqr"):
+        log |= {f"{axis}_model_rad_s": 0.1 * np.sin(t) + i, f"{axis}_measured_rad_s": 0.05 * np.sin(t) + i}
+    asked = []
+
+    def read(path, names):
+        asked.append((path.parent.name, names))
+        return log
+
+    monkeypatch.setattr("beaver_ftc.results.log.read", read)
+    other = run_of(tmp_path / "b", fault={"at_s": 5.5})
+    figure = runs.figure_of([run_of(tmp_path / "a"), other, run_of(tmp_path / "c", fault=None)])
+    kept(picture(figure))
+    assert [len(line.get_xdata()) for line in figure.axes[0].lines[:1]] == [20_500]
+    assert [folder for folder, _ in asked] == ["a", "b", "c"]
+    assert asked[0][1] == list(log)
+
+
+def test_folders_that_are_no_runs_are_all_named(tmp_path):
+    for name, metrics in (("a", "{"), ("b", None), ("c", "{}")):
+        (tmp_path / name).mkdir()
+        for file, content in (("metrics.json", metrics), ("log.parquet", ""), ("scenario.yaml", "{}")):
+            if content is not None:
+                (tmp_path / name / file).write_text(content)
+    (tmp_path / "d").mkdir()
+    (tmp_path / "d" / "metrics.json").write_text("{}")
+    with pytest.raises(BadInput) as said:
+        runs.read_runs([tmp_path / name for name in "abcd"])
+    allowed = "allowed: a result folder of beaver-ftc run"
+    unreadable = f"metrics.json or scenario.yaml cannot be read, {allowed}"
+    assert str(said.value).splitlines() == [
+        f"{tmp_path / 'a'}: {unreadable}", f"{tmp_path / 'b'}: holds no metrics.json, {allowed}",
+        f"{tmp_path / 'c'}: {unreadable}", f"{tmp_path / 'd'}: holds no log.parquet, {allowed}",
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("target_per_h", "level"), [(0.0, 6.0), (0.9, 6.0), (1.0, 3.0), (2.9, 2.0), (3.0, 1.0), (9.0, 1.0)]
+)
+def test_the_level_with_as_many_alarms_as_are_allowed(target_per_h, level):
+    healthy = [Trace(before, (), faulted=False, healthy_s=900.0) for before in (3.0, 1.0, 5.0, 2.0)]
+    assert tune.alarm_level(healthy, target_per_h) == level
+
+
+def test_a_miss_costs_as_much_as_all_the_time_there_was():
+    found = Trace(0.5, ((0.25, 2.0),), faulted=True, healthy_s=1.0)
+    assert [tune._cost(found, level) for level in (1.0, 2.0, 0.4)] == [0.25, 10.0, 10.0]
+
+
+@pytest.mark.parametrize("errors", [False, True])
+def test_what_is_tuned(errors, monkeypatch, tmp_path):
+    """Two candidates of a detector on two flights, of a law on the faulted one."""
+    cases = [SetFlight("c", scenario(faults=[])), SetFlight("c", scenario())]
+    faulted = scenario(faults=[{"actuator": "elevator", "type": "float", "at_s": 1.0}])
+    cases[1] = SetFlight("c", faulted)
+    asked, played = [], []
+    monkeypatch.setattr(tune, "of_set", lambda name, most: asked.append((name, most)) or cases)
+    of = {
+        "detectors": {"observer-constant": {"gain": [1.0, 2.0]}},
+        "laws": {"lqr": {"weight": [3.0, 4.0, 5.0]}},
+    }
+    of["detectors for errors"] = {"observer-constant": {"gain": [2.0, 3.0]}}
+    monkeypatch.setattr(tune, "grids", lambda: of)
+    monkeypatch.setattr(tune, "record", lambda given: given)
+
+    def replayed(given, name, options):
+        played.append((name, options))
+        late = 1.0 / options["gain"]
+        return Trace(0.5, ((late, 9.0),) if given.faults else (), bool(given.faults), 1800.0)
+
+    monkeypatch.setattr(tune, "replay", replayed)
+    monkeypatch.setattr(tune, "_law_cost", lambda case, name, option: abs(option["weight"] - 4.1))
+    shares = []
+    found = tune.tune(0.0, 1, 3, shares.append, errors)
+    assert asked == [("calibration-errors" if errors else "calibration", 3)]
+    assert played[0] == ("observer-constant", {"gain": 2.0 if errors else 1.0, "alarm": 1.0})
+    assert found == {
+        "procedure": f"beaver-ftc compare --tune{' --errors' if errors else ''}; docs/benchmark.md",
+        "target_false_alarms_per_h": 0.0, "healthy_hours": 1.0, "flights": 2,
+        "options": {"observer-constant": {"gain": 3.0 if errors else 2.0, "alarm": 0.6}}
+        | ({} if errors else {"lqr": {"weight": 4.0}}),
+    }  # fmt: skip
+    assert shares == [0.5, 1.0]
+    for name in ("TUNED", "TUNED_FOR_ERRORS"):
+        monkeypatch.setattr(tune, name, tmp_path / name)
+    tune.write_tuned(found, errors)
+    assert [path.name for path in tmp_path.iterdir()] == ["TUNED_FOR_ERRORS" if errors else "TUNED"]
+
+
+def test_a_law_costs_its_error_and_a_departure_ten(monkeypatch):
+    flown = []
+    monkeypatch.setattr(tune, "fly", lambda given: flown.append(given) or given)
+    for rms_deg_s, cost in ((1.5, 1.5), (inf, 10.0)):
+        made = Result(None, False, 0.0, True, rms_deg_s=rms_deg_s)
+        monkeypatch.setattr(tune, "result_of", lambda flight, entry, us, made=made: made)
+        assert tune._law_cost(SetFlight("c", scenario()), "lqr", {"rate_weight": 2.0}) == cost
+    control = flown[0].control
+    assert (control.law, control.options, flown[0].fdi.scheme) == ("lqr", {"rate_weight": 2.0}, SCHEME)

@@ -36,9 +36,8 @@ def filed(tmp_path_factory):
     return derive(str(TRAINER), folder, folder / "envelope.yaml")
 
 
-@pytest.mark.parametrize("which", ["stranger", "filed"])
-def test_what_is_derived(which, request, kept):
-    found, told = request.getfixturevalue(which)
+def hold(found_and_told, kept):
+    found, told = found_and_told
     folder = found.aircraft.folder
     kept(yaml.safe_load((folder / "aircraft.yaml").read_text()), part="file")
     document = derived.document_of(replace(found, took_s=1.2345))
@@ -47,6 +46,14 @@ def test_what_is_derived(which, request, kept):
     page = derived.page_of(replace(found, took_s=1.2345))
     kept(page.splitlines(), part="page")
     assert page.replace("1.2 s", f"{found.took_s:.1f} s") == (folder / "derived.md").read_text()
+
+
+def test_what_is_derived_of_a_model(stranger, kept):
+    hold(stranger, kept)
+
+
+def test_what_is_derived_of_an_aircraft_with_a_file_over_an_envelope_of_its_own(filed, kept):
+    hold(filed, kept)
 
 
 def test_a_page_on_an_aircraft_of_which_little_is_to_be_said(stranger, kept):

@@ -221,7 +221,7 @@ def _derived(
 def _moments(samples: Samples, data: outline.Data, folder: Path) -> outline.Data:
     """The terms: as many as the evaluator has room for."""
     bare = {name: value for name, value in data.items() if name != "model_error_map"}
-    any_term = {"name": "Cl_any", "value": -0.1, "surface": next(iter(data["surfaces"]))}
+    any_term = {"name": "Cl_any", "value": 1.0, "surface": next(iter(data["surfaces"]))}
     aircraft = outline.aircraft_of(bare | {"moments": {"Cl": [any_term]}}, folder)
     for most in range(MOST_TERMS, FEWEST_TERMS - 1, -4):
         terms = fitted(samples, aircraft, most)

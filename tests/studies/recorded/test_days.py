@@ -147,7 +147,7 @@ def data():
 
 
 def test_a_labelled_flight_on_other_days(kept, monkeypatch, data):
-    """As it was: the benchmark's own figures of its halves. Settings that are quick: one delay, few levels."""
+    """As it was: the benchmark's own figures of its halves. Quick settings: one delay, few levels."""
     quick = Settings(delays_s=[0.0], level_step=0.25, levels={"right": [0.4], "left": [0.5]})
     monkeypatch.setattr(benchmark, "settings_of", lambda stretches, data: quick)
     monkeypatch.setattr(other_days, "grid", lambda mixer, commands: [nominal(2)])

@@ -114,7 +114,7 @@ def _looks_like_a_scenario(keys: list[str]) -> bool:
     known = set(Scenario.model_fields)
     own = known - {"name", "description"}
     near = any(get_close_matches(str(key).lower(), own, n=1, cutoff=_NEAR) for key in keys)
-    return near or ("name" in keys and set(keys) <= known)
+    return near or ("name" in keys and known.issuperset(keys))
 
 
 class FlownFile(pytest.File):

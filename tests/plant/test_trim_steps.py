@@ -143,6 +143,10 @@ def test_a_quick_look_is_the_full_start_s_accelerations():
         quick = look(x)
     assert quick == pytest.approx(steps._accelerations(truth, steps._moved(point, names, off)), abs=1e-5)
     assert len(steps.ACCELERATIONS) == 6
+    J = steps._jacobian(truth, point, names, steps._accelerations(truth, point))
+    small = 1e-3 * off
+    moved = steps._accelerations(truth, steps._moved(point, names, small))
+    assert J @ small == pytest.approx(moved, abs=1e-5)
 
 
 def test_trims_and_slopes(kept):
@@ -224,3 +228,19 @@ def test_a_trim_from_python_names_what_is_wrong():
     assert said(lambda: bf.trim(flaps_deg=1.0)).startswith(
         "initial.flaps_deg: unknown key, did you mean flap_deg?"
     )
+
+
+def test_an_engine_s_setting_or_limit_without_words_goes_by_its_name():
+    of = {"property": "propulsion/thrust-n", "range": [0, 3000]}
+    for section, default in (("settings", 4000.0), ("limits", 2000.0)):
+        named = {"settings": {"thrust_n": {**of, "default": 2000.0}}, "limits": {}}
+        named[section] = {"push": {**of, "range": [0, 1000 if section == "limits" else 3000], "unit": "N"}}
+        if section == "settings":
+            named[section]["push"]["default"] = 3000.0
+        aircraft = trainer(engine=named)
+        plant = Plant(100, aircraft=aircraft)
+        given = {"push": default} if section == "settings" else {}
+        most = 3000 if section == "settings" else 1000
+        assert said(lambda plant=plant, given=given: trim(50.0, 500.0, plant, **given)) == (
+            f"push is {default:g} N, allowed: 0 to {most} N"
+        )

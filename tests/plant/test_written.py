@@ -198,17 +198,30 @@ def test_what_jsbsim_raises_is_one_line(flown, name):
         raise jsbsim.BaseError("a\n b")
 
 
-def test_engines_are_run_up_with_the_aircraft_where_it_is(tmp_path):
+@pytest.fixture
+def engined(tmp_path):
+    """Makes aircraft of the jsbsim package's c172x whose engine is started so."""
+    model = copy_of(package() / "aircraft" / "c172x" / "c172x.xml", tmp_path)
     throttle = {"throttle": {"property": "fcs/throttle-cmd-norm", "default": 0.7, "range": [0, 1]}}
     surfaces = {name: {"command": f"fcs/{name}-cmd-norm", "position": f"fcs/{name}-pos-norm",
                        "effective": f"fcs/{name}-pos-norm", "travel_rad": [-0.3, 0.3]}
                 for name in ("aileron", "elevator", "rudder")}  # fmt: skip
-    aircraft = trainer(engine={"settings": throttle, "start": "run_up"}, surfaces=surfaces)
-    model = copy_of(package() / "aircraft" / "c172x" / "c172x.xml", tmp_path)
-    plant = Plant(100, aircraft=aircraft, model=model)
+
+    def made(start):
+        aircraft = trainer(engine={"settings": throttle, "start": start}, surfaces=surfaces)
+        return aircraft, Plant(100, aircraft=aircraft, model=model)
+
+    return made
+
+
+RPM = "propulsion/engine/engine-rpm"
+
+
+def test_engines_are_run_up_with_the_aircraft_where_it_is(engined):
+    aircraft, plant = engined("run_up")
     state = FlightState(50.0, 1000.0, alpha_rad=0.05, theta_rad=0.05, aircraft=aircraft)
     plant.start(state)
-    first = plant.read("propulsion/engine/engine-rpm")
+    first = plant.read(RPM)
     assert first > 1500
     assert plant.read("simulation/sim-time-sec") == 0.0
     assert plant.read("position/h-sl-ft") * 0.3048 == pytest.approx(1000.0, abs=0.01)
@@ -219,7 +232,34 @@ def test_engines_are_run_up_with_the_aircraft_where_it_is(tmp_path):
     assert len(runs) == 5  # they run already: it settles
     plant.start(FlightState(50.0, 1000.0, aircraft=aircraft, throttle=0.2))
     assert len(runs) == 10 + 100 * 10
-    assert plant.read("propulsion/engine/engine-rpm") < 0.9 * first
+    assert plant.read(RPM) < 0.9 * first
+
+
+@pytest.mark.parametrize(("start", "runs"), [("steady", 10), ("off", 5)])
+def test_engines_run_steadily_at_once_or_not_at_all(engined, start, runs):
+    aircraft, plant = engined(start)
+    counted = []
+    plant.run = lambda run=plant.run: counted.append(run())
+    for throttle in (0.9, 0.3):
+        plant.start(FlightState(50.0, 1000.0, aircraft=aircraft, throttle=throttle))
+        counted.append(round(plant.read(RPM)))
+        assert plant.read("fcs/throttle-cmd-norm") == throttle
+    assert [place for place, of in enumerate(counted) if type(of) is int] == [runs, 2 * runs + 1]
+    fast, slow = counted[runs], counted[-1]
+    assert (fast > 1.2 * slow > 600) == (start == "steady")
+
+
+@pytest.mark.parametrize(
+    ("severity", "exceedence", "wind_fps"), [("light", 3, 25.3), ("moderate", 4, 50.6), ("severe", 6, 76.0)]
+)
+def test_turbulence_as_the_specification_has_it(severity, exceedence, wind_fps, trim_point):
+    plant = Noted(rate_hz=50)
+    air = {"turbulence": "dryden", "severity": severity}
+    take_off(plant, load({"environment": air, "seed": 2**31 - 2}), trim_point)
+    folder = "atmosphere/turbulence/milspec"
+    found = [plant.written[f"{folder}/severity"], plant.written[f"{folder}/windspeed_at_20ft_AGL-fps"]]
+    assert found == [exceedence, wind_fps]
+    assert (plant.written["atmosphere/randomseed"], plant.written["atmosphere/turb-type"]) == (1, 4)
 
 
 def test_names_and_units_of_what_is_read_and_logged(kept):

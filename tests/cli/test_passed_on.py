@@ -1,0 +1,208 @@
+"""What commands hand on to what they are of, what they answer with it, and their exit status."""
+
+import json
+import re
+import sys
+from importlib import import_module
+from inspect import signature
+from pathlib import Path
+from types import SimpleNamespace
+from typing import get_args
+
+import pytest
+
+from beaver_ftc.cli import catalogue
+from beaver_ftc.cli.main import app, main
+from beaver_ftc.documents.errors import BadInput
+
+
+def test_options_of_all_commands(kept):
+    """Defaults, names, ranges and helps of every option."""
+    found = {}
+    for info in app.registered_commands:
+        parameters = signature(info.callback).parameters.values()
+        found[info.name] = {each.name: _option(each) for each in parameters}
+    kept(found)
+
+
+def _option(parameter):
+    _, option = get_args(parameter.annotation)
+    default = "" if parameter.default is parameter.empty else parameter.default
+    ends = ["" if of is None else of for of in (option.min, option.max, option.metavar)]
+    return " | ".join(map(str, (default, getattr(option, "param_decls", None), *ends, option.help)))
+
+
+@pytest.fixture
+def beaver(monkeypatch, capsys, tmp_path):
+    """Runs a command with functions put in place: (status, standard output, what these were given)."""
+    monkeypatch.chdir(tmp_path)
+
+    def run(asked, **instead):
+        given = []
+        for path, result in instead.items():
+            module, _, name = path.replace("__", ".").rpartition(".")
+            noting = _noting(name, result, given)
+            monkeypatch.setattr(import_module(f"beaver_ftc.{module}"), name, noting)
+        monkeypatch.setattr(sys, "argv", ["beaver-ftc", *asked.split()])
+        with pytest.raises(SystemExit) as ended:
+            main()
+        return ended.value.code or 0, capsys.readouterr().out, given
+
+    return run
+
+
+def _noting(name, result, given):
+    def called(*of, **named):
+        given.append((name, *map(_shown, of), {key: _shown(value) for key, value in named.items()}))
+        return result(*of, **named) if callable(result) else result
+
+    return called
+
+
+def _shown(value):
+    if isinstance(value, Path):
+        return str(value)
+    return (
+        value
+        if isinstance(value, str | int | float | bool | None | list | tuple | dict)
+        else getattr(value, "vanes", "(object)")
+    )
+
+
+MATRIX = {
+    "studies__matrix__fault_matrix__run_matrix": {"passed": False},
+    "studies__matrix__fault_matrix__as_text": "m",
+    "studies__matrix__pitch_lost__run_pitch_lost": {"passed": True},
+    "studies__matrix__pitch_lost__as_text": "l",
+}
+POWER = {
+    "studies__power__shown__run_power": {"a": 1},
+    "studies__power__shown__as_text": "p",
+    "studies__power__survey__contenders": lambda names: names,
+    "studies__engine__workers__cores": 7,
+}
+REPRODUCE = {
+    "studies__reproduce__reproduction__reproduce": {"passed": False},
+    "studies__reproduce__reproduction__as_text": "r",
+}
+VERIFY = {
+    "studies__verify__conduct": ["row"],
+    "studies__verify__summarise": {"kept": False},
+    "studies__verify__summary_text": "v",
+    "studies__engine__workers__cores": 7,
+}
+SURVEY = {"studies__detectability__run_survey": {"points": [1]}, "studies__detectability__text": "d"}
+BENCH = {"studies__bench__measure__bench": {"b": 1}, "studies__bench__measure__text_of": "bench"}
+DERIVE = {
+    "studies__derive__derivation__derive": "made",
+    "studies__derive__derived__document_of": {"d": 2},
+    "studies__derive__derived__text_of": "derived",
+}
+COMPARE = {
+    "studies__compare__trial__of_set": lambda name, most: [SimpleNamespace(set=name)] * 2,
+    "studies__compare__trial__of_sweep": lambda path, most: [SimpleNamespace(set="of-a-sweep")],
+    "studies__compare__trial__entries_of": lambda schemes, laws: [*schemes, *laws],
+    "studies__compare__leaderboard__run_comparison": {"c": 1},
+    "studies__compare__leaderboard__as_text": "c\n",
+    "studies__compare__leaderboard__write_leaderboard": None,
+    "studies__compare__trial__set_names": ["one", "two"],
+    "studies__compare__tune__tune": {"options": {"rls": 3, "ekf": 4}},
+    "studies__compare__tune__write_tuned": None,
+    "studies__compare__runs__write_runs": ["r"],
+    "studies__compare__runs__labels": lambda runs: ["first"],
+    "studies__compare__runs__as_text": "runs",
+    "studies__recorded__benchmark__run_benchmark": {"rec": 1},
+    "studies__recorded__benchmark__as_text": "recorded",
+    "studies__recorded__benchmark__files_of": {"flights.png": b"picture"},
+    "studies__recorded__benchmark__update_page": None,
+    "studies__recorded__other_days__run_other_days": {"o": 1},
+}
+ASKED = [
+    ("matrix", MATRIX),
+    ("matrix --airspeed 35 --airspeed 40 --workers 3 --declared --turbulence light --format json", MATRIX),
+    ("matrix --pitch-lost --out o --airspeed 45", MATRIX),
+    ("matrix --aircraft beaver --workers 0", MATRIX), ("matrix --aircraft beaver", MATRIX),
+    ("matrix --pitch-lost --declared", MATRIX), ("matrix --pitch-lost --aircraft beaver", MATRIX),
+    ("matrix --declared --aircraft beaver", MATRIX), ("matrix --turbulence light", MATRIX),
+    ("power", POWER),
+    ("power --grid full --schemes a,,b --workers 2 --rates-alone --out o --format json", POWER),
+    ("power --turbulence none --sensors ideal", POWER),
+    ("reproduce", REPRODUCE), ("reproduce --workers 5 --out o --format json", REPRODUCE),
+    ("verify", VERIFY),
+    ("verify --hours 0.5 --faults 3 --seed 4 --workers 2 --steps --out o --format json", VERIFY),
+    ("detectability fault-free --out o", SURVEY), ("detectability fault-free --format json", SURVEY),
+    ("bench --rounds 3", BENCH), ("bench --no-parts --format json", BENCH), ("bench --rounds 2", BENCH),
+    ("derive x", DERIVE), ("derive x --out o --envelope e --format json", DERIVE),
+    ("compare --benchmark", COMPARE),
+    ("compare --benchmark --set one --flights 3 --laws lqr --format json", COMPARE),
+    ("compare --sweep s --schemes rls-monitor --workers 4 --leaderboard page --out o", COMPARE),
+    ("compare --sweep s --schemes rls-monito --laws lq", COMPARE),
+    ("compare --tune", COMPARE),
+    ("compare --tune --errors --target 2 --flights 9 --workers 1 --format json", COMPARE),
+    ("compare a b", COMPARE), ("compare a b --out o --format json", COMPARE),
+    ("compare --flights recorded", COMPARE),
+    ("compare --flights recorded --out o --leaderboard page.md", COMPARE),
+    ("compare --flights recorded --other-days --leaderboard page.md --format json", COMPARE),
+    ("compare --flights recorded --other-days", COMPARE),
+    ("compare", COMPARE), ("compare a --tune", COMPARE), ("compare --tune --flights recorded", COMPARE),
+    ("compare --tune --flights 0", COMPARE), ("compare --tune --flights 1", COMPARE),
+    ("compare --tune --flights -3", COMPARE), ("compare --tune --set x", COMPARE),
+    ("compare --benchmark --errors", COMPARE), ("compare --benchmark --other-days", COMPARE),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "kind", ["matrix", "power", "reproduce", "verify", "detectability", "bench", "derive", "compare"]
+)
+def test_what_is_handed_on_and_answered(beaver, kind, kept):
+    kept({asked: beaver(asked, **instead) for asked, instead in ASKED if asked.split()[0] == kind})
+
+
+def test_the_picture_beside_a_page_is_renewed(beaver, tmp_path):
+    (tmp_path / "images").mkdir()
+    beaver("compare --flights recorded --leaderboard page.md", **COMPARE)
+    assert (tmp_path / "images" / "recorded-flights.png").read_bytes() == b"picture"
+
+
+def test_a_trim_as_a_table(beaver, kept):
+    status, shown, _ = beaver("trim --airspeed-mps 40 --altitude-m 1000 --flap-deg 5 --engine-rpm 1900")
+    kept([status, [re.sub(r"\S+(?= m/s2 or)", "tiny", line) for line in shown.splitlines()]])
+    status, shown, _ = beaver("trim --airspeed-mps 46 --format json")
+    document = json.loads(shown)
+    assert (document["airspeed_mps"], document["envelope_valid"], list(document["residual"])) == (
+        46.0, True, ["udot_mps2", "vdot_mps2", "wdot_mps2", "pdot_rad_s2", "qdot_rad_s2", "rdot_rad_s2"],
+    )  # fmt: skip
+    assert (
+        beaver("trim --airspeed-mps 60 --altitude-m 0")[1].splitlines()[-1].startswith("outside the flight-")
+    )
+
+
+def test_what_there_is_to_choose_from(beaver, kept):
+    document = json.loads(beaver("list --format json")[1])
+    for kind in ("schemes", "laws", "faults", "signals"):
+        kept(catalogue._section(kind, document[kind]).splitlines(), part=kind)
+    assert list(document) == ["scenarios", "sweeps", "aircraft", "schemes", "laws", "faults", "signals"]
+    assert {"name", "description"} == set(document["scenarios"][0])
+    names = [entry["name"] for entry in document["aircraft"]]
+    assert names[0] == "beaver"
+    assert "jsbsim:c172x" in names
+    derived = {entry["description"].partition("package")[2] for entry in document["aircraft"][1:]}
+    assert derived <= {", derived", ": derived at first use"}
+
+
+def test_schemas_of_both_kinds_of_file(beaver):
+    for asked, title in (("schema", "beaver-ftc scenario"), ("schema --sweep", "beaver-ftc sweep")):
+        assert json.loads(beaver(asked)[1])["title"] == title
+
+
+def test_who_is_chosen():
+    from beaver_ftc.cli.compare import _chosen
+    from beaver_ftc.plugins import LAWS, registered
+
+    assert _chosen("--laws", LAWS, None, "fault-tolerant") == list(registered(LAWS))
+    assert _chosen("--laws", LAWS, "lqr, fault-tolerant,lqr", "fault-tolerant") == ["fault-tolerant", "lqr"]
+    with pytest.raises(BadInput) as caught:
+        _chosen("--laws", LAWS, "lq,nomina", "fault-tolerant")
+    assert [line.partition(",")[0] for line in str(caught.value).splitlines()] == [
+        "--laws: unknown law 'lq'", "--laws: unknown law 'nomina'",
+    ]  # fmt: skip

@@ -1,0 +1,88 @@
+"""Modes, zeros and responses against systems whose answers are written down."""
+
+import numpy as np
+import pytest
+
+from beaver_ftc.studies.linear_systems import (
+    MODES,
+    Mode,
+    deviation,
+    held_over_frame,
+    modes,
+    pulse_response,
+    response,
+    zeros,
+)
+
+
+def pair(real, imaginary):
+    return np.array([[real, imaginary], [-imaginary, real]])
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_each_mode_by_its_name(seed):
+    """Two pairs of the longitudinal states, a pair and two real ones of the lateral, in any coordinates."""
+    A = np.zeros((8, 8))
+    A[:2, :2], A[2:4, 2:4] = pair(-0.02, 0.3), pair(-2.0, 1.5)
+    A[4:6, 4:6] = pair(-0.3, 2.0)
+    A[6, 6], A[7, 7] = -5.0, -0.01
+    turn = np.zeros((8, 8))
+    rng = np.random.default_rng(seed)
+    for part in (slice(0, 4), slice(4, 8)):
+        turn[part, part] = np.linalg.qr(rng.normal(size=(4, 4)))[0]
+    turn[:4, 4:] = 0.01
+    found = modes(turn @ A @ np.linalg.inv(turn))
+    poles = {
+        "short_period": -2 + 1.5j,
+        "phugoid": -0.02 + 0.3j,
+        "roll": -5,
+        "dutch_roll": -0.3 + 2j,
+        "spiral": -0.01,
+    }
+    assert list(found) == list(MODES)
+    for name, pole in poles.items():
+        assert found[name].pole == pytest.approx(pole), name
+    assert found["short_period"].frequency_rad_s == pytest.approx(2.5)
+    assert found["short_period"].damping == pytest.approx(0.8)
+    assert (found["spiral"].damping, Mode(0.5 + 0j).damping) == (pytest.approx(1.0), -1.0)
+    assert deviation(3 + 4j, 3 + 0j) == pytest.approx(4 / 3)
+
+
+# x'' + 0.4 x' + 4 x = u + 3 u': states x and what is fed by u alone
+A = np.array([[0.0, 1.0], [-4.0, -0.4]])
+B = np.array([0.0, 1.0])
+
+
+def test_a_frequency_response_is_the_transfer_function():
+    w = np.array([0.1, 2.0, 7.0])
+    s = 1j * w
+    np.testing.assert_allclose(response(A, B, 0, w), 1 / (s**2 + 0.4 * s + 4))
+    np.testing.assert_allclose(response(A, B, 1, w), s / (s**2 + 0.4 * s + 4))
+
+
+def test_zeros_of_a_transfer_function_slowest_first():
+    """(s + 0.5)(s - 3) over a cubic, in companion form: the output is 1.5 of the first state."""
+    a = np.array([[-6.0, -11.0, -6.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+    # y = s^2 - 2.5 s - 1.5 over it is the new first state
+    T = np.array([[1.0, -2.5, -1.5], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+    found = zeros(T @ a @ np.linalg.inv(T), T @ np.array([1.0, 0.0, 0.0]), 0)
+    np.testing.assert_allclose(found, [-0.5, 3.0], atol=1e-9)
+    assert zeros(A, B, 0).size == 0
+    np.testing.assert_allclose(zeros(A, B, 1), [0.0], atol=1e-9)
+
+
+def test_inputs_held_over_a_frame():
+    """Of an integrator of an integrator with a decay beside it."""
+    F = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, -2.0]])
+    G = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 3.0]])
+    Fd, Gd = held_over_frame(F, G, 0.5)
+    gone = np.exp(-1.0)
+    np.testing.assert_allclose(Fd, [[1.0, 0.5, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, gone]], atol=1e-12)
+    np.testing.assert_allclose(Gd, [[0.125, 0.0], [0.5, 0.0], [0.0, 1.5 * (1 - gone)]], atol=1e-12)
+
+
+def test_after_a_pulse_a_decay_has_risen_and_falls():
+    t = np.arange(0.0, 3.0, 0.1)
+    found = pulse_response(np.array([[-2.0]]), np.array([3.0]), 0, t, 1.0)
+    rising, falling = 1.5 * (1 - np.exp(-2 * t)), 1.5 * (1 - np.exp(-2.0)) * np.exp(-2 * (t - 1.0))
+    np.testing.assert_allclose(found, np.where(t <= 1.0 + 1e-9, rising, falling), atol=1e-12)

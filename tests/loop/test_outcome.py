@@ -1,0 +1,177 @@
+"""What is read off a flight's record: of each part set by hand what the landing says, in kept documents."""
+
+from math import inf, radians
+
+import numpy as np
+import pytest
+
+from beaver_ftc.diagnosis.base import Verdict
+from beaver_ftc.diagnosis.state import STATISTICS, UNANTICIPATED
+from beaver_ftc.loop.assembly import assemble
+from beaver_ftc.loop.outcome import guaranteed_delay_s, landing_of, verdict_of
+from beaver_ftc.scenario.schema import Scenario
+
+SURFACES = ("aileron", "elevator", "rudder", "flap")
+TRIM = np.array([0.01, -0.02, 0.03, 0.04])
+TRAVEL = np.array([[-0.5, -0.4, -0.3, -0.1], [0.5, 0.45, 0.35, 1.0]])
+ALARM = {"fdi.verdict.detected": 1, "fdi.verdict.detected_at_s": 2.25, "fdi.verdict.detected_axis": 1}
+NAMED = ALARM | {"fdi.verdict.isolated": 1, "fdi.verdict.isolated_at_s": 2.5}
+PILOT = {"autopilot.enabled": 1, "autopilot.commanded": [1, 1, 0, 1]}
+
+# Of each case the scenario's keys, and what is put into the record of its flight.
+CASES = {
+    "tracked": ({}, {
+        "k": 301, "t": 3.0, "accounts.tracking.before": [4e-4, 1e-4, 9e-4],
+        "accounts.tracking.frames_before": 100, "accounts.tracking.since": [1.0, 4.0, 16.0],
+        "accounts.tracking.frames_since": 4,
+        "accounts.authority.demanded": [2.0, 0.0, 8.0], "accounts.authority.lacking": [0.5, 0.0, 6.0],
+        "accounts.authority.beyond_frames": [5, 0, 7], "accounts.saturated_frames": [1, 2, 3, 4],
+        "accounts.travelled": [0.1, 0.2, 0.3, 0.4], "accounts.hurried": [1.0, 2.0, 3.0, 4.0],
+        "truth.value.5": 50.0, "truth.value.12": 1500.0,
+    }),
+    "modes-and-exits": ({}, {
+        "t": 9.0, "departed": 30, "supervisor.n_modes": 3, "supervisor.mode_at_s": [0.0, 1.5, 2.0, 7.0],
+        "supervisor.mode_is": [0, 1, 3, 2], "accounts.envelope.n_exits": 2,
+        "accounts.envelope.outside_frames": 150, "accounts.envelope.exit_at_s": [2.0, 8.0, 5.0],
+        "accounts.envelope.return_at_s": [3.0, inf, 6.0],
+    }),
+    "alarm": ({}, ALARM | {"fdi.bank.closest": [0.2, 0.7, 0.9], "fdi.bank.n": 2,
+                           "fdi.isolation.estimator.2.excluded": 1}),
+    "named": ({}, NAMED | {"fdi.isolation.estimator.0.excluded": 1, "fdi.isolation.estimator.2.excluded": 1,
+                           "fdi.isolation.estimator.1.theta": [-0.1, -0.4, -0.7], "fdi.bank.n": 0,
+                           "fdi.bank.closest": [0.3, 0.7]}),
+    "unanticipated": ({}, ALARM | {"fdi.verdict.isolated": UNANTICIPATED, "fdi.verdict.isolated_at_s": 3.0}),
+    "statistical": ({"fdi": {"statistical": {}}}, ALARM | {
+        "fdi.statistical.alarm.detected_at_s": 2.0, "fdi.statistical.alarm.closest": 0.95,
+        "fdi.statistical.tests.alarm_level": 6.5,
+    }),
+    "engine": ({}, {
+        "control.power.enabled": 1, "control.power.from_s": 0.0, "control.power.frames": 250,
+        "control.power.least": 11.5, "control.power.greatest": 30.25,
+    }),
+    "engine-not-used": ({}, {"control.power.enabled": 1, "control.power.from_s": -1.0}),
+    "no-engine": ({}, {"control.power.from_s": 1.0}),
+    "probed": ({"fdi": {"fault_class": "all", "probing": {}}}, {
+        "t": 9.0, "control.probe.from_s": 0.0, "control.probe.to_s": 4.5,
+    }),
+    "still-probing": ({"fdi": {"fault_class": "all", "probing": {}}}, {
+        "t": 9.0, "control.probe.from_s": 2.0,
+    }),
+    "probed-for-nothing": ({}, {"t": 9.0, "control.probe.from_s": 2.0}),
+    "profile": ({}, PILOT | {
+        "autopilot.worst": [5.0, 2.5, 0.4, 0.2], "autopilot.held_worst": 1.25,
+        "autopilot.mean_off": [-1.0, 0.5, 0.1, -0.1],
+    }),
+    "profile-without-speed": ({}, PILOT | {
+        "autopilot.commanded": [1, 0, 1, 0], "autopilot.held_worst": 1.25,
+    }),
+    "limits": ({}, PILOT | {
+        "autopilot.holding.from_s": [5.0, 3.0, 0.0], "autopilot.holding.value": [55.0, 38.5, radians(25.0)],
+        "autopilot.holding.in_force": [1, 0, 1], "autopilot.holding.acting": radians(-4.25),
+        "control.surfaces.effectiveness": [0.8, 0.1, 0.35, 0.0],
+    }),
+    "limits-of-roll": ({}, PILOT | {
+        "autopilot.holding.from_s": [-1.0, -1.0, 2.0], "autopilot.holding.value": [55.0, 38.5, radians(25.0)],
+        "control.surfaces.effectiveness": [0.2, 0.1, 0.35, 0.0],
+    }),
+    "no-limits": ({}, {"autopilot.holding.from_s": [5.0, 3.0, 0.0]}),
+    "instrument": ({"fdi": {"sensor_monitor": "always"}}, ALARM | {
+        "t": 5.0, "fdi.watch.alarmed": 1, "fdi.watch.alarmed_at_s": 1.5,
+        "fdi.watch.named": 1, "fdi.watch.named_at_s": 1.75,
+    }),
+}  # fmt: skip
+
+
+def _put(frame, values):
+    for path, value in values.items():
+        *way, last = (int(part) if part.isdigit() else part for part in path.split("."))
+        record = frame
+        for part in way:
+            record = record[part]
+        if isinstance(last, str) and np.ndim(record[last]):
+            record[last][: np.size(value)] = value
+        else:
+            record[last] = value
+
+
+def _record(keys, values):
+    scenario = Scenario.model_validate({"name": "x", **keys})
+    frames = assemble(scenario, TRIM, TRAVEL)
+    frames["autopilot"]["holding"]["from_s"] = -1.0
+    _put(frames[0], values)
+    return scenario, frames[0]
+
+
+def _said(landing):
+    return {name: value for name, value in vars(landing).items() if name not in ("scenario", "columns")}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_what_a_record_says(case, kept):
+    """All of it for the flight that was tracked; of the others what differs from a flight of nothing."""
+    scenario, frame = _record(*CASES[case])
+    said, nothing = _said(landing_of(scenario, frame, ())), _said(landing_of(*_record({}, {}), ()))
+    verdict = verdict_of(frame, SURFACES)
+    assert verdict.detected is (said["detection_time_s"] is not None)
+    assert verdict[:3] == (verdict.detected, said["detection_axis"], said["isolated"])
+    assert (verdict.type, verdict.estimate, verdict.candidates) == (
+        said["isolation_type"], said["estimate"], said["candidates"],
+    )  # fmt: skip
+    kept({name: value for name, value in said.items() if case == "tracked" or value != nothing[name]})
+
+
+PLUGGED = Verdict(True, "p", "rudder", "stuck", 0.125, ("rudder", "flap"))
+
+
+@pytest.mark.parametrize(
+    ("values", "verdict", "said"),
+    [
+        (ALARM | {"fdi.verdict.isolated_at_s": 2.5}, PLUGGED, (2.25, "q", "rudder", "stuck", 0.125, 2.5)),
+        ({}, PLUGGED, (None, None, None, None, None, None)),  # it has said so, and was not believed
+        (ALARM, Verdict(True, "p", None, "stuck", 0.5, ("flap",)), (2.25, "q", None, None, None, None)),
+    ],
+)
+def test_of_a_plug_in_the_alarm_is_latched_and_the_rest_its_own(values, verdict, said):
+    scenario, frame = _record({}, values)
+    landing = landing_of(scenario, frame, ("t_s",), verdict, ({"time_s": 1.0},))
+    found = (landing.detection_time_s, landing.detection_axis, landing.isolated, landing.isolation_type)
+    assert (*found, landing.estimate, landing.isolation_time_s) == said
+    assert landing.candidates == (tuple(verdict.candidates) if values else ())
+    assert (landing.columns, landing.changes) == (("t_s",), ({"time_s": 1.0},))
+
+
+FAULTED = {"truth.faulted": 1, "truth.fault_at_s": 2.0, "accounts.guarantee.certain_after_s": 2.5}
+FAULT = {"type": "loss_of_effectiveness", "actuator": "elevator", "magnitude": 0.4, "at_s": 2.0}
+BROKEN = {"sensor": "q", "type": "bias", "magnitude": 3.0}
+WRONG = {"uncertainty": {"coefficients": {"Cm_q": 1.5}}}
+NOISY = {"q": {"noise_std_deg_s": 1.0}}
+
+
+@pytest.mark.parametrize(
+    ("keys", "values", "plugged", "certain"),
+    [
+        ({}, {}, False, True), ({}, {}, True, False),
+        ({}, {"accounts.guarantee.certain_after_s": -1.0}, False, False),
+        ({}, {"truth.faulted": 0}, False, False),
+        ({}, ALARM, False, True),  # after the fault
+        ({}, ALARM | {"fdi.verdict.detected_at_s": 2.0}, False, True),
+        ({}, ALARM | {"fdi.verdict.detected_at_s": 1.99}, False, False),
+        ({}, {"fdi.verdict.detected_at_s": 1.99}, False, True),
+        ({}, {"fdi.config.authority": STATISTICS}, False, False),
+        ({}, {"fdi.watch.alarmed": 1}, False, False),
+        ({"faults": [FAULT, BROKEN | {"at_s": 2.5}]}, {}, False, False),
+        ({"faults": [FAULT, BROKEN | {"at_s": 2.51}]}, {}, False, True),
+        (WRONG, {}, False, False), ({"sensors": NOISY}, {}, False, False),
+        ({"changes": [{"at_s": 2.5, "sensors": NOISY}]}, {}, False, False),
+        ({"changes": [{"at_s": 2.51, "sensors": NOISY}]}, {}, False, True),
+    ],
+)  # fmt: skip
+def test_when_detection_was_certain(keys, values, plugged, certain):
+    scenario, frame = _record({"faults": [FAULT], **keys}, FAULTED | values)
+    assert guaranteed_delay_s(frame, scenario, plugged) == (pytest.approx(0.5) if certain else None)
+
+
+def test_from_the_very_start_detection_may_be_certain():
+    at_once = {**FAULTED, "truth.fault_at_s": 0.0, "accounts.guarantee.certain_after_s": 0.0}
+    scenario, frame = _record({"faults": [{**FAULT, "at_s": 0.0}]}, at_once)
+    assert guaranteed_delay_s(frame, scenario, False) == 0.0

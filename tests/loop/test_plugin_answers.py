@@ -1,0 +1,147 @@
+"""What a plug-in answers is checked in its very frame, and it alone is to blame."""
+
+import numpy as np
+import pytest
+
+from beaver_ftc.control.laws import ADAPTIVE, NOMINAL, ORACLE
+from beaver_ftc.diagnosis.base import Verdict
+from beaver_ftc.diagnosis.state import NOT_ISOLATED, UNANTICIPATED
+from beaver_ftc.documents.errors import BadInput, SimulationFailed
+from beaver_ftc.loop.loop import Loop
+from beaver_ftc.loop.plugin_frame import PluginFrame
+from beaver_ftc.scenario.schema import Scenario
+
+
+class Answers:
+    """A detector or a law that answers what it was given, and keeps what it was asked."""
+
+    def __init__(self, answer=None, error=None):
+        self.answer, self.error, self.contexts, self.asked = answer, error, [], []
+
+    def reset(self, context):
+        self.contexts.append(context)
+
+    def step(self, *asked):
+        self.asked.append(asked)
+        if self.error is not None:
+            raise self.error
+        return self.answer
+
+
+def _scenario(**keys):
+    return Scenario.model_validate({"name": "x", "duration_s": 1, **keys})
+
+
+@pytest.fixture(scope="module")
+def frame():
+    """A frame with a detector and a law, of a flight that has a scheme and a law of those names."""
+    keys = {"fdi": {"scheme": "augmented-ekf"}, "control": {"law": "nominal", "options": {}}}
+    loop = Loop(_scenario(**keys), Answers(Verdict()), Answers(np.zeros(4)))
+    return loop.plugin_frame, loop.frames[0]["verdict"]
+
+
+@pytest.mark.parametrize(
+    ("answer", "says"),
+    [
+        (True, "step returned bool, allowed: a Verdict"),
+        (None, "step returned NoneType, allowed: a Verdict"),
+        (Verdict(axis="yaw"), "verdict.axis is 'yaw', allowed: p, q, r or None"),
+        (Verdict(isolated="nose"), "verdict.isolated is 'nose', allowed: None, unanticipated, aileron, "
+                                   "elevator, rudder, flap"),
+        (Verdict(estimate="x"), "verdict.estimate is 'x', allowed: a finite number"),
+        (Verdict(estimate=float("inf")), "verdict.estimate is inf, allowed: a finite number"),
+        (Verdict(effectiveness=[1, 2, 3]), "verdict.effectiveness has shape (3,), allowed: 4 numbers"),
+        (Verdict(effectiveness=[]), "verdict.effectiveness has type list, allowed: 4 numbers"),
+        (Verdict(effectiveness="all"), "verdict.effectiveness has type str, allowed: 4 numbers"),
+        (Verdict(effectiveness=[1, 2, 3, np.nan]),
+         "verdict.effectiveness is not finite: [1.0, 2.0, 3.0, nan]"),
+    ],
+)  # fmt: skip
+def test_an_answer_that_is_no_verdict(frame, answer, says):
+    plugins, taken = frame
+    with pytest.raises(SimulationFailed) as failed:
+        plugins._checked(answer, taken)
+    assert str(failed.value) == f"plug-in augmented-ekf at 0 s: {says}"
+
+
+@pytest.mark.parametrize(
+    ("verdict", "taken"),
+    [
+        (Verdict(), (0, 0, NOT_ISOLATED, 0.0, 0)),
+        (Verdict(True, "q", "elevator", None, -0.5), (1, 1, 1, -0.5, 0)),
+        (Verdict(True, "r", "flap", None, 1), (1, 2, 3, 1.0, 0)),
+        (Verdict(1, "p", "unanticipated", None, np.float32(0.25)), (1, 0, UNANTICIPATED, 0.25, 0)),
+        (Verdict(effectiveness=(1, 0.5, 0.25, 0)), (0, 0, NOT_ISOLATED, 0.0, 1)),
+    ],
+)
+def test_what_is_taken_of_a_verdict(frame, verdict, taken):
+    plugins, record = frame
+    record["effectiveness"] = 7.0
+    assert plugins._checked(verdict, record) is verdict
+    found = tuple(record[name].item() for name in ("detected", "axis", "isolated", "theta", "estimates"))
+    assert found == taken
+    expected = verdict.effectiveness if taken[-1] else [7.0] * 4
+    assert record["effectiveness"].tolist() == list(expected)
+
+
+def test_errors_are_put_in_one_line_and_bounded(frame):
+    plugins, _ = frame
+    raising = Answers(error=ValueError("a\n  b" + "c" * 600))
+    with pytest.raises(SimulationFailed) as failed:
+        plugins._ask("mine", raising.step)
+    says = str(failed.value)
+    assert says.startswith("plug-in mine at 0 s: step raised ValueError: a bccc")
+    assert len(says) == len("plug-in mine at 0 s: ") + 500
+    with pytest.raises(SimulationFailed, match="step raised SystemExit: 3"):
+        plugins._ask("mine", Answers(error=SystemExit(3)).step)
+    with pytest.raises(BadInput, match=r"^as it says$"):
+        plugins._ask("mine", Answers(error=BadInput("as it says")).step)
+    with pytest.raises(KeyboardInterrupt):
+        plugins._ask("mine", Answers(error=KeyboardInterrupt()).step)
+
+
+def test_each_is_told_of_its_own_options_once_and_one_that_goes_on_not_again():
+    law = Answers(np.zeros(4))
+    keys = {"fdi": {"scheme": "augmented-ekf", "options": {"alarm": 2.0}},
+            "control": {"law": "lqr", "options": {"q": 3.0}}}  # fmt: skip
+    detector = Answers(Verdict())
+    loop = Loop(_scenario(**keys), detector, law)
+    assert [dict(context.options) for context in detector.contexts + law.contexts] == [
+        {"alarm": 2.0},
+        {"q": 3.0},
+    ]
+    begun = loop.plugin_frame
+    assert begun._names == ("augmented-ekf", "lqr")
+    given = loop.frames, loop.scenario, loop.start
+    PluginFrame(*given, detector, law, begun)
+    assert (len(detector.contexts), len(law.contexts)) == (1, 1)
+    PluginFrame(*given, Answers(Verdict()), law, begun)
+    PluginFrame(*given, detector, Answers(), begun)
+    assert (len(detector.contexts), len(law.contexts)) == (1, 1)
+    PluginFrame(*given, detector, law, None)
+    assert (len(detector.contexts), len(law.contexts)) == (2, 2)
+    unnamed = PluginFrame(loop.frames, _scenario(), loop.start, detector, law, begun)
+    assert unnamed._names == ("Answers", "Answers")
+
+
+class Tolerant(Answers):
+    fault_tolerant = True
+
+
+@pytest.mark.parametrize(
+    ("detector", "law", "named", "expected"),
+    [
+        (None, Answers(np.zeros(4)), "fault-tolerant", (1, NOMINAL, 0)),
+        (None, Tolerant(np.zeros(4)), "oracle", (1, ADAPTIVE, 0)),
+        (Answers(Verdict()), None, "fault-tolerant", (0, None, 0)),
+        (Answers(Verdict()), None, "oracle", (0, ORACLE, 1)),
+    ],
+)
+def test_what_a_record_is_made_ready_for(detector, law, named, expected):
+    frames = Loop(_scenario(control={"law": named}), detector, law).frames
+    power, of_law = frames["control"]["power"]["enabled"][0], frames["control"]["law"][0]
+    assert (
+        frames["fdi"]["config"]["enabled"][0],
+        of_law if expected[1] is not None else None,
+        power,
+    ) == expected

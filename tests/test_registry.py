@@ -1,0 +1,217 @@
+"""The registry of detectors and laws, and the package's public names, one function at a time."""
+
+import sys
+
+import pytest
+
+import beaver_ftc as bf
+from beaver_ftc import plugins
+from beaver_ftc.documents.errors import BadInput, SimulationFailed
+from beaver_ftc.plugins import DETECTORS, LAWS, VARIABLE, Registered, refusal, register, registered
+
+MODULE = '''
+class MyOwnDetector:
+    """Sees all.
+
+    More of it."""
+    def reset(self, context): pass
+    def step(self, measured, command): pass
+
+class Undescribed(MyOwnDetector):
+    __doc__ = None
+
+class MyLaw:
+    """Commands nothing."""
+    def reset(self, context): pass
+    def step(self, measured, reference, verdict): pass
+
+class Odd(MyLaw):
+    def step(self, a, b, c, d): pass
+
+class NoReset:
+    reset = None
+    def step(self, measured, command): pass
+
+class Nothing: pass
+
+class Refuses(MyLaw):
+    def __init__(self): raise ArithmeticError("no\\n numbers")
+
+class Explains(MyLaw):
+    def __init__(self):
+        from beaver_ftc.documents.errors import SimulationFailed
+        raise SimulationFailed("said already")
+
+def function(): pass
+function.reset = function.step = lambda self, measured, command: None
+'''
+
+
+@pytest.fixture(autouse=True)
+def own(tmp_path, monkeypatch):
+    """A module in the working folder; nothing is registered, and what a test registers goes with it."""
+    (tmp_path / "own_plugins.py").write_text(MODULE)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv(VARIABLE, "")
+    monkeypatch.setattr(sys, "path", list(sys.path))
+    plugins._read_all.cache_clear()
+    yield
+    sys.modules.pop("own_plugins", None)
+
+
+def test_a_class_is_registered_for_this_run(tmp_path):
+    entry = register("own_plugins:MyOwnDetector")
+    assert entry == Registered(DETECTORS, "my-own-detector", "own_plugins:MyOwnDetector", "--plugin")
+    assert sys.path.count(str(tmp_path)) == 1
+    assert sys.path[-1] == str(tmp_path)
+    law = register("mine=own_plugins:MyLaw")
+    assert (law.group, law.name) == (LAWS, "mine")
+    assert register("mine=own_plugins:MyLaw") == law
+    text = "my-own-detector=own_plugins:MyOwnDetector mine=own_plugins:MyLaw"
+    assert plugins.os.environ[VARIABLE] == text
+    assert list(registered(DETECTORS))[-1] == "my-own-detector"
+    assert list(registered(LAWS))[-1] == "mine"
+    assert "mine" not in registered(DETECTORS)
+    assert (entry.description(), law.description()) == ("Sees all.", "Commands nothing.")
+    assert register("own_plugins:Undescribed").description() == "Sees all."  # what it inherits
+    for name in ("my-own-detector", "MyOwnDetector"):
+        assert refusal(DETECTORS, name) is None
+        assert type(plugins.made(DETECTORS, name)).__name__ == "MyOwnDetector"
+    assert "unknown law 'MyOwnDetector'" in refusal(LAWS, "MyOwnDetector")
+    with pytest.raises(BadInput, match=r"--plugin mine=own_plugins:Refuses: there is a mine already"):
+        register("mine=own_plugins:Refuses")
+
+
+@pytest.mark.parametrize(
+    ("given", "says"),
+    [
+        ("own_plugins", "--plugin: 'own_plugins' is no class, allowed: MODULE:CLASS or NAME=MODULE:CLASS"),
+        ("own_plugins:Odd", "--plugin own_plugins:Odd: step(self, a, b, c, d) is neither, allowed: "),
+        ("own_plugins:NoReset", "own_plugins:NoReset lacks reset, allowed: a class with reset and step"),
+        ("own_plugins:Nothing", "own_plugins:Nothing lacks reset and step, allowed: a class with"),
+        ("own_plugins:function", "own_plugins:function is not a class, allowed: a class with reset and"),
+        ("own_plugins:Absent", "cannot load own_plugins:Absent: AttributeError: module 'own_plugins' has"),
+    ],
+)
+def test_what_is_no_plug_in(given, says):
+    with pytest.raises(BadInput) as refused:
+        register(given)
+    assert says in str(refused.value)
+    assert plugins.os.environ[VARIABLE] == ""
+
+
+def test_what_cannot_be_made():
+    register("own_plugins:Refuses")
+    register("own_plugins:Explains")
+    with pytest.raises(BadInput, match=r"^plug-in refuses: cannot be made: ArithmeticError: no numbers$"):
+        plugins.made(LAWS, "refuses")
+    with pytest.raises(SimulationFailed, match=r"^said already$"):
+        plugins.made(LAWS, "explains")
+    for name in ("adaptive", "adaptve"):
+        with pytest.raises(BadInput, match=f"^plug-in {name}: not registered"):
+            plugins.made(LAWS, name)
+
+
+def test_a_broken_one_says_so_where_it_is_listed():
+    entry = Registered(LAWS, "gone", "nowhere:Gone", "a-package")
+    assert entry.description() == "broken: plug-in gone: not registered" + plugins.suggestion(
+        "gone", registered(LAWS)
+    )
+
+
+@pytest.mark.parametrize(
+    ("group", "name", "says"),
+    [
+        (DETECTORS, "none", None), (DETECTORS, "augmented-ekf", None), (LAWS, "lqr", None),
+        (DETECTORS, "lqr", "unknown scheme 'lqr'"), (LAWS, "none", "unknown law 'none'"),
+        (LAWS, "lqg", "unknown law 'lqg', did you mean lqr?"),
+        (LAWS, "a:B", "'a:B' is a class; a scenario names what is registered, allowed: nominal, adaptive, "),
+        (LAWS, "x" * 101, f"unknown law '{'x' * 100}', allowed"),
+        (LAWS, "x:" + "y" * 101, f"'x:{'y' * 98}' is a class;"),
+    ],
+)  # fmt: skip
+def test_what_is_said_of_a_name(group, name, says):
+    found = refusal(group, name)
+    assert found is None if says is None else found.startswith(says)
+
+
+def test_a_long_text_is_cut():
+    with pytest.raises(BadInput, match=rf"^--plugin: '{'-' * 200}' is no class"):
+        register("-" * 300)
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("MyDetector", "my-detector"), ("AugmentedEKFMonitor", "augmented-ekf-monitor"), ("L1", "l1"),
+        ("A2B", "a2-b"),
+    ],
+)  # fmt: skip
+def test_a_class_in_words(name, words):
+    assert plugins._hyphenated(name) == words
+
+
+def test_what_is_compiled_in():
+    names = {
+        group: {name for name in registered(group) if plugins.is_compiled(group, name)}
+        for group in (DETECTORS, LAWS)
+    }
+    assert names == {
+        DETECTORS: {"adaptive-estimators", "none"},
+        LAWS: {
+            "nominal", "adaptive", "fault-tolerant", "fault-tolerant-published", "oracle", "oracle-published",
+        },
+    }  # fmt: skip
+    assert not plugins.is_compiled(DETECTORS, "oracle")
+
+
+class Point:
+    """An entry point of an installed package."""
+
+    def __init__(self, name, value, dist):
+        self.name, self.value, self.dist = name, value, dist
+
+
+class Dist:
+    name = "a-package"
+
+
+def test_what_packages_register_comes_after_ours_and_never_in_their_place(monkeypatch, tmp_path):
+    monkeypatch.syspath_prepend(tmp_path)
+    points = [
+        Point("zeta", "own_plugins:MyLaw", Dist),
+        Point("alpha", "own_plugins:Odd", None),
+        Point("lqr", "x:Y", Dist),
+    ]
+    monkeypatch.setattr("importlib.metadata.entry_points", lambda group: points if group == LAWS else [])
+    known = registered(LAWS)
+    assert list(known)[-2:] == ["alpha", "zeta"]
+    assert (known["zeta"].package, known["alpha"].package, known["lqr"].package) == (
+        "a-package",
+        "",
+        "beaver-ftc",
+    )
+    assert known["zeta"].description() == "Commands nothing."
+    assert not plugins.is_compiled(LAWS, "zeta")
+
+
+def test_public_names_are_found_where_they_are_said_to_be():
+    for name in bf.__all__:
+        assert getattr(bf, name) is not None
+    assert bf.scenarios.__name__ == "builtin_names"
+    assert bf.Simulation.__name__ == "Simulation"
+    assert bf.aircraft("beaver").name == "beaver"
+    with pytest.raises(AttributeError, match="module 'beaver_ftc' has no attribute 'flight'"):
+        bf.flight  # noqa: B018
+    assert set(dir(bf)) >= set(bf.__all__)
+
+
+def test_what_the_first_use_of_an_aircraft_does(monkeypatch):
+    from beaver_ftc.studies.derive import first_use
+
+    seen = []
+    monkeypatch.setattr(first_use, "derive_if_needed", seen.append)
+    monkeypatch.setattr(first_use, "compare_once", seen.append)
+    plugins.first_use.derive("jsbsim:x")
+    plugins.first_use.compare("own")
+    assert seen == ["jsbsim:x", "own"]

@@ -1,5 +1,6 @@
 """What is read off a flight's record: of each part set by hand what the landing says, in kept documents."""
 
+from dataclasses import MISSING, fields
 from math import inf, radians
 
 import numpy as np
@@ -8,7 +9,8 @@ import pytest
 from beaver_ftc.diagnosis.base import Verdict
 from beaver_ftc.diagnosis.state import STATISTICS, UNANTICIPATED
 from beaver_ftc.loop.assembly import assemble
-from beaver_ftc.loop.outcome import guaranteed_delay_s, landing_of, verdict_of
+from beaver_ftc.loop.outcome import Landing, guaranteed_delay_s, landing_of, verdict_of
+from beaver_ftc.plant.faults import TIME_TOLERANCE_S
 from beaver_ftc.scenario.schema import Scenario
 
 SURFACES = ("aileron", "elevator", "rudder", "flap")
@@ -24,7 +26,7 @@ CASES = {
         "k": 301, "t": 3.0, "accounts.tracking.before": [4e-4, 1e-4, 9e-4],
         "accounts.tracking.frames_before": 100, "accounts.tracking.since": [1.0, 4.0, 16.0],
         "accounts.tracking.frames_since": 4,
-        "accounts.authority.demanded": [2.0, 0.0, 8.0], "accounts.authority.lacking": [0.5, 0.0, 6.0],
+        "accounts.authority.demanded": [0.8, 0.0, 8.0], "accounts.authority.lacking": [0.2, 0.0, 6.0],
         "accounts.authority.beyond_frames": [5, 0, 7], "accounts.saturated_frames": [1, 2, 3, 4],
         "accounts.travelled": [0.1, 0.2, 0.3, 0.4], "accounts.hurried": [1.0, 2.0, 3.0, 4.0],
         "truth.value.5": 50.0, "truth.value.12": 1500.0,
@@ -40,6 +42,8 @@ CASES = {
     "named": ({}, NAMED | {"fdi.isolation.estimator.0.excluded": 1, "fdi.isolation.estimator.2.excluded": 1,
                            "fdi.isolation.estimator.1.theta": [-0.1, -0.4, -0.7], "fdi.bank.n": 0,
                            "fdi.bank.closest": [0.3, 0.7]}),
+    "nothing": ({}, {}),
+    "alarm-at-once": ({}, ALARM | {"fdi.verdict.detected_at_s": 0.0}),
     "unanticipated": ({}, ALARM | {"fdi.verdict.isolated": UNANTICIPATED, "fdi.verdict.isolated_at_s": 3.0}),
     "statistical": ({"fdi": {"statistical": {}}}, ALARM | {
         "fdi.statistical.alarm.detected_at_s": 2.0, "fdi.statistical.alarm.closest": 0.95,
@@ -72,7 +76,7 @@ CASES = {
     }),
     "limits-of-roll": ({}, PILOT | {
         "autopilot.holding.from_s": [-1.0, -1.0, 2.0], "autopilot.holding.value": [55.0, 38.5, radians(25.0)],
-        "control.surfaces.effectiveness": [0.2, 0.1, 0.35, 0.0],
+        "control.surfaces.effectiveness": [0.8, 0.1, 0.9, 0.0],
     }),
     "no-limits": ({}, {"autopilot.holding.from_s": [5.0, 3.0, 0.0]}),
     "instrument": ({"fdi": {"sensor_monitor": "always"}}, ALARM | {
@@ -108,7 +112,7 @@ def _said(landing):
 
 @pytest.mark.parametrize("case", CASES)
 def test_what_a_record_says(case, kept):
-    """All of it for the flight that was tracked; of the others what differs from a flight of nothing."""
+    """All of it for two flights; of the others what differs from a flight of nothing."""
     scenario, frame = _record(*CASES[case])
     said, nothing = _said(landing_of(scenario, frame, ())), _said(landing_of(*_record({}, {}), ()))
     verdict = verdict_of(frame, SURFACES)
@@ -117,7 +121,18 @@ def test_what_a_record_says(case, kept):
     assert (verdict.type, verdict.estimate, verdict.candidates) == (
         said["isolation_type"], said["estimate"], said["candidates"],
     )  # fmt: skip
-    kept({name: value for name, value in said.items() if case == "tracked" or value != nothing[name]})
+    kept(
+        {
+            name: value
+            for name, value in said.items()
+            if case in ("tracked", "nothing") or value != nothing[name]
+        }
+    )
+
+
+def test_what_is_not_said_of_a_flight_is_nothing(kept):
+    said = {one.name: one.default for one in fields(Landing) if one.default is not MISSING}
+    kept(said)
 
 
 PLUGGED = Verdict(True, "p", "rudder", "stuck", 0.125, ("rudder", "flap"))
@@ -155,6 +170,7 @@ NOISY = {"q": {"noise_std_deg_s": 1.0}}
         ({}, {"truth.faulted": 0}, False, False),
         ({}, ALARM, False, True),  # after the fault
         ({}, ALARM | {"fdi.verdict.detected_at_s": 2.0}, False, True),
+        ({}, ALARM | {"fdi.verdict.detected_at_s": 2.0 - TIME_TOLERANCE_S}, False, True),
         ({}, ALARM | {"fdi.verdict.detected_at_s": 1.99}, False, False),
         ({}, {"fdi.verdict.detected_at_s": 1.99}, False, True),
         ({}, {"fdi.config.authority": STATISTICS}, False, False),

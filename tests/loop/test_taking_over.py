@@ -1,0 +1,177 @@
+"""What a law finds of the one before it, when a diagnosis begins anew, and which changes are due: by hand."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import beaver_ftc as bf
+from beaver_ftc.control.laws import REJECTING
+from beaver_ftc.loop.assembly import assemble
+from beaver_ftc.loop.changing import Changing, _check_delays, renews_diagnosis, take_diagnosis, take_law
+from beaver_ftc.scenario.schema import Scenario
+from flying import loss, scenario
+
+TRAVEL = np.array([[-0.5, -0.4, -0.3, -0.1], [0.5, 0.45, 0.35, 1.0]])
+LEARNT, FHAT, INTEGRAL = (np.array(x) for x in ([0.3, -0.1, 0.2], [0.5, 0.25, -0.5], [1.0, -2.0, 4.0]))
+DISTURBANCE = np.array([0.7, -0.6, 0.05])
+
+
+def _frame(law, **control):
+    given = Scenario.model_validate({"name": "x", "control": {"law": law, **control}})
+    return assemble(given, np.zeros(4), TRAVEL)[0]
+
+
+def _taken(before, after, detected=1, **control):
+    """The control record after a law has been changed in a flight that has learnt something."""
+    frame, new = _frame(before, integral_per_s2=0.5), _frame(after, **control)["control"]
+    feedback, rejection = frame["control"]["feedback"], frame["control"]["rejection"]
+    feedback["fhat"], feedback["integral"], rejection["disturbance"] = FHAT, INTEGRAL, DISTURBANCE
+    rejection["begun"], rejection["rate"] = 1, [1.0, 2.0, 3.0]
+    frame["fdi"]["verdict"]["detected"], frame["fdi"]["fdae"]["network"]["output"] = detected, LEARNT
+    new["feedback"]["integral"] = 99.0
+    take_law(frame, new)
+    return frame["control"]
+
+
+UNEXPLAINED = FHAT - 0.5 * INTEGRAL
+
+
+@pytest.mark.parametrize(
+    ("before", "found"),
+    [("nominal", UNEXPLAINED), ("adaptive", UNEXPLAINED), ("fault-tolerant", DISTURBANCE)],
+)
+def test_an_observer_begins_with_what_the_law_before_it_has_found(before, found):
+    control = _taken(before, "fault-tolerant")
+    assert control["inner"] == REJECTING
+    assert control["rejection"]["disturbance"] == pytest.approx(found)
+    assert (control["rejection"]["begun"], control["rejection"]["rate"].tolist()) == (1, [1.0, 2.0, 3.0])
+    assert control["feedback"]["integral"].tolist() == [99.0] * 3
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "detected", "integral"),
+    [
+        # -Ki integral + what the law itself compensates is what was found
+        ("fault-tolerant", "nominal", 1, -DISTURBANCE / 0.8),
+        ("fault-tolerant", "oracle-published", 1, -DISTURBANCE / 0.8),
+        ("fault-tolerant", "adaptive", 0, -DISTURBANCE / 0.8),
+        ("fault-tolerant", "adaptive", 1, (LEARNT - DISTURBANCE) / 0.8),
+        ("adaptive", "fault-tolerant-published", 1, (LEARNT - UNEXPLAINED) / 0.8),
+    ],
+)
+def test_an_integrator_begins_where_the_demand_is(before, after, detected, integral):
+    control = _taken(before, after, detected, integral_per_s2=0.8)
+    assert control["feedback"]["integral"] == pytest.approx(integral)
+
+
+def test_a_law_without_an_integrator_has_nothing_to_begin_with():
+    assert _taken("adaptive", "nominal", integral_per_s2=0.0)["feedback"]["integral"].tolist() == [99.0] * 3
+
+
+def _change(law=None, scheme=None, sensors=None, declared_sensors=None):
+    return SimpleNamespace(law=law, scheme=scheme, sensors=sensors, declared_sensors=declared_sensors)
+
+
+@pytest.mark.parametrize(
+    ("change", "ideal", "ours", "renewed"),
+    [
+        (_change(law="lqr"), False, True, False), (_change(scheme="none"), True, False, True),
+        (_change(declared_sensors="ideal"), True, False, True), (_change(sensors="ideal"), True, True, False),
+        (_change(sensors="ideal"), False, True, True), (_change(sensors="ideal"), False, False, False),
+    ],
+)  # fmt: skip
+def test_when_a_diagnosis_begins_anew(change, ideal, ours, renewed):
+    bounds = SimpleNamespace(sensors=SimpleNamespace(is_ideal=ideal))
+    then = SimpleNamespace(fdi=SimpleNamespace(bounds=bounds, is_ours=ours))
+    assert renews_diagnosis(change, then) is renewed
+
+
+@pytest.mark.parametrize("lines", [512, 513])
+def test_delays_that_just_fit_are_taken(lines):
+    room = {"instruments": {"line": np.zeros(512)}}
+    needed = {"instruments": {"length": np.array([500, lines - 500])}}
+    if lines == 512:
+        assert _check_delays(needed, room) is None
+        return
+    with pytest.raises(bf.BadInput, match="delays of 513 samples in all, allowed: 512 in this flight"):
+        _check_delays(needed, room)
+
+
+def test_a_diagnosis_begun_anew_keeps_what_healthy_flight_has_shown():
+    frame, new = _frame("nominal"), _frame("nominal")
+    frame["fdi"]["bank"]["closest"], frame["fdi"]["statistical"]["alarm"]["closest"] = 0.5, 0.75
+    for same in (True, False):
+        new["fdi"]["bank"]["closest"], new["fdi"]["watch"]["past"] = 0.0, 3
+        new["fdi"]["bank"]["n"] = frame["fdi"]["bank"]["n"] + (not same)
+        then = frame.copy()
+        take_diagnosis(then, new, 77)
+        assert then["since"] == 77
+        assert then["fdi"]["watch"]["past"] == 0
+        assert then["fdi"]["statistical"]["alarm"]["closest"] == 0.75
+        assert set(then["fdi"]["bank"]["closest"]) == {0.5 if same else 0.0}
+
+
+def test_changes_are_due_at_their_frames():
+    """Declared at 0.07 s, a rounding above frame 7, between two frames, and at the frame to fly."""
+    due = [0.02, 0.07, 0.101, 0.3]
+    flown = scenario(duration_s=1.0, changes=[{"at_s": at_s, "law": "nominal"} for at_s in due])
+    sim = bf.Simulation(flown)
+    changing = sim._loop.changing
+    assert [stage.frame for stage in changing._coming] == [2, 7, 11, 30]
+    assert [changing.next_change(k) for k in (0, 1, 2, 7, 29)] == [2, 2, 7, 11, 30]
+    assert changing.next_change(30) > 10**6
+    changing.plan(flown, 7)
+    assert [stage.frame for stage in changing._coming] == [7, 11, 30]
+    sim.step(frames=20)
+    assert [noted["time_s"] for noted in changing.replaced] == pytest.approx([0.07, 0.11])
+    assert [stage.frame for stage in changing._coming] == [30]
+
+
+def test_what_is_noted_of_a_change():
+    changes = [
+        {"at_s": 0.1, "law": "nominal"}, {"at_s": 0.5, "scheme": "none"},
+        {"at_s": 0.6, "sensors": {"q": {"bias_deg_s": 0.1}}, "law": "adaptive"},
+    ]  # fmt: skip
+    flight = bf.fly(scenario(duration_s=0.8, faults=[loss(at_s=0.2, magnitude=0.8)], changes=changes))
+    first, second, third = flight.metrics["changes"]
+    assert first == {"time_s": 0.1, "law": "nominal", "scheme": None, "sensors": False}
+    assert second["detection_time_s"] < 0.5
+    assert second["isolated"] == "elevator"
+    assert third == {"time_s": 0.6, "law": "adaptive", "scheme": None, "sensors": True}
+
+
+def test_a_plug_in_detectors_word_stands_while_another_law_takes_over():
+    class Once:
+        """Says its word in the tenth frame alone."""
+
+        def reset(self, context):
+            pass
+
+        def step(self, measured, command):
+            return bf.Verdict(True, "q", "elevator") if measured.t_s == pytest.approx(0.1) else said[-1]
+
+    said = [bf.Verdict()]
+    sim = bf.Simulation(scenario(duration_s=0.5), detector=Once())
+    sim.step(frames=10)
+    said.append(sim.verdict)
+    assert sim.verdict.isolated == "elevator"
+    sim.change({"law": "nominal"})
+    sim._loop.changing.apply(sim.frames)
+    assert sim.verdict.isolated == "elevator"
+    assert isinstance(sim._loop.changing, Changing)
+
+
+def test_an_instrument_broken_in_flight_is_watched_by_a_diagnosis_begun_anew(monkeypatch):
+    sim, watched = bf.Simulation(scenario(duration_s=1.0)), []
+    monkeypatch.setattr(sim._loop, "enable_watch", watched.append)
+    sim.change({"scheme": "adaptive-estimators"})
+    sim.step(frames=10)
+    assert watched == []
+    sim.inject({"type": "bias", "sensor": "q", "magnitude": 5.0})
+    sim.change({"law": "nominal"})
+    sim.step(frames=10)
+    assert len(watched) == 1  # since it is broken
+    sim.change({"scheme": "adaptive-estimators"})
+    sim.step(frames=10)
+    assert len(watched) == 2

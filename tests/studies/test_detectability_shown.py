@@ -49,7 +49,9 @@ def rows_made():
 def test_the_survey_as_it_is_shown(kept):
     rows = rows_made()
     kept(text(rows).splitlines(), "text")
-    kept(picture(draw("made", rows)), "figure")
+    figure = draw("made", rows)
+    kept(picture(figure), "figure")
+    assert figure.get_size_inches().tolist() == [8.0, 9.0]
     document = document_of("made", [rows[:8], rows[8:]])
     files = files_of(document)
     kept(files["detectability.csv"].splitlines(), "csv")

@@ -71,7 +71,9 @@ def test_all_that_is_found(compared, kept):
 
 def test_all_that_is_shown(compared, kept, tmp_path):
     kept(as_text(compared).splitlines(), "text")
-    kept(picture(figure_of(compared)), "figure")
+    figure = figure_of(compared)
+    kept(picture(figure), "figure")
+    assert figure.get_size_inches().tolist() == [13.0, 6.8]
     (tmp_path / "comparison.png").write_bytes(b"a picture")
     kept(page(page_of(compared, "Comparison: made", tmp_path)), "page")
     write_leaderboard(compared, tmp_path / "board.md")
@@ -174,6 +176,8 @@ def test_tracking_errors_of_runs_in_one_figure(kept, monkeypatch, tmp_path):
     other = run_of(tmp_path / "b", fault={"at_s": 5.5})
     figure = runs.figure_of([run_of(tmp_path / "a"), other, run_of(tmp_path / "c", fault=None)])
     kept(picture(figure))
+    assert figure.get_size_inches().tolist() == [11.0, 9.0]
+    assert {axes.texts[0].xy for axes in figure.axes[:1]} == {(5.5, 1.0)}
     assert [len(line.get_xdata()) for line in figure.axes[0].lines[:1]] == [20_500]
     assert [folder for folder, _ in asked] == ["a", "b", "c"]
     assert asked[0][1] == list(log)

@@ -79,7 +79,9 @@ def test_the_matrix_as_it_is_shown(made, kept):
     lost = [row for row in rows if row["departure_s"] and not row["oracle_departure_s"]]
     assert document["lost_though_the_oracle_was_not"] == lost != []
     kept(as_text(document).splitlines(), "text")
-    kept(picture(heat_map_of(document)), "figure")
+    figure = heat_map_of(document)
+    kept(picture(figure), "figure")
+    assert figure.get_size_inches().tolist() == [11.0, 0.5 * len(FAULTS) + 1.8]
     files = files_of(document)
     assert list(files) == ["fault-matrix.json", "fault-matrix.txt", "fault-matrix.png"]
     assert files["fault-matrix.txt"] == as_text(document) + "\n"

@@ -147,7 +147,9 @@ def test_the_document_and_its_pages(document, kept, tmp_path):
 
 
 def test_how_far_each_statement_is_from_its_limit(document, kept):
-    kept(picture(margins_figure(document)))
+    figure = margins_figure(document)
+    kept(picture(figure))
+    assert figure.get_size_inches().tolist() == [12.0, pytest.approx(0.6 + 0.28 * len(CLAIMS))]
 
 
 def test_each_figure_has_its_panels(kept):

@@ -7,11 +7,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from beaver_ftc.scenario.sweeps import load_sweep_text
+from beaver_ftc.scenario.sweeps import SweepExpect, load_sweep_text
 from beaver_ftc.studies.sweep import outcomes, pictures
 from beaver_ftc.studies.sweep.outcomes import rank, replay_command, worst_flights
 from beaver_ftc.studies.sweep.pictures import FIGURES, magnitude_key, write_figures
-from beaver_ftc.studies.sweep.summary import summarise
+from beaver_ftc.studies.sweep.summary import OUTCOMES, evaluate, summarise
 from beaver_ftc.studies.sweep.summary_page import render, summary_text
 from kept import page, picture
 
@@ -46,7 +46,58 @@ def test_every_figure(shown, kept):
     flights, summary, _ = shown
     summary = summary | {"search": SEARCH} if summary["sweep"] == "various" else summary
     drawn = {name: draw(flights, summary) for name, (_, draw) in FIGURES.items()}
-    kept({name: picture(figure) for name, figure in drawn.items() if figure is not None})
+    kept({name: whole(figure) for name, figure in drawn.items() if figure is not None})
+
+
+def whole(figure):
+    """A picture, how large it is, and the places that annotations are of."""
+    places = [list(getattr(text, "xy", ())) for axes in figure.axes for text in axes.texts]
+    return picture(figure) | {"size": figure.get_size_inches(), "places": places}
+
+
+SMALL = ("initial.altitude_m", "initial.flap_deg", *(
+    f"{of}.{axis}{what}" for axis in "pqr" for of, what in (
+        ("uncertainty.sinusoid", ".amplitude_rad_s2"), ("uncertainty.inertia_coupling", ""),
+        ("fdi.bounds.inertia_coupling", ""),
+    )
+))  # fmt: skip
+MANY = "\n".join([
+    f"{SWEEP}  sensors: {{choice: [ideal, tactical-grade, consumer-grade]}}",
+    "  faults[0].at_s: {uniform: [3, 4]}", *(f"  {key}: {{uniform: [0.01, 0.02]}}" for key in SMALL),
+])  # fmt: skip
+
+
+def test_of_many_keys_those_that_explain_most_are_shown(tmp_path):
+    sweep = load_sweep_text(MANY)
+    keys = list(sweep.file.vary)
+    sensors = ("ideal", "tactical-grade", "consumer-grade")
+    rows = [
+        row(
+            run,
+            **{key: float((run * (k + 3)) % 20) for k, key in enumerate(keys)}
+            | {"sensors": sensors[run % 3]},
+        )
+        for run in range(20)
+    ]
+    flights = flights_of(rows, tmp_path, MANY)
+    ranked = [{"key": key, "explained": 0.5} for key in keys]
+    summary = {"sensitivity": dict.fromkeys(OUTCOMES, ranked)}
+    bars, lines = pictures.sensitivity_bars(flights, summary), pictures.parallel_coordinates(flights, summary)
+    assert len(bars.axes[0].get_yticks()) == 12
+    assert len(lines.axes[0].get_xticks()) == 9
+    assert lines.get_size_inches().tolist() == [pytest.approx(16.6), 5.0]
+    names = {text.get_text(): text.xy for text in lines.axes[0].texts if text.get_text() in sensors}
+    assert names == {"consumer-grade": (1, 0.0), "ideal": (1, 0.5), "tactical-grade": (1, 1.0)}
+    few = summary | {"sensitivity": {"detection_delay": ranked[:2]}}
+    assert pictures.parallel_coordinates(flights, few).get_size_inches()[0] == 7.0
+
+
+def test_nothing_is_kept_of_what_no_flight_tells(tmp_path):
+    healthy = {"fault.actuator": None, "fault.type": None, "fault.at_s": None}
+    flights = flights_of([row(0, **healthy)], tmp_path)
+    for bound in ({"at_most": 1.0, "confidence": 0.9}, {"at_least": 0.0, "confidence": 0.9}):
+        (found,) = evaluate(SweepExpect(detection_rate=bound), flights)
+        assert (found["passed"], found["of"]) == (False, 0)
 
 
 def test_the_worst_flights_the_page_and_the_text(shown, kept, tmp_path):

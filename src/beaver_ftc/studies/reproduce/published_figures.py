@@ -124,7 +124,7 @@ def margins_figure(document: Document) -> "Figure":
     axes.set_ylim(len(claims) - 0.5, -0.5)
     axes.set_yticks(range(len(claims)), [f"{c['where']}  {c['statement']}" for c in claims], fontsize=8)
     axes.tick_params(axis="x", labelsize=8)
-    axes.grid(visible=True, axis="x", color="#dddddd", linewidth=0.6)
+    axes.grid(axis="x", color="#dddddd", linewidth=0.6)
     axes.set_xlabel("share of what is allowed: dot as flown, bar over all changes", fontsize=9)
     axes.set_title("Left of 1 the statement holds", fontsize=9)
     return figure

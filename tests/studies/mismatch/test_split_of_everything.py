@@ -1,5 +1,6 @@
 """A short flight with all that is declared at once: what each source adds, and the documents made of it."""
 
+import json
 from types import SimpleNamespace
 
 import numpy as np
@@ -218,3 +219,61 @@ def test_a_map_has_a_flight_for_each_place(monkeypatch, tmp_path, kept):
         "mismatch.json",
         "mismatch.csv",
     }
+
+
+@pytest.mark.parametrize(("frames", "rms"), [(0, 0.0), (1, 2.0), (4, 1.0)])
+def test_the_rms_is_over_all_frames_and_of_none_nothing(frames, rms):
+    tally = Tally(np.zeros(3), 0.1, frames=frames, figures={TOTAL: split.Figures()})
+    tally.figures[TOTAL].square_sum = np.full(3, 4.0 if frames else 0.0)
+    assert tally.rms(TOTAL).tolist() == [rms] * 3
+    assert study._figures(tally.figures[TOTAL], tally, 0)["rms"] == rms
+    assert study._figures(tally.figures[TOTAL], tally, 0)["share"] == (1.0 if frames else 0.0)
+
+
+@pytest.mark.parametrize("report", [True, False])
+def test_a_run_is_a_result_folder_with_the_mismatch_in_it(report, monkeypatch, tmp_path, document):
+    """Pictures, and a report with a section of them, unless nobody wants them."""
+    recommended = {key: document[key] for key in ("recommended", "guarantee")}
+    registered = []
+    monkeypatch.setattr(study, "recommended_for", lambda scenarios, kept: recommended)
+    monkeypatch.setattr(study.charts, "figures", lambda folder, *of: {"mismatch-bound.png": b"drawn"})
+    monkeypatch.setattr(study, "write_report_files", lambda folder, flown: registered.append(folder))
+    monkeypatch.setattr(tables, "register_section", registered.append)
+    case = scenario(duration_s=0.3)
+    found, kept = study.run_mismatch(case, tmp_path, **({} if report else {"report": False}))
+    folder = tmp_path / "test"
+    assert kept.frames == found["frames"] == 30
+    assert found["recommended"] == recommended["recommended"]
+    assert (folder / "figures" / "mismatch-bound.png").exists() == report
+    names = {
+        "scenario.yaml",
+        "metrics.json",
+        "log.parquet",
+        *(f"mismatch.{of}" for of in ("json", "csv", "parquet")),
+    }
+    assert {path.name for path in folder.iterdir()} == names | ({"figures"} if report else set())
+    assert [one == tables.mismatch_section for one in registered] == ([True, False] if report else [])
+
+
+@pytest.mark.parametrize("report", [True, False])
+def test_runs_side_by_side_are_a_folder_of_their_own(report, tmp_path, document):
+    folder = study.write_comparison(tmp_path, [study.entry(document)], {"recommended": {}}, report)
+    assert folder == tmp_path / "mismatch-comparison"
+    assert read_json(folder / "mismatch.json") == {"runs": [study.entry(document)], "recommended": {}}
+    assert (folder / "figures" / "mismatch-comparison.png").exists() == report
+
+
+def read_json(path):
+    return json.loads(path.read_text())
+
+
+def test_a_variant_is_named_after_both_and_the_declared_one_as_it_was():
+    case = scenario()
+    assert study.variant_of(case, "declared").name == "test"
+    assert study.variant_of(case, "mass=1.1+linearised").name == "test-mass-1-1-linearised"
+    long = case.model_copy(update={"name": "x" * 95})
+    assert study.variant_of(long, "linearised").name == "x" * 95 + "-line"
+    assert study.variant_of(case, "engine_terms=false").design_model.engine_terms is False
+    for wrong in ("mass", "mass=[1]", "mass={"):
+        with pytest.raises(BadInput, match=r"^--variant mass"):
+            study.variant_of(case, wrong)

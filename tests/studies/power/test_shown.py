@@ -2,6 +2,7 @@
 
 import io
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -137,3 +138,24 @@ def test_what_comes_of_a_block_in_short_flights(kept, monkeypatch):
         }
         document = {"faults": found.faults, "deflections": found.deflections, "traces": traces}
         kept(document, part="faulted" if faulted else "healthy")
+
+
+def test_a_survey_flies_the_healthy_blocks_first(monkeypatch, tmp_path):
+    """Its document is made of these as healthy ones and of the rest as faulted ones."""
+    asked = []
+
+    def run_study(study, out, workers, progress):
+        asked.append((study, out, workers, progress))
+        return "document", "rows"
+
+    monkeypatch.setattr(shown, "run_study", run_study)
+    monkeypatch.setattr(shown, "document_of", lambda grid, healthy, faulted: (healthy, faulted))
+    assert shown.run_power(tmp_path, GRID, [BOTH], 3) == "document"
+    ((study, out, workers, progress),) = asked
+    assert (study.name, out, workers, progress) == ("power", tmp_path, 3, None)
+    assert [faulted for _, faulted in study.cases] == [False] * 16 + [True] * 12
+    assert study.document(list(range(28))) == (list(range(16)), list(range(16, 28)))
+    shown.run_power(tmp_path, GRID, [BOTH])
+    assert asked[1][2] == 1
+    lost = survey.lost(SimpleNamespace(what=study.cases[-1]), "gone")
+    assert lost.failures == ["tactical-grade light, seed 1002: gone"]

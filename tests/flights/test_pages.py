@@ -5,9 +5,9 @@ import pytest
 from pyarrow import parquet
 
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.flights import pages
+from beaver_ftc.flights import fitting, pages
 from beaver_ftc.flights.findings import verdict_of
-from beaver_ftc.flights.fitting import fit_order, stretches_of
+from beaver_ftc.flights.fitting import Stretch, fit_order, stretches_of
 from beaver_ftc.flights.identification import regressor_names
 from beaver_ftc.flights.samples import Samples
 from flights import small
@@ -187,7 +187,9 @@ def test_the_pictures_of_an_identification(kept):
     kept(picture(fits), part="fits")
     assert [axis.get_legend()._ncols for axis in fits.axes if axis.get_legend()] == [3, 3]
     assert fits.get_size_inches().tolist() == pytest.approx([11, 9.2])
-    kept(picture(pages._spectrum(stretches, model)), part="spectrum")
+    spectrum = pages._spectrum(stretches, model)
+    kept(picture(spectrum), part="spectrum")
+    assert spectrum.get_size_inches().tolist() == pytest.approx([7.5, 3.2])
     fit = fit_order(stretches, model.vehicle, model.history, model.lags)
     names = ["constant", *regressor_names(model)]
     correlation = pages._correlation(fit, names)
@@ -204,6 +206,22 @@ def test_parts_of_which_nothing_is_known_are_not_drawn():
     figure = pages._fits(stretches_of(flights), model)
     titles = [axis.get_title(loc="left") for axis in figure.axes]
     assert [title for title in titles if title] == [f"{name}, not fitted: one sample ahead" for name in "acd"]
+
+
+@pytest.mark.parametrize(("known", "shown"), [((), 0), ((1,), 1)])
+def test_a_picture_of_one_part_or_none(known, shown):
+    model = small.model()
+    flights = [small.flight(model, 200, name=str(seed), seed=seed) for seed in (1, 2)]
+    fitted, kept_part = stretches_of(flights)
+    part = Stretch(kept_part.samples, kept_part.use if known else np.zeros(200, dtype=bool))
+    nothing = Stretch(fitted.samples, np.zeros(200, dtype=bool))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(
+            fitting, "folds", lambda stretches: [([fitted], part, "one"), ([fitted], nothing, "two")]
+        )
+        figure = pages._fits([fitted, part], model)
+    assert figure.get_size_inches().tolist() == pytest.approx([11, 4.6])
+    assert len(figure.axes) == 3 * shown
 
 
 def test_the_liveliest_window():

@@ -129,6 +129,34 @@ def test_variance_inflation_of_columns_that_stand_still_or_depend():
     assert np.isinf(found[[1, 3]]).all()
 
 
+@pytest.mark.parametrize(("share", "excited"), [(1.5e-10, True), (0.7e-10, False)])
+def test_a_direction_excited_too_little_gets_no_coefficient(share, excited):
+    """Two columns that differ by a ten-thousandth: their difference has this share of what their sum has."""
+    a, b, *_ = np.linalg.qr(np.random.default_rng(4).standard_normal((200, 4)))[0].T
+    off = 2.0 * np.sqrt(share)
+    x = np.column_stack([a, a + off * b])
+    y = np.column_stack([x @ [1.0, -2.0]] * 3)
+    found = regression.least_squares(x, y, np.zeros(200, dtype=int), 0).coefficients[:, 0]
+    np.testing.assert_allclose(found, [1.0, -2.0] if excited else [-0.5, -0.5], atol=1e-3)
+
+
+@pytest.mark.parametrize(("share", "depends"), [(1.6e-12, False), (0.6e-12, True)])
+def test_columns_that_depend_on_one_another_are_inflated_without_end(share, depends):
+    """One twice, but for this share of the sum of both; a third column has nothing to do with it."""
+    rng = np.random.default_rng(4)
+    centred = rng.standard_normal((200, 3))
+    a, b, c = np.linalg.qr(centred - centred.mean(axis=0))[0].T
+    off = 2.0 * np.sqrt(share)
+    found = regression.variance_inflation(np.column_stack([a, c, a + off * b]) + 3.0)
+    assert found[1] == pytest.approx(1.0)
+    if depends:
+        assert np.isinf(found[[0, 2]]).all()
+    else:
+        assert found[[0, 2]] == pytest.approx([1.0 / (4.0 * share)] * 2, rel=1e-2)
+    assert np.isinf(regression.variance_inflation(np.column_stack([a, c, a]))).tolist() == [True, False, True]
+    assert np.isinf(regression.variance_inflation(np.ones((9, 2)))).all()
+
+
 def test_a_spectrum_holds_the_variance():
     rng = np.random.default_rng(3)
     white = rng.standard_normal((4096, 3)) * [1.0, 2.0, 3.0]

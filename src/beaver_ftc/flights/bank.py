@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from beaver_ftc.flights.model import Model
-from beaver_ftc.flights.recording import Floats
+from beaver_ftc.flights.recording import TINY, Floats
 
 HEALTHY, GROUP, PAIR, UNKNOWN, IDLE = range(5)
 _PAIR_SHARE = 0.02
@@ -107,7 +107,7 @@ def _offsets(model: Model, group: int) -> list[Floats]:
     anywhere within its travel, along the axes it moves most."""
     _, _, response, noise = model.arrays()
     total = np.abs(response[group]).sum(axis=0) / np.sqrt(np.diag(noise))
-    share = np.clip(total / max(total.max(), 1e-300), 0.3, 1.0)
+    share = np.clip(total / max(total.max(), TINY), 0.3, 1.0)
     kinds = {"loss": np.zeros(3), "stuck": np.diag(noise) * (model.settings.jam_sd * share) ** 2}
     return [kinds[kind] for kind in model.vehicle.faults]
 

@@ -15,7 +15,7 @@ from beaver_ftc.flights.bank import UNKNOWN as UNKNOWN_OFFSET
 from beaver_ftc.flights.bank import Bank, bank_of
 from beaver_ftc.flights.filtering import posterior_of
 from beaver_ftc.flights.model import Model
-from beaver_ftc.flights.recording import Floats
+from beaver_ftc.flights.recording import TINY, Floats
 from beaver_ftc.flights.regression import by_surface
 from beaver_ftc.flights.samples import Samples
 
@@ -64,7 +64,7 @@ def rows_of(samples: Samples, model: Model, bank: Bank, posterior: Floats) -> Ro
     """What the probabilities of the hypotheses (n, H) say of each sample."""
     idle = posterior[:, bank.idle]
     probability = posterior[:, bank.faults].sum(axis=1)
-    answering = posterior[:, : bank.idle] / np.maximum(1.0 - idle, 1e-300)[:, None]
+    answering = posterior[:, : bank.idle] / np.maximum(1.0 - idle, TINY)[:, None]
     well = posterior[:, 0] + idle > 0.5
     faulty = _latched(_standing(probability >= model.settings.alarm, model), well).astype(np.int64)
     by_group = [_of_group(bank, answering, g, model) for g in range(len(model.groups))]
@@ -136,7 +136,7 @@ def _bounds(levels: Floats, mass: Floats, share: float) -> tuple[Floats, Floats]
 
 def _names(model: Model, bank: Bank, posterior: Floats, faulty: NDArray[np.int64]) -> NDArray[np.object_]:
     """The surfaces of the groups that most of the fault's probability is on; `unknown` where it is split."""
-    total = np.maximum(posterior[:, bank.faults].sum(axis=1), 1e-300)
+    total = np.maximum(posterior[:, bank.faults].sum(axis=1), TINY)
     shares = [posterior[:, bank.faulty(g)].sum(axis=1) / total for g in range(len(model.groups))]
     likely = joined(np.column_stack(shares) > _NAMED, ["+".join(group) for group in model.groups])
     named = np.full(len(posterior), "", dtype=object)

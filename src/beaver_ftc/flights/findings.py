@@ -14,7 +14,7 @@ import numpy as np
 from beaver_ftc.flights.bank import Bank, bank_of
 from beaver_ftc.flights.diagnose import UNKNOWN, Rows
 from beaver_ftc.flights.model import Model
-from beaver_ftc.flights.recording import Floats
+from beaver_ftc.flights.recording import TINY, Floats
 from beaver_ftc.flights.regression import predicted
 from beaver_ftc.flights.samples import Samples, constant_parts
 
@@ -206,7 +206,7 @@ def _proportional(answers: Floats, model: Model) -> list[dict[str, Any]]:
     for a, b in combinations(range(len(model.groups)), 2):
         one, other = answers[:, a].ravel(), answers[:, b].ravel()
         norms = float(np.sqrt((one @ one) * (other @ other)))
-        cosine = float(one @ other) / max(norms, 1e-300)
+        cosine = float(one @ other) / max(norms, TINY)
         surfaces = [model.groups[a], model.groups[b]]
         pairs.append({"surfaces": surfaces, "cosine": cosine, "separable": abs(cosine) < _ALIKE})
     return pairs

@@ -21,7 +21,7 @@ from beaver_ftc.flights.bank import bank_of
 from beaver_ftc.flights.diagnose import Rows, rows_of
 from beaver_ftc.flights.filtering import posterior_of
 from beaver_ftc.flights.model import Model, Settings
-from beaver_ftc.flights.recording import Floats
+from beaver_ftc.flights.recording import TINY, Floats
 from beaver_ftc.flights.samples import Samples, constant_parts
 from beaver_ftc.flights.scoring import by_labels
 from beaver_ftc.flights.vehicle import Vehicle
@@ -109,7 +109,7 @@ def choose_order(stretches: Sequence[Stretch], vehicle: Vehicle) -> tuple[int, i
     Every order's regressors are among those of the largest: one matrix of products serves all.
     """
     x, y, _ = stacked(stretches, vehicle, max(HISTORIES), max(LAGS))
-    size = np.maximum(np.sqrt((x**2).mean(axis=0)), 1e-300)
+    size = np.maximum(np.sqrt((x**2).mean(axis=0)), TINY)
     products, cross, own = (x / size).T @ (x / size), (x / size).T @ y, y.T @ y
     scores = {}
     for history in HISTORIES:
@@ -264,7 +264,7 @@ def prediction(model: Model, kept: Stretch) -> Document:
     rates = kept.samples.rates[rows]
     if not len(rates):
         return {"samples": 0}
-    explained = 1.0 - residual.var(axis=0) / np.maximum(rates.var(axis=0), 1e-300)
+    explained = 1.0 - residual.var(axis=0) / np.maximum(rates.var(axis=0), TINY)
     return {
         "samples": len(rates),
         "explained": dict(zip("pqr", explained.tolist(), strict=True)),

@@ -149,7 +149,7 @@ def output_error(stretches: Sequence[fitting.Stretch], groups: list[list[int]]) 
         return ((run - rates[part]) / spread).ravel()
 
     found = least_squares(residual, start, bounds=(low, high), args=(fitted,), loss="soft_l1", max_nfev=40)
-    covariance = np.linalg.pinv(found.jac.T @ found.jac, hermitian=True)
+    covariance = np.linalg.pinv(found.jac.T @ found.jac)
     errors = np.sqrt(np.maximum(np.diag(covariance), 0.0) * float(found.fun @ found.fun) / len(found.fun))
     rest = residual(found.x, kept).reshape(-1, 3) * spread
     explained = 1.0 - rest.var(axis=0) / rates[kept].reshape(-1, 3).var(axis=0)

@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 _US = 1e-6
+TINY = float(np.sqrt(np.finfo(float).tiny))
+"""What a divisor is at least that may be zero."""
 
 
 @dataclass(frozen=True)

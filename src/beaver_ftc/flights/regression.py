@@ -13,12 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from beaver_ftc.flights.model import Model
-from beaver_ftc.flights.recording import Floats
+from beaver_ftc.flights.recording import TINY, Floats
 from beaver_ftc.flights.samples import Samples, mixer
 from beaver_ftc.flights.vehicle import Vehicle
 
 _PARALLEL = 1e-9
 _RIDGE = 1e-10
+_DEPENDENT = 1e-12
 
 
 def groups_of(vehicle: Vehicle) -> list[list[int]]:
@@ -110,9 +111,9 @@ def least_squares(x: Floats, y: Floats, run: NDArray[np.int64], reach: int) -> F
     run (n,): products of residuals are formed within one gap-free stretch only. Directions that x does not
     excite get the least coefficients that fit.
     """
-    scale = np.maximum(np.sqrt((x**2).mean(axis=0)), 1e-300)
+    scale = np.maximum(np.sqrt((x**2).mean(axis=0)), TINY)
     z = x / scale
-    inverse = np.linalg.pinv(z.T @ z, rcond=_RIDGE, hermitian=True)
+    inverse = np.linalg.pinv(z.T @ z, rcond=_RIDGE)
     coefficients = inverse @ (z.T @ y)
     residuals = y - z @ coefficients
     free = max(len(y) - x.shape[1], 1)
@@ -122,7 +123,7 @@ def least_squares(x: Floats, y: Floats, run: NDArray[np.int64], reach: int) -> F
         [_newey_west(z, residuals[:, i], inverse, run, reach) for i in range(y.shape[1])]
     )
     colour = np.divide(robust, white, out=np.ones_like(robust), where=white > 0)
-    size = np.sqrt(np.maximum(np.diag(inverse), 1e-300))
+    size = np.sqrt(np.maximum(np.diag(inverse), TINY))
     return Fit(
         coefficients / scale[:, None], covariance, robust / scale[:, None], colour,
         inverse / np.outer(size, size),
@@ -147,7 +148,10 @@ def variance_inflation(x: Floats) -> Floats:
     factors = np.full(x.shape[1], np.inf)
     live = norm > 1e-12
     correlation = (z[:, live] / norm[live]).T @ (z[:, live] / norm[live])
-    factors[live] = np.diag(np.linalg.pinv(correlation, rcond=1e-12, hermitian=True))
+    values, vectors = np.linalg.eigh(correlation)
+    free, share = values > _DEPENDENT * values.max(initial=0.0), vectors**2
+    inflated = (share[:, free] / values[free]).sum(axis=1)
+    factors[live] = np.where(share[:, ~free].sum(axis=1) > _DEPENDENT, np.inf, inflated)
     return factors
 
 

@@ -118,6 +118,15 @@ def test_a_detector_in_python_compares_a_frame_with_the_model():
         assert said == [alarm, alarm], "once raised an alarm stays"
 
 
+def test_what_is_as_much_as_is_declared_raises_no_alarm():
+    """Half a rad/s2 over half a second, of which the model says a quarter: a quarter is declared."""
+    detector, x = InnovationDetector(), np.array([0.25, 0.0, 0.0])
+    detector.reset(SimpleNamespace(dt_s=0.5))
+    for k in range(2):
+        seen = SimpleNamespace(x=k * x, acceleration=np.array([0.25, 0.0, 0.0]), eta_bar=np.full(3, 0.25))
+        assert not detector.step(seen, None).detected
+
+
 def test_a_law_in_python_inverts_the_model_on_its_feedback():
     G = np.array([[-8.0, 0.1, 0.5, 0.2], [0.3, -10.0, 0.0, -2.0], [-0.5, 0.0, -4.0, 0.1]])
     f, x = np.array([0.1, -0.2, 0.3]), np.array([0.01, 0.02, -0.03])

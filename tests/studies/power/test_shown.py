@@ -8,6 +8,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
+from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.studies.compare.replay import Trace
 from beaver_ftc.studies.power import shown, survey
 from beaver_ftc.studies.power.chances import document_of
@@ -159,3 +160,18 @@ def test_a_survey_flies_the_healthy_blocks_first(monkeypatch, tmp_path):
     assert asked[1][2] == 1
     lost = survey.lost(SimpleNamespace(what=study.cases[-1]), "gone")
     assert lost.failures == ["tactical-grade light, seed 1002: gone"]
+
+
+def test_a_fault_after_which_nothing_was_seen_stands_out_of_nothing():
+    seen = [(SimpleNamespace(t_s=1.0), None)]
+    assert survey.deflections(SimpleNamespace(seen=seen, fault_at_s=1.0), "rudder", 1.0, (0.5, 1.0)) == [
+        0.0,
+        0.0,
+    ]
+
+
+def test_some_conditions_of_a_grid():
+    assert GRID.only("ideal", None).conditions == GRID.only(None, "none").conditions == GRID.conditions[:1]
+    assert GRID.only(None, None) == GRID
+    with pytest.raises(BadInput, match="allowed: ideal, none; tactical-grade, light"):
+        GRID.only("ideal", "light")

@@ -10,7 +10,17 @@ from beaver_ftc.results import figures
 from beaver_ftc.results.figures import draw
 from beaver_ftc.results.metrics import metrics
 from beaver_ftc.results.style import closeup_window, marks
-from beaver_ftc.results.views import Panel, Trace, View, estimators, series_of, sources, surfaces, views
+from beaver_ftc.results.views import (
+    Panel,
+    Trace,
+    View,
+    _share_of_bound,
+    estimators,
+    series_of,
+    sources,
+    surfaces,
+    views,
+)
 from kept import picture
 
 MORE = (
@@ -167,8 +177,8 @@ def test_a_figure_is_laid_out_in_inches():
 class _Rows:
     """A log in chunks of so many rows: t_s at 100 Hz, x."""
 
-    def __init__(self, x, chunk=100):
-        self.x, self.t_s, self.chunk = x, np.arange(x.size) / 100, chunk
+    def __init__(self, x, chunk=100, from_s=0.0):
+        self.x, self.t_s, self.chunk = x, from_s + np.arange(x.size) / 100, chunk
 
     def row_count(self):
         return self.x.size
@@ -194,6 +204,92 @@ def test_a_log_as_long_as_the_limit_is_shown_as_it_is_and_a_longer_one_by_stretc
     assert series_of(_Rows(x), ["x"], (50.0, 60.0), 10)["x"].size == 0
     two = series_of(_Rows(x, chunk=6), ["x"], WHOLE, 10)
     assert list(two["x"]) == list(shown["x"])
+
+
+def test_a_window_is_cut_into_stretches_by_its_own_length():
+    """9.5 rows to 4 points: stretches of 5, at their first and third instants; the first ends as it began.
+    Of 13 rows to 5 points, stretches of 6, the last is a single row.
+    """
+    x = np.array([9.0, 2.0, 5.0, 0.0, 1.0, 2.0, 7.0, 8.0, 3.0, 6.0, 4.0])
+    shown = series_of(_Rows(x, from_s=5.0), ["x"], (5.0099, 5.1049), 4)
+    assert list(shown["x"]) == [0.0, 5.0, 8.0, 3.0]
+    assert list(shown["t_s"]) == pytest.approx([5.01, 5.03, 5.06, 5.08])
+    shown = series_of(_Rows(np.arange(13.0)), ["x"], WHOLE, 5)
+    assert list(shown["t_s"]) == pytest.approx([0.0, 0.03, 0.06, 0.09, 0.12, 0.12])
+
+
+@pytest.mark.parametrize(("rows", "points"), [(4000, 4000), (4001, 2668)])
+def test_up_to_4000_points_are_shown_as_they_are(rows, points):
+    assert series_of(_Rows(np.arange(float(rows)), rows), ["x"], WHOLE)["x"].size == points
+
+
+def test_of_a_residual_of_nothing_the_upper_bound_counts():
+    chunk = {"a": np.array([0.0, -1.0]), "b": np.array([0.0, -4.0]), "c": np.array([2.0, 2.0])}
+    assert list(_share_of_bound(chunk, "abc")) == [0.0, 0.25]
+
+
+def test_there_are_looks_for_eight_surfaces():
+    known = {view.name: view for view in views([f"s{i}_effectiveness_estimate" for i in range(9)]
+                                               + [f"s{i}_cmd_rad" for i in range(9)])}  # fmt: skip
+    assert [trace.role for trace in known["effectiveness"].panels[0].traces] == [
+        f"surface {i}" for i in range(8)
+    ]
+
+
+def test_what_a_figure_looks_like():
+    """What only the eye would see otherwise: pixels, heights of titles, grid, size of numbers, marks."""
+    low = View("low", "Low", (Panel("low", (Trace("y", "low", "p"),), log_scale=True),))
+    t_s = T_S[24:37]  # from the fault's instant to the departure's
+    figure = draw(low, {"t_s": t_s, "y": 10.0 ** -np.arange(t_s.size)}, INSTANTS, "x")
+    figure.canvas.draw()
+    (axes,) = figure.axes
+    assert figure.bbox.width == 1100
+    assert figure._suptitle.get_position()[1] == pytest.approx(1 - 0.12 / figure.get_figheight())
+    assert axes.get_ylim()[0] == 0.01
+    assert axes.yaxis.get_minorticklocs().size == 0
+    assert axes.title.get_position()[1] == 1.0
+    assert {label.get_fontsize() for label in axes.xaxis.get_ticklabels()} == {8.0}
+    assert all(line.get_visible() for line in axes.xaxis.get_gridlines())
+    assert not axes.xaxis.get_major_formatter().get_useOffset()
+    _, *marks = axes.lines
+    assert [mark.get_linewidth() for mark in marks] == [0.9] * 8
+    assert [mark.get_alpha() for mark in marks] == [0.8, None] * 4
+    assert [mark.get_clip_on() for mark in marks] == [True, False] * 4
+    assert figure._repr_png_().startswith(b"\x89PNG")
+
+
+def test_the_pictures_of_a_flight_whole_and_around_the_fault(tmp_path, monkeypatch):
+    document, shown = metrics(Flight()), []
+    monkeypatch.setattr(figures.log, "column_names", lambda path: COLUMNS)
+    monkeypatch.setattr(
+        figures, "draw", lambda view, series, instants, name: _Drawn(view, series, name, shown)
+    )
+    monkeypatch.setattr(figures, "read_series", lambda path, columns, span: span)
+    for given in (document, document | {"engine_power": {"from_s": 1.0}}, metrics(QUIET)):
+        shown.clear()
+        written = figures.write_figures(tmp_path / "log.parquet", given, tmp_path / "figures")
+        assert [path for path, *_ in shown] == written
+        assert {folder for path in written for folder in path.parents[:1]} == {tmp_path / "figures"}
+        spans = {path.name: span for path, span, *_ in shown}
+        closeups = {name: span for name, span in spans.items() if "closeup" in name}
+        around = {"detection-closeup.png": (11.5, 14.12), "isolation-closeup.png": (11.5, 14.12)}
+        assert closeups == ({} if given["fault"] is None else around)
+        assert {span for name, span in spans.items() if name not in closeups} == {WHOLE}
+        assert {more for *_, more in shown} == {("synthetic", "beaver-ftc")}
+
+
+QUIET = Flight(scenario=Scenario(faults=()), detection_time_s=None, isolation_time_s=None, isolated=None)
+
+
+class _Drawn:
+    """A figure that notes where it would be saved."""
+
+    def __init__(self, view, series, _, name, shown):
+        self.view, self.series, self.name, self.shown = view, series, name, shown
+
+    def savefig(self, path, metadata):
+        assert path.name.startswith(self.view.name)
+        self.shown.append((path, self.series, (self.name, metadata["Software"])))
 
 
 def test_a_window_without_a_fault():

@@ -261,9 +261,7 @@ def test_what_a_figure_looks_like():
 def test_the_pictures_of_a_flight_whole_and_around_the_fault(tmp_path, monkeypatch):
     document, shown = metrics(Flight()), []
     monkeypatch.setattr(figures.log, "column_names", lambda path: COLUMNS)
-    monkeypatch.setattr(
-        figures, "draw", lambda view, series, instants, name: _Drawn(view, series, name, shown)
-    )
+    monkeypatch.setattr(figures, "draw", lambda *given: _Drawn(*given, shown))
     monkeypatch.setattr(figures, "read_series", lambda path, columns, span: span)
     for given in (document, document | {"engine_power": {"from_s": 1.0}}, metrics(QUIET)):
         shown.clear()

@@ -148,3 +148,62 @@ def test_words_of_what_is_asked(session, tmp_path):
     assert session._rates_rad_s() is None
     asked(session, do="stick", rates_deg_s=[0, 18, 0])
     assert session._rates_rad_s() == pytest.approx((0.0, pi / 10, 0.0))
+
+
+def test_what_a_page_waits_for_is_told_whatever_hides_the_rest(session, monkeypatch):
+    """The diagnosis has 10 s once somebody has answered; a scenario's own faults come and go unseen."""
+    asked(session, do="game", move="second")
+    with pytest.raises(BadInput, match="a round is on, allowed: changes after it"):
+        asked(session, do="change", law="lqr")
+    asked(session, do="break", fault={"type": "bias", "actuator": "flap", "bias_deg": 0.001})
+    asked(session, do="game", move="answer", answer="nothing")
+    answered_s = session.sim.t_s
+    while session.game.hidden:
+        session.step()
+    assert session.sim.t_s - answered_s == pytest.approx(10.0, abs=0.011)
+    assert session.state()["game"]["winner"] is None
+    assert asked(session, do="fresh", scenario="rudder-stuck") == "new flight"
+    assert [fault.actuator for fault in session.scenario.faults] == ["rudder"]
+    assert session.state()["game"]["phase"] == "idle"
+    asked(session, do="game", move="second")
+    assert session.scenario.faults == ()  # what is hidden is not what the scenario says
+    asked(session, do="fresh")
+    assert [fault.actuator for fault in session.scenario.faults] == ["rudder"]
+    assert session.state()["game"]["phase"] == "over"
+
+
+def test_faults_of_the_scenario_are_told_when_they_come_and_end(tmp_path):
+    """Two at the same instant, one that ends, one there from the start."""
+    jam = {"type": "stuck", "actuator": "rudder", "at_s": 0.1, "end_s": 0.2}
+    faults = [{**LOSS, "at_s": 0.1}, jam, {"type": "float", "actuator": "flap", "at_s": 0.0, "end_s": 0.3}]
+    session = Session(bf.load({"name": "x", "faults": faults}), tmp_path)
+    _flown(session, 40)
+    own = [list(event.values()) for event in session.events if event["kind"] in ("broken", "repaired")]
+    assert own == [
+        [0.02, "broken", "flap: float", True],
+        [0.1, "broken", "elevator: loss of effectiveness (magnitude 0.4)", True],
+        [0.1, "broken", "rudder: stuck", True],
+        [0.2, "repaired", "rudder: stuck", True],
+        [0.3, "repaired", "flap: float", True],
+    ]
+
+
+def test_what_the_session_was_given_can_be_flown_again_and_files_cannot(session):
+    given = bf.load({"name": "mine", "seed": 77})
+    own = Session(given, session._out)
+    asked(own, do="fresh", scenario="fault-free")
+    assert own.hello()["scenario"] == "fault-free"
+    assert "mine" in own.hello()["scenarios"]
+    asked(own, do="fresh", scenario="mine", law="lqr")
+    assert (own.scenario.seed, own.scenario.control.law, own.hello()["law"]) == (77, "lqr", "lqr")
+    with pytest.raises(BadInput, match="scenario: 'fault-fre' is not known, did you mean fault-free"):
+        asked(own, do="fresh", scenario="fault-fre")
+
+
+def test_a_saved_flight_is_said_with_its_report(session, tmp_path, monkeypatch):
+    asked_for = []
+    monkeypatch.setattr(session.sim, "save", lambda out, report: asked_for.append((out, report)) or out / "x")
+    says = asked(session, do="save")
+    assert asked_for == [(tmp_path, True)]
+    assert says == f"saved: {tmp_path / 'x'}; fly it again: beaver-ftc run {tmp_path / 'x' / 'scenario.yaml'}"
+    assert session.events[-1]["says"] == str(tmp_path / "x")

@@ -50,7 +50,7 @@ class Session:
 
     def _begin(self, scenario: "bf.Scenario", faults: bool = True) -> None:
         """A new flight from trim. Raises BadInput, the old one going on, where it cannot be flown."""
-        flown = as_live(scenario if faults else scenario.with_({"faults": []}))
+        flown = as_live(scenario if faults else scenario.with_({"faults": [], "expect": {}}))
         sim = bf.Simulation(flown, log=SpooledLog())
         sim.step()
         if hasattr(self, "sim"):

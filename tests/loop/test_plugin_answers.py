@@ -145,3 +145,26 @@ def test_what_a_record_is_made_ready_for(detector, law, named, expected):
         of_law if expected[1] is not None else None,
         power,
     ) == expected
+
+
+class Late(Answers):
+    """Fails from 0.05 s on."""
+
+    def step(self, measured, *more):
+        if measured.t_s > 0.045:
+            raise LookupError("no more")
+        return self.answer
+
+
+@pytest.mark.parametrize(
+    ("detector", "law", "blamed"),
+    [
+        (Late(Verdict()), Answers(np.zeros(4)), "augmented-ekf"),
+        (Answers(Verdict()), Late(np.zeros(4)), "lqr"),
+    ],
+)
+def test_who_fails_in_flight_is_blamed_and_when(detector, law, blamed):
+    loop = Loop(_scenario(fdi={"scheme": "augmented-ekf"}, control={"law": "lqr"}), detector, law)
+    with pytest.raises(SimulationFailed) as failed:
+        loop.fly_chunk(0, 20)
+    assert str(failed.value) == f"plug-in {blamed} at 0.05 s: step raised LookupError: no more"

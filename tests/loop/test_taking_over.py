@@ -7,8 +7,11 @@ import pytest
 
 import beaver_ftc as bf
 from beaver_ftc.control.laws import REJECTING
+from beaver_ftc.design.model import N_Y
+from beaver_ftc.loop import stream
 from beaver_ftc.loop.assembly import assemble
 from beaver_ftc.loop.changing import Changing, _check_delays, renews_diagnosis, take_diagnosis, take_law
+from beaver_ftc.loop.loop import fly
 from beaver_ftc.scenario.schema import Scenario
 from flying import loss, scenario
 
@@ -175,3 +178,33 @@ def test_an_instrument_broken_in_flight_is_watched_by_a_diagnosis_begun_anew(mon
     sim.change({"scheme": "adaptive-estimators"})
     sim.step(frames=10)
     assert len(watched) == 2
+
+
+@pytest.mark.parametrize(
+    ("what", "given", "fits"),
+    [
+        ("rates_rad_s", (1, 2, 3), True), ("rates_rad_s", (1, 2), False), ("rates_rad_s", range(N_Y), False),
+        ("signals", (1, 2, 3), True), ("signals", range(N_Y), True), ("signals", range(4), False),
+        ("signals", 3.0, False), ("signals", "abc", False), ("signals", (1, None, "x"), False),
+    ],
+)  # fmt: skip
+def test_a_sample_fits_its_place_and_signals_that_of_the_loop_too(what, given, fits):
+    place = np.full(3, 7.0)
+    if fits:
+        stream._put(what, np.array(given, float), place)
+        assert place.tolist() == [float(x) for x in given][:3]
+        return
+    with pytest.raises(bf.BadInput, match=f"^{what}: .* does not fit, allowed: 3 numbers$"):
+        stream._put(what, given, place)
+
+
+def test_a_flight_tells_its_log_and_how_far_it_is():
+    told = []
+    sink = SimpleNamespace(
+        open=lambda columns: told.append(len(columns)), write=lambda rows: told.append(rows.shape),
+        close=lambda: told.append("closed"),
+    )  # fmt: skip
+    landing = fly(scenario(duration_s=0.1), sink, told.append)
+    columns = len(landing.columns)
+    assert told == [columns, (10, columns), 1.0, "closed"]
+    assert fly(scenario(duration_s=0.1)).frames == 10

@@ -173,13 +173,41 @@ def test_a_tacview_recording(tmp_path, kept):
 
 
 @pytest.mark.parametrize(
-    ("hz", "frames", "shown"), [(25.0, 6, 6), (26.0, 6, 3), (100.0, 9, 3), (10.0, 3, 3), (50.0, 1, 1)]
+    ("hz", "frames", "every"),
+    [(25.0, 6, 1), (26.0, 6, 2), (100.0, 9, 4), (75.0, 12, 3), (10.0, 3, 1), (50.0, 1, 1)],
 )
-def test_a_tacview_recording_has_25_frames_a_second_at_most(tmp_path, hz, frames, shown):
+def test_a_tacview_recording_has_25_frames_a_second_at_most(tmp_path, hz, frames, every):
     path = _written(tmp_path / "log.parquet", frames, hz)
     write_acmi(path, metrics(FLIGHTS["quiet"]), tmp_path / "flight.acmi")
     lines = (tmp_path / "flight.acmi").read_text().splitlines()
-    assert sum(line.startswith("#") for line in lines) == shown
+    shown = [line for line in lines if line.startswith("#")]
+    assert shown == [f"#{i / hz:.3f}" for i in range(0, frames, every)]
+
+
+def test_a_place_is_told_by_the_radius_at_the_start(tmp_path):
+    """A flight that begins 629 km up and ends on the ground: 122.173 km to the north are a degree there."""
+    rows = np.zeros((2, len(LOGGED)))
+    rows[:, 0], rows[:, LOGGED.index("altitude_m")] = [0.0, 0.04], [629_000.0, 0.0]
+    rows[:, LOGGED.index("north_m")] = math.radians(1.0) * 7_000_000.0
+    with ParquetLog(tmp_path / "log.parquet") as log:
+        log.open(LOGGED)
+        log.write(rows)
+    write_acmi(tmp_path / "log.parquet", metrics(FLIGHTS["quiet"]), tmp_path / "flight.acmi")
+    text = (tmp_path / "flight.acmi").read_text()
+    assert text.count("b1,T=0.00000000|46.00000000|") == 2
+
+
+def test_a_false_alarm_is_one_before_the_fault_by_more_than_rounding():
+    for early_s, false in ((1.5e-9, True), (1e-9, False), (0.5e-9, False)):
+        flown = Flight(scenario=Scenario(faults=(Fault(at_s=1.0),)), detection_time_s=1.0 - early_s)
+        assert metrics(flown)["false_alarm"] is false
+
+
+def test_numbers_have_nine_decimals_and_texts_their_letters():
+    flown = metrics(Flight(scenario=Scenario(rate_hz=30.0), frames=100, estimate=-1 / 3))
+    assert flown["flight"]["flown_s"] == 3.333333333
+    assert flown["isolation"]["estimate"] == -0.333333333
+    assert as_json({"é": [1, "\udce9"]}) == '{\n  "é": [\n    1,\n    "\\udce9"\n  ]\n}\n'
 
 
 def _folder(path, flight, group=1000):

@@ -124,7 +124,12 @@ SMALL = View(
 def test_the_figure_of_a_small_view(case, kept):
     t_s = {"one-instant": T_S[:1], "empty": T_S[:0]}.get(case, T_S)
     many = np.nan if case == "nothing-in-it" else 1.0
-    shown = {"t_s": t_s, "x_rad": many * np.sin(t_s), "y": many * t_s / 10, "flag": many * (t_s > 12.0)}
+    shown = {
+        "t_s": t_s,
+        "x_rad": many * np.sin(t_s),
+        "y": many * (t_s + 0.5) / 10,
+        "flag": many * (t_s > 12.0),
+    }
     if case == "never-shaded":
         shown["flag"] = np.zeros_like(t_s)
     if case == "no-marks-in-it":

@@ -1,5 +1,6 @@
 """What an identification says of itself: documents, lines for people, and the free runs by another road."""
 
+import json
 from types import SimpleNamespace
 
 import numpy as np
@@ -14,7 +15,9 @@ from beaver_ftc.flights.identification import (
     residual_spectrum,
     summary,
 )
+from beaver_ftc.flights.pages import template
 from beaver_ftc.flights.samples import Samples
+from beaver_ftc.results.metrics import as_json
 from flights import small
 
 MODEL = small.model()
@@ -65,6 +68,10 @@ def test_an_account_in_lines(kept):
         "much": (small.TAIL, FOUND | {"output_error": RUN}),
         "short": (small.WING, FOUND | {"output_error": RUN | {"shorter_than_can_be_told": True}}),
         "little": (small.WING, FOUND | {"collinear": [], "tests": [], "flights": FOUND["flights"][1:]}),
+        "made up": (
+            small.WING,
+            FOUND | {"collinear": [{"regressor": "still[-1]", "inflation": None}], "tests": []},
+        ),
         "one": (small.WING, FOUND | {"collinear": FOUND["collinear"][1:], "tests": []}),
     }
     kept(
@@ -85,8 +92,25 @@ def test_collinear_is_more_than_tenfold_worst_first(monkeypatch):
     monkeypatch.setattr(identification, "variance_inflation", lambda x: factors)
     found = identification.collinear(fitting.stretches_of([small.flight(MODEL, 200)]), MODEL)
     assert [(one["regressor"], one["inflation"]) for one in found] == [
-        ("q[-2]", np.inf), ("p[-2]", 40.0), ("q[-1]", 10.1),
+        ("q[-2]", None), ("p[-2]", 40.0), ("q[-1]", 10.1),
     ]  # fmt: skip
+
+
+def test_a_signal_that_stands_still_is_told_and_can_be_written():
+    """As a document, whose numbers are finite, in words and on the page."""
+    model = small.model(small.TAIL)
+    samples = small.flight(model, 300)
+    samples.signals[:] = 20.0
+    stretches = fitting.stretches_of([samples])
+    found = identification.collinear(stretches, model)
+    assert found[0] == {"regressor": "airspeed_m_s[-1]", "inflation": None}
+    assert json.loads(as_json(found)) == found
+    told = model.model_copy(update={"identified": FOUND | {"collinear": found}})
+    assert "most airspeed_m_s[-1] (made up by the others)" in summary(told)
+    page = template("model.html.j2")
+    said = {"mark": "", "used": 1, "coefficients": [], "fits": "", "spectrum": "", "correlation": ""}
+    whole = FOUND | {"collinear": found, "spectrum": [], "tests": []}
+    assert ">made up by the others</td>" in page.render(model=model, found=whole, **said)
 
 
 def test_inflation_is_of_the_regressors_without_the_constant():

@@ -1,6 +1,7 @@
 """The whole of an identification: the fit, its tests on what it did not see, and what is said about both."""
 
 from collections.abc import Sequence
+from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -44,11 +45,13 @@ def _used(stretch: fitting.Stretch) -> Document:
 
 
 def collinear(stretches: Sequence[fitting.Stretch], model: Model) -> list[Document]:
-    """Regressors whose coefficient's variance the others inflate more than tenfold, worst first."""
+    """Regressors whose coefficient's variance the others inflate more than tenfold, worst first; None where
+    the others make it up."""
     x, _, _ = fitting.stacked(stretches, model.vehicle, model.history, model.lags)
     factors = variance_inflation(x[:, 1:])
     worst = sorted(zip(regressor_names(model), factors.tolist(), strict=True), key=lambda pair: -pair[1])
-    return [{"regressor": name, "inflation": factor} for name, factor in worst if factor > _COLLINEAR]
+    told = [(name, factor if isfinite(factor) else None) for name, factor in worst if factor > _COLLINEAR]
+    return [{"regressor": name, "inflation": factor} for name, factor in told]
 
 
 def regressor_names(model: Model) -> list[str]:
@@ -103,7 +106,7 @@ def summary(model: Model) -> str:
         worst, many = found["collinear"][0], len(found["collinear"])
         lines.append(
             f"  {many} {'regressors are' if many > 1 else 'regressor is'} collinear (variance inflated over "
-            f"{_COLLINEAR:g} times), most {worst['regressor']} ({worst['inflation']:.0f} times)"
+            f"{_COLLINEAR:g} times), most {worst['regressor']} ({_times(worst['inflation'])})"
         )
     return "\n".join(lines)
 
@@ -125,6 +128,10 @@ def _lag(run: Document) -> str:
     if run["shorter_than_can_be_told"]:
         return "shorter than this rate can tell"
     return f"{run['servo_lag_s']:.3f} s (sd {run['servo_lag_sd_s']:.3f})"
+
+
+def _times(factor: float | None) -> str:
+    return "made up by the others" if factor is None else f"{factor:.0f} times"
 
 
 def _axes(values: dict[str, float]) -> str:

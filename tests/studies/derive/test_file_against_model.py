@@ -3,12 +3,13 @@
 import numpy as np
 import pytest
 
+from beaver_ftc.aircraft.loading import read
 from beaver_ftc.design.model import inertia_coefficients
+from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.studies.derive import first_use, fit
+from kept import in_short
 
-from .known import aircraft, moving, states
-
-SHARES = (0.15, 0.35, 0.65, 1.0)
+from .known import TRAINER, aircraft, moving, states
 
 
 def test_declared_is_the_files_error_beside_what_every_scenario_adds():
@@ -47,3 +48,20 @@ def test_the_worst_state_of_an_axis_is_said_with_what_is_declared_there():
     )
     nobody = off.at(np.zeros(60, bool))
     assert list(first_use._lines(plain, nobody)) == []
+
+
+def test_nothing_is_promised_of_what_is_no_aircraft(monkeypatch, tmp_path, capsys):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    with pytest.raises(BadInput, match="no such aircraft"):
+        first_use.derive_if_needed("jsbsim:nothing")
+    assert capsys.readouterr().err == ""
+
+
+def test_states_are_drawn_over_the_envelope_from_engines_just_started(kept):
+    trainer = read(TRAINER)
+    samples = first_use._samples(trainer, first_use._loaded(trainer))
+    assert len(samples) == 800
+    assert not samples.age.any()
+    low, high = samples.y[:, 2].min(), samples.y[:, 2].max()
+    assert (low, high) == pytest.approx(trainer.envelope.airspeed_mps, rel=1e-3)
+    kept({name: in_short(getattr(samples, name)) for name in ("x", "y", "u", "rate", "box", "level")})

@@ -1,10 +1,12 @@
 """A comparison of made flights, all of it: document, tables, page, figure; and runs side by side."""
 
-from math import inf
+import json
+from math import inf, nan
 
 import numpy as np
 import pytest
 
+from beaver_ftc.diagnosis.base import Verdict
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.studies.compare import runs, tune
 from beaver_ftc.studies.compare.leaderboard import (
@@ -16,10 +18,11 @@ from beaver_ftc.studies.compare.leaderboard import (
     page_of,
     write_leaderboard,
 )
-from beaver_ftc.studies.compare.replay import Recording, Trace, alarms_at, trace
+from beaver_ftc.studies.compare.replay import Recording, Trace, _statistic, alarms_at, trace
 from beaver_ftc.studies.compare.scores import document_of
 from beaver_ftc.studies.compare.trial import LAW, SCHEME, Result, SetFlight, Trial, entries_of
 from beaver_ftc.studies.engine.workers import Case
+from beaver_ftc.studies.present.figures import panels
 from flying import scenario
 from kept import page, picture
 
@@ -74,6 +77,7 @@ def test_all_that_is_shown(compared, kept, tmp_path):
     figure = figure_of(compared)
     kept(picture(figure), "figure")
     assert figure.get_size_inches().tolist() == [13.0, 6.8]
+    assert all(line.get_visible() for axes in figure.axes for line in axes.xaxis.get_gridlines())
     (tmp_path / "comparison.png").write_bytes(b"a picture")
     kept(page(page_of(compared, "Comparison: made", tmp_path)), "page")
     write_leaderboard(compared, tmp_path / "board.md")
@@ -92,6 +96,19 @@ def test_one_set_without_a_curve_that_came_to_anything(compared, kept):
         row |= {"ratio_median": None, "ratio_90": None}
     kept(picture(figure_of({"sets": {"healthy": part}})))
     assert "could not fly" not in as_text({"sets": {"healthy": part}})
+
+
+def test_what_was_written_above_the_mark_stays(compared, tmp_path):
+    board = tmp_path / "board.md"
+    board.write_text(f"# Mine\n\nWords.\n\n{MARK}\n\nold\n")
+    write_leaderboard(compared, board)
+    assert board.read_text().startswith(f"# Mine\n\nWords.\n\n{MARK}\n\nMade with ours 1")
+    assert "old" not in board.read_text()
+
+
+def test_a_detector_without_a_statistic_is_far_from_the_level():
+    said = [Verdict(detected=alarm, statistic=value) for alarm, value in ((1, nan), (0, nan), (1, 0.5))]
+    assert list(map(_statistic, said)) == [1e6, 0.0, 0.5]
 
 
 def test_a_case_that_ends_its_process_has_no_results_and_says_why():
@@ -181,6 +198,18 @@ def test_tracking_errors_of_runs_in_one_figure(kept, monkeypatch, tmp_path):
     assert [len(line.get_xdata()) for line in figure.axes[0].lines[:1]] == [20_500]
     assert [folder for folder, _ in asked] == ["a", "b", "c"]
     assert asked[0][1] == list(log)
+
+
+def test_runs_leave_a_figure_a_document_and_a_report(monkeypatch, tmp_path):
+    reports, folders = [], [tmp_path / "a", tmp_path / "b"]
+    monkeypatch.setattr(runs, "read_runs", lambda given: [run_of(folder) for folder in given])
+    monkeypatch.setattr(runs, "figure_of", lambda given: panels(1, 1, 2.0, 2.0)[0])
+    monkeypatch.setattr("beaver_ftc.results.report.write_report", lambda *given: reports.append(given))
+    found = runs.write_runs(tmp_path / "out", folders)
+    there = tmp_path / "out" / "runs"
+    assert json.loads((there / "runs.json").read_text()) == found == [run_of(folder) for folder in folders]
+    assert (there / "runs.png").read_bytes()[1:4] == b"PNG"
+    assert [(path.name, *rest) for path, *rest in reports] == [("runs.html", folders, ["a", "b"])]
 
 
 def test_folders_that_are_no_runs_are_all_named(tmp_path):

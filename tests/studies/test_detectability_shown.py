@@ -1,17 +1,17 @@
 """What the detectability survey says and draws of rows made by hand; known moments; one flight."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.scenario.loader import load_text
 from beaver_ftc.studies import detectability
 from beaver_ftc.studies.detectability import (
     ALTITUDES_M,
-    EXCITATIONS,
     MAGNITUDES,
-    SPEEDS_MPS,
     Excitation,
     at,
     detection_magnitude,
@@ -28,6 +28,8 @@ from beaver_ftc.studies.detectability import (
 )
 from flying import loss, scenario
 from kept import in_short, picture
+
+AIRCRAFT = Path(__file__).parents[1] / "data" / "aircraft"
 
 
 def rows_made():
@@ -178,11 +180,33 @@ def pointed(monkeypatch):
 
 def test_the_points_of_the_built_in_aircraft_and_those_asked_for(pointed, tmp_path):
     document = run_survey(tmp_path, scenario())
-    assert pointed == [(V, h, s) for V in SPEEDS_MPS for h in ALTITUDES_M for s in EXCITATIONS]
+    speeds_mps, altitudes_m = (36.0, 40.0, 44.0, 48.0, 52.0), (0.0, 1000.0, 2000.0, 3000.0)
+    assert pointed == [(V, h, s) for V in speeds_mps for h in altitudes_m for s in (0.25, 0.5, 1.0, 2.0)]
     assert document["scenario"] == scenario().name
     pointed.clear()
     run_survey(tmp_path, scenario(), [40.0], [5.0], [1.5])
     assert pointed == [(40.0, 5.0, 1.5)]
+
+
+def test_the_points_of_another_aircraft_are_about_its_start(pointed, tmp_path, monkeypatch):
+    given = load_text("name: elsewhere\naircraft: ./trainer\n", folder=AIRCRAFT)
+    monkeypatch.setattr(type(given.airframe), "usual_airspeed_mps", 33.37)
+    run_survey(tmp_path, given)
+    start_m = given.airframe.file.start.altitude_m
+    expected = ALTITUDES_M if start_m is None else (start_m,)
+    assert [point[0] for point in pointed[:: 4 * len(expected)]] == [30.0, 33.4, 36.7]
+    assert list(dict.fromkeys(point[1] for point in pointed)) == list(expected)
+
+
+def test_a_point_that_cannot_be_flown_says_so_of_every_surface(monkeypatch):
+    def untrimmed(given):
+        raise BadInput("no trim")
+
+    monkeypatch.setattr(detectability, "excitation", untrimmed)
+    found = detectability._point(scenario(), (40.0, 5.0, 1.5))
+    nothing = dict.fromkeys((*MAGNITUDES, "confused_with")) | {"why": "no trim"}
+    place = {"airspeed_mps": 40.0, "altitude_m": 5.0, "excitation": 1.5}
+    assert found == [{**place, "fault": s, **nothing} for s in ("aileron", "elevator", "rudder")]
 
 
 @pytest.mark.parametrize(

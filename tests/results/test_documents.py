@@ -276,6 +276,16 @@ def test_a_long_flight_is_shown_whole_and_around_the_fault(tmp_path):
     assert points == pytest.approx([per * 2 * 3000 / 3, per * 600], rel=0.01)
 
 
+def test_a_quiet_flight_is_shown_from_its_first_instant_to_its_last(tmp_path):
+    none = {"detection_time_s": None, "isolation_time_s": None, "isolated": None}
+    quiet = Flight(scenario=Scenario(rate_hz=10.0, faults=()), frames=200, **none)
+    folder = _folder(tmp_path / "quiet", quiet)
+    (run,) = _data_of(render([folder]))["runs"]
+    assert run["window"] == [0.0, 19.9]
+    report.write_report(tmp_path / "report.html", [folder])
+    assert (tmp_path / "report.html").read_text(encoding="utf-8") == render([folder])
+
+
 def test_the_page_of_a_report(folders, kept):
     html = render(folders)
     words = html.partition("</style>")[2].partition('<script type="application/json"')[0]

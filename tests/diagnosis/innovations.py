@@ -165,9 +165,10 @@ class Detector:
         self.frames = assemble(scenario, np.zeros(4), TRAVEL_RAD).view(np.recarray)
         frame = self.frames[0]
         self.fdi, self.dt = frame["fdi"], 1.0 / rate_hz
-        noise_model.set_up(self.fdi, scenario.fdi, frame["belief"]["design"], MASS, LEVEL_FLIGHT, rate_hz)
+        design, aircraft = frame["belief"]["design"], scenario.airframe
+        noise_model.set_up(self.fdi, scenario.fdi, design, MASS, LEVEL_FLIGHT, rate_hz, aircraft)
         self.detector = self.fdi["statistical"]
-        Statistical.prepare(self.detector, self.fdi, frame["belief"]["design"], *LEVEL_FLIGHT)
+        Statistical.prepare(self.detector, self.fdi, design, *LEVEL_FLIGHT)
         self.frame = 0
 
     @property

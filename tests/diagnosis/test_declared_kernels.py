@@ -96,7 +96,7 @@ def test_deflections_inertia_and_the_air_are_told_in_si(design):
 
 def test_what_is_declared_of_no_aircraft_is_of_the_beaver(design):
     bounds = Bounds.model_validate({"coefficients": 0.1})
-    told = declared_of(bounds, Actuators(), design, Y, U)
+    told = declared_of(bounds, Actuators(), design, Y, U, AIRCRAFT)
     assert told.coefficients == pytest.approx([0.1 * abs(term.value) for term in AIRCRAFT.moments])
 
 

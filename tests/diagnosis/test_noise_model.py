@@ -50,7 +50,8 @@ def test_false_alarms_are_no_more_than_declared_and_not_absurdly_fewer(setting, 
     """On innovations as declared, a new flight after every alarm. The union bound costs a factor of six or
     so: tests of neighbouring onsets and frames go together."""
     alone = Detector(rate_hz, bounds=SETTINGS[setting])
-    alone.detector["tests"]["alarm_level"] = noise_model.alarm_level(per_h, rate_hz)
+    tests = noise_model.tests_a_frame(load())
+    alone.detector["tests"]["alarm_level"] = noise_model.alarm_level(per_h, rate_hz, tests)
     hours, rng = 240.0 / 3600.0, np.random.default_rng(8)
     frames = round(hours * 3600.0 * rate_hz)
     scores = alone.watch(alone.innovations(frames, rng), *surfaces_at_work(frames, rate_hz, rng), renew=True)

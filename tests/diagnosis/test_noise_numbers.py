@@ -274,7 +274,7 @@ def as_set_up(bounds):
     alone = Detector(50.0)
     given = {**GIVEN, "fdi": {"statistical": {}, "bounds": bounds}}
     design, config = alone.frames[0]["belief"]["design"], Scenario.model_validate(given).fdi
-    noise_model.set_up(alone.fdi, config, design, MASS, LEVEL_FLIGHT, 50.0)
+    noise_model.set_up(alone.fdi, config, design, MASS, LEVEL_FLIGHT, 50.0, AIRCRAFT)
     return alone.detector
 
 
@@ -316,7 +316,7 @@ def test_means_over_a_frame_are_shared_among_its_instants(instants, share):
     alone, config = Detector(50.0), Scenario.model_validate(GIVEN).fdi
     alone.fdi["config"]["instants"] = instants
     design = alone.frames[0]["belief"]["design"]
-    noise_model.set_up(alone.fdi, config, design, MASS, LEVEL_FLIGHT, 50.0)
+    noise_model.set_up(alone.fdi, config, design, MASS, LEVEL_FLIGHT, 50.0, AIRCRAFT)
     assert alone.detector["tests"]["share"] == share
 
 
@@ -327,7 +327,7 @@ def test_an_elevator_off_trim_is_in_what_constants_multiply():
     alone, design = Detector(50.0), design_record()[0]
     scenario = Scenario.model_validate({**GIVEN, "fdi": {"statistical": {}, "bounds": config.model_dump()}})
     start = np.zeros(3), Y, u
-    noise_model.set_up(alone.fdi, scenario.fdi, design, MASS, start, 50.0)
+    noise_model.set_up(alone.fdi, scenario.fdi, design, MASS, start, 50.0, AIRCRAFT)
     total = variances.steady_tolerance(config, AIRCRAFT, design, MASS, Y, u)
     for block, axes in zip(alone.blocks, ((1,), (0, 2), (0, 2)), strict=True):
         of_it = total[np.isin(AXIS, axes)]

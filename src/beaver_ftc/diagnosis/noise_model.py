@@ -13,7 +13,7 @@ from statistics import NormalDist
 
 import numpy as np
 
-from beaver_ftc.aircraft import AXES, Aircraft, MassProperties, load
+from beaver_ftc.aircraft import AXES, Aircraft, MassProperties
 from beaver_ftc.compiled import kernel
 from beaver_ftc.design.engine import slipstream_slopes
 from beaver_ftc.design.terms import AIRSPEED, ALPHA, BETA, PH, QDYN, RH, directional, whole_sum
@@ -84,10 +84,9 @@ def tests_a_frame(aircraft: Aircraft, *views: Direction) -> int:
     return N_SLOTS * sum(SIDES[kind] for kind in kinds) + tones
 
 
-def alarm_level(false_alarms_per_h: float, rate_hz: float, tests: int | None = None) -> float:
+def alarm_level(false_alarms_per_h: float, rate_hz: float, tests: int) -> float:
     """Standard deviations at which all tests of an hour together, so many in a frame, give so many false
     alarms at most."""
-    tests = tests_a_frame(load()) if tests is None else tests
     return -NormalDist().inv_cdf(false_alarms_per_h / (3600.0 * rate_hz * tests))
 
 
@@ -103,10 +102,9 @@ def set_up(
     mass: MassProperties,
     start: Start,
     rate_hz: float,
-    aircraft: Aircraft | None = None,
+    aircraft: Aircraft,
 ) -> None:
     """Fill the statistical part of a diagnosis record; start: x (3,), y and u (surfaces,) in trim."""
-    aircraft = aircraft or load()
     statistical, given = fdi["statistical"], config.statistical
     statistical["alarm"]["detected_at_s"] = -1.0
     if given is None or not fdi["config"]["enabled"]:  # a plug-in diagnoses, or nothing does

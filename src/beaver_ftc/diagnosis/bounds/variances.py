@@ -4,7 +4,7 @@ from math import hypot, pi, radians, sqrt
 
 import numpy as np
 
-from beaver_ftc.aircraft import AXES, Aircraft, MassProperties, Term, load
+from beaver_ftc.aircraft import AXES, Aircraft, MassProperties, Term
 from beaver_ftc.aircraft.aircraft import MOMENTS
 from beaver_ftc.aircraft.schema import RATE_SIGNALS
 from beaver_ftc.design.context import Declared, DesignFunctions
@@ -40,10 +40,9 @@ def declared_of(
     design: np.ndarray,
     y: np.ndarray,
     u: np.ndarray,
-    aircraft: Aircraft | None = None,
+    aircraft: Aircraft,
 ) -> Declared:
     """What is declared, of a flight trimmed at y and u rad; design: the designer's record, (1,)."""
-    aircraft = aircraft or load()
     errors = Errors(bounds.sensors)
     noise, bias, resolution = (errors.each(of_it) for of_it in ("noise", "steady", "resolution"))
     coefficients = tolerances(bounds.coefficients, aircraft, design["moments"]["value"][0])

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from beaver_ftc.aircraft import load
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, UNANTICIPATED
 from beaver_ftc.diagnosis.types import registry
 from beaver_ftc.diagnosis.types.pairs import IN_PITCH
@@ -32,12 +31,11 @@ _NOTHING: Found = {
 }  # fmt: skip
 
 
-def found(fdi: np.void, surfaces: Sequence[str] | None = None) -> Found:
+def found(fdi: np.void, surfaces: Sequence[str]) -> Found:
     """isolated, isolation_type, candidates, estimate and more of a Flight diagnosed for every type.
 
-    surfaces: their names, by default the built-in aircraft's.
+    surfaces: their names.
     """
-    surfaces = load().surfaces if surfaces is None else surfaces
     if not fdi["verdict"]["detected"]:
         return dict(_NOTHING)
     if fdi["types"]["pair"]["enabled"]:

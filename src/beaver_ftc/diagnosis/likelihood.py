@@ -179,20 +179,14 @@ def gains(block):
 @kernel
 def learn(block):
     """Take off the covariances what is learnt from the measurement."""
-    n = block.n
-    p00, p01 = block.P_xx[0, 0], block.P_xx[0, 1]
-    p10, p11 = block.P_xx[1, 0], block.P_xx[1, 1]
-    c00, c01 = block.P_xd[0, 0], block.P_xd[0, 1]
-    c10, c11 = block.P_xd[1, 0], block.P_xd[1, 1]
-    for i in range(n):
-        k0, k1 = block.K_d[i, 0], block.K_d[i, 1]
-        block.P_dd[i, 0] -= k0 * c00 + k1 * c10
-        block.P_dd[i, 1] -= k0 * c01 + k1 * c11
-        k0, k1 = block.K_x[i, 0], block.K_x[i, 1]
-        block.P_xx[i, 0] -= k0 * p00 + k1 * p10
-        block.P_xx[i, 1] -= k0 * p01 + k1 * p11
-        block.P_xd[i, 0] -= k0 * c00 + k1 * c10
-        block.P_xd[i, 1] -= k0 * c01 + k1 * c11
+    K_x, K_d = block.K_x, block.K_d
+    for j in range(2):  # a column follows from itself alone
+        p0, p1 = block.P_xx[0, j], block.P_xx[1, j]
+        c0, c1 = block.P_xd[0, j], block.P_xd[1, j]
+        for i in range(block.n):
+            block.P_dd[i, j] -= K_d[i, 0] * c0 + K_d[i, 1] * c1
+            block.P_xx[i, j] -= K_x[i, 0] * p0 + K_x[i, 1] * p1
+            block.P_xd[i, j] -= K_x[i, 0] * c0 + K_x[i, 1] * c1
 
 
 @kernel

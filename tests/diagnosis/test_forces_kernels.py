@@ -43,7 +43,7 @@ def felt(bounds=None):
     air["area_per_mass"], air["gravity"] = AIRCRAFT.geometry.wing_area_m2 / AIRCRAFT.mass.mass_kg, GRAVITY
     air["scale"], statistical["forces"]["known"] = 533.4, 1
     air["read"] = 1
-    set_up_forces(statistical, bounds or Bounds(), AIRCRAFT, (X, Y, U), ALONG_Y, DT, fdi["bound"]["admitted"])
+    set_up_forces(fdi, bounds or Bounds(), AIRCRAFT, (X, Y, U), ALONG_Y, DT)
     return fdi
 
 

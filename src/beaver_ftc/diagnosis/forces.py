@@ -189,20 +189,13 @@ def tell_apart(aircraft: Aircraft) -> bool:
 
 
 def set_up_forces(
-    statistical: np.void,
-    bounds: Bounds,
-    aircraft: Aircraft,
-    trim: Trim,
-    along_y: np.ndarray,
-    dt_s: float,
-    admitted: np.void,
+    fdi: np.void, bounds: Bounds, aircraft: Aircraft, trim: Trim, along_y: np.ndarray, dt_s: float
 ) -> None:
     """Fill the record of forces that are `known` from what is declared.
 
-    along_y (3, y.size): the slopes of the angular accelerations with y. dt_s: of a frame. admitted: of the
-    bound, for the engine's power.
+    along_y (3, y.size): the slopes of the angular accelerations with y. dt_s: of a frame.
     """
-    y = trim[1]
+    y, statistical = trim[1], fdi["statistical"]
     forces, air, size = statistical["forces"], statistical["air"], aircraft.geometry
     forces["per_m"], forces["gravity"] = 1.0 / size.chord_m, air["gravity"]
     declared = Errors(bounds.sensors)
@@ -211,7 +204,7 @@ def set_up_forces(
     forces["span"], forces["of_rate"] = size.span_m, sum(rates)
     scale = y[QDYN] * air["area_per_mass"] * forces["per_m"]
     errors = declared.each("random", ("alpha", "beta", "V", *AXES))
-    by_airspeed, by_others = _slipstream_noise(y, admitted, declared)
+    by_airspeed, by_others = _slipstream_noise(y, fdi["bound"]["admitted"], declared)
     for f, (vane, axis) in enumerate(((BETA, 2), (ALPHA, 1))):
         force, terms = forces["component"][f], terms_of(aircraft, f)
         every = scale * _slopes(aircraft, COMPONENTS[f], trim)

@@ -131,8 +131,7 @@ def set_up(
         set_up_listening(statistical["listening"], chance, airspeed_mps, pace * rate_hz, dt_s)
         if forces:
             along_y = jacobian(design, *start)[3]
-            admitted = fdi["bound"]["admitted"]
-            set_up_forces(statistical, config.bounds, aircraft, start, along_y, dt_s, admitted)
+            set_up_forces(fdi, config.bounds, aircraft, start, along_y, dt_s)
             air["read"] = not fdi["watch"]["enabled"]  # which may find them broken
             statistical["inertial_air"] = air
             statistical["inertial_air"]["moving"] *= air["read"]

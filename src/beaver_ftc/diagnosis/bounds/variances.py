@@ -35,12 +35,7 @@ def gusts(turbulence: str, airspeed_mps: float, span_m: float) -> tuple[np.ndarr
 
 
 def declared_of(
-    bounds: Bounds,
-    actuators: Actuators,
-    design: np.ndarray,
-    y: np.ndarray,
-    u: np.ndarray,
-    aircraft: Aircraft,
+    bounds: Bounds, actuators: Actuators, design: np.ndarray, y: np.ndarray, u: np.ndarray, aircraft: Aircraft
 ) -> Declared:
     """What is declared, of a flight trimmed at y and u rad; design: the designer's record, (1,)."""
     errors = Errors(bounds.sensors)

@@ -94,16 +94,10 @@ def sum_up(belief, bound, layout, every_type):
                 total.own_per_rad[i, s] += bound.admitted.per_rad[i, s]
                 total.own[i, s] += bound.admitted.per_rad[i, s] * abs(u[s])
     if every_type:
-        note_extremes(layout.dominant_axis, G, u, total)
-
-
-@kernel
-def note_extremes(dominant_axis, G, u, total):
-    """Keep the least and greatest effectiveness and deflection within the frame."""
-    for s, axis in enumerate(dominant_axis):
-        now = G[axis, s]
-        total.G_least[s], total.G_most[s] = min(total.G_least[s], now), max(total.G_most[s], now)
-        total.u_least[s], total.u_most[s] = min(total.u_least[s], u[s]), max(total.u_most[s], u[s])
+        for s, axis in enumerate(layout.dominant_axis):
+            now = G[axis, s]
+            total.G_least[s], total.G_most[s] = min(total.G_least[s], now), max(total.G_most[s], now)
+            total.u_least[s], total.u_most[s] = min(total.u_least[s], u[s]), max(total.u_most[s], u[s])
 
 
 @kernel

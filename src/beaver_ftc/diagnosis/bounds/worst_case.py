@@ -237,14 +237,6 @@ def derived_bound(admitted, design, x, y, u, eta_bar):
 
 
 @kernel
-def find_place(error_map, x, y):
-    """Fill `place` from x (3,) rad/s and y (4 + declared,)."""
-    place = error_map.place
-    place[:3], place[3 : 3 + y.size] = x, y
-    place[3 + QDYN] = 2.0 * y[QDYN] / (y[AIRSPEED] * y[AIRSPEED])
-
-
-@kernel
 def is_inside(error_map, k):
     """Whether `place` is in box k."""
     inside = True
@@ -282,8 +274,11 @@ def age_of(error_map):
 
 @kernel
 def look_up(error_map, x, y, u):
-    """Fill `now` with the error measured about this state; x (3,) rad/s, y, u (n,) rad."""
-    find_place(error_map, x, y)
+    """Fill `place` and `now`, the error measured about this state; x (3,) rad/s, y (4 + declared,), u (n,)
+    rad."""
+    place = error_map.place
+    place[:3], place[3 : 3 + y.size] = x, y
+    place[3 + QDYN] = 2.0 * y[QDYN] / (y[AIRSPEED] * y[AIRSPEED])
     level, age = level_of(error_map, u), age_of(error_map)
     for k in range(error_map.n_boxes if age >= 0 else 0):
         if is_inside(error_map, k):

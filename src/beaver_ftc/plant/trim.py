@@ -151,23 +151,9 @@ def _alpha_for_lift(aircraft: Aircraft, of: dict[str, float], truth: Plant) -> f
     return max(-_ALPHA_LIMIT_RAD, min(_ALPHA_LIMIT_RAD, -(lift + at_zero) / slope))
 
 
-def _accelerations(truth: Plant, state: FlightState) -> np.ndarray:
-    """Start the truth at a state and read its six accelerations, m/s2 and rad/s2."""
-    truth.start(state)
-    return np.array([truth.read(name) * factor for name, factor in ACCELERATIONS])
-
-
-def _moved(state: FlightState, names: tuple[str, ...], step: np.ndarray) -> FlightState:
-    return replace(
-        state, **{name: getattr(state, name) + float(dx) for name, dx in zip(names, step, strict=True)}
-    )
-
-
-def _jacobian(truth: Plant, state: FlightState, names: tuple[str, ...], here: np.ndarray) -> np.ndarray:
-    """d accelerations / d unknowns, (6, unknowns), by forward differences."""
-    steps = STEP_RAD * np.eye(len(names))
-    columns = [(_accelerations(truth, _moved(state, names, step)) - here) / STEP_RAD for step in steps]
-    return np.column_stack(columns)
+def _jacobian(look: Look, x: Vector, here: Vector) -> Vector:
+    """d accelerations / d unknowns, (6, unknowns), at x, where they are `here`: by forward differences."""
+    return np.column_stack([(look(x + step) - here) / STEP_RAD for step in STEP_RAD * np.eye(x.size)])
 
 
 def _solve(truth: Plant, state: FlightState) -> tuple[FlightState, np.ndarray]:
@@ -176,31 +162,37 @@ def _solve(truth: Plant, state: FlightState) -> tuple[FlightState, np.ndarray]:
     Returns the state, left in `truth`, and its accelerations.
     """
     names = (*_FLOW_UNKNOWNS, *(f"{surface}_rad" for surface in truth.aircraft.primary))
+    x = np.array([getattr(state, name) for name in names])
+
+    def state_at(x: Vector) -> FlightState:
+        return replace(state, **dict(zip(names, x.tolist(), strict=True)))
+
+    def look(x: Vector) -> Vector:
+        truth.start(state_at(x))
+        return np.array([truth.read(name) * factor for name, factor in ACCELERATIONS])
+
     if not truth.n_engines:
-        near = _approach(truth, state, names)
+        near = _approach(_looking(truth, state, names), x)
         if np.isfinite(near).all():
-            state = _moved(state, names, near - np.array([getattr(state, name) for name in names]))
-    here = _accelerations(truth, state)
+            x = x + (near - x)  # which is not `near` to the last bit
+    here = look(x)
     for _ in range(_MAX_ITERATIONS):
         if np.abs(here).max() <= TOLERANCE:
-            return state, here
+            return state_at(x), here
         if not np.isfinite(here).all():
             break
-        state = _moved(state, names, _shortened(_newton_step(_jacobian(truth, state, names, here), here)))
-        here = _accelerations(truth, state)
-    raise _not_flown(state, _left_over(here), truth.aircraft)
+        x = x + _shortened(_newton_step(_jacobian(look, x, here), here))
+        here = look(x)
+    raise _not_flown(state_at(x), _left_over(here), truth.aircraft)
 
 
-def _approach(truth: Plant, state: FlightState, names: tuple[str, ...]) -> Vector:
-    """Values of the unknowns `names` of a state at which its accelerations nearly vanish, (unknowns,) rad.
+def _approach(look: Look, x: Vector) -> Vector:
+    """Values of the unknowns, from x, at which the accelerations nearly vanish, (unknowns,) rad.
 
-    names: alpha, beta, theta, then `<surface>_rad`. The truth has been started at the state. What comes out
-    is not finite, or not near, where there is no such flight.
+    What comes out is not finite, or not near, where there is no such flight.
     """
-    look = _looking(truth, state, names)
-    x = np.array([getattr(state, name) for name in names])
     here = look(x)
-    J = np.column_stack([(look(x + step) - here) / STEP_RAD for step in STEP_RAD * np.eye(x.size)])
+    J = _jacobian(look, x, here)
     for _ in range(_MAX_STEPS):
         if not np.abs(here).max() > _GOAL:
             break
@@ -228,7 +220,8 @@ def _shortened(step: Vector) -> Vector:
 
 
 def _looking(truth: Plant, state: FlightState, names: tuple[str, ...]) -> Look:
-    """The six accelerations, m/s2 and rad/s2, as a function of the unknowns."""
+    """The six accelerations, m/s2 and rad/s2, as a function of the unknowns `names` of a state at which the
+    truth has been started: alpha, beta, theta, then `<surface>_rad`."""
     fdm, speed_fps = truth.fdm, state.airspeed_mps * FT_PER_M
     theta_place, *flow = (truth.input(name) for name in ("ic/theta-rad", *_RATES_AND_FLOW))
     surfaces = [truth.input(truth.aircraft.surface[name.removesuffix("_rad")].command) for name in names[3:]]

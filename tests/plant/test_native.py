@@ -29,7 +29,7 @@ def test_reads_agree_to_the_bit_along_a_flight(beaver):
     bank, found = NodeBank([beaver.node(name) for name in READ], owner=beaver), np.empty(len(READ))
     for _ in range(50):
         beaver.run()
-        native.read_nodes(addresses.getter_address(), bank.pointers, found)
+        native.read_nodes(addresses.address(addresses.GETTER), bank.pointers, found)
         assert found.tolist() == [beaver.read(name) for name in READ]
 
 
@@ -39,7 +39,7 @@ def test_writes_agree_to_the_bit(beaver):
         NodeBank([beaver.node(name) for name in WRITTEN], owner=beaver),
         np.array([0.1, -0.2, 1 / 3, 0.7]),
     )
-    native.write_nodes(addresses.setter_address(), bank.pointers, values)
+    native.write_nodes(addresses.address(addresses.SETTER), bank.pointers, values)
     assert [beaver.read(name) for name in WRITTEN] == values.tolist()
 
 
@@ -51,7 +51,7 @@ def test_usable_inside_another_kernel(beaver):
         return out[0] + out[1]
 
     bank = NodeBank([beaver.node(name) for name in READ[:2]], owner=beaver)
-    total = first_plus_second(addresses.getter_address(), bank.pointers, np.empty(2))
+    total = first_plus_second(addresses.address(addresses.GETTER), bank.pointers, np.empty(2))
     assert total == beaver.read(READ[0]) + beaver.read(READ[1])
 
 
@@ -80,7 +80,7 @@ def test_a_bank_keeps_its_aircraft_alive(trim_point):
 
 
 @pytest.mark.parametrize(
-    "change", [{"_NODE_SIZE": 40}, {"_GETTER": "_ZNK9NoSuchName"}, {"_POINTER_OFFSET": 16}]
+    "change", [{"_NODE_SIZE": 40}, {"GETTER": "_ZNK9NoSuchName"}, {"_POINTER_OFFSET": 16}]
 )
 def test_another_layout_is_recognised(monkeypatch, change):
     """A node of another size, a missing symbol, a word that is not the node's address."""

@@ -4,9 +4,9 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from beaver_ftc.plant import addresses
 from beaver_ftc.plant import channels as ch
 from beaver_ftc.plant.adapter import Plant
+from beaver_ftc.plant.addresses import GETTER, RUN, SETTER, address, available
 from beaver_ftc.plant.native import NodeBank
 
 UNANTICIPATED = "failures/unanticipated/Cm-alpha3"
@@ -29,13 +29,13 @@ class Cockpit:
         if n not in banks:
             banks[n] = _banks(plant, n)
         self._read, self._write, self._engine, self._air = banks[n]
-        self.native = addresses.available()
+        self.native = available()
         truth["native"] = self.native
-        truth["getter"], truth["setter"] = addresses.getter_address(), addresses.setter_address()
+        truth["getter"], truth["setter"] = address(GETTER), address(SETTER)
         truth["read_pointers"][: truth["n"]] = self._read.pointers
         truth["write_pointers"] = self._write.pointers
         truth["engine_pointer"] = self._engine.pointers
-        running["run"], running["executive"] = addresses.run_address(), plant.executive
+        running["run"], running["executive"] = address(RUN), plant.executive
         running["getter"], running["setter"] = truth["getter"], truth["setter"]
         running["heading_pointer"], running["axes_pointer"] = self._air.pointers
 

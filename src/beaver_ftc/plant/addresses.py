@@ -13,14 +13,14 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     import jsbsim
 
-_GETTER = "_ZNK14SGPropertyNode14getDoubleValueEv"  # double SGPropertyNode::getDoubleValue() const
-_SETTER = "_ZN14SGPropertyNode14setDoubleValueEd"  # bool SGPropertyNode::setDoubleValue(double)
+GETTER = "_ZNK14SGPropertyNode14getDoubleValueEv"  # double SGPropertyNode::getDoubleValue() const
+SETTER = "_ZN14SGPropertyNode14setDoubleValueEd"  # bool SGPropertyNode::setDoubleValue(double)
 
 # The Python node: reference count, type, C++ method table, then the counted pointer to the C++ node.
 _NODE_SIZE = 32
 _POINTER_OFFSET = 24
 
-_RUN = "_ZN6JSBSim9FGFDMExec3RunEv"  # bool JSBSim::FGFDMExec::Run()
+RUN = "_ZN6JSBSim9FGFDMExec3RunEv"  # bool JSBSim::FGFDMExec::Run()
 
 # The Python executive: reference count, type, the C++ executive twice (as its base, as itself), a dictionary.
 _EXECUTIVE_SIZE = 40
@@ -32,21 +32,13 @@ def _library() -> ctypes.CDLL:
     return ctypes.CDLL(import_module("jsbsim._jsbsim").__file__)
 
 
-def _address(symbol: str) -> int:
+def address(symbol: str) -> int:
+    """Address of GETTER, SETTER (the compiled read and write of one node) or RUN (the executive's); 0 if this
+    build does not export it."""
     try:
         return ctypes.cast(getattr(_library(), symbol), ctypes.c_void_p).value or 0
     except (AttributeError, OSError):
         return 0
-
-
-def getter_address() -> int:
-    """Address of the compiled read of one node; 0 if this build does not export it."""
-    return _address(_GETTER)
-
-
-def setter_address() -> int:
-    """Address of the compiled write of one node; 0 if this build does not export it."""
-    return _address(_SETTER)
 
 
 def pointer(node: "jsbsim.FGPropertyNode") -> int:
@@ -64,21 +56,16 @@ def executive_address(fdm: "jsbsim.FGFDMExec") -> int:
     return executive if base == executive > 0 and executive % 8 == 0 and _flies(fdm, executive) else 0
 
 
-def run_address() -> int:
-    """Address of the executive's `Run`; 0 if this build does not export it."""
-    return _address(_RUN)
-
-
 def _runs_by_address() -> bool:
     import jsbsim
 
-    return jsbsim.FGFDMExec.__basicsize__ == _EXECUTIVE_SIZE and run_address() > 0
+    return jsbsim.FGFDMExec.__basicsize__ == _EXECUTIVE_SIZE and address(RUN) > 0
 
 
 def _flies(fdm: "jsbsim.FGFDMExec", executive: int) -> bool:
     """Whether a frame run by address is one more frame of this very executive."""
     before_s = fdm.get_sim_time()
-    ctypes.PYFUNCTYPE(ctypes.c_bool, ctypes.c_void_p)(run_address())(executive)
+    ctypes.PYFUNCTYPE(ctypes.c_bool, ctypes.c_void_p)(address(RUN))(executive)
     return bool(fdm.get_sim_time() == before_s + fdm.get_delta_t())
 
 
@@ -97,41 +84,31 @@ def _layout_is_known() -> bool:
     cpython = sys.implementation.name == "cpython" and ctypes.sizeof(ctypes.c_void_p) == 8
     if not (cpython and jsbsim.FGPropertyNode.__basicsize__ == _NODE_SIZE):
         return False
-    return bool(getter_address() and setter_address()) and _pointers_are_nodes() and _values_agree()
+    return bool(address(GETTER) and address(SETTER)) and _pointers_are_nodes() and _values_agree()
 
 
-def _made(manager: "jsbsim.FGPropertyManager", name: str) -> "jsbsim.FGPropertyNode":
-    node = manager.get_node(name, True)
-    assert node is not None
-    return node
-
-
-def _trial_nodes() -> "list[jsbsim.FGPropertyNode]":
-    """Nodes in a property tree of their own, with no aircraft behind them."""
+def _trial_nodes(names: str) -> "list[jsbsim.FGPropertyNode]":
+    """Nodes of these names, a letter each, in a property tree of their own, with no aircraft behind them."""
     import jsbsim
 
     manager = jsbsim.FGPropertyManager()
-    nodes = [_made(manager, f"trial/value-{i}") for i in range(3)]
-    for i, node in enumerate(nodes):
-        node.set_double_value(1.0 / (i + 3))
-    return nodes
+    nodes = (manager.get_node(f"trial/{name}", True) for name in names)
+    return [node for node in nodes if node is not None]
 
 
 def _pointers_are_nodes() -> bool:
     """Two wrappers of one node hold the same aligned address, wrappers of different nodes different ones."""
-    import jsbsim
-
-    manager = jsbsim.FGPropertyManager()
-    first, second, again = (_made(manager, f"trial/{name}") for name in "aba")
+    first, second, again = _trial_nodes("aba")
     same = pointer(first) == pointer(again) and first is not again
     return same and pointer(first) != pointer(second) and pointer(first) > 0 and pointer(first) % 8 == 0
 
 
 def _values_agree() -> bool:
     """What is written by address reads back through Python to the bit, and the other way round."""
-    get = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_void_p)(getter_address())
-    put = ctypes.CFUNCTYPE(ctypes.c_bool, ctypes.c_void_p, ctypes.c_double)(setter_address())
-    for node in _trial_nodes():
+    get = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_void_p)(address(GETTER))
+    put = ctypes.CFUNCTYPE(ctypes.c_bool, ctypes.c_void_p, ctypes.c_double)(address(SETTER))
+    for i, node in enumerate(_trial_nodes("abc")):
+        node.set_double_value(1.0 / (i + 3))
         read = get(pointer(node))
         if node.get_double_value() != read:
             return False

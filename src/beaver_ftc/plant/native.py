@@ -11,7 +11,7 @@ changes. An error that JSBSim raises could not be caught there. Its models of an
 raise none once that is loaded and trimmed; aircraft with engines are run through Python.
 
     bank = NodeBank([plant.node(name) for name in names])
-    read_nodes(getter_address(), bank.pointers, out)       # also from inside another compiled kernel
+    read_nodes(address(GETTER), bank.pointers, out)       # also from inside another compiled kernel
 """
 
 from collections.abc import Sequence
@@ -74,14 +74,14 @@ def advance(simulator):
 
 @kernel
 def read_nodes(getter, pointers, out):
-    """Read nodes into out. getter: getter_address(). pointers, out: (n,) int64, float64."""
+    """Read nodes into out. getter: address(GETTER). pointers, out: (n,) int64, float64."""
     for i in range(pointers.size):
         out[i] = _call_getter(getter, pointers[i])  # type: ignore[call-arg]
 
 
 @kernel
 def write_nodes(setter, pointers, values):
-    """Write values to nodes. setter: setter_address(). pointers, values: (n,) int64, float64."""
+    """Write values to nodes. setter: address(SETTER). pointers, values: (n,) int64, float64."""
     for i in range(pointers.size):
         _call_setter(setter, pointers[i], values[i])  # type: ignore[call-arg]
 

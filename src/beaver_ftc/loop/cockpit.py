@@ -51,6 +51,15 @@ class Cockpit:
         if power["in_use"][0]:
             self._engine.write(power["command"][0])
 
+    def turn_air(self) -> None:
+        """Turn the turbulence with the aircraft's heading, as its spectra are meant [MIL-F-8785C, 3.7.1].
+
+        JSBSim keeps it in axes along the wind, and without one along whatever direction it met first: a
+        rolling gust would pitch an aircraft that flies across. `psiw` turns them the other way round.
+        """
+        heading, axes = self._air.nodes
+        axes.set_double_value(-heading.get_double_value())
+
 
 def _banks(plant: Plant, n: int) -> tuple[NodeBank, ...]:
     """What is read of the truth, n channels; where the command goes, and the engine's; heading and axes of

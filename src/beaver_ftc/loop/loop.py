@@ -21,7 +21,7 @@ from beaver_ftc.loop.stepping import fly_frame, fly_on, hold, look_inside
 from beaver_ftc.plant import channels as ch
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.conditions import ready
-from beaver_ftc.plant.configure import GustSchedule, MovingAir, take_off
+from beaver_ftc.plant.configure import GustSchedule, take_off
 from beaver_ftc.plant.faults import FaultSchedule, SensorFaultSchedule
 from beaver_ftc.plant.instruments import AX, ENGINE_SPEED
 from beaver_ftc.plant.reuse import give_back
@@ -82,8 +82,8 @@ class Loop:
         self.schedule = FaultSchedule(scenario.faults, self.plant, scenario.rate_hz)
         instruments, has_engine = self.frames["instruments"][0], self.aircraft.has_engine_instruments
         self.sensor_schedule = SensorFaultSchedule(scenario.faults, instruments, scenario.rate_hz, has_engine)
-        self.air = MovingAir(scenario.environment, self.plant)
-        self.frames["running"]["turbulent"] = self.air.turbulent
+        self._turbulent = scenario.environment.severity is not None
+        self.frames["running"]["turbulent"] = self._turbulent
         self.gust = GustSchedule(scenario.environment.gusts, self.plant, scenario.rate_hz)
         self.n_frames = round(scenario.duration_s * scenario.rate_hz)
         self.plugin_frame = self._with_plugins(detector, law)
@@ -254,7 +254,7 @@ class Loop:
         frames, references, log, fly_frame = self.frames, self.references, self.log, self.fly_frame
         if fly_frame is None:
             return self._fly_compiled(count, runs)
-        as_it_is = runs == 1 and self.cockpit.native and not self.air.turbulent
+        as_it_is = runs == 1 and self.cockpit.native and not self._turbulent
         advance = self.plant.run if as_it_is else partial(self._advance, runs)
         for _ in range(count):
             advance()
@@ -286,7 +286,8 @@ class Loop:
         if runs and not native:
             self.cockpit.write()
         for left in reversed(range(runs)):
-            self.air.turn()
+            if self._turbulent:
+                self.cockpit.turn_air()
             self.plant.run()
             if not native:
                 self.cockpit.read()

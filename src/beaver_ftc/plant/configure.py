@@ -9,7 +9,7 @@ from math import ceil, radians
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.plant.adapter import FT_PER_M, Plant
 from beaver_ftc.plant.trim import TrimPoint, trim
-from beaver_ftc.scenario.environment import Environment, Gust
+from beaver_ftc.scenario.environment import Gust
 from beaver_ftc.scenario.schema import Scenario
 
 _AXES = ("p", "q", "r")
@@ -106,24 +106,6 @@ def trim_of(scenario: Scenario, plant: Plant) -> TrimPoint:
     return trim(initial.airspeed_mps, initial.altitude_m, plant=plant, **given)
 
 
-class MovingAir:
-    """Turns the turbulence with the aircraft's heading, as its spectra are meant [MIL-F-8785C, 3.7.1].
-
-    JSBSim keeps it in axes along the wind, and without one along whatever direction it met first: a rolling
-    gust would pitch an aircraft that flies across. `psiw` turns them the other way round.
-    """
-
-    def __init__(self, environment: Environment, plant: Plant) -> None:
-        self.turbulent = environment.severity is not None
-        self._heading = plant.node("attitude/psi-rad")
-        self._axes = plant.input("atmosphere/psiw-rad")
-
-    def turn(self) -> None:
-        """Before a JSBSim frame: axes along the present heading."""
-        if self.turbulent:
-            self._axes.set_double_value(-self._heading.get_double_value())
-
-
 class GustSchedule:
     """Sets gusts off, one after the other; without any it does nothing."""
 
@@ -133,18 +115,16 @@ class GustSchedule:
 
     def apply(self, k: int) -> None:
         """Set the gust off that starts with frame k."""
-        if k in self._starts:
-            self._set(self._starts[k])
-            self._plant.write("atmosphere/cosine-gust/start", 1.0)
-
-    def _set(self, gust: Gust) -> None:
+        if k not in self._starts:
+            return
+        gust = self._starts[k]
         height = sum(speed**2 for speed in gust.velocity_mps) ** 0.5
         values = {
             "startup-duration-sec": gust.rise_s, "steady-duration-sec": gust.hold_s,
             "end-duration-sec": gust.fade_s, "magnitude-ft_sec": height * FT_PER_M, "frame": _LOCAL_FRAME,
         }  # fmt: skip
         values |= {f"{axis}-velocity-ft_sec": v for axis, v in zip("XYZ", gust.velocity_mps, strict=True)}
-        for name, value in values.items():
+        for name, value in (values | {"start": 1.0}).items():
             self._plant.write(f"atmosphere/cosine-gust/{name}", value)
 
     def next_change(self, k: int) -> int:

@@ -126,9 +126,13 @@ class Loop:
         scheme, named = self.scenario.fdi.scheme, self.scenario.control.law
         if detector is law is None and is_compiled(DETECTORS, scheme) and is_compiled(LAWS, named):
             return None
-        from beaver_ftc.loop.plugin_frame import plugin_frame
+        from beaver_ftc.loop.plugin_frame import named_detector, named_law, plugged
 
-        return plugin_frame(self.frames, self.scenario, self.start, detector, law)
+        if detector is None:
+            detector = named_detector(self.scenario)
+        if law is None:
+            law = named_law(self.frames, self.scenario, self.start)
+        return plugged(self.frames, self.scenario, self.start, detector, law)
 
     def fly_with(self, plugins: "PluginFrame | None") -> None:
         """Fly on with these plug-ins, or with none. fly_frame: what Python is to call, None if nothing."""

@@ -179,30 +179,18 @@ def context_of(
     )
 
 
-def plugin_frame(
-    frames: np.ndarray, scenario: Scenario, start: np.ndarray, detector: Detector | None, law: Law | None
-) -> PluginFrame | None:
-    """The frame with the plug-ins the scenario names, or with these; None if everything is compiled in.
-
-    frames: the assembled record, made ready for them. start: as in `context_of`. Raises BadInput for a name
-    that cannot be loaded, SimulationFailed for a plug-in that fails at reset.
-    """
-    if detector is None:
-        detector = named_detector(scenario)
-    if law is None:
-        law = named_law(frames, scenario, start)
-    return plugged(frames, scenario, start, detector, law)
-
-
 def named_detector(scenario: Scenario) -> Detector | None:
-    """The plug-in a scenario names for its diagnosis; None if it is compiled in."""
+    """The plug-in a scenario names for its diagnosis; None if it is compiled in.
+
+    Raises BadInput for a name that cannot be loaded.
+    """
     scheme = scenario.fdi.scheme
     return None if is_compiled(DETECTORS, scheme) else made(DETECTORS, scheme)
 
 
 def named_law(frames: np.ndarray, scenario: Scenario, start: np.ndarray) -> Law | None:
     """The plug-in a scenario names for its law; None if it is compiled in, or has a compiled form, which is
-    put into the record then. start: as in `context_of`."""
+    put into the record then. start: as in `context_of`. Raises as `named_detector` does."""
     if is_compiled(LAWS, scenario.control.law):
         return None
     law = made(LAWS, scenario.control.law)
@@ -224,7 +212,7 @@ def plugged(
     begun: PluginFrame | None = None,
 ) -> PluginFrame | None:
     """The frame with these plug-ins, the record made ready for them; None with none. begun: as in
-    `PluginFrame`."""
+    `PluginFrame`. Raises SimulationFailed for a plug-in that fails at reset."""
     if detector is None and law is None:
         return None
     if detector is not None:  # no built-in isolation; instead, one estimator a surface for its verdict

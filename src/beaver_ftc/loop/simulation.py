@@ -34,34 +34,6 @@ if TYPE_CHECKING:
 Vector = NDArray[np.float64]
 
 
-class Steering:
-    """The stick of one flight; `track` keeps its movements."""
-
-    def __init__(self, loop: Loop) -> None:
-        self._loop, self._scenario = loop, loop.scenario
-        self._base: tuple[int, Vector] | None = None
-        self.track = StickTrack()
-
-    def put(self, k: int, stop: int, stick_deg_s: Vector | None) -> None:
-        """Add the stick, (3,) deg/s, to the references of frames k to stop, all in one chunk of the log.
-
-        The sum is formed in deg/s, as a scenario that says the same forms it: to the bit.
-        """
-        self.track.move(k, stick_deg_s)
-        if stick_deg_s is not None:
-            row = slice(k % CHUNK_ROWS, k % CHUNK_ROWS + stop - k)
-            self._loop.references[row] = (self._base_deg_s(k)[row] + stick_deg_s) * RAD_PER_DEG
-
-    def _base_deg_s(self, k: int) -> Vector:
-        """The scenario's own references of the chunk that frame k is in, (rows, 3) deg/s."""
-        start = k - k % CHUNK_ROWS
-        if self._base is None or self._base[0] != start:
-            end = min(start + CHUNK_ROWS, self._loop.n_frames)
-            t = np.arange(start, end) / self._scenario.rate_hz
-            self._base = start, sample_deg_s(self._scenario.reference, t)
-        return self._base[1]
-
-
 class Stepping:
     """A flight in progress. The first step flies frame 0 as well, in which the trimmed flight is measured.
 
@@ -100,7 +72,8 @@ class Stepping:
         self._k_flown, self._rows_flown = (self._loop.frames[name].item for name in ("k", "row"))
         self._next, self._turn_at, self._written = 0, 0, 0
         self._status, self._by_hand = FLYING, False
-        self._steering = Steering(self._loop)
+        self._stick = StickTrack()
+        self._unsteered: tuple[int, Vector] | None = None  # references of a chunk, and its first frame
         self._last: list[Vector] = []  # rows of the last step, a piece a segment
         if self._sink is not None:
             self._sink.open(self._loop.columns)
@@ -282,11 +255,11 @@ class Stepping:
                 "the reference, sticks and faults"
             )
         self._begin()
-        return interventions.scenario_flown(self._scenario, self._faults, self._steering.track, self._next)
+        return interventions.scenario_flown(self._scenario, self._faults, self._stick, self._next)
 
     def _as_it_happened(self) -> Scenario:
         """The scenario of the verdict: as given if it was flown to its end and nobody interfered."""
-        if self.done and self._faults is self._scenario.faults and not self._steering.track.moved:
+        if self.done and self._faults is self._scenario.faults and not self._stick.moved:
             return self._scenario
         try:
             return self.scenario_flown()
@@ -330,17 +303,31 @@ class Stepping:
             if k >= self._turn_at:
                 self._turn_at = loop.turn_to(k)
             stop = min(end, self._turn_at, (k // CHUNK_ROWS + 1) * CHUNK_ROWS)
-            self._steering.put(k, stop, stick_deg_s)
+            self._steer(k, stop, stick_deg_s)
             start = rows_flown()
             try:
                 self._status = loop.fly_segment(k, stop)
             finally:
                 self._next = k_flown()
-                self._note(loop.log[start : rows_flown()])
+                self._last.append(loop.log[start : rows_flown()].copy())
 
-    def _note(self, rows: Vector) -> None:
-        """Keep the rows just flown, (frames, columns), until the next step."""
-        self._last.append(rows.copy())
+    def _steer(self, k: int, stop: int, stick_deg_s: Vector | None) -> None:
+        """Add the stick, (3,) deg/s, to the references of frames k to stop, all in one chunk of the log.
+
+        The sum is formed in deg/s, as a scenario that says the same forms it: to the bit.
+        """
+        self._stick.move(k, stick_deg_s)
+        if stick_deg_s is not None:
+            row = slice(k % CHUNK_ROWS, k % CHUNK_ROWS + stop - k)
+            self._loop.references[row] = (self._unsteered_deg_s(k)[row] + stick_deg_s) * RAD_PER_DEG
+
+    def _unsteered_deg_s(self, k: int) -> Vector:
+        """The scenario's own references of the chunk that frame k is in, (rows, 3) deg/s."""
+        start = k - k % CHUNK_ROWS
+        if self._unsteered is None or self._unsteered[0] != start:
+            t = np.arange(start, min(start + CHUNK_ROWS, self._loop.n_frames)) / self.rate_hz
+            self._unsteered = start, sample_deg_s(self._given.reference, t)
+        return self._unsteered[1]
 
     def _declare(self, faults: Sequence[Any]) -> None:
         self._faults = tuple(faults)

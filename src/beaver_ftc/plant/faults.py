@@ -147,7 +147,12 @@ class FaultSchedule(_Schedule):
     def apply(self, k: int) -> None:
         """Bring the aircraft's failures to frame k. Call it before that frame's runs; again is harmless."""
         self._note_where_surfaces_were(k)
-        if self._write(self._wanted(k)) and k == 0:
+        wanted = self._wanted(k)
+        changed = {name: value for name, value in wanted.items() if self._written.get(name) != value}
+        for name, value in changed.items():
+            self._plant.write(name, value)
+        self._written |= changed
+        if changed and k == 0:
             self._plant.settle()  # nothing runs before frame 0 is read: its accelerations must show the fault
 
     def _note_where_surfaces_were(self, k: int) -> None:
@@ -170,14 +175,6 @@ class FaultSchedule(_Schedule):
             for name, value in properties.items()
             if value != HEALTHY[name] or f"{place}/{name}" in self._written
         }
-
-    def _write(self, wanted: dict[str, float]) -> bool:
-        """Write what differs from what was written last; whether anything did."""
-        changed = {name: value for name, value in wanted.items() if self._written.get(name) != value}
-        for name, value in changed.items():
-            self._plant.write(name, value)
-        self._written.update(changed)
-        return bool(changed)
 
 
 class SensorFaultSchedule(_Schedule):

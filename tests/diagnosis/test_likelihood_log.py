@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from beaver_ftc.plant.channels import LIKELIHOODS
+from beaver_ftc.aircraft import load
+from beaver_ftc.plant.channels import likelihoods
 from beaver_ftc.results.views import views
 from flying import flown, loss
 
@@ -11,7 +12,7 @@ TACTICAL = {"sensors": "tactical-grade", "fdi": {"statistical": {}, "bounds": {"
 
 def test_the_elevator_leaves_the_alarm_level_and_nothing_else_did_before():
     flight, log = flown(duration_s=4, faults=[loss(magnitude=0.6, at_s=3.0)], **TACTICAL)
-    assert log.columns[-6:] == list(LIKELIHOODS)
+    assert log.columns[-6:] == list(likelihoods(load()))
     before = log["t_s"] < 3.0
     shares = log.rows[:, -6:]
     assert 0.2 < shares[before].max() < 1.0
@@ -25,4 +26,4 @@ def test_there_is_a_view_of_them_where_there_are_any():
     _, statistical = flown(duration_s=0.1, **TACTICAL)
     assert "likelihood" not in [view.name for view in views(plain.columns)]
     (view,) = [view for view in views(statistical.columns) if view.name == "likelihood"]
-    assert set(view.columns) == set(LIKELIHOODS)
+    assert set(view.columns) == set(likelihoods(load()))

@@ -103,4 +103,4 @@ def lay_out(frame: np.void, scenario: Scenario, diagnoses_itself: bool) -> tuple
     logged["power"] = frame["control"]["power"]["enabled"] or profile
     logged["tests"] = tests["n_columns"] if tests["enabled"] else 0
     power, tested, columns = bool(logged["power"]), bool(tests["enabled"]), COLUMNS if profile else ()
-    return ch.log_columns(estimators, power, tested, aircraft, profile=columns, watch=watched)
+    return ch.log_columns(aircraft, estimators, watched, power, columns, tested)

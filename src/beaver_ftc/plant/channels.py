@@ -105,9 +105,6 @@ def likelihoods(aircraft: Aircraft) -> tuple[str, ...]:
     )
 
 
-LIKELIHOODS = likelihoods(load())
-
-
 def _per_axis(pattern: str) -> list[str]:
     return [pattern.format(axis) for axis in AXES]
 
@@ -119,17 +116,16 @@ def _estimator_columns(name: str) -> list[str]:
 
 @lru_cache(maxsize=32)
 def log_columns(
+    aircraft: Aircraft,
     estimators: tuple[str, ...],
-    power: bool = False,
-    statistical: bool = False,
-    aircraft: Aircraft | None = None,
-    profile: tuple[str, ...] = (),
-    watch: bool = False,
+    watch: bool,
+    power: bool,
+    profile: tuple[str, ...],
+    tests: bool,
 ) -> tuple[str, ...]:
-    """The log's columns in order, for the isolation estimators of these names; power: the law may use the
-    engine; statistical: there is a statistical detector, whose tests are logged as shares of its level;
-    profile: columns of the commanded profile; watch: the instruments are held against one another."""
-    aircraft = aircraft or load()
+    """The log's columns in order, for the isolation estimators of these names; watch: the instruments are
+    held against one another; power: the law may use the engine; profile: columns of the commanded profile;
+    tests: there is a statistical detector, whose tests are logged as shares of its level."""
     surfaces = aircraft.surfaces
     return (
         "t_s", *_STATES, *_per_axis("{}dot_rad_s2"), "qdyn_pa", *aircraft.signals, "envelope_valid",
@@ -146,5 +142,5 @@ def log_columns(
         *(("watch_share", "watch_test") if watch else ()),
         *(("manifold_pressure_inhg",) if power else ()),
         *profile,
-        *(likelihoods(aircraft) if statistical else ()),
+        *(likelihoods(aircraft) if tests else ()),
     )  # fmt: skip

@@ -6,7 +6,6 @@ reference stand at; the diagnosis', which begins anew; or the instruments'. Trut
 accounts and log go on, and so do plug-ins that are not changed.
 """
 
-from math import ceil
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,7 +14,7 @@ from beaver_ftc.control.laws import NOMINAL, ORACLE, REJECTING
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.assembly import assemble
 from beaver_ftc.loop.plugin_frame import PluginFrame, named_detector, named_law, plugged
-from beaver_ftc.plant.faults import NEVER, TIME_TOLERANCE_S
+from beaver_ftc.plant.faults import NEVER, frame_of
 from beaver_ftc.scenario.interventions import stages
 from beaver_ftc.scenario.schema import Change, Scenario
 
@@ -62,7 +61,7 @@ class Changing:
         """Make ready what a scenario changes from frame k on. Raises BadInput for what cannot be flown."""
         coming: list[Stage] = []
         for change, then in stages(scenario):
-            frame = ceil((change.at_s - TIME_TOLERANCE_S) * scenario.rate_hz)
+            frame = frame_of(change.at_s, scenario.rate_hz)
             if frame >= k:
                 before = coming[-1].plugins if coming else self._loop.plugin_frame
                 coming.append(self._stage(frame, change, then, before))

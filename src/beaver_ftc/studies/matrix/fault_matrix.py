@@ -28,6 +28,7 @@ from beaver_ftc.studies.engine.study import Progress, Study, run_study
 from beaver_ftc.studies.matrix.clairvoyant import columns_of, seen_when_told
 from beaver_ftc.studies.present.figures import heat_map, panels
 from beaver_ftc.studies.present.page import Files
+from beaver_ftc.studies.reproduce.choices import SETTING
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -43,18 +44,7 @@ LIKELY = 0.5  # a test that finds a fault more often than not sees it
 WORST_FIRST = ("WRONG", "unseen", "open", "surface", "named")
 MOST_DOUBLINGS = 3.0  # of the tracking error, where the heat map is darkest
 SPEEDS = (0.9, 1.0, 1.1)  # of another aircraft, as shares of the speed it starts with
-REFERENCE = {
-    axis: [{"sine": {"amplitude_deg_s": 3, "frequency_hz": frequency_hz}}]
-    for axis, frequency_hz in (("p", 0.25), ("q", 0.2), ("r", 0.15))
-}
-# [Zhang2005, sec. VII]
-UNCERTAINTY = {
-    "inertia_coupling": {"p": 0.25, "q": -0.25, "r": 0.25},
-    "sinusoid": {
-        axis: {"amplitude_rad_s2": 0.02, "frequency_rad_s": frequency_rad_s}
-        for axis, frequency_rad_s in (("p", 10), ("q", 15), ("r", 10))
-    },
-}
+REFERENCE, UNCERTAINTY = SETTING["reference"], SETTING["uncertainty"]
 
 # Name in the table, and the fault; off_deg: a jam this far off the trimmed command.
 FAULTS: tuple[tuple[str, dict[str, Any]], ...] = tuple(

@@ -68,8 +68,13 @@ CHOICES = (
 )
 
 
+# Both together, as the sections of a scenario.
+SETTING: dict[str, Any] = with_values(
+    {}, {parse_key(key): value for key, value in {**GIVEN, **{c.key: c.value for c in CHOICES}}.items()}
+)
+
+
 def scenario(name: str, changes: Mapping[str, Any]) -> Scenario:
-    """The published setting with our choices and `changes`, all dotted keys, as a scenario."""
-    values = {**GIVEN, **{choice.key: choice.value for choice in CHOICES}, **changes}
-    places = {parse_key(key): value for key, value in values.items()}
-    return Scenario.model_validate(with_values({"name": name}, places))
+    """The published setting with our choices and `changes`, dotted keys, as a scenario."""
+    places = {parse_key(key): value for key, value in changes.items()}
+    return Scenario.model_validate(with_values({"name": name, **SETTING}, places))

@@ -28,10 +28,11 @@ from beaver_ftc.documents.problems import ScenarioError
 from beaver_ftc.documents.validation import parse_document
 from beaver_ftc.plant.adapter import Plant, translated
 from beaver_ftc.plant.model_file import refuse_deeds
+from beaver_ftc.plant.trim import trim
 from beaver_ftc.scenario.diagnosis import Bounds
 from beaver_ftc.studies.derive.derivation import derive, source_of
 from beaver_ftc.studies.derive.fit import errors_of
-from beaver_ftc.studies.derive.outline import trim_at, usual_start
+from beaver_ftc.studies.derive.outline import usual_start
 from beaver_ftc.studies.derive.sample import FRESH, SIDESLIP_RAD, Envelope, Samples, sample, sorted_in
 from beaver_ftc.studies.engine.store import write_whole
 
@@ -133,7 +134,7 @@ def _bad(aircraft: Aircraft, says: Mapping[Location, str]) -> ScenarioError:
 
 def _samples(aircraft: Aircraft, plant: Plant) -> Samples:
     """States over the envelope, in their boxes if the file has a map."""
-    point = trim_at(plant, **usual_start(aircraft))
+    point = trim(plant=plant, **usual_start(aircraft))
     envelope = Envelope(aircraft.envelope.airspeed_mps, aircraft.alpha_rad, SIDESLIP_RAD)
     properties = {name: signal.property for name, signal in aircraft.signals.items()}
     samples = sample(plant, envelope, point, STATES, SEED, properties, FRESH, STARTS)

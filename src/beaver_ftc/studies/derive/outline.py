@@ -308,19 +308,13 @@ def level_as_filed(source: Path, folder: Path, envelope: EnvelopeFile) -> Level:
     if envelope.altitude_m is not None:
         start["altitude_m"] = envelope.altitude_m
     plant = Plant(100, aircraft=aircraft)
-    return data, plant, trim_at(plant, **start)
+    return data, plant, trim(plant=plant, **start)
 
 
 def usual_start(aircraft: Aircraft) -> dict[str, float]:
     """Where a scenario of an aircraft starts that says nothing else."""
     usual = initial_of(aircraft)()
     return {"airspeed_mps": usual.airspeed_mps, "altitude_m": usual.altitude_m}
-
-
-def trim_at(plant: Plant, airspeed_mps: float, altitude_m: float) -> TrimPoint:
-    """Trim with the engine as the file has it. Raises BadInput as `trim`."""
-    settings = {name: setting.default for name, setting in plant.aircraft.engine.settings.items()}
-    return trim(airspeed_mps, altitude_m, plant=plant, **settings)
 
 
 def named_as(aircraft: Aircraft, moments: dict[str, list[dict[str, Any]]]) -> dict[str, list[dict[str, Any]]]:

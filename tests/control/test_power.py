@@ -22,7 +22,7 @@ from beaver_ftc.scenario.control import EnginePower
 from beaver_ftc.scenario.loader import load_text
 from beaver_ftc.studies.matrix.fault_matrix import REFERENCE, trimmed_deg
 from beaver_ftc.studies.matrix.pitch_lost import closed_loop
-from beaver_ftc.studies.mismatch.linear import engine_of, state_vector, surfaces_of
+from beaver_ftc.studies.mismatch.linear import in_fdc
 from flying import flown, scenario
 
 DT = 0.01
@@ -168,7 +168,7 @@ class TestTheDesign:
 
     def plant(self, V):
         point = trim(V, 1828.8)
-        arguments = state_vector(point), surfaces_of(point), engine_of(point)
+        arguments = in_fdc(point)
         A = fdc.linearise(*arguments)[0]
         ahead, behind = (
             fdc.derivatives(*arguments[:2], fdc.Engine(1800.0, 20.0 + step)) for step in (0.01, -0.01)

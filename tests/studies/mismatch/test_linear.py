@@ -21,7 +21,7 @@ from beaver_ftc.studies.linear_systems import (
     response,
     zeros,
 )
-from beaver_ftc.studies.mismatch.linear import analyse, engine_of, state_vector, surfaces_of
+from beaver_ftc.studies.mismatch.linear import analyse, in_fdc
 from flying import scenario
 
 ENVELOPE = [(30, 0), (35, 1828.8), (45, 1828.8), (50, 3000), (55, 4000)]
@@ -51,7 +51,7 @@ def test_surfaces_act_in_jsbsims_linear_models_as_in_fdc(analysis):
     """Angular acceleration per rad of each surface, from differences and from JSBSim's own linearisation."""
     rates = ("p", "q", "r")
     straight = dataclasses.replace(analysis.point, beta_rad=0.0)
-    _, B = fdc.linearise(state_vector(straight), surfaces_of(straight), engine_of(straight))
+    _, B = fdc.linearise(*in_fdc(straight))
     found = own(scenario(), straight).of(rates).B
     assert found == pytest.approx(B[3:6, :3], rel=2e-3, abs=1e-3)
     differenced = analysis.models["truth"].of(rates).B

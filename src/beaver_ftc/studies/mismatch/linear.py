@@ -69,26 +69,17 @@ def own_deviation(scenario: Scenario, point: FlightState) -> dict[str, float]:
 def fdc_model(scenario: Scenario, point: FlightState) -> LinearModel:
     """The FDC equations with the truth's declared coefficients, twelve states."""
     ratio = scenario.uncertainty.coefficients
-    matrices = fdc.linearise(state_vector(point), surfaces_of(point), engine_of(point), ratio)
-    return LinearModel(*matrices, fdc.STATES, fdc.SURFACES)
+    return LinearModel(*fdc.linearise(*in_fdc(point), ratio), fdc.STATES, fdc.SURFACES)
 
 
-def state_vector(point: FlightState) -> np.ndarray:
-    """A flight condition as the FDC state, (12,)."""
-    return np.array([
+def in_fdc(point: FlightState) -> tuple[np.ndarray, np.ndarray, fdc.Engine]:
+    """A flight condition as the FDC equations take it: state (12,), deflections (4,) rad, engine setting."""
+    state = np.array([
         point.airspeed_mps, point.alpha_rad, point.beta_rad, point.p_rad_s, point.q_rad_s, point.r_rad_s,
         point.phi_rad, point.theta_rad, point.psi_rad, 0.0, 0.0, point.altitude_m,
     ])  # fmt: skip
-
-
-def surfaces_of(point: FlightState) -> np.ndarray:
-    """Deflections (4,) rad."""
-    return np.array([getattr(point, f"{surface}_rad") for surface in fdc.SURFACES])
-
-
-def engine_of(point: FlightState) -> fdc.Engine:
-    """Engine setting."""
-    return fdc.Engine(point.engine_rpm, point.manifold_pressure_inhg)
+    deflections = np.array([point.surfaces_rad[surface] for surface in fdc.SURFACES])
+    return state, deflections, fdc.Engine(point.engine_rpm, point.manifold_pressure_inhg)
 
 
 def designed(scenario: Scenario, point: FlightState, equations: LinearModel) -> LinearModel:
@@ -107,7 +98,7 @@ def designed_derivatives(scenario: Scenario, point: FlightState) -> tuple[np.nda
     """f_x (3, 3), f_y (3, 5) and G (3, 4) of the design model at a trim, where it is frozen or linearised."""
     design = design_of(scenario.design_model)[0]
     y = np.array([point.alpha_rad, point.beta_rad, *air_data(point)])
-    _, G, f_x, f_y = jacobian(design, np.zeros(3), y, surfaces_of(point))
+    _, G, f_x, f_y = jacobian(design, np.zeros(3), y, in_fdc(point)[1])
     if design["frozen_alpha"]:
         f_y[:, ALPHA] = 0.0
     return f_x, f_y, G

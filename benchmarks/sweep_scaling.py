@@ -23,7 +23,7 @@ from pathlib import Path
 
 from beaver_ftc.scenario.sweeps import Sweep, load_sweep
 from beaver_ftc.studies.engine.store import Parts
-from beaver_ftc.studies.engine.workers import ONE_THREAD_EACH, Row, Task, Work, Workers
+from beaver_ftc.studies.engine.workers import ONE_THREAD_EACH, Batch, Row, Work, Workers
 from beaver_ftc.studies.sweep.campaign import Options, run_sweep
 from beaver_ftc.studies.sweep.one_flight import fly_one, scenario_of
 from beaver_ftc.studies.sweep.sampling import Assignment, Plan
@@ -178,7 +178,7 @@ def _through(workers: Workers, cases: tuple[Assignment, ...], batches: int) -> N
     sent = back = 0
     while back < batches:
         while sent < batches and sent - back < workers.slots:
-            workers.submit(Task(sent, cases))
+            workers.submit(Batch(sent, cases))
             sent += 1
         back += len(workers.outcomes(1.0))
 

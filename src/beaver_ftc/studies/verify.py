@@ -26,9 +26,9 @@ from beaver_ftc.scenario.faults import LossOfEffectiveness
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.engine.statistics import CONFIDENCE, binomial_upper, poisson_bound, share_within
 from beaver_ftc.studies.engine.store import Parts, RowsAsJson, fingerprint, write_whole
-from beaver_ftc.studies.engine.study import GO_ON, Batch, Batches, Progress
+from beaver_ftc.studies.engine.study import GO_ON, Batches, Progress
 from beaver_ftc.studies.engine.study import conduct as fly_missing
-from beaver_ftc.studies.engine.workers import Work
+from beaver_ftc.studies.engine.workers import Batch, Work
 from beaver_ftc.studies.present.tables import finite, number
 
 AXES = ("p", "q", "r")

@@ -4,8 +4,8 @@ import random
 
 import pytest
 
-from beaver_ftc.studies.engine.study import Batch, Batches, Campaign
-from beaver_ftc.studies.engine.workers import Case, Outcome, Task
+from beaver_ftc.studies.engine.study import Batches, Campaign
+from beaver_ftc.studies.engine.workers import Batch, Case, Outcome
 
 
 class Numbers:
@@ -29,8 +29,8 @@ class Unreliable:
     def __init__(self, slots: int, loses: float = 0.0, deadly: frozenset[int] = frozenset()) -> None:
         self.slots, self._loses, self._deadly = slots, loses, deadly
         self._random = random.Random(4)
-        self._tasks: list[Task] = []
-        self.submitted: list[Task] = []
+        self._tasks: list[Batch] = []
+        self.submitted: list[Batch] = []
 
     def submit(self, task):
         assert len(self._tasks) < self.slots, "more tasks than it has hands"

@@ -8,7 +8,7 @@ import pytest
 
 PROGRAM = """
 import sys, time
-from beaver_ftc.studies.engine.workers import Case, Task, Work, _Worker
+from beaver_ftc.studies.engine.workers import Batch, Case, Work, _Worker
 
 def nap(case):
     time.sleep(20.0)
@@ -16,7 +16,7 @@ def nap(case):
 if __name__ == "__main__":
     workers = [_Worker(Work(nap)) for _ in range(3)]
     for number, worker in enumerate(workers):
-        worker.fly(Task(number, (Case(0, None),)))
+        worker.fly(Batch(number, (Case(0, None),)))
     time.sleep(float(sys.argv[1]))
     for worker in workers:
         worker.end()

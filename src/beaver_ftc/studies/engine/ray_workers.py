@@ -10,7 +10,7 @@ from typing import Any
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.plugins import VARIABLE
 from beaver_ftc.results.metrics import versions
-from beaver_ftc.studies.engine.workers import ONE_THREAD_EACH, Outcome, Row, Task, Work, silence
+from beaver_ftc.studies.engine.workers import ONE_THREAD_EACH, Batch, Outcome, Row, Work, silence
 
 QUEUED_A_CPU = 2
 
@@ -29,7 +29,7 @@ class RayWorkers:
         self._work = self._ray.put(work)
         self._versions = dict(versions())
         self._fly = self._ray.remote(num_cpus=1, max_retries=0)(fly_task)
-        self._tasks: dict[Any, Task] = {}
+        self._tasks: dict[Any, Batch] = {}
 
     @property
     def slots(self) -> int:
@@ -37,7 +37,7 @@ class RayWorkers:
         cpus = max(1, int(self._ray.cluster_resources().get("CPU", 1)))
         return self._most or QUEUED_A_CPU * cpus
 
-    def submit(self, task: Task) -> None:
+    def submit(self, task: Batch) -> None:
         self._tasks[self._fly.remote(self._work, self._versions, task.cases)] = task
 
     def outcomes(self, timeout_s: float) -> list[Outcome]:

@@ -13,17 +13,17 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from beaver_ftc.documents.errors import SimulationFailed
 from beaver_ftc.results.writer import clear_disk_errors, result_folder
 from beaver_ftc.studies.engine import store
 from beaver_ftc.studies.engine.workers import (
+    Batch,
     Case,
     LocalWorkers,
     Number,
     Row,
-    Task,
     ThisProcess,
     Work,
     Workers,
@@ -38,13 +38,6 @@ POLL_S = 0.2
 MOST_LOSSES = 3
 TASKS_A_SLOT = 4  # towards the end tasks get smaller, so that no worker is left with a long last one
 LOST = "the process that flies it ends, each time it is tried"
-
-
-class Batch(NamedTuple):
-    """Cases that land together; each has a `run`."""
-
-    number: Number
-    cases: tuple[Any, ...]
 
 
 @dataclass
@@ -68,7 +61,7 @@ class Campaign:
 
     def __init__(self, batches: Batches, workers: Workers, lost: Lost) -> None:
         self._batches, self._workers, self._lost = batches, workers, lost
-        self._waiting: deque[Task] = deque()
+        self._waiting: deque[Batch] = deque()
         self._flying = 0
         self._flown: dict[Number, tuple[Batch, dict[int, Row]]] = {}
         self._losses: Counter[tuple[int, ...]] = Counter()
@@ -99,32 +92,32 @@ class Campaign:
             self._flown[batch.number] = (batch, {})
             size = max(1, math.ceil(self._batches.left / (self._workers.slots * TASKS_A_SLOT)))
             self._batches.left -= len(batch.cases)
-            self._waiting.extend(_tasks(batch.number, batch.cases, size))
+            self._waiting.extend(_tasks(batch, size))
 
-    def _gather(self, task: Task, rows: list[Row] | None) -> list[tuple[Batch, dict[int, Row]]]:
+    def _gather(self, task: Batch, rows: list[Row] | None) -> list[tuple[Batch, dict[int, Row]]]:
         """The batch that these rows complete, if they do."""
         self._flying -= 1
-        batch, so_far = self._flown[task.batch]
+        batch, so_far = self._flown[task.number]
         flown = self._fly_again(task) if rows is None else zip(task.cases, rows, strict=True)
         so_far.update((case.run, row) for case, row in flown)
         if len(so_far) < len(batch.cases):
             return []
-        del self._flown[task.batch]
+        del self._flown[task.number]
         return [(batch, so_far)]
 
-    def _fly_again(self, task: Task) -> list[tuple[Any, Row]]:
+    def _fly_again(self, task: Batch) -> list[tuple[Any, Row]]:
         """See to a lost task; the (case, row) it yields all the same."""
         key = tuple(case.run for case in task.cases)
         self._losses[key] += 1
         if len(key) == 1 and self._losses[key] >= MOST_LOSSES:
             return [(task.cases[0], self._lost(task.cases[0], LOST))]
         size = 1 if self._losses[key] > 1 else len(key)
-        self._waiting.extendleft(reversed(_tasks(task.batch, task.cases, size)))
+        self._waiting.extendleft(reversed(_tasks(task, size)))
         return []
 
 
-def _tasks(batch: Number, cases: Sequence[Any], size: int) -> list[Task]:
-    return [Task(batch, tuple(cases[i : i + size])) for i in range(0, len(cases), size)]
+def _tasks(batch: Batch, size: int) -> list[Batch]:
+    return [Batch(batch.number, batch.cases[i : i + size]) for i in range(0, len(batch.cases), size)]
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,7 @@
 """Who flies: the contract of a backend, worker processes on this machine, and this very process.
 
-A task is some cases of a batch. Workers fly tasks and hand back their rows, or say that one was lost over it.
+A task is a batch, or some of its cases. Workers fly tasks and hand back their rows, or say that one was lost
+over it.
 
 Processes are forked from a clean one that has everything imported. Importing takes that process half a
 second; started early, it does so while this one still reads its input. Nothing heavy is imported here.
@@ -34,17 +35,17 @@ class Case(NamedTuple):
     what: Any
 
 
-class Task(NamedTuple):
-    """Cases to be flown one after the other by one worker; each has a `run`."""
+class Batch(NamedTuple):
+    """Cases that land together, or those of them that one worker flies in turn; each has a `run`."""
 
-    batch: Number
+    number: Number
     cases: tuple[Any, ...]
 
 
 class Outcome(NamedTuple):
     """What became of a task: its rows, or None if the worker was lost over it."""
 
-    task: Task
+    task: Batch
     rows: list[Row] | None
 
 
@@ -66,7 +67,7 @@ class Workers(Protocol):
     def slots(self) -> int:
         """How many tasks to keep in its hands, so that no worker waits."""
 
-    def submit(self, task: Task) -> None:
+    def submit(self, task: Batch) -> None:
         """Take a task; never more at a time than `slots`."""
 
     def outcomes(self, timeout_s: float) -> list[Outcome]:
@@ -83,9 +84,9 @@ class ThisProcess:
 
     def __init__(self, work: Work) -> None:
         self._work = work
-        self._tasks: deque[Task] = deque()
+        self._tasks: deque[Batch] = deque()
 
-    def submit(self, task: Task) -> None:
+    def submit(self, task: Batch) -> None:
         self._tasks.append(task)
 
     def outcomes(self, timeout_s: float) -> list[Outcome]:
@@ -104,7 +105,7 @@ class _Worker:
         with single_threaded():
             self.pid: Future[int] = self._pool.submit(os.getpid)
 
-    def fly(self, task: Task) -> "Future[list[Row]]":
+    def fly(self, task: Batch) -> "Future[list[Row]]":
         return self._pool.submit(_fly, task.cases)
 
     def end(self) -> None:
@@ -129,9 +130,9 @@ class LocalWorkers:
         self._idle = [_Worker(work)]
         wait([self._idle[0].pid])  # the first compiles, should that be needed; the others find it done
         self._idle += [_Worker(work) for _ in range(workers - 1)]
-        self._busy: dict[Future[list[Row]], tuple[_Worker, Task]] = {}
+        self._busy: dict[Future[list[Row]], tuple[_Worker, Batch]] = {}
 
-    def submit(self, task: Task) -> None:
+    def submit(self, task: Batch) -> None:
         worker = self._idle.pop()
         try:
             flying = worker.fly(task)

@@ -14,8 +14,8 @@ from beaver_ftc.results.metrics import as_json, versions
 from beaver_ftc.results.writer import clear_disk_errors
 from beaver_ftc.scenario.sweeps import Sweep
 from beaver_ftc.studies.engine.store import batches_of, write_whole
-from beaver_ftc.studies.engine.study import Batch, Batches, Campaign
-from beaver_ftc.studies.engine.workers import LocalWorkers, Number, Row, Work, Workers, cores
+from beaver_ftc.studies.engine.study import Batches, Campaign
+from beaver_ftc.studies.engine.workers import Batch, LocalWorkers, Number, Row, Work, Workers, cores
 from beaver_ftc.studies.sweep import one_flight
 from beaver_ftc.studies.sweep.one_flight import Keep, counts_of_rows, counts_of_table
 from beaver_ftc.studies.sweep.sampling import Assignment, Plan

@@ -15,7 +15,7 @@ import numpy as np
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.scenario.sweeps import Sweep
 from beaver_ftc.studies.engine.store import batches_of
-from beaver_ftc.studies.engine.study import Batch
+from beaver_ftc.studies.engine.workers import Batch
 from beaver_ftc.studies.present.tables import finite
 from beaver_ftc.studies.sweep.one_flight import AXES, DEPARTED
 from beaver_ftc.studies.sweep.sampling import Assignment, value_at

@@ -8,7 +8,7 @@ from statistics import fmean
 from typing import Any
 
 from beaver_ftc.diagnosis.bounds.clairvoyant import chance
-from beaver_ftc.results.metrics import versions
+from beaver_ftc.results.metrics import Document, versions
 from beaver_ftc.studies.compare.replay import Trace, alarms_at
 from beaver_ftc.studies.engine.statistics import Estimate, binomial, poisson, share_within, sign_test
 from beaver_ftc.studies.power.survey import BUILT_IN, WATCHED_S, WITHIN_S, Grid, Watched
@@ -46,7 +46,6 @@ def level_at(healthy: Sequence[Trace], level: float) -> Level:
 
 
 Row = dict[str, Any]
-Document = dict[str, Any]
 Key = tuple[str, str, str]  # sensors, turbulence, scheme
 
 

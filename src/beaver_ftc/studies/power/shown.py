@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from beaver_ftc.results.metrics import as_json
+from beaver_ftc.results.metrics import Document, as_json
 from beaver_ftc.studies.engine.study import Progress, Study, run_study
 from beaver_ftc.studies.power.chances import JUDGED_S, SIGNIFICANT, Row, document_of, grouped, limit, summary
 from beaver_ftc.studies.power.survey import BUILT_IN, WITHIN_S, Grid, Watched, fly_block, lost
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from matplotlib.image import AxesImage
     from rich.table import Table
 
-Document = dict[str, Any]
 NAME = "power"
 WIDTH = 140
 OWN = "  as it ships"

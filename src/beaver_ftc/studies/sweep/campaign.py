@@ -7,10 +7,10 @@ from contextlib import ExitStack, closing
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from beaver_ftc.documents.errors import BadInput, BeaverFtcError, SimulationFailed
-from beaver_ftc.results.metrics import as_json, versions
+from beaver_ftc.results.metrics import Document, as_json, versions
 from beaver_ftc.results.writer import clear_disk_errors
 from beaver_ftc.scenario.sweeps import Sweep
 from beaver_ftc.studies.engine.store import batches_of, write_whole
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from beaver_ftc.studies.sweep.outcomes import Flights
 
 
-Document = dict[str, Any]
 Landed = Callable[[Counter[str]], None]  # takes the counts of a batch
 
 

@@ -8,17 +8,14 @@ import re
 from collections import Counter
 from collections.abc import Callable, Iterator
 from functools import partial
-from typing import Any
 
 import numpy as np
 
 from beaver_ftc.scenario.sweeps import AxisLevels, Level, QuantileLevel, Sweep, SweepExpect
 from beaver_ftc.studies.engine import statistics
 from beaver_ftc.studies.engine.statistics import CONFIDENCE, Estimate, quantile, wilson
-from beaver_ftc.studies.sweep.one_flight import AXES
+from beaver_ftc.studies.sweep.one_flight import AXES, Document
 from beaver_ftc.studies.sweep.outcomes import NO_FAULT, Flights, Ranking, rank
-
-Document = dict[str, Any]
 
 QUANTILES = {"median": 0.5, "p90": 0.9, "p95": 0.95, "p99": 0.99, "max": 1.0}
 FALSE_ALARM, NO_ALARM, NOT_ISOLATED = "false alarm", "no alarm", "not isolated"

@@ -8,15 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 from beaver_ftc.studies.present.page import picture_data
 from beaver_ftc.studies.present.tables import number, printed
-from beaver_ftc.studies.sweep.one_flight import AXES
+from beaver_ftc.studies.sweep.one_flight import AXES, Document
 from beaver_ftc.studies.sweep.pictures import FIGURES
 from beaver_ftc.studies.sweep.summary import OUTCOMES
 
 if TYPE_CHECKING:
     from rich.table import Table
 
-
-Document = dict[str, Any]
 
 _UNITS = {"delay": " s", "false_alarm": " of the threshold", "tracking": " deg/s"}
 

@@ -26,7 +26,7 @@ from beaver_ftc.studies.power.survey import (
     Condition,
     Watched,
     contenders,
-    fly_faulted,
+    fly_block,
     loss,
     scenario_of,
     strikes_at_s,
@@ -252,7 +252,7 @@ class TestSurvey:
     def test_without_the_vanes_plug_ins_are_shown_the_rates_alone_and_ours_as_before(self):
         block = SMALL.faulted()[-1]
         with_vanes, without = (
-            fly_faulted(block, replace(SMALL, vanes=vanes), contenders(["augmented-ekf"]))
+            fly_block((block, True), replace(SMALL, vanes=vanes), contenders(["augmented-ekf"]))
             for vanes in (True, False)
         )
         for scheme in BUILT_IN:
@@ -265,7 +265,7 @@ class TestSurvey:
     def test_a_bout_flown_alone_gives_the_same(self, survey):
         document, folder = survey
         block = SMALL.faulted()[-1]
-        one = fly_faulted(block, SMALL, contenders(["observer-constant"]))
+        one = fly_block((block, True), SMALL, contenders(["observer-constant"]))
         level = next(
             level["level"]
             for level in document["levels"]
@@ -314,7 +314,7 @@ class TestContenders:
     def test_a_plug_in_that_fails_is_named_and_the_others_go_on(self):
         broken = f"{__name__}:Raises"
         grid = replace(SMALL, magnitudes=(1.0,), surfaces=("elevator",))
-        one = fly_faulted(grid.faulted()[0], grid, [*contenders([]), broken])
+        one = fly_block((grid.faulted()[0], True), grid, [*contenders([]), broken])
         assert set(one.traces) == set(BUILT_IN)
         assert len(one.failures) == 1
         assert one.failures[0].startswith(f"{broken}: plug-in {broken}: not registered")

@@ -216,19 +216,14 @@ class Watched:
     failures: list[str] = field(default_factory=list)
 
 
-def fly_faulted(block: Block, grid: Grid, schemes: Sequence[str]) -> Watched:
-    """Every fault of the grid in this block."""
-    at_s = strikes_at_s(block)
-    flights = [scenario_of(block, at_s + WATCHED_S, [loss(*fault, at_s)]) for fault in grid.faults]
-    return _watch(Watched(block, grid.faults), flights, schemes, grid.vanes)
-
-
 def fly_block(case: tuple[Block, bool], grid: Grid, schemes: Sequence[str]) -> Watched:
     """Every fault of the grid in a block, or the one flight of a block without a fault."""
     block, faulted = case
-    if faulted:
-        return fly_faulted(block, grid, schemes)
-    return _watch(Watched(block), [scenario_of(block, grid.healthy_flight_s)], schemes, grid.vanes)
+    if not faulted:
+        return _watch(Watched(block), [scenario_of(block, grid.healthy_flight_s)], schemes, grid.vanes)
+    at_s = strikes_at_s(block)
+    flights = [scenario_of(block, at_s + WATCHED_S, [loss(*fault, at_s)]) for fault in grid.faults]
+    return _watch(Watched(block, grid.faults), flights, schemes, grid.vanes)
 
 
 def _watch(watched: Watched, flights: Sequence[Scenario], schemes: Sequence[str], vanes: bool) -> Watched:

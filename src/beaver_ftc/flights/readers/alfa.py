@@ -8,8 +8,11 @@ Time counts from the first row of `mavros-imu-data_raw`. A fault begins at the f
 `failure_status-*` topic.
 """
 
+import json
 from collections.abc import Callable, Iterator
+from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,20 +23,10 @@ from beaver_ftc.flights.recording import Column, Event, Floats, Recording, in_or
 
 _NS = 1e-9
 _TIME = "%time"
-_RAW, _OUTPUTS = "mavros-imu-data_raw", "mavros-rc-out"
+_RAW = "mavros-imu-data_raw"
 _STATUS = "failure_status-"
-_SIDES = {
-    ("aileron", 1): "right_aileron",
-    ("aileron", 2): "left_aileron",
-    ("elevator", 1): "elevator",
-    ("engines", 1): "engine",
-}
 
 Table = dict[str, Floats]
-
-
-def _same(values: Floats) -> Floats:
-    return values
 
 
 def _microseconds(values: Floats) -> Floats:
@@ -41,25 +34,15 @@ def _microseconds(values: Floats) -> Floats:
     return (values - 1500.0) / 400.0
 
 
-_COLUMNS: tuple[tuple[str, str, str, Callable[[Floats], Floats]], ...] = (
-    ("p_rad_s", _RAW, "field.angular_velocity.x", _same),
-    ("q_rad_s", _RAW, "field.angular_velocity.y", _same),
-    ("r_rad_s", _RAW, "field.angular_velocity.z", _same),
-    *((f"a{axis}_m_s2", _RAW, f"field.linear_acceleration.{axis}", _same) for axis in "xyz"),
-    ("roll_command_rad", "mavros-nav_info-roll", "field.commanded", np.deg2rad),
-    ("roll_rad", "mavros-nav_info-roll", "field.measured", np.deg2rad),
-    ("pitch_command_rad", "mavros-nav_info-pitch", "field.commanded", np.deg2rad),
-    ("pitch_rad", "mavros-nav_info-pitch", "field.measured", np.deg2rad),
-    ("ground_north_m_s", "mavros-nav_info-velocity", "field.meas_y", _same),
-    ("ground_east_m_s", "mavros-nav_info-velocity", "field.meas_x", _same),
-    ("wind_east_m_s", "mavros-wind_estimation", "field.twist.linear.x", _same),
-    ("wind_north_m_s", "mavros-wind_estimation", "field.twist.linear.y", _same),
-    ("elevator_output", _OUTPUTS, "field.channels1", _microseconds),
-    ("throttle_output", _OUTPUTS, "field.channels2", _microseconds),
-    ("rudder_output", _OUTPUTS, "field.channels3", _microseconds),
-    ("left_aileron_output", _OUTPUTS, "field.channels4", _microseconds),
-    ("right_aileron_output", _OUTPUTS, "field.channels5", _microseconds),
-)
+_FROM: dict[str, Callable[[Floats], Floats]] = {"": np.asarray, "deg": np.deg2rad, "us": _microseconds}
+
+
+@cache
+def _known() -> dict[str, dict[str, Any]]:
+    """columns: of each its topic, its field and the unit there, empty for the column's own; failures: of a
+    status' part and code, what has failed."""
+    found: dict[str, dict[str, Any]] = json.loads(Path(__file__).with_name("alfa.json").read_text("utf-8"))
+    return found
 
 
 def read(path: Path) -> Recording:
@@ -78,7 +61,7 @@ def read(path: Path) -> Recording:
 
 
 def _topics(path: Path) -> Iterator[tuple[str, Table]]:
-    wanted = {topic for _, topic, _, _ in _COLUMNS}
+    wanted = {topic for topic, _, _ in _known()["columns"].values()}
     for file in sorted(path.glob("*.csv")):
         topic = file.stem.removeprefix(path.name).removeprefix("-")
         if topic in wanted or topic.startswith(_STATUS):
@@ -90,11 +73,11 @@ def _topics(path: Path) -> Iterator[tuple[str, Table]]:
 def _columns(
     topics: dict[str, Table], ordered: dict[str, tuple[NDArray[np.int64], str]], origin_ns: float
 ) -> Iterator[tuple[str, Column]]:
-    for name, topic, field, convert in _COLUMNS:
+    for name, (topic, field, unit) in _known()["columns"].items():
         if field in topics.get(topic, {}):
             kept, note = ordered[topic]
             t_s = (topics[topic][_TIME][kept] - origin_ns) * _NS
-            yield name, Column(t_s, convert(topics[topic][field])[kept], note)
+            yield name, Column(t_s, _FROM[unit](topics[topic][field])[kept], note)
 
 
 def _add_errors(columns: dict[str, Column]) -> None:
@@ -113,4 +96,4 @@ def _events(topics: dict[str, Table], origin_ns: float) -> Iterator[Event]:
             for code in sorted(set(codes[np.isfinite(codes)])):
                 first = int(np.argmax(codes == code))
                 t_s = float((table[_TIME][first] - origin_ns) * _NS)
-                yield Event(t_s, _SIDES.get((part, int(code)), part))
+                yield Event(t_s, _known()["failures"].get(f"{part} {int(code)}", part))

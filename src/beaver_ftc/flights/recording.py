@@ -4,12 +4,17 @@ Which rows of an autopilot's log are in order, and what is said of the others.
 """
 
 from bisect import bisect_left
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, redirect_stdout
 from dataclasses import dataclass, field
+from io import StringIO
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from beaver_ftc.documents.errors import BadInput
 
 Floats = NDArray[np.float64]
 _US = 1e-6
@@ -43,6 +48,24 @@ class Recording:
     columns: Mapping[str, Column]
     events: tuple[Event, ...] = ()
     notes: tuple[str, ...] = field(default=())
+
+
+@contextmanager
+def reading(path: Path, what: str, package: str, form: str) -> Iterator[None]:
+    """Within this an autopilot's log is read with a package of others: what it prints of damaged files stays
+    here. Raises BadInput where the package is missing, or the file is none that it can read.
+
+    what: such a log is called; form: of the files that hold one.
+    """
+    try:
+        with redirect_stdout(StringIO()):
+            yield
+    except ImportError:
+        extra = f"reading a {what} needs {package}, allowed: pip install 'beaver-ftc[flights]'"
+        raise BadInput(f"{path}: {extra}") from None
+    except Exception as error:  # these packages raise whatever a damaged file makes them stumble over
+        says = " ".join(str(error).split()) or type(error).__name__
+        raise BadInput(f"{path}: is no {what} that can be read ({says}), allowed: {form}") from None
 
 
 def columns_of(topics: dict[str, dict[str, Any]], stamp: str) -> tuple[dict[str, Column], float]:

@@ -9,14 +9,13 @@ import os
 import sys
 from array import array
 from collections.abc import Iterator
-from contextlib import contextmanager, redirect_stdout
-from io import StringIO
+from contextlib import contextmanager
 from math import nan
 from pathlib import Path
 from typing import Any
 
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.flights.recording import Recording, columns_of
+from beaver_ftc.flights.recording import Recording, columns_of, reading
 
 _TIME, _INSTANCES = "TimeUS", ("I", "C", "Instance")
 _OVERHEAD = {"FMT", "FMTU", "UNIT", "MULT", "PARM", "MSG"}
@@ -35,48 +34,33 @@ def read(path: Path) -> Recording:
 def _messages(path: Path) -> dict[str, Fields]:
     """The numeric fields of all messages with a stamp, by message and instance: those of its first."""
     found: dict[str, Fields] = {}
-    reader = _reader(path)
-    try:
-        with _silence():
-            log = reader(str(path))
-            while (message := log.recv_msg()) is not None:
-                fields = message.to_dict()
-                numbers = {k: float(value) for k, value in fields.items() if isinstance(value, int | float)}
-                if message.get_type() not in _OVERHEAD and _TIME in numbers:
-                    name = _name(message.get_type(), fields)
-                    for field, values in found.setdefault(name, {k: array("d") for k in numbers}).items():
-                        values.append(numbers.get(field, nan))
-    except Exception as error:  # pymavlink raises whatever a damaged file makes it stumble over
-        says = " ".join(str(error).split()) or type(error).__name__
-        allowed = "allowed: ArduPilot's .bin or .log"
-        raise BadInput(f"{path}: is no dataflash log that can be read ({says}), {allowed}") from None
+    with reading(path, "dataflash log", "pymavlink", "ArduPilot's .bin or .log"), _silence():
+        from pymavlink import DFReader
+
+        text = path.suffix.lower() == ".log"
+        log = (DFReader.DFReader_text if text else DFReader.DFReader_binary)(str(path))
+        while (message := log.recv_msg()) is not None:
+            fields = message.to_dict()
+            numbers = {k: float(value) for k, value in fields.items() if isinstance(value, int | float)}
+            if message.get_type() not in _OVERHEAD and _TIME in numbers:
+                name = _name(message.get_type(), fields)
+                for field, values in found.setdefault(name, {k: array("d") for k in numbers}).items():
+                    values.append(numbers.get(field, nan))
     return found
 
 
 @contextmanager
 def _silence() -> Iterator[None]:
-    """Nothing on standard error or output: pymavlink, and its indexer in C, print what they skip."""
+    """Nothing on standard error: pymavlink, and its indexer in C, print what they skip."""
     sys.stderr.flush()
     kept, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, 2)
     try:
-        with redirect_stdout(StringIO()):
-            yield
+        yield
     finally:
         os.dup2(kept, 2)
         os.close(kept)
         os.close(nowhere)
-
-
-def _reader(path: Path) -> Any:
-    try:
-        from pymavlink import DFReader
-    except ImportError:
-        raise BadInput(
-            f"{path}: reading a dataflash log needs pymavlink, allowed: pip install 'beaver-ftc[flights]'"
-        ) from None
-    text = path.suffix.lower() == ".log"
-    return DFReader.DFReader_text if text else DFReader.DFReader_binary
 
 
 def _name(kind: str, fields: dict[str, Any]) -> str:

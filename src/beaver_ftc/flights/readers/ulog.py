@@ -3,13 +3,11 @@
 Time counts from the first message of the log. Reading needs pyulog: the extra `flights`.
 """
 
-from contextlib import redirect_stdout
-from io import StringIO
 from pathlib import Path
 from typing import Any
 
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.flights.recording import Recording, columns_of
+from beaver_ftc.flights.recording import Recording, columns_of, reading
 
 _STAMP = "timestamp"
 _LONGEST = 65535
@@ -31,22 +29,15 @@ def _name(topic: Any) -> str:
 
 
 def _topics(path: Path) -> list[Any]:
-    try:
+    with reading(path, "ULog", "pyulog", "a .ulg file of PX4"):
         from pyulog import ULog
-    except ImportError:
-        raise BadInput(
-            f"{path}: reading a ULog needs pyulog, allowed: pip install 'beaver-ftc[flights]'"
-        ) from None
-    try:
-        with redirect_stdout(StringIO()):  # pyulog prints what is damaged where the answer belongs
-            formats = ULog(str(path), parse_header_only=True).message_formats
-            for name in formats:
-                if _length(formats, name, ()) > _LONGEST:  # pyulog writes every field of one out
-                    raise ValueError(f"a message {name} would have more than {_LONGEST} bytes")
-            return list(ULog(str(path)).data_list)
-    except Exception as error:  # pyulog raises whatever a damaged file makes it stumble over
-        says = " ".join(str(error).split()) or type(error).__name__
-        raise BadInput(f"{path}: is no ULog that can be read ({says}), allowed: a .ulg file of PX4") from None
+
+        formats = ULog(str(path), parse_header_only=True).message_formats
+        for name in formats:
+            if _length(formats, name, ()) > _LONGEST:  # pyulog writes every field of one out
+                raise ValueError(f"a message {name} would have more than {_LONGEST} bytes")
+        topics = list(ULog(str(path)).data_list)
+    return topics
 
 
 def _length(formats: dict[str, Any], name: str, within: tuple[str, ...]) -> int:

@@ -35,10 +35,12 @@ def identify(
     out: The model file to write.
     """
     from beaver_ftc.flights.identification import identify, summary
-    from beaver_ftc.flights.model import as_text, write_text
+    from beaver_ftc.flights.model import as_text
     from beaver_ftc.flights.pages import check_page, render_model
     from beaver_ftc.flights.samples import load_flights
     from beaver_ftc.flights.vehicle import load_vehicle
+    from beaver_ftc.results.writer import clear_disk_errors
+    from beaver_ftc.studies.engine.store import write_whole
 
     page = out.with_suffix(".html")
     check_page(page)
@@ -46,8 +48,10 @@ def identify(
     loaded = load_flights(flights, described, reader)
     model = identify(loaded, described)
     shown = render_model(loaded, model)
-    write_text(out, as_text(model))
-    write_text(page, shown)
+    for path, text in ((out, as_text(model)), (page, shown)):
+        with clear_disk_errors(path):
+            path.parent.mkdir(parents=True, exist_ok=True)
+            write_whole(path, text.encode("utf-8"))
     document = {
         "model": str(out),
         "page": str(page),

@@ -9,7 +9,6 @@ import numpy as np
 from pydantic import Field
 
 from beaver_ftc.documents.base import Number, Section, Whole
-from beaver_ftc.documents.errors import SimulationFailed
 from beaver_ftc.documents.validation import read_file
 from beaver_ftc.flights.recording import Floats
 from beaver_ftc.flights.vehicle import Vehicle
@@ -80,15 +79,3 @@ def load_model(path: Path) -> Model:
 def as_text(model: Model) -> str:
     """The model as the text of its file."""
     return model.model_dump_json(indent=1) + "\n"
-
-
-def write_text(path: Path, text: str) -> None:
-    """Write a file whole or not at all. Raises SimulationFailed where it cannot be written."""
-    partial = path.with_name(f".{path.name}.partial")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        partial.write_text(text, encoding="utf-8")
-        partial.replace(path)
-    except OSError as error:
-        partial.unlink(missing_ok=True)
-        raise SimulationFailed(f"cannot write {path}: {(error.strerror or str(error)).lower()}") from error

@@ -165,14 +165,14 @@ class SettingSection(LimitSection):
 
 
 class EngineSection(Section):
-    """Settings of the engine, by their key in a scenario's `initial`, and limits of what they yield."""
+    """Settings of the engine, by their key in a scenario's `initial`, and limits of what they yield.
+
+    start: how they come to run: at once, by their starters with time to come to speed, or not
+    """
 
     settings: dict[Name, SettingSection] = Field(default_factory=dict)
     limits: dict[Name, LimitSection] = Field(default_factory=dict)
-    start: Literal["steady", "run_up", "off"] = Field(
-        default="steady",
-        description="how they come to run: at once, by their starters with time to come to speed, or not",
-    )
+    start: Literal["steady", "run_up", "off"] = "steady"
 
 
 class ModelErrorSection(Section):
@@ -244,15 +244,19 @@ class StartSection(Section):
 
 
 class AircraftFile(Section):
-    """The whole file."""
+    """The whole file.
+
+    jsbsim: the JSBSim model beside this file
+    groups: who can stand in for whom, in the order of hand-over
+    model_error_rad_s2: added to the declared bound of the uncertainty
+    model_error_map: where in the envelope the error is how large, in place of one value
+    """
 
     name: Name
     description: Text = ""
-    jsbsim: str = Field(pattern=FILE_PATTERN, max_length=200, description="the JSBSim model beside this file")
+    jsbsim: str = Field(pattern=FILE_PATTERN, max_length=200)
     surfaces: dict[Name, SurfaceSection] = Field(min_length=3, max_length=MAX_SURFACES)
-    groups: dict[Name, tuple[Name, ...]] = Field(
-        description="who can stand in for whom, in the order of hand-over"
-    )
+    groups: dict[Name, tuple[Name, ...]]
     signals: dict[Name, SignalSection] = Field(default_factory=dict, max_length=MAX_SIGNALS)
     mass: MassSection
     geometry: GeometrySection
@@ -261,12 +265,8 @@ class AircraftFile(Section):
     envelope: EnvelopeSection
     trim: TrimSection
     engine: EngineSection = Field(default_factory=EngineSection)
-    model_error_rad_s2: ModelErrorSection = Field(
-        default_factory=ModelErrorSection, description="added to the declared bound of the uncertainty"
-    )
-    model_error_map: ErrorMapSection | None = Field(
-        default=None, description="where in the envelope the error is how large, in place of one value"
-    )
+    model_error_rad_s2: ModelErrorSection = Field(default_factory=ModelErrorSection)
+    model_error_map: ErrorMapSection | None = None
     start: StartSection = Field(default_factory=StartSection)
 
     @model_validator(mode="after")

@@ -1,17 +1,17 @@
 """What commands are given: options that several share, and scenarios, checked before the first one flies."""
 
-import re
 from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import is_dataclass
 from enum import StrEnum
 from functools import wraps
-from inspect import Parameter, Signature, getdoc, signature
+from inspect import Parameter, Signature, signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, get_args
 
 import typer
 
+from beaver_ftc.documents.docstrings import split_docstring
 from beaver_ftc.documents.errors import BadInput
 
 if TYPE_CHECKING:
@@ -59,8 +59,7 @@ def as_typer_reads(command: Callable[..., None], flies: bool) -> Callable[..., N
     first = next(iter(signature(command).parameters.values())).annotation
     record = first if isinstance(first, type) and is_dataclass(first) else None
     own = signature(record or command).parameters
-    about, *said = re.split(rf"^({'|'.join(own)}): ", getdoc(command) or "", flags=re.MULTILINE)
-    helps = dict(zip(said[::2], said[1::2], strict=True))
+    about, helps = split_docstring(command.__doc__, own)
     parameters = [_annotated(each, helps.get(name)) for name, each in own.items()]
     if flies:
         parameters.append(Parameter("plugin", Parameter.KEYWORD_ONLY, default=None, annotation=PluginOption))
@@ -74,7 +73,7 @@ def as_typer_reads(command: Callable[..., None], flies: bool) -> Callable[..., N
                 register(each)
         command(**given) if record is None else command(record(**given))
 
-    called.__doc__ = about.rstrip()
+    called.__doc__ = about
     called.__signature__ = Signature(parameters)  # type: ignore[attr-defined]
     called.__annotations__ = {each.name: each.annotation for each in parameters}
     return called
@@ -88,7 +87,7 @@ def _annotated(parameter: Parameter, help: str | None) -> Parameter:
     switch = [f"--{parameter.name.replace('_', '-')}"] if kind is bool else []
     option = copy(given) or typer.Option(*switch)
     if help:
-        option.help = " ".join(help.split())
+        option.help = help
     return parameter.replace(annotation=Annotated[kind, option])
 
 

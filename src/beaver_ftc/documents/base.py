@@ -6,14 +6,25 @@ from typing import Annotated, Any, NoReturn
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, Strict
 from pydantic_core import PydanticCustomError
 
+from beaver_ftc.documents.docstrings import split_docstring
+
 Location = tuple[int | str, ...]
 Conflict = tuple[Location, str]
 
 
 class Section(BaseModel):
-    """A part of a scenario file: immutable, strict about its keys, finite in its numbers."""
+    """A part of a scenario file: immutable, strict about its keys, finite in its numbers.
+
+    What the docstring of a section says of a field, `name: ...` at its end, is what an editor says of it.
+    """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    def __init_subclass__(cls, **given: Any) -> None:
+        super().__init_subclass__(**given)
+        cls.__doc__, says = split_docstring(cls.__doc__, cls.__annotations__)
+        for name, text in says.items():
+            cls.__annotations__[name] = Annotated[cls.__annotations__[name], Field(description=text)]
 
 
 def _whole(value: Any) -> Any:
@@ -26,15 +37,17 @@ Whole = Annotated[int, Strict(), BeforeValidator(_whole)]
 Flag = Annotated[bool, Strict()]
 
 
-def entry(default: Any, says: str, **limits: Any) -> Any:
-    """A field and what an editor says of it. default: a value, what makes one, or ... where there is none."""
+def entry(default: Any, says: str | None = None, **limits: Any) -> Any:
+    """A field and what an editor says of it. default: a value, what makes one, or ... where there is none.
+    says: left out where the section's docstring says it."""
     how = "default_factory" if callable(default) else "default"
-    return Field(**{how: default}, description=says, **limits)
+    said = {"description": says} if says else {}
+    return Field(**{how: default}, **said, **limits)
 
 
-def number(default: Any, unit: str, says: str, **limits: Any) -> Any:
+def number(default: Any, unit: str, says: str | None = None, **limits: Any) -> Any:
     """A field of one number, or several alike: the JSON Schema has their unit and meaning."""
-    return entry(default, f"{says}, {unit}", json_schema_extra={"unit": unit}, **limits)
+    return entry(default, says and f"{says}, {unit}", json_schema_extra={"unit": unit}, **limits)
 
 
 def refuse(conflicts: Iterable[Conflict]) -> None:

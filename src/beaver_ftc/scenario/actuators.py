@@ -13,15 +13,16 @@ from beaver_ftc.scenario.airframe import checked_aircraft
 
 
 class ActuatorDynamics(Section):
-    """First-order lag, rate limit and stops of one surface."""
+    """First-order lag, rate limit and stops of one surface.
 
-    bandwidth_rad_s: Number = number(0.0, "rad/s", "bandwidth of the lag, 0 means none", ge=0, le=10_000)
-    rate_limit_deg_s: Number = number(
-        0.0, "deg/s", "largest surface rate, 0 means no limit", ge=0, le=100_000
-    )
-    travel_deg: tuple[Number, Number] | None = number(
-        None, "deg", "lower and upper stop; left out: the aircraft's own"
-    )
+    bandwidth_rad_s: bandwidth of the lag, 0 means none, rad/s
+    rate_limit_deg_s: largest surface rate, 0 means no limit, deg/s
+    travel_deg: lower and upper stop; left out: the aircraft's own, deg
+    """
+
+    bandwidth_rad_s: Number = number(0.0, "rad/s", ge=0, le=10_000)
+    rate_limit_deg_s: Number = number(0.0, "deg/s", ge=0, le=100_000)
+    travel_deg: tuple[Number, Number] | None = number(None, "deg")
 
     @model_validator(mode="after")
     def _stops_are_in_order(self) -> Self:

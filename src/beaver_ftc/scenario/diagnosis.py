@@ -44,26 +44,25 @@ BoundedSensors = Annotated[Sensors, AfterValidator(_can_be_bounded)]
 
 
 class Bounds(Section, strict=True):
-    """What uncertainty the diagnosis admits; thresholds follow from it [Zhang2005, sec. VII]."""
+    """What uncertainty the diagnosis admits; thresholds follow from it [Zhang2005, sec. VII].
 
-    inertia_coupling: PerAxis = entry(
-        PerAxis(p=0.25, q=0.25, r=0.25), "relative error of Pqr, Qpr, Rpq: as published"
-    )
-    constant_rad_s2: PerAxis = entry(
-        PerAxis(p=0.02, q=0.02, r=0.02), "unstructured angular acceleration, rad/s2: as published"
-    )
-    coefficients: Share | dict[str, Share] = entry(
-        0.0, "tolerance of the moment coefficients as a share: of all, or by name"
-    )
-    inertia: Share = entry(0.0, "tolerance of Ix, Iy, Iz and Jxz as a share of each")
-    sensors: BoundedSensors = entry(
-        Sensors,
-        "measurement errors, as those of the truth: a preset, or noise, bias, resolution, slope by signal",
-    )
-    deflection_deg: Deflection = entry(0.0, "how far a surface may be from its actuator's model, deg")
-    turbulence: Literal["none", "light", "moderate", "severe"] = entry(
-        "none", "rotation of the air, which no instrument sees: Dryden, above 2000 ft"
-    )
+    inertia_coupling: relative error of Pqr, Qpr, Rpq: as published
+    constant_rad_s2: unstructured angular acceleration, rad/s2: as published
+    coefficients: tolerance of the moment coefficients as a share: of all, or by name
+    inertia: tolerance of Ix, Iy, Iz and Jxz as a share of each
+    sensors: measurement errors, as those of the truth: a preset, or noise, bias, resolution, slope by
+    signal
+    deflection_deg: how far a surface may be from its actuator's model, deg
+    turbulence: rotation of the air, which no instrument sees: Dryden, above 2000 ft
+    """
+
+    inertia_coupling: PerAxis = entry(PerAxis(p=0.25, q=0.25, r=0.25))
+    constant_rad_s2: PerAxis = entry(PerAxis(p=0.02, q=0.02, r=0.02))
+    coefficients: Share | dict[str, Share] = 0.0
+    inertia: Share = 0.0
+    sensors: BoundedSensors = entry(Sensors)
+    deflection_deg: Deflection = 0.0
+    turbulence: Literal["none", "light", "moderate", "severe"] = "none"
 
     @field_validator("coefficients")
     @classmethod
@@ -75,17 +74,16 @@ class Bounds(Section, strict=True):
 
 
 class Statistical(Section, strict=True):
-    """Likelihood ratio tests beside the worst-case thresholds; levels follow from the rates declared here."""
+    """Likelihood ratio tests beside the worst-case thresholds; levels follow from the rates declared here.
 
-    false_alarms_per_h: float = entry(
-        1e-3, "at most so many false alarms per flight hour under the noise declared", gt=0, le=3600
-    )
-    misnaming: float = entry(
-        1e-4, "chance, within a second, that noise excludes the true fault", gt=0, lt=0.5
-    )
-    uncertainty_rad_s: float = entry(
-        15.0, "how fast an uncertainty that is merely bounded swings, rad/s: as published", gt=0, le=1000
-    )
+    false_alarms_per_h: at most so many false alarms per flight hour under the noise declared
+    misnaming: chance, within a second, that noise excludes the true fault
+    uncertainty_rad_s: how fast an uncertainty that is merely bounded swings, rad/s: as published
+    """
+
+    false_alarms_per_h: float = entry(1e-3, gt=0, le=3600)
+    misnaming: float = entry(1e-4, gt=0, lt=0.5)
+    uncertainty_rad_s: float = entry(15.0, gt=0, le=1000)
 
 
 class Probing(Section):
@@ -123,64 +121,50 @@ class Sharpen(Section, strict=True):
 
 
 class FdiConfig(Section, strict=True):
-    """Gains, bounds and the choice of scheme. All have defaults."""
+    """Gains, bounds and the choice of scheme. All have defaults.
 
-    scheme: Scheme = entry(
-        "adaptive-estimators",
-        "a registered detector, `beaver-ftc list schemes` names them; none: nobody diagnoses",
-    )
-    options: dict[str, float] = entry({}, "parameters of a registered detector, by name")
-    fault_class: Literal["published", "all"] = entry(
-        "published",
-        "what may befall a surface: loss of effectiveness of aileron, elevator or rudder, "
-        "or every fault type on all four",
-    )
-    pairs: bool = entry(
-        False,
-        "also look for two faults at once on different surfaces (class `all`), pitch and "
-        "roll-yaw each for itself",
-    )
-    sensor_monitor: Literal["auto", "always", "never"] = entry(
-        "auto", "hold the instruments against one another: auto, where the scenario breaks one"
-    )
-    slowest_oscillation_rad_s: float = entry(
-        1.0, "oscillatory failures are this fast or faster (class `all`), rad/s", gt=0, le=100
-    )
-    slowest_rate_deg_s: float = entry(
-        0.5,
-        "a slow surface moves this fast or faster, a slower one is a jam (class `all`), deg/s",
-        gt=0,
-        le=100,
-    )
-    probing: Probing | None = entry(
-        None, "active diagnosis (class `all`): off unless given; `{}` for its defaults"
-    )
-    statistical: Statistical | None = entry(
-        None, "statistical detector beside the worst-case one: off unless given; `{}` for its defaults"
-    )
-    authority: Literal["either", "worst-case", "statistical"] = entry(
-        "either", "whose alarms and exclusions count where there are two detectors"
-    )
-    thresholds: Literal["interval", "published"] = entry(
-        "interval", "isolation test: signed interval or the paper's norm bound"
-    )
-    detection_pole_per_s: float = entry(
-        10.0, "Lambda0, 1/s: a few times the bound shows in 0.1 s", gt=0, le=1000
-    )
-    isolation_pole_per_s: float = entry(10.0, "Lambda of the isolation estimators, 1/s", gt=0, le=1000)
-    forgetting_time_s: float = entry(
-        5.0, "memory of the estimates, s: longer than a reference period", gt=0, le=3600
-    )
+    scheme: a registered detector, `beaver-ftc list schemes` names them; none: nobody diagnoses
+    options: parameters of a registered detector, by name
+    fault_class: what may befall a surface: loss of effectiveness of aileron, elevator or rudder, or every
+    fault type on all four
+    pairs: also look for two faults at once on different surfaces (class `all`), pitch and roll-yaw each
+    for itself
+    sensor_monitor: hold the instruments against one another: auto, where the scenario breaks one
+    slowest_oscillation_rad_s: oscillatory failures are this fast or faster (class `all`), rad/s
+    slowest_rate_deg_s: a slow surface moves this fast or faster, a slower one is a jam (class `all`),
+    deg/s
+    probing: active diagnosis (class `all`): off unless given; `{}` for its defaults
+    statistical: statistical detector beside the worst-case one: off unless given; `{}` for its defaults
+    authority: whose alarms and exclusions count where there are two detectors
+    thresholds: isolation test: signed interval or the paper's norm bound
+    detection_pole_per_s: Lambda0, 1/s: a few times the bound shows in 0.1 s
+    isolation_pole_per_s: Lambda of the isolation estimators, 1/s
+    forgetting_time_s: memory of the estimates, s: longer than a reference period
+    sharpen: steps beyond the published scheme: `all`, `none` or one by one
+    pole_bank_per_s: filters beside the published one, 1/s; the default keeps a single frame
+    fault_profile: what is assumed of the fault's course: nothing, or constant once it is there
+    """
+
+    scheme: Scheme = "adaptive-estimators"
+    options: dict[str, float] = entry({})
+    fault_class: Literal["published", "all"] = "published"
+    pairs: bool = False
+    sensor_monitor: Literal["auto", "always", "never"] = "auto"
+    slowest_oscillation_rad_s: float = entry(1.0, gt=0, le=100)
+    slowest_rate_deg_s: float = entry(0.5, gt=0, le=100)
+    probing: Probing | None = None
+    statistical: Statistical | None = None
+    authority: Literal["either", "worst-case", "statistical"] = "either"
+    thresholds: Literal["interval", "published"] = "interval"
+    detection_pole_per_s: float = entry(10.0, gt=0, le=1000)
+    isolation_pole_per_s: float = entry(10.0, gt=0, le=1000)
+    forgetting_time_s: float = entry(5.0, gt=0, le=3600)
     bounds: Bounds = Bounds()
-    sharpen: Sharpen = entry(Sharpen(), "steps beyond the published scheme: `all`, `none` or one by one")
+    sharpen: Sharpen = entry(Sharpen())
     pole_bank_per_s: Annotated[tuple[Pole, ...], Strict(False)] = entry(
-        (DEADBEAT_PER_S,),
-        "filters beside the published one, 1/s; the default keeps a single frame",
-        max_length=MAX_POLES - 1,
+        (DEADBEAT_PER_S,), max_length=MAX_POLES - 1
     )
-    fault_profile: Literal["any", "abrupt"] = entry(
-        "any", "what is assumed of the fault's course: nothing, or constant once it is there"
-    )
+    fault_profile: Literal["any", "abrupt"] = "any"
 
     @property
     def is_ours(self) -> bool:

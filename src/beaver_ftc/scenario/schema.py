@@ -79,22 +79,22 @@ Offset = Annotated[Number, Field(ge=-0.5, le=0.5)]
 
 
 class Uncertainty(Section):
-    """How the truth differs from what the designer believes."""
+    """How the truth differs from what the designer believes.
 
-    inertia_coupling: InertiaCoupling = entry(InertiaCoupling, "relative errors of the inertia coupling")
-    sinusoid: SinusoidAxes = entry(SinusoidAxes, "sinusoidal angular accelerations")
-    coefficients: Ratios = entry(
-        dict,
-        "truth / design ratio of single aerodynamic terms, 1 is no error, e.g. Cm_alpha: 1.05",
-        examples=[{"Cm_alpha": 1.05}],
-    )
-    mass: Number = number(
-        1.0, "share of 1", "truth / design ratio of the mass, at the same inertia", ge=0.5, le=2
-    )
-    inertia: TrueInertia = entry(TrueInertia, "truth / design ratio of the inertia")
-    cg_m: tuple[Offset, Offset, Offset] = number(
-        (0.0, 0.0, 0.0), "m", "centre of gravity, forward, right and down of where the designer has it"
-    )
+    inertia_coupling: relative errors of the inertia coupling
+    sinusoid: sinusoidal angular accelerations
+    coefficients: truth / design ratio of single aerodynamic terms, 1 is no error, e.g. Cm_alpha: 1.05
+    mass: truth / design ratio of the mass, at the same inertia, share of 1
+    inertia: truth / design ratio of the inertia
+    cg_m: centre of gravity, forward, right and down of where the designer has it, m
+    """
+
+    inertia_coupling: InertiaCoupling = entry(InertiaCoupling)
+    sinusoid: SinusoidAxes = entry(SinusoidAxes)
+    coefficients: Ratios = entry(dict, examples=[{"Cm_alpha": 1.05}])
+    mass: Number = number(1.0, "share of 1", ge=0.5, le=2)
+    inertia: TrueInertia = entry(TrueInertia)
+    cg_m: tuple[Offset, Offset, Offset] = number((0.0, 0.0, 0.0), "m")
 
 
 Scale = Annotated[Number, Field(ge=0.1, le=10)]
@@ -110,20 +110,22 @@ class InertiaScale(Section):
 
 
 class DesignModel(Section):
-    """What the designer leaves out or gets wrong on purpose; the truth stays as it is."""
+    """What the designer leaves out or gets wrong on purpose; the truth stays as it is.
 
-    engine_terms: Flag = entry(True, "false neglects the dpt terms of Cl, Cm, Cn, as published")
-    linearised: Flag = entry(
-        False, "true: the Jacobian at the trim the flight starts from, instead of f and G"
-    )
-    frozen_alpha: Flag = entry(False, "true: alpha stays at its trim value in the designer's model")
-    mass: Scale = number(1.0, "share of 1", "the designer's mass over the table's; inertia goes with it")
-    inertia: InertiaScale = entry(InertiaScale, "the designer's inertia over the table's")
-    coefficients: Ratios = entry(
-        dict,
-        "design / table ratio of single aerodynamic terms, 1 is no error, e.g. Cm_alpha: 0.9",
-        examples=[{"Cm_alpha": 0.9}],
-    )
+    engine_terms: false neglects the dpt terms of Cl, Cm, Cn, as published
+    linearised: true: the Jacobian at the trim the flight starts from, instead of f and G
+    frozen_alpha: true: alpha stays at its trim value in the designer's model
+    mass: the designer's mass over the table's; inertia goes with it, share of 1
+    inertia: the designer's inertia over the table's
+    coefficients: design / table ratio of single aerodynamic terms, 1 is no error, e.g. Cm_alpha: 0.9
+    """
+
+    engine_terms: Flag = True
+    linearised: Flag = False
+    frozen_alpha: Flag = False
+    mass: Scale = number(1.0, "share of 1")
+    inertia: InertiaScale = entry(InertiaScale)
+    coefficients: Ratios = entry(dict, examples=[{"Cm_alpha": 0.9}])
 
 
 class Change(Section):
@@ -161,86 +163,91 @@ class Arrival(Section):
 
 
 class Expect(Section):
-    """What must come out for the run to pass; what is left out is not asserted."""
+    """What must come out for the run to pass; what is left out is not asserted.
 
-    detected_within_s: Number | None = number(None, "s", "delay from fault to first alarm", ge=0, le=360_000)
-    isolated_as: Nameable | None = entry(
-        None, "what the diagnosis must name: a surface, `sensor p` and the like, or unanticipated"
-    )
-    isolated_type: FaultType | None = entry(None, "the fault type the diagnosis must name")
-    candidate_type: FaultType | None = entry(None, "a fault type that must be named or still be possible")
-    isolated_within_s: Number | None = number(None, "s", "delay from fault to isolation", ge=0, le=360_000)
-    no_false_alarm: Flag | None = entry(None, "true: no alarm without a fault; false: there must be one")
-    no_departure: Flag | None = entry(None, "true: the aircraft is kept; false: it must be lost")
-    pre_fault_rms_deg_s: RmsLimits | None = entry(
-        None, "largest RMS tracking error before the fault, or of a flight without one"
-    )
-    post_fault_rms_deg_s: RmsLimits | None = entry(None, "largest RMS tracking error after the fault")
-    altitude_within_m: Number | None = number(
-        None, "m", "largest deviation from the commanded altitude", gt=0, le=10_000
-    )
-    airspeed_within_mps: Number | None = number(
-        None, "m/s", "largest deviation from the commanded airspeed", gt=0, le=100
-    )
-    airspeed_within_limits_mps: Number | None = number(
-        None,
-        "m/s",
-        "largest deviation from the commanded airspeed, as limited to what can still be held",
-        gt=0,
-        le=100,
-    )
-    heading_within_deg: Number | None = number(
-        None,
-        "deg",
-        "largest deviation from the commanded heading, 30 s after a change of it and later",
-        gt=0,
-        le=180,
-    )
-    stays_in_envelope: Flag | None = entry(
-        None, "true: never outside the validated envelope; false: it must leave it"
-    )
-    arrives: Arrival | None = entry(
-        None, "how far it is from the commanded profile at its end; a lost aircraft never arrives"
-    )
+    detected_within_s: delay from fault to first alarm, s
+    isolated_as: what the diagnosis must name: a surface, `sensor p` and the like, or unanticipated
+    isolated_type: the fault type the diagnosis must name
+    candidate_type: a fault type that must be named or still be possible
+    isolated_within_s: delay from fault to isolation, s
+    no_false_alarm: true: no alarm without a fault; false: there must be one
+    no_departure: true: the aircraft is kept; false: it must be lost
+    pre_fault_rms_deg_s: largest RMS tracking error before the fault, or of a flight without one
+    post_fault_rms_deg_s: largest RMS tracking error after the fault
+    altitude_within_m: largest deviation from the commanded altitude, m
+    airspeed_within_mps: largest deviation from the commanded airspeed, m/s
+    airspeed_within_limits_mps: largest deviation from the commanded airspeed, as limited to what can
+    still be held, m/s
+    heading_within_deg: largest deviation from the commanded heading, 30 s after a change of it and later,
+    deg
+    stays_in_envelope: true: never outside the validated envelope; false: it must leave it
+    arrives: how far it is from the commanded profile at its end; a lost aircraft never arrives
+    """
+
+    detected_within_s: Number | None = number(None, "s", ge=0, le=360_000)
+    isolated_as: Nameable | None = None
+    isolated_type: FaultType | None = None
+    candidate_type: FaultType | None = None
+    isolated_within_s: Number | None = number(None, "s", ge=0, le=360_000)
+    no_false_alarm: Flag | None = None
+    no_departure: Flag | None = None
+    pre_fault_rms_deg_s: RmsLimits | None = None
+    post_fault_rms_deg_s: RmsLimits | None = None
+    altitude_within_m: Number | None = number(None, "m", gt=0, le=10_000)
+    airspeed_within_mps: Number | None = number(None, "m/s", gt=0, le=100)
+    airspeed_within_limits_mps: Number | None = number(None, "m/s", gt=0, le=100)
+    heading_within_deg: Number | None = number(None, "deg", gt=0, le=180)
+    stays_in_envelope: Flag | None = None
+    arrives: Arrival | None = None
 
 
 class Scenario(Section, title="beaver-ftc scenario"):
-    """One flight: what flies, what it shall do, what breaks, who diagnoses and controls, what is expected."""
+    """One flight: what flies, what it shall do, what breaks, who diagnoses and controls, what is expected.
 
-    name: str = entry(
-        ...,
-        "name of the result folder: letters, digits, - and _",
-        pattern=NAME_PATTERN,
-        max_length=100,
-        examples=["elevator-partial-loss"],
-    )
-    description: str = entry("", "what the case shows", max_length=2000)
-    aircraft: Annotated[str, AfterValidator(known_aircraft)] = entry(
-        DEFAULT, "what flies: a built-in name, or ./FOLDER beside this file", max_length=200
-    )
-    duration_s: Number = number(DURATION_S, "s", "length of the flight", gt=0, le=360_000)
-    rate_hz: Number = number(RATE_HZ, "Hz", "frame rate of diagnosis and control", ge=20, le=1000)
-    substeps: Whole = entry(1, "JSBSim frames per such frame", ge=1, le=50)
-    seed: Whole = entry(1, "of everything random in the flight", ge=0, le=2**63 - 1)
+    name: name of the result folder: letters, digits, - and _
+    description: what the case shows
+    aircraft: what flies: a built-in name, or ./FOLDER beside this file
+    duration_s: length of the flight, s
+    rate_hz: frame rate of diagnosis and control, Hz
+    substeps: JSBSim frames per such frame
+    seed: of everything random in the flight
+    initial: flight condition at the start, trimmed
+    reference: body rates to follow
+    autopilot: the flight path to fly, on top of the reference; left out: no outer loops
+    faults: what breaks, and when
+    uncertainty: how the truth differs from the design model
+    actuators: actuator dynamics
+    sensors: measurement errors
+    environment: wind, turbulence and gusts
+    fdi: fault detection and isolation
+    control: the control law
+    changes: law, diagnosis and sensors changed in flight, and when
+    design_model: what the designer believes
+    expect: what must come out
+    """
+
+    name: str = entry(..., pattern=NAME_PATTERN, max_length=100, examples=["elevator-partial-loss"])
+    description: str = entry("", max_length=2000)
+    aircraft: Annotated[str, AfterValidator(known_aircraft)] = entry(DEFAULT, max_length=200)
+    duration_s: Number = number(DURATION_S, "s", gt=0, le=360_000)
+    rate_hz: Number = number(RATE_HZ, "Hz", ge=20, le=1000)
+    substeps: Whole = entry(1, ge=1, le=50)
+    seed: Whole = entry(1, ge=0, le=2**63 - 1)
     initial: Annotated[SerializeAsAny[Initial], PlainValidator(given_initial)] = entry(
-        default_initial, "flight condition at the start, trimmed", json_schema_extra=initial_schema
+        default_initial, json_schema_extra=initial_schema
     )
-    reference: Reference = entry(Reference, "body rates to follow")
-    autopilot: Autopilot | None = entry(
-        None, "the flight path to fly, on top of the reference; left out: no outer loops"
-    )
-    faults: tuple[Fault, ...] = entry((), "what breaks, and when", max_length=MOST_FAULTS)
-    uncertainty: Uncertainty = entry(Uncertainty, "how the truth differs from the design model")
-    actuators: Actuators = entry(Actuators, "actuator dynamics")
-    sensors: Sensors = entry(Sensors, "measurement errors")
-    environment: Environment = entry(Environment, "wind, turbulence and gusts")
-    fdi: FdiConfig = entry(FdiConfig, "fault detection and isolation")
-    control: ControlConfig = entry(ControlConfig, "the control law")
-    changes: tuple[Change, ...] = entry(
-        (), "law, diagnosis and sensors changed in flight, and when", max_length=1000
-    )
-    design_model: DesignModel = entry(DesignModel, "what the designer believes")
-    expect: Expect = entry(Expect, "what must come out")
+    reference: Reference = entry(Reference)
+    autopilot: Autopilot | None = None
+    faults: tuple[Fault, ...] = entry((), max_length=MOST_FAULTS)
+    uncertainty: Uncertainty = entry(Uncertainty)
+    actuators: Actuators = entry(Actuators)
+    sensors: Sensors = entry(Sensors)
+    environment: Environment = entry(Environment)
+    fdi: FdiConfig = entry(FdiConfig)
+    control: ControlConfig = entry(ControlConfig)
+    changes: tuple[Change, ...] = entry((), max_length=1000)
+    design_model: DesignModel = entry(DesignModel)
+    expect: Expect = entry(Expect)
 
     _airframe: Aircraft | None = PrivateAttr(default=None)
 

@@ -18,17 +18,21 @@ from beaver_ftc.scenario.airframe import checked_aircraft
 
 
 class _Sensor(Section):
-    """measured = quantised((1 + scale_error) lagged(t - delay) + bias + noise); lost: the last one."""
+    """measured = quantised((1 + scale_error) lagged(t - delay) + bias + noise); lost: the last one.
+
+    scale_error: relative error of the slope, share of 1
+    delay_s: age of the measurement, s
+    bandwidth_rad_s: bandwidth of the first-order lag, 0 means none, rad/s
+    dropout_share: samples lost, the last one standing in, share of 1
+    """
 
     # Keys of noise, bias and resolution, and their unit in SI.
     si: ClassVar[tuple[str, str, str, float]]
 
-    scale_error: Number = number(0.0, "share of 1", "relative error of the slope", ge=-0.9, le=1)
-    delay_s: Number = number(0.0, "s", "age of the measurement", ge=0, le=1)
-    bandwidth_rad_s: Number = number(
-        0.0, "rad/s", "bandwidth of the first-order lag, 0 means none", ge=0, le=100_000
-    )
-    dropout_share: Number = number(0.0, "share of 1", "samples lost, the last one standing in", ge=0, le=0.99)
+    scale_error: Number = number(0.0, "share of 1", ge=-0.9, le=1)
+    delay_s: Number = number(0.0, "s", ge=0, le=1)
+    bandwidth_rad_s: Number = number(0.0, "rad/s", ge=0, le=100_000)
+    dropout_share: Number = number(0.0, "share of 1", ge=0, le=0.99)
 
     @property
     def is_ideal(self) -> bool:

@@ -161,16 +161,19 @@ class Csv(Section):
 
     The table is read when the scenario is loaded and becomes part of it (`time_s`, `values_deg_s`), so that a
     fully resolved scenario flies anywhere.
+
+    file: CSV file in the scenario's own folder or below it
+    column: column to fly, deg/s; time is `t_s`
+    time_s: read from the file: times, s
+    values_deg_s: read from the file: rates, deg/s
     """
 
     model_config = ConfigDict(json_schema_extra={"required": ["file"]})
 
-    file: str = entry(..., "CSV file in the scenario's own folder or below it", min_length=1, max_length=200)
-    column: str = entry("rate_deg_s", "column to fly, deg/s; time is `t_s`", min_length=1, max_length=100)
-    time_s: tuple[Number, ...] = entry(..., "read from the file: times, s", min_length=1, max_length=MAX_ROWS)
-    values_deg_s: tuple[Number, ...] = entry(
-        ..., "read from the file: rates, deg/s", min_length=1, max_length=MAX_ROWS
-    )
+    file: str = entry(..., min_length=1, max_length=200)
+    column: str = entry("rate_deg_s", min_length=1, max_length=100)
+    time_s: tuple[Number, ...] = entry(..., min_length=1, max_length=MAX_ROWS)
+    values_deg_s: tuple[Number, ...] = entry(..., min_length=1, max_length=MAX_ROWS)
 
     @model_validator(mode="before")
     @classmethod

@@ -43,18 +43,22 @@ _DERIVED = {"name": "follows from the sweep's name", "seed": "follows from the s
 
 
 class Variation(Section):
-    """How one key varies: a mapping of exactly one kind to its parameters."""
+    """How one key varies: a mapping of exactly one kind to its parameters.
 
-    uniform: Span | None = entry(None, "[lowest, highest], all values equally likely")
-    loguniform: Span | None = entry(None, "[lowest, highest], all ratios equally likely, lowest over 0")
-    normal: Span | None = entry(None, "[mean, standard deviation]")
-    within: Span | None = entry(None, "[lowest, highest] that `normal` is cut to; only with normal")
-    linspace: tuple[Number, Number, Annotated[Whole, Field(ge=1, le=1_000_000)]] | None = entry(
-        None, "[first, last, count], gone through in turn"
-    )
-    choice: tuple[Any, ...] | None = entry(
-        None, "a list of values, all equally likely", min_length=1, max_length=100_000
-    )
+    uniform: [lowest, highest], all values equally likely
+    loguniform: [lowest, highest], all ratios equally likely, lowest over 0
+    normal: [mean, standard deviation]
+    within: [lowest, highest] that `normal` is cut to; only with normal
+    linspace: [first, last, count], gone through in turn
+    choice: a list of values, all equally likely
+    """
+
+    uniform: Span | None = None
+    loguniform: Span | None = None
+    normal: Span | None = None
+    within: Span | None = None
+    linspace: tuple[Number, Number, Annotated[Whole, Field(ge=1, le=1_000_000)]] | None = None
+    choice: tuple[Any, ...] | None = entry(None, min_length=1, max_length=100_000)
 
     @model_validator(mode="after")
     def _makes_sense(self) -> Self:
@@ -100,13 +104,16 @@ class Variation(Section):
 
 
 class Level(Section):
-    """A bound on a number that the flights estimate; with a confidence, on its one-sided confidence bound."""
+    """A bound on a number that the flights estimate; with a confidence, on its one-sided confidence bound.
 
-    at_least: Number | None = entry(None, "smallest value allowed")
-    at_most: Number | None = entry(None, "largest value allowed")
-    confidence: Number | None = entry(
-        None, "left out: the estimate itself is held against the bound", ge=0.5, lt=1
-    )
+    at_least: smallest value allowed
+    at_most: largest value allowed
+    confidence: left out: the estimate itself is held against the bound
+    """
+
+    at_least: Number | None = None
+    at_most: Number | None = None
+    confidence: Number | None = entry(None, ge=0.5, lt=1)
 
     @model_validator(mode="after")
     def _bounds_something(self) -> Self:
@@ -130,46 +137,55 @@ class AxisLevels(Section):
 
 
 class SweepExpect(Section):
-    """What the statistics of a sweep must show; what is left out is not asserted."""
+    """What the statistics of a sweep must show; what is left out is not asserted.
 
-    detection_rate: Level | None = entry(None, "share of faults that were detected")
-    isolation_rate: Level | None = entry(None, "share of faults that were named rightly")
-    false_alarms_per_hour: Level | None = entry(None, "per hour without a fault")
-    departure_rate: Level | None = entry(None, "share of flights that lost the aircraft")
-    failure_rate: Level | None = entry(None, "share of flights that could not be flown")
-    pass_rate: Level | None = entry(None, "share of flights that met every expectation of the base scenario")
-    detection_delay_s: QuantileLevel | None = entry(
-        None, "from fault to alarm; a missed fault counts as infinite"
-    )
-    isolation_delay_s: QuantileLevel | None = entry(
-        None, "from fault to the right name; a fault not named rightly counts as infinite"
-    )
-    post_fault_rms_deg_s: AxisLevels | None = entry(
-        None, "RMS tracking error after the fault; a departure counts as infinite"
-    )
-    tracking_ratio: AxisLevels | None = entry(
-        None, "RMS error after / before the fault; a departure counts as infinite"
-    )
+    detection_rate: share of faults that were detected
+    isolation_rate: share of faults that were named rightly
+    false_alarms_per_hour: per hour without a fault
+    departure_rate: share of flights that lost the aircraft
+    failure_rate: share of flights that could not be flown
+    pass_rate: share of flights that met every expectation of the base scenario
+    detection_delay_s: from fault to alarm; a missed fault counts as infinite
+    isolation_delay_s: from fault to the right name; a fault not named rightly counts as infinite
+    post_fault_rms_deg_s: RMS tracking error after the fault; a departure counts as infinite
+    tracking_ratio: RMS error after / before the fault; a departure counts as infinite
+    """
+
+    detection_rate: Level | None = None
+    isolation_rate: Level | None = None
+    false_alarms_per_hour: Level | None = None
+    departure_rate: Level | None = None
+    failure_rate: Level | None = None
+    pass_rate: Level | None = None
+    detection_delay_s: QuantileLevel | None = None
+    isolation_delay_s: QuantileLevel | None = None
+    post_fault_rms_deg_s: AxisLevels | None = None
+    tracking_ratio: AxisLevels | None = None
 
 
 class SweepFile(Section, title="beaver-ftc sweep"):
-    """Many flights: a base scenario, what varies in it, and what the statistics must show."""
+    """Many flights: a base scenario, what varies in it, and what the statistics must show.
 
-    name: str = entry(
-        ..., "name of the result folder: letters, digits, - and _", pattern=NAME_PATTERN, max_length=70
-    )
-    description: str = entry("", "what the sweep is to show", max_length=2000)
-    base: str | dict[str, Any] = entry(
-        ..., "a built-in scenario's name, a scenario file beside this one, or a scenario itself"
-    )
-    set: dict[str, Any] = entry(dict, "dotted keys of the base to new values, the same in all flights")
-    runs: Whole | None = entry(
-        None, "number of flights; left out: one a point of the grid", ge=1, le=MAX_RUNS
-    )
-    seed: Whole = entry(1, "of all values and of each flight's seed", ge=0, le=2**63 - 1)
-    sampling: Sampling = entry("random", "how values are drawn that are not linspace")
-    vary: dict[str, Variation] = entry(dict, "dotted keys of the base to how they vary", max_length=200)
-    expect: SweepExpect = entry(SweepExpect, "what the statistics must show")
+    name: name of the result folder: letters, digits, - and _
+    description: what the sweep is to show
+    base: a built-in scenario's name, a scenario file beside this one, or a scenario itself
+    set: dotted keys of the base to new values, the same in all flights
+    runs: number of flights; left out: one a point of the grid
+    seed: of all values and of each flight's seed
+    sampling: how values are drawn that are not linspace
+    vary: dotted keys of the base to how they vary
+    expect: what the statistics must show
+    """
+
+    name: str = entry(..., pattern=NAME_PATTERN, max_length=70)
+    description: str = entry("", max_length=2000)
+    base: str | dict[str, Any]
+    set: dict[str, Any] = entry(dict)
+    runs: Whole | None = entry(None, ge=1, le=MAX_RUNS)
+    seed: Whole = entry(1, ge=0, le=2**63 - 1)
+    sampling: Sampling = "random"
+    vary: dict[str, Variation] = entry(dict, max_length=200)
+    expect: SweepExpect = entry(SweepExpect)
 
     @model_validator(mode="after")
     def _parts_fit_together(self) -> Self:

@@ -69,21 +69,23 @@ class SensorBias(SensorFault):
 
 
 class SensorNoise(SensorFault):
-    """The reading scatters."""
+    """The reading scatters.
+
+    magnitude: standard deviation added to the reading, the sensor's unit
+    """
 
     type: Literal["noise"]
-    magnitude: Number = number(
-        ..., "the sensor's unit", "standard deviation added to the reading", gt=0, le=5000
-    )
+    magnitude: Number = number(..., "the sensor's unit", gt=0, le=5000)
 
 
 class SensorScale(SensorFault):
-    """The reading is (1 + magnitude) times what it should be."""
+    """The reading is (1 + magnitude) times what it should be.
+
+    magnitude: relative error of the reading, share of 1
+    """
 
     type: Literal["scale"]
-    magnitude: Number = number(
-        ..., "share of 1", "relative error of the reading", ge=-MOST_SCALE, le=MOST_SCALE
-    )
+    magnitude: Number = number(..., "share of 1", ge=-MOST_SCALE, le=MOST_SCALE)
 
 
 class SensorFreeze(SensorFault):

@@ -9,34 +9,38 @@ from beaver_ftc.scenario.faults.base import Button, Gradual, Properties, Switche
 
 
 class LossOfEffectiveness(Gradual):
-    """The surface gives only a part of its moment: 1 + theta, theta = -magnitude."""
+    """The surface gives only a part of its moment: 1 + theta, theta = -magnitude.
+
+    actuator: the surface that fails
+    magnitude: effectiveness lost: 0 healthy, 1 no moment at all, share of 1
+    """
 
     truth, size = ("magnitude", -1.0), ("of", "%")
     examples = (("40 % loss", {"magnitude": 0.4}), ("total loss", {"magnitude": 1.0}))
     button = Button(1, "lose 40 %", {"magnitude": 0.4})
 
     type: Literal["loss_of_effectiveness"]
-    actuator: Actuator = entry(..., "the surface that fails")
-    magnitude: Number = number(
-        ..., "share of 1", "effectiveness lost: 0 healthy, 1 no moment at all", ge=0, le=1
-    )
+    actuator: Actuator
+    magnitude: Number = number(..., "share of 1", ge=0, le=1)
 
     def strike(self, of: Properties, share: float, was_rad: float) -> None:
         of["effectiveness"] *= 1.0 - share * self.magnitude
 
 
 class Stuck(Switched):
-    """The surface jams."""
+    """The surface jams.
+
+    actuator: the surface that fails
+    position_deg: where it jams; left out: where it happens to be, deg
+    """
 
     adds, stays_where_it_is, truth, size = False, True, ("position_deg", 1.0), ("at", "deg")
     examples = (("stuck +3 deg", {"off_deg": 3.0}), ("stuck -3 deg", {"off_deg": -3.0}))
     button = Button(2, "jam", {})
 
     type: Literal["stuck"]
-    actuator: Actuator = entry(..., "the surface that fails")
-    position_deg: Number | None = number(
-        None, "deg", "where it jams; left out: where it happens to be", ge=-90, le=90
-    )
+    actuator: Actuator
+    position_deg: Number | None = number(None, "deg", ge=-90, le=90)
 
     def strike(self, of: Properties, share: float, was_rad: float) -> None:
         if of["stuck"] == 0.0:

@@ -15,9 +15,10 @@ import re
 import sys
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache, lru_cache
 from importlib import import_module
 from inspect import getdoc, isclass, signature
+from pathlib import Path
 from typing import Any
 
 from beaver_ftc.documents.errors import BadInput, BeaverFtcError, suggestion
@@ -29,56 +30,7 @@ _GIVEN = re.compile(r"(?:([A-Za-z0-9_-]+)=)?([A-Za-z_]\w*(?:\.[A-Za-z_]\w*)*):([
 _WORDS = re.compile(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
 _ARGUMENTS = {3: DETECTORS, 4: LAWS}  # of `step`, with self
 
-# Our own by name: what `list` says of them.
-_OURS = {
-    DETECTORS: {
-        "adaptive-estimators": "N + 1 nonlinear adaptive estimators with adaptive thresholds [Zhang2005].",
-        "none": "No diagnosis.",
-        "rls-monitor": (
-            "Recursive least-squares monitor of each surface and its rate, without a model [Keipour2019]."
-        ),
-        "augmented-ekf": (
-            "Extended Kalman filter of effectiveness, chi-square test on the estimates [Jazwinski1970]."
-        ),
-        "augmented-ukf": (
-            "Unscented Kalman filter of effectiveness, CUSUM on the innovation squared [Julier2004]."
-        ),
-        "multiple-models": (
-            "Interacting multiple models of lost effectiveness, alarm on the odds of a fault [Blom1988]."
-        ),
-        "observer-constant": (
-            "Observer residual with a constant threshold, surface named by least squares [Chen1999]."
-        ),
-    },
-    LAWS: {
-        "nominal": "Feedback linearisation with proportional-integral feedback.",
-        "adaptive": "Nominal, and compensates an unknown fault by what the estimators have learnt of it.",
-        "fault-tolerant": (
-            "Inversion with a disturbance observer; hands pitch control from a weak elevator to the flap."
-        ),
-        "fault-tolerant-published": (
-            "Adaptive, and hands pitch control from a weak elevator to the flap [Zhang2005]."
-        ),
-        "oracle": "Fault-tolerant, and told the true fault the moment it occurs: the yardstick.",
-        "oracle-published": "Fault-tolerant-published, and told the true fault the moment it occurs.",
-        "indi": "Incremental nonlinear dynamic inversion on filtered angular acceleration [Sieberling2010].",
-        "l1-adaptive": (
-            "L1 adaptive control, piecewise-constant adaptation behind a low-pass filter [Hovakimyan2010]."
-        ),
-        "lqr": "Fixed-gain linear quadratic regulator about the trim, with integral action [Anderson1990].",
-    },
-}
-# Their classes; without one it is in the compiled frame itself.
-_CLASSES = {
-    "rls-monitor": "beaver_ftc.diagnosis.rivals.rls:RlsMonitor",
-    "augmented-ekf": "beaver_ftc.diagnosis.rivals.effectiveness:AugmentedEkf",
-    "augmented-ukf": "beaver_ftc.diagnosis.rivals.effectiveness:AugmentedUkf",
-    "multiple-models": "beaver_ftc.diagnosis.rivals.imm:InteractingMultipleModels",
-    "observer-constant": "beaver_ftc.diagnosis.rivals.observer:ConstantThresholdObserver",
-    "indi": "beaver_ftc.control.rivals.indi:IncrementalInversion",
-    "l1-adaptive": "beaver_ftc.control.rivals.l1:L1Adaptive",
-    "lqr": "beaver_ftc.control.rivals.lqr:FixedGainLqr",
-}
+_ROWS = Path(__file__).with_suffix(".yaml")
 _METHODS = ("reset", "step")
 
 
@@ -102,15 +54,24 @@ class Registered:
             return f"broken: {error}"
 
 
+@cache
+def _ours(group: str) -> dict[str, dict[str, str]]:
+    """Our own by name: what is said of each, and its class, if it is not in the compiled frame itself."""
+    from beaver_ftc.documents.document import parse
+
+    rows: dict[str, dict[str, str]] = parse(_ROWS.read_text(encoding="utf-8")).data[group]
+    return rows
+
+
 def is_compiled(group: str, name: str) -> bool:
     """Whether the compiled frame does this scheme or law itself."""
-    return name in _OURS[group] and name not in _CLASSES
+    return name in _ours(group) and "class" not in _ours(group)[name]
 
 
 def registered(group: str) -> dict[str, Registered]:
     """Everything registered under DETECTORS or LAWS, by name, ours first; imports none of it."""
-    known = _OURS[group].items()
-    ours = {name: Registered(group, name, _CLASSES.get(name, ""), OURS, says) for name, says in known}
+    rows = _ours(group).items()
+    ours = {name: Registered(group, name, row.get("class", ""), OURS, row["says"]) for name, row in rows}
     others = {entry.name: entry for entry in _from_packages(group) if entry.name not in ours}
     return ours | others | {entry.name: entry for entry in _of_this_run(group)}
 
@@ -180,7 +141,7 @@ def _entry(group: str, name: str) -> Registered | None:
 
 def refusal(group: str, name: str) -> str | None:
     """What is wrong with a scheme's or law's name in a scenario, and what is allowed; None if nothing is."""
-    if name in _OURS[group] or _entry(group, name):
+    if name in _ours(group) or _entry(group, name):
         return None
     known = registered(group)
     what = "scheme" if group == DETECTORS else "law"

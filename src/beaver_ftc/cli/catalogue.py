@@ -21,6 +21,9 @@ def list_choices(
     Built-in scenarios and sweeps, aircraft, diagnosis schemes, control laws, fault types and reference
     signals.
 
+    Examples:
+      beaver-ftc list
+
     kind: One kind only, e.g. aircraft.
     """
     available = _available()
@@ -107,6 +110,9 @@ def show(
 
     What is printed is a file that `run` or `sweep` takes.
 
+    Examples:
+      beaver-ftc show elevator-partial-loss
+
     name: A built-in scenario or sweep.
     """
     from beaver_ftc.scenario.loader import builtin_names, builtin_path, builtin_sweeps, resolve
@@ -122,6 +128,9 @@ def schema(sweep: bool = False) -> None:
     """Print the JSON Schema of a scenario.
 
     Editors that know it complete and check a scenario as it is written.
+
+    Examples:
+      beaver-ftc schema
 
     sweep: Of a sweep file instead of a scenario.
     """

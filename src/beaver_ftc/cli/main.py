@@ -1,13 +1,14 @@
 """The command `beaver-ftc`: its commands, and what becomes of errors.
 
 A command is one thin function of a module of this package, that imports what it needs when it runs, and one
-row here. `--help` must answer at once.
+row here. Its docstring is its help: what it does, examples, what each option means. `--help` must answer at
+once.
 """
 
 import signal
 import sys
 from importlib import import_module
-from typing import Annotated, NamedTuple, NoReturn
+from typing import Annotated, NoReturn
 
 import typer
 
@@ -15,46 +16,32 @@ from beaver_ftc import __version__
 from beaver_ftc.cli.inputs import as_typer_reads
 from beaver_ftc.cli.output import failure_of, report_last
 
-
-class Command(NamedTuple):
-    """Where a command is, whether it flies scenarios (then plug-ins can be registered), examples of it."""
-
-    module: str
-    function: str = "command"
-    flies: bool = True
-    examples: tuple[str, ...] = ()
-
-
+# Where each is: a module of this package, and its function there.
 COMMANDS = {
-    "run": Command("run", examples=(
-        "beaver-ftc run elevator-partial-loss",
-        "beaver-ftc run elevator-partial-loss --format json --no-report",
-    )),
-    "mismatch": Command("mismatch"),
-    "validate": Command("scenarios", "validate", examples=(
-        "beaver-ftc validate elevator-partial-loss fault-free",
-    )),
-    "schema": Command("catalogue", "schema", False, ("beaver-ftc schema",)),
-    "trim": Command("studies", "trim", examples=("beaver-ftc trim --airspeed-mps 40 --altitude-m 1000",)),
-    "linearise": Command("studies", "linearise"),
-    "list": Command("catalogue", "list_choices", examples=("beaver-ftc list",)),
-    "show": Command("catalogue", "show", False, ("beaver-ftc show elevator-partial-loss",)),
-    "new": Command("scenarios", "new", flies=False, examples=(
-        "beaver-ftc new my-case", "beaver-ftc new my-other-case --like elevator-partial-loss",
-    )),
-    "sweep": Command("sweep"),
-    "compare": Command("compare"),
-    "reproduce": Command("studies", "reproduce", False),
-    "matrix": Command("surveys", "matrix"),
-    "power": Command("surveys", "power"),
-    "bench": Command("studies", "bench", False),
-    "derive": Command("studies", "derive", False),
-    "verify": Command("studies", "verify", False),
-    "detectability": Command("studies", "detectability", False),
-    "identify": Command("recorded", "identify"),
-    "diagnose": Command("recorded", "diagnose"),
-    "live": Command("run", "live"),
-}  # fmt: skip
+    "run": "run:command",
+    "mismatch": "mismatch:command",
+    "validate": "scenarios:validate",
+    "schema": "catalogue:schema",
+    "trim": "studies:trim",
+    "linearise": "studies:linearise",
+    "list": "catalogue:list_choices",
+    "show": "catalogue:show",
+    "new": "scenarios:new",
+    "sweep": "sweep:command",
+    "compare": "compare:command",
+    "reproduce": "studies:reproduce",
+    "matrix": "surveys:matrix",
+    "power": "surveys:power",
+    "bench": "studies:bench",
+    "derive": "studies:derive",
+    "verify": "studies:verify",
+    "detectability": "studies:detectability",
+    "identify": "recorded:identify",
+    "diagnose": "recorded:diagnose",
+    "live": "run:live",
+}
+# Those that fly no scenario of the user's choice: no plug-in can be registered for them.
+WITHOUT_PLUGINS = {"schema", "show", "new", "reproduce", "bench", "derive", "verify", "detectability"}
 
 app = typer.Typer(
     name="beaver-ftc",
@@ -85,12 +72,13 @@ def options(
     """
 
 
-for _name, _command in COMMANDS.items():
-    _function = getattr(import_module(f"beaver_ftc.cli.{_command.module}"), _command.function)
+for _name, _where in COMMANDS.items():
+    _module, _, _function = _where.partition(":")
+    _command = getattr(import_module(f"beaver_ftc.cli.{_module}"), _function)
+    _read = as_typer_reads(_command, flies=_name not in WITHOUT_PLUGINS)
     # the examples at the end of its help, each on a line of its own
-    _epilog = "\n".join(["\b", "Examples:", *(f"  {line}" for line in _command.examples)])
-    _add = app.command(_name, epilog=_epilog if _command.examples else None)
-    _add(as_typer_reads(_function, _command.flies))
+    _read.__doc__, _, _examples = str(_read.__doc__).partition("\n\nExamples:\n")
+    app.command(_name, epilog=f"\b\nExamples:\n{_examples}" if _examples else None)(_read)
 
 
 def main() -> NoReturn:

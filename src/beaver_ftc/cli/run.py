@@ -64,6 +64,10 @@ def command(options: Options) -> None:
     With --format json: the metrics and `folder` of the run (or its `error`), with `runs`, a list of it; of
     several scenarios {"passed": ..., "runs": [...]}.
 
+    Examples:
+      beaver-ftc run elevator-partial-loss
+      beaver-ftc run elevator-partial-loss --format json --no-report
+
     csv: Also write the log as log.csv.
     acmi: Also write flight.acmi, for Tacview.
     recording: Also write the log as a recorder on board would have, with vehicle.yaml.

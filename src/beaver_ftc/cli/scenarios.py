@@ -39,6 +39,9 @@ def validate(
 
     With --format json: {"valid": ..., "files": [{"file", "valid", "errors", "warnings"}]}.
 
+    Examples:
+      beaver-ftc validate elevator-partial-loss fault-free
+
     files: Scenario and sweep files, or names of built-in ones.
     """
     reports = [_check(file) for file in files]
@@ -79,6 +82,10 @@ def new(
     """Write NAME.yaml, a scenario to begin with.
 
     It flies as it is; an existing file is never replaced.
+
+    Examples:
+      beaver-ftc new my-case
+      beaver-ftc new my-other-case --like elevator-partial-loss
 
     name: Name of the scenario, and of its file.
     like: Begin with a built-in one.

@@ -47,6 +47,9 @@ def trim(condition: Condition) -> None:
     is the scenario's, or else its default: 45 m/s at 1828.8 m, 1800 rpm, 20 inHg, no flap.
     Engine and flap are those of an aircraft that has them.
 
+    Examples:
+      beaver-ftc trim --airspeed-mps 40 --altitude-m 1000
+
     scenario: Take the flight condition from it.
     airspeed_mps: True airspeed, m/s.
     altitude_m: Altitude, m.

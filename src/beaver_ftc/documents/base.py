@@ -41,7 +41,7 @@ def entry(default: Any, says: str | None = None, **limits: Any) -> Any:
     """A field and what an editor says of it. default: a value, what makes one, or ... where there is none.
     says: left out where the section's docstring says it."""
     how = "default_factory" if callable(default) else "default"
-    said = {"description": says} if says else {}
+    said: dict[str, Any] = {"description": says} if says else {}
     return Field(**{how: default}, **said, **limits)
 
 

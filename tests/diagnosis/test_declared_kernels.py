@@ -94,7 +94,7 @@ def test_deflections_inertia_and_the_air_are_told_in_si(design):
     assert (told.gust_rad_s.tolist(), told.gust_time_s.tolist()) == (rotation.tolist(), time_s.tolist())
 
 
-def test_what_is_declared_of_no_aircraft_is_of_the_beaver(design):
+def test_a_tolerance_is_a_share_of_each_coefficient(design):
     bounds = Bounds.model_validate({"coefficients": 0.1})
     told = declared_of(bounds, Actuators(), design, Y, U, AIRCRAFT)
     assert told.coefficients == pytest.approx([0.1 * abs(term.value) for term in AIRCRAFT.moments])
